@@ -1,0 +1,17 @@
+# One interface target that every target of ours links: warnings, sanitizers and the floating-point contract.
+add_library(isohf_options INTERFACE)
+target_compile_options(isohf_options INTERFACE
+  -Wall -Wextra -Wconversion -Wshadow
+  # The same input gives the same bytes on every machine: a fused multiply-add in one build and not in another would
+  # change the last bit of a resampled elevation.
+  -ffp-contract=off
+  # Loops over heights may assume neither errno nor traps; results stay IEEE.
+  -fno-math-errno -fno-trapping-math)
+if(ISOHF_WERROR)
+  target_compile_options(isohf_options INTERFACE -Werror)
+endif()
+if(ISOHF_SANITIZE)
+  target_compile_options(isohf_options INTERFACE -fsanitize=address,undefined -fno-sanitize-recover=undefined
+                         -fno-omit-frame-pointer)
+  target_link_options(isohf_options INTERFACE -fsanitize=address,undefined)
+endif()

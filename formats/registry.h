@@ -1,0 +1,37 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "isohf/surface/height_source.h"
+
+namespace isohf {
+
+/// What a user may say about an input that the file does not, or says wrongly.
+struct OpenOptions {
+  std::string channel;                       ///< channel name or zero-based number; empty: the reader's choice
+  std::optional<Registration> registration;  ///< overrides the file's
+  std::optional<double> void_value;          ///< overrides the file's void values
+  std::optional<double> z_scale;             ///< elevation = raw * z_scale + z_offset; overrides the file's
+  std::optional<double> z_offset;
+  std::optional<double> spacing;             ///< sample spacing in metres, for files that do not say; overrides
+};
+
+/// One row of the table of formats.
+struct Format {
+  const char* name;                      ///< "OpenEXR"
+  std::vector<const char*> extensions;   ///< ".exr"; lower case
+};
+
+/// The formats read natively, in the order in which they are tried.
+[[nodiscard]] const std::vector<Format>& native_formats();
+
+/// Opens a raster of elevations by its content, not by its name: the file's first bytes pick the reader; the extension
+/// decides only for formats without a signature (.hgt). What no native reader knows goes to the OpenImageIO module.
+/// Throws Error naming the path: kIo (missing, folder, unreadable), kUnsupported (unknown format, with what is read),
+/// kCorrupt (empty, truncated, absurd sizes), kInvalidArgument (no such channel, with those there are).
+[[nodiscard]] std::unique_ptr<HeightSource> open_source(const std::string& path, const OpenOptions& options);
+
+}  // namespace isohf

@@ -1,0 +1,76 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "isohf/archive/metadata.h"
+#include "isohf/archive/tile_codec.h"
+
+namespace isohf {
+
+/// What the archive's index says of one tile.
+struct TileEntry {
+  bool stored = false;             ///< false: wholly void, takes no bytes
+  std::uint64_t offset_bytes = 0;  ///< of the compressed data in the file
+  std::uint32_t compressed_bytes = 0;
+  std::uint32_t payload_bytes = 0;
+  std::uint32_t payload_crc32 = 0;
+  std::uint32_t code_min = 0;  ///< as in EncodedTile
+  std::uint32_t code_max = 0;
+  bool has_voids = false;
+};
+
+/// Any other member.
+struct MemberEntry {
+  std::string name;
+  std::uint64_t offset_bytes = 0;
+  std::uint64_t compressed_bytes = 0;
+  std::uint64_t bytes = 0;
+  std::uint32_t crc32 = 0;
+  bool deflated = false;
+};
+
+/// Opens an archive by memory map and decodes tiles in any order, from any number of threads at once.
+///
+/// Opening reads the tail, the index and the metadata, no tile. Nothing in the file is trusted.
+class ArchiveReader {
+ public:
+  /// Throws Error{kIo} where the file cannot be opened, Error{kCorrupt} or Error{kUnsupported} naming member and byte
+  /// offset where it is no archive that this build can read.
+  explicit ArchiveReader(const std::string& path);
+  ~ArchiveReader();
+  ArchiveReader(const ArchiveReader&) = delete;
+  ArchiveReader& operator=(const ArchiveReader&) = delete;
+
+  [[nodiscard]] const std::string& path() const;
+  [[nodiscard]] std::uint64_t size_bytes() const;
+  [[nodiscard]] const Metadata& metadata() const;
+  [[nodiscard]] const TileGrid& grid() const { return metadata().grid; }
+  [[nodiscard]] const std::string& metadata_json() const;  ///< as stored, for --json
+
+  /// True where the index disagreed with the ZIP directory and tiles are found by the directory instead.
+  [[nodiscard]] bool reads_by_directory() const;
+  /// What opening found odd, one line each, for the user.
+  [[nodiscard]] const std::vector<std::string>& warnings() const;
+
+  [[nodiscard]] TileEntry tile_entry(TileIndex tile) const;
+  [[nodiscard]] const std::vector<MemberEntry>& members() const;  ///< all but the tiles, in file order
+
+  /// Decodes one tile; a tile that is not stored comes back wholly void. Throws Error{kCorrupt} naming tile and byte.
+  [[nodiscard]] TileCodes read_tile(TileIndex tile) const;
+
+  /// The same as elevations in vertical units, NaN where void. C*R doubles.
+  [[nodiscard]] std::vector<double> read_elevations(TileIndex tile) const;
+
+  /// Inflates any other member; nullopt where there is none of that name.
+  [[nodiscard]] std::optional<std::vector<std::byte>> read_member(const std::string& name) const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace isohf

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "isohf/archive/metadata.h"
+#include "isohf/lattice/tile_shape.h"
+
+namespace isohf {
+
+/// The C*R elevations of one tile, row by row, as stored: 16-bit codes (kU16 and kU8) or floats (kF32). Exactly one of
+/// the two vectors is in use.
+struct TileCodes {
+  CodeType type = CodeType::kU16;
+  std::vector<std::uint16_t> codes;  ///< kU16, kU8; void as in Quantisation::void_code()
+  std::vector<float> heights;        ///< kF32; void is NaN
+
+  friend bool operator==(const TileCodes&, const TileCodes&) = default;
+};
+
+/// A tile, coded and compressed, ready to be written as an archive member.
+struct EncodedTile {
+  std::vector<std::byte> deflated;      ///< raw Deflate stream (RFC 1951)
+  std::uint32_t payload_bytes = 0;      ///< size once inflated
+  std::uint32_t payload_crc32 = 0;      ///< CRC-32 (ZIP's) of the inflated payload
+  std::uint32_t code_min = 0;           ///< smallest and largest code that is not void; float bits for kF32
+  std::uint32_t code_max = 0;
+  bool has_voids = false;
+  bool is_empty = false;                ///< every vertex is void: nothing to store
+  std::vector<std::byte> content_digest;  ///< SHA-256 of the codes, little-endian, void included: 32 bytes
+};
+
+/// Codes one tile: hexagonal prediction, residuals in context streams, Deflate. Deterministic; thread-safe.
+/// `tile` holds shape.stored_vertex_count() samples. Never fails on data; throws Error{kOutOfMemory}.
+[[nodiscard]] EncodedTile encode_tile(const TileShape& shape, const TileCodes& tile);
+
+/// Decodes one tile from its inflated payload. Trusts nothing: throws Error{kCorrupt} for whatever encode_tile would
+/// not have made and that cannot be read exactly, Error{kUnsupported} for a codec version of the future. Thread-safe.
+[[nodiscard]] TileCodes decode_tile(const TileShape& shape, CodeType type, std::span<const std::byte> payload);
+
+}  // namespace isohf

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "isohf/archive/metadata.h"
+#include "isohf/archive/tile_codec.h"
+
+namespace isohf {
+
+/// What a writer may do to files that exist.
+struct WriterOptions {
+  bool overwrite = false;  ///< replace a finished archive of the final name
+  bool resume = false;     ///< continue NAME.part where its journal says so, after checking what is there
+  /// Identifies the job for resuming: the same text means the same input and options. Stored in the journal.
+  std::string job_fingerprint;
+};
+
+/// Writes an archive from its first byte to its last: tiles in flat-index order, members, then finish().
+///
+/// Everything goes to NAME.part (and its journal NAME.part.journal), which finish() flushes to the disk and renames;
+/// nothing ever stands half-written under the final name. Destroyed unfinished, the writer removes its part file,
+/// unless keep_part() was called. Not thread-safe. Every call throws Error{kIo} with path and reason (disk full, ...).
+class ArchiveWriter {
+ public:
+  /// Opens NAME.part beside `path`. Throws Error{kInvalidArgument} where `path` exists without overwrite, or names a
+  /// folder; Error{kIo} where the folder is missing or not writable.
+  ArchiveWriter(const std::string& path, const TileGrid& grid, const WriterOptions& options);
+  ~ArchiveWriter();
+  ArchiveWriter(const ArchiveWriter&) = delete;
+  ArchiveWriter& operator=(const ArchiveWriter&) = delete;
+
+  /// Flat index of the next tile that add_tile expects: 0, or where a resumed job goes on.
+  [[nodiscard]] std::int64_t next_tile() const;
+
+  /// Appends the tile with flat index next_tile(). An empty tile takes no bytes.
+  void add_tile(const EncodedTile& tile);
+
+  /// Appends any other member. `name` is relative, '/'-separated, without "..". Stored or deflated as `deflate` says.
+  void add_member(const std::string& name, std::span<const std::byte> bytes, bool deflate);
+
+  /// Completes the archive: metadata (tiles_stored and content_sha256 are filled in here), index, directory; flush and
+  /// rename. All tiles must have been added. Returns the archive's size in bytes.
+  std::uint64_t finish(Metadata metadata);
+
+  /// Leaves NAME.part and its journal in place for a later resume.
+  void keep_part();
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace isohf
