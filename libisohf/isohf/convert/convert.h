@@ -1,0 +1,67 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "isohf/convert/plan.h"
+#include "isohf/surface/height_source.h"
+
+namespace isohf {
+
+/// What a conversion does, beyond its input and output.
+struct ConvertOptions {
+  PlanRequest plan;
+  CodeType code_type = CodeType::kU16;
+  /// Elevations of the first and last code; nullopt: taken from the data in a first pass.
+  std::optional<std::pair<double, double>> z_range;
+  /// Elevation step of one code; nullopt: chosen (docs/decisions). 0 asks for the finest that the code type holds.
+  std::optional<double> step;
+  /// What to do with elevations outside z_range: false refuses, true moves them to its end and counts them.
+  bool clamp_range = false;
+  std::string filter = "bilinear";
+  std::string acquisition = "point";
+  int threads = 0;                 ///< 0: all cores
+  std::uint64_t memory_bytes = 0;  ///< refuse plans that would need more; 0: no limit
+  bool overwrite = false;
+  bool resume = false;
+  std::string producer;            ///< "isohf 0.1.0"
+};
+
+/// What a conversion reports while it runs. Called from one thread at a time, a few times a second at most.
+struct ConvertProgress {
+  enum class Pass { kRange, kTiles };
+  Pass pass = Pass::kRange;
+  std::int64_t done = 0;   ///< source rows, or tiles
+  std::int64_t total = 0;
+  std::uint64_t bytes_written = 0;
+};
+
+/// What a conversion did.
+struct ConvertSummary {
+  Metadata metadata;
+  std::int64_t tiles_expected = 0;
+  std::int64_t tiles_written = 0;  ///< stored and void ones together: always tiles_expected on return
+  std::int64_t tiles_void = 0;
+  std::uint64_t archive_bytes = 0;
+  std::uint64_t source_samples = 0;
+  std::uint64_t lattice_samples = 0;  ///< C*R for every tile
+  double step = 0.0;                  ///< elevation of one code
+  double worst_rounding = 0.0;
+  double seconds = 0.0;
+  std::vector<std::string> warnings;  ///< one line each
+};
+
+/// source -> tiles -> archive. Two passes over the source at most (the first only finds the range), bounded memory,
+/// all cores; the same bytes for any thread count.
+/// `cancel` is polled between tiles: set, the conversion stops within a fraction of a second with Error{kCancelled},
+/// leaving NAME.part and its journal for --resume and nothing under the final name.
+/// Throws Error as the source, the plan and the writer do.
+ConvertSummary convert(HeightSource& source, const std::string& output, const ConvertOptions& options,
+                       const std::function<void(const ConvertProgress&)>& progress, const std::atomic<bool>& cancel);
+
+}  // namespace isohf
