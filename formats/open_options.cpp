@@ -1,0 +1,119 @@
+#include "formats/open_options.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "isohf/base/error.h"
+
+namespace isohf {
+namespace {
+
+template <typename T>
+std::optional<double> integer_as_stored(double value) {
+  const auto lowest = static_cast<double>(std::numeric_limits<T>::min());
+  const auto highest = static_cast<double>(std::numeric_limits<T>::max());
+  if (!(value >= lowest && value <= highest) || std::trunc(value) != value) return std::nullopt;
+  return value;
+}
+
+/// Rounds to a binary format of `digits` significant bits whose largest finite value is `highest` and whose smallest
+/// step is 2^`lowest_exponent`. Decimal texts of the largest value round up past it (GDAL writes 3.40282346638529e+38),
+/// up to half a step; those mean the largest value.
+std::optional<double> float_as_stored(double value, int digits, double highest, int lowest_exponent) {
+  if (!std::isfinite(value)) return value;
+  int exponent = 0;
+  std::frexp(value, &exponent);  // |value| < 2^exponent
+  const int step = std::max(exponent - digits, lowest_exponent);
+  const double rounded = std::ldexp(std::nearbyint(std::ldexp(value, -step)), step);
+  if (std::abs(rounded) <= highest) return rounded;
+  int top = 0;
+  std::frexp(highest, &top);
+  if (std::abs(value) <= highest + std::ldexp(0.5, top - digits)) return std::copysign(highest, value);
+  return std::nullopt;
+}
+
+void require_finite(const std::optional<double>& value, const SourceInfo& info, const char* what) {
+  if (value && !std::isfinite(*value)) {
+    throw Error(ErrorCode::kInvalidArgument, fmt::format("{}: {} is {}, must be finite", info.path, what, *value));
+  }
+}
+
+void override_void(SourceInfo& info, double value) {
+  const std::optional<double> stored = void_value_as_stored(info.sample_type, value);
+  if (!stored) {
+    throw Error(ErrorCode::kInvalidArgument, fmt::format("{}: void value is {}, which no {} sample can hold", info.path,
+                                                         value, to_string(info.sample_type)));
+  }
+  info.void_values = {*stored};
+}
+
+void override_spacing(SourceInfo& info, double spacing_m) {
+  Georeference& place = info.georeference;
+  if (place.unit == HorizontalUnit::kMetre) {
+    place.origin_x *= place.metres_per_unit;
+    place.origin_y *= place.metres_per_unit;
+  } else {
+    if (place.unit == HorizontalUnit::kDegree) {
+      info.warnings.push_back(
+          fmt::format("a spacing of {} m replaces {} x {} degrees: the origin in degrees is dropped", spacing_m,
+                      place.spacing_x, place.spacing_y));
+    }
+    place.has_origin = false;
+    place.origin_x = place.origin_y = 0.0;
+  }
+  place.unit = HorizontalUnit::kMetre;
+  place.metres_per_unit = 1.0;
+  place.spacing_x = place.spacing_y = spacing_m;
+}
+
+}  // namespace
+
+std::optional<double> void_value_as_stored(SampleType type, double value) {
+  switch (type) {
+    case SampleType::kUint8:
+      return integer_as_stored<std::uint8_t>(value);
+    case SampleType::kInt8:
+      return integer_as_stored<std::int8_t>(value);
+    case SampleType::kUint16:
+      return integer_as_stored<std::uint16_t>(value);
+    case SampleType::kInt16:
+      return integer_as_stored<std::int16_t>(value);
+    case SampleType::kUint32:
+      return integer_as_stored<std::uint32_t>(value);
+    case SampleType::kInt32:
+      return integer_as_stored<std::int32_t>(value);
+    case SampleType::kFloat16:
+      return float_as_stored(value, 11, 65504.0, -24);
+    case SampleType::kFloat32:
+      return float_as_stored(value, std::numeric_limits<float>::digits,
+                             static_cast<double>(std::numeric_limits<float>::max()), -149);
+    case SampleType::kFloat64:
+      return value;
+  }
+  return std::nullopt;
+}
+
+void apply_open_options(SourceInfo& info, const OpenOptions& options) {
+  require_finite(options.z_scale, info, "the vertical scale");
+  require_finite(options.z_offset, info, "the vertical offset");
+  require_finite(options.spacing, info, "the spacing");
+  if (options.z_scale && *options.z_scale == 0.0) {
+    throw Error(ErrorCode::kInvalidArgument,
+                info.path + ": the vertical scale is 0, which makes every elevation equal");
+  }
+  if (options.spacing && *options.spacing <= 0.0) {
+    throw Error(ErrorCode::kInvalidArgument,
+                fmt::format("{}: the spacing is {} m, must be positive", info.path, *options.spacing));
+  }
+  if (options.registration) info.georeference.registration = *options.registration;
+  if (options.void_value) override_void(info, *options.void_value);
+  if (options.z_scale) info.z_scale = *options.z_scale;
+  if (options.z_offset) info.z_offset = *options.z_offset;
+  if (options.spacing) override_spacing(info, *options.spacing);
+}
+
+}  // namespace isohf

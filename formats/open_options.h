@@ -1,0 +1,23 @@
+#pragma once
+
+#include <optional>
+
+#include "formats/registry.h"
+#include "isohf/surface/heightmap.h"
+
+namespace isohf {
+
+/// The value that a sample of `type` holds when a file or a user writes `value` in decimal: rounded to the type's
+/// precision, so that "-3.4e38" finds the float32 voids; nullopt where no sample of that type can hold it.
+[[nodiscard]] std::optional<double> void_value_as_stored(SampleType type, double value);
+
+/// Lets what the user says override what the file says; every reader calls it last, on a complete `info`.
+///
+/// registration replaces only the meaning of the samples: the place of sample (0, 0) stays where the file puts it.
+/// void_value replaces the list of void values; the valid range of special pixels stays.
+/// spacing is in metres: coordinates in metres (feet, kilometres) keep their origin, now in metres; others lose it,
+/// with a warning when the file had a unit. Throws Error{kInvalidArgument}: a value that is not finite, a spacing <= 0,
+/// a scale of 0, a void value that the sample type cannot hold. `options.channel` is the reader's own business.
+void apply_open_options(SourceInfo& info, const OpenOptions& options);
+
+}  // namespace isohf
