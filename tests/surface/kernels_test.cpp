@@ -1,0 +1,160 @@
+#include "isohf/surface/kernels.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "isohf/base/error.h"
+
+namespace isohf {
+namespace {
+
+constexpr std::array<Filter, 8> kAll = {Filter::kNearest,  Filter::kBilinear, Filter::kCatmullRom, Filter::kBspline2,
+                                        Filter::kBspline3, Filter::kBspline5, Filter::kLanczos3,   Filter::kLanczos6};
+
+/// Positions over several samples, integers and halves among them.
+std::vector<double> positions() {
+  std::vector<double> u;
+  for (int i = -3 * 96; i <= 5 * 96; ++i) u.push_back(i / 96.0);
+  u.push_back(std::nextafter(2.0, 0.0));
+  u.push_back(std::nextafter(0.5, 0.0));
+  u.push_back(-std::numeric_limits<double>::min());
+  u.push_back(std::numeric_limits<double>::min());
+  u.push_back(1e6 + 1.0 / 3.0);
+  return u;
+}
+
+double weighted(const Kernel& kernel, double u, int power) {
+  const TapWeights taps = kernel.at(u);
+  double sum = 0.0;
+  for (int i = 0; i < kernel.taps(); ++i) {
+    sum += static_cast<double>(taps.weights[static_cast<std::size_t>(i)]) *
+           std::pow(static_cast<double>(taps.first + i) - u, power);
+  }
+  return sum;
+}
+
+TEST(Filter, NamesRoundTripAndOthersAreRefused) {
+  for (const Filter filter : kAll) EXPECT_EQ(filter_from_string(to_string(filter)), filter);
+  for (const char* text : {"", "Bilinear", "bspline4", "bspline3 ", "lanczos"}) {
+    EXPECT_THROW((void)filter_from_string(text), Error) << text;
+  }
+}
+
+TEST(Kernel, WeightsSumToOne) {
+  for (const Filter filter : kAll) {
+    const Kernel kernel = Kernel::make(filter);
+    // Each of up to 12 weights, below 1 in size, is off by at most half a unit of its last place: 12 * 2^-25.
+    for (const double u : positions())
+      EXPECT_NEAR(weighted(kernel, u, 0), 1.0, 3.6e-7) << to_string(filter) << " " << u;
+  }
+}
+
+TEST(Kernel, TapsBeyondTheCountAreZero) {
+  for (const Filter filter : kAll) {
+    const Kernel kernel = Kernel::make(filter);
+    for (const double u : positions()) {
+      const TapWeights taps = kernel.at(u);
+      for (int i = kernel.taps(); i < kMaxTaps; ++i) EXPECT_EQ(taps.weights[static_cast<std::size_t>(i)], 0.0F);
+    }
+  }
+}
+
+TEST(Kernel, TapsSurroundThePosition) {
+  for (const Filter filter : kAll) {
+    const Kernel kernel = Kernel::make(filter);
+    for (const double u : positions()) {
+      const auto first = static_cast<double>(kernel.at(u).first);
+      EXPECT_LE(u - first, kernel.support() + 0.5 * (kernel.taps() - 1));
+      EXPECT_LE(std::abs(u - (first + 0.5 * (kernel.taps() - 1))), 0.5) << to_string(filter) << " " << u;
+    }
+  }
+}
+
+TEST(Kernel, FirstMomentsVanishSoThatSlopesAreReproduced) {
+  for (const Filter filter :
+       {Filter::kBilinear, Filter::kCatmullRom, Filter::kBspline2, Filter::kBspline3, Filter::kBspline5}) {
+    const Kernel kernel = Kernel::make(filter);
+    for (const double u : positions()) EXPECT_NEAR(weighted(kernel, u, 1), 0.0, 1e-6) << to_string(filter) << " " << u;
+  }
+}
+
+TEST(Kernel, HigherMomentsAreThoseOfTheirDegree) {
+  // Catmull-Rom reproduces parabolas: its second moment is 0. The sampled moments 2...n of the B-spline of degree n
+  // do not depend on the position: the second is (n + 1) / 12.
+  struct Case {
+    Filter filter;
+    double second;
+  };
+  for (const Case& c : {Case{Filter::kCatmullRom, 0.0}, Case{Filter::kBspline2, 3.0 / 12.0},
+                        Case{Filter::kBspline3, 4.0 / 12.0}, Case{Filter::kBspline5, 6.0 / 12.0}}) {
+    const Kernel kernel = Kernel::make(c.filter);
+    for (const double u : positions()) EXPECT_NEAR(weighted(kernel, u, 2), c.second, 1e-6) << to_string(c.filter);
+  }
+  // Of the fourth moment of the quintic: 3 m2^2 - (n + 1) / 120.
+  const Kernel quintic = Kernel::make(Filter::kBspline5);
+  for (const double u : positions()) EXPECT_NEAR(weighted(quintic, u, 4), 0.75 - 6.0 / 120.0, 1e-5);
+}
+
+TEST(Kernel, InterpolatingOnesReturnTheSampleExactly) {
+  for (const Filter filter : kAll) {
+    const Kernel kernel = Kernel::make(filter);
+    if (!kernel.interpolates()) continue;
+    for (int u = -2; u <= 3; ++u) {
+      const TapWeights taps = kernel.at(u);
+      for (int i = 0; i < kernel.taps(); ++i) {
+        EXPECT_EQ(taps.weights[static_cast<std::size_t>(i)], taps.first + i == u ? 1.0F : 0.0F) << to_string(filter);
+      }
+    }
+  }
+}
+
+TEST(Kernel, NearestGivesTiesToTheNextSample) {
+  const Kernel nearest = Kernel::make(Filter::kNearest);
+  EXPECT_EQ(nearest.at(0.5).first, 1);
+  EXPECT_EQ(nearest.at(-0.5).first, 0);
+  EXPECT_EQ(nearest.at(std::nextafter(0.5, 0.0)).first, 0);
+}
+
+TEST(Kernel, MirroredPositionsGiveMirroredWeights) {
+  for (const Filter filter : kAll) {
+    const Kernel kernel = Kernel::make(filter);
+    for (const double u : {0.125, 0.25, 0.375, 0.625, 0.875}) {
+      const TapWeights a = kernel.at(u);
+      const TapWeights b = kernel.at(-u);
+      for (int i = 0; i < kernel.taps(); ++i) {
+        EXPECT_NEAR(a.weights[static_cast<std::size_t>(i)], b.weights[static_cast<std::size_t>(kernel.taps() - 1 - i)],
+                    1e-7F)
+            << to_string(filter) << " " << u;
+      }
+    }
+  }
+}
+
+TEST(Kernel, ValueIsTheWeightOfOneSample) {
+  for (const Filter filter : kAll) {
+    const Kernel kernel = Kernel::make(filter);
+    for (const double u : positions()) {
+      if (std::abs(u) > 100.0) continue;
+      const TapWeights taps = kernel.at(u);
+      for (int i = 0; i < kernel.taps(); ++i) {
+        EXPECT_NEAR(kernel.value(u - static_cast<double>(taps.first + i)), taps.weights[static_cast<std::size_t>(i)],
+                    1e-7);
+      }
+    }
+    EXPECT_EQ(kernel.value(kernel.support()), 0.0);
+    EXPECT_EQ(kernel.value(-7.0), 0.0);
+  }
+}
+
+TEST(MirrorIndex, ReflectsAboutTheEndSamples) {
+  const std::vector<std::int64_t> expected = {0, 1, 2, 3, 2, 1, 0, 1, 2, 3, 2, 1, 0};
+  for (std::int64_t k = -6; k <= 6; ++k) EXPECT_EQ(mirror_index(k, 4), expected[static_cast<std::size_t>(k + 6)]) << k;
+  for (std::int64_t k = -5; k <= 5; ++k) EXPECT_EQ(mirror_index(k, 1), 0);
+  for (std::int64_t k = -5; k <= 5; ++k) EXPECT_EQ(mirror_index(k, 2), k & 1);
+}
+
+}  // namespace
+}  // namespace isohf
