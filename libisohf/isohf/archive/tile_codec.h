@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -20,6 +21,17 @@ struct TileCodes {
   friend bool operator==(const TileCodes&, const TileCodes&) = default;
 };
 
+/// What is known of one tile's visible vertices; the writer journals it and adds the tiles up in order.
+struct TileStatistics {
+  std::int64_t vertices = 0;
+  std::int64_t voids = 0;
+  std::int64_t clamped = 0;      ///< stored vertices moved to the end of the z range
+  double sum = 0.0;              ///< of the elevations that are not void
+  double min = std::numeric_limits<double>::infinity();
+  double max = -std::numeric_limits<double>::infinity();
+  double worst_rounding = 0.0;   ///< largest |stored - computed|
+};
+
 /// A tile, coded and compressed, ready to be written as an archive member.
 struct EncodedTile {
   std::vector<std::byte> deflated;      ///< raw Deflate stream (RFC 1951)
@@ -29,6 +41,7 @@ struct EncodedTile {
   std::uint32_t code_max = 0;
   bool has_voids = false;
   bool is_empty = false;                ///< every vertex is void: nothing to store
+  TileStatistics statistics;            ///< filled in by whoever made the codes
   std::vector<std::byte> content_digest;  ///< SHA-256 of the codes, little-endian, void included: 32 bytes
 };
 
