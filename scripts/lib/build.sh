@@ -1,0 +1,30 @@
+# Sourced, with $root set to the top of the tree. Configuring and building, the same way for every script.
+
+# isohf_jobs: compilations side by side: one for each core, but no more than memory allows (about 1.5 GB for one).
+isohf_jobs() {
+  local cores memory_gb
+  cores=$(nproc)
+  memory_gb=$(awk '/MemAvailable/ {print int($2 / 1500000)}' /proc/meminfo)
+  ((memory_gb < 1)) && memory_gb=1
+  echo $((cores < memory_gb ? cores : memory_gb))
+}
+
+# isohf_build PRESET [TARGET...]: configures once and builds; prints ninja's output only when something fails.
+isohf_build() {
+  local preset=$1 folder log
+  shift
+  case $preset in
+    release) folder=$root/build ;;
+    *) folder=$root/build-$preset ;;
+  esac
+  mkdir -p "$folder"
+  log=$folder/last_build.log
+  if [[ ! -f $folder/build.ninja ]]; then
+    local launcher=()
+    command -v ccache >/dev/null && launcher=(-DCMAKE_CXX_COMPILER_LAUNCHER=ccache)
+    (cd "$root" && cmake --preset "$preset" "${launcher[@]}") >"$log" 2>&1 || { cat "$log" >&2; return 1; }
+  fi
+  local started=$SECONDS
+  ninja -C "$folder" -j "$(isohf_jobs)" "$@" >"$log" 2>&1 || { cat "$log" >&2; return 1; }
+  grep -q 'no work to do' "$log" || echo "isohf: built ${folder#"$root"/} in $((SECONDS - started)) s" >&2
+}
