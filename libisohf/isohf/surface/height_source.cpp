@@ -55,15 +55,24 @@ void heights_from_samples(const SourceInfo& info, double datum, std::span<const 
   ISOHF_ASSERT(raw.size() == heights.size() * size_bytes(info.sample_type));
   const auto same = [](auto value) { return value; };
   switch (info.sample_type) {
-    case SampleType::kUint8: return convert<std::uint8_t>(info, datum, raw.data(), heights, same);
-    case SampleType::kInt8: return convert<std::int8_t>(info, datum, raw.data(), heights, same);
-    case SampleType::kUint16: return convert<std::uint16_t>(info, datum, raw.data(), heights, same);
-    case SampleType::kInt16: return convert<std::int16_t>(info, datum, raw.data(), heights, same);
-    case SampleType::kUint32: return convert<std::uint32_t>(info, datum, raw.data(), heights, same);
-    case SampleType::kInt32: return convert<std::int32_t>(info, datum, raw.data(), heights, same);
-    case SampleType::kFloat16: return convert<std::uint16_t>(info, datum, raw.data(), heights, float_from_half);
-    case SampleType::kFloat32: return convert<float>(info, datum, raw.data(), heights, same);
-    case SampleType::kFloat64: return convert<double>(info, datum, raw.data(), heights, same);
+    case SampleType::kUint8:
+      return convert<std::uint8_t>(info, datum, raw.data(), heights, same);
+    case SampleType::kInt8:
+      return convert<std::int8_t>(info, datum, raw.data(), heights, same);
+    case SampleType::kUint16:
+      return convert<std::uint16_t>(info, datum, raw.data(), heights, same);
+    case SampleType::kInt16:
+      return convert<std::int16_t>(info, datum, raw.data(), heights, same);
+    case SampleType::kUint32:
+      return convert<std::uint32_t>(info, datum, raw.data(), heights, same);
+    case SampleType::kInt32:
+      return convert<std::int32_t>(info, datum, raw.data(), heights, same);
+    case SampleType::kFloat16:
+      return convert<std::uint16_t>(info, datum, raw.data(), heights, float_from_half);
+    case SampleType::kFloat32:
+      return convert<float>(info, datum, raw.data(), heights, same);
+    case SampleType::kFloat64:
+      return convert<double>(info, datum, raw.data(), heights, same);
   }
 }
 

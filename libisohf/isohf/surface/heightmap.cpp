@@ -26,14 +26,18 @@ constexpr std::array<std::pair<SampleType, const char*>, 9> kSampleTypeNames = {
 std::size_t size_bytes(SampleType type) {
   switch (type) {
     case SampleType::kUint8:
-    case SampleType::kInt8: return 1;
+    case SampleType::kInt8:
+      return 1;
     case SampleType::kUint16:
     case SampleType::kInt16:
-    case SampleType::kFloat16: return 2;
+    case SampleType::kFloat16:
+      return 2;
     case SampleType::kUint32:
     case SampleType::kInt32:
-    case SampleType::kFloat32: return 4;
-    case SampleType::kFloat64: return 8;
+    case SampleType::kFloat32:
+      return 4;
+    case SampleType::kFloat64:
+      return 8;
   }
   return 0;
 }
@@ -50,7 +54,8 @@ SampleType sample_type_from_string(const std::string& text) {
     if (text == name) return type;
   }
   throw Error(ErrorCode::kInvalidArgument,
-              "sample type is \"" + text + "\", must be uint8, int8, uint16, int16, uint32, int32, float16, float32 or float64");
+              "sample type is \"" + text +
+                  "\", must be uint8, int8, uint16, int16, uint32, int32, float16, float32 or float64");
 }
 
 bool is_floating(SampleType type) {
@@ -59,9 +64,12 @@ bool is_floating(SampleType type) {
 
 std::string to_string(Registration registration) {
   switch (registration) {
-    case Registration::kArea: return "area";
-    case Registration::kPoint: return "point";
-    case Registration::kUnknown: break;
+    case Registration::kArea:
+      return "area";
+    case Registration::kPoint:
+      return "point";
+    case Registration::kUnknown:
+      break;
   }
   return "unknown";
 }

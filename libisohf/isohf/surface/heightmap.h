@@ -30,14 +30,14 @@ enum class HorizontalUnit { kUnknown, kMetre, kDegree };
 
 /// The body and reference system that a file declares. Carried, never transformed; empty or nullopt where unknown.
 struct ReferenceSystem {
-  std::string name;                            ///< citation or name as found in the file
-  std::optional<int> epsg;                     ///< code of the horizontal system
-  std::string wkt;                             ///< as found (a .prj beside the file), else empty
-  std::string body;                            ///< "Earth", "Mars", "Moon", ...; empty where unknown
-  std::optional<double> semi_major_axis_m;     ///< ellipsoid
-  std::optional<double> inverse_flattening;    ///< 0 for a sphere
-  std::optional<int> vertical_epsg;            ///< code of the vertical system
-  std::string vertical_datum;                  ///< name as found
+  std::string name;                          ///< citation or name as found in the file
+  std::optional<int> epsg;                   ///< code of the horizontal system
+  std::string wkt;                           ///< as found (a .prj beside the file), else empty
+  std::string body;                          ///< "Earth", "Mars", "Moon", ...; empty where unknown
+  std::optional<double> semi_major_axis_m;   ///< ellipsoid
+  std::optional<double> inverse_flattening;  ///< 0 for a sphere
+  std::optional<int> vertical_epsg;          ///< code of the vertical system
+  std::string vertical_datum;                ///< name as found
 };
 
 /// Where the samples lie on the ground. Rows run from North to South and columns from West to East in the order that
@@ -56,26 +56,26 @@ struct Georeference {
 
 /// All that is known of a raster of elevations before a sample is read.
 struct SourceInfo {
-  std::string path;          ///< for messages
-  std::string format;        ///< "GeoTIFF", "OpenEXR", "PNG", "SRTM HGT", ...
-  std::int64_t width = 0;    ///< columns, >= 1
-  std::int64_t height = 0;   ///< rows, >= 1
+  std::string path;         ///< for messages
+  std::string format;       ///< "GeoTIFF", "OpenEXR", "PNG", "SRTM HGT", ...
+  std::int64_t width = 0;   ///< columns, >= 1
+  std::int64_t height = 0;  ///< rows, >= 1
   SampleType sample_type = SampleType::kFloat32;
-  std::string channel;                 ///< the chosen channel's name or number; empty where there is but one
-  std::vector<double> void_values;     ///< raw values that mean "no elevation"; NaN and infinities always do
+  std::string channel;              ///< the chosen channel's name or number; empty where there is but one
+  std::vector<double> void_values;  ///< raw values that mean "no elevation"; NaN and infinities always do
   /// Raw values outside [valid_min, valid_max] are void as well (special pixel ranges); infinite where unbounded.
   double valid_min = -std::numeric_limits<double>::infinity();
   double valid_max = std::numeric_limits<double>::infinity();
-  double z_scale = 1.0;                ///< elevation = raw * z_scale + z_offset, in vertical units
+  double z_scale = 1.0;  ///< elevation = raw * z_scale + z_offset, in vertical units
   double z_offset = 0.0;
-  std::string vertical_unit;           ///< "metre", "foot", ...; empty where unknown
+  std::string vertical_unit;  ///< "metre", "foot", ...; empty where unknown
   double metres_per_vertical_unit = 1.0;
   Georeference georeference;
   /// Rows that the file stores together (strip or tile height) and columns (tile width; = width for strips): reading
   /// whole multiples of these costs no sample twice.
   std::int64_t block_width = 0;
   std::int64_t block_height = 1;
-  std::vector<std::string> warnings;   ///< one line each, for the user; e.g. "values look like 0...1"
+  std::vector<std::string> warnings;  ///< one line each, for the user; e.g. "values look like 0...1"
 };
 
 /// Half-precision bits to float, exact.

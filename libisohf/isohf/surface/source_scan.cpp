@@ -1,0 +1,100 @@
+#include "isohf/surface/source_scan.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <type_traits>
+
+namespace isohf {
+namespace {
+
+template <typename T>
+T load(const std::byte* at) {
+  T value;
+  std::memcpy(&value, at, sizeof(T));
+  return value;
+}
+
+/// Range of the valid raw samples; W widens a stored sample to a number that compares.
+template <typename T, typename Widen>
+void scan(const SourceInfo& info, std::span<const std::byte> raw, SourceScan& scan, Widen widen) {
+  using Wide = decltype(widen(T{}));
+  const std::size_t count = raw.size() / sizeof(T);
+  Wide low = std::numeric_limits<Wide>::max();
+  Wide high = std::numeric_limits<Wide>::lowest();
+  std::int64_t valid = 0;
+  const bool bounded = std::isfinite(info.valid_min) || std::isfinite(info.valid_max);
+  const auto accept = [&](Wide value, bool is_valid) {
+    low = is_valid && value < low ? value : low;
+    high = is_valid && value > high ? value : high;
+    valid += is_valid ? 1 : 0;
+  };
+  const auto is_number = [](Wide value) {
+    if constexpr (std::is_floating_point_v<Wide>) return static_cast<bool>(std::isfinite(value));
+    return true;
+  };
+  if (!bounded && info.void_values.size() <= 1) {
+    const bool has_void = !info.void_values.empty();
+    const double void_value = has_void ? info.void_values.front() : 0.0;
+    for (std::size_t i = 0; i < count; ++i) {
+      const Wide value = widen(load<T>(raw.data() + i * sizeof(T)));
+      accept(value, is_number(value) && !(has_void && static_cast<double>(value) == void_value));
+    }
+  } else {
+    for (std::size_t i = 0; i < count; ++i) {
+      const Wide value = widen(load<T>(raw.data() + i * sizeof(T)));
+      const auto number = static_cast<double>(value);
+      bool is_valid = is_number(value) && number >= info.valid_min && number <= info.valid_max;
+      for (const double void_value : info.void_values) is_valid = is_valid && number != void_value;
+      accept(value, is_valid);
+    }
+  }
+  scan.voids += static_cast<std::int64_t>(count) - valid;
+  if (valid == 0) return;
+  const double a = static_cast<double>(low) * info.z_scale + info.z_offset;
+  const double b = static_cast<double>(high) * info.z_scale + info.z_offset;
+  const double least = std::min(a, b);
+  const double most = std::max(a, b);
+  scan.range.min = scan.valid == 0 ? least : std::min(scan.range.min, least);
+  scan.range.max = scan.valid == 0 ? most : std::max(scan.range.max, most);
+  scan.valid += valid;
+}
+
+}  // namespace
+
+void scan_samples(const SourceInfo& info, std::span<const std::byte> raw, SourceScan& found) {
+  const auto same = [](auto value) { return value; };
+  switch (info.sample_type) {
+    case SampleType::kUint8:
+      return scan<std::uint8_t>(info, raw, found, same);
+    case SampleType::kInt8:
+      return scan<std::int8_t>(info, raw, found, same);
+    case SampleType::kUint16:
+      return scan<std::uint16_t>(info, raw, found, same);
+    case SampleType::kInt16:
+      return scan<std::int16_t>(info, raw, found, same);
+    case SampleType::kUint32:
+      return scan<std::uint32_t>(info, raw, found, same);
+    case SampleType::kInt32:
+      return scan<std::int32_t>(info, raw, found, same);
+    case SampleType::kFloat16:
+      return scan<std::uint16_t>(info, raw, found, float_from_half);
+    case SampleType::kFloat32:
+      return scan<float>(info, raw, found, same);
+    case SampleType::kFloat64:
+      return scan<double>(info, raw, found, same);
+  }
+}
+
+std::int64_t rows_per_read(const SourceInfo& info) {
+  constexpr std::int64_t kReadBytes = std::int64_t{8} << 20;
+  const auto row_bytes = static_cast<std::int64_t>(size_bytes(info.sample_type)) * info.width;
+  const std::int64_t block_rows = std::clamp<std::int64_t>(info.block_height, 1, info.height);
+  const std::int64_t blocks = std::max<std::int64_t>(1, kReadBytes / (row_bytes * block_rows));
+  // A strip may be as high as the picture; it is read in parts then.
+  if (row_bytes * block_rows > 4 * kReadBytes) return std::max<std::int64_t>(1, kReadBytes / row_bytes);
+  return std::min(info.height, blocks * block_rows);
+}
+
+}  // namespace isohf

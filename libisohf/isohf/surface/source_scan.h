@@ -1,0 +1,30 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "isohf/surface/heightmap.h"
+
+namespace isohf {
+
+/// Smallest and largest elevation of a source, in its vertical units.
+struct ElevationRange {
+  double min = 0.0;
+  double max = 0.0;
+};
+
+/// What the first pass over a source finds.
+struct SourceScan {
+  ElevationRange range;    ///< meaningless where valid is 0
+  std::int64_t valid = 0;  ///< samples with an elevation
+  std::int64_t voids = 0;
+};
+
+/// Accumulates range and counts over raw samples of the source's type, exactly, z_scale and z_offset applied.
+void scan_samples(const SourceInfo& info, std::span<const std::byte> raw, SourceScan& scan);
+
+/// Rows that one read of a pass over the whole source should take: whole blocks, about 8 MiB.
+[[nodiscard]] std::int64_t rows_per_read(const SourceInfo& info);
+
+}  // namespace isohf

@@ -1,0 +1,210 @@
+#include "isohf/surface/tile_cutter.h"
+
+#include <gtest/gtest.h>
+
+#include <bit>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <map>
+#include <random>
+#include <vector>
+
+namespace isohf {
+namespace {
+
+/// A source held whole, and the cutter that reads it.
+struct Fixture {
+  std::int64_t width;
+  std::int64_t height;
+  Registration registration;
+  double spacing;
+  std::vector<float> heights;
+
+  Fixture(std::int64_t w, std::int64_t h, Registration reg, const std::function<float(double, double)>& height_at,
+          double sample_spacing = 10.0)
+      : width(w), height(h), registration(reg), spacing(sample_spacing), heights(static_cast<std::size_t>(w * h)) {
+    for (std::int64_t row = 0; row < h; ++row) {
+      for (std::int64_t column = 0; column < w; ++column) {
+        at(column, row) =
+            height_at(first() + static_cast<double>(column) * spacing, first() + static_cast<double>(row) * spacing);
+      }
+    }
+  }
+
+  [[nodiscard]] double first() const { return registration == Registration::kArea ? spacing / 2.0 : 0.0; }
+  float& at(std::int64_t column, std::int64_t row) { return heights[static_cast<std::size_t>(row * width + column)]; }
+  [[nodiscard]] SourceAxis axis(std::int64_t samples, Outside outside) const {
+    return {samples, first(), spacing, registration, outside};
+  }
+  [[nodiscard]] TileCutter cutter(const TileGrid& grid, Filter filter, Outside outside) const {
+    return {grid, axis(width, outside), axis(height, outside), Kernel::make(filter)};
+  }
+  /// Cuts with a band of just the rows that the cutter asks for.
+  [[nodiscard]] std::vector<float> cut(const TileGrid& grid, TileIndex tile, Filter filter = Filter::kBilinear,
+                                       Outside outside = Outside::kClamp) const {
+    const TileCutter cutter_ = cutter(grid, filter, outside);
+    const RowRange rows = cutter_.rows_needed(tile.row);
+    const SourceBand band{{heights.data() + rows.first * width, width, rows.last - rows.first + 1}, rows.first};
+    std::vector<float> out(static_cast<std::size_t>(grid.shape().stored_vertex_count()));
+    cutter_.cut(tile, band, out);
+    return out;
+  }
+};
+
+constexpr Filter kFilters[] = {Filter::kNearest,  Filter::kBilinear, Filter::kCatmullRom, Filter::kBspline2,
+                               Filter::kBspline3, Filter::kBspline5, Filter::kLanczos3,   Filter::kLanczos6};
+
+float bumps(double x, double z) {
+  return static_cast<float>(50.0 * std::sin(x * 0.03) + 30.0 * std::cos(z * 0.05 + x * 0.01));
+}
+
+TEST(TileCutter, ReproducesAPlaneAtEveryStoredVertexInside) {
+  const auto plane = [](double x, double z) { return static_cast<float>(3.0 + 0.25 * x - 0.5 * z); };
+  for (const Registration registration : {Registration::kArea, Registration::kPoint}) {
+    const Fixture source(60, 70, registration, plane);
+    const TileGrid grid = TileGrid::make(TileShape::make(12, 11, 2), 4, 4, 110.0, 110.0);
+    for (const Filter filter : {Filter::kBilinear, Filter::kCatmullRom, Filter::kBspline3}) {
+      for (std::int64_t tile = 0; tile < grid.tile_count(); ++tile) {
+        const TileIndex index = grid.tile_at(tile);
+        const std::vector<float> heights = source.cut(grid, index, filter);
+        for (int r = 0; r < 11; ++r) {
+          for (int c = 0; c < 12; ++c) {
+            const WorldPoint world = grid.world_from_lattice(grid.lattice_vertex(index, {c, r}));
+            if (world.x < 30.0 || world.z < 30.0) continue;  // mirrored taps bend a plane at the border
+            // A few float roundings of heights below 500.
+            EXPECT_NEAR(heights[static_cast<std::size_t>(r * 12 + c)], plane(world.x, world.z), 2e-4);
+          }
+        }
+      }
+    }
+  }
+}
+
+TEST(Errata, E06SlidVerticesAreSampledWhereTheyLie) {
+  const Fixture source(40, 40, Registration::kPoint, bumps);
+  const TileGrid grid = TileGrid::make(TileShape::make(12, 11, 2), 2, 2, 120.0, 120.0);
+  const std::vector<float> heights = source.cut(grid, {1, 0});
+  for (int r = 2; r <= 8; r += 2) {
+    for (const int c : {1, 10}) {
+      const LatticeVertex vertex = grid.lattice_vertex({1, 0}, {c, r});
+      EXPECT_EQ(vertex.x % 16, 0) << "on the straight edge";
+      const WorldPoint world = grid.world_from_lattice(vertex);
+      const double u = world.x / 10.0;
+      const double v = world.z / 10.0;
+      const auto i = static_cast<std::int64_t>(u);
+      const auto j = static_cast<std::int64_t>(v);
+      const auto h = [&](std::int64_t a, std::int64_t b) {
+        return double{source.heights[static_cast<std::size_t>(b * 40 + a)]};
+      };
+      const double fu = u - static_cast<double>(i);
+      const double fv = v - static_cast<double>(j);
+      const double expected = (1 - fv) * ((1 - fu) * h(i, j) + fu * h(std::min<std::int64_t>(i + 1, 39), j)) +
+                              fv * ((1 - fu) * h(i, j + 1) + fu * h(std::min<std::int64_t>(i + 1, 39), j + 1));
+      EXPECT_NEAR(heights[static_cast<std::size_t>(r * 12 + c)], expected, 1e-4) << c << "," << r;
+      // Copying an ordinary neighbour half a step away, as the printed text invites, would be off by far more.
+      EXPECT_GT(std::abs(heights[static_cast<std::size_t>(r * 12 + (c == 1 ? 2 : 9))] - expected), 1e-3);
+    }
+  }
+}
+
+TEST(TileCutter, SharedVerticesAndPaddingHaveTheSameBitsInEveryTile) {
+  std::mt19937 random(7);
+  Fixture source(50, 45, Registration::kArea, bumps);
+  // Voids near tile edges must not make a difference either.
+  for (int i = 0; i < 60; ++i) {
+    source.at(static_cast<std::int64_t>(random() % 50), static_cast<std::int64_t>(random() % 45)) =
+        std::numeric_limits<float>::quiet_NaN();
+  }
+  const TileGrid grid = TileGrid::make(TileShape::make(12, 11, 2), 5, 5, 101.3, 97.7);
+  for (const Filter filter : kFilters) {
+    for (const Outside outside : {Outside::kCover, Outside::kClamp, Outside::kVoid}) {
+      std::map<std::pair<std::int64_t, std::int64_t>, std::uint32_t> seen;
+      for (std::int64_t tile = 0; tile < grid.tile_count(); ++tile) {
+        const TileIndex index = grid.tile_at(tile);
+        const std::vector<float> heights = source.cut(grid, index, filter, outside);
+        for (int r = 0; r < 11; ++r) {
+          for (int c = 0; c < 12; ++c) {
+            const LatticeVertex vertex = grid.lattice_vertex(index, {c, r});
+            const float height = heights[static_cast<std::size_t>(r * 12 + c)];
+            const std::uint32_t bits = std::isnan(height) ? 0x7FC00000U : std::bit_cast<std::uint32_t>(height);
+            const auto [at, is_new] = seen.emplace(std::pair{vertex.x, vertex.z}, bits);
+            EXPECT_EQ(at->second, bits) << to_string(filter) << " vertex " << vertex.x << "," << vertex.z;
+          }
+        }
+      }
+    }
+  }
+}
+
+TEST(TileCutter, VoidsNeverLeakIntoElevations) {
+  Fixture source(40, 40, Registration::kPoint, [](double, double) { return 100.0F; });
+  for (std::int64_t row = 10; row < 20; ++row) {
+    for (std::int64_t column = 12; column < 25; ++column)
+      source.at(column, row) = std::numeric_limits<float>::quiet_NaN();
+  }
+  const TileGrid grid = TileGrid::make(TileShape::make(68, 83, 4), 1, 1, 390.0, 390.0);
+  for (const Filter filter : kFilters) {
+    int voids = 0;
+    const std::vector<float> heights = source.cut(grid, {0, 0}, filter);
+    for (int r = 1; r < 82; ++r) {
+      for (int c = 1; c < 66; ++c) {
+        const float height = heights[static_cast<std::size_t>(r * 68 + c)];
+        const WorldPoint world = grid.world_from_lattice(grid.lattice_vertex({0, 0}, {c, r}));
+        const bool deep_inside = world.x > 131.0 && world.x < 229.0 && world.z > 111.0 && world.z < 179.0;
+        const bool far_outside = world.x < 100.0 || world.x > 260.0 || world.z < 80.0 || world.z > 210.0;
+        if (deep_inside) {
+          EXPECT_TRUE(std::isnan(height)) << to_string(filter);
+        }
+        if (far_outside) {
+          EXPECT_FLOAT_EQ(height, 100.0F) << to_string(filter);
+        }
+        if (!std::isnan(height)) {
+          EXPECT_NEAR(height, 100.0F, 1e-3) << to_string(filter);
+        }
+        voids += std::isnan(height) ? 1 : 0;
+      }
+    }
+    EXPECT_GT(voids, 0);
+  }
+}
+
+TEST(TileCutter, ReadsOnlyTheRowsThatItAskedFor) {
+  const Fixture source(30, 200, Registration::kArea, bumps);
+  const TileGrid grid = TileGrid::make(TileShape::make(12, 11, 2), 3, 25, 82.0, 82.0);
+  for (const Filter filter : kFilters) {
+    const TileCutter cutter = source.cutter(grid, filter, Outside::kCover);
+    std::int64_t last_first = 0;
+    for (std::int64_t row = 0; row < 25; ++row) {
+      const RowRange rows = cutter.rows_needed(row);
+      EXPECT_GE(rows.first, 0);
+      EXPECT_LT(rows.last, 200);
+      EXPECT_LE(rows.last - rows.first, 30) << "a band, not the whole";
+      if (row < 24) {
+        EXPECT_GE(rows.first, last_first);
+      }
+      last_first = rows.first;
+      // A band of NaN around the asked rows changes nothing: with those rows alone, cut() never reads outside (ASan).
+      (void)source.cut(grid, {1, row}, filter, Outside::kCover);
+    }
+  }
+}
+
+TEST(TileCutter, OutsideFollowsTheRule) {
+  const Fixture source(20, 20, Registration::kPoint, [](double x, double z) { return static_cast<float>(x + z); });
+  const TileGrid grid = TileGrid::make(TileShape::make(12, 11, 2), 1, 1, 380.0, 380.0);  // twice the source
+  const int c = 8;
+  const int r = 7;
+  const WorldPoint world = grid.world_from_lattice(grid.lattice_vertex({0, 0}, {c, r}));
+  ASSERT_GT(world.x, 190.0);
+  ASSERT_GT(world.z, 190.0);
+  const auto value = [&](Outside outside) {
+    return source.cut(grid, {0, 0}, Filter::kBilinear, outside)[static_cast<std::size_t>(r * 12 + c)];
+  };
+  EXPECT_FLOAT_EQ(value(Outside::kClamp), 380.0F);
+  EXPECT_TRUE(std::isnan(value(Outside::kVoid)));
+  EXPECT_NEAR(value(Outside::kCover), (380.0 - world.x) + (380.0 - world.z), 1e-3);
+}
+
+}  // namespace
+}  // namespace isohf
