@@ -29,20 +29,22 @@ struct ConvertOptions {
   std::uint64_t memory_bytes = 0;  ///< refuse plans that would need more; 0: no limit
   bool overwrite = false;
   bool resume = false;
-  std::string producer;            ///< "isohf 0.1.0"
+  std::string producer;  ///< "isohf 0.1.0"
 };
 
 /// What a conversion reports while it runs. Called from one thread at a time, a few times a second at most.
 struct ConvertProgress {
   enum class Pass { kRange, kTiles };
   Pass pass = Pass::kRange;
-  std::int64_t done = 0;   ///< source rows, or tiles
+  std::int64_t done = 0;  ///< source rows, or tiles
   std::int64_t total = 0;
   std::uint64_t bytes_written = 0;
 };
 
 /// What a conversion did.
 struct ConvertSummary {
+  explicit ConvertSummary(const TileGrid& grid) : metadata(grid) {}
+
   Metadata metadata;
   std::int64_t tiles_expected = 0;
   std::int64_t tiles_written = 0;  ///< stored and void ones together: always tiles_expected on return

@@ -9,18 +9,9 @@
 #include "isohf/archive/metadata.h"
 #include "isohf/lattice/tile_grid.h"
 #include "isohf/surface/heightmap.h"
+#include "isohf/surface/source_axis.h"
 
 namespace isohf {
-
-/// What surrounds the source: tiles reach past its last sample unless they were fitted to it.
-enum class Outside {
-  kCover,  ///< the surface goes on mirrored about the source's edge
-  kClamp,  ///< the edge value goes on
-  kVoid,   ///< no elevation
-};
-
-[[nodiscard]] std::string to_string(Outside outside);                  ///< "cover", "clamp", "void"
-[[nodiscard]] Outside outside_from_string(const std::string& text);    ///< throws Error{kInvalidArgument}
 
 /// What a user asks of the lattice and its tiles. At most one of density, spacing and tiles is given; at most one of
 /// shape and budget.
@@ -31,7 +22,7 @@ struct PlanRequest {
   std::optional<double> density;             ///< lattice samples for one source sample, > 0; nullopt: 1
   std::optional<double> spacing;             ///< lattice column step, world units, > 0
   std::optional<std::pair<std::int64_t, std::int64_t>> tiles;  ///< tile columns, rows
-  bool fit = false;                          ///< stretch the extents a little so that tiles end on the source's edge
+  bool fit = false;  ///< stretch the extents a little so that tiles end on the source's edge
   Outside outside = Outside::kClamp;
 };
 
@@ -40,11 +31,11 @@ struct SourceFrame {
   std::int64_t width = 0;
   std::int64_t height = 0;
   Registration registration = Registration::kPoint;  ///< as used, never kUnknown
-  double first_sample_x = 0.0;  ///< world place of sample (0, 0)
+  double first_sample_x = 0.0;                       ///< world place of sample (0, 0)
   double first_sample_z = 0.0;
-  double spacing_x = 1.0;       ///< world units between neighbouring columns and rows
+  double spacing_x = 1.0;  ///< world units between neighbouring columns and rows
   double spacing_z = 1.0;
-  bool in_metres = false;       ///< world units are metres; else the source's own units
+  bool in_metres = false;  ///< world units are metres; else the source's own units
 
   /// The part of the world that the source covers: pixel areas, or posts.
   [[nodiscard]] WorldBounds bounds() const;
@@ -60,8 +51,8 @@ struct Plan {
   SourceFrame frame;
   TileGrid grid;
   Outside outside = Outside::kClamp;
-  double density = 1.0;           ///< lattice samples for one source sample, as it came out
-  std::int64_t lattice_samples = 0;  ///< C*R for all tiles
+  double density = 1.0;                      ///< lattice samples for one source sample, as it came out
+  std::int64_t lattice_samples = 0;          ///< C*R for all tiles
   std::uint64_t estimated_bytes = 0;         ///< of the archive, from typical bits per sample; an estimate
   std::uint64_t estimated_memory_bytes = 0;  ///< peak of convert
 };

@@ -31,8 +31,8 @@ struct FindingKind {
 [[nodiscard]] const std::vector<FindingKind>& finding_catalogue();
 
 struct VerifyOptions {
-  int threads = 0;                 ///< 0: all cores
-  std::size_t max_findings = 1000; ///< further ones are counted, not kept
+  int threads = 0;                                                      ///< 0: all cores
+  std::size_t max_findings = 1000;                                      ///< further ones are counted, not kept
   std::function<bool(std::int64_t done, std::int64_t total)> progress;  ///< false cancels
 };
 

@@ -1,0 +1,235 @@
+#include "isohf/convert/plan.h"
+
+#include <fmt/format.h>
+
+#include <GeographicLib/Ellipsoid.hpp>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "isohf/base/error.h"
+
+namespace isohf {
+namespace {
+
+constexpr double kSin60 = std::numbers::sqrt3 / 2.0;
+constexpr double kDegree = std::numbers::pi / 180.0;
+
+/// Columns, rows and levels of a tile where neither the user nor a small source asks otherwise: the best true aspect in
+/// Table 1 (docs/decisions/0011).
+constexpr int kDefaultColumns = 212;
+constexpr int kDefaultRows = 243;
+constexpr int kDefaultLevels = 4;
+
+/// A source of this many default tiles or more gets them; below, the shape is looked for that wastes least.
+constexpr double kManyTiles = 12.0;
+/// How far a shape that is chosen for a small source may be from equilateral.
+constexpr double kWorstAspect = 0.02;
+/// What one tile costs beyond its samples (header, index, directory, a draw call), in samples.
+constexpr double kTileOverhead = 4000.0;
+
+[[noreturn]] void refuse(const std::string& why) {
+  throw Error(ErrorCode::kInvalidArgument, why);
+}
+
+/// Metres for one degree along the parallel and along the meridian.
+std::pair<double, double> metres_per_degree(const ReferenceSystem& system, double latitude) {
+  const double semi_major = system.semi_major_axis_m.value_or(6378137.0);
+  const double inverse_flattening = system.inverse_flattening.value_or(system.semi_major_axis_m ? 0.0 : 298.257223563);
+  const GeographicLib::Ellipsoid ellipsoid(semi_major, inverse_flattening > 0.0 ? 1.0 / inverse_flattening : 0.0);
+  return {ellipsoid.CircleRadius(latitude) * kDegree, ellipsoid.MeridionalCurvatureRadius(latitude) * kDegree};
+}
+
+std::int64_t tiles_to_cover(double length, double extent) {
+  const double tiles = std::ceil(length / extent - 1e-9);
+  if (!(tiles <= static_cast<double>(kMaxTilesPerAxis))) {
+    refuse(
+        fmt::format("the lattice needs {:.3g} tiles in one direction, at most {} are possible; use a larger --spacing "
+                    "or a smaller --density",
+                    tiles, kMaxTilesPerAxis));
+  }
+  return std::max<std::int64_t>(1, static_cast<std::int64_t>(tiles));
+}
+
+/// Side of a square tile whose cells hold `density` lattice samples for one source sample.
+double extent_for_density(const TileShape& shape, const SourceFrame& frame, double density) {
+  return std::sqrt(static_cast<double>(shape.cell_columns()) * shape.cell_rows() * frame.spacing_x * frame.spacing_z /
+                   density);
+}
+
+double extent_for(const TileShape& shape, const SourceFrame& frame, const PlanRequest& request) {
+  const WorldBounds bounds = frame.bounds();
+  if (request.tiles) {
+    return std::max(bounds.x1 / static_cast<double>(request.tiles->first),
+                    bounds.z1 / static_cast<double>(request.tiles->second));
+  }
+  if (request.spacing) return *request.spacing * shape.cell_columns();
+  return extent_for_density(shape, frame, request.density.value_or(1.0));
+}
+
+/// Stored samples of the whole dataset with this shape, tile overhead included.
+double cost_of(const TileShape& shape, const SourceFrame& frame, const PlanRequest& request) {
+  const double extent = extent_for(shape, frame, request);
+  const WorldBounds bounds = frame.bounds();
+  const double tiles = std::ceil(bounds.x1 / extent - 1e-9) * std::ceil(bounds.z1 / extent - 1e-9);
+  return std::max(tiles, 1.0) * (static_cast<double>(shape.stored_vertex_count()) + kTileOverhead);
+}
+
+TileShape shape_for_small_source(const SourceFrame& frame, const PlanRequest& request) {
+  const int most_levels = request.levels.value_or(kDefaultLevels);
+  const int fewest_levels = request.levels.value_or(1);
+  std::optional<TileShape> best;
+  double best_cost = 0.0;
+  for (int levels = most_levels; levels >= fewest_levels; --levels) {
+    for (int cells = 1 << (levels - 1); cells <= kDefaultColumns + 48; cells += 1 << (levels - 1)) {
+      const int step = 1 << levels;
+      const int rows = static_cast<int>(std::lround(cells / kSin60 / step)) * step + 3;
+      if (!TileShape::why_invalid(cells + 4, rows, levels).empty()) continue;
+      const TileShape shape = TileShape::make(cells + 4, rows, levels);
+      if (std::abs(shape.aspect() - 1.0) > kWorstAspect) continue;
+      // Every level given up must save a tenth.
+      const double cost = cost_of(shape, frame, request) * std::pow(1.1, most_levels - levels);
+      if (!best || cost < best_cost) {
+        best = shape;
+        best_cost = cost;
+      }
+    }
+  }
+  return best.value_or(TileShape::nearest(kDefaultColumns, kDefaultRows, most_levels));
+}
+
+TileShape choose_shape(const SourceFrame& frame, const PlanRequest& request) {
+  const int levels = request.levels.value_or(kDefaultLevels);
+  if (request.shape) return TileShape::make(request.shape->first, request.shape->second, levels);
+  if (request.budget) {
+    const std::vector<TileShape> found = candidate_shapes(request, 1);
+    if (found.empty()) {
+      refuse(fmt::format("no tile shape of {} levels lies near the budget of {}; use fewer --levels or a larger budget",
+                         levels, request.budget->count));
+    }
+    return found.front();
+  }
+  if (!request.levels || *request.levels == kDefaultLevels) {
+    const TileShape usual = TileShape::make(kDefaultColumns, kDefaultRows, kDefaultLevels);
+    const double extent = extent_for(usual, frame, request);
+    const WorldBounds bounds = frame.bounds();
+    if (bounds.x1 / extent * (bounds.z1 / extent) >= kManyTiles) return usual;
+  }
+  return shape_for_small_source(frame, request);
+}
+
+void check(const PlanRequest& request) {
+  if ((request.density ? 1 : 0) + (request.spacing ? 1 : 0) + (request.tiles ? 1 : 0) > 1) {
+    refuse("more than one of --density, --spacing and --tiles is given; give one");
+  }
+  if (request.shape && request.budget) refuse("both a tile shape and a tile budget are given; give one");
+  const auto check_positive = [](const std::optional<double>& value, const char* option) {
+    if (value && !(std::isfinite(*value) && *value > 0.0))
+      refuse(fmt::format("{} is {}, must be positive", option, *value));
+  };
+  check_positive(request.density, "--density");
+  check_positive(request.spacing, "--spacing");
+  if (request.tiles && (request.tiles->first < 1 || request.tiles->second < 1)) {
+    refuse(fmt::format("--tiles is {}x{}, must be at least 1x1", request.tiles->first, request.tiles->second));
+  }
+}
+
+/// Peak memory of convert: two bands of rows and their raw samples, tiles in flight, the index; see convert.cpp.
+std::uint64_t estimate_memory(const SourceInfo& info, const Plan& plan) {
+  const TileShape& shape = plan.grid.shape();
+  const double band_rows = shape.rows() * plan.grid.sigma_z() / plan.frame.spacing_z + 16.0;
+  const double row_bytes = static_cast<double>(info.width) * 4.0;
+  const double bands = 3.0 * std::min(band_rows, static_cast<double>(info.height)) * row_bytes;
+  const double blocks = 2.0 * static_cast<double>(info.block_height) * static_cast<double>(info.width) *
+                        static_cast<double>(size_bytes(info.sample_type));
+  const double tiles = 300.0 * static_cast<double>(shape.stored_vertex_count());
+  const double index = 128.0 * static_cast<double>(plan.grid.tile_count());
+  return static_cast<std::uint64_t>(bands + blocks + tiles + index + 40e6);
+}
+
+}  // namespace
+
+WorldBounds SourceFrame::bounds() const {
+  const auto columns = static_cast<double>(registration == Registration::kArea ? width : width - 1);
+  const auto rows = static_cast<double>(registration == Registration::kArea ? height : height - 1);
+  return {0.0, 0.0, columns * spacing_x, rows * spacing_z};
+}
+
+SourceFrame make_source_frame(const SourceInfo& info) {
+  const Georeference& place = info.georeference;
+  SourceFrame frame;
+  frame.width = info.width;
+  frame.height = info.height;
+  frame.registration = place.registration;
+  if (frame.registration == Registration::kUnknown) {
+    frame.registration = place.has_origin ? Registration::kArea : Registration::kPoint;
+  }
+  frame.spacing_x = place.spacing_x * place.metres_per_unit;
+  frame.spacing_z = place.spacing_y * place.metres_per_unit;
+  frame.in_metres = place.unit == HorizontalUnit::kMetre;
+  if (place.unit == HorizontalUnit::kDegree) {
+    const double middle =
+        place.has_origin ? place.origin_y - place.spacing_y * static_cast<double>(info.height - 1) / 2.0 : 0.0;
+    if (!(std::abs(middle) < 89.9)) {
+      refuse(fmt::format(
+          "{}: its middle latitude is {:.6g} degrees; within 0.1 degrees of a pole a degree of longitude has no "
+          "length: reproject the source first",
+          info.path, middle));
+    }
+    const auto [along_parallel, along_meridian] = metres_per_degree(place.system, middle);
+    frame.spacing_x = place.spacing_x * along_parallel;
+    frame.spacing_z = place.spacing_y * along_meridian;
+    frame.in_metres = true;
+  }
+  if (frame.registration == Registration::kArea) {
+    frame.first_sample_x = frame.spacing_x / 2.0;
+    frame.first_sample_z = frame.spacing_z / 2.0;
+  }
+  return frame;
+}
+
+Plan make_plan(const SourceInfo& info, const PlanRequest& request) {
+  check(request);
+  if (info.width < 2 || info.height < 2) {
+    refuse(fmt::format("{}: {}x{} samples, a surface needs at least 2x2", info.path, info.width, info.height));
+  }
+  const SourceFrame frame = make_source_frame(info);
+  const WorldBounds bounds = frame.bounds();
+  const TileShape shape = choose_shape(frame, request);
+  double extent_x = extent_for(shape, frame, request);
+  double extent_z = extent_x;
+  std::int64_t columns = request.tiles ? request.tiles->first : 0;
+  std::int64_t rows = request.tiles ? request.tiles->second : 0;
+  if (request.fit) {
+    if (!request.tiles) {
+      columns = tiles_to_cover(std::max(bounds.x1 - extent_x / 2.0, 0.0), extent_x);  // the nearest whole number
+      rows = tiles_to_cover(std::max(bounds.z1 - extent_z / 2.0, 0.0), extent_z);
+    }
+    extent_x = bounds.x1 / static_cast<double>(columns);
+    extent_z = bounds.z1 / static_cast<double>(rows);
+  } else if (!request.tiles) {
+    columns = tiles_to_cover(bounds.x1, extent_x);
+    rows = tiles_to_cover(bounds.z1, extent_z);
+  }
+  Plan plan{frame, TileGrid::make(shape, columns, rows, extent_x, extent_z)};
+  plan.outside = request.outside;
+  plan.density = static_cast<double>(shape.cell_columns()) * shape.cell_rows() * frame.spacing_x * frame.spacing_z /
+                 (extent_x * extent_z);
+  plan.lattice_samples = shape.stored_vertex_count() * plan.grid.tile_count();
+  constexpr double kTypicalBits = 5.0;
+  plan.estimated_bytes = static_cast<std::uint64_t>(static_cast<double>(plan.lattice_samples) * kTypicalBits / 8.0 +
+                                                    150.0 * static_cast<double>(plan.grid.tile_count()) + 20e3);
+  plan.estimated_memory_bytes = estimate_memory(info, plan);
+  return plan;
+}
+
+std::vector<TileShape> candidate_shapes(const PlanRequest& request, int limit) {
+  const ShapeBudget budget = request.budget.value_or(ShapeBudget{ShapeBudget::Kind::kTriangles, 100000});
+  for (const double tolerance : {0.1, 0.25, 0.5, 1.0}) {
+    std::vector<TileShape> found = find_shapes(request.levels.value_or(kDefaultLevels), budget, tolerance, limit);
+    if (!found.empty()) return found;
+  }
+  return {};
+}
+
+}  // namespace isohf

@@ -1,0 +1,53 @@
+#include "isohf/verify/findings.h"
+
+#include <fmt/format.h>
+
+#include "isohf/base/assert.h"
+
+namespace isohf {
+
+const std::vector<FindingKind>& finding_catalogue() {
+  static const std::vector<FindingKind> kinds = {
+      {finding::kNotReadable, Severity::kError, "the file is no archive that this build can read"},
+      {finding::kReadByDirectory, Severity::kWarning,
+       "the index disagrees with the ZIP directory (the file was zipped again); tiles are read by the directory"},
+      {finding::kTileUndecodable, Severity::kError, "a tile cannot be inflated or decoded"},
+      {finding::kTileCodeRange, Severity::kError, "a tile's smallest or largest code differs from the index"},
+      {finding::kTileVoidFlag, Severity::kError, "a tile's void flag differs from its contents"},
+      {finding::kTileEmpty, Severity::kError, "a stored tile holds no elevation, or an absent one is not marked so"},
+      {finding::kSharedVertex, Severity::kError, "two tiles hold different elevations for a vertex that they share"},
+      {finding::kPadding, Severity::kError, "a tile's padding differs from its neighbour's vertices"},
+      {finding::kNormal, Severity::kError, "two tiles compute different normals for a vertex that they share"},
+      {finding::kStatistics, Severity::kError, "the metadata's statistics differ from the elevations"},
+      {finding::kContentHash, Severity::kError, "the content hash differs from the elevations"},
+      {finding::kTileCount, Severity::kError, "the number of stored tiles differs from the metadata"},
+      {finding::kElevationRange, Severity::kError, "a code lies beyond the last one"},
+      {finding::kMemberUnreadable, Severity::kError, "a member beside the tiles cannot be read, or its CRC is wrong"},
+      {finding::kStructure, Severity::kError, "the ZIP structure breaks the profile of docs/archive_format.md"},
+      {finding::kSourceLost, Severity::kError,
+       "the source has an elevation well inside valid ground where the archive has none"},
+      {finding::kSourceInvented, Severity::kError, "the archive has an elevation deep inside a void of the source"},
+  };
+  return kinds;
+}
+
+Severity severity_of(int id) {
+  for (const FindingKind& kind : finding_catalogue()) {
+    if (kind.id == id) return kind.severity;
+  }
+  ISOHF_ASSERT(false);
+  return Severity::kError;
+}
+
+std::string finding_name(int id) {
+  return fmt::format("ISOHF-{:04}", id);
+}
+
+bool VerifyReport::passed() const {
+  for (const Finding& found : findings) {
+    if (found.severity != Severity::kNote) return false;
+  }
+  return findings_total <= static_cast<std::int64_t>(findings.size());
+}
+
+}  // namespace isohf
