@@ -16,13 +16,13 @@ struct OpenOptions {
   std::optional<double> void_value;          ///< overrides the file's void values
   std::optional<double> z_scale;             ///< elevation = raw * z_scale + z_offset; overrides the file's
   std::optional<double> z_offset;
-  std::optional<double> spacing;             ///< sample spacing in metres, for files that do not say; overrides
+  std::optional<double> spacing;  ///< sample spacing in metres, for files that do not say; overrides
 };
 
 /// One row of the table of formats.
 struct Format {
-  const char* name;                      ///< "OpenEXR"
-  std::vector<const char*> extensions;   ///< ".exr"; lower case
+  const char* name;                     ///< "OpenEXR"
+  std::vector<const char*> extensions;  ///< ".exr"; lower case
 };
 
 /// The formats read natively, in the order in which they are tried.

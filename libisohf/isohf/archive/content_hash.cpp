@@ -62,10 +62,14 @@ struct ContentHash::State {
   sha256_ctx context;
 };
 
-ContentHash::ContentHash() : state_(std::make_unique<State>()) { sha256_init(&state_->context); }
+ContentHash::ContentHash() : state_(std::make_unique<State>()) {
+  sha256_init(&state_->context);
+}
 ContentHash::~ContentHash() = default;
 
-void ContentHash::add_tile(std::span<const std::byte> digest) { update(state_->context, digest); }
+void ContentHash::add_tile(std::span<const std::byte> digest) {
+  update(state_->context, digest);
+}
 
 std::string ContentHash::finish(const Metadata& metadata) {
   std::vector<std::byte> bytes;

@@ -39,15 +39,15 @@ struct Statistics {
   std::optional<double> min;  ///< vertical units; absent where every vertex is void
   std::optional<double> max;
   std::optional<double> mean;
-  std::int64_t vertices = 0;  ///< visible vertices of all tiles
-  std::int64_t voids = 0;     ///< of these, void
-  std::int64_t clamped = 0;   ///< elevations outside --z-range that were moved to its end
+  std::int64_t vertices = 0;    ///< visible vertices of all tiles
+  std::int64_t voids = 0;       ///< of these, void
+  std::int64_t clamped = 0;     ///< elevations outside --z-range that were moved to its end
   double worst_rounding = 0.0;  ///< largest |stored - computed| elevation, vertical units
 };
 
 /// What the surface was made from, as found in the source.
 struct SourceRecord {
-  std::string name;           ///< file name without its folder
+  std::string name;  ///< file name without its folder
   std::string format;
   std::int64_t width = 0;
   std::int64_t height = 0;
@@ -56,13 +56,13 @@ struct SourceRecord {
   std::string registration;   ///< "area", "point": as used
   double first_sample_x = 0;  ///< world place of sample (0, 0)
   double first_sample_z = 0;
-  double spacing_x = 1;       ///< world units between neighbouring columns and rows
+  double spacing_x = 1;  ///< world units between neighbouring columns and rows
   double spacing_z = 1;
   std::optional<double> origin_x;  ///< CRS coordinates of sample (0, 0), as found
   std::optional<double> origin_y;
-  double crs_spacing_x = 0;        ///< CRS units between neighbouring columns and rows, as found; 0 where unknown
+  double crs_spacing_x = 0;  ///< CRS units between neighbouring columns and rows, as found; 0 where unknown
   double crs_spacing_y = 0;
-  std::string crs_unit;            ///< "metre", "degree", "unknown"
+  std::string crs_unit;  ///< "metre", "degree", "unknown"
   std::string crs_name;
   std::optional<int> crs_epsg;
   std::string crs_wkt;
@@ -91,7 +91,8 @@ struct Metadata {
   std::int64_t tiles_stored = 0;  ///< tiles that hold at least one elevation; the others are wholly void and absent
   std::string content_sha256;     ///< see docs/archive_format.md; independent of threads, level and codec
   std::string producer;           ///< "isohf 0.1.0"
-  /// Further top-level JSON members that a later section adds (shadow seeds, residuals, accuracy), as JSON text by name.
+  /// Further top-level JSON members that a later section adds (shadow seeds, residuals, accuracy), as JSON text by
+  /// name.
   std::vector<std::pair<std::string, std::string>> extensions;
 };
 

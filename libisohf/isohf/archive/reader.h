@@ -56,8 +56,9 @@ class ArchiveReader {
   /// What opening found odd, one line each, for the user.
   [[nodiscard]] const std::vector<std::string>& warnings() const;
 
-  /// Holds the whole ZIP structure against the profile of docs/archive_format.md: every directory entry, local header and
-  /// name, order, gaps and overlaps, index against directory. One line for each thing wrong; empty where all is well.
+  /// Holds the whole ZIP structure against the profile of docs/archive_format.md: every directory entry, local header
+  /// and name, order, gaps and overlaps, index against directory. One line for each thing wrong; empty where all is
+  /// well.
   [[nodiscard]] std::vector<std::string> check_structure() const;
 
   [[nodiscard]] TileEntry tile_entry(TileIndex tile) const;

@@ -25,23 +25,23 @@ struct TileCodes {
 struct TileStatistics {
   std::int64_t vertices = 0;
   std::int64_t voids = 0;
-  std::int64_t clamped = 0;      ///< stored vertices moved to the end of the z range
-  double sum = 0.0;              ///< of the elevations that are not void
+  std::int64_t clamped = 0;  ///< stored vertices moved to the end of the z range
+  double sum = 0.0;          ///< of the elevations that are not void
   double min = std::numeric_limits<double>::infinity();
   double max = -std::numeric_limits<double>::infinity();
-  double worst_rounding = 0.0;   ///< largest |stored - computed|
+  double worst_rounding = 0.0;  ///< largest |stored - computed|
 };
 
 /// A tile, coded and compressed, ready to be written as an archive member.
 struct EncodedTile {
-  std::vector<std::byte> deflated;      ///< raw Deflate stream (RFC 1951)
-  std::uint32_t payload_bytes = 0;      ///< size once inflated
-  std::uint32_t payload_crc32 = 0;      ///< CRC-32 (ZIP's) of the inflated payload
-  std::uint32_t code_min = 0;           ///< smallest and largest code that is not void; float bits for kF32
+  std::vector<std::byte> deflated;  ///< raw Deflate stream (RFC 1951)
+  std::uint32_t payload_bytes = 0;  ///< size once inflated
+  std::uint32_t payload_crc32 = 0;  ///< CRC-32 (ZIP's) of the inflated payload
+  std::uint32_t code_min = 0;       ///< smallest and largest code that is not void; float bits for kF32
   std::uint32_t code_max = 0;
   bool has_voids = false;
-  bool is_empty = false;                ///< every vertex is void: nothing to store
-  TileStatistics statistics;            ///< filled in by whoever made the codes
+  bool is_empty = false;                  ///< every vertex is void: nothing to store
+  TileStatistics statistics;              ///< filled in by whoever made the codes
   std::vector<std::byte> content_digest;  ///< SHA-256 of the codes, little-endian, void included: 32 bytes
 };
 

@@ -36,8 +36,8 @@ class ArchiveWriter {
   /// Flat index of the next tile that add_tile expects: 0, or where a resumed job goes on.
   [[nodiscard]] std::int64_t next_tile() const;
 
-  /// Tiles so far that hold an elevation, bytes so far, and the sum of all tiles' statistics, added in flat order: those
-  /// that a resumed job found in the journal count like those that it adds.
+  /// Tiles so far that hold an elevation, bytes so far, and the sum of all tiles' statistics, added in flat order:
+  /// those that a resumed job found in the journal count like those that it adds.
   [[nodiscard]] std::int64_t tiles_stored() const;
   [[nodiscard]] std::uint64_t bytes_written() const;
   [[nodiscard]] TileStatistics statistics() const;

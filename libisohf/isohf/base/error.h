@@ -24,9 +24,7 @@ class Error : public std::runtime_error {
   [[nodiscard]] ErrorCode code() const noexcept { return code_; }
 
   /// The same error seen from one level further out: "where: message".
-  [[nodiscard]] Error within(std::string_view where) const {
-    return {code_, std::string(where) + ": " + what()};
-  }
+  [[nodiscard]] Error within(std::string_view where) const { return {code_, std::string(where) + ": " + what()}; }
 
  private:
   ErrorCode code_;

@@ -12,7 +12,8 @@ namespace isohf {
 TileGrid TileGrid::make(const TileShape& shape, std::int64_t tile_columns, std::int64_t tile_rows, double extent_x,
                         double extent_z) {
   const auto refuse = [](const std::string& why) { throw Error(ErrorCode::kInvalidArgument, "tile grid: " + why); };
-  if (tile_columns < 1 || tile_rows < 1) refuse(fmt::format("{}x{} tiles, must be at least 1x1", tile_columns, tile_rows));
+  if (tile_columns < 1 || tile_rows < 1)
+    refuse(fmt::format("{}x{} tiles, must be at least 1x1", tile_columns, tile_rows));
   if (tile_columns > kMaxTilesPerAxis || tile_rows > kMaxTilesPerAxis || tile_columns > kMaxTiles / tile_rows) {
     refuse(fmt::format("{}x{} tiles, must be at most {} in one direction and {} in all", tile_columns, tile_rows,
                        kMaxTilesPerAxis, kMaxTiles));

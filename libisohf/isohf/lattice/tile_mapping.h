@@ -60,10 +60,10 @@ struct ObjectPoint {
   const int even = 1 - (row & 1);
   int slide = 0;
   if (even != 0) {
-    if (column == 0) slide = 2;                      // E5: the neighbour's vertex beside the edge
+    if (column == 0) slide = 2;  // E5: the neighbour's vertex beside the edge
     if (column == 1) slide = 1;
     if (column == tile_columns - 2) slide = -1;
-    if (column == tile_columns - 1) slide = -2;      // E5
+    if (column == tile_columns - 1) slide = -2;  // E5
   }
   return 2 * column + (row & 1) + slide - 3;
 }

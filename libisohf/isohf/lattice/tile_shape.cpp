@@ -14,7 +14,9 @@ namespace {
 constexpr int kMaxLevels = 13;  // C-4 <= 2^14-4 holds one multiple of 2^12 with room, none of 2^14
 constexpr double kSin60 = std::numbers::sqrt3 / 2.0;
 
-int coarsest_stride(int levels) { return 1 << (levels - 1); }
+int coarsest_stride(int levels) {
+  return 1 << (levels - 1);
+}
 
 /// The multiple of `step` that is nearest to `value` and lies in [step, limit].
 int nearest_multiple(int value, int step, int limit) {
@@ -66,7 +68,9 @@ std::int64_t TileShape::visible_vertex_count() const {
   return std::int64_t{rows_ - 1} / 2 * (columns_ - 3) + std::int64_t{rows_ - 3} / 2 * (columns_ - 2);
 }
 
-std::int64_t TileShape::triangle_count() const { return strip_triangle_count(0); }
+std::int64_t TileShape::triangle_count() const {
+  return strip_triangle_count(0);
+}
 
 std::int64_t TileShape::strip_index_count(int level) const {
   // Eq. 3 as the appendix evaluates it: pairs of rows times (indices a pair), less the three that the last row omits.
@@ -86,11 +90,17 @@ std::int64_t TileShape::stitch_triangle_count(int level) const {
   return count;
 }
 
-std::int64_t TileShape::stitch_index_count(int level) const { return 3 * stitch_triangle_count(level); }
+std::int64_t TileShape::stitch_index_count(int level) const {
+  return 3 * stitch_triangle_count(level);
+}
 
-double TileShape::aspect() const { return (rows_ - 3) * kSin60 / (columns_ - 4); }
+double TileShape::aspect() const {
+  return (rows_ - 3) * kSin60 / (columns_ - 4);
+}
 
-double TileShape::printed_aspect() const { return rows_ * kSin60 / columns_; }
+double TileShape::printed_aspect() const {
+  return rows_ * kSin60 / columns_;
+}
 
 std::vector<TileShape> find_shapes(int levels, const ShapeBudget& budget, double tolerance, int limit) {
   if (levels < 1 || levels > kMaxLevels) {
@@ -134,8 +144,8 @@ std::vector<TileShape> find_shapes(int levels, const ShapeBudget& budget, double
 
 const std::vector<Table1Row>& table1() {
   static const std::vector<Table1Row> rows = {
-      {1, 5, 5, 0.866, true},    {1, 24, 29, 1.046, true},   {1, 49, 57, 1.007, true},   {3, 12, 11, 0.794, true},
-      {3, 24, 27, 0.974, true},  {3, 48, 55, 0.992, false},  {4, 52, 67, 1.116, true},   {4, 68, 83, 1.057, true},
+      {1, 5, 5, 0.866, true},     {1, 24, 29, 1.046, true},   {1, 49, 57, 1.007, true},      {3, 12, 11, 0.794, true},
+      {3, 24, 27, 0.974, true},   {3, 48, 55, 0.992, false},  {4, 52, 67, 1.116, true},      {4, 68, 83, 1.057, true},
       {4, 156, 179, 0.994, true}, {4, 212, 243, 0.993, true}, {10, 2564, 3075, 1.039, true},
   };
   return rows;
