@@ -1,0 +1,254 @@
+#include "isohf/surface/prefilter.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <utility>
+
+#include "isohf/base/assert.h"
+#include "isohf/base/error.h"
+
+// The one hot loop is compiled for wider vectors as well and chosen when the program starts. Each lane does the same
+// operations in the same order, and products are never fused with sums, so all choices give the same bits.
+#if defined(__x86_64__) && defined(__ELF__) && !defined(__SANITIZE_ADDRESS__)
+#define ISOHF_VECTOR_CLONES __attribute__((target_clones("avx512f", "avx2", "default")))
+#else
+#define ISOHF_VECTOR_CLONES
+#endif
+
+namespace isohf {
+namespace {
+
+/// Points of the unit circle at which spectra are taken; also the period after which an inverse would alias.
+constexpr std::size_t kCircle = 8192;
+/// What may be left out of an impulse response, as a sum of sizes.
+constexpr double kTail = 1e-9;
+constexpr std::size_t kLongestHalo = 1024;
+
+constexpr std::int64_t kBlock = 16;         ///< outputs whose sums are kept in registers together
+constexpr std::int64_t kStripColumns = 64;  ///< columns that are filtered together: four cache lines of floats
+static_assert(kStripColumns % kBlock == 0);
+
+/// a[0] + 2 sum of a[k] cos(2 pi j k / kCircle).
+double spectrum_at(const std::vector<double>& even, std::size_t j, const std::vector<double>& cosines) {
+  double sum = 0.0;
+  for (std::size_t k = even.size() - 1; k > 0; --k) sum += even[k] * cosines[(j * k) % kCircle];
+  return even[0] + 2.0 * sum;
+}
+
+/// Eight neighbouring samples in one vector, or in as many as the machine needs; loads need no alignment. Left to
+/// itself the compiler would vectorise over k.
+using Pack = double __attribute__((vector_size(64), aligned(8), may_alias));
+constexpr std::int64_t kPack = 8;
+static_assert(kBlock == 2 * kPack);
+
+/// out[b * out_step + i] = p[0] x[i'] + sum over k of p[k] (x[i' - k * step] + x[i' + k * step]), i' = b * kBlock + i.
+ISOHF_VECTOR_CLONES
+void convolve(const double* x, std::int64_t step, const double* p, std::int64_t halo, std::int64_t blocks, float* out,
+              std::int64_t out_step) {
+  const auto at = [](const double* place) -> const Pack& { return *reinterpret_cast<const Pack*>(place); };
+  for (std::int64_t b = 0; b < blocks; ++b) {
+    const double* centre = x + b * kBlock;
+    Pack sum0 = p[0] * at(centre);
+    Pack sum1 = p[0] * at(centre + kPack);
+    for (std::int64_t k = 1; k <= halo; ++k) {
+      const double* before = centre - k * step;
+      const double* after = centre + k * step;
+      sum0 += p[k] * (at(before) + at(after));
+      sum1 += p[k] * (at(before + kPack) + at(after + kPack));
+    }
+    float* target = out + b * out_step;
+    for (std::int64_t i = 0; i < kPack; ++i) target[i] = static_cast<float>(sum0[i]);
+    for (std::int64_t i = 0; i < kPack; ++i) target[kPack + i] = static_cast<float>(sum1[i]);
+  }
+}
+
+std::int64_t round_up(std::int64_t count, std::int64_t multiple) {
+  return (count + multiple - 1) / multiple * multiple;
+}
+
+/// Room for one run of samples with its mirrored ends, and for its coefficients.
+struct RunScratch {
+  std::vector<double> samples;
+  std::vector<float> coefficients;
+};
+
+/// Samples or coefficients along a row or a column.
+template <typename T>
+struct Line {
+  T* data;
+  std::int64_t step;
+  T& operator[](std::int64_t i) const { return data[i * step]; }
+};
+
+/// Filters a run of `count` samples that is mirrored at its ends; delivers coefficients `from` to `to` into `out`.
+void filter_run(const std::vector<double>& taps, Line<const float> run, std::int64_t count, std::int64_t from,
+                std::int64_t to, Line<float> out, RunScratch& scratch) {
+  const auto halo = static_cast<std::int64_t>(taps.size()) - 1;
+  const std::int64_t padded = round_up(to - from, kBlock);
+  scratch.samples.resize(static_cast<std::size_t>(padded + 2 * halo));
+  scratch.coefficients.resize(static_cast<std::size_t>(padded));
+  const std::int64_t begin = from - halo;  // of the scratch, as an index into the run
+  const std::int64_t end = to + halo;
+  double* samples = scratch.samples.data();
+  for (std::int64_t k = begin; k < std::min<std::int64_t>(0, end); ++k) {
+    samples[k - begin] = static_cast<double>(run[mirror_index(k, count)]);
+  }
+  for (std::int64_t k = std::max<std::int64_t>(0, begin); k < std::min(count, end); ++k) {
+    samples[k - begin] = static_cast<double>(run[k]);
+  }
+  for (std::int64_t k = std::max(count, begin); k < end; ++k) {
+    samples[k - begin] = static_cast<double>(run[mirror_index(k, count)]);
+  }
+  std::fill(samples + (end - begin), samples + scratch.samples.size(), 0.0);  // of the last block, thrown away
+  convolve(samples + halo, 1, taps.data(), halo, padded / kBlock, scratch.coefficients.data(), kBlock);
+  for (std::int64_t i = 0; i < to - from; ++i) out[i] = scratch.coefficients[static_cast<std::size_t>(i)];
+}
+
+/// Filters coefficients `from` to `to` of a line with voids, run by run; out[0] is the one at `from`.
+void filter_line(const std::vector<double>& taps, Line<const float> line, std::int64_t count, std::int64_t from,
+                 std::int64_t to, Line<float> out, RunScratch& scratch) {
+  const auto halo = static_cast<std::int64_t>(taps.size()) - 1;
+  const std::int64_t last = std::min(count, to + halo);  // runs that start later are not asked for
+  std::int64_t at = std::max<std::int64_t>(0, from - halo);
+  // A run that starts before `at` starts more than halo before `from`: where exactly makes no difference.
+  while (at < last) {
+    if (std::isnan(line[at])) {
+      if (at >= from && at < to) out[at - from] = std::numeric_limits<float>::quiet_NaN();
+      ++at;
+      continue;
+    }
+    std::int64_t end = at + 1;
+    while (end < last && !std::isnan(line[end])) ++end;
+    const std::int64_t wanted_from = std::max(at, from);
+    const std::int64_t wanted_to = std::min(end, to);
+    if (wanted_from < wanted_to) {
+      filter_run(taps, {&line[at], line.step}, end - at, wanted_from - at, wanted_to - at,
+                 {&out[wanted_from - from], out.step}, scratch);
+    }
+    at = end;
+  }
+}
+
+/// Copies a strip of columns, rows begin to end of the band, mirrored at the band's ends; false where it has voids.
+bool load_strip(View2D<const float> band, std::int64_t column, std::int64_t columns, std::int64_t begin,
+                std::int64_t end, double* strip) {
+  bool whole = true;
+  for (std::int64_t r = begin; r < end && whole; ++r, strip += kStripColumns) {
+    const float* row = band.row(mirror_index(r, band.rows())) + column;
+    int voids = 0;
+    for (std::int64_t i = 0; i < columns; ++i) {
+      voids |= static_cast<int>(row[i] != row[i]);
+      strip[i] = static_cast<double>(row[i]);
+    }
+    std::fill(strip + columns, strip + kStripColumns, 0.0);
+    whole = voids == 0;
+  }
+  return whole;
+}
+
+}  // namespace
+
+Prefilter::Prefilter(std::vector<double> taps, double worst_gain) : taps_(std::move(taps)), worst_gain_(worst_gain) {}
+
+Prefilter Prefilter::make(Filter filter, const Acquisition& acquisition) {
+  const Kernel kernel = Kernel::make(filter);
+  const std::vector<double> response = sampled_response(kernel, acquisition);
+  const std::vector<double> at_points = sampled_response(kernel, Acquisition{});
+  std::vector<double> cosines(kCircle);
+  for (std::size_t j = 0; j < kCircle; ++j) {
+    cosines[j] = std::cos(2.0 * std::numbers::pi * static_cast<double>(j) / kCircle);
+  }
+
+  std::vector<double> inverse(kCircle / 2 + 1);
+  double worst_gain = 0.0;
+  std::size_t worst_at = 0;
+  for (std::size_t j = 0; j <= kCircle / 2; ++j) {
+    const double spectrum = spectrum_at(response, j, cosines);
+    inverse[j] = 1.0 / spectrum;
+    const double gain =
+        spectrum > 0.0 ? spectrum_at(at_points, j, cosines) / spectrum : std::numeric_limits<double>::infinity();
+    if (gain > worst_gain) {
+      worst_gain = gain;
+      worst_at = j;
+    }
+  }
+  if (!(worst_gain <= kMostGain)) {
+    throw Error(
+        ErrorCode::kInvalidArgument,
+        fmt::format("acquisition {} cannot be undone with {}: waves of {:.3g} samples would have to be "
+                    "amplified {}, at most {:g} times is allowed; give a milder filter, or point",
+                    to_string(acquisition), to_string(filter),
+                    static_cast<double>(kCircle) / static_cast<double>(worst_at),
+                    std::isinf(worst_gain) ? "without bound" : fmt::format("{:.4g} times", worst_gain), kMostGain));
+  }
+
+  // p[k] is the mean of cos(omega k) / A(omega) over the circle.
+  std::vector<double> taps;
+  for (std::size_t k = 0; k <= kLongestHalo; ++k) {
+    double sum = 0.5 * (inverse.front() + ((k & 1U) != 0 ? -inverse.back() : inverse.back()));
+    for (std::size_t j = 1; j < kCircle / 2; ++j) sum += inverse[j] * cosines[(j * k) % kCircle];
+    taps.push_back(sum / (kCircle / 2));
+  }
+  double tail = 0.0;
+  while (taps.size() > 1 && tail + 2.0 * std::abs(taps.back()) < kTail) {
+    tail += 2.0 * std::abs(taps.back());
+    taps.pop_back();
+  }
+  // A gain of at most 100 by a filter of at most 255 taps or a Gaussian fades within a few hundred samples.
+  if (taps.size() > kLongestHalo) {
+    throw Error(ErrorCode::kInvalidArgument, fmt::format("acquisition {}: the inverse does not fade within {} samples",
+                                                         to_string(acquisition), kLongestHalo));
+  }
+  if (taps.size() == 1) taps[0] = 1.0;
+  return {std::move(taps), worst_gain};
+}
+
+void Prefilter::filter_rows(View2D<float> band) const {
+  if (is_identity()) return;
+  RunScratch scratch;
+  for (std::int64_t r = 0; r < band.rows(); ++r) {
+    float* row = band.row(r);
+    filter_line(taps_, {row, 1}, band.columns(), 0, band.columns(), {row, 1}, scratch);
+  }
+}
+
+void Prefilter::filter_columns(View2D<const float> band, std::int64_t first, View2D<float> out) const {
+  ISOHF_ASSERT(out.columns() == band.columns() && first >= 0 && first + out.rows() <= band.rows());
+  if (is_identity()) {
+    for (std::int64_t r = 0; r < out.rows(); ++r) {
+      if (out.row(r) != band.row(first + r)) std::copy_n(band.row(first + r), band.columns(), out.row(r));
+    }
+    return;
+  }
+  const std::int64_t reach = halo();
+  const std::int64_t rows = out.rows();
+  std::vector<double> strip(static_cast<std::size_t>((rows + 2 * reach) * kStripColumns));
+  std::vector<float> filtered(static_cast<std::size_t>(rows * kStripColumns));
+  RunScratch scratch;
+  for (std::int64_t column = 0; column < band.columns(); column += kStripColumns) {
+    const std::int64_t columns = std::min(kStripColumns, band.columns() - column);
+    if (load_strip(band, column, columns, first - reach, first + rows + reach, strip.data())) {
+      convolve(strip.data() + reach * kStripColumns, kStripColumns, taps_.data(), reach, rows * kStripColumns / kBlock,
+               filtered.data(), kBlock);
+    } else {
+      for (std::int64_t i = 0; i < columns; ++i) {
+        filter_line(taps_, {band.data() + column + i, band.stride()}, band.rows(), first, first + rows,
+                    {filtered.data() + i, kStripColumns}, scratch);
+      }
+    }
+    for (std::int64_t r = 0; r < rows; ++r) {
+      std::copy_n(filtered.data() + r * kStripColumns, columns, out.row(r) + column);
+    }
+  }
+}
+
+void Prefilter::filter(View2D<float> raster) const {
+  filter_rows(raster);
+  filter_columns(raster, 0, raster);
+}
+
+}  // namespace isohf

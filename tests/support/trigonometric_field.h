@@ -1,0 +1,43 @@
+#pragma once
+
+#include <complex>
+#include <cstdint>
+#include <vector>
+
+#include "isohf/base/view.h"
+#include "isohf/surface/kernels.h"
+#include "isohf/surface/prefilter.h"
+
+namespace isohf {
+
+/// A sum of waves that fit a square of n x n samples: wave vectors (i, j) with 0 < |(i, j)| <= rho n / 2, amplitude
+/// |(i, j)|^-p, random phases from a fixed generator; known exactly everywhere.
+class TrigonometricField {
+ public:
+  TrigonometricField(int n, double p, double rho, std::uint64_t seed);
+
+  [[nodiscard]] int n() const { return n_; }
+  /// Heights at columns first_u + i * step_u of the row at v.
+  [[nodiscard]] std::vector<double> row(double v, double first_u, double step_u, int count) const;
+  /// The field at the n x n sample places.
+  [[nodiscard]] std::vector<float> samples() const;
+
+ private:
+  int n_;
+  int reach_;                                ///< largest wave number of an axis
+  std::vector<std::complex<double>> waves_;  ///< by j in [-reach, reach], then i in [0, reach]
+};
+
+/// The value at (u, v) by the rule of kernels.h, sums in double; NaN where void.
+[[nodiscard]] double evaluate(const Kernel& kernel, View2D<const float> coefficients, double u, double v);
+
+/// PSNR in dB, relative to the samples' peak-to-peak range, of ortho -> iso at equal density against the exact field:
+/// lattice column step sqrt(2 / sqrt 3), row step sqrt(3) / 2 of that, odd rows half a step to the East; only points
+/// at least `margin` samples from the square's edge count.
+[[nodiscard]] double psnr_of_resampling(Filter filter, const TrigonometricField& field, int margin);
+
+/// The same for ortho -> iso -> ortho on the lattice of column step 1 and row step sqrt(3) / 2, which contains the
+/// square band; back by the separable inverse: along each lattice row to the source's columns, then along columns.
+[[nodiscard]] double psnr_of_round_trip(Filter filter, const TrigonometricField& field, int margin);
+
+}  // namespace isohf
