@@ -1,16 +1,109 @@
 #include "formats/registry.h"
 
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cerrno>
+#include <cstring>
+#include <span>
+
+#include "formats/exr_source.h"
 #include "isohf/base/error.h"
 
 namespace isohf {
+namespace {
+
+/// One native reader: how its files begin, and how one is opened.
+struct Reader {
+  Format format;
+  bool (*recognises)(std::span<const std::byte> head);  ///< nullptr: the extension decides
+  std::unique_ptr<HeightSource> (*open)(const std::string& path, const OpenOptions& options);
+};
+
+const std::vector<Reader>& readers() {
+  static const std::vector<Reader> table = {
+      {{"OpenEXR", {".exr"}}, looks_like_exr, open_exr},
+  };
+  return table;
+}
+
+/// Enough for every signature.
+constexpr std::size_t kHeadBytes = 64;
+
+struct Head {
+  std::array<std::byte, kHeadBytes> bytes{};
+  std::size_t size = 0;
+};
+
+/// The file's first bytes; refuses whatever is not a readable regular file with something in it.
+Head read_head(const std::string& path) {
+  const auto refuse = [&](ErrorCode code, const std::string& why) { throw Error(code, path + ": " + why); };
+  struct stat status {};
+  if (::stat(path.c_str(), &status) != 0) {
+    refuse(ErrorCode::kIo, errno == ENOENT ? "no such file" : std::strerror(errno));
+  }
+  if (S_ISDIR(status.st_mode)) refuse(ErrorCode::kIo, "is a folder; a raster file is wanted");
+  if (!S_ISREG(status.st_mode)) refuse(ErrorCode::kIo, "is not a regular file; a raster must be seekable");
+  if (status.st_size == 0) refuse(ErrorCode::kCorrupt, "is empty (0 bytes)");
+  const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (file < 0) refuse(ErrorCode::kIo, fmt::format("cannot be opened: {}", std::strerror(errno)));
+  Head head;
+  const ssize_t got = ::pread(file, head.bytes.data(), head.bytes.size(), 0);
+  const int error = errno;
+  ::close(file);
+  if (got < 0) refuse(ErrorCode::kIo, fmt::format("cannot be read: {}", std::strerror(error)));
+  head.size = static_cast<std::size_t>(got);
+  return head;
+}
+
+bool has_extension(const std::string& path, const Format& format) {
+  std::string lower = path;
+  std::transform(lower.begin(), lower.end(), lower.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return std::any_of(format.extensions.begin(), format.extensions.end(), [&](const std::string& extension) {
+    return lower.size() > extension.size() &&
+           lower.compare(lower.size() - extension.size(), extension.size(), extension) == 0;
+  });
+}
+
+const Reader* reader_of(const std::string& path, std::span<const std::byte> head) {
+  for (const Reader& reader : readers()) {
+    if (reader.recognises != nullptr ? reader.recognises(head) : has_extension(path, reader.format)) return &reader;
+  }
+  return nullptr;
+}
+
+std::string native_names() {
+  std::string names;
+  for (const Format& format : native_formats()) {
+    names += fmt::format("{}{} ({})", names.empty() ? "" : ", ", format.name, fmt::join(format.extensions, " "));
+  }
+  return names;
+}
+
+}  // namespace
 
 const std::vector<Format>& native_formats() {
-  static const std::vector<Format> formats = {};
+  static const std::vector<Format> formats = [] {
+    std::vector<Format> list;
+    for (const Reader& reader : readers()) list.push_back(reader.format);
+    return list;
+  }();
   return formats;
 }
 
-std::unique_ptr<HeightSource> open_source(const std::string& path, const OpenOptions& /*options*/) {
-  throw Error(ErrorCode::kUnsupported, path + ": no reader is built in");
+std::unique_ptr<HeightSource> open_source(const std::string& path, const OpenOptions& options) {
+  const Head head = read_head(path);
+  const Reader* reader = reader_of(path, std::span(head.bytes).first(head.size));
+  if (reader == nullptr) {
+    throw Error(ErrorCode::kUnsupported, fmt::format("{}: unknown format; read natively: {}", path, native_names()));
+  }
+  return reader->open(path, options);
 }
 
 }  // namespace isohf

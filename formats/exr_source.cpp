@@ -1,0 +1,313 @@
+#include "formats/exr_source.h"
+
+#include <OpenEXR/Iex.h>
+#include <OpenEXR/ImfChannelList.h>
+#include <OpenEXR/ImfFrameBuffer.h>
+#include <OpenEXR/ImfHeader.h>
+#include <OpenEXR/ImfInputPart.h>
+#include <OpenEXR/ImfMultiPartInputFile.h>
+#include <OpenEXR/ImfPartType.h>
+#include <OpenEXR/ImfThreading.h>
+#include <OpenEXR/ImfTileDescription.h>
+#include <OpenEXR/ImfTiledInputPart.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cstring>
+#include <mutex>
+#include <new>
+#include <optional>
+#include <thread>
+#include <vector>
+
+#include "formats/open_options.h"
+#include "isohf/base/assert.h"
+#include "isohf/base/error.h"
+
+namespace isohf {
+namespace {
+
+constexpr std::array<const char*, 7> kPreferredChannels = {"Y", "Z", "height", "Height", "elevation", "depth", "R"};
+
+/// Rows are decoded in runs of at most about this size, so that several chunks are decoded at a time.
+constexpr std::int64_t kBandBytes = std::int64_t{8} << 20U;
+
+struct Channel {
+  int part = 0;
+  std::string part_name;  ///< empty in a file of one part
+  std::string name;
+  Imf::PixelType type = Imf::HALF;
+  bool subsampled = false;
+  bool deep = false;
+};
+
+std::string full_name(const Channel& channel) {
+  return channel.part_name.empty() ? channel.name : channel.part_name + "." + channel.name;
+}
+
+std::string last_component(const std::string& name) {
+  const std::size_t dot = name.rfind('.');
+  return dot == std::string::npos ? name : name.substr(dot + 1);
+}
+
+/// The library's own threads decode the chunks of one request; four of them already outrun what follows.
+void start_decoding_threads() {
+  static std::once_flag once;
+  std::call_once(once, [] {
+    Imf::setGlobalThreadCount(static_cast<int>(std::clamp(std::thread::hardware_concurrency(), 1U, 4U)));
+  });
+}
+
+bool is_deep(const Imf::Header& header) {
+  return header.hasType() && Imf::isDeepData(header.type());
+}
+
+std::vector<Channel> channels_of(const Imf::MultiPartInputFile& file) {
+  std::vector<Channel> channels;
+  for (int part = 0; part < file.parts(); ++part) {
+    const Imf::Header& header = file.header(part);
+    for (auto at = header.channels().begin(); at != header.channels().end(); ++at) {
+      Channel channel;
+      channel.part = part;
+      if (file.parts() > 1) channel.part_name = header.hasName() ? header.name() : std::to_string(part);
+      channel.name = at.name();
+      channel.type = at.channel().type;
+      channel.subsampled = at.channel().xSampling != 1 || at.channel().ySampling != 1;
+      channel.deep = is_deep(header);
+      channels.push_back(channel);
+    }
+  }
+  return channels;
+}
+
+std::string list_of(const std::vector<Channel>& channels) {
+  std::string list;
+  for (const Channel& channel : channels) list += (list.empty() ? "" : ", ") + full_name(channel);
+  return list;
+}
+
+Channel named_channel(const std::vector<Channel>& channels, const std::string& wanted) {
+  for (const Channel& channel : channels) {
+    if (channel.name == wanted) return channel;
+  }
+  for (const Channel& channel : channels) {
+    if (full_name(channel) == wanted) return channel;
+  }
+  std::size_t index = 0;
+  const char* end = wanted.data() + wanted.size();
+  const auto parsed = std::from_chars(wanted.data(), end, index);
+  if (parsed.ec == std::errc() && parsed.ptr == end && index < channels.size()) return channels[index];
+  throw Error(ErrorCode::kInvalidArgument, fmt::format("has no channel \"{}\"; it has {} (or 0...{})", wanted,
+                                                       list_of(channels), channels.size() - 1));
+}
+
+/// The channel that most likely holds elevations, in the first part that is not deep.
+Channel default_channel(const std::vector<Channel>& channels) {
+  std::vector<Channel> candidates;
+  for (const Channel& channel : channels) {
+    if (!channel.deep && (candidates.empty() || candidates.front().part == channel.part)) candidates.push_back(channel);
+  }
+  if (candidates.empty()) return channels.front();
+  for (const bool whole_name : {true, false}) {
+    for (const char* preferred : kPreferredChannels) {
+      for (const Channel& channel : candidates) {
+        if ((whole_name ? channel.name : last_component(channel.name)) == preferred) return channel;
+      }
+    }
+  }
+  return candidates.front();
+}
+
+SampleType sample_type_of(Imf::PixelType type) {
+  switch (type) {
+    case Imf::UINT:
+      return SampleType::kUint32;
+    case Imf::HALF:
+      return SampleType::kFloat16;
+    case Imf::FLOAT:
+      return SampleType::kFloat32;
+    default:
+      throw Error(ErrorCode::kCorrupt, fmt::format("OpenEXR pixel type {} is unknown", static_cast<int>(type)));
+  }
+}
+
+std::int64_t scan_lines_per_chunk(Imf::Compression compression) {
+  switch (compression) {
+    case Imf::ZIP_COMPRESSION:
+    case Imf::PXR24_COMPRESSION:
+      return 16;
+    case Imf::PIZ_COMPRESSION:
+    case Imf::B44_COMPRESSION:
+    case Imf::B44A_COMPRESSION:
+    case Imf::DWAA_COMPRESSION:
+      return 32;
+    case Imf::DWAB_COMPRESSION:
+      return 256;
+    default:
+      return 1;
+  }
+}
+
+std::string one_line(std::string text) {
+  std::replace(text.begin(), text.end(), '\n', ' ');
+  return text;
+}
+
+/// Runs `action`, turning whatever the OpenEXR library throws into Error with `where` in front.
+template <typename Action>
+auto translated(const std::string& where, Action action) -> decltype(action()) {
+  try {
+    return action();
+  } catch (const Error& error) {
+    throw error.within(where);
+  } catch (const std::bad_alloc&) {
+    throw Error(ErrorCode::kOutOfMemory, where + ": OpenEXR ran out of memory");
+  } catch (const std::exception& error) {
+    throw Error(ErrorCode::kCorrupt, where + ": OpenEXR: " + one_line(error.what()));
+  }
+}
+
+class ExrSource final : public HeightSource {
+ public:
+  ExrSource(const std::string& path, const OpenOptions& options)
+      : file_(path.c_str(), Imf::globalThreadCount(), false) {
+    const std::vector<Channel> channels = channels_of(file_);
+    if (channels.empty()) throw Error(ErrorCode::kCorrupt, "OpenEXR file has no channels");
+    channel_ = options.channel.empty() ? default_channel(channels) : named_channel(channels, options.channel);
+    if (channel_.deep) {
+      throw Error(
+          ErrorCode::kUnsupported,
+          fmt::format("OpenEXR channel {} is deep, several samples per pixel; flatten it", full_name(channel_)));
+    }
+    if (channel_.subsampled) {
+      throw Error(ErrorCode::kUnsupported, fmt::format("OpenEXR channel {} is subsampled; the file has {}",
+                                                       full_name(channel_), list_of(channels)));
+    }
+    if (!file_.partComplete(channel_.part)) {
+      throw Error(ErrorCode::kCorrupt, "OpenEXR file is incomplete: its table of chunks has gaps");
+    }
+    describe(path, channels, options.channel.empty());
+    open_part();
+    apply_open_options(info_, options);
+  }
+
+  [[nodiscard]] const SourceInfo& info() const override { return info_; }
+
+  void read_window(const Window& window, std::span<std::byte> samples) override {
+    ISOHF_ASSERT(window.column >= 0 && window.row >= 0 && window.columns >= 0 && window.rows >= 0 &&
+                 window.column + window.columns <= info_.width && window.row + window.rows <= info_.height);
+    const std::size_t row_bytes = static_cast<std::size_t>(window.columns) * sample_bytes_;
+    ISOHF_ASSERT(samples.size() == row_bytes * static_cast<std::size_t>(window.rows));
+    if (samples.empty()) return;
+    std::byte* out = samples.data();
+    for (std::int64_t row = window.row; row < window.row + window.rows; ++row, out += row_bytes) {
+      if (!band_holds(row, window)) load_band(row, window);
+      const std::int64_t at = (row - band_.row) * band_.columns + window.column - band_.column;
+      std::memcpy(out, samples_.data() + static_cast<std::size_t>(at) * sample_bytes_, row_bytes);
+    }
+  }
+
+ private:
+  void describe(const std::string& path, const std::vector<Channel>& channels, bool chosen_here) {
+    const Imf::Header& header = file_.header(channel_.part);
+    const Imath::Box2i& data = header.dataWindow();
+    const Imath::Box2i& display = header.displayWindow();
+    info_.path = path;
+    info_.format = "OpenEXR";
+    info_.width = std::int64_t{data.max.x} - data.min.x + 1;
+    info_.height = std::int64_t{data.max.y} - data.min.y + 1;
+    info_.sample_type = sample_type_of(channel_.type);
+    info_.channel = channels.size() > 1 ? full_name(channel_) : std::string();
+    sample_bytes_ = size_bytes(info_.sample_type);
+    if (chosen_here && channels.size() > 1) {
+      info_.warnings.push_back(
+          fmt::format("channel {} is read, of {} ({})", full_name(channel_), channels.size(), list_of(channels)));
+    }
+    if (data != display) {
+      info_.warnings.push_back(fmt::format(
+          "the data window ({}, {}) - ({}, {}) is read; the display window ({}, {}) - "
+          "({}, {}) differs",
+          data.min.x, data.min.y, data.max.x, data.max.y, display.min.x, display.min.y, display.max.x, display.max.y));
+    }
+  }
+
+  void open_part() {
+    const Imf::Header& header = file_.header(channel_.part);
+    origin_ = header.dataWindow().min;
+    if (header.hasType() ? Imf::isTiled(header.type()) : header.hasTileDescription()) {
+      tiles_.emplace(file_, channel_.part);
+      info_.block_width = std::min<std::int64_t>(tiles_->tileXSize(), info_.width);
+      info_.block_height = std::min<std::int64_t>(tiles_->tileYSize(), info_.height);
+    } else {
+      scan_lines_.emplace(file_, channel_.part);
+      info_.block_width = info_.width;
+      info_.block_height = std::min(scan_lines_per_chunk(header.compression()), info_.height);
+    }
+  }
+
+  [[nodiscard]] bool band_holds(std::int64_t row, const Window& window) const {
+    return row >= band_.row && row < band_.row + band_.rows && window.column >= band_.column &&
+           window.column + window.columns <= band_.column + band_.columns;
+  }
+
+  /// Decodes whole chunks around the part of `window` that begins at `row`: all of its rows if they are few.
+  void load_band(std::int64_t row, const Window& window) {
+    const auto down = [](std::int64_t value, std::int64_t step) { return value / step * step; };
+    const auto up = [](std::int64_t value, std::int64_t step, std::int64_t end) {
+      return std::min((value + step - 1) / step * step, end);
+    };
+    Window band;
+    band.column = down(window.column, info_.block_width);
+    band.columns = up(window.column + window.columns, info_.block_width, info_.width) - band.column;
+    band.row = down(row, info_.block_height);
+    const std::int64_t wanted = up(window.row + window.rows, info_.block_height, info_.height) - band.row;
+    const std::int64_t affordable = kBandBytes / (band.columns * static_cast<std::int64_t>(sample_bytes_));
+    const std::int64_t whole_chunks = std::max(down(affordable, info_.block_height), info_.block_height);
+    band.rows = std::min({wanted, whole_chunks, info_.height - band.row});
+    band_ = {};  // what is there is overwritten, even if decoding fails half-way
+    translated(fmt::format("{}: rows {} to {}", info_.path, band.row, band.row + band.rows - 1), [&] { decode(band); });
+    band_ = band;
+  }
+
+  void decode(const Window& band) {
+    samples_.resize(static_cast<std::size_t>(band.columns * band.rows) * sample_bytes_);
+    const Imath::V2i first(origin_.x + static_cast<int>(band.column), origin_.y + static_cast<int>(band.row));
+    Imf::FrameBuffer frame;
+    frame.insert(channel_.name,
+                 Imf::Slice::Make(channel_.type, samples_.data(), first, band.columns, band.rows, sample_bytes_,
+                                  sample_bytes_ * static_cast<std::size_t>(band.columns)));
+    if (tiles_) {
+      tiles_->setFrameBuffer(frame);
+      const auto tile = [](std::int64_t at, std::int64_t size) { return static_cast<int>(at / size); };
+      tiles_->readTiles(tile(band.column, info_.block_width), tile(band.column + band.columns - 1, info_.block_width),
+                        tile(band.row, info_.block_height), tile(band.row + band.rows - 1, info_.block_height));
+    } else {
+      scan_lines_->setFrameBuffer(frame);
+      scan_lines_->readPixels(first.y, first.y + static_cast<int>(band.rows) - 1);
+    }
+  }
+
+  Imf::MultiPartInputFile file_;
+  std::optional<Imf::InputPart> scan_lines_;
+  std::optional<Imf::TiledInputPart> tiles_;
+  Channel channel_;
+  Imath::V2i origin_;
+  SourceInfo info_;
+  std::size_t sample_bytes_ = 0;
+  Window band_;                     ///< what samples_ holds
+  std::vector<std::byte> samples_;  ///< decoded chunks of the channel
+};
+
+}  // namespace
+
+std::unique_ptr<HeightSource> open_exr(const std::string& path, const OpenOptions& options) {
+  return translated(path, [&]() -> std::unique_ptr<HeightSource> {
+    check_exr_headers(path);
+    start_decoding_threads();
+    return std::make_unique<ExrSource>(path, options);
+  });
+}
+
+}  // namespace isohf
