@@ -72,15 +72,6 @@ SourceScan scan_source(HeightSource& source, const ProgressCallback& callback, c
   return found;
 }
 
-/// Samples of more than 24 bits are resampled as differences from the middle of their range, so that single precision
-/// holds them; all others as they are.
-double choose_datum(const SourceInfo& info, const ElevationRange& range) {
-  const bool wide = info.sample_type == SampleType::kUint32 || info.sample_type == SampleType::kInt32 ||
-                    info.sample_type == SampleType::kFloat64;
-  const bool scaled = info.z_scale != 1.0 || info.z_offset != 0.0;
-  return wide || scaled ? std::round((range.min + range.max) / 2.0) : 0.0;
-}
-
 /// Everything that decides the bytes of the archive, as text: two runs with the same fingerprint may continue each
 /// other.
 std::string fingerprint_of(const SourceInfo& info, const Plan& plan, const ConvertOptions& options) {

@@ -97,4 +97,11 @@ std::int64_t rows_per_read(const SourceInfo& info) {
   return std::min(info.height, blocks * block_rows);
 }
 
+double choose_datum(const SourceInfo& info, const ElevationRange& range) {
+  const bool wide = info.sample_type == SampleType::kUint32 || info.sample_type == SampleType::kInt32 ||
+                    info.sample_type == SampleType::kFloat64;
+  const bool scaled = info.z_scale != 1.0 || info.z_offset != 0.0;
+  return wide || scaled ? std::round((range.min + range.max) / 2.0) : 0.0;
+}
+
 }  // namespace isohf

@@ -12,14 +12,17 @@ namespace isohf {
 
 /// How far an archive's surface (barycentric, as the renderer draws it) lies from the source it was made from.
 struct AccuracyReport {
-  std::int64_t samples = 0;           ///< source samples compared
-  std::int64_t samples_void = 0;      ///< void in the source
+  std::int64_t samples = 0;           ///< source samples
+  std::int64_t samples_void = 0;      ///< of these, void in the source
+  std::int64_t samples_compared = 0;  ///< elevations on both sides
   std::int64_t samples_lost = 0;      ///< elevations in the source where the archive has none
+  std::int64_t lost_inside = 0;       ///< of these, with no void and no edge of the source within reach of a triangle
   std::int64_t samples_invented = 0;  ///< elevations in the archive at void source samples
+  std::int64_t invented_inside = 0;   ///< of these, with nothing but voids within reach of a triangle
   double rms = 0.0;                   ///< vertical units
   double max = 0.0;
-  double p99 = 0.0;                ///< 99th percentile of the absolute error (to 1/1000 of max)
-  double psnr_db = 0.0;            ///< 20 log10(range / rms)
+  double p99 = 0.0;                ///< 99th percentile of the absolute error, to 1.1 %, rounded up
+  double psnr_db = 0.0;            ///< 20 log10(elevation range / rms); infinite where rms is 0
   WorldPoint worst{};              ///< where the largest error lies
   std::int64_t random_points = 0;  ///< random places compared with bilinear interpolation of the source
   double random_rms = 0.0;

@@ -1,0 +1,283 @@
+#include "isohf/verify/against_source.h"
+
+#include <fmt/format.h>
+#include <oneapi/tbb/parallel_for.h>
+#include <oneapi/tbb/task_arena.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <random>
+#include <vector>
+
+#include "isohf/base/error.h"
+#include "isohf/lattice/barycentric.h"
+#include "isohf/surface/band_reader.h"
+#include "isohf/surface/source_scan.h"
+
+namespace isohf {
+namespace {
+
+/// Absolute errors by magnitude: 64 bins an octave, so that a percentile is known to 1.1 % in constant memory.
+class ErrorHistogram {
+ public:
+  ErrorHistogram() : counts_(kBins, 0) {}
+
+  void add(double error) { ++counts_[bin_of(error)]; }
+  void add(const ErrorHistogram& other) {
+    for (std::size_t i = 0; i < kBins; ++i) counts_[i] += other.counts_[i];
+  }
+  /// Upper end of the bin that holds the given share of all errors.
+  [[nodiscard]] double percentile(double share) const {
+    std::int64_t total = 0;
+    for (const std::int64_t count : counts_) total += count;
+    const auto wanted = static_cast<std::int64_t>(std::ceil(share * static_cast<double>(total)));
+    std::int64_t seen = 0;
+    for (std::size_t i = 0; i < kBins; ++i) {
+      seen += counts_[i];
+      if (seen >= wanted && seen > 0)
+        return i == 0 ? 0.0 : double{std::bit_cast<float>(static_cast<std::uint32_t>(i + 1) << kShift)};
+    }
+    return 0.0;
+  }
+
+ private:
+  static constexpr std::uint32_t kShift = 23 - 6;
+  static constexpr std::size_t kBins = 0x7F800000U >> kShift;
+
+  static std::size_t bin_of(double error) {
+    return std::min<std::size_t>(std::bit_cast<std::uint32_t>(static_cast<float>(error)) >> kShift, kBins - 1);
+  }
+
+  std::vector<std::int64_t> counts_;
+};
+
+/// What one run of samples adds up to; sums are formed run by run in a fixed order.
+struct Sums {
+  AccuracyReport counts;
+  double squares = 0.0;
+};
+
+/// A row of tiles, decoded.
+struct TileRowSurface {
+  std::int64_t tile_row = 0;
+  std::vector<std::vector<double>> elevations;
+};
+
+class Comparison {
+ public:
+  Comparison(const ArchiveReader& archive, HeightSource& source, std::int64_t random_points)
+      : archive_(archive),
+        grid_(archive.grid()),
+        record_(archive.metadata().source),
+        source_(source),
+        info_(source.info()) {
+    if (info_.width != record_.width || info_.height != record_.height) {
+      throw Error(ErrorCode::kInvalidArgument,
+                  fmt::format("{}: {}x{} samples, {} was made from {}x{}", info_.path, info_.width, info_.height,
+                              archive.path(), record_.width, record_.height));
+    }
+    const Statistics& statistics = archive.metadata().statistics;
+    const ElevationRange range{statistics.min.value_or(0.0), statistics.max.value_or(0.0)};
+    datum_ = choose_datum(info_, range);
+    span_ = range.max - range.min;
+    const double reach = std::max(grid_.sigma_x() * 2.0 / record_.spacing_x, grid_.sigma_z() / record_.spacing_z);
+    reach_ = static_cast<std::int64_t>(std::ceil(reach)) + 1;
+    draw_points(random_points);
+  }
+
+  AccuracyReport run(const std::function<void(std::int64_t, std::int64_t)>& progress, const std::atomic<bool>& cancel) {
+    BandReader reader(source_, datum_);
+    AccuracyReport report;
+    double squares = 0.0;
+    double random_squares = 0.0;
+    std::int64_t first_row = 0;
+    for (std::int64_t tile_row = 0; tile_row < grid_.tile_rows() && first_row < info_.height; ++tile_row) {
+      if (cancel.load(std::memory_order_relaxed)) throw Error(ErrorCode::kCancelled, "interrupted");
+      const std::int64_t end_row = rows_until(tile_row);
+      if (end_row > first_row) {
+        const auto band =
+            reader.read({std::max<std::int64_t>(first_row - reach_, 0), std::min(end_row + reach_, info_.height) - 1});
+        const TileRowSurface surface = decode(tile_row);
+        compare_rows(surface, *band, first_row, end_row, report, squares);
+        compare_points(surface, *band, first_row, end_row, report, random_squares);
+        first_row = end_row;
+      }
+      if (progress) progress(tile_row + 1, grid_.tile_rows());
+    }
+    report.samples = info_.width * info_.height;
+    if (report.samples_compared > 0) report.rms = std::sqrt(squares / static_cast<double>(report.samples_compared));
+    if (report.random_points > 0)
+      report.random_rms = std::sqrt(random_squares / static_cast<double>(report.random_points));
+    report.psnr_db = report.rms > 0.0 ? 20.0 * std::log10(span_ / report.rms) : std::numeric_limits<double>::infinity();
+    report.p99 = std::min(histogram_.percentile(0.99), report.max);
+    return report;
+  }
+
+ private:
+  [[nodiscard]] double world_x(double column) const { return record_.first_sample_x + column * record_.spacing_x; }
+  [[nodiscard]] double world_z(double row) const { return record_.first_sample_z + row * record_.spacing_z; }
+
+  /// One past the last source row that lies North of the tile row's South edge; all that are left, for the last row.
+  [[nodiscard]] std::int64_t rows_until(std::int64_t tile_row) const {
+    if (tile_row + 1 == grid_.tile_rows()) return info_.height;
+    const double edge = static_cast<double>(tile_row + 1) * grid_.extent_z();
+    const double rows = std::ceil((edge - record_.first_sample_z) / record_.spacing_z);
+    return std::clamp<std::int64_t>(static_cast<std::int64_t>(rows), 0, info_.height);
+  }
+
+  TileRowSurface decode(std::int64_t tile_row) const {
+    TileRowSurface surface;
+    surface.tile_row = tile_row;
+    surface.elevations.resize(static_cast<std::size_t>(grid_.tile_columns()));
+    oneapi::tbb::parallel_for(std::size_t{0}, surface.elevations.size(), [&](std::size_t column) {
+      surface.elevations[column] = archive_.read_elevations({static_cast<std::int64_t>(column), tile_row});
+    });
+    return surface;
+  }
+
+  [[nodiscard]] double elevation_at(const TileRowSurface& surface, WorldPoint world) const {
+    TilePoint at = grid_.locate(world);
+    // A source row on the edge of two tile rows may be rounded to either; their vertices on it are the same.
+    if (at.tile.row > surface.tile_row) at.point.z = grid_.shape().cell_rows();
+    if (at.tile.row < surface.tile_row) at.point.z = 0.0;
+    const std::vector<double>& elevations = surface.elevations[static_cast<std::size_t>(at.tile.column)];
+    const View2D<const double> view(elevations.data(), grid_.shape().columns(), grid_.shape().rows());
+    return interpolate(barycentric(grid_.shape(), at.point), view);
+  }
+
+  void compare_rows(const TileRowSurface& surface, const Band& band, std::int64_t first, std::int64_t end,
+                    AccuracyReport& report, double& squares) {
+    std::vector<Sums> sums(static_cast<std::size_t>(end - first));
+    std::vector<ErrorHistogram> histograms(1);
+    constexpr std::int64_t kRowsAtOnce = 16;  // one histogram each: bounded memory
+    for (std::int64_t begin = first; begin < end; begin += kRowsAtOnce) {
+      const std::int64_t count = std::min(kRowsAtOnce, end - begin);
+      histograms.assign(static_cast<std::size_t>(count), {});
+      oneapi::tbb::parallel_for(std::int64_t{0}, count, [&](std::int64_t i) {
+        compare_row(surface, band, begin + i, sums[static_cast<std::size_t>(begin + i - first)],
+                    histograms[static_cast<std::size_t>(i)]);
+      });
+      for (const ErrorHistogram& histogram : histograms) histogram_.add(histogram);
+    }
+    for (const Sums& row : sums) {
+      squares += row.squares;
+      report.samples_void += row.counts.samples_void;
+      report.samples_compared += row.counts.samples_compared;
+      report.samples_lost += row.counts.samples_lost;
+      report.lost_inside += row.counts.lost_inside;
+      report.samples_invented += row.counts.samples_invented;
+      report.invented_inside += row.counts.invented_inside;
+      if (row.counts.max > report.max) {
+        report.max = row.counts.max;
+        report.worst = row.counts.worst;
+      }
+    }
+  }
+
+  void compare_row(const TileRowSurface& surface, const Band& band, std::int64_t row, Sums& sums,
+                   ErrorHistogram& histogram) const {
+    const View2D<const float> heights = band.view().heights;
+    const float* samples = heights.row(row - band.rows.first);
+    for (std::int64_t column = 0; column < info_.width; ++column) {
+      const WorldPoint world{world_x(static_cast<double>(column)), world_z(static_cast<double>(row))};
+      const double stored = elevation_at(surface, world);
+      const bool is_void = std::isnan(samples[column]);
+      sums.counts.samples_void += is_void ? 1 : 0;
+      if (is_void || std::isnan(stored)) {
+        if (is_void != std::isnan(stored)) count_mismatch(band, column, row, is_void, sums.counts);
+        continue;
+      }
+      const double error = std::abs(stored - (double{samples[column]} + datum_));
+      ++sums.counts.samples_compared;
+      sums.squares += error * error;
+      histogram.add(error);
+      if (error > sums.counts.max) {
+        sums.counts.max = error;
+        sums.counts.worst = world;
+      }
+    }
+  }
+
+  /// A sample that has an elevation on one side only. Around voids that is as it should be: a triangle with a void
+  /// vertex is no surface. It is a fault where the neighbourhood within a triangle's reach is all of one kind.
+  void count_mismatch(const Band& band, std::int64_t column, std::int64_t row, bool void_in_source,
+                      AccuracyReport& counts) const {
+    ++(void_in_source ? counts.samples_invented : counts.samples_lost);
+    const bool edge_is_void = archive_.metadata().outside == "void";
+    for (std::int64_t r = row - reach_; r <= row + reach_; ++r) {
+      for (std::int64_t c = column - reach_; c <= column + reach_; ++c) {
+        const bool inside = c >= 0 && r >= band.rows.first && c < info_.width && r <= band.rows.last;
+        if (!inside && !edge_is_void) continue;
+        const bool is_void = !inside || std::isnan(band.view().heights(c, r - band.rows.first));
+        if (is_void != void_in_source) return;
+      }
+    }
+    ++(void_in_source ? counts.invented_inside : counts.lost_inside);
+  }
+
+  /// Fixed seed, sorted from North to South.
+  void draw_points(std::int64_t count) {
+    std::mt19937_64 random(20040808);
+    const auto uniform = [&](double end) { return static_cast<double>(random() >> 11U) * 0x1p-53 * end; };
+    points_.reserve(static_cast<std::size_t>(count));
+    for (std::int64_t i = 0; i < count; ++i) {
+      const double column = uniform(static_cast<double>(info_.width - 1));
+      points_.push_back({column, uniform(static_cast<double>(info_.height - 1))});
+    }
+    std::sort(points_.begin(), points_.end(), [](const auto& a, const auto& b) { return a.z < b.z; });
+  }
+
+  /// Points whose place lies in this tile row: their source row is in [first - 1, end).
+  void compare_points(const TileRowSurface& surface, const Band& band, std::int64_t first, std::int64_t end,
+                      AccuracyReport& report, double& squares) {
+    const bool last = end == info_.height;
+    for (; next_point_ < points_.size(); ++next_point_) {
+      const WorldPoint source_place = points_[next_point_];
+      if (!last && source_place.z > static_cast<double>(end - 1)) break;
+      if (first > 0 && source_place.z < static_cast<double>(first)) continue;  // between the last row and the edge
+      const auto i = static_cast<std::int64_t>(source_place.x);
+      const auto j = static_cast<std::int64_t>(source_place.z);
+      const View2D<const float> heights = band.view().heights;
+      const auto h = [&](std::int64_t c, std::int64_t r) {
+        return double{heights(std::min(c, info_.width - 1), std::min(r, info_.height - 1) - band.rows.first)};
+      };
+      const double u = source_place.x - static_cast<double>(i);
+      const double v = source_place.z - static_cast<double>(j);
+      const double expected =
+          (1 - v) * ((1 - u) * h(i, j) + u * h(i + 1, j)) + v * ((1 - u) * h(i, j + 1) + u * h(i + 1, j + 1));
+      const double stored = elevation_at(surface, {world_x(source_place.x), world_z(source_place.z)});
+      if (std::isnan(expected) || std::isnan(stored)) continue;
+      const double error = std::abs(stored - expected - datum_);
+      ++report.random_points;
+      squares += error * error;
+      report.random_max = std::max(report.random_max, error);
+    }
+  }
+
+  const ArchiveReader& archive_;
+  const TileGrid& grid_;
+  const SourceRecord& record_;
+  HeightSource& source_;
+  const SourceInfo& info_;
+  double datum_ = 0.0;
+  double span_ = 0.0;
+  std::int64_t reach_ = 2;
+  std::vector<WorldPoint> points_;  ///< in source columns and rows
+  std::size_t next_point_ = 0;
+  ErrorHistogram histogram_;
+};
+
+}  // namespace
+
+AccuracyReport compare_with_source(const ArchiveReader& archive, HeightSource& source, std::int64_t random_points,
+                                   int threads, const std::function<void(std::int64_t, std::int64_t)>& progress,
+                                   const std::atomic<bool>& cancel) {
+  AccuracyReport report;
+  oneapi::tbb::task_arena arena(threads > 0 ? threads : oneapi::tbb::task_arena::automatic);
+  arena.execute([&] { report = Comparison(archive, source, random_points).run(progress, cancel); });
+  return report;
+}
+
+}  // namespace isohf
