@@ -1,0 +1,267 @@
+#include "renderer.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "shaders.h"
+
+namespace isohf::view {
+namespace {
+
+constexpr Vec3 kHorizon{0.62, 0.70, 0.78};
+constexpr Vec3 kZenith{0.16, 0.30, 0.55};
+
+void set_vec3(GLint place, Vec3 value) {
+  glUniform3f(place, static_cast<float>(value.x), static_cast<float>(value.y), static_cast<float>(value.z));
+}
+
+/// A sky that dims with the sun.
+Vec3 by_day(Vec3 colour, Vec3 sun) {
+  return std::clamp(sun.y * 5.0 + 0.35, 0.06, 1.0) * colour;
+}
+
+/// Corners' outcome against the clip volume: true where all eight lie beyond one plane.
+bool outside_view(const Mat4& clip, Vec3 low, Vec3 high) {
+  std::array<int, 5> beyond{};
+  for (int corner = 0; corner < 8; ++corner) {
+    const double x = (corner & 1) != 0 ? high.x : low.x;
+    const double y = (corner & 2) != 0 ? high.y : low.y;
+    const double z = (corner & 4) != 0 ? high.z : low.z;
+    std::array<double, 4> c{};
+    for (int row = 0; row < 4; ++row) {
+      c[static_cast<std::size_t>(row)] =
+          clip.at(row, 0) * x + clip.at(row, 1) * y + clip.at(row, 2) * z + clip.at(row, 3);
+    }
+    beyond[0] += c[0] < -c[3] ? 1 : 0;
+    beyond[1] += c[0] > c[3] ? 1 : 0;
+    beyond[2] += c[1] < -c[3] ? 1 : 0;
+    beyond[3] += c[1] > c[3] ? 1 : 0;
+    beyond[4] += c[2] > c[3] ? 1 : 0;
+  }
+  return std::any_of(beyond.begin(), beyond.end(), [](int count) { return count == 8; });
+}
+
+double focal_px(const ViewState& view) {
+  return view.height / (2.0 * std::tan(view.fov_y_rad / 2.0));
+}
+
+}  // namespace
+
+TerrainFrame terrain_frame(const TileSource& source, const ViewState& view) {
+  const TileGrid& grid = source.grid();
+  const double aspect = static_cast<double>(view.width) / view.height;
+  TerrainFrame frame;
+  frame.clip_from_eye =
+      perspective(view.fov_y_rad, aspect, view.far_distance * kNearShare, view.far_distance) * look_along(view.forward);
+  frame.anchor_tile = grid.locate({view.eye.x, view.eye.z}).tile;
+  frame.anchor = {static_cast<double>(frame.anchor_tile.column) * grid.extent_x() - view.eye.x,
+                  source.scale().offset * view.exaggeration - view.eye.y,
+                  static_cast<double>(frame.anchor_tile.row) * grid.extent_z() - view.eye.z};
+  frame.code_height = source.scale().scale * view.exaggeration;
+  frame.code_slope = frame.code_height;
+  return frame;
+}
+
+Renderer::Renderer(const TileSource& source, const SharedGeometry& shared)
+    : source_(source),
+      shared_(shared),
+      whole_(whole_bounds(source)),
+      shade_{{"terrain", false, terrain_fragment_shader(false)}, {"terrain", true, terrain_fragment_shader(true)}},
+      flat_{{"wire", false, flat_fragment_shader(false)}, {"wire", true, flat_fragment_shader(true)}},
+      sky_("sky", sky_vertex_shader(), sky_fragment_shader()) {}
+
+double Renderer::level_of(const ViewState& view, TileIndex tile, const TileBounds& bounds) const {
+  const TileGrid& grid = source_.grid();
+  const int levels = grid.shape().levels();
+  double level = 0.0;
+  if (view.fixed_level) {
+    level = std::clamp(*view.fixed_level, 0.0, static_cast<double>(levels - 1));
+  } else {
+    // Section 3.9, with the straight distance in place of camera-space depth: turning the head changes no mesh.
+    const Vec3 centre{(static_cast<double>(tile.column) + 0.5) * grid.extent_x(),
+                      0.5 * (bounds.low + bounds.high) * view.exaggeration,
+                      (static_cast<double>(tile.row) + 0.5) * grid.extent_z()};
+    const double distance = length(centre - view.eye);
+    level = fractional_level(projected_area_px(triangle_area(grid, 1.0), focal_px(view), distance), levels);
+  }
+  return view.plain_switching ? std::round(level) : level;
+}
+
+std::vector<Renderer::Item> Renderer::visible_items(const ViewState& view, const TerrainFrame& frame,
+                                                    const std::array<std::int64_t, 4>& range,
+                                                    const ResidentTile& resident, FrameFigures& figures) const {
+  const TileGrid& grid = source_.grid();
+  std::vector<Item> items;
+  for (std::int64_t row = range[2]; row <= range[3]; ++row) {
+    for (std::int64_t column = range[0]; column <= range[1]; ++column) {
+      const TileIndex tile{column, row};
+      const TileBounds bounds = source_.bounds(tile);
+      if (!bounds.stored) continue;
+      const Vec3 low = Vec3{static_cast<double>(column) * grid.extent_x(), bounds.low * view.exaggeration,
+                            static_cast<double>(row) * grid.extent_z()} -
+                       view.eye;
+      const Vec3 high = low + Vec3{grid.extent_x(), (bounds.high - bounds.low) * view.exaggeration, grid.extent_z()};
+      if (outside_view(frame.clip_from_eye, low, high)) continue;
+      const TileSlot* slot = resident(tile);
+      if (slot == nullptr) {
+        ++figures.absent_tiles;
+        continue;
+      }
+      const LodBlend blend = lod_blend(level_of(view, tile, bounds), grid.shape().levels());
+      items.push_back({tile, slot, bounds.has_voids, length(0.5 * (low + high)), blend});
+    }
+  }
+  std::sort(items.begin(), items.end(), [](const Item& a, const Item& b) { return a.distance < b.distance; });
+  figures.visible_tiles = static_cast<std::int64_t>(items.size());
+  return items;
+}
+
+void Renderer::begin_shading(const TerrainProgram& program, const ViewState& view, const TerrainFrame& frame) const {
+  program.begin(source_.grid(), frame);
+  const Vec3 sun = normalised(view.sun);
+  const ViewScale scale = source_.scale();
+  const double codes = std::max(whole_.high - whole_.low, 1e-9) / scale.scale;
+  glUniform1i(program.uniform("mode"), static_cast<GLint>(view.mode));
+  glUniform1i(program.uniform("borders"), view.borders ? 1 : 0);
+  glUniform2f(program.uniform("ramp"), static_cast<float>((whole_.low - scale.offset) / scale.scale),
+              static_cast<float>(1.0 / codes));
+  set_vec3(program.uniform("sun"), sun);
+  set_vec3(program.uniform("horizon"), by_day(kHorizon, sun));
+  const double k = 2.0 * view.exaggeration;  // the paper's k for the Sun and terrestrial mountains
+  glUniform1f(program.uniform("penumbra"), static_cast<float>(k));
+  const double haze_begin = view.haze ? 0.55 * view.far_distance : 1.0;
+  const double haze_end = view.haze ? view.far_distance : 0.0;
+  glUniform2f(program.uniform("haze"), static_cast<float>(haze_begin), static_cast<float>(haze_end));
+}
+
+void Renderer::draw_mesh(const TerrainProgram& program, const TerrainFrame& frame, const Item& item, int level,
+                         FrameFigures& figures) const {
+  const TileShape& shape = source_.grid().shape();
+  program.set_tile(source_.grid(), frame, item.tile);
+  glUniform1i(program.uniform("level"), level);
+  glUniform1i(program.uniform("is_stitch"), 0);
+  item.slot->bind();
+  glEnable(GL_CULL_FACE);
+  shared_.draw_strip(level);
+  figures.triangles += shape.strip_triangle_count(level);
+  ++figures.draw_calls;
+  if (!shared_.has_stitch(level)) return;
+  // Stitch triangles stand upright and are seen from either side.
+  glUniform1i(program.uniform("is_stitch"), 1);
+  glDisable(GL_CULL_FACE);
+  shared_.draw_stitch(level);
+  figures.triangles += shape.stitch_triangle_count(level);
+  ++figures.draw_calls;
+}
+
+void Renderer::draw_opaque(const ViewState& view, const TerrainFrame& frame, const std::vector<Item>& items,
+                           FrameFigures& figures) const {
+  glDisable(GL_BLEND);
+  glDepthMask(GL_TRUE);
+  for (const bool voids : {false, true}) {
+    const TerrainProgram& program = shade_.of(voids);
+    begin_shading(program, view, frame);
+    glUniform1f(program.uniform("alpha"), 1.0F);
+    for (const Item& item : items) {
+      if (item.has_voids == voids) draw_mesh(program, frame, item, item.blend.first, figures);
+    }
+  }
+}
+
+// The second mesh shows only where it lies in front of the first. Where both lie in one plane (water, a plain), fading
+// in and then switching to the coarse mesh at β = ½ is only seamless if the coarse mesh counts as in front there in
+// both stages: nearer by two depth steps while it fades in over the fine one, and the fine one farther by two while it
+// fades out over the coarse one.
+void Renderer::draw_fading(const ViewState& view, const TerrainFrame& frame, const std::vector<Item>& items,
+                           FrameFigures& figures) const {
+  glEnable(GL_BLEND);
+  glBlendFunc(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA);
+  glDepthMask(GL_FALSE);
+  glEnable(GL_POLYGON_OFFSET_FILL);
+  for (const bool voids : {false, true}) {
+    const TerrainProgram& program = shade_.of(voids);
+    begin_shading(program, view, frame);
+    for (auto item = items.rbegin(); item != items.rend(); ++item) {
+      if (item->has_voids != voids || item->blend.alpha <= 0.0 || item->blend.second == item->blend.first) continue;
+      glPolygonOffset(0.0F, item->blend.second > item->blend.first ? -2.0F : 2.0F);
+      glUniform1f(program.uniform("alpha"), static_cast<float>(item->blend.alpha));
+      draw_mesh(program, frame, *item, item->blend.second, figures);
+    }
+  }
+  glDisable(GL_POLYGON_OFFSET_FILL);
+  glDepthMask(GL_TRUE);
+  glDisable(GL_BLEND);
+}
+
+void Renderer::draw_wires(const TerrainFrame& frame, const std::vector<Item>& items, FrameFigures& figures) const {
+  glPolygonMode(GL_FRONT_AND_BACK, GL_LINE);
+  glEnable(GL_POLYGON_OFFSET_LINE);
+  glPolygonOffset(-1.0F, -2.0F);
+  glEnable(GL_BLEND);
+  glBlendFunc(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA);
+  for (const bool voids : {false, true}) {
+    const TerrainProgram& program = flat_.of(voids);
+    program.begin(source_.grid(), frame);
+    glUniform4f(program.uniform("flat_colour"), 0.05F, 0.06F, 0.09F, 0.7F);
+    for (const Item& item : items) {
+      if (item.has_voids == voids) draw_mesh(program, frame, item, item.blend.first, figures);
+    }
+  }
+  glDisable(GL_BLEND);
+  glDisable(GL_POLYGON_OFFSET_LINE);
+  glPolygonMode(GL_FRONT_AND_BACK, GL_FILL);
+}
+
+void Renderer::draw_sky(const ViewState& view) const {
+  sky_.use();
+  const Mat4 camera = look_along(view.forward);
+  std::array<float, 9> world_from_camera{};  // column-major: the columns are the camera's axes in the world
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) {
+      world_from_camera[static_cast<std::size_t>(column * 3 + row)] = static_cast<float>(camera.at(column, row));
+    }
+  }
+  const double half = std::tan(view.fov_y_rad / 2.0);
+  const Vec3 sun = normalised(view.sun);
+  glUniformMatrix3fv(sky_.uniform("world_from_camera"), 1, GL_FALSE, world_from_camera.data());
+  glUniform2f(sky_.uniform("half_view"), static_cast<float>(half * view.width / view.height), static_cast<float>(half));
+  set_vec3(sky_.uniform("sun"), sun);
+  set_vec3(sky_.uniform("horizon"), by_day(kHorizon, sun));
+  set_vec3(sky_.uniform("zenith"), by_day(kZenith, sun));
+  glDisable(GL_DEPTH_TEST);
+  glBindVertexArray(nothing_.get());
+  glDrawArrays(GL_TRIANGLES, 0, 3);
+  glEnable(GL_DEPTH_TEST);
+}
+
+FrameFigures Renderer::draw(const ViewState& view, std::int64_t first_column, std::int64_t last_column,
+                            std::int64_t first_row, std::int64_t last_row, const ResidentTile& resident) {
+  FrameFigures figures;
+  const TerrainFrame frame = terrain_frame(source_, view);
+  const std::vector<Item> items =
+      visible_items(view, frame, {first_column, last_column, first_row, last_row}, resident, figures);
+  glViewport(0, 0, view.width, view.height);
+  glEnable(GL_DEPTH_TEST);
+  glDepthFunc(GL_LESS);
+  glDepthMask(GL_TRUE);
+  glFrontFace(GL_CCW);
+  glCullFace(GL_BACK);
+  glClear(GL_DEPTH_BUFFER_BIT);
+  draw_sky(view);
+  draw_opaque(view, frame, items, figures);
+  figures.passes = 1;
+  const bool fades = std::any_of(items.begin(), items.end(), [](const Item& item) { return item.blend.alpha > 0.0; });
+  if (fades) {
+    draw_fading(view, frame, items, figures);
+    ++figures.passes;
+  }
+  if (view.wireframe) {
+    draw_wires(frame, items, figures);
+    ++figures.passes;
+  }
+  glBindVertexArray(0);
+  return figures;
+}
+
+}  // namespace isohf::view

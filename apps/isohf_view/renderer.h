@@ -1,0 +1,81 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "isohf/lattice/lod.h"
+#include "terrain_program.h"
+#include "tile_buffers.h"
+#include "tile_source.h"
+#include "view_state.h"
+
+namespace isohf::view {
+
+/// What one frame drew.
+struct FrameFigures {
+  std::int64_t visible_tiles = 0;  ///< in the view and resident
+  std::int64_t absent_tiles = 0;   ///< in the view, stored, not resident yet
+  std::int64_t triangles = 0;
+  std::int64_t draw_calls = 0;  ///< of terrain; at most two for each visible tile and pass
+  std::int64_t passes = 0;      ///< over the terrain: opaque, fading, wires
+};
+
+/// Finds a tile's buffers; nullptr where the tile is not resident.
+using ResidentTile = std::function<const TileSlot*(TileIndex)>;
+
+/// Draws the heightfield: sky, opaque pass, fading pass (paper sections 3.3-3.9), wires.
+class Renderer {
+ public:
+  Renderer(const TileSource& source, const SharedGeometry& shared);
+
+  /// Draws tiles first..last of both axes, as far as resident, into the bound framebuffer.
+  FrameFigures draw(const ViewState& view, std::int64_t first_column, std::int64_t last_column, std::int64_t first_row,
+                    std::int64_t last_row, const ResidentTile& resident);
+
+  /// Level of detail at which a tile is drawn, fractional.
+  [[nodiscard]] double level_of(const ViewState& view, TileIndex tile, const TileBounds& bounds) const;
+
+ private:
+  struct Item {
+    TileIndex tile;
+    const TileSlot* slot;
+    bool has_voids;
+    double distance;
+    LodBlend blend;
+  };
+  struct Variants {
+    TerrainProgram solid;
+    TerrainProgram voids;
+    [[nodiscard]] const TerrainProgram& of(bool has_voids) const { return has_voids ? voids : solid; }
+  };
+
+  [[nodiscard]] std::vector<Item> visible_items(const ViewState& view, const TerrainFrame& frame,
+                                                const std::array<std::int64_t, 4>& range, const ResidentTile& resident,
+                                                FrameFigures& figures) const;
+  void draw_sky(const ViewState& view) const;
+  void draw_opaque(const ViewState& view, const TerrainFrame& frame, const std::vector<Item>& items,
+                   FrameFigures& figures) const;
+  void draw_fading(const ViewState& view, const TerrainFrame& frame, const std::vector<Item>& items,
+                   FrameFigures& figures) const;
+  void draw_wires(const TerrainFrame& frame, const std::vector<Item>& items, FrameFigures& figures) const;
+  void draw_mesh(const TerrainProgram& program, const TerrainFrame& frame, const Item& item, int level,
+                 FrameFigures& figures) const;
+  void begin_shading(const TerrainProgram& program, const ViewState& view, const TerrainFrame& frame) const;
+
+  const TileSource& source_;
+  const SharedGeometry& shared_;
+  TileBounds whole_;
+  Variants shade_;
+  Variants flat_;
+  Program sky_;
+  VertexArray nothing_;
+};
+
+/// The frame's uniforms for a view: positions are told from an anchor tile under the eye, in floats near the eye.
+[[nodiscard]] TerrainFrame terrain_frame(const TileSource& source, const ViewState& view);
+
+/// Nearest and farthest depth that a frame draws.
+inline constexpr double kNearShare = 2e-4;  ///< of the far distance
+
+}  // namespace isohf::view

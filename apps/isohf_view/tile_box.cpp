@@ -1,0 +1,190 @@
+#include "tile_box.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "isohf/base/error.h"
+
+namespace isohf::view {
+namespace {
+
+/// What a tile takes on the CPU while it is decoded and waits: the codes twice over, and the inflated payload.
+constexpr std::uint64_t kCpuCopies = 4;
+
+std::int64_t wrap(std::int64_t value, std::int64_t size) {
+  return value % size;
+}
+
+}  // namespace
+
+TileBox::TileBox(const TileSource& source, const SharedGeometry& shared, const TileBoxLimits& limits)
+    : source_(source), shared_(shared), limits_(limits), loader_(source, limits.workers) {
+  const std::uint64_t tile_bytes = TileSlot::bytes(shared.shape());
+  const std::uint64_t per_frame = limits.upload_bytes_per_frame / tile_bytes + 1;
+  const std::uint64_t tiles = limits.memory_bytes / tile_bytes;
+  // A quarter of the memory at most is for tiles on their way.
+  in_flight_limit_ = static_cast<std::size_t>(std::max<std::uint64_t>(
+      1, std::min<std::uint64_t>(per_frame + 2 * static_cast<std::uint64_t>(limits.workers), tiles / 4 / kCpuCopies)));
+  const std::uint64_t on_the_way = in_flight_limit_ * kCpuCopies;
+  if (tiles < on_the_way + 4) {
+    throw Error(ErrorCode::kInvalidArgument,
+                fmt::format("memory for tiles: {} bytes hold fewer than four tiles of {} bytes and those on their way; "
+                            "{} are required",
+                            limits.memory_bytes, tile_bytes, (on_the_way + 4) * tile_bytes));
+  }
+  max_slots_ = static_cast<std::int64_t>(tiles - on_the_way);
+}
+
+std::size_t TileBox::cell_of(TileIndex tile) const {
+  return static_cast<std::size_t>(wrap(tile.column, box_columns_) + wrap(tile.row, box_rows_) * box_columns_);
+}
+
+void TileBox::resize(WorldPoint centre, double radius) {
+  const TileGrid& grid = source_.grid();
+  const auto count_for = [](double r, double extent, std::int64_t all) {
+    const double needed = std::floor(2.0 * r / extent) + 2.0;
+    return needed >= static_cast<double>(all) ? all : static_cast<std::int64_t>(needed);
+  };
+  // A box that memory does not hold shrinks to one that it does; figures say so.
+  double kept = radius;
+  std::int64_t columns = 0;
+  std::int64_t rows = 0;
+  for (;;) {
+    columns = count_for(kept, grid.extent_x(), grid.tile_columns());
+    rows = count_for(kept, grid.extent_z(), grid.tile_rows());
+    if (columns * rows <= max_slots_ || kept < 1e-6 * grid.extent_x()) break;
+    kept *= 0.98;
+  }
+  columns = std::min(columns, max_slots_);
+  rows = std::min(rows, std::max<std::int64_t>(1, max_slots_ / columns));
+  figures_.radius = kept;
+  if (columns != box_columns_ || rows != box_rows_) {
+    // Rehouse what is resident and still fits.
+    std::vector<Cell> old = std::move(cells_);
+    box_columns_ = columns;
+    box_rows_ = rows;
+    cells_ = std::vector<Cell>(static_cast<std::size_t>(columns * rows));
+    for (Cell& cell : old) {
+      if (cell.state == State::kUnused) continue;
+      Cell& home = cells_[cell_of(cell.tile)];
+      if (home.state == State::kUnused) {
+        home = std::move(cell);
+      } else if (cell.slot) {
+        spare_.push_back(std::move(cell.slot));
+      }
+    }
+  }
+  const auto first = [](double place, double r, double extent, std::int64_t count, std::int64_t all) {
+    const double at = std::floor((place - r) / extent);
+    const double low = std::clamp(at, 0.0, static_cast<double>(all - count));
+    return static_cast<std::int64_t>(low);
+  };
+  range_.first_column = first(centre.x, kept, grid.extent_x(), columns, grid.tile_columns());
+  range_.first_row = first(centre.z, kept, grid.extent_z(), rows, grid.tile_rows());
+  range_.last_column = range_.first_column + columns - 1;
+  range_.last_row = range_.first_row + rows - 1;
+}
+
+void TileBox::enter(Cell& cell, TileIndex tile) {
+  if (cell.slot) spare_.push_back(std::move(cell.slot));
+  cell.tile = tile;
+  cell.state = source_.bounds(tile).stored ? State::kMissing : State::kVoid;
+}
+
+void TileBox::update(WorldPoint centre, double radius) {
+  figures_.uploads = 0;
+  figures_.upload_bytes = 0;
+  resize(centre, radius);
+  for (std::int64_t row = range_.first_row; row <= range_.last_row; ++row) {
+    for (std::int64_t column = range_.first_column; column <= range_.last_column; ++column) {
+      Cell& cell = cells_[cell_of({column, row})];
+      if (!(cell.tile == TileIndex{column, row})) enter(cell, {column, row});
+    }
+  }
+  loader_.collect(waiting_);
+  upload();
+  request(centre);
+  count();
+}
+
+void TileBox::upload() {
+  std::size_t done = 0;
+  for (; done < waiting_.size(); ++done) {
+    if (figures_.upload_bytes >= limits_.upload_bytes_per_frame) break;
+    place(waiting_[done]);
+  }
+  waiting_.erase(waiting_.begin(), waiting_.begin() + static_cast<std::ptrdiff_t>(done));
+}
+
+void TileBox::place(LoadedTile& loaded) {
+  if (!range_.contains(loaded.tile)) return;  // the box has moved on
+  Cell& cell = cells_[cell_of(loaded.tile)];
+  if (cell.state != State::kRequested && cell.state != State::kMissing) return;
+  if (loaded.codes.empty()) {
+    cell.state = State::kBroken;
+    if (!error_) error_ = loaded.error;
+    return;
+  }
+  if (spare_.empty()) {
+    cell.slot = std::make_unique<TileSlot>(shared_);
+  } else {
+    cell.slot = std::move(spare_.back());
+    spare_.pop_back();
+  }
+  cell.slot->upload(loaded.codes);
+  cell.state = State::kResident;
+  ++figures_.uploads;
+  figures_.upload_bytes += loaded.codes.size() * sizeof(std::uint16_t);
+}
+
+void TileBox::request(WorldPoint centre) {
+  const std::size_t busy = loader_.in_flight() + waiting_.size();
+  if (busy >= in_flight_limit_) return;
+  const TileGrid& grid = source_.grid();
+  std::vector<std::pair<double, Cell*>> missing;
+  for (Cell& cell : cells_) {
+    if (cell.state != State::kMissing) continue;
+    const double x = (static_cast<double>(cell.tile.column) + 0.5) * grid.extent_x() - centre.x;
+    const double z = (static_cast<double>(cell.tile.row) + 0.5) * grid.extent_z() - centre.z;
+    missing.emplace_back(x * x + z * z, &cell);
+  }
+  const std::size_t wanted = std::min(missing.size(), in_flight_limit_ - busy);
+  std::partial_sort(missing.begin(), missing.begin() + static_cast<std::ptrdiff_t>(wanted), missing.end(),
+                    [](const auto& a, const auto& b) { return a.first < b.first; });
+  for (std::size_t i = 0; i < wanted; ++i) {
+    missing[i].second->state = State::kRequested;
+    loader_.request(missing[i].second->tile);
+  }
+}
+
+void TileBox::count() {
+  figures_.resident_tiles = 0;
+  figures_.missing_tiles = 0;
+  std::uint64_t slots = spare_.size();
+  for (const Cell& cell : cells_) {
+    if (cell.slot) ++slots;
+    if (cell.state == State::kResident) ++figures_.resident_tiles;
+    if (cell.state == State::kMissing || cell.state == State::kRequested) ++figures_.missing_tiles;
+  }
+  figures_.resident_bytes =
+      TileSlot::bytes(shared_.shape()) * (slots + kCpuCopies * (loader_.in_flight() + waiting_.size()));
+}
+
+void TileBox::finish(WorldPoint centre, double radius) {
+  for (;;) {
+    update(centre, radius);
+    if (figures_.missing_tiles == 0) return;
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+}
+
+const TileSlot* TileBox::resident(TileIndex tile) const {
+  if (!range_.contains(tile)) return nullptr;
+  const Cell& cell = cells_[cell_of(tile)];
+  return cell.tile == tile && cell.state == State::kResident ? cell.slot.get() : nullptr;
+}
+
+}  // namespace isohf::view

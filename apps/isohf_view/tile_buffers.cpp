@@ -1,0 +1,124 @@
+#include "tile_buffers.h"
+
+#include <algorithm>
+
+#include "isohf/base/assert.h"
+#include "isohf/lattice/tile_mapping.h"
+
+namespace isohf::view {
+namespace {
+
+std::vector<std::int16_t> object_places(const TileShape& shape) {
+  std::vector<std::int16_t> places;
+  places.reserve(static_cast<std::size_t>(2 * shape.stored_vertex_count()));
+  for (int row = 0; row < shape.rows(); ++row) {
+    for (int column = 0; column < shape.columns(); ++column) {
+      const ObjectVertex place = object_from_grid(shape, GridVertex{column, row});
+      places.push_back(static_cast<std::int16_t>(place.x));
+      places.push_back(static_cast<std::int16_t>(place.z));
+    }
+  }
+  return places;
+}
+
+template <typename T>
+GLsizeiptr upload_static(GLenum target, const std::vector<T>& values) {
+  const auto size = static_cast<GLsizeiptr>(values.size() * sizeof(T));
+  glBufferData(target, size, values.data(), GL_STATIC_DRAW);
+  return size;
+}
+
+const void* offset_pointer(std::size_t bytes) {
+  return reinterpret_cast<const void*>(bytes);
+}
+
+}  // namespace
+
+SharedGeometry::SharedGeometry(const TileShape& shape, const IndexArrays& arrays) : shape_(shape) {
+  const bool fits_16_bits = shape.stored_vertex_count() <= 65536;
+  index_type_ = fits_16_bits ? GL_UNSIGNED_SHORT : GL_UNSIGNED_INT;
+  const std::size_t index_bytes = fits_16_bits ? 2 : 4;
+
+  std::vector<std::uint32_t> all;
+  for (const auto& strip : arrays.strips) {
+    strip_offsets_bytes_.push_back(all.size() * index_bytes);
+    strip_counts_.push_back(static_cast<GLsizei>(strip.size()));
+    all.insert(all.end(), strip.begin(), strip.end());
+  }
+  stitch_offset_bytes_ = all.size() * index_bytes;
+  for (const std::size_t count : arrays.stitch_counts) stitch_counts_.push_back(static_cast<GLsizei>(count));
+  all.insert(all.end(), arrays.stitch.begin(), arrays.stitch.end());
+
+  glBindVertexArray(0);
+  glBindBuffer(GL_ARRAY_BUFFER, xz_.get());
+  bytes_ += static_cast<std::uint64_t>(upload_static(GL_ARRAY_BUFFER, object_places(shape)));
+  // The element array belongs to a vertex array's state: fill the buffer through another target.
+  glBindBuffer(GL_COPY_WRITE_BUFFER, indices_.get());
+  if (fits_16_bits) {
+    bytes_ += static_cast<std::uint64_t>(
+        upload_static(GL_COPY_WRITE_BUFFER, std::vector<std::uint16_t>(all.begin(), all.end())));
+  } else {
+    bytes_ += static_cast<std::uint64_t>(upload_static(GL_COPY_WRITE_BUFFER, all));
+  }
+  check_gl("uploading the shared vertex and index arrays");
+}
+
+void SharedGeometry::draw_strip(int level) const {
+  const auto i = static_cast<std::size_t>(level);
+  glDrawElements(GL_TRIANGLE_STRIP, strip_counts_[i], index_type_, offset_pointer(strip_offsets_bytes_[i]));
+}
+
+void SharedGeometry::draw_stitch(int level) const {
+  glDrawElements(GL_TRIANGLES, stitch_counts_[static_cast<std::size_t>(level)], index_type_,
+                 offset_pointer(stitch_offset_bytes_));
+}
+
+TileSlot::TileSlot(const SharedGeometry& shared)
+    : vertices_(static_cast<std::size_t>(shared.shape().stored_vertex_count())) {
+  glBindVertexArray(array_.get());
+  glBindBuffer(GL_ARRAY_BUFFER, shared.xz());
+  glVertexAttribIPointer(0, 2, GL_SHORT, 0, nullptr);
+  glEnableVertexAttribArray(0);
+  glBindBuffer(GL_ARRAY_BUFFER, codes_.get());
+  glBufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(vertices_ * sizeof(std::uint16_t)), nullptr, GL_DYNAMIC_DRAW);
+  glVertexAttribIPointer(1, 1, GL_UNSIGNED_SHORT, 0, nullptr);
+  glEnableVertexAttribArray(1);
+  glVertexAttribI4ui(2, 0, 0, 0, 0);
+  glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, shared.indices());
+  glBindVertexArray(0);
+
+  glBindTexture(GL_TEXTURE_BUFFER, codes_texture_.get());
+  glTexBuffer(GL_TEXTURE_BUFFER, GL_R16UI, codes_.get());
+  check_gl("making a tile's elevation buffer");
+}
+
+void TileSlot::upload(std::span<const std::uint16_t> codes) {
+  ISOHF_ASSERT(codes.size() == vertices_);
+  glBindBuffer(GL_ARRAY_BUFFER, codes_.get());
+  glBufferSubData(GL_ARRAY_BUFFER, 0, static_cast<GLsizeiptr>(codes.size_bytes()), codes.data());
+}
+
+void TileSlot::upload_shadow(std::span<const std::uint16_t> shadow) {
+  glBindVertexArray(array_.get());
+  if (shadow.empty()) {
+    glDisableVertexAttribArray(2);
+    shadow_.reset();
+    glBindVertexArray(0);
+    return;
+  }
+  ISOHF_ASSERT(shadow.size() == vertices_);
+  if (!shadow_) shadow_.emplace();
+  glBindBuffer(GL_ARRAY_BUFFER, shadow_->get());
+  glBufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(shadow.size_bytes()), shadow.data(), GL_DYNAMIC_DRAW);
+  glVertexAttribIPointer(2, 1, GL_UNSIGNED_SHORT, 0, nullptr);
+  glEnableVertexAttribArray(2);
+  glBindVertexArray(0);
+}
+
+void TileSlot::bind() const {
+  glBindVertexArray(array_.get());
+  glActiveTexture(GL_TEXTURE0);
+  glBindTexture(GL_TEXTURE_BUFFER, codes_texture_.get());
+}
+
+}  // namespace isohf::view

@@ -1,0 +1,68 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include "gl_objects.h"
+#include "index_arrays.h"
+#include "isohf/lattice/tile_shape.h"
+
+namespace isohf::view {
+
+/// What all tiles of one shape share on the GPU (paper section 3.2): the object-space (x, z) of every stored vertex as
+/// GL_SHORT pairs, and the index arrays of all levels in one buffer, 16 bits an index where they fit.
+class SharedGeometry {
+ public:
+  SharedGeometry(const TileShape& shape, const IndexArrays& arrays);
+
+  [[nodiscard]] const TileShape& shape() const { return shape_; }
+  [[nodiscard]] GLuint xz() const { return xz_.get(); }
+  [[nodiscard]] GLuint indices() const { return indices_.get(); }
+  [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
+
+  /// One draw call each, with the tile's vertex array bound.
+  void draw_strip(int level) const;
+  void draw_stitch(int level) const;
+  [[nodiscard]] bool has_stitch(int level) const { return stitch_counts_[static_cast<std::size_t>(level)] > 0; }
+
+ private:
+  TileShape shape_;
+  Buffer xz_;
+  Buffer indices_;
+  GLenum index_type_;
+  std::vector<GLsizei> strip_counts_;
+  std::vector<std::size_t> strip_offsets_bytes_;
+  std::vector<GLsizei> stitch_counts_;
+  std::size_t stitch_offset_bytes_ = 0;
+  std::uint64_t bytes_ = 0;
+};
+
+/// One tile on the GPU: two bytes a vertex, in a buffer that is both a vertex attribute and, for the neighbours that a
+/// normal needs, a buffer texture. A slot is reused for tile after tile.
+class TileSlot {
+ public:
+  explicit TileSlot(const SharedGeometry& shared);
+
+  /// codes [C x R]
+  void upload(std::span<const std::uint16_t> codes);
+  /// Shadow heights in codes of the same scale, [C x R]; two more bytes a vertex from the first call on. An empty span
+  /// takes the shadow away.
+  void upload_shadow(std::span<const std::uint16_t> shadow);
+
+  /// Binds the vertex array and, to texture unit 0, the codes.
+  void bind() const;
+
+  [[nodiscard]] static std::uint64_t bytes(const TileShape& shape) {
+    return static_cast<std::uint64_t>(shape.stored_vertex_count()) * sizeof(std::uint16_t);
+  }
+
+ private:
+  std::size_t vertices_;
+  Buffer codes_;
+  std::optional<Buffer> shadow_;
+  Texture codes_texture_;
+  VertexArray array_;
+};
+
+}  // namespace isohf::view

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "isohf/archive/metadata.h"
+#include "isohf/lattice/tile_grid.h"
+
+namespace isohf::view {
+
+/// The code that means "void" on the GPU, whatever the archive's own is.
+inline constexpr std::uint16_t kVoidCode = 65535;
+
+/// How the viewer's 16-bit codes become elevations: elevation = offset + scale * code, vertical units.
+struct ViewScale {
+  double offset = 0.0;
+  double scale = 1.0;
+};
+
+/// What is known of a tile before it is read.
+struct TileBounds {
+  bool stored = false;  ///< false: wholly void
+  bool has_voids = false;
+  double low = 0.0;  ///< vertical units
+  double high = 0.0;
+};
+
+/// Where tiles come from. All functions may be called from any number of threads at once.
+class TileSource {
+ public:
+  TileSource() = default;
+  TileSource(const TileSource&) = delete;
+  TileSource& operator=(const TileSource&) = delete;
+  virtual ~TileSource() = default;
+
+  [[nodiscard]] virtual const TileGrid& grid() const = 0;
+  [[nodiscard]] virtual ViewScale scale() const = 0;
+  [[nodiscard]] virtual TileBounds bounds(TileIndex tile) const = 0;
+  /// codes [C x R] out, 0..65534, or kVoidCode. Throws Error naming the tile.
+  virtual void read(TileIndex tile, std::span<std::uint16_t> codes) const = 0;
+};
+
+/// Opens an archive for viewing. 16- and 8-bit codes are taken as they are; float elevations are rounded to 65535
+/// steps between the dataset's smallest and largest elevation. Throws what ArchiveReader throws.
+[[nodiscard]] std::unique_ptr<TileSource> open_archive(const std::string& path);
+
+/// Lowest and highest elevation of the tiles together; {0, 0} where all is void.
+[[nodiscard]] TileBounds whole_bounds(const TileSource& source);
+
+}  // namespace isohf::view

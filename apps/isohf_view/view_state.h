@@ -1,0 +1,38 @@
+#pragma once
+
+#include <optional>
+
+#include "vec.h"
+
+namespace isohf::view {
+
+/// How the ground is coloured; the numbers are the terrain fragment shader's.
+enum class ColourMode { kElevation = 0, kPlain = 1, kLevels = 2, kStrips = 3, kTexture = 4, kNormals = 5 };
+
+/// All that a picture depends on besides the tiles.
+struct ViewState {
+  Vec3 eye;                       ///< world units; y as drawn, exaggeration included
+  Vec3 forward{0.0, -0.5, -1.0};  ///< need not be a unit vector
+  double fov_y_rad = 0.87;        ///< 50 degrees
+  double far_distance = 1.0;      ///< world units, > 0
+  Vec3 sun{-0.6, 0.6, -0.5};      ///< towards the sun; need not be a unit vector
+  double exaggeration = 1.0;      ///< of elevations, > 0
+  ColourMode mode = ColourMode::kElevation;
+  bool wireframe = false;
+  bool borders = false;
+  bool haze = true;
+  std::optional<double> fixed_level;  ///< draws every tile at this fractional level
+  bool plain_switching = false;       ///< rounds the level instead of fading: for comparison
+  int width = 1280;                   ///< pixels
+  int height = 720;
+};
+
+/// Unit vector towards a sun at `azimuth_deg`, clockwise from North, `elevation_deg` above the horizon.
+inline Vec3 sun_direction(double azimuth_deg, double elevation_deg) {
+  const double radians = std::acos(-1.0) / 180.0;
+  const double flat = std::cos(elevation_deg * radians);
+  return {flat * std::sin(azimuth_deg * radians), std::sin(elevation_deg * radians),
+          -flat * std::cos(azimuth_deg * radians)};
+}
+
+}  // namespace isohf::view

@@ -1,0 +1,67 @@
+#pragma once
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <functional>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "support/analytic_surface.h"
+#include "tile_source.h"
+
+namespace isohf::test {
+
+/// The analytic surface as a tile source; `alter` may change a tile's codes, `delay` makes reading slow.
+class MemorySource final : public view::TileSource {
+ public:
+  using Alter = std::function<void(TileIndex, std::vector<std::uint16_t>&)>;
+
+  explicit MemorySource(const TileGrid& grid, Alter alter = {}, std::chrono::milliseconds delay = {})
+      : grid_(grid), alter_(std::move(alter)), delay_(delay) {
+    for (std::int64_t flat = 0; flat < grid.tile_count(); ++flat) bounds_.push_back(measure(grid.tile_at(flat)));
+  }
+
+  [[nodiscard]] const TileGrid& grid() const override { return grid_; }
+  [[nodiscard]] view::ViewScale scale() const override { return {-20.0, 0.002}; }
+  [[nodiscard]] view::TileBounds bounds(TileIndex tile) const override {
+    return bounds_[static_cast<std::size_t>(grid_.flat_index(tile))];
+  }
+  void read(TileIndex tile, std::span<std::uint16_t> codes) const override {
+    std::this_thread::sleep_for(delay_);
+    const auto made = make(tile);
+    std::copy(made.begin(), made.end(), codes.begin());
+    ++reads;
+  }
+
+  mutable std::atomic<int> reads{0};
+
+ private:
+  [[nodiscard]] view::TileBounds measure(TileIndex tile) const {
+    const auto codes = make(tile);
+    view::TileBounds bounds{false, false, 1e9, -1e9};
+    for (const std::uint16_t code : codes) {
+      if (code == view::kVoidCode) {
+        bounds.has_voids = true;
+        continue;
+      }
+      bounds.stored = true;
+      bounds.low = std::min(bounds.low, scale().offset + scale().scale * code);
+      bounds.high = std::max(bounds.high, scale().offset + scale().scale * code);
+    }
+    return bounds;
+  }
+  [[nodiscard]] std::vector<std::uint16_t> make(TileIndex tile) const {
+    auto codes = analytic_tile(grid_, tile);
+    if (alter_) alter_(tile, codes);
+    return codes;
+  }
+
+  TileGrid grid_;
+  Alter alter_;
+  std::chrono::milliseconds delay_;
+  std::vector<view::TileBounds> bounds_;
+};
+
+}  // namespace isohf::test

@@ -1,0 +1,56 @@
+#include "renderer.h"
+
+#include <cstdlib>
+
+#include "camera.h"
+#include "gl_test.h"
+#include "memory_source.h"
+#include "offscreen.h"
+#include "png_file.h"
+#include "tile_box.h"
+
+namespace isohf::view {
+namespace {
+
+class RendererTest : public test::GlTest {};
+
+TileGrid small_grid() {
+  return TileGrid::make(TileShape::make(68, 83, 4), 4, 3, 640.0, 640.0);
+}
+
+TEST_F(RendererTest, DrawsEveryVisibleTileWithAtMostTwoCallsAPass) {
+  const test::MemorySource source(small_grid());
+  const SharedGeometry shared(source.grid().shape(), make_index_arrays(source.grid().shape()));
+  TileBox box(source, shared, {});
+  Renderer renderer(source, shared);
+  ViewState view;
+  view.width = 640;
+  view.height = 360;
+  const Camera camera = overview_camera(source, 1.0);
+  view.eye = camera.eye;
+  view.forward = camera.forward();
+  view.far_distance = 1.2 * farthest_corner(source, view.eye, 1.0);
+  box.finish({view.eye.x, view.eye.z}, view.far_distance);
+  Offscreen target(view.width, view.height, GL_RGBA8);
+  const TileRange& range = box.range();
+  for (const double level : {0.0, 0.3, 1.0, 1.7, 3.0}) {
+    view.fixed_level = level;
+    const FrameFigures figures = renderer.draw(view, range.first_column, range.last_column, range.first_row,
+                                               range.last_row, [&](TileIndex tile) { return box.resident(tile); });
+    EXPECT_EQ(figures.visible_tiles, 12);
+    EXPECT_EQ(figures.absent_tiles, 0);
+    EXPECT_LE(figures.draw_calls, 2 * figures.visible_tiles * figures.passes);
+    EXPECT_EQ(figures.passes, level == std::floor(level) ? 1 : 2);
+    check_gl("drawing");
+  }
+  const auto pixels = target.read_rgba8();
+  if (const char* folder = std::getenv("ISOHF_TEST_PICTURES")) {
+    write_png(std::string(folder) + "/renderer.png", view.width, view.height, pixels);
+  }
+  std::size_t green = 0;  // the lowland colours: the terrain is there
+  for (std::size_t i = 0; i < pixels.size(); i += 4) green += pixels[i + 1] > pixels[i + 2] ? 1 : 0;
+  EXPECT_GT(green, pixels.size() / 4 / 10);
+}
+
+}  // namespace
+}  // namespace isohf::view
