@@ -1,8 +1,12 @@
 #include "isohf/surface/prefilter.h"
 
 #include <fmt/format.h>
+#include <oneapi/tbb/blocked_range.h>
+#include <oneapi/tbb/parallel_for.h>
+#include <oneapi/tbb/task_arena.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -28,7 +32,7 @@ constexpr std::size_t kCircle = 8192;
 constexpr double kTail = 1e-9;
 constexpr std::size_t kLongestHalo = 1024;
 
-constexpr std::int64_t kBlock = 16;         ///< outputs whose sums are kept in registers together
+constexpr std::int64_t kBlock = 32;         ///< outputs whose sums are kept in registers together
 constexpr std::int64_t kStripColumns = 64;  ///< columns that are filtered together: four cache lines of floats
 static_assert(kStripColumns % kBlock == 0);
 
@@ -43,7 +47,7 @@ double spectrum_at(const std::vector<double>& even, std::size_t j, const std::ve
 /// itself the compiler would vectorise over k.
 using Pack = double __attribute__((vector_size(64), aligned(8), may_alias));
 constexpr std::int64_t kPack = 8;
-static_assert(kBlock == 2 * kPack);
+static_assert(kBlock == 4 * kPack);
 
 /// out[b * out_step + i] = p[0] x[i'] + sum over k of p[k] (x[i' - k * step] + x[i' + k * step]), i' = b * kBlock + i.
 ISOHF_VECTOR_CLONES
@@ -52,17 +56,24 @@ void convolve(const double* x, std::int64_t step, const double* p, std::int64_t 
   const auto at = [](const double* place) -> const Pack& { return *reinterpret_cast<const Pack*>(place); };
   for (std::int64_t b = 0; b < blocks; ++b) {
     const double* centre = x + b * kBlock;
+    // Four sums side by side: each addition waits for the one before it.
     Pack sum0 = p[0] * at(centre);
     Pack sum1 = p[0] * at(centre + kPack);
+    Pack sum2 = p[0] * at(centre + 2 * kPack);
+    Pack sum3 = p[0] * at(centre + 3 * kPack);
     for (std::int64_t k = 1; k <= halo; ++k) {
       const double* before = centre - k * step;
       const double* after = centre + k * step;
       sum0 += p[k] * (at(before) + at(after));
       sum1 += p[k] * (at(before + kPack) + at(after + kPack));
+      sum2 += p[k] * (at(before + 2 * kPack) + at(after + 2 * kPack));
+      sum3 += p[k] * (at(before + 3 * kPack) + at(after + 3 * kPack));
     }
     float* target = out + b * out_step;
-    for (std::int64_t i = 0; i < kPack; ++i) target[i] = static_cast<float>(sum0[i]);
-    for (std::int64_t i = 0; i < kPack; ++i) target[kPack + i] = static_cast<float>(sum1[i]);
+    for (const Pack& sum : {sum0, sum1, sum2, sum3}) {
+      for (std::int64_t i = 0; i < kPack; ++i) target[i] = static_cast<float>(sum[i]);
+      target += kPack;
+    }
   }
 }
 
@@ -133,21 +144,37 @@ void filter_line(const std::vector<double>& taps, Line<const float> line, std::i
   }
 }
 
-/// Copies a strip of columns, rows begin to end of the band, mirrored at the band's ends; false where it has voids.
-bool load_strip(View2D<const float> band, std::int64_t column, std::int64_t columns, std::int64_t begin,
-                std::int64_t end, double* strip) {
-  bool whole = true;
-  for (std::int64_t r = begin; r < end && whole; ++r, strip += kStripColumns) {
+/// Columns that are filtered together, row by row, with room for their coefficients.
+struct Strip {
+  std::vector<double> samples;
+  std::vector<float> coefficients;
+  std::array<int, kStripColumns> has_void{};
+};
+
+/// Copies a strip of columns, rows begin to end of the band, mirrored at the band's ends; notes which have voids.
+void load_strip(View2D<const float> band, std::int64_t column, std::int64_t columns, std::int64_t begin,
+                std::int64_t end, Strip& strip) {
+  strip.has_void.fill(0);
+  double* samples = strip.samples.data();
+  int* has_void = strip.has_void.data();
+  for (std::int64_t r = begin; r < end; ++r, samples += kStripColumns) {
     const float* row = band.row(mirror_index(r, band.rows())) + column;
-    int voids = 0;
     for (std::int64_t i = 0; i < columns; ++i) {
-      voids |= static_cast<int>(row[i] != row[i]);
-      strip[i] = static_cast<double>(row[i]);
+      has_void[i] |= static_cast<int>(row[i] != row[i]);
+      samples[i] = static_cast<double>(row[i]);
     }
-    std::fill(strip + columns, strip + kStripColumns, 0.0);
-    whole = voids == 0;
+    std::fill(samples + columns, samples + kStripColumns, 0.0);
   }
-  return whole;
+}
+
+/// Calls work(begin, end) on parts of 0 ... count, on as many threads as the caller's arena has. A waiting thread takes
+/// up nothing else meanwhile: the caller may be a serial stage of a pipeline.
+template <typename Work>
+void in_parallel(std::int64_t count, std::int64_t grain, const Work& work) {
+  oneapi::tbb::this_task_arena::isolate([&] {
+    oneapi::tbb::parallel_for(oneapi::tbb::blocked_range<std::int64_t>(0, count, static_cast<std::size_t>(grain)),
+                              [&](const auto& range) { work(range.begin(), range.end()); });
+  });
 }
 
 }  // namespace
@@ -209,11 +236,13 @@ Prefilter Prefilter::make(Filter filter, const Acquisition& acquisition) {
 
 void Prefilter::filter_rows(View2D<float> band) const {
   if (is_identity()) return;
-  RunScratch scratch;
-  for (std::int64_t r = 0; r < band.rows(); ++r) {
-    float* row = band.row(r);
-    filter_line(taps_, {row, 1}, band.columns(), 0, band.columns(), {row, 1}, scratch);
-  }
+  in_parallel(band.rows(), 4, [&](std::int64_t begin, std::int64_t end) {
+    RunScratch scratch;
+    for (std::int64_t r = begin; r < end; ++r) {
+      float* row = band.row(r);
+      filter_line(taps_, {row, 1}, band.columns(), 0, band.columns(), {row, 1}, scratch);
+    }
+  });
 }
 
 void Prefilter::filter_columns(View2D<const float> band, std::int64_t first, View2D<float> out) const {
@@ -224,26 +253,29 @@ void Prefilter::filter_columns(View2D<const float> band, std::int64_t first, Vie
     }
     return;
   }
-  const std::int64_t reach = halo();
   const std::int64_t rows = out.rows();
-  std::vector<double> strip(static_cast<std::size_t>((rows + 2 * reach) * kStripColumns));
-  std::vector<float> filtered(static_cast<std::size_t>(rows * kStripColumns));
-  RunScratch scratch;
-  for (std::int64_t column = 0; column < band.columns(); column += kStripColumns) {
-    const std::int64_t columns = std::min(kStripColumns, band.columns() - column);
-    if (load_strip(band, column, columns, first - reach, first + rows + reach, strip.data())) {
-      convolve(strip.data() + reach * kStripColumns, kStripColumns, taps_.data(), reach, rows * kStripColumns / kBlock,
-               filtered.data(), kBlock);
-    } else {
+  in_parallel(round_up(band.columns(), kStripColumns) / kStripColumns, 1, [&](std::int64_t begin, std::int64_t end) {
+    Strip strip;
+    strip.samples.resize(static_cast<std::size_t>((rows + 2 * halo()) * kStripColumns));
+    strip.coefficients.resize(static_cast<std::size_t>(rows * kStripColumns));
+    RunScratch scratch;
+    for (std::int64_t column = begin * kStripColumns; column < std::min(end * kStripColumns, band.columns());
+         column += kStripColumns) {
+      const std::int64_t columns = std::min(kStripColumns, band.columns() - column);
+      load_strip(band, column, columns, first - halo(), first + rows + halo(), strip);
+      // Columns do not touch each other: those with voids come out wrong here and are done again, run by run.
+      convolve(strip.samples.data() + halo() * kStripColumns, kStripColumns, taps_.data(), halo(),
+               rows * kStripColumns / kBlock, strip.coefficients.data(), kBlock);
       for (std::int64_t i = 0; i < columns; ++i) {
+        if (strip.has_void[static_cast<std::size_t>(i)] == 0) continue;
         filter_line(taps_, {band.data() + column + i, band.stride()}, band.rows(), first, first + rows,
-                    {filtered.data() + i, kStripColumns}, scratch);
+                    {strip.coefficients.data() + i, kStripColumns}, scratch);
+      }
+      for (std::int64_t r = 0; r < rows; ++r) {
+        std::copy_n(strip.coefficients.data() + r * kStripColumns, columns, out.row(r) + column);
       }
     }
-    for (std::int64_t r = 0; r < rows; ++r) {
-      std::copy_n(filtered.data() + r * kStripColumns, columns, out.row(r) + column);
-    }
-  }
+  });
 }
 
 void Prefilter::filter(View2D<float> raster) const {

@@ -20,6 +20,8 @@ namespace isohf {
 ///
 /// Voids are NaN and stay so; each run of samples between two voids is filtered alone, mirrored at its ends as the
 /// source is at its own (whole-sample mirror), so that no void is ever read as a number.
+///
+/// The work is shared among the threads of the caller's task arena.
 class Prefilter {
  public:
   /// The inverse exists and is stable where the spectrum of a is positive. It is refused, Error{kInvalidArgument} with
