@@ -1,0 +1,192 @@
+#include "formats/hgt_source.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <cstring>
+#include <optional>
+#include <vector>
+
+#include "formats/open_options.h"
+#include "formats/raw_file.h"
+#include "formats/zip_member.h"
+#include "isohf/base/assert.h"
+#include "isohf/base/error.h"
+
+namespace isohf {
+namespace {
+
+constexpr std::uint64_t kMostUnpackedBytes = std::uint64_t{64} << 20U;
+constexpr std::int64_t kSampleBytes = 2;
+
+std::string lower(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return text;
+}
+
+bool ends_with(const std::string& text, std::string_view ending) {
+  return text.size() >= ending.size() && text.compare(text.size() - ending.size(), ending.size(), ending) == 0;
+}
+
+std::string file_name(const std::string& path) {
+  const std::size_t slash = path.find_last_of('/');
+  return slash == std::string::npos ? path : path.substr(slash + 1);
+}
+
+struct Corner {
+  int longitude = 0;
+  int latitude = 0;
+};
+
+/// "N44E006..." or "s35e145...": hemisphere, two digits, hemisphere, three digits.
+std::optional<Corner> south_west_corner(const std::string& name) {
+  const std::string text = lower(file_name(name));
+  const auto digits = [&](std::size_t begin, std::size_t count) {
+    int value = 0;
+    for (std::size_t i = begin; i < begin + count; ++i) {
+      if (std::isdigit(static_cast<unsigned char>(text[i])) == 0) return -1;
+      value = value * 10 + (text[i] - '0');
+    }
+    return value;
+  };
+  if (text.size() < 7 || (text[0] != 'n' && text[0] != 's') || (text[3] != 'e' && text[3] != 'w')) return std::nullopt;
+  const int latitude = digits(1, 2);
+  const int longitude = digits(4, 3);
+  if (latitude < 0 || latitude > 90 || longitude < 0 || longitude > 180) return std::nullopt;
+  return Corner{text[3] == 'w' ? -longitude : longitude, text[0] == 's' ? -latitude : latitude};
+}
+
+struct Size {
+  std::int64_t columns = 0;
+  std::int64_t rows = 0;
+};
+
+std::optional<Size> size_of_tile(std::uint64_t bytes) {
+  if (bytes % kSampleBytes != 0) return std::nullopt;
+  const auto samples = static_cast<std::int64_t>(bytes / kSampleBytes);
+  // Beyond 50 degrees of latitude some producers halve the columns.
+  if (samples == std::int64_t{1801} * 3601) return Size{1801, 3601};
+  const auto side = static_cast<std::int64_t>(std::llround(std::sqrt(static_cast<double>(samples))));
+  if (side < 2 || side * side != samples) return std::nullopt;
+  return Size{side, side};
+}
+
+class HgtSource final : public HeightSource {
+ public:
+  HgtSource(const std::string& path, const OpenOptions& options) : file_(path) {
+    info_.path = path;
+    std::string name = path;
+    std::uint64_t bytes = file_.size_bytes();
+    if (ends_with(lower(path), ".zip")) {
+      name = unpack();
+      bytes = unpacked_.size();
+    }
+    describe(name, bytes, options);
+    apply_open_options(info_, options);
+  }
+
+  [[nodiscard]] const SourceInfo& info() const override { return info_; }
+
+  void read_window(const Window& window, std::span<std::byte> samples) override {
+    ISOHF_ASSERT(window.column >= 0 && window.row >= 0 && window.columns >= 0 && window.rows >= 0);
+    ISOHF_ASSERT(window.column + window.columns <= info_.width && window.row + window.rows <= info_.height);
+    ISOHF_ASSERT(samples.size() == static_cast<std::size_t>(window.columns * window.rows * kSampleBytes));
+    // Whole rows lie together in the file as in the window.
+    const bool whole = window.columns == info_.width;
+    const std::int64_t runs = whole ? 1 : window.rows;
+    const std::size_t run_bytes = whole ? samples.size() : static_cast<std::size_t>(window.columns * kSampleBytes);
+    for (std::int64_t i = 0; i < runs; ++i) {
+      const auto offset = static_cast<std::uint64_t>(((window.row + i) * info_.width + window.column) * kSampleBytes);
+      const auto out = samples.subspan(static_cast<std::size_t>(i) * run_bytes, run_bytes);
+      if (unpacked_.empty()) {
+        file_.read(offset, out);
+      } else {
+        std::memcpy(out.data(), unpacked_.data() + offset, out.size());
+      }
+    }
+    swap_byte_order(samples, kSampleBytes);
+  }
+
+ private:
+  /// Returns the name that says where the tile lies.
+  std::string unpack() {
+    std::vector<ZipMember> tiles;
+    for (ZipMember& member : zip_members(file_)) {
+      if (ends_with(lower(member.name), ".hgt")) tiles.push_back(std::move(member));
+    }
+    if (tiles.size() != 1) {
+      throw Error(ErrorCode::kUnsupported,
+                  fmt::format("{}: {} .hgt files are in the archive, must be 1", info_.path, tiles.size()));
+    }
+    unpacked_ = read_zip_member(file_, tiles.front(), kMostUnpackedBytes);
+    return south_west_corner(tiles.front().name) ? tiles.front().name : info_.path;
+  }
+
+  void describe(const std::string& name, std::uint64_t bytes, const OpenOptions& options) {
+    const std::optional<Size> size = size_of_tile(bytes);
+    if (!size) {
+      throw Error(
+          ErrorCode::kCorrupt,
+          fmt::format("{}: the tile has {} bytes; an HGT tile has 2884802 (1201 x 1201), 25934402 (3601 x 3601), "
+                      "12970802 (1801 x 3601) or another square of 2 byte samples",
+                      info_.path, bytes));
+    }
+    if (!options.channel.empty() && options.channel != "0") {
+      throw Error(ErrorCode::kInvalidArgument,
+                  fmt::format("{}: there is no channel \"{}\"; there is 0 alone", info_.path, options.channel));
+    }
+    info_.format = "SRTM HGT";
+    info_.width = size->columns;
+    info_.height = size->rows;
+    info_.sample_type = SampleType::kInt16;
+    info_.void_values = {-32768.0};
+    info_.vertical_unit = "metre";
+    info_.block_width = info_.width;
+    info_.block_height = 1;
+    Georeference& geo = info_.georeference;
+    geo.registration = Registration::kPoint;
+    geo.unit = HorizontalUnit::kDegree;
+    geo.spacing_x = 1.0 / static_cast<double>(size->columns - 1);
+    geo.spacing_y = 1.0 / static_cast<double>(size->rows - 1);
+    geo.system.name = "WGS 84";
+    geo.system.epsg = 4326;
+    geo.system.body = "Earth";
+    geo.system.semi_major_axis_m = 6378137.0;
+    geo.system.inverse_flattening = 298.257223563;
+    geo.system.vertical_epsg = 5773;
+    geo.system.vertical_datum = "EGM96";
+    if (const std::optional<Corner> corner = south_west_corner(name)) {
+      geo.has_origin = true;
+      geo.origin_x = corner->longitude;
+      geo.origin_y = corner->latitude + 1;
+    } else {
+      info_.warnings.push_back("the name does not say where the tile lies (N44E006.hgt does); its position is unknown");
+    }
+    if (size->rows != 1201 && size->rows != 3601) {
+      info_.warnings.push_back(
+          fmt::format("{} x {} is not the size of an SRTM tile (1201 or 3601 squared); it is read as "
+                      "one degree",
+                      size->columns, size->rows));
+    }
+  }
+
+  RawFile file_;
+  std::vector<std::byte> unpacked_;  // of a zipped tile; empty: read from the file
+  SourceInfo info_;
+};
+
+}  // namespace
+
+bool is_hgt_name(const std::string& path) {
+  const std::string name = lower(path);
+  return ends_with(name, ".hgt") || ends_with(name, ".hgt.zip");
+}
+
+std::unique_ptr<HeightSource> open_hgt(const std::string& path, const OpenOptions& options) {
+  return std::make_unique<HgtSource>(path, options);
+}
+
+}  // namespace isohf

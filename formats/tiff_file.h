@@ -1,0 +1,124 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "formats/geotiff_keys.h"
+#include "formats/raw_file.h"
+
+namespace isohf {
+
+/// How the samples of a TIFF directory are stored. "Block" is a strip or a tile.
+struct TiffLayout {
+  std::int64_t width = 0;
+  std::int64_t height = 0;
+  std::uint16_t bits_per_sample = 1;
+  std::uint16_t samples_per_pixel = 1;
+  std::uint16_t sample_format = 1;  ///< 1 unsigned, 2 signed, 3 floating, 4 undefined, 5 and 6 complex
+  std::uint16_t compression = 1;
+  std::uint16_t photometric = 1;
+  std::uint16_t orientation = 1;
+  int alpha_sample = -1;  ///< which sample is opacity; -1 where none is
+  bool tiled = false;
+  bool separate = false;  ///< one plane of blocks for each sample
+  bool big_endian = false;
+  bool bits_reversed = false;  ///< FillOrder 2
+  std::int64_t block_width = 0;
+  std::int64_t block_height = 0;
+  std::int64_t blocks_across = 0;
+  std::int64_t blocks_down = 0;
+
+  [[nodiscard]] std::uint64_t block_index(std::int64_t plane, std::int64_t across, std::int64_t down) const {
+    return static_cast<std::uint64_t>((plane * blocks_down + down) * blocks_across + across);
+  }
+  /// Samples of one pixel that a block holds.
+  [[nodiscard]] std::int64_t interleaved() const { return separate ? 1 : samples_per_pixel; }
+  [[nodiscard]] std::int64_t sample_bytes() const { return bits_per_sample / 8; }
+  /// Rows that block row `down` really holds: tiles are whole, the last strip is cut.
+  [[nodiscard]] std::int64_t stored_rows(std::int64_t down) const;
+  /// Whether the bytes in the file are the samples, but for their byte order.
+  [[nodiscard]] bool plain() const { return compression == 1 && !bits_reversed; }
+};
+
+/// Tags beside the layout.
+struct TiffTags {
+  GeoTags geo;
+  std::string gdal_nodata;
+  std::string gdal_metadata;
+  std::vector<std::string> warnings;
+};
+
+/// Where a block lies in the file; 0 bytes: not stored (sparse file).
+struct TiffBlockSpan {
+  std::uint64_t offset_bytes = 0;
+  std::uint64_t size_bytes = 0;
+};
+
+/// The name of a compression scheme, for messages.
+[[nodiscard]] std::string tiff_compression_name(std::uint16_t compression);
+
+/// The directories (images) of a file.
+struct TiffDirectories {
+  std::uint32_t main = 0;       ///< the first that is neither a reduced image nor a mask
+  bool has_mask = false;        ///< another is a transparency mask
+  bool has_more_pages = false;  ///< another is a full-size image
+};
+
+/// One libtiff handle on a directory; not thread-safe. Nothing of libtiff shows outside its source file.
+class TiffHandle {
+ public:
+  /// `mapped`: compressed bytes are mapped instead of read, for strips too large to buffer.
+  TiffHandle(const RawFile& file, std::uint32_t directory, bool mapped);
+  TiffHandle(const TiffHandle&) = delete;
+  TiffHandle& operator=(const TiffHandle&) = delete;
+  ~TiffHandle();
+
+  /// Decodes block `index` into host byte order; `bytes` is exactly its decoded size. Throws Error{kCorrupt, kIo}.
+  void decode_block(std::uint64_t index, bool tiled, std::span<std::byte> bytes);
+
+  /// Decodes one row of a stripped image. Rows of one strip must be asked for in order, from its first.
+  void decode_row(std::int64_t row, std::int64_t plane, std::span<std::byte> bytes);
+
+  /// Gives mapped pages that were read back to the system.
+  void forget_mapped();
+
+  /// Throws Error{kCorrupt} where the table of blocks has no such entry.
+  [[nodiscard]] TiffBlockSpan block_span(std::uint64_t index);
+
+  [[nodiscard]] TiffLayout read_layout();
+  [[nodiscard]] TiffTags read_tags();
+
+  /// Room that the user of the handle may use while he holds it.
+  std::vector<std::byte> scratch;
+
+ private:
+  friend TiffDirectories read_directories(const RawFile& file);
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// Throws Error{kCorrupt} where not even the first directory can be read.
+[[nodiscard]] TiffDirectories read_directories(const RawFile& file);
+
+/// Handles on one directory for any number of threads, opened when first needed.
+class TiffHandlePool {
+ public:
+  TiffHandlePool(const RawFile& file, std::uint32_t directory) : file_(&file), directory_(directory) {}
+
+  [[nodiscard]] std::unique_ptr<TiffHandle> take();
+  void give_back(std::unique_ptr<TiffHandle> handle);
+
+ private:
+  const RawFile* file_;
+  std::uint32_t directory_;
+  std::mutex mutex_;
+  std::vector<std::unique_ptr<TiffHandle>> idle_;
+};
+
+}  // namespace isohf

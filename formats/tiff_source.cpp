@@ -1,0 +1,299 @@
+#include "formats/tiff_source.h"
+
+#include <fmt/core.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cctype>
+#include <charconv>
+#include <cstring>
+#include <optional>
+#include <vector>
+
+#include "formats/gdal_tags.h"
+#include "formats/geotiff_keys.h"
+#include "formats/open_options.h"
+#include "formats/raw_file.h"
+#include "formats/tiff_blocks.h"
+#include "formats/tiff_file.h"
+#include "formats/units.h"
+#include "formats/world_file.h"
+#include "isohf/base/assert.h"
+#include "isohf/base/error.h"
+
+namespace isohf {
+namespace {
+
+// TIFF 6.0 and its supplements: PhotometricInterpretation, SampleFormat, Orientation.
+constexpr int kMinIsWhite = 0;
+constexpr int kMinIsBlack = 1;
+constexpr int kRgb = 2;
+constexpr int kYCbCr = 6;
+constexpr int kJpeg = 7;
+constexpr int kSigned = 2;
+constexpr int kFloating = 3;
+constexpr int kComplexInteger = 5;
+constexpr int kComplexFloating = 6;
+constexpr int kTopLeft = 1;
+constexpr int kBottomLeft = 4;
+
+SampleType sample_type_of(const TiffLayout& layout) {
+  switch (layout.sample_format) {
+    case kFloating:
+      if (layout.bits_per_sample == 16) return SampleType::kFloat16;
+      if (layout.bits_per_sample == 32) return SampleType::kFloat32;
+      if (layout.bits_per_sample == 64) return SampleType::kFloat64;
+      break;
+    case kSigned:
+      if (layout.bits_per_sample == 8) return SampleType::kInt8;
+      if (layout.bits_per_sample == 16) return SampleType::kInt16;
+      if (layout.bits_per_sample == 32) return SampleType::kInt32;
+      break;
+    case kComplexInteger:
+    case kComplexFloating:
+      break;
+    default:
+      if (layout.bits_per_sample == 8) return SampleType::kUint8;
+      if (layout.bits_per_sample == 16) return SampleType::kUint16;
+      if (layout.bits_per_sample == 32) return SampleType::kUint32;
+  }
+  constexpr std::array<const char*, 7> kFormats = {
+      "undefined", "unsigned integer", "signed integer",        "floating-point",
+      "undefined", "complex integer",  "complex floating-point"};
+  const char* format = layout.sample_format < kFormats.size() ? kFormats[layout.sample_format] : "undefined";
+  throw Error(
+      ErrorCode::kUnsupported,
+      fmt::format("the samples are {} bit {}; isohf reads 8, 16 and 32 bit integers and 16, 32 and 64 bit floats",
+                  layout.bits_per_sample, format));
+}
+
+void require_heights(const TiffLayout& layout) {
+  const int photometric = layout.photometric;
+  const bool picture = photometric == kRgb || (photometric == kYCbCr && layout.compression == kJpeg);
+  if (photometric == kMinIsWhite || photometric == kMinIsBlack || picture) return;
+  constexpr std::array<const char*, 11> kNames = {"",
+                                                  "",
+                                                  "",
+                                                  "a colour palette",
+                                                  "a transparency mask",
+                                                  "CMYK colour",
+                                                  "YCbCr colour",
+                                                  "",
+                                                  "CIE L*a*b* colour",
+                                                  "ICC L*a*b* colour",
+                                                  "ITU L*a*b* colour"};
+  const auto index = static_cast<std::size_t>(photometric);
+  const std::string what = index < kNames.size() && kNames[index][0] != '\0'
+                               ? std::string(kNames[index])
+                               : fmt::format("photometric interpretation {}", photometric);
+  throw Error(ErrorCode::kUnsupported, fmt::format("the image has {}; isohf reads grey and RGB images", what));
+}
+
+/// "R", "G", "B" or "Y" and "A"; empty where a sample has no name.
+std::vector<std::string> channel_names(const TiffLayout& layout) {
+  std::vector<std::string> names(layout.samples_per_pixel);
+  if (layout.photometric == kMinIsWhite || layout.photometric == kMinIsBlack) {
+    names[0] = std::string(1, 'Y');
+  } else {
+    for (std::size_t i = 0; i < std::min<std::size_t>(names.size(), 3); ++i) names[i] = std::string(1, "RGB"[i]);
+  }
+  if (layout.alpha_sample > 0 && static_cast<std::size_t>(layout.alpha_sample) < names.size()) {
+    names[static_cast<std::size_t>(layout.alpha_sample)] = std::string(1, 'A');
+  }
+  return names;
+}
+
+int choose_channel(const TiffLayout& layout, const std::string& wanted, SourceInfo& info) {
+  const std::vector<std::string> names = channel_names(layout);
+  const auto label = [&](std::size_t i) { return names[i].empty() ? std::to_string(i) : names[i]; };
+  std::size_t chosen = 0;
+  if (!wanted.empty()) {
+    std::string upper = wanted;
+    std::transform(upper.begin(), upper.end(), upper.begin(),
+                   [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
+    chosen = static_cast<std::size_t>(std::find(names.begin(), names.end(), upper) - names.begin());
+    if (chosen == names.size()) {
+      const auto [end, failure] = std::from_chars(wanted.data(), wanted.data() + wanted.size(), chosen);
+      if (failure != std::errc() || end != wanted.data() + wanted.size()) chosen = names.size();
+    }
+    if (chosen >= names.size()) {
+      std::vector<std::string> there;
+      for (std::size_t i = 0; i < names.size(); ++i) {
+        there.push_back(names[i].empty() ? std::to_string(i) : fmt::format("{} ({})", i, names[i]));
+      }
+      throw Error(ErrorCode::kInvalidArgument,
+                  fmt::format("there is no channel \"{}\"; there are {}", wanted, fmt::join(there, ", ")));
+    }
+  }
+  const bool colour = layout.photometric == kRgb || layout.photometric == kYCbCr;
+  if (names.size() > 1) info.channel = label(chosen);
+  if (wanted.empty() && colour && layout.bits_per_sample == 8) {
+    info.warnings.push_back(
+        fmt::format("this is an 8 bit colour picture; its channel {} is read as elevation", label(0)));
+  } else if (wanted.empty() && names.size() > 1) {
+    info.warnings.push_back(fmt::format("there are {} channels; channel {} is read", names.size(), label(0)));
+  }
+  return static_cast<int>(chosen);
+}
+
+std::array<std::byte, 8> bytes_of_value(SampleType type, double value) {
+  std::array<std::byte, 8> bytes = {};
+  const auto store = [&](auto typed) { std::memcpy(bytes.data(), &typed, sizeof(typed)); };
+  switch (type) {
+    case SampleType::kUint8:
+      store(static_cast<std::uint8_t>(value));
+      break;
+    case SampleType::kInt8:
+      store(static_cast<std::int8_t>(value));
+      break;
+    case SampleType::kUint16:
+      store(static_cast<std::uint16_t>(value));
+      break;
+    case SampleType::kInt16:
+      store(static_cast<std::int16_t>(value));
+      break;
+    case SampleType::kUint32:
+      store(static_cast<std::uint32_t>(value));
+      break;
+    case SampleType::kInt32:
+      store(static_cast<std::int32_t>(value));
+      break;
+    // Any void is as good as another here; a half NaN spares the conversion.
+    case SampleType::kFloat16:
+      store(std::uint16_t{0x7E00});
+      break;
+    case SampleType::kFloat32:
+      store(static_cast<float>(value));
+      break;
+    case SampleType::kFloat64:
+      store(value);
+      break;
+  }
+  return bytes;
+}
+
+class TiffSource final : public HeightSource {
+ public:
+  TiffSource(const std::string& path, const OpenOptions& options) : file_(path) {
+    info_.path = path;
+    const TiffDirectories directories = read_directories(file_);
+    TiffHandle handle(file_, directories.main, false);
+    const TiffTags tags = handle.read_tags();
+    layout_ = handle.read_layout();
+    try {
+      describe(directories, tags, options);
+    } catch (const Error& error) {
+      throw error.within(path);
+    }
+    apply_open_options(info_, options);
+    blocks_.emplace(file_, layout_, directories.main, channel_);
+    describe_missing_blocks();
+  }
+
+  [[nodiscard]] const SourceInfo& info() const override { return info_; }
+
+  void read_window(const Window& window, std::span<std::byte> samples) override {
+    if (!turned_) return blocks_->read(window, samples);
+    blocks_->read({window.column, info_.height - window.row - window.rows, window.columns, window.rows}, samples);
+    const std::size_t row_bytes = static_cast<std::size_t>(window.columns) * size_bytes(info_.sample_type);
+    const auto rows = static_cast<std::size_t>(window.rows);
+    for (std::size_t row = 0; row < rows / 2; ++row) {
+      std::byte* upper = samples.data() + row * row_bytes;
+      std::swap_ranges(upper, upper + row_bytes, samples.data() + (rows - 1 - row) * row_bytes);
+    }
+  }
+
+ private:
+  void describe(const TiffDirectories& directories, const TiffTags& tags, const OpenOptions& options) {
+    require_heights(layout_);
+    info_.format = std::string(tags.geo.empty() ? "TIFF" : "GeoTIFF");
+    info_.width = layout_.width;
+    info_.height = layout_.height;
+    info_.sample_type = sample_type_of(layout_);
+    for (const std::string& warning : tags.warnings) info_.warnings.push_back("libtiff: " + warning);
+    channel_ = choose_channel(layout_, options.channel, info_);
+    if (directories.has_more_pages)
+      info_.warnings.emplace_back("there are several images in the file; the first is read");
+    if (directories.has_mask) info_.warnings.emplace_back("the file has a transparency mask, which is not applied");
+    place(tags);
+    read_gdal_metadata(tags.gdal_metadata, channel_, info_);
+    read_gdal_nodata(tags.gdal_nodata, info_);
+  }
+
+  void place(const TiffTags& tags) {
+    GeoTiffPlace place = place_from_geotiff(tags.geo, layout_.height);
+    info_.georeference = place.georeference;
+    info_.vertical_unit = place.vertical_unit;
+    info_.metres_per_vertical_unit = place.metres_per_vertical_unit;
+    info_.warnings.insert(info_.warnings.end(), place.warnings.begin(), place.warnings.end());
+    turned_ = place.rows_from_south;
+    if (!place.placed) place_from_world_file();
+    if (info_.georeference.system.wkt.empty() && !info_.georeference.system.epsg) {
+      info_.georeference.system.wkt = prj_beside(info_.path);
+    }
+    if (layout_.orientation == kTopLeft) return;
+    if (info_.georeference.has_origin) {
+      info_.warnings.push_back(fmt::format(
+          "the orientation tag ({}) is ignored: the georeference says which way the rows run", layout_.orientation));
+    } else if (layout_.orientation == kBottomLeft) {
+      turned_ = !turned_;
+    } else {
+      throw Error(
+          ErrorCode::kUnsupported,
+          fmt::format("the orientation is {}; isohf reads 1 (top-left) and 4 (bottom-left)", layout_.orientation));
+    }
+  }
+
+  void place_from_world_file() {
+    const std::optional<WorldFile> world = world_file_beside(info_.path);
+    if (!world) return;
+    Georeference& geo = info_.georeference;
+    turned_ = world->dy > 0.0;
+    geo.spacing_x = world->dx;
+    geo.spacing_y = std::abs(world->dy);
+    geo.has_origin = true;
+    geo.origin_x = world->x0;
+    geo.origin_y = world->y0 + (turned_ ? static_cast<double>(layout_.height - 1) * world->dy : 0.0);
+  }
+
+  void describe_missing_blocks() {
+    info_.block_width = layout_.block_width;
+    info_.block_height = blocks_->unit_rows();
+    if (blocks_->missing_blocks() == 0) return;
+    const char* reads_as = "0";
+    if (!info_.void_values.empty()) {
+      const auto fill = bytes_of_value(info_.sample_type, info_.void_values.front());
+      blocks_->set_fill(std::span(fill).first(size_bytes(info_.sample_type)));
+      reads_as = "void";
+    }
+    info_.warnings.push_back(fmt::format("{} of {} {} are not stored in the file; they read as {}",
+                                         blocks_->missing_blocks(), blocks_->block_count(),
+                                         layout_.tiled ? "tiles" : "strips", reads_as));
+  }
+
+  RawFile file_;
+  TiffLayout layout_;
+  SourceInfo info_;
+  int channel_ = 0;
+  bool turned_ = false;  // the stored rows run from South to North
+  std::optional<TiffBlocks> blocks_;
+};
+
+}  // namespace
+
+bool looks_like_tiff(std::span<const std::byte> head) {
+  if (head.size() < 4) return false;
+  const auto is = [&](std::array<int, 4> magic) {
+    return std::equal(magic.begin(), magic.end(), head.begin(),
+                      [](int wanted, std::byte found) { return static_cast<std::byte>(wanted) == found; });
+  };
+  return is({'I', 'I', 42, 0}) || is({'M', 'M', 0, 42}) || is({'I', 'I', 43, 0}) || is({'M', 'M', 0, 43});
+}
+
+std::unique_ptr<HeightSource> open_tiff(const std::string& path, const OpenOptions& options) {
+  return std::make_unique<TiffSource>(path, options);
+}
+
+}  // namespace isohf

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace isohf {
+
+/// A unit of length.
+struct LinearUnit {
+  std::string name;     ///< "metre", "foot", "US survey foot", ...
+  double metres = 1.0;  ///< metres in one unit
+};
+
+/// By EPSG unit code (9001 is the metre); nullopt for a code that isohf does not know.
+[[nodiscard]] std::optional<LinearUnit> linear_unit(int epsg);
+
+/// By the name or abbreviation that files use, in any case: "m", "Meters", "ft", "ftUS", ...; nullopt for any other
+/// text.
+[[nodiscard]] std::optional<LinearUnit> linear_unit(std::string_view name);
+
+/// The planet or moon that a reference system's name (or, failing that, its semi-major axis) belongs to; else empty.
+/// Axes: reports of the IAU working group on cartographic coordinates; anything from 6.35e6 m to 6.38e6 m is the Earth.
+[[nodiscard]] std::string body_of(std::string_view name, std::optional<double> semi_major_axis_m);
+
+}  // namespace isohf

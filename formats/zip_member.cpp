@@ -1,0 +1,153 @@
+#include "formats/zip_member.h"
+
+#include <fmt/core.h>
+#include <zlib.h>
+
+#include <algorithm>
+
+#include "isohf/base/bytes.h"
+#include "isohf/base/error.h"
+
+namespace isohf {
+namespace {
+
+constexpr std::uint32_t kEndSignature = 0x06054B50;
+constexpr std::uint32_t kEntrySignature = 0x02014B50;
+constexpr std::uint32_t kHeaderSignature = 0x04034B50;
+constexpr std::size_t kEndBytes = 22;
+constexpr std::size_t kHeaderBytes = 30;
+constexpr std::uint32_t kZip64 = 0xFFFFFFFF;
+/// The comment after the end record has at most 65535 bytes.
+constexpr std::uint64_t kLongestTail = kEndBytes + 65535;
+
+[[noreturn]] void corrupt(const RawFile& file, const std::string& why) {
+  throw Error(ErrorCode::kCorrupt, file.path() + ": " + why);
+}
+
+struct End {
+  std::uint16_t entries = 0;
+  std::uint32_t directory_bytes = 0;
+  std::uint32_t directory_offset = 0;
+};
+
+End find_end(const RawFile& file) {
+  std::vector<std::byte> tail(static_cast<std::size_t>(std::min(kLongestTail, file.size_bytes())));
+  if (tail.size() < kEndBytes) corrupt(file, "is too short for a zip archive");
+  file.read(file.size_bytes() - tail.size(), tail);
+  for (std::size_t at = tail.size() - kEndBytes + 1; at-- > 0;) {
+    ByteReader in(std::span<const std::byte>(tail).subspan(at));
+    if (in.read<std::uint32_t>() != kEndSignature) continue;
+    (void)in.read_bytes(6);  // disk numbers, entries on this disk
+    End end;
+    end.entries = in.read<std::uint16_t>();
+    end.directory_bytes = in.read<std::uint32_t>();
+    end.directory_offset = in.read<std::uint32_t>();
+    return end;
+  }
+  corrupt(file, "is truncated or no zip archive: its directory's end is not there");
+}
+
+ZipMember read_entry(const RawFile& file, ByteReader& in) {
+  if (in.read<std::uint32_t>() != kEntrySignature) corrupt(file, "the zip directory is damaged");
+  (void)in.read_bytes(4);  // versions
+  ZipMember member;
+  member.encrypted = (in.read<std::uint16_t>() & 1U) != 0;
+  member.method = in.read<std::uint16_t>();
+  (void)in.read_bytes(4);  // time and date
+  member.crc32 = in.read<std::uint32_t>();
+  member.stored_bytes = in.read<std::uint32_t>();
+  member.size_bytes = in.read<std::uint32_t>();
+  const std::size_t name_bytes = in.read<std::uint16_t>();
+  const std::size_t extra_bytes = in.read<std::uint16_t>();
+  const std::size_t comment_bytes = in.read<std::uint16_t>();
+  (void)in.read_bytes(8);  // disk, attributes
+  member.header_offset_bytes = in.read<std::uint32_t>();
+  const auto name = in.read_bytes(name_bytes);
+  member.name.assign(reinterpret_cast<const char*>(name.data()), name.size());
+  (void)in.read_bytes(extra_bytes + comment_bytes);
+  return member;
+}
+
+void inflate_raw(const RawFile& file, const ZipMember& member, std::vector<std::byte>& in,
+                 std::vector<std::byte>& out) {
+  z_stream stream = {};
+  if (inflateInit2(&stream, -MAX_WBITS) != Z_OK)
+    throw Error(ErrorCode::kOutOfMemory, file.path() + ": no memory to inflate");
+  // One spare byte of output tells a member that is longer than it says.
+  std::byte spare = {};
+  stream.next_in = reinterpret_cast<Bytef*>(in.data());
+  stream.avail_in = static_cast<uInt>(in.size());
+  stream.next_out = reinterpret_cast<Bytef*>(out.data());
+  stream.avail_out = static_cast<uInt>(out.size());
+  int result = out.empty() ? Z_OK : inflate(&stream, Z_NO_FLUSH);
+  if (result == Z_OK && stream.avail_out == 0) {
+    stream.next_out = reinterpret_cast<Bytef*>(&spare);
+    stream.avail_out = 1;
+    result = inflate(&stream, Z_FINISH);
+  }
+  const std::uint64_t got = stream.total_out;
+  inflateEnd(&stream);
+  if (result != Z_STREAM_END || got != out.size()) {
+    corrupt(file,
+            fmt::format("{} is damaged: inflated to {} bytes, the directory says {}", member.name, got, out.size()));
+  }
+}
+
+}  // namespace
+
+std::vector<ZipMember> zip_members(const RawFile& file) {
+  const End end = find_end(file);
+  if (end.directory_offset == kZip64) throw Error(ErrorCode::kUnsupported, file.path() + ": is a Zip64 archive");
+  if (std::uint64_t{end.directory_offset} + end.directory_bytes > file.size_bytes()) {
+    corrupt(file, "the zip directory lies outside the file");
+  }
+  std::vector<std::byte> directory(end.directory_bytes);
+  file.read(end.directory_offset, directory);
+  std::vector<ZipMember> members;
+  try {
+    ByteReader in(directory, end.directory_offset);
+    for (int i = 0; i < end.entries; ++i) members.push_back(read_entry(file, in));
+  } catch (const Error& error) {
+    throw error.within(file.path() + ": zip directory");
+  }
+  return members;
+}
+
+std::vector<std::byte> read_zip_member(const RawFile& file, const ZipMember& member, std::uint64_t most_bytes) {
+  if (member.encrypted || (member.method != 0 && member.method != 8)) {
+    throw Error(
+        ErrorCode::kUnsupported,
+        fmt::format("{}: {} is {}; stored and deflated members are read", file.path(), member.name,
+                    member.encrypted ? std::string("encrypted") : fmt::format("packed by method {}", member.method)));
+  }
+  if (member.size_bytes > most_bytes || member.stored_bytes > most_bytes) {
+    throw Error(ErrorCode::kUnsupported, fmt::format("{}: {} has {} bytes, at most {} are unpacked", file.path(),
+                                                     member.name, member.size_bytes, most_bytes));
+  }
+  std::vector<std::byte> header(kHeaderBytes);
+  file.read(member.header_offset_bytes, header);
+  ByteReader fields(header);
+  if (fields.read<std::uint32_t>() != kHeaderSignature) corrupt(file, member.name + ": the zip header is damaged");
+  (void)fields.read_bytes(22);
+  const std::uint64_t name_bytes = fields.read<std::uint16_t>();
+  const std::uint64_t extra_bytes = fields.read<std::uint16_t>();
+  const std::uint64_t begin = member.header_offset_bytes + kHeaderBytes + name_bytes + extra_bytes;
+  if (begin > file.size_bytes() || member.stored_bytes > file.size_bytes() - begin) {
+    corrupt(file, member.name + " lies outside the file");
+  }
+  std::vector<std::byte> stored(static_cast<std::size_t>(member.stored_bytes));
+  file.read(begin, stored);
+  std::vector<std::byte> contents;
+  if (member.method == 0) {
+    if (member.size_bytes != member.stored_bytes) corrupt(file, member.name + ": the zip directory contradicts itself");
+    contents = std::move(stored);
+  } else {
+    contents.resize(static_cast<std::size_t>(member.size_bytes));
+    inflate_raw(file, member, stored, contents);
+  }
+  const uLong crc = crc32_z(0, reinterpret_cast<const Bytef*>(contents.data()), contents.size());
+  if (crc != member.crc32) corrupt(file, member.name + " is damaged: its CRC does not match");
+  return contents;
+}
+
+}  // namespace isohf

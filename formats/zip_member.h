@@ -1,0 +1,31 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "formats/raw_file.h"
+
+namespace isohf {
+
+/// One file of a zip archive (PKWARE APPNOTE 6.3, without Zip64).
+struct ZipMember {
+  std::string name;
+  std::uint16_t method = 0;  ///< 0 stored, 8 deflated
+  bool encrypted = false;
+  std::uint32_t crc32 = 0;
+  std::uint64_t stored_bytes = 0;
+  std::uint64_t size_bytes = 0;
+  std::uint64_t header_offset_bytes = 0;
+};
+
+/// The directory of the archive. Throws Error{kCorrupt, kIo} naming the file.
+[[nodiscard]] std::vector<ZipMember> zip_members(const RawFile& file);
+
+/// The contents of `member`, checked against its size and CRC. Throws Error: kUnsupported beyond `most_bytes`, for
+/// encrypted members and for other methods; kCorrupt.
+[[nodiscard]] std::vector<std::byte> read_zip_member(const RawFile& file, const ZipMember& member,
+                                                     std::uint64_t most_bytes);
+
+}  // namespace isohf

@@ -1,0 +1,240 @@
+#include "formats/hgt_source.h"
+
+#include <gtest/gtest.h>
+#include <zlib.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "formats/real_files.h"
+#include "isohf/base/bytes.h"
+#include "isohf/base/error.h"
+
+namespace isohf {
+namespace {
+
+/// A folder of its own for each test, removed with it.
+class HgtSource : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    const auto* test = ::testing::UnitTest::GetInstance()->current_test_info();
+    folder_ = std::filesystem::temp_directory_path() /
+              ("isohf_hgt_" + std::string(test->name()) + std::to_string(::getpid()));
+    std::filesystem::create_directories(folder_);
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+
+  std::string write(const std::string& name, const std::vector<std::byte>& bytes) const {
+    const std::string path = (folder_ / name).string();
+    std::ofstream(path, std::ios::binary)
+        .write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+    return path;
+  }
+
+  std::filesystem::path folder_;
+};
+
+/// Big-endian samples 0, 1, 2, ... with a void in front.
+std::vector<std::byte> tile(int columns, int rows) {
+  std::vector<std::byte> bytes;
+  for (int i = 0; i < columns * rows; ++i) {
+    const int value = i == 0 ? -32768 : i % 9000 - 100;
+    bytes.push_back(static_cast<std::byte>((value >> 8) & 0xFF));
+    bytes.push_back(static_cast<std::byte>(value & 0xFF));
+  }
+  return bytes;
+}
+
+/// A zip archive of one deflated (or stored) member.
+std::vector<std::byte> zipped(const std::string& name, const std::vector<std::byte>& contents, bool deflated) {
+  std::vector<std::byte> packed = contents;
+  if (deflated) {
+    packed.resize(compressBound(contents.size()));
+    z_stream stream = {};
+    deflateInit2(&stream, 9, Z_DEFLATED, -MAX_WBITS, 9, Z_DEFAULT_STRATEGY);
+    stream.next_in = reinterpret_cast<Bytef*>(const_cast<std::byte*>(contents.data()));
+    stream.avail_in = static_cast<uInt>(contents.size());
+    stream.next_out = reinterpret_cast<Bytef*>(packed.data());
+    stream.avail_out = static_cast<uInt>(packed.size());
+    EXPECT_EQ(deflate(&stream, Z_FINISH), Z_STREAM_END);
+    packed.resize(stream.total_out);
+    deflateEnd(&stream);
+  }
+  std::vector<std::byte> zip;
+  ByteWriter out(zip);
+  const auto common = [&] {
+    out.write<std::uint16_t>(20);
+    out.write<std::uint16_t>(0);
+    out.write<std::uint16_t>(deflated ? 8 : 0);
+    out.write<std::uint32_t>(0);
+    out.write(static_cast<std::uint32_t>(crc32_z(0, reinterpret_cast<const Bytef*>(contents.data()), contents.size())));
+    out.write(static_cast<std::uint32_t>(packed.size()));
+    out.write(static_cast<std::uint32_t>(contents.size()));
+    out.write(static_cast<std::uint16_t>(name.size()));
+    out.write<std::uint16_t>(0);
+  };
+  const auto text = std::as_bytes(std::span(name));
+  out.write<std::uint32_t>(0x04034B50);
+  common();
+  out.write_bytes(text);
+  out.write_bytes(packed);
+  const auto directory = static_cast<std::uint32_t>(zip.size());
+  out.write<std::uint32_t>(0x02014B50);
+  out.write<std::uint16_t>(20);
+  common();
+  for (int i = 0; i < 5; ++i) out.write<std::uint16_t>(0);
+  out.write<std::uint32_t>(0);
+  out.write_bytes(text);
+  const auto directory_bytes = static_cast<std::uint32_t>(zip.size()) - directory;
+  out.write<std::uint32_t>(0x06054B50);
+  out.write<std::uint32_t>(0);
+  out.write<std::uint16_t>(1);
+  out.write<std::uint16_t>(1);
+  out.write(directory_bytes);
+  out.write(directory);
+  out.write<std::uint16_t>(0);
+  return zip;
+}
+
+ErrorCode code_of(const std::string& path, const OpenOptions& options = {}) {
+  try {
+    const auto source = open_hgt(path, options);
+    (void)testing::read_all(*source);
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find(path), std::string::npos) << error.what();
+    return error.code();
+  }
+  ADD_FAILURE() << path << " opened";
+  return ErrorCode::kCancelled;
+}
+
+TEST_F(HgtSource, DeliversRealFilesAsTheReferenceDoes) {
+  const auto files = testing::real_files({".hgt", ".hgt.zip"});
+  if (files.empty()) GTEST_SKIP() << "the real files are not there";
+  for (const auto& file : files) {
+    SCOPED_TRACE(file.string());
+    const auto source = open_hgt(file.string(), {});
+    testing::expect_as_reference(*source, testing::reference_of(file), false);
+    EXPECT_TRUE(source->info().warnings.empty());
+    EXPECT_EQ(source->info().georeference.system.vertical_datum, "EGM96");
+    EXPECT_EQ(source->info().vertical_unit, "metre");
+  }
+}
+
+TEST_F(HgtSource, RecognisesItsNames) {
+  EXPECT_TRUE(is_hgt_name("a/N44E006.hgt"));
+  EXPECT_TRUE(is_hgt_name("N44E006.HGT"));
+  EXPECT_TRUE(is_hgt_name("N44E006.SRTMGL1.hgt.zip"));
+  EXPECT_FALSE(is_hgt_name("N44E006.zip"));
+  EXPECT_FALSE(is_hgt_name("hgt"));
+}
+
+TEST_F(HgtSource, TakesTheCornerFromTheName) {
+  const auto corner = [&](const std::string& name) {
+    const auto source = open_hgt(write(name, tile(3, 3)), {});
+    const Georeference& geo = source->info().georeference;
+    EXPECT_TRUE(geo.has_origin);
+    EXPECT_EQ(geo.spacing_x, 0.5);
+    return std::pair(geo.origin_x, geo.origin_y);
+  };
+  EXPECT_EQ(corner("N44E006.hgt"), std::pair(6.0, 45.0));
+  EXPECT_EQ(corner("s35e145.hgt"), std::pair(145.0, -34.0));
+  EXPECT_EQ(corner("S01W180.HGT"), std::pair(-180.0, 0.0));
+  EXPECT_EQ(corner("n00w001.SRTMGL1.hgt"), std::pair(-1.0, 1.0));
+}
+
+TEST_F(HgtSource, KeepsATileWithoutPlaceAndSaysSo) {
+  for (const char* name : {"terrain.hgt", "N91E006.hgt", "N44E181.hgt", "N4.hgt", "NxxE006.hgt"}) {
+    const auto source = open_hgt(write(name, tile(1201, 1201)), {});
+    EXPECT_FALSE(source->info().georeference.has_origin) << name;
+    EXPECT_EQ(source->info().warnings.size(), 1U) << name;
+  }
+}
+
+TEST_F(HgtSource, ReadsSquaresAndHalvedColumns) {
+  const auto size = [&](int columns, int rows) {
+    const auto source = open_hgt(write("N60E010.hgt", tile(columns, rows)), {});
+    EXPECT_EQ(source->info().width, columns);
+    EXPECT_EQ(source->info().height, rows);
+    return source->info().warnings.size();
+  };
+  EXPECT_EQ(size(1201, 1201), 0U);
+  EXPECT_EQ(size(3601, 3601), 0U);
+  EXPECT_EQ(size(1801, 3601), 0U);
+  EXPECT_EQ(size(2, 2), 1U);
+  EXPECT_EQ(size(601, 601), 1U);
+}
+
+TEST_F(HgtSource, WindowsEqualTheWhole) {
+  for (const std::string& path :
+       {write("N01E001.hgt", tile(7, 7)), write("N01E001.hgt.zip", zipped("N01E001.hgt", tile(7, 7), true))}) {
+    const auto source = open_hgt(path, {});
+    const auto whole = testing::read_all(*source);
+    EXPECT_EQ(testing::value_at(SampleType::kInt16, whole, 0), -32768);
+    EXPECT_EQ(testing::value_at(SampleType::kInt16, whole, 48), 48 - 100);
+    for (std::int64_t r = 6; r >= 0; --r) {
+      for (std::int64_t c = 0; c < 7; ++c) {
+        for (std::int64_t n = 1; n <= 7 - c; ++n) {
+          std::vector<std::byte> part(static_cast<std::size_t>(n * (7 - r)) * 2);
+          source->read_window({c, r, n, 7 - r}, part);
+          for (std::int64_t i = 0; i < n * (7 - r); ++i) {
+            EXPECT_EQ(
+                testing::value_at(SampleType::kInt16, part, static_cast<std::size_t>(i)),
+                testing::value_at(SampleType::kInt16, whole, static_cast<std::size_t>((r + i / n) * 7 + c + i % n)));
+          }
+        }
+      }
+    }
+  }
+}
+
+TEST_F(HgtSource, ReadsStoredAndDeflatedMembers) {
+  for (const bool deflated : {false, true}) {
+    const auto source = open_hgt(write("any.hgt.zip", zipped("folder/S10W070.hgt", tile(11, 11), deflated)), {});
+    EXPECT_EQ(source->info().georeference.origin_y, -9.0);
+    EXPECT_EQ(source->info().georeference.origin_x, -70.0);
+    EXPECT_EQ(testing::value_at(SampleType::kInt16, testing::read_all(*source), 120), 20);
+  }
+}
+
+TEST_F(HgtSource, RefusesEveryTruncatedArchive) {
+  const auto zip = zipped("N01E001.hgt", tile(5, 5), true);
+  for (std::size_t length = 0; length < zip.size(); ++length) {
+    const auto path = write("N01E001.hgt.zip", {zip.begin(), zip.begin() + static_cast<std::ptrdiff_t>(length)});
+    EXPECT_EQ(code_of(path), ErrorCode::kCorrupt) << length;
+  }
+}
+
+TEST_F(HgtSource, NeverCrashesOnADamagedArchive) {
+  const auto zip = zipped("N01E001.hgt", tile(5, 5), true);
+  const auto intact = tile(5, 5);
+  for (std::size_t at = 0; at < zip.size(); ++at) {
+    for (const int bits : {0x01, 0x80, 0xFF}) {
+      auto damaged = zip;
+      damaged[at] ^= static_cast<std::byte>(bits);
+      try {
+        const auto source = open_hgt(write("N01E001.hgt.zip", damaged), {});
+        auto raw = testing::read_all(*source);
+        for (std::size_t i = 0; i + 1 < raw.size(); i += 2) std::swap(raw[i], raw[i + 1]);
+        EXPECT_EQ(raw, intact) << at;
+      } catch (const Error&) {
+      }
+    }
+  }
+}
+
+TEST_F(HgtSource, RefusesWhatIsNoTile) {
+  EXPECT_EQ(code_of(write("N01E001.hgt", {})), ErrorCode::kCorrupt);
+  EXPECT_EQ(code_of(write("N01E001.hgt", std::vector<std::byte>(2))), ErrorCode::kCorrupt);
+  EXPECT_EQ(code_of(write("N01E001.hgt", std::vector<std::byte>(17))), ErrorCode::kCorrupt);
+  EXPECT_EQ(code_of(write("N01E001.hgt", std::vector<std::byte>(2884800))), ErrorCode::kCorrupt);
+  EXPECT_EQ(code_of((folder_ / "N02E002.hgt").string()), ErrorCode::kIo);
+  EXPECT_EQ(code_of(folder_.string()), ErrorCode::kIo);
+  EXPECT_EQ(code_of(write("N01E001.hgt.zip", zipped("readme.txt", tile(3, 3), true))), ErrorCode::kUnsupported);
+  OpenOptions options;
+  options.channel = "R";
+  EXPECT_EQ(code_of(write("N01E001.hgt", tile(3, 3)), options), ErrorCode::kInvalidArgument);
+}
+
+}  // namespace
+}  // namespace isohf

@@ -1,0 +1,38 @@
+#include <gtest/gtest.h>
+
+#include "formats/real_files.h"
+#include "formats/tiff_source.h"
+
+namespace isohf {
+namespace {
+
+TEST(TiffSource, DeliversRealFilesAsTheReferenceDoes) {
+  const auto files = testing::real_files({".tif", ".TIF"});
+  if (files.empty()) GTEST_SKIP() << "the real files are not there";
+  for (const auto& file : files) {
+    SCOPED_TRACE(file.string());
+    const auto source = open_tiff(file.string(), {});
+    testing::expect_as_reference(*source, testing::reference_of(file), file.filename() == "float_nan.tif");
+    EXPECT_TRUE(source->info().warnings.empty()) << source->info().warnings.front();
+    EXPECT_EQ(source->info().format, "GeoTIFF");
+  }
+}
+
+TEST(TiffSource, KnowsTheBodiesOfRealFiles) {
+  if (testing::real_files({".tif"}).empty()) GTEST_SKIP() << "the real files are not there";
+  const auto system = [](const std::string& name) {
+    return open_tiff((testing::real_data() / name).string(), {})->info().georeference.system;
+  };
+  EXPECT_EQ(system("missionDEM_gale_hirise.tif").body, "Mars");
+  EXPECT_EQ(system("missionDEM_gale_hirise.tif").semi_major_axis_m, 3396190.0);
+  EXPECT_EQ(system("missionDEM_gale_hirise.tif").inverse_flattening, 0.0);
+  EXPECT_EQ(system("derived/mola_4ppd_lon360.tif").body, "Mars");
+  EXPECT_EQ(system("derived/mola_4ppd_lon360.tif").name, "GCS_Mars_2000_Sphere");
+  EXPECT_EQ(system("N2000000E3000000_noepsg.tif").body, "Earth");
+  EXPECT_FALSE(system("N2000000E3000000_noepsg.tif").epsg);
+  EXPECT_EQ(system("mt_fuji_90m.tif").body, "Earth");
+  EXPECT_EQ(system("N00E010_utm32.tif").name, "UTM Zone 32, Northern Hemisphere");
+}
+
+}  // namespace
+}  // namespace isohf
