@@ -162,7 +162,8 @@ void carve_gullies(const NoiseLattice& lattice, std::int64_t column, std::int64_
       rise -= weight * (from_crest < 0 ? -24.0F : 24.0F) * t * (1 - t);
       weights += weight;
     }
-    const float steep = steepness / (1 + 0.6F * steepness);
+    // Cliffs have no gullies: without this, each octave would steepen what the one before made.
+    const float steep = steepness / (1 + 0.6F * steepness * steepness);
     const float depth = strength * steep / weights;
     land.height[i] += wavelength_m * depth * (wave - 0.25F * weights);
     land.slope_x[i] += depth * rise * across_x;
@@ -207,7 +208,7 @@ constexpr float kVoidRadius = 24;     // samples
 constexpr float kPlain = 0.06F;       // of relief: height of an average plain
 constexpr float kContinent = 0.30F;   // of relief: swing of the lowlands
 constexpr float kFill = 0.06F;        // of relief: height over which rock goes over into sediment
-constexpr float kGullyDepth = 0.20F;  // of wavelength and slope
+constexpr float kGullyDepth = 0.18F;  // of wavelength and slope
 constexpr float kHighest = 1.6F;      // of relief: bound on every height, reached by none
 constexpr double kFinest = 2.6;       // samples: the shortest wavelength that a raster can hold
 
