@@ -2,20 +2,22 @@
 
 #include <fmt/format.h>
 #include <oneapi/tbb/global_control.h>
+#include <oneapi/tbb/parallel_for.h>
 #include <oneapi/tbb/parallel_pipeline.h>
 #include <oneapi/tbb/task_arena.h>
-#include <sys/stat.h>
 
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <filesystem>
 #include <memory>
 
 #include "isohf/archive/writer.h"
 #include "isohf/base/assert.h"
 #include "isohf/base/error.h"
+#include "isohf/convert/elevation_range.h"
+#include "isohf/convert/job_description.h"
 #include "isohf/convert/quantiser.h"
+#include "isohf/convert/tile_statistics.h"
 #include "isohf/surface/band_reader.h"
 #include "isohf/surface/source_scan.h"
 #include "isohf/surface/tile_cutter.h"
@@ -72,113 +74,6 @@ SourceScan scan_source(HeightSource& source, const ProgressCallback& callback, c
   return found;
 }
 
-/// Everything that decides the bytes of the archive, as text: two runs with the same fingerprint may continue each
-/// other.
-std::string fingerprint_of(const SourceInfo& info, const Plan& plan, const ConvertOptions& options) {
-  std::error_code ignored;
-  const auto size = std::filesystem::file_size(info.path, ignored);
-  struct stat status {};
-  const bool known = ::stat(info.path.c_str(), &status) == 0;
-  const TileShape& shape = plan.grid.shape();
-  return fmt::format(
-      "{} | {} {} bytes {}.{:09} {}x{} {} channel '{}' scale {} {} void {} | shape {}x{}/{} tiles {}x{} extent {} {} "
-      "first {} {} "
-      "spacing {} {} {} | {} range {} step {} clamp {} | {} {}",
-      options.producer, std::filesystem::path(info.path).filename().string(), ignored ? 0 : size,
-      known ? status.st_mtim.tv_sec : 0, known ? status.st_mtim.tv_nsec : 0, info.width, info.height,
-      to_string(info.sample_type), info.channel, info.z_scale, info.z_offset,
-      info.void_values.empty() ? std::string("none") : fmt::format("{}", info.void_values.front()), shape.columns(),
-      shape.rows(), shape.levels(), plan.grid.tile_columns(), plan.grid.tile_rows(), plan.grid.extent_x(),
-      plan.grid.extent_z(), plan.frame.first_sample_x, plan.frame.first_sample_z, plan.frame.spacing_x,
-      plan.frame.spacing_z, to_string(plan.outside), to_string(options.code_type),
-      options.z_range ? fmt::format("{}:{}", options.z_range->first, options.z_range->second) : "data",
-      options.step ? fmt::format("{}", *options.step) : "auto", options.clamp_range, options.filter,
-      options.acquisition);
-}
-
-SourceRecord record_of(const SourceInfo& info, const SourceFrame& frame) {
-  const Georeference& place = info.georeference;
-  SourceRecord record;
-  record.name = std::filesystem::path(info.path).filename().string();
-  record.format = info.format;
-  record.width = info.width;
-  record.height = info.height;
-  record.sample_type = to_string(info.sample_type);
-  record.channel = info.channel;
-  record.registration = to_string(frame.registration);
-  record.first_sample_x = frame.first_sample_x;
-  record.first_sample_z = frame.first_sample_z;
-  record.spacing_x = frame.spacing_x;
-  record.spacing_z = frame.spacing_z;
-  if (place.has_origin) {
-    record.origin_x = place.origin_x;
-    record.origin_y = place.origin_y;
-  }
-  record.crs_unit = place.unit == HorizontalUnit::kMetre    ? "metre"
-                    : place.unit == HorizontalUnit::kDegree ? "degree"
-                                                            : "unknown";
-  if (place.has_origin || place.unit != HorizontalUnit::kUnknown) {
-    record.crs_spacing_x = place.spacing_x;
-    record.crs_spacing_y = place.spacing_y;
-  }
-  record.crs_name = place.system.name;
-  record.crs_epsg = place.system.epsg;
-  record.crs_wkt = place.system.wkt;
-  record.body = place.system.body;
-  record.semi_major_axis_m = place.system.semi_major_axis_m;
-  record.inverse_flattening = place.system.inverse_flattening;
-  record.vertical_datum = place.system.vertical_datum;
-  record.vertical_epsg = place.system.vertical_epsg;
-  return record;
-}
-
-/// Statistics of one tile over its visible vertices.
-TileStatistics statistics_of(const TileShape& shape, const TileCodes& tile, const Quantisation& quantisation) {
-  TileStatistics statistics;
-  const auto add = [&](double elevation, bool is_void) {
-    ++statistics.vertices;
-    if (is_void) {
-      ++statistics.voids;
-      return;
-    }
-    statistics.sum += elevation;
-    statistics.min = std::min(statistics.min, elevation);
-    statistics.max = std::max(statistics.max, elevation);
-  };
-  for (int r = 1; r <= shape.rows() - 2; ++r) {
-    const int last = shape.columns() - (r % 2 == 0 ? 2 : 3);
-    const std::size_t row = static_cast<std::size_t>(r) * static_cast<std::size_t>(shape.columns());
-    if (tile.type == CodeType::kF32) {
-      for (int c = 1; c <= last; ++c) {
-        const float height = tile.heights[row + static_cast<std::size_t>(c)];
-        add(double{height}, std::isnan(height));
-      }
-      continue;
-    }
-    // Codes are summed as integers: no rounding, and the loop vectorises.
-    std::uint64_t sum = 0;
-    std::uint32_t low = 0xFFFFFFFFU;
-    std::uint32_t high = 0;
-    std::int64_t voids = 0;
-    for (int c = 1; c <= last; ++c) {
-      const std::uint32_t code = tile.codes[row + static_cast<std::size_t>(c)];
-      const bool is_void = code == quantisation.void_code();
-      voids += is_void ? 1 : 0;
-      sum += is_void ? 0U : code;
-      low = !is_void && code < low ? code : low;
-      high = !is_void && code > high ? code : high;
-    }
-    statistics.vertices += last;
-    statistics.voids += voids;
-    if (voids == last) continue;
-    statistics.sum +=
-        quantisation.offset * static_cast<double>(last - voids) + quantisation.scale * static_cast<double>(sum);
-    statistics.min = std::min(statistics.min, elevation_from_code(quantisation, low));
-    statistics.max = std::max(statistics.max, elevation_from_code(quantisation, high));
-  }
-  return statistics;
-}
-
 /// A tile on its way through the pipeline.
 struct TileJob {
   TileIndex index{};
@@ -186,15 +81,95 @@ struct TileJob {
   EncodedTile encoded;
 };
 
+/// Elevations 0 to 1 in floats or scaled integers are most often a fraction of something.
+void warn_of_unit_range(const SourceInfo& info, const ElevationRange& range, std::vector<std::string>& warnings) {
+  if (!is_floating(info.sample_type) || info.z_scale != 1.0 || info.z_offset != 0.0) return;
+  if (range.min >= -0.1 && range.max <= 1.1 && range.max > range.min) {
+    warnings.push_back(
+        fmt::format("{}: elevations run from {:.4g} to {:.4g}, which looks like a fraction of a height, not "
+                    "metres; give --z-scale and --z-offset",
+                    info.path, range.min, range.max));
+  }
+}
+
 /// What one conversion holds constant.
 struct Conversion {
   HeightSource& source;
   const ConvertOptions& options;
   const Plan& plan;
-  Quantisation quantisation;
-  double datum;
+  const Kernel kernel;
+  const Prefilter prefilter;
   const std::atomic<bool>& cancel;
+  double datum = 0.0;
+  Quantisation quantisation{};
+
+  [[nodiscard]] TileCutter cutter() const {
+    const SourceFrame& frame = plan.frame;
+    return {plan.grid, SourceAxis(frame.width, frame.first_sample_x, frame.spacing_x, frame.registration, plan.outside),
+            SourceAxis(frame.height, frame.first_sample_z, frame.spacing_z, frame.registration, plan.outside), kernel};
+  }
 };
+
+/// The range of the surface itself, for kernels that leave the range of their samples: cuts every tile, keeps none.
+ElevationRange measure_surface(const Conversion& job, const ProgressCallback& callback) {
+  const TileGrid& grid = job.plan.grid;
+  const TileCutter cutter = job.cutter();
+  BandReader reader(job.source, job.datum, job.prefilter);
+  ProgressMeter meter(callback, ConvertProgress::Pass::kRange, grid.tile_rows());
+  std::vector<ElevationRange> ranges(static_cast<std::size_t>(grid.tile_columns()), {HUGE_VAL, -HUGE_VAL});
+  for (std::int64_t row = 0; row < grid.tile_rows(); ++row) {
+    throw_if_cancelled(job.cancel);
+    const auto band = reader.read(cutter.rows_needed(row));
+    oneapi::tbb::parallel_for(std::int64_t{0}, grid.tile_columns(), [&](std::int64_t column) {
+      std::vector<float> heights(static_cast<std::size_t>(grid.shape().stored_vertex_count()));
+      cutter.cut({column, row}, band->view(), heights);
+      ElevationRange& range = ranges[static_cast<std::size_t>(column)];
+      for (const float height : heights) {
+        const double elevation = double{height} + job.datum;  // NaN compares false
+        range.min = elevation < range.min ? elevation : range.min;
+        range.max = elevation > range.max ? elevation : range.max;
+      }
+    });
+    meter.report(row + 1, 0);
+  }
+  ElevationRange all{HUGE_VAL, -HUGE_VAL};
+  for (const ElevationRange& range : ranges) {
+    all = {std::min(all.min, range.min), std::max(all.max, range.max)};
+  }
+  return all.min <= all.max ? all : ElevationRange{};
+}
+
+/// First pass and what follows from it: datum, scale and offset.
+void choose_codes(Conversion& job, std::vector<std::string>& warnings, const ProgressCallback& progress) {
+  const SourceInfo& info = job.source.info();
+  const QuantisationRequest request{job.options.code_type, job.options.step};
+  if (job.options.z_range) {
+    const ElevationRange range{job.options.z_range->first, job.options.z_range->second};
+    job.datum = choose_datum(info, range);
+    job.quantisation = choose_quantisation(request, range, info);
+    return;
+  }
+  const SourceScan found = scan_source(job.source, progress, job.cancel);
+  if (found.valid == 0) {
+    throw Error(ErrorCode::kInvalidArgument,
+                fmt::format("{}: all {} samples are void or not finite, there is no elevation to convert", info.path,
+                            found.voids));
+  }
+  warn_of_unit_range(info, found.range, warnings);
+  job.datum = choose_datum(info, found.range);
+  job.quantisation = choose_quantisation(request, found.range, info);
+  const double over = overshoot(job.kernel, job.prefilter);
+  if (over == 0.0 || job.options.code_type == CodeType::kF32) return;
+  // The surface may leave the samples' range. Where the codes reach far enough for the worst case at the same step,
+  // nothing needs to be measured; voids, at which weights are renormalised, have no such bound.
+  const bool has_step = request.step ? *request.step != 0.0 : !is_floating(info.sample_type);
+  const ElevationRange reach = widened(found.range, over);
+  if (found.voids == 0 && has_step && has_codes_for(job.quantisation, reach)) {
+    job.quantisation = choose_quantisation({request.type, job.quantisation.scale}, reach, info);
+    return;
+  }
+  job.quantisation = choose_quantisation(request, measure_surface(job, progress), info);
+}
 
 [[noreturn]] void refuse_overflow(const Conversion& job, TileIndex tile, const QuantiserCounts& counts) {
   throw Error(ErrorCode::kInvalidArgument,
@@ -212,7 +187,7 @@ EncodedTile make_tile(const Conversion& job, const TileCutter& cutter, TileIndex
   const QuantiserCounts counts = quantise(job.quantisation, job.datum, heights, codes);
   if (counts.below + counts.above > 0 && !job.options.clamp_range) refuse_overflow(job, index, counts);
   EncodedTile encoded = encode_tile(shape, codes);
-  encoded.statistics = statistics_of(shape, codes, job.quantisation);
+  encoded.statistics = tile_statistics(shape, codes, job.quantisation);
   encoded.statistics.clamped = counts.below + counts.above;
   encoded.statistics.worst_rounding = counts.worst_rounding;
   return encoded;
@@ -222,12 +197,8 @@ EncodedTile make_tile(const Conversion& job, const TileCutter& cutter, TileIndex
 /// number of bands: one that is being cut and one that is being read.
 void write_tiles(const Conversion& job, ArchiveWriter& writer, const ProgressCallback& callback, int threads) {
   const TileGrid& grid = job.plan.grid;
-  const SourceFrame& frame = job.plan.frame;
-  const TileCutter cutter(
-      grid, SourceAxis(frame.width, frame.first_sample_x, frame.spacing_x, frame.registration, job.plan.outside),
-      SourceAxis(frame.height, frame.first_sample_z, frame.spacing_z, frame.registration, job.plan.outside),
-      Kernel::make(filter_from_string(job.options.filter)));
-  BandReader reader(job.source, job.datum);
+  const TileCutter cutter = job.cutter();
+  BandReader reader(job.source, job.datum, job.prefilter);
   ProgressMeter meter(callback, ConvertProgress::Pass::kTiles, grid.tile_count());
   std::int64_t next = writer.next_tile();
   std::int64_t band_row = -1;
@@ -271,47 +242,6 @@ void write_tiles(const Conversion& job, ArchiveWriter& writer, const ProgressCal
           make_filter<std::shared_ptr<TileJob>, void>(filter_mode::serial_in_order, write));
 }
 
-Metadata describe(const Conversion& job, const SourceInfo& info) {
-  Metadata metadata(job.plan.grid);
-  metadata.quantisation = job.quantisation;
-  metadata.horizontal_unit = job.plan.frame.in_metres ? "metre" : "unknown";
-  metadata.vertical_unit = info.vertical_unit.empty() ? "unknown" : info.vertical_unit;
-  metadata.valid = job.plan.frame.bounds();
-  metadata.valid.x1 = std::min(metadata.valid.x1, job.plan.grid.world_width());
-  metadata.valid.z1 = std::min(metadata.valid.z1, job.plan.grid.world_height());
-  metadata.outside = to_string(job.plan.outside);
-  metadata.filter = job.options.filter;
-  metadata.acquisition = job.options.acquisition;
-  metadata.source = record_of(info, job.plan.frame);
-  metadata.producer = job.options.producer;
-  return metadata;
-}
-
-Statistics totals(const TileStatistics& all) {
-  Statistics statistics;
-  statistics.vertices = all.vertices;
-  statistics.voids = all.voids;
-  statistics.clamped = all.clamped;
-  statistics.worst_rounding = all.worst_rounding;
-  if (all.voids < all.vertices) {
-    statistics.min = all.min;
-    statistics.max = all.max;
-    statistics.mean = all.sum / static_cast<double>(all.vertices - all.voids);
-  }
-  return statistics;
-}
-
-/// Elevations 0 to 1 in floats or scaled integers are most often a fraction of something.
-void warn_of_unit_range(const SourceInfo& info, const ElevationRange& range, std::vector<std::string>& warnings) {
-  if (!is_floating(info.sample_type) || info.z_scale != 1.0 || info.z_offset != 0.0) return;
-  if (range.min >= -0.1 && range.max <= 1.1 && range.max > range.min) {
-    warnings.push_back(
-        fmt::format("{}: elevations run from {:.4g} to {:.4g}, which looks like a fraction of a height, not "
-                    "metres; give --z-scale and --z-offset",
-                    info.path, range.min, range.max));
-  }
-}
-
 void check_range(const std::pair<double, double>& range) {
   if (!(std::isfinite(range.first) && std::isfinite(range.second) && range.first < range.second)) {
     throw Error(ErrorCode::kInvalidArgument,
@@ -337,31 +267,19 @@ ConvertSummary convert(HeightSource& source, const std::string& output, const Co
   const oneapi::tbb::global_control workers(oneapi::tbb::global_control::max_allowed_parallelism,
                                             static_cast<std::size_t>(threads));
 
-  ArchiveWriter writer(output, plan.grid, {options.overwrite, options.resume, fingerprint_of(info, plan, options)});
+  ArchiveWriter writer(output, plan.grid, {options.overwrite, options.resume, job_fingerprint(info, plan, options)});
   ConvertSummary summary(plan.grid);
   summary.warnings = info.warnings;
+  const Kernel kernel = Kernel::make(filter_from_string(options.filter));
+  Conversion job{
+      source, options, plan, kernel, Prefilter::make(kernel.filter(), acquisition_from_string(options.acquisition)),
+      cancel};
   try {
-    ElevationRange range{0.0, 0.0};
-    if (options.z_range) {
-      range = {options.z_range->first, options.z_range->second};
-    } else {
-      const SourceScan found = scan_source(source, progress, cancel);
-      if (found.valid == 0) {
-        throw Error(ErrorCode::kInvalidArgument,
-                    fmt::format("{}: all {} samples are void or not finite, there is no elevation to convert",
-                                info.path, found.voids));
-      }
-      range = found.range;
-      warn_of_unit_range(info, range, summary.warnings);
-    }
-    Conversion job{source,
-                   options,
-                   plan,
-                   choose_quantisation({options.code_type, options.step}, range, info),
-                   choose_datum(info, range),
-                   cancel};
     oneapi::tbb::task_arena arena(threads);
-    arena.execute([&] { write_tiles(job, writer, progress, threads); });
+    arena.execute([&] {
+      choose_codes(job, summary.warnings, progress);
+      write_tiles(job, writer, progress, threads);
+    });
 
     const TileStatistics all = writer.statistics();
     if (all.voids == all.vertices) {
@@ -369,8 +287,8 @@ ConvertSummary convert(HeightSource& source, const std::string& output, const Co
           ErrorCode::kInvalidArgument,
           fmt::format("{}: every one of the {} lattice vertices is void, nothing to write", info.path, all.vertices));
     }
-    summary.metadata = describe(job, info);
-    summary.metadata.statistics = totals(all);
+    summary.metadata = describe_job(info, plan, options, job.quantisation);
+    summary.metadata.statistics = total_statistics(all);
   } catch (const Error& error) {
     if (error.code() == ErrorCode::kCancelled) writer.keep_part();
     throw;

@@ -27,6 +27,9 @@ struct QuantisationRequest {
 [[nodiscard]] Quantisation choose_quantisation(const QuantisationRequest& request, const ElevationRange& range,
                                                const SourceInfo& info);
 
+/// True where steps of this scale reach over the whole range with the codes that the type has.
+[[nodiscard]] bool has_codes_for(const Quantisation& quantisation, const ElevationRange& range);
+
 /// What quantising one tile did.
 struct QuantiserCounts {
   std::int64_t below = 0;       ///< elevations below code 0

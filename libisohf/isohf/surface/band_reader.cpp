@@ -1,13 +1,51 @@
 #include "isohf/surface/band_reader.h"
 
+#include <oneapi/tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cstring>
 
-#include "isohf/surface/source_scan.h"
-
 namespace isohf {
+namespace {
+
+constexpr std::int64_t kColumnsAtOnce = 512;  // one task's share of a column prefilter: stays in the cache
+constexpr std::int64_t kRowsAtOnce = 16;
+
+}  // namespace
+
+std::int64_t rows_per_read(const SourceInfo& info) {
+  constexpr std::int64_t kReadBytes = std::int64_t{8} << 20;
+  const auto row_bytes = static_cast<std::int64_t>(size_bytes(info.sample_type)) * info.width;
+  const std::int64_t block_rows = std::clamp<std::int64_t>(info.block_height, 1, info.height);
+  const std::int64_t blocks = std::max<std::int64_t>(1, kReadBytes / (row_bytes * block_rows));
+  // A strip may be as high as the picture; it is read in parts then.
+  if (row_bytes * block_rows > 4 * kReadBytes) return std::max<std::int64_t>(1, kReadBytes / row_bytes);
+  return std::min(info.height, blocks * block_rows);
+}
 
 std::shared_ptr<const Band> BandReader::read(const RowRange& rows) {
+  if (prefilter_.is_identity()) return read_heights(rows);
+  const std::int64_t halo = prefilter_.halo();
+  const auto heights = read_heights(
+      {std::max<std::int64_t>(rows.first - halo, 0), std::min(rows.last + halo, source_.info().height - 1)});
+  auto band = std::make_shared<Band>();
+  band->columns = heights->columns;
+  band->rows = rows;
+  const std::int64_t count = rows.last - rows.first + 1;
+  band->heights.resize(static_cast<std::size_t>(band->columns) * static_cast<std::size_t>(count));
+  const View2D<const float> from = heights->view().heights;
+  oneapi::tbb::parallel_for(
+      std::int64_t{0}, (band->columns + kColumnsAtOnce - 1) / kColumnsAtOnce, [&](std::int64_t part) {
+        const std::int64_t first_column = part * kColumnsAtOnce;
+        const std::int64_t columns = std::min(kColumnsAtOnce, band->columns - first_column);
+        prefilter_.filter_columns({from.data() + first_column, columns, from.rows(), from.stride()},
+                                  rows.first - heights->rows.first,
+                                  {band->heights.data() + first_column, columns, count, band->columns});
+      });
+  return band;
+}
+
+std::shared_ptr<const Band> BandReader::read_heights(const RowRange& rows) {
   auto band = std::make_shared<Band>();
   band->columns = source_.info().width;
   band->rows = rows;
@@ -38,7 +76,15 @@ void BandReader::read_rows(std::int64_t first, std::int64_t count, float* height
   const auto samples = static_cast<std::size_t>(count) * static_cast<std::size_t>(info.width);
   raw_.resize(samples * size_bytes(info.sample_type));
   source_.read_window({0, first, info.width, count}, raw_);
-  heights_from_samples(info, datum_, raw_, {heights, samples});
+  oneapi::tbb::parallel_for(std::int64_t{0}, (count + kRowsAtOnce - 1) / kRowsAtOnce, [&](std::int64_t part) {
+    const std::int64_t rows = std::min(kRowsAtOnce, count - part * kRowsAtOnce);
+    const auto begin = static_cast<std::size_t>(part * kRowsAtOnce) * static_cast<std::size_t>(info.width);
+    const std::size_t samples_here = static_cast<std::size_t>(rows) * static_cast<std::size_t>(info.width);
+    const std::size_t bytes = size_bytes(info.sample_type);
+    heights_from_samples(info, datum_, std::span(raw_).subspan(begin * bytes, samples_here * bytes),
+                         {heights + begin, samples_here});
+    if (!prefilter_.is_identity()) prefilter_.filter_rows({heights + begin, info.width, rows});
+  });
 }
 
 }  // namespace isohf

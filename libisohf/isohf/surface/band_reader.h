@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "isohf/surface/height_source.h"
+#include "isohf/surface/prefilter.h"
 #include "isohf/surface/tile_cutter.h"
 
 namespace isohf {
@@ -19,22 +20,33 @@ struct Band {
   [[nodiscard]] SourceBand view() const { return {{heights.data(), columns, rows.last - rows.first + 1}, rows.first}; }
 };
 
-/// Reads a source from North to South in overlapping bands, each source row once.
+/// Reads a source from North to South in overlapping bands, each source row once, and prefilters it on the way.
+///
+/// The bytes of a band do not depend on how the source is cut into bands: a coefficient depends on the rows within the
+/// prefilter's halo and on nothing else.
 class BandReader {
  public:
-  /// `datum` as in heights_from_samples.
-  BandReader(HeightSource& source, double datum) : source_(source), datum_(datum) {}
+  /// `datum` as in heights_from_samples. Both references outlive the reader.
+  BandReader(HeightSource& source, double datum, const Prefilter& prefilter)
+      : source_(source), datum_(datum), prefilter_(prefilter) {}
 
-  /// The band that holds exactly `rows`. Rows that the last band held are copied from it.
+  /// The band that holds exactly `rows`: coefficients, or heights where the prefilter is the identity. Rows that the
+  /// last band held are not read again. Works on the calling thread's task arena.
   [[nodiscard]] std::shared_ptr<const Band> read(const RowRange& rows);
 
  private:
+  /// Heights, prefiltered along rows but not yet along columns.
+  [[nodiscard]] std::shared_ptr<const Band> read_heights(const RowRange& rows);
   void read_rows(std::int64_t first, std::int64_t count, float* heights);
 
   HeightSource& source_;
   double datum_;
+  const Prefilter& prefilter_;
   std::vector<std::byte> raw_;
   std::shared_ptr<const Band> last_;
 };
+
+/// Rows that one read of a pass over the whole source should take: whole blocks, about 8 MiB.
+[[nodiscard]] std::int64_t rows_per_read(const SourceInfo& info);
 
 }  // namespace isohf

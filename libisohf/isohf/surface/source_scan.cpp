@@ -87,16 +87,6 @@ void scan_samples(const SourceInfo& info, std::span<const std::byte> raw, Source
   }
 }
 
-std::int64_t rows_per_read(const SourceInfo& info) {
-  constexpr std::int64_t kReadBytes = std::int64_t{8} << 20;
-  const auto row_bytes = static_cast<std::int64_t>(size_bytes(info.sample_type)) * info.width;
-  const std::int64_t block_rows = std::clamp<std::int64_t>(info.block_height, 1, info.height);
-  const std::int64_t blocks = std::max<std::int64_t>(1, kReadBytes / (row_bytes * block_rows));
-  // A strip may be as high as the picture; it is read in parts then.
-  if (row_bytes * block_rows > 4 * kReadBytes) return std::max<std::int64_t>(1, kReadBytes / row_bytes);
-  return std::min(info.height, blocks * block_rows);
-}
-
 double choose_datum(const SourceInfo& info, const ElevationRange& range) {
   const bool wide = info.sample_type == SampleType::kUint32 || info.sample_type == SampleType::kInt32 ||
                     info.sample_type == SampleType::kFloat64;

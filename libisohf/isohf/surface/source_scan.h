@@ -24,9 +24,6 @@ struct SourceScan {
 /// Accumulates range and counts over raw samples of the source's type, exactly, z_scale and z_offset applied.
 void scan_samples(const SourceInfo& info, std::span<const std::byte> raw, SourceScan& scan);
 
-/// Rows that one read of a pass over the whole source should take: whole blocks, about 8 MiB.
-[[nodiscard]] std::int64_t rows_per_read(const SourceInfo& info);
-
 /// The datum that heights of this source are taken from (heights_from_samples): the middle of the range, rounded, for
 /// samples of more than 24 bits or scaled ones, so that single precision holds them; 0 for all others.
 [[nodiscard]] double choose_datum(const SourceInfo& info, const ElevationRange& range);

@@ -88,7 +88,8 @@ class Comparison {
   }
 
   AccuracyReport run(const std::function<void(std::int64_t, std::int64_t)>& progress, const std::atomic<bool>& cancel) {
-    BandReader reader(source_, datum_);
+    const Prefilter samples_as_they_are = Prefilter::make(Filter::kBilinear, {});
+    BandReader reader(source_, datum_, samples_as_they_are);
     AccuracyReport report;
     double squares = 0.0;
     double random_squares = 0.0;

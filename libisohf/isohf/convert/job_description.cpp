@@ -1,0 +1,89 @@
+#include "isohf/convert/job_description.h"
+
+#include <fmt/format.h>
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <filesystem>
+
+namespace isohf {
+namespace {
+
+SourceRecord record_of(const SourceInfo& info, const SourceFrame& frame) {
+  const Georeference& place = info.georeference;
+  SourceRecord record;
+  record.name = std::filesystem::path(info.path).filename().string();
+  record.format = info.format;
+  record.width = info.width;
+  record.height = info.height;
+  record.sample_type = to_string(info.sample_type);
+  record.channel = info.channel;
+  record.registration = to_string(frame.registration);
+  record.first_sample_x = frame.first_sample_x;
+  record.first_sample_z = frame.first_sample_z;
+  record.spacing_x = frame.spacing_x;
+  record.spacing_z = frame.spacing_z;
+  if (place.has_origin) {
+    record.origin_x = place.origin_x;
+    record.origin_y = place.origin_y;
+  }
+  record.crs_unit = place.unit == HorizontalUnit::kMetre    ? "metre"
+                    : place.unit == HorizontalUnit::kDegree ? "degree"
+                                                            : "unknown";
+  if (place.has_origin || place.unit != HorizontalUnit::kUnknown) {
+    record.crs_spacing_x = place.spacing_x;
+    record.crs_spacing_y = place.spacing_y;
+  }
+  record.crs_name = place.system.name;
+  record.crs_epsg = place.system.epsg;
+  record.crs_wkt = place.system.wkt;
+  record.body = place.system.body;
+  record.semi_major_axis_m = place.system.semi_major_axis_m;
+  record.inverse_flattening = place.system.inverse_flattening;
+  record.vertical_datum = place.system.vertical_datum;
+  record.vertical_epsg = place.system.vertical_epsg;
+  return record;
+}
+
+}  // namespace
+
+std::string job_fingerprint(const SourceInfo& info, const Plan& plan, const ConvertOptions& options) {
+  std::error_code ignored;
+  const auto size = std::filesystem::file_size(info.path, ignored);
+  struct stat status {};
+  const bool known = ::stat(info.path.c_str(), &status) == 0;
+  const TileShape& shape = plan.grid.shape();
+  return fmt::format(
+      "{} | {} {} bytes {}.{:09} {}x{} {} channel '{}' scale {} {} void {} | shape {}x{}/{} tiles {}x{} extent {} {} "
+      "first {} {} "
+      "spacing {} {} {} | {} range {} step {} clamp {} | {} {}",
+      options.producer, std::filesystem::path(info.path).filename().string(), ignored ? 0 : size,
+      known ? status.st_mtim.tv_sec : 0, known ? status.st_mtim.tv_nsec : 0, info.width, info.height,
+      to_string(info.sample_type), info.channel, info.z_scale, info.z_offset,
+      info.void_values.empty() ? std::string("none") : fmt::format("{}", info.void_values.front()), shape.columns(),
+      shape.rows(), shape.levels(), plan.grid.tile_columns(), plan.grid.tile_rows(), plan.grid.extent_x(),
+      plan.grid.extent_z(), plan.frame.first_sample_x, plan.frame.first_sample_z, plan.frame.spacing_x,
+      plan.frame.spacing_z, to_string(plan.outside), to_string(options.code_type),
+      options.z_range ? fmt::format("{}:{}", options.z_range->first, options.z_range->second) : "data",
+      options.step ? fmt::format("{}", *options.step) : "auto", options.clamp_range, options.filter,
+      options.acquisition);
+}
+
+Metadata describe_job(const SourceInfo& info, const Plan& plan, const ConvertOptions& options,
+                      const Quantisation& quantisation) {
+  Metadata metadata(plan.grid);
+  metadata.quantisation = quantisation;
+  metadata.horizontal_unit = plan.frame.in_metres ? "metre" : "unknown";
+  metadata.vertical_unit = info.vertical_unit.empty() ? "unknown" : info.vertical_unit;
+  metadata.valid = plan.frame.bounds();
+  metadata.valid.x1 = std::min(metadata.valid.x1, plan.grid.world_width());
+  metadata.valid.z1 = std::min(metadata.valid.z1, plan.grid.world_height());
+  metadata.outside = to_string(plan.outside);
+  metadata.filter = options.filter;
+  metadata.acquisition = options.acquisition;
+  metadata.source = record_of(info, plan.frame);
+  metadata.producer = options.producer;
+  return metadata;
+}
+
+}  // namespace isohf
