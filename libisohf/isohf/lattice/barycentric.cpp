@@ -1,13 +1,14 @@
 #include "isohf/lattice/barycentric.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace isohf {
 
 Barycentric barycentric(const TileShape& shape, ObjectPoint point) {
   const int cells = shape.cell_columns();
-  const double x = std::clamp(point.x, 0.0, 2.0 * cells);
-  const double z = std::clamp(point.z, 0.0, static_cast<double>(shape.cell_rows()));
+  const double x = std::fmax(0.0, std::fmin(point.x, 2.0 * cells));
+  const double z = std::fmax(0.0, std::fmin(point.z, shape.cell_rows()));
   // The row of triangles lies between an odd grid row with vertices at x = 0, 2, ..., 2n, column 1 + x/2, and an even
   // one with vertices at 0, 1, 3, ..., 2n-1, 2n, columns 1, 2, 3, ..., n+1, n+2.
   const int top = std::min(static_cast<int>(z), shape.cell_rows() - 1) + 1;

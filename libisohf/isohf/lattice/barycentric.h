@@ -35,9 +35,9 @@ struct Barycentric {
 };
 
 /// The triangle of the full-detail mesh under a point of a tile, and the point's weights in it.
-/// point  object space, x in [0, 2(C-4)], z in [0, R-3]; points outside are moved to the nearest point of the square.
-/// On a side that two triangles share either may be named; the weights of the vertices off that side are 0, so that
-/// interpolated values agree. O(1), cannot fail.
+/// point  object space, x in [0, 2(C-4)], z in [0, R-3]; points outside are moved to the nearest point of the square,
+/// NaN to any. On a side that two triangles share either may be named; the weights of the vertices off that side are 0,
+/// so that interpolated values agree. O(1), cannot fail.
 [[nodiscard]] Barycentric barycentric(const TileShape& shape, ObjectPoint point);
 
 /// Value of a per-vertex property at the point.

@@ -18,8 +18,9 @@ TileGrid TileGrid::make(const TileShape& shape, std::int64_t tile_columns, std::
     refuse(fmt::format("{}x{} tiles, must be at most {} in one direction and {} in all", tile_columns, tile_rows,
                        kMaxTilesPerAxis, kMaxTiles));
   }
-  if (!(std::isfinite(extent_x) && std::isfinite(extent_z) && extent_x > 0.0 && extent_z > 0.0)) {
-    refuse(fmt::format("tile extent is {} x {}, must be finite and positive", extent_x, extent_z));
+  const auto usable = [](double extent) { return extent >= kMinExtent && extent <= kMaxExtent; };
+  if (!usable(extent_x) || !usable(extent_z)) {
+    refuse(fmt::format("tile extent is {} x {}, must lie in {} to {}", extent_x, extent_z, kMinExtent, kMaxExtent));
   }
   return {shape, tile_columns, tile_rows, extent_x, extent_z};
 }
@@ -30,8 +31,8 @@ bool TileGrid::contains(WorldPoint point) const {
 
 TilePoint TileGrid::locate(WorldPoint point) const {
   const auto axis = [](double world, double extent, std::int64_t tiles, double cells) {
-    const double in_tiles = std::isfinite(world) ? world / extent : 0.0;
-    const double tile = std::clamp(std::floor(in_tiles), 0.0, static_cast<double>(tiles - 1));
+    if (std::isnan(world)) return std::pair{std::int64_t{0}, 0.0};
+    const double tile = std::clamp(std::floor(world / extent), 0.0, static_cast<double>(tiles - 1));
     const double object = std::clamp((world - tile * extent) / extent * cells, 0.0, cells);
     return std::pair{static_cast<std::int64_t>(tile), object};
   };

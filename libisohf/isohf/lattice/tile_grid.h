@@ -38,6 +38,9 @@ struct TilePoint {
 /// The most tiles in one direction and in all.
 inline constexpr std::int64_t kMaxTilesPerAxis = std::int64_t{1} << 24;
 inline constexpr std::int64_t kMaxTiles = std::int64_t{1} << 32;
+/// Tile extents, world units: wide enough for any unit, narrow enough that no spacing or its reciprocal overflows.
+inline constexpr double kMinExtent = 1e-30;
+inline constexpr double kMaxExtent = 1e30;
 
 /// The grid of square tiles: shape, tile columns and rows, and extents (paper section 3.12, Eqs. 2 and 12-15, errata
 /// E13: extents are world lengths). Immutable.
@@ -46,8 +49,8 @@ inline constexpr std::int64_t kMaxTiles = std::int64_t{1} << 32;
 /// the North-West corner of tile (0, 0).
 class TileGrid {
  public:
-  /// tile_columns, tile_rows >= 1, at most kMaxTilesPerAxis and kMaxTiles together; extents finite and > 0, world
-  /// units. Throws Error{kInvalidArgument}.
+  /// tile_columns, tile_rows >= 1, at most kMaxTilesPerAxis and kMaxTiles together; extents in [kMinExtent,
+  /// kMaxExtent], world units. Throws Error{kInvalidArgument}.
   static TileGrid make(const TileShape& shape, std::int64_t tile_columns, std::int64_t tile_rows, double extent_x,
                        double extent_z);
 
@@ -76,7 +79,7 @@ class TileGrid {
 
   /// Eqs. 12-14: the tile under a world point and the place inside it. A point on an inner edge belongs to the tile
   /// East or South of it; points on the East or South border of the whole belong to the last tile. Points outside are
-  /// moved to the border: ask contains() first.
+  /// moved to the border, NaN to the North-West: ask contains() first.
   [[nodiscard]] TilePoint locate(WorldPoint point) const;
 
   /// The vertex's one name in the whole heightfield; padding of border tiles lies outside [0, width] x [0, height].

@@ -20,8 +20,8 @@ ObjectVertex object_from_grid(const TileShape& shape, GridVertex vertex) {
 
 GridPoint grid_from_object(const TileShape& shape, ObjectPoint point) {
   const int width = 2 * shape.cell_columns();
-  const double x = std::clamp(point.x, 0.0, static_cast<double>(width));
-  const double z = std::clamp(point.z, 0.0, static_cast<double>(shape.cell_rows()));
+  const double x = std::fmax(0.0, std::fmin(point.x, width));
+  const double z = std::fmax(0.0, std::fmin(point.z, shape.cell_rows()));
   // Row of triangles: rows r (above) and r+1 (below), v in [0, 1] from one to the other.
   const int row = std::min(static_cast<int>(z), shape.cell_rows() - 1) + 1;
   const double v = z - (row - 1);

@@ -70,7 +70,7 @@ struct ObjectPoint {
 
 /// The exact inverse of Eq. 1 on the tile's visible square, extended piecewise linearly inside each triangle (errata
 /// E12): a point in a triangle maps to the point with the same barycentric weights in the grid-space triangle.
-/// x in [0, 2(C-4)], z in [0, R-3]; points outside are moved to the nearest point of the square.
+/// x in [0, 2(C-4)], z in [0, R-3]; points outside are moved to the nearest point of the square, NaN to any.
 [[nodiscard]] GridPoint grid_from_object(const TileShape& shape, ObjectPoint point);
 
 /// The piecewise inverse's own inverse: a fractional grid position to object space, by barycentric weights.

@@ -5,29 +5,31 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <tuple>
 
 #include "isohf/base/error.h"
 
 namespace isohf {
 namespace {
 
-constexpr int kMaxLevels = 13;  // C-4 <= 2^14-4 holds one multiple of 2^12 with room, none of 2^14
 constexpr double kSin60 = std::numbers::sqrt3 / 2.0;
 
 int coarsest_stride(int levels) {
   return 1 << (levels - 1);
 }
 
-/// The multiple of `step` that is nearest to `value` and lies in [step, limit].
-int nearest_multiple(int value, int step, int limit) {
-  const auto rounded = static_cast<int>((std::int64_t{std::max(value, 0)} + step / 2) / step * step);
-  return std::clamp(rounded, step, limit / step * step);
+/// The multiple of `step` that is nearest to `value` and lies in [step, limit]; ties upwards.
+int nearest_multiple(std::int64_t value, int step, int limit) {
+  const std::int64_t last = limit / step;
+  return static_cast<int>(std::clamp((std::max<std::int64_t>(value, 0) + step / 2) / step, std::int64_t{1}, last)) *
+         step;
 }
 
 }  // namespace
 
 std::string TileShape::why_invalid(int columns, int rows, int levels) {
-  if (levels < 1 || levels > kMaxLevels) return fmt::format("levels is {}, must lie in 1..{}", levels, kMaxLevels);
+  if (levels < 1 || levels > kMaxTileLevels)
+    return fmt::format("levels is {}, must lie in 1..{}", levels, kMaxTileLevels);
   if (columns < 5) return fmt::format("columns is {}, must be at least 5", columns);
   if (columns > kMaxTileColumns) {
     return fmt::format("columns is {}, must be at most {} so that object-space x fits 16 bits", columns,
@@ -47,10 +49,10 @@ std::string TileShape::why_invalid(int columns, int rows, int levels) {
 }
 
 TileShape TileShape::nearest(int columns, int rows, int levels) {
-  const int kept_levels = std::clamp(levels, 1, kMaxLevels);
+  const int kept_levels = std::clamp(levels, 1, kMaxTileLevels);
   const int stride = coarsest_stride(kept_levels);
-  const int cells = nearest_multiple(columns - 4, stride, kMaxTileColumns - 4);
-  const int cell_rows = nearest_multiple(rows - 3, 2 * stride, kMaxTileRows - 3);
+  const int cells = nearest_multiple(std::int64_t{columns} - 4, stride, kMaxTileColumns - 4);
+  const int cell_rows = nearest_multiple(std::int64_t{rows} - 3, 2 * stride, kMaxTileRows - 3);
   return {cells + 4, cell_rows + 3, kept_levels};
 }
 
@@ -102,43 +104,67 @@ double TileShape::printed_aspect() const {
   return rows_ * kSin60 / columns_;
 }
 
-std::vector<TileShape> find_shapes(int levels, const ShapeBudget& budget, double tolerance, int limit) {
-  if (levels < 1 || levels > kMaxLevels) {
-    throw Error(ErrorCode::kInvalidArgument, fmt::format("levels is {}, must lie in 1..{}", levels, kMaxLevels));
-  }
-  if (budget.count < 1) {
-    throw Error(ErrorCode::kInvalidArgument, fmt::format("tile budget is {}, must be at least 1", budget.count));
-  }
-  const auto wanted = static_cast<double>(budget.count);
-  const auto off_budget = [&](const TileShape& shape) {
-    const std::int64_t count =
-        budget.kind == ShapeBudget::Kind::kTriangles ? shape.triangle_count() : shape.stored_vertex_count();
-    return std::abs(static_cast<double>(count) / wanted - 1.0);
+namespace {
+
+std::int64_t budgeted_count(const TileShape& shape, ShapeBudget::Kind kind) {
+  return kind == ShapeBudget::Kind::kTriangles ? shape.triangle_count() : shape.stored_vertex_count();
+}
+
+/// Appends the shapes of this many columns whose count lies in [least, most] and that are nearest to equilateral: at
+/// most two, since the aspect grows with the rows and so does the count.
+void append_best_rows(int columns, int levels, ShapeBudget::Kind kind, double least, double most,
+                      std::vector<TileShape>& found) {
+  const int step = 2 * coarsest_stride(levels);
+  const int most_steps = (kMaxTileRows - 3) / step;
+  // R = step·k + 3 rows (errata E2). Triangles (2C-7)·step·k, or vertices C·(step·k + 3), bound k.
+  const bool by_triangles = kind == ShapeBudget::Kind::kTriangles;
+  const double per_row = by_triangles ? 2.0 * columns - 7.0 : columns;
+  const double fixed_rows = by_triangles ? 0.0 : 3.0;
+  const double lower = std::ceil((least / per_row - fixed_rows) / step);
+  const double upper = std::floor((most / per_row - fixed_rows) / step);
+  if (upper < 1.0 || lower > most_steps) return;
+  // One step wider, so that the rounding of the division loses nothing; the exact test follows.
+  const auto in_budget = [&](int k) {
+    const auto count = static_cast<double>(budgeted_count(TileShape::make(columns, step * k + 3, levels), kind));
+    return count >= least && count <= most;
   };
+  int first = static_cast<int>(std::max(lower - 1.0, 1.0));
+  int last = static_cast<int>(std::min(upper + 1.0, static_cast<double>(most_steps)));
+  while (first <= last && !in_budget(first)) ++first;
+  while (last >= first && !in_budget(last)) --last;
+  if (first > last) return;
+  const auto ideal = static_cast<int>((columns - 4) / kSin60 / step);  // equilateral between this and the next
+  const int below = std::clamp(ideal, first, std::max(first, last - 1));
+  for (int k = below; k <= std::min(below + 1, last); ++k) {
+    found.push_back(TileShape::make(columns, step * k + 3, levels));
+  }
+}
+
+}  // namespace
+
+std::vector<TileShape> find_shapes(int levels, const ShapeBudget& budget, double tolerance, int limit) {
+  const auto refuse = [](const std::string& why) { throw Error(ErrorCode::kInvalidArgument, why); };
+  if (levels < 1 || levels > kMaxTileLevels) {
+    refuse(fmt::format("levels is {}, must lie in 1..{}", levels, kMaxTileLevels));
+  }
+  if (budget.count < 1) refuse(fmt::format("tile budget is {}, must be at least 1", budget.count));
+  if (!(tolerance >= 0.0)) refuse(fmt::format("tile budget tolerance is {}, must be at least 0", tolerance));
+  const auto wanted = static_cast<double>(budget.count);
   const int stride = coarsest_stride(levels);
   std::vector<TileShape> found;
-  for (int cells = stride; cells + 4 <= kMaxTileColumns; cells += stride) {
-    // Only the two row counts on either side of the equilateral one can be best for these columns.
-    const double ideal = cells / kSin60 / (2.0 * stride);
-    for (const int pairs : {static_cast<int>(std::floor(ideal)), static_cast<int>(std::floor(ideal)) + 1}) {
-      const int rows = pairs * 2 * stride + 3;
-      if (!TileShape::why_invalid(cells + 4, rows, levels).empty()) continue;
-      const TileShape shape = TileShape::make(cells + 4, rows, levels);
-      if (off_budget(shape) <= tolerance) found.push_back(shape);
-    }
+  for (int columns = 4 + stride; columns <= kMaxTileColumns; columns += stride) {
+    append_best_rows(columns, levels, budget.kind, wanted * (1.0 - tolerance), wanted * (1.0 + tolerance), found);
   }
+  const auto off_budget = [&](const TileShape& shape) {
+    return std::abs(static_cast<double>(budgeted_count(shape, budget.kind) - budget.count));
+  };
   std::sort(found.begin(), found.end(), [&](const TileShape& a, const TileShape& b) {
-    const double distortion_a = std::abs(a.aspect() - 1.0);
-    const double distortion_b = std::abs(b.aspect() - 1.0);
-    if (distortion_a != distortion_b) return distortion_a < distortion_b;
-    const double off_a = off_budget(a);
-    const double off_b = off_budget(b);
-    if (off_a != off_b) return off_a < off_b;
-    return a.columns() < b.columns();
+    const auto key = [&](const TileShape& shape) {
+      return std::tuple(std::abs(shape.aspect() - 1.0), off_budget(shape), shape.columns());
+    };
+    return key(a) < key(b);
   });
-  if (limit >= 0 && found.size() > static_cast<std::size_t>(limit)) {
-    found.erase(found.begin() + limit, found.end());
-  }
+  if (limit >= 0 && found.size() > static_cast<std::size_t>(limit)) found.erase(found.begin() + limit, found.end());
   return found;
 }
 

@@ -11,11 +11,13 @@ namespace isohf {
 inline constexpr int kMaxTileColumns = 1 << 14;
 /// The most stored rows: object-space z reaches R-2 and grid indices stay in 16 bits.
 inline constexpr int kMaxTileRows = (1 << 15) - 1;
+/// The most levels: C-4 and (R-3)/2 hold a multiple of 2^13 within the limits above, none of 2^14.
+inline constexpr int kMaxTileLevels = 14;
 
 /// The validated shape of every tile of a heightfield: C columns and R rows of stored elevations, a one-vertex border
 /// included, and Λ levels of detail (paper section 3, errata E1-E4).
 ///
-/// Constraints: C >= 5, R >= 5, R odd, C-4 and (R-3)/2 integer multiples of 2^(Λ-1), C <= 2^14, R < 2^15, Λ >= 1.
+/// Constraints: C >= 5, R >= 5, R odd, C-4 and (R-3)/2 integer multiples of 2^(Λ-1), C <= 2^14, R < 2^15, 1 <= Λ <= 14.
 /// A function that is given a TileShape is total. Immutable, cheap to copy.
 class TileShape {
  public:
@@ -25,7 +27,7 @@ class TileShape {
   /// Why (columns, rows, levels) is no valid shape, one clause; empty where it is one.
   static std::string why_invalid(int columns, int rows, int levels);
 
-  /// The valid shape nearest to the one asked for: levels are kept where they lie in 1..13, then columns and rows are
+  /// The valid shape nearest to the one asked for: levels are kept where they lie in 1..14, then columns and rows are
   /// rounded to the nearest that satisfy the constraints (ties upwards).
   static TileShape nearest(int columns, int rows, int levels);
 
@@ -72,9 +74,11 @@ struct ShapeBudget {
   std::int64_t count = 10000;
 };
 
-/// The search behind Table 1 with the true aspect (errata E2, E3): all shapes of `levels` levels whose count lies
-/// within `tolerance` (a fraction, > 0) of the budget, best |aspect - 1| first, ties by nearness to the budget; at
-/// most `limit`. May be empty. Throws Error{kInvalidArgument} for levels < 1 or > 13, or a budget below 1.
+/// The search behind Table 1 with the true aspect (errata E2, E3): shapes of `levels` levels whose count lies within
+/// `tolerance` (a fraction, >= 0) of the budget, best |aspect - 1| first, ties by nearness to the budget, then fewer
+/// columns; at most `limit`, all where it is negative. For each number of columns the two row counts within the budget
+/// that are nearest to equilateral are considered. May be empty. O(2^14 / 2^levels) shapes.
+/// Throws Error{kInvalidArgument} for levels outside 1..14, a budget below 1, or a negative or NaN tolerance.
 std::vector<TileShape> find_shapes(int levels, const ShapeBudget& budget, double tolerance, int limit);
 
 /// A row of the paper's Table 1, as printed.

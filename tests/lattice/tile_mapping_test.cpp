@@ -1,0 +1,180 @@
+#include "isohf/lattice/tile_mapping.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <random>
+#include <set>
+
+#include "isohf/lattice/tile_grid.h"
+#include "lattice/mesh_check.h"
+
+namespace isohf {
+namespace {
+
+using test::deepest_shapes;
+
+TEST(TileMapping, Eq1PlacesEveryVisibleVertexOnItsRow) {
+  for (const TileShape& shape : deepest_shapes(24, 19)) {
+    const int width = 2 * shape.cell_columns();
+    for (int r = 1; r <= shape.rows() - 2; ++r) {
+      std::vector<int> places;
+      for (int c = 0; c < shape.columns(); ++c) {
+        const ObjectVertex p = object_from_grid(shape, GridVertex{c, r});
+        ASSERT_EQ(p.z, r - 1);
+        if (is_visible(shape, {c, r})) places.push_back(p.x);
+      }
+      std::vector<int> expected;
+      if (r % 2 == 1) {
+        for (int x = 0; x <= width; x += 2) expected.push_back(x);
+      } else {
+        expected.push_back(0);
+        for (int x = 1; x < width; x += 2) expected.push_back(x);
+        expected.push_back(width);
+      }
+      ASSERT_EQ(places, expected) << shape.columns() << "x" << shape.rows() << " row " << r;
+    }
+  }
+}
+
+TEST(TileMapping, SlidVerticesAreTheOnesOffTheInfiniteLattice) {
+  for (const TileShape& shape : deepest_shapes(24, 19)) {
+    for (int r = 0; r < shape.rows(); ++r) {
+      for (int c = 0; c < shape.columns(); ++c) {
+        const ObjectVertex p = object_from_grid(shape, GridVertex{c, r});
+        ASSERT_EQ(is_slid(shape, {c, r}), (p.x + p.z) % 2 != 0) << c << "," << r;
+      }
+    }
+  }
+}
+
+TEST(TileMapping, InverseReturnsEveryVisibleVertex) {
+  for (const TileShape& shape : deepest_shapes(24, 19)) {
+    for (int r = 1; r <= shape.rows() - 2; ++r) {
+      for (int c = 1; c < shape.columns(); ++c) {
+        if (!is_visible(shape, {c, r})) continue;
+        const ObjectVertex p = object_from_grid(shape, GridVertex{c, r});
+        const GridPoint back = grid_from_object(shape, ObjectPoint{static_cast<double>(p.x), static_cast<double>(p.z)});
+        ASSERT_EQ(back.column, c);
+        ASSERT_EQ(back.row, r);
+        const ObjectPoint again = object_from_grid(shape, GridPoint{static_cast<double>(c), static_cast<double>(r)});
+        ASSERT_EQ(again.x, p.x);
+        ASSERT_EQ(again.z, p.z);
+      }
+    }
+  }
+}
+
+// On the coordinates of a 1/8 grid all arithmetic is exact, and every half triangle holds dozens of points.
+TEST(TileMapping, InverseUndoesTheMappingOnAFineGridExactly) {
+  for (const TileShape& shape : deepest_shapes(9, 11)) {
+    for (int x8 = 0; x8 <= 16 * shape.cell_columns(); ++x8) {
+      for (int z8 = 0; z8 <= 8 * shape.cell_rows(); ++z8) {
+        const ObjectPoint point{x8 / 8.0, z8 / 8.0};
+        const ObjectPoint back = object_from_grid(shape, grid_from_object(shape, point));
+        ASSERT_EQ(back.x, point.x) << point.x << "," << point.z;
+        ASSERT_EQ(back.z, point.z) << point.x << "," << point.z;
+      }
+    }
+  }
+}
+
+TEST(TileMapping, InverseUndoesTheMappingAtRandomPoints) {
+  constexpr unsigned kSeed = 20240611;
+  SCOPED_TRACE(testing::Message() << "seed " << kSeed);
+  std::mt19937_64 random(kSeed);
+  for (const TileShape& shape : {TileShape::make(5, 5, 1), TileShape::make(12, 11, 3), TileShape::make(212, 243, 4)}) {
+    std::uniform_real_distribution<double> any_x(0.0, 2.0 * shape.cell_columns());
+    std::uniform_real_distribution<double> any_z(0.0, shape.cell_rows());
+    for (int i = 0; i < 20000; ++i) {
+      // Every second point in a half triangle's reach of an edge.
+      ObjectPoint point{any_x(random), any_z(random)};
+      if (i % 4 == 1) point.x = std::fmod(point.x, 1.0);
+      if (i % 4 == 3) point.x = 2.0 * shape.cell_columns() - std::fmod(point.x, 1.0);
+      const ObjectPoint back = object_from_grid(shape, grid_from_object(shape, point));
+      // A few roundings of coordinates below 512.
+      ASSERT_NEAR(back.x, point.x, 1e-12);
+      ASSERT_NEAR(back.z, point.z, 1e-12);
+    }
+  }
+}
+
+TEST(TileMapping, InverseTakesPointsOutsideToTheSquare) {
+  const TileShape shape = TileShape::make(8, 9, 1);
+  const double inf = std::numeric_limits<double>::infinity();
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const auto expect_inside = [&](const ObjectPoint& point) {
+    const GridPoint grid = grid_from_object(shape, point);
+    EXPECT_GE(grid.column, 1.0);
+    EXPECT_LE(grid.column, shape.columns() - 2);
+    EXPECT_GE(grid.row, 1.0);
+    EXPECT_LE(grid.row, shape.rows() - 2);
+  };
+  for (const double x : {-inf, -1e300, -1e-300, 0.0, 8.0, 8.0000001, 1e300, inf, nan}) {
+    for (const double z : {-inf, -1e300, 0.0, 6.0, 6.5, inf, nan}) expect_inside({x, z});
+  }
+  EXPECT_EQ(grid_from_object(shape, ObjectPoint{-5.0, -5.0}).column, 1.0);
+  EXPECT_EQ(grid_from_object(shape, ObjectPoint{50.0, 50.0}).column, shape.columns() - 3);
+}
+
+/// All triangles' vertices around a tile, in a 3x3 neighbourhood: which places are vertices of the mesh.
+std::set<std::pair<std::int64_t, std::int64_t>> mesh_vertices(const TileGrid& grid) {
+  std::set<std::pair<std::int64_t, std::int64_t>> places;
+  for (std::int64_t row = -1; row <= 1; ++row) {
+    for (std::int64_t column = -1; column <= 1; ++column) {
+      for (int r = 0; r < grid.shape().rows(); ++r) {
+        for (int c = 0; c < grid.shape().columns(); ++c) {
+          if (!is_visible(grid.shape(), {c, r})) continue;
+          const LatticeVertex v = grid.lattice_vertex({column, row}, {c, r});
+          places.insert({v.x, v.z});
+        }
+      }
+    }
+  }
+  return places;
+}
+
+TEST(Errata, E05PaddingLiesOnTheNeighboursVertices) {
+  for (const TileShape& shape : deepest_shapes(16, 19)) {
+    const TileGrid grid = TileGrid::make(shape, 1, 1, 1.0, 1.0);
+    const auto mesh = mesh_vertices(grid);
+    std::set<std::pair<std::int64_t, std::int64_t>> stored;
+    for (int r = 0; r < shape.rows(); ++r) {
+      for (int c = 0; c < shape.columns(); ++c) {
+        if (r % 2 == 1 && c == shape.columns() - 1) continue;  // the one unused place of an odd row
+        const LatticeVertex v = grid.lattice_vertex({0, 0}, {c, r});
+        EXPECT_TRUE(mesh.count({v.x, v.z}) == 1) << c << "," << r << " lies on no vertex";
+        EXPECT_TRUE(stored.insert({v.x, v.z}).second) << c << "," << r << " is stored twice";
+      }
+    }
+    // The whole ring is there: every mesh vertex at most one row outside, and as near beside the edge as its row has.
+    const int width = 2 * shape.cell_columns();
+    for (const auto& [x, z] : mesh) {
+      const std::int64_t reach = z % 2 == 0 ? 2 : 1;
+      if (z < -1 || z > shape.cell_rows() + 1 || x < -reach || x > width + reach) continue;
+      EXPECT_EQ(stored.count({x, z}), 1U) << x << "," << z << " is in no array";
+    }
+    // Printed with b = 0: x = -3 and width+3, while the edge's neighbours lie at -1 and width+1.
+    EXPECT_EQ(object_from_grid(shape, GridVertex{0, 2}).x, -1);
+    EXPECT_EQ(object_from_grid(shape, GridVertex{shape.columns() - 1, 2}).x, width + 1);
+  }
+}
+
+TEST(Errata, E12TheInverseOfEq1IsPiecewiseNearTheStraightEdges) {
+  const TileShape shape = TileShape::make(8, 9, 1);
+  // Inverting Eq. 1's ordinary case everywhere puts the slid vertex (1, 2) at column 1.5.
+  const auto ordinary_column = [](double x, double even_share) { return (x + even_share) / 2.0 + 1.0; };
+  EXPECT_EQ(ordinary_column(0.0, 1.0), 1.5);
+  EXPECT_EQ(grid_from_object(shape, ObjectPoint{0.0, 1.0}).column, 1.0);
+  EXPECT_EQ(ordinary_column(8.0, 1.0), 5.5);
+  EXPECT_EQ(grid_from_object(shape, ObjectPoint{8.0, 1.0}).column, 6.0);
+  // Halfway along the West half triangle's sides and on its border with the ordinary triangles.
+  EXPECT_EQ(grid_from_object(shape, ObjectPoint{0.0, 0.5}).column, 1.0);
+  EXPECT_EQ(grid_from_object(shape, ObjectPoint{0.25, 0.5}).column, 1.25);
+  EXPECT_EQ(grid_from_object(shape, ObjectPoint{0.5, 0.5}).column, 1.5);
+  EXPECT_EQ(ordinary_column(0.5, 0.5), 1.5);
+}
+
+}  // namespace
+}  // namespace isohf
