@@ -95,7 +95,9 @@ TEST(Normals, AreExactForPlanesEverywhere) {
     for (const double stretch : {1.0, 4.0, 0.125}) {
       const TileGrid grid =
           TileGrid::make(shape, 2, 2, 2.0 * shape.cell_columns() * 0.5, shape.cell_rows() * 0.25 * stretch);
-      for (const auto& [alpha, beta] : slopes) {
+      for (const auto& slope : slopes) {
+        const double alpha = slope[0];
+        const double beta = slope[1];
         const Vector wanted = unit({-alpha, 1.0, -beta});
         Tile tile(grid, {1, 0}, [&](LatticeVertex v) {
           const WorldPoint p = grid.world_from_lattice(v);
