@@ -13,6 +13,9 @@
 #include <span>
 
 #include "formats/exr_source.h"
+#include "formats/hgt_source.h"
+#include "formats/png_source.h"
+#include "formats/tiff_source.h"
 #include "isohf/base/error.h"
 
 namespace isohf {
@@ -28,6 +31,9 @@ struct Reader {
 const std::vector<Reader>& readers() {
   static const std::vector<Reader> table = {
       {{"OpenEXR", {".exr"}}, looks_like_exr, open_exr},
+      {{"TIFF, GeoTIFF", {".tif", ".tiff"}}, looks_like_tiff, open_tiff},
+      {{"PNG", {".png"}}, looks_like_png, open_png},
+      {{"SRTM HGT", {".hgt", ".hgt.zip"}}, nullptr, open_hgt},
   };
   return table;
 }

@@ -1,0 +1,311 @@
+#include "formats/png_source.h"
+
+#include <fmt/format.h>
+#include <png.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <csetjmp>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <vector>
+
+#include "formats/open_options.h"
+#include "isohf/base/assert.h"
+#include "isohf/base/error.h"
+
+namespace isohf {
+namespace {
+
+constexpr std::array<unsigned char, 8> kMagic = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1A, '\n'};
+
+/// Deflate's highest compression: 258 bytes from two bits and a little.
+constexpr std::uint64_t kMaxCompressionRatio = 1032;
+
+/// Decoded rows of the channel that are kept for a reader whose windows overlap.
+constexpr std::size_t kKeptBytes = std::size_t{8} << 20U;
+constexpr std::size_t kMaxKeptRows = 1024;
+
+/// What the header says, after the reader's transformations.
+struct PngHeader {
+  std::uint32_t width = 0;
+  std::uint32_t height = 0;
+  int bit_depth = 0;
+  int color_type = 0;
+  bool interlaced = false;
+  bool has_transparent_gray = false;
+  std::uint16_t transparent_gray = 0;
+  std::size_t row_bytes = 0;  ///< packed as in the file until the decoder is started
+};
+
+/// libpng's decoder, started once. libpng leaves a failed call by longjmp: each member that calls it holds nothing but
+/// trivial objects, returns false on failure, and leaves the reason in message().
+class PngDecoder {
+ public:
+  PngDecoder() = default;
+  PngDecoder(const PngDecoder&) = delete;
+  PngDecoder& operator=(const PngDecoder&) = delete;
+  ~PngDecoder() { close(); }
+
+  /// Opens the file and reads what stands before the first row.
+  [[nodiscard]] bool open(const char* path, PngHeader& header) {
+    close();
+    file_ = std::fopen(path, "rb");
+    if (file_ == nullptr) return fail(std::strerror(errno));
+    png_ = png_create_read_struct(PNG_LIBPNG_VER_STRING, this, on_error, on_warning);
+    info_ = png_ != nullptr ? png_create_info_struct(png_) : nullptr;
+    if (info_ == nullptr) return fail("out of memory");
+    return read_header(header);
+  }
+
+  /// Allocates for rows of the header's size.
+  [[nodiscard]] bool start(PngHeader& header) {
+    if (setjmp(png_jmpbuf(png_)) != 0) return false;  // NOLINT(cert-err52-cpp)
+    if (header.bit_depth < 8) png_set_packing(png_);  // a byte each, values as stored
+    if (header.bit_depth == 16) png_set_swap(png_);   // PNG is big-endian, we are not
+    if (header.interlaced) (void)png_set_interlace_handling(png_);
+    png_read_update_info(png_, info_);
+    header.row_bytes = png_get_rowbytes(png_, info_);
+    return true;
+  }
+
+  /// Decodes the next row, or in an interlaced picture all rows at once.
+  [[nodiscard]] bool read_row(png_bytep row) {
+    if (setjmp(png_jmpbuf(png_)) != 0) return false;  // NOLINT(cert-err52-cpp): libpng's way to return errors
+    png_read_row(png_, row, nullptr);
+    return true;
+  }
+  [[nodiscard]] bool read_image(png_bytepp rows) {
+    if (setjmp(png_jmpbuf(png_)) != 0) return false;  // NOLINT(cert-err52-cpp)
+    png_read_image(png_, rows);
+    return true;
+  }
+
+  /// Checks what follows the last row: the last checksums.
+  [[nodiscard]] bool finish() {
+    if (setjmp(png_jmpbuf(png_)) != 0) return false;  // NOLINT(cert-err52-cpp)
+    png_read_end(png_, nullptr);
+    return true;
+  }
+
+  [[nodiscard]] bool has_file() const { return file_ != nullptr; }
+  [[nodiscard]] const char* message() const { return message_.data(); }
+
+ private:
+  static void on_error(png_structp png, png_const_charp text) {
+    static_cast<PngDecoder*>(png_get_error_ptr(png))->fail(text);
+    png_longjmp(png, 1);
+  }
+  static void on_warning(png_structp, png_const_charp) {}
+
+  bool fail(const char* text) {
+    std::snprintf(message_.data(), message_.size(), "%s", text);
+    return false;
+  }
+
+  [[nodiscard]] bool read_header(PngHeader& header) {
+    if (setjmp(png_jmpbuf(png_)) != 0) return false;  // NOLINT(cert-err52-cpp)
+    png_set_user_limits(png_, PNG_UINT_31_MAX, PNG_UINT_31_MAX);
+    png_init_io(png_, file_);
+    png_read_info(png_, info_);
+    header.width = png_get_image_width(png_, info_);
+    header.height = png_get_image_height(png_, info_);
+    header.bit_depth = png_get_bit_depth(png_, info_);
+    header.color_type = png_get_color_type(png_, info_);
+    header.interlaced = png_get_interlace_type(png_, info_) != PNG_INTERLACE_NONE;
+    png_color_16p transparent = nullptr;
+    if (header.color_type == PNG_COLOR_TYPE_GRAY && png_get_tRNS(png_, info_, nullptr, nullptr, &transparent) != 0 &&
+        transparent != nullptr) {
+      header.has_transparent_gray = true;
+      header.transparent_gray = transparent->gray;
+    }
+    header.row_bytes = png_get_rowbytes(png_, info_);
+    return true;
+  }
+
+  void close() {
+    if (png_ != nullptr) png_destroy_read_struct(&png_, &info_, nullptr);
+    if (file_ != nullptr) std::fclose(file_);
+    png_ = nullptr;
+    info_ = nullptr;
+    file_ = nullptr;
+  }
+
+  std::FILE* file_ = nullptr;
+  png_structp png_ = nullptr;
+  png_infop info_ = nullptr;
+  std::array<char, 256> message_{};
+};
+
+std::vector<std::string> channels_of(int color_type) {
+  switch (color_type) {
+    case PNG_COLOR_TYPE_GRAY:
+      return {"Y"};
+    case PNG_COLOR_TYPE_GRAY_ALPHA:
+      return {"Y", "A"};
+    case PNG_COLOR_TYPE_RGB:
+      return {"R", "G", "B"};
+    default:
+      return {"R", "G", "B", "A"};
+  }
+}
+
+/// Rows of one channel, decoded in order.
+class PngSource final : public HeightSource {
+ public:
+  PngSource(const std::string& path, const OpenOptions& options) {
+    info_.path = path;
+    info_.format = "PNG";
+    restart();
+    info_.width = info_.block_width = header_.width;
+    info_.height = header_.height;
+    info_.block_height = header_.interlaced ? info_.height : 1;
+    info_.sample_type = header_.bit_depth == 16 ? SampleType::kUint16 : SampleType::kUint8;
+    if (header_.has_transparent_gray) info_.void_values = {static_cast<double>(header_.transparent_gray)};
+    sample_bytes_ = size_bytes(info_.sample_type);
+    choose_channel(options.channel);
+    apply_open_options(info_, options);
+    const std::size_t row_bytes = header_.width * sample_bytes_;
+    kept_rows_ = header_.interlaced ? header_.height : std::clamp<std::size_t>(kKeptBytes / row_bytes, 1, kMaxKeptRows);
+    kept_rows_ = std::min<std::size_t>(kept_rows_, header_.height);
+  }
+
+  [[nodiscard]] const SourceInfo& info() const override { return info_; }
+
+  void read_window(const Window& window, std::span<std::byte> samples) override {
+    ISOHF_ASSERT(window.column >= 0 && window.row >= 0 && window.columns >= 0 && window.rows >= 0 &&
+                 window.column + window.columns <= info_.width && window.row + window.rows <= info_.height);
+    const std::size_t out_bytes = static_cast<std::size_t>(window.columns) * sample_bytes_;
+    ISOHF_ASSERT(samples.size() == out_bytes * static_cast<std::size_t>(window.rows));
+    if (samples.empty()) return;
+    const auto first = static_cast<std::size_t>(window.row);
+    const std::size_t end = first + static_cast<std::size_t>(window.rows);
+    if (first + kept_rows_ < next_row_) restart();
+    std::byte* out = samples.data();
+    for (std::size_t row = first; row < end; ++row, out += out_bytes) {
+      while (next_row_ <= row) decode_next();
+      std::memcpy(out, kept_row(row) + static_cast<std::size_t>(window.column) * sample_bytes_, out_bytes);
+    }
+  }
+
+ private:
+  /// Opens the file anew; the next row decoded is the first.
+  void restart() {
+    next_row_ = 0;
+    if (!decoder_.open(info_.path.c_str(), header_)) {
+      throw Error(decoder_.has_file() ? ErrorCode::kCorrupt : ErrorCode::kIo,
+                  fmt::format("{}: PNG header: {}", info_.path, decoder_.message()));
+    }
+    if (header_.color_type == PNG_COLOR_TYPE_PALETTE) {
+      throw Error(ErrorCode::kUnsupported,
+                  info_.path + ": PNG with a palette: its numbers are colours, not elevations");
+    }
+    check_size();
+    if (!decoder_.start(header_)) {
+      throw Error(ErrorCode::kCorrupt, fmt::format("{}: PNG header: {}", info_.path, decoder_.message()));
+    }
+  }
+
+  void check_size() const {
+    const std::uint64_t picture_bytes = (header_.row_bytes + 1) * std::uint64_t{header_.height};
+    std::error_code error;
+    const std::uint64_t file_size = std::filesystem::file_size(info_.path, error);
+    if (!error && picture_bytes / kMaxCompressionRatio > file_size) {
+      throw Error(ErrorCode::kCorrupt, fmt::format("{}: PNG header declares {} x {} pixels, for which a file of {} "
+                                                   "bytes has no room",
+                                                   info_.path, header_.width, header_.height, file_size));
+    }
+    if (header_.interlaced && picture_bytes > kMaxInterlacedBytes) {
+      throw Error(ErrorCode::kUnsupported,
+                  fmt::format("{}: interlaced PNG of {} x {} pixels would take more than {} "
+                              "MiB; store it without interlacing",
+                              info_.path, header_.width, header_.height, kMaxInterlacedBytes >> 20U));
+    }
+  }
+
+  void choose_channel(const std::string& wanted) {
+    const std::vector<std::string> channels = channels_of(header_.color_type);
+    channels_ = channels.size();
+    const auto is_wanted = [&](std::size_t at) { return wanted == channels[at] || wanted == std::to_string(at); };
+    while (channel_ < channels_ && !wanted.empty() && !is_wanted(channel_)) ++channel_;
+    if (channel_ == channels_) {
+      throw Error(ErrorCode::kInvalidArgument,
+                  fmt::format("{}: has no channel \"{}\"; it has {} (or 0...{})", info_.path, wanted,
+                              fmt::join(channels, ", "), channels_ - 1));
+    }
+    if (channels_ == 1) return;
+    info_.channel = channels[channel_];
+    if (!wanted.empty()) return;
+    info_.warnings.push_back(
+        channels_ == 2 ? "channel Y is read, not the alpha channel"
+                       : fmt::format("colour picture: only channel R is read, of {}; packed elevations (Terrarium, "
+                                     "Mapbox) are not unpacked",
+                                     fmt::join(channels, ", ")));
+  }
+
+  [[nodiscard]] std::byte* kept_row(std::size_t row) {
+    return kept_.data() + row % kept_rows_ * header_.width * sample_bytes_;
+  }
+
+  void decode_next() {
+    if (kept_.empty()) kept_.resize(kept_rows_ * header_.width * sample_bytes_);
+    if (header_.interlaced) return decode_all();
+    row_.resize(header_.row_bytes);
+    if (!decoder_.read_row(row_.data())) fail(fmt::format("PNG row {}", next_row_));
+    if (next_row_ + 1 == header_.height && !decoder_.finish()) fail(fmt::format("PNG row {}", next_row_));
+    pick_channel(row_.data(), kept_row(next_row_));
+    ++next_row_;
+  }
+
+  void decode_all() {
+    std::vector<png_byte> picture(header_.row_bytes * header_.height);
+    std::vector<png_bytep> rows(header_.height);
+    for (std::size_t row = 0; row < rows.size(); ++row) rows[row] = picture.data() + row * header_.row_bytes;
+    if (!decoder_.read_image(rows.data()) || !decoder_.finish()) fail("interlaced PNG");
+    for (std::size_t row = 0; row < rows.size(); ++row) pick_channel(rows[row], kept_row(row));
+    next_row_ = header_.height;
+  }
+
+  void pick_channel(const png_byte* pixels, std::byte* out) const {
+    const std::size_t pixel_bytes = channels_ * sample_bytes_;
+    if (channels_ == 1) {
+      std::memcpy(out, pixels, header_.width * sample_bytes_);
+      return;
+    }
+    pixels += channel_ * sample_bytes_;
+    for (std::size_t column = 0; column < header_.width; ++column, pixels += pixel_bytes, out += sample_bytes_) {
+      std::memcpy(out, pixels, sample_bytes_);
+    }
+  }
+
+  /// The decoder cannot go on after an error: the next request starts again from the first row.
+  [[noreturn]] void fail(const std::string& where) {
+    next_row_ = header_.height + kept_rows_ + 1;
+    throw Error(ErrorCode::kCorrupt, fmt::format("{}: {}: {}", info_.path, where, decoder_.message()));
+  }
+
+  PngDecoder decoder_;
+  PngHeader header_;
+  SourceInfo info_;
+  std::size_t sample_bytes_ = 0;
+  std::size_t channels_ = 1;
+  std::size_t channel_ = 0;
+  std::size_t next_row_ = 0;   ///< the row that the decoder delivers next
+  std::size_t kept_rows_ = 0;  ///< rows next_row_ - kept_rows_ ... next_row_ - 1 are in kept_, at row % kept_rows_
+  std::vector<std::byte> kept_;
+  std::vector<png_byte> row_;
+};
+
+}  // namespace
+
+bool looks_like_png(std::span<const std::byte> head) {
+  return head.size() >= kMagic.size() && std::memcmp(head.data(), kMagic.data(), kMagic.size()) == 0;
+}
+
+std::unique_ptr<HeightSource> open_png(const std::string& path, const OpenOptions& options) {
+  return std::make_unique<PngSource>(path, options);
+}
+
+}  // namespace isohf

@@ -1,0 +1,306 @@
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <png.h>
+
+#include <algorithm>
+#include <cstdio>
+
+#include "formats/png_source.h"
+#include "formats/raster_reference.h"
+#include "formats/registry.h"
+#include "isohf/base/error.h"
+
+namespace isohf::testing {
+namespace {
+
+using ::testing::HasSubstr;
+
+struct Picture {
+  std::uint32_t width = 37;
+  std::uint32_t height = 41;
+  int bit_depth = 16;
+  int color_type = PNG_COLOR_TYPE_GRAY;
+  bool interlaced = false;
+  int transparent_gray = -1;  ///< tRNS, unless negative
+
+  [[nodiscard]] std::uint32_t channels() const {
+    switch (color_type) {
+      case PNG_COLOR_TYPE_GRAY_ALPHA:
+        return 2;
+      case PNG_COLOR_TYPE_RGB:
+        return 3;
+      case PNG_COLOR_TYPE_RGB_ALPHA:
+        return 4;
+      default:
+        return 1;
+    }
+  }
+  [[nodiscard]] unsigned value(std::uint32_t column, std::uint32_t row, std::uint32_t channel) const {
+    return (column * 977 + row * 3541 + channel * 12345) & ((1U << static_cast<unsigned>(bit_depth)) - 1U);
+  }
+  [[nodiscard]] std::size_t sample_bytes() const { return bit_depth == 16 ? 2 : 1; }
+};
+
+void write_picture(const std::string& path, const Picture& picture) {
+  std::FILE* file = std::fopen(path.c_str(), "wb");
+  png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, nullptr, nullptr);
+  png_infop info = png_create_info_struct(png);
+  png_init_io(png, file);
+  png_set_IHDR(png, info, picture.width, picture.height, picture.bit_depth, picture.color_type,
+               picture.interlaced ? PNG_INTERLACE_ADAM7 : PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT,
+               PNG_FILTER_TYPE_DEFAULT);
+  const png_color palette[4] = {{0, 0, 0}, {1, 1, 1}, {2, 2, 2}, {3, 3, 3}};
+  if (picture.color_type == PNG_COLOR_TYPE_PALETTE) png_set_PLTE(png, info, palette, 4);
+  png_set_gAMA(png, info, 0.45);  // must change nothing
+  if (picture.transparent_gray >= 0) {
+    png_color_16 gray{};
+    gray.gray = static_cast<png_uint_16>(picture.transparent_gray);
+    png_set_tRNS(png, info, nullptr, 0, &gray);
+  }
+  png_write_info(png, info);
+  if (picture.bit_depth < 8) png_set_packing(png);
+  std::vector<std::vector<png_byte>> rows(picture.height);
+  std::vector<png_bytep> pointers;
+  for (std::uint32_t row = 0; row < picture.height; ++row) {
+    for (std::uint32_t column = 0; column < picture.width; ++column) {
+      for (std::uint32_t channel = 0; channel < picture.channels(); ++channel) {
+        const unsigned value = picture.value(column, row, channel);
+        if (picture.bit_depth == 16) rows[row].push_back(static_cast<png_byte>(value >> 8U));
+        rows[row].push_back(static_cast<png_byte>(value & 0xFFU));
+      }
+    }
+    pointers.push_back(rows[row].data());
+  }
+  png_write_image(png, pointers.data());
+  png_write_end(png, nullptr);
+  png_destroy_write_struct(&png, &info);
+  std::fclose(file);
+}
+
+std::vector<std::byte> expected_window(const Picture& picture, std::uint32_t channel, const Window& window) {
+  std::vector<std::byte> samples;
+  for (std::int64_t row = window.row; row < window.row + window.rows; ++row) {
+    for (std::int64_t column = window.column; column < window.column + window.columns; ++column) {
+      const unsigned value =
+          picture.value(static_cast<std::uint32_t>(column), static_cast<std::uint32_t>(row), channel);
+      samples.push_back(static_cast<std::byte>(value & 0xFFU));
+      if (picture.bit_depth == 16) samples.push_back(static_cast<std::byte>(value >> 8U));
+    }
+  }
+  return samples;
+}
+
+std::vector<std::byte> expected_whole(const Picture& picture, std::uint32_t channel = 0) {
+  return expected_window(picture, channel, {0, 0, picture.width, picture.height});
+}
+
+TEST(PngSource, ReadsEveryDepthAndChannelAsStored) {
+  const ScratchFolder folder;
+  const std::string path = folder / "picture.png";
+  const std::vector<std::pair<int, std::vector<int>>> kinds = {{PNG_COLOR_TYPE_GRAY, {1, 2, 4, 8, 16}},
+                                                               {PNG_COLOR_TYPE_GRAY_ALPHA, {8, 16}},
+                                                               {PNG_COLOR_TYPE_RGB, {8, 16}},
+                                                               {PNG_COLOR_TYPE_RGB_ALPHA, {8, 16}}};
+  const std::vector<std::vector<std::string>> names = {{}, {"Y"}, {"Y", "A"}, {"R", "G", "B"}, {"R", "G", "B", "A"}};
+  for (const auto& [color_type, depths] : kinds) {
+    for (const int depth : depths) {
+      for (const bool interlaced : {false, true}) {
+        Picture picture;
+        picture.color_type = color_type;
+        picture.bit_depth = depth;
+        picture.interlaced = interlaced;
+        SCOPED_TRACE(fmt::format("colour type {} depth {} interlaced {}", color_type, depth, interlaced));
+        write_picture(path, picture);
+        for (std::uint32_t channel = 0; channel < picture.channels(); ++channel) {
+          for (const std::string& name : {names[picture.channels()][channel], std::to_string(channel)}) {
+            OpenOptions options;
+            options.channel = name;
+            const auto source = open_png(path, options);
+            EXPECT_EQ(read_whole(*source), expected_whole(picture, channel));
+            EXPECT_EQ(source->info().sample_type, depth == 16 ? SampleType::kUint16 : SampleType::kUint8);
+            EXPECT_TRUE(source->info().warnings.empty());
+            EXPECT_EQ(source->info().channel, picture.channels() > 1 ? names[picture.channels()][channel] : "");
+          }
+        }
+      }
+    }
+  }
+}
+
+TEST(PngSource, DeliversWindowsInAnyOrder) {
+  const ScratchFolder folder;
+  const std::string path = folder / "tall.png";
+  Picture picture;
+  picture.height = 3000;  // more rows than are kept
+  write_picture(path, picture);
+  const auto source = open_png(path, {});
+  for (const std::int64_t row : {0, 2990, 5, 2990, 1500, 1400, 700, 699, 0}) {
+    const Window window = {3, row, 20, 9};
+    ASSERT_EQ(read_window(*source, window), expected_window(picture, 0, window)) << "row " << row;
+  }
+  EXPECT_EQ(read_whole(*source), expected_whole(picture));
+}
+
+TEST(PngSource, WarnsThatOneChannelOfAPictureIsRead) {
+  const ScratchFolder folder;
+  const std::string path = folder / "picture.png";
+  Picture picture;
+  picture.bit_depth = 8;
+  picture.color_type = PNG_COLOR_TYPE_RGB;
+  write_picture(path, picture);
+  auto source = open_png(path, {});
+  ASSERT_EQ(source->info().warnings.size(), 1U);
+  EXPECT_THAT(source->info().warnings[0], HasSubstr("only channel R is read"));
+  EXPECT_THAT(source->info().warnings[0], HasSubstr("Terrarium"));
+  picture.color_type = PNG_COLOR_TYPE_GRAY_ALPHA;
+  write_picture(path, picture);
+  source = open_png(path, {});
+  ASSERT_EQ(source->info().warnings.size(), 1U);
+  EXPECT_THAT(source->info().warnings[0], HasSubstr("alpha"));
+  picture.color_type = PNG_COLOR_TYPE_GRAY;
+  write_picture(path, picture);
+  EXPECT_TRUE(open_png(path, {})->info().warnings.empty());
+}
+
+TEST(PngSource, TakesTransparentGrayAsVoid) {
+  const ScratchFolder folder;
+  const std::string path = folder / "holes.png";
+  Picture picture;
+  picture.transparent_gray = 777;
+  write_picture(path, picture);
+  EXPECT_EQ(open_png(path, {})->info().void_values, std::vector<double>{777.0});
+}
+
+TEST(PngSource, RefusesPalettesAndUnknownChannels) {
+  const ScratchFolder folder;
+  const std::string path = folder / "picture.png";
+  Picture picture;
+  picture.bit_depth = 2;
+  picture.color_type = PNG_COLOR_TYPE_PALETTE;
+  write_picture(path, picture);
+  Error error = error_of([&] { (void)open_png(path, {}); });
+  EXPECT_EQ(error.code(), ErrorCode::kUnsupported);
+  EXPECT_THAT(error.what(), HasSubstr("palette"));
+
+  picture.bit_depth = 8;
+  picture.color_type = PNG_COLOR_TYPE_RGB;
+  write_picture(path, picture);
+  OpenOptions options;
+  options.channel = "Z";
+  error = error_of([&] { (void)open_png(path, options); });
+  EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
+  EXPECT_EQ(error.what(), path + ": has no channel \"Z\"; it has R, G, B (or 0...2)");
+}
+
+TEST(PngSource, ReportsEveryTruncation) {
+  const ScratchFolder folder;
+  const std::string cut = folder / "cut.png";
+  for (const bool interlaced : {false, true}) {
+    Picture picture;
+    picture.interlaced = interlaced;
+    const std::string path = folder / "whole.png";
+    write_picture(path, picture);
+    const auto bytes = file_bytes(path);
+    for (std::size_t length = 0; length < bytes.size(); ++length) {
+      write_bytes(cut, bytes.data(), length);
+      SCOPED_TRACE(fmt::format("{} of {} bytes", length, bytes.size()));
+      const Error error = error_of([&] { (void)read_whole(*open_png(cut, {})); });
+      EXPECT_EQ(error.code(), ErrorCode::kCorrupt);
+      EXPECT_THAT(error.what(), HasSubstr(cut));
+    }
+  }
+}
+
+TEST(PngSource, NamesTheRowThatIsMissingAndReadsTheOnesBefore) {
+  const ScratchFolder folder;
+  const std::string path = folder / "cut.png";
+  Picture picture;
+  picture.width = 1000;  // tens of kilobytes: libpng reads 8 KiB ahead
+  picture.height = 400;
+  write_picture(path, picture);
+  const auto bytes = file_bytes(path);
+  write_bytes(path, bytes.data(), bytes.size() * 9 / 10);
+  const auto source = open_png(path, {});
+  EXPECT_THAT(error_of([&] { (void)read_whole(*source); }).what(), HasSubstr("PNG row "));
+  const Window top = {0, 0, picture.width, 5};
+  EXPECT_EQ(read_window(*source, top), expected_window(picture, 0, top));
+  EXPECT_THAT(error_of([&] { (void)read_whole(*source); }).what(), HasSubstr("PNG row "));
+}
+
+TEST(PngSource, NeverDeliversASampleThatAFlippedBitChanged) {
+  const ScratchFolder folder;
+  const std::string path = folder / "flipped.png";
+  for (const bool interlaced : {false, true}) {
+    Picture picture;
+    picture.width = picture.height = 16;
+    picture.interlaced = interlaced;
+    write_picture(path, picture);
+    const auto bytes = file_bytes(path);
+    for (std::size_t at = 8; at < bytes.size(); ++at) {
+      auto changed = bytes;
+      changed[at] = static_cast<char>(changed[at] ^ 0x10);
+      write_bytes(path, changed.data(), changed.size());
+      try {
+        EXPECT_EQ(read_whole(*open_png(path, {})), expected_whole(picture)) << "byte " << at;
+      } catch (const Error& error) {
+        EXPECT_THAT(error.what(), HasSubstr(path));
+      }
+    }
+  }
+}
+
+/// A PNG header with a right checksum and any numbers.
+void write_header_only(const std::string& path, std::uint32_t width, std::uint32_t height, int interlace) {
+  std::vector<unsigned char> bytes = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1A, '\n', 0, 0, 0, 13, 'I', 'H', 'D', 'R'};
+  const auto put = [&](std::uint32_t value) {
+    for (const unsigned shift : {24U, 16U, 8U, 0U}) bytes.push_back(static_cast<unsigned char>(value >> shift));
+  };
+  put(width);
+  put(height);
+  for (const int field : {16, 0, 0, 0, interlace}) bytes.push_back(static_cast<unsigned char>(field));
+  std::uint32_t crc = 0xFFFFFFFFU;
+  for (std::size_t at = 12; at < bytes.size(); ++at) {
+    crc ^= bytes[at];
+    for (int bit = 0; bit < 8; ++bit) crc = (crc >> 1U) ^ ((crc & 1U) != 0 ? 0xEDB88320U : 0U);
+  }
+  put(~crc);
+  for (const char c : std::string("\0\0\0\0IDAT", 8)) bytes.push_back(static_cast<unsigned char>(c));
+  put(0x35AF061EU);
+  write_bytes(path, reinterpret_cast<const char*>(bytes.data()), bytes.size());
+}
+
+TEST(PngSource, RefusesAbsurdSizesBeforeAllocating) {
+  const ScratchFolder folder;
+  const std::string path = folder / "absurd.png";
+  for (const auto& [width, height] : {std::pair{0x7FFFFFFFU, 1U}, {0x7FFFFFFFU, 0x7FFFFFFFU}, {100000U, 100000U}}) {
+    write_header_only(path, width, height, 0);
+    const Error error = error_of([&] { (void)open_png(path, {}); });
+    EXPECT_EQ(error.code(), ErrorCode::kCorrupt);
+    EXPECT_THAT(error.what(), HasSubstr("has no room"));
+  }
+  for (const auto& [width, height] : {std::pair{0U, 5U}, {5U, 0U}, {0x80000000U, 5U}}) {
+    write_header_only(path, width, height, 0);
+    EXPECT_EQ(error_of([&] { (void)open_png(path, {}); }).code(), ErrorCode::kCorrupt);
+  }
+}
+
+TEST(PngSource, AgreesWithReferenceReadersOnRealFiles) {
+  const auto files = references(".png");
+  if (files.empty()) GTEST_SKIP() << "no shared terrain beside this checkout";
+  for (const Reference& file : files) {
+    SCOPED_TRACE(file.path);
+    const auto source = open_source(file.path, {});
+    if (file.expected.at("dtype") == "UInt16") {
+      expect_matches(*source, file.expected);
+      EXPECT_TRUE(source->info().warnings.empty());
+    } else {  // the reference values are of unpacked elevations
+      EXPECT_EQ(source->info().sample_type, SampleType::kUint8);
+      EXPECT_EQ(source->info().warnings.size(), 1U);
+      EXPECT_EQ(read_whole(*source).size(), static_cast<std::size_t>(source->info().width * source->info().height));
+    }
+  }
+}
+
+}  // namespace
+}  // namespace isohf::testing
