@@ -59,5 +59,37 @@ TEST(OpenSource, ListsWhatIsReadWhenTheFormatIsUnknown) {
   }
 }
 
+TEST(OpenSource, GoesByContentNotByName) {
+  const auto data = shared_data();
+  if (!data) GTEST_SKIP() << "no shared terrain beside this checkout";
+  const ScratchFolder folder;
+  for (const auto& [name, format] : {std::pair{"t3d_peak1.exr", "OpenEXR"},
+                                     {"earth_0_0_0.png", "PNG"},
+                                     {"float_nan.tif", "GeoTIFF"},
+                                     {"N44E006.hgt", "SRTM HGT"}}) {
+    EXPECT_EQ(open_source((*data / name).string(), {})->info().format, format);
+    const bool has_signature = std::string(format) != "SRTM HGT";
+    const std::string renamed = folder / (has_signature ? "N44E006.hgt" : "UPPER_N44E006.HGT");
+    std::filesystem::copy_file(*data / name, renamed, std::filesystem::copy_options::overwrite_existing);
+    EXPECT_EQ(open_source(renamed, {})->info().format, format);
+  }
+}
+
+/// The native readers must not pull in the libraries of others: they cost start-up time.
+TEST(OpenSource, LoadsNoOtherImageLibraryForNativeFormats) {
+  const auto data = shared_data();
+  if (!data) GTEST_SKIP() << "no shared terrain beside this checkout";
+  for (const char* name : {"t3d_peak1.exr", "earth_0_0_0.png", "mt_fuji_90m.tif", "N44E006.hgt"}) {
+    const auto source = open_source((*data / name).string(), {});
+    (void)read_window(*source, {0, 0, source->info().width, 2});
+  }
+  std::ifstream maps("/proc/self/maps");
+  for (std::string line; std::getline(maps, line);) {
+    for (const char* library : {"libgdal", "OpenImageIO", "isohf_oiio"}) {
+      EXPECT_EQ(line.find(library), std::string::npos) << line;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace isohf::testing
