@@ -1,0 +1,26 @@
+# What `cmake --install` lays down: the programs, the reader modules beside them, the library with its headers, and what
+# CMake (find_package(isohf)) and pkg-config need to find it.
+include(CMakePackageConfigHelpers)
+
+install(TARGETS isohf EXPORT isohf ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT development)
+install(DIRECTORY libisohf/isohf DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT development
+        FILES_MATCHING PATTERN "*.h")
+install(TARGETS isohf_cli RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT programs)
+if(TARGET isohf_view)
+  install(TARGETS isohf_view RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT programs)
+endif()
+if(TARGET isohf_oiio)
+  install(TARGETS isohf_oiio LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/isohf COMPONENT programs)
+endif()
+
+set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/isohf)
+install(EXPORT isohf FILE isohfTargets.cmake NAMESPACE isohf:: DESTINATION ${package_dir} COMPONENT development)
+configure_package_config_file(cmake/isohfConfig.cmake.in ${PROJECT_BINARY_DIR}/isohfConfig.cmake
+                              INSTALL_DESTINATION ${package_dir} NO_SET_AND_CHECK_MACRO)
+# Before 1.0 every minor version may change the interface.
+write_basic_package_version_file(${PROJECT_BINARY_DIR}/isohfConfigVersion.cmake COMPATIBILITY SameMinorVersion)
+install(FILES ${PROJECT_BINARY_DIR}/isohfConfig.cmake ${PROJECT_BINARY_DIR}/isohfConfigVersion.cmake
+        DESTINATION ${package_dir} COMPONENT development)
+
+configure_file(cmake/isohf.pc.in ${PROJECT_BINARY_DIR}/isohf.pc @ONLY)
+install(FILES ${PROJECT_BINARY_DIR}/isohf.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig COMPONENT development)
