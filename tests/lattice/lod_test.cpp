@@ -6,6 +6,9 @@
 #include <limits>
 #include <numbers>
 
+#include "isohf/lattice/strip.h"
+#include "lattice/mesh_check.h"
+
 namespace isohf {
 namespace {
 
@@ -101,6 +104,48 @@ TEST(Errata, E18AreaOfAFlatTriangleIsSigmaXTimesSigmaZ) {
   EXPECT_NEAR(triangle_area(grid, 0.0), std::numbers::sqrt3 / 4.0 * edge * edge, 1e-12);
   EXPECT_NEAR(triangle_area(grid, 1.0), std::numbers::sqrt2 * triangle_area(grid, 0.0), 1e-12);
   EXPECT_GT(triangle_area(grid, 0.0), 20.0 * grid.sigma_x() * std::numbers::sqrt3 / 8.0);  // as printed: 1.08, a length
+}
+
+/// Calls check with the triangle's area times how far a level's surface lies above the full-detail vertex, for each
+/// vertex inside or on each of its triangles. Heights x² + z² (times `sign`) are integers, so all of it is exact.
+template <typename Check>
+void for_level_against_vertices(const TileShape& shape, int level, std::int64_t sign, Check&& check) {
+  const auto height = [&](const ObjectVertex& p) { return sign * (std::int64_t{p.x} * p.x + std::int64_t{p.z} * p.z); };
+  const auto doubled = [](const ObjectVertex& a, const ObjectVertex& b, const ObjectVertex& c) {
+    return std::int64_t{b.z - a.z} * (c.x - a.x) - std::int64_t{b.x - a.x} * (c.z - a.z);
+  };
+  for (const test::Triangle& t : test::triangles_of_strip(strip_indices(shape, level))) {
+    if (test::repeats_a_vertex(t)) continue;
+    const ObjectVertex a = test::place_of(shape, t[0]);
+    const ObjectVertex b = test::place_of(shape, t[1]);
+    const ObjectVertex c = test::place_of(shape, t[2]);
+    for (int r = 1; r <= shape.rows() - 2; ++r) {
+      for (int column = 1; column < shape.columns(); ++column) {
+        if (!is_visible(shape, {column, r})) continue;
+        const ObjectVertex p = object_from_grid(shape, GridVertex{column, r});
+        const std::int64_t wa = doubled(p, b, c);
+        const std::int64_t wb = doubled(a, p, c);
+        const std::int64_t wc = doubled(a, b, p);
+        if (wa < 0 || wb < 0 || wc < 0) continue;
+        check(wa * height(a) + wb * height(b) + wc * height(c) - (wa + wb + wc) * height(p));
+      }
+    }
+  }
+}
+
+// Where the surface curves downwards (a hill) a coarser level lies below it, in a valley above: C <= F where F'' < 0.
+TEST(Errata, E17CoarserLevelsLieBelowHillsAndAboveValleys) {
+  const TileShape shape = TileShape::make(12, 19, 4);
+  for (int level = 1; level < shape.levels(); ++level) {
+    int below = 0;
+    for_level_against_vertices(shape, level, -1, [&](std::int64_t coarse_above_fine) {
+      ASSERT_LE(coarse_above_fine, 0);
+      below += coarse_above_fine < 0 ? 1 : 0;
+    });
+    EXPECT_GT(below, 0);
+    for_level_against_vertices(shape, level, 1,
+                               [](std::int64_t coarse_above_fine) { ASSERT_GE(coarse_above_fine, 0); });
+  }
 }
 
 // Beyond the errata: section 3.9 divides the area by the depth once. What projects like 1/z are lengths.
