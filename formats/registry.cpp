@@ -14,6 +14,7 @@
 
 #include "formats/exr_source.h"
 #include "formats/hgt_source.h"
+#include "formats/oiio_source.h"
 #include "formats/png_source.h"
 #include "formats/tiff_source.h"
 #include "isohf/base/error.h"
@@ -31,7 +32,7 @@ struct Reader {
 const std::vector<Reader>& readers() {
   static const std::vector<Reader> table = {
       {{"OpenEXR", {".exr"}}, looks_like_exr, open_exr},
-      {{"TIFF, GeoTIFF", {".tif", ".tiff"}}, looks_like_tiff, open_tiff},
+      {{"TIFF", {".tif", ".tiff"}}, looks_like_tiff, open_tiff},
       {{"PNG", {".png"}}, looks_like_png, open_png},
       {{"SRTM HGT", {".hgt", ".hgt.zip"}}, nullptr, open_hgt},
   };
@@ -84,14 +85,6 @@ const Reader* reader_of(const std::string& path, std::span<const std::byte> head
   return nullptr;
 }
 
-std::string native_names() {
-  std::string names;
-  for (const Format& format : native_formats()) {
-    names += fmt::format("{}{} ({})", names.empty() ? "" : ", ", format.name, fmt::join(format.extensions, " "));
-  }
-  return names;
-}
-
 }  // namespace
 
 const std::vector<Format>& native_formats() {
@@ -106,9 +99,7 @@ const std::vector<Format>& native_formats() {
 std::unique_ptr<HeightSource> open_source(const std::string& path, const OpenOptions& options) {
   const Head head = read_head(path);
   const Reader* reader = reader_of(path, std::span(head.bytes).first(head.size));
-  if (reader == nullptr) {
-    throw Error(ErrorCode::kUnsupported, fmt::format("{}: unknown format; read natively: {}", path, native_names()));
-  }
+  if (reader == nullptr) return open_with_oiio(path, options);
   return reader->open(path, options);
 }
 

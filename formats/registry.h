@@ -28,6 +28,10 @@ struct Format {
 /// The formats read natively, in the order in which they are tried.
 [[nodiscard]] const std::vector<Format>& native_formats();
 
+/// Names a folder in which the OpenImageIO module is looked for first; empty: only beside the program and in
+/// ../lib/isohf. A program calls it before it opens anything.
+void set_module_folder(const std::string& folder);
+
 /// Opens a raster of elevations by its content, not by its name: the file's first bytes pick the reader; the extension
 /// decides only for formats without a signature (.hgt). What no native reader knows goes to the OpenImageIO module.
 /// Throws Error naming the path: kIo (missing, folder, unreadable), kUnsupported (unknown format, with what is read),

@@ -55,6 +55,8 @@ TEST(OpenSource, ListsWhatIsReadWhenTheFormatIsUnknown) {
     EXPECT_EQ(error.code(), ErrorCode::kUnsupported);
     EXPECT_THAT(error.what(), HasSubstr("unknown format"));
     EXPECT_THAT(error.what(), HasSubstr("OpenEXR (.exr)"));
+    // This program has no module beside it.
+    EXPECT_THAT(error.what(), HasSubstr("need the OpenImageIO module isohf_oiio.so"));
     EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos);
   }
 }

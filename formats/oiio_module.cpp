@@ -1,0 +1,216 @@
+#include "formats/oiio_module.h"
+
+#include <OpenImageIO/imageio.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <cstring>
+#include <memory>
+#include <new>
+#include <string>
+#include <vector>
+
+#include "isohf/base/error.h"
+#include "isohf/surface/heightmap.h"
+
+// The module is a library of its own: it shares headers with isohf, no code.
+struct IsohfOiioRaster {
+  std::unique_ptr<OIIO::ImageInput> input;
+  OIIO::ImageSpec spec;
+  OIIO::TypeDesc type;
+  int channel = 0;
+  std::vector<unsigned char> band;  ///< rows read around a window that does not end where the file's blocks do
+};
+
+namespace {
+
+using isohf::Error;
+using isohf::ErrorCode;
+using isohf::SampleType;
+
+/// Windows narrower than the raster, or in tiles, are cut out of bands of about this size.
+constexpr std::int64_t kBandBytes = std::int64_t{8} << 20U;
+/// One row of blocks may not be larger.
+constexpr std::int64_t kMaxBlockRowBytes = std::int64_t{1} << 30U;
+
+template <std::size_t kSize>
+void put_text(char (&out)[kSize], const std::string& text) {
+  std::snprintf(out, kSize, "%s", text.c_str());
+  std::replace(out, out + std::strlen(out), '\n', ' ');
+}
+
+/// Runs `action` and turns what it throws into a result code and a message.
+template <typename Action>
+int guarded(IsohfOiioMessage* message, Action action) {
+  const auto report = [&](ErrorCode code, const char* text) {
+    put_text(message->text, text);
+    return static_cast<int>(code) + 1;
+  };
+  try {
+    action();
+    return 0;
+  } catch (const Error& error) {
+    return report(error.code(), error.what());
+  } catch (const std::bad_alloc&) {
+    return report(ErrorCode::kOutOfMemory, "OpenImageIO ran out of memory");
+  } catch (const std::exception& error) {
+    return report(ErrorCode::kCorrupt, error.what());
+  } catch (...) {
+    return report(ErrorCode::kCorrupt, "OpenImageIO failed without saying why");
+  }
+}
+
+SampleType sample_type_of(OIIO::TypeDesc type) {
+  switch (type.basetype) {
+    case OIIO::TypeDesc::UINT8:
+      return SampleType::kUint8;
+    case OIIO::TypeDesc::INT8:
+      return SampleType::kInt8;
+    case OIIO::TypeDesc::UINT16:
+      return SampleType::kUint16;
+    case OIIO::TypeDesc::INT16:
+      return SampleType::kInt16;
+    case OIIO::TypeDesc::UINT32:
+      return SampleType::kUint32;
+    case OIIO::TypeDesc::INT32:
+      return SampleType::kInt32;
+    case OIIO::TypeDesc::HALF:
+      return SampleType::kFloat16;
+    case OIIO::TypeDesc::FLOAT:
+      return SampleType::kFloat32;
+    case OIIO::TypeDesc::DOUBLE:
+      return SampleType::kFloat64;
+    default:
+      throw Error(ErrorCode::kUnsupported, "OpenImageIO: samples of type " + std::string(type.c_str()));
+  }
+}
+
+int channel_index(const OIIO::ImageSpec& spec, const std::string& wanted) {
+  if (wanted.empty()) return 0;
+  std::string names;
+  for (int at = 0; at < spec.nchannels; ++at) {
+    const std::string name = spec.channel_name(at);
+    if (wanted == name || wanted == std::to_string(at)) return at;
+    names += (names.empty() ? "" : ", ") + name;
+  }
+  throw Error(ErrorCode::kInvalidArgument, "has no channel \"" + wanted + "\"; it has " + names + " (or 0..." +
+                                               std::to_string(spec.nchannels - 1) + ")");
+}
+
+void check(const OIIO::ImageSpec& spec) {
+  if (spec.width < 1 || spec.height < 1 || spec.nchannels < 1) {
+    throw Error(ErrorCode::kCorrupt, "OpenImageIO: raster of " + std::to_string(spec.width) + " x " +
+                                         std::to_string(spec.height) + " samples");
+  }
+  if (spec.deep) throw Error(ErrorCode::kUnsupported, "OpenImageIO: deep picture");
+  if (spec.depth > 1) throw Error(ErrorCode::kUnsupported, "OpenImageIO: volume, not a raster");
+  if (spec.get_int_attribute("oiio:Movie") != 0)
+    throw Error(ErrorCode::kUnsupported, "OpenImageIO: film, not a raster");
+  const std::int64_t rows = spec.tile_width > 0 ? spec.tile_height : 1;
+  const auto pixel_bytes = static_cast<std::int64_t>(spec.pixel_bytes(true));
+  if (std::int64_t{spec.width} * rows > kMaxBlockRowBytes / std::max<std::int64_t>(pixel_bytes, 1)) {
+    throw Error(ErrorCode::kUnsupported, "OpenImageIO: one row of blocks is larger than 1 GiB");
+  }
+}
+
+void open_raster(IsohfOiioRaster& raster, const char* path, const std::string& channel, IsohfOiioInfo& info) {
+  OIIO::ImageSpec config;
+  config.attribute("oiio:UnassociatedAlpha", 1);  // numbers as stored, not multiplied by alpha
+  config.attribute("oiio:RawColor", 1);
+  raster.input = OIIO::ImageInput::open(path, &config);
+  if (!raster.input) {
+    const std::string why = OIIO::geterror();
+    const bool unknown = why.find("could not find a format reader") != std::string::npos;
+    throw Error(ErrorCode::kUnsupported, unknown ? "OpenImageIO does not know it either" : "OpenImageIO: " + why);
+  }
+  raster.spec = raster.input->spec();
+  const OIIO::ImageSpec& spec = raster.spec;
+  check(spec);
+  raster.channel = channel_index(spec, channel);
+  raster.type = spec.channelformat(raster.channel);
+  info.width = spec.width;
+  info.height = spec.height;
+  info.block_width = spec.tile_width > 0 ? std::min(spec.tile_width, spec.width) : spec.width;
+  info.block_height = spec.tile_width > 0 ? std::min(spec.tile_height, spec.height) : 1;
+  info.sample_type = static_cast<int32_t>(sample_type_of(raster.type));
+  put_text(info.format, raster.input->format_name());
+  if (spec.nchannels == 1) return;
+  put_text(info.channel, spec.channel_name(raster.channel));
+  if (channel.empty()) {
+    put_text(info.warning,
+             "channel " + std::string(spec.channel_name(0)) + " is read, of " + std::to_string(spec.nchannels));
+  }
+}
+
+/// Reads whole rows [begin, end) of the channel into `out`; in a tiled file begin and end lie between tiles.
+void read_rows(IsohfOiioRaster& raster, int begin, int end, void* out) {
+  const OIIO::ImageSpec& spec = raster.spec;
+  const int from = spec.y + begin;
+  const int to = spec.y + end;
+  const bool done =
+      spec.tile_width > 0
+          ? raster.input->read_tiles(0, 0, spec.x, spec.x + spec.width, from, to, spec.z, spec.z + 1, raster.channel,
+                                     raster.channel + 1, raster.type, out)
+          : raster.input->read_scanlines(0, 0, from, to, spec.z, raster.channel, raster.channel + 1, raster.type, out);
+  if (done) return;
+  throw Error(ErrorCode::kCorrupt,
+              "rows " + std::to_string(begin) + " to " + std::to_string(end - 1) + ": " + raster.input->geterror());
+}
+
+void read_window(IsohfOiioRaster& raster, int column, int row, int columns, int rows, unsigned char* out) {
+  const OIIO::ImageSpec& spec = raster.spec;
+  const bool tiled = spec.tile_width > 0;
+  if (!tiled && columns == spec.width) return read_rows(raster, row, row + rows, out);
+  const std::size_t size = raster.type.size();
+  const std::size_t row_bytes = static_cast<std::size_t>(spec.width) * size;
+  const std::size_t out_bytes = static_cast<std::size_t>(columns) * size;
+  const std::int64_t step = tiled ? spec.tile_height : 1;
+  const std::int64_t fitting = kBandBytes / static_cast<std::int64_t>(row_bytes) / step * step;
+  const std::int64_t band_rows = std::max(fitting, step);
+  const int end = row + rows;
+  while (row < end) {
+    const auto begin = static_cast<int>(row / step * step);
+    const std::int64_t wanted = (end - begin + step - 1) / step * step;
+    const auto stop = static_cast<int>(std::min<std::int64_t>(begin + std::min(wanted, band_rows), spec.height));
+    raster.band.resize(static_cast<std::size_t>(stop - begin) * row_bytes);
+    read_rows(raster, begin, stop, raster.band.data());
+    for (; row < std::min(stop, end); ++row, out += out_bytes) {
+      std::memcpy(out,
+                  raster.band.data() + static_cast<std::size_t>(row - begin) * row_bytes +
+                      static_cast<std::size_t>(column) * size,
+                  out_bytes);
+    }
+  }
+}
+
+int module_open(const char* path, const char* channel, IsohfOiioRaster** raster, IsohfOiioInfo* info,
+                IsohfOiioMessage* message) {
+  return guarded(message, [&] {
+    auto opened = std::make_unique<IsohfOiioRaster>();
+    *info = {};
+    open_raster(*opened, path, channel, *info);
+    *raster = opened.release();
+  });
+}
+
+int module_read(IsohfOiioRaster* raster, int64_t column, int64_t row, int64_t columns, int64_t rows, void* samples,
+                size_t bytes, IsohfOiioMessage* message) {
+  return guarded(message, [&] {
+    if (static_cast<size_t>(columns * rows) * raster->type.size() != bytes) {
+      throw Error(ErrorCode::kInvalidArgument, "the window and its buffer differ in size");
+    }
+    read_window(*raster, static_cast<int>(column), static_cast<int>(row), static_cast<int>(columns),
+                static_cast<int>(rows), static_cast<unsigned char*>(samples));
+  });
+}
+
+void module_close(IsohfOiioRaster* raster) {
+  delete raster;
+}
+
+}  // namespace
+
+extern "C" __attribute__((visibility("default"))) const IsohfOiioModule* isohf_oiio_module() {
+  static const IsohfOiioModule module = {ISOHF_OIIO_ABI, module_open, module_read, module_close};
+  return &module;
+}

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <stddef.h>  // NOLINT(modernize-deprecated-headers): the boundary is C
+#include <stdint.h>  // NOLINT(modernize-deprecated-headers)
+
+/// The boundary between isohf and the module that reads through OpenImageIO, isohf_oiio.so. It is loaded only for files
+/// that no native reader knows, because OpenImageIO brings some hundred libraries with it. Only C types cross: the two
+/// sides may be built by different compilers, and no exception passes.
+///
+/// Every function returns 0, or one more than the ErrorCode with a message of one line, without the path.
+
+extern "C" {
+
+/// Raised whenever anything below changes; the loader refuses any other.
+#define ISOHF_OIIO_ABI 1
+
+typedef struct IsohfOiioRaster IsohfOiioRaster;
+
+typedef struct IsohfOiioInfo {
+  int64_t width;
+  int64_t height;
+  int64_t block_width;
+  int64_t block_height;
+  int32_t sample_type;  ///< a SampleType
+  char format[32];      ///< "fits", "bmp", ...
+  char channel[64];     ///< empty where there is but one
+  char warning[256];    ///< empty: none
+} IsohfOiioInfo;
+
+typedef struct IsohfOiioMessage {
+  char text[512];
+} IsohfOiioMessage;
+
+/// Opens `path` and its channel (name or number; empty: the first) and fills `info`.
+typedef int (*IsohfOiioOpen)(const char* path, const char* channel, IsohfOiioRaster** raster, IsohfOiioInfo* info,
+                             IsohfOiioMessage* message);
+/// Reads a window of raw samples in the host's byte order; `bytes` is the size of `samples`.
+typedef int (*IsohfOiioRead)(IsohfOiioRaster* raster, int64_t column, int64_t row, int64_t columns, int64_t rows,
+                             void* samples, size_t bytes, IsohfOiioMessage* message);
+typedef void (*IsohfOiioClose)(IsohfOiioRaster* raster);
+
+typedef struct IsohfOiioModule {
+  int32_t abi;
+  IsohfOiioOpen open;
+  IsohfOiioRead read;
+  IsohfOiioClose close;
+} IsohfOiioModule;
+
+/// The one symbol that the module exports, and its name.
+const IsohfOiioModule* isohf_oiio_module(void);
+#define ISOHF_OIIO_SYMBOL "isohf_oiio_module"
+}

@@ -1,0 +1,123 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "formats/raster_reference.h"
+#include "formats/registry.h"
+#include "isohf/base/error.h"
+
+namespace isohf::testing {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr int kWidth = 23;
+constexpr int kHeight = 17;
+
+int value_at(int column, int row) {
+  return column * 1000 + row * 7;
+}
+
+class OiioModule : public ::testing::Test {
+ protected:
+  OiioModule() { set_module_folder(ISOHF_BIN_DIR); }
+
+  /// A 16-bit portable graymap: big-endian, rows from the top.
+  std::string write_graymap() {
+    std::string bytes = "P5\n23 17\n65535\n";
+    for (int row = 0; row < kHeight; ++row) {
+      for (int column = 0; column < kWidth; ++column) {
+        bytes.push_back(static_cast<char>(value_at(column, row) >> 8));
+        bytes.push_back(static_cast<char>(value_at(column, row) & 0xFF));
+      }
+    }
+    const std::string path = folder_ / "ground.pgm";
+    write_bytes(path, bytes.data(), bytes.size());
+    return path;
+  }
+
+  /// An 8-bit portable pixmap whose channels differ.
+  std::string write_pixmap() {
+    std::string bytes = "P6\n4 2\n255\n";
+    for (char value = 0; value < 24; ++value) bytes.push_back(value);
+    const std::string path = folder_ / "colours.ppm";
+    write_bytes(path, bytes.data(), bytes.size());
+    return path;
+  }
+
+  ScratchFolder folder_;
+};
+
+TEST_F(OiioModule, ReadsWhatNoNativeReaderKnows) {
+  const auto source = open_source(write_graymap(), {});
+  const SourceInfo& info = source->info();
+  EXPECT_EQ(info.format, "pnm");
+  ASSERT_EQ(info.width, kWidth);
+  ASSERT_EQ(info.height, kHeight);
+  ASSERT_EQ(info.sample_type, SampleType::kUint16);
+  EXPECT_TRUE(info.warnings.empty());
+  for (const Window& window :
+       {Window{0, 0, kWidth, kHeight}, Window{3, 9, 5, 4}, Window{20, 0, 3, 17}, Window{0, 16, 23, 1}}) {
+    const auto samples = read_window(*source, window);
+    for (int row = 0; row < window.rows; ++row) {
+      for (int column = 0; column < window.columns; ++column) {
+        const auto at = static_cast<std::size_t>(row * window.columns + column) * 2;
+        EXPECT_EQ(raw_value(info.sample_type, samples.data() + at),
+                  value_at(static_cast<int>(window.column) + column, static_cast<int>(window.row) + row));
+      }
+    }
+  }
+}
+
+TEST_F(OiioModule, ReadsTheChannelAskedFor) {
+  const std::string path = write_pixmap();
+  const auto first = open_source(path, {});
+  EXPECT_EQ(first->info().channel, "R");
+  ASSERT_EQ(first->info().warnings.size(), 1U);
+  EXPECT_EQ(first->info().warnings[0], "channel R is read, of 3");
+  for (const char* name : {"G", "1"}) {
+    OpenOptions options;
+    options.channel = name;
+    const auto source = open_source(path, options);
+    const auto samples = read_whole(*source);
+    ASSERT_EQ(samples.size(), 8U);
+    for (std::size_t at = 0; at < samples.size(); ++at) EXPECT_EQ(static_cast<std::size_t>(samples[at]), at * 3 + 1);
+  }
+  OpenOptions options;
+  options.channel = "Z";
+  const Error error = error_of([&] { (void)open_source(path, options); });
+  EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
+  EXPECT_EQ(error.what(), path + ": has no channel \"Z\"; it has R, G, B (or 0...2)");
+}
+
+TEST_F(OiioModule, AppliesTheOpenOptions) {
+  OpenOptions options;
+  options.z_scale = 0.5;
+  options.void_value = 7.0;
+  const auto source = open_source(write_graymap(), options);
+  EXPECT_EQ(source->info().z_scale, 0.5);
+  EXPECT_EQ(source->info().void_values, std::vector<double>{7.0});
+  options.z_scale = 0.0;
+  EXPECT_EQ(error_of([&] { (void)open_source(write_graymap(), options); }).code(), ErrorCode::kInvalidArgument);
+}
+
+TEST_F(OiioModule, ReportsTruncationAndForeignFilesInOneLine) {
+  const std::string whole = write_graymap();
+  const auto bytes = file_bytes(whole);
+  const std::string cut = folder_ / "cut.pgm";
+  for (std::size_t length = 1; length < bytes.size(); length += 13) {
+    write_bytes(cut, bytes.data(), length);
+    const Error error = error_of([&] { (void)read_whole(*open_source(cut, {})); });
+    EXPECT_THAT(error.what(), HasSubstr(cut));
+    EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos) << error.what();
+  }
+  const std::string text = folder_ / "notes.txt";
+  write_bytes(text, "this is no raster", 17);
+  const Error error = error_of([&] { (void)open_source(text, {}); });
+  EXPECT_EQ(error.code(), ErrorCode::kUnsupported);
+  EXPECT_THAT(error.what(), HasSubstr("unknown format; read natively: OpenEXR (.exr)"));
+  EXPECT_THAT(error.what(), HasSubstr("OpenImageIO"));
+  EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos) << error.what();
+}
+
+}  // namespace
+}  // namespace isohf::testing
