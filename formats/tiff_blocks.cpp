@@ -98,6 +98,11 @@ TiffBlocks::TiffBlocks(const RawFile& file, const TiffLayout& layout, std::uint3
     throw Error(ErrorCode::kCorrupt, fmt::format("{}: {} x {} blocks, more than a TIFF file can hold", file_.path(),
                                                  layout_.blocks_across, layout_.blocks_down));
   }
+  if (layout_.table_entries < per_plane * planes) {
+    throw Error(ErrorCode::kCorrupt,
+                fmt::format("{}: the table of {} has {} entries, the image needs {}", file_.path(),
+                            layout_.tiled ? "tiles" : "strips", layout_.table_entries, per_plane * planes));
+  }
   block_count_ = per_plane;
   check_blocks();
   choose_mode(block_bytes);
@@ -121,20 +126,20 @@ void TiffBlocks::check_blocks() {
     const std::uint64_t decoded = row_bytes * to_unsigned(layout_.stored_rows(down));
     // Writers may round a plain strip's size up; what counts is what its rows need.
     const std::uint64_t needed = layout_.compression == 1 ? decoded : span.size_bytes;
+    if (expansion == 1 && span.size_bytes < decoded) {
+      throw Error(ErrorCode::kCorrupt, fmt::format("{}: {} {} has {} bytes, its samples need {}", file_.path(), kind, i,
+                                                   span.size_bytes, decoded));
+    }
     if (span.offset_bytes > file_.size_bytes() || needed > file_.size_bytes() - span.offset_bytes) {
       throw Error(ErrorCode::kCorrupt,
-                  fmt::format("{}: truncated: {} {} of {} ends at byte {}, the file has {}", file_.path(), kind, i,
-                              block_count_, span.offset_bytes + needed, file_.size_bytes()));
+                  fmt::format("{}: truncated: {} {} of {} has {} bytes from byte {} on, the file has {} bytes in all",
+                              file_.path(), kind, i, block_count_, needed, span.offset_bytes, file_.size_bytes()));
     }
     if (expansion != 0 && decoded / expansion > span.size_bytes) {
       throw Error(
           ErrorCode::kCorrupt,
           fmt::format("{}: {} {} has {} bytes ({}), which cannot hold its {} samples' {} bytes", file_.path(), kind, i,
                       span.size_bytes, tiff_compression_name(layout_.compression), decoded / sample_bytes_, decoded));
-    }
-    if (expansion == 1 && span.size_bytes < decoded) {
-      throw Error(ErrorCode::kCorrupt, fmt::format("{}: {} {} has {} bytes, its samples need {}", file_.path(), kind, i,
-                                                   span.size_bytes, decoded));
     }
     largest = std::max(largest, span.size_bytes);
   }
@@ -172,15 +177,16 @@ void TiffBlocks::fill(std::byte* out, std::int64_t count) const {
 
 void TiffBlocks::pick_channel(const std::byte* pixels, std::byte* out, std::int64_t count) const {
   const std::int64_t stride = layout_.interleaved();
+  const std::int64_t first = layout_.separate ? 0 : channel_;
   switch (sample_bytes_) {
     case 1:
-      return pick<std::uint8_t>(pixels, out, count, stride, channel_);
+      return pick<std::uint8_t>(pixels, out, count, stride, first);
     case 2:
-      return pick<std::uint16_t>(pixels, out, count, stride, channel_);
+      return pick<std::uint16_t>(pixels, out, count, stride, first);
     case 4:
-      return pick<std::uint32_t>(pixels, out, count, stride, channel_);
+      return pick<std::uint32_t>(pixels, out, count, stride, first);
     default:
-      return pick<std::uint64_t>(pixels, out, count, stride, channel_);
+      return pick<std::uint64_t>(pixels, out, count, stride, first);
   }
 }
 

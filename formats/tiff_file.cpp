@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cstdarg>
 #include <cstdio>
 #include <exception>
@@ -234,6 +235,26 @@ struct TiffHandle::Impl {
     return value;
   }
 
+  /// The count of tag `wanted` in the directory as it stands in the file; nullopt where it is absent. libtiff pads
+  /// short tables with zeros, which would pass for blocks that a sparse file leaves out.
+  [[nodiscard]] std::optional<std::uint64_t> stored_count(std::uint16_t wanted) const {
+    const bool big_tiff = TIFFIsBigTIFF(tif) != 0;
+    const bool swapped = TIFFIsByteSwapped(tif) != 0;
+    const auto number = [&](std::uint64_t offset, std::size_t bytes) {
+      std::array<std::byte, 8> stored = {};
+      file.read(offset, std::span(stored).first(bytes));
+      if (swapped) std::reverse(stored.begin(), stored.begin() + static_cast<std::ptrdiff_t>(bytes));
+      return std::bit_cast<std::uint64_t>(stored);  // little-endian, which base/bytes.h asserts
+    };
+    const std::uint64_t directory = TIFFCurrentDirOffset(tif);
+    const std::uint64_t entries = number(directory, big_tiff ? 8 : 2);
+    for (std::uint64_t i = 0; i < entries; ++i) {
+      const std::uint64_t entry = directory + (big_tiff ? 8 + 20 * i : 2 + 12 * i);
+      if (number(entry, 2) == wanted) return number(entry + 4, big_tiff ? 8 : 4);
+    }
+    return std::nullopt;
+  }
+
   const RawFile& file;
   bool mapped;
   TIFF* tif = nullptr;
@@ -334,6 +355,10 @@ TiffLayout TiffHandle::read_layout() {
   }
   layout.blocks_across = (layout.width + layout.block_width - 1) / layout.block_width;
   layout.blocks_down = (layout.height + layout.block_height - 1) / layout.block_height;
+  // Without sizes libtiff works them out from the offsets.
+  const auto offsets = impl.stored_count(layout.tiled ? TIFFTAG_TILEOFFSETS : TIFFTAG_STRIPOFFSETS);
+  const auto sizes = impl.stored_count(layout.tiled ? TIFFTAG_TILEBYTECOUNTS : TIFFTAG_STRIPBYTECOUNTS);
+  layout.table_entries = std::min(offsets.value_or(0), sizes.value_or(UINT64_MAX));
   if (TIFFIsCODECConfigured(layout.compression) == 0) {
     throw Error(ErrorCode::kUnsupported,
                 fmt::format("{}: the compression is {}, which this build of libtiff cannot read", impl.file.path(),

@@ -33,6 +33,7 @@ struct TiffLayout {
   std::int64_t block_height = 0;
   std::int64_t blocks_across = 0;
   std::int64_t blocks_down = 0;
+  std::uint64_t table_entries = 0;  ///< in the shorter of the tables of the blocks' offsets and sizes
 
   [[nodiscard]] std::uint64_t block_index(std::int64_t plane, std::int64_t across, std::int64_t down) const {
     return static_cast<std::uint64_t>((plane * blocks_down + down) * blocks_across + across);

@@ -7,31 +7,21 @@
 #include <fstream>
 
 #include "formats/real_files.h"
+#include "formats/scratch_folder.h"
 #include "isohf/base/bytes.h"
 #include "isohf/base/error.h"
 
 namespace isohf {
 namespace {
 
-/// A folder of its own for each test, removed with it.
-class HgtSource : public ::testing::Test {
+class HgtSource : public testing::ScratchFolder {
  protected:
-  void SetUp() override {
-    const auto* test = ::testing::UnitTest::GetInstance()->current_test_info();
-    folder_ = std::filesystem::temp_directory_path() /
-              ("isohf_hgt_" + std::string(test->name()) + std::to_string(::getpid()));
-    std::filesystem::create_directories(folder_);
-  }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
-
   std::string write(const std::string& name, const std::vector<std::byte>& bytes) const {
-    const std::string path = (folder_ / name).string();
+    const std::string path = testing::fresh(folder() / name);
     std::ofstream(path, std::ios::binary)
         .write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
     return path;
   }
-
-  std::filesystem::path folder_;
 };
 
 /// Big-endian samples 0, 1, 2, ... with a void in front.
@@ -228,8 +218,8 @@ TEST_F(HgtSource, RefusesWhatIsNoTile) {
   EXPECT_EQ(code_of(write("N01E001.hgt", std::vector<std::byte>(2))), ErrorCode::kCorrupt);
   EXPECT_EQ(code_of(write("N01E001.hgt", std::vector<std::byte>(17))), ErrorCode::kCorrupt);
   EXPECT_EQ(code_of(write("N01E001.hgt", std::vector<std::byte>(2884800))), ErrorCode::kCorrupt);
-  EXPECT_EQ(code_of((folder_ / "N02E002.hgt").string()), ErrorCode::kIo);
-  EXPECT_EQ(code_of(folder_.string()), ErrorCode::kIo);
+  EXPECT_EQ(code_of((folder() / "N02E002.hgt").string()), ErrorCode::kIo);
+  EXPECT_EQ(code_of(folder().string()), ErrorCode::kIo);
   EXPECT_EQ(code_of(write("N01E001.hgt.zip", zipped("readme.txt", tile(3, 3), true))), ErrorCode::kUnsupported);
   OpenOptions options;
   options.channel = "R";

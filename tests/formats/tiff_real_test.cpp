@@ -6,7 +6,7 @@
 namespace isohf {
 namespace {
 
-TEST(TiffSource, DeliversRealFilesAsTheReferenceDoes) {
+TEST(TiffRealFiles, AreDeliveredAsInTheReference) {
   const auto files = testing::real_files({".tif", ".TIF"});
   if (files.empty()) GTEST_SKIP() << "the real files are not there";
   for (const auto& file : files) {
@@ -18,7 +18,7 @@ TEST(TiffSource, DeliversRealFilesAsTheReferenceDoes) {
   }
 }
 
-TEST(TiffSource, KnowsTheBodiesOfRealFiles) {
+TEST(TiffRealFiles, TellTheirBodies) {
   if (testing::real_files({".tif"}).empty()) GTEST_SKIP() << "the real files are not there";
   const auto system = [](const std::string& name) {
     return open_tiff((testing::real_data() / name).string(), {})->info().georeference.system;
