@@ -17,6 +17,8 @@ struct WriterOptions {
   bool resume = false;     ///< continue NAME.part where its journal says so, after checking what is there
   /// Identifies the job for resuming: the same text means the same input and options. Stored in the journal.
   std::string job_fingerprint;
+  /// Room for the metadata at the head of the file, JSON and padding. The same for the same input and options.
+  std::uint32_t metadata_bytes = 16384;
 };
 
 /// Writes an archive from its first byte to its last: tiles in flat-index order, members, then finish().
@@ -24,6 +26,7 @@ struct WriterOptions {
 /// Everything goes to NAME.part (and its journal NAME.part.journal), which finish() flushes to the disk and renames;
 /// nothing ever stands half-written under the final name. Destroyed unfinished, the writer removes its part file,
 /// unless keep_part() was called. Not thread-safe. Every call throws Error{kIo} with path and reason (disk full, ...).
+/// Two processes cannot write the same archive at once: the second gets Error{kIo}. Memory: 32 bytes a tile.
 class ArchiveWriter {
  public:
   /// Opens NAME.part beside `path`. Throws Error{kInvalidArgument} where `path` exists without overwrite, or names a
@@ -45,11 +48,15 @@ class ArchiveWriter {
   /// Appends the tile with flat index next_tile(). An empty tile takes no bytes.
   void add_tile(const EncodedTile& tile);
 
-  /// Appends any other member. `name` is relative, '/'-separated, without "..". Stored or deflated as `deflate` says.
+  /// Appends any other member. `name` is relative, '/'-separated, without "..", not in tiles/. Stored or deflated as
+  /// `deflate` says. Members added between two tiles belong to the tile that follows: a resumed job adds them again
+  /// where that tile had not been written.
   void add_member(const std::string& name, std::span<const std::byte> bytes, bool deflate);
 
   /// Completes the archive: metadata (tiles_stored and content_sha256 are filled in here), index, directory; flush and
-  /// rename. All tiles must have been added. Returns the archive's size in bytes.
+  /// rename. All tiles must have been added. Returns the archive's size in bytes. Throws Error{kInvalidArgument} where
+  /// the metadata do not fit WriterOptions::metadata_bytes; Error{kIo} where somebody else made `path` meanwhile (then
+  /// the finished part file stays).
   std::uint64_t finish(Metadata metadata);
 
   /// Leaves NAME.part and its journal in place for a later resume.

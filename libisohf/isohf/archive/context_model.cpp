@@ -1,0 +1,136 @@
+#include "isohf/archive/context_model.h"
+
+#include <algorithm>
+#include <bit>
+
+#include "isohf/archive/tile_payload.h"
+
+namespace isohf {
+namespace {
+
+constexpr std::size_t kSymbols = 256;
+constexpr std::uint64_t kTableBits = 150;    // of a context beside its code lengths: threshold, count, block header
+constexpr std::uint64_t kBitsPerSymbol = 3;  // of a code length in a block header
+
+/// log2 of 1 + i/256 in 2^-16, by repeated squaring.
+constexpr std::array<std::uint32_t, 257> make_log_table() {
+  std::array<std::uint32_t, 257> table{};
+  for (std::uint32_t i = 0; i < table.size(); ++i) {
+    std::uint64_t value = (std::uint64_t{256} + i) << 23U;  // 1.0 is 2^31
+    std::uint32_t log = 0;
+    for (unsigned bit = 0; bit < 17; ++bit) {
+      const bool carry = (value >> 32U) != 0;
+      log = log << 1U | (carry ? 1U : 0U);
+      if (carry) value >>= 1U;
+      value = (value * value) >> 31U;
+    }
+    table[i] = log;
+  }
+  return table;
+}
+constexpr auto kLogTable = make_log_table();
+
+/// n·log2(n) in 2^-16 bits.
+std::uint64_t n_log_n(std::uint64_t n) {
+  if (n < 2) return 0;
+  const auto octave = static_cast<unsigned>(std::bit_width(n)) - 1;
+  const std::uint64_t mantissa = octave >= 8 ? n >> (octave - 8) : n << (8 - octave);
+  return n * ((std::uint64_t{octave} << 16U) + kLogTable[mantissa - 256]);
+}
+
+/// The symbols of one range of activities and what coding them takes.
+struct Group {
+  unsigned end;  ///< first activity that is not in it
+  std::array<std::uint32_t, kSymbols> counts{};
+
+  [[nodiscard]] std::uint64_t bits_with(const Group& other) const {
+    std::uint64_t total = 0;
+    std::uint64_t parts = 0;
+    std::uint64_t used = 0;
+    for (std::size_t symbol = 0; symbol < kSymbols; ++symbol) {
+      const std::uint64_t count = std::uint64_t{counts[symbol]} + other.counts[symbol];
+      if (count == 0) continue;
+      total += count;
+      parts += n_log_n(count);
+      ++used;
+    }
+    // A code has no less than one bit a symbol.
+    return std::max((n_log_n(total) - parts) >> 16U, total / 4) + kTableBits + kBitsPerSymbol * used;
+  }
+};
+
+std::uint8_t choose_shift(std::span<const CodedResidual> residuals) {
+  std::uint64_t sum = 0;
+  for (const CodedResidual& residual : residuals) sum += residual.activity_sum;
+  const std::uint64_t mean = residuals.empty() ? 0 : sum / residuals.size();
+  unsigned shift = 0;
+  while ((mean >> shift) > kActivityLimit / 16) ++shift;
+  return static_cast<std::uint8_t>(shift);
+}
+
+}  // namespace
+
+ContextChoice choose_contexts(std::span<const CodedResidual> residuals) {
+  ContextChoice choice;
+  choice.activity_shift = choose_shift(residuals);
+  const auto level = [&](const CodedResidual& residual) {
+    return std::min(residual.activity_sum >> choice.activity_shift, kActivityLimit - 1);
+  };
+  std::vector<std::uint32_t> histogram(kActivityLimit);
+  for (const CodedResidual& residual : residuals) ++histogram[level(residual)];
+
+  // Start from ranges of about equal count...
+  std::vector<Group> groups;
+  std::vector<std::uint8_t> group_of(kActivityLimit);
+  const std::uint64_t share = residuals.size() / kMaxContexts + 1;
+  std::uint64_t in_group = 0;
+  for (unsigned at = 0; at < kActivityLimit; ++at) {
+    group_of[at] = static_cast<std::uint8_t>(groups.size());
+    in_group += histogram[at];
+    if (in_group >= share && groups.size() + 1 < kMaxContexts) {
+      groups.push_back({at + 1, {}});
+      in_group = 0;
+    }
+  }
+  groups.push_back({kActivityLimit, {}});
+  for (const CodedResidual& residual : residuals)
+    ++groups[group_of[level(residual)]].counts[symbol_of(residual.folded)];
+
+  // ... and join the two neighbours whose joining saves most, while any does.
+  const Group nothing{};
+  std::vector<std::uint64_t> alone;
+  std::vector<std::uint64_t> joined;
+  for (std::size_t i = 0; i < groups.size(); ++i) {
+    alone.push_back(groups[i].bits_with(nothing));
+    if (i > 0) joined.push_back(groups[i - 1].bits_with(groups[i]));
+  }
+  while (groups.size() > 1) {
+    std::size_t best = 0;
+    std::int64_t best_gain = -1;
+    for (std::size_t i = 0; i + 1 < groups.size(); ++i) {
+      const std::int64_t gain =
+          static_cast<std::int64_t>(alone[i] + alone[i + 1]) - static_cast<std::int64_t>(joined[i]);
+      if (gain > best_gain) {
+        best = i;
+        best_gain = gain;
+      }
+    }
+    if (best_gain < 0) break;
+    Group& kept = groups[best];
+    const auto next = static_cast<std::ptrdiff_t>(best) + 1;
+    for (std::size_t symbol = 0; symbol < kSymbols; ++symbol) kept.counts[symbol] += groups[best + 1].counts[symbol];
+    kept.end = groups[best + 1].end;
+    alone[best] = joined[best];
+    groups.erase(groups.begin() + next);
+    alone.erase(alone.begin() + next);
+    joined.erase(joined.begin() + next - 1);
+    if (best > 0) joined[best - 1] = groups[best - 1].bits_with(groups[best]);
+    if (best + 1 < groups.size()) joined[best] = groups[best].bits_with(groups[best + 1]);
+  }
+  for (std::size_t i = 0; i + 1 < groups.size(); ++i) {
+    choice.thresholds.push_back(static_cast<std::uint16_t>(groups[i].end));
+  }
+  return choice;
+}
+
+}  // namespace isohf

@@ -1,0 +1,129 @@
+#include "isohf/archive/journal.h"
+
+#include <algorithm>
+
+#include "isohf/archive/deflate.h"
+#include "isohf/base/bytes.h"
+#include "isohf/base/error.h"
+
+namespace isohf {
+namespace {
+
+constexpr std::uint64_t kMagic = 0x314c4e4a46485349;  // "ISHFJNL1"
+constexpr std::size_t kHeaderBytes = 8 + 32 + 4;
+
+std::vector<std::byte> make_header(const Digest& job) {
+  std::vector<std::byte> bytes;
+  bytes.reserve(kHeaderBytes);
+  ByteWriter writer(bytes);
+  writer.write(kMagic);
+  writer.write_bytes(job);
+  writer.write(crc32(bytes));
+  return bytes;
+}
+
+void append_record(const JournalRecord& record, std::vector<std::byte>& out) {
+  const std::size_t start = out.size();
+  ByteWriter writer(out);
+  writer.write(static_cast<std::uint32_t>(record.kind));
+  writer.write(static_cast<std::uint32_t>(record.member.name.size()));
+  writer.write(static_cast<std::uint32_t>(record.member.method));
+  writer.write(record.member.crc32);
+  writer.write(record.member.compressed_bytes);
+  writer.write(record.member.bytes);
+  writer.write(record.member.header_offset);
+  writer.write(record.data_crc32);
+  writer.write(record.code_min);
+  writer.write(record.code_max);
+  writer.write(static_cast<std::uint32_t>(record.has_voids ? 1 : 0));
+  writer.write_bytes(record.digest);
+  const TileStatistics& statistics = record.statistics;
+  for (const std::int64_t count : {statistics.vertices, statistics.voids, statistics.clamped}) writer.write(count);
+  for (const double value : {statistics.sum, statistics.min, statistics.max, statistics.worst_rounding}) {
+    writer.write(value);
+  }
+  writer.write_bytes(std::as_bytes(std::span<const char>(record.member.name)));
+  writer.write(crc32(std::span<const std::byte>(out).subspan(start)));
+}
+
+/// Throws Error{kCorrupt} at the journal's end, however it looks.
+JournalRecord read_record(std::span<const std::byte> bytes, std::size_t& position) {
+  ByteReader reader(bytes.subspan(position));
+  JournalRecord record;
+  const auto kind = reader.read<std::uint32_t>();
+  record.kind = static_cast<JournalRecord::Kind>(kind);
+  const auto name_bytes = reader.read<std::uint32_t>();
+  record.member.method = static_cast<ZipMethod>(reader.read<std::uint32_t>());
+  record.member.crc32 = reader.read<std::uint32_t>();
+  record.member.compressed_bytes = reader.read<std::uint64_t>();
+  record.member.bytes = reader.read<std::uint64_t>();
+  record.member.header_offset = reader.read<std::uint64_t>();
+  record.data_crc32 = reader.read<std::uint32_t>();
+  record.code_min = reader.read<std::uint32_t>();
+  record.code_max = reader.read<std::uint32_t>();
+  record.has_voids = reader.read<std::uint32_t>() != 0;
+  const auto digest = reader.read_bytes(record.digest.size());
+  std::copy(digest.begin(), digest.end(), record.digest.begin());
+  TileStatistics& statistics = record.statistics;
+  for (auto* count : {&statistics.vertices, &statistics.voids, &statistics.clamped})
+    *count = reader.read<std::int64_t>();
+  for (double* value : {&statistics.sum, &statistics.min, &statistics.max, &statistics.worst_rounding}) {
+    *value = reader.read<double>();
+  }
+  const auto name = reader.read_bytes(name_bytes);
+  record.member.name.assign(reinterpret_cast<const char*>(name.data()), name.size());
+  const std::uint32_t found = crc32(bytes.subspan(position, reader.position()));
+  if (kind < 1 || kind > 3 || reader.read<std::uint32_t>() != found) throw Error(ErrorCode::kCorrupt, "journal record");
+  position += reader.position();
+  return record;
+}
+
+}  // namespace
+
+Journal Journal::start(const std::string& path, const Digest& job) {
+  Journal journal(File(path, File::Mode::kReadWrite));
+  journal.file_.truncate(0);
+  journal.pending_ = make_header(job);
+  journal.flush();
+  return journal;
+}
+
+Journal::Opened Journal::open(const std::string& path, const Digest& job) {
+  Opened opened{Journal(File(path, File::Mode::kReadWrite)), true, {}, {}, kHeaderBytes};
+  std::vector<std::byte> bytes(opened.journal.file_.size_bytes());
+  bytes.resize(opened.journal.file_.read_at(0, bytes));
+  const std::vector<std::byte> header = make_header(job);
+  const bool has_header = bytes.size() >= kHeaderBytes && std::equal(header.begin(), header.begin() + 8, bytes.begin());
+  if (!has_header) {
+    opened.journal = start(path, job);
+    return opened;
+  }
+  opened.matches = std::equal(header.begin(), header.end(), bytes.begin());
+  if (!opened.matches) return opened;
+  try {
+    for (std::size_t position = kHeaderBytes; position < bytes.size();) {
+      opened.records.push_back(read_record(bytes, position));
+      opened.ends.push_back(position);
+    }
+  } catch (const Error&) {
+    // A run that was killed leaves its last record cut off: the journal ends before it.
+  }
+  return opened;
+}
+
+void Journal::add(const JournalRecord& record) {
+  append_record(record, pending_);
+}
+
+void Journal::flush() {
+  file_.write_at(size_, pending_);
+  size_ += pending_.size();
+  pending_.clear();
+}
+
+void Journal::truncate(std::uint64_t size_bytes) {
+  file_.truncate(size_bytes);
+  size_ = size_bytes;
+}
+
+}  // namespace isohf

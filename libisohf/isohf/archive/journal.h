@@ -1,0 +1,64 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "isohf/archive/tile_codec.h"
+#include "isohf/archive/zip_layout.h"
+#include "isohf/base/file.h"
+
+namespace isohf {
+
+using Digest = std::array<std::byte, 32>;  ///< SHA-256
+
+/// One step of writing an archive, as its journal keeps it for a resume.
+struct JournalRecord {
+  enum class Kind : std::uint32_t { kTile = 1, kEmptyTile = 2, kMember = 3 };
+  Kind kind = Kind::kTile;
+  ZipMember member;              ///< what was written; unused for an empty tile
+  std::uint32_t data_crc32 = 0;  ///< of the member's data as they stand in the file
+  std::uint32_t code_min = 0;
+  std::uint32_t code_max = 0;
+  bool has_voids = false;
+  Digest digest{};            ///< of a tile's content
+  TileStatistics statistics;  ///< of a tile
+};
+
+/// NAME.part.journal: a header that names the job, then a record for every step, each with a CRC of its own. What is
+/// cut off or damaged ends the journal.
+class Journal {
+ public:
+  /// Starts an empty journal, dropping what the file holds.
+  static Journal start(const std::string& path, const Digest& job);
+
+  /// Opens an existing one and reads its intact records. `matches` is false, and nothing is read, where it belongs to
+  /// another job; a file without a valid header has no records and matches.
+  struct Opened;
+  static Opened open(const std::string& path, const Digest& job);
+
+  /// Remembers a step; it reaches the file with the next flush().
+  void add(const JournalRecord& record);
+  void flush();
+  /// Forgets everything behind the first `records` that open() returned. `sizes` as open() returned them.
+  void truncate(std::uint64_t size_bytes);
+
+ private:
+  explicit Journal(File file) : file_(std::move(file)) {}
+
+  File file_;
+  std::uint64_t size_ = 0;
+  std::vector<std::byte> pending_;
+};
+
+struct Journal::Opened {
+  Journal journal;
+  bool matches = true;
+  std::vector<JournalRecord> records;
+  std::vector<std::uint64_t> ends;  ///< byte offset behind each record
+  std::uint64_t header_bytes = 0;
+};
+
+}  // namespace isohf

@@ -1,0 +1,357 @@
+#include "isohf/archive/metadata.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "isohf/base/error.h"
+
+namespace isohf {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr int kFormatVersion = 1;
+constexpr const char* kFormatName = "isohf";
+constexpr int kMaxDepth = 64;
+
+[[noreturn]] void refuse(const std::string& where, const std::string& why) {
+  throw Error(ErrorCode::kCorrupt, fmt::format("metadata: {}: {}", where, why));
+}
+
+/// Reads the members of one JSON object and names them in errors.
+class ObjectReader {
+ public:
+  ObjectReader(const Json& object, std::string where) : object_(&object), where_(std::move(where)) {
+    if (!object.is_object()) refuse(where_, "is no object");
+  }
+
+  [[nodiscard]] ObjectReader object(const char* key) const { return {required(key), path(key)}; }
+
+  [[nodiscard]] std::string text(const char* key) const {
+    const Json& value = required(key);
+    if (!value.is_string()) refuse(path(key), "is no string");
+    return value.get<std::string>();
+  }
+
+  [[nodiscard]] double number(const char* key) const {
+    const Json& value = required(key);
+    if (!value.is_number()) refuse(path(key), "is no number");
+    const auto result = value.get<double>();
+    if (!std::isfinite(result)) refuse(path(key), "is not finite");
+    return result;
+  }
+
+  [[nodiscard]] std::int64_t integer(const char* key, std::int64_t least = 0,
+                                     std::int64_t most = std::numeric_limits<std::int64_t>::max()) const {
+    const Json& value = required(key);
+    if (!value.is_number_integer()) refuse(path(key), "is no whole number");
+    if (value.is_number_unsigned() &&
+        value.get<std::uint64_t>() > static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max())) {
+      refuse(path(key), fmt::format("is {}, too large", value.get<std::uint64_t>()));
+    }
+    const auto result = value.get<std::int64_t>();
+    if (result < least || result > most)
+      refuse(path(key), fmt::format("is {}, must lie in {}..{}", result, least, most));
+    return result;
+  }
+
+  /// null and an absent member both mean "not known".
+  [[nodiscard]] bool has(const char* key) const {
+    const auto found = object_->find(key);
+    return found != object_->end() && !found->is_null();
+  }
+  [[nodiscard]] std::optional<double> optional_number(const char* key) const {
+    return has(key) ? std::optional(number(key)) : std::nullopt;
+  }
+  [[nodiscard]] std::optional<int> optional_code(const char* key) const {
+    if (!has(key)) return std::nullopt;
+    return static_cast<int>(integer(key, 0, std::numeric_limits<int>::max()));
+  }
+  [[nodiscard]] std::string optional_text(const char* key) const { return has(key) ? text(key) : std::string(); }
+
+  [[nodiscard]] const Json& required(const char* key) const {
+    const auto found = object_->find(key);
+    if (found == object_->end()) refuse(path(key), "is missing");
+    return *found;
+  }
+  [[nodiscard]] std::string path(const char* key) const { return where_.empty() ? key : where_ + "." + key; }
+
+ private:
+  const Json* object_;
+  std::string where_;
+};
+
+template <typename T>
+Json or_null(const std::optional<T>& value) {
+  return value ? Json(*value) : Json(nullptr);
+}
+
+Json text_or_null(const std::string& text) {
+  return text.empty() ? Json(nullptr) : Json(text);
+}
+
+Json source_to_json(const SourceRecord& source) {
+  Json json;
+  json["name"] = source.name;
+  json["format"] = source.format;
+  json["width"] = source.width;
+  json["height"] = source.height;
+  json["sample_type"] = source.sample_type;
+  json["channel"] = text_or_null(source.channel);
+  json["registration"] = source.registration;
+  json["first_sample"] = {{"x", source.first_sample_x}, {"z", source.first_sample_z}};
+  json["spacing"] = {{"x", source.spacing_x}, {"z", source.spacing_z}};
+  json["crs"] = {{"name", text_or_null(source.crs_name)}, {"epsg", or_null(source.crs_epsg)},
+                 {"wkt", text_or_null(source.crs_wkt)},   {"unit", text_or_null(source.crs_unit)},
+                 {"origin_x", or_null(source.origin_x)},  {"origin_y", or_null(source.origin_y)},
+                 {"spacing_x", source.crs_spacing_x},     {"spacing_y", source.crs_spacing_y}};
+  json["body"] = {{"name", text_or_null(source.body)},
+                  {"semi_major_axis_m", or_null(source.semi_major_axis_m)},
+                  {"inverse_flattening", or_null(source.inverse_flattening)}};
+  json["vertical_datum"] = {{"name", text_or_null(source.vertical_datum)}, {"epsg", or_null(source.vertical_epsg)}};
+  return json;
+}
+
+SourceRecord source_from_json(const ObjectReader& json) {
+  SourceRecord source;
+  source.name = json.text("name");
+  source.format = json.text("format");
+  source.width = json.integer("width");
+  source.height = json.integer("height");
+  source.sample_type = json.text("sample_type");
+  source.channel = json.optional_text("channel");
+  source.registration = json.text("registration");
+  source.first_sample_x = json.object("first_sample").number("x");
+  source.first_sample_z = json.object("first_sample").number("z");
+  source.spacing_x = json.object("spacing").number("x");
+  source.spacing_z = json.object("spacing").number("z");
+  const ObjectReader crs = json.object("crs");
+  source.crs_name = crs.optional_text("name");
+  source.crs_epsg = crs.optional_code("epsg");
+  source.crs_wkt = crs.optional_text("wkt");
+  source.crs_unit = crs.optional_text("unit");
+  source.origin_x = crs.optional_number("origin_x");
+  source.origin_y = crs.optional_number("origin_y");
+  source.crs_spacing_x = crs.number("spacing_x");
+  source.crs_spacing_y = crs.number("spacing_y");
+  const ObjectReader body = json.object("body");
+  source.body = body.optional_text("name");
+  source.semi_major_axis_m = body.optional_number("semi_major_axis_m");
+  source.inverse_flattening = body.optional_number("inverse_flattening");
+  const ObjectReader datum = json.object("vertical_datum");
+  source.vertical_datum = datum.optional_text("name");
+  source.vertical_epsg = datum.optional_code("epsg");
+  return source;
+}
+
+Json statistics_to_json(const Statistics& statistics) {
+  Json json;
+  json["min"] = or_null(statistics.min);
+  json["max"] = or_null(statistics.max);
+  json["mean"] = or_null(statistics.mean);
+  json["vertices"] = statistics.vertices;
+  json["voids"] = statistics.voids;
+  json["clamped"] = statistics.clamped;
+  json["worst_rounding"] = statistics.worst_rounding;
+  return json;
+}
+
+Statistics statistics_from_json(const ObjectReader& json) {
+  Statistics statistics;
+  statistics.min = json.optional_number("min");
+  statistics.max = json.optional_number("max");
+  statistics.mean = json.optional_number("mean");
+  statistics.vertices = json.integer("vertices");
+  statistics.voids = json.integer("voids");
+  statistics.clamped = json.integer("clamped");
+  statistics.worst_rounding = json.number("worst_rounding");
+  return statistics;
+}
+
+TileGrid grid_from_json(const ObjectReader& root) {
+  const ObjectReader shape = root.object("tile_shape");
+  const auto columns = static_cast<int>(shape.integer("columns", 0, kMaxTileColumns));
+  const auto rows = static_cast<int>(shape.integer("rows", 0, kMaxTileRows));
+  const auto levels = static_cast<int>(shape.integer("levels", 0, 99));
+  if (const std::string why = TileShape::why_invalid(columns, rows, levels); !why.empty()) refuse("tile_shape", why);
+  const ObjectReader tiles = root.object("tiles");
+  const ObjectReader extent = root.object("extent");
+  try {
+    return TileGrid::make(TileShape::make(columns, rows, levels), tiles.integer("columns"), tiles.integer("rows"),
+                          extent.number("x"), extent.number("z"));
+  } catch (const Error& error) {
+    throw Error(ErrorCode::kCorrupt, fmt::format("metadata: {}", error.what()));
+  }
+}
+
+Quantisation quantisation_from_json(const ObjectReader& root) {
+  const ObjectReader samples = root.object("samples");
+  Quantisation quantisation;
+  try {
+    quantisation.type = code_type_from_string(samples.text("type"));
+  } catch (const Error& error) {
+    refuse(samples.path("type"), error.what());
+  }
+  quantisation.offset = samples.number("offset");
+  quantisation.scale = samples.number("scale");
+  if (!(quantisation.scale > 0.0)) refuse(samples.path("scale"), "must be above 0");
+  if (quantisation.type == CodeType::kF32 && (quantisation.offset != 0.0 || quantisation.scale != 1.0)) {
+    refuse("samples", "offset and scale of f32 must be 0 and 1");
+  }
+  return quantisation;
+}
+
+/// All names that belong to the format; any other top-level member is an extension.
+const std::set<std::string>& known_members() {
+  static const std::set<std::string> names = {
+      "format", "version", "producer", "tile_shape",  "tiles",  "extent",     "lattice",  "samples",       "units",
+      "valid",  "outside", "filter",   "acquisition", "source", "statistics", "textures", "content_sha256"};
+  return names;
+}
+
+/// Refuses text nested so deeply that handling it would exhaust the stack.
+void check_depth(const std::string& text) {
+  int depth = 0;
+  bool in_string = false;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const char c = text[i];
+    if (in_string) {
+      if (c == '\\') ++i;
+      if (c == '"') in_string = false;
+    } else if (c == '"') {
+      in_string = true;
+    } else if (c == '{' || c == '[') {
+      if (++depth > kMaxDepth)
+        refuse(fmt::format("at character {}", i), fmt::format("nests deeper than {}", kMaxDepth));
+    } else if (c == '}' || c == ']') {
+      --depth;
+    }
+  }
+}
+
+Json parse_json(const std::string& text) {
+  check_depth(text);
+  try {
+    return Json::parse(text);
+  } catch (const nlohmann::json::exception& error) {
+    throw Error(ErrorCode::kCorrupt, fmt::format("metadata: is no valid JSON: {}", error.what()));
+  }
+}
+
+void check_version(const ObjectReader& root) {
+  if (const std::string format = root.text("format"); format != kFormatName) {
+    refuse("format", fmt::format("is \"{}\", must be \"{}\"", format, kFormatName));
+  }
+  const std::int64_t version = root.integer("version", 1);
+  if (version != kFormatVersion) {
+    throw Error(ErrorCode::kUnsupported,
+                fmt::format("metadata: format version {}; this build reads version {}", version, kFormatVersion));
+  }
+}
+
+std::string checked_hash(const ObjectReader& root) {
+  std::string hash = root.text("content_sha256");
+  const bool is_hex = hash.find_first_not_of("0123456789abcdef") == std::string::npos;
+  if (hash.size() != 64 || !is_hex) refuse("content_sha256", "is no 64 lower-case hexadecimal digits");
+  return hash;
+}
+
+}  // namespace
+
+std::string to_string(CodeType type) {
+  switch (type) {
+    case CodeType::kU16:
+      return "u16";
+    case CodeType::kU8:
+      return "u8";
+    case CodeType::kF32:
+      return "f32";
+  }
+  return "unknown";
+}
+
+CodeType code_type_from_string(const std::string& text) {
+  for (const CodeType type : {CodeType::kU16, CodeType::kU8, CodeType::kF32}) {
+    if (text == to_string(type)) return type;
+  }
+  throw Error(ErrorCode::kInvalidArgument, fmt::format("sample type is \"{}\", must be u16, u8 or f32", text));
+}
+
+std::string format_metadata(const Metadata& metadata) {
+  const TileGrid& grid = metadata.grid;
+  const TileShape& shape = grid.shape();
+  const Quantisation& quantisation = metadata.quantisation;
+  const bool is_float = quantisation.type == CodeType::kF32;
+  Json json;
+  json["format"] = kFormatName;
+  json["version"] = kFormatVersion;
+  json["producer"] = metadata.producer;
+  json["tile_shape"] = {{"columns", shape.columns()}, {"rows", shape.rows()}, {"levels", shape.levels()}};
+  json["tiles"] = {{"columns", grid.tile_columns()}, {"rows", grid.tile_rows()}, {"stored", metadata.tiles_stored}};
+  json["extent"] = {{"x", grid.extent_x()}, {"z", grid.extent_z()}};
+  // Follows from shape and extent; written down for people.
+  json["lattice"] = {{"origin", {{"x", 0.0}, {"z", 0.0}}},
+                     {"column_step", 2.0 * grid.sigma_x()},
+                     {"row_step", grid.sigma_z()},
+                     {"odd_row_shift", grid.sigma_x()}};
+  json["samples"] = {{"type", to_string(quantisation.type)},
+                     {"offset", quantisation.offset},
+                     {"scale", quantisation.scale},
+                     {"void", is_float ? Json("nan") : Json(quantisation.void_code())}};
+  json["units"] = {{"horizontal", metadata.horizontal_unit}, {"vertical", metadata.vertical_unit}};
+  const WorldBounds& valid = metadata.valid;
+  json["valid"] = {{"x0", valid.x0}, {"z0", valid.z0}, {"x1", valid.x1}, {"z1", valid.z1}};
+  json["outside"] = metadata.outside;
+  json["filter"] = metadata.filter;
+  json["acquisition"] = metadata.acquisition;
+  json["source"] = source_to_json(metadata.source);
+  json["statistics"] = statistics_to_json(metadata.statistics);
+  json["textures"] = metadata.textures;
+  json["content_sha256"] = metadata.content_sha256;
+  for (const auto& [name, text] : metadata.extensions) {
+    if (known_members().count(name) != 0) {
+      throw Error(ErrorCode::kInvalidArgument,
+                  fmt::format("metadata: extension \"{}\" has a name of the format", name));
+    }
+    json[name] = parse_json(text);
+  }
+  // Text of unknown encoding (a WKT, a file name) must not make the whole unreadable.
+  return json.dump(1, ' ', false, Json::error_handler_t::replace);
+}
+
+Metadata parse_metadata(const std::string& text) {
+  const Json json = parse_json(text);
+  const ObjectReader root(json, "");
+  check_version(root);
+  Metadata metadata(grid_from_json(root));
+  metadata.quantisation = quantisation_from_json(root);
+  metadata.tiles_stored = root.object("tiles").integer("stored", 0, metadata.grid.tile_count());
+  metadata.horizontal_unit = root.object("units").text("horizontal");
+  metadata.vertical_unit = root.object("units").text("vertical");
+  const ObjectReader valid = root.object("valid");
+  metadata.valid = {valid.number("x0"), valid.number("z0"), valid.number("x1"), valid.number("z1")};
+  metadata.outside = root.text("outside");
+  metadata.filter = root.text("filter");
+  metadata.acquisition = root.text("acquisition");
+  metadata.source = source_from_json(root.object("source"));
+  metadata.statistics = statistics_from_json(root.object("statistics"));
+  const Json& textures = root.required("textures");
+  if (!textures.is_array()) refuse("textures", "is no array");
+  for (const Json& texture : textures) {
+    if (!texture.is_string()) refuse("textures", "holds something that is no string");
+    metadata.textures.push_back(texture.get<std::string>());
+  }
+  metadata.content_sha256 = checked_hash(root);
+  metadata.producer = root.text("producer");
+  for (const auto& [name, value] : json.items()) {
+    if (known_members().count(name) == 0) metadata.extensions.emplace_back(name, value.dump());
+  }
+  return metadata;
+}
+
+}  // namespace isohf

@@ -1,0 +1,271 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <limits>
+
+#include "isohf/archive/tile_codec.h"
+#include "isohf/archive/tile_payload.h"
+#include "isohf/archive/void_mask.h"
+
+namespace isohf {
+namespace {
+
+[[noreturn]] void refuse(const std::string& why) {
+  throw Error(ErrorCode::kCorrupt, "tile payload: " + why);
+}
+
+/// Bits from a span, the lowest of a byte first; reads zeros past the end and remembers it.
+class BitReader {
+ public:
+  explicit BitReader(std::span<const std::byte> bytes) : bytes_(bytes) {}
+
+  std::uint32_t take(unsigned count) {
+    if (bit_count_ < 32) refill();
+    const auto value = static_cast<std::uint32_t>(bits_ & ((std::uint64_t{1} << count) - 1));
+    bits_ >>= count;
+    bit_count_ -= count;
+    return value;
+  }
+
+  [[nodiscard]] bool ran_out() const { return used_bits() > 8 * std::uint64_t{bytes_.size()}; }
+  /// True where all bytes were used and the bits left over in the last one are zero.
+  [[nodiscard]] bool is_used_up() const { return (used_bits() + 7) / 8 == bytes_.size() && bits_ == 0; }
+
+ private:
+  [[nodiscard]] std::uint64_t used_bits() const { return 8 * std::uint64_t{position_} - bit_count_; }
+
+  void refill() {
+    if (position_ + 4 <= bytes_.size()) {
+      std::uint32_t word;
+      std::memcpy(&word, bytes_.data() + position_, 4);
+      bits_ |= std::uint64_t{word} << bit_count_;
+    } else {
+      for (std::size_t i = 0; position_ + i < bytes_.size(); ++i) {
+        bits_ |= std::uint64_t{std::to_integer<unsigned>(bytes_[position_ + i])} << (bit_count_ + 8 * i);
+      }
+    }
+    position_ += 4;
+    bit_count_ += 32;
+  }
+
+  std::span<const std::byte> bytes_;
+  std::size_t position_ = 0;  ///< past the end where zeros were made up
+  std::uint64_t bits_ = 0;
+  unsigned bit_count_ = 0;
+};
+
+/// The symbols of all contexts, and what follows from them.
+class ResidualReader {
+ public:
+  ResidualReader(const PayloadHeader& header, ByteReader& reader)
+      : table_(context_table(header.thresholds)),
+        shift_(header.activity_shift),
+        symbol_limit_(symbol_limit(residual_bits(header.type))),
+        extra_({}) {
+    for (std::size_t i = 0; i < header.symbol_counts.size(); ++i) {
+      const auto symbols = reader.read_bytes(header.symbol_counts[i]);
+      next_[i] = symbols.data();
+      end_[i] = symbols.data() + symbols.size();
+    }
+    extra_ = BitReader(reader.read_bytes(header.extra_bytes));
+  }
+
+  /// The folded residual of a place with that activity sum.
+  std::uint32_t take(std::uint32_t activity_sum) {
+    const std::uint32_t level = std::min(activity_sum >> shift_, kActivityLimit - 1);
+    const std::size_t context = table_[level];
+    if (next_[context] == end_[context]) refuse(fmt::format("context {} holds too few symbols", context));
+    const auto symbol = std::to_integer<unsigned>(*next_[context]++);
+    if (symbol < kFirstSplitSymbol) return symbol;
+    if (symbol >= symbol_limit_)
+      refuse(fmt::format("symbol {} does not exist, the last is {}", symbol, symbol_limit_ - 1));
+    return folded_from(symbol, extra_.take(extra_bits_of_symbol(symbol)));
+  }
+
+  void check_used_up(std::size_t contexts) const {
+    for (std::size_t i = 0; i < contexts; ++i) {
+      if (next_[i] != end_[i]) refuse(fmt::format("context {} holds {} symbols too many", i, end_[i] - next_[i]));
+    }
+    if (extra_.ran_out()) refuse("it holds too few extra bits");
+    if (!extra_.is_used_up()) refuse("it holds more extra bits than its symbols ask for");
+  }
+
+ private:
+  std::array<std::uint8_t, kActivityLimit> table_;
+  unsigned shift_;
+  unsigned symbol_limit_;
+  std::array<const std::byte*, kMaxContexts> next_{};
+  std::array<const std::byte*, kMaxContexts> end_{};
+  BitReader extra_;
+};
+
+/// Sums of the weighted samples above plus W and WW, as predict_row has them (modulo 2^32 for codes).
+std::int32_t complete(std::int32_t part, std::int32_t weighted_west) {
+  return static_cast<std::int32_t>(static_cast<std::uint32_t>(part) + static_cast<std::uint32_t>(weighted_west)) >>
+         kWeightBits;
+}
+std::int64_t complete(std::int64_t part, std::int64_t weighted_west) {
+  return (part + weighted_west) >> kWeightBits;
+}
+
+std::int32_t weigh(std::int32_t w, std::int32_t west, std::int32_t ww, std::int32_t far_west) {
+  return static_cast<std::int32_t>(static_cast<std::uint32_t>(w) * static_cast<std::uint32_t>(west) +
+                                   static_cast<std::uint32_t>(ww) * static_cast<std::uint32_t>(far_west));
+}
+std::int64_t weigh(std::int64_t w, std::int64_t west, std::int64_t ww, std::int64_t far_west) {
+  return w * west + ww * far_west;
+}
+
+/// Prediction plus residual, modulo 2^16 or 2^32.
+std::int32_t unfold(std::int32_t prediction, std::uint32_t folded) {
+  return static_cast<std::int32_t>((static_cast<std::uint32_t>(prediction) + unzigzag(folded)) & 0xffffU);
+}
+std::int64_t unfold(std::int64_t prediction, std::uint32_t folded) {
+  return static_cast<std::int32_t>(static_cast<std::uint32_t>(prediction) + unzigzag(folded));
+}
+
+template <typename Wide>
+class TileDecoder {
+ public:
+  TileDecoder(const TileShape& shape, const PayloadHeader& header, std::span<const std::uint8_t> is_void,
+              ResidualReader& residuals)
+      : header_(header),
+        is_void_(is_void),
+        residuals_(residuals),
+        lattice_(shape),
+        parts_(static_cast<std::size_t>(shape.columns())),
+        folded_(shape.columns()) {
+    lattice_.fill_rows_above(header.base);
+  }
+
+  /// Calls `put(index, sample)` for every sample that is not void.
+  template <typename Put>
+  void decode(const Put& put) {
+    const int columns = lattice_.columns();
+    for (int r = 0; r < lattice_.rows(); ++r) {
+      const auto row_start = static_cast<std::size_t>(r) * static_cast<std::size_t>(columns);
+      const std::uint8_t* const void_row = is_void_.empty() ? nullptr : is_void_.data() + row_start;
+      const int first = Lattice<Wide>::first(r);
+      const int last = lattice_.last(r);
+      lattice_.open_row(r);
+      folded_.open_row(first, r % 2);
+      if (!(void_row == nullptr ? decode_row<false>(r, void_row) : decode_row<true>(r, void_row))) {
+        refuse(fmt::format("row {} leaves the range {}..{} that the header states", r, header_.low, header_.high));
+      }
+      const Wide* const own = lattice_.row(r);
+      for (int place = first; place <= last; ++place) {
+        const int column = column_of_place(columns, r, place);
+        if (void_row == nullptr || void_row[column] == 0) put(row_start + static_cast<std::size_t>(column), own[place]);
+      }
+      for (int side = 0; r % 2 == 0 && side < 2; ++side) {
+        const int column = column_of_slid(columns, side);
+        if (void_row != nullptr && void_row[column] != 0) continue;
+        put(row_start + static_cast<std::size_t>(column), decode_slid(r, side));
+      }
+      lattice_.close_row(r);
+      folded_.close_row(first, last);
+    }
+  }
+
+ private:
+  /// False where a sample leaves the stated range.
+  template <bool kWithVoids>
+  bool decode_row(int r, const std::uint8_t* void_row) {
+    const PredictorWeights& weights = r == 0 ? kFirstRowWeights : r == 1 ? kSecondRowWeights : header_.weights;
+    predict_row_from_above<Wide>(lattice_, r, weights, parts_);
+    const Wide low = header_.low, high = header_.high;
+    const Wide weight_w = weights[0], weight_ww = weights[2];
+    Wide* const own = lattice_.row(r);
+    const Wide* const north = lattice_.row(r - 1) + r % 2;
+    std::uint32_t* const folded = folded_.current();
+    const std::uint32_t* const folded_north = folded_.above() + r % 2;
+    const int last = lattice_.last(r);
+    bool in_range = true;
+    for (int place = Lattice<Wide>::first(r); place <= last; ++place) {
+      if (kWithVoids && void_row[column_of_place(lattice_.columns(), r, place)] != 0) {
+        own[place] = void_fill(own, north, place);
+        folded[place] = 0;
+        continue;
+      }
+      const std::uint32_t residual = residuals_.take(activity_from_above(folded_north, place) + 2 * folded[place - 1]);
+      folded[place] = std::min(residual, kFoldedLimit);
+      const Wide sum =
+          complete(parts_[static_cast<std::size_t>(place)], weigh(weight_w, own[place - 1], weight_ww, own[place - 2]));
+      own[place] = unfold(std::min(std::max(sum, low), high), residual);
+      in_range &= own[place] >= low && own[place] <= high;
+    }
+    return in_range;
+  }
+
+  Wide decode_slid(int r, int side) {
+    const int at = side == 0 ? 1 : lattice_.columns() - 3;
+    const std::uint32_t* const folded = folded_.current();
+    const Wide sample = unfold(lattice_.slid_prediction(r, side), residuals_.take(folded[at] + folded[at + 1]));
+    if (sample < header_.low || sample > header_.high) {
+      refuse(fmt::format("row {} leaves the range {}..{} that the header states", r, header_.low, header_.high));
+    }
+    return sample;
+  }
+
+  const PayloadHeader& header_;
+  std::span<const std::uint8_t> is_void_;
+  ResidualReader& residuals_;
+  Lattice<Wide> lattice_;
+  std::vector<Wide> parts_;
+  ResidualRows folded_;
+};
+
+/// Reads all samples but the voids, which `put` never sees.
+template <typename Wide, typename Put>
+void decode_samples(const TileShape& shape, const PayloadHeader& header, std::span<const std::uint8_t> is_void,
+                    ByteReader& reader, const Put& put) {
+  if (header.is_constant) {
+    for (std::size_t i = 0; i < static_cast<std::size_t>(shape.stored_vertex_count()); ++i) {
+      if (is_void.empty() || is_void[i] == 0) put(i, Wide{header.low});
+    }
+    return;
+  }
+  ResidualReader residuals(header, reader);
+  TileDecoder<Wide>(shape, header, is_void, residuals).decode(put);
+  residuals.check_used_up(header.symbol_counts.size());
+}
+
+TileCodes decode_checked(const TileShape& shape, CodeType type, std::span<const std::byte> payload) {
+  if (payload.size() > max_payload_bytes(shape, type)) {
+    refuse(fmt::format("{} bytes, more than a tile of this shape can have", payload.size()));
+  }
+  ByteReader reader(payload);
+  const PayloadHeader header = read_payload_header(shape, type, reader);
+  const auto samples = static_cast<std::size_t>(shape.stored_vertex_count());
+  std::vector<std::uint8_t> is_void;
+  if (header.has_voids) is_void = unpack_void_mask(reader.read_bytes(header.mask_bytes), samples);
+  TileCodes tile;
+  tile.type = type;
+  if (type == CodeType::kF32) {
+    tile.heights.assign(samples, std::numeric_limits<float>::quiet_NaN());
+    decode_samples<std::int64_t>(shape, header, is_void, reader, [&](std::size_t i, std::int64_t ordered) {
+      tile.heights[i] = float_from_ordered(static_cast<std::int32_t>(ordered), header.dropped_bits);
+    });
+  } else {
+    const Quantisation quantisation{type, 0.0, 1.0};
+    tile.codes.assign(samples, static_cast<std::uint16_t>(quantisation.void_code()));
+    decode_samples<std::int32_t>(shape, header, is_void, reader, [&](std::size_t i, std::int32_t code) {
+      tile.codes[i] = static_cast<std::uint16_t>(code);
+    });
+  }
+  if (reader.remaining() != 0) refuse(fmt::format("{} bytes too many at its end", reader.remaining()));
+  return tile;
+}
+
+}  // namespace
+
+TileCodes decode_tile(const TileShape& shape, CodeType type, std::span<const std::byte> payload) {
+  try {
+    return decode_checked(shape, type, payload);
+  } catch (const std::bad_alloc&) {
+    throw Error(ErrorCode::kOutOfMemory,
+                fmt::format("no memory to decode a tile of {} samples", shape.stored_vertex_count()));
+  }
+}
+
+}  // namespace isohf

@@ -1,0 +1,86 @@
+#include "isohf/archive/tile_index.h"
+
+#include "isohf/archive/deflate.h"
+#include "isohf/base/bytes.h"
+
+namespace isohf {
+namespace {
+
+constexpr std::uint64_t kMagic = 0x58444946484f5349;  // "ISOHFIDX"
+constexpr std::uint32_t kVersion = 1;
+constexpr std::uint32_t kStored = 1;
+constexpr std::uint32_t kHasVoids = 2;
+
+}  // namespace
+
+void append_index_record(const TileEntry& entry, std::vector<std::byte>& out) {
+  if (!entry.stored) {
+    out.resize(out.size() + kIndexRecordBytes);
+    return;
+  }
+  ByteWriter writer(out);
+  writer.write(entry.offset_bytes);
+  writer.write(entry.compressed_bytes);
+  writer.write(entry.payload_bytes);
+  writer.write(entry.payload_crc32);
+  writer.write(entry.code_min);
+  writer.write(entry.code_max);
+  writer.write(kStored | (entry.has_voids ? kHasVoids : 0));
+}
+
+std::optional<TileEntry> parse_index_record(std::span<const std::byte> record) {
+  ByteReader reader(record);
+  TileEntry entry;
+  entry.offset_bytes = reader.read<std::uint64_t>();
+  entry.compressed_bytes = reader.read<std::uint32_t>();
+  entry.payload_bytes = reader.read<std::uint32_t>();
+  entry.payload_crc32 = reader.read<std::uint32_t>();
+  entry.code_min = reader.read<std::uint32_t>();
+  entry.code_max = reader.read<std::uint32_t>();
+  const auto flags = reader.read<std::uint32_t>();
+  entry.stored = (flags & kStored) != 0;
+  entry.has_voids = (flags & kHasVoids) != 0;
+  if ((flags & ~(kStored | kHasVoids)) != 0) return std::nullopt;
+  if (entry.stored) return entry;
+  for (const std::byte byte : record) {
+    if (byte != std::byte{0}) return std::nullopt;
+  }
+  return TileEntry{};
+}
+
+void append_index_footer(const IndexFooter& footer, std::vector<std::byte>& out) {
+  const std::size_t start = out.size();
+  ByteWriter writer(out);
+  writer.write(kMagic);
+  writer.write(kVersion);
+  writer.write(static_cast<std::uint32_t>(kIndexRecordBytes));
+  writer.write(footer.record_count);
+  writer.write(footer.stored_count);
+  writer.write(footer.directory_entries);
+  writer.write(footer.directory_bytes);
+  writer.write(footer.directory_crc32);
+  writer.write(footer.records_crc32);
+  writer.write(std::uint32_t{0});
+  writer.write(crc32(std::span<const std::byte>(out).subspan(start)));
+}
+
+std::optional<IndexFooter> parse_index_footer(std::span<const std::byte> bytes) {
+  if (bytes.size() != kIndexFooterBytes) return std::nullopt;
+  ByteReader reader(bytes);
+  if (reader.read<std::uint64_t>() != kMagic || reader.read<std::uint32_t>() != kVersion ||
+      reader.read<std::uint32_t>() != kIndexRecordBytes) {
+    return std::nullopt;
+  }
+  IndexFooter footer;
+  footer.record_count = reader.read<std::uint64_t>();
+  footer.stored_count = reader.read<std::uint64_t>();
+  footer.directory_entries = reader.read<std::uint64_t>();
+  footer.directory_bytes = reader.read<std::uint64_t>();
+  footer.directory_crc32 = reader.read<std::uint32_t>();
+  footer.records_crc32 = reader.read<std::uint32_t>();
+  const auto reserved = reader.read<std::uint32_t>();
+  if (reserved != 0 || reader.read<std::uint32_t>() != crc32(bytes.first(kIndexFooterBytes - 4))) return std::nullopt;
+  return footer;
+}
+
+}  // namespace isohf

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "isohf/archive/reader.h"
+
+/// The member index.bin: one record for each tile of the grid, by flat index, and a footer that is the last thing
+/// before the ZIP directory (docs/archive_format.md, "Index").
+
+namespace isohf {
+
+inline constexpr std::size_t kIndexRecordBytes = 32;
+inline constexpr std::size_t kIndexFooterBytes = 64;
+
+/// What the footer says.
+struct IndexFooter {
+  std::uint64_t record_count = 0;
+  std::uint64_t stored_count = 0;       ///< tiles that are stored
+  std::uint64_t directory_entries = 0;  ///< of the ZIP directory, index.bin's own not counted
+  std::uint64_t directory_bytes = 0;    ///< of these entries
+  std::uint32_t directory_crc32 = 0;    ///< of these entries
+  std::uint32_t records_crc32 = 0;
+};
+
+void append_index_record(const TileEntry& entry, std::vector<std::byte>& out);
+void append_index_footer(const IndexFooter& footer, std::vector<std::byte>& out);
+
+/// The record as it stands; reserved bits and the rules for absent tiles are checked: nullopt where they are broken.
+[[nodiscard]] std::optional<TileEntry> parse_index_record(std::span<const std::byte> record);
+/// nullopt where there is no valid footer of a known version.
+[[nodiscard]] std::optional<IndexFooter> parse_index_footer(std::span<const std::byte> footer);
+
+}  // namespace isohf

@@ -1,0 +1,149 @@
+#include "isohf/archive/tile_payload.h"
+
+#include <fmt/format.h>
+
+#include <cstdlib>
+
+#include "isohf/base/error.h"
+
+namespace isohf {
+namespace {
+
+enum : std::uint8_t { kHasVoids = 1, kIsConstant = 2 };
+
+std::uint8_t byte_of(CodeType type) {
+  switch (type) {
+    case CodeType::kU16:
+      return 0;
+    case CodeType::kU8:
+      return 1;
+    case CodeType::kF32:
+      return 2;
+  }
+  return 0;
+}
+
+[[noreturn]] void refuse(const std::string& why) {
+  throw Error(ErrorCode::kCorrupt, "tile header: " + why);
+}
+
+void check_range(const PayloadHeader& header) {
+  std::int64_t least = 0;
+  std::int64_t most = header.type == CodeType::kU8 ? 254 : 65534;
+  if (header.type == CodeType::kF32) {
+    most = ordered_from_float(std::bit_cast<float>(0x7f800000U), header.dropped_bits);  // infinity, both signs
+    least = -most - 1;
+  }
+  if (header.low < least || header.high > most || header.low > header.high) {
+    refuse(fmt::format("its range {}..{} is none within {}..{}", header.low, header.high, least, most));
+  }
+  if (header.is_constant != (header.low == header.high)) refuse("its range contradicts its flag for equal samples");
+}
+
+void check_predictor(const PayloadHeader& header) {
+  if (header.base < header.low || header.base > header.high) {
+    refuse(fmt::format("its base {} lies outside its range {}..{}", header.base, header.low, header.high));
+  }
+  int sum = 0;
+  for (const std::int16_t weight : header.weights) sum += std::abs(int{weight});
+  if (sum >= kWeightSumLimit) refuse(fmt::format("its weights add up to {}, must be below {}", sum, kWeightSumLimit));
+  if (header.activity_shift > 31)
+    refuse(fmt::format("its activity shift is {}, must lie in 0..31", header.activity_shift));
+  for (std::size_t i = 0; i < header.thresholds.size(); ++i) {
+    const unsigned before = i == 0 ? 0 : header.thresholds[i - 1];
+    if (header.thresholds[i] <= before || header.thresholds[i] >= kActivityLimit) {
+      refuse(
+          fmt::format("its threshold {} is {}, must ascend within 1..{}", i, header.thresholds[i], kActivityLimit - 1));
+    }
+  }
+}
+
+}  // namespace
+
+std::uint64_t max_payload_bytes(const TileShape& shape, CodeType type) {
+  const auto samples = static_cast<std::uint64_t>(shape.stored_vertex_count());
+  // One symbol each and its extra bits, at most 12 or 28; a run of the mask takes a byte for each sample or fewer.
+  const std::uint64_t extra_bits = type == CodeType::kF32 ? 28 : 12;
+  const std::uint64_t contexts = kPredictedHeaderBytes + 6 * kMaxContexts;
+  return contexts + samples + (samples * extra_bits + 7) / 8 + samples + 8;
+}
+
+void write_payload_header(const PayloadHeader& header, std::vector<std::byte>& out) {
+  ByteWriter writer(out);
+  writer.write(kCodecVersion);
+  writer.write(byte_of(header.type));
+  writer.write(static_cast<std::uint8_t>((header.has_voids ? kHasVoids : 0) | (header.is_constant ? kIsConstant : 0)));
+  writer.write(header.dropped_bits);
+  writer.write(header.low);
+  writer.write(header.high);
+  writer.write(header.mask_bytes);
+  if (header.is_constant) return;
+  writer.write(header.base);
+  writer.write(header.extra_bytes);
+  writer.write(header.activity_shift);
+  writer.write(static_cast<std::uint8_t>(header.symbol_counts.size()));
+  writer.write(std::uint16_t{0});
+  for (const std::int16_t weight : header.weights) writer.write(weight);
+  for (const std::uint16_t threshold : header.thresholds) writer.write(threshold);
+  for (const std::uint32_t count : header.symbol_counts) writer.write(count);
+}
+
+PayloadHeader read_payload_header(const TileShape& shape, CodeType type, ByteReader& reader) {
+  const auto version = reader.read<std::uint8_t>();
+  if (version != kCodecVersion) {
+    if (version == 0) refuse("its codec version is 0");
+    throw Error(ErrorCode::kUnsupported,
+                fmt::format("tile codec version {}; this build reads version {}", version, kCodecVersion));
+  }
+  PayloadHeader header;
+  header.type = type;
+  if (const auto found = reader.read<std::uint8_t>(); found != byte_of(type)) {
+    refuse(fmt::format("its sample type is {}, the archive's is {} ({})", found, byte_of(type), to_string(type)));
+  }
+  const auto flags = reader.read<std::uint8_t>();
+  if ((flags & ~(kHasVoids | kIsConstant)) != 0) refuse(fmt::format("reserved flags are set: {:#04x}", flags));
+  header.has_voids = (flags & kHasVoids) != 0;
+  header.is_constant = (flags & kIsConstant) != 0;
+  header.dropped_bits = reader.read<std::uint8_t>();
+  if (header.dropped_bits > (type == CodeType::kF32 ? 30 : 0)) {
+    refuse(fmt::format("{} low bits are left out, too many for {}", header.dropped_bits, to_string(type)));
+  }
+  header.low = reader.read<std::int32_t>();
+  header.high = reader.read<std::int32_t>();
+  header.mask_bytes = reader.read<std::uint32_t>();
+  check_range(header);
+  if (header.has_voids != (header.mask_bytes != 0)) refuse("its void mask contradicts its flag for voids");
+  const auto samples = static_cast<std::uint64_t>(shape.stored_vertex_count());
+  if (header.mask_bytes > samples + 8) refuse(fmt::format("its void mask of {} bytes is too long", header.mask_bytes));
+  if (header.is_constant) return header;
+
+  header.base = reader.read<std::int32_t>();
+  header.extra_bytes = reader.read<std::uint32_t>();
+  header.activity_shift = reader.read<std::uint8_t>();
+  const std::size_t contexts = reader.read<std::uint8_t>();
+  if (contexts < 1 || contexts > kMaxContexts)
+    refuse(fmt::format("it has {} contexts, must have 1..{}", contexts, kMaxContexts));
+  if (const auto reserved = reader.read<std::uint16_t>(); reserved != 0) {
+    refuse(fmt::format("its reserved bytes are {}, must be 0", reserved));
+  }
+  for (std::int16_t& weight : header.weights) weight = reader.read<std::int16_t>();
+  for (std::size_t i = 1; i < contexts; ++i) header.thresholds.push_back(reader.read<std::uint16_t>());
+  std::uint64_t symbols = 0;
+  for (std::size_t i = 0; i < contexts; ++i) {
+    header.symbol_counts.push_back(reader.read<std::uint32_t>());
+    symbols += header.symbol_counts.back();
+  }
+  check_predictor(header);
+  if (symbols > samples) refuse(fmt::format("it has {} symbols, more than the tile's {} samples", symbols, samples));
+  return header;
+}
+
+std::array<std::uint8_t, kActivityLimit> context_table(std::span<const std::uint16_t> thresholds) {
+  std::array<std::uint8_t, kActivityLimit> table{};
+  for (const std::uint16_t threshold : thresholds) {
+    for (std::size_t activity = threshold; activity < table.size(); ++activity) ++table[activity];
+  }
+  return table;
+}
+
+}  // namespace isohf

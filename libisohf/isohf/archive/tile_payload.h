@@ -1,0 +1,155 @@
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "isohf/archive/hex_predictor.h"
+#include "isohf/archive/tile_codec.h"
+#include "isohf/base/bytes.h"
+
+/// What encoder and decoder of a tile share: the payload's header, the samples' order, the residuals' symbols and the
+/// contexts (docs/archive_format.md, "Tile payload").
+
+namespace isohf {
+
+inline constexpr std::uint8_t kCodecVersion = 1;
+inline constexpr std::size_t kMaxContexts = 16;
+inline constexpr std::size_t kFixedHeaderBytes = 16;      ///< of every payload
+inline constexpr std::size_t kPredictedHeaderBytes = 44;  ///< of one whose samples are not all equal, without contexts
+
+/// The largest payload that a tile of this shape and type can have.
+[[nodiscard]] std::uint64_t max_payload_bytes(const TileShape& shape, CodeType type);
+
+struct PayloadHeader {
+  CodeType type = CodeType::kU16;
+  bool has_voids = false;
+  bool is_constant = false;
+  std::int32_t low = 0;  ///< smallest and largest sample that is not void
+  std::int32_t high = 0;
+  std::int32_t base = 0;  ///< stands for all samples above and West of the first
+  std::uint32_t mask_bytes = 0;
+  std::uint32_t extra_bytes = 0;
+  std::uint8_t activity_shift = 0;
+  std::uint8_t dropped_bits = 0;  ///< kF32: low bits of the float that are zero everywhere
+  PredictorWeights weights{};
+  std::vector<std::uint16_t> thresholds;     ///< one fewer than contexts, ascending
+  std::vector<std::uint32_t> symbol_counts;  ///< one for each context
+};
+
+/// Appends the header: 16 bytes, and where the samples differ the rest of it.
+void write_payload_header(const PayloadHeader& header, std::vector<std::byte>& out);
+
+/// Reads a header and checks all that it says against itself and the shape. Throws Error{kCorrupt, kUnsupported}.
+[[nodiscard]] PayloadHeader read_payload_header(const TileShape& shape, CodeType type, ByteReader& reader);
+
+// --- samples ---
+
+/// A float's place among all floats that have `dropped` zero low bits: order-preserving, -0.0 just below +0.0.
+[[nodiscard]] inline std::int32_t ordered_from_float(float value, unsigned dropped) {
+  const auto bits = std::bit_cast<std::uint32_t>(value);
+  const auto magnitude = static_cast<std::int32_t>((bits & 0x7fffffffU) >> dropped);
+  return bits >> 31U != 0 ? -magnitude - 1 : magnitude;
+}
+
+[[nodiscard]] inline float float_from_ordered(std::int32_t ordered, unsigned dropped) {
+  const bool negative = ordered < 0;
+  const std::uint32_t magnitude = static_cast<std::uint32_t>(negative ? -(ordered + 1) : ordered) << dropped;
+  return std::bit_cast<float>(magnitude | (negative ? 0x80000000U : 0U));
+}
+
+// --- residuals ---
+
+/// 0, -1, 1, -2, 2, ... to 0, 1, 2, 3, 4, ...
+[[nodiscard]] inline std::uint32_t zigzag(std::int32_t residual) {
+  return (static_cast<std::uint32_t>(residual) << 1U) ^ static_cast<std::uint32_t>(residual >> 31);
+}
+[[nodiscard]] inline std::uint32_t unzigzag(std::uint32_t folded) {
+  return (folded >> 1U) ^ (0U - (folded & 1U));
+}
+
+/// A folded residual as a symbol and some bits more: itself below 16; above, eight symbols for every octave.
+inline constexpr std::uint32_t kFirstSplitSymbol = 16;
+
+[[nodiscard]] inline unsigned extra_bits_of_symbol(unsigned symbol) {
+  return symbol < kFirstSplitSymbol ? 0U : (symbol - kFirstSplitSymbol) / 8 + 1;
+}
+[[nodiscard]] inline unsigned symbol_of(std::uint32_t folded) {
+  if (folded < kFirstSplitSymbol) return folded;
+  const auto octave = static_cast<unsigned>(std::bit_width(folded)) - 1;  // 4..31
+  return kFirstSplitSymbol + (octave - 4) * 8 + ((folded >> (octave - 3)) & 7U);
+}
+[[nodiscard]] inline std::uint32_t folded_from(unsigned symbol, std::uint32_t extra) {
+  if (symbol < kFirstSplitSymbol) return symbol;
+  const unsigned bits = extra_bits_of_symbol(symbol);
+  return ((8U + (symbol & 7U)) << bits) + extra;
+}
+/// One more than the last symbol of residuals of that many bits: 112 for 16, 240 for 32.
+[[nodiscard]] inline unsigned symbol_limit(unsigned residual_bits) {
+  return kFirstSplitSymbol + (residual_bits - 4) * 8;
+}
+[[nodiscard]] inline unsigned residual_bits(CodeType type) {
+  return type == CodeType::kF32 ? 32U : 16U;
+}
+
+// --- contexts ---
+
+inline constexpr unsigned kActivityLimit = 4096;                ///< activities are below this
+inline constexpr std::uint32_t kFoldedLimit = (1U << 28U) - 1;  ///< larger residuals count as this in activities
+
+/// How rough the tile is around a place, from the folded residuals of its neighbours.
+[[nodiscard]] inline std::uint32_t activity_from_above(const std::uint32_t* north, int place) {
+  return north[place] + north[place - 1];
+}
+[[nodiscard]] inline std::uint32_t activity(std::uint32_t from_above, std::uint32_t west, unsigned shift) {
+  const std::uint32_t sum = (from_above + 2 * west) >> shift;
+  return sum < kActivityLimit ? sum : kActivityLimit - 1;
+}
+
+/// The context of every activity: how many thresholds it reaches.
+[[nodiscard]] std::array<std::uint8_t, kActivityLimit> context_table(std::span<const std::uint16_t> thresholds);
+
+/// Folded residuals of two rows, with margins as in Lattice.
+class ResidualRows {
+ public:
+  explicit ResidualRows(int columns)
+      : columns_(columns), current_(static_cast<std::size_t>(columns) + 4), above_(current_.size()) {}
+
+  [[nodiscard]] std::uint32_t* current() { return current_.data() + 2; }
+  [[nodiscard]] const std::uint32_t* above() const { return above_.data() + 2; }
+
+  /// Before row r: West of it stands what is North-East of its first place.
+  void open_row(int first, int shift) { current()[first - 1] = above()[first + shift]; }
+  /// After it: margins repeat the outermost residuals, and the row becomes the one above.
+  void close_row(int first, int last) {
+    for (int place = -2; place < first; ++place) current()[place] = current()[first];
+    for (int place = last + 1; place < columns_ + 2; ++place) current()[place] = current()[last];
+    current_.swap(above_);
+  }
+
+ private:
+  int columns_;
+  std::vector<std::uint32_t> current_;
+  std::vector<std::uint32_t> above_;
+};
+
+/// What a void sample counts as while its neighbours are predicted: the mean of W and NE, rounded down.
+template <typename Wide>
+[[nodiscard]] inline Wide void_fill(const Wide* own, const Wide* north, int place) {
+  return (own[place - 1] + north[place]) >> 1;
+}
+
+/// The column whose sample stands at a lattice place, and that of a slid vertex (even rows; 0 West, 1 East). A row is
+/// coded place by place from West to East, an even row's slid vertices after it.
+[[nodiscard]] inline int column_of_place(int columns, int row, int place) {
+  if (row % 2 != 0) return place;
+  if (place == 1) return 0;
+  return place == columns - 2 ? columns - 1 : place;
+}
+[[nodiscard]] inline int column_of_slid(int columns, int side) {
+  return side == 0 ? 1 : columns - 2;
+}
+
+}  // namespace isohf

@@ -1,0 +1,426 @@
+#include "isohf/archive/writer.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <optional>
+#include <unordered_set>
+#include <vector>
+
+#include "isohf/archive/content_hash.h"
+#include "isohf/archive/deflate.h"
+#include "isohf/archive/journal.h"
+#include "isohf/archive/part_file.h"
+#include "isohf/archive/tile_index.h"
+#include "isohf/archive/zip_layout.h"
+#include "isohf/base/assert.h"
+#include "isohf/base/bytes.h"
+#include "isohf/base/error.h"
+
+namespace isohf {
+namespace {
+
+/// Bytes after which part file and journal are flushed to the disk, so that a power cut costs no more than these.
+constexpr std::uint64_t kSyncBytes = std::uint64_t{256} << 20U;
+constexpr std::uint64_t kJournalBytes = std::uint64_t{4} << 20U;
+
+std::string part_path(const std::string& path) {
+  return path + ".part";
+}
+std::string journal_path(const std::string& path) {
+  return path + ".part.journal";
+}
+
+/// Refuses a target that must not be written, before anything is made.
+void check_target(const std::string& path, bool overwrite) {
+  switch (path_kind(path)) {
+    case PathKind::kAbsent:
+      return;
+    case PathKind::kFolder:
+      throw Error(ErrorCode::kInvalidArgument, path + ": is a folder, must be a file name");
+    case PathKind::kOther:
+      throw Error(ErrorCode::kInvalidArgument, path + ": is no ordinary file");
+    case PathKind::kFile:
+      break;
+  }
+  if (!overwrite) throw Error(ErrorCode::kInvalidArgument, path + ": exists; --overwrite replaces it");
+}
+
+Digest job_digest(const TileGrid& grid, const WriterOptions& options) {
+  std::vector<std::byte> bytes;
+  ByteWriter writer(bytes);
+  const TileShape& shape = grid.shape();
+  for (const int value : {shape.columns(), shape.rows(), shape.levels()}) writer.write(value);
+  writer.write(grid.tile_columns());
+  writer.write(grid.tile_rows());
+  writer.write(grid.extent_x());
+  writer.write(grid.extent_z());
+  writer.write(options.metadata_bytes);
+  writer.write_bytes(std::as_bytes(std::span<const char>(options.job_fingerprint)));
+  const std::vector<std::byte> hash = sha256(bytes);
+  Digest digest{};
+  std::copy(hash.begin(), hash.end(), digest.begin());
+  return digest;
+}
+
+}  // namespace
+
+struct ArchiveWriter::State {
+  /// A member that is no tile, and the tile that it stands before.
+  struct Placed {
+    std::int64_t before_tile;
+    ZipMember member;
+  };
+
+  std::string path;
+  TileGrid grid;
+  WriterOptions options;
+  PartFile part;
+  std::optional<Journal> journal;
+  std::vector<std::byte> index;  ///< records of the tiles added so far
+  std::vector<Placed> members;
+  std::unordered_set<std::string> names;
+  ContentHash content;
+  TileStatistics statistics;
+  std::int64_t next = 0;
+  std::int64_t stored = 0;
+  std::uint64_t journalled = 0;  ///< bytes of the part file that the journal's file vouches for
+  std::uint64_t synced = 0;
+  bool finished = false;
+  bool keep = false;
+
+  State(const std::string& target, const TileGrid& tile_grid, const WriterOptions& writer_options)
+      : path(target), grid(tile_grid), options(writer_options), part(part_path(target)) {}
+
+  [[nodiscard]] ZipMember metadata_member() const {
+    return {kMetadataName, ZipMethod::kStored, 0, options.metadata_bytes, options.metadata_bytes, 0};
+  }
+
+  void start_over();
+  void resume();
+  [[nodiscard]] bool is_intact(const JournalRecord& record, std::uint64_t expected_offset) const;
+  void account(const JournalRecord& record);
+  void add_up(const TileStatistics& tile);
+  void append(const ZipMember& member, std::span<const std::byte> data);
+  void checkpoint();
+  [[nodiscard]] ZipMember tile_member(std::int64_t flat) const;
+  void for_each_directory_chunk(const ZipMember& metadata,
+                                const std::function<void(std::span<const std::byte>, std::uint64_t)>& at) const;
+  void write_metadata(const std::string& json, ZipMember& member);
+  void write_index_and_directory(const ZipMember& metadata);
+};
+
+void ArchiveWriter::State::start_over() {
+  part.truncate(0);
+  journal = Journal::start(journal_path(path), job_digest(grid, options));
+  std::vector<std::byte> head;
+  append_local_header(metadata_member(), head);
+  head.resize(head.size() + options.metadata_bytes, std::byte{' '});
+  part.append(head);
+}
+
+/// True where the part file holds what the record says, at the offset that it must stand at.
+bool ArchiveWriter::State::is_intact(const JournalRecord& record, std::uint64_t expected_offset) const {
+  if (record.kind == JournalRecord::Kind::kEmptyTile) return true;
+  if (record.member.header_offset != expected_offset) return false;
+  std::vector<std::byte> header;
+  append_local_header(record.member, header);
+  std::vector<std::byte> found(header.size());
+  if (part.read_at(expected_offset, found) != found.size() || found != header) return false;
+  std::uint64_t at = expected_offset + header.size();
+  std::uint32_t crc = 0;
+  found.resize(std::size_t{1} << 20U);
+  for (std::uint64_t left = record.member.compressed_bytes; left > 0;) {
+    const auto wanted = static_cast<std::size_t>(std::min<std::uint64_t>(left, found.size()));
+    if (part.read_at(at, std::span(found).first(wanted)) != wanted) return false;
+    crc = crc32(std::span(found).first(wanted), crc);
+    at += wanted;
+    left -= wanted;
+  }
+  return crc == record.data_crc32;
+}
+
+void ArchiveWriter::State::resume() {
+  Journal::Opened opened = Journal::open(journal_path(path), job_digest(grid, options));
+  if (!opened.matches) {
+    keep = true;
+    throw Error(ErrorCode::kInvalidArgument,
+                fmt::format("{}: belongs to another input or other options; start over without --resume", part.path()));
+  }
+  const std::uint64_t head = local_header_bytes(metadata_member()) + options.metadata_bytes;
+  if (opened.records.empty() || part.size_on_disk() < head) {
+    start_over();
+    return;
+  }
+  // All records that are true, then back to the last tile: what stands behind it is written again.
+  std::uint64_t good_end = head;
+  std::uint64_t journal_end = opened.header_bytes;
+  std::uint64_t offset = head;
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < opened.records.size(); ++i) {
+    const JournalRecord& record = opened.records[i];
+    if (!is_intact(record, offset)) break;
+    if (record.kind != JournalRecord::Kind::kEmptyTile) {
+      offset += local_header_bytes(record.member) + record.member.compressed_bytes;
+    }
+    if (record.kind == JournalRecord::Kind::kMember) continue;
+    good_end = offset;
+    journal_end = opened.ends[i];
+    kept = i + 1;
+  }
+  for (std::size_t i = 0; i < kept && next < grid.tile_count(); ++i) account(opened.records[i]);
+  part.truncate(good_end);
+  journal = std::move(opened.journal);
+  journal->truncate(journal_end);
+  journalled = synced = good_end;
+}
+
+/// Takes a step into index, directory and content hash.
+void ArchiveWriter::State::account(const JournalRecord& record) {
+  if (record.kind == JournalRecord::Kind::kMember) {
+    members.push_back({next, record.member});
+    names.insert(record.member.name);
+    return;
+  }
+  TileEntry entry;
+  entry.stored = record.kind == JournalRecord::Kind::kTile;
+  if (entry.stored) {
+    entry.offset_bytes = record.member.header_offset + local_header_bytes(record.member);
+    entry.compressed_bytes = static_cast<std::uint32_t>(record.member.compressed_bytes);
+    entry.payload_bytes = static_cast<std::uint32_t>(record.member.bytes);
+    entry.payload_crc32 = record.member.crc32;
+    entry.code_min = record.code_min;
+    entry.code_max = record.code_max;
+    entry.has_voids = record.has_voids;
+    ++stored;
+  }
+  append_index_record(entry, index);
+  content.add_tile(record.digest);
+  add_up(record.statistics);
+  ++next;
+}
+
+void ArchiveWriter::State::add_up(const TileStatistics& tile) {
+  statistics.vertices += tile.vertices;
+  statistics.voids += tile.voids;
+  statistics.clamped += tile.clamped;
+  statistics.sum += tile.sum;
+  statistics.min = std::min(statistics.min, tile.min);
+  statistics.max = std::max(statistics.max, tile.max);
+  statistics.worst_rounding = std::max(statistics.worst_rounding, tile.worst_rounding);
+}
+
+void ArchiveWriter::State::append(const ZipMember& member, std::span<const std::byte> data) {
+  try {
+    std::vector<std::byte> header;
+    append_local_header(member, header);
+    part.append(header);
+    part.append(data);
+  } catch (const Error& error) {
+    throw Error(error.code(), fmt::format("{}; {} bytes were written and {} of {} tiles are in it", error.what(),
+                                          part.size_on_disk(), next, grid.tile_count()));
+  }
+}
+
+void ArchiveWriter::State::checkpoint() {
+  if (part.position() - journalled < kJournalBytes) return;
+  // The part file first: what the journal says is then there, as long as the machine keeps running.
+  part.flush();
+  if (part.position() - synced >= kSyncBytes) {
+    part.sync();
+    synced = part.position();
+  }
+  journal->flush();
+  journalled = part.position();
+}
+
+ZipMember ArchiveWriter::State::tile_member(std::int64_t flat) const {
+  const auto at = static_cast<std::size_t>(flat) * kIndexRecordBytes;
+  const auto entry = parse_index_record(std::span(index).subspan(at, kIndexRecordBytes));
+  ISOHF_ASSERT(entry.has_value());
+  ZipMember member{tile_name(grid.tile_at(flat)), ZipMethod::kDeflated, entry->payload_crc32,
+                   entry->compressed_bytes,       entry->payload_bytes, entry->offset_bytes};
+  if (entry->stored) member.header_offset -= local_header_bytes(member);
+  return member;
+}
+
+/// Hands the directory's entries over in file order, a few at a time, with their number; index.bin's is not among them.
+void ArchiveWriter::State::for_each_directory_chunk(
+    const ZipMember& metadata, const std::function<void(std::span<const std::byte>, std::uint64_t)>& at) const {
+  constexpr std::size_t kChunkBytes = std::size_t{1} << 16U;
+  std::vector<std::byte> chunk;
+  std::uint64_t entries = 0;
+  const auto add = [&](const ZipMember& member) {
+    append_directory_entry(member, chunk);
+    ++entries;
+    if (chunk.size() < kChunkBytes) return;
+    at(chunk, entries);
+    chunk.clear();
+    entries = 0;
+  };
+  add(metadata);
+  std::size_t placed = 0;
+  for (std::int64_t flat = 0; flat <= grid.tile_count(); ++flat) {
+    for (; placed < members.size() && members[placed].before_tile == flat; ++placed) add(members[placed].member);
+    if (flat == grid.tile_count()) break;
+    const ZipMember member = tile_member(flat);
+    if (member.bytes != 0) add(member);
+  }
+  at(chunk, entries);
+}
+
+void ArchiveWriter::State::write_metadata(const std::string& json, ZipMember& member) {
+  if (json.size() + 1 > options.metadata_bytes) {
+    throw Error(ErrorCode::kInvalidArgument, fmt::format("{}: the metadata take {} bytes, room was made for {}", path,
+                                                         json.size() + 1, options.metadata_bytes));
+  }
+  std::string padded = json;
+  padded.resize(options.metadata_bytes, ' ');
+  padded.back() = '\n';
+  const auto data = std::as_bytes(std::span<const char>(padded));
+  member.crc32 = crc32(data);
+  std::vector<std::byte> head;
+  append_local_header(member, head);
+  head.insert(head.end(), data.begin(), data.end());
+  part.overwrite(0, head);
+}
+
+void ArchiveWriter::State::write_index_and_directory(const ZipMember& metadata) {
+  IndexFooter footer;
+  footer.record_count = static_cast<std::uint64_t>(grid.tile_count());
+  footer.stored_count = static_cast<std::uint64_t>(stored);
+  footer.records_crc32 = crc32(index);
+  for_each_directory_chunk(metadata, [&](std::span<const std::byte> chunk, std::uint64_t entries) {
+    footer.directory_entries += entries;
+    footer.directory_bytes += chunk.size();
+    footer.directory_crc32 = crc32(chunk, footer.directory_crc32);
+  });
+  append_index_footer(footer, index);
+  const ZipMember member{kIndexName, ZipMethod::kStored, crc32(index), index.size(), index.size(), part.position()};
+  append(member, index);
+  index.resize(index.size() - kIndexFooterBytes);
+
+  const std::uint64_t directory_offset = part.position();
+  for_each_directory_chunk(metadata, [&](std::span<const std::byte> chunk, std::uint64_t) { part.append(chunk); });
+  std::vector<std::byte> tail;
+  append_directory_entry(member, tail);
+  append_end_records(footer.directory_entries + 1, directory_offset, part.position() + tail.size() - directory_offset,
+                     tail);
+  part.append(tail);
+}
+
+ArchiveWriter::ArchiveWriter(const std::string& path, const TileGrid& grid, const WriterOptions& options) {
+  check_target(path, options.overwrite);
+  state_ = std::make_unique<State>(path, grid, options);
+  try {
+    options.resume ? state_->resume() : state_->start_over();
+  } catch (...) {
+    if (!state_->keep) {
+      remove_file(part_path(path));
+      remove_file(journal_path(path));
+    }
+    throw;
+  }
+}
+
+ArchiveWriter::~ArchiveWriter() {
+  if (state_ == nullptr || state_->finished || state_->keep) return;
+  remove_file(journal_path(state_->path));
+  remove_file(part_path(state_->path));
+}
+
+std::int64_t ArchiveWriter::next_tile() const {
+  return state_->next;
+}
+std::int64_t ArchiveWriter::tiles_stored() const {
+  return state_->stored;
+}
+std::uint64_t ArchiveWriter::bytes_written() const {
+  return state_->part.position();
+}
+TileStatistics ArchiveWriter::statistics() const {
+  return state_->statistics;
+}
+
+void ArchiveWriter::add_tile(const EncodedTile& tile) {
+  State& state = *state_;
+  ISOHF_ASSERT(state.next < state.grid.tile_count());
+  JournalRecord record;
+  record.kind = tile.is_empty ? JournalRecord::Kind::kEmptyTile : JournalRecord::Kind::kTile;
+  ISOHF_ASSERT(tile.content_digest.size() == record.digest.size());
+  std::copy(tile.content_digest.begin(), tile.content_digest.end(), record.digest.begin());
+  record.statistics = tile.statistics;
+  if (!tile.is_empty) {
+    record.member = {tile_name(state.grid.tile_at(state.next)),
+                     ZipMethod::kDeflated,
+                     tile.payload_crc32,
+                     tile.deflated.size(),
+                     tile.payload_bytes,
+                     state.part.position()};
+    record.data_crc32 = crc32(tile.deflated);
+    record.code_min = tile.code_min;
+    record.code_max = tile.code_max;
+    record.has_voids = tile.has_voids;
+    state.append(record.member, tile.deflated);
+  }
+  state.journal->add(record);
+  state.account(record);
+  state.checkpoint();
+}
+
+void ArchiveWriter::add_member(const std::string& name, std::span<const std::byte> bytes, bool deflate) {
+  State& state = *state_;
+  const auto refuse = [&](const std::string& why) {
+    throw Error(ErrorCode::kInvalidArgument, fmt::format("{}: member \"{}\": {}", state.path, name, why));
+  };
+  if (const std::string why = why_bad_name(name); !why.empty()) refuse(why);
+  if (name == kMetadataName || name == kIndexName || name.rfind("tiles/", 0) == 0) refuse("the name is taken");
+  if (state.names.count(name) != 0) refuse("it is there already");
+  std::vector<std::byte> deflated;
+  if (deflate) deflated = deflate_bytes(bytes);
+  const std::span<const std::byte> data = deflate ? std::span<const std::byte>(deflated) : bytes;
+  JournalRecord record;
+  record.kind = JournalRecord::Kind::kMember;
+  record.member = {name,         deflate ? ZipMethod::kDeflated : ZipMethod::kStored,
+                   crc32(bytes), data.size(),
+                   bytes.size(), state.part.position()};
+  record.data_crc32 = crc32(data);
+  state.append(record.member, data);
+  state.journal->add(record);
+  state.account(record);
+  state.checkpoint();
+}
+
+std::uint64_t ArchiveWriter::finish(Metadata metadata) {
+  State& state = *state_;
+  ISOHF_ASSERT(state.next == state.grid.tile_count() && !state.finished);
+  metadata.tiles_stored = state.stored;
+  metadata.content_sha256 = state.content.finish(metadata);
+  ZipMember member = state.metadata_member();
+  state.part.flush();
+  state.write_metadata(format_metadata(metadata), member);
+  state.write_index_and_directory(member);
+  state.part.sync();
+  const std::uint64_t size = state.part.position();
+  if (!rename_file(part_path(state.path), state.path, state.options.overwrite)) {
+    state.keep = true;
+    throw Error(ErrorCode::kIo, fmt::format("{}: was made by somebody else meanwhile; the finished archive is {}",
+                                            state.path, part_path(state.path)));
+  }
+  state.finished = true;
+  remove_file(journal_path(state.path));
+  sync_folder_of(state.path);
+  state.part.close();
+  return size;
+}
+
+void ArchiveWriter::keep_part() {
+  State& state = *state_;
+  state.keep = true;
+  if (state.finished || !state.journal) return;
+  state.part.sync();
+  state.journal->flush();
+  state.journalled = state.part.position();
+}
+
+}  // namespace isohf

@@ -1,0 +1,184 @@
+#include "isohf/base/file.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/file.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdio>
+#include <system_error>
+#include <utility>
+
+#include "isohf/base/error.h"
+
+namespace isohf {
+namespace {
+
+std::string reason(int error_number) {
+  return std::generic_category().message(error_number);
+}
+
+[[noreturn]] void fail(const std::string& path, const std::string& deed, int error_number) {
+  throw Error(ErrorCode::kIo, fmt::format("{}: {}: {}", path, deed, reason(error_number)));
+}
+
+std::string folder_of(const std::string& path) {
+  const std::size_t slash = path.find_last_of('/');
+  if (slash == std::string::npos) return ".";
+  return slash == 0 ? "/" : path.substr(0, slash);
+}
+
+}  // namespace
+
+File::File(const std::string& path, Mode mode) : path_(path) {
+  const int flags = O_CLOEXEC | (mode == Mode::kRead ? O_RDONLY | O_NONBLOCK : O_RDWR | O_CREAT);
+  do {
+    descriptor_ = ::open(path.c_str(), flags, 0666);
+  } while (descriptor_ < 0 && errno == EINTR);
+  if (descriptor_ < 0) fail(path, "cannot open", errno);
+  struct stat status {};
+  const bool known = ::fstat(descriptor_, &status) == 0;
+  if (!known || S_ISDIR(status.st_mode)) {
+    const int error_number = known ? EISDIR : errno;
+    ::close(std::exchange(descriptor_, -1));
+    fail(path, "cannot open", error_number);
+  }
+}
+
+File::~File() {
+  if (descriptor_ >= 0) ::close(descriptor_);
+}
+
+File::File(File&& other) noexcept : path_(std::move(other.path_)), descriptor_(std::exchange(other.descriptor_, -1)) {}
+
+File& File::operator=(File&& other) noexcept {
+  if (this != &other) {
+    if (descriptor_ >= 0) ::close(descriptor_);
+    path_ = std::move(other.path_);
+    descriptor_ = std::exchange(other.descriptor_, -1);
+  }
+  return *this;
+}
+
+std::uint64_t File::size_bytes() const {
+  struct stat status {};
+  if (::fstat(descriptor_, &status) != 0) fail(path_, "cannot tell its size", errno);
+  return static_cast<std::uint64_t>(status.st_size);
+}
+
+bool File::try_lock() {
+  // A file system without locks gives no protection, but no reason to refuse either.
+  return ::flock(descriptor_, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK;
+}
+
+bool File::is_at_path() const {
+  struct stat by_path {};
+  struct stat by_descriptor {};
+  return ::stat(path_.c_str(), &by_path) == 0 && ::fstat(descriptor_, &by_descriptor) == 0 &&
+         by_path.st_dev == by_descriptor.st_dev && by_path.st_ino == by_descriptor.st_ino;
+}
+
+void File::write_at(std::uint64_t offset_bytes, std::span<const std::byte> bytes) {
+  while (!bytes.empty()) {
+    const ssize_t done = ::pwrite(descriptor_, bytes.data(), bytes.size(), static_cast<off_t>(offset_bytes));
+    if (done < 0) {
+      if (errno == EINTR) continue;
+      fail(path_, fmt::format("cannot write {} bytes at byte {}", bytes.size(), offset_bytes), errno);
+    }
+    bytes = bytes.subspan(static_cast<std::size_t>(done));
+    offset_bytes += static_cast<std::uint64_t>(done);
+  }
+}
+
+std::size_t File::read_at(std::uint64_t offset_bytes, std::span<std::byte> bytes) const {
+  std::size_t total = 0;
+  while (total < bytes.size()) {
+    const ssize_t done =
+        ::pread(descriptor_, bytes.data() + total, bytes.size() - total, static_cast<off_t>(offset_bytes + total));
+    if (done < 0) {
+      if (errno == EINTR) continue;
+      fail(path_, fmt::format("cannot read at byte {}", offset_bytes + total), errno);
+    }
+    if (done == 0) break;
+    total += static_cast<std::size_t>(done);
+  }
+  return total;
+}
+
+void File::truncate(std::uint64_t size_bytes) {
+  if (::ftruncate(descriptor_, static_cast<off_t>(size_bytes)) != 0) fail(path_, "cannot set its size", errno);
+}
+
+void File::sync() {
+  if (::fsync(descriptor_) != 0) fail(path_, "cannot flush to the disk", errno);
+}
+
+void File::start_writeback(std::uint64_t offset_bytes, std::uint64_t size_bytes) {
+  static_cast<void>(::sync_file_range(descriptor_, static_cast<off_t>(offset_bytes), static_cast<off_t>(size_bytes),
+                                      SYNC_FILE_RANGE_WRITE));
+}
+
+void File::close() {
+  if (descriptor_ >= 0 && ::close(std::exchange(descriptor_, -1)) != 0) fail(path_, "cannot close", errno);
+}
+
+MappedFile::MappedFile(const std::string& path) : path_(path) {
+  const File file(path, File::Mode::kRead);
+  size_ = file.size_bytes();
+  if (size_ == 0) return;
+  void* mapped = ::mmap(nullptr, size_, PROT_READ, MAP_SHARED, file.descriptor_, 0);
+  if (mapped == MAP_FAILED) fail(path, "cannot map", errno);
+  data_ = static_cast<const std::byte*>(mapped);
+}
+
+MappedFile::~MappedFile() {
+  if (data_ != nullptr) ::munmap(const_cast<std::byte*>(data_), size_);
+}
+
+bool rename_file(const std::string& from, const std::string& to, bool overwrite) {
+  const auto fail_rename = [&](int error_number) { fail(from, fmt::format("cannot rename to {}", to), error_number); };
+  if (overwrite) {
+    if (::rename(from.c_str(), to.c_str()) != 0) fail_rename(errno);
+    return true;
+  }
+  if (::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0) return true;
+  if (errno == EEXIST) return false;
+  if (errno != EINVAL && errno != ENOSYS && errno != ENOTSUP) fail_rename(errno);
+  // A file system without RENAME_NOREPLACE: a hard link is refused just as well where the name is taken.
+  if (::link(from.c_str(), to.c_str()) != 0) {
+    if (errno == EEXIST) return false;
+    fail_rename(errno);
+  }
+  if (::unlink(from.c_str()) != 0) fail(from, "cannot remove", errno);
+  return true;
+}
+
+void sync_folder_of(const std::string& path) {
+  const std::string folder = folder_of(path);
+  const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (descriptor < 0) fail(folder, "cannot open", errno);
+  const int result = ::fsync(descriptor);
+  const int error_number = errno;
+  ::close(descriptor);
+  // Some file systems cannot flush a folder; the rename itself stands.
+  if (result != 0 && error_number != EINVAL && error_number != ENOTSUP) fail(folder, "cannot flush", error_number);
+}
+
+bool remove_file(const std::string& path) noexcept {
+  return ::unlink(path.c_str()) == 0 || errno == ENOENT;
+}
+
+PathKind path_kind(const std::string& path) {
+  struct stat status {};
+  if (::stat(path.c_str(), &status) != 0) {
+    if (errno == ENOENT) return PathKind::kAbsent;
+    fail(path, "cannot look at it", errno);
+  }
+  if (S_ISREG(status.st_mode)) return PathKind::kFile;
+  return S_ISDIR(status.st_mode) ? PathKind::kFolder : PathKind::kOther;
+}
+
+}  // namespace isohf

@@ -1,0 +1,81 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+
+namespace isohf {
+
+/// An open file descriptor whose every failure is one Error{kIo} naming path, deed and reason. Movable, not copyable.
+class File {
+ public:
+  enum class Mode {
+    kRead,       ///< must exist
+    kReadWrite,  ///< made where absent, kept where present
+  };
+
+  File() = default;
+  /// Throws Error{kIo}; a folder is refused.
+  File(const std::string& path, Mode mode);
+  ~File();
+  File(File&& other) noexcept;
+  File& operator=(File&& other) noexcept;
+
+  [[nodiscard]] bool is_open() const { return descriptor_ >= 0; }
+  [[nodiscard]] const std::string& path() const { return path_; }
+  [[nodiscard]] std::uint64_t size_bytes() const;
+
+  /// Takes the exclusive advisory lock; false where another process holds it.
+  [[nodiscard]] bool try_lock();
+  /// True while `path()` still names this very file.
+  [[nodiscard]] bool is_at_path() const;
+
+  void write_at(std::uint64_t offset_bytes, std::span<const std::byte> bytes);
+  /// Reads as many of the bytes as the file holds there; returns their number.
+  [[nodiscard]] std::size_t read_at(std::uint64_t offset_bytes, std::span<std::byte> bytes) const;
+  void truncate(std::uint64_t size_bytes);
+  void sync();                                                                 ///< data and size reach the disk
+  void start_writeback(std::uint64_t offset_bytes, std::uint64_t size_bytes);  ///< a hint, never fails
+  void close();  ///< throws where the system reports a late error
+
+ private:
+  friend class MappedFile;
+
+  std::string path_;
+  int descriptor_ = -1;
+};
+
+/// A whole file, mapped for reading.
+class MappedFile {
+ public:
+  /// Throws Error{kIo} where the file cannot be opened or mapped. An empty file maps to an empty span.
+  explicit MappedFile(const std::string& path);
+  ~MappedFile();
+  MappedFile(const MappedFile&) = delete;
+  MappedFile& operator=(const MappedFile&) = delete;
+
+  [[nodiscard]] std::span<const std::byte> bytes() const { return {data_, size_}; }
+  [[nodiscard]] const std::string& path() const { return path_; }
+
+ private:
+  std::string path_;
+  const std::byte* data_ = nullptr;
+  std::size_t size_ = 0;
+};
+
+/// Moves `from` to `to` in one step. Without `overwrite` an existing `to` is left alone and false is returned.
+/// Throws Error{kIo} for anything else that goes wrong.
+[[nodiscard]] bool rename_file(const std::string& from, const std::string& to, bool overwrite);
+
+/// Makes a rename in the folder of `path` durable.
+void sync_folder_of(const std::string& path);
+
+/// Removes a file; an absent one is fine. Returns false where it could not be removed.
+bool remove_file(const std::string& path) noexcept;
+
+enum class PathKind { kAbsent, kFile, kFolder, kOther };
+/// What stands at a path, symbolic links followed. Throws Error{kIo} where the system does not say.
+[[nodiscard]] PathKind path_kind(const std::string& path);
+
+}  // namespace isohf

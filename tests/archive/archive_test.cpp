@@ -1,0 +1,40 @@
+#include <gtest/gtest.h>
+
+#include "archive/tiles.h"
+#include "isohf/archive/reader.h"
+#include "isohf/archive/writer.h"
+#include "isohf/base/error.h"
+
+namespace isohf {
+namespace {
+
+using test::TemporaryFolder;
+
+TileGrid small_grid() {
+  return TileGrid::make(TileShape::make(12, 11, 3), 5, 4, 100.0, 100.0);
+}
+
+TEST(Archive, BringsBackTilesMembersAndMetadata) {
+  for (const CodeType type : {CodeType::kU16, CodeType::kU8, CodeType::kF32}) {
+    const TemporaryFolder folder;
+    const TileGrid grid = small_grid();
+    const std::string path = folder.file("a.isohf");
+    test::make_archive(path, grid, type);
+    EXPECT_EQ(folder.names(), std::vector<std::string>{"a.isohf"});
+    const ArchiveReader reader(path);
+    EXPECT_FALSE(reader.reads_by_directory());
+    EXPECT_TRUE(reader.warnings().empty());
+    EXPECT_TRUE(reader.check_structure().empty());
+    EXPECT_EQ(reader.metadata().tiles_stored, 18);
+    for (std::int64_t flat = 0; flat < grid.tile_count(); ++flat) {
+      EXPECT_TRUE(test::same_samples(reader.read_tile(grid.tile_at(flat)), test::tile_of_archive(grid, type, flat)));
+    }
+    ASSERT_EQ(reader.members().size(), 4U);
+    EXPECT_EQ(reader.read_member("shadow/seeds.bin"), std::vector<std::byte>(1000, std::byte{7}));
+    EXPECT_EQ(reader.read_member("preview.png"), std::vector<std::byte>(33, std::byte{9}));
+    EXPECT_EQ(reader.read_member("nothing"), std::nullopt);
+  }
+}
+
+}  // namespace
+}  // namespace isohf

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "isohf/archive/metadata.h"
+#include "isohf/archive/tile_codec.h"
+
+/// Tiles and archives to test with.
+
+namespace isohf::test {
+
+/// What a tile's samples look like.
+enum class Kind { kConstant, kPlane, kTerrain, kNoise, kExtremes, kTwoLevels, kVoidIsland, kVoidNoise, kAllVoid };
+
+inline constexpr Kind kAllKinds[] = {Kind::kConstant,   Kind::kPlane,     Kind::kTerrain,
+                                     Kind::kNoise,      Kind::kExtremes,  Kind::kTwoLevels,
+                                     Kind::kVoidIsland, Kind::kVoidNoise, Kind::kAllVoid};
+
+/// A tile of that kind; the same arguments give the same tile.
+[[nodiscard]] TileCodes make_tile(const TileShape& shape, CodeType type, Kind kind, std::uint32_t seed);
+
+/// NaN equals NaN; otherwise bits decide.
+[[nodiscard]] bool same_samples(const TileCodes& a, const TileCodes& b);
+
+/// A fresh folder that goes away with the object.
+class TemporaryFolder {
+ public:
+  TemporaryFolder();
+  ~TemporaryFolder();
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  [[nodiscard]] std::string file(const std::string& name) const { return (path_ / name).string(); }
+  [[nodiscard]] std::vector<std::string> names() const;  ///< sorted
+
+ private:
+  std::filesystem::path path_;
+};
+
+[[nodiscard]] std::vector<std::byte> read_file(const std::string& path);
+void write_file(const std::string& path, const std::vector<std::byte>& bytes);
+
+/// Metadata for that grid with every member filled in.
+[[nodiscard]] Metadata make_metadata(const TileGrid& grid, CodeType type);
+
+/// The tile that make_archive puts at a place: kinds in turn.
+[[nodiscard]] TileCodes tile_of_archive(const TileGrid& grid, CodeType type, std::int64_t flat);
+
+/// Writes a small archive with tiles of all kinds, a stored and a deflated member.
+void make_archive(const std::string& path, const TileGrid& grid, CodeType type);
+
+}  // namespace isohf::test
