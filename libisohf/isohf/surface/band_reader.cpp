@@ -1,18 +1,9 @@
 #include "isohf/surface/band_reader.h"
 
-#include <oneapi/tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cstring>
 
 namespace isohf {
-namespace {
-
-constexpr std::int64_t kColumnsAtOnce = 512;  // one task's share of a column prefilter: stays in the cache
-constexpr std::int64_t kRowsAtOnce = 16;
-
-}  // namespace
-
 std::int64_t rows_per_read(const SourceInfo& info) {
   constexpr std::int64_t kReadBytes = std::int64_t{8} << 20;
   const auto row_bytes = static_cast<std::int64_t>(size_bytes(info.sample_type)) * info.width;
@@ -33,15 +24,8 @@ std::shared_ptr<const Band> BandReader::read(const RowRange& rows) {
   band->rows = rows;
   const std::int64_t count = rows.last - rows.first + 1;
   band->heights.resize(static_cast<std::size_t>(band->columns) * static_cast<std::size_t>(count));
-  const View2D<const float> from = heights->view().heights;
-  oneapi::tbb::parallel_for(
-      std::int64_t{0}, (band->columns + kColumnsAtOnce - 1) / kColumnsAtOnce, [&](std::int64_t part) {
-        const std::int64_t first_column = part * kColumnsAtOnce;
-        const std::int64_t columns = std::min(kColumnsAtOnce, band->columns - first_column);
-        prefilter_.filter_columns({from.data() + first_column, columns, from.rows(), from.stride()},
-                                  rows.first - heights->rows.first,
-                                  {band->heights.data() + first_column, columns, count, band->columns});
-      });
+  prefilter_.filter_columns(heights->view().heights, rows.first - heights->rows.first,
+                            {band->heights.data(), band->columns, count});
   return band;
 }
 
@@ -76,15 +60,8 @@ void BandReader::read_rows(std::int64_t first, std::int64_t count, float* height
   const auto samples = static_cast<std::size_t>(count) * static_cast<std::size_t>(info.width);
   raw_.resize(samples * size_bytes(info.sample_type));
   source_.read_window({0, first, info.width, count}, raw_);
-  oneapi::tbb::parallel_for(std::int64_t{0}, (count + kRowsAtOnce - 1) / kRowsAtOnce, [&](std::int64_t part) {
-    const std::int64_t rows = std::min(kRowsAtOnce, count - part * kRowsAtOnce);
-    const auto begin = static_cast<std::size_t>(part * kRowsAtOnce) * static_cast<std::size_t>(info.width);
-    const std::size_t samples_here = static_cast<std::size_t>(rows) * static_cast<std::size_t>(info.width);
-    const std::size_t bytes = size_bytes(info.sample_type);
-    heights_from_samples(info, datum_, std::span(raw_).subspan(begin * bytes, samples_here * bytes),
-                         {heights + begin, samples_here});
-    if (!prefilter_.is_identity()) prefilter_.filter_rows({heights + begin, info.width, rows});
-  });
+  heights_from_samples(info, datum_, raw_, {heights, samples});
+  if (!prefilter_.is_identity()) prefilter_.filter_rows({heights, info.width, count});
 }
 
 }  // namespace isohf
