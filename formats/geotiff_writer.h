@@ -1,0 +1,17 @@
+#pragma once
+
+#include <string>
+
+#include "formats/geotiff_keys.h"
+
+namespace isohf {
+
+/// The GeoTIFF tags that place_from_geotiff reads as `georeference` (OGC GeoTIFF 1.1, 19-008r4): pixel scale, tie point
+/// of the first sample (its corner where the samples are areas), model and raster type, EPSG codes, units, ellipsoid,
+/// names and the vertical system. Empty for a georeference that says nothing.
+/// Registration kUnknown is written as area: GeoTIFF knows no third kind. What has no EPSG code keeps its name,
+/// ellipsoid and WKT, not the parameters of its projection.
+[[nodiscard]] GeoTags geotiff_tags(const Georeference& georeference, double metres_per_vertical_unit,
+                                   const std::string& vertical_unit);
+
+}  // namespace isohf

@@ -1,0 +1,114 @@
+#include "formats/raster_sink.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <limits>
+
+#include "formats/output_part.h"
+#include "formats/raster_encoder.h"
+#include "isohf/base/error.h"
+
+namespace isohf {
+namespace {
+
+struct Writer {
+  const char* extension;
+  std::unique_ptr<RasterEncoder> (*encode)(const std::string& path, const RasterSpec& spec);
+};
+
+constexpr std::array<Writer, 5> kWriters = {
+    {{".tif", encode_tiff}, {".tiff", encode_tiff}, {".exr", encode_exr}, {".png", encode_png}, {".hgt", encode_hgt}}};
+
+std::string lower_extension(const std::string& path) {
+  const std::size_t dot = path.rfind('.');
+  if (dot == std::string::npos || path.find('/', dot) != std::string::npos) return {};
+  std::string extension = path.substr(dot);
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return extension;
+}
+
+const Writer& writer_for(const std::string& path) {
+  const std::string extension = lower_extension(path);
+  for (const Writer& writer : kWriters) {
+    if (extension == writer.extension) return writer;
+  }
+  throw Error(ErrorCode::kUnsupported, fmt::format("no writer for the extension \"{}\"; there are {}", extension,
+                                                   fmt::join(writable_extensions(), " ")));
+}
+
+void check(const RasterSpec& spec) {
+  constexpr std::int64_t kMaxSide = std::numeric_limits<std::int32_t>::max();
+  if (spec.width < 1 || spec.height < 1 || spec.width > kMaxSide || spec.height > kMaxSide) {
+    throw Error(ErrorCode::kInvalidArgument, fmt::format("a raster of {} x {} samples, must be 1...{} on each side",
+                                                         spec.width, spec.height, kMaxSide));
+  }
+  if (spec.channels != 1 && spec.channels != 3 && spec.channels != 4) {
+    throw Error(ErrorCode::kInvalidArgument, fmt::format("{} channels, must be 1, 3 or 4", spec.channels));
+  }
+}
+
+}  // namespace
+
+RasterSink::RasterSink(std::string path, const RasterSpec& spec, std::unique_ptr<OutputPart> part,
+                       std::unique_ptr<RasterEncoder> encoder)
+    : path_(std::move(path)), spec_(spec), part_(std::move(part)), encoder_(std::move(encoder)) {}
+
+RasterSink::~RasterSink() = default;
+
+void RasterSink::write_rows(std::span<const std::byte> rows) {
+  const std::size_t one_row = row_bytes(spec_);
+  const auto count = static_cast<std::int64_t>(rows.size() / one_row);
+  if (rows.size() % one_row != 0 || count > spec_.height - rows_written_) {
+    throw Error(ErrorCode::kInvalidArgument,
+                fmt::format("{}: {} bytes after row {} of {}, must be whole rows of {} bytes", path_, rows.size(),
+                            rows_written_, spec_.height, one_row));
+  }
+  if (count == 0) return;
+  try {
+    encoder_->write(rows, count);
+  } catch (const Error& error) {
+    throw error.within(path_);
+  }
+  rows_written_ += count;
+}
+
+void RasterSink::finish() {
+  if (rows_written_ != spec_.height || !encoder_) {
+    throw Error(ErrorCode::kInvalidArgument,
+                fmt::format("{}: finished after {} of {} rows", path_, rows_written_, spec_.height));
+  }
+  try {
+    encoder_->close();
+    encoder_.reset();
+    part_->commit();
+  } catch (const Error& error) {
+    throw error.within(path_);
+  }
+}
+
+std::unique_ptr<RasterSink> create_raster(const std::string& path, const RasterSpec& spec) {
+  try {
+    const Writer& writer = writer_for(path);
+    check(spec);
+    auto part = std::make_unique<OutputPart>(path, spec.overwrite);
+    auto encoder = writer.encode(part->path(), spec);
+    return std::make_unique<RasterSink>(path, spec, std::move(part), std::move(encoder));
+  } catch (const Error& error) {
+    throw error.within(path);
+  }
+}
+
+const std::vector<std::string>& writable_extensions() {
+  static const std::vector<std::string> extensions = [] {
+    std::vector<std::string> list;
+    for (const Writer& writer : kWriters) list.emplace_back(writer.extension);
+    return list;
+  }();
+  return extensions;
+}
+
+}  // namespace isohf

@@ -1,0 +1,74 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "isohf/surface/heightmap.h"
+
+namespace isohf {
+
+/// What a new raster is. Georeference, scale, offset and unit go into TIFF; the other formats have no place for them.
+struct RasterSpec {
+  std::int64_t width = 0;   ///< columns, >= 1
+  std::int64_t height = 0;  ///< rows, >= 1
+  SampleType sample_type = SampleType::kFloat32;
+  int channels = 1;                  ///< 1 gray (Y), 3 RGB, 4 RGBA
+  std::optional<double> void_value;  ///< raw value that means "no elevation"
+  std::optional<Georeference> georeference;
+  double z_scale = 1.0;  ///< elevation = raw * z_scale + z_offset, in vertical units
+  double z_offset = 0.0;
+  std::string vertical_unit;  ///< "metre", ...; empty where unknown
+  double metres_per_vertical_unit = 1.0;
+  bool overwrite = false;  ///< replace a file of that name
+};
+
+class OutputPart;
+class RasterEncoder;
+
+/// A raster file that is written from its first row to its last.
+///
+/// Everything goes to NAME.part, which finish() flushes to the disk and renames; a sink that is destroyed before leaves
+/// nothing behind. One thread calls. Memory: a few hundred kilobytes, or a few rows where these are longer.
+class RasterSink {
+ public:
+  RasterSink(std::string path, const RasterSpec& spec, std::unique_ptr<OutputPart> part,
+             std::unique_ptr<RasterEncoder> encoder);
+  RasterSink(const RasterSink&) = delete;
+  RasterSink& operator=(const RasterSink&) = delete;
+  ~RasterSink();
+
+  [[nodiscard]] const RasterSpec& spec() const { return spec_; }
+
+  /// Appends whole rows: [k * width * channels] samples in host byte order, the channels of a pixel together.
+  /// Throws Error naming the path: kIo (disk full, ...), kInvalidArgument (part of a row; more rows than declared).
+  void write_rows(std::span<const std::byte> rows);
+
+  /// Completes the file and gives it its name. All rows must have been written. Throws Error{kIo, kInvalidArgument}.
+  void finish();
+
+ private:
+  std::string path_;
+  RasterSpec spec_;
+  std::unique_ptr<OutputPart> part_;  ///< outlives the encoder, which has it open
+  std::unique_ptr<RasterEncoder> encoder_;
+  std::int64_t rows_written_ = 0;
+};
+
+/// Begins a raster whose format follows from the extension of `path`, in any case:
+///   .tif .tiff  TIFF 6.0: strips, deflate with predictor, BigTIFF above 4 GB, GeoTIFF keys, GDAL_NODATA; any type
+///   .exr        OpenEXR scan lines, ZIP; float16, float32, uint32
+///   .png        uint8, uint16; a gray void value becomes the transparent one
+///   .hgt        one int16 channel of 1201 x 1201, 3601 x 3601 or 1801 x 3601 samples; void is -32768
+/// Throws Error naming the path: kUnsupported (no such extension, or samples that the format cannot hold),
+/// kInvalidArgument (sizes; the file exists and overwrite is not set), kIo.
+[[nodiscard]] std::unique_ptr<RasterSink> create_raster(const std::string& path, const RasterSpec& spec);
+
+/// The extensions that create_raster knows: ".tif", ...
+[[nodiscard]] const std::vector<std::string>& writable_extensions();
+
+}  // namespace isohf

@@ -1,0 +1,196 @@
+#include <fmt/format.h>
+#include <tiffio.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdarg>
+#include <cstdio>
+#include <cstring>
+#include <vector>
+
+#include "formats/geotiff_writer.h"
+#include "formats/raster_encoder.h"
+#include "isohf/base/error.h"
+
+namespace isohf {
+namespace {
+
+/// Strips of about this size: small enough to read a part of the raster cheaply, large enough to compress well.
+constexpr std::size_t kStripBytes = std::size_t{256} << 10U;
+/// Classic TIFF counts bytes in 32 bits; a little is left for tags and for samples that do not compress.
+constexpr double kClassicBytes = 4.0e9;
+
+// GeoTIFF (OGC 19-008r4) and GDAL's tags, which libtiff does not know by itself.
+constexpr ttag_t kPixelScaleTag = 33550;
+constexpr ttag_t kTiepointTag = 33922;
+constexpr ttag_t kGeoDirectoryTag = 34735;
+constexpr ttag_t kGeoDoublesTag = 34736;
+constexpr ttag_t kGeoAsciiTag = 34737;
+constexpr ttag_t kGdalMetadataTag = 42112;
+constexpr ttag_t kGdalNodataTag = 42113;
+
+TIFFFieldInfo counted(ttag_t tag, TIFFDataType type, const char* name) {
+  return {tag, TIFF_VARIABLE, TIFF_VARIABLE, type, FIELD_CUSTOM, 1, 1, const_cast<char*>(name)};
+}
+
+TIFFFieldInfo text(ttag_t tag, const char* name) {
+  return {tag, TIFF_VARIABLE, TIFF_VARIABLE, TIFF_ASCII, FIELD_CUSTOM, 1, 0, const_cast<char*>(name)};
+}
+
+/// The unit and scale as GDAL stores them; empty where there is nothing to say.
+std::string gdal_metadata(const RasterSpec& spec) {
+  std::string items;
+  if (spec.z_scale != 1.0 || spec.z_offset != 0.0) {
+    items += fmt::format("  <Item name=\"OFFSET\" sample=\"0\" role=\"offset\">{}</Item>\n", spec.z_offset);
+    items += fmt::format("  <Item name=\"SCALE\" sample=\"0\" role=\"scale\">{}</Item>\n", spec.z_scale);
+  }
+  if (!spec.vertical_unit.empty()) {
+    std::string unit;
+    for (const char c : spec.vertical_unit) unit += c == '<' ? "&lt;" : c == '&' ? "&amp;" : std::string(1, c);
+    items += fmt::format("  <Item name=\"UNITTYPE\" sample=\"0\" role=\"unittype\">{}</Item>\n", unit);
+  }
+  return items.empty() ? items : "<GDALMetadata>\n" + items + "</GDALMetadata>\n";
+}
+
+class TiffEncoder final : public RasterEncoder {
+ public:
+  TiffEncoder(const std::string& path, const RasterSpec& spec) : row_bytes_(row_bytes(spec)) {
+    const double raw_bytes = static_cast<double>(row_bytes_) * static_cast<double>(spec.height);
+    TIFFOpenOptions* options = TIFFOpenOptionsAlloc();
+    if (options == nullptr) throw Error(ErrorCode::kOutOfMemory, "libtiff ran out of memory");
+    TIFFOpenOptionsSetErrorHandlerExtR(options, on_error, this);
+    TIFFOpenOptionsSetWarningHandlerExtR(options, on_warning, this);
+    tiff_ = TIFFOpenExt(path.c_str(), raw_bytes > kClassicBytes ? "w8" : "w", options);
+    TIFFOpenOptionsFree(options);
+    if (tiff_ == nullptr) fail();
+    try {
+      set_layout(spec);
+      set_place(spec);
+    } catch (...) {
+      release();
+      throw;
+    }
+  }
+  ~TiffEncoder() override { release(); }
+
+  void write(std::span<const std::byte> rows, std::int64_t count) override {
+    const std::size_t strip_bytes = rows_per_strip_ * row_bytes_;
+    for (std::int64_t row = 0; row < count;) {
+      const auto room = static_cast<std::int64_t>((strip_bytes - pending_.size()) / row_bytes_);
+      const std::int64_t taken = std::min(room, count - row);
+      const auto part =
+          rows.subspan(static_cast<std::size_t>(row) * row_bytes_, static_cast<std::size_t>(taken) * row_bytes_);
+      pending_.insert(pending_.end(), part.begin(), part.end());
+      row += taken;
+      if (pending_.size() == strip_bytes) write_strip();
+    }
+  }
+
+  void close() override {
+    if (!pending_.empty()) write_strip();
+    if (TIFFWriteDirectory(tiff_) == 0) fail();
+    release();
+    if (failed_) fail();
+  }
+
+ private:
+  /// Keeps the first message: those that follow are its consequences.
+  static int on_error(TIFF*, void* self, const char* module, const char* format, va_list arguments) {
+    auto& encoder = *static_cast<TiffEncoder*>(self);
+    if (encoder.failed_) return 1;
+    encoder.failed_ = true;
+    std::array<char, 300> text{};
+    std::vsnprintf(text.data(), text.size(), format, arguments);
+    encoder.message_ = fmt::format("{}: {}", module != nullptr ? module : "libtiff", text.data());
+    return 1;
+  }
+  static int on_warning(TIFF*, void*, const char*, const char*, va_list) { return 1; }
+
+  [[noreturn]] void fail() const {
+    throw Error(ErrorCode::kIo, "TIFF cannot be written: " + (message_.empty() ? "unknown reason" : message_));
+  }
+
+  template <typename... Values>
+  void set(ttag_t tag, Values... values) {
+    if (TIFFSetField(tiff_, tag, values...) == 0) fail();
+  }
+
+  void set_layout(const RasterSpec& spec) {
+    const bool floating = is_floating(spec.sample_type);
+    const bool is_signed = spec.sample_type == SampleType::kInt8 || spec.sample_type == SampleType::kInt16 ||
+                           spec.sample_type == SampleType::kInt32;
+    rows_per_strip_ = std::clamp<std::size_t>(kStripBytes / row_bytes_, 1, static_cast<std::size_t>(spec.height));
+    set(TIFFTAG_IMAGEWIDTH, static_cast<std::uint32_t>(spec.width));
+    set(TIFFTAG_IMAGELENGTH, static_cast<std::uint32_t>(spec.height));
+    set(TIFFTAG_BITSPERSAMPLE, static_cast<int>(8 * size_bytes(spec.sample_type)));
+    set(TIFFTAG_SAMPLESPERPIXEL, spec.channels);
+    set(TIFFTAG_SAMPLEFORMAT, floating ? SAMPLEFORMAT_IEEEFP : is_signed ? SAMPLEFORMAT_INT : SAMPLEFORMAT_UINT);
+    set(TIFFTAG_PHOTOMETRIC, spec.channels == 1 ? PHOTOMETRIC_MINISBLACK : PHOTOMETRIC_RGB);
+    set(TIFFTAG_PLANARCONFIG, PLANARCONFIG_CONTIG);
+    set(TIFFTAG_ROWSPERSTRIP, static_cast<std::uint32_t>(rows_per_strip_));
+    set(TIFFTAG_COMPRESSION, COMPRESSION_ADOBE_DEFLATE);
+    set(TIFFTAG_PREDICTOR, floating ? PREDICTOR_FLOATINGPOINT : PREDICTOR_HORIZONTAL);
+    if (spec.channels == 4) {
+      const std::uint16_t opacity = EXTRASAMPLE_UNASSALPHA;
+      set(TIFFTAG_EXTRASAMPLES, 1, &opacity);
+    }
+  }
+
+  void set_place(const RasterSpec& spec) {
+    const std::array<TIFFFieldInfo, 7> fields = {counted(kPixelScaleTag, TIFF_DOUBLE, "ModelPixelScale"),
+                                                 counted(kTiepointTag, TIFF_DOUBLE, "ModelTiepoint"),
+                                                 counted(kGeoDirectoryTag, TIFF_SHORT, "GeoKeyDirectory"),
+                                                 counted(kGeoDoublesTag, TIFF_DOUBLE, "GeoDoubleParams"),
+                                                 text(kGeoAsciiTag, "GeoAsciiParams"),
+                                                 text(kGdalMetadataTag, "GDALMetadata"),
+                                                 text(kGdalNodataTag, "GDALNoDataValue")};
+    if (TIFFMergeFieldInfo(tiff_, fields.data(), static_cast<std::uint32_t>(fields.size())) != 0) fail();
+    if (spec.georeference) {
+      const GeoTags tags = geotiff_tags(*spec.georeference, spec.metres_per_vertical_unit, spec.vertical_unit);
+      set_counted(kPixelScaleTag, tags.pixel_scale);
+      set_counted(kTiepointTag, tags.tiepoints);
+      set_counted(kGeoDirectoryTag, tags.directory);
+      set_counted(kGeoDoublesTag, tags.doubles);
+      if (!tags.ascii.empty()) set(kGeoAsciiTag, tags.ascii.c_str());
+    }
+    if (const std::string metadata = gdal_metadata(spec); !metadata.empty()) set(kGdalMetadataTag, metadata.c_str());
+    if (spec.void_value) {
+      const std::string value = std::isnan(*spec.void_value) ? "nan" : fmt::format("{}", *spec.void_value);
+      set(kGdalNodataTag, value.c_str());
+    }
+  }
+
+  template <typename Value>
+  void set_counted(ttag_t tag, const std::vector<Value>& values) {
+    if (!values.empty()) set(tag, static_cast<int>(values.size()), values.data());
+  }
+
+  void write_strip() {
+    const auto size = static_cast<tmsize_t>(pending_.size());
+    if (TIFFWriteEncodedStrip(tiff_, strip_, pending_.data(), size) != size) fail();
+    ++strip_;
+    pending_.clear();
+  }
+
+  void release() {
+    if (tiff_ != nullptr) TIFFClose(tiff_);
+    tiff_ = nullptr;
+  }
+
+  std::size_t row_bytes_;
+  std::size_t rows_per_strip_ = 1;
+  TIFF* tiff_ = nullptr;
+  std::uint32_t strip_ = 0;
+  std::vector<std::byte> pending_;  ///< rows of the next strip
+  bool failed_ = false;
+  std::string message_;
+};
+
+}  // namespace
+
+std::unique_ptr<RasterEncoder> encode_tiff(const std::string& path, const RasterSpec& spec) {
+  return std::make_unique<TiffEncoder>(path, spec);
+}
+
+}  // namespace isohf
