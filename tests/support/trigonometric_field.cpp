@@ -60,9 +60,16 @@ std::vector<float> TrigonometricField::samples() const {
 }
 
 double evaluate(const Kernel& kernel, View2D<const float> coefficients, double u, double v) {
+  return evaluate(kernel, coefficients, coefficients, u, v);
+}
+
+double evaluate(const Kernel& kernel, View2D<const float> coefficients, View2D<const float> samples, double u,
+                double v) {
+  const auto at = [](View2D<const float> view, std::int64_t c, std::int64_t r) {
+    return static_cast<double>(view(mirror_index(c, view.columns()), mirror_index(r, view.rows())));
+  };
   const auto is_void = [&](double c, double r) {
-    return std::isnan(coefficients(mirror_index(static_cast<std::int64_t>(c), coefficients.columns()),
-                                   mirror_index(static_cast<std::int64_t>(r), coefficients.rows())));
+    return std::isnan(at(samples, static_cast<std::int64_t>(c), static_cast<std::int64_t>(r)));
   };
   const double nothing = std::numeric_limits<double>::quiet_NaN();
   if (is_void(std::floor(u), std::floor(v)) && is_void(std::ceil(u), std::floor(v)) &&
@@ -71,15 +78,16 @@ double evaluate(const Kernel& kernel, View2D<const float> coefficients, double u
   }
   const TapWeights across = kernel.at(u);
   const TapWeights down = kernel.at(v);
+  double valid = 0.0;
   double weight = 0.0;
   double sum = 0.0;
   bool whole = true;
   for (int j = 0; j < kernel.taps(); ++j) {
-    const float* row = coefficients.row(mirror_index(down.first + j, coefficients.rows()));
     for (int i = 0; i < kernel.taps(); ++i) {
       const auto w = static_cast<double>(across.weights[static_cast<std::size_t>(i)]) *
                      static_cast<double>(down.weights[static_cast<std::size_t>(j)]);
-      const auto c = static_cast<double>(row[mirror_index(across.first + i, coefficients.columns())]);
+      if (!std::isnan(at(samples, across.first + i, down.first + j))) valid += w;
+      const double c = at(coefficients, across.first + i, down.first + j);
       if (std::isnan(c)) {
         whole = false;
         continue;
@@ -88,8 +96,8 @@ double evaluate(const Kernel& kernel, View2D<const float> coefficients, double u
       sum += w * c;
     }
   }
-  if (whole) return sum;
-  return weight < 0.5 ? nothing : sum / weight;
+  if (valid < 0.5) return nothing;
+  return whole ? sum : sum / weight;
 }
 
 double psnr_of_resampling(Filter filter, const TrigonometricField& field, int margin) {

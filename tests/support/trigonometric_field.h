@@ -28,8 +28,11 @@ class TrigonometricField {
   std::vector<std::complex<double>> waves_;  ///< by j in [-reach, reach], then i in [0, reach]
 };
 
-/// The value at (u, v) by the rule of kernels.h, sums in double; NaN where void.
+/// The value at (u, v) by the rule of kernels.h, sums in double; NaN where void. `samples` tell the voids, where they
+/// are not the coefficients.
 [[nodiscard]] double evaluate(const Kernel& kernel, View2D<const float> coefficients, double u, double v);
+[[nodiscard]] double evaluate(const Kernel& kernel, View2D<const float> coefficients, View2D<const float> samples,
+                              double u, double v);
 
 /// PSNR in dB, relative to the samples' peak-to-peak range, of ortho -> iso at equal density against the exact field:
 /// lattice column step sqrt(2 / sqrt 3), row step sqrt(3) / 2 of that, odd rows half a step to the East; only points

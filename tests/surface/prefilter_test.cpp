@@ -79,8 +79,8 @@ TEST(Prefilter, ImpulseResponseOfTheCubicIsItsGeometricSeries) {
   for (std::size_t k = 0; k < p.size(); ++k) {
     EXPECT_NEAR(p[k], -6.0 * z / (1.0 - z * z) * std::pow(z, static_cast<double>(k)), 1e-13) << k;
   }
-  EXPECT_EQ(make(Filter::kBspline3).halo(), 16);
-  EXPECT_EQ(make(Filter::kBspline5).halo(), 27);
+  EXPECT_EQ(make(Filter::kBspline3).halo(), 16 + 4);
+  EXPECT_EQ(make(Filter::kBspline5).halo(), 27 + 6);
 }
 
 TEST(Prefilter, AgreesWithUnsersRecursion) {
@@ -273,16 +273,65 @@ TEST(Prefilter, EveryCutIntoBandsGivesTheSameBits) {
   }
 }
 
-TEST(Prefilter, VoidsStayVoidAndNothingElseBecomesSo) {
+TEST(Prefilter, CoefficientsGoOnIntoVoidsByTheBorderAndNoFurther) {
   for (const double void_share : {0.01, 0.5, 0.97, 1.0}) {
-    const Raster source = random_raster(90, 75, 5, void_share);
+    Raster source = random_raster(90, 75, 5, void_share);
     Raster raster = source;
-    make(Filter::kBspline5, "box").filter(raster.view());
-    for (std::size_t i = 0; i < source.heights.size(); ++i) {
-      ASSERT_EQ(std::isnan(raster.heights[i]), std::isnan(source.heights[i]));
-      // Largest possible: 12^2 per unit of range.
-      if (!std::isnan(raster.heights[i])) {
-        ASSERT_LT(std::abs(raster.heights[i]), 4000.0 * 144.0);
+    const Prefilter prefilter = make(Filter::kBspline5, "box");
+    const std::int64_t border = prefilter.border();
+    EXPECT_EQ(border, 3);
+    prefilter.filter(raster.view());
+    for (std::int64_t r = 0; r < raster.rows; ++r) {
+      for (std::int64_t c = 0; c < raster.columns; ++c) {
+        bool near = false;  // a kernel at the nearest sample, or next to it, reads this coefficient
+        bool far = true;    // neither within the border of a sample nor in a gap of twice that between two
+        for (std::int64_t j = -2 * border; j <= 2 * border; ++j) {
+          for (std::int64_t i = -2 * border; i <= 2 * border; ++i) {
+            if (c + i < 0 || c + i >= raster.columns || r + j < 0 || r + j >= raster.rows) continue;
+            if (std::isnan(source.view()(c + i, r + j))) continue;
+            far = false;
+            near |= std::max(std::abs(i), std::abs(j)) <= border;
+          }
+        }
+        if (near) {
+          ASSERT_FALSE(std::isnan(raster.view()(c, r))) << c << " " << r;
+        }
+        if (far) {
+          ASSERT_TRUE(std::isnan(raster.view()(c, r))) << c << " " << r;
+        }
+        // Largest possible: 12^2 per unit of range.
+        if (near) {
+          ASSERT_LT(std::abs(raster.view()(c, r)), 4000.0F * 144.0F);
+        }
+      }
+    }
+  }
+}
+
+TEST(Prefilter, EverySampleKeepsItsHeightAmongVoids) {
+  for (const Filter filter : {Filter::kBspline2, Filter::kBspline3, Filter::kBspline5}) {
+    for (const double void_share : {0.01, 0.2, 0.6, 0.95}) {
+      Raster source = random_raster(60, 50, 9, void_share);
+      Raster raster = source;
+      make(filter).filter(raster.view());
+      const Kernel kernel = Kernel::make(filter);
+      for (std::int64_t r = 0; r < source.rows; ++r) {
+        for (std::int64_t c = 0; c < source.columns; ++c) {
+          const auto height = static_cast<double>(source.view()(c, r));
+          if (std::isnan(height)) continue;
+          const TapWeights across = kernel.at(static_cast<double>(c));
+          const TapWeights down = kernel.at(static_cast<double>(r));
+          double sum = 0.0;
+          for (int j = 0; j < kernel.taps(); ++j) {
+            for (int i = 0; i < kernel.taps(); ++i) {
+              sum += static_cast<double>(across.weights[static_cast<std::size_t>(i)]) *
+                     static_cast<double>(down.weights[static_cast<std::size_t>(j)]) *
+                     static_cast<double>(raster.view()(mirror_index(across.first + i, source.columns),
+                                                       mirror_index(down.first + j, source.rows)));
+            }
+          }
+          ASSERT_NEAR(sum, height, 4000.0 * 56.0 * 0x1p-23) << to_string(filter) << " " << c << " " << r;
+        }
       }
     }
   }
@@ -290,13 +339,14 @@ TEST(Prefilter, VoidsStayVoidAndNothingElseBecomesSo) {
 
 TEST(Prefilter, NothingIsSeenAcrossAWallOfVoids) {
   const Prefilter prefilter = make(Filter::kBspline5);
+  const std::int64_t thickness = 2 * prefilter.border() + 1;  // thinner ones are bridged
   Raster a = random_raster(60, 60, 1);
   Raster b = random_raster(60, 60, 2);
   for (std::int64_t r = 0; r < 60; ++r) {
     for (std::int64_t c = 0; c < 60; ++c) {
       float& other = b.view()(c, r);
       if (c < 30 && r < 30) other = a.view()(c, r);
-      if (c == 30 || r == 30) other = a.view()(c, r) = kVoid;
+      if ((c >= 30 && c < 30 + thickness) || (r >= 30 && r < 30 + thickness)) other = a.view()(c, r) = kVoid;
     }
   }
   prefilter.filter(a.view());
@@ -322,11 +372,16 @@ TEST(Prefilter, FarFromVoidsTheyChangeNothing) {
   }
 }
 
-TEST(Prefilter, LoneSamplesAmongVoidsAreTheirOwnCoefficients) {
-  Raster raster{5, 5, std::vector<float>(25, kVoid)};
-  raster.view()(2, 2) = 77.25F;
+TEST(Prefilter, LoneSamplesAreLevelGround) {
+  Raster raster{9, 9, std::vector<float>(81, kVoid)};
+  raster.view()(4, 4) = 77.25F;
   make(Filter::kBspline5, "gaussian:0.7").filter(raster.view());
-  EXPECT_EQ(raster.view()(2, 2), 77.25F);
+  for (std::int64_t r = 0; r < 9; ++r) {
+    for (std::int64_t c = 0; c < 9; ++c) {
+      const bool within = std::max(std::abs(c - 4), std::abs(r - 4)) <= 3;
+      EXPECT_TRUE(within ? raster.view()(c, r) == 77.25F : std::isnan(raster.view()(c, r))) << c << " " << r;
+    }
+  }
   Raster one{1, 1, {3.5F}};
   make(Filter::kBspline5).filter(one.view());
   EXPECT_EQ(one.heights[0], 3.5F);

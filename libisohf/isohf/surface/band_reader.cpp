@@ -24,6 +24,10 @@ std::shared_ptr<const Band> BandReader::read(const RowRange& rows) {
   band->rows = rows;
   const std::int64_t count = rows.last - rows.first + 1;
   band->heights.resize(static_cast<std::size_t>(band->columns) * static_cast<std::size_t>(count));
+  const auto voids = heights->voids.begin() + (rows.first - heights->rows.first) * band->columns;
+  if (std::find(voids, voids + count * band->columns, 1) != voids + count * band->columns) {
+    band->voids.assign(voids, voids + count * band->columns);
+  }
   prefilter_.filter_columns(heights->view().heights, rows.first - heights->rows.first,
                             {band->heights.data(), band->columns, count});
   return band;
@@ -35,12 +39,14 @@ std::shared_ptr<const Band> BandReader::read_heights(const RowRange& rows) {
   band->rows = rows;
   const auto columns = static_cast<std::size_t>(band->columns);
   band->heights.resize(columns * static_cast<std::size_t>(rows.last - rows.first + 1));
+  if (!prefilter_.is_identity()) band->voids.resize(band->heights.size());
   std::int64_t next = rows.first;
   if (last_ && last_->rows.first <= rows.first && last_->rows.last >= rows.first) {
     const std::int64_t kept = std::min(last_->rows.last, rows.last) - rows.first + 1;
-    std::memcpy(band->heights.data(),
-                last_->heights.data() + static_cast<std::size_t>(rows.first - last_->rows.first) * columns,
-                static_cast<std::size_t>(kept) * columns * sizeof(float));
+    const std::size_t skipped = static_cast<std::size_t>(rows.first - last_->rows.first) * columns;
+    const std::size_t samples = static_cast<std::size_t>(kept) * columns;
+    std::memcpy(band->heights.data(), last_->heights.data() + skipped, samples * sizeof(float));
+    if (!band->voids.empty()) std::memcpy(band->voids.data(), last_->voids.data() + skipped, samples);
     next += kept;
   }
   last_.reset();  // its memory goes as soon as the tiles that are cut from it are done
@@ -48,20 +54,23 @@ std::shared_ptr<const Band> BandReader::read_heights(const RowRange& rows) {
   while (next <= rows.last) {
     // Reads end on multiples of the step, so that blocks are not asked for in two halves.
     const std::int64_t count = std::min(rows.last + 1, (next / step + 1) * step) - next;
-    read_rows(next, count, band->heights.data() + static_cast<std::size_t>(next - rows.first) * columns);
+    const std::size_t at = static_cast<std::size_t>(next - rows.first) * columns;
+    read_rows(next, count, band->heights.data() + at, band->voids.empty() ? nullptr : band->voids.data() + at);
     next += count;
   }
   last_ = band;
   return band;
 }
 
-void BandReader::read_rows(std::int64_t first, std::int64_t count, float* heights) {
+void BandReader::read_rows(std::int64_t first, std::int64_t count, float* heights, char* voids) {
   const SourceInfo& info = source_.info();
   const auto samples = static_cast<std::size_t>(count) * static_cast<std::size_t>(info.width);
   raw_.resize(samples * size_bytes(info.sample_type));
   source_.read_window({0, first, info.width, count}, raw_);
   heights_from_samples(info, datum_, raw_, {heights, samples});
-  if (!prefilter_.is_identity()) prefilter_.filter_rows({heights, info.width, count});
+  if (prefilter_.is_identity()) return;
+  for (std::size_t i = 0; i < samples; ++i) voids[i] = heights[i] != heights[i] ? 1 : 0;
+  prefilter_.filter_rows({heights, info.width, count});
 }
 
 }  // namespace isohf

@@ -14,10 +14,14 @@ namespace isohf {
 /// Whole rows of the source as heights; shared by the tiles that are cut from it.
 struct Band {
   std::vector<float> heights;
+  std::vector<char> voids;  ///< as SourceBand::voids; empty where it has no data, or there are none
   std::int64_t columns = 0;
   RowRange rows{0, -1};
 
-  [[nodiscard]] SourceBand view() const { return {{heights.data(), columns, rows.last - rows.first + 1}, rows.first}; }
+  [[nodiscard]] SourceBand view() const {
+    const std::int64_t count = rows.last - rows.first + 1;
+    return {{heights.data(), columns, count}, rows.first, {voids.empty() ? nullptr : voids.data(), columns, count}};
+  }
 };
 
 /// Reads a source from North to South in overlapping bands, each source row once, and prefilters it on the way.
@@ -35,9 +39,9 @@ class BandReader {
   [[nodiscard]] std::shared_ptr<const Band> read(const RowRange& rows);
 
  private:
-  /// Heights, prefiltered along rows but not yet along columns.
+  /// Heights, prefiltered along rows but not yet along columns; with voids, unless the prefilter is the identity.
   [[nodiscard]] std::shared_ptr<const Band> read_heights(const RowRange& rows);
-  void read_rows(std::int64_t first, std::int64_t count, float* heights);
+  void read_rows(std::int64_t first, std::int64_t count, float* heights, char* voids);
 
   HeightSource& source_;
   double datum_;

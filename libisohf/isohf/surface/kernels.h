@@ -31,9 +31,10 @@ struct TapWeights {
 /// How to evaluate in two dimensions, with tap weights w[i] along the columns and v[j] along the rows:
 ///   1. Beyond the raster's true ends a tap reads the mirrored coefficient (mirror_index). It is not a void.
 ///   2. A point is void where all samples around it (columns floor(u) and ceil(u), rows likewise) are void.
-///   3. Let W = sum of w[i] v[j] over the taps whose coefficient is not NaN. A point with W < 1/2 is void.
-///   4. The value is (sum of w[i] v[j] c[i, j] over those taps) / W; without void taps the division is left out, so
-///      that heights do not depend on the rounding of W.
+///   3. Let W = sum of w[i] v[j] over the taps whose sample is not void. A point with W < 1/2 is void.
+///   4. The value is the sum of w[i] v[j] c[i, j]. Where some of these coefficients are NaN, they are left out and the
+///      sum is divided by the weight of the others; a Prefilter leaves none NaN where rule 2 holds, so that happens
+///      only to samples that are their own coefficients.
 /// W is the plain sum, negative lobes included: the weights of the taps that were dropped then sum to at most 1/2, and
 /// the result stays an affine combination of heights, exact on level ground.
 class Kernel {

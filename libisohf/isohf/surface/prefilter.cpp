@@ -81,12 +81,6 @@ std::int64_t round_up(std::int64_t count, std::int64_t multiple) {
   return (count + multiple - 1) / multiple * multiple;
 }
 
-/// Room for one run of samples with its mirrored ends, and for its coefficients.
-struct RunScratch {
-  std::vector<double> samples;
-  std::vector<float> coefficients;
-};
-
 /// Samples or coefficients along a row or a column.
 template <typename T>
 struct Line {
@@ -95,54 +89,80 @@ struct Line {
   T& operator[](std::int64_t i) const { return data[i * step]; }
 };
 
-/// Filters a run of `count` samples that is mirrored at its ends; delivers coefficients `from` to `to` into `out`.
-void filter_run(const std::vector<double>& taps, Line<const float> run, std::int64_t count, std::int64_t from,
-                std::int64_t to, Line<float> out, RunScratch& scratch) {
-  const auto halo = static_cast<std::int64_t>(taps.size()) - 1;
-  const std::int64_t padded = round_up(to - from, kBlock);
-  scratch.samples.resize(static_cast<std::size_t>(padded + 2 * halo));
-  scratch.coefficients.resize(static_cast<std::size_t>(padded));
-  const std::int64_t begin = from - halo;  // of the scratch, as an index into the run
-  const std::int64_t end = to + halo;
-  double* samples = scratch.samples.data();
-  for (std::int64_t k = begin; k < std::min<std::int64_t>(0, end); ++k) {
-    samples[k - begin] = static_cast<double>(run[mirror_index(k, count)]);
-  }
-  for (std::int64_t k = std::max<std::int64_t>(0, begin); k < std::min(count, end); ++k) {
-    samples[k - begin] = static_cast<double>(run[k]);
-  }
-  for (std::int64_t k = std::max(count, begin); k < end; ++k) {
-    samples[k - begin] = static_cast<double>(run[mirror_index(k, count)]);
-  }
-  std::fill(samples + (end - begin), samples + scratch.samples.size(), 0.0);  // of the last block, thrown away
-  convolve(samples + halo, 1, taps.data(), halo, padded / kBlock, scratch.coefficients.data(), kBlock);
-  for (std::int64_t i = 0; i < to - from; ++i) out[i] = scratch.coefficients[static_cast<std::size_t>(i)];
-}
+/// Filters single lines: rows, and columns with voids.
+class LineFilter {
+ public:
+  /// taps as in Prefilter; voids up to `border` samples from a valid one receive coefficients as well.
+  LineFilter(const std::vector<double>& taps, std::int64_t border)
+      : taps_(taps), reach_(static_cast<std::int64_t>(taps.size()) - 1), border_(border) {}
 
-/// Filters coefficients `from` to `to` of a line with voids, run by run; out[0] is the one at `from`.
-void filter_line(const std::vector<double>& taps, Line<const float> line, std::int64_t count, std::int64_t from,
-                 std::int64_t to, Line<float> out, RunScratch& scratch) {
-  const auto halo = static_cast<std::int64_t>(taps.size()) - 1;
-  const std::int64_t last = std::min(count, to + halo);  // runs that start later are not asked for
-  std::int64_t at = std::max<std::int64_t>(0, from - halo);
-  // A run that starts before `at` starts more than halo before `from`: where exactly makes no difference.
-  while (at < last) {
-    if (std::isnan(line[at])) {
-      if (at >= from && at < to) out[at - from] = std::numeric_limits<float>::quiet_NaN();
-      ++at;
-      continue;
+  /// Filters samples `from` to `to` of a line of `count`, run by run; out[0] is the coefficient at `from`. Places of
+  /// out that no run reaches are left alone. out may be the line itself.
+  void filter(Line<const float> line, std::int64_t count, std::int64_t from, std::int64_t to, Line<float> out) {
+    // A run that is cut here has its true end further from `from` and `to` than they can tell.
+    const std::int64_t margin = reach_ + 2 * border_;
+    const std::int64_t last = std::min(count, to + margin);
+    std::int64_t begin = next_valid(line, std::max<std::int64_t>(0, from - margin), last);
+    // Runs with mirrored ends, and a last block that may go on beyond what is asked for.
+    samples_.resize(
+        static_cast<std::size_t>(std::max<std::int64_t>(0, last - begin) + border_ + 2 * pad() + kBlock + reach_));
+    while (begin < last) {
+      double* run = samples_.data() + pad();
+      const std::int64_t first = begin <= border_ ? 0 : begin;  // bridged to its own mirror image
+      std::fill(run, run + (begin - first), static_cast<double>(line[begin]));
+      std::int64_t end = begin;
+      std::int64_t next = begin;
+      while (next < last && next - end <= 2 * border_) {
+        bridge(run, end - first, next - first, line[next]);
+        for (end = next; end < last && !std::isnan(line[end]); ++end) run[end - first] = static_cast<double>(line[end]);
+        next = next_valid(line, end, last);
+      }
+      if (next == count && count - end <= border_) {
+        std::fill(run + (end - first), run + (count - first), run[end - 1 - first]);
+        end = count;
+      }
+      const std::int64_t wanted = std::max(first - border_, from);
+      filter_run(run, end - first, wanted - first, std::min(end + border_, to) - first,
+                 {out.data + (wanted - from) * out.step, out.step});
+      begin = next;
     }
-    std::int64_t end = at + 1;
-    while (end < last && !std::isnan(line[end])) ++end;
-    const std::int64_t wanted_from = std::max(at, from);
-    const std::int64_t wanted_to = std::min(end, to);
-    if (wanted_from < wanted_to) {
-      filter_run(taps, {&line[at], line.step}, end - at, wanted_from - at, wanted_to - at,
-                 {&out[wanted_from - from], out.step}, scratch);
-    }
-    at = end;
   }
-}
+
+ private:
+  /// Mirrored samples before and after a run.
+  [[nodiscard]] std::int64_t pad() const { return reach_ + border_; }
+
+  static std::int64_t next_valid(Line<const float> line, std::int64_t at, std::int64_t last) {
+    while (at < last && std::isnan(line[at])) ++at;
+    return at;
+  }
+
+  /// Straight across the voids from `end` to `next`: both of their sides want to continue there.
+  static void bridge(double* run, std::int64_t end, std::int64_t next, float after) {
+    for (std::int64_t k = end; k < next; ++k) {
+      const double part = static_cast<double>(k - end + 1) / static_cast<double>(next - end + 1);
+      run[k] = run[end - 1] + part * (static_cast<double>(after) - run[end - 1]);
+    }
+  }
+
+  /// out[0] receives the coefficient at `from`, and so on to `to`, of a run of `count` samples with room for pad() more
+  /// on either side.
+  void filter_run(double* run, std::int64_t count, std::int64_t from, std::int64_t to, Line<float> out) {
+    if (from >= to) return;
+    for (std::int64_t k = -pad(); k < 0; ++k) run[k] = run[mirror_index(k, count)];
+    for (std::int64_t k = count; k < count + pad(); ++k) run[k] = run[mirror_index(k, count)];
+    const std::int64_t blocks = round_up(to - from, kBlock) / kBlock;
+    coefficients_.resize(static_cast<std::size_t>(blocks * kBlock));
+    convolve(run + from, 1, taps_.data(), reach_, blocks, coefficients_.data(), kBlock);
+    for (std::int64_t k = 0; k < to - from; ++k) out[k] = coefficients_[static_cast<std::size_t>(k)];
+  }
+
+  const std::vector<double>& taps_;
+  std::int64_t reach_;
+  std::int64_t border_;
+  std::vector<double> samples_;
+  std::vector<float> coefficients_;
+};
 
 /// Columns that are filtered together, row by row, with room for their coefficients.
 struct Strip {
@@ -179,7 +199,8 @@ void in_parallel(std::int64_t count, std::int64_t grain, const Work& work) {
 
 }  // namespace
 
-Prefilter::Prefilter(std::vector<double> taps, double worst_gain) : taps_(std::move(taps)), worst_gain_(worst_gain) {}
+Prefilter::Prefilter(std::vector<double> taps, int border, double worst_gain)
+    : taps_(std::move(taps)), border_(taps_.size() == 1 ? 0 : border), worst_gain_(worst_gain) {}
 
 Prefilter Prefilter::make(Filter filter, const Acquisition& acquisition) {
   const Kernel kernel = Kernel::make(filter);
@@ -231,16 +252,16 @@ Prefilter Prefilter::make(Filter filter, const Acquisition& acquisition) {
                                                          to_string(acquisition), kLongestHalo));
   }
   if (taps.size() == 1) taps[0] = 1.0;
-  return {std::move(taps), worst_gain};
+  return {std::move(taps), (kernel.taps() + 1) / 2, worst_gain};
 }
 
 void Prefilter::filter_rows(View2D<float> band) const {
   if (is_identity()) return;
   in_parallel(band.rows(), 4, [&](std::int64_t begin, std::int64_t end) {
-    RunScratch scratch;
+    LineFilter lines(taps_, border_);
     for (std::int64_t r = begin; r < end; ++r) {
       float* row = band.row(r);
-      filter_line(taps_, {row, 1}, band.columns(), 0, band.columns(), {row, 1}, scratch);
+      lines.filter({row, 1}, band.columns(), 0, band.columns(), {row, 1});
     }
   });
 }
@@ -254,22 +275,24 @@ void Prefilter::filter_columns(View2D<const float> band, std::int64_t first, Vie
     return;
   }
   const std::int64_t rows = out.rows();
+  const auto reach = static_cast<std::int64_t>(taps_.size()) - 1;
   in_parallel(round_up(band.columns(), kStripColumns) / kStripColumns, 1, [&](std::int64_t begin, std::int64_t end) {
     Strip strip;
-    strip.samples.resize(static_cast<std::size_t>((rows + 2 * halo()) * kStripColumns));
+    strip.samples.resize(static_cast<std::size_t>((rows + 2 * reach) * kStripColumns));
     strip.coefficients.resize(static_cast<std::size_t>(rows * kStripColumns));
-    RunScratch scratch;
+    LineFilter lines(taps_, border_);
     for (std::int64_t column = begin * kStripColumns; column < std::min(end * kStripColumns, band.columns());
          column += kStripColumns) {
       const std::int64_t columns = std::min(kStripColumns, band.columns() - column);
-      load_strip(band, column, columns, first - halo(), first + rows + halo(), strip);
+      load_strip(band, column, columns, first - reach, first + rows + reach, strip);
       // Columns do not touch each other: those with voids come out wrong here and are done again, run by run.
-      convolve(strip.samples.data() + halo() * kStripColumns, kStripColumns, taps_.data(), halo(),
+      convolve(strip.samples.data() + reach * kStripColumns, kStripColumns, taps_.data(), reach,
                rows * kStripColumns / kBlock, strip.coefficients.data(), kBlock);
       for (std::int64_t i = 0; i < columns; ++i) {
         if (strip.has_void[static_cast<std::size_t>(i)] == 0) continue;
-        filter_line(taps_, {band.data() + column + i, band.stride()}, band.rows(), first, first + rows,
-                    {strip.coefficients.data() + i, kStripColumns}, scratch);
+        const Line<float> coefficients{strip.coefficients.data() + i, kStripColumns};
+        for (std::int64_t r = 0; r < rows; ++r) coefficients[r] = std::numeric_limits<float>::quiet_NaN();
+        lines.filter({band.data() + column + i, band.stride()}, band.rows(), first, first + rows, coefficients);
       }
       for (std::int64_t r = 0; r < rows; ++r) {
         std::copy_n(strip.coefficients.data() + r * kStripColumns, columns, out.row(r) + column);

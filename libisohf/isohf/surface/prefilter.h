@@ -18,8 +18,16 @@ namespace isohf {
 /// coefficient so depends on halo() samples on either side and on nothing else: however the work is cut into bands or
 /// blocks, the bits are the same. Sums are double, in order of k, and rounded to float once for each axis.
 ///
-/// Voids are NaN and stay so; each run of samples between two voids is filtered alone, mirrored at its ends as the
-/// source is at its own (whole-sample mirror), so that no void is ever read as a number.
+/// Voids are NaN and never read as numbers: each run of samples is filtered alone, mirrored at its ends as the source
+/// is at its own (whole-sample mirror).
+///
+///   samples        . . . . . . . s s s s s s . . s s s s s . . . . . . .      . void    s sample
+///   coefficients   . . . . b b b c c c c c c l l c c c c c b b b . . . .      c of a sample
+///
+/// The surface goes on by border() places into the voids (b), mirrored like the run, and straight across gaps of at
+/// most twice that (l), along rows and then along columns. So a kernel finds all its coefficients wherever a sample is
+/// next to it, and every sample keeps its height, next to voids too; voids must be told from the samples, no longer
+/// from the coefficients.
 ///
 /// The work is shared among the threads of the caller's task arena.
 class Prefilter {
@@ -32,12 +40,14 @@ class Prefilter {
 
   /// True where samples are their own coefficients; the functions below then only copy.
   [[nodiscard]] bool is_identity() const { return taps_.size() == 1; }
-  /// Samples on either side that one coefficient depends on: 0 for the identity, 16 for bspline3, 27 for bspline5.
-  [[nodiscard]] int halo() const { return static_cast<int>(taps_.size()) - 1; }
+  /// Samples on either side that one coefficient depends on: 0 for the identity, 20 for bspline3, 33 for bspline5.
+  [[nodiscard]] int halo() const { return static_cast<int>(taps_.size()) - 1 + 2 * border_; }
+  /// Places beyond a sample, into voids, that receive coefficients: half the kernel's taps; 0 for the identity.
+  [[nodiscard]] int border() const { return border_; }
   /// How much more the highest-gain frequency is amplified along one axis than interpolation of point samples by the
   /// same kernel would: 1 for a point, about pi/2 for a box, exp((pi sigma)^2 / 2) for a Gaussian.
   [[nodiscard]] double worst_gain() const { return worst_gain_; }
-  /// p[k] for k = 0 ... halo(); even.
+  /// p[k] for k = 0, 1, ...; even.
   [[nodiscard]] const std::vector<double>& impulse_response() const { return taps_; }
 
   /// Along every row of a band of whole rows, in place.
@@ -53,9 +63,10 @@ class Prefilter {
   void filter(View2D<float> raster) const;
 
  private:
-  Prefilter(std::vector<double> taps, double worst_gain);
+  Prefilter(std::vector<double> taps, int border, double worst_gain);
 
   std::vector<double> taps_;
+  int border_;
   double worst_gain_;
 };
 

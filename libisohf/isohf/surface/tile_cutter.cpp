@@ -83,6 +83,26 @@ void blend_rows(const SourceBand& band, const TapWeights& rows, int taps, const 
   }
 }
 
+/// near_void[c] = 1 where a tap of column c, on one of the rows that `rows` read, is a void. line as in blend_rows.
+void find_voids(const SourceBand& band, const TapWeights& rows, int taps, const SourceAxis& axis_x,
+                const SourceAxis& axis_z, const ColumnTaps& columns, std::span<char> line, std::span<char> near_void) {
+  std::fill(line.begin(), line.end(), char{0});
+  bool any = false;
+  for (int t = 0; t < taps; ++t) {
+    const char* row = band.voids.row(mirror_index(rows.first + t, axis_z.samples()) - band.first_row);
+    for (std::int64_t k = 0; k < columns.width; ++k) {
+      const char is_void = row[mirror_index(columns.first + k, axis_x.samples())];
+      line[static_cast<std::size_t>(k)] |= is_void;
+      any |= is_void != 0;
+    }
+  }
+  std::fill(near_void.begin(), near_void.end(), char{0});
+  if (!any) return;
+  for (std::size_t c = 0; c < near_void.size(); ++c) {
+    for (int t = 0; t < taps; ++t) near_void[c] |= line[static_cast<std::size_t>(columns.start[c] + t)];
+  }
+}
+
 template <int kTaps>
 void gather_columns(const ColumnTaps& columns, const float* line, std::span<float> out) {
   const std::size_t count = out.size();
@@ -125,18 +145,25 @@ class VoidAwareSampler {
     if (all_nearest_void(u, v)) return kVoid;
     double sum = 0.0;
     double weight_sum = 0.0;
+    double valid_weight = 0.0;
+    bool whole = true;
     const std::int64_t first_column = columns.first + columns.start[c];
     for (int j = 0; j < taps_; ++j) {
       for (int i = 0; i < taps_; ++i) {
-        const float height = coefficient(first_column + i, rows.first + j);
-        if (std::isnan(height)) continue;
         const double weight = double{columns.weights[static_cast<std::size_t>(i) * columns.start.size() + c]} *
                               rows.weights[static_cast<std::size_t>(j)];
+        if (!is_void(first_column + i, rows.first + j)) valid_weight += weight;
+        const float height = coefficient(first_column + i, rows.first + j);
+        if (std::isnan(height)) {
+          whole = false;
+          continue;
+        }
         sum += weight * height;
         weight_sum += weight;
       }
     }
-    return weight_sum < 0.5 ? kVoid : static_cast<float>(sum / weight_sum);
+    if (valid_weight < 0.5) return kVoid;
+    return static_cast<float>(whole ? sum : sum / weight_sum);
   }
 
  private:
@@ -145,12 +172,18 @@ class VoidAwareSampler {
                          mirror_index(row, axis_z_.samples()) - band_.first_row);
   }
 
+  [[nodiscard]] bool is_void(std::int64_t column, std::int64_t row) const {
+    if (band_.voids.data() == nullptr) return std::isnan(coefficient(column, row));
+    return band_.voids(mirror_index(column, axis_x_.samples()),
+                       mirror_index(row, axis_z_.samples()) - band_.first_row) != 0;
+  }
+
   /// Rows that the kernel itself does not read may lie outside the band; the nearest kernel has but one.
   [[nodiscard]] bool all_nearest_void(double u, double v) const {
     if (taps_ == 1) return false;
     for (const double row : {std::floor(v), std::ceil(v)}) {
       for (const double column : {std::floor(u), std::ceil(u)}) {
-        if (!std::isnan(coefficient(static_cast<std::int64_t>(column), static_cast<std::int64_t>(row)))) return false;
+        if (!is_void(static_cast<std::int64_t>(column), static_cast<std::int64_t>(row))) return false;
       }
     }
     return true;
@@ -188,6 +221,8 @@ void TileCutter::cut(TileIndex tile, const SourceBand& band, std::span<float> he
   const std::array<ColumnTaps, 2> taps = {make_column_taps(grid_, axis_x_, kernel_, tile, 0),
                                           make_column_taps(grid_, axis_x_, kernel_, tile, 1)};
   std::vector<float> line(static_cast<std::size_t>(std::max(taps[0].width, taps[1].width)));
+  std::vector<char> void_line(band.voids.data() != nullptr ? line.size() : 0);
+  std::vector<char> near_void(static_cast<std::size_t>(columns), 0);
   const VoidAwareSampler void_aware(band, axis_x_, axis_z_, kernel_.taps());
   for (int r = 0; r < rows; ++r) {
     const std::span<float> out = heights.subspan(static_cast<std::size_t>(r) * static_cast<std::size_t>(columns),
@@ -202,8 +237,11 @@ void TileCutter::cut(TileIndex tile, const SourceBand& band, std::span<float> he
     const TapWeights row_taps = kernel_.at(v);
     blend_rows(band, row_taps, kernel_.taps(), axis_x_, axis_z_, at, line);
     gather_columns(kernel_.taps(), at, line.data(), out);
+    if (!void_line.empty()) {
+      find_voids(band, row_taps, kernel_.taps(), axis_x_, axis_z_, at, void_line, near_void);
+    }
     for (std::size_t c = 0; c < out.size(); ++c) {
-      if (std::isnan(out[c])) out[c] = void_aware.at(at.position[c], v, at, c, row_taps);
+      if (std::isnan(out[c]) || near_void[c] != 0) out[c] = void_aware.at(at.position[c], v, at, c, row_taps);
     }
     if (at.any_outside) {
       for (std::size_t c = 0; c < out.size(); ++c) {

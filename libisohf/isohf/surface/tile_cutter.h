@@ -21,6 +21,9 @@ struct RowRange {
 struct SourceBand {
   View2D<const float> heights;  ///< all columns of the source
   std::int64_t first_row = 0;   ///< source row of heights.row(0)
+  /// As large as heights, not 0 where the sample is void: coefficients go on into voids (Prefilter). No data where the
+  /// NaN among heights are the voids.
+  View2D<const char> voids = {};
 };
 
 /// Resamples the source at every stored vertex of a tile: visible ones, slid ones where they lie (errata E6), padding.
