@@ -63,6 +63,34 @@ TerrainFrame terrain_frame(const TileSource& source, const ViewState& view) {
   return frame;
 }
 
+void begin_opaque_pass() {
+  glEnable(GL_DEPTH_TEST);
+  glDepthFunc(GL_LESS);
+  glDepthMask(GL_TRUE);
+  glDisable(GL_BLEND);
+}
+
+void begin_fading_pass() {
+  glEnable(GL_BLEND);
+  glBlendFunc(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA);
+  glDepthMask(GL_FALSE);
+  glEnable(GL_POLYGON_OFFSET_FILL);
+}
+
+// The second mesh shows only where it lies in front of the first. Where both lie in one plane (water, a plain), fading
+// in and then switching to the coarse mesh at β = ½ is only seamless if the coarse mesh counts as in front there in
+// both stages: nearer by two depth steps while it fades in over the fine one, and the fine one farther by two while it
+// fades out over the coarse one.
+void order_fading(const LodBlend& blend) {
+  glPolygonOffset(0.0F, blend.second > blend.first ? -2.0F : 2.0F);
+}
+
+void end_fading_pass() {
+  glDisable(GL_POLYGON_OFFSET_FILL);
+  glDepthMask(GL_TRUE);
+  glDisable(GL_BLEND);
+}
+
 Renderer::Renderer(const TileSource& source, const SharedGeometry& shared)
     : source_(source),
       shared_(shared),
@@ -157,8 +185,7 @@ void Renderer::draw_mesh(const TerrainProgram& program, const TerrainFrame& fram
 
 void Renderer::draw_opaque(const ViewState& view, const TerrainFrame& frame, const std::vector<Item>& items,
                            FrameFigures& figures) const {
-  glDisable(GL_BLEND);
-  glDepthMask(GL_TRUE);
+  begin_opaque_pass();
   for (const bool voids : {false, true}) {
     const TerrainProgram& program = shade_.of(voids);
     begin_shading(program, view, frame);
@@ -169,29 +196,20 @@ void Renderer::draw_opaque(const ViewState& view, const TerrainFrame& frame, con
   }
 }
 
-// The second mesh shows only where it lies in front of the first. Where both lie in one plane (water, a plain), fading
-// in and then switching to the coarse mesh at β = ½ is only seamless if the coarse mesh counts as in front there in
-// both stages: nearer by two depth steps while it fades in over the fine one, and the fine one farther by two while it
-// fades out over the coarse one.
 void Renderer::draw_fading(const ViewState& view, const TerrainFrame& frame, const std::vector<Item>& items,
                            FrameFigures& figures) const {
-  glEnable(GL_BLEND);
-  glBlendFunc(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA);
-  glDepthMask(GL_FALSE);
-  glEnable(GL_POLYGON_OFFSET_FILL);
+  begin_fading_pass();
   for (const bool voids : {false, true}) {
     const TerrainProgram& program = shade_.of(voids);
     begin_shading(program, view, frame);
     for (auto item = items.rbegin(); item != items.rend(); ++item) {
       if (item->has_voids != voids || item->blend.alpha <= 0.0 || item->blend.second == item->blend.first) continue;
-      glPolygonOffset(0.0F, item->blend.second > item->blend.first ? -2.0F : 2.0F);
+      order_fading(item->blend);
       glUniform1f(program.uniform("alpha"), static_cast<float>(item->blend.alpha));
       draw_mesh(program, frame, *item, item->blend.second, figures);
     }
   }
-  glDisable(GL_POLYGON_OFFSET_FILL);
-  glDepthMask(GL_TRUE);
-  glDisable(GL_BLEND);
+  end_fading_pass();
 }
 
 void Renderer::draw_wires(const TerrainFrame& frame, const std::vector<Item>& items, FrameFigures& figures) const {

@@ -75,6 +75,13 @@ class Renderer {
 /// The frame's uniforms for a view: positions are told from an anchor tile under the eye, in floats near the eye.
 [[nodiscard]] TerrainFrame terrain_frame(const TileSource& source, const ViewState& view);
 
+/// The GL state of the opaque and of the fading pass; verifying draws with the same.
+void begin_opaque_pass();
+void begin_fading_pass();
+/// Before a tile's second mesh is drawn in the fading pass.
+void order_fading(const LodBlend& blend);
+void end_fading_pass();
+
 /// Nearest and farthest depth that a frame draws.
 inline constexpr double kNearShare = 2e-4;  ///< of the far distance
 

@@ -73,6 +73,29 @@ void SharedGeometry::draw_stitch(int level) const {
                  offset_pointer(stitch_offset_bytes_));
 }
 
+std::vector<std::uint32_t> SharedGeometry::read(std::size_t offset_bytes, GLsizei count) const {
+  const auto size = static_cast<std::size_t>(count);
+  const auto offset = static_cast<GLintptr>(offset_bytes);
+  glBindBuffer(GL_COPY_READ_BUFFER, indices_.get());
+  if (index_type_ == GL_UNSIGNED_INT) {
+    std::vector<std::uint32_t> indices(size);
+    glGetBufferSubData(GL_COPY_READ_BUFFER, offset, static_cast<GLsizeiptr>(size * 4), indices.data());
+    return indices;
+  }
+  std::vector<std::uint16_t> indices(size);
+  glGetBufferSubData(GL_COPY_READ_BUFFER, offset, static_cast<GLsizeiptr>(size * 2), indices.data());
+  return {indices.begin(), indices.end()};
+}
+
+std::vector<std::uint32_t> SharedGeometry::read_strip(int level) const {
+  const auto i = static_cast<std::size_t>(level);
+  return read(strip_offsets_bytes_[i], strip_counts_[i]);
+}
+
+std::vector<std::uint32_t> SharedGeometry::read_stitch(int level) const {
+  return read(stitch_offset_bytes_, stitch_counts_[static_cast<std::size_t>(level)]);
+}
+
 TileSlot::TileSlot(const SharedGeometry& shared)
     : vertices_(static_cast<std::size_t>(shared.shape().stored_vertex_count())) {
   glBindVertexArray(array_.get());

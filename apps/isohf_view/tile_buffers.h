@@ -24,9 +24,14 @@ class SharedGeometry {
   /// One draw call each, with the tile's vertex array bound.
   void draw_strip(int level) const;
   void draw_stitch(int level) const;
+  /// The arrays as the GPU holds them, for verifying.
+  [[nodiscard]] std::vector<std::uint32_t> read_strip(int level) const;
+  [[nodiscard]] std::vector<std::uint32_t> read_stitch(int level) const;
   [[nodiscard]] bool has_stitch(int level) const { return stitch_counts_[static_cast<std::size_t>(level)] > 0; }
 
  private:
+  [[nodiscard]] std::vector<std::uint32_t> read(std::size_t offset_bytes, GLsizei count) const;
+
   TileShape shape_;
   Buffer xz_;
   Buffer indices_;

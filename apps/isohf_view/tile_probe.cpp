@@ -1,0 +1,116 @@
+#include "tile_probe.h"
+
+#include <algorithm>
+
+#include "renderer.h"
+#include "shaders.h"
+
+namespace isohf::view {
+namespace {
+
+int largest(const std::vector<PixelWindow>& windows, int PixelWindow::*side) {
+  int size = 1;
+  for (const PixelWindow& window : windows) size = std::max(size, window.*side);
+  return size;
+}
+
+}  // namespace
+
+TileProbe::TileProbe(const TileGrid& grid, const SharedGeometry& shared, double code_height)
+    : grid_(grid),
+      shared_(shared),
+      solid_("probe", false, probe_fragment_shader(false)),
+      voids_("probe", true, probe_fragment_shader(true)),
+      feedback_("capture", false, probe_fragment_shader(false), {"v_eye", "v_normal", "v_code"}),
+      target_(largest(MeshOracle(grid.shape()).windows(), &PixelWindow::width),
+              largest(MeshOracle(grid.shape()).windows(), &PixelWindow::height), GL_RGBA32F) {
+  frame_.code_height = code_height;
+  frame_.code_slope = code_height;
+}
+
+void TileProbe::begin(bool voids, const PixelWindow& window) {
+  // Straight down, North up: clip x and y from x and -z, nearer where higher.
+  Mat4 clip;
+  clip.at(0, 0) = 2.0 * kPixelsPerX / (grid_.sigma_x() * target_.width());
+  clip.at(0, 3) = -2.0 * window.x0 / target_.width() - 1.0;
+  clip.at(1, 2) = -2.0 * kPixelsPerZ / (grid_.sigma_z() * target_.height());
+  clip.at(1, 3) = 2.0 * (window.z0 + window.height) / target_.height() - 1.0;
+  clip.at(2, 1) = -1.8 / (65535.0 * frame_.code_height);
+  clip.at(2, 3) = 0.9;
+  clip.at(3, 3) = 1.0;
+  frame_.clip_from_eye = clip;
+  const TerrainProgram& program = voids ? voids_ : solid_;
+  target_.bind();
+  glViewport(0, 0, target_.width(), target_.height());
+  glClearColor(0.0F, 0.0F, 0.0F, 0.0F);
+  glDepthMask(GL_TRUE);
+  glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
+  glFrontFace(GL_CCW);
+  glCullFace(GL_BACK);
+  program.begin(grid_, frame_);
+  program.set_tile(grid_, frame_, {0, 0});
+  glUniform1f(program.uniform("alpha"), 1.0F);
+}
+
+void TileProbe::draw_mesh(const TileSlot& slot, int level, bool cull) {
+  slot.bind();
+  if (cull) {
+    glEnable(GL_CULL_FACE);
+  } else {
+    glDisable(GL_CULL_FACE);
+  }
+  shared_.draw_strip(level);
+  glDisable(GL_CULL_FACE);
+  if (shared_.has_stitch(level)) shared_.draw_stitch(level);
+}
+
+void TileProbe::draw_level(const TileSlot& slot, bool voids, int level, const PixelWindow& window, bool cull,
+                           std::vector<float>& out) {
+  begin(voids, window);
+  glDisable(GL_DEPTH_TEST);
+  glEnable(GL_BLEND);
+  glBlendFunc(GL_ONE, GL_ONE);
+  draw_mesh(slot, level, cull);
+  glDisable(GL_BLEND);
+  target_.read_rgba32f(out);
+}
+
+void TileProbe::draw_blend(const TileSlot& slot, bool voids, const LodBlend& blend, const PixelWindow& window,
+                           std::vector<float>& out) {
+  begin(voids, window);
+  begin_opaque_pass();
+  draw_mesh(slot, blend.first, true);
+  if (blend.alpha > 0.0 && blend.second != blend.first) {
+    begin_fading_pass();
+    order_fading(blend);
+    glUniform1f((voids ? voids_ : solid_).uniform("alpha"), static_cast<float>(blend.alpha));
+    draw_mesh(slot, blend.second, true);
+    end_fading_pass();
+  }
+  target_.read_rgba32f(out);
+}
+
+void TileProbe::capture(const TileSlot& slot, std::vector<ProbedVertex>& out) {
+  const TileShape& shape = grid_.shape();
+  // Neighbours of columns 0 and C-1 may lie in the next row; those of the first and last row outside the array.
+  const int first = shape.columns();
+  const int count = (shape.rows() - 2) * shape.columns() - 2;
+  out.resize(static_cast<std::size_t>(shape.stored_vertex_count()));
+  const auto bytes = static_cast<GLsizeiptr>(static_cast<std::size_t>(count) * sizeof(ProbedVertex));
+  glBindBuffer(GL_TRANSFORM_FEEDBACK_BUFFER, captured_.get());
+  glBufferData(GL_TRANSFORM_FEEDBACK_BUFFER, bytes, nullptr, GL_STREAM_READ);
+  glBindBufferBase(GL_TRANSFORM_FEEDBACK_BUFFER, 0, captured_.get());
+  feedback_.begin(grid_, frame_);
+  feedback_.set_tile(grid_, frame_, {0, 0});
+  slot.bind();
+  glEnable(GL_RASTERIZER_DISCARD);
+  glBeginTransformFeedback(GL_POINTS);
+  glDrawArrays(GL_POINTS, first, count);
+  glEndTransformFeedback();
+  glDisable(GL_RASTERIZER_DISCARD);
+  glGetBufferSubData(GL_TRANSFORM_FEEDBACK_BUFFER, 0, bytes, out.data() + first);
+  glBindBufferBase(GL_TRANSFORM_FEEDBACK_BUFFER, 0, 0);
+  check_gl("capturing vertices");
+}
+
+}  // namespace isohf::view

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "isohf/lattice/lod.h"
+#include "mesh_oracle.h"
+#include "offscreen.h"
+#include "terrain_program.h"
+#include "tile_buffers.h"
+
+namespace isohf::view {
+
+/// What the vertex shader made of one vertex, captured by transform feedback.
+struct ProbedVertex {
+  float x, y, z;  ///< from the tile's North-West corner and code 0, world units
+  float nx, ny, nz;
+  float code;
+};
+
+/// Draws a tile from straight above with the terrain's vertex shader into floats: (code, normal x, normal z, count).
+class TileProbe {
+ public:
+  TileProbe(const TileGrid& grid, const SharedGeometry& shared, double code_height);
+
+  /// Strip and stitch of one level, added up: `cull` leaves back faces out. Rows from the South.
+  void draw_level(const TileSlot& slot, bool voids, int level, const PixelWindow& window, bool cull,
+                  std::vector<float>& out);
+  /// The two-stage transition, by the same passes as pictures.
+  void draw_blend(const TileSlot& slot, bool voids, const LodBlend& blend, const PixelWindow& window,
+                  std::vector<float>& out);
+  /// Stored vertices 0..C*R-1; only those of rows 1..R-2 are filled in.
+  void capture(const TileSlot& slot, std::vector<ProbedVertex>& out);
+  [[nodiscard]] int width() const { return target_.width(); }  ///< pixels of a row of the pictures
+
+ private:
+  void begin(bool voids, const PixelWindow& window);
+  void draw_mesh(const TileSlot& slot, int level, bool cull);
+
+  const TileGrid& grid_;
+  const SharedGeometry& shared_;
+  TerrainFrame frame_;
+  TerrainProgram solid_;
+  TerrainProgram voids_;
+  TerrainProgram feedback_;
+  Offscreen target_;
+  Buffer captured_;
+};
+
+}  // namespace isohf::view
