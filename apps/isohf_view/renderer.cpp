@@ -72,7 +72,7 @@ void begin_opaque_pass() {
 
 void begin_fading_pass() {
   glEnable(GL_BLEND);
-  glBlendFunc(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA);
+  glBlendFuncSeparate(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA, GL_ONE, GL_ONE_MINUS_SRC_ALPHA);  // alpha stays 1
   glDepthMask(GL_FALSE);
   glEnable(GL_POLYGON_OFFSET_FILL);
 }

@@ -95,6 +95,7 @@ void TileBox::enter(Cell& cell, TileIndex tile) {
 }
 
 void TileBox::update(WorldPoint centre, double radius) {
+  const auto begin = std::chrono::steady_clock::now();
   figures_.uploads = 0;
   figures_.upload_bytes = 0;
   resize(centre, radius);
@@ -108,6 +109,7 @@ void TileBox::update(WorldPoint centre, double radius) {
   upload();
   request(centre);
   count();
+  figures_.update_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
 }
 
 void TileBox::upload() {

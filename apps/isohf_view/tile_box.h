@@ -39,6 +39,7 @@ struct TileBoxFigures {
   std::int64_t resident_tiles = 0;
   std::int64_t missing_tiles = 0;    ///< in the box and stored, but not resident yet
   std::uint64_t resident_bytes = 0;  ///< GPU and CPU bytes of tiles: never above memory_bytes
+  double update_ms = 0.0;            ///< that the last update took
   double radius = 0.0;               ///< world units: what was asked for, or less where memory would not do
 };
 

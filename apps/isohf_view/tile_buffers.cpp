@@ -138,6 +138,13 @@ void TileSlot::upload_shadow(std::span<const std::uint16_t> shadow) {
   glBindVertexArray(0);
 }
 
+std::vector<std::uint16_t> TileSlot::read_back() const {
+  std::vector<std::uint16_t> codes(vertices_);
+  glBindBuffer(GL_ARRAY_BUFFER, codes_.get());
+  glGetBufferSubData(GL_ARRAY_BUFFER, 0, static_cast<GLsizeiptr>(codes.size() * sizeof(std::uint16_t)), codes.data());
+  return codes;
+}
+
 void TileSlot::bind() const {
   glBindVertexArray(array_.get());
   glActiveTexture(GL_TEXTURE0);

@@ -55,6 +55,9 @@ class TileSlot {
   /// takes the shadow away.
   void upload_shadow(std::span<const std::uint16_t> shadow);
 
+  /// The codes as the GPU holds them, for tests.
+  [[nodiscard]] std::vector<std::uint16_t> read_back() const;
+
   /// Binds the vertex array and, to texture unit 0, the codes.
   void bind() const;
 

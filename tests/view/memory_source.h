@@ -2,9 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
-#include <chrono>
 #include <functional>
-#include <thread>
 #include <utility>
 #include <vector>
 
@@ -13,13 +11,13 @@
 
 namespace isohf::test {
 
-/// The analytic surface as a tile source; `alter` may change a tile's codes, `delay` makes reading slow.
+/// The analytic surface as a tile source; `alter` may change a tile's codes, `before_read` may hold up whoever reads.
 class MemorySource final : public view::TileSource {
  public:
   using Alter = std::function<void(TileIndex, std::vector<std::uint16_t>&)>;
 
-  explicit MemorySource(const TileGrid& grid, Alter alter = {}, std::chrono::milliseconds delay = {})
-      : grid_(grid), alter_(std::move(alter)), delay_(delay) {
+  explicit MemorySource(const TileGrid& grid, Alter alter = {}, std::function<void()> before_read = {})
+      : grid_(grid), alter_(std::move(alter)), before_read_(std::move(before_read)) {
     for (std::int64_t flat = 0; flat < grid.tile_count(); ++flat) bounds_.push_back(measure(grid.tile_at(flat)));
   }
 
@@ -29,7 +27,7 @@ class MemorySource final : public view::TileSource {
     return bounds_[static_cast<std::size_t>(grid_.flat_index(tile))];
   }
   void read(TileIndex tile, std::span<std::uint16_t> codes) const override {
-    std::this_thread::sleep_for(delay_);
+    if (before_read_) before_read_();
     const auto made = make(tile);
     std::copy(made.begin(), made.end(), codes.begin());
     ++reads;
@@ -60,7 +58,7 @@ class MemorySource final : public view::TileSource {
 
   TileGrid grid_;
   Alter alter_;
-  std::chrono::milliseconds delay_;
+  std::function<void()> before_read_;
   std::vector<view::TileBounds> bounds_;
 };
 

@@ -7,7 +7,9 @@
 #include "memory_source.h"
 #include "offscreen.h"
 #include "png_file.h"
+#include "session.h"
 #include "tile_box.h"
+#include "transition_sweep.h"
 
 namespace isohf::view {
 namespace {
@@ -50,6 +52,24 @@ TEST_F(RendererTest, DrawsEveryVisibleTileWithAtMostTwoCallsAPass) {
   std::size_t green = 0;  // the lowland colours: the terrain is there
   for (std::size_t i = 0; i < pixels.size(); i += 4) green += pixels[i + 1] > pixels[i + 2] ? 1 : 0;
   EXPECT_GT(green, pixels.size() / 4 / 10);
+}
+
+/// The largest change of any pixel between small steps of level, fading and switching.
+TEST_F(RendererTest, FadesBetweenLevelsWithoutJumps) {
+  const test::MemorySource source(small_grid());
+  Options options;
+  options.view.width = 320;
+  options.view.height = 240;
+  options.view.haze = false;
+  Session session(source, options);
+  const SweepResult fading = sweep_levels(session, 32, false);
+  const SweepResult plain = sweep_levels(session, 32, true);
+  EXPECT_LT(2 * fading.largest_jump, plain.largest_jump);
+  EXPECT_LT(2 * fading.largest_mean_jump, plain.largest_mean_jump);
+  // Rounding to 8 bits alone may take a picture back by a little.
+  EXPECT_LT(fading.largest_retreat, 0.05);
+  RecordProperty("fading", fading.largest_jump);
+  RecordProperty("plain", plain.largest_jump);
 }
 
 }  // namespace

@@ -1,0 +1,11 @@
+#pragma once
+
+#include "options.h"
+#include "tile_source.h"
+
+namespace isohf::view {
+
+/// Does what the options ask for without a screen; the exit code. Throws Error.
+[[nodiscard]] int run_headless(const TileSource& source, const Options& options);
+
+}  // namespace isohf::view

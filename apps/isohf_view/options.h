@@ -1,0 +1,43 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "view_state.h"
+
+namespace isohf::view {
+
+/// What the command line asks for; no file has been touched.
+struct Options {
+  enum class Action { kWindow, kScreenshot, kFlight, kVerify, kSweep };
+
+  Action action = Action::kWindow;
+  std::string archive;
+  std::string screenshot;  ///< PNG to write; with kWindow: of the window, after `frames` frames
+  std::string flight;
+  std::string csv;
+  int frames = 0;  ///< 0: window: until closed; flight: 300
+  int sweep_steps = 80;
+  bool baseline = false;
+  bool overlay = true;           ///< figures on the screen
+  std::optional<Vec3> position;  ///< world units, y before exaggeration
+  std::optional<Vec3> look_at;
+  bool fly = false;
+  double sun_azimuth_deg = 300.0;
+  double sun_elevation_deg = 35.0;
+  std::optional<double> far_distance;
+  std::uint64_t memory_mib = 512;
+  std::uint64_t upload_mib = 4;
+  int threads = 0;  ///< workers that decode; 0: one less than the machine's cores
+  ViewState view;   ///< size, exaggeration, mode, level, field of view, switches
+};
+
+/// Outcome of parsing: options, or the exit code of --help, --version or a usage error (already printed).
+struct ParsedOptions {
+  std::optional<Options> options;
+  int exit_code = 0;
+};
+[[nodiscard]] ParsedOptions parse_options(int argc, char** argv);
+
+}  // namespace isohf::view

@@ -1,0 +1,142 @@
+#include "session.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <thread>
+
+#include "isohf/base/error.h"
+
+namespace isohf::view {
+namespace {
+
+TileBoxLimits limits_from(const Options& options) {
+  TileBoxLimits limits;
+  limits.memory_bytes = options.memory_mib << 20;
+  limits.upload_bytes_per_frame = options.upload_mib << 20;
+  const int cores = static_cast<int>(std::thread::hardware_concurrency());
+  limits.workers = options.threads > 0 ? options.threads : std::max(1, cores - 1);
+  return limits;
+}
+
+const std::vector<std::string>& help_lines() {
+  static const std::vector<std::string> kLines{"W A S D, arrows  move          drag left   turn",
+                                               "Q E              down, up      drag right  move sideways",
+                                               "Shift, Ctrl      fast, slow    wheel       nearer, farther",
+                                               "C  fly or orbit                R  back to the start",
+                                               "J L  sun round   I K  sun up and down",
+                                               "+ -  vertical exaggeration     [ ]  far distance",
+                                               "M  colours       X  wires      B  tile borders",
+                                               "T  fade or switch levels       Z  haze",
+                                               "P  picture       F  figures    H  this help     Esc  end"};
+  return kLines;
+}
+
+const char* mode_name(ColourMode mode) {
+  switch (mode) {
+    case ColourMode::kElevation:
+      return "elevation";
+    case ColourMode::kPlain:
+      return "plain";
+    case ColourMode::kLevels:
+      return "levels of detail";
+    case ColourMode::kStrips:
+      return "strip order";
+    case ColourMode::kTexture:
+      return "texture";
+    case ColourMode::kNormals:
+      return "normals";
+  }
+  return "";
+}
+
+}  // namespace
+
+std::string grouped(std::int64_t number) {
+  const std::string digits = std::to_string(number);
+  std::string out;
+  for (std::size_t i = 0; i < digits.size(); ++i) {
+    if (i > 0 && digits[i - 1] != '-' && (digits.size() - i) % 3 == 0) out += ' ';
+    out += digits[i];
+  }
+  return out;
+}
+
+Session::Session(const TileSource& source, const Options& options)
+    : view(options.view),
+      sun_azimuth_deg(options.sun_azimuth_deg),
+      sun_elevation_deg(options.sun_elevation_deg),
+      source_(source),
+      shared_(source.grid().shape(), make_index_arrays(source.grid().shape())),
+      renderer_(source, shared_),
+      box_(source, shared_, limits_from(options)),
+      far_distance_(options.far_distance) {
+  const int levels = source.grid().shape().levels();
+  if (view.fixed_level && *view.fixed_level > levels - 1) {
+    throw Error(ErrorCode::kInvalidArgument,
+                fmt::format("--level {}: this archive has levels 0 to {}", *view.fixed_level, levels - 1));
+  }
+  camera = overview_camera(source, view.exaggeration);
+  const auto exaggerated = [this](Vec3 at) { return Vec3{at.x, at.y * view.exaggeration, at.z}; };
+  if (options.position || options.look_at) {
+    camera.look_at(options.position ? exaggerated(*options.position) : camera.eye,
+                   options.look_at ? exaggerated(*options.look_at) : camera.pivot);
+  }
+  if (options.fly) camera.kind = Camera::Kind::kFly;
+}
+
+void Session::prepare() {
+  view.eye = camera.eye;
+  view.forward = camera.forward();
+  view.sun = sun_direction(sun_azimuth_deg, sun_elevation_deg);
+  // Haze begins at a little more than half the far distance: by default all of the heightfield lies before it.
+  view.far_distance = far_distance_ ? *far_distance_ : 1.8 * farthest_corner(source_, camera.eye, view.exaggeration);
+}
+
+void Session::draw() {
+  // Where memory has shortened the reach, haze hides its end.
+  const double reach = box_.figures().radius;
+  cut_ = reach < view.far_distance;
+  if (cut_) view.far_distance = reach;
+  const TileRange& range = box_.range();
+  figures_ = renderer_.draw(view, range.first_column, range.last_column, range.first_row, range.last_row,
+                            [this](TileIndex tile) { return box_.resident(tile); });
+}
+
+void Session::frame() {
+  prepare();
+  box_.update({view.eye.x, view.eye.z}, view.far_distance);
+  draw();
+}
+
+void Session::complete_frame() {
+  prepare();
+  box_.finish({view.eye.x, view.eye.z}, view.far_distance);
+  if (box_.error()) throw Error(ErrorCode::kCorrupt, *box_.error());
+  draw();
+}
+
+void Session::draw_overlay(double frames_per_second, bool figures, bool help) const {
+  const int size = std::max(1, view.height / 540);
+  if (figures) {
+    const TileBoxFigures& box = box_.figures();
+    std::vector<std::string> lines{
+        fmt::format("{:5.1f} fps   {} triangles   {} draw calls", frames_per_second, grouped(figures_.triangles),
+                    figures_.draw_calls),
+        fmt::format("{} tiles drawn, {} resident, {} to come, {:.1f} MiB", figures_.visible_tiles, box.resident_tiles,
+                    box.missing_tiles, static_cast<double>(box.resident_bytes) / (1 << 20)),
+        fmt::format("x {:.0f}  y {:.0f}  z {:.0f}   {}   {}", camera.eye.x, camera.eye.y / view.exaggeration,
+                    camera.eye.z, camera.kind == Camera::Kind::kFly ? "fly" : "orbit", mode_name(view.mode)),
+        fmt::format("sun {:.0f}, {:.0f} deg   height x {:.2g}   {}", sun_azimuth_deg, sun_elevation_deg,
+                    view.exaggeration, help ? "" : "H help")};
+    if (cut_) {
+      lines.push_back(fmt::format("far distance cut to {:.0f} by --memory", box.radius));
+    }
+    if (box_.error()) lines.push_back(box_.error()->substr(0, 100));
+    overlay_.draw(lines, view.width, view.height, size);
+  }
+  if (help) overlay_.draw(help_lines(), view.width, view.height, size, true);
+}
+
+}  // namespace isohf::view

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "camera.h"
+#include "options.h"
+#include "overlay.h"
+#include "renderer.h"
+#include "tile_box.h"
+
+namespace isohf::view {
+
+/// An open heightfield with a camera: all that window, picture and flight have in common. A GL context must be
+/// current as long as it lives.
+class Session {
+ public:
+  /// Throws Error{kInvalidArgument} where a level beyond the archive's is asked for.
+  Session(const TileSource& source, const Options& options);
+
+  /// Updates the tile box and draws a frame into the bound framebuffer; never waits for a tile.
+  void frame();
+  /// Waits for all tiles in reach first. Throws Error{kCorrupt} where one cannot be read.
+  void complete_frame();
+  /// Changes the far distance by a factor.
+  void scale_far(double factor) { far_distance_ = view.far_distance * factor; }
+  /// Figures, and the keys where `help`, over the frame.
+  void draw_overlay(double frames_per_second, bool figures, bool help) const;
+
+  Camera camera;
+  ViewState view;
+  double sun_azimuth_deg;
+  double sun_elevation_deg;
+
+  [[nodiscard]] const FrameFigures& figures() const { return figures_; }
+  [[nodiscard]] const TileBox& box() const { return box_; }
+  [[nodiscard]] const TileSource& source() const { return source_; }
+  [[nodiscard]] const SharedGeometry& shared() const { return shared_; }
+  [[nodiscard]] Renderer& renderer() { return renderer_; }
+
+ private:
+  void prepare();
+  void draw();
+
+  const TileSource& source_;
+  SharedGeometry shared_;
+  Renderer renderer_;
+  TileBox box_;
+  Overlay overlay_;
+  std::optional<double> far_distance_;
+  FrameFigures figures_;
+  bool cut_ = false;  ///< memory shortens the far distance
+};
+
+/// "12 345 678"
+[[nodiscard]] std::string grouped(std::int64_t number);
+
+}  // namespace isohf::view

@@ -1,0 +1,155 @@
+// The real program, run as a person runs it.
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <array>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include "gl_test.h"
+#include "support/analytic_archive.h"
+
+namespace isohf {
+namespace {
+
+struct Outcome {
+  int exit_code = -1;
+  std::string out;
+  std::string err;
+};
+
+class ViewProgramTest : public test::GlTest {
+ protected:
+  void SetUp() override {
+    GlTest::SetUp();
+    if (IsSkipped()) return;
+    folder_ = std::filesystem::temp_directory_path() /
+              ("isohf_view_" + std::string(testing::UnitTest::GetInstance()->current_test_info()->name()));
+    std::filesystem::create_directories(folder_);
+    test::write_analytic_archive(path("good.isohf"), grid());
+  }
+  void TearDown() override {
+    if (!folder_.empty()) std::filesystem::remove_all(folder_);
+  }
+
+  static TileGrid grid() { return TileGrid::make(TileShape::make(36, 43, 3), 3, 2, 320.0, 320.0); }
+  [[nodiscard]] std::string path(const std::string& name) const { return (folder_ / name).string(); }
+  [[nodiscard]] std::string text(const std::string& name) const {
+    std::ifstream file(path(name));
+    std::ostringstream all;
+    all << file.rdbuf();
+    return all.str();
+  }
+  [[nodiscard]] Outcome run(const std::string& arguments, const std::string& before = "") const {
+    const std::string command =
+        before + " '" + ISOHF_BIN_DIR + "/isohf-view' " + arguments + " >'" + path("out") + "' 2>'" + path("err") + "'";
+    const int status = std::system(command.c_str());
+    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, text("out"), text("err")};
+  }
+  [[nodiscard]] static bool is_png(const std::string& file) {
+    std::ifstream in(file, std::ios::binary);
+    std::array<char, 4> head{};
+    in.read(head.data(), 4);
+    return in && head[1] == 'P' && head[2] == 'N' && head[3] == 'G';
+  }
+
+ private:
+  std::filesystem::path folder_;
+};
+
+TEST_F(ViewProgramTest, WritesScreenshots) {
+  for (const std::string mode : {"elevation", "plain", "levels", "strips", "normals"}) {
+    const Outcome outcome =
+        run(path("good.isohf") + " --size 320x200 --borders --wireframe --mode " + mode +
+            " --sun 90,12 --position 480,300,900 --look-at 480,0,300 --screenshot " + path(mode + ".png"));
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    EXPECT_EQ(outcome.err, "");
+    EXPECT_TRUE(is_png(path(mode + ".png"))) << mode;
+  }
+}
+
+TEST_F(ViewProgramTest, VerifiesGoodAndBadArchives) {
+  const Outcome good = run(path("good.isohf") + " --verify");
+  EXPECT_EQ(good.exit_code, 0) << good.out << good.err;
+  EXPECT_EQ(good.err, "");
+  EXPECT_NE(good.out.find("agree"), std::string::npos);
+
+  test::write_analytic_archive(path("bad.isohf"), grid(), [](TileIndex tile, std::vector<std::uint16_t>& codes) {
+    if (tile == TileIndex{1, 1}) std::rotate(codes.begin(), codes.begin() + 1, codes.end());
+  });
+  const Outcome bad = run(path("bad.isohf") + " --verify");
+  EXPECT_EQ(bad.exit_code, 3) << bad.err;
+  EXPECT_NE(bad.out.find("shared vertices: tile (1,1)"), std::string::npos) << bad.out;
+}
+
+TEST_F(ViewProgramTest, FliesAndCountsEachFrame) {
+  {
+    std::ofstream file(path("path.txt"));
+    file << "# seconds, eye, target\n0 100 200 600  480 0 100\n2 500 150 500  480 0 0\n4 900 180 300 480 0 300\n";
+  }
+  const Outcome outcome = run(path("good.isohf") + " --size 160x120 --flight " + path("path.txt") +
+                              " --frames 12 --baseline --csv " + path("frames.csv"));
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_EQ(outcome.err, "");
+  EXPECT_NE(outcome.out.find("frames with more than 2 draw calls a visible tile and pass: 0"), std::string::npos);
+  EXPECT_NE(outcome.out.find("plain static mesh"), std::string::npos);
+  const std::string csv = text("frames.csv");
+  EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 13);
+}
+
+TEST_F(ViewProgramTest, SweepsLevels) {
+  const Outcome outcome = run(path("good.isohf") + " --size 160x120 --sweep --steps 8 --csv " + path("sweep.csv"));
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_NE(outcome.out.find("switching: largest jump"), std::string::npos);
+}
+
+TEST_F(ViewProgramTest, RefusesInOneLine) {
+  const auto one_line = [](const Outcome& outcome) {
+    return std::count(outcome.err.begin(), outcome.err.end(), '\n') == 1 && outcome.out.empty();
+  };
+  Outcome outcome = run(path("missing.isohf") + " --verify");
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_TRUE(one_line(outcome)) << outcome.err;
+  { std::ofstream(path("text.isohf")) << "this is no archive\n"; }
+  outcome = run(path("text.isohf") + " --verify");
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_TRUE(one_line(outcome)) << outcome.err;
+  outcome = run(path("good.isohf") + " --level 9 --screenshot " + path("no.png"));
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_TRUE(one_line(outcome)) << outcome.err;
+  // The driver is told to offer no more than OpenGL 2.1.
+  outcome = run(path("good.isohf") + " --verify", "MESA_GL_VERSION_OVERRIDE=2.1");
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_TRUE(one_line(outcome)) << outcome.err;
+  EXPECT_NE(outcome.err.find("OpenGL 3.3"), std::string::npos) << outcome.err;
+  // No display for a window.
+  outcome = run(path("good.isohf"), "env -u DISPLAY -u WAYLAND_DISPLAY");
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_TRUE(one_line(outcome)) << outcome.err;
+}
+
+TEST_F(ViewProgramTest, RefusesBadUsage) {
+  EXPECT_EQ(run("").exit_code, 2);
+  EXPECT_EQ(run(path("good.isohf") + " --size 3x").exit_code, 2);
+  EXPECT_EQ(run(path("good.isohf") + " --verify --sweep").exit_code, 2);
+  EXPECT_EQ(run(path("good.isohf") + " --mode puce").exit_code, 2);
+  EXPECT_EQ(run(path("good.isohf") + " --sun 3").exit_code, 2);
+  const Outcome help = run("--help");
+  EXPECT_EQ(help.exit_code, 0);
+  EXPECT_NE(help.out.find("never take more than --memory MiB"), std::string::npos);
+}
+
+TEST_F(ViewProgramTest, OpensAWindow) {
+  if (std::system("command -v xvfb-run >/dev/null 2>&1") != 0) GTEST_SKIP() << "xvfb-run is not installed";
+  const Outcome outcome =
+      run(path("good.isohf") + " --window --size 400x300 --frames 10 --screenshot " + path("window.png"),
+          "xvfb-run -a -s '-screen 0 800x600x24'");
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_TRUE(is_png(path("window.png")));
+}
+
+}  // namespace
+}  // namespace isohf

@@ -1,0 +1,120 @@
+#include "tile_box.h"
+
+#include <chrono>
+#include <future>
+#include <thread>
+
+#include "gl_test.h"
+#include "memory_source.h"
+
+namespace isohf::view {
+namespace {
+
+using std::chrono::milliseconds;
+using test::MemorySource;
+
+TileGrid wide_grid() {
+  return TileGrid::make(TileShape::make(12, 11, 3), 30, 20, 100.0, 100.0);
+}
+
+class TileBoxTest : public test::GlTest {
+ protected:
+  static TileBoxLimits limits_for(std::uint64_t tiles, std::uint64_t per_frame) {
+    const std::uint64_t bytes = TileSlot::bytes(wide_grid().shape());
+    return {tiles * bytes, per_frame * bytes, 2};
+  }
+};
+
+TEST_F(TileBoxTest, HoldsTheBoundingSquareOfTheCircle) {
+  const MemorySource source(wide_grid());
+  const SharedGeometry shared(source.grid().shape(), make_index_arrays(source.grid().shape()));
+  TileBox box(source, shared, {});
+  box.finish({1550.0, 1050.0}, 220.0);
+  for (std::int64_t row = 0; row < 20; ++row) {
+    for (std::int64_t column = 0; column < 30; ++column) {
+      const bool near =
+          std::abs(static_cast<double>(column) - 15.0) < 2.8 && std::abs(static_cast<double>(row) - 10.0) < 2.8;
+      EXPECT_TRUE(!near || box.resident({column, row}) != nullptr) << column << "," << row;
+    }
+  }
+  EXPECT_LE(box.figures().resident_tiles, 36);
+}
+
+TEST_F(TileBoxTest, SwapsOnlyWhatEntersWhenItMovesByOneTile) {
+  const MemorySource source(wide_grid());
+  const SharedGeometry shared(source.grid().shape(), make_index_arrays(source.grid().shape()));
+  TileBox box(source, shared, {});
+  box.finish({1050.0, 1050.0}, 300.0);
+  const int reads = source.reads;
+  const std::int64_t rows = box.range().last_row - box.range().first_row + 1;
+  box.finish({1150.0, 1050.0}, 300.0);
+  EXPECT_EQ(source.reads - reads, rows);
+  box.finish({1150.0, 1050.0}, 300.0);
+  EXPECT_EQ(source.reads - reads, rows);
+}
+
+TEST_F(TileBoxTest, NeverExceedsItsMemoryAndSaysHowFarItReaches) {
+  const MemorySource source(wide_grid());
+  const SharedGeometry shared(source.grid().shape(), make_index_arrays(source.grid().shape()));
+  for (const std::uint64_t tiles : {20, 60, 130}) {
+    const TileBoxLimits limits = limits_for(tiles, 2);
+    TileBox box(source, shared, limits);
+    for (int step = 0; step < 60; ++step) {
+      box.update({40.0 * step, 30.0 * step}, 900.0);
+      EXPECT_LE(box.figures().resident_bytes, limits.memory_bytes);
+      EXPECT_LE(box.figures().upload_bytes, limits.upload_bytes_per_frame);
+      EXPECT_LT(box.figures().radius, 900.0);
+      std::this_thread::sleep_for(milliseconds(1));
+    }
+    box.finish({1500.0, 1000.0}, 900.0);
+    EXPECT_LE(box.figures().resident_bytes, limits.memory_bytes);
+    EXPECT_NE(box.resident({15, 10}), nullptr);
+  }
+}
+
+TEST_F(TileBoxTest, NeverWaitsForATile) {
+  // No tile can be read until the gate opens; an update that waited for one would never come back.
+  std::promise<void> gate;
+  const std::shared_future<void> opened = gate.get_future().share();
+  const MemorySource source(wide_grid(), {}, [&] { opened.wait(); });
+  const SharedGeometry shared(source.grid().shape(), make_index_arrays(source.grid().shape()));
+  TileBox box(source, shared, limits_for(1000, 4));
+  for (int frame = 0; frame < 10; ++frame) {
+    box.update({1000.0 + 90.0 * frame, 1000.0}, 900.0);
+    EXPECT_EQ(box.figures().resident_tiles, 0);
+    EXPECT_GT(box.figures().missing_tiles, 100);
+  }
+  gate.set_value();
+  box.finish({1500.0, 1000.0}, 200.0);
+  EXPECT_EQ(box.figures().missing_tiles, 0);
+}
+
+TEST_F(TileBoxTest, ShowsTheSameBytesWhateverTheRoute) {
+  // After any flight, each resident tile's buffer holds that tile's codes and no other's.
+  const MemorySource source(wide_grid());
+  const SharedGeometry shared(source.grid().shape(), make_index_arrays(source.grid().shape()));
+  TileBox box(source, shared, limits_for(80, 3));
+  for (int step = 0; step < 40; ++step) {
+    box.update({static_cast<double>(step * 977 % 3000), static_cast<double>(step * 571 % 2000)}, 300.0);
+    std::this_thread::sleep_for(milliseconds(1));
+  }
+  box.finish({700.0, 900.0}, 300.0);
+  std::int64_t seen = 0;
+  for (std::int64_t flat = 0; flat < source.grid().tile_count(); ++flat) {
+    const TileSlot* slot = box.resident(source.grid().tile_at(flat));
+    if (slot == nullptr) continue;
+    ++seen;
+    EXPECT_EQ(slot->read_back(), test::analytic_tile(source.grid(), source.grid().tile_at(flat)));
+  }
+  EXPECT_EQ(seen, box.figures().resident_tiles);
+  EXPECT_GT(seen, 40);
+}
+
+TEST_F(TileBoxTest, RefusesTooLittleMemory) {
+  const MemorySource source(wide_grid());
+  const SharedGeometry shared(source.grid().shape(), make_index_arrays(source.grid().shape()));
+  EXPECT_THROW(TileBox(source, shared, limits_for(7, 1)), Error);
+}
+
+}  // namespace
+}  // namespace isohf::view
