@@ -11,6 +11,7 @@
 #include <cstring>
 #include <optional>
 
+#include "formats/exr_threads.h"
 #include "formats/raster_encoder.h"
 #include "isohf/base/error.h"
 
@@ -91,6 +92,7 @@ class ExrEncoder final : public RasterEncoder {
       names_.emplace_back(spec.channels == 1 ? "Y" : kColours[static_cast<std::size_t>(channel)]);
       header.channels().insert(names_.back(), Imf::Channel(type_));
     }
+    start_exr_threads();
     stream_.emplace(path);
     translated([&] { file_.emplace(*stream_, header); });
   }

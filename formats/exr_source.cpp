@@ -7,7 +7,6 @@
 #include <OpenEXR/ImfInputPart.h>
 #include <OpenEXR/ImfMultiPartInputFile.h>
 #include <OpenEXR/ImfPartType.h>
-#include <OpenEXR/ImfThreading.h>
 #include <OpenEXR/ImfTileDescription.h>
 #include <OpenEXR/ImfTiledInputPart.h>
 #include <fmt/format.h>
@@ -16,12 +15,11 @@
 #include <array>
 #include <charconv>
 #include <cstring>
-#include <mutex>
 #include <new>
 #include <optional>
-#include <thread>
 #include <vector>
 
+#include "formats/exr_threads.h"
 #include "formats/open_options.h"
 #include "isohf/base/assert.h"
 #include "isohf/base/error.h"
@@ -50,14 +48,6 @@ std::string full_name(const Channel& channel) {
 std::string last_component(const std::string& name) {
   const std::size_t dot = name.rfind('.');
   return dot == std::string::npos ? name : name.substr(dot + 1);
-}
-
-/// The library's own threads decode the chunks of one request; four of them already outrun what follows.
-void start_decoding_threads() {
-  static std::once_flag once;
-  std::call_once(once, [] {
-    Imf::setGlobalThreadCount(static_cast<int>(std::clamp(std::thread::hardware_concurrency(), 1U, 4U)));
-  });
 }
 
 bool is_deep(const Imf::Header& header) {
@@ -305,7 +295,7 @@ class ExrSource final : public HeightSource {
 std::unique_ptr<HeightSource> open_exr(const std::string& path, const OpenOptions& options) {
   return translated(path, [&]() -> std::unique_ptr<HeightSource> {
     check_exr_headers(path);
-    start_decoding_threads();
+    start_exr_threads();
     return std::make_unique<ExrSource>(path, options);
   });
 }

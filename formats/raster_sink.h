@@ -33,7 +33,8 @@ class RasterEncoder;
 /// A raster file that is written from its first row to its last.
 ///
 /// Everything goes to NAME.part, which finish() flushes to the disk and renames; a sink that is destroyed before leaves
-/// nothing behind. One thread calls. Memory: a few hundred kilobytes, or a few rows where these are longer.
+/// nothing behind. One thread calls. Memory: a few megabytes, or a few rows where these are longer.
+/// TIFF strips are compressed on the caller's oneTBB arena; the bytes do not depend on the number of threads.
 class RasterSink {
  public:
   RasterSink(std::string path, const RasterSpec& spec, std::unique_ptr<OutputPart> part,

@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <tbb/parallel_for.h>
 #include <tiffio.h>
 
 #include <algorithm>
@@ -11,6 +12,7 @@
 
 #include "formats/geotiff_writer.h"
 #include "formats/raster_encoder.h"
+#include "formats/tiff_strip.h"
 #include "isohf/base/error.h"
 
 namespace isohf {
@@ -18,6 +20,9 @@ namespace {
 
 /// Strips of about this size: small enough to read a part of the raster cheaply, large enough to compress well.
 constexpr std::size_t kStripBytes = std::size_t{256} << 10U;
+/// Strips that are compressed side by side, and the most bytes that they may have together.
+constexpr std::size_t kBatchStrips = 16;
+constexpr std::size_t kBatchBytes = std::size_t{8} << 20U;
 /// Classic TIFF counts bytes in 32 bits; a little is left for tags and for samples that do not compress.
 constexpr double kClassicBytes = 4.0e9;
 
@@ -55,8 +60,8 @@ std::string gdal_metadata(const RasterSpec& spec) {
 
 class TiffEncoder final : public RasterEncoder {
  public:
-  TiffEncoder(const std::string& path, const RasterSpec& spec) : row_bytes_(row_bytes(spec)) {
-    const double raw_bytes = static_cast<double>(row_bytes_) * static_cast<double>(spec.height);
+  TiffEncoder(const std::string& path, const RasterSpec& spec) {
+    const double raw_bytes = static_cast<double>(row_bytes(spec)) * static_cast<double>(spec.height);
     TIFFOpenOptions* options = TIFFOpenOptionsAlloc();
     if (options == nullptr) throw Error(ErrorCode::kOutOfMemory, "libtiff ran out of memory");
     TIFFOpenOptionsSetErrorHandlerExtR(options, on_error, this);
@@ -74,21 +79,17 @@ class TiffEncoder final : public RasterEncoder {
   }
   ~TiffEncoder() override { release(); }
 
-  void write(std::span<const std::byte> rows, std::int64_t count) override {
-    const std::size_t strip_bytes = rows_per_strip_ * row_bytes_;
-    for (std::int64_t row = 0; row < count;) {
-      const auto room = static_cast<std::int64_t>((strip_bytes - pending_.size()) / row_bytes_);
-      const std::int64_t taken = std::min(room, count - row);
-      const auto part =
-          rows.subspan(static_cast<std::size_t>(row) * row_bytes_, static_cast<std::size_t>(taken) * row_bytes_);
-      pending_.insert(pending_.end(), part.begin(), part.end());
-      row += taken;
-      if (pending_.size() == strip_bytes) write_strip();
+  void write(std::span<const std::byte> rows, std::int64_t /*count*/) override {
+    while (!rows.empty()) {
+      const auto taken = rows.first(std::min(rows.size(), batch_bytes_ - pending_.size()));
+      pending_.insert(pending_.end(), taken.begin(), taken.end());
+      rows = rows.subspan(taken.size());
+      if (pending_.size() == batch_bytes_) write_pending();
     }
   }
 
   void close() override {
-    if (!pending_.empty()) write_strip();
+    write_pending();
     if (TIFFWriteDirectory(tiff_) == 0) fail();
     release();
     if (failed_) fail();
@@ -120,7 +121,13 @@ class TiffEncoder final : public RasterEncoder {
     const bool floating = is_floating(spec.sample_type);
     const bool is_signed = spec.sample_type == SampleType::kInt8 || spec.sample_type == SampleType::kInt16 ||
                            spec.sample_type == SampleType::kInt32;
-    rows_per_strip_ = std::clamp<std::size_t>(kStripBytes / row_bytes_, 1, static_cast<std::size_t>(spec.height));
+    const std::size_t one_row = row_bytes(spec);
+    const auto rows_per_strip =
+        std::clamp<std::size_t>(kStripBytes / one_row, 1, static_cast<std::size_t>(spec.height));
+    strip_bytes_ = rows_per_strip * one_row;
+    batch_bytes_ = strip_bytes_ * std::clamp<std::size_t>(kBatchBytes / strip_bytes_, 1, kBatchStrips);
+    const auto channels = static_cast<std::size_t>(spec.channels);
+    layout_ = {spec.sample_type, static_cast<std::size_t>(spec.width) * channels, channels};
     set(TIFFTAG_IMAGEWIDTH, static_cast<std::uint32_t>(spec.width));
     set(TIFFTAG_IMAGELENGTH, static_cast<std::uint32_t>(spec.height));
     set(TIFFTAG_BITSPERSAMPLE, static_cast<int>(8 * size_bytes(spec.sample_type)));
@@ -128,7 +135,7 @@ class TiffEncoder final : public RasterEncoder {
     set(TIFFTAG_SAMPLEFORMAT, floating ? SAMPLEFORMAT_IEEEFP : is_signed ? SAMPLEFORMAT_INT : SAMPLEFORMAT_UINT);
     set(TIFFTAG_PHOTOMETRIC, spec.channels == 1 ? PHOTOMETRIC_MINISBLACK : PHOTOMETRIC_RGB);
     set(TIFFTAG_PLANARCONFIG, PLANARCONFIG_CONTIG);
-    set(TIFFTAG_ROWSPERSTRIP, static_cast<std::uint32_t>(rows_per_strip_));
+    set(TIFFTAG_ROWSPERSTRIP, static_cast<std::uint32_t>(rows_per_strip));
     set(TIFFTAG_COMPRESSION, COMPRESSION_ADOBE_DEFLATE);
     set(TIFFTAG_PREDICTOR, floating ? PREDICTOR_FLOATINGPOINT : PREDICTOR_HORIZONTAL);
     if (spec.channels == 4) {
@@ -166,10 +173,20 @@ class TiffEncoder final : public RasterEncoder {
     if (!values.empty()) set(tag, static_cast<int>(values.size()), values.data());
   }
 
-  void write_strip() {
-    const auto size = static_cast<tmsize_t>(pending_.size());
-    if (TIFFWriteEncodedStrip(tiff_, strip_, pending_.data(), size) != size) fail();
-    ++strip_;
+  /// Compresses the pending strips on all threads and stores them in order.
+  void write_pending() {
+    const std::size_t count = (pending_.size() + strip_bytes_ - 1) / strip_bytes_;
+    std::vector<std::vector<std::byte>> strips(count);
+    tbb::parallel_for(std::size_t{0}, count, [&](std::size_t at) {
+      const std::size_t begin = at * strip_bytes_;
+      strips[at] = compress_tiff_strip(
+          layout_, std::span(pending_).subspan(begin, std::min(strip_bytes_, pending_.size() - begin)));
+    });
+    for (std::vector<std::byte>& strip : strips) {
+      const auto size = static_cast<tmsize_t>(strip.size());
+      if (TIFFWriteRawStrip(tiff_, strip_, strip.data(), size) != size) fail();
+      ++strip_;
+    }
     pending_.clear();
   }
 
@@ -178,11 +195,12 @@ class TiffEncoder final : public RasterEncoder {
     tiff_ = nullptr;
   }
 
-  std::size_t row_bytes_;
-  std::size_t rows_per_strip_ = 1;
+  std::size_t strip_bytes_ = 0;
+  std::size_t batch_bytes_ = 0;
+  TiffStripLayout layout_;
   TIFF* tiff_ = nullptr;
   std::uint32_t strip_ = 0;
-  std::vector<std::byte> pending_;  ///< rows of the next strip
+  std::vector<std::byte> pending_;  ///< rows of the next strips
   bool failed_ = false;
   std::string message_;
 };

@@ -1,0 +1,18 @@
+#include "formats/exr_threads.h"
+
+#include <OpenEXR/ImfThreading.h>
+
+#include <algorithm>
+#include <mutex>
+#include <thread>
+
+namespace isohf {
+
+void start_exr_threads() {
+  static std::once_flag once;
+  std::call_once(once, [] {
+    Imf::setGlobalThreadCount(static_cast<int>(std::clamp(std::thread::hardware_concurrency(), 1U, 4U)));
+  });
+}
+
+}  // namespace isohf
