@@ -4,6 +4,7 @@
 #include <cstring>
 
 namespace isohf {
+
 std::int64_t rows_per_read(const SourceInfo& info) {
   constexpr std::int64_t kReadBytes = std::int64_t{8} << 20;
   const auto row_bytes = static_cast<std::int64_t>(size_bytes(info.sample_type)) * info.width;

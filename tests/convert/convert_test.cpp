@@ -1,0 +1,255 @@
+#include "isohf/convert/convert.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <limits>
+#include <random>
+#include <string>
+
+#include "isohf/archive/reader.h"
+#include "isohf/base/error.h"
+#include "isohf/lattice/barycentric.h"
+#include "isohf/verify/against_source.h"
+#include "isohf/verify/verify.h"
+#include "support/memory_source.h"
+
+namespace isohf {
+namespace {
+
+namespace fs = std::filesystem;
+
+class Convert : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::path(testing::TempDir()) /
+              (std::string("isohf_convert_") + testing::UnitTest::GetInstance()->current_test_info()->name());
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  [[nodiscard]] std::string path(const std::string& name) const { return (folder_ / name).string(); }
+
+  static ConvertOptions small_tiles(Filter filter = Filter::kBilinear) {
+    ConvertOptions options;
+    options.plan.shape = {20, 19};
+    options.plan.levels = 4;
+    options.filter = to_string(filter);
+    options.producer = "isohf test";
+    return options;
+  }
+
+  static ConvertSummary run(HeightSource& source, const std::string& output, const ConvertOptions& options) {
+    const std::atomic<bool> cancel = false;
+    return convert(source, output, options, {}, cancel);
+  }
+
+  static std::string bytes_of(const std::string& file) {
+    std::ifstream in(file, std::ios::binary);
+    return {std::istreambuf_iterator<char>(in), {}};
+  }
+
+  fs::path folder_;
+};
+
+test::MemorySource<std::int16_t> hills(std::int64_t width = 90, std::int64_t height = 75) {
+  return {SampleType::kInt16, width, height, [](std::int64_t c, std::int64_t r) {
+            return std::round(800.0 + 300.0 * std::sin(static_cast<double>(c) * 0.11) *
+                                          std::cos(static_cast<double>(r) * 0.07));
+          }};
+}
+
+TEST_F(Convert, WritesAnArchiveThatVerifies) {
+  auto source = hills();
+  const ConvertSummary summary = run(source, path("hills.isohf"), small_tiles());
+  EXPECT_EQ(summary.tiles_written, summary.tiles_expected);
+  EXPECT_EQ(summary.tiles_expected, summary.metadata.grid.tile_count());
+  EXPECT_EQ(summary.archive_bytes, fs::file_size(path("hills.isohf")));
+  const VerifyReport report = verify_archive(path("hills.isohf"), {});
+  for (const Finding& finding : report.findings) ADD_FAILURE() << finding_name(finding.id) << " " << finding.text;
+  EXPECT_TRUE(report.passed());
+  EXPECT_EQ(report.tiles_checked, summary.tiles_expected);
+  EXPECT_GT(report.shared_vertices_checked, 0);
+  EXPECT_FALSE(fs::exists(path("hills.isohf.part")));
+}
+
+TEST_F(Convert, APlaneComesBackEverywhereToHalfAStep) {
+  for (const Registration registration : {Registration::kArea, Registration::kPoint}) {
+    test::MemorySource<float> source(SampleType::kFloat32, 80, 70, [](std::int64_t c, std::int64_t r) {
+      return 5.0 + 0.5 * static_cast<double>(c) - 0.25 * static_cast<double>(r);
+    });
+    source.mutable_info().georeference.registration = registration;
+    ConvertOptions options = small_tiles();
+    options.overwrite = true;
+    options.plan.fit = true;
+    const ConvertSummary summary = run(source, path("plane.isohf"), options);
+    const ArchiveReader archive(path("plane.isohf"));
+    const TileGrid& grid = archive.grid();
+    const SourceRecord& record = archive.metadata().source;
+    std::mt19937_64 random(5);
+    std::uniform_real_distribution<double> unit(0.0, 1.0);
+    for (int i = 0; i < 3000; ++i) {
+      WorldPoint world{unit(random) * grid.world_width(), unit(random) * grid.world_height()};
+      if (i % 10 == 0) world.x = std::round(world.x / grid.extent_x()) * grid.extent_x();  // on the straight edges
+      const double u = (world.x - record.first_sample_x) / record.spacing_x;
+      const double v = (world.z - record.first_sample_z) / record.spacing_z;
+      // Half a pixel around an area source repeats the edge value: no plane there.
+      if (u < 1.0 || v < 1.0 || u > 78.0 || v > 68.0) continue;
+      const TilePoint at = grid.locate(world);
+      const std::vector<double> elevations = archive.read_elevations(at.tile);
+      const View2D<const double> view(elevations.data(), grid.shape().columns(), grid.shape().rows());
+      const double found = interpolate(barycentric(grid.shape(), at.point), view);
+      // Half a step, and single-precision rounding of heights below 64.
+      EXPECT_NEAR(found, 5.0 + 0.5 * u - 0.25 * v, summary.step / 2 + 1e-5);
+    }
+  }
+}
+
+TEST_F(Convert, AQuadraticComesBackWithinTheBilinearBound) {
+  constexpr double kCurvature = 0.01;
+  test::MemorySource<float> source(SampleType::kFloat32, 100, 100, [](std::int64_t c, std::int64_t r) {
+    return 0.5 * kCurvature * static_cast<double>(c * c + r * r);
+  });
+  const ConvertSummary summary = run(source, path("bowl.isohf"), small_tiles());
+  const ArchiveReader archive(path("bowl.isohf"));
+  const std::atomic<bool> cancel = false;
+  const AccuracyReport report = compare_with_source(archive, source, 5000, 0, {}, cancel);
+  EXPECT_EQ(report.samples_compared, 100 * 100);
+  // Linear interpolation of a parabola of second derivative k errs by at most k/8 times the square of the longest side:
+  // once bilinearly from the source (both axes), once over the triangles (sides up to 1.08 spacings).
+  const double bound = kCurvature / 8.0 * (2.0 + 2.0 * 1.08 * 1.08) + summary.step / 2;
+  EXPECT_LE(report.max, bound);
+  EXPECT_LE(report.random_max, bound);
+  EXPECT_GT(report.max, 0.0);
+}
+
+TEST_F(Convert, TheBytesAreTheSameForAnyNumberOfThreads) {
+  auto source = hills(400, 300);
+  for (const Filter filter : {Filter::kBilinear, Filter::kBspline3}) {
+    std::string first;
+    for (const int threads : {1, 2, 3, 7}) {
+      ConvertOptions options = small_tiles(filter);
+      options.threads = threads;
+      options.overwrite = true;
+      (void)run(source, path("t.isohf"), options);
+      const std::string bytes = bytes_of(path("t.isohf"));
+      if (first.empty()) first = bytes;
+      EXPECT_TRUE(bytes == first) << threads << " threads, " << to_string(filter);
+    }
+  }
+}
+
+TEST_F(Convert, ReadsTheSourceTwiceAtMost) {
+  auto source = hills(200, 400);
+  (void)run(source, path("once.isohf"), small_tiles());
+  EXPECT_LE(source.rows_read, 2 * 400);
+}
+
+TEST_F(Convert, VoidsStayVoidAndAreCounted) {
+  auto source = hills();
+  source.mutable_info().void_values = {-32768.0};
+  for (std::int64_t r = 20; r < 50; ++r) {
+    for (std::int64_t c = 30; c < 60; ++c) source.at(c, r) = -32768;
+  }
+  for (const CodeType type : {CodeType::kU16, CodeType::kU8, CodeType::kF32}) {
+    ConvertOptions options = small_tiles();
+    options.code_type = type;
+    options.overwrite = true;
+    const ConvertSummary summary = run(source, path("voids.isohf"), options);
+    EXPECT_GT(summary.metadata.statistics.voids, 0);
+    EXPECT_GE(*summary.metadata.statistics.min, 500.0) << "the void value never becomes an elevation";
+    const VerifyReport report = verify_archive(path("voids.isohf"), {});
+    for (const Finding& finding : report.findings) ADD_FAILURE() << finding_name(finding.id) << " " << finding.text;
+    const ArchiveReader archive(path("voids.isohf"));
+    const std::atomic<bool> cancel = false;
+    const AccuracyReport accuracy = compare_with_source(archive, source, 0, 0, {}, cancel);
+    EXPECT_EQ(accuracy.samples_void, 30 * 30);
+    EXPECT_EQ(accuracy.lost_inside, 0);
+    EXPECT_EQ(accuracy.invented_inside, 0);
+  }
+}
+
+TEST_F(Convert, EveryFilterStaysInsideItsCodes) {
+  // Steps of full height make every kernel with negative lobes overshoot.
+  test::MemorySource<float> source(SampleType::kFloat32, 64, 64,
+                                   [](std::int64_t c, std::int64_t r) { return ((c / 8 + r / 8) % 2) * 1000.0; });
+  for (const char* filter :
+       {"nearest", "bilinear", "catmull-rom", "bspline2", "bspline3", "bspline5", "lanczos3", "lanczos6"}) {
+    for (const double step : {0.0, 0.125}) {
+      ConvertOptions options = small_tiles();
+      options.filter = filter;
+      options.step = step;
+      options.overwrite = true;
+      const ConvertSummary summary = run(source, path("checker.isohf"), options);
+      EXPECT_EQ(summary.metadata.statistics.clamped, 0) << filter;
+      EXPECT_TRUE(verify_archive(path("checker.isohf"), {}).passed()) << filter;
+    }
+  }
+}
+
+TEST_F(Convert, ElevationsOutsideTheZRangeAreRefusedOrCounted) {
+  auto source = hills();
+  ConvertOptions options = small_tiles();
+  options.z_range = {600.0, 900.0};
+  EXPECT_THROW((void)run(source, path("range.isohf"), options), Error);
+  EXPECT_FALSE(fs::exists(path("range.isohf")));
+  EXPECT_FALSE(fs::exists(path("range.isohf.part")));
+  options.clamp_range = true;
+  const ConvertSummary summary = run(source, path("range.isohf"), options);
+  EXPECT_GT(summary.metadata.statistics.clamped, 0);
+}
+
+TEST_F(Convert, NothingButVoidsIsRefusedAndLeavesNothing) {
+  test::MemorySource<float> source(SampleType::kFloat32, 30, 30,
+                                   [](std::int64_t, std::int64_t) { return std::numeric_limits<double>::quiet_NaN(); });
+  EXPECT_THROW((void)run(source, path("nan.isohf"), small_tiles()), Error);
+  EXPECT_TRUE(fs::is_empty(folder_));
+}
+
+TEST_F(Convert, ACancelledJobIsResumedToTheSameBytes) {
+  auto source = hills(300, 300);
+  const ConvertOptions options = small_tiles();
+  (void)run(source, path("whole.isohf"), options);
+  std::atomic<bool> cancel = false;
+  try {
+    (void)convert(
+        source, path("parts.isohf"), options,
+        [&](const ConvertProgress& progress) {
+          if (progress.pass == ConvertProgress::Pass::kTiles) cancel = true;
+        },
+        cancel);
+    FAIL() << "was not cancelled";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::kCancelled);
+  }
+  EXPECT_FALSE(fs::exists(path("parts.isohf")));
+  ConvertOptions again = options;
+  again.resume = true;
+  (void)run(source, path("parts.isohf"), again);
+  EXPECT_TRUE(bytes_of(path("parts.isohf")) == bytes_of(path("whole.isohf")));
+}
+
+TEST_F(Convert, ValuesThatLookLikeFractionsAreWarnedOf) {
+  test::MemorySource<float> source(SampleType::kFloat32, 30, 30,
+                                   [](std::int64_t c, std::int64_t) { return static_cast<double>(c) / 29.0; });
+  const ConvertSummary summary = run(source, path("unit.isohf"), small_tiles());
+  ASSERT_EQ(summary.warnings.size(), 1U);
+  EXPECT_NE(summary.warnings[0].find("--z-scale"), std::string::npos);
+}
+
+TEST_F(Convert, RadiiOfAWholeMoonKeepTheirDecimals) {
+  test::MemorySource<double> source(SampleType::kFloat64, 40, 40, [](std::int64_t c, std::int64_t r) {
+    return 1737400.0 + 0.001 * static_cast<double>(c) + 0.002 * static_cast<double>(r);
+  });
+  const ConvertSummary summary = run(source, path("moon.isohf"), small_tiles());
+  const ArchiveReader archive(path("moon.isohf"));
+  const std::atomic<bool> cancel = false;
+  EXPECT_LE(compare_with_source(archive, source, 0, 0, {}, cancel).max, summary.step + 1e-7);
+}
+
+}  // namespace
+}  // namespace isohf
