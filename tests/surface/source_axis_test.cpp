@@ -8,35 +8,41 @@ namespace isohf {
 namespace {
 
 TEST(SourceAxis, PutsSamplesWhereTheyLie) {
-  const SourceAxis area(10, 15.0, 30.0, Registration::kArea, Outside::kClamp);
-  EXPECT_DOUBLE_EQ(area.position(15.0), 0.0);
-  EXPECT_DOUBLE_EQ(area.position(15.0 + 9 * 30.0), 9.0);
-  EXPECT_DOUBLE_EQ(area.position(30.0), 0.5);
-  const SourceAxis point(10, 0.0, 30.0, Registration::kPoint, Outside::kClamp);
-  EXPECT_DOUBLE_EQ(point.position(45.0), 1.5);
+  const SourceAxis area(10, 15.0, 30.0, Registration::kArea, Outside::kClamp, 60.0);
+  EXPECT_DOUBLE_EQ(area.place(15.0).position, 0.0);
+  EXPECT_DOUBLE_EQ(area.place(15.0 + 9 * 30.0).position, 9.0);
+  EXPECT_DOUBLE_EQ(area.place(30.0).position, 0.5);
+  const SourceAxis point(10, 0.0, 30.0, Registration::kPoint, Outside::kClamp, 60.0);
+  EXPECT_DOUBLE_EQ(point.place(45.0).position, 1.5);
+  EXPECT_FALSE(point.place(45.0).continued);
 }
 
-TEST(SourceAxis, AreaTakesTheEdgeValueInTheOuterHalfPixelWhateverLiesOutside) {
+TEST(SourceAxis, TheOuterHalfPixelOfAnAreaIsCoveredGround) {
   for (const Outside outside : {Outside::kCover, Outside::kClamp, Outside::kVoid}) {
-    const SourceAxis area(10, 15.0, 30.0, Registration::kArea, outside);
-    EXPECT_DOUBLE_EQ(area.position(0.0), 0.0) << to_string(outside);
-    EXPECT_DOUBLE_EQ(area.position(300.0), 9.0) << to_string(outside);
-    EXPECT_TRUE(area.has_elevation(0.0));
-    EXPECT_TRUE(area.has_elevation(300.0));
+    const SourceAxis area(10, 15.0, 30.0, Registration::kArea, outside, 60.0);
+    for (const double world : {0.0, 300.0}) {
+      const SourceAxis::Place place = area.place(world);
+      EXPECT_TRUE(place.has_elevation) << to_string(outside);
+      EXPECT_EQ(place.continued, outside != Outside::kClamp) << to_string(outside);
+    }
   }
 }
 
 TEST(SourceAxis, BeyondTheEndsFollowsTheRule) {
-  const auto axis = [](Outside outside) { return SourceAxis(10, 0.0, 1.0, Registration::kPoint, outside); };
-  EXPECT_DOUBLE_EQ(axis(Outside::kClamp).position(-3.0), 0.0);
-  EXPECT_DOUBLE_EQ(axis(Outside::kClamp).position(40.0), 9.0);
-  EXPECT_DOUBLE_EQ(axis(Outside::kCover).position(-3.25), -3.25);
-  EXPECT_DOUBLE_EQ(axis(Outside::kCover).position(12.5), 12.5);
-  EXPECT_TRUE(axis(Outside::kClamp).has_elevation(-3.0));
-  EXPECT_TRUE(axis(Outside::kCover).has_elevation(-3.0));
-  EXPECT_FALSE(axis(Outside::kVoid).has_elevation(-3.0));
-  EXPECT_FALSE(axis(Outside::kVoid).has_elevation(9.001));
-  EXPECT_TRUE(axis(Outside::kVoid).has_elevation(9.0));
+  const auto axis = [](Outside outside) { return SourceAxis(10, 0.0, 1.0, Registration::kPoint, outside, 2.5); };
+  EXPECT_DOUBLE_EQ(axis(Outside::kClamp).place(-3.0).position, 0.0);
+  EXPECT_DOUBLE_EQ(axis(Outside::kClamp).place(40.0).position, 9.0);
+  EXPECT_FALSE(axis(Outside::kClamp).place(40.0).continued);
+  const SourceAxis::Place near = axis(Outside::kCover).place(-1.25);
+  EXPECT_TRUE(near.continued);
+  EXPECT_DOUBLE_EQ(near.edge, 0.0);
+  EXPECT_DOUBLE_EQ(near.position, 1.25);
+  const SourceAxis::Place far = axis(Outside::kCover).place(40.0);
+  EXPECT_DOUBLE_EQ(far.edge, 9.0);
+  EXPECT_DOUBLE_EQ(far.position, 6.5) << "level after 2.5 samples";
+  EXPECT_FALSE(axis(Outside::kVoid).place(-3.0).has_elevation);
+  EXPECT_FALSE(axis(Outside::kVoid).place(9.001).has_elevation);
+  EXPECT_TRUE(axis(Outside::kVoid).place(9.0).has_elevation);
 }
 
 TEST(Outside, NamesRoundTripAndOthersAreRefused) {

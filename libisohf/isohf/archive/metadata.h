@@ -82,7 +82,7 @@ struct Metadata {
   std::string horizontal_unit = "unknown";  ///< world units: "metre" or "unknown"
   std::string vertical_unit = "unknown";    ///< "metre", "foot", ... or "unknown"
   WorldBounds valid;                        ///< the part of the world that the source covers
-  std::string outside = "clamp";            ///< what lies beyond: "cover", "clamp" or "void"
+  std::string outside = "cover";            ///< what lies beyond: "cover", "clamp" or "void"
   std::string filter = "bilinear";
   std::string acquisition = "point";
   SourceRecord source;

@@ -19,6 +19,7 @@
 #include "isohf/convert/quantiser.h"
 #include "isohf/convert/tile_statistics.h"
 #include "isohf/surface/band_reader.h"
+#include "isohf/surface/edge_range.h"
 #include "isohf/surface/source_scan.h"
 #include "isohf/surface/tile_cutter.h"
 
@@ -57,7 +58,8 @@ void throw_if_cancelled(const std::atomic<bool>& cancel) {
 }
 
 /// First pass: range and counts of the whole source.
-SourceScan scan_source(HeightSource& source, const ProgressCallback& callback, const std::atomic<bool>& cancel) {
+SourceScan scan_source(HeightSource& source, EdgeRange& edge, const ProgressCallback& callback,
+                       const std::atomic<bool>& cancel) {
   const SourceInfo& info = source.info();
   const std::int64_t step = rows_per_read(info);
   ProgressMeter meter(callback, ConvertProgress::Pass::kRange, info.height);
@@ -69,6 +71,7 @@ SourceScan scan_source(HeightSource& source, const ProgressCallback& callback, c
     raw.resize(static_cast<std::size_t>(rows * info.width) * size_bytes(info.sample_type));
     source.read_window({0, row, info.width, rows}, raw);
     scan_samples(info, raw, found);
+    edge.add_rows(raw);
     meter.report(row + rows, 0);
   }
   return found;
@@ -92,6 +95,10 @@ void warn_of_unit_range(const SourceInfo& info, const ElevationRange& range, std
   }
 }
 
+/// Lattice steps for which Outside::kCover continues slopes: the triangles that straddle the source's edge need one,
+/// and the normals of their vertices another.
+constexpr double kContinuedSteps = 2.0;
+
 /// What one conversion holds constant.
 struct Conversion {
   HeightSource& source;
@@ -103,17 +110,25 @@ struct Conversion {
   double datum = 0.0;
   Quantisation quantisation{};
 
-  [[nodiscard]] TileCutter cutter() const {
+  [[nodiscard]] SourceAxis axis_x() const {
     const SourceFrame& frame = plan.frame;
-    return {plan.grid, SourceAxis(frame.width, frame.first_sample_x, frame.spacing_x, frame.registration, plan.outside),
-            SourceAxis(frame.height, frame.first_sample_z, frame.spacing_z, frame.registration, plan.outside), kernel};
+    return {frame.width,        frame.first_sample_x, frame.spacing_x,
+            frame.registration, plan.outside,         kContinuedSteps * 2.0 * plan.grid.sigma_x()};
+  }
+  [[nodiscard]] SourceAxis axis_z() const {
+    const SourceFrame& frame = plan.frame;
+    return {frame.height,       frame.first_sample_z, frame.spacing_z,
+            frame.registration, plan.outside,         kContinuedSteps * plan.grid.sigma_z()};
+  }
+  [[nodiscard]] TileCutter cutter(const ElevationRange& limits) const {
+    return {plan.grid, axis_x(), axis_z(), kernel, limits};
   }
 };
 
 /// The range of the surface itself, for kernels that leave the range of their samples: cuts every tile, keeps none.
-ElevationRange measure_surface(const Conversion& job, const ProgressCallback& callback) {
+ElevationRange measure_surface(const Conversion& job, const ElevationRange& limits, const ProgressCallback& callback) {
   const TileGrid& grid = job.plan.grid;
-  const TileCutter cutter = job.cutter();
+  const TileCutter cutter = job.cutter({limits.min - job.datum, limits.max - job.datum});
   BandReader reader(job.source, job.datum, job.prefilter);
   ProgressMeter meter(callback, ConvertProgress::Pass::kRange, grid.tile_rows());
   std::vector<ElevationRange> ranges(static_cast<std::size_t>(grid.tile_columns()), {HUGE_VAL, -HUGE_VAL});
@@ -149,7 +164,8 @@ void choose_codes(Conversion& job, std::vector<std::string>& warnings, const Pro
     job.quantisation = choose_quantisation(request, range, info);
     return;
   }
-  const SourceScan found = scan_source(job.source, progress, job.cancel);
+  EdgeRange edge(info, job.axis_x().continued_samples(), job.axis_z().continued_samples());
+  SourceScan found = scan_source(job.source, edge, progress, job.cancel);
   if (found.valid == 0) {
     throw Error(ErrorCode::kInvalidArgument,
                 fmt::format("{}: all {} samples are void or not finite, there is no elevation to convert", info.path,
@@ -157,6 +173,7 @@ void choose_codes(Conversion& job, std::vector<std::string>& warnings, const Pro
   }
   warn_of_unit_range(info, found.range, warnings);
   job.datum = choose_datum(info, found.range);
+  if (job.plan.outside == Outside::kCover) found.range = edge.widen(found.range);
   job.quantisation = choose_quantisation(request, found.range, info);
   const double over = overshoot(job.kernel, job.prefilter);
   if (over == 0.0 || job.options.code_type == CodeType::kF32) return;
@@ -168,7 +185,7 @@ void choose_codes(Conversion& job, std::vector<std::string>& warnings, const Pro
     job.quantisation = choose_quantisation({request.type, job.quantisation.scale}, reach, info);
     return;
   }
-  job.quantisation = choose_quantisation(request, measure_surface(job, progress), info);
+  job.quantisation = choose_quantisation(request, measure_surface(job, found.range, progress), info);
 }
 
 [[noreturn]] void refuse_overflow(const Conversion& job, TileIndex tile, const QuantiserCounts& counts) {
@@ -197,7 +214,12 @@ EncodedTile make_tile(const Conversion& job, const TileCutter& cutter, TileIndex
 /// number of bands: one that is being cut and one that is being read.
 void write_tiles(const Conversion& job, ArchiveWriter& writer, const ProgressCallback& callback, int threads) {
   const TileGrid& grid = job.plan.grid;
-  const TileCutter cutter = job.cutter();
+  const Quantisation& codes = job.quantisation;
+  ElevationRange limits{-HUGE_VAL, HUGE_VAL};
+  if (codes.type != CodeType::kF32) {
+    limits = {codes.offset - job.datum, elevation_from_code(codes, codes.max_code()) - job.datum};
+  }
+  const TileCutter cutter = job.cutter(limits);
   BandReader reader(job.source, job.datum, job.prefilter);
   ProgressMeter meter(callback, ConvertProgress::Pass::kTiles, grid.tile_count());
   std::int64_t next = writer.next_tile();

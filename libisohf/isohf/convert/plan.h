@@ -23,7 +23,7 @@ struct PlanRequest {
   std::optional<double> spacing;             ///< lattice column step, world units, > 0
   std::optional<std::pair<std::int64_t, std::int64_t>> tiles;  ///< tile columns, rows
   bool fit = false;  ///< stretch the extents a little so that tiles end on the source's edge
-  Outside outside = Outside::kClamp;
+  Outside outside = Outside::kCover;
 };
 
 /// Where the source's samples lie in world space.
@@ -50,7 +50,7 @@ struct SourceFrame {
 struct Plan {
   SourceFrame frame;
   TileGrid grid;
-  Outside outside = Outside::kClamp;
+  Outside outside = Outside::kCover;
   double density = 1.0;                      ///< lattice samples for one source sample, as it came out
   std::int64_t lattice_samples = 0;          ///< C*R for all tiles
   std::uint64_t estimated_bytes = 0;         ///< of the archive, from typical bits per sample; an estimate

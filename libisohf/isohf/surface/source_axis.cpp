@@ -1,6 +1,7 @@
 #include "isohf/surface/source_axis.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "isohf/base/error.h"
 
@@ -33,25 +34,28 @@ Outside outside_from_string(const std::string& text) {
 }
 
 SourceAxis::SourceAxis(std::int64_t samples, double first_world, double spacing_world, Registration registration,
-                       Outside outside)
+                       Outside outside, double continued_world)
     : samples_(samples),
       first_world_(first_world),
       spacing_world_(spacing_world),
       reach_(registration == Registration::kArea ? 0.5 : 0.0),
-      outside_(outside) {}
+      outside_(outside),
+      continued_(std::min(std::max(continued_world / spacing_world, reach_), static_cast<double>(samples - 1))) {}
 
-bool SourceAxis::covers(double u) const {
-  return u >= -reach_ - kEndTolerance && u <= static_cast<double>(samples_ - 1) + reach_ + kEndTolerance;
+std::int64_t SourceAxis::continued_samples() const {
+  return static_cast<std::int64_t>(std::ceil(continued_));
 }
 
-double SourceAxis::position(double world) const {
+SourceAxis::Place SourceAxis::place(double world) const {
   const double u = (world - first_world_) / spacing_world_;
-  if (outside_ == Outside::kCover && !covers(u)) return u;
-  return std::clamp(u, 0.0, static_cast<double>(samples_ - 1));
-}
-
-bool SourceAxis::has_elevation(double world) const {
-  return outside_ != Outside::kVoid || covers((world - first_world_) / spacing_world_);
+  const auto last = static_cast<double>(samples_ - 1);
+  if (u >= 0.0 && u <= last) return {u};
+  const double edge = u < 0.0 ? 0.0 : last;
+  const double beyond = std::abs(u - edge);
+  if (outside_ == Outside::kVoid && beyond > reach_ + kEndTolerance) return {edge, edge, false, false};
+  if (outside_ == Outside::kClamp || beyond <= kEndTolerance) return {edge};
+  const double inside = std::min(beyond, continued_);
+  return {u < 0.0 ? inside : last - inside, edge, true, true};
 }
 
 }  // namespace isohf

@@ -9,7 +9,8 @@ namespace isohf {
 
 /// What surrounds the source: tiles reach past its last sample unless they were fitted to it.
 enum class Outside {
-  kCover,  ///< the surface goes on mirrored about the source's first and last samples
+  kCover,  ///< the surface goes on with its slope for two lattice steps, then level: planes hold up to the source's
+           ///< edge
   kClamp,  ///< the edge value goes on
   kVoid,   ///< no elevation
 };
@@ -23,28 +24,35 @@ enum class Outside {
 ///   point       0-------1---  ...  ---n-1          the source ends at its first and last posts
 class SourceAxis {
  public:
-  /// samples >= 1; first_world and spacing_world in world units, spacing > 0.
-  SourceAxis(std::int64_t samples, double first_world, double spacing_world, Registration registration,
-             Outside outside);
+  /// Where a world coordinate reads the source. Beyond the first or last sample by d, a continued surface has the
+  /// elevation 2 F(edge) - F(position), with the position mirrored: as far inside as the coordinate lies outside.
+  struct Place {
+    double position;    ///< in samples, within [0, n-1]
+    double edge = 0.0;  ///< 0 or n-1, where continued
+    bool continued = false;
+    bool has_elevation = true;  ///< false where Outside::kVoid leaves none
+  };
+
+  /// samples >= 1; first_world, spacing_world and continued_world in world units, spacing > 0; continued_world is how
+  /// far Outside::kCover continues slopes.
+  SourceAxis(std::int64_t samples, double first_world, double spacing_world, Registration registration, Outside outside,
+             double continued_world);
 
   [[nodiscard]] std::int64_t samples() const { return samples_; }
+  /// Whole samples inside the edge that a continued place may read.
+  [[nodiscard]] std::int64_t continued_samples() const;
 
-  /// Position in samples, 0 at the first and n-1 at the last. Beyond the covered ground the position goes on for
-  /// Outside::kCover and stays at the edge sample for the others; half a pixel around an area-registered source always
-  /// takes the edge value.
-  [[nodiscard]] double position(double world) const;
-
-  /// False where Outside::kVoid leaves no elevation at this place.
-  [[nodiscard]] bool has_elevation(double world) const;
+  /// Pure function of the coordinate. Half a pixel around an area-registered source is covered ground: clamped where
+  /// Outside::kClamp asks for it, else continued.
+  [[nodiscard]] Place place(double world) const;
 
  private:
-  [[nodiscard]] bool covers(double u) const;
-
   std::int64_t samples_;
   double first_world_;
   double spacing_world_;
   double reach_;  ///< how far the covered ground goes beyond the first and last samples, in samples
   Outside outside_;
+  double continued_;  ///< in samples
 };
 
 }  // namespace isohf

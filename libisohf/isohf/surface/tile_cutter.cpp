@@ -13,47 +13,56 @@ namespace {
 
 constexpr float kVoid = std::numeric_limits<float>::quiet_NaN();
 
-/// Taps of all columns of one row parity. The line they read holds `width` coefficients, from unmirrored source column
-/// `first` on.
+/// Taps of all columns of one row parity, and of the source's two edges after them, which continued columns read as
+/// well. The line they read holds `width` coefficients, from unmirrored source column `first` on.
 struct ColumnTaps {
-  std::vector<std::int32_t> start;  ///< [C] first tap's place in the line
-  std::vector<float> weights;       ///< [taps][C]
-  std::vector<char> outside;        ///< [C] 1 where Outside::kVoid leaves no elevation
-  std::vector<double> position;     ///< [C] in source columns
+  std::size_t count = 0;               ///< C + 2: the tile's columns, the West edge, the East edge
+  std::vector<std::int32_t> start;     ///< [count] first tap's place in the line
+  std::vector<float> weights;          ///< [taps][count]
+  std::vector<double> position;        ///< [count] in source columns
+  std::vector<std::size_t> outside;    ///< columns that Outside::kVoid leaves without elevation
+  std::vector<std::size_t> continued;  ///< columns beyond the source's edge whose slope goes on
+  std::vector<std::size_t> edge;       ///< for each of these, the edge's place: C or C + 1
   std::int64_t first = 0;
   std::int64_t width = 0;
-  bool any_outside = false;
 };
 
 ColumnTaps make_column_taps(const TileGrid& grid, const SourceAxis& axis, const Kernel& kernel, TileIndex tile,
                             int parity) {
-  const int columns = grid.shape().columns();
-  const auto count = static_cast<std::size_t>(columns);
+  const auto columns = static_cast<std::size_t>(grid.shape().columns());
   ColumnTaps taps;
-  taps.start.resize(count);
-  taps.weights.resize(count * static_cast<std::size_t>(kernel.taps()));
-  taps.outside.assign(count, 0);
-  taps.position.resize(count);
-  std::vector<std::int64_t> first(count);
-  std::int64_t low = std::numeric_limits<std::int64_t>::max();
-  std::int64_t high = std::numeric_limits<std::int64_t>::min();
-  for (int c = 0; c < columns; ++c) {
-    const auto i = static_cast<std::size_t>(c);
-    const double world = grid.world_from_lattice(grid.lattice_vertex(tile, {c, parity})).x;
-    taps.outside[i] = axis.has_elevation(world) ? 0 : 1;
-    taps.any_outside |= taps.outside[i] != 0;
-    taps.position[i] = axis.position(world);
+  taps.position.resize(columns);
+  for (std::size_t c = 0; c < columns; ++c) {
+    const LatticeVertex vertex = grid.lattice_vertex(tile, {static_cast<int>(c), parity});
+    const SourceAxis::Place place = axis.place(grid.world_from_lattice(vertex).x);
+    taps.position[c] = place.position;
+    if (!place.has_elevation) taps.outside.push_back(c);
+    if (!place.continued) continue;
+    taps.continued.push_back(c);
+    taps.edge.push_back(place.edge == 0.0 ? columns : columns + 1);
+  }
+  // The edges are read only where something is continued; elsewhere they would stretch the line over the whole source.
+  const auto edge_or_column = [&](std::size_t edge_place, double edge) {
+    const bool is_read = std::find(taps.edge.begin(), taps.edge.end(), edge_place) != taps.edge.end();
+    return is_read ? edge : taps.position[0];
+  };
+  taps.position.push_back(edge_or_column(columns, 0.0));
+  taps.position.push_back(edge_or_column(columns + 1, static_cast<double>(axis.samples() - 1)));
+
+  taps.count = taps.position.size();
+  taps.weights.resize(taps.count * static_cast<std::size_t>(kernel.taps()));
+  std::vector<std::int64_t> first(taps.count);
+  for (std::size_t i = 0; i < taps.count; ++i) {
     const TapWeights at = kernel.at(taps.position[i]);
     first[i] = at.first;
-    low = std::min(low, at.first);
-    high = std::max(high, at.first + kernel.taps() - 1);
     for (int t = 0; t < kernel.taps(); ++t) {
-      taps.weights[static_cast<std::size_t>(t) * count + i] = at.weights[static_cast<std::size_t>(t)];
+      taps.weights[static_cast<std::size_t>(t) * taps.count + i] = at.weights[static_cast<std::size_t>(t)];
     }
   }
-  taps.first = low;
-  taps.width = high - low + 1;
-  for (std::size_t i = 0; i < count; ++i) taps.start[i] = static_cast<std::int32_t>(first[i] - low);
+  const auto [low, high] = std::minmax_element(first.begin(), first.end());
+  taps.first = *low;
+  taps.width = *high - *low + kernel.taps();
+  for (const std::int64_t tap : first) taps.start.push_back(static_cast<std::int32_t>(tap - taps.first));
   return taps;
 }
 
@@ -150,7 +159,7 @@ class VoidAwareSampler {
     const std::int64_t first_column = columns.first + columns.start[c];
     for (int j = 0; j < taps_; ++j) {
       for (int i = 0; i < taps_; ++i) {
-        const double weight = double{columns.weights[static_cast<std::size_t>(i) * columns.start.size() + c]} *
+        const double weight = double{columns.weights[static_cast<std::size_t>(i) * columns.count + c]} *
                               rows.weights[static_cast<std::size_t>(j)];
         if (!is_void(first_column + i, rows.first + j)) valid_weight += weight;
         const float height = coefficient(first_column + i, rows.first + j);
@@ -195,59 +204,109 @@ class VoidAwareSampler {
   int taps_;
 };
 
+/// The row of the surface at source row position v: all columns of the tile, continued ones included. `values` has the
+/// two edges behind the columns.
+struct RowSampler {
+  const SourceBand& band;
+  const SourceAxis& axis_x;
+  const SourceAxis& axis_z;
+  const Kernel& kernel;
+  std::vector<float>& line;
+  std::vector<char>& void_line;
+  std::vector<char>& near_void;
+
+  void sample(double v, const ColumnTaps& columns, std::vector<float>& values) const {
+    const TapWeights rows = kernel.at(v);
+    blend_rows(band, rows, kernel.taps(), axis_x, axis_z, columns, line);
+    values.resize(columns.count);
+    gather_columns(kernel.taps(), columns, line.data(), values);
+    near_void.assign(columns.count, 0);
+    if (band.voids.data() != nullptr) {
+      void_line.resize(line.size());
+      find_voids(band, rows, kernel.taps(), axis_x, axis_z, columns, void_line, near_void);
+    }
+    const VoidAwareSampler void_aware(band, axis_x, axis_z, kernel.taps());
+    for (std::size_t c = 0; c < values.size(); ++c) {
+      if (std::isnan(values[c]) || near_void[c] != 0)
+        values[c] = void_aware.at(columns.position[c], v, columns, c, rows);
+    }
+    for (std::size_t i = 0; i < columns.continued.size(); ++i) {
+      float& value = values[columns.continued[i]];
+      value = continue_slope(values[columns.edge[i]], value);
+    }
+  }
+
+  /// The elevation outside that the edge and its mirror place inside ask for; the edge's own where the latter is void.
+  static float continue_slope(float edge, float mirrored) {
+    const float height = 2.0F * edge - mirrored;
+    return std::isnan(height) ? edge : height;
+  }
+};
+
 }  // namespace
 
-TileCutter::TileCutter(const TileGrid& grid, const SourceAxis& axis_x, const SourceAxis& axis_z, const Kernel& kernel)
-    : grid_(grid), axis_x_(axis_x), axis_z_(axis_z), kernel_(kernel) {}
+TileCutter::TileCutter(const TileGrid& grid, const SourceAxis& axis_x, const SourceAxis& axis_z, const Kernel& kernel,
+                       const ElevationRange& limits)
+    : grid_(grid),
+      axis_x_(axis_x),
+      axis_z_(axis_z),
+      kernel_(kernel),
+      lowest_(static_cast<float>(limits.min)),
+      highest_(static_cast<float>(limits.max)) {}
 
 RowRange TileCutter::rows_needed(std::int64_t tile_row) const {
   RowRange range{axis_z_.samples() - 1, 0};
-  for (int r = 0; r < grid_.shape().rows(); ++r) {
-    const double world = grid_.world_from_lattice(grid_.lattice_vertex({0, tile_row}, {0, r})).z;
-    const std::int64_t first = kernel_.at(axis_z_.position(world)).first;
+  const auto add = [&](double v) {
+    const std::int64_t first = kernel_.at(v).first;
     for (std::int64_t row = first; row < first + kernel_.taps(); ++row) {
       const std::int64_t mirrored = mirror_index(row, axis_z_.samples());
       range.first = std::min(range.first, mirrored);
       range.last = std::max(range.last, mirrored);
     }
+  };
+  for (int r = 0; r < grid_.shape().rows(); ++r) {
+    const SourceAxis::Place place =
+        axis_z_.place(grid_.world_from_lattice(grid_.lattice_vertex({0, tile_row}, {0, r})).z);
+    add(place.position);
+    if (place.continued) add(place.edge);
   }
   return range;
 }
 
 void TileCutter::cut(TileIndex tile, const SourceBand& band, std::span<float> heights) const {
-  const int columns = grid_.shape().columns();
+  const auto columns = static_cast<std::size_t>(grid_.shape().columns());
   const int rows = grid_.shape().rows();
   ISOHF_ASSERT(heights.size() == static_cast<std::size_t>(grid_.shape().stored_vertex_count()));
   const std::array<ColumnTaps, 2> taps = {make_column_taps(grid_, axis_x_, kernel_, tile, 0),
                                           make_column_taps(grid_, axis_x_, kernel_, tile, 1)};
   std::vector<float> line(static_cast<std::size_t>(std::max(taps[0].width, taps[1].width)));
-  std::vector<char> void_line(band.voids.data() != nullptr ? line.size() : 0);
-  std::vector<char> near_void(static_cast<std::size_t>(columns), 0);
-  const VoidAwareSampler void_aware(band, axis_x_, axis_z_, kernel_.taps());
+  std::vector<char> void_line;
+  std::vector<char> near_void;
+  const RowSampler sampler{band, axis_x_, axis_z_, kernel_, line, void_line, near_void};
+  std::vector<float> values;
+  std::vector<float> edge_values;
   for (int r = 0; r < rows; ++r) {
-    const std::span<float> out = heights.subspan(static_cast<std::size_t>(r) * static_cast<std::size_t>(columns),
-                                                 static_cast<std::size_t>(columns));
-    const double world = grid_.world_from_lattice(grid_.lattice_vertex(tile, {0, r})).z;
-    if (!axis_z_.has_elevation(world)) {
+    const std::span<float> out = heights.subspan(static_cast<std::size_t>(r) * columns, columns);
+    const ColumnTaps& at = taps[static_cast<std::size_t>(r & 1)];
+    const SourceAxis::Place place = axis_z_.place(grid_.world_from_lattice(grid_.lattice_vertex(tile, {0, r})).z);
+    if (!place.has_elevation) {
       std::fill(out.begin(), out.end(), kVoid);
       continue;
     }
-    const double v = axis_z_.position(world);
-    const ColumnTaps& at = taps[static_cast<std::size_t>(r & 1)];
-    const TapWeights row_taps = kernel_.at(v);
-    blend_rows(band, row_taps, kernel_.taps(), axis_x_, axis_z_, at, line);
-    gather_columns(kernel_.taps(), at, line.data(), out);
-    if (!void_line.empty()) {
-      find_voids(band, row_taps, kernel_.taps(), axis_x_, axis_z_, at, void_line, near_void);
+    sampler.sample(place.position, at, values);
+    if (place.continued) {
+      sampler.sample(place.edge, at, edge_values);
+      for (std::size_t c = 0; c < columns; ++c) values[c] = RowSampler::continue_slope(edge_values[c], values[c]);
     }
-    for (std::size_t c = 0; c < out.size(); ++c) {
-      if (std::isnan(out[c]) || near_void[c] != 0) out[c] = void_aware.at(at.position[c], v, at, c, row_taps);
+    const auto hold = [&](float height) {  // NaN stays NaN
+      return height < lowest_ ? lowest_ : (height > highest_ ? highest_ : height);
+    };
+    if (place.continued) {
+      for (std::size_t c = 0; c < columns; ++c) values[c] = hold(values[c]);
     }
-    if (at.any_outside) {
-      for (std::size_t c = 0; c < out.size(); ++c) {
-        if (at.outside[c] != 0) out[c] = kVoid;
-      }
-    }
+    for (const std::size_t c : at.continued) values[c] = hold(values[c]);
+    for (const std::size_t c : at.outside) values[c] = kVoid;
+    std::copy_n(values.begin(), columns, out.begin());
   }
 }
 

@@ -7,6 +7,7 @@
 #include "isohf/lattice/tile_grid.h"
 #include "isohf/surface/kernels.h"
 #include "isohf/surface/source_axis.h"
+#include "isohf/surface/source_scan.h"
 
 namespace isohf {
 
@@ -32,7 +33,10 @@ struct SourceBand {
 /// the same bits of it. Thread-safe.
 class TileCutter {
  public:
-  TileCutter(const TileGrid& grid, const SourceAxis& axis_x, const SourceAxis& axis_z, const Kernel& kernel);
+  /// `limits`, relative to the band's datum, hold the continuation beyond the source's edge only; elevations of the
+  /// source itself are never touched.
+  TileCutter(const TileGrid& grid, const SourceAxis& axis_x, const SourceAxis& axis_z, const Kernel& kernel,
+             const ElevationRange& limits);
 
   /// The source rows that a row of tiles reads.
   [[nodiscard]] RowRange rows_needed(std::int64_t tile_row) const;
@@ -48,6 +52,8 @@ class TileCutter {
   SourceAxis axis_x_;
   SourceAxis axis_z_;
   Kernel kernel_;
+  float lowest_;
+  float highest_;
 };
 
 }  // namespace isohf
