@@ -86,8 +86,8 @@ TEST(BandReader, TilesCutFromItsBandsFollowTheRuleForVoids) {
       const Prefilter prefilter = Prefilter::make(kernel.filter(), Acquisition{});
       prefilter.filter({coefficients.data(), 61, 61});
       BandReader reader(source, 0.0, prefilter);
-      const SourceAxis axis(61, 0.0, 10.0, Registration::kPoint, Outside::kClamp);
-      const TileCutter cutter(grid, axis, axis, kernel);
+      const SourceAxis axis(61, 0.0, 10.0, Registration::kPoint, Outside::kClamp, 0.0);
+      const TileCutter cutter(grid, axis, axis, kernel, {-1e9, 1e9});
       std::vector<float> heights(12 * 11);
       for (std::int64_t tile = 0; tile < grid.tile_count(); ++tile) {
         const TileIndex index = grid.tile_at(tile);
@@ -97,7 +97,7 @@ TEST(BandReader, TilesCutFromItsBandsFollowTheRuleForVoids) {
           for (int c = 0; c < 12; ++c) {
             const WorldPoint world = grid.world_from_lattice(grid.lattice_vertex(index, {c, r}));
             const double expected = evaluate(kernel, {coefficients.data(), 61, 61}, {source.heights.data(), 61, 61},
-                                             axis.position(world.x), axis.position(world.z));
+                                             axis.place(world.x).position, axis.place(world.z).position);
             const auto height = static_cast<double>(heights[static_cast<std::size_t>(r * 12 + c)]);
             ASSERT_EQ(std::isnan(height), std::isnan(expected)) << name << " " << c << " " << r;
             // Roundings of coefficients up to 56 times the range of 1000, and as many weights.
