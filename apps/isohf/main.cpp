@@ -1,1 +1,143 @@
-int main() { return 2; }
+/// isohf: elevation rasters to isometric heightfield archives. The command table; errors to exit codes.
+
+#include <csignal>
+#include <cstring>
+#include <exception>
+#include <new>
+#include <string>
+#include <vector>
+
+#include "command.h"
+#include "command_line.h"
+#include "isohf/base/error.h"
+#include "standard_output.h"
+
+namespace isohf::cli {
+namespace {
+
+struct Command {
+  const char* name;
+  const char* summary;
+  CommandFunction run;
+};
+
+constexpr Command kCommands[] = {
+    {"plan", "List tile shapes, or what convert would make of an input", command_plan},
+    {"info", "Say what an archive holds", command_info},
+};
+
+constexpr const char* kVersion = "isohf " ISOHF_VERSION "\n";
+
+constexpr const char* kUsage = R"(Usage: isohf COMMAND [arguments] [options]
+
+Turns rasters of elevations (GeoTIFF, OpenEXR, PNG, SRTM .hgt, ...) into archives of isometric heightfield
+tiles, and reads, checks and measures such archives.
+
+Commands:
+)";
+
+constexpr const char* kAfterCommands = R"(
+Common options, after the command:
+  -h, --help          The command's arguments, options, defaults and examples
+      --json          One JSON document on standard output instead of text
+  -q, --quiet         Print nothing but errors
+  -v, --verbose       Say more on standard error
+      --config FILE   Read options from a TOML or INI file: one 'long-option = value' a line
+Of commands that take a while:
+  -j, --threads N     Threads (default: all cores); the result does not depend on it
+      --progress MODE auto, plain, json or none; on standard error
+Of commands that write a file:
+      --overwrite     Replace the output where it exists
+      --resume        Continue an interrupted run
+      --memory SIZE   Refuse to start where more would be needed, as in 400M
+Alone:
+      --version       Print the version
+
+Results go to standard output, everything else to standard error.
+Exit codes: 0 done, 1 failed, 2 wrong usage, 3 verify found differences, 130 interrupted.
+
+Examples:
+  isohf plan                              tile shapes for about 100000 triangles a tile
+  isohf plan dem.tif                      what convert would do, without doing it
+  isohf convert dem.tif dem.isohf
+  isohf verify dem.isohf --against dem.tif
+  echo "1200.5 340" | isohf sample dem.isohf
+)";
+
+void print_usage() {
+  StandardOutput out;
+  out.write(kUsage);
+  for (const Command& command : kCommands) {
+    std::string name = std::string("  ") + command.name;
+    name.resize(14, ' ');
+    out.write(name + command.summary + "\n");
+  }
+  out.write(kAfterCommands);
+  out.finish();
+}
+
+int run(Arguments arguments) {
+  if (arguments.empty()) {
+    throw Error(ErrorCode::kInvalidArgument, "no command given (isohf --help lists the commands)");
+  }
+  std::string name = arguments.front();
+  arguments.erase(arguments.begin());
+  if (name == "--version" || name == "version") {
+    StandardOutput out;
+    out.write(kVersion);
+    out.finish();
+    return kExitDone;
+  }
+  if (name == "--help" || name == "-h" || name == "help") {
+    if (name == "help" && !arguments.empty()) {
+      name = arguments.front();
+      arguments = {"--help"};
+    } else {
+      print_usage();
+      return kExitDone;
+    }
+  }
+  std::vector<std::string> names;
+  for (const Command& command : kCommands) {
+    if (name == command.name) return command.run(arguments);
+    names.emplace_back(command.name);
+  }
+  if (name.starts_with("-")) {
+    throw Error(ErrorCode::kInvalidArgument,
+                "found " + name + " where a command is required; options follow the command (isohf --help)");
+  }
+  const std::string near = nearest_word(name, names);
+  throw Error(ErrorCode::kInvalidArgument, "unknown command '" + name + "'" +
+                                               (near.empty() ? "" : "; did you mean " + near + "?") +
+                                               " (isohf --help lists the commands)");
+}
+
+int exit_code_for(ErrorCode code) {
+  if (code == ErrorCode::kInvalidArgument) return kExitUsage;
+  if (code == ErrorCode::kCancelled) return kExitInterrupted;
+  return kExitFailed;
+}
+
+}  // namespace
+}  // namespace isohf::cli
+
+int main(int argc, char** argv) {
+  using namespace isohf::cli;
+  // A closed pipe or a file over its size limit is an error that write() reports, not a reason to die.
+  std::signal(SIGPIPE, SIG_IGN);
+  std::signal(SIGXFSZ, SIG_IGN);
+  try {
+    return run(Arguments(argv + (argc > 0 ? 1 : 0), argv + argc));
+  } catch (const OutputClosed&) {
+    return kExitFailed;
+  } catch (const isohf::Error& error) {
+    print_error(error.what());
+    return exit_code_for(error.code());
+  } catch (const std::bad_alloc&) {
+    print_error("out of memory");
+    return kExitFailed;
+  } catch (const std::exception& error) {
+    print_error(std::string("internal error: ") + error.what());
+    return kExitFailed;
+  }
+}

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace isohf::cli {
+
+/// What follows the command's name on the command line.
+using Arguments = std::vector<std::string>;
+
+/// How the program ends (docs/cli.md).
+enum ExitCode : int {
+  kExitDone = 0,
+  kExitFailed = 1,
+  kExitUsage = 2,
+  kExitDifferences = 3,  ///< verify found something
+  kExitInterrupted = 130,
+};
+
+/// A command: parses its arguments, which touches no file but --config, and runs. Throws Error.
+using CommandFunction = int (*)(const Arguments& arguments);
+
+int command_convert(const Arguments& arguments);
+int command_info(const Arguments& arguments);
+int command_plan(const Arguments& arguments);
+int command_sample(const Arguments& arguments);
+int command_verify(const Arguments& arguments);
+
+}  // namespace isohf::cli

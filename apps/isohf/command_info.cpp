@@ -1,0 +1,248 @@
+/// isohf info: what an archive holds.
+
+#include <fmt/format.h>
+
+#include <cstring>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "command.h"
+#include "describe.h"
+#include "isohf/archive/reader.h"
+#include "json_output.h"
+#include "options_common.h"
+#include "standard_output.h"
+
+namespace isohf::cli {
+namespace {
+
+using nlohmann::ordered_json;
+
+constexpr const char* kFooter = R"(Reads the index and the metadata, no tile.
+
+Examples:
+  isohf info dem.isohf
+  isohf info dem.isohf --tiles        one line a tile: column row bytes minimum maximum voids
+  isohf info dem.isohf --json         the metadata and what follows from it)";
+
+struct InfoOptions {
+  CommonOptions common;
+  std::string archive;
+  bool tiles = false;
+};
+
+std::optional<InfoOptions> parse(const Arguments& arguments) {
+  InfoOptions options;
+  CommandLine line("info", "Says what an archive holds.");
+  line.group("Arguments");
+  line.positional("ARCHIVE", "-i,--input", "Archive to describe", options.archive);
+  line.flag("--tiles", "List the tiles", options.tiles);
+  add_common_options(line, options.common);
+  line.footer(kFooter);
+  if (!line.parse(arguments)) return std::nullopt;
+  line.require("ARCHIVE", options.archive);
+  return options;
+}
+
+/// The elevation that the index's code stands for.
+double elevation_of(const Quantisation& quantisation, std::uint32_t code) {
+  if (quantisation.type == CodeType::kF32) {
+    float value = 0.0F;
+    static_assert(sizeof value == sizeof code);
+    std::memcpy(&value, &code, sizeof value);
+    return static_cast<double>(value);
+  }
+  return quantisation.offset + quantisation.scale * static_cast<double>(code);
+}
+
+struct Derived {
+  std::uint64_t tile_bytes = 0;    ///< compressed, all tiles
+  std::uint64_t member_bytes = 0;  ///< compressed, everything else
+  std::int64_t samples = 0;        ///< C*R for every tile
+  double bits_per_sample = 0.0;    ///< of the tiles that are stored
+  double ratio_to_u16 = 0.0;       ///< raw 16-bit samples of all tiles / archive
+};
+
+Derived derive(const ArchiveReader& archive) {
+  const TileGrid& grid = archive.grid();
+  Derived derived;
+  std::int64_t stored = 0;
+  for (std::int64_t i = 0; i < grid.tile_count(); ++i) {
+    const TileEntry entry = archive.tile_entry(grid.tile_at(i));
+    stored += entry.stored ? 1 : 0;
+    derived.tile_bytes += entry.compressed_bytes;
+  }
+  for (const MemberEntry& member : archive.members()) derived.member_bytes += member.compressed_bytes;
+  const std::int64_t per_tile = grid.shape().stored_vertex_count();
+  derived.samples = per_tile * grid.tile_count();
+  if (stored > 0) {
+    derived.bits_per_sample = 8.0 * static_cast<double>(derived.tile_bytes) / static_cast<double>(per_tile * stored);
+  }
+  derived.ratio_to_u16 = 2.0 * static_cast<double>(derived.samples) / static_cast<double>(archive.size_bytes());
+  return derived;
+}
+
+ordered_json json_from_tiles(const ArchiveReader& archive) {
+  const TileGrid& grid = archive.grid();
+  const Quantisation& quantisation = archive.metadata().quantisation;
+  ordered_json tiles = ordered_json::array();
+  for (std::int64_t i = 0; i < grid.tile_count(); ++i) {
+    const TileIndex tile = grid.tile_at(i);
+    const TileEntry entry = archive.tile_entry(tile);
+    ordered_json json = {{"column", tile.column}, {"row", tile.row}, {"stored", entry.stored}};
+    if (entry.stored) {
+      json["offset_bytes"] = entry.offset_bytes;
+      json["compressed_bytes"] = entry.compressed_bytes;
+      json["min"] = elevation_of(quantisation, entry.code_min);
+      json["max"] = elevation_of(quantisation, entry.code_max);
+      json["has_voids"] = entry.has_voids;
+    }
+    tiles.push_back(std::move(json));
+  }
+  return tiles;
+}
+
+void print_json(const ArchiveReader& archive, bool tiles) {
+  const Derived derived = derive(archive);
+  ordered_json members = ordered_json::array();
+  for (const MemberEntry& member : archive.members()) {
+    members.push_back({{"name", member.name},
+                       {"offset_bytes", member.offset_bytes},
+                       {"compressed_bytes", member.compressed_bytes},
+                       {"bytes", member.bytes},
+                       {"deflated", member.deflated}});
+  }
+  ordered_json document = {{"archive", archive.path()},
+                           {"bytes", archive.size_bytes()},
+                           {"metadata", ordered_json::parse(archive.metadata_json())},
+                           {"shape", json_from(archive.grid().shape())},
+                           {"grid", json_from(archive.grid())},
+                           {"tile_bytes", derived.tile_bytes},
+                           {"lattice_samples", derived.samples},
+                           {"bits_per_sample", derived.bits_per_sample},
+                           {"ratio_to_raw_16_bit", derived.ratio_to_u16},
+                           {"reads_by_directory", archive.reads_by_directory()},
+                           {"warnings", archive.warnings()},
+                           {"members", members}};
+  if (tiles) document["tiles"] = json_from_tiles(archive);
+  StandardOutput out;
+  out.write(json_text(document));
+  out.finish();
+}
+
+std::string describe_crs(const SourceRecord& source) {
+  std::string text = source.crs_name;
+  if (source.crs_epsg) text += fmt::format("{}EPSG:{}", text.empty() ? "" : ", ", *source.crs_epsg);
+  if (!source.body.empty()) text += fmt::format("{}{}", text.empty() ? "" : ", ", source.body);
+  if (text.empty()) text = source.crs_wkt.empty() ? "not known" : "as WKT in the metadata";
+  if (!source.vertical_datum.empty()) text += ", heights above " + source.vertical_datum;
+  if (source.vertical_epsg) text += fmt::format(", vertical EPSG:{}", *source.vertical_epsg);
+  return text;
+}
+
+std::string describe_archive(const ArchiveReader& archive) {
+  const Metadata& metadata = archive.metadata();
+  const TileGrid& grid = metadata.grid;
+  const TileShape& shape = grid.shape();
+  const Quantisation& codes = metadata.quantisation;
+  const SourceRecord& source = metadata.source;
+  const Statistics& statistics = metadata.statistics;
+  const bool metres = metadata.horizontal_unit == "metre";
+  const std::string unit = metadata.vertical_unit == "unknown" ? "" : " " + metadata.vertical_unit;
+  const Derived derived = derive(archive);
+  std::string text;
+  const auto say = [&](const char* what, const std::string& value) { text += fmt::format("{:<12} {}\n", what, value); };
+
+  say("archive",
+      fmt::format("{}: {}, written by {}", archive.path(), describe_bytes(archive.size_bytes()), metadata.producer));
+  say("tiles", fmt::format("{} x {} = {}, {} stored, {} wholly void", grid.tile_columns(), grid.tile_rows(),
+                           describe_count(grid.tile_count()), describe_count(metadata.tiles_stored),
+                           describe_count(grid.tile_count() - metadata.tiles_stored)));
+  say("tile shape", fmt::format("{}x{} (C x R), {} levels, aspect {:.5f}, {} triangles", shape.columns(), shape.rows(),
+                                shape.levels(), shape.aspect(), describe_count(shape.triangle_count())));
+  say("tile extent",
+      fmt::format("{} by {}", describe_length(grid.extent_x(), metres), describe_length(grid.extent_z(), metres)));
+  say("lattice", fmt::format("columns {} apart, rows {}", describe_length(2.0 * grid.sigma_x(), metres),
+                             describe_length(grid.sigma_z(), metres)));
+  say("covers", fmt::format("{} by {}", describe_length(grid.world_width(), metres),
+                            describe_length(grid.world_height(), metres)));
+  say("source in", fmt::format("x {:.6g}..{:.6g}, z {:.6g}..{:.6g}; beyond it: {}", metadata.valid.x0,
+                               metadata.valid.x1, metadata.valid.z0, metadata.valid.z1, metadata.outside));
+  if (codes.type == CodeType::kF32) {
+    say("elevations", "f32");
+  } else {
+    say("elevations", fmt::format("{}: {:.9g} + code * {:.9g}{}, worst rounding {:.4g}", to_string(codes.type),
+                                  codes.offset, codes.scale, unit, statistics.worst_rounding));
+  }
+  if (statistics.min && statistics.max) {
+    say("range", fmt::format("{:.9g} .. {:.9g}{}{}", *statistics.min, *statistics.max, unit,
+                             statistics.mean ? fmt::format(", mean {:.6g}", *statistics.mean) : ""));
+  } else {
+    say("range", "no elevation at all");
+  }
+  say("vertices",
+      fmt::format(
+          "{} visible, {} void{}", describe_count(statistics.vertices), describe_count(statistics.voids),
+          statistics.clamped > 0 ? fmt::format(", {} moved into the range", describe_count(statistics.clamped)) : ""));
+  say("source", fmt::format("{}: {}, {} x {} {}{}, registered as {}", source.name, source.format, source.width,
+                            source.height, source.sample_type,
+                            source.channel.empty() ? "" : ", channel " + source.channel, source.registration));
+  say("reference", describe_crs(source));
+  say("filter", fmt::format("{}, acquisition {}", metadata.filter, metadata.acquisition));
+  say("size", fmt::format("{:.3f} bits a stored sample; {:.2f} times smaller than raw 16-bit samples",
+                          derived.bits_per_sample, derived.ratio_to_u16));
+  std::string members;
+  for (const MemberEntry& member : archive.members()) {
+    members += fmt::format("{}{} ({})", members.empty() ? "" : ", ", member.name, describe_bytes(member.bytes));
+  }
+  say("members", members + (members.empty() ? "" : " beside the tiles"));
+  say("content", "sha256 " + metadata.content_sha256);
+  return text;
+}
+
+void print_tiles(const ArchiveReader& archive, StandardOutput& out) {
+  const TileGrid& grid = archive.grid();
+  const Quantisation& quantisation = archive.metadata().quantisation;
+  out.write("# column row bytes minimum maximum voids\n");
+  for (std::int64_t i = 0; i < grid.tile_count(); ++i) {
+    const TileIndex tile = grid.tile_at(i);
+    const TileEntry entry = archive.tile_entry(tile);
+    if (!entry.stored) {
+      out.write(fmt::format("{} {} 0 void void all\n", tile.column, tile.row));
+      continue;
+    }
+    out.write(fmt::format("{} {} {} {:.9g} {:.9g} {}\n", tile.column, tile.row, entry.compressed_bytes,
+                          elevation_of(quantisation, entry.code_min), elevation_of(quantisation, entry.code_max),
+                          entry.has_voids ? "some" : "none"));
+  }
+}
+
+int run(const InfoOptions& options) {
+  const ArchiveReader archive(options.archive);
+  if (!options.common.quiet) {
+    for (const std::string& warning : archive.warnings()) print_warning(warning);
+  }
+  if (options.common.json) {
+    print_json(archive, options.tiles);
+    return kExitDone;
+  }
+  StandardOutput out;
+  if (!options.common.quiet) {
+    if (options.tiles) {
+      print_tiles(archive, out);
+    } else {
+      out.write(describe_archive(archive));
+    }
+  }
+  out.finish();
+  return kExitDone;
+}
+
+}  // namespace
+
+int command_info(const Arguments& arguments) {
+  const std::optional<InfoOptions> options = parse(arguments);
+  return options ? run(*options) : static_cast<int>(kExitDone);
+}
+
+}  // namespace isohf::cli

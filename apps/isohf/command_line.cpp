@@ -1,0 +1,254 @@
+#include "command_line.h"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <utility>
+
+#include "isohf/base/error.h"
+#include "standard_output.h"
+
+namespace isohf::cli {
+namespace {
+
+constexpr std::size_t kHelpWidth = 100;
+constexpr std::size_t kNameWidth = 28;
+
+/// Breaks `text` at blanks so that no line is longer than `width`; lines after the first start with `indent` blanks.
+std::string wrapped(const std::string& text, std::size_t indent, std::size_t width) {
+  std::string out;
+  std::size_t column = indent;
+  std::size_t from = 0;
+  while (from < text.size()) {
+    const std::size_t to = std::min(text.find(' ', from), text.size());
+    const std::size_t length = to - from;
+    if (column > indent && column + 1 + length > width) {
+      out += "\n" + std::string(indent, ' ');
+      column = indent;
+    } else if (column > indent) {
+      out += ' ';
+      ++column;
+    }
+    out.append(text, from, length);
+    column += length;
+    from = to + 1;
+  }
+  return out;
+}
+
+/// Two columns, wrapped; the value's name after the flags, and nothing of CLI11's own notes.
+class HelpFormatter : public CLI::Formatter {
+ public:
+  explicit HelpFormatter(std::string usage) : usage_(std::move(usage)) {}
+
+  [[nodiscard]] std::string make_usage(const CLI::App* /*app*/, std::string /*name*/) const override {
+    return "Usage: isohf " + usage_ + "\n";
+  }
+
+  [[nodiscard]] std::string make_option(const CLI::Option* option, bool is_positional) const override {
+    std::string name;
+    if (is_positional) {
+      name = option->get_name(true, false);
+    } else {
+      for (const std::string& flag : option->get_snames()) name += (name.empty() ? "-" : ", -") + flag;
+      for (const std::string& flag : option->get_lnames()) name += (name.empty() ? "    --" : ", --") + flag;
+      if (option->get_type_size() != 0) name += " " + option->get_type_name();
+    }
+    std::string line = "  " + name;
+    if (line.size() + 2 > kNameWidth) {
+      line += "\n" + std::string(kNameWidth, ' ');
+    } else {
+      line.resize(kNameWidth, ' ');
+    }
+    return line + wrapped(option->get_description(), kNameWidth, kHelpWidth) + "\n";
+  }
+
+ private:
+  std::string usage_;
+};
+
+std::size_t edit_distance(const std::string& a, const std::string& b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    std::size_t diagonal = row[0];
+    row[0] = i;
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      const std::size_t substituted = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
+      diagonal = row[j];
+      row[j] = std::min({row[j] + 1, row[j - 1] + 1, substituted});
+    }
+  }
+  return row[b.size()];
+}
+
+}  // namespace
+
+std::string nearest_word(const std::string& text, const std::vector<std::string>& candidates) {
+  std::string best;
+  std::size_t best_distance = std::max<std::size_t>(2, text.size() / 3) + 1;
+  for (const std::string& candidate : candidates) {
+    std::size_t distance = edit_distance(text, candidate);
+    if (text.size() >= 3 && candidate.compare(0, text.size(), text) == 0) distance = 1;
+    if (distance < best_distance) {
+      best_distance = distance;
+      best = candidate;
+    }
+  }
+  return best;
+}
+
+struct CommandLine::State {
+  State(const std::string& name, const std::string& summary) : command(name), app(summary, name) {}
+
+  std::string command;
+  CLI::App app;
+  std::string group = "Options";
+  std::string usage_positionals;
+
+  /// The first long name in "-q,--quiet" as the user writes it.
+  static std::string long_name(const std::string& flags) { return flags.substr(flags.find("--")); }
+
+  [[nodiscard]] std::vector<std::string> long_names() const {
+    std::vector<std::string> names;
+    for (const CLI::Option* option : app.get_options()) {
+      for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+    }
+    return names;
+  }
+
+  /// What is wrong with an argument that CLI11 could not place.
+  [[nodiscard]] std::string why_unexpected() const {
+    for (const std::string& extra : app.remaining()) {
+      if (extra.size() < 2 || extra[0] != '-') continue;
+      const std::string near = nearest_word(extra.substr(0, extra.find('=')), long_names());
+      return fmt::format("unknown option {}{}", extra, near.empty() ? "" : fmt::format("; did you mean {}?", near));
+    }
+    return fmt::format("'{}' is one argument too many", app.remaining().empty() ? "" : app.remaining().front());
+  }
+};
+
+CommandLine::CommandLine(const std::string& command, const std::string& summary)
+    : state_(std::make_unique<State>(command, summary)) {
+  state_->app.set_help_flag("-h,--help", "Print this help and exit");
+  state_->app.get_help_ptr()->group("Common");
+  state_->app.allow_config_extras(CLI::config_extras_mode::error);
+}
+
+CommandLine::~CommandLine() = default;
+
+void CommandLine::group(const std::string& title) {
+  state_->group = title;
+}
+
+void CommandLine::positional(const std::string& name, const std::string& flags, const std::string& description,
+                             std::string& value) {
+  state_->app.add_option(flags.empty() ? name : flags + "," + name, value, description)
+      ->type_name(name)
+      ->group(state_->group);
+  state_->usage_positionals += " " + name;
+}
+
+void CommandLine::option(const std::string& flags, const std::string& value_name, const std::string& description,
+                         Take take) {
+  const std::string name = State::long_name(flags);
+  const auto callback = [name, take = std::move(take)](const std::vector<std::string>& values) {
+    if (values.size() != 1) {
+      throw Error(ErrorCode::kInvalidArgument, fmt::format("{} is given {} times", name, values.size()));
+    }
+    try {
+      take(values.front());
+    } catch (const Error& error) {
+      throw error.within(name);
+    }
+    return true;
+  };
+  state_->app.add_option(flags, callback, description)
+      ->type_name(value_name)
+      ->group(state_->group)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
+      ->allow_extra_args(false);
+}
+
+void CommandLine::option(const std::string& flags, const std::string& value_name, const std::string& description,
+                         std::string& value) {
+  option(flags, value_name, description, [&value](const std::string& text) { value = text; });
+}
+
+void CommandLine::repeated_pair(const std::string& flags, const std::string& value_name, const std::string& description,
+                                std::function<void(const std::string&, const std::string&)> take) {
+  const std::string name = State::long_name(flags);
+  const auto callback = [name, take = std::move(take)](const std::vector<std::string>& values) {
+    try {
+      for (std::size_t i = 0; i + 1 < values.size(); i += 2) take(values[i], values[i + 1]);
+    } catch (const Error& error) {
+      throw error.within(name);
+    }
+    return true;
+  };
+  state_->app.add_option(flags, callback, description)
+      ->type_name(value_name)
+      ->group(state_->group)
+      ->type_size(2)
+      ->expected(1)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
+      ->allow_extra_args(false);
+}
+
+void CommandLine::flag(const std::string& flags, const std::string& description, bool& value) {
+  state_->app.add_flag(flags, value, description)->group(state_->group);
+}
+
+void CommandLine::exclusive(const std::vector<std::string>& options) {
+  for (std::size_t i = 0; i < options.size(); ++i) {
+    for (std::size_t j = i + 1; j < options.size(); ++j) {
+      state_->app.get_option(options[i])->excludes(state_->app.get_option(options[j]));
+    }
+  }
+}
+
+void CommandLine::footer(const std::string& text) {
+  state_->app.footer(text);
+}
+
+bool CommandLine::parse(const Arguments& arguments) {
+  CLI::App& app = state_->app;
+  app.set_config("--config", "",
+                 "Read options from a TOML or INI file: one 'long-option = value' a line; the command "
+                 "line wins")
+      ->type_name("FILE")
+      ->group("Common");
+  app.formatter(std::make_shared<HelpFormatter>(state_->command + state_->usage_positionals + " [options]"));
+  const auto fail = [&](const std::string& why) {
+    throw Error(ErrorCode::kInvalidArgument,
+                fmt::format("{}: {} (isohf {} --help lists the options)", state_->command, why, state_->command));
+  };
+  try {
+    app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));
+  } catch (const CLI::CallForHelp&) {
+    StandardOutput out;
+    out.write(app.help());
+    out.finish();
+    return false;
+  } catch (const CLI::ExtrasError&) {
+    fail(state_->why_unexpected());
+  } catch (const CLI::ParseError& error) {
+    fail(error.what());
+  } catch (const Error& error) {
+    throw error.within(state_->command);
+  }
+  return true;
+}
+
+bool CommandLine::given(const std::string& option) const {
+  return state_->app.get_option(option)->count() > 0;
+}
+
+void CommandLine::require(const std::string& name, const std::string& value) const {
+  if (!value.empty()) return;
+  throw Error(ErrorCode::kInvalidArgument, fmt::format("{}: no {} given (usage: isohf {}{} [options])", state_->command,
+                                                       name, state_->command, state_->usage_positionals));
+}
+
+}  // namespace isohf::cli

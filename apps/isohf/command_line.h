@@ -1,0 +1,58 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "command.h"
+
+namespace isohf::cli {
+
+/// The command line of one command: its options, its help, and the parsing of both. The only user of CLI11.
+///
+/// Options are listed in --help under the group that was named last, in the order of their declaration. Values arrive
+/// as text; the function that takes one throws Error{kInvalidArgument} with "found ..., must be ...", to which the
+/// option's name is added. An option that is given twice is an error. Every long option may also stand in the --config
+/// file.
+class CommandLine {
+ public:
+  using Take = std::function<void(const std::string& text)>;
+
+  CommandLine(const std::string& command, const std::string& summary);
+  ~CommandLine();
+  CommandLine(const CommandLine&) = delete;
+  CommandLine& operator=(const CommandLine&) = delete;
+
+  void group(const std::string& title);
+  /// A value without a name; `flags` ("-i,--input") names it as well, or is empty.
+  void positional(const std::string& name, const std::string& flags, const std::string& description,
+                  std::string& value);
+  void option(const std::string& flags, const std::string& value_name, const std::string& description, Take take);
+  void option(const std::string& flags, const std::string& value_name, const std::string& description,
+              std::string& value);
+  /// An option of two values that may be given again and again.
+  void repeated_pair(const std::string& flags, const std::string& value_name, const std::string& description,
+                     std::function<void(const std::string&, const std::string&)> take);
+  void flag(const std::string& flags, const std::string& description, bool& value);
+  /// At most one of these long options may be given.
+  void exclusive(const std::vector<std::string>& options);
+  /// What --help ends with: examples and notes.
+  void footer(const std::string& text);
+
+  /// Parses. False: help was asked for and printed, there is nothing to run. Throws Error{kInvalidArgument}.
+  [[nodiscard]] bool parse(const Arguments& arguments);
+  /// Whether parse() met the long option.
+  [[nodiscard]] bool given(const std::string& option) const;
+  /// Throws Error{kInvalidArgument} for a positional that is empty after parsing.
+  void require(const std::string& name, const std::string& value) const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+/// The candidate nearest to `text` by edit distance; empty where none is near.
+[[nodiscard]] std::string nearest_word(const std::string& text, const std::vector<std::string>& candidates);
+
+}  // namespace isohf::cli

@@ -1,0 +1,57 @@
+#include "describe.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+namespace isohf::cli {
+
+std::string describe_bytes(std::uint64_t bytes) {
+  if (bytes < 1000) return fmt::format("{} bytes", bytes);
+  constexpr const char* kUnits[] = {"kB", "MB", "GB", "TB", "PB", "EB"};
+  double value = static_cast<double>(bytes) / 1000.0;
+  std::size_t unit = 0;
+  while (value >= 999.5 && unit + 1 < std::size(kUnits)) {
+    value /= 1000.0;
+    ++unit;
+  }
+  return fmt::format("{:.3g} {}", value, kUnits[unit]);
+}
+
+std::string describe_count(std::int64_t count) {
+  const std::string digits = std::to_string(count);
+  std::string out;
+  for (std::size_t i = 0; i < digits.size(); ++i) {
+    const bool starts_group = i > 0 && digits[i - 1] != '-' && (digits.size() - i) % 3 == 0;
+    if (starts_group) out += ' ';
+    out += digits[i];
+  }
+  return out;
+}
+
+std::string describe_seconds(double seconds) {
+  if (seconds < 60.0) return fmt::format("{:.{}f} s", seconds, seconds < 10.0 ? 2 : 0);
+  const auto whole = static_cast<std::int64_t>(std::llround(std::fmin(seconds, 1e12)));
+  if (whole < 3600) return fmt::format("{} min {:02} s", whole / 60, whole % 60);
+  return fmt::format("{} h {:02} min", whole / 3600, whole / 60 % 60);
+}
+
+std::string describe_length(double length, bool metres) {
+  if (!metres) return fmt::format("{:.6g} units", length);
+  if (std::fabs(length) >= 1e4) return fmt::format("{:.6g} km", length / 1000.0);
+  return fmt::format("{:.6g} m", length);
+}
+
+int raw_bytes(CodeType type) {
+  switch (type) {
+    case CodeType::kU8:
+      return 1;
+    case CodeType::kU16:
+      return 2;
+    case CodeType::kF32:
+      return 4;
+  }
+  return 0;
+}
+
+}  // namespace isohf::cli

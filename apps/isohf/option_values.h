@@ -1,0 +1,31 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace isohf::cli {
+
+/// Text of an option's value -> value. All of them read the whole text, clamp nothing, and throw
+/// Error{kInvalidArgument} "found 'abc', must be ...".
+
+[[nodiscard]] double parse_number(const std::string& text);
+[[nodiscard]] double parse_positive_number(const std::string& text);
+/// `what` names the thing, for the message: "a whole number from 1 to 1024".
+[[nodiscard]] std::int64_t parse_whole_number(const std::string& text, std::int64_t least, std::int64_t most);
+/// "COLUMNSxROWS", as in 212x243; each part as parse_whole_number.
+[[nodiscard]] std::pair<std::int64_t, std::int64_t> parse_size(const std::string& text, std::int64_t least,
+                                                               std::int64_t most);
+/// "MIN:MAX" or "MIN,MAX", MIN < MAX.
+[[nodiscard]] std::pair<double, double> parse_range(const std::string& text);
+/// Bytes: 400M, 1.5GiB, 2GB; K, M, G, T and KiB... are powers of 1024, KB, MB, GB, TB powers of 1000.
+[[nodiscard]] std::uint64_t parse_bytes(const std::string& text);
+/// One of `words`; returns its place.
+[[nodiscard]] std::size_t parse_word(const std::string& text, const std::vector<std::string>& words);
+
+/// A number and nothing else, blanks included; false otherwise. Locale-independent. Reads "nan" and "inf".
+[[nodiscard]] bool read_number(std::string_view text, double& value);
+
+}  // namespace isohf::cli

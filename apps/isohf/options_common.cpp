@@ -1,0 +1,37 @@
+#include "options_common.h"
+
+#include "option_values.h"
+
+namespace isohf::cli {
+namespace {
+
+constexpr int kMaxThreads = 1024;
+
+}  // namespace
+
+void add_common_options(CommandLine& line, CommonOptions& options) {
+  line.group("Common");
+  line.flag("--json", "Print one JSON document on standard output instead of text", options.json);
+  line.flag("-q,--quiet", "Print nothing but errors", options.quiet);
+  line.flag("-v,--verbose", "Say more on standard error", options.verbose);
+}
+
+void add_work_options(CommandLine& line, WorkOptions& options) {
+  line.group("Work");
+  line.option(
+      "-j,--threads", "N", "Threads, 1 to 1024 (default: all cores); the result does not depend on it",
+      [&](const std::string& text) { options.threads = static_cast<int>(parse_whole_number(text, 1, kMaxThreads)); });
+  line.option("--progress", "MODE",
+              "auto: a bar on a terminal, plain lines with -v, else nothing; plain: lines; json: one object a line; "
+              "none. On standard error (default auto)",
+              [&](const std::string& text) {
+                options.progress = static_cast<ProgressMode>(parse_word(text, {"auto", "plain", "json", "none"}));
+              });
+}
+
+void add_memory_option(CommandLine& line, const std::string& description, std::uint64_t& bytes) {
+  line.option("--memory", "SIZE", description + "; as in 400M or 1.5GiB",
+              [&](const std::string& text) { bytes = parse_bytes(text); });
+}
+
+}  // namespace isohf::cli

@@ -1,0 +1,45 @@
+#include "options_source.h"
+
+#include <cmath>
+
+#include "isohf/base/error.h"
+#include "option_values.h"
+
+namespace isohf::cli {
+
+void add_source_options(CommandLine& line, OpenOptions& options) {
+  line.group("Input");
+  line.option("--channel", "NAME|N",
+              "Channel of elevations: its name, or its number from 0 (default: the file's only "
+              "or first fitting one)",
+              options.channel);
+  line.option("--registration", "KIND",
+              "Where samples lie: area (middle of a pixel), point (on posts), or auto: as the file says, else posts "
+              "without and areas with a georeference (default auto)",
+              [&](const std::string& text) {
+                const std::size_t word = parse_word(text, {"area", "point", "auto"});
+                options.registration.reset();
+                if (word == 0) options.registration = Registration::kArea;
+                if (word == 1) options.registration = Registration::kPoint;
+              });
+  line.option("--nodata", "VALUE", "Raw value that means 'no elevation', instead of the file's; NaN always does",
+              [&](const std::string& text) {
+                double value = 0.0;
+                if (!read_number(text, value)) {
+                  throw Error(ErrorCode::kInvalidArgument, "found '" + text + "', must be a number or nan");
+                }
+                options.void_value = value;
+              });
+  line.option("--z-scale", "FACTOR", "elevation = raw * FACTOR + z-offset, instead of the file's (default 1)",
+              [&](const std::string& text) {
+                const double scale = parse_number(text);
+                if (scale == 0.0) throw Error(ErrorCode::kInvalidArgument, "found '" + text + "', must not be 0");
+                options.z_scale = scale;
+              });
+  line.option("--z-offset", "NUMBER", "See --z-scale (default 0)",
+              [&](const std::string& text) { options.z_offset = parse_number(text); });
+  line.option("--sample-spacing", "METRES", "Distance of neighbouring samples, instead of the file's",
+              [&](const std::string& text) { options.spacing = parse_positive_number(text); });
+}
+
+}  // namespace isohf::cli

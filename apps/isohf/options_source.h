@@ -1,0 +1,11 @@
+#pragma once
+
+#include "command_line.h"
+#include "formats/registry.h"
+
+namespace isohf::cli {
+
+/// What a user may say about an input: --channel, --registration, --nodata, --z-scale, --z-offset, --sample-spacing.
+void add_source_options(CommandLine& line, OpenOptions& options);
+
+}  // namespace isohf::cli

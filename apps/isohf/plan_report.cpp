@@ -1,0 +1,90 @@
+#include "plan_report.h"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include "describe.h"
+#include "json_output.h"
+#include "standard_output.h"
+
+namespace isohf::cli {
+namespace {
+
+using nlohmann::ordered_json;
+
+ordered_json json_from_plan(const SourceInfo& info, const Plan& plan, CodeType code_type) {
+  const std::uint64_t raw =
+      static_cast<std::uint64_t>(plan.lattice_samples) * static_cast<std::uint64_t>(raw_bytes(code_type));
+  return {{"input",
+           {{"path", info.path},
+            {"format", info.format},
+            {"width", info.width},
+            {"height", info.height},
+            {"sample_type", to_string(info.sample_type)},
+            {"channel", info.channel},
+            {"registration", to_string(plan.frame.registration)},
+            {"spacing_x", plan.frame.spacing_x},
+            {"spacing_z", plan.frame.spacing_z},
+            {"in_metres", plan.frame.in_metres},
+            {"warnings", info.warnings}}},
+          {"shape", json_from(plan.grid.shape())},
+          {"grid", json_from(plan.grid)},
+          {"density", plan.density},
+          {"outside", to_string(plan.outside)},
+          {"covered", json_from(plan.frame.bounds())},
+          {"lattice_samples", plan.lattice_samples},
+          {"code_type", to_string(code_type)},
+          {"raw_bytes", raw},
+          {"estimated_archive_bytes", plan.estimated_bytes},
+          {"estimated_memory_bytes", plan.estimated_memory_bytes}};
+}
+
+std::string text_from_plan(const SourceInfo& info, const Plan& plan, CodeType code_type) {
+  const TileGrid& grid = plan.grid;
+  const TileShape& shape = grid.shape();
+  const bool metres = plan.frame.in_metres;
+  const WorldBounds covered = plan.frame.bounds();
+  std::string text;
+  const auto say = [&](const char* what, const std::string& value) { text += fmt::format("{:<12} {}\n", what, value); };
+  say("input", fmt::format("{}: {}, {} x {} {}{}", info.path, info.format, info.width, info.height,
+                           to_string(info.sample_type), info.channel.empty() ? "" : ", channel " + info.channel));
+  say("samples", fmt::format("{} apart in x, {} in z, registered as {}", describe_length(plan.frame.spacing_x, metres),
+                             describe_length(plan.frame.spacing_z, metres), to_string(plan.frame.registration)));
+  say("tile shape", fmt::format("{}x{} (C x R), {} levels, aspect {:.5f}, {} triangles, {} samples", shape.columns(),
+                                shape.rows(), shape.levels(), shape.aspect(), describe_count(shape.triangle_count()),
+                                describe_count(shape.stored_vertex_count())));
+  say("tile grid", fmt::format("{} x {} = {} tiles of {} by {}", grid.tile_columns(), grid.tile_rows(),
+                               describe_count(grid.tile_count()), describe_length(grid.extent_x(), metres),
+                               describe_length(grid.extent_z(), metres)));
+  say("lattice", fmt::format("columns {} apart, rows {}; {:.4g} samples for one of the input",
+                             describe_length(2.0 * grid.sigma_x(), metres), describe_length(grid.sigma_z(), metres),
+                             plan.density));
+  say("covers", fmt::format("{} by {}", describe_length(grid.world_width(), metres),
+                            describe_length(grid.world_height(), metres)));
+  say("input lies in", fmt::format("x {:.6g}..{:.6g}, z {:.6g}..{:.6g}; beyond it: {}", covered.x0, covered.x1,
+                                   covered.z0, covered.z1, to_string(plan.outside)));
+  const std::uint64_t raw =
+      static_cast<std::uint64_t>(plan.lattice_samples) * static_cast<std::uint64_t>(raw_bytes(code_type));
+  say("archive", fmt::format("about {} ({} samples, {} as raw {})", describe_bytes(plan.estimated_bytes),
+                             describe_count(plan.lattice_samples), describe_bytes(raw), to_string(code_type)));
+  say("memory", fmt::format("about {} while converting", describe_bytes(plan.estimated_memory_bytes)));
+  return text;
+}
+
+}  // namespace
+
+void print_plan(const SourceInfo& info, const Plan& plan, CodeType code_type, const CommonOptions& common) {
+  if (!common.quiet) {
+    for (const std::string& warning : info.warnings) print_warning(warning);
+  }
+  StandardOutput out;
+  if (common.json) {
+    out.write(json_text(json_from_plan(info, plan, code_type)));
+  } else if (!common.quiet) {
+    out.write(text_from_plan(info, plan, code_type));
+  }
+  out.finish();
+}
+
+}  // namespace isohf::cli

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <string>
+
+namespace isohf::cli {
+
+/// In the order of --progress's words.
+enum class ProgressMode { kAuto, kPlain, kJson, kNone };
+
+/// How far a long run has come, on standard error: a bar with rate and time left on a terminal, plain lines or JSON
+/// lines otherwise. Erases its bar when it goes.
+class ProgressDisplay {
+ public:
+  /// `quiet` silences it; kAuto is a bar on a terminal, plain lines where `verbose`, else nothing.
+  ProgressDisplay(ProgressMode mode, bool quiet, bool verbose);
+  ~ProgressDisplay();
+  ProgressDisplay(const ProgressDisplay&) = delete;
+  ProgressDisplay& operator=(const ProgressDisplay&) = delete;
+
+  /// `what` names the pass ("tiles"); a new name starts a new clock. `unit` is what is counted.
+  void update(const std::string& what, const std::string& unit, std::int64_t done, std::int64_t total);
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  enum class Style { kNothing, kBar, kLines, kJson };
+
+  Style style_;
+  std::string what_;
+  Clock::time_point started_;
+  Clock::time_point shown_;
+  std::int64_t first_done_ = 0;
+  bool bar_is_shown_ = false;
+};
+
+}  // namespace isohf::cli

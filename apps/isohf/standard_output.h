@@ -1,0 +1,34 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+
+namespace isohf::cli {
+
+/// Buffered writing to standard output, every failure noticed.
+///
+/// A reader that has gone away (a closed pipe) is no error worth a message: it ends the program with exit code 1 and
+/// nothing said. Any other failure throws Error{kIo}.
+class StandardOutput {
+ public:
+  void write(std::string_view text);
+  /// Hands everything to the operating system.
+  void flush();
+  /// flush(), named for the end: output that was not finished is lost.
+  void finish() { flush(); }
+
+ private:
+  std::string pending_;
+};
+
+/// Thrown where standard output's reader has gone; main() ends quietly.
+struct OutputClosed {};
+
+/// One line on standard error: "isohf: warning: ...".
+void print_warning(const std::string& text);
+/// One line on standard error: "isohf: ...".
+void print_error(const std::string& text);
+/// One line on standard error as it stands.
+void print_note(const std::string& text);
+
+}  // namespace isohf::cli
