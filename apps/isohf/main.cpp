@@ -23,7 +23,10 @@ struct Command {
 
 constexpr Command kCommands[] = {
     {"plan", "List tile shapes, or what convert would make of an input", command_plan},
+    {"convert", "Turn a raster of elevations into an archive", command_convert},
     {"info", "Say what an archive holds", command_info},
+    {"verify", "Check an archive, and compare it with its source", command_verify},
+    {"sample", "Print elevation and normal at places", command_sample},
 };
 
 constexpr const char* kVersion = "isohf " ISOHF_VERSION "\n";

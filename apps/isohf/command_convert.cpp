@@ -1,0 +1,206 @@
+/// isohf convert: a raster of elevations becomes an archive.
+
+#include <fmt/format.h>
+#include <sys/resource.h>
+
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "command.h"
+#include "describe.h"
+#include "interrupt.h"
+#include "isohf/base/error.h"
+#include "isohf/convert/convert.h"
+#include "isohf/surface/kernels.h"
+#include "json_output.h"
+#include "options_common.h"
+#include "options_lattice.h"
+#include "options_source.h"
+#include "output_file.h"
+#include "plan_report.h"
+#include "standard_output.h"
+
+namespace isohf::cli {
+namespace {
+
+using nlohmann::ordered_json;
+
+constexpr const char* kFooter =
+    R"(The archive is written as OUTPUT.part and renamed when it is complete; an interrupted run leaves the
+part for --resume and nothing under the final name. The bytes do not depend on --threads.
+
+Examples:
+  isohf convert dem.tif dem.isohf
+  isohf convert dem.tif -o dem.isohf --density 0.866 --outside void --overwrite
+  isohf convert heights.exr h.isohf --channel R --z-scale 1200 --sample-spacing 2
+  isohf plan dem.tif                  the same options without writing: see what comes out
+  for f in *.hgt; do isohf convert "$f" "${f%.hgt}.isohf" -q || break; done)";
+
+struct ConvertCommandOptions {
+  CommonOptions common;
+  WorkOptions work;
+  std::string input;
+  std::string output;
+  OpenOptions open;
+  ConvertOptions convert;
+  bool dry_run = false;
+};
+
+std::optional<ConvertCommandOptions> parse(const Arguments& arguments) {
+  ConvertCommandOptions options;
+  CommandLine line("convert", "Turns a raster of elevations into an archive of isometric heightfield tiles.");
+  line.group("Arguments");
+  line.positional("INPUT", "-i,--input", "Raster of elevations", options.input);
+  line.positional("OUTPUT", "-o,--output", "Archive to write, NAME.isohf", options.output);
+  line.flag("--overwrite", "Replace OUTPUT where it exists", options.convert.overwrite);
+  line.flag("--resume", "Continue OUTPUT.part of an interrupted run, after checking what is there",
+            options.convert.resume);
+  line.flag("--dry-run", "Print the plan and write nothing, as isohf plan INPUT does", options.dry_run);
+  add_source_options(line, options.open);
+  add_lattice_options(line, options.convert.plan);
+  add_shape_options(line, options.convert.plan);
+  add_quantisation_options(line, options.convert);
+  line.group("Reconstruction");
+  line.option("--filter", "NAME",
+              "nearest, bilinear, catmull-rom, bspline2, bspline3, bspline5, lanczos3 or lanczos6 (default " +
+                  options.convert.filter + ")",
+              [&](const std::string& text) { options.convert.filter = to_string(filter_from_string(text)); });
+  line.option("--acquisition", "NAME",
+              "How the input's samples were taken: point, box, tent, gaussian:SIGMA or fir:FILE (default " +
+                  options.convert.acquisition + ")",
+              options.convert.acquisition);
+  add_work_options(line, options.work);
+  add_memory_option(line, "Refuse to start where more memory would be needed", options.convert.memory_bytes);
+  add_common_options(line, options.common);
+  line.footer(kFooter);
+  if (!line.parse(arguments)) return std::nullopt;
+  line.require("INPUT", options.input);
+  if (!options.dry_run) line.require("OUTPUT", options.output);
+  if (options.convert.clamp_range && !options.convert.z_range) {
+    throw Error(ErrorCode::kInvalidArgument, "convert: --clamp-range needs --z-range MIN:MAX");
+  }
+  options.convert.threads = options.work.threads;
+  options.convert.producer = "isohf " ISOHF_VERSION;
+  return options;
+}
+
+struct Measured {
+  std::uint64_t raw_bytes = 0;      ///< the lattice as raw 16-bit samples
+  double ratio = 0.0;               ///< of it to the archive
+  double bits_per_sample = 0.0;     ///< whole archive over all lattice samples
+  double samples_per_second = 0.0;  ///< of the source
+  std::uint64_t peak_memory_bytes = 0;
+};
+
+Measured measure(const ConvertSummary& summary) {
+  Measured measured;
+  measured.raw_bytes = 2 * summary.lattice_samples;
+  const auto bytes = static_cast<double>(summary.archive_bytes);
+  if (summary.archive_bytes > 0) measured.ratio = static_cast<double>(measured.raw_bytes) / bytes;
+  if (summary.lattice_samples > 0) {
+    measured.bits_per_sample = 8.0 * bytes / static_cast<double>(summary.lattice_samples);
+  }
+  if (summary.seconds > 0.0) {
+    measured.samples_per_second = static_cast<double>(summary.source_samples) / summary.seconds;
+  }
+  struct rusage usage {};
+  ::getrusage(RUSAGE_SELF, &usage);
+  measured.peak_memory_bytes = static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;
+  return measured;
+}
+
+std::string json_from(const ConvertCommandOptions& options, const ConvertSummary& summary) {
+  const Measured measured = measure(summary);
+  return json_text({{"input", options.input},
+                    {"output", options.output},
+                    {"tiles_expected", summary.tiles_expected},
+                    {"tiles_written", summary.tiles_written},
+                    {"tiles_void", summary.tiles_void},
+                    {"archive_bytes", summary.archive_bytes},
+                    {"raw_16_bit_bytes", measured.raw_bytes},
+                    {"ratio_to_raw_16_bit", measured.ratio},
+                    {"bits_per_sample", measured.bits_per_sample},
+                    {"source_samples", summary.source_samples},
+                    {"lattice_samples", summary.lattice_samples},
+                    {"step", summary.step},
+                    {"worst_rounding", summary.worst_rounding},
+                    {"seconds", summary.seconds},
+                    {"source_samples_per_second", measured.samples_per_second},
+                    {"peak_memory_bytes", measured.peak_memory_bytes},
+                    {"warnings", summary.warnings},
+                    {"metadata", ordered_json::parse(format_metadata(summary.metadata))}});
+}
+
+std::string text_from(const ConvertCommandOptions& options, const ConvertSummary& summary) {
+  const Measured measured = measure(summary);
+  const Metadata& metadata = summary.metadata;
+  const TileShape& shape = metadata.grid.shape();
+  const std::string unit = metadata.vertical_unit == "unknown" ? "" : " " + metadata.vertical_unit;
+  std::string text;
+  const auto say = [&](const char* what, const std::string& value) { text += fmt::format("{:<12} {}\n", what, value); };
+  say("archive", fmt::format("{}: {}", options.output, describe_bytes(summary.archive_bytes)));
+  say("tiles", fmt::format("{} of {} written, {} of them wholly void; {} x {} tiles of {}x{}",
+                           describe_count(summary.tiles_written), describe_count(summary.tiles_expected),
+                           describe_count(summary.tiles_void), metadata.grid.tile_columns(), metadata.grid.tile_rows(),
+                           shape.columns(), shape.rows()));
+  say("size", fmt::format("{:.2f} times smaller than raw 16-bit samples ({}), {:.3f} bits a sample", measured.ratio,
+                          describe_bytes(measured.raw_bytes), measured.bits_per_sample));
+  if (metadata.quantisation.type == CodeType::kF32) {
+    say("elevations", fmt::format("f32, worst rounding {:.4g}{}", summary.worst_rounding, unit));
+  } else {
+    say("elevations", fmt::format("{}, step {:.9g}{}, worst rounding {:.4g}{}", to_string(metadata.quantisation.type),
+                                  summary.step, unit, summary.worst_rounding, unit));
+  }
+  if (metadata.statistics.clamped > 0) {
+    say("clamped", fmt::format("{} vertices moved into the range", describe_count(metadata.statistics.clamped)));
+  }
+  say("time", fmt::format("{}, {:.3g} million input samples a second", describe_seconds(summary.seconds),
+                          measured.samples_per_second / 1e6));
+  say("memory", fmt::format("{} at most", describe_bytes(measured.peak_memory_bytes)));
+  return text;
+}
+
+int run(const ConvertCommandOptions& options) {
+  const CommonOptions& common = options.common;
+  if (!options.dry_run) check_output_file(options.input, options.output, options.convert.overwrite);
+  const std::unique_ptr<HeightSource> source = open_source(options.input, options.open);
+  if (options.dry_run) {
+    print_plan(source->info(), make_plan(source->info(), options.convert.plan), options.convert.code_type, common);
+    return kExitDone;
+  }
+  const std::atomic<bool>& cancel = watch_interrupts();
+  ConvertSummary summary = [&] {
+    ProgressDisplay display(options.work.progress, common.quiet, common.verbose);
+    return convert(
+        *source, options.output, options.convert,
+        [&](const ConvertProgress& at) {
+          const bool ranging = at.pass == ConvertProgress::Pass::kRange;
+          display.update(ranging ? "range" : "tiles", ranging ? "rows" : "tiles", at.done, at.total);
+        },
+        cancel);
+  }();
+  if (!common.quiet) {
+    for (const std::string& warning : summary.warnings) print_warning(warning);
+  }
+  if (summary.tiles_written != summary.tiles_expected) {
+    throw Error(ErrorCode::kIo, fmt::format("{}: {} tiles written, {} expected", options.output, summary.tiles_written,
+                                            summary.tiles_expected));
+  }
+  StandardOutput out;
+  if (common.json) {
+    out.write(json_from(options, summary));
+  } else if (!common.quiet) {
+    out.write(text_from(options, summary));
+  }
+  out.finish();
+  return kExitDone;
+}
+
+}  // namespace
+
+int command_convert(const Arguments& arguments) {
+  const std::optional<ConvertCommandOptions> options = parse(arguments);
+  return options ? run(*options) : static_cast<int>(kExitDone);
+}
+
+}  // namespace isohf::cli

@@ -1,0 +1,243 @@
+/// isohf verify: is an archive whole, and how far is it from what it was made from?
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "command.h"
+#include "describe.h"
+#include "interrupt.h"
+#include "isohf/base/error.h"
+#include "isohf/verify/against_source.h"
+#include "isohf/verify/verify.h"
+#include "json_output.h"
+#include "option_values.h"
+#include "options_common.h"
+#include "options_source.h"
+#include "standard_output.h"
+
+namespace isohf::cli {
+namespace {
+
+using nlohmann::ordered_json;
+
+constexpr const char* kFooter =
+    R"(Each finding is one line: its number, its severity, where, what. Exit code 0: nothing above a note was found;
+3: something was, or the surface is further from INPUT than allowed; 1: the check itself failed.
+Options of the input default to what the archive says it was made with.
+
+Examples:
+  isohf verify dem.isohf
+  isohf verify dem.isohf --against dem.tif --max-error 5
+  isohf verify --list-checks)";
+
+struct VerifyCommandOptions {
+  CommonOptions common;
+  WorkOptions work;
+  std::string archive;
+  std::string against;
+  OpenOptions open;
+  std::int64_t random_points = 100000;
+  std::optional<double> max_error;
+  std::optional<double> max_rms;
+  bool list_checks = false;
+};
+
+std::optional<VerifyCommandOptions> parse(const Arguments& arguments) {
+  VerifyCommandOptions options;
+  CommandLine line("verify", "Checks an archive, and compares it with what it was made from.");
+  line.group("Arguments");
+  line.positional("ARCHIVE", "-i,--input", "Archive to check", options.archive);
+  line.flag("--list-checks", "Print what is checked, one finding kind a line, and exit", options.list_checks);
+  line.group("Comparison");
+  line.option("--against", "INPUT", "Measure the surface against the raster it was made from", options.against);
+  line.option("--random", "N", "Random places to compare beside the input's samples (default 100000)",
+              [&](const std::string& text) { options.random_points = parse_whole_number(text, 0, 1000000000); });
+  const auto limit = [](std::optional<double>& value) {
+    return [&value](const std::string& text) {
+      double found = 0.0;
+      if (!read_number(text, found) || !(found >= 0.0)) {
+        throw Error(ErrorCode::kInvalidArgument, "found '" + text + "', must be a number of at least 0");
+      }
+      value = found;
+    };
+  };
+  line.option("--max-error", "E", "Exit 3 where an input sample is missed by more than E (default: any error passes)",
+              limit(options.max_error));
+  line.option("--max-rms", "E", "Exit 3 where the root mean square error is above E (default: any passes)",
+              limit(options.max_rms));
+  add_source_options(line, options.open);
+  add_work_options(line, options.work);
+  add_common_options(line, options.common);
+  line.footer(kFooter);
+  if (!line.parse(arguments)) return std::nullopt;
+  if (options.list_checks) return options;
+  line.require("ARCHIVE", options.archive);
+  if (options.against.empty()) {
+    for (const char* option : {"--random", "--max-error", "--max-rms", "--channel", "--registration", "--nodata",
+                               "--z-scale", "--z-offset", "--sample-spacing"}) {
+      if (line.given(option)) {
+        throw Error(ErrorCode::kInvalidArgument, std::string("verify: ") + option + " needs --against INPUT");
+      }
+    }
+  }
+  return options;
+}
+
+const char* to_word(Severity severity) {
+  switch (severity) {
+    case Severity::kNote:
+      return "note";
+    case Severity::kWarning:
+      return "warning";
+    case Severity::kError:
+      return "error";
+  }
+  return "?";
+}
+
+void list_checks(bool json) {
+  StandardOutput out;
+  ordered_json list = ordered_json::array();
+  for (const FindingKind& kind : finding_catalogue()) {
+    if (json) {
+      list.push_back({{"id", finding_name(kind.id)}, {"severity", to_word(kind.severity)}, {"meaning", kind.meaning}});
+    } else {
+      out.write(fmt::format("{} {:<7} {}\n", finding_name(kind.id), to_word(kind.severity), kind.meaning));
+    }
+  }
+  if (json) out.write(json_text({{"checks", list}}));
+  out.finish();
+}
+
+ordered_json json_from(const VerifyReport& report) {
+  ordered_json findings = ordered_json::array();
+  for (const Finding& finding : report.findings) {
+    ordered_json json = {{"id", finding_name(finding.id)}, {"severity", to_word(finding.severity)}};
+    json["tile"] = finding.tile ? ordered_json{{"column", finding.tile->column}, {"row", finding.tile->row}}
+                                : ordered_json(nullptr);
+    json["text"] = finding.text;
+    findings.push_back(std::move(json));
+  }
+  return {{"passed", report.passed()},
+          {"tiles_checked", report.tiles_checked},
+          {"shared_vertices_checked", report.shared_vertices_checked},
+          {"findings_total", report.findings_total},
+          {"findings", findings}};
+}
+
+ordered_json json_from(const AccuracyReport& report) {
+  return {{"samples", report.samples},
+          {"samples_void", report.samples_void},
+          {"samples_lost", report.samples_lost},
+          {"samples_invented", report.samples_invented},
+          {"rms", report.rms},
+          {"max", report.max},
+          {"p99", report.p99},
+          {"psnr_db", report.psnr_db},
+          {"worst", {{"x", report.worst.x}, {"z", report.worst.z}}},
+          {"random_points", report.random_points},
+          {"random_rms", report.random_rms},
+          {"random_max", report.random_max}};
+}
+
+std::string text_from(const Finding& finding) {
+  std::string text = finding_name(finding.id) + " " + to_word(finding.severity);
+  if (finding.tile) text += fmt::format(" tile ({},{})", finding.tile->column, finding.tile->row);
+  return text + ": " + finding.text + "\n";
+}
+
+std::string text_from(const AccuracyReport& report, const std::string& input) {
+  std::string text = fmt::format("against      {}: {} samples, {} void; {} lost, {} where the input has none\n", input,
+                                 describe_count(report.samples), describe_count(report.samples_void),
+                                 describe_count(report.samples_lost), describe_count(report.samples_invented));
+  text +=
+      fmt::format("error        rms {:.6g}, 99 % within {:.6g}, largest {:.6g} at x {:.9g} z {:.9g}, PSNR {:.1f} dB\n",
+                  report.rms, report.p99, report.max, report.worst.x, report.worst.z, report.psnr_db);
+  if (report.random_points > 0) {
+    text += fmt::format("between      rms {:.6g}, largest {:.6g} at {} random places\n", report.random_rms,
+                        report.random_max, describe_count(report.random_points));
+  }
+  return text;
+}
+
+VerifyReport check(const VerifyCommandOptions& options, const std::atomic<bool>& cancel) {
+  ProgressDisplay display(options.work.progress, options.common.quiet, options.common.verbose);
+  VerifyOptions verify;
+  verify.threads = options.work.threads;
+  verify.progress = [&](std::int64_t done, std::int64_t total) {
+    display.update("verify", "tiles", done, total);
+    return !cancel.load();
+  };
+  return verify_archive(options.archive, verify);
+}
+
+AccuracyReport compare(const VerifyCommandOptions& options, const std::atomic<bool>& cancel) {
+  const ArchiveReader archive(options.archive);
+  OpenOptions open = options.open;
+  const SourceRecord& record = archive.metadata().source;
+  if (open.channel.empty()) open.channel = record.channel;
+  if (!open.registration)
+    open.registration = record.registration == "area" ? Registration::kArea : Registration::kPoint;
+  const std::unique_ptr<HeightSource> source = open_source(options.against, open);
+  ProgressDisplay display(options.work.progress, options.common.quiet, options.common.verbose);
+  return compare_with_source(
+      archive, *source, options.random_points, options.work.threads,
+      [&](std::int64_t done, std::int64_t total) { display.update("compare", "rows", done, total); }, cancel);
+}
+
+/// What of the measured error is more than was allowed; empty where nothing is.
+std::string why_too_far(const VerifyCommandOptions& options, const AccuracyReport& accuracy) {
+  if (options.max_error && accuracy.max > *options.max_error) {
+    return fmt::format("the largest error is {:.6g}, at most {:.6g} is allowed", accuracy.max, *options.max_error);
+  }
+  if (options.max_rms && accuracy.rms > *options.max_rms) {
+    return fmt::format("the rms error is {:.6g}, at most {:.6g} is allowed", accuracy.rms, *options.max_rms);
+  }
+  return {};
+}
+
+int run(const VerifyCommandOptions& options) {
+  if (options.list_checks) {
+    list_checks(options.common.json);
+    return kExitDone;
+  }
+  const std::atomic<bool>& cancel = watch_interrupts();
+  const VerifyReport report = check(options, cancel);
+  std::optional<AccuracyReport> accuracy;
+  // An archive that is not whole has no surface to measure.
+  const bool compares = !options.against.empty() && report.passed();
+  if (compares) accuracy = compare(options, cancel);
+  const std::string too_far = accuracy ? why_too_far(options, *accuracy) : "";
+  const bool passed = report.passed() && too_far.empty();
+
+  StandardOutput out;
+  if (options.common.json) {
+    ordered_json document = {{"archive", options.archive}, {"passed", passed}, {"checks", json_from(report)}};
+    if (accuracy) document["against"] = json_from(*accuracy);
+    if (!too_far.empty()) document["difference"] = too_far;
+    out.write(json_text(document));
+  } else if (!options.common.quiet) {
+    for (const Finding& finding : report.findings) out.write(text_from(finding));
+    const std::int64_t not_listed = report.findings_total - static_cast<std::int64_t>(report.findings.size());
+    if (not_listed > 0) out.write(fmt::format("and {} more\n", describe_count(not_listed)));
+    if (accuracy) out.write(text_from(*accuracy, options.against));
+    if (!options.against.empty() && !compares) out.write("not compared with the input: the archive is not whole\n");
+    if (!too_far.empty()) out.write("difference: " + too_far + "\n");
+    out.write(fmt::format("{}: {}: {} tiles and {} shared vertices checked, {} findings\n", options.archive,
+                          passed ? "passed" : "FAILED", describe_count(report.tiles_checked),
+                          describe_count(report.shared_vertices_checked), describe_count(report.findings_total)));
+  }
+  out.finish();
+  return passed ? kExitDone : kExitDifferences;
+}
+
+}  // namespace
+
+int command_verify(const Arguments& arguments) {
+  const std::optional<VerifyCommandOptions> options = parse(arguments);
+  return options ? run(*options) : static_cast<int>(kExitDone);
+}
+
+}  // namespace isohf::cli
