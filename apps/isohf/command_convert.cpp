@@ -168,6 +168,9 @@ int run(const ConvertCommandOptions& options) {
     print_plan(source->info(), make_plan(source->info(), options.convert.plan), options.convert.code_type, common);
     return kExitDone;
   }
+  if (common.verbose && !common.quiet) {
+    print_plan_notes(source->info(), make_plan(source->info(), options.convert.plan), options.convert.code_type);
+  }
   const std::atomic<bool>& cancel = watch_interrupts();
   ConvertSummary summary = [&] {
     ProgressDisplay display(options.work.progress, common.quiet, common.verbose);

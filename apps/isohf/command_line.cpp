@@ -37,25 +37,33 @@ std::string wrapped(const std::string& text, std::size_t indent, std::size_t wid
   return out;
 }
 
-/// Two columns, wrapped; the value's name after the flags, and nothing of CLI11's own notes.
+/// Usage, then one list of options a group, "Common" last; two columns, wrapped, and nothing of CLI11's own notes.
 class HelpFormatter : public CLI::Formatter {
  public:
   explicit HelpFormatter(std::string usage) : usage_(std::move(usage)) {}
 
-  [[nodiscard]] std::string make_usage(const CLI::App* /*app*/, std::string /*name*/) const override {
-    return "Usage: isohf " + usage_ + "\n";
+  [[nodiscard]] std::string make_help(const CLI::App* app, std::string /*name*/,
+                                      CLI::AppFormatMode /*mode*/) const override {
+    std::string help = fmt::format("{}\n\nUsage: isohf {}\n", app->get_description(), usage_);
+    std::vector<std::string> groups = app->get_groups();
+    std::stable_partition(groups.begin(), groups.end(), [](const std::string& group) { return group != "Common"; });
+    for (const std::string& group : groups) {
+      std::string lines;
+      for (const CLI::Option* option : app->get_options()) {
+        if (option->get_group() == group) lines += describe(option);
+      }
+      if (!lines.empty()) help += "\n" + group + ":\n" + lines;
+    }
+    return help + "\n" + app->get_footer() + "\n";
   }
 
-  [[nodiscard]] std::string make_option(const CLI::Option* option, bool is_positional) const override {
-    std::string name;
-    if (is_positional) {
-      name = option->get_name(true, false);
-    } else {
-      for (const std::string& flag : option->get_snames()) name += (name.empty() ? "-" : ", -") + flag;
-      for (const std::string& flag : option->get_lnames()) name += (name.empty() ? "    --" : ", --") + flag;
-      if (option->get_type_size() != 0) name += " " + option->get_type_name();
-    }
-    std::string line = "  " + name;
+ private:
+  static std::string describe(const CLI::Option* option) {
+    std::string line = "  ";
+    for (const std::string& flag : option->get_snames()) line += "-" + flag + ", ";
+    if (option->get_snames().empty() && !option->get_lnames().empty()) line += "    ";
+    for (const std::string& flag : option->get_lnames()) line += "--" + flag + " ";
+    if (option->get_lnames().empty() || option->get_type_size() != 0) line += option->get_type_name();
     if (line.size() + 2 > kNameWidth) {
       line += "\n" + std::string(kNameWidth, ' ');
     } else {
@@ -64,7 +72,6 @@ class HelpFormatter : public CLI::Formatter {
     return line + wrapped(option->get_description(), kNameWidth, kHelpWidth) + "\n";
   }
 
- private:
   std::string usage_;
 };
 
@@ -107,8 +114,11 @@ struct CommandLine::State {
   std::string group = "Options";
   std::string usage_positionals;
 
-  /// The first long name in "-q,--quiet" as the user writes it.
-  static std::string long_name(const std::string& flags) { return flags.substr(flags.find("--")); }
+  /// The long name in "-q,--quiet" or "-i,--input,INPUT" as the user writes it.
+  static std::string long_name(const std::string& flags) {
+    const std::size_t from = flags.find("--");
+    return flags.substr(from, flags.find(',', from) - from);
+  }
 
   [[nodiscard]] std::vector<std::string> long_names() const {
     std::vector<std::string> names;
@@ -144,9 +154,7 @@ void CommandLine::group(const std::string& title) {
 
 void CommandLine::positional(const std::string& name, const std::string& flags, const std::string& description,
                              std::string& value) {
-  state_->app.add_option(flags.empty() ? name : flags + "," + name, value, description)
-      ->type_name(name)
-      ->group(state_->group);
+  option(flags + "," + name, name, description, [&value](const std::string& text) { value = text; });
   state_->usage_positionals += " " + name;
 }
 
@@ -233,6 +241,18 @@ bool CommandLine::parse(const Arguments& arguments) {
     return false;
   } catch (const CLI::ExtrasError&) {
     fail(state_->why_unexpected());
+  } catch (const CLI::ArgumentMismatch& error) {
+    // "--density: 1 required RATIO missing"
+    const std::string text = error.what();
+    fail(text.find("missing") == std::string::npos ? text : text.substr(0, text.find(':')) + " lacks its value");
+  } catch (const CLI::ExcludesError& error) {
+    fail(std::string(error.what()) + "; at most one of them may be given");
+  } catch (const CLI::FileError& error) {
+    fail(std::string("--config: ") + error.what());
+  } catch (const CLI::ConfigError& error) {
+    // "INI was not able to parse density2"
+    const std::string text = error.what();
+    fail("--config: no option is named " + text.substr(text.rfind(' ') + 1));
   } catch (const CLI::ParseError& error) {
     fail(error.what());
   } catch (const Error& error) {

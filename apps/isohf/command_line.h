@@ -25,7 +25,7 @@ class CommandLine {
   CommandLine& operator=(const CommandLine&) = delete;
 
   void group(const std::string& title);
-  /// A value without a name; `flags` ("-i,--input") names it as well, or is empty.
+  /// A value without a name; `flags` ("-i,--input") name it as well.
   void positional(const std::string& name, const std::string& flags, const std::string& description,
                   std::string& value);
   void option(const std::string& flags, const std::string& value_name, const std::string& description, Take take);

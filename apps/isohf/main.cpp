@@ -60,7 +60,7 @@ Results go to standard output, everything else to standard error.
 Exit codes: 0 done, 1 failed, 2 wrong usage, 3 verify found differences, 130 interrupted.
 
 Examples:
-  isohf plan                              tile shapes for about 100000 triangles a tile
+  isohf plan                              list tile shapes
   isohf plan dem.tif                      what convert would do, without doing it
   isohf convert dem.tif dem.isohf
   isohf verify dem.isohf --against dem.tif

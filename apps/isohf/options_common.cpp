@@ -13,7 +13,7 @@ void add_common_options(CommandLine& line, CommonOptions& options) {
   line.group("Common");
   line.flag("--json", "Print one JSON document on standard output instead of text", options.json);
   line.flag("-q,--quiet", "Print nothing but errors", options.quiet);
-  line.flag("-v,--verbose", "Say more on standard error", options.verbose);
+  line.flag("-v,--verbose", "Say more, on standard error", options.verbose);
 }
 
 void add_work_options(CommandLine& line, WorkOptions& options) {

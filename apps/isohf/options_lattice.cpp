@@ -16,7 +16,7 @@ void add_shape_options(CommandLine& line, PlanRequest& request) {
   line.group("Tile shape");
   line.option("--shape", "CxR", "Stored elevations of one tile, columns by rows, as in 212x243",
               [&](const std::string& text) {
-                const auto [columns, rows] = parse_size(text, 0, kMostCount);
+                const auto [columns, rows] = parse_size(text, 1, kMaxTileRows);
                 request.shape = {static_cast<int>(columns), static_cast<int>(rows)};
               });
   line.option("--levels", "N", "Levels of detail, 1 to 13 (default 4, fewer for a small input)",

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "describe.h"
 #include "json_output.h"
@@ -85,6 +86,11 @@ void print_plan(const SourceInfo& info, const Plan& plan, CodeType code_type, co
     out.write(text_from_plan(info, plan, code_type));
   }
   out.finish();
+}
+
+void print_plan_notes(const SourceInfo& info, const Plan& plan, CodeType code_type) {
+  std::istringstream lines(text_from_plan(info, plan, code_type));
+  for (std::string line; std::getline(lines, line);) print_note("isohf: " + line);
 }
 
 }  // namespace isohf::cli

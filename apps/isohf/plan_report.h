@@ -9,4 +9,7 @@ namespace isohf::cli {
 /// standard error.
 void print_plan(const SourceInfo& info, const Plan& plan, CodeType code_type, const CommonOptions& common);
 
+/// The same text on standard error, for -v.
+void print_plan_notes(const SourceInfo& info, const Plan& plan, CodeType code_type);
+
 }  // namespace isohf::cli
