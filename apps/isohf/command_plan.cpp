@@ -135,8 +135,22 @@ void list_table1(const PlanOptions& options) {
   out.finish();
 }
 
+std::vector<TileShape> shapes_for(const PlanOptions& options) {
+  constexpr int kDefaultLevels = 4;
+  const PlanRequest& request = options.request;
+  const int levels = request.levels.value_or(kDefaultLevels);
+  if (request.shape) return {TileShape::make(request.shape->first, request.shape->second, levels)};
+  std::vector<TileShape> shapes = candidate_shapes(request, options.limit);
+  if (shapes.empty()) {
+    throw Error(ErrorCode::kInvalidArgument,
+                fmt::format("plan: no tile shape of {} levels lies near {}; ask for more of them or for fewer --levels",
+                            levels, request.budget ? request.budget->count : 0));
+  }
+  return shapes;
+}
+
 void list_candidates(const PlanOptions& options) {
-  std::vector<TileShape> shapes = candidate_shapes(options.request, options.limit);
+  const std::vector<TileShape> shapes = shapes_for(options);
   StandardOutput out;
   if (options.common.json) {
     ordered_json list = ordered_json::array();

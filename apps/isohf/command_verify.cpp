@@ -10,6 +10,7 @@
 #include "interrupt.h"
 #include "isohf/base/error.h"
 #include "isohf/verify/against_source.h"
+#include "isohf/verify/findings.h"
 #include "isohf/verify/verify.h"
 #include "json_output.h"
 #include "option_values.h"
@@ -130,8 +131,11 @@ ordered_json json_from(const VerifyReport& report) {
 ordered_json json_from(const AccuracyReport& report) {
   return {{"samples", report.samples},
           {"samples_void", report.samples_void},
+          {"samples_compared", report.samples_compared},
           {"samples_lost", report.samples_lost},
+          {"lost_inside", report.lost_inside},
           {"samples_invented", report.samples_invented},
+          {"invented_inside", report.invented_inside},
           {"rms", report.rms},
           {"max", report.max},
           {"p99", report.p99},
@@ -149,9 +153,16 @@ std::string text_from(const Finding& finding) {
 }
 
 std::string text_from(const AccuracyReport& report, const std::string& input) {
-  std::string text = fmt::format("against      {}: {} samples, {} void; {} lost, {} where the input has none\n", input,
-                                 describe_count(report.samples), describe_count(report.samples_void),
-                                 describe_count(report.samples_lost), describe_count(report.samples_invented));
+  std::string text = fmt::format("against      {}: {} of {} samples compared, {} void in the input\n", input,
+                                 describe_count(report.samples_compared), describe_count(report.samples),
+                                 describe_count(report.samples_void));
+  if (report.samples_lost + report.samples_invented > 0) {
+    text += fmt::format(
+        "voids        {} samples lie in voids of the surface, {} voids lie on it; {} and {} of them away "
+        "from borders of voids\n",
+        describe_count(report.samples_lost), describe_count(report.samples_invented),
+        describe_count(report.lost_inside), describe_count(report.invented_inside));
+  }
   text +=
       fmt::format("error        rms {:.6g}, 99 % within {:.6g}, largest {:.6g} at x {:.9g} z {:.9g}, PSNR {:.1f} dB\n",
                   report.rms, report.p99, report.max, report.worst.x, report.worst.z, report.psnr_db);
@@ -160,6 +171,17 @@ std::string text_from(const AccuracyReport& report, const std::string& input) {
                         report.random_max, describe_count(report.random_points));
   }
   return text;
+}
+
+/// What the comparison found beside errors of size: ground that is missing or made up, away from borders of voids.
+void add_findings(const AccuracyReport& accuracy, VerifyReport& report) {
+  const auto add = [&](int id, std::int64_t count, const char* what) {
+    if (count == 0) return;
+    report.findings.push_back({id, severity_of(id), std::nullopt, fmt::format("{} {}", describe_count(count), what)});
+    ++report.findings_total;
+  };
+  add(finding::kSourceLost, accuracy.lost_inside, "elevations of the input lie where the archive has none");
+  add(finding::kSourceInvented, accuracy.invented_inside, "voids of the input lie where the archive has elevations");
 }
 
 VerifyReport check(const VerifyCommandOptions& options, const std::atomic<bool>& cancel) {
@@ -204,11 +226,14 @@ int run(const VerifyCommandOptions& options) {
     return kExitDone;
   }
   const std::atomic<bool>& cancel = watch_interrupts();
-  const VerifyReport report = check(options, cancel);
+  VerifyReport report = check(options, cancel);
   std::optional<AccuracyReport> accuracy;
   // An archive that is not whole has no surface to measure.
   const bool compares = !options.against.empty() && report.passed();
-  if (compares) accuracy = compare(options, cancel);
+  if (compares) {
+    accuracy = compare(options, cancel);
+    add_findings(*accuracy, report);
+  }
   const std::string too_far = accuracy ? why_too_far(options, *accuracy) : "";
   const bool passed = report.passed() && too_far.empty();
 

@@ -31,9 +31,7 @@ struct Pipe {
 };
 
 void limit(int resource, std::uint64_t bytes) {
-  const struct rlimit value {
-    bytes, bytes
-  };
+  const struct rlimit value { bytes, bytes };
   ::setrlimit(static_cast<__rlimit_resource>(resource), &value);
 }
 
@@ -94,7 +92,9 @@ RunningProgram::~RunningProgram() {
   close_if_open(err_);
 }
 
-void RunningProgram::send(int signal) const { ::kill(pid_, signal); }
+void RunningProgram::send(int signal) const {
+  ::kill(pid_, signal);
+}
 
 void RunningProgram::feed_input() {
   const ssize_t sent = ::write(in_, unsent_input_.data(), unsent_input_.size());
@@ -147,7 +147,9 @@ RunResult run_program(const std::vector<std::string>& command, const RunOptions&
   return RunningProgram(command, options).wait();
 }
 
-std::string isohf_path() { return ISOHF_BIN_DIR "/isohf"; }
+std::string isohf_path() {
+  return ISOHF_BIN_DIR "/isohf";
+}
 
 RunResult run_isohf(const std::vector<std::string>& arguments, const RunOptions& options) {
   std::vector<std::string> command = {isohf_path()};

@@ -1,0 +1,217 @@
+/// Inputs and outputs that cannot work: each is one clear line, exit code 1 or 2, and nothing is written.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <limits>
+
+#include "support/plain_tiff.h"
+#include "support/run_program.h"
+#include "support/temporary_folder.h"
+
+namespace isohf::test {
+namespace {
+
+using testing::AnyOf;
+using testing::HasSubstr;
+
+class BadInput : public testing::Test {
+ protected:
+  /// Converts `input` and expects that it fails with one line holding all of `parts`, and leaves the folder as it was.
+  void expect_refused(const std::string& input, const std::vector<std::string>& parts,
+                      const std::vector<std::string>& more = {}) {
+    const std::vector<std::string> before = folder.names();
+    std::vector<std::string> arguments = {"convert", input, folder / "out.isohf"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const RunResult result = run_isohf(arguments);
+    EXPECT_THAT(result.exit_code, AnyOf(1, 2));
+    EXPECT_EQ(result.out, "");
+    EXPECT_THAT(result.err, testing::StartsWith("isohf: "));
+    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+    for (const std::string& part : parts) EXPECT_THAT(result.err, HasSubstr(part));
+    EXPECT_EQ(folder.names(), before);
+  }
+
+  void write_hills(const std::string& name, std::uint32_t size = 64) const {
+    write_int16_tiff(folder / name, size, size, [](std::int64_t c, std::int64_t r) {
+      return static_cast<std::int16_t>(500 + 100 * std::sin(0.1 * static_cast<double>(c)) *
+                                                 std::cos(0.07 * static_cast<double>(r)));
+    });
+  }
+
+  TemporaryFolder folder;
+};
+
+TEST_F(BadInput, MissingFile) {
+  expect_refused(folder / "none.tif", {"none.tif", "no such file"});
+}
+
+TEST_F(BadInput, EmptyFile) {
+  write_file(folder / "empty.tif", "");
+  expect_refused(folder / "empty.tif", {"empty.tif", "empty"});
+}
+
+TEST_F(BadInput, Folder) {
+  expect_refused(folder.path(), {folder.path(), "folder"});
+}
+
+TEST_F(BadInput, UnreadableFile) {
+  if (::geteuid() == 0) GTEST_SKIP() << "root reads every file";
+  write_hills("secret.tif");
+  ::chmod((folder / "secret.tif").c_str(), 0);
+  expect_refused(folder / "secret.tif", {"secret.tif", "Permission denied"});
+}
+
+TEST_F(BadInput, TruncatedFile) {
+  write_hills("whole.tif");
+  const std::string whole = read_file(folder / "whole.tif");
+  // Inside the header, the directory, the strip tables, the first rows, and one byte before the end.
+  for (const std::size_t length : {std::size_t{3}, std::size_t{7}, std::size_t{40}, std::size_t{200}, std::size_t{1000},
+                                   whole.size() / 2, whole.size() - 1}) {
+    SCOPED_TRACE(length);
+    write_file(folder / "cut.tif", whole.substr(0, length));
+    expect_refused(folder / "cut.tif", {"cut.tif"});
+  }
+}
+
+TEST_F(BadInput, UnknownFormat) {
+  write_file(folder / "notes.txt", "These are no elevations, but there are many of them.\n");
+  expect_refused(folder / "notes.txt", {"notes.txt"});
+  write_file(folder / "picture.xyzzy", std::string(5000, '\x17'));
+  expect_refused(folder / "picture.xyzzy", {"picture.xyzzy"});
+}
+
+TEST_F(BadInput, NothingButNaN) {
+  write_float_tiff(folder / "nan.tif", 40, 30,
+                   [](std::int64_t, std::int64_t) { return std::numeric_limits<float>::quiet_NaN(); });
+  expect_refused(folder / "nan.tif", {"nan.tif", "void"});
+  expect_refused(folder / "nan.tif", {"nan.tif", "void"}, {"--z-range", "0:1"});
+  expect_refused(folder / "nan.tif", {"nan.tif", "void"}, {"--type", "f32"});
+}
+
+TEST_F(BadInput, NothingButNodata) {
+  write_int16_tiff(folder / "flat.tif", 40, 30, [](std::int64_t, std::int64_t) { return std::int16_t{-999}; });
+  expect_refused(folder / "flat.tif", {"flat.tif", "void"}, {"--nodata", "-999"});
+}
+
+TEST_F(BadInput, OneRowOneColumnOneSample) {
+  const auto level = [](std::int64_t, std::int64_t) { return std::int16_t{5}; };
+  for (const auto& [width, height] : {std::pair{1U, 50U}, {50U, 1U}, {1U, 1U}}) {
+    write_int16_tiff(folder / "thin.tif", width, height, level);
+    expect_refused(folder / "thin.tif", {"thin.tif", std::to_string(width) + "x" + std::to_string(height), "2x2"});
+  }
+}
+
+TEST_F(BadInput, NoSamplesAtAll) {
+  write_hills("zero.tif");
+  std::string bytes = read_file(folder / "zero.tif");
+  bytes.replace(8 + 2 + 8, 4, std::string(4, '\0'));  // the width, the first entry's value
+  write_file(folder / "zero.tif", bytes);
+  expect_refused(folder / "zero.tif", {"zero.tif"});
+}
+
+TEST_F(BadInput, AbsurdHeaderSizes) {
+  write_hills("huge.tif");
+  std::string bytes = read_file(folder / "huge.tif");
+  bytes.replace(8 + 2 + 8, 4, std::string("\xff\xff\xff\x7f", 4));       // width
+  bytes.replace(8 + 2 + 12 + 8, 4, std::string("\xff\xff\xff\x7f", 4));  // height
+  write_file(folder / "huge.tif", bytes);
+  expect_refused(folder / "huge.tif", {"huge.tif"});
+}
+
+TEST_F(BadInput, WrongChannel) {
+  write_hills("one.tif");
+  expect_refused(folder / "one.tif", {"one.tif", "channel"}, {"--channel", "7"});
+  expect_refused(folder / "one.tif", {"one.tif", "channel"}, {"--channel", "Depth"});
+}
+
+TEST_F(BadInput, OutputFolderIsMissing) {
+  write_hills("a.tif");
+  const RunResult result = run_isohf({"convert", folder / "a.tif", folder / "none/out.isohf"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.err, HasSubstr("none: No such file or directory"));
+  EXPECT_EQ(folder.names(), std::vector<std::string>{"a.tif"});
+}
+
+TEST_F(BadInput, OutputIsAFolder) {
+  write_hills("a.tif");
+  const RunResult result = run_isohf({"convert", folder / "a.tif", folder.path(), "--overwrite"});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("is a folder"));
+}
+
+TEST_F(BadInput, OutputExists) {
+  write_hills("a.tif");
+  write_file(folder / "out.isohf", "precious");
+  expect_refused(folder / "a.tif", {"out.isohf: exists", "--overwrite"});
+  EXPECT_EQ(read_file(folder / "out.isohf"), "precious");
+  // Said before the input is looked at.
+  expect_refused(folder / "none.tif", {"out.isohf: exists"});
+}
+
+TEST_F(BadInput, OutputIsTheInputByWhateverName) {
+  write_hills("a.tif");
+  ASSERT_EQ(::symlink("a.tif", (folder / "symbolic.tif").c_str()), 0);
+  ASSERT_EQ(::link((folder / "a.tif").c_str(), (folder / "hard.tif").c_str()), 0);
+  const std::string before = read_file(folder / "a.tif");
+  for (const char* name : {"a.tif", "symbolic.tif", "hard.tif", "./a.tif"}) {
+    const RunResult result = run_isohf({"convert", folder / "a.tif", folder / name, "--overwrite"});
+    EXPECT_EQ(result.exit_code, 2);
+    EXPECT_THAT(result.err, HasSubstr("is the input"));
+  }
+  EXPECT_EQ(read_file(folder / "a.tif"), before);
+  // The part file is written as well.
+  ASSERT_EQ(::rename((folder / "a.tif").c_str(), (folder / "b.isohf.part").c_str()), 0);
+  const RunResult part = run_isohf({"convert", folder / "b.isohf.part", folder / "b.isohf"});
+  EXPECT_EQ(part.exit_code, 2);
+  EXPECT_THAT(part.err, HasSubstr("is the input"));
+  EXPECT_EQ(read_file(folder / "b.isohf.part"), before);
+}
+
+TEST_F(BadInput, ShapeThatBreaksAConstraint) {
+  write_hills("a.tif");
+  expect_refused(folder / "a.tif", {"48x55", "multiple of 4", "nearest valid shape is 48x59"},
+                 {"--shape", "48x55", "--levels", "3"});
+  expect_refused(folder / "a.tif", {"rows is 242, must be odd", "nearest valid shape is 212x243"},
+                 {"--shape", "212x242"});
+  expect_refused(folder / "a.tif", {"columns is 4, must be at least 5"}, {"--shape", "4x5", "--levels", "1"});
+  expect_refused(folder / "a.tif", {"columns is 16385, must be at most 16384"},
+                 {"--shape", "16385x5", "--levels", "1"});
+}
+
+TEST_F(BadInput, ElevationsOutsideTheRange) {
+  write_hills("a.tif");
+  expect_refused(folder / "a.tif", {"--z-range", "--clamp-range"}, {"--z-range", "450:550"});
+}
+
+TEST_F(BadInput, StepThatNeedsTooManyCodes) {
+  write_hills("a.tif");
+  expect_refused(folder / "a.tif", {"step"}, {"--type", "u8", "--step", "0.001"});
+}
+
+TEST_F(BadInput, MemoryLimitBelowTheNeed) {
+  write_hills("a.tif");
+  expect_refused(folder / "a.tif", {"--memory"}, {"--memory", "1M"});
+}
+
+TEST_F(BadInput, FullDisk) {
+  std::uint32_t state = 1;  // noise, which no codec makes small
+  write_int16_tiff(folder / "noise.tif", 400, 400, [&](std::int64_t, std::int64_t) {
+    state = state * 1664525U + 1013904223U;
+    return static_cast<std::int16_t>(state >> 16);
+  });
+  RunOptions full;
+  full.file_size_limit_bytes = 50000;
+  const RunResult result = run_isohf({"convert", folder / "noise.tif", folder / "out.isohf"}, full);
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_EQ(result.out, "");
+  EXPECT_THAT(result.err, HasSubstr("File too large"));
+  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+  EXPECT_EQ(folder.names(), std::vector<std::string>{"noise.tif"});
+}
+
+}  // namespace
+}  // namespace isohf::test

@@ -1,0 +1,146 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "support/plain_tiff.h"
+#include "support/run_program.h"
+#include "support/temporary_folder.h"
+
+namespace isohf::test {
+namespace {
+
+using nlohmann::json;
+using testing::HasSubstr;
+
+class ConvertCommand : public testing::Test {
+ protected:
+  ConvertCommand() {
+    write_int16_tiff(folder / "a.tif", 300, 200, [](std::int64_t c, std::int64_t r) {
+      return static_cast<std::int16_t>(
+          std::lround(700 + 300 * std::sin(0.05 * static_cast<double>(c)) * std::cos(0.04 * static_cast<double>(r))));
+    });
+  }
+
+  /// Converts a.tif and returns the archive's bytes.
+  std::string convert(const std::string& name, std::vector<std::string> more) {
+    std::vector<std::string> arguments = {"convert", folder / "a.tif", folder / name};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const RunResult result = run_isohf(arguments);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_EQ(result.err, "");
+    return read_file(folder / name);
+  }
+
+  TemporaryFolder folder;
+};
+
+TEST_F(ConvertCommand, SummaryCountsTilesAndNothingElseIsLeft) {
+  const RunResult result = run_isohf({"convert", folder / "a.tif", folder / "a.isohf", "--shape", "52x67"});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_EQ(result.err, "");
+  for (const char* what : {"archive", "tiles", "size", "elevations", "time", "memory"}) {
+    EXPECT_THAT("\n" + result.out, HasSubstr("\n" + std::string(what) + " "));
+  }
+  EXPECT_EQ(folder.names(), (std::vector<std::string>{"a.isohf", "a.tif"}));
+}
+
+TEST_F(ConvertCommand, JsonIsOneDocumentAndAgreesWithTheArchive) {
+  const RunResult result = run_isohf({"convert", "-i", folder / "a.tif", "-o", folder / "a.isohf", "--json"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(result.err, "");
+  const json summary = json::parse(result.out);
+  EXPECT_EQ(summary.at("tiles_written"), summary.at("tiles_expected"));
+  EXPECT_EQ(summary.at("archive_bytes"), read_file(folder / "a.isohf").size());
+  EXPECT_EQ(summary.at("source_samples"), 300 * 200);
+  EXPECT_GT(summary.at("ratio_to_raw_16_bit").get<double>(), 1.0);
+  EXPECT_GT(summary.at("peak_memory_bytes").get<double>(), 0.0);
+  EXPECT_LE(summary.at("worst_rounding").get<double>(), summary.at("step").get<double>());
+  const json info = json::parse(run_isohf({"info", folder / "a.isohf", "--json"}).out);
+  EXPECT_EQ(info.at("bytes"), summary.at("archive_bytes"));
+  EXPECT_EQ(info.at("metadata"), summary.at("metadata"));
+}
+
+TEST_F(ConvertCommand, BytesDoNotDependOnThreads) {
+  const std::string one = convert("1.isohf", {"--shape", "52x67", "--threads", "1"});
+  ASSERT_FALSE(one.empty());
+  for (const char* threads : {"2", "3", "7"}) {
+    EXPECT_EQ(convert(std::string(threads) + ".isohf", {"--shape", "52x67", "-j", threads}), one) << threads;
+  }
+  EXPECT_EQ(convert("default.isohf", {"--shape", "52x67"}), one);
+}
+
+TEST_F(ConvertCommand, QuietPrintsNothing) {
+  const RunResult result = run_isohf({"convert", folder / "a.tif", folder / "a.isohf", "-q", "--progress", "plain"});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_EQ(result.out, "");
+  EXPECT_EQ(result.err, "");
+}
+
+TEST_F(ConvertCommand, ProgressGoesToStandardErrorInTheFormAskedFor) {
+  const RunResult plain = run_isohf({"convert", folder / "a.tif", folder / "1.isohf", "--progress", "plain"});
+  EXPECT_THAT(plain.err, HasSubstr("isohf: tiles 100 %"));
+  EXPECT_EQ(plain.err.find('\r'), std::string::npos);
+  const RunResult lines = run_isohf({"convert", folder / "a.tif", folder / "2.isohf", "--progress", "json", "--json"});
+  json::parse(lines.out);
+  std::istringstream stream(lines.err);
+  json last;
+  for (std::string line; std::getline(stream, line);) last = json::parse(line);
+  EXPECT_EQ(last.at("progress"), "tiles");
+  EXPECT_EQ(last.at("done"), last.at("total"));
+  const RunResult verbose = run_isohf({"convert", folder / "a.tif", folder / "3.isohf", "-v"});
+  EXPECT_THAT(verbose.err, HasSubstr("isohf: tile grid"));
+}
+
+TEST_F(ConvertCommand, OverwriteReplaces) {
+  write_file(folder / "a.isohf", "old");
+  EXPECT_NE(convert("a.isohf", {"--overwrite"}), "old");
+  EXPECT_EQ(folder.names(), (std::vector<std::string>{"a.isohf", "a.tif"}));
+}
+
+TEST_F(ConvertCommand, FractionsAreWarnedOfUnlessScaled) {
+  write_float_tiff(folder / "unit.tif", 60, 60,
+                   [](std::int64_t c, std::int64_t r) { return static_cast<float>(c * r) / 3600.0F; });
+  const RunResult warned = run_isohf({"convert", folder / "unit.tif", folder / "1.isohf"});
+  EXPECT_EQ(warned.exit_code, 0);
+  EXPECT_THAT(warned.err, testing::StartsWith("isohf: warning: "));
+  EXPECT_THAT(warned.err, HasSubstr("--z-scale"));
+  const RunResult scaled = run_isohf({"convert", folder / "unit.tif", folder / "2.isohf", "--z-scale", "1200"});
+  EXPECT_EQ(scaled.exit_code, 0);
+  EXPECT_EQ(scaled.err, "");
+}
+
+TEST_F(ConvertCommand, EveryOptionChangesWhatItSays) {
+  const auto metadata = [&](const std::string& name, const std::vector<std::string>& more) {
+    convert(name, more);
+    return json::parse(run_isohf({"info", folder / name, "--json"}).out);
+  };
+  const json tiles = metadata("tiles.isohf", {"--tiles", "3x2", "--shape", "28x35", "--levels", "2"});
+  EXPECT_EQ(tiles.at("grid").at("tile_columns"), 3);
+  EXPECT_EQ(tiles.at("grid").at("tile_rows"), 2);
+  EXPECT_EQ(tiles.at("shape").at("columns"), 28);
+  EXPECT_EQ(tiles.at("shape").at("levels"), 2);
+  const json spaced = metadata("spaced.isohf", {"--sample-spacing", "30", "--spacing", "45", "--registration", "area"});
+  EXPECT_NEAR(spaced.at("grid").at("column_spacing").get<double>(), 45.0, 1e-9);
+  const json outside = metadata("outside.isohf", {"--outside", "void", "--type", "f32"});
+  EXPECT_NE(outside.dump().find("void"), std::string::npos);
+  const json fitted = metadata("fitted.isohf", {"--fit", "--registration", "area"});
+  EXPECT_NEAR(fitted.at("grid").at("world_width").get<double>(), 300.0, 1e-9);
+  EXPECT_NEAR(fitted.at("grid").at("world_height").get<double>(), 200.0, 1e-9);
+}
+
+TEST_F(ConvertCommand, MemoryThatRunsOutIsOneLine) {
+  RunOptions small;
+  small.address_space_bytes = std::uint64_t{90} << 20;
+  const RunResult result = run_isohf({"convert", folder / "a.tif", folder / "a.isohf", "-j", "1"}, small);
+  // Either it fits, or it says so; a program that dies of a signal has no exit code below 128.
+  EXPECT_LT(result.exit_code, 128) << result.err;
+  if (result.exit_code != 0) {
+    EXPECT_EQ(folder.names(), std::vector<std::string>{"a.tif"});
+  }
+}
+
+}  // namespace
+}  // namespace isohf::test

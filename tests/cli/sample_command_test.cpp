@@ -1,0 +1,134 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <random>
+#include <sstream>
+
+#include "support/plain_tiff.h"
+#include "support/run_program.h"
+#include "support/temporary_folder.h"
+
+namespace isohf::test {
+namespace {
+
+using nlohmann::json;
+using testing::HasSubstr;
+
+constexpr double kSlopeX = 0.25;  // rise per metre
+constexpr double kSlopeZ = -0.125;
+constexpr double kSpacing = 10.0;  // metres
+
+/// A plane over 200 x 150 samples on posts; its North-West quarter of 40 x 40 samples is void.
+class SampleCommand : public testing::Test {
+ protected:
+  SampleCommand() {
+    write_float_tiff(folder / "plane.tif", 200, 150, [](std::int64_t c, std::int64_t r) {
+      if (c < 40 && r < 40) return std::numeric_limits<float>::quiet_NaN();
+      return static_cast<float>(1000.0 + kSlopeX * kSpacing * static_cast<double>(c) +
+                                kSlopeZ * kSpacing * static_cast<double>(r));
+    });
+    const RunResult result =
+        run_isohf({"convert", folder / "plane.tif", folder / "plane.isohf", "--sample-spacing", "10", "--registration",
+                   "point", "--type", "f32", "--shape", "28x35", "--levels", "2"});
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+  }
+
+  TemporaryFolder folder;
+};
+
+TEST_F(SampleCommand, PlaneComesBackEverywhere) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> x_of(450.0, 1985.0);
+  std::uniform_real_distribution<double> z_of(10.0, 1485.0);
+  RunOptions input;
+  std::vector<std::pair<double, double>> places;
+  for (int i = 0; i < 2000; ++i) {
+    places.emplace_back(x_of(random), z_of(random));
+    std::ostringstream line;
+    line.precision(17);
+    line << places.back().first << (i % 2 == 0 ? " " : ",") << places.back().second << "\n";
+    input.input += line.str();
+  }
+  const RunResult result = run_isohf({"sample", folder / "plane.isohf", "--memory", "100K"}, input);
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(result.err, "");
+  std::istringstream lines(result.out);
+  const double length = std::sqrt(kSlopeX * kSlopeX + 1.0 + kSlopeZ * kSlopeZ);
+  for (const auto& [x, z] : places) {
+    double elevation = 0.0;
+    double nx = 0.0;
+    double ny = 0.0;
+    double nz = 0.0;
+    int column = -1;
+    int row = -1;
+    ASSERT_TRUE(lines >> elevation >> nx >> ny >> nz >> column >> row);
+    // Single precision at 1500 m is 1.2e-4 m apart; weights and sums add a few of its roundings.
+    EXPECT_NEAR(elevation, 1000.0 + kSlopeX * x + kSlopeZ * z, 5e-4);
+    // Slopes are differences of two such heights 10 m apart.
+    EXPECT_NEAR(nx, -kSlopeX / length, 1e-4);
+    EXPECT_NEAR(ny, 1.0 / length, 1e-4);
+    EXPECT_NEAR(nz, -kSlopeZ / length, 1e-4);
+    EXPECT_GE(column, 0);
+    EXPECT_GE(row, 0);
+  }
+}
+
+TEST_F(SampleCommand, VoidOutsideCommentsAndBlankLines) {
+  RunOptions input;
+  input.input = "# places\n\n100 100\r\n\t 1000 ,  1000 \n-1 5\n5 1e9\n1000 1000";
+  const RunResult result = run_isohf({"sample", folder / "plane.isohf"}, input);
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  std::istringstream stream(result.out);
+  std::vector<std::string> lines;
+  for (std::string line; std::getline(stream, line);) lines.push_back(line);
+  ASSERT_EQ(lines.size(), 5U);
+  EXPECT_EQ(lines[0], "void");
+  EXPECT_THAT(lines[1], testing::StartsWith("1125"));
+  EXPECT_EQ(lines[2], "outside");
+  EXPECT_EQ(lines[3], "outside");
+  EXPECT_EQ(lines[4], lines[1]);
+}
+
+TEST_F(SampleCommand, PlacesMayStandOnTheCommandLine) {
+  const RunResult result =
+      run_isohf({"sample", "--at", "1000", "1000", "--at", "-5", "-7", folder / "plane.isohf", "--json"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  std::istringstream stream(result.out);
+  std::string line;
+  std::getline(stream, line);
+  const json first = json::parse(line);
+  EXPECT_EQ(first.at("state"), "surface");
+  EXPECT_NEAR(first.at("elevation").get<double>(), 1125.0, 5e-4);  // as above
+  EXPECT_EQ(first.at("normal").size(), 3U);
+  std::getline(stream, line);
+  EXPECT_EQ(json::parse(line).at("state"), "outside");
+  EXPECT_EQ(json::parse(line).at("x"), -5.0);
+}
+
+TEST_F(SampleCommand, BadLineIsNamedAfterTheAnswersBeforeIt) {
+  for (const char* bad : {"1000", "1000 abc", "1000 1000 1000", "nan 5", "1000,,1000", "1000 1000x"}) {
+    RunOptions input;
+    input.input = std::string("1000 1000\n# comment\n") + bad + "\n1000 1000\n";
+    const RunResult result = run_isohf({"sample", folder / "plane.isohf"}, input);
+    EXPECT_EQ(result.exit_code, 1);
+    EXPECT_EQ(result.err,
+              std::string("isohf: standard input, line 3: found '") + bad + "', must be 'x z', two numbers\n");
+    EXPECT_EQ(std::count(result.out.begin(), result.out.end(), '\n'), 1);
+  }
+}
+
+TEST_F(SampleCommand, AnswersComeBeforeMoreIsAskedFor) {
+  // A closed output is noticed although more input would follow.
+  RunOptions closed;
+  closed.close_output = true;
+  for (int i = 0; i < 1000; ++i) closed.input += "1000 1000\n";
+  const RunResult result = run_isohf({"sample", folder / "plane.isohf"}, closed);
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_EQ(result.err, "");
+}
+
+}  // namespace
+}  // namespace isohf::test

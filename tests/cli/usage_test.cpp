@@ -1,0 +1,210 @@
+/// What the program says about itself, and what it says to a wrong command line.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <regex>
+#include <set>
+
+#include "support/run_program.h"
+#include "support/temporary_folder.h"
+
+namespace isohf::test {
+namespace {
+
+using testing::HasSubstr;
+
+const std::vector<std::string> kCommands = {"plan", "convert", "info", "verify", "sample"};
+
+std::set<std::string> long_options_in(const std::string& text) {
+  std::set<std::string> found;
+  const std::regex option("--[a-z][a-z0-9-]+");
+  for (std::sregex_iterator at(text.begin(), text.end(), option), end; at != end; ++at) found.insert(at->str());
+  return found;
+}
+
+/// Expects exit code 2, one line on standard error that holds `message`, and nothing on standard output.
+void expect_usage_error(const std::vector<std::string>& arguments, const std::string& message) {
+  const RunResult result = run_isohf(arguments);
+  SCOPED_TRACE(testing::PrintToString(arguments));
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_EQ(result.out, "");
+  EXPECT_THAT(result.err, testing::StartsWith("isohf: "));
+  EXPECT_THAT(result.err, HasSubstr(message));
+  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+}
+
+TEST(Usage, HelpListsEveryCommandAndTheExitCodes) {
+  for (const char* argument : {"--help", "-h", "help"}) {
+    const RunResult result = run_isohf({argument});
+    EXPECT_EQ(result.exit_code, 0);
+    EXPECT_EQ(result.err, "");
+    for (const std::string& command : kCommands) EXPECT_THAT(result.out, HasSubstr("\n  " + command + " "));
+    EXPECT_THAT(result.out, HasSubstr("Exit codes: 0 done, 1 failed, 2 wrong usage, 3 "));
+  }
+}
+
+TEST(Usage, VersionIsOneLine) {
+  const RunResult result = run_isohf({"--version"});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_TRUE(std::regex_match(result.out, std::regex("isohf [0-9]+\\.[0-9]+\\.[0-9]+\n"))) << result.out;
+}
+
+TEST(Usage, EveryCommandHasHelpWithExamplesAndNoLineIsTooLong) {
+  for (const std::string& command : kCommands) {
+    const RunResult result = run_isohf({command, "--help"});
+    EXPECT_EQ(result.exit_code, 0);
+    EXPECT_EQ(result.err, "");
+    EXPECT_THAT(result.out, HasSubstr("Usage: isohf " + command));
+    EXPECT_THAT(result.out, HasSubstr("Examples:\n  isohf " + command));
+    EXPECT_EQ(run_isohf({"help", command}).out, result.out);
+    std::istringstream lines(result.out);
+    for (std::string line; std::getline(lines, line);) EXPECT_LE(line.size(), 110U) << line;
+  }
+}
+
+TEST(Usage, HelpKnowsTheOptionsOfTheTask) {
+  const std::set<std::string> convert = long_options_in(run_isohf({"convert", "--help"}).out);
+  for (const char* option :
+       {"--input",   "--output",      "--overwrite",      "--resume",      "--channel",  "--registration", "--nodata",
+        "--z-scale", "--z-offset",    "--sample-spacing", "--density",     "--spacing",  "--tiles",        "--fit",
+        "--outside", "--shape",       "--levels",         "--triangles",   "--vertices", "--type",         "--z-range",
+        "--step",    "--clamp-range", "--filter",         "--acquisition", "--threads",  "--progress",     "--memory",
+        "--json",    "--quiet",       "--verbose",        "--config",      "--help"}) {
+    EXPECT_TRUE(convert.contains(option)) << option;
+  }
+}
+
+TEST(Usage, TheManualKnowsEveryOption) {
+  const std::set<std::string> manual = long_options_in(read_file(ISOHF_SOURCE_DIR "/docs/cli.md"));
+  for (const std::string& command : kCommands) {
+    for (const std::string& option : long_options_in(run_isohf({command, "--help"}).out)) {
+      EXPECT_TRUE(manual.contains(option)) << command << " " << option;
+    }
+  }
+}
+
+TEST(Usage, NearestCommandAndOptionAreNamed) {
+  expect_usage_error({}, "no command given");
+  expect_usage_error({"plna"}, "unknown command 'plna'; did you mean plan?");
+  expect_usage_error({"conv"}, "did you mean convert?");
+  expect_usage_error({"xyzzy"}, "unknown command 'xyzzy' (");
+  expect_usage_error({"--json", "info", "a.isohf"}, "found --json where a command is required");
+  expect_usage_error({"convert", "--densty", "1", "a.tif", "b.isohf"},
+                     "unknown option --densty; did you mean --density?");
+  expect_usage_error({"convert", "--densty=1", "a.tif", "b.isohf"}, "did you mean --density?");
+}
+
+TEST(Usage, MissingAndSuperfluousArgumentsAreNamed) {
+  expect_usage_error({"convert"}, "convert: no INPUT given");
+  expect_usage_error({"convert", "a.tif"}, "convert: no OUTPUT given");
+  expect_usage_error({"convert", "a.tif", "b.isohf", "c"}, "'c' is one argument too many");
+  expect_usage_error({"info"}, "no ARCHIVE given");
+  expect_usage_error({"verify"}, "no ARCHIVE given");
+  expect_usage_error({"sample"}, "no ARCHIVE given");
+  expect_usage_error({"convert", "a.tif", "b.isohf", "--density"}, "--density lacks its value");
+  expect_usage_error({"sample", "a.isohf", "--at", "1"}, "--at lacks its value");
+  expect_usage_error({"convert", "-o", "a", "-o", "b", "c"}, "--output is given 2 times");
+}
+
+struct BadValue {
+  const char* option;
+  const char* value;
+  const char* required;
+};
+
+class BadValueTest : public testing::TestWithParam<BadValue> {};
+
+TEST_P(BadValueTest, IsRefusedWithWhatWasFoundAndRequired) {
+  const BadValue& bad = GetParam();
+  const std::string message =
+      std::string("convert: ") + bad.option + ": found '" + bad.value + "', must be " + bad.required;
+  expect_usage_error({"convert", "a.tif", "b.isohf", bad.option, bad.value}, message);
+  expect_usage_error({"convert", "a.tif", "b.isohf", std::string(bad.option) + "=" + bad.value}, message);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Usage, BadValueTest,
+    testing::Values(
+        BadValue{"--density", "-1", "a number greater than 0"}, BadValue{"--density", "0", "a number greater than 0"},
+        BadValue{"--density", "abc", "a number greater than 0"}, BadValue{"--density", "1x", "a number greater than 0"},
+        BadValue{"--density", "1 ", "a number greater than 0"}, BadValue{"--density", "nan", "a number greater than 0"},
+        BadValue{"--density", "inf", "a number greater than 0"},
+        BadValue{"--density", "1,5", "a number greater than 0"},
+        BadValue{"--density", "1e999", "a number greater than 0"},
+        BadValue{"--spacing", "-3", "a number greater than 0"},
+        BadValue{"--sample-spacing", "0", "a number greater than 0"}, BadValue{"--tiles", "3", "COLUMNSxROWS"},
+        BadValue{"--tiles", "0x3", "COLUMNSxROWS"}, BadValue{"--tiles", "3x", "COLUMNSxROWS"},
+        BadValue{"--tiles", "-1x3", "COLUMNSxROWS"},
+        BadValue{"--shape", "5", "COLUMNSxROWS, two whole numbers from 1 to 32767"},
+        BadValue{"--shape", "212x243x4", "COLUMNSxROWS"}, BadValue{"--shape", "99999x5", "COLUMNSxROWS"},
+        BadValue{"--levels", "0", "a whole number from 1 to 13"},
+        BadValue{"--levels", "14", "a whole number from 1 to 13"},
+        BadValue{"--levels", "4.0", "a whole number from 1 to 13"},
+        BadValue{"--triangles", "0", "a whole number from 1"}, BadValue{"--vertices", "-5", "a whole number from 1"},
+        BadValue{"--threads", "0", "a whole number from 1 to 1024"},
+        BadValue{"--threads", "abc", "a whole number from 1 to 1024"},
+        BadValue{"--threads", "1025", "a whole number from 1 to 1024"},
+        BadValue{"--threads", "99999999999999999999", "a whole number from 1 to 1024"},
+        BadValue{"--type", "u17", "u16, u8 or f32"}, BadValue{"--outside", "Void", "cover, clamp or void"},
+        BadValue{"--registration", "pixel", "area, point or auto"}, BadValue{"--nodata", "none", "a number or nan"},
+        BadValue{"--z-scale", "x", "a finite number"}, BadValue{"--z-offset", "inf", "a finite number"},
+        BadValue{"--z-range", "5", "MIN:MAX, two finite numbers"},
+        BadValue{"--z-range", "5:1", "MIN:MAX with MIN less than MAX"},
+        BadValue{"--z-range", "1:1", "MIN:MAX with MIN less than MAX"},
+        BadValue{"--z-range", "nan:1", "MIN:MAX, two finite numbers"},
+        BadValue{"--step", "0", "a number greater than 0, finest or auto"},
+        BadValue{"--step", "-1", "a number greater than 0, finest or auto"},
+        BadValue{"--step", "fine", "a number greater than 0, finest or auto"},
+        BadValue{"--memory", "4X", "a size in bytes such as 400M"},
+        BadValue{"--memory", "0", "a size in bytes such as 400M"},
+        BadValue{"--memory", "M", "a size in bytes such as 400M"},
+        BadValue{"--progress", "bar", "auto, plain, json or none"}));
+
+TEST(Usage, WrongFilterIsAnsweredWithTheRightOnes) {
+  expect_usage_error({"convert", "a.tif", "b.isohf", "--filter", "cubic"}, "catmull-rom");
+}
+
+TEST(Usage, OptionsThatContradictEachOtherAreRefused) {
+  expect_usage_error({"convert", "a", "b", "--density", "1", "--spacing", "2"}, "excludes");
+  expect_usage_error({"convert", "a", "b", "--shape", "5x5", "--triangles", "200"}, "excludes");
+  expect_usage_error({"convert", "a", "b", "--density", "1", "--density", "1"}, "--density is given 2 times");
+  expect_usage_error({"convert", "a", "b", "--clamp-range"}, "--clamp-range needs --z-range");
+  expect_usage_error({"plan", "--density", "1"}, "--density needs an INPUT");
+  expect_usage_error({"plan", "--table1", "--levels", "3"}, "--table1 takes no --levels");
+  expect_usage_error({"verify", "a", "--max-error", "1"}, "--max-error needs --against");
+}
+
+TEST(Usage, ConfigFileGivesOptionsAndTheCommandLineWins) {
+  const TemporaryFolder folder;
+  write_file(folder / "options.toml", "limit = 3\nlevels = 2\n");
+  const auto lines = [](const RunResult& result) { return std::count(result.out.begin(), result.out.end(), '\n'); };
+  const RunResult three = run_isohf({"plan", "--config", folder / "options.toml"});
+  const RunResult one = run_isohf({"plan", "--config", folder / "options.toml", "--limit", "1"});
+  EXPECT_EQ(three.exit_code, 0) << three.err;
+  EXPECT_EQ(lines(three), lines(one) + 2);
+  write_file(folder / "bad.toml", "limitt = 3\n");
+  expect_usage_error({"plan", "--config", folder / "bad.toml"}, "--config: no option is named limitt");
+  write_file(folder / "bad2.toml", "limit = many\n");
+  expect_usage_error({"plan", "--config", folder / "bad2.toml"}, "--limit: found 'many', must be a whole number");
+  expect_usage_error({"plan", "--config", folder / "missing.toml"}, "missing.toml");
+}
+
+TEST(Usage, FailureToWriteStandardOutputIsReported) {
+  RunOptions full;
+  full.output_path = "/dev/full";
+  const RunResult result = run_isohf({"plan"}, full);
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_EQ(result.err, "isohf: standard output: No space left on device\n");
+}
+
+TEST(Usage, ReaderThatLeavesIsNoMessage) {
+  RunOptions closed;
+  closed.close_output = true;
+  const RunResult result = run_isohf({"plan"}, closed);
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_EQ(result.err, "");
+}
+
+}  // namespace
+}  // namespace isohf::test

@@ -1,0 +1,108 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <regex>
+
+#include "support/plain_tiff.h"
+#include "support/run_program.h"
+#include "support/temporary_folder.h"
+
+namespace isohf::test {
+namespace {
+
+using nlohmann::json;
+using testing::HasSubstr;
+
+class VerifyCommand : public testing::Test {
+ protected:
+  VerifyCommand() {
+    write_int16_tiff(folder / "a.tif", 150, 120, [](std::int64_t c, std::int64_t r) {
+      return static_cast<std::int16_t>(
+          std::lround(700 + 300 * std::sin(0.05 * static_cast<double>(c)) * std::cos(0.04 * static_cast<double>(r))));
+    });
+    const RunResult result =
+        run_isohf({"convert", folder / "a.tif", folder / "a.isohf", "--shape", "28x35", "--levels", "2"});
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+  }
+
+  TemporaryFolder folder;
+};
+
+TEST_F(VerifyCommand, WholeArchivePasses) {
+  const RunResult result = run_isohf({"verify", folder / "a.isohf"});
+  EXPECT_EQ(result.exit_code, 0) << result.out;
+  EXPECT_EQ(result.err, "");
+  EXPECT_THAT(result.out, HasSubstr("passed"));
+  const json report = json::parse(run_isohf({"verify", folder / "a.isohf", "--json"}).out);
+  EXPECT_TRUE(report.at("passed").get<bool>());
+  EXPECT_GT(report.at("checks").at("tiles_checked").get<int>(), 1);
+  EXPECT_GT(report.at("checks").at("shared_vertices_checked").get<int>(), 1);
+  EXPECT_TRUE(report.at("checks").at("findings").empty());
+}
+
+TEST_F(VerifyCommand, ComparesWithTheSource) {
+  const RunResult text = run_isohf({"verify", folder / "a.isohf", "--against", folder / "a.tif"});
+  EXPECT_EQ(text.exit_code, 0) << text.out << text.err;
+  EXPECT_EQ(text.err, "");
+  EXPECT_THAT(text.out, HasSubstr("rms"));
+  const json report = json::parse(
+      run_isohf({"verify", folder / "a.isohf", "--against", folder / "a.tif", "--random", "500", "--json"}).out);
+  EXPECT_EQ(report.at("against").at("samples"), 150 * 120);
+  EXPECT_EQ(report.at("against").at("random_points"), 500);
+  const double rms = report.at("against").at("rms").get<double>();
+  const double max = report.at("against").at("max").get<double>();
+  EXPECT_GT(rms, 0.0);
+  EXPECT_LT(max, 5.0);  // a smooth surface of 300 units in waves of 126 samples, rounded to whole units
+
+  const std::vector<std::string> base = {"verify", folder / "a.isohf", "--against", folder / "a.tif"};
+  const auto code_with = [&](const std::string& option, double limit) {
+    std::vector<std::string> arguments = base;
+    arguments.push_back(option);
+    arguments.push_back(std::to_string(limit));
+    return run_isohf(arguments).exit_code;
+  };
+  EXPECT_EQ(code_with("--max-error", max * 1.01), 0);
+  EXPECT_EQ(code_with("--max-error", max * 0.99), 3);
+  EXPECT_EQ(code_with("--max-rms", rms * 1.01), 0);
+  EXPECT_EQ(code_with("--max-rms", rms * 0.99), 3);
+}
+
+TEST_F(VerifyCommand, AnotherSourceIsNoSource) {
+  write_int16_tiff(folder / "b.tif", 151, 120, [](std::int64_t, std::int64_t) { return std::int16_t{1}; });
+  const RunResult result = run_isohf({"verify", folder / "a.isohf", "--against", folder / "b.tif"});
+  EXPECT_THAT(result.exit_code, testing::AnyOf(1, 2));
+  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+}
+
+TEST_F(VerifyCommand, DamageIsFoundWithExitCode3) {
+  std::string bytes = read_file(folder / "a.isohf");
+  const json info = json::parse(run_isohf({"info", folder / "a.isohf", "--json", "--tiles"}).out);
+  const json& tile = info.at("tiles").back();
+  bytes[tile.at("offset_bytes").get<std::size_t>() + tile.at("compressed_bytes").get<std::size_t>() / 2] ^= 0x10;
+  write_file(folder / "bad.isohf", bytes);
+  const RunResult result = run_isohf({"verify", folder / "bad.isohf"});
+  EXPECT_EQ(result.exit_code, 3);
+  EXPECT_EQ(result.err, "");
+  EXPECT_TRUE(std::regex_search(result.out, std::regex("ISOHF-[0-9]{4} error tile \\([0-9]+,[0-9]+\\): ")))
+      << result.out;
+  EXPECT_THAT(result.out, HasSubstr("FAILED"));
+  const json report = json::parse(run_isohf({"verify", folder / "bad.isohf", "--json"}).out);
+  EXPECT_FALSE(report.at("passed").get<bool>());
+  EXPECT_EQ(report.at("checks").at("findings").at(0).at("tile").at("column"), tile.at("column"));
+  const RunResult against = run_isohf({"verify", folder / "bad.isohf", "--against", folder / "a.tif"});
+  EXPECT_EQ(against.exit_code, 3);
+  EXPECT_THAT(against.out, HasSubstr("not compared"));
+}
+
+TEST_F(VerifyCommand, ChecksAreListed) {
+  const RunResult result = run_isohf({"verify", "--list-checks"});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_THAT(result.out, HasSubstr("ISOHF-0001 "));
+  const json checks = json::parse(run_isohf({"verify", "--list-checks", "--json"}).out).at("checks");
+  EXPECT_GT(checks.size(), 10U);
+}
+
+}  // namespace
+}  // namespace isohf::test
