@@ -9,6 +9,7 @@
 #include "command.h"
 #include "describe.h"
 #include "interrupt.h"
+#include "isohf/archive/reader.h"
 #include "isohf/base/error.h"
 #include "isohf/convert/convert.h"
 #include "isohf/surface/kernels.h"
@@ -128,7 +129,7 @@ std::string json_from(const ConvertCommandOptions& options, const ConvertSummary
                     {"source_samples_per_second", measured.samples_per_second},
                     {"peak_memory_bytes", measured.peak_memory_bytes},
                     {"warnings", summary.warnings},
-                    {"metadata", ordered_json::parse(format_metadata(summary.metadata))}});
+                    {"metadata", ordered_json::parse(ArchiveReader(options.output).metadata_json())}});
 }
 
 std::string text_from(const ConvertCommandOptions& options, const ConvertSummary& summary) {
