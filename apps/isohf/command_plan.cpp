@@ -22,8 +22,8 @@ namespace {
 using nlohmann::ordered_json;
 
 constexpr const char* kFooter =
-    R"(Without INPUT the candidates for a tile are listed, best true aspect first: 1 is equilateral, (R-3)sin60/(C-4).
-With INPUT nothing is written; sizes are estimates.
+    R"(Without INPUT the candidates for a tile are listed, best true aspect first: (R-3)sin60/(C-4), 1 is
+equilateral. With INPUT nothing is written; sizes are estimates.
 
 Examples:
   isohf plan --levels 4 --triangles 10000

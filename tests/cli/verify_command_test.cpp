@@ -50,7 +50,8 @@ TEST_F(VerifyCommand, ComparesWithTheSource) {
   const json report = json::parse(
       run_isohf({"verify", folder / "a.isohf", "--against", folder / "a.tif", "--random", "500", "--json"}).out);
   EXPECT_EQ(report.at("against").at("samples"), 150 * 120);
-  EXPECT_EQ(report.at("against").at("random_points"), 500);
+  EXPECT_LE(report.at("against").at("random_points").get<int>(), 500);  // some fall where there is nothing to compare
+  EXPECT_GT(report.at("against").at("random_points").get<int>(), 400);
   const double rms = report.at("against").at("rms").get<double>();
   const double max = report.at("against").at("max").get<double>();
   EXPECT_GT(rms, 0.0);
