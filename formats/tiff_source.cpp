@@ -39,6 +39,9 @@ constexpr int kComplexFloating = 6;
 constexpr int kTopLeft = 1;
 constexpr int kBottomLeft = 4;
 
+/// Floats beyond this are voids that a file forgot to declare (-3.4e38, 1.7e308, 1e31), in any unit.
+constexpr double kBeyondAnyHeight = 1e30;
+
 SampleType sample_type_of(const TiffLayout& layout) {
   switch (layout.sample_format) {
     case kFloating:
@@ -220,6 +223,10 @@ class TiffSource final : public HeightSource {
     place(tags);
     read_gdal_metadata(tags.gdal_metadata, channel_, info_);
     read_gdal_nodata(tags.gdal_nodata, info_);
+    if (is_floating(info_.sample_type) && info_.void_values.empty()) {
+      info_.valid_min = -kBeyondAnyHeight;
+      info_.valid_max = kBeyondAnyHeight;
+    }
   }
 
   void place(const TiffTags& tags) {

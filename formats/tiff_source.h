@@ -19,9 +19,11 @@ namespace isohf {
 ///
 /// Rows are delivered from North to South: a raster stored from South to North (by its transformation, or by
 /// orientation bottom-left where it has no georeference) is turned. Without GeoTIFF tags a world file beside it places
-/// the raster. Blocks that a sparse file leaves out read as the void value, else as 0, with a warning. Full-width
-/// windows from North to South decode every block once, on all threads of the caller's arena; memory is bounded by two
-/// rows of blocks or 16 MiB, whichever is more.
+/// the raster. Void is what GDAL_NODATA says; in a float raster without it, whatever lies beyond 1e30, such as -3.4e38.
+/// Blocks that a sparse file leaves out read as the void value, else as 0, with a warning.
+///
+/// Full-width windows from North to South decode every block once, on all threads of the caller's arena; memory is
+/// bounded by two rows of blocks or 16 MiB, whichever is more.
 ///
 /// Throws Error: kIo; kCorrupt (truncated, contradictory or absurdly large); kUnsupported (other sample types, colour
 /// palettes, rotation, unknown compression); kInvalidArgument (no such channel; options out of range).

@@ -8,10 +8,10 @@ namespace isohf {
 namespace {
 
 struct UnitRow {
-  int epsg;
-  const char* name;
-  double metres;
-  std::array<std::string_view, 6> spellings;  // lower case
+  int epsg = 0;
+  const char* name = "";
+  double metres = 1.0;
+  std::array<std::string_view, 6> spellings = {};  // lower case
 };
 
 // EPSG dataset, table of units of measure; the US survey foot is 1200/3937 m by definition.

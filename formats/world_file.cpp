@@ -16,7 +16,7 @@
 namespace isohf {
 namespace {
 
-constexpr std::size_t kLongestText = 64 * 1024;
+constexpr std::size_t kLongestText = 65536;
 
 std::optional<std::string> text_of(const std::filesystem::path& path) {
   std::error_code error;

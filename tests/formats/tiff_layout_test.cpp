@@ -152,17 +152,18 @@ constexpr SampleType kTypes[] = {SampleType::kUint8,   SampleType::kInt8,    Sam
                                  SampleType::kFloat16, SampleType::kFloat32, SampleType::kFloat64};
 
 TEST_F(TiffLayouts, EverySampleTypeComesThroughEveryCompression) {
-  const std::pair<int, int> packings[] = {{COMPRESSION_NONE, 1},          {COMPRESSION_LZW, 1},
-                                          {COMPRESSION_LZW, 2},           {COMPRESSION_ADOBE_DEFLATE, 1},
-                                          {COMPRESSION_ADOBE_DEFLATE, 2}, {COMPRESSION_ADOBE_DEFLATE, 3},
-                                          {COMPRESSION_PACKBITS, 1},      {COMPRESSION_ZSTD, 1},
-                                          {COMPRESSION_ZSTD, 2},          {COMPRESSION_LZMA, 1}};
+  const std::pair<int, int> packings[] = {
+      {COMPRESSION_NONE, 1},          {COMPRESSION_LZW, 1},           {COMPRESSION_LZW, 2},
+      {COMPRESSION_ADOBE_DEFLATE, 1}, {COMPRESSION_ADOBE_DEFLATE, 2}, {COMPRESSION_ADOBE_DEFLATE, 3},
+      {COMPRESSION_PACKBITS, 1},      {COMPRESSION_ZSTD, 1},          {COMPRESSION_ZSTD, 2},
+      {COMPRESSION_LZMA, 1},          {COMPRESSION_LERC, 1}};
   int written = 0;
   for (const SampleType type : kTypes) {
     for (const auto& [compression, predictor] : packings) {
       if (TIFFIsCODECConfigured(static_cast<std::uint16_t>(compression)) == 0) continue;
       if (predictor == 3 && !is_floating(type)) continue;
       if (compression == COMPRESSION_LZMA && type != SampleType::kInt16) continue;  // slow to set up
+      if (compression == COMPRESSION_LERC && is_floating(type)) continue;           // keeps NaN, but not its bits
       for (const int tile : {0, 16}) {
         for (const bool big_endian : {false, true}) {
           // libtiff writes such files with the bytes the wrong way round, and reads right ones; see TiffSource.
@@ -253,10 +254,10 @@ TEST_F(TiffLayouts, WindowsInAnyOrderEqualTheWhole) {
 
 /// Compressed strips of more than 16 MiB are decoded row by row.
 TEST_F(TiffLayouts, LargeCompressedStripsComeThroughInAnyOrder) {
-  for (const auto& [rows_per_strip, samples] : {std::pair(3000U, 1), std::pair(2200U, 1), std::pair(3000U, 2)}) {
+  for (const auto& [rows_per_strip, samples] : {std::pair(3000U, 1), std::pair(2100U, 1), std::pair(3000U, 2)}) {
     Storage s;
-    s.width = 4096;
-    s.height = 2500;
+    s.width = 4096 / samples;
+    s.height = 2200;
     s.rows_per_strip = rows_per_strip;
     s.samples = samples;
     s.compression = COMPRESSION_LZW;
@@ -264,15 +265,15 @@ TEST_F(TiffLayouts, LargeCompressedStripsComeThroughInAnyOrder) {
     OpenOptions options;
     options.channel = std::to_string(samples - 1);
     const auto source = open_tiff(path(), options);
-    EXPECT_LT(source->info().block_height, 200);
+    EXPECT_LT(source->info().block_height, 300);
     for (std::int64_t row = 0; row < s.height; row += 450) {
       // Neighbouring bands overlap, as a resampler's do.
       const std::int64_t top = std::max<std::int64_t>(0, row - 7);
       expect_window(*source, s, samples - 1, {0, top, s.width, std::min(s.height, row + 450) - top});
     }
-    expect_window(*source, s, samples - 1, {4000, 2190, 96, 30});
+    expect_window(*source, s, samples - 1, {s.width - 96, 2090, 96, 30});
     expect_window(*source, s, samples - 1, {5, 3, 7, 1});
-    expect_window(*source, s, samples - 1, {0, 2499, s.width, 1});
+    expect_window(*source, s, samples - 1, {0, 2199, s.width, 1});
     if (HasFatalFailure()) return;
   }
 }
@@ -294,8 +295,8 @@ TEST_F(TiffLayouts, LargePlainStripsComeThrough) {
 
 TEST_F(TiffLayouts, ManyTilesComeThroughTheCache) {
   Storage s;
-  s.width = 5000;
-  s.height = 1500;
+  s.width = 3000;
+  s.height = 1100;
   s.tile = 256;
   s.type = SampleType::kFloat64;
   s.compression = COMPRESSION_LZW;
@@ -305,7 +306,7 @@ TEST_F(TiffLayouts, ManyTilesComeThroughTheCache) {
     expect_window(*source, s, 0, {0, row, s.width, std::min<std::int64_t>(130, s.height - row)});
   }
   expect_window(*source, s, 0, {0, 0, s.width, s.height});
-  expect_window(*source, s, 0, {4000, 0, 1000, 300});
+  expect_window(*source, s, 0, {2000, 0, 1000, 300});
 }
 
 TEST_F(TiffLayouts, LossyJpegIsReadAsItDecodes) {

@@ -183,6 +183,19 @@ TEST_F(TiffSource, FindsFloatVoidsByTheirDecimalTexts) {
   EXPECT_TRUE(std::isnan(info_of(tiff.ascii(42113, "nan")).void_values.at(0)));
 }
 
+TEST_F(TiffSource, TakesFloatsBeyondAnyHeightForVoidsWhereNoneAreDeclared) {
+  TiffBytes tiff;
+  tiff.image(3, 1, 32, 3, 1).block(bytes_of<float>({std::numeric_limits<float>::lowest(), 1.0F, 1e31F}));
+  const auto source = open(tiff);
+  std::vector<float> heights(3);
+  heights_from_samples(source->info(), 0.0, testing::read_all(*source), heights);
+  EXPECT_TRUE(std::isnan(heights[0]));
+  EXPECT_EQ(heights[1], 1.0F);
+  EXPECT_TRUE(std::isnan(heights[2]));
+  EXPECT_TRUE(std::isinf(info_of(tiff.ascii(42113, "-9999")).valid_min));
+  EXPECT_TRUE(std::isinf(info_of(small()).valid_min));
+}
+
 TEST_F(TiffSource, PicksTheChannel) {
   TiffBytes tiff;
   tiff.image(2, 1, 16, 1, 1).shorts(262, {2}).shorts(277, {4}).shorts(258, {16, 16, 16, 16}).shorts(338, {2});
