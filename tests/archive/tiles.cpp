@@ -134,7 +134,7 @@ TileCodes tile_of_archive(const TileGrid& grid, CodeType type, std::int64_t flat
 }
 
 void make_archive(const std::string& path, const TileGrid& grid, CodeType type) {
-  ArchiveWriter writer(path, grid, {});
+  ArchiveWriter writer(path, grid, WriterOptions{});
   for (std::int64_t flat = 0; flat < grid.tile_count(); ++flat) {
     writer.add_tile(encode_tile(grid.shape(), tile_of_archive(grid, type, flat)));
   }

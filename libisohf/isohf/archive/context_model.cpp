@@ -61,7 +61,7 @@ struct Group {
 
 std::uint8_t choose_shift(std::span<const CodedResidual> residuals) {
   std::uint64_t sum = 0;
-  for (const CodedResidual& residual : residuals) sum += residual.activity_sum;
+  for (const CodedResidual& residual : residuals) sum += residual.activity;
   const std::uint64_t mean = residuals.empty() ? 0 : sum / residuals.size();
   unsigned shift = 0;
   while ((mean >> shift) > kActivityLimit / 16) ++shift;
@@ -74,7 +74,7 @@ ContextChoice choose_contexts(std::span<const CodedResidual> residuals) {
   ContextChoice choice;
   choice.activity_shift = choose_shift(residuals);
   const auto level = [&](const CodedResidual& residual) {
-    return std::min(residual.activity_sum >> choice.activity_shift, kActivityLimit - 1);
+    return activity_level(residual.activity, choice.activity_shift);
   };
   std::vector<std::uint32_t> histogram(kActivityLimit);
   for (const CodedResidual& residual : residuals) ++histogram[level(residual)];

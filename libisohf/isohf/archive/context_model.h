@@ -12,7 +12,7 @@ namespace isohf {
 /// A residual, ready to be sorted into its context.
 struct CodedResidual {
   std::uint32_t folded;
-  std::uint32_t activity_sum;  ///< before the shift
+  std::uint32_t activity;
 };
 
 struct ContextChoice {

@@ -6,7 +6,7 @@
 #include <memory>
 #include <optional>
 
-// Wide vectors where the machine has them; the results are integers and the same everywhere.
+// Wide vectors where the machine has them; the results are integers, or single IEEE operations, and the same everywhere.
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__)
 #define ISOHF_VECTORISED __attribute__((target_clones("arch=x86-64-v3", "default")))
 #else
@@ -18,54 +18,83 @@ namespace {
 
 constexpr int kRounding = 1 << (kWeightBits - 1);
 
-/// A row's neighbours, each as an array indexed by place.
+/// Where a row's neighbours stand: own[c-1] is W, north[c] NE, far[c] NN and farther[c] the one North-East of NE's NN.
 template <typename Wide>
 struct Neighbours {
   const Wide* own;
-  const Wide* north;  // so that north[place] is NE
-  const Wide* north_north;
+  const Wide* north;
+  const Wide* far;
+  const Wide* farther;
+  int first;
+  int last;
 
   Neighbours(const Lattice<Wide>& lattice, int r)
-      : own(lattice.row(r)), north(lattice.row(r - 1) + r % 2), north_north(lattice.row(r - 2)) {}
+      : own(lattice.row(r)),
+        north(lattice.row(r - 1) + r % 2),
+        far(lattice.row(r - 2)),
+        farther(lattice.row(r - 3) + r % 2),
+        first(Lattice<Wide>::first(r)),
+        last(lattice.last(r)) {}
+
+  /// The samples that weight i belongs to, indexed by place.
+  [[nodiscard]] const Wide* of_weight(std::size_t i) const {
+    const std::array<const Wide*, kWeightCount> all = {own - 1, north - 1, own - 2, north + 1, north - 2, far,
+                                                       far + 1, far - 1,   far + 2, far - 2,   farther,   farther - 1};
+    return all[i];
+  }
 };
 
 template <typename Wide>
-inline void predict_places(const Wide* own, const Wide* north, const Wide* far, const PredictorWeights& weights,
-                           int first, int last, Wide low, Wide high, Wide* out) {
-  const Wide w = weights[0], nw = weights[1], ww = weights[2], nee = weights[3];
-  const Wide nww = weights[4], nn = weights[5], nne = weights[6], nnw = weights[7];
-  for (int c = first; c <= last; ++c) {
+inline void predict_places(const Neighbours<Wide>& at, const PredictorWeights& weights, Wide low, Wide high,
+                           Wide* out) {
+  const Wide* const own = at.own;
+  const Wide* const north = at.north;
+  const Wide* const far = at.far;
+  const Wide* const farther = at.farther;
+  std::array<Wide, kWeightCount> w{};
+  std::copy(weights.begin(), weights.end(), w.begin());
+  for (int c = at.first; c <= at.last; ++c) {
     const Wide ne = north[c];
-    const Wide sum = w * (own[c - 1] - ne) + nw * (north[c - 1] - ne) + ww * (own[c - 2] - ne) +
-                     nee * (north[c + 1] - ne) + nww * (north[c - 2] - ne) + nn * (far[c] - ne) +
-                     nne * (far[c + 1] - ne) + nnw * (far[c - 1] - ne);
+    const Wide sum = w[0] * (own[c - 1] - ne) + w[1] * (north[c - 1] - ne) + w[2] * (own[c - 2] - ne) +
+                     w[3] * (north[c + 1] - ne) + w[4] * (north[c - 2] - ne) + w[5] * (far[c] - ne) +
+                     w[6] * (far[c + 1] - ne) + w[7] * (far[c - 1] - ne) + w[8] * (far[c + 2] - ne) +
+                     w[9] * (far[c - 2] - ne) + w[10] * (farther[c] - ne) + w[11] * (farther[c - 1] - ne);
     const Wide value = ne + ((sum + kRounding) >> kWeightBits);
     out[c] = std::min(std::max(value, low), high);
   }
 }
 
-// Only free functions of plain arguments can be cloned for several machines.
-ISOHF_VECTORISED void predict_codes(const std::int32_t* own, const std::int32_t* north, const std::int32_t* far,
-                                    const PredictorWeights& weights, int first, int last, std::int32_t low,
-                                    std::int32_t high, std::int32_t* out) {
-  predict_places(own, north, far, weights, first, last, low, high, out);
+// Only free functions can be cloned for several machines, not templates.
+ISOHF_VECTORISED void predict_codes(const Neighbours<std::int32_t>& at, const PredictorWeights& weights,
+                                    std::int32_t low, std::int32_t high, std::int32_t* out) {
+  predict_places(at, weights, low, high, out);
 }
 
-ISOHF_VECTORISED void predict_parts(const std::int32_t* north, const std::int32_t* far, const PredictorWeights& weights,
-                                    int first, int last, std::int32_t* out) {
-  // Sums wrap modulo 2^32: the parts may leave 32 bits, the completed sum does not.
-  const auto weight = [&](int i) {
-    return static_cast<std::uint32_t>(std::int32_t{weights[static_cast<std::size_t>(i)]});
-  };
-  const std::uint32_t nw = weight(1), nee = weight(3), nww = weight(4), nn = weight(5), nne = weight(6),
-                      nnw = weight(7);
-  const std::uint32_t anchor = (1U << kWeightBits) - (weight(0) + nw + weight(2) + nee + nww + nn + nne + nnw);
-  const auto at = [](const std::int32_t* samples, int c) { return static_cast<std::uint32_t>(samples[c]); };
-  for (int c = first; c <= last; ++c) {
-    out[c] = static_cast<std::int32_t>(anchor * at(north, c) + nw * at(north, c - 1) + nee * at(north, c + 1) +
-                                       nww * at(north, c - 2) + nn * at(far, c) + nne * at(far, c + 1) +
-                                       nnw * at(far, c - 1) + kRounding);
+/// Sums of weighted samples above. Unsigned: modulo 2^32 for codes, whose parts may leave 32 bits where the completed
+/// sum does not.
+template <typename Wide, typename Unsigned>
+inline void sum_above(const Neighbours<Wide>& at, const PredictorWeights& weights, Wide* out) {
+  const Wide* const north = at.north;
+  const Wide* const far = at.far;
+  const Wide* const farther = at.farther;
+  std::array<Unsigned, kWeightCount> w{};
+  Unsigned anchor = 1U << kWeightBits;
+  for (std::size_t i = 0; i < w.size(); ++i) {
+    w[i] = static_cast<Unsigned>(Wide{weights[i]});
+    anchor -= w[i];
   }
+  const auto u = [](Wide value) { return static_cast<Unsigned>(value); };
+  for (int c = at.first; c <= at.last; ++c) {
+    out[c] = static_cast<Wide>(anchor * u(north[c]) + w[1] * u(north[c - 1]) + w[3] * u(north[c + 1]) +
+                               w[4] * u(north[c - 2]) + w[5] * u(far[c]) + w[6] * u(far[c + 1]) + w[7] * u(far[c - 1]) +
+                               w[8] * u(far[c + 2]) + w[9] * u(far[c - 2]) + w[10] * u(farther[c]) +
+                               w[11] * u(farther[c - 1]) + kRounding);
+  }
+}
+
+ISOHF_VECTORISED void sum_codes_above(const Neighbours<std::int32_t>& at, const PredictorWeights& weights,
+                                      std::int32_t* out) {
+  sum_above<std::int32_t, std::uint32_t>(at, weights, out);
 }
 
 }  // namespace
@@ -73,49 +102,36 @@ ISOHF_VECTORISED void predict_parts(const std::int32_t* north, const std::int32_
 template <>
 void predict_row(const Lattice<std::int32_t>& lattice, int r, const PredictorWeights& weights, std::int32_t low,
                  std::int32_t high, std::span<std::int32_t> predictions) {
-  const Neighbours<std::int32_t> at(lattice, r);
-  predict_codes(at.own, at.north, at.north_north, weights, Lattice<std::int32_t>::first(r), lattice.last(r), low, high,
-                predictions.data());
+  predict_codes(Neighbours(lattice, r), weights, low, high, predictions.data());
 }
 
 template <>
 void predict_row(const Lattice<std::int64_t>& lattice, int r, const PredictorWeights& weights, std::int64_t low,
                  std::int64_t high, std::span<std::int64_t> predictions) {
-  const Neighbours<std::int64_t> at(lattice, r);
-  predict_places(at.own, at.north, at.north_north, weights, Lattice<std::int64_t>::first(r), lattice.last(r), low, high,
-                 predictions.data());
+  predict_places(Neighbours(lattice, r), weights, low, high, predictions.data());
 }
 
 template <>
 void predict_row_from_above(const Lattice<std::int32_t>& lattice, int r, const PredictorWeights& weights,
                             std::span<std::int32_t> parts) {
-  const Neighbours<std::int32_t> at(lattice, r);
-  predict_parts(at.north, at.north_north, weights, Lattice<std::int32_t>::first(r), lattice.last(r), parts.data());
+  sum_codes_above(Neighbours(lattice, r), weights, parts.data());
 }
 
 template <>
 void predict_row_from_above(const Lattice<std::int64_t>& lattice, int r, const PredictorWeights& weights,
                             std::span<std::int64_t> parts) {
-  const Neighbours<std::int64_t> at(lattice, r);
-  std::int64_t sum = 0;
-  for (const std::int64_t weight : weights) sum += weight;
-  const std::int64_t anchor = (std::int64_t{1} << kWeightBits) - sum;
-  for (int c = Lattice<std::int64_t>::first(r); c <= lattice.last(r); ++c) {
-    parts[static_cast<std::size_t>(c)] = anchor * at.north[c] + weights[1] * at.north[c - 1] +
-                                         weights[3] * at.north[c + 1] + weights[4] * at.north[c - 2] +
-                                         weights[5] * at.north_north[c] + weights[6] * at.north_north[c + 1] +
-                                         weights[7] * at.north_north[c - 1] + kRounding;
-  }
+  sum_above<std::int64_t, std::uint64_t>(Neighbours(lattice, r), weights, parts.data());
 }
 
 namespace {
 
-constexpr int kTerms = kWeightCount + 1;  // eight neighbours and the sample itself, each less NE
-constexpr int kDifferenceLimit = 1023;    // squares of which add up to 31 bits over kChunk places
+constexpr std::size_t kTerms = kWeightCount + 1;  // the neighbours and the sample itself, each less NE
+constexpr float kDifferenceLimit = 1023.0F;       // squares of which add up to less than 2^31 over kChunk places
 constexpr int kChunk = 2048;
+constexpr int kPasses = 3;
+constexpr int kRowsToThin = 96;  // from this many rows on, every third one says enough
 
 using Moments = std::array<std::array<std::int64_t, kTerms>, kTerms>;
-using Differences = std::array<std::array<std::int16_t, kChunk>, kTerms>;
 
 ISOHF_VECTORISED std::int32_t dot(const std::int16_t* a, const std::int16_t* b, int count) {
   std::int32_t sum = 0;
@@ -124,40 +140,85 @@ ISOHF_VECTORISED std::int32_t dot(const std::int16_t* a, const std::int16_t* b, 
 }
 
 template <typename Wide>
-void take_differences(const Neighbours<Wide>& at, int start, int count, int shift, Differences& differences) {
-  const auto take = [&](std::size_t term, const Wide* samples) {
-    for (int i = 0; i < count; ++i) {
-      const Wide difference = (samples[start + i] - at.north[start + i]) >> shift;
-      differences[term][static_cast<std::size_t>(i)] =
-          static_cast<std::int16_t>(std::clamp<Wide>(difference, -kDifferenceLimit, kDifferenceLimit));
-    }
-  };
-  take(0, at.own - 1);
-  take(1, at.north - 1);
-  take(2, at.own - 2);
-  take(3, at.north + 1);
-  take(4, at.north - 2);
-  take(5, at.north_north);
-  take(6, at.north_north + 1);
-  take(7, at.north_north - 1);
-  take(8, at.own);
+inline void scale_differences(const Wide* samples, const Wide* anchor, const float* scale, int count,
+                              std::int16_t* out) {
+  for (int i = 0; i < count; ++i) {
+    const float difference = static_cast<float>(samples[i] - anchor[i]) * scale[i];
+    out[i] = static_cast<std::int16_t>(
+        static_cast<std::int32_t>(std::min(std::max(difference, -kDifferenceLimit), kDifferenceLimit)));
+  }
 }
 
-/// The shift that brings the mean |W - NE| near 2^6, far below the limit of the differences.
+ISOHF_VECTORISED void scale_code_differences(const std::int32_t* samples, const std::int32_t* anchor,
+                                             const float* scale, int count, std::int16_t* out) {
+  scale_differences(samples, anchor, scale, count, out);
+}
+
+/// One row's part of the normal equations.
+class MomentSum {
+ public:
+  template <typename Wide>
+  void add(const Neighbours<Wide>& at, std::span<const float> scale) {
+    const int start = at.first + 2;  // places whose WW is a sample of the row
+    for (int from = start; from <= at.last; from += kChunk) {
+      const int count = std::min(kChunk, at.last + 1 - from);
+      const auto take = [&](std::size_t term, const Wide* samples) {
+        if constexpr (sizeof(Wide) == 4) {
+          scale_code_differences(samples + from, at.north + from, &scale[static_cast<std::size_t>(from)], count,
+                                 differences_[term].data());
+        } else {
+          scale_differences(samples + from, at.north + from, &scale[static_cast<std::size_t>(from)], count,
+                            differences_[term].data());
+        }
+      };
+      for (std::size_t term = 0; term < kWeightCount; ++term) take(term, at.of_weight(term));
+      take(kWeightCount, at.own);
+      for (std::size_t i = 0; i < kTerms; ++i) {
+        for (std::size_t j = 0; j <= i; ++j) {
+          moments_[i][j] += dot(differences_[i].data(), differences_[j].data(), count);
+        }
+      }
+    }
+  }
+  [[nodiscard]] const Moments& moments() const { return moments_; }
+
+ private:
+  Moments moments_{};
+  std::array<std::array<std::int16_t, kChunk>, kTerms> differences_{};
+};
+
+/// What brings the mean |W - NE| to 2^6 at most, far below the limit of the differences.
 template <typename Wide>
-int difference_shift(const Lattice<Wide>& lattice) {
+float overall_scale(const Lattice<Wide>& lattice) {
   std::uint64_t sum = 0;
   std::uint64_t count = 0;
-  for (int r = 2; r < lattice.rows(); r += 4) {
+  for (int r = 2; r < lattice.rows(); r += 5) {
     const Neighbours<Wide> at(lattice, r);
-    for (int c = Lattice<Wide>::first(r) + 1; c <= lattice.last(r); ++c, ++count) {
-      sum += static_cast<std::uint64_t>(std::abs(at.own[c] - at.north[c]));
+    for (int c = at.first + 1; c <= at.last; ++c, ++count) {
+      sum += static_cast<std::uint64_t>(std::abs(at.own[c - 1] - at.north[c]));
     }
   }
   const std::uint64_t mean = sum / std::max<std::uint64_t>(count, 1);
-  int shift = 0;
-  while ((mean >> shift) > 64) ++shift;
-  return shift;
+  float scale = 1.0F;
+  for (std::uint64_t rest = mean; rest > 64; rest /= 2) scale *= 0.5F;
+  return scale;
+}
+
+/// A sample's weight: the inverse of the error that it and its neighbours on the row had, half and half.
+template <typename Wide>
+void weigh_by_errors(const Neighbours<Wide>& at, std::span<const Wide> predictions, float overall,
+                     std::span<float> errors, std::span<float> scale) {
+  constexpr float kFloor = 2.0F;  // errors below this, in units of 1/overall, tell nothing
+  constexpr float kGain = 4.0F;
+  const auto error = [&](int c) -> float& { return errors[static_cast<std::size_t>(c)]; };
+  for (int c = at.first; c <= at.last; ++c) {
+    error(c) = std::abs(static_cast<float>(at.own[c] - predictions[static_cast<std::size_t>(c)]));
+  }
+  for (int c = at.first + 2; c <= at.last; ++c) {
+    const float around = error(c - 2) + 2.0F * error(c - 1) + error(std::min(c + 1, at.last));
+    const float typical = 0.5F * error(c) + 0.125F * around;
+    scale[static_cast<std::size_t>(c)] = kGain * overall / (typical * overall + kFloor);
+  }
 }
 
 /// Solves the normal equations by LDL^T. Only the four operations of IEEE arithmetic, so the same everywhere; nullopt
@@ -169,7 +230,7 @@ std::optional<std::array<double, kWeightCount>> solve(const Moments& moments) {
   std::array<double, n> solution{};
   double trace = 0.0;
   for (std::size_t i = 0; i < n; ++i) trace += static_cast<double>(moments[i][i]);
-  const double ridge = trace * 1e-6 + 1.0;  // flat and one-dimensional terrain leaves weights undecided
+  const double ridge = trace * 1e-9 + 1.0;  // flat and one-dimensional terrain leaves weights undecided
   for (std::size_t i = 0; i < n; ++i) {
     for (std::size_t j = 0; j <= i; ++j) {
       double sum = static_cast<double>(moments[i][j]) + (i == j ? ridge : 0.0);
@@ -195,40 +256,50 @@ std::optional<std::array<double, kWeightCount>> solve(const Moments& moments) {
   return solution;
 }
 
-}  // namespace
-
-template <typename Wide>
-PredictorWeights fit_weights(Lattice<Wide>& lattice) {
-  const int shift = difference_shift(lattice);
-  Moments moments{};
-  const auto differences = std::make_unique<Differences>();
-  for (int r = 2; r < lattice.rows(); ++r) {
-    const Neighbours<Wide> at(lattice, r);
-    const int start = Lattice<Wide>::first(r) + 2;  // places whose WW is a sample of the row
-    for (int from = start; from <= lattice.last(r); from += kChunk) {
-      const int count = std::min(kChunk, lattice.last(r) + 1 - from);
-      take_differences(at, from, count, shift, *differences);
-      for (std::size_t i = 0; i < kTerms; ++i) {
-        for (std::size_t j = 0; j <= i; ++j) {
-          moments[i][j] += dot((*differences)[i].data(), (*differences)[j].data(), count);
-        }
-      }
-    }
-  }
-  const auto solution = solve(moments);
-  if (!solution) return kSecondRowWeights;
+/// Weights as the header stores them; nullopt where they exceed what it may hold.
+std::optional<PredictorWeights> quantise(const std::array<double, kWeightCount>& solution) {
   PredictorWeights weights{};
   double sum = 0.0;
   for (std::size_t i = 0; i < kWeightCount; ++i) {
-    const double scaled = std::floor((*solution)[i] * (1 << kWeightBits) + 0.5);
+    const double scaled = std::floor(solution[i] * (1 << kWeightBits) + 0.5);
     sum += std::abs(scaled);
-    if (!(sum < kWeightSumLimit)) return kSecondRowWeights;
+    if (!(sum < kWeightSumLimit)) return std::nullopt;
     weights[i] = static_cast<std::int16_t>(scaled);
   }
   return weights;
 }
 
-template PredictorWeights fit_weights(Lattice<std::int32_t>& lattice);
-template PredictorWeights fit_weights(Lattice<std::int64_t>& lattice);
+}  // namespace
+
+template <typename Wide>
+PredictorWeights fit_weights(const Lattice<Wide>& lattice, Wide low, Wide high) {
+  const auto columns = static_cast<std::size_t>(lattice.columns());
+  const float overall = overall_scale(lattice);
+  const int step = lattice.rows() >= kRowsToThin ? 3 : 1;  // odd: rows of both kinds take part
+  std::vector<float> scale(columns, overall);
+  std::vector<float> errors(columns);
+  std::vector<Wide> predictions(columns);
+  PredictorWeights weights = kThirdRowWeights;
+  for (int pass = 0; pass < kPasses; ++pass) {
+    const auto sum = std::make_unique<MomentSum>();
+    for (int r = 3 + pass % step; r < lattice.rows(); r += step) {
+      const Neighbours<Wide> at(lattice, r);
+      if (pass > 0) {
+        predict_row<Wide>(lattice, r, weights, low, high, predictions);
+        weigh_by_errors<Wide>(at, predictions, overall, errors, scale);
+      }
+      sum->add(at, scale);
+    }
+    const auto solution = solve(sum->moments());
+    if (!solution) return weights;
+    const auto fitted = quantise(*solution);
+    if (!fitted) return weights;
+    weights = *fitted;
+  }
+  return weights;
+}
+
+template PredictorWeights fit_weights(const Lattice<std::int32_t>& lattice, std::int32_t low, std::int32_t high);
+template PredictorWeights fit_weights(const Lattice<std::int64_t>& lattice, std::int64_t low, std::int64_t high);
 
 }  // namespace isohf

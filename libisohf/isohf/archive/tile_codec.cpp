@@ -58,10 +58,6 @@ void load(Lattice<Wide>& lattice, const Voids& voids, Wide base, const SampleAt&
   }
 }
 
-const PredictorWeights& weights_of_row(const PredictorWeights& fitted, int r) {
-  return r == 0 ? kFirstRowWeights : r == 1 ? kSecondRowWeights : fitted;
-}
-
 /// A residual modulo 2^16 or 2^32, folded.
 std::uint32_t fold(std::int32_t difference) {
   return zigzag(static_cast<std::int16_t>(difference)) & 0xffffU;
@@ -98,12 +94,12 @@ std::vector<CodedResidual> find_residuals(Lattice<Wide>& lattice, const Voids& v
         current[place] = 0;
         continue;
       }
-      *out++ = {whole, activity_from_above(north, place) + 2 * current[place - 1]};
+      *out++ = {whole, activity_from_above(north, place) + activity_from_west(current, place)};
     }
     for (int side = 0; r % 2 == 0 && side < 2; ++side) {
       if (void_row != nullptr && void_row[column_of_slid(columns, side)] != 0) continue;
       const int at = side == 0 ? 1 : columns - 3;
-      *out++ = {fold(lattice.slid(r, side) - lattice.slid_prediction(r, side)), current[at] + current[at + 1]};
+      *out++ = {fold(lattice.slid(r, side) - lattice.slid_prediction(r, side)), activity_of_slid(current[at], current[at + 1])};
     }
     lattice.close_row(r);
     folded.close_row(first, last);
@@ -129,7 +125,7 @@ Streams sort_into_streams(std::span<const CodedResidual> residuals, const Payloa
   std::uint64_t bits = 0;
   unsigned bit_count = 0;
   for (const CodedResidual& residual : residuals) {
-    const std::uint32_t level = std::min(residual.activity_sum >> header.activity_shift, kActivityLimit - 1);
+    const std::uint32_t level = activity_level(residual.activity, header.activity_shift);
     const unsigned symbol = symbol_of(residual.folded);
     *to[table[level]]++ = static_cast<std::byte>(symbol);
     const unsigned extra_bits = extra_bits_of_symbol(symbol);
@@ -183,7 +179,7 @@ void encode_samples(const TileShape& shape, PayloadHeader header, const Voids& v
   if (!header.is_constant) {
     Lattice<Wide> lattice(shape);
     load<Wide>(lattice, voids, header.base, sample_at);
-    header.weights = fit_weights(lattice);
+    header.weights = fit_weights<Wide>(lattice, header.low, header.high);
     const std::vector<CodedResidual> residuals = find_residuals(lattice, voids, header);
     ContextChoice contexts = choose_contexts(residuals);
     header.activity_shift = contexts.activity_shift;

@@ -70,9 +70,9 @@ class ResidualReader {
     extra_ = BitReader(reader.read_bytes(header.extra_bytes));
   }
 
-  /// The folded residual of a place with that activity sum.
-  std::uint32_t take(std::uint32_t activity_sum) {
-    const std::uint32_t level = std::min(activity_sum >> shift_, kActivityLimit - 1);
+  /// The folded residual of a place with that activity.
+  std::uint32_t take(std::uint32_t activity) {
+    const std::uint32_t level = activity_level(activity, shift_);
     const std::size_t context = table_[level];
     if (next_[context] == end_[context]) refuse(fmt::format("context {} holds too few symbols", context));
     const auto symbol = std::to_integer<unsigned>(*next_[context]++);
@@ -171,7 +171,7 @@ class TileDecoder {
   /// False where a sample leaves the stated range.
   template <bool kWithVoids>
   bool decode_row(int r, const std::uint8_t* void_row) {
-    const PredictorWeights& weights = r == 0 ? kFirstRowWeights : r == 1 ? kSecondRowWeights : header_.weights;
+    const PredictorWeights& weights = weights_of_row(header_.weights, r);
     predict_row_from_above<Wide>(lattice_, r, weights, parts_);
     const Wide low = header_.low, high = header_.high;
     const Wide weight_w = weights[0], weight_ww = weights[2];
@@ -187,7 +187,7 @@ class TileDecoder {
         folded[place] = 0;
         continue;
       }
-      const std::uint32_t residual = residuals_.take(activity_from_above(folded_north, place) + 2 * folded[place - 1]);
+      const std::uint32_t residual = residuals_.take(activity_from_above(folded_north, place) + activity_from_west(folded, place));
       folded[place] = std::min(residual, kFoldedLimit);
       const Wide sum =
           complete(parts_[static_cast<std::size_t>(place)], weigh(weight_w, own[place - 1], weight_ww, own[place - 2]));
@@ -200,7 +200,7 @@ class TileDecoder {
   Wide decode_slid(int r, int side) {
     const int at = side == 0 ? 1 : lattice_.columns() - 3;
     const std::uint32_t* const folded = folded_.current();
-    const Wide sample = unfold(lattice_.slid_prediction(r, side), residuals_.take(folded[at] + folded[at + 1]));
+    const Wide sample = unfold(lattice_.slid_prediction(r, side), residuals_.take(activity_of_slid(folded[at], folded[at + 1])));
     if (sample < header_.low || sample > header_.high) {
       refuse(fmt::format("row {} leaves the range {}..{} that the header states", r, header_.low, header_.high));
     }

@@ -18,7 +18,7 @@ namespace isohf {
 inline constexpr std::uint8_t kCodecVersion = 1;
 inline constexpr std::size_t kMaxContexts = 16;
 inline constexpr std::size_t kFixedHeaderBytes = 16;      ///< of every payload
-inline constexpr std::size_t kPredictedHeaderBytes = 44;  ///< of one whose samples are not all equal, without contexts
+inline constexpr std::size_t kPredictedHeaderBytes = 52;  ///< of one whose samples are not all equal, without contexts
 
 /// The largest payload that a tile of this shape and type can have.
 [[nodiscard]] std::uint64_t max_payload_bytes(const TileShape& shape, CodeType type);
@@ -99,16 +99,24 @@ inline constexpr std::uint32_t kFirstSplitSymbol = 16;
 inline constexpr unsigned kActivityLimit = 4096;                ///< activities are below this
 inline constexpr std::uint32_t kFoldedLimit = (1U << 28U) - 1;  ///< larger residuals count as this in activities
 
-/// How rough the tile is around a place, from the folded residuals of its neighbours.
+/// How rough the tile is around a place: the sum of these two, from the folded residuals of its neighbours above
+/// (`north` as in prediction, so that north[place] is NE's) and West of it.
 [[nodiscard]] inline std::uint32_t activity_from_above(const std::uint32_t* north, int place) {
-  return north[place] + north[place - 1];
+  return 2 * (north[place] + north[place - 1]) + north[place + 1] + north[place - 2];
 }
-[[nodiscard]] inline std::uint32_t activity(std::uint32_t from_above, std::uint32_t west, unsigned shift) {
-  const std::uint32_t sum = (from_above + 2 * west) >> shift;
-  return sum < kActivityLimit ? sum : kActivityLimit - 1;
+[[nodiscard]] inline std::uint32_t activity_from_west(const std::uint32_t* own, int place) {
+  return 3 * own[place - 1] + own[place - 2];
+}
+/// The same for a slid vertex, from the residuals of the two lattice places beside it.
+[[nodiscard]] inline std::uint32_t activity_of_slid(std::uint32_t west, std::uint32_t east) { return 3 * (west + east); }
+
+/// The level by which the context is chosen.
+[[nodiscard]] inline std::uint32_t activity_level(std::uint32_t activity, unsigned shift) {
+  const std::uint32_t level = activity >> shift;
+  return level < kActivityLimit ? level : kActivityLimit - 1;
 }
 
-/// The context of every activity: how many thresholds it reaches.
+/// The context of every level: how many thresholds it reaches.
 [[nodiscard]] std::array<std::uint8_t, kActivityLimit> context_table(std::span<const std::uint16_t> thresholds);
 
 /// Folded residuals of two rows, with margins as in Lattice.
@@ -121,7 +129,7 @@ class ResidualRows {
   [[nodiscard]] const std::uint32_t* above() const { return above_.data() + 2; }
 
   /// Before row r: West of it stands what is North-East of its first place.
-  void open_row(int first, int shift) { current()[first - 1] = above()[first + shift]; }
+  void open_row(int first, int shift) { current()[first - 1] = current()[first - 2] = above()[first + shift]; }
   /// After it: margins repeat the outermost residuals, and the row becomes the one above.
   void close_row(int first, int last) {
     for (int place = -2; place < first; ++place) current()[place] = current()[first];

@@ -1,0 +1,132 @@
+#include "isohf/archive/metadata.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "archive/tiles.h"
+#include "isohf/base/error.h"
+
+namespace isohf {
+namespace {
+
+Metadata full() {
+  const TileGrid grid = TileGrid::make(TileShape::make(12, 11, 3), 5, 4, 1.0 / 3.0, 0.1);
+  Metadata metadata = test::make_metadata(grid, CodeType::kU16);
+  metadata.content_sha256 = std::string(64, 'a');
+  metadata.tiles_stored = 17;
+  metadata.extensions = {{"shadow", R"({"sun":[0.1,2],"note":"ä"})"}, {"accuracy", "1.5"}};
+  return metadata;
+}
+
+std::string replaced(std::string text, const std::string& from, const std::string& to) {
+  const std::size_t at = text.find(from);
+  EXPECT_NE(at, std::string::npos) << from;
+  return text.replace(at, from.size(), to);
+}
+
+TEST(Metadata, ComesBackAsItWas) {
+  const Metadata metadata = full();
+  const std::string json = format_metadata(metadata);
+  const Metadata back = parse_metadata(json);
+  EXPECT_EQ(format_metadata(back), json);
+  EXPECT_EQ(back.grid.extent_x(), 1.0 / 3.0);  // doubles to the last bit
+  EXPECT_EQ(back.grid.shape(), metadata.grid.shape());
+  EXPECT_EQ(back.grid.tile_columns(), 5);
+  EXPECT_EQ(back.quantisation.offset, -12.5);
+  EXPECT_EQ(back.quantisation.scale, 0.1);
+  EXPECT_EQ(back.valid.x1, 1.0 / 3.0);
+  EXPECT_EQ(back.source.name, metadata.source.name);
+  EXPECT_EQ(back.source.origin_x, 6.000123456789);
+  EXPECT_EQ(back.source.origin_y, std::nullopt);
+  EXPECT_EQ(back.source.crs_epsg, 32611);
+  EXPECT_EQ(back.source.crs_wkt, metadata.source.crs_wkt);
+  EXPECT_EQ(back.statistics.max, std::nullopt);
+  EXPECT_EQ(back.statistics.vertices, 1234567890123);
+  EXPECT_EQ(back.textures, metadata.textures);
+  EXPECT_EQ(back.tiles_stored, 17);
+  ASSERT_EQ(back.extensions.size(), 2U);
+  EXPECT_EQ(back.extensions[0], metadata.extensions[0]);
+}
+
+TEST(Metadata, BeginsWithFormatAndVersion) {
+  EXPECT_THAT(format_metadata(full()), testing::StartsWith("{\n \"format\": \"isohf\",\n \"version\": 1,\n"));
+}
+
+TEST(Metadata, RefusesTheFutureByItsVersion) {
+  try {
+    static_cast<void>(parse_metadata(replaced(format_metadata(full()), "\"version\": 1", "\"version\": 2")));
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::kUnsupported);
+  }
+}
+
+TEST(Metadata, NamesWhatIsWrong) {
+  const std::string json = format_metadata(full());
+  const std::pair<std::pair<const char*, const char*>, const char*> cases[] = {
+      {{"\"format\": \"isohf\"", "\"format\": \"other\""}, "format"},
+      {{"\"version\": 1", "\"version\": \"1\""}, "version"},
+      {{"\"rows\": 11", "\"rows\": 12"}, "tile_shape"},
+      {{"\"rows\": 11", "\"rows\": 1e9"}, "tile_shape.rows"},
+      {{"\"columns\": 12", "\"columns\": -12"}, "tile_shape.columns"},
+      {{"\"rows\": 4", "\"rows\": 0"}, "tile grid"},
+      {{"\"rows\": 4", "\"rows\": 18446744073709551615"}, "tiles.rows"},
+      {{"\"stored\": 17", "\"stored\": 21"}, "tiles.stored"},
+      {{"\"type\": \"u16\"", "\"type\": \"u17\""}, "samples.type"},
+      {{"\"scale\": 0.1", "\"scale\": 0"}, "samples.scale"},
+      {{"\"scale\": 0.1", "\"scale\": -1"}, "samples.scale"},
+      {{"\"scale\": 0.1", "\"scale\": 1e999"}, ""},
+      {{"\"offset\": -12.5", "\"offset\": null"}, "samples.offset"},
+      {{"\"textures\"", "\"textures2\""}, "textures"},
+      {{"\"x0\"", "\"y0\""}, "valid.x0"},
+      {{"aaaa", "AAAA"}, "content_sha256"},
+      {{"\"epsg\": 32611", "\"epsg\": \"x\""}, "source.crs.epsg"},
+      {{"{", "["}, ""},
+  };
+  for (const auto& [change, name] : cases) {
+    SCOPED_TRACE(change.second);
+    try {
+      static_cast<void>(parse_metadata(replaced(json, change.first, change.second)));
+      ADD_FAILURE() << "was read";
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ErrorCode::kCorrupt);
+      EXPECT_THAT(error.what(), testing::HasSubstr(name));
+    }
+  }
+}
+
+TEST(Metadata, RefusesEveryTruncation) {
+  const std::string json = format_metadata(full());
+  for (std::size_t size = 0; size < json.size(); ++size) {
+    EXPECT_THROW(static_cast<void>(parse_metadata(json.substr(0, size))), Error) << size;
+  }
+}
+
+TEST(Metadata, RefusesDeepNesting) {
+  EXPECT_THROW(static_cast<void>(parse_metadata(std::string(1000000, '['))), Error);
+  std::string json = format_metadata(full());
+  json.insert(1, "\"deep\":" + std::string(100, '[') + std::string(100, ']') + ",");
+  EXPECT_THROW(static_cast<void>(parse_metadata(json)), Error);
+}
+
+TEST(Metadata, IgnoresBracketsInStrings) {
+  Metadata metadata = full();
+  metadata.source.crs_wkt = std::string(500, '[') + "\\\"{";
+  EXPECT_EQ(parse_metadata(format_metadata(metadata)).source.crs_wkt, metadata.source.crs_wkt);
+}
+
+TEST(Metadata, RefusesAnExtensionWithANameOfTheFormat) {
+  Metadata metadata = full();
+  metadata.extensions = {{"source", "1"}};
+  EXPECT_THROW(static_cast<void>(format_metadata(metadata)), Error);
+}
+
+TEST(CodeType, HasNames) {
+  for (const CodeType type : {CodeType::kU16, CodeType::kU8, CodeType::kF32}) {
+    EXPECT_EQ(code_type_from_string(to_string(type)), type);
+  }
+  EXPECT_THROW(static_cast<void>(code_type_from_string("u32")), Error);
+}
+
+}  // namespace
+}  // namespace isohf

@@ -1,0 +1,278 @@
+#include "isohf/archive/writer.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <csignal>
+
+#include "archive/tiles.h"
+#include "isohf/archive/reader.h"
+#include "isohf/base/error.h"
+
+namespace isohf {
+namespace {
+
+using test::TemporaryFolder;
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+TileGrid small_grid() { return TileGrid::make(TileShape::make(12, 11, 3), 5, 4, 100.0, 100.0); }
+
+EncodedTile tile_at(const TileGrid& grid, std::int64_t flat) {
+  EncodedTile tile = encode_tile(grid.shape(), test::tile_of_archive(grid, CodeType::kU16, flat));
+  tile.statistics.vertices = flat + 1;
+  tile.statistics.sum = 0.1 * static_cast<double>(flat);
+  tile.statistics.min = -static_cast<double>(flat);
+  return tile;
+}
+
+/// Adds tiles up to `end`, a member before every third one.
+void add_tiles(ArchiveWriter& writer, const TileGrid& grid, std::int64_t end) {
+  while (writer.next_tile() < end) {
+    const std::int64_t flat = writer.next_tile();
+    if (flat % 3 == 0) writer.add_member("extra/" + std::to_string(flat), std::vector<std::byte>(50, std::byte{3}), true);
+    writer.add_tile(tile_at(grid, flat));
+  }
+}
+
+void complete(ArchiveWriter& writer, const TileGrid& grid) {
+  add_tiles(writer, grid, grid.tile_count());
+  EXPECT_EQ(writer.statistics().vertices, 210);
+  EXPECT_EQ(writer.statistics().min, -19.0);
+  EXPECT_EQ(writer.tiles_stored(), 18);
+  Metadata metadata = test::make_metadata(grid, CodeType::kU16);
+  metadata.statistics.mean = writer.statistics().sum;
+  static_cast<void>(writer.finish(metadata));
+}
+
+ErrorCode code_of(const std::function<void()>& deed, const std::string& part_of_message) {
+  try {
+    deed();
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), HasSubstr(part_of_message));
+    return error.code();
+  }
+  ADD_FAILURE() << "nothing was thrown";
+  return ErrorCode::kCancelled;
+}
+
+TEST(ArchiveWriter, RefusesTargetsThatItMustNotWrite) {
+  const TemporaryFolder folder;
+  const TileGrid grid = small_grid();
+  const auto open = [&](const std::string& path) { return [&grid, path] { ArchiveWriter(path, grid, {}); }; };
+  test::write_file(folder.file("there"), {std::byte{1}});
+  EXPECT_EQ(code_of(open(folder.file("there")), "--overwrite"), ErrorCode::kInvalidArgument);
+  EXPECT_EQ(code_of(open(folder.file(".")), "folder"), ErrorCode::kInvalidArgument);
+  EXPECT_EQ(code_of(open(folder.file("no/such")), "no/such"), ErrorCode::kIo);
+  EXPECT_EQ(code_of(open("/dev/null"), "/dev/null"), ErrorCode::kInvalidArgument);
+  EXPECT_THAT(folder.names(), ElementsAre("there"));
+  EXPECT_EQ(test::read_file(folder.file("there")).size(), 1U);
+}
+
+TEST(ArchiveWriter, LeavesNothingWhereItIsNotFinished) {
+  const TemporaryFolder folder;
+  const TileGrid grid = small_grid();
+  {
+    ArchiveWriter writer(folder.file("a"), grid, {});
+    add_tiles(writer, grid, 7);
+    EXPECT_THAT(folder.names(), ElementsAre("a.part", "a.part.journal"));
+  }
+  EXPECT_THAT(folder.names(), ElementsAre());
+}
+
+TEST(ArchiveWriter, LetsOneProcessWriteATarget) {
+  const TemporaryFolder folder;
+  const TileGrid grid = small_grid();
+  ArchiveWriter writer(folder.file("a"), grid, {});
+  for (const bool resume : {false, true}) {
+    EXPECT_EQ(code_of([&] { ArchiveWriter(folder.file("a"), grid, {true, resume, ""}); }, "another process"), ErrorCode::kIo);
+  }
+  complete(writer, grid);  // unharmed
+  EXPECT_EQ(ArchiveReader(folder.file("a")).check_structure(), std::vector<std::string>{});
+}
+
+TEST(ArchiveWriter, KeepsWhatSomebodyElseMadeMeanwhile) {
+  const TemporaryFolder folder;
+  const TileGrid grid = small_grid();
+  {
+    ArchiveWriter writer(folder.file("a"), grid, {});
+    test::write_file(folder.file("a"), {std::byte{1}});
+    EXPECT_EQ(code_of([&] { complete(writer, grid); }, "meanwhile"), ErrorCode::kIo);
+  }
+  EXPECT_EQ(test::read_file(folder.file("a")).size(), 1U);
+  EXPECT_EQ(ArchiveReader(folder.file("a.part")).check_structure(), std::vector<std::string>{});
+}
+
+TEST(ArchiveWriter, ReplacesWhereItMay) {
+  const TemporaryFolder folder;
+  const TileGrid grid = small_grid();
+  test::write_file(folder.file("a"), {std::byte{1}});
+  ArchiveWriter writer(folder.file("a"), grid, {true, false, ""});
+  complete(writer, grid);
+  EXPECT_THAT(folder.names(), ElementsAre("a"));
+  EXPECT_EQ(ArchiveReader(folder.file("a")).metadata().tiles_stored, 18);
+}
+
+TEST(ArchiveWriter, RefusesMembersWithBadOrTakenNames) {
+  const TemporaryFolder folder;
+  ArchiveWriter writer(folder.file("a"), small_grid(), {});
+  writer.add_member("good", {}, false);
+  for (const char* name : {"", "/a", "a/", "..", "a/../b", "./a", "a//b", "a\\b", "c:a", "a\nb", "good", "isohf.json",
+                           "index.bin", "tiles/0/0.tile"}) {
+    EXPECT_EQ(code_of([&] { writer.add_member(name, {}, false); }, "member"), ErrorCode::kInvalidArgument) << name;
+  }
+}
+
+TEST(ArchiveWriter, SaysWhereTheMetadataDoNotFit) {
+  const TemporaryFolder folder;
+  const TileGrid grid = small_grid();
+  ArchiveWriter writer(folder.file("a"), grid, {});
+  add_tiles(writer, grid, 20);
+  Metadata metadata = test::make_metadata(grid, CodeType::kU16);
+  metadata.source.crs_wkt = std::string(20000, 'x');
+  EXPECT_EQ(code_of([&] { static_cast<void>(writer.finish(metadata)); }, "16384"), ErrorCode::kInvalidArgument);
+}
+
+/// Archives that a run wrote whole, and one that stopped at `stop` tiles, was damaged, and went on.
+class Resume : public testing::Test {
+ protected:
+  Resume() : grid_(small_grid()) {
+    ArchiveWriter writer(folder_.file("whole"), grid_, {false, false, "job"});
+    complete(writer, grid_);
+    whole_ = test::read_file(folder_.file("whole"));
+  }
+  void stop_at(std::int64_t tiles) {
+    ArchiveWriter writer(folder_.file("a"), grid_, {true, false, "job"});
+    add_tiles(writer, grid_, tiles);
+    writer.keep_part();
+  }
+  /// Goes on and checks the result; returns the tile that it went on with.
+  std::int64_t go_on() {
+    std::int64_t first = 0;
+    {
+      ArchiveWriter writer(folder_.file("a"), grid_, {true, true, "job"});
+      first = writer.next_tile();
+      complete(writer, grid_);
+    }
+    EXPECT_EQ(test::read_file(folder_.file("a")), whole_);
+    EXPECT_THAT(folder_.names(), ElementsAre("a", "whole"));
+    return first;
+  }
+  [[nodiscard]] std::string part() const { return folder_.file("a.part"); }
+  [[nodiscard]] std::string journal() const { return folder_.file("a.part.journal"); }
+
+  TemporaryFolder folder_;
+  TileGrid grid_;
+  std::vector<std::byte> whole_;
+};
+
+TEST_F(Resume, GivesTheSameBytesFromWhereverItStopped) {
+  for (std::int64_t tiles = 0; tiles <= 20; ++tiles) {
+    stop_at(tiles);
+    EXPECT_EQ(go_on(), tiles);
+  }
+}
+
+TEST_F(Resume, StartsOverWhereThereIsNothing) { EXPECT_EQ(go_on(), 0); }
+
+TEST_F(Resume, SurvivesEveryLengthOfAJournal) {
+  stop_at(9);
+  const std::vector<std::byte> part_bytes = test::read_file(part());
+  const std::vector<std::byte> journal_bytes = test::read_file(journal());
+  std::int64_t before = 0;
+  for (std::size_t size = 0; size <= journal_bytes.size(); size += 7) {
+    test::write_file(part(), part_bytes);
+    test::write_file(journal(), {journal_bytes.begin(), journal_bytes.begin() + static_cast<std::ptrdiff_t>(size)});
+    const std::int64_t first = go_on();
+    EXPECT_GE(first, before);
+    before = first;
+  }
+}
+
+TEST_F(Resume, GoesBackToTheLastTileThatIsWhole) {
+  stop_at(9);
+  const std::vector<std::byte> part_bytes = test::read_file(part());
+  const std::vector<std::byte> journal_bytes = test::read_file(journal());
+  for (std::size_t at = 16000; at < part_bytes.size(); at += 61) {
+    for (const bool cut : {false, true}) {
+      std::vector<std::byte> damaged = part_bytes;
+      if (cut) {
+        damaged.resize(at);
+      } else {
+        damaged[at] ^= std::byte{16};
+      }
+      test::write_file(part(), damaged);
+      test::write_file(journal(), journal_bytes);
+      EXPECT_LE(go_on(), 9);
+    }
+  }
+}
+
+TEST_F(Resume, RefusesThePartOfAnotherJob) {
+  stop_at(5);
+  const std::vector<std::byte> before = test::read_file(part());
+  EXPECT_EQ(code_of([&] { ArchiveWriter(folder_.file("a"), grid_, {true, true, "other"}); }, "other"), ErrorCode::kInvalidArgument);
+  EXPECT_EQ(test::read_file(part()), before);
+  EXPECT_EQ(go_on(), 5);
+}
+
+TEST_F(Resume, DropsAnOldPartWithoutBeingAsked) {
+  stop_at(5);
+  {
+    ArchiveWriter writer(folder_.file("a"), grid_, {true, false, "job"});
+    EXPECT_EQ(writer.next_tile(), 0);
+    complete(writer, grid_);
+  }
+  EXPECT_EQ(test::read_file(folder_.file("a")), whole_);
+}
+
+TEST_F(Resume, GoesOnAfterAKill) {
+  const pid_t child = ::fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    ArchiveWriter writer(folder_.file("a"), grid_, {true, false, "job"});
+    add_tiles(writer, grid_, 13);
+    ::kill(::getpid(), SIGKILL);
+  }
+  int status = 0;
+  ASSERT_EQ(::waitpid(child, &status, 0), child);
+  ASSERT_TRUE(WIFSIGNALED(status));
+  EXPECT_THAT(folder_.names(), ElementsAre("a.part", "a.part.journal", "whole"));
+  static_cast<void>(go_on());
+}
+
+TEST(ArchiveWriter, SaysThatTheDiskIsFullAndLeavesNothing) {
+  // A limit on file sizes fails writes as a full disk does, without needing one.
+  const TemporaryFolder folder;
+  const TileGrid grid = TileGrid::make(TileShape::make(212, 243, 4), 40, 4, 1.0, 1.0);
+  const pid_t child = ::fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    std::signal(SIGXFSZ, SIG_IGN);
+    const rlimit limit{5 << 20, 5 << 20};
+    ::setrlimit(RLIMIT_FSIZE, &limit);
+    int result = 1;
+    try {
+      ArchiveWriter writer(folder.file("a"), grid, {});
+      const EncodedTile tile = encode_tile(grid.shape(), test::make_tile(grid.shape(), CodeType::kU16, test::Kind::kNoise, 1));
+      while (writer.next_tile() < grid.tile_count()) writer.add_tile(tile);
+    } catch (const Error& error) {
+      const std::string message = error.what();
+      const bool is_clear = message.find("a.part") != std::string::npos && message.find("File too large") != std::string::npos &&
+                            message.find("bytes were written") != std::string::npos;
+      result = error.code() == ErrorCode::kIo && is_clear ? 0 : 2;
+    }
+    ::_exit(result);
+  }
+  int status = 0;
+  ASSERT_EQ(::waitpid(child, &status, 0), child);
+  EXPECT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 0);
+  EXPECT_THAT(folder.names(), ElementsAre());
+}
+
+}  // namespace
+}  // namespace isohf
