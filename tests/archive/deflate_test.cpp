@@ -32,7 +32,8 @@ std::vector<std::byte> make_bytes(std::size_t size, unsigned values, unsigned ru
   std::vector<std::byte> bytes;
   while (bytes.size() < size) {
     const auto byte = static_cast<std::byte>(static_cast<unsigned>(random()) % values);
-    for (unsigned i = static_cast<unsigned>(random()) % run + 1; i > 0 && bytes.size() < size; --i) bytes.push_back(byte);
+    for (unsigned i = static_cast<unsigned>(random()) % run + 1; i > 0 && bytes.size() < size; --i)
+      bytes.push_back(byte);
   }
   return bytes;
 }
@@ -66,7 +67,8 @@ TEST(CodeLengths, AreACompletePrefixCodeWithinTheLimit) {
       std::vector<std::uint32_t> frequencies(symbols);
       std::uint64_t a = 1, b = 1;
       for (std::uint32_t& frequency : frequencies) {  // Fibonacci numbers make the deepest trees
-        frequency = symbols % 2 == 0 ? static_cast<std::uint32_t>(std::min<std::uint64_t>(a, 1U << 30U)) : static_cast<std::uint32_t>(random() % 1000 + 1);
+        frequency = symbols % 2 == 0 ? static_cast<std::uint32_t>(std::min<std::uint64_t>(a, 1U << 30U))
+                                     : static_cast<std::uint32_t>(random() % 1000 + 1);
         b = std::min<std::uint64_t>(a + b, 1U << 30U);
         std::swap(a, b);
       }
@@ -139,9 +141,9 @@ TEST(VoidMask, RefusesRunsThatDoNotAddUp) {
   refuses({9}, 10);
   refuses({11}, 10);
   refuses({5, 6}, 10);
-  refuses({5, 0, 5}, 10);           // an empty run inside
-  refuses({5, 128 + 5}, 10);        // cut off
-  refuses({128 + 10, 0}, 10);       // not the shortest form
+  refuses({5, 0, 5}, 10);      // an empty run inside
+  refuses({5, 128 + 5}, 10);   // cut off
+  refuses({128 + 10, 0}, 10);  // not the shortest form
   refuses({255, 255, 255, 255, 255, 255, 1}, 10);
   refuses({255, 255, 255, 255, 15}, 10);
 }

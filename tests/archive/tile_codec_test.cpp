@@ -123,8 +123,9 @@ TEST(TileCodec, CountsEveryNaNAsTheSameVoid) {
 
 TEST(TileCodec, KeepsFloatsToTheLastBit) {
   const TileShape shape = TileShape::make(5, 5, 1);
-  const std::uint32_t bits[] = {0x80000000U, 0U,          1U,          0x80000001U, 0x007fffffU, 0x00800000U, 0x7f7fffffU,
-                                0xff7fffffU, 0x7f800000U, 0xff800000U, 0x3f800000U, 0x3f800001U, 0xbf800000U};
+  const std::uint32_t bits[] = {0x80000000U, 0U,          1U,          0x80000001U, 0x007fffffU,
+                                0x00800000U, 0x7f7fffffU, 0xff7fffffU, 0x7f800000U, 0xff800000U,
+                                0x3f800000U, 0x3f800001U, 0xbf800000U};
   TileCodes tile{CodeType::kF32, {}, {}};
   for (std::size_t i = 0; i < 25; ++i) tile.heights.push_back(std::bit_cast<float>(bits[i % std::size(bits)]));
   EXPECT_TRUE(test::same_samples(decode_tile(shape, CodeType::kF32, payload_of(encode_tile(shape, tile))), tile));
@@ -169,7 +170,8 @@ TEST(TileCodec, SurvivesEveryFlippedBit) {
 TEST(TileCodec, SurvivesNoiseBehindAValidHeader) {
   const TileShape shape = TileShape::make(24, 29, 1);
   std::mt19937 random(1);
-  const std::vector<std::byte> good = payload_of(encode_tile(shape, test::make_tile(shape, CodeType::kU16, Kind::kTerrain, 2)));
+  const std::vector<std::byte> good =
+      payload_of(encode_tile(shape, test::make_tile(shape, CodeType::kU16, Kind::kTerrain, 2)));
   for (int round = 0; round < 2000; ++round) {
     std::vector<std::byte> payload = good;
     const std::size_t from = random() % payload.size();
@@ -183,7 +185,8 @@ TEST(TileCodec, SurvivesNoiseBehindAValidHeader) {
 
 TEST(TileCodec, RefusesEveryWrongHeaderField) {
   const TileShape shape = TileShape::make(12, 11, 3);
-  const std::vector<std::byte> good = payload_of(encode_tile(shape, test::make_tile(shape, CodeType::kU16, Kind::kTerrain, 2)));
+  const std::vector<std::byte> good =
+      payload_of(encode_tile(shape, test::make_tile(shape, CodeType::kU16, Kind::kTerrain, 2)));
   const auto with = [&](std::size_t at, std::initializer_list<int> bytes) {
     std::vector<std::byte> payload = good;
     std::size_t i = at;
@@ -191,32 +194,33 @@ TEST(TileCodec, RefusesEveryWrongHeaderField) {
     return payload;
   };
   const CodeType type = CodeType::kU16;
-  expect_error(shape, type, with(0, {0}), ErrorCode::kCorrupt);       // version
+  expect_error(shape, type, with(0, {0}), ErrorCode::kCorrupt);  // version
   expect_error(shape, type, with(0, {2}), ErrorCode::kUnsupported);
   expect_error(shape, type, with(0, {255}), ErrorCode::kUnsupported);
-  expect_error(shape, type, with(1, {1}), ErrorCode::kCorrupt);       // sample type
+  expect_error(shape, type, with(1, {1}), ErrorCode::kCorrupt);  // sample type
   expect_error(shape, type, with(1, {9}), ErrorCode::kCorrupt);
-  expect_error(shape, type, with(2, {1}), ErrorCode::kCorrupt);       // flags: voids without mask
-  expect_error(shape, type, with(2, {2}), ErrorCode::kCorrupt);       // constant with a range
-  expect_error(shape, type, with(2, {4}), ErrorCode::kCorrupt);       // reserved
-  expect_error(shape, type, with(3, {1}), ErrorCode::kCorrupt);       // dropped bits
-  expect_error(shape, type, with(4, {255, 255, 0, 0}), ErrorCode::kCorrupt);    // low above high
-  expect_error(shape, type, with(4, {0, 0, 0, 128}), ErrorCode::kCorrupt);      // negative
-  expect_error(shape, type, with(8, {255, 255, 0, 0}), ErrorCode::kCorrupt);    // high is the void code
-  expect_error(shape, type, with(12, {1}), ErrorCode::kCorrupt);                // mask bytes
-  expect_error(shape, type, with(16, {0, 0, 1, 0}), ErrorCode::kCorrupt);       // base
+  expect_error(shape, type, with(2, {1}), ErrorCode::kCorrupt);                    // flags: voids without mask
+  expect_error(shape, type, with(2, {2}), ErrorCode::kCorrupt);                    // constant with a range
+  expect_error(shape, type, with(2, {4}), ErrorCode::kCorrupt);                    // reserved
+  expect_error(shape, type, with(3, {1}), ErrorCode::kCorrupt);                    // dropped bits
+  expect_error(shape, type, with(4, {255, 255, 0, 0}), ErrorCode::kCorrupt);       // low above high
+  expect_error(shape, type, with(4, {0, 0, 0, 128}), ErrorCode::kCorrupt);         // negative
+  expect_error(shape, type, with(8, {255, 255, 0, 0}), ErrorCode::kCorrupt);       // high is the void code
+  expect_error(shape, type, with(12, {1}), ErrorCode::kCorrupt);                   // mask bytes
+  expect_error(shape, type, with(16, {0, 0, 1, 0}), ErrorCode::kCorrupt);          // base
   expect_error(shape, type, with(20, {255, 255, 255, 255}), ErrorCode::kCorrupt);  // extra bytes
-  expect_error(shape, type, with(24, {32}), ErrorCode::kCorrupt);     // activity shift
-  expect_error(shape, type, with(25, {0}), ErrorCode::kCorrupt);      // contexts
+  expect_error(shape, type, with(24, {32}), ErrorCode::kCorrupt);                  // activity shift
+  expect_error(shape, type, with(25, {0}), ErrorCode::kCorrupt);                   // contexts
   expect_error(shape, type, with(25, {17}), ErrorCode::kCorrupt);
-  expect_error(shape, type, with(26, {1}), ErrorCode::kCorrupt);      // reserved
+  expect_error(shape, type, with(26, {1}), ErrorCode::kCorrupt);                   // reserved
   expect_error(shape, type, with(28, {255, 127, 255, 127}), ErrorCode::kCorrupt);  // weights too large
   expect_error(shape, type, with(52, {255, 255, 255, 255}), ErrorCode::kCorrupt);  // threshold or count
 }
 
 TEST(TileCodec, RefusesThePayloadOfAnotherShape) {
   const TileShape shape = TileShape::make(12, 11, 3);
-  const std::vector<std::byte> payload = payload_of(encode_tile(shape, test::make_tile(shape, CodeType::kU16, Kind::kTerrain, 2)));
+  const std::vector<std::byte> payload =
+      payload_of(encode_tile(shape, test::make_tile(shape, CodeType::kU16, Kind::kTerrain, 2)));
   expect_error(TileShape::make(12, 13, 1), CodeType::kU16, payload, ErrorCode::kCorrupt);
   expect_error(TileShape::make(5, 5, 1), CodeType::kU16, payload, ErrorCode::kCorrupt);
 }

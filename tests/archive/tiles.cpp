@@ -101,6 +101,7 @@ std::vector<std::byte> read_file(const std::string& path) {
   return bytes;
 }
 void write_file(const std::string& path, const std::vector<std::byte>& bytes) {
+  std::filesystem::remove(path);  // some file systems flush a file that is truncated and written anew
   std::ofstream out(path, std::ios::binary | std::ios::trunc);
   out.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
 }

@@ -19,7 +19,9 @@ using test::TemporaryFolder;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-TileGrid small_grid() { return TileGrid::make(TileShape::make(12, 11, 3), 5, 4, 100.0, 100.0); }
+TileGrid small_grid() {
+  return TileGrid::make(TileShape::make(12, 11, 3), 5, 4, 100.0, 100.0);
+}
 
 EncodedTile tile_at(const TileGrid& grid, std::int64_t flat) {
   EncodedTile tile = encode_tile(grid.shape(), test::tile_of_archive(grid, CodeType::kU16, flat));
@@ -33,7 +35,8 @@ EncodedTile tile_at(const TileGrid& grid, std::int64_t flat) {
 void add_tiles(ArchiveWriter& writer, const TileGrid& grid, std::int64_t end) {
   while (writer.next_tile() < end) {
     const std::int64_t flat = writer.next_tile();
-    if (flat % 3 == 0) writer.add_member("extra/" + std::to_string(flat), std::vector<std::byte>(50, std::byte{3}), true);
+    if (flat % 3 == 0)
+      writer.add_member("extra/" + std::to_string(flat), std::vector<std::byte>(50, std::byte{3}), true);
     writer.add_tile(tile_at(grid, flat));
   }
 }
@@ -88,7 +91,12 @@ TEST(ArchiveWriter, LetsOneProcessWriteATarget) {
   const TileGrid grid = small_grid();
   ArchiveWriter writer(folder.file("a"), grid, {});
   for (const bool resume : {false, true}) {
-    EXPECT_EQ(code_of([&] { ArchiveWriter(folder.file("a"), grid, {true, resume, ""}); }, "another process"), ErrorCode::kIo);
+    EXPECT_EQ(code_of(
+                  [&] {
+                    ArchiveWriter(folder.file("a"), grid, {true, resume, ""});
+                  },
+                  "another process"),
+              ErrorCode::kIo);
   }
   complete(writer, grid);  // unharmed
   EXPECT_EQ(ArchiveReader(folder.file("a")).check_structure(), std::vector<std::string>{});
@@ -176,7 +184,9 @@ TEST_F(Resume, GivesTheSameBytesFromWhereverItStopped) {
   }
 }
 
-TEST_F(Resume, StartsOverWhereThereIsNothing) { EXPECT_EQ(go_on(), 0); }
+TEST_F(Resume, StartsOverWhereThereIsNothing) {
+  EXPECT_EQ(go_on(), 0);
+}
 
 TEST_F(Resume, SurvivesEveryLengthOfAJournal) {
   stop_at(9);
@@ -214,7 +224,12 @@ TEST_F(Resume, GoesBackToTheLastTileThatIsWhole) {
 TEST_F(Resume, RefusesThePartOfAnotherJob) {
   stop_at(5);
   const std::vector<std::byte> before = test::read_file(part());
-  EXPECT_EQ(code_of([&] { ArchiveWriter(folder_.file("a"), grid_, {true, true, "other"}); }, "other"), ErrorCode::kInvalidArgument);
+  EXPECT_EQ(code_of(
+                [&] {
+                  ArchiveWriter(folder_.file("a"), grid_, {true, true, "other"});
+                },
+                "other"),
+            ErrorCode::kInvalidArgument);
   EXPECT_EQ(test::read_file(part()), before);
   EXPECT_EQ(go_on(), 5);
 }
@@ -257,11 +272,13 @@ TEST(ArchiveWriter, SaysThatTheDiskIsFullAndLeavesNothing) {
     int result = 1;
     try {
       ArchiveWriter writer(folder.file("a"), grid, {});
-      const EncodedTile tile = encode_tile(grid.shape(), test::make_tile(grid.shape(), CodeType::kU16, test::Kind::kNoise, 1));
+      const EncodedTile tile =
+          encode_tile(grid.shape(), test::make_tile(grid.shape(), CodeType::kU16, test::Kind::kNoise, 1));
       while (writer.next_tile() < grid.tile_count()) writer.add_tile(tile);
     } catch (const Error& error) {
       const std::string message = error.what();
-      const bool is_clear = message.find("a.part") != std::string::npos && message.find("File too large") != std::string::npos &&
+      const bool is_clear = message.find("a.part") != std::string::npos &&
+                            message.find("File too large") != std::string::npos &&
                             message.find("bytes were written") != std::string::npos;
       result = error.code() == ErrorCode::kIo && is_clear ? 0 : 2;
     }

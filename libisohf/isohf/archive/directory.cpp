@@ -133,6 +133,12 @@ void check_profile(std::span<const std::byte> file, const ZipEnd& end, const Com
     offset = entry.header_offset + ours.size() + entry.compressed_bytes;
     ++entries;
   });
+  std::vector<std::byte> records;
+  append_end_records(end.entries, end.directory_offset, end.directory_bytes, records);
+  const auto found = file.subspan(end.records_offset);
+  if (!std::equal(records.begin(), records.end(), found.begin(), found.end())) {
+    complain(fmt::format("the end records at byte {} are not as the profile has them", end.records_offset));
+  }
   if (offset != end.directory_offset) {
     complain(
         fmt::format("the directory begins at byte {}, the last member ends at byte {}", end.directory_offset, offset));

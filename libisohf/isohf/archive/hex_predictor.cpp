@@ -6,7 +6,8 @@
 #include <memory>
 #include <optional>
 
-// Wide vectors where the machine has them; the results are integers, or single IEEE operations, and the same everywhere.
+// Wide vectors where the machine has them; the results are integers, or single IEEE operations, and the same
+// everywhere.
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__)
 #define ISOHF_VECTORISED __attribute__((target_clones("arch=x86-64-v3", "default")))
 #else

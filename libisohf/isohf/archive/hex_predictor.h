@@ -18,7 +18,8 @@
 ///          WW . W  . (x)              row r
 ///
 /// Rows are worked on in lattice order: even rows keep column 0 in place 1 and column C-1 in place C-2, where the
-/// lattice has them (errata E5), and their two slid vertices apart; these are predicted from their row once it is known.
+/// lattice has them (errata E5), and their two slid vertices apart; these are predicted from their row once it is
+/// known.
 
 namespace isohf {
 
@@ -40,7 +41,8 @@ inline constexpr PredictorWeights kThirdRowWeights = {4750, -1050, -1180, 370, -
 /// The sum of |weight| must stay below this, so that 16-bit samples are predicted in 32 bits.
 inline constexpr int kWeightSumLimit = 1 << 15;
 
-/// The samples of a tile in lattice order, with two places of margin West and East and three rows North. Wide: int32 for codes, int64 for floats.
+/// The samples of a tile in lattice order, with two places of margin West and East and three rows North. Wide: int32
+/// for codes, int64 for floats.
 template <typename Wide>
 class Lattice {
  public:
@@ -62,7 +64,9 @@ class Lattice {
   [[nodiscard]] int last(int row) const { return row % 2 == 0 ? columns_ - 2 : columns_ - 1; }
 
   /// Place 0 of row r; rows -3 to -1 exist, as do places -2, -1, C and C+1.
-  [[nodiscard]] Wide* row(int r) { return samples_.data() + static_cast<std::ptrdiff_t>(r + kRowsAbove) * stride_ + kMargin; }
+  [[nodiscard]] Wide* row(int r) {
+    return samples_.data() + static_cast<std::ptrdiff_t>(r + kRowsAbove) * stride_ + kMargin;
+  }
   [[nodiscard]] const Wide* row(int r) const {
     return samples_.data() + static_cast<std::ptrdiff_t>(r + kRowsAbove) * stride_ + kMargin;
   }
@@ -112,8 +116,8 @@ void predict_row_from_above(const Lattice<Wide>& lattice, int r, const Predictor
                             std::span<Wide> parts);
 
 /// The weights that predict the tile's rows from the fourth on best: least squares, then twice more with every sample
-/// weighted by how well it and its surroundings were predicted, which is what their codes' lengths go by. In large tiles
-/// every third row takes part. All rows must be closed; low and high are the range of the samples.
+/// weighted by how well it and its surroundings were predicted, which is what their codes' lengths go by. In large
+/// tiles every third row takes part. All rows must be closed; low and high are the range of the samples.
 template <typename Wide>
 [[nodiscard]] PredictorWeights fit_weights(const Lattice<Wide>& lattice, Wide low, Wide high);
 

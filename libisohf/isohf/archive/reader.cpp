@@ -215,9 +215,7 @@ void ArchiveReader::State::check_local_header(const TileEntry& entry, TileIndex 
   if (entry.offset_bytes < bytes ||
       !std::equal(header.begin(), header.end(),
                   file.begin() + static_cast<std::ptrdiff_t>(entry.offset_bytes - bytes))) {
-    throw Error(ErrorCode::kCorrupt,
-                fmt::format("tile ({},{}) at byte {}: its local header does not say what the index says", tile.column,
-                            tile.row, entry.offset_bytes));
+    throw Error(ErrorCode::kCorrupt, "its local header does not say what the index says");
   }
 }
 

@@ -99,7 +99,8 @@ std::vector<CodedResidual> find_residuals(Lattice<Wide>& lattice, const Voids& v
     for (int side = 0; r % 2 == 0 && side < 2; ++side) {
       if (void_row != nullptr && void_row[column_of_slid(columns, side)] != 0) continue;
       const int at = side == 0 ? 1 : columns - 3;
-      *out++ = {fold(lattice.slid(r, side) - lattice.slid_prediction(r, side)), activity_of_slid(current[at], current[at + 1])};
+      *out++ = {fold(lattice.slid(r, side) - lattice.slid_prediction(r, side)),
+                activity_of_slid(current[at], current[at + 1])};
     }
     lattice.close_row(r);
     folded.close_row(first, last);

@@ -187,7 +187,8 @@ class TileDecoder {
         folded[place] = 0;
         continue;
       }
-      const std::uint32_t residual = residuals_.take(activity_from_above(folded_north, place) + activity_from_west(folded, place));
+      const std::uint32_t residual =
+          residuals_.take(activity_from_above(folded_north, place) + activity_from_west(folded, place));
       folded[place] = std::min(residual, kFoldedLimit);
       const Wide sum =
           complete(parts_[static_cast<std::size_t>(place)], weigh(weight_w, own[place - 1], weight_ww, own[place - 2]));
@@ -200,7 +201,8 @@ class TileDecoder {
   Wide decode_slid(int r, int side) {
     const int at = side == 0 ? 1 : lattice_.columns() - 3;
     const std::uint32_t* const folded = folded_.current();
-    const Wide sample = unfold(lattice_.slid_prediction(r, side), residuals_.take(activity_of_slid(folded[at], folded[at + 1])));
+    const Wide sample =
+        unfold(lattice_.slid_prediction(r, side), residuals_.take(activity_of_slid(folded[at], folded[at + 1])));
     if (sample < header_.low || sample > header_.high) {
       refuse(fmt::format("row {} leaves the range {}..{} that the header states", r, header_.low, header_.high));
     }

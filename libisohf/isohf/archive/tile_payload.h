@@ -108,7 +108,9 @@ inline constexpr std::uint32_t kFoldedLimit = (1U << 28U) - 1;  ///< larger resi
   return 3 * own[place - 1] + own[place - 2];
 }
 /// The same for a slid vertex, from the residuals of the two lattice places beside it.
-[[nodiscard]] inline std::uint32_t activity_of_slid(std::uint32_t west, std::uint32_t east) { return 3 * (west + east); }
+[[nodiscard]] inline std::uint32_t activity_of_slid(std::uint32_t west, std::uint32_t east) {
+  return 3 * (west + east);
+}
 
 /// The level by which the context is chosen.
 [[nodiscard]] inline std::uint32_t activity_level(std::uint32_t activity, unsigned shift) {

@@ -1,0 +1,147 @@
+#include "isohf/archive/zip_layout.h"
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include "archive/tiles.h"
+#include "isohf/archive/content_hash.h"
+#include "isohf/archive/deflate.h"
+#include "isohf/archive/reader.h"
+#include "isohf/archive/tile_index.h"
+#include "isohf/base/error.h"
+
+namespace isohf {
+namespace {
+
+TEST(ZipLayout, NamesTilesAndReadsTheirNamesBack) {
+  EXPECT_EQ(tile_name({7, 12}), "tiles/12/7.tile");
+  for (const TileIndex tile : {TileIndex{0, 0}, TileIndex{10, 0}, TileIndex{16777215, 16777215}}) {
+    EXPECT_EQ(tile_from_name(tile_name(tile)), tile);
+  }
+  for (const char* name :
+       {"", "tiles/", "tiles/1", "tiles/1/", "tiles/1/2", "tiles/01/2.tile", "tiles/1/02.tile", "tiles/+1/2.tile",
+        "tiles/1/2.tile ", "Tiles/1/2.tile", "tiles/1/-2.tile", "tiles//2.tile", "tiles/1/2/3.tile"}) {
+    EXPECT_EQ(tile_from_name(name), std::nullopt) << name;
+  }
+}
+
+/// Entries of a directory that stands alone in a file.
+std::vector<ZipEntry> entries_of(const std::vector<std::byte>& file) {
+  std::vector<ZipEntry> entries;
+  for_each_entry(file, find_zip_end(file), [&](const ZipEntry& entry) { entries.push_back(entry); });
+  return entries;
+}
+
+TEST(ZipLayout, KeepsSizesAndOffsetsBeyond32Bits) {
+  const std::uint64_t values[] = {0, 1, 0xfffffffeU, 0xffffffffU, 0x100000000U, 0x123456789abcU};
+  std::vector<ZipMember> members;
+  for (const std::uint64_t bytes : values) {
+    for (const std::uint64_t offset : values)
+      members.push_back({"a/b", ZipMethod::kDeflated, 77, bytes / 2, bytes, offset});
+  }
+  std::vector<std::byte> file;
+  for (const ZipMember& member : members) append_directory_entry(member, file);
+  append_end_records(members.size(), 0, file.size(), file);
+  const std::vector<ZipEntry> entries = entries_of(file);
+  ASSERT_EQ(entries.size(), members.size());
+  for (std::size_t i = 0; i < members.size(); ++i) {
+    EXPECT_EQ(entries[i].bytes, members[i].bytes);
+    EXPECT_EQ(entries[i].compressed_bytes, members[i].compressed_bytes);
+    EXPECT_EQ(entries[i].header_offset, members[i].header_offset);
+    EXPECT_EQ(entries[i].crc32, 77U);
+    EXPECT_EQ(entries[i].name, "a/b");
+  }
+}
+
+TEST(ZipLayout, CountsMoreEntriesThan16Bits) {
+  std::vector<std::byte> file;
+  for (int i = 0; i < 70000; ++i) append_directory_entry({"x", ZipMethod::kStored, 0, 0, 0, 0}, file);
+  append_end_records(70000, 0, file.size(), file);
+  EXPECT_EQ(entries_of(file).size(), 70000U);
+}
+
+TEST(ZipLayout, StatesTheSizeOfALocalHeader) {
+  for (const std::uint64_t bytes : {std::uint64_t{5}, std::uint64_t{0xffffffffU}}) {
+    const ZipMember member{"some/name", ZipMethod::kStored, 1, bytes, bytes, 0};
+    std::vector<std::byte> header;
+    append_local_header(member, header);
+    EXPECT_EQ(header.size(), local_header_bytes(member));
+  }
+}
+
+TEST(ZipLayout, RefusesEveryTruncationOfADirectory) {
+  std::vector<std::byte> file;
+  for (int i = 0; i < 3; ++i) append_directory_entry({"name", ZipMethod::kStored, 0, 1, 1, 0x1ffffffffU}, file);
+  append_end_records(3, 0, file.size(), file);
+  for (std::size_t size = 0; size < file.size(); ++size) {
+    const std::vector<std::byte> cut(file.begin(), file.begin() + static_cast<std::ptrdiff_t>(size));
+    EXPECT_THROW(static_cast<void>(entries_of(cut)), Error) << size;
+  }
+}
+
+/// Writes bytes into a file at an offset and leaves a hole before it.
+void write_at(const std::string& path, std::uint64_t offset, const std::vector<std::byte>& bytes) {
+  const int descriptor = ::open(path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0644);
+  ASSERT_GE(descriptor, 0);
+  EXPECT_EQ(::pwrite(descriptor, bytes.data(), bytes.size(), static_cast<off_t>(offset)),
+            static_cast<ssize_t>(bytes.size()));
+  ::close(descriptor);
+}
+
+TEST(ZipLayout, ReachesTilesBeyondFourGibibytes) {
+  // metadata, five GiB of a hole as a member, one tile, the index.
+  const test::TemporaryFolder folder;
+  const std::string path = folder.file("large.isohf");
+  const TileGrid grid = TileGrid::make(TileShape::make(12, 11, 3), 1, 1, 1.0, 1.0);
+  const TileCodes tile = test::make_tile(grid.shape(), CodeType::kU16, test::Kind::kTerrain, 1);
+  const EncodedTile encoded = encode_tile(grid.shape(), tile);
+  Metadata metadata = test::make_metadata(grid, CodeType::kU16);
+  metadata.content_sha256 = std::string(64, '0');
+  const std::string json = format_metadata(metadata);
+  const auto text = std::as_bytes(std::span<const char>(json));
+
+  const ZipMember first{kMetadataName, ZipMethod::kStored, crc32(text), json.size(), json.size(), 0};
+  std::vector<std::byte> head;
+  append_local_header(first, head);
+  head.insert(head.end(), text.begin(), text.end());
+  const std::uint64_t hole_bytes = std::uint64_t{5} << 30U;
+  const ZipMember hole{"hole", ZipMethod::kStored, 0, hole_bytes, hole_bytes, head.size()};
+  append_local_header(hole, head);
+  write_at(path, 0, head);
+
+  std::vector<std::byte> tail;
+  const std::uint64_t start = head.size() + hole_bytes;
+  const ZipMember member{tile_name({0, 0}),       ZipMethod::kDeflated,  encoded.payload_crc32,
+                         encoded.deflated.size(), encoded.payload_bytes, start};
+  append_local_header(member, tail);
+  TileEntry entry;
+  entry.stored = true;
+  entry.offset_bytes = start + tail.size();
+  entry.compressed_bytes = static_cast<std::uint32_t>(encoded.deflated.size());
+  entry.payload_bytes = encoded.payload_bytes;
+  entry.payload_crc32 = encoded.payload_crc32;
+  tail.insert(tail.end(), encoded.deflated.begin(), encoded.deflated.end());
+  std::vector<std::byte> directory;
+  for (const ZipMember& one : {first, hole, member}) append_directory_entry(one, directory);
+  std::vector<std::byte> index;
+  append_index_record(entry, index);
+  append_index_footer({1, 1, 3, directory.size(), crc32(directory), crc32(index)}, index);
+  const ZipMember last{kIndexName, ZipMethod::kStored, crc32(index), index.size(), index.size(), start + tail.size()};
+  append_local_header(last, tail);
+  tail.insert(tail.end(), index.begin(), index.end());
+  append_directory_entry(last, directory);
+  const std::uint64_t directory_offset = start + tail.size();
+  tail.insert(tail.end(), directory.begin(), directory.end());
+  append_end_records(4, directory_offset, directory.size(), tail);
+  write_at(path, start, tail);
+
+  const ArchiveReader reader(path);
+  EXPECT_FALSE(reader.reads_by_directory());
+  EXPECT_GT(reader.tile_entry({0, 0}).offset_bytes, hole_bytes);
+  EXPECT_EQ(reader.read_tile({0, 0}), tile);
+  EXPECT_EQ(reader.members().size(), 3U);
+}
+
+}  // namespace
+}  // namespace isohf
