@@ -19,13 +19,13 @@ SourceInfo info_of(SampleType type, double z_scale = 1.0) {
   return info;
 }
 
-TEST(Quantiser, IntegerSourcesGetAQuarterStepAndKeepWholeElevationsWhole) {
+TEST(Quantiser, IntegerSourcesGetHalfAStepAndKeepWholeElevationsWhole) {
   const Quantisation q = choose_quantisation({CodeType::kU16, {}}, {-16.0, 3742.0}, info_of(SampleType::kInt16));
-  EXPECT_DOUBLE_EQ(q.scale, 0.25);
+  EXPECT_DOUBLE_EQ(q.scale, 0.5);
   EXPECT_DOUBLE_EQ(q.offset, -16.0);
-  const Quantisation wide = choose_quantisation({CodeType::kU16, {}}, {-8068.0, 21134.0}, info_of(SampleType::kInt16));
-  EXPECT_DOUBLE_EQ(wide.scale, 0.5) << "doubled until 29 km fit";
-  EXPECT_LE(wide.offset, -8068.0);
+  const Quantisation wide = choose_quantisation({CodeType::kU16, {}}, {-18068.0, 21134.0}, info_of(SampleType::kInt16));
+  EXPECT_DOUBLE_EQ(wide.scale, 1.0) << "doubled until 39 km fit";
+  EXPECT_LE(wide.offset, -18068.0);
   EXPECT_GE(elevation_from_code(wide, wide.max_code()), 21134.0);
 }
 

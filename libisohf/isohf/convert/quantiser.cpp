@@ -11,8 +11,8 @@
 namespace isohf {
 namespace {
 
-/// Integer sources get steps of a quarter of their own (docs/decisions/0011).
-constexpr double kStepsPerSourceStep = 4.0;
+/// Integer sources get steps of half their own (docs/decisions/0011).
+constexpr double kStepsPerSourceStep = 2.0;
 
 /// The finest step of which `codes` steps span the range: a hair wider than range/codes, so that the last elevation
 /// does not round past the last code.

@@ -20,7 +20,7 @@ struct QuantisationRequest {
 
 /// One scale and offset for the whole dataset.
 ///
-/// The chosen step is a quarter of the source's own for integer samples, doubled until the range fits, and the finest
+/// The chosen step is half of the source's own for integer samples, doubled until the range fits, and the finest
 /// that fits for floats. The offset is a multiple of the step, so that whole elevations stay whole.
 /// Throws Error{kInvalidArgument} where a step that was asked for needs more codes than the type has, naming the
 /// smallest one that fits.
