@@ -60,7 +60,7 @@ int guarded(IsohfOiioMessage* message, Action action) {
   }
 }
 
-SampleType sample_type_of(OIIO::TypeDesc type) {
+SampleType sample_type_of(const OIIO::TypeDesc& type) {
   switch (type.basetype) {
     case OIIO::TypeDesc::UINT8:
       return SampleType::kUint8;

@@ -105,6 +105,7 @@ std::unique_ptr<RasterSink> create_raster(const std::string& path, const RasterS
 const std::vector<std::string>& writable_extensions() {
   static const std::vector<std::string> extensions = [] {
     std::vector<std::string> list;
+    list.reserve(kWriters.size());
     for (const Writer& writer : kWriters) list.emplace_back(writer.extension);
     return list;
   }();
