@@ -58,11 +58,25 @@ TEST_F(BadInput, Folder) {
   expect_refused(folder.path(), {folder.path(), "folder"});
 }
 
-TEST_F(BadInput, UnreadableFile) {
-  if (::geteuid() == 0) GTEST_SKIP() << "root reads every file";
+TEST_F(BadInput, UnreadableFileAndFolder) {
   write_hills("secret.tif");
+  write_hills("open.tif");
   ::chmod((folder / "secret.tif").c_str(), 0);
-  expect_refused(folder / "secret.tif", {"secret.tif", "Permission denied"});
+  ::chmod((folder / "open.tif").c_str(), 0444);
+  ::chmod(folder.path().c_str(), 0555);
+  RunOptions plain_user;
+  plain_user.without_privileges = true;
+  if (run_isohf({"--version"}, plain_user).exit_code != 0) GTEST_SKIP() << "other users cannot run the program";
+  const RunResult input = run_isohf({"convert", folder / "secret.tif", folder / "out.isohf"}, plain_user);
+  EXPECT_EQ(input.exit_code, 1);
+  EXPECT_THAT(input.err, HasSubstr("secret.tif: cannot be opened: Permission denied\n"));
+  const RunResult output = run_isohf({"convert", folder / "open.tif", folder / "out.isohf"}, plain_user);
+  EXPECT_EQ(output.exit_code, 1);
+  EXPECT_THAT(output.err, HasSubstr("out.isohf"));
+  EXPECT_THAT(output.err, HasSubstr("Permission denied\n"));
+  EXPECT_EQ(std::count(output.err.begin(), output.err.end(), '\n'), 1) << output.err;
+  ::chmod(folder.path().c_str(), 0755);
+  EXPECT_EQ(folder.names(), (std::vector<std::string>{"open.tif", "secret.tif"}));
 }
 
 TEST_F(BadInput, TruncatedFile) {
@@ -75,6 +89,10 @@ TEST_F(BadInput, TruncatedFile) {
     write_file(folder / "cut.tif", whole.substr(0, length));
     expect_refused(folder / "cut.tif", {"cut.tif"});
   }
+}
+
+TEST_F(BadInput, NoRegularFile) {
+  expect_refused("/dev/zero", {"/dev/zero", "regular file"});
 }
 
 TEST_F(BadInput, UnknownFormat) {

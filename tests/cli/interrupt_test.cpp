@@ -59,6 +59,15 @@ TEST_F(Interrupt, SigtermIsExit130) {
   EXPECT_FALSE(exists("big.isohf"));
 }
 
+TEST_F(Interrupt, ASecondSigintEndsAtOnce) {
+  RunningProgram program(command("big.isohf"));
+  EXPECT_TRUE(program.wait_for_error_text("\"progress\":\"tiles\""));
+  program.send(SIGINT);
+  program.send(SIGINT);
+  EXPECT_EQ(program.wait().exit_code, 130);
+  EXPECT_FALSE(exists("big.isohf"));
+}
+
 TEST_F(Interrupt, KillLeavesNothingUnderTheFinalNameAndTheNextRunWorks) {
   EXPECT_EQ(stopped_by(SIGKILL).exit_code, 128 + SIGKILL);
   EXPECT_FALSE(exists("big.isohf"));

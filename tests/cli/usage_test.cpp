@@ -183,11 +183,24 @@ TEST(Usage, ConfigFileGivesOptionsAndTheCommandLineWins) {
   const RunResult one = run_isohf({"plan", "--config", folder / "options.toml", "--limit", "1"});
   EXPECT_EQ(three.exit_code, 0) << three.err;
   EXPECT_EQ(lines(three), lines(one) + 2);
+  write_file(folder / "flags.toml", "# a comment\njson = true\nshape = \"212x243\"\n");
+  EXPECT_THAT(run_isohf({"plan", "--config", folder / "flags.toml"}).out, testing::StartsWith("{"));
   write_file(folder / "bad.toml", "limitt = 3\n");
   expect_usage_error({"plan", "--config", folder / "bad.toml"}, "--config: no option is named limitt");
   write_file(folder / "bad2.toml", "limit = many\n");
   expect_usage_error({"plan", "--config", folder / "bad2.toml"}, "--limit: found 'many', must be a whole number");
   expect_usage_error({"plan", "--config", folder / "missing.toml"}, "missing.toml");
+}
+
+TEST(Usage, BashCompletesCommandsAndOptions) {
+  const auto complete = [](const std::string& words, int at) {
+    const std::string script = "source " ISOHF_SOURCE_DIR "/apps/isohf/completion.bash; COMP_WORDS=(" + isohf_path() +
+                               words + "); COMP_CWORD=" + std::to_string(at) + "; _isohf; echo \"${COMPREPLY[@]}\"";
+    return run_program({"/bin/bash", "-c", script}).out;
+  };
+  EXPECT_EQ(complete(" co", 1), "convert\n");
+  EXPECT_EQ(complete(" convert --dens", 2), "--density\n");
+  EXPECT_EQ(complete(" sample --a", 2), "--at\n");
 }
 
 TEST(Usage, FailureToWriteStandardOutputIsReported) {

@@ -45,6 +45,8 @@ void limit(int resource, std::uint64_t bytes) {
   if (options.file_size_limit_bytes) limit(RLIMIT_FSIZE, *options.file_size_limit_bytes);
   if (options.address_space_bytes) limit(RLIMIT_AS, *options.address_space_bytes);
   limit(RLIMIT_CORE, 0);
+  constexpr uid_t kNobody = 65534;
+  if (options.without_privileges && ::geteuid() == 0 && ::setuid(kNobody) != 0) ::_exit(126);
   std::signal(SIGPIPE, SIG_DFL);
   std::vector<char*> arguments;
   for (const std::string& argument : command) arguments.push_back(const_cast<char*>(argument.c_str()));
