@@ -1,5 +1,8 @@
 #include <gtest/gtest.h>
 
+#include <cstdlib>
+#include <filesystem>
+
 #include "archive/tiles.h"
 #include "isohf/archive/reader.h"
 #include "isohf/archive/writer.h"
@@ -33,6 +36,21 @@ TEST(Archive, BringsBackTilesMembersAndMetadata) {
     EXPECT_EQ(reader.read_member("shadow/seeds.bin"), std::vector<std::byte>(1000, std::byte{7}));
     EXPECT_EQ(reader.read_member("preview.png"), std::vector<std::byte>(33, std::byte{9}));
     EXPECT_EQ(reader.read_member("nothing"), std::nullopt);
+  }
+}
+
+TEST(Archive, IsReadByThePageAboutItsFormat) {
+  // page_reader.py was written from docs/archive_format.md; it compares content hashes.
+  if (std::system("command -v python3 >/dev/null 2>&1") != 0) GTEST_SKIP() << "python3 is not installed";
+  const TemporaryFolder folder;
+  const std::string path = folder.file("a.isohf");
+  for (const TileShape& shape : {TileShape::make(5, 5, 1), TileShape::make(12, 11, 3), TileShape::make(24, 29, 1)}) {
+    for (const CodeType type : {CodeType::kU16, CodeType::kU8, CodeType::kF32}) {
+      std::filesystem::remove(path);
+      test::make_archive(path, TileGrid::make(shape, 5, 4, 100.0, 1.0 / 3.0), type);
+      const std::string command = std::string("python3 \"" ISOHF_SOURCE_DIR "/tests/archive/page_reader.py\" ") + path;
+      EXPECT_EQ(std::system(command.c_str()), 0) << to_string(type) << " " << shape.columns();
+    }
   }
 }
 

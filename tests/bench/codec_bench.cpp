@@ -88,7 +88,9 @@ double now() {
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
   return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
 }
-double seconds_since(double start) { return now() - start; }
+double seconds_since(double start) {
+  return now() - start;
+}
 
 int run(int argc, char** argv) {
   const auto argument = [&](int i, const char* otherwise) { return std::string(i < argc ? argv[i] : otherwise); };

@@ -59,30 +59,26 @@ struct Group {
   }
 };
 
-std::uint8_t choose_shift(std::span<const CodedResidual> residuals) {
+}  // namespace
+
+std::uint8_t choose_activity_shift(std::span<const std::uint32_t> activities) {
   std::uint64_t sum = 0;
-  for (const CodedResidual& residual : residuals) sum += residual.activity;
-  const std::uint64_t mean = residuals.empty() ? 0 : sum / residuals.size();
+  for (const std::uint32_t activity : activities) sum += activity;
+  const std::uint64_t mean = activities.empty() ? 0 : sum / activities.size();
   unsigned shift = 0;
   while ((mean >> shift) > kActivityLimit / 16) ++shift;
   return static_cast<std::uint8_t>(shift);
 }
 
-}  // namespace
-
-ContextChoice choose_contexts(std::span<const CodedResidual> residuals) {
-  ContextChoice choice;
-  choice.activity_shift = choose_shift(residuals);
-  const auto level = [&](const CodedResidual& residual) {
-    return activity_level(residual.activity, choice.activity_shift);
-  };
+std::vector<std::uint16_t> choose_thresholds(std::span<const std::uint8_t> symbols,
+                                             std::span<const std::uint16_t> levels) {
   std::vector<std::uint32_t> histogram(kActivityLimit);
-  for (const CodedResidual& residual : residuals) ++histogram[level(residual)];
+  for (const std::uint16_t level : levels) ++histogram[level];
 
   // Start from ranges of about equal count...
   std::vector<Group> groups;
   std::vector<std::uint8_t> group_of(kActivityLimit);
-  const std::uint64_t share = residuals.size() / kMaxContexts + 1;
+  const std::uint64_t share = symbols.size() / kMaxContexts + 1;
   std::uint64_t in_group = 0;
   for (unsigned at = 0; at < kActivityLimit; ++at) {
     group_of[at] = static_cast<std::uint8_t>(groups.size());
@@ -93,8 +89,7 @@ ContextChoice choose_contexts(std::span<const CodedResidual> residuals) {
     }
   }
   groups.push_back({kActivityLimit, {}});
-  for (const CodedResidual& residual : residuals)
-    ++groups[group_of[level(residual)]].counts[symbol_of(residual.folded)];
+  for (std::size_t i = 0; i < symbols.size(); ++i) ++groups[group_of[levels[i]]].counts[symbols[i]];
 
   // ... and join the two neighbours whose joining saves most, while any does.
   const Group nothing{};
@@ -127,10 +122,9 @@ ContextChoice choose_contexts(std::span<const CodedResidual> residuals) {
     if (best > 0) joined[best - 1] = groups[best - 1].bits_with(groups[best]);
     if (best + 1 < groups.size()) joined[best] = groups[best].bits_with(groups[best + 1]);
   }
-  for (std::size_t i = 0; i + 1 < groups.size(); ++i) {
-    choice.thresholds.push_back(static_cast<std::uint16_t>(groups[i].end));
-  }
-  return choice;
+  std::vector<std::uint16_t> thresholds;
+  for (std::size_t i = 0; i + 1 < groups.size(); ++i) thresholds.push_back(static_cast<std::uint16_t>(groups[i].end));
+  return thresholds;
 }
 
 }  // namespace isohf

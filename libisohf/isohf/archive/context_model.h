@@ -9,18 +9,12 @@
 
 namespace isohf {
 
-/// A residual, ready to be sorted into its context.
-struct CodedResidual {
-  std::uint32_t folded;
-  std::uint32_t activity;
-};
+/// The shift that brings activities to levels of which the mean is near 2^8.
+[[nodiscard]] std::uint8_t choose_activity_shift(std::span<const std::uint32_t> activities);
 
-struct ContextChoice {
-  std::uint8_t activity_shift = 0;
-  std::vector<std::uint16_t> thresholds;
-};
-
-/// Deterministic; integers only.
-[[nodiscard]] ContextChoice choose_contexts(std::span<const CodedResidual> residuals);
+/// Thresholds between contexts, ascending, for residuals given as symbols and levels in the same order. Deterministic;
+/// integers only.
+[[nodiscard]] std::vector<std::uint16_t> choose_thresholds(std::span<const std::uint8_t> symbols,
+                                                           std::span<const std::uint16_t> levels);
 
 }  // namespace isohf

@@ -252,11 +252,17 @@ void tokenise(std::span<const std::byte> bytes, const std::array<std::uint32_t, 
 void DeflateWriter::write_block(std::span<const std::byte> bytes) {
   std::array<std::uint32_t, 256> counts{};
   for (const std::byte byte : bytes) ++counts[std::to_integer<std::size_t>(byte)];
-  tokenise(bytes, shortest_worthwhile_runs(counts, bytes.size()), tokens_);
-
   std::array<std::uint32_t, 288> frequencies{};
   std::uint64_t extra_bits = 0;
   bool has_matches = false;
+  tokens_.clear();
+  // Bytes that never take more than a quarter of a block do not come in runs worth a match.
+  const bool may_have_runs = *std::max_element(counts.begin(), counts.end()) > bytes.size() / 4;
+  if (may_have_runs) {
+    tokenise(bytes, shortest_worthwhile_runs(counts, bytes.size()), tokens_);
+  } else {
+    std::copy(counts.begin(), counts.end(), frequencies.begin());
+  }
   for (const std::uint16_t token : tokens_) {
     if (token < 256) {
       ++frequencies[token];
@@ -288,11 +294,11 @@ void DeflateWriter::write_block(std::span<const std::byte> bytes) {
   } else if (fixed_bits <= dynamic_bits) {
     put(0b010, 3);
     assign_codes(fixed.lengths, fixed.codes);
-    write_tokens(fixed, 5);
+    may_have_runs ? write_tokens(fixed, 5) : write_literals(fixed, bytes);
   } else {
     assign_codes(dynamic.lengths, dynamic.codes);
     write_header(header);
-    write_tokens(dynamic, header.distance_length);
+    may_have_runs ? write_tokens(dynamic, header.distance_length) : write_literals(dynamic, bytes);
   }
 }
 
@@ -341,6 +347,33 @@ void DeflateWriter::write_tokens(const Code& code, unsigned distance_bits) {
       count += match.extra_bits + distance_bits;
     }
     if (count >= 32) {
+      std::memcpy(to, &bits, 4);
+      to += 4;
+      bits >>= 32U;
+      count -= 32;
+    }
+  }
+  out_->resize(static_cast<std::size_t>(to - out_->data()));
+  bits_ = bits;
+  bit_count_ = count;
+  put(code.codes[kEndOfBlock], code.lengths[kEndOfBlock]);
+}
+
+void DeflateWriter::write_literals(const Code& code, std::span<const std::byte> bytes) {
+  const std::size_t at = out_->size();
+  out_->resize(at + 2 * bytes.size() + 16);
+  std::byte* to = out_->data() + at;
+  std::uint64_t bits = bits_;
+  unsigned count = bit_count_;
+  const auto add = [&](std::byte byte) {
+    const auto symbol = std::to_integer<std::size_t>(byte);
+    bits |= std::uint64_t{code.codes[symbol]} << count;
+    count += code.lengths[symbol];
+  };
+  for (std::size_t i = 0; i < bytes.size(); i += 2) {
+    add(bytes[i]);
+    if (i + 1 < bytes.size()) add(bytes[i + 1]);
+    if (count >= 32) {  // 31 + 2·15 bits fit
       std::memcpy(to, &bits, 4);
       to += 4;
       bits >>= 32U;

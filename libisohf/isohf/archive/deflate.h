@@ -40,6 +40,7 @@ class DeflateWriter {
   void write_block(std::span<const std::byte> bytes);
   void write_stored(std::span<const std::byte> bytes);
   void write_header(const Header& header);
+  void write_literals(const Code& code, std::span<const std::byte> bytes);
   void write_tokens(const Code& code, unsigned distance_bits);
 
   std::vector<std::byte>* out_;

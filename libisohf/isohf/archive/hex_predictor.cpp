@@ -6,13 +6,7 @@
 #include <memory>
 #include <optional>
 
-// Wide vectors where the machine has them; the results are integers, or single IEEE operations, and the same
-// everywhere.
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__)
-#define ISOHF_VECTORISED __attribute__((target_clones("arch=x86-64-v3", "default")))
-#else
-#define ISOHF_VECTORISED
-#endif
+#include "isohf/archive/vectorised.h"
 
 namespace isohf {
 namespace {
@@ -130,7 +124,8 @@ constexpr std::size_t kTerms = kWeightCount + 1;  // the neighbours and the samp
 constexpr float kDifferenceLimit = 1023.0F;       // squares of which add up to less than 2^31 over kChunk places
 constexpr int kChunk = 2048;
 constexpr int kPasses = 3;
-constexpr int kRowsToThin = 96;  // from this many rows on, every third one says enough
+constexpr int kRowsToThin = 96;  // from this many rows on, one in kThinning says enough in each pass
+constexpr int kThinning = 5;     // odd: rows of both kinds take part
 
 using Moments = std::array<std::array<std::int64_t, kTerms>, kTerms>;
 
@@ -276,7 +271,7 @@ template <typename Wide>
 PredictorWeights fit_weights(const Lattice<Wide>& lattice, Wide low, Wide high) {
   const auto columns = static_cast<std::size_t>(lattice.columns());
   const float overall = overall_scale(lattice);
-  const int step = lattice.rows() >= kRowsToThin ? 3 : 1;  // odd: rows of both kinds take part
+  const int step = lattice.rows() >= kRowsToThin ? kThinning : 1;
   std::vector<float> scale(columns, overall);
   std::vector<float> errors(columns);
   std::vector<Wide> predictions(columns);

@@ -7,6 +7,7 @@
 #include "isohf/archive/context_model.h"
 #include "isohf/archive/deflate.h"
 #include "isohf/archive/tile_payload.h"
+#include "isohf/archive/vectorised.h"
 #include "isohf/archive/void_mask.h"
 #include "isohf/base/assert.h"
 
@@ -66,46 +67,83 @@ std::uint32_t fold(std::int64_t difference) {
   return zigzag(static_cast<std::int32_t>(difference));
 }
 
-/// All residuals of the tile in coding order, voids left out.
+ISOHF_VECTORISED void fold_row(const std::int32_t* own, const std::int32_t* predictions, int count,
+                               std::uint32_t* out) {
+  for (int i = 0; i < count; ++i) out[i] = fold(own[i] - predictions[i]);
+}
+void fold_row(const std::int64_t* own, const std::int64_t* predictions, int count, std::uint32_t* out) {
+  for (int i = 0; i < count; ++i) out[i] = fold(own[i] - predictions[i]);
+}
+
+/// Activities of `count` places from `first` on.
+ISOHF_VECTORISED void find_activities(const std::uint32_t* north, const std::uint32_t* own, int first, int count,
+                                      std::uint32_t* out) {
+  for (int i = 0; i < count; ++i) {
+    out[i] = activity_from_above(north, first + i) + activity_from_west(own, first + i);
+  }
+}
+
+/// A tile's residuals in coding order, voids left out.
+struct Residuals {
+  std::vector<std::uint32_t> folded;
+  std::vector<std::uint32_t> activities;
+  std::size_t count = 0;
+
+  explicit Residuals(std::size_t most) : folded(most), activities(most) {}
+  void add(std::uint32_t residual, std::uint32_t activity) {
+    folded[count] = residual;
+    activities[count++] = activity;
+  }
+  /// Drops those of `added` last ones that are void.
+  template <typename IsVoid>
+  void drop_voids(std::size_t added, const IsVoid& is_void) {
+    const std::size_t start = count;
+    for (std::size_t i = 0; i < added; ++i) {
+      if (!is_void(static_cast<int>(i))) add(folded[start + i], activities[start + i]);
+    }
+  }
+};
+
 template <typename Wide>
-std::vector<CodedResidual> find_residuals(Lattice<Wide>& lattice, const Voids& voids, const PayloadHeader& header) {
+Residuals find_residuals(Lattice<Wide>& lattice, const Voids& voids, const PayloadHeader& header) {
   const int columns = lattice.columns();
-  std::vector<CodedResidual> residuals(static_cast<std::size_t>(columns) * static_cast<std::size_t>(lattice.rows()));
-  CodedResidual* out = residuals.data();
+  Residuals residuals(static_cast<std::size_t>(columns) * static_cast<std::size_t>(lattice.rows()));
   std::vector<Wide> predictions(static_cast<std::size_t>(columns));
-  ResidualRows folded(columns);
+  ResidualRows rows(columns);
   for (int r = 0; r < lattice.rows(); ++r) {
     const int first = Lattice<Wide>::first(r);
     const int last = lattice.last(r);
+    const int count = last + 1 - first;
     const std::uint8_t* const void_row =
         voids.is_void.empty() ? nullptr : voids.is_void.data() + static_cast<std::ptrdiff_t>(r) * columns;
+    const auto is_void_place = [&](int i) { return void_row[column_of_place(columns, r, first + i)] != 0; };
     lattice.open_row(r);
-    folded.open_row(first, r % 2);
+    rows.open_row(first, r % 2);
     predict_row<Wide>(lattice, r, weights_of_row(header.weights, r), header.low, header.high, predictions);
-    const Wide* const own = lattice.row(r);
-    std::uint32_t* const current = folded.current();
-    const std::uint32_t* const north = folded.above() + r % 2;
-    for (int place = first; place <= last; ++place) {
-      current[place] = std::min(fold(own[place] - predictions[static_cast<std::size_t>(place)]), kFoldedLimit);
+    std::uint32_t* const folded = residuals.folded.data() + residuals.count;
+    std::uint32_t* const current = rows.current();
+    fold_row(lattice.row(r) + first, predictions.data() + first, count, folded);
+    for (int i = 0; i < count; ++i) current[first + i] = std::min(folded[i], kFoldedLimit);
+    for (int i = 0; void_row != nullptr && i < count; ++i) {
+      if (is_void_place(i)) current[first + i] = 0;
     }
-    for (int place = first; place <= last; ++place) {
-      const std::uint32_t whole = fold(own[place] - predictions[static_cast<std::size_t>(place)]);
-      if (void_row != nullptr && void_row[column_of_place(columns, r, place)] != 0) {
-        current[place] = 0;
-        continue;
-      }
-      *out++ = {whole, activity_from_above(north, place) + activity_from_west(current, place)};
+    find_activities(rows.above() + r % 2, current, first, count, residuals.activities.data() + residuals.count);
+    if (void_row == nullptr) {
+      residuals.count += static_cast<std::size_t>(count);
+    } else {
+      residuals.drop_voids(static_cast<std::size_t>(count), is_void_place);
     }
     for (int side = 0; r % 2 == 0 && side < 2; ++side) {
       if (void_row != nullptr && void_row[column_of_slid(columns, side)] != 0) continue;
       const int at = side == 0 ? 1 : columns - 3;
-      *out++ = {fold(lattice.slid(r, side) - lattice.slid_prediction(r, side)),
-                activity_of_slid(current[at], current[at + 1])};
+      residuals.add(fold(lattice.slid(r, side) - lattice.slid_prediction(r, side)),
+                    activity_of_slid(current[at], current[at + 1]));
     }
     lattice.close_row(r);
-    folded.close_row(first, last);
+    rows.close_row(first, last);
   }
-  residuals.resize(static_cast<std::size_t>(out - residuals.data()));
+  residuals.folded.resize(residuals.count);
+  residuals.activities.resize(residuals.count);
   return residuals;
 }
 
@@ -115,22 +153,31 @@ struct Streams {
   std::vector<std::byte> extra;
 };
 
-Streams sort_into_streams(std::span<const CodedResidual> residuals, const PayloadHeader& header) {
+ISOHF_VECTORISED void find_levels(const std::uint32_t* activities, std::size_t count, unsigned shift,
+                                  std::uint16_t* levels) {
+  for (std::size_t i = 0; i < count; ++i) levels[i] = static_cast<std::uint16_t>(activity_level(activities[i], shift));
+}
+
+Streams sort_into_streams(std::span<const std::uint32_t> folded, std::span<const std::uint8_t> symbols,
+                          std::span<const std::uint16_t> levels, const PayloadHeader& header) {
   const auto table = context_table(header.thresholds);
+  std::array<std::size_t, kMaxContexts> counts{};
+  for (const std::uint16_t level : levels) ++counts[table[level]];
   Streams streams;
-  streams.symbols.assign(header.thresholds.size() + 1, std::vector<std::byte>(residuals.size()));
   std::array<std::byte*, kMaxContexts> to{};
-  for (std::size_t i = 0; i < streams.symbols.size(); ++i) to[i] = streams.symbols[i].data();
-  streams.extra.resize(residuals.size() * 4 + 8);
+  for (std::size_t i = 0; i <= header.thresholds.size(); ++i) {
+    streams.symbols.emplace_back(counts[i]);
+    to[i] = streams.symbols[i].data();
+  }
+  streams.extra.resize(folded.size() * 4 + 8);
   std::byte* extra_to = streams.extra.data();
   std::uint64_t bits = 0;
   unsigned bit_count = 0;
-  for (const CodedResidual& residual : residuals) {
-    const std::uint32_t level = activity_level(residual.activity, header.activity_shift);
-    const unsigned symbol = symbol_of(residual.folded);
-    *to[table[level]]++ = static_cast<std::byte>(symbol);
+  for (std::size_t i = 0; i < folded.size(); ++i) {
+    const unsigned symbol = symbols[i];
+    *to[table[levels[i]]]++ = static_cast<std::byte>(symbol);
     const unsigned extra_bits = extra_bits_of_symbol(symbol);
-    bits |= (std::uint64_t{residual.folded} & ((std::uint64_t{1} << extra_bits) - 1)) << bit_count;
+    bits |= (std::uint64_t{folded[i]} & ((std::uint64_t{1} << extra_bits) - 1)) << bit_count;
     bit_count += extra_bits;
     if (bit_count >= 32) {
       std::memcpy(extra_to, &bits, 4);
@@ -142,10 +189,19 @@ Streams sort_into_streams(std::span<const CodedResidual> residuals, const Payloa
   std::memcpy(extra_to, &bits, 8);
   extra_to += (bit_count + 7) / 8;
   streams.extra.resize(static_cast<std::size_t>(extra_to - streams.extra.data()));
-  for (std::size_t i = 0; i < streams.symbols.size(); ++i) {
-    streams.symbols[i].resize(static_cast<std::size_t>(to[i] - streams.symbols[i].data()));
-  }
   return streams;
+}
+
+/// Cuts the residuals into contexts, as many as pay.
+Streams make_streams(const Residuals& residuals, PayloadHeader& header) {
+  std::vector<std::uint8_t> symbols(residuals.count);
+  std::transform(residuals.folded.begin(), residuals.folded.end(), symbols.begin(),
+                 [](std::uint32_t folded) { return static_cast<std::uint8_t>(symbol_of(folded)); });
+  header.activity_shift = choose_activity_shift(residuals.activities);
+  std::vector<std::uint16_t> levels(residuals.count);
+  find_levels(residuals.activities.data(), residuals.count, header.activity_shift, levels.data());
+  header.thresholds = choose_thresholds(symbols, levels);
+  return sort_into_streams(residuals.folded, symbols, levels, header);
 }
 
 /// Completes payload and Deflate stream; a block for each part.
@@ -181,11 +237,7 @@ void encode_samples(const TileShape& shape, PayloadHeader header, const Voids& v
     Lattice<Wide> lattice(shape);
     load<Wide>(lattice, voids, header.base, sample_at);
     header.weights = fit_weights<Wide>(lattice, header.low, header.high);
-    const std::vector<CodedResidual> residuals = find_residuals(lattice, voids, header);
-    ContextChoice contexts = choose_contexts(residuals);
-    header.activity_shift = contexts.activity_shift;
-    header.thresholds = std::move(contexts.thresholds);
-    streams = sort_into_streams(residuals, header);
+    streams = make_streams(find_residuals(lattice, voids, header), header);
   }
   assemble(header, mask, streams, tile);
 }

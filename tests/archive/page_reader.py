@@ -1,0 +1,157 @@
+"""Reads an isohf archive by docs/archive_format.md alone, with nothing but Python's standard library, and compares the
+content hash that it finds with the one in the metadata. usage: page_reader.py FILE"""
+
+import hashlib
+import json
+import struct
+import sys
+import zlib
+
+KINDS = {"u16": 0, "u8": 1, "f32": 2}
+FIXED = {0: [4096], 1: [4096, -4096], 2: [4750, -1050, -1180, 370, -1230, 350, -1230, -290, 50, 660]}
+
+
+def void_mask(data, samples):
+    mask, run, shift, of = [], 0, 0, 0
+    for byte in data:
+        run |= (byte & 127) << shift
+        shift += 7
+        if byte < 128:
+            mask += [of] * run
+            run, shift, of = 0, 0, 1 - of
+    assert len(mask) == samples
+    return mask
+
+
+class Bits:
+    def __init__(self, data):
+        self.number, self.at = int.from_bytes(data, "little"), 0
+
+    def take(self, count):
+        value = self.number >> self.at & (1 << count) - 1
+        self.at += count
+        return value
+
+
+def decode(payload, columns, rows, kind):
+    """The integers of a tile in row order, None where void, and the number of dropped bits."""
+    version, found_kind, flags, dropped, low, high, mask_bytes = struct.unpack_from("<BBBBiiI", payload)
+    assert (version, found_kind) == (1, kind)
+    at = 16
+    if not flags & 2:
+        base, extra_bytes, shift, contexts = struct.unpack_from("<iIBB", payload, 16)
+        weights = struct.unpack_from("<12h", payload, 28)
+        thresholds = struct.unpack_from("<%dH" % (contexts - 1), payload, 52)
+        at = 52 + 2 * (contexts - 1)
+        counts = struct.unpack_from("<%dI" % contexts, payload, at)
+        at += 4 * contexts
+    mask = void_mask(payload[at : at + mask_bytes], columns * rows) if flags & 1 else [0] * (columns * rows)
+    at += mask_bytes
+    if flags & 2:
+        assert at == len(payload)
+        return [None if void else low for void in mask], dropped
+    streams = []
+    for count in counts:
+        streams.append(iter(payload[at : at + count]))
+        at += count
+    extra = Bits(payload[at : at + extra_bytes])
+    assert at + extra_bytes == len(payload)
+    modulus = 1 << (32 if kind == 2 else 16)
+
+    def residual(activity):
+        level = min(activity >> shift, 4095)
+        symbol = next(streams[sum(threshold <= level for threshold in thresholds)])
+        if symbol < 16:
+            return symbol
+        bits = (symbol - 16) // 8 + 1
+        return ((8 + (symbol & 7)) << bits) + extra.take(bits)
+
+    def restore(prediction, folded):
+        value = (prediction + (folded // 2 if folded % 2 == 0 else -(folded + 1) // 2)) % modulus
+        if kind == 2 and value >= modulus // 2:
+            value -= modulus
+        assert low <= value <= high
+        return value
+
+    # Dictionaries by place, margins included.
+    places = range(-2, columns + 2)
+    above = [dict.fromkeys(places, base) for _ in range(3)]  # rows r-1, r-2, r-3
+    above_folded = dict.fromkeys(places, 0)
+    out = [None] * (columns * rows)
+    for r in range(rows):
+        s = r % 2
+        first, last = (0, columns - 1) if s else (1, columns - 2)
+        column = {p: p for p in range(first, last + 1)}
+        if not s:
+            column[1], column[columns - 2] = 0, columns - 1
+        w = FIXED.get(r, weights)
+        w = list(w) + [0] * (12 - len(w))
+        v, g = {}, {}
+        v[first - 1] = v[first - 2] = above[0][first + s]
+        g[first - 1] = g[first - 2] = above_folded[first + s]
+        for p in range(first, last + 1):
+            ne = above[0][p + s]
+            if mask[r * columns + column[p]]:
+                v[p], g[p] = (v[p - 1] + ne) >> 1, 0
+                continue
+            near, far, farther, n = above[0], above[1], above[2], above_folded
+            neighbours = [v[p - 1], near[p + s - 1], v[p - 2], near[p + s + 1], near[p + s - 2], far[p], far[p + 1],
+                          far[p - 1], far[p + 2], far[p - 2], farther[p + s], farther[p + s - 1]]
+            total = sum(a * (b - ne) for a, b in zip(w, neighbours))
+            folded = residual(2 * (n[p + s] + n[p + s - 1]) + n[p + s + 1] + n[p + s - 2] + 3 * g[p - 1] + g[p - 2])
+            v[p] = restore(min(max(ne + ((total + 2048) >> 12), low), high), folded)
+            g[p] = min(folded, 2**28 - 1)
+            out[r * columns + column[p]] = v[p]
+        for c, p in (() if s else ((1, 1), (columns - 2, columns - 3))):
+            if not mask[r * columns + c]:
+                out[r * columns + c] = restore((v[p] + v[p + 1]) >> 1, residual(3 * (g[p] + g[p + 1])))
+        for row in (v, g):
+            row.update({p: row[first] for p in places if p < first})
+            row.update({p: row[last] for p in places if p > last})
+        above, above_folded = [v] + above[:2], g
+    assert all(next(stream, None) is None for stream in streams) and (extra.at + 7) // 8 == extra_bytes
+    return out, dropped
+
+
+def pack(values, dropped, kind):
+    if kind < 2:
+        void = (65535, 255)[kind]
+        return struct.pack("<%d%s" % (len(values), "HB"[kind]), *(void if v is None else v for v in values))
+    bits = [0x7FC00000 if v is None else (v << dropped if v >= 0 else (-v - 1) << dropped | 1 << 31) for v in values]
+    return struct.pack("<%dI" % len(bits), *bits)
+
+
+def main(path):
+    with open(path, "rb") as file:
+        data = file.read()
+    end64 = struct.unpack("<IQHHIIQQQQ", data[-98:-42])
+    directory = end64[9]
+    crc, _, size, name = struct.unpack_from("<IIIH", data, 14)
+    assert data[30 : 30 + name] == b"isohf.json"
+    text = data[30 + name : 30 + name + size]
+    assert zlib.crc32(text) == crc
+    metadata = json.loads(text)
+    shape, tiles, samples = metadata["tile_shape"], metadata["tiles"], metadata["samples"]
+    kind, columns, rows = KINDS[samples["type"]], shape["columns"], shape["rows"]
+    count = tiles["columns"] * tiles["rows"]
+    start = directory - 64 - 32 * count
+    assert data[directory - 64 : directory - 56] == b"ISOHFIDX"
+    everything = hashlib.sha256()
+    stored = 0
+    for tile in range(count):
+        offset, compressed, inflated, crc, _, _, flags = struct.unpack_from("<QIIIIII", data, start + 32 * tile)
+        values, dropped = [None] * (columns * rows), 0
+        if flags & 1:
+            payload = zlib.decompress(data[offset : offset + compressed], wbits=-15)
+            assert len(payload) == inflated and zlib.crc32(payload) == crc
+            values, dropped = decode(payload, columns, rows, kind)
+            stored += 1
+        everything.update(hashlib.sha256(pack(values, dropped, kind)).digest())
+    everything.update(struct.pack("<IIIQQddBdd", columns, rows, shape["levels"], tiles["columns"], tiles["rows"],
+                                  metadata["extent"]["x"], metadata["extent"]["z"], kind, samples["offset"],
+                                  samples["scale"]))
+    assert stored == tiles["stored"]
+    assert everything.hexdigest() == metadata["content_sha256"], "another content hash"
+
+
+main(sys.argv[1])
