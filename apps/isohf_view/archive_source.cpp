@@ -27,6 +27,8 @@ class ArchiveSource final : public TileSource {
   [[nodiscard]] const TileGrid& grid() const override { return reader_.grid(); }
   [[nodiscard]] ViewScale scale() const override { return scale_; }
 
+  [[nodiscard]] WorldBounds covered() const override { return reader_.metadata().valid; }
+
   [[nodiscard]] TileBounds bounds(TileIndex tile) const override {
     const TileEntry entry = reader_.tile_entry(tile);
     if (!entry.stored) return {};

@@ -56,14 +56,31 @@ void Camera::switch_kind() {
   pivot = eye + distance * forward();
 }
 
-Camera overview_camera(const TileSource& source, double exaggeration) {
-  const TileGrid& grid = source.grid();
+Camera overview_camera(const TileSource& source, const ViewState& view) {
   const TileBounds whole = whole_bounds(source);
-  const double size = std::max(grid.world_width(), grid.world_height());
-  const Vec3 middle{grid.world_width() / 2.0, 0.5 * (whole.low + whole.high) * exaggeration, grid.world_height() / 2.0};
-  Camera camera;
-  camera.look_at(middle + Vec3{0.25 * size, 0.62 * size, 0.95 * size}, middle);
-  return camera;
+  const WorldBounds covered = source.covered();
+  const double low = whole.low * view.exaggeration;
+  const double high = whole.high * view.exaggeration;
+  const Vec3 middle{0.5 * (covered.x0 + covered.x1), 0.5 * (low + high), 0.5 * (covered.z0 + covered.z1)};
+  const Vec3 way = normalised({0.25, 0.62, 0.95});
+  const Mat4 camera = look_along(-1.0 * way);
+  const double half_y = std::tan(view.fov_y_rad / 2.0);
+  const double half_x = half_y * view.width / view.height;
+  // The nearest distance from which every corner lies within nine tenths of the view.
+  double distance = 0.0;
+  for (int corner = 0; corner < 8; ++corner) {
+    const Vec3 at = Vec3{(corner & 1) != 0 ? covered.x1 : covered.x0, (corner & 2) != 0 ? high : low,
+                         (corner & 4) != 0 ? covered.z1 : covered.z0} -
+                    middle;
+    const auto along = [&](int row) {
+      return camera.at(row, 0) * at.x + camera.at(row, 1) * at.y + camera.at(row, 2) * at.z;
+    };
+    const double aside = std::max(std::abs(along(0)) / half_x, std::abs(along(1)) / half_y) / 0.9;
+    distance = std::max(distance, aside + along(2));
+  }
+  Camera out;
+  out.look_at(middle + std::max(distance, 1e-6) * way, middle);
+  return out;
 }
 
 double farthest_corner(const TileSource& source, Vec3 eye, double exaggeration) {

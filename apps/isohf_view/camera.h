@@ -29,8 +29,8 @@ struct Camera {
   void switch_kind();
 };
 
-/// A camera that sees the whole heightfield from the South, and how far it must see.
-[[nodiscard]] Camera overview_camera(const TileSource& source, double exaggeration);
+/// A camera that sees all that the source covers from the South-East, as large as the view takes.
+[[nodiscard]] Camera overview_camera(const TileSource& source, const ViewState& view);
 
 /// Distance from a point to the farthest corner of the heightfield.
 [[nodiscard]] double farthest_corner(const TileSource& source, Vec3 eye, double exaggeration);

@@ -46,7 +46,7 @@ struct Raw {
   std::vector<double> sun;
   std::string size = "1280x720";
   double fov_deg = 50.0;
-  double level = 0.0;
+  std::vector<double> level;
   double far_distance = 0.0;
 };
 
@@ -62,7 +62,10 @@ void add_picture_options(CLI::App& app, Options& options, Raw& raw) {
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   app.add_option("--mode", options.view.mode, "Colours")->transform(CLI::CheckedTransformer(modes()));
-  app.add_option("--level", raw.level, "Draw every tile at this level of detail, fractional")
+  app.add_option("--level", raw.level,
+                 "Draw every tile at this level of detail, fractional; two levels A,B: like a chessboard")
+      ->delimiter(',')
+      ->expected(1, 2)
       ->check(CLI::Range(0.0, 12.0));
   app.add_option("--fov", raw.fov_deg, "Vertical field of view, degrees")
       ->check(CLI::Range(1.0, 150.0))
@@ -72,6 +75,7 @@ void add_picture_options(CLI::App& app, Options& options, Raw& raw) {
   app.add_flag("--wireframe", options.view.wireframe, "Draw the triangles' sides");
   app.add_flag("--borders", options.view.borders, "Draw the tiles' borders");
   app.add_flag("!--no-haze", options.view.haze, "No haze towards the far distance");
+  app.add_flag("--beyond", options.view.beyond, "Show tiles beyond the source's edge as well");
   app.add_flag("!--no-overlay", options.overlay, "No figures on the picture");
   app.add_flag("--switch", options.view.plain_switching, "Switch levels of detail at once instead of fading");
 }
@@ -128,7 +132,8 @@ ParsedOptions parse_options(int argc, char** argv) {
     const int code = app.exit(error);
     return {std::nullopt, code == 0 ? 0 : 2};
   }
-  if (app.count("--level") > 0) options.view.fixed_level = raw.level;
+  if (!raw.level.empty()) options.view.fixed_level = raw.level[0];
+  if (raw.level.size() > 1) options.view.other_level = raw.level[1];
   if (app.count("--far") > 0) options.far_distance = raw.far_distance;
   if (!raw.position.empty()) options.position = vec3_from(raw.position);
   if (!raw.look_at.empty()) options.look_at = vec3_from(raw.look_at);

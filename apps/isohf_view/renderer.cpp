@@ -42,6 +42,22 @@ bool outside_view(const Mat4& clip, Vec3 low, Vec3 high) {
   return std::any_of(beyond.begin(), beyond.end(), [](int count) { return count == 8; });
 }
 
+void set_cutting(bool on) {
+  for (GLenum plane = GL_CLIP_DISTANCE0; plane < GL_CLIP_DISTANCE0 + 4; ++plane) {
+    if (on) {
+      glEnable(plane);
+    } else {
+      glDisable(plane);
+    }
+  }
+}
+
+bool reaches_beyond(const TileGrid& grid, TileIndex tile, const WorldBounds& covered) {
+  const WorldPoint west_north = grid.world_from_object(tile, {0.0, 0.0});
+  return west_north.x < covered.x0 || west_north.z < covered.z0 || west_north.x + grid.extent_x() > covered.x1 ||
+         west_north.z + grid.extent_z() > covered.z1;
+}
+
 double focal_px(const ViewState& view) {
   return view.height / (2.0 * std::tan(view.fov_y_rad / 2.0));
 }
@@ -60,6 +76,8 @@ TerrainFrame terrain_frame(const TileSource& source, const ViewState& view) {
                   static_cast<double>(frame.anchor_tile.row) * grid.extent_z() - view.eye.z};
   frame.code_height = source.scale().scale * view.exaggeration;
   frame.code_slope = frame.code_height;
+  const WorldBounds covered = source.covered();
+  frame.covered = {covered.x0 - view.eye.x, covered.z0 - view.eye.z, covered.x1 - view.eye.x, covered.z1 - view.eye.z};
   return frame;
 }
 
@@ -104,7 +122,8 @@ double Renderer::level_of(const ViewState& view, TileIndex tile, const TileBound
   const int levels = grid.shape().levels();
   double level = 0.0;
   if (view.fixed_level) {
-    level = std::clamp(*view.fixed_level, 0.0, static_cast<double>(levels - 1));
+    const bool second = view.other_level && (tile.column + tile.row) % 2 != 0;
+    level = std::clamp(second ? *view.other_level : *view.fixed_level, 0.0, static_cast<double>(levels - 1));
   } else {
     // Section 3.9, with the straight distance in place of camera-space depth: turning the head changes no mesh.
     const Vec3 centre{(static_cast<double>(tile.column) + 0.5) * grid.extent_x(),
@@ -136,8 +155,9 @@ std::vector<Renderer::Item> Renderer::visible_items(const ViewState& view, const
         ++figures.absent_tiles;
         continue;
       }
+      const bool is_cut = !view.beyond && reaches_beyond(grid, tile, source_.covered());
       const LodBlend blend = lod_blend(level_of(view, tile, bounds), grid.shape().levels());
-      items.push_back({tile, slot, bounds.has_voids, length(0.5 * (low + high)), blend});
+      items.push_back({tile, slot, bounds.has_voids, is_cut, length(0.5 * (low + high)), blend});
     }
   }
   std::sort(items.begin(), items.end(), [](const Item& a, const Item& b) { return a.distance < b.distance; });
@@ -170,17 +190,20 @@ void Renderer::draw_mesh(const TerrainProgram& program, const TerrainFrame& fram
   glUniform1i(program.uniform("level"), level);
   glUniform1i(program.uniform("is_stitch"), 0);
   item.slot->bind();
+  if (item.is_cut) set_cutting(true);
   glEnable(GL_CULL_FACE);
   shared_.draw_strip(level);
   figures.triangles += shape.strip_triangle_count(level);
   ++figures.draw_calls;
-  if (!shared_.has_stitch(level)) return;
-  // Stitch triangles stand upright and are seen from either side.
-  glUniform1i(program.uniform("is_stitch"), 1);
-  glDisable(GL_CULL_FACE);
-  shared_.draw_stitch(level);
-  figures.triangles += shape.stitch_triangle_count(level);
-  ++figures.draw_calls;
+  if (shared_.has_stitch(level)) {
+    // Stitch triangles stand upright and are seen from either side.
+    glUniform1i(program.uniform("is_stitch"), 1);
+    glDisable(GL_CULL_FACE);
+    shared_.draw_stitch(level);
+    figures.triangles += shape.stitch_triangle_count(level);
+    ++figures.draw_calls;
+  }
+  if (item.is_cut) set_cutting(false);
 }
 
 void Renderer::draw_opaque(const ViewState& view, const TerrainFrame& frame, const std::vector<Item>& items,
@@ -212,7 +235,8 @@ void Renderer::draw_fading(const ViewState& view, const TerrainFrame& frame, con
   end_fading_pass();
 }
 
-void Renderer::draw_wires(const TerrainFrame& frame, const std::vector<Item>& items, FrameFigures& figures) const {
+void Renderer::draw_wires(const ViewState& view, const TerrainFrame& frame, const std::vector<Item>& items,
+                          FrameFigures& figures) const {
   glPolygonMode(GL_FRONT_AND_BACK, GL_LINE);
   glEnable(GL_POLYGON_OFFSET_LINE);
   glPolygonOffset(-1.0F, -2.0F);
@@ -223,7 +247,11 @@ void Renderer::draw_wires(const TerrainFrame& frame, const std::vector<Item>& it
     program.begin(source_.grid(), frame);
     glUniform4f(program.uniform("flat_colour"), 0.05F, 0.06F, 0.09F, 0.7F);
     for (const Item& item : items) {
-      if (item.has_voids == voids) draw_mesh(program, frame, item, item.blend.first, figures);
+      if (item.has_voids != voids) continue;
+      // Lines vanish where a triangle's side falls below eight pixels.
+      const double side = 2.0 * source_.grid().sigma_x() * (1 << item.blend.first);
+      glUniform1f(program.uniform("fade_distance"), static_cast<float>(side * focal_px(view) / 8.0));
+      draw_mesh(program, frame, item, item.blend.first, figures);
     }
   }
   glDisable(GL_BLEND);
@@ -275,7 +303,7 @@ FrameFigures Renderer::draw(const ViewState& view, std::int64_t first_column, st
     ++figures.passes;
   }
   if (view.wireframe) {
-    draw_wires(frame, items, figures);
+    draw_wires(view, frame, items, figures);
     ++figures.passes;
   }
   glBindVertexArray(0);

@@ -41,6 +41,7 @@ class Renderer {
     TileIndex tile;
     const TileSlot* slot;
     bool has_voids;
+    bool is_cut;  ///< reaches beyond what the source covers
     double distance;
     LodBlend blend;
   };
@@ -58,7 +59,8 @@ class Renderer {
                    FrameFigures& figures) const;
   void draw_fading(const ViewState& view, const TerrainFrame& frame, const std::vector<Item>& items,
                    FrameFigures& figures) const;
-  void draw_wires(const TerrainFrame& frame, const std::vector<Item>& items, FrameFigures& figures) const;
+  void draw_wires(const ViewState& view, const TerrainFrame& frame, const std::vector<Item>& items,
+                  FrameFigures& figures) const;
   void draw_mesh(const TerrainProgram& program, const TerrainFrame& frame, const Item& item, int level,
                  FrameFigures& figures) const;
   void begin_shading(const TerrainProgram& program, const ViewState& view, const TerrainFrame& frame) const;

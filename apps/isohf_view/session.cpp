@@ -28,7 +28,7 @@ const std::vector<std::string>& help_lines() {
                                                "J L  sun round   I K  sun up and down",
                                                "+ -  vertical exaggeration     [ ]  far distance",
                                                "M  colours       X  wires      B  tile borders",
-                                               "T  fade or switch levels       Z  haze",
+                                               "T  fade or switch levels       Z  haze   V  beyond the source",
                                                "P  picture       F  figures    H  this help     Esc  end"};
   return kLines;
 }
@@ -73,11 +73,13 @@ Session::Session(const TileSource& source, const Options& options)
       box_(source, shared_, limits_from(options)),
       far_distance_(options.far_distance) {
   const int levels = source.grid().shape().levels();
-  if (view.fixed_level && *view.fixed_level > levels - 1) {
-    throw Error(ErrorCode::kInvalidArgument,
-                fmt::format("--level {}: this archive has levels 0 to {}", *view.fixed_level, levels - 1));
+  for (const std::optional<double>& level : {view.fixed_level, view.other_level}) {
+    if (level && *level > levels - 1) {
+      throw Error(ErrorCode::kInvalidArgument,
+                  fmt::format("--level {}: this archive has levels 0 to {}", *level, levels - 1));
+    }
   }
-  camera = overview_camera(source, view.exaggeration);
+  camera = overview_camera(source, view);
   const auto exaggerated = [this](Vec3 at) { return Vec3{at.x, at.y * view.exaggeration, at.z}; };
   if (options.position || options.look_at) {
     camera.look_at(options.position ? exaggerated(*options.position) : camera.eye,

@@ -31,7 +31,12 @@ uniform vec3 anchor;            // the anchor's place, seen from the eye; y: ele
 uniform float code_height;      // world units of one code, exaggeration included
 uniform float code_slope;       // the same for normals
 uniform mat4 clip_from_eye;
+uniform vec4 covered;           // West, North, East, South of what is shown, seen from the eye
 
+out gl_PerVertex {
+  vec4 gl_Position;
+  float gl_ClipDistance[4];     // only looked at where the renderer asks for it
+};
 out vec3 v_eye;                 // world axes, seen from the eye
 out vec3 v_normal;
 out vec2 v_object;
@@ -110,6 +115,10 @@ void main() {
   v_void = elevation_code == 65535u ? 1.0 : 0.0;
 #endif
   gl_Position = clip_from_eye * vec4(v_eye, 1.0);
+  gl_ClipDistance[0] = v_eye.x - covered.x;
+  gl_ClipDistance[1] = v_eye.z - covered.y;
+  gl_ClipDistance[2] = covered.z - v_eye.x;
+  gl_ClipDistance[3] = covered.w - v_eye.z;
 }
 )glsl";
 
@@ -215,11 +224,14 @@ void main() {
 )glsl";
 
 constexpr const char* kFlatFragment = R"glsl(
+in vec3 v_eye;
 out vec4 colour;
 uniform vec4 flat_colour;
+uniform float fade_distance;    // where lines begin to vanish; gone at three times as far; 0: never
 void main() {
   DISCARD_VOID;
   colour = flat_colour;
+  if (fade_distance > 0.0) colour.a *= clamp(1.5 - 0.5 * length(v_eye) / fade_distance, 0.0, 1.0);
 }
 )glsl";
 
@@ -259,7 +271,7 @@ uniform vec3 horizon;
 uniform vec3 zenith;
 void main() {
   vec3 ray = normalize(world_from_camera * vec3(v_ndc * half_view, -1.0));
-  vec3 sky = mix(horizon, zenith, pow(clamp(ray.y, 0.0, 1.0), 0.5));
+  vec3 sky = mix(horizon, zenith, 1.0 - exp(-2.2 * max(ray.y, 0.0)));
   if (sun.y > -0.1) {
     float near_sun = max(dot(ray, sun), 0.0);
     sky += vec3(1.0, 0.75, 0.45) * (0.25 * pow(near_sun, 24.0) + 0.6 * smoothstep(0.9995, 0.9998, near_sun));

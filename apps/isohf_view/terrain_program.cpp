@@ -22,6 +22,8 @@ void TerrainProgram::begin(const TileGrid& grid, const TerrainFrame& frame) cons
               static_cast<float>(frame.anchor.z));
   glUniform1f(uniform("code_height"), static_cast<float>(frame.code_height));
   glUniform1f(uniform("code_slope"), static_cast<float>(frame.code_slope));
+  glUniform4f(uniform("covered"), static_cast<float>(frame.covered.x0), static_cast<float>(frame.covered.z0),
+              static_cast<float>(frame.covered.x1), static_cast<float>(frame.covered.z1));
   glUniformMatrix4fv(uniform("clip_from_eye"), 1, GL_FALSE, frame.clip_from_eye.floats().data());
 }
 

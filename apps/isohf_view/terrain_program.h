@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "gl_objects.h"
+#include "isohf/archive/metadata.h"
 #include "isohf/lattice/tile_grid.h"
 #include "vec.h"
 
@@ -17,6 +18,7 @@ struct TerrainFrame {
   TileIndex anchor_tile{0, 0};
   double code_height = 1.0;  ///< world units of one code
   double code_slope = 1.0;   ///< the same for normals
+  WorldBounds covered;       ///< what is shown of tiles that are cut, seen from the eye
 };
 
 /// A program with the terrain's vertex shader and one fragment shader or another.

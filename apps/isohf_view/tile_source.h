@@ -37,6 +37,8 @@ class TileSource {
 
   [[nodiscard]] virtual const TileGrid& grid() const = 0;
   [[nodiscard]] virtual ViewScale scale() const = 0;
+  /// The part of the world that the source covers; what lies beyond is made up.
+  [[nodiscard]] virtual WorldBounds covered() const { return {0.0, 0.0, grid().world_width(), grid().world_height()}; }
   [[nodiscard]] virtual TileBounds bounds(TileIndex tile) const = 0;
   /// codes [C x R] out, 0..65534, or kVoidCode. Throws Error naming the tile.
   virtual void read(TileIndex tile, std::span<std::uint16_t> codes) const = 0;

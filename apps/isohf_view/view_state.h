@@ -21,7 +21,9 @@ struct ViewState {
   bool wireframe = false;
   bool borders = false;
   bool haze = true;
+  bool beyond = false;                ///< shows tiles beyond the source's edge as well
   std::optional<double> fixed_level;  ///< draws every tile at this fractional level
+  std::optional<double> other_level;  ///< of every second tile, like a chessboard; with fixed_level
   bool plain_switching = false;       ///< rounds the level instead of fading: for comparison
   int width = 1280;                   ///< pixels
   int height = 720;

@@ -28,7 +28,7 @@ TEST_F(RendererTest, DrawsEveryVisibleTileWithAtMostTwoCallsAPass) {
   ViewState view;
   view.width = 640;
   view.height = 360;
-  const Camera camera = overview_camera(source, 1.0);
+  const Camera camera = overview_camera(source, view);
   view.eye = camera.eye;
   view.forward = camera.forward();
   view.far_distance = 1.2 * farthest_corner(source, view.eye, 1.0);
