@@ -63,20 +63,11 @@ GLint Program::uniform(const char* uniform_name) const {
   return found->second;
 }
 
-void require_gl(std::size_t tile_vertices) {
+void require_gl() {
   const int version = epoxy_gl_version();
-  if (version < 33 || !epoxy_is_desktop_gl()) {
-    throw Error(ErrorCode::kUnsupported,
-                fmt::format("OpenGL 3.3 is required, this machine offers {}.{}", version / 10, version % 10));
-  }
-  GLint texels = 0;
-  glGetIntegerv(GL_MAX_TEXTURE_BUFFER_SIZE, &texels);
-  if (static_cast<std::size_t>(texels) < tile_vertices) {
-    throw Error(ErrorCode::kUnsupported,
-                fmt::format("tiles have {} vertices, this GL driver's buffer textures hold at most {}; convert with "
-                            "smaller tiles",
-                            tile_vertices, texels));
-  }
+  if (version >= 33 && epoxy_is_desktop_gl()) return;
+  throw Error(ErrorCode::kUnsupported,
+              fmt::format("OpenGL 3.3 is required, this machine offers {}.{}", version / 10, version % 10));
 }
 
 std::string gl_description() {

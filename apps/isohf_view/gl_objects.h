@@ -103,9 +103,8 @@ class Program {
   mutable std::map<std::string, GLint, std::less<>> places_;
 };
 
-/// Throws Error{kUnsupported} in one line unless the current context is OpenGL 3.3 or newer and takes tiles of
-/// `tile_vertices` as buffer textures.
-void require_gl(std::size_t tile_vertices);
+/// Throws Error{kUnsupported} in one line unless the current context is OpenGL 3.3 or newer.
+void require_gl();
 
 /// "llvmpipe (LLVM 15.0.6, 256 bits), OpenGL 4.5": the renderer in use.
 [[nodiscard]] std::string gl_description();

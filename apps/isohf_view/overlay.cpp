@@ -88,8 +88,8 @@ void Overlay::draw(const std::vector<std::string>& lines, int view_width, int vi
                GL_STREAM_DRAW);
   program_.use();
   glUniform2f(program_.uniform("view_size"), static_cast<float>(view_width), static_cast<float>(view_height));
-  glUniform1i(program_.uniform("font"), 1);
-  glActiveTexture(GL_TEXTURE1);
+  glUniform1i(program_.uniform("font"), 0);
+  glActiveTexture(GL_TEXTURE0);
   glBindTexture(GL_TEXTURE_2D, font_.get());
   glDisable(GL_DEPTH_TEST);
   glDisable(GL_CULL_FACE);
@@ -98,7 +98,6 @@ void Overlay::draw(const std::vector<std::string>& lines, int view_width, int vi
   glDrawArrays(GL_TRIANGLES, 0, static_cast<GLsizei>(corners.size()));
   glDisable(GL_BLEND);
   glBindTexture(GL_TEXTURE_2D, 0);
-  glActiveTexture(GL_TEXTURE0);
   glBindVertexArray(0);
 }
 

@@ -113,7 +113,10 @@ Renderer::Renderer(const TileSource& source, const SharedGeometry& shared)
     : source_(source),
       shared_(shared),
       whole_(whole_bounds(source)),
-      shade_{{"terrain", false, terrain_fragment_shader(false)}, {"terrain", true, terrain_fragment_shader(true)}},
+      shade_{{"terrain", false, terrain_fragment_shader(false, false)},
+             {"terrain", true, terrain_fragment_shader(true, false)}},
+      shade_strips_{{"strips", false, terrain_fragment_shader(false, true)},
+                    {"strips", true, terrain_fragment_shader(true, true)}},
       flat_{{"wire", false, flat_fragment_shader(false)}, {"wire", true, flat_fragment_shader(true)}},
       sky_("sky", sky_vertex_shader(), sky_fragment_shader()) {}
 
@@ -157,7 +160,7 @@ std::vector<Renderer::Item> Renderer::visible_items(const ViewState& view, const
       }
       const bool is_cut = !view.beyond && reaches_beyond(grid, tile, source_.covered());
       const LodBlend blend = lod_blend(level_of(view, tile, bounds), grid.shape().levels());
-      items.push_back({tile, slot, bounds.has_voids, is_cut, length(0.5 * (low + high)), blend});
+      items.push_back({tile, slot, is_cut, is_cut || bounds.has_voids, length(0.5 * (low + high)), blend});
     }
   }
   std::sort(items.begin(), items.end(), [](const Item& a, const Item& b) { return a.distance < b.distance; });
@@ -209,12 +212,12 @@ void Renderer::draw_mesh(const TerrainProgram& program, const TerrainFrame& fram
 void Renderer::draw_opaque(const ViewState& view, const TerrainFrame& frame, const std::vector<Item>& items,
                            FrameFigures& figures) const {
   begin_opaque_pass();
-  for (const bool voids : {false, true}) {
-    const TerrainProgram& program = shade_.of(voids);
+  for (const bool rim : {false, true}) {
+    const TerrainProgram& program = shading(view, rim);
     begin_shading(program, view, frame);
     glUniform1f(program.uniform("alpha"), 1.0F);
     for (const Item& item : items) {
-      if (item.has_voids == voids) draw_mesh(program, frame, item, item.blend.first, figures);
+      if (item.is_rim == rim) draw_mesh(program, frame, item, item.blend.first, figures);
     }
   }
 }
@@ -222,11 +225,11 @@ void Renderer::draw_opaque(const ViewState& view, const TerrainFrame& frame, con
 void Renderer::draw_fading(const ViewState& view, const TerrainFrame& frame, const std::vector<Item>& items,
                            FrameFigures& figures) const {
   begin_fading_pass();
-  for (const bool voids : {false, true}) {
-    const TerrainProgram& program = shade_.of(voids);
+  for (const bool rim : {false, true}) {
+    const TerrainProgram& program = shading(view, rim);
     begin_shading(program, view, frame);
     for (auto item = items.rbegin(); item != items.rend(); ++item) {
-      if (item->has_voids != voids || item->blend.alpha <= 0.0 || item->blend.second == item->blend.first) continue;
+      if (item->is_rim != rim || item->blend.alpha <= 0.0 || item->blend.second == item->blend.first) continue;
       order_fading(item->blend);
       glUniform1f(program.uniform("alpha"), static_cast<float>(item->blend.alpha));
       draw_mesh(program, frame, *item, item->blend.second, figures);
@@ -242,12 +245,12 @@ void Renderer::draw_wires(const ViewState& view, const TerrainFrame& frame, cons
   glPolygonOffset(-1.0F, -2.0F);
   glEnable(GL_BLEND);
   glBlendFunc(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA);
-  for (const bool voids : {false, true}) {
-    const TerrainProgram& program = flat_.of(voids);
+  for (const bool rim : {false, true}) {
+    const TerrainProgram& program = flat_.of(rim);
     program.begin(source_.grid(), frame);
     glUniform4f(program.uniform("flat_colour"), 0.05F, 0.06F, 0.09F, 0.7F);
     for (const Item& item : items) {
-      if (item.has_voids != voids) continue;
+      if (item.is_rim != rim) continue;
       // Lines vanish where a triangle's side falls below eight pixels.
       const double side = 2.0 * source_.grid().sigma_x() * (1 << item.blend.first);
       glUniform1f(program.uniform("fade_distance"), static_cast<float>(side * focal_px(view) / 8.0));

@@ -40,20 +40,23 @@ class Renderer {
   struct Item {
     TileIndex tile;
     const TileSlot* slot;
-    bool has_voids;
     bool is_cut;  ///< reaches beyond what the source covers
+    bool is_rim;  ///< is cut, or has voids
     double distance;
     LodBlend blend;
   };
   struct Variants {
-    TerrainProgram solid;
-    TerrainProgram voids;
-    [[nodiscard]] const TerrainProgram& of(bool has_voids) const { return has_voids ? voids : solid; }
+    TerrainProgram inner;
+    TerrainProgram rim;
+    [[nodiscard]] const TerrainProgram& of(bool is_rim) const { return is_rim ? rim : inner; }
   };
 
   [[nodiscard]] std::vector<Item> visible_items(const ViewState& view, const TerrainFrame& frame,
                                                 const std::array<std::int64_t, 4>& range, const ResidentTile& resident,
                                                 FrameFigures& figures) const;
+  [[nodiscard]] const TerrainProgram& shading(const ViewState& view, bool is_rim) const {
+    return (view.mode == ColourMode::kStrips ? shade_strips_ : shade_).of(is_rim);
+  }
   void draw_sky(const ViewState& view) const;
   void draw_opaque(const ViewState& view, const TerrainFrame& frame, const std::vector<Item>& items,
                    FrameFigures& figures) const;
@@ -69,6 +72,7 @@ class Renderer {
   const SharedGeometry& shared_;
   TileBounds whole_;
   Variants shade_;
+  Variants shade_strips_;
   Variants flat_;
   Program sky_;
   VertexArray nothing_;

@@ -5,18 +5,21 @@
 namespace isohf::view {
 
 /// The terrain's vertex shader: every picture and every check draws through it. Vertex attributes: 0 the shared
-/// object-space (x, z), 1 the tile's elevation codes, 2 the tile's shadow heights in codes (constant 0 without them).
-/// `voids` adds the varying that fragment shaders discard by.
-[[nodiscard]] std::string terrain_vertex_shader(bool voids);
+/// object-space (x, z); 1, 2, 3 the tile's elevation codes around the vertex; 4 the tile's shadow heights in codes
+/// (constant 0 without them).
+/// `rim` is the variant for tiles with voids, or that reach
+/// beyond what the source covers: it adds what fragment shaders discard by, and clip distances.
+[[nodiscard]] std::string terrain_vertex_shader(bool rim);
 
 /// Light, colours, borders, haze.
-[[nodiscard]] std::string terrain_fragment_shader(bool voids);
+/// `strips` is the variant that also knows strip order: to number triangles costs a software rasteriser dear.
+[[nodiscard]] std::string terrain_fragment_shader(bool rim, bool strips);
 
 /// (elevation code, normal x, normal z, 1): what verifying reads back.
-[[nodiscard]] std::string probe_fragment_shader(bool voids);
+[[nodiscard]] std::string probe_fragment_shader(bool rim);
 
 /// One flat colour: wireframes.
-[[nodiscard]] std::string flat_fragment_shader(bool voids);
+[[nodiscard]] std::string flat_fragment_shader(bool rim);
 
 [[nodiscard]] std::string sky_vertex_shader();
 [[nodiscard]] std::string sky_fragment_shader();

@@ -4,18 +4,17 @@
 
 namespace isohf::view {
 
-TerrainProgram::TerrainProgram(const std::string& name, bool voids, const std::string& fragment_source,
+TerrainProgram::TerrainProgram(const std::string& name, bool rim, const std::string& fragment_source,
                                const std::vector<std::string>& feedback)
-    : program_(name, terrain_vertex_shader(voids), fragment_source, feedback) {}
+    : program_(name, terrain_vertex_shader(rim), fragment_source, feedback) {}
 
 void TerrainProgram::begin(const TileGrid& grid, const TerrainFrame& frame) const {
   program_.use();
   const auto set_vec2 = [this](const char* name, double x, double y) {
     glUniform2f(uniform(name), static_cast<float>(x), static_cast<float>(y));
   };
-  glUniform1i(uniform("tile_codes"), 0);
-  glUniform1i(uniform("tile_texture"), 1);  // samplers of two types may not share a unit, used or not
-  glUniform2i(uniform("tile_shape"), grid.shape().columns(), grid.shape().rows());
+  glUniform1i(uniform("tile_texture"), 0);
+  glUniform2i(uniform("last_xz"), 2 * grid.shape().cell_columns(), grid.shape().cell_rows());
   set_vec2("sigma", grid.sigma_x(), grid.sigma_z());
   set_vec2("object_size", 2.0 * grid.shape().cell_columns(), grid.shape().cell_rows());
   glUniform3f(uniform("anchor"), static_cast<float>(frame.anchor.x), static_cast<float>(frame.anchor.y),

@@ -18,13 +18,14 @@ struct TerrainFrame {
   TileIndex anchor_tile{0, 0};
   double code_height = 1.0;  ///< world units of one code
   double code_slope = 1.0;   ///< the same for normals
-  WorldBounds covered;       ///< what is shown of tiles that are cut, seen from the eye
+  /// What is shown of tiles that are cut, seen from the eye; all of the world unless said otherwise.
+  WorldBounds covered{-1e30, -1e30, 1e30, 1e30};
 };
 
 /// A program with the terrain's vertex shader and one fragment shader or another.
 class TerrainProgram {
  public:
-  TerrainProgram(const std::string& name, bool voids, const std::string& fragment_source,
+  TerrainProgram(const std::string& name, bool rim, const std::string& fragment_source,
                  const std::vector<std::string>& feedback = {});
 
   /// Makes the program current and sets the frame's uniforms.

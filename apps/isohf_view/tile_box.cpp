@@ -115,7 +115,8 @@ void TileBox::update(WorldPoint centre, double radius) {
 void TileBox::upload() {
   std::size_t done = 0;
   for (; done < waiting_.size(); ++done) {
-    if (figures_.upload_bytes >= limits_.upload_bytes_per_frame) break;
+    const std::uint64_t next = waiting_[done].codes.size() * sizeof(std::uint16_t);
+    if (figures_.uploads > 0 && figures_.upload_bytes + next > limits_.upload_bytes_per_frame) break;
     place(waiting_[done]);
   }
   waiting_.erase(waiting_.begin(), waiting_.begin() + static_cast<std::ptrdiff_t>(done));

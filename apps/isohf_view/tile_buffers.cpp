@@ -28,6 +28,8 @@ GLsizeiptr upload_static(GLenum target, const std::vector<T>& values) {
   return size;
 }
 
+constexpr GLuint kShadowAttribute = 4;
+
 const void* offset_pointer(std::size_t bytes) {
   return reinterpret_cast<const void*>(bytes);
 }
@@ -97,34 +99,37 @@ std::vector<std::uint32_t> SharedGeometry::read_stitch(int level) const {
 }
 
 TileSlot::TileSlot(const SharedGeometry& shared)
-    : vertices_(static_cast<std::size_t>(shared.shape().stored_vertex_count())) {
+    : vertices_(static_cast<std::size_t>(shared.shape().stored_vertex_count())),
+      rim_(static_cast<std::size_t>(shared.shape().columns()) + 2) {
+  constexpr GLsizei kStep = sizeof(std::uint16_t);
   glBindVertexArray(array_.get());
   glBindBuffer(GL_ARRAY_BUFFER, shared.xz());
   glVertexAttribIPointer(0, 2, GL_SHORT, 0, nullptr);
-  glEnableVertexAttribArray(0);
   glBindBuffer(GL_ARRAY_BUFFER, codes_.get());
-  glBufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(vertices_ * sizeof(std::uint16_t)), nullptr, GL_DYNAMIC_DRAW);
-  glVertexAttribIPointer(1, 1, GL_UNSIGNED_SHORT, 0, nullptr);
-  glEnableVertexAttribArray(1);
-  glVertexAttribI4ui(2, 0, 0, 0, 0);
+  const std::vector<std::uint16_t> nothing(vertices_ + 2 * rim_, 0);
+  glBufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(nothing.size() * kStep), nothing.data(), GL_DYNAMIC_DRAW);
+  const std::size_t row = rim_ - 2;
+  glVertexAttribIPointer(1, 3, GL_UNSIGNED_SHORT, kStep, offset_pointer((rim_ - 1) * kStep));
+  glVertexAttribIPointer(2, 4, GL_UNSIGNED_SHORT, kStep, offset_pointer((rim_ - row - 1) * kStep));
+  glVertexAttribIPointer(3, 4, GL_UNSIGNED_SHORT, kStep, offset_pointer((rim_ + row - 1) * kStep));
+  for (GLuint attribute = 0; attribute < 4; ++attribute) glEnableVertexAttribArray(attribute);
+  glVertexAttribI4ui(kShadowAttribute, 0, 0, 0, 0);
   glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, shared.indices());
   glBindVertexArray(0);
-
-  glBindTexture(GL_TEXTURE_BUFFER, codes_texture_.get());
-  glTexBuffer(GL_TEXTURE_BUFFER, GL_R16UI, codes_.get());
   check_gl("making a tile's elevation buffer");
 }
 
 void TileSlot::upload(std::span<const std::uint16_t> codes) {
   ISOHF_ASSERT(codes.size() == vertices_);
   glBindBuffer(GL_ARRAY_BUFFER, codes_.get());
-  glBufferSubData(GL_ARRAY_BUFFER, 0, static_cast<GLsizeiptr>(codes.size_bytes()), codes.data());
+  glBufferSubData(GL_ARRAY_BUFFER, static_cast<GLintptr>(rim_ * sizeof(std::uint16_t)),
+                  static_cast<GLsizeiptr>(codes.size_bytes()), codes.data());
 }
 
 void TileSlot::upload_shadow(std::span<const std::uint16_t> shadow) {
   glBindVertexArray(array_.get());
   if (shadow.empty()) {
-    glDisableVertexAttribArray(2);
+    glDisableVertexAttribArray(kShadowAttribute);
     shadow_.reset();
     glBindVertexArray(0);
     return;
@@ -133,22 +138,21 @@ void TileSlot::upload_shadow(std::span<const std::uint16_t> shadow) {
   if (!shadow_) shadow_.emplace();
   glBindBuffer(GL_ARRAY_BUFFER, shadow_->get());
   glBufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(shadow.size_bytes()), shadow.data(), GL_DYNAMIC_DRAW);
-  glVertexAttribIPointer(2, 1, GL_UNSIGNED_SHORT, 0, nullptr);
-  glEnableVertexAttribArray(2);
+  glVertexAttribIPointer(kShadowAttribute, 1, GL_UNSIGNED_SHORT, 0, nullptr);
+  glEnableVertexAttribArray(kShadowAttribute);
   glBindVertexArray(0);
 }
 
 std::vector<std::uint16_t> TileSlot::read_back() const {
   std::vector<std::uint16_t> codes(vertices_);
   glBindBuffer(GL_ARRAY_BUFFER, codes_.get());
-  glGetBufferSubData(GL_ARRAY_BUFFER, 0, static_cast<GLsizeiptr>(codes.size() * sizeof(std::uint16_t)), codes.data());
+  glGetBufferSubData(GL_ARRAY_BUFFER, static_cast<GLintptr>(rim_ * sizeof(std::uint16_t)),
+                     static_cast<GLsizeiptr>(codes.size() * sizeof(std::uint16_t)), codes.data());
   return codes;
 }
 
 void TileSlot::bind() const {
   glBindVertexArray(array_.get());
-  glActiveTexture(GL_TEXTURE0);
-  glBindTexture(GL_TEXTURE_BUFFER, codes_texture_.get());
 }
 
 }  // namespace isohf::view

@@ -43,8 +43,9 @@ class SharedGeometry {
   std::uint64_t bytes_ = 0;
 };
 
-/// One tile on the GPU: two bytes a vertex, in a buffer that is both a vertex attribute and, for the neighbours that a
-/// normal needs, a buffer texture. A slot is reused for tile after tile.
+/// One tile on the GPU: two bytes a vertex. The one buffer is bound as three overlapping attributes, so that the vertex
+/// shader finds the neighbours that a normal needs: v-1..v+1, v-C-1..v-C+2 and v+C-1..v+C+2. A row and two vertices of
+/// nothing lie before and behind the codes. A slot is reused for tile after tile.
 class TileSlot {
  public:
   explicit TileSlot(const SharedGeometry& shared);
@@ -58,18 +59,18 @@ class TileSlot {
   /// The codes as the GPU holds them, for tests.
   [[nodiscard]] std::vector<std::uint16_t> read_back() const;
 
-  /// Binds the vertex array and, to texture unit 0, the codes.
+  /// Binds the vertex array.
   void bind() const;
 
   [[nodiscard]] static std::uint64_t bytes(const TileShape& shape) {
-    return static_cast<std::uint64_t>(shape.stored_vertex_count()) * sizeof(std::uint16_t);
+    return static_cast<std::uint64_t>(shape.stored_vertex_count() + 2 * (shape.columns() + 2)) * sizeof(std::uint16_t);
   }
 
  private:
   std::size_t vertices_;
+  std::size_t rim_;  ///< unused vertices before and behind the codes
   Buffer codes_;
   std::optional<Buffer> shadow_;
-  Texture codes_texture_;
   VertexArray array_;
 };
 

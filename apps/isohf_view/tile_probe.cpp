@@ -21,7 +21,8 @@ TileProbe::TileProbe(const TileGrid& grid, const SharedGeometry& shared, double 
       shared_(shared),
       solid_("probe", false, probe_fragment_shader(false)),
       voids_("probe", true, probe_fragment_shader(true)),
-      feedback_("capture", false, probe_fragment_shader(false), {"v_eye", "v_normal", "v_code"}),
+      solid_feedback_("capture", false, probe_fragment_shader(false), {"gl_Position", "v_facing", "v_place"}),
+      voids_feedback_("capture", true, probe_fragment_shader(true), {"gl_Position", "v_facing", "v_place"}),
       target_(largest(MeshOracle(grid.shape()).windows(), &PixelWindow::width),
               largest(MeshOracle(grid.shape()).windows(), &PixelWindow::height), GL_RGBA32F) {
   frame_.code_height = code_height;
@@ -90,25 +91,23 @@ void TileProbe::draw_blend(const TileSlot& slot, bool voids, const LodBlend& ble
   target_.read_rgba32f(out);
 }
 
-void TileProbe::capture(const TileSlot& slot, std::vector<ProbedVertex>& out) {
-  const TileShape& shape = grid_.shape();
-  // Neighbours of columns 0 and C-1 may lie in the next row; those of the first and last row outside the array.
-  const int first = shape.columns();
-  const int count = (shape.rows() - 2) * shape.columns() - 2;
-  out.resize(static_cast<std::size_t>(shape.stored_vertex_count()));
-  const auto bytes = static_cast<GLsizeiptr>(static_cast<std::size_t>(count) * sizeof(ProbedVertex));
+void TileProbe::capture(const TileSlot& slot, bool voids, std::vector<ProbedVertex>& out) {
+  out.resize(static_cast<std::size_t>(grid_.shape().stored_vertex_count()));
+  const auto bytes = static_cast<GLsizeiptr>(out.size() * sizeof(ProbedVertex));
   glBindBuffer(GL_TRANSFORM_FEEDBACK_BUFFER, captured_.get());
   glBufferData(GL_TRANSFORM_FEEDBACK_BUFFER, bytes, nullptr, GL_STREAM_READ);
   glBindBufferBase(GL_TRANSFORM_FEEDBACK_BUFFER, 0, captured_.get());
-  feedback_.begin(grid_, frame_);
-  feedback_.set_tile(grid_, frame_, {0, 0});
+  const TerrainProgram& program = voids ? voids_feedback_ : solid_feedback_;
+  frame_.clip_from_eye = Mat4::identity();  // clip positions are then the vertices' places
+  program.begin(grid_, frame_);
+  program.set_tile(grid_, frame_, {0, 0});
   slot.bind();
   glEnable(GL_RASTERIZER_DISCARD);
   glBeginTransformFeedback(GL_POINTS);
-  glDrawArrays(GL_POINTS, first, count);
+  glDrawArrays(GL_POINTS, 0, static_cast<GLsizei>(out.size()));
   glEndTransformFeedback();
   glDisable(GL_RASTERIZER_DISCARD);
-  glGetBufferSubData(GL_TRANSFORM_FEEDBACK_BUFFER, 0, bytes, out.data() + first);
+  glGetBufferSubData(GL_TRANSFORM_FEEDBACK_BUFFER, 0, bytes, out.data());
   glBindBufferBase(GL_TRANSFORM_FEEDBACK_BUFFER, 0, 0);
   check_gl("capturing vertices");
 }

@@ -13,9 +13,9 @@ namespace isohf::view {
 
 /// What the vertex shader made of one vertex, captured by transform feedback.
 struct ProbedVertex {
-  float x, y, z;  ///< from the tile's North-West corner and code 0, world units
-  float nx, ny, nz;
-  float code;
+  float x, y, z, w;  ///< from the tile's North-West corner and code 0, world units; w = 1
+  float nx, ny, nz, distance;
+  float object_x, object_z, code, shadow;
 };
 
 /// Draws a tile from straight above with the terrain's vertex shader into floats: (code, normal x, normal z, count).
@@ -29,8 +29,8 @@ class TileProbe {
   /// The two-stage transition, by the same passes as pictures.
   void draw_blend(const TileSlot& slot, bool voids, const LodBlend& blend, const PixelWindow& window,
                   std::vector<float>& out);
-  /// Stored vertices 0..C*R-1; only those of rows 1..R-2 are filled in.
-  void capture(const TileSlot& slot, std::vector<ProbedVertex>& out);
+  /// All stored vertices; padding gets no sensible normal.
+  void capture(const TileSlot& slot, bool voids, std::vector<ProbedVertex>& out);
   [[nodiscard]] int width() const { return target_.width(); }  ///< pixels of a row of the pictures
 
  private:
@@ -42,7 +42,8 @@ class TileProbe {
   TerrainFrame frame_;
   TerrainProgram solid_;
   TerrainProgram voids_;
-  TerrainProgram feedback_;
+  TerrainProgram solid_feedback_;
+  TerrainProgram voids_feedback_;
   Offscreen target_;
   Buffer captured_;
 };

@@ -95,11 +95,11 @@ void TileVerifier::verify(TileIndex tile) {
   }
   slot_.upload(codes_);
   compute_normals();
-  probe_.capture(slot_, captured_);
+  const bool voids = bounds.has_voids || !bounds.stored;
+  probe_.capture(slot_, voids, captured_);
   check_vertices(tile);
   check_shared(tile);
   const int levels = source_.grid().shape().levels();
-  const bool voids = bounds.has_voids || !bounds.stored;
   for (const PixelWindow& window : oracle_.windows()) {
     for (int level = 0; level < levels; ++level) {
       check_level(tile, voids, level, window);

@@ -211,7 +211,7 @@ void save_picture(const ViewState& view, const std::string& path) {
 
 void run_window(const TileSource& source, const Options& options) {
   const Window window(options.view.width, options.view.height, "isohf-view - " + options.archive);
-  require_gl(static_cast<std::size_t>(source.grid().shape().stored_vertex_count()));
+  require_gl();
   Session session(source, options);
   Controls controls(window.get(), session);
   controls.show_figures = options.overlay;
