@@ -1,7 +1,7 @@
 /// isohf: elevation rasters to isometric heightfield archives. The command table; errors to exit codes.
 
 #include <csignal>
-#include <cstring>
+#include <cstdlib>
 #include <exception>
 #include <new>
 #include <string>
@@ -9,6 +9,7 @@
 
 #include "command.h"
 #include "command_line.h"
+#include "formats/registry.h"
 #include "isohf/base/error.h"
 #include "standard_output.h"
 
@@ -55,6 +56,8 @@ Of commands that write a file:
       --memory SIZE   Refuse to start where more would be needed, as in 400M
 Alone:
       --version       Print the version
+
+ISOHF_MODULE_PATH names the folder of the OpenImageIO reader (default: beside the program, then ../lib/isohf).
 
 Results go to standard output, everything else to standard error.
 Exit codes: 0 done, 1 failed, 2 wrong usage, 3 verify found differences, 130 interrupted.
@@ -129,6 +132,7 @@ int main(int argc, char** argv) {
   // A closed pipe or a file over its size limit is an error that write() reports, not a reason to die.
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGXFSZ, SIG_IGN);
+  if (const char* folder = std::getenv("ISOHF_MODULE_PATH"); folder != nullptr) isohf::set_module_folder(folder);
   try {
     return run(Arguments(argv + (argc > 0 ? 1 : 0), argv + argc));
   } catch (const OutputClosed&) {
