@@ -46,11 +46,17 @@ class ShadowHull {
 };
 
 /// The casters among a tile's own vertices, as seen from the edge where the light leaves; those on that edge (at
-/// distance 0) are listed as well. codes or heights [C x R]. Thread-safe. O(C R).
-[[nodiscard]] CasterRows tile_casters(const TileShape& shape, View2D<const std::uint16_t> codes,
-                                      std::uint16_t void_code, LightTravel travel, double fall_min);
-[[nodiscard]] CasterRows tile_casters(const TileShape& shape, View2D<const float> heights, LightTravel travel,
-                                      double fall_min);
+/// distance 0) are listed as well.
+struct TileCasters {
+  CasterRows eastward;
+  CasterRows westward;
+};
+
+/// codes or heights [C x R]; NaN, infinities and elevations beyond 3e38 are void. Thread-safe. O(C R), a few vertices
+/// at a time.
+[[nodiscard]] TileCasters tile_casters(const TileShape& shape, View2D<const std::uint16_t> codes,
+                                       std::uint16_t void_code, double fall_min);
+[[nodiscard]] TileCasters tile_casters(const TileShape& shape, View2D<const float> heights, double fall_min);
 
 /// What a tile hands on: the casters that entered it (seen from the edge where they enter, at distances > 0) and its
 /// own (as tile_casters gives them), seen from the edge where the light leaves. Vertices on that edge are left out: the
