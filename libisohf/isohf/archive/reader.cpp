@@ -359,15 +359,19 @@ std::optional<std::vector<std::byte>> ArchiveReader::read_member(const std::stri
   const auto found =
       std::find_if(all.begin(), all.end(), [&](const MemberEntry& member) { return member.name == name; });
   if (found == all.end()) return std::nullopt;
+  return read_member(*found);
+}
+
+std::vector<std::byte> ArchiveReader::read_member(const MemberEntry& member) const {
   ZipEntry entry;
-  entry.name = found->name;
-  entry.method = found->deflated ? 8 : 0;
-  entry.crc32 = found->crc32;
-  entry.compressed_bytes = found->compressed_bytes;
-  entry.bytes = found->bytes;
-  entry.header_offset = found->offset_bytes;
+  entry.name = member.name;
+  entry.method = member.deflated ? 8 : 0;
+  entry.crc32 = member.crc32;
+  entry.compressed_bytes = member.compressed_bytes;
+  entry.bytes = member.bytes;
+  entry.header_offset = member.offset_bytes;
   try {
-    return read_data(state_->file, entry, found->offset_bytes);
+    return read_data(state_->file, entry, member.offset_bytes);
   } catch (const Error& error) {
     throw error.within(path());
   }

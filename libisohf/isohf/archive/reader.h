@@ -72,6 +72,8 @@ class ArchiveReader {
 
   /// Inflates any other member; nullopt where there is none of that name.
   [[nodiscard]] std::optional<std::vector<std::byte>> read_member(const std::string& name) const;
+  /// The same for one of members(), without a search.
+  [[nodiscard]] std::vector<std::byte> read_member(const MemberEntry& member) const;
 
  private:
   struct State;

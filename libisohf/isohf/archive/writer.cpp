@@ -102,6 +102,7 @@ struct ArchiveWriter::State {
   void account(const JournalRecord& record);
   void add_up(const TileStatistics& tile);
   void append(const ZipMember& member, std::span<const std::byte> data);
+  void add_member(ZipMember member, std::span<const std::byte> data);
   void checkpoint();
   [[nodiscard]] ZipMember tile_member(std::int64_t flat) const;
   void for_each_directory_chunk(const ZipMember& metadata,
@@ -368,27 +369,36 @@ void ArchiveWriter::add_tile(const EncodedTile& tile) {
   state.checkpoint();
 }
 
-void ArchiveWriter::add_member(const std::string& name, std::span<const std::byte> bytes, bool deflate) {
-  State& state = *state_;
+void ArchiveWriter::State::add_member(ZipMember member, std::span<const std::byte> data) {
   const auto refuse = [&](const std::string& why) {
-    throw Error(ErrorCode::kInvalidArgument, fmt::format("{}: member \"{}\": {}", state.path, name, why));
+    throw Error(ErrorCode::kInvalidArgument, fmt::format("{}: member \"{}\": {}", path, member.name, why));
   };
+  const std::string& name = member.name;
   if (const std::string why = why_bad_name(name); !why.empty()) refuse(why);
   if (name == kMetadataName || name == kIndexName || name.rfind("tiles/", 0) == 0) refuse("the name is taken");
-  if (state.names.count(name) != 0) refuse("it is there already");
+  if (names.count(name) != 0) refuse("it is there already");
+  JournalRecord record;
+  record.kind = JournalRecord::Kind::kMember;
+  record.member = std::move(member);
+  record.member.header_offset = part.position();
+  record.data_crc32 = crc32(data);
+  append(record.member, data);
+  journal->add(record);
+  account(record);
+  checkpoint();
+}
+
+void ArchiveWriter::add_member(const std::string& name, std::span<const std::byte> bytes, bool deflate) {
   std::vector<std::byte> deflated;
   if (deflate) deflated = deflate_bytes(bytes);
   const std::span<const std::byte> data = deflate ? std::span<const std::byte>(deflated) : bytes;
-  JournalRecord record;
-  record.kind = JournalRecord::Kind::kMember;
-  record.member = {name,         deflate ? ZipMethod::kDeflated : ZipMethod::kStored,
-                   crc32(bytes), data.size(),
-                   bytes.size(), state.part.position()};
-  record.data_crc32 = crc32(data);
-  state.append(record.member, data);
-  state.journal->add(record);
-  state.account(record);
-  state.checkpoint();
+  state_->add_member(
+      {name, deflate ? ZipMethod::kDeflated : ZipMethod::kStored, crc32(bytes), data.size(), bytes.size(), 0}, data);
+}
+
+void ArchiveWriter::add_deflated_member(const std::string& name, std::span<const std::byte> deflated,
+                                        std::uint64_t bytes, std::uint32_t crc32_of_bytes) {
+  state_->add_member({name, ZipMethod::kDeflated, crc32_of_bytes, deflated.size(), bytes, 0}, deflated);
 }
 
 std::uint64_t ArchiveWriter::finish(Metadata metadata) {

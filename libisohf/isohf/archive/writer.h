@@ -52,6 +52,9 @@ class ArchiveWriter {
   /// `deflate` says. Members added between two tiles belong to the tile that follows: a resumed job adds them again
   /// where that tile had not been written.
   void add_member(const std::string& name, std::span<const std::byte> bytes, bool deflate);
+  /// The same for one that is deflated already: `bytes` and `crc32_of_bytes` are those of the inflated member.
+  void add_deflated_member(const std::string& name, std::span<const std::byte> deflated, std::uint64_t bytes,
+                           std::uint32_t crc32_of_bytes);
 
   /// Completes the archive: metadata (tiles_stored and content_sha256 are filled in here), index, directory; flush and
   /// rename. All tiles must have been added. Returns the archive's size in bytes. Throws Error{kInvalidArgument} where

@@ -92,7 +92,7 @@ class Verification {
   void check_members() {
     for (const MemberEntry& member : archive_.members()) {
       try {
-        (void)archive_.read_member(member.name);
+        (void)archive_.read_member(member);
       } catch (const Error& error) {
         add(make(finding::kMemberUnreadable, {}, error.what()));
       }
