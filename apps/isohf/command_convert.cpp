@@ -14,6 +14,7 @@
 #include "isohf/convert/convert.h"
 #include "isohf/surface/kernels.h"
 #include "json_output.h"
+#include "option_values.h"
 #include "options_common.h"
 #include "options_lattice.h"
 #include "options_source.h"
@@ -49,6 +50,7 @@ struct ConvertCommandOptions {
 
 std::optional<ConvertCommandOptions> parse(const Arguments& arguments) {
   ConvertCommandOptions options;
+  std::optional<double> sun_min_deg;
   CommandLine line("convert", "Turns a raster of elevations into an archive of isometric heightfield tiles.");
   line.group("Arguments");
   line.positional("INPUT", "-i,--input", "Raster of elevations", options.input);
@@ -70,6 +72,17 @@ std::optional<ConvertCommandOptions> parse(const Arguments& arguments) {
               "How the input's samples were taken: point, box, tent, gaussian:SIGMA or fir:FILE (default " +
                   options.convert.acquisition + ")",
               options.convert.acquisition);
+  line.group("Shadows");
+  line.option_or_numbers(
+      "--shadow-seeds", "[DEG,...]", "all",
+      "Store what tiles cast over their neighbours, so that a tile's shadows need no other tile: for "
+      "every sun elevation from --sun-min on, or for the given ones, as in 5,15,30",
+      [&](const std::string& text) {
+        options.convert.shadow_seeds.emplace();
+        if (text != "all") options.convert.shadow_seeds->sun_deg = parse_numbers(text);
+      });
+  line.option("--sun-min", "DEG", "Lowest sun elevation for --shadow-seeds (default 2); a lower one takes more room",
+              [&](const std::string& text) { sun_min_deg = parse_number(text); });
   add_work_options(line, options.work);
   add_memory_option(line, "Refuse to start where more memory would be needed", options.convert.memory_bytes);
   add_common_options(line, options.common);
@@ -79,6 +92,12 @@ std::optional<ConvertCommandOptions> parse(const Arguments& arguments) {
   if (!options.dry_run) line.require("OUTPUT", options.output);
   if (options.convert.clamp_range && !options.convert.z_range) {
     throw Error(ErrorCode::kInvalidArgument, "convert: --clamp-range needs --z-range MIN:MAX");
+  }
+  if (sun_min_deg) {
+    if (!options.convert.shadow_seeds || !options.convert.shadow_seeds->sun_deg.empty()) {
+      throw Error(ErrorCode::kInvalidArgument, "convert: --sun-min needs --shadow-seeds without angles");
+    }
+    options.convert.shadow_seeds->sun_min_deg = *sun_min_deg;
   }
   options.convert.threads = options.work.threads;
   options.convert.producer = "isohf " ISOHF_VERSION;
@@ -118,6 +137,8 @@ std::string json_from(const ConvertCommandOptions& options, const ConvertSummary
                     {"tiles_written", summary.tiles_written},
                     {"tiles_void", summary.tiles_void},
                     {"archive_bytes", summary.archive_bytes},
+                    {"tile_bytes", summary.tile_bytes},
+                    {"shadow_seed_bytes", summary.seed_bytes},
                     {"raw_16_bit_bytes", measured.raw_bytes},
                     {"ratio_to_raw_16_bit", measured.ratio},
                     {"bits_per_sample", measured.bits_per_sample},
@@ -151,6 +172,11 @@ std::string text_from(const ConvertCommandOptions& options, const ConvertSummary
   } else {
     say("elevations", fmt::format("{}, step {:.9g}{}, worst rounding {:.4g}{}", to_string(metadata.quantisation.type),
                                   summary.step, unit, summary.worst_rounding, unit));
+  }
+  if (summary.seed_bytes > 0) {
+    const auto tile_bytes = static_cast<double>(summary.tile_bytes);
+    say("shadows", fmt::format("seeds of {}, {:.1f} % of the tiles'", describe_bytes(summary.seed_bytes),
+                               100.0 * static_cast<double>(summary.seed_bytes) / tile_bytes));
   }
   if (metadata.statistics.clamped > 0) {
     say("clamped", fmt::format("{} vertices moved into the range", describe_count(metadata.statistics.clamped)));

@@ -4,6 +4,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <map>
 #include <utility>
 
 #include "isohf/base/error.h"
@@ -92,6 +93,31 @@ std::size_t edit_distance(const std::string& a, const std::string& b) {
 
 }  // namespace
 
+namespace {
+
+/// Ties options that may stand alone to the numbers that follow them, or to what they mean alone.
+Arguments with_values(const Arguments& given, const std::map<std::string, std::string>& alone) {
+  Arguments out;
+  for (std::size_t i = 0; i < given.size(); ++i) {
+    const auto found = alone.find(given[i]);
+    if (found == alone.end()) {
+      out.push_back(given[i]);
+      if (given[i] == "--") {
+        out.insert(out.end(), given.begin() + static_cast<std::ptrdiff_t>(i) + 1, given.end());
+        break;
+      }
+      continue;
+    }
+    const bool has_numbers = i + 1 < given.size() && !given[i + 1].empty() &&
+                             given[i + 1].find_first_not_of("0123456789.,") == std::string::npos;
+    out.push_back(given[i] + "=" + (has_numbers ? given[i + 1] : found->second));
+    if (has_numbers) ++i;
+  }
+  return out;
+}
+
+}  // namespace
+
 std::string nearest_word(const std::string& text, const std::vector<std::string>& candidates) {
   std::string best;
   std::size_t best_distance = std::max<std::size_t>(2, text.size() / 3) + 1;
@@ -113,6 +139,7 @@ struct CommandLine::State {
   CLI::App app;
   std::string group = "Options";
   std::string usage_positionals;
+  std::map<std::string, std::string> alone;  ///< options that may stand without a value, and what that means
 
   /// The long name in "-q,--quiet" or "-i,--input,INPUT" as the user writes it.
   static std::string long_name(const std::string& flags) {
@@ -184,6 +211,12 @@ void CommandLine::option(const std::string& flags, const std::string& value_name
   option(flags, value_name, description, [&value](const std::string& text) { value = text; });
 }
 
+void CommandLine::option_or_numbers(const std::string& flag, const std::string& value_name, const std::string& alone,
+                                    const std::string& description, Take take) {
+  option(flag, value_name, description, std::move(take));
+  state_->alone[flag] = alone;
+}
+
 void CommandLine::repeated_pair(const std::string& flags, const std::string& value_name, const std::string& description,
                                 std::function<void(const std::string&, const std::string&)> take) {
   const std::string name = State::long_name(flags);
@@ -220,8 +253,9 @@ void CommandLine::footer(const std::string& text) {
   state_->app.footer(text);
 }
 
-bool CommandLine::parse(const Arguments& arguments) {
+bool CommandLine::parse(const Arguments& given) {
   CLI::App& app = state_->app;
+  const Arguments arguments = with_values(given, state_->alone);
   app.set_config("--config", "",
                  "Read options from a TOML or INI file: one 'long-option = value' a line; the command "
                  "line wins")

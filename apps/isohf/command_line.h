@@ -31,6 +31,10 @@ class CommandLine {
   void option(const std::string& flags, const std::string& value_name, const std::string& description, Take take);
   void option(const std::string& flags, const std::string& value_name, const std::string& description,
               std::string& value);
+  /// An option that may stand without a value, which counts as `alone`. What follows it is its value where it holds
+  /// nothing but digits, dots and commas; anything else is the next argument.
+  void option_or_numbers(const std::string& flag, const std::string& value_name, const std::string& alone,
+                         const std::string& description, Take take);
   /// An option of two values that may be given again and again.
   void repeated_pair(const std::string& flags, const std::string& value_name, const std::string& description,
                      std::function<void(const std::string&, const std::string&)> take);

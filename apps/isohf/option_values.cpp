@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 
@@ -66,6 +67,21 @@ std::pair<double, double> parse_range(const std::string& text) {
   }
   if (!(low < high)) refuse(text, "MIN:MAX with MIN less than MAX");
   return {low, high};
+}
+
+std::vector<double> parse_numbers(const std::string& text) {
+  std::vector<double> numbers;
+  for (std::size_t start = 0; start <= text.size();) {
+    const std::size_t end = std::min(text.find(',', start), text.size());
+    double value = 0.0;
+    if (!read_number(std::string_view(text).substr(start, end - start), value)) {
+      throw Error(ErrorCode::kInvalidArgument,
+                  fmt::format("found '{}', must be numbers separated by commas, as in 5,15,30", text));
+    }
+    numbers.push_back(value);
+    start = end + 1;
+  }
+  return numbers;
 }
 
 std::uint64_t parse_bytes(const std::string& text) {

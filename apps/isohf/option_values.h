@@ -20,6 +20,8 @@ namespace isohf::cli {
                                                                std::int64_t most);
 /// "MIN:MAX" or "MIN,MAX", MIN < MAX.
 [[nodiscard]] std::pair<double, double> parse_range(const std::string& text);
+/// "5,15,30": numbers, at least one.
+[[nodiscard]] std::vector<double> parse_numbers(const std::string& text);
 /// Bytes: 400M, 1.5GiB, 2GB; K, M, G, T and KiB... are powers of 1024, KB, MB, GB, TB powers of 1000.
 [[nodiscard]] std::uint64_t parse_bytes(const std::string& text);
 /// One of `words`; returns its place.

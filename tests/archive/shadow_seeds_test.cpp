@@ -66,6 +66,7 @@ struct Case {
   TileIndex index;
   TileCodes tile;
   HullSeeds seeds;
+  TileEdges edges;
 };
 
 Case random_case(CodeType type, unsigned seed) {
@@ -73,7 +74,8 @@ Case random_case(CodeType type, unsigned seed) {
   const int cells = 1 + static_cast<int>(random() % 9);
   const TileShape shape = TileShape::make(cells + 4, 5 + 2 * static_cast<int>(random() % 6), 1);
   const TileGrid grid = TileGrid::make(shape, 6, 2, 100.0, 100.0);
-  Case out{grid, {static_cast<std::int64_t>(random() % 6), 1}, random_tile(shape, type, random), {}};
+  Case out{grid, {static_cast<std::int64_t>(random() % 6), 1}, random_tile(shape, type, random), {}, {}};
+  out.edges = tile_edges(shape, out.tile);
   const std::size_t most = random() % 12;
   out.seeds.eastward = random_casters(shape, type, out.index.column * shape.cell_columns(), most, random);
   out.seeds.westward = random_casters(shape, type, (5 - out.index.column) * shape.cell_columns(), most, random);
@@ -85,7 +87,7 @@ TEST(ShadowSeeds, HullsComeBackForAllTypesAndShapes) {
     for (unsigned seed = 0; seed < 300; ++seed) {
       const Case c = random_case(type, seed);
       const HullSeeds found =
-          decode_hull_seeds(c.grid, c.index, c.tile, inflate(encode_seeds(c.grid, c.tile, c.seeds)));
+          decode_hull_seeds(c.grid, c.index, c.edges, inflate(encode_seeds(c.grid, c.edges, c.seeds)));
       ASSERT_EQ(found.eastward, c.seeds.eastward) << to_string(type) << " seed " << seed;
       ASSERT_EQ(found.westward, c.seeds.westward) << to_string(type) << " seed " << seed;
     }
@@ -105,7 +107,7 @@ TEST(ShadowSeeds, AnglesComeBackToTheNearestCode) {
           direction->push_back(random() % 3 == 0 ? kNone : type == CodeType::kF32 ? 2000.0 + code / 7 : code);
         }
       }
-      const AngleSeeds found = decode_angle_seeds(c.grid, c.tile, 3, inflate(encode_seeds(c.grid, c.tile, seeds, 3)));
+      const AngleSeeds found = decode_angle_seeds(c.grid, c.edges, 3, inflate(encode_seeds(c.grid, c.edges, seeds, 3)));
       const TileShape& shape = c.grid.shape();
       for (std::size_t i = 0; i < 3 * rows; ++i) {
         const int row = static_cast<int>(i % rows) + 1;
@@ -131,30 +133,30 @@ TEST(ShadowSeeds, AnglesComeBackToTheNearestCode) {
 TEST(ShadowSeeds, EveryTruncationAndEveryByteTooManyIsRefused) {
   const Case c = random_case(CodeType::kU16, 17);
   ASSERT_FALSE(c.seeds.empty());
-  std::vector<std::byte> payload = inflate(encode_seeds(c.grid, c.tile, c.seeds));
+  std::vector<std::byte> payload = inflate(encode_seeds(c.grid, c.edges, c.seeds));
   for (std::size_t n = 0; n < payload.size(); ++n) {
-    EXPECT_THROW((void)decode_hull_seeds(c.grid, c.index, c.tile, std::span(payload).first(n)), Error) << n;
+    EXPECT_THROW((void)decode_hull_seeds(c.grid, c.index, c.edges, std::span(payload).first(n)), Error) << n;
   }
   payload.push_back({});
-  EXPECT_THROW((void)decode_hull_seeds(c.grid, c.index, c.tile, payload), Error);
+  EXPECT_THROW((void)decode_hull_seeds(c.grid, c.index, c.edges, payload), Error);
 
   AngleSeeds seeds;
   const auto rows = static_cast<std::size_t>(visible_rows(c.grid.shape()));
   seeds.eastward.assign(rows, 60000.0);
   seeds.westward.assign(rows, kNone);
-  payload = inflate(encode_seeds(c.grid, c.tile, seeds, 1));
+  payload = inflate(encode_seeds(c.grid, c.edges, seeds, 1));
   for (std::size_t n = 0; n < payload.size(); ++n) {
-    EXPECT_THROW((void)decode_angle_seeds(c.grid, c.tile, 1, std::span(payload).first(n)), Error) << n;
+    EXPECT_THROW((void)decode_angle_seeds(c.grid, c.edges, 1, std::span(payload).first(n)), Error) << n;
   }
   payload.push_back({});
-  EXPECT_THROW((void)decode_angle_seeds(c.grid, c.tile, 1, payload), Error);
+  EXPECT_THROW((void)decode_angle_seeds(c.grid, c.edges, 1, payload), Error);
 }
 
 /// Whatever it decodes to must be possible in that place.
 void expect_refused_or_sane(const Case& c, std::span<const std::byte> payload) {
   HullSeeds seeds;
   try {
-    seeds = decode_hull_seeds(c.grid, c.index, c.tile, payload);
+    seeds = decode_hull_seeds(c.grid, c.index, c.edges, payload);
   } catch (const Error&) {
     return;
   }
@@ -172,7 +174,7 @@ void expect_refused_or_sane(const Case& c, std::span<const std::byte> payload) {
 TEST(ShadowSeeds, AnyByteMayBeWrong) {
   for (const CodeType type : kAllTypes) {
     const Case c = random_case(type, 23);
-    const std::vector<std::byte> payload = inflate(encode_seeds(c.grid, c.tile, c.seeds));
+    const std::vector<std::byte> payload = inflate(encode_seeds(c.grid, c.edges, c.seeds));
     for (std::size_t i = 0; i < payload.size(); ++i) {
       for (const unsigned value : {0U, 1U, 15U, 16U, 127U, 200U, 239U, 240U, 255U}) {
         auto damaged = payload;
@@ -185,14 +187,14 @@ TEST(ShadowSeeds, AnyByteMayBeWrong) {
 
 TEST(ShadowSeeds, EveryHeaderFieldIsChecked) {
   const Case c = random_case(CodeType::kU16, 17);
-  const std::vector<std::byte> payload = inflate(encode_seeds(c.grid, c.tile, c.seeds));
+  const std::vector<std::byte> payload = inflate(encode_seeds(c.grid, c.edges, c.seeds));
   for (std::size_t i = 0; i < 8; ++i) {
     for (unsigned value = 0; value < 256; ++value) {
       if (payload[i] == static_cast<std::byte>(value)) continue;
       auto damaged = payload;
       damaged[i] = static_cast<std::byte>(value);
       try {
-        (void)decode_hull_seeds(c.grid, c.index, c.tile, damaged);
+        (void)decode_hull_seeds(c.grid, c.index, c.edges, damaged);
         ADD_FAILURE() << "byte " << i << " = " << value;
       } catch (const Error& error) {
         EXPECT_EQ(error.code(), i == 0 ? ErrorCode::kUnsupported : ErrorCode::kCorrupt);
@@ -203,9 +205,9 @@ TEST(ShadowSeeds, EveryHeaderFieldIsChecked) {
 
 TEST(ShadowSeeds, CastersBeforeTheFirstTileAreRefused) {
   const Case c = random_case(CodeType::kU16, 3);
-  const std::vector<std::byte> payload = inflate(encode_seeds(c.grid, c.tile, c.seeds));
+  const std::vector<std::byte> payload = inflate(encode_seeds(c.grid, c.edges, c.seeds));
   ASSERT_FALSE(c.seeds.eastward.casters.empty());
-  EXPECT_THROW((void)decode_hull_seeds(c.grid, {0, 1}, c.tile, payload), Error);
+  EXPECT_THROW((void)decode_hull_seeds(c.grid, {0, 1}, c.edges, payload), Error);
 }
 
 TEST(ShadowSeeds, NamesAreExact) {
@@ -223,31 +225,28 @@ TEST(ShadowSeedInfo, ComesBackFromJson) {
   info.elevation_units_per_world_unit = 3.28;
   info.members = 5;
   info.bytes = 700;
-  info.header_bytes = 40;
   const ShadowSeedInfo hulls = parse_shadow_seed_info(format_shadow_seed_info(info));
   EXPECT_EQ(hulls.kind, ShadowSeedInfo::Kind::kHulls);
   EXPECT_EQ(hulls.sun_min_deg, 1.5);
   EXPECT_EQ(hulls.elevation_units_per_world_unit, 3.28);
   EXPECT_EQ(hulls.members, 5);
   EXPECT_EQ(hulls.bytes, 700U);
-  EXPECT_EQ(hulls.header_bytes, 40U);
   info.kind = ShadowSeedInfo::Kind::kAngles;
   info.sun_deg = {5, 15, 30};
   EXPECT_EQ(parse_shadow_seed_info(format_shadow_seed_info(info)).sun_deg, info.sun_deg);
 }
 
 TEST(ShadowSeedInfo, RefusesWhatItIsNot) {
-  const std::string rest = R"(,"elevation_units_per_world_unit":1,"members":1,"bytes":1,"header_bytes":1})";
+  const std::string rest = R"(,"elevation_units_per_world_unit":1,"members":1,"bytes":1})";
   EXPECT_NO_THROW((void)parse_shadow_seed_info(R"({"kind":"hulls","sun_min_deg":2)" + rest));
-  for (
-      const std::string& text : std::vector<std::string>{
-          "", "[]", "{}", R"({"kind":"lines","sun_min_deg":2)" + rest, R"({"kind":"hulls")" + rest,
-          R"({"kind":"hulls","sun_min_deg":0)" + rest, R"({"kind":"hulls","sun_min_deg":90)" + rest,
-          R"({"kind":"hulls","sun_min_deg":"2")" + rest, R"({"kind":"angles")" + rest,
-          R"({"kind":"angles","sun_deg":[])" + rest, R"({"kind":"angles","sun_deg":[5,5])" + rest,
-          R"({"kind":"angles","sun_deg":[5,"x"])" + rest, R"({"kind":"hulls","sun_min_deg":2})",
-          R"({"kind":"hulls","sun_min_deg":2,"elevation_units_per_world_unit":0,"members":1,"bytes":1,"header_bytes":1})",
-          R"({"kind":"hulls","sun_min_deg":2,"elevation_units_per_world_unit":1,"members":-1,"bytes":1,"header_bytes":1})"}) {
+  for (const std::string& text : std::vector<std::string>{
+           "", "[]", "{}", R"({"kind":"lines","sun_min_deg":2)" + rest, R"({"kind":"hulls")" + rest,
+           R"({"kind":"hulls","sun_min_deg":0)" + rest, R"({"kind":"hulls","sun_min_deg":90)" + rest,
+           R"({"kind":"hulls","sun_min_deg":"2")" + rest, R"({"kind":"angles")" + rest,
+           R"({"kind":"angles","sun_deg":[])" + rest, R"({"kind":"angles","sun_deg":[5,5])" + rest,
+           R"({"kind":"angles","sun_deg":[5,"x"])" + rest, R"({"kind":"hulls","sun_min_deg":2})",
+           R"({"kind":"hulls","sun_min_deg":2,"elevation_units_per_world_unit":0,"members":1,"bytes":1})",
+           R"({"kind":"hulls","sun_min_deg":2,"elevation_units_per_world_unit":1,"members":-1,"bytes":1})"}) {
     EXPECT_THROW((void)parse_shadow_seed_info(text), Error) << text;
   }
 }

@@ -54,7 +54,6 @@ std::string format_shadow_seed_info(const ShadowSeedInfo& info) {
   json["elevation_units_per_world_unit"] = info.elevation_units_per_world_unit;
   json["members"] = info.members;
   json["bytes"] = info.bytes;
-  json["header_bytes"] = info.header_bytes;
   return json.dump();
 }
 
@@ -86,7 +85,6 @@ ShadowSeedInfo parse_shadow_seed_info(const std::string& text) {
   }
   info.members = static_cast<std::int64_t>(count(json, "members"));
   info.bytes = count(json, "bytes");
-  info.header_bytes = count(json, "header_bytes");
   return info;
 }
 

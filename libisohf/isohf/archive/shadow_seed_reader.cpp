@@ -67,7 +67,7 @@ HullSeeds ShadowSeedReader::hulls(TileIndex index, const TileCodes& tile) const 
     return {none, none};
   }
   try {
-    return decode_hull_seeds(archive_.grid(), index, tile, bytes);
+    return decode_hull_seeds(archive_.grid(), index, tile_edges(archive_.grid().shape(), tile), bytes);
   } catch (const Error& error) {
     throw error.within(fmt::format("{}: member \"{}\"", archive_.path(), seed_name(index)));
   }
@@ -117,7 +117,8 @@ std::vector<double> ShadowSeedReader::entering_by_angle(TileIndex index, const T
     return std::abs(a - sun_elevation_deg) < std::abs(b - sun_elevation_deg);
   });
   try {
-    const AngleSeeds seeds = decode_angle_seeds(archive_.grid(), tile, info_.sun_deg.size(), bytes);
+    const AngleSeeds seeds =
+        decode_angle_seeds(archive_.grid(), tile_edges(archive_.grid().shape(), tile), info_.sun_deg.size(), bytes);
     const auto& heights = travel == LightTravel::kEastward ? seeds.eastward : seeds.westward;
     const auto first = heights.begin() + (nearest - info_.sun_deg.begin()) * static_cast<std::ptrdiff_t>(rows);
     return {first, first + static_cast<std::ptrdiff_t>(rows)};

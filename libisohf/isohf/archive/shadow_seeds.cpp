@@ -47,23 +47,11 @@ double height_from_whole(CodeType type, std::int32_t whole) {
 }
 
 /// What heights at a row's edge are coded on: the tile's own vertex there; where it is void what is below all others.
-struct Edge {
-  bool is_void;
-  std::int32_t whole;
-};
 
-Edge edge_of(const TileShape& shape, const TileCodes& tile, int row, LightTravel travel) {
-  const int column = travel == LightTravel::kEastward ? 1 : last_visible_column(shape, row);
-  const auto at =
-      static_cast<std::size_t>(row) * static_cast<std::size_t>(shape.columns()) + static_cast<std::size_t>(column);
-  if (tile.type == CodeType::kF32) {
-    const float height = tile.heights[at];
-    const bool is_void = !std::isfinite(height);
-    return {is_void,
-            is_void ? ordered_from_float(-std::numeric_limits<float>::infinity(), 0) : ordered_from_float(height, 0)};
-  }
-  const bool is_void = tile.codes[at] == (tile.type == CodeType::kU8 ? 255 : 65535);
-  return {is_void, is_void ? -1 : static_cast<std::int32_t>(tile.codes[at])};
+std::int32_t edge_of(const TileEdges& edges, int row, LightTravel travel) {
+  const double height = (travel == LightTravel::kEastward ? edges.west : edges.east)[static_cast<std::size_t>(row - 1)];
+  if (!std::isnan(height)) return whole_from_height(edges.type, height);
+  return edges.type == CodeType::kF32 ? ordered_from_float(-std::numeric_limits<float>::infinity(), 0) : -1;
 }
 
 /// Differences wrap around, so that the two ends of the floats fit as well.
@@ -85,8 +73,9 @@ std::int64_t nearest_ordinal(const TileShape& shape, int row, std::int64_t dista
 /// take the same steps.
 class CasterPrediction {
  public:
-  CasterPrediction(const TileShape& shape, CodeType type, int row, Edge edge, std::span<const ShadowCaster> above)
-      : shape_(shape), type_(type), row_(row), above_(above), whole_(edge.whole) {
+  CasterPrediction(const TileShape& shape, CodeType type, int row, std::int32_t edge,
+                   std::span<const ShadowCaster> above)
+      : shape_(shape), type_(type), row_(row), above_(above), whole_(edge) {
     skip_passed();
   }
 
@@ -130,18 +119,18 @@ std::span<const ShadowCaster> row_above(const CasterRows& rows, int row) {
   return row == 1 ? std::span<const ShadowCaster>() : rows.row(row - 1);
 }
 
-void encode_direction(const TileGrid& grid, const TileCodes& tile, LightTravel travel, const CasterRows& rows,
+void encode_direction(const TileGrid& grid, const TileEdges& edges, LightTravel travel, const CasterRows& rows,
                       SymbolWriter& writer) {
   const TileShape& shape = grid.shape();
   for (int row = 1; row <= visible_rows(shape); ++row) {
     const auto above = row_above(rows, row);
     const auto casters = rows.row(row);
     writer.put(kCounts, zigzag(static_cast<std::int32_t>(casters.size()) - static_cast<std::int32_t>(above.size())));
-    CasterPrediction prediction(shape, tile.type, row, edge_of(shape, tile, row, travel), above);
+    CasterPrediction prediction(shape, edges.type, row, edge_of(edges, row, travel), above);
     for (const ShadowCaster& caster : casters) {
       const std::int64_t place = ordinal_from_distance(shape, row, caster.distance);
       ISOHF_ASSERT(place > prediction.previous_place());
-      const std::int32_t whole = whole_from_height(tile.type, caster.height);
+      const std::int32_t whole = whole_from_height(edges.type, caster.height);
       const Stream stream = prediction.height_stream(place);
       writer.put(kPlaces, zigzag(static_cast<std::int32_t>(place - prediction.place())));
       const std::uint32_t off = minus(whole, prediction.whole(stream));
@@ -165,7 +154,7 @@ void check_height(CodeType type, std::int32_t whole, int row) {
 }
 
 /// `most` vertices lie before the edge.
-CasterRows decode_direction(const TileGrid& grid, const TileCodes& tile, LightTravel travel, std::int64_t most,
+CasterRows decode_direction(const TileGrid& grid, const TileEdges& edges, LightTravel travel, std::int64_t most,
                             SymbolReader& reader) {
   const TileShape& shape = grid.shape();
   CasterRows rows;
@@ -179,7 +168,7 @@ CasterRows decode_direction(const TileGrid& grid, const TileCodes& tile, LightTr
     if (count < 0 || static_cast<std::uint64_t>(count) > reader.left(kPlaces)) {
       refuse(fmt::format("row {}: states {} casters, {} are left", row, count, reader.left(kPlaces)));
     }
-    CasterPrediction prediction(shape, tile.type, row, edge_of(shape, tile, row, travel), above);
+    CasterPrediction prediction(shape, edges.type, row, edge_of(edges, row, travel), above);
     for (std::int64_t i = 0; i < count; ++i) {
       const std::int64_t place = prediction.place() + static_cast<std::int32_t>(unzigzag(reader.get(kPlaces)));
       if (place <= prediction.previous_place() || place > most) {
@@ -189,8 +178,8 @@ CasterRows decode_direction(const TileGrid& grid, const TileCodes& tile, LightTr
       const Stream stream = prediction.height_stream(place);
       const std::uint32_t folded = reader.get(stream);
       const std::int32_t whole = plus(prediction.whole(stream), stream == kFreeHeights ? folded : unzigzag(folded));
-      check_height(tile.type, whole, row);
-      rows.casters.push_back({distance_from_ordinal(shape, row, place), height_from_whole(tile.type, whole)});
+      check_height(edges.type, whole, row);
+      rows.casters.push_back({distance_from_ordinal(shape, row, place), height_from_whole(edges.type, whole)});
       prediction.take(place, whole);
     }
     rows.starts.push_back(static_cast<std::uint32_t>(rows.casters.size()));
@@ -230,11 +219,11 @@ void read_header(const TileShape& shape, CodeType type, ShadowSeedInfo::Kind kin
 }
 
 /// S of an angle as a whole number above the edge's, 0 where it is no higher.
-std::uint32_t rise_above(CodeType type, Edge edge, double height) {
+std::uint32_t rise_above(CodeType type, std::int32_t edge, double height) {
   if (height == kNone) return 0;
   const double rounded = type == CodeType::kF32 ? height : std::clamp(std::round(height), -1.0, 65534.0);
   const std::int32_t whole = whole_from_height(type, rounded);
-  return whole > edge.whole ? minus(whole, edge.whole) : 0;
+  return whole > edge ? minus(whole, edge) : 0;
 }
 
 template <typename Visit>
@@ -248,6 +237,26 @@ void for_each_angle_row(const TileShape& shape, std::size_t angles, Visit visit)
 
 }  // namespace
 
+TileEdges tile_edges(const TileShape& shape, const TileCodes& tile) {
+  TileEdges edges;
+  edges.type = tile.type;
+  const auto void_code = tile.type == CodeType::kU8 ? 255 : 65535;
+  for (int row = 1; row <= visible_rows(shape); ++row) {
+    for (const int column : {1, last_visible_column(shape, row)}) {
+      const auto at =
+          static_cast<std::size_t>(row) * static_cast<std::size_t>(shape.columns()) + static_cast<std::size_t>(column);
+      double height = NAN;
+      if (tile.type == CodeType::kF32) {
+        if (std::isfinite(tile.heights[at])) height = static_cast<double>(tile.heights[at]);
+      } else if (tile.codes[at] != void_code) {
+        height = tile.codes[at];
+      }
+      (column == 1 ? edges.west : edges.east).push_back(height);
+    }
+  }
+  return edges;
+}
+
 bool AngleSeeds::empty() const {
   const auto none = [](double height) { return height == kNone; };
   return std::all_of(eastward.begin(), eastward.end(), none) && std::all_of(westward.begin(), westward.end(), none);
@@ -257,15 +266,15 @@ bool has_room_for_seeds(const TileGrid& grid) {
   return grid.tile_columns() < (std::int64_t{1} << 31) / (grid.shape().cell_columns() + 1);
 }
 
-EncodedSeeds encode_seeds(const TileGrid& grid, const TileCodes& tile, const HullSeeds& seeds) {
+EncodedSeeds encode_seeds(const TileGrid& grid, const TileEdges& edges, const HullSeeds& seeds) {
   ISOHF_ASSERT(has_room_for_seeds(grid));
   SymbolWriter writer(kHullStreams);
-  encode_direction(grid, tile, LightTravel::kEastward, seeds.eastward, writer);
-  encode_direction(grid, tile, LightTravel::kWestward, seeds.westward, writer);
-  return writer.finish(start_payload(grid.shape(), tile.type, ShadowSeedInfo::Kind::kHulls, 0));
+  encode_direction(grid, edges, LightTravel::kEastward, seeds.eastward, writer);
+  encode_direction(grid, edges, LightTravel::kWestward, seeds.westward, writer);
+  return writer.finish(start_payload(grid.shape(), edges.type, ShadowSeedInfo::Kind::kHulls, 0));
 }
 
-EncodedSeeds encode_seeds(const TileGrid& grid, const TileCodes& tile, const AngleSeeds& seeds, std::size_t angles) {
+EncodedSeeds encode_seeds(const TileGrid& grid, const TileEdges& edges, const AngleSeeds& seeds, std::size_t angles) {
   const TileShape& shape = grid.shape();
   SymbolWriter writer(1);
   std::uint32_t before = 0;
@@ -273,45 +282,45 @@ EncodedSeeds encode_seeds(const TileGrid& grid, const TileCodes& tile, const Ang
     const auto& heights = travel == LightTravel::kEastward ? seeds.eastward : seeds.westward;
     const double height =
         heights[angle * static_cast<std::size_t>(visible_rows(shape)) + static_cast<std::size_t>(row - 1)];
-    const std::uint32_t rise = rise_above(tile.type, edge_of(shape, tile, row, travel), height);
+    const std::uint32_t rise = rise_above(edges.type, edge_of(edges, row, travel), height);
     writer.put(0, zigzag(static_cast<std::int32_t>(rise - before)));
     before = rise;
   });
-  return writer.finish(start_payload(shape, tile.type, ShadowSeedInfo::Kind::kAngles, angles));
+  return writer.finish(start_payload(shape, edges.type, ShadowSeedInfo::Kind::kAngles, angles));
 }
 
-HullSeeds decode_hull_seeds(const TileGrid& grid, TileIndex index, const TileCodes& tile,
+HullSeeds decode_hull_seeds(const TileGrid& grid, TileIndex index, const TileEdges& edges,
                             std::span<const std::byte> payload) {
   ByteReader bytes(payload);
-  read_header(grid.shape(), tile.type, ShadowSeedInfo::Kind::kHulls, 0, bytes);
+  read_header(grid.shape(), edges.type, ShadowSeedInfo::Kind::kHulls, 0, bytes);
   SymbolReader reader(bytes, kHullStreams);
   // Even rows have a vertex more for each tile; a limit that holds for both keeps casters inside the heightfield.
   const std::int64_t steps = grid.shape().cell_columns() + 1;
   HullSeeds seeds;
-  seeds.eastward = decode_direction(grid, tile, LightTravel::kEastward, index.column * steps, reader);
+  seeds.eastward = decode_direction(grid, edges, LightTravel::kEastward, index.column * steps, reader);
   seeds.westward =
-      decode_direction(grid, tile, LightTravel::kWestward, (grid.tile_columns() - 1 - index.column) * steps, reader);
+      decode_direction(grid, edges, LightTravel::kWestward, (grid.tile_columns() - 1 - index.column) * steps, reader);
   reader.finish();
   return seeds;
 }
 
-AngleSeeds decode_angle_seeds(const TileGrid& grid, const TileCodes& tile, std::size_t angles,
+AngleSeeds decode_angle_seeds(const TileGrid& grid, const TileEdges& edges, std::size_t angles,
                               std::span<const std::byte> payload) {
   const TileShape& shape = grid.shape();
   ByteReader bytes(payload);
-  read_header(shape, tile.type, ShadowSeedInfo::Kind::kAngles, angles, bytes);
+  read_header(shape, edges.type, ShadowSeedInfo::Kind::kAngles, angles, bytes);
   SymbolReader reader(bytes, 1);
   AngleSeeds seeds;
   std::uint32_t rise = 0;
   for_each_angle_row(shape, angles, [&](LightTravel travel, std::size_t, int row) {
     rise += unzigzag(reader.get(0));
-    const Edge edge = edge_of(shape, tile, row, travel);
+    const std::int32_t edge = edge_of(edges, row, travel);
     double height = kNone;
     if (rise != 0) {
-      const std::int32_t whole = plus(edge.whole, rise);
-      if (whole <= edge.whole) refuse(fmt::format("row {}: a shadow's height is no elevation", row));
-      check_height(tile.type, whole, row);
-      height = height_from_whole(tile.type, whole);
+      const std::int32_t whole = plus(edge, rise);
+      if (whole <= edge) refuse(fmt::format("row {}: a shadow's height is no elevation", row));
+      check_height(edges.type, whole, row);
+      height = height_from_whole(edges.type, whole);
     }
     (travel == LightTravel::kEastward ? seeds.eastward : seeds.westward).push_back(height);
   });

@@ -26,9 +26,8 @@ struct ShadowSeedInfo {
   std::vector<double> sun_deg;  ///< kAngles: the sun elevations, ascending
   /// Elevation units in the length of one world unit: 1 where both are metres or either is unknown.
   double elevation_units_per_world_unit = 1.0;
-  std::int64_t members = 0;        ///< tiles that have seeds
-  std::uint64_t bytes = 0;         ///< of their members, compressed
-  std::uint64_t header_bytes = 0;  ///< what ZIP headers and directory take for them
+  std::int64_t members = 0;  ///< tiles that have seeds
+  std::uint64_t bytes = 0;   ///< of their members, compressed
 
   /// What a shadow loses in one half lattice step, in codes (elevation units for kF32), under that sun.
   [[nodiscard]] double fall_per_half_step(const TileGrid& grid, const Quantisation& quantisation,
@@ -66,6 +65,14 @@ struct AngleSeeds {
   [[nodiscard]] bool empty() const;
 };
 
+/// A tile's own vertices on its West and East edge, in visible rows: what heights are coded on.
+struct TileEdges {
+  CodeType type = CodeType::kU16;
+  std::vector<double> west;  ///< [R-2] codes (kF32: elevations), NaN where void
+  std::vector<double> east;
+};
+[[nodiscard]] TileEdges tile_edges(const TileShape& shape, const TileCodes& tile);
+
 /// A member, compressed.
 struct EncodedSeeds {
   std::vector<std::byte> deflated;
@@ -73,18 +80,18 @@ struct EncodedSeeds {
   std::uint32_t payload_crc32 = 0;
 };
 
-/// Codes the seeds of a tile, whose own elevations are the base that heights are coded on. Heights of codes are whole
-/// numbers; those of AngleSeeds are rounded to the nearest code (half a code off at most; nearest float for kF32).
-/// Deterministic, thread-safe. The grid must satisfy has_room_for_seeds.
-[[nodiscard]] EncodedSeeds encode_seeds(const TileGrid& grid, const TileCodes& tile, const HullSeeds& seeds);
-[[nodiscard]] EncodedSeeds encode_seeds(const TileGrid& grid, const TileCodes& tile, const AngleSeeds& seeds,
+/// Codes the seeds of a tile. Heights of codes are whole numbers; those of AngleSeeds are rounded to the nearest code
+/// (half a code off at most; nearest float for kF32). Deterministic, thread-safe. The grid must satisfy
+/// has_room_for_seeds.
+[[nodiscard]] EncodedSeeds encode_seeds(const TileGrid& grid, const TileEdges& edges, const HullSeeds& seeds);
+[[nodiscard]] EncodedSeeds encode_seeds(const TileGrid& grid, const TileEdges& edges, const AngleSeeds& seeds,
                                         std::size_t angles);
 
 /// The inverse, from the inflated member. Trusts nothing: throws Error{kCorrupt} for whatever encode_seeds would not
 /// have made of a tile in that place and cannot be read exactly, kUnsupported for a version of the future. Thread-safe.
-[[nodiscard]] HullSeeds decode_hull_seeds(const TileGrid& grid, TileIndex index, const TileCodes& tile,
+[[nodiscard]] HullSeeds decode_hull_seeds(const TileGrid& grid, TileIndex index, const TileEdges& edges,
                                           std::span<const std::byte> payload);
-[[nodiscard]] AngleSeeds decode_angle_seeds(const TileGrid& grid, const TileCodes& tile, std::size_t angles,
+[[nodiscard]] AngleSeeds decode_angle_seeds(const TileGrid& grid, const TileEdges& edges, std::size_t angles,
                                             std::span<const std::byte> payload);
 
 /// False for grids of 2^31 vertices in a row and more.

@@ -84,6 +84,7 @@ struct ArchiveWriter::State {
   TileStatistics statistics;
   std::int64_t next = 0;
   std::int64_t stored = 0;
+  std::uint64_t tile_bytes = 0;
   std::uint64_t journalled = 0;  ///< bytes of the part file that the journal's file vouches for
   std::uint64_t synced = 0;
   bool finished = false;
@@ -195,6 +196,7 @@ void ArchiveWriter::State::account(const JournalRecord& record) {
     entry.has_voids = record.has_voids;
     ++stored;
   }
+  tile_bytes += entry.compressed_bytes;
   append_index_record(entry, index);
   content.add_tile(record.digest);
   add_up(record.statistics);
@@ -339,8 +341,21 @@ std::int64_t ArchiveWriter::tiles_stored() const {
 std::uint64_t ArchiveWriter::bytes_written() const {
   return state_->part.position();
 }
+std::uint64_t ArchiveWriter::tile_bytes() const {
+  return state_->tile_bytes;
+}
 TileStatistics ArchiveWriter::statistics() const {
   return state_->statistics;
+}
+
+ArchiveWriter::MemberTotals ArchiveWriter::members_in(const std::string& folder) const {
+  MemberTotals totals;
+  for (const State::Placed& placed : state_->members) {
+    if (!placed.member.name.starts_with(folder)) continue;
+    ++totals.members;
+    totals.bytes += placed.member.compressed_bytes;
+  }
+  return totals;
 }
 
 void ArchiveWriter::add_tile(const EncodedTile& tile) {

@@ -43,7 +43,15 @@ class ArchiveWriter {
   /// those that a resumed job found in the journal count like those that it adds.
   [[nodiscard]] std::int64_t tiles_stored() const;
   [[nodiscard]] std::uint64_t bytes_written() const;
+  [[nodiscard]] std::uint64_t tile_bytes() const;  ///< of the tiles' members alone, compressed
   [[nodiscard]] TileStatistics statistics() const;
+
+  /// How many members other than tiles there are so far under a folder ("seeds/"), and their compressed bytes.
+  struct MemberTotals {
+    std::int64_t members = 0;
+    std::uint64_t bytes = 0;
+  };
+  [[nodiscard]] MemberTotals members_in(const std::string& folder) const;
 
   /// Appends the tile with flat index next_tile(). An empty tile takes no bytes.
   void add_tile(const EncodedTile& tile);

@@ -10,6 +10,7 @@
 #include <chrono>
 #include <cmath>
 #include <memory>
+#include <optional>
 
 #include "isohf/archive/writer.h"
 #include "isohf/base/assert.h"
@@ -17,6 +18,7 @@
 #include "isohf/convert/elevation_range.h"
 #include "isohf/convert/job_description.h"
 #include "isohf/convert/quantiser.h"
+#include "isohf/convert/seed_stage.h"
 #include "isohf/convert/tile_statistics.h"
 #include "isohf/surface/band_reader.h"
 #include "isohf/surface/edge_range.h"
@@ -82,6 +84,7 @@ struct TileJob {
   TileIndex index{};
   std::shared_ptr<const Band> band;
   EncodedTile encoded;
+  SeedStage::Tile seeds;
 };
 
 /// Elevations 0 to 1 in floats or scaled integers are most often a fraction of something.
@@ -196,23 +199,26 @@ void choose_codes(Conversion& job, std::vector<std::string>& warnings, const Pro
                           elevation_from_code(job.quantisation, job.quantisation.max_code())));
 }
 
-EncodedTile make_tile(const Conversion& job, const TileCutter& cutter, TileIndex index, const Band& band) {
+void make_tile(const Conversion& job, const TileCutter& cutter, const SeedStage* seeds, TileJob& tile) {
   const TileShape& shape = job.plan.grid.shape();
   std::vector<float> heights(static_cast<std::size_t>(shape.stored_vertex_count()));
-  cutter.cut(index, band.view(), heights);
+  cutter.cut(tile.index, tile.band->view(), heights);
   TileCodes codes;
   const QuantiserCounts counts = quantise(job.quantisation, job.datum, heights, codes);
-  if (counts.below + counts.above > 0 && !job.options.clamp_range) refuse_overflow(job, index, counts);
-  EncodedTile encoded = encode_tile(shape, codes);
+  if (counts.below + counts.above > 0 && !job.options.clamp_range) refuse_overflow(job, tile.index, counts);
+  EncodedTile& encoded = tile.encoded;
+  encoded = encode_tile(shape, codes);
   encoded.statistics = tile_statistics(shape, codes, job.quantisation);
   encoded.statistics.clamped = counts.below + counts.above;
   encoded.statistics.worst_rounding = counts.worst_rounding;
-  return encoded;
+  if (seeds != nullptr) tile.seeds = seeds->prepare(codes);
+  tile.seeds.is_empty = encoded.is_empty;
 }
 
 /// Second pass: read -> resample and encode -> write in order. The number of tiles in flight is fixed, and so is the
 /// number of bands: one that is being cut and one that is being read.
-void write_tiles(const Conversion& job, ArchiveWriter& writer, const ProgressCallback& callback, int threads) {
+void write_tiles(const Conversion& job, ArchiveWriter& writer, SeedStage* seeds, const ProgressCallback& callback,
+                 int threads) {
   const TileGrid& grid = job.plan.grid;
   const Quantisation& codes = job.quantisation;
   ElevationRange limits{-HUGE_VAL, HUGE_VAL};
@@ -222,7 +228,8 @@ void write_tiles(const Conversion& job, ArchiveWriter& writer, const ProgressCal
   const TileCutter cutter = job.cutter(limits);
   BandReader reader(job.source, job.datum, job.prefilter);
   ProgressMeter meter(callback, ConvertProgress::Pass::kTiles, grid.tile_count());
-  std::int64_t next = writer.next_tile();
+  const std::int64_t first_new = writer.next_tile();
+  std::int64_t next = seeds != nullptr ? SeedStage::first_tile_needed(grid, first_new) : first_new;
   std::int64_t band_row = -1;
   std::shared_ptr<const Band> band;
 
@@ -244,13 +251,14 @@ void write_tiles(const Conversion& job, ArchiveWriter& writer, const ProgressCal
     return tile;
   };
   const auto encode = [&](std::shared_ptr<TileJob> tile) {
-    tile->encoded = make_tile(job, cutter, tile->index, *tile->band);
+    make_tile(job, cutter, seeds, *tile);
     tile->band.reset();
     return tile;
   };
   std::int64_t written = next;
   const auto write = [&](const std::shared_ptr<TileJob>& tile) {
-    writer.add_tile(tile->encoded);
+    if (written >= first_new) writer.add_tile(tile->encoded);
+    if (seeds != nullptr) seeds->add(tile->index, std::move(tile->seeds), writer);
     meter.report(++written, writer.bytes_written());
   };
 
@@ -279,11 +287,14 @@ ConvertSummary convert(HeightSource& source, const std::string& output, const Co
   const SourceInfo& info = source.info();
   const Plan plan = make_plan(info, options.plan);
   if (options.z_range) check_range(*options.z_range);
-  if (options.memory_bytes != 0 && plan.estimated_memory_bytes > options.memory_bytes) {
+  if (options.shadow_seeds) check_seed_request(*options.shadow_seeds, plan.grid);
+  const std::uint64_t memory_bytes =
+      plan.estimated_memory_bytes + (options.shadow_seeds ? seed_stage_memory_bytes(plan.grid) : 0);
+  if (options.memory_bytes != 0 && memory_bytes > options.memory_bytes) {
     throw Error(ErrorCode::kOutOfMemory,
                 fmt::format("this conversion needs about {} MB, --memory allows {} MB; use smaller tiles (--shape, "
                             "--triangles) or allow more",
-                            plan.estimated_memory_bytes / 1000000, options.memory_bytes / 1000000));
+                            memory_bytes / 1000000, options.memory_bytes / 1000000));
   }
   const int threads = options.threads > 0 ? options.threads : oneapi::tbb::this_task_arena::max_concurrency();
   const oneapi::tbb::global_control workers(oneapi::tbb::global_control::max_allowed_parallelism,
@@ -296,11 +307,18 @@ ConvertSummary convert(HeightSource& source, const std::string& output, const Co
   Conversion job{
       source, options, plan, kernel, Prefilter::make(kernel.filter(), acquisition_from_string(options.acquisition)),
       cancel};
+  std::optional<SeedStage> seeds;
   try {
     oneapi::tbb::task_arena arena(threads);
     arena.execute([&] {
       choose_codes(job, summary.warnings, progress);
-      write_tiles(job, writer, progress, threads);
+      if (options.shadow_seeds) {
+        // Lengths of both kinds are compared as metres where both are known to be.
+        const bool known = plan.frame.in_metres && !info.vertical_unit.empty();
+        seeds.emplace(plan.grid, job.quantisation, *options.shadow_seeds,
+                      known ? 1.0 / info.metres_per_vertical_unit : 1.0);
+      }
+      write_tiles(job, writer, seeds ? &*seeds : nullptr, progress, threads);
     });
 
     const TileStatistics all = writer.statistics();
@@ -311,6 +329,11 @@ ConvertSummary convert(HeightSource& source, const std::string& output, const Co
     }
     summary.metadata = describe_job(info, plan, options, job.quantisation);
     summary.metadata.statistics = total_statistics(all);
+    if (seeds) {
+      const ShadowSeedInfo record = seeds->info(writer);
+      summary.seed_bytes = record.bytes;
+      summary.metadata.extensions.emplace_back(kShadowSeedsName, format_shadow_seed_info(record));
+    }
   } catch (const Error& error) {
     if (error.code() == ErrorCode::kCancelled) writer.keep_part();
     throw;
@@ -322,6 +345,7 @@ ConvertSummary convert(HeightSource& source, const std::string& output, const Co
     throw Error(ErrorCode::kIo, fmt::format("{}: {} tiles written, {} expected", output, summary.tiles_written,
                                             summary.tiles_expected));
   }
+  summary.tile_bytes = writer.tile_bytes();
   summary.archive_bytes = writer.finish(summary.metadata);
   summary.metadata.tiles_stored = writer.tiles_stored();
   summary.source_samples = static_cast<std::uint64_t>(info.width) * static_cast<std::uint64_t>(info.height);

@@ -13,6 +13,12 @@
 
 namespace isohf {
 
+/// Which shadow seeds an archive gets (docs/archive_format.md).
+struct ShadowSeedRequest {
+  double sun_min_deg = 2.0;     ///< hulls for every sun elevation from here on, degrees, 0.01 to below 90
+  std::vector<double> sun_deg;  ///< instead: shadow heights for these sun elevations, ascending
+};
+
 /// What a conversion does, beyond its input and output.
 struct ConvertOptions {
   PlanRequest plan;
@@ -25,8 +31,9 @@ struct ConvertOptions {
   bool clamp_range = false;
   std::string filter = "bilinear";
   std::string acquisition = "point";
-  int threads = 0;                 ///< 0: all cores
-  std::uint64_t memory_bytes = 0;  ///< refuse plans that would need more; 0: no limit
+  std::optional<ShadowSeedRequest> shadow_seeds;  ///< nullopt: none
+  int threads = 0;                                ///< 0: all cores
+  std::uint64_t memory_bytes = 0;                 ///< refuse plans that would need more; 0: no limit
   bool overwrite = false;
   bool resume = false;
   std::string producer;  ///< "isohf 0.1.0"
@@ -54,6 +61,8 @@ struct ConvertSummary {
   std::uint64_t lattice_samples = 0;  ///< C*R for every tile
   double step = 0.0;                  ///< elevation of one code
   double worst_rounding = 0.0;
+  std::uint64_t tile_bytes = 0;  ///< of all tiles, compressed
+  std::uint64_t seed_bytes = 0;  ///< of shadow seeds, compressed
   double seconds = 0.0;
   std::vector<std::string> warnings;  ///< one line each
 };

@@ -1,6 +1,7 @@
 #include "isohf/convert/job_description.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <sys/stat.h>
 
 #include <algorithm>
@@ -56,7 +57,7 @@ std::string job_fingerprint(const SourceInfo& info, const Plan& plan, const Conv
   return fmt::format(
       "{} | {} {} bytes {}.{:09} {}x{} {} channel '{}' scale {} {} void {} | shape {}x{}/{} tiles {}x{} extent {} {} "
       "first {} {} "
-      "spacing {} {} {} | {} range {} step {} clamp {} | {} {}",
+      "spacing {} {} {} | {} range {} step {} clamp {} | {} {} | seeds {}",
       options.producer, std::filesystem::path(info.path).filename().string(), ignored ? 0 : size,
       known ? status.st_mtim.tv_sec : 0, known ? status.st_mtim.tv_nsec : 0, info.width, info.height,
       to_string(info.sample_type), info.channel, info.z_scale, info.z_offset,
@@ -66,7 +67,10 @@ std::string job_fingerprint(const SourceInfo& info, const Plan& plan, const Conv
       plan.frame.spacing_z, to_string(plan.outside), to_string(options.code_type),
       options.z_range ? fmt::format("{}:{}", options.z_range->first, options.z_range->second) : "data",
       options.step ? fmt::format("{}", *options.step) : "auto", options.clamp_range, options.filter,
-      options.acquisition);
+      options.acquisition,
+      options.shadow_seeds
+          ? fmt::format("{} [{}]", options.shadow_seeds->sun_min_deg, fmt::join(options.shadow_seeds->sun_deg, " "))
+          : "none");
 }
 
 Metadata describe_job(const SourceInfo& info, const Plan& plan, const ConvertOptions& options,
