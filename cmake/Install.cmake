@@ -9,9 +9,7 @@ install(TARGETS isohf_cli RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT 
 if(TARGET isohf_view)
   install(TARGETS isohf_view RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT programs)
 endif()
-if(TARGET isohf_oiio)
-  install(TARGETS isohf_oiio LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/isohf COMPONENT programs)
-endif()
+# The reader module is installed where it is built: formats/CMakeLists.txt.
 
 set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/isohf)
 install(EXPORT isohf FILE isohfTargets.cmake NAMESPACE isohf:: DESTINATION ${package_dir} COMPONENT development)
