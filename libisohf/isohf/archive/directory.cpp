@@ -10,6 +10,8 @@
 namespace isohf {
 namespace {
 
+constexpr std::string_view kTileFolder = "tiles/";
+
 /// A member's bytes in the file, local header included.
 struct Extent {
   std::uint64_t begin;
@@ -66,6 +68,7 @@ Directory read_directory(std::span<const std::byte> file, const ZipEnd& end, con
   Directory directory;
   std::vector<Extent> extents;
   for_each_entry(file, end, [&](const ZipEntry& entry) {
+    if (!grid && entry.name.substr(0, kTileFolder.size()) == kTileFolder) return;
     // Archivers put in entries for folders; they hold nothing.
     const bool is_folder = entry.name.size() > 1 && entry.name.back() == '/' && entry.bytes == 0;
     const std::string_view name = is_folder ? entry.name.substr(0, entry.name.size() - 1) : entry.name;
@@ -82,14 +85,12 @@ Directory read_directory(std::span<const std::byte> file, const ZipEnd& end, con
     }
     extents.push_back({entry.header_offset, data_offset + entry.compressed_bytes, entry.name});
     if (is_folder) return;
-    if (entry.name.substr(0, 6) != "tiles/") {
+    if (entry.name.substr(0, kTileFolder.size()) != kTileFolder) {
       directory.members.push_back({entry, data_offset});
-    } else if (grid) {
-      if (const std::string why = why_bad_tile(entry, *grid); !why.empty()) {
-        complain(fmt::format("{}: {}", describe(entry), why));
-      } else {
-        directory.tiles.push_back({grid->flat_index(*tile_from_name(entry.name)), entry, data_offset});
-      }
+    } else if (const std::string why = why_bad_tile(entry, *grid); !why.empty()) {
+      complain(fmt::format("{}: {}", describe(entry), why));
+    } else {
+      directory.tiles.push_back({grid->flat_index(*tile_from_name(entry.name)), entry, data_offset});
     }
   });
   check_overlaps(extents, end.directory_offset, complain);

@@ -31,8 +31,8 @@ struct Directory {
 /// What a check hands its findings to: a finding's text. It may throw, or take note and return.
 using Complain = std::function<void(const std::string&)>;
 
-/// Reads and checks the directory of a file whose tiles belong to `grid` (nullopt: not known yet, tiles are skipped).
-/// What is wrong goes to `complain`; the entry at fault is left out.
+/// Reads and checks the directory of a file whose tiles belong to `grid`; with nullopt the members alone, and what is
+/// in tiles/ goes unread. What is wrong goes to `complain`; the entry at fault is left out.
 [[nodiscard]] Directory read_directory(std::span<const std::byte> file, const ZipEnd& end,
                                        const std::optional<TileGrid>& grid, const Complain& complain);
 

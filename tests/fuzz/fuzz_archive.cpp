@@ -1,0 +1,48 @@
+// Any file is an archive or an error; what opens can be read from end to end without harm.
+
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <string>
+
+#include "isohf/archive/reader.h"
+#include "isohf/base/error.h"
+
+namespace {
+
+void read_everything(const std::string& path) {
+  const isohf::ArchiveReader reader(path);
+  static_cast<void>(reader.check_structure());
+  for (const auto& member : reader.members()) {
+    try {
+      static_cast<void>(reader.read_member(member.name));
+    } catch (const isohf::Error&) {
+    }
+  }
+  const std::int64_t tiles = std::min<std::int64_t>(reader.grid().tile_count(), 64);
+  if (reader.grid().shape().stored_vertex_count() > 1000000) return;  // an honest claim, but slow to fill
+  for (std::int64_t flat = 0; flat < tiles; ++flat) {
+    try {
+      static_cast<void>(reader.read_tile(reader.grid().tile_at(flat)));
+    } catch (const isohf::Error&) {
+    }
+  }
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const int descriptor = ::memfd_create("archive", MFD_CLOEXEC);
+  if (descriptor < 0) std::abort();
+  if (::write(descriptor, data, size) != static_cast<ssize_t>(size)) std::abort();
+  try {
+    read_everything("/proc/self/fd/" + std::to_string(descriptor));
+  } catch (const isohf::Error&) {
+  }
+  ::close(descriptor);
+  return 0;
+}

@@ -1,0 +1,27 @@
+// Any bytes are a tile payload or an error, for every sample type. The first byte chooses shape and type.
+
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <span>
+
+#include "isohf/archive/tile_codec.h"
+#include "isohf/base/error.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using isohf::CodeType;
+  if (size == 0) return 0;
+  static const isohf::TileShape shapes[] = {isohf::TileShape::make(5, 5, 1), isohf::TileShape::make(12, 11, 3)};
+  const CodeType types[] = {CodeType::kU16, CodeType::kU8, CodeType::kF32};
+  const isohf::TileShape& shape = shapes[data[0] % 2];
+  const CodeType type = types[data[0] / 2 % 3];
+  try {
+    const auto payload = std::as_bytes(std::span<const std::uint8_t>(data, size)).subspan(1);
+    const isohf::TileCodes tile = decode_tile(shape, type, payload);
+    // What is read can be written, and reads back the same.
+    const isohf::EncodedTile encoded = encode_tile(shape, tile);
+    if (encoded.content_digest.size() != 32) std::abort();
+  } catch (const isohf::Error&) {
+  }
+  return 0;
+}
