@@ -53,7 +53,7 @@ class HelpFormatter : public CLI::Formatter {
       for (const CLI::Option* option : app->get_options()) {
         if (option->get_group() == group) lines += describe(option);
       }
-      if (!lines.empty()) help += "\n" + group + ":\n" + lines;
+      if (!lines.empty()) help += fmt::format("\n{}:\n{}", group, lines);
     }
     return help + "\n" + app->get_footer() + "\n";
   }
