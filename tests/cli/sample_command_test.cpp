@@ -15,7 +15,6 @@ namespace isohf::test {
 namespace {
 
 using nlohmann::json;
-using testing::HasSubstr;
 
 constexpr double kSlopeX = 0.25;  // rise per metre
 constexpr double kSlopeZ = -0.125;

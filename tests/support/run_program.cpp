@@ -49,6 +49,7 @@ void limit(int resource, std::uint64_t bytes) {
   if (options.without_privileges && ::geteuid() == 0 && ::setuid(kNobody) != 0) ::_exit(126);
   std::signal(SIGPIPE, SIG_DFL);
   std::vector<char*> arguments;
+  arguments.reserve(command.size() + 1);
   for (const std::string& argument : command) arguments.push_back(const_cast<char*>(argument.c_str()));
   arguments.push_back(nullptr);
   ::execv(arguments[0], arguments.data());
