@@ -66,20 +66,35 @@ Camera overview_camera(const TileSource& source, const ViewState& view) {
   const Mat4 camera = look_along(-1.0 * way);
   const double half_y = std::tan(view.fov_y_rad / 2.0);
   const double half_x = half_y * view.width / view.height;
-  // The nearest distance from which every corner lies within nine tenths of the view.
+  // The nearest distance from which every corner lies within nine tenths of the view; then the view moves up or down
+  // until the corners lie as far from its upper as from its lower edge, and again.
   double distance = 0.0;
-  for (int corner = 0; corner < 8; ++corner) {
-    const Vec3 at = Vec3{(corner & 1) != 0 ? covered.x1 : covered.x0, (corner & 2) != 0 ? high : low,
-                         (corner & 4) != 0 ? covered.z1 : covered.z0} -
-                    middle;
-    const auto along = [&](int row) {
-      return camera.at(row, 0) * at.x + camera.at(row, 1) * at.y + camera.at(row, 2) * at.z;
-    };
-    const double aside = std::max(std::abs(along(0)) / half_x, std::abs(along(1)) / half_y) / 0.9;
-    distance = std::max(distance, aside + along(2));
+  double lift = 0.0;
+  for (int round = 0; round < 8; ++round) {
+    double nearest = 0.0;
+    double top = -1e300;
+    double bottom = 1e300;
+    for (int corner = 0; corner < 8; ++corner) {
+      const Vec3 at = Vec3{(corner & 1) != 0 ? covered.x1 : covered.x0, (corner & 2) != 0 ? high : low,
+                           (corner & 4) != 0 ? covered.z1 : covered.z0} -
+                      middle;
+      const auto along = [&](int row) {
+        return camera.at(row, 0) * at.x + camera.at(row, 1) * at.y + camera.at(row, 2) * at.z;
+      };
+      const double aside = std::max(std::abs(along(0)) / half_x, std::abs(along(1) - lift) / half_y) / 0.9;
+      nearest = std::max(nearest, aside + along(2));
+      if (round == 0) continue;
+      const double height = (along(1) - lift) / (distance - along(2));
+      top = std::max(top, height);
+      bottom = std::min(bottom, height);
+    }
+    distance = std::max(nearest, 1e-6);
+    if (round > 0) lift += 0.5 * (top + bottom) * distance;
   }
+  const Vec3 up{camera.at(1, 0), camera.at(1, 1), camera.at(1, 2)};
+  const Vec3 pivot = middle + lift * up;
   Camera out;
-  out.look_at(middle + std::max(distance, 1e-6) * way, middle);
+  out.look_at(pivot + distance * way, pivot);
   return out;
 }
 

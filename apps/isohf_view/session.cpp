@@ -120,7 +120,7 @@ void Session::complete_frame() {
 }
 
 void Session::draw_overlay(double frames_per_second, bool figures, bool help) const {
-  const int size = std::max(1, view.height / 540);
+  const int size = std::max(1, view.height / 400);
   if (figures) {
     const TileBoxFigures& box = box_.figures();
     std::vector<std::string> lines{
