@@ -118,8 +118,9 @@ void SeamVerifier::draw(const Block& block, const TerrainFrame& frame, int even_
   glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
   glDisable(GL_DEPTH_TEST);
   glDisable(GL_BLEND);
-  glFrontFace(GL_CCW);
-  glCullFace(GL_BACK);
+  // Slanted, triangles may stand edge-on; a driver may call such a one back-facing and yet need it for a pixel. Which
+  // way triangles face is checked from above.
+  glDisable(GL_CULL_FACE);
   const TileGrid& grid = source_.grid();
   program_.begin(grid, frame);
   glUniform4f(program_.uniform("flat_colour"), 1.0F, 1.0F, 1.0F, 1.0F);
@@ -128,9 +129,7 @@ void SeamVerifier::draw(const Block& block, const TerrainFrame& frame, int even_
       const int level = (row + column) % 2 == 0 ? even_level : odd_level;
       program_.set_tile(grid, frame, {block.first.column + column, block.first.row + row});
       slots_[static_cast<std::size_t>(row * block.columns + column)].bind();
-      glEnable(GL_CULL_FACE);
       shared_.draw_strip(level);
-      glDisable(GL_CULL_FACE);
       if (shared_.has_stitch(level)) shared_.draw_stitch(level);
     }
   }
