@@ -21,6 +21,7 @@ enum ExitCode : int {
 using CommandFunction = int (*)(const Arguments& arguments);
 
 int command_convert(const Arguments& arguments);
+int command_experiment(const Arguments& arguments);
 int command_info(const Arguments& arguments);
 int command_plan(const Arguments& arguments);
 int command_sample(const Arguments& arguments);

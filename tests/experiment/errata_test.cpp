@@ -1,0 +1,106 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "isohf/experiment/experiment.h"
+
+/// Erratum E19: what section 2's experiment gives, against closed forms.
+
+namespace isohf::experiment {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+constexpr double kTolerance = 0.02;  // what the closed forms, limits for long waves, are promised to
+
+/// One triangle count and one frequency, given in cycles per sample of that mesh.
+ExperimentResult measure(HeightRule heights, double cycles_per_sample) {
+  ExperimentSettings settings;
+  settings.triangles = {2000};
+  settings.phases = 4;
+  settings.orientations = 40;
+  settings.frequency_count = 1;
+  settings.heights = heights;
+  // The first frequency is 0.01, 0.005·√(nyquist/2000) cycles per sample.
+  settings.nyquist_triangles = std::lround(2000.0 * std::pow(cycles_per_sample / 0.005, 2));
+  return run_experiment(settings);
+}
+
+double rms_at(const ExperimentResult& result, MeshKind mesh, int orientation) {
+  for (const Trial& t : result.trials) {
+    if (t.mesh == mesh && t.orientation == orientation) return t.errors.rms;
+  }
+  return std::nan("");
+}
+
+double quadratic_mean(const ExperimentResult& result, MeshKind mesh) {
+  double sum = 0.0;
+  const int count = result.settings.orientations / 2;
+  for (int i = 0; i < count; ++i) sum += std::pow(rms_at(result, mesh, i), 2);
+  return std::sqrt(sum / count);
+}
+
+double ratio_of_mean_rms(const ExperimentResult& result, MeshKind other) {
+  const std::int64_t triangles = result.settings.triangles[0];
+  return average_errors(result, MeshKind::kIso, triangles).rms / average_errors(result, other, triangles).rms;
+}
+
+// A quadratic interpolated over a triangle with edges e errs by ½ Σ (k·e)² λi λj. Its mean square over the area is
+// S²/480, S = Σ (k·e)²: (2 + sin 2t)² k⁴/480 for the right triangles of area ½, 3 k⁴/480 for the equilateral ones. (3
+// is to (2 + sin 2t)² as 4.5 is to 1.5 (2 + sin 2t)².) The phases' average of sin² halves it.
+TEST(Errata, E19LongWavesInterpolatedGiveTheClosedFormAtEveryOrientation) {
+  constexpr double kCycles = 0.02;
+  const ExperimentResult result = measure(HeightRule::kInterpolate, kCycles);
+  const double k = 2.0 * kPi * kCycles;
+  for (const Trial& t : result.trials) {
+    if (t.mesh != MeshKind::kIso && t.mesh != MeshKind::kOrthoConsistent) continue;
+    const double s = t.mesh == MeshKind::kIso ? std::numbers::sqrt3 : 2.0 + std::sin(2.0 * t.angle_rad);
+    const double closed_form = k * k * s / std::sqrt(2.0 * 480.0);
+    EXPECT_NEAR(t.errors.rms / closed_form, 1.0, kTolerance) << to_string(t.mesh) << " " << t.angle_rad;
+  }
+}
+
+TEST(Errata, E19LongWavesInterpolatedFavourIsoBy0816And0866) {
+  const ExperimentResult result = measure(HeightRule::kInterpolate, 0.02);
+  const double iso = quadratic_mean(result, MeshKind::kIso);
+  EXPECT_NEAR(iso / quadratic_mean(result, MeshKind::kOrthoConsistent) / std::sqrt(2.0 / 3.0), 1.0, kTolerance);
+  EXPECT_NEAR(ratio_of_mean_rms(result, MeshKind::kOrthoConsistent) / std::sqrt(0.75), 1.0, kTolerance);
+  // Chessboard diagonals: half the squares have 2 + sin 2t, half 2 - sin 2t; the quadratic mean is the same.
+  EXPECT_NEAR(iso / quadratic_mean(result, MeshKind::kOrthoAlternating) / std::sqrt(2.0 / 3.0), 1.0, kTolerance);
+}
+
+// The best constant takes the mean S/24 from an error of mean square S²/480, which leaves S²/2880: the fit is √6 times
+// better than interpolation for both meshes, and their ratio is the same.
+TEST(Errata, E19LongWavesFittedGiveTheClosedFormAtEveryOrientation) {
+  constexpr double kCycles = 0.02;
+  const ExperimentResult result = measure(HeightRule::kLeastSquares, kCycles);
+  const double k = 2.0 * kPi * kCycles;
+  for (const Trial& t : result.trials) {
+    if (t.mesh != MeshKind::kIso && t.mesh != MeshKind::kOrthoConsistent) continue;
+    const double s = t.mesh == MeshKind::kIso ? std::numbers::sqrt3 : 2.0 + std::sin(2.0 * t.angle_rad);
+    const double closed_form = k * k * s / std::sqrt(2.0 * 2880.0);
+    EXPECT_NEAR(t.errors.rms / closed_form, 1.0, kTolerance) << to_string(t.mesh) << " " << t.angle_rad;
+  }
+  EXPECT_NEAR(ratio_of_mean_rms(result, MeshKind::kOrthoConsistent) / 0.86, 1.0, kTolerance);
+}
+
+TEST(Errata, E19ShorterWavesFittedFavourIsoBy081To083) {
+  for (const double cycles : {0.3, 0.4}) {
+    const double ratio = ratio_of_mean_rms(measure(HeightRule::kLeastSquares, cycles), MeshKind::kOrthoConsistent);
+    EXPECT_GE(ratio, 0.81 * (1.0 - kTolerance)) << cycles;
+    EXPECT_LE(ratio, 0.83 * (1.0 + kTolerance)) << cycles;
+  }
+}
+
+// "Strictly lower at all orientations" would fail here: crests along the consistent diagonal suit that mesh.
+TEST(Errata, E19IsoIsNotBetterAtEveryOrientation) {
+  const ExperimentResult result = measure(HeightRule::kLeastSquares, 0.1);
+  const int orientations = result.settings.orientations;
+  const int along = 3 * orientations / 8;  // the wave runs across the diagonals, its crests along them
+  const int across = orientations / 8;
+  EXPECT_GT(rms_at(result, MeshKind::kIso, along), 1.5 * rms_at(result, MeshKind::kOrthoConsistent, along));
+  EXPECT_LT(rms_at(result, MeshKind::kIso, across), 0.7 * rms_at(result, MeshKind::kOrthoConsistent, across));
+}
+
+}  // namespace
+}  // namespace isohf::experiment
