@@ -233,14 +233,22 @@ void write_tiles(const Conversion& job, ArchiveWriter& writer, SeedStage* seeds,
   std::int64_t band_row = -1;
   std::shared_ptr<const Band> band;
 
-  const auto read = [&](oneapi::tbb::flow_control& control) -> std::shared_ptr<TileJob> {
+  // Tiles leave the pipeline in the order in which they enter it, so that a ring of as many as may be in flight always
+  // has the next one free. The pipeline itself only hands on pointers: it forgets to destroy what it holds when a stage
+  // throws.
+  constexpr std::size_t kTilesInFlightPerThread = 8;
+  std::vector<TileJob> ring(static_cast<std::size_t>(threads) * kTilesInFlightPerThread);
+  std::size_t entered = 0;
+
+  const auto read = [&](oneapi::tbb::flow_control& control) -> TileJob* {
     throw_if_cancelled(job.cancel);
     if (next == grid.tile_count()) {
       band.reset();
       control.stop();
       return nullptr;
     }
-    auto tile = std::make_shared<TileJob>();
+    TileJob* tile = &ring[entered++ % ring.size()];
+    *tile = {};
     tile->index = grid.tile_at(next++);
     if (tile->index.row != band_row) {
       band.reset();
@@ -250,26 +258,23 @@ void write_tiles(const Conversion& job, ArchiveWriter& writer, SeedStage* seeds,
     tile->band = band;
     return tile;
   };
-  const auto encode = [&](std::shared_ptr<TileJob> tile) {
+  const auto encode = [&](TileJob* tile) {
     make_tile(job, cutter, seeds, *tile);
     tile->band.reset();
     return tile;
   };
   std::int64_t written = next;
-  const auto write = [&](const std::shared_ptr<TileJob>& tile) {
+  const auto write = [&](TileJob* tile) {
     if (written >= first_new) writer.add_tile(tile->encoded);
     if (seeds != nullptr) seeds->add(tile->index, std::move(tile->seeds), writer);
     meter.report(++written, writer.bytes_written());
   };
 
-  constexpr std::size_t kTilesInFlightPerThread = 8;
   using oneapi::tbb::filter_mode;
   using oneapi::tbb::make_filter;
-  oneapi::tbb::parallel_pipeline(
-      static_cast<std::size_t>(threads) * kTilesInFlightPerThread,
-      make_filter<void, std::shared_ptr<TileJob>>(filter_mode::serial_in_order, read) &
-          make_filter<std::shared_ptr<TileJob>, std::shared_ptr<TileJob>>(filter_mode::parallel, encode) &
-          make_filter<std::shared_ptr<TileJob>, void>(filter_mode::serial_in_order, write));
+  oneapi::tbb::parallel_pipeline(ring.size(), make_filter<void, TileJob*>(filter_mode::serial_in_order, read) &
+                                                  make_filter<TileJob*, TileJob*>(filter_mode::parallel, encode) &
+                                                  make_filter<TileJob*, void>(filter_mode::serial_in_order, write));
 }
 
 void check_range(const std::pair<double, double>& range) {
