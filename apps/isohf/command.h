@@ -25,6 +25,7 @@ int command_experiment(const Arguments& arguments);
 int command_info(const Arguments& arguments);
 int command_plan(const Arguments& arguments);
 int command_sample(const Arguments& arguments);
+int command_shade(const Arguments& arguments);
 int command_verify(const Arguments& arguments);
 
 }  // namespace isohf::cli

@@ -28,6 +28,7 @@ constexpr Command kCommands[] = {
     {"info", "Say what an archive holds", command_info},
     {"verify", "Check an archive, and compare it with its source", command_verify},
     {"sample", "Print elevation and normal at places", command_sample},
+    {"shade", "Draw a picture of the surface with its shadows", command_shade},
     {"experiment", "Measure iso and ortho meshes against sine waves, as the paper does", command_experiment},
 };
 
