@@ -24,6 +24,7 @@ int command_convert(const Arguments& arguments);
 int command_experiment(const Arguments& arguments);
 int command_info(const Arguments& arguments);
 int command_plan(const Arguments& arguments);
+int command_restore(const Arguments& arguments);
 int command_sample(const Arguments& arguments);
 int command_shade(const Arguments& arguments);
 int command_verify(const Arguments& arguments);

@@ -83,6 +83,8 @@ std::optional<ConvertCommandOptions> parse(const Arguments& arguments) {
       });
   line.option("--sun-min", "DEG", "Lowest sun elevation for --shadow-seeds (default 2); a lower one takes more room",
               [&](const std::string& text) { sun_min_deg = parse_number(text); });
+  line.flag("--lossless", "Keep residuals as well, so that restore gives INPUT's samples bit for bit",
+            options.convert.lossless);
   add_work_options(line, options.work);
   add_memory_option(line, "Refuse to start where more memory would be needed", options.convert.memory_bytes);
   add_common_options(line, options.common);
@@ -139,6 +141,7 @@ std::string json_from(const ConvertCommandOptions& options, const ConvertSummary
                     {"archive_bytes", summary.archive_bytes},
                     {"tile_bytes", summary.tile_bytes},
                     {"shadow_seed_bytes", summary.seed_bytes},
+                    {"residual_bytes", summary.residual_bytes},
                     {"raw_16_bit_bytes", measured.raw_bytes},
                     {"ratio_to_raw_16_bit", measured.ratio},
                     {"bits_per_sample", measured.bits_per_sample},
@@ -167,6 +170,11 @@ std::string text_from(const ConvertCommandOptions& options, const ConvertSummary
                            shape.columns(), shape.rows()));
   say("size", fmt::format("{:.2f} times smaller than raw 16-bit samples ({}), {:.3f} bits a sample", measured.ratio,
                           describe_bytes(measured.raw_bytes), measured.bits_per_sample));
+  if (summary.residual_bytes > 0) {
+    say("residuals",
+        fmt::format("{}, {:.3f} bits an input sample", describe_bytes(summary.residual_bytes),
+                    8.0 * static_cast<double>(summary.residual_bytes) / static_cast<double>(summary.source_samples)));
+  }
   if (metadata.quantisation.type == CodeType::kF32) {
     say("elevations", fmt::format("f32, worst rounding {:.4g}{}", summary.worst_rounding, unit));
   } else {
@@ -204,8 +212,10 @@ int run(const ConvertCommandOptions& options) {
     return convert(
         *source, options.output, options.convert,
         [&](const ConvertProgress& at) {
-          const bool ranging = at.pass == ConvertProgress::Pass::kRange;
-          display.update(ranging ? "range" : "tiles", ranging ? "rows" : "tiles", at.done, at.total);
+          using Pass = ConvertProgress::Pass;
+          const char* const pass =
+              at.pass == Pass::kRange ? "range" : (at.pass == Pass::kTiles ? "tiles" : "residuals");
+          display.update(pass, at.pass == Pass::kTiles ? "tiles" : "rows", at.done, at.total);
         },
         cancel);
   }();

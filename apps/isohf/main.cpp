@@ -27,6 +27,7 @@ constexpr Command kCommands[] = {
     {"convert", "Turn a raster of elevations into an archive", command_convert},
     {"info", "Say what an archive holds", command_info},
     {"verify", "Check an archive, and compare it with its source", command_verify},
+    {"restore", "Turn an archive back into a raster", command_restore},
     {"sample", "Print elevation and normal at places", command_sample},
     {"shade", "Draw a picture of the surface with its shadows", command_shade},
     {"experiment", "Measure iso and ortho meshes against sine waves, as the paper does", command_experiment},
@@ -69,6 +70,7 @@ Examples:
   isohf plan dem.tif                      what convert would do, without doing it
   isohf convert dem.tif dem.isohf
   isohf verify dem.isohf --against dem.tif
+  isohf restore dem.isohf back.tif
   echo "1200.5 340" | isohf sample dem.isohf
 )";
 

@@ -31,6 +31,23 @@ std::vector<std::byte> sha256(std::span<const std::byte> bytes) {
   return digest_of(context);
 }
 
+struct Sha256::State {
+  sha256_ctx context;
+};
+
+Sha256::Sha256() : state_(std::make_unique<State>()) {
+  sha256_init(&state_->context);
+}
+Sha256::~Sha256() = default;
+
+void Sha256::add(std::span<const std::byte> bytes) {
+  update(state_->context, bytes);
+}
+
+std::vector<std::byte> Sha256::finish() {
+  return digest_of(state_->context);
+}
+
 std::string hex(std::span<const std::byte> digest) {
   constexpr char kDigits[] = "0123456789abcdef";
   std::string text;

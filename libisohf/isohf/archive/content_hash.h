@@ -13,6 +13,21 @@ namespace isohf {
 
 /// SHA-256 of any bytes: 32 bytes.
 [[nodiscard]] std::vector<std::byte> sha256(std::span<const std::byte> bytes);
+/// SHA-256 of bytes that come in parts.
+class Sha256 {
+ public:
+  Sha256();
+  ~Sha256();
+  Sha256(const Sha256&) = delete;
+  Sha256& operator=(const Sha256&) = delete;
+
+  void add(std::span<const std::byte> bytes);
+  [[nodiscard]] std::vector<std::byte> finish();  ///< 32 bytes; call once
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
 /// Lower-case hexadecimal text of a digest.
 [[nodiscard]] std::string hex(std::span<const std::byte> digest);
 

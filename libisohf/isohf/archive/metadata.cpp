@@ -103,6 +103,8 @@ Json source_to_json(const SourceRecord& source) {
   json["height"] = source.height;
   json["sample_type"] = source.sample_type;
   json["channel"] = text_or_null(source.channel);
+  json["z_scale"] = source.z_scale;
+  json["z_offset"] = source.z_offset;
   json["registration"] = source.registration;
   json["first_sample"] = {{"x", source.first_sample_x}, {"z", source.first_sample_z}};
   json["spacing"] = {{"x", source.spacing_x}, {"z", source.spacing_z}};
@@ -125,6 +127,8 @@ SourceRecord source_from_json(const ObjectReader& json) {
   source.height = json.integer("height");
   source.sample_type = json.text("sample_type");
   source.channel = json.optional_text("channel");
+  source.z_scale = json.optional_number("z_scale").value_or(1.0);
+  source.z_offset = json.optional_number("z_offset").value_or(0.0);
   source.registration = json.text("registration");
   source.first_sample_x = json.object("first_sample").number("x");
   source.first_sample_z = json.object("first_sample").number("z");

@@ -53,6 +53,8 @@ struct SourceRecord {
   std::int64_t height = 0;
   std::string sample_type;
   std::string channel;
+  double z_scale = 1;  ///< elevation = raw sample * z_scale + z_offset, in vertical units
+  double z_offset = 0;
   std::string registration;   ///< "area", "point": as used
   double first_sample_x = 0;  ///< world place of sample (0, 0)
   double first_sample_z = 0;

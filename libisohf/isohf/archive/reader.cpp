@@ -323,17 +323,7 @@ TileCodes ArchiveReader::read_tile(TileIndex tile) const {
   const TileEntry entry = tile_entry(tile);
   const CodeType type = metadata().quantisation.type;
   const TileShape& shape = grid().shape();
-  if (!entry.stored) {
-    TileCodes empty;
-    empty.type = type;
-    const auto samples = static_cast<std::size_t>(shape.stored_vertex_count());
-    if (type == CodeType::kF32) {
-      empty.heights.assign(samples, std::numeric_limits<float>::quiet_NaN());
-    } else {
-      empty.codes.assign(samples, static_cast<std::uint16_t>(metadata().quantisation.void_code()));
-    }
-    return empty;
-  }
+  if (!entry.stored) return void_tile(shape, metadata().quantisation);
   try {
     return decode_tile(shape, type, state_->payload(entry, tile));
   } catch (const Error& error) {

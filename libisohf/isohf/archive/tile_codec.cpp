@@ -304,6 +304,18 @@ EncodedTile encode_floats(const TileShape& shape, const TileCodes& tile) {
 
 }  // namespace
 
+TileCodes void_tile(const TileShape& shape, const Quantisation& quantisation) {
+  TileCodes tile;
+  tile.type = quantisation.type;
+  const auto samples = static_cast<std::size_t>(shape.stored_vertex_count());
+  if (tile.type == CodeType::kF32) {
+    tile.heights.assign(samples, std::numeric_limits<float>::quiet_NaN());
+  } else {
+    tile.codes.assign(samples, static_cast<std::uint16_t>(quantisation.void_code()));
+  }
+  return tile;
+}
+
 EncodedTile encode_tile(const TileShape& shape, const TileCodes& tile) {
   const auto samples = static_cast<std::size_t>(shape.stored_vertex_count());
   const bool is_float = tile.type == CodeType::kF32;

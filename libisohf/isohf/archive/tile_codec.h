@@ -32,6 +32,9 @@ struct TileStatistics {
   double worst_rounding = 0.0;  ///< largest |stored - computed|
 };
 
+/// A tile without an elevation.
+[[nodiscard]] TileCodes void_tile(const TileShape& shape, const Quantisation& quantisation);
+
 /// A tile, coded and compressed, ready to be written as an archive member.
 struct EncodedTile {
   std::vector<std::byte> deflated;  ///< raw Deflate stream (RFC 1951)

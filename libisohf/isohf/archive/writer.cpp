@@ -416,6 +416,26 @@ void ArchiveWriter::add_deflated_member(const std::string& name, std::span<const
   state_->add_member({name, ZipMethod::kDeflated, crc32_of_bytes, deflated.size(), bytes, 0}, deflated);
 }
 
+void ArchiveWriter::flush_tiles() {
+  state_->part.flush();
+}
+
+TileCodes ArchiveWriter::read_tile(TileIndex tile, const Quantisation& quantisation) const {
+  const State& state = *state_;
+  const auto at = static_cast<std::size_t>(state.grid.flat_index(tile)) * kIndexRecordBytes;
+  const auto entry = parse_index_record(std::span(state.index).subspan(at, kIndexRecordBytes));
+  ISOHF_ASSERT(entry.has_value());
+  if (!entry->stored) return void_tile(state.grid.shape(), quantisation);
+  std::vector<std::byte> deflated(entry->compressed_bytes);
+  std::vector<std::byte> payload(entry->payload_bytes);
+  if (state.part.read_at(entry->offset_bytes, deflated) != deflated.size()) {
+    throw Error(ErrorCode::kIo, fmt::format("{}: tile ({},{}) at byte {} cannot be read back", state.part.path(),
+                                            tile.column, tile.row, entry->offset_bytes));
+  }
+  inflate_exactly(deflated, payload);
+  return decode_tile(state.grid.shape(), quantisation.type, payload);
+}
+
 std::uint64_t ArchiveWriter::finish(Metadata metadata) {
   State& state = *state_;
   ISOHF_ASSERT(state.next == state.grid.tile_count() && !state.finished);

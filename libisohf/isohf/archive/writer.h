@@ -64,6 +64,12 @@ class ArchiveWriter {
   void add_deflated_member(const std::string& name, std::span<const std::byte> deflated, std::uint64_t bytes,
                            std::uint32_t crc32_of_bytes);
 
+  /// Makes every tile added so far readable by read_tile.
+  void flush_tiles();
+  /// Decodes a tile that was added before flush_tiles(), for members that are made from the tiles as stored; also those
+  /// that a resumed job found. Any number of threads at once, but none beside the other functions.
+  [[nodiscard]] TileCodes read_tile(TileIndex tile, const Quantisation& quantisation) const;
+
   /// Completes the archive: metadata (tiles_stored and content_sha256 are filled in here), index, directory; flush and
   /// rename. All tiles must have been added. Returns the archive's size in bytes. Throws Error{kInvalidArgument} where
   /// the metadata do not fit WriterOptions::metadata_bytes; Error{kIo} where somebody else made `path` meanwhile (then

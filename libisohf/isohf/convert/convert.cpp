@@ -18,6 +18,7 @@
 #include "isohf/convert/elevation_range.h"
 #include "isohf/convert/job_description.h"
 #include "isohf/convert/quantiser.h"
+#include "isohf/convert/residual_stage.h"
 #include "isohf/convert/seed_stage.h"
 #include "isohf/convert/tile_statistics.h"
 #include "isohf/surface/band_reader.h"
@@ -313,6 +314,7 @@ ConvertSummary convert(HeightSource& source, const std::string& output, const Co
       source, options, plan, kernel, Prefilter::make(kernel.filter(), acquisition_from_string(options.acquisition)),
       cancel};
   std::optional<SeedStage> seeds;
+  std::optional<LosslessRecord> lossless;
   try {
     oneapi::tbb::task_arena arena(threads);
     arena.execute([&] {
@@ -324,6 +326,12 @@ ConvertSummary convert(HeightSource& source, const std::string& output, const Co
                       known ? 1.0 / info.metres_per_vertical_unit : 1.0);
       }
       write_tiles(job, writer, seeds ? &*seeds : nullptr, progress, threads);
+      if (options.lossless) {
+        ProgressMeter meter(progress, ConvertProgress::Pass::kResiduals, info.height);
+        lossless = write_residuals(
+            source, plan.frame, plan.grid, job.quantisation, writer,
+            [&](std::int64_t rows) { meter.report(rows, writer.bytes_written()); }, cancel);
+      }
     });
 
     const TileStatistics all = writer.statistics();
@@ -339,6 +347,8 @@ ConvertSummary convert(HeightSource& source, const std::string& output, const Co
       summary.seed_bytes = record.bytes;
       summary.metadata.extensions.emplace_back(kShadowSeedsName, format_shadow_seed_info(record));
     }
+    if (lossless) summary.metadata.extensions.emplace_back(kLosslessName, format_lossless(*lossless));
+    summary.residual_bytes = lossless ? lossless->residual_bytes : 0;
   } catch (const Error& error) {
     if (error.code() == ErrorCode::kCancelled) writer.keep_part();
     throw;

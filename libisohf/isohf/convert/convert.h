@@ -36,14 +36,15 @@ struct ConvertOptions {
   std::uint64_t memory_bytes = 0;                 ///< refuse plans that would need more; 0: no limit
   bool overwrite = false;
   bool resume = false;
-  std::string producer;  ///< "isohf 0.1.0"
+  bool lossless = false;  ///< write residuals beside the tiles, so that the source's samples come back bit for bit
+  std::string producer;   ///< "isohf 0.1.0"
 };
 
 /// What a conversion reports while it runs. Called from one thread at a time, a few times a second at most.
 struct ConvertProgress {
-  enum class Pass { kRange, kTiles };
+  enum class Pass { kRange, kTiles, kResiduals };
   Pass pass = Pass::kRange;
-  std::int64_t done = 0;  ///< source rows, or tiles
+  std::int64_t done = 0;  ///< source rows; tiles in kTiles
   std::int64_t total = 0;
   std::uint64_t bytes_written = 0;
 };
@@ -57,6 +58,7 @@ struct ConvertSummary {
   std::int64_t tiles_written = 0;  ///< stored and void ones together: always tiles_expected on return
   std::int64_t tiles_void = 0;
   std::uint64_t archive_bytes = 0;
+  std::uint64_t residual_bytes = 0;  ///< of these, residuals; 0 where not lossless
   std::uint64_t source_samples = 0;
   std::uint64_t lattice_samples = 0;  ///< C*R for every tile
   double step = 0.0;                  ///< elevation of one code
@@ -67,7 +69,8 @@ struct ConvertSummary {
   std::vector<std::string> warnings;  ///< one line each
 };
 
-/// source -> tiles -> archive. Two passes over the source at most (the first only finds the range), bounded memory,
+/// source -> tiles -> archive. Two passes over the source at most (the first only finds the range; lossless takes one
+/// more for the residuals), bounded memory,
 /// all cores; the same bytes for any thread count.
 /// `cancel` is polled between tiles: set, the conversion stops within a fraction of a second with Error{kCancelled},
 /// leaving NAME.part and its journal for --resume and nothing under the final name.

@@ -19,6 +19,8 @@ SourceRecord record_of(const SourceInfo& info, const SourceFrame& frame) {
   record.height = info.height;
   record.sample_type = to_string(info.sample_type);
   record.channel = info.channel;
+  record.z_scale = info.z_scale;
+  record.z_offset = info.z_offset;
   record.registration = to_string(frame.registration);
   record.first_sample_x = frame.first_sample_x;
   record.first_sample_z = frame.first_sample_z;

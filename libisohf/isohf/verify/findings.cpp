@@ -27,6 +27,8 @@ const std::vector<FindingKind>& finding_catalogue() {
       {finding::kSourceLost, Severity::kError,
        "the source has an elevation well inside valid ground where the archive has none"},
       {finding::kSourceInvented, Severity::kError, "the archive has an elevation deep inside a void of the source"},
+      {finding::kLossless, Severity::kError,
+       "the residuals do not give the source's samples: one cannot be decoded, or their SHA-256 differs"},
   };
   return kinds;
 }

@@ -23,6 +23,7 @@ inline constexpr int kMemberUnreadable = 14;
 inline constexpr int kStructure = 15;
 inline constexpr int kSourceLost = 16;
 inline constexpr int kSourceInvented = 17;
+inline constexpr int kLossless = 18;
 }  // namespace finding
 
 /// Severity of a catalogue id.

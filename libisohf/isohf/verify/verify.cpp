@@ -14,6 +14,7 @@
 
 #include "isohf/archive/content_hash.h"
 #include "isohf/base/error.h"
+#include "isohf/restore/lossless.h"
 #include "isohf/surface/normals.h"
 #include "isohf/verify/findings.h"
 #include "isohf/verify/shared_vertices.h"
@@ -63,6 +64,7 @@ class Verification {
       }
     }
     check_totals();
+    check_lossless();
     return std::move(report_);
   }
 
@@ -269,6 +271,23 @@ class Verification {
       min_ = std::min(min_, tile.min);
       max_ = std::max(max_, tile.max);
       if (tile.readable) hash_.add_tile(tile.digest);
+    }
+  }
+
+  /// The source's samples, restored from tiles and residuals, against their hash.
+  void check_lossless() {
+    if (!all_readable_) return;
+    try {
+      const std::optional<LosslessRecord> record = lossless_record(archive_.metadata());
+      if (!record) return;
+      Sha256 hash;
+      for (LosslessReader reader(archive_, *record); !reader.at_end();) hash.add(reader.read_next());
+      if (const std::string found = hex(hash.finish()); found != record->sha256) {
+        add(make(finding::kLossless, {},
+                 fmt::format("the restored samples have the SHA-256 {}, the metadata says {}", found, record->sha256)));
+      }
+    } catch (const Error& error) {
+      add(make(finding::kLossless, {}, error.what()));
     }
   }
 

@@ -1,0 +1,292 @@
+/// isohf restore: an archive becomes a raster of elevations again.
+
+#include <fmt/format.h>
+#include <oneapi/tbb/parallel_for.h>
+#include <oneapi/tbb/task_arena.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "command.h"
+#include "describe.h"
+#include "formats/registry.h"
+#include "interrupt.h"
+#include "isohf/archive/content_hash.h"
+#include "isohf/base/error.h"
+#include "isohf/restore/lossless.h"
+#include "json_output.h"
+#include "option_values.h"
+#include "options_common.h"
+#include "output_file.h"
+#include "restored_raster.h"
+#include "standard_output.h"
+
+namespace isohf::cli {
+namespace {
+
+using nlohmann::ordered_json;
+
+constexpr const char* kFooter =
+    R"(The raster has the samples of the archive's source, at their places, unless another grid is asked for. An
+archive made with --lossless gives the source's samples bit for bit, and their SHA-256 is checked; with
+--method it gives what its surface alone holds.
+Methods: hex, quintic B-splines along the lattice rows and then down the columns, is nearest to the source;
+barycentric is what a renderer shows. The format follows from RASTER's extension: .tif, .exr, .png or .hgt.
+
+Examples:
+  isohf restore dem.isohf back.tif
+  isohf restore dem.isohf seen.tif --method barycentric
+  isohf restore dem.isohf half.tif --size 600x600
+  isohf restore dem.isohf beside.tif --like other.tif)";
+
+struct RestoreOptions {
+  CommonOptions common;
+  WorkOptions work;
+  std::string archive;
+  std::string output;
+  std::string like;
+  std::optional<std::pair<std::int64_t, std::int64_t>> size;
+  std::optional<double> spacing;
+  std::optional<RestoreMethod> method;
+  bool overwrite = false;
+};
+
+std::optional<RestoreOptions> parse(const Arguments& arguments) {
+  RestoreOptions options;
+  CommandLine line("restore", "Turns an archive back into a raster of elevations.");
+  line.group("Arguments");
+  line.positional("ARCHIVE", "-i,--input", "Archive to read", options.archive);
+  line.positional("RASTER", "-o,--output", "Raster to write: NAME.tif, .exr, .png or .hgt", options.output);
+  line.flag("--overwrite", "Replace RASTER where it exists", options.overwrite);
+  line.group("Grid");
+  line.option("--like", "INPUT", "The grid of this raster (default: of the archive's source)", options.like);
+  line.option("--size", "WxH", "So many samples over the source's ground",
+              [&](const std::string& text) { options.size = parse_size(text, 1, std::int64_t{1} << 31U); });
+  line.option("--spacing", "D", "Samples D world units apart",
+              [&](const std::string& text) { options.spacing = parse_positive_number(text); });
+  line.option("--method", "NAME", "hex or barycentric (default hex; the source's own samples where they are kept)",
+              [&](const std::string& text) { options.method = restore_method_from_string(text); });
+  add_work_options(line, options.work);
+  add_common_options(line, options.common);
+  line.footer(kFooter);
+  line.exclusive({"--like", "--size"});
+  line.exclusive({"--like", "--spacing"});
+  if (!line.parse(arguments)) return std::nullopt;
+  line.require("ARCHIVE", options.archive);
+  line.require("RASTER", options.output);
+  return options;
+}
+
+/// Samples over the ground that the source covers: in the middle of areas, or from the first post on.
+SampleGrid asked_grid(const RestoreOptions& options, const Metadata& metadata) {
+  if (!options.like.empty()) return grid_like(metadata, open_source(options.like, {})->info());
+  if (!options.size && !options.spacing) return source_grid(metadata.source);
+  const WorldBounds& ground = metadata.valid;
+  const bool area = metadata.source.registration == "area";
+  const double width = ground.x1 - ground.x0;
+  const double height = ground.z1 - ground.z0;
+  const auto count = [&](double length) {
+    const double steps = std::floor(length / *options.spacing * (1.0 + 1e-12));
+    return std::max<std::int64_t>(static_cast<std::int64_t>(steps) + (area ? 0 : 1), 1);
+  };
+  const auto step = [&](double length, std::int64_t samples) {
+    const std::int64_t steps = area ? samples : samples - 1;
+    return options.spacing ? *options.spacing : (steps > 0 ? length / static_cast<double>(steps) : length);
+  };
+  SampleGrid grid;
+  grid.width = options.size ? options.size->first : count(width);
+  grid.height = options.size ? options.size->second : count(height);
+  grid.spacing_x = step(width, grid.width);
+  grid.spacing_z = step(height, grid.height);
+  grid.first_x = ground.x0 + (area ? grid.spacing_x / 2.0 : 0.0);
+  grid.first_z = ground.z0 + (area ? grid.spacing_z / 2.0 : 0.0);
+  return grid;
+}
+
+/// Throws for a sample that the raster's type does not hold, naming its place.
+[[noreturn]] void refuse_sample(const RestoreOptions& options, SampleType type, std::int64_t column, std::int64_t row,
+                                double value) {
+  throw Error(ErrorCode::kInvalidArgument,
+              fmt::format("{}: sample (column {}, row {}) is {:.9g}, which {} does not hold; write .tif",
+                          options.output, column, row, value, to_string(type)));
+}
+
+struct Restored {
+  std::int64_t voids = 0;
+  bool is_source = false;  ///< the source's own samples, hash checked
+};
+
+class Restorer {
+ public:
+  Restorer(const RestoreOptions& options, const ArchiveReader& archive, const SampleGrid& grid,
+           const std::atomic<bool>& cancel)
+      : options_(options),
+        archive_(archive),
+        grid_(grid),
+        cancel_(cancel),
+        display_(options.work.progress, options.common.quiet, options.common.verbose) {}
+
+  Restored run() {
+    const Metadata& metadata = archive_.metadata();
+    const bool wants_source = options_.like.empty() && !options_.size && !options_.spacing && !options_.method;
+    const std::optional<LosslessRecord> record = wants_source ? lossless_record(metadata) : std::nullopt;
+    return record ? run_lossless(*record) : run_surface();
+  }
+
+ private:
+  void report(std::int64_t rows) {
+    display_.update("restore", "rows", rows, grid_.height);
+    if (cancel_.load()) throw Error(ErrorCode::kCancelled, "interrupted");
+  }
+
+  [[nodiscard]] std::unique_ptr<RasterSink> open(const SampleMapping& mapping, std::optional<double> void_value) const {
+    RasterSpec spec = restored_raster(archive_.metadata(), grid_, mapping.type);
+    spec.z_scale = mapping.z_scale;
+    spec.z_offset = mapping.z_offset;
+    if (void_value && !std::isnan(*void_value)) spec.void_value = void_value;
+    spec.overwrite = options_.overwrite;
+    return create_raster(options_.output, spec);
+  }
+
+  Restored run_lossless(const LosslessRecord& record) {
+    const SampleMapping kept = record.mapping;
+    SampleMapping written = kept;
+    written.type = restored_type(options_.output, kept.type);
+    const auto void_value = record.void_values.empty() ? std::nullopt : std::optional(record.void_values.front());
+    const std::unique_ptr<RasterSink> sink = open(written, void_value);
+    LosslessReader reader(archive_, record);
+    Sha256 hash;
+    std::int64_t row = 0;
+    while (!reader.at_end()) {
+      const std::vector<std::byte> raw = reader.read_next();
+      hash.add(raw);
+      if (written.type == kept.type) {
+        sink->write_rows(raw);
+      } else {
+        sink->write_rows(in_type(raw, kept.type, written.type, row));
+      }
+      row += static_cast<std::int64_t>(raw.size() / size_bytes(kept.type)) / record.width;
+      report(row);
+    }
+    if (const std::string found = hex(hash.finish()); found != record.sha256) {
+      throw Error(ErrorCode::kCorrupt, fmt::format("{}: the restored samples have the SHA-256 {}, the source's is {}",
+                                                   options_.archive, found, record.sha256));
+    }
+    sink->finish();
+    return {0, true};
+  }
+
+  /// The same numbers in another type; refuses what would not be the same.
+  [[nodiscard]] std::vector<std::byte> in_type(std::span<const std::byte> raw, SampleType from, SampleType to,
+                                               std::int64_t first_row) const {
+    const std::size_t count = raw.size() / size_bytes(from);
+    std::vector<std::byte> out(count * size_bytes(to));
+    for (std::size_t i = 0; i < count; ++i) {
+      const double value = load_sample(from, raw.data() + i * size_bytes(from));
+      std::byte* const at = out.data() + i * size_bytes(to);
+      const bool same = !std::isnan(value) && store_sample({to, 1.0, 0.0}, value, at) && load_sample(to, at) == value;
+      const auto place = static_cast<std::int64_t>(i);
+      if (!same) refuse_sample(options_, to, place % grid_.width, first_row + place / grid_.width, value);
+    }
+    return out;
+  }
+
+  Restored run_surface() {
+    const Metadata& metadata = archive_.metadata();
+    SampleMapping mapping{restored_type(options_.output, sample_type_from_string(metadata.source.sample_type)),
+                          metadata.source.z_scale, metadata.source.z_offset};
+    const std::unique_ptr<RasterSink> sink = open(mapping, usual_void(mapping.type));
+    SurfaceRows surface(
+        archive_.grid(), metadata.quantisation, [&](TileIndex tile) { return archive_.read_tile(tile); }, grid_,
+        options_.method.value_or(RestoreMethod::kHex));
+    const std::int64_t rows_at_once = std::max<std::int64_t>((std::int64_t{1} << 20U) / grid_.width, 1);
+    Restored restored;
+    for (std::int64_t row = 0; row < grid_.height; row += rows_at_once) {
+      const std::int64_t rows = std::min(rows_at_once, grid_.height - row);
+      std::vector<double> elevations(static_cast<std::size_t>(rows * grid_.width));
+      surface.read(row, rows, elevations);
+      std::vector<std::byte> raw(elevations.size() * size_bytes(mapping.type));
+      restored.voids += std::count_if(elevations.begin(), elevations.end(), [](double h) { return std::isnan(h); });
+      oneapi::tbb::parallel_for(std::int64_t{0}, rows, [&](std::int64_t r) {
+        for (std::int64_t c = 0; c < grid_.width; ++c) {
+          const auto i = static_cast<std::size_t>(r * grid_.width + c);
+          store(mapping, elevations[i], raw.data() + i * size_bytes(mapping.type), c, row + r);
+        }
+      });
+      sink->write_rows(raw);
+      report(row + rows);
+    }
+    sink->finish();
+    return restored;
+  }
+
+  void store(const SampleMapping& mapping, double elevation, std::byte* raw, std::int64_t column,
+             std::int64_t row) const {
+    if (!std::isnan(elevation)) {
+      if (!store_sample(mapping, elevation, raw)) refuse_sample(options_, mapping.type, column, row, elevation);
+      return;
+    }
+    if (const auto value = usual_void(mapping.type)) {
+      (void)store_sample({mapping.type, 1.0, 0.0}, *value, raw);
+    } else if (mapping.type == SampleType::kFloat16) {
+      const std::uint16_t bits = 0x7E00U;
+      std::memcpy(raw, &bits, sizeof(bits));
+    } else if (mapping.type == SampleType::kFloat32) {
+      const float nothing = std::numeric_limits<float>::quiet_NaN();
+      std::memcpy(raw, &nothing, sizeof(nothing));
+    } else {
+      const double nothing = std::numeric_limits<double>::quiet_NaN();
+      std::memcpy(raw, &nothing, sizeof(nothing));
+    }
+  }
+
+  const RestoreOptions& options_;
+  const ArchiveReader& archive_;
+  SampleGrid grid_;
+  const std::atomic<bool>& cancel_;
+  ProgressDisplay display_;
+};
+
+int run(const RestoreOptions& options) {
+  check_output_file(options.archive, options.output, options.overwrite);
+  const ArchiveReader archive(options.archive);
+  const SampleGrid grid = asked_grid(options, archive.metadata());
+  const std::atomic<bool>& cancel = watch_interrupts();
+  Restored restored;
+  oneapi::tbb::task_arena arena(options.work.threads > 0 ? options.work.threads : oneapi::tbb::task_arena::automatic);
+  arena.execute([&] { restored = Restorer(options, archive, grid, cancel).run(); });
+  const std::string how = restored.is_source ? "source" : to_string(options.method.value_or(RestoreMethod::kHex));
+  StandardOutput out;
+  if (options.common.json) {
+    out.write(json_text({{"archive", options.archive},
+                         {"output", options.output},
+                         {"method", how},
+                         {"width", grid.width},
+                         {"height", grid.height},
+                         {"first_sample", {{"x", grid.first_x}, {"z", grid.first_z}}},
+                         {"spacing", {{"x", grid.spacing_x}, {"z", grid.spacing_z}}},
+                         {"source_samples", restored.is_source},
+                         {"voids", restored.is_source ? ordered_json(nullptr) : ordered_json(restored.voids)}}));
+  } else if (!options.common.quiet) {
+    const std::string what = restored.is_source
+                                 ? "the source's own samples, SHA-256 as stated"
+                                 : fmt::format("method {}, {} voids", how, describe_count(restored.voids));
+    out.write(fmt::format("{}: {} x {} samples, {}\n", options.output, grid.width, grid.height, what));
+  }
+  out.finish();
+  return kExitDone;
+}
+
+}  // namespace
+
+int command_restore(const Arguments& arguments) {
+  const std::optional<RestoreOptions> options = parse(arguments);
+  return options ? run(*options) : static_cast<int>(kExitDone);
+}
+
+}  // namespace isohf::cli

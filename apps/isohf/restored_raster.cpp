@@ -1,0 +1,117 @@
+#include "restored_raster.h"
+
+#include <algorithm>
+#include <cctype>
+#include <filesystem>
+#include <limits>
+
+#include "isohf/convert/plan.h"
+
+namespace isohf::cli {
+namespace {
+
+std::string extension_of(const std::string& path) {
+  std::string extension = std::filesystem::path(path).extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return extension;
+}
+
+HorizontalUnit unit_of(const std::string& name) {
+  if (name == "metre") return HorizontalUnit::kMetre;
+  return name == "degree" ? HorizontalUnit::kDegree : HorizontalUnit::kUnknown;
+}
+
+}  // namespace
+
+SampleType restored_type(const std::string& path, SampleType source_type) {
+  const std::string extension = extension_of(path);
+  if (extension == ".hgt") return SampleType::kInt16;
+  if (extension == ".exr") {
+    const bool holds = source_type == SampleType::kFloat16 || source_type == SampleType::kUint32;
+    return holds ? source_type : SampleType::kFloat32;
+  }
+  if (extension == ".png") return source_type == SampleType::kUint8 ? source_type : SampleType::kUint16;
+  return source_type;
+}
+
+std::optional<double> usual_void(SampleType type) {
+  switch (type) {
+    case SampleType::kUint8:
+      return std::numeric_limits<std::uint8_t>::max();
+    case SampleType::kInt8:
+      return std::numeric_limits<std::int8_t>::min();
+    case SampleType::kUint16:
+      return std::numeric_limits<std::uint16_t>::max();
+    case SampleType::kInt16:
+      return std::numeric_limits<std::int16_t>::min();
+    case SampleType::kUint32:
+      return std::numeric_limits<std::uint32_t>::max();
+    case SampleType::kInt32:
+      return std::numeric_limits<std::int32_t>::min();
+    case SampleType::kFloat16:
+    case SampleType::kFloat32:
+    case SampleType::kFloat64:
+      break;
+  }
+  return std::nullopt;
+}
+
+RasterSpec restored_raster(const Metadata& metadata, const SampleGrid& grid, SampleType type) {
+  const SourceRecord& source = metadata.source;
+  RasterSpec spec;
+  spec.width = grid.width;
+  spec.height = grid.height;
+  spec.sample_type = type;
+  if (metadata.vertical_unit != "unknown") spec.vertical_unit = metadata.vertical_unit;
+  Georeference place;
+  place.registration = source.registration == "area" ? Registration::kArea : Registration::kPoint;
+  place.unit = unit_of(source.crs_unit);
+  // World units to the source's own.
+  const double per_x = source.crs_spacing_x > 0.0 ? source.crs_spacing_x / source.spacing_x : 1.0;
+  const double per_z = source.crs_spacing_y > 0.0 ? source.crs_spacing_y / source.spacing_z : 1.0;
+  const bool is_source_grid = grid.spacing_x == source.spacing_x && grid.spacing_z == source.spacing_z;
+  place.spacing_x = is_source_grid && source.crs_spacing_x > 0.0 ? source.crs_spacing_x : grid.spacing_x * per_x;
+  place.spacing_y = is_source_grid && source.crs_spacing_y > 0.0 ? source.crs_spacing_y : grid.spacing_z * per_z;
+  place.has_origin = source.origin_x.has_value() && source.origin_y.has_value();
+  if (place.has_origin) {
+    place.origin_x = *source.origin_x + (grid.first_x - source.first_sample_x) * per_x;
+    place.origin_y = *source.origin_y - (grid.first_z - source.first_sample_z) * per_z;
+  }
+  place.system.name = source.crs_name;
+  place.system.epsg = source.crs_epsg;
+  place.system.wkt = source.crs_wkt;
+  place.system.body = source.body;
+  place.system.semi_major_axis_m = source.semi_major_axis_m;
+  place.system.inverse_flattening = source.inverse_flattening;
+  place.system.vertical_datum = source.vertical_datum;
+  place.system.vertical_epsg = source.vertical_epsg;
+  if (place.has_origin) spec.georeference = place;
+  return spec;
+}
+
+SampleGrid grid_like(const Metadata& metadata, const SourceInfo& other) {
+  const SourceRecord& source = metadata.source;
+  const Georeference& place = other.georeference;
+  const bool comparable = source.origin_x && source.origin_y && place.has_origin && source.crs_spacing_x > 0.0 &&
+                          source.crs_spacing_y > 0.0 && unit_of(source.crs_unit) == place.unit;
+  if (!comparable) {
+    const SourceFrame frame = make_source_frame(other);
+    return {frame.width,
+            frame.height,
+            metadata.valid.x0 + frame.first_sample_x,
+            metadata.valid.z0 + frame.first_sample_z,
+            frame.spacing_x,
+            frame.spacing_z};
+  }
+  const double to_x = source.spacing_x / source.crs_spacing_x;
+  const double to_z = source.spacing_z / source.crs_spacing_y;
+  return {other.width,
+          other.height,
+          source.first_sample_x + (place.origin_x - *source.origin_x) * to_x,
+          source.first_sample_z + (*source.origin_y - place.origin_y) * to_z,
+          place.spacing_x * to_x,
+          place.spacing_y * to_z};
+}
+
+}  // namespace isohf::cli

@@ -1,0 +1,84 @@
+#include "isohf/convert/residual_stage.h"
+
+#include <oneapi/tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "isohf/archive/content_hash.h"
+#include "isohf/archive/deflate.h"
+#include "isohf/base/error.h"
+
+namespace isohf {
+namespace {
+
+/// Samples of one residual member: enough for its tables, few enough for many to be made side by side.
+constexpr std::int64_t kSamplesPerMember = std::int64_t{1} << 19U;
+constexpr std::size_t kMembersAtOnce = 8;
+
+/// Some rows of the source on their way into a member.
+struct ResidualBand {
+  std::int64_t first_row = 0;
+  std::vector<std::byte> raw;
+  std::vector<double> predicted;
+  std::vector<std::byte> deflated;
+  std::size_t payload_bytes = 0;
+  std::uint32_t payload_crc32 = 0;
+
+  void encode(const SourceInfo& info, const SampleMapping& mapping) {
+    std::vector<float> heights(predicted.size());
+    heights_from_samples(info, 0.0, raw, heights);
+    std::vector<char> voids(heights.size());
+    std::transform(heights.begin(), heights.end(), voids.begin(), [](float h) { return std::isnan(h) ? 1 : 0; });
+    const std::vector<std::byte> payload = encode_residuals(mapping, info.width, raw, voids, predicted);
+    deflated = deflate_bytes(payload);
+    payload_bytes = payload.size();
+    payload_crc32 = crc32(payload);
+  }
+};
+
+}  // namespace
+
+LosslessRecord write_residuals(HeightSource& source, const SourceFrame& frame, const TileGrid& grid,
+                               const Quantisation& quantisation, ArchiveWriter& writer,
+                               const std::function<void(std::int64_t)>& progress, const std::atomic<bool>& cancel) {
+  const SourceInfo& info = source.info();
+  LosslessRecord record;
+  record.mapping = {info.sample_type, info.z_scale, info.z_offset};
+  record.width = info.width;
+  record.height = info.height;
+  record.void_values = info.void_values;
+  record.rows_per_member = std::clamp<std::int64_t>(kSamplesPerMember / info.width, 8, info.height + 8);
+  writer.flush_tiles();
+  SurfaceRows surface(
+      grid, quantisation, [&](TileIndex tile) { return writer.read_tile(tile, quantisation); },
+      {frame.width, frame.height, frame.first_sample_x, frame.first_sample_z, frame.spacing_x, frame.spacing_z},
+      record.method);
+  Sha256 hash;
+  for (std::int64_t row = 0; row < info.height;) {
+    std::vector<ResidualBand> bands;
+    for (; row < info.height && bands.size() < kMembersAtOnce; row += record.rows_per_member) {
+      if (cancel.load(std::memory_order_relaxed)) throw Error(ErrorCode::kCancelled, "interrupted");
+      ResidualBand& band = bands.emplace_back();
+      const std::int64_t rows = std::min(record.rows_per_member, info.height - row);
+      band.first_row = row;
+      band.predicted.resize(static_cast<std::size_t>(rows * info.width));
+      band.raw.resize(band.predicted.size() * size_bytes(info.sample_type));
+      source.read_window({0, row, info.width, rows}, band.raw);
+      hash.add(band.raw);
+      surface.read(row, rows, band.predicted);
+    }
+    oneapi::tbb::parallel_for(std::size_t{0}, bands.size(),
+                              [&](std::size_t i) { bands[i].encode(info, record.mapping); });
+    for (const ResidualBand& band : bands) {
+      writer.add_deflated_member(residual_name(band.first_row), band.deflated, band.payload_bytes, band.payload_crc32);
+      record.residual_bytes += band.deflated.size();
+    }
+    progress(std::min(row, info.height));
+  }
+  record.sha256 = hex(hash.finish());
+  return record;
+}
+
+}  // namespace isohf

@@ -1,0 +1,23 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+
+#include "isohf/archive/writer.h"
+#include "isohf/convert/plan.h"
+#include "isohf/restore/lossless.h"
+#include "isohf/surface/height_source.h"
+
+namespace isohf {
+
+/// Writes the residual members: reads all tiles back from the writer, predicts every source sample from them and keeps
+/// the difference. All tiles have been added, no member of that name. Reads the source once more from North to South;
+/// memory is bounded by two rows of tiles and a few bands of source rows. Works on the caller's oneTBB arena; the bytes
+/// do not depend on it. `progress` is told the source rows done; `cancel` is polled between bands.
+[[nodiscard]] LosslessRecord write_residuals(HeightSource& source, const SourceFrame& frame, const TileGrid& grid,
+                                             const Quantisation& quantisation, ArchiveWriter& writer,
+                                             const std::function<void(std::int64_t)>& progress,
+                                             const std::atomic<bool>& cancel);
+
+}  // namespace isohf

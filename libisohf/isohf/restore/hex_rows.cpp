@@ -1,0 +1,178 @@
+#include "isohf/restore/hex_rows.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "isohf/surface/kernels.h"
+
+namespace isohf {
+namespace {
+
+/// Poles of the quintic B-spline's inverse: z + 1/z = -13 +- sqrt(105) (from z^2 + 26 z + 66 + 26/z + 1/z^2).
+struct Poles {
+  std::array<double, 2> z;
+  Poles() : z{} {
+    const double root = std::sqrt(105.0);
+    const std::array<double, 2> sums = {-13.0 + root, -13.0 - root};
+    for (std::size_t i = 0; i < 2; ++i) z[i] = (sums[i] + std::sqrt(sums[i] * sums[i] - 4.0)) / 2.0;
+  }
+};
+
+const Poles& poles() {
+  static const Poles found;
+  return found;
+}
+
+/// Impulse response of the prefilter at 0, 1, ...: residues of 120 z^2 / ((z-z1)(z-1/z1)(z-z2)(z-1/z2)) z^(k-1).
+std::array<double, QuinticResponse::kHalo + 1> make_inverse() {
+  const auto& z = poles().z;
+  std::array<double, QuinticResponse::kHalo + 1> taps{};
+  for (std::size_t i = 0; i < 2; ++i) {
+    const double a = z[i];
+    const double b = z[1 - i];
+    double term = 120.0 * a / ((a - 1.0 / a) * (a - b) * (a - 1.0 / b));
+    for (double& tap : taps) {
+      tap += term;
+      term *= a;
+    }
+  }
+  return taps;
+}
+
+double beta5(double x) {
+  const double a = std::abs(x);
+  if (a < 1.0) return 0.55 + a * a * (-0.5 + a * a * (0.25 - a / 12.0));
+  if (a < 2.0) return 0.425 + a * (0.625 + a * (-1.75 + a * (1.25 + a * (-0.375 + a / 24.0))));
+  const double rest = std::max(3.0 - a, 0.0);
+  return rest * rest * rest * rest * rest / 120.0;
+}
+
+/// Fills voids between two valid samples along the straight line, beyond the outermost with its value. False where
+/// there is no valid one.
+bool fill_voids(std::span<double> line) {
+  const auto count = static_cast<std::int64_t>(line.size());
+  std::int64_t before = -1;
+  for (std::int64_t i = 0; i <= count; ++i) {
+    if (i < count && std::isnan(line[static_cast<std::size_t>(i)])) continue;
+    if (i == count && before < 0) return false;
+    for (std::int64_t k = before + 1; k < i; ++k) {
+      double& hole = line[static_cast<std::size_t>(k)];
+      if (before < 0) {
+        hole = line[static_cast<std::size_t>(i)];
+      } else if (i == count) {
+        hole = line[static_cast<std::size_t>(before)];
+      } else {
+        const double share = static_cast<double>(k - before) / static_cast<double>(i - before);
+        hole = line[static_cast<std::size_t>(before)] * (1.0 - share) + line[static_cast<std::size_t>(i)] * share;
+      }
+    }
+    before = i;
+  }
+  return true;
+}
+
+}  // namespace
+
+QuinticWeights quintic_weights(double u) {
+  QuinticWeights at{static_cast<std::int64_t>(std::floor(u)) - 2, {}};
+  for (std::size_t i = 0; i < at.weights.size(); ++i) {
+    at.weights[i] = beta5(u - static_cast<double>(at.first + static_cast<std::int64_t>(i)));
+  }
+  return at;
+}
+
+QuinticResponse quintic_response(double u) {
+  static const auto inverse = make_inverse();
+  const QuinticWeights spline = quintic_weights(u);
+  QuinticResponse response{spline.first - QuinticResponse::kHalo, {}};
+  for (int t = 0; t < 6; ++t) {
+    for (int k = -QuinticResponse::kHalo; k <= QuinticResponse::kHalo; ++k) {
+      response.weights[static_cast<std::size_t>(t + k + QuinticResponse::kHalo)] +=
+          spline.weights[static_cast<std::size_t>(t)] * inverse[static_cast<std::size_t>(std::abs(k))];
+    }
+  }
+  return response;
+}
+
+void quintic_prefilter(std::span<double> line) {
+  constexpr std::int64_t kStart = 40;  // 0.4306^40 < 1e-14
+  const auto count = static_cast<std::int64_t>(line.size());
+  if (count < 2) return;
+  for (const double z : poles().z) {
+    double start = 0.0;
+    double power = 1.0;
+    for (std::int64_t k = 0; k < kStart; ++k) {
+      start += power * line[static_cast<std::size_t>(mirror_index(k, count))];
+      power *= z;
+    }
+    line[0] = start;
+    for (std::size_t i = 1; i < line.size(); ++i) line[i] += z * line[i - 1];
+    const std::size_t last = line.size() - 1;
+    line[last] = z / (z * z - 1.0) * (line[last] + z * line[last - 1]);
+    for (std::size_t i = last; i-- > 0;) line[i] = z * (line[i + 1] - line[i]);
+  }
+  for (double& value : line) value *= 120.0;
+}
+
+HexRows::HexRows(const TileGrid& grid, std::vector<double> columns_x) : grid_(grid) {
+  // Even k are odd z, with vertices at object-space x = -1, 1, ...; odd k have them at -2, 0, ...
+  for (const double x : columns_x) {
+    const double half_steps = x / grid.sigma_x();
+    taps_[0].push_back(quintic_weights((half_steps + 1.0) / 2.0));
+    taps_[1].push_back(quintic_weights((half_steps + 2.0) / 2.0));
+  }
+}
+
+std::int64_t HexRows::tile_row_of(std::int64_t row) const {
+  return std::clamp<std::int64_t>((row - 1) / grid_.shape().cell_rows(), 0, grid_.tile_rows() - 1);
+}
+
+bool HexRows::straighten(std::int64_t row, const std::vector<std::vector<double>>& tiles, std::span<double> heights,
+                         std::span<char> near_void) const {
+  const std::int64_t columns = grid_.shape().columns();
+  const std::int64_t cells = grid_.shape().cell_columns();
+  const std::int64_t r = row - tile_row_of(row) * grid_.shape().cell_rows();
+  const bool shifted = r % 2 == 0;
+  std::vector<double> line(static_cast<std::size_t>(cells * grid_.tile_columns() + (shifted ? 2 : 3)));
+  for (std::size_t t = 0; t < tiles.size(); ++t) {
+    const double* from = tiles[t].data() + r * columns;
+    double* to = line.data() + static_cast<std::int64_t>(t) * cells;
+    if (shifted) {
+      to[0] = from[0];
+      std::copy(from + 2, from + columns - 2, to + 1);
+      to[cells + 1] = from[columns - 1];
+    } else {
+      std::copy(from, from + columns - 1, to);
+    }
+  }
+  std::vector<char> voids;
+  if (std::any_of(line.begin(), line.end(), [](double h) { return std::isnan(h); })) {
+    for (const double height : line) voids.push_back(std::isnan(height) ? 1 : 0);
+    if (!fill_voids(line)) {
+      std::fill(heights.begin(), heights.end(), 0.0);
+      std::fill(near_void.begin(), near_void.end(), char{1});
+      return true;
+    }
+  }
+  quintic_prefilter(line);
+  const auto count = static_cast<std::int64_t>(line.size());
+  const std::vector<QuinticWeights>& taps = taps_[shifted ? 0 : 1];
+  bool any = false;
+  for (std::size_t c = 0; c < heights.size(); ++c) {
+    const QuinticWeights& at = taps[c];
+    const bool inside = at.first >= 0 && at.first + 6 <= count;
+    double sum = 0.0;
+    char near = 0;
+    for (std::int64_t i = 0; i < 6; ++i) {
+      const auto place = static_cast<std::size_t>(inside ? at.first + i : mirror_index(at.first + i, count));
+      sum += at.weights[static_cast<std::size_t>(i)] * line[place];
+      if (!voids.empty()) near = static_cast<char>(near | voids[place]);
+    }
+    heights[c] = sum;
+    near_void[c] = near;
+    any = any || near != 0;
+  }
+  return any;
+}
+
+}  // namespace isohf

@@ -1,0 +1,113 @@
+#include "isohf/restore/lossless.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "isohf/base/error.h"
+
+namespace isohf {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// JSON has no numbers that are not finite.
+Json json_from(double value) {
+  if (std::isfinite(value)) return value;
+  return std::isnan(value) ? "nan" : (value > 0.0 ? "inf" : "-inf");
+}
+
+double number_from(const Json& json) {
+  if (!json.is_string()) return json.get<double>();
+  const auto text = json.get<std::string>();
+  if (text == "nan") return std::nan("");
+  if (text == "inf" || text == "-inf") return text == "inf" ? HUGE_VAL : -HUGE_VAL;
+  throw Error(ErrorCode::kCorrupt, "metadata: lossless: \"" + text + "\" is no number");
+}
+
+void check(const LosslessRecord& record, const Metadata& metadata) {
+  const bool fits = record.width == metadata.source.width && record.height == metadata.source.height &&
+                    record.width >= 1 && record.height >= 1 && record.rows_per_member >= 1 &&
+                    record.rows_per_member <= (std::int64_t{1} << 26U) / record.width + 16 &&
+                    std::isfinite(record.mapping.z_offset) && std::isfinite(record.mapping.z_scale) &&
+                    record.mapping.z_scale != 0.0;
+  if (!fits) throw Error(ErrorCode::kCorrupt, "metadata: lossless does not fit the source's record");
+}
+
+}  // namespace
+
+std::string format_lossless(const LosslessRecord& record) {
+  Json voids = Json::array();
+  for (const double value : record.void_values) voids.push_back(json_from(value));
+  const Json json = {{"sample_type", to_string(record.mapping.type)},
+                     {"width", record.width},
+                     {"height", record.height},
+                     {"z_scale", record.mapping.z_scale},
+                     {"z_offset", record.mapping.z_offset},
+                     {"void_values", voids},
+                     {"prediction", to_string(record.method)},
+                     {"rows_per_member", record.rows_per_member},
+                     {"residual_bytes", record.residual_bytes},
+                     {"sha256", record.sha256}};
+  return json.dump();
+}
+
+std::optional<LosslessRecord> lossless_record(const Metadata& metadata) {
+  const auto found = std::find_if(metadata.extensions.begin(), metadata.extensions.end(),
+                                  [](const auto& extension) { return extension.first == kLosslessName; });
+  if (found == metadata.extensions.end()) return std::nullopt;
+  LosslessRecord record;
+  try {
+    const Json json = Json::parse(found->second);
+    record.mapping = {sample_type_from_string(json.at("sample_type").get<std::string>()),
+                      json.at("z_scale").get<double>(), json.at("z_offset").get<double>()};
+    record.width = json.at("width").get<std::int64_t>();
+    record.height = json.at("height").get<std::int64_t>();
+    for (const Json& value : json.at("void_values")) record.void_values.push_back(number_from(value));
+    record.method = restore_method_from_string(json.at("prediction").get<std::string>());
+    record.rows_per_member = json.at("rows_per_member").get<std::int64_t>();
+    record.residual_bytes = json.at("residual_bytes").get<std::uint64_t>();
+    record.sha256 = json.at("sha256").get<std::string>();
+  } catch (const nlohmann::json::exception& error) {
+    throw Error(ErrorCode::kCorrupt, fmt::format("metadata: lossless: {}", error.what()));
+  } catch (const Error& error) {
+    throw Error(ErrorCode::kCorrupt, fmt::format("metadata: lossless: {}", error.what()));
+  }
+  check(record, metadata);
+  return record;
+}
+
+std::string residual_name(std::int64_t first_row) {
+  return fmt::format("residual/{:08}", first_row);
+}
+
+LosslessReader::LosslessReader(const ArchiveReader& archive, const LosslessRecord& record)
+    : archive_(archive),
+      record_(record),
+      surface_(
+          archive.grid(), archive.metadata().quantisation,
+          [&archive](TileIndex tile) { return archive.read_tile(tile); }, source_grid(archive.metadata().source),
+          record.method) {}
+
+std::vector<std::byte> LosslessReader::read_next() {
+  const std::int64_t rows = std::min(record_.rows_per_member, record_.height - next_row_);
+  const std::string name = residual_name(next_row_);
+  const auto payload = archive_.read_member(name);
+  if (!payload) {
+    throw Error(ErrorCode::kCorrupt, fmt::format("{}: member \"{}\" is missing", archive_.path(), name));
+  }
+  std::vector<double> predicted(static_cast<std::size_t>(rows * record_.width));
+  surface_.read(next_row_, rows, predicted);
+  std::vector<std::byte> raw(predicted.size() * size_bytes(record_.mapping.type));
+  try {
+    decode_residuals(record_.mapping, record_.width, *payload, predicted, raw);
+  } catch (const Error& error) {
+    throw error.within(fmt::format("{}: member \"{}\"", archive_.path(), name));
+  }
+  next_row_ += rows;
+  return raw;
+}
+
+}  // namespace isohf

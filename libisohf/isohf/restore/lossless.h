@@ -1,0 +1,53 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "isohf/archive/reader.h"
+#include "isohf/restore/residual_codec.h"
+#include "isohf/restore/surface_rows.h"
+
+namespace isohf {
+
+/// The metadata's "lossless" member: what is needed beside the residual members to have the source's samples again.
+struct LosslessRecord {
+  SampleMapping mapping;
+  std::int64_t width = 0;
+  std::int64_t height = 0;
+  RestoreMethod method = RestoreMethod::kHex;  ///< how samples are predicted
+  std::int64_t rows_per_member = 0;
+  std::vector<double> void_values;   ///< as SourceInfo has them
+  std::uint64_t residual_bytes = 0;  ///< of all residual members, compressed
+  std::string sha256;                ///< over all raw samples, little-endian, row by row
+};
+
+inline constexpr const char* kLosslessName = "lossless";
+
+/// The member's JSON text, and back; nullopt where the archive has no residuals. Throws Error{kCorrupt}.
+[[nodiscard]] std::string format_lossless(const LosslessRecord& record);
+[[nodiscard]] std::optional<LosslessRecord> lossless_record(const Metadata& metadata);
+
+/// "residual/00000000": the member that starts with source row `first_row`.
+[[nodiscard]] std::string residual_name(std::int64_t first_row);
+
+/// The source's own samples out of an archive with residuals, from its first row to its last.
+class LosslessReader {
+ public:
+  /// Throws Error{kCorrupt} where the record does not fit the rest of the metadata.
+  LosslessReader(const ArchiveReader& archive, const LosslessRecord& record);
+
+  [[nodiscard]] bool at_end() const { return next_row_ == record_.height; }
+  /// The rows of the next member, in the source's sample type. Throws Error{kCorrupt} naming the member.
+  [[nodiscard]] std::vector<std::byte> read_next();
+
+ private:
+  const ArchiveReader& archive_;
+  LosslessRecord record_;
+  SurfaceRows surface_;
+  std::int64_t next_row_ = 0;
+};
+
+}  // namespace isohf

@@ -1,0 +1,301 @@
+#include "isohf/restore/residual_codec.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <type_traits>
+
+#include "isohf/base/assert.h"
+#include "isohf/base/bytes.h"
+
+namespace isohf {
+namespace {
+
+constexpr std::size_t kContexts = 8;
+
+/// Stream of a residual from the bits of its two neighbours, West and North.
+std::size_t context_of(unsigned west_bits, unsigned north_bits) {
+  const unsigned sum = west_bits + north_bits;
+  constexpr std::array<unsigned, kContexts - 1> kLimits = {1, 3, 5, 7, 9, 12, 18};
+  std::size_t context = 0;
+  while (context < kLimits.size() && sum > kLimits[context]) ++context;
+  return context;
+}
+
+/// Nearest half-precision value, ties away from zero; the maximum where the number is larger.
+std::uint16_t half_from_double(double value) {
+  const std::uint16_t sign = std::signbit(value) ? 0x8000U : 0U;
+  const double size = std::abs(value);
+  if (size >= 65504.0) return static_cast<std::uint16_t>(sign | 0x7BFFU);
+  int exponent = size > 0.0 ? std::ilogb(size) : -15;
+  exponent = std::max(exponent, -14);
+  const double steps = std::floor(std::ldexp(size, 10 - exponent) + 0.5);  // 2^10 to 2^11, less where subnormal
+  const auto bits = static_cast<unsigned>(steps) + (static_cast<unsigned>(exponent + 14) << 10U);
+  return static_cast<std::uint16_t>(sign | bits);
+}
+
+template <typename Bits>
+Bits ordered(Bits bits) {
+  constexpr Bits kSign = static_cast<Bits>(Bits{1} << (sizeof(Bits) * 8 - 1));
+  return (bits & kSign) != 0 ? static_cast<Bits>(~bits) : static_cast<Bits>(bits | kSign);
+}
+template <typename Bits>
+Bits unordered(Bits key) {
+  constexpr Bits kSign = static_cast<Bits>(Bits{1} << (sizeof(Bits) * 8 - 1));
+  return (key & kSign) != 0 ? static_cast<Bits>(key & ~kSign) : static_cast<Bits>(~key);
+}
+
+/// An integer sample type: bits are their own key, differences wrap.
+template <typename T>
+struct Integer {
+  using Bits = std::make_unsigned_t<T>;
+  static Bits key(Bits bits) { return bits; }
+  static Bits bits(Bits key) { return key; }
+  static bool reaches(double raw) {
+    return raw >= static_cast<double>(std::numeric_limits<T>::min()) - 0.5 &&
+           raw < static_cast<double>(std::numeric_limits<T>::max()) + 0.5;
+  }
+  static Bits nearest(double raw) {
+    const double rounded = std::clamp(std::floor(raw + 0.5), static_cast<double>(std::numeric_limits<T>::min()),
+                                      static_cast<double>(std::numeric_limits<T>::max()));
+    return static_cast<Bits>(static_cast<T>(rounded));
+  }
+};
+
+struct Half {
+  using Bits = std::uint16_t;
+  static Bits key(Bits bits) { return ordered(bits); }
+  static Bits bits(Bits key) { return unordered(key); }
+  static bool reaches(double raw) { return std::abs(raw) < 65520.0; }
+  static Bits nearest(double raw) { return half_from_double(raw); }
+};
+
+template <typename T, typename B>
+struct Floating {
+  using Bits = B;
+  static Bits key(Bits bits) { return ordered(bits); }
+  static Bits bits(Bits key) { return unordered(key); }
+  static bool reaches(double raw) { return std::isfinite(static_cast<T>(raw)); }
+  static Bits nearest(double raw) {
+    constexpr auto kMost = static_cast<double>(std::numeric_limits<T>::max());
+    return std::bit_cast<Bits>(static_cast<T>(std::clamp(raw, -kMost, kMost)));
+  }
+};
+
+template <typename Action>
+auto with_type(SampleType type, Action action) {
+  switch (type) {
+    case SampleType::kUint8:
+      return action(Integer<std::uint8_t>());
+    case SampleType::kInt8:
+      return action(Integer<std::int8_t>());
+    case SampleType::kUint16:
+      return action(Integer<std::uint16_t>());
+    case SampleType::kInt16:
+      return action(Integer<std::int16_t>());
+    case SampleType::kUint32:
+      return action(Integer<std::uint32_t>());
+    case SampleType::kInt32:
+      return action(Integer<std::int32_t>());
+    case SampleType::kFloat16:
+      return action(Half());
+    case SampleType::kFloat32:
+      return action(Floating<float, std::uint32_t>());
+    case SampleType::kFloat64:
+      break;
+  }
+  return action(Floating<double, std::uint64_t>());
+}
+
+template <typename Bits>
+Bits load(const std::byte* at) {
+  Bits bits;
+  std::memcpy(&bits, at, sizeof(Bits));
+  return bits;
+}
+
+/// Residual 0, -1, 1, -2, ... as 0, 1, 2, 3, ...
+template <typename Bits>
+Bits fold(Bits difference) {
+  constexpr unsigned kLast = sizeof(Bits) * 8 - 1;
+  const auto negative = static_cast<Bits>(-static_cast<Bits>(difference >> kLast));
+  return static_cast<Bits>(static_cast<Bits>(difference << 1U) ^ negative);
+}
+template <typename Bits>
+Bits unfold(Bits folded) {
+  return static_cast<Bits>(static_cast<Bits>(folded >> 1U) ^ static_cast<Bits>(-static_cast<Bits>(folded & 1U)));
+}
+
+/// The bits of the residuals of a row and the one above: what contexts are made of.
+class Neighbours {
+ public:
+  explicit Neighbours(std::int64_t width) : bits_(static_cast<std::size_t>(width), 0) {}
+
+  [[nodiscard]] std::size_t context(std::size_t column) const {
+    return context_of(column == 0 ? bits_[0] : bits_[column - 1], bits_[column]);
+  }
+  template <typename Bits>
+  void set(std::size_t column, Bits folded) {
+    bits_[column] = static_cast<unsigned char>(std::bit_width(folded));
+  }
+
+ private:
+  std::vector<unsigned char> bits_;  ///< West of the place at hand this row's, from there on the row above's
+};
+
+[[noreturn]] void refuse(const char* what) {
+  throw Error(ErrorCode::kCorrupt, what);
+}
+
+template <typename Type>
+std::vector<std::byte> encode(const SampleMapping& mapping, std::int64_t width, std::span<const std::byte> raw,
+                              std::span<const char> is_void, std::span<const double> predicted) {
+  using Bits = typename Type::Bits;
+  std::array<std::vector<Bits>, kContexts> streams;
+  std::vector<Bits> kept;
+  std::vector<std::byte> mask((predicted.size() + 7) / 8);
+  Neighbours neighbours(width);
+  bool any_masked = false;
+  for (std::size_t i = 0; i < predicted.size(); ++i) {
+    const Bits bits = load<Bits>(raw.data() + i * sizeof(Bits));
+    if (std::isnan(predicted[i]) || is_void[i] != 0) {
+      kept.push_back(bits);
+      if (std::isnan(predicted[i])) continue;
+      mask[i / 8] |= std::byte{1} << (i % 8);
+      any_masked = true;
+      continue;
+    }
+    const Bits guess = Type::nearest((predicted[i] - mapping.z_offset) / mapping.z_scale);
+    const Bits folded = fold(static_cast<Bits>(Type::key(bits) - Type::key(guess)));
+    const std::size_t column = i % static_cast<std::size_t>(width);
+    streams[neighbours.context(column)].push_back(folded);
+    neighbours.set(column, folded);
+  }
+  std::vector<std::byte> payload;
+  ByteWriter out(payload);
+  out.write(static_cast<std::uint8_t>(any_masked ? 1 : 0));
+  for (const auto& stream : streams) out.write(static_cast<std::uint32_t>(stream.size()));
+  if (any_masked) out.write_bytes(mask);
+  out.write_bytes(std::as_bytes(std::span(kept)));
+  for (const auto& stream : streams) {
+    for (std::size_t plane = 0; plane < sizeof(Bits); ++plane) {
+      for (const Bits folded : stream) payload.push_back(static_cast<std::byte>((folded >> (8 * plane)) & 0xFFU));
+    }
+  }
+  return payload;
+}
+
+/// One context's residuals, read plane by plane.
+struct Stream {
+  std::span<const std::byte> bytes;
+  std::size_t count = 0;
+  std::size_t next = 0;
+
+  template <typename Bits>
+  Bits take() {
+    if (next == count) refuse("a stream of residuals ends early");
+    Bits folded = 0;
+    for (std::size_t plane = 0; plane < sizeof(Bits); ++plane) {
+      const auto byte = std::to_integer<Bits>(bytes[plane * count + next]);
+      folded = static_cast<Bits>(folded | static_cast<Bits>(byte << (8 * plane)));
+    }
+    ++next;
+    return folded;
+  }
+};
+
+template <typename Type>
+void decode(const SampleMapping& mapping, std::int64_t width, std::span<const std::byte> payload,
+            std::span<const double> predicted, std::span<std::byte> raw) {
+  using Bits = typename Type::Bits;
+  ByteReader in(payload);
+  const auto flags = in.read<std::uint8_t>();
+  if (flags > 1) refuse("residuals of a kind that this build does not know");
+  std::array<Stream, kContexts> streams;
+  std::size_t coded = 0;
+  for (Stream& stream : streams) {
+    stream.count = in.read<std::uint32_t>();
+    coded += stream.count;
+  }
+  if (coded > predicted.size()) refuse("more residuals than samples");
+  std::span<const std::byte> mask;
+  if (flags == 1) mask = in.read_bytes((predicted.size() + 7) / 8);
+  std::span<const std::byte> kept = in.read_bytes((predicted.size() - coded) * sizeof(Bits));
+  for (Stream& stream : streams) stream.bytes = in.read_bytes(stream.count * sizeof(Bits));
+  if (in.remaining() != 0) refuse("bytes behind the residuals");
+  Neighbours neighbours(width);
+  for (std::size_t i = 0; i < predicted.size(); ++i) {
+    Bits bits = 0;
+    const bool is_masked = !mask.empty() && (mask[i / 8] & (std::byte{1} << (i % 8))) != std::byte{0};
+    if (is_masked || std::isnan(predicted[i])) {
+      if (kept.empty()) refuse("fewer kept samples than there are places for");
+      bits = load<Bits>(kept.data());
+      kept = kept.subspan(sizeof(Bits));
+    } else {
+      const Bits guess = Type::nearest((predicted[i] - mapping.z_offset) / mapping.z_scale);
+      const std::size_t column = i % static_cast<std::size_t>(width);
+      const Bits folded = streams[neighbours.context(column)].template take<Bits>();
+      neighbours.set(column, folded);
+      bits = Type::bits(static_cast<Bits>(Type::key(guess) + unfold(folded)));
+    }
+    std::memcpy(raw.data() + i * sizeof(Bits), &bits, sizeof(Bits));
+  }
+  // As many samples as are kept and coded together: where all kept ones are used, so are all residuals.
+  if (!kept.empty()) refuse("more kept samples than there are places for");
+}
+
+}  // namespace
+
+bool store_sample(const SampleMapping& mapping, double elevation, std::byte* raw) {
+  return with_type(mapping.type, [&](auto type) {
+    using Type = decltype(type);
+    const double sample = (elevation - mapping.z_offset) / mapping.z_scale;
+    if (!Type::reaches(sample)) return false;
+    const typename Type::Bits bits = Type::nearest(sample);
+    std::memcpy(raw, &bits, sizeof(bits));
+    return true;
+  });
+}
+
+double load_sample(SampleType type, const std::byte* raw) {
+  switch (type) {
+    case SampleType::kUint8:
+      return load<std::uint8_t>(raw);
+    case SampleType::kInt8:
+      return load<std::int8_t>(raw);
+    case SampleType::kUint16:
+      return load<std::uint16_t>(raw);
+    case SampleType::kInt16:
+      return load<std::int16_t>(raw);
+    case SampleType::kUint32:
+      return load<std::uint32_t>(raw);
+    case SampleType::kInt32:
+      return load<std::int32_t>(raw);
+    case SampleType::kFloat16:
+      return double{float_from_half(load<std::uint16_t>(raw))};
+    case SampleType::kFloat32:
+      return double{load<float>(raw)};
+    case SampleType::kFloat64:
+      break;
+  }
+  return load<double>(raw);
+}
+
+std::vector<std::byte> encode_residuals(const SampleMapping& mapping, std::int64_t width,
+                                        std::span<const std::byte> raw, std::span<const char> is_void,
+                                        std::span<const double> predicted) {
+  ISOHF_ASSERT(raw.size() == predicted.size() * size_bytes(mapping.type) && is_void.size() == predicted.size());
+  return with_type(mapping.type,
+                   [&](auto type) { return encode<decltype(type)>(mapping, width, raw, is_void, predicted); });
+}
+
+void decode_residuals(const SampleMapping& mapping, std::int64_t width, std::span<const std::byte> payload,
+                      std::span<const double> predicted, std::span<std::byte> raw) {
+  ISOHF_ASSERT(raw.size() == predicted.size() * size_bytes(mapping.type));
+  with_type(mapping.type, [&](auto type) { decode<decltype(type)>(mapping, width, payload, predicted, raw); });
+}
+
+}  // namespace isohf

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "isohf/surface/heightmap.h"
+
+/// Source samples as what is left after predicting them from the archive's surface (docs/archive_format.md, residuals).
+///
+/// A sample and its prediction are mapped to unsigned integers in the order of their values; the residual is the
+/// difference modulo 2^bits, folded so that small ones of both signs are small. Residuals are sorted into streams by
+/// the size of the two before them (West and North), their bytes into planes. Samples without an elevation, and those
+/// where the surface has none, are kept as they are.
+
+namespace isohf {
+
+/// How raw samples and elevations go together: elevation = raw * z_scale + z_offset.
+struct SampleMapping {
+  SampleType type = SampleType::kFloat32;
+  double z_scale = 1.0;
+  double z_offset = 0.0;
+};
+
+/// The raw sample nearest to an elevation, as `size_bytes(type)` bytes at `raw`; ties upwards. False, and nothing
+/// written, where the type does not reach that far. `elevation` is not NaN.
+bool store_sample(const SampleMapping& mapping, double elevation, std::byte* raw);
+
+/// The number that a raw sample is; exact.
+[[nodiscard]] double load_sample(SampleType type, const std::byte* raw);
+
+/// Codes whole rows. raw [n] source samples, little-endian   predicted [n] elevations, NaN where there is none
+/// is_void [n]  1 where the source sample is no elevation   width  samples a row
+[[nodiscard]] std::vector<std::byte> encode_residuals(const SampleMapping& mapping, std::int64_t width,
+                                                      std::span<const std::byte> raw, std::span<const char> is_void,
+                                                      std::span<const double> predicted);
+
+/// The samples again: raw [n] out. Throws Error{kCorrupt} for whatever does not fill them exactly.
+void decode_residuals(const SampleMapping& mapping, std::int64_t width, std::span<const std::byte> payload,
+                      std::span<const double> predicted, std::span<std::byte> raw);
+
+}  // namespace isohf
