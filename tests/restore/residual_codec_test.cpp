@@ -1,0 +1,107 @@
+#include "isohf/restore/residual_codec.h"
+
+#include <gtest/gtest.h>
+
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "isohf/base/error.h"
+
+namespace isohf {
+namespace {
+
+constexpr SampleType kTypes[] = {SampleType::kUint8,   SampleType::kInt8,    SampleType::kUint16,
+                                 SampleType::kInt16,   SampleType::kUint32,  SampleType::kInt32,
+                                 SampleType::kFloat16, SampleType::kFloat32, SampleType::kFloat64};
+
+struct Samples {
+  std::vector<std::byte> raw;
+  std::vector<char> voids;
+  std::vector<double> predicted;
+};
+
+/// Any bits at all, predictions from near to absurd, voids on both sides.
+Samples random_samples(SampleType type, std::size_t count, std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  Samples samples;
+  for (std::size_t i = 0; i < count * size_bytes(type); ++i) samples.raw.push_back(static_cast<std::byte>(random()));
+  for (std::size_t i = 0; i < count; ++i) {
+    const double value = load_sample(type, samples.raw.data() + i * size_bytes(type));
+    samples.voids.push_back(!std::isfinite(value) || random() % 16 == 0 ? 1 : 0);
+    const double offsets[] = {0.0, 1.0, -3.5, 1e30, -1e300};
+    const bool none = random() % 16 == 0 || !std::isfinite(value);
+    samples.predicted.push_back(none ? std::nan("") : value + offsets[random() % 5]);
+  }
+  return samples;
+}
+
+TEST(ResidualCodec, ReturnsAnyBitsOfAnyType) {
+  for (const SampleType type : kTypes) {
+    for (const std::size_t rows : {1U, 2U, 7U}) {
+      const std::int64_t width = 13;
+      const Samples s = random_samples(type, rows * 13, 7 * rows);
+      const SampleMapping mapping{type, 0.5, -3.0};
+      const auto payload = encode_residuals(mapping, width, s.raw, s.voids, s.predicted);
+      std::vector<std::byte> back(s.raw.size());
+      decode_residuals(mapping, width, payload, s.predicted, back);
+      EXPECT_EQ(back, s.raw) << to_string(type) << " rows " << rows;
+    }
+  }
+}
+
+TEST(ResidualCodec, RefusesEveryTruncationAndAnExtraByte) {
+  const SampleMapping mapping{SampleType::kInt16, 1.0, 0.0};
+  const Samples s = random_samples(SampleType::kInt16, 60, 3);
+  std::vector<std::byte> payload = encode_residuals(mapping, 10, s.raw, s.voids, s.predicted);
+  std::vector<std::byte> back(s.raw.size());
+  for (std::size_t size = 0; size < payload.size(); ++size) {
+    EXPECT_THROW(decode_residuals(mapping, 10, std::span(payload).first(size), s.predicted, back), Error) << size;
+  }
+  payload.push_back(std::byte{0});
+  EXPECT_THROW(decode_residuals(mapping, 10, payload, s.predicted, back), Error);
+}
+
+TEST(ResidualCodec, DamagedBytesAreRefusedOrGiveOtherSamples) {
+  const SampleMapping mapping{SampleType::kFloat32, 1.0, 0.0};
+  const Samples s = random_samples(SampleType::kFloat32, 60, 4);
+  const std::vector<std::byte> payload = encode_residuals(mapping, 10, s.raw, s.voids, s.predicted);
+  std::vector<std::byte> back(s.raw.size());
+  for (std::size_t i = 0; i < payload.size(); ++i) {
+    for (const unsigned change : {1U, 128U, 255U}) {
+      std::vector<std::byte> damaged = payload;
+      damaged[i] ^= static_cast<std::byte>(change);
+      try {
+        decode_residuals(mapping, 10, damaged, s.predicted, back);
+      } catch (const Error& error) {
+        EXPECT_EQ(error.code(), ErrorCode::kCorrupt);
+      }
+    }
+  }
+}
+
+TEST(StoreSample, GivesEveryHalfBack) {
+  for (unsigned bits = 0; bits < 0x10000U; ++bits) {
+    const auto half = static_cast<std::uint16_t>(bits);
+    const float value = float_from_half(half);
+    if (!std::isfinite(value)) continue;
+    std::uint16_t back = 0;
+    ASSERT_TRUE(store_sample({SampleType::kFloat16, 1.0, 0.0}, double{value}, reinterpret_cast<std::byte*>(&back)));
+    ASSERT_EQ(back, half) << value;
+  }
+}
+
+TEST(StoreSample, RoundsToTheNearestAndRefusesWhatIsOutOfReach) {
+  std::uint8_t byte = 0;
+  auto* const at = reinterpret_cast<std::byte*>(&byte);
+  EXPECT_TRUE(store_sample({SampleType::kUint8, 2.0, 10.0}, 15.0, at));
+  EXPECT_EQ(byte, 3);  // 2.5, a tie, upwards
+  EXPECT_TRUE(store_sample({SampleType::kUint8, 1.0, 0.0}, -0.5, at));
+  EXPECT_EQ(byte, 0);
+  EXPECT_FALSE(store_sample({SampleType::kUint8, 1.0, 0.0}, -0.6, at));
+  EXPECT_FALSE(store_sample({SampleType::kUint8, 1.0, 0.0}, 255.5, at));
+}
+
+}  // namespace
+}  // namespace isohf
