@@ -121,7 +121,8 @@ TEST(SurfaceRows, BothMethodsAreVoidAtTheSamePlacesAndNoVoidLeaks) {
   for (std::size_t i = 0; i < spline.size(); ++i) {
     ASSERT_EQ(std::isnan(spline[i]), std::isnan(triangles[i])) << i;
     voids += std::isnan(spline[i]) ? 1 : 0;
-    if (!std::isnan(spline[i])) EXPECT_NEAR(spline[i], 1000.0, 1e-6) << i;
+    if (std::isnan(spline[i])) continue;
+    EXPECT_NEAR(spline[i], 1000.0, 1e-6) << i;
   }
   EXPECT_GT(voids, 10);
 }
