@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <libdeflate.h>
+#include <zlib.h>
 
 #include <algorithm>
 #include <cstring>
@@ -416,6 +417,21 @@ void inflate_exactly(std::span<const std::byte> deflated, std::span<std::byte> o
     throw Error(ErrorCode::kCorrupt,
                 fmt::format("its Deflate stream ends after {} of {} bytes", used, deflated.size()));
   }
+}
+
+bool zlib_inflates_to(std::span<const std::byte> deflated, std::span<const std::byte> expected) {
+  std::vector<std::byte> out(expected.size() + 1);  // one to spare, so that a longer stream shows
+  z_stream stream{};
+  if (inflateInit2(&stream, -MAX_WBITS) != Z_OK) throw Error(ErrorCode::kOutOfMemory, "no memory for zlib");
+  // Tiles and members are far below 4 GiB; zlib reads through a pointer that it does not declare constant.
+  stream.next_in = reinterpret_cast<Bytef*>(const_cast<std::byte*>(deflated.data()));
+  stream.avail_in = static_cast<uInt>(deflated.size());
+  stream.next_out = reinterpret_cast<Bytef*>(out.data());
+  stream.avail_out = static_cast<uInt>(out.size());
+  const int result = inflate(&stream, Z_FINISH);
+  const bool whole = result == Z_STREAM_END && stream.avail_in == 0 && stream.total_out == expected.size();
+  inflateEnd(&stream);
+  return whole && std::equal(expected.begin(), expected.end(), out.begin());
 }
 
 std::uint32_t crc32(std::span<const std::byte> bytes, std::uint32_t seed) {

@@ -60,6 +60,10 @@ void build_code_lengths(std::span<const std::uint32_t> frequencies, unsigned lim
 /// Thread-safe.
 void inflate_exactly(std::span<const std::byte> deflated, std::span<std::byte> out);
 
+/// Inflates with zlib, the reference that every archive must satisfy: true where it makes exactly `expected`.
+/// libdeflate is laxer about code tables that zlib calls invalid.
+[[nodiscard]] bool zlib_inflates_to(std::span<const std::byte> deflated, std::span<const std::byte> expected);
+
 /// CRC-32 as ZIP has it; `seed` continues an earlier one.
 [[nodiscard]] std::uint32_t crc32(std::span<const std::byte> bytes, std::uint32_t seed = 0);
 

@@ -331,6 +331,12 @@ TileCodes ArchiveReader::read_tile(TileIndex tile) const {
   }
 }
 
+bool ArchiveReader::zlib_reads(TileIndex tile) const {
+  const TileEntry entry = tile_entry(tile);
+  if (!entry.stored || state_->by_directory) return true;  // zipped again by another program: not our stream
+  return zlib_inflates_to(state_->file.subspan(entry.offset_bytes, entry.compressed_bytes), state_->payload(entry, tile));
+}
+
 std::vector<double> ArchiveReader::read_elevations(TileIndex tile) const {
   const TileCodes codes = read_tile(tile);
   if (codes.type == CodeType::kF32) return {codes.heights.begin(), codes.heights.end()};

@@ -64,6 +64,10 @@ class ArchiveReader {
   [[nodiscard]] TileEntry tile_entry(TileIndex tile) const;
   [[nodiscard]] const std::vector<MemberEntry>& members() const;  ///< all but the tiles, in file order
 
+  /// True where zlib inflates the tile's member to the same payload; tiles that are not stored need nothing inflated.
+  /// Throws Error{kCorrupt} like read_tile.
+  [[nodiscard]] bool zlib_reads(TileIndex tile) const;
+
   /// Decodes one tile; a tile that is not stored comes back wholly void. Throws Error{kCorrupt} naming tile and byte.
   [[nodiscard]] TileCodes read_tile(TileIndex tile) const;
 

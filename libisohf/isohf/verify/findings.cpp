@@ -29,6 +29,7 @@ const std::vector<FindingKind>& finding_catalogue() {
       {finding::kSourceInvented, Severity::kError, "the archive has an elevation deep inside a void of the source"},
       {finding::kLossless, Severity::kError,
        "the residuals do not give the source's samples: one cannot be decoded, or their SHA-256 differs"},
+      {finding::kTileNotDeflate, Severity::kError, "zlib does not inflate a tile that a laxer decoder reads"},
   };
   return kinds;
 }

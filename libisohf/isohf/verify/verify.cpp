@@ -114,6 +114,9 @@ class Verification {
     tile.stored = entry.stored;
     try {
       tile.codes = archive_.read_tile(index);
+      if (!archive_.zlib_reads(index)) {
+        tile.findings.push_back(make(finding::kTileNotDeflate, index, "zlib does not inflate it to the same payload"));
+      }
     } catch (const Error& error) {
       tile.findings.push_back(make(finding::kTileUndecodable, index, error.what()));
       return;
