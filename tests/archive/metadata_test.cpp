@@ -115,6 +115,14 @@ TEST(Metadata, IgnoresBracketsInStrings) {
   EXPECT_EQ(parse_metadata(format_metadata(metadata)).source.crs_wkt, metadata.source.crs_wkt);
 }
 
+TEST(Metadata, AsksForRoomThatALongWktTakes) {
+  Metadata metadata = full();
+  EXPECT_EQ(metadata_room(metadata), 16384U);
+  metadata.source.crs_wkt = std::string(50000, 'x');
+  EXPECT_GT(metadata_room(metadata), 55000U);
+  EXPECT_LT(metadata_room(metadata), 65536U);
+}
+
 TEST(Metadata, RefusesAnExtensionWithANameOfTheFormat) {
   Metadata metadata = full();
   metadata.extensions = {{"source", "1"}};

@@ -328,6 +328,13 @@ std::string format_metadata(const Metadata& metadata) {
   return json.dump(1, ' ', false, Json::error_handler_t::replace);
 }
 
+std::uint32_t metadata_room(const Metadata& draft) {
+  constexpr std::size_t kLeast = 16384;
+  constexpr std::size_t kStillToCome = 8192;
+  const std::size_t wanted = (format_metadata(draft).size() + kStillToCome + 4095) / 4096 * 4096;
+  return static_cast<std::uint32_t>(std::clamp<std::size_t>(wanted, kLeast, kMaxMetadataBytes));
+}
+
 Metadata parse_metadata(const std::string& text) {
   const Json json = parse_json(text);
   const ObjectReader root(json, "");

@@ -9,6 +9,9 @@
 
 namespace isohf {
 
+/// Metadata of more bytes than this are refused.
+inline constexpr std::uint32_t kMaxMetadataBytes = 64U << 20U;
+
 /// How a tile stores one elevation: a 16- or 8-bit code, or a 32-bit float.
 enum class CodeType { kU16, kU8, kF32 };
 
@@ -101,6 +104,9 @@ struct Metadata {
 /// The metadata as JSON text (UTF-8, no trailing newline), and back. parse_metadata throws Error{kCorrupt} naming the
 /// member at fault, and Error{kUnsupported} for a format version that this build does not know.
 [[nodiscard]] std::string format_metadata(const Metadata& metadata);
+/// Room to set aside for these metadata (WriterOptions::metadata_bytes) while statistics, hash and extensions are yet
+/// to come: 16384 bytes, or as much more as a long WKT takes.
+[[nodiscard]] std::uint32_t metadata_room(const Metadata& draft);
 [[nodiscard]] Metadata parse_metadata(const std::string& json);
 
 }  // namespace isohf

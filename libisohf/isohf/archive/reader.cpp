@@ -17,8 +17,6 @@
 namespace isohf {
 namespace {
 
-constexpr std::uint64_t kMaxMetadataBytes = std::uint64_t{64} << 20U;
-
 /// The first entry of that name; nullopt where there is none.
 std::optional<ZipEntry> find_entry(std::span<const std::byte> file, const ZipEnd& end, std::string_view name) {
   std::optional<ZipEntry> found;

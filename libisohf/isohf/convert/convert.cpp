@@ -306,7 +306,9 @@ ConvertSummary convert(HeightSource& source, const std::string& output, const Co
   const oneapi::tbb::global_control workers(oneapi::tbb::global_control::max_allowed_parallelism,
                                             static_cast<std::size_t>(threads));
 
-  ArchiveWriter writer(output, plan.grid, {options.overwrite, options.resume, job_fingerprint(info, plan, options)});
+  ArchiveWriter writer(output, plan.grid,
+                       {options.overwrite, options.resume, job_fingerprint(info, plan, options),
+                        metadata_room(describe_job(info, plan, options, {}))});
   ConvertSummary summary(plan.grid);
   summary.warnings = info.warnings;
   const Kernel kernel = Kernel::make(filter_from_string(options.filter));
