@@ -332,7 +332,8 @@ TileCodes ArchiveReader::read_tile(TileIndex tile) const {
 bool ArchiveReader::zlib_reads(TileIndex tile) const {
   const TileEntry entry = tile_entry(tile);
   if (!entry.stored || state_->by_directory) return true;  // zipped again by another program: not our stream
-  return zlib_inflates_to(state_->file.subspan(entry.offset_bytes, entry.compressed_bytes), state_->payload(entry, tile));
+  return zlib_inflates_to(state_->file.subspan(entry.offset_bytes, entry.compressed_bytes),
+                          state_->payload(entry, tile));
 }
 
 std::vector<double> ArchiveReader::read_elevations(TileIndex tile) const {
