@@ -42,6 +42,11 @@ bool outside_view(const Mat4& clip, Vec3 low, Vec3 high) {
   return std::any_of(beyond.begin(), beyond.end(), [](int count) { return count == 8; });
 }
 
+/// From the eye, at the origin, to a box.
+double box_distance(Vec3 low, Vec3 high) {
+  return length({std::clamp(0.0, low.x, high.x), std::clamp(0.0, low.y, high.y), std::clamp(0.0, low.z, high.z)});
+}
+
 void set_cutting(bool on) {
   for (GLenum plane = GL_CLIP_DISTANCE0; plane < GL_CLIP_DISTANCE0 + 4; ++plane) {
     if (on) {
@@ -64,12 +69,13 @@ double focal_px(const ViewState& view) {
 
 }  // namespace
 
-TerrainFrame terrain_frame(const TileSource& source, const ViewState& view) {
+TerrainFrame terrain_frame(const TileSource& source, const ViewState& view, double nearest) {
   const TileGrid& grid = source.grid();
   const double aspect = static_cast<double>(view.width) / view.height;
   TerrainFrame frame;
+  const double near_distance = std::clamp(nearest, view.far_distance * kNearShare, 0.5 * view.far_distance);
   frame.clip_from_eye =
-      perspective(view.fov_y_rad, aspect, view.far_distance * kNearShare, view.far_distance) * look_along(view.forward);
+      perspective(view.fov_y_rad, aspect, near_distance, view.far_distance) * look_along(view.forward);
   frame.anchor_tile = grid.locate({view.eye.x, view.eye.z}).tile;
   frame.anchor = {static_cast<double>(frame.anchor_tile.column) * grid.extent_x() - view.eye.x,
                   source.scale().offset * view.exaggeration - view.eye.y,
@@ -160,7 +166,8 @@ std::vector<Renderer::Item> Renderer::visible_items(const ViewState& view, const
       }
       const bool is_cut = !view.beyond && reaches_beyond(grid, tile, source_.covered());
       const LodBlend blend = lod_blend(level_of(view, tile, bounds), grid.shape().levels());
-      items.push_back({tile, slot, is_cut, is_cut || bounds.has_voids, length(0.5 * (low + high)), blend});
+      items.push_back(
+          {tile, slot, is_cut, is_cut || bounds.has_voids, length(0.5 * (low + high)), box_distance(low, high), blend});
     }
   }
   std::sort(items.begin(), items.end(), [](const Item& a, const Item& b) { return a.distance < b.distance; });
@@ -287,9 +294,16 @@ void Renderer::draw_sky(const ViewState& view) const {
 FrameFigures Renderer::draw(const ViewState& view, std::int64_t first_column, std::int64_t last_column,
                             std::int64_t first_row, std::int64_t last_row, const ResidentTile& resident) {
   FrameFigures figures;
-  const TerrainFrame frame = terrain_frame(source_, view);
+  TerrainFrame frame = terrain_frame(source_, view);
   const std::vector<Item> items =
       visible_items(view, frame, {first_column, last_column, first_row, last_row}, resident, figures);
+  // Depth is fine only near the eye: begin it where the ground begins, or two meshes of one hill cannot be told apart.
+  double nearest = view.far_distance;
+  for (const Item& item : items) nearest = std::min(nearest, item.nearest);
+  // In the corners of the view depth is the least part of distance.
+  const double half_y = std::tan(view.fov_y_rad / 2.0);
+  const double half_x = half_y * view.width / view.height;
+  frame = terrain_frame(source_, view, 0.95 * nearest / std::sqrt(1.0 + half_x * half_x + half_y * half_y));
   glViewport(0, 0, view.width, view.height);
   glEnable(GL_DEPTH_TEST);
   glDepthFunc(GL_LESS);

@@ -43,6 +43,7 @@ class Renderer {
     bool is_cut;  ///< reaches beyond what the source covers
     bool is_rim;  ///< is cut, or has voids
     double distance;
+    double nearest;  ///< distance of the nearest point of the tile's box
     LodBlend blend;
   };
   struct Variants {
@@ -79,7 +80,8 @@ class Renderer {
 };
 
 /// The frame's uniforms for a view: positions are told from an anchor tile under the eye, in floats near the eye.
-[[nodiscard]] TerrainFrame terrain_frame(const TileSource& source, const ViewState& view);
+/// nearest  distance from the eye within which nothing is drawn; kNearShare of the far distance where smaller.
+[[nodiscard]] TerrainFrame terrain_frame(const TileSource& source, const ViewState& view, double nearest = 0.0);
 
 /// The GL state of the opaque and of the fading pass; verifying draws with the same.
 void begin_opaque_pass();
