@@ -1,27 +1,40 @@
-#include "tile_source.h"
-
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <limits>
+#include <optional>
 
+#include "formats/units.h"
 #include "isohf/archive/reader.h"
+#include "isohf/archive/shadow_seed_reader.h"
 #include "isohf/base/assert.h"
+#include "isohf/surface/shadow.h"
+#include "tile_source.h"
 
 namespace isohf::view {
 namespace {
 
+/// World units of one elevation unit; 1 where either is not known.
+double world_per_elevation(const Metadata& metadata) {
+  if (metadata.horizontal_unit != "metre") return 1.0;
+  const auto unit = linear_unit(metadata.vertical_unit);
+  return unit ? unit->metres : 1.0;
+}
+
 class ArchiveSource final : public TileSource {
  public:
-  explicit ArchiveSource(const std::string& path) : reader_(path) {
+  explicit ArchiveSource(const std::string& path)
+      : reader_(path), world_per_elevation_(world_per_elevation(reader_.metadata())) {
     const Metadata& metadata = reader_.metadata();
-    if (metadata.quantisation.type != CodeType::kF32) {
-      scale_ = {metadata.quantisation.offset, metadata.quantisation.scale};
-      return;
+    const Quantisation& stored = metadata.quantisation;
+    scale_ = {stored.offset * world_per_elevation_, stored.scale * world_per_elevation_};
+    if (stored.type == CodeType::kF32) {
+      // Floats on the GPU would be four bytes a vertex: round them to 65535 steps over the dataset's range.
+      const double low = metadata.statistics.min.value_or(0.0) * world_per_elevation_;
+      const double high = metadata.statistics.max.value_or(0.0) * world_per_elevation_;
+      scale_ = {low, high > low ? (high - low) / (kVoidCode - 1) : 1.0};
     }
-    // Floats on the GPU would be four bytes a vertex: round them to 65535 steps over the dataset's range.
-    const double low = metadata.statistics.min.value_or(0.0);
-    const double high = metadata.statistics.max.value_or(0.0);
-    scale_ = {low, high > low ? (high - low) / (kVoidCode - 1) : 1.0};
+    if (shadow_seed_info(metadata)) seeds_.emplace(reader_);
   }
 
   [[nodiscard]] const TileGrid& grid() const override { return reader_.grid(); }
@@ -32,22 +45,59 @@ class ArchiveSource final : public TileSource {
   [[nodiscard]] TileBounds bounds(TileIndex tile) const override {
     const TileEntry entry = reader_.tile_entry(tile);
     if (!entry.stored) return {};
-    if (reader_.metadata().quantisation.type == CodeType::kF32) {
-      return {true, entry.has_voids, std::bit_cast<float>(entry.code_min), std::bit_cast<float>(entry.code_max)};
+    if (is_float()) {
+      return {true, entry.has_voids, std::bit_cast<float>(entry.code_min) * world_per_elevation_,
+              std::bit_cast<float>(entry.code_max) * world_per_elevation_};
     }
     return {true, entry.has_voids, scale_.offset + scale_.scale * entry.code_min,
             scale_.offset + scale_.scale * entry.code_max};
   }
 
-  void read(TileIndex tile, std::span<std::uint16_t> codes) const override {
-    const TileCodes stored = reader_.read_tile(tile);
+  void read(TileIndex tile, std::span<std::uint16_t> codes) const override { convert(reader_.read_tile(tile), codes); }
+
+  [[nodiscard]] const ShadowSeedInfo* shadow_seeds() const override { return seeds_ ? &seeds_->info() : nullptr; }
+
+  void read_lit(TileIndex tile, const RowSun& sun, std::span<std::uint16_t> codes,
+                std::span<std::uint16_t> shadow) const override {
+    TileCodes stored = reader_.read_tile(tile);
+    convert(stored, codes);
+    // Shadow heights are found in stored codes, which floats hold exactly.
+    const Quantisation& quantisation = reader_.metadata().quantisation;
+    std::vector<double> entering = seeds_->entering(tile, stored, sun.travel, sun.elevation_deg);
+    for (double& height : entering) height = (height - quantisation.offset) / quantisation.scale;
+    const ShadowLight light{
+        sun.travel, seeds_->info().fall_per_half_step(grid(), quantisation, sun.elevation_deg) / grid().sigma_x()};
+    if (!is_float()) {
+      stored.heights.resize(stored.codes.size());
+      const std::uint32_t void_code = quantisation.void_code();
+      std::transform(stored.codes.begin(), stored.codes.end(), stored.heights.begin(), [=](std::uint16_t code) {
+        return code == void_code ? std::numeric_limits<float>::quiet_NaN() : static_cast<float>(code);
+      });
+    }
+    const TileShape& shape = grid().shape();
+    std::vector<float> heights(stored.heights.size());
+    tile_shadow(grid(), View2D<const float>(stored.heights.data(), shape.columns(), shape.rows()), light, entering,
+                View2D<float>(heights.data(), shape.columns(), shape.rows()), {});
+    std::transform(heights.begin(), heights.end(), shadow.begin(), [this](float height) {
+      if (!std::isfinite(height)) return std::uint16_t{0};
+      return is_float() ? code_of(height) : rounded(height);
+    });
+  }
+
+ private:
+  [[nodiscard]] bool is_float() const { return reader_.metadata().quantisation.type == CodeType::kF32; }
+  [[nodiscard]] static std::uint16_t rounded(double code) {
+    return static_cast<std::uint16_t>(std::clamp(std::round(code), 0.0, kVoidCode - 1.0));
+  }
+  [[nodiscard]] std::uint16_t code_of(float elevation) const {
+    return rounded((elevation * world_per_elevation_ - scale_.offset) / scale_.scale);
+  }
+
+  void convert(const TileCodes& stored, std::span<std::uint16_t> codes) const {
     if (stored.type == CodeType::kF32) {
       ISOHF_ASSERT(stored.heights.size() == codes.size());
-      std::transform(stored.heights.begin(), stored.heights.end(), codes.begin(), [this](float height) {
-        if (std::isnan(height)) return kVoidCode;
-        const double code = std::round((height - scale_.offset) / scale_.scale);
-        return static_cast<std::uint16_t>(std::clamp(code, 0.0, kVoidCode - 1.0));
-      });
+      std::transform(stored.heights.begin(), stored.heights.end(), codes.begin(),
+                     [this](float height) { return std::isnan(height) ? kVoidCode : code_of(height); });
       return;
     }
     ISOHF_ASSERT(stored.codes.size() == codes.size());
@@ -56,9 +106,10 @@ class ArchiveSource final : public TileSource {
                    [=](std::uint16_t code) { return code == void_code ? kVoidCode : code; });
   }
 
- private:
   ArchiveReader reader_;
+  double world_per_elevation_;
   ViewScale scale_;
+  std::optional<ShadowSeedReader> seeds_;
 };
 
 }  // namespace

@@ -98,9 +98,7 @@ Camera overview_camera(const TileSource& source, const ViewState& view) {
   return out;
 }
 
-double farthest_corner(const TileSource& source, Vec3 eye, double exaggeration) {
-  const TileGrid& grid = source.grid();
-  const TileBounds whole = whole_bounds(source);
+double farthest_corner(const TileGrid& grid, const TileBounds& whole, Vec3 eye, double exaggeration) {
   double farthest = 0.0;
   for (int corner = 0; corner < 8; ++corner) {
     const Vec3 place{(corner & 1) != 0 ? grid.world_width() : 0.0,

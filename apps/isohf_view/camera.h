@@ -32,7 +32,7 @@ struct Camera {
 /// A camera that sees all that the source covers from the South-East, as large as the view takes.
 [[nodiscard]] Camera overview_camera(const TileSource& source, const ViewState& view);
 
-/// Distance from a point to the farthest corner of the heightfield.
-[[nodiscard]] double farthest_corner(const TileSource& source, Vec3 eye, double exaggeration);
+/// Distance from a point to the farthest corner of the heightfield, of which `whole` are the bounds.
+[[nodiscard]] double farthest_corner(const TileGrid& grid, const TileBounds& whole, Vec3 eye, double exaggeration);
 
 }  // namespace isohf::view

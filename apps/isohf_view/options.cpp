@@ -18,6 +18,11 @@ constexpr const char* kDescription =
 
 constexpr const char* kFooter =
     "Axes: x eastwards, y up, z southwards, world units of the archive, from its North-West corner.\n"
+    "Shadows need an archive with shadow seeds (isohf convert --shadow-seeds). They are those of light along the "
+    "rows,\n"
+    "from East or West: at azimuth 90 or 270 exactly the sun's, as isohf shade draws them. At other azimuths they are\n"
+    "those of the sun as it is seen in that plane, whose elevation has the tangent tan(elevation) / |sin(azimuth)|; a\n"
+    "sun due North or South casts none.\n"
     "Memory: tiles on the GPU and on their way there never take more than --memory MiB together. Where the far\n"
     "distance would need more, it is shortened and the figures say so. Besides: the shared vertex and index arrays\n"
     "(some bytes a vertex of one tile), the picture, and the memory-mapped archive.\n"
@@ -48,6 +53,8 @@ struct Raw {
   double fov_deg = 50.0;
   std::vector<double> level;
   double far_distance = 0.0;
+  std::string shadows;
+  double shadow_softness = 0.0;
 };
 
 void add_picture_options(CLI::App& app, Options& options, Raw& raw) {
@@ -58,6 +65,12 @@ void add_picture_options(CLI::App& app, Options& options, Raw& raw) {
   app.add_option("--sun", raw.sun, "AZIMUTH,ELEVATION in degrees, clockwise from North, above the horizon")
       ->delimiter(',')
       ->expected(2);
+  app.add_option("--shadows", raw.shadows, "Cast shadows, on or off; default: on where the archive has shadow seeds")
+      ->check(CLI::IsMember({"on", "off"}));
+  app.add_option("--shadow-softness", raw.shadow_softness,
+                 "The sun's apparent size at the caster's distance, world units; default: 2, or 0.5 % of the range of "
+                 "heights where that is less")
+      ->check(CLI::PositiveNumber);
   app.add_option("--exaggeration", options.view.exaggeration, "Vertical exaggeration")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
@@ -135,6 +148,8 @@ ParsedOptions parse_options(int argc, char** argv) {
   if (!raw.level.empty()) options.view.fixed_level = raw.level[0];
   if (raw.level.size() > 1) options.view.other_level = raw.level[1];
   if (app.count("--far") > 0) options.far_distance = raw.far_distance;
+  if (!raw.shadows.empty()) options.shadows = raw.shadows == "on";
+  if (app.count("--shadow-softness") > 0) options.shadow_softness = raw.shadow_softness;
   if (!raw.position.empty()) options.position = vec3_from(raw.position);
   if (!raw.look_at.empty()) options.look_at = vec3_from(raw.look_at);
   if (!raw.sun.empty()) {

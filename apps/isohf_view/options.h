@@ -26,6 +26,8 @@ struct Options {
   bool fly = false;
   double sun_azimuth_deg = 300.0;
   double sun_elevation_deg = 35.0;
+  std::optional<bool> shadows;            ///< nullopt: where the archive has seeds
+  std::optional<double> shadow_softness;  ///< k of Eq. 16, world units; nullopt: default_softness()
   std::optional<double> far_distance;
   std::uint64_t memory_mib = 512;
   std::uint64_t upload_mib = 4;

@@ -186,8 +186,8 @@ void Renderer::begin_shading(const TerrainProgram& program, const ViewState& vie
               static_cast<float>(1.0 / codes));
   set_vec3(program.uniform("sun"), sun);
   set_vec3(program.uniform("horizon"), by_day(kHorizon, sun));
-  const double k = 2.0 * view.exaggeration;  // the paper's k for the Sun and terrestrial mountains
-  glUniform1f(program.uniform("penumbra"), static_cast<float>(k));
+  const double gain = view.shadow_softness ? 2.0 * scale.scale / *view.shadow_softness : 0.0;
+  glUniform1f(program.uniform("shadow_gain"), static_cast<float>(gain));
   const double haze_begin = view.haze ? 0.55 * view.far_distance : 1.0;
   const double haze_end = view.haze ? view.far_distance : 0.0;
   glUniform2f(program.uniform("haze"), static_cast<float>(haze_begin), static_cast<float>(haze_end));

@@ -20,12 +20,18 @@ TileBoxLimits limits_from(const Options& options) {
   return limits;
 }
 
+/// The paper's k for the sun and mountains on Earth, 2 metres; less for small things. As isohf shade has it.
+double default_softness(const TileBounds& whole) {
+  const double range = whole.high - whole.low;
+  return range > 0.0 ? std::min(2.0, 0.005 * range) : 2.0;
+}
+
 const std::vector<std::string>& help_lines() {
   static const std::vector<std::string> kLines{"W A S D, arrows  move          drag left   turn",
                                                "Q E              down, up      drag right  move sideways",
                                                "Shift, Ctrl      fast, slow    wheel       nearer, farther",
                                                "C  fly or orbit                R  back to the start",
-                                               "J L  sun round   I K  sun up and down",
+                                               "J L  sun round   I K  sun up and down   U  shadows",
                                                "+ -  vertical exaggeration     [ ]  far distance",
                                                "M  colours       X  wires      B  tile borders",
                                                "T  fade or switch levels       Z  haze   V  beyond the source",
@@ -67,7 +73,10 @@ Session::Session(const TileSource& source, const Options& options)
     : view(options.view),
       sun_azimuth_deg(options.sun_azimuth_deg),
       sun_elevation_deg(options.sun_elevation_deg),
+      shadows(options.shadows.value_or(true)),
       source_(source),
+      whole_(whole_bounds(source)),
+      shadow_softness_(options.shadow_softness.value_or(default_softness(whole_))),
       shared_(source.grid().shape(), make_index_arrays(source.grid().shape())),
       renderer_(source, shared_),
       box_(source, shared_, limits_from(options)),
@@ -78,6 +87,10 @@ Session::Session(const TileSource& source, const Options& options)
       throw Error(ErrorCode::kInvalidArgument,
                   fmt::format("--level {}: this archive has levels 0 to {}", *level, levels - 1));
     }
+  }
+  if (options.shadows.value_or(false) && source.shadow_seeds() == nullptr) {
+    throw Error(ErrorCode::kInvalidArgument,
+                "--shadows on: this archive has no shadow seeds; convert with --shadow-seeds");
   }
   camera = overview_camera(source, view);
   const auto exaggerated = [this](Vec3 at) { return Vec3{at.x, at.y * view.exaggeration, at.z}; };
@@ -93,7 +106,13 @@ void Session::prepare() {
   view.forward = camera.forward();
   view.sun = sun_direction(sun_azimuth_deg, sun_elevation_deg);
   // Haze begins at a little more than half the far distance: by default all of the heightfield lies before it.
-  view.far_distance = far_distance_ ? *far_distance_ : 1.8 * farthest_corner(source_, camera.eye, view.exaggeration);
+  view.far_distance =
+      far_distance_ ? *far_distance_ : 1.8 * farthest_corner(source_.grid(), whole_, camera.eye, view.exaggeration);
+  shadow_sun_ = shadow_sun(source_.shadow_seeds(), sun_azimuth_deg, sun_elevation_deg, view.exaggeration);
+  const bool casts = shadow_sun_.state == ShadowSun::State::kExact || shadow_sun_.state == ShadowSun::State::kNearest;
+  view.shadow_softness.reset();
+  if (shadows && casts) view.shadow_softness = shadow_softness_;
+  box_.set_sun(shadows && casts ? std::optional(shadow_sun_.sun) : std::nullopt);
 }
 
 void Session::draw() {
@@ -119,6 +138,24 @@ void Session::complete_frame() {
   draw();
 }
 
+std::string Session::shadow_line() const {
+  switch (shadow_sun_.state) {
+    case ShadowSun::State::kNoSeeds:
+      return "no shadows: the archive has no shadow seeds";
+    case ShadowSun::State::kNone:
+      return "no shadows: no sun along the rows";
+    default:
+      break;
+  }
+  if (!shadows) return "shadows off";
+  std::string line =
+      fmt::format("shadows from the {}, {:.1f} deg", shadow_sun_.sun.travel == LightTravel::kEastward ? "West" : "East",
+                  shadow_sun_.seen_deg);
+  if (shadow_sun_.state == ShadowSun::State::kNearest) line += ", the nearest that the seeds hold for";
+  const std::int64_t to_come = box_.figures().shadows_to_come;
+  return to_come > 0 ? fmt::format("{}, {} to come", line, to_come) : line;
+}
+
 void Session::draw_overlay(double frames_per_second, bool figures, bool help) const {
   const int size = std::max(1, view.height / 400);
   if (figures) {
@@ -131,7 +168,8 @@ void Session::draw_overlay(double frames_per_second, bool figures, bool help) co
         fmt::format("x {:.0f}  y {:.0f}  z {:.0f}   {}   {}", camera.eye.x, camera.eye.y / view.exaggeration,
                     camera.eye.z, camera.kind == Camera::Kind::kFly ? "fly" : "orbit", mode_name(view.mode)),
         fmt::format("sun {:.0f}, {:.0f} deg   height x {:.2g}   {}", sun_azimuth_deg, sun_elevation_deg,
-                    view.exaggeration, help ? "" : "H help")};
+                    view.exaggeration, help ? "" : "H help"),
+        shadow_line()};
     if (cut_) {
       lines.push_back(fmt::format("far distance cut to {:.0f} by --memory", box.radius));
     }

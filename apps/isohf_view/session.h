@@ -7,6 +7,7 @@
 #include "options.h"
 #include "overlay.h"
 #include "renderer.h"
+#include "shadow_sun.h"
 #include "tile_box.h"
 
 namespace isohf::view {
@@ -15,7 +16,7 @@ namespace isohf::view {
 /// current as long as it lives.
 class Session {
  public:
-  /// Throws Error{kInvalidArgument} where a level beyond the archive's is asked for.
+  /// Throws Error{kInvalidArgument} where a level beyond the archive's is asked for, or shadows without seeds.
   Session(const TileSource& source, const Options& options);
 
   /// Updates the tile box and draws a frame into the bound framebuffer; never waits for a tile.
@@ -31,6 +32,7 @@ class Session {
   ViewState view;
   double sun_azimuth_deg;
   double sun_elevation_deg;
+  bool shadows;  ///< wanted; drawn where the source has seeds
 
   [[nodiscard]] const FrameFigures& figures() const { return figures_; }
   [[nodiscard]] const TileBox& box() const { return box_; }
@@ -41,8 +43,12 @@ class Session {
  private:
   void prepare();
   void draw();
+  [[nodiscard]] std::string shadow_line() const;
 
   const TileSource& source_;
+  TileBounds whole_;
+  double shadow_softness_;
+  ShadowSun shadow_sun_;
   SharedGeometry shared_;
   Renderer renderer_;
   TileBox box_;

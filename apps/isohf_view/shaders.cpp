@@ -34,7 +34,7 @@ uniform float code_slope;       // the same for normals
 uniform mat4 clip_from_eye;
 // Two slots of four: a software rasteriser pays for each slot and triangle.
 out vec4 v_facing;              // unit normal, distance from the eye
-out vec4 v_place;               // object space x and z, elevation code, world units that the shadow lies above
+out vec4 v_place;               // object space x and z, elevation code, codes that the shadow lies above
 #ifdef RIM
 uniform vec4 covered;           // West, North, East, South of what is shown, seen from the eye
 out gl_PerVertex {
@@ -92,7 +92,7 @@ void main() {
   float height = float(here.y) * code_height;
   vec3 eye = anchor + vec3(float(lattice.x) * sigma.x, height, float(lattice.y) * sigma.y);
   v_facing = vec4(vertex_normal(), length(eye));
-  v_place = vec4(vec2(object_xz), float(here.y), max(float(shadow_code) - float(here.y), 0.0) * code_height);
+  v_place = vec4(vec2(object_xz), float(here.y), max(float(shadow_code) - float(here.y), 0.0));
   gl_Position = clip_from_eye * vec4(eye, 1.0);
 #ifdef RIM
   v_void = here.y == 65535u ? 1.0 : 0.0;
@@ -113,6 +113,13 @@ in float v_void;
 #endif
 )glsl";
 
+// Eq. 16 on the surface itself (isohf/surface/shadow.h): all of the sun where the ground is its own shadow height, none
+// where that lies k/2 above. Interpolated along the triangles, as heights are.
+constexpr const char* kSunShare = R"glsl(
+uniform float shadow_gain;      // 2/k, per code; 0: no shadows
+float sun_share() { return clamp(1.0 - v_place.w * shadow_gain, 0.0, 1.0); }
+)glsl";
+
 // Modes, as in view_state.h: 0 elevation colours, 1 plain, 2 levels of detail, 3 strip order, 4 texture, 5 normals.
 constexpr const char* kTerrainFragment = R"glsl(
 in vec4 v_facing;
@@ -127,10 +134,10 @@ uniform bool borders;
 uniform vec2 object_size;       // 2(C-4), R-3
 uniform vec2 ramp;              // code at the ramp's foot, 1/codes of its height
 uniform vec3 sun;               // towards the sun
-uniform float penumbra;         // k of Eq. 16, world units
 uniform vec2 haze;              // distances where it begins and is complete; x >= y: none
 uniform vec3 horizon;
 uniform sampler2D tile_texture;
+float sun_share();
 
 vec3 hypsometric(float t) {
   const int kCount = 8;
@@ -179,9 +186,7 @@ void main() {
     float edge = min(inside.x / width.x, inside.y / width.y);
     base = mix(vec3(0.05, 0.05, 0.08), base, clamp(edge - 0.5, 0.25, 1.0));
   }
-  // Eq. 16 with S >= y on the ground: fully lit where the ground itself is S, dark where S lies k above it.
-  float lit = clamp(1.0 - v_place.w / penumbra, 0.0, 1.0);
-  float direct = max(dot(normal, sun), 0.0) * lit;
+  float direct = max(dot(normal, sun), 0.0) * sun_share();
   float sky = 0.5 + 0.5 * normal.y;
   float day = clamp(sun.y * 6.0 + 0.25, 0.05, 1.0);
   vec3 warm = mix(vec3(1.0, 0.62, 0.36), vec3(1.0, 0.96, 0.88), clamp(sun.y * 2.5, 0.0, 1.0));
@@ -206,6 +211,16 @@ void main() {
 }
 )glsl";
 
+constexpr const char* kShadowProbeFragment = R"glsl(
+in vec4 v_place;
+out vec4 probe;
+float sun_share();
+void main() {
+  DISCARD_VOID;
+  probe = vec4(sun_share(), v_place.w, 0.0, 1.0);
+}
+)glsl";
+
 constexpr const char* kFlatFragment = R"glsl(
 in vec4 v_facing;
 out vec4 colour;
@@ -224,10 +239,13 @@ std::string terrain_vertex_shader(bool rim) {
   return header(rim) + kTerrainVertex;
 }
 std::string terrain_fragment_shader(bool rim, bool strips) {
-  return header(rim) + (strips ? "#define STRIPS\n" : "") + kDiscardVoid + kTerrainFragment;
+  return header(rim) + (strips ? "#define STRIPS\n" : "") + kDiscardVoid + kTerrainFragment + kSunShare;
 }
 std::string probe_fragment_shader(bool rim) {
   return header(rim) + kDiscardVoid + kProbeFragment;
+}
+std::string shadow_probe_fragment_shader(bool rim) {
+  return header(rim) + kDiscardVoid + kShadowProbeFragment + kSunShare;
 }
 std::string flat_fragment_shader(bool rim) {
   return header(rim) + kDiscardVoid + kFlatFragment;

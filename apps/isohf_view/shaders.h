@@ -7,8 +7,8 @@ namespace isohf::view {
 /// The terrain's vertex shader: every picture and every check draws through it. Vertex attributes: 0 the shared
 /// object-space (x, z); 1, 2, 3 the tile's elevation codes around the vertex; 4 the tile's shadow heights in codes
 /// (constant 0 without them).
-/// `rim` is the variant for tiles with voids, or that reach
-/// beyond what the source covers: it adds what fragment shaders discard by, and clip distances.
+/// `rim` is the variant for tiles with voids, or that reach beyond what the source covers: it adds what fragment
+/// shaders discard by, and clip distances.
 [[nodiscard]] std::string terrain_vertex_shader(bool rim);
 
 /// Light, colours, borders, haze.
@@ -17,6 +17,9 @@ namespace isohf::view {
 
 /// (elevation code, normal x, normal z, 1): what verifying reads back.
 [[nodiscard]] std::string probe_fragment_shader(bool rim);
+
+/// (share of the sun, shadow height above the ground in codes, 0, 1): what verifying reads back of shadows.
+[[nodiscard]] std::string shadow_probe_fragment_shader(bool rim);
 
 /// One flat colour: wireframes.
 [[nodiscard]] std::string flat_fragment_shader(bool rim);

@@ -39,6 +39,8 @@ struct TileBoxFigures {
   std::int64_t resident_tiles = 0;
   std::int64_t missing_tiles = 0;    ///< in the box and stored, but not resident yet
   std::uint64_t resident_bytes = 0;  ///< GPU and CPU bytes of tiles: never above memory_bytes
+  std::int64_t shadows_to_come = 0;  ///< resident tiles whose shadow is not yet of the sun wanted
+  int shadow_uploads = 0;            ///< in this frame, of tiles that were there already
   double update_ms = 0.0;            ///< that the last update took
   double radius = 0.0;               ///< world units: what was asked for, or less where memory would not do
 };
@@ -47,11 +49,16 @@ struct TileBoxFigures {
 ///
 /// Tile (c, r) lives in cell (c mod box columns, r mod box rows), so that rows and columns that leave the box hand
 /// their cells, and GPU buffers, to those that enter on the other side. Workers decode; update() uploads what they have
-/// finished, within the frame's budget, and never waits for them. A TileBox lives on the GL thread.
+/// finished, within the frame's budget, and never waits for them. When the sun moves they compute all resident tiles'
+/// shadows anew, the longest outdated first; until then the old ones stay. A TileBox lives on the GL thread.
 class TileBox {
  public:
   /// Throws Error{kInvalidArgument} where memory_bytes does not hold four tiles.
   TileBox(const TileSource& source, const SharedGeometry& shared, const TileBoxLimits& limits);
+
+  /// The sun that shadows are wanted for, one that the source's seeds hold for; nullopt: none are. From the next update
+  /// on.
+  void set_sun(const std::optional<RowSun>& sun);
 
   /// Moves the box to the bounding square of a circle round `centre`, world units; once a frame.
   void update(WorldPoint centre, double radius);
@@ -72,6 +79,9 @@ class TileBox {
     TileIndex tile{-1, -1};
     State state = State::kUnused;
     std::unique_ptr<TileSlot> slot;
+    std::uint64_t sun_number = 0;  ///< of the sun that its shadow is of; 0: it has none
+    bool shadow_requested = false;
+    bool shadow_broken = false;
   };
 
   [[nodiscard]] std::size_t cell_of(TileIndex tile) const;
@@ -79,12 +89,20 @@ class TileBox {
   void enter(Cell& cell, TileIndex tile);
   void place(LoadedTile& loaded);
   void upload();
+  void place_shadow(Cell& cell, const LoadedTile& loaded);
+  [[nodiscard]] bool is_outdated(const Cell& cell) const {
+    return sun_ && cell.state == State::kResident && cell.sun_number != sun_number_ && !cell.shadow_broken;
+  }
   void request(WorldPoint centre);
+  void request_shadows(WorldPoint centre, std::size_t most);
+  [[nodiscard]] double distance_squared(const Cell& cell, WorldPoint centre) const;
   void count();
 
   const TileSource& source_;
   const SharedGeometry& shared_;
   TileBoxLimits limits_;
+  std::uint64_t slot_bytes_;
+  std::uint64_t on_the_way_bytes_;  ///< of one tile
   std::size_t in_flight_limit_;
   std::int64_t max_slots_;
   std::int64_t box_columns_ = 0;
@@ -93,6 +111,8 @@ class TileBox {
   std::vector<Cell> cells_;
   std::vector<std::unique_ptr<TileSlot>> spare_;
   std::vector<LoadedTile> waiting_;  ///< decoded, for a later frame's budget
+  std::optional<RowSun> sun_;
+  std::uint64_t sun_number_ = 0;  ///< counts suns
   TileBoxFigures figures_;
   std::optional<std::string> error_;
   TileLoader loader_;  // last: its threads stop first

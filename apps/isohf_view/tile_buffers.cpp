@@ -151,6 +151,14 @@ std::vector<std::uint16_t> TileSlot::read_back() const {
   return codes;
 }
 
+std::vector<std::uint16_t> TileSlot::read_back_shadow() const {
+  if (!shadow_) return {};
+  std::vector<std::uint16_t> shadow(vertices_);
+  glBindBuffer(GL_ARRAY_BUFFER, shadow_->get());
+  glGetBufferSubData(GL_ARRAY_BUFFER, 0, static_cast<GLsizeiptr>(shadow.size() * sizeof(std::uint16_t)), shadow.data());
+  return shadow;
+}
+
 void TileSlot::bind() const {
   glBindVertexArray(array_.get());
 }

@@ -45,7 +45,8 @@ class SharedGeometry {
 
 /// One tile on the GPU: two bytes a vertex. The one buffer is bound as three overlapping attributes, so that the vertex
 /// shader finds the neighbours that a normal needs: v-1..v+1, v-C-1..v-C+2 and v+C-1..v+C+2. A row and two vertices of
-/// nothing lie before and behind the codes. A slot is reused for tile after tile.
+/// nothing lie before and behind the codes. Shadow heights take two more bytes a vertex. A slot is reused for tile
+/// after tile.
 class TileSlot {
  public:
   explicit TileSlot(const SharedGeometry& shared);
@@ -58,12 +59,15 @@ class TileSlot {
 
   /// The codes as the GPU holds them, for tests.
   [[nodiscard]] std::vector<std::uint16_t> read_back() const;
+  /// Empty where it has no shadow.
+  [[nodiscard]] std::vector<std::uint16_t> read_back_shadow() const;
 
   /// Binds the vertex array.
   void bind() const;
 
-  [[nodiscard]] static std::uint64_t bytes(const TileShape& shape) {
-    return static_cast<std::uint64_t>(shape.stored_vertex_count() + 2 * (shape.columns() + 2)) * sizeof(std::uint16_t);
+  [[nodiscard]] static std::uint64_t bytes(const TileShape& shape, bool shadow = false) {
+    const std::int64_t codes = shape.stored_vertex_count() + 2 * (shape.columns() + 2);
+    return static_cast<std::uint64_t>(codes + (shadow ? shape.stored_vertex_count() : 0)) * sizeof(std::uint16_t);
   }
 
  private:

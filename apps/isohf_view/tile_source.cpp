@@ -3,7 +3,13 @@
 #include <algorithm>
 #include <limits>
 
+#include "isohf/base/error.h"
+
 namespace isohf::view {
+
+void TileSource::read_lit(TileIndex, const RowSun&, std::span<std::uint16_t>, std::span<std::uint16_t>) const {
+  throw Error(ErrorCode::kUnsupported, "this source has no shadow seeds");
+}
 
 TileBounds whole_bounds(const TileSource& source) {
   TileBounds whole{false, false, std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};

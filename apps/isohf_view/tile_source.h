@@ -6,6 +6,7 @@
 #include <string>
 
 #include "isohf/archive/metadata.h"
+#include "isohf/archive/shadow_seeds.h"
 #include "isohf/lattice/tile_grid.h"
 
 namespace isohf::view {
@@ -13,7 +14,8 @@ namespace isohf::view {
 /// The code that means "void" on the GPU, whatever the archive's own is.
 inline constexpr std::uint16_t kVoidCode = 65535;
 
-/// How the viewer's 16-bit codes become elevations: elevation = offset + scale * code, vertical units.
+/// How the viewer's 16-bit codes become heights: height = offset + scale * code, world units. Where the unit of
+/// elevations is known and another than that of the ground (feet over metres), it has been converted.
 struct ViewScale {
   double offset = 0.0;
   double scale = 1.0;
@@ -23,8 +25,15 @@ struct ViewScale {
 struct TileBounds {
   bool stored = false;  ///< false: wholly void
   bool has_voids = false;
-  double low = 0.0;  ///< vertical units
+  double low = 0.0;  ///< world units
   double high = 0.0;
+};
+
+/// A sun in the plane of the rows, over true heights: what shadows are computed for.
+struct RowSun {
+  LightTravel travel = LightTravel::kEastward;
+  double elevation_deg = 15.0;  ///< above 0, below 90
+  friend bool operator==(const RowSun&, const RowSun&) = default;
 };
 
 /// Where tiles come from. All functions may be called from any number of threads at once.
@@ -42,6 +51,13 @@ class TileSource {
   [[nodiscard]] virtual TileBounds bounds(TileIndex tile) const = 0;
   /// codes [C x R] out, 0..65534, or kVoidCode. Throws Error naming the tile.
   virtual void read(TileIndex tile, std::span<std::uint16_t> codes) const = 0;
+  /// The record of the shadow seeds; nullptr where the source has none.
+  [[nodiscard]] virtual const ShadowSeedInfo* shadow_seeds() const { return nullptr; }
+  /// Reads a tile with its shadow heights, from no other tile. sun must be one that the seeds hold for.
+  /// shadow [C x R] out: in codes like heights, rounded, at visible vertices; 0 at others. Throws Error naming the
+  /// tile.
+  virtual void read_lit(TileIndex tile, const RowSun& sun, std::span<std::uint16_t> codes,
+                        std::span<std::uint16_t> shadow) const;
 };
 
 /// Opens an archive for viewing. 16- and 8-bit codes are taken as they are; float elevations are rounded to 65535

@@ -137,6 +137,9 @@ class Controls {
       case GLFW_KEY_T:
         view.plain_switching = !view.plain_switching;
         break;
+      case GLFW_KEY_U:
+        session_.shadows = !session_.shadows;
+        break;
       case GLFW_KEY_V:
         view.beyond = !view.beyond;
         break;

@@ -31,7 +31,7 @@ TEST_F(RendererTest, DrawsEveryVisibleTileWithAtMostTwoCallsAPass) {
   const Camera camera = overview_camera(source, view);
   view.eye = camera.eye;
   view.forward = camera.forward();
-  view.far_distance = 1.2 * farthest_corner(source, view.eye, 1.0);
+  view.far_distance = 1.2 * farthest_corner(source.grid(), whole_bounds(source), view.eye, 1.0);
   box.finish({view.eye.x, view.eye.z}, view.far_distance);
   Offscreen target(view.width, view.height, GL_RGBA8);
   const TileRange& range = box.range();

@@ -1,5 +1,6 @@
 #include "tile_box.h"
 
+#include <atomic>
 #include <chrono>
 #include <future>
 #include <thread>
@@ -108,6 +109,77 @@ TEST_F(TileBoxTest, ShowsTheSameBytesWhateverTheRoute) {
   }
   EXPECT_EQ(seen, box.figures().resident_tiles);
   EXPECT_GT(seen, 40);
+}
+
+std::vector<std::uint16_t> shadow_of(const MemorySource& source, TileIndex tile, const RowSun& sun) {
+  std::vector<std::uint16_t> codes(static_cast<std::size_t>(source.grid().shape().stored_vertex_count()));
+  std::vector<std::uint16_t> shadow(codes.size());
+  source.read_lit(tile, sun, codes, shadow);
+  return shadow;
+}
+
+TEST_F(TileBoxTest, ShadesAllTilesAnewWhenTheSunMoves) {
+  MemorySource source(wide_grid());
+  source.set_seeds({});
+  const SharedGeometry shared(source.grid().shape(), make_index_arrays(source.grid().shape()));
+  TileBox box(source, shared, limits_for(400, 4));
+  for (const RowSun& sun : {RowSun{LightTravel::kEastward, 2.0}, RowSun{LightTravel::kWestward, 6.0}}) {
+    box.set_sun(sun);
+    box.finish({700.0, 900.0}, 300.0);
+    EXPECT_EQ(box.figures().shadows_to_come, 0);
+    EXPECT_LE(box.figures().resident_bytes, limits_for(400, 4).memory_bytes);
+    int shaded = 0;
+    for (std::int64_t flat = 0; flat < source.grid().tile_count(); ++flat) {
+      const TileIndex tile = source.grid().tile_at(flat);
+      const TileSlot* slot = box.resident(tile);
+      if (slot == nullptr) continue;
+      EXPECT_EQ(slot->read_back(), test::analytic_tile(source.grid(), tile));
+      EXPECT_EQ(slot->read_back_shadow(), shadow_of(source, tile, sun));
+      ++shaded;
+    }
+    EXPECT_GT(shaded, 40);
+  }
+}
+
+TEST_F(TileBoxTest, KeepsOldShadowsUntilNewOnesAreThere) {
+  const RowSun old_sun{LightTravel::kEastward, 2.0};
+  std::promise<void> gate;
+  const std::shared_future<void> opened = gate.get_future().share();
+  std::atomic<bool> closed{false};
+  MemorySource source(wide_grid(), {}, [&] {
+    if (closed) opened.wait();
+  });
+  source.set_seeds({});
+  const SharedGeometry shared(source.grid().shape(), make_index_arrays(source.grid().shape()));
+  TileBox box(source, shared, limits_for(400, 4));
+  box.set_sun(old_sun);
+  box.finish({700.0, 900.0}, 300.0);
+  closed = true;
+  for (int frame = 0; frame < 5; ++frame) {
+    box.set_sun(RowSun{LightTravel::kEastward, 3.0 + frame});
+    box.update({700.0, 900.0}, 300.0);
+    EXPECT_EQ(box.figures().shadows_to_come, box.figures().resident_tiles);
+  }
+  closed = false;
+  const auto kept = box.resident({7, 9})->read_back_shadow();
+  gate.set_value();
+  EXPECT_EQ(kept, shadow_of(source, {7, 9}, old_sun));
+  box.finish({700.0, 900.0}, 300.0);
+  EXPECT_EQ(box.resident({7, 9})->read_back_shadow(), shadow_of(source, {7, 9}, {LightTravel::kEastward, 7.0}));
+}
+
+TEST_F(TileBoxTest, ShowsTilesWithBrokenSeedsWithoutShadows) {
+  MemorySource source(wide_grid());
+  source.set_seeds({}, [](TileIndex tile, LightTravel, std::vector<double>&) {
+    if (tile == TileIndex{7, 9}) throw Error(ErrorCode::kCorrupt, "seeds of tile (7,9)");
+  });
+  const SharedGeometry shared(source.grid().shape(), make_index_arrays(source.grid().shape()));
+  TileBox box(source, shared, limits_for(400, 4));
+  box.set_sun(RowSun{LightTravel::kEastward, 2.0});
+  box.finish({700.0, 900.0}, 300.0);
+  ASSERT_NE(box.resident({7, 9}), nullptr);
+  EXPECT_TRUE(box.resident({7, 9})->read_back_shadow().empty());
+  EXPECT_EQ(box.error(), "seeds of tile (7,9)");
 }
 
 TEST_F(TileBoxTest, RefusesTooLittleMemory) {
