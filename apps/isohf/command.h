@@ -13,7 +13,7 @@ enum ExitCode : int {
   kExitDone = 0,
   kExitFailed = 1,
   kExitUsage = 2,
-  kExitDifferences = 3,  ///< verify found something
+  kExitDifferences = 3,  ///< verify found something, restore not what --lossless kept
   kExitInterrupted = 130,
 };
 

@@ -1,13 +1,12 @@
 /// isohf restore: an archive becomes a raster of elevations again.
 
 #include <fmt/format.h>
+#include <oneapi/tbb/blocked_range.h>
 #include <oneapi/tbb/parallel_for.h>
 #include <oneapi/tbb/task_arena.h>
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
-#include <limits>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -24,6 +23,7 @@
 #include "options_common.h"
 #include "output_file.h"
 #include "restored_raster.h"
+#include "restored_samples.h"
 #include "standard_output.h"
 
 namespace isohf::cli {
@@ -35,6 +35,7 @@ constexpr const char* kFooter =
     R"(The raster has the samples of the archive's source, at their places, unless another grid is asked for. An
 archive made with --lossless gives the source's samples bit for bit, and their SHA-256 is checked; with
 --method it gives what its surface alone holds.
+Samples are raw numbers in the source's scale and type; only .tif has a place for scale, offset and void value.
 Methods: hex, quintic B-splines along the lattice rows and then down the columns, is nearest to the source;
 barycentric is what a renderer shows. The format follows from RASTER's extension: .tif, .exr, .png or .hgt.
 
@@ -54,6 +55,7 @@ struct RestoreOptions {
   std::optional<double> spacing;
   std::optional<RestoreMethod> method;
   bool overwrite = false;
+  bool clamp_range = false;
 };
 
 std::optional<RestoreOptions> parse(const Arguments& arguments) {
@@ -71,6 +73,8 @@ std::optional<RestoreOptions> parse(const Arguments& arguments) {
               [&](const std::string& text) { options.spacing = parse_positive_number(text); });
   line.option("--method", "NAME", "hex or barycentric (default hex; the source's own samples where they are kept)",
               [&](const std::string& text) { options.method = restore_method_from_string(text); });
+  line.flag("--clamp-range", "Move samples that RASTER's type does not hold to its ends, instead of refusing",
+            options.clamp_range);
   add_work_options(line, options.work);
   add_common_options(line, options.common);
   line.footer(kFooter);
@@ -108,16 +112,26 @@ SampleGrid asked_grid(const RestoreOptions& options, const Metadata& metadata) {
   return grid;
 }
 
-/// Throws for a sample that the raster's type does not hold, naming its place.
+/// Throws for a sample that the raster's type does not hold, naming its place and the remedy.
 [[noreturn]] void refuse_sample(const RestoreOptions& options, SampleType type, std::int64_t column, std::int64_t row,
-                                double value) {
+                                double value, const char* remedy) {
   throw Error(ErrorCode::kInvalidArgument,
-              fmt::format("{}: sample (column {}, row {}) is {:.9g}, which {} does not hold; write .tif",
-                          options.output, column, row, value, to_string(type)));
+              fmt::format("{}: sample (column {}, row {}) is {:.9g}, which {} does not hold; {}", options.output,
+                          column, row, value, to_string(type), remedy));
+}
+
+/// True where the surface may have no elevation at a sample of the grid.
+bool may_have_voids(const Metadata& metadata, const SampleGrid& grid) {
+  const TileGrid& tiles = metadata.grid;
+  const double last_x = grid.first_x + static_cast<double>(grid.width - 1) * grid.spacing_x;
+  const double last_z = grid.first_z + static_cast<double>(grid.height - 1) * grid.spacing_z;
+  return metadata.statistics.voids > 0 || grid.first_x < 0.0 || grid.first_z < 0.0 || last_x > tiles.world_width() ||
+         last_z > tiles.world_height();
 }
 
 struct Restored {
   std::int64_t voids = 0;
+  std::int64_t clamped = 0;
   bool is_source = false;  ///< the source's own samples, hash checked
 };
 
@@ -131,12 +145,7 @@ class Restorer {
         cancel_(cancel),
         display_(options.work.progress, options.common.quiet, options.common.verbose) {}
 
-  Restored run() {
-    const Metadata& metadata = archive_.metadata();
-    const bool wants_source = options_.like.empty() && !options_.size && !options_.spacing && !options_.method;
-    const std::optional<LosslessRecord> record = wants_source ? lossless_record(metadata) : std::nullopt;
-    return record ? run_lossless(*record) : run_surface();
-  }
+  Restored run(const std::optional<LosslessRecord>& record) { return record ? run_lossless(*record) : run_surface(); }
 
  private:
   void report(std::int64_t rows) {
@@ -150,14 +159,29 @@ class Restorer {
     spec.z_offset = mapping.z_offset;
     if (void_value && !std::isnan(*void_value)) spec.void_value = void_value;
     spec.overwrite = options_.overwrite;
-    return create_raster(options_.output, spec);
+    std::unique_ptr<RasterSink> sink = create_raster(options_.output, spec);
+    const bool scaled = mapping.z_scale != 1.0 || mapping.z_offset != 0.0;
+    if (scaled && raster_kind(options_.output) != RasterKind::kTiff && !options_.common.quiet) {
+      print_warning(fmt::format("{}: has no place for what its raw numbers mean: elevation = raw * {} + {}",
+                                options_.output, mapping.z_scale, mapping.z_offset));
+    }
+    return sink;
   }
 
   Restored run_lossless(const LosslessRecord& record) {
     const SampleMapping kept = record.mapping;
     SampleMapping written = kept;
     written.type = restored_type(options_.output, kept.type);
-    const auto void_value = record.void_values.empty() ? std::nullopt : std::optional(record.void_values.front());
+    auto void_value = record.void_values.empty() ? std::nullopt : std::optional(record.void_values.front());
+    // OpenEXR has no void value; what came from there has none but the user's.
+    const bool voids_to_nan = raster_kind(options_.output) == RasterKind::kExr && is_floating(written.type) &&
+                              archive_.metadata().source.format != "OpenEXR";
+    const bool as_kept = written.type == kept.type && !voids_to_nan;
+    if (voids_to_nan) void_value.reset();
+    if (void_value && !as_kept && !SampleStore(written, std::nullopt, false).holds(*void_value)) {
+      throw Error(ErrorCode::kInvalidArgument, fmt::format("{}: {} does not hold the void value {}; write .tif",
+                                                           options_.output, to_string(written.type), *void_value));
+    }
     const std::unique_ptr<RasterSink> sink = open(written, void_value);
     LosslessReader reader(archive_, record);
     Sha256 hash;
@@ -165,11 +189,7 @@ class Restorer {
     while (!reader.at_end()) {
       const std::vector<std::byte> raw = reader.read_next();
       hash.add(raw);
-      if (written.type == kept.type) {
-        sink->write_rows(raw);
-      } else {
-        sink->write_rows(in_type(raw, kept.type, written.type, row));
-      }
+      sink->write_rows(as_kept ? raw : in_type(raw, record, written.type, row, voids_to_nan));
       row += static_cast<std::int64_t>(raw.size() / size_bytes(kept.type)) / record.width;
       report(row);
     }
@@ -178,29 +198,40 @@ class Restorer {
                                                    options_.archive, found, record.sha256));
     }
     sink->finish();
-    return {0, true};
+    return {0, 0, true};
   }
 
   /// The same numbers in another type; refuses what would not be the same.
-  [[nodiscard]] std::vector<std::byte> in_type(std::span<const std::byte> raw, SampleType from, SampleType to,
-                                               std::int64_t first_row) const {
+  [[nodiscard]] std::vector<std::byte> in_type(std::span<const std::byte> raw, const LosslessRecord& record,
+                                               SampleType to, std::int64_t first_row, bool voids_to_nan) const {
+    const SampleType from = record.mapping.type;
+    const std::vector<double>& voids = record.void_values;
+    const SampleStore store({to, 1.0, 0.0}, std::nullopt, false);
     const std::size_t count = raw.size() / size_bytes(from);
     std::vector<std::byte> out(count * size_bytes(to));
     for (std::size_t i = 0; i < count; ++i) {
       const double value = load_sample(from, raw.data() + i * size_bytes(from));
       std::byte* const at = out.data() + i * size_bytes(to);
-      const bool same = !std::isnan(value) && store_sample({to, 1.0, 0.0}, value, at) && load_sample(to, at) == value;
+      const bool is_void = !std::isfinite(value) || std::find(voids.begin(), voids.end(), value) != voids.end();
+      const SampleStore::Outcome outcome = store.store(is_void && voids_to_nan ? std::nan("") : value, at);
+      const bool same = outcome == SampleStore::Outcome::kVoid ||
+                        (outcome == SampleStore::Outcome::kStored && load_sample(to, at) == value);
       const auto place = static_cast<std::int64_t>(i);
-      if (!same) refuse_sample(options_, to, place % grid_.width, first_row + place / grid_.width, value);
+      if (!same) {
+        refuse_sample(options_, to, place % grid_.width, first_row + place / grid_.width, value, "write .tif");
+      }
     }
     return out;
   }
 
   Restored run_surface() {
     const Metadata& metadata = archive_.metadata();
-    SampleMapping mapping{restored_type(options_.output, sample_type_from_string(metadata.source.sample_type)),
-                          metadata.source.z_scale, metadata.source.z_offset};
-    const std::unique_ptr<RasterSink> sink = open(mapping, usual_void(mapping.type));
+    const SampleMapping mapping{restored_type(options_.output, sample_type_from_string(metadata.source.sample_type)),
+                                metadata.source.z_scale, metadata.source.z_offset};
+    const bool has_voids = may_have_voids(metadata, grid_) || raster_kind(options_.output) == RasterKind::kHgt;
+    const auto void_value = has_voids ? usual_void(mapping.type) : std::nullopt;
+    const SampleStore store(mapping, void_value, options_.clamp_range);
+    const std::unique_ptr<RasterSink> sink = open(mapping, void_value);
     SurfaceRows surface(
         archive_.grid(), metadata.quantisation, [&](TileIndex tile) { return archive_.read_tile(tile); }, grid_,
         options_.method.value_or(RestoreMethod::kHex));
@@ -210,39 +241,34 @@ class Restorer {
       const std::int64_t rows = std::min(rows_at_once, grid_.height - row);
       std::vector<double> elevations(static_cast<std::size_t>(rows * grid_.width));
       surface.read(row, rows, elevations);
-      std::vector<std::byte> raw(elevations.size() * size_bytes(mapping.type));
-      restored.voids += std::count_if(elevations.begin(), elevations.end(), [](double h) { return std::isnan(h); });
-      oneapi::tbb::parallel_for(std::int64_t{0}, rows, [&](std::int64_t r) {
-        for (std::int64_t c = 0; c < grid_.width; ++c) {
-          const auto i = static_cast<std::size_t>(r * grid_.width + c);
-          store(mapping, elevations[i], raw.data() + i * size_bytes(mapping.type), c, row + r);
-        }
-      });
-      sink->write_rows(raw);
+      sink->write_rows(raw_samples(store, mapping.type, elevations, row, restored));
       report(row + rows);
     }
     sink->finish();
     return restored;
   }
 
-  void store(const SampleMapping& mapping, double elevation, std::byte* raw, std::int64_t column,
-             std::int64_t row) const {
-    if (!std::isnan(elevation)) {
-      if (!store_sample(mapping, elevation, raw)) refuse_sample(options_, mapping.type, column, row, elevation);
-      return;
+  [[nodiscard]] std::vector<std::byte> raw_samples(const SampleStore& store, SampleType type,
+                                                   std::span<const double> elevations, std::int64_t first_row,
+                                                   Restored& counts) const {
+    using Outcome = SampleStore::Outcome;
+    std::vector<std::byte> raw(elevations.size() * size_bytes(type));
+    std::vector<Outcome> outcomes(elevations.size());
+    oneapi::tbb::parallel_for(oneapi::tbb::blocked_range<std::size_t>(0, elevations.size(), 4096),
+                              [&](const oneapi::tbb::blocked_range<std::size_t>& part) {
+                                for (std::size_t i = part.begin(); i < part.end(); ++i) {
+                                  outcomes[i] = store.store(elevations[i], raw.data() + i * size_bytes(type));
+                                }
+                              });
+    counts.voids += std::count(outcomes.begin(), outcomes.end(), Outcome::kVoid);
+    counts.clamped += std::count(outcomes.begin(), outcomes.end(), Outcome::kClamped);
+    const auto refused = std::find(outcomes.begin(), outcomes.end(), Outcome::kRefused);
+    if (refused != outcomes.end()) {
+      const std::int64_t place = refused - outcomes.begin();
+      refuse_sample(options_, type, place % grid_.width, first_row + place / grid_.width,
+                    elevations[static_cast<std::size_t>(place)], "--clamp-range moves it, .exr holds it");
     }
-    if (const auto value = usual_void(mapping.type)) {
-      (void)store_sample({mapping.type, 1.0, 0.0}, *value, raw);
-    } else if (mapping.type == SampleType::kFloat16) {
-      const std::uint16_t bits = 0x7E00U;
-      std::memcpy(raw, &bits, sizeof(bits));
-    } else if (mapping.type == SampleType::kFloat32) {
-      const float nothing = std::numeric_limits<float>::quiet_NaN();
-      std::memcpy(raw, &nothing, sizeof(nothing));
-    } else {
-      const double nothing = std::numeric_limits<double>::quiet_NaN();
-      std::memcpy(raw, &nothing, sizeof(nothing));
-    }
+    return raw;
   }
 
   const RestoreOptions& options_;
@@ -256,10 +282,18 @@ int run(const RestoreOptions& options) {
   check_output_file(options.archive, options.output, options.overwrite);
   const ArchiveReader archive(options.archive);
   const SampleGrid grid = asked_grid(options, archive.metadata());
+  const bool wants_source = options.like.empty() && !options.size && !options.spacing && !options.method;
+  const std::optional<LosslessRecord> record = wants_source ? lossless_record(archive.metadata()) : std::nullopt;
   const std::atomic<bool>& cancel = watch_interrupts();
   Restored restored;
   oneapi::tbb::task_arena arena(options.work.threads > 0 ? options.work.threads : oneapi::tbb::task_arena::automatic);
-  arena.execute([&] { restored = Restorer(options, archive, grid, cancel).run(); });
+  try {
+    arena.execute([&] { restored = Restorer(options, archive, grid, cancel).run(record); });
+  } catch (const Error& error) {
+    if (!record || error.code() != ErrorCode::kCorrupt) throw;
+    print_error(error.what());
+    return kExitDifferences;
+  }
   const std::string how = restored.is_source ? "source" : to_string(options.method.value_or(RestoreMethod::kHex));
   StandardOutput out;
   if (options.common.json) {
@@ -271,11 +305,12 @@ int run(const RestoreOptions& options) {
                          {"first_sample", {{"x", grid.first_x}, {"z", grid.first_z}}},
                          {"spacing", {{"x", grid.spacing_x}, {"z", grid.spacing_z}}},
                          {"source_samples", restored.is_source},
-                         {"voids", restored.is_source ? ordered_json(nullptr) : ordered_json(restored.voids)}}));
+                         {"voids", restored.is_source ? ordered_json(nullptr) : ordered_json(restored.voids)},
+                         {"clamped", restored.clamped}}));
   } else if (!options.common.quiet) {
-    const std::string what = restored.is_source
-                                 ? "the source's own samples, SHA-256 as stated"
-                                 : fmt::format("method {}, {} voids", how, describe_count(restored.voids));
+    std::string what = "the source's own samples, SHA-256 as stated";
+    if (!restored.is_source) what = fmt::format("method {}, {} voids", how, describe_count(restored.voids));
+    if (restored.clamped > 0) what += fmt::format(", {} moved into the range", describe_count(restored.clamped));
     out.write(fmt::format("{}: {} x {} samples, {}\n", options.output, grid.width, grid.height, what));
   }
   out.finish();

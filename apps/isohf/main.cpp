@@ -63,7 +63,7 @@ Alone:
 ISOHF_MODULE_PATH names the folder of the OpenImageIO reader (default: beside the program, then ../lib/isohf).
 
 Results go to standard output, everything else to standard error.
-Exit codes: 0 done, 1 failed, 2 wrong usage, 3 verify found differences, 130 interrupted.
+Exit codes: 0 done, 1 failed, 2 wrong usage, 3 verify or restore found differences, 130 interrupted.
 
 Examples:
   isohf plan                              list tile shapes

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cctype>
 #include <filesystem>
-#include <limits>
 
 #include "isohf/convert/plan.h"
 
@@ -24,37 +23,28 @@ HorizontalUnit unit_of(const std::string& name) {
 
 }  // namespace
 
-SampleType restored_type(const std::string& path, SampleType source_type) {
+RasterKind raster_kind(const std::string& path) {
   const std::string extension = extension_of(path);
-  if (extension == ".hgt") return SampleType::kInt16;
-  if (extension == ".exr") {
-    const bool holds = source_type == SampleType::kFloat16 || source_type == SampleType::kUint32;
-    return holds ? source_type : SampleType::kFloat32;
-  }
-  if (extension == ".png") return source_type == SampleType::kUint8 ? source_type : SampleType::kUint16;
-  return source_type;
+  if (extension == ".tif" || extension == ".tiff") return RasterKind::kTiff;
+  if (extension == ".exr") return RasterKind::kExr;
+  if (extension == ".png") return RasterKind::kPng;
+  return extension == ".hgt" ? RasterKind::kHgt : RasterKind::kOther;
 }
 
-std::optional<double> usual_void(SampleType type) {
-  switch (type) {
-    case SampleType::kUint8:
-      return std::numeric_limits<std::uint8_t>::max();
-    case SampleType::kInt8:
-      return std::numeric_limits<std::int8_t>::min();
-    case SampleType::kUint16:
-      return std::numeric_limits<std::uint16_t>::max();
-    case SampleType::kInt16:
-      return std::numeric_limits<std::int16_t>::min();
-    case SampleType::kUint32:
-      return std::numeric_limits<std::uint32_t>::max();
-    case SampleType::kInt32:
-      return std::numeric_limits<std::int32_t>::min();
-    case SampleType::kFloat16:
-    case SampleType::kFloat32:
-    case SampleType::kFloat64:
+SampleType restored_type(const std::string& path, SampleType source_type) {
+  switch (raster_kind(path)) {
+    case RasterKind::kHgt:
+      return SampleType::kInt16;
+    case RasterKind::kExr:
+      if (source_type == SampleType::kFloat16 || source_type == SampleType::kUint32) return source_type;
+      return SampleType::kFloat32;
+    case RasterKind::kPng:
+      return source_type == SampleType::kUint8 ? source_type : SampleType::kUint16;
+    case RasterKind::kTiff:
+    case RasterKind::kOther:
       break;
   }
-  return std::nullopt;
+  return source_type;
 }
 
 RasterSpec restored_raster(const Metadata& metadata, const SampleGrid& grid, SampleType type) {

@@ -9,6 +9,10 @@
 
 namespace isohf::cli {
 
+/// The format of a raster by its extension, in any case; kOther where create_raster() knows none.
+enum class RasterKind { kTiff, kExr, kPng, kHgt, kOther };
+[[nodiscard]] RasterKind raster_kind(const std::string& path);
+
 /// The sample type of a raster restored to `path`: the source's own where the format holds it, else the nearest that
 /// it holds (float32 in EXR, int16 in HGT, uint16 in PNG).
 [[nodiscard]] SampleType restored_type(const std::string& path, SampleType source_type);
@@ -19,8 +23,5 @@ namespace isohf::cli {
 /// The grid of another raster of elevations, in the archive's world: by the origins of both where they are known in
 /// the same unit, else from the North-West corner.
 [[nodiscard]] SampleGrid grid_like(const Metadata& metadata, const SourceInfo& other);
-
-/// The raw value that stands for "no elevation" in samples of a type; nullopt for floats, which have NaN.
-[[nodiscard]] std::optional<double> usual_void(SampleType type);
 
 }  // namespace isohf::cli

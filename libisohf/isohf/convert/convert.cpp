@@ -294,15 +294,16 @@ ConvertSummary convert(HeightSource& source, const std::string& output, const Co
   const Plan plan = make_plan(info, options.plan);
   if (options.z_range) check_range(*options.z_range);
   if (options.shadow_seeds) check_seed_request(*options.shadow_seeds, plan.grid);
-  const std::uint64_t memory_bytes =
-      plan.estimated_memory_bytes + (options.shadow_seeds ? seed_stage_memory_bytes(plan.grid) : 0);
+  const int threads = options.threads > 0 ? options.threads : oneapi::tbb::this_task_arena::max_concurrency();
+  const std::uint64_t memory_bytes = plan.estimated_memory_bytes +
+                                     (options.shadow_seeds ? seed_stage_memory_bytes(plan.grid) : 0) +
+                                     (options.lossless ? residual_stage_memory_bytes(info, plan, threads) : 0);
   if (options.memory_bytes != 0 && memory_bytes > options.memory_bytes) {
     throw Error(ErrorCode::kOutOfMemory,
                 fmt::format("this conversion needs about {} MB, --memory allows {} MB; use smaller tiles (--shape, "
                             "--triangles) or allow more",
                             memory_bytes / 1000000, options.memory_bytes / 1000000));
   }
-  const int threads = options.threads > 0 ? options.threads : oneapi::tbb::this_task_arena::max_concurrency();
   const oneapi::tbb::global_control workers(oneapi::tbb::global_control::max_allowed_parallelism,
                                             static_cast<std::size_t>(threads));
 

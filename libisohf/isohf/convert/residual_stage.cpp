@@ -38,7 +38,26 @@ struct ResidualBand {
   }
 };
 
+std::int64_t rows_per_member(const SourceInfo& info) {
+  return std::clamp<std::int64_t>(kSamplesPerMember / info.width, 8, info.height + 8);
+}
+
 }  // namespace
+
+std::uint64_t residual_stage_memory_bytes(const SourceInfo& info, const Plan& plan, int threads) {
+  const TileShape& shape = plan.grid.shape();
+  const auto width = static_cast<double>(info.width);
+  const auto rows = static_cast<double>(std::min(rows_per_member(info), info.height));
+  const auto sample = static_cast<double>(size_bytes(info.sample_type));
+  // Raw samples, predictions and what they deflate to; in each thread also heights, voids, streams and payload.
+  const double bands = static_cast<double>(kMembersAtOnce) * rows * width * (2.0 * sample + 8.0);
+  const double encoding = threads * rows * width * (5.0 + 5.0 * sample);
+  const double tile_rows = std::ceil(rows * plan.frame.spacing_z / plan.grid.extent_z()) + 2.0;
+  const double tiles = tile_rows * static_cast<double>(plan.grid.tile_columns()) * 8.0 *
+                       static_cast<double>(shape.stored_vertex_count());
+  const double lattice_rows = rows * plan.frame.spacing_z / plan.grid.sigma_z() + QuinticResponse::kTaps + 2.0;
+  return static_cast<std::uint64_t>(bands + encoding + tiles + lattice_rows * width * 9.0);
+}
 
 LosslessRecord write_residuals(HeightSource& source, const SourceFrame& frame, const TileGrid& grid,
                                const Quantisation& quantisation, ArchiveWriter& writer,
@@ -49,7 +68,7 @@ LosslessRecord write_residuals(HeightSource& source, const SourceFrame& frame, c
   record.width = info.width;
   record.height = info.height;
   record.void_values = info.void_values;
-  record.rows_per_member = std::clamp<std::int64_t>(kSamplesPerMember / info.width, 8, info.height + 8);
+  record.rows_per_member = rows_per_member(info);
   writer.flush_tiles();
   SurfaceRows surface(
       grid, quantisation, [&](TileIndex tile) { return writer.read_tile(tile, quantisation); },

@@ -11,6 +11,9 @@
 
 namespace isohf {
 
+/// What write_residuals() holds at most, beyond what convert() needs before it.
+[[nodiscard]] std::uint64_t residual_stage_memory_bytes(const SourceInfo& info, const Plan& plan, int threads);
+
 /// Writes the residual members: reads all tiles back from the writer, predicts every source sample from them and keeps
 /// the difference. All tiles have been added, no member of that name. Reads the source once more from North to South;
 /// memory is bounded by two rows of tiles and a few bands of source rows. Works on the caller's oneTBB arena; the bytes

@@ -1,0 +1,99 @@
+#include "restored_samples.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <limits>
+#include <tuple>
+#include <utility>
+
+namespace isohf::cli {
+namespace {
+
+template <typename T>
+std::pair<double, double> range() {
+  return {static_cast<double>(std::numeric_limits<T>::lowest()), static_cast<double>(std::numeric_limits<T>::max())};
+}
+
+std::pair<double, double> range_of(SampleType type) {
+  switch (type) {
+    case SampleType::kUint8:
+      return range<std::uint8_t>();
+    case SampleType::kInt8:
+      return range<std::int8_t>();
+    case SampleType::kUint16:
+      return range<std::uint16_t>();
+    case SampleType::kInt16:
+      return range<std::int16_t>();
+    case SampleType::kUint32:
+      return range<std::uint32_t>();
+    case SampleType::kInt32:
+      return range<std::int32_t>();
+    case SampleType::kFloat16:
+      return {-65504.0, 65504.0};  // (2 - 2^-10) * 2^15
+    case SampleType::kFloat32:
+      return range<float>();
+    case SampleType::kFloat64:
+      break;
+  }
+  return range<double>();
+}
+
+template <typename T>
+void put(T value, std::byte* raw) {
+  std::memcpy(raw, &value, sizeof(value));
+}
+
+void store_nan(SampleType type, std::byte* raw) {
+  if (type == SampleType::kFloat16) return put(std::uint16_t{0x7E00}, raw);
+  if (type == SampleType::kFloat32) return put(std::numeric_limits<float>::quiet_NaN(), raw);
+  put(std::numeric_limits<double>::quiet_NaN(), raw);
+}
+
+}  // namespace
+
+std::optional<double> usual_void(SampleType type) {
+  if (is_floating(type)) return std::nullopt;
+  const auto [low, high] = range_of(type);
+  return low < 0.0 ? low : high;
+}
+
+SampleStore::SampleStore(const SampleMapping& mapping, std::optional<double> void_value, bool clamp)
+    : mapping_(mapping), void_value_(void_value), clamp_(clamp) {
+  std::tie(low_, high_) = range_of(mapping.type);
+  if (void_value == low_) low_ += 1.0;
+  if (void_value == high_) high_ -= 1.0;
+}
+
+SampleStore::Outcome SampleStore::store(double elevation, std::byte* raw) const {
+  const SampleMapping plain{mapping_.type, 1.0, 0.0};
+  if (std::isnan(elevation)) {
+    if (!void_value_ && !is_floating(mapping_.type)) return Outcome::kRefused;
+    if (void_value_) {
+      store_sample(plain, *void_value_, raw);
+    } else {
+      store_nan(mapping_.type, raw);
+    }
+    return Outcome::kVoid;
+  }
+  std::array<std::byte, sizeof(double)> bytes{};
+  const bool held = store_sample(mapping_, elevation, bytes.data());
+  const double stored = held ? load_sample(mapping_.type, bytes.data()) : 0.0;
+  if (held && stored >= low_ && stored <= high_) {
+    std::copy_n(bytes.begin(), size_bytes(mapping_.type), raw);
+    return Outcome::kStored;
+  }
+  if (!clamp_) return Outcome::kRefused;
+  const double sample = (elevation - mapping_.z_offset) / mapping_.z_scale;
+  store_sample(plain, sample < low_ + (high_ - low_) / 2.0 ? low_ : high_, raw);
+  return Outcome::kClamped;
+}
+
+bool SampleStore::holds(double raw) const {
+  std::array<std::byte, sizeof(double)> bytes{};
+  return store_sample({mapping_.type, 1.0, 0.0}, raw, bytes.data()) && load_sample(mapping_.type, bytes.data()) == raw;
+}
+
+}  // namespace isohf::cli

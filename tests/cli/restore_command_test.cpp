@@ -1,0 +1,397 @@
+/// isohf restore, and convert --lossless, as a user runs them.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <csignal>
+#include <cstring>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "formats/raster_sink.h"
+#include "formats/registry.h"
+#include "isohf/archive/reader.h"
+#include "support/plain_tiff.h"
+#include "support/run_program.h"
+#include "support/temporary_folder.h"
+
+namespace isohf::test {
+namespace {
+
+using nlohmann::json;
+using testing::HasSubstr;
+
+const std::string kCoast = ISOHF_SOURCE_DIR "/testdata/coast_512x384_int16.tif";
+const std::string kPeaks = ISOHF_SOURCE_DIR "/testdata/peaks_256x256_uint16.png";
+const std::string kRidges = ISOHF_SOURCE_DIR "/testdata/ridges_161x161_float.exr";
+const std::string kVoids = ISOHF_SOURCE_DIR "/testdata/voids_200x150_int16.tif";
+
+struct Raster {
+  SourceInfo info;
+  std::vector<float> heights;  ///< NaN where void
+  [[nodiscard]] float at(std::int64_t column, std::int64_t row) const {
+    return heights[static_cast<std::size_t>(row * info.width + column)];
+  }
+};
+
+Raster read_raster(const std::string& path) {
+  const auto source = open_source(path, {});
+  Raster raster{source->info(), {}};
+  const auto count = static_cast<std::size_t>(raster.info.width * raster.info.height);
+  std::vector<std::byte> raw(count * size_bytes(raster.info.sample_type));
+  source->read_window({0, 0, raster.info.width, raster.info.height}, raw);
+  raster.heights.resize(count);
+  heights_from_samples(raster.info, 0.0, raw, raster.heights);
+  return raster;
+}
+
+/// Stripes of 0 and 255, which a spline overshoots.
+void write_stripes(const std::string& path) {
+  RasterSpec spec;
+  spec.width = 64;
+  spec.height = 64;
+  spec.sample_type = SampleType::kUint8;
+  const auto sink = create_raster(path, spec);
+  std::vector<std::byte> rows(64 * 64);
+  for (std::size_t i = 0; i < rows.size(); ++i)
+    rows[i] = std::byte{i % 64 / 8 % 2 == 0 ? std::uint8_t{0} : std::uint8_t{255}};
+  sink->write_rows(rows);
+  sink->finish();
+}
+
+class RestoreCommand : public testing::Test {
+ protected:
+  void convert(const std::string& input, const std::vector<std::string>& more = {}) const {
+    std::vector<std::string> arguments = {"convert", input, folder / "a.isohf", "--overwrite", "-q"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const RunResult result = run_isohf(arguments);
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    ASSERT_EQ(result.out + result.err, "");
+  }
+
+  [[nodiscard]] RunResult run(const std::string& output, const std::vector<std::string>& more = {},
+                              const RunOptions& options = {}) const {
+    std::vector<std::string> arguments = {"restore", folder / "a.isohf", folder / output};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return run_isohf(arguments, options);
+  }
+
+  [[nodiscard]] Raster restore(const std::string& output, std::vector<std::string> more = {}) const {
+    more.emplace_back("--overwrite");
+    more.emplace_back("-q");
+    const RunResult result = run(output, more);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_EQ(result.out + result.err, "");
+    return read_raster(folder / output);
+  }
+
+  /// One line on standard error that holds `part`, nothing on standard output, nothing written.
+  void expect_refused(const RunResult& result, int exit_code, const std::string& part) const {
+    EXPECT_EQ(result.exit_code, exit_code);
+    EXPECT_EQ(result.out, "");
+    EXPECT_THAT(result.err, testing::StartsWith("isohf: "));
+    EXPECT_THAT(result.err, HasSubstr(part));
+    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+    for (const std::string& name : folder.names()) EXPECT_FALSE(name.ends_with(".part")) << name;
+  }
+
+  TemporaryFolder folder;
+};
+
+TEST_F(RestoreCommand, SaysInOneLineWhatItWrote) {
+  convert(kCoast);
+  EXPECT_EQ(run("back.tif").out, folder / "back.tif" + ": 512 x 384 samples, method hex, 0 voids\n");
+  EXPECT_EQ(run("seen.tif", {"--method", "barycentric"}).out,
+            folder / "seen.tif" + ": 512 x 384 samples, method barycentric, 0 voids\n");
+  const json said = json::parse(run("json.tif", {"--json"}).out);
+  EXPECT_EQ(said.at("method"), "hex");
+  EXPECT_EQ(said.at("voids"), 0);
+  EXPECT_EQ(said.at("clamped"), 0);
+  EXPECT_EQ(said.at("source_samples"), false);
+  convert(kCoast, {"--lossless"});
+  EXPECT_EQ(run("exact.tif").out,
+            folder / "exact.tif" + ": 512 x 384 samples, the source's own samples, SHA-256 as stated\n");
+}
+
+TEST_F(RestoreCommand, KeepsThePlaceTypeAndReferenceSystemOfTheSource) {
+  convert(kCoast);
+  const Raster source = read_raster(kCoast);
+  for (const char* method : {"hex", "barycentric"}) {
+    const Raster back = restore("back.tif", {"--method", method});
+    EXPECT_EQ(back.info.sample_type, source.info.sample_type);
+    EXPECT_EQ(back.info.vertical_unit, source.info.vertical_unit);
+    const Georeference& place = back.info.georeference;
+    EXPECT_EQ(place.has_origin, source.info.georeference.has_origin);
+    EXPECT_EQ(place.registration, source.info.georeference.registration);
+    EXPECT_EQ(place.origin_x, source.info.georeference.origin_x);
+    EXPECT_EQ(place.origin_y, source.info.georeference.origin_y);
+    EXPECT_EQ(place.spacing_x, source.info.georeference.spacing_x);
+    EXPECT_EQ(place.system.epsg, source.info.georeference.system.epsg);
+  }
+}
+
+/// Restoring by splines undoes more of the resampling than the triangles do.
+TEST_F(RestoreCommand, HexIsNearerToTheSourceThanTheTriangles) {
+  convert(kRidges, {"--filter", "bspline5", "--type", "f32"});
+  const Raster source = read_raster(kRidges);
+  const auto rms = [&](const Raster& back) {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < back.heights.size(); ++i) {
+      const double error = static_cast<double>(back.heights[i]) - static_cast<double>(source.heights[i]);
+      sum += error * error;
+    }
+    return std::sqrt(sum / static_cast<double>(back.heights.size()));
+  };
+  const double hex = rms(restore("hex.exr", {"--method", "hex"}));
+  const double triangles = rms(restore("seen.exr", {"--method", "barycentric"}));
+  EXPECT_LT(hex, 0.5 * triangles);
+}
+
+TEST_F(RestoreCommand, BarycentricGivesWhatSamplePrints) {
+  convert(kRidges);
+  const Raster back = restore("seen.exr", {"--method", "barycentric", "--size", "23x19"});
+  const json said = json::parse(run("seen2.exr", {"--method", "barycentric", "--size", "23x19", "--json"}).out);
+  std::string places;
+  for (int r = 0; r < 19; ++r) {
+    for (int c = 0; c < 23; ++c) {
+      places +=
+          std::to_string(said.at("first_sample").at("x").get<double>() + c * said.at("spacing").at("x").get<double>()) +
+          " " +
+          std::to_string(said.at("first_sample").at("z").get<double>() + r * said.at("spacing").at("z").get<double>()) +
+          "\n";
+    }
+  }
+  RunOptions input;
+  input.input = places;
+  std::istringstream lines(run_isohf({"sample", folder / "a.isohf"}, input).out);
+  std::size_t i = 0;
+  for (std::string line; std::getline(lines, line); ++i) {
+    // Places were printed with six decimals, on slopes of up to some hundred.
+    EXPECT_NEAR(std::stod(line), static_cast<double>(back.heights.at(i)), 0.01) << line;
+  }
+  EXPECT_EQ(i, back.heights.size());
+}
+
+TEST_F(RestoreCommand, SizeAndSpacingCoverTheSourcesGround) {
+  convert(kVoids);
+  const Georeference source = read_raster(kVoids).info.georeference;
+  const double first = source.registration == Registration::kArea ? 0.5 : 0.0;
+  const double west = source.origin_x - first * source.spacing_x;
+  const double north = source.origin_y + first * source.spacing_y;
+  const Raster half = restore("half.tif", {"--size", "100x75"});
+  const Georeference& place = half.info.georeference;
+  EXPECT_EQ(half.info.width, 100);
+  EXPECT_EQ(half.info.height, 75);
+  // Coordinates up to 1e7 with 15 digits.
+  EXPECT_NEAR(place.origin_x - first * place.spacing_x, west, 1e-6);
+  EXPECT_NEAR(place.origin_y + first * place.spacing_y, north, 1e-6);
+  const double span = source.spacing_x * (first > 0.0 ? 200.0 : 199.0);
+  EXPECT_NEAR(place.spacing_x * (first > 0.0 ? 100.0 : 99.0), span, 1e-6);
+  EXPECT_GT(std::count_if(half.heights.begin(), half.heights.end(), [](float h) { return std::isnan(h); }), 0);
+
+  const json said = json::parse(run("spaced.tif", {"--spacing", "50", "--json"}).out);
+  const Raster spaced = read_raster(folder / "spaced.tif");
+  EXPECT_EQ(said.at("spacing").at("x"), 50.0);
+  EXPECT_EQ(spaced.info.width, said.at("width"));
+}
+
+TEST_F(RestoreCommand, LikeTakesTheOtherRastersGrid) {
+  convert(kVoids);
+  const Raster plain = restore("plain.tif");
+  const Raster same = restore("same.tif", {"--like", kVoids});
+  EXPECT_EQ(read_file(folder / "plain.tif"), read_file(folder / "same.tif"));
+  // A coarse raster over the same ground, by its georeference.
+  const Raster half = restore("half.tif", {"--size", "100x75"});
+  const Raster like_half = restore("like.tif", {"--like", folder / "half.tif"});
+  EXPECT_EQ(like_half.info.width, 100);
+  EXPECT_NEAR(like_half.info.georeference.origin_x, half.info.georeference.origin_x, 1e-6);
+  for (std::size_t i = 0; i < half.heights.size(); ++i) {
+    ASSERT_EQ(std::isnan(half.heights[i]), std::isnan(like_half.heights[i])) << i;
+    if (std::isnan(half.heights[i])) continue;
+    EXPECT_NEAR(half.heights[i], like_half.heights[i], 1.0F) << i;  // rounding ties
+  }
+  // Far away there is nothing.
+  const Raster far = restore("far.tif", {"--like", kCoast});
+  EXPECT_EQ(far.info.width, 512);
+}
+
+TEST_F(RestoreCommand, WritesEveryFormat) {
+  convert(kPeaks);
+  const Raster source = read_raster(kPeaks);
+  for (const char* name : {"back.tif", "back.exr", "back.png"}) {
+    const Raster back = restore(name);
+    ASSERT_EQ(back.heights.size(), source.heights.size());
+    for (std::size_t i = 0; i < back.heights.size(); i += 37) EXPECT_NEAR(back.heights[i], source.heights[i], 2000.0F);
+  }
+  convert(kCoast);
+  const Raster tile = restore("back.hgt", {"--size", "1201x1201"});
+  EXPECT_EQ(tile.info.format, "SRTM HGT");
+  EXPECT_EQ(std::filesystem::file_size(folder / "back.hgt"), std::uintmax_t{2} * 1201 * 1201);
+}
+
+TEST_F(RestoreCommand, ExactSamplesGoIntoEveryFormatThatHoldsThem) {
+  convert(kVoids, {"--lossless"});
+  const Raster source = read_raster(kVoids);
+  for (const char* name : {"back.tif", "back.exr"}) {
+    const Raster back = restore(name);
+    ASSERT_EQ(back.heights.size(), source.heights.size());
+    for (std::size_t i = 0; i < back.heights.size(); ++i) {
+      // OpenEXR has no void value: there voids are NaN.
+      ASSERT_TRUE(back.heights[i] == source.heights[i] ||
+                  (std::isnan(back.heights[i]) && std::isnan(source.heights[i])))
+          << i;
+    }
+  }
+  expect_refused(run("back.png"), 2, "uint16 does not hold the void value -32768; write .tif");
+  convert(kRidges, {"--lossless"});
+  expect_refused(run("back.png"), 2, "which uint16 does not hold; write .tif");
+}
+
+TEST_F(RestoreCommand, SamplesThatTheTypeDoesNotHoldAreRefusedOrClamped) {
+  write_stripes(folder / "stripes.png");
+  convert(folder / "stripes.png", {"--filter", "bspline3"});
+  expect_refused(run("back.png"), 2, "which uint8 does not hold; --clamp-range moves it, .exr holds it");
+  const RunResult clamped = run("back.png", {"--clamp-range"});
+  EXPECT_EQ(clamped.exit_code, 0) << clamped.err;
+  EXPECT_THAT(clamped.out, HasSubstr("moved into the range"));
+  const Raster back = read_raster(folder / "back.png");
+  // No void value takes a number away from a raster without voids.
+  EXPECT_EQ(*std::max_element(back.heights.begin(), back.heights.end()), 255.0F);
+  EXPECT_EQ(std::count_if(back.heights.begin(), back.heights.end(), [](float h) { return std::isnan(h); }), 0);
+  const Raster wide = restore("back.exr");
+  EXPECT_GT(*std::max_element(wide.heights.begin(), wide.heights.end()), 255.0F);
+}
+
+TEST_F(RestoreCommand, VoidsAndSamplesOfTheVoidValueStayApart) {
+  write_stripes(folder / "stripes.tif");
+  convert(folder / "stripes.tif", {"--nodata", "0"});
+  // 255 stands for the voids here, so that no sample may be 255.
+  expect_refused(run("back.tif"), 2, "is 255, which uint8 does not hold");
+  const Raster back = restore("back.tif", {"--clamp-range"});
+  EXPECT_EQ(*std::max_element(back.heights.begin(), back.heights.end(),
+                              [](float a, float b) { return std::isnan(a) || a < b; }),
+            254.0F);
+}
+
+TEST_F(RestoreCommand, SaysWhereScaleAndOffsetAreLost) {
+  convert(kPeaks, {"--z-scale", "0.5", "--z-offset", "-100"});
+  const RunResult result = run("back.png");
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_THAT(result.err, HasSubstr("warning: "));
+  EXPECT_THAT(result.err, HasSubstr("elevation = raw * 0.5 + -100"));
+  const Raster tiff = restore("back.tif");
+  EXPECT_EQ(tiff.info.z_scale, 0.5);
+  EXPECT_EQ(tiff.info.z_offset, -100.0);
+}
+
+TEST_F(RestoreCommand, WrongUseIsOneClearLine) {
+  expect_refused(run("back.tif"), 1, "a.isohf: cannot open: No such file");
+  write_file(folder / "a.isohf", "no archive");
+  expect_refused(run("back.tif"), 1, "is no isohf archive");
+  expect_refused(run_isohf({"restore", kCoast, folder / "back.tif"}), 1, "is no isohf archive");
+  convert(kCoast);
+  write_file(folder / "back.tif", "precious");
+  expect_refused(run("back.tif"), 2, "back.tif: exists; --overwrite replaces it");
+  EXPECT_EQ(read_file(folder / "back.tif"), "precious");
+  expect_refused(run("a.isohf", {"--overwrite"}), 2, "is the input");
+  expect_refused(run("back.jpg"), 1, "no writer for the extension \".jpg\"");
+  expect_refused(run("none/back.tif"), 1, "none: No such file or directory");
+  expect_refused(run("back.hgt"), 1, "not 512 x 384");
+  expect_refused(run("new.tif", {"--method", "cubic"}), 2, "must be barycentric or hex");
+  expect_refused(run("new.tif", {"--size", "0x3"}), 2, "COLUMNSxROWS");
+  expect_refused(run("new.tif", {"--spacing", "-1"}), 2, "a number greater than 0");
+  expect_refused(run("new.tif", {"--spacing", "1e-9"}), 2, "must be 1...2147483647");
+  expect_refused(run("new.tif", {"--like", folder / "none.tif"}), 1, "none.tif: no such file");
+  expect_refused(run("new.tif", {"--like", kCoast, "--size", "3x3"}), 2, "--like excludes --size");
+  EXPECT_EQ(folder.names(), (std::vector<std::string>{"a.isohf", "back.tif"}));
+}
+
+TEST_F(RestoreCommand, FullDiskLeavesNothing) {
+  convert(kPeaks, {"--lossless"});
+  RunOptions full;
+  full.file_size_limit_bytes = 20000;
+  for (const char* name : {"back.tif", "back.exr", "back.png"}) {
+    expect_refused(run(name, {}, full), 1, std::string(name) + ": ");
+    expect_refused(run(name, {"--method", "hex"}, full), 1, std::string(name) + ": ");
+  }
+  expect_refused(run("back.hgt", {"--size", "1201x1201", "--clamp-range"}, full), 1, "back.hgt: ");
+  EXPECT_EQ(folder.names(), std::vector<std::string>{"a.isohf"});
+}
+
+/// Changes one byte in the middle of a member's compressed bytes.
+void damage_member(const std::string& path, const std::string& name) {
+  std::string bytes = read_file(path);
+  const std::size_t local = bytes.find(name) + name.size();
+  const std::size_t next = bytes.find("PK\x03\x04", local);
+  bytes[local + (next - local) / 2] ^= 0x10;
+  write_file(path, bytes);
+}
+
+TEST_F(RestoreCommand, DamageToWhatLosslessKeptIsExitCode3) {
+  for (const char* member : {"residual/00000000", "tiles/0/1.tile"}) {
+    SCOPED_TRACE(member);
+    convert(kCoast, {"--lossless"});
+    damage_member(folder / "a.isohf", member);
+    const bool tile = std::string(member).starts_with("tiles");
+    expect_refused(run("back.tif"), 3, tile ? "tile (1,0)" : "member \"residual/00000000\"");
+    expect_refused(run("back.exr"), 3, tile ? "tile (1,0)" : "member \"residual/00000000\"");
+    EXPECT_EQ(run_isohf({"verify", folder / "a.isohf", "-q"}).exit_code, 3);
+    EXPECT_EQ(folder.names(), std::vector<std::string>{"a.isohf"});
+  }
+  // Nothing was promised of the surface alone.
+  convert(kCoast);
+  damage_member(folder / "a.isohf", "tiles/0/1.tile");
+  expect_refused(run("back.tif"), 1, "tile (1,0)");
+}
+
+TEST_F(RestoreCommand, LosslessBytesDoNotDependOnThreadsOrMemory) {
+  convert(kCoast, {"--lossless", "--shape", "36x35", "--levels", "3"});
+  const std::string one = read_file(folder / "a.isohf");
+  for (const std::vector<std::string>& more :
+       {std::vector<std::string>{"-j", "1"}, {"-j", "7"}, {"--memory", "4G"}, {"-j", "2", "--memory", "500M"}}) {
+    std::vector<std::string> all = {"--lossless", "--shape", "36x35", "--levels", "3"};
+    all.insert(all.end(), more.begin(), more.end());
+    convert(kCoast, all);
+    EXPECT_TRUE(read_file(folder / "a.isohf") == one) << testing::PrintToString(more);
+  }
+  (void)restore("back.tif");
+  const std::string back = read_file(folder / "back.tif");
+  (void)restore("back.tif", {"-j", "1"});
+  EXPECT_TRUE(read_file(folder / "back.tif") == back);
+}
+
+class LosslessInterrupt : public RestoreCommand, public testing::WithParamInterface<const char*> {};
+
+TEST_P(LosslessInterrupt, ResumingGivesTheSameBytes) {
+  std::uint32_t state = 1;
+  write_int16_tiff(folder / "big.tif", 3000, 2000, [&](std::int64_t c, std::int64_t r) {
+    state = state * 1664525U + 1013904223U;
+    return static_cast<std::int16_t>(500.0 * std::sin(static_cast<double>(c + r) * 0.01) + (state >> 29U));
+  });
+  const auto command = [&](const std::string& output, bool resume) {
+    std::vector<std::string> all = {isohf_path(), "convert", folder / "big.tif", folder / output, "--lossless",
+                                    "--progress", "json"};
+    if (resume) all.emplace_back("--resume");
+    return all;
+  };
+  RunningProgram program(command("a.isohf", false));
+  ASSERT_TRUE(program.wait_for_error_text(std::string("\"progress\":\"") + GetParam() + "\""));
+  program.send(SIGINT);
+  const RunResult stopped = program.wait();
+  ASSERT_EQ(stopped.exit_code, 130) << stopped.err;
+  EXPECT_EQ(folder.names(), (std::vector<std::string>{"a.isohf.part", "a.isohf.part.journal", "big.tif"}));
+  const RunResult resumed = run_program(command("a.isohf", true));
+  ASSERT_EQ(resumed.exit_code, 0) << resumed.err;
+  ASSERT_EQ(run_program(command("straight.isohf", false)).exit_code, 0);
+  EXPECT_TRUE(read_file(folder / "a.isohf") == read_file(folder / "straight.isohf"));
+  (void)restore("back.tif");
+  const auto samples = [](const std::string& path) { return read_raster(path).heights; };
+  EXPECT_TRUE(samples(folder / "back.tif") == samples(folder / "big.tif"));
+}
+
+INSTANTIATE_TEST_SUITE_P(InEachPass, LosslessInterrupt, testing::Values("tiles", "residuals"));
+
+}  // namespace
+}  // namespace isohf::test
