@@ -1,6 +1,7 @@
 #include "headless.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -166,6 +167,13 @@ int verify(const TileSource& source, const Options& options) {
              report.tiles, grouped(report.pictures), grouped(report.pixels), grouped(report.vertices),
              grouped(report.shared_vertices), grouped(report.seam_pixels));
   fmt::print("worst height {:.4f} codes, worst normal {:.2e}\n", report.worst_height, report.worst_normal);
+  if (!report.suns_deg.empty()) {
+    fmt::print(
+        "shadows: suns of {:g} degrees, East and West, {} vertices, worst {:.4f} codes, share of the sun {:.2e}\n",
+        fmt::join(report.suns_deg, ", "), grouped(report.shadow_vertices), report.worst_shadow, report.worst_share);
+  } else {
+    fmt::print("shadows: the archive has no shadow seeds\n");
+  }
   if (report.passed()) {
     fmt::print("{}: archive, index arrays and shaders agree\n", options.archive);
     return 0;

@@ -21,6 +21,8 @@ TileProbe::TileProbe(const TileGrid& grid, const SharedGeometry& shared, double 
       shared_(shared),
       solid_("probe", false, probe_fragment_shader(false)),
       voids_("probe", true, probe_fragment_shader(true)),
+      solid_shadow_("shadow probe", false, shadow_probe_fragment_shader(false)),
+      voids_shadow_("shadow probe", true, shadow_probe_fragment_shader(true)),
       solid_feedback_("capture", false, probe_fragment_shader(false), {"gl_Position", "v_facing", "v_place"}),
       voids_feedback_("capture", true, probe_fragment_shader(true), {"gl_Position", "v_facing", "v_place"}),
       target_(largest(MeshOracle(grid.shape()).windows(), &PixelWindow::width),
@@ -29,7 +31,7 @@ TileProbe::TileProbe(const TileGrid& grid, const SharedGeometry& shared, double 
   frame_.code_slope = code_height;
 }
 
-void TileProbe::begin(bool voids, const PixelWindow& window) {
+void TileProbe::begin(const TerrainProgram& program, const PixelWindow& window) {
   // Straight down, North up: clip x and y from x and -z, nearer where higher.
   Mat4 clip;
   clip.at(0, 0) = 2.0 * kPixelsPerX / (grid_.sigma_x() * target_.width());
@@ -40,7 +42,6 @@ void TileProbe::begin(bool voids, const PixelWindow& window) {
   clip.at(2, 3) = 0.9;
   clip.at(3, 3) = 1.0;
   frame_.clip_from_eye = clip;
-  const TerrainProgram& program = voids ? voids_ : solid_;
   target_.bind();
   glViewport(0, 0, target_.width(), target_.height());
   glClearColor(0.0F, 0.0F, 0.0F, 0.0F);
@@ -67,7 +68,19 @@ void TileProbe::draw_mesh(const TileSlot& slot, int level, bool cull) {
 
 void TileProbe::draw_level(const TileSlot& slot, bool voids, int level, const PixelWindow& window, bool cull,
                            std::vector<float>& out) {
-  begin(voids, window);
+  begin(voids ? voids_ : solid_, window);
+  add_up(slot, level, cull, out);
+}
+
+void TileProbe::draw_shadow(const TileSlot& slot, bool voids, int level, const PixelWindow& window, double softness,
+                            std::vector<float>& out) {
+  const TerrainProgram& program = voids ? voids_shadow_ : solid_shadow_;
+  begin(program, window);
+  glUniform1f(program.uniform("shadow_gain"), static_cast<float>(2.0 / softness));
+  add_up(slot, level, true, out);
+}
+
+void TileProbe::add_up(const TileSlot& slot, int level, bool cull, std::vector<float>& out) {
   glDisable(GL_DEPTH_TEST);
   glEnable(GL_BLEND);
   glBlendFunc(GL_ONE, GL_ONE);
@@ -78,7 +91,7 @@ void TileProbe::draw_level(const TileSlot& slot, bool voids, int level, const Pi
 
 void TileProbe::draw_blend(const TileSlot& slot, bool voids, const LodBlend& blend, const PixelWindow& window,
                            std::vector<float>& out) {
-  begin(voids, window);
+  begin(voids ? voids_ : solid_, window);
   begin_opaque_pass();
   draw_mesh(slot, blend.first, true);
   if (blend.alpha > 0.0 && blend.second != blend.first) {

@@ -29,12 +29,17 @@ class TileProbe {
   /// The two-stage transition, by the same passes as pictures.
   void draw_blend(const TileSlot& slot, bool voids, const LodBlend& blend, const PixelWindow& window,
                   std::vector<float>& out);
+  /// What the fragment shader makes of the shadow, strip and stitch of one level added up: (share of the sun, shadow
+  /// height above the ground in codes, 0, count). softness is k of Eq. 16 in codes.
+  void draw_shadow(const TileSlot& slot, bool voids, int level, const PixelWindow& window, double softness,
+                   std::vector<float>& out);
   /// All stored vertices; padding gets no sensible normal.
   void capture(const TileSlot& slot, bool voids, std::vector<ProbedVertex>& out);
   [[nodiscard]] int width() const { return target_.width(); }  ///< pixels of a row of the pictures
 
  private:
-  void begin(bool voids, const PixelWindow& window);
+  void begin(const TerrainProgram& program, const PixelWindow& window);
+  void add_up(const TileSlot& slot, int level, bool cull, std::vector<float>& out);
   void draw_mesh(const TileSlot& slot, int level, bool cull);
 
   const TileGrid& grid_;
@@ -42,6 +47,8 @@ class TileProbe {
   TerrainFrame frame_;
   TerrainProgram solid_;
   TerrainProgram voids_;
+  TerrainProgram solid_shadow_;
+  TerrainProgram voids_shadow_;
   TerrainProgram solid_feedback_;
   TerrainProgram voids_feedback_;
   Offscreen target_;

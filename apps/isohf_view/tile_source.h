@@ -51,6 +51,8 @@ class TileSource {
   [[nodiscard]] virtual TileBounds bounds(TileIndex tile) const = 0;
   /// codes [C x R] out, 0..65534, or kVoidCode. Throws Error naming the tile.
   virtual void read(TileIndex tile, std::span<std::uint16_t> codes) const = 0;
+  /// True where codes are rounded from finer heights, from which shadows are computed.
+  [[nodiscard]] virtual bool rounds() const { return false; }
   /// The record of the shadow seeds; nullptr where the source has none.
   [[nodiscard]] virtual const ShadowSeedInfo* shadow_seeds() const { return nullptr; }
   /// Reads a tile with its shadow heights, from no other tile. sun must be one that the seeds hold for.

@@ -21,6 +21,8 @@ enum class Check {
   kTransition = 8,  ///< heights while one level fades into the next
   kCrack = 9,       ///< no background shows between tiles, at any pair of levels
   kMesh = 10,       ///< triangles join side to side, and meet the full-detail border
+  kShadow = 11,     ///< shadow height of each vertex as the shader has it, against shadows carried along the row
+  kSunShare = 12,   ///< the share of the sun inside triangles (Eq. 16)
 };
 [[nodiscard]] std::string to_string(Check check);
 
@@ -30,13 +32,14 @@ struct Finding {
   TileIndex tile;
   double level = 0.0;      ///< fractional in transitions
   std::string where;       ///< place, what was found, what was required
-  double deviation = 0.0;  ///< codes, normal components, or pixels not drawn once
+  double deviation = 0.0;  ///< codes, normal components, shares of the sun, or pixels not drawn once
   std::int64_t count = 1;  ///< places at fault
 };
 
 struct VerifyOptions {
   std::vector<double> fractions{0.25, 0.5, 0.8};  ///< β of the transitions looked at between each two levels
   bool seams = true;
+  bool shadows = true;  ///< where the source has seeds
   /// Called now and then with tiles done and all tiles.
   std::function<void(std::int64_t, std::int64_t)> progress;
 };
@@ -48,7 +51,11 @@ struct VerifyReport {
   std::int64_t vertices = 0;
   std::int64_t shared_vertices = 0;  ///< compared between tiles
   std::int64_t seam_pixels = 0;      ///< of oblique and perspective pictures
-  double worst_height = 0.0;         ///< codes, within tolerance or not
+  std::int64_t shadow_vertices = 0;
+  std::vector<double> suns_deg;  ///< that shadows were looked at for, from either side
+  double worst_shadow = 0.0;     ///< codes
+  double worst_share = 0.0;      ///< of the sun
+  double worst_height = 0.0;     ///< codes, within tolerance or not
   double worst_normal = 0.0;
   std::int64_t failures = 0;      ///< findings in all
   std::vector<Finding> findings;  ///< at most kMaxFindings, the first ones

@@ -7,54 +7,12 @@
 
 #include "isohf/base/error.h"
 #include "isohf/lattice/lod.h"
+#include "verify_places.h"
 
 namespace isohf::view {
 namespace {
 
-// Why the tolerances are what they are: codes and unit normals pass through 32-bit interpolation, whose planes are
-// told from the picture's corner: an error of about spread·2^-21 for each pixel of distance, where spread is the
-// difference that a triangle spans. The fixed parts are float roundings of 65535 and of 1.
-constexpr double kCodeTolerance = 0.05;
-constexpr double kNormalTolerance = 1e-4;
-constexpr double kPerPixel = 1.0 / (1 << 21);
-
-/// Keeps the worst of many deviations and how many there were.
-class Worst {
- public:
-  template <typename Describe>
-  void add(double deviation, Describe&& describe) {
-    ++count_;
-    if (!(deviation > worst_) && count_ > 1) return;
-    worst_ = deviation;
-    where_ = describe();
-  }
-  [[nodiscard]] bool any() const { return count_ > 0; }
-  [[nodiscard]] Finding finding(Check check, TileIndex tile, double level) const {
-    return {check, tile, level, where_, worst_, count_};
-  }
-
- private:
-  double worst_ = -1.0;
-  std::int64_t count_ = 0;
-  std::string where_;
-};
-
-std::string vertex_name(GridVertex vertex) {
-  return fmt::format("vertex (c {}, r {})", vertex.column, vertex.row);
-}
-
-/// "object (12.25, 3.5), triangle of vertices (c, r) ..."
-std::string pixel_name(const TileShape& shape, const PixelWindow& window, int i, int j, const PixelSample& sample) {
-  std::string text = fmt::format("object space ({:.2f}, {:.2f})", (window.x0 + i + 0.5) / kPixelsPerX,
-                                 (window.z0 + j + 0.5) / kPixelsPerZ);
-  if (sample.weights[0] + sample.weights[1] + sample.weights[2] < 0.5F) return text + ", outside the tile";
-  text += ", triangle";
-  for (const std::uint32_t vertex : sample.vertices) {
-    const auto columns = static_cast<std::uint32_t>(shape.columns());
-    text += fmt::format(" (c {}, r {})", vertex % columns, vertex / columns);
-  }
-  return text;
-}
+constexpr double kNormalTolerance = 1e-4;  ///< float roundings of 1
 
 std::uint64_t lattice_key(LatticeVertex vertex) {
   return static_cast<std::uint64_t>(vertex.x) * 0x1000000000U + (static_cast<std::uint64_t>(vertex.z) & 0xFFFFFFFFFU);
@@ -62,13 +20,13 @@ std::uint64_t lattice_key(LatticeVertex vertex) {
 
 }  // namespace
 
-TileVerifier::TileVerifier(const TileSource& source, const SharedGeometry& shared, const VerifyOptions& options,
-                           VerifyReport& report)
+TileVerifier::TileVerifier(const TileSource& source, const SharedGeometry& shared, MeshOracle& oracle, TileProbe& probe,
+                           const VerifyOptions& options, VerifyReport& report)
     : source_(source),
       options_(options),
       report_(report),
-      oracle_(source.grid().shape()),
-      probe_(source.grid(), shared, source.scale().scale),
+      oracle_(oracle),
+      probe_(probe),
       slot_(shared),
       codes_(static_cast<std::size_t>(source.grid().shape().stored_vertex_count())),
       normals_(codes_.size()) {}

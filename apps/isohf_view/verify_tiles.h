@@ -14,8 +14,8 @@ namespace isohf::view {
 /// The checks that need one tile at a time, and those between a tile and the ones before it in flat order.
 class TileVerifier {
  public:
-  TileVerifier(const TileSource& source, const SharedGeometry& shared, const VerifyOptions& options,
-               VerifyReport& report);
+  TileVerifier(const TileSource& source, const SharedGeometry& shared, MeshOracle& oracle, TileProbe& probe,
+               const VerifyOptions& options, VerifyReport& report);
 
   /// Tiles in flat-index order.
   void verify(TileIndex tile);
@@ -39,8 +39,8 @@ class TileVerifier {
   const TileSource& source_;
   const VerifyOptions& options_;
   VerifyReport& report_;
-  MeshOracle oracle_;
-  TileProbe probe_;
+  MeshOracle& oracle_;
+  TileProbe& probe_;
   TileSlot slot_;
   std::vector<std::uint16_t> codes_;
   std::vector<Normal> normals_;

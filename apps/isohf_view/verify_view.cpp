@@ -2,6 +2,7 @@
 
 #include "verify_mesh.h"
 #include "verify_seams.h"
+#include "verify_shadows.h"
 #include "verify_tiles.h"
 
 namespace isohf::view {
@@ -28,6 +29,10 @@ std::string to_string(Check check) {
       return "cracks";
     case Check::kMesh:
       return "mesh";
+    case Check::kShadow:
+      return "shadows";
+    case Check::kSunShare:
+      return "share of the sun";
   }
   return "unknown";
 }
@@ -38,10 +43,15 @@ VerifyReport verify_view(const TileSource& source, const IndexArrays& arrays, co
   const SharedGeometry shared(grid.shape(), arrays);
   verify_mesh(shared, report);
   {
-    TileVerifier tiles(source, shared, options, report);
+    MeshOracle oracle(grid.shape());
+    TileProbe probe(grid, shared, source.scale().scale);
+    TileVerifier tiles(source, shared, oracle, probe, options, report);
     for (std::int64_t flat = 0; flat < grid.tile_count(); ++flat) {
       tiles.verify(grid.tile_at(flat));
       if (options.progress) options.progress(flat + 1, grid.tile_count());
+    }
+    if (options.shadows && source.shadow_seeds() != nullptr) {
+      ShadowVerifier(source, shared, oracle, probe, options, report).verify();
     }
   }
   if (options.seams) SeamVerifier(source, shared, report).verify();

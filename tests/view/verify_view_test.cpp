@@ -193,6 +193,84 @@ TEST_F(VerifyViewTest, FindsShiftedPadding) {
       Check::kShared, "the North padding row is one column off");
 }
 
+ShadowSeedInfo low_suns() {
+  ShadowSeedInfo seeds;
+  seeds.sun_min_deg = 3.0;
+  return seeds;
+}
+
+TEST_F(VerifyViewTest, PassesOnSoundShadows) {
+  MemorySource source(tiny_grid());
+  source.set_seeds(low_suns());
+  const VerifyReport report = verify_view(source, make_index_arrays(source.grid().shape()), quick(false));
+  EXPECT_TRUE(report.passed()) << text_of(report);
+  EXPECT_EQ(report.suns_deg.size(), 4U);
+  EXPECT_EQ(report.shadow_vertices, 4 * 2 * 6 * source.grid().shape().visible_vertex_count());
+  // Half a code is what rounding costs, and it does: there are shadows.
+  EXPECT_GT(report.worst_shadow, 0.3);
+}
+
+TEST_F(VerifyViewTest, PassesOnShadowsAcrossVoids) {
+  const TileGrid grid = tiny_grid();
+  MemorySource source(grid, [&](TileIndex tile, std::vector<std::uint16_t>& codes) {
+    for (int row = 0; row < grid.shape().rows(); ++row) {
+      for (int column = 0; column < grid.shape().columns(); ++column) {
+        const LatticeVertex at = grid.lattice_vertex(tile, {column, row});
+        if (std::abs(at.x - 32) + std::abs(at.z - 24) < 7 || at.x > 63) {
+          codes[static_cast<std::size_t>(row * grid.shape().columns() + column)] = kVoidCode;
+        }
+      }
+    }
+  });
+  source.set_seeds(low_suns());
+  const VerifyReport report = verify_view(source, make_index_arrays(grid.shape()), quick(false));
+  EXPECT_TRUE(report.passed()) << text_of(report);
+}
+
+/// Tile (1,1) alone is told something wrong of the shadows that enter it; findings name it, a vertex and the sun.
+void expect_seeds_found(const std::function<void(std::vector<double>&)>& spoil, const std::string& what) {
+  MemorySource source(tiny_grid());
+  source.set_seeds(low_suns(), [&](TileIndex tile, LightTravel travel, std::vector<double>& entering) {
+    if (tile == TileIndex{1, 1} && travel == LightTravel::kWestward) spoil(entering);
+  });
+  const VerifyReport report = verify_view(source, make_index_arrays(source.grid().shape()), quick(false));
+  EXPECT_FALSE(report.passed()) << what;
+  for (const Finding& finding : report.findings) {
+    EXPECT_EQ(finding.check, Check::kShadow) << what;
+    EXPECT_EQ(finding.tile, (TileIndex{1, 1})) << what;
+    EXPECT_NE(finding.where.find("vertex (c "), std::string::npos) << what;
+    EXPECT_NE(finding.where.find("sun in the East at "), std::string::npos) << what;
+  }
+}
+
+TEST_F(VerifyViewTest, FindsBrokenSeeds) {
+  expect_seeds_found([](std::vector<double>& s) { std::rotate(s.begin(), s.begin() + 1, s.end()); },
+                     "seeds of one row further South");
+  expect_seeds_found([](std::vector<double>& s) { std::rotate(s.begin(), s.end() - 1, s.end()); },
+                     "seeds of one row further North");
+  expect_seeds_found([](std::vector<double>& s) { std::fill(s.begin(), s.end(), kNoShadow); }, "no seeds");
+  expect_seeds_found(
+      [](std::vector<double>& s) {
+        for (double& height : s) height += 3.0;
+      },
+      "shadows three codes too high");
+  expect_seeds_found([](std::vector<double>& s) { s[s.size() / 2] = 65000.0; }, "one caster in one row too many");
+}
+
+TEST_F(VerifyViewTest, NamesTilesWhoseSeedsCannotBeRead) {
+  MemorySource source(tiny_grid());
+  source.set_seeds(low_suns(), [](TileIndex tile, LightTravel, std::vector<double>&) {
+    if (tile == TileIndex{2, 0}) throw Error(ErrorCode::kCorrupt, "member \"seeds/0/2.seed\" is broken");
+  });
+  const VerifyReport report = verify_view(source, make_index_arrays(source.grid().shape()), quick(false));
+  EXPECT_FALSE(report.passed());
+  for (const Finding& finding : report.findings) {
+    EXPECT_EQ(finding.check, Check::kShadow);
+    EXPECT_EQ(finding.tile, (TileIndex{2, 0}));
+    EXPECT_NE(finding.where.find("seeds/0/2.seed"), std::string::npos);
+  }
+}
+
 TEST_F(VerifyViewTest, FindsOneWrongElevationOnAnEdge) {
   const int columns = tiny_grid().shape().columns();
   expect_tile_found(
