@@ -60,29 +60,28 @@ class ArchiveSource final : public TileSource {
 
   void read_lit(TileIndex tile, const RowSun& sun, std::span<std::uint16_t> codes,
                 std::span<std::uint16_t> shadow) const override {
-    TileCodes stored = reader_.read_tile(tile);
+    const TileCodes stored = reader_.read_tile(tile);
     convert(stored, codes);
-    // Shadow heights are found in stored codes, which floats hold exactly.
-    const Quantisation& quantisation = reader_.metadata().quantisation;
+    // Shadow heights are found in the viewer's codes, unrounded: single precision holds these to 1/256 of a code.
     std::vector<double> entering = seeds_->entering(tile, stored, sun.travel, sun.elevation_deg);
-    for (double& height : entering) height = (height - quantisation.offset) / quantisation.scale;
-    const ShadowLight light{
-        sun.travel, seeds_->info().fall_per_half_step(grid(), quantisation, sun.elevation_deg) / grid().sigma_x()};
-    if (!is_float()) {
-      stored.heights.resize(stored.codes.size());
-      const std::uint32_t void_code = quantisation.void_code();
-      std::transform(stored.codes.begin(), stored.codes.end(), stored.heights.begin(), [=](std::uint16_t code) {
-        return code == void_code ? std::numeric_limits<float>::quiet_NaN() : static_cast<float>(code);
+    for (double& height : entering) height = exact_code_of(height);
+    std::vector<float> heights(codes.size());
+    if (is_float()) {
+      std::transform(stored.heights.begin(), stored.heights.end(), heights.begin(),
+                     [this](float height) { return static_cast<float>(exact_code_of(height)); });
+    } else {
+      std::transform(codes.begin(), codes.end(), heights.begin(), [](std::uint16_t code) {
+        return code == kVoidCode ? std::numeric_limits<float>::quiet_NaN() : static_cast<float>(code);
       });
     }
+    const Quantisation unit{CodeType::kF32, 0.0, scale_.scale / world_per_elevation_};  // elevation units of a code
+    const double fall = seeds_->info().fall_per_half_step(grid(), unit, sun.elevation_deg) / grid().sigma_x();
     const TileShape& shape = grid().shape();
-    std::vector<float> heights(stored.heights.size());
-    tile_shadow(grid(), View2D<const float>(stored.heights.data(), shape.columns(), shape.rows()), light, entering,
-                View2D<float>(heights.data(), shape.columns(), shape.rows()), {});
-    std::transform(heights.begin(), heights.end(), shadow.begin(), [this](float height) {
-      if (!std::isfinite(height)) return std::uint16_t{0};
-      return is_float() ? code_of(height) : rounded(height);
-    });
+    std::vector<float> lit(codes.size());
+    tile_shadow(grid(), View2D<const float>(heights.data(), shape.columns(), shape.rows()), {sun.travel, fall},
+                entering, View2D<float>(lit.data(), shape.columns(), shape.rows()), {});
+    std::transform(lit.begin(), lit.end(), shadow.begin(),
+                   [](float height) { return std::isfinite(height) ? rounded(height) : std::uint16_t{0}; });
   }
 
  private:
@@ -90,9 +89,10 @@ class ArchiveSource final : public TileSource {
   [[nodiscard]] static std::uint16_t rounded(double code) {
     return static_cast<std::uint16_t>(std::clamp(std::round(code), 0.0, kVoidCode - 1.0));
   }
-  [[nodiscard]] std::uint16_t code_of(float elevation) const {
-    return rounded((elevation * world_per_elevation_ - scale_.offset) / scale_.scale);
+  [[nodiscard]] double exact_code_of(double elevation) const {
+    return (elevation * world_per_elevation_ - scale_.offset) / scale_.scale;
   }
+  [[nodiscard]] std::uint16_t code_of(float elevation) const { return rounded(exact_code_of(elevation)); }
 
   void convert(const TileCodes& stored, std::span<std::uint16_t> codes) const {
     if (stored.type == CodeType::kF32) {

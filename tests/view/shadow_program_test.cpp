@@ -1,0 +1,106 @@
+// The real programs: what convert stores, the viewer draws and checks.
+#include <gtest/gtest.h>
+
+#include "gl_test.h"
+#include "support/run_program.h"
+#include "support/temporary_folder.h"
+
+namespace isohf::test {
+namespace {
+
+class ShadowProgramTest : public GlTest {
+ protected:
+  void convert(const std::vector<std::string>& options, const std::string& source = "coast_512x384_int16.tif") const {
+    std::vector<std::string> command{"convert", ISOHF_SOURCE_DIR "/testdata/" + source,
+                                     archive(), "--overwrite",
+                                     "--quiet", "--density",
+                                     "0.1",     "--shape",
+                                     "52x59",   "--levels",
+                                     "3"};
+    command.insert(command.end(), options.begin(), options.end());
+    const RunResult result = run_isohf(command);
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+  }
+  [[nodiscard]] RunResult view(const std::vector<std::string>& options) const {
+    std::vector<std::string> command{ISOHF_BIN_DIR "/isohf-view", archive()};
+    command.insert(command.end(), options.begin(), options.end());
+    return run_program(command);
+  }
+  [[nodiscard]] std::string picture(const std::vector<std::string>& options) const {
+    std::vector<std::string> all{"--screenshot", folder_ / "a.png", "--size", "200x150"};
+    all.insert(all.end(), options.begin(), options.end());
+    const RunResult result = view(all);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_EQ(result.err, "");
+    return read_file(folder_ / "a.png");
+  }
+  [[nodiscard]] std::string archive() const { return folder_ / "a.isohf"; }
+
+  const TemporaryFolder folder_;
+};
+
+TEST_F(ShadowProgramTest, DrawsShadowsUnlessToldNotTo) {
+  convert({"--shadow-seeds", "--type", "f32"});
+  const std::string lit = picture({"--sun", "90,6"});
+  EXPECT_EQ(picture({"--sun", "90,6", "--shadows", "on"}), lit);
+  const std::string plain = picture({"--sun", "90,6", "--shadows", "off"});
+  EXPECT_NE(plain, lit);
+  EXPECT_NE(picture({"--sun", "90,6", "--shadow-softness", "200"}), lit);
+  // No shadows from a sun due North, and none at night.
+  EXPECT_EQ(picture({"--sun", "0,6"}), picture({"--sun", "0,6", "--shadows", "off"}));
+  EXPECT_EQ(picture({"--sun", "90,-3"}), picture({"--sun", "90,-3", "--shadows", "off"}));
+}
+
+TEST_F(ShadowProgramTest, DrawsArchivesWithoutSeedsAndRefusesToShadeThem) {
+  convert({});
+  EXPECT_EQ(picture({"--sun", "90,6"}), picture({"--sun", "90,6", "--shadows", "off"}));
+  const RunResult refused = view({"--shadows", "on", "--screenshot", folder_ / "b.png"});
+  EXPECT_EQ(refused.exit_code, 1);
+  EXPECT_EQ(std::count(refused.err.begin(), refused.err.end(), '\n'), 1) << refused.err;
+  EXPECT_NE(refused.err.find("--shadow-seeds"), std::string::npos);
+  EXPECT_EQ(view({"--shadows", "dim", "--screenshot", folder_ / "b.png"}).exit_code, 2);
+  const RunResult verified = view({"--verify"});
+  EXPECT_EQ(verified.exit_code, 0) << verified.out;
+  EXPECT_NE(verified.out.find("no shadow seeds"), std::string::npos);
+}
+
+TEST_F(ShadowProgramTest, VerifiesSeedsAndNamesAFlippedMember) {
+  convert({"--shadow-seeds"});
+  const RunResult good = view({"--verify"});
+  EXPECT_EQ(good.exit_code, 0) << good.out << good.err;
+  // One bit in the middle of a member's data, which begins behind the name in its local header.
+  std::string bytes = read_file(archive());
+  const std::string name = "seeds/0/1.seed";
+  const std::size_t at = bytes.find(name);
+  ASSERT_NE(at, std::string::npos);
+  bytes[at + name.size() + 40] = static_cast<char>(bytes[at + name.size() + 40] ^ 4);
+  write_file(archive(), bytes);
+  const RunResult bad = view({"--verify"});
+  EXPECT_EQ(bad.exit_code, 3) << bad.err;
+  EXPECT_NE(bad.out.find("shadows: tile (1,0)"), std::string::npos) << bad.out;
+  EXPECT_NE(bad.out.find(name), std::string::npos) << bad.out;
+  const RunResult refused = view({"--sun", "90,6", "--screenshot", folder_ / "b.png"});
+  EXPECT_EQ(refused.exit_code, 1);
+  EXPECT_NE(refused.err.find(name), std::string::npos) << refused.err;
+}
+
+TEST_F(ShadowProgramTest, NamesTilesThatHaveTheSeedsOfOthers) {
+  convert({"--shadow-seeds"});
+  // Two members change names: each is sound in itself, but belongs elsewhere.
+  std::string bytes = read_file(archive());
+  for (std::size_t at = bytes.find("seeds/"); at != std::string::npos; at = bytes.find("seeds/", at + 14)) {
+    const std::string name = bytes.substr(at, 14);
+    if (name == "seeds/0/1.seed") bytes.replace(at, 14, "seeds/1/1.seed");
+    if (name == "seeds/1/1.seed") bytes.replace(at, 14, "seeds/0/1.seed");
+  }
+  write_file(archive(), bytes);
+  const RunResult bad = view({"--verify"});
+  EXPECT_EQ(bad.exit_code, 3) << bad.out << bad.err;
+  for (const std::string tile : {"shadows: tile (1,0)", "shadows: tile (1,1)"}) {
+    EXPECT_NE(bad.out.find(tile), std::string::npos) << bad.out;
+  }
+  EXPECT_EQ(bad.out.find("shadows: tile (0,"), std::string::npos) << bad.out;
+}
+
+}  // namespace
+}  // namespace isohf::test
