@@ -9,7 +9,9 @@ namespace isohf {
 namespace {
 
 constexpr std::size_t kSymbols = 256;
-constexpr std::uint64_t kTableBits = 150;    // of a context beside its code lengths: threshold, count, block header
+constexpr std::uint64_t kTableBits = 150;      // of a context beside its code lengths: threshold, count, block header
+constexpr std::size_t kSymbolsToThin = 16384;  // from this many on, one in kThinning says enough
+constexpr std::size_t kThinning = 3;
 constexpr std::uint64_t kBitsPerSymbol = 3;  // of a code length in a block header
 
 /// log2 of 1 + i/256 in 2^-16, by repeated squaring.
@@ -72,13 +74,14 @@ std::uint8_t choose_activity_shift(std::span<const std::uint32_t> activities) {
 
 std::vector<std::uint16_t> choose_thresholds(std::span<const std::uint8_t> symbols,
                                              std::span<const std::uint16_t> levels) {
+  const std::size_t thinning = symbols.size() >= kSymbolsToThin ? kThinning : 1;
   std::vector<std::uint32_t> histogram(kActivityLimit);
-  for (const std::uint16_t level : levels) ++histogram[level];
+  for (std::size_t i = 0; i < levels.size(); i += thinning) ++histogram[levels[i]];
 
   // Start from ranges of about equal count...
   std::vector<Group> groups;
   std::vector<std::uint8_t> group_of(kActivityLimit);
-  const std::uint64_t share = symbols.size() / kMaxContexts + 1;
+  const std::uint64_t share = symbols.size() / thinning / kMaxContexts + 1;
   std::uint64_t in_group = 0;
   for (unsigned at = 0; at < kActivityLimit; ++at) {
     group_of[at] = static_cast<std::uint8_t>(groups.size());
@@ -89,7 +92,9 @@ std::vector<std::uint16_t> choose_thresholds(std::span<const std::uint8_t> symbo
     }
   }
   groups.push_back({kActivityLimit, {}});
-  for (std::size_t i = 0; i < symbols.size(); ++i) ++groups[group_of[levels[i]]].counts[symbols[i]];
+  for (std::size_t i = 0; i < symbols.size(); i += thinning) {
+    groups[group_of[levels[i]]].counts[symbols[i]] += static_cast<std::uint32_t>(thinning);
+  }
 
   // ... and join the two neighbours whose joining saves most, while any does.
   const Group nothing{};

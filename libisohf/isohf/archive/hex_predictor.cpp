@@ -6,7 +6,7 @@
 #include <memory>
 #include <optional>
 
-#include "isohf/archive/vectorised.h"
+#include "isohf/base/vectorised.h"
 
 namespace isohf {
 namespace {
@@ -39,9 +39,10 @@ struct Neighbours {
   }
 };
 
+/// `out` is none of the lattice's rows; the compiler has to be told so, or it does not vectorise.
 template <typename Wide>
 inline void predict_places(const Neighbours<Wide>& at, const PredictorWeights& weights, Wide low, Wide high,
-                           Wide* out) {
+                           Wide* __restrict out) {
   const Wide* const own = at.own;
   const Wide* const north = at.north;
   const Wide* const far = at.far;
@@ -55,20 +56,21 @@ inline void predict_places(const Neighbours<Wide>& at, const PredictorWeights& w
                      w[6] * (far[c + 1] - ne) + w[7] * (far[c - 1] - ne) + w[8] * (far[c + 2] - ne) +
                      w[9] * (far[c - 2] - ne) + w[10] * (farther[c] - ne) + w[11] * (farther[c - 1] - ne);
     const Wide value = ne + ((sum + kRounding) >> kWeightBits);
-    out[c] = std::min(std::max(value, low), high);
+    const Wide raised = value < low ? low : value;
+    out[c] = raised > high ? high : raised;
   }
 }
 
 // Only free functions can be cloned for several machines, not templates.
 ISOHF_VECTORISED void predict_codes(const Neighbours<std::int32_t>& at, const PredictorWeights& weights,
-                                    std::int32_t low, std::int32_t high, std::int32_t* out) {
+                                    std::int32_t low, std::int32_t high, std::int32_t* __restrict out) {
   predict_places(at, weights, low, high, out);
 }
 
 /// Sums of weighted samples above. Unsigned: modulo 2^32 for codes, whose parts may leave 32 bits where the completed
 /// sum does not.
 template <typename Wide, typename Unsigned>
-inline void sum_above(const Neighbours<Wide>& at, const PredictorWeights& weights, Wide* out) {
+inline void sum_above(const Neighbours<Wide>& at, const PredictorWeights& weights, Wide* __restrict out) {
   const Wide* const north = at.north;
   const Wide* const far = at.far;
   const Wide* const farther = at.farther;
@@ -88,7 +90,7 @@ inline void sum_above(const Neighbours<Wide>& at, const PredictorWeights& weight
 }
 
 ISOHF_VECTORISED void sum_codes_above(const Neighbours<std::int32_t>& at, const PredictorWeights& weights,
-                                      std::int32_t* out) {
+                                      std::int32_t* __restrict out) {
   sum_above<std::int32_t, std::uint32_t>(at, weights, out);
 }
 
@@ -125,7 +127,7 @@ constexpr float kDifferenceLimit = 1023.0F;       // squares of which add up to 
 constexpr int kChunk = 2048;
 constexpr int kPasses = 3;
 constexpr int kRowsToThin = 96;  // from this many rows on, one in kThinning says enough in each pass
-constexpr int kThinning = 5;     // odd: rows of both kinds take part
+constexpr int kThinning = 7;     // odd: rows of both kinds take part
 
 using Moments = std::array<std::array<std::int64_t, kTerms>, kTerms>;
 
@@ -200,21 +202,27 @@ float overall_scale(const Lattice<Wide>& lattice) {
   return scale;
 }
 
-/// A sample's weight: the inverse of the error that it and its neighbours on the row had, half and half.
 template <typename Wide>
-void weigh_by_errors(const Neighbours<Wide>& at, std::span<const Wide> predictions, float overall,
-                     std::span<float> errors, std::span<float> scale) {
+inline void find_errors(const Wide* own, const Wide* predictions, int first, int last, float* __restrict errors) {
+  for (int c = first; c <= last; ++c) errors[c] = std::abs(static_cast<float>(own[c] - predictions[c]));
+}
+ISOHF_VECTORISED void find_code_errors(const std::int32_t* own, const std::int32_t* predictions, int first, int last,
+                                       float* __restrict errors) {
+  find_errors(own, predictions, first, last, errors);
+}
+
+/// A sample's weight: the inverse of the error that it and its neighbours on the row had, half and half.
+ISOHF_VECTORISED void weigh_by_errors(const float* __restrict errors, int first, int last, float overall,
+                                      float* __restrict scale) {
   constexpr float kFloor = 2.0F;  // errors below this, in units of 1/overall, tell nothing
   constexpr float kGain = 4.0F;
-  const auto error = [&](int c) -> float& { return errors[static_cast<std::size_t>(c)]; };
-  for (int c = at.first; c <= at.last; ++c) {
-    error(c) = std::abs(static_cast<float>(at.own[c] - predictions[static_cast<std::size_t>(c)]));
-  }
-  for (int c = at.first + 2; c <= at.last; ++c) {
-    const float around = error(c - 2) + 2.0F * error(c - 1) + error(std::min(c + 1, at.last));
-    const float typical = 0.5F * error(c) + 0.125F * around;
-    scale[static_cast<std::size_t>(c)] = kGain * overall / (typical * overall + kFloor);
-  }
+  const auto weight = [&](int c, float east) {
+    const float around = errors[c - 2] + 2.0F * errors[c - 1] + east;
+    const float typical = 0.5F * errors[c] + 0.125F * around;
+    return kGain * overall / (typical * overall + kFloor);
+  };
+  for (int c = first + 2; c < last; ++c) scale[c] = weight(c, errors[c + 1]);
+  if (last >= first + 2) scale[last] = weight(last, errors[last]);
 }
 
 /// Solves the normal equations by LDL^T. Only the four operations of IEEE arithmetic, so the same everywhere; nullopt
@@ -282,7 +290,12 @@ PredictorWeights fit_weights(const Lattice<Wide>& lattice, Wide low, Wide high) 
       const Neighbours<Wide> at(lattice, r);
       if (pass > 0) {
         predict_row<Wide>(lattice, r, weights, low, high, predictions);
-        weigh_by_errors<Wide>(at, predictions, overall, errors, scale);
+        if constexpr (sizeof(Wide) == 4) {
+          find_code_errors(at.own, predictions.data(), at.first, at.last, errors.data());
+        } else {
+          find_errors(at.own, predictions.data(), at.first, at.last, errors.data());
+        }
+        weigh_by_errors(errors.data(), at.first, at.last, overall, scale.data());
       }
       sum->add(at, scale);
     }

@@ -117,7 +117,7 @@ void predict_row_from_above(const Lattice<Wide>& lattice, int r, const Predictor
 
 /// The weights that predict the tile's rows from the fourth on best: least squares, then twice more with every sample
 /// weighted by how well it and its surroundings were predicted, which is what their codes' lengths go by. In large
-/// tiles every fifth row takes part. All rows must be closed; low and high are the range of the samples.
+/// tiles every seventh row takes part. All rows must be closed; low and high are the range of the samples.
 template <typename Wide>
 [[nodiscard]] PredictorWeights fit_weights(const Lattice<Wide>& lattice, Wide low, Wide high);
 

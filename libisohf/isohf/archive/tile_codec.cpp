@@ -1,18 +1,32 @@
 #include "isohf/archive/tile_codec.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <memory>
 
 #include "isohf/archive/content_hash.h"
 #include "isohf/archive/context_model.h"
 #include "isohf/archive/deflate.h"
 #include "isohf/archive/tile_payload.h"
-#include "isohf/archive/vectorised.h"
 #include "isohf/archive/void_mask.h"
 #include "isohf/base/assert.h"
+#include "isohf/base/vectorised.h"
 
 namespace isohf {
 namespace {
+
+/// Room for `count` values that are written before they are read: a vector would set them to zero first.
+template <typename T>
+class Scratch {
+ public:
+  explicit Scratch(std::size_t count) : values_(std::make_unique_for_overwrite<T[]>(count)) {}
+  [[nodiscard]] T* data() { return values_.get(); }
+  [[nodiscard]] const T* data() const { return values_.get(); }
+
+ private:
+  std::unique_ptr<T[]> values_;
+};
 
 /// The void mask, as 0 and 1; empty where nothing is void.
 struct Voids {
@@ -21,9 +35,9 @@ struct Voids {
 };
 
 template <typename Sample, typename IsVoid>
-Voids find_voids(std::span<const Sample> samples, const IsVoid& is_void) {
+Voids find_voids(std::span<const Sample> samples, std::int64_t count, const IsVoid& is_void) {
   Voids voids;
-  voids.count = std::count_if(samples.begin(), samples.end(), is_void);
+  voids.count = count;
   if (voids.count == 0) return voids;
   voids.is_void.resize(samples.size());
   std::transform(samples.begin(), samples.end(), voids.is_void.begin(),
@@ -68,7 +82,7 @@ std::uint32_t fold(std::int64_t difference) {
 }
 
 ISOHF_VECTORISED void fold_row(const std::int32_t* own, const std::int32_t* predictions, int count,
-                               std::uint32_t* out) {
+                               std::uint32_t* __restrict out) {
   for (int i = 0; i < count; ++i) out[i] = fold(own[i] - predictions[i]);
 }
 void fold_row(const std::int64_t* own, const std::int64_t* predictions, int count, std::uint32_t* out) {
@@ -77,7 +91,7 @@ void fold_row(const std::int64_t* own, const std::int64_t* predictions, int coun
 
 /// Activities of `count` places from `first` on.
 ISOHF_VECTORISED void find_activities(const std::uint32_t* north, const std::uint32_t* own, int first, int count,
-                                      std::uint32_t* out) {
+                                      std::uint32_t* __restrict out) {
   for (int i = 0; i < count; ++i) {
     out[i] = activity_from_above(north, first + i) + activity_from_west(own, first + i);
   }
@@ -85,21 +99,21 @@ ISOHF_VECTORISED void find_activities(const std::uint32_t* north, const std::uin
 
 /// A tile's residuals in coding order, voids left out.
 struct Residuals {
-  std::vector<std::uint32_t> folded;
-  std::vector<std::uint32_t> activities;
+  Scratch<std::uint32_t> folded;
+  Scratch<std::uint32_t> activities;
   std::size_t count = 0;
 
   explicit Residuals(std::size_t most) : folded(most), activities(most) {}
   void add(std::uint32_t residual, std::uint32_t activity) {
-    folded[count] = residual;
-    activities[count++] = activity;
+    folded.data()[count] = residual;
+    activities.data()[count++] = activity;
   }
   /// Drops those of `added` last ones that are void.
   template <typename IsVoid>
   void drop_voids(std::size_t added, const IsVoid& is_void) {
     const std::size_t start = count;
     for (std::size_t i = 0; i < added; ++i) {
-      if (!is_void(static_cast<int>(i))) add(folded[start + i], activities[start + i]);
+      if (!is_void(static_cast<int>(i))) add(folded.data()[start + i], activities.data()[start + i]);
     }
   }
 };
@@ -142,8 +156,6 @@ Residuals find_residuals(Lattice<Wide>& lattice, const Voids& voids, const Paylo
     lattice.close_row(r);
     rows.close_row(first, last);
   }
-  residuals.folded.resize(residuals.count);
-  residuals.activities.resize(residuals.count);
   return residuals;
 }
 
@@ -153,55 +165,91 @@ struct Streams {
   std::vector<std::byte> extra;
 };
 
-ISOHF_VECTORISED void find_levels(const std::uint32_t* activities, std::size_t count, unsigned shift,
-                                  std::uint16_t* levels) {
+/// Symbols of residuals below 2^24: a float's exponent and upper three bits of mantissa are octave and eighth.
+ISOHF_VECTORISED void find_small_symbols(const std::uint32_t* __restrict folded, std::size_t count,
+                                         std::uint8_t* __restrict symbols) {
+  constexpr std::int32_t kFirst = (127 + 4) * 8 - static_cast<std::int32_t>(kFirstSplitSymbol);
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto residual = static_cast<std::int32_t>(folded[i]);
+    const std::int32_t split = (std::bit_cast<std::int32_t>(static_cast<float>(residual)) >> 20) - kFirst;
+    symbols[i] = static_cast<std::uint8_t>(residual < static_cast<std::int32_t>(kFirstSplitSymbol) ? residual : split);
+  }
+}
+
+void find_symbols(const Residuals& residuals, CodeType type, std::uint8_t* symbols) {
+  const std::uint32_t* const folded = residuals.folded.data();
+  if (type != CodeType::kF32) return find_small_symbols(folded, residuals.count, symbols);
+  for (std::size_t i = 0; i < residuals.count; ++i) symbols[i] = static_cast<std::uint8_t>(symbol_of(folded[i]));
+}
+
+ISOHF_VECTORISED void find_levels(const std::uint32_t* __restrict activities, std::size_t count, unsigned shift,
+                                  std::uint16_t* __restrict levels) {
   for (std::size_t i = 0; i < count; ++i) levels[i] = static_cast<std::uint16_t>(activity_level(activities[i], shift));
 }
 
-Streams sort_into_streams(std::span<const std::uint32_t> folded, std::span<const std::uint8_t> symbols,
-                          std::span<const std::uint16_t> levels, const PayloadHeader& header) {
-  const auto table = context_table(header.thresholds);
-  std::array<std::size_t, kMaxContexts> counts{};
-  for (const std::uint16_t level : levels) ++counts[table[level]];
-  Streams streams;
-  std::array<std::byte*, kMaxContexts> to{};
-  for (std::size_t i = 0; i <= header.thresholds.size(); ++i) {
-    streams.symbols.emplace_back(counts[i]);
-    to[i] = streams.symbols[i].data();
-  }
-  streams.extra.resize(folded.size() * 4 + 8);
-  std::byte* extra_to = streams.extra.data();
+/// The bits of the residuals that their symbols leave out.
+std::vector<std::byte> pack_extra_bits(std::span<const std::uint32_t> folded, const std::uint8_t* symbols) {
+  Scratch<std::byte> room(folded.size() * 4 + 8);
+  std::byte* const begin = room.data();
+  std::byte* to = begin;
   std::uint64_t bits = 0;
   unsigned bit_count = 0;
   for (std::size_t i = 0; i < folded.size(); ++i) {
-    const unsigned symbol = symbols[i];
-    *to[table[levels[i]]]++ = static_cast<std::byte>(symbol);
-    const unsigned extra_bits = extra_bits_of_symbol(symbol);
+    const unsigned extra_bits = extra_bits_of_symbol(symbols[i]);
     bits |= (std::uint64_t{folded[i]} & ((std::uint64_t{1} << extra_bits) - 1)) << bit_count;
     bit_count += extra_bits;
     if (bit_count >= 32) {
-      std::memcpy(extra_to, &bits, 4);
-      extra_to += 4;
+      std::memcpy(to, &bits, 4);
+      to += 4;
       bits >>= 32U;
       bit_count -= 32;
     }
   }
-  std::memcpy(extra_to, &bits, 8);
-  extra_to += (bit_count + 7) / 8;
-  streams.extra.resize(static_cast<std::size_t>(extra_to - streams.extra.data()));
-  return streams;
+  std::memcpy(to, &bits, 8);
+  to += (bit_count + 7) / 8;
+  return {begin, to};
+}
+
+/// Each context's symbols, in order. Two halves are sorted side by side: one alone would wait for its own pointers.
+std::vector<std::vector<std::byte>> sort_symbols(const std::uint8_t* symbols, const std::uint16_t* levels,
+                                                 std::size_t count, std::span<const std::uint16_t> thresholds) {
+  const auto table = context_table(thresholds);
+  const std::size_t half = count / 2;
+  std::array<std::array<std::size_t, kMaxContexts>, 2> counts{};
+  for (std::size_t i = 0; i < half; ++i) {
+    ++counts[0][table[levels[i]]];
+    ++counts[1][table[levels[half + i]]];
+  }
+  if (2 * half < count) ++counts[1][table[levels[count - 1]]];
+  std::vector<std::vector<std::byte>> sorted;
+  std::array<std::array<std::byte*, kMaxContexts>, 2> to{};
+  for (std::size_t i = 0; i <= thresholds.size(); ++i) {
+    sorted.emplace_back(counts[0][i] + counts[1][i]);
+    to[0][i] = sorted[i].data();
+    to[1][i] = sorted[i].data() + counts[0][i];
+  }
+  const auto put = [&](std::size_t lane, std::size_t i) {
+    *to[lane][table[levels[i]]]++ = static_cast<std::byte>(symbols[i]);
+  };
+  for (std::size_t i = 0; i < half; ++i) {
+    put(0, i);
+    put(1, half + i);
+  }
+  if (2 * half < count) put(1, count - 1);
+  return sorted;
 }
 
 /// Cuts the residuals into contexts, as many as pay.
 Streams make_streams(const Residuals& residuals, PayloadHeader& header) {
-  std::vector<std::uint8_t> symbols(residuals.count);
-  std::transform(residuals.folded.begin(), residuals.folded.end(), symbols.begin(),
-                 [](std::uint32_t folded) { return static_cast<std::uint8_t>(symbol_of(folded)); });
-  header.activity_shift = choose_activity_shift(residuals.activities);
-  std::vector<std::uint16_t> levels(residuals.count);
-  find_levels(residuals.activities.data(), residuals.count, header.activity_shift, levels.data());
-  header.thresholds = choose_thresholds(symbols, levels);
-  return sort_into_streams(residuals.folded, symbols, levels, header);
+  const std::size_t count = residuals.count;
+  Scratch<std::uint8_t> symbols(count);
+  Scratch<std::uint16_t> levels(count);
+  find_symbols(residuals, header.type, symbols.data());
+  header.activity_shift = choose_activity_shift({residuals.activities.data(), count});
+  find_levels(residuals.activities.data(), count, header.activity_shift, levels.data());
+  header.thresholds = choose_thresholds({symbols.data(), count}, {levels.data(), count});
+  return {sort_symbols(symbols.data(), levels.data(), count, header.thresholds),
+          pack_extra_bits({residuals.folded.data(), count}, symbols.data())};
 }
 
 /// Completes payload and Deflate stream; a block for each part.
@@ -242,6 +290,25 @@ void encode_samples(const TileShape& shape, PayloadHeader header, const Voids& v
   assemble(header, mask, streams, tile);
 }
 
+/// Smallest and largest code, and how many are void; `low` is the void code where all are.
+struct CodeRange {
+  std::uint16_t low = 0xffff;
+  std::uint16_t high = 0;
+  std::uint32_t voids = 0;
+};
+
+ISOHF_VECTORISED CodeRange range_of_codes(const std::uint16_t* codes, std::size_t count, std::uint16_t void_code) {
+  CodeRange range;
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::uint16_t code = codes[i];
+    const auto valid = static_cast<std::uint16_t>(code == void_code ? 0 : code);
+    range.low = code < range.low ? code : range.low;
+    range.high = valid > range.high ? valid : range.high;
+    range.voids += code == void_code ? 1U : 0U;
+  }
+  return range;
+}
+
 EncodedTile encode_codes(const TileShape& shape, const TileCodes& tile) {
   const std::span<const std::uint16_t> codes = tile.codes;
   const Quantisation quantisation{tile.type, 0.0, 1.0};
@@ -249,7 +316,8 @@ EncodedTile encode_codes(const TileShape& shape, const TileCodes& tile) {
   EncodedTile encoded;
   encoded.content_digest = tile_content_digest(tile);
   const auto is_void = [&](std::uint16_t code) { return code == void_code; };
-  const Voids voids = find_voids(codes, is_void);
+  const CodeRange range = range_of_codes(codes.data(), codes.size(), void_code);
+  const Voids voids = find_voids(codes, range.voids, is_void);
   encoded.has_voids = voids.count != 0;
   encoded.is_empty = voids.count == shape.stored_vertex_count();
   if (encoded.is_empty) return encoded;
@@ -257,11 +325,8 @@ EncodedTile encode_codes(const TileShape& shape, const TileCodes& tile) {
   PayloadHeader header;
   header.type = tile.type;
   header.base = *std::find_if_not(codes.begin(), codes.end(), is_void);
-  header.low = header.high = header.base;
-  for (const std::uint16_t code : codes) {
-    header.low = std::min<std::int32_t>(header.low, code);
-    if (!is_void(code)) header.high = std::max<std::int32_t>(header.high, code);
-  }
+  header.low = range.low;
+  header.high = range.high;
   ISOHF_ASSERT(header.high <= static_cast<std::int32_t>(quantisation.max_code()));
   encoded.code_min = static_cast<std::uint32_t>(header.low);
   encoded.code_max = static_cast<std::uint32_t>(header.high);
@@ -279,7 +344,7 @@ EncodedTile encode_floats(const TileShape& shape, const TileCodes& tile) {
   EncodedTile encoded;
   encoded.content_digest = tile_content_digest(tile);
   const auto is_void = [](float height) { return std::isnan(height); };
-  const Voids voids = find_voids(heights, is_void);
+  const Voids voids = find_voids(heights, std::count_if(heights.begin(), heights.end(), is_void), is_void);
   encoded.has_voids = voids.count != 0;
   encoded.is_empty = voids.count == shape.stored_vertex_count();
   if (encoded.is_empty) return encoded;

@@ -5,9 +5,34 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "isohf/base/vectorised.h"
 #include "isohf/convert/quantiser.h"
 
 namespace isohf {
+namespace {
+
+/// What a row of codes adds up to; as integers there is no rounding. 32 bits hold 2^16 codes.
+struct CodeSum {
+  std::uint32_t sum = 0;
+  std::uint32_t voids = 0;
+  std::uint16_t low = 0xffff;
+  std::uint16_t high = 0;
+};
+
+ISOHF_VECTORISED CodeSum sum_codes(const std::uint16_t* codes, int count, std::uint16_t void_code) {
+  CodeSum found;
+  for (int i = 0; i < count; ++i) {
+    const std::uint16_t code = codes[i];
+    const auto valid = static_cast<std::uint16_t>(code == void_code ? 0 : code);
+    found.voids += code == void_code ? 1U : 0U;
+    found.sum += valid;
+    found.low = code < found.low ? code : found.low;
+    found.high = valid > found.high ? valid : found.high;
+  }
+  return found;
+}
+
+}  // namespace
 
 TileStatistics tile_statistics(const TileShape& shape, const TileCodes& tile, const Quantisation& quantisation) {
   TileStatistics statistics;
@@ -31,26 +56,15 @@ TileStatistics tile_statistics(const TileShape& shape, const TileCodes& tile, co
       }
       continue;
     }
-    // Codes are summed as integers: no rounding, and the loop vectorises.
-    std::uint64_t sum = 0;
-    std::uint32_t low = 0xFFFFFFFFU;
-    std::uint32_t high = 0;
-    std::int64_t voids = 0;
-    for (int c = 1; c <= last; ++c) {
-      const std::uint32_t code = tile.codes[row + static_cast<std::size_t>(c)];
-      const bool is_void = code == quantisation.void_code();
-      voids += is_void ? 1 : 0;
-      sum += is_void ? 0U : code;
-      low = !is_void && code < low ? code : low;
-      high = !is_void && code > high ? code : high;
-    }
+    const CodeSum found =
+        sum_codes(tile.codes.data() + row + 1, last, static_cast<std::uint16_t>(quantisation.void_code()));
     statistics.vertices += last;
-    statistics.voids += voids;
-    if (voids == last) continue;
-    statistics.sum +=
-        quantisation.offset * static_cast<double>(last - voids) + quantisation.scale * static_cast<double>(sum);
-    statistics.min = std::min(statistics.min, elevation_from_code(quantisation, low));
-    statistics.max = std::max(statistics.max, elevation_from_code(quantisation, high));
+    statistics.voids += found.voids;
+    if (static_cast<int>(found.voids) == last) continue;
+    statistics.sum += quantisation.offset * static_cast<double>(last - static_cast<int>(found.voids)) +
+                      quantisation.scale * static_cast<double>(found.sum);
+    statistics.min = std::min(statistics.min, elevation_from_code(quantisation, found.low));
+    statistics.max = std::max(statistics.max, elevation_from_code(quantisation, found.high));
   }
   return statistics;
 }

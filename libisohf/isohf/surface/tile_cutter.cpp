@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "isohf/base/assert.h"
+#include "isohf/base/vectorised.h"
 
 namespace isohf {
 namespace {
@@ -66,6 +67,14 @@ ColumnTaps make_column_taps(const TileGrid& grid, const SourceAxis& axis, const 
   return taps;
 }
 
+ISOHF_VECTORISED void weigh(const float* __restrict in, float weight, std::int64_t count, float* __restrict out) {
+  for (std::int64_t k = 0; k < count; ++k) out[k] = weight * in[k];
+}
+ISOHF_VECTORISED void add_weighted(const float* __restrict in, float weight, std::int64_t count,
+                                   float* __restrict out) {
+  for (std::int64_t k = 0; k < count; ++k) out[k] += weight * in[k];
+}
+
 /// line[k] = sum over the row taps of weight * band(column first + k), mirrored at the source's ends.
 void blend_rows(const SourceBand& band, const TapWeights& rows, int taps, const SourceAxis& axis_x,
                 const SourceAxis& axis_z, const ColumnTaps& columns, std::span<float> line) {
@@ -78,11 +87,7 @@ void blend_rows(const SourceBand& band, const TapWeights& rows, int taps, const 
     float* out = line.data() + (inner_first - columns.first);
     const float* in = source + inner_first;
     const std::int64_t inner = inner_last - inner_first;
-    if (t == 0) {
-      for (std::int64_t k = 0; k < inner; ++k) out[k] = weight * in[k];
-    } else {
-      for (std::int64_t k = 0; k < inner; ++k) out[k] += weight * in[k];
-    }
+    t == 0 ? weigh(in, weight, inner, out) : add_weighted(in, weight, inner, out);
     const auto mirrored = [&](std::int64_t k) {
       const float height = weight * source[mirror_index(columns.first + k, axis_x.samples())];
       line[static_cast<std::size_t>(k)] = t == 0 ? height : line[static_cast<std::size_t>(k)] + height;
@@ -113,10 +118,10 @@ void find_voids(const SourceBand& band, const TapWeights& rows, int taps, const 
 }
 
 template <int kTaps>
-void gather_columns(const ColumnTaps& columns, const float* line, std::span<float> out) {
-  const std::size_t count = out.size();
-  const std::int32_t* start = columns.start.data();
-  const float* weights = columns.weights.data();
+inline void gather_columns(const ColumnTaps& columns, const float* __restrict line, float* __restrict out) {
+  const std::size_t count = columns.count;
+  const std::int32_t* __restrict start = columns.start.data();
+  const float* __restrict weights = columns.weights.data();
   for (std::size_t c = 0; c < count; ++c) {
     const float* from = line + start[c];
     float height = weights[c] * from[0];
@@ -124,19 +129,35 @@ void gather_columns(const ColumnTaps& columns, const float* line, std::span<floa
     out[c] = height;
   }
 }
+// Only free functions can be cloned for several machines, not templates.
+ISOHF_VECTORISED void gather_two(const ColumnTaps& columns, const float* __restrict line, float* __restrict out) {
+  gather_columns<2>(columns, line, out);
+}
+ISOHF_VECTORISED void gather_four(const ColumnTaps& columns, const float* __restrict line, float* __restrict out) {
+  gather_columns<4>(columns, line, out);
+}
+ISOHF_VECTORISED void gather_six(const ColumnTaps& columns, const float* __restrict line, float* __restrict out) {
+  gather_columns<6>(columns, line, out);
+}
 
-void gather_columns(int taps, const ColumnTaps& columns, const float* line, std::span<float> out) {
+ISOHF_VECTORISED bool has_nan(const float* values, std::size_t count) {
+  std::int32_t any = 0;
+  for (std::size_t i = 0; i < count; ++i) any |= values[i] != values[i] ? 1 : 0;
+  return any != 0;
+}
+
+void gather_columns(int taps, const ColumnTaps& columns, const float* line, float* out) {
   switch (taps) {
     case 1:
       return gather_columns<1>(columns, line, out);
     case 2:
-      return gather_columns<2>(columns, line, out);
+      return gather_two(columns, line, out);
     case 3:
       return gather_columns<3>(columns, line, out);
     case 4:
-      return gather_columns<4>(columns, line, out);
+      return gather_four(columns, line, out);
     case 6:
-      return gather_columns<6>(columns, line, out);
+      return gather_six(columns, line, out);
     case 12:
       return gather_columns<12>(columns, line, out);
     default:
@@ -219,7 +240,17 @@ struct RowSampler {
     const TapWeights rows = kernel.at(v);
     blend_rows(band, rows, kernel.taps(), axis_x, axis_z, columns, line);
     values.resize(columns.count);
-    gather_columns(kernel.taps(), columns, line.data(), values);
+    gather_columns(kernel.taps(), columns, line.data(), values.data());
+    if (band.voids.data() != nullptr || has_nan(values.data(), values.size()))
+      resample_near_voids(v, columns, rows, values);
+    for (std::size_t i = 0; i < columns.continued.size(); ++i) {
+      float& value = values[columns.continued[i]];
+      value = continue_slope(values[columns.edge[i]], value);
+    }
+  }
+
+  void resample_near_voids(double v, const ColumnTaps& columns, const TapWeights& rows,
+                           std::vector<float>& values) const {
     near_void.assign(columns.count, 0);
     if (band.voids.data() != nullptr) {
       void_line.resize(line.size());
@@ -229,10 +260,6 @@ struct RowSampler {
     for (std::size_t c = 0; c < values.size(); ++c) {
       if (std::isnan(values[c]) || near_void[c] != 0)
         values[c] = void_aware.at(columns.position[c], v, columns, c, rows);
-    }
-    for (std::size_t i = 0; i < columns.continued.size(); ++i) {
-      float& value = values[columns.continued[i]];
-      value = continue_slope(values[columns.edge[i]], value);
     }
   }
 
