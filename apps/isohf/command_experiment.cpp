@@ -29,8 +29,9 @@ using nlohmann::ordered_json;
 
 constexpr const char* kFooter =
     R"(Fits meshes of equal triangle counts to 22,800 plane sine waves by least squares and measures what is left:
-iso against square grids with consistent, alternating and best diagonals. docs/experiment.md says how units were
-chosen and what came out. The full set takes minutes, --quick seconds.
+iso against square grids with consistent, alternating and best diagonals. Frequency 1 is half a cycle a sample
+of the square grid of --nyquist-triangles; docs/experiment.md says more of units, and what came out.
+The full set takes minutes, --quick seconds.
 
 Examples:
   isohf experiment --quick

@@ -35,7 +35,7 @@ constexpr const char* kFooter =
     R"(The raster has the samples of the archive's source, at their places, unless another grid is asked for. An
 archive made with --lossless gives the source's samples bit for bit, and their SHA-256 is checked; with
 --method it gives what its surface alone holds.
-Samples are raw numbers in the source's scale and type; only .tif has a place for scale, offset and void value.
+Samples are raw numbers in the source's scale and type; only .tif has room for scale, offset and void value.
 Methods: hex, quintic B-splines along the lattice rows and then down the columns, is nearest to the source;
 barycentric is what a renderer shows. The format follows from RASTER's extension: .tif, .exr, .png or .hgt.
 

@@ -21,14 +21,25 @@ _isohf() {
     mapfile -t COMPREPLY < <(compgen -W "$options" -- "$current")
     return
   fi
-  case $previous in
-    --filter) mapfile -t COMPREPLY < <(compgen -W 'nearest bilinear catmull-rom bspline2 bspline3 bspline5 lanczos3 lanczos6' -- "$current") ;;
-    --outside) mapfile -t COMPREPLY < <(compgen -W 'cover clamp void' -- "$current") ;;
-    --type) mapfile -t COMPREPLY < <(compgen -W 'u16 u8 f32' -- "$current") ;;
-    --registration) mapfile -t COMPREPLY < <(compgen -W 'area point auto' -- "$current") ;;
-    --progress) mapfile -t COMPREPLY < <(compgen -W 'auto plain json none' -- "$current") ;;
-    *) compopt -o filenames 2>/dev/null || true
-       mapfile -t COMPREPLY < <(compgen -f -- "$current") ;;
+  local values=''
+  case "$command $previous" in
+    *' --filter') values='nearest bilinear catmull-rom bspline2 bspline3 bspline5 lanczos3 lanczos6' ;;
+    *' --acquisition') values='point box tent gaussian: fir:' ;;
+    *' --outside') values='cover clamp void' ;;
+    *' --type') values='u16 u8 f32' ;;
+    *' --registration') values='area point auto' ;;
+    *' --progress') values='auto plain json none' ;;
+    *' --step') values='auto finest' ;;
+    *' --method') values='hex barycentric' ;;
+    *' --azimuth') values='E W' ;;
+    *' --palette') values='elevation gray' ;;
+    'experiment --fit') values='least-squares interpolate' ;;
   esac
+  if [[ -n $values ]]; then
+    mapfile -t COMPREPLY < <(compgen -W "$values" -- "$current")
+  else
+    compopt -o filenames 2>/dev/null || true
+    mapfile -t COMPREPLY < <(compgen -f -- "$current")
+  fi
 }
 complete -F _isohf isohf

@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <cstdlib>
 
+#include "support/restored_field.h"
 #include "support/trigonometric_field.h"
 
 namespace {
@@ -18,6 +19,13 @@ struct FieldKind {
   double rho;
 };
 constexpr FieldKind kKinds[] = {{1.8, 1.0}, {1.8, 0.7}, {0.0, 0.7}};
+
+double psnr_of_hex(isohf::Filter filter, const isohf::TrigonometricField& field, int margin) {
+  return isohf::test::psnr_of_restoring(filter, field, margin, isohf::RestoreMethod::kHex);
+}
+double psnr_of_triangles(isohf::Filter filter, const isohf::TrigonometricField& field, int margin) {
+  return isohf::test::psnr_of_restoring(filter, field, margin, isohf::RestoreMethod::kBarycentric);
+}
 
 using Measure = double (*)(isohf::Filter, const isohf::TrigonometricField&, int);
 
@@ -52,5 +60,7 @@ int main(int argc, char** argv) {
   print_table("Ortho to iso at equal density, dB", isohf::psnr_of_resampling, fields);
   print_table("Ortho to iso to ortho on the lattice with 15.5 % more samples, separable inverse, dB",
               isohf::psnr_of_round_trip, fields);
+  print_table("isohf convert --spacing 1, restore --method hex, dB", psnr_of_hex, fields);
+  print_table("isohf convert --spacing 1, restore --method barycentric, dB", psnr_of_triangles, fields);
   return 0;
 }

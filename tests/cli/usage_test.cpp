@@ -14,7 +14,8 @@ namespace {
 
 using testing::HasSubstr;
 
-const std::vector<std::string> kCommands = {"plan", "convert", "info", "verify", "sample"};
+const std::vector<std::string> kCommands = {"plan",    "convert", "info",  "verify",
+                                            "restore", "sample",  "shade", "experiment"};
 
 std::set<std::string> long_options_in(const std::string& text) {
   std::set<std::string> found;
@@ -192,15 +193,36 @@ TEST(Usage, ConfigFileGivesOptionsAndTheCommandLineWins) {
   expect_usage_error({"plan", "--config", folder / "missing.toml"}, "missing.toml");
 }
 
+/// What TAB offers after the program's name and `words`, the last of which is begun.
+std::string completions_of(const std::string& words, int at) {
+  const std::string script = "source " ISOHF_SOURCE_DIR "/apps/isohf/completion.bash; COMP_WORDS=(" + isohf_path() +
+                             words + "); COMP_CWORD=" + std::to_string(at) + "; _isohf; echo \"${COMPREPLY[@]}\"";
+  return run_program({"/bin/bash", "-c", script}).out;
+}
+
 TEST(Usage, BashCompletesCommandsAndOptions) {
-  const auto complete = [](const std::string& words, int at) {
-    const std::string script = "source " ISOHF_SOURCE_DIR "/apps/isohf/completion.bash; COMP_WORDS=(" + isohf_path() +
-                               words + "); COMP_CWORD=" + std::to_string(at) + "; _isohf; echo \"${COMPREPLY[@]}\"";
-    return run_program({"/bin/bash", "-c", script}).out;
-  };
-  EXPECT_EQ(complete(" co", 1), "convert\n");
-  EXPECT_EQ(complete(" convert --dens", 2), "--density\n");
-  EXPECT_EQ(complete(" sample --a", 2), "--at\n");
+  EXPECT_EQ(completions_of(" co", 1), "convert\n");
+  EXPECT_EQ(completions_of(" convert --dens", 2), "--density\n");
+  EXPECT_EQ(completions_of(" sample --a", 2), "--at\n");
+}
+
+TEST(Usage, BashCompletesEveryCommandOptionAndWord) {
+  const std::string commands = " " + completions_of(" ''", 1);
+  for (const std::string& command : kCommands) {
+    EXPECT_THAT(commands, HasSubstr(" " + command + " "));
+    const std::string help = run_isohf({command, "--help"}).out;
+    const std::set<std::string> offered = long_options_in(completions_of(" " + command + " --", 2));
+    // Where a line of the help begins with an option, or with its letter and the option.
+    const std::regex option("\n +(-[A-Za-z], )?(--[a-z][a-z0-9-]+)");
+    std::set<std::string> described;
+    for (std::sregex_iterator at(help.begin(), help.end(), option), end; at != end; ++at) described.insert((*at)[2]);
+    EXPECT_EQ(offered, described) << command;
+  }
+  EXPECT_EQ(completions_of(" restore --method h", 3), "hex\n");
+  EXPECT_EQ(completions_of(" shade --palette g", 3), "gray\n");
+  EXPECT_EQ(completions_of(" experiment --fit i", 3), "interpolate\n");
+  // Of convert and plan it is a flag.
+  EXPECT_EQ(completions_of(" convert --fit interpol", 3), "\n");
 }
 
 TEST(Usage, FailureToWriteStandardOutputIsReported) {

@@ -7,15 +7,11 @@
 #include <random>
 
 namespace isohf {
-namespace {
 
-/// Mean squared error to dB below the range.
 double psnr(const std::vector<float>& samples, double squares, std::int64_t count) {
   const auto [low, high] = std::minmax_element(samples.begin(), samples.end());
   return 20.0 * std::log10((*high - *low) / std::sqrt(squares / static_cast<double>(count)));
 }
-
-}  // namespace
 
 TrigonometricField::TrigonometricField(int n, double p, double rho, std::uint64_t seed)
     : n_(n), reach_(static_cast<int>(rho * n / 2)) {

@@ -71,7 +71,7 @@ std::string figure2_svg(const ExperimentResult& result) {
   Chart chart = {"Mean shading error (the paper's Fig. 2)",
                  "triangles",
                  "mean |difference of Lambert shading|",
-                 "averaged over phases, orientations and the frequencies below each mesh's Nyquist frequency",
+                 "averaged over the waves below each mesh's Nyquist frequency; coarse meshes leave the short ones out",
                  {}};
   for (const MeshKind kind : kMeshKinds) {
     Curve curve = curve_of(kind);

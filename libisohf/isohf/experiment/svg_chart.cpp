@@ -51,6 +51,13 @@ class Drawing {
     out_ += fmt::format("<circle cx=\"{:.2f}\" cy=\"{:.2f}\" r=\"{:.2f}\" stroke=\"{}\" fill=\"{}\"/>\n", x, y, radius,
                         stroke, fill);
   }
+  /// A label that stays readable over lines.
+  void label_over(double x, double y, const std::string& words) {
+    out_ += fmt::format(
+        "<text x=\"{:.2f}\" y=\"{:.2f}\" text-anchor=\"middle\" font-size=\"11\" fill=\"{}\" stroke=\"white\" "
+        "stroke-width=\"4\" stroke-linejoin=\"round\" paint-order=\"stroke\">{}</text>\n",
+        x, y, kInk, escaped(words));
+  }
   void text(double x, double y, const std::string& words, const char* anchor, double size = 13, bool upwards = false) {
     const std::string turn = upwards ? fmt::format(" transform=\"rotate(-90 {:.2f} {:.2f})\"", x, y) : "";
     out_ +=
@@ -77,6 +84,14 @@ class Drawing {
  private:
   std::string out_;
 };
+
+/// A power of ten as people write it: 100, 10⁵.
+std::string power_label(double power) {
+  static constexpr const char* kDigits[] = {"⁰", "¹", "²", "³", "⁴", "⁵", "⁶", "⁷", "⁸", "⁹"};
+  const auto exponent = std::lround(std::log10(power));
+  if (exponent < 4 || exponent > 99) return fmt::format("{:g}", power);
+  return std::string("10") + (exponent > 9 ? kDigits[exponent / 10] : "") + kDigits[exponent % 10];
+}
 
 /// A step of 1, 2 or 5 times a power of ten with at most `most` steps up to `extent`.
 double tick_step(double extent, int most) {
@@ -145,7 +160,8 @@ std::string line_chart(const Chart& chart, Scale y_scale) {
   };
   for (const double tick : axis.ticks) {
     drawing.line(kLeft, axis.place(tick), kWidth - kRight, axis.place(tick), kGrid);
-    drawing.text(kLeft - 8, axis.place(tick) + 4, fmt::format("{:g}", tick), "end");
+    drawing.text(kLeft - 8, axis.place(tick) + 4, axis.logarithmic ? power_label(tick) : fmt::format("{:g}", tick),
+                 "end");
   }
   const double step = tick_step(x_high - x_low, 10);
   for (double x = step * std::ceil(x_low / step); x <= x_high + 1e-9 * step; x += step) {
@@ -175,7 +191,7 @@ std::string polar_chart(const Chart& chart) {
   constexpr double kMiddleY = kPolarSize / 2 + 10;
   constexpr double kRadius = 240;
   Drawing drawing(kPolarSize, kPolarSize + 66);
-  const double step = tick_step(largest_y(chart), 4);
+  const double step = tick_step(largest_y(chart), 5);
   const double high = step * std::ceil(largest_y(chart) / step);
   for (int degrees = 0; degrees < 360; degrees += 30) {
     const double angle = degrees * std::numbers::pi / 180.0;
@@ -198,8 +214,8 @@ std::string polar_chart(const Chart& chart) {
   // Radii are labelled last, over the curves, between two spokes.
   for (int i = 1; i * step <= high * 1.0001; ++i) {
     const double radius = kRadius * i * step / high;
-    drawing.text(kMiddleX + radius * std::cos(1.31), kMiddleY - radius * std::sin(1.31), fmt::format("{:g}", i * step),
-                 "start", 11);
+    drawing.label_over(kMiddleX + radius * std::cos(1.31), kMiddleY - radius * std::sin(1.31) + 4,
+                       fmt::format("{:g}", i * step));
   }
   drawing.text(kMiddleX, 26, chart.title, "middle", 16);
   drawing.text(kMiddleX, 46, chart.y_label, "middle");
