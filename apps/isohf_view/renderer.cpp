@@ -16,6 +16,12 @@ void set_vec3(GLint place, Vec3 value) {
   glUniform3f(place, static_cast<float>(value.x), static_cast<float>(value.y), static_cast<float>(value.z));
 }
 
+Vec3 level_colour(int level) {
+  constexpr std::array<Vec3, 6> kColours{Vec3{0.85, 0.33, 0.28}, {0.93, 0.66, 0.25}, {0.60, 0.76, 0.32},
+                                         {0.25, 0.64, 0.62},     {0.30, 0.45, 0.80}, {0.55, 0.35, 0.70}};
+  return kColours[static_cast<std::size_t>(level) % kColours.size()];
+}
+
 /// A sky that dims with the sun.
 Vec3 by_day(Vec3 colour, Vec3 sun) {
   return std::clamp(sun.y * 5.0 + 0.35, 0.06, 1.0) * colour;
@@ -119,12 +125,16 @@ Renderer::Renderer(const TileSource& source, const SharedGeometry& shared)
     : source_(source),
       shared_(shared),
       whole_(whole_bounds(source)),
-      shade_{{"terrain", false, terrain_fragment_shader(false, false)},
-             {"terrain", true, terrain_fragment_shader(true, false)}},
-      shade_strips_{{"strips", false, terrain_fragment_shader(false, true)},
-                    {"strips", true, terrain_fragment_shader(true, true)}},
       flat_{{"wire", false, flat_fragment_shader(false)}, {"wire", true, flat_fragment_shader(true)}},
       sky_("sky", sky_vertex_shader(), sky_fragment_shader()) {}
+
+const TerrainProgram& Renderer::shading(const ViewState& view, bool is_rim) {
+  const std::tuple key{view.mode, view.borders, is_rim};
+  const auto found = shading_.find(key);
+  if (found != shading_.end()) return found->second;
+  const std::string fragment = terrain_fragment_shader(is_rim, view.mode, view.borders);
+  return shading_.try_emplace(key, "terrain", is_rim, fragment).first->second;
+}
 
 double Renderer::level_of(const ViewState& view, TileIndex tile, const TileBounds& bounds) const {
   const TileGrid& grid = source_.grid();
@@ -180,17 +190,19 @@ void Renderer::begin_shading(const TerrainProgram& program, const ViewState& vie
   const Vec3 sun = normalised(view.sun);
   const ViewScale scale = source_.scale();
   const double codes = std::max(whole_.high - whole_.low, 1e-9) / scale.scale;
-  glUniform1i(program.uniform("mode"), static_cast<GLint>(view.mode));
-  glUniform1i(program.uniform("borders"), view.borders ? 1 : 0);
   glUniform2f(program.uniform("ramp"), static_cast<float>((whole_.low - scale.offset) / scale.scale),
               static_cast<float>(1.0 / codes));
   set_vec3(program.uniform("sun"), sun);
+  const double height = std::clamp(sun.y * 2.5, 0.0, 1.0);
+  const Vec3 warm{1.0, 0.62 + height * 0.34, 0.36 + height * 0.52};
+  set_vec3(program.uniform("sun_light"), (sun.y > 0.0 ? 0.95 : 0.0) * warm);
+  set_vec3(program.uniform("sky_light"), std::clamp(sun.y * 6.0 + 0.25, 0.05, 1.0) * Vec3{0.33, 0.39, 0.48});
   set_vec3(program.uniform("horizon"), by_day(kHorizon, sun));
   const double gain = view.shadow_softness ? 2.0 * scale.scale / *view.shadow_softness : 0.0;
   glUniform1f(program.uniform("shadow_gain"), static_cast<float>(gain));
-  const double haze_begin = view.haze ? 0.55 * view.far_distance : 1.0;
-  const double haze_end = view.haze ? view.far_distance : 0.0;
-  glUniform2f(program.uniform("haze"), static_cast<float>(haze_begin), static_cast<float>(haze_end));
+  const double haze_begin = 0.55 * view.far_distance;
+  const double haze_rise = view.haze ? 1.0 / (view.far_distance - haze_begin) : 0.0;
+  glUniform2f(program.uniform("haze"), static_cast<float>(haze_begin), static_cast<float>(haze_rise));
 }
 
 void Renderer::draw_mesh(const TerrainProgram& program, const TerrainFrame& frame, const Item& item, int level,
@@ -199,6 +211,7 @@ void Renderer::draw_mesh(const TerrainProgram& program, const TerrainFrame& fram
   program.set_tile(source_.grid(), frame, item.tile);
   glUniform1i(program.uniform("level"), level);
   glUniform1i(program.uniform("is_stitch"), 0);
+  set_vec3(program.uniform("level_colour"), level_colour(level));
   item.slot->bind();
   if (item.is_cut) set_cutting(true);
   glEnable(GL_CULL_FACE);
@@ -208,6 +221,7 @@ void Renderer::draw_mesh(const TerrainProgram& program, const TerrainFrame& fram
   if (shared_.has_stitch(level)) {
     // Stitch triangles stand upright and are seen from either side.
     glUniform1i(program.uniform("is_stitch"), 1);
+    set_vec3(program.uniform("level_colour"), 0.8 * level_colour(level));
     glDisable(GL_CULL_FACE);
     shared_.draw_stitch(level);
     figures.triangles += shape.stitch_triangle_count(level);
@@ -217,7 +231,7 @@ void Renderer::draw_mesh(const TerrainProgram& program, const TerrainFrame& fram
 }
 
 void Renderer::draw_opaque(const ViewState& view, const TerrainFrame& frame, const std::vector<Item>& items,
-                           FrameFigures& figures) const {
+                           FrameFigures& figures) {
   begin_opaque_pass();
   for (const bool rim : {false, true}) {
     const TerrainProgram& program = shading(view, rim);
@@ -230,7 +244,7 @@ void Renderer::draw_opaque(const ViewState& view, const TerrainFrame& frame, con
 }
 
 void Renderer::draw_fading(const ViewState& view, const TerrainFrame& frame, const std::vector<Item>& items,
-                           FrameFigures& figures) const {
+                           FrameFigures& figures) {
   begin_fading_pass();
   for (const bool rim : {false, true}) {
     const TerrainProgram& program = shading(view, rim);

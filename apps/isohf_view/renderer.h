@@ -2,6 +2,8 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
+#include <tuple>
 #include <vector>
 
 #include "isohf/lattice/lod.h"
@@ -55,14 +57,13 @@ class Renderer {
   [[nodiscard]] std::vector<Item> visible_items(const ViewState& view, const TerrainFrame& frame,
                                                 const std::array<std::int64_t, 4>& range, const ResidentTile& resident,
                                                 FrameFigures& figures) const;
-  [[nodiscard]] const TerrainProgram& shading(const ViewState& view, bool is_rim) const {
-    return (view.mode == ColourMode::kStrips ? shade_strips_ : shade_).of(is_rim);
-  }
+  /// Made when first wanted.
+  [[nodiscard]] const TerrainProgram& shading(const ViewState& view, bool is_rim);
   void draw_sky(const ViewState& view) const;
   void draw_opaque(const ViewState& view, const TerrainFrame& frame, const std::vector<Item>& items,
-                   FrameFigures& figures) const;
+                   FrameFigures& figures);
   void draw_fading(const ViewState& view, const TerrainFrame& frame, const std::vector<Item>& items,
-                   FrameFigures& figures) const;
+                   FrameFigures& figures);
   void draw_wires(const ViewState& view, const TerrainFrame& frame, const std::vector<Item>& items,
                   FrameFigures& figures) const;
   void draw_mesh(const TerrainProgram& program, const TerrainFrame& frame, const Item& item, int level,
@@ -72,8 +73,7 @@ class Renderer {
   const TileSource& source_;
   const SharedGeometry& shared_;
   TileBounds whole_;
-  Variants shade_;
-  Variants shade_strips_;
+  std::map<std::tuple<ColourMode, bool, bool>, TerrainProgram> shading_;  ///< by mode, borders, rim
   Variants flat_;
   Program sky_;
   VertexArray nothing_;

@@ -120,42 +120,39 @@ uniform float shadow_gain;      // 2/k, per code; 0: no shadows
 float sun_share() { return clamp(1.0 - v_place.w * shadow_gain, 0.0, 1.0); }
 )glsl";
 
-// Modes, as in view_state.h: 0 elevation colours, 1 plain, 2 levels of detail, 3 strip order, 4 texture, 5 normals.
+// MODE as in view_state.h: 0 elevation colours, 1 plain, 2 levels of detail, 3 strip order, 4 texture, 5 normals. Each
+// mode is a program of its own, and what does not change from pixel to pixel comes as a uniform: a software rasteriser
+// takes every branch and repeats every sum in every pixel.
 constexpr const char* kTerrainFragment = R"glsl(
 in vec4 v_facing;
 in vec4 v_place;
 out vec4 colour;
 
-uniform int mode;
 uniform int level;              // of the mesh in hand
 uniform bool is_stitch;
+uniform vec3 level_colour;
 uniform float alpha;
-uniform bool borders;
 uniform vec2 object_size;       // 2(C-4), R-3
 uniform vec2 ramp;              // code at the ramp's foot, 1/codes of its height
 uniform vec3 sun;               // towards the sun
-uniform vec2 haze;              // distances where it begins and is complete; x >= y: none
+uniform vec3 sun_light;         // on ground that faces it
+uniform vec3 sky_light;         // on level ground
+uniform vec2 haze;              // distance where it begins, 1/distance to where it is complete; y = 0: none
 uniform vec3 horizon;
 uniform sampler2D tile_texture;
 float sun_share();
 
+#if MODE == 0
 vec3 hypsometric(float t) {
-  const int kCount = 8;
-  vec3 stops[8] = vec3[8](vec3(0.17, 0.36, 0.30), vec3(0.30, 0.48, 0.27), vec3(0.53, 0.60, 0.34),
-                          vec3(0.74, 0.69, 0.45), vec3(0.67, 0.53, 0.36), vec3(0.54, 0.42, 0.34),
-                          vec3(0.66, 0.63, 0.61), vec3(0.95, 0.96, 0.98));
-  float at = clamp(t, 0.0, 1.0) * float(kCount - 1);
-  int i = min(int(at), kCount - 2);
-  return mix(stops[i], stops[i + 1], at - float(i));
+  float at = 7.0 * t;
+  return vec3(0.17, 0.36, 0.30) + vec3(0.13, 0.12, -0.03) * clamp(at, 0.0, 1.0) +
+         vec3(0.23, 0.12, 0.07) * clamp(at - 1.0, 0.0, 1.0) + vec3(0.21, 0.09, 0.11) * clamp(at - 2.0, 0.0, 1.0) +
+         vec3(-0.07, -0.16, -0.09) * clamp(at - 3.0, 0.0, 1.0) + vec3(-0.13, -0.11, -0.02) * clamp(at - 4.0, 0.0, 1.0) +
+         vec3(0.12, 0.21, 0.27) * clamp(at - 5.0, 0.0, 1.0) + vec3(0.29, 0.33, 0.37) * clamp(at - 6.0, 0.0, 1.0);
 }
+#endif
 
-vec3 level_colour(int l) {
-  vec3 colours[6] = vec3[6](vec3(0.85, 0.33, 0.28), vec3(0.93, 0.66, 0.25), vec3(0.60, 0.76, 0.32),
-                            vec3(0.25, 0.64, 0.62), vec3(0.30, 0.45, 0.80), vec3(0.55, 0.35, 0.70));
-  return colours[l % 6];
-}
-
-#ifdef STRIPS
+#if MODE == 3
 // The paper's Fig. 6: even rows of triangles red, drawn from East to West, odd rows blue, from West to East; the
 // colour deepens along the way and every second triangle is lighter.
 vec3 strip_colour() {
@@ -170,33 +167,39 @@ vec3 strip_colour() {
 }
 #endif
 
+vec3 base_colour() {
+#if MODE == 0
+  return hypsometric((v_place.z - ramp.x) * ramp.y);
+#elif MODE == 2
+  return level_colour;
+#elif MODE == 3
+  return strip_colour();
+#elif MODE == 4
+  return texture(tile_texture, v_place.xy / object_size).rgb;
+#else
+  return vec3(0.80, 0.79, 0.76);
+#endif
+}
+
 void main() {
   DISCARD_VOID;
   vec3 normal = normalize(v_facing.xyz);
-  vec3 base = vec3(0.80, 0.79, 0.76);
-  if (mode == 0) base = hypsometric((v_place.z - ramp.x) * ramp.y);
-  if (mode == 2) base = is_stitch ? level_colour(level) * 0.8 : level_colour(level);
-#ifdef STRIPS
-  if (mode == 3) base = strip_colour();
+#if MODE == 5
+  vec3 shown = normal * 0.5 + 0.5;
+#else
+  vec3 base = base_colour();
+#ifdef BORDERS
+  vec2 inside = min(v_place.xy, object_size - v_place.xy);
+  vec2 width = max(fwidth(v_place.xy), vec2(1e-6));
+  float edge = min(inside.x / width.x, inside.y / width.y);
+  base = mix(vec3(0.05, 0.05, 0.08), base, clamp(edge - 0.5, 0.25, 1.0));
 #endif
-  if (mode == 4) base = texture(tile_texture, v_place.xy / object_size).rgb;
-  if (borders) {
-    vec2 inside = min(v_place.xy, object_size - v_place.xy);
-    vec2 width = max(fwidth(v_place.xy), vec2(1e-6));
-    float edge = min(inside.x / width.x, inside.y / width.y);
-    base = mix(vec3(0.05, 0.05, 0.08), base, clamp(edge - 0.5, 0.25, 1.0));
-  }
   float direct = max(dot(normal, sun), 0.0) * sun_share();
-  float sky = 0.5 + 0.5 * normal.y;
-  float day = clamp(sun.y * 6.0 + 0.25, 0.05, 1.0);
-  vec3 warm = mix(vec3(1.0, 0.62, 0.36), vec3(1.0, 0.96, 0.88), clamp(sun.y * 2.5, 0.0, 1.0));
-  vec3 light = vec3(0.33, 0.39, 0.48) * sky * day + warm * 0.95 * direct * (sun.y > 0.0 ? 1.0 : 0.0);
-  vec3 shown = mode == 5 ? normal * 0.5 + 0.5 : base * light;
-  if (haze.x < haze.y) {
-    float amount = smoothstep(haze.x, haze.y, v_facing.w);
-    shown = mix(shown, horizon, amount);
-  }
-  colour = vec4(pow(shown, vec3(1.0 / 1.6)), alpha);
+  vec3 shown = base * (sky_light * (0.5 + 0.5 * normal.y) + sun_light * direct);
+#endif
+  float far = clamp((v_facing.w - haze.x) * haze.y, 0.0, 1.0);
+  shown = mix(shown, horizon, far * far * (3.0 - 2.0 * far));
+  colour = vec4(sqrt(shown * sqrt(sqrt(shown))), alpha);  // to the power of 1/1.6
 }
 )glsl";
 
@@ -238,8 +241,9 @@ void main() {
 std::string terrain_vertex_shader(bool rim) {
   return header(rim) + kTerrainVertex;
 }
-std::string terrain_fragment_shader(bool rim, bool strips) {
-  return header(rim) + (strips ? "#define STRIPS\n" : "") + kDiscardVoid + kTerrainFragment + kSunShare;
+std::string terrain_fragment_shader(bool rim, ColourMode mode, bool borders) {
+  return header(rim) + "#define MODE " + std::to_string(static_cast<int>(mode)) + "\n" +
+         (borders ? "#define BORDERS\n" : "") + kDiscardVoid + kTerrainFragment + kSunShare;
 }
 std::string probe_fragment_shader(bool rim) {
   return header(rim) + kDiscardVoid + kProbeFragment;

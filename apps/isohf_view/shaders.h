@@ -2,6 +2,8 @@
 
 #include <string>
 
+#include "view_state.h"
+
 namespace isohf::view {
 
 /// The terrain's vertex shader: every picture and every check draws through it. Vertex attributes: 0 the shared
@@ -11,9 +13,8 @@ namespace isohf::view {
 /// shaders discard by, and clip distances.
 [[nodiscard]] std::string terrain_vertex_shader(bool rim);
 
-/// Light, colours, borders, haze.
-/// `strips` is the variant that also knows strip order: to number triangles costs a software rasteriser dear.
-[[nodiscard]] std::string terrain_fragment_shader(bool rim, bool strips);
+/// Light, colours, haze, and tile borders where wanted. A program for each mode.
+[[nodiscard]] std::string terrain_fragment_shader(bool rim, ColourMode mode, bool borders);
 
 /// (elevation code, normal x, normal z, 1): what verifying reads back.
 [[nodiscard]] std::string probe_fragment_shader(bool rim);
