@@ -80,6 +80,10 @@ void add_picture_options(CLI::App& app, Options& options, Raw& raw) {
       ->delimiter(',')
       ->expected(1, 2)
       ->check(CLI::Range(0.0, 12.0));
+  app.add_option("--triangle-size", options.view.triangle_px,
+                 "Area that triangles are meant to have, pixels: more is coarser and faster")
+      ->check(CLI::Range(0.01, 1e6))
+      ->capture_default_str();
   app.add_option("--fov", raw.fov_deg, "Vertical field of view, degrees")
       ->check(CLI::Range(1.0, 150.0))
       ->capture_default_str();
@@ -113,7 +117,7 @@ ParsedOptions parse_options(int argc, char** argv) {
   app.add_option("--frames", options.frames, "Frames of the flight (300), or after which the window closes")
       ->check(CLI::Range(1, 10000000));
   app.add_option("--csv", options.csv, "Write figures of each frame of the flight or step of the sweep");
-  app.add_flag("--baseline", options.baseline, "After the flight, measure a plain static mesh of as many triangles");
+  app.add_flag("--baseline", options.baseline, "After the flight, measure a plain static mesh of the same triangles");
   bool verify = false;
   app.add_flag("--verify", verify, "Check that archive, index arrays and shaders agree with the library");
   bool sweep = false;

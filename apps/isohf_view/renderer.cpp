@@ -149,7 +149,8 @@ double Renderer::level_of(const ViewState& view, TileIndex tile, const TileBound
                       0.5 * (bounds.low + bounds.high) * view.exaggeration,
                       (static_cast<double>(tile.row) + 0.5) * grid.extent_z()};
     const double distance = length(centre - view.eye);
-    level = fractional_level(projected_area_px(triangle_area(grid, 1.0), focal_px(view), distance), levels);
+    level = fractional_level(projected_area_px(triangle_area(grid, 1.0), focal_px(view), distance), levels,
+                             view.triangle_px);
   }
   return view.plain_switching ? std::round(level) : level;
 }
@@ -238,7 +239,9 @@ void Renderer::draw_opaque(const ViewState& view, const TerrainFrame& frame, con
     begin_shading(program, view, frame);
     glUniform1f(program.uniform("alpha"), 1.0F);
     for (const Item& item : items) {
-      if (item.is_rim == rim) draw_mesh(program, frame, item, item.blend.first, figures);
+      if (item.is_rim != rim) continue;
+      draw_mesh(program, frame, item, item.blend.first, figures);
+      drawn_.push_back({item.tile, item.blend.first});
     }
   }
 }
@@ -250,10 +253,11 @@ void Renderer::draw_fading(const ViewState& view, const TerrainFrame& frame, con
     const TerrainProgram& program = shading(view, rim);
     begin_shading(program, view, frame);
     for (auto item = items.rbegin(); item != items.rend(); ++item) {
-      if (item->is_rim != rim || item->blend.alpha <= 0.0 || item->blend.second == item->blend.first) continue;
+      if (item->is_rim != rim || !fades(*item)) continue;
       order_fading(item->blend);
       glUniform1f(program.uniform("alpha"), static_cast<float>(item->blend.alpha));
       draw_mesh(program, frame, *item, item->blend.second, figures);
+      drawn_.push_back({item->tile, item->blend.second});
     }
   }
   end_fading_pass();
@@ -299,15 +303,19 @@ void Renderer::draw_sky(const ViewState& view) const {
   set_vec3(sky_.uniform("sun"), sun);
   set_vec3(sky_.uniform("horizon"), by_day(kHorizon, sun));
   set_vec3(sky_.uniform("zenith"), by_day(kZenith, sun));
-  glDisable(GL_DEPTH_TEST);
+  // At the far end of depth: only where no ground is.
+  glDepthFunc(GL_LEQUAL);
+  glDepthMask(GL_FALSE);
   glBindVertexArray(nothing_.get());
   glDrawArrays(GL_TRIANGLES, 0, 3);
-  glEnable(GL_DEPTH_TEST);
+  glDepthMask(GL_TRUE);
+  glDepthFunc(GL_LESS);
 }
 
 FrameFigures Renderer::draw(const ViewState& view, std::int64_t first_column, std::int64_t last_column,
                             std::int64_t first_row, std::int64_t last_row, const ResidentTile& resident) {
   FrameFigures figures;
+  drawn_.clear();
   TerrainFrame frame = terrain_frame(source_, view);
   const std::vector<Item> items =
       visible_items(view, frame, {first_column, last_column, first_row, last_row}, resident, figures);
@@ -325,11 +333,10 @@ FrameFigures Renderer::draw(const ViewState& view, std::int64_t first_column, st
   glFrontFace(GL_CCW);
   glCullFace(GL_BACK);
   glClear(GL_DEPTH_BUFFER_BIT);
-  draw_sky(view);
   draw_opaque(view, frame, items, figures);
+  draw_sky(view);
   figures.passes = 1;
-  const bool fades = std::any_of(items.begin(), items.end(), [](const Item& item) { return item.blend.alpha > 0.0; });
-  if (fades) {
+  if (std::any_of(items.begin(), items.end(), fades)) {
     draw_fading(view, frame, items, figures);
     ++figures.passes;
   }

@@ -23,6 +23,13 @@ struct FrameFigures {
   std::int64_t passes = 0;      ///< over the terrain: opaque, fading, wires
 };
 
+/// A mesh that a frame drew: strip and stitch of a tile at a whole level.
+struct DrawnMesh {
+  TileIndex tile{};
+  int level = 0;
+  friend bool operator==(const DrawnMesh&, const DrawnMesh&) = default;
+};
+
 /// Finds a tile's buffers; nullptr where the tile is not resident.
 using ResidentTile = std::function<const TileSlot*(TileIndex)>;
 
@@ -34,6 +41,9 @@ class Renderer {
   /// Draws tiles first..last of both axes, as far as resident, into the bound framebuffer.
   FrameFigures draw(const ViewState& view, std::int64_t first_column, std::int64_t last_column, std::int64_t first_row,
                     std::int64_t last_row, const ResidentTile& resident);
+
+  /// What the last frame drew in its opaque and its fading pass, in order.
+  [[nodiscard]] const std::vector<DrawnMesh>& drawn() const { return drawn_; }
 
   /// Level of detail at which a tile is drawn, fractional.
   [[nodiscard]] double level_of(const ViewState& view, TileIndex tile, const TileBounds& bounds) const;
@@ -48,6 +58,10 @@ class Renderer {
     double nearest;  ///< distance of the nearest point of the tile's box
     LodBlend blend;
   };
+  /// True where the second mesh shows: less than half an 8-bit step of it does not.
+  [[nodiscard]] static bool fades(const Item& item) {
+    return item.blend.alpha > 0.5 / 255.0 && item.blend.second != item.blend.first;
+  }
   struct Variants {
     TerrainProgram inner;
     TerrainProgram rim;
@@ -74,6 +88,7 @@ class Renderer {
   const SharedGeometry& shared_;
   TileBounds whole_;
   std::map<std::tuple<ColourMode, bool, bool>, TerrainProgram> shading_;  ///< by mode, borders, rim
+  std::vector<DrawnMesh> drawn_;
   Variants flat_;
   Program sky_;
   VertexArray nothing_;

@@ -6,15 +6,16 @@
 
 namespace isohf::view {
 
-/// What a plain static mesh costs the same driver: float positions, one plain colour, one strip drawn over and over.
-struct StaticMeshSpeed {
-  double frame_ms = 0.0;
+/// The same picture's triangles, drawn twice.
+struct MeshSpeed {
   std::int64_t triangles = 0;  ///< a frame
-  [[nodiscard]] double triangles_per_s() const { return 1e3 * static_cast<double>(triangles) / frame_ms; }
+  double ours_ms = 0.0;        ///< a whole frame of the session, nothing left to load
+  double plain_ms = 0.0;       ///< the same meshes from float positions, in one plain colour, without sky or fading
 };
 
-/// Draws about `triangles` a frame: copies of one full-detail tile, spread over the picture as the session's view
-/// spreads the heightfield. Median of a few frames.
-[[nodiscard]] StaticMeshSpeed measure_static_mesh(const Session& session, std::int64_t triangles);
+/// What a plain static mesh costs the same driver: every mesh that the session's frame draws, strip by strip and at the
+/// same places, but with its vertices' positions laid out beforehand, and no light. Loads all tiles in reach first.
+/// Medians of a few frames.
+[[nodiscard]] MeshSpeed measure_static_mesh(Session& session);
 
 }  // namespace isohf::view

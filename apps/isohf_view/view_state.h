@@ -26,6 +26,7 @@ struct ViewState {
   bool beyond = false;                ///< shows tiles beyond the source's edge as well
   std::optional<double> fixed_level;  ///< draws every tile at this fractional level
   std::optional<double> other_level;  ///< of every second tile, like a chessboard; with fixed_level
+  double triangle_px = 4.0;           ///< area that triangles are meant to have, pixels (section 3.9)
   bool plain_switching = false;       ///< rounds the level instead of fading: for comparison
   int width = 1280;                   ///< pixels
   int height = 720;
