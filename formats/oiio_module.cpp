@@ -1,12 +1,10 @@
-#include "formats/oiio_module.h"
+#include "formats/oiio_module_inside.h"
 
 #include <OpenImageIO/imageio.h>
 
 #include <algorithm>
-#include <cstdio>
 #include <cstring>
 #include <memory>
-#include <new>
 #include <string>
 #include <vector>
 
@@ -26,39 +24,14 @@ namespace {
 
 using isohf::Error;
 using isohf::ErrorCode;
+using isohf::guarded;
+using isohf::put_text;
 using isohf::SampleType;
 
 /// Windows narrower than the raster, or in tiles, are cut out of bands of about this size.
 constexpr std::int64_t kBandBytes = std::int64_t{8} << 20U;
 /// One row of blocks may not be larger.
 constexpr std::int64_t kMaxBlockRowBytes = std::int64_t{1} << 30U;
-
-template <std::size_t kSize>
-void put_text(char (&out)[kSize], const std::string& text) {
-  std::snprintf(out, kSize, "%s", text.c_str());
-  std::replace(out, out + std::strlen(out), '\n', ' ');
-}
-
-/// Runs `action` and turns what it throws into a result code and a message.
-template <typename Action>
-int guarded(IsohfOiioMessage* message, Action action) {
-  const auto report = [&](ErrorCode code, const char* text) {
-    put_text(message->text, text);
-    return static_cast<int>(code) + 1;
-  };
-  try {
-    action();
-    return 0;
-  } catch (const Error& error) {
-    return report(error.code(), error.what());
-  } catch (const std::bad_alloc&) {
-    return report(ErrorCode::kOutOfMemory, "OpenImageIO ran out of memory");
-  } catch (const std::exception& error) {
-    return report(ErrorCode::kCorrupt, error.what());
-  } catch (...) {
-    return report(ErrorCode::kCorrupt, "OpenImageIO failed without saying why");
-  }
-}
 
 SampleType sample_type_of(const OIIO::TypeDesc& type) {
   switch (type.basetype) {
@@ -211,6 +184,8 @@ void module_close(IsohfOiioRaster* raster) {
 }  // namespace
 
 extern "C" __attribute__((visibility("default"))) const IsohfOiioModule* isohf_oiio_module() {
-  static const IsohfOiioModule module = {ISOHF_OIIO_ABI, module_open, module_read, module_close};
+  static const IsohfOiioModule module = {ISOHF_OIIO_ABI,         module_open,           module_read,
+                                         module_close,           isohf_oiio_open_photo, isohf_oiio_read_photo,
+                                         isohf_oiio_bound_photo, isohf_oiio_close_photo};
   return &module;
 }

@@ -12,7 +12,7 @@
 extern "C" {
 
 /// Raised whenever anything below changes; the loader refuses any other.
-#define ISOHF_OIIO_ABI 1
+#define ISOHF_OIIO_ABI 2
 
 typedef struct IsohfOiioRaster IsohfOiioRaster;
 
@@ -27,6 +27,20 @@ typedef struct IsohfOiioInfo {
   char warning[256];    ///< empty: none
 } IsohfOiioInfo;
 
+/// A picture of the ground, read as 8-bit sRGB through a cache of bounded size.
+typedef struct IsohfOiioPhoto IsohfOiioPhoto;
+
+typedef struct IsohfOiioPhotoInfo {
+  int64_t width;
+  int64_t height;
+  int64_t block_height;   ///< rows that are decoded together
+  int64_t pixel_bytes;    ///< of one pixel in the cache
+  int32_t channels;       ///< as delivered: 1 grey, 3 RGB, 4 RGBA with straight alpha
+  int32_t random_access;  ///< 0: a block needs those before it
+  char format[32];
+  char warning[256];  ///< empty: none
+} IsohfOiioPhotoInfo;
+
 typedef struct IsohfOiioMessage {
   char text[512];
 } IsohfOiioMessage;
@@ -39,11 +53,25 @@ typedef int (*IsohfOiioRead)(IsohfOiioRaster* raster, int64_t column, int64_t ro
                              void* samples, size_t bytes, IsohfOiioMessage* message);
 typedef void (*IsohfOiioClose)(IsohfOiioRaster* raster);
 
+/// Opens a photo and fills `info`. Photos are read by any number of threads at once.
+typedef int (*IsohfOiioOpenPhoto)(const char* path, IsohfOiioPhoto** photo, IsohfOiioPhotoInfo* info,
+                                  IsohfOiioMessage* message);
+/// Reads a window as 8-bit samples, channels interleaved; `bytes` is the size of `samples`.
+typedef int (*IsohfOiioReadPhoto)(IsohfOiioPhoto* photo, int64_t column, int64_t row, int64_t columns, int64_t rows,
+                                  uint8_t* samples, size_t bytes, IsohfOiioMessage* message);
+/// Bounds the cache.
+typedef void (*IsohfOiioBoundPhoto)(IsohfOiioPhoto* photo, int64_t bytes);
+typedef void (*IsohfOiioClosePhoto)(IsohfOiioPhoto* photo);
+
 typedef struct IsohfOiioModule {
   int32_t abi;
   IsohfOiioOpen open;
   IsohfOiioRead read;
   IsohfOiioClose close;
+  IsohfOiioOpenPhoto open_photo;
+  IsohfOiioReadPhoto read_photo;
+  IsohfOiioBoundPhoto bound_photo;
+  IsohfOiioClosePhoto close_photo;
 } IsohfOiioModule;
 
 /// The one symbol that the module exports, and its name.

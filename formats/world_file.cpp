@@ -28,7 +28,7 @@ std::optional<std::string> text_of(const std::filesystem::path& path) {
   return text;
 }
 
-std::vector<std::string> spellings(std::initializer_list<std::string> extensions) {
+std::vector<std::string> spellings(const std::vector<std::string>& extensions) {
   std::vector<std::string> all;
   for (const std::string& extension : extensions) {
     std::string upper = extension;
@@ -40,10 +40,19 @@ std::vector<std::string> spellings(std::initializer_list<std::string> extensions
   return all;
 }
 
+/// .jgw and .jpgw for .jpg: the first and last letter and a w, or all of them.
+std::vector<std::string> world_extensions(const std::string& raster_path) {
+  std::string own = std::filesystem::path(raster_path).extension().string();
+  std::transform(own.begin(), own.end(), own.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  if (own.size() < 3 || own == ".tif" || own == ".tiff") return {".tfw", ".tifw", ".wld"};
+  return {fmt::format(".{}{}w", own[1], own.back()), own + "w", ".wld"};
+}
+
 }  // namespace
 
 std::optional<WorldFile> world_file_beside(const std::string& raster_path) {
-  for (const std::string& extension : spellings({".tfw", ".tifw", ".wld"})) {
+  for (const std::string& extension : spellings(world_extensions(raster_path))) {
     const std::filesystem::path path = std::filesystem::path(raster_path).replace_extension(extension);
     const std::optional<std::string> text = text_of(path);
     if (!text) continue;

@@ -14,8 +14,9 @@ struct WorldFile {
   double y0 = 0.0;
 };
 
-/// Looks beside raster.tif for raster.tfw, raster.tifw and raster.wld (any of them in upper case); nullopt where none
-/// is. Throws Error: kCorrupt where one is but is not six numbers, kUnsupported where it rotates the raster.
+/// Looks beside raster.tif for raster.tfw, raster.tifw, those of other formats (.jgw, .pgw, ...) and raster.wld (any of
+/// them in upper case); nullopt where none is. Throws Error: kCorrupt where one is but is not six numbers, kUnsupported
+/// where it rotates the raster.
 [[nodiscard]] std::optional<WorldFile> world_file_beside(const std::string& raster_path);
 
 /// The text of raster.prj (or .PRJ) beside raster.tif; empty where none is. At most 64 KiB.

@@ -18,6 +18,7 @@
 #include "options_common.h"
 #include "options_lattice.h"
 #include "options_source.h"
+#include "options_texture.h"
 #include "output_file.h"
 #include "plan_report.h"
 #include "standard_output.h"
@@ -34,6 +35,7 @@ part for --resume and nothing under the final name. The bytes do not depend on -
 Examples:
   isohf convert dem.tif dem.isohf
   isohf convert dem.tif -o dem.isohf --density 0.866 --outside void --overwrite
+  isohf convert dem.tif dem.isohf --texture orthophoto.tif
   isohf convert heights.exr h.isohf --channel R --z-scale 1200 --sample-spacing 2
   isohf plan dem.tif                  the same options without writing: see what comes out
   for f in *.hgt; do isohf convert "$f" "${f%.hgt}.isohf" -q || break; done)";
@@ -44,6 +46,7 @@ struct ConvertCommandOptions {
   std::string input;
   std::string output;
   OpenOptions open;
+  TextureOptions texture;
   ConvertOptions convert;
   bool dry_run = false;
 };
@@ -83,6 +86,8 @@ std::optional<ConvertCommandOptions> parse(const Arguments& arguments) {
       });
   line.option("--sun-min", "DEG", "Lowest sun elevation for --shadow-seeds (default 2); a lower one takes more room",
               [&](const std::string& text) { sun_min_deg = parse_number(text); });
+  add_texture_options(line, options.texture);
+  line.group("Residuals");
   line.flag("--lossless", "Keep residuals as well, so that restore gives INPUT's samples bit for bit",
             options.convert.lossless);
   add_work_options(line, options.work);
@@ -101,6 +106,7 @@ std::optional<ConvertCommandOptions> parse(const Arguments& arguments) {
     }
     options.convert.shadow_seeds->sun_min_deg = *sun_min_deg;
   }
+  check_texture_options(options.texture);
   options.convert.threads = options.work.threads;
   options.convert.producer = "isohf " ISOHF_VERSION;
   return options;
@@ -142,6 +148,8 @@ std::string json_from(const ConvertCommandOptions& options, const ConvertSummary
                     {"tile_bytes", summary.tile_bytes},
                     {"shadow_seed_bytes", summary.seed_bytes},
                     {"residual_bytes", summary.residual_bytes},
+                    {"texture_bytes", summary.texture_bytes},
+                    {"photo_pixels_per_texel", summary.pixels_per_texel},
                     {"raw_16_bit_bytes", measured.raw_bytes},
                     {"ratio_to_raw_16_bit", measured.ratio},
                     {"bits_per_sample", measured.bits_per_sample},
@@ -186,6 +194,7 @@ std::string text_from(const ConvertCommandOptions& options, const ConvertSummary
     say("shadows", fmt::format("seeds of {}, {:.1f} % of the tiles'", describe_bytes(summary.seed_bytes),
                                100.0 * static_cast<double>(summary.seed_bytes) / tile_bytes));
   }
+  if (summary.texture) say("textures", describe_textures(*summary.texture, summary.pixels_per_texel));
   if (metadata.statistics.clamped > 0) {
     say("clamped", fmt::format("{} vertices moved into the range", describe_count(metadata.statistics.clamped)));
   }
@@ -195,10 +204,11 @@ std::string text_from(const ConvertCommandOptions& options, const ConvertSummary
   return text;
 }
 
-int run(const ConvertCommandOptions& options) {
+int run(ConvertCommandOptions options) {
   const CommonOptions& common = options.common;
   if (!options.dry_run) check_output_file(options.input, options.output, options.convert.overwrite);
   const std::unique_ptr<HeightSource> source = open_source(options.input, options.open);
+  const std::unique_ptr<PhotoSource> photo = open_texture(options.texture, options.convert.texture);
   if (options.dry_run) {
     print_plan(source->info(), make_plan(source->info(), options.convert.plan), options.convert.code_type, common);
     return kExitDone;
@@ -239,8 +249,8 @@ int run(const ConvertCommandOptions& options) {
 }  // namespace
 
 int command_convert(const Arguments& arguments) {
-  const std::optional<ConvertCommandOptions> options = parse(arguments);
-  return options ? run(*options) : static_cast<int>(kExitDone);
+  std::optional<ConvertCommandOptions> options = parse(arguments);
+  return options ? run(std::move(*options)) : static_cast<int>(kExitDone);
 }
 
 }  // namespace isohf::cli

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstring>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -9,8 +10,10 @@
 #include "command.h"
 #include "describe.h"
 #include "isohf/archive/reader.h"
+#include "isohf/archive/texture_info.h"
 #include "json_output.h"
 #include "options_common.h"
+#include "options_texture.h"
 #include "standard_output.h"
 
 namespace isohf::cli {
@@ -140,6 +143,31 @@ std::string describe_crs(const SourceRecord& source) {
   return text;
 }
 
+/// Those of one folder together.
+std::string describe_members(const std::vector<MemberEntry>& members) {
+  struct Group {
+    std::string name;
+    std::int64_t members = 0;
+    std::uint64_t bytes = 0;
+  };
+  std::vector<Group> groups;
+  for (const MemberEntry& member : members) {
+    const std::string folder = member.name.substr(0, member.name.find('/') + 1);
+    const std::string& name = folder.empty() ? member.name : folder;
+    auto group = std::find_if(groups.begin(), groups.end(), [&](const Group& g) { return g.name == name; });
+    if (group == groups.end()) group = groups.insert(groups.end(), {name});
+    ++group->members;
+    group->bytes += member.bytes;
+  }
+  std::string text;
+  for (const Group& group : groups) {
+    text += fmt::format("{}{} ({}{})", text.empty() ? "" : ", ", group.name,
+                        group.name.back() == '/' ? fmt::format("{} members, ", describe_count(group.members)) : "",
+                        describe_bytes(group.bytes));
+  }
+  return text;
+}
+
 std::string describe_archive(const ArchiveReader& archive) {
   const Metadata& metadata = archive.metadata();
   const TileGrid& grid = metadata.grid;
@@ -191,10 +219,11 @@ std::string describe_archive(const ArchiveReader& archive) {
   say("filter", fmt::format("{}, acquisition {}", metadata.filter, metadata.acquisition));
   say("size", fmt::format("{:.3f} bits a stored sample; {:.2f} times smaller than raw 16-bit samples",
                           derived.bits_per_sample, derived.ratio_to_u16));
-  std::string members;
-  for (const MemberEntry& member : archive.members()) {
-    members += fmt::format("{}{} ({})", members.empty() ? "" : ", ", member.name, describe_bytes(member.bytes));
+  if (const auto info = texture_info(metadata)) {
+    say("textures", fmt::format("{}; from {}, {} x {} pixels, placed by {}", describe_textures(*info, 0.0),
+                                info->photo_name, info->photo_width, info->photo_height, info->placed_by));
   }
+  const std::string members = describe_members(archive.members());
   say("members", members + (members.empty() ? "" : " beside the tiles"));
   say("content", "sha256 " + metadata.content_sha256);
   return text;

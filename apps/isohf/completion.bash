@@ -34,6 +34,7 @@ _isohf() {
     *' --azimuth') values='E W' ;;
     *' --palette') values='elevation gray' ;;
     'experiment --fit') values='least-squares interpolate' ;;
+    *' --texture-format') values='png jpeg' ;;
   esac
   if [[ -n $values ]]; then
     mapfile -t COMPREPLY < <(compgen -W "$values" -- "$current")

@@ -20,6 +20,7 @@
 #include "isohf/convert/quantiser.h"
 #include "isohf/convert/residual_stage.h"
 #include "isohf/convert/seed_stage.h"
+#include "isohf/convert/texture_stage.h"
 #include "isohf/convert/tile_statistics.h"
 #include "isohf/surface/band_reader.h"
 #include "isohf/surface/edge_range.h"
@@ -80,12 +81,23 @@ SourceScan scan_source(HeightSource& source, EdgeRange& edge, const ProgressCall
   return found;
 }
 
+/// Tiles that are read, made or waiting to be written; fewer where each takes long and brings much along.
+constexpr int kTilesInFlightPerThread = 8;
+constexpr int kTexturedTilesInFlightPerThread = 2;
+
 /// A tile on its way through the pipeline.
 struct TileJob {
   TileIndex index{};
   std::shared_ptr<const Band> band;
   EncodedTile encoded;
   SeedStage::Tile seeds;
+  TextureStage::Encoded texture;
+};
+
+/// What goes into an archive beside the tiles, made in the same pass; nullptr: not asked for.
+struct Stages {
+  SeedStage* seeds = nullptr;
+  const TextureStage* textures = nullptr;
 };
 
 /// Elevations 0 to 1 in floats or scaled integers are most often a fraction of something.
@@ -200,7 +212,7 @@ void choose_codes(Conversion& job, std::vector<std::string>& warnings, const Pro
                           elevation_from_code(job.quantisation, job.quantisation.max_code())));
 }
 
-void make_tile(const Conversion& job, const TileCutter& cutter, const SeedStage* seeds, TileJob& tile) {
+void make_tile(const Conversion& job, const TileCutter& cutter, const Stages& stages, bool is_new, TileJob& tile) {
   const TileShape& shape = job.plan.grid.shape();
   std::vector<float> heights(static_cast<std::size_t>(shape.stored_vertex_count()));
   cutter.cut(tile.index, tile.band->view(), heights);
@@ -212,14 +224,15 @@ void make_tile(const Conversion& job, const TileCutter& cutter, const SeedStage*
   encoded.statistics = tile_statistics(shape, codes, job.quantisation);
   encoded.statistics.clamped = counts.below + counts.above;
   encoded.statistics.worst_rounding = counts.worst_rounding;
-  if (seeds != nullptr) tile.seeds = seeds->prepare(codes);
+  if (stages.seeds != nullptr) tile.seeds = stages.seeds->prepare(codes);
   tile.seeds.is_empty = encoded.is_empty;
+  if (stages.textures != nullptr && is_new && !encoded.is_empty) tile.texture = stages.textures->encode(tile.index);
 }
 
 /// Second pass: read -> resample and encode -> write in order. The number of tiles in flight is fixed, and so is the
 /// number of bands: one that is being cut and one that is being read.
-void write_tiles(const Conversion& job, ArchiveWriter& writer, SeedStage* seeds, const ProgressCallback& callback,
-                 int threads) {
+void write_tiles(const Conversion& job, ArchiveWriter& writer, const Stages& stages, const ProgressCallback& callback,
+                 std::size_t tiles_in_flight) {
   const TileGrid& grid = job.plan.grid;
   const Quantisation& codes = job.quantisation;
   ElevationRange limits{-HUGE_VAL, HUGE_VAL};
@@ -230,15 +243,14 @@ void write_tiles(const Conversion& job, ArchiveWriter& writer, SeedStage* seeds,
   BandReader reader(job.source, job.datum, job.prefilter);
   ProgressMeter meter(callback, ConvertProgress::Pass::kTiles, grid.tile_count());
   const std::int64_t first_new = writer.next_tile();
-  std::int64_t next = seeds != nullptr ? SeedStage::first_tile_needed(grid, first_new) : first_new;
+  std::int64_t next = stages.seeds != nullptr ? SeedStage::first_tile_needed(grid, first_new) : first_new;
   std::int64_t band_row = -1;
   std::shared_ptr<const Band> band;
 
   // Tiles leave the pipeline in the order in which they enter it, so that a ring of as many as may be in flight always
   // has the next one free. The pipeline itself only hands on pointers: it forgets to destroy what it holds when a stage
   // throws.
-  constexpr std::size_t kTilesInFlightPerThread = 8;
-  std::vector<TileJob> ring(static_cast<std::size_t>(threads) * kTilesInFlightPerThread);
+  std::vector<TileJob> ring(tiles_in_flight);
   std::size_t entered = 0;
 
   const auto read = [&](oneapi::tbb::flow_control& control) -> TileJob* {
@@ -260,14 +272,17 @@ void write_tiles(const Conversion& job, ArchiveWriter& writer, SeedStage* seeds,
     return tile;
   };
   const auto encode = [&](TileJob* tile) {
-    make_tile(job, cutter, seeds, *tile);
+    make_tile(job, cutter, stages, grid.flat_index(tile->index) >= first_new, *tile);
     tile->band.reset();
     return tile;
   };
   std::int64_t written = next;
   const auto write = [&](TileJob* tile) {
-    if (written >= first_new) writer.add_tile(tile->encoded);
-    if (seeds != nullptr) seeds->add(tile->index, std::move(tile->seeds), writer);
+    if (written >= first_new) {
+      if (stages.textures != nullptr) stages.textures->add(tile->index, tile->texture, writer);
+      writer.add_tile(tile->encoded);
+    }
+    if (stages.seeds != nullptr) stages.seeds->add(tile->index, std::move(tile->seeds), writer);
     meter.report(++written, writer.bytes_written());
   };
 
@@ -295,9 +310,14 @@ ConvertSummary convert(HeightSource& source, const std::string& output, const Co
   if (options.z_range) check_range(*options.z_range);
   if (options.shadow_seeds) check_seed_request(*options.shadow_seeds, plan.grid);
   const int threads = options.threads > 0 ? options.threads : oneapi::tbb::this_task_arena::max_concurrency();
+  const int tiles_in_flight = threads * (options.texture ? kTexturedTilesInFlightPerThread : kTilesInFlightPerThread);
+  const std::optional<TextureStage> textures =
+      options.texture ? std::optional(TextureStage::make(plan, info, *options.texture, threads, tiles_in_flight))
+                      : std::nullopt;
   const std::uint64_t memory_bytes = plan.estimated_memory_bytes +
                                      (options.shadow_seeds ? seed_stage_memory_bytes(plan.grid) : 0) +
-                                     (options.lossless ? residual_stage_memory_bytes(info, plan, threads) : 0);
+                                     (options.lossless ? residual_stage_memory_bytes(info, plan, threads) : 0) +
+                                     (textures ? textures->memory_bytes() : 0);
   if (options.memory_bytes != 0 && memory_bytes > options.memory_bytes) {
     throw Error(ErrorCode::kOutOfMemory,
                 fmt::format("this conversion needs about {} MB, --memory allows {} MB; use smaller tiles (--shape, "
@@ -312,6 +332,8 @@ ConvertSummary convert(HeightSource& source, const std::string& output, const Co
                         metadata_room(describe_job(info, plan, options, {}))});
   ConvertSummary summary(plan.grid);
   summary.warnings = info.warnings;
+  if (textures)
+    summary.warnings.insert(summary.warnings.end(), textures->warnings().begin(), textures->warnings().end());
   const Kernel kernel = Kernel::make(filter_from_string(options.filter));
   Conversion job{
       source, options, plan, kernel, Prefilter::make(kernel.filter(), acquisition_from_string(options.acquisition)),
@@ -328,7 +350,8 @@ ConvertSummary convert(HeightSource& source, const std::string& output, const Co
         seeds.emplace(plan.grid, job.quantisation, *options.shadow_seeds,
                       known ? 1.0 / info.metres_per_vertical_unit : 1.0);
       }
-      write_tiles(job, writer, seeds ? &*seeds : nullptr, progress, threads);
+      write_tiles(job, writer, {seeds ? &*seeds : nullptr, textures ? &*textures : nullptr}, progress,
+                  static_cast<std::size_t>(tiles_in_flight));
       if (options.lossless) {
         ProgressMeter meter(progress, ConvertProgress::Pass::kResiduals, info.height);
         lossless = write_residuals(
@@ -349,6 +372,13 @@ ConvertSummary convert(HeightSource& source, const std::string& output, const Co
       const ShadowSeedInfo record = seeds->info(writer);
       summary.seed_bytes = record.bytes;
       summary.metadata.extensions.emplace_back(kShadowSeedsName, format_shadow_seed_info(record));
+    }
+    if (textures) {
+      summary.texture = textures->info(writer);
+      summary.texture_bytes = summary.texture->bytes;
+      summary.pixels_per_texel = textures->pixels_per_texel();
+      summary.metadata.textures = {texture_name_pattern(summary.texture->format)};
+      summary.metadata.extensions.emplace_back(kTileTexturesName, format_texture_info(*summary.texture));
     }
     if (lossless) summary.metadata.extensions.emplace_back(kLosslessName, format_lossless(*lossless));
     summary.residual_bytes = lossless ? lossless->residual_bytes : 0;

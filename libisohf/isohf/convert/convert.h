@@ -8,8 +8,10 @@
 #include <utility>
 #include <vector>
 
+#include "isohf/archive/texture_info.h"
 #include "isohf/convert/plan.h"
 #include "isohf/surface/height_source.h"
+#include "isohf/surface/photo_source.h"
 
 namespace isohf {
 
@@ -17,6 +19,14 @@ namespace isohf {
 struct ShadowSeedRequest {
   double sun_min_deg = 2.0;     ///< hulls for every sun elevation from here on, degrees, 0.01 to below 90
   std::vector<double> sun_deg;  ///< instead: shadow heights for these sun elevations, ascending
+};
+
+/// Which textures an archive gets (docs/decisions/0015).
+struct TextureRequest {
+  PhotoSource* photo = nullptr;         ///< must outlive the conversion
+  std::optional<TextureFormat> format;  ///< nullopt: JPEG, or PNG where the photo has alpha
+  int max_size = 1024;                  ///< texels on a side at most: a power of two, 64...4096
+  int jpeg_quality = 90;                ///< 1...100
 };
 
 /// What a conversion does, beyond its input and output.
@@ -32,6 +42,7 @@ struct ConvertOptions {
   std::string filter = "bilinear";
   std::string acquisition = "point";
   std::optional<ShadowSeedRequest> shadow_seeds;  ///< nullopt: none
+  std::optional<TextureRequest> texture;          ///< nullopt: none
   int threads = 0;                                ///< 0: all cores
   std::uint64_t memory_bytes = 0;                 ///< refuse plans that would need more; 0: no limit
   bool overwrite = false;
@@ -65,6 +76,10 @@ struct ConvertSummary {
   double worst_rounding = 0.0;
   std::uint64_t tile_bytes = 0;  ///< of all tiles, compressed
   std::uint64_t seed_bytes = 0;  ///< of shadow seeds, compressed
+  std::uint64_t texture_bytes = 0;
+  std::optional<TextureInfo> texture;  ///< as in the metadata
+  double pixels_per_texel =
+      0.0;  ///< photo pixels under the side of a texel; above 1 where --texture-size is in the way
   double seconds = 0.0;
   std::vector<std::string> warnings;  ///< one line each
 };

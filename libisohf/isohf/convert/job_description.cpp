@@ -48,9 +48,7 @@ SourceRecord record_of(const SourceInfo& info, const SourceFrame& frame) {
   return record;
 }
 
-}  // namespace
-
-std::string job_fingerprint(const SourceInfo& info, const Plan& plan, const ConvertOptions& options) {
+std::string heights_fingerprint(const SourceInfo& info, const Plan& plan, const ConvertOptions& options) {
   std::error_code ignored;
   const auto size = std::filesystem::file_size(info.path, ignored);
   struct stat status {};
@@ -75,6 +73,27 @@ std::string job_fingerprint(const SourceInfo& info, const Plan& plan, const Conv
           : "none");
 }
 
+}  // namespace
+
+std::string job_fingerprint(const SourceInfo& info, const Plan& plan, const ConvertOptions& options) {
+  std::string job = heights_fingerprint(info, plan, options);
+  if (options.texture) {
+    const TextureRequest& texture = *options.texture;
+    const PhotoInfo& photo = texture.photo->info();
+    struct stat status {};
+    const bool known = ::stat(photo.path.c_str(), &status) == 0;
+    job += fmt::format(" | texture {} {} bytes {}.{:09} {}x{}x{} {} {} {}",
+                       std::filesystem::path(photo.path).filename().string(), known ? status.st_size : 0,
+                       known ? status.st_mtim.tv_sec : 0, known ? status.st_mtim.tv_nsec : 0, photo.width, photo.height,
+                       photo.channels, texture.format ? to_string(*texture.format) : "auto", texture.max_size,
+                       texture.jpeg_quality);
+    if (photo.georeference) {
+      job += fmt::format(" at {} {} step {} {}", photo.georeference->origin_x, photo.georeference->origin_y,
+                         photo.georeference->spacing_x, photo.georeference->spacing_y);
+    }
+  }
+  return job;
+}
 Metadata describe_job(const SourceInfo& info, const Plan& plan, const ConvertOptions& options,
                       const Quantisation& quantisation) {
   Metadata metadata(plan.grid);

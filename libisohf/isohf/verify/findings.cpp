@@ -29,6 +29,8 @@ const std::vector<FindingKind>& finding_catalogue() {
       {finding::kSourceInvented, Severity::kError, "the archive has an elevation deep inside a void of the source"},
       {finding::kLossless, Severity::kError,
        "the residuals do not give the source's samples: one cannot be decoded, or their SHA-256 differs"},
+      {finding::kTexture, Severity::kError,
+       "a texture is missing, cannot be decoded, or has another size than the metadata says"},
       {finding::kTileNotDeflate, Severity::kError, "zlib does not inflate a tile that a laxer decoder reads"},
   };
   return kinds;

@@ -25,6 +25,7 @@ inline constexpr int kSourceLost = 16;
 inline constexpr int kSourceInvented = 17;
 inline constexpr int kLossless = 18;
 inline constexpr int kTileNotDeflate = 20;
+inline constexpr int kTexture = 21;
 }  // namespace finding
 
 /// Severity of a catalogue id.

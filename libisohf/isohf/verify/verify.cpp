@@ -18,6 +18,7 @@
 #include "isohf/surface/normals.h"
 #include "isohf/verify/findings.h"
 #include "isohf/verify/shared_vertices.h"
+#include "isohf/verify/texture_check.h"
 
 namespace isohf {
 namespace {
@@ -65,6 +66,7 @@ class Verification {
     }
     check_totals();
     check_lossless();
+    for (std::string& problem : check_textures(archive_)) add(make(finding::kTexture, {}, std::move(problem)));
     return std::move(report_);
   }
 

@@ -1,0 +1,50 @@
+#include "formats/photo_place.h"
+
+#include <array>
+
+#include "formats/geotiff_keys.h"
+#include "formats/raw_file.h"
+#include "formats/tiff_file.h"
+#include "formats/tiff_source.h"
+#include "formats/world_file.h"
+#include "isohf/base/error.h"
+
+namespace isohf {
+namespace {
+
+[[noreturn]] void refuse_south_up() {
+  throw Error(ErrorCode::kUnsupported, "its rows run from South to North; turn it first");
+}
+
+/// The place that the tags of a TIFF file give; nullopt for other files and for tags without one.
+std::optional<Georeference> place_from_tags(const std::string& path, std::int64_t rows) {
+  const RawFile file(path);
+  std::array<std::byte, 4> head{};
+  if (file.read_some(0, head) != head.size() || !looks_like_tiff(head)) return std::nullopt;
+  TiffHandle handle(file, read_directories(file).main, false);
+  const GeoTiffPlace place = place_from_geotiff(handle.read_tags().geo, rows);
+  if (!place.placed || !place.georeference.has_origin) return std::nullopt;
+  if (place.rows_from_south) refuse_south_up();
+  return place.georeference;
+}
+
+}  // namespace
+
+std::optional<Georeference> photo_georeference(const std::string& path, std::int64_t rows) {
+  std::optional<Georeference> place = place_from_tags(path, rows);
+  if (!place) {
+    const std::optional<WorldFile> world = world_file_beside(path);
+    if (!world) return std::nullopt;
+    if (world->dy > 0.0) refuse_south_up();
+    place.emplace();
+    place->spacing_x = world->dx;
+    place->spacing_y = -world->dy;
+    place->has_origin = true;
+    place->origin_x = world->x0;
+    place->origin_y = world->y0;
+  }
+  if (place->system.wkt.empty() && !place->system.epsg) place->system.wkt = prj_beside(path);
+  return place;
+}
+
+}  // namespace isohf

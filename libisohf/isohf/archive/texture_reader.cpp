@@ -1,0 +1,81 @@
+#include "isohf/archive/texture_reader.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "isohf/archive/picture_codec.h"
+#include "isohf/base/error.h"
+
+namespace isohf {
+namespace {
+
+TextureInfo info_of(const ArchiveReader& archive) {
+  const auto info = texture_info(archive.metadata());
+  if (!info) {
+    throw Error(ErrorCode::kInvalidArgument,
+                fmt::format("{}: has no textures; convert with --texture", archive.path()));
+  }
+  return *info;
+}
+
+}  // namespace
+
+TextureReader::TextureReader(const ArchiveReader& archive)
+    : archive_(archive),
+      info_(info_of(archive)),
+      members_(static_cast<std::size_t>(archive.grid().tile_count()) * static_cast<std::size_t>(info_.levels), -1) {
+  const auto& members = archive.members();
+  for (std::size_t i = 0; i < members.size(); ++i) {
+    const auto place = place_from_texture_name(info_, members[i].name);
+    if (place && archive.grid().contains(place->tile)) {
+      members_[slot(place->tile, place->level)] = static_cast<std::int64_t>(i);
+    }
+  }
+}
+
+std::size_t TextureReader::slot(TileIndex tile, int level) const {
+  return static_cast<std::size_t>(archive_.grid().flat_index(tile)) * static_cast<std::size_t>(info_.levels) +
+         static_cast<std::size_t>(level);
+}
+
+bool TextureReader::has(TileIndex tile, int level) const {
+  return archive_.grid().contains(tile) && level >= 0 && level < info_.levels && members_[slot(tile, level)] >= 0;
+}
+
+Picture TextureReader::read(TileIndex tile, int level) const {
+  if (!has(tile, level)) {
+    throw Error(ErrorCode::kInvalidArgument, fmt::format("{}: tile ({},{}) has no texture of level {}", archive_.path(),
+                                                         tile.column, tile.row, level));
+  }
+  const MemberEntry& member = archive_.members()[static_cast<std::size_t>(members_[slot(tile, level)])];
+  const int size = info_.level_size(level);
+  const std::vector<std::byte> bytes = archive_.read_member(member);
+  try {
+    Picture picture = info_.format == TextureFormat::kPng ? decode_png(bytes, size) : decode_jpeg(bytes, size);
+    if (picture.width != size || picture.height != size || picture.channels != info_.channels) {
+      throw Error(ErrorCode::kCorrupt,
+                  fmt::format("is {} x {} pixels of {} channels, must be {} x {} of {}", picture.width, picture.height,
+                              picture.channels, size, size, info_.channels));
+    }
+    return picture;
+  } catch (const Error& error) {
+    throw error.within(fmt::format("{}: member \"{}\" at byte {}", archive_.path(), member.name, member.offset_bytes));
+  }
+}
+
+Picture TextureReader::read_rgba(TileIndex tile, int level) const {
+  Picture picture = read(tile, level);
+  if (picture.channels == 4) return picture;
+  Picture rgba(picture.width, picture.height, 4);
+  const std::size_t channels = static_cast<std::size_t>(picture.channels);
+  const std::size_t pixels = rgba.samples.size() / 4;
+  for (std::size_t i = 0; i < pixels; ++i) {
+    for (std::size_t c = 0; c < 3; ++c)
+      rgba.samples[4 * i + c] = picture.samples[i * channels + (channels == 1 ? 0 : c)];
+    rgba.samples[4 * i + 3] = 255;
+  }
+  return rgba;
+}
+
+}  // namespace isohf

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "isohf/archive/reader.h"
+#include "isohf/archive/texture_info.h"
+#include "isohf/base/picture.h"
+
+namespace isohf {
+
+/// Reads an archive's textures, any level of any tile, from any number of threads at once.
+/// Memory: 8 bytes a tile and level. The archive must outlive it.
+class TextureReader {
+ public:
+  /// Finds the members. Throws Error{kInvalidArgument} where the archive has no textures; kCorrupt, kUnsupported.
+  explicit TextureReader(const ArchiveReader& archive);
+
+  [[nodiscard]] const TextureInfo& info() const { return info_; }
+
+  /// True where the tile has a texture.
+  [[nodiscard]] bool has(TileIndex tile) const { return has(tile, info_.levels - 1); }
+  [[nodiscard]] bool has(TileIndex tile, int level) const;
+
+  /// Level `level` of a tile, info().level_size(level) texels on a side, info().channels channels as stored.
+  /// Throws Error{kInvalidArgument} where has() is false; kCorrupt naming the member.
+  [[nodiscard]] Picture read(TileIndex tile, int level) const;
+  /// The same as RGBA, opaque where the archive stores no alpha.
+  [[nodiscard]] Picture read_rgba(TileIndex tile, int level) const;
+
+ private:
+  [[nodiscard]] std::size_t slot(TileIndex tile, int level) const;
+
+  const ArchiveReader& archive_;
+  TextureInfo info_;
+  std::vector<std::int64_t> members_;  ///< by flat tile index and level: place in archive.members(), -1 where none
+};
+
+}  // namespace isohf

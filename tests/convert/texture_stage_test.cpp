@@ -1,0 +1,360 @@
+#include "isohf/convert/texture_stage.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <limits>
+
+#include "isohf/archive/reader.h"
+#include "isohf/archive/texture_reader.h"
+#include "isohf/base/error.h"
+#include "isohf/convert/convert.h"
+#include "isohf/convert/photo_placement.h"
+#include "isohf/verify/verify.h"
+#include "support/memory_photo.h"
+#include "support/memory_source.h"
+#include "support/temporary_folder.h"
+
+namespace isohf {
+namespace {
+
+using test::MemoryPhoto;
+using test::noise;
+using test::read_file;
+using ::testing::HasSubstr;
+
+/// Hills, with a corner of voids that leaves a tile empty.
+class Hills : public test::MemorySource<float> {
+ public:
+  explicit Hills(std::int64_t width = 120, std::int64_t height = 90)
+      : MemorySource(SampleType::kFloat32, width, height, [width](std::int64_t c, std::int64_t r) {
+          if (c > width - 40 && r < 40) return std::numeric_limits<double>::quiet_NaN();
+          return 20.0 * std::sin(static_cast<double>(c) * 0.1) * std::cos(static_cast<double>(r) * 0.07);
+        }) {}
+};
+
+ConvertOptions options_for(MemoryPhoto& photo, TextureFormat format = TextureFormat::kPng) {
+  ConvertOptions options;
+  options.plan.shape = {20, 19};
+  options.plan.levels = 1;
+  options.overwrite = true;
+  options.producer = "isohf test";
+  options.z_range = {-30.0, 30.0};
+  options.texture = TextureRequest{&photo, format, 64, 90};
+  return options;
+}
+
+ConvertSummary run(HeightSource& source, const std::string& output, const ConvertOptions& options) {
+  const std::atomic<bool> cancel = false;
+  return convert(source, output, options, {}, cancel);
+}
+
+std::string message_of(const std::function<void()>& action) {
+  try {
+    action();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
+    return error.what();
+  }
+  return "nothing was thrown";
+}
+
+/// 30 m pixels from (500000, 4000000) on.
+Georeference utm(double origin_x, double origin_y, double spacing, int epsg = 32632) {
+  Georeference place;
+  place.registration = Registration::kArea;
+  place.unit = HorizontalUnit::kMetre;
+  place.spacing_x = place.spacing_y = spacing;
+  place.has_origin = true;
+  place.origin_x = origin_x;
+  place.origin_y = origin_y;
+  place.system.epsg = epsg;
+  return place;
+}
+
+TEST(PhotoPlacement, CoversTheAreaOfPixelsOrTheSpanOfPosts) {
+  Hills source(11, 21);
+  MemoryPhoto photo(100, 200, 3, noise);
+  source.mutable_info().georeference.registration = Registration::kArea;
+  PhotoPlacement at = place_photo(photo.info(), source.info(), make_source_frame(source.info()));
+  EXPECT_FALSE(at.by_georeference);
+  EXPECT_DOUBLE_EQ(at.bounds.x0, 0.0);
+  EXPECT_DOUBLE_EQ(at.bounds.x1, 11.0);
+  EXPECT_DOUBLE_EQ(at.bounds.z1, 21.0);
+  EXPECT_DOUBLE_EQ(at.frame.first_pixel_x, 0.055);
+  EXPECT_TRUE(!at.warnings.empty());  // pixels of 0.11 x 0.105
+  source.mutable_info().georeference.registration = Registration::kPoint;
+  at = place_photo(photo.info(), source.info(), make_source_frame(source.info()));
+  EXPECT_DOUBLE_EQ(at.bounds.x1, 10.0);
+  EXPECT_DOUBLE_EQ(at.bounds.z1, 20.0);
+  EXPECT_TRUE(at.warnings.empty());
+}
+
+TEST(PhotoPlacement, PutsOnePixelOnEverySampleWhereThereAreAsMany) {
+  Hills source(30, 40);
+  MemoryPhoto photo(30, 40, 1, noise);
+  for (const Registration registration : {Registration::kPoint, Registration::kArea}) {
+    source.mutable_info().georeference.registration = registration;
+    const SourceFrame frame = make_source_frame(source.info());
+    const PhotoPlacement at = place_photo(photo.info(), source.info(), frame);
+    EXPECT_DOUBLE_EQ(at.frame.first_pixel_x, frame.first_sample_x);
+    EXPECT_DOUBLE_EQ(at.frame.spacing_x, frame.spacing_x);
+    EXPECT_DOUBLE_EQ(at.bounds.x0, registration == Registration::kPoint ? -0.5 : 0.0);
+  }
+}
+
+TEST(PhotoPlacement, FollowsTheGeoreferences) {
+  Hills source(100, 80);
+  source.mutable_info().georeference = utm(500015.0, 3999985.0, 30.0);
+  MemoryPhoto photo(400, 300, 3, noise);
+  photo.mutable_info().georeference = utm(500305.0, 3999395.0, 10.0);
+  const PhotoPlacement at = place_photo(photo.info(), source.info(), make_source_frame(source.info()));
+  EXPECT_TRUE(at.by_georeference);
+  EXPECT_DOUBLE_EQ(at.bounds.x0, 300.0);
+  EXPECT_DOUBLE_EQ(at.bounds.x1, 4300.0);
+  EXPECT_DOUBLE_EQ(at.bounds.z0, 600.0);
+  EXPECT_DOUBLE_EQ(at.bounds.z1, 3600.0);
+  EXPECT_DOUBLE_EQ(at.frame.spacing_z, 10.0);
+}
+
+TEST(PhotoPlacement, TurnsDegreesIntoTheSourcesMetres) {
+  Hills source(100, 80);
+  Georeference degrees = utm(7.0, 46.0, 1.0 / 3600, 4326);
+  degrees.unit = HorizontalUnit::kDegree;
+  source.mutable_info().georeference = degrees;
+  MemoryPhoto photo(100, 80, 3, noise);
+  photo.mutable_info().georeference = degrees;
+  photo.mutable_info().georeference->origin_x += 10.0 / 3600;
+  const SourceFrame frame = make_source_frame(source.info());
+  const PhotoPlacement at = place_photo(photo.info(), source.info(), frame);
+  EXPECT_NEAR(at.frame.first_pixel_x, frame.first_sample_x + 10.0 * frame.spacing_x, 1e-6);
+  EXPECT_NEAR(at.frame.spacing_x, frame.spacing_x, 1e-9);
+}
+
+TEST(PhotoPlacement, RefusesAnotherReferenceSystemAndAnotherPlace) {
+  Hills source(100, 80);
+  source.mutable_info().georeference = utm(500015.0, 3999985.0, 30.0);
+  MemoryPhoto photo(400, 300, 3, noise);
+  const auto place = [&] { (void)place_photo(photo.info(), source.info(), make_source_frame(source.info())); };
+  photo.mutable_info().georeference = utm(500305.0, 3999395.0, 10.0, 32633);
+  EXPECT_THAT(message_of(place), HasSubstr("photo: is in EPSG:32633, memory in EPSG:32632"));
+  photo.mutable_info().georeference->unit = HorizontalUnit::kDegree;
+  photo.mutable_info().georeference->system.epsg.reset();
+  EXPECT_THAT(message_of(place), HasSubstr("degrees"));
+  // A world file names no system.
+  photo.mutable_info().georeference->unit = HorizontalUnit::kUnknown;
+  EXPECT_NO_THROW(place());
+  photo.mutable_info().georeference->origin_x = 600000.0;
+  EXPECT_THAT(message_of(place), HasSubstr("shows no ground of memory"));
+}
+
+TEST(TextureStage, StoresWhatTheCutterCutsForEveryTileWithGround) {
+  const test::TemporaryFolder folder;
+  Hills source;
+  MemoryPhoto photo(500, 400, 3, noise);
+  const ConvertSummary summary = run(source, folder / "a.isohf", options_for(photo));
+  ASSERT_TRUE(summary.texture);
+  EXPECT_GT(summary.tiles_void, 0);
+  const ArchiveReader archive(folder / "a.isohf");
+  EXPECT_EQ(archive.metadata().textures, std::vector<std::string>{"textures/ROW/COLUMN/SIZE.png"});
+  const TextureReader reader(archive);
+  EXPECT_EQ(reader.info().size, 64);
+  EXPECT_EQ(reader.info().levels, 4);
+  EXPECT_EQ(reader.info().photo_width, 500);
+  EXPECT_EQ(reader.info().members, 4 * (summary.tiles_written - summary.tiles_void));
+  EXPECT_EQ(reader.info().bytes, summary.texture_bytes);
+  const Plan plan = make_plan(source.info(), options_for(photo).plan);
+  const TextureCutter cutter(plan.grid, place_photo(photo.info(), source.info(), plan.frame).frame, {64, 4});
+  for (std::int64_t flat = 0; flat < archive.grid().tile_count(); ++flat) {
+    const TileIndex tile = archive.grid().tile_at(flat);
+    ASSERT_EQ(reader.has(tile), archive.tile_entry(tile).stored);
+    if (!reader.has(tile)) continue;
+    const std::vector<Picture> expected = cutter.cut(photo, tile);
+    for (int level = 0; level < 4; ++level) {
+      EXPECT_EQ(reader.read(tile, level), expected[static_cast<std::size_t>(level)]);
+      const Picture rgba = reader.read_rgba(tile, level);
+      EXPECT_EQ(rgba.channels, 4);
+      EXPECT_EQ(rgba.pixel(3, 5)[2], expected[static_cast<std::size_t>(level)].pixel(3, 5)[2]);
+      EXPECT_EQ(rgba.pixel(3, 5)[3], 255);
+    }
+  }
+  EXPECT_TRUE(verify_archive(folder / "a.isohf", {}).passed());
+}
+
+TEST(TextureStage, ChoosesTexelsNoCoarserThanPixels) {
+  const test::TemporaryFolder folder;
+  Hills source(96, 96);
+  ConvertOptions options;
+  options.plan.tiles = {2, 2};
+  options.plan.fit = true;
+  options.plan.shape = {52, 67};
+  const Plan plan = make_plan(source.info(), options.plan);
+  const auto size_for = [&](int pixels, int most) {
+    MemoryPhoto photo(pixels, pixels, 1, [](auto, auto, int) { return 9; });
+    const TextureStage stage = TextureStage::make(plan, source.info(), TextureRequest{&photo, {}, most, 90}, 1, 1);
+    EXPECT_GE(photo.cache_bytes, 64U << 20U);
+    EXPECT_GT(stage.memory_bytes(), photo.cache_bytes);
+    const double spans = 2.0 * stage.pixels_per_texel();
+    return static_cast<int>(std::lround(pixels / spans)) + 1;
+  };
+  EXPECT_EQ(size_for(10, 1024), 64);
+  EXPECT_EQ(size_for(2 * 63, 1024), 64);
+  EXPECT_EQ(size_for(2 * 63 + 2, 1024), 128);
+  EXPECT_EQ(size_for(2 * 255, 1024), 256);
+  EXPECT_EQ(size_for(2 * 600, 512), 512);
+  EXPECT_EQ(size_for(2 * 600, 4096), 1024);
+}
+
+TEST(TextureStage, RefusesOptionsOutOfRange) {
+  const test::TemporaryFolder folder;
+  Hills source;
+  MemoryPhoto photo(50, 40, 3, noise);
+  for (const int size : {0, -64, 32, 65, 100, 8192}) {
+    ConvertOptions options = options_for(photo);
+    options.texture->max_size = size;
+    EXPECT_THAT(message_of([&] { (void)run(source, folder / "a.isohf", options); }), HasSubstr("--texture-size"));
+  }
+  for (const int quality : {0, 101}) {
+    ConvertOptions options = options_for(photo);
+    options.texture->jpeg_quality = quality;
+    EXPECT_THAT(message_of([&] { (void)run(source, folder / "a.isohf", options); }), HasSubstr("--texture-quality"));
+  }
+  EXPECT_TRUE(folder.names().empty());
+}
+
+TEST(TextureStage, PicksTheFormatByAlpha) {
+  const test::TemporaryFolder folder;
+  Hills source(40, 40);
+  for (const int channels : {1, 3, 4}) {
+    MemoryPhoto photo(40, 40, channels, noise);
+    ConvertOptions options = options_for(photo);
+    options.texture->format.reset();
+    const ConvertSummary summary = run(source, folder / "a.isohf", options);
+    EXPECT_EQ(summary.texture->format, channels == 4 ? TextureFormat::kPng : TextureFormat::kJpeg);
+    EXPECT_EQ(summary.texture->channels, channels);
+    EXPECT_TRUE(verify_archive(folder / "a.isohf", {}).passed());
+    options.texture->format = TextureFormat::kJpeg;
+    const ConvertSummary jpeg = run(source, folder / "a.isohf", options);
+    EXPECT_EQ(jpeg.texture->channels, std::min(channels, 3));
+    EXPECT_EQ(jpeg.warnings.size(), channels == 4 ? 1U : 0U);
+    EXPECT_TRUE(verify_archive(folder / "a.isohf", {}).passed());
+  }
+}
+
+TEST(TextureStage, GivesTheSameBytesForAnyNumberOfThreads) {
+  const test::TemporaryFolder folder;
+  Hills source;
+  MemoryPhoto photo(700, 500, 3, noise);
+  std::string first;
+  for (const int threads : {1, 2, 5}) {
+    ConvertOptions options = options_for(photo, TextureFormat::kJpeg);
+    options.threads = threads;
+    options.shadow_seeds.emplace();
+    options.lossless = true;
+    (void)run(source, folder / "a.isohf", options);
+    const std::string bytes = read_file(folder / "a.isohf");
+    if (first.empty()) first = bytes;
+    EXPECT_EQ(bytes, first);
+  }
+}
+
+/// Breaks off where a tile's row of pixels is asked for.
+class FailingPhoto final : public PhotoSource {
+ public:
+  FailingPhoto(MemoryPhoto& photo, std::int64_t pixels) : photo_(photo), left_(pixels) {}
+  [[nodiscard]] const PhotoInfo& info() const override { return photo_.info(); }
+  void set_cache_bytes(std::uint64_t) override {}
+  void read_window(const Window& window, std::span<std::uint8_t> out) override {
+    left_ -= window.columns * window.rows;
+    if (left_ < 0) throw Error(ErrorCode::kCancelled, "interrupted");
+    photo_.read_window(window, out);
+  }
+
+ private:
+  MemoryPhoto& photo_;
+  std::atomic<std::int64_t> left_;
+};
+
+TEST(TextureStage, ResumesToTheSameBytesWhereverItWasCut) {
+  const test::TemporaryFolder folder;
+  Hills source;
+  MemoryPhoto photo(300, 220, 3, noise);
+  for (const bool with_seeds : {false, true}) {
+    ConvertOptions options = options_for(photo);
+    if (with_seeds) options.shadow_seeds.emplace();
+    options.threads = 2;
+    (void)run(source, folder / "whole.isohf", options);
+    const std::string whole = read_file(folder / "whole.isohf");
+    photo.pixels_read = 0;
+    (void)run(source, folder / "whole.isohf", options);
+    const std::int64_t all = photo.pixels_read;
+    for (const double share : {0.0, 0.1, 0.35, 0.6, 0.9, 0.99}) {
+      FailingPhoto failing(photo, static_cast<std::int64_t>(share * static_cast<double>(all)));
+      options.texture->photo = &failing;
+      options.resume = false;
+      EXPECT_THROW((void)run(source, folder / "cut.isohf", options), Error);
+      options.texture->photo = &photo;
+      options.resume = true;
+      (void)run(source, folder / "cut.isohf", options);
+      EXPECT_EQ(read_file(folder / "cut.isohf"), whole) << share;
+    }
+  }
+}
+
+TEST(TextureStage, WillNotResumeWithAnotherTexture) {
+  const test::TemporaryFolder folder;
+  Hills source;
+  MemoryPhoto photo(300, 220, 3, noise);
+  FailingPhoto failing(photo, 100000);
+  ConvertOptions options = options_for(photo);
+  options.texture->photo = &failing;
+  EXPECT_THROW((void)run(source, folder / "cut.isohf", options), Error);
+  options.texture->photo = &photo;
+  options.resume = true;
+  options.texture->jpeg_quality = 91;
+  EXPECT_THAT(message_of([&] { (void)run(source, folder / "cut.isohf", options); }), HasSubstr("other options"));
+}
+
+TEST(TextureStage, CountsAgainstTheMemoryAllowed) {
+  const test::TemporaryFolder folder;
+  Hills source;
+  MemoryPhoto photo(300, 220, 3, noise);
+  ConvertOptions options = options_for(photo);
+  options.memory_bytes = 80000000;
+  EXPECT_THROW((void)run(source, folder / "a.isohf", options), Error);
+  options.texture.reset();
+  EXPECT_NO_THROW((void)run(source, folder / "a.isohf", options));
+}
+
+/// Findings of kTexture after the file's bytes were changed.
+std::vector<std::string> textures_found_wrong(const std::string& path) {
+  std::vector<std::string> found;
+  for (const Finding& finding : verify_archive(path, {}).findings) {
+    if (finding_name(finding.id) == "ISOHF-0021") found.push_back(finding.text);
+  }
+  return found;
+}
+
+TEST(TextureStage, VerifyNamesADamagedTexture) {
+  const test::TemporaryFolder folder;
+  Hills source;
+  MemoryPhoto photo(300, 220, 3, noise);
+  for (const TextureFormat format : {TextureFormat::kPng, TextureFormat::kJpeg}) {
+    (void)run(source, folder / "a.isohf", options_for(photo, format));
+    const std::string name = format == TextureFormat::kPng ? "textures/1/2/32.png" : "textures/1/2/32.jpg";
+    const std::string bytes = read_file(folder / "a.isohf");
+    const std::size_t header = bytes.find(name) - 30;
+    ASSERT_LT(header, bytes.size());
+    std::string bad = bytes;
+    bad[header + 30 + name.size() + 200] ^= 0x55;
+    test::write_file(folder / "b.isohf", bad);
+    const auto found = textures_found_wrong(folder / "b.isohf");
+    ASSERT_EQ(found.size(), 1U);
+    EXPECT_THAT(found[0], HasSubstr(name));
+  }
+}
+
+}  // namespace
+}  // namespace isohf
