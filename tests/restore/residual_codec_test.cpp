@@ -43,7 +43,7 @@ TEST(ResidualCodec, ReturnsAnyBitsOfAnyType) {
       const std::int64_t width = 13;
       const Samples s = random_samples(type, rows * 13, 7 * rows);
       const SampleMapping mapping{type, 0.5, -3.0};
-      const auto payload = encode_residuals(mapping, width, s.raw, s.voids, s.predicted);
+      const auto payload = encode_residuals(mapping, width, s.raw, s.voids, s.predicted).bytes;
       std::vector<std::byte> back(s.raw.size());
       decode_residuals(mapping, width, payload, s.predicted, back);
       EXPECT_EQ(back, s.raw) << to_string(type) << " rows " << rows;
@@ -54,7 +54,7 @@ TEST(ResidualCodec, ReturnsAnyBitsOfAnyType) {
 TEST(ResidualCodec, RefusesEveryTruncationAndAnExtraByte) {
   const SampleMapping mapping{SampleType::kInt16, 1.0, 0.0};
   const Samples s = random_samples(SampleType::kInt16, 60, 3);
-  std::vector<std::byte> payload = encode_residuals(mapping, 10, s.raw, s.voids, s.predicted);
+  std::vector<std::byte> payload = encode_residuals(mapping, 10, s.raw, s.voids, s.predicted).bytes;
   std::vector<std::byte> back(s.raw.size());
   for (std::size_t size = 0; size < payload.size(); ++size) {
     EXPECT_THROW(decode_residuals(mapping, 10, std::span(payload).first(size), s.predicted, back), Error) << size;
@@ -66,7 +66,7 @@ TEST(ResidualCodec, RefusesEveryTruncationAndAnExtraByte) {
 TEST(ResidualCodec, DamagedBytesAreRefusedOrGiveOtherSamples) {
   const SampleMapping mapping{SampleType::kFloat32, 1.0, 0.0};
   const Samples s = random_samples(SampleType::kFloat32, 60, 4);
-  const std::vector<std::byte> payload = encode_residuals(mapping, 10, s.raw, s.voids, s.predicted);
+  const std::vector<std::byte> payload = encode_residuals(mapping, 10, s.raw, s.voids, s.predicted).bytes;
   std::vector<std::byte> back(s.raw.size());
   for (std::size_t i = 0; i < payload.size(); ++i) {
     for (const unsigned change : {1U, 128U, 255U}) {

@@ -31,10 +31,16 @@ struct ResidualBand {
     heights_from_samples(info, 0.0, raw, heights);
     std::vector<char> voids(heights.size());
     std::transform(heights.begin(), heights.end(), voids.begin(), [](float h) { return std::isnan(h) ? 1 : 0; });
-    const std::vector<std::byte> payload = encode_residuals(mapping, info.width, raw, voids, predicted);
-    deflated = deflate_bytes(payload);
-    payload_bytes = payload.size();
-    payload_crc32 = crc32(payload);
+    const ResidualPayload payload = encode_residuals(mapping, info.width, raw, voids, predicted);
+    DeflateWriter writer(deflated);
+    std::size_t from = 0;
+    for (const std::size_t end : payload.part_ends) {
+      writer.add(std::span(payload.bytes).subspan(from, end - from));
+      from = end;
+    }
+    writer.finish();
+    payload_bytes = payload.bytes.size();
+    payload_crc32 = crc32(payload.bytes);
   }
 };
 

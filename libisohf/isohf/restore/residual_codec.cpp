@@ -150,9 +150,21 @@ class Neighbours {
   throw Error(ErrorCode::kCorrupt, what);
 }
 
+/// All lowest bytes, then all second bytes, ...; each plane a part.
+template <typename Bits>
+void add_planes(const std::vector<Bits>& values, ResidualPayload& payload) {
+  for (std::size_t plane = 0; plane < sizeof(Bits); ++plane) {
+    const std::size_t start = payload.bytes.size();
+    payload.bytes.resize(start + values.size());
+    std::byte* const to = payload.bytes.data() + start;
+    for (std::size_t i = 0; i < values.size(); ++i) to[i] = static_cast<std::byte>((values[i] >> (8 * plane)) & 0xFFU);
+    payload.end_part();
+  }
+}
+
 template <typename Type>
-std::vector<std::byte> encode(const SampleMapping& mapping, std::int64_t width, std::span<const std::byte> raw,
-                              std::span<const char> is_void, std::span<const double> predicted) {
+ResidualPayload encode(const SampleMapping& mapping, std::int64_t width, std::span<const std::byte> raw,
+                       std::span<const char> is_void, std::span<const double> predicted) {
   using Bits = typename Type::Bits;
   std::array<std::vector<Bits>, kContexts> streams;
   std::vector<Bits> kept;
@@ -174,21 +186,18 @@ std::vector<std::byte> encode(const SampleMapping& mapping, std::int64_t width, 
     streams[neighbours.context(column)].push_back(folded);
     neighbours.set(column, folded);
   }
-  std::vector<std::byte> payload;
-  ByteWriter out(payload);
+  ResidualPayload payload;
+  ByteWriter out(payload.bytes);
   out.write(static_cast<std::uint8_t>(any_masked ? 1 : 0));
   for (const auto& stream : streams) out.write(static_cast<std::uint32_t>(stream.size()));
   if (any_masked) out.write_bytes(mask);
-  out.write_bytes(std::as_bytes(std::span(kept)));
-  for (const auto& stream : streams) {
-    for (std::size_t plane = 0; plane < sizeof(Bits); ++plane) {
-      for (const Bits folded : stream) payload.push_back(static_cast<std::byte>((folded >> (8 * plane)) & 0xFFU));
-    }
-  }
+  payload.end_part();
+  add_planes<Bits>(kept, payload);
+  for (const auto& stream : streams) add_planes<Bits>(stream, payload);
   return payload;
 }
 
-/// One context's residuals, read plane by plane.
+/// Numbers that stand in planes: one context's residuals, or kept samples.
 struct Stream {
   std::span<const std::byte> bytes;
   std::size_t count = 0;
@@ -196,14 +205,14 @@ struct Stream {
 
   template <typename Bits>
   Bits take() {
-    if (next == count) refuse("a stream of residuals ends early");
-    Bits folded = 0;
+    if (next == count) refuse("a stream of samples ends early");
+    Bits value = 0;
     for (std::size_t plane = 0; plane < sizeof(Bits); ++plane) {
       const auto byte = std::to_integer<Bits>(bytes[plane * count + next]);
-      folded = static_cast<Bits>(folded | static_cast<Bits>(byte << (8 * plane)));
+      value = static_cast<Bits>(value | static_cast<Bits>(byte << (8 * plane)));
     }
     ++next;
-    return folded;
+    return value;
   }
 };
 
@@ -223,7 +232,9 @@ void decode(const SampleMapping& mapping, std::int64_t width, std::span<const st
   if (coded > predicted.size()) refuse("more residuals than samples");
   std::span<const std::byte> mask;
   if (flags == 1) mask = in.read_bytes((predicted.size() + 7) / 8);
-  std::span<const std::byte> kept = in.read_bytes((predicted.size() - coded) * sizeof(Bits));
+  Stream kept;
+  kept.count = predicted.size() - coded;
+  kept.bytes = in.read_bytes(kept.count * sizeof(Bits));
   for (Stream& stream : streams) stream.bytes = in.read_bytes(stream.count * sizeof(Bits));
   if (in.remaining() != 0) refuse("bytes behind the residuals");
   Neighbours neighbours(width);
@@ -231,9 +242,7 @@ void decode(const SampleMapping& mapping, std::int64_t width, std::span<const st
     Bits bits = 0;
     const bool is_masked = !mask.empty() && (mask[i / 8] & (std::byte{1} << (i % 8))) != std::byte{0};
     if (is_masked || std::isnan(predicted[i])) {
-      if (kept.empty()) refuse("fewer kept samples than there are places for");
-      bits = load<Bits>(kept.data());
-      kept = kept.subspan(sizeof(Bits));
+      bits = kept.template take<Bits>();
     } else {
       const Bits guess = Type::nearest((predicted[i] - mapping.z_offset) / mapping.z_scale);
       const std::size_t column = i % static_cast<std::size_t>(width);
@@ -244,7 +253,7 @@ void decode(const SampleMapping& mapping, std::int64_t width, std::span<const st
     std::memcpy(raw.data() + i * sizeof(Bits), &bits, sizeof(Bits));
   }
   // As many samples as are kept and coded together: where all kept ones are used, so are all residuals.
-  if (!kept.empty()) refuse("more kept samples than there are places for");
+  if (kept.next != kept.count) refuse("more kept samples than there are places for");
 }
 
 }  // namespace
@@ -284,9 +293,8 @@ double load_sample(SampleType type, const std::byte* raw) {
   return load<double>(raw);
 }
 
-std::vector<std::byte> encode_residuals(const SampleMapping& mapping, std::int64_t width,
-                                        std::span<const std::byte> raw, std::span<const char> is_void,
-                                        std::span<const double> predicted) {
+ResidualPayload encode_residuals(const SampleMapping& mapping, std::int64_t width, std::span<const std::byte> raw,
+                                 std::span<const char> is_void, std::span<const double> predicted) {
   ISOHF_ASSERT(raw.size() == predicted.size() * size_bytes(mapping.type) && is_void.size() == predicted.size());
   return with_type(mapping.type,
                    [&](auto type) { return encode<decltype(type)>(mapping, width, raw, is_void, predicted); });

@@ -30,11 +30,21 @@ bool store_sample(const SampleMapping& mapping, double elevation, std::byte* raw
 /// The number that a raw sample is; exact.
 [[nodiscard]] double load_sample(SampleType type, const std::byte* raw);
 
+/// A member's bytes and where its parts end, so that each can have a Huffman table of its own.
+struct ResidualPayload {
+  std::vector<std::byte> bytes;
+  std::vector<std::size_t> part_ends;
+
+  void end_part() {
+    if (part_ends.empty() || part_ends.back() != bytes.size()) part_ends.push_back(bytes.size());
+  }
+};
+
 /// Codes whole rows. raw [n] source samples, little-endian   predicted [n] elevations, NaN where there is none
 /// is_void [n]  1 where the source sample is no elevation   width  samples a row
-[[nodiscard]] std::vector<std::byte> encode_residuals(const SampleMapping& mapping, std::int64_t width,
-                                                      std::span<const std::byte> raw, std::span<const char> is_void,
-                                                      std::span<const double> predicted);
+[[nodiscard]] ResidualPayload encode_residuals(const SampleMapping& mapping, std::int64_t width,
+                                               std::span<const std::byte> raw, std::span<const char> is_void,
+                                               std::span<const double> predicted);
 
 /// The samples again: raw [n] out. Throws Error{kCorrupt} for whatever does not fill them exactly.
 void decode_residuals(const SampleMapping& mapping, std::int64_t width, std::span<const std::byte> payload,
