@@ -4,6 +4,8 @@
 #include <fmt/format.h>
 #include <tiffio.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <ctime>
@@ -12,6 +14,7 @@
 #include <vector>
 
 #include "isohf/archive/deflate.h"
+#include "isohf/archive/lane_decoder.h"
 #include "isohf/archive/tile_codec.h"
 #include "isohf/base/error.h"
 #include "isohf/lattice/tile_mapping.h"
@@ -129,7 +132,7 @@ int run(int argc, char** argv) {
     }
   }
   const double samples = static_cast<double>(shape.stored_vertex_count()) * static_cast<double>(tiles.size());
-  double encode_seconds = 1e9, decode_seconds = 1e9, inflate_seconds = 1e9;
+  double encode_seconds = 1e9, decode_seconds = 1e9, plain_seconds = 1e9, lanes_seconds = 1e9, inflate_seconds = 1e9;
   std::size_t bytes = 0;
   for (int repeat = 0; repeat < repeats; ++repeat) {
     double start = now();
@@ -145,19 +148,38 @@ int run(int argc, char** argv) {
       isohf::inflate_exactly(tile.deflated, payloads.back());
     }
     inflate_seconds = std::min(inflate_seconds, seconds_since(start));
-    start = now();
     bool same = true;
-    for (std::size_t i = 0; i < tiles.size(); ++i) {
-      if (encoded[i].is_empty) continue;
-      const auto decoded = decode_tile(shape, tiles[i].type, payloads[i]);
-      same &= floats || decoded == tiles[i];
+    const auto time_decoding = [&](double& seconds, const auto& decode) {
+      const double from = now();
+      for (std::size_t i = 0; i < tiles.size(); ++i) {
+        if (encoded[i].is_empty) continue;
+        const isohf::TileCodes decoded = decode(i);
+        same &= floats || decoded == tiles[i];
+      }
+      seconds = std::min(seconds, seconds_since(from));
+    };
+    time_decoding(plain_seconds, [&](std::size_t i) { return decode_tile_slowly(shape, tiles[i].type, payloads[i]); });
+    time_decoding(decode_seconds, [&](std::size_t i) { return decode_tile(shape, tiles[i].type, payloads[i]); });
+    const double from = now();
+    for (std::size_t i = 0; i < tiles.size(); i += isohf::kDecoderLanes) {
+      const std::size_t count = std::min(isohf::kDecoderLanes, tiles.size() - i);
+      std::array<isohf::TileCodes, isohf::kDecoderLanes> decoded;
+      std::array<bool, isohf::kDecoderLanes> is_decoded{};
+      std::array<std::span<const std::byte>, isohf::kDecoderLanes> four;
+      for (std::size_t k = 0; k < count; ++k) four[k] = payloads[i + k];
+      decode_lanes(shape, tiles[i].type, std::span(four).first(count), std::span(decoded).first(count),
+                   std::span(is_decoded).first(count));
+      for (std::size_t k = 0; k < count; ++k) same &= !is_decoded[k] || decoded[k] == tiles[i + k];
     }
-    decode_seconds = std::min(decode_seconds, seconds_since(start));
+    lanes_seconds = std::min(lanes_seconds, seconds_since(from));
     if (!same) fmt::print("DIFFERENT\n");
   }
-  fmt::print("{} tiles, {:.0f} samples: {:.4f} bits/sample; encode {:.1f} M samples/s, inflate {:.1f}, decode {:.1f}\n",
-             tiles.size(), samples, 8.0 * static_cast<double>(bytes) / samples, samples / encode_seconds / 1e6,
-             samples / inflate_seconds / 1e6, samples / decode_seconds / 1e6);
+  fmt::print(
+      "{} tiles, {:.0f} samples: {:.4f} bits/sample; encode {:.1f} M samples/s, inflate {:.1f}, decode {:.1f}, "
+      "plainly {:.1f}, four at once {:.1f}\n",
+      tiles.size(), samples, 8.0 * static_cast<double>(bytes) / samples, samples / encode_seconds / 1e6,
+      samples / inflate_seconds / 1e6, samples / decode_seconds / 1e6, samples / plain_seconds / 1e6,
+      samples / lanes_seconds / 1e6);
   return 0;
 }
 

@@ -23,6 +23,8 @@ struct Neighbours {
   int first;
   int last;
 
+  Neighbours(const RowsAbove& rows, int first_place, int last_place) requires(sizeof(Wide) == 4)
+      : own(nullptr), north(rows.north), far(rows.far), farther(rows.farther), first(first_place), last(last_place) {}
   Neighbours(const Lattice<Wide>& lattice, int r)
       : own(lattice.row(r)),
         north(lattice.row(r - 1) + r % 2),
@@ -95,6 +97,11 @@ ISOHF_VECTORISED void sum_codes_above(const Neighbours<std::int32_t>& at, const 
 }
 
 }  // namespace
+
+void predict_from_above(const RowsAbove& rows, int first, int last, const PredictorWeights& weights,
+                        std::int32_t* parts) {
+  sum_codes_above(Neighbours<std::int32_t>(rows, first, last), weights, parts);
+}
 
 template <>
 void predict_row(const Lattice<std::int32_t>& lattice, int r, const PredictorWeights& weights, std::int32_t low,

@@ -115,6 +115,18 @@ template <typename Wide>
 void predict_row_from_above(const Lattice<Wide>& lattice, int r, const PredictorWeights& weights,
                             std::span<Wide> parts);
 
+/// The rows above the one that is predicted, by place: NE stands at north[place], NN at far[place], NNNE at
+/// farther[place].
+struct RowsAbove {
+  const std::int32_t* north;
+  const std::int32_t* far;
+  const std::int32_t* farther;
+};
+
+/// predict_row_from_above for rows of codes that are no Lattice. parts: indexed by place, first to last are written.
+void predict_from_above(const RowsAbove& rows, int first, int last, const PredictorWeights& weights,
+                        std::int32_t* parts);
+
 /// The weights that predict the tile's rows from the fourth on best: least squares, then twice more with every sample
 /// weighted by how well it and its surroundings were predicted, which is what their codes' lengths go by. In large
 /// tiles every seventh row takes part. All rows must be closed; low and high are the range of the samples.

@@ -3,11 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <limits>
 #include <mutex>
 
 #include "isohf/archive/deflate.h"
 #include "isohf/archive/directory.h"
+#include "isohf/archive/lane_decoder.h"
 #include "isohf/archive/tile_index.h"
 #include "isohf/archive/tile_payload.h"
 #include "isohf/archive/zip_layout.h"
@@ -329,6 +331,41 @@ TileCodes ArchiveReader::read_tile(TileIndex tile) const {
   }
 }
 
+std::vector<TileCodes> ArchiveReader::read_tiles(std::span<const TileIndex> tiles) const {
+  std::vector<TileCodes> codes(tiles.size());
+  for (std::size_t begin = 0; begin < tiles.size(); begin += kDecoderLanes) {
+    const std::size_t count = std::min(kDecoderLanes, tiles.size() - begin);
+    std::array<std::vector<std::byte>, kDecoderLanes> payloads;
+    std::array<std::span<const std::byte>, kDecoderLanes> spans;
+    std::array<std::size_t, kDecoderLanes> place{};
+    std::size_t lanes = 0;
+    for (std::size_t i = begin; i < begin + count; ++i) {
+      const TileEntry entry = tile_entry(tiles[i]);
+      if (!entry.stored) {
+        codes[i] = void_tile(grid().shape(), metadata().quantisation);
+        continue;
+      }
+      try {
+        payloads[lanes] = state_->payload(entry, tiles[i]);
+      } catch (const Error&) {
+        codes[i] = read_tile(tiles[i]);  // tells which tile and why
+        continue;
+      }
+      spans[lanes] = payloads[lanes];
+      place[lanes++] = i;
+    }
+    std::array<TileCodes, kDecoderLanes> decoded;
+    std::array<bool, kDecoderLanes> is_decoded{};
+    decode_lanes(grid().shape(), metadata().quantisation.type, std::span(spans).first(lanes),
+                 std::span(decoded).first(lanes), std::span(is_decoded).first(lanes));
+    for (std::size_t lane = 0; lane < lanes; ++lane) {
+      const std::size_t i = place[lane];
+      codes[i] = is_decoded[lane] ? std::move(decoded[lane]) : read_tile(tiles[i]);
+    }
+  }
+  return codes;
+}
+
 bool ArchiveReader::zlib_reads(TileIndex tile) const {
   const TileEntry entry = tile_entry(tile);
   if (!entry.stored || state_->by_directory) return true;  // zipped again by another program: not our stream
@@ -341,12 +378,12 @@ std::vector<double> ArchiveReader::read_elevations(TileIndex tile) const {
   if (codes.type == CodeType::kF32) return {codes.heights.begin(), codes.heights.end()};
   const Quantisation& quantisation = metadata().quantisation;
   const std::uint32_t void_code = quantisation.void_code();
-  std::vector<double> elevations(codes.codes.size());
-  std::transform(codes.codes.begin(), codes.codes.end(), elevations.begin(), [&](std::uint16_t code) {
+  std::vector<double> heights(codes.codes.size());
+  std::transform(codes.codes.begin(), codes.codes.end(), heights.begin(), [&](std::uint16_t code) {
     return code == void_code ? std::numeric_limits<double>::quiet_NaN()
                              : quantisation.offset + quantisation.scale * code;
   });
-  return elevations;
+  return heights;
 }
 
 std::optional<std::vector<std::byte>> ArchiveReader::read_member(const std::string& name) const {

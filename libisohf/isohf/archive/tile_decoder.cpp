@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "isohf/archive/lane_decoder.h"
 #include "isohf/archive/tile_codec.h"
 #include "isohf/archive/tile_payload.h"
 #include "isohf/archive/void_mask.h"
@@ -261,13 +262,20 @@ TileCodes decode_checked(const TileShape& shape, CodeType type, std::span<const 
 
 }  // namespace
 
-TileCodes decode_tile(const TileShape& shape, CodeType type, std::span<const std::byte> payload) {
+TileCodes decode_tile_slowly(const TileShape& shape, CodeType type, std::span<const std::byte> payload) {
   try {
     return decode_checked(shape, type, payload);
   } catch (const std::bad_alloc&) {
     throw Error(ErrorCode::kOutOfMemory,
                 fmt::format("no memory to decode a tile of {} samples", shape.stored_vertex_count()));
   }
+}
+
+TileCodes decode_tile(const TileShape& shape, CodeType type, std::span<const std::byte> payload) {
+  TileCodes tile;
+  bool is_decoded = false;
+  decode_lanes(shape, type, {&payload, 1}, {&tile, 1}, {&is_decoded, 1});
+  return is_decoded ? tile : decode_tile_slowly(shape, type, payload);
 }
 
 }  // namespace isohf

@@ -73,21 +73,21 @@ void write_payload_header(const PayloadHeader& header, std::vector<std::byte>& o
 /// A folded residual as a symbol and some bits more: itself below 16; above, eight symbols for every octave.
 inline constexpr std::uint32_t kFirstSplitSymbol = 16;
 
-[[nodiscard]] inline unsigned extra_bits_of_symbol(unsigned symbol) {
+[[nodiscard]] constexpr unsigned extra_bits_of_symbol(unsigned symbol) {
   return symbol < kFirstSplitSymbol ? 0U : (symbol - kFirstSplitSymbol) / 8 + 1;
 }
-[[nodiscard]] inline unsigned symbol_of(std::uint32_t folded) {
+[[nodiscard]] constexpr unsigned symbol_of(std::uint32_t folded) {
   if (folded < kFirstSplitSymbol) return folded;
   const auto octave = static_cast<unsigned>(std::bit_width(folded)) - 1;  // 4..31
   return kFirstSplitSymbol + (octave - 4) * 8 + ((folded >> (octave - 3)) & 7U);
 }
-[[nodiscard]] inline std::uint32_t folded_from(unsigned symbol, std::uint32_t extra) {
+[[nodiscard]] constexpr std::uint32_t folded_from(unsigned symbol, std::uint32_t extra) {
   if (symbol < kFirstSplitSymbol) return symbol;
   const unsigned bits = extra_bits_of_symbol(symbol);
   return ((8U + (symbol & 7U)) << bits) + extra;
 }
 /// One more than the last symbol of residuals of that many bits: 112 for 16, 240 for 32.
-[[nodiscard]] inline unsigned symbol_limit(unsigned residual_bits) {
+[[nodiscard]] constexpr unsigned symbol_limit(unsigned residual_bits) {
   return kFirstSplitSymbol + (residual_bits - 4) * 8;
 }
 [[nodiscard]] inline unsigned residual_bits(CodeType type) {

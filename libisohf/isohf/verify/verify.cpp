@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "isohf/archive/content_hash.h"
+#include "isohf/archive/lane_decoder.h"
 #include "isohf/base/error.h"
 #include "isohf/restore/lossless.h"
 #include "isohf/surface/normals.h"
@@ -105,17 +106,31 @@ class Verification {
 
   TileRow read_row(std::int64_t row) {
     TileRow tiles(static_cast<std::size_t>(grid_.tile_columns()));
-    oneapi::tbb::parallel_for(std::size_t{0}, tiles.size(), [&](std::size_t column) {
-      read_tile({static_cast<std::int64_t>(column), row}, tiles[column]);
+    const std::size_t groups = (tiles.size() + kDecoderLanes - 1) / kDecoderLanes;
+    oneapi::tbb::parallel_for(std::size_t{0}, groups, [&](std::size_t group) {
+      const std::size_t first = group * kDecoderLanes;
+      const std::size_t count = std::min(kDecoderLanes, tiles.size() - first);
+      std::array<TileIndex, kDecoderLanes> indices{};
+      for (std::size_t i = 0; i < count; ++i) indices[i] = {static_cast<std::int64_t>(first + i), row};
+      std::vector<TileCodes> codes;
+      try {
+        codes = archive_.read_tiles(std::span(indices).first(count));
+      } catch (const Error&) {
+        codes.clear();  // one by one, to tell which
+      }
+      for (std::size_t i = 0; i < count; ++i) {
+        read_tile(indices[i], codes.empty() ? nullptr : &codes[i], tiles[first + i]);
+      }
     });
     return tiles;
   }
 
-  void read_tile(TileIndex index, TileState& tile) const {
+  /// codes: the tile as read already, or nullptr.
+  void read_tile(TileIndex index, TileCodes* codes, TileState& tile) const {
     const TileEntry entry = archive_.tile_entry(index);
     tile.stored = entry.stored;
     try {
-      tile.codes = archive_.read_tile(index);
+      tile.codes = codes != nullptr ? std::move(*codes) : archive_.read_tile(index);
       if (!archive_.zlib_reads(index)) {
         tile.findings.push_back(make(finding::kTileNotDeflate, index, "zlib does not inflate it to the same payload"));
       }

@@ -1,0 +1,136 @@
+#include "isohf/archive/lane_decoder.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <optional>
+#include <random>
+
+#include "archive/tiles.h"
+#include "isohf/archive/deflate.h"
+#include "isohf/base/error.h"
+
+namespace isohf {
+namespace {
+
+using test::Kind;
+
+std::vector<std::byte> payload_of(const EncodedTile& tile) {
+  std::vector<std::byte> payload(tile.payload_bytes);
+  inflate_exactly(tile.deflated, payload);
+  return payload;
+}
+
+std::vector<std::byte> payload_of(const TileShape& shape, CodeType type, Kind kind, std::uint32_t seed) {
+  return payload_of(encode_tile(shape, test::make_tile(shape, type, kind, seed)));
+}
+
+/// What the plain decoder says: the tile, or nothing where it refuses.
+std::optional<TileCodes> decode_plainly(const TileShape& shape, CodeType type, std::span<const std::byte> payload) {
+  try {
+    return decode_tile_slowly(shape, type, payload);
+  } catch (const Error&) {
+    return std::nullopt;
+  }
+}
+
+struct Decoded {
+  std::array<TileCodes, kDecoderLanes> tiles;
+  std::array<bool, kDecoderLanes> decoded{};
+};
+
+Decoded decode(const TileShape& shape, CodeType type, const std::vector<std::vector<std::byte>>& payloads) {
+  std::array<std::span<const std::byte>, kDecoderLanes> spans;
+  std::copy(payloads.begin(), payloads.end(), spans.begin());
+  Decoded out;
+  decode_lanes(shape, type, std::span(spans).first(payloads.size()), std::span(out.tiles).first(payloads.size()),
+               std::span(out.decoded).first(payloads.size()));
+  return out;
+}
+
+TEST(LaneDecoder, GivesWhatThePlainDecoderGivesForAnyNumberOfLanes) {
+  const Kind kinds[] = {Kind::kPlane, Kind::kTerrain, Kind::kNoise, Kind::kExtremes, Kind::kTwoLevels};
+  std::uint32_t seed = 1;
+  for (const TileShape& shape : {TileShape::make(5, 5, 1), TileShape::make(6, 5, 1), TileShape::make(24, 29, 1),
+                                 TileShape::make(52, 67, 4), TileShape::make(300, 9, 1)}) {
+    for (const CodeType type : {CodeType::kU16, CodeType::kU8}) {
+      for (std::size_t count = 1; count <= kDecoderLanes; ++count) {
+        for (const Kind first : kinds) {
+          std::vector<std::vector<std::byte>> payloads;
+          for (std::size_t i = 0; i < count; ++i) {
+            const auto kind = kinds[(static_cast<std::size_t>(first) + i) % std::size(kinds)];
+            payloads.push_back(payload_of(shape, type, kind, ++seed));
+          }
+          const Decoded fast = decode(shape, type, payloads);
+          for (std::size_t i = 0; i < count; ++i) {
+            const auto plain = decode_plainly(shape, type, payloads[i]);
+            ASSERT_TRUE(plain.has_value());
+            ASSERT_TRUE(fast.decoded[i]) << shape.columns() << "x" << shape.rows() << ", lane " << i;
+            ASSERT_EQ(fast.tiles[i], *plain);
+          }
+        }
+      }
+    }
+  }
+}
+
+TEST(LaneDecoder, LeavesVoidsFloatsAndEqualSamplesToThePlainDecoder) {
+  const TileShape shape = TileShape::make(24, 29, 1);
+  const Decoded fast = decode(
+      shape, CodeType::kU16,
+      {payload_of(shape, CodeType::kU16, Kind::kVoidIsland, 1), payload_of(shape, CodeType::kU16, Kind::kTerrain, 2),
+       payload_of(shape, CodeType::kU16, Kind::kConstant, 3)});
+  EXPECT_EQ(fast.decoded, (std::array<bool, kDecoderLanes>{false, true, false, false}));
+  EXPECT_EQ(fast.tiles[1], test::make_tile(shape, CodeType::kU16, Kind::kTerrain, 2));
+  EXPECT_FALSE(decode(shape, CodeType::kF32, {payload_of(shape, CodeType::kF32, Kind::kTerrain, 1)}).decoded[0]);
+}
+
+TEST(LaneDecoder, RefusesWhatThePlainDecoderRefusesWithoutHarmToOtherLanes) {
+  const TileShape shape = TileShape::make(12, 11, 3);
+  for (const CodeType type : {CodeType::kU16, CodeType::kU8}) {
+    const std::vector<std::byte> good = payload_of(shape, type, Kind::kTerrain, 1);
+    const TileCodes tile = test::make_tile(shape, type, Kind::kTerrain, 1);
+    std::vector<std::byte> broken = payload_of(shape, type, Kind::kNoise, 2);
+    for (std::size_t bit = 0; bit < 8 * broken.size(); ++bit) {
+      broken[bit / 8] ^= static_cast<std::byte>(1U << bit % 8);
+      const auto plain = decode_plainly(shape, type, broken);
+      const Decoded fast = decode(shape, type, {good, broken, good});
+      ASSERT_TRUE(fast.decoded[0] && fast.decoded[2]) << bit;
+      ASSERT_EQ(fast.tiles[0], tile);
+      ASSERT_EQ(fast.tiles[2], tile);
+      if (fast.decoded[1]) {
+        ASSERT_TRUE(plain.has_value()) << "bit " << bit;
+        ASSERT_EQ(fast.tiles[1], *plain) << "bit " << bit;
+      }
+      broken[bit / 8] ^= static_cast<std::byte>(1U << bit % 8);
+    }
+  }
+}
+
+TEST(LaneDecoder, RefusesEveryTruncation) {
+  const TileShape shape = TileShape::make(12, 11, 3);
+  std::vector<std::byte> payload = payload_of(shape, CodeType::kU16, Kind::kNoise, 3);
+  while (!payload.empty()) {
+    payload.pop_back();
+    ASSERT_FALSE(decode(shape, CodeType::kU16, {payload}).decoded[0]) << payload.size();
+  }
+}
+
+TEST(LaneDecoder, SurvivesNoiseBehindAValidHeader) {
+  const TileShape shape = TileShape::make(24, 29, 1);
+  std::mt19937 random(1);
+  const std::vector<std::byte> good = payload_of(shape, CodeType::kU16, Kind::kTerrain, 2);
+  for (int round = 0; round < 2000; ++round) {
+    std::vector<std::byte> payload = good;
+    for (std::size_t i = random() % payload.size(); i < payload.size(); ++i) {
+      payload[i] = static_cast<std::byte>(random());
+    }
+    const Decoded fast = decode(shape, CodeType::kU16, {payload, good});
+    ASSERT_TRUE(fast.decoded[1]);
+    if (!fast.decoded[0]) continue;
+    ASSERT_EQ(fast.tiles[0], decode_plainly(shape, CodeType::kU16, payload));
+  }
+}
+
+}  // namespace
+}  // namespace isohf
