@@ -300,6 +300,15 @@ void check_range(const std::pair<double, double>& range) {
   }
 }
 
+/// What bands take beyond plain heights: coefficients, a byte a sample that tells voids, and a halo on either side;
+/// while the next band is made the last one is still there.
+std::uint64_t prefilter_memory_bytes(const SourceInfo& info, const Plan& plan, const Prefilter& prefilter) {
+  if (prefilter.is_identity()) return 0;
+  const double band_rows = plan.grid.shape().rows() * plan.grid.sigma_z() / plan.frame.spacing_z + 16.0;
+  const double rows = std::min(band_rows + 4.0 * prefilter.halo(), 2.0 * static_cast<double>(info.height));
+  return static_cast<std::uint64_t>(6.0 * rows * static_cast<double>(info.width));
+}
+
 }  // namespace
 
 ConvertSummary convert(HeightSource& source, const std::string& output, const ConvertOptions& options,
@@ -314,7 +323,9 @@ ConvertSummary convert(HeightSource& source, const std::string& output, const Co
   const std::optional<TextureStage> textures =
       options.texture ? std::optional(TextureStage::make(plan, info, *options.texture, threads, tiles_in_flight))
                       : std::nullopt;
-  const std::uint64_t memory_bytes = plan.estimated_memory_bytes +
+  const Kernel kernel = Kernel::make(filter_from_string(options.filter));
+  Prefilter prefilter = Prefilter::make(kernel.filter(), acquisition_from_string(options.acquisition));
+  const std::uint64_t memory_bytes = plan.estimated_memory_bytes + prefilter_memory_bytes(info, plan, prefilter) +
                                      (options.shadow_seeds ? seed_stage_memory_bytes(plan.grid) : 0) +
                                      (options.lossless ? residual_stage_memory_bytes(info, plan, threads) : 0) +
                                      (textures ? textures->memory_bytes() : 0);
@@ -334,10 +345,7 @@ ConvertSummary convert(HeightSource& source, const std::string& output, const Co
   summary.warnings = info.warnings;
   if (textures)
     summary.warnings.insert(summary.warnings.end(), textures->warnings().begin(), textures->warnings().end());
-  const Kernel kernel = Kernel::make(filter_from_string(options.filter));
-  Conversion job{
-      source, options, plan, kernel, Prefilter::make(kernel.filter(), acquisition_from_string(options.acquisition)),
-      cancel};
+  Conversion job{source, options, plan, kernel, std::move(prefilter), cancel};
   std::optional<SeedStage> seeds;
   std::optional<LosslessRecord> lossless;
   try {
