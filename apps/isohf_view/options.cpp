@@ -117,6 +117,7 @@ ParsedOptions parse_options(int argc, char** argv) {
   app.add_option("--frames", options.frames, "Frames of the flight (300), or after which the window closes")
       ->check(CLI::Range(1, 10000000));
   app.add_option("--csv", options.csv, "Write figures of each frame of the flight or step of the sweep");
+  app.add_option("--plot", options.plot, "Write a chart of the flight's frame times, SVG")->needs(flight);
   app.add_flag("--baseline", options.baseline, "After the flight, measure a plain static mesh of the same triangles");
   bool verify = false;
   app.add_flag("--verify", verify, "Check that archive, index arrays and shaders agree with the library");

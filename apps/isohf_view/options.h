@@ -17,6 +17,7 @@ struct Options {
   std::string screenshot;  ///< PNG to write; with kWindow: of the window, after `frames` frames
   std::string flight;
   std::string csv;
+  std::string plot;
   int frames = 0;  ///< 0: window: until closed; flight: 300
   int sweep_steps = 80;
   bool baseline = false;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <ctime>
 #include <map>
 #include <vector>
 
@@ -63,17 +64,25 @@ class StaticTile {
   Buffer places_;
 };
 
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
 template <typename Draw>
-double median_ms(const Draw& draw) {
-  std::vector<double> times_ms;
+MeshSpeed::Time median_time(const Draw& draw) {
+  std::vector<double> wall_ms;
+  std::vector<double> processor_ms;
   for (int run = 0; run < kRuns; ++run) {
     const auto begin = std::chrono::steady_clock::now();
+    const std::clock_t begin_clock = std::clock();
     draw();
     glFinish();
-    times_ms.push_back(std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count());
+    processor_ms.push_back(1e3 * static_cast<double>(std::clock() - begin_clock) / CLOCKS_PER_SEC);
+    wall_ms.push_back(std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count());
   }
-  std::nth_element(times_ms.begin(), times_ms.begin() + kRuns / 2, times_ms.end());
-  return times_ms[kRuns / 2];
+  return {median(wall_ms), median(processor_ms)};
 }
 
 }  // namespace
@@ -84,7 +93,7 @@ MeshSpeed measure_static_mesh(Session& session) {
   session.complete_frame();
   MeshSpeed speed;
   speed.triangles = session.figures().triangles;
-  speed.ours_ms = median_ms([&] { session.frame(); });
+  speed.ours = median_time([&] { session.frame(); });
 
   const std::vector<DrawnMesh> meshes = session.renderer().drawn();
   std::map<std::int64_t, StaticTile> tiles;
@@ -94,7 +103,7 @@ MeshSpeed measure_static_mesh(Session& session) {
   const Program program("static mesh", kVertex, kFragment);
   const TerrainFrame frame = terrain_frame(session.source(), session.view);
   const SharedGeometry& shared = session.shared();
-  speed.plain_ms = median_ms([&] {
+  speed.plain = median_time([&] {
     glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
     begin_opaque_pass();
     program.use();

@@ -91,13 +91,43 @@ TEST_F(ViewProgramTest, FliesAndCountsEachFrame) {
     file << "# seconds, eye, target\n0 100 200 600  480 0 100\n2 500 150 500  480 0 0\n4 900 180 300 480 0 300\n";
   }
   const Outcome outcome = run(path("good.isohf") + " --size 160x120 --flight " + path("path.txt") +
-                              " --frames 12 --baseline --csv " + path("frames.csv"));
+                              " --frames 12 --baseline --csv " + path("frames.csv") + " --plot " + path("frames.svg"));
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_EQ(outcome.err, "");
   EXPECT_NE(outcome.out.find("frames with more than 2 draw calls a visible tile and pass: 0"), std::string::npos);
   EXPECT_NE(outcome.out.find("plain static mesh"), std::string::npos);
   const std::string csv = text("frames.csv");
   EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 13);
+  EXPECT_NE(text("frames.svg").find("</svg>"), std::string::npos);
+}
+
+TEST_F(ViewProgramTest, GrowsNoMoreThanItsMemoryBound) {
+  const TileGrid wide = TileGrid::make(TileShape::make(68, 83, 4), 50, 40, 640.0, 640.0);
+  test::write_analytic_archive(path("wide.isohf"), wide);
+  {
+    // Across it all, looking up: what the driver takes for triangles would hide what tiles take.
+    std::ofstream file(path("up.txt"));
+    file << "0 1000 200 9000  1001 99000 9000\n9 30000 200 9000  30001 99000 9000\n";
+  }
+  const auto grown_mib = [&](int bound_mib) {
+    const Outcome outcome = run(path("wide.isohf") + " --size 64x48 --far 9000 --frames 300 --flight " +
+                                path("up.txt") + " --memory " + std::to_string(bound_mib) + " --upload 1");
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    double before = 0.0;
+    double most = 0.0;
+    const std::size_t at = outcome.out.find("process: ");
+    EXPECT_EQ(
+        std::sscanf(outcome.out.c_str() + at, "process: %lf MiB of its own before the first tile, %lf", &before, &most),
+        2)
+        << outcome.out;
+    return most - before;
+  };
+  const double small = grown_mib(2);
+  const double large = grown_mib(18);
+  if (large == 0.0) GTEST_SKIP() << "the system does not say how much memory the process has";
+  // Half of the bound at least is put to use; a tenth is the allocator's rounding.
+  EXPECT_GT(large - small, 8.0);
+  EXPECT_LT(large - small, 1.1 * 16.0 + 1.0);
 }
 
 TEST_F(ViewProgramTest, SweepsLevels) {

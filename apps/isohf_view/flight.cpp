@@ -1,0 +1,183 @@
+#include "flight.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <numeric>
+
+#include "flight_path.h"
+#include "isohf/base/error.h"
+#include "isohf/experiment/svg_chart.h"
+#include "offscreen.h"
+#include "process_memory.h"
+#include "session.h"
+#include "static_mesh.h"
+#include "text_file.h"
+
+namespace isohf::view {
+namespace {
+
+double milliseconds_since(std::chrono::steady_clock::time_point begin) {
+  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
+}
+
+struct FlightTotals {
+  std::vector<double> frame_ms;
+  std::int64_t triangles = 0;
+  std::uint64_t most_bytes = 0;
+  std::int64_t absent = 0;
+  std::int64_t over_two_calls = 0;  ///< frames with more than two draw calls for a visible tile and pass
+  std::uint64_t upload_bytes = 0;
+  std::vector<double> time_s;
+  std::vector<double> update_ms;
+  std::uint64_t anonymous_before = 0;  ///< of the process, before there were tiles
+  std::uint64_t most_anonymous = 0;
+};
+
+double mib(std::uint64_t bytes) {
+  return static_cast<double>(bytes) / (1 << 20);
+}
+
+void print_flight(const FlightTotals& totals, const Options& options) {
+  std::vector<double> sorted = totals.frame_ms;
+  std::sort(sorted.begin(), sorted.end());
+  double sum = 0.0;
+  for (const double ms : sorted) sum += ms;
+  const auto at = [&](double share) {
+    return sorted[static_cast<std::size_t>(share * static_cast<double>(sorted.size() - 1))];
+  };
+  fmt::print("frames: {}, ms: mean {:.2f}, median {:.2f}, 99 % {:.2f}, worst {:.2f}\n", sorted.size(),
+             sum / static_cast<double>(sorted.size()), at(0.5), at(0.99), sorted.back());
+  fmt::print("triangles: {} a frame, {:.2f} million a second\n",
+             grouped(totals.triangles / static_cast<std::int64_t>(sorted.size())),
+             static_cast<double>(totals.triangles) / sum / 1e3);
+  fmt::print("tile memory: at most {:.1f} MiB, bound {} MiB; uploaded {:.1f} MiB\n", mib(totals.most_bytes),
+             options.memory_mib, mib(totals.upload_bytes));
+  fmt::print("update(), all that a frame does for paging: ms: mean {:.3f}, worst {:.3f}\n",
+             std::accumulate(totals.update_ms.begin(), totals.update_ms.end(), 0.0) /
+                 static_cast<double>(totals.update_ms.size()),
+             *std::max_element(totals.update_ms.begin(), totals.update_ms.end()));
+  fmt::print(
+      "process: {:.1f} MiB of its own before the first tile, {:.1f} MiB at most; peak with mapped files {:.1f} MiB\n",
+      mib(totals.anonymous_before), mib(totals.most_anonymous), mib(process_memory().peak));
+  fmt::print("frames with more than 2 draw calls a visible tile and pass: {}\n", totals.over_two_calls);
+  fmt::print("tiles in view that were not there yet, a frame: {:.2f}\n",
+             static_cast<double>(totals.absent) / static_cast<double>(sorted.size()));
+}
+
+/// Frame times along the flight, a few frames a point, as SVG.
+std::string plot_of(const FlightTotals& totals, const std::string& title) {
+  constexpr std::size_t kPoints = 60;
+  const std::size_t frames = totals.frame_ms.size();
+  const std::size_t together = (frames + kPoints - 1) / kPoints;
+  experiment::Chart chart;
+  chart.title = title;
+  chart.x_label = "seconds along the flight";
+  chart.y_label = "milliseconds";
+  chart.note = fmt::format("{} frames, {} a point; update() is all that a frame does for paging", frames, together);
+  chart.curves = {{"frame, worst", "#b03a2e", true, {}, {}},
+                  {"frame, mean", "#b03a2e", false, {}, {}},
+                  {"update(), worst", "#1f618d", true, {}, {}},
+                  {"update(), mean", "#1f618d", false, {}, {}}};
+  for (std::size_t first = 0; first < frames; first += together) {
+    const std::size_t last = std::min(frames, first + together);
+    const auto add = [&](const std::vector<double>& ms, std::size_t curve) {
+      const auto from = ms.begin() + static_cast<std::ptrdiff_t>(first);
+      const auto to = ms.begin() + static_cast<std::ptrdiff_t>(last);
+      constexpr double kLeast_ms = 1e-3;  // the axis is logarithmic
+      const double mean = std::accumulate(from, to, 0.0) / static_cast<double>(last - first);
+      chart.curves[curve].y.push_back(std::max(kLeast_ms, *std::max_element(from, to)));
+      chart.curves[curve + 1].y.push_back(std::max(kLeast_ms, mean));
+    };
+    add(totals.frame_ms, 0);
+    add(totals.update_ms, 2);
+    for (experiment::Curve& curve : chart.curves) curve.x.push_back(totals.time_s[first]);
+  }
+  return experiment::line_chart(chart, experiment::Scale::kLogarithmic);
+}
+
+/// The rasteriser's limit, at a few places along the flight.
+void print_baseline(Session& session, const std::function<void(double)>& stand, const FlightPath& path) {
+  constexpr int kPlaces = 5;
+  MeshSpeed sum;
+  const auto add = [](MeshSpeed::Time& total, const MeshSpeed::Time& time) {
+    total.wall_ms += time.wall_ms;
+    total.processor_ms += time.processor_ms;
+  };
+  for (int i = 0; i < kPlaces; ++i) {
+    stand(path.begin_s() + (path.end_s() - path.begin_s()) * (i + 0.5) / kPlaces);
+    const MeshSpeed here = measure_static_mesh(session);
+    sum.triangles += here.triangles;
+    add(sum.ours, here.ours);
+    add(sum.plain, here.plain);
+  }
+  fmt::print("standing at {} places: {} triangles a frame\n", kPlaces, grouped(sum.triangles / kPlaces));
+  const auto print = [&](const char* name, const MeshSpeed::Time& time) {
+    fmt::print("  {} {:.2f} ms, {:.2f} million triangles a second; processor {:.2f} ms\n", name, time.wall_ms / kPlaces,
+               static_cast<double>(sum.triangles) / time.wall_ms / 1e3, time.processor_ms / kPlaces);
+  };
+  print("isohf-view:", sum.ours);
+  print("the same as a plain static mesh:", sum.plain);
+}
+
+}  // namespace
+
+void fly(const TileSource& source, const Options& options, const std::function<void()>& poll) {
+  const FlightPath path = FlightPath::read(options.flight);
+  const int frames = options.frames > 0 ? options.frames : 300;
+  TextFile csv(options.csv);
+  TextFile plot(options.plot);
+  csv.line(
+      "frame,time_s,frame_ms,update_ms,triangles,draw_calls,passes,visible_tiles,absent_tiles,resident_tiles,"
+      "missing_tiles,uploads,shadow_uploads,shadows_to_come,upload_bytes,resident_bytes,radius");
+  Session session(source, options);
+  const Offscreen target(options.view.width, options.view.height, GL_RGBA8);
+  FlightTotals totals;
+  totals.anonymous_before = process_memory().anonymous;
+  // The flight begins with everything in reach; from then on no frame waits.
+  const auto stand = [&](double time_s) {
+    const Waypoint at = path.at(time_s);
+    const double lift = session.view.exaggeration;
+    session.camera.look_at({at.eye.x, at.eye.y * lift, at.eye.z}, {at.target.x, at.target.y * lift, at.target.z});
+  };
+  stand(path.begin_s());
+  session.complete_frame();
+  for (int frame = 0; frame < frames; ++frame) {
+    poll();
+    const double time_s = path.begin_s() + (path.end_s() - path.begin_s()) * frame / std::max(1, frames - 1);
+    stand(time_s);
+    const auto begin = std::chrono::steady_clock::now();
+    target.bind();
+    session.frame();
+    glFinish();
+    const double ms = milliseconds_since(begin);
+    const FrameFigures& figures = session.figures();
+    const TileBoxFigures& box = session.box().figures();
+    csv.line(fmt::format("{},{:.4f},{:.3f},{:.3f},{},{},{},{},{},{},{},{},{},{},{},{},{:.1f}", frame, time_s, ms,
+                         box.update_ms, figures.triangles, figures.draw_calls, figures.passes, figures.visible_tiles,
+                         figures.absent_tiles, box.resident_tiles, box.missing_tiles, box.uploads, box.shadow_uploads,
+                         box.shadows_to_come, box.upload_bytes, box.resident_bytes, box.radius));
+    totals.frame_ms.push_back(ms);
+    totals.time_s.push_back(time_s);
+    totals.update_ms.push_back(box.update_ms);
+    totals.most_anonymous = std::max(totals.most_anonymous, process_memory().anonymous);
+    totals.triangles += figures.triangles;
+    totals.absent += figures.absent_tiles;
+    totals.most_bytes = std::max(totals.most_bytes, box.resident_bytes);
+    totals.upload_bytes += box.upload_bytes;
+    if (figures.draw_calls > 2 * figures.visible_tiles * figures.passes) ++totals.over_two_calls;
+    if (session.box().error()) throw Error(ErrorCode::kCorrupt, *session.box().error());
+  }
+  csv.close();
+  plot.line(plot_of(totals, fmt::format("Flight over {} tiles, {} x {} pixels", source.grid().tile_count(),
+                                        options.view.width, options.view.height)));
+  plot.close();
+  print_flight(totals, options);
+  if (options.baseline) {
+    print_baseline(session, stand, path);
+  }
+}
+
+}  // namespace isohf::view
