@@ -111,10 +111,6 @@ void warn_of_unit_range(const SourceInfo& info, const ElevationRange& range, std
   }
 }
 
-/// Lattice steps for which Outside::kCover continues slopes: the triangles that straddle the source's edge need one,
-/// and the normals of their vertices another.
-constexpr double kContinuedSteps = 2.0;
-
 /// What one conversion holds constant.
 struct Conversion {
   HeightSource& source;

@@ -5,8 +5,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "isohf/archive/quantise.h"
 #include "isohf/base/vectorised.h"
-#include "isohf/convert/quantiser.h"
 
 namespace isohf {
 namespace {

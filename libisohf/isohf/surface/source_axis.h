@@ -18,6 +18,10 @@ enum class Outside {
 [[nodiscard]] std::string to_string(Outside outside);                ///< "cover", "clamp", "void"
 [[nodiscard]] Outside outside_from_string(const std::string& text);  ///< throws Error{kInvalidArgument}
 
+/// Lattice steps for which Outside::kCover continues slopes: the triangles that straddle the source's edge need one,
+/// and the normals of their vertices another.
+inline constexpr double kContinuedSteps = 2.0;
+
 /// One axis of the source: which of its samples a world coordinate falls on or between.
 ///
 ///   area    |-- 0 --|-- 1 --|  ...  |- n-1 -|      first_world is the place of sample 0, the middle of its pixel

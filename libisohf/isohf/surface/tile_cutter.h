@@ -3,29 +3,13 @@
 #include <cstdint>
 #include <span>
 
-#include "isohf/base/view.h"
 #include "isohf/lattice/tile_grid.h"
 #include "isohf/surface/kernels.h"
+#include "isohf/surface/row_sampler.h"
 #include "isohf/surface/source_axis.h"
 #include "isohf/surface/source_scan.h"
 
 namespace isohf {
-
-/// A run of source rows, both ends included.
-struct RowRange {
-  std::int64_t first;
-  std::int64_t last;
-};
-
-/// Consecutive whole rows of the source as heights relative to a datum, NaN where void: what a kernel's taps read
-/// (coefficients, where the kernel has a prefilter).
-struct SourceBand {
-  View2D<const float> heights;  ///< all columns of the source
-  std::int64_t first_row = 0;   ///< source row of heights.row(0)
-  /// As large as heights, not 0 where the sample is void: coefficients go on into voids (Prefilter). No data where the
-  /// NaN among heights are the voids.
-  View2D<const char> voids = {};
-};
 
 /// Resamples the source at every stored vertex of a tile: visible ones, slid ones where they lie (errata E6), padding.
 ///
@@ -50,10 +34,8 @@ class TileCutter {
  private:
   TileGrid grid_;
   SourceAxis axis_x_;
-  SourceAxis axis_z_;
   Kernel kernel_;
-  float lowest_;
-  float highest_;
+  RowSampler sampler_;
 };
 
 }  // namespace isohf

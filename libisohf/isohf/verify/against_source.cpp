@@ -1,13 +1,12 @@
 #include "isohf/verify/against_source.h"
 
 #include <fmt/format.h>
+#include <oneapi/tbb/enumerable_thread_specific.h>
 #include <oneapi/tbb/parallel_for.h>
 #include <oneapi/tbb/task_arena.h>
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
-#include <limits>
 #include <random>
 #include <vector>
 
@@ -15,48 +14,15 @@
 #include "isohf/lattice/barycentric.h"
 #include "isohf/surface/band_reader.h"
 #include "isohf/surface/source_scan.h"
+#include "isohf/verify/error_statistics.h"
 
 namespace isohf {
 namespace {
 
-/// Absolute errors by magnitude: 64 bins an octave, so that a percentile is known to 1.1 % in constant memory.
-class ErrorHistogram {
- public:
-  ErrorHistogram() : counts_(kBins, 0) {}
-
-  void add(double error) { ++counts_[bin_of(error)]; }
-  void add(const ErrorHistogram& other) {
-    for (std::size_t i = 0; i < kBins; ++i) counts_[i] += other.counts_[i];
-  }
-  /// Upper end of the bin that holds the given share of all errors.
-  [[nodiscard]] double percentile(double share) const {
-    std::int64_t total = 0;
-    for (const std::int64_t count : counts_) total += count;
-    const auto wanted = static_cast<std::int64_t>(std::ceil(share * static_cast<double>(total)));
-    std::int64_t seen = 0;
-    for (std::size_t i = 0; i < kBins; ++i) {
-      seen += counts_[i];
-      if (seen >= wanted && seen > 0)
-        return i == 0 ? 0.0 : double{std::bit_cast<float>(static_cast<std::uint32_t>(i + 1) << kShift)};
-    }
-    return 0.0;
-  }
-
- private:
-  static constexpr std::uint32_t kShift = 23 - 6;
-  static constexpr std::size_t kBins = 0x7F800000U >> kShift;
-
-  static std::size_t bin_of(double error) {
-    return std::min<std::size_t>(std::bit_cast<std::uint32_t>(static_cast<float>(error)) >> kShift, kBins - 1);
-  }
-
-  std::vector<std::int64_t> counts_;
-};
-
 /// What one run of samples adds up to; sums are formed run by run in a fixed order.
 struct Sums {
   AccuracyReport counts;
-  double squares = 0.0;
+  ErrorSums errors;
 };
 
 /// A row of tiles, decoded.
@@ -91,7 +57,7 @@ class Comparison {
     const Prefilter samples_as_they_are = Prefilter::make(Filter::kBilinear, {});
     BandReader reader(source_, datum_, samples_as_they_are);
     AccuracyReport report;
-    double squares = 0.0;
+    ErrorSums errors;
     double random_squares = 0.0;
     std::int64_t first_row = 0;
     for (std::int64_t tile_row = 0; tile_row < grid_.tile_rows() && first_row < info_.height; ++tile_row) {
@@ -101,18 +67,23 @@ class Comparison {
         const auto band =
             reader.read({std::max<std::int64_t>(first_row - reach_, 0), std::min(end_row + reach_, info_.height) - 1});
         const TileRowSurface surface = decode(tile_row);
-        compare_rows(surface, *band, first_row, end_row, report, squares);
+        compare_rows(surface, *band, first_row, end_row, report, errors);
         compare_points(surface, *band, first_row, end_row, report, random_squares);
         first_row = end_row;
       }
       if (progress) progress(tile_row + 1, grid_.tile_rows());
     }
     report.samples = info_.width * info_.height;
-    if (report.samples_compared > 0) report.rms = std::sqrt(squares / static_cast<double>(report.samples_compared));
+    report.samples_compared = errors.count;
+    report.rms = errors.rms();
+    report.max = errors.max;
+    report.worst = errors.worst;
     if (report.random_points > 0)
       report.random_rms = std::sqrt(random_squares / static_cast<double>(report.random_points));
-    report.psnr_db = report.rms > 0.0 ? 20.0 * std::log10(span_ / report.rms) : std::numeric_limits<double>::infinity();
-    report.p99 = std::min(histogram_.percentile(0.99), report.max);
+    report.psnr_db = psnr_db(span_, report.rms);
+    ErrorHistogram histogram;
+    for (const ErrorHistogram& part : histograms_) histogram.add(part);
+    report.p99 = std::min(histogram.percentile(0.99), report.max);
     return report;
   }
 
@@ -149,31 +120,18 @@ class Comparison {
   }
 
   void compare_rows(const TileRowSurface& surface, const Band& band, std::int64_t first, std::int64_t end,
-                    AccuracyReport& report, double& squares) {
+                    AccuracyReport& report, ErrorSums& errors) {
     std::vector<Sums> sums(static_cast<std::size_t>(end - first));
-    std::vector<ErrorHistogram> histograms(1);
-    constexpr std::int64_t kRowsAtOnce = 16;  // one histogram each: bounded memory
-    for (std::int64_t begin = first; begin < end; begin += kRowsAtOnce) {
-      const std::int64_t count = std::min(kRowsAtOnce, end - begin);
-      histograms.assign(static_cast<std::size_t>(count), {});
-      oneapi::tbb::parallel_for(std::int64_t{0}, count, [&](std::int64_t i) {
-        compare_row(surface, band, begin + i, sums[static_cast<std::size_t>(begin + i - first)],
-                    histograms[static_cast<std::size_t>(i)]);
-      });
-      for (const ErrorHistogram& histogram : histograms) histogram_.add(histogram);
-    }
+    oneapi::tbb::parallel_for(first, end, [&](std::int64_t row) {
+      compare_row(surface, band, row, sums[static_cast<std::size_t>(row - first)], histograms_.local());
+    });
     for (const Sums& row : sums) {
-      squares += row.squares;
+      errors.add(row.errors);
       report.samples_void += row.counts.samples_void;
-      report.samples_compared += row.counts.samples_compared;
       report.samples_lost += row.counts.samples_lost;
       report.lost_inside += row.counts.lost_inside;
       report.samples_invented += row.counts.samples_invented;
       report.invented_inside += row.counts.invented_inside;
-      if (row.counts.max > report.max) {
-        report.max = row.counts.max;
-        report.worst = row.counts.worst;
-      }
     }
   }
 
@@ -191,13 +149,8 @@ class Comparison {
         continue;
       }
       const double error = std::abs(stored - (double{samples[column]} + datum_));
-      ++sums.counts.samples_compared;
-      sums.squares += error * error;
+      sums.errors.add(error, world);
       histogram.add(error);
-      if (error > sums.counts.max) {
-        sums.counts.max = error;
-        sums.counts.worst = world;
-      }
     }
   }
 
@@ -267,7 +220,7 @@ class Comparison {
   std::int64_t reach_ = 2;
   std::vector<WorldPoint> points_;  ///< in source columns and rows
   std::size_t next_point_ = 0;
-  ErrorHistogram histogram_;
+  oneapi::tbb::enumerable_thread_specific<ErrorHistogram> histograms_;
 };
 
 }  // namespace

@@ -1,0 +1,294 @@
+#include "isohf/surface/row_sampler.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "isohf/base/assert.h"
+#include "isohf/base/vectorised.h"
+
+namespace isohf {
+namespace {
+
+constexpr float kVoid = std::numeric_limits<float>::quiet_NaN();
+
+ISOHF_VECTORISED void weigh(const float* __restrict in, float weight, std::int64_t count, float* __restrict out) {
+  for (std::int64_t k = 0; k < count; ++k) out[k] = weight * in[k];
+}
+ISOHF_VECTORISED void add_weighted(const float* __restrict in, float weight, std::int64_t count,
+                                   float* __restrict out) {
+  for (std::int64_t k = 0; k < count; ++k) out[k] += weight * in[k];
+}
+
+/// line[k] = sum over the row taps of weight * band(column first + k), mirrored at the source's ends.
+void blend_rows(const SourceBand& band, const TapWeights& rows, int taps, const SourceAxis& axis_x,
+                const SourceAxis& axis_z, const ColumnTaps& columns, std::span<float> line) {
+  const std::int64_t inner_first = std::clamp<std::int64_t>(columns.first, 0, axis_x.samples());
+  const std::int64_t inner_last =
+      std::clamp<std::int64_t>(columns.first + columns.width, inner_first, axis_x.samples());
+  for (int t = 0; t < taps; ++t) {
+    const float weight = rows.weights[static_cast<std::size_t>(t)];
+    const float* source = band.heights.row(mirror_index(rows.first + t, axis_z.samples()) - band.first_row);
+    float* out = line.data() + (inner_first - columns.first);
+    const float* in = source + inner_first;
+    const std::int64_t inner = inner_last - inner_first;
+    t == 0 ? weigh(in, weight, inner, out) : add_weighted(in, weight, inner, out);
+    const auto mirrored = [&](std::int64_t k) {
+      const float height = weight * source[mirror_index(columns.first + k, axis_x.samples())];
+      line[static_cast<std::size_t>(k)] = t == 0 ? height : line[static_cast<std::size_t>(k)] + height;
+    };
+    for (std::int64_t k = 0; k < inner_first - columns.first; ++k) mirrored(k);
+    for (std::int64_t k = inner_last - columns.first; k < columns.width; ++k) mirrored(k);
+  }
+}
+
+/// near_void[c] = 1 where a tap of column c, on one of the rows that `rows` read, is a void. line as in blend_rows.
+void find_voids(const SourceBand& band, const TapWeights& rows, int taps, const SourceAxis& axis_x,
+                const SourceAxis& axis_z, const ColumnTaps& columns, std::span<char> line, std::span<char> near_void) {
+  std::fill(line.begin(), line.end(), char{0});
+  bool any = false;
+  for (int t = 0; t < taps; ++t) {
+    const char* row = band.voids.row(mirror_index(rows.first + t, axis_z.samples()) - band.first_row);
+    for (std::int64_t k = 0; k < columns.width; ++k) {
+      const char is_void = row[mirror_index(columns.first + k, axis_x.samples())];
+      line[static_cast<std::size_t>(k)] |= is_void;
+      any |= is_void != 0;
+    }
+  }
+  std::fill(near_void.begin(), near_void.end(), char{0});
+  if (!any) return;
+  for (std::size_t c = 0; c < near_void.size(); ++c) {
+    for (int t = 0; t < taps; ++t) near_void[c] |= line[static_cast<std::size_t>(columns.start[c] + t)];
+  }
+}
+
+template <int kTaps>
+inline void gather_columns(const ColumnTaps& columns, const float* __restrict line, float* __restrict out) {
+  const std::size_t count = columns.count;
+  const std::int32_t* __restrict start = columns.start.data();
+  const float* __restrict weights = columns.weights.data();
+  for (std::size_t c = 0; c < count; ++c) {
+    const float* from = line + start[c];
+    float height = weights[c] * from[0];
+    for (int t = 1; t < kTaps; ++t) height += weights[static_cast<std::size_t>(t) * count + c] * from[t];
+    out[c] = height;
+  }
+}
+// Only free functions can be cloned for several machines, not templates.
+ISOHF_VECTORISED void gather_two(const ColumnTaps& columns, const float* __restrict line, float* __restrict out) {
+  gather_columns<2>(columns, line, out);
+}
+ISOHF_VECTORISED void gather_four(const ColumnTaps& columns, const float* __restrict line, float* __restrict out) {
+  gather_columns<4>(columns, line, out);
+}
+ISOHF_VECTORISED void gather_six(const ColumnTaps& columns, const float* __restrict line, float* __restrict out) {
+  gather_columns<6>(columns, line, out);
+}
+
+ISOHF_VECTORISED bool has_nan(const float* values, std::size_t count) {
+  std::int32_t any = 0;
+  for (std::size_t i = 0; i < count; ++i) any |= values[i] != values[i] ? 1 : 0;
+  return any != 0;
+}
+
+void gather_columns(int taps, const ColumnTaps& columns, const float* line, float* out) {
+  switch (taps) {
+    case 1:
+      return gather_columns<1>(columns, line, out);
+    case 2:
+      return gather_two(columns, line, out);
+    case 3:
+      return gather_columns<3>(columns, line, out);
+    case 4:
+      return gather_four(columns, line, out);
+    case 6:
+      return gather_six(columns, line, out);
+    case 12:
+      return gather_columns<12>(columns, line, out);
+    default:
+      ISOHF_ASSERT(false);
+  }
+}
+
+/// One vertex with a void among its taps, by the rule in kernels.h.
+class VoidAwareSampler {
+ public:
+  VoidAwareSampler(const SourceBand& band, const SourceAxis& axis_x, const SourceAxis& axis_z, int taps)
+      : band_(band), axis_x_(axis_x), axis_z_(axis_z), taps_(taps) {}
+
+  [[nodiscard]] float at(double u, double v, const ColumnTaps& columns, std::size_t c, const TapWeights& rows) const {
+    if (all_nearest_void(u, v)) return kVoid;
+    double sum = 0.0;
+    double weight_sum = 0.0;
+    double valid_weight = 0.0;
+    bool whole = true;
+    const std::int64_t first_column = columns.first + columns.start[c];
+    for (int j = 0; j < taps_; ++j) {
+      for (int i = 0; i < taps_; ++i) {
+        const double weight = double{columns.weights[static_cast<std::size_t>(i) * columns.count + c]} *
+                              rows.weights[static_cast<std::size_t>(j)];
+        if (!is_void(first_column + i, rows.first + j)) valid_weight += weight;
+        const float height = coefficient(first_column + i, rows.first + j);
+        if (std::isnan(height)) {
+          whole = false;
+          continue;
+        }
+        sum += weight * height;
+        weight_sum += weight;
+      }
+    }
+    if (valid_weight < 0.5) return kVoid;
+    return static_cast<float>(whole ? sum : sum / weight_sum);
+  }
+
+ private:
+  [[nodiscard]] float coefficient(std::int64_t column, std::int64_t row) const {
+    return band_.heights(mirror_index(column, axis_x_.samples()),
+                         mirror_index(row, axis_z_.samples()) - band_.first_row);
+  }
+
+  [[nodiscard]] bool is_void(std::int64_t column, std::int64_t row) const {
+    if (band_.voids.data() == nullptr) return std::isnan(coefficient(column, row));
+    return band_.voids(mirror_index(column, axis_x_.samples()),
+                       mirror_index(row, axis_z_.samples()) - band_.first_row) != 0;
+  }
+
+  /// Rows that the kernel itself does not read may lie outside the band; the nearest kernel has but one.
+  [[nodiscard]] bool all_nearest_void(double u, double v) const {
+    if (taps_ == 1) return false;
+    for (const double row : {std::floor(v), std::ceil(v)}) {
+      for (const double column : {std::floor(u), std::ceil(u)}) {
+        if (!is_void(static_cast<std::int64_t>(column), static_cast<std::int64_t>(row))) return false;
+      }
+    }
+    return true;
+  }
+
+  const SourceBand& band_;
+  const SourceAxis& axis_x_;
+  const SourceAxis& axis_z_;
+  int taps_;
+};
+
+/// The elevation outside that the edge and its mirror place inside ask for; the edge's own where the latter is void.
+float continue_slope(float edge, float mirrored) {
+  const float height = 2.0F * edge - mirrored;
+  return std::isnan(height) ? edge : height;
+}
+
+}  // namespace
+
+ColumnTaps make_column_taps(const SourceAxis& axis, const Kernel& kernel, std::span<const double> world_x) {
+  const std::size_t columns = world_x.size();
+  ColumnTaps taps;
+  taps.position.resize(columns);
+  for (std::size_t c = 0; c < columns; ++c) {
+    const SourceAxis::Place place = axis.place(world_x[c]);
+    taps.position[c] = place.position;
+    if (!place.has_elevation) taps.outside.push_back(c);
+    if (!place.continued) continue;
+    taps.continued.push_back(c);
+    taps.edge.push_back(place.edge == 0.0 ? columns : columns + 1);
+  }
+  // The edges are read only where something is continued; elsewhere they would stretch the line over the whole source.
+  const auto edge_or_column = [&](std::size_t edge_place, double edge) {
+    const bool is_read = std::find(taps.edge.begin(), taps.edge.end(), edge_place) != taps.edge.end();
+    return is_read ? edge : taps.position[0];
+  };
+  taps.position.push_back(edge_or_column(columns, 0.0));
+  taps.position.push_back(edge_or_column(columns + 1, static_cast<double>(axis.samples() - 1)));
+
+  taps.count = taps.position.size();
+  taps.weights.resize(taps.count * static_cast<std::size_t>(kernel.taps()));
+  std::vector<std::int64_t> first(taps.count);
+  for (std::size_t i = 0; i < taps.count; ++i) {
+    const TapWeights at = kernel.at(taps.position[i]);
+    first[i] = at.first;
+    for (int t = 0; t < kernel.taps(); ++t) {
+      taps.weights[static_cast<std::size_t>(t) * taps.count + i] = at.weights[static_cast<std::size_t>(t)];
+    }
+  }
+  const auto [low, high] = std::minmax_element(first.begin(), first.end());
+  taps.first = *low;
+  taps.width = *high - *low + kernel.taps();
+  for (const std::int64_t tap : first) taps.start.push_back(static_cast<std::int32_t>(tap - taps.first));
+  return taps;
+}
+
+RowSampler::RowSampler(const SourceAxis& axis_x, const SourceAxis& axis_z, const Kernel& kernel,
+                       const ElevationRange& limits)
+    : axis_x_(axis_x),
+      axis_z_(axis_z),
+      kernel_(kernel),
+      lowest_(static_cast<float>(limits.min)),
+      highest_(static_cast<float>(limits.max)) {}
+
+void RowSampler::add_rows_needed(double world_z, RowRange& range) const {
+  const auto add = [&](double v) {
+    const std::int64_t first = kernel_.at(v).first;
+    for (std::int64_t row = first; row < first + kernel_.taps(); ++row) {
+      const std::int64_t mirrored = mirror_index(row, axis_z_.samples());
+      range.first = std::min(range.first, mirrored);
+      range.last = std::max(range.last, mirrored);
+    }
+  };
+  const SourceAxis::Place place = axis_z_.place(world_z);
+  add(place.position);
+  if (place.continued) add(place.edge);
+}
+
+void RowSampler::sample_at(const SourceBand& band, double v, const ColumnTaps& columns, Scratch& scratch,
+                           std::vector<float>& values) const {
+  const TapWeights rows = kernel_.at(v);
+  scratch.line.resize(static_cast<std::size_t>(columns.width));
+  blend_rows(band, rows, kernel_.taps(), axis_x_, axis_z_, columns, scratch.line);
+  values.resize(columns.count);
+  gather_columns(kernel_.taps(), columns, scratch.line.data(), values.data());
+  if (band.voids.data() != nullptr || has_nan(values.data(), values.size()))
+    resample_near_voids(band, v, columns, rows, scratch, values);
+  for (std::size_t i = 0; i < columns.continued.size(); ++i) {
+    float& value = values[columns.continued[i]];
+    value = continue_slope(values[columns.edge[i]], value);
+  }
+}
+
+void RowSampler::resample_near_voids(const SourceBand& band, double v, const ColumnTaps& columns,
+                                     const TapWeights& rows, Scratch& scratch, std::vector<float>& values) const {
+  scratch.near_void.assign(columns.count, 0);
+  if (band.voids.data() != nullptr) {
+    scratch.void_line.resize(scratch.line.size());
+    find_voids(band, rows, kernel_.taps(), axis_x_, axis_z_, columns, scratch.void_line, scratch.near_void);
+  }
+  const VoidAwareSampler void_aware(band, axis_x_, axis_z_, kernel_.taps());
+  for (std::size_t c = 0; c < values.size(); ++c) {
+    if (std::isnan(values[c]) || scratch.near_void[c] != 0)
+      values[c] = void_aware.at(columns.position[c], v, columns, c, rows);
+  }
+}
+
+void RowSampler::sample(const SourceBand& band, double world_z, const ColumnTaps& columns, Scratch& scratch,
+                        std::span<float> heights) const {
+  ISOHF_ASSERT(heights.size() + 2 == columns.count);
+  const SourceAxis::Place place = axis_z_.place(world_z);
+  if (!place.has_elevation) {
+    std::fill(heights.begin(), heights.end(), kVoid);
+    return;
+  }
+  std::vector<float>& values = scratch.values;
+  sample_at(band, place.position, columns, scratch, values);
+  if (place.continued) {
+    sample_at(band, place.edge, columns, scratch, scratch.edge_values);
+    for (std::size_t c = 0; c < heights.size(); ++c) values[c] = continue_slope(scratch.edge_values[c], values[c]);
+  }
+  const auto hold = [&](float height) {  // NaN stays NaN
+    return height < lowest_ ? lowest_ : (height > highest_ ? highest_ : height);
+  };
+  if (place.continued) {
+    for (std::size_t c = 0; c < heights.size(); ++c) values[c] = hold(values[c]);
+  }
+  for (const std::size_t c : columns.continued) values[c] = hold(values[c]);
+  for (const std::size_t c : columns.outside) values[c] = kVoid;
+  std::copy_n(values.begin(), heights.size(), heights.begin());
+}
+
+}  // namespace isohf
