@@ -3,9 +3,11 @@
 #include <fmt/format.h>
 #include <sys/resource.h>
 
+#include <fstream>
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "accuracy_output.h"
 #include "command.h"
 #include "describe.h"
 #include "interrupt.h"
@@ -49,6 +51,8 @@ struct ConvertCommandOptions {
   TextureOptions texture;
   ConvertOptions convert;
   bool dry_run = false;
+  /// Measure the archive against the input; the file for the report, "-" for none beside the summary.
+  std::optional<std::string> report;
 };
 
 std::optional<ConvertCommandOptions> parse(const Arguments& arguments) {
@@ -90,6 +94,12 @@ std::optional<ConvertCommandOptions> parse(const Arguments& arguments) {
   line.group("Residuals");
   line.flag("--lossless", "Keep residuals as well, so that restore gives INPUT's samples bit for bit",
             options.convert.lossless);
+  line.group("Report");
+  line.option_or_value(
+      "--report", "[FILE.json|-]", "-", [](const std::string& text) { return text == "-" || text.ends_with(".json"); },
+      "Measure the archive against INPUT afterwards, and ortho meshes beside it; print it with the summary, and write "
+      "it to FILE.json as well",
+      [&](const std::string& text) { options.report = text; });
   add_work_options(line, options.work);
   add_memory_option(line, "Refuse to start where more memory would be needed", options.convert.memory_bytes);
   add_common_options(line, options.common);
@@ -137,31 +147,29 @@ Measured measure(const ConvertSummary& summary) {
   return measured;
 }
 
-std::string json_from(const ConvertCommandOptions& options, const ConvertSummary& summary) {
+ordered_json json_from(const ConvertCommandOptions& options, const ConvertSummary& summary) {
   const Measured measured = measure(summary);
-  return json_text({{"input", options.input},
-                    {"output", options.output},
-                    {"tiles_expected", summary.tiles_expected},
-                    {"tiles_written", summary.tiles_written},
-                    {"tiles_void", summary.tiles_void},
-                    {"archive_bytes", summary.archive_bytes},
-                    {"tile_bytes", summary.tile_bytes},
-                    {"shadow_seed_bytes", summary.seed_bytes},
-                    {"residual_bytes", summary.residual_bytes},
-                    {"texture_bytes", summary.texture_bytes},
-                    {"photo_pixels_per_texel", summary.pixels_per_texel},
-                    {"raw_16_bit_bytes", measured.raw_bytes},
-                    {"ratio_to_raw_16_bit", measured.ratio},
-                    {"bits_per_sample", measured.bits_per_sample},
-                    {"source_samples", summary.source_samples},
-                    {"lattice_samples", summary.lattice_samples},
-                    {"step", summary.step},
-                    {"worst_rounding", summary.worst_rounding},
-                    {"seconds", summary.seconds},
-                    {"source_samples_per_second", measured.samples_per_second},
-                    {"peak_memory_bytes", measured.peak_memory_bytes},
-                    {"warnings", summary.warnings},
-                    {"metadata", ordered_json::parse(ArchiveReader(options.output).metadata_json())}});
+  return {{"input", options.input},
+          {"output", options.output},
+          {"tiles_expected", summary.tiles_expected},
+          {"tiles_written", summary.tiles_written},
+          {"tiles_void", summary.tiles_void},
+          {"archive_bytes", summary.archive_bytes},
+          {"tile_bytes", summary.tile_bytes},
+          {"shadow_seed_bytes", summary.seed_bytes},
+          {"residual_bytes", summary.residual_bytes},
+          {"raw_16_bit_bytes", measured.raw_bytes},
+          {"ratio_to_raw_16_bit", measured.ratio},
+          {"bits_per_sample", measured.bits_per_sample},
+          {"source_samples", summary.source_samples},
+          {"lattice_samples", summary.lattice_samples},
+          {"step", summary.step},
+          {"worst_rounding", summary.worst_rounding},
+          {"seconds", summary.seconds},
+          {"source_samples_per_second", measured.samples_per_second},
+          {"peak_memory_bytes", measured.peak_memory_bytes},
+          {"warnings", summary.warnings},
+          {"metadata", ordered_json::parse(ArchiveReader(options.output).metadata_json())}};
 }
 
 std::string text_from(const ConvertCommandOptions& options, const ConvertSummary& summary) {
@@ -204,9 +212,21 @@ std::string text_from(const ConvertCommandOptions& options, const ConvertSummary
   return text;
 }
 
+void write_report(const ConvertCommandOptions& options, const Accuracy& accuracy) {
+  std::ofstream file(*options.report, std::ios::binary);
+  file << json_text(json_from(accuracy));
+  file.close();
+  if (!file) throw Error(ErrorCode::kIo, *options.report + ": cannot be written");
+}
+
 int run(ConvertCommandOptions options) {
   const CommonOptions& common = options.common;
-  if (!options.dry_run) check_output_file(options.input, options.output, options.convert.overwrite);
+  if (!options.dry_run) {
+    check_output_file(options.input, options.output, options.convert.overwrite);
+    if (options.report && *options.report != "-") {
+      check_output_file(options.input, *options.report, options.convert.overwrite);
+    }
+  }
   const std::unique_ptr<HeightSource> source = open_source(options.input, options.open);
   const std::unique_ptr<PhotoSource> photo = open_texture(options.texture, options.convert.texture);
   if (options.dry_run) {
@@ -236,11 +256,19 @@ int run(ConvertCommandOptions options) {
     throw Error(ErrorCode::kIo, fmt::format("{}: {} tiles written, {} expected", options.output, summary.tiles_written,
                                             summary.tiles_expected));
   }
+  std::optional<Accuracy> accuracy;
+  if (options.report) {
+    accuracy = measure_accuracy(options.output, *source, kRandomPoints, true, options.work, common, cancel);
+    if (*options.report != "-") write_report(options, *accuracy);
+  }
   StandardOutput out;
   if (common.json) {
-    out.write(json_from(options, summary));
+    ordered_json document = json_from(options, summary);
+    if (accuracy) document["report"] = json_from(*accuracy);
+    out.write(json_text(document));
   } else if (!common.quiet) {
     out.write(text_from(options, summary));
+    if (accuracy) out.write(text_from(*accuracy, options.input));
   }
   out.finish();
   return kExitDone;

@@ -95,8 +95,18 @@ std::size_t edit_distance(const std::string& a, const std::string& b) {
 
 namespace {
 
-/// Ties options that may stand alone to the numbers that follow them, or to what they mean alone.
-Arguments with_values(const Arguments& given, const std::map<std::string, std::string>& alone) {
+/// An option that may stand without a value.
+struct Lone {
+  std::string meaning;
+  std::function<bool(const std::string&)> is_value;
+};
+
+bool is_numbers(const std::string& text) {
+  return !text.empty() && text.find_first_not_of("0123456789.,") == std::string::npos;
+}
+
+/// Ties options that may stand alone to the values that follow them, or to what they mean alone.
+Arguments with_values(const Arguments& given, const std::map<std::string, Lone>& alone) {
   Arguments out;
   for (std::size_t i = 0; i < given.size(); ++i) {
     const auto found = alone.find(given[i]);
@@ -108,10 +118,9 @@ Arguments with_values(const Arguments& given, const std::map<std::string, std::s
       }
       continue;
     }
-    const bool has_numbers = i + 1 < given.size() && !given[i + 1].empty() &&
-                             given[i + 1].find_first_not_of("0123456789.,") == std::string::npos;
-    out.push_back(given[i] + "=" + (has_numbers ? given[i + 1] : found->second));
-    if (has_numbers) ++i;
+    const bool has_value = i + 1 < given.size() && found->second.is_value(given[i + 1]);
+    out.push_back(given[i] + "=" + (has_value ? given[i + 1] : found->second.meaning));
+    if (has_value) ++i;
   }
   return out;
 }
@@ -139,7 +148,7 @@ struct CommandLine::State {
   CLI::App app;
   std::string group = "Options";
   std::string usage_positionals;
-  std::map<std::string, std::string> alone;  ///< options that may stand without a value, and what that means
+  std::map<std::string, Lone> alone;  ///< options that may stand without a value, and what that means
 
   /// The long name in "-q,--quiet" or "-i,--input,INPUT" as the user writes it.
   static std::string long_name(const std::string& flags) {
@@ -213,8 +222,14 @@ void CommandLine::option(const std::string& flags, const std::string& value_name
 
 void CommandLine::option_or_numbers(const std::string& flag, const std::string& value_name, const std::string& alone,
                                     const std::string& description, Take take) {
+  option_or_value(flag, value_name, alone, is_numbers, description, std::move(take));
+}
+
+void CommandLine::option_or_value(const std::string& flag, const std::string& value_name, const std::string& alone,
+                                  std::function<bool(const std::string&)> is_value, const std::string& description,
+                                  Take take) {
   option(flag, value_name, description, std::move(take));
-  state_->alone[flag] = alone;
+  state_->alone[flag] = {alone, std::move(is_value)};
 }
 
 void CommandLine::repeated_pair(const std::string& flags, const std::string& value_name, const std::string& description,

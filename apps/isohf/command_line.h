@@ -35,6 +35,9 @@ class CommandLine {
   /// nothing but digits, dots and commas; anything else is the next argument.
   void option_or_numbers(const std::string& flag, const std::string& value_name, const std::string& alone,
                          const std::string& description, Take take);
+  /// The same where the next argument is its value if `is_value` says so.
+  void option_or_value(const std::string& flag, const std::string& value_name, const std::string& alone,
+                       std::function<bool(const std::string&)> is_value, const std::string& description, Take take);
   /// An option of two values that may be given again and again.
   void repeated_pair(const std::string& flags, const std::string& value_name, const std::string& description,
                      std::function<void(const std::string&, const std::string&)> take);

@@ -5,11 +5,11 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "accuracy_output.h"
 #include "command.h"
 #include "describe.h"
 #include "interrupt.h"
 #include "isohf/base/error.h"
-#include "isohf/verify/against_source.h"
 #include "isohf/verify/findings.h"
 #include "isohf/verify/verify.h"
 #include "json_output.h"
@@ -39,9 +39,10 @@ struct VerifyCommandOptions {
   std::string archive;
   std::string against;
   OpenOptions open;
-  std::int64_t random_points = 100000;
+  std::int64_t random_points = kRandomPoints;
   std::optional<double> max_error;
   std::optional<double> max_rms;
+  bool no_ortho = false;
   bool list_checks = false;
 };
 
@@ -55,6 +56,7 @@ std::optional<VerifyCommandOptions> parse(const Arguments& arguments) {
   line.option("--against", "INPUT", "Measure the surface against the raster it was made from", options.against);
   line.option("--random", "N", "Random places to compare beside the input's samples (default 100000)",
               [&](const std::string& text) { options.random_points = parse_whole_number(text, 0, 1000000000); });
+  line.flag("--no-ortho", "Leave out the ortho meshes that the surface is compared with", options.no_ortho);
   const auto limit = [](std::optional<double>& value) {
     return [&value](const std::string& text) {
       double found = 0.0;
@@ -76,8 +78,8 @@ std::optional<VerifyCommandOptions> parse(const Arguments& arguments) {
   if (options.list_checks) return options;
   line.require("ARCHIVE", options.archive);
   if (options.against.empty()) {
-    for (const char* option : {"--random", "--max-error", "--max-rms", "--channel", "--registration", "--nodata",
-                               "--z-scale", "--z-offset", "--sample-spacing"}) {
+    for (const char* option : {"--random", "--no-ortho", "--max-error", "--max-rms", "--channel", "--registration",
+                               "--nodata", "--z-scale", "--z-offset", "--sample-spacing"}) {
       if (line.given(option)) {
         throw Error(ErrorCode::kInvalidArgument, std::string("verify: ") + option + " needs --against INPUT");
       }
@@ -128,49 +130,10 @@ ordered_json json_from(const VerifyReport& report) {
           {"findings", findings}};
 }
 
-ordered_json json_from(const AccuracyReport& report) {
-  return {{"samples", report.samples},
-          {"samples_void", report.samples_void},
-          {"samples_compared", report.samples_compared},
-          {"samples_lost", report.samples_lost},
-          {"lost_inside", report.lost_inside},
-          {"samples_invented", report.samples_invented},
-          {"invented_inside", report.invented_inside},
-          {"rms", report.rms},
-          {"max", report.max},
-          {"p99", report.p99},
-          {"psnr_db", report.psnr_db},
-          {"worst", {{"x", report.worst.x}, {"z", report.worst.z}}},
-          {"random_points", report.random_points},
-          {"random_rms", report.random_rms},
-          {"random_max", report.random_max}};
-}
-
 std::string text_from(const Finding& finding) {
   std::string text = finding_name(finding.id) + " " + to_word(finding.severity);
   if (finding.tile) text += fmt::format(" tile ({},{})", finding.tile->column, finding.tile->row);
   return text + ": " + finding.text + "\n";
-}
-
-std::string text_from(const AccuracyReport& report, const std::string& input) {
-  std::string text = fmt::format("against      {}: {} of {} samples compared, {} void in the input\n", input,
-                                 describe_count(report.samples_compared), describe_count(report.samples),
-                                 describe_count(report.samples_void));
-  if (report.samples_lost + report.samples_invented > 0) {
-    text += fmt::format(
-        "voids        {} samples lie in voids of the surface, {} voids lie on it; {} and {} of them away "
-        "from borders of voids\n",
-        describe_count(report.samples_lost), describe_count(report.samples_invented),
-        describe_count(report.lost_inside), describe_count(report.invented_inside));
-  }
-  text +=
-      fmt::format("error        rms {:.6g}, 99 % within {:.6g}, largest {:.6g} at x {:.9g} z {:.9g}, PSNR {:.1f} dB\n",
-                  report.rms, report.p99, report.max, report.worst.x, report.worst.z, report.psnr_db);
-  if (report.random_points > 0) {
-    text += fmt::format("between      rms {:.6g}, largest {:.6g} at {} random places\n", report.random_rms,
-                        report.random_max, describe_count(report.random_points));
-  }
-  return text;
 }
 
 /// What the comparison found beside errors of size: ground that is missing or made up, away from borders of voids.
@@ -195,18 +158,15 @@ VerifyReport check(const VerifyCommandOptions& options, const std::atomic<bool>&
   return verify_archive(options.archive, verify);
 }
 
-AccuracyReport compare(const VerifyCommandOptions& options, const std::atomic<bool>& cancel) {
-  const ArchiveReader archive(options.archive);
+Accuracy compare(const VerifyCommandOptions& options, const std::atomic<bool>& cancel) {
   OpenOptions open = options.open;
-  const SourceRecord& record = archive.metadata().source;
+  const SourceRecord record = ArchiveReader(options.archive).metadata().source;
   if (open.channel.empty()) open.channel = record.channel;
   if (!open.registration)
     open.registration = record.registration == "area" ? Registration::kArea : Registration::kPoint;
   const std::unique_ptr<HeightSource> source = open_source(options.against, open);
-  ProgressDisplay display(options.work.progress, options.common.quiet, options.common.verbose);
-  return compare_with_source(
-      archive, *source, options.random_points, options.work.threads,
-      [&](std::int64_t done, std::int64_t total) { display.update("compare", "rows", done, total); }, cancel);
+  return measure_accuracy(options.archive, *source, options.random_points, !options.no_ortho, options.work,
+                          options.common, cancel);
 }
 
 /// What of the measured error is more than was allowed; empty where nothing is.
@@ -227,14 +187,14 @@ int run(const VerifyCommandOptions& options) {
   }
   const std::atomic<bool>& cancel = watch_interrupts();
   VerifyReport report = check(options, cancel);
-  std::optional<AccuracyReport> accuracy;
+  std::optional<Accuracy> accuracy;
   // An archive that is not whole has no surface to measure.
   const bool compares = !options.against.empty() && report.passed();
   if (compares) {
     accuracy = compare(options, cancel);
-    add_findings(*accuracy, report);
+    add_findings(accuracy->surface, report);
   }
-  const std::string too_far = accuracy ? why_too_far(options, *accuracy) : "";
+  const std::string too_far = accuracy ? why_too_far(options, accuracy->surface) : "";
   const bool passed = report.passed() && too_far.empty();
 
   StandardOutput out;

@@ -131,6 +131,32 @@ TEST_F(ConvertCommand, EveryOptionChangesWhatItSays) {
   EXPECT_NEAR(fitted.at("grid").at("world_height").get<double>(), 200.0, 1e-9);
 }
 
+TEST_F(ConvertCommand, ReportIsWhatVerifyFindsAndLeavesTheArchiveAsItIs) {
+  const std::string plain = convert("plain.isohf", {"--quiet"});
+  EXPECT_EQ(convert("a.isohf", {"--quiet", "--report", folder / "r.json"}), plain);
+  const json report = json::parse(read_file(folder / "r.json"));
+  const json verified =
+      json::parse(run_isohf({"verify", folder / "a.isohf", "--against", folder / "a.tif", "--json"}).out);
+  EXPECT_EQ(report, verified.at("against"));
+
+  // Without a file it stands alone, whatever follows; the output is no report.
+  const RunResult text = run_isohf({"convert", folder / "a.tif", "--report", folder / "b.isohf"});
+  EXPECT_EQ(text.exit_code, 0) << text.err;
+  EXPECT_THAT(text.out, testing::AllOf(HasSubstr("archive "), HasSubstr("\nerror "), HasSubstr("\northo ")));
+  const RunResult summary =
+      run_isohf({"convert", folder / "a.tif", folder / "b.isohf", "--overwrite", "--json", "--report", "-"});
+  EXPECT_EQ(json::parse(summary.out).at("report"), report);
+}
+
+TEST_F(ConvertCommand, AReportThatExistsIsRefusedBeforeConverting) {
+  write_file(folder / "r.json", "mine");
+  const RunResult result = run_isohf({"convert", folder / "a.tif", folder / "a.isohf", "--report", folder / "r.json"});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("--overwrite"));
+  EXPECT_EQ(read_file(folder / "r.json"), "mine");
+  EXPECT_EQ(folder.names(), (std::vector<std::string>{"a.tif", "r.json"}));
+}
+
 TEST_F(ConvertCommand, MemoryThatRunsOutIsOneLine) {
 #ifdef __SANITIZE_ADDRESS__
   GTEST_SKIP() << "AddressSanitizer needs more address space than this test leaves";

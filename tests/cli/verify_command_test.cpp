@@ -71,6 +71,38 @@ TEST_F(VerifyCommand, ComparesWithTheSource) {
   EXPECT_EQ(code_with("--max-rms", rms * 0.99), 3);
 }
 
+TEST_F(VerifyCommand, ComparesWithAnOrthoMeshOfAsManyVertices) {
+  const std::vector<std::string> base = {"verify", folder / "a.isohf", "--against", folder / "a.tif"};
+  const auto with = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> arguments = base;
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const RunResult result = run_isohf(arguments);
+    EXPECT_EQ(result.exit_code, 0) << result.out;
+    EXPECT_EQ(result.err, "");
+    return result.out;
+  };
+  const json against = json::parse(with({"--json"})).at("against");
+  EXPECT_EQ(against.at("iso").at("triangles"), against.at("ortho").at("triangles"));
+  for (const char* key : {"vertices", "triangles", "tile_bytes", "plain_bytes"}) {
+    EXPECT_GT(against.at("iso").at(key).get<int>(), 0) << key;
+  }
+  for (const char* mesh : {"ortho", "ortho_at_equal_rms"}) {
+    for (const char* key : {"spacing", "vertices", "triangles", "samples_compared", "rms", "rms_other_diagonal", "max",
+                            "p99", "psnr_db", "plain_bytes"}) {
+      EXPECT_GT(against.at(mesh).at(key).get<double>(), 0.0) << mesh << " " << key;
+    }
+    EXPECT_THAT(against.at(mesh).at("diagonal"), testing::AnyOf("nw-se", "sw-ne"));
+    EXPECT_EQ(against.at(mesh).at("clamped"), 0);
+  }
+  const double rms = against.at("rms").get<double>();
+  EXPECT_NEAR(against.at("ortho_at_equal_rms").at("rms").get<double>(), rms, 0.02 * rms);
+  EXPECT_THAT(with({}), testing::AllOf(HasSubstr("\northo  "), HasSubstr("\nequal rms ")));
+
+  EXPECT_FALSE(json::parse(with({"--json", "--no-ortho"})).at("against").contains("ortho"));
+  EXPECT_THAT(with({"--no-ortho"}), testing::Not(HasSubstr("ortho")));
+  EXPECT_EQ(run_isohf({"verify", folder / "a.isohf", "--no-ortho"}).exit_code, 2);  // needs --against
+}
+
 TEST_F(VerifyCommand, AnotherSourceIsNoSource) {
   write_int16_tiff(folder / "b.tif", 151, 120, [](std::int64_t, std::int64_t) { return std::int16_t{1}; });
   const RunResult result = run_isohf({"verify", folder / "a.isohf", "--against", folder / "b.tif"});
