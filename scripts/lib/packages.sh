@@ -8,7 +8,7 @@ ISOHF_PACKAGES_BUILD=(
   libgtest-dev libgmock-dev libbenchmark-dev
   gnuplot-nox unzip zip xvfb xauth)
 ISOHF_PACKAGES_CHECK=(clang-format-14 clang-tidy-14)
-ISOHF_PACKAGES_BENCH=(gdal-bin time)
+ISOHF_PACKAGES_BENCH=(gdal-bin time python3)
 
 # isohf_require_packages NAME...: installs those that are missing; quick when none is.
 isohf_require_packages() {

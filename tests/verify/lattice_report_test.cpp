@@ -79,6 +79,21 @@ TEST_F(LatticeReports, LongWavesGiveTheClosedFormsFactor) {
   EXPECT_NEAR(more, twin.rms / both.surface.rms, 0.03 * more);
 }
 
+// Neither lattice has anything to say of noise between its vertices: the mean of a triangle's squared weights is 1/2
+// for any triangle. A twin with an advantage of its own, or none that iso has, would show here.
+TEST_F(LatticeReports, NoiseIsMissedAlikeByBoth) {
+  std::uint32_t state = 3;
+  test::MemorySource<std::int16_t> source(SampleType::kInt16, 700, 600, [&](std::int64_t, std::int64_t) {
+    state = state * 1664525U + 1013904223U;
+    return state >> 22U;  // 0 to 1023
+  });
+  ConvertOptions how = options(1.0 / 16.0);
+  how.filter = "nearest";  // the others would smooth it
+  how.code_type = CodeType::kU16;
+  const Both both = compare(source, how);
+  EXPECT_NEAR(both.surface.rms / both.lattice.twin.rms, 1.0, 0.01);  // 26250 vertices: 1/sqrt(26250) = 0.6 %
+}
+
 TEST_F(LatticeReports, AsManyVerticesAndTrianglesOnEitherLattice) {
   test::MemorySource<float> source = long_waves();
   const Both both = compare(source, options(0.25));

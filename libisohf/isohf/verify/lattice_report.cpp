@@ -59,14 +59,10 @@ class SpacingSearch {
     points_.insert(std::upper_bound(points_.begin(), points_.end(), point,
                                     [](const Point& a, const Point& b) { return a.spacing < b.spacing; }),
                    point);
-    last_ = point;
   }
 
-  [[nodiscard]] bool is_met() const { return std::abs(last_.error) < kCloseEnough; }
-
-  /// The ratio to try next, within the two measured ones that enclose the target where there are such; nullopt where
-  /// the ends of what is tried leave it outside.
-  [[nodiscard]] std::optional<double> next() const {
+  /// Where the error is met between two measured ratios, by interpolation.
+  [[nodiscard]] std::optional<double> found() const {
     for (std::size_t i = 1; i < points_.size(); ++i) {
       const Point& a = points_[i - 1];
       const Point& b = points_[i];
@@ -74,12 +70,19 @@ class SpacingSearch {
         return std::exp(a.spacing - a.error * (b.spacing - a.spacing) / (b.error - a.error));
       }
     }
+    return std::nullopt;
+  }
+
+  /// The ratio to try next while nothing is found; nullopt where the ends of what is tried leave the error outside.
+  [[nodiscard]] std::optional<double> next() const {
     const Point& end = points_.front().error > 0.0 ? points_.front() : points_.back();
-    const double limit = end.error > 0.0 ? -kFarthest : kFarthest;
     if (std::abs(end.spacing) >= kFarthest) return std::nullopt;
-    // A little further than the usual slope asks for, so that the next one encloses the target.
-    const double step = -1.2 * end.error / kUsualSlope;
-    return std::exp(limit < 0.0 ? std::max(end.spacing + step, limit) : std::min(end.spacing + step, limit));
+    // Further than the usual slope asks for, so that the next one encloses the target; twice as far each time where it
+    // does not: errors of rounding hardly change with the spacing.
+    const double shortest = kShortestStep * std::pow(2.0, static_cast<double>(points_.size()));
+    const double step = std::max(1.5 * std::abs(end.error) / kUsualSlope, shortest);
+    const double next = end.error > 0.0 ? end.spacing - step : end.spacing + step;
+    return std::exp(std::clamp(next, -kFarthest, kFarthest));
   }
 
  private:
@@ -87,13 +90,12 @@ class SpacingSearch {
     double spacing;  ///< log of the ratio to the twin's
     double error;    ///< log of rms over the target
   };
-  static constexpr double kCloseEnough = 0.002;
   static constexpr double kUsualSlope = 1.5;  ///< of terrain, whose rms error grows with a power of the spacing below 2
+  static constexpr double kShortestStep = 0.01;
   static constexpr double kFarthest = 0.6931471805599453;  ///< log 2: four times the vertices, or a quarter
 
   double target_;
   std::vector<Point> points_;  ///< by spacing
-  Point last_{};
 };
 
 /// Errors of no more than this are arithmetic, not terrain: half a unit in the last place of a float of that size.
@@ -101,8 +103,6 @@ double rounding_of(const Metadata& metadata) {
   const Statistics& statistics = metadata.statistics;
   return 0x1p-24 * std::max(std::abs(statistics.min.value_or(0.0)), std::abs(statistics.max.value_or(0.0)));
 }
-
-constexpr int kMostSearchPasses = 6;
 
 void compare(const ArchiveReader& archive, HeightSource& source, double iso_rms, LatticeReport& report,
              const LatticeProgress& progress, const std::atomic<bool>& cancel) {
@@ -120,21 +120,14 @@ void compare(const ArchiveReader& archive, HeightSource& source, double iso_rms,
   if (std::min(iso_rms, report.twin.rms) <= rounding_of(archive.metadata())) return;
   SpacingSearch search(iso_rms);
   search.add(1.0, report.twin.rms);
-  double ratio = 1.0;
-  for (int i = 0; i < kMostSearchPasses && !search.is_met(); ++i) {
-    const std::optional<double> next = search.next();
-    if (!next) return;
-    ratio = *next;
-    const double rms = measure(spacing * ratio, false).rms;
+  while (!search.found()) {
+    const std::optional<double> ratio = search.next();
+    if (!ratio) return;
+    const double rms = measure(spacing * *ratio, false).rms;
     if (!(rms > 0.0)) return;
-    search.add(ratio, rms);
+    search.add(*ratio, rms);
   }
-  if (!search.is_met()) {
-    const std::optional<double> next = search.next();
-    if (!next) return;
-    ratio = *next;
-  }
-  report.equal = ratio == 1.0 ? report.twin : measure(spacing * ratio, true);
+  report.equal = measure(spacing * *search.found(), true);
 }
 
 }  // namespace

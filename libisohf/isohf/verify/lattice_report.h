@@ -22,17 +22,17 @@ struct LatticeReport {
   std::uint64_t tile_bytes = 0;   ///< of all tiles as stored
   std::uint64_t plain_bytes = 0;  ///< of the vertices, each once
   OrthoErrors twin;               ///< as many vertices
-  /// The ortho mesh whose rms error is the iso surface's: found in at most six passes over the source, each of which
-  /// measures a mesh of another spacing, by interpolation between the two that enclose it (log rms over log spacing);
-  /// then measured itself. nullopt where either rms is no more than the rounding of floats, or where it is not met with
-  /// a quarter to four times the vertices.
+  /// The ortho mesh whose rms error is the iso surface's. Meshes of other spacings are measured until one lies beyond
+  /// it (seldom more than one), then the spacing is interpolated, log rms over log spacing, and that mesh is measured
+  /// itself. nullopt where either rms is no more than the rounding of floats, or where it is not met with a quarter to
+  /// four times the vertices.
   std::optional<OrthoErrors> equal;
 };
 
 /// Progress of one pass: which, source rows done, of all.
 using LatticeProgress = std::function<void(int pass, std::int64_t done, std::int64_t total)>;
 
-/// `iso_rms` as compare_with_source found it. Deterministic; cost: up to eight times measure_ortho_twin's.
+/// `iso_rms` as compare_with_source found it. Deterministic; cost: most often three times measure_ortho_twin's.
 /// threads  0: all cores. Throws as measure_ortho_twin does.
 [[nodiscard]] LatticeReport compare_lattices(const ArchiveReader& archive, HeightSource& source, double iso_rms,
                                              int threads, const LatticeProgress& progress,
