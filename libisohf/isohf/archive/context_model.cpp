@@ -72,16 +72,19 @@ std::uint8_t choose_activity_shift(std::span<const std::uint32_t> activities) {
   return static_cast<std::uint8_t>(shift);
 }
 
-std::vector<std::uint16_t> choose_thresholds(std::span<const std::uint8_t> symbols,
-                                             std::span<const std::uint16_t> levels) {
-  const std::size_t thinning = symbols.size() >= kSymbolsToThin ? kThinning : 1;
+std::vector<std::uint32_t> count_levels(std::span<const std::uint16_t> levels) {
   std::vector<std::uint32_t> histogram(kActivityLimit);
-  for (std::size_t i = 0; i < levels.size(); i += thinning) ++histogram[levels[i]];
+  for (const std::uint16_t level : levels) ++histogram[level];
+  return histogram;
+}
 
+std::vector<std::uint16_t> choose_thresholds(std::span<const std::uint8_t> symbols,
+                                             std::span<const std::uint16_t> levels,
+                                             std::span<const std::uint32_t> histogram) {
   // Start from ranges of about equal count...
   std::vector<Group> groups;
   std::vector<std::uint8_t> group_of(kActivityLimit);
-  const std::uint64_t share = symbols.size() / thinning / kMaxContexts + 1;
+  const std::uint64_t share = symbols.size() / kMaxContexts + 1;
   std::uint64_t in_group = 0;
   for (unsigned at = 0; at < kActivityLimit; ++at) {
     group_of[at] = static_cast<std::uint8_t>(groups.size());
@@ -92,6 +95,7 @@ std::vector<std::uint16_t> choose_thresholds(std::span<const std::uint8_t> symbo
     }
   }
   groups.push_back({kActivityLimit, {}});
+  const std::size_t thinning = symbols.size() >= kSymbolsToThin ? kThinning : 1;
   for (std::size_t i = 0; i < symbols.size(); i += thinning) {
     groups[group_of[levels[i]]].counts[symbols[i]] += static_cast<std::uint32_t>(thinning);
   }

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -53,7 +54,8 @@ class Lattice {
       : columns_(shape.columns()),
         rows_(shape.rows()),
         stride_(columns_ + 2 * kMargin),
-        samples_(static_cast<std::size_t>(stride_) * static_cast<std::size_t>(rows_ + kRowsAbove)),
+        samples_(std::make_unique_for_overwrite<Wide[]>(static_cast<std::size_t>(stride_) *
+                                                        static_cast<std::size_t>(rows_ + kRowsAbove))),
         slid_(2 * static_cast<std::size_t>(rows_)) {}
 
   [[nodiscard]] int columns() const { return columns_; }
@@ -65,10 +67,10 @@ class Lattice {
 
   /// Place 0 of row r; rows -3 to -1 exist, as do places -2, -1, C and C+1.
   [[nodiscard]] Wide* row(int r) {
-    return samples_.data() + static_cast<std::ptrdiff_t>(r + kRowsAbove) * stride_ + kMargin;
+    return samples_.get() + static_cast<std::ptrdiff_t>(r + kRowsAbove) * stride_ + kMargin;
   }
   [[nodiscard]] const Wide* row(int r) const {
-    return samples_.data() + static_cast<std::ptrdiff_t>(r + kRowsAbove) * stride_ + kMargin;
+    return samples_.get() + static_cast<std::ptrdiff_t>(r + kRowsAbove) * stride_ + kMargin;
   }
   /// The slid vertices of even row r: 0 West, 1 East.
   [[nodiscard]] Wide& slid(int r, int side) {
@@ -76,7 +78,7 @@ class Lattice {
   }
 
   /// Rows -3 to -1, all of them `base`.
-  void fill_rows_above(Wide base) { std::fill_n(samples_.begin(), kRowsAbove * stride_, base); }
+  void fill_rows_above(Wide base) { std::fill_n(samples_.get(), kRowsAbove * stride_, base); }
   /// What stands West of row r while it is predicted: the sample North-East of its first place.
   void open_row(int r) {
     Wide* const samples = row(r);
@@ -100,7 +102,7 @@ class Lattice {
   int columns_;
   int rows_;
   int stride_;
-  std::vector<Wide> samples_;
+  std::unique_ptr<Wide[]> samples_;  ///< set row by row, before it is read
   std::vector<Wide> slid_;
 };
 

@@ -187,55 +187,96 @@ ISOHF_VECTORISED void find_levels(const std::uint32_t* __restrict activities, st
   for (std::size_t i = 0; i < count; ++i) levels[i] = static_cast<std::uint16_t>(activity_level(activities[i], shift));
 }
 
-/// The bits of the residuals that their symbols leave out.
-std::vector<std::byte> pack_extra_bits(std::span<const std::uint32_t> folded, const std::uint8_t* symbols) {
-  Scratch<std::byte> room(folded.size() * 4 + 8);
-  std::byte* const begin = room.data();
-  std::byte* to = begin;
-  std::uint64_t bits = 0;
-  unsigned bit_count = 0;
-  for (std::size_t i = 0; i < folded.size(); ++i) {
-    const unsigned extra_bits = extra_bits_of_symbol(symbols[i]);
-    bits |= (std::uint64_t{folded[i]} & ((std::uint64_t{1} << extra_bits) - 1)) << bit_count;
-    bit_count += extra_bits;
-    if (bit_count >= 32) {
-      std::memcpy(to, &bits, 4);
-      to += 4;
-      bits >>= 32U;
-      bit_count -= 32;
-    }
+/// Bits one after the other, the lowest of a byte first.
+class BitPacker {
+ public:
+  /// `most_bytes` is the most that will come.
+  explicit BitPacker(std::size_t most_bytes) : room_(most_bytes + 8), to_(room_.data()) {}
+
+  void put(std::uint32_t bits, unsigned count) {
+    bits_ |= std::uint64_t{bits} << bit_count_;
+    bit_count_ += count;
+    if (bit_count_ < 32) return;
+    std::memcpy(to_, &bits_, 4);
+    to_ += 4;
+    bits_ >>= 32U;
+    bit_count_ -= 32;
   }
-  std::memcpy(to, &bits, 8);
-  to += (bit_count + 7) / 8;
-  return {begin, to};
+  [[nodiscard]] std::vector<std::byte> finish() {
+    std::memcpy(to_, &bits_, 8);
+    return {room_.data(), to_ + (bit_count_ + 7) / 8};
+  }
+
+ private:
+  Scratch<std::byte> room_;
+  std::byte* to_;
+  std::uint64_t bits_ = 0;
+  unsigned bit_count_ = 0;
+};
+
+/// The extra bits of two neighbouring residuals of codes, together no more than 24, and how many these are.
+ISOHF_VECTORISED void join_extra_bits(const std::uint32_t* __restrict folded, std::size_t pairs,
+                                      std::uint32_t* __restrict bits, std::uint32_t* __restrict counts) {
+  constexpr std::int32_t kFirstOctave = 127 + 4;
+  for (std::size_t i = 0; i < pairs; ++i) {
+    const auto extra = [&](std::uint32_t value, std::uint32_t& count) {
+      const std::int32_t exponent =
+          std::bit_cast<std::int32_t>(static_cast<float>(static_cast<std::int32_t>(value))) >> 23;
+      const std::int32_t octave = exponent - kFirstOctave + 1;
+      count = static_cast<std::uint32_t>(octave < 0 ? 0 : octave);
+      return value & ((1U << count) - 1);
+    };
+    std::uint32_t first_count = 0;
+    std::uint32_t second_count = 0;
+    const std::uint32_t first = extra(folded[2 * i], first_count);
+    const std::uint32_t second = extra(folded[2 * i + 1], second_count);
+    bits[i] = first | second << first_count;
+    counts[i] = first_count + second_count;
+  }
 }
 
-/// Each context's symbols, in order. Two halves are sorted side by side: one alone would wait for its own pointers.
+/// The bits of the residuals that their symbols leave out.
+std::vector<std::byte> pack_extra_bits(const Residuals& residuals, CodeType type) {
+  const std::uint32_t* const folded = residuals.folded.data();
+  BitPacker packer(residuals.count * 4);
+  std::size_t packed = 0;
+  if (type != CodeType::kF32) {
+    const std::size_t pairs = residuals.count / 2;
+    Scratch<std::uint32_t> bits(pairs);
+    Scratch<std::uint32_t> counts(pairs);
+    join_extra_bits(folded, pairs, bits.data(), counts.data());
+    for (std::size_t i = 0; i < pairs; ++i) packer.put(bits.data()[i], counts.data()[i]);
+    packed = 2 * pairs;
+  }
+  for (; packed < residuals.count; ++packed) {
+    const unsigned count = extra_bits_of_symbol(symbol_of(folded[packed]));
+    packer.put(folded[packed] & ((1U << count) - 1), count);
+  }
+  return packer.finish();
+}
+
+/// Each context's symbols, in order. The last half is sorted from its end, beside the first: one alone would wait for
+/// its own pointers.
 std::vector<std::vector<std::byte>> sort_symbols(const std::uint8_t* symbols, const std::uint16_t* levels,
-                                                 std::size_t count, std::span<const std::uint16_t> thresholds) {
+                                                 std::size_t count, std::span<const std::uint16_t> thresholds,
+                                                 std::span<const std::uint32_t> histogram) {
   const auto table = context_table(thresholds);
-  const std::size_t half = count / 2;
-  std::array<std::array<std::size_t, kMaxContexts>, 2> counts{};
-  for (std::size_t i = 0; i < half; ++i) {
-    ++counts[0][table[levels[i]]];
-    ++counts[1][table[levels[half + i]]];
-  }
-  if (2 * half < count) ++counts[1][table[levels[count - 1]]];
+  std::array<std::size_t, kMaxContexts> counts{};
+  for (std::size_t level = 0; level < histogram.size(); ++level) counts[table[level]] += histogram[level];
   std::vector<std::vector<std::byte>> sorted;
-  std::array<std::array<std::byte*, kMaxContexts>, 2> to{};
+  std::array<std::byte*, kMaxContexts> to{};
+  std::array<std::byte*, kMaxContexts> to_end{};
   for (std::size_t i = 0; i <= thresholds.size(); ++i) {
-    sorted.emplace_back(counts[0][i] + counts[1][i]);
-    to[0][i] = sorted[i].data();
-    to[1][i] = sorted[i].data() + counts[0][i];
+    sorted.emplace_back(counts[i]);
+    to[i] = sorted[i].data();
+    to_end[i] = sorted[i].data() + counts[i];
   }
-  const auto put = [&](std::size_t lane, std::size_t i) {
-    *to[lane][table[levels[i]]]++ = static_cast<std::byte>(symbols[i]);
-  };
-  for (std::size_t i = 0; i < half; ++i) {
-    put(0, i);
-    put(1, half + i);
+  for (std::size_t i = 0; i < count / 2; ++i) {
+    const std::size_t from_end = count - 1 - i;
+    *to[table[levels[i]]]++ = static_cast<std::byte>(symbols[i]);
+    *--to_end[table[levels[from_end]]] = static_cast<std::byte>(symbols[from_end]);
   }
-  if (2 * half < count) put(1, count - 1);
+  if (count % 2 != 0) *to[table[levels[count / 2]]] = static_cast<std::byte>(symbols[count / 2]);
   return sorted;
 }
 
@@ -247,9 +288,10 @@ Streams make_streams(const Residuals& residuals, PayloadHeader& header) {
   find_symbols(residuals, header.type, symbols.data());
   header.activity_shift = choose_activity_shift({residuals.activities.data(), count});
   find_levels(residuals.activities.data(), count, header.activity_shift, levels.data());
-  header.thresholds = choose_thresholds({symbols.data(), count}, {levels.data(), count});
-  return {sort_symbols(symbols.data(), levels.data(), count, header.thresholds),
-          pack_extra_bits({residuals.folded.data(), count}, symbols.data())};
+  const std::vector<std::uint32_t> histogram = count_levels({levels.data(), count});
+  header.thresholds = choose_thresholds({symbols.data(), count}, {levels.data(), count}, histogram);
+  return {sort_symbols(symbols.data(), levels.data(), count, header.thresholds, histogram),
+          pack_extra_bits(residuals, header.type)};
 }
 
 /// Completes payload and Deflate stream; a block for each part.
@@ -292,21 +334,23 @@ void encode_samples(const TileShape& shape, PayloadHeader header, const Voids& v
 
 /// Smallest and largest code, and how many are void; `low` is the void code where all are.
 struct CodeRange {
-  std::uint16_t low = 0xffff;
-  std::uint16_t high = 0;
-  std::uint32_t voids = 0;
+  std::int32_t low = 0xffff;
+  std::int32_t high = 0;
+  std::int32_t voids = 0;
 };
 
-ISOHF_VECTORISED CodeRange range_of_codes(const std::uint16_t* codes, std::size_t count, std::uint16_t void_code) {
-  CodeRange range;
+ISOHF_VECTORISED CodeRange range_of_codes(const std::uint16_t* codes, std::size_t count, std::int32_t void_code) {
+  std::int32_t low = 0xffff;
+  std::int32_t high = 0;
+  std::int32_t voids = 0;
   for (std::size_t i = 0; i < count; ++i) {
-    const std::uint16_t code = codes[i];
-    const auto valid = static_cast<std::uint16_t>(code == void_code ? 0 : code);
-    range.low = code < range.low ? code : range.low;
-    range.high = valid > range.high ? valid : range.high;
-    range.voids += code == void_code ? 1U : 0U;
+    const std::int32_t code = codes[i];
+    const std::int32_t valid = code == void_code ? 0 : code;
+    low = code < low ? code : low;
+    high = valid > high ? valid : high;
+    voids += code == void_code ? 1 : 0;
   }
-  return range;
+  return {low, high, voids};
 }
 
 EncodedTile encode_codes(const TileShape& shape, const TileCodes& tile) {

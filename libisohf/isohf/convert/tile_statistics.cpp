@@ -11,25 +11,28 @@
 namespace isohf {
 namespace {
 
-/// What a row of codes adds up to; as integers there is no rounding. 32 bits hold 2^16 codes.
+/// What a row of codes adds up to; as integers there is no rounding. 32 bits hold the sum of 2^16 codes.
 struct CodeSum {
   std::uint32_t sum = 0;
-  std::uint32_t voids = 0;
-  std::uint16_t low = 0xffff;
-  std::uint16_t high = 0;
+  std::int32_t voids = 0;
+  std::int32_t low = 0xffff;
+  std::int32_t high = 0;
 };
 
-ISOHF_VECTORISED CodeSum sum_codes(const std::uint16_t* codes, int count, std::uint16_t void_code) {
-  CodeSum found;
+ISOHF_VECTORISED CodeSum sum_codes(const std::uint16_t* codes, int count, std::int32_t void_code) {
+  std::uint32_t sum = 0;
+  std::int32_t voids = 0;
+  std::int32_t low = 0xffff;
+  std::int32_t high = 0;
   for (int i = 0; i < count; ++i) {
-    const std::uint16_t code = codes[i];
-    const auto valid = static_cast<std::uint16_t>(code == void_code ? 0 : code);
-    found.voids += code == void_code ? 1U : 0U;
-    found.sum += valid;
-    found.low = code < found.low ? code : found.low;
-    found.high = valid > found.high ? valid : found.high;
+    const std::int32_t code = codes[i];
+    const std::int32_t valid = code == void_code ? 0 : code;
+    voids += code == void_code ? 1 : 0;
+    sum += static_cast<std::uint32_t>(valid);
+    low = code < low ? code : low;
+    high = valid > high ? valid : high;
   }
-  return found;
+  return {sum, voids, low, high};
 }
 
 }  // namespace
@@ -57,14 +60,15 @@ TileStatistics tile_statistics(const TileShape& shape, const TileCodes& tile, co
       continue;
     }
     const CodeSum found =
-        sum_codes(tile.codes.data() + row + 1, last, static_cast<std::uint16_t>(quantisation.void_code()));
+        sum_codes(tile.codes.data() + row + 1, last, static_cast<std::int32_t>(quantisation.void_code()));
     statistics.vertices += last;
     statistics.voids += found.voids;
-    if (static_cast<int>(found.voids) == last) continue;
-    statistics.sum += quantisation.offset * static_cast<double>(last - static_cast<int>(found.voids)) +
+    if (found.voids == last) continue;
+    statistics.sum += quantisation.offset * static_cast<double>(last - found.voids) +
                       quantisation.scale * static_cast<double>(found.sum);
-    statistics.min = std::min(statistics.min, elevation_from_code(quantisation, found.low));
-    statistics.max = std::max(statistics.max, elevation_from_code(quantisation, found.high));
+    statistics.min = std::min(statistics.min, elevation_from_code(quantisation, static_cast<std::uint32_t>(found.low)));
+    statistics.max =
+        std::max(statistics.max, elevation_from_code(quantisation, static_cast<std::uint32_t>(found.high)));
   }
   return statistics;
 }
