@@ -84,6 +84,18 @@ std::string text_from(const LatticeReport& lattice, double iso_rms) {
   return text;
 }
 
+std::string text_from(const VertexReport& report) {
+  return line("vertices", fmt::format("{} resampled once more: largest difference {:.6g}, at most {:.6g} is rounding{}",
+                                      describe_count(report.vertices), report.worst, report.bound,
+                                      report.clamped > 0 ? fmt::format("; {} clamped", describe_count(report.clamped))
+                                                         : std::string()));
+}
+
+ordered_json json_from(const VertexReport& report) {
+  return {{"checked", report.vertices}, {"voids", report.voids}, {"clamped", report.clamped},
+          {"wrong", report.wrong},      {"bound", report.bound}, {"worst", report.worst}};
+}
+
 std::string text_from(const AccuracyReport& report, const std::string& input) {
   std::string text = line("against", fmt::format("{}: {} of {} samples compared, {} void in the input", input,
                                                  describe_count(report.samples_compared),
@@ -129,6 +141,9 @@ Accuracy measure_accuracy(const std::string& archive, HeightSource& source, std:
   const ArchiveReader reader(archive);
   ProgressDisplay display(work.progress, common.quiet, common.verbose);
   Accuracy accuracy;
+  accuracy.vertices = check_vertices(
+      reader, source, work.threads,
+      [&](std::int64_t done, std::int64_t total) { display.update("resample", "rows", done, total); }, cancel);
   accuracy.surface = compare_with_source(
       reader, source, random_points, work.threads,
       [&](std::int64_t done, std::int64_t total) { display.update("compare", "rows", done, total); }, cancel);
@@ -145,12 +160,13 @@ Accuracy measure_accuracy(const std::string& archive, HeightSource& source, std:
 
 ordered_json json_from(const Accuracy& accuracy) {
   ordered_json json = json_from(accuracy.surface);
+  json["vertices"] = json_from(accuracy.vertices);
   if (accuracy.lattice) add_lattice(*accuracy.lattice, json);
   return json;
 }
 
 std::string text_from(const Accuracy& accuracy, const std::string& input) {
-  std::string text = text_from(accuracy.surface, input);
+  std::string text = text_from(accuracy.surface, input) + text_from(accuracy.vertices);
   if (accuracy.lattice) text += text_from(*accuracy.lattice, accuracy.surface.rms);
   return text;
 }

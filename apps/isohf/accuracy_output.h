@@ -7,6 +7,7 @@
 
 #include "isohf/verify/against_source.h"
 #include "isohf/verify/lattice_report.h"
+#include "isohf/verify/vertex_check.h"
 #include "options_common.h"
 
 namespace isohf::cli {
@@ -16,6 +17,7 @@ inline constexpr std::int64_t kRandomPoints = 100000;
 
 /// What convert --report and verify --against measure and print.
 struct Accuracy {
+  VertexReport vertices;
   AccuracyReport surface;
   std::optional<LatticeReport> lattice;  ///< nullopt where it was not asked for
 };

@@ -137,12 +137,19 @@ std::string text_from(const Finding& finding) {
 }
 
 /// What the comparison found beside errors of size: ground that is missing or made up, away from borders of voids.
-void add_findings(const AccuracyReport& accuracy, VerifyReport& report) {
-  const auto add = [&](int id, std::int64_t count, const char* what) {
+void add_findings(const Accuracy& measured, VerifyReport& report) {
+  const AccuracyReport& accuracy = measured.surface;
+  const VertexReport& vertices = measured.vertices;
+  const auto add = [&](int id, std::int64_t count, const std::string& what, std::optional<TileIndex> tile = {}) {
     if (count == 0) return;
-    report.findings.push_back({id, severity_of(id), std::nullopt, fmt::format("{} {}", describe_count(count), what)});
+    report.findings.push_back({id, severity_of(id), tile, fmt::format("{} {}", describe_count(count), what)});
     ++report.findings_total;
   };
+  add(finding::kVertex, vertices.wrong,
+      fmt::format("vertices, from this tile on, differ from the input resampled, by up to {:.6g} where {:.6g} is "
+                  "allowed, or in being void",
+                  vertices.worst, vertices.bound),
+      vertices.first_wrong);
   add(finding::kSourceLost, accuracy.lost_inside, "elevations of the input lie where the archive has none");
   add(finding::kSourceInvented, accuracy.invented_inside, "voids of the input lie where the archive has elevations");
 }
@@ -192,7 +199,7 @@ int run(const VerifyCommandOptions& options) {
   const bool compares = !options.against.empty() && report.passed();
   if (compares) {
     accuracy = compare(options, cancel);
-    add_findings(accuracy->surface, report);
+    add_findings(*accuracy, report);
   }
   const std::string too_far = accuracy ? why_too_far(options, accuracy->surface) : "";
   const bool passed = report.passed() && too_far.empty();

@@ -45,8 +45,8 @@ void add_lattice_options(CommandLine& line, PlanRequest& request) {
   line.flag("--fit", "Stretch the tiles a little so that they end on the input's edge", request.fit);
   line.option(
       "--outside", "RULE",
-      "What tiles hold beyond the input: cover (the surface mirrored about its edge), clamp (the edge value goes "
-      "on) or void (default clamp)",
+      "What tiles hold beyond the input: cover (the slope goes on for two lattice steps, then level), clamp (the edge "
+      "value goes on) or void (default cover)",
       [&](const std::string& text) {
         constexpr Outside kRules[] = {Outside::kCover, Outside::kClamp, Outside::kVoid};
         request.outside = kRules[parse_word(text, {"cover", "clamp", "void"})];
@@ -85,6 +85,9 @@ void add_quantisation_options(CommandLine& line, ConvertOptions& options) {
                   options.step = step;
                 }
               });
+  line.option("--max-error", "E", "Store every vertex's elevation to within E: steps of twice that",
+              [&](const std::string& text) { options.step = 2.0 * parse_positive_number(text); });
+  line.exclusive({"--step", "--max-error"});
 }
 
 }  // namespace isohf::cli

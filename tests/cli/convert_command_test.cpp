@@ -131,6 +131,22 @@ TEST_F(ConvertCommand, EveryOptionChangesWhatItSays) {
   EXPECT_NEAR(fitted.at("grid").at("world_height").get<double>(), 200.0, 1e-9);
 }
 
+TEST_F(ConvertCommand, MaxErrorBoundsEveryVertex) {
+  convert("a.isohf", {"--quiet", "--max-error", "0.125", "--filter", "bspline3"});
+  const json report =
+      json::parse(run_isohf({"verify", folder / "a.isohf", "--against", folder / "a.tif", "--no-ortho", "--json"}).out);
+  const json& vertices = report.at("against").at("vertices");
+  EXPECT_GT(vertices.at("checked").get<int>(), 10000);
+  EXPECT_EQ(vertices.at("wrong"), 0);
+  EXPECT_LE(vertices.at("worst").get<double>(), 0.125 + 1e-3);  // heights are floats of some hundred units
+  EXPECT_GT(vertices.at("worst").get<double>(), 0.12);
+  EXPECT_LE(vertices.at("bound").get<double>(), 0.125 + 1e-3);
+  const RunResult both =
+      run_isohf({"convert", folder / "a.tif", folder / "b.isohf", "--max-error", "1", "--step", "1"});
+  EXPECT_EQ(both.exit_code, 2);
+  EXPECT_THAT(both.err, HasSubstr("--max-error"));
+}
+
 TEST_F(ConvertCommand, ReportIsWhatVerifyFindsAndLeavesTheArchiveAsItIs) {
   const std::string plain = convert("plain.isohf", {"--quiet"});
   EXPECT_EQ(convert("a.isohf", {"--quiet", "--report", folder / "r.json"}), plain);

@@ -19,13 +19,15 @@ using testing::HasSubstr;
 class VerifyCommand : public testing::Test {
  protected:
   VerifyCommand() {
-    write_int16_tiff(folder / "a.tif", 150, 120, [](std::int64_t c, std::int64_t r) {
-      return static_cast<std::int16_t>(
-          std::lround(700 + 300 * std::sin(0.05 * static_cast<double>(c)) * std::cos(0.04 * static_cast<double>(r))));
-    });
+    write_int16_tiff(folder / "a.tif", 150, 120, height);
     const RunResult result =
         run_isohf({"convert", folder / "a.tif", folder / "a.isohf", "--shape", "28x35", "--levels", "2"});
     EXPECT_EQ(result.exit_code, 0) << result.err;
+  }
+
+  static std::int16_t height(std::int64_t c, std::int64_t r) {
+    return static_cast<std::int16_t>(
+        std::lround(700 + 300 * std::sin(0.05 * static_cast<double>(c)) * std::cos(0.04 * static_cast<double>(r))));
   }
 
   TemporaryFolder folder;
@@ -69,6 +71,25 @@ TEST_F(VerifyCommand, ComparesWithTheSource) {
   EXPECT_EQ(code_with("--max-error", max * 0.99), 3);
   EXPECT_EQ(code_with("--max-rms", rms * 1.01), 0);
   EXPECT_EQ(code_with("--max-rms", rms * 0.99), 3);
+}
+
+TEST_F(VerifyCommand, FindsAVertexThatTheSourceDoesNotGive) {
+  // One sample in the middle is raised by 3: four lattice vertices or so are off, the others are not.
+  write_int16_tiff(folder / "b.tif", 150, 120, [](std::int64_t c, std::int64_t r) {
+    return static_cast<std::int16_t>(height(c, r) + (c == 75 && r == 60 ? 3 : 0));
+  });
+  const RunResult result =
+      run_isohf({"verify", folder / "a.isohf", "--against", folder / "b.tif", "--no-ortho", "--json"});
+  EXPECT_EQ(result.exit_code, 3);
+  const json report = json::parse(result.out);
+  ASSERT_EQ(report.at("checks").at("findings").size(), 1U) << result.out;
+  const json& found = report.at("checks").at("findings")[0];
+  EXPECT_EQ(found.at("id"), "ISOHF-0022");
+  EXPECT_FALSE(found.at("tile").is_null());
+  const json& vertices = report.at("against").at("vertices");
+  EXPECT_GE(vertices.at("wrong").get<int>(), 2);
+  EXPECT_LE(vertices.at("wrong").get<int>(), 24);  // in up to four tiles' padding as well
+  EXPECT_GT(vertices.at("worst").get<double>(), 1.0);
 }
 
 TEST_F(VerifyCommand, ComparesWithAnOrthoMeshOfAsManyVertices) {

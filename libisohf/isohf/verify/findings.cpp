@@ -31,6 +31,8 @@ const std::vector<FindingKind>& finding_catalogue() {
        "the residuals do not give the source's samples: one cannot be decoded, or their SHA-256 differs"},
       {finding::kTexture, Severity::kError,
        "a texture is missing, cannot be decoded, or has another size than the metadata says"},
+      {finding::kVertex, Severity::kError,
+       "a stored vertex is further from the source, resampled as the metadata say, than half a step"},
       {finding::kTileNotDeflate, Severity::kError, "zlib does not inflate a tile that a laxer decoder reads"},
   };
   return kinds;

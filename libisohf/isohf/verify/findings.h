@@ -26,6 +26,7 @@ inline constexpr int kSourceInvented = 17;
 inline constexpr int kLossless = 18;
 inline constexpr int kTileNotDeflate = 20;
 inline constexpr int kTexture = 21;
+inline constexpr int kVertex = 22;
 }  // namespace finding
 
 /// Severity of a catalogue id.

@@ -1,0 +1,130 @@
+#include "isohf/verify/vertex_check.h"
+
+#include <oneapi/tbb/parallel_for.h>
+#include <oneapi/tbb/task_arena.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "isohf/base/error.h"
+#include "isohf/surface/band_reader.h"
+#include "isohf/surface/source_scan.h"
+#include "isohf/surface/tile_cutter.h"
+
+namespace isohf {
+namespace {
+
+class VertexCheck {
+ public:
+  VertexCheck(const ArchiveReader& archive, HeightSource& source)
+      : archive_(archive),
+        metadata_(archive.metadata()),
+        grid_(archive.grid()),
+        source_(source),
+        kernel_(Kernel::make(filter_from_string(metadata_.filter))),
+        prefilter_(Prefilter::make(kernel_.filter(), acquisition_from_string(metadata_.acquisition))) {
+    const Quantisation& q = metadata_.quantisation;
+    const Statistics& statistics = metadata_.statistics;
+    const ElevationRange range{statistics.min.value_or(0.0), statistics.max.value_or(0.0)};
+    datum_ = choose_datum(source.info(), range);
+    const bool is_float = q.type == CodeType::kF32;
+    lowest_ = is_float ? -HUGE_VAL : q.offset;
+    highest_ = is_float ? HUGE_VAL : q.offset + q.scale * q.max_code();
+    // Heights are floats relative to a datum that need not be the one that was used; elevations in f32 are floats.
+    const double largest = std::max(std::abs(range.min), std::abs(range.max)) + std::abs(datum_);
+    const double rounding = 4.0 * largest * double{std::numeric_limits<float>::epsilon()};
+    report_.bound = (is_float ? 0.0 : 0.5 * q.scale) + rounding;
+    can_clamp_ = statistics.clamped > 0;
+  }
+
+  VertexReport run(const std::function<void(std::int64_t, std::int64_t)>& progress, const std::atomic<bool>& cancel) {
+    const TileCutter cutter = make_cutter();
+    BandReader reader(source_, datum_, prefilter_);
+    std::vector<VertexReport> tiles(static_cast<std::size_t>(grid_.tile_columns()));
+    for (std::int64_t row = 0; row < grid_.tile_rows(); ++row) {
+      if (cancel.load(std::memory_order_relaxed)) throw Error(ErrorCode::kCancelled, "interrupted");
+      const auto band = reader.read(cutter.rows_needed(row));
+      oneapi::tbb::parallel_for(std::int64_t{0}, grid_.tile_columns(), [&](std::int64_t column) {
+        tiles[static_cast<std::size_t>(column)] = check_tile(cutter, *band, {column, row});
+      });
+      for (const VertexReport& tile : tiles) add(tile);
+      if (progress) progress(row + 1, grid_.tile_rows());
+    }
+    return report_;
+  }
+
+ private:
+  [[nodiscard]] TileCutter make_cutter() const {
+    const SourceRecord& source = metadata_.source;
+    const Registration registration = source.registration == "area" ? Registration::kArea : Registration::kPoint;
+    const Outside outside = outside_from_string(metadata_.outside);
+    const SourceAxis x(source.width, source.first_sample_x, source.spacing_x, registration, outside,
+                       kContinuedSteps * 2.0 * grid_.sigma_x());
+    const SourceAxis z(source.height, source.first_sample_z, source.spacing_z, registration, outside,
+                       kContinuedSteps * grid_.sigma_z());
+    return {grid_, x, z, kernel_, {lowest_ - datum_, highest_ - datum_}};
+  }
+
+  [[nodiscard]] VertexReport check_tile(const TileCutter& cutter, const Band& band, TileIndex tile) const {
+    std::vector<float> heights(static_cast<std::size_t>(grid_.shape().stored_vertex_count()));
+    cutter.cut(tile, band.view(), heights);
+    const std::vector<double> stored = archive_.read_elevations(tile);
+    VertexReport found;
+    for (std::size_t i = 0; i < heights.size(); ++i) {
+      const double resampled = double{heights[i]} + datum_;
+      if (std::isnan(resampled) || std::isnan(stored[i])) {
+        const bool both = std::isnan(resampled) && std::isnan(stored[i]);
+        found.voids += both ? 1 : 0;
+        found.wrong += both ? 0 : 1;
+        continue;
+      }
+      const double held = std::clamp(resampled, lowest_, highest_);
+      if (can_clamp_ && std::abs(held - resampled) > report_.bound && stored[i] == held) {
+        ++found.clamped;
+        continue;
+      }
+      const double error = std::abs(stored[i] - resampled);
+      found.worst = std::max(found.worst, error);
+      found.wrong += error > report_.bound ? 1 : 0;
+    }
+    found.vertices = static_cast<std::int64_t>(heights.size());
+    if (found.wrong > 0) found.first_wrong = tile;
+    return found;
+  }
+
+  void add(const VertexReport& tile) {
+    report_.vertices += tile.vertices;
+    report_.voids += tile.voids;
+    report_.clamped += tile.clamped;
+    report_.wrong += tile.wrong;
+    report_.worst = std::max(report_.worst, tile.worst);
+    if (!report_.first_wrong) report_.first_wrong = tile.first_wrong;
+  }
+
+  const ArchiveReader& archive_;
+  const Metadata& metadata_;
+  TileGrid grid_;
+  HeightSource& source_;
+  Kernel kernel_;
+  Prefilter prefilter_;
+  double datum_ = 0.0;
+  double lowest_ = 0.0;
+  double highest_ = 0.0;
+  bool can_clamp_ = false;
+  VertexReport report_;
+};
+
+}  // namespace
+
+VertexReport check_vertices(const ArchiveReader& archive, HeightSource& source, int threads,
+                            const std::function<void(std::int64_t, std::int64_t)>& progress,
+                            const std::atomic<bool>& cancel) {
+  VertexReport report;
+  oneapi::tbb::task_arena arena(threads > 0 ? threads : oneapi::tbb::task_arena::automatic);
+  arena.execute([&] { report = VertexCheck(archive, source).run(progress, cancel); });
+  return report;
+}
+
+}  // namespace isohf
