@@ -11,6 +11,7 @@
 #include "describe.h"
 #include "isohf/archive/reader.h"
 #include "isohf/archive/texture_info.h"
+#include "isohf/restore/lossless.h"
 #include "json_output.h"
 #include "options_common.h"
 #include "options_texture.h"
@@ -143,7 +144,7 @@ std::string describe_crs(const SourceRecord& source) {
   return text;
 }
 
-/// Those of one folder together.
+/// Those of one folder together, with what they take of the archive.
 std::string describe_members(const std::vector<MemberEntry>& members) {
   struct Group {
     std::string name;
@@ -157,7 +158,7 @@ std::string describe_members(const std::vector<MemberEntry>& members) {
     auto group = std::find_if(groups.begin(), groups.end(), [&](const Group& g) { return g.name == name; });
     if (group == groups.end()) group = groups.insert(groups.end(), {name});
     ++group->members;
-    group->bytes += member.bytes;
+    group->bytes += member.compressed_bytes;
   }
   std::string text;
   for (const Group& group : groups) {
@@ -222,6 +223,12 @@ std::string describe_archive(const ArchiveReader& archive) {
   if (const auto info = texture_info(metadata)) {
     say("textures", fmt::format("{}; from {}, {} x {} pixels, placed by {}", describe_textures(*info, 0.0),
                                 info->photo_name, info->photo_width, info->photo_height, info->placed_by));
+  }
+  if (const auto record = lossless_record(metadata)) {
+    say("lossless", fmt::format("restore gives the {} samples bit for bit; residuals of {}, {:.3f} bits a sample",
+                                source.sample_type, describe_bytes(record->residual_bytes),
+                                8.0 * static_cast<double>(record->residual_bytes) /
+                                    (static_cast<double>(record->width) * static_cast<double>(record->height))));
   }
   const std::string members = describe_members(archive.members());
   say("members", members + (members.empty() ? "" : " beside the tiles"));

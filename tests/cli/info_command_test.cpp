@@ -39,6 +39,14 @@ TEST_F(InfoCommand, SaysWhatTheArchiveHolds) {
   }
 }
 
+TEST_F(InfoCommand, SaysThatTheSourcesSamplesAreKept) {
+  EXPECT_THAT(run_isohf({"info", folder / "a.isohf"}).out, testing::Not(HasSubstr("lossless")));
+  ASSERT_EQ(run_isohf({"convert", folder / "a.tif", folder / "b.isohf", "--lossless", "-q"}).exit_code, 0);
+  const std::string text = run_isohf({"info", folder / "b.isohf"}).out;
+  EXPECT_THAT(text, HasSubstr("restore gives the float32 samples bit for bit; residuals of "));
+  EXPECT_THAT(text, HasSubstr("residual/ (1 members, "));
+}
+
 TEST_F(InfoCommand, TilesAreListedOneALine) {
   const json info = json::parse(run_isohf({"info", folder / "a.isohf", "--json", "--tiles"}).out);
   const std::size_t count = info.at("grid").at("tiles").get<std::size_t>();
