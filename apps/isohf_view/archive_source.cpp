@@ -40,6 +40,7 @@ class ArchiveSource final : public TileSource {
   [[nodiscard]] const TileGrid& grid() const override { return reader_.grid(); }
   [[nodiscard]] ViewScale scale() const override { return scale_; }
 
+  [[nodiscard]] bool is_to_scale() const override { return reader_.metadata().horizontal_unit == "metre"; }
   [[nodiscard]] bool rounds() const override { return is_float(); }
   [[nodiscard]] WorldBounds covered() const override { return reader_.metadata().valid; }
 

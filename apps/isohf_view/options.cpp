@@ -53,6 +53,7 @@ struct Raw {
   double fov_deg = 50.0;
   std::vector<double> level;
   double far_distance = 0.0;
+  double exaggeration = 1.0;
   std::string shadows;
   double shadow_softness = 0.0;
 };
@@ -71,9 +72,11 @@ void add_picture_options(CLI::App& app, Options& options, Raw& raw) {
                  "The sun's apparent size at the caster's distance, world units; default: 2, or 0.5 % of the range of "
                  "heights where that is less")
       ->check(CLI::PositiveNumber);
-  app.add_option("--exaggeration", options.view.exaggeration, "Vertical exaggeration")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
+  app.add_option(
+         "--exaggeration", raw.exaggeration,
+         "Vertical exaggeration; default: 1, or less where the ground's unit is not known and heights would tower "
+         "over it")
+      ->check(CLI::PositiveNumber);
   app.add_option("--mode", options.view.mode, "Colours")->transform(CLI::CheckedTransformer(modes()));
   app.add_option("--level", raw.level,
                  "Draw every tile at this level of detail, fractional; two levels A,B: like a chessboard")
@@ -153,6 +156,7 @@ ParsedOptions parse_options(int argc, char** argv) {
   if (!raw.level.empty()) options.view.fixed_level = raw.level[0];
   if (raw.level.size() > 1) options.view.other_level = raw.level[1];
   if (app.count("--far") > 0) options.far_distance = raw.far_distance;
+  if (app.count("--exaggeration") > 0) options.exaggeration = raw.exaggeration;
   if (!raw.shadows.empty()) options.shadows = raw.shadows == "on";
   if (app.count("--shadow-softness") > 0) options.shadow_softness = raw.shadow_softness;
   if (!raw.position.empty()) options.position = vec3_from(raw.position);

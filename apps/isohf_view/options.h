@@ -27,13 +27,14 @@ struct Options {
   bool fly = false;
   double sun_azimuth_deg = 300.0;
   double sun_elevation_deg = 35.0;
+  std::optional<double> exaggeration;     ///< nullopt: default_exaggeration()
   std::optional<bool> shadows;            ///< nullopt: where the archive has seeds
   std::optional<double> shadow_softness;  ///< k of Eq. 16, world units; nullopt: default_softness()
   std::optional<double> far_distance;
   std::uint64_t memory_mib = 512;
   std::uint64_t upload_mib = 4;
   int threads = 0;  ///< workers that decode; 0: one less than the machine's cores
-  ViewState view;   ///< size, exaggeration, mode, level, field of view, switches
+  ViewState view;   ///< size, mode, level, field of view, switches
 };
 
 /// Outcome of parsing: options, or the exit code of --help, --version or a usage error (already printed).

@@ -26,6 +26,15 @@ double default_softness(const TileBounds& whole) {
   return range > 0.0 ? std::min(2.0, 0.005 * range) : 2.0;
 }
 
+/// 1, but where heights are in no known proportion to the ground and would tower over it: a quarter of its shorter
+/// side.
+double default_exaggeration(const TileSource& source, const TileBounds& whole) {
+  const WorldBounds covered = source.covered();
+  const double side = std::min(covered.x1 - covered.x0, covered.z1 - covered.z0);
+  const double range = whole.high - whole.low;
+  return source.is_to_scale() || range < 0.5 * side ? 1.0 : 0.25 * side / range;
+}
+
 const std::vector<std::string>& help_lines() {
   static const std::vector<std::string> kLines{"W A S D, arrows  move          drag left   turn",
                                                "Q E              down, up      drag right  move sideways",
@@ -92,6 +101,7 @@ Session::Session(const TileSource& source, const Options& options)
     throw Error(ErrorCode::kInvalidArgument,
                 "--shadows on: this archive has no shadow seeds; convert with --shadow-seeds");
   }
+  view.exaggeration = options.exaggeration.value_or(default_exaggeration(source, whole_));
   camera = overview_camera(source, view);
   const auto exaggerated = [this](Vec3 at) { return Vec3{at.x, at.y * view.exaggeration, at.z}; };
   if (options.position || options.look_at) {

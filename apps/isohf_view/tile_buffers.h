@@ -65,9 +65,12 @@ class TileSlot {
   /// Binds the vertex array.
   void bind() const;
 
+  /// What a tile takes, and what drivers keep of it besides: Mesa 3 KB for its vertex array and buffers.
   [[nodiscard]] static std::uint64_t bytes(const TileShape& shape, bool shadow = false) {
+    constexpr std::uint64_t kDriverBytes = 4096;
     const std::int64_t codes = shape.stored_vertex_count() + 2 * (shape.columns() + 2);
-    return static_cast<std::uint64_t>(codes + (shadow ? shape.stored_vertex_count() : 0)) * sizeof(std::uint16_t);
+    return static_cast<std::uint64_t>(codes + (shadow ? shape.stored_vertex_count() : 0)) * sizeof(std::uint16_t) +
+           kDriverBytes;
   }
 
  private:

@@ -46,6 +46,8 @@ class TileSource {
 
   [[nodiscard]] virtual const TileGrid& grid() const = 0;
   [[nodiscard]] virtual ViewScale scale() const = 0;
+  /// False where the ground's unit is not known, so that heights may have any proportion to it.
+  [[nodiscard]] virtual bool is_to_scale() const { return true; }
   /// The part of the world that the source covers; what lies beyond is made up.
   [[nodiscard]] virtual WorldBounds covered() const { return {0.0, 0.0, grid().world_width(), grid().world_height()}; }
   [[nodiscard]] virtual TileBounds bounds(TileIndex tile) const = 0;

@@ -101,6 +101,28 @@ TEST_F(ViewProgramTest, FliesAndCountsEachFrame) {
   EXPECT_NE(text("frames.svg").find("</svg>"), std::string::npos);
 }
 
+TEST_F(ViewProgramTest, DrawsArchivesThatAreVoidOrOneTile) {
+  test::write_analytic_archive(path("void.isohf"), grid(), [](TileIndex, std::vector<std::uint16_t>& codes) {
+    std::fill(codes.begin(), codes.end(), std::uint16_t{65535});
+  });
+  test::write_analytic_archive(path("one.isohf"), TileGrid::make(TileShape::make(5, 5, 1), 1, 1, 10.0, 10.0));
+  {
+    std::ofstream file(path("path.txt"));
+    file << "0 100 200 600  480 0 100\n2 500 150 500  480 0 0\n";
+  }
+  for (const std::string archive : {"void.isohf", "one.isohf"}) {
+    for (const std::string& action :
+         {"--screenshot " + path("a.png"), std::string("--verify"), std::string("--sweep --steps 4"),
+          "--frames 3 --baseline --plot " + path("a.svg") + " --flight " + path("path.txt")}) {
+      const Outcome outcome = run(path(archive) + " --size 100x80 " + action);
+      EXPECT_EQ(outcome.exit_code, 0) << archive << " " << action << "\n" << outcome.out << outcome.err;
+      EXPECT_EQ(outcome.err, "") << archive << " " << action;
+      EXPECT_EQ(outcome.out.find("nan"), std::string::npos) << outcome.out;
+      EXPECT_EQ(outcome.out.find("inf"), std::string::npos) << outcome.out;
+    }
+  }
+}
+
 TEST_F(ViewProgramTest, GrowsNoMoreThanItsMemoryBound) {
   const TileGrid wide = TileGrid::make(TileShape::make(68, 83, 4), 50, 40, 640.0, 640.0);
   test::write_analytic_archive(path("wide.isohf"), wide);
