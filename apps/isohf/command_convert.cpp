@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <sys/resource.h>
 
+#include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -124,8 +125,8 @@ std::optional<ConvertCommandOptions> parse(const Arguments& arguments) {
 
 struct Measured {
   std::uint64_t raw_bytes = 0;      ///< the lattice as raw 16-bit samples
-  double ratio = 0.0;               ///< of it to the archive
-  double bits_per_sample = 0.0;     ///< whole archive over all lattice samples
+  double ratio = 0.0;               ///< of it to the tiles
+  double bits_per_sample = 0.0;     ///< of the tiles, over all lattice samples
   double samples_per_second = 0.0;  ///< of the source
   std::uint64_t peak_memory_bytes = 0;
 };
@@ -133,8 +134,8 @@ struct Measured {
 Measured measure(const ConvertSummary& summary) {
   Measured measured;
   measured.raw_bytes = 2 * summary.lattice_samples;
-  const auto bytes = static_cast<double>(summary.archive_bytes);
-  if (summary.archive_bytes > 0) measured.ratio = static_cast<double>(measured.raw_bytes) / bytes;
+  const auto bytes = static_cast<double>(summary.tile_bytes);
+  if (summary.tile_bytes > 0) measured.ratio = static_cast<double>(measured.raw_bytes) / bytes;
   if (summary.lattice_samples > 0) {
     measured.bits_per_sample = 8.0 * bytes / static_cast<double>(summary.lattice_samples);
   }
@@ -158,6 +159,8 @@ ordered_json json_from(const ConvertCommandOptions& options, const ConvertSummar
           {"tile_bytes", summary.tile_bytes},
           {"shadow_seed_bytes", summary.seed_bytes},
           {"residual_bytes", summary.residual_bytes},
+          {"texture_bytes", summary.texture_bytes},
+          {"photo_pixels_per_texel", summary.pixels_per_texel},
           {"raw_16_bit_bytes", measured.raw_bytes},
           {"ratio_to_raw_16_bit", measured.ratio},
           {"bits_per_sample", measured.bits_per_sample},
@@ -184,8 +187,8 @@ std::string text_from(const ConvertCommandOptions& options, const ConvertSummary
                            describe_count(summary.tiles_written), describe_count(summary.tiles_expected),
                            describe_count(summary.tiles_void), metadata.grid.tile_columns(), metadata.grid.tile_rows(),
                            shape.columns(), shape.rows()));
-  say("size", fmt::format("{:.2f} times smaller than raw 16-bit samples ({}), {:.3f} bits a sample", measured.ratio,
-                          describe_bytes(measured.raw_bytes), measured.bits_per_sample));
+  say("size", fmt::format("elevations take {}, {:.3f} bits a sample: {:.2f} times smaller than raw 16-bit samples",
+                          describe_bytes(summary.tile_bytes), measured.bits_per_sample, measured.ratio));
   if (summary.residual_bytes > 0) {
     say("residuals",
         fmt::format("{}, {:.3f} bits an input sample", describe_bytes(summary.residual_bytes),
@@ -213,10 +216,16 @@ std::string text_from(const ConvertCommandOptions& options, const ConvertSummary
 }
 
 void write_report(const ConvertCommandOptions& options, const Accuracy& accuracy) {
-  std::ofstream file(*options.report, std::ios::binary);
+  const std::string part = *options.report + ".part";
+  std::ofstream file(part, std::ios::binary);
   file << json_text(json_from(accuracy));
   file.close();
-  if (!file) throw Error(ErrorCode::kIo, *options.report + ": cannot be written");
+  std::error_code failed;
+  if (file) std::filesystem::rename(part, *options.report, failed);
+  if (file && !failed) return;
+  std::error_code ignored;
+  std::filesystem::remove(part, ignored);
+  throw Error(ErrorCode::kIo, *options.report + ": cannot be written");
 }
 
 int run(ConvertCommandOptions options) {

@@ -64,7 +64,7 @@ struct Derived {
   std::uint64_t member_bytes = 0;  ///< compressed, everything else
   std::int64_t samples = 0;        ///< C*R for every tile
   double bits_per_sample = 0.0;    ///< of the tiles that are stored
-  double ratio_to_u16 = 0.0;       ///< raw 16-bit samples of all tiles / archive
+  double ratio_to_u16 = 0.0;       ///< raw 16-bit samples of all tiles / tile_bytes
 };
 
 Derived derive(const ArchiveReader& archive) {
@@ -82,7 +82,9 @@ Derived derive(const ArchiveReader& archive) {
   if (stored > 0) {
     derived.bits_per_sample = 8.0 * static_cast<double>(derived.tile_bytes) / static_cast<double>(per_tile * stored);
   }
-  derived.ratio_to_u16 = 2.0 * static_cast<double>(derived.samples) / static_cast<double>(archive.size_bytes());
+  if (derived.tile_bytes > 0) {
+    derived.ratio_to_u16 = 2.0 * static_cast<double>(derived.samples) / static_cast<double>(derived.tile_bytes);
+  }
   return derived;
 }
 
@@ -218,8 +220,9 @@ std::string describe_archive(const ArchiveReader& archive) {
                             source.channel.empty() ? "" : ", channel " + source.channel, source.registration));
   say("reference", describe_crs(source));
   say("filter", fmt::format("{}, acquisition {}", metadata.filter, metadata.acquisition));
-  say("size", fmt::format("{:.3f} bits a stored sample; {:.2f} times smaller than raw 16-bit samples",
-                          derived.bits_per_sample, derived.ratio_to_u16));
+  say("size",
+      fmt::format("elevations take {}, {:.3f} bits a stored sample: {:.2f} times smaller than raw 16-bit samples",
+                  describe_bytes(derived.tile_bytes), derived.bits_per_sample, derived.ratio_to_u16));
   if (const auto info = texture_info(metadata)) {
     say("textures", fmt::format("{}; from {}, {} x {} pixels, placed by {}", describe_textures(*info, 0.0),
                                 info->photo_name, info->photo_width, info->photo_height, info->placed_by));
