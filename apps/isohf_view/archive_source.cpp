@@ -7,6 +7,7 @@
 #include "formats/units.h"
 #include "isohf/archive/reader.h"
 #include "isohf/archive/shadow_seed_reader.h"
+#include "isohf/archive/texture_reader.h"
 #include "isohf/base/assert.h"
 #include "isohf/surface/shadow.h"
 #include "tile_source.h"
@@ -35,6 +36,7 @@ class ArchiveSource final : public TileSource {
       scale_ = {low, high > low ? (high - low) / (kVoidCode - 1) : 1.0};
     }
     if (shadow_seed_info(metadata)) seeds_.emplace(reader_);
+    if (texture_info(metadata)) textures_.emplace(reader_);
   }
 
   [[nodiscard]] const TileGrid& grid() const override { return reader_.grid(); }
@@ -58,6 +60,12 @@ class ArchiveSource final : public TileSource {
   void read(TileIndex tile, std::span<std::uint16_t> codes) const override { convert(reader_.read_tile(tile), codes); }
 
   [[nodiscard]] const ShadowSeedInfo* shadow_seeds() const override { return seeds_ ? &seeds_->info() : nullptr; }
+
+  [[nodiscard]] const TextureInfo* textures() const override { return textures_ ? &textures_->info() : nullptr; }
+  [[nodiscard]] bool has_texture(TileIndex tile) const override { return textures_ && textures_->has(tile); }
+  [[nodiscard]] Picture read_texture(TileIndex tile, int level) const override {
+    return textures_->read_rgba(tile, level);
+  }
 
   void read_lit(TileIndex tile, const RowSun& sun, std::span<std::uint16_t> codes,
                 std::span<std::uint16_t> shadow) const override {
@@ -112,6 +120,7 @@ class ArchiveSource final : public TileSource {
   double world_per_elevation_;
   ViewScale scale_;
   std::optional<ShadowSeedReader> seeds_;
+  std::optional<TextureReader> textures_;
 };
 
 }  // namespace

@@ -131,7 +131,9 @@ void fly(const TileSource& source, const Options& options, const std::function<v
   TextFile plot(options.plot);
   csv.line(
       "frame,time_s,frame_ms,update_ms,triangles,draw_calls,passes,visible_tiles,absent_tiles,resident_tiles,"
-      "missing_tiles,uploads,shadow_uploads,shadows_to_come,upload_bytes,resident_bytes,radius");
+      "missing_tiles,uploads,shadow_uploads,shadows_to_come,upload_bytes,resident_bytes,radius,texture_upload_bytes,"
+      "texture_bytes,"
+      "textures_to_come");
   Session session(source, options);
   const Offscreen target(options.view.width, options.view.height, GL_RGBA8);
   FlightTotals totals;
@@ -155,20 +157,27 @@ void fly(const TileSource& source, const Options& options, const std::function<v
     const double ms = milliseconds_since(begin);
     const FrameFigures& figures = session.figures();
     const TileBoxFigures& box = session.box().figures();
-    csv.line(fmt::format("{},{:.4f},{:.3f},{:.3f},{},{},{},{},{},{},{},{},{},{},{},{},{:.1f}", frame, time_s, ms,
-                         box.update_ms, figures.triangles, figures.draw_calls, figures.passes, figures.visible_tiles,
+    const TextureBoxFigures textures =
+        session.textures() != nullptr ? session.textures()->figures() : TextureBoxFigures{};
+    const double update_ms = box.update_ms + textures.update_ms;
+    csv.line(fmt::format("{},{:.4f},{:.3f},{:.3f},{},{},{},{},{},{},{},{},{},{},{},{},{:.1f},{},{},{}", frame, time_s,
+                         ms, update_ms, figures.triangles, figures.draw_calls, figures.passes, figures.visible_tiles,
                          figures.absent_tiles, box.resident_tiles, box.missing_tiles, box.uploads, box.shadow_uploads,
-                         box.shadows_to_come, box.upload_bytes, box.resident_bytes, box.radius));
+                         box.shadows_to_come, box.upload_bytes, box.resident_bytes, box.radius, textures.upload_bytes,
+                         textures.resident_bytes, textures.to_come));
     totals.frame_ms.push_back(ms);
     totals.time_s.push_back(time_s);
-    totals.update_ms.push_back(box.update_ms);
+    totals.update_ms.push_back(update_ms);
     totals.most_anonymous = std::max(totals.most_anonymous, process_memory().anonymous);
     totals.triangles += figures.triangles;
     totals.absent += figures.absent_tiles;
-    totals.most_bytes = std::max(totals.most_bytes, box.resident_bytes);
-    totals.upload_bytes += box.upload_bytes;
+    totals.most_bytes = std::max(totals.most_bytes, box.resident_bytes + textures.resident_bytes);
+    totals.upload_bytes += box.upload_bytes + textures.upload_bytes;
     if (figures.draw_calls > 2 * figures.visible_tiles * figures.passes) ++totals.over_two_calls;
     if (session.box().error()) throw Error(ErrorCode::kCorrupt, *session.box().error());
+    if (session.textures() != nullptr && session.textures()->error()) {
+      throw Error(ErrorCode::kCorrupt, *session.textures()->error());
+    }
   }
   csv.close();
   plot.line(plot_of(totals, fmt::format("Flight over {} tiles, {} x {} pixels", source.grid().tile_count(),

@@ -23,8 +23,9 @@ constexpr const char* kFooter =
     "from East or West: at azimuth 90 or 270 exactly the sun's, as isohf shade draws them. At other azimuths they are\n"
     "those of the sun as it is seen in that plane, whose elevation has the tangent tan(elevation) / |sin(azimuth)|; a\n"
     "sun due North or South casts none.\n"
-    "Memory: tiles on the GPU and on their way there never take more than --memory MiB together. Where the far\n"
-    "distance would need more, it is shortened and the figures say so. Besides: the shared vertex and index arrays\n"
+    "Memory: tiles and textures on the GPU and on their way there never take more than --memory MiB together, in an\n"
+    "archive with textures a third for tiles and two thirds for textures. Where the far distance would need more, it\n"
+    "is shortened and the figures say so; textures get coarser. Besides: the shared vertex and index arrays\n"
     "(some bytes a vertex of one tile), the picture, and the memory-mapped archive.\n"
     "Float archives are rounded for viewing to 65535 steps between their lowest and highest elevation.\n"
     "Flight file: one line a place, 'seconds x y z look_x look_y look_z', # begins a comment; places are joined by\n"
@@ -36,11 +37,9 @@ Vec3 vec3_from(const std::vector<double>& values) {
 }
 
 const std::map<std::string, ColourMode>& modes() {
-  static const std::map<std::string, ColourMode> kModes{{"elevation", ColourMode::kElevation},
-                                                        {"plain", ColourMode::kPlain},
-                                                        {"levels", ColourMode::kLevels},
-                                                        {"strips", ColourMode::kStrips},
-                                                        {"normals", ColourMode::kNormals}};
+  static const std::map<std::string, ColourMode> kModes{
+      {"elevation", ColourMode::kElevation}, {"plain", ColourMode::kPlain},     {"levels", ColourMode::kLevels},
+      {"strips", ColourMode::kStrips},       {"texture", ColourMode::kTexture}, {"normals", ColourMode::kNormals}};
   return kModes;
 }
 
@@ -77,7 +76,9 @@ void add_picture_options(CLI::App& app, Options& options, Raw& raw) {
          "Vertical exaggeration; default: 1, or less where the ground's unit is not known and heights would tower "
          "over it")
       ->check(CLI::PositiveNumber);
-  app.add_option("--mode", options.view.mode, "Colours")->transform(CLI::CheckedTransformer(modes()));
+  app.add_option("--mode", options.view.mode,
+                 "Colours; default: texture where the archive has textures, else elevation")
+      ->transform(CLI::CheckedTransformer(modes()));
   app.add_option("--level", raw.level,
                  "Draw every tile at this level of detail, fractional; two levels A,B: like a chessboard")
       ->delimiter(',')
@@ -153,6 +154,7 @@ ParsedOptions parse_options(int argc, char** argv) {
     const int code = app.exit(error);
     return {std::nullopt, code == 0 ? 0 : 2};
   }
+  options.mode_given = app.count("--mode") > 0;
   if (!raw.level.empty()) options.view.fixed_level = raw.level[0];
   if (raw.level.size() > 1) options.view.other_level = raw.level[1];
   if (app.count("--far") > 0) options.far_distance = raw.far_distance;

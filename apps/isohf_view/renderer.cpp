@@ -126,7 +126,14 @@ Renderer::Renderer(const TileSource& source, const SharedGeometry& shared)
       shared_(shared),
       whole_(whole_bounds(source)),
       flat_{{"wire", false, flat_fragment_shader(false)}, {"wire", true, flat_fragment_shader(true)}},
-      sky_("sky", sky_vertex_shader(), sky_fragment_shader()) {}
+      sky_("sky", sky_vertex_shader(), sky_fragment_shader()) {
+  const std::array<std::uint8_t, 4> nothing{};
+  glBindTexture(GL_TEXTURE_2D, no_texture_.get());
+  glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, 1, 1, 0, GL_RGBA, GL_UNSIGNED_BYTE, nothing.data());
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAX_LEVEL, 0);
+  glBindTexture(GL_TEXTURE_2D, 0);
+}
 
 const TerrainProgram& Renderer::shading(const ViewState& view, bool is_rim) {
   const std::tuple key{view.mode, view.borders, is_rim};
@@ -177,8 +184,13 @@ std::vector<Renderer::Item> Renderer::visible_items(const ViewState& view, const
       }
       const bool is_cut = !view.beyond && reaches_beyond(grid, tile, source_.covered());
       const LodBlend blend = lod_blend(level_of(view, tile, bounds), grid.shape().levels());
-      items.push_back(
-          {tile, slot, is_cut, is_cut || bounds.has_voids, length(0.5 * (low + high)), box_distance(low, high), blend});
+      GLuint texture = 0;
+      if (view.mode == ColourMode::kTexture) {
+        if (textures_) texture = textures_(tile);
+        if (texture == 0) texture = no_texture_.get();
+      }
+      items.push_back({tile, slot, is_cut, is_cut || bounds.has_voids, length(0.5 * (low + high)),
+                       box_distance(low, high), blend, texture});
     }
   }
   std::sort(items.begin(), items.end(), [](const Item& a, const Item& b) { return a.distance < b.distance; });
@@ -194,6 +206,14 @@ void Renderer::begin_shading(const TerrainProgram& program, const ViewState& vie
   glUniform2f(program.uniform("ramp"), static_cast<float>((whole_.low - scale.offset) / scale.scale),
               static_cast<float>(1.0 / codes));
   set_vec3(program.uniform("sun"), sun);
+  if (const TextureInfo* textures = source_.textures()) {
+    // Texel centres lie on the tile's edges (docs/archive_format.md, section 12).
+    const TileShape& shape = source_.grid().shape();
+    const double size = textures->size;
+    const double whole = (size - 1.0) / size;
+    set_vec3(program.uniform("texture_place"),
+             {whole / (2.0 * shape.cell_columns()), whole / shape.cell_rows(), 0.5 / size});
+  }
   const double height = std::clamp(sun.y * 2.5, 0.0, 1.0);
   const Vec3 warm{1.0, 0.62 + height * 0.34, 0.36 + height * 0.52};
   set_vec3(program.uniform("sun_light"), (sun.y > 0.0 ? 0.95 : 0.0) * warm);
@@ -214,6 +234,7 @@ void Renderer::draw_mesh(const TerrainProgram& program, const TerrainFrame& fram
   glUniform1i(program.uniform("is_stitch"), 0);
   set_vec3(program.uniform("level_colour"), level_colour(level));
   item.slot->bind();
+  if (item.texture != 0) glBindTexture(GL_TEXTURE_2D, item.texture);
   if (item.is_cut) set_cutting(true);
   glEnable(GL_CULL_FACE);
   shared_.draw_strip(level);
@@ -333,6 +354,7 @@ FrameFigures Renderer::draw(const ViewState& view, std::int64_t first_column, st
   glFrontFace(GL_CCW);
   glCullFace(GL_BACK);
   glClear(GL_DEPTH_BUFFER_BIT);
+  glActiveTexture(GL_TEXTURE0);
   draw_opaque(view, frame, items, figures);
   draw_sky(view);
   figures.passes = 1;

@@ -33,10 +33,16 @@ struct DrawnMesh {
 /// Finds a tile's buffers; nullptr where the tile is not resident.
 using ResidentTile = std::function<const TileSlot*(TileIndex)>;
 
+/// The GL texture of a tile; 0 where there is none.
+using TileTexture = std::function<GLuint(TileIndex)>;
+
 /// Draws the heightfield: sky, opaque pass, fading pass (paper sections 3.3-3.9), wires.
 class Renderer {
  public:
   Renderer(const TileSource& source, const SharedGeometry& shared);
+
+  /// Where ColourMode::kTexture finds its textures.
+  void set_textures(TileTexture textures) { textures_ = std::move(textures); }
 
   /// Draws tiles first..last of both axes, as far as resident, into the bound framebuffer.
   FrameFigures draw(const ViewState& view, std::int64_t first_column, std::int64_t last_column, std::int64_t first_row,
@@ -57,6 +63,7 @@ class Renderer {
     double distance;
     double nearest;  ///< distance of the nearest point of the tile's box
     LodBlend blend;
+    GLuint texture;  ///< 0: not wanted
   };
   /// True where the second mesh shows: less than half an 8-bit step of it does not.
   [[nodiscard]] static bool fades(const Item& item) {
@@ -91,6 +98,8 @@ class Renderer {
   std::vector<DrawnMesh> drawn_;
   Variants flat_;
   Program sky_;
+  TileTexture textures_;
+  Texture no_texture_;  ///< one texel without alpha
   VertexArray nothing_;
 };
 

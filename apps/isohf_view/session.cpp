@@ -11,9 +11,14 @@
 namespace isohf::view {
 namespace {
 
-TileBoxLimits limits_from(const Options& options) {
+/// Textures get two thirds of the memory.
+std::uint64_t texture_bytes(const TileSource& source, const Options& options) {
+  return source.textures() == nullptr ? 0 : (options.memory_mib << 20) / 3 * 2;
+}
+
+TileBoxLimits limits_from(const TileSource& source, const Options& options) {
   TileBoxLimits limits;
-  limits.memory_bytes = options.memory_mib << 20;
+  limits.memory_bytes = (options.memory_mib << 20) - texture_bytes(source, options);
   limits.upload_bytes_per_frame = options.upload_mib << 20;
   const int cores = static_cast<int>(std::thread::hardware_concurrency());
   limits.workers = options.threads > 0 ? options.threads : std::max(1, cores - 1);
@@ -88,7 +93,8 @@ Session::Session(const TileSource& source, const Options& options)
       shadow_softness_(options.shadow_softness.value_or(default_softness(whole_))),
       shared_(source.grid().shape(), make_index_arrays(source.grid().shape())),
       renderer_(source, shared_),
-      box_(source, shared_, limits_from(options)),
+      box_(source, shared_, limits_from(source, options)),
+      upload_bytes_(options.upload_mib << 20),
       far_distance_(options.far_distance) {
   const int levels = source.grid().shape().levels();
   for (const std::optional<double>& level : {view.fixed_level, view.other_level}) {
@@ -102,6 +108,13 @@ Session::Session(const TileSource& source, const Options& options)
                 "--shadows on: this archive has no shadow seeds; convert with --shadow-seeds");
   }
   view.exaggeration = options.exaggeration.value_or(default_exaggeration(source, whole_));
+  if (source.textures() != nullptr) {
+    textures_.emplace(source, texture_bytes(source, options), limits_from(source, options).workers);
+    renderer_.set_textures([this](TileIndex tile) { return textures_->texture(tile); });
+    if (!options.mode_given) view.mode = ColourMode::kTexture;
+  } else if (view.mode == ColourMode::kTexture) {
+    throw Error(ErrorCode::kInvalidArgument, "--mode texture: this archive has no textures; convert with --texture");
+  }
   camera = overview_camera(source, view);
   const auto exaggerated = [this](Vec3 at) { return Vec3{at.x, at.y * view.exaggeration, at.z}; };
   if (options.position || options.look_at) {
@@ -138,6 +151,10 @@ void Session::draw() {
 void Session::frame() {
   prepare();
   box_.update({view.eye.x, view.eye.z}, view.far_distance);
+  if (shows_textures()) {
+    const std::uint64_t gone = box_.figures().upload_bytes;
+    textures_->update(box_.range(), view, upload_bytes_ > gone ? upload_bytes_ - gone : 0);
+  }
   draw();
 }
 
@@ -145,6 +162,10 @@ void Session::complete_frame() {
   prepare();
   box_.finish({view.eye.x, view.eye.z}, view.far_distance);
   if (box_.error()) throw Error(ErrorCode::kCorrupt, *box_.error());
+  if (shows_textures()) {
+    textures_->finish(box_.range(), view);
+    if (textures_->error()) throw Error(ErrorCode::kCorrupt, *textures_->error());
+  }
   draw();
 }
 
@@ -180,6 +201,12 @@ void Session::draw_overlay(double frames_per_second, bool figures, bool help) co
         fmt::format("sun {:.0f}, {:.0f} deg   height x {:.2g}   {}", sun_azimuth_deg, sun_elevation_deg,
                     view.exaggeration, help ? "" : "H help"),
         shadow_line()};
+    if (shows_textures()) {
+      const TextureBoxFigures& textures = textures_->figures();
+      lines.push_back(fmt::format("{} textures resident, {} to come, {:.1f} MiB", textures.resident, textures.to_come,
+                                  static_cast<double>(textures.resident_bytes) / (1 << 20)));
+      if (textures_->error()) lines.push_back(textures_->error()->substr(0, 100));
+    }
     if (cut_) {
       lines.push_back(fmt::format("far distance cut to {:.0f} by --memory", box.radius));
     }

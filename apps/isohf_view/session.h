@@ -8,6 +8,7 @@
 #include "overlay.h"
 #include "renderer.h"
 #include "shadow_sun.h"
+#include "texture_box.h"
 #include "tile_box.h"
 
 namespace isohf::view {
@@ -36,6 +37,8 @@ class Session {
 
   [[nodiscard]] const FrameFigures& figures() const { return figures_; }
   [[nodiscard]] const TileBox& box() const { return box_; }
+  /// nullptr where the source has no textures.
+  [[nodiscard]] const TextureBox* textures() const { return textures_ ? &*textures_ : nullptr; }
   [[nodiscard]] const TileSource& source() const { return source_; }
   [[nodiscard]] const SharedGeometry& shared() const { return shared_; }
   [[nodiscard]] Renderer& renderer() { return renderer_; }
@@ -43,6 +46,7 @@ class Session {
  private:
   void prepare();
   void draw();
+  [[nodiscard]] bool shows_textures() const { return textures_ && view.mode == ColourMode::kTexture; }
   [[nodiscard]] std::string shadow_line() const;
 
   const TileSource& source_;
@@ -52,6 +56,8 @@ class Session {
   SharedGeometry shared_;
   Renderer renderer_;
   TileBox box_;
+  std::optional<TextureBox> textures_;
+  std::uint64_t upload_bytes_;  ///< a frame, tiles and textures together
   Overlay overlay_;
   std::optional<double> far_distance_;
   FrameFigures figures_;

@@ -139,10 +139,11 @@ uniform vec3 sun_light;         // on ground that faces it
 uniform vec3 sky_light;         // on level ground
 uniform vec2 haze;              // distance where it begins, 1/distance to where it is complete; y = 0: none
 uniform vec3 horizon;
-uniform sampler2D tile_texture;
+uniform sampler2D tile_texture; // colours as coded, multiplied by alpha
+uniform vec3 texture_place;     // texture coordinates = object space * xy + z
 float sun_share();
 
-#if MODE == 0
+#if MODE == 0 || MODE == 4
 vec3 hypsometric(float t) {
   float at = 7.0 * t;
   return vec3(0.17, 0.36, 0.30) + vec3(0.13, 0.12, -0.03) * clamp(at, 0.0, 1.0) +
@@ -175,7 +176,11 @@ vec3 base_colour() {
 #elif MODE == 3
   return strip_colour();
 #elif MODE == 4
-  return texture(tile_texture, v_place.xy / object_size).rgb;
+  // Under full light a photo shows its own colours: the power of 1/1.6 below is undone. Where there is no photo the
+  // texture has no alpha.
+  vec4 photo = texture(tile_texture, v_place.xy * texture_place.xy + texture_place.z);
+  vec3 own = pow(min(photo.rgb / max(photo.a, 0.004), 1.0), vec3(1.6));
+  return mix(hypsometric((v_place.z - ramp.x) * ramp.y), own, photo.a);
 #else
   return vec3(0.80, 0.79, 0.76);
 #endif

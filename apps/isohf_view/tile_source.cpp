@@ -11,6 +11,10 @@ void TileSource::read_lit(TileIndex, const RowSun&, std::span<std::uint16_t>, st
   throw Error(ErrorCode::kUnsupported, "this source has no shadow seeds");
 }
 
+Picture TileSource::read_texture(TileIndex, int) const {
+  throw Error(ErrorCode::kUnsupported, "this source has no textures");
+}
+
 TileBounds whole_bounds(const TileSource& source) {
   TileBounds whole{false, false, std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
   const TileGrid& grid = source.grid();

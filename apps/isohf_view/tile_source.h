@@ -7,6 +7,8 @@
 
 #include "isohf/archive/metadata.h"
 #include "isohf/archive/shadow_seeds.h"
+#include "isohf/archive/texture_info.h"
+#include "isohf/base/picture.h"
 #include "isohf/lattice/tile_grid.h"
 
 namespace isohf::view {
@@ -62,6 +64,11 @@ class TileSource {
   /// tile.
   virtual void read_lit(TileIndex tile, const RowSun& sun, std::span<std::uint16_t> codes,
                         std::span<std::uint16_t> shadow) const;
+  /// The record of the textures; nullptr where the source has none.
+  [[nodiscard]] virtual const TextureInfo* textures() const { return nullptr; }
+  [[nodiscard]] virtual bool has_texture(TileIndex) const { return false; }
+  /// A level of a tile's texture as RGBA with straight alpha. Throws Error naming the tile.
+  [[nodiscard]] virtual Picture read_texture(TileIndex tile, int level) const;
 };
 
 /// Opens an archive for viewing. 16- and 8-bit codes are taken as they are; float elevations are rounded to 65535

@@ -13,6 +13,7 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "isohf/base/error.h"
 #include "offscreen.h"
@@ -176,10 +177,11 @@ class Controls {
   }
 
   void next_mode() {
-    constexpr std::array kOrder{ColourMode::kElevation, ColourMode::kPlain, ColourMode::kLevels, ColourMode::kStrips,
-                                ColourMode::kNormals};
-    const auto at = std::find(kOrder.begin(), kOrder.end(), session_.view.mode);
-    session_.view.mode = at == kOrder.end() || at + 1 == kOrder.end() ? kOrder.front() : *(at + 1);
+    std::vector<ColourMode> order{ColourMode::kElevation, ColourMode::kPlain, ColourMode::kLevels, ColourMode::kStrips,
+                                  ColourMode::kNormals};
+    if (session_.textures() != nullptr) order.insert(order.begin(), ColourMode::kTexture);
+    const auto at = std::find(order.begin(), order.end(), session_.view.mode);
+    session_.view.mode = at == order.end() || at + 1 == order.end() ? order.front() : *(at + 1);
   }
 
   /// The pivot stays on the same ground, the eye at the same height above it.

@@ -1,0 +1,90 @@
+// The real programs: what convert cuts out of a photo, the viewer shows.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "gl_test.h"
+#include "support/memory_photo.h"
+#include "support/run_program.h"
+#include "support/temporary_folder.h"
+
+namespace isohf::test {
+namespace {
+
+class TextureProgramTest : public GlTest {
+ protected:
+  TextureProgramTest() {
+    std::string pixels = "P6\n512 384\n255\n";
+    for (int i = 0; i < 512 * 384; ++i) {
+      for (int c = 0; c < 3; ++c) pixels.push_back(static_cast<char>(noise(i % 512 / 16, i / 512 / 16, c)));
+    }
+    write_file(folder_ / "photo.ppm", pixels);
+  }
+
+  void convert(const std::vector<std::string>& options) const {
+    std::vector<std::string> command{"convert", ISOHF_SOURCE_DIR "/testdata/coast_512x384_int16.tif", archive()};
+    command.insert(command.end(), {"--overwrite", "--quiet", "--density", "0.1", "--shape", "52x59", "--levels", "3"});
+    command.insert(command.end(), options.begin(), options.end());
+    const RunResult result = run_isohf(command);
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+  }
+  [[nodiscard]] RunResult view(const std::vector<std::string>& options) const {
+    std::vector<std::string> command{ISOHF_BIN_DIR "/isohf-view", archive()};
+    command.insert(command.end(), options.begin(), options.end());
+    return run_program(command);
+  }
+  [[nodiscard]] std::string picture(const std::vector<std::string>& options) const {
+    std::vector<std::string> all{"--screenshot", folder_ / "a.png", "--size", "200x150"};
+    all.insert(all.end(), options.begin(), options.end());
+    const RunResult result = view(all);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_EQ(result.err, "");
+    return read_file(folder_ / "a.png");
+  }
+  [[nodiscard]] std::string archive() const { return folder_ / "a.isohf"; }
+
+  const TemporaryFolder folder_;
+};
+
+TEST_F(TextureProgramTest, ShowsTexturesUnlessAskedForOtherColours) {
+  convert({"--texture", folder_ / "photo.ppm"});
+  const std::string textured = picture({});
+  EXPECT_EQ(picture({"--mode", "texture"}), textured);
+  EXPECT_EQ(picture({"--memory", "16", "--threads", "3", "--upload", "1"}), textured);
+  const std::string elevation = picture({"--mode", "elevation"});
+  EXPECT_NE(elevation, textured);
+  convert({});
+  EXPECT_EQ(picture({}), elevation);
+  const RunResult refused = view({"--mode", "texture", "--screenshot", folder_ / "b.png"});
+  EXPECT_EQ(refused.exit_code, 1);
+  EXPECT_EQ(std::count(refused.err.begin(), refused.err.end(), '\n'), 1) << refused.err;
+  EXPECT_NE(refused.err.find("convert with --texture"), std::string::npos);
+}
+
+TEST_F(TextureProgramTest, FliesWithTexturesBelowTheBound) {
+  convert({"--texture", folder_ / "photo.ppm", "--texture-format", "png"});
+  write_file(folder_ / "path.txt", "0 2000 3000 9000 9000 0 6000\n2 12000 1500 9000 18000 0 6000\n");
+  const RunResult result = view({"--flight", folder_ / "path.txt", "--frames", "12", "--size", "160x120", "--memory",
+                                 "8", "--csv", folder_ / "frames.csv"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  const std::string csv = read_file(folder_ / "frames.csv");
+  EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 13);
+  EXPECT_NE(csv.find(",texture_upload_bytes,texture_bytes,textures_to_come\n"), std::string::npos);
+  EXPECT_EQ(view({"--verify"}).exit_code, 0);
+}
+
+TEST_F(TextureProgramTest, NamesABrokenTextureInOneLine) {
+  convert({"--texture", folder_ / "photo.ppm", "--texture-format", "png"});
+  std::string bytes = read_file(archive());
+  const std::size_t at = bytes.find("textures/0/0/8.png");
+  ASSERT_NE(at, std::string::npos);
+  bytes[at + 60] ^= 0x55;
+  write_file(archive(), bytes);
+  const RunResult result = view({"--screenshot", folder_ / "b.png"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+  EXPECT_NE(result.err.find("textures/0/0/8.png"), std::string::npos) << result.err;
+}
+
+}  // namespace
+}  // namespace isohf::test
