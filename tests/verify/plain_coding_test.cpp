@@ -12,7 +12,7 @@ namespace {
 std::uint64_t deflated(const std::vector<int>& values) {
   std::vector<std::byte> bytes;
   for (const int value : values) bytes.push_back(static_cast<std::byte>(value & 0xff));
-  return deflate_bytes(bytes).size();
+  return deflate_bytes(bytes, 6).size();
 }
 
 TEST(PlainCoding, CodesAreDifferencesAlongRowsOfAnyWidth) {

@@ -401,9 +401,9 @@ void DeflateWriter::write_literals(const Code& code, std::span<const std::byte> 
   put(code.codes[kEndOfBlock], code.lengths[kEndOfBlock]);
 }
 
-std::vector<std::byte> deflate_bytes(std::span<const std::byte> bytes) {
+std::vector<std::byte> deflate_bytes(std::span<const std::byte> bytes, int level) {
   const std::unique_ptr<libdeflate_compressor, decltype(&libdeflate_free_compressor)> compressor(
-      libdeflate_alloc_compressor(9), &libdeflate_free_compressor);
+      libdeflate_alloc_compressor(level), &libdeflate_free_compressor);
   if (compressor == nullptr) throw Error(ErrorCode::kOutOfMemory, "no memory for a compressor");
   std::vector<std::byte> out(libdeflate_deflate_compress_bound(compressor.get(), bytes.size()));
   out.resize(libdeflate_deflate_compress(compressor.get(), bytes.data(), bytes.size(), out.data(), out.size()));

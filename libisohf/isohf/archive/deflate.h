@@ -53,8 +53,8 @@ class DeflateWriter {
 /// for symbols of frequency 0. A single symbol gets length 1.
 void build_code_lengths(std::span<const std::uint32_t> frequencies, unsigned limit, std::span<std::uint8_t> lengths);
 
-/// Raw Deflate of any bytes, at libdeflate's level 9.
-[[nodiscard]] std::vector<std::byte> deflate_bytes(std::span<const std::byte> bytes);
+/// Raw Deflate of any bytes, at one of libdeflate's levels, 1 to 12.
+[[nodiscard]] std::vector<std::byte> deflate_bytes(std::span<const std::byte> bytes, int level = 9);
 
 /// Inflates a raw Deflate stream that must fill `out` exactly and use up `deflated` exactly. Throws Error{kCorrupt}.
 /// Thread-safe.

@@ -30,11 +30,15 @@ struct Square {
 
   /// Both meshes at (u, v) in [0, 1], [diagonal]. A vertex of weight 0 is not read; NaN where another is void.
   [[nodiscard]] std::array<double, 2> at(double u, double v) const {
-    const std::array<double, 2> quick = {
-        blend(u >= v ? falling_above(u, v) : falling_below(u, v)),
-        blend(u + v <= 1.0 ? rising_above(u, v) : rising_below(u, v)),
-    };
-    return quick;
+    const auto& [nw, ne, sw, se] = heights;
+    const double fold = nw - ne - sw + se;
+    if (std::isnan(fold)) {
+      return {blend(u >= v ? falling_above(u, v) : falling_below(u, v)),
+              blend(u + v <= 1.0 ? rising_above(u, v) : rising_below(u, v))};
+    }
+    // The plane through three vertices, folded along the diagonal: no branch that nothing predicts.
+    const double plane = nw + u * (ne - nw) + v * (sw - nw);
+    return {plane + std::min(u, v) * fold, plane + std::max(u + v - 1.0, 0.0) * fold};
   }
 
  private:

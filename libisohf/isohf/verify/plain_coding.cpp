@@ -9,6 +9,8 @@
 namespace isohf {
 namespace {
 
+constexpr int kLevel = 6;  // what writers of such files take where nobody asks
+
 std::byte byte_of(std::uint32_t value, unsigned index) {
   return static_cast<std::byte>((value >> (8 * index)) & 0xffU);
 }
@@ -49,7 +51,7 @@ std::uint64_t plainly_coded_bytes(const TileCodes& samples, std::span<const std:
     }
     at += count;
   }
-  return deflate_bytes(bytes).size();
+  return deflate_bytes(bytes, kLevel).size();
 }
 
 }  // namespace isohf
