@@ -24,6 +24,7 @@ isohf_build() {
     command -v ccache >/dev/null && launcher=(-DCMAKE_CXX_COMPILER_LAUNCHER=ccache)
     (cd "$root" && cmake --preset "$preset" "${launcher[@]}") >"$log" 2>&1 || { cat "$log" >&2; return 1; }
   fi
+  [[ -f $folder/.ninja_log ]] || echo "isohf: building ${folder#"$root"/}; the first time takes some minutes" >&2
   local started=$SECONDS
   ninja -C "$folder" -j "$(isohf_jobs)" "$@" >"$log" 2>&1 || { cat "$log" >&2; return 1; }
   grep -q 'no work to do' "$log" || echo "isohf: built ${folder#"$root"/} in $((SECONDS - started)) s" >&2
