@@ -284,7 +284,7 @@ void main() {
   vec3 sky = mix(horizon, zenith, 1.0 - exp(-2.2 * max(ray.y, 0.0)));
   if (sun.y > -0.1) {
     float near_sun = max(dot(ray, sun), 0.0);
-    sky += vec3(1.0, 0.75, 0.45) * (0.25 * pow(near_sun, 24.0) + 0.6 * smoothstep(0.9995, 0.9998, near_sun));
+    sky += vec3(1.0, 0.75, 0.45) * (0.25 * pow(near_sun, 24.0) + 0.6 * smoothstep(0.99993, 0.99997, near_sun));
   }
   colour = vec4(pow(sky, vec3(1.0 / 1.6)), 1.0);
 }

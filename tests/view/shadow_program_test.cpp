@@ -1,6 +1,8 @@
 // The real programs: what convert stores, the viewer draws and checks.
 #include <gtest/gtest.h>
 
+#include <cstdlib>
+
 #include "gl_test.h"
 #include "support/run_program.h"
 #include "support/temporary_folder.h"
@@ -62,6 +64,41 @@ TEST_F(ShadowProgramTest, DrawsArchivesWithoutSeedsAndRefusesToShadeThem) {
   const RunResult verified = view({"--verify"});
   EXPECT_EQ(verified.exit_code, 0) << verified.out;
   EXPECT_NE(verified.out.find("no shadow seeds"), std::string::npos);
+}
+
+TEST_F(ShadowProgramTest, ObeysKeysInAWindow) {
+  if (std::system("command -v xvfb-run >/dev/null 2>&1 && command -v xdotool >/dev/null 2>&1") != 0) {
+    GTEST_SKIP() << "xvfb-run or xdotool is not installed";
+  }
+  convert({"--shadow-seeds"});
+  // Pictures with shadows, without, and with them again; then every other key, and Escape.
+  write_file(folder_ / "keys.sh", R"sh(
+    cd "$1" || exit 9
+    "$2" a.isohf --window --no-overlay --size 200x150 --sun 90,6 2>log & viewer=$!
+    id=$(timeout 30 xdotool search --sync --onlyvisible --name isohf-view | head -1)
+    xdotool windowfocus "$id" sleep 2
+    picture() {
+      xdotool key "$@"
+      count=$((count + 1))
+      for i in $(seq 200); do grep -q "isohf-000$count.png" log && return; sleep 0.1; done
+    }
+    picture p
+    picture u p
+    picture u p
+    picture k k k c m m m m m x b t z v plus minus bracketleft bracketright f h h r j l i w a s d q e p
+    xdotool key Escape
+    wait $viewer
+  )sh");
+  const RunResult result = run_program({"xvfb-run", "-a", "-s", "-screen 0 800x600x24", "sh", folder_ / "keys.sh",
+                                        folder_.path(), ISOHF_BIN_DIR "/isohf-view"});
+  EXPECT_EQ(result.exit_code, 0) << result.err << read_file(folder_ / "log");
+  const std::string lit = read_file(folder_ / "isohf-0001.png");
+  const std::string plain = read_file(folder_ / "isohf-0002.png");
+  EXPECT_FALSE(lit.empty());
+  EXPECT_FALSE(plain.empty());
+  EXPECT_NE(lit, plain);
+  EXPECT_EQ(read_file(folder_ / "isohf-0003.png"), lit);
+  EXPECT_NE(read_file(folder_ / "isohf-0004.png"), "");
 }
 
 TEST_F(ShadowProgramTest, VerifiesSeedsAndNamesAFlippedMember) {
