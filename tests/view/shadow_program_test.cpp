@@ -89,8 +89,8 @@ TEST_F(ShadowProgramTest, ObeysKeysInAWindow) {
     xdotool key Escape
     wait $viewer
   )sh");
-  const RunResult result = run_program({"xvfb-run", "-a", "-s", "-screen 0 800x600x24", "sh", folder_ / "keys.sh",
-                                        folder_.path(), ISOHF_BIN_DIR "/isohf-view"});
+  const RunResult result = run_program({"/usr/bin/env", "xvfb-run", "-a", "-s", "-screen 0 800x600x24", "sh",
+                                        folder_ / "keys.sh", folder_.path(), ISOHF_BIN_DIR "/isohf-view"});
   EXPECT_EQ(result.exit_code, 0) << result.err << read_file(folder_ / "log");
   const std::string lit = read_file(folder_ / "isohf-0001.png");
   const std::string plain = read_file(folder_ / "isohf-0002.png");
