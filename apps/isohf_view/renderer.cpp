@@ -100,10 +100,13 @@ void begin_opaque_pass() {
   glDisable(GL_BLEND);
 }
 
-void begin_fading_pass() {
+// The paper has depth writes off here. Within a tile triangles come in the order of the strip, though, so that the far
+// side of a hill may be drawn over the near one; the picture would then jump at β = ½, where the second mesh becomes
+// the first and is drawn with depth. With depth writes the nearest one stays in front in both stages.
+void begin_fading_pass(bool write_depth) {
+  glDepthMask(write_depth ? GL_TRUE : GL_FALSE);
   glEnable(GL_BLEND);
   glBlendFuncSeparate(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA, GL_ONE, GL_ONE_MINUS_SRC_ALPHA);  // alpha stays 1
-  glDepthMask(GL_FALSE);
   glEnable(GL_POLYGON_OFFSET_FILL);
 }
 
@@ -269,7 +272,7 @@ void Renderer::draw_opaque(const ViewState& view, const TerrainFrame& frame, con
 
 void Renderer::draw_fading(const ViewState& view, const TerrainFrame& frame, const std::vector<Item>& items,
                            FrameFigures& figures) {
-  begin_fading_pass();
+  begin_fading_pass(!view.wireframe);  // wires are those of the first mesh, and shown through the second
   for (const bool rim : {false, true}) {
     const TerrainProgram& program = shading(view, rim);
     begin_shading(program, view, frame);

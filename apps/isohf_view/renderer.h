@@ -109,7 +109,7 @@ class Renderer {
 
 /// The GL state of the opaque and of the fading pass; verifying draws with the same.
 void begin_opaque_pass();
-void begin_fading_pass();
+void begin_fading_pass(bool write_depth = true);
 /// Before a tile's second mesh is drawn in the fading pass.
 void order_fading(const LodBlend& blend);
 void end_fading_pass();

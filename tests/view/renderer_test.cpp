@@ -56,11 +56,15 @@ TEST_F(RendererTest, DrawsEveryVisibleTileWithAtMostTwoCallsAPass) {
 
 /// The largest change of any pixel between small steps of level, fading and switching.
 TEST_F(RendererTest, FadesBetweenLevelsWithoutJumps) {
+  // Low, and southwards: hills cover hills, and strips run from near to far.
   const test::MemorySource source(small_grid());
   Options options;
   options.view.width = 320;
   options.view.height = 240;
   options.view.haze = false;
+  options.exaggeration = 3.0;
+  options.position = Vec3{1200.0, 140.0, 100.0};
+  options.look_at = Vec3{1300.0, 60.0, 900.0};
   Session session(source, options);
   const SweepResult fading = sweep_levels(session, 32, false);
   const SweepResult plain = sweep_levels(session, 32, true);
@@ -68,6 +72,11 @@ TEST_F(RendererTest, FadesBetweenLevelsWithoutJumps) {
   EXPECT_LT(2 * fading.largest_mean_jump, plain.largest_mean_jump);
   // Rounding to 8 bits alone may take a picture back by a little.
   EXPECT_LT(fading.largest_retreat, 0.05);
+  // Nothing changes places at β = ½, where the meshes change order: a step like those beside it.
+  for (const std::size_t half : {std::size_t{8}, std::size_t{24}}) {
+    const int beside = std::max(fading.steps[half - 1].largest_jump, fading.steps[half + 1].largest_jump);
+    EXPECT_LE(fading.steps[half].largest_jump, beside + beside / 2 + 2);
+  }
   RecordProperty("fading", fading.largest_jump);
   RecordProperty("plain", plain.largest_jump);
 }
