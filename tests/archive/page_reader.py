@@ -33,13 +33,28 @@ class Bits:
         return value
 
 
+def unpair(payload, at, count):
+    """The symbols of a context that are stored in pairs, and where they end."""
+    symbols = []
+    while len(symbols) < count:
+        assert payload[at] <= 225
+        if payload[at] < 225:
+            symbols += divmod(payload[at], 15)
+            at += 1
+        else:
+            symbols += payload[at + 1 : at + 3]
+            at += 3
+    assert len(symbols) == count or symbols.pop() == 0
+    return symbols, at
+
+
 def decode(payload, columns, rows, kind):
     """The integers of a tile in row order, None where void, and the number of dropped bits."""
     version, found_kind, flags, dropped, low, high, mask_bytes = struct.unpack_from("<BBBBiiI", payload)
     assert (version, found_kind) == (1, kind)
     at = 16
     if not flags & 2:
-        base, extra_bytes, shift, contexts = struct.unpack_from("<iIBB", payload, 16)
+        base, extra_bytes, shift, contexts, paired = struct.unpack_from("<iIBBH", payload, 16)
         weights = struct.unpack_from("<12h", payload, 28)
         thresholds = struct.unpack_from("<%dH" % (contexts - 1), payload, 52)
         at = 52 + 2 * (contexts - 1)
@@ -51,9 +66,12 @@ def decode(payload, columns, rows, kind):
         assert at == len(payload)
         return [None if void else low for void in mask], dropped
     streams = []
-    for count in counts:
-        streams.append(iter(payload[at : at + count]))
-        at += count
+    for k, count in enumerate(counts):
+        if paired >> k & 1:
+            symbols, at = unpair(payload, at, count)
+        else:
+            symbols, at = payload[at : at + count], at + count
+        streams.append(iter(symbols))
     extra = Bits(payload[at : at + extra_bytes])
     assert at + extra_bytes == len(payload)
     modulus = 1 << (32 if kind == 2 else 16)

@@ -212,7 +212,7 @@ TEST(TileCodec, RefusesEveryWrongHeaderField) {
   expect_error(shape, type, with(24, {32}), ErrorCode::kCorrupt);                  // activity shift
   expect_error(shape, type, with(25, {0}), ErrorCode::kCorrupt);                   // contexts
   expect_error(shape, type, with(25, {17}), ErrorCode::kCorrupt);
-  expect_error(shape, type, with(26, {1}), ErrorCode::kCorrupt);                   // reserved
+  expect_error(shape, type, with(26, {0, 128}), ErrorCode::kCorrupt);              // pairs in a context that is not
   expect_error(shape, type, with(28, {255, 127, 255, 127}), ErrorCode::kCorrupt);  // weights too large
   expect_error(shape, type, with(52, {255, 255, 255, 255}), ErrorCode::kCorrupt);  // threshold or count
 }

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstring>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "isohf/archive/tile_payload.h"
@@ -133,8 +134,9 @@ class Lane {
     header_ = read_payload_header(shape, type, reader);
     if (header_.has_voids || header_.is_constant || header_.mask_bytes != 0) return false;
     table_ = context_table(header_.thresholds);
+    symbols_.emplace(header_, reader);
     for (std::size_t i = 0; i < header_.symbol_counts.size(); ++i) {
-      const auto symbols = reader.read_bytes(header_.symbol_counts[i]);
+      const auto symbols = (*symbols_)[i];
       state.next[i] = symbols.data();
       state.end[i] = symbols.data() + symbols.size();
     }
@@ -219,6 +221,7 @@ class Lane {
   }
 
   PayloadHeader header_;
+  std::optional<SymbolStreams> symbols_;
   std::array<std::uint8_t, kActivityLimit> table_{};
   int columns_;
   int stride_;

@@ -8,6 +8,7 @@
 #include "isohf/archive/content_hash.h"
 #include "isohf/archive/context_model.h"
 #include "isohf/archive/deflate.h"
+#include "isohf/archive/pair_coding.h"
 #include "isohf/archive/tile_payload.h"
 #include "isohf/archive/void_mask.h"
 #include "isohf/base/assert.h"
@@ -159,7 +160,8 @@ Residuals find_residuals(Lattice<Wide>& lattice, const Voids& voids, const Paylo
   return residuals;
 }
 
-/// A tile's residuals as they are stored: symbols by context, and the extra bits in coding order.
+/// A tile's residuals as they are stored: symbols by context, paired where that pays, and the extra bits in coding
+/// order.
 struct Streams {
   std::vector<std::vector<std::byte>> symbols;
   std::vector<std::byte> extra;
@@ -290,16 +292,24 @@ Streams make_streams(const Residuals& residuals, PayloadHeader& header) {
   find_levels(residuals.activities.data(), count, header.activity_shift, levels.data());
   const std::vector<std::uint32_t> histogram = count_levels({levels.data(), count});
   header.thresholds = choose_thresholds({symbols.data(), count}, {levels.data(), count}, histogram);
-  return {sort_symbols(symbols.data(), levels.data(), count, header.thresholds, histogram),
-          pack_extra_bits(residuals, header.type)};
+  Streams streams{sort_symbols(symbols.data(), levels.data(), count, header.thresholds, histogram),
+                  pack_extra_bits(residuals, header.type)};
+  for (std::size_t i = 0; i < streams.symbols.size(); ++i) {
+    std::vector<std::byte>& stream = streams.symbols[i];
+    header.symbol_counts.push_back(static_cast<std::uint32_t>(stream.size()));
+    if (!pairs_pay(stream)) continue;
+    std::vector<std::byte> pairs = pair_symbols(stream);
+    if (pairs.size() > stream.size()) continue;  // max_payload_bytes holds for either
+    stream = std::move(pairs);
+    header.paired = static_cast<std::uint16_t>(header.paired | 1U << i);
+  }
+  return streams;
 }
 
 /// Completes payload and Deflate stream; a block for each part.
 void assemble(PayloadHeader& header, std::span<const std::byte> mask, const Streams& streams, EncodedTile& tile) {
   header.mask_bytes = static_cast<std::uint32_t>(mask.size());
   header.extra_bytes = static_cast<std::uint32_t>(streams.extra.size());
-  for (const auto& symbols : streams.symbols)
-    header.symbol_counts.push_back(static_cast<std::uint32_t>(symbols.size()));
   std::vector<std::byte> bytes;
   write_payload_header(header, bytes);
   DeflateWriter writer(tile.deflated);

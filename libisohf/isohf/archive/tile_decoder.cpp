@@ -60,13 +60,13 @@ class ResidualReader {
  public:
   ResidualReader(const PayloadHeader& header, ByteReader& reader)
       : table_(context_table(header.thresholds)),
+        symbols_(header, reader),
         shift_(header.activity_shift),
         symbol_limit_(symbol_limit(residual_bits(header.type))),
         extra_({}) {
     for (std::size_t i = 0; i < header.symbol_counts.size(); ++i) {
-      const auto symbols = reader.read_bytes(header.symbol_counts[i]);
-      next_[i] = symbols.data();
-      end_[i] = symbols.data() + symbols.size();
+      next_[i] = symbols_[i].data();
+      end_[i] = symbols_[i].data() + symbols_[i].size();
     }
     extra_ = BitReader(reader.read_bytes(header.extra_bytes));
   }
@@ -93,6 +93,7 @@ class ResidualReader {
 
  private:
   std::array<std::uint8_t, kActivityLimit> table_;
+  SymbolStreams symbols_;
   unsigned shift_;
   unsigned symbol_limit_;
   std::array<const std::byte*, kMaxContexts> next_{};

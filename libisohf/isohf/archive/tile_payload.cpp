@@ -4,6 +4,7 @@
 
 #include <cstdlib>
 
+#include "isohf/archive/pair_coding.h"
 #include "isohf/base/error.h"
 
 namespace isohf {
@@ -62,7 +63,8 @@ void check_predictor(const PayloadHeader& header) {
 
 std::uint64_t max_payload_bytes(const TileShape& shape, CodeType type) {
   const auto samples = static_cast<std::uint64_t>(shape.stored_vertex_count());
-  // One symbol each and its extra bits, at most 12 or 28; a run of the mask takes a byte for each sample or fewer.
+  // One symbol each, a byte and a half where pairs are written apart, and its extra bits, at most 12 or 28; a run of
+  // the mask takes a byte for each sample or fewer.
   const std::uint64_t extra_bits = type == CodeType::kF32 ? 28 : 12;
   const std::uint64_t contexts = kPredictedHeaderBytes + 6 * kMaxContexts;
   return contexts + samples + (samples * extra_bits + 7) / 8 + samples + 8;
@@ -82,7 +84,7 @@ void write_payload_header(const PayloadHeader& header, std::vector<std::byte>& o
   writer.write(header.extra_bytes);
   writer.write(header.activity_shift);
   writer.write(static_cast<std::uint8_t>(header.symbol_counts.size()));
-  writer.write(std::uint16_t{0});
+  writer.write(header.paired);
   for (const std::int16_t weight : header.weights) writer.write(weight);
   for (const std::uint16_t threshold : header.thresholds) writer.write(threshold);
   for (const std::uint32_t count : header.symbol_counts) writer.write(count);
@@ -123,8 +125,9 @@ PayloadHeader read_payload_header(const TileShape& shape, CodeType type, ByteRea
   const std::size_t contexts = reader.read<std::uint8_t>();
   if (contexts < 1 || contexts > kMaxContexts)
     refuse(fmt::format("it has {} contexts, must have 1..{}", contexts, kMaxContexts));
-  if (const auto reserved = reader.read<std::uint16_t>(); reserved != 0) {
-    refuse(fmt::format("its reserved bytes are {}, must be 0", reserved));
+  header.paired = reader.read<std::uint16_t>();
+  if ((std::uint32_t{header.paired} >> contexts) != 0) {
+    refuse(fmt::format("it has pairs in context {}, the last is {}", std::bit_width(header.paired) - 1, contexts - 1));
   }
   for (std::int16_t& weight : header.weights) weight = reader.read<std::int16_t>();
   for (std::size_t i = 1; i < contexts; ++i) header.thresholds.push_back(reader.read<std::uint16_t>());
@@ -136,6 +139,24 @@ PayloadHeader read_payload_header(const TileShape& shape, CodeType type, ByteRea
   check_predictor(header);
   if (symbols > samples) refuse(fmt::format("it has {} symbols, more than the tile's {} samples", symbols, samples));
   return header;
+}
+
+SymbolStreams::SymbolStreams(const PayloadHeader& header, ByteReader& reader) {
+  const auto is_paired = [&](std::size_t context) { return ((header.paired >> context) & 1U) != 0; };
+  std::size_t unpaired = 0;
+  for (std::size_t i = 0; i < header.symbol_counts.size(); ++i) unpaired += is_paired(i) ? header.symbol_counts[i] : 0;
+  unpaired_ = std::make_unique_for_overwrite<std::byte[]>(unpaired);
+  std::byte* to = unpaired_.get();
+  for (std::size_t i = 0; i < header.symbol_counts.size(); ++i) {
+    const std::size_t count = header.symbol_counts[i];
+    if (is_paired(i)) {
+      unpair_symbols(reader, {to, count});
+      streams_[i] = {to, count};
+      to += count;
+    } else {
+      streams_[i] = reader.read_bytes(count);
+    }
+  }
 }
 
 std::array<std::uint8_t, kActivityLimit> context_table(std::span<const std::uint16_t> thresholds) {

@@ -3,6 +3,7 @@
 #include <array>
 #include <bit>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -37,6 +38,7 @@ struct PayloadHeader {
   PredictorWeights weights{};
   std::vector<std::uint16_t> thresholds;     ///< one fewer than contexts, ascending
   std::vector<std::uint32_t> symbol_counts;  ///< one for each context
+  std::uint16_t paired = 0;                  ///< bit k: context k's symbols are stored in pairs (pair_coding.h)
 };
 
 /// Appends the header: 16 bytes, and where the samples differ the rest of it.
@@ -44,6 +46,19 @@ void write_payload_header(const PayloadHeader& header, std::vector<std::byte>& o
 
 /// Reads a header and checks all that it says against itself and the shape. Throws Error{kCorrupt, kUnsupported}.
 [[nodiscard]] PayloadHeader read_payload_header(const TileShape& shape, CodeType type, ByteReader& reader);
+
+/// The symbols of all contexts, unpaired.
+class SymbolStreams {
+ public:
+  /// Reads what the header says that there is. Throws Error{kCorrupt}. The reader's bytes must outlive the streams.
+  SymbolStreams(const PayloadHeader& header, ByteReader& reader);
+
+  [[nodiscard]] std::span<const std::byte> operator[](std::size_t context) const { return streams_[context]; }
+
+ private:
+  std::array<std::span<const std::byte>, kMaxContexts> streams_{};
+  std::unique_ptr<std::byte[]> unpaired_;
+};
 
 // --- samples ---
 

@@ -39,6 +39,8 @@ class ByteReader {
     return part;
   }
 
+  /// What has not been read yet.
+  [[nodiscard]] std::span<const std::byte> rest() const { return bytes_.subspan(position_); }
   [[nodiscard]] std::size_t position() const { return position_; }
   [[nodiscard]] std::size_t remaining() const { return bytes_.size() - position_; }
 
