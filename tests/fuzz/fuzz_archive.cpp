@@ -10,6 +10,7 @@
 #include <string>
 
 #include "isohf/archive/reader.h"
+#include "isohf/archive/texture_reader.h"
 #include "isohf/base/error.h"
 
 namespace {
@@ -23,6 +24,7 @@ void read_everything(const std::string& path) {
     } catch (const isohf::Error&) {
     }
   }
+  if (isohf::texture_info(reader.metadata())) static_cast<void>(isohf::TextureReader(reader));
   const std::int64_t tiles = std::min<std::int64_t>(reader.grid().tile_count(), 64);
   if (reader.grid().shape().stored_vertex_count() > 1000000) return;  // an honest claim, but slow to fill
   for (std::int64_t flat = 0; flat < tiles; ++flat) {

@@ -21,36 +21,40 @@ TextureInfo info_of(const ArchiveReader& archive) {
 
 }  // namespace
 
-TextureReader::TextureReader(const ArchiveReader& archive)
-    : archive_(archive),
-      info_(info_of(archive)),
-      members_(static_cast<std::size_t>(archive.grid().tile_count()) * static_cast<std::size_t>(info_.levels), -1) {
+TextureReader::TextureReader(const ArchiveReader& archive) : archive_(archive), info_(info_of(archive)) {
   const auto& members = archive.members();
   for (std::size_t i = 0; i < members.size(); ++i) {
     const auto place = place_from_texture_name(info_, members[i].name);
-    if (place && archive.grid().contains(place->tile)) {
-      members_[slot(place->tile, place->level)] = static_cast<std::int64_t>(i);
-    }
+    if (place && archive.grid().contains(place->tile)) members_.emplace_back(slot(place->tile, place->level), i);
   }
+  std::sort(members_.begin(), members_.end());
 }
 
-std::size_t TextureReader::slot(TileIndex tile, int level) const {
-  return static_cast<std::size_t>(archive_.grid().flat_index(tile)) * static_cast<std::size_t>(info_.levels) +
-         static_cast<std::size_t>(level);
+std::uint64_t TextureReader::slot(TileIndex tile, int level) const {
+  return static_cast<std::uint64_t>(archive_.grid().flat_index(tile)) * static_cast<std::uint64_t>(info_.levels) +
+         static_cast<std::uint64_t>(level);
+}
+
+const MemberEntry* TextureReader::member(TileIndex tile, int level) const {
+  if (!archive_.grid().contains(tile) || level < 0 || level >= info_.levels) return nullptr;
+  const std::pair<std::uint64_t, std::uint64_t> wanted{slot(tile, level), 0};
+  const auto found = std::lower_bound(members_.begin(), members_.end(), wanted);
+  if (found == members_.end() || found->first != wanted.first) return nullptr;
+  return &archive_.members()[found->second];
 }
 
 bool TextureReader::has(TileIndex tile, int level) const {
-  return archive_.grid().contains(tile) && level >= 0 && level < info_.levels && members_[slot(tile, level)] >= 0;
+  return member(tile, level) != nullptr;
 }
 
 Picture TextureReader::read(TileIndex tile, int level) const {
-  if (!has(tile, level)) {
+  const MemberEntry* const found = member(tile, level);
+  if (found == nullptr) {
     throw Error(ErrorCode::kInvalidArgument, fmt::format("{}: tile ({},{}) has no texture of level {}", archive_.path(),
                                                          tile.column, tile.row, level));
   }
-  const MemberEntry& member = archive_.members()[static_cast<std::size_t>(members_[slot(tile, level)])];
+  const std::vector<std::byte> bytes = archive_.read_member(*found);
   const int size = info_.level_size(level);
-  const std::vector<std::byte> bytes = archive_.read_member(member);
   try {
     Picture picture = info_.format == TextureFormat::kPng ? decode_png(bytes, size) : decode_jpeg(bytes, size);
     if (picture.width != size || picture.height != size || picture.channels != info_.channels) {
@@ -60,7 +64,7 @@ Picture TextureReader::read(TileIndex tile, int level) const {
     }
     return picture;
   } catch (const Error& error) {
-    throw error.within(fmt::format("{}: member \"{}\" at byte {}", archive_.path(), member.name, member.offset_bytes));
+    throw error.within(fmt::format("{}: member \"{}\" at byte {}", archive_.path(), found->name, found->offset_bytes));
   }
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "isohf/archive/reader.h"
@@ -10,7 +11,7 @@
 namespace isohf {
 
 /// Reads an archive's textures, any level of any tile, from any number of threads at once.
-/// Memory: 8 bytes a tile and level. The archive must outlive it.
+/// Memory: 16 bytes a member. The archive must outlive it.
 class TextureReader {
  public:
   /// Finds the members. Throws Error{kInvalidArgument} where the archive has no textures; kCorrupt, kUnsupported.
@@ -29,11 +30,14 @@ class TextureReader {
   [[nodiscard]] Picture read_rgba(TileIndex tile, int level) const;
 
  private:
-  [[nodiscard]] std::size_t slot(TileIndex tile, int level) const;
+  [[nodiscard]] std::uint64_t slot(TileIndex tile, int level) const;
+  /// nullptr where there is none.
+  [[nodiscard]] const MemberEntry* member(TileIndex tile, int level) const;
 
   const ArchiveReader& archive_;
   TextureInfo info_;
-  std::vector<std::int64_t> members_;  ///< by flat tile index and level: place in archive.members(), -1 where none
+  /// Tile and level as one number, and the place in archive.members(), in ascending order.
+  std::vector<std::pair<std::uint64_t, std::uint64_t>> members_;
 };
 
 }  // namespace isohf
