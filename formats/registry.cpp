@@ -12,6 +12,7 @@
 #include <cstring>
 #include <span>
 
+#include "formats/ascii_grid_source.h"
 #include "formats/exr_source.h"
 #include "formats/hgt_source.h"
 #include "formats/oiio_source.h"
@@ -34,6 +35,7 @@ const std::vector<Reader>& readers() {
       {{"OpenEXR", {".exr"}}, looks_like_exr, open_exr},
       {{"TIFF", {".tif", ".tiff"}}, looks_like_tiff, open_tiff},
       {{"PNG", {".png"}}, looks_like_png, open_png},
+      {{"ESRI ASCII grid", {".asc"}}, looks_like_ascii_grid, open_ascii_grid},
       {{"SRTM HGT", {".hgt", ".hgt.zip"}}, nullptr, open_hgt},
   };
   return table;

@@ -1,0 +1,320 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fmt/core.h>
+#include <cmath>
+#include <random>
+
+#include "formats/ascii_grid_source.h"
+#include "formats/raster_reference.h"
+#include "formats/real_files.h"
+#include "isohf/base/error.h"
+
+namespace isohf::testing {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+constexpr const char* kHeader = "ncols 3\nnrows 2\nxllcorner 100\nyllcorner 200\ncellsize 10\nNODATA_value -9999\n";
+constexpr const char* kNumbers = "1 2 3\n4 5 -9999\n";
+
+class AsciiGrid : public ::testing::Test {
+ protected:
+  [[nodiscard]] std::unique_ptr<HeightSource> open(const std::string& text, const OpenOptions& options = {}) const {
+    return open_source(write(text), options);
+  }
+
+  [[nodiscard]] Error refusal(const std::string& text) const {
+    return error_of([&] { (void)open(text); });
+  }
+
+  [[nodiscard]] std::vector<double> values(HeightSource& source) const {
+    const auto raw = read_whole(source);
+    std::vector<double> all;
+    for (std::size_t i = 0; i < raw.size() / size_bytes(source.info().sample_type); ++i) {
+      all.push_back(value_at(source.info().sample_type, raw, i));
+    }
+    return all;
+  }
+
+  [[nodiscard]] std::vector<double> values(const std::string& text) const { return values(*open(text)); }
+
+  [[nodiscard]] std::string write(const std::string& text, const std::string& name = "grid.asc") const {
+    std::filesystem::remove(folder_ / name);
+    write_bytes(folder_ / name, text.data(), text.size());
+    return folder_ / name;
+  }
+
+  ScratchFolder folder_;
+};
+
+TEST_F(AsciiGrid, DeliversRealFilesAsTheReferenceDoes) {
+  const auto files = real_files({".asc"});
+  if (files.empty()) GTEST_SKIP() << "the real files are not there";
+  for (const auto& file : files) {
+    SCOPED_TRACE(file.string());
+    const auto source = open_source(file.string(), {});
+    expect_as_reference(*source, reference_of(file), false);
+    EXPECT_EQ(source->info().format, "ESRI ASCII grid");
+  }
+}
+
+TEST_F(AsciiGrid, ReadsWholeNumbersAsIntegers) {
+  const auto source = open(std::string(kHeader) + kNumbers);
+  const SourceInfo& info = source->info();
+  EXPECT_EQ(info.width, 3);
+  EXPECT_EQ(info.height, 2);
+  EXPECT_EQ(info.sample_type, SampleType::kInt32);
+  EXPECT_THAT(info.void_values, ElementsAre(-9999.0));
+  EXPECT_THAT(info.warnings, IsEmpty());
+  EXPECT_THAT(values(*source), ElementsAre(1, 2, 3, 4, 5, -9999));
+  const Georeference& place = info.georeference;
+  EXPECT_EQ(place.registration, Registration::kArea);
+  EXPECT_EQ(place.unit, HorizontalUnit::kUnknown);
+  EXPECT_TRUE(place.has_origin);
+  EXPECT_EQ(place.origin_x, 105.0);
+  EXPECT_EQ(place.origin_y, 215.0);
+}
+
+TEST_F(AsciiGrid, ChoosesTheSampleTypeThatHoldsEveryNumber) {
+  const auto type_of = [&](const std::string& number) {
+    const auto source = open("ncols 2\nnrows 1\n7 " + number + "\n");
+    EXPECT_THAT(values(*source), ElementsAre(7, std::stod(number))) << number;
+    return source->info().sample_type;
+  };
+  for (const char* number : {"2147483647", "-2147483648", "+5", "-0", "12.", "12.000", "0000000000012"}) {
+    EXPECT_EQ(type_of(number), SampleType::kInt32) << number;
+  }
+  for (const char* number :
+       {"2147483648", "-2147483649", "0.5", ".5", "-.5", "12.0001", "1e2", "1E+2", "-1.5e-3", "99999999999999999999"}) {
+    EXPECT_EQ(type_of(number), SampleType::kFloat64) << number;
+  }
+}
+
+TEST_F(AsciiGrid, TakesTheHeaderInAnyOrderAndCase) {
+  const auto source = open(
+      "nodata_VALUE -1.5\r\nCELLSIZE 2.5\r\nYLLCENTER -4\r\nXllCenter -3\r\nNROWS 2\r\nNCOLS 3\r\n1 2 3\r\n4 5 "
+      "6.5\r\n");
+  const SourceInfo& info = source->info();
+  EXPECT_EQ(info.georeference.origin_x, -3.0);
+  EXPECT_EQ(info.georeference.origin_y, -1.5);
+  EXPECT_EQ(info.georeference.spacing_x, 2.5);
+  EXPECT_EQ(info.georeference.registration, Registration::kArea);
+  EXPECT_THAT(info.void_values, ElementsAre(-1.5));
+  EXPECT_THAT(values(*source), ElementsAre(1, 2, 3, 4, 5, 6.5));
+}
+
+TEST_F(AsciiGrid, TakesTheVoidValueInAnySpelling) {
+  for (const char* name : {"NODATA_value", "nodata_value", "NODATA", "NoData_Value", "nodatavalue"}) {
+    const auto source = open(fmt::format("ncols 2\nnrows 1\n{} -9999.000\n1.5 -9999\n", name));
+    EXPECT_THAT(source->info().void_values, ElementsAre(-9999.0)) << name;
+  }
+  EXPECT_THAT(open("ncols 2\nnrows 1\nNODATA_value nan\n1.5 nan\n")->info().void_values, IsEmpty());
+  // No sample of this file can be void.
+  EXPECT_THAT(open("ncols 2\nnrows 1\nNODATA_value -0.5\n1 2\n")->info().void_values, IsEmpty());
+  // Its digits vary: everything as low is void.
+  const auto low = open("ncols 2\nnrows 1\nNODATA_value -3.4028234663852886e+38\n-3.40282e+38 2\n");
+  EXPECT_EQ(low->info().valid_min, -1e38);
+  EXPECT_EQ(low->info().valid_max, std::numeric_limits<double>::infinity());
+}
+
+TEST_F(AsciiGrid, TellsTheSpacingsOfBothAxes) {
+  const auto source = open("ncols 3\nnrows 2\nxllcorner 0\nyllcorner 0\ndx 10\ndy 20\n1 2 3 4 5 6\n");
+  EXPECT_EQ(source->info().georeference.spacing_x, 10.0);
+  EXPECT_EQ(source->info().georeference.spacing_y, 20.0);
+  EXPECT_EQ(source->info().georeference.origin_x, 5.0);
+  EXPECT_EQ(source->info().georeference.origin_y, 30.0);
+}
+
+TEST_F(AsciiGrid, BreaksLinesAnywhere) {
+  const std::vector<double> wanted = {1, 2, 3, 4, 5, -9999};
+  for (const char* numbers : {"1\n2\n3\n4\n5\n-9999\n", "1 2 3 4 5 -9999\n", " 1\t2 \n\n 3 4\r\n5\r-9999   \n\n"}) {
+    EXPECT_EQ(values(std::string(kHeader) + numbers), wanted) << numbers;
+  }
+  EXPECT_EQ(values("ncols 3 nrows 2 1 2 3 4 5 -9999\n"), wanted);
+  EXPECT_EQ(values("\xEF\xBB\xBF" + std::string(kHeader) + kNumbers), wanted);
+}
+
+TEST_F(AsciiGrid, ReadsDecimalCommasAndSaysSo) {
+  const auto source = open("ncols 3\nnrows 1\nxllcorner 1,5\nyllcorner 0\ncellsize 0,5\n1,25 -2,5 7\n");
+  EXPECT_EQ(source->info().georeference.origin_x, 1.75);
+  EXPECT_THAT(values(*source), ElementsAre(1.25, -2.5, 7));
+  ASSERT_EQ(source->info().warnings.size(), 1U);
+  EXPECT_THAT(source->info().warnings[0], HasSubstr("decimal commas"));
+  EXPECT_THAT(refusal("ncols 3\nnrows 1\n1,5 2.5 3\n").what(), HasSubstr("line 3: \"2.5\" has a decimal point"));
+  EXPECT_THAT(refusal("ncols 3\nnrows 1\n1,2,3\n").what(), HasSubstr("not commas"));
+  EXPECT_THAT(refusal("ncols 3\nnrows 1\n1, 2, 3\n").what(), HasSubstr("not commas"));
+  EXPECT_THAT(refusal("ncols 2\nnrows 1\n1.234,5 2\n").what(), HasSubstr("is not a number"));
+}
+
+TEST_F(AsciiGrid, ReadsWhatIsNoNumberAsVoid) {
+  const auto found = values("ncols 8\nnrows 1\nnan NaN -nan NAN inf -Inf 1.#QNAN -1.#IND\n");
+  ASSERT_EQ(found.size(), 8U);
+  for (const double value : found) EXPECT_FALSE(std::isfinite(value));
+}
+
+TEST_F(AsciiGrid, WarnsOfAVoidValueThatTheHeaderDoesNotName) {
+  const auto warnings = [&](const std::string& text, const OpenOptions& options = {}) {
+    return open(text, options)->info().warnings;
+  };
+  EXPECT_THAT(warnings("ncols 2\nnrows 1\n1 -9999\n"), ElementsAre(HasSubstr("--nodata -9999")));
+  EXPECT_THAT(warnings("ncols 2\nnrows 1\n-9.999e+03 1\n"), ElementsAre(HasSubstr("--nodata -9999")));
+  EXPECT_THAT(warnings("ncols 2\nnrows 1\n-32768.0 1\n"), ElementsAre(HasSubstr("--nodata -32768")));
+  EXPECT_THAT(warnings("ncols 2\nnrows 1\n-999 1\n"), IsEmpty());
+  OpenOptions options;
+  options.void_value = -9999.0;
+  EXPECT_THAT(warnings("ncols 2\nnrows 1\n-9999 1\n", options), IsEmpty());
+}
+
+TEST_F(AsciiGrid, CarriesThePrjBesideIt) {
+  (void)write(R"(PROJCS["UTM_11N",GEOGCS["WGS",DATUM["D",SPHEROID["WGS_1984",6378137.0,298.257223563]],)"
+              R"(PRIMEM["Greenwich",0.0],UNIT["Degree",0.0174532925199433]],PROJECTION["Transverse_Mercator"],)"
+              R"(UNIT["Foot_US",0.304800609601219]])",
+              "grid.prj");
+  const auto source = open(std::string(kHeader) + kNumbers);
+  const Georeference& place = source->info().georeference;
+  EXPECT_EQ(place.unit, HorizontalUnit::kMetre);
+  EXPECT_EQ(place.metres_per_unit, 0.304800609601219);
+  EXPECT_EQ(place.system.name, "UTM_11N");
+  EXPECT_EQ(place.system.body, "Earth");
+  EXPECT_EQ(place.system.semi_major_axis_m, 6378137.0);
+  EXPECT_THAT(place.system.wkt, HasSubstr("Transverse_Mercator"));
+  (void)write(R"(GEOGCS["GCS_Mars_2000",DATUM["D_Mars",SPHEROID["Mars",3396190.0,169.89]],PRIMEM["Ref",0],)"
+              R"(UNIT["Degree",0.0174532925199433],AUTHORITY["EPSG","104905"]])",
+              "grid.prj");
+  const auto mars = open(std::string(kHeader) + kNumbers);
+  EXPECT_EQ(mars->info().georeference.unit, HorizontalUnit::kDegree);
+  EXPECT_EQ(mars->info().georeference.system.body, "Mars");
+  EXPECT_EQ(mars->info().georeference.system.epsg, 104905);
+  for (const char* text :
+       {"Projection UTM\nZone 11\n", "PROJCS[", "PROJCS[\"a\"", "[]", "PROJCS[\"a\",,]", "A[B[C]]"}) {
+    (void)write(text, "grid.prj");
+    const auto other = open(std::string(kHeader) + kNumbers);
+    EXPECT_THAT(other->info().warnings, ElementsAre(HasSubstr(".prj"))) << text;
+    EXPECT_EQ(other->info().georeference.system.wkt, "");
+  }
+}
+
+TEST_F(AsciiGrid, RefusesAGrassHeader) {
+  for (const char* first : {"north: 4\nsouth: 0\n", "rows: 2\ncols: 3\n", "  NORTH:   4N\n"}) {
+    const Error error = refusal(std::string(first) + "1 2 3 4 5 6\n");
+    EXPECT_EQ(error.code(), ErrorCode::kUnsupported);
+    EXPECT_THAT(error.what(), HasSubstr("GRASS"));
+  }
+}
+
+TEST_F(AsciiGrid, NamesTheLineThatIsWrong) {
+  const std::string header = kHeader;
+  const std::string path = folder_ / "grid.asc";
+  const auto what = [&](const std::string& text) { return std::string(refusal(text).what()); };
+  EXPECT_EQ(what(header + "1 2 3\n4 x5 6\n"), path + ": line 8: \"x5\" is not a number");
+  EXPECT_EQ(what(header + "1 2 3\n4 5\n"), path + ": line 9: the file ends after 5 of 3 x 2 numbers");
+  EXPECT_EQ(what(header + "1 2 3\n4 5 6\n7"),
+            path + ": line 9: \"7\" comes after the 3 x 2 numbers that the header says");
+  EXPECT_EQ(what(header + "ncols 4\n" + kNumbers),
+            path + ": line 7: ncols is \"4\", on line 1 it was \"3\"; it must be given once");
+  EXPECT_EQ(what("ncols 3\n1 2 3\n"), path + ": the header does not say nrows, which it must");
+  EXPECT_EQ(what("ncols 0\nnrows 2\n1 2 3\n"), path + ": line 1: ncols is \"0\", must be a whole number from 1 on");
+  EXPECT_EQ(what(header + "zunits m\n" + kNumbers),
+            path + ": line 7: \"zunits m\" is no line of an ESRI grid header that isohf knows");
+  EXPECT_THAT(what("ncols 4000000000\nnrows 4000000000\n1 2 3\n"), HasSubstr("the header says 4000000000 x"));
+  EXPECT_THAT(what("ncols 3\nnrows 2\ncellsize 0\n1 2 3 4 5 6\n"), HasSubstr("must be a positive number"));
+  EXPECT_THAT(what("ncols 3\nnrows 2\nxllcorner 0\nxllcenter 1\nyllcorner 0\ncellsize 1\n1 2 3 4 5 6\n"),
+              HasSubstr("one of two words that place the x axis"));
+  EXPECT_THAT(what(header + std::string("1 2 3\n4 \0 6\n", 12)), HasSubstr("line 8: \"?\" is not a number"));
+  EXPECT_THAT(what(header + "1e400 2 3 4 5 6\n"), HasSubstr("\"1e400\" is not a number"));
+  EXPECT_THAT(what(header + std::string(5000, '1') + " 2 3 4 5 6\n"), HasSubstr("is no"));
+  EXPECT_THAT(what(header + std::string(600000, '1')), HasSubstr("bytes without a blank"));
+  OpenOptions options;
+  options.channel = "R";
+  EXPECT_EQ(error_of([&] { (void)open(header + kNumbers, options); }).code(), ErrorCode::kInvalidArgument);
+}
+
+TEST_F(AsciiGrid, DeliversEveryWindowInAnyOrder) {
+  for (const bool fractions : {false, true}) {
+    std::string text = "ncols 7\nnrows 5\n";
+    for (int i = 0; i < 35; ++i) text += fmt::format("{}{}{}", i, fractions ? ".5" : "", i % 3 == 0 ? "\n" : " ");
+    const auto source = open(text + "\n");
+    const std::size_t size = size_bytes(source->info().sample_type);
+    const auto all = read_whole(*source);
+    for (std::int64_t row = 4; row >= 0; --row) {
+      for (std::int64_t column = 0; column < 7; ++column) {
+        for (std::int64_t rows = 1; rows <= 5 - row; ++rows) {
+          for (std::int64_t columns = 1; columns <= 7 - column; ++columns) {
+            const auto part = testing::read_window(*source, {column, row, columns, rows});
+            for (std::int64_t i = 0; i < columns * rows; ++i) {
+              const auto at = static_cast<std::size_t>((row + i / columns) * 7 + column + i % columns);
+              ASSERT_EQ(0, std::memcmp(part.data() + static_cast<std::size_t>(i) * size, all.data() + at * size, size));
+            }
+          }
+        }
+      }
+    }
+  }
+}
+
+/// More rows than places are kept of, and many more bytes than are buffered.
+TEST_F(AsciiGrid, FindsRowsOfALongFile) {
+  constexpr int kRows = 300001;
+  std::string text = fmt::format("ncols 2\nnrows {}\n", kRows);
+  for (int row = 0; row < kRows; ++row) text += fmt::format("{} {}\n", row, -row);
+  const auto source = open(text);
+  std::mt19937 random(1);
+  for (int i = 0; i < 200; ++i) {
+    const auto row = static_cast<std::int64_t>(random() % kRows);
+    const auto pair = testing::read_window(*source, {0, row, 2, 1});
+    ASSERT_EQ(value_at(SampleType::kInt32, pair, 0), static_cast<double>(row));
+    ASSERT_EQ(value_at(SampleType::kInt32, pair, 1), static_cast<double>(-row));
+  }
+}
+
+TEST_F(AsciiGrid, ReportsEveryTruncation) {
+  const std::string text = std::string(kHeader) + kNumbers;
+  for (std::size_t length = 1; length < text.size(); ++length) {
+    SCOPED_TRACE(length);
+    try {
+      const auto source = open_ascii_grid(write(text.substr(0, length)), {});
+      // Every number has at least its first digit; that the last one may be cut off is said.
+      EXPECT_GT(length, text.size() - 6);
+      EXPECT_THAT(source->info().warnings, ElementsAre(HasSubstr("cut off")));
+    } catch (const Error& error) {
+      EXPECT_LT(length, text.size() - 1);  // the last line break alone may be missing
+      EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos);
+    }
+  }
+}
+
+TEST_F(AsciiGrid, SurvivesDamage) {
+  const std::string text = std::string(kHeader) + kNumbers;
+  std::mt19937 random(20260101);
+  int opened = 0;
+  for (int round = 0; round < 4000; ++round) {
+    std::string damaged = text;
+    for (unsigned i = 0; i <= random() % 3; ++i) {
+      const std::size_t at = random() % damaged.size();
+      switch (random() % 3) {
+        case 0:
+          damaged[at] = static_cast<char>(random() % 256);
+          break;
+        case 1:
+          damaged.erase(at, 1 + random() % 4);
+          break;
+        default:
+          damaged.insert(at, 1, "0123456789-+.,eE \nnx:"[random() % 21]);
+      }
+    }
+    try {
+      const auto source = open_ascii_grid(write(damaged), {});
+      EXPECT_EQ(values(*source).size(), static_cast<std::size_t>(source->info().width * source->info().height));
+      ++opened;
+    } catch (const Error& error) {
+      EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos) << error.what();
+    }
+  }
+  EXPECT_GT(opened, 100);  // many a changed digit is another valid file
+}
+
+}  // namespace
+}  // namespace isohf::testing
