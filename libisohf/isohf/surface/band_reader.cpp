@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <mutex>
 
 namespace isohf {
 
@@ -15,16 +16,63 @@ std::int64_t rows_per_read(const SourceInfo& info) {
   return std::min(info.height, blocks * block_rows);
 }
 
+namespace {
+
+/// Bands differ by a row or two: room is made for these, and nothing is copied into new memory.
+template <typename T>
+void resize(std::vector<T>& values, std::size_t samples, std::size_t columns) {
+  constexpr std::size_t kSpareRows = 4;
+  if (values.capacity() < samples) {
+    values = {};
+    values.reserve(samples + kSpareRows * columns);
+  }
+  values.resize(samples);
+}
+
+}  // namespace
+
+/// Takes bands back on whatever thread drops them last.
+class BandReader::Pool {
+ public:
+  [[nodiscard]] std::unique_ptr<Band> take() {
+    const std::lock_guard lock(mutex_);
+    if (bands_.empty()) return std::make_unique<Band>();
+    std::unique_ptr<Band> band = std::move(bands_.back());
+    bands_.pop_back();
+    return band;
+  }
+  void give_back(std::unique_ptr<Band> band) {
+    const std::lock_guard lock(mutex_);
+    bands_.push_back(std::move(band));
+  }
+
+ private:
+  std::mutex mutex_;
+  std::vector<std::unique_ptr<Band>> bands_;
+};
+
+BandReader::BandReader(HeightSource& source, double datum, const Prefilter& prefilter)
+    : source_(source), datum_(datum), prefilter_(prefilter), pool_(std::make_shared<Pool>()) {}
+
+std::shared_ptr<Band> BandReader::make_band(const RowRange& rows, bool with_voids) const {
+  std::shared_ptr<Band> band(pool_->take().release(),
+                             [pool = pool_](Band* dropped) { pool->give_back(std::unique_ptr<Band>(dropped)); });
+  band->columns = source_.info().width;
+  band->rows = rows;
+  const auto columns = static_cast<std::size_t>(band->columns);
+  const std::size_t samples = columns * static_cast<std::size_t>(rows.last - rows.first + 1);
+  resize(band->heights, samples, columns);
+  resize(band->voids, with_voids ? samples : 0, columns);
+  return band;
+}
+
 std::shared_ptr<const Band> BandReader::read(const RowRange& rows) {
   if (prefilter_.is_identity()) return read_heights(rows);
   const std::int64_t halo = prefilter_.halo();
   const auto heights = read_heights(
       {std::max<std::int64_t>(rows.first - halo, 0), std::min(rows.last + halo, source_.info().height - 1)});
-  auto band = std::make_shared<Band>();
-  band->columns = heights->columns;
-  band->rows = rows;
+  const auto band = make_band(rows, false);
   const std::int64_t count = rows.last - rows.first + 1;
-  band->heights.resize(static_cast<std::size_t>(band->columns) * static_cast<std::size_t>(count));
   const auto voids = heights->voids.begin() + (rows.first - heights->rows.first) * band->columns;
   if (std::find(voids, voids + count * band->columns, 1) != voids + count * band->columns) {
     band->voids.assign(voids, voids + count * band->columns);
@@ -35,12 +83,8 @@ std::shared_ptr<const Band> BandReader::read(const RowRange& rows) {
 }
 
 std::shared_ptr<const Band> BandReader::read_heights(const RowRange& rows) {
-  auto band = std::make_shared<Band>();
-  band->columns = source_.info().width;
-  band->rows = rows;
+  const auto band = make_band(rows, !prefilter_.is_identity());
   const auto columns = static_cast<std::size_t>(band->columns);
-  band->heights.resize(columns * static_cast<std::size_t>(rows.last - rows.first + 1));
-  if (!prefilter_.is_identity()) band->voids.resize(band->heights.size());
   std::int64_t next = rows.first;
   if (last_ && last_->rows.first <= rows.first && last_->rows.last >= rows.first) {
     const std::int64_t kept = std::min(last_->rows.last, rows.last) - rows.first + 1;

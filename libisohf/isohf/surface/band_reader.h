@@ -31,14 +31,17 @@ struct Band {
 class BandReader {
  public:
   /// `datum` as in heights_from_samples. Both references outlive the reader.
-  BandReader(HeightSource& source, double datum, const Prefilter& prefilter)
-      : source_(source), datum_(datum), prefilter_(prefilter) {}
+  BandReader(HeightSource& source, double datum, const Prefilter& prefilter);
 
   /// The band that holds exactly `rows`: coefficients, or heights where the prefilter is the identity. Rows that the
   /// last band held are not read again. Works on the calling thread's task arena.
   [[nodiscard]] std::shared_ptr<const Band> read(const RowRange& rows);
 
  private:
+  /// Memory of bands that nobody reads any more, for the next ones: fresh memory would be cleared page by page.
+  class Pool;
+
+  [[nodiscard]] std::shared_ptr<Band> make_band(const RowRange& rows, bool with_voids) const;
   /// Heights, prefiltered along rows but not yet along columns; with voids, unless the prefilter is the identity.
   [[nodiscard]] std::shared_ptr<const Band> read_heights(const RowRange& rows);
   void read_rows(std::int64_t first, std::int64_t count, float* heights, char* voids);
@@ -46,6 +49,7 @@ class BandReader {
   HeightSource& source_;
   double datum_;
   const Prefilter& prefilter_;
+  std::shared_ptr<Pool> pool_;
   std::vector<std::byte> raw_;
   std::shared_ptr<const Band> last_;
 };
