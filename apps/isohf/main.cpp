@@ -1,5 +1,7 @@
 /// isohf: elevation rasters to isometric heightfield archives. The command table; errors to exit codes.
 
+#include <malloc.h>
+
 #include <csignal>
 #include <cstdlib>
 #include <exception>
@@ -128,6 +130,17 @@ int exit_code_for(ErrorCode code) {
   return kExitFailed;
 }
 
+/// Keeps freed memory in the process. Tiles come and go by the thousand, a few hundred kilobytes each; the system would
+/// clear every page of each anew, a quarter of the time that large inputs take.
+void keep_freed_memory() {
+#if defined(__GLIBC__)
+  constexpr int kMappedFrom = 4 << 20;
+  constexpr int kKept = 256 << 20;
+  ::mallopt(M_MMAP_THRESHOLD, kMappedFrom);
+  ::mallopt(M_TRIM_THRESHOLD, kKept);
+#endif
+}
+
 }  // namespace
 }  // namespace isohf::cli
 
@@ -136,6 +149,7 @@ int main(int argc, char** argv) {
   // A closed pipe or a file over its size limit is an error that write() reports, not a reason to die.
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGXFSZ, SIG_IGN);
+  keep_freed_memory();
   if (const char* folder = std::getenv("ISOHF_MODULE_PATH"); folder != nullptr) isohf::set_module_folder(folder);
   try {
     return run(Arguments(argv + (argc > 0 ? 1 : 0), argv + argc));
