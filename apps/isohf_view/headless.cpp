@@ -33,6 +33,12 @@ int take_screenshot(const TileSource& source, const Options& options) {
   Session session(source, options);
   const Offscreen target(options.view.width, options.view.height, GL_RGBA8);
   session.complete_frame();
+  if (session.is_cut()) {
+    std::fprintf(stderr,
+                 "isohf-view: note: --memory %llu MiB hold the tiles within %.0f world units of the eye; what lies "
+                 "beyond is left out\n",
+                 static_cast<unsigned long long>(options.memory_mib), session.box().figures().radius);
+  }
   write_png(options.screenshot, target.width(), target.height(), target.read_rgba8());
   return 0;
 }

@@ -115,7 +115,7 @@ Session::Session(const TileSource& source, const Options& options)
   } else if (view.mode == ColourMode::kTexture) {
     throw Error(ErrorCode::kInvalidArgument, "--mode texture: this archive has no textures; convert with --texture");
   }
-  camera = overview_camera(source, view);
+  camera = first_camera();
   const auto exaggerated = [this](Vec3 at) { return Vec3{at.x, at.y * view.exaggeration, at.z}; };
   if (options.position || options.look_at) {
     camera.look_at(options.position ? exaggerated(*options.position) : camera.eye,
@@ -124,13 +124,29 @@ Session::Session(const TileSource& source, const Options& options)
   if (options.fly) camera.kind = Camera::Kind::kFly;
 }
 
+Camera Session::first_camera() const {
+  Camera all = overview_camera(source_, view);
+  // Where memory does not hold what that sees, stand nearer, over the middle.
+  const double needed = farthest_corner(source_.grid(), whole_, all.eye, view.exaggeration);
+  const double reach = box_.fitting_radius(needed);
+  if (reach < needed) {
+    const Vec3 way = normalised(all.eye - all.pivot);
+    const WorldBounds covered = source_.covered();
+    const Vec3 middle{0.5 * (covered.x0 + covered.x1), 0.5 * (whole_.low + whole_.high) * view.exaggeration,
+                      0.5 * (covered.z0 + covered.z1)};
+    all.look_at(middle + 0.3 * reach * way, middle);
+  }
+  return all;
+}
+
 void Session::prepare() {
   view.eye = camera.eye;
   view.forward = camera.forward();
   view.sun = sun_direction(sun_azimuth_deg, sun_elevation_deg);
   // Haze begins at a little more than half the far distance: by default all of the heightfield lies before it.
-  view.far_distance =
-      far_distance_ ? *far_distance_ : 1.8 * farthest_corner(source_.grid(), whole_, camera.eye, view.exaggeration);
+  const double farthest = farthest_corner(source_.grid(), whole_, camera.eye, view.exaggeration);
+  view.far_distance = far_distance_ ? *far_distance_ : 1.8 * farthest;
+  reach_wanted_ = std::min(view.far_distance, farthest);
   shadow_sun_ = shadow_sun(source_.shadow_seeds(), sun_azimuth_deg, sun_elevation_deg, view.exaggeration);
   const bool casts = shadow_sun_.state == ShadowSun::State::kExact || shadow_sun_.state == ShadowSun::State::kNearest;
   view.shadow_softness.reset();
@@ -141,7 +157,7 @@ void Session::prepare() {
 void Session::draw() {
   // Where memory has shortened the reach, haze hides its end.
   const double reach = box_.figures().radius;
-  cut_ = reach < view.far_distance;
+  cut_ = reach < reach_wanted_;
   if (cut_) view.far_distance = reach;
   const TileRange& range = box_.range();
   figures_ = renderer_.draw(view, range.first_column, range.last_column, range.first_row, range.last_row,
@@ -150,7 +166,7 @@ void Session::draw() {
 
 void Session::frame() {
   prepare();
-  box_.update({view.eye.x, view.eye.z}, view.far_distance);
+  box_.update({view.eye.x, view.eye.z}, reach_wanted_);
   if (shows_textures()) {
     const std::uint64_t gone = box_.figures().upload_bytes;
     textures_->update(box_.range(), view, upload_bytes_ > gone ? upload_bytes_ - gone : 0);
@@ -160,7 +176,7 @@ void Session::frame() {
 
 void Session::complete_frame() {
   prepare();
-  box_.finish({view.eye.x, view.eye.z}, view.far_distance);
+  box_.finish({view.eye.x, view.eye.z}, reach_wanted_);
   if (box_.error()) throw Error(ErrorCode::kCorrupt, *box_.error());
   if (shows_textures()) {
     textures_->finish(box_.range(), view);

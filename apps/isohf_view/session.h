@@ -35,6 +35,8 @@ class Session {
   double sun_elevation_deg;
   bool shadows;  ///< wanted; drawn where the source has seeds
 
+  /// True where memory ended the last frame before the far distance.
+  [[nodiscard]] bool is_cut() const { return cut_; }
   [[nodiscard]] const FrameFigures& figures() const { return figures_; }
   [[nodiscard]] const TileBox& box() const { return box_; }
   /// nullptr where the source has no textures.
@@ -46,6 +48,7 @@ class Session {
  private:
   void prepare();
   void draw();
+  [[nodiscard]] Camera first_camera() const;
   [[nodiscard]] bool shows_textures() const { return textures_ && view.mode == ColourMode::kTexture; }
   [[nodiscard]] std::string shadow_line() const;
 
@@ -61,7 +64,8 @@ class Session {
   Overlay overlay_;
   std::optional<double> far_distance_;
   FrameFigures figures_;
-  bool cut_ = false;  ///< memory shortens the far distance
+  double reach_wanted_ = 0.0;  ///< the far distance, or to the farthest corner where that is nearer
+  bool cut_ = false;           ///< memory shortens the far distance
 };
 
 /// "12 345 678"

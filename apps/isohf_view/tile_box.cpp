@@ -56,22 +56,28 @@ std::size_t TileBox::cell_of(TileIndex tile) const {
   return static_cast<std::size_t>(wrap(tile.column, box_columns_) + wrap(tile.row, box_rows_) * box_columns_);
 }
 
-void TileBox::resize(WorldPoint centre, double radius) {
+std::pair<std::int64_t, std::int64_t> TileBox::tiles_across(double radius) const {
   const TileGrid& grid = source_.grid();
-  const auto count_for = [](double r, double extent, std::int64_t all) {
-    const double needed = std::floor(2.0 * r / extent) + 2.0;
+  const auto count_for = [radius](double extent, std::int64_t all) {
+    const double needed = std::floor(2.0 * radius / extent) + 2.0;
     return needed >= static_cast<double>(all) ? all : static_cast<std::int64_t>(needed);
   };
-  // A box that memory does not hold shrinks to one that it does; figures say so.
-  double kept = radius;
-  std::int64_t columns = 0;
-  std::int64_t rows = 0;
-  for (;;) {
-    columns = count_for(kept, grid.extent_x(), grid.tile_columns());
-    rows = count_for(kept, grid.extent_z(), grid.tile_rows());
-    if (columns * rows <= max_slots_ || kept < 1e-6 * grid.extent_x()) break;
-    kept *= 0.98;
+  return {count_for(grid.extent_x(), grid.tile_columns()), count_for(grid.extent_z(), grid.tile_rows())};
+}
+
+double TileBox::fitting_radius(double radius) const {
+  const double least = 1e-6 * source_.grid().extent_x();
+  for (;; radius *= 0.98) {
+    const auto [columns, rows] = tiles_across(radius);
+    if (columns * rows <= max_slots_ || radius < least) return radius;
   }
+}
+
+void TileBox::resize(WorldPoint centre, double radius) {
+  const TileGrid& grid = source_.grid();
+  // A box that memory does not hold shrinks to one that it does; figures say so.
+  const double kept = fitting_radius(radius);
+  auto [columns, rows] = tiles_across(kept);
   columns = std::min(columns, max_slots_);
   rows = std::min(rows, std::max<std::int64_t>(1, max_slots_ / columns));
   figures_.radius = kept;

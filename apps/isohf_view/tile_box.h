@@ -4,6 +4,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tile_buffers.h"
@@ -66,6 +67,9 @@ class TileBox {
   /// Updates until the box is complete: for pictures, not for frames.
   void finish(WorldPoint centre, double radius);
 
+  /// `radius`, or the most that memory holds the tiles of.
+  [[nodiscard]] double fitting_radius(double radius) const;
+
   [[nodiscard]] const TileSlot* resident(TileIndex tile) const;
   [[nodiscard]] const TileRange& range() const { return range_; }
   [[nodiscard]] const TileBoxFigures& figures() const { return figures_; }
@@ -85,6 +89,7 @@ class TileBox {
   };
 
   [[nodiscard]] std::size_t cell_of(TileIndex tile) const;
+  [[nodiscard]] std::pair<std::int64_t, std::int64_t> tiles_across(double radius) const;
   void resize(WorldPoint centre, double radius);
   void enter(Cell& cell, TileIndex tile);
   void place(LoadedTile& loaded);
