@@ -17,11 +17,15 @@ namespace {
 constexpr std::uint64_t kOnTheWay = 3;
 /// Levels of this size and below are loaded first.
 constexpr int kCoarseSize = 32;
-/// Of the extension GL_EXT_texture_filter_anisotropic, and of GL 4.6.
 constexpr float kMostAnisotropy = 8.0F;
 
+/// A software rasteriser would spend nearly all its time on it.
 float best_anisotropy() {
-  if (!epoxy_has_gl_extension("GL_EXT_texture_filter_anisotropic")) return 1.0F;
+  const std::string renderer = reinterpret_cast<const char*>(glGetString(GL_RENDERER));
+  const bool is_software = renderer.find("llvmpipe") != std::string::npos ||
+                           renderer.find("softpipe") != std::string::npos ||
+                           renderer.find("swrast") != std::string::npos;
+  if (is_software || !epoxy_has_gl_extension("GL_EXT_texture_filter_anisotropic")) return 1.0F;
   GLfloat most = 1.0F;
   glGetFloatv(GL_MAX_TEXTURE_MAX_ANISOTROPY_EXT, &most);
   return std::min(most, kMostAnisotropy);
