@@ -43,6 +43,7 @@ Memory is bounded whatever the archive's and the picture's size: a few dozen til
 Examples:
   isohf shade dem.isohf -o dem.png --hillshade
   isohf shade dem.isohf -o evening.png --hillshade --sun-elevation 5 --azimuth W --size 4096x2300
+  isohf shade dem.isohf -o map.png --hillshade --texture
   isohf shade dem.isohf -o shadows.tif --palette gray --sun-elevation 8)";
 
 struct ShadeOptions {
@@ -90,6 +91,7 @@ std::optional<ShadeOptions> parse(const Arguments& arguments) {
               [&](const std::string& text) { options.size = parse_size(text, 1, kMaxPixels); });
   line.option("--exaggeration", "F", "Draw heights F times as high (default 1)",
               [&](const std::string& text) { request.exaggeration = parse_positive_number(text); });
+  line.flag("--texture", "Show the archive's textures; where there is none, the palette's colours", request.texture);
   line.option("--palette", "NAME", "Colours of the ground: elevation or gray (default elevation)",
               [&](const std::string& text) {
                 request.palette = static_cast<PaletteName>(parse_word(text, {"elevation", "gray"}));

@@ -12,6 +12,7 @@
 #include "isohf/base/error.h"
 #include "isohf/lattice/barycentric.h"
 #include "isohf/surface/normals.h"
+#include "shade_texture.h"
 
 namespace isohf::cli {
 namespace {
@@ -41,6 +42,7 @@ class Places {
 
   [[nodiscard]] std::int64_t per_pixel() const { return per_pixel_; }
   [[nodiscard]] std::int64_t count() const { return count_; }
+  [[nodiscard]] double step() const { return step_; }
   [[nodiscard]] double world(std::int64_t place) const { return start_ + (static_cast<double>(place) + 0.5) * step_; }
   /// The first place at or behind a world coordinate; count() where there is none.
   [[nodiscard]] std::int64_t first_from(double world) const {
@@ -86,6 +88,7 @@ class ShadeRenderer {
         illumination_(request.travel, request.sun_elevation_deg, request.hillshade),
         x_(archive.metadata().valid.x0, archive.metadata().valid.x1, request.width, 2.0 * grid_.sigma_x()),
         z_(archive.metadata().valid.z0, archive.metadata().valid.z1, request.height, grid_.sigma_z()) {
+    if (request.texture) textures_.emplace(archive, x_.step(), z_.step());
     datum_ = low(archive);
     world_per_elevation_ = request.exaggeration / request.elevation_units_per_world_unit;
     fall_ = std::tan(request.sun_elevation_deg * std::numbers::pi / 180.0);
@@ -203,6 +206,7 @@ class ShadeRenderer {
       normals.resize(tile.heights.size());
       tile_normals(grid_, view(tile), {normals.data(), shape.columns(), shape.rows()});
     }
+    const ShadeTexture::Tile texture = textures_ ? textures_->read(tile.index) : ShadeTexture::Tile();
     tile.first_pixel_x = columns.first / x_.per_pixel();
     tile.first_pixel_y = rows.first / z_.per_pixel();
     tile.pixels_x = (columns.last - 1) / x_.per_pixel() + 1 - tile.first_pixel_x;
@@ -215,13 +219,15 @@ class ShadeRenderer {
       Pixel* const row = tile.pixels.data() + (j / z_.per_pixel() - tile.first_pixel_y) * tile.pixels_x;
       for (std::int64_t i = columns.first; i < columns.last; ++i) {
         const double x = (x_.world(i) - static_cast<double>(tile.index.column) * grid_.extent_x()) * x_scale;
-        add_place(tile, shadow, normals, barycentric(shape, {x, z}), row[i / x_.per_pixel() - tile.first_pixel_x]);
+        const ShadeTexture::Colour colour = texture.at(x / (2.0 * shape.cell_columns()), z / shape.cell_rows());
+        add_place(tile, shadow, normals, barycentric(shape, {x, z}), colour,
+                  row[i / x_.per_pixel() - tile.first_pixel_x]);
       }
     }
   }
 
   void add_place(const TileDrawing& tile, const std::vector<float>& shadow, const std::vector<Normal>& normals,
-                 const Barycentric& at, Pixel& pixel) const {
+                 const Barycentric& at, const ShadeTexture::Colour& photo, Pixel& pixel) const {
     double height = 0.0;
     double dark_to = 0.0;
     Normal normal{0.0F, 0.0F, 0.0F};
@@ -248,7 +254,9 @@ class ShadeRenderer {
     const double share = request_.shadows ? sun_share_on_surface(height, dark_to, softness) : 1.0;
     const Light light = illumination_.on(normal, share);
     const Light& ground = palette_.at(height / world_per_elevation_ + datum_);
-    for (std::size_t k = 0; k < 3; ++k) pixel.light[k] += ground[k] * light[k];
+    for (std::size_t k = 0; k < 3; ++k) {
+      pixel.light[k] += (ground[k] + (photo.light[k] - ground[k]) * photo.alpha) * light[k];
+    }
     pixel.places += 1.0F;
   }
 
@@ -303,6 +311,7 @@ class ShadeRenderer {
   double fall_ = 1.0;
   double seed_sun_deg_ = 0.0;
   std::optional<ShadowSeedReader> seeds_;
+  std::optional<ShadeTexture> textures_;
   std::vector<Pixel> rows_;  ///< rows of the picture that are not handed over yet
   std::int64_t first_row_ = 0;
 };

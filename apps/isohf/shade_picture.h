@@ -22,6 +22,7 @@ struct ShadeRequest {
   double exaggeration = 1.0;  ///< of heights, > 0
   double softness = 2.0;      ///< the sun's apparent size, elevation units, > 0 (Eq. 16)
   PaletteName palette = PaletteName::kElevation;
+  bool texture = false;  ///< the archive's textures where it has them, over the palette's colours
   double elevation_units_per_world_unit = 1.0;
 };
 

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "formats/registry.h"
 #include "support/memory_photo.h"
 #include "support/plain_tiff.h"
 #include "support/run_program.h"
@@ -94,6 +95,39 @@ TEST_F(TextureOption, RefusesWhatItCannotUse) {
   const std::string whole = read_file(folder / "photo.ppm");
   write_file(folder / "cut.ppm", whole.substr(0, whole.size() / 2));
   refused({"--texture", folder / "cut.ppm"}, 1, "cut.ppm");
+}
+
+TEST_F(TextureOption, ShadeShowsThePhoto) {
+  // Red West of column 200, blue East of it.
+  std::string bytes = "P6\n400 240\n255\n";
+  for (int i = 0; i < 400 * 240; ++i) bytes += i % 400 < 200 ? std::string("\xC8\0\0", 3) : std::string("\0\0\xC8", 3);
+  write_file(folder / "halves.ppm", bytes);
+  ASSERT_EQ(convert({"--texture", folder / "halves.ppm", "--texture-format", "png"}).exit_code, 0);
+  for (const char* size : {"400x240", "90x54"}) {
+    const RunResult result = run_isohf({"shade", folder / "a.isohf", "-o", folder / "s.tif", "--texture", "--no-shadow",
+                                        "--size", size, "--overwrite"});
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    OpenOptions channel;
+    const auto row_of = [&](const char* name) {
+      channel.channel = name;
+      const auto source = open_source(folder / "s.tif", channel);
+      std::vector<std::byte> row(static_cast<std::size_t>(source->info().width));
+      source->read_window({0, source->info().height / 2, source->info().width, 1}, row);
+      return row;
+    };
+    const auto red = row_of("R");
+    const auto blue = row_of("B");
+    const std::size_t middle = red.size() / 2;
+    for (std::size_t i = 0; i < red.size(); ++i) {
+      if (i + 2 > middle && i < middle + 2) continue;
+      EXPECT_EQ(red[i] != std::byte{0}, i < middle) << i;
+      EXPECT_EQ(blue[i] != std::byte{0}, i >= middle) << i;
+    }
+  }
+  ASSERT_EQ(convert({}).exit_code, 0);
+  const RunResult none = run_isohf({"shade", folder / "a.isohf", "-o", folder / "n.png", "--texture"});
+  EXPECT_EQ(none.exit_code, 2);
+  EXPECT_THAT(none.err, HasSubstr("convert with --texture"));
 }
 
 TEST_F(TextureOption, WarnsOfAPhotoOfAnotherShape) {
