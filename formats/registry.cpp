@@ -17,6 +17,7 @@
 #include "formats/hgt_source.h"
 #include "formats/oiio_source.h"
 #include "formats/png_source.h"
+#include "formats/raw_source.h"
 #include "formats/tiff_source.h"
 #include "isohf/base/error.h"
 
@@ -37,6 +38,7 @@ const std::vector<Reader>& readers() {
       {{"PNG", {".png"}}, looks_like_png, open_png},
       {{"ESRI ASCII grid", {".asc"}}, looks_like_ascii_grid, open_ascii_grid},
       {{"SRTM HGT", {".hgt", ".hgt.zip"}}, nullptr, open_hgt},
+      {{"raw samples", {".r8", ".r16", ".r32", ".f32", ".f64", ".raw"}}, nullptr, open_raw},
   };
   return table;
 }
@@ -100,6 +102,7 @@ const std::vector<Format>& native_formats() {
 
 std::unique_ptr<HeightSource> open_source(const std::string& path, const OpenOptions& options) {
   const Head head = read_head(path);
+  if (options.raw) return open_raw(path, options);
   const Reader* reader = reader_of(path, std::span(head.bytes).first(head.size));
   if (reader == nullptr) return open_with_oiio(path, options);
   return reader->open(path, options);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
@@ -9,6 +10,14 @@
 
 namespace isohf {
 
+/// What the samples of a file without a header are.
+struct RawLayout {
+  std::int64_t width = 0;
+  std::int64_t height = 0;
+  SampleType type = SampleType::kUint16;
+  bool big_endian = false;
+};
+
 /// What a user may say about an input that the file does not, or says wrongly.
 struct OpenOptions {
   std::string channel;                       ///< channel name or zero-based number; empty: the reader's choice
@@ -17,6 +26,7 @@ struct OpenOptions {
   std::optional<double> z_scale;             ///< elevation = raw * z_scale + z_offset; overrides the file's
   std::optional<double> z_offset;
   std::optional<double> spacing;  ///< sample spacing in metres, for files that do not say; overrides
+  std::optional<RawLayout> raw;   ///< the file is nothing but these samples, whatever its name and content say
 };
 
 /// One row of the table of formats.
@@ -33,9 +43,10 @@ struct Format {
 void set_module_folder(const std::string& folder);
 
 /// Opens a raster of elevations by its content, not by its name: the file's first bytes pick the reader; the extension
-/// decides only for formats without a signature (.hgt). What no native reader knows goes to the OpenImageIO module.
-/// Throws Error naming the path: kIo (missing, folder, unreadable), kUnsupported (unknown format, with what is read),
-/// kCorrupt (empty, truncated, absurd sizes), kInvalidArgument (no such channel, with those there are).
+/// decides only for formats without a signature (.hgt), options.raw before both. What no native reader knows goes to
+/// the OpenImageIO module. Throws Error naming the path: kIo (missing, folder, unreadable), kUnsupported (unknown
+/// format, with what is read), kCorrupt (empty, truncated, absurd sizes), kInvalidArgument (no such channel, with those
+/// there are).
 [[nodiscard]] std::unique_ptr<HeightSource> open_source(const std::string& path, const OpenOptions& options);
 
 }  // namespace isohf

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "formats/raw_source.h"
 #include "isohf/base/error.h"
 #include "option_values.h"
 
@@ -38,6 +39,10 @@ void add_source_options(CommandLine& line, OpenOptions& options) {
               });
   line.option("--z-offset", "NUMBER", "See --z-scale (default 0)",
               [&](const std::string& text) { options.z_offset = parse_number(text); });
+  line.option("--raw", "WxH:TYPE",
+              "The input is nothing but samples: columns, rows, and u8, i8, or u16, i16, u32, i32, f32, f64 with le or "
+              "be, as in 200x200:u16le",
+              [&](const std::string& text) { options.raw = raw_layout_from_string(text); });
   line.option("--sample-spacing", "METRES", "Distance of neighbouring samples, instead of the file's",
               [&](const std::string& text) { options.spacing = parse_positive_number(text); });
 }

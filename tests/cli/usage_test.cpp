@@ -127,9 +127,10 @@ TEST_P(BadValueTest, IsRefusedWithWhatWasFoundAndRequired) {
 INSTANTIATE_TEST_SUITE_P(
     Usage, BadValueTest,
     testing::Values(
-        BadValue{"--density", "-1", "a number greater than 0"}, BadValue{"--density", "0", "a number greater than 0"},
-        BadValue{"--density", "abc", "a number greater than 0"}, BadValue{"--density", "1x", "a number greater than 0"},
-        BadValue{"--density", "1 ", "a number greater than 0"}, BadValue{"--density", "nan", "a number greater than 0"},
+        BadValue{"--raw", "200x200:u16", "WxH:TYPE"}, BadValue{"--density", "-1", "a number greater than 0"},
+        BadValue{"--density", "0", "a number greater than 0"}, BadValue{"--density", "abc", "a number greater than 0"},
+        BadValue{"--density", "1x", "a number greater than 0"}, BadValue{"--density", "1 ", "a number greater than 0"},
+        BadValue{"--density", "nan", "a number greater than 0"},
         BadValue{"--density", "inf", "a number greater than 0"},
         BadValue{"--density", "1,5", "a number greater than 0"},
         BadValue{"--density", "1e999", "a number greater than 0"},

@@ -1,0 +1,161 @@
+#include "formats/raw_source.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <array>
+
+#include "formats/raster_reference.h"
+#include "formats/real_files.h"
+#include "isohf/base/error.h"
+
+namespace isohf::testing {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+OpenOptions raw(const std::string& layout) {
+  OpenOptions options;
+  options.raw = raw_layout_from_string(layout);
+  return options;
+}
+
+std::string write(const ScratchFolder& folder, const std::string& name, std::size_t bytes) {
+  std::vector<char> data(bytes);
+  for (std::size_t i = 0; i < bytes; ++i) data[i] = static_cast<char>(i * 37 + 5);
+  write_bytes(folder / name, data.data(), data.size());
+  return folder / name;
+}
+
+TEST(RawSource, DeliversRealFilesAsTheReferenceDoes) {
+  const auto files = real_files({".r16"});
+  if (files.empty()) GTEST_SKIP() << "the real files are not there";
+  for (const auto& file : files) {
+    SCOPED_TRACE(file.string());
+    const auto expected = reference_of(file);
+    const std::string size = std::to_string(expected.at("width").get<int>());
+    // The square that the refusal suggests is the file's.
+    const Error error = error_of([&] { (void)open_source(file.string(), {}); });
+    EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
+    EXPECT_THAT(error.what(), HasSubstr("--raw " + size + "x" + size + ":u16le"));
+    const auto source = open_source(file.string(), raw(size + "x" + size + ":u16le"));
+    expect_matches(*source, expected);
+    EXPECT_EQ(source->info().georeference.registration, Registration::kUnknown);
+    EXPECT_FALSE(source->info().georeference.has_origin);
+  }
+}
+
+TEST(RawLayout, IsReadFromItsText) {
+  const RawLayout layout = raw_layout_from_string("513x7:i16be");
+  EXPECT_EQ(layout.width, 513);
+  EXPECT_EQ(layout.height, 7);
+  EXPECT_EQ(layout.type, SampleType::kInt16);
+  EXPECT_TRUE(layout.big_endian);
+  EXPECT_EQ(raw_layout_from_string("1X1:u8").type, SampleType::kUint8);
+  EXPECT_EQ(raw_layout_from_string("100000x100000:f64le").type, SampleType::kFloat64);
+  for (const char* text :
+       {"", "200", "200x200", "200x200:", "200x200:u16",
+
+        "200x200:u17le", "0x200:u8", "-2x2:u8", "200x0:u8", "x:u8", "200x200:u16LE", "200x200:u16le ", " 200x200:u8",
+        "200x200 u8", "2.5x2:u8", "200,200:u8", "99999999999999999999x1:u8",
+        "9223372036854775807x9223372036854775807:f64le", "4294967296x4294967296:u8"}) {
+    const Error error = error_of([&] { (void)raw_layout_from_string(text); });
+    EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument) << text;
+    EXPECT_THAT(error.what(), HasSubstr("must be WxH:TYPE")) << text;
+  }
+}
+
+TEST(RawSource, ReadsEveryTypeInBothByteOrders) {
+  const ScratchFolder folder;
+  constexpr std::array<std::pair<const char*, SampleType>, 8> kTypes = {{{"u8", SampleType::kUint8},
+                                                                         {"i8", SampleType::kInt8},
+                                                                         {"u16", SampleType::kUint16},
+                                                                         {"i16", SampleType::kInt16},
+                                                                         {"u32", SampleType::kUint32},
+                                                                         {"i32", SampleType::kInt32},
+                                                                         {"f32", SampleType::kFloat32},
+                                                                         {"f64", SampleType::kFloat64}}};
+  for (const auto& [name, type] : kTypes) {
+    const std::size_t size = size_bytes(type);
+    for (const std::string order : {"le", "be"}) {
+      const std::string path = write(folder, "samples", 15 * size);
+      auto wanted = file_bytes(path);
+      if (order == "be") {
+        for (std::size_t i = 0; i < wanted.size(); i += size) {
+          std::reverse(wanted.begin() + static_cast<std::ptrdiff_t>(i),
+                       wanted.begin() + static_cast<std::ptrdiff_t>(i + size));
+        }
+      }
+      const auto source = open_source(path, raw(std::string("5x3:") + name + (size == 1 ? "" : order)));
+      EXPECT_EQ(source->info().sample_type, type);
+      for (std::int64_t row = 0; row < 3; ++row) {
+        for (std::int64_t column = 0; column < 5; ++column) {
+          for (std::int64_t columns = 1; columns <= 5 - column; ++columns) {
+            const auto part = testing::read_window(*source, {column, row, columns, 3 - row});
+            for (std::int64_t i = 0; i < columns * (3 - row); ++i) {
+              const auto at = static_cast<std::size_t>((row + i / columns) * 5 + column + i % columns);
+              ASSERT_EQ(0,
+                        std::memcmp(part.data() + static_cast<std::size_t>(i) * size, wanted.data() + at * size, size))
+                  << name << order;
+            }
+          }
+        }
+      }
+    }
+  }
+}
+
+TEST(RawSource, WantsExactlyTheBytesOfItsLayout) {
+  const ScratchFolder folder;
+  for (std::size_t bytes = 1; bytes < 30; ++bytes) {
+    const std::string path = write(folder, "terrain.r16", bytes);
+    if (bytes == 24) {
+      EXPECT_EQ(open_source(path, raw("4x3:u16le"))->info().height, 3);
+      continue;
+    }
+    const Error error = error_of([&] { (void)open_source(path, raw("4x3:u16le")); });
+    EXPECT_EQ(error.code(), ErrorCode::kCorrupt);
+    EXPECT_EQ(error.what(),
+              path + ": the file has " + std::to_string(bytes) + " bytes, 4 x 3 samples of 2 bytes take 24");
+  }
+}
+
+TEST(RawSource, AsksForALayoutByName) {
+  const ScratchFolder folder;
+  const auto what = [&](const std::string& name, std::size_t bytes) {
+    const Error error = error_of([&] { (void)open_source(write(folder, name, bytes), {}); });
+    EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
+    return std::string(error.what());
+  };
+  EXPECT_THAT(what("a.r8", 9), HasSubstr("--raw 3x3:u8)"));
+  EXPECT_THAT(what("a.R16", 18), HasSubstr("--raw 3x3:u16le)"));
+  EXPECT_THAT(what("a.f32", 36), HasSubstr("--raw 3x3:f32le)"));
+  EXPECT_THAT(what("a.raw", 18), HasSubstr("--raw 3x3:u16le)"));
+  EXPECT_THAT(what("a.raw", 9), HasSubstr("--raw 3x3:u8)"));
+  EXPECT_THAT(what("a.r16", 20), HasSubstr("as in --raw 200x300:u16le"));
+  EXPECT_THAT(what("a.r16", 20), Not(HasSubstr("\n")));
+}
+
+TEST(RawSource, GoesBeforeNameAndContent) {
+  const ScratchFolder folder;
+  write_bytes(folder / "a.png", "\x89PNG\r\n\x1A\n", 8);
+  EXPECT_EQ(open_source(folder / "a.png", raw("2x2:u16be"))->info().format, "raw samples");
+  OpenOptions channel = raw("2x2:u16be");
+  channel.channel = "1";
+  EXPECT_EQ(error_of([&] { (void)open_source(folder / "a.png", channel); }).code(), ErrorCode::kInvalidArgument);
+}
+
+TEST(RawSource, TakesFloatsBeyondAnyHeightAsVoid) {
+  const ScratchFolder folder;
+  const std::array<float, 4> samples = {1.0F, -3.4e38F, NAN, 8848.0F};
+  write_bytes(folder / "a.f32", reinterpret_cast<const char*>(samples.data()), sizeof(samples));
+  const auto source = open_source(folder / "a.f32", raw("4x1:f32le"));
+  const auto read = read_whole(*source);
+  for (std::size_t i = 0; i < 4; ++i) {
+    EXPECT_EQ(is_void(source->info(), value_at(SampleType::kFloat32, read, i)), i == 1 || i == 2);
+  }
+}
+
+}  // namespace
+}  // namespace isohf::testing
