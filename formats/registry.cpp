@@ -14,6 +14,7 @@
 
 #include "formats/ascii_grid_source.h"
 #include "formats/exr_source.h"
+#include "formats/header_grid_source.h"
 #include "formats/hgt_source.h"
 #include "formats/oiio_source.h"
 #include "formats/png_source.h"
@@ -37,6 +38,9 @@ const std::vector<Reader>& readers() {
       {{"TIFF", {".tif", ".tiff"}}, looks_like_tiff, open_tiff},
       {{"PNG", {".png"}}, looks_like_png, open_png},
       {{"ESRI ASCII grid", {".asc"}}, looks_like_ascii_grid, open_ascii_grid},
+      {{"GridFloat or EHdr header", {".hdr"}}, looks_like_grid_header, open_header_grid},
+      {{"GridFloat", {".flt"}}, nullptr, open_header_grid},
+      {{"EHdr", {".bil", ".bip", ".bsq"}}, nullptr, open_header_grid},
       {{"SRTM HGT", {".hgt", ".hgt.zip"}}, nullptr, open_hgt},
       {{"raw samples", {".r8", ".r16", ".r32", ".f32", ".f64", ".raw"}}, nullptr, open_raw},
   };
