@@ -112,10 +112,10 @@ void begin_fading_pass(bool write_depth) {
 
 // The second mesh shows only where it lies in front of the first. Where both lie in one plane (water, a plain), fading
 // in and then switching to the coarse mesh at β = ½ is only seamless if the coarse mesh counts as in front there in
-// both stages: nearer by two depth steps while it fades in over the fine one, and the fine one farther by two while it
-// fades out over the coarse one.
+// both stages: nearer by eight depth steps while it fades in over the fine one, and the fine one farther by eight while
+// it fades out over the coarse one.
 void order_fading(const LodBlend& blend) {
-  glPolygonOffset(0.0F, blend.second > blend.first ? -2.0F : 2.0F);
+  glPolygonOffset(0.0F, blend.second > blend.first ? -8.0F : 8.0F);
 }
 
 void end_fading_pass() {
