@@ -19,6 +19,8 @@ constexpr int kDeepest = 32;
 constexpr double kRadiansPerDegree = 0.017453292519943295;
 // Files give 12 to 17 digits of it.
 constexpr double kDegreeTolerance = 1e-10;
+/// Grids of so many metres and less within 360 m of (0, 0) are rarer than those in degrees: it is 36" of arc.
+constexpr double kFinestAsMetres = 0.01;
 
 /// KEYWORD["text", number, KEYWORD[...], ...]
 struct Node {
@@ -181,8 +183,17 @@ bool read_wkt(std::string_view text, Georeference& place) {
 
 void read_prj_beside(SourceInfo& info) {
   const std::string text = prj_beside(info.path);
-  if (text.empty() || read_wkt(text, info.georeference)) return;
-  info.warnings.emplace_back("the .prj beside the file is not the WKT of a map's reference system; it is ignored");
+  if (!text.empty() && read_wkt(text, info.georeference)) return;
+  if (!text.empty()) {
+    info.warnings.emplace_back("the .prj beside the file is not the WKT of a map's reference system; it is ignored");
+  }
+  const Georeference& place = info.georeference;
+  if (place.has_origin && place.spacing_x < kFinestAsMetres && place.spacing_y < kFinestAsMetres &&
+      std::abs(place.origin_x) <= 360.0 && std::abs(place.origin_y) <= 90.0) {
+    info.warnings.emplace_back(
+        "the coordinates look like degrees, but no .prj beside the file says so; with one, or with --sample-spacing, "
+        "distances would be in metres");
+  }
 }
 
 }  // namespace isohf

@@ -11,7 +11,8 @@ namespace isohf {
 /// text is not the WKT of a projected or geographic system.
 [[nodiscard]] bool read_wkt(std::string_view text, Georeference& place);
 
-/// Reads the .prj beside info.path, where there is one, with read_wkt; a text that is no WKT becomes a warning.
+/// Reads the .prj beside info.path, where there is one, with read_wkt; a text that is no WKT becomes a
+/// warning, and so do coordinates that look like degrees without one.
 void read_prj_beside(SourceInfo& info);
 
 }  // namespace isohf

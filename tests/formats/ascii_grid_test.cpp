@@ -197,6 +197,21 @@ TEST_F(AsciiGrid, CarriesThePrjBesideIt) {
   }
 }
 
+TEST_F(AsciiGrid, WarnsOfDegreesThatNothingDeclares) {
+  const auto warnings = [&](const std::string& x, const std::string& spacing) {
+    return open("ncols 2\nnrows 1\nxllcorner " + x + "\nyllcorner 40.09\ncellsize " + spacing + "\n1 2\n")
+        ->info()
+        .warnings;
+  };
+  EXPECT_THAT(warnings("-105.55", "0.000833333333"), ElementsAre(HasSubstr("look like degrees")));
+  EXPECT_THAT(warnings("-105.55", "0.5"), IsEmpty());
+  EXPECT_THAT(warnings("361015.59", "0.0008"), IsEmpty());
+  (void)write(
+      R"(GEOGCS["WGS 84",DATUM["D",SPHEROID["WGS 84",6378137,298.257223563]],UNIT["degree",0.017453292519943]])",
+      "grid.prj");
+  EXPECT_THAT(warnings("-105.55", "0.000833333333"), IsEmpty());
+}
+
 TEST_F(AsciiGrid, RefusesAGrassHeader) {
   for (const char* first : {"north: 4\nsouth: 0\n", "rows: 2\ncols: 3\n", "  NORTH:   4N\n"}) {
     const Error error = refusal(std::string(first) + "1 2 3 4 5 6\n");
