@@ -1,6 +1,7 @@
 // The real program, run as a person runs it.
 #include <gtest/gtest.h>
 #include <sys/wait.h>
+#include <unistd.h>
 
 #include <array>
 #include <cstdio>
@@ -27,7 +28,8 @@ class ViewProgramTest : public test::GlTest {
     GlTest::SetUp();
     if (IsSkipped()) return;
     folder_ = std::filesystem::temp_directory_path() /
-              ("isohf_view_" + std::string(testing::UnitTest::GetInstance()->current_test_info()->name()));
+              ("isohf_view_" + std::string(testing::UnitTest::GetInstance()->current_test_info()->name()) + "_" +
+               std::to_string(::getpid()));
     std::filesystem::create_directories(folder_);
     test::write_analytic_archive(path("good.isohf"), grid());
   }
