@@ -17,6 +17,7 @@
 #include "formats/header_grid_source.h"
 #include "formats/hgt_source.h"
 #include "formats/oiio_source.h"
+#include "formats/pds3_source.h"
 #include "formats/png_source.h"
 #include "formats/raw_source.h"
 #include "formats/tiff_source.h"
@@ -30,6 +31,8 @@ struct Reader {
   Format format;
   bool (*recognises)(std::span<const std::byte> head);  ///< nullptr: the extension decides
   std::unique_ptr<HeightSource> (*open)(const std::string& path, const OpenOptions& options);
+  /// Whether a file beside `path` describes it; nullptr where the format has no such files.
+  bool (*described)(const std::string& path) = nullptr;
 };
 
 const std::vector<Reader>& readers() {
@@ -41,6 +44,7 @@ const std::vector<Reader>& readers() {
       {{"GridFloat or EHdr header", {".hdr"}}, looks_like_grid_header, open_header_grid},
       {{"GridFloat", {".flt"}}, nullptr, open_header_grid},
       {{"EHdr", {".bil", ".bip", ".bsq"}}, nullptr, open_header_grid},
+      {{"PDS3", {".img", ".lbl"}}, looks_like_pds3, open_pds3, has_pds3_label},
       {{"SRTM HGT", {".hgt", ".hgt.zip"}}, nullptr, open_hgt},
       {{"raw samples", {".r8", ".r16", ".r32", ".f32", ".f64", ".raw"}}, nullptr, open_raw},
   };
@@ -48,7 +52,7 @@ const std::vector<Reader>& readers() {
 }
 
 /// Enough for every signature.
-constexpr std::size_t kHeadBytes = 64;
+constexpr std::size_t kHeadBytes = 128;
 
 struct Head {
   std::array<std::byte, kHeadBytes> bytes{};
@@ -89,6 +93,9 @@ bool has_extension(const std::string& path, const Format& format) {
 const Reader* reader_of(const std::string& path, std::span<const std::byte> head) {
   for (const Reader& reader : readers()) {
     if (reader.recognises != nullptr ? reader.recognises(head) : has_extension(path, reader.format)) return &reader;
+  }
+  for (const Reader& reader : readers()) {
+    if (reader.described != nullptr && reader.described(path)) return &reader;
   }
   return nullptr;
 }
