@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <limits>
 #include <string>
@@ -114,6 +115,23 @@ void apply_open_options(SourceInfo& info, const OpenOptions& options) {
   if (options.z_scale) info.z_scale = *options.z_scale;
   if (options.z_offset) info.z_offset = *options.z_offset;
   if (options.spacing) override_spacing(info, *options.spacing);
+}
+
+std::int64_t choose_band(SourceInfo& info, const OpenOptions& options, std::int64_t bands) {
+  std::int64_t band = 0;
+  if (!options.channel.empty()) {
+    const char* const end = options.channel.data() + options.channel.size();
+    const auto [at, error] = std::from_chars(options.channel.data(), end, band);
+    if (error != std::errc{} || at != end || band < 0 || band >= bands) {
+      throw Error(ErrorCode::kInvalidArgument,
+                  fmt::format("{}: there is no channel \"{}\"; there {}", info.path, options.channel,
+                              bands == 1 ? "is 0 alone" : fmt::format("are 0 to {}", bands - 1)));
+    }
+  } else if (bands > 1) {
+    info.warnings.push_back(fmt::format("there are {} bands; channel 0 is read", bands));
+  }
+  if (bands > 1) info.channel = fmt::format("{}", band);
+  return band;
 }
 
 }  // namespace isohf

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
 
 #include "formats/registry.h"
@@ -19,5 +20,10 @@ namespace isohf {
 /// with a warning when the file had a unit. Throws Error{kInvalidArgument}: a value that is not finite, a spacing <= 0,
 /// a scale of 0, a void value that the sample type cannot hold. `options.channel` is the reader's own business.
 void apply_open_options(SourceInfo& info, const OpenOptions& options);
+
+/// The band that `options.channel` picks by its number from 0 among `bands` of a raster whose bands have no names; the
+/// first where it says nothing, with a warning when there are others. Fills info.channel.
+/// Throws Error{kInvalidArgument} where there is no such band.
+[[nodiscard]] std::int64_t choose_band(SourceInfo& info, const OpenOptions& options, std::int64_t bands);
 
 }  // namespace isohf

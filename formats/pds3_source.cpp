@@ -65,7 +65,8 @@ class Pds3Source final : public HeightSource {
     file_.emplace(data_path_);
     check_size(label);
     describe(fields, label.root);
-    choose_band(options);
+    const std::int64_t band = choose_band(info_, options, layout_.bands);
+    layout_.offset_bytes += static_cast<std::uint64_t>(band * layout_.band_stride_bytes);
     apply_open_options(info_, options);
   }
 
@@ -224,23 +225,6 @@ class Pds3Source final : public HeightSource {
     } else if (std::find(info_.void_values.begin(), info_.void_values.end(), *stored) == info_.void_values.end()) {
       info_.void_values.push_back(*stored);
     }
-  }
-
-  void choose_band(const OpenOptions& options) {
-    std::int64_t band = 0;
-    if (!options.channel.empty()) {
-      const std::optional<double> number = number_of({options.channel, {}});
-      if (!number || !(*number >= 0.0) || *number >= static_cast<double>(layout_.bands) ||
-          *number != static_cast<double>(std::int64_t(*number))) {
-        throw Error(ErrorCode::kInvalidArgument, fmt::format("{}: there is no channel \"{}\"; there are 0 to {}",
-                                                             info_.path, options.channel, layout_.bands - 1));
-      }
-      band = static_cast<std::int64_t>(*number);
-    } else if (layout_.bands > 1) {
-      info_.warnings.push_back(fmt::format("there are {} bands; channel 0 is read", layout_.bands));
-    }
-    if (layout_.bands > 1) info_.channel = fmt::format("{}", band);
-    layout_.offset_bytes += static_cast<std::uint64_t>(band * layout_.band_stride_bytes);
   }
 
   [[nodiscard]] std::uint64_t place_of(std::int64_t row, std::int64_t column) const {

@@ -13,9 +13,11 @@
 #include <span>
 
 #include "formats/ascii_grid_source.h"
+#include "formats/dted_source.h"
 #include "formats/exr_source.h"
 #include "formats/header_grid_source.h"
 #include "formats/hgt_source.h"
+#include "formats/isis3_source.h"
 #include "formats/oiio_source.h"
 #include "formats/pds3_source.h"
 #include "formats/png_source.h"
@@ -45,6 +47,8 @@ const std::vector<Reader>& readers() {
       {{"GridFloat", {".flt"}}, nullptr, open_header_grid},
       {{"EHdr", {".bil", ".bip", ".bsq"}}, nullptr, open_header_grid},
       {{"PDS3", {".img", ".lbl"}}, looks_like_pds3, open_pds3, has_pds3_label},
+      {{"ISIS3 cube", {".cub"}}, looks_like_isis3, open_isis3},
+      {{"DTED", {".dt0", ".dt1", ".dt2"}}, looks_like_dted, open_dted},
       {{"SRTM HGT", {".hgt", ".hgt.zip"}}, nullptr, open_hgt},
       {{"raw samples", {".r8", ".r16", ".r32", ".f32", ".f64", ".raw"}}, nullptr, open_raw},
   };
