@@ -18,6 +18,7 @@
 #include "formats/header_grid_source.h"
 #include "formats/hgt_source.h"
 #include "formats/isis3_source.h"
+#include "formats/npy_source.h"
 #include "formats/oiio_source.h"
 #include "formats/pds3_source.h"
 #include "formats/png_source.h"
@@ -48,6 +49,7 @@ const std::vector<Reader>& readers() {
       {{"EHdr", {".bil", ".bip", ".bsq"}}, nullptr, open_header_grid},
       {{"PDS3", {".img", ".lbl"}}, looks_like_pds3, open_pds3, has_pds3_label},
       {{"ISIS3 cube", {".cub"}}, looks_like_isis3, open_isis3},
+      {{"NumPy", {".npy"}}, looks_like_npy, open_npy},
       {{"DTED", {".dt0", ".dt1", ".dt2"}}, looks_like_dted, open_dted},
       {{"SRTM HGT", {".hgt", ".hgt.zip"}}, nullptr, open_hgt},
       {{"raw samples", {".r8", ".r16", ".r32", ".f32", ".f64", ".raw"}}, nullptr, open_raw},
@@ -119,6 +121,11 @@ std::unique_ptr<HeightSource> open_source(const std::string& path, const OpenOpt
   const Head head = read_head(path);
   if (options.raw) return open_raw(path, options);
   const Reader* reader = reader_of(path, std::span(head.bytes).first(head.size));
+  if (reader == nullptr && has_extension(path, {"", {".npz"}})) {
+    throw Error(ErrorCode::kUnsupported, path +
+                                             ": is a NumPy archive of arrays; numpy.save writes one of them as .npy, "
+                                             "which is read");
+  }
   if (reader == nullptr) return open_with_oiio(path, options);
   return reader->open(path, options);
 }

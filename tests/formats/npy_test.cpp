@@ -1,0 +1,146 @@
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <fstream>
+#include <random>
+
+#include "formats/npy_source.h"
+#include "formats/real_files.h"
+#include "formats/scratch_folder.h"
+#include "isohf/base/error.h"
+
+namespace isohf {
+namespace {
+
+using ::testing::HasSubstr;
+
+std::string array(const std::string& descr, const std::string& shape, const std::string& data, int version = 1,
+                  const std::string& order = "False") {
+  std::string text = fmt::format("{{'descr': '{}', 'fortran_order': {}, 'shape': {}, }}", descr, order, shape);
+  text.resize(117, ' ');
+  text += '\n';
+  std::string bytes = "\x93NUMPY";
+  bytes += static_cast<char>(version);
+  bytes += '\0';
+  bytes += static_cast<char>(text.size());
+  bytes.append(version == 1 ? 1 : 3, '\0');
+  return bytes + text + data;
+}
+
+/// 3 x 2 samples 1 to 6 of `size` bytes.
+std::string counting(int size, bool big_endian) {
+  std::string bytes;
+  for (int i = 1; i <= 6; ++i) {
+    for (int b = 0; b < size; ++b) bytes += b == (big_endian ? size - 1 : 0) ? static_cast<char>(i) : '\0';
+  }
+  return bytes;
+}
+
+class Npy : public testing::ScratchFolder {
+ protected:
+  std::string write(const std::string& bytes, const std::string& name = "a.npy") const {
+    const std::string path = testing::fresh(folder() / name);
+    std::ofstream(path, std::ios::binary).write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+    return path;
+  }
+
+  std::string failure(const std::string& bytes, ErrorCode* code = nullptr, const std::string& name = "a.npy") const {
+    const std::string path = write(bytes, name);
+    try {
+      const auto source = open_source(path, {});
+      const SourceInfo& info = source->info();
+      const Window window = {0, 0, std::min<std::int64_t>(info.width, 512), std::min<std::int64_t>(info.height, 64)};
+      std::vector<std::byte> raw(static_cast<std::size_t>(window.columns * window.rows) * size_bytes(info.sample_type));
+      source->read_window(window, raw);
+      return {};
+    } catch (const Error& error) {
+      if (code != nullptr) *code = error.code();
+      const std::string message = error.what();
+      EXPECT_EQ(message.rfind(path, 0), 0U) << message;
+      EXPECT_EQ(message.find('\n'), std::string::npos) << message;
+      return message;
+    }
+  }
+};
+
+TEST_F(Npy, DeliversARealArray) {
+  const auto file = testing::real_data() / "derived" / "gale.npy";
+  if (!std::filesystem::exists(file)) GTEST_SKIP() << "the real files are not there";
+  const auto source = open_source(file.string(), {});
+  const auto ref = testing::reference_of(file);
+  EXPECT_EQ(source->info().width, ref.at("width").get<int>());
+  EXPECT_EQ(source->info().height, ref.at("height").get<int>());
+  EXPECT_EQ(source->info().format, "NumPy");
+  EXPECT_FALSE(source->info().georeference.has_origin);
+  const auto raw = testing::read_all(*source);
+  for (const char* list : {"pixels", "corners"}) {
+    for (const auto& pixel : ref.at(list)) {
+      const auto at = static_cast<std::size_t>(pixel.at("row").get<int>() * 348 + pixel.at("col").get<int>());
+      EXPECT_EQ(testing::value_at(SampleType::kFloat32, raw, at), pixel.at("raw").get<double>());
+    }
+  }
+}
+
+TEST_F(Npy, ReadsEveryTypeOrderAndVersion) {
+  const std::pair<const char*, SampleType> types[] = {
+      {"u1", SampleType::kUint8},   {"i1", SampleType::kInt8},    {"u2", SampleType::kUint16},
+      {"i2", SampleType::kInt16},   {"u4", SampleType::kUint32},  {"i4", SampleType::kInt32},
+      {"f2", SampleType::kFloat16}, {"f4", SampleType::kFloat32}, {"f8", SampleType::kFloat64}};
+  for (const auto& [name, type] : types) {
+    const int size = static_cast<int>(size_bytes(type));
+    for (const char order : {'<', '>', '=', '|'}) {
+      if (order == '|' && size > 1) continue;
+      for (const int version : {1, 2, 3}) {
+        SCOPED_TRACE(fmt::format("{}{} {}", order, name, version));
+        const std::string data = counting(size, order == '>');
+        const auto source = open_source(write(array(order + std::string(name), "(2, 3)", data, version)), {});
+        ASSERT_EQ(source->info().sample_type, type);
+        ASSERT_EQ(source->info().width, 3);
+        const auto raw = testing::read_all(*source);
+        const std::string little = counting(size, false);
+        EXPECT_TRUE(std::equal(raw.begin(), raw.end(), std::as_bytes(std::span(little)).begin()));
+        std::vector<std::byte> last(static_cast<std::size_t>(size) * 2);
+        source->read_window({2, 0, 1, 2}, last);
+        EXPECT_EQ(testing::value_at(type, last, 1), testing::value_at(type, raw, 5));
+      }
+    }
+  }
+}
+
+TEST_F(Npy, SaysWhatItDoesNotRead) {
+  const std::string data(64, '\0');
+  EXPECT_THAT(failure(array("<i8", "(2, 3)", data)), HasSubstr("the array's type is '<i8'"));
+  EXPECT_THAT(failure(array("|i2", "(2, 3)", data)), HasSubstr("the array's type is '|i2'"));
+  EXPECT_THAT(failure(array("<i2", "(6,)", data)), HasSubstr("the array's shape is (6), must have 2 dimensions"));
+  EXPECT_THAT(failure(array("<i2", "(2, 3, 1)", data)), HasSubstr("must have 2 dimensions"));
+  EXPECT_THAT(failure(array("<i2", "(2, 0)", data)), HasSubstr("must be from 1"));
+  EXPECT_THAT(failure(array("<i2", "(2, 3)", data, 1, "True")), HasSubstr("Fortran order"));
+  EXPECT_THAT(failure(array("<i2", "(2, 3)", data, 4)), HasSubstr("NumPy format 4"));
+  EXPECT_THAT(failure("PK\x03\x04 anything", nullptr, "a.npz"), HasSubstr("a NumPy archive"));
+}
+
+TEST_F(Npy, RefusesEveryTruncation) {
+  const std::string whole = array("<i2", "(2, 3)", counting(2, false));
+  EXPECT_EQ(failure(whole), "");
+  for (std::size_t length = 6; length < whole.size(); ++length) {
+    ErrorCode code = ErrorCode::kCancelled;
+    EXPECT_NE(failure(whole.substr(0, length), &code), "") << length;
+    EXPECT_EQ(code, ErrorCode::kCorrupt) << length;
+  }
+}
+
+TEST_F(Npy, SurvivesDamagedHeaders) {
+  const std::string whole = array("<i2", "(2, 3)", counting(2, false));
+  std::mt19937 random(23);
+  const std::string alphabet = "{}(),:'\"<>0123456789TFi \xFF";
+  for (int round = 0; round < 4000; ++round) {
+    std::string damaged = whole;
+    for (unsigned k = random() % 4; k != 4; ++k) damaged[6 + random() % 74] = alphabet[random() % alphabet.size()];
+    (void)failure(damaged);
+  }
+}
+
+}  // namespace
+}  // namespace isohf
