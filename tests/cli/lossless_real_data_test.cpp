@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <iostream>
 
+#include "formats/raw_source.h"
 #include "formats/registry.h"
 #include "isohf/base/error.h"
 #include "support/run_program.h"
@@ -57,9 +58,22 @@ struct Samples {
   std::vector<float> elevations;  ///< NaN where void
 };
 
+/// What --raw has to say of a .r16 file: the ones in the folder are squares. Empty for all others.
+std::string raw_layout(const fs::path& file) {
+  if (lower_extension(file) != ".r16") return {};
+  const auto side = static_cast<long>(std::lround(std::sqrt(static_cast<double>(fs::file_size(file)) / 2.0)));
+  return std::to_string(side) + "x" + std::to_string(side) + ":u16le";
+}
+
+std::unique_ptr<HeightSource> open_file(const fs::path& file) {
+  OpenOptions options;
+  if (const std::string layout = raw_layout(file); !layout.empty()) options.raw = raw_layout_from_string(layout);
+  return open_source(file, options);
+}
+
 /// As the program reads it: the archive's channel where there are several.
 Samples read_samples(const std::string& path) {
-  const std::unique_ptr<HeightSource> source = open_source(path, {});
+  const std::unique_ptr<HeightSource> source = open_file(path);
   Samples samples{source->info(), {}, {}};
   const auto count = static_cast<std::size_t>(samples.info.width * samples.info.height);
   samples.raw.resize(count * size_bytes(samples.info.sample_type));
@@ -91,7 +105,9 @@ std::string restored_name(const fs::path& file) {
 void expect_restored(const fs::path& file, const TemporaryFolder& folder) {
   const std::string archive = folder / "a.isohf";
   const std::string back = folder / restored_name(file);
-  const RunResult converted = run_isohf({"convert", file, archive, "--lossless", "--overwrite", "--quiet"});
+  std::vector<std::string> convert = {"convert", file, archive, "--lossless", "--overwrite", "--quiet"};
+  if (const std::string layout = raw_layout(file); !layout.empty()) convert.insert(convert.end(), {"--raw", layout});
+  const RunResult converted = run_isohf(convert);
   ASSERT_EQ(converted.exit_code, 0) << converted.err;
   const RunResult restored = run_isohf({"restore", archive, back, "--overwrite", "--quiet"});
   ASSERT_EQ(restored.exit_code, 0) << restored.err;
@@ -114,7 +130,12 @@ TEST_P(LosslessRealData, ComesBackBitForBit) {
     if (!is_in(GetParam(), file)) continue;
     SCOPED_TRACE(file);
     try {
-      (void)open_source(file, {});
+      const auto source = open_file(file);
+      // One row is no surface: ldem_4_cropped.img.
+      if (std::min(source->info().width, source->info().height) < 2) {
+        not_read.push_back(file.filename());
+        continue;
+      }
     } catch (const Error& error) {
       // No raster, or of a format that this build does not read.
       ASSERT_EQ(error.code(), ErrorCode::kUnsupported) << error.what();
