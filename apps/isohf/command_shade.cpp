@@ -20,6 +20,7 @@
 #include "option_values.h"
 #include "options_common.h"
 #include "output_file.h"
+#include "restored_raster.h"
 #include "shade_picture.h"
 #include "standard_output.h"
 
@@ -159,12 +160,7 @@ std::optional<Georeference> georeference_of(const Metadata& metadata, const Shad
   place.has_origin = true;
   place.origin_x = *source.origin_x + (metadata.valid.x0 + pixel_x / 2.0 - source.first_sample_x) * units_x;
   place.origin_y = *source.origin_y - (metadata.valid.z0 + pixel_z / 2.0 - source.first_sample_z) * units_z;
-  place.system.name = source.crs_name;
-  place.system.epsg = source.crs_epsg;
-  place.system.wkt = source.crs_wkt;
-  place.system.body = source.body;
-  place.system.semi_major_axis_m = source.semi_major_axis_m;
-  place.system.inverse_flattening = source.inverse_flattening;
+  place.system = horizontal_system(source);
   return place;
 }
 

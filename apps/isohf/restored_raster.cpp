@@ -68,16 +68,22 @@ RasterSpec restored_raster(const Metadata& metadata, const SampleGrid& grid, Sam
     place.origin_x = *source.origin_x + (grid.first_x - source.first_sample_x) * per_x;
     place.origin_y = *source.origin_y - (grid.first_z - source.first_sample_z) * per_z;
   }
-  place.system.name = source.crs_name;
-  place.system.epsg = source.crs_epsg;
-  place.system.wkt = source.crs_wkt;
-  place.system.body = source.body;
-  place.system.semi_major_axis_m = source.semi_major_axis_m;
-  place.system.inverse_flattening = source.inverse_flattening;
+  place.system = horizontal_system(source);
   place.system.vertical_datum = source.vertical_datum;
   place.system.vertical_epsg = source.vertical_epsg;
   if (place.has_origin) spec.georeference = place;
   return spec;
+}
+
+ReferenceSystem horizontal_system(const SourceRecord& source) {
+  ReferenceSystem system;
+  system.name = source.crs_name;
+  system.epsg = source.crs_epsg;
+  system.wkt = source.crs_wkt;
+  system.body = source.body;
+  system.semi_major_axis_m = source.semi_major_axis_m;
+  system.inverse_flattening = source.inverse_flattening;
+  return system;
 }
 
 SampleGrid grid_like(const Metadata& metadata, const SourceInfo& other) {

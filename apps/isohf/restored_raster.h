@@ -20,6 +20,9 @@ enum class RasterKind { kTiff, kExr, kPng, kHgt, kOther };
 /// What a raster of that grid is: size, place and reference system as the source's, so far as they are known.
 [[nodiscard]] RasterSpec restored_raster(const Metadata& metadata, const SampleGrid& grid, SampleType type);
 
+/// The source's body and horizontal reference system, as recorded.
+[[nodiscard]] ReferenceSystem horizontal_system(const SourceRecord& source);
+
 /// The grid of another raster of elevations, in the archive's world: by the origins of both where they are known in
 /// the same unit, else from the North-West corner.
 [[nodiscard]] SampleGrid grid_like(const Metadata& metadata, const SourceInfo& other);

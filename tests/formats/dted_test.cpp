@@ -3,10 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <fstream>
 #include <random>
 
 #include "formats/dted_source.h"
+#include "formats/reader_failure.h"
 #include "formats/real_files.h"
 #include "formats/scratch_folder.h"
 #include "isohf/base/error.h"
@@ -61,24 +61,17 @@ class Dted : public testing::ScratchFolder {
  protected:
   std::string write(const std::string& bytes) const {
     const std::string path = testing::fresh(folder() / "n43.dt0");
-    std::ofstream(path, std::ios::binary).write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+    testing::write_bytes(path, bytes);
     return path;
   }
 
   /// What opening and reading all of it says; empty where it works.
   std::string failure(const std::string& bytes, ErrorCode* code = nullptr) const {
     const std::string path = write(bytes);
-    try {
+    return testing::failure_of(path, code, [&] {
       const auto source = open_dted(path, {});
       (void)testing::read_all(*source);
-      return {};
-    } catch (const Error& error) {
-      if (code != nullptr) *code = error.code();
-      const std::string message = error.what();
-      EXPECT_EQ(message.rfind(path, 0), 0U) << message;
-      EXPECT_EQ(message.find('\n'), std::string::npos) << message;
-      return message;
-    }
+    });
   }
 };
 

@@ -3,10 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <fstream>
 #include <random>
 
 #include "formats/npy_source.h"
+#include "formats/reader_failure.h"
 #include "formats/real_files.h"
 #include "formats/scratch_folder.h"
 #include "isohf/base/error.h"
@@ -42,26 +42,16 @@ class Npy : public testing::ScratchFolder {
  protected:
   std::string write(const std::string& bytes, const std::string& name = "a.npy") const {
     const std::string path = testing::fresh(folder() / name);
-    std::ofstream(path, std::ios::binary).write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+    testing::write_bytes(path, bytes);
     return path;
   }
 
   std::string failure(const std::string& bytes, ErrorCode* code = nullptr, const std::string& name = "a.npy") const {
     const std::string path = write(bytes, name);
-    try {
+    return testing::failure_of(path, code, [&] {
       const auto source = open_source(path, {});
-      const SourceInfo& info = source->info();
-      const Window window = {0, 0, std::min<std::int64_t>(info.width, 512), std::min<std::int64_t>(info.height, 64)};
-      std::vector<std::byte> raw(static_cast<std::size_t>(window.columns * window.rows) * size_bytes(info.sample_type));
-      source->read_window(window, raw);
-      return {};
-    } catch (const Error& error) {
-      if (code != nullptr) *code = error.code();
-      const std::string message = error.what();
-      EXPECT_EQ(message.rfind(path, 0), 0U) << message;
-      EXPECT_EQ(message.find('\n'), std::string::npos) << message;
-      return message;
-    }
+      testing::read_corner(*source);
+    });
   }
 };
 

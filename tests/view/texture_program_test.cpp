@@ -3,15 +3,13 @@
 
 #include <algorithm>
 
-#include "gl_test.h"
+#include "program_fixture.h"
 #include "support/memory_photo.h"
-#include "support/run_program.h"
-#include "support/temporary_folder.h"
 
 namespace isohf::test {
 namespace {
 
-class TextureProgramTest : public GlTest {
+class TextureProgramTest : public ProgramFixture {
  protected:
   TextureProgramTest() {
     std::string pixels = "P6\n512 384\n255\n";
@@ -20,30 +18,6 @@ class TextureProgramTest : public GlTest {
     }
     write_file(folder_ / "photo.ppm", pixels);
   }
-
-  void convert(const std::vector<std::string>& options) const {
-    std::vector<std::string> command{"convert", ISOHF_SOURCE_DIR "/testdata/coast_512x384_int16.tif", archive()};
-    command.insert(command.end(), {"--overwrite", "--quiet", "--density", "0.1", "--shape", "52x59", "--levels", "3"});
-    command.insert(command.end(), options.begin(), options.end());
-    const RunResult result = run_isohf(command);
-    ASSERT_EQ(result.exit_code, 0) << result.err;
-  }
-  [[nodiscard]] RunResult view(const std::vector<std::string>& options) const {
-    std::vector<std::string> command{ISOHF_BIN_DIR "/isohf-view", archive()};
-    command.insert(command.end(), options.begin(), options.end());
-    return run_program(command);
-  }
-  [[nodiscard]] std::string picture(const std::vector<std::string>& options) const {
-    std::vector<std::string> all{"--screenshot", folder_ / "a.png", "--size", "200x150"};
-    all.insert(all.end(), options.begin(), options.end());
-    const RunResult result = view(all);
-    EXPECT_EQ(result.exit_code, 0) << result.err;
-    EXPECT_EQ(result.err, "");
-    return read_file(folder_ / "a.png");
-  }
-  [[nodiscard]] std::string archive() const { return folder_ / "a.isohf"; }
-
-  const TemporaryFolder folder_;
 };
 
 TEST_F(TextureProgramTest, ShowsTexturesUnlessAskedForOtherColours) {
