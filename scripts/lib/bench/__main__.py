@@ -1,0 +1,66 @@
+"""Called by scripts/bench: ROOT [SECTION...] [options].
+
+A section is a file of sections/: its first line says what it measures, measure(bench) does so and calls bench.add(); docs/performance.md has a place for its table. Where it cannot
+be quick on small inputs it says SMOKE = False.
+"""
+
+import argparse
+import importlib
+import json
+import pathlib
+import sys
+
+from harness import Bench
+
+FIRST = ["convert", "filters", "sizes", "large"]
+
+
+def find_sections():
+    """Modules by name: FIRST, then the others by the alphabet."""
+    names = [path.stem for path in (pathlib.Path(__file__).parent / "sections").glob("*.py")]
+    names.sort(key=lambda name: (FIRST.index(name) if name in FIRST else len(FIRST), name))
+    return {name: importlib.import_module(f"sections.{name}") for name in names}
+
+
+def main():
+    sections = find_sections()
+    if sys.argv[1:] == ["--list"]:
+        for name, module in sections.items():
+            print(f"    {name + ':':<10} {module.__doc__.strip().splitlines()[0]}")
+        return
+    root = pathlib.Path(sys.argv[1])
+    parser = argparse.ArgumentParser(prog="scripts/bench")
+    parser.add_argument("root")
+    parser.add_argument("sections", nargs="*", metavar="SECTION")
+    parser.add_argument("--rounds", type=int, default=None)
+    parser.add_argument("--small", action="store_true")
+    parser.add_argument("--smoke", action="store_true")
+    parser.add_argument("--write", action="store_true")
+    parser.add_argument("--json", action="store_true")
+    parser.add_argument("--data", default=str(root / "../shared/data"))
+    parser.add_argument("--input")
+    options = parser.parse_args()
+    for section in options.sections:
+        if section not in sections:
+            parser.error(f"{section}: no section; there are {', '.join(sections)}")
+    chosen = options.sections or ["convert"]
+    if options.smoke:
+        options.small, options.rounds = True, 1
+        chosen = options.sections or [name for name in sections if getattr(sections[name], "SMOKE", True)]
+    if options.rounds is None:
+        options.rounds = 2 if options.small else 5
+    if options.rounds < 1:
+        parser.error("--rounds: at least 1")
+    bench = Bench(options)
+    for section in chosen:
+        sections[section].measure(bench)
+    if options.json:
+        print(json.dumps(bench.results, indent=2))
+    else:
+        print("\n\n".join(bench.tables.values()))
+    if options.write:
+        bench.write()
+
+
+if __name__ == "__main__":
+    main()

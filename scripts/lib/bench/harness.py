@@ -1,0 +1,88 @@
+"""What every section of scripts/bench uses: runs programs, makes inputs, keeps tables."""
+
+import json
+import os
+import pathlib
+import statistics
+import subprocess
+import sys
+import time
+
+GDAL_OPTIONS = ["-q", "-r", "bilinear", "-co", "TILED=YES", "-co", "COMPRESS=DEFLATE", "-co", "PREDICTOR=2",
+                "-co", "NUM_THREADS=2"]
+
+
+class Bench:
+    def __init__(self, options):
+        self.options = options
+        self.root = pathlib.Path(options.root)
+        self.isohf = str(self.root / "build/bin/isohf")
+        self.work = self.root / "build/bench"
+        self.work.mkdir(parents=True, exist_ok=True)
+        self.results = {}
+        self.tables = {}
+
+    def say(self, text):
+        print(f"bench: {text}", file=sys.stderr)
+
+    def fail(self, why):
+        sys.exit(f"bench: {why}")
+
+    def run(self, *command):
+        """Runs once: wall and processor seconds, peak memory in MB, standard output."""
+        with open(self.work / "time.txt", "w+b") as figures:
+            start = time.monotonic()
+            result = subprocess.run(["/usr/bin/time", "-f", "%U %S %M", "-o", figures.name, *map(str, command)],
+                                    capture_output=True, text=True, check=False)
+            wall = time.monotonic() - start
+            if result.returncode != 0:
+                self.fail(f"{' '.join(map(str, command))}: {result.stderr.strip()}")
+            user, system, peak = figures.read().split()[-3:]
+        return {"wall_s": wall, "cpu_s": float(user) + float(system), "peak_mb": float(peak) / 1024,
+                "out": result.stdout}
+
+    def in_turn(self, jobs, rounds):
+        """Runs every job once, then every one again; medians by name."""
+        runs = {name: [] for name in jobs}
+        for _ in range(rounds):
+            for name, command in jobs.items():
+                runs[name].append(self.run(*command))
+        return {name: {key: statistics.median(run[key] for run in done) for key in ("wall_s", "cpu_s", "peak_mb")}
+                for name, done in runs.items()}
+
+    def terrain(self, size):
+        path = self.work / f"land_{size}.tif"
+        if not path.exists():
+            part = path.with_suffix(".part.tif")
+            self.run(self.root / "build/bin/make_terrain", "--size", size, "--uncompressed", "--quiet", "-o", part)
+            part.rename(path)
+        return path
+
+    def input(self):
+        path = pathlib.Path(self.options.input) if self.options.input else self.terrain(
+            "2048x1024" if self.options.small else "16384x8192")
+        with open(path, "rb") as file:  # into the file cache
+            while file.read(1 << 24):
+                pass
+        return path
+
+    def info(self, archive):
+        return json.loads(self.run(self.isohf, "info", archive, "--json")["out"])
+
+    def add(self, section, header, rows, note):
+        lines = ["| " + " | ".join(header) + " |", "|" + "---|" * len(header)]
+        lines += ["| " + " | ".join(row) + " |" for row in rows]
+        self.tables[section] = "\n".join([*lines, "", note])
+
+    def machine(self):
+        return f"{len(os.sched_getaffinity(0))} cores"
+
+    def write(self):
+        page = self.root / "docs/performance.md"
+        text = page.read_text()
+        for section, table in self.tables.items():
+            begin, end = f"<!-- {section} -->", f"<!-- end of {section} -->"
+            if begin not in text or end not in text:
+                self.fail(f"{page}: no place for the table: {begin}")
+            text = text[:text.index(begin) + len(begin)] + "\n\n" + table + "\n\n" + text[text.index(end):]
+        page.write_text(text)
