@@ -1,0 +1,36 @@
+#pragma once
+
+#include <string>
+
+#include "isohf/projection/projected_extent.h"
+
+namespace isohf {
+
+/// Up to this scale error `auto` keeps degrees equirectangular (docs/decisions/0016).
+inline constexpr double kEquirectangularError = 0.02;
+
+/// A ground in degrees that is to become metres.
+struct ProjectionProblem {
+  std::string path;  ///< of the source, for messages
+  std::string body;  ///< "Earth", ...; empty where unknown
+  Ellipsoid ellipsoid;
+  GeoExtent ground;         ///< latitudes within [-90, 90]
+  bool goes_round = false;  ///< its East side is its West side
+  /// What needs the source's rows to stay rows, as in "--lossless": auto then takes no other kind than
+  /// equirectangular, and others are refused. Empty where nothing does.
+  std::string keeps_rows;
+};
+
+struct ProjectionChoice {
+  ProjectionSpec spec;  ///< of kind none where degrees stay degrees
+  ScaleError error;
+  std::string why;  ///< one line
+};
+
+/// Fills in what the request leaves open from the ground: centre, zone, parallels, for auto the kind. Angles that are
+/// chosen are whole multiples of 0.0001 degrees.
+/// Throws Error{kInvalidArgument}, naming the kind that works, where the ground does not suit the kind: a pole outside
+/// polar-stereographic, both hemispheres in it, a scale that errs by more than 100 %.
+[[nodiscard]] ProjectionChoice choose_projection(const ProjectionRequest& request, const ProjectionProblem& problem);
+
+}  // namespace isohf

@@ -1,0 +1,30 @@
+#pragma once
+
+#include "isohf/projection/projection.h"
+
+namespace isohf {
+
+/// The least rectangle of a map around a ground, metres.
+struct MapBounds {
+  double west = 0.0;
+  double south = 0.0;
+  double east = 0.0;
+  double north = 0.0;
+};
+
+/// Bounds of a ground's image, found by walking along its four sides in many short steps. The curve between two of
+/// these places is allowed for: the bounds hold it, and exceed the image by less than 1e-5 of its size. NaN where a
+/// place on the way has no image.
+[[nodiscard]] MapBounds projected_bounds(const Projection& projection, const GeoExtent& ground);
+
+/// The worst scale on a ground, and where.
+struct ScaleError {
+  double worst = 0.0;  ///< deviation from 1: 0.01 for 1 %; infinite where a length has no bound
+  GeoPoint place;
+};
+
+/// Looks at 33 x 33 places, the sides included: on these kinds of map the worst lies on a side, in a corner or on the
+/// central meridian or parallel.
+[[nodiscard]] ScaleError worst_scale_error(const Projection& projection, const GeoExtent& ground);
+
+}  // namespace isohf

@@ -1,0 +1,255 @@
+#include "isohf/projection/projection.h"
+
+#include <fmt/format.h>
+
+#include <GeographicLib/AzimuthalEquidistant.hpp>
+#include <GeographicLib/Ellipsoid.hpp>
+#include <GeographicLib/LambertConformalConic.hpp>
+#include <GeographicLib/PolarStereographic.hpp>
+#include <GeographicLib/TransverseMercator.hpp>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <optional>
+
+#include "isohf/base/error.h"
+
+namespace isohf {
+namespace {
+
+constexpr double kDegree = std::numbers::pi / 180.0;
+constexpr double kNowhere = std::numeric_limits<double>::quiet_NaN();
+
+/// In [-180, 180].
+double normalised(double degrees) {
+  return std::remainder(degrees, 360.0);
+}
+
+}  // namespace
+
+double MapScale::error() const {
+  return std::max(std::abs(most - 1.0), std::abs(least - 1.0));
+}
+
+/// One projection around longitude 0 with northing 0 at its own natural origin.
+class Projection::Map {
+ public:
+  explicit Map(const ProjectionSpec& map_spec) : spec(map_spec) {}
+  virtual ~Map() = default;
+  Map(const Map&) = delete;
+  Map& operator=(const Map&) = delete;
+
+  [[nodiscard]] virtual MapPoint forward(double longitude, double latitude) const = 0;
+  [[nodiscard]] virtual GeoPoint inverse(double x, double y) const = 0;
+  [[nodiscard]] virtual MapScale scale(double longitude, double latitude) const = 0;
+
+  const ProjectionSpec spec;
+
+  class Equirectangular;
+  class Local;
+  class TransverseMercator;
+  class LambertConformal;
+  class PolarStereographic;
+};
+
+class Projection::Map::Equirectangular final : public Map {
+ public:
+  explicit Equirectangular(const ProjectionSpec& map_spec)
+      : Map(map_spec), degree_(degree_lengths(spec.ellipsoid, spec.latitude_0)) {}
+  [[nodiscard]] MapPoint forward(double longitude, double latitude) const override {
+    return {longitude * degree_.along_parallel, (latitude - spec.latitude_0) * degree_.along_meridian};
+  }
+  [[nodiscard]] GeoPoint inverse(double x, double y) const override {
+    return {x / degree_.along_parallel, spec.latitude_0 + y / degree_.along_meridian};
+  }
+  [[nodiscard]] MapScale scale(double, double latitude) const override {
+    const DegreeLengths here = degree_lengths(spec.ellipsoid, latitude);
+    const double along_parallel = degree_.along_parallel / here.along_parallel;
+    const double along_meridian = degree_.along_meridian / here.along_meridian;
+    return {std::min(along_parallel, along_meridian), std::max(along_parallel, along_meridian)};
+  }
+
+ private:
+  DegreeLengths degree_;
+};
+
+class Projection::Map::Local final : public Map {
+ public:
+  explicit Local(const ProjectionSpec& map_spec)
+      : Map(map_spec), map_(GeographicLib::Geodesic(spec.ellipsoid.semi_major_axis_m, spec.ellipsoid.flattening())) {}
+  [[nodiscard]] MapPoint forward(double longitude, double latitude) const override {
+    MapPoint at;
+    map_.Forward(spec.latitude_0, 0.0, latitude, longitude, at.easting, at.northing);
+    return at;
+  }
+  [[nodiscard]] GeoPoint inverse(double x, double y) const override {
+    GeoPoint at;
+    map_.Reverse(spec.latitude_0, 0.0, x, y, at.latitude, at.longitude);
+    return at;
+  }
+  [[nodiscard]] MapScale scale(double longitude, double latitude) const override {
+    double x = 0.0;
+    double y = 0.0;
+    double azimuth = 0.0;
+    double reciprocal = 1.0;
+    map_.Forward(spec.latitude_0, 0.0, latitude, longitude, x, y, azimuth, reciprocal);
+    // True to scale away from the centre, larger across.
+    const double across = 1.0 / reciprocal;
+    return {std::min(1.0, across), std::max(1.0, across)};
+  }
+
+ private:
+  GeographicLib::AzimuthalEquidistant map_;
+};
+
+class Projection::Map::TransverseMercator final : public Map {
+ public:
+  explicit TransverseMercator(const ProjectionSpec& map_spec)
+      : Map(map_spec), map_(spec.ellipsoid.semi_major_axis_m, spec.ellipsoid.flattening(), spec.scale_0) {
+    double x = 0.0;
+    map_.Forward(0.0, spec.latitude_0, 0.0, x, northing_0_);
+  }
+  [[nodiscard]] MapPoint forward(double longitude, double latitude) const override {
+    MapPoint at;
+    map_.Forward(0.0, latitude, longitude, at.easting, at.northing);
+    at.northing -= northing_0_;
+    return at;
+  }
+  [[nodiscard]] GeoPoint inverse(double x, double y) const override {
+    GeoPoint at;
+    map_.Reverse(0.0, x, y + northing_0_, at.latitude, at.longitude);
+    return at;
+  }
+  [[nodiscard]] MapScale scale(double longitude, double latitude) const override {
+    double x = 0.0;
+    double y = 0.0;
+    double gamma = 0.0;
+    double k = 1.0;
+    map_.Forward(0.0, latitude, longitude, x, y, gamma, k);
+    return {k, k};
+  }
+
+ private:
+  GeographicLib::TransverseMercator map_;
+  double northing_0_ = 0.0;
+};
+
+class Projection::Map::LambertConformal final : public Map {
+ public:
+  explicit LambertConformal(const ProjectionSpec& map_spec)
+      : Map(map_spec),
+        map_(spec.ellipsoid.semi_major_axis_m, spec.ellipsoid.flattening(), spec.parallel_1, spec.parallel_2, 1.0) {
+    double x = 0.0;
+    map_.Forward(0.0, spec.latitude_0, 0.0, x, northing_0_);
+  }
+  [[nodiscard]] MapPoint forward(double longitude, double latitude) const override {
+    MapPoint at;
+    map_.Forward(0.0, latitude, longitude, at.easting, at.northing);
+    at.northing -= northing_0_;
+    return at;
+  }
+  [[nodiscard]] GeoPoint inverse(double x, double y) const override {
+    GeoPoint at;
+    map_.Reverse(0.0, x, y + northing_0_, at.latitude, at.longitude);
+    return at;
+  }
+  [[nodiscard]] MapScale scale(double longitude, double latitude) const override {
+    double x = 0.0;
+    double y = 0.0;
+    double gamma = 0.0;
+    double k = 1.0;
+    map_.Forward(0.0, latitude, longitude, x, y, gamma, k);
+    return {k, k};
+  }
+
+ private:
+  GeographicLib::LambertConformalConic map_;
+  double northing_0_ = 0.0;
+};
+
+class Projection::Map::PolarStereographic final : public Map {
+ public:
+  explicit PolarStereographic(const ProjectionSpec& map_spec)
+      : Map(map_spec),
+        map_(spec.ellipsoid.semi_major_axis_m, spec.ellipsoid.flattening(), 1.0),
+        is_north_(spec.parallel_1 > 0.0) {
+    map_.SetScale(std::abs(spec.parallel_1), 1.0);
+  }
+  [[nodiscard]] MapPoint forward(double longitude, double latitude) const override {
+    MapPoint at;
+    map_.Forward(is_north_, latitude, longitude, at.easting, at.northing);
+    return at;
+  }
+  [[nodiscard]] GeoPoint inverse(double x, double y) const override {
+    GeoPoint at;
+    map_.Reverse(is_north_, x, y, at.latitude, at.longitude);
+    return at;
+  }
+  [[nodiscard]] MapScale scale(double longitude, double latitude) const override {
+    double x = 0.0;
+    double y = 0.0;
+    double gamma = 0.0;
+    double k = 1.0;
+    map_.Forward(is_north_, latitude, longitude, x, y, gamma, k);
+    return {k, k};
+  }
+
+ private:
+  GeographicLib::PolarStereographic map_;
+  bool is_north_;
+};
+
+Projection::Projection(const ProjectionSpec& spec) {
+  try {
+    switch (spec.kind) {
+      case ProjectionKind::kEquirectangular:
+        map_ = std::make_shared<Map::Equirectangular>(spec);
+        break;
+      case ProjectionKind::kLocal:
+        map_ = std::make_shared<Map::Local>(spec);
+        break;
+      case ProjectionKind::kTransverseMercator:
+      case ProjectionKind::kUtm:
+        map_ = std::make_shared<Map::TransverseMercator>(spec);
+        break;
+      case ProjectionKind::kLambertConformal:
+        map_ = std::make_shared<Map::LambertConformal>(spec);
+        break;
+      case ProjectionKind::kPolarStereographic:
+        map_ = std::make_shared<Map::PolarStereographic>(spec);
+        break;
+      case ProjectionKind::kNone:
+        throw Error(ErrorCode::kInvalidArgument, "projection none makes no map");
+    }
+  } catch (const std::exception& error) {
+    throw Error(ErrorCode::kInvalidArgument, fmt::format("projection {}: {}", to_string(spec.kind), error.what()));
+  }
+}
+
+const ProjectionSpec& Projection::spec() const {
+  return map_->spec;
+}
+
+MapPoint Projection::forward(GeoPoint place) const {
+  if (!(std::abs(place.latitude) <= 90.0) || !std::isfinite(place.longitude)) return {kNowhere, kNowhere};
+  const MapPoint at = map_->forward(normalised(place.longitude - map_->spec.longitude_0), place.latitude);
+  return {at.easting + map_->spec.false_easting, at.northing + map_->spec.false_northing};
+}
+
+GeoPoint Projection::inverse(MapPoint place) const {
+  const GeoPoint at =
+      map_->inverse(place.easting - map_->spec.false_easting, place.northing - map_->spec.false_northing);
+  return {normalised(at.longitude + map_->spec.longitude_0), at.latitude};
+}
+
+MapScale Projection::scale(GeoPoint place) const {
+  return map_->scale(normalised(place.longitude - map_->spec.longitude_0), place.latitude);
+}
+
+DegreeLengths degree_lengths(const Ellipsoid& ellipsoid, double latitude) {
+  const GeographicLib::Ellipsoid body(ellipsoid.semi_major_axis_m, ellipsoid.flattening());
+  return {body.CircleRadius(latitude) * kDegree, body.MeridionalCurvatureRadius(latitude) * kDegree};
+}
+
+}  // namespace isohf
