@@ -1,5 +1,6 @@
 /// isohf: elevation rasters to isometric heightfield archives. The command table; errors to exit codes.
 
+#include <fmt/core.h>
 #include <malloc.h>
 
 #include <csignal>
@@ -7,12 +8,14 @@
 #include <exception>
 #include <new>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "command.h"
 #include "command_line.h"
 #include "formats/registry.h"
 #include "isohf/base/error.h"
+#include "isohf/base/simd.h"
 #include "standard_output.h"
 
 namespace isohf::cli {
@@ -63,6 +66,7 @@ Alone:
       --version       Print the version
 
 ISOHF_MODULE_PATH names the folder of the OpenImageIO reader (default: beside the program, then ../lib/isohf).
+ISOHF_SIMD=off runs the plain twins of vectorised code: slower, and the same bytes.
 
 Results go to standard output, everything else to standard error.
 Exit codes: 0 done, 1 failed, 2 wrong usage, 3 verify or restore found differences, 130 interrupted.
@@ -141,6 +145,16 @@ void keep_freed_memory() {
 #endif
 }
 
+/// `setting`: "off" runs the plain twins of vectorised code, for tests and for finding faults.
+void choose_simd(const char* setting) {
+  const std::string_view text = setting == nullptr ? "on" : setting;
+  if (text != "on" && text != "off") {
+    throw Error(ErrorCode::kInvalidArgument,
+                fmt::format("the environment variable ISOHF_SIMD is '{}', must be on or off", text));
+  }
+  set_simd(text == "on");
+}
+
 }  // namespace
 }  // namespace isohf::cli
 
@@ -152,6 +166,7 @@ int main(int argc, char** argv) {
   keep_freed_memory();
   if (const char* folder = std::getenv("ISOHF_MODULE_PATH"); folder != nullptr) isohf::set_module_folder(folder);
   try {
+    choose_simd(std::getenv("ISOHF_SIMD"));
     return run(Arguments(argv + (argc > 0 ? 1 : 0), argv + argc));
   } catch (const OutputClosed&) {
     return kExitFailed;

@@ -64,8 +64,10 @@ inline void predict_places(const Neighbours<Wide>& at, const PredictorWeights& w
 }
 
 // Only free functions can be cloned for several machines, not templates.
-ISOHF_VECTORISED void predict_codes(const Neighbours<std::int32_t>& at, const PredictorWeights& weights,
-                                    std::int32_t low, std::int32_t high, std::int32_t* __restrict out) {
+ISOHF_VECTORISED(void, predict_codes,
+                 (const Neighbours<std::int32_t>& at, const PredictorWeights& weights, std::int32_t low,
+                  std::int32_t high, std::int32_t* __restrict out),
+                 (at, weights, low, high, out)) {
   predict_places(at, weights, low, high, out);
 }
 
@@ -91,8 +93,9 @@ inline void sum_above(const Neighbours<Wide>& at, const PredictorWeights& weight
   }
 }
 
-ISOHF_VECTORISED void sum_codes_above(const Neighbours<std::int32_t>& at, const PredictorWeights& weights,
-                                      std::int32_t* __restrict out) {
+ISOHF_VECTORISED(void, sum_codes_above,
+                 (const Neighbours<std::int32_t>& at, const PredictorWeights& weights, std::int32_t* __restrict out),
+                 (at, weights, out)) {
   sum_above<std::int32_t, std::uint32_t>(at, weights, out);
 }
 
@@ -138,7 +141,7 @@ constexpr int kThinning = 7;     // odd: rows of both kinds take part
 
 using Moments = std::array<std::array<std::int64_t, kTerms>, kTerms>;
 
-ISOHF_VECTORISED std::int32_t dot(const std::int16_t* a, const std::int16_t* b, int count) {
+ISOHF_VECTORISED(std::int32_t, dot, (const std::int16_t* a, const std::int16_t* b, int count), (a, b, count)) {
   std::int32_t sum = 0;
   for (int i = 0; i < count; ++i) sum += std::int32_t{a[i]} * b[i];
   return sum;
@@ -154,8 +157,10 @@ inline void scale_differences(const Wide* samples, const Wide* anchor, const flo
   }
 }
 
-ISOHF_VECTORISED void scale_code_differences(const std::int32_t* samples, const std::int32_t* anchor,
-                                             const float* scale, int count, std::int16_t* out) {
+ISOHF_VECTORISED(void, scale_code_differences,
+                 (const std::int32_t* samples, const std::int32_t* anchor, const float* scale, int count,
+                  std::int16_t* out),
+                 (samples, anchor, scale, count, out)) {
   scale_differences(samples, anchor, scale, count, out);
 }
 
@@ -213,14 +218,17 @@ template <typename Wide>
 inline void find_errors(const Wide* own, const Wide* predictions, int first, int last, float* __restrict errors) {
   for (int c = first; c <= last; ++c) errors[c] = std::abs(static_cast<float>(own[c] - predictions[c]));
 }
-ISOHF_VECTORISED void find_code_errors(const std::int32_t* own, const std::int32_t* predictions, int first, int last,
-                                       float* __restrict errors) {
+ISOHF_VECTORISED(void, find_code_errors,
+                 (const std::int32_t* own, const std::int32_t* predictions, int first, int last,
+                  float* __restrict errors),
+                 (own, predictions, first, last, errors)) {
   find_errors(own, predictions, first, last, errors);
 }
 
 /// A sample's weight: the inverse of the error that it and its neighbours on the row had, half and half.
-ISOHF_VECTORISED void weigh_by_errors(const float* __restrict errors, int first, int last, float overall,
-                                      float* __restrict scale) {
+ISOHF_VECTORISED(void, weigh_by_errors,
+                 (const float* __restrict errors, int first, int last, float overall, float* __restrict scale),
+                 (errors, first, last, overall, scale)) {
   constexpr float kFloor = 2.0F;  // errors below this, in units of 1/overall, tell nothing
   constexpr float kGain = 4.0F;
   const auto weight = [&](int c, float east) {

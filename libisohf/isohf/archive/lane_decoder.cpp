@@ -35,19 +35,22 @@ constexpr SymbolTable make_symbol_table() {
 constexpr SymbolTable kSymbolTable = make_symbol_table();
 constexpr unsigned kMaxExtraBits = 12;
 
-ISOHF_VECTORISED void find_activities_above(const std::uint32_t* __restrict north, int first, int last,
-                                            std::uint32_t* __restrict out) {
+ISOHF_VECTORISED(void, find_activities_above,
+                 (const std::uint32_t* __restrict north, int first, int last, std::uint32_t* __restrict out),
+                 (north, first, last, out)) {
   for (int place = first; place <= last; ++place) out[place] = activity_from_above(north, place);
 }
 
-ISOHF_VECTORISED bool all_within(const std::int32_t* samples, int first, int last, std::int32_t low,
-                                 std::int32_t high) {
+ISOHF_VECTORISED(bool, all_within,
+                 (const std::int32_t* samples, int first, int last, std::int32_t low, std::int32_t high),
+                 (samples, first, last, low, high)) {
   std::int32_t outside = 0;
   for (int place = first; place <= last; ++place) outside |= (samples[place] < low) | (samples[place] > high);
   return outside == 0;
 }
 
-ISOHF_VECTORISED void narrow(const std::int32_t* __restrict samples, int count, std::uint16_t* __restrict codes) {
+ISOHF_VECTORISED(void, narrow, (const std::int32_t* __restrict samples, int count, std::uint16_t* __restrict codes),
+                 (samples, count, codes)) {
   for (int i = 0; i < count; ++i) codes[i] = static_cast<std::uint16_t>(samples[i]);
 }
 
@@ -249,16 +252,16 @@ template <std::size_t kCount>
   for (std::size_t i = 0; i < kCount; ++i) lanes[i]->state = states[i];
 }
 // Only free functions can be cloned for several machines, not templates.
-ISOHF_VECTORISED void step_one(const Lanes& lanes, int first, int last) {
+ISOHF_VECTORISED(void, step_one, (const Lanes& lanes, int first, int last), (lanes, first, last)) {
   step_lanes<1>(lanes, first, last);
 }
-ISOHF_VECTORISED void step_two(const Lanes& lanes, int first, int last) {
+ISOHF_VECTORISED(void, step_two, (const Lanes& lanes, int first, int last), (lanes, first, last)) {
   step_lanes<2>(lanes, first, last);
 }
-ISOHF_VECTORISED void step_three(const Lanes& lanes, int first, int last) {
+ISOHF_VECTORISED(void, step_three, (const Lanes& lanes, int first, int last), (lanes, first, last)) {
   step_lanes<3>(lanes, first, last);
 }
-ISOHF_VECTORISED void step_four(const Lanes& lanes, int first, int last) {
+ISOHF_VECTORISED(void, step_four, (const Lanes& lanes, int first, int last), (lanes, first, last)) {
   step_lanes<4>(lanes, first, last);
 }
 

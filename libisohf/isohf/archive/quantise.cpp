@@ -19,8 +19,9 @@ struct CodeLine {
   std::int64_t above = 0;
 };
 
-ISOHF_VECTORISED void round_to_codes(const float* __restrict heights, std::size_t count, CodeLine& line,
-                                     std::uint16_t* __restrict codes) {
+ISOHF_VECTORISED(void, round_to_codes,
+                 (const float* __restrict heights, std::size_t count, CodeLine& line, std::uint16_t* __restrict codes),
+                 (heights, count, line, codes)) {
   const double inverse = line.inverse;
   const double shift = line.shift;
   const double last = line.last;

@@ -82,8 +82,9 @@ std::uint32_t fold(std::int64_t difference) {
   return zigzag(static_cast<std::int32_t>(difference));
 }
 
-ISOHF_VECTORISED void fold_row(const std::int32_t* own, const std::int32_t* predictions, int count,
-                               std::uint32_t* __restrict out) {
+ISOHF_VECTORISED(void, fold_row,
+                 (const std::int32_t* own, const std::int32_t* predictions, int count, std::uint32_t* __restrict out),
+                 (own, predictions, count, out)) {
   for (int i = 0; i < count; ++i) out[i] = fold(own[i] - predictions[i]);
 }
 void fold_row(const std::int64_t* own, const std::int64_t* predictions, int count, std::uint32_t* out) {
@@ -91,8 +92,10 @@ void fold_row(const std::int64_t* own, const std::int64_t* predictions, int coun
 }
 
 /// Activities of `count` places from `first` on.
-ISOHF_VECTORISED void find_activities(const std::uint32_t* north, const std::uint32_t* own, int first, int count,
-                                      std::uint32_t* __restrict out) {
+ISOHF_VECTORISED(void, find_activities,
+                 (const std::uint32_t* north, const std::uint32_t* own, int first, int count,
+                  std::uint32_t* __restrict out),
+                 (north, own, first, count, out)) {
   for (int i = 0; i < count; ++i) {
     out[i] = activity_from_above(north, first + i) + activity_from_west(own, first + i);
   }
@@ -168,8 +171,9 @@ struct Streams {
 };
 
 /// Symbols of residuals below 2^24: a float's exponent and upper three bits of mantissa are octave and eighth.
-ISOHF_VECTORISED void find_small_symbols(const std::uint32_t* __restrict folded, std::size_t count,
-                                         std::uint8_t* __restrict symbols) {
+ISOHF_VECTORISED(void, find_small_symbols,
+                 (const std::uint32_t* __restrict folded, std::size_t count, std::uint8_t* __restrict symbols),
+                 (folded, count, symbols)) {
   constexpr std::int32_t kFirst = (127 + 4) * 8 - static_cast<std::int32_t>(kFirstSplitSymbol);
   for (std::size_t i = 0; i < count; ++i) {
     const auto residual = static_cast<std::int32_t>(folded[i]);
@@ -184,8 +188,10 @@ void find_symbols(const Residuals& residuals, CodeType type, std::uint8_t* symbo
   for (std::size_t i = 0; i < residuals.count; ++i) symbols[i] = static_cast<std::uint8_t>(symbol_of(folded[i]));
 }
 
-ISOHF_VECTORISED void find_levels(const std::uint32_t* __restrict activities, std::size_t count, unsigned shift,
-                                  std::uint16_t* __restrict levels) {
+ISOHF_VECTORISED(void, find_levels,
+                 (const std::uint32_t* __restrict activities, std::size_t count, unsigned shift,
+                  std::uint16_t* __restrict levels),
+                 (activities, count, shift, levels)) {
   for (std::size_t i = 0; i < count; ++i) levels[i] = static_cast<std::uint16_t>(activity_level(activities[i], shift));
 }
 
@@ -217,8 +223,10 @@ class BitPacker {
 };
 
 /// The extra bits of two neighbouring residuals of codes, together no more than 24, and how many these are.
-ISOHF_VECTORISED void join_extra_bits(const std::uint32_t* __restrict folded, std::size_t pairs,
-                                      std::uint32_t* __restrict bits, std::uint32_t* __restrict counts) {
+ISOHF_VECTORISED(void, join_extra_bits,
+                 (const std::uint32_t* __restrict folded, std::size_t pairs, std::uint32_t* __restrict bits,
+                  std::uint32_t* __restrict counts),
+                 (folded, pairs, bits, counts)) {
   constexpr std::int32_t kFirstOctave = 127 + 4;
   for (std::size_t i = 0; i < pairs; ++i) {
     const auto extra = [&](std::uint32_t value, std::uint32_t& count) {
@@ -349,7 +357,8 @@ struct CodeRange {
   std::int32_t voids = 0;
 };
 
-ISOHF_VECTORISED CodeRange range_of_codes(const std::uint16_t* codes, std::size_t count, std::int32_t void_code) {
+ISOHF_VECTORISED(CodeRange, range_of_codes, (const std::uint16_t* codes, std::size_t count, std::int32_t void_code),
+                 (codes, count, void_code)) {
   std::int32_t low = 0xffff;
   std::int32_t high = 0;
   std::int32_t voids = 0;

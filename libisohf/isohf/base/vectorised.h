@@ -1,9 +1,29 @@
 #pragma once
 
-/// Marks a free function to be compiled twice, for machines with AVX2 and for all, the better one chosen at start-up.
-/// Only for arithmetic whose results are the same either way: integers, and single IEEE operations.
+#include "isohf/base/simd.h"
+
+/// Defines a function that is compiled twice, for machines with AVX2 and for all, the better one chosen at run time:
+///
+///   ISOHF_VECTORISED(void, add, (const float* __restrict a, int count, float* __restrict sum), (a, count, sum)) {
+///     for (int i = 0; i < count; ++i) sum[i] += a[i];
+///   }
+///
+/// Only for arithmetic whose results are the same either way: integers, and single IEEE operations (fused ones are off
+/// everywhere). `__restrict` belongs to every pointer that is written through: without it most loops stay scalar.
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__)
-#define ISOHF_VECTORISED __attribute__((target_clones("arch=x86-64-v3", "default")))
+#define ISOHF_VECTORISED(result, name, parameters, arguments)                                    \
+  [[gnu::always_inline]] inline result name##_kernel parameters;                                 \
+  [[gnu::target("arch=x86-64-v3"), gnu::noinline]] result name##_wide parameters {               \
+    return name##_kernel arguments;                                                              \
+  }                                                                                              \
+  [[gnu::noinline]] result name##_plain parameters {                                             \
+    return name##_kernel arguments;                                                              \
+  }                                                                                              \
+  inline result name parameters {                                                                \
+    return ::isohf::detail::simd_is_on.load(std::memory_order_relaxed) ? name##_wide arguments   \
+                                                                       : name##_plain arguments; \
+  }                                                                                              \
+  inline result name##_kernel parameters
 #else
-#define ISOHF_VECTORISED
+#define ISOHF_VECTORISED(result, name, parameters, arguments) inline result name parameters
 #endif

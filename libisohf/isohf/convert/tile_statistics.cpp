@@ -19,7 +19,8 @@ struct CodeSum {
   std::int32_t high = 0;
 };
 
-ISOHF_VECTORISED CodeSum sum_codes(const std::uint16_t* codes, int count, std::int32_t void_code) {
+ISOHF_VECTORISED(CodeSum, sum_codes, (const std::uint16_t* codes, int count, std::int32_t void_code),
+                 (codes, count, void_code)) {
   std::uint32_t sum = 0;
   std::int32_t voids = 0;
   std::int32_t low = 0xffff;

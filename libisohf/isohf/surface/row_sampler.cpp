@@ -12,11 +12,13 @@ namespace {
 
 constexpr float kVoid = std::numeric_limits<float>::quiet_NaN();
 
-ISOHF_VECTORISED void weigh(const float* __restrict in, float weight, std::int64_t count, float* __restrict out) {
+ISOHF_VECTORISED(void, weigh, (const float* __restrict in, float weight, std::int64_t count, float* __restrict out),
+                 (in, weight, count, out)) {
   for (std::int64_t k = 0; k < count; ++k) out[k] = weight * in[k];
 }
-ISOHF_VECTORISED void add_weighted(const float* __restrict in, float weight, std::int64_t count,
-                                   float* __restrict out) {
+ISOHF_VECTORISED(void, add_weighted,
+                 (const float* __restrict in, float weight, std::int64_t count, float* __restrict out),
+                 (in, weight, count, out)) {
   for (std::int64_t k = 0; k < count; ++k) out[k] += weight * in[k];
 }
 
@@ -75,17 +77,20 @@ inline void gather_columns(const ColumnTaps& columns, const float* __restrict li
   }
 }
 // Only free functions can be cloned for several machines, not templates.
-ISOHF_VECTORISED void gather_two(const ColumnTaps& columns, const float* __restrict line, float* __restrict out) {
+ISOHF_VECTORISED(void, gather_two, (const ColumnTaps& columns, const float* __restrict line, float* __restrict out),
+                 (columns, line, out)) {
   gather_columns<2>(columns, line, out);
 }
-ISOHF_VECTORISED void gather_four(const ColumnTaps& columns, const float* __restrict line, float* __restrict out) {
+ISOHF_VECTORISED(void, gather_four, (const ColumnTaps& columns, const float* __restrict line, float* __restrict out),
+                 (columns, line, out)) {
   gather_columns<4>(columns, line, out);
 }
-ISOHF_VECTORISED void gather_six(const ColumnTaps& columns, const float* __restrict line, float* __restrict out) {
+ISOHF_VECTORISED(void, gather_six, (const ColumnTaps& columns, const float* __restrict line, float* __restrict out),
+                 (columns, line, out)) {
   gather_columns<6>(columns, line, out);
 }
 
-ISOHF_VECTORISED bool has_nan(const float* values, std::size_t count) {
+ISOHF_VECTORISED(bool, has_nan, (const float* values, std::size_t count), (values, count)) {
   std::int32_t any = 0;
   for (std::size_t i = 0; i < count; ++i) any |= values[i] != values[i] ? 1 : 0;
   return any != 0;
