@@ -1,10 +1,13 @@
 #include "formats/exr_threads.h"
 
 #include <OpenEXR/ImfThreading.h>
+#include <OpenEXR/OpenEXRConfig.h>
 
 #include <algorithm>
 #include <mutex>
 #include <thread>
+
+#include "formats/libraries.h"
 
 namespace isohf {
 
@@ -13,6 +16,10 @@ void start_exr_threads() {
   std::call_once(once, [] {
     Imf::setGlobalThreadCount(static_cast<int>(std::clamp(std::thread::hardware_concurrency(), 1U, 4U)));
   });
+}
+
+std::string exr_library() {
+  return "OpenEXR " OPENEXR_VERSION_STRING;
 }
 
 }  // namespace isohf

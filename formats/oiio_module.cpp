@@ -181,11 +181,52 @@ void module_close(IsohfOiioRaster* raster) {
   delete raster;
 }
 
+const char* module_library() {
+  static const std::string text = "OpenImageIO " + std::to_string(OIIO::openimageio_version() / 10000) + "." +
+                                  std::to_string(OIIO::openimageio_version() / 100 % 100) + "." +
+                                  std::to_string(OIIO::openimageio_version() % 100);
+  return text.c_str();
+}
+
+/// OpenImageIO has them as "bmp:bmp,dib;cineon:cin;...", formats that it only writes as well.
+const char* module_extensions() {
+  static const std::string text = [] {
+    std::string readable(1, ',');
+    readable += std::string(OIIO::get_string_attribute("input_format_list"));
+    readable += ',';
+    const std::string all{OIIO::get_string_attribute("extension_list")};
+    std::string list;
+    for (std::size_t at = 0; at < all.size();) {
+      const std::size_t end = std::min(all.find(';', at), all.size());
+      const std::size_t colon = std::min(all.find(':', at), end);
+      std::string name(1, ',');
+      name.append(all, at, colon - at);
+      name += ',';
+      if (readable.find(name) != std::string::npos && colon < end) {
+        std::string extensions = all.substr(colon + 1, end - colon - 1);
+        std::replace(extensions.begin(), extensions.end(), ',', ' ');
+        if (!list.empty()) list += ' ';
+        list += extensions;
+      }
+      at = end + 1;
+    }
+    return list;
+  }();
+  return text.c_str();
+}
+
 }  // namespace
 
 extern "C" __attribute__((visibility("default"))) const IsohfOiioModule* isohf_oiio_module() {
-  static const IsohfOiioModule module = {ISOHF_OIIO_ABI,         module_open,           module_read,
-                                         module_close,           isohf_oiio_open_photo, isohf_oiio_read_photo,
-                                         isohf_oiio_bound_photo, isohf_oiio_close_photo};
+  static const IsohfOiioModule module = {ISOHF_OIIO_ABI,
+                                         module_open,
+                                         module_read,
+                                         module_close,
+                                         isohf_oiio_open_photo,
+                                         isohf_oiio_read_photo,
+                                         isohf_oiio_bound_photo,
+                                         isohf_oiio_close_photo,
+                                         module_library,
+                                         module_extensions};
   return &module;
 }

@@ -12,7 +12,7 @@
 extern "C" {
 
 /// Raised whenever anything below changes; the loader refuses any other.
-#define ISOHF_OIIO_ABI 2
+#define ISOHF_OIIO_ABI 3
 
 typedef struct IsohfOiioRaster IsohfOiioRaster;
 
@@ -63,6 +63,9 @@ typedef int (*IsohfOiioReadPhoto)(IsohfOiioPhoto* photo, int64_t column, int64_t
 typedef void (*IsohfOiioBoundPhoto)(IsohfOiioPhoto* photo, int64_t bytes);
 typedef void (*IsohfOiioClosePhoto)(IsohfOiioPhoto* photo);
 
+/// "OpenImageIO 2.4.7", and the extensions of all formats that it reads: "bmp fits ...". Both stay valid.
+typedef const char* (*IsohfOiioText)(void);
+
 typedef struct IsohfOiioModule {
   int32_t abi;
   IsohfOiioOpen open;
@@ -72,6 +75,8 @@ typedef struct IsohfOiioModule {
   IsohfOiioReadPhoto read_photo;
   IsohfOiioBoundPhoto bound_photo;
   IsohfOiioClosePhoto close_photo;
+  IsohfOiioText library;
+  IsohfOiioText extensions;
 } IsohfOiioModule;
 
 /// The one symbol that the module exports, and its name.

@@ -3,6 +3,9 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <sstream>
+
+#include "formats/libraries.h"
 #include "formats/oiio_loader.h"
 #include "formats/open_options.h"
 #include "isohf/base/assert.h"
@@ -74,6 +77,14 @@ std::unique_ptr<HeightSource> open_with_oiio(const std::string& path, const Open
     throw Error(error.code(),
                 fmt::format("{}: unknown format; read natively: {}; {}", path, native_names(), error.what()));
   }
+}
+
+OiioFormats oiio_formats() {
+  const IsohfOiioModule& module = oiio_module();
+  OiioFormats formats{module.library(), {}};
+  std::istringstream extensions(module.extensions());
+  for (std::string extension; extensions >> extension;) formats.extensions.push_back("." + extension);
+  return formats;
 }
 
 }  // namespace isohf

@@ -12,6 +12,7 @@
 #include <filesystem>
 #include <vector>
 
+#include "formats/libraries.h"
 #include "formats/open_options.h"
 #include "isohf/base/assert.h"
 #include "isohf/base/error.h"
@@ -306,6 +307,10 @@ bool looks_like_png(std::span<const std::byte> head) {
 
 std::unique_ptr<HeightSource> open_png(const std::string& path, const OpenOptions& options) {
   return std::make_unique<PngSource>(path, options);
+}
+
+std::string png_library() {
+  return std::string("libpng ") + png_get_libpng_ver(nullptr);
 }
 
 }  // namespace isohf

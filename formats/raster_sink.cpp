@@ -3,10 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cctype>
 #include <limits>
 
+#include "formats/libraries.h"
 #include "formats/output_part.h"
 #include "formats/raster_encoder.h"
 #include "isohf/base/error.h"
@@ -15,12 +15,19 @@ namespace isohf {
 namespace {
 
 struct Writer {
-  const char* extension;
+  Format format;
   std::unique_ptr<RasterEncoder> (*encode)(const std::string& path, const RasterSpec& spec);
 };
 
-constexpr std::array<Writer, 5> kWriters = {
-    {{".tif", encode_tiff}, {".tiff", encode_tiff}, {".exr", encode_exr}, {".png", encode_png}, {".hgt", encode_hgt}}};
+const std::vector<Writer>& writers() {
+  static const std::vector<Writer> table = {
+      {{"GeoTIFF", {".tif", ".tiff"}, tiff_library, "samples of any type"}, encode_tiff},
+      {{"OpenEXR", {".exr"}, exr_library, "float16, float32, uint32"}, encode_exr},
+      {{"PNG", {".png"}, png_library, "uint8, uint16"}, encode_png},
+      {{"SRTM HGT", {".hgt"}, nullptr, "int16; 1201x1201, 3601x3601 or 1801x3601"}, encode_hgt},
+  };
+  return table;
+}
 
 std::string lower_extension(const std::string& path) {
   const std::size_t dot = path.rfind('.');
@@ -33,8 +40,10 @@ std::string lower_extension(const std::string& path) {
 
 const Writer& writer_for(const std::string& path) {
   const std::string extension = lower_extension(path);
-  for (const Writer& writer : kWriters) {
-    if (extension == writer.extension) return writer;
+  for (const Writer& writer : writers()) {
+    for (const char* known : writer.format.extensions) {
+      if (extension == known) return writer;
+    }
   }
   throw Error(ErrorCode::kUnsupported, fmt::format("no writer for the extension \"{}\"; there are {}", extension,
                                                    fmt::join(writable_extensions(), " ")));
@@ -105,11 +114,21 @@ std::unique_ptr<RasterSink> create_raster(const std::string& path, const RasterS
 const std::vector<std::string>& writable_extensions() {
   static const std::vector<std::string> extensions = [] {
     std::vector<std::string> list;
-    list.reserve(kWriters.size());
-    for (const Writer& writer : kWriters) list.emplace_back(writer.extension);
+    for (const Format& format : writable_formats()) {
+      list.insert(list.end(), format.extensions.begin(), format.extensions.end());
+    }
     return list;
   }();
   return extensions;
+}
+
+const std::vector<Format>& writable_formats() {
+  static const std::vector<Format> formats = [] {
+    std::vector<Format> list;
+    for (const Writer& writer : writers()) list.push_back(writer.format);
+    return list;
+  }();
+  return formats;
 }
 
 }  // namespace isohf

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "formats/registry.h"
 #include "isohf/surface/heightmap.h"
 
 namespace isohf {
@@ -71,5 +72,8 @@ class RasterSink {
 
 /// The extensions that create_raster knows: ".tif", ...
 [[nodiscard]] const std::vector<std::string>& writable_extensions();
+
+/// The formats behind them; a note says what samples one holds.
+[[nodiscard]] const std::vector<Format>& writable_formats();
 
 }  // namespace isohf

@@ -18,6 +18,7 @@
 #include "formats/header_grid_source.h"
 #include "formats/hgt_source.h"
 #include "formats/isis3_source.h"
+#include "formats/libraries.h"
 #include "formats/npy_source.h"
 #include "formats/oiio_source.h"
 #include "formats/pds3_source.h"
@@ -40,19 +41,19 @@ struct Reader {
 
 const std::vector<Reader>& readers() {
   static const std::vector<Reader> table = {
-      {{"OpenEXR", {".exr"}}, looks_like_exr, open_exr},
-      {{"TIFF", {".tif", ".tiff"}}, looks_like_tiff, open_tiff},
-      {{"PNG", {".png"}}, looks_like_png, open_png},
+      {{"OpenEXR", {".exr"}, exr_library, "takes --channel"}, looks_like_exr, open_exr},
+      {{"TIFF", {".tif", ".tiff"}, tiff_library, "takes --channel"}, looks_like_tiff, open_tiff},
+      {{"PNG", {".png"}, png_library, "takes --channel"}, looks_like_png, open_png},
       {{"ESRI ASCII grid", {".asc"}}, looks_like_ascii_grid, open_ascii_grid},
       {{"GridFloat or EHdr header", {".hdr"}}, looks_like_grid_header, open_header_grid},
       {{"GridFloat", {".flt"}}, nullptr, open_header_grid},
       {{"EHdr", {".bil", ".bip", ".bsq"}}, nullptr, open_header_grid},
-      {{"PDS3", {".img", ".lbl"}}, looks_like_pds3, open_pds3, has_pds3_label},
-      {{"ISIS3 cube", {".cub"}}, looks_like_isis3, open_isis3},
+      {{"PDS3", {".img", ".lbl"}, nullptr, "takes --channel"}, looks_like_pds3, open_pds3, has_pds3_label},
+      {{"ISIS3 cube", {".cub"}, nullptr, "takes --channel"}, looks_like_isis3, open_isis3},
       {{"NumPy", {".npy"}}, looks_like_npy, open_npy},
       {{"DTED", {".dt0", ".dt1", ".dt2"}}, looks_like_dted, open_dted},
       {{"SRTM HGT", {".hgt", ".hgt.zip"}}, nullptr, open_hgt},
-      {{"raw samples", {".r8", ".r16", ".r32", ".f32", ".f64", ".raw"}}, nullptr, open_raw},
+      {{"raw samples", {".r8", ".r16", ".r32", ".f32", ".f64", ".raw"}, nullptr, "needs --raw"}, nullptr, open_raw},
   };
   return table;
 }
@@ -106,6 +107,12 @@ const Reader* reader_of(const std::string& path, std::span<const std::byte> head
   return nullptr;
 }
 
+const Format& raw_format() {
+  const auto raw =
+      std::find_if(readers().begin(), readers().end(), [](const Reader& reader) { return reader.open == open_raw; });
+  return raw->format;
+}
+
 }  // namespace
 
 const std::vector<Format>& native_formats() {
@@ -115,6 +122,17 @@ const std::vector<Format>& native_formats() {
     return list;
   }();
   return formats;
+}
+
+const Format* native_format_of(const std::string& path, const OpenOptions& options) {
+  const Head head = read_head(path);
+  if (options.raw) return &raw_format();
+  const Reader* reader = reader_of(path, std::span(head.bytes).first(head.size));
+  return reader != nullptr ? &reader->format : nullptr;
+}
+
+std::string library_of(const Format& format) {
+  return format.library != nullptr ? format.library() : "isohf";
 }
 
 std::unique_ptr<HeightSource> open_source(const std::string& path, const OpenOptions& options) {

@@ -29,14 +29,23 @@ struct OpenOptions {
   std::optional<RawLayout> raw;   ///< the file is nothing but these samples, whatever its name and content say
 };
 
-/// One row of the table of formats.
+/// One row of a table of formats.
 struct Format {
   const char* name;                     ///< "OpenEXR"
   std::vector<const char*> extensions;  ///< ".exr"; lower case
+  std::string (*library)() = nullptr;   ///< "libpng 1.6.39": who reads or writes it; nullptr: isohf's own code
+  std::string note = {};                ///< what is special: an option that it takes or needs, samples that it holds
 };
 
 /// The formats read natively, in the order in which they are tried.
 [[nodiscard]] const std::vector<Format>& native_formats();
+
+/// The native format in which open_source() would read this file; nullptr where none knows it. Throws Error{kIo,
+/// kCorrupt} as open_source does for what is no readable file.
+[[nodiscard]] const Format* native_format_of(const std::string& path, const OpenOptions& options);
+
+/// "libtiff 4.5.0", or "isohf".
+[[nodiscard]] std::string library_of(const Format& format);
 
 /// Names a folder in which the OpenImageIO module is looked for first; empty: only beside the program and in
 /// ../lib/isohf. A program calls it before it opens anything.

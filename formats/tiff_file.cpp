@@ -12,6 +12,7 @@
 #include <exception>
 #include <utility>
 
+#include "formats/libraries.h"
 #include "isohf/base/error.h"
 
 namespace isohf {
@@ -416,6 +417,13 @@ std::unique_ptr<TiffHandle> TiffHandlePool::take() {
 void TiffHandlePool::give_back(std::unique_ptr<TiffHandle> handle) {
   const std::lock_guard lock(mutex_);
   idle_.push_back(std::move(handle));
+}
+
+std::string tiff_library() {
+  // "LIBTIFF, Version 4.5.0" and lines of copyright.
+  const std::string text = TIFFGetVersion();
+  const std::size_t number = std::min(text.find_first_of("0123456789"), text.size());
+  return "libtiff " + text.substr(number, text.find('\n') - number);
 }
 
 }  // namespace isohf

@@ -1,4 +1,4 @@
-/// isohf info: what an archive holds.
+/// isohf info: what an archive or a raster holds.
 
 #include <fmt/format.h>
 
@@ -11,10 +11,13 @@
 #include "describe.h"
 #include "isohf/archive/reader.h"
 #include "isohf/archive/texture_info.h"
+#include "isohf/base/error.h"
 #include "isohf/restore/lossless.h"
 #include "json_output.h"
 #include "options_common.h"
+#include "options_source.h"
 #include "options_texture.h"
+#include "raster_info.h"
 #include "standard_output.h"
 
 namespace isohf::cli {
@@ -22,29 +25,42 @@ namespace {
 
 using nlohmann::ordered_json;
 
-constexpr const char* kFooter = R"(Reads the index and the metadata, no tile.
+constexpr const char* kFooter =
+    R"(Of an archive, the index and the metadata are read, no tile; of a raster, no sample unless --stats is given.
 
 Examples:
   isohf info dem.isohf
+  isohf info dem.tif --stats          what is understood of a raster, its range and its voids
   isohf info dem.isohf --tiles        one line a tile: column row bytes minimum maximum voids
   isohf info dem.isohf --json         the metadata and what follows from it)";
 
 struct InfoOptions {
   CommonOptions common;
-  std::string archive;
+  WorkOptions work;
+  std::string input;
   bool tiles = false;
+  OpenOptions open;
+  bool stats = false;
+  std::vector<std::string> for_rasters;  ///< options given that only rasters take
 };
 
 std::optional<InfoOptions> parse(const Arguments& arguments) {
   InfoOptions options;
-  CommandLine line("info", "Says what an archive holds.");
+  CommandLine line("info", "Says what an archive or a raster holds.");
   line.group("Arguments");
-  line.positional("ARCHIVE", "-i,--input", "Archive to describe", options.archive);
-  line.flag("--tiles", "List the tiles", options.tiles);
+  line.positional("INPUT", "-i,--input", "Archive or raster to describe", options.input);
+  line.flag("--tiles", "List an archive's tiles", options.tiles);
+  line.flag("--stats", "Read all samples of a raster: range, mean, voids", options.stats);
+  add_source_options(line, options.open);
+  add_work_options(line, options.work);
   add_common_options(line, options.common);
   line.footer(kFooter);
   if (!line.parse(arguments)) return std::nullopt;
-  line.require("ARCHIVE", options.archive);
+  line.require("INPUT", options.input);
+  for (const char* option :
+       {"--stats", "--channel", "--registration", "--nodata", "--z-scale", "--z-offset", "--raw", "--sample-spacing"}) {
+    if (line.given(option)) options.for_rasters.emplace_back(option);
+  }
   return options;
 }
 
@@ -257,7 +273,18 @@ void print_tiles(const ArchiveReader& archive, StandardOutput& out) {
 }
 
 int run(const InfoOptions& options) {
-  const ArchiveReader archive(options.archive);
+  if (!is_archive(options.input, options.open)) {
+    if (options.tiles) {
+      throw Error(ErrorCode::kInvalidArgument, "info: --tiles is for archives, " + options.input + " is none");
+    }
+    print_raster_info(options.input, options.open, options.stats, options.work, options.common);
+    return kExitDone;
+  }
+  if (!options.for_rasters.empty()) {
+    throw Error(ErrorCode::kInvalidArgument,
+                "info: " + options.for_rasters.front() + " is for rasters, " + options.input + " is an archive");
+  }
+  const ArchiveReader archive(options.input);
   if (!options.common.quiet) {
     for (const std::string& warning : archive.warnings()) print_warning(warning);
   }

@@ -30,11 +30,12 @@ struct Command {
 constexpr Command kCommands[] = {
     {"plan", "List tile shapes, or what convert would make of an input", command_plan},
     {"convert", "Turn a raster of elevations into an archive", command_convert},
-    {"info", "Say what an archive holds", command_info},
+    {"info", "Say what an archive or a raster holds", command_info},
     {"verify", "Check an archive, and compare it with its source", command_verify},
     {"restore", "Turn an archive back into a raster", command_restore},
     {"sample", "Print elevation and normal at places", command_sample},
     {"shade", "Draw a picture of the surface with its shadows", command_shade},
+    {"formats", "List what can be read and written", command_formats},
     {"experiment", "Measure iso and ortho meshes against sine waves, as the paper does", command_experiment},
 };
 

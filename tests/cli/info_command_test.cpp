@@ -1,6 +1,8 @@
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <functional>
 #include <limits>
 #include <nlohmann/json.hpp>
 
@@ -70,10 +72,80 @@ TEST_F(InfoCommand, TilesAreListedOneALine) {
   EXPECT_THAT(text.out, HasSubstr(" 0 void void all\n"));
 }
 
+TEST_F(InfoCommand, SaysWhatIsUnderstoodOfARaster) {
+  const RunResult result = run_isohf({"info", folder / "a.tif"});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_EQ(result.err, "");
+  for (const char* part : {"a.tif: TIFF, read by libtiff ", "200 x 100 float32, stored in blocks of 200 x ",
+                           "point: samples on posts, taken for granted without", "NaN and infinities"}) {
+    EXPECT_THAT(result.out, HasSubstr(part));
+  }
+  EXPECT_THAT(result.out, testing::Not(HasSubstr("range")));  // no sample is read
+
+  const RunResult stats = run_isohf({"info", folder / "a.tif", "--stats", "--registration", "area"});
+  EXPECT_EQ(stats.err, "");
+  EXPECT_THAT(stats.out, HasSubstr("area: samples in the middle of pixels, by --registration"));
+  EXPECT_THAT(stats.out, HasSubstr("0 .. 297, mean 148.5\n"));
+  EXPECT_THAT(stats.out, HasSubstr("20 000, 10 000 of them void\n"));
+
+  const json info = json::parse(run_isohf({"info", folder / "a.tif", "--json", "--stats"}).out);
+  EXPECT_EQ(info.at("width"), 200);
+  EXPECT_EQ(info.at("statistics").at("voids"), 10000);
+  EXPECT_EQ(info.at("statistics").at("mean"), 148.5);
+  EXPECT_EQ(info.at("registration_from"), "default");
+  EXPECT_TRUE(info.at("origin").is_null());
+  EXPECT_TRUE(json::parse(run_isohf({"info", folder / "a.tif", "--json"}).out).at("statistics").is_null());
+}
+
+TEST_F(InfoCommand, RastersAndArchivesTakeTheirOwnOptions) {
+  for (const std::vector<std::string>& arguments : {std::vector<std::string>{"info", folder / "a.tif", "--tiles"},
+                                                    {"info", folder / "a.isohf", "--stats"},
+                                                    {"info", folder / "a.isohf", "--nodata", "3"}}) {
+    const RunResult result = run_isohf(arguments);
+    EXPECT_EQ(result.exit_code, 2) << arguments.back();
+    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+  }
+}
+
+/// What says that a raster of these samples holds voids that it does not declare.
+std::string spike_warning(const TemporaryFolder& folder,
+                          const std::function<std::int16_t(std::int64_t, std::int64_t)>& height_at) {
+  write_int16_tiff(folder / "s.tif", 64, 48, height_at);
+  return run_isohf({"info", folder / "s.tif", "--stats"}).err;
+}
+
+TEST_F(InfoCommand, WarnsOfVoidsThatAreNotDeclared) {
+  const auto land = [](std::int64_t c, std::int64_t r) { return static_cast<std::int16_t>(100 + 3 * c + r); };
+  for (const int mark : {-32768, -9999, 9999, 32767}) {
+    const std::string warning = spike_warning(folder, [&](std::int64_t c, std::int64_t r) {
+      return c == 7 && r < 3 ? static_cast<std::int16_t>(mark) : land(c, r);
+    });
+    EXPECT_EQ(warning, fmt::format("isohf: warning: {}: 3 samples hold {}, far from all others (100 to 336): if that "
+                                   "means no elevation, give --nodata {}\n",
+                                   folder / "s.tif", mark, mark));
+  }
+  // Convert says the same; with --nodata nobody does.
+  EXPECT_THAT(run_isohf({"convert", folder / "s.tif", folder / "s.isohf"}).err, HasSubstr("3 samples hold 32767"));
+  EXPECT_EQ(run_isohf({"convert", folder / "s.tif", folder / "t.isohf", "--nodata", "32767"}).err, "");
+}
+
+TEST_F(InfoCommand, TakesNoOrdinaryElevationForAVoid) {
+  // All codes, a range that happens to end on a mark, and a step of -32768 under its neighbours.
+  EXPECT_EQ(spike_warning(folder, [](std::int64_t c,
+                                     std::int64_t r) { return static_cast<std::int16_t>(-32768 + 21 * (c + 64 * r)); }),
+            "");
+  EXPECT_EQ(spike_warning(folder,
+                          [](std::int64_t c, std::int64_t r) { return static_cast<std::int16_t>(-9999 + c * c + r); }),
+            "");
+  EXPECT_EQ(spike_warning(folder, [](std::int64_t c,
+                                     std::int64_t) { return static_cast<std::int16_t>(c == 0 ? -9999 : c * 200); }),
+            "");
+}
+
 TEST_F(InfoCommand, WhatIsNoArchiveIsRefusedInOneLine) {
   write_file(folder / "empty.isohf", "");
   write_file(folder / "short.isohf", read_file(folder / "a.isohf").substr(0, 500));
-  for (const char* name : {"none.isohf", "empty.isohf", "short.isohf", "a.tif"}) {
+  for (const char* name : {"none.isohf", "empty.isohf", "short.isohf"}) {
     for (const char* command : {"info", "sample"}) {
       const RunResult result = run_isohf({command, folder / name});
       EXPECT_EQ(result.exit_code, 1) << name;

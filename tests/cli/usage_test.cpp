@@ -14,8 +14,8 @@ namespace {
 
 using testing::HasSubstr;
 
-const std::vector<std::string> kCommands = {"plan",    "convert", "info",  "verify",
-                                            "restore", "sample",  "shade", "experiment"};
+const std::vector<std::string> kCommands = {"plan",   "convert", "info",    "verify",    "restore",
+                                            "sample", "shade",   "formats", "experiment"};
 
 std::set<std::string> long_options_in(const std::string& text) {
   std::set<std::string> found;
@@ -100,7 +100,7 @@ TEST(Usage, MissingAndSuperfluousArgumentsAreNamed) {
   expect_usage_error({"convert"}, "convert: no INPUT given");
   expect_usage_error({"convert", "a.tif"}, "convert: no OUTPUT given");
   expect_usage_error({"convert", "a.tif", "b.isohf", "c"}, "'c' is one argument too many");
-  expect_usage_error({"info"}, "no ARCHIVE given");
+  expect_usage_error({"info"}, "no INPUT given");
   expect_usage_error({"verify"}, "no ARCHIVE given");
   expect_usage_error({"sample"}, "no ARCHIVE given");
   expect_usage_error({"convert", "a.tif", "b.isohf", "--density"}, "--density lacks its value");

@@ -5,13 +5,19 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <set>
+#include <string>
+
 #include "formats/raster_reference.h"
+#include "formats/raster_sink.h"
 #include "isohf/base/error.h"
 
 namespace isohf::testing {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::MatchesRegex;
 
 Error refusal(const std::string& path) {
   return error_of([&] { (void)open_source(path, {}); });
@@ -91,6 +97,51 @@ TEST(OpenSource, LoadsNoOtherImageLibraryForNativeFormats) {
       EXPECT_EQ(line.find(library), std::string::npos) << line;
     }
   }
+}
+
+TEST(Formats, AreListedWithTheLibraryThatReadsThem) {
+  std::set<std::string> extensions;
+  for (const Format& format : native_formats()) {
+    EXPECT_FALSE(format.extensions.empty()) << format.name;
+    EXPECT_FALSE(library_of(format).empty()) << format.name;
+    for (const std::string extension : format.extensions) {
+      EXPECT_TRUE(extensions.insert(extension).second) << extension << " is listed twice";
+    }
+  }
+  const auto library = [](const std::vector<Format>& formats, const std::string& name) {
+    const auto found = std::find_if(formats.begin(), formats.end(), [&](const Format& f) { return f.name == name; });
+    return found == formats.end() ? std::string("no such format") : library_of(*found);
+  };
+  EXPECT_THAT(library(native_formats(), "TIFF"), MatchesRegex("libtiff [0-9]+\\.[0-9]+\\.[0-9]+"));
+  EXPECT_THAT(library(native_formats(), "PNG"), MatchesRegex("libpng [0-9]+\\.[0-9]+\\.[0-9]+"));
+  EXPECT_THAT(library(writable_formats(), "OpenEXR"), MatchesRegex("OpenEXR [0-9]+\\.[0-9]+\\.[0-9]+"));
+  EXPECT_EQ(library(native_formats(), "SRTM HGT"), "isohf");
+}
+
+TEST(Formats, ListEveryExtensionThatIsWritten) {
+  for (const Format& format : writable_formats()) {
+    EXPECT_NE(format.note, "") << format.name;
+    for (const std::string extension : format.extensions) {
+      EXPECT_THAT(writable_extensions(), ::testing::Contains(extension));
+    }
+  }
+}
+
+TEST(Formats, TheOneOfAFileIsFoundWithoutOpeningIt) {
+  const ScratchFolder folder;
+  const std::string path = folder / "a.raw";
+  write_bytes(path, "0123456789abcdef", 16);
+  ASSERT_NE(native_format_of(path, {}), nullptr);
+  EXPECT_EQ(std::string(native_format_of(path, {})->name), "raw samples");
+  const std::string tiff = folder / "b.raw";  // the content decides
+  write_bytes(tiff, "II*\0\10\0\0\0", 8);
+  EXPECT_EQ(std::string(native_format_of(tiff, {})->name), "TIFF");
+  OpenOptions raw;
+  raw.raw = RawLayout{4, 4, SampleType::kUint8, false};
+  EXPECT_EQ(std::string(native_format_of(tiff, raw)->name), "raw samples");
+  const std::string other = folder / "c.txt";
+  write_bytes(other, "what is this", 12);
+  EXPECT_EQ(native_format_of(other, {}), nullptr);
 }
 
 }  // namespace

@@ -24,7 +24,7 @@
 #include "isohf/convert/tile_statistics.h"
 #include "isohf/surface/band_reader.h"
 #include "isohf/surface/edge_range.h"
-#include "isohf/surface/source_scan.h"
+#include "isohf/surface/source_survey.h"
 #include "isohf/surface/tile_cutter.h"
 
 namespace isohf {
@@ -62,23 +62,23 @@ void throw_if_cancelled(const std::atomic<bool>& cancel) {
 }
 
 /// First pass: range and counts of the whole source.
-SourceScan scan_source(HeightSource& source, EdgeRange& edge, const ProgressCallback& callback,
-                       const std::atomic<bool>& cancel) {
+SourceSurvey survey_source(HeightSource& source, EdgeRange& edge, const ProgressCallback& callback,
+                           const std::atomic<bool>& cancel) {
   const SourceInfo& info = source.info();
   const std::int64_t step = rows_per_read(info);
   ProgressMeter meter(callback, ConvertProgress::Pass::kRange, info.height);
-  SourceScan found;
+  SourceSurvey survey(info, false);
   std::vector<std::byte> raw;
   for (std::int64_t row = 0; row < info.height; row += step) {
     throw_if_cancelled(cancel);
     const std::int64_t rows = std::min(step, info.height - row);
     raw.resize(static_cast<std::size_t>(rows * info.width) * size_bytes(info.sample_type));
     source.read_window({0, row, info.width, rows}, raw);
-    scan_samples(info, raw, found);
+    survey.add(raw);
     edge.add_rows(raw);
     meter.report(row + rows, 0);
   }
-  return found;
+  return survey;
 }
 
 /// Tiles that are read, made or waiting to be written; fewer where each takes long and brings much along.
@@ -177,13 +177,15 @@ void choose_codes(Conversion& job, std::vector<std::string>& warnings, const Pro
     return;
   }
   EdgeRange edge(info, job.axis_x().continued_samples(), job.axis_z().continued_samples());
-  SourceScan found = scan_source(job.source, edge, progress, job.cancel);
+  const SourceSurvey survey = survey_source(job.source, edge, progress, job.cancel);
+  SourceScan found = survey.scan();
   if (found.valid == 0) {
     throw Error(ErrorCode::kInvalidArgument,
                 fmt::format("{}: all {} samples are void or not finite, there is no elevation to convert", info.path,
                             found.voids));
   }
   warn_of_unit_range(info, found.range, warnings);
+  if (const std::string warning = survey.warning(); !warning.empty()) warnings.push_back(info.path + ": " + warning);
   job.datum = choose_datum(info, found.range);
   if (job.plan.outside == Outside::kCover) found.range = edge.widen(found.range);
   job.quantisation = choose_quantisation(request, found.range, info);

@@ -61,7 +61,50 @@ void scan(const SourceInfo& info, std::span<const std::byte> raw, SourceScan& sc
   scan.valid += valid;
 }
 
+template <typename T, typename Widen>
+double sum(const SourceInfo& info, std::span<const std::byte> raw, Widen widen) {
+  constexpr std::size_t kRun = 4096;  // sums of sums: rounding grows with the root of the count
+  const std::size_t count = raw.size() / sizeof(T);
+  double total = 0.0;
+  for (std::size_t first = 0; first < count; first += kRun) {
+    double run = 0.0;
+    for (std::size_t i = first; i < std::min(first + kRun, count); ++i) {
+      const auto number = static_cast<double>(widen(load<T>(raw.data() + i * sizeof(T))));
+      bool is_valid = std::isfinite(number) && number >= info.valid_min && number <= info.valid_max;
+      for (const double void_value : info.void_values) is_valid = is_valid && number != void_value;
+      run += is_valid ? number : 0.0;
+    }
+    total += run;
+  }
+  return total;
+}
+
 }  // namespace
+
+double sum_of_samples(const SourceInfo& info, std::span<const std::byte> raw) {
+  const auto same = [](auto value) { return value; };
+  switch (info.sample_type) {
+    case SampleType::kUint8:
+      return sum<std::uint8_t>(info, raw, same);
+    case SampleType::kInt8:
+      return sum<std::int8_t>(info, raw, same);
+    case SampleType::kUint16:
+      return sum<std::uint16_t>(info, raw, same);
+    case SampleType::kInt16:
+      return sum<std::int16_t>(info, raw, same);
+    case SampleType::kUint32:
+      return sum<std::uint32_t>(info, raw, same);
+    case SampleType::kInt32:
+      return sum<std::int32_t>(info, raw, same);
+    case SampleType::kFloat16:
+      return sum<std::uint16_t>(info, raw, float_from_half);
+    case SampleType::kFloat32:
+      return sum<float>(info, raw, same);
+    case SampleType::kFloat64:
+      return sum<double>(info, raw, same);
+  }
+  return 0.0;
+}
 
 void scan_samples(const SourceInfo& info, std::span<const std::byte> raw, SourceScan& found) {
   const auto same = [](auto value) { return value; };
