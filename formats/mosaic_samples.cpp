@@ -12,7 +12,6 @@
 
 #include "formats/open_options.h"
 #include "isohf/base/assert.h"
-#include "isohf/base/vectorised.h"
 
 namespace isohf {
 namespace {
@@ -210,8 +209,7 @@ MosaicSamples widened(const SampleKind& kind) {
 }
 
 template <typename T>
-ISOHF_VECTORISED void lay_integers_over(const T* __restrict upper, T* __restrict lower, std::size_t count,
-                                        T void_value) {
+void lay_integers_over(const T* __restrict upper, T* __restrict lower, std::size_t count, T void_value) {
   for (std::size_t i = 0; i < count; ++i) {
     const T above = upper[i];
     lower[i] = above != void_value || lower[i] == void_value ? above : lower[i];
