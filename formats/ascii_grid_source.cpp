@@ -11,6 +11,7 @@
 #include <limits>
 #include <vector>
 
+#include "formats/grass_header.h"
 #include "formats/grid_header.h"
 #include "formats/header_grid_source.h"
 #include "formats/open_options.h"
@@ -38,11 +39,6 @@ std::string_view first_word(std::string_view text) {
   text.remove_prefix(std::min(text.find_first_not_of(kBlanks), text.size()));
   const std::size_t end = text.find_first_of(kBlanks);
   return end == std::string_view::npos ? std::string_view() : text.substr(0, end);
-}
-
-bool is_grass_word(std::string_view word) {
-  constexpr std::array<std::string_view, 6> kWords = {"north:", "south:", "east:", "west:", "rows:", "cols:"};
-  return std::find(kWords.begin(), kWords.end(), GridHeader::plain_name(word)) != kWords.end();
 }
 
 /// What a word among the numbers is, found without computing its value.
@@ -113,7 +109,7 @@ bool read_whole(std::string_view word, std::int32_t& value) {
 
 class AsciiGridSource final : public HeightSource {
  public:
-  AsciiGridSource(const std::string& path, const OpenOptions& options) : file_(path), words_(file_) {
+  AsciiGridSource(const std::string& path, const OpenOptions& options) : file_(path), words_(file_), grass_(path) {
     info_.path = path;
     info_.format = "ESRI ASCII grid";
     if (!options.channel.empty() && options.channel != "0") {
@@ -123,13 +119,24 @@ class AsciiGridSource final : public HeightSource {
     GridHeader header(path);
     std::string_view word;
     const bool any = read_header(header, word);
-    header.require_only(known_words());
-    header.read_size(info_);
-    header.read_place(info_);
+    if (is_grass_) {
+      info_.format = "GRASS ASCII grid";
+      grass_.read(info_);
+      marked_ = true;
+    } else {
+      header.require_only(known_words());
+      header.read_size(info_);
+      header.read_place(info_);
+      marked_ = header.has("nodatavalue") || header.has("nodata") || options.void_value.has_value();
+    }
     require_room();
-    marked_ = header.has("nodatavalue") || header.has("nodata") || options.void_value.has_value();
     scan(word, any);
-    header.read_void(info_);
+    if (is_grass_) {
+      const auto stored = void_value_as_stored(info_.sample_type, grass_.null_value());
+      if (grass_.has_null() && stored && !std::isnan(*stored)) info_.void_values = {*stored};
+    } else {
+      header.read_void(info_);
+    }
     read_prj_beside(info_);
     info_.block_width = info_.width;
     apply_open_options(info_, options);
@@ -149,6 +156,11 @@ class AsciiGridSource final : public HeightSource {
       const auto row = samples.subspan(static_cast<std::size_t>(i) * row_bytes, row_bytes);
       if (info_.sample_type == SampleType::kInt32) {
         read_run<std::int32_t>(row, read_whole);
+      } else if (is_grass_) {
+        read_run<double>(row, [this](std::string_view word, double& value) {
+          value = std::numeric_limits<double>::quiet_NaN();
+          return word == grass_.null_word() || read_decimal(word, value);
+        });
       } else {
         read_run<double>(row, read_decimal);
       }
@@ -168,20 +180,35 @@ class AsciiGridSource final : public HeightSource {
       words_.seek(3);
     }
     while (words_.next(word)) {
-      if (is_grass_word(word)) {
-        refuse(ErrorCode::kUnsupported,
-               fmt::format("\"{}\" is of a GRASS ASCII header, which isohf does not read; r.out.gdal format=AAIGrid "
-                           "writes an ESRI one",
-                           printable(word)));
+      if (GrassHeader::is_name(word)) {
+        read_grass_line(word);
+        continue;
       }
       double special = 0.0;
       if (std::isalpha(static_cast<unsigned char>(word.front())) == 0 || read_decimal(word, special)) return true;
       const std::string name(word);
       const std::uint64_t line = words_.line();
       if (!words_.next(word)) refuse(ErrorCode::kCorrupt, fmt::format("{} has no value", printable(name)));
+      if (is_grass_) {
+        refuse(ErrorCode::kUnsupported,
+               fmt::format("\"{} {}\" is no line of a GRASS ASCII header", printable(name), printable(word)));
+      }
       header.add(name, word, line);
+      is_esri_ = true;
     }
     return false;
+  }
+
+  /// "name: value" or "name:value".
+  void read_grass_line(std::string_view word) {
+    if (is_esri_) refuse(ErrorCode::kCorrupt, fmt::format("\"{}\" follows lines of an ESRI header", printable(word)));
+    is_grass_ = true;
+    const std::size_t colon = word.find(':');
+    const std::string name(word.substr(0, colon));
+    const std::uint64_t line = words_.line();
+    word.remove_prefix(colon + 1);
+    if (word.empty() && !words_.next(word)) refuse(ErrorCode::kCorrupt, name + ": has no value");
+    grass_.add(name, word, line);
   }
 
   /// A number takes a byte and another one keeps it apart from the next.
@@ -232,8 +259,12 @@ class AsciiGridSource final : public HeightSource {
 
   /// Whether a number can be an int32 sample.
   bool check(std::string_view word) {
+    if (is_grass_ && word == grass_.null_word() && std::isnan(grass_.null_value())) return false;
     const Shape shape = shape_of(word);
     if (!shape.number) refuse_word(word);
+    if (is_grass_ && grass_.is_whole() && !shape.whole) {
+      refuse(ErrorCode::kCorrupt, fmt::format("\"{}\" is no whole number, as type: int says", printable(word)));
+    }
     if (shape.decimal != 0 && shape.decimal != decimal_) {
       if (decimal_ != 0) {
         refuse(ErrorCode::kCorrupt, fmt::format("\"{}\" has a decimal {}, numbers before it have the other sign; they "
@@ -306,6 +337,9 @@ class AsciiGridSource final : public HeightSource {
 
   RawFile file_;
   TextTokens words_;
+  GrassHeader grass_;
+  bool is_grass_ = false;
+  bool is_esri_ = false;
   SourceInfo info_;
   std::vector<std::uint64_t> places_;  // of every stride_-th row
   std::int64_t stride_ = 1;
@@ -320,7 +354,7 @@ class AsciiGridSource final : public HeightSource {
 
 bool looks_like_ascii_grid(std::span<const std::byte> head) {
   const std::string_view word = first_word({reinterpret_cast<const char*>(head.data()), head.size()});
-  if (is_grass_word(word)) return true;
+  if (GrassHeader::is_name(word)) return true;
   const std::string name = GridHeader::plain_name(word);
   return std::find(known_words().begin(), known_words().end(), name) != known_words().end();
 }

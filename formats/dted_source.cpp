@@ -170,6 +170,20 @@ class DtedSource final : public HeightSource {
     geo.origin_x = angle(4, "longitude", 'E', 'W', 360);
     geo.origin_y = angle(12, "latitude", 'N', 'S', 90) + static_cast<double>(info_.height - 1) * geo.spacing_y;
     describe_datums();
+    check_level();
+  }
+
+  /// The name's level is the distance of posts along a meridian: 30, 3 or 1 seconds.
+  void check_level() {
+    const std::size_t at = info_.path.rfind(".dt");
+    if (at == std::string::npos || at + 4 != info_.path.size()) return;
+    const int level = info_.path.back() - '0';
+    constexpr std::array<int, 3> kTenthsOfSeconds = {300, 30, 10};
+    const std::optional<int> interval = digits(24, 4);
+    if (level < 0 || level > 2 || !interval || *interval == kTenthsOfSeconds[static_cast<std::size_t>(level)]) return;
+    info_.warnings.push_back(fmt::format("its name says DTED level {}, whose posts are {} seconds apart; they are {}",
+                                         level, kTenthsOfSeconds[static_cast<std::size_t>(level)] / 10,
+                                         *interval / 10.0));
   }
 
   void describe_datums() {

@@ -78,6 +78,24 @@ std::string list_of(const std::vector<Channel>& channels) {
   return list;
 }
 
+/// Drops the channels of all parts but one, given by its name or number.
+void keep_part(std::vector<Channel>& channels, const std::string& wanted) {
+  const int parts = channels.back().part + 1;
+  int part = -1;
+  for (const Channel& channel : channels) {
+    if (part < 0 && channel.part_name == wanted) part = channel.part;
+  }
+  const char* const end = wanted.data() + wanted.size();
+  int number = 0;
+  const auto [at, error] = std::from_chars(wanted.data(), end, number);
+  if (part < 0 && error == std::errc() && at == end && number >= 0 && number < parts) part = number;
+  if (part < 0) {
+    throw Error(ErrorCode::kInvalidArgument, fmt::format("has no part \"{}\"; its channels are {}, in parts 0...{}",
+                                                         wanted, list_of(channels), parts - 1));
+  }
+  std::erase_if(channels, [part](const Channel& channel) { return channel.part != part; });
+}
+
 Channel named_channel(const std::vector<Channel>& channels, const std::string& wanted) {
   for (const Channel& channel : channels) {
     if (channel.name == wanted) return channel;
@@ -163,8 +181,9 @@ class ExrSource final : public HeightSource {
  public:
   ExrSource(const std::string& path, const OpenOptions& options)
       : file_(path.c_str(), Imf::globalThreadCount(), false) {
-    const std::vector<Channel> channels = channels_of(file_);
+    std::vector<Channel> channels = channels_of(file_);
     if (channels.empty()) throw Error(ErrorCode::kCorrupt, "OpenEXR file has no channels");
+    if (!options.part.empty()) keep_part(channels, options.part);
     channel_ = options.channel.empty() ? default_channel(channels) : named_channel(channels, options.channel);
     if (channel_.deep) {
       throw Error(
@@ -209,7 +228,7 @@ class ExrSource final : public HeightSource {
     info_.width = std::int64_t{data.max.x} - data.min.x + 1;
     info_.height = std::int64_t{data.max.y} - data.min.y + 1;
     info_.sample_type = sample_type_of(channel_.type);
-    info_.channel = channels.size() > 1 ? full_name(channel_) : std::string();
+    info_.channel = channels.size() > 1 || !channel_.part_name.empty() ? full_name(channel_) : std::string();
     sample_bytes_ = size_bytes(info_.sample_type);
     if (chosen_here && channels.size() > 1) {
       info_.warnings.push_back(

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <cmath>
 #include <filesystem>
 #include <optional>
 #include <string_view>
@@ -16,6 +17,7 @@
 #include "formats/raw_file.h"
 #include "formats/text_tokens.h"
 #include "formats/wkt.h"
+#include "formats/world_file.h"
 #include "isohf/base/error.h"
 
 namespace isohf {
@@ -67,7 +69,7 @@ struct Pair {
 
 std::string data_beside(const std::string& header) {
   std::vector<std::string> found;
-  for (const char* extension : {".flt", ".bil", ".bip", ".bsq", ".FLT", ".BIL", ".BIP", ".BSQ"}) {
+  for (const char* extension : {".flt", ".bil", ".bip", ".bsq", ".dem", ".FLT", ".BIL", ".BIP", ".BSQ", ".DEM"}) {
     const auto candidate = std::filesystem::path(header).replace_extension(extension);
     if (is_file(candidate)) found.push_back(candidate.string());
   }
@@ -143,6 +145,7 @@ class HeaderGridSource final : public HeightSource {
     read_byte_order(header);
     read_layout(header);
     header.read_place(info_);
+    read_world_file();
     header.read_void(info_);
     if (is_floating(info_.sample_type) && info_.void_values.empty()) {
       info_.valid_min = -kBeyondAnyHeight;
@@ -162,6 +165,30 @@ class HeaderGridSource final : public HeightSource {
  private:
   [[noreturn]] void refuse(ErrorCode code, const std::string& what) const {
     throw Error(code, header_path_ + ": " + what);
+  }
+
+  /// A world file beside the samples (.blw, .bqw, .flw) places them where the header does not.
+  void read_world_file() {
+    const std::optional<WorldFile> world = world_file_beside(info_.path);
+    if (!world) return;
+    if (world->dy > 0.0) {
+      throw Error(ErrorCode::kUnsupported, world->path + ": dy is positive; rows must run from North to South");
+    }
+    Georeference& place = info_.georeference;
+    if (!place.has_origin) {
+      place.has_origin = true;
+      place.spacing_x = world->dx;
+      place.spacing_y = -world->dy;
+      place.origin_x = world->x0;
+      place.origin_y = world->y0;
+      return;
+    }
+    const double off = std::max({std::abs(world->x0 - place.origin_x), std::abs(world->dx - place.spacing_x),
+                                 std::abs(world->y0 - place.origin_y), std::abs(-world->dy - place.spacing_y)});
+    if (off > 1e-3 * std::min(place.spacing_x, place.spacing_y)) {
+      info_.warnings.push_back(fmt::format("{} places the samples elsewhere than the header, which is followed",
+                                           std::filesystem::path(world->path).filename().string()));
+    }
   }
 
   void require_one_band(const GridHeader& header) const {

@@ -122,7 +122,13 @@ class HgtSource final : public HeightSource {
                   fmt::format("{}: {} .hgt files are in the archive, must be 1", info_.path, tiles.size()));
     }
     unpacked_ = read_zip_member(file_, tiles.front(), kMostUnpackedBytes);
-    return south_west_corner(tiles.front().name) ? tiles.front().name : info_.path;
+    const std::optional<Corner> inside = south_west_corner(tiles.front().name);
+    const std::optional<Corner> outside = south_west_corner(info_.path);
+    if (inside && outside && (inside->latitude != outside->latitude || inside->longitude != outside->longitude)) {
+      info_.warnings.push_back(fmt::format("the archive is called {} and holds {}; the latter says where the tile lies",
+                                           file_name(info_.path), file_name(tiles.front().name)));
+    }
+    return inside ? tiles.front().name : info_.path;
   }
 
   void describe(const std::string& name, std::uint64_t bytes, const OpenOptions& options) {
@@ -181,7 +187,7 @@ class HgtSource final : public HeightSource {
 }  // namespace
 
 bool is_hgt_name(const std::string& path) {
-  const std::string name = lower(path);
+  const std::string name = lower(without_gzip(path));
   return ends_with(name, ".hgt") || ends_with(name, ".hgt.zip");
 }
 

@@ -8,14 +8,15 @@
 
 namespace isohf {
 
-/// Whether a file of this name is meant to be SRTM HGT: it ends in .hgt or .hgt.zip, in any case. HGT has no signature.
+/// Whether a file of this name is meant to be SRTM HGT: it ends in .hgt, .hgt.gz or .hgt.zip, in any case. HGT has no
+/// signature.
 [[nodiscard]] bool is_hgt_name(const std::string& path);
 
-/// Opens an SRTM tile, plain or as the one .hgt member of a zip archive (NASA, SRTM topography, 2005): big-endian 16
-/// bit metres above EGM96 on posts, n x n of one degree (1201: 3", 3601: 1") or 1801 x 3601, void -32768. The name says
-/// where: N44E006.hgt has its South-West post at 44 N, 6 E; a name that does not leaves the origin unknown, with a
-/// warning. A zipped tile is held in memory, at most 64 MiB.
-/// Throws Error: kIo, kCorrupt (a length that no tile has; a damaged archive), kUnsupported, kInvalidArgument.
+/// Opens an SRTM tile, plain, in gzip, or as the one .hgt member of a zip archive (NASA, SRTM topography, 2005):
+/// big-endian 16 bit metres above EGM96 on posts, n x n of one degree (1201: 3", 3601: 1") or 1801 x 3601, void -32768.
+/// The name says where: N44E006.hgt has its South-West post at 44 N, 6 E; a name that does not leaves the origin
+/// unknown, with a warning. A zipped tile is held in memory, at most 64 MiB. Throws Error: kIo, kCorrupt (a length that
+/// no tile has; a damaged archive), kUnsupported, kInvalidArgument.
 [[nodiscard]] std::unique_ptr<HeightSource> open_hgt(const std::string& path, const OpenOptions& options);
 
 }  // namespace isohf

@@ -11,6 +11,7 @@
 #include <string_view>
 #include <vector>
 
+#include "formats/file_beside.h"
 #include "formats/label_text.h"
 #include "formats/open_options.h"
 #include "formats/raw_file.h"
@@ -56,7 +57,7 @@ std::optional<double> metres(const LabelFields& fields, const char* key) {
 
 class Isis3Source final : public HeightSource {
  public:
-  Isis3Source(const std::string& path, const OpenOptions& options) : file_(path) {
+  Isis3Source(const std::string& path, const OpenOptions& options) {
     info_.path = path;
     info_.format = "ISIS3 cube";
     const LabelText label = read_label(path);
@@ -97,10 +98,13 @@ class Isis3Source final : public HeightSource {
 
   void read_core(const LabelBlock& core, std::uint64_t label_bytes) {
     const LabelFields fields(info_.path, core);
+    std::uint64_t first_free = label_bytes;
+    std::string data_path = info_.path;
     if (core.entry("^CORE") != nullptr) {
-      throw Error(ErrorCode::kUnsupported,
-                  info_.path + ": the samples lie in another file; labels in the file are read");
+      data_path = core_file(fields, core.entry("^CORE")->line);
+      first_free = 0;
     }
+    file_.emplace(data_path);
     const LabelFields dimensions(info_.path, inner(core, "DIMENSIONS"));
     info_.width = dimensions.count("SAMPLES", 1, kMostSamples);
     info_.height = dimensions.count("LINES", 1, kMostSamples);
@@ -121,14 +125,14 @@ class Isis3Source final : public HeightSource {
     const double total = static_cast<double>(tiles_across_ * tile_columns_) *
                          static_cast<double>(tiles_down * tile_rows_) * static_cast<double>(size_ * bands_);
     first_bytes_ = static_cast<std::uint64_t>(fields.count("STARTBYTE", 1, std::int64_t{1} << 50)) - 1;
-    if (first_bytes_ < label_bytes) {
-      fields.refuse("STARTBYTE", fmt::format("behind the label, which has {} bytes", label_bytes));
+    if (first_bytes_ < first_free) {
+      fields.refuse("STARTBYTE", fmt::format("behind the label, which has {} bytes", first_free));
     }
     const auto wanted = static_cast<double>(first_bytes_) + total;
-    if (!(wanted < kMostBytes) || static_cast<double>(file_.size_bytes()) < wanted) {
+    if (!(wanted < kMostBytes) || static_cast<double>(file_->size_bytes()) < wanted) {
       throw Error(ErrorCode::kCorrupt,
-                  fmt::format("{}: ends early: {} bytes, {} x {} samples in {} bands need {:.0f}", info_.path,
-                              file_.size_bytes(), info_.width, info_.height, bands_, wanted));
+                  fmt::format("{}: ends early: {} bytes, {} x {} samples in {} bands need {:.0f}", data_path,
+                              file_->size_bytes(), info_.width, info_.height, bands_, wanted));
     }
     band_bytes_ = static_cast<std::uint64_t>(tiles_across_ * tiles_down * tile_columns_ * tile_rows_ * size_);
     info_.block_width = tile_columns_;
@@ -137,6 +141,15 @@ class Isis3Source final : public HeightSource {
       info_.block_width = info_.width;
       info_.block_height = 1;  // rows follow each other
     }
+  }
+
+  /// The file beside the label that holds the samples.
+  [[nodiscard]] std::string core_file(const LabelFields& core, int line) const {
+    const std::string name = core.text("^CORE").value_or("");
+    const std::string found = name.find('/') == std::string::npos ? file_beside(info_.path, name) : std::string();
+    if (!found.empty()) return found;
+    throw Error(ErrorCode::kIo, fmt::format("{}: label line {}: ^Core names {}, which must be a file beside the label",
+                                            info_.path, line, name));
   }
 
   void read_pixels(const LabelFields& pixels) {
@@ -216,10 +229,10 @@ class Isis3Source final : public HeightSource {
       const auto run = static_cast<std::size_t>(part.columns * size_);
       const std::uint64_t begin = at + static_cast<std::uint64_t>(row * row_bytes + column * size_);
       if (rows == 1) {
-        file_.read(begin, {out, run});
+        file_->read(begin, {out, run});
       } else {
         piece_.resize(static_cast<std::size_t>((rows - 1) * row_bytes) + run);
-        file_.read(begin, piece_);
+        file_->read(begin, piece_);
         for (std::int64_t i = 0; i < rows; ++i) {
           std::memcpy(out + i * window.columns * size_, piece_.data() + i * row_bytes, run);
         }
@@ -228,7 +241,7 @@ class Isis3Source final : public HeightSource {
     }
   }
 
-  RawFile file_;
+  std::optional<RawFile> file_;
   std::uint64_t first_bytes_ = 0;  // of the band's first sample
   std::uint64_t band_bytes_ = 0;
   std::int64_t bands_ = 1;

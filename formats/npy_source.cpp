@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cctype>
 #include <charconv>
+#include <cstring>
 #include <optional>
 #include <string_view>
 #include <vector>
@@ -13,13 +15,18 @@
 #include "formats/open_options.h"
 #include "formats/plain_samples.h"
 #include "formats/raw_file.h"
+#include "formats/text_tokens.h"
+#include "formats/zip_member.h"
+#include "isohf/base/assert.h"
 #include "isohf/base/error.h"
 
 namespace isohf {
 namespace {
 
 constexpr std::string_view kMagic = "\x93NUMPY";
+constexpr std::size_t kLongestList = 200;  // of names in a message
 constexpr std::size_t kMostHeaderBytes = std::size_t{1} << 20U;
+constexpr std::int64_t kRowsAtOnce = 256;
 constexpr std::int64_t kMostSide = std::int64_t{1} << 31;
 
 struct Header {
@@ -143,11 +150,23 @@ class NpySource final : public HeightSource {
     (void)choose_band(info_, options, 1);
     apply_open_options(info_, options);
   }
+  /// One array of an .npz.
+  NpySource(const std::string& path, const ZipMember& member) : file_(path, member) {
+    info_.path = path;
+    info_.format = "NumPy";
+    read_header();
+  }
+
+  [[nodiscard]] SourceInfo& info() { return info_; }
 
   [[nodiscard]] const SourceInfo& info() const override { return info_; }
 
   void read_window(const Window& window, std::span<std::byte> samples) override {
-    read_plain_samples(file_, info_, layout_, window, samples);
+    if (fortran_order_) {
+      read_by_columns(window, samples);
+    } else {
+      read_plain_samples(file_, info_, layout_, window, samples);
+    }
   }
 
  private:
@@ -186,9 +205,7 @@ class NpySource final : public HeightSource {
     if (header.shape.size() != 2) {
       unsupported(fmt::format("the array's shape is ({}), must have 2 dimensions", fmt::join(header.shape, ", ")));
     }
-    if (header.fortran_order && header.shape[0] > 1 && header.shape[1] > 1) {
-      unsupported("the array is in Fortran order; numpy.ascontiguousarray makes it C order");
-    }
+    fortran_order_ = header.fortran_order && header.shape[0] > 1 && header.shape[1] > 1;
     info_.height = header.shape[0];
     info_.width = header.shape[1];
     if (info_.width < 1 || info_.height < 1 || info_.width > kMostSide || info_.height > kMostSide) {
@@ -197,7 +214,7 @@ class NpySource final : public HeightSource {
     }
     info_.sample_type = type.value_or(SampleType::kFloat32);
     info_.block_width = info_.width;
-    info_.block_height = 1;
+    info_.block_height = fortran_order_ ? std::min(info_.height, kRowsAtOnce) : 1;
     layout_.big_endian = order == '>';
     layout_.row_bytes = static_cast<std::uint64_t>(info_.width) * size_bytes(info_.sample_type);
     // At most 2^31 rows of 2^34 bytes would overflow; no file is that large.
@@ -212,10 +229,46 @@ class NpySource final : public HeightSource {
     if (there > wanted) info_.warnings.push_back(fmt::format("{:.0f} bytes follow the array", there - wanted));
   }
 
+  /// Fortran order: the samples of a column follow each other.
+  void read_by_columns(const Window& window, std::span<std::byte> samples) {
+    const std::size_t size = size_bytes(info_.sample_type);
+    ISOHF_ASSERT(window.column >= 0 && window.row >= 0 && window.columns >= 0 && window.rows >= 0);
+    ISOHF_ASSERT(window.column + window.columns <= info_.width && window.row + window.rows <= info_.height);
+    ISOHF_ASSERT(samples.size() == static_cast<std::size_t>(window.columns * window.rows) * size);
+    column_.resize(static_cast<std::size_t>(window.rows) * size);
+    const std::size_t row_bytes = static_cast<std::size_t>(window.columns) * size;
+    for (std::int64_t c = 0; c < window.columns; ++c) {
+      const auto first = static_cast<std::uint64_t>((window.column + c) * info_.height + window.row);
+      file_.read(layout_.offset_bytes + first * size, column_);
+      std::byte* out = samples.data() + static_cast<std::size_t>(c) * size;
+      for (std::size_t at = 0; at < column_.size(); at += size, out += row_bytes) {
+        std::memcpy(out, column_.data() + at, size);
+      }
+    }
+    if (layout_.big_endian != (std::endian::native == std::endian::big)) swap_byte_order(samples, size);
+  }
+
   RawFile file_;
   PlainLayout layout_;
+  bool fortran_order_ = false;
+  std::vector<std::byte> column_;
   SourceInfo info_;
 };
+
+/// "elevation.npy" is the array elevation.
+std::string array_name(const ZipMember& member) {
+  return member.name.ends_with(".npy") ? member.name.substr(0, member.name.size() - 4) : member.name;
+}
+
+/// An array that is a raster; nullptr where its shape or type make it none and nobody asked for it by name.
+std::unique_ptr<NpySource> open_array(const std::string& path, const ZipMember& member, bool wanted) {
+  try {
+    return std::make_unique<NpySource>(path, member);
+  } catch (const Error& error) {
+    if (!wanted && error.code() == ErrorCode::kUnsupported) return nullptr;
+    throw Error(error.code(), fmt::format("{} (array {})", error.what(), array_name(member)));
+  }
+}
 
 }  // namespace
 
@@ -226,6 +279,43 @@ bool looks_like_npy(std::span<const std::byte> head) {
 
 std::unique_ptr<HeightSource> open_npy(const std::string& path, const OpenOptions& options) {
   return std::make_unique<NpySource>(path, options);
+}
+
+std::unique_ptr<HeightSource> open_npz(const std::string& path, const OpenOptions& options) {
+  const std::vector<ZipMember> members = zip_members(RawFile(path));
+  std::unique_ptr<NpySource> chosen;
+  std::string name;
+  std::string names;
+  std::size_t rasters = 0;
+  for (const ZipMember& member : members) {
+    const std::string array = array_name(member);
+    const bool wanted = options.channel == array;
+    if (wanted || options.channel.empty()) {
+      std::unique_ptr<NpySource> source = open_array(path, member, wanted);
+      rasters += source ? 1 : 0;
+      if (source && !chosen) {
+        chosen = std::move(source);
+        name = array;
+      }
+    }
+    if (names.size() < kLongestList) names += (names.empty() ? "" : ", ") + printable(array);
+  }
+  if (!chosen && !options.channel.empty()) {
+    throw Error(ErrorCode::kInvalidArgument,
+                fmt::format("{}: there is no array \"{}\"; there are {}", path, options.channel, names));
+  }
+  if (!chosen) {
+    throw Error(
+        ErrorCode::kUnsupported,
+        fmt::format("{}: no array of the archive ({}) has two dimensions and a type that is read", path, names));
+  }
+  if (rasters > 1) {
+    chosen->info().warnings.push_back(
+        fmt::format("array {} is read, of {}; --channel NAME takes another", name, names));
+  }
+  chosen->info().channel = members.size() > 1 ? name : std::string();
+  apply_open_options(chosen->info(), options);
+  return chosen;
 }
 
 }  // namespace isohf

@@ -18,12 +18,12 @@ constexpr double kMostBytes = 1125899906842624.0;  // 2^50
 
 struct SampleKind {
   const char* name;
-  char kind;  ///< i: signed, u: unsigned, f: IEEE float
+  char kind;  ///< i: signed, u: unsigned, f: IEEE float, v: VAX F-float, g: another VAX float
   bool big_endian;
 };
 
 // PDS Data Dictionary, SAMPLE_TYPE, with its synonyms.
-constexpr std::array<SampleKind, 20> kSampleKinds = {{{"MSB_INTEGER", 'i', true},
+constexpr std::array<SampleKind, 22> kSampleKinds = {{{"MSB_INTEGER", 'i', true},
                                                       {"INTEGER", 'i', true},
                                                       {"SUN_INTEGER", 'i', true},
                                                       {"MAC_INTEGER", 'i', true},
@@ -42,9 +42,15 @@ constexpr std::array<SampleKind, 20> kSampleKinds = {{{"MSB_INTEGER", 'i', true}
                                                       {"FLOAT", 'f', true},
                                                       {"SUN_REAL", 'f', true},
                                                       {"MAC_REAL", 'f', true},
-                                                      {"PC_REAL", 'f', false}}};
+                                                      {"PC_REAL", 'f', false},
+                                                      {"VAX_REAL", 'v', false},
+                                                      {"VAXG_REAL", 'g', false}}};
 
 SampleType sample_type(char kind, std::int64_t bits, const LabelFields& image) {
+  if (kind == 'v') {
+    if (bits == 32) return SampleType::kFloat32;
+    image.refuse("SAMPLE_BITS", "32 for VAX floats");
+  }
   if (kind == 'f') {
     if (bits == 32) return SampleType::kFloat32;
     if (bits == 64) return SampleType::kFloat64;
@@ -61,13 +67,14 @@ void read_sample_type(const LabelFields& image, Pds3Layout& layout) {
   std::replace(type.begin(), type.end(), ' ', '_');
   const auto* const kind =
       std::find_if(kSampleKinds.begin(), kSampleKinds.end(), [&](const SampleKind& k) { return type == k.name; });
-  if (kind == kSampleKinds.end()) {
+  if (kind == kSampleKinds.end() || kind->kind == 'g') {
     throw Error(ErrorCode::kUnsupported, fmt::format("{}: SAMPLE_TYPE is \"{}\"; MSB_, LSB_ and UNSIGNED integers, "
-                                                     "IEEE_REAL and PC_REAL are read",
+                                                     "IEEE_REAL, PC_REAL and VAX_REAL are read",
                                                      image.path(), type));
   }
   layout.type = sample_type(kind->kind, image.count("SAMPLE_BITS", 1, 64), image);
   layout.big_endian = kind->big_endian;
+  layout.vax = kind->kind == 'v';
 }
 
 }  // namespace

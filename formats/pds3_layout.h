@@ -14,6 +14,7 @@ struct Pds3Layout {
   std::int64_t bands = 1;
   SampleType type = SampleType::kInt16;
   bool big_endian = false;
+  bool vax = false;                ///< VAX F-floats
   std::uint64_t offset_bytes = 0;  ///< of the first sample: the first line's prefix
   std::int64_t sample_stride_bytes = 0;
   std::int64_t line_stride_bytes = 0;

@@ -6,11 +6,14 @@
 #include <array>
 #include <bit>
 #include <cctype>
+#include <cmath>
 #include <cstring>
 #include <filesystem>
+#include <limits>
 #include <optional>
 #include <vector>
 
+#include "formats/file_beside.h"
 #include "formats/label_text.h"
 #include "formats/open_options.h"
 #include "formats/pds3_layout.h"
@@ -29,22 +32,15 @@ std::string lower(std::string text) {
   return text;
 }
 
-bool is_file(const std::filesystem::path& path) {
-  std::error_code ignored;
-  return std::filesystem::is_regular_file(path, ignored);
-}
-
-/// The file called `name`, in any case, in the folder of `beside`; labels were written for file systems without case.
-std::string file_beside(const std::string& beside, const std::string& name) {
-  const std::filesystem::path folder = std::filesystem::path(beside).parent_path();
-  if (is_file(folder / name)) return (folder / name).string();
-  std::string found;
-  std::error_code ignored;
-  for (const auto& entry : std::filesystem::directory_iterator(folder.empty() ? "." : folder, ignored)) {
-    const std::string candidate = entry.path().filename().string();
-    if (lower(candidate) == lower(name) && (found.empty() || candidate < found)) found = candidate;
-  }
-  return found.empty() ? found : (folder / found).string();
+/// A VAX F-float, its bytes as stored, as an IEEE float: words in the other order, no leading 1 in front of the point,
+/// exponents up to 127; its reserved operand is a NaN. The smallest ones lose bits, which are no elevation.
+float float_from_vax(std::uint32_t stored) {
+  const std::uint32_t bits = stored >> 16U | stored << 16U;
+  const auto exponent = static_cast<int>(bits >> 23U & 0xFFU);
+  const bool negative = bits >> 31U != 0;
+  if (exponent == 0) return negative ? std::numeric_limits<float>::quiet_NaN() : 0.0F;
+  const double magnitude = std::ldexp(static_cast<double>((bits & 0x7FFFFFU) | 0x800000U), exponent - 128 - 24);
+  return static_cast<float>(negative ? -magnitude : magnitude);
 }
 
 class Pds3Source final : public HeightSource {
@@ -94,6 +90,13 @@ class Pds3Source final : public HeightSource {
       }
     }
     if (layout_.big_endian) swap_byte_order(samples, static_cast<std::size_t>(size));
+    if (!layout_.vax) return;
+    for (std::size_t at = 0; at < samples.size(); at += sizeof(float)) {
+      std::uint32_t stored = 0;
+      std::memcpy(&stored, samples.data() + at, sizeof(stored));
+      const float value = float_from_vax(stored);
+      std::memcpy(samples.data() + at, &value, sizeof(value));
+    }
   }
 
  private:
@@ -205,7 +208,7 @@ class Pds3Source final : public HeightSource {
       }
     }
     // ISIS writes its special pixels into PDS products: the lowest values of 32 bit floats, up to FF7FFFF9.
-    if (info_.sample_type == SampleType::kFloat32) info_.valid_min = std::bit_cast<float>(0xFF7FFFFAU);
+    if (info_.sample_type == SampleType::kFloat32 && !layout_.vax) info_.valid_min = std::bit_cast<float>(0xFF7FFFFAU);
     Pds3Place place = place_from_pds3(label_path_, root, info_.width, info_.height);
     info_.georeference = std::move(place.georeference);
     info_.warnings.insert(info_.warnings.end(), place.warnings.begin(), place.warnings.end());
@@ -216,7 +219,8 @@ class Pds3Source final : public HeightSource {
     std::optional<double> number = number_of(value);
     if (!number) return;  // N/A
     if (info_.sample_type == SampleType::kFloat32 && value.text.find('#') != std::string::npos) {
-      number = static_cast<double>(std::bit_cast<float>(static_cast<std::uint32_t>(*number)));
+      const auto bits = static_cast<std::uint32_t>(*number);
+      number = static_cast<double>(layout_.vax ? float_from_vax(bits) : std::bit_cast<float>(bits));
     }
     const std::optional<double> stored = void_value_as_stored(info_.sample_type, *number);
     if (!stored) {

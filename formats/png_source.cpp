@@ -10,10 +10,13 @@
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
+#include <optional>
+#include <span>
 #include <vector>
 
 #include "formats/libraries.h"
 #include "formats/open_options.h"
+#include "formats/packed_elevations.h"
 #include "isohf/base/assert.h"
 #include "isohf/base/error.h"
 
@@ -167,6 +170,7 @@ class PngSource final : public HeightSource {
     if (header_.has_transparent_gray) info_.void_values = {static_cast<double>(header_.transparent_gray)};
     sample_bytes_ = size_bytes(info_.sample_type);
     choose_channel(options.channel);
+    if (channels_ > 2 && options.channel.empty()) warn_of_colours();
     apply_open_options(info_, options);
     const std::size_t row_bytes = header_.width * sample_bytes_;
     kept_rows_ = header_.interlaced ? header_.height : std::clamp<std::size_t>(kKeptBytes / row_bytes, 1, kMaxKeptRows);
@@ -229,21 +233,54 @@ class PngSource final : public HeightSource {
   void choose_channel(const std::string& wanted) {
     const std::vector<std::string> channels = channels_of(header_.color_type);
     channels_ = channels.size();
+    if (const auto packing = packing_from_string(wanted)) return unpack(*packing);
     const auto is_wanted = [&](std::size_t at) { return wanted == channels[at] || wanted == std::to_string(at); };
     while (channel_ < channels_ && !wanted.empty() && !is_wanted(channel_)) ++channel_;
     if (channel_ == channels_) {
       throw Error(ErrorCode::kInvalidArgument,
-                  fmt::format("{}: has no channel \"{}\"; it has {} (or 0...{})", info_.path, wanted,
-                              fmt::join(channels, ", "), channels_ - 1));
+                  fmt::format("{}: has no channel \"{}\"; it has {} (or 0...{}){}", info_.path, wanted,
+                              fmt::join(channels, ", "), channels_ - 1,
+                              channels_ > 2 ? ", and with --encoding terrarium, mapbox or rgba-float" : ""));
     }
     if (channels_ == 1) return;
     info_.channel = channels[channel_];
-    if (!wanted.empty()) return;
+    if (wanted.empty() && channels_ == 2) info_.warnings.emplace_back("channel Y is read, not the alpha channel");
+  }
+
+  /// All channels together are one elevation.
+  void unpack(Packing packing) {
+    const std::size_t least = packing == Packing::kRgbaFloat ? 4 : 3;
+    if (channels_ < least || header_.bit_depth != 8) {
+      throw Error(ErrorCode::kInvalidArgument,
+                  fmt::format("{}: has {} channels of {} bits; encoding {} packs an elevation into {} of 8", info_.path,
+                              channels_, header_.bit_depth, to_string(packing), least));
+    }
+    packing_ = packing;
+    describe_packing(packing, channels_ == 4, info_);
+    sample_bytes_ = size_bytes(info_.sample_type);
+  }
+
+  /// One channel of a colour picture is seldom what is meant.
+  void warn_of_colours() {
+    constexpr std::size_t kRowsLookedAt = 64;
+    std::optional<Packing> packing;
+    if (header_.bit_depth == 8 && !header_.interlaced) {
+      PackingEvidence evidence(channels_);
+      row_.resize(header_.row_bytes);
+      const std::size_t rows = std::min<std::size_t>(kRowsLookedAt, header_.height);
+      for (std::size_t row = 0; row < rows && decoder_.read_row(row_.data()); ++row) {
+        evidence.add(std::as_bytes(std::span(row_)));
+      }
+      restart();
+      packing = evidence.packing();
+    }
     info_.warnings.push_back(
-        channels_ == 2 ? "channel Y is read, not the alpha channel"
-                       : fmt::format("colour picture: only channel R is read, of {}; packed elevations (Terrarium, "
-                                     "Mapbox) are not unpacked",
-                                     fmt::join(channels, ", ")));
+        packing ? fmt::format("colour picture: only channel R is read; the colours look like packed elevations: "
+                              "--encoding {} decodes them",
+                              to_string(*packing))
+                : fmt::format("colour picture: only channel R is read, of {}; if the colours are packed elevations, "
+                              "give --encoding terrarium or mapbox",
+                              fmt::join(channels_of(header_.color_type), ", ")));
   }
 
   [[nodiscard]] std::byte* kept_row(std::size_t row) {
@@ -270,6 +307,10 @@ class PngSource final : public HeightSource {
   }
 
   void pick_channel(const png_byte* pixels, std::byte* out) const {
+    if (packing_) {
+      const std::span all(pixels, header_.width * channels_);
+      return unpack_elevations(*packing_, channels_, std::as_bytes(all), {out, header_.width * sample_bytes_});
+    }
     const std::size_t pixel_bytes = channels_ * sample_bytes_;
     if (channels_ == 1) {
       std::memcpy(out, pixels, header_.width * sample_bytes_);
@@ -293,6 +334,7 @@ class PngSource final : public HeightSource {
   std::size_t sample_bytes_ = 0;
   std::size_t channels_ = 1;
   std::size_t channel_ = 0;
+  std::optional<Packing> packing_;
   std::size_t next_row_ = 0;   ///< the row that the decoder delivers next
   std::size_t kept_rows_ = 0;  ///< rows next_row_ - kept_rows_ ... next_row_ - 1 are in kept_, at row % kept_rows_
   std::vector<std::byte> kept_;

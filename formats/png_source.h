@@ -18,7 +18,8 @@ namespace isohf {
 /// value that a tRNS chunk calls transparent is void.
 ///
 /// options.channel is Y or A (gray), R, G, B or A (colour), or 0...3; without it the first one, with a warning for a
-/// colour picture, whose channels may be the bytes of packed elevations.
+/// colour picture, whose channels may be the bytes of packed elevations; or terrarium, mapbox or rgba-float for those
+/// (packed_elevations.h).
 /// Rows are decoded in order; going back further than the few hundred rows that are kept starts again from the first.
 /// An interlaced picture is decoded whole, up to kMaxInterlacedBytes.
 /// Throws Error naming the path: kUnsupported (palette, interlaced and too large), kCorrupt (with the row), kIo,

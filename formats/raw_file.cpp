@@ -4,12 +4,17 @@
 #include <fmt/core.h>
 #include <sys/stat.h>
 #include <unistd.h>
+#include <zlib.h>
 
 #include <algorithm>
+#include <array>
+#include <cctype>
 #include <cerrno>
 #include <cstring>
 #include <system_error>
+#include <vector>
 
+#include "formats/zip_member.h"
 #include "isohf/base/error.h"
 
 namespace isohf {
@@ -31,7 +36,30 @@ void swap_words(std::span<std::byte> samples, Swap swap) {
   }
 }
 
+/// Of all bytes, in pieces.
+std::uint32_t crc_of(const RawFile& file) {
+  std::vector<std::byte> piece(std::size_t{1} << 16U);
+  uLong crc = ::crc32(0, nullptr, 0);
+  for (std::uint64_t at = 0; at < file.size_bytes();) {
+    const std::size_t got = file.read_some(at, piece);
+    if (got == 0) break;
+    crc = ::crc32_z(crc, reinterpret_cast<const Bytef*>(piece.data()), got);
+    at += got;
+  }
+  return static_cast<std::uint32_t>(crc);
+}
+
 }  // namespace
+
+bool is_gzip_name(const std::string& path) {
+  const std::size_t dot = path.size() - std::min<std::size_t>(path.size(), 3);
+  return dot > 0 && path[dot] == '.' && std::tolower(static_cast<unsigned char>(path[dot + 1])) == 'g' &&
+         std::tolower(static_cast<unsigned char>(path[dot + 2])) == 'z';
+}
+
+std::string without_gzip(const std::string& path) {
+  return is_gzip_name(path) ? path.substr(0, path.size() - 3) : path;
+}
 
 RawFile::RawFile(const std::string& path) : path_(path) {
   descriptor_ = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
@@ -48,15 +76,61 @@ RawFile::RawFile(const std::string& path) : path_(path) {
                                                                 : ": is not a regular file, which is required"));
   }
   size_bytes_ = static_cast<std::uint64_t>(status.st_size);
+  if (!is_gzip_name(path)) return;
+  try {
+    std::array<std::byte, 3> head = {};
+    if (looks_like_gzip(std::span(head).first(read_stored(0, head)))) {
+      inflate(0, size_bytes_, InflatedBytes::Kind::kGzip);
+    }
+  } catch (...) {
+    ::close(descriptor_);
+    throw;
+  }
+}
+
+RawFile::RawFile(const std::string& path, const ZipMember& member) : RawFile(path) {
+  const std::uint64_t begin = zip_member_begin(*this, member);
+  std::uint32_t crc = 0;
+  if (member.method == 0) {
+    begin_bytes_ = begin;
+    size_bytes_ = member.stored_bytes;
+    crc = crc_of(*this);
+  } else {
+    inflate(begin, member.stored_bytes, InflatedBytes::Kind::kRawDeflate);
+    crc = inflated_->crc32();
+  }
+  if (size_bytes_ != member.size_bytes || crc != member.crc32) {
+    throw Error(ErrorCode::kCorrupt,
+                fmt::format("{}: {} is damaged: its {} do not match", path, member.name,
+                            size_bytes_ != member.size_bytes ? "size and the zip directory's" : "CRC and bytes"));
+  }
 }
 
 RawFile::~RawFile() {
   ::close(descriptor_);
 }
 
+void RawFile::inflate(std::uint64_t begin_bytes, std::uint64_t stored_bytes, InflatedBytes::Kind kind) {
+  const auto read = [this, begin_bytes, stored_bytes](std::uint64_t offset, std::span<std::byte> bytes) {
+    if (offset >= stored_bytes) return std::size_t{0};
+    const std::uint64_t most = std::min<std::uint64_t>(bytes.size(), stored_bytes - offset);
+    return read_stored(begin_bytes + offset, bytes.first(static_cast<std::size_t>(most)));
+  };
+  inflated_ = std::make_unique<InflatedBytes>(path_, read, kind);
+  size_bytes_ = inflated_->size_bytes();
+}
+
 std::size_t RawFile::read_some(std::uint64_t offset_bytes, std::span<std::byte> bytes) const {
+  if (offset_bytes >= size_bytes_) return 0;
+  bytes = bytes.first(static_cast<std::size_t>(std::min<std::uint64_t>(bytes.size(), size_bytes_ - offset_bytes)));
+  if (!inflated_) return read_stored(begin_bytes_ + offset_bytes, bytes);
+  const std::lock_guard lock(one_inflates_);
+  return inflated_->read_some(offset_bytes, bytes);
+}
+
+std::size_t RawFile::read_stored(std::uint64_t offset_bytes, std::span<std::byte> bytes) const {
   std::size_t done = 0;
-  while (done < bytes.size() && offset_bytes + done < size_bytes_) {
+  while (done < bytes.size()) {
     const ssize_t got =
         ::pread(descriptor_, bytes.data() + done, bytes.size() - done, static_cast<off_t>(offset_bytes + done));
     if (got < 0 && errno == EINTR) continue;

@@ -23,8 +23,10 @@
 #include "formats/oiio_source.h"
 #include "formats/pds3_source.h"
 #include "formats/png_source.h"
+#include "formats/raw_file.h"
 #include "formats/raw_source.h"
 #include "formats/tiff_source.h"
+#include "formats/usgs_dem_source.h"
 #include "isohf/base/error.h"
 
 namespace isohf {
@@ -37,33 +39,44 @@ struct Reader {
   std::unique_ptr<HeightSource> (*open)(const std::string& path, const OpenOptions& options);
   /// Whether a file beside `path` describes it; nullptr where the format has no such files.
   bool (*described)(const std::string& path) = nullptr;
+  bool in_gzip = false;  ///< reads what is inside a .gz
 };
 
 const std::vector<Reader>& readers() {
   static const std::vector<Reader> table = {
-      {{"OpenEXR", {".exr"}, exr_library, "takes --channel"}, looks_like_exr, open_exr},
+      {{"OpenEXR", {".exr"}, exr_library, "takes --channel and --part"}, looks_like_exr, open_exr},
       {{"TIFF", {".tif", ".tiff"}, tiff_library, "takes --channel"}, looks_like_tiff, open_tiff},
-      {{"PNG", {".png"}, png_library, "takes --channel"}, looks_like_png, open_png},
-      {{"ESRI ASCII grid", {".asc"}}, looks_like_ascii_grid, open_ascii_grid},
+      {{"PNG", {".png"}, png_library, "takes --channel and --encoding"}, looks_like_png, open_png},
+      {{"ESRI ASCII grid, GRASS ASCII", {".asc"}}, looks_like_ascii_grid, open_ascii_grid, nullptr, true},
       {{"GridFloat or EHdr header", {".hdr"}}, looks_like_grid_header, open_header_grid},
       {{"GridFloat", {".flt"}}, nullptr, open_header_grid},
       {{"EHdr", {".bil", ".bip", ".bsq"}}, nullptr, open_header_grid},
-      {{"PDS3", {".img", ".lbl"}, nullptr, "takes --channel"}, looks_like_pds3, open_pds3, has_pds3_label},
-      {{"ISIS3 cube", {".cub"}, nullptr, "takes --channel"}, looks_like_isis3, open_isis3},
-      {{"NumPy", {".npy"}}, looks_like_npy, open_npy},
-      {{"DTED", {".dt0", ".dt1", ".dt2"}}, looks_like_dted, open_dted},
-      {{"SRTM HGT", {".hgt", ".hgt.zip"}}, nullptr, open_hgt},
-      {{"raw samples", {".r8", ".r16", ".r32", ".f32", ".f64", ".raw"}, nullptr, "needs --raw"}, nullptr, open_raw},
+      {{"PDS3", {".img", ".lbl"}, nullptr, "takes --channel"}, looks_like_pds3, open_pds3, has_pds3_label, true},
+      {{"ISIS3 cube", {".cub", ".lbl"}, nullptr, "takes --channel"}, looks_like_isis3, open_isis3, nullptr, true},
+      {{"NumPy", {".npy"}}, looks_like_npy, open_npy, nullptr, true},
+      {{"NumPy archive", {".npz"}, nullptr, "takes --channel"}, nullptr, open_npz},
+      {{"USGS DEM", {".dem"}}, looks_like_usgs_dem, open_usgs_dem, nullptr, true},
+      {{"GTOPO30", {".dem"}}, nullptr, open_header_grid},
+      {{"DTED", {".dt0", ".dt1", ".dt2"}}, looks_like_dted, open_dted, nullptr, true},
+      {{"SRTM HGT", {".hgt", ".hgt.zip"}}, nullptr, open_hgt, nullptr, true},
+      {{"raw samples", {".r8", ".r16", ".r32", ".f32", ".f64", ".raw"}, nullptr, "needs --raw"},
+       nullptr,
+       open_raw,
+       nullptr,
+       true},
   };
   return table;
 }
 
 /// Enough for every signature.
-constexpr std::size_t kHeadBytes = 128;
+constexpr std::size_t kHeadBytes = 256;
+/// Of a gzip file, to inflate so many from.
+constexpr std::size_t kStoredHeadBytes = 4096;
 
 struct Head {
   std::array<std::byte, kHeadBytes> bytes{};
   std::size_t size = 0;
+  bool in_gzip = false;  ///< the bytes are those inside
 };
 
 /// The file's first bytes; refuses whatever is not a readable regular file with something in it.
@@ -79,16 +92,24 @@ Head read_head(const std::string& path) {
   const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
   if (file < 0) refuse(ErrorCode::kIo, fmt::format("cannot be opened: {}", std::strerror(errno)));
   Head head;
-  const ssize_t got = ::pread(file, head.bytes.data(), head.bytes.size(), 0);
+  std::array<std::byte, kStoredHeadBytes> stored{};
+  const ssize_t got = ::pread(file, stored.data(), stored.size(), 0);
   const int error = errno;
   ::close(file);
   if (got < 0) refuse(ErrorCode::kIo, fmt::format("cannot be read: {}", std::strerror(error)));
-  head.size = static_cast<std::size_t>(got);
+  const auto there = std::span(stored).first(static_cast<std::size_t>(got));
+  head.in_gzip = is_gzip_name(path) && looks_like_gzip(there);
+  if (head.in_gzip) {
+    head.size = inflate_head(there, head.bytes);
+  } else {
+    head.size = std::min(there.size(), head.bytes.size());
+    std::copy_n(there.begin(), head.size, head.bytes.begin());
+  }
   return head;
 }
 
 bool has_extension(const std::string& path, const Format& format) {
-  std::string lower = path;
+  std::string lower = without_gzip(path);
   std::transform(lower.begin(), lower.end(), lower.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   return std::any_of(format.extensions.begin(), format.extensions.end(), [&](const std::string& extension) {
@@ -139,12 +160,15 @@ std::unique_ptr<HeightSource> open_source(const std::string& path, const OpenOpt
   const Head head = read_head(path);
   if (options.raw) return open_raw(path, options);
   const Reader* reader = reader_of(path, std::span(head.bytes).first(head.size));
-  if (reader == nullptr && has_extension(path, {"", {".npz"}})) {
-    throw Error(ErrorCode::kUnsupported, path +
-                                             ": is a NumPy archive of arrays; numpy.save writes one of them as .npy, "
-                                             "which is read");
+  if (head.in_gzip && (reader == nullptr || !reader->in_gzip)) {
+    throw Error(ErrorCode::kUnsupported,
+                fmt::format("{}: is {} in gzip, which isohf does not read; gunzip it first", path,
+                            reader == nullptr ? "something unknown" : reader->format.name));
   }
   if (reader == nullptr) return open_with_oiio(path, options);
+  if (!options.part.empty() && reader->open != open_exr) {
+    throw Error(ErrorCode::kInvalidArgument, path + ": has no parts; --part is for OpenEXR files of several");
+  }
   return reader->open(path, options);
 }
 

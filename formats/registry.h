@@ -21,6 +21,7 @@ struct RawLayout {
 /// What a user may say about an input that the file does not, or says wrongly.
 struct OpenOptions {
   std::string channel;                       ///< channel name or zero-based number; empty: the reader's choice
+  std::string part;                          ///< of a file of several parts: name or zero-based number
   std::optional<Registration> registration;  ///< overrides the file's
   std::optional<double> void_value;          ///< overrides the file's void values
   std::optional<double> z_scale;             ///< elevation = raw * z_scale + z_offset; overrides the file's

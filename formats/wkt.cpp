@@ -181,9 +181,37 @@ bool read_wkt(std::string_view text, Georeference& place) {
   return true;
 }
 
+namespace {
+
+/// "Projection GEOGRAPHIC", "Datum WGS84", "Units DD", a line each: what stood in a .prj before WKT did (GTOPO30).
+/// False, and nothing changed, where it says anything else.
+bool read_old_prj(std::string_view text, Georeference& place) {
+  std::string words;
+  for (const char c : text) {
+    if (std::isspace(static_cast<unsigned char>(c)) == 0) {
+      words += static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+    } else if (!words.empty() && words.back() != ' ') {
+      words += ' ';
+    }
+  }
+  const auto says = [&](std::string_view what) { return words.find(what) != std::string::npos; };
+  if (words.rfind("PROJECTION GEOGRAPHIC", 0) != 0 || !says("UNITS DD")) return false;
+  place.unit = HorizontalUnit::kDegree;
+  if (!says("DATUM WGS84")) return true;
+  ReferenceSystem& system = place.system;
+  system.name = "WGS 84";
+  system.epsg = 4326;
+  system.body = "Earth";
+  system.semi_major_axis_m = 6378137.0;
+  system.inverse_flattening = 298.257223563;
+  return true;
+}
+
+}  // namespace
+
 void read_prj_beside(SourceInfo& info) {
   const std::string text = prj_beside(info.path);
-  if (!text.empty() && read_wkt(text, info.georeference)) return;
+  if (!text.empty() && (read_wkt(text, info.georeference) || read_old_prj(text, info.georeference))) return;
   if (!text.empty()) {
     info.warnings.emplace_back("the .prj beside the file is not the WKT of a map's reference system; it is ignored");
   }

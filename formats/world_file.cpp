@@ -11,6 +11,7 @@
 #include <sstream>
 #include <vector>
 
+#include "formats/raw_file.h"
 #include "isohf/base/error.h"
 
 namespace isohf {
@@ -45,6 +46,7 @@ std::vector<std::string> world_extensions(const std::string& raster_path) {
   std::string own = std::filesystem::path(raster_path).extension().string();
   std::transform(own.begin(), own.end(), own.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  if (own == ".flt") return {".flw", ".ftw", ".fltw", ".wld"};
   if (own.size() < 3 || own == ".tif" || own == ".tiff") return {".tfw", ".tifw", ".wld"};
   return {fmt::format(".{}{}w", own[1], own.back()), own + "w", ".wld"};
 }
@@ -79,7 +81,7 @@ std::optional<WorldFile> world_file_beside(const std::string& raster_path) {
 
 std::string prj_beside(const std::string& raster_path) {
   for (const std::string& extension : spellings({".prj"})) {
-    if (auto text = text_of(std::filesystem::path(raster_path).replace_extension(extension))) {
+    if (auto text = text_of(std::filesystem::path(without_gzip(raster_path)).replace_extension(extension))) {
       while (!text->empty() && std::isspace(static_cast<unsigned char>(text->back())) != 0) text->pop_back();
       return *text;
     }

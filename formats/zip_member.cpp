@@ -113,16 +113,12 @@ std::vector<ZipMember> zip_members(const RawFile& file) {
   return members;
 }
 
-std::vector<std::byte> read_zip_member(const RawFile& file, const ZipMember& member, std::uint64_t most_bytes) {
+std::uint64_t zip_member_begin(const RawFile& file, const ZipMember& member) {
   if (member.encrypted || (member.method != 0 && member.method != 8)) {
     throw Error(
         ErrorCode::kUnsupported,
         fmt::format("{}: {} is {}; stored and deflated members are read", file.path(), member.name,
                     member.encrypted ? std::string("encrypted") : fmt::format("packed by method {}", member.method)));
-  }
-  if (member.size_bytes > most_bytes || member.stored_bytes > most_bytes) {
-    throw Error(ErrorCode::kUnsupported, fmt::format("{}: {} has {} bytes, at most {} are unpacked", file.path(),
-                                                     member.name, member.size_bytes, most_bytes));
   }
   std::vector<std::byte> header(kHeaderBytes);
   file.read(member.header_offset_bytes, header);
@@ -134,6 +130,15 @@ std::vector<std::byte> read_zip_member(const RawFile& file, const ZipMember& mem
   const std::uint64_t begin = member.header_offset_bytes + kHeaderBytes + name_bytes + extra_bytes;
   if (begin > file.size_bytes() || member.stored_bytes > file.size_bytes() - begin) {
     corrupt(file, member.name + " lies outside the file");
+  }
+  return begin;
+}
+
+std::vector<std::byte> read_zip_member(const RawFile& file, const ZipMember& member, std::uint64_t most_bytes) {
+  const std::uint64_t begin = zip_member_begin(file, member);
+  if (member.size_bytes > most_bytes || member.stored_bytes > most_bytes) {
+    throw Error(ErrorCode::kUnsupported, fmt::format("{}: {} has {} bytes, at most {} are unpacked", file.path(),
+                                                     member.name, member.size_bytes, most_bytes));
   }
   std::vector<std::byte> stored(static_cast<std::size_t>(member.stored_bytes));
   file.read(begin, stored);

@@ -23,6 +23,10 @@ struct ZipMember {
 /// The directory of the archive. Throws Error{kCorrupt, kIo} naming the file.
 [[nodiscard]] std::vector<ZipMember> zip_members(const RawFile& file);
 
+/// Where the stored bytes of `member` begin in the file. Throws Error: kUnsupported for encrypted members and for
+/// methods other than stored and deflated; kCorrupt.
+[[nodiscard]] std::uint64_t zip_member_begin(const RawFile& file, const ZipMember& member);
+
 /// The contents of `member`, checked against its size and CRC. Throws Error: kUnsupported beyond `most_bytes`, for
 /// encrypted members and for other methods; kCorrupt.
 [[nodiscard]] std::vector<std::byte> read_zip_member(const RawFile& file, const ZipMember& member,

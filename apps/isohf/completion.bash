@@ -27,6 +27,7 @@ _isohf() {
     *' --acquisition') values='point box tent gaussian: fir:' ;;
     *' --outside') values='cover clamp void' ;;
     *' --type') values='u16 u8 f32' ;;
+    *' --encoding') values='terrarium mapbox rgba-float' ;;
     *' --registration') values='area point auto' ;;
     *' --progress') values='auto plain json none' ;;
     *' --step') values='auto finest' ;;

@@ -14,6 +14,14 @@ void add_source_options(CommandLine& line, OpenOptions& options) {
               "Channel of elevations: its name, or its number from 0 (default: the file's only "
               "or first fitting one)",
               options.channel);
+  line.option("--part", "NAME|N", "Part of an OpenEXR file of several: its name, or its number from 0", options.part);
+  line.option("--encoding", "NAME",
+              "The colours of a PNG are packed elevations: terrarium, mapbox or rgba-float; never guessed",
+              [&](const std::string& text) {
+                (void)parse_word(text, {"terrarium", "mapbox", "rgba-float"});
+                options.channel = text;  // one more channel of the picture, as which archives record it
+              });
+  line.exclusive({"--channel", "--encoding"});
   line.option("--registration", "KIND",
               "Where samples lie: area (middle of a pixel), point (on posts), or auto: as the file says, else posts "
               "without and areas with a georeference (default auto)",

@@ -5,7 +5,8 @@
 
 namespace isohf::cli {
 
-/// What a user may say about an input: --channel, --registration, --nodata, --z-scale, --z-offset, --raw,
+/// What a user may say about an input: --channel, --part, --encoding, --registration, --nodata, --z-scale, --z-offset,
+/// --raw,
 /// --sample-spacing.
 void add_source_options(CommandLine& line, OpenOptions& options);
 

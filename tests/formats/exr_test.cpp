@@ -317,6 +317,26 @@ TEST(ExrSource, ReadsPartsOfAMultiPartFile) {
   options.channel = "Z";
   EXPECT_THAT(error_of([&] { (void)open_exr(path, options); }).what(),
               HasSubstr("it has cover.mask, ground.Y, ground.error, small.Y"));
+  const auto expect_part = [&](const char* part, const char* channel, std::size_t number, std::size_t plane,
+                               const std::string& name) {
+    OpenOptions of_part;
+    of_part.part = part;
+    of_part.channel = channel;
+    const auto source = open_source(path, of_part);
+    EXPECT_EQ(read_whole(*source), Samples(pictures[number]).plane(plane)) << part;
+    EXPECT_EQ(source->info().channel, name);
+  };
+  expect_part("ground", "", 1, 0, "ground.Y");
+  expect_part("1", "error", 1, 1, "ground.error");
+  expect_part("small", "", 2, 0, "small.Y");
+  expect_part("2", "0", 2, 0, "small.Y");
+  OpenOptions wrong;
+  wrong.part = "sky";
+  EXPECT_THAT(error_of([&] { (void)open_exr(path, wrong); }).what(), HasSubstr("has no part \"sky\""));
+  wrong.part = "3";
+  EXPECT_THAT(error_of([&] { (void)open_exr(path, wrong); }).what(), HasSubstr("in parts 0...2"));
+  write_bytes(folder / "a.asc", "ncols 1\nnrows 1\n1\n", 20);
+  EXPECT_THAT(error_of([&] { (void)open_source(folder / "a.asc", wrong); }).what(), HasSubstr("--part is for OpenEXR"));
 }
 
 TEST(ExrSource, RefusesSubsampledChannelsOnly) {

@@ -65,6 +65,53 @@ TEST_F(HeaderGrid, DeliversRealFilesAsTheReferenceDoes) {
   }
 }
 
+TEST_F(HeaderGrid, ReadsGtopo30) {
+  write("W180N90.PRJ", "Projection    GEOGRAPHIC\nDatum         WGS84\nZunits        METERS\nUnits         DD\n");
+  write("W180N90.HDR",
+        "BYTEORDER      M\nLAYOUT       BIL\nNROWS         2\nNCOLS         3\nNBANDS        1\nNBITS         16\n"
+        "BANDROWBYTES         6\nTOTALROWBYTES        6\nBANDGAPBYTES         0\nNODATA        -9999\n"
+        "ULXMAP        -179.99583333333334\nULYMAP        89.99583333333334\nXDIM          0.00833333333333\n"
+        "YDIM          0.00833333333333\n");
+  write("W180N90.DEM", std::string("\xD8\xF1\x00\x01\x00\x02\x01\x00\xFF\xFF\x22\x78", 12));
+  for (const char* name : {"W180N90.DEM", "W180N90.HDR"}) {
+    const auto source = open_source(folder_ / name, {});
+    const SourceInfo& info = source->info();
+    ASSERT_EQ(info.sample_type, SampleType::kInt16);
+    EXPECT_EQ(info.void_values, std::vector<double>{-9999.0});
+    EXPECT_EQ(info.georeference.unit, HorizontalUnit::kDegree);
+    EXPECT_EQ(info.georeference.system.epsg, 4326);
+    EXPECT_EQ(info.georeference.origin_y, 89.99583333333334);
+    const auto all = read_whole(*source);
+    const std::vector<double> wanted = {-9999, 1, 2, 256, -1, 8824};
+    for (std::size_t i = 0; i < 6; ++i) EXPECT_EQ(raw_value(SampleType::kInt16, all.data() + 2 * i), wanted[i]);
+    EXPECT_THAT(info.warnings, ElementsAre(HasSubstr("no pixeltype")));
+  }
+}
+
+TEST_F(HeaderGrid, TakesThePlaceFromAWorldFileWhereTheHeaderHasNone) {
+  const std::string world = "10\n0\n0\n-20\n500005\n4000010\n";
+  for (const auto& [data, extension] : {std::pair{"grid.bil", "grid.blw"}, {"grid.bsq", "grid.bqw"}}) {
+    write(extension, world);
+    const auto source = open(kSixteenBits, bytes(12), data);
+    const Georeference& place = source->info().georeference;
+    EXPECT_TRUE(place.has_origin);
+    EXPECT_EQ(place.origin_x, 500005.0);
+    EXPECT_EQ(place.origin_y, 4000010.0);
+    EXPECT_EQ(place.spacing_x, 10.0);
+    EXPECT_EQ(place.spacing_y, 20.0);
+    EXPECT_THAT(source->info().warnings, IsEmpty());
+    // The header goes first, and what contradicts it is said.
+    const std::string placed = std::string(kSixteenBits) + "ULXMAP 500005\nULYMAP 4000010\nXDIM 10\nYDIM ";
+    EXPECT_THAT(open(placed + "20\n", bytes(12), data)->info().warnings, IsEmpty());
+    EXPECT_THAT(open(placed + "10\n", bytes(12), data)->info().warnings,
+                ElementsAre(HasSubstr("elsewhere than the header")));
+    write(extension, "10\n0\n0\n20\n500005\n4000010\n");
+    EXPECT_THAT(refusal(kSixteenBits, bytes(12), data), HasSubstr("dy is positive"));
+    std::filesystem::remove(folder_ / extension);
+    std::filesystem::remove(folder_ / data);
+  }
+}
+
 TEST_F(HeaderGrid, ReadsEveryTypeInBothByteOrdersAndEveryLayout) {
   struct Kind {
     const char* name;

@@ -1,14 +1,13 @@
 #include "formats/hgt_source.h"
 
 #include <gtest/gtest.h>
-#include <zlib.h>
 
 #include <filesystem>
 #include <fstream>
 
 #include "formats/real_files.h"
 #include "formats/scratch_folder.h"
-#include "isohf/base/bytes.h"
+#include "formats/zip_archive.h"
 #include "isohf/base/error.h"
 
 namespace isohf {
@@ -35,55 +34,8 @@ std::vector<std::byte> tile(int columns, int rows) {
   return bytes;
 }
 
-/// A zip archive of one deflated (or stored) member.
 std::vector<std::byte> zipped(const std::string& name, const std::vector<std::byte>& contents, bool deflated) {
-  std::vector<std::byte> packed = contents;
-  if (deflated) {
-    packed.resize(compressBound(contents.size()));
-    z_stream stream = {};
-    deflateInit2(&stream, 9, Z_DEFLATED, -MAX_WBITS, 9, Z_DEFAULT_STRATEGY);
-    stream.next_in = reinterpret_cast<Bytef*>(const_cast<std::byte*>(contents.data()));
-    stream.avail_in = static_cast<uInt>(contents.size());
-    stream.next_out = reinterpret_cast<Bytef*>(packed.data());
-    stream.avail_out = static_cast<uInt>(packed.size());
-    EXPECT_EQ(deflate(&stream, Z_FINISH), Z_STREAM_END);
-    packed.resize(stream.total_out);
-    deflateEnd(&stream);
-  }
-  std::vector<std::byte> zip;
-  ByteWriter out(zip);
-  const auto common = [&] {
-    out.write<std::uint16_t>(20);
-    out.write<std::uint16_t>(0);
-    out.write<std::uint16_t>(deflated ? 8 : 0);
-    out.write<std::uint32_t>(0);
-    out.write(static_cast<std::uint32_t>(crc32_z(0, reinterpret_cast<const Bytef*>(contents.data()), contents.size())));
-    out.write(static_cast<std::uint32_t>(packed.size()));
-    out.write(static_cast<std::uint32_t>(contents.size()));
-    out.write(static_cast<std::uint16_t>(name.size()));
-    out.write<std::uint16_t>(0);
-  };
-  const auto text = std::as_bytes(std::span(name));
-  out.write<std::uint32_t>(0x04034B50);
-  common();
-  out.write_bytes(text);
-  out.write_bytes(packed);
-  const auto directory = static_cast<std::uint32_t>(zip.size());
-  out.write<std::uint32_t>(0x02014B50);
-  out.write<std::uint16_t>(20);
-  common();
-  for (int i = 0; i < 5; ++i) out.write<std::uint16_t>(0);
-  out.write<std::uint32_t>(0);
-  out.write_bytes(text);
-  const auto directory_bytes = static_cast<std::uint32_t>(zip.size()) - directory;
-  out.write<std::uint32_t>(0x06054B50);
-  out.write<std::uint32_t>(0);
-  out.write<std::uint16_t>(1);
-  out.write<std::uint16_t>(1);
-  out.write(directory_bytes);
-  out.write(directory);
-  out.write<std::uint16_t>(0);
-  return zip;
+  return testing::zip_archive({{name, contents}}, deflated);
 }
 
 ErrorCode code_of(const std::string& path, const OpenOptions& options = {}) {
@@ -185,6 +137,13 @@ TEST_F(HgtSource, ReadsStoredAndDeflatedMembers) {
     EXPECT_EQ(source->info().georeference.origin_x, -70.0);
     EXPECT_EQ(testing::value_at(SampleType::kInt16, testing::read_all(*source), 120), 20);
   }
+}
+
+TEST_F(HgtSource, SaysWhenAnArchiveHoldsAnotherTileThanItsNameSays) {
+  const auto source = open_hgt(write("N46E007.hgt.zip", zipped("N45E006.hgt", tile(1201, 1201), true)), {});
+  EXPECT_EQ(source->info().georeference.origin_x, 6.0);
+  ASSERT_EQ(source->info().warnings.size(), 1U);
+  EXPECT_NE(source->info().warnings[0].find("is called N46E007.hgt.zip and holds N45E006.hgt"), std::string::npos);
 }
 
 TEST_F(HgtSource, RefusesEveryTruncatedArchive) {

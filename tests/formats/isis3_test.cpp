@@ -133,6 +133,24 @@ TEST_F(Isis3, WindowsEqualTheWholeInEveryLayout) {
   }
 }
 
+TEST_F(Isis3, FollowsADetachedLabelToItsCore) {
+  const std::string whole = label(kTiles, 1, kWord) + tiles(3, 2, 1, false);
+  std::string text = label(std::string("^Core = DATA.cub\n") + kTiles, 1, kWord);
+  testing::write_bytes(testing::fresh(folder() / "whole.cub"), whole);
+  testing::write_bytes(testing::fresh(folder() / "data.CUB"), std::string(kLabelBytes, 'x') + tiles(3, 2, 1, false));
+  const std::string path = testing::fresh(folder() / "outside.lbl");
+  testing::write_bytes(path, text);
+  const auto expected = open_source((folder() / "whole.cub").string(), {});
+  const auto source = open_source(path, {});
+  EXPECT_EQ(testing::read_all(*source), testing::read_all(*expected));
+  EXPECT_EQ(source->info().georeference.origin_x, expected->info().georeference.origin_x);
+  std::filesystem::remove(folder() / "data.CUB");
+  ErrorCode code = ErrorCode::kCancelled;
+  EXPECT_THAT(testing::failure_of(path, &code, [&] { (void)open_source(path, {}); }),
+              HasSubstr("^Core names DATA.cub, which must be a file beside the label"));
+  EXPECT_EQ(code, ErrorCode::kIo);
+}
+
 TEST_F(Isis3, PlacesPixelsAndScalesThem) {
   const auto source = open_source(write(label(kTiles, 1, kWord) + tiles(3, 2, 1, false)), {});
   const SourceInfo& info = source->info();
@@ -211,7 +229,7 @@ TEST_F(Isis3, NamesWhatItRefuses) {
   EXPECT_THAT(failure(label(kTiles, 1, "Type = Double") + data), HasSubstr("TYPE is \"Double\", must be UnsignedByte"));
   EXPECT_THAT(failure(label(kTiles, 3, kWord) + data), HasSubstr("ends early"));
   EXPECT_THAT(failure(label(std::string("^Core = \"other.cub\"\n") + kTiles, 1, kWord) + data),
-              HasSubstr("the samples lie in another file"));
+              HasSubstr("^Core names other.cub, which must be a file beside the label"));
   std::string early = label(kTiles, 1, kWord) + data;
   early.replace(early.find("1537"), 4, "0099");
   EXPECT_THAT(failure(early), HasSubstr("STARTBYTE is \"0099\", must be behind the label"));

@@ -180,6 +180,28 @@ TEST_F(Pds3, ReadsEverySampleType) {
   }
 }
 
+TEST_F(Pds3, ReadsVaxFloats) {
+  // VAX Architecture Reference Manual, F_floating: 1.0 is 00004080 hexadecimal, -1.5 0000C0C0.
+  const std::vector<std::pair<std::uint32_t, double>> numbers = {
+      {0x00004080, 1.0},   {0x0000C0C0, -1.5},   {0x00000000, 0.0},
+      {0x00004020, 0.625}, {0x0000458A, 1104.0}, {0xFFFF7FFF, 1.7014117331926443e38}};
+  std::string data;
+  std::vector<double> wanted;
+  for (int i = 0; i < 12; ++i) {
+    const auto& [bits, value] = numbers[static_cast<std::size_t>(i) % numbers.size()];
+    for (unsigned b = 0; b < 32; b += 8) data.push_back(static_cast<char>(bits >> b & 0xFFU));
+    wanted.push_back(value);
+  }
+  const std::string image =
+      replaced(replaced(kImage, "MSB_INTEGER", "VAX_REAL"), "SAMPLE_BITS = 16", "SAMPLE_BITS = 32");
+  const auto source = open_pds3(write("vax.img", attached(image) + data), {});
+  ASSERT_EQ(source->info().sample_type, SampleType::kFloat32);
+  const auto raw = testing::read_all(*source);
+  for (std::size_t i = 0; i < 12; ++i) {
+    EXPECT_EQ(testing::value_at(SampleType::kFloat32, raw, i), wanted[i]) << i;
+  }
+}
+
 TEST_F(Pds3, WindowsEqualTheWholeInEveryLayout) {
   for (const char* order : {"BAND_SEQUENTIAL", "LINE_INTERLEAVED", "SAMPLE_INTERLEAVED"}) {
     for (const int margin : {0, 3}) {
@@ -391,7 +413,8 @@ TEST_F(Pds3, NamesTheLineOfWhatItRefuses) {
   EXPECT_THAT(says("LINES = 3", "LINES = many"), HasSubstr("label line 6: LINES is \"many\", must be a whole number"));
   EXPECT_THAT(says("SAMPLE_BITS = 16", "SAMPLE_BITS = 12"),
               HasSubstr("line 9: SAMPLE_BITS is \"12\", must be 8, 16 or 32"));
-  EXPECT_THAT(says("MSB_INTEGER", "VAX_REAL"), HasSubstr("SAMPLE_TYPE is \"VAX_REAL\""));
+  EXPECT_THAT(says("MSB_INTEGER", "VAXG_REAL"), HasSubstr("SAMPLE_TYPE is \"VAXG_REAL\""));
+  EXPECT_THAT(says("MSB_INTEGER", "VAX_REAL"), HasSubstr("must be 32 for VAX floats"));
   EXPECT_THAT(says("END_OBJECT = IMAGE", "END_OBJECT = TABLE"),
               HasSubstr("line 10: END_OBJECT = TABLE ends block IMAGE"));
   EXPECT_THAT(says("END_OBJECT = IMAGE", "COLOUR = GREY     "), HasSubstr("block IMAGE has no end"));

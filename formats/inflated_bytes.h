@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+
+namespace isohf {
+
+/// The contents of deflated data, readable at any offset. Opening inflates all of it once, checks it, and keeps the
+/// decoder's state at up to 128 places (6 MiB); a read goes on from the last one's end or from the nearest place
+/// before. One thread at a time.
+class InflatedBytes {
+ public:
+  enum class Kind { kGzip, kRawDeflate };
+  /// Reads up to bytes.size() stored bytes at an offset; returns how many there were.
+  using ReadStored = std::function<std::size_t(std::uint64_t offset_bytes, std::span<std::byte> bytes)>;
+
+  /// `name` begins the messages. Gzip's own checksums and lengths are verified, of members that follow each other too.
+  /// Throws Error{kCorrupt} where the data are damaged or cut off.
+  InflatedBytes(std::string name, ReadStored read_stored, Kind kind);
+  InflatedBytes(const InflatedBytes&) = delete;
+  InflatedBytes& operator=(const InflatedBytes&) = delete;
+  ~InflatedBytes();
+
+  [[nodiscard]] std::uint64_t size_bytes() const;
+  [[nodiscard]] std::uint32_t crc32() const;
+  /// Returns how many of the bytes there were before the end. Throws Error{kIo, kCorrupt}.
+  std::size_t read_some(std::uint64_t offset_bytes, std::span<std::byte> bytes);
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+/// Whether these first bytes of a file are of a gzip member with deflated data (RFC 1952).
+[[nodiscard]] bool looks_like_gzip(std::span<const std::byte> head);
+
+/// Inflates the beginning of a gzip file, given its first bytes; returns how many bytes came out.
+std::size_t inflate_head(std::span<const std::byte> stored, std::span<std::byte> bytes);
+
+}  // namespace isohf

@@ -1,0 +1,430 @@
+#include "formats/usgs_dem_source.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include "formats/open_options.h"
+#include "formats/raw_file.h"
+#include "formats/text_tokens.h"
+#include "isohf/base/assert.h"
+#include "isohf/base/error.h"
+
+namespace isohf {
+namespace {
+
+constexpr std::size_t kRecordBytes = 1024;
+constexpr std::size_t kProfileHeadBytes = 144;
+constexpr std::int64_t kPostsInFirst = 146;  // record of a profile, behind its head
+constexpr std::int64_t kPostsInNext = 170;
+constexpr std::size_t kPostBytes = 6;
+constexpr std::int64_t kMostPosts = 999999;  // a field of six digits
+constexpr std::int64_t kRowsAtOnce = 256;
+constexpr std::int64_t kVoid = -32767;
+/// Of a spacing; the coordinates have fifteen digits.
+constexpr double kOffGrid = 0.01;
+
+/// The record of a profile that holds a post.
+std::int64_t record_of(std::int64_t post) {
+  return post < kPostsInFirst ? 0 : 1 + (post - kPostsInFirst) / kPostsInNext;
+}
+
+std::size_t byte_of(std::int64_t post) {
+  if (post < kPostsInFirst) return kProfileHeadBytes + static_cast<std::size_t>(post) * kPostBytes;
+  return static_cast<std::size_t>((post - kPostsInFirst) % kPostsInNext) * kPostBytes;
+}
+
+std::string_view trimmed(std::string_view text) {
+  text.remove_prefix(std::min(text.find_first_not_of(' '), text.size()));
+  return text.substr(0, text.find_last_not_of(' ') + 1);
+}
+
+/// A Fortran number, whose exponent is a D as often as an E; nullopt where the field holds none.
+std::optional<double> fortran_number(std::string_view field) {
+  std::string text(trimmed(field));
+  for (char& c : text) c = c == 'D' || c == 'd' ? 'E' : c;
+  double value = 0.0;
+  if (text.empty() || !read_decimal(text, value) || !std::isfinite(value)) return std::nullopt;
+  return value;
+}
+
+std::optional<std::int64_t> whole_number(std::string_view field) {
+  const std::string_view text = trimmed(field);
+  std::int64_t value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  return error == std::errc{} && end == text.data() + text.size() ? std::optional(value) : std::nullopt;
+}
+
+/// An elevation in six characters; false where they are none. The hot path.
+bool read_post(const char* field, std::int64_t& value) {
+  std::size_t i = 0;
+  while (i < kPostBytes && field[i] == ' ') ++i;
+  const bool negative = i < kPostBytes && field[i] == '-';
+  if (negative) ++i;
+  if (i == kPostBytes) return false;
+  value = 0;
+  for (; i < kPostBytes; ++i) {
+    const auto digit = static_cast<unsigned>(field[i] - '0');
+    if (digit > 9) return false;
+    value = value * 10 + digit;
+  }
+  if (negative) value = -value;
+  return true;
+}
+
+struct Profile {
+  std::uint64_t offset_bytes = 0;
+  std::uint64_t end_bytes = 0;
+  std::int64_t first = 0;  // row of its first post, counted from the South
+  std::int64_t posts = 0;
+  double x = 0.0;
+  double y = 0.0;
+};
+
+class UsgsDemSource final : public HeightSource {
+ public:
+  UsgsDemSource(const std::string& path, const OpenOptions& options) : file_(path) {
+    info_.path = path;
+    info_.format = "USGS DEM";
+    (void)choose_band(info_, options, 1);
+    find_record_ends();
+    std::uint64_t at = 0;
+    header_ = record(at);
+    if (header_.size() < 864) corrupt("the type A record", fmt::format("has {} bytes, must have 864", header_.size()));
+    header_.resize(kRecordBytes, ' ');
+    read_grid();
+    read_profiles(at);
+    place_profiles();
+    read_system();
+    info_.block_width = info_.width;
+    info_.block_height = std::min(info_.height, kRowsAtOnce);
+    apply_open_options(info_, options);
+  }
+
+  [[nodiscard]] const SourceInfo& info() const override { return info_; }
+
+  void read_window(const Window& window, std::span<std::byte> samples) override {
+    ISOHF_ASSERT(window.column >= 0 && window.row >= 0 && window.columns >= 0 && window.rows >= 0);
+    ISOHF_ASSERT(window.column + window.columns <= info_.width && window.row + window.rows <= info_.height);
+    ISOHF_ASSERT(samples.size() ==
+                 static_cast<std::size_t>(window.columns * window.rows) * size_bytes(info_.sample_type));
+    if (info_.sample_type == SampleType::kInt16) {
+      read_columns<std::int16_t>(window, samples);
+    } else {
+      read_columns<std::int32_t>(window, samples);
+    }
+  }
+
+ private:
+  [[noreturn]] void corrupt(const std::string& where, const std::string& what) const {
+    throw Error(ErrorCode::kCorrupt, fmt::format("{}: {}: {}", info_.path, where, what));
+  }
+
+  [[nodiscard]] std::string_view field(std::size_t first, std::size_t size) const {
+    return std::string_view(header_).substr(first - 1, size);  // the standard counts from 1
+  }
+  [[nodiscard]] std::int64_t whole(std::size_t first, std::size_t size, const char* name, std::int64_t lowest,
+                                   std::int64_t highest) const {
+    const std::optional<std::int64_t> value = whole_number(field(first, size));
+    if (!value || *value < lowest || *value > highest) {
+      corrupt("the type A record",
+              fmt::format("the {} at byte {} is \"{}\", must be a whole number from {} to {}", name, first - 1,
+                          printable(trimmed(field(first, size))), lowest, highest));
+    }
+    return *value;
+  }
+
+  /// Records are 1024 bytes, or lines of at most so many.
+  void find_record_ends() {
+    std::array<char, 2 * kRecordBytes + 8> start{};
+    const std::size_t got = file_.read_some(0, std::as_writable_bytes(std::span(start)));
+    const std::string_view text(start.data(), got);
+    const std::size_t end = text.find('\n');
+    if (end == std::string_view::npos || end > kRecordBytes + 1) return;
+    lines_ = true;
+  }
+
+  /// The record at `at`, without its line end; moves `at` to the next. Empty at the end of the file.
+  [[nodiscard]] std::string record(std::uint64_t& at) const {
+    std::string text(kRecordBytes + (lines_ ? 2 : 0), '\0');
+    text.resize(file_.read_some(at, std::as_writable_bytes(std::span(text))));
+    if (!lines_) {
+      at += text.size();
+      return text;
+    }
+    const std::size_t end = text.find('\n');
+    if (end == std::string::npos && text.size() > kRecordBytes) {
+      corrupt(fmt::format("the line at byte {}", at), "is longer than a record, which has 1024 bytes");
+    }
+    at += end == std::string::npos ? text.size() : end + 1;
+    text.resize(std::min(end, text.size()));
+    if (!text.empty() && text.back() == '\r') text.pop_back();
+    return text;
+  }
+
+  void read_grid() {
+    if (whole(151, 6, "elevation pattern", 1, 4) != 1) {
+      throw Error(ErrorCode::kUnsupported, info_.path + ": the elevation pattern is not regular (1), which is read");
+    }
+    unit_ = whole(529, 6, "unit of the ground coordinates", 0, 3);
+    if (unit_ == 0)
+      throw Error(ErrorCode::kUnsupported,
+                  info_.path + ": the ground coordinates are radians; feet, metres and seconds are read");
+    if (const auto angle = fortran_number(field(787, 24)); angle && *angle != 0.0) {
+      throw Error(
+          ErrorCode::kUnsupported,
+          fmt::format("{}: the grid is turned by {} radians; only grids along the axes are read", info_.path, *angle));
+    }
+    const std::array<const char*, 3> names = {"x", "y", "vertical"};
+    std::array<double, 3> resolution = {};
+    for (std::size_t i = 0; i < 3; ++i) {
+      const auto value = fortran_number(field(817 + 12 * i, 12));
+      if (!value || !(*value > 0.0)) {
+        corrupt("the type A record",
+                fmt::format("the {} resolution at byte {} is not a positive number", names[i], 816 + 12 * i));
+      }
+      resolution[i] = *value;
+    }
+    dx_ = resolution[0];
+    dy_ = resolution[1];
+    info_.z_scale = resolution[2];
+    info_.width = whole(859, 6, "number of profiles", 1, kMostPosts);
+    const std::int64_t unit = whole(535, 6, "unit of the elevations", 1, 2);
+    info_.vertical_unit = unit == 1 ? "foot" : "metre";
+    info_.metres_per_vertical_unit = unit == 1 ? 0.3048 : 1.0;
+    // A range that the header does not say is taken for one that fits.
+    const double low = fortran_number(field(739, 24)).value_or(0.0) / info_.z_scale;
+    const double high = fortran_number(field(763, 24)).value_or(0.0) / info_.z_scale;
+    const bool small = low >= -32767.0 && high <= 32767.0;
+    info_.sample_type = small ? SampleType::kInt16 : SampleType::kInt32;
+    info_.void_values = {static_cast<double>(kVoid)};
+  }
+
+  void read_profiles(std::uint64_t at) {
+    // A profile has one record at least; a line has its end at least.
+    const std::uint64_t room = file_.size_bytes() / (lines_ ? kProfileHeadBytes : kRecordBytes);
+    if (static_cast<std::uint64_t>(info_.width) > room) {
+      corrupt("the type A record",
+              fmt::format("says {} profiles, for which {} bytes have no room", info_.width, file_.size_bytes()));
+    }
+    profiles_.reserve(static_cast<std::size_t>(info_.width));
+    std::optional<double> datum;
+    for (std::int64_t column = 0; column < info_.width; ++column) {
+      Profile profile;
+      profile.offset_bytes = at;
+      const std::string where = fmt::format("profile {} at byte {}", column + 1, at);
+      const std::string head = record(at);
+      if (head.size() < kProfileHeadBytes) corrupt(where, "the file ends early");
+      const auto text = [&](std::size_t first, std::size_t size) { return std::string_view(head).substr(first, size); };
+      const auto row_number = whole_number(text(0, 6));
+      const auto number = whole_number(text(6, 6));
+      const auto posts = whole_number(text(12, 6));
+      const auto across = whole_number(text(18, 6));
+      if (row_number != 1 || number != column + 1)
+        corrupt(where, "does not begin with its numbers, row 1 and column " + std::to_string(column + 1));
+      if (!posts || *posts < 1 || *posts > kMostPosts || across != 1)
+        corrupt(where, "does not say how many elevations it has, in one column");
+      const auto x = fortran_number(text(24, 24));
+      const auto y = fortran_number(text(48, 24));
+      const auto z = fortran_number(text(72, 24));
+      if (!x || !y || !z) corrupt(where, "does not say the place and datum of its first elevation");
+      if (datum && *datum != *z) {
+        throw Error(ErrorCode::kUnsupported,
+                    fmt::format("{}: {}: its datum is {}, of those before it {}; they must be the same", info_.path,
+                                where, *z, *datum));
+      }
+      datum = z;
+      profile.x = *x;
+      profile.y = *y;
+      profile.posts = *posts;
+      if (lines_) {
+        for (std::int64_t i = record_of(*posts - 1); i > 0; --i) (void)record(at);
+      } else {
+        at = profile.offset_bytes + kRecordBytes * static_cast<std::uint64_t>(record_of(*posts - 1) + 1);
+      }
+      profile.end_bytes = at;
+      profiles_.push_back(profile);
+    }
+    info_.z_offset = datum.value_or(0.0);
+    // The last record may lack its blanks.
+    const Profile& last = profiles_.back();
+    const std::uint64_t least = last.end_bytes - kRecordBytes + byte_of(last.posts - 1) + kPostBytes;
+    if (!lines_ && file_.size_bytes() < least) {
+      corrupt(fmt::format("profile {}", info_.width),
+              fmt::format("the file ends early: it has {} bytes, must have {}", file_.size_bytes(), least));
+    }
+  }
+
+  void place_profiles() {
+    double south = profiles_.front().y;
+    for (const Profile& profile : profiles_) south = std::min(south, profile.y);
+    double rows = 0.0;
+    for (std::size_t i = 0; i < profiles_.size(); ++i) {
+      Profile& profile = profiles_[i];
+      const double x = (profile.x - profiles_.front().x) / dx_;
+      const double y = (profile.y - south) / dy_;
+      if (!(std::abs(x - static_cast<double>(i)) < kOffGrid) || !(std::abs(y - std::nearbyint(y)) < kOffGrid) ||
+          !(y < static_cast<double>(kMostPosts))) {
+        throw Error(
+            ErrorCode::kUnsupported,
+            fmt::format("{}: profile {} begins at ({}, {}), which is no post of the grid of {} x {} from ({}, {})",
+                        info_.path, i + 1, profile.x, profile.y, dx_, dy_, profiles_.front().x, south));
+      }
+      profile.first = static_cast<std::int64_t>(std::nearbyint(y));
+      rows = std::max(rows, static_cast<double>(profile.first + profile.posts));
+    }
+    info_.height = static_cast<std::int64_t>(rows);
+    Georeference& place = info_.georeference;
+    const double unit = unit_ == 3 ? 3600.0 : 1.0;  // seconds become degrees
+    place.registration = Registration::kPoint;
+    place.unit = unit_ == 3 ? HorizontalUnit::kDegree : HorizontalUnit::kMetre;
+    if (unit_ == 1) place.metres_per_unit = 0.3048;
+    place.spacing_x = dx_ / unit;
+    place.spacing_y = dy_ / unit;
+    place.has_origin = true;
+    place.origin_x = profiles_.front().x / unit;
+    place.origin_y = (south + (rows - 1.0) * dy_) / unit;
+  }
+
+  void read_system() {
+    struct Datum {
+      const char* name;
+      int geographic;
+      int utm_north;
+      int utm_south;
+      double semi_major_axis_m;
+      double inverse_flattening;
+    };
+    constexpr std::array<Datum, 4> kDatums = {{{"NAD27", 4267, 26700, 0, 6378206.4, 294.9786982},
+                                               {"WGS 72", 4322, 32200, 32300, 6378135.0, 298.26},
+                                               {"WGS 84", 4326, 32600, 32700, 6378137.0, 298.257223563},
+                                               {"NAD83", 4269, 26900, 0, 6378137.0, 298.257222101}}};
+    ReferenceSystem& system = info_.georeference.system;
+    system.body = "Earth";
+    const std::int64_t kind = whole(157, 6, "ground reference system", -9999, 99);
+    const auto datum = whole_number(field(891, 2));
+    const Datum* known = datum && *datum >= 1 && *datum <= 4 ? &kDatums[static_cast<std::size_t>(*datum - 1)] : nullptr;
+    if (known != nullptr) {
+      system.semi_major_axis_m = known->semi_major_axis_m;
+      system.inverse_flattening = known->inverse_flattening;
+    } else {
+      info_.warnings.emplace_back("the header names no horizontal datum that isohf knows (old files mean NAD27)");
+    }
+    const std::string name = known != nullptr ? known->name : "unknown datum";
+    system.name = name;
+    if (kind == 0) {
+      if (known != nullptr) system.epsg = known->geographic;
+    } else if (kind == 1) {
+      const std::int64_t zone = whole(163, 6, "UTM zone", -60, 60);
+      system.name = fmt::format("{} / UTM zone {}{}", name, std::abs(zone), zone < 0 ? 'S' : 'N');
+      const int base = known == nullptr ? 0 : zone < 0 ? known->utm_south : known->utm_north;
+      if (base != 0 && zone != 0) system.epsg = base + static_cast<int>(std::abs(zone));
+    } else {
+      system.name = fmt::format("{} / {} zone {}", name, kind == 2 ? "State Plane" : "unknown projection",
+                                trimmed(field(163, 6)));
+    }
+    const std::int64_t vertical = whole_number(field(889, 2)).value_or(0);
+    system.vertical_datum = vertical == 1 ? "mean sea level" : vertical == 2 ? "NGVD29" : vertical == 3 ? "NAVD88" : "";
+    if (vertical == 3 && info_.vertical_unit == "metre") system.vertical_epsg = 5703;
+  }
+
+  template <typename Sample>
+  void read_columns(const Window& window, std::span<std::byte> samples) {
+    const std::int64_t south = info_.height - window.row - window.rows;  // of the window, from the grid's
+    for (std::int64_t c = 0; c < window.columns; ++c) {
+      const std::int64_t column = window.column + c;
+      const Profile& profile = profiles_[static_cast<std::size_t>(column)];
+      const std::int64_t begin = std::clamp<std::int64_t>(south - profile.first, 0, profile.posts);
+      const std::int64_t end = std::clamp<std::int64_t>(south + window.rows - profile.first, begin, profile.posts);
+      if (begin < end) load(profile, begin, end);
+      // From South to North; rows run from North to South.
+      std::byte* out =
+          samples.data() + static_cast<std::size_t>(c + (window.rows - 1) * window.columns) * sizeof(Sample);
+      const auto up = static_cast<std::ptrdiff_t>(static_cast<std::size_t>(window.columns) * sizeof(Sample));
+      for (std::int64_t i = 0; i < window.rows; ++i, out -= up) {
+        const std::int64_t post = south + i - profile.first;
+        std::int64_t value = kVoid;
+        if (post >= begin && post < end) value = post_value(column, profile, post);
+        const auto sample = static_cast<Sample>(value);
+        if (sample != value) refuse_range(column, post, value);
+        std::memcpy(out, &sample, sizeof(sample));
+      }
+    }
+  }
+
+  [[noreturn]] void refuse_range(std::int64_t column, std::int64_t post, std::int64_t value) const {
+    corrupt(fmt::format("profile {}", column + 1),
+            fmt::format("elevation {} is {}, outside of the range that the type A record says", post + 1, value));
+  }
+
+  [[nodiscard]] std::int64_t post_value(std::int64_t column, const Profile& profile, std::int64_t post) const {
+    const std::string_view text = records_[static_cast<std::size_t>(record_of(post) - first_record_)];
+    const std::size_t at = byte_of(post);
+    std::int64_t value = 0;
+    if (at + kPostBytes > text.size() || !read_post(text.data() + at, value)) {
+      corrupt(fmt::format("profile {} at byte {}", column + 1, profile.offset_bytes),
+              fmt::format("elevation {} of {} is not a whole number of six characters", post + 1, profile.posts));
+    }
+    return value;
+  }
+
+  /// The records that hold the posts `begin` to `end - 1`.
+  void load(const Profile& profile, std::int64_t begin, std::int64_t end) {
+    first_record_ = lines_ ? 0 : record_of(begin);
+    const std::uint64_t at = profile.offset_bytes + static_cast<std::uint64_t>(first_record_) * kRecordBytes;
+    const std::uint64_t most = lines_
+                                   ? profile.end_bytes - at
+                                   : static_cast<std::uint64_t>(record_of(end - 1) - first_record_ + 1) * kRecordBytes;
+    text_.resize(static_cast<std::size_t>(most));
+    text_.resize(file_.read_some(at, std::as_writable_bytes(std::span(text_))));
+    records_.clear();
+    const std::string_view all = text_;
+    for (std::size_t i = 0; i < all.size();) {
+      const std::size_t line_end =
+          lines_ ? std::min(all.find('\n', i), all.size()) : std::min(i + kRecordBytes, all.size());
+      records_.push_back(all.substr(i, line_end - i));
+      i = line_end + (lines_ ? 1 : 0);
+    }
+    records_.resize(std::max(records_.size(), static_cast<std::size_t>(record_of(end - 1) - first_record_ + 1)));
+  }
+
+  RawFile file_;
+  bool lines_ = false;
+  std::string header_;
+  std::int64_t unit_ = 2;
+  double dx_ = 1.0;
+  double dy_ = 1.0;
+  std::vector<Profile> profiles_;
+  std::string text_;  // of the records below
+  std::vector<std::string_view> records_;
+  std::int64_t first_record_ = 0;
+  SourceInfo info_;
+};
+
+}  // namespace
+
+bool looks_like_usgs_dem(std::span<const std::byte> head) {
+  const std::string_view text(reinterpret_cast<const char*>(head.data()), head.size());
+  if (text.size() < 168) return false;
+  const auto code = [&](std::size_t at, std::int64_t low, std::int64_t high) {
+    const auto value = whole_number(text.substr(at, 6));
+    return value && *value >= low && *value <= high;
+  };
+  const auto is_text = [](char c) { return c >= ' ' && c <= '~'; };
+  return std::all_of(text.begin(), text.begin() + 168, is_text) && code(144, 0, 9) && code(150, 1, 4) &&
+         code(156, -9999, 99) && code(162, -9999, 9999);
+}
+
+std::unique_ptr<HeightSource> open_usgs_dem(const std::string& path, const OpenOptions& options) {
+  return std::make_unique<UsgsDemSource>(path, options);
+}
+
+}  // namespace isohf
