@@ -15,6 +15,13 @@ std::int32_t at_i32(std::span<const std::byte> bytes, std::size_t i) {
   return std::to_integer<std::int32_t>(bytes[i]);
 }
 
+/// Whether four bytes are a float from 2^-10 to 2^15 in size, or 0.
+bool is_a_height(std::span<const std::byte> bytes) {
+  const std::int32_t exponent = (at_i32(bytes, 0) << 1 & 0xff) | at_i32(bytes, 1) >> 7;
+  const bool is_zero = (at_i32(bytes, 0) & 0x7f) == 0 && at_i32(bytes, 1) == 0;
+  return is_zero || (exponent >= 127 - 10 && exponent < 127 + 15);
+}
+
 }  // namespace
 
 std::string to_string(Packing packing) {
@@ -58,6 +65,15 @@ void unpack_elevations(Packing packing, std::size_t channels, std::span<const st
 }
 
 void PackingEvidence::add(std::span<const std::byte> row) {
+  for (std::size_t at = 0; at + channels_ <= row.size(); at += channels_) {
+    if (row[at] != row[at + 1] || row[at] != row[at + 2]) ++differing_;
+    if (channels_ == 4) {
+      alphas_.set(std::to_integer<std::size_t>(row[at + 3]));
+      if (is_a_height(row.subspan(at, 4))) ++heights_;
+    }
+    red_ += at_i32(row, at);
+    ++pixels_;
+  }
   for (std::size_t at = channels_; at + channels_ <= row.size(); at += channels_) {
     std::int32_t code = 0;
     std::int32_t apart = 0;
@@ -68,12 +84,12 @@ void PackingEvidence::add(std::span<const std::byte> row) {
     }
     of_codes_ += std::abs(static_cast<double>(code));
     of_channels_ += apart;
-    red_ += at_i32(row, at);
-    ++pixels_;
   }
 }
 
 std::optional<Packing> PackingEvidence::packing() const {
+  constexpr std::size_t kNoise = 16;
+  if (pixels_ > 0 && heights_ == pixels_ && alphas_.count() >= kNoise) return Packing::kRgbaFloat;
   // In photographs the channels rise and fall together, and the two sums are nearly the same.
   if (pixels_ == 0 || of_channels_ == 0.0 || of_codes_ > 0.6 * of_channels_) return std::nullopt;
   const double red = static_cast<double>(red_) / static_cast<double>(pixels_);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <bitset>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -29,13 +30,16 @@ void describe_packing(Packing packing, bool has_alpha, SourceInfo& info);
 void unpack_elevations(Packing packing, std::size_t channels, std::span<const std::byte> pixels,
                        std::span<std::byte> samples);
 
-/// Whether rows of a picture look packed: where a byte overflows, the next higher one goes on, which colours do not do.
+/// Whether rows of a picture look packed. In codes the next higher byte goes on where one overflows, which colours do
+/// not do; floats have exponents of heights, and an alpha channel that is noise.
 class PackingEvidence {
  public:
   explicit PackingEvidence(std::size_t channels) : channels_(channels) {}
   void add(std::span<const std::byte> row);
   /// nullopt where nothing speaks for it, as in land so flat that no byte overflows.
   [[nodiscard]] std::optional<Packing> packing() const;
+  /// Whether red, green and blue were equal everywhere.
+  [[nodiscard]] bool is_grey() const { return differing_ == 0; }
 
  private:
   std::size_t channels_;
@@ -43,6 +47,9 @@ class PackingEvidence {
   double of_channels_ = 0.0;  ///< and of the channels by themselves, weighted as in the code
   std::int64_t red_ = 0;
   std::int64_t pixels_ = 0;
+  std::int64_t differing_ = 0;  ///< pixels that have a colour
+  std::int64_t heights_ = 0;    ///< pixels that are floats of a height's size
+  std::bitset<256> alphas_;     ///< that occur
 };
 
 }  // namespace isohf

@@ -170,7 +170,7 @@ class PngSource final : public HeightSource {
     if (header_.has_transparent_gray) info_.void_values = {static_cast<double>(header_.transparent_gray)};
     sample_bytes_ = size_bytes(info_.sample_type);
     choose_channel(options.channel);
-    if (channels_ > 2 && options.channel.empty()) warn_of_colours();
+    if (channels_ > 2 && options.channel.empty()) decide_on_colours();
     apply_open_options(info_, options);
     const std::size_t row_bytes = header_.width * sample_bytes_;
     kept_rows_ = header_.interlaced ? header_.height : std::clamp<std::size_t>(kKeptBytes / row_bytes, 1, kMaxKeptRows);
@@ -260,27 +260,36 @@ class PngSource final : public HeightSource {
     sample_bytes_ = size_bytes(info_.sample_type);
   }
 
-  /// One channel of a colour picture is seldom what is meant.
-  void warn_of_colours() {
+  /// One channel of a colour picture is seldom what is meant: packed elevations are unpacked where that is beyond
+  /// doubt, grey in three channels is grey, and what is left is for the user to decide.
+  void decide_on_colours() {
     constexpr std::size_t kRowsLookedAt = 64;
-    std::optional<Packing> packing;
+    PackingEvidence evidence(channels_);
     if (header_.bit_depth == 8 && !header_.interlaced) {
-      PackingEvidence evidence(channels_);
       row_.resize(header_.row_bytes);
       const std::size_t rows = std::min<std::size_t>(kRowsLookedAt, header_.height);
       for (std::size_t row = 0; row < rows && decoder_.read_row(row_.data()); ++row) {
         evidence.add(std::as_bytes(std::span(row_)));
       }
       restart();
-      packing = evidence.packing();
+      if (const std::optional<Packing> packing = evidence.packing()) {
+        unpack(*packing);
+        info_.warnings.push_back(
+            fmt::format("its colours are packed elevations, as their bytes show: decoded as with --encoding {0}; give "
+                        "--encoding {0} to say so, or --channel R for one channel alone",
+                        to_string(*packing)));
+        return;
+      }
+      if (evidence.is_grey()) {
+        info_.warnings.emplace_back("colour picture in greys: channel R is read");
+        return;
+      }
     }
-    info_.warnings.push_back(
-        packing ? fmt::format("colour picture: only channel R is read; the colours look like packed elevations: "
-                              "--encoding {} decodes them",
-                              to_string(*packing))
-                : fmt::format("colour picture: only channel R is read, of {}; if the colours are packed elevations, "
-                              "give --encoding terrarium or mapbox",
-                              fmt::join(channels_of(header_.color_type), ", ")));
+    throw Error(
+        ErrorCode::kInvalidArgument,
+        fmt::format("{}: is a colour picture with channels {}; say which one holds elevations (--channel R), or "
+                    "how they are packed into all (--encoding terrarium, mapbox or rgba-float)",
+                    info_.path, fmt::join(channels_of(header_.color_type), ", ")));
   }
 
   [[nodiscard]] std::byte* kept_row(std::size_t row) {

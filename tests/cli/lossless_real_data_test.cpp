@@ -93,9 +93,10 @@ void expect_same(const Samples& found, const Samples& expected) {
       << "voids or scale differ";
 }
 
-/// The format of the source, so far as isohf writes it.
+/// The format of the source, so far as isohf writes it; no PNG of elevations that were packed into its colours.
 std::string restored_name(const fs::path& file) {
   const std::string extension = lower_extension(file);
+  if (extension == ".png" && size_bytes(open_file(file)->info().sample_type) > 2) return "back.tif";
   for (const char* own : {".tif", ".exr", ".png", ".hgt"}) {
     if (extension == own) return std::string("back") + own;
   }
