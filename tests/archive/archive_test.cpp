@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "archive/tiles.h"
+#include "isohf/archive/deflate.h"
 #include "isohf/archive/reader.h"
 #include "isohf/archive/writer.h"
 #include "isohf/base/error.h"
@@ -50,6 +51,28 @@ TEST(Archive, IsReadByThePageAboutItsFormat) {
       test::make_archive(path, TileGrid::make(shape, 5, 4, 100.0, 1.0 / 3.0), type);
       const std::string command = std::string("python3 \"" ISOHF_SOURCE_DIR "/tests/archive/page_reader.py\" ") + path;
       EXPECT_EQ(std::system(command.c_str()), 0) << to_string(type) << " " << shape.columns();
+    }
+  }
+}
+
+TEST(Archive, IsReadByThePageWithPredictorsOfEveryKind) {
+  if (std::system("command -v python3 >/dev/null 2>&1") != 0) GTEST_SKIP() << "python3 is not installed";
+  const TemporaryFolder folder;
+  const std::string path = folder.file("a.isohf");
+  const TileGrid grid = TileGrid::make(TileShape::make(68, 67, 1), 1, 1, 100.0, 1.0 / 3.0);
+  for (const CodeType type : {CodeType::kU16, CodeType::kU8, CodeType::kF32}) {
+    for (const int level : {kMinLevel, kDefaultLevel, kMaxLevel}) {
+      std::filesystem::remove(path);
+      ArchiveWriter writer(path, grid, WriterOptions{});
+      const EncodedTile tile = encode_tile(grid.shape(), test::make_halves(grid.shape(), type), level);
+      std::vector<std::byte> payload(tile.payload_bytes);
+      inflate_exactly(tile.deflated, payload);
+      EXPECT_TRUE(level != kDefaultLevel || std::to_integer<int>(payload[28]) > 1) << "one predictor";
+      EXPECT_EQ(std::to_integer<int>(payload[29]), level == kMaxLevel ? 18 : 12);
+      writer.add_tile(tile);
+      static_cast<void>(writer.finish(test::make_metadata(grid, type)));
+      const std::string command = std::string("python3 \"" ISOHF_SOURCE_DIR "/tests/archive/page_reader.py\" ") + path;
+      EXPECT_EQ(std::system(command.c_str()), 0) << to_string(type) << " at level " << level;
     }
   }
 }

@@ -49,7 +49,8 @@ Decoded decode(const TileShape& shape, CodeType type, const std::vector<std::vec
 }
 
 TEST(LaneDecoder, GivesWhatThePlainDecoderGivesForAnyNumberOfLanes) {
-  const Kind kinds[] = {Kind::kPlane, Kind::kTerrain, Kind::kNoise, Kind::kExtremes, Kind::kTwoLevels};
+  const Kind kinds[] = {Kind::kPlane,     Kind::kTerrain,    Kind::kNoise,    Kind::kExtremes,
+                        Kind::kTwoLevels, Kind::kVoidIsland, Kind::kVoidNoise};
   std::uint32_t seed = 1;
   for (const TileShape& shape : {TileShape::make(5, 5, 1), TileShape::make(6, 5, 1), TileShape::make(24, 29, 1),
                                  TileShape::make(52, 67, 4), TileShape::make(300, 9, 1)}) {
@@ -74,13 +75,34 @@ TEST(LaneDecoder, GivesWhatThePlainDecoderGivesForAnyNumberOfLanes) {
   }
 }
 
-TEST(LaneDecoder, LeavesVoidsFloatsAndEqualSamplesToThePlainDecoder) {
+TEST(LaneDecoder, GivesWhatThePlainDecoderGivesForPredictorsOfEveryKind) {
+  const TileShape shape = TileShape::make(68, 67, 1);
+  for (const CodeType type : {CodeType::kU16, CodeType::kU8}) {
+    const TileCodes tile = test::make_halves(shape, type);
+    std::vector<std::vector<std::byte>> payloads;
+    for (const int level : {kMinLevel, kDefaultLevel, kMaxLevel})
+      payloads.push_back(payload_of(encode_tile(shape, tile, level)));
+    EXPECT_GT(std::to_integer<int>(payloads[1][28]), 1);
+    payloads.push_back(payload_of(shape, type, Kind::kVoidNoise, 1));
+    for (std::size_t begin = 0; begin < payloads.size(); ++begin) {  // with and without the others beside it
+      const Decoded fast = decode(shape, type, {payloads.begin() + static_cast<std::ptrdiff_t>(begin), payloads.end()});
+      for (std::size_t i = begin; i < 3; ++i) {
+        ASSERT_TRUE(fast.decoded[i - begin]);
+        EXPECT_EQ(fast.tiles[i - begin], tile);
+        EXPECT_EQ(decode_plainly(shape, type, payloads[i]), tile);
+      }
+    }
+  }
+}
+
+TEST(LaneDecoder, LeavesFloatsAndEqualSamplesToThePlainDecoder) {
   const TileShape shape = TileShape::make(24, 29, 1);
   const Decoded fast = decode(
       shape, CodeType::kU16,
       {payload_of(shape, CodeType::kU16, Kind::kVoidIsland, 1), payload_of(shape, CodeType::kU16, Kind::kTerrain, 2),
        payload_of(shape, CodeType::kU16, Kind::kConstant, 3)});
-  EXPECT_EQ(fast.decoded, (std::array<bool, kDecoderLanes>{false, true, false, false}));
+  EXPECT_EQ(fast.decoded, (std::array<bool, kDecoderLanes>{true, true, false}));
+  EXPECT_EQ(fast.tiles[0], test::make_tile(shape, CodeType::kU16, Kind::kVoidIsland, 1));
   EXPECT_EQ(fast.tiles[1], test::make_tile(shape, CodeType::kU16, Kind::kTerrain, 2));
   EXPECT_FALSE(decode(shape, CodeType::kF32, {payload_of(shape, CodeType::kF32, Kind::kTerrain, 1)}).decoded[0]);
 }

@@ -9,6 +9,7 @@ import zlib
 
 KINDS = {"u16": 0, "u8": 1, "f32": 2}
 FIXED = {0: [4096], 1: [4096, -4096], 2: [4750, -1050, -1180, 370, -1230, 350, -1230, -290, 50, 660]}
+BLOCK = 16
 
 
 def void_mask(data, samples):
@@ -54,10 +55,14 @@ def decode(payload, columns, rows, kind):
     assert (version, found_kind) == (1, kind)
     at = 16
     if not flags & 2:
-        base, extra_bytes, shift, contexts, paired = struct.unpack_from("<iIBBH", payload, 16)
-        weights = struct.unpack_from("<12h", payload, 28)
-        thresholds = struct.unpack_from("<%dH" % (contexts - 1), payload, 52)
-        at = 52 + 2 * (contexts - 1)
+        base, extra_bytes, shift, contexts, paired, predictors, n = struct.unpack_from("<iIBBHBB", payload, 16)
+        at = 30
+        weights = []
+        for _ in range(predictors):
+            weights.append(list(struct.unpack_from("<%dh" % n, payload, at)))
+            at += 2 * n
+        thresholds = struct.unpack_from("<%dH" % (contexts - 1), payload, at)
+        at += 2 * (contexts - 1)
         counts = struct.unpack_from("<%dI" % contexts, payload, at)
         at += 4 * contexts
     mask = void_mask(payload[at : at + mask_bytes], columns * rows) if flags & 1 else [0] * (columns * rows)
@@ -65,36 +70,47 @@ def decode(payload, columns, rows, kind):
     if flags & 2:
         assert at == len(payload)
         return [None if void else low for void in mask], dropped
-    streams = []
+    across, down = -(-columns // BLOCK), -(-rows // BLOCK)
+    block_map = bytes(across * down)
+    if predictors > 1:
+        block_map = payload[at : at + across * down]
+        at += across * down
+    symbols = []
     for k, count in enumerate(counts):
         if paired >> k & 1:
-            symbols, at = unpair(payload, at, count)
+            found, at = unpair(payload, at, count)
         else:
-            symbols, at = payload[at : at + count], at + count
-        streams.append(iter(symbols))
+            found, at = payload[at : at + count], at + count
+        symbols.append(found)
     extra = Bits(payload[at : at + extra_bytes])
     assert at + extra_bytes == len(payload)
     modulus = 1 << (32 if kind == 2 else 16)
 
-    def residual(activity):
-        level = min(activity >> shift, 4095)
-        symbol = next(streams[sum(threshold <= level for threshold in thresholds)])
+    def unfolded(symbol):
         if symbol < 16:
             return symbol
         bits = (symbol - 16) // 8 + 1
         return ((8 + (symbol & 7)) << bits) + extra.take(bits)
 
-    def restore(prediction, folded):
-        value = (prediction + (folded // 2 if folded % 2 == 0 else -(folded + 1) // 2)) % modulus
+    streams = [iter([unfolded(symbol) for symbol in found]) for found in symbols]
+    assert (extra.at + 7) // 8 == extra_bytes
+
+    def residual(activity):
+        return next(streams[sum(threshold <= activity for threshold in thresholds)])
+
+    def restore(halves, folded):
+        difference = folded // 2 if folded % 2 == 0 else -(folded + 1) // 2
+        prediction = (halves + 1) >> 1
+        value = (prediction + difference if halves % 2 else prediction - difference) % modulus
         if kind == 2 and value >= modulus // 2:
             value -= modulus
         assert low <= value <= high
         return value
 
     # Dictionaries by place, margins included.
-    places = range(-2, columns + 2)
+    places = range(-3, columns + 3)
     above = [dict.fromkeys(places, base) for _ in range(3)]  # rows r-1, r-2, r-3
-    above_folded = dict.fromkeys(places, 0)
+    rough = [dict.fromkeys(places, 0) for _ in range(2)]  # magnitudes of rows r-1, r-2
     out = [None] * (columns * rows)
     for r in range(rows):
         s = r % 2
@@ -102,32 +118,35 @@ def decode(payload, columns, rows, kind):
         column = {p: p for p in range(first, last + 1)}
         if not s:
             column[1], column[columns - 2] = 0, columns - 1
-        w = FIXED.get(r, weights)
-        w = list(w) + [0] * (12 - len(w))
         v, g = {}, {}
         v[first - 1] = v[first - 2] = above[0][first + s]
-        g[first - 1] = g[first - 2] = above_folded[first + s]
         for p in range(first, last + 1):
             ne = above[0][p + s]
             if mask[r * columns + column[p]]:
                 v[p], g[p] = (v[p - 1] + ne) >> 1, 0
                 continue
-            near, far, farther, n = above[0], above[1], above[2], above_folded
+            near, far, farther = above
+            n, f = rough
+            w = FIXED.get(r) or weights[block_map[r // BLOCK * across + p // BLOCK]]
             neighbours = [v[p - 1], near[p + s - 1], v[p - 2], near[p + s + 1], near[p + s - 2], far[p], far[p + 1],
-                          far[p - 1], far[p + 2], far[p - 2], farther[p + s], farther[p + s - 1]]
+                          far[p - 1], far[p + 2], far[p - 2], farther[p + s], farther[p + s - 1], farther[p + s + 1],
+                          farther[p + s - 2], near[p + s + 2], near[p + s - 3], far[p + 3], far[p - 3]]
             total = sum(a * (b - ne) for a, b in zip(w, neighbours))
-            folded = residual(2 * (n[p + s] + n[p + s - 1]) + n[p + s + 1] + n[p + s - 2] + 3 * g[p - 1] + g[p - 2])
-            v[p] = restore(min(max(ne + ((total + 2048) >> 12), low), high), folded)
-            g[p] = min(folded, 2**28 - 1)
+            halves = min(max((4096 * ne + total) >> 11, 2 * low), 2 * high - 1)
+            folded = residual(4 * (n[p + s] + n[p + s - 1] + f[p]) + 3 * n[p + s + 1]
+                              + 2 * (n[p + s + 2] + n[p + s - 2] + f[p + 1] + f[p - 1])
+                              + n[p + s - 3] + f[p + 2] + f[p - 2])
+            v[p] = restore(halves, folded)
+            g[p] = min(folded >> shift, 157)
             out[r * columns + column[p]] = v[p]
         for c, p in (() if s else ((1, 1), (columns - 2, columns - 3))):
             if not mask[r * columns + c]:
-                out[r * columns + c] = restore((v[p] + v[p + 1]) >> 1, residual(3 * (g[p] + g[p + 1])))
+                out[r * columns + c] = restore(2 * ((v[p] + v[p + 1]) >> 1), residual(13 * (g[p] + g[p + 1])))
         for row in (v, g):
             row.update({p: row[first] for p in places if p < first})
             row.update({p: row[last] for p in places if p > last})
-        above, above_folded = [v] + above[:2], g
-    assert all(next(stream, None) is None for stream in streams) and (extra.at + 7) // 8 == extra_bytes
+        above, rough = [v] + above[:2], [g, rough[0]]
+    assert all(next(stream, None) is None for stream in streams)
     return out, dropped
 
 

@@ -89,7 +89,7 @@ TEST(PairCoding, MakesTilesOfLittleDoubtSmaller) {
   inflate_exactly(encoded.deflated, payload);
   ByteReader reader(payload);
   EXPECT_NE(read_payload_header(shape, CodeType::kU16, reader).paired, 0);
-  EXPECT_LT(8.0 * static_cast<double>(encoded.deflated.size()), 0.9 * static_cast<double>(tile.codes.size()));
+  EXPECT_LT(8.0 * static_cast<double>(encoded.deflated.size()), 0.95 * static_cast<double>(tile.codes.size()));
   EXPECT_EQ(decode_tile(shape, CodeType::kU16, payload), tile);
   EXPECT_EQ(decode_tile_slowly(shape, CodeType::kU16, payload), tile);
 }

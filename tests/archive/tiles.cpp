@@ -67,6 +67,24 @@ TileCodes make_tile(const TileShape& shape, CodeType type, Kind kind, std::uint3
   return tile;
 }
 
+TileCodes make_halves(const TileShape& shape, CodeType type) {
+  std::mt19937 random(1);
+  TileCodes tile;
+  tile.type = type;
+  for (int r = 0; r < shape.rows(); ++r) {
+    for (int c = 0; c < shape.columns(); ++c) {
+      const double noise = static_cast<double>(random() % 160) - 80.0;
+      const double value = 120.0 + (c < shape.columns() / 2 ? noise : 90.0 * std::sin(0.2 * c + 0.3 * r));
+      if (type == CodeType::kF32) {
+        tile.heights.push_back(static_cast<float>(value));
+      } else {
+        tile.codes.push_back(static_cast<std::uint16_t>(value));
+      }
+    }
+  }
+  return tile;
+}
+
 bool same_samples(const TileCodes& a, const TileCodes& b) {
   if (a.type != b.type || a.codes != b.codes || a.heights.size() != b.heights.size()) return false;
   for (std::size_t i = 0; i < a.heights.size(); ++i) {

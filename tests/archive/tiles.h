@@ -23,6 +23,9 @@ inline constexpr Kind kAllKinds[] = {Kind::kConstant,   Kind::kPlane,     Kind::
 /// A tile of that kind; the same arguments give the same tile.
 [[nodiscard]] TileCodes make_tile(const TileShape& shape, CodeType type, Kind kind, std::uint32_t seed);
 
+/// Codes or floats that want a predictor of their own in each half: noise in the West, waves in the East.
+[[nodiscard]] TileCodes make_halves(const TileShape& shape, CodeType type);
+
 /// NaN equals NaN; otherwise bits decide.
 [[nodiscard]] bool same_samples(const TileCodes& a, const TileCodes& b);
 

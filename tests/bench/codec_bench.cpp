@@ -165,9 +165,9 @@ int run(int argc, char** argv) {
       const std::size_t count = std::min(isohf::kDecoderLanes, tiles.size() - i);
       std::array<isohf::TileCodes, isohf::kDecoderLanes> decoded;
       std::array<bool, isohf::kDecoderLanes> is_decoded{};
-      std::array<std::span<const std::byte>, isohf::kDecoderLanes> four;
-      for (std::size_t k = 0; k < count; ++k) four[k] = payloads[i + k];
-      decode_lanes(shape, tiles[i].type, std::span(four).first(count), std::span(decoded).first(count),
+      std::array<std::span<const std::byte>, isohf::kDecoderLanes> group;
+      for (std::size_t k = 0; k < count; ++k) group[k] = payloads[i + k];
+      decode_lanes(shape, tiles[i].type, std::span(group).first(count), std::span(decoded).first(count),
                    std::span(is_decoded).first(count));
       for (std::size_t k = 0; k < count; ++k) same &= !is_decoded[k] || decoded[k] == tiles[i + k];
     }
@@ -176,7 +176,7 @@ int run(int argc, char** argv) {
   }
   fmt::print(
       "{} tiles, {:.0f} samples: {:.4f} bits/sample; encode {:.1f} M samples/s, inflate {:.1f}, decode {:.1f}, "
-      "plainly {:.1f}, four at once {:.1f}\n",
+      "plainly {:.1f}, eight at once {:.1f}\n",
       tiles.size(), samples, 8.0 * static_cast<double>(bytes) / samples, samples / encode_seconds / 1e6,
       samples / inflate_seconds / 1e6, samples / decode_seconds / 1e6, samples / plain_seconds / 1e6,
       samples / lanes_seconds / 1e6);

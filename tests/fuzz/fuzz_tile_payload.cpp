@@ -11,10 +11,12 @@
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using isohf::CodeType;
   if (size == 0) return 0;
-  static const isohf::TileShape shapes[] = {isohf::TileShape::make(5, 5, 1), isohf::TileShape::make(12, 11, 3)};
+  // The last one is large enough for several blocks of predictors.
+  static const isohf::TileShape shapes[] = {isohf::TileShape::make(5, 5, 1), isohf::TileShape::make(12, 11, 3),
+                                            isohf::TileShape::make(68, 67, 1)};
   const CodeType types[] = {CodeType::kU16, CodeType::kU8, CodeType::kF32};
-  const isohf::TileShape& shape = shapes[data[0] % 2];
-  const CodeType type = types[data[0] / 2 % 3];
+  const isohf::TileShape& shape = shapes[data[0] % 3];
+  const CodeType type = types[data[0] / 3 % 3];
   try {
     const auto payload = std::as_bytes(std::span<const std::uint8_t>(data, size)).subspan(1);
     const isohf::TileCodes tile = decode_tile(shape, type, payload);

@@ -10,9 +10,8 @@ namespace {
 
 constexpr std::size_t kSymbols = 256;
 constexpr std::uint64_t kTableBits = 150;      // of a context beside its code lengths: threshold, count, block header
-constexpr std::size_t kSymbolsToThin = 16384;  // from this many on, one in kThinning says enough
-constexpr std::size_t kThinning = 3;
-constexpr std::uint64_t kBitsPerSymbol = 3;  // of a code length in a block header
+constexpr std::size_t kSymbolsToThin = 16384;  // below, all take part
+constexpr std::uint64_t kBitsPerSymbol = 3;    // of a code length in a block header
 
 /// The symbols of one range of activities and what coding them takes.
 struct Group {
@@ -37,24 +36,15 @@ struct Group {
 
 }  // namespace
 
-std::uint8_t choose_activity_shift(std::span<const std::uint32_t> activities) {
-  std::uint64_t sum = 0;
-  for (const std::uint32_t activity : activities) sum += activity;
-  const std::uint64_t mean = activities.empty() ? 0 : sum / activities.size();
-  unsigned shift = 0;
-  while ((mean >> shift) > kActivityLimit / 16) ++shift;
-  return static_cast<std::uint8_t>(shift);
-}
-
-std::vector<std::uint32_t> count_levels(std::span<const std::uint16_t> levels) {
+std::vector<std::uint32_t> count_activities(std::span<const std::uint16_t> activities) {
   std::vector<std::uint32_t> histogram(kActivityLimit);
-  for (const std::uint16_t level : levels) ++histogram[level];
+  for (const std::uint16_t activity : activities) ++histogram[activity];
   return histogram;
 }
 
 std::vector<std::uint16_t> choose_thresholds(std::span<const std::uint8_t> symbols,
-                                             std::span<const std::uint16_t> levels,
-                                             std::span<const std::uint32_t> histogram) {
+                                             std::span<const std::uint16_t> activities,
+                                             std::span<const std::uint32_t> histogram, std::size_t thinning) {
   // Start from ranges of about equal count...
   std::vector<Group> groups;
   std::vector<std::uint8_t> group_of(kActivityLimit);
@@ -69,9 +59,9 @@ std::vector<std::uint16_t> choose_thresholds(std::span<const std::uint8_t> symbo
     }
   }
   groups.push_back({kActivityLimit, {}});
-  const std::size_t thinning = symbols.size() >= kSymbolsToThin ? kThinning : 1;
-  for (std::size_t i = 0; i < symbols.size(); i += thinning) {
-    groups[group_of[levels[i]]].counts[symbols[i]] += static_cast<std::uint32_t>(thinning);
+  const std::size_t step = symbols.size() >= kSymbolsToThin ? thinning : 1;
+  for (std::size_t i = 0; i < symbols.size(); i += step) {
+    groups[group_of[activities[i]]].counts[symbols[i]] += static_cast<std::uint32_t>(step);
   }
 
   // ... and join the two neighbours whose joining saves most, while any does.

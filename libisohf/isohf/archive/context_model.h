@@ -9,16 +9,14 @@
 
 namespace isohf {
 
-/// The shift that brings activities to levels of which the mean is near 2^8.
-[[nodiscard]] std::uint8_t choose_activity_shift(std::span<const std::uint32_t> activities);
+/// How many residuals there are of each activity: [kActivityLimit].
+[[nodiscard]] std::vector<std::uint32_t> count_activities(std::span<const std::uint16_t> activities);
 
-/// How many residuals there are of each level: [kActivityLimit].
-[[nodiscard]] std::vector<std::uint32_t> count_levels(std::span<const std::uint16_t> levels);
-
-/// Thresholds between contexts, ascending, for residuals given as symbols and levels in the same order, `histogram`
-/// being count_levels of these. Deterministic; integers only.
+/// Thresholds between contexts, ascending, for residuals given as symbols and activities in the same order, `histogram`
+/// being count_activities of these. In large tiles one residual in `thinning` takes part. Deterministic; integers only.
 [[nodiscard]] std::vector<std::uint16_t> choose_thresholds(std::span<const std::uint8_t> symbols,
-                                                           std::span<const std::uint16_t> levels,
-                                                           std::span<const std::uint32_t> histogram);
+                                                           std::span<const std::uint16_t> activities,
+                                                           std::span<const std::uint32_t> histogram,
+                                                           std::size_t thinning);
 
 }  // namespace isohf

@@ -13,10 +13,11 @@
 /// Linear prediction on the hexagonal neighbourhood of a tile's vertices, in integers, so that every decoder on every
 /// machine predicts what the encoder predicted (docs/archive_format.md, "Prediction").
 ///
-///             NNNW . NNNE             row r-3      weights: one each, in this order, for W, NW, WW, NEE, NWW, NN, NNE,
-///     NNWW . NNW . NN . NNE . NNEE    row r-2      NNW, NNEE, NNWW, and the two of row r-3 (East, West); NE has what
-///        NWW . NW . NE . NEE          row r-1      is left to make the sum 1
-///          WW . W  . (x)              row r
+///         NNNWW . NNNW . NNNE . NNNEE            row r-3      weights: one each, in the order of
+///         Neighbours::of_weight;
+///  NNWWW . NNWW . NNW . NN . NNE . NNEE . NNEEE  row r-2      NE has what is left to make the sum 1; the outermost
+///       NWWW . NWW . NW . NE . NEE . NEEE        row r-1      six take part in wide prediction alone
+///                WW . W  . (x)                   row r
 ///
 /// Rows are worked on in lattice order: even rows keep column 0 in place 1 and column C-1 in place C-2, where the
 /// lattice has them (errata E5), and their two slid vertices apart; these are predicted from their row once it is
@@ -24,8 +25,9 @@
 
 namespace isohf {
 
-inline constexpr int kWeightCount = 12;
-inline constexpr int kWeightBits = 12;  ///< weights are multiples of 2^-12
+inline constexpr std::size_t kWeightCount = 18;
+inline constexpr std::size_t kNearWeightCount = 12;  ///< the first so many are all that near prediction has
+inline constexpr int kWeightBits = 12;               ///< weights are multiples of 2^-12
 using PredictorWeights = std::array<std::int16_t, kWeightCount>;
 
 /// Weights of the first three rows, which lack rows above: W; then W + NE - NW; then what terrain has on average.
@@ -33,30 +35,58 @@ inline constexpr PredictorWeights kFirstRowWeights = {4096};
 inline constexpr PredictorWeights kSecondRowWeights = {4096, -4096};
 inline constexpr PredictorWeights kThirdRowWeights = {4750, -1050, -1180, 370, -1230, 350, -1230, -290, 50, 660};
 
-/// The weights of row r, of which `fitted` are a tile's own.
-[[nodiscard]] inline const PredictorWeights& weights_of_row(const PredictorWeights& fitted, int r) {
-  if (r > 2) return fitted;
-  return r == 0 ? kFirstRowWeights : r == 1 ? kSecondRowWeights : kThirdRowWeights;
-}
+/// The sum of |weight| must stay below this, so that 16-bit samples are predicted in 32 bits: 28671 * 65534 + 4096 *
+/// 65534 < 2^31.
+inline constexpr int kWeightSumLimit = 7 << kWeightBits;
 
-/// The sum of |weight| must stay below this, so that 16-bit samples are predicted in 32 bits.
-inline constexpr int kWeightSumLimit = 1 << 15;
+inline constexpr std::size_t kMaxPredictors = 8;
+inline constexpr int kBlockPlaces = 16;  ///< a block of places that share a predictor: so many wide and high
 
-/// The samples of a tile in lattice order, with two places of margin West and East and three rows North. Wide: int32
+/// The weights of a tile, and which of them hold where.
+struct Predictors {
+  std::vector<PredictorWeights> weights = {kThirdRowWeights};  ///< 1 to kMaxPredictors
+  bool is_wide = false;                                        ///< all weights count, not only the near ones
+  std::vector<std::uint8_t> map;  ///< block by block, row by row, an index into weights; empty where there is one
+  int block_columns = 0;
+
+  [[nodiscard]] static int blocks_across(int places) { return (places + kBlockPlaces - 1) / kBlockPlaces; }
+  [[nodiscard]] const PredictorWeights& of_row(int r) const {
+    return r == 0 ? kFirstRowWeights : r == 1 ? kSecondRowWeights : kThirdRowWeights;
+  }
+  /// Calls `use(weights, begin, end)` for stretches of places [begin, end) that have the same weights, from `first` to
+  /// `last` of row r.
+  template <typename Use>
+  void for_stretches(int r, int first, int last, const Use& use) const {
+    if (r <= 2) return use(of_row(r), first, last + 1);
+    if (map.empty()) return use(weights.front(), first, last + 1);
+    const std::uint8_t* const row = map.data() + static_cast<std::ptrdiff_t>(r / kBlockPlaces) * block_columns;
+    for (int begin = first; begin <= last;) {
+      int block = begin / kBlockPlaces;
+      const std::uint8_t index = row[block];
+      while (block < block_columns && row[block] == index) ++block;
+      const int end = std::min(block * kBlockPlaces, last + 1);
+      use(weights[index], begin, end);
+      begin = end;
+    }
+  }
+};
+
+/// The samples of a tile in lattice order, with three places of margin West and East and three rows North. Wide: int32
 /// for codes, int64 for floats.
 template <typename Wide>
 class Lattice {
  public:
-  static constexpr int kMargin = 2;
+  static constexpr int kMargin = 3;
   static constexpr int kRowsAbove = 3;
 
   explicit Lattice(const TileShape& shape)
       : columns_(shape.columns()),
         rows_(shape.rows()),
         stride_(columns_ + 2 * kMargin),
-        samples_(std::make_unique_for_overwrite<Wide[]>(static_cast<std::size_t>(stride_) *
-                                                        static_cast<std::size_t>(rows_ + kRowsAbove))),
-        slid_(2 * static_cast<std::size_t>(rows_)) {}
+        samples_(std::make_unique_for_overwrite<Wide[]>(sample_count() + kSpare)),
+        slid_(2 * static_cast<std::size_t>(rows_)) {
+    std::fill_n(samples_.get() + sample_count(), kSpare, Wide{0});
+  }
 
   [[nodiscard]] int columns() const { return columns_; }
   [[nodiscard]] int rows() const { return rows_; }
@@ -65,7 +95,7 @@ class Lattice {
   [[nodiscard]] static int first(int row) { return row % 2 == 0 ? 1 : 0; }
   [[nodiscard]] int last(int row) const { return row % 2 == 0 ? columns_ - 2 : columns_ - 1; }
 
-  /// Place 0 of row r; rows -3 to -1 exist, as do places -2, -1, C and C+1.
+  /// Place 0 of row r; rows -3 to -1 exist, as do places -3 to -1 and C to C+2.
   [[nodiscard]] Wide* row(int r) {
     return samples_.get() + static_cast<std::ptrdiff_t>(r + kRowsAbove) * stride_ + kMargin;
   }
@@ -99,6 +129,12 @@ class Lattice {
   }
 
  private:
+  static constexpr std::size_t kSpare = 2 * kBlockPlaces;  ///< whole blocks are read past the end of a row
+
+  [[nodiscard]] std::size_t sample_count() const {
+    return static_cast<std::size_t>(stride_) * static_cast<std::size_t>(rows_ + kRowsAbove);
+  }
+
   int columns_;
   int rows_;
   int stride_;
@@ -106,33 +142,29 @@ class Lattice {
   std::vector<Wide> slid_;
 };
 
-/// Predictions for all lattice places of row r, limited to [low, high]; `predictions` is indexed by place. The row must
-/// be open.
+/// Predictions for all lattice places of row r, in halves of a sample: 2 * prediction, less 1 where it was rounded up.
+/// Limited to the samples' range [low, high]. `halves` is indexed by place. The row must be open.
 template <typename Wide>
-void predict_row(const Lattice<Wide>& lattice, int r, const PredictorWeights& weights, Wide low, Wide high,
-                 std::span<Wide> predictions);
+void predict_row(const Lattice<Wide>& lattice, int r, const Predictors& predictors, Wide low, Wide high,
+                 std::span<Wide> halves);
 
-/// The part of a row's predictions that the rows above decide: prediction = clamp((part + wW·W + wWW·WW) >> 12).
+/// The part of a prediction that the rows above decide, by place: halves = (part + wW*W + wWW*WW) >> (kWeightBits - 1),
+/// limited to 2*low ... 2*high-1.
+void predict_row_from_above(const Lattice<std::int64_t>& lattice, int r, const Predictors& predictors,
+                            std::span<std::int64_t> parts);
+void predict_row_from_above(const Lattice<std::int32_t>& lattice, int r, const Predictors& predictors,
+                            std::span<std::int32_t> parts);
+
+/// The sample that halves predict, and the difference from it that is folded: a sample below it comes first where it
+/// was rounded up, one above it otherwise.
 template <typename Wide>
-void predict_row_from_above(const Lattice<Wide>& lattice, int r, const PredictorWeights& weights,
-                            std::span<Wide> parts);
-
-/// The rows above the one that is predicted, by place: NE stands at north[place], NN at far[place], NNNE at
-/// farther[place].
-struct RowsAbove {
-  const std::int32_t* north;
-  const std::int32_t* far;
-  const std::int32_t* farther;
-};
-
-/// predict_row_from_above for rows of codes that are no Lattice. parts: indexed by place, first to last are written.
-void predict_from_above(const RowsAbove& rows, int first, int last, const PredictorWeights& weights,
-                        std::int32_t* parts);
-
-/// The weights that predict the tile's rows from the fourth on best: least squares, then twice more with every sample
-/// weighted by how well it and its surroundings were predicted, which is what their codes' lengths go by. In large
-/// tiles every seventh row takes part. All rows must be closed; low and high are the range of the samples.
+[[nodiscard]] inline Wide prediction_of_halves(Wide halves) {
+  return (halves + 1) >> 1;
+}
 template <typename Wide>
-[[nodiscard]] PredictorWeights fit_weights(const Lattice<Wide>& lattice, Wide low, Wide high);
+[[nodiscard]] inline Wide oriented_difference(Wide sample, Wide halves) {
+  const Wide difference = prediction_of_halves(halves) - sample;
+  return (halves & 1) != 0 ? -difference : difference;
+}
 
 }  // namespace isohf

@@ -4,278 +4,386 @@
 #include <array>
 #include <cstring>
 #include <memory>
-#include <optional>
 #include <vector>
 
+#include "isohf/archive/residual_expander.h"
 #include "isohf/archive/tile_payload.h"
+#include "isohf/archive/void_mask.h"
 #include "isohf/base/assert.h"
 #include "isohf/base/error.h"
+#include "isohf/base/scratch.h"
 #include "isohf/base/vectorised.h"
 
 namespace isohf {
 namespace {
 
-/// What a symbol stands for: base plus so many extra bits. Symbols that codes never have get a base beyond 16 bits.
-struct SymbolTable {
-  std::array<std::uint32_t, 256> base{};
-  std::array<std::uint8_t, 256> extra_bits{};
+constexpr std::size_t kLanes = kDecoderLanes;
+constexpr int kMargin = 3;
+
+/// A value for each lane.
+template <typename T>
+using PerLane = std::array<T, kLanes>;
+
+/// What a stretch of places is predicted with: a weight of each lane, one term after the other; NE's comes first.
+using StretchWeights = std::array<PerLane<std::int32_t>, kWeightCount + 1>;
+
+/// The rows of all lanes, lane by lane at each place.
+struct LaneRows {
+  std::int32_t* own;
+  const std::int32_t* north;
+  const std::int32_t* far;
+  const std::int32_t* farther;
+  const std::uint16_t* folded;
+  const std::uint8_t* is_void;  ///< by place and lane; nullptr where no lane has voids in the row
 };
 
-constexpr std::uint32_t kNoSuchResidual = 1U << 16U;
-
-constexpr SymbolTable make_symbol_table() {
-  SymbolTable table;
-  for (unsigned symbol = 0; symbol < 256; ++symbol) {
-    const bool exists = symbol < symbol_limit(16);
-    table.base[symbol] = exists ? folded_from(symbol, 0) : kNoSuchResidual;
-    table.extra_bits[symbol] = static_cast<std::uint8_t>(exists ? extra_bits_of_symbol(symbol) : 0);
-  }
-  return table;
-}
-constexpr SymbolTable kSymbolTable = make_symbol_table();
-constexpr unsigned kMaxExtraBits = 12;
-
-ISOHF_VECTORISED(void, find_activities_above,
-                 (const std::uint32_t* __restrict north, int first, int last, std::uint32_t* __restrict out),
-                 (north, first, last, out)) {
-  for (int place = first; place <= last; ++place) out[place] = activity_from_above(north, place);
-}
-
-ISOHF_VECTORISED(bool, all_within,
-                 (const std::int32_t* samples, int first, int last, std::int32_t low, std::int32_t high),
-                 (samples, first, last, low, high)) {
-  std::int32_t outside = 0;
-  for (int place = first; place <= last; ++place) outside |= (samples[place] < low) | (samples[place] > high);
-  return outside == 0;
-}
-
-ISOHF_VECTORISED(void, narrow, (const std::int32_t* __restrict samples, int count, std::uint16_t* __restrict codes),
-                 (samples, count, codes)) {
-  for (int i = 0; i < count; ++i) codes[i] = static_cast<std::uint16_t>(samples[i]);
-}
-
-/// What each step of a lane uses. Steps work on a copy of it on the stack, which no store through a pointer can change,
-/// so that the compiler may keep it in registers.
-struct LaneState {
-  std::int32_t* own = nullptr;
-  std::uint32_t* current = nullptr;
-  const std::int32_t* parts = nullptr;
-  const std::uint32_t* above = nullptr;
-  const std::uint8_t* contexts = nullptr;  ///< by level
-  const std::byte* extra = nullptr;
-  std::uint64_t position = 0;  ///< bits of `extra` taken
-  unsigned shift = 0;
-  std::int32_t low = 0;
-  std::int32_t high = 0;
-  std::uint32_t weight_w = 0;
-  std::uint32_t weight_ww = 0;
-  std::int32_t west = 0;
-  std::int32_t far_west = 0;
-  std::uint32_t folded_west = 0;
-  std::uint32_t folded_far_west = 0;
-  std::uint32_t all_folded = 0;  ///< or'ed
-  bool ran_out = false;
-  std::array<const std::byte*, kMaxContexts> next{};
-  std::array<const std::byte*, kMaxContexts> end{};
+/// The samples' range, and whether a sample has left it.
+struct LaneRange {
+  PerLane<std::int32_t> low{};
+  PerLane<std::int32_t> high{};
+  PerLane<std::int32_t> least_seen{};
+  PerLane<std::int32_t> most_seen{};
 };
 
-[[gnu::always_inline]] inline std::uint32_t take(LaneState& lane, std::uint32_t activity) {
-  const std::size_t context = lane.contexts[activity_level(activity, lane.shift)];
-  const std::byte* const at = lane.next[context];
-  if (at == lane.end[context]) {
-    lane.ran_out = true;
-    return 0;
+/// Predictions completed by residuals, from West to East. Sums modulo 2^32, as the plain decoder has them.
+template <std::size_t kTerms, bool kWithVoids>
+[[gnu::always_inline]] inline void restore_places(const LaneRows& rows, const StretchWeights& weights, int begin,
+                                                  int end, LaneRange& range) {
+  using Ints = std::int32_t __attribute__((vector_size(4 * kLanes), aligned(4), may_alias));
+  using Words = std::uint32_t __attribute__((vector_size(4 * kLanes), aligned(4), may_alias));
+  using Shorts = std::uint16_t __attribute__((vector_size(2 * kLanes), aligned(2), may_alias));
+  using Bytes = std::int8_t __attribute__((vector_size(kLanes), aligned(1), may_alias));
+  constexpr std::ptrdiff_t kStep = kLanes;
+  const std::array<const std::int32_t*, kWeightCount + 1> from = {
+      rows.north,
+      rows.own - kStep,
+      rows.north - kStep,
+      rows.own - 2 * kStep,
+      rows.north + kStep,
+      rows.north - 2 * kStep,
+      rows.far,
+      rows.far + kStep,
+      rows.far - kStep,
+      rows.far + 2 * kStep,
+      rows.far - 2 * kStep,
+      rows.farther,
+      rows.farther - kStep,
+      rows.farther + kStep,
+      rows.farther - 2 * kStep,
+      rows.north + 2 * kStep,
+      rows.north - 3 * kStep,
+      rows.far + 3 * kStep,
+      rows.far - 3 * kStep,
+  };
+  constexpr std::size_t kWest = 1;
+  constexpr std::size_t kFarWest = 3;
+  const auto* const weight = reinterpret_cast<const Words*>(weights.data());
+  const Ints low = *reinterpret_cast<const Ints*>(range.low.data());
+  const Ints high = *reinterpret_cast<const Ints*>(range.high.data());
+  const Ints least = 2 * low;
+  const Ints most = 2 * high - 1;
+  Ints least_seen = *reinterpret_cast<const Ints*>(range.least_seen.data());
+  Ints most_seen = *reinterpret_cast<const Ints*>(range.most_seen.data());
+  Ints west = *reinterpret_cast<const Ints*>(rows.own + (begin - 1) * kStep);
+  Ints far_west = *reinterpret_cast<const Ints*>(rows.own + (begin - 2) * kStep);
+  for (int place = begin; place < end; ++place) {
+    const std::ptrdiff_t at = place * kStep;
+    Words sum = weight[kFarWest] * (Words)far_west;
+    for (std::size_t term = 0; term < kTerms; ++term) {
+      if (term != kWest && term != kFarWest) sum += weight[term] * *reinterpret_cast<const Words*>(from[term] + at);
+    }
+    sum += weight[kWest] * (Words)west;
+    Ints halves = (Ints)sum >> (kWeightBits - 1);
+    halves = halves < least ? least : halves;
+    halves = halves > most ? most : halves;
+    const Words folded = __builtin_convertvector(*reinterpret_cast<const Shorts*>(rows.folded + at), Words);
+    const Ints residual = (Ints)((folded >> 1U) ^ -(folded & 1U));
+    const Ints turned = -(halves & 1);  // -1 where the residual is added, 0 where it is taken off
+    const Ints sample = (((halves + 1) >> 1) + ((residual ^ ~turned) - ~turned)) & 0xffff;
+    far_west = west;
+    west = sample;
+    if constexpr (kWithVoids) {
+      const Ints north = *reinterpret_cast<const Ints*>(rows.north + at);
+      const Ints is_void = __builtin_convertvector(*reinterpret_cast<const Bytes*>(rows.is_void + at), Ints);
+      west = is_void != 0 ? (far_west + north) >> 1 : sample;
+    }
+    least_seen = west < least_seen ? west : least_seen;
+    most_seen = west > most_seen ? west : most_seen;
+    *reinterpret_cast<Ints*>(rows.own + at) = west;
   }
-  lane.next[context] = at + 1;
-  const auto symbol = std::to_integer<std::size_t>(*at);
-  std::uint64_t bits;
-  std::memcpy(&bits, lane.extra + lane.position / 8, sizeof(bits));
-  bits >>= lane.position % 8;
-  const unsigned count = kSymbolTable.extra_bits[symbol];
-  lane.position += count;
-  const std::uint32_t folded = kSymbolTable.base[symbol] + (static_cast<std::uint32_t>(bits) & ((1U << count) - 1));
-  lane.all_folded |= folded;
-  return folded;
+  *reinterpret_cast<Ints*>(range.least_seen.data()) = least_seen;
+  *reinterpret_cast<Ints*>(range.most_seen.data()) = most_seen;
 }
 
-/// Prediction plus residual, modulo 2^16.
-[[gnu::always_inline]] inline std::int32_t unfold(std::int32_t prediction, std::uint32_t folded) {
-  return static_cast<std::int32_t>((static_cast<std::uint32_t>(prediction) + unzigzag(folded)) & 0xffffU);
+ISOHF_VECTORISED(void, restore_near,
+                 (const LaneRows& rows, const StretchWeights& weights, int begin, int end, LaneRange& range),
+                 (rows, weights, begin, end, range)) {
+  restore_places<kNearWeightCount + 1, false>(rows, weights, begin, end, range);
+}
+ISOHF_VECTORISED(void, restore_widely,
+                 (const LaneRows& rows, const StretchWeights& weights, int begin, int end, LaneRange& range),
+                 (rows, weights, begin, end, range)) {
+  restore_places<kWeightCount + 1, false>(rows, weights, begin, end, range);
+}
+ISOHF_VECTORISED(void, restore_with_voids,
+                 (const LaneRows& rows, const StretchWeights& weights, int begin, int end, LaneRange& range),
+                 (rows, weights, begin, end, range)) {
+  restore_places<kWeightCount + 1, true>(rows, weights, begin, end, range);
 }
 
-[[gnu::always_inline]] inline void step(LaneState& lane, int place) {
-  const std::uint32_t folded = take(lane, lane.above[place] + 3 * lane.folded_west + lane.folded_far_west);
-  lane.folded_far_west = lane.folded_west;
-  lane.folded_west = folded;
-  lane.current[place] = folded;
-  const std::uint32_t sum = static_cast<std::uint32_t>(lane.parts[place]) +
-                            lane.weight_ww * static_cast<std::uint32_t>(lane.far_west) +
-                            lane.weight_w * static_cast<std::uint32_t>(lane.west);
-  const std::int32_t predicted = static_cast<std::int32_t>(sum) >> kWeightBits;
-  const std::int32_t raised = predicted < lane.low ? lane.low : predicted;
-  const std::int32_t inside = raised > lane.high ? lane.high : raised;
-  lane.far_west = lane.west;
-  lane.west = unfold(inside, folded);
-  lane.own[place] = lane.west;
+ISOHF_VECTORISED(void, find_magnitudes,
+                 (const std::uint16_t* folded, int first, int last, unsigned shift, std::uint8_t* __restrict out),
+                 (folded, first, last, shift, out)) {
+  for (int place = first; place <= last; ++place) out[place] = magnitude(folded[place], shift);
 }
 
-/// One tile on its way. Samples of four rows, residuals of two; everything else goes straight to `codes`.
+/// One tile's residuals: sorted out to places from the streams of its contexts.
 class Lane {
  public:
-  explicit Lane(const TileShape& shape)
-      : columns_(shape.columns()),
-        stride_(shape.columns() + 4),
-        samples_(4 * static_cast<std::size_t>(stride_)),
-        parts_(static_cast<std::size_t>(shape.columns())),
-        above_(static_cast<std::size_t>(shape.columns())),
-        folded_(shape.columns()) {}
+  Lane(const TileShape& shape, CodeType type)
+      : type_(type),
+        columns_(shape.columns()),
+        samples_(static_cast<std::size_t>(shape.stored_vertex_count())),
+        row_(static_cast<std::size_t>(columns_)),
+        activities_(static_cast<std::size_t>(columns_)),
+        magnitudes_(columns_) {}
 
-  /// False where the payload is not for this decoder.
-  bool open(const TileShape& shape, CodeType type, std::span<const std::byte> payload, std::uint16_t* codes) {
-    if (payload.size() > max_payload_bytes(shape, type)) return false;
+  /// False where the payload is not for this decoder. Throws Error where it is broken.
+  bool open(const TileShape& shape, std::span<const std::byte> payload) {
+    if (payload.size() > max_payload_bytes(shape, type_)) return false;
     ByteReader reader(payload);
-    header_ = read_payload_header(shape, type, reader);
-    if (header_.has_voids || header_.is_constant || header_.mask_bytes != 0) return false;
-    table_ = context_table(header_.thresholds);
-    symbols_.emplace(header_, reader);
-    for (std::size_t i = 0; i < header_.symbol_counts.size(); ++i) {
-      const auto symbols = (*symbols_)[i];
-      state.next[i] = symbols.data();
-      state.end[i] = symbols.data() + symbols.size();
+    header = read_payload_header(shape, type_, reader);
+    if (header.is_constant) return false;
+    std::size_t voids = 0;
+    if (header.has_voids) {
+      is_void = unpack_void_mask(reader.read_bytes(header.mask_bytes), samples_);
+      for (const std::uint8_t value : is_void) voids += value;
     }
-    const auto extra = reader.read_bytes(header_.extra_bytes);
+    read_block_map(shape, reader, header.predictors);
+    table_ = context_table(header.thresholds);
+    const SymbolStreams symbols(header, reader);
+    const auto extra = reader.read_bytes(header.extra_bytes);
     if (reader.remaining() != 0) return false;
-    // A row may read as far past the end as its bits can reach; what it finds there is zero, and told afterwards.
-    const std::size_t spare = (static_cast<std::size_t>(columns_) + 2) * kMaxExtraBits / 8 + 16;
-    extra_.assign(extra.size() + spare, std::byte{0});
-    std::copy(extra.begin(), extra.end(), extra_.begin());
-    extra_bits_ = 8 * std::uint64_t{extra.size()};
-    state.parts = parts_.data();
-    state.above = above_.data();
-    state.contexts = table_.data();
-    state.extra = extra_.data();
-    state.shift = header_.activity_shift;
-    state.low = header_.low;
-    state.high = header_.high;
-    codes_ = codes;
-    std::fill(samples_.begin(), samples_.end(), header_.base);
+    std::size_t count = 0;
+    for (const std::uint32_t of_context : header.symbol_counts) count += of_context;
+    return count == samples_ - voids && expand(symbols, extra, count);
+  }
+
+  /// Takes the residuals of row r's places, to `out[place * kLanes]`, and of its slid vertices. False where a context
+  /// has run out.
+  bool take_row(int r, std::uint16_t* out) {
+    const int first = Lattice<std::int32_t>::first(r);
+    const int last = r % 2 == 0 ? columns_ - 2 : columns_ - 1;
+    find_activities(magnitudes_.above() + r % 2, magnitudes_.far_above(), first, last, activities_.data());
+    void_row_ = has_voids_in(r) ? is_void.data() + static_cast<std::ptrdiff_t>(r) * columns_ : nullptr;
+    const std::uint16_t* const activities = activities_.data();
+    std::uint16_t* const row = row_.data();
+    if (void_row_ == nullptr) {
+      for (int place = first; place <= last; ++place) {
+        const std::uint16_t folded = *next_[table_[activities[place]]]++;
+        row[place] = folded;
+        out[static_cast<std::ptrdiff_t>(place) * static_cast<std::ptrdiff_t>(kLanes)] = folded;
+      }
+    } else {
+      for (int place = first; place <= last; ++place) {
+        const bool is_void_here = void_row_[column_of_place(columns_, r, place)] != 0;
+        const std::uint16_t folded = is_void_here ? std::uint16_t{0} : *next_[table_[activities[place]]]++;
+        row[place] = folded;
+        out[static_cast<std::ptrdiff_t>(place) * static_cast<std::ptrdiff_t>(kLanes)] = folded;
+      }
+    }
+    std::uint8_t* const magnitudes = magnitudes_.current();
+    find_magnitudes(row, first, last, header.activity_shift, magnitudes);
+    for (int side = 0; r % 2 == 0 && side < 2; ++side) {
+      const int at = side == 0 ? 1 : columns_ - 3;
+      if (void_row_ != nullptr && void_row_[column_of_slid(columns_, side)] != 0) continue;
+      const std::uint16_t activity = activity_of_slid(magnitudes[at], magnitudes[at + 1]);
+      slid_[static_cast<std::size_t>(side)] = *next_[table_[activity]]++;
+    }
+    magnitudes_.close_row(first, last);
+    for (std::size_t i = 0; i < header.symbol_counts.size(); ++i) {
+      if (next_[i] > end_[i]) return false;
+    }
     return true;
   }
 
-  void open_row(int r) {
-    row_ = r;
-    first_ = r % 2 == 0 ? 1 : 0;
-    last_ = r % 2 == 0 ? columns_ - 2 : columns_ - 1;
-    std::int32_t* const samples = row(r);
-    const std::int32_t* const north = row(r - 1) + r % 2;
-    samples[first_ - 1] = samples[first_ - 2] = north[first_];
-    folded_.open_row(first_, r % 2);
-    const PredictorWeights& weights = weights_of_row(header_.weights, r);
-    predict_from_above({north, row(r - 2), row(r - 3) + r % 2}, first_, last_, weights, parts_.data());
-    find_activities_above(folded_.above() + r % 2, first_, last_, above_.data());
-    state.own = samples;
-    state.current = folded_.current();
-    state.weight_w = static_cast<std::uint32_t>(std::int32_t{weights[0]});
-    state.weight_ww = static_cast<std::uint32_t>(std::int32_t{weights[2]});
-    state.west = samples[first_ - 1];
-    state.far_west = samples[first_ - 2];
-    state.folded_west = state.current[first_ - 1];
-    state.folded_far_west = state.current[first_ - 2];
+  [[nodiscard]] bool has_voids_in(int r) const {
+    if (is_void.empty()) return false;
+    const auto row = is_void.begin() + static_cast<std::ptrdiff_t>(r) * columns_;
+    return std::find(row, row + columns_, std::uint8_t{1}) != row + columns_;
   }
+  [[nodiscard]] const std::uint8_t* void_row() const { return void_row_; }
+  /// The residual of a slid vertex of the row taken last; 0 West, 1 East.
+  [[nodiscard]] std::uint32_t slid(int side) const { return slid_[static_cast<std::size_t>(side)]; }
 
-  /// Writes the row's codes; false where it was broken.
-  bool close_row() {
-    std::int32_t* const samples = state.own;
-    std::uint16_t* const codes = codes_ + static_cast<std::ptrdiff_t>(row_) * columns_;
-    bool is_good = all_within(samples, first_, last_, header_.low, header_.high);
-    narrow(samples + first_, last_ + 1 - first_, codes + first_);
-    if (row_ % 2 == 0) {
-      codes[0] = codes[1];
-      codes[columns_ - 1] = codes[columns_ - 2];
-      for (int side = 0; side < 2; ++side) is_good &= take_slid(side, codes[column_of_slid(columns_, side)]);
-    }
-    for (int place = -2; place < first_; ++place) samples[place] = samples[first_];
-    for (int place = last_ + 1; place < columns_ + 2; ++place) samples[place] = samples[last_];
-    folded_.close_row(first_, last_);
-    return is_good && !state.ran_out && state.all_folded < kNoSuchResidual && state.position <= extra_bits_;
-  }
-
-  /// True where every symbol and every extra bit was used.
-  [[nodiscard]] bool is_used_up() const {
-    for (std::size_t i = 0; i < header_.symbol_counts.size(); ++i) {
-      if (state.next[i] != state.end[i]) return false;
-    }
-    const std::uint64_t position = state.position;
-    if ((position + 7) / 8 != extra_bits_ / 8) return false;
-    return position % 8 == 0 || (std::to_integer<unsigned>(extra_[position / 8]) >> (position % 8)) == 0;
-  }
-
-  LaneState state;
+  PayloadHeader header;
+  std::vector<std::uint8_t> is_void;  ///< in row order; empty where nothing is void
 
  private:
-  [[nodiscard]] std::int32_t* row(int r) { return samples_.data() + static_cast<std::ptrdiff_t>(r & 3) * stride_ + 2; }
-
-  bool take_slid(int side, std::uint16_t& code) {
-    const int at = side == 0 ? 1 : columns_ - 3;
-    const std::uint32_t folded = take(state, activity_of_slid(state.current[at], state.current[at + 1]));
-    const std::int32_t sample = unfold((state.own[at] + state.own[at + 1]) >> 1, folded);
-    code = static_cast<std::uint16_t>(sample);
-    return sample >= header_.low && sample <= header_.high;
+  bool expand(const SymbolStreams& symbols, std::span<const std::byte> extra, std::size_t count) {
+    std::vector<std::byte> padded(extra.size() + 8);
+    std::copy(extra.begin(), extra.end(), padded.begin());
+    const std::span<const std::byte> bits = std::span(padded).first(extra.size());
+    // A row may run past a context's last residual, and past the last of all; that is told when it is done.
+    const auto spare = static_cast<std::size_t>(columns_) + 2;
+    folded_ = std::make_unique_for_overwrite<std::uint16_t[]>(count + spare);
+    std::fill_n(folded_.get() + count, spare, std::uint16_t{0});
+    std::uint16_t* to = folded_.get();
+    std::uint64_t position = 0;
+    for (std::size_t i = 0; i < header.symbol_counts.size(); ++i) {
+      position = expand_residuals(symbols[i], bits, position, to);
+      if (position == kNotExpanded) return false;
+      next_[i] = to;
+      to += symbols[i].size();
+      end_[i] = to;
+    }
+    if ((position + 7) / 8 != extra.size()) return false;
+    return position % 8 == 0 || (std::to_integer<unsigned>(extra[position / 8]) >> (position % 8)) == 0;
   }
 
-  PayloadHeader header_;
-  std::optional<SymbolStreams> symbols_;
-  std::array<std::uint8_t, kActivityLimit> table_{};
+  CodeType type_;
   int columns_;
-  int stride_;
-  int row_ = 0;
-  int first_ = 0;
-  int last_ = 0;
-  std::vector<std::int32_t> samples_;
-  std::vector<std::int32_t> parts_;
-  std::vector<std::uint32_t> above_;
-  ResidualRows folded_;
-  std::vector<std::byte> extra_;
-  std::uint64_t extra_bits_ = 0;
-  std::uint16_t* codes_ = nullptr;
+  std::size_t samples_;
+  std::array<std::uint8_t, kActivityLimit> table_{};
+  std::unique_ptr<std::uint16_t[]> folded_;
+  std::array<const std::uint16_t*, kMaxContexts> next_{};
+  std::array<const std::uint16_t*, kMaxContexts> end_{};
+  std::vector<std::uint16_t> row_;
+  std::vector<std::uint16_t> activities_;
+  MagnitudeRows magnitudes_;
+  const std::uint8_t* void_row_ = nullptr;
+  std::array<std::uint32_t, 2> slid_{};
 };
 
-using Lanes = std::array<Lane*, kDecoderLanes>;
+/// The samples of all lanes, on their way from residuals to codes.
+class LaneSamples {
+ public:
+  explicit LaneSamples(const TileShape& shape)
+      : columns_(shape.columns()),
+        stride_(static_cast<std::ptrdiff_t>(kLanes) * (columns_ + 2 * kMargin)),
+        samples_(4 * static_cast<std::size_t>(stride_)),
+        folded_(kLanes * static_cast<std::size_t>(columns_)),
+        is_void_(folded_.size()) {}
 
-template <std::size_t kCount>
-[[gnu::always_inline]] inline void step_lanes(const Lanes& lanes, int first, int last) {
-  std::array<LaneState, kCount> states;
-  for (std::size_t i = 0; i < kCount; ++i) states[i] = lanes[i]->state;
-  for (int place = first; place <= last; ++place) {
-    for (LaneState& state : states) step(state, place);
+  void open(std::size_t lane, const PayloadHeader& header) {
+    for (std::size_t i = lane; i < samples_.size(); i += kLanes) samples_[i] = header.base;
+    range.low[lane] = header.low;
+    range.high[lane] = header.high;
+    is_wide_ |= header.predictors.is_wide;
   }
-  for (std::size_t i = 0; i < kCount; ++i) lanes[i]->state = states[i];
-}
-// Only free functions can be cloned for several machines, not templates.
-ISOHF_VECTORISED(void, step_one, (const Lanes& lanes, int first, int last), (lanes, first, last)) {
-  step_lanes<1>(lanes, first, last);
-}
-ISOHF_VECTORISED(void, step_two, (const Lanes& lanes, int first, int last), (lanes, first, last)) {
-  step_lanes<2>(lanes, first, last);
-}
-ISOHF_VECTORISED(void, step_three, (const Lanes& lanes, int first, int last), (lanes, first, last)) {
-  step_lanes<3>(lanes, first, last);
-}
-ISOHF_VECTORISED(void, step_four, (const Lanes& lanes, int first, int last), (lanes, first, last)) {
-  step_lanes<4>(lanes, first, last);
+
+  /// Where a lane's residuals of the row's place 0 go, and what is void.
+  [[nodiscard]] std::uint16_t* folded(std::size_t lane) { return folded_.data() + lane; }
+  [[nodiscard]] std::uint8_t* is_void(std::size_t lane) { return is_void_.data() + lane; }
+
+  /// Restores row r. `lanes` may be less than kLanes; the others hold what they like.
+  void restore_row(int r, std::span<Lane* const> lanes, bool has_voids) {
+    const int first = Lattice<std::int32_t>::first(r);
+    const int last = r % 2 == 0 ? columns_ - 2 : columns_ - 1;
+    const auto step = static_cast<std::ptrdiff_t>(kLanes);
+    const std::int32_t* const north = row(r - 1) + r % 2 * step;
+    for (int place : {first - 1, first - 2}) std::copy_n(north + first * step, kLanes, row(r) + place * step);
+    if (r <= 3 || r % kBlockPlaces == 0) gather_weights(r, lanes);
+    range.least_seen = range.low;
+    range.most_seen = range.high;
+    const LaneRows rows = {row(r), north, row(r - 2), row(r - 3) + r % 2 * step, folded_.data(), is_void_.data()};
+    for (std::size_t stretch = 0; stretch < weights_.size(); ++stretch) {
+      const int begin = std::max(first, static_cast<int>(stretch) * kBlockPlaces);
+      const bool is_last = stretch + 1 == weights_.size();
+      const int end = is_last ? last + 1 : std::min(last + 1, static_cast<int>(stretch + 1) * kBlockPlaces);
+      if (has_voids) {
+        restore_with_voids(rows, weights_[stretch], begin, end, range);
+      } else if (is_wide_) {
+        restore_widely(rows, weights_[stretch], begin, end, range);
+      } else {
+        restore_near(rows, weights_[stretch], begin, end, range);
+      }
+    }
+    std::int32_t* const own = row(r);
+    for (int place = -kMargin; place < first; ++place) std::copy_n(own + first * step, kLanes, own + place * step);
+    for (int place = last + 1; place < columns_ + kMargin; ++place) {
+      std::copy_n(own + last * step, kLanes, own + place * step);
+    }
+  }
+
+  [[nodiscard]] bool is_in_range(std::size_t lane) const {
+    return range.least_seen[lane] >= range.low[lane] && range.most_seen[lane] <= range.high[lane];
+  }
+
+  /// The samples of a lane in row r by place, kLanes apart.
+  [[nodiscard]] const std::int32_t* samples(int r, std::size_t lane) { return row(r) + lane; }
+
+  LaneRange range;
+
+ private:
+  [[nodiscard]] std::int32_t* row(int r) {
+    return samples_.data() + (r & 3) * stride_ + static_cast<std::ptrdiff_t>(kLanes) * kMargin;
+  }
+
+  /// The weights of all lanes for row r and those below it in its blocks: one stretch where no lane has a map.
+  void gather_weights(int r, std::span<Lane* const> lanes) {
+    const bool has_map = r > 2 && std::any_of(lanes.begin(), lanes.end(),
+                                              [](const Lane* lane) { return !lane->header.predictors.map.empty(); });
+    weights_.assign(has_map ? static_cast<std::size_t>(Predictors::blocks_across(columns_)) : 1, StretchWeights{});
+    for (std::size_t stretch = 0; stretch < weights_.size(); ++stretch) {
+      for (std::size_t lane = 0; lane < lanes.size(); ++lane) {
+        const Predictors& predictors = lanes[lane]->header.predictors;
+        std::size_t index = 0;
+        if (!predictors.map.empty()) {
+          index = predictors.map[static_cast<std::size_t>(r / kBlockPlaces * predictors.block_columns) + stretch];
+        }
+        const PredictorWeights& weights = r > 2 ? predictors.weights[index] : predictors.of_row(r);
+        std::int32_t anchor = 1 << kWeightBits;
+        for (std::size_t i = 0; i < kWeightCount; ++i) {
+          weights_[stretch][i + 1][lane] = weights[i];
+          anchor -= weights[i];
+        }
+        weights_[stretch][0][lane] = anchor;
+      }
+    }
+  }
+
+  int columns_;
+  std::ptrdiff_t stride_;
+  bool is_wide_ = false;
+  std::vector<std::int32_t> samples_;
+  std::vector<std::uint16_t> folded_;
+  std::vector<std::uint8_t> is_void_;
+  std::vector<StretchWeights> weights_;
+};
+
+/// The slid vertex's code; false where it lies outside the range.
+bool restore_slid(const Lane& lane, const std::int32_t* samples, int columns, int side, std::uint16_t& code) {
+  const std::ptrdiff_t step = kLanes;
+  const std::ptrdiff_t at = (side == 0 ? 1 : columns - 3) * step;
+  const auto prediction = static_cast<std::uint32_t>((samples[at] + samples[at + step]) >> 1);
+  const auto sample = static_cast<std::int32_t>((prediction - unzigzag(lane.slid(side))) & 0xffffU);
+  code = static_cast<std::uint16_t>(sample);
+  return sample >= lane.header.low && sample <= lane.header.high;
 }
 
-void step_all(const Lanes& lanes, std::size_t count, int first, int last) {
-  switch (count) {
-    case 1:
-      return step_one(lanes, first, last);
-    case 2:
-      return step_two(lanes, first, last);
-    case 3:
-      return step_three(lanes, first, last);
-    default:
-      return step_four(lanes, first, last);
+/// Writes a lane's row of codes; false where a slid vertex lies outside the range.
+bool write_codes(const Lane& lane, const std::int32_t* samples, int columns, int r, std::uint16_t void_code,
+                 std::uint16_t* codes) {
+  const std::ptrdiff_t step = kLanes;
+  const int first = Lattice<std::int32_t>::first(r);
+  const int last = r % 2 == 0 ? columns - 2 : columns - 1;
+  for (int place = first; place <= last; ++place) codes[place] = static_cast<std::uint16_t>(samples[place * step]);
+  bool is_good = true;
+  if (r % 2 == 0) {
+    codes[0] = codes[1];
+    codes[columns - 1] = codes[columns - 2];
+    for (int side = 0; side < 2; ++side) {
+      const int column = column_of_slid(columns, side);
+      if (lane.void_row() != nullptr && lane.void_row()[column] != 0) continue;
+      is_good &= restore_slid(lane, samples, columns, side, codes[column]);
+    }
   }
+  if (lane.void_row() == nullptr) return is_good;
+  for (int column = 0; column < columns; ++column) {
+    if (lane.void_row()[column] != 0) codes[column] = void_code;
+  }
+  return is_good;
 }
 
 }  // namespace
@@ -285,37 +393,53 @@ void decode_lanes(const TileShape& shape, CodeType type, std::span<const std::sp
   ISOHF_ASSERT(payloads.size() <= kDecoderLanes && tiles.size() == payloads.size());
   std::fill(decoded.begin(), decoded.end(), false);
   if (type == CodeType::kF32) return;
-  std::vector<std::unique_ptr<Lane>> lanes;
-  Lanes active{};
-  std::array<std::size_t, kDecoderLanes> tile_of{};
-  std::size_t count = 0;
+  const auto void_code = static_cast<std::uint16_t>(Quantisation{type, 0.0, 1.0}.void_code());
+  std::vector<std::unique_ptr<Lane>> owned;
+  std::vector<Lane*> lanes;
+  std::vector<std::size_t> tile_of;
+  LaneSamples samples(shape);
   for (std::size_t i = 0; i < payloads.size(); ++i) {
     tiles[i] = {};
     tiles[i].type = type;
-    tiles[i].codes.resize(static_cast<std::size_t>(shape.stored_vertex_count()));
-    lanes.push_back(std::make_unique<Lane>(shape));
+    auto lane = std::make_unique<Lane>(shape, type);
     try {
-      if (!lanes.back()->open(shape, type, payloads[i], tiles[i].codes.data())) continue;
+      if (!lane->open(shape, payloads[i])) continue;
     } catch (const Error&) {
       continue;  // decode_tile says what is wrong
     }
-    active[count] = lanes.back().get();
-    tile_of[count++] = i;
+    tiles[i].codes.resize(static_cast<std::size_t>(shape.stored_vertex_count()));
+    samples.open(lanes.size(), lane->header);
+    lanes.push_back(lane.get());
+    tile_of.push_back(i);
+    owned.push_back(std::move(lane));
   }
-  for (int r = 0; r < shape.rows() && count > 0; ++r) {
-    for (std::size_t i = 0; i < count; ++i) active[i]->open_row(r);
-    step_all(active, count, r % 2 == 0 ? 1 : 0, shape.columns() - (r % 2 == 0 ? 2 : 1));
-    for (std::size_t i = 0; i < count;) {
-      if (active[i]->close_row()) {
-        ++i;
-      } else {
-        --count;
-        std::swap(active[i], active[count]);
-        std::swap(tile_of[i], tile_of[count]);
+  std::vector<bool> is_good(lanes.size(), true);
+  const int columns = shape.columns();
+  for (int r = 0; r < shape.rows() && !lanes.empty(); ++r) {
+    bool has_voids = false;
+    for (std::size_t lane = 0; lane < lanes.size(); ++lane) {
+      if (!is_good[lane]) continue;
+      if (!lanes[lane]->take_row(r, samples.folded(lane))) is_good[lane] = false;
+      has_voids |= lanes[lane]->void_row() != nullptr;
+    }
+    if (has_voids) {
+      for (std::size_t lane = 0; lane < lanes.size(); ++lane) {
+        const std::uint8_t* const void_row = lanes[lane]->void_row();
+        for (int place = 0; place < columns; ++place) {
+          samples.is_void(lane)[static_cast<std::size_t>(place) * kLanes] =
+              void_row == nullptr ? std::uint8_t{0} : void_row[column_of_place(columns, r, place)];
+        }
       }
     }
+    samples.restore_row(r, lanes, has_voids);
+    for (std::size_t lane = 0; lane < lanes.size(); ++lane) {
+      std::uint16_t* const codes = tiles[tile_of[lane]].codes.data() + static_cast<std::ptrdiff_t>(r) * columns;
+      if (!is_good[lane]) continue;
+      is_good[lane] = samples.is_in_range(lane) &&
+                      write_codes(*lanes[lane], samples.samples(r, lane), columns, r, void_code, codes);
+    }
   }
-  for (std::size_t i = 0; i < count; ++i) decoded[tile_of[i]] = active[i]->is_used_up();
+  for (std::size_t lane = 0; lane < lanes.size(); ++lane) decoded[tile_of[lane]] = is_good[lane];
 }
 
 }  // namespace isohf

@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <memory>
 
+#include "isohf/archive/coding_effort.h"
 #include "isohf/archive/content_hash.h"
-#include "isohf/archive/context_model.h"
 #include "isohf/archive/deflate.h"
-#include "isohf/archive/pair_coding.h"
+#include "isohf/archive/predictor_fit.h"
+#include "isohf/archive/residual_streams.h"
 #include "isohf/archive/tile_payload.h"
 #include "isohf/archive/void_mask.h"
 #include "isohf/base/assert.h"
@@ -16,18 +16,6 @@
 
 namespace isohf {
 namespace {
-
-/// Room for `count` values that are written before they are read: a vector would set them to zero first.
-template <typename T>
-class Scratch {
- public:
-  explicit Scratch(std::size_t count) : values_(std::make_unique_for_overwrite<T[]>(count)) {}
-  [[nodiscard]] T* data() { return values_.get(); }
-  [[nodiscard]] const T* data() const { return values_.get(); }
-
- private:
-  std::unique_ptr<T[]> values_;
-};
 
 /// The void mask, as 0 and 1; empty where nothing is void.
 struct Voids {
@@ -74,244 +62,92 @@ void load(Lattice<Wide>& lattice, const Voids& voids, Wide base, const SampleAt&
   }
 }
 
-/// A residual modulo 2^16 or 2^32, folded.
-std::uint32_t fold(std::int32_t difference) {
-  return zigzag(static_cast<std::int16_t>(difference)) & 0xffffU;
+ISOHF_VECTORISED(void, fold_row,
+                 (const std::int32_t* own, const std::int32_t* halves, int count, std::uint16_t* __restrict out),
+                 (own, halves, count, out)) {
+  for (int i = 0; i < count; ++i) {
+    const auto difference = static_cast<std::int16_t>(oriented_difference(own[i], halves[i]));
+    out[i] = static_cast<std::uint16_t>(zigzag(difference));
+  }
+}
+void fold_row(const std::int64_t* own, const std::int64_t* halves, int count, std::uint32_t* out) {
+  for (int i = 0; i < count; ++i) out[i] = zigzag(static_cast<std::int32_t>(oriented_difference(own[i], halves[i])));
+}
+
+std::uint16_t fold(std::int32_t difference) {
+  return static_cast<std::uint16_t>(zigzag(static_cast<std::int16_t>(difference)));
 }
 std::uint32_t fold(std::int64_t difference) {
   return zigzag(static_cast<std::int32_t>(difference));
 }
 
-ISOHF_VECTORISED(void, fold_row,
-                 (const std::int32_t* own, const std::int32_t* predictions, int count, std::uint32_t* __restrict out),
-                 (own, predictions, count, out)) {
-  for (int i = 0; i < count; ++i) out[i] = fold(own[i] - predictions[i]);
+ISOHF_VECTORISED(void, find_code_magnitudes,
+                 (const std::uint16_t* folded, int count, unsigned shift, std::uint8_t* __restrict out),
+                 (folded, count, shift, out)) {
+  for (int i = 0; i < count; ++i) out[i] = magnitude(folded[i], shift);
 }
-void fold_row(const std::int64_t* own, const std::int64_t* predictions, int count, std::uint32_t* out) {
-  for (int i = 0; i < count; ++i) out[i] = fold(own[i] - predictions[i]);
+void find_magnitudes(const std::uint16_t* folded, int count, unsigned shift, std::uint8_t* out) {
+  find_code_magnitudes(folded, count, shift, out);
 }
-
-/// Activities of `count` places from `first` on.
-ISOHF_VECTORISED(void, find_activities,
-                 (const std::uint32_t* north, const std::uint32_t* own, int first, int count,
-                  std::uint32_t* __restrict out),
-                 (north, own, first, count, out)) {
-  for (int i = 0; i < count; ++i) {
-    out[i] = activity_from_above(north, first + i) + activity_from_west(own, first + i);
-  }
+void find_magnitudes(const std::uint32_t* folded, int count, unsigned shift, std::uint8_t* out) {
+  for (int i = 0; i < count; ++i) out[i] = magnitude(folded[i], shift);
 }
 
-/// A tile's residuals in coding order, voids left out.
-struct Residuals {
-  Scratch<std::uint32_t> folded;
-  Scratch<std::uint32_t> activities;
-  std::size_t count = 0;
+/// The columns of a tile's samples in coding order, row by row; a row has as many samples as columns.
+template <typename Use>
+void for_coding_order(int columns, int r, const Use& use) {
+  const int first = r % 2 == 0 ? 1 : 0;
+  const int last = r % 2 == 0 ? columns - 2 : columns - 1;
+  std::size_t i = 0;
+  for (int place = first; place <= last; ++place) use(i++, column_of_place(columns, r, place));
+  for (int side = 0; r % 2 == 0 && side < 2; ++side) use(i++, column_of_slid(columns, side));
+}
 
-  explicit Residuals(std::size_t most) : folded(most), activities(most) {}
-  void add(std::uint32_t residual, std::uint32_t activity) {
-    folded.data()[count] = residual;
-    activities.data()[count++] = activity;
-  }
-  /// Drops those of `added` last ones that are void.
-  template <typename IsVoid>
-  void drop_voids(std::size_t added, const IsVoid& is_void) {
-    const std::size_t start = count;
-    for (std::size_t i = 0; i < added; ++i) {
-      if (!is_void(static_cast<int>(i))) add(folded.data()[start + i], activities.data()[start + i]);
-    }
-  }
-};
-
-template <typename Wide>
-Residuals find_residuals(Lattice<Wide>& lattice, const Voids& voids, const PayloadHeader& header) {
+/// Folded residuals of all samples in coding order; 0 where void. `is_void` comes in coding order as well.
+template <typename Wide, typename Folded>
+void find_residuals(Lattice<Wide>& lattice, const Voids& voids, const PayloadHeader& header, Residuals<Folded>& out) {
   const int columns = lattice.columns();
-  Residuals residuals(static_cast<std::size_t>(columns) * static_cast<std::size_t>(lattice.rows()));
-  std::vector<Wide> predictions(static_cast<std::size_t>(columns));
-  ResidualRows rows(columns);
+  std::vector<Wide> halves(static_cast<std::size_t>(columns));
   for (int r = 0; r < lattice.rows(); ++r) {
     const int first = Lattice<Wide>::first(r);
-    const int last = lattice.last(r);
-    const int count = last + 1 - first;
-    const std::uint8_t* const void_row =
-        voids.is_void.empty() ? nullptr : voids.is_void.data() + static_cast<std::ptrdiff_t>(r) * columns;
-    const auto is_void_place = [&](int i) { return void_row[column_of_place(columns, r, first + i)] != 0; };
+    const int count = lattice.last(r) + 1 - first;
+    const auto row_start = static_cast<std::size_t>(r) * static_cast<std::size_t>(columns);
+    Folded* const folded = out.folded.data() + row_start;
     lattice.open_row(r);
-    rows.open_row(first, r % 2);
-    predict_row<Wide>(lattice, r, weights_of_row(header.weights, r), header.low, header.high, predictions);
-    std::uint32_t* const folded = residuals.folded.data() + residuals.count;
-    std::uint32_t* const current = rows.current();
-    fold_row(lattice.row(r) + first, predictions.data() + first, count, folded);
-    for (int i = 0; i < count; ++i) current[first + i] = std::min(folded[i], kFoldedLimit);
-    for (int i = 0; void_row != nullptr && i < count; ++i) {
-      if (is_void_place(i)) current[first + i] = 0;
-    }
-    find_activities(rows.above() + r % 2, current, first, count, residuals.activities.data() + residuals.count);
-    if (void_row == nullptr) {
-      residuals.count += static_cast<std::size_t>(count);
-    } else {
-      residuals.drop_voids(static_cast<std::size_t>(count), is_void_place);
-    }
+    predict_row<Wide>(lattice, r, header.predictors, header.low, header.high, halves);
+    fold_row(lattice.row(r) + first, halves.data() + first, count, folded);
     for (int side = 0; r % 2 == 0 && side < 2; ++side) {
-      if (void_row != nullptr && void_row[column_of_slid(columns, side)] != 0) continue;
-      const int at = side == 0 ? 1 : columns - 3;
-      residuals.add(fold(lattice.slid(r, side) - lattice.slid_prediction(r, side)),
-                    activity_of_slid(current[at], current[at + 1]));
+      folded[count + side] = fold(lattice.slid_prediction(r, side) - lattice.slid(r, side));
     }
     lattice.close_row(r);
-    rows.close_row(first, last);
-  }
-  return residuals;
-}
-
-/// A tile's residuals as they are stored: symbols by context, paired where that pays, and the extra bits in coding
-/// order.
-struct Streams {
-  std::vector<std::vector<std::byte>> symbols;
-  std::vector<std::byte> extra;
-};
-
-/// Symbols of residuals below 2^24: a float's exponent and upper three bits of mantissa are octave and eighth.
-ISOHF_VECTORISED(void, find_small_symbols,
-                 (const std::uint32_t* __restrict folded, std::size_t count, std::uint8_t* __restrict symbols),
-                 (folded, count, symbols)) {
-  constexpr std::int32_t kFirst = (127 + 4) * 8 - static_cast<std::int32_t>(kFirstSplitSymbol);
-  for (std::size_t i = 0; i < count; ++i) {
-    const auto residual = static_cast<std::int32_t>(folded[i]);
-    const std::int32_t split = (std::bit_cast<std::int32_t>(static_cast<float>(residual)) >> 20) - kFirst;
-    symbols[i] = static_cast<std::uint8_t>(residual < static_cast<std::int32_t>(kFirstSplitSymbol) ? residual : split);
+    if (voids.is_void.empty()) continue;
+    for_coding_order(columns, r, [&](std::size_t i, int column) {
+      const bool is_void = voids.is_void[row_start + static_cast<std::size_t>(column)] != 0;
+      out.is_void[row_start + i] = is_void ? 1 : 0;
+      if (is_void) folded[i] = 0;
+    });
   }
 }
 
-void find_symbols(const Residuals& residuals, CodeType type, std::uint8_t* symbols) {
-  const std::uint32_t* const folded = residuals.folded.data();
-  if (type != CodeType::kF32) return find_small_symbols(folded, residuals.count, symbols);
-  for (std::size_t i = 0; i < residuals.count; ++i) symbols[i] = static_cast<std::uint8_t>(symbol_of(folded[i]));
-}
-
-ISOHF_VECTORISED(void, find_levels,
-                 (const std::uint32_t* __restrict activities, std::size_t count, unsigned shift,
-                  std::uint16_t* __restrict levels),
-                 (activities, count, shift, levels)) {
-  for (std::size_t i = 0; i < count; ++i) levels[i] = static_cast<std::uint16_t>(activity_level(activities[i], shift));
-}
-
-/// Bits one after the other, the lowest of a byte first.
-class BitPacker {
- public:
-  /// `most_bytes` is the most that will come.
-  explicit BitPacker(std::size_t most_bytes) : room_(most_bytes + 8), to_(room_.data()) {}
-
-  void put(std::uint32_t bits, unsigned count) {
-    bits_ |= std::uint64_t{bits} << bit_count_;
-    bit_count_ += count;
-    if (bit_count_ < 32) return;
-    std::memcpy(to_, &bits_, 4);
-    to_ += 4;
-    bits_ >>= 32U;
-    bit_count_ -= 32;
+/// Activities in coding order, by the magnitudes that `shift` makes of the residuals.
+template <typename Folded>
+void find_all_activities(int columns, int rows, unsigned shift, Residuals<Folded>& residuals) {
+  MagnitudeRows magnitudes(columns);
+  std::vector<std::uint16_t> activities(static_cast<std::size_t>(columns));
+  for (int r = 0; r < rows; ++r) {
+    const int first = r % 2 == 0 ? 1 : 0;
+    const int last = r % 2 == 0 ? columns - 2 : columns - 1;
+    const auto row_start = static_cast<std::size_t>(r) * static_cast<std::size_t>(columns);
+    std::uint16_t* const out = residuals.activities.data() + row_start;
+    find_activities(magnitudes.above() + r % 2, magnitudes.far_above(), first, last, out - first);
+    std::uint8_t* const current = magnitudes.current();
+    find_magnitudes(residuals.folded.data() + row_start, last + 1 - first, shift, current + first);
+    if (r % 2 == 0) {
+      out[columns - 2] = activity_of_slid(current[1], current[2]);
+      out[columns - 1] = activity_of_slid(current[columns - 3], current[columns - 2]);
+    }
+    magnitudes.close_row(first, last);
   }
-  [[nodiscard]] std::vector<std::byte> finish() {
-    std::memcpy(to_, &bits_, 8);
-    return {room_.data(), to_ + (bit_count_ + 7) / 8};
-  }
-
- private:
-  Scratch<std::byte> room_;
-  std::byte* to_;
-  std::uint64_t bits_ = 0;
-  unsigned bit_count_ = 0;
-};
-
-/// The extra bits of two neighbouring residuals of codes, together no more than 24, and how many these are.
-ISOHF_VECTORISED(void, join_extra_bits,
-                 (const std::uint32_t* __restrict folded, std::size_t pairs, std::uint32_t* __restrict bits,
-                  std::uint32_t* __restrict counts),
-                 (folded, pairs, bits, counts)) {
-  constexpr std::int32_t kFirstOctave = 127 + 4;
-  for (std::size_t i = 0; i < pairs; ++i) {
-    const auto extra = [&](std::uint32_t value, std::uint32_t& count) {
-      const std::int32_t exponent =
-          std::bit_cast<std::int32_t>(static_cast<float>(static_cast<std::int32_t>(value))) >> 23;
-      const std::int32_t octave = exponent - kFirstOctave + 1;
-      count = static_cast<std::uint32_t>(octave < 0 ? 0 : octave);
-      return value & ((1U << count) - 1);
-    };
-    std::uint32_t first_count = 0;
-    std::uint32_t second_count = 0;
-    const std::uint32_t first = extra(folded[2 * i], first_count);
-    const std::uint32_t second = extra(folded[2 * i + 1], second_count);
-    bits[i] = first | second << first_count;
-    counts[i] = first_count + second_count;
-  }
-}
-
-/// The bits of the residuals that their symbols leave out.
-std::vector<std::byte> pack_extra_bits(const Residuals& residuals, CodeType type) {
-  const std::uint32_t* const folded = residuals.folded.data();
-  BitPacker packer(residuals.count * 4);
-  std::size_t packed = 0;
-  if (type != CodeType::kF32) {
-    const std::size_t pairs = residuals.count / 2;
-    Scratch<std::uint32_t> bits(pairs);
-    Scratch<std::uint32_t> counts(pairs);
-    join_extra_bits(folded, pairs, bits.data(), counts.data());
-    for (std::size_t i = 0; i < pairs; ++i) packer.put(bits.data()[i], counts.data()[i]);
-    packed = 2 * pairs;
-  }
-  for (; packed < residuals.count; ++packed) {
-    const unsigned count = extra_bits_of_symbol(symbol_of(folded[packed]));
-    packer.put(folded[packed] & ((1U << count) - 1), count);
-  }
-  return packer.finish();
-}
-
-/// Each context's symbols, in order. The last half is sorted from its end, beside the first: one alone would wait for
-/// its own pointers.
-std::vector<std::vector<std::byte>> sort_symbols(const std::uint8_t* symbols, const std::uint16_t* levels,
-                                                 std::size_t count, std::span<const std::uint16_t> thresholds,
-                                                 std::span<const std::uint32_t> histogram) {
-  const auto table = context_table(thresholds);
-  std::array<std::size_t, kMaxContexts> counts{};
-  for (std::size_t level = 0; level < histogram.size(); ++level) counts[table[level]] += histogram[level];
-  std::vector<std::vector<std::byte>> sorted;
-  std::array<std::byte*, kMaxContexts> to{};
-  std::array<std::byte*, kMaxContexts> to_end{};
-  for (std::size_t i = 0; i <= thresholds.size(); ++i) {
-    sorted.emplace_back(counts[i]);
-    to[i] = sorted[i].data();
-    to_end[i] = sorted[i].data() + counts[i];
-  }
-  for (std::size_t i = 0; i < count / 2; ++i) {
-    const std::size_t from_end = count - 1 - i;
-    *to[table[levels[i]]]++ = static_cast<std::byte>(symbols[i]);
-    *--to_end[table[levels[from_end]]] = static_cast<std::byte>(symbols[from_end]);
-  }
-  if (count % 2 != 0) *to[table[levels[count / 2]]] = static_cast<std::byte>(symbols[count / 2]);
-  return sorted;
-}
-
-/// Cuts the residuals into contexts, as many as pay.
-Streams make_streams(const Residuals& residuals, PayloadHeader& header) {
-  const std::size_t count = residuals.count;
-  Scratch<std::uint8_t> symbols(count);
-  Scratch<std::uint16_t> levels(count);
-  find_symbols(residuals, header.type, symbols.data());
-  header.activity_shift = choose_activity_shift({residuals.activities.data(), count});
-  find_levels(residuals.activities.data(), count, header.activity_shift, levels.data());
-  const std::vector<std::uint32_t> histogram = count_levels({levels.data(), count});
-  header.thresholds = choose_thresholds({symbols.data(), count}, {levels.data(), count}, histogram);
-  Streams streams{sort_symbols(symbols.data(), levels.data(), count, header.thresholds, histogram),
-                  pack_extra_bits(residuals, header.type)};
-  for (std::size_t i = 0; i < streams.symbols.size(); ++i) {
-    std::vector<std::byte>& stream = streams.symbols[i];
-    header.symbol_counts.push_back(static_cast<std::uint32_t>(stream.size()));
-    if (!pairs_pay(stream)) continue;
-    std::vector<std::byte> pairs = pair_symbols(stream);
-    if (pairs.size() > stream.size()) continue;  // max_payload_bytes holds for either
-    stream = std::move(pairs);
-    header.paired = static_cast<std::uint16_t>(header.paired | 1U << i);
-  }
-  return streams;
 }
 
 /// Completes payload and Deflate stream; a block for each part.
@@ -328,14 +164,15 @@ void assemble(PayloadHeader& header, std::span<const std::byte> mask, const Stre
   };
   add(bytes);
   add(mask);
+  add(std::as_bytes(std::span(header.predictors.map)));
   for (const auto& symbols : streams.symbols) add(symbols);
   add(streams.extra);
   writer.finish();
 }
 
-template <typename Wide, typename SampleAt>
+template <typename Wide, typename Folded, typename SampleAt>
 void encode_samples(const TileShape& shape, PayloadHeader header, const Voids& voids, const SampleAt& sample_at,
-                    EncodedTile& tile) {
+                    const CodingEffort& effort, EncodedTile& tile) {
   std::vector<std::byte> mask;
   if (!voids.is_void.empty()) mask = pack_void_mask(voids.is_void);
   header.has_voids = !mask.empty();
@@ -344,8 +181,13 @@ void encode_samples(const TileShape& shape, PayloadHeader header, const Voids& v
   if (!header.is_constant) {
     Lattice<Wide> lattice(shape);
     load<Wide>(lattice, voids, header.base, sample_at);
-    header.weights = fit_weights<Wide>(lattice, header.low, header.high);
-    streams = make_streams(find_residuals(lattice, voids, header), header);
+    header.predictors = fit_predictors<Wide>(lattice, header.low, header.high, effort.fit);
+    Residuals<Folded> residuals(static_cast<std::size_t>(shape.stored_vertex_count()), !voids.is_void.empty());
+    find_residuals<Wide, Folded>(lattice, voids, header, residuals);
+    header.activity_shift = choose_activity_shift(residuals);
+    find_all_activities(shape.columns(), shape.rows(), header.activity_shift, residuals);
+    if (header.has_voids) residuals.drop_voids();
+    streams = make_streams(residuals, effort, header);
   }
   assemble(header, mask, streams, tile);
 }
@@ -372,7 +214,7 @@ ISOHF_VECTORISED(CodeRange, range_of_codes, (const std::uint16_t* codes, std::si
   return {low, high, voids};
 }
 
-EncodedTile encode_codes(const TileShape& shape, const TileCodes& tile) {
+EncodedTile encode_codes(const TileShape& shape, const TileCodes& tile, const CodingEffort& effort) {
   const std::span<const std::uint16_t> codes = tile.codes;
   const Quantisation quantisation{tile.type, 0.0, 1.0};
   const auto void_code = static_cast<std::uint16_t>(quantisation.void_code());
@@ -393,12 +235,12 @@ EncodedTile encode_codes(const TileShape& shape, const TileCodes& tile) {
   ISOHF_ASSERT(header.high <= static_cast<std::int32_t>(quantisation.max_code()));
   encoded.code_min = static_cast<std::uint32_t>(header.low);
   encoded.code_max = static_cast<std::uint32_t>(header.high);
-  encode_samples<std::int32_t>(
-      shape, header, voids, [&](std::size_t i) { return std::int32_t{codes[i]}; }, encoded);
+  encode_samples<std::int32_t, std::uint16_t>(
+      shape, header, voids, [&](std::size_t i) { return std::int32_t{codes[i]}; }, effort, encoded);
   return encoded;
 }
 
-EncodedTile encode_floats(const TileShape& shape, const TileCodes& tile) {
+EncodedTile encode_floats(const TileShape& shape, const TileCodes& tile, const CodingEffort& effort) {
   const std::span<const float> heights = tile.heights;
   std::uint32_t used_bits = 0;
   for (const float height : heights) {
@@ -425,8 +267,8 @@ EncodedTile encode_floats(const TileShape& shape, const TileCodes& tile) {
   }
   encoded.code_min = std::bit_cast<std::uint32_t>(float_from_ordered(header.low, header.dropped_bits));
   encoded.code_max = std::bit_cast<std::uint32_t>(float_from_ordered(header.high, header.dropped_bits));
-  encode_samples<std::int64_t>(
-      shape, header, voids, [&](std::size_t i) { return std::int64_t{ordered(heights[i])}; }, encoded);
+  encode_samples<std::int64_t, std::uint32_t>(
+      shape, header, voids, [&](std::size_t i) { return std::int64_t{ordered(heights[i])}; }, effort, encoded);
   return encoded;
 }
 
@@ -444,12 +286,13 @@ TileCodes void_tile(const TileShape& shape, const Quantisation& quantisation) {
   return tile;
 }
 
-EncodedTile encode_tile(const TileShape& shape, const TileCodes& tile) {
+EncodedTile encode_tile(const TileShape& shape, const TileCodes& tile, int level) {
   const auto samples = static_cast<std::size_t>(shape.stored_vertex_count());
   const bool is_float = tile.type == CodeType::kF32;
   ISOHF_ASSERT(tile.codes.size() == (is_float ? 0 : samples) && tile.heights.size() == (is_float ? samples : 0));
   try {
-    return is_float ? encode_floats(shape, tile) : encode_codes(shape, tile);
+    const CodingEffort effort = coding_effort(level);
+    return is_float ? encode_floats(shape, tile, effort) : encode_codes(shape, tile, effort);
   } catch (const std::bad_alloc&) {
     throw Error(ErrorCode::kOutOfMemory, "no memory to code a tile of " + std::to_string(samples) + " samples");
   }

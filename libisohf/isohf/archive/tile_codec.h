@@ -48,9 +48,15 @@ struct EncodedTile {
   std::vector<std::byte> content_digest;  ///< SHA-256 of the codes, little-endian, void included: 32 bytes
 };
 
+/// How hard the encoder tries: the higher, the fewer bytes and the slower. Readers need not know.
+inline constexpr int kMinLevel = 1;
+inline constexpr int kMaxLevel = 12;
+inline constexpr int kDefaultLevel = 5;
+
 /// Codes one tile: hexagonal prediction, residuals in context streams, Deflate. Deterministic; thread-safe.
-/// `tile` holds shape.stored_vertex_count() samples. Never fails on data; throws Error{kOutOfMemory}.
-[[nodiscard]] EncodedTile encode_tile(const TileShape& shape, const TileCodes& tile);
+/// `tile` holds shape.stored_vertex_count() samples; `level` is kMinLevel to kMaxLevel. Never fails on data; throws
+/// Error{kOutOfMemory}.
+[[nodiscard]] EncodedTile encode_tile(const TileShape& shape, const TileCodes& tile, int level = kDefaultLevel);
 
 /// Decodes one tile from its inflated payload. Trusts nothing: throws Error{kCorrupt} for whatever encode_tile would
 /// not have made and that cannot be read exactly, Error{kUnsupported} for a codec version of the future. Thread-safe.

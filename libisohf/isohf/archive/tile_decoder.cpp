@@ -55,75 +55,66 @@ class BitReader {
   unsigned bit_count_ = 0;
 };
 
-/// The symbols of all contexts, and what follows from them.
+/// The folded residuals of all contexts: symbols and extra bits put together.
 class ResidualReader {
  public:
-  ResidualReader(const PayloadHeader& header, ByteReader& reader)
-      : table_(context_table(header.thresholds)),
-        symbols_(header, reader),
-        shift_(header.activity_shift),
-        symbol_limit_(symbol_limit(residual_bits(header.type))),
-        extra_({}) {
+  ResidualReader(const PayloadHeader& header, ByteReader& reader) : table_(context_table(header.thresholds)) {
+    const SymbolStreams symbols(header, reader);
+    BitReader extra(reader.read_bytes(header.extra_bytes));
+    const unsigned limit = symbol_limit(residual_bits(header.type));
     for (std::size_t i = 0; i < header.symbol_counts.size(); ++i) {
-      next_[i] = symbols_[i].data();
-      end_[i] = symbols_[i].data() + symbols_[i].size();
+      next_[i] = folded_.size();
+      for (const std::byte byte : symbols[i]) {
+        const auto symbol = std::to_integer<unsigned>(byte);
+        if (symbol >= limit) refuse(fmt::format("symbol {} does not exist, the last is {}", symbol, limit - 1));
+        const unsigned bits = extra_bits_of_symbol(symbol);
+        folded_.push_back(folded_from(symbol, bits == 0 ? 0 : extra.take(bits)));
+      }
+      end_[i] = folded_.size();
     }
-    extra_ = BitReader(reader.read_bytes(header.extra_bytes));
+    if (extra.ran_out()) refuse("it holds too few extra bits");
+    if (!extra.is_used_up()) refuse("it holds more extra bits than its symbols ask for");
   }
 
   /// The folded residual of a place with that activity.
-  std::uint32_t take(std::uint32_t activity) {
-    const std::uint32_t level = activity_level(activity, shift_);
-    const std::size_t context = table_[level];
+  std::uint32_t take(std::uint16_t activity) {
+    const std::size_t context = table_[activity];
     if (next_[context] == end_[context]) refuse(fmt::format("context {} holds too few symbols", context));
-    const auto symbol = std::to_integer<unsigned>(*next_[context]++);
-    if (symbol < kFirstSplitSymbol) return symbol;
-    if (symbol >= symbol_limit_)
-      refuse(fmt::format("symbol {} does not exist, the last is {}", symbol, symbol_limit_ - 1));
-    return folded_from(symbol, extra_.take(extra_bits_of_symbol(symbol)));
+    return folded_[next_[context]++];
   }
 
   void check_used_up(std::size_t contexts) const {
     for (std::size_t i = 0; i < contexts; ++i) {
       if (next_[i] != end_[i]) refuse(fmt::format("context {} holds {} symbols too many", i, end_[i] - next_[i]));
     }
-    if (extra_.ran_out()) refuse("it holds too few extra bits");
-    if (!extra_.is_used_up()) refuse("it holds more extra bits than its symbols ask for");
   }
 
  private:
   std::array<std::uint8_t, kActivityLimit> table_;
-  SymbolStreams symbols_;
-  unsigned shift_;
-  unsigned symbol_limit_;
-  std::array<const std::byte*, kMaxContexts> next_{};
-  std::array<const std::byte*, kMaxContexts> end_{};
-  BitReader extra_;
+  std::vector<std::uint32_t> folded_;
+  std::array<std::size_t, kMaxContexts> next_{};
+  std::array<std::size_t, kMaxContexts> end_{};
 };
 
-/// Sums of the weighted samples above plus W and WW, as predict_row has them (modulo 2^32 for codes).
-std::int32_t complete(std::int32_t part, std::int32_t weighted_west) {
-  return static_cast<std::int32_t>(static_cast<std::uint32_t>(part) + static_cast<std::uint32_t>(weighted_west)) >>
-         kWeightBits;
+/// The sample that halves predict, plus or less the residual as it is turned, modulo 2^16 or 2^32.
+std::int32_t restore(std::int32_t halves, std::uint32_t folded) {
+  const std::uint32_t residual = unzigzag(folded);
+  const auto prediction = static_cast<std::uint32_t>(prediction_of_halves(halves));
+  return static_cast<std::int32_t>(((halves & 1) != 0 ? prediction + residual : prediction - residual) & 0xffffU);
 }
-std::int64_t complete(std::int64_t part, std::int64_t weighted_west) {
-  return (part + weighted_west) >> kWeightBits;
-}
-
-std::int32_t weigh(std::int32_t w, std::int32_t west, std::int32_t ww, std::int32_t far_west) {
-  return static_cast<std::int32_t>(static_cast<std::uint32_t>(w) * static_cast<std::uint32_t>(west) +
-                                   static_cast<std::uint32_t>(ww) * static_cast<std::uint32_t>(far_west));
-}
-std::int64_t weigh(std::int64_t w, std::int64_t west, std::int64_t ww, std::int64_t far_west) {
-  return w * west + ww * far_west;
+std::int64_t restore(std::int64_t halves, std::uint32_t folded) {
+  const std::uint32_t residual = unzigzag(folded);
+  const auto prediction = static_cast<std::uint32_t>(prediction_of_halves(halves));
+  return static_cast<std::int32_t>((halves & 1) != 0 ? prediction + residual : prediction - residual);
 }
 
-/// Prediction plus residual, modulo 2^16 or 2^32.
-std::int32_t unfold(std::int32_t prediction, std::uint32_t folded) {
-  return static_cast<std::int32_t>((static_cast<std::uint32_t>(prediction) + unzigzag(folded)) & 0xffffU);
+/// Sums of the weighted samples above plus W and WW, in halves, as predict_row has them (modulo 2^32 for codes).
+std::int32_t complete(std::int32_t part, std::int32_t w, std::int32_t west, std::int32_t ww, std::int32_t far_west) {
+  const auto u = [](std::int32_t value) { return static_cast<std::uint32_t>(value); };
+  return static_cast<std::int32_t>(u(part) + u(w) * u(west) + u(ww) * u(far_west)) >> (kWeightBits - 1);
 }
-std::int64_t unfold(std::int64_t prediction, std::uint32_t folded) {
-  return static_cast<std::int32_t>(static_cast<std::uint32_t>(prediction) + unzigzag(folded));
+std::int64_t complete(std::int64_t part, std::int64_t w, std::int64_t west, std::int64_t ww, std::int64_t far_west) {
+  return (part + w * west + ww * far_west) >> (kWeightBits - 1);
 }
 
 template <typename Wide>
@@ -136,7 +127,8 @@ class TileDecoder {
         residuals_(residuals),
         lattice_(shape),
         parts_(static_cast<std::size_t>(shape.columns())),
-        folded_(shape.columns()) {
+        magnitudes_(shape.columns()),
+        activities_(parts_.size()) {
     lattice_.fill_rows_above(header.base);
   }
 
@@ -150,7 +142,6 @@ class TileDecoder {
       const int first = Lattice<Wide>::first(r);
       const int last = lattice_.last(r);
       lattice_.open_row(r);
-      folded_.open_row(first, r % 2);
       if (!(void_row == nullptr ? decode_row<false>(r, void_row) : decode_row<true>(r, void_row))) {
         refuse(fmt::format("row {} leaves the range {}..{} that the header states", r, header_.low, header_.high));
       }
@@ -165,7 +156,7 @@ class TileDecoder {
         put(row_start + static_cast<std::size_t>(column), decode_slid(r, side));
       }
       lattice_.close_row(r);
-      folded_.close_row(first, last);
+      magnitudes_.close_row(first, last);
     }
   }
 
@@ -173,38 +164,40 @@ class TileDecoder {
   /// False where a sample leaves the stated range.
   template <bool kWithVoids>
   bool decode_row(int r, const std::uint8_t* void_row) {
-    const PredictorWeights& weights = weights_of_row(header_.weights, r);
-    predict_row_from_above<Wide>(lattice_, r, weights, parts_);
-    const Wide low = header_.low, high = header_.high;
-    const Wide weight_w = weights[0], weight_ww = weights[2];
+    const int first = Lattice<Wide>::first(r);
+    const int last = lattice_.last(r);
+    predict_row_from_above(lattice_, r, header_.predictors, parts_);
+    find_activities(magnitudes_.above() + r % 2, magnitudes_.far_above(), first, last, activities_.data());
+    const Wide least = 2 * Wide{header_.low};
+    const Wide most = 2 * Wide{header_.high} - 1;
     Wide* const own = lattice_.row(r);
     const Wide* const north = lattice_.row(r - 1) + r % 2;
-    std::uint32_t* const folded = folded_.current();
-    const std::uint32_t* const folded_north = folded_.above() + r % 2;
-    const int last = lattice_.last(r);
+    std::uint8_t* const magnitudes = magnitudes_.current();
     bool in_range = true;
-    for (int place = Lattice<Wide>::first(r); place <= last; ++place) {
-      if (kWithVoids && void_row[column_of_place(lattice_.columns(), r, place)] != 0) {
-        own[place] = void_fill(own, north, place);
-        folded[place] = 0;
-        continue;
+    header_.predictors.for_stretches(r, first, last, [&](const PredictorWeights& weights, int begin, int end) {
+      const Wide weight_w = weights[0], weight_ww = weights[2];
+      for (int place = begin; place < end; ++place) {
+        if (kWithVoids && void_row[column_of_place(lattice_.columns(), r, place)] != 0) {
+          own[place] = void_fill(own, north, place);
+          magnitudes[place] = 0;
+          continue;
+        }
+        const auto at = static_cast<std::size_t>(place);
+        const std::uint32_t residual = residuals_.take(activities_[at]);
+        magnitudes[place] = magnitude(residual, header_.activity_shift);
+        const Wide halves = complete(parts_[at], weight_w, own[place - 1], weight_ww, own[place - 2]);
+        own[place] = restore(std::min(std::max(halves, least), most), residual);
+        in_range &= own[place] >= header_.low && own[place] <= header_.high;
       }
-      const std::uint32_t residual =
-          residuals_.take(activity_from_above(folded_north, place) + activity_from_west(folded, place));
-      folded[place] = std::min(residual, kFoldedLimit);
-      const Wide sum =
-          complete(parts_[static_cast<std::size_t>(place)], weigh(weight_w, own[place - 1], weight_ww, own[place - 2]));
-      own[place] = unfold(std::min(std::max(sum, low), high), residual);
-      in_range &= own[place] >= low && own[place] <= high;
-    }
+    });
     return in_range;
   }
 
   Wide decode_slid(int r, int side) {
     const int at = side == 0 ? 1 : lattice_.columns() - 3;
-    const std::uint32_t* const folded = folded_.current();
-    const Wide sample =
-        unfold(lattice_.slid_prediction(r, side), residuals_.take(activity_of_slid(folded[at], folded[at + 1])));
+    const std::uint8_t* const magnitudes = magnitudes_.current();
+    const Wide sample = restore(2 * lattice_.slid_prediction(r, side),
+                                residuals_.take(activity_of_slid(magnitudes[at], magnitudes[at + 1])));
     if (sample < header_.low || sample > header_.high) {
       refuse(fmt::format("row {} leaves the range {}..{} that the header states", r, header_.low, header_.high));
     }
@@ -216,7 +209,8 @@ class TileDecoder {
   ResidualReader& residuals_;
   Lattice<Wide> lattice_;
   std::vector<Wide> parts_;
-  ResidualRows folded_;
+  MagnitudeRows magnitudes_;
+  std::vector<std::uint16_t> activities_;
 };
 
 /// Reads all samples but the voids, which `put` never sees.
@@ -239,10 +233,11 @@ TileCodes decode_checked(const TileShape& shape, CodeType type, std::span<const 
     refuse(fmt::format("{} bytes, more than a tile of this shape can have", payload.size()));
   }
   ByteReader reader(payload);
-  const PayloadHeader header = read_payload_header(shape, type, reader);
+  PayloadHeader header = read_payload_header(shape, type, reader);
   const auto samples = static_cast<std::size_t>(shape.stored_vertex_count());
   std::vector<std::uint8_t> is_void;
   if (header.has_voids) is_void = unpack_void_mask(reader.read_bytes(header.mask_bytes), samples);
+  if (!header.is_constant) read_block_map(shape, reader, header.predictors);
   TileCodes tile;
   tile.type = type;
   if (type == CodeType::kF32) {

@@ -6,6 +6,7 @@
 
 #include "isohf/archive/pair_coding.h"
 #include "isohf/base/error.h"
+#include "isohf/base/vectorised.h"
 
 namespace isohf {
 namespace {
@@ -45,9 +46,11 @@ void check_predictor(const PayloadHeader& header) {
   if (header.base < header.low || header.base > header.high) {
     refuse(fmt::format("its base {} lies outside its range {}..{}", header.base, header.low, header.high));
   }
-  int sum = 0;
-  for (const std::int16_t weight : header.weights) sum += std::abs(int{weight});
-  if (sum >= kWeightSumLimit) refuse(fmt::format("its weights add up to {}, must be below {}", sum, kWeightSumLimit));
+  for (const PredictorWeights& weights : header.predictors.weights) {
+    int sum = 0;
+    for (const std::int16_t weight : weights) sum += std::abs(int{weight});
+    if (sum >= kWeightSumLimit) refuse(fmt::format("its weights add up to {}, must be below {}", sum, kWeightSumLimit));
+  }
   if (header.activity_shift > 31)
     refuse(fmt::format("its activity shift is {}, must lie in 0..31", header.activity_shift));
   for (std::size_t i = 0; i < header.thresholds.size(); ++i) {
@@ -66,8 +69,13 @@ std::uint64_t max_payload_bytes(const TileShape& shape, CodeType type) {
   // One symbol each, a byte and a half where pairs are written apart, and its extra bits, at most 12 or 28; a run of
   // the mask takes a byte for each sample or fewer.
   const std::uint64_t extra_bits = type == CodeType::kF32 ? 28 : 12;
-  const std::uint64_t contexts = kPredictedHeaderBytes + 6 * kMaxContexts;
-  return contexts + samples + (samples * extra_bits + 7) / 8 + samples + 8;
+  const std::uint64_t header = kPredictedHeaderBytes + 2 * kWeightCount * kMaxPredictors + 6 * kMaxContexts;
+  return header + block_count(shape) + samples + (samples * extra_bits + 7) / 8 + samples + 8;
+}
+
+std::size_t block_count(const TileShape& shape) {
+  return static_cast<std::size_t>(Predictors::blocks_across(shape.columns())) *
+         static_cast<std::size_t>(Predictors::blocks_across(shape.rows()));
 }
 
 void write_payload_header(const PayloadHeader& header, std::vector<std::byte>& out) {
@@ -85,7 +93,12 @@ void write_payload_header(const PayloadHeader& header, std::vector<std::byte>& o
   writer.write(header.activity_shift);
   writer.write(static_cast<std::uint8_t>(header.symbol_counts.size()));
   writer.write(header.paired);
-  for (const std::int16_t weight : header.weights) writer.write(weight);
+  const std::size_t weight_count = header.predictors.is_wide ? kWeightCount : kNearWeightCount;
+  writer.write(static_cast<std::uint8_t>(header.predictors.weights.size()));
+  writer.write(static_cast<std::uint8_t>(weight_count));
+  for (const PredictorWeights& weights : header.predictors.weights) {
+    for (std::size_t i = 0; i < weight_count; ++i) writer.write(weights[i]);
+  }
   for (const std::uint16_t threshold : header.thresholds) writer.write(threshold);
   for (const std::uint32_t count : header.symbol_counts) writer.write(count);
 }
@@ -129,7 +142,20 @@ PayloadHeader read_payload_header(const TileShape& shape, CodeType type, ByteRea
   if ((std::uint32_t{header.paired} >> contexts) != 0) {
     refuse(fmt::format("it has pairs in context {}, the last is {}", std::bit_width(header.paired) - 1, contexts - 1));
   }
-  for (std::int16_t& weight : header.weights) weight = reader.read<std::int16_t>();
+  const std::size_t predictors = reader.read<std::uint8_t>();
+  if (predictors < 1 || predictors > kMaxPredictors) {
+    refuse(fmt::format("it has {} predictors, must have 1..{}", predictors, kMaxPredictors));
+  }
+  const std::size_t weight_count = reader.read<std::uint8_t>();
+  if (weight_count != kNearWeightCount && weight_count != kWeightCount) {
+    refuse(fmt::format("its predictors have {} weights, must have {} or {}", weight_count, kNearWeightCount,
+                       kWeightCount));
+  }
+  header.predictors.is_wide = weight_count == kWeightCount;
+  header.predictors.weights.assign(predictors, {});
+  for (PredictorWeights& weights : header.predictors.weights) {
+    for (std::size_t i = 0; i < weight_count; ++i) weights[i] = reader.read<std::int16_t>();
+  }
   for (std::size_t i = 1; i < contexts; ++i) header.thresholds.push_back(reader.read<std::uint16_t>());
   std::uint64_t symbols = 0;
   for (std::size_t i = 0; i < contexts; ++i) {
@@ -139,6 +165,19 @@ PayloadHeader read_payload_header(const TileShape& shape, CodeType type, ByteRea
   check_predictor(header);
   if (symbols > samples) refuse(fmt::format("it has {} symbols, more than the tile's {} samples", symbols, samples));
   return header;
+}
+
+void read_block_map(const TileShape& shape, ByteReader& reader, Predictors& predictors) {
+  const std::size_t count = predictors.weights.size();
+  if (count == 1) return;
+  const auto bytes = reader.read_bytes(block_count(shape));
+  predictors.block_columns = Predictors::blocks_across(shape.columns());
+  predictors.map.clear();
+  for (const std::byte byte : bytes) {
+    const auto index = std::to_integer<std::uint8_t>(byte);
+    if (index >= count) refuse(fmt::format("its map names predictor {}, the last is {}", index, count - 1));
+    predictors.map.push_back(index);
+  }
 }
 
 SymbolStreams::SymbolStreams(const PayloadHeader& header, ByteReader& reader) {
@@ -157,6 +196,22 @@ SymbolStreams::SymbolStreams(const PayloadHeader& header, ByteReader& reader) {
       streams_[i] = reader.read_bytes(count);
     }
   }
+}
+
+namespace {
+
+ISOHF_VECTORISED(void, sum_magnitudes,
+                 (const std::uint8_t* north, const std::uint8_t* far, int first, int last,
+                  std::uint16_t* __restrict activities),
+                 (north, far, first, last, activities)) {
+  for (int place = first; place <= last; ++place) activities[place] = activity_of(north, far, place);
+}
+
+}  // namespace
+
+void find_activities(const std::uint8_t* north, const std::uint8_t* far, int first, int last,
+                     std::uint16_t* __restrict activities) {
+  sum_magnitudes(north, far, first, last, activities);
 }
 
 std::array<std::uint8_t, kActivityLimit> context_table(std::span<const std::uint16_t> thresholds) {

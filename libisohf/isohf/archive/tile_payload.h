@@ -19,7 +19,8 @@ namespace isohf {
 inline constexpr std::uint8_t kCodecVersion = 1;
 inline constexpr std::size_t kMaxContexts = 16;
 inline constexpr std::size_t kFixedHeaderBytes = 16;      ///< of every payload
-inline constexpr std::size_t kPredictedHeaderBytes = 52;  ///< of one whose samples are not all equal, without contexts
+inline constexpr std::size_t kPredictedHeaderBytes = 30;  ///< of one whose samples are not all equal, without weights
+                                                          ///< and contexts
 
 /// The largest payload that a tile of this shape and type can have.
 [[nodiscard]] std::uint64_t max_payload_bytes(const TileShape& shape, CodeType type);
@@ -35,17 +36,24 @@ struct PayloadHeader {
   std::uint32_t extra_bytes = 0;
   std::uint8_t activity_shift = 0;
   std::uint8_t dropped_bits = 0;  ///< kF32: low bits of the float that are zero everywhere
-  PredictorWeights weights{};
+  Predictors predictors;
   std::vector<std::uint16_t> thresholds;     ///< one fewer than contexts, ascending
   std::vector<std::uint32_t> symbol_counts;  ///< one for each context
   std::uint16_t paired = 0;                  ///< bit k: context k's symbols are stored in pairs (pair_coding.h)
 };
 
-/// Appends the header: 16 bytes, and where the samples differ the rest of it.
+/// Appends the header: 16 bytes, and where the samples differ the rest of it. Mask and map come behind it.
 void write_payload_header(const PayloadHeader& header, std::vector<std::byte>& out);
 
-/// Reads a header and checks all that it says against itself and the shape. Throws Error{kCorrupt, kUnsupported}.
+/// Blocks that the map of a tile of this shape has.
+[[nodiscard]] std::size_t block_count(const TileShape& shape);
+
+/// Reads a header, void mask and map of predictors left out, and checks all that it says against itself and the shape.
+/// Throws Error{kCorrupt, kUnsupported}.
 [[nodiscard]] PayloadHeader read_payload_header(const TileShape& shape, CodeType type, ByteReader& reader);
+
+/// Reads the map, which follows the mask where there are several predictors. Throws Error{kCorrupt}.
+void read_block_map(const TileShape& shape, ByteReader& reader, Predictors& predictors);
 
 /// The symbols of all contexts, unpaired.
 class SymbolStreams {
@@ -111,53 +119,65 @@ inline constexpr std::uint32_t kFirstSplitSymbol = 16;
 
 // --- contexts ---
 
-inline constexpr unsigned kActivityLimit = 4096;                ///< activities are below this
-inline constexpr std::uint32_t kFoldedLimit = (1U << 28U) - 1;  ///< larger residuals count as this in activities
+/// How rough the tile is around a place, from the residuals of the two rows above it: a weighted sum of these, shifted
+/// and limited, so that it needs no more than 12 bits. The rows above alone: a decoder knows the contexts of a whole
+/// row before it reads a residual of it.
+///
+///     1 . 2 . 4 . 2 . 1      row r-2
+///   1 . 2 . 4 . 4 . 3 . 2    row r-1
+///              (x)
+inline constexpr unsigned kActivityLimit = 4096;  ///< activities are below this
+inline constexpr unsigned kActivityWeight = 26;   ///< sum of the weights
+inline constexpr std::uint32_t kMagnitudeLimit = (kActivityLimit - 1) / kActivityWeight;
 
-/// How rough the tile is around a place: the sum of these two, from the folded residuals of its neighbours above
-/// (`north` as in prediction, so that north[place] is NE's) and West of it.
-[[nodiscard]] inline std::uint32_t activity_from_above(const std::uint32_t* north, int place) {
-  return 2 * (north[place] + north[place - 1]) + north[place + 1] + north[place - 2];
+/// What a folded residual counts in activities.
+[[nodiscard]] inline std::uint8_t magnitude(std::uint32_t folded, unsigned shift) {
+  const std::uint32_t shifted = folded >> shift;
+  return static_cast<std::uint8_t>(shifted < kMagnitudeLimit ? shifted : kMagnitudeLimit);
 }
-[[nodiscard]] inline std::uint32_t activity_from_west(const std::uint32_t* own, int place) {
-  return 3 * own[place - 1] + own[place - 2];
+/// `north` as in prediction, so that north[place] is NE's; far[place] is NN's.
+[[nodiscard]] inline std::uint16_t activity_of(const std::uint8_t* north, const std::uint8_t* far, int place) {
+  const std::uint8_t* const n = north + place;
+  const std::uint8_t* const f = far + place;
+  return static_cast<std::uint16_t>(4 * (n[0] + n[-1] + f[0]) + 3 * n[1] + 2 * (n[2] + n[-2] + f[1] + f[-1]) + n[-3] +
+                                    f[2] + f[-2]);
 }
-/// The same for a slid vertex, from the residuals of the two lattice places beside it.
-[[nodiscard]] inline std::uint32_t activity_of_slid(std::uint32_t west, std::uint32_t east) {
-  return 3 * (west + east);
-}
-
-/// The level by which the context is chosen.
-[[nodiscard]] inline std::uint32_t activity_level(std::uint32_t activity, unsigned shift) {
-  const std::uint32_t level = activity >> shift;
-  return level < kActivityLimit ? level : kActivityLimit - 1;
+/// The same for a slid vertex, from the two lattice places beside it.
+[[nodiscard]] inline std::uint16_t activity_of_slid(std::uint8_t west, std::uint8_t east) {
+  return static_cast<std::uint16_t>(kActivityWeight / 2 * (unsigned{west} + east));
 }
 
-/// The context of every level: how many thresholds it reaches.
+/// Activities of places first to last of a row.
+void find_activities(const std::uint8_t* north, const std::uint8_t* far, int first, int last,
+                     std::uint16_t* __restrict activities);
+
+/// The context of every activity: how many thresholds it reaches.
 [[nodiscard]] std::array<std::uint8_t, kActivityLimit> context_table(std::span<const std::uint16_t> thresholds);
 
-/// Folded residuals of two rows, with margins as in Lattice.
-class ResidualRows {
+/// Magnitudes of the row that is worked on and the two above it, with margins of three places.
+class MagnitudeRows {
  public:
-  explicit ResidualRows(int columns)
-      : columns_(columns), current_(static_cast<std::size_t>(columns) + 4), above_(current_.size()) {}
+  explicit MagnitudeRows(int columns) : columns_(columns) {
+    for (auto& row : rows_) row.resize(static_cast<std::size_t>(columns) + 2 * kMargin);
+  }
 
-  [[nodiscard]] std::uint32_t* current() { return current_.data() + 2; }
-  [[nodiscard]] const std::uint32_t* above() const { return above_.data() + 2; }
+  [[nodiscard]] std::uint8_t* current() { return rows_[0].data() + kMargin; }
+  [[nodiscard]] const std::uint8_t* above() const { return rows_[1].data() + kMargin; }
+  [[nodiscard]] const std::uint8_t* far_above() const { return rows_[2].data() + kMargin; }
 
-  /// Before row r: West of it stands what is North-East of its first place.
-  void open_row(int first, int shift) { current()[first - 1] = current()[first - 2] = above()[first + shift]; }
-  /// After it: margins repeat the outermost residuals, and the row becomes the one above.
+  /// After a row: its margins repeat the outermost magnitudes, and it becomes the one above.
   void close_row(int first, int last) {
-    for (int place = -2; place < first; ++place) current()[place] = current()[first];
-    for (int place = last + 1; place < columns_ + 2; ++place) current()[place] = current()[last];
-    current_.swap(above_);
+    std::uint8_t* const row = current();
+    for (int place = -kMargin; place < first; ++place) row[place] = row[first];
+    for (int place = last + 1; place < columns_ + kMargin; ++place) row[place] = row[last];
+    rows_[2].swap(rows_[1]);
+    rows_[1].swap(rows_[0]);
   }
 
  private:
+  static constexpr int kMargin = 3;
   int columns_;
-  std::vector<std::uint32_t> current_;
-  std::vector<std::uint32_t> above_;
+  std::array<std::vector<std::uint8_t>, 3> rows_;
 };
 
 /// What a void sample counts as while its neighbours are predicted: the mean of W and NE, rounded down.

@@ -1,0 +1,35 @@
+#include "isohf/archive/coding_effort.h"
+
+#include <array>
+
+#include "isohf/archive/tile_codec.h"
+#include "isohf/base/assert.h"
+
+namespace isohf {
+
+namespace {
+
+//                          passes thinning predictors rounds thinning moves wide
+constexpr std::array<CodingEffort, kMaxLevel> kEfforts = {{
+    {.fit = {0, 1, 1, 0, 1, 0, false}, .context_thinning = 15, .has_pairs = false},
+    {.fit = {1, 15, 1, 0, 1, 0, false}, .context_thinning = 15, .has_pairs = true},
+    {.fit = {2, 9, 1, 0, 1, 0, false}, .context_thinning = 3, .has_pairs = true},
+    {.fit = {3, 7, 1, 0, 1, 0, false}, .context_thinning = 3, .has_pairs = true},
+    {.fit = {1, 7, 2, 1, 5, 3, false}, .context_thinning = 3, .has_pairs = true},
+    {.fit = {2, 5, 2, 1, 3, 3, false}, .context_thinning = 3, .has_pairs = true},
+    {.fit = {2, 5, 2, 2, 3, 3, false}, .context_thinning = 3, .has_pairs = true},
+    {.fit = {2, 5, 2, 1, 3, 3, true}, .context_thinning = 3, .has_pairs = true},
+    {.fit = {2, 5, 2, 2, 3, 3, true}, .context_thinning = 3, .has_pairs = true},
+    {.fit = {2, 3, 2, 2, 1, 4, true}, .context_thinning = 1, .has_pairs = true},
+    {.fit = {2, 3, 2, 4, 1, 4, true}, .context_thinning = 1, .has_pairs = true},
+    {.fit = {2, 1, 2, 8, 1, 6, true}, .context_thinning = 1, .has_pairs = true},
+}};
+
+}  // namespace
+
+CodingEffort coding_effort(int level) {
+  ISOHF_ASSERT(level >= kMinLevel && level <= kMaxLevel);
+  return kEfforts[static_cast<std::size_t>(level - kMinLevel)];
+}
+
+}  // namespace isohf

@@ -1,0 +1,19 @@
+#pragma once
+
+#include <cstddef>
+
+#include "isohf/archive/predictor_fit.h"
+
+namespace isohf {
+
+/// What the encoder does at a level.
+struct CodingEffort {
+  FitEffort fit;
+  std::size_t context_thinning = 3;  ///< one residual in so many decides on the contexts of a large tile; odd
+  bool has_pairs = true;             ///< symbols may be paired
+};
+
+/// The effort of a level, kMinLevel to kMaxLevel.
+[[nodiscard]] CodingEffort coding_effort(int level);
+
+}  // namespace isohf

@@ -1,0 +1,179 @@
+#include "isohf/archive/residual_streams.h"
+
+#include <bit>
+#include <cstring>
+
+#include "isohf/archive/context_model.h"
+#include "isohf/archive/pair_coding.h"
+#include "isohf/base/vectorised.h"
+
+namespace isohf {
+namespace {
+
+/// Symbols of residuals below 2^24: a float's exponent and upper three bits of mantissa are octave and eighth.
+ISOHF_VECTORISED(void, find_small_symbols,
+                 (const std::uint16_t* __restrict folded, std::size_t count, std::uint8_t* __restrict symbols),
+                 (folded, count, symbols)) {
+  constexpr std::int32_t kFirst = (127 + 4) * 8 - static_cast<std::int32_t>(kFirstSplitSymbol);
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto residual = static_cast<std::int32_t>(folded[i]);
+    const std::int32_t split = (std::bit_cast<std::int32_t>(static_cast<float>(residual)) >> 20) - kFirst;
+    symbols[i] = static_cast<std::uint8_t>(residual < static_cast<std::int32_t>(kFirstSplitSymbol) ? residual : split);
+  }
+}
+void find_symbols(const std::uint16_t* folded, std::size_t count, std::uint8_t* symbols) {
+  find_small_symbols(folded, count, symbols);
+}
+void find_symbols(const std::uint32_t* folded, std::size_t count, std::uint8_t* symbols) {
+  for (std::size_t i = 0; i < count; ++i) symbols[i] = static_cast<std::uint8_t>(symbol_of(folded[i]));
+}
+
+/// Bits one after the other, the lowest of a byte first.
+class BitPacker {
+ public:
+  /// `most_bytes` is the most that will come.
+  explicit BitPacker(std::size_t most_bytes) : room_(most_bytes + 8), to_(room_.data()) {}
+
+  void put(std::uint32_t bits, unsigned count) {
+    bits_ |= std::uint64_t{bits} << bit_count_;
+    bit_count_ += count;
+    if (bit_count_ < 32) return;
+    std::memcpy(to_, &bits_, 4);
+    to_ += 4;
+    bits_ >>= 32U;
+    bit_count_ -= 32;
+  }
+  [[nodiscard]] std::vector<std::byte> finish() {
+    std::memcpy(to_, &bits_, 8);
+    return {room_.data(), to_ + (bit_count_ + 7) / 8};
+  }
+
+ private:
+  Scratch<std::byte> room_;
+  std::byte* to_;
+  std::uint64_t bits_ = 0;
+  unsigned bit_count_ = 0;
+};
+
+/// The extra bits of two neighbouring residuals of codes, together no more than 24, and how many these are.
+ISOHF_VECTORISED(void, join_extra_bits,
+                 (const std::uint16_t* __restrict folded, std::size_t pairs, std::uint32_t* __restrict bits,
+                  std::uint32_t* __restrict counts),
+                 (folded, pairs, bits, counts)) {
+  constexpr std::int32_t kFirstOctave = 127 + 4;
+  for (std::size_t i = 0; i < pairs; ++i) {
+    const auto extra = [&](std::uint32_t value, std::uint32_t& count) {
+      const std::int32_t exponent =
+          std::bit_cast<std::int32_t>(static_cast<float>(static_cast<std::int32_t>(value))) >> 23;
+      const std::int32_t octave = exponent - kFirstOctave + 1;
+      count = static_cast<std::uint32_t>(octave < 0 ? 0 : octave);
+      return value & ((1U << count) - 1);
+    };
+    std::uint32_t first_count = 0;
+    std::uint32_t second_count = 0;
+    const std::uint32_t first = extra(folded[2 * i], first_count);
+    const std::uint32_t second = extra(folded[2 * i + 1], second_count);
+    bits[i] = first | second << first_count;
+    counts[i] = first_count + second_count;
+  }
+}
+
+void put_extra_bits(BitPacker& packer, std::uint32_t folded) {
+  const unsigned count = extra_bits_of_symbol(symbol_of(folded));
+  packer.put(folded & ((1U << count) - 1), count);
+}
+
+/// The bits of the residuals that their symbols leave out.
+std::vector<std::byte> pack_extra_bits(const std::uint16_t* folded, std::size_t count) {
+  BitPacker packer(count * 2);
+  const std::size_t pairs = count / 2;
+  Scratch<std::uint32_t> bits(pairs);
+  Scratch<std::uint32_t> counts(pairs);
+  join_extra_bits(folded, pairs, bits.data(), counts.data());
+  for (std::size_t i = 0; i < pairs; ++i) packer.put(bits.data()[i], counts.data()[i]);
+  if (count % 2 != 0) put_extra_bits(packer, folded[count - 1]);
+  return packer.finish();
+}
+std::vector<std::byte> pack_extra_bits(const std::uint32_t* folded, std::size_t count) {
+  BitPacker packer(count * 4);
+  for (std::size_t i = 0; i < count; ++i) put_extra_bits(packer, folded[i]);
+  return packer.finish();
+}
+
+/// The residuals context by context, each context's in order, and how many there are of each. The last half is sorted
+/// from its end, beside the first: one alone would wait for its own pointers.
+template <typename Folded>
+std::vector<std::uint32_t> sort_by_context(const Residuals<Folded>& residuals,
+                                           std::span<const std::uint16_t> thresholds,
+                                           std::span<const std::uint32_t> histogram, Folded* sorted) {
+  const auto table = context_table(thresholds);
+  std::vector<std::uint32_t> counts(thresholds.size() + 1);
+  for (std::size_t level = 0; level < histogram.size(); ++level) counts[table[level]] += histogram[level];
+  std::array<Folded*, kMaxContexts> to{};
+  std::array<Folded*, kMaxContexts> to_end{};
+  for (std::size_t i = 0; i < counts.size(); ++i) {
+    to[i] = sorted;
+    sorted += counts[i];
+    to_end[i] = sorted;
+  }
+  const Folded* const folded = residuals.folded.data();
+  const std::uint16_t* const activities = residuals.activities.data();
+  const std::size_t count = residuals.count;
+  for (std::size_t i = 0; i < count / 2; ++i) {
+    const std::size_t from_end = count - 1 - i;
+    *to[table[activities[i]]]++ = folded[i];
+    *--to_end[table[activities[from_end]]] = folded[from_end];
+  }
+  if (count % 2 != 0) *to[table[activities[count / 2]]] = folded[count / 2];
+  return counts;
+}
+
+}  // namespace
+
+template <typename Folded>
+std::uint8_t choose_activity_shift(const Residuals<Folded>& residuals) {
+  std::uint64_t sum = 0;
+  for (std::size_t i = 0; i < residuals.count; ++i) sum += residuals.folded.data()[i];
+  std::size_t count = residuals.count;
+  for (const std::uint8_t is_void : residuals.is_void) count -= is_void;
+  const std::uint64_t mean = count == 0 ? 0 : sum / count;
+  unsigned shift = 0;
+  while ((mean >> shift) > kMagnitudeLimit / 10) ++shift;
+  return static_cast<std::uint8_t>(shift);
+}
+
+template <typename Folded>
+Streams make_streams(const Residuals<Folded>& residuals, const CodingEffort& effort, PayloadHeader& header) {
+  const std::size_t count = residuals.count;
+  Scratch<std::uint8_t> symbols(count);
+  find_symbols(residuals.folded.data(), count, symbols.data());
+  const std::span<const std::uint16_t> activities(residuals.activities.data(), count);
+  const std::vector<std::uint32_t> histogram = count_activities(activities);
+  header.thresholds = choose_thresholds({symbols.data(), count}, activities, histogram, effort.context_thinning);
+  Scratch<Folded> sorted(count);
+  header.symbol_counts = sort_by_context(residuals, header.thresholds, histogram, sorted.data());
+  find_symbols(sorted.data(), count, symbols.data());
+  Streams streams;
+  streams.extra = pack_extra_bits(sorted.data(), count);
+  const auto* from = reinterpret_cast<const std::byte*>(symbols.data());
+  for (std::size_t i = 0; i < header.symbol_counts.size(); ++i) {
+    const std::span<const std::byte> stream(from, header.symbol_counts[i]);
+    from += stream.size();
+    streams.symbols.emplace_back(stream.begin(), stream.end());
+    if (!effort.has_pairs || !pairs_pay(stream)) continue;
+    std::vector<std::byte> pairs = pair_symbols(stream);
+    if (pairs.size() > stream.size()) continue;  // max_payload_bytes holds for either
+    streams.symbols.back() = std::move(pairs);
+    header.paired = static_cast<std::uint16_t>(header.paired | 1U << i);
+  }
+  return streams;
+}
+
+template std::uint8_t choose_activity_shift(const Residuals<std::uint16_t>& residuals);
+template std::uint8_t choose_activity_shift(const Residuals<std::uint32_t>& residuals);
+template Streams make_streams(const Residuals<std::uint16_t>& residuals, const CodingEffort& effort,
+                              PayloadHeader& header);
+template Streams make_streams(const Residuals<std::uint32_t>& residuals, const CodingEffort& effort,
+                              PayloadHeader& header);
+
+}  // namespace isohf
