@@ -1,11 +1,10 @@
 #include <fmt/format.h>
 
-#include <cerrno>
-#include <cstdio>
-#include <cstring>
 #include <vector>
 
+#include "formats/output_stream.h"
 #include "formats/raster_encoder.h"
+#include "formats/raw_file.h"
 #include "isohf/base/error.h"
 
 namespace isohf {
@@ -13,38 +12,20 @@ namespace {
 
 constexpr double kVoid = -32768.0;
 
-[[noreturn]] void fail() {
-  const int error = errno;
-  throw Error(ErrorCode::kIo, fmt::format("cannot be written: {}", std::strerror(error)));
-}
-
 /// Big-endian int16, nothing else.
 class HgtEncoder final : public RasterEncoder {
  public:
-  explicit HgtEncoder(const std::string& path) : file_(std::fopen(path.c_str(), "wb")) {
-    if (file_ == nullptr) fail();
-  }
-  ~HgtEncoder() override {
-    if (file_ != nullptr) std::fclose(file_);
-  }
+  explicit HgtEncoder(const std::string& path) : out_(path) {}
 
   void write(std::span<const std::byte> rows, std::int64_t /*count*/) override {
-    swapped_.resize(rows.size());
-    for (std::size_t at = 0; at < rows.size(); at += 2) {
-      swapped_[at] = rows[at + 1];
-      swapped_[at + 1] = rows[at];
-    }
-    if (std::fwrite(swapped_.data(), 1, swapped_.size(), file_) != swapped_.size()) fail();
+    swapped_.assign(rows.begin(), rows.end());
+    swap_byte_order(swapped_, sizeof(std::int16_t));
+    out_.write(swapped_);
   }
-
-  void close() override {
-    std::FILE* file = file_;
-    file_ = nullptr;
-    if (std::fclose(file) != 0) fail();
-  }
+  void close() override { out_.close(); }
 
  private:
-  std::FILE* file_;
+  OutputStream out_;
   std::vector<std::byte> swapped_;
 };
 

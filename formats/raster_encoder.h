@@ -29,6 +29,11 @@ class RasterEncoder {
 [[nodiscard]] std::unique_ptr<RasterEncoder> encode_exr(const std::string& path, const RasterSpec& spec);
 [[nodiscard]] std::unique_ptr<RasterEncoder> encode_png(const std::string& path, const RasterSpec& spec);
 [[nodiscard]] std::unique_ptr<RasterEncoder> encode_hgt(const std::string& path, const RasterSpec& spec);
+[[nodiscard]] std::unique_ptr<RasterEncoder> encode_r16(const std::string& path, const RasterSpec& spec);
+[[nodiscard]] std::unique_ptr<RasterEncoder> encode_r32(const std::string& path, const RasterSpec& spec);
+[[nodiscard]] std::unique_ptr<RasterEncoder> encode_flt(const std::string& path, const RasterSpec& spec);
+[[nodiscard]] std::unique_ptr<RasterEncoder> encode_npy(const std::string& path, const RasterSpec& spec);
+[[nodiscard]] std::unique_ptr<RasterEncoder> encode_asc(const std::string& path, const RasterSpec& spec);
 
 /// Bytes of one row of all channels.
 [[nodiscard]] inline std::size_t row_bytes(const RasterSpec& spec) {

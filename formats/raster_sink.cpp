@@ -4,11 +4,14 @@
 
 #include <algorithm>
 #include <cctype>
+#include <fstream>
 #include <limits>
 
 #include "formats/libraries.h"
 #include "formats/output_part.h"
+#include "formats/output_stream.h"
 #include "formats/raster_encoder.h"
+#include "formats/raster_sidecars.h"
 #include "isohf/base/error.h"
 
 namespace isohf {
@@ -25,6 +28,11 @@ const std::vector<Writer>& writers() {
       {{"OpenEXR", {".exr"}, exr_library, "float16, float32, uint32"}, encode_exr},
       {{"PNG", {".png"}, png_library, "uint8, uint16"}, encode_png},
       {{"SRTM HGT", {".hgt"}, nullptr, "int16; 1201x1201, 3601x3601 or 1801x3601"}, encode_hgt},
+      {{"ESRI ASCII grid", {".asc"}, nullptr, "samples of any type"}, encode_asc},
+      {{"GridFloat", {".flt"}, nullptr, "float32; with .hdr"}, encode_flt},
+      {{"raw 16 bit", {".r16", ".raw"}, nullptr, "uint16; with .json"}, encode_r16},
+      {{"raw 32 bit", {".r32"}, nullptr, "float32; with .json"}, encode_r32},
+      {{"NumPy", {".npy"}, nullptr, "samples of any type"}, encode_npy},
   };
   return table;
 }
@@ -60,11 +68,39 @@ void check(const RasterSpec& spec) {
   }
 }
 
+/// Whether the file is there already, as it would be written: rasters of one name may share a .prj.
+bool holds(const Sidecar& sidecar) {
+  std::ifstream in(sidecar.path, std::ios::binary);
+  std::string text(sidecar.text.size() + 1, '\0');
+  in.read(text.data(), static_cast<std::streamsize>(text.size()));
+  return in.gcount() == static_cast<std::streamsize>(sidecar.text.size()) && text.starts_with(sidecar.text);
+}
+
+std::vector<std::unique_ptr<OutputPart>> begin_sidecars(const std::string& path, const RasterSpec& spec) {
+  std::vector<std::unique_ptr<OutputPart>> parts;
+  for (const Sidecar& sidecar : sidecars_of(path, spec)) {
+    if (holds(sidecar)) continue;
+    try {
+      parts.push_back(std::make_unique<OutputPart>(sidecar.path, spec.overwrite));
+      OutputStream out(parts.back()->path());
+      out.write(sidecar.text);
+      out.close();
+    } catch (const Error& error) {
+      throw error.within(sidecar.path);
+    }
+  }
+  return parts;
+}
+
 }  // namespace
 
 RasterSink::RasterSink(std::string path, const RasterSpec& spec, std::unique_ptr<OutputPart> part,
-                       std::unique_ptr<RasterEncoder> encoder)
-    : path_(std::move(path)), spec_(spec), part_(std::move(part)), encoder_(std::move(encoder)) {}
+                       std::vector<std::unique_ptr<OutputPart>> sidecars, std::unique_ptr<RasterEncoder> encoder)
+    : path_(std::move(path)),
+      spec_(spec),
+      part_(std::move(part)),
+      sidecars_(std::move(sidecars)),
+      encoder_(std::move(encoder)) {}
 
 RasterSink::~RasterSink() = default;
 
@@ -93,6 +129,8 @@ void RasterSink::finish() {
   try {
     encoder_->close();
     encoder_.reset();
+    // What the name stands for is complete when it appears.
+    for (const auto& sidecar : sidecars_) sidecar->commit();
     part_->commit();
   } catch (const Error& error) {
     throw error.within(path_);
@@ -104,8 +142,9 @@ std::unique_ptr<RasterSink> create_raster(const std::string& path, const RasterS
     const Writer& writer = writer_for(path);
     check(spec);
     auto part = std::make_unique<OutputPart>(path, spec.overwrite);
+    auto sidecars = begin_sidecars(path, spec);
     auto encoder = writer.encode(part->path(), spec);
-    return std::make_unique<RasterSink>(path, spec, std::move(part), std::move(encoder));
+    return std::make_unique<RasterSink>(path, spec, std::move(part), std::move(sidecars), std::move(encoder));
   } catch (const Error& error) {
     throw error.within(path);
   }

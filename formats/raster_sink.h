@@ -13,7 +13,8 @@
 
 namespace isohf {
 
-/// What a new raster is. Georeference, scale, offset and unit go into TIFF; the other formats have no place for them.
+/// What a new raster is. Georeference, scale, offset and unit go into TIFF and the .json beside raw samples and PNG;
+/// grids have a place for the georeference, the other formats for nothing.
 struct RasterSpec {
   std::int64_t width = 0;   ///< columns, >= 1
   std::int64_t height = 0;  ///< rows, >= 1
@@ -25,6 +26,7 @@ struct RasterSpec {
   double z_offset = 0.0;
   std::string vertical_unit;  ///< "metre", ...; empty where unknown
   double metres_per_vertical_unit = 1.0;
+  bool describe = false;   ///< of PNG: write NAME.png.json beside it, which says what the numbers mean
   bool overwrite = false;  ///< replace a file of that name
 };
 
@@ -34,12 +36,13 @@ class RasterEncoder;
 /// A raster file that is written from its first row to its last.
 ///
 /// Everything goes to NAME.part, which finish() flushes to the disk and renames; a sink that is destroyed before leaves
-/// nothing behind. One thread calls. Memory: a few megabytes, or a few rows where these are longer.
-/// TIFF strips are compressed on the caller's oneTBB arena; the bytes do not depend on the number of threads.
+/// nothing behind. The files beside it (raster_sidecars.h) are finished first, in the same way. One thread calls.
+/// Memory: a few megabytes, a few rows where these are longer, and 256 rows for TIFF, of 64 MiB at most. TIFF strips
+/// are compressed on the caller's oneTBB arena; the bytes do not depend on the number of threads.
 class RasterSink {
  public:
   RasterSink(std::string path, const RasterSpec& spec, std::unique_ptr<OutputPart> part,
-             std::unique_ptr<RasterEncoder> encoder);
+             std::vector<std::unique_ptr<OutputPart>> sidecars, std::unique_ptr<RasterEncoder> encoder);
   RasterSink(const RasterSink&) = delete;
   RasterSink& operator=(const RasterSink&) = delete;
   ~RasterSink();
@@ -57,15 +60,18 @@ class RasterSink {
   std::string path_;
   RasterSpec spec_;
   std::unique_ptr<OutputPart> part_;  ///< outlives the encoder, which has it open
+  std::vector<std::unique_ptr<OutputPart>> sidecars_;
   std::unique_ptr<RasterEncoder> encoder_;
   std::int64_t rows_written_ = 0;
 };
 
 /// Begins a raster whose format follows from the extension of `path`, in any case:
-///   .tif .tiff  TIFF 6.0: strips, deflate with predictor, BigTIFF above 4 GB, GeoTIFF keys, GDAL_NODATA; any type
-///   .exr        OpenEXR scan lines, ZIP; float16, float32, uint32
-///   .png        uint8, uint16; a gray void value becomes the transparent one
-///   .hgt        one int16 channel of 1201 x 1201, 3601 x 3601 or 1801 x 3601 samples; void is -32768
+///   .tif .tiff  TIFF 6.0: tiles of 256 x 256, or strips; deflate with predictor, BigTIFF above 4 GB, GeoTIFF keys,
+///   GDAL_NODATA; any type .exr        OpenEXR scan lines, ZIP; float16, float32, uint32 .png        uint8, uint16; a
+///   gray void value becomes the transparent one .hgt        one int16 channel of 1201 x 1201, 3601 x 3601 or 1801 x
+///   3601 samples; void is -32768 .asc        one channel of any type, in decimal; NaN becomes the lowest float .flt
+///   one float32 channel, with its .hdr; NaN becomes the lowest float .r16 .raw   one uint16 channel, little-endian,
+///   nothing else; .r32 the same of float32; with NAME.r16.json .npy        NumPy, any type
 /// Throws Error naming the path: kUnsupported (no such extension, or samples that the format cannot hold),
 /// kInvalidArgument (sizes; the file exists and overwrite is not set), kIo.
 [[nodiscard]] std::unique_ptr<RasterSink> create_raster(const std::string& path, const RasterSpec& spec);

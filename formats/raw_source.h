@@ -14,7 +14,8 @@ namespace isohf {
 [[nodiscard]] RawLayout raw_layout_from_string(std::string_view text);
 
 /// Opens a file of nothing but samples, row by row from the North-West one on, as options.raw says; nothing is known of
-/// where they lie. Throws Error: kInvalidArgument without options.raw, with a suggestion where the samples make a
+/// where they lie. Without options.raw a NAME.r16.json beside it says both, as isohf writes it. Throws Error:
+/// kInvalidArgument without either, with a suggestion where the samples make a
 /// square, and for a channel; kCorrupt for any other length than the layout's; kIo.
 [[nodiscard]] std::unique_ptr<HeightSource> open_raw(const std::string& path, const OpenOptions& options);
 

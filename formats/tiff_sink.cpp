@@ -18,6 +18,9 @@
 namespace isohf {
 namespace {
 
+/// Sides of tiles; rasters that are no larger, and those where so many rows take more than kMostBandBytes, have strips.
+constexpr std::size_t kTileSide = 256;
+constexpr std::size_t kMostBandBytes = std::size_t{64} << 20U;
 /// Strips of about this size: small enough to read a part of the raster cheaply, large enough to compress well.
 constexpr std::size_t kStripBytes = std::size_t{256} << 10U;
 /// Strips that are compressed side by side, and the most bytes that they may have together.
@@ -122,12 +125,23 @@ class TiffEncoder final : public RasterEncoder {
     const bool is_signed = spec.sample_type == SampleType::kInt8 || spec.sample_type == SampleType::kInt16 ||
                            spec.sample_type == SampleType::kInt32;
     const std::size_t one_row = row_bytes(spec);
-    const auto rows_per_strip =
-        std::clamp<std::size_t>(kStripBytes / one_row, 1, static_cast<std::size_t>(spec.height));
-    strip_bytes_ = rows_per_strip * one_row;
-    batch_bytes_ = strip_bytes_ * std::clamp<std::size_t>(kBatchBytes / strip_bytes_, 1, kBatchStrips);
     const auto channels = static_cast<std::size_t>(spec.channels);
-    layout_ = {spec.sample_type, static_cast<std::size_t>(spec.width) * channels, channels};
+    constexpr auto kSide = static_cast<std::int64_t>(kTileSide);
+    row_bytes_ = one_row;
+    tiled_ = spec.width > kSide && spec.height > kSide && one_row <= kMostBandBytes / kTileSide;
+    if (tiled_) {
+      batch_bytes_ = kTileSide * one_row;
+      layout_ = {spec.sample_type, kTileSide * channels, channels};
+      set(TIFFTAG_TILEWIDTH, static_cast<std::uint32_t>(kTileSide));
+      set(TIFFTAG_TILELENGTH, static_cast<std::uint32_t>(kTileSide));
+    } else {
+      const auto rows_per_strip =
+          std::clamp<std::size_t>(kStripBytes / one_row, 1, static_cast<std::size_t>(spec.height));
+      strip_bytes_ = rows_per_strip * one_row;
+      batch_bytes_ = strip_bytes_ * std::clamp<std::size_t>(kBatchBytes / strip_bytes_, 1, kBatchStrips);
+      layout_ = {spec.sample_type, static_cast<std::size_t>(spec.width) * channels, channels};
+      set(TIFFTAG_ROWSPERSTRIP, static_cast<std::uint32_t>(rows_per_strip));
+    }
     set(TIFFTAG_IMAGEWIDTH, static_cast<std::uint32_t>(spec.width));
     set(TIFFTAG_IMAGELENGTH, static_cast<std::uint32_t>(spec.height));
     set(TIFFTAG_BITSPERSAMPLE, static_cast<int>(8 * size_bytes(spec.sample_type)));
@@ -135,7 +149,6 @@ class TiffEncoder final : public RasterEncoder {
     set(TIFFTAG_SAMPLEFORMAT, floating ? SAMPLEFORMAT_IEEEFP : is_signed ? SAMPLEFORMAT_INT : SAMPLEFORMAT_UINT);
     set(TIFFTAG_PHOTOMETRIC, spec.channels == 1 ? PHOTOMETRIC_MINISBLACK : PHOTOMETRIC_RGB);
     set(TIFFTAG_PLANARCONFIG, PLANARCONFIG_CONTIG);
-    set(TIFFTAG_ROWSPERSTRIP, static_cast<std::uint32_t>(rows_per_strip));
     set(TIFFTAG_COMPRESSION, COMPRESSION_ADOBE_DEFLATE);
     set(TIFFTAG_PREDICTOR, floating ? PREDICTOR_FLOATINGPOINT : PREDICTOR_HORIZONTAL);
     if (spec.channels == 4) {
@@ -175,6 +188,7 @@ class TiffEncoder final : public RasterEncoder {
 
   /// Compresses the pending strips on all threads and stores them in order.
   void write_pending() {
+    if (tiled_) return write_tiles();
     const std::size_t count = (pending_.size() + strip_bytes_ - 1) / strip_bytes_;
     std::vector<std::vector<std::byte>> strips(count);
     tbb::parallel_for(std::size_t{0}, count, [&](std::size_t at) {
@@ -190,16 +204,43 @@ class TiffEncoder final : public RasterEncoder {
     pending_.clear();
   }
 
+  /// The same for the pending rows as tiles; what lies beyond the raster is zero.
+  void write_tiles() {
+    const std::size_t size = size_bytes(layout_.sample_type);
+    const std::size_t tile_row = layout_.samples_per_row * size;
+    const std::size_t across = (row_bytes_ + tile_row - 1) / tile_row;
+    const std::size_t rows = pending_.size() / row_bytes_;
+    if (rows == 0) return;
+    std::vector<std::vector<std::byte>> tiles(across);
+    tbb::parallel_for(std::size_t{0}, across, [&](std::size_t at) {
+      std::vector<std::byte> tile(tile_row * kTileSide);
+      const std::size_t begin = at * tile_row;
+      const std::size_t there = std::min(tile_row, row_bytes_ - begin);
+      for (std::size_t row = 0; row < rows; ++row) {
+        std::memcpy(tile.data() + row * tile_row, pending_.data() + row * row_bytes_ + begin, there);
+      }
+      tiles[at] = compress_tiff_strip(layout_, tile);
+    });
+    for (std::vector<std::byte>& tile : tiles) {
+      const auto bytes = static_cast<tmsize_t>(tile.size());
+      if (TIFFWriteRawTile(tiff_, strip_, tile.data(), bytes) != bytes) fail();
+      ++strip_;
+    }
+    pending_.clear();
+  }
+
   void release() {
     if (tiff_ != nullptr) TIFFClose(tiff_);
     tiff_ = nullptr;
   }
 
+  bool tiled_ = false;
+  std::size_t row_bytes_ = 0;
   std::size_t strip_bytes_ = 0;
   std::size_t batch_bytes_ = 0;
   TiffStripLayout layout_;
   TIFF* tiff_ = nullptr;
-  std::uint32_t strip_ = 0;
+  std::uint32_t strip_ = 0;         ///< or tile, the next one
   std::vector<std::byte> pending_;  ///< rows of the next strips
   bool failed_ = false;
   std::string message_;

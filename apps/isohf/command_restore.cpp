@@ -1,8 +1,6 @@
 /// isohf restore: an archive becomes a raster of elevations again.
 
 #include <fmt/format.h>
-#include <oneapi/tbb/blocked_range.h>
-#include <oneapi/tbb/parallel_for.h>
 #include <oneapi/tbb/task_arena.h>
 
 #include <algorithm>
@@ -22,6 +20,7 @@
 #include "option_values.h"
 #include "options_common.h"
 #include "output_file.h"
+#include "output_grid.h"
 #include "restored_raster.h"
 #include "restored_samples.h"
 #include "standard_output.h"
@@ -35,9 +34,11 @@ constexpr const char* kFooter =
     R"(The raster has the samples of the archive's source, at their places, unless another grid is asked for. An
 archive made with --lossless gives the source's samples bit for bit, and their SHA-256 is checked; with
 --method it gives what its surface alone holds.
-Samples are raw numbers in the source's scale and type; only .tif has room for scale, offset and void value.
+Samples are raw numbers in the source's scale and type; only .tif, and the .json beside .png and .r16, have
+room for scale and offset.
 Methods: hex, quintic B-splines along the lattice rows and then down the columns, is nearest to the source;
-barycentric is what a renderer shows. The format follows from RASTER's extension: .tif, .exr, .png or .hgt.
+barycentric is what a renderer shows. The format follows from RASTER's extension: .tif, .exr,
+.png, .hgt, .asc, .flt, .r16, .r32 or .npy.
 
 Examples:
   isohf restore dem.isohf back.tif
@@ -63,7 +64,8 @@ std::optional<RestoreOptions> parse(const Arguments& arguments) {
   CommandLine line("restore", "Turns an archive back into a raster of elevations.");
   line.group("Arguments");
   line.positional("ARCHIVE", "-i,--input", "Archive to read", options.archive);
-  line.positional("RASTER", "-o,--output", "Raster to write: NAME.tif, .exr, .png or .hgt", options.output);
+  line.positional("RASTER", "-o,--output",
+                  "Raster to write: NAME.tif, .exr, .png, .hgt, .asc, .flt, .r16, .r32 or .npy", options.output);
   line.flag("--overwrite", "Replace RASTER where it exists", options.overwrite);
   line.group("Grid");
   line.option("--like", "INPUT", "The grid of this raster (default: of the archive's source)", options.like);
@@ -86,52 +88,14 @@ std::optional<RestoreOptions> parse(const Arguments& arguments) {
   return options;
 }
 
-/// Samples over the ground that the source covers: in the middle of areas, or from the first post on.
 SampleGrid asked_grid(const RestoreOptions& options, const Metadata& metadata) {
   if (!options.like.empty()) return grid_like(metadata, open_source(options.like, {})->info());
   if (!options.size && !options.spacing) return source_grid(metadata.source);
-  const WorldBounds& ground = metadata.valid;
-  const bool area = metadata.source.registration == "area";
-  const double width = ground.x1 - ground.x0;
-  const double height = ground.z1 - ground.z0;
-  const auto count = [&](double length) {
-    const double steps = std::floor(length / *options.spacing * (1.0 + 1e-12));
-    return std::max<std::int64_t>(static_cast<std::int64_t>(steps) + (area ? 0 : 1), 1);
-  };
-  const auto step = [&](double length, std::int64_t samples) {
-    const std::int64_t steps = area ? samples : samples - 1;
-    return options.spacing ? *options.spacing : (steps > 0 ? length / static_cast<double>(steps) : length);
-  };
-  SampleGrid grid;
-  grid.width = options.size ? options.size->first : count(width);
-  grid.height = options.size ? options.size->second : count(height);
-  grid.spacing_x = step(width, grid.width);
-  grid.spacing_z = step(height, grid.height);
-  grid.first_x = ground.x0 + (area ? grid.spacing_x / 2.0 : 0.0);
-  grid.first_z = ground.z0 + (area ? grid.spacing_z / 2.0 : 0.0);
-  return grid;
-}
-
-/// Throws for a sample that the raster's type does not hold, naming its place and the remedy.
-[[noreturn]] void refuse_sample(const RestoreOptions& options, SampleType type, std::int64_t column, std::int64_t row,
-                                double value, const char* remedy) {
-  throw Error(ErrorCode::kInvalidArgument,
-              fmt::format("{}: sample (column {}, row {}) is {:.9g}, which {} does not hold; {}", options.output,
-                          column, row, value, to_string(type), remedy));
-}
-
-/// True where the surface may have no elevation at a sample of the grid.
-bool may_have_voids(const Metadata& metadata, const SampleGrid& grid) {
-  const TileGrid& tiles = metadata.grid;
-  const double last_x = grid.first_x + static_cast<double>(grid.width - 1) * grid.spacing_x;
-  const double last_z = grid.first_z + static_cast<double>(grid.height - 1) * grid.spacing_z;
-  return metadata.statistics.voids > 0 || grid.first_x < 0.0 || grid.first_z < 0.0 || last_x > tiles.world_width() ||
-         last_z > tiles.world_height();
+  return grid_over(metadata.valid, metadata.source.registration == "area", options.size, options.spacing);
 }
 
 struct Restored {
-  std::int64_t voids = 0;
-  std::int64_t clamped = 0;
+  SampleCounts counts;
   bool is_source = false;  ///< the source's own samples, hash checked
 };
 
@@ -161,7 +125,7 @@ class Restorer {
     spec.overwrite = options_.overwrite;
     std::unique_ptr<RasterSink> sink = create_raster(options_.output, spec);
     const bool scaled = mapping.z_scale != 1.0 || mapping.z_offset != 0.0;
-    if (scaled && raster_kind(options_.output) != RasterKind::kTiff && !options_.common.quiet) {
+    if (scaled && !has_scale(raster_kind(options_.output)) && !options_.common.quiet) {
       print_warning(fmt::format("{}: has no place for what its raw numbers mean: elevation = raw * {} + {}",
                                 options_.output, mapping.z_scale, mapping.z_offset));
     }
@@ -198,7 +162,7 @@ class Restorer {
                                                    options_.archive, found, record.sha256));
     }
     sink->finish();
-    return {0, 0, true};
+    return {{}, true};
   }
 
   /// The same numbers in another type; refuses what would not be the same.
@@ -218,7 +182,7 @@ class Restorer {
                         (outcome == SampleStore::Outcome::kStored && load_sample(to, at) == value);
       const auto place = static_cast<std::int64_t>(i);
       if (!same) {
-        refuse_sample(options_, to, place % grid_.width, first_row + place / grid_.width, value, "write .tif");
+        refuse_sample(options_.output, to, place % grid_.width, first_row + place / grid_.width, value, "write .tif");
       }
     }
     return out;
@@ -241,34 +205,11 @@ class Restorer {
       const std::int64_t rows = std::min(rows_at_once, grid_.height - row);
       std::vector<double> elevations(static_cast<std::size_t>(rows * grid_.width));
       surface.read(row, rows, elevations);
-      sink->write_rows(raw_samples(store, mapping.type, elevations, row, restored));
+      sink->write_rows(store_rows(store, mapping.type, options_.output, grid_.width, row, elevations, restored.counts));
       report(row + rows);
     }
     sink->finish();
     return restored;
-  }
-
-  [[nodiscard]] std::vector<std::byte> raw_samples(const SampleStore& store, SampleType type,
-                                                   std::span<const double> elevations, std::int64_t first_row,
-                                                   Restored& counts) const {
-    using Outcome = SampleStore::Outcome;
-    std::vector<std::byte> raw(elevations.size() * size_bytes(type));
-    std::vector<Outcome> outcomes(elevations.size());
-    oneapi::tbb::parallel_for(oneapi::tbb::blocked_range<std::size_t>(0, elevations.size(), 4096),
-                              [&](const oneapi::tbb::blocked_range<std::size_t>& part) {
-                                for (std::size_t i = part.begin(); i < part.end(); ++i) {
-                                  outcomes[i] = store.store(elevations[i], raw.data() + i * size_bytes(type));
-                                }
-                              });
-    counts.voids += std::count(outcomes.begin(), outcomes.end(), Outcome::kVoid);
-    counts.clamped += std::count(outcomes.begin(), outcomes.end(), Outcome::kClamped);
-    const auto refused = std::find(outcomes.begin(), outcomes.end(), Outcome::kRefused);
-    if (refused != outcomes.end()) {
-      const std::int64_t place = refused - outcomes.begin();
-      refuse_sample(options_, type, place % grid_.width, first_row + place / grid_.width,
-                    elevations[static_cast<std::size_t>(place)], "--clamp-range moves it, .exr holds it");
-    }
-    return raw;
   }
 
   const RestoreOptions& options_;
@@ -305,12 +246,13 @@ int run(const RestoreOptions& options) {
                          {"first_sample", {{"x", grid.first_x}, {"z", grid.first_z}}},
                          {"spacing", {{"x", grid.spacing_x}, {"z", grid.spacing_z}}},
                          {"source_samples", restored.is_source},
-                         {"voids", restored.is_source ? ordered_json(nullptr) : ordered_json(restored.voids)},
-                         {"clamped", restored.clamped}}));
+                         {"voids", restored.is_source ? ordered_json(nullptr) : ordered_json(restored.counts.voids)},
+                         {"clamped", restored.counts.clamped}}));
   } else if (!options.common.quiet) {
     std::string what = "the source's own samples, SHA-256 as stated";
-    if (!restored.is_source) what = fmt::format("method {}, {} voids", how, describe_count(restored.voids));
-    if (restored.clamped > 0) what += fmt::format(", {} moved into the range", describe_count(restored.clamped));
+    if (!restored.is_source) what = fmt::format("method {}, {} voids", how, describe_count(restored.counts.voids));
+    if (restored.counts.clamped > 0)
+      what += fmt::format(", {} moved into the range", describe_count(restored.counts.clamped));
     out.write(fmt::format("{}: {} x {} samples, {}\n", options.output, grid.width, grid.height, what));
   }
   out.finish();

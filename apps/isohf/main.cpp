@@ -33,6 +33,7 @@ constexpr Command kCommands[] = {
     {"info", "Say what an archive or a raster holds", command_info},
     {"verify", "Check an archive, and compare it with its source", command_verify},
     {"restore", "Turn an archive back into a raster", command_restore},
+    {"export", "Write the surface as a raster of any grid, whole or cut into tiles", command_export},
     {"sample", "Print elevation and normal at places", command_sample},
     {"shade", "Draw a picture of the surface with its shadows", command_shade},
     {"formats", "List what can be read and written", command_formats},

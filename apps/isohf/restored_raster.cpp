@@ -4,6 +4,7 @@
 #include <cctype>
 #include <filesystem>
 
+#include "isohf/base/error.h"
 #include "isohf/convert/plan.h"
 
 namespace isohf::cli {
@@ -28,7 +29,17 @@ RasterKind raster_kind(const std::string& path) {
   if (extension == ".tif" || extension == ".tiff") return RasterKind::kTiff;
   if (extension == ".exr") return RasterKind::kExr;
   if (extension == ".png") return RasterKind::kPng;
-  return extension == ".hgt" ? RasterKind::kHgt : RasterKind::kOther;
+  if (extension == ".hgt") return RasterKind::kHgt;
+  if (extension == ".asc") return RasterKind::kAsc;
+  if (extension == ".flt") return RasterKind::kFlt;
+  if (extension == ".r16" || extension == ".raw") return RasterKind::kRaw16;
+  if (extension == ".r32") return RasterKind::kRaw32;
+  return extension == ".npy" ? RasterKind::kNpy : RasterKind::kOther;
+}
+
+bool has_scale(RasterKind kind) {
+  return kind == RasterKind::kTiff || kind == RasterKind::kPng || kind == RasterKind::kRaw16 ||
+         kind == RasterKind::kRaw32;
 }
 
 SampleType restored_type(const std::string& path, SampleType source_type) {
@@ -40,7 +51,14 @@ SampleType restored_type(const std::string& path, SampleType source_type) {
       return SampleType::kFloat32;
     case RasterKind::kPng:
       return source_type == SampleType::kUint8 ? source_type : SampleType::kUint16;
+    case RasterKind::kFlt:
+    case RasterKind::kRaw32:
+      return SampleType::kFloat32;
+    case RasterKind::kRaw16:
+      return SampleType::kUint16;
     case RasterKind::kTiff:
+    case RasterKind::kAsc:
+    case RasterKind::kNpy:
     case RasterKind::kOther:
       break;
   }
@@ -53,6 +71,7 @@ RasterSpec restored_raster(const Metadata& metadata, const SampleGrid& grid, Sam
   spec.width = grid.width;
   spec.height = grid.height;
   spec.sample_type = type;
+  spec.describe = true;
   if (metadata.vertical_unit != "unknown") spec.vertical_unit = metadata.vertical_unit;
   Georeference place;
   place.registration = source.registration == "area" ? Registration::kArea : Registration::kPoint;
@@ -84,6 +103,21 @@ ReferenceSystem horizontal_system(const SourceRecord& source) {
   system.semi_major_axis_m = source.semi_major_axis_m;
   system.inverse_flattening = source.inverse_flattening;
   return system;
+}
+
+WorldBounds world_bounds(const Metadata& metadata, double west, double south, double east, double north) {
+  const SourceRecord& source = metadata.source;
+  if (!source.origin_x || !source.origin_y || !(source.crs_spacing_x > 0.0) || !(source.crs_spacing_y > 0.0)) {
+    throw Error(ErrorCode::kInvalidArgument, "the archive does not say where its source lay; coordinates mean nothing");
+  }
+  const double to_x = source.spacing_x / source.crs_spacing_x;
+  const double to_z = source.spacing_z / source.crs_spacing_y;
+  WorldBounds bounds;
+  bounds.x0 = source.first_sample_x + (west - *source.origin_x) * to_x;
+  bounds.x1 = source.first_sample_x + (east - *source.origin_x) * to_x;
+  bounds.z0 = source.first_sample_z + (*source.origin_y - north) * to_z;
+  bounds.z1 = source.first_sample_z + (*source.origin_y - south) * to_z;
+  return bounds;
 }
 
 SampleGrid grid_like(const Metadata& metadata, const SourceInfo& other) {

@@ -10,11 +10,14 @@
 namespace isohf::cli {
 
 /// The format of a raster by its extension, in any case; kOther where create_raster() knows none.
-enum class RasterKind { kTiff, kExr, kPng, kHgt, kOther };
+enum class RasterKind { kTiff, kExr, kPng, kHgt, kAsc, kFlt, kRaw16, kRaw32, kNpy, kOther };
 [[nodiscard]] RasterKind raster_kind(const std::string& path);
 
+/// Whether the file, or the one beside it, says what scale and offset are.
+[[nodiscard]] bool has_scale(RasterKind kind);
+
 /// The sample type of a raster restored to `path`: the source's own where the format holds it, else the nearest that
-/// it holds (float32 in EXR, int16 in HGT, uint16 in PNG).
+/// it holds (float32 in EXR and GridFloat, int16 in HGT, uint16 in PNG and .r16).
 [[nodiscard]] SampleType restored_type(const std::string& path, SampleType source_type);
 
 /// What a raster of that grid is: size, place and reference system as the source's, so far as they are known.
@@ -22,6 +25,10 @@ enum class RasterKind { kTiff, kExr, kPng, kHgt, kOther };
 
 /// The source's body and horizontal reference system, as recorded.
 [[nodiscard]] ReferenceSystem horizontal_system(const SourceRecord& source);
+
+/// The part of the world between these coordinates of the source. Throws Error{kInvalidArgument} where the archive does
+/// not know where its source lay.
+[[nodiscard]] WorldBounds world_bounds(const Metadata& metadata, double west, double south, double east, double north);
 
 /// The grid of another raster of elevations, in the archive's world: by the origins of both where they are known in
 /// the same unit, else from the North-West corner.

@@ -1,7 +1,12 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "isohf/restore/residual_codec.h"
 
@@ -9,6 +14,9 @@ namespace isohf::cli {
 
 /// The raw value that stands for "no elevation" in samples of a type; nullopt for floats, which have NaN.
 [[nodiscard]] std::optional<double> usual_void(SampleType type);
+
+/// The lowest and highest raw number of a type.
+[[nodiscard]] std::pair<double, double> sample_range(SampleType type);
 
 /// Elevations into raw samples of a raster's type.
 class SampleStore {
@@ -32,5 +40,20 @@ class SampleStore {
   double low_;  ///< smallest and largest raw number that is an elevation
   double high_;
 };
+
+/// Throws Error{kInvalidArgument} for a sample that a raster's type does not hold, naming its place and the remedy.
+[[noreturn]] void refuse_sample(const std::string& output, SampleType type, std::int64_t column, std::int64_t row,
+                                double value, const char* remedy);
+
+struct SampleCounts {
+  std::int64_t voids = 0;
+  std::int64_t clamped = 0;
+};
+
+/// Rows of elevations, NaN where void, into raw samples; the first row's number and the width are for messages. Adds to
+/// `counts`. Works on the caller's oneTBB arena. Throws Error{kInvalidArgument} as refuse_sample.
+[[nodiscard]] std::vector<std::byte> store_rows(const SampleStore& store, SampleType type, const std::string& output,
+                                                std::int64_t width, std::int64_t first_row,
+                                                std::span<const double> elevations, SampleCounts& counts);
 
 }  // namespace isohf::cli

@@ -277,10 +277,15 @@ TEST_F(RestoreCommand, VoidsAndSamplesOfTheVoidValueStayApart) {
 
 TEST_F(RestoreCommand, SaysWhereScaleAndOffsetAreLost) {
   convert(kPeaks, {"--z-scale", "0.5", "--z-offset", "-100"});
-  const RunResult result = run("back.png");
+  const RunResult result = run("back.exr");
   EXPECT_EQ(result.exit_code, 0);
   EXPECT_THAT(result.err, HasSubstr("warning: "));
   EXPECT_THAT(result.err, HasSubstr("elevation = raw * 0.5 + -100"));
+  const RunResult picture = run("back.png");
+  EXPECT_EQ(picture.err, "");
+  const json beside = json::parse(std::ifstream(folder / "back.png.json"));
+  EXPECT_EQ(beside.at("z_scale"), 0.5);
+  EXPECT_EQ(beside.at("z_offset"), -100.0);
   const Raster tiff = restore("back.tif");
   EXPECT_EQ(tiff.info.z_scale, 0.5);
   EXPECT_EQ(tiff.info.z_offset, -100.0);

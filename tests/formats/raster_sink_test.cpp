@@ -111,6 +111,174 @@ TEST(RasterSink, RoundTripsManyStripsAndLongRows) {
   }
 }
 
+RasterSpec placed(std::int64_t width, std::int64_t height, SampleType type, double spacing_y) {
+  RasterSpec spec = spec_of(width, height, type);
+  Georeference place;
+  place.registration = Registration::kArea;
+  place.unit = HorizontalUnit::kMetre;
+  place.spacing_x = 10.0;
+  place.spacing_y = spacing_y;
+  place.has_origin = true;
+  place.origin_x = 500005.0;
+  place.origin_y = 4000195.0;
+  place.system.name = "WGS 84 / UTM zone 32N";
+  place.system.epsg = 32632;
+  place.system.body = "Earth";
+  spec.georeference = place;
+  return spec;
+}
+
+/// The same samples as numbers; NaN for what is void.
+std::vector<double> values_of(HeightSource& source) {
+  const SourceInfo& info = source.info();
+  const auto raw = read_whole(source);
+  std::vector<double> values;
+  for (std::size_t at = 0; at < raw.size(); at += size_bytes(info.sample_type)) {
+    const double value = raw_value(info.sample_type, raw.data() + at);
+    const bool is_void = !std::isfinite(value) || value < info.valid_min || value > info.valid_max ||
+                         std::find(info.void_values.begin(), info.void_values.end(), value) != info.void_values.end();
+    values.push_back(is_void ? std::nan("") : value);
+  }
+  return values;
+}
+
+TEST(RasterSink, GridsAndPlainSamplesReadBackWithPlaceAndVoids) {
+  const ScratchFolder folder;
+  int round = 0;
+  for (const std::string extension : {".asc", ".flt", ".r16", ".r32", ".raw", ".npy"}) {
+    for (const double spacing_y : {10.0, 12.5}) {
+      for (const SampleType type : kAllTypes) {
+        const bool any_type = extension == ".asc" || extension == ".npy";
+        const bool sixteen = extension == ".r16" || extension == ".raw";
+        if (!any_type && type != (sixteen ? SampleType::kUint16 : SampleType::kFloat32)) continue;
+        SCOPED_TRACE(extension + " " + to_string(type));
+        RasterSpec spec = placed(5, 4, type, spacing_y);
+        spec.z_scale = 0.25;
+        spec.z_offset = -100.0;
+        if (!is_floating(type)) spec.void_value = 7.0;
+        std::vector<std::byte> samples(20 * size_bytes(type));
+        const auto put = [&](std::size_t i, auto value) {
+          std::memcpy(samples.data() + i * sizeof(value), &value, sizeof(value));
+        };
+        std::vector<double> wanted;
+        for (std::size_t i = 0; i < 20; ++i) {
+          const auto z = static_cast<std::uint8_t>(i == 9 ? 7 : i + 10);
+          switch (type) {
+            case SampleType::kFloat16:
+              put(i, static_cast<std::uint16_t>(i == 9 ? 0x7E00 : 0x3C00 + i));  // 1 + i / 1024
+              wanted.push_back(i == 9 ? NAN : 1.0 + static_cast<double>(i) / 1024.0);
+              continue;
+            case SampleType::kFloat32:
+              put(i, i == 9 ? NAN : static_cast<float>(z) / 3.0F);
+              wanted.push_back(i == 9 ? NAN : static_cast<double>(static_cast<float>(z) / 3.0F));
+              continue;
+            case SampleType::kFloat64:
+              put(i, i == 9 ? std::nan("") : z / 3e10);
+              wanted.push_back(i == 9 ? std::nan("") : z / 3e10);
+              continue;
+            default:
+              samples[i * size_bytes(type)] = static_cast<std::byte>(z);
+              wanted.push_back(i == 9 ? NAN : z);
+          }
+        }
+        const std::string path = folder / (std::to_string(++round) + extension);
+        write(path, spec, samples, 3);
+        const auto source = open_source(path, {});
+        const SourceInfo& info = source->info();
+        ASSERT_EQ(info.width, 5);
+        ASSERT_EQ(info.height, 4);
+        std::vector<double> found = values_of(*source);
+        if (extension == ".npy") {  // has no void value
+          EXPECT_EQ(info.sample_type, type);
+          if (!is_floating(type)) wanted[9] = 7.0;
+          EXPECT_FALSE(info.georeference.has_origin);
+        } else {
+          const Georeference& place = info.georeference;
+          EXPECT_TRUE(place.has_origin);
+          EXPECT_EQ(place.registration, Registration::kArea);
+          EXPECT_EQ(place.unit, HorizontalUnit::kMetre);
+          EXPECT_EQ(place.spacing_x, 10.0);
+          EXPECT_EQ(place.spacing_y, spacing_y);
+          EXPECT_EQ(place.origin_x, 500005.0);
+          EXPECT_EQ(place.origin_y, 4000195.0);
+          EXPECT_EQ(info.z_scale, any_type || extension == ".flt" ? 1.0 : 0.25);
+          EXPECT_EQ(info.warnings.size(), 0U) << info.warnings.front();
+        }
+        for (std::size_t i = 0; i < 20; ++i) {
+          if (std::isnan(wanted[i])) {
+            EXPECT_TRUE(std::isnan(found[i])) << i << " " << found[i];
+          } else {
+            // An ASCII grid is read as float64: the float is the nearest one to its digits.
+            const bool digits = extension == ".asc" && (type == SampleType::kFloat16 || type == SampleType::kFloat32);
+            EXPECT_EQ(digits ? static_cast<double>(static_cast<float>(found[i])) : found[i], wanted[i]) << i;
+          }
+        }
+      }
+    }
+  }
+}
+
+TEST(RasterSink, WritesSidecarsWithTheRasterOrNotAtAll) {
+  const ScratchFolder folder;
+  const RasterSpec spec = placed(6, 4, SampleType::kFloat32, 10.0);
+  { const auto abandoned = create_raster(folder / "a.flt", spec); }
+  EXPECT_TRUE(std::filesystem::is_empty(folder / "."));
+  write(folder / "a.flt", spec, noise(spec), 4);
+  EXPECT_TRUE(std::filesystem::exists(folder / "a.hdr"));
+  EXPECT_TRUE(std::filesystem::exists(folder / "a.prj"));
+  write(folder / "a.asc", spec, noise(spec), 4);  // the .prj is there already, and the same
+  write_bytes(folder / "b.hdr", "mine", 4);
+  const Error error = error_of([&] { (void)create_raster(folder / "b.flt", spec); });
+  EXPECT_EQ(error.what(), folder / "b.flt: " + (folder / "b.hdr: exists already (--overwrite replaces it)"));
+  EXPECT_EQ(file_bytes(folder / "b.hdr"), (std::vector<char>{'m', 'i', 'n', 'e'}));
+  RasterSpec picture = placed(6, 4, SampleType::kUint16, 10.0);
+  write(folder / "c.png", picture, noise(picture), 4);
+  EXPECT_FALSE(std::filesystem::exists(folder / "c.png.json"));
+  picture.describe = true;
+  picture.z_scale = 0.5;
+  write(folder / "d.png", picture, noise(picture), 4);
+  const auto json = nlohmann::json::parse(std::ifstream(folder / "d.png.json"));
+  EXPECT_EQ(json.at("z_scale"), 0.5);
+  EXPECT_EQ(json.at("origin_y"), 4000195.0);
+  EXPECT_EQ(json.at("registration"), "area");
+  EXPECT_EQ(json.at("crs_epsg"), 32632);
+}
+
+TEST(RasterSink, RefusesADescriptionThatIsWrong) {
+  const ScratchFolder folder;
+  const std::string path = folder / "a.r16";
+  const std::string good = R"({"width": 2, "height": 2, "sample_type": "uint16", "byte_order": "little")";
+  const auto says = [&](const std::string& json) {
+    std::filesystem::remove(path + ".json");
+    write_bytes(path, "12345678", 8);
+    write_bytes(path + ".json", json.data(), json.size());
+    const Error error = error_of([&] { (void)open_source(path, {}); });
+    EXPECT_EQ(error.code(), ErrorCode::kCorrupt);
+    return std::string(error.what());
+  };
+  EXPECT_THAT(says("[1]"), HasSubstr("is not a JSON object"));
+  EXPECT_THAT(says("{"), HasSubstr("is not a JSON object"));
+  EXPECT_THAT(says(R"({"width": 2.5, "height": 2})"), HasSubstr("has no width and height"));
+  EXPECT_THAT(says(R"({"width": 2, "height": 2, "sample_type": "real"})"), HasSubstr("sample_type"));
+  EXPECT_THAT(says(R"({"width": 2, "height": 2, "sample_type": "int8"})"), HasSubstr("neither little nor big"));
+  EXPECT_THAT(says(good + R"(, "z_scale": "1"})"), HasSubstr("z_scale is no number"));
+  EXPECT_THAT(says(good + R"(, "z_scale": 0})"), HasSubstr("z_scale is 0"));
+  EXPECT_THAT(says(good + R"(, "void_value": -1})"), HasSubstr("no uint16 sample can hold"));
+  EXPECT_THAT(says(good + R"(, "spacing_x": -1})"), HasSubstr("is not positive"));
+  EXPECT_THAT(says(R"({"width": 2, "height": 3, "sample_type": "uint16", "byte_order": "little"})"),
+              HasSubstr("the file has 8 bytes"));
+}
+
+TEST(RasterSink, BeginsBigTiffWhereClassicTiffEnds) {
+  const ScratchFolder folder;
+  for (const auto& [side, magic] : {std::pair{1000, 42}, {40000, 43}}) {
+    const auto sink = create_raster(folder / "large.tif", spec_of(side, side, SampleType::kFloat32));
+    const std::vector<char> head = file_bytes(folder / "large.tif.part");
+    ASSERT_GE(head.size(), 4U);
+    EXPECT_EQ(head[2], magic);
+  }
+}
+
 TEST(RasterSink, WritesHgtTilesOfTheSizesThatExist) {
   const ScratchFolder folder;
   const RasterSpec spec = spec_of(1201, 1201, SampleType::kInt16);
@@ -250,7 +418,7 @@ TEST(RasterSink, RefusesWhatItCannotWriteAndLeavesNothing) {
   const RasterSpec good = spec_of(4, 4, SampleType::kFloat32);
   Error error = error_of([&] { (void)create_raster(folder / "a.jpg", good); });
   EXPECT_EQ(error.code(), ErrorCode::kUnsupported);
-  EXPECT_THAT(error.what(), HasSubstr("\".jpg\"; there are .tif .tiff .exr .png .hgt"));
+  EXPECT_THAT(error.what(), HasSubstr("\".jpg\"; there are .tif .tiff .exr .png .hgt .asc .flt .r16 .raw .r32 .npy"));
   EXPECT_EQ(error_of([&] { (void)create_raster(folder / "a", good); }).code(), ErrorCode::kUnsupported);
   EXPECT_EQ(error_of([&] { (void)create_raster(folder / "a.png", good); }).code(), ErrorCode::kUnsupported);
   EXPECT_EQ(error_of([&] { (void)create_raster(folder / "a.exr", spec_of(4, 4, SampleType::kInt16)); }).code(),
@@ -291,7 +459,7 @@ class FileSizeLimit {
 
 TEST(RasterSink, ReportsADiskThatIsFull) {
   const ScratchFolder folder;
-  for (const std::string name : {"full.tif", "full.exr", "full.png", "N00E000.hgt"}) {
+  for (const std::string name : {"full.tif", "full.exr", "full.png", "N00E000.hgt", "full.asc", "full.npy"}) {
     const RasterSpec spec = spec_of(1201, 1201,
                                     name == "full.exr"   ? SampleType::kFloat32
                                     : name == "full.png" ? SampleType::kUint16

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "formats/raster_sink.h"
+
+namespace isohf {
+
+/// A text file that belongs to a raster.
+struct Sidecar {
+  std::string path;
+  std::string text;
+};
+
+/// The files that stand beside a raster of that name and spec: .hdr for GridFloat, .json (NAME.r16.json) for raw
+/// samples and, where spec.describe says so, PNG, and .prj for grids whose reference system has a WKT.
+[[nodiscard]] std::vector<Sidecar> sidecars_of(const std::string& path, const RasterSpec& spec);
+
+/// The lines in front of an ESRI ASCII grid's numbers.
+[[nodiscard]] std::string ascii_grid_header(const RasterSpec& spec);
+
+/// The void value of an ASCII grid or GridFloat: the spec's own, or the lowest float, as which NaN is written.
+[[nodiscard]] double grid_void(const RasterSpec& spec);
+
+}  // namespace isohf
