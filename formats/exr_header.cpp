@@ -9,6 +9,7 @@
 #include <optional>
 #include <vector>
 
+#include "formats/text_tokens.h"
 #include "isohf/base/bytes.h"
 #include "isohf/base/error.h"
 
@@ -157,7 +158,7 @@ std::optional<PartHeader> take_header(HeaderWalk& walk) {
     try {
       take_attribute(walk, name, size, part);
     } catch (const Error& error) {
-      throw error.within(fmt::format("attribute \"{}\"", name));
+      throw error.within(fmt::format("attribute \"{}\"", printable(name)));
     }
   }
   throw Error(ErrorCode::kUnsupported, fmt::format("OpenEXR header has more than {} attributes", kMaxAttributes));

@@ -21,6 +21,7 @@
 
 #include "formats/exr_threads.h"
 #include "formats/open_options.h"
+#include "formats/text_tokens.h"
 #include "isohf/base/assert.h"
 #include "isohf/base/error.h"
 
@@ -43,6 +44,11 @@ struct Channel {
 
 std::string full_name(const Channel& channel) {
   return channel.part_name.empty() ? channel.name : channel.part_name + "." + channel.name;
+}
+
+/// For messages.
+std::string shown_name(const Channel& channel) {
+  return one_line(full_name(channel));
 }
 
 std::string last_component(const std::string& name) {
@@ -74,7 +80,7 @@ std::vector<Channel> channels_of(const Imf::MultiPartInputFile& file) {
 
 std::string list_of(const std::vector<Channel>& channels) {
   std::string list;
-  for (const Channel& channel : channels) list += (list.empty() ? "" : ", ") + full_name(channel);
+  for (const Channel& channel : channels) list += (list.empty() ? "" : ", ") + shown_name(channel);
   return list;
 }
 
@@ -158,11 +164,6 @@ std::int64_t scan_lines_per_chunk(Imf::Compression compression) {
   }
 }
 
-std::string one_line(std::string text) {
-  std::replace(text.begin(), text.end(), '\n', ' ');
-  return text;
-}
-
 /// Runs `action`, turning whatever the OpenEXR library throws into Error with `where` in front.
 template <typename Action>
 auto translated(const std::string& where, Action action) -> decltype(action()) {
@@ -188,11 +189,11 @@ class ExrSource final : public HeightSource {
     if (channel_.deep) {
       throw Error(
           ErrorCode::kUnsupported,
-          fmt::format("OpenEXR channel {} is deep, several samples per pixel; flatten it", full_name(channel_)));
+          fmt::format("OpenEXR channel {} is deep, several samples per pixel; flatten it", shown_name(channel_)));
     }
     if (channel_.subsampled) {
       throw Error(ErrorCode::kUnsupported, fmt::format("OpenEXR channel {} is subsampled; the file has {}",
-                                                       full_name(channel_), list_of(channels)));
+                                                       shown_name(channel_), list_of(channels)));
     }
     if (!file_.partComplete(channel_.part)) {
       throw Error(ErrorCode::kCorrupt, "OpenEXR file is incomplete: its table of chunks has gaps");
@@ -232,7 +233,7 @@ class ExrSource final : public HeightSource {
     sample_bytes_ = size_bytes(info_.sample_type);
     if (chosen_here && channels.size() > 1) {
       info_.warnings.push_back(
-          fmt::format("channel {} is read, of {} ({})", full_name(channel_), channels.size(), list_of(channels)));
+          fmt::format("channel {} is read, of {} ({})", shown_name(channel_), channels.size(), list_of(channels)));
     }
     if (data != display) {
       info_.warnings.push_back(fmt::format(

@@ -59,7 +59,11 @@ void TextTokens::seek(std::uint64_t offset_bytes) {
 
 bool TextTokens::finish_odd_word(const char* begin, std::string_view& word) {
   while (at_ != end_ && !is_blank(*at_)) ++at_;
-  if (at_ == end_ && fill(begin)) return false;
+  if (at_ == end_) {
+    if (fill(begin)) return false;
+    begin = buffer_.data();  // whither the word has moved
+    at_ = end_;
+  }
   word = {begin, static_cast<std::size_t>(at_ - begin)};
   return true;
 }
@@ -107,6 +111,14 @@ bool read_decimal(std::string_view word, double& value) {
     }
   }
   return read_special(word, value);
+}
+
+std::string one_line(std::string text) {
+  for (char& c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (byte < 0x20 || byte == 0x7F) c = ' ';
+  }
+  return text;
 }
 
 std::string printable(std::string_view word) {

@@ -69,4 +69,7 @@ class TextTokens {
 /// A word fit for a message: at most 40 bytes, only printable ones.
 [[nodiscard]] std::string printable(std::string_view word);
 
+/// A text found in a file, fit for one line: blanks for control characters.
+[[nodiscard]] std::string one_line(std::string text);
+
 }  // namespace isohf

@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "formats/libraries.h"
+#include "formats/text_tokens.h"
 #include "isohf/base/error.h"
 
 namespace isohf {
@@ -111,7 +112,7 @@ struct TiffHandle::Impl {
   static std::string text(const char* format, std::va_list arguments) {
     std::array<char, 512> buffer = {};
     std::vsnprintf(buffer.data(), buffer.size(), format, arguments);
-    return buffer.data();
+    return one_line(buffer.data());  // some have several
   }
 
   static int on_error(TIFF* /*tif*/, void* self, const char* /*module*/, const char* format, std::va_list arguments) {

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "formats/text_tokens.h"
 #include "isohf/base/bytes.h"
 #include "isohf/base/error.h"
 
@@ -63,7 +64,7 @@ ZipMember read_entry(const RawFile& file, ByteReader& in) {
   (void)in.read_bytes(8);  // disk, attributes
   member.header_offset_bytes = in.read<std::uint32_t>();
   const auto name = in.read_bytes(name_bytes);
-  member.name.assign(reinterpret_cast<const char*>(name.data()), name.size());
+  member.name = one_line({reinterpret_cast<const char*>(name.data()), name.size()});
   (void)in.read_bytes(extra_bytes + comment_bytes);
   return member;
 }

@@ -263,6 +263,15 @@ TEST_F(AsciiGrid, RefusesAGrassHeaderThatIsWrong) {
               HasSubstr("must be a number, or degrees"));
 }
 
+TEST_F(AsciiGrid, SurvivesZeroBytesAtTheEnd) {
+  for (const std::size_t zeros : {1U, 2U, 5000U}) {
+    std::string text = std::string(kHeader) + "1 2 3\n4 5 6" + std::string(zeros, '\0');
+    EXPECT_THAT(refusal(text).what(), ::testing::AnyOf(HasSubstr("is not a number"), HasSubstr("without a blank")));
+    text += "\n";
+    EXPECT_THAT(refusal(text).what(), ::testing::AnyOf(HasSubstr("is not a number"), HasSubstr("without a blank")));
+  }
+}
+
 TEST_F(AsciiGrid, NamesTheLineThatIsWrong) {
   const std::string header = kHeader;
   const std::string path = folder_ / "grid.asc";

@@ -1,0 +1,190 @@
+/// Every reader over every truncation of a small file, and over ten thousand damaged ones: each is read, or refused
+/// with one line that names it.
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <random>
+#include <set>
+
+#include "formats/raster_reference.h"
+#include "formats/reader_cases.h"
+#include "formats/reader_failure.h"
+#include "isohf/base/error.h"
+
+namespace isohf::testing {
+namespace {
+
+constexpr int kMutations = 10000;
+constexpr unsigned kSeed = 20040808;
+
+#if defined(__SANITIZE_ADDRESS__)
+constexpr bool kSanitized = true;
+#else
+constexpr bool kSanitized = false;
+#endif
+
+const std::vector<ReaderCase>& cases() {
+  static const std::vector<ReaderCase> all = reader_cases();
+  return all;
+}
+
+/// A folder in memory where there is one: tens of thousands of files are written.
+std::filesystem::path fast_folder() {
+  const std::filesystem::path shared = "/dev/shm";
+  std::error_code ignored;
+  std::string pattern =
+      ((std::filesystem::is_directory(shared, ignored) ? shared : std::filesystem::temp_directory_path()) /
+       "isohf_mutations_XXXXXX")
+          .string();
+  return ::mkdtemp(pattern.data());
+}
+
+class ReaderMutation : public ::testing::TestWithParam<std::size_t> {
+ protected:
+  void SetUp() override {
+    folder_ = fast_folder();
+    for (const auto& [name, bytes] : tested().beside) testing::write_bytes(folder_ / name, bytes);
+    if (kSanitized) return;  // it reserves terabytes itself
+    // What a few bytes claim must not be believed: an allocation of more than this fails, and is no Error.
+    ::rlimit limit{};
+    ::getrlimit(RLIMIT_AS, &limit);
+    limit.rlim_cur = rlim_t{4} << 30U;
+    ::setrlimit(RLIMIT_AS, &limit);
+  }
+  void TearDown() override {
+    std::error_code ignored;
+    std::filesystem::remove_all(folder_, ignored);
+  }
+
+  [[nodiscard]] const ReaderCase& tested() const { return cases()[GetParam()]; }
+
+  /// Reads the first and the last samples; returns what went wrong, empty where nothing did.
+  [[nodiscard]] std::string outcome(const std::string& bytes) const {
+    const std::filesystem::path path = folder_ / tested().file_name;
+    testing::write_bytes(path, bytes);
+    try {
+      const std::string opened = tested().opened.empty() ? path.string() : (folder_ / tested().opened).string();
+      const auto source = tested().open(opened, tested().options);
+      const SourceInfo& info = source->info();
+      read_corner(*source);
+      const Window last{info.width - std::min<std::int64_t>(info.width, 64),
+                        info.height - std::min<std::int64_t>(info.height, 8), std::min<std::int64_t>(info.width, 64),
+                        std::min<std::int64_t>(info.height, 8)};
+      (void)read_window(*source, last);
+      for (const std::string& warning : info.warnings) expect_one_line(warning);
+      return {};
+    } catch (const Error& error) {
+      const std::string message = error.what();
+      EXPECT_EQ(message.rfind(folder_.string(), 0), 0U) << message;
+      expect_one_line(message);
+      return message.empty() ? "an empty message" : message;
+    }
+  }
+
+  static void expect_one_line(const std::string& message) {
+    EXPECT_EQ(message.find_first_of("\n\r"), std::string::npos) << message;
+  }
+
+  std::filesystem::path folder_;
+};
+
+/// One to four changes, most of them near the beginning, where headers are.
+std::string mutated(const std::string& bytes, bool text, std::mt19937& random) {
+  const auto pick = [&](std::size_t below) {
+    return static_cast<std::size_t>(random()) % std::max<std::size_t>(below, 1);
+  };
+  const std::string digits = "0123456789-+.eE \n:=(),'\"*<>";
+  std::string damaged = bytes;
+  for (std::size_t change = pick(4) + 1; change > 0 && !damaged.empty(); --change) {
+    const std::size_t head = std::min<std::size_t>(damaged.size(), 512);
+    const std::size_t at = pick(4) == 0 ? pick(damaged.size()) : pick(head);
+    switch (pick(text ? 9 : 6)) {
+      case 0:
+        damaged[at] = static_cast<char>(damaged[at] ^ static_cast<char>(1U << pick(8)));
+        break;
+      case 1:
+        damaged[at] = static_cast<char>(random());
+        break;
+      case 2: {  // a number of several bytes at an end of its range
+        const char extreme = pick(2) == 0 ? '\0' : '\xFF';
+        for (std::size_t i = at; i < std::min(at + (std::size_t{1} << pick(4)), damaged.size()); ++i)
+          damaged[i] = extreme;
+        break;
+      }
+      case 3:
+        damaged.insert(at, 1, static_cast<char>(random()));
+        break;
+      case 4:
+        damaged.erase(at, 1 + pick(8));
+        break;
+      case 5:
+        damaged.insert(at, damaged.substr(pick(damaged.size()), pick(32)));
+        break;
+      default:
+        damaged[at] = digits[pick(digits.size())];
+        break;
+    }
+  }
+  return damaged;
+}
+
+TEST_P(ReaderMutation, ReadsTheFileAsItIs) {
+  EXPECT_EQ(outcome(tested().bytes), "");
+}
+
+TEST_P(ReaderMutation, RefusesOrReadsEveryTruncation) {
+  const ReaderCase& each = tested();
+  for (std::size_t length = 0; length < each.bytes.size(); ++length) {
+    const std::string what = outcome(each.bytes.substr(0, length));
+    const bool must_fail = each.shortest_valid == 0 || (each.shortest_valid > 1 && length < each.shortest_valid);
+    EXPECT_TRUE(!must_fail || !what.empty()) << length << " of " << each.bytes.size() << " bytes";
+    if (HasFailure()) return;
+  }
+}
+
+TEST_P(ReaderMutation, SurvivesTenThousandDamagedFiles) {
+  const ReaderCase& each = tested();
+  std::mt19937 random(kSeed);
+  int read = 0;
+  for (int round = 0; round < kMutations; ++round) {
+    const std::string damaged = mutated(each.bytes, each.text, random);
+    read += outcome(damaged).empty() ? 1 : 0;
+    if (!HasFailure()) continue;
+    const std::string kept = (std::filesystem::temp_directory_path() / ("mutation_" + each.file_name)).string();
+    testing::write_bytes(kept, damaged);
+    FAIL() << "round " << round << " of seed " << kSeed << "; the file is kept as " << kept;
+  }
+  std::cout << kMutations << " mutations from seed " << kSeed << ": " << read << " read, " << kMutations - read
+            << " refused\n";
+  // A .prj that says nothing is passed over, with a warning.
+  EXPECT_TRUE(read < kMutations || each.name == "EhdrProjection");
+}
+
+INSTANTIATE_TEST_SUITE_P(Formats, ReaderMutation, ::testing::Range<std::size_t>(0, cases().size()),
+                         [](const ::testing::TestParamInfo<std::size_t>& each) { return cases()[each.param].name; });
+
+/// A reader that is not in the table is one that nobody damages.
+TEST(ReaderCases, HaveAFileForEveryNativeFormat) {
+  std::set<std::string> covered;
+  const ScratchFolder folder;
+  for (const ReaderCase& each : cases()) {
+    for (const auto& [name, bytes] : each.beside) testing::write_bytes(folder / name, bytes);
+    testing::write_bytes(folder / each.file_name, each.bytes);
+    const std::string opened = folder / (each.opened.empty() ? each.file_name : each.opened);
+    covered.insert(native_format_of(opened, each.options)->name);
+    for (const auto& entry : std::filesystem::directory_iterator(folder / ".")) std::filesystem::remove(entry);
+  }
+  for (const Format& format : native_formats()) {
+    // The header of a grid and GTOPO30 are the reader of EHdr under other names.
+    if (std::string(format.name) == "GTOPO30" || std::string(format.name) == "GridFloat or EHdr header") continue;
+    EXPECT_EQ(covered.count(format.name), 1U) << format.name;
+  }
+}
+
+}  // namespace
+}  // namespace isohf::testing

@@ -1,0 +1,287 @@
+#include "formats/reader_cases.h"
+
+#include <fmt/format.h>
+
+#include <cstring>
+
+#include "formats/ascii_grid_source.h"
+#include "formats/dted_source.h"
+#include "formats/exr_source.h"
+#include "formats/header_grid_source.h"
+#include "formats/hgt_source.h"
+#include "formats/isis3_source.h"
+#include "formats/npy_source.h"
+#include "formats/pds3_source.h"
+#include "formats/png_source.h"
+#include "formats/raster_reference.h"
+#include "formats/raster_sink.h"
+#include "formats/raw_source.h"
+#include "formats/tiff_source.h"
+#include "formats/usgs_dem_source.h"
+#include "formats/zip_archive.h"
+
+namespace isohf::testing {
+namespace {
+
+std::string text_of(const std::string& path) {
+  const std::vector<char> bytes = file_bytes(path);
+  return {bytes.begin(), bytes.end()};
+}
+
+/// `count` numbers of `size` bytes, little-endian, rising.
+std::string counting(int count, int size) {
+  std::string bytes;
+  for (int i = 0; i < count; ++i) {
+    for (int b = 0; b < size; ++b) bytes += b == 0 ? static_cast<char>(i + 1) : '\0';
+  }
+  return bytes;
+}
+
+/// Written by isohf's own writer.
+std::string written(const ScratchFolder& folder, const std::string& name, std::int64_t width, std::int64_t height,
+                    SampleType type, int channels = 1) {
+  RasterSpec spec;
+  spec.width = width;
+  spec.height = height;
+  spec.sample_type = type;
+  spec.channels = channels;
+  spec.overwrite = true;
+  Georeference place;
+  place.registration = Registration::kArea;
+  place.unit = HorizontalUnit::kMetre;
+  place.has_origin = true;
+  place.spacing_x = place.spacing_y = 10.0;
+  place.origin_x = 5e5;
+  place.origin_y = 4e6;
+  place.system.name = "WGS 84 / UTM zone 32N";
+  place.system.epsg = 32632;
+  spec.georeference = place;
+  if (!is_floating(type)) spec.void_value = 0.0;
+  const auto sink = create_raster(folder / name, spec);
+  std::vector<std::byte> samples(static_cast<std::size_t>(width * height * channels) * size_bytes(type));
+  for (std::size_t i = 0; i < samples.size(); ++i) samples[i] = static_cast<std::byte>(i * 37 % 61);
+  sink->write_rows(samples);
+  sink->finish();
+  return text_of(folder / name);
+}
+
+/// A TIFF whose tags come first, so that mutations of the beginning meet them: 8 x 6 int16 in strips of two rows.
+std::string plain_tiff(bool big_endian) {
+  std::string bytes = big_endian ? std::string("MM\0*\0\0\0\x08", 8) : std::string("II*\0\x08\0\0\0", 8);
+  const auto put = [&](std::uint32_t value, int size) {
+    for (int b = 0; b < size; ++b) bytes += static_cast<char>(value >> (8 * (big_endian ? size - 1 - b : b)) & 0xFFU);
+  };
+  struct Tag {
+    std::uint32_t tag, type, count, value;
+  };
+  constexpr std::uint32_t kEntries = 10;
+  constexpr std::uint32_t kEnd = 8 + 2 + kEntries * 12 + 4;
+  const std::vector<Tag> tags = {{256, 3, 1, 8},         {257, 3, 1, 6},    {258, 3, 1, 16}, {259, 3, 1, 1},
+                                 {262, 3, 1, 1},         {273, 4, 3, kEnd}, {277, 3, 1, 1},  {278, 3, 1, 2},
+                                 {279, 4, 3, kEnd + 12}, {339, 3, 1, 2}};
+  put(kEntries, 2);
+  for (const Tag& tag : tags) {
+    put(tag.tag, 2);
+    put(tag.type, 2);
+    put(tag.count, 4);
+    const bool small = tag.type == 3;
+    if (small && big_endian) {
+      put(tag.value, 2);
+      put(0, 2);
+    } else {
+      put(tag.value, 4);
+    }
+  }
+  put(0, 4);
+  for (std::uint32_t i = 0; i < 3; ++i) put(kEnd + 24 + 32 * i, 4);
+  for (std::uint32_t i = 0; i < 3; ++i) put(32, 4);
+  return bytes + counting(48, 2);
+}
+
+std::string pds3() {
+  std::string label =
+      "PDS_VERSION_ID = PDS3\r\nRECORD_BYTES = 512\r\n^IMAGE = 3\r\nTARGET_NAME = MARS\r\nOBJECT = IMAGE\r\n"
+      " LINES = 3\r\n LINE_SAMPLES = 4\r\n SAMPLE_TYPE = MSB_INTEGER\r\n SAMPLE_BITS = 16\r\n BANDS = 1\r\n"
+      " SCALING_FACTOR = 0.5\r\n OFFSET = 3396000.0 <m>\r\n MISSING_CONSTANT = -32768\r\nEND_OBJECT = IMAGE\r\n"
+      "OBJECT = IMAGE_MAP_PROJECTION\r\n MAP_PROJECTION_TYPE = \"SIMPLE CYLINDRICAL\"\r\n A_AXIS_RADIUS = 3396.0 "
+      "<KM>\r\n"
+      " MAP_RESOLUTION = 4 <PIXEL/DEG>\r\n MAXIMUM_LATITUDE = 1\r\n MINIMUM_LATITUDE = 0.25\r\n"
+      " WESTERNMOST_LONGITUDE = 0\r\n EASTERNMOST_LONGITUDE = 1\r\n LINE_PROJECTION_OFFSET = 4\r\n"
+      " SAMPLE_PROJECTION_OFFSET = 0\r\nEND_OBJECT = IMAGE_MAP_PROJECTION\r\nEND\r\n";
+  label.resize(1024, ' ');
+  return label + counting(12, 2);
+}
+
+std::string isis3_label(const std::string& more) {
+  return fmt::format(
+      "Object = IsisCube\n  Object = Core\n    {}StartByte = {}\n    Format = Tile\n    TileSamples = 3\n    TileLines "
+      "= 2\n"
+      "    Group = Dimensions\n      Samples = 5\n      Lines = 4\n      Bands = 1\n    End_Group\n    Group = Pixels\n"
+      "      Type = SignedWord\n      ByteOrder = Lsb\n      Base = 0.0\n      Multiplier = 0.5\n    End_Group\n"
+      "  End_Object\n  Group = Mapping\n    ProjectionName = SimpleCylindrical\n    TargetName = Moon\n"
+      "    EquatorialRadius = 1737400.0 <meters>\n    UpperLeftCornerX = -100.0 <meters>\n    UpperLeftCornerY = "
+      "200.0\n"
+      "    PixelResolution = 10.0 <meters/pixel>\n  End_Group\nEnd_Object\nEnd\n",
+      more, more.empty() ? 1025 : 1);
+}
+
+std::string isis3() {
+  std::string label = isis3_label("");
+  label.resize(1024, '\0');
+  return label + counting(24, 2);
+}
+
+std::string dted() {
+  constexpr int kColumns = 3;
+  constexpr int kPosts = 4;
+  std::string bytes(3428, ' ');
+  const auto put = [&](std::size_t at, const std::string& text) { bytes.replace(at, text.size(), text); };
+  put(0, "UHL10800000W0430000N030001500200U  ");
+  put(47, fmt::format("{:04}{:04}0", kColumns, kPosts));
+  put(80, "DSIU");
+  put(80 + 141, "MSLWGS84");
+  put(80 + 264, fmt::format("0000000.001500300{:04}{:04}00", kPosts, kColumns));
+  put(728, "ACC");
+  for (int c = 0; c < kColumns; ++c) {
+    std::string record = {'\xAA', '\0', '\0', static_cast<char>(c), '\0', static_cast<char>(c), '\0', '\0'};
+    for (int p = 0; p < kPosts; ++p) record += {'\1', static_cast<char>(10 * c + p)};
+    std::uint32_t sum = 0;
+    for (const char byte : record) sum += static_cast<unsigned char>(byte);
+    for (unsigned shift = 24; shift < 32; shift -= 8) record += static_cast<char>(sum >> shift & 0xFFU);
+    bytes += record;
+  }
+  return bytes;
+}
+
+std::string npy() {
+  std::string text = "{'descr': '<i2', 'fortran_order': True, 'shape': (3, 4), }";
+  text.resize(117, ' ');
+  return std::string("\x93NUMPY\1\0\x76\0", 10) + text + "\n" + counting(12, 2);
+}
+
+std::string usgs_dem() {
+  const std::string zero = "   0.000000000000000D+00";
+  std::string text(144, ' ');
+  text += fmt::format("{:6}{:6}{:6}{:6}", 1, 1, 1, 12);
+  for (int i = 0; i < 15; ++i) text += zero;
+  text += fmt::format("{:6}{:6}{:6}", 2, 2, 4);
+  for (int i = 0; i < 11; ++i) text += zero;
+  text += "     0";
+  for (int i = 0; i < 3; ++i) text += "1.000000E+01";
+  text += fmt::format("{:6}{:6}", 1, 3) + std::string(24, ' ') + " 2 1";
+  text.resize(1024, ' ');
+  for (int c = 0; c < 3; ++c) {
+    std::string profile = fmt::format("{:6}{:6}{:6}{:6}{:24}{}{}{}{}", 1, c + 1, 4, 1, 10 * c, zero, zero, zero, zero);
+    for (int p = 0; p < 4; ++p) profile += fmt::format("{:6}", 100 * c + p);
+    profile.resize(1024, ' ');
+    text += profile;
+  }
+  return text;
+}
+
+std::vector<std::byte> bytes_of(const std::string& text) {
+  const auto bytes = std::as_bytes(std::span(text));
+  return {bytes.begin(), bytes.end()};
+}
+
+std::string zip(const std::string& name, const std::string& contents) {
+  const auto archive = zip_archive({{name, bytes_of(contents)}}, true);
+  return {reinterpret_cast<const char*>(archive.data()), archive.size()};
+}
+
+std::string gzip(const std::string& contents) {
+  const auto packed = raw_deflated(bytes_of(contents));
+  std::string bytes("\x1F\x8B\x08\0\0\0\0\0\0\3", 10);
+  bytes.append(reinterpret_cast<const char*>(packed.data()), packed.size());
+  const auto crc =
+      static_cast<std::uint32_t>(crc32_z(0, reinterpret_cast<const Bytef*>(contents.data()), contents.size()));
+  for (const std::uint32_t word : {crc, static_cast<std::uint32_t>(contents.size())}) {
+    for (unsigned shift = 0; shift < 32; shift += 8) bytes += static_cast<char>(word >> shift & 0xFFU);
+  }
+  return bytes;
+}
+
+const char* const kEhdr =
+    "BYTEORDER M\nLAYOUT BIL\nNROWS 3\nNCOLS 4\nNBANDS 1\nNBITS 16\nBANDROWBYTES 8\nTOTALROWBYTES 8\nBANDGAPBYTES 0\n"
+    "PIXELTYPE SIGNEDINT\nNODATA -9999\nULXMAP 100.5\nULYMAP 200.5\nXDIM 0.5\nYDIM 0.5\n";
+const char* const kWkt =
+    R"(PROJCS["WGS_1984_UTM_Zone_11N",GEOGCS["GCS_WGS_1984",DATUM["D_WGS_1984",SPHEROID["WGS_1984",6378137.0,298.25]],)"
+    R"(PRIMEM["Greenwich",0.0],UNIT["Degree",0.0174532925199433]],PARAMETER["Central_Meridian",-117],UNIT["Meter",1.0]])";
+
+}  // namespace
+
+std::vector<ReaderCase> reader_cases() {
+  const ScratchFolder folder;
+  const std::string esri = "ncols 4\nnrows 3\nxllcorner 100\nyllcorner 200.5\ncellsize 10\nNODATA_value -9999\n";
+  const std::string numbers = "1 2.5 3 4\n5 -9999 7e1 8\n9 10 nan 12\n";
+  const std::string grass = "north: 200\nsouth: 180\neast: 130\nwest: 100\nrows: 2\ncols: 3\nnull: -1\ntype: int\n";
+  OpenOptions packed;
+  packed.channel = "terrarium";
+  std::vector<ReaderCase> cases = {
+      {"ExrScanLines", "a.exr", written(folder, "a.exr", 5, 4, SampleType::kFloat32), open_exr, {}},
+      {"ExrChannels", "a.exr", written(folder, "a.exr", 4, 3, SampleType::kFloat16, 4), open_exr, {}},
+      {"TiffTagsFirst", "a.tif", plain_tiff(false), open_tiff, {}},
+      {"TiffBigEndian", "a.tif", plain_tiff(true), open_tiff, {}},
+      {"TiffStripsDeflated", "a.tif", written(folder, "a.tif", 9, 7, SampleType::kInt16), open_tiff, {}},
+      {"TiffTiles", "a.tif", written(folder, "a.tif", 257, 258, SampleType::kUint8), open_tiff, {}},
+      {"PngGray16", "a.png", written(folder, "a.png", 6, 5, SampleType::kUint16), open_png, {}},
+      {"PngPacked", "a.png", written(folder, "a.png", 6, 5, SampleType::kUint8, 3), open_png, packed},
+      {"EsriAsciiGrid", "a.asc", esri + numbers, open_ascii_grid, {}},
+      {"GrassAsciiGrid", "a.asc", grass + "1 2 3\n4 -1 6\n", open_ascii_grid, {}},
+      {"GzippedAsciiGrid", "a.asc.gz", gzip(esri + numbers), open_ascii_grid, {}},
+      {"EhdrHeader", "a.hdr", kEhdr, open_header_grid, {}},
+      {"EhdrWorldFile", "a.blw", "0.5\n0\n0\n-0.5\n100.5\n200.5\n", open_header_grid, {}},
+      {"EhdrProjection", "a.prj", kWkt, open_header_grid, {}},
+      {"GridFloatSamples", "a.flt", counting(12, 4), open_header_grid, {}},
+      {"Pds3", "a.img", pds3(), open_pds3, {}},
+      {"Isis3", "a.cub", isis3(), open_isis3, {}},
+      {"Isis3Label", "a.lbl", isis3_label("^Core = core.cub\n    "), open_isis3, {}},
+      {"Npy", "a.npy", npy(), open_npy, {}},
+      {"Npz", "a.npz", zip("z.npy", npy()), open_npz, {}},
+      {"Dted", "a.dt0", dted(), open_dted, {}},
+      {"UsgsDem", "a.dem", usgs_dem(), open_usgs_dem, {}},
+      {"Hgt", "N10E010.hgt", counting(25, 2), open_hgt, {}},
+      {"ZippedHgt", "N10E010.hgt.zip", zip("N10E010.hgt", counting(25, 2)), open_hgt, {}},
+      {"RawDescription", "a.r16.json", "", open_raw, {}},
+  };
+  const auto find = [&](const char* name) -> ReaderCase& {
+    for (ReaderCase& each : cases) {
+      if (each.name == name) return each;
+    }
+    throw std::logic_error(name);
+  };
+  for (const char* name : {"EhdrHeader", "EhdrWorldFile", "EhdrProjection"}) {
+    ReaderCase& each = find(name);
+    each.opened = "a.bil";
+    each.text = true;
+    each.beside = {{"a.bil", counting(12, 2)}, {"a.hdr", kEhdr}};
+    if (each.name == "EhdrHeader") each.beside.pop_back();
+  }
+  find("GridFloatSamples").beside = {{"a.hdr", esri + "byteorder LSBFIRST\n"}};
+  find("Isis3Label").beside = {{"core.cub", counting(24, 2)}};
+  ReaderCase& raw = find("RawDescription");
+  (void)written(folder, "a.r16", 4, 3, SampleType::kUint16);
+  raw.bytes = text_of(folder / "a.r16.json");
+  raw.opened = "a.r16";
+  raw.beside = {{"a.r16", counting(12, 2)}};
+  for (const char* name :
+       {"EsriAsciiGrid", "GrassAsciiGrid", "Pds3", "Isis3", "Isis3Label", "Dted", "UsgsDem", "RawDescription", "Npy"}) {
+    find(name).text = true;
+  }
+  // The last digits of a text can be missing without trace; a world file, a .prj and a label's last words are not
+  // needed.
+  find("EsriAsciiGrid").shortest_valid = find("EsriAsciiGrid").bytes.size() - 2;
+  find("GrassAsciiGrid").shortest_valid = find("GrassAsciiGrid").bytes.size() - 1;
+  find("EhdrHeader").shortest_valid = 1;
+  find("EhdrWorldFile").shortest_valid = 1;
+  find("EhdrProjection").shortest_valid = 1;
+  find("Isis3Label").shortest_valid = find("Isis3Label").bytes.size() - 1;
+  find("UsgsDem").shortest_valid = find("UsgsDem").bytes.find_last_not_of(' ') + 1;
+  find("RawDescription").shortest_valid = find("RawDescription").bytes.size() - 1;
+  find("TiffStripsDeflated").shortest_valid = 1;  // the tags that isohf writes come last, and not all are needed
+  find("TiffTiles").shortest_valid = 1;
+  find("Hgt").shortest_valid = 1;  // another square
+  return cases;
+}
+
+}  // namespace isohf::testing
