@@ -20,6 +20,8 @@ namespace {
 
 constexpr std::size_t kOpenedAtOnce = 16;
 constexpr std::size_t kMostWarnings = 10;
+/// Places without a file that a warning names.
+constexpr std::size_t kHolesNamed = 4;
 /// Axes of ellipsoids that are written in fewer digits are the same.
 constexpr double kSameBody = 1e-9;
 
@@ -295,6 +297,7 @@ MosaicPlan plan_mosaic(const std::vector<std::string>& paths, const OpenOptions&
   info.z_offset = plan.samples.kind.z_offset;
   info.block_width = info.width;
   info.warnings.insert(info.warnings.end(), plan.samples.notes.begin(), plan.samples.notes.end());
+  if (plan.holes.samples > 0) info.warnings.push_back(plan.holes.describe(kHolesNamed));
   return plan;
 }
 

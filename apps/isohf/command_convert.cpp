@@ -11,6 +11,7 @@
 #include "accuracy_output.h"
 #include "command.h"
 #include "describe.h"
+#include "input_files.h"
 #include "interrupt.h"
 #include "isohf/archive/reader.h"
 #include "isohf/base/error.h"
@@ -24,6 +25,7 @@
 #include "options_texture.h"
 #include "output_file.h"
 #include "plan_report.h"
+#include "source_inputs.h"
 #include "standard_output.h"
 
 namespace isohf::cli {
@@ -39,6 +41,8 @@ Examples:
   isohf convert dem.tif dem.isohf
   isohf convert dem.tif -o dem.isohf --density 0.866 --outside void --overwrite
   isohf convert dem.tif dem.isohf --texture orthophoto.tif
+  isohf convert N4*E00*.hgt alps.isohf               many inputs form one surface
+  isohf convert tiles/ -o land.isohf --require-complete
   isohf convert heights.exr h.isohf --channel R --z-scale 1200 --sample-spacing 2
   isohf plan dem.tif                  the same options without writing: see what comes out
   for f in *.hgt; do isohf convert "$f" "${f%.hgt}.isohf" -q || break; done)";
@@ -46,8 +50,11 @@ Examples:
 struct ConvertCommandOptions {
   CommonOptions common;
   WorkOptions work;
-  std::string input;
+  SourceInputs inputs;
+  std::string input;  ///< what messages and reports call them: the file, or "mosaic of 12 files"
   std::string output;
+  bool output_is_last_name = false;  ///< without -o
+  std::string source_name;
   OpenOptions open;
   TextureOptions texture;
   ConvertOptions convert;
@@ -56,18 +63,52 @@ struct ConvertCommandOptions {
   std::optional<std::string> report;
 };
 
+/// The last name is the output where -o names none and there is another.
+void take_output(std::vector<std::string> names, ConvertCommandOptions& options) {
+  std::vector<std::string>& inputs = options.inputs.names;
+  if (options.output.empty() && !names.empty() && inputs.size() + names.size() > 1) {
+    options.output = names.back();
+    options.output_is_last_name = true;
+    names.pop_back();
+  }
+  inputs.insert(inputs.end(), names.begin(), names.end());
+}
+
+/// A forgotten output must not cost the last of many inputs.
+void protect_last_input(const ConvertCommandOptions& options, std::size_t inputs) {
+  std::error_code error;
+  if (!options.output_is_last_name || inputs < 2 || options.output.ends_with(".isohf") ||
+      !std::filesystem::is_regular_file(options.output, error)) {
+    return;
+  }
+  throw Error(
+      ErrorCode::kInvalidArgument,
+      fmt::format("{0}: exists, and is taken for the output as the last of {1} names; say -o {0} if that is meant",
+                  options.output, inputs + 1));
+}
+
 std::optional<ConvertCommandOptions> parse(const Arguments& arguments) {
   ConvertCommandOptions options;
   std::optional<double> sun_min_deg;
-  CommandLine line("convert", "Turns a raster of elevations into an archive of isometric heightfield tiles.");
+  std::vector<std::string> names;
+  CommandLine line("convert", "Turns rasters of elevations into an archive of isometric heightfield tiles.");
   line.group("Arguments");
-  line.positional("INPUT", "-i,--input", "Raster of elevations", options.input);
-  line.positional("OUTPUT", "-o,--output", "Archive to write, NAME.isohf", options.output);
+  line.positionals("INPUT... OUTPUT",
+                   "Rasters of elevations: files, folders, \"patterns*\" and @lists, which form one source; then the "
+                   "archive to write, NAME.isohf",
+                   names);
+  line.repeated("-i,--input", "INPUT", "An input, before those without a name; may be given again",
+                options.inputs.names);
+  line.option("-o,--output", "OUTPUT", "The archive to write; then all others are inputs", options.output);
   line.flag("--overwrite", "Replace OUTPUT where it exists", options.convert.overwrite);
   line.flag("--resume", "Continue OUTPUT.part of an interrupted run, after checking what is there",
             options.convert.resume);
   line.flag("--dry-run", "Print the plan and write nothing, as isohf plan INPUT does", options.dry_run);
   add_source_options(line, options.open);
+  add_mosaic_options(line, options.inputs);
+  line.option("--source-name", "NAME",
+              "What the archive says it was made from, instead of the input's file name or a mosaic's files",
+              options.source_name);
   add_lattice_options(line, options.convert.plan);
   add_shape_options(line, options.convert.plan);
   add_quantisation_options(line, options.convert);
@@ -106,7 +147,8 @@ std::optional<ConvertCommandOptions> parse(const Arguments& arguments) {
   add_common_options(line, options.common);
   line.footer(kFooter);
   if (!line.parse(arguments)) return std::nullopt;
-  line.require("INPUT", options.input);
+  take_output(std::move(names), options);
+  line.require("INPUT", options.inputs.names);
   if (!options.dry_run) line.require("OUTPUT", options.output);
   if (options.convert.clamp_range && !options.convert.z_range) {
     throw Error(ErrorCode::kInvalidArgument, "convert: --clamp-range needs --z-range MIN:MAX");
@@ -151,6 +193,7 @@ Measured measure(const ConvertSummary& summary) {
 ordered_json json_from(const ConvertCommandOptions& options, const ConvertSummary& summary) {
   const Measured measured = measure(summary);
   return {{"input", options.input},
+          {"files", summary.metadata.source.mosaic ? summary.metadata.source.mosaic->files : 1},
           {"output", options.output},
           {"tiles_expected", summary.tiles_expected},
           {"tiles_written", summary.tiles_written},
@@ -230,13 +273,24 @@ void write_report(const ConvertCommandOptions& options, const Accuracy& accuracy
 
 int run(ConvertCommandOptions options) {
   const CommonOptions& common = options.common;
+  // What the output is can be told before anything is looked for.
+  if (!options.dry_run) check_output_file(options.inputs.names, options.output, options.convert.overwrite);
+  std::vector<std::string> files = expand_inputs(options.inputs.names, options.inputs.recursive);
   if (!options.dry_run) {
-    check_output_file(options.input, options.output, options.convert.overwrite);
+    protect_last_input(options, files.size());
+    check_output_file(files, options.output, options.convert.overwrite);
     if (options.report && *options.report != "-") {
-      check_output_file(options.input, *options.report, options.convert.overwrite);
+      check_output_file(files, *options.report, options.convert.overwrite);
     }
   }
-  const std::unique_ptr<HeightSource> source = open_source(options.input, options.open);
+  const OpenedInputs opened = open_inputs(std::move(files), options.inputs, options.open, options.work.threads);
+  const std::unique_ptr<HeightSource>& source = opened.source;
+  options.input = source->info().path;
+  options.convert.source_note = opened.note;
+  if (!options.source_name.empty()) {
+    options.convert.source_note.name = options.source_name;
+    options.convert.source_note.mosaic.reset();
+  }
   const std::unique_ptr<PhotoSource> photo = open_texture(options.texture, options.convert.texture);
   if (options.dry_run) {
     print_plan(source->info(), make_plan(source->info(), options.convert.plan), options.convert.code_type, common);

@@ -1,6 +1,7 @@
 /// isohf info: what an archive or a raster holds.
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cstring>
@@ -187,6 +188,13 @@ std::string describe_members(const std::vector<MemberEntry>& members) {
   return text;
 }
 
+std::string describe_mosaic(const MosaicRecord& mosaic) {
+  const auto shown = static_cast<std::int64_t>(mosaic.first_names.size());
+  std::string names = fmt::format("{}", fmt::join(mosaic.first_names, ", "));
+  if (mosaic.files > shown) names += fmt::format(" and {} more", describe_count(mosaic.files - shown));
+  return fmt::format("{} files, the {} on top: {}", describe_count(mosaic.files), mosaic.overlap, names);
+}
+
 std::string describe_archive(const ArchiveReader& archive) {
   const Metadata& metadata = archive.metadata();
   const TileGrid& grid = metadata.grid;
@@ -234,6 +242,7 @@ std::string describe_archive(const ArchiveReader& archive) {
   say("source", fmt::format("{}: {}, {} x {} {}{}, registered as {}", source.name, source.format, source.width,
                             source.height, source.sample_type,
                             source.channel.empty() ? "" : ", channel " + source.channel, source.registration));
+  if (source.mosaic) say("joined from", describe_mosaic(*source.mosaic));
   say("reference", describe_crs(source));
   say("filter", fmt::format("{}, acquisition {}", metadata.filter, metadata.acquisition));
   say("size",

@@ -194,6 +194,13 @@ void CommandLine::positional(const std::string& name, const std::string& flags, 
   state_->usage_positionals += " " + name;
 }
 
+void CommandLine::positionals(const std::string& usage, const std::string& description,
+                              std::vector<std::string>& values) {
+  const std::string name = usage.substr(0, usage.find_first_of(" ."));
+  state_->app.add_option(name, values, description)->type_name(usage)->group(state_->group);
+  state_->usage_positionals += " " + usage;
+}
+
 void CommandLine::option(const std::string& flags, const std::string& value_name, const std::string& description,
                          Take take) {
   const std::string name = State::long_name(flags);
@@ -230,6 +237,20 @@ void CommandLine::option_or_value(const std::string& flag, const std::string& va
                                   Take take) {
   option(flag, value_name, description, std::move(take));
   state_->alone[flag] = {alone, std::move(is_value)};
+}
+
+void CommandLine::repeated(const std::string& flags, const std::string& value_name, const std::string& description,
+                           std::vector<std::string>& values) {
+  const auto callback = [&values](const std::vector<std::string>& found) {
+    values.insert(values.end(), found.begin(), found.end());
+    return true;
+  };
+  state_->app.add_option(flags, callback, description)
+      ->type_name(value_name)
+      ->group(state_->group)
+      ->expected(1)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
+      ->allow_extra_args(false);
 }
 
 void CommandLine::repeated_pair(const std::string& flags, const std::string& value_name, const std::string& description,
@@ -312,6 +333,10 @@ bool CommandLine::parse(const Arguments& given) {
 
 bool CommandLine::given(const std::string& option) const {
   return state_->app.get_option(option)->count() > 0;
+}
+
+void CommandLine::require(const std::string& name, const std::vector<std::string>& values) const {
+  require(name, values.empty() ? std::string() : "given");
 }
 
 void CommandLine::require(const std::string& name, const std::string& value) const {

@@ -28,6 +28,8 @@ class CommandLine {
   /// A value without a name; `flags` ("-i,--input") name it as well.
   void positional(const std::string& name, const std::string& flags, const std::string& description,
                   std::string& value);
+  /// All values without a name that no other positional takes; `usage` is how they are shown: "INPUT... OUTPUT".
+  void positionals(const std::string& usage, const std::string& description, std::vector<std::string>& values);
   void option(const std::string& flags, const std::string& value_name, const std::string& description, Take take);
   void option(const std::string& flags, const std::string& value_name, const std::string& description,
               std::string& value);
@@ -38,6 +40,9 @@ class CommandLine {
   /// The same where the next argument is its value if `is_value` says so.
   void option_or_value(const std::string& flag, const std::string& value_name, const std::string& alone,
                        std::function<bool(const std::string&)> is_value, const std::string& description, Take take);
+  /// An option that may be given again and again; values are appended.
+  void repeated(const std::string& flags, const std::string& value_name, const std::string& description,
+                std::vector<std::string>& values);
   /// An option of two values that may be given again and again.
   void repeated_pair(const std::string& flags, const std::string& value_name, const std::string& description,
                      std::function<void(const std::string&, const std::string&)> take);
@@ -53,6 +58,7 @@ class CommandLine {
   [[nodiscard]] bool given(const std::string& option) const;
   /// Throws Error{kInvalidArgument} for a positional that is empty after parsing.
   void require(const std::string& name, const std::string& value) const;
+  void require(const std::string& name, const std::vector<std::string>& values) const;
 
  private:
   struct State;

@@ -7,6 +7,7 @@
 
 #include "command.h"
 #include "describe.h"
+#include "input_files.h"
 #include "isohf/base/error.h"
 #include "json_output.h"
 #include "option_values.h"
@@ -14,6 +15,7 @@
 #include "options_lattice.h"
 #include "options_source.h"
 #include "plan_report.h"
+#include "source_inputs.h"
 #include "standard_output.h"
 
 namespace isohf::cli {
@@ -29,12 +31,14 @@ Examples:
   isohf plan --levels 4 --triangles 10000
   isohf plan --shape 212x243
   isohf plan dem.tif --density 0.866
+  isohf plan tiles/                   what many rasters make together
   isohf plan --table1                 the paper's Table 1 with true aspects)";
 
 struct PlanOptions {
   CommonOptions common;
-  std::string input;
+  SourceInputs inputs;
   OpenOptions open;
+
   PlanRequest request;
   CodeType code_type = CodeType::kU16;
   int limit = 10;
@@ -45,7 +49,13 @@ std::optional<PlanOptions> parse(const Arguments& arguments) {
   PlanOptions options;
   CommandLine line("plan", "Lists tile shapes, or what convert would make of an input.");
   line.group("Arguments");
-  line.positional("INPUT", "-i,--input", "Raster of elevations (default: none, list shapes)", options.input);
+  std::vector<std::string> names;
+  line.positionals("INPUT...",
+                   "Rasters of elevations: files, folders, \"patterns*\" and @lists, which form one source (default: "
+                   "none, list shapes)",
+                   names);
+  line.repeated("-i,--input", "INPUT", "An input, before those without a name; may be given again",
+                options.inputs.names);
   add_shape_options(line, options.request);
   add_code_type_option(line, options.code_type);
   line.option("--limit", "N", "List at most N candidates (default 10)",
@@ -53,20 +63,23 @@ std::optional<PlanOptions> parse(const Arguments& arguments) {
   line.flag("--table1", "List the shapes of the paper's Table 1", options.table1);
   add_lattice_options(line, options.request);
   add_source_options(line, options.open);
+  add_mosaic_options(line, options.inputs);
   add_common_options(line, options.common);
   line.footer(kFooter);
   if (!line.parse(arguments)) return std::nullopt;
+  options.inputs.names.insert(options.inputs.names.end(), names.begin(), names.end());
   const auto refuse = [](const std::string& why) { throw Error(ErrorCode::kInvalidArgument, "plan: " + why); };
-  if (options.input.empty()) {
-    for (const char* option : {"--density", "--spacing", "--tiles", "--fit", "--outside", "--channel", "--registration",
-                               "--nodata", "--z-scale", "--z-offset", "--sample-spacing"}) {
+  if (options.inputs.names.empty()) {
+    for (const char* option :
+         {"--density", "--spacing", "--tiles", "--fit", "--outside", "--channel", "--registration", "--nodata",
+          "--z-scale", "--z-offset", "--sample-spacing", "--overlap", "--require-complete", "--recursive"}) {
       if (line.given(option)) refuse(std::string(option) + " needs an INPUT");
     }
   } else if (line.given("--limit")) {
     refuse("--limit is for lists of candidates, without an INPUT");
   }
   if (options.table1) {
-    if (!options.input.empty()) refuse("--table1 takes no INPUT");
+    if (!options.inputs.names.empty()) refuse("--table1 takes no INPUT");
     for (const char* option : {"--shape", "--levels", "--triangles", "--vertices", "--limit"}) {
       if (line.given(option)) refuse(std::string("--table1 takes no ") + option);
     }
@@ -167,10 +180,12 @@ void list_candidates(const PlanOptions& options) {
 int run(const PlanOptions& options) {
   if (options.table1) {
     list_table1(options);
-  } else if (options.input.empty()) {
+  } else if (options.inputs.names.empty()) {
     list_candidates(options);
   } else {
-    const std::unique_ptr<HeightSource> source = open_source(options.input, options.open);
+    const std::unique_ptr<HeightSource> source =
+        open_inputs(expand_inputs(options.inputs.names, options.inputs.recursive), options.inputs, options.open, 0)
+            .source;
     const Plan plan = make_plan(source->info(), options.request);
     print_plan(source->info(), plan, options.code_type, options.common);
   }

@@ -12,6 +12,7 @@
 #include "command.h"
 #include "describe.h"
 #include "formats/registry.h"
+#include "input_files.h"
 #include "interrupt.h"
 #include "isohf/archive/content_hash.h"
 #include "isohf/base/error.h"
@@ -23,6 +24,7 @@
 #include "output_grid.h"
 #include "restored_raster.h"
 #include "restored_samples.h"
+#include "source_inputs.h"
 #include "standard_output.h"
 
 namespace isohf::cli {
@@ -68,7 +70,10 @@ std::optional<RestoreOptions> parse(const Arguments& arguments) {
                   "Raster to write: NAME.tif, .exr, .png, .hgt, .asc, .flt, .r16, .r32 or .npy", options.output);
   line.flag("--overwrite", "Replace RASTER where it exists", options.overwrite);
   line.group("Grid");
-  line.option("--like", "INPUT", "The grid of this raster (default: of the archive's source)", options.like);
+  line.option(
+      "--like", "INPUT",
+      "The grid of this raster, or of a folder, \"pattern*\" or @list of them (default: of the archive's source)",
+      options.like);
   line.option("--size", "WxH", "So many samples over the source's ground",
               [&](const std::string& text) { options.size = parse_size(text, 1, std::int64_t{1} << 31U); });
   line.option("--spacing", "D", "Samples D world units apart",
@@ -89,7 +94,9 @@ std::optional<RestoreOptions> parse(const Arguments& arguments) {
 }
 
 SampleGrid asked_grid(const RestoreOptions& options, const Metadata& metadata) {
-  if (!options.like.empty()) return grid_like(metadata, open_source(options.like, {})->info());
+  if (!options.like.empty()) {
+    return grid_like(metadata, open_inputs(expand_inputs({options.like}, false), {}, {}, 0).source->info());
+  }
   if (!options.size && !options.spacing) return source_grid(metadata.source);
   return grid_over(metadata.valid, metadata.source.registration == "area", options.size, options.spacing);
 }

@@ -1,6 +1,7 @@
 /// isohf verify: is an archive whole, and how far is it from what it was made from?
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -8,6 +9,7 @@
 #include "accuracy_output.h"
 #include "command.h"
 #include "describe.h"
+#include "input_files.h"
 #include "interrupt.h"
 #include "isohf/base/error.h"
 #include "isohf/verify/findings.h"
@@ -16,6 +18,7 @@
 #include "option_values.h"
 #include "options_common.h"
 #include "options_source.h"
+#include "source_inputs.h"
 #include "standard_output.h"
 
 namespace isohf::cli {
@@ -37,7 +40,7 @@ struct VerifyCommandOptions {
   CommonOptions common;
   WorkOptions work;
   std::string archive;
-  std::string against;
+  SourceInputs against;
   OpenOptions open;
   std::int64_t random_points = kRandomPoints;
   std::optional<double> max_error;
@@ -53,7 +56,11 @@ std::optional<VerifyCommandOptions> parse(const Arguments& arguments) {
   line.positional("ARCHIVE", "-i,--input", "Archive to check", options.archive);
   line.flag("--list-checks", "Print what is checked, one finding kind a line, and exit", options.list_checks);
   line.group("Comparison");
-  line.option("--against", "INPUT", "Measure the surface against the raster it was made from", options.against);
+  line.repeated(
+      "--against", "INPUT",
+      "Measure the surface against the raster it was made from; a folder, \"pattern*\" or @list, or again and "
+      "again, for a mosaic",
+      options.against.names);
   line.option("--random", "N", "Random places to compare beside the input's samples (default 100000)",
               [&](const std::string& text) { options.random_points = parse_whole_number(text, 0, 1000000000); });
   line.flag("--no-ortho", "Leave out the ortho meshes that the surface is compared with", options.no_ortho);
@@ -71,15 +78,17 @@ std::optional<VerifyCommandOptions> parse(const Arguments& arguments) {
   line.option("--max-rms", "E", "Exit 3 where the root mean square error is above E (default: any passes)",
               limit(options.max_rms));
   add_source_options(line, options.open);
+  add_mosaic_options(line, options.against);
   add_work_options(line, options.work);
   add_common_options(line, options.common);
   line.footer(kFooter);
   if (!line.parse(arguments)) return std::nullopt;
   if (options.list_checks) return options;
   line.require("ARCHIVE", options.archive);
-  if (options.against.empty()) {
-    for (const char* option : {"--random", "--no-ortho", "--max-error", "--max-rms", "--channel", "--registration",
-                               "--nodata", "--z-scale", "--z-offset", "--sample-spacing"}) {
+  if (options.against.names.empty()) {
+    for (const char* option :
+         {"--random", "--no-ortho", "--max-error", "--max-rms", "--channel", "--registration", "--nodata", "--z-scale",
+          "--z-offset", "--sample-spacing", "--overlap", "--require-complete", "--recursive"}) {
       if (line.given(option)) {
         throw Error(ErrorCode::kInvalidArgument, std::string("verify: ") + option + " needs --against INPUT");
       }
@@ -171,7 +180,10 @@ Accuracy compare(const VerifyCommandOptions& options, const std::atomic<bool>& c
   if (open.channel.empty()) open.channel = record.channel;
   if (!open.registration)
     open.registration = record.registration == "area" ? Registration::kArea : Registration::kPoint;
-  const std::unique_ptr<HeightSource> source = open_source(options.against, open);
+  SourceInputs inputs = options.against;
+  if (!inputs.overlap_given && record.mosaic && record.mosaic->overlap == "first") inputs.overlap = OverlapRule::kFirst;
+  const std::unique_ptr<HeightSource> source =
+      open_inputs(expand_inputs(inputs.names, inputs.recursive), inputs, open, options.work.threads).source;
   return measure_accuracy(options.archive, *source, options.random_points, !options.no_ortho, options.work,
                           options.common, cancel);
 }
@@ -196,7 +208,7 @@ int run(const VerifyCommandOptions& options) {
   VerifyReport report = check(options, cancel);
   std::optional<Accuracy> accuracy;
   // An archive that is not whole has no surface to measure.
-  const bool compares = !options.against.empty() && report.passed();
+  const bool compares = !options.against.names.empty() && report.passed();
   if (compares) {
     accuracy = compare(options, cancel);
     add_findings(*accuracy, report);
@@ -214,8 +226,9 @@ int run(const VerifyCommandOptions& options) {
     for (const Finding& finding : report.findings) out.write(text_from(finding));
     const std::int64_t not_listed = report.findings_total - static_cast<std::int64_t>(report.findings.size());
     if (not_listed > 0) out.write(fmt::format("and {} more\n", describe_count(not_listed)));
-    if (accuracy) out.write(text_from(*accuracy, options.against));
-    if (!options.against.empty() && !compares) out.write("not compared with the input: the archive is not whole\n");
+    if (accuracy) out.write(text_from(*accuracy, fmt::format("{}", fmt::join(options.against.names, " "))));
+    if (!options.against.names.empty() && !compares)
+      out.write("not compared with the input: the archive is not whole\n");
     if (!too_far.empty()) out.write("difference: " + too_far + "\n");
     out.write(fmt::format("{}: {}: {} tiles and {} shared vertices checked, {} findings\n", options.archive,
                           passed ? "passed" : "FAILED", describe_count(report.tiles_checked),

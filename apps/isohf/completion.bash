@@ -25,6 +25,7 @@ _isohf() {
   case "$command $previous" in
     *' --filter') values='nearest bilinear catmull-rom bspline2 bspline3 bspline5 lanczos3 lanczos6' ;;
     *' --acquisition') values='point box tent gaussian: fir:' ;;
+    *' --overlap') values='last first' ;;
     *' --outside') values='cover clamp void' ;;
     *' --type') values='u16 u8 f32' ;;
     *' --encoding') values='terrarium mapbox rgba-float' ;;

@@ -22,17 +22,20 @@ bool same_file(const struct stat& a, const struct stat& b) {
 }  // namespace
 
 void check_output_file(const std::string& input, const std::string& output, bool overwrite) {
-  struct stat in {};
+  check_output_file(std::vector<std::string>{input}, output, overwrite);
+}
+
+void check_output_file(const std::vector<std::string>& inputs, const std::string& output, bool overwrite) {
   struct stat out {};
-  const bool input_exists = ::stat(input.c_str(), &in) == 0;
-  if (input_exists) {
-    // The writer truncates NAME.part and its journal as well.
-    for (const char* ending : {"", ".part", ".part.journal"}) {
-      const std::string written = output + ending;
-      if (::stat(written.c_str(), &out) == 0 && same_file(in, out)) {
-        refuse(output, "the output " + (*ending == '\0' ? std::string() : "writes " + written + ", which ") +
-                           "is the input; choose another name");
-      }
+  // The writer truncates NAME.part and its journal as well.
+  for (const char* ending : {"", ".part", ".part.journal"}) {
+    const std::string written = output + ending;
+    if (::stat(written.c_str(), &out) != 0) continue;
+    for (const std::string& input : inputs) {
+      struct stat in {};
+      if (::stat(input.c_str(), &in) != 0 || !same_file(in, out)) continue;
+      refuse(output, "the output " + (*ending == '\0' ? std::string() : "writes " + written + ", which ") +
+                         (inputs.size() == 1 ? "is the input" : "is one of the inputs") + "; choose another name");
     }
   }
   if (::stat(output.c_str(), &out) == 0) {

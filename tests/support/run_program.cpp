@@ -44,6 +44,7 @@ void limit(int resource, std::uint64_t bytes) {
   if (!options.folder.empty() && ::chdir(options.folder.c_str()) != 0) ::_exit(126);
   if (options.file_size_limit_bytes) limit(RLIMIT_FSIZE, *options.file_size_limit_bytes);
   if (options.address_space_bytes) limit(RLIMIT_AS, *options.address_space_bytes);
+  if (options.open_files) limit(RLIMIT_NOFILE, *options.open_files);
   limit(RLIMIT_CORE, 0);
   constexpr uid_t kNobody = 65534;
   if (options.without_privileges && ::geteuid() == 0 && ::setuid(kNobody) != 0) ::_exit(126);

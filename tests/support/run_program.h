@@ -17,6 +17,7 @@ struct RunOptions {
   bool close_output = false;                           ///< nobody reads standard output: a closed pipe
   std::optional<std::uint64_t> file_size_limit_bytes;  ///< RLIMIT_FSIZE: a disk that fills up
   std::optional<std::uint64_t> address_space_bytes;    ///< RLIMIT_AS: memory that runs out
+  std::optional<std::uint64_t> open_files;             ///< RLIMIT_NOFILE
   bool without_privileges = false;                     ///< as the user nobody, where the test runs as root
 };
 

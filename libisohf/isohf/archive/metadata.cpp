@@ -116,7 +116,27 @@ Json source_to_json(const SourceRecord& source) {
                   {"semi_major_axis_m", or_null(source.semi_major_axis_m)},
                   {"inverse_flattening", or_null(source.inverse_flattening)}};
   json["vertical_datum"] = {{"name", text_or_null(source.vertical_datum)}, {"epsg", or_null(source.vertical_epsg)}};
+  if (source.mosaic) {
+    json["mosaic"] = {{"files", source.mosaic->files},
+                      {"names", source.mosaic->first_names},
+                      {"names_sha256", source.mosaic->names_sha256},
+                      {"overlap", source.mosaic->overlap}};
+  }
   return json;
+}
+
+MosaicRecord mosaic_from_json(const ObjectReader& json) {
+  MosaicRecord mosaic;
+  mosaic.files = json.integer("files");
+  const Json& names = json.required("names");
+  if (!names.is_array()) refuse(json.path("names"), "is no array");
+  for (const Json& name : names) {
+    if (!name.is_string()) refuse(json.path("names"), "holds something that is no string");
+    mosaic.first_names.push_back(name.get<std::string>());
+  }
+  mosaic.names_sha256 = json.text("names_sha256");
+  mosaic.overlap = json.text("overlap");
+  return mosaic;
 }
 
 SourceRecord source_from_json(const ObjectReader& json) {
@@ -150,6 +170,7 @@ SourceRecord source_from_json(const ObjectReader& json) {
   const ObjectReader datum = json.object("vertical_datum");
   source.vertical_datum = datum.optional_text("name");
   source.vertical_epsg = datum.optional_code("epsg");
+  if (json.has("mosaic")) source.mosaic = mosaic_from_json(json.object("mosaic"));
   return source;
 }
 

@@ -48,6 +48,14 @@ struct Statistics {
   double worst_rounding = 0.0;  ///< largest |stored - computed| elevation, vertical units
 };
 
+/// What a source of several files was joined from.
+struct MosaicRecord {
+  std::int64_t files = 0;
+  std::vector<std::string> first_names;  ///< without folders, some of them
+  std::string names_sha256;              ///< over all names, a line feed after each
+  std::string overlap;                   ///< which showed where several overlapped: "last" or "first" named
+};
+
 /// What the surface was made from, as found in the source.
 struct SourceRecord {
   std::string name;  ///< file name without its folder
@@ -76,6 +84,7 @@ struct SourceRecord {
   std::optional<double> inverse_flattening;
   std::string vertical_datum;
   std::optional<int> vertical_epsg;
+  std::optional<MosaicRecord> mosaic;  ///< nullopt: a single file
 };
 
 /// Everything about an archive but its elevations; its first member, as JSON (docs/archive_format.md).

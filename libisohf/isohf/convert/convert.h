@@ -29,6 +29,13 @@ struct TextureRequest {
   int jpeg_quality = 90;                ///< 1...100
 };
 
+/// What an archive says of its source beyond what the source itself says.
+struct SourceNote {
+  std::string name;                    ///< instead of the file's; empty: the file's
+  std::optional<MosaicRecord> mosaic;  ///< nullopt: a single file, or not to be said
+  std::string fingerprint;             ///< what --resume compares beside the file's own size and time
+};
+
 /// What a conversion does, beyond its input and output.
 struct ConvertOptions {
   PlanRequest plan;
@@ -49,6 +56,7 @@ struct ConvertOptions {
   bool resume = false;
   bool lossless = false;  ///< write residuals beside the tiles, so that the source's samples come back bit for bit
   std::string producer;   ///< "isohf 0.1.0"
+  SourceNote source_note;
 };
 
 /// What a conversion reports while it runs. Called from one thread at a time, a few times a second at most.

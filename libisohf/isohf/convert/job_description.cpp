@@ -10,10 +10,11 @@
 namespace isohf {
 namespace {
 
-SourceRecord record_of(const SourceInfo& info, const SourceFrame& frame) {
+SourceRecord record_of(const SourceInfo& info, const SourceFrame& frame, const SourceNote& note) {
   const Georeference& place = info.georeference;
   SourceRecord record;
-  record.name = std::filesystem::path(info.path).filename().string();
+  record.name = note.name.empty() ? std::filesystem::path(info.path).filename().string() : note.name;
+  record.mosaic = note.mosaic;
   record.format = info.format;
   record.width = info.width;
   record.height = info.height;
@@ -77,6 +78,7 @@ std::string heights_fingerprint(const SourceInfo& info, const Plan& plan, const 
 
 std::string job_fingerprint(const SourceInfo& info, const Plan& plan, const ConvertOptions& options) {
   std::string job = heights_fingerprint(info, plan, options);
+  if (!options.source_note.fingerprint.empty()) job += " | " + options.source_note.fingerprint;
   if (options.texture) {
     const TextureRequest& texture = *options.texture;
     const PhotoInfo& photo = texture.photo->info();
@@ -106,7 +108,7 @@ Metadata describe_job(const SourceInfo& info, const Plan& plan, const ConvertOpt
   metadata.outside = to_string(plan.outside);
   metadata.filter = options.filter;
   metadata.acquisition = options.acquisition;
-  metadata.source = record_of(info, plan.frame);
+  metadata.source = record_of(info, plan.frame, options.source_note);
   metadata.producer = options.producer;
   return metadata;
 }

@@ -1,0 +1,153 @@
+#include "input_files.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <glob.h>
+
+#include <algorithm>
+#include <cctype>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <set>
+
+#include "formats/registry.h"
+#include "isohf/base/error.h"
+
+namespace isohf::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+[[noreturn]] void refuse(const std::string& input, const std::string& why) {
+  throw Error(ErrorCode::kIo, input + ": " + why);
+}
+
+/// Extensions of native formats; headers beside the files that they describe are not rasters of their own.
+const std::set<std::string>& raster_extensions() {
+  static const std::set<std::string> known = [] {
+    std::set<std::string> list;
+    for (const Format& format : native_formats()) list.insert(format.extensions.begin(), format.extensions.end());
+    list.erase(".hdr");
+    return list;
+  }();
+  return known;
+}
+
+std::string lower(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return text;
+}
+
+bool has_raster_name(const fs::path& path) {
+  std::string name = lower(path.filename().string());
+  if (name.starts_with(".")) return false;
+  if (name.ends_with(".gz")) name.resize(name.size() - 3);
+  return std::any_of(raster_extensions().begin(), raster_extensions().end(), [&](const std::string& extension) {
+    return name.size() > extension.size() && name.ends_with(extension);
+  });
+}
+
+/// A detached label is read with the image beside it.
+bool is_label_of_another(const fs::path& path) {
+  if (lower(path.extension().string()) != ".lbl") return false;
+  for (const char* extension : {".img", ".IMG", ".Img"}) {
+    std::error_code ignored;
+    if (fs::exists(fs::path(path).replace_extension(extension), ignored)) return true;
+  }
+  return false;
+}
+
+template <typename Iterator>
+std::vector<std::string> rasters_in(const std::string& folder) {
+  std::vector<std::string> found;
+  std::error_code error;
+  Iterator entry(folder, error);
+  for (; !error && entry != Iterator(); entry.increment(error)) {
+    std::error_code gone;
+    if (entry->is_regular_file(gone) && has_raster_name(entry->path()) && !is_label_of_another(entry->path())) {
+      found.push_back(entry->path().string());
+    }
+  }
+  if (error) refuse(folder, "cannot be listed: " + error.message());
+  std::sort(found.begin(), found.end());
+  return found;
+}
+
+std::vector<std::string> files_of_folder(const std::string& folder, bool recursive) {
+  std::vector<std::string> found =
+      recursive ? rasters_in<fs::recursive_directory_iterator>(folder) : rasters_in<fs::directory_iterator>(folder);
+  if (found.empty()) {
+    refuse(folder, fmt::format("holds no raster that isohf reads ({}){}", fmt::join(raster_extensions(), ", "),
+                               recursive ? "" : "; --recursive looks into its folders too"));
+  }
+  return found;
+}
+
+std::vector<std::string> files_of_pattern(const std::string& pattern) {
+  glob_t matches{};
+  const int result = ::glob(pattern.c_str(), GLOB_NOSORT | GLOB_ERR, nullptr, &matches);
+  std::vector<std::string> found(matches.gl_pathv, matches.gl_pathv + matches.gl_pathc);
+  ::globfree(&matches);
+  if (result == GLOB_NOSPACE) throw Error(ErrorCode::kOutOfMemory, pattern + ": matches more than memory holds");
+  if (result == GLOB_ABORTED) refuse(pattern, "a folder of the pattern cannot be listed");
+  found.erase(std::remove_if(found.begin(), found.end(),
+                             [](const std::string& path) {
+                               std::error_code gone;
+                               return fs::is_directory(path, gone);
+                             }),
+              found.end());
+  if (found.empty()) refuse(pattern, "no file matches");
+  std::sort(found.begin(), found.end());
+  return found;
+}
+
+std::vector<std::string> files_of(const std::string& input, bool recursive) {
+  std::error_code error;
+  const fs::file_status status = fs::status(input, error);
+  if (fs::is_directory(status)) return files_of_folder(input, recursive);
+  if (fs::exists(status)) return {input};
+  if (input.find_first_of("*?[") != std::string::npos) return files_of_pattern(input);
+  refuse(input, error && error != std::errc::no_such_file_or_directory ? error.message() : "no such file");
+}
+
+std::vector<std::string> files_of_list(const std::string& list, bool recursive) {
+  std::error_code error;
+  if (fs::is_directory(list, error)) refuse(list, "is a folder; @ is for a list of inputs, leave it out");
+  std::ifstream file(list, std::ios::binary);
+  if (!file) refuse(list, fs::exists(list, error) ? "cannot be read" : "no such list of inputs");
+  const fs::path folder = fs::path(list).parent_path();
+  std::vector<std::string> found;
+  std::string line;
+  for (std::int64_t number = 1; std::getline(file, line); ++number) {
+    while (!line.empty() && (line.back() == '\r' || line.back() == ' ' || line.back() == '\t')) line.pop_back();
+    line.erase(0, std::min(line.find_first_not_of(" \t"), line.size()));
+    if (number == 1 && line.starts_with("\xEF\xBB\xBF")) line.erase(0, 3);
+    if (line.empty() || line.front() == '#') continue;
+    try {
+      // An absolute path stays what it is.
+      std::vector<std::string> files = files_of((folder / line).string(), recursive);
+      std::move(files.begin(), files.end(), std::back_inserter(found));
+    } catch (const Error& problem) {
+      throw problem.within(fmt::format("{}: line {}", list, number));
+    }
+  }
+  if (file.bad()) refuse(list, "cannot be read");
+  if (found.empty()) refuse(list, "names no input");
+  return found;
+}
+
+}  // namespace
+
+std::vector<std::string> expand_inputs(const std::vector<std::string>& inputs, bool recursive) {
+  std::vector<std::string> found;
+  for (const std::string& input : inputs) {
+    const bool is_list = input.size() > 1 && input.front() == '@';
+    std::vector<std::string> files = is_list ? files_of_list(input.substr(1), recursive) : files_of(input, recursive);
+    std::move(files.begin(), files.end(), std::back_inserter(found));
+  }
+  return found;
+}
+
+}  // namespace isohf::cli

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "command_line.h"
+#include "formats/mosaic_source.h"
+#include "formats/registry.h"
+#include "isohf/convert/convert.h"
+
+namespace isohf::cli {
+
+/// The inputs of a command that form one source, and how they are joined.
+struct SourceInputs {
+  std::vector<std::string> names;  ///< files, folders, patterns and @lists, as on the command line
+  OverlapRule overlap = OverlapRule::kLast;
+  bool overlap_given = false;
+  bool require_complete = false;
+  bool recursive = false;
+};
+
+/// The group "Several inputs": --overlap, --require-complete, --recursive.
+void add_mosaic_options(CommandLine& line, SourceInputs& inputs);
+
+/// Inputs, opened as one source.
+struct OpenedInputs {
+  std::vector<std::string> files;
+  std::unique_ptr<HeightSource> source;
+  SourceNote note;  ///< for the archive's metadata and --resume; says nothing of a single file
+};
+
+/// Opens what `files`, as expand_inputs gives them, are together: the file itself where it is one, else their mosaic.
+/// With --require-complete ground without a file is an Error{kIo}. threads: 0 for all cores.
+[[nodiscard]] OpenedInputs open_inputs(std::vector<std::string> files, const SourceInputs& inputs,
+                                       const OpenOptions& options, int threads);
+
+}  // namespace isohf::cli
