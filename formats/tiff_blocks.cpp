@@ -164,6 +164,22 @@ void TiffBlocks::choose_mode(std::uint64_t largest_block_bytes) {
   cache_.emplace(unit_bytes, std::max<std::uint64_t>(2, bound / unit_bytes));
 }
 
+void TiffBlocks::limit_cache(std::uint64_t bytes) {
+  if (cache_ && cache_bytes(bytes) < cache_bytes(UINT64_MAX)) {
+    const std::size_t unit_bytes = cache_->block_bytes();
+    cache_.emplace(unit_bytes, static_cast<std::size_t>(cache_bytes(bytes)) / unit_bytes);
+  }
+}
+
+std::uint64_t TiffBlocks::cache_bytes(std::uint64_t limit) const {
+  if (!cache_) return 0;
+  const std::uint64_t all = std::uint64_t{cache_->capacity()} * cache_->block_bytes();
+  if (mode_ == Mode::kRows) return all;
+  const std::uint64_t units = std::max<std::uint64_t>(2, limit / cache_->block_bytes());
+  return std::min(
+      {all, units * cache_->block_bytes(), std::max<std::uint64_t>(2, block_count_) * cache_->block_bytes()});
+}
+
 void TiffBlocks::set_fill(std::span<const std::byte> sample) {
   ISOHF_ASSERT(sample.size() == sample_bytes_);
   std::copy(sample.begin(), sample.end(), fill_.begin());

@@ -35,6 +35,11 @@ class TiffBlocks {
 
   [[nodiscard]] std::uint64_t block_count() const { return block_count_; }
   [[nodiscard]] std::uint64_t missing_blocks() const { return missing_; }
+  /// A smaller bound for the cache: whole blocks that are read in order need none. Large strips that are decoded row by
+  /// row keep theirs.
+  void limit_cache(std::uint64_t bytes);
+  /// What the cache takes at most within that bound.
+  [[nodiscard]] std::uint64_t cache_bytes(std::uint64_t limit) const;
   /// Rows that decode together.
   [[nodiscard]] std::int64_t unit_rows() const { return mode_ == Mode::kDirect ? 1 : unit_rows_; }
 

@@ -208,6 +208,14 @@ class TiffSource final : public HeightSource {
     }
   }
 
+  // From the South the windows of a caller do not begin where blocks do.
+  void limit_buffers(std::uint64_t bytes) override {
+    if (!turned_) blocks_->limit_cache(bytes);
+  }
+  [[nodiscard]] std::uint64_t buffer_bytes(std::uint64_t limit) const override {
+    return blocks_->cache_bytes(turned_ ? UINT64_MAX : limit);
+  }
+
  private:
   void describe(const TiffDirectories& directories, const TiffTags& tags, const OpenOptions& options) {
     require_heights(layout_);

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <sys/resource.h>
 
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -15,6 +16,7 @@
 #include "interrupt.h"
 #include "isohf/archive/reader.h"
 #include "isohf/base/error.h"
+#include "isohf/base/file.h"
 #include "isohf/convert/convert.h"
 #include "isohf/surface/kernels.h"
 #include "json_output.h"
@@ -143,7 +145,10 @@ std::optional<ConvertCommandOptions> parse(const Arguments& arguments) {
       "it to FILE.json as well",
       [&](const std::string& text) { options.report = text; });
   add_work_options(line, options.work);
-  add_memory_option(line, "Refuse to start where more memory would be needed", options.convert.memory_bytes);
+  add_memory_option(line, "Stay within SIZE of memory, to a tenth (default: as is fastest)",
+                    options.convert.memory_bytes);
+  line.option("--tmpdir", "FOLDER", "Where a scratch file may go that --memory asks for (default: OUTPUT's folder)",
+              options.convert.scratch_folder);
   add_common_options(line, options.common);
   line.footer(kFooter);
   if (!line.parse(arguments)) return std::nullopt;
@@ -160,6 +165,7 @@ std::optional<ConvertCommandOptions> parse(const Arguments& arguments) {
     options.convert.shadow_seeds->sun_min_deg = *sun_min_deg;
   }
   check_texture_options(options.texture);
+  if (!line.given("--tmpdir")) options.convert.scratch_folder = folder_of(options.output);
   options.convert.threads = options.work.threads;
   options.convert.producer = "isohf " ISOHF_VERSION;
   return options;
@@ -173,6 +179,17 @@ struct Measured {
   std::uint64_t peak_memory_bytes = 0;
 };
 
+/// The largest resident set so far. getrusage() would also count the program that started this one.
+std::uint64_t peak_memory_bytes() {
+  std::ifstream status("/proc/self/status");
+  for (std::string line; std::getline(status, line);) {
+    if (line.rfind("VmHWM:", 0) == 0) return std::strtoull(line.c_str() + 6, nullptr, 10) * 1024;
+  }
+  struct rusage usage {};
+  ::getrusage(RUSAGE_SELF, &usage);
+  return static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;
+}
+
 Measured measure(const ConvertSummary& summary) {
   Measured measured;
   measured.raw_bytes = 2 * summary.lattice_samples;
@@ -184,9 +201,7 @@ Measured measure(const ConvertSummary& summary) {
   if (summary.seconds > 0.0) {
     measured.samples_per_second = static_cast<double>(summary.source_samples) / summary.seconds;
   }
-  struct rusage usage {};
-  ::getrusage(RUSAGE_SELF, &usage);
-  measured.peak_memory_bytes = static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;
+  measured.peak_memory_bytes = peak_memory_bytes();
   return measured;
 }
 
@@ -293,11 +308,11 @@ int run(ConvertCommandOptions options) {
   }
   const std::unique_ptr<PhotoSource> photo = open_texture(options.texture, options.convert.texture);
   if (options.dry_run) {
-    print_plan(source->info(), make_plan(source->info(), options.convert.plan), options.convert.code_type, common);
+    print_plan(*source, options.convert, common);
     return kExitDone;
   }
   if (common.verbose && !common.quiet) {
-    print_plan_notes(source->info(), make_plan(source->info(), options.convert.plan), options.convert.code_type);
+    print_plan_notes(*source, options.convert);
   }
   const std::atomic<bool>& cancel = watch_interrupts();
   ConvertSummary summary = [&] {

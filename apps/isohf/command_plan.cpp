@@ -186,8 +186,10 @@ int run(const PlanOptions& options) {
     const std::unique_ptr<HeightSource> source =
         open_inputs(expand_inputs(options.inputs.names, options.inputs.recursive), options.inputs, options.open, 0)
             .source;
-    const Plan plan = make_plan(source->info(), options.request);
-    print_plan(source->info(), plan, options.code_type, options.common);
+    ConvertOptions convert;
+    convert.plan = options.request;
+    convert.code_type = options.code_type;
+    print_plan(*source, convert, options.common);
   }
   return kExitDone;
 }

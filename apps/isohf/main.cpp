@@ -63,7 +63,7 @@ Of commands that take a while:
 Of commands that write a file:
       --overwrite     Replace the output where it exists
       --resume        Continue an interrupted run
-      --memory SIZE   Refuse to start where more would be needed, as in 400M
+      --memory SIZE   Stay within that much, as in 400M
 Alone:
       --version       Print the version
 

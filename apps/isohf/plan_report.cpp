@@ -14,7 +14,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-ordered_json json_from_plan(const SourceInfo& info, const Plan& plan, CodeType code_type) {
+ordered_json json_from_plan(const SourceInfo& info, const Plan& plan, const MemoryPlan& memory, CodeType code_type) {
   const std::uint64_t raw =
       static_cast<std::uint64_t>(plan.lattice_samples) * static_cast<std::uint64_t>(raw_bytes(code_type));
   return {{"input",
@@ -38,10 +38,12 @@ ordered_json json_from_plan(const SourceInfo& info, const Plan& plan, CodeType c
           {"code_type", to_string(code_type)},
           {"raw_bytes", raw},
           {"estimated_archive_bytes", plan.estimated_bytes},
-          {"estimated_memory_bytes", plan.estimated_memory_bytes}};
+          {"estimated_memory_bytes", memory.bytes},
+          {"least_memory_bytes", memory.least_bytes},
+          {"scratch_bytes", memory.scratch_bytes}};
 }
 
-std::string text_from_plan(const SourceInfo& info, const Plan& plan, CodeType code_type) {
+std::string text_from_plan(const SourceInfo& info, const Plan& plan, const MemoryPlan& memory, CodeType code_type) {
   const TileGrid& grid = plan.grid;
   const TileShape& shape = grid.shape();
   const bool metres = plan.frame.in_metres;
@@ -69,27 +71,35 @@ std::string text_from_plan(const SourceInfo& info, const Plan& plan, CodeType co
       static_cast<std::uint64_t>(plan.lattice_samples) * static_cast<std::uint64_t>(raw_bytes(code_type));
   say("archive", fmt::format("about {} ({} samples, {} as raw {})", describe_bytes(plan.estimated_bytes),
                              describe_count(plan.lattice_samples), describe_bytes(raw), to_string(code_type)));
-  say("memory", fmt::format("about {} while converting", describe_bytes(plan.estimated_memory_bytes)));
+  say("memory", fmt::format("about {} while converting{}; --memory can be as small as {}", describe_bytes(memory.bytes),
+                            memory.scratch_bytes == 0
+                                ? ""
+                                : fmt::format(", and {} of a scratch file", describe_bytes(memory.scratch_bytes)),
+                            describe_bytes(memory.least_bytes)));
   return text;
 }
 
 }  // namespace
 
-void print_plan(const SourceInfo& info, const Plan& plan, CodeType code_type, const CommonOptions& common) {
+void print_plan(const HeightSource& source, const ConvertOptions& options, const CommonOptions& common) {
+  const SourceInfo& info = source.info();
+  const Plan plan = make_plan(info, options.plan);
+  const MemoryPlan memory = plan_memory(source, plan, options);
   if (!common.quiet) {
     for (const std::string& warning : info.warnings) print_warning(warning);
   }
   StandardOutput out;
   if (common.json) {
-    out.write(json_text(json_from_plan(info, plan, code_type)));
+    out.write(json_text(json_from_plan(info, plan, memory, options.code_type)));
   } else if (!common.quiet) {
-    out.write(text_from_plan(info, plan, code_type));
+    out.write(text_from_plan(info, plan, memory, options.code_type));
   }
   out.finish();
 }
 
-void print_plan_notes(const SourceInfo& info, const Plan& plan, CodeType code_type) {
-  std::istringstream lines(text_from_plan(info, plan, code_type));
+void print_plan_notes(const HeightSource& source, const ConvertOptions& options) {
+  const Plan plan = make_plan(source.info(), options.plan);
+  std::istringstream lines(text_from_plan(source.info(), plan, plan_memory(source, plan, options), options.code_type));
   for (std::string line; std::getline(lines, line);) print_note("isohf: " + line);
 }
 

@@ -76,6 +76,39 @@ TEST(BandReader, BandsHoldTheBitsOfTheWholeAndReadEachRowOnce) {
   }
 }
 
+TEST(BandReader, PartsOfTheColumnsHoldTheBitsOfTheWhole) {
+  for (const double void_share : {0.0, 0.02, 0.5, 0.9}) {
+    for (const auto& [filter, acquisition] :
+         {std::pair{Filter::kBilinear, "point"}, std::pair{Filter::kBspline2, "point"},
+          std::pair{Filter::kBspline3, "point"}, std::pair{Filter::kBspline5, "box"}}) {
+      MemorySource source(310, 130, void_share);
+      const Prefilter prefilter = Prefilter::make(filter, acquisition_from_string(acquisition));
+      BandReader whole(source, 0.0, prefilter);
+      SourceRows rows(source, ReadStep::make(source.info(), 5000), testing::TempDir(), 130);
+      BandReader in_parts(rows, 0.0, prefilter);
+      for (const RowRange& range : {RowRange{0, 40}, RowRange{38, 61}, RowRange{60, 129}}) {
+        const auto expected = whole.read(range);
+        for (const RowRange& columns : {RowRange{0, 20}, RowRange{18, 150}, RowRange{149, 152}, RowRange{150, 309}}) {
+          const auto part = in_parts.read(range, columns);
+          const SourceBand view = part->view();
+          ASSERT_EQ(view.first_column, columns.first);
+          for (std::int64_t r = 0; r <= range.last - range.first; ++r) {
+            ASSERT_EQ(std::memcmp(view.heights.row(r), expected->view().heights.row(r) + columns.first,
+                                  static_cast<std::size_t>(columns.last - columns.first + 1) * sizeof(float)),
+                      0)
+                << to_string(filter) << " voids " << void_share << " row " << r << " columns " << columns.first;
+            for (std::int64_t c = columns.first; c <= columns.last && !prefilter.is_identity(); ++c) {
+              const bool is_void = view.voids.data() != nullptr && view.voids(c - columns.first, r) != 0;
+              const float height = source.heights[static_cast<std::size_t>((range.first + r) * 310 + c)];
+              ASSERT_EQ(is_void, std::isnan(height)) << c << " " << r;
+            }
+          }
+        }
+      }
+    }
+  }
+}
+
 TEST(BandReader, TilesCutFromItsBandsFollowTheRuleForVoids) {
   const TileGrid grid = TileGrid::make(TileShape::make(12, 11, 2), 4, 4, 150.0, 150.0);
   for (const char* name : {"bilinear", "catmull-rom", "bspline2", "bspline3", "bspline5", "lanczos3"}) {

@@ -9,6 +9,7 @@
 
 #include <cerrno>
 #include <cstdio>
+#include <cstdlib>
 #include <system_error>
 #include <utility>
 
@@ -25,13 +26,13 @@ std::string reason(int error_number) {
   throw Error(ErrorCode::kIo, fmt::format("{}: {}: {}", path, deed, reason(error_number)));
 }
 
+}  // namespace
+
 std::string folder_of(const std::string& path) {
   const std::size_t slash = path.find_last_of('/');
   if (slash == std::string::npos) return ".";
   return slash == 0 ? "/" : path.substr(0, slash);
 }
-
-}  // namespace
 
 File::File(const std::string& path, Mode mode) : path_(path) {
   const int flags = O_CLOEXEC | (mode == Mode::kRead ? O_RDONLY | O_NONBLOCK : O_RDWR | O_CREAT);
@@ -46,6 +47,23 @@ File::File(const std::string& path, Mode mode) : path_(path) {
     ::close(std::exchange(descriptor_, -1));
     fail(path, "cannot open", error_number);
   }
+}
+
+File File::scratch(const std::string& folder, std::uint64_t size_bytes) {
+  File file;
+  file.path_ = folder;
+  file.descriptor_ = ::open(folder.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, 0600);
+  if (file.descriptor_ < 0 && (errno == EOPNOTSUPP || errno == EISDIR || errno == EINVAL)) {  // no O_TMPFILE there
+    std::string name = folder + "/isohf-scratch-XXXXXX";
+    file.descriptor_ = ::mkostemp(name.data(), O_CLOEXEC);
+    if (file.descriptor_ >= 0) ::unlink(name.c_str());
+  }
+  if (file.descriptor_ < 0) fail(folder, "cannot make a scratch file", errno);
+  const int failed = ::posix_fallocate(file.descriptor_, 0, static_cast<off_t>(size_bytes));
+  if (failed != 0 && failed != EINVAL && failed != EOPNOTSUPP) {
+    fail(folder, fmt::format("cannot reserve {} bytes for a scratch file", size_bytes), failed);
+  }
+  return file;
 }
 
 File::~File() {

@@ -18,6 +18,9 @@ class File {
   File() = default;
   /// Throws Error{kIo}; a folder is refused.
   File(const std::string& path, Mode mode);
+  /// A new file of `size_bytes` in `folder` that has no name and goes with its descriptor; its room is reserved where
+  /// the file system can. path() is the folder's. Throws Error{kIo}.
+  [[nodiscard]] static File scratch(const std::string& folder, std::uint64_t size_bytes);
   ~File();
   File(File&& other) noexcept;
   File& operator=(File&& other) noexcept;
@@ -67,6 +70,9 @@ class MappedFile {
 /// Moves `from` to `to` in one step. Without `overwrite` an existing `to` is left alone and false is returned.
 /// Throws Error{kIo} for anything else that goes wrong.
 [[nodiscard]] bool rename_file(const std::string& from, const std::string& to, bool overwrite);
+
+/// The folder that a path lies in; "." for a bare name.
+[[nodiscard]] std::string folder_of(const std::string& path);
 
 /// Makes a rename in the folder of `path` durable.
 void sync_folder_of(const std::string& path);

@@ -2,12 +2,10 @@
 
 #include <fmt/format.h>
 #include <oneapi/tbb/global_control.h>
-#include <oneapi/tbb/parallel_for.h>
 #include <oneapi/tbb/parallel_pipeline.h>
 #include <oneapi/tbb/task_arena.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <memory>
 #include <optional>
@@ -15,80 +13,23 @@
 #include "isohf/archive/writer.h"
 #include "isohf/base/assert.h"
 #include "isohf/base/error.h"
-#include "isohf/convert/elevation_range.h"
+#include "isohf/convert/conversion.h"
 #include "isohf/convert/job_description.h"
+#include "isohf/convert/memory_plan.h"
 #include "isohf/convert/quantiser.h"
 #include "isohf/convert/residual_stage.h"
 #include "isohf/convert/seed_stage.h"
 #include "isohf/convert/texture_stage.h"
+#include "isohf/convert/tile_source.h"
 #include "isohf/convert/tile_statistics.h"
-#include "isohf/surface/band_reader.h"
-#include "isohf/surface/edge_range.h"
-#include "isohf/surface/source_survey.h"
-#include "isohf/surface/tile_cutter.h"
 
 namespace isohf {
 namespace {
 
-using ProgressCallback = std::function<void(const ConvertProgress&)>;
-
-/// Calls back at most ten times a second, and at the end of a pass.
-class ProgressMeter {
- public:
-  ProgressMeter(const ProgressCallback& callback, ConvertProgress::Pass pass, std::int64_t total)
-      : callback_(callback) {
-    progress_.pass = pass;
-    progress_.total = total;
-  }
-
-  void report(std::int64_t done, std::uint64_t bytes_written) {
-    if (!callback_) return;
-    const auto now = std::chrono::steady_clock::now();
-    if (done < progress_.total && now - last_ < std::chrono::milliseconds(100)) return;
-    last_ = now;
-    progress_.done = done;
-    progress_.bytes_written = bytes_written;
-    callback_(progress_);
-  }
-
- private:
-  const ProgressCallback& callback_;
-  ConvertProgress progress_;
-  std::chrono::steady_clock::time_point last_{};
-};
-
-void throw_if_cancelled(const std::atomic<bool>& cancel) {
-  if (cancel.load(std::memory_order_relaxed)) throw Error(ErrorCode::kCancelled, "interrupted");
-}
-
-/// First pass: range and counts of the whole source.
-SourceSurvey survey_source(HeightSource& source, EdgeRange& edge, const ProgressCallback& callback,
-                           const std::atomic<bool>& cancel) {
-  const SourceInfo& info = source.info();
-  const std::int64_t step = rows_per_read(info);
-  ProgressMeter meter(callback, ConvertProgress::Pass::kRange, info.height);
-  SourceSurvey survey(info, false);
-  std::vector<std::byte> raw;
-  for (std::int64_t row = 0; row < info.height; row += step) {
-    throw_if_cancelled(cancel);
-    const std::int64_t rows = std::min(step, info.height - row);
-    raw.resize(static_cast<std::size_t>(rows * info.width) * size_bytes(info.sample_type));
-    source.read_window({0, row, info.width, rows}, raw);
-    survey.add(raw);
-    edge.add_rows(raw);
-    meter.report(row + rows, 0);
-  }
-  return survey;
-}
-
-/// Tiles that are read, made or waiting to be written; fewer where each takes long and brings much along.
-constexpr int kTilesInFlightPerThread = 8;
-constexpr int kTexturedTilesInFlightPerThread = 2;
-
 /// A tile on its way through the pipeline.
 struct TileJob {
   TileIndex index{};
-  std::shared_ptr<const Band> band;
+  std::shared_ptr<const TileSource::Part> part;
   EncodedTile encoded;
   SeedStage::Tile seeds;
   TextureStage::Encoded texture;
@@ -100,108 +41,6 @@ struct Stages {
   const TextureStage* textures = nullptr;
 };
 
-/// Elevations 0 to 1 in floats or scaled integers are most often a fraction of something.
-void warn_of_unit_range(const SourceInfo& info, const ElevationRange& range, std::vector<std::string>& warnings) {
-  if (!is_floating(info.sample_type) || info.z_scale != 1.0 || info.z_offset != 0.0) return;
-  if (range.min >= -0.1 && range.max <= 1.1 && range.max > range.min) {
-    warnings.push_back(
-        fmt::format("{}: elevations run from {:.4g} to {:.4g}, which looks like a fraction of a height, not "
-                    "metres; give --z-scale and --z-offset",
-                    info.path, range.min, range.max));
-  }
-}
-
-/// What one conversion holds constant.
-struct Conversion {
-  HeightSource& source;
-  const ConvertOptions& options;
-  const Plan& plan;
-  const Kernel kernel;
-  const Prefilter prefilter;
-  const std::atomic<bool>& cancel;
-  double datum = 0.0;
-  Quantisation quantisation{};
-
-  [[nodiscard]] SourceAxis axis_x() const {
-    const SourceFrame& frame = plan.frame;
-    return {frame.width,        frame.first_sample_x, frame.spacing_x,
-            frame.registration, plan.outside,         kContinuedSteps * 2.0 * plan.grid.sigma_x()};
-  }
-  [[nodiscard]] SourceAxis axis_z() const {
-    const SourceFrame& frame = plan.frame;
-    return {frame.height,       frame.first_sample_z, frame.spacing_z,
-            frame.registration, plan.outside,         kContinuedSteps * plan.grid.sigma_z()};
-  }
-  [[nodiscard]] TileCutter cutter(const ElevationRange& limits) const {
-    return {plan.grid, axis_x(), axis_z(), kernel, limits};
-  }
-};
-
-/// The range of the surface itself, for kernels that leave the range of their samples: cuts every tile, keeps none.
-ElevationRange measure_surface(const Conversion& job, const ElevationRange& limits, const ProgressCallback& callback) {
-  const TileGrid& grid = job.plan.grid;
-  const TileCutter cutter = job.cutter({limits.min - job.datum, limits.max - job.datum});
-  BandReader reader(job.source, job.datum, job.prefilter);
-  ProgressMeter meter(callback, ConvertProgress::Pass::kRange, grid.tile_rows());
-  std::vector<ElevationRange> ranges(static_cast<std::size_t>(grid.tile_columns()), {HUGE_VAL, -HUGE_VAL});
-  for (std::int64_t row = 0; row < grid.tile_rows(); ++row) {
-    throw_if_cancelled(job.cancel);
-    const auto band = reader.read(cutter.rows_needed(row));
-    oneapi::tbb::parallel_for(std::int64_t{0}, grid.tile_columns(), [&](std::int64_t column) {
-      std::vector<float> heights(static_cast<std::size_t>(grid.shape().stored_vertex_count()));
-      cutter.cut({column, row}, band->view(), heights);
-      ElevationRange& range = ranges[static_cast<std::size_t>(column)];
-      for (const float height : heights) {
-        const double elevation = double{height} + job.datum;  // NaN compares false
-        range.min = elevation < range.min ? elevation : range.min;
-        range.max = elevation > range.max ? elevation : range.max;
-      }
-    });
-    meter.report(row + 1, 0);
-  }
-  ElevationRange all{HUGE_VAL, -HUGE_VAL};
-  for (const ElevationRange& range : ranges) {
-    all = {std::min(all.min, range.min), std::max(all.max, range.max)};
-  }
-  return all.min <= all.max ? all : ElevationRange{};
-}
-
-/// First pass and what follows from it: datum, scale and offset.
-void choose_codes(Conversion& job, std::vector<std::string>& warnings, const ProgressCallback& progress) {
-  const SourceInfo& info = job.source.info();
-  const QuantisationRequest request{job.options.code_type, job.options.step};
-  if (job.options.z_range) {
-    const ElevationRange range{job.options.z_range->first, job.options.z_range->second};
-    job.datum = choose_datum(info, range);
-    job.quantisation = choose_quantisation(request, range, info);
-    return;
-  }
-  EdgeRange edge(info, job.axis_x().continued_samples(), job.axis_z().continued_samples());
-  const SourceSurvey survey = survey_source(job.source, edge, progress, job.cancel);
-  SourceScan found = survey.scan();
-  if (found.valid == 0) {
-    throw Error(ErrorCode::kInvalidArgument,
-                fmt::format("{}: all {} samples are void or not finite, there is no elevation to convert", info.path,
-                            found.voids));
-  }
-  warn_of_unit_range(info, found.range, warnings);
-  if (const std::string warning = survey.warning(); !warning.empty()) warnings.push_back(info.path + ": " + warning);
-  job.datum = choose_datum(info, found.range);
-  if (job.plan.outside == Outside::kCover) found.range = edge.widen(found.range);
-  job.quantisation = choose_quantisation(request, found.range, info);
-  const double over = overshoot(job.kernel, job.prefilter);
-  if (over == 0.0 || job.options.code_type == CodeType::kF32) return;
-  // The surface may leave the samples' range. Where the codes reach far enough for the worst case at the same step,
-  // nothing needs to be measured; voids, at which weights are renormalised, have no such bound.
-  const bool has_step = request.step ? *request.step != 0.0 : !is_floating(info.sample_type);
-  const ElevationRange reach = widened(found.range, over);
-  if (found.voids == 0 && has_step && has_codes_for(job.quantisation, reach)) {
-    job.quantisation = choose_quantisation({request.type, job.quantisation.scale}, reach, info);
-    return;
-  }
-  job.quantisation = choose_quantisation(request, measure_surface(job, found.range, progress), info);
-}
-
 [[noreturn]] void refuse_overflow(const Conversion& job, TileIndex tile, const QuantiserCounts& counts) {
   throw Error(ErrorCode::kInvalidArgument,
               fmt::format("tile ({},{}): {} elevations lie outside the z range {} to {}; widen --z-range, or give "
@@ -210,10 +49,10 @@ void choose_codes(Conversion& job, std::vector<std::string>& warnings, const Pro
                           elevation_from_code(job.quantisation, job.quantisation.max_code())));
 }
 
-void make_tile(const Conversion& job, const TileCutter& cutter, const Stages& stages, bool is_new, TileJob& tile) {
+void make_tile(const Conversion& job, const TileSource& source, const Stages& stages, bool is_new, TileJob& tile) {
   const TileShape& shape = job.plan.grid.shape();
   std::vector<float> heights(static_cast<std::size_t>(shape.stored_vertex_count()));
-  cutter.cut(tile.index, tile.band->view(), heights);
+  source.cut(tile.index, *tile.part, heights);
   TileCodes codes;
   const QuantiserCounts counts = quantise(job.quantisation, job.datum, heights, codes);
   if (counts.below + counts.above > 0 && !job.options.clamp_range) refuse_overflow(job, tile.index, counts);
@@ -228,50 +67,46 @@ void make_tile(const Conversion& job, const TileCutter& cutter, const Stages& st
 }
 
 /// Second pass: read -> resample and encode -> write in order. The number of tiles in flight is fixed, and so is the
-/// number of bands: one that is being cut and one that is being read.
-void write_tiles(const Conversion& job, ArchiveWriter& writer, const Stages& stages, const ProgressCallback& callback,
-                 std::size_t tiles_in_flight) {
+/// number of parts of the source: one that is being cut and one that is being read.
+void write_tiles(const Conversion& job, ArchiveWriter& writer, const Stages& stages, const ProgressCallback& callback) {
   const TileGrid& grid = job.plan.grid;
   const Quantisation& codes = job.quantisation;
   ElevationRange limits{-HUGE_VAL, HUGE_VAL};
   if (codes.type != CodeType::kF32) {
     limits = {codes.offset - job.datum, elevation_from_code(codes, codes.max_code()) - job.datum};
   }
-  const TileCutter cutter = job.cutter(limits);
-  BandReader reader(job.source, job.datum, job.prefilter);
+  TileSource source(job, limits);
   ProgressMeter meter(callback, ConvertProgress::Pass::kTiles, grid.tile_count());
   const std::int64_t first_new = writer.next_tile();
   std::int64_t next = stages.seeds != nullptr ? SeedStage::first_tile_needed(grid, first_new) : first_new;
-  std::int64_t band_row = -1;
-  std::shared_ptr<const Band> band;
+  std::shared_ptr<const TileSource::Part> part;
 
   // Tiles leave the pipeline in the order in which they enter it, so that a ring of as many as may be in flight always
   // has the next one free. The pipeline itself only hands on pointers: it forgets to destroy what it holds when a stage
   // throws.
-  std::vector<TileJob> ring(tiles_in_flight);
+  std::vector<TileJob> ring(job.memory.tiles_in_flight);
   std::size_t entered = 0;
 
   const auto read = [&](oneapi::tbb::flow_control& control) -> TileJob* {
     throw_if_cancelled(job.cancel);
     if (next == grid.tile_count()) {
-      band.reset();
+      part.reset();
       control.stop();
       return nullptr;
     }
     TileJob* tile = &ring[entered++ % ring.size()];
     *tile = {};
     tile->index = grid.tile_at(next++);
-    if (tile->index.row != band_row) {
-      band.reset();
-      band = reader.read(cutter.rows_needed(tile->index.row));
-      band_row = tile->index.row;
+    if (!part || !part->holds(tile->index)) {
+      part.reset();
+      part = source.read(tile->index);
     }
-    tile->band = band;
+    tile->part = part;
     return tile;
   };
   const auto encode = [&](TileJob* tile) {
-    make_tile(job, cutter, stages, grid.flat_index(tile->index) >= first_new, *tile);
-    tile->band.reset();
+    make_tile(job, source, stages, grid.flat_index(tile->index) >= first_new, *tile);
+    tile->part.reset();
     return tile;
   };
   std::int64_t written = next;
@@ -291,6 +126,16 @@ void write_tiles(const Conversion& job, ArchiveWriter& writer, const Stages& sta
                                                   make_filter<TileJob*, void>(filter_mode::serial_in_order, write));
 }
 
+[[noreturn]] void refuse_memory(const MemoryPlan& memory, const ConvertOptions& options) {
+  constexpr std::uint64_t kMega = 1000000;
+  const std::uint64_t least = (memory.least_bytes + kMega - 1) / kMega;
+  throw Error(
+      ErrorCode::kOutOfMemory,
+      fmt::format("--memory allows {} MB, this conversion needs at least {} MB; allow that much, or use smaller "
+                  "tiles (--shape, --triangles) or fewer --threads than {}",
+                  options.memory_bytes / kMega, least, threads_of(options)));
+}
+
 void check_range(const std::pair<double, double>& range) {
   if (!(std::isfinite(range.first) && std::isfinite(range.second) && range.first < range.second)) {
     throw Error(ErrorCode::kInvalidArgument,
@@ -298,16 +143,27 @@ void check_range(const std::pair<double, double>& range) {
   }
 }
 
-/// What bands take beyond plain heights: coefficients, a byte a sample that tells voids, and a halo on either side;
-/// while the next band is made the last one is still there.
-std::uint64_t prefilter_memory_bytes(const SourceInfo& info, const Plan& plan, const Prefilter& prefilter) {
-  if (prefilter.is_identity()) return 0;
-  const double band_rows = plan.grid.shape().rows() * plan.grid.sigma_z() / plan.frame.spacing_z + 16.0;
-  const double rows = std::min(band_rows + 4.0 * prefilter.halo(), 2.0 * static_cast<double>(info.height));
-  return static_cast<std::uint64_t>(6.0 * rows * static_cast<double>(info.width));
+}  // namespace
+
+void throw_if_cancelled(const std::atomic<bool>& cancel) {
+  if (cancel.load(std::memory_order_relaxed)) throw Error(ErrorCode::kCancelled, "interrupted");
 }
 
-}  // namespace
+SourceAxis Conversion::axis_x() const {
+  const SourceFrame& frame = plan.frame;
+  return {frame.width,        frame.first_sample_x, frame.spacing_x,
+          frame.registration, plan.outside,         kContinuedSteps * 2.0 * plan.grid.sigma_x()};
+}
+
+SourceAxis Conversion::axis_z() const {
+  const SourceFrame& frame = plan.frame;
+  return {frame.height,       frame.first_sample_z, frame.spacing_z,
+          frame.registration, plan.outside,         kContinuedSteps * plan.grid.sigma_z()};
+}
+
+TileCutter Conversion::cutter(const ElevationRange& limits) const {
+  return {plan.grid, axis_x(), axis_z(), kernel, limits};
+}
 
 ConvertSummary convert(HeightSource& source, const std::string& output, const ConvertOptions& options,
                        const ProgressCallback& progress, const std::atomic<bool>& cancel) {
@@ -316,23 +172,16 @@ ConvertSummary convert(HeightSource& source, const std::string& output, const Co
   const Plan plan = make_plan(info, options.plan);
   if (options.z_range) check_range(*options.z_range);
   if (options.shadow_seeds) check_seed_request(*options.shadow_seeds, plan.grid);
-  const int threads = options.threads > 0 ? options.threads : oneapi::tbb::this_task_arena::max_concurrency();
-  const int tiles_in_flight = threads * (options.texture ? kTexturedTilesInFlightPerThread : kTilesInFlightPerThread);
+  const int threads = threads_of(options);
   const std::optional<TextureStage> textures =
-      options.texture ? std::optional(TextureStage::make(plan, info, *options.texture, threads, tiles_in_flight))
-                      : std::nullopt;
+      options.texture
+          ? std::optional(TextureStage::make(plan, info, *options.texture, threads, textured_tiles_in_flight(options)))
+          : std::nullopt;
   const Kernel kernel = Kernel::make(filter_from_string(options.filter));
   Prefilter prefilter = Prefilter::make(kernel.filter(), acquisition_from_string(options.acquisition));
-  const std::uint64_t memory_bytes = plan.estimated_memory_bytes + prefilter_memory_bytes(info, plan, prefilter) +
-                                     (options.shadow_seeds ? seed_stage_memory_bytes(plan.grid) : 0) +
-                                     (options.lossless ? residual_stage_memory_bytes(info, plan, threads) : 0) +
-                                     (textures ? textures->memory_bytes() : 0);
-  if (options.memory_bytes != 0 && memory_bytes > options.memory_bytes) {
-    throw Error(ErrorCode::kOutOfMemory,
-                fmt::format("this conversion needs about {} MB, --memory allows {} MB; use smaller tiles (--shape, "
-                            "--triangles) or allow more",
-                            memory_bytes / 1000000, options.memory_bytes / 1000000));
-  }
+  const MemoryPlan memory = plan_memory(source, plan, options, textures ? textures->memory_bytes() : 0);
+  if (options.memory_bytes != 0 && memory.bytes > options.memory_bytes) refuse_memory(memory, options);
+  source.limit_buffers(memory.source_buffer_bytes);
   const oneapi::tbb::global_control workers(oneapi::tbb::global_control::max_allowed_parallelism,
                                             static_cast<std::size_t>(threads));
 
@@ -343,7 +192,7 @@ ConvertSummary convert(HeightSource& source, const std::string& output, const Co
   summary.warnings = info.warnings;
   if (textures)
     summary.warnings.insert(summary.warnings.end(), textures->warnings().begin(), textures->warnings().end());
-  Conversion job{source, options, plan, kernel, std::move(prefilter), cancel};
+  Conversion job{source, options, plan, memory, kernel, std::move(prefilter), cancel};
   std::optional<SeedStage> seeds;
   std::optional<LosslessRecord> lossless;
   try {
@@ -356,12 +205,11 @@ ConvertSummary convert(HeightSource& source, const std::string& output, const Co
         seeds.emplace(plan.grid, job.quantisation, *options.shadow_seeds,
                       known ? 1.0 / info.metres_per_vertical_unit : 1.0);
       }
-      write_tiles(job, writer, {seeds ? &*seeds : nullptr, textures ? &*textures : nullptr}, progress,
-                  static_cast<std::size_t>(tiles_in_flight));
+      write_tiles(job, writer, {seeds ? &*seeds : nullptr, textures ? &*textures : nullptr}, progress);
       if (options.lossless) {
         ProgressMeter meter(progress, ConvertProgress::Pass::kResiduals, info.height);
         lossless = write_residuals(
-            source, plan.frame, plan.grid, job.quantisation, writer,
+            source, plan.frame, plan.grid, job.quantisation, memory.members_at_once, writer,
             [&](std::int64_t rows) { meter.report(rows, writer.bytes_written()); }, cancel);
       }
     });

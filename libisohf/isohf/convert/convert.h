@@ -51,7 +51,10 @@ struct ConvertOptions {
   std::optional<ShadowSeedRequest> shadow_seeds;  ///< nullopt: none
   std::optional<TextureRequest> texture;          ///< nullopt: none
   int threads = 0;                                ///< 0: all cores
-  std::uint64_t memory_bytes = 0;                 ///< refuse plans that would need more; 0: no limit
+  /// Peak of the resident set, which is held to it within a tenth; a limit below what the most frugal way needs is
+  /// refused (memory_plan.h). 0: none. The archive does not depend on it.
+  std::uint64_t memory_bytes = 0;
+  std::string scratch_folder = ".";  ///< where rows go that memory has no room for, in a file without a name
   bool overwrite = false;
   bool resume = false;
   bool lossless = false;  ///< write residuals beside the tiles, so that the source's samples come back bit for bit
@@ -93,8 +96,7 @@ struct ConvertSummary {
 };
 
 /// source -> tiles -> archive. Two passes over the source at most (the first only finds the range; lossless takes one
-/// more for the residuals), bounded memory,
-/// all cores; the same bytes for any thread count.
+/// more for the residuals), bounded memory, all cores; the same bytes for any thread count and any bound.
 /// `cancel` is polled between tiles: set, the conversion stops within a fraction of a second with Error{kCancelled},
 /// leaving NAME.part and its journal for --resume and nothing under the final name.
 /// Throws Error as the source, the plan and the writer do.

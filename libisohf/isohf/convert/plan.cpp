@@ -134,19 +134,6 @@ void check(const PlanRequest& request) {
   }
 }
 
-/// Peak memory of convert: two bands of rows and their raw samples, tiles in flight, the index; see convert.cpp.
-std::uint64_t estimate_memory(const SourceInfo& info, const Plan& plan) {
-  const TileShape& shape = plan.grid.shape();
-  const double band_rows = shape.rows() * plan.grid.sigma_z() / plan.frame.spacing_z + 16.0;
-  const double row_bytes = static_cast<double>(info.width) * 4.0;
-  const double bands = 3.0 * std::min(band_rows, static_cast<double>(info.height)) * row_bytes;
-  const double blocks = 2.0 * static_cast<double>(info.block_height) * static_cast<double>(info.width) *
-                        static_cast<double>(size_bytes(info.sample_type));
-  const double tiles = 300.0 * static_cast<double>(shape.stored_vertex_count());
-  const double index = 128.0 * static_cast<double>(plan.grid.tile_count());
-  return static_cast<std::uint64_t>(bands + blocks + tiles + index + 40e6);
-}
-
 }  // namespace
 
 WorldBounds SourceFrame::bounds() const {
@@ -219,7 +206,6 @@ Plan make_plan(const SourceInfo& info, const PlanRequest& request) {
   constexpr double kTypicalBits = 5.0;
   plan.estimated_bytes = static_cast<std::uint64_t>(static_cast<double>(plan.lattice_samples) * kTypicalBits / 8.0 +
                                                     150.0 * static_cast<double>(plan.grid.tile_count()) + 20e3);
-  plan.estimated_memory_bytes = estimate_memory(info, plan);
   return plan;
 }
 

@@ -51,10 +51,9 @@ struct Plan {
   SourceFrame frame;
   TileGrid grid;
   Outside outside = Outside::kCover;
-  double density = 1.0;                      ///< lattice samples for one source sample, as it came out
-  std::int64_t lattice_samples = 0;          ///< C*R for all tiles
-  std::uint64_t estimated_bytes = 0;         ///< of the archive, from typical bits per sample; an estimate
-  std::uint64_t estimated_memory_bytes = 0;  ///< peak of convert
+  double density = 1.0;               ///< lattice samples for one source sample, as it came out
+  std::int64_t lattice_samples = 0;   ///< C*R for all tiles
+  std::uint64_t estimated_bytes = 0;  ///< of the archive, from typical bits per sample; an estimate
 };
 
 /// Chooses shape, spacing and tile grid. Throws Error{kInvalidArgument} naming the option at fault; a shape that breaks

@@ -15,7 +15,6 @@ namespace {
 
 /// Samples of one residual member: enough for its tables, few enough for many to be made side by side.
 constexpr std::int64_t kSamplesPerMember = std::int64_t{1} << 19U;
-constexpr std::size_t kMembersAtOnce = 8;
 
 /// Some rows of the source on their way into a member.
 struct ResidualBand {
@@ -50,15 +49,18 @@ std::int64_t rows_per_member(const SourceInfo& info) {
 
 }  // namespace
 
-std::uint64_t residual_stage_memory_bytes(const SourceInfo& info, const Plan& plan, int threads) {
+std::uint64_t residual_stage_memory_bytes(const SourceInfo& info, const Plan& plan, int threads,
+                                          std::size_t members_at_once) {
   const TileShape& shape = plan.grid.shape();
   const auto width = static_cast<double>(info.width);
   const auto rows = static_cast<double>(std::min(rows_per_member(info), info.height));
   const auto sample = static_cast<double>(size_bytes(info.sample_type));
   // Raw samples, predictions and what they deflate to; in each thread also heights, voids, streams and payload.
-  const double bands = static_cast<double>(kMembersAtOnce) * rows * width * (2.0 * sample + 8.0);
+  const double members =
+      std::min(static_cast<double>(members_at_once), std::ceil(static_cast<double>(info.height) / rows));
+  const double bands = members * rows * width * (2.0 * sample + 8.0);
   const double encoding = threads * rows * width * (5.0 + 5.0 * sample);
-  const double tile_rows = std::ceil(rows * plan.frame.spacing_z / plan.grid.extent_z()) + 2.0;
+  const double tile_rows = std::ceil(rows * plan.frame.spacing_z / plan.grid.extent_z()) + 1.0;
   const double tiles = tile_rows * static_cast<double>(plan.grid.tile_columns()) * 8.0 *
                        static_cast<double>(shape.stored_vertex_count());
   const double lattice_rows = rows * plan.frame.spacing_z / plan.grid.sigma_z() + QuinticResponse::kTaps + 2.0;
@@ -66,7 +68,7 @@ std::uint64_t residual_stage_memory_bytes(const SourceInfo& info, const Plan& pl
 }
 
 LosslessRecord write_residuals(HeightSource& source, const SourceFrame& frame, const TileGrid& grid,
-                               const Quantisation& quantisation, ArchiveWriter& writer,
+                               const Quantisation& quantisation, std::size_t members_at_once, ArchiveWriter& writer,
                                const std::function<void(std::int64_t)>& progress, const std::atomic<bool>& cancel) {
   const SourceInfo& info = source.info();
   LosslessRecord record;
@@ -83,7 +85,7 @@ LosslessRecord write_residuals(HeightSource& source, const SourceFrame& frame, c
   Sha256 hash;
   for (std::int64_t row = 0; row < info.height;) {
     std::vector<ResidualBand> bands;
-    for (; row < info.height && bands.size() < kMembersAtOnce; row += record.rows_per_member) {
+    for (; row < info.height && bands.size() < members_at_once; row += record.rows_per_member) {
       if (cancel.load(std::memory_order_relaxed)) throw Error(ErrorCode::kCancelled, "interrupted");
       ResidualBand& band = bands.emplace_back();
       const std::int64_t rows = std::min(record.rows_per_member, info.height - row);

@@ -1,22 +1,25 @@
 #include "isohf/surface/band_reader.h"
 
+#include <oneapi/tbb/blocked_range.h>
+#include <oneapi/tbb/parallel_for.h>
+#include <oneapi/tbb/task_arena.h>
+
 #include <algorithm>
 #include <cstring>
 #include <mutex>
 
 namespace isohf {
+namespace {
 
-std::int64_t rows_per_read(const SourceInfo& info) {
-  constexpr std::int64_t kReadBytes = std::int64_t{8} << 20;
-  const auto row_bytes = static_cast<std::int64_t>(size_bytes(info.sample_type)) * info.width;
-  const std::int64_t block_rows = std::clamp<std::int64_t>(info.block_height, 1, info.height);
-  const std::int64_t blocks = std::max<std::int64_t>(1, kReadBytes / (row_bytes * block_rows));
-  // A strip may be as high as the picture; it is read in parts then.
-  if (row_bytes * block_rows > 4 * kReadBytes) return std::max<std::int64_t>(1, kReadBytes / row_bytes);
-  return std::min(info.height, blocks * block_rows);
+constexpr std::uint64_t kReadBytes = std::uint64_t{8} << 20U;
+
+std::size_t count_of(const RowRange& range) {
+  return static_cast<std::size_t>(range.last - range.first + 1);
 }
 
-namespace {
+RowRange widened(const RowRange& range, std::int64_t by, std::int64_t size) {
+  return {std::max<std::int64_t>(range.first - by, 0), std::min(range.last + by, size - 1)};
+}
 
 /// Bands differ by a row or two: room is made for these, and nothing is copied into new memory.
 template <typename T>
@@ -52,70 +55,129 @@ class BandReader::Pool {
 };
 
 BandReader::BandReader(HeightSource& source, double datum, const Prefilter& prefilter)
-    : source_(source), datum_(datum), prefilter_(prefilter), pool_(std::make_shared<Pool>()) {}
+    : own_rows_(std::make_unique<SourceRows>(source, ReadStep::make(source.info(), kReadBytes))),
+      rows_(*own_rows_),
+      datum_(datum),
+      prefilter_(prefilter),
+      pool_(std::make_shared<Pool>()) {}
 
-std::shared_ptr<Band> BandReader::make_band(const RowRange& rows, bool with_voids) const {
+BandReader::BandReader(SourceRows& rows, double datum, const Prefilter& prefilter)
+    : rows_(rows), datum_(datum), prefilter_(prefilter), pool_(std::make_shared<Pool>()) {}
+
+std::uint64_t BandReader::memory_bytes(const Prefilter& prefilter, std::int64_t rows, std::int64_t columns,
+                                       const SourceInfo& info) {
+  const std::int64_t halo = prefilter.halo();
+  const auto area = [&](std::int64_t r, std::int64_t c) {
+    return static_cast<std::uint64_t>(std::min(r, info.height)) * static_cast<std::uint64_t>(std::min(c, info.width));
+  };
+  const std::uint64_t bands = 2 * area(rows + 4, columns) * sizeof(float);
+  if (prefilter.is_identity()) return bands;
+  return bands + area(rows + 8 + 2 * halo, columns + 2 * halo) * (sizeof(float) + 1);
+}
+
+std::shared_ptr<Band> BandReader::make_band(const RowRange& rows, const RowRange& columns) const {
   std::shared_ptr<Band> band(pool_->take().release(),
                              [pool = pool_](Band* dropped) { pool->give_back(std::unique_ptr<Band>(dropped)); });
-  band->columns = source_.info().width;
+  band->columns = static_cast<std::int64_t>(count_of(columns));
+  band->first_column = columns.first;
   band->rows = rows;
-  const auto columns = static_cast<std::size_t>(band->columns);
-  const std::size_t samples = columns * static_cast<std::size_t>(rows.last - rows.first + 1);
-  resize(band->heights, samples, columns);
-  resize(band->voids, with_voids ? samples : 0, columns);
+  resize(band->heights, count_of(columns) * count_of(rows), count_of(columns));
+  band->voids.clear();
   return band;
 }
 
 std::shared_ptr<const Band> BandReader::read(const RowRange& rows) {
-  if (prefilter_.is_identity()) return read_heights(rows);
+  return read(rows, {0, rows_.info().width - 1});
+}
+
+std::shared_ptr<const Band> BandReader::read(const RowRange& rows, const RowRange& columns) {
+  const auto band = make_band(rows, columns);
+  if (prefilter_.is_identity()) {
+    std::int64_t next = rows.first;
+    if (last_ && last_->first_column == columns.first && last_->columns == band->columns &&
+        last_->rows.first <= rows.first && last_->rows.last >= rows.first) {
+      const std::int64_t kept = std::min(last_->rows.last, rows.last) - rows.first + 1;
+      const auto skipped = static_cast<std::size_t>((rows.first - last_->rows.first) * band->columns);
+      std::memcpy(band->heights.data(), last_->heights.data() + skipped,
+                  static_cast<std::size_t>(kept * band->columns) * sizeof(float));
+      next += kept;
+    }
+    last_.reset();  // its memory goes as soon as the tiles that are cut from it are done
+    if (next <= rows.last) read_rows({next, rows.last}, *band);
+    last_ = band;
+    return band;
+  }
+  const SourceInfo& info = rows_.info();
   const std::int64_t halo = prefilter_.halo();
-  const auto heights = read_heights(
-      {std::max<std::int64_t>(rows.first - halo, 0), std::min(rows.last + halo, source_.info().height - 1)});
-  const auto band = make_band(rows, false);
-  const std::int64_t count = rows.last - rows.first + 1;
-  const auto voids = heights->voids.begin() + (rows.first - heights->rows.first) * band->columns;
-  if (std::find(voids, voids + count * band->columns, 1) != voids + count * band->columns) {
-    band->voids.assign(voids, voids + count * band->columns);
+  move_heights_to(widened(rows, halo, info.height), widened(columns, halo, info.width));
+  const std::int64_t first = rows.first - filtered_.rows.first;
+  const std::int64_t left = columns.first - filtered_.first_column;
+  const View2D<const float> heights(filtered_.heights.data() + left, band->columns,
+                                    static_cast<std::int64_t>(count_of(filtered_.rows)), filtered_.columns);
+  const auto count = static_cast<std::int64_t>(count_of(rows));
+  prefilter_.filter_columns(heights, first, {band->heights.data(), band->columns, count});
+  const char* voids = filtered_.voids.data() + first * filtered_.columns + left;
+  const auto width = static_cast<std::size_t>(band->columns);
+  bool any = false;
+  for (std::int64_t r = 0; r < count && !any; ++r) {
+    any = std::memchr(voids + r * filtered_.columns, 1, width) != nullptr;
   }
-  prefilter_.filter_columns(heights->view().heights, rows.first - heights->rows.first,
-                            {band->heights.data(), band->columns, count});
+  if (any) resize(band->voids, count_of(rows) * width, width);
+  for (std::int64_t r = 0; r < count && any; ++r) {
+    std::memcpy(band->voids.data() + static_cast<std::size_t>(r) * width, voids + r * filtered_.columns, width);
+  }
   return band;
 }
 
-std::shared_ptr<const Band> BandReader::read_heights(const RowRange& rows) {
-  const auto band = make_band(rows, !prefilter_.is_identity());
-  const auto columns = static_cast<std::size_t>(band->columns);
-  std::int64_t next = rows.first;
-  if (last_ && last_->rows.first <= rows.first && last_->rows.last >= rows.first) {
-    const std::int64_t kept = std::min(last_->rows.last, rows.last) - rows.first + 1;
-    const std::size_t skipped = static_cast<std::size_t>(rows.first - last_->rows.first) * columns;
-    const std::size_t samples = static_cast<std::size_t>(kept) * columns;
-    std::memcpy(band->heights.data(), last_->heights.data() + skipped, samples * sizeof(float));
-    if (!band->voids.empty()) std::memcpy(band->voids.data(), last_->voids.data() + skipped, samples);
-    next += kept;
+void BandReader::move_heights_to(const RowRange& rows, const RowRange& columns) {
+  Band& band = filtered_;
+  const std::size_t width = count_of(columns);
+  const bool goes_on = band.first_column == columns.first && band.columns == static_cast<std::int64_t>(width) &&
+                       band.rows.first <= rows.first && band.rows.last >= rows.first;
+  const std::size_t kept = goes_on ? count_of({rows.first, std::min(band.rows.last, rows.last)}) : 0;
+  const std::size_t skipped = goes_on ? static_cast<std::size_t>(rows.first - band.rows.first) * width : 0;
+  const auto go_on = [&](auto& values) {
+    // Not by resize(): what is kept must stay. The first band lacks the halo North of it.
+    const auto spare = static_cast<std::size_t>(8 + (rows.first == 0 ? prefilter_.halo() : 0));
+    if (values.capacity() < count_of(rows) * width) values.reserve((count_of(rows) + spare) * width);
+    if (kept > 0) std::copy_n(values.begin() + static_cast<std::ptrdiff_t>(skipped), kept * width, values.begin());
+    values.resize(count_of(rows) * width);
+  };
+  go_on(band.heights);
+  go_on(band.voids);
+  band.columns = static_cast<std::int64_t>(width);
+  band.first_column = columns.first;
+  band.rows = rows;
+  const RowRange missing{rows.first + static_cast<std::int64_t>(kept), rows.last};
+  if (missing.first > missing.last) return;
+  try {
+    read_rows(missing, band);
+  } catch (...) {
+    band.rows = {0, -1};
+    throw;
   }
-  last_.reset();  // its memory goes as soon as the tiles that are cut from it are done
-  const std::int64_t step = rows_per_read(source_.info());
-  while (next <= rows.last) {
-    // Reads end on multiples of the step, so that blocks are not asked for in two halves.
-    const std::int64_t count = std::min(rows.last + 1, (next / step + 1) * step) - next;
-    const std::size_t at = static_cast<std::size_t>(next - rows.first) * columns;
-    read_rows(next, count, band->heights.data() + at, band->voids.empty() ? nullptr : band->voids.data() + at);
-    next += count;
-  }
-  last_ = band;
-  return band;
-}
-
-void BandReader::read_rows(std::int64_t first, std::int64_t count, float* heights, char* voids) {
-  const SourceInfo& info = source_.info();
-  const auto samples = static_cast<std::size_t>(count) * static_cast<std::size_t>(info.width);
-  raw_.resize(samples * size_bytes(info.sample_type));
-  source_.read_window({0, first, info.width, count}, raw_);
-  heights_from_samples(info, datum_, raw_, {heights, samples});
-  if (prefilter_.is_identity()) return;
+  float* heights = band.heights.data() + kept * width;
+  char* voids = band.voids.data() + kept * width;
+  const std::size_t samples = count_of(missing) * width;
   for (std::size_t i = 0; i < samples; ++i) voids[i] = heights[i] != heights[i] ? 1 : 0;
-  prefilter_.filter_rows({heights, info.width, count});
+  prefilter_.filter_rows({heights, band.columns, static_cast<std::int64_t>(count_of(missing))});
+}
+
+void BandReader::read_rows(const RowRange& rows, Band& band) {
+  const SourceInfo& info = rows_.info();
+  const std::shared_ptr<const RawRows> raw = rows_.rows(rows);
+  // Isolated: a thread that waits here must not take a tile of a pipeline in hand and come back late.
+  oneapi::tbb::this_task_arena::isolate([&] {
+    oneapi::tbb::parallel_for(
+        oneapi::tbb::blocked_range<std::int64_t>(rows.first, rows.last + 1, 8), [&](const auto& part) {
+          std::vector<std::byte> buffer;
+          for (std::int64_t row = part.begin(); row < part.end(); ++row) {
+            float* heights = band.heights.data() + (row - band.rows.first) * band.columns;
+            heights_from_samples(info, datum_, raw->part(row, band.first_column, band.columns, buffer),
+                                 {heights, static_cast<std::size_t>(band.columns)});
+          }
+        });
+  });
 }
 
 }  // namespace isohf

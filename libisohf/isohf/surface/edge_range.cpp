@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "isohf/surface/height_source.h"
+#include "isohf/base/assert.h"
 
 namespace isohf {
 namespace {
@@ -45,43 +45,50 @@ void EdgeRange::add_between(const Profile& a, const Profile& b, ElevationRange& 
   bound.min = std::min(bound.min, 2.0 * edge_min - inside_max);
 }
 
-void EdgeRange::add_row_profiles(std::span<const float> row) {
-  std::vector<float> east(row.end() - static_cast<std::ptrdiff_t>(depth_columns_), row.end());
-  std::reverse(east.begin(), east.end());
-  const std::vector<Profile> profiles = {profile_of(row.first(depth_columns_)), profile_of(east)};
-  const std::vector<Profile>& before = last_profiles_.empty() ? profiles : last_profiles_;
-  for (std::size_t i = 0; i < 2; ++i) add_between(profiles[i], before[i], bound_);
-  last_profiles_ = profiles;
+void EdgeRange::add_side(std::span<const std::byte> samples, bool east) {
+  side_.resize(depth_columns_);
+  heights_from_samples(info_, 0.0, samples, side_);
+  if (east) std::reverse(side_.begin(), side_.end());
+  const Profile profile = profile_of(side_);
+  std::optional<Profile>& before = last_profile_[east ? 1 : 0];
+  add_between(profile, before.value_or(profile), bound_);
+  before = profile;
 }
 
-void EdgeRange::add_rows(std::span<const std::byte> raw) {
+void EdgeRange::add_window(const Window& window, std::span<const std::byte> raw) {
   const std::size_t bytes = size_bytes(info_.sample_type);
+  const auto columns = static_cast<std::size_t>(window.columns);
   const auto width = static_cast<std::size_t>(info_.width);
-  const auto rows = static_cast<std::int64_t>(raw.size() / (width * bytes));
-  std::vector<float> sides(2 * depth_columns_);
-  for (std::int64_t i = 0; i < rows; ++i, ++rows_) {
-    const auto row = raw.subspan(static_cast<std::size_t>(i) * width * bytes, width * bytes);
+  ISOHF_ASSERT(raw.size() == static_cast<std::size_t>(window.rows) * columns * bytes);
+  for (std::int64_t i = 0; i < window.rows; ++i) {
+    const auto row = raw.subspan(static_cast<std::size_t>(i) * columns * bytes, columns * bytes);
     // Only the ends of most rows are converted.
-    heights_from_samples(info_, 0.0, row.first(depth_columns_ * bytes), std::span(sides).first(depth_columns_));
-    heights_from_samples(info_, 0.0, row.last(depth_columns_ * bytes), std::span(sides).last(depth_columns_));
-    add_row_profiles(sides);
-    const bool is_first = rows_ < static_cast<std::int64_t>(depth_rows_);
-    const bool is_last = rows_ >= info_.height - static_cast<std::int64_t>(depth_rows_);
-    if (!is_first && !is_last) continue;
-    std::vector<float> heights(width);
-    heights_from_samples(info_, 0.0, row, heights);
-    if (is_first) first_rows_.push_back(heights);
-    if (is_last) last_rows_.push_front(std::move(heights));
+    if (window.column == 0) add_side(row.first(depth_columns_ * bytes), false);
+    if (window.column + window.columns == info_.width) add_side(row.last(depth_columns_ * bytes), true);
+    const auto from_north = static_cast<std::size_t>(window.row + i);
+    const auto from_south = static_cast<std::size_t>(info_.height - 1 - window.row - i);
+    const auto keep = [&](std::vector<float>& rows, std::size_t from_edge) {
+      if (from_edge >= depth_rows_) return;
+      rows.resize(depth_rows_ * width);
+      heights_from_samples(
+          info_, 0.0, row,
+          std::span(rows).subspan(from_edge * width + static_cast<std::size_t>(window.column), columns));
+    };
+    keep(north_, from_north);
+    keep(south_, from_south);
   }
 }
 
-void EdgeRange::add_edge_rows(bool from_end, ElevationRange& bound) const {
-  const std::deque<std::vector<float>>& rows = from_end ? last_rows_ : first_rows_;
-  if (rows.empty()) return;
-  std::vector<float> column(rows.size());
+std::uint64_t EdgeRange::memory_bytes() const {
+  return 2 * sizeof(float) * depth_rows_ * static_cast<std::uint64_t>(info_.width);
+}
+
+void EdgeRange::add_edge_rows(const std::vector<float>& rows, ElevationRange& bound) const {
+  const auto width = static_cast<std::size_t>(info_.width);
+  std::vector<float> column(depth_rows_);
   Profile before{};
-  for (std::size_t c = 0; c < static_cast<std::size_t>(info_.width); ++c) {
-    for (std::size_t r = 0; r < rows.size(); ++r) column[r] = rows[r][c];
+  for (std::size_t c = 0; c < width; ++c) {
+    for (std::size_t r = 0; r < depth_rows_; ++r) column[r] = rows[r * width + c];
     const Profile profile = profile_of(column);
     add_between(profile, c == 0 ? profile : before, bound);
     before = profile;
@@ -89,8 +96,8 @@ void EdgeRange::add_edge_rows(bool from_end, ElevationRange& bound) const {
   // Corners are continued along both axes: 2(2a - b) - (2c - d) of four values in the corner's block.
   for (const bool east : {false, true}) {
     ElevationRange block{kInfinity, -kInfinity};
-    for (const std::vector<float>& row : rows) {
-      for (std::size_t i = 0; i < depth_columns_; ++i) include(block, row[east ? row.size() - 1 - i : i]);
+    for (std::size_t r = 0; r < depth_rows_; ++r) {
+      for (std::size_t i = 0; i < depth_columns_; ++i) include(block, rows[r * width + (east ? width - 1 - i : i)]);
     }
     if (block.min > block.max) continue;
     bound.max = std::max(bound.max, 5.0 * block.max - 4.0 * block.min);
@@ -100,8 +107,8 @@ void EdgeRange::add_edge_rows(bool from_end, ElevationRange& bound) const {
 
 ElevationRange EdgeRange::widen(const ElevationRange& range) const {
   ElevationRange bound = bound_;
-  add_edge_rows(false, bound);
-  add_edge_rows(true, bound);
+  if (!north_.empty()) add_edge_rows(north_, bound);
+  if (!south_.empty()) add_edge_rows(south_, bound);
   // Heights were rounded to single precision.
   const double slack = 1e-6 * std::max(std::abs(range.min), std::abs(range.max));
   const double most = (range.max - range.min) * kMostWidening;

@@ -34,6 +34,13 @@ class HeightSource {
   /// samples [window.columns * window.rows * size_bytes(sample_type)] out.
   /// Throws Error{kIo, kCorrupt}: a sample is either delivered as stored or reported, never made up.
   virtual void read_window(const Window& window, std::span<std::byte> samples) = 0;
+
+  /// Asks to keep no more than about `bytes` of decoded samples from one call to the next: for a caller that reads
+  /// whole blocks in order and never goes back.
+  virtual void limit_buffers(std::uint64_t /*bytes*/) {}
+  /// How many bytes are kept at most once that was asked; more where the source cannot do with so few, 0 where there
+  /// are none to speak of.
+  [[nodiscard]] virtual std::uint64_t buffer_bytes(std::uint64_t /*limit*/) const { return 0; }
 };
 
 /// Raw samples -> elevations, relative to `datum`: float(raw * z_scale + z_offset - datum), NaN where void.

@@ -32,11 +32,11 @@ void blend_rows(const SourceBand& band, const TapWeights& rows, int taps, const 
     const float weight = rows.weights[static_cast<std::size_t>(t)];
     const float* source = band.heights.row(mirror_index(rows.first + t, axis_z.samples()) - band.first_row);
     float* out = line.data() + (inner_first - columns.first);
-    const float* in = source + inner_first;
+    const float* in = source + (inner_first - band.first_column);
     const std::int64_t inner = inner_last - inner_first;
     t == 0 ? weigh(in, weight, inner, out) : add_weighted(in, weight, inner, out);
     const auto mirrored = [&](std::int64_t k) {
-      const float height = weight * source[mirror_index(columns.first + k, axis_x.samples())];
+      const float height = weight * source[mirror_index(columns.first + k, axis_x.samples()) - band.first_column];
       line[static_cast<std::size_t>(k)] = t == 0 ? height : line[static_cast<std::size_t>(k)] + height;
     };
     for (std::int64_t k = 0; k < inner_first - columns.first; ++k) mirrored(k);
@@ -52,7 +52,7 @@ void find_voids(const SourceBand& band, const TapWeights& rows, int taps, const 
   for (int t = 0; t < taps; ++t) {
     const char* row = band.voids.row(mirror_index(rows.first + t, axis_z.samples()) - band.first_row);
     for (std::int64_t k = 0; k < columns.width; ++k) {
-      const char is_void = row[mirror_index(columns.first + k, axis_x.samples())];
+      const char is_void = row[mirror_index(columns.first + k, axis_x.samples()) - band.first_column];
       line[static_cast<std::size_t>(k)] |= is_void;
       any |= is_void != 0;
     }
@@ -148,13 +148,13 @@ class VoidAwareSampler {
 
  private:
   [[nodiscard]] float coefficient(std::int64_t column, std::int64_t row) const {
-    return band_.heights(mirror_index(column, axis_x_.samples()),
+    return band_.heights(mirror_index(column, axis_x_.samples()) - band_.first_column,
                          mirror_index(row, axis_z_.samples()) - band_.first_row);
   }
 
   [[nodiscard]] bool is_void(std::int64_t column, std::int64_t row) const {
     if (band_.voids.data() == nullptr) return std::isnan(coefficient(column, row));
-    return band_.voids(mirror_index(column, axis_x_.samples()),
+    return band_.voids(mirror_index(column, axis_x_.samples()) - band_.first_column,
                        mirror_index(row, axis_z_.samples()) - band_.first_row) != 0;
   }
 
@@ -218,6 +218,18 @@ ColumnTaps make_column_taps(const SourceAxis& axis, const Kernel& kernel, std::s
   taps.width = *high - *low + kernel.taps();
   for (const std::int64_t tap : first) taps.start.push_back(static_cast<std::int32_t>(tap - taps.first));
   return taps;
+}
+
+void add_columns_needed(const SourceAxis& axis, const ColumnTaps& taps, RowRange& range) {
+  const std::int64_t last = axis.samples() - 1;
+  const auto add = [&](std::int64_t column) {
+    range.first = std::min(range.first, column);
+    range.last = std::max(range.last, column);
+  };
+  add(std::clamp<std::int64_t>(taps.first, 0, last));
+  add(std::clamp<std::int64_t>(taps.first + taps.width - 1, 0, last));
+  for (std::int64_t k = taps.first; k < 0; ++k) add(mirror_index(k, axis.samples()));
+  for (std::int64_t k = last + 1; k < taps.first + taps.width; ++k) add(mirror_index(k, axis.samples()));
 }
 
 RowSampler::RowSampler(const SourceAxis& axis_x, const SourceAxis& axis_z, const Kernel& kernel,

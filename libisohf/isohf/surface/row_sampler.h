@@ -13,20 +13,21 @@
 
 namespace isohf {
 
-/// A run of source rows, both ends included.
+/// A run of source rows, or of columns, both ends included.
 struct RowRange {
   std::int64_t first;
   std::int64_t last;
 };
 
-/// Consecutive whole rows of the source as heights relative to a datum, NaN where void: what a kernel's taps read
-/// (coefficients, where the kernel has a prefilter).
+/// Consecutive rows of the source, whole or in part, as heights relative to a datum, NaN where void: what a kernel's
+/// taps read (coefficients, where the kernel has a prefilter).
 struct SourceBand {
-  View2D<const float> heights;  ///< all columns of the source
-  std::int64_t first_row = 0;   ///< source row of heights.row(0)
+  View2D<const float> heights;
+  std::int64_t first_row = 0;  ///< source row of heights.row(0)
   /// As large as heights, not 0 where the sample is void: coefficients go on into voids (Prefilter). No data where the
   /// NaN among heights are the voids.
   View2D<const char> voids = {};
+  std::int64_t first_column = 0;  ///< source column of heights(0, ...)
 };
 
 /// Where the vertices of a row read the source's columns: their taps, and those of the source's two edges after them,
@@ -48,6 +49,9 @@ struct ColumnTaps {
 [[nodiscard]] ColumnTaps make_column_taps(const SourceAxis& axis, const Kernel& kernel,
                                           std::span<const double> world_x);
 
+/// Widens `range` by the source columns that the taps read.
+void add_columns_needed(const SourceAxis& axis, const ColumnTaps& taps, RowRange& range);
+
 /// Resamples the source along rows of vertices. An elevation is a pure function of its place. Thread-safe.
 class RowSampler {
  public:
@@ -67,7 +71,7 @@ class RowSampler {
     std::vector<float> values;
     std::vector<float> edge_values;
   };
-  /// The row of vertices at world_z. `band` holds at least what add_rows_needed asks for.
+  /// The row of vertices at world_z. `band` holds at least what add_rows_needed and add_columns_needed ask for.
   /// heights [columns.count - 2] out, relative to the band's datum; NaN where void: outside the source by
   /// Outside::kVoid, or where less than half of the kernel's weight, or none of the nearest samples, is valid.
   void sample(const SourceBand& band, double world_z, const ColumnTaps& columns, Scratch& scratch,

@@ -42,6 +42,15 @@ void SourceSurvey::add(std::span<const std::byte> raw) {
   look_for_voids(raw, part);
 }
 
+void SourceSurvey::add(const SourceSurvey& other) {
+  merge(all_, other.all_);
+  merge(others_, other.others_);
+  merge(huge_negative_, other.huge_negative_);
+  merge(huge_positive_, other.huge_positive_);
+  for (const auto& [value, count] : other.suspects_) suspects_[value] += count;
+  sum_ += other.sum_;
+}
+
 /// Takes suspects out of the part, one after the other, until its ends are none.
 void SourceSurvey::look_for_voids(std::span<const std::byte> raw, SourceScan part) {
   SourceInfo without = info_;

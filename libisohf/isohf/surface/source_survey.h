@@ -33,6 +33,8 @@ class SourceSurvey {
 
   /// Samples of the source's type; every sample of the source once, in any order that suits.
   void add(std::span<const std::byte> raw);
+  /// What another survey of the same source found in other parts.
+  void add(const SourceSurvey& other);
 
   /// Range in elevations.
   [[nodiscard]] SourceScan scan() const;

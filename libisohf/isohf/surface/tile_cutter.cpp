@@ -32,6 +32,14 @@ RowRange TileCutter::rows_needed(std::int64_t tile_row) const {
   return range;
 }
 
+RowRange TileCutter::columns_needed(std::int64_t tile_column) const {
+  RowRange range = RowSampler::no_rows();
+  for (const int parity : {0, 1}) {
+    add_columns_needed(axis_x_, taps_of_tile(grid_, axis_x_, kernel_, {tile_column, 0}, parity), range);
+  }
+  return range;
+}
+
 void TileCutter::cut(TileIndex tile, const SourceBand& band, std::span<float> heights) const {
   const auto columns = static_cast<std::size_t>(grid_.shape().columns());
   ISOHF_ASSERT(heights.size() == static_cast<std::size_t>(grid_.shape().stored_vertex_count()));

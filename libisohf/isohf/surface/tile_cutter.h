@@ -25,7 +25,10 @@ class TileCutter {
   /// The source rows that a row of tiles reads.
   [[nodiscard]] RowRange rows_needed(std::int64_t tile_row) const;
 
-  /// Cuts one tile. `band` holds at least rows_needed(tile.row).
+  /// The source columns that a column of tiles reads.
+  [[nodiscard]] RowRange columns_needed(std::int64_t tile_column) const;
+
+  /// Cuts one tile. `band` holds at least rows_needed(tile.row) and columns_needed(tile.column).
   /// heights [C x R] out, relative to the band's datum; NaN where void: outside the source by Outside::kVoid, or where
   /// less than half of the kernel's weight, or none of the nearest samples, is valid.
   /// O(C*R*taps); no allocation proportional to anything but the tile.

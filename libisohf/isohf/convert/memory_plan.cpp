@@ -1,0 +1,210 @@
+#include "isohf/convert/memory_plan.h"
+
+#include <oneapi/tbb/task_arena.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "isohf/convert/residual_stage.h"
+#include "isohf/convert/seed_stage.h"
+#include "isohf/convert/texture_stage.h"
+#include "isohf/surface/band_reader.h"
+#include "isohf/surface/kernels.h"
+#include "isohf/surface/prefilter.h"
+
+namespace isohf {
+namespace {
+
+constexpr std::uint64_t kMiB = std::uint64_t{1} << 20U;
+
+// Measured (docs/performance.md, decision 23): the program with its libraries and its pools of memory that was freed.
+constexpr double kProgramBytes = 11.5e6;
+constexpr double kThreadBytes = 0.7e6;
+/// In each thread, of one tile: heights, codes, and what the encoder works with.
+constexpr double kBytesPerVertex = 24.0;
+/// Of a tile that waits to be written.
+constexpr double kWaitingBytesPerVertex = 1.3;
+/// Index, journal and directory of the archive.
+constexpr double kBytesPerTile = 200.0;
+
+/// What is set when memory is short: reads and tiles in flight, in the order of preference.
+struct Ration {
+  std::uint64_t read_bytes;
+  int tiles_per_thread;
+  std::size_t members_at_once;
+};
+constexpr std::array<Ration, 7> kRations = {{{8 * kMiB, 16, 8},
+                                             {4 * kMiB, 16, 8},
+                                             {4 * kMiB, 8, 4},
+                                             {2 * kMiB, 8, 2},
+                                             {kMiB, 4, 2},
+                                             {kMiB / 2, 2, 1},
+                                             {kMiB / 4, 2, 1}}};
+/// Where nobody limits it.
+constexpr std::size_t kUnlimitedRation = 1;
+constexpr int kTexturedTilesPerThread = 2;
+
+class Estimate {
+ public:
+  /// limit: 0 where there is none.
+  Estimate(const HeightSource& source, const Plan& plan, const ConvertOptions& options, const Prefilter& prefilter,
+           std::uint64_t texture_bytes, std::uint64_t limit)
+      : source_(source),
+        info_(source.info()),
+        plan_(plan),
+        options_(options),
+        texture_bytes_(texture_bytes),
+        limit_(limit),
+        prefilter_(prefilter),
+        threads_(threads_of(options)) {
+    const TileGrid& grid = plan.grid;
+    // Source rows and columns of a tile with its padding and the taps around it.
+    const int taps = Kernel::make(filter_from_string(options.filter)).taps();
+    tile_rows_ =
+        std::min(rounded(grid.shape().rows() * grid.sigma_z() / plan.frame.spacing_z) + taps + 2, info_.height);
+    tile_columns_ =
+        std::min(rounded(grid.shape().columns() * 2.0 * grid.sigma_x() / plan.frame.spacing_x) + taps + 2, info_.width);
+  }
+
+  [[nodiscard]] MemoryPlan with(const Ration& ration, bool in_scratch) const {
+    const TileGrid& grid = plan_.grid;
+    MemoryPlan memory;
+    memory.scan_step = memory.read_step = ReadStep::make(info_, ration.read_bytes);
+    memory.source_buffer_bytes = std::max<std::uint64_t>(2 * ration.read_bytes, kMiB);
+    memory.tiles_in_flight =
+        static_cast<std::size_t>(threads_ * (options_.texture ? kTexturedTilesPerThread : ration.tiles_per_thread));
+    memory.members_at_once = ration.members_at_once;
+    memory.tile_columns_at_once = grid.tile_columns();
+    if (in_scratch) {
+      const std::int64_t in_use = prefilter_.is_identity() ? 2 * tile_rows_ : tile_rows_ + 2 * prefilter_.halo();
+      memory.scratch_rows = std::min(SourceRows::kept_rows_for(memory.read_step, in_use), info_.height);
+      memory.scratch_bytes = static_cast<std::uint64_t>(memory.scratch_rows) * row_bytes();
+      if (!prefilter_.is_identity()) choose_columns(memory);
+    }
+    memory.bytes = total(memory);
+    return memory;
+  }
+
+ private:
+  static std::int64_t rounded(double samples) { return static_cast<std::int64_t>(std::ceil(samples)); }
+  [[nodiscard]] std::uint64_t row_bytes() const {
+    return static_cast<std::uint64_t>(info_.width) * size_bytes(info_.sample_type);
+  }
+
+  /// As many tiles as may be prefiltered together within the limit.
+  void choose_columns(MemoryPlan& memory) const {
+    std::int64_t fits = 1;
+    for (std::int64_t beyond = plan_.grid.tile_columns() + 1; beyond - fits > 1;) {
+      memory.tile_columns_at_once = (fits + beyond) / 2;
+      (total(memory) <= limit_ ? fits : beyond) = memory.tile_columns_at_once;
+    }
+    memory.tile_columns_at_once = fits;
+  }
+
+  [[nodiscard]] std::uint64_t total(const MemoryPlan& memory) const {
+    const auto vertices = static_cast<double>(plan_.grid.shape().stored_vertex_count());
+    const double program = kProgramBytes + threads_ * kThreadBytes + threads_ * vertices * kBytesPerVertex +
+                           kBytesPerTile * static_cast<double>(plan_.grid.tile_count()) +
+                           static_cast<double>(source_.buffer_bytes(memory.source_buffer_bytes));
+    const double seeds = options_.shadow_seeds ? static_cast<double>(seed_stage_memory_bytes(plan_.grid)) : 0.0;
+    const double tiles = tiles_pass(memory) + seeds + static_cast<double>(texture_bytes_);
+    double peak = std::max(scan_pass(memory), tiles);
+    if (options_.lossless) {
+      peak = std::max(peak,
+                      static_cast<double>(residual_stage_memory_bytes(info_, plan_, threads_, memory.members_at_once)));
+    }
+    return static_cast<std::uint64_t>(program + peak);
+  }
+
+  [[nodiscard]] double scan_pass(const MemoryPlan& memory) const {
+    if (options_.z_range) return 0.0;
+    const double edge_rows = 2.0 * (kContinuedSteps * plan_.grid.sigma_z() / plan_.frame.spacing_z + 4.0);
+    return 2.0 * static_cast<double>(memory.scan_step.most_bytes(info_)) +
+           edge_rows * sizeof(float) * static_cast<double>(info_.width);
+  }
+
+  [[nodiscard]] double tiles_pass(const MemoryPlan& memory) const {
+    const auto vertices = static_cast<double>(plan_.grid.shape().stored_vertex_count());
+    const auto waiting =
+        std::min(static_cast<double>(memory.tiles_in_flight), static_cast<double>(plan_.grid.tile_count()));
+    double bytes = waiting * vertices * kWaitingBytesPerVertex;
+    const std::int64_t step = memory.read_step.rows;
+    // Slabs that hold the rows of two rows of tiles, wherever they begin; the prefilter copies what it needs at once.
+    const std::int64_t in_use = prefilter_.is_identity() ? 2 * tile_rows_ : std::min(tile_rows_, step);
+    const std::int64_t slabs = std::min((in_use + step - 2) / step + 1, (info_.height + step - 1) / step);
+    const bool in_parts = memory.read_step.columns < info_.width;
+    if (memory.scratch_rows == 0) {
+      bytes += static_cast<double>(slabs * step) * static_cast<double>(row_bytes());
+      if (in_parts) bytes += static_cast<double>(memory.read_step.most_bytes(info_));
+    } else {
+      bytes += static_cast<double>(memory.read_step.most_bytes(info_));
+    }
+    if (prefilter_.is_identity()) {
+      return bytes + threads_ * static_cast<double>(tile_rows_) * static_cast<double>(tile_columns_) * sizeof(float);
+    }
+    const double columns = std::min(static_cast<double>(info_.width), static_cast<double>(memory.tile_columns_at_once) *
+                                                                          static_cast<double>(tile_columns_));
+    // Strips of columns that the threads filter, doubles.
+    const double strips = threads_ * 64.0 * 12.0 * static_cast<double>(tile_rows_ + 2 * prefilter_.halo());
+    return bytes + strips +
+           static_cast<double>(
+               BandReader::memory_bytes(prefilter_, tile_rows_, static_cast<std::int64_t>(columns), info_));
+  }
+
+  const HeightSource& source_;
+  const SourceInfo& info_;
+  const Plan& plan_;
+  const ConvertOptions& options_;
+  std::uint64_t texture_bytes_;
+  std::uint64_t limit_;
+  const Prefilter& prefilter_;
+  int threads_;
+  std::int64_t tile_rows_ = 0;     ///< of the source, that a row of tiles reads
+  std::int64_t tile_columns_ = 0;  ///< of the source, that a tile reads
+};
+
+}  // namespace
+
+int threads_of(const ConvertOptions& options) {
+  return options.threads > 0 ? options.threads : oneapi::tbb::this_task_arena::max_concurrency();
+}
+
+int textured_tiles_in_flight(const ConvertOptions& options) {
+  return threads_of(options) * kTexturedTilesPerThread;
+}
+
+MemoryPlan plan_memory(const HeightSource& source, const Plan& plan, const ConvertOptions& options,
+                       std::uint64_t texture_bytes) {
+  const Prefilter prefilter =
+      Prefilter::make(filter_from_string(options.filter), acquisition_from_string(options.acquisition));
+  const Estimate estimate(source, plan, options, prefilter, texture_bytes, options.memory_bytes);
+  const Estimate least(source, plan, options, prefilter, texture_bytes, 1);
+  const std::uint64_t least_bytes =
+      std::min(least.with(kRations.back(), false).bytes, least.with(kRations.back(), true).bytes);
+  const auto choose = [&]() -> MemoryPlan {
+    if (options.memory_bytes == 0) return estimate.with(kRations[kUnlimitedRation], false);
+    for (const bool in_scratch : {false, true}) {
+      for (const Ration& ration : kRations) {
+        const MemoryPlan memory = estimate.with(ration, in_scratch);
+        if (memory.bytes <= options.memory_bytes) return memory;
+      }
+    }
+    return estimate.with(kRations.back(), true);
+  };
+  MemoryPlan memory = choose();
+  memory.least_bytes = least_bytes;
+  return memory;
+}
+
+MemoryPlan plan_memory(const HeightSource& source, const Plan& plan, const ConvertOptions& options) {
+  std::uint64_t texture_bytes = 0;
+  if (options.texture) {
+    texture_bytes = TextureStage::make(plan, source.info(), *options.texture, threads_of(options),
+                                       textured_tiles_in_flight(options))
+                        .memory_bytes();
+  }
+  return plan_memory(source, plan, options, texture_bytes);
+}
+
+}  // namespace isohf

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "isohf/convert/convert.h"
+#include "isohf/convert/plan.h"
+#include "isohf/surface/height_source.h"
+#include "isohf/surface/source_rows.h"
+
+namespace isohf {
+
+/// How a conversion uses memory. None of it changes a byte of the archive.
+struct MemoryPlan {
+  std::uint64_t bytes = 0;        ///< resident set at its peak, the program itself included; within a tenth
+  std::uint64_t least_bytes = 0;  ///< what the most frugal way takes
+  ReadStep scan_step;             ///< of the pass that finds the range, two reads at a time
+  ReadStep read_step;             ///< of the pass that makes the tiles
+  /// Rows of the source that a scratch file keeps, where the rows of tiles that are in hand are too many for memory; 0:
+  /// they are in memory.
+  std::int64_t scratch_rows = 0;
+  std::uint64_t scratch_bytes = 0;
+  std::int64_t tile_columns_at_once = 1;  ///< tiles for which heights are prefiltered together
+  std::size_t tiles_in_flight = 1;        ///< read, made, or waiting to be written
+  std::size_t members_at_once = 1;        ///< of residuals
+  std::uint64_t source_buffer_bytes = 0;  ///< what the source may keep of decoded blocks
+};
+
+/// The one estimate that `plan`, `--dry-run`, `--memory` and convert() itself go by. Takes the fastest way that stays
+/// within options.memory_bytes (0: the fastest), or the most frugal one where none does: bytes > memory_bytes then.
+/// texture_bytes: what a TextureStage takes, where there is one.
+[[nodiscard]] MemoryPlan plan_memory(const HeightSource& source, const Plan& plan, const ConvertOptions& options,
+                                     std::uint64_t texture_bytes);
+
+/// The same, with the textures that the options ask for.
+[[nodiscard]] MemoryPlan plan_memory(const HeightSource& source, const Plan& plan, const ConvertOptions& options);
+
+/// Threads that a conversion works with.
+[[nodiscard]] int threads_of(const ConvertOptions& options);
+/// Tiles in flight where each brings a texture along.
+[[nodiscard]] int textured_tiles_in_flight(const ConvertOptions& options);
+
+}  // namespace isohf

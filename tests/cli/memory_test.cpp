@@ -1,0 +1,107 @@
+/// isohf convert --memory: what the program really takes, by its own account of its largest resident set.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdint>
+#include <nlohmann/json.hpp>
+
+#include "support/run_program.h"
+#include "support/temporary_folder.h"
+
+namespace isohf::test {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr std::int64_t kWidth = 60000;
+constexpr std::int64_t kHeight = 300;
+
+/// Small but wide: hills as 16-bit samples without a header.
+std::string wide_raster() {
+  std::string bytes(static_cast<std::size_t>(kWidth * kHeight * 2), '\0');
+  for (std::int64_t r = 0; r < kHeight; ++r) {
+    for (std::int64_t c = 0; c < kWidth; ++c) {
+      const auto height = static_cast<std::uint16_t>(1000 + ((c * 37) >> 6) % 311 + ((r * c) >> 9) % 53);
+      bytes[static_cast<std::size_t>(2 * (r * kWidth + c))] = static_cast<char>(height & 0xFFU);
+      bytes[static_cast<std::size_t>(2 * (r * kWidth + c) + 1)] = static_cast<char>(height >> 8U);
+    }
+  }
+  return bytes;
+}
+
+TEST(Memory, ConvertStaysWithinATenthOfWhatItIsGivenAndWritesTheSameBytes) {
+  const TemporaryFolder folder;
+  write_file(folder / "wide.raw", wide_raster());
+  const auto convert = [&](const std::string& name, std::vector<std::string> more) {
+    std::vector<std::string> command = {"convert",
+                                        folder / "wide.raw",
+                                        folder / name,
+                                        "--raw",
+                                        std::to_string(kWidth) + "x" + std::to_string(kHeight) + ":u16le",
+                                        "-j",
+                                        "2",
+                                        "--json",
+                                        "--overwrite"};
+    command.insert(command.end(), more.begin(), more.end());
+    return run_isohf(command);
+  };
+  for (const std::vector<std::string>& filter :
+       {std::vector<std::string>{"--filter", "bilinear"}, {"--filter", "bspline5", "--shadow-seeds"}}) {
+    ASSERT_EQ(convert("free.isohf", filter).exit_code, 0);
+    const std::string expected = read_file(folder / "free.isohf");
+    for (const int megabytes : {60, 80, 120}) {
+      std::vector<std::string> bound = filter;
+      bound.insert(bound.end(), {"--memory", std::to_string(megabytes) + "MB"});
+      const RunResult result = convert("bound.isohf", bound);
+      ASSERT_EQ(result.exit_code, 0) << result.err;
+      EXPECT_EQ(result.err, "");
+      EXPECT_TRUE(read_file(folder / "bound.isohf") == expected) << megabytes;
+#ifndef __SANITIZE_ADDRESS__  // its shadow memory counts as well
+      EXPECT_LE(nlohmann::json::parse(result.out).at("peak_memory_bytes").get<double>(), 1.1e6 * megabytes)
+          << filter[1];
+#endif
+    }
+  }
+  EXPECT_EQ(folder.names(), (std::vector<std::string>{"bound.isohf", "free.isohf", "wide.raw"}));
+}
+
+TEST(Memory, TheDryRunSaysTheLeastAndConvertTakesIt) {
+  const TemporaryFolder folder;
+  write_file(folder / "wide.raw", wide_raster());
+  const std::vector<std::string> command = {"convert",
+                                            folder / "wide.raw",
+                                            folder / "wide.isohf",
+                                            "--raw",
+                                            std::to_string(kWidth) + "x" + std::to_string(kHeight) + ":u16le",
+                                            "-j",
+                                            "2",
+                                            "--json"};
+  const auto with = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), command.begin(), command.end());
+    return run_isohf(more);
+  };
+  const auto plan = nlohmann::json::parse(with({"--dry-run"}).out);
+  EXPECT_EQ(plan.at("scratch_bytes"), 0);
+  const auto least = plan.at("least_memory_bytes").get<std::uint64_t>();
+  EXPECT_LT(least, plan.at("estimated_memory_bytes").get<std::uint64_t>());
+  const RunResult refused = with({"--memory", std::to_string(least / 1000000 - 1) + "MB"});
+  EXPECT_EQ(refused.exit_code, 1);
+  EXPECT_THAT(refused.err, HasSubstr("needs at least " + std::to_string((least + 999999) / 1000000) + " MB"));
+  EXPECT_EQ(folder.names(), std::vector<std::string>{"wide.raw"});
+  const std::string enough = std::to_string(least / 1000000 + 1) + "MB";
+  EXPECT_GT(nlohmann::json::parse(with({"--dry-run", "--memory", enough}).out).at("scratch_bytes"), 0);
+  const RunResult nowhere = with({"--memory", enough, "--tmpdir", folder / "none"});
+  EXPECT_EQ(nowhere.exit_code, 1);
+  EXPECT_THAT(nowhere.err, HasSubstr(folder / "none: cannot make a scratch file"));
+  EXPECT_EQ(folder.names(), std::vector<std::string>{"wide.raw"});
+  const RunResult made = with({"--memory", enough});
+  EXPECT_EQ(made.exit_code, 0) << made.err;
+#ifndef __SANITIZE_ADDRESS__
+  EXPECT_LE(nlohmann::json::parse(made.out).at("peak_memory_bytes").get<double>(), 1.1 * static_cast<double>(least));
+#endif
+}
+
+}  // namespace
+}  // namespace isohf::test
