@@ -15,7 +15,7 @@
 #include "isohf/base/error.h"
 #include "isohf/base/file.h"
 #include "isohf/convert/plan.h"
-#include "isohf/surface/band_reader.h"
+#include "isohf/surface/source_rows.h"
 #include "isohf/surface/source_survey.h"
 #include "json_output.h"
 #include "progress.h"
@@ -62,16 +62,18 @@ SourceSurvey survey(HeightSource& source, const WorkOptions& work, const CommonO
   const std::atomic<bool>& cancel = watch_interrupts();
   ProgressDisplay display(work.progress, common.quiet, common.verbose);
   const SourceInfo& info = source.info();
-  const std::int64_t step = rows_per_read(info);
+  constexpr std::uint64_t kReadBytes = std::uint64_t{8} << 20U;
+  const ReadStep step = ReadStep::make(info, kReadBytes);
   SourceSurvey survey(info, true);
   std::vector<std::byte> raw;
-  for (std::int64_t row = 0; row < info.height; row += step) {
-    if (cancel.load(std::memory_order_relaxed)) throw Error(ErrorCode::kCancelled, "interrupted");
-    const std::int64_t rows = std::min(step, info.height - row);
-    raw.resize(static_cast<std::size_t>(rows * info.width) * size_bytes(info.sample_type));
-    source.read_window({0, row, info.width, rows}, raw);
-    survey.add(raw);
-    display.update("statistics", "rows", row + rows, info.height);
+  for (std::int64_t row = 0; row < info.height; row += step.rows) {
+    for (const Window& window : step.windows(info, row)) {
+      if (cancel.load(std::memory_order_relaxed)) throw Error(ErrorCode::kCancelled, "interrupted");
+      raw.resize(static_cast<std::size_t>(window.columns * window.rows) * size_bytes(info.sample_type));
+      source.read_window(window, raw);
+      survey.add(raw);
+    }
+    display.update("statistics", "rows", std::min(row + step.rows, info.height), info.height);
   }
   return survey;
 }

@@ -41,6 +41,7 @@ constexpr std::array<Ration, 7> kRations = {{{8 * kMiB, 16, 8},
                                              {kMiB, 4, 2},
                                              {kMiB / 2, 2, 1},
                                              {kMiB / 4, 2, 1}}};
+constexpr std::uint64_t kLeastReads = 8;
 /// Where nobody limits it.
 constexpr std::size_t kUnlimitedRation = 1;
 constexpr int kTexturedTilesPerThread = 2;
@@ -70,7 +71,10 @@ class Estimate {
   [[nodiscard]] MemoryPlan with(const Ration& ration, bool in_scratch) const {
     const TileGrid& grid = plan_.grid;
     MemoryPlan memory;
-    memory.scan_step = memory.read_step = ReadStep::make(info_, ration.read_bytes);
+    // Several reads of even a small raster: what follows begins with the first of them.
+    const std::uint64_t part = row_bytes() * static_cast<std::uint64_t>(info_.height) / kLeastReads;
+    memory.scan_step = memory.read_step =
+        ReadStep::make(info_, std::min(ration.read_bytes, std::max(part, row_bytes())));
     memory.source_buffer_bytes = std::max<std::uint64_t>(2 * ration.read_bytes, kMiB);
     memory.tiles_in_flight =
         static_cast<std::size_t>(threads_ * (options_.texture ? kTexturedTilesPerThread : ration.tiles_per_thread));

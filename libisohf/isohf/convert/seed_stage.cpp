@@ -14,8 +14,9 @@
 namespace isohf {
 namespace {
 
-/// Bytes kept of one visible row of a tile: about four casters of its own and three that enter, either way.
-constexpr std::uint64_t kBytesPerRow = 2 * 7 * sizeof(ShadowCaster) + 32;
+/// Bytes kept of one visible row of a tile: about four casters of its own and three that enter, either way, and as much
+/// again while a row of tiles is finished (measured).
+constexpr std::uint64_t kBytesPerRow = 2 * (2 * 7 * sizeof(ShadowCaster) + 32);
 
 }  // namespace
 

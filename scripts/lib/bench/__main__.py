@@ -12,7 +12,7 @@ import sys
 
 from harness import Bench
 
-FIRST = ["convert", "filters", "sizes", "large"]
+FIRST = ["convert", "peers", "floor", "filters", "sizes", "large", "memory"]
 
 
 def find_sections():
@@ -52,6 +52,8 @@ def main():
     if options.rounds < 1:
         parser.error("--rounds: at least 1")
     bench = Bench(options)
+    if options.write:
+        bench.has_places(chosen)
     for section in chosen:
         sections[section].measure(bench)
     if options.json:

@@ -3,6 +3,7 @@
 import json
 import os
 import pathlib
+import shutil
 import statistics
 import subprocess
 import sys
@@ -41,6 +42,20 @@ class Bench:
         return {"wall_s": wall, "cpu_s": float(user) + float(system), "peak_mb": float(peak) / 1024,
                 "out": result.stdout}
 
+    def cores(self):
+        return len(os.sched_getaffinity(0))
+
+    def busy(self, run):
+        """Share of all cores' time that a run used, in percent, as text."""
+        return f"{100 * run['cpu_s'] / (run['wall_s'] * self.cores()):.0f} %"
+
+    def has(self, section, program, package):
+        """Whether a peer is installed; says so where it is not."""
+        if shutil.which(program) is not None:
+            return True
+        self.say(f"{section}: without {program}: it is not installed (Debian package {package})")
+        return False
+
     def in_turn(self, jobs, rounds):
         """Runs every job once, then every one again; medians by name."""
         runs = {name: [] for name in jobs}
@@ -75,7 +90,14 @@ class Bench:
         self.tables[section] = "\n".join([*lines, "", note])
 
     def machine(self):
-        return f"{len(os.sched_getaffinity(0))} cores"
+        return f"{self.cores()} cores"
+
+    def has_places(self, sections):
+        """Fails where docs/performance.md has no place for a section's table, before anything is measured."""
+        text = (self.root / "docs/performance.md").read_text()
+        for section in sections:
+            if f"<!-- {section} -->" not in text or f"<!-- end of {section} -->" not in text:
+                self.fail(f"docs/performance.md has no place for the table of {section}: <!-- {section} -->")
 
     def write(self):
         page = self.root / "docs/performance.md"

@@ -25,11 +25,11 @@ def measure(bench):
         found[name] |= {"bytes": path.stat().st_size, "samples": samples}
     starts = sorted(bench.run(bench.isohf, "info", archive)["wall_s"] for _ in range(50))
     us = found["isohf convert"]
-    rows = [[name, f"{run['wall_s']:.2f}", f"{run['cpu_s']:.2f}", f"{run['peak_mb']:.0f}",
+    rows = [[name, f"{run['wall_s']:.2f}", f"{run['cpu_s']:.2f}", bench.busy(run), f"{run['peak_mb']:.0f}",
              f"{run['bytes'] / 1e6:.1f}", f"{8 * run['bytes'] / run['samples']:.2f}",
              f"{run['wall_s'] / us['wall_s']:.2f}", f"{run['cpu_s'] / us['cpu_s']:.2f}",
              f"{run['peak_mb'] / us['peak_mb']:.2f}"] for name, run in found.items()]
-    bench.add("convert", ["program", "wall s", "cpu s", "peak MB", "MB", "bits a sample", "wall ×", "cpu ×", "peak ×"],
+    bench.add("convert", ["program", "wall s", "cpu s", "cores busy", "peak MB", "MB", "bits a sample", "wall ×", "cpu ×", "peak ×"],
              rows, f"{source.name}, medians of {rounds} rounds, {bench.machine()}; ×: divided by isohf convert's. The "
              f"other programs write whole metres, as `--step 1` does. `isohf info`: {1000 * starts[25]:.1f} ms, median "
              "of 50 starts.")

@@ -1,0 +1,234 @@
+// Bandwidth of what stands between a raster's samples and a tile's residuals, and after it, beside memcpy and
+// libdeflate on the same terrain. Bytes are those that go in: 2 a sample of 16 bits, 4 a height. usage: surface_bench
+// [--benchmark_filter=REGEX] [--benchmark_...]
+
+#include <benchmark/benchmark.h>
+#include <libdeflate.h>
+
+#include <cmath>
+#include <cstring>
+#include <memory>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include "isohf/archive/content_hash.h"
+#include "isohf/archive/deflate.h"
+#include "isohf/archive/quantise.h"
+#include "isohf/archive/tile_codec.h"
+#include "isohf/surface/height_source.h"
+#include "isohf/surface/kernels.h"
+#include "isohf/surface/normals.h"
+#include "isohf/surface/prefilter.h"
+#include "isohf/surface/shadow_hull.h"
+#include "isohf/surface/source_scan.h"
+#include "isohf/surface/tile_cutter.h"
+
+namespace {
+
+using namespace isohf;
+
+constexpr std::int64_t kColumns = 512;
+constexpr std::int64_t kRows = 512;
+constexpr double kSpacing = 30.0;
+
+/// Hills with some roughness, whole metres.
+std::vector<std::int16_t> terrain() {
+  std::vector<std::int16_t> samples;
+  std::uint32_t state = 1;
+  for (std::int64_t r = 0; r < kRows; ++r) {
+    for (std::int64_t c = 0; c < kColumns; ++c) {
+      const auto x = static_cast<double>(c);
+      const auto z = static_cast<double>(r);
+      state = state * 1664525U + 1013904223U;
+      samples.push_back(static_cast<std::int16_t>(900.0 + 400.0 * std::sin(x * 0.02) * std::cos(z * 0.017) +
+                                                  60.0 * std::sin(x * 0.13 + z * 0.09) +
+                                                  static_cast<double>(state >> 30U)));
+    }
+  }
+  return samples;
+}
+
+/// One tile of the usual shape in the middle of the terrain, at every stage of its way.
+struct Stages {
+  Stages() : raw(terrain().size() * 2), heights(raw.size() / 2) {
+    std::memcpy(raw.data(), terrain().data(), raw.size());
+    info.width = kColumns;
+    info.height = kRows;
+    info.sample_type = SampleType::kInt16;
+    heights_from_samples(info, 0.0, raw, heights);
+    cutter(Filter::kBilinear).cut({0, 0}, band(), tile);
+    quantise(quantisation, 0.0, tile, codes);
+  }
+
+  [[nodiscard]] SourceBand band() const { return {{heights.data(), kColumns, kRows}, 0}; }
+  [[nodiscard]] SourceAxis axis() const {
+    return {kColumns, kSpacing / 2.0, kSpacing, Registration::kArea, Outside::kCover, 60.0};
+  }
+  [[nodiscard]] TileCutter cutter(Filter filter) const {
+    return {grid, axis(), axis(), Kernel::make(filter), {-1e9, 1e9}};
+  }
+
+  SourceInfo info;
+  TileGrid grid = TileGrid::make(TileShape::make(212, 243, 4), 2, 2, 6700.0, 6700.0);
+  Quantisation quantisation{CodeType::kU16, 0.0, 0.5};
+  std::vector<std::byte> raw;
+  std::vector<float> heights;
+  std::vector<float> tile = std::vector<float>(212 * 243);
+  TileCodes codes;
+};
+
+const Stages& stages() {
+  static const Stages made;
+  return made;
+}
+
+void set_bytes(benchmark::State& state, std::size_t bytes) {
+  state.SetBytesProcessed(static_cast<std::int64_t>(bytes) * state.iterations());
+}
+
+std::span<const std::byte> code_bytes() {
+  return std::as_bytes(std::span(stages().codes.codes));
+}
+
+void memcpy_of_samples(benchmark::State& state) {
+  std::vector<std::byte> to(stages().raw.size());
+  for (auto _ : state) {
+    std::memcpy(to.data(), stages().raw.data(), to.size());
+    benchmark::DoNotOptimize(to.data());
+    benchmark::ClobberMemory();
+  }
+  set_bytes(state, to.size());
+}
+BENCHMARK(memcpy_of_samples);
+
+void libdeflate_of_codes(benchmark::State& state) {
+  const std::unique_ptr<libdeflate_compressor, decltype(&libdeflate_free_compressor)> compressor(
+      libdeflate_alloc_compressor(static_cast<int>(state.range(0))), libdeflate_free_compressor);
+  const std::span<const std::byte> bytes = code_bytes();
+  std::vector<std::byte> out(libdeflate_deflate_compress_bound(compressor.get(), bytes.size()));
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(
+        libdeflate_deflate_compress(compressor.get(), bytes.data(), bytes.size(), out.data(), out.size()));
+  }
+  set_bytes(state, bytes.size());
+}
+BENCHMARK(libdeflate_of_codes)->Arg(1)->Arg(6)->ArgName("level");
+
+void scan(benchmark::State& state) {
+  for (auto _ : state) {
+    SourceScan found;
+    scan_samples(stages().info, stages().raw, found);
+    benchmark::DoNotOptimize(found);
+  }
+  set_bytes(state, stages().raw.size());
+}
+BENCHMARK(scan);
+
+void heights_of_samples(benchmark::State& state) {
+  SourceInfo info = stages().info;
+  if (state.range(0) != 0) info.void_values = {-32768.0};
+  std::vector<float> out(stages().heights.size());
+  for (auto _ : state) {
+    heights_from_samples(info, 0.0, stages().raw, out);
+    benchmark::DoNotOptimize(out.data());
+    benchmark::ClobberMemory();
+  }
+  set_bytes(state, stages().raw.size());
+}
+BENCHMARK(heights_of_samples)->Arg(0)->Arg(1)->ArgName("voids");
+
+constexpr Filter kFilters[] = {Filter::kNearest,  Filter::kBilinear, Filter::kCatmullRom, Filter::kBspline2,
+                               Filter::kBspline3, Filter::kBspline5, Filter::kLanczos3,   Filter::kLanczos6};
+
+void prefilter_rows(benchmark::State& state) {
+  const Prefilter prefilter = Prefilter::make(kFilters[state.range(0)], Acquisition{});
+  std::vector<float> band = stages().heights;
+  for (auto _ : state) {
+    prefilter.filter_rows({band.data(), kColumns, kRows});
+    benchmark::ClobberMemory();
+  }
+  set_bytes(state, band.size() * sizeof(float));
+  state.SetLabel(to_string(kFilters[state.range(0)]));
+}
+BENCHMARK(prefilter_rows)->DenseRange(3, 5);
+
+void prefilter_columns(benchmark::State& state) {
+  const Prefilter prefilter = Prefilter::make(kFilters[state.range(0)], Acquisition{});
+  std::vector<float> out(stages().heights.size());
+  for (auto _ : state) {
+    prefilter.filter_columns({stages().heights.data(), kColumns, kRows}, 0, {out.data(), kColumns, kRows});
+    benchmark::ClobberMemory();
+  }
+  set_bytes(state, out.size() * sizeof(float));
+  state.SetLabel(to_string(kFilters[state.range(0)]));
+}
+BENCHMARK(prefilter_columns)->DenseRange(3, 5);
+
+/// Row sampler and all: bytes of the heights that come out.
+void cut_tile(benchmark::State& state) {
+  const TileCutter cutter = stages().cutter(kFilters[state.range(0)]);
+  std::vector<float> out(stages().tile.size());
+  for (auto _ : state) {
+    cutter.cut({0, 0}, stages().band(), out);
+    benchmark::DoNotOptimize(out.data());
+    benchmark::ClobberMemory();
+  }
+  set_bytes(state, out.size() * sizeof(float));
+  state.SetLabel(to_string(kFilters[state.range(0)]));
+}
+BENCHMARK(cut_tile)->DenseRange(0, 7);
+
+void quantise_tile(benchmark::State& state) {
+  TileCodes codes;
+  for (auto _ : state) benchmark::DoNotOptimize(quantise(stages().quantisation, 0.0, stages().tile, codes));
+  set_bytes(state, stages().tile.size() * sizeof(float));
+}
+BENCHMARK(quantise_tile);
+
+void encode(benchmark::State& state) {
+  for (auto _ : state) {
+    const EncodedTile encoded = encode_tile(stages().grid.shape(), stages().codes);
+    benchmark::DoNotOptimize(encoded.deflated.data());
+  }
+  set_bytes(state, code_bytes().size());
+}
+BENCHMARK(encode);
+
+void digest(benchmark::State& state) {
+  for (auto _ : state) benchmark::DoNotOptimize(tile_content_digest(stages().codes).data());
+  set_bytes(state, code_bytes().size());
+}
+BENCHMARK(digest);
+
+void crc(benchmark::State& state) {
+  for (auto _ : state) benchmark::DoNotOptimize(crc32(code_bytes()));
+  set_bytes(state, code_bytes().size());
+}
+BENCHMARK(crc);
+
+void normals(benchmark::State& state) {
+  std::vector<Normal> out(stages().tile.size());
+  for (auto _ : state) {
+    tile_normals(stages().grid, {stages().tile.data(), 212, 243}, {out.data(), 212, 243});
+    benchmark::ClobberMemory();
+  }
+  set_bytes(state, stages().tile.size() * sizeof(float));
+}
+BENCHMARK(normals);
+
+void shadow_casters(benchmark::State& state) {
+  const double fall =
+      std::tan(2.0 * std::numbers::pi / 180.0) * 15.0 / 0.5;  // codes for one half step, sun at 2 degrees
+  for (auto _ : state) {
+    const TileCasters casters =
+        tile_casters(stages().grid.shape(), {stages().codes.codes.data(), 212, 243}, std::uint16_t{65535}, fall);
+    benchmark::DoNotOptimize(&casters);
+  }
+  set_bytes(state, code_bytes().size());
+}
+BENCHMARK(shadow_casters);
+
+}  // namespace
+
+BENCHMARK_MAIN();
