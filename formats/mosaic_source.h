@@ -31,6 +31,10 @@ class MosaicSource final : public HeightSource {
 
   [[nodiscard]] const SourceInfo& info() const override { return plan_.info; }
   void read_window(const Window& window, std::span<std::byte> samples) override;
+  [[nodiscard]] std::uint64_t buffer_bytes(std::uint64_t /*limit*/) const override {
+    return static_cast<std::uint64_t>(plan_.info.block_height) * static_cast<std::uint64_t>(plan_.info.width) *
+           size_bytes(plan_.info.sample_type);
+  }
 
   [[nodiscard]] const MosaicPlan& plan() const { return plan_; }
   [[nodiscard]] std::int64_t times_opened() const { return pool_.times_opened(); }
