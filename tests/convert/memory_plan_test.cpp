@@ -122,6 +122,32 @@ TEST(MemoryPlan, TheArchiveDoesNotDependOnTheLimit) {
   EXPECT_GE(in_scratch, 8);
 }
 
+TEST(MemoryPlan, AScratchFileHoldsAllRowsOfTilesInFlightOfANarrowRaster) {
+  const test::TemporaryFolder folder;
+  // One column of tiles: every tile in flight is of another row.
+  test::MemorySource<std::int16_t> source(SampleType::kInt16, 60, 6000, [](std::int64_t c, std::int64_t r) {
+    return static_cast<double>((c * 7919 + r * 104729) % 4999);
+  });
+  ConvertOptions options;
+  options.plan.shape = {68, 75};
+  options.plan.levels = 2;
+  options.threads = 4;
+  options.overwrite = true;
+  options.scratch_folder = folder.path();
+  const Plan plan = make_plan(source.info(), options.plan);
+  ASSERT_EQ(plan.grid.tile_columns(), 1);
+  const std::atomic<bool> cancel = false;
+  (void)convert(source, folder / "any.isohf", options, {}, cancel);
+  options.memory_bytes = plan_memory(source, plan, options).least_bytes;
+  const MemoryPlan least = plan_memory(source, plan, options);
+  ASSERT_GT(least.scratch_rows, 0);
+  ASSERT_LT(least.scratch_rows, 6000);
+  // Each tile in flight needs its own rows, all at once.
+  EXPECT_GE(least.scratch_rows, static_cast<std::int64_t>(least.tiles_in_flight) * 70);
+  (void)convert(source, folder / "bound.isohf", options, {}, cancel);
+  EXPECT_EQ(test::read_file(folder / "bound.isohf"), test::read_file(folder / "any.isohf"));
+}
+
 TEST(MemoryPlan, ALimitThatIsTooSmallIsAnsweredWithTheSmallest) {
   const test::TemporaryFolder folder;
   test::MemorySource<std::int16_t> source(SampleType::kInt16, 90, 75,

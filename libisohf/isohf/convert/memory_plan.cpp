@@ -81,7 +81,8 @@ class Estimate {
     memory.members_at_once = ration.members_at_once;
     memory.tile_columns_at_once = grid.tile_columns();
     if (in_scratch) {
-      const std::int64_t in_use = prefilter_.is_identity() ? 2 * tile_rows_ : tile_rows_ + 2 * prefilter_.halo();
+      const std::int64_t in_use = prefilter_.is_identity() ? parts_in_flight(memory, grid.tile_columns()) * tile_rows_
+                                                           : tile_rows_ + 2 * prefilter_.halo();
       memory.scratch_rows = std::min(SourceRows::kept_rows_for(memory.read_step, in_use), info_.height);
       memory.scratch_bytes = static_cast<std::uint64_t>(memory.scratch_rows) * row_bytes();
       if (!prefilter_.is_identity()) choose_columns(memory);
@@ -94,6 +95,12 @@ class Estimate {
   static std::int64_t rounded(double samples) { return static_cast<std::int64_t>(std::ceil(samples)); }
   [[nodiscard]] std::uint64_t row_bytes() const {
     return static_cast<std::uint64_t>(info_.width) * size_bytes(info_.sample_type);
+  }
+
+  /// Groups of `tiles` tiles that are in hand at once: the last tile of one may still be waited for while all tiles in
+  /// flight behind it have entered.
+  [[nodiscard]] static std::int64_t parts_in_flight(const MemoryPlan& memory, std::int64_t tiles) {
+    return (static_cast<std::int64_t>(memory.tiles_in_flight) + tiles - 2) / tiles + 1;
   }
 
   /// As many tiles as may be prefiltered together within the limit.
@@ -135,7 +142,9 @@ class Estimate {
     double bytes = waiting * vertices * kWaitingBytesPerVertex;
     const std::int64_t step = memory.read_step.rows;
     // Slabs that hold the rows of two rows of tiles, wherever they begin; the prefilter copies what it needs at once.
-    const std::int64_t in_use = prefilter_.is_identity() ? 2 * tile_rows_ : std::min(tile_rows_, step);
+    const std::int64_t in_use = prefilter_.is_identity()
+                                    ? parts_in_flight(memory, plan_.grid.tile_columns()) * tile_rows_
+                                    : std::min(tile_rows_, step);
     const std::int64_t slabs = std::min((in_use + step - 2) / step + 1, (info_.height + step - 1) / step);
     const bool in_parts = memory.read_step.columns < info_.width;
     if (memory.scratch_rows == 0) {
@@ -151,9 +160,12 @@ class Estimate {
                                                                           static_cast<double>(tile_columns_));
     // Strips of columns that the threads filter, doubles.
     const double strips = threads_ * 64.0 * 12.0 * static_cast<double>(tile_rows_ + 2 * prefilter_.halo());
-    return bytes + strips +
-           static_cast<double>(
-               BandReader::memory_bytes(prefilter_, tile_rows_, static_cast<std::int64_t>(columns), info_));
+    // Pieces of changing sizes leave gaps in the heap (measured).
+    const double gaps = memory.scratch_rows > 0 ? 1.12 : 1.0;
+    const std::uint64_t bands =
+        BandReader::memory_bytes(prefilter_, parts_in_flight(memory, memory.tile_columns_at_once), tile_rows_,
+                                 static_cast<std::int64_t>(columns), info_);
+    return bytes + strips + gaps * static_cast<double>(bands);
   }
 
   const HeightSource& source_;

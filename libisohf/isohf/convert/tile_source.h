@@ -34,8 +34,8 @@ class TileSource {
       return tile.row == tile_row && tile.column >= first_column && tile.column < end_column;
     }
   };
-  /// The part that holds `tile`. One thread, tiles in flat order. The part before must be on its way out: no more than
-  /// two are held at once.
+  /// The part that holds `tile`. One thread, tiles in flat order. No tile may be cut from a part that more tiles than
+  /// MemoryPlan::tiles_in_flight have entered after.
   [[nodiscard]] std::shared_ptr<const Part> read(TileIndex tile);
 
   /// heights [C x R] out, as TileCutter::cut. Any thread.

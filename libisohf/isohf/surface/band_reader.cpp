@@ -64,15 +64,15 @@ BandReader::BandReader(HeightSource& source, double datum, const Prefilter& pref
 BandReader::BandReader(SourceRows& rows, double datum, const Prefilter& prefilter)
     : rows_(rows), datum_(datum), prefilter_(prefilter), pool_(std::make_shared<Pool>()) {}
 
-std::uint64_t BandReader::memory_bytes(const Prefilter& prefilter, std::int64_t rows, std::int64_t columns,
-                                       const SourceInfo& info) {
+std::uint64_t BandReader::memory_bytes(const Prefilter& prefilter, std::int64_t bands, std::int64_t rows,
+                                       std::int64_t columns, const SourceInfo& info) {
   const std::int64_t halo = prefilter.halo();
   const auto area = [&](std::int64_t r, std::int64_t c) {
     return static_cast<std::uint64_t>(std::min(r, info.height)) * static_cast<std::uint64_t>(std::min(c, info.width));
   };
-  const std::uint64_t bands = 2 * area(rows + 4, columns) * sizeof(float);
-  if (prefilter.is_identity()) return bands;
-  return bands + area(rows + 8 + 2 * halo, columns + 2 * halo) * (sizeof(float) + 1);
+  const std::uint64_t in_use = static_cast<std::uint64_t>(bands) * area(rows + 4, columns) * sizeof(float);
+  if (prefilter.is_identity()) return in_use;
+  return in_use + area(rows + 8 + 2 * halo, columns + 2 * halo) * (sizeof(float) + 1);
 }
 
 std::shared_ptr<Band> BandReader::make_band(const RowRange& rows, const RowRange& columns) const {
@@ -139,7 +139,10 @@ void BandReader::move_heights_to(const RowRange& rows, const RowRange& columns) 
   const auto go_on = [&](auto& values) {
     // Not by resize(): what is kept must stay. The first band lacks the halo North of it.
     const auto spare = static_cast<std::size_t>(8 + (rows.first == 0 ? prefilter_.halo() : 0));
-    if (values.capacity() < count_of(rows) * width) values.reserve((count_of(rows) + spare) * width);
+    if (values.capacity() < count_of(rows) * width) {
+      if (kept == 0) values = {};  // or both would be there for a while
+      values.reserve((count_of(rows) + spare) * width);
+    }
     if (kept > 0) std::copy_n(values.begin() + static_cast<std::ptrdiff_t>(skipped), kept * width, values.begin());
     values.resize(count_of(rows) * width);
   };

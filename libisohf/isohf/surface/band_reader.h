@@ -46,9 +46,9 @@ class BandReader {
   /// the rows before is only kept while the columns stay the same.
   [[nodiscard]] std::shared_ptr<const Band> read(const RowRange& rows, const RowRange& columns);
 
-  /// Memory of a reader and its bands, bytes: two that are in use, and what they are made from.
-  [[nodiscard]] static std::uint64_t memory_bytes(const Prefilter& prefilter, std::int64_t rows, std::int64_t columns,
-                                                  const SourceInfo& info);
+  /// Memory of a reader and of `bands` bands that are in use, and of what they are made from, bytes.
+  [[nodiscard]] static std::uint64_t memory_bytes(const Prefilter& prefilter, std::int64_t bands, std::int64_t rows,
+                                                  std::int64_t columns, const SourceInfo& info);
 
  private:
   /// Memory of bands that nobody reads any more, for the next ones: fresh memory would be cleared page by page.
