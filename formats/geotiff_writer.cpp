@@ -1,6 +1,7 @@
 #include "formats/geotiff_writer.h"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <optional>
 
@@ -21,6 +22,24 @@ constexpr std::uint16_t kProjectedCrs = 3072;
 constexpr std::uint16_t kProjectedCitation = 3073;
 constexpr std::uint16_t kLinearUnits = 3076;
 constexpr std::uint16_t kLinearUnitSize = 3077;
+constexpr std::uint16_t kDatum = 2050;
+constexpr std::uint16_t kEllipsoid = 2056;
+constexpr std::uint16_t kProjection = 3074;
+constexpr std::uint16_t kMethod = 3075;
+constexpr std::uint16_t kParallel1 = 3078;
+constexpr std::uint16_t kParallel2 = 3079;
+constexpr std::uint16_t kNaturalLongitude = 3080;
+constexpr std::uint16_t kNaturalLatitude = 3081;
+constexpr std::uint16_t kFalseEasting = 3082;
+constexpr std::uint16_t kFalseNorthing = 3083;
+constexpr std::uint16_t kFalseOriginLongitude = 3084;
+constexpr std::uint16_t kFalseOriginLatitude = 3085;
+constexpr std::uint16_t kFalseOriginEasting = 3086;
+constexpr std::uint16_t kFalseOriginNorthing = 3087;
+constexpr std::uint16_t kCentreLongitude = 3088;
+constexpr std::uint16_t kCentreLatitude = 3089;
+constexpr std::uint16_t kNaturalScale = 3092;
+constexpr std::uint16_t kVerticalLongitude = 3095;
 constexpr std::uint16_t kVerticalCrs = 4096;
 constexpr std::uint16_t kVerticalCitation = 4097;
 constexpr std::uint16_t kVerticalUnits = 4099;
@@ -115,6 +134,64 @@ void write_system(const Georeference& geo, KeyWriter& keys) {
   }
 }
 
+/// Methods and parameters: GeoTIFF 1.0, sections 6.3.3.3 and 2.7, as readers of it know them.
+void write_projection(const ProjectionSpec& spec, KeyWriter& keys) {
+  constexpr std::uint16_t kTransverseMercator = 1;
+  constexpr std::uint16_t kMercator = 7;
+  constexpr std::uint16_t kLambertConformalTwoParallels = 8;
+  constexpr std::uint16_t kAzimuthalEquidistant = 12;
+  constexpr std::uint16_t kPolarStereographic = 15;
+  keys.number(kProjectedCrs, kUserDefined);
+  keys.number(kProjection, kUserDefined);
+  keys.number(kAngularUnits, kDegree);
+  const bool is_wgs84 = spec.ellipsoid == Ellipsoid{};
+  constexpr std::uint16_t kWgs84 = 4326;
+  keys.number(kGeodeticCrs, is_wgs84 ? kWgs84 : kUserDefined);
+  if (!is_wgs84) {
+    keys.number(kDatum, kUserDefined);
+    keys.number(kEllipsoid, kUserDefined);
+  }
+  switch (spec.kind) {
+    case ProjectionKind::kTransverseMercator:
+    case ProjectionKind::kUtm:
+      keys.number(kMethod, kTransverseMercator);
+      keys.real(kNaturalLatitude, spec.latitude_0);
+      keys.real(kNaturalLongitude, spec.longitude_0);
+      keys.real(kNaturalScale, spec.scale_0);
+      break;
+    case ProjectionKind::kLambertConformal:
+      keys.real(kParallel1, spec.parallel_1 == -spec.parallel_2 ? std::abs(spec.parallel_1) : spec.parallel_1);
+      if (spec.parallel_1 == -spec.parallel_2) {
+        keys.number(kMethod, kMercator);
+        keys.real(kNaturalLongitude, spec.longitude_0);
+        break;
+      }
+      keys.number(kMethod, kLambertConformalTwoParallels);
+      keys.real(kParallel2, spec.parallel_2);
+      keys.real(kFalseOriginLatitude, spec.latitude_0);
+      keys.real(kFalseOriginLongitude, spec.longitude_0);
+      keys.real(kFalseOriginEasting, spec.false_easting);
+      keys.real(kFalseOriginNorthing, spec.false_northing);
+      return;
+    case ProjectionKind::kPolarStereographic:
+      keys.number(kMethod, kPolarStereographic);
+      keys.real(kNaturalLatitude, spec.parallel_1);
+      keys.real(kVerticalLongitude, spec.longitude_0);
+      keys.real(kNaturalScale, 1.0);
+      break;
+    case ProjectionKind::kLocal:
+      keys.number(kMethod, kAzimuthalEquidistant);
+      keys.real(kCentreLatitude, spec.latitude_0);
+      keys.real(kCentreLongitude, spec.longitude_0);
+      break;
+    case ProjectionKind::kEquirectangular:
+    case ProjectionKind::kNone:
+      return;
+  }
+  keys.real(kFalseEasting, spec.false_easting);
+  keys.real(kFalseNorthing, spec.false_northing);
+}
+
 void write_vertical(const ReferenceSystem& system, double metres_per_unit, const std::string& unit, KeyWriter& keys) {
   if (system.vertical_epsg) keys.number(kVerticalCrs, code_or_user_defined(system.vertical_epsg));
   keys.text(kVerticalCitation, system.vertical_datum);
@@ -124,8 +201,8 @@ void write_vertical(const ReferenceSystem& system, double metres_per_unit, const
 
 }  // namespace
 
-GeoTags geotiff_tags(const Georeference& georeference, double metres_per_vertical_unit,
-                     const std::string& vertical_unit) {
+GeoTags geotiff_tags(const Georeference& georeference, const std::optional<ProjectionSpec>& projection,
+                     double metres_per_vertical_unit, const std::string& vertical_unit) {
   GeoTags tags;
   const bool has_unit = georeference.unit != HorizontalUnit::kUnknown;
   const bool has_spacing = georeference.spacing_x != 1.0 || georeference.spacing_y != 1.0;
@@ -144,7 +221,15 @@ GeoTags geotiff_tags(const Georeference& georeference, double metres_per_vertica
   constexpr std::uint16_t kArea = 1;
   constexpr std::uint16_t kPoint = 2;
   keys.number(kRasterType, georeference.registration == Registration::kPoint ? kPoint : kArea);
-  if (has_unit) write_system(georeference, keys);
+  if (has_unit && projection) {
+    Georeference on_map = georeference;
+    on_map.system.wkt.clear();
+    write_system(on_map, keys);
+    write_projection(*projection, keys);
+    keys.text(kProjectedCitation, georeference.system.name);
+  } else if (has_unit) {
+    write_system(georeference, keys);
+  }
   write_vertical(georeference.system, metres_per_vertical_unit, vertical_unit, keys);
   keys.finish();
   return tags;

@@ -1,8 +1,10 @@
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "formats/geotiff_keys.h"
+#include "isohf/projection/projection_spec.h"
 
 namespace isohf {
 
@@ -11,7 +13,8 @@ namespace isohf {
 /// names and the vertical system. Empty for a georeference that says nothing.
 /// Registration kUnknown is written as area: GeoTIFF knows no third kind. What has no EPSG code keeps its name,
 /// ellipsoid and WKT, not the parameters of its projection.
-[[nodiscard]] GeoTags geotiff_tags(const Georeference& georeference, double metres_per_vertical_unit,
-                                   const std::string& vertical_unit);
+/// projection   the map that the georeference is on: its method and parameters are written instead of a WKT
+[[nodiscard]] GeoTags geotiff_tags(const Georeference& georeference, const std::optional<ProjectionSpec>& projection,
+                                   double metres_per_vertical_unit, const std::string& vertical_unit);
 
 }  // namespace isohf

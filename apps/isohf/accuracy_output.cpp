@@ -7,6 +7,7 @@
 
 #include "describe.h"
 #include "isohf/archive/reader.h"
+#include "isohf/restore/archive_geometry.h"
 #include "progress.h"
 
 namespace isohf::cli {
@@ -147,7 +148,8 @@ Accuracy measure_accuracy(const std::string& archive, HeightSource& source, std:
   accuracy.surface = compare_with_source(
       reader, source, random_points, work.threads,
       [&](std::int64_t done, std::int64_t total) { display.update("compare", "rows", done, total); }, cancel);
-  if (with_ortho) {
+  // An ortho mesh of the map would have to be resampled through the projection as well.
+  if (with_ortho && !is_warped(reader.metadata())) {
     accuracy.lattice = compare_lattices(
         reader, source, accuracy.surface.rms, work.threads,
         [&](int pass, std::int64_t done, std::int64_t total) {

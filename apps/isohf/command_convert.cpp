@@ -22,6 +22,7 @@
 #include "json_output.h"
 #include "option_values.h"
 #include "options_common.h"
+#include "options_ground.h"
 #include "options_lattice.h"
 #include "options_source.h"
 #include "options_texture.h"
@@ -60,6 +61,7 @@ struct ConvertCommandOptions {
   OpenOptions open;
   TextureOptions texture;
   ConvertOptions convert;
+  GeoidRequest geoid;
   bool dry_run = false;
   /// Measure the archive against the input; the file for the report, "-" for none beside the summary.
   std::optional<std::string> report;
@@ -112,6 +114,8 @@ std::optional<ConvertCommandOptions> parse(const Arguments& arguments) {
               "What the archive says it was made from, instead of the input's file name or a mosaic's files",
               options.source_name);
   add_lattice_options(line, options.convert.plan);
+  add_ground_options(line, options.convert.plan.ground);
+  add_geoid_option(line, options.geoid);
   add_shape_options(line, options.convert.plan);
   add_quantisation_options(line, options.convert);
   line.group("Reconstruction");
@@ -163,6 +167,10 @@ std::optional<ConvertCommandOptions> parse(const Arguments& arguments) {
       throw Error(ErrorCode::kInvalidArgument, "convert: --sun-min needs --shadow-seeds without angles");
     }
     options.convert.shadow_seeds->sun_min_deg = *sun_min_deg;
+  }
+  if (options.convert.lossless && !options.geoid.path.empty()) {
+    throw Error(ErrorCode::kInvalidArgument,
+                "convert: --lossless keeps the input's own samples, --geoid changes them; give one of the two");
   }
   check_texture_options(options.texture);
   if (!line.given("--tmpdir")) options.convert.scratch_folder = folder_of(options.output);
@@ -245,6 +253,7 @@ std::string text_from(const ConvertCommandOptions& options, const ConvertSummary
                            describe_count(summary.tiles_written), describe_count(summary.tiles_expected),
                            describe_count(summary.tiles_void), metadata.grid.tile_columns(), metadata.grid.tile_rows(),
                            shape.columns(), shape.rows()));
+  if (metadata.projection) say("projection", describe_projection(*metadata.projection));
   say("size", fmt::format("elevations take {}, {:.3f} bits a sample: {:.2f} times smaller than raw 16-bit samples",
                           describe_bytes(summary.tile_bytes), measured.bits_per_sample, measured.ratio));
   if (summary.residual_bytes > 0) {
@@ -298,8 +307,9 @@ int run(ConvertCommandOptions options) {
       check_output_file(files, *options.report, options.convert.overwrite);
     }
   }
-  const OpenedInputs opened = open_inputs(std::move(files), options.inputs, options.open, options.work.threads);
-  const std::unique_ptr<HeightSource>& source = opened.source;
+  OpenedInputs opened = open_inputs(std::move(files), options.inputs, options.open, options.work.threads);
+  const std::unique_ptr<HeightSource> source =
+      laid_out(std::move(opened.source), options.geoid, options.convert.plan.ground);
   options.input = source->info().path;
   options.convert.source_note = opened.note;
   if (!options.source_name.empty()) {

@@ -178,12 +178,12 @@ ExportGrid asked_grid(const ExportOptions& options, const Metadata& metadata) {
       throw Error(ErrorCode::kInvalidArgument, options.archive + ": --bbox lies outside of what the archive covers");
     }
   }
-  const bool area = metadata.source.registration == "area";
+  const bool area = samples_are_areas(metadata);
   ExportGrid grid;
   if (options.size || options.spacing) {
     grid.samples = grid_over(ground, area, options.size, options.spacing);
   } else {
-    grid.samples = source_grid(metadata.source);
+    grid.samples = natural_grid(metadata);
     if (options.bbox) grid.samples = part_of_source_grid(grid.samples, ground);
   }
   GridSize size{grid.samples.width, grid.samples.height};

@@ -223,6 +223,8 @@ std::string describe_archive(const ArchiveReader& archive) {
                             describe_length(grid.world_height(), metres)));
   say("source in", fmt::format("x {:.6g}..{:.6g}, z {:.6g}..{:.6g}; beyond it: {}", metadata.valid.x0,
                                metadata.valid.x1, metadata.valid.z0, metadata.valid.z1, metadata.outside));
+  if (metadata.projection) say("projection", describe_projection(*metadata.projection));
+  if (metadata.wraps_x) say("joins", "the East edge is the West edge");
   if (codes.type == CodeType::kF32) {
     say("elevations", "f32");
   } else {

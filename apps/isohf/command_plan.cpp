@@ -12,6 +12,7 @@
 #include "json_output.h"
 #include "option_values.h"
 #include "options_common.h"
+#include "options_ground.h"
 #include "options_lattice.h"
 #include "options_source.h"
 #include "plan_report.h"
@@ -40,6 +41,7 @@ struct PlanOptions {
   OpenOptions open;
 
   PlanRequest request;
+  GeoidRequest geoid;
   CodeType code_type = CodeType::kU16;
   int limit = 10;
   bool table1 = false;
@@ -62,6 +64,8 @@ std::optional<PlanOptions> parse(const Arguments& arguments) {
               [&](const std::string& text) { options.limit = static_cast<int>(parse_whole_number(text, 1, 1000000)); });
   line.flag("--table1", "List the shapes of the paper's Table 1", options.table1);
   add_lattice_options(line, options.request);
+  add_ground_options(line, options.request.ground);
+  add_geoid_option(line, options.geoid);
   add_source_options(line, options.open);
   add_mosaic_options(line, options.inputs);
   add_common_options(line, options.common);
@@ -72,7 +76,8 @@ std::optional<PlanOptions> parse(const Arguments& arguments) {
   if (options.inputs.names.empty()) {
     for (const char* option :
          {"--density", "--spacing", "--tiles", "--fit", "--outside", "--channel", "--registration", "--nodata",
-          "--z-scale", "--z-offset", "--sample-spacing", "--overlap", "--require-complete", "--recursive"}) {
+          "--z-scale", "--z-offset", "--sample-spacing", "--overlap", "--require-complete", "--recursive",
+          "--projection", "--wrap-x", "--geoid"}) {
       if (line.given(option)) refuse(std::string(option) + " needs an INPUT");
     }
   } else if (line.given("--limit")) {
@@ -184,8 +189,10 @@ int run(const PlanOptions& options) {
     list_candidates(options);
   } else {
     const std::unique_ptr<HeightSource> source =
-        open_inputs(expand_inputs(options.inputs.names, options.inputs.recursive), options.inputs, options.open, 0)
-            .source;
+        laid_out(open_inputs(expand_inputs(options.inputs.names, options.inputs.recursive), options.inputs,
+                             options.open, 0)
+                     .source,
+                 options.geoid, options.request.ground);
     ConvertOptions convert;
     convert.plan = options.request;
     convert.code_type = options.code_type;

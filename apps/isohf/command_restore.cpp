@@ -16,6 +16,8 @@
 #include "interrupt.h"
 #include "isohf/archive/content_hash.h"
 #include "isohf/base/error.h"
+#include "isohf/projection/projection_wkt.h"
+#include "isohf/restore/archive_geometry.h"
 #include "isohf/restore/lossless.h"
 #include "json_output.h"
 #include "option_values.h"
@@ -95,10 +97,17 @@ std::optional<RestoreOptions> parse(const Arguments& arguments) {
 
 SampleGrid asked_grid(const RestoreOptions& options, const Metadata& metadata) {
   if (!options.like.empty()) {
+    if (is_warped(metadata)) {
+      throw Error(
+          ErrorCode::kInvalidArgument,
+          fmt::format("{}: --like does not go through projections, and this archive's input was projected ({}); "
+                      "give --size or --spacing, and bring the raster to that grid (gdalwarp)",
+                      options.archive, describe_projection(metadata.projection->spec)));
+    }
     return grid_like(metadata, open_inputs(expand_inputs({options.like}, false), {}, {}, 0).source->info());
   }
-  if (!options.size && !options.spacing) return source_grid(metadata.source);
-  return grid_over(metadata.valid, metadata.source.registration == "area", options.size, options.spacing);
+  if (!options.size && !options.spacing) return natural_grid(metadata);
+  return grid_over(metadata.valid, samples_are_areas(metadata), options.size, options.spacing);
 }
 
 struct Restored {

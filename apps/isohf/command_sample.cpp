@@ -10,6 +10,7 @@
 #include "isohf/archive/reader.h"
 #include "isohf/base/error.h"
 #include "isohf/lattice/barycentric.h"
+#include "isohf/restore/archive_geometry.h"
 #include "isohf/surface/normals.h"
 #include "json_output.h"
 #include "line_reader.h"
@@ -35,12 +36,15 @@ blend over it, of length 1. A place without elevation gives 'void', one beyond t
 
 Examples:
   isohf sample dem.isohf --at 1200.5 340
+  isohf sample dem.isohf --at-lonlat 6.865 45.833
   isohf sample dem.isohf < places.txt > elevations.txt)";
 
 struct SampleOptions {
   CommonOptions common;
   std::string archive;
   std::vector<WorldPoint> places;
+  std::vector<GeoPoint> geo_places;
+  bool reads_degrees = false;  ///< standard input holds longitudes and latitudes
   std::uint64_t memory_bytes = std::uint64_t{256} << 20;
 };
 
@@ -53,6 +57,15 @@ std::optional<SampleOptions> parse(const Arguments& arguments) {
                      [&](const std::string& x, const std::string& z) {
                        options.places.push_back({parse_number(x), parse_number(z)});
                      });
+  line.repeated_pair("--at-lonlat", "LON LAT",
+                     "A place in degrees, for archives of inputs in degrees; may be given again",
+                     [&](const std::string& longitude, const std::string& latitude) {
+                       options.geo_places.push_back({parse_number(longitude), parse_number(latitude)});
+                     });
+  line.flag("--lonlat", "Places on standard input are longitude and latitude, degrees", options.reads_degrees);
+  line.exclusive({"--at", "--at-lonlat"});
+  line.exclusive({"--at", "--lonlat"});
+  line.exclusive({"--at-lonlat", "--lonlat"});
   add_memory_option(line, "Decoded tiles to keep (default 256M)", options.memory_bytes);
   add_common_options(line, options.common);
   line.footer(kFooter);
@@ -123,7 +136,9 @@ std::string text_from(const Sample& sample) {
 }
 
 std::string json_from(const Sample& sample, WorldPoint place) {
-  ordered_json json = {{"x", place.x}, {"z", place.z}};
+  // A place that the map does not show has no world coordinates.
+  const auto number = [](double value) { return std::isnan(value) ? ordered_json(nullptr) : ordered_json(value); };
+  ordered_json json = {{"x", number(place.x)}, {"z", number(place.z)}};
   if (!sample.inside) {
     json["state"] = "outside";
   } else {
@@ -145,12 +160,21 @@ int run(const SampleOptions& options) {
   }
   TileCache cache(archive, options.memory_bytes);
   StandardOutput out;
+  std::optional<GeoPlaces> geo;
+  if (options.reads_degrees || !options.geo_places.empty()) {
+    try {
+      geo.emplace(archive.metadata());
+    } catch (const Error& error) {
+      throw Error(error.code(), options.archive + ": " + error.what());
+    }
+  }
   const auto answer = [&](WorldPoint place) {
     const Sample sample = sample_at(archive.grid(), cache, place);
     out.write(options.common.json ? json_from(sample, place) : text_from(sample));
   };
   for (const WorldPoint place : options.places) answer(place);
-  if (options.places.empty()) {
+  for (const GeoPoint place : options.geo_places) answer(geo->world_from_geo(place));
+  if (options.places.empty() && options.geo_places.empty()) {
     LineReader reader;
     while (const std::optional<std::string> line = reader.next([&] { out.flush(); })) {
       const std::size_t first = line->find_first_not_of(" \t");
@@ -161,7 +185,7 @@ int run(const SampleOptions& options) {
         throw Error(ErrorCode::kCorrupt, fmt::format("standard input, line {}: found '{}', must be 'x z', two numbers",
                                                      reader.line_number(), line->substr(0, 80)));
       }
-      answer(place);
+      answer(geo ? geo->world_from_geo({place.x, place.z}) : place);
     }
   }
   out.finish();

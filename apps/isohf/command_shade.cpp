@@ -16,6 +16,7 @@
 #include "formats/units.h"
 #include "interrupt.h"
 #include "isohf/base/error.h"
+#include "isohf/restore/archive_geometry.h"
 #include "json_output.h"
 #include "option_values.h"
 #include "options_common.h"
@@ -143,6 +144,14 @@ double default_softness(const Metadata& metadata) {
 /// Where the picture lies, for GeoTIFF; nullopt where the source did not say.
 std::optional<Georeference> georeference_of(const Metadata& metadata, const ShadeRequest& request) {
   const SourceRecord& source = metadata.source;
+  if (is_warped(metadata)) {
+    SampleGrid grid{request.width, request.height};
+    grid.spacing_x = (metadata.valid.x1 - metadata.valid.x0) / static_cast<double>(request.width);
+    grid.spacing_z = (metadata.valid.z1 - metadata.valid.z0) / static_cast<double>(request.height);
+    grid.first_x = metadata.valid.x0 + grid.spacing_x / 2.0;
+    grid.first_z = metadata.valid.z0 + grid.spacing_z / 2.0;
+    return map_georeference(metadata, grid);
+  }
   if (!source.origin_x || !source.origin_y || !(source.crs_spacing_x > 0.0) || !(source.crs_spacing_y > 0.0)) {
     return std::nullopt;
   }
@@ -183,6 +192,9 @@ int run(ShadeOptions options) {
   spec.sample_type = SampleType::kUint8;
   spec.channels = static_cast<int>(kShadeChannels);
   spec.georeference = georeference_of(archive.metadata(), request);
+  if (is_warped(archive.metadata()) && !spec.georeference->system.epsg) {
+    spec.projection = archive.metadata().projection->spec;
+  }
   spec.overwrite = options.overwrite;
   const auto sink = create_raster(options.output, spec);
 

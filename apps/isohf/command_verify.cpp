@@ -17,6 +17,7 @@
 #include "json_output.h"
 #include "option_values.h"
 #include "options_common.h"
+#include "options_ground.h"
 #include "options_source.h"
 #include "source_inputs.h"
 #include "standard_output.h"
@@ -42,6 +43,7 @@ struct VerifyCommandOptions {
   std::string archive;
   SourceInputs against;
   OpenOptions open;
+  GeoidRequest geoid;
   std::int64_t random_points = kRandomPoints;
   std::optional<double> max_error;
   std::optional<double> max_rms;
@@ -79,6 +81,7 @@ std::optional<VerifyCommandOptions> parse(const Arguments& arguments) {
               limit(options.max_rms));
   add_source_options(line, options.open);
   add_mosaic_options(line, options.against);
+  add_geoid_option(line, options.geoid);
   add_work_options(line, options.work);
   add_common_options(line, options.common);
   line.footer(kFooter);
@@ -88,7 +91,7 @@ std::optional<VerifyCommandOptions> parse(const Arguments& arguments) {
   if (options.against.names.empty()) {
     for (const char* option :
          {"--random", "--no-ortho", "--max-error", "--max-rms", "--channel", "--registration", "--nodata", "--z-scale",
-          "--z-offset", "--sample-spacing", "--overlap", "--require-complete", "--recursive"}) {
+          "--z-offset", "--sample-spacing", "--overlap", "--require-complete", "--recursive", "--geoid"}) {
       if (line.given(option)) {
         throw Error(ErrorCode::kInvalidArgument, std::string("verify: ") + option + " needs --against INPUT");
       }
@@ -176,14 +179,18 @@ VerifyReport check(const VerifyCommandOptions& options, const std::atomic<bool>&
 
 Accuracy compare(const VerifyCommandOptions& options, const std::atomic<bool>& cancel) {
   OpenOptions open = options.open;
-  const SourceRecord record = ArchiveReader(options.archive).metadata().source;
+  const Metadata metadata = ArchiveReader(options.archive).metadata();
+  const SourceRecord& record = metadata.source;
   if (open.channel.empty()) open.channel = record.channel;
   if (!open.registration)
     open.registration = record.registration == "area" ? Registration::kArea : Registration::kPoint;
   SourceInputs inputs = options.against;
   if (!inputs.overlap_given && record.mosaic && record.mosaic->overlap == "first") inputs.overlap = OverlapRule::kFirst;
-  const std::unique_ptr<HeightSource> source =
-      open_inputs(expand_inputs(inputs.names, inputs.recursive), inputs, open, options.work.threads).source;
+  GroundRequest ground;
+  ground.wrap_x = metadata.wraps_x;
+  OpenedInputs opened =
+      open_inputs(expand_inputs(inputs.names, inputs.recursive), inputs, open, options.work.threads);
+  const std::unique_ptr<HeightSource> source = laid_out(std::move(opened.source), options.geoid, ground);
   return measure_accuracy(options.archive, *source, options.random_points, !options.no_ortho, options.work,
                           options.common, cancel);
 }

@@ -4,6 +4,8 @@
 
 #include <cmath>
 
+#include "isohf/projection/projection_wkt.h"
+
 namespace isohf::cli {
 
 std::string describe_bytes(std::uint64_t bytes) {
@@ -40,6 +42,15 @@ std::string describe_length(double length, bool metres) {
   if (!metres) return fmt::format("{:.6g} units", length);
   if (std::fabs(length) >= 1e4) return fmt::format("{:.6g} km", length / 1000.0);
   return fmt::format("{:.6g} m", length);
+}
+
+std::string describe_projection(const ProjectionRecord& record) {
+  const double worst = 100.0 * record.worst_scale_error;
+  const std::string error =
+      worst < 1000.0 ? fmt::format("lengths err by up to {:.3g} %", worst) : std::string("lengths err by any amount");
+  const double longitude = std::remainder(record.worst_place.longitude, 360.0);
+  return fmt::format("{}; {} (at longitude {:.6g}, latitude {:.6g}); {}", describe_projection(record.spec), error,
+                     longitude, record.worst_place.latitude, record.why);
 }
 
 int raw_bytes(CodeType type) {

@@ -15,6 +15,9 @@ namespace isohf::cli {
 /// A horizontal length with its unit: metres, kilometres, or "units" where `metres` is false.
 [[nodiscard]] std::string describe_length(double length, bool metres);
 
+/// The projection, how far lengths err and where, and why it was taken.
+[[nodiscard]] std::string describe_projection(const ProjectionRecord& record);
+
 /// Bytes of one stored elevation before coding.
 [[nodiscard]] int raw_bytes(CodeType type);
 

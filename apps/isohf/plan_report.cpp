@@ -33,6 +33,9 @@ ordered_json json_from_plan(const SourceInfo& info, const Plan& plan, const Memo
           {"grid", json_from(plan.grid)},
           {"density", plan.density},
           {"outside", to_string(plan.outside)},
+          {"projection", plan.frame.projection ? ordered_json::parse(format_projection(*plan.frame.projection))
+                                               : ordered_json(nullptr)},
+          {"wraps_x", plan.frame.wraps_x},
           {"covered", json_from(plan.frame.bounds())},
           {"lattice_samples", plan.lattice_samples},
           {"code_type", to_string(code_type)},
@@ -67,6 +70,8 @@ std::string text_from_plan(const SourceInfo& info, const Plan& plan, const Memor
                             describe_length(grid.world_height(), metres)));
   say("input lies in", fmt::format("x {:.6g}..{:.6g}, z {:.6g}..{:.6g}; beyond it: {}", covered.x0, covered.x1,
                                    covered.z0, covered.z1, to_string(plan.outside)));
+  if (plan.frame.projection) say("projection", describe_projection(*plan.frame.projection));
+  if (plan.frame.wraps_x) say("joins", "the East edge is the West edge");
   const std::uint64_t raw =
       static_cast<std::uint64_t>(plan.lattice_samples) * static_cast<std::uint64_t>(raw_bytes(code_type));
   say("archive", fmt::format("about {} ({} samples, {} as raw {})", describe_bytes(plan.estimated_bytes),
@@ -83,7 +88,7 @@ std::string text_from_plan(const SourceInfo& info, const Plan& plan, const Memor
 
 void print_plan(const HeightSource& source, const ConvertOptions& options, const CommonOptions& common) {
   const SourceInfo& info = source.info();
-  const Plan plan = make_plan(info, options.plan);
+  const Plan plan = make_plan(info, plan_request(options));
   const MemoryPlan memory = plan_memory(source, plan, options);
   if (!common.quiet) {
     for (const std::string& warning : info.warnings) print_warning(warning);
@@ -98,7 +103,7 @@ void print_plan(const HeightSource& source, const ConvertOptions& options, const
 }
 
 void print_plan_notes(const HeightSource& source, const ConvertOptions& options) {
-  const Plan plan = make_plan(source.info(), options.plan);
+  const Plan plan = make_plan(source.info(), plan_request(options));
   std::istringstream lines(text_from_plan(source.info(), plan, plan_memory(source, plan, options), options.code_type));
   for (std::string line; std::getline(lines, line);) print_note("isohf: " + line);
 }

@@ -2,10 +2,14 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cmath>
 #include <filesystem>
 
 #include "isohf/base/error.h"
 #include "isohf/convert/plan.h"
+#include "isohf/projection/projected_extent.h"
+#include "isohf/projection/projection_wkt.h"
+#include "isohf/restore/archive_geometry.h"
 
 namespace isohf::cli {
 namespace {
@@ -73,6 +77,11 @@ RasterSpec restored_raster(const Metadata& metadata, const SampleGrid& grid, Sam
   spec.sample_type = type;
   spec.describe = true;
   if (metadata.vertical_unit != "unknown") spec.vertical_unit = metadata.vertical_unit;
+  if (is_warped(metadata)) {
+    spec.georeference = map_georeference(metadata, grid);
+    if (!spec.georeference->system.epsg) spec.projection = metadata.projection->spec;
+    return spec;
+  }
   Georeference place;
   place.registration = source.registration == "area" ? Registration::kArea : Registration::kPoint;
   place.unit = unit_of(source.crs_unit);
@@ -94,6 +103,45 @@ RasterSpec restored_raster(const Metadata& metadata, const SampleGrid& grid, Sam
   return spec;
 }
 
+Georeference map_georeference(const Metadata& metadata, const SampleGrid& grid) {
+  const SourceRecord& source = metadata.source;
+  const ProjectionRecord& on = *metadata.projection;
+  Georeference place;
+  place.registration = Registration::kArea;
+  place.unit = HorizontalUnit::kMetre;
+  place.spacing_x = grid.spacing_x;
+  place.spacing_y = grid.spacing_z;
+  place.has_origin = true;
+  place.origin_x = on.origin.easting + grid.first_x;
+  place.origin_y = on.origin.northing - grid.first_z;
+  place.system.epsg = projection_epsg(on.spec, source.crs_epsg);
+  place.system.name = describe_projection(on.spec);
+  if (!place.system.epsg) place.system.wkt = projection_wkt(on.spec, source.crs_name);
+  place.system.body = source.body;
+  place.system.semi_major_axis_m = on.spec.ellipsoid.semi_major_axis_m;
+  place.system.inverse_flattening = on.spec.ellipsoid.inverse_flattening;
+  place.system.vertical_datum = source.vertical_datum;
+  place.system.vertical_epsg = source.vertical_epsg;
+  return place;
+}
+
+bool samples_are_areas(const Metadata& metadata) {
+  return is_warped(metadata) || metadata.source.registration == "area";
+}
+
+SampleGrid natural_grid(const Metadata& metadata) {
+  if (!is_warped(metadata)) return source_grid(metadata.source);
+  const WorldBounds& ground = metadata.valid;
+  SampleGrid grid;
+  // One area for one of the source's, in the middle of its ground.
+  grid.spacing_x = grid.spacing_z = std::sqrt(metadata.source.spacing_x * metadata.source.spacing_z);
+  grid.width = std::max(std::llround((ground.x1 - ground.x0) / grid.spacing_x), 1LL);
+  grid.height = std::max(std::llround((ground.z1 - ground.z0) / grid.spacing_z), 1LL);
+  grid.first_x = ground.x0 + grid.spacing_x / 2.0;
+  grid.first_z = ground.z0 + grid.spacing_z / 2.0;
+  return grid;
+}
+
 ReferenceSystem horizontal_system(const SourceRecord& source) {
   ReferenceSystem system;
   system.name = source.crs_name;
@@ -109,6 +157,15 @@ WorldBounds world_bounds(const Metadata& metadata, double west, double south, do
   const SourceRecord& source = metadata.source;
   if (!source.origin_x || !source.origin_y || !(source.crs_spacing_x > 0.0) || !(source.crs_spacing_y > 0.0)) {
     throw Error(ErrorCode::kInvalidArgument, "the archive does not say where its source lay; coordinates mean nothing");
+  }
+  if (is_warped(metadata)) {
+    const ProjectionRecord& on = *metadata.projection;
+    const MapBounds map = projected_bounds(Projection(on.spec), {west, south, east, north});
+    if (!std::isfinite(map.west)) {
+      throw Error(ErrorCode::kInvalidArgument, "the archive's map has no place for a part of that");
+    }
+    return {map.west - on.origin.easting, on.origin.northing - map.north, map.east - on.origin.easting,
+            on.origin.northing - map.south};
   }
   const double to_x = source.spacing_x / source.crs_spacing_x;
   const double to_z = source.spacing_z / source.crs_spacing_y;

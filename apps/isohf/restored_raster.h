@@ -23,6 +23,16 @@ enum class RasterKind { kTiff, kExr, kPng, kHgt, kAsc, kFlt, kRaw16, kRaw32, kNp
 /// What a raster of that grid is: size, place and reference system as the source's, so far as they are known.
 [[nodiscard]] RasterSpec restored_raster(const Metadata& metadata, const SampleGrid& grid, SampleType type);
 
+/// Where a grid of the world lies on the map that the archive's source was projected to (is_warped), its samples areas.
+[[nodiscard]] Georeference map_georeference(const Metadata& metadata, const SampleGrid& grid);
+
+/// The grid of the archive's source; where that was projected, square areas as large as its own over the rectangle
+/// around its ground.
+[[nodiscard]] SampleGrid natural_grid(const Metadata& metadata);
+
+/// True where samples of rasters of the archive stand for areas: as the source's, or on a map.
+[[nodiscard]] bool samples_are_areas(const Metadata& metadata);
+
 /// The source's body and horizontal reference system, as recorded.
 [[nodiscard]] ReferenceSystem horizontal_system(const SourceRecord& source);
 

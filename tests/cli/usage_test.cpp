@@ -205,7 +205,7 @@ std::string completions_of(const std::string& words, int at) {
 TEST(Usage, BashCompletesCommandsAndOptions) {
   EXPECT_EQ(completions_of(" co", 1), "convert\n");
   EXPECT_EQ(completions_of(" convert --dens", 2), "--density\n");
-  EXPECT_EQ(completions_of(" sample --a", 2), "--at\n");
+  EXPECT_EQ(completions_of(" sample --a", 2), "--at --at-lonlat\n");
 }
 
 TEST(Usage, BashCompletesEveryCommandOptionAndWord) {

@@ -411,5 +411,33 @@ TEST(Prefilter, KernelsReachTheirPsnrOnBandLimitedFields) {
   EXPECT_GE(psnr_of_round_trip(Filter::kBspline5, narrow, 24), 82.1);
 }
 
+TEST(Prefilter, RowsThatWrapAreTheMiddleOfManyTurns) {
+  for (const std::int64_t columns : {5, 37, 90}) {
+    for (const double voids : {0.0, 0.05}) {
+      for (const Filter filter : {Filter::kBspline2, Filter::kBspline3, Filter::kBspline5}) {
+        const Prefilter prefilter = Prefilter::make(filter, {});
+        Raster once = random_raster(columns, 6, 5, voids);
+        // Enough turns for the middle one to know nothing of the ends.
+        const std::int64_t turns = 2 * (prefilter.halo() / columns + 1) + 1;
+        Raster many{columns * turns, 6, {}};
+        for (std::int64_t r = 0; r < 6; ++r) {
+          for (std::int64_t c = 0; c < many.columns; ++c) many.heights.push_back(once.view()(c % columns, r));
+        }
+        prefilter.filter_rows(once.view(), true);
+        prefilter.filter_rows(many.view());
+        for (std::int64_t r = 0; r < 6; ++r) {
+          for (std::int64_t c = 0; c < columns; ++c) {
+            const float expected = many.view()(turns / 2 * columns + c, r);
+            const float found = once.view()(c, r);
+            ASSERT_EQ(std::isnan(found), std::isnan(expected)) << to_string(filter) << " " << c << "," << r;
+            if (std::isnan(found)) continue;
+            ASSERT_EQ(found, expected) << to_string(filter) << " " << c << "," << r;
+          }
+        }
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace isohf

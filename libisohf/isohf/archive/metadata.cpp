@@ -72,6 +72,12 @@ class ObjectReader {
     if (!has(key)) return std::nullopt;
     return static_cast<int>(integer(key, 0, std::numeric_limits<int>::max()));
   }
+  [[nodiscard]] bool optional_flag(const char* key) const {
+    if (!has(key)) return false;
+    const Json& value = required(key);
+    if (!value.is_boolean()) refuse(path(key), "is neither true nor false");
+    return value.get<bool>();
+  }
   [[nodiscard]] std::string optional_text(const char* key) const { return has(key) ? text(key) : std::string(); }
 
   [[nodiscard]] const Json& required(const char* key) const {
@@ -174,6 +180,63 @@ SourceRecord source_from_json(const ObjectReader& json) {
   return source;
 }
 
+Json projection_to_json(const std::optional<ProjectionRecord>& record) {
+  if (!record) return nullptr;
+  const ProjectionSpec& spec = record->spec;
+  Json json;
+  json["kind"] = to_string(spec.kind);
+  json["semi_major_axis_m"] = spec.ellipsoid.semi_major_axis_m;
+  json["inverse_flattening"] = spec.ellipsoid.inverse_flattening;
+  json["longitude_0"] = spec.longitude_0;
+  json["latitude_0"] = spec.latitude_0;
+  json["parallel_1"] = spec.parallel_1;
+  json["parallel_2"] = spec.parallel_2;
+  json["scale_0"] = spec.scale_0;
+  json["false_easting"] = spec.false_easting;
+  json["false_northing"] = spec.false_northing;
+  json["utm_zone"] = spec.utm_zone == 0 ? Json(nullptr) : Json(spec.utm_zone);
+  json["origin"] = {{"easting", record->origin.easting}, {"northing", record->origin.northing}};
+  const double worst = record->worst_scale_error;
+  json["worst_scale_error"] = {{"error", std::isfinite(worst) ? Json(worst) : Json(nullptr)},
+                               {"longitude", record->worst_place.longitude},
+                               {"latitude", record->worst_place.latitude}};
+  json["why"] = record->why;
+  return json;
+}
+
+std::optional<ProjectionRecord> projection_from_json(const ObjectReader& root) {
+  if (!root.has("projection")) return std::nullopt;
+  const ObjectReader json = root.object("projection");
+  ProjectionRecord record;
+  ProjectionSpec& spec = record.spec;
+  try {
+    spec.kind = projection_kind_from_string(json.text("kind"));
+  } catch (const Error& error) {
+    if (error.code() == ErrorCode::kCorrupt) throw;
+    refuse(json.path("kind"), error.what());
+  }
+  if (spec.kind == ProjectionKind::kNone) refuse(json.path("kind"), "is none; the member must then be null");
+  spec.ellipsoid = {json.number("semi_major_axis_m"), json.number("inverse_flattening")};
+  if (!(spec.ellipsoid.semi_major_axis_m > 0.0)) refuse(json.path("semi_major_axis_m"), "must be above 0");
+  const double inverse = spec.ellipsoid.inverse_flattening;
+  if (inverse != 0.0 && !(inverse > 1.0)) refuse(json.path("inverse_flattening"), "must be 0 or above 1");
+  spec.longitude_0 = json.number("longitude_0");
+  spec.latitude_0 = json.number("latitude_0");
+  spec.parallel_1 = json.number("parallel_1");
+  spec.parallel_2 = json.number("parallel_2");
+  spec.scale_0 = json.number("scale_0");
+  spec.false_easting = json.number("false_easting");
+  spec.false_northing = json.number("false_northing");
+  if (json.has("utm_zone")) spec.utm_zone = static_cast<int>(json.integer("utm_zone", -60, 60));
+  const ObjectReader origin = json.object("origin");
+  record.origin = {origin.number("easting"), origin.number("northing")};
+  const ObjectReader worst = json.object("worst_scale_error");
+  record.worst_scale_error = worst.optional_number("error").value_or(std::numeric_limits<double>::infinity());
+  record.worst_place = {worst.number("longitude"), worst.number("latitude")};
+  record.why = json.optional_text("why");
+  return record;
+}
+
 Json statistics_to_json(const Statistics& statistics) {
   Json json;
   json["min"] = or_null(statistics.min);
@@ -233,9 +296,10 @@ Quantisation quantisation_from_json(const ObjectReader& root) {
 
 /// All names that belong to the format; any other top-level member is an extension.
 const std::set<std::string>& known_members() {
-  static const std::set<std::string> names = {
-      "format", "version", "producer", "tile_shape",  "tiles",  "extent",     "lattice",  "samples",       "units",
-      "valid",  "outside", "filter",   "acquisition", "source", "statistics", "textures", "content_sha256"};
+  static const std::set<std::string> names = {"format",   "version",        "producer",    "tile_shape", "tiles",
+                                              "extent",   "lattice",        "samples",     "units",      "valid",
+                                              "outside",  "filter",         "acquisition", "source",     "statistics",
+                                              "textures", "content_sha256", "projection",  "wraps_x"};
   return names;
 }
 
@@ -332,6 +396,8 @@ std::string format_metadata(const Metadata& metadata) {
   const WorldBounds& valid = metadata.valid;
   json["valid"] = {{"x0", valid.x0}, {"z0", valid.z0}, {"x1", valid.x1}, {"z1", valid.z1}};
   json["outside"] = metadata.outside;
+  json["projection"] = projection_to_json(metadata.projection);
+  json["wraps_x"] = metadata.wraps_x;
   json["filter"] = metadata.filter;
   json["acquisition"] = metadata.acquisition;
   json["source"] = source_to_json(metadata.source);
@@ -347,6 +413,10 @@ std::string format_metadata(const Metadata& metadata) {
   }
   // Text of unknown encoding (a WKT, a file name) must not make the whole unreadable.
   return json.dump(1, ' ', false, Json::error_handler_t::replace);
+}
+
+std::string format_projection(const ProjectionRecord& record) {
+  return projection_to_json(record).dump();
 }
 
 std::uint32_t metadata_room(const Metadata& draft) {
@@ -368,6 +438,8 @@ Metadata parse_metadata(const std::string& text) {
   const ObjectReader valid = root.object("valid");
   metadata.valid = {valid.number("x0"), valid.number("z0"), valid.number("x1"), valid.number("z1")};
   metadata.outside = root.text("outside");
+  metadata.projection = projection_from_json(root);
+  metadata.wraps_x = root.optional_flag("wraps_x");
   metadata.filter = root.text("filter");
   metadata.acquisition = root.text("acquisition");
   metadata.source = source_from_json(root.object("source"));

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "isohf/lattice/tile_grid.h"
+#include "isohf/projection/projection_spec.h"
 
 namespace isohf {
 
@@ -87,6 +88,15 @@ struct SourceRecord {
   std::optional<MosaicRecord> mosaic;  ///< nullopt: a single file
 };
 
+/// The map on which world space lies: metres, made from the source's degrees.
+struct ProjectionRecord {
+  ProjectionSpec spec;
+  MapPoint origin;                 ///< map place of world (0, 0); x goes East from there, z South
+  double worst_scale_error = 0.0;  ///< over the source's ground: 0.01 for 1 %; may be infinite
+  GeoPoint worst_place;            ///< where that is
+  std::string why;                 ///< why this one
+};
+
 /// Everything about an archive but its elevations; its first member, as JSON (docs/archive_format.md).
 struct Metadata {
   explicit Metadata(const TileGrid& tile_grid) : grid(tile_grid) {}
@@ -95,8 +105,10 @@ struct Metadata {
   Quantisation quantisation;
   std::string horizontal_unit = "unknown";  ///< world units: "metre" or "unknown"
   std::string vertical_unit = "unknown";    ///< "metre", "foot", ... or "unknown"
-  WorldBounds valid;                        ///< the part of the world that the source covers
-  std::string outside = "cover";            ///< what lies beyond: "cover", "clamp" or "void"
+  WorldBounds valid;  ///< the part of the world that the source covers; a rectangle around it where it was projected
+  std::optional<ProjectionRecord> projection;  ///< absent where world space is the source's own plane
+  bool wraps_x = false;                        ///< the East edge of the last tiles is the West edge of the first
+  std::string outside = "cover";               ///< what lies beyond: "cover", "clamp" or "void"
   std::string filter = "bilinear";
   std::string acquisition = "point";
   SourceRecord source;
@@ -113,6 +125,8 @@ struct Metadata {
 /// The metadata as JSON text (UTF-8, no trailing newline), and back. parse_metadata throws Error{kCorrupt} naming the
 /// member at fault, and Error{kUnsupported} for a format version that this build does not know.
 [[nodiscard]] std::string format_metadata(const Metadata& metadata);
+/// The projection alone, as metadata have it: JSON text.
+[[nodiscard]] std::string format_projection(const ProjectionRecord& record);
 /// Room to set aside for these metadata (WriterOptions::metadata_bytes) while statistics, hash and extensions are yet
 /// to come: 16384 bytes, or as much more as a long WKT takes.
 [[nodiscard]] std::uint32_t metadata_room(const Metadata& draft);

@@ -126,7 +126,8 @@ void choose_codes(Conversion& job, std::vector<std::string>& warnings, const Pro
     job.quantisation = choose_quantisation(request, range, info);
     return;
   }
-  EdgeRange edge(info, job.axis_x().continued_samples(), job.axis_z().continued_samples());
+  const SourceAxes axes = make_axes(job.plan.grid, job.geometry());
+  EdgeRange edge(info, axes.x.continued_samples(), axes.z.continued_samples());
   const SourceSurvey survey = survey_source(job, edge, progress);
   SourceScan found = survey.scan();
   if (found.valid == 0) {

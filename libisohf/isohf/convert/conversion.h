@@ -3,6 +3,7 @@
 #include <atomic>
 #include <chrono>
 #include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -10,7 +11,7 @@
 #include "isohf/convert/memory_plan.h"
 #include "isohf/surface/kernels.h"
 #include "isohf/surface/prefilter.h"
-#include "isohf/surface/tile_cutter.h"
+#include "isohf/surface/source_geometry.h"
 
 namespace isohf {
 
@@ -56,10 +57,11 @@ struct Conversion {
   double datum = 0.0;
   Quantisation quantisation{};
 
-  [[nodiscard]] SourceAxis axis_x() const;
-  [[nodiscard]] SourceAxis axis_z() const;
+  [[nodiscard]] SourceGeometry geometry() const { return plan.frame.geometry(plan.outside); }
   /// Elevations beyond the source's edge are held within `limits`.
-  [[nodiscard]] TileCutter cutter(const ElevationRange& limits) const;
+  [[nodiscard]] std::unique_ptr<VertexCutter> cutter(const ElevationRange& limits) const {
+    return make_cutter(plan.grid, geometry(), kernel, limits);
+  }
 };
 
 /// The first pass over the source, where one is needed, and what follows from it: datum, scale and offset.

@@ -149,27 +149,22 @@ void throw_if_cancelled(const std::atomic<bool>& cancel) {
   if (cancel.load(std::memory_order_relaxed)) throw Error(ErrorCode::kCancelled, "interrupted");
 }
 
-SourceAxis Conversion::axis_x() const {
-  const SourceFrame& frame = plan.frame;
-  return {frame.width,        frame.first_sample_x, frame.spacing_x,
-          frame.registration, plan.outside,         kContinuedSteps * 2.0 * plan.grid.sigma_x()};
-}
-
-SourceAxis Conversion::axis_z() const {
-  const SourceFrame& frame = plan.frame;
-  return {frame.height,       frame.first_sample_z, frame.spacing_z,
-          frame.registration, plan.outside,         kContinuedSteps * plan.grid.sigma_z()};
-}
-
-TileCutter Conversion::cutter(const ElevationRange& limits) const {
-  return {plan.grid, axis_x(), axis_z(), kernel, limits};
+PlanRequest plan_request(const ConvertOptions& options) {
+  PlanRequest request = options.plan;
+  // Both are laid out along the source's rows.
+  if (options.lossless) {
+    request.ground.keeps_rows = "--lossless";
+  } else if (options.texture) {
+    request.ground.keeps_rows = "--texture";
+  }
+  return request;
 }
 
 ConvertSummary convert(HeightSource& source, const std::string& output, const ConvertOptions& options,
                        const ProgressCallback& progress, const std::atomic<bool>& cancel) {
   const auto start = std::chrono::steady_clock::now();
   const SourceInfo& info = source.info();
-  const Plan plan = make_plan(info, options.plan);
+  const Plan plan = make_plan(info, plan_request(options));
   if (options.z_range) check_range(*options.z_range);
   if (options.shadow_seeds) check_seed_request(*options.shadow_seeds, plan.grid);
   const int threads = threads_of(options);

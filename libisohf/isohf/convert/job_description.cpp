@@ -79,6 +79,14 @@ std::string heights_fingerprint(const SourceInfo& info, const Plan& plan, const 
 std::string job_fingerprint(const SourceInfo& info, const Plan& plan, const ConvertOptions& options) {
   std::string job = heights_fingerprint(info, plan, options);
   if (!options.source_note.fingerprint.empty()) job += " | " + options.source_note.fingerprint;
+  if (const std::string& datum = info.georeference.system.vertical_datum; !datum.empty()) job += " | above " + datum;
+  if (plan.frame.projection) {
+    const ProjectionRecord& on = *plan.frame.projection;
+    job += fmt::format(" | on {} {} {} {} {} {} {} at {} {}{}", to_string(on.spec.kind),
+                       on.spec.ellipsoid.semi_major_axis_m, on.spec.longitude_0, on.spec.latitude_0, on.spec.parallel_1,
+                       on.spec.parallel_2, on.spec.scale_0, on.origin.easting, on.origin.northing,
+                       plan.frame.wraps_x ? " round" : "");
+  }
   if (options.texture) {
     const TextureRequest& texture = *options.texture;
     const PhotoInfo& photo = texture.photo->info();
@@ -106,6 +114,8 @@ Metadata describe_job(const SourceInfo& info, const Plan& plan, const ConvertOpt
   metadata.valid.x1 = std::min(metadata.valid.x1, plan.grid.world_width());
   metadata.valid.z1 = std::min(metadata.valid.z1, plan.grid.world_height());
   metadata.outside = to_string(plan.outside);
+  metadata.projection = plan.frame.projection;
+  metadata.wraps_x = plan.frame.wraps_x;
   metadata.filter = options.filter;
   metadata.acquisition = options.acquisition;
   metadata.source = record_of(info, plan.frame, options.source_note);

@@ -63,9 +63,11 @@ class Estimate {
     // Source rows and columns of a tile with its padding and the taps around it.
     const int taps = Kernel::make(filter_from_string(options.filter)).taps();
     tile_rows_ =
-        std::min(rounded(grid.shape().rows() * grid.sigma_z() / plan.frame.spacing_z) + taps + 2, info_.height);
+        std::min(rounded(plan.band_rows) + taps + 2, info_.height);
     tile_columns_ =
         std::min(rounded(grid.shape().columns() * 2.0 * grid.sigma_x() / plan.frame.spacing_x) + taps + 2, info_.width);
+    reads_whole_rows_ = plan.frame.warp || plan.frame.wraps_x;
+    has_bands_ = !prefilter.is_identity() || plan.frame.warp;
   }
 
   [[nodiscard]] MemoryPlan with(const Ration& ration, bool in_scratch) const {
@@ -85,7 +87,7 @@ class Estimate {
                                                            : tile_rows_ + 2 * prefilter_.halo();
       memory.scratch_rows = std::min(SourceRows::kept_rows_for(memory.read_step, in_use), info_.height);
       memory.scratch_bytes = static_cast<std::uint64_t>(memory.scratch_rows) * row_bytes();
-      if (!prefilter_.is_identity()) choose_columns(memory);
+      if (has_bands_ && !reads_whole_rows_) choose_columns(memory);
     }
     memory.bytes = total(memory);
     return memory;
@@ -153,7 +155,7 @@ class Estimate {
     } else {
       bytes += static_cast<double>(memory.read_step.most_bytes(info_));
     }
-    if (prefilter_.is_identity()) {
+    if (!has_bands_) {
       return bytes + threads_ * static_cast<double>(tile_rows_) * static_cast<double>(tile_columns_) * sizeof(float);
     }
     const double columns = std::min(static_cast<double>(info_.width), static_cast<double>(memory.tile_columns_at_once) *
@@ -176,6 +178,8 @@ class Estimate {
   std::uint64_t limit_;
   const Prefilter& prefilter_;
   int threads_;
+  bool reads_whole_rows_ = false;  ///< tiles of a row are cut from whole rows of the source
+  bool has_bands_ = false;         ///< of heights or coefficients, instead of tiles' own pieces
   std::int64_t tile_rows_ = 0;     ///< of the source, that a row of tiles reads
   std::int64_t tile_columns_ = 0;  ///< of the source, that a tile reads
 };

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <GeographicLib/Ellipsoid.hpp>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -13,7 +12,6 @@ namespace isohf {
 namespace {
 
 constexpr double kSin60 = std::numbers::sqrt3 / 2.0;
-constexpr double kDegree = std::numbers::pi / 180.0;
 
 /// Columns, rows and levels of a tile where neither the user nor a small source asks otherwise: the best true aspect in
 /// Table 1 (docs/decisions/0011).
@@ -30,14 +28,6 @@ constexpr double kTileOverhead = 4000.0;
 
 [[noreturn]] void refuse(const std::string& why) {
   throw Error(ErrorCode::kInvalidArgument, why);
-}
-
-/// Metres for one degree along the parallel and along the meridian.
-std::pair<double, double> metres_per_degree(const ReferenceSystem& system, double latitude) {
-  const double semi_major = system.semi_major_axis_m.value_or(6378137.0);
-  const double inverse_flattening = system.inverse_flattening.value_or(system.semi_major_axis_m ? 0.0 : 298.257223563);
-  const GeographicLib::Ellipsoid ellipsoid(semi_major, inverse_flattening > 0.0 ? 1.0 / inverse_flattening : 0.0);
-  return {ellipsoid.CircleRadius(latitude) * kDegree, ellipsoid.MeridionalCurvatureRadius(latitude) * kDegree};
 }
 
 std::int64_t tiles_to_cover(double length, double extent) {
@@ -134,60 +124,40 @@ void check(const PlanRequest& request) {
   }
 }
 
+/// The source rows that a row of tiles reads, at most, without the kernel's taps.
+double band_rows(const Plan& plan) {
+  if (!plan.frame.warp) return plan.grid.shape().rows() * plan.grid.sigma_z() / plan.frame.spacing_z;
+  const SourceWarp warp(plan.grid, *plan.frame.warp, 0.0);
+  const auto last = static_cast<double>(plan.frame.height - 1);
+  double most = 0.0;
+  for (const SourceWarp::RowBounds& bounds : warp.reading_bounds()) {
+    most = std::max(most, std::clamp(bounds.most, 0.0, last) - std::clamp(bounds.least, 0.0, last));
+  }
+  return most + 2.0;
+}
+
 }  // namespace
-
-WorldBounds SourceFrame::bounds() const {
-  const auto columns = static_cast<double>(registration == Registration::kArea ? width : width - 1);
-  const auto rows = static_cast<double>(registration == Registration::kArea ? height : height - 1);
-  return {0.0, 0.0, columns * spacing_x, rows * spacing_z};
-}
-
-SourceFrame make_source_frame(const SourceInfo& info) {
-  const Georeference& place = info.georeference;
-  SourceFrame frame;
-  frame.width = info.width;
-  frame.height = info.height;
-  frame.registration = place.registration;
-  if (frame.registration == Registration::kUnknown) {
-    frame.registration = place.has_origin ? Registration::kArea : Registration::kPoint;
-  }
-  frame.spacing_x = place.spacing_x * place.metres_per_unit;
-  frame.spacing_z = place.spacing_y * place.metres_per_unit;
-  frame.in_metres = place.unit == HorizontalUnit::kMetre;
-  if (place.unit == HorizontalUnit::kDegree) {
-    const double middle =
-        place.has_origin ? place.origin_y - place.spacing_y * static_cast<double>(info.height - 1) / 2.0 : 0.0;
-    if (!(std::abs(middle) < 89.9)) {
-      refuse(fmt::format(
-          "{}: its middle latitude is {:.6g} degrees; within 0.1 degrees of a pole a degree of longitude has no "
-          "length: reproject the source first",
-          info.path, middle));
-    }
-    const auto [along_parallel, along_meridian] = metres_per_degree(place.system, middle);
-    frame.spacing_x = place.spacing_x * along_parallel;
-    frame.spacing_z = place.spacing_y * along_meridian;
-    frame.in_metres = true;
-  }
-  if (frame.registration == Registration::kArea) {
-    frame.first_sample_x = frame.spacing_x / 2.0;
-    frame.first_sample_z = frame.spacing_z / 2.0;
-  }
-  return frame;
-}
 
 Plan make_plan(const SourceInfo& info, const PlanRequest& request) {
   check(request);
   if (info.width < 2 || info.height < 2) {
     refuse(fmt::format("{}: {}x{} samples, a surface needs at least 2x2", info.path, info.width, info.height));
   }
-  const SourceFrame frame = make_source_frame(info);
+  const SourceFrame frame = make_source_frame(info, request.ground);
   const WorldBounds bounds = frame.bounds();
   const TileShape shape = choose_shape(frame, request);
   double extent_x = extent_for(shape, frame, request);
   double extent_z = extent_x;
   std::int64_t columns = request.tiles ? request.tiles->first : 0;
   std::int64_t rows = request.tiles ? request.tiles->second : 0;
-  if (request.fit) {
+  if (frame.wraps_x) {
+    // A whole number of tiles goes round.
+    if (!request.tiles) columns = tiles_to_cover(std::max(bounds.x1 - extent_x / 2.0, 0.0), extent_x);
+    extent_x = bounds.x1 / static_cast<double>(columns);
+    if (!request.tiles)
+      rows = tiles_to_cover(request.fit ? std::max(bounds.z1 - extent_x / 2.0, 0.0) : bounds.z1, extent_x);
+    extent_z = request.fit ? bounds.z1 / static_cast<double>(rows) : std::max(extent_x, request.tiles ? extent_z : 0.0);
+  } else if (request.fit) {
     if (!request.tiles) {
       columns = tiles_to_cover(std::max(bounds.x1 - extent_x / 2.0, 0.0), extent_x);  // the nearest whole number
       rows = tiles_to_cover(std::max(bounds.z1 - extent_z / 2.0, 0.0), extent_z);
@@ -202,6 +172,7 @@ Plan make_plan(const SourceInfo& info, const PlanRequest& request) {
   plan.outside = request.outside;
   plan.density = static_cast<double>(shape.cell_columns()) * shape.cell_rows() * frame.spacing_x * frame.spacing_z /
                  (extent_x * extent_z);
+  plan.band_rows = band_rows(plan);
   plan.lattice_samples = shape.stored_vertex_count() * plan.grid.tile_count();
   constexpr double kTypicalBits = 5.0;
   plan.estimated_bytes = static_cast<std::uint64_t>(static_cast<double>(plan.lattice_samples) * kTypicalBits / 8.0 +

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "isohf/archive/metadata.h"
+#include "isohf/convert/source_frame.h"
 #include "isohf/lattice/tile_grid.h"
 #include "isohf/surface/heightmap.h"
 #include "isohf/surface/source_axis.h"
@@ -24,27 +24,8 @@ struct PlanRequest {
   std::optional<std::pair<std::int64_t, std::int64_t>> tiles;  ///< tile columns, rows
   bool fit = false;  ///< stretch the extents a little so that tiles end on the source's edge
   Outside outside = Outside::kCover;
+  GroundRequest ground;
 };
-
-/// Where the source's samples lie in world space.
-struct SourceFrame {
-  std::int64_t width = 0;
-  std::int64_t height = 0;
-  Registration registration = Registration::kPoint;  ///< as used, never kUnknown
-  double first_sample_x = 0.0;                       ///< world place of sample (0, 0)
-  double first_sample_z = 0.0;
-  double spacing_x = 1.0;  ///< world units between neighbouring columns and rows
-  double spacing_z = 1.0;
-  bool in_metres = false;  ///< world units are metres; else the source's own units
-
-  /// The part of the world that the source covers: pixel areas, or posts.
-  [[nodiscard]] WorldBounds bounds() const;
-};
-
-/// Degrees become metres on the declared ellipsoid (WGS 84 where none is declared) at the raster's middle latitude, x
-/// along the parallel and z along the meridian. Unknown registration counts as point where the source has no
-/// georeference, else as area. Throws Error{kInvalidArgument} for latitudes beyond the poles.
-[[nodiscard]] SourceFrame make_source_frame(const SourceInfo& info);
 
 /// Everything that is decided before a sample is read.
 struct Plan {
@@ -53,6 +34,7 @@ struct Plan {
   Outside outside = Outside::kCover;
   double density = 1.0;               ///< lattice samples for one source sample, as it came out
   std::int64_t lattice_samples = 0;   ///< C*R for all tiles
+  double band_rows = 0.0;             ///< source rows that a row of tiles reads, at most, without the kernel's taps
   std::uint64_t estimated_bytes = 0;  ///< of the archive, from typical bits per sample; an estimate
 };
 

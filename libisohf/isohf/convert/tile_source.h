@@ -8,7 +8,7 @@
 #include "isohf/convert/conversion.h"
 #include "isohf/surface/band_reader.h"
 #include "isohf/surface/source_rows.h"
-#include "isohf/surface/tile_cutter.h"
+#include "isohf/surface/vertex_cutter.h"
 
 namespace isohf {
 
@@ -45,7 +45,9 @@ class TileSource {
   struct Windows;
 
   const Conversion& job_;
-  TileCutter cutter_;
+  std::unique_ptr<VertexCutter> cutter_;
+  bool cuts_windows_;                     ///< tiles have their own pieces of the source
+  bool reads_whole_rows_;
   std::vector<RowRange> columns_needed_;  ///< by tile column
   SourceRows rows_;
   BandReader bands_;

@@ -8,6 +8,8 @@
 #include <cstring>
 #include <mutex>
 
+#include "isohf/base/assert.h"
+
 namespace isohf {
 namespace {
 
@@ -54,15 +56,16 @@ class BandReader::Pool {
   std::vector<std::unique_ptr<Band>> bands_;
 };
 
-BandReader::BandReader(HeightSource& source, double datum, const Prefilter& prefilter)
+BandReader::BandReader(HeightSource& source, double datum, const Prefilter& prefilter, bool wraps)
     : own_rows_(std::make_unique<SourceRows>(source, ReadStep::make(source.info(), kReadBytes))),
       rows_(*own_rows_),
       datum_(datum),
       prefilter_(prefilter),
+      wraps_(wraps),
       pool_(std::make_shared<Pool>()) {}
 
-BandReader::BandReader(SourceRows& rows, double datum, const Prefilter& prefilter)
-    : rows_(rows), datum_(datum), prefilter_(prefilter), pool_(std::make_shared<Pool>()) {}
+BandReader::BandReader(SourceRows& rows, double datum, const Prefilter& prefilter, bool wraps)
+    : rows_(rows), datum_(datum), prefilter_(prefilter), wraps_(wraps), pool_(std::make_shared<Pool>()) {}
 
 std::uint64_t BandReader::memory_bytes(const Prefilter& prefilter, std::int64_t bands, std::int64_t rows,
                                        std::int64_t columns, const SourceInfo& info) {
@@ -108,6 +111,7 @@ std::shared_ptr<const Band> BandReader::read(const RowRange& rows, const RowRang
     return band;
   }
   const SourceInfo& info = rows_.info();
+  ISOHF_ASSERT(!wraps_ || count_of(columns) == static_cast<std::size_t>(info.width));
   const std::int64_t halo = prefilter_.halo();
   move_heights_to(widened(rows, halo, info.height), widened(columns, halo, info.width));
   const std::int64_t first = rows.first - filtered_.rows.first;
@@ -163,7 +167,7 @@ void BandReader::move_heights_to(const RowRange& rows, const RowRange& columns) 
   char* voids = band.voids.data() + kept * width;
   const std::size_t samples = count_of(missing) * width;
   for (std::size_t i = 0; i < samples; ++i) voids[i] = heights[i] != heights[i] ? 1 : 0;
-  prefilter_.filter_rows({heights, band.columns, static_cast<std::int64_t>(count_of(missing))});
+  prefilter_.filter_rows({heights, band.columns, static_cast<std::int64_t>(count_of(missing))}, wraps_);
 }
 
 void BandReader::read_rows(const RowRange& rows, Band& band) {

@@ -35,9 +35,10 @@ struct Band {
 /// the prefilter's halo, along both axes, and on nothing else.
 class BandReader {
  public:
-  /// `datum` as in heights_from_samples. All references outlive the reader.
-  BandReader(HeightSource& source, double datum, const Prefilter& prefilter);
-  BandReader(SourceRows& rows, double datum, const Prefilter& prefilter);
+  /// `datum` as in heights_from_samples. All references outlive the reader. `wraps` as in Prefilter::filter_rows; only
+  /// whole rows are read then.
+  BandReader(HeightSource& source, double datum, const Prefilter& prefilter, bool wraps = false);
+  BandReader(SourceRows& rows, double datum, const Prefilter& prefilter, bool wraps = false);
 
   /// The band that holds exactly `rows`: coefficients, or heights where the prefilter is the identity. Rows that the
   /// last band held are not read again. Works on the calling thread's task arena.
@@ -63,6 +64,7 @@ class BandReader {
   SourceRows& rows_;
   double datum_;
   const Prefilter& prefilter_;
+  bool wraps_;
   std::shared_ptr<Pool> pool_;
   Band filtered_;                     ///< heights prefiltered along rows alone, halo included
   std::shared_ptr<const Band> last_;  ///< where the prefilter is the identity

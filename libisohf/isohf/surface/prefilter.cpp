@@ -255,12 +255,23 @@ Prefilter Prefilter::make(Filter filter, const Acquisition& acquisition) {
   return {std::move(taps), (kernel.taps() + 1) / 2, worst_gain};
 }
 
-void Prefilter::filter_rows(View2D<float> band) const {
+void Prefilter::filter_rows(View2D<float> band, bool wraps) const {
   if (is_identity()) return;
   in_parallel(band.rows(), 4, [&](std::int64_t begin, std::int64_t end) {
     LineFilter lines(taps_, border_);
+    // All that a coefficient depends on, written down once more on either side.
+    const std::int64_t beyond = wraps ? halo() : 0;
+    std::vector<float> round(static_cast<std::size_t>(wraps ? band.columns() + 2 * beyond : 0));
     for (std::int64_t r = begin; r < end; ++r) {
       float* row = band.row(r);
+      if (wraps) {
+        const std::int64_t columns = band.columns();
+        for (std::int64_t k = 0; k < static_cast<std::int64_t>(round.size()); ++k) {
+          round[static_cast<std::size_t>(k)] = row[((k - beyond) % columns + columns) % columns];
+        }
+        lines.filter({round.data(), 1}, columns + 2 * beyond, beyond, beyond + columns, {row, 1});
+        continue;
+      }
       lines.filter({row, 1}, band.columns(), 0, band.columns(), {row, 1});
     }
   });

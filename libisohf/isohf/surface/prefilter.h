@@ -50,8 +50,9 @@ class Prefilter {
   /// p[k] for k = 0, 1, ...; even.
   [[nodiscard]] const std::vector<double>& impulse_response() const { return taps_; }
 
-  /// Along every row of a band of whole rows, in place.
-  void filter_rows(View2D<float> band) const;
+  /// Along every row of a band of whole rows, in place. `wraps`: the sample behind a row's last one is its first, and
+  /// nothing is mirrored.
+  void filter_rows(View2D<float> band, bool wraps = false) const;
 
   /// Along every column: out row r receives the coefficients of band row `first` + r.
   /// band  the rows to filter and halo() more on either side, or all that the source has there: where the band ends

@@ -6,6 +6,7 @@
 
 #include "isohf/base/assert.h"
 #include "isohf/base/vectorised.h"
+#include "isohf/surface/void_rule.h"
 
 namespace isohf {
 namespace {
@@ -30,13 +31,13 @@ void blend_rows(const SourceBand& band, const TapWeights& rows, int taps, const 
       std::clamp<std::int64_t>(columns.first + columns.width, inner_first, axis_x.samples());
   for (int t = 0; t < taps; ++t) {
     const float weight = rows.weights[static_cast<std::size_t>(t)];
-    const float* source = band.heights.row(mirror_index(rows.first + t, axis_z.samples()) - band.first_row);
+    const float* source = band.heights.row(axis_z.index(rows.first + t) - band.first_row);
     float* out = line.data() + (inner_first - columns.first);
     const float* in = source + (inner_first - band.first_column);
     const std::int64_t inner = inner_last - inner_first;
     t == 0 ? weigh(in, weight, inner, out) : add_weighted(in, weight, inner, out);
     const auto mirrored = [&](std::int64_t k) {
-      const float height = weight * source[mirror_index(columns.first + k, axis_x.samples()) - band.first_column];
+      const float height = weight * source[axis_x.index(columns.first + k) - band.first_column];
       line[static_cast<std::size_t>(k)] = t == 0 ? height : line[static_cast<std::size_t>(k)] + height;
     };
     for (std::int64_t k = 0; k < inner_first - columns.first; ++k) mirrored(k);
@@ -50,9 +51,9 @@ void find_voids(const SourceBand& band, const TapWeights& rows, int taps, const 
   std::fill(line.begin(), line.end(), char{0});
   bool any = false;
   for (int t = 0; t < taps; ++t) {
-    const char* row = band.voids.row(mirror_index(rows.first + t, axis_z.samples()) - band.first_row);
+    const char* row = band.voids.row(axis_z.index(rows.first + t) - band.first_row);
     for (std::int64_t k = 0; k < columns.width; ++k) {
-      const char is_void = row[mirror_index(columns.first + k, axis_x.samples()) - band.first_column];
+      const char is_void = row[axis_x.index(columns.first + k) - band.first_column];
       line[static_cast<std::size_t>(k)] |= is_void;
       any |= is_void != 0;
     }
@@ -115,72 +116,6 @@ void gather_columns(int taps, const ColumnTaps& columns, const float* line, floa
   }
 }
 
-/// One vertex with a void among its taps, by the rule in kernels.h.
-class VoidAwareSampler {
- public:
-  VoidAwareSampler(const SourceBand& band, const SourceAxis& axis_x, const SourceAxis& axis_z, int taps)
-      : band_(band), axis_x_(axis_x), axis_z_(axis_z), taps_(taps) {}
-
-  [[nodiscard]] float at(double u, double v, const ColumnTaps& columns, std::size_t c, const TapWeights& rows) const {
-    if (all_nearest_void(u, v)) return kVoid;
-    double sum = 0.0;
-    double weight_sum = 0.0;
-    double valid_weight = 0.0;
-    bool whole = true;
-    const std::int64_t first_column = columns.first + columns.start[c];
-    for (int j = 0; j < taps_; ++j) {
-      for (int i = 0; i < taps_; ++i) {
-        const double weight = double{columns.weights[static_cast<std::size_t>(i) * columns.count + c]} *
-                              rows.weights[static_cast<std::size_t>(j)];
-        if (!is_void(first_column + i, rows.first + j)) valid_weight += weight;
-        const float height = coefficient(first_column + i, rows.first + j);
-        if (std::isnan(height)) {
-          whole = false;
-          continue;
-        }
-        sum += weight * height;
-        weight_sum += weight;
-      }
-    }
-    if (valid_weight < 0.5) return kVoid;
-    return static_cast<float>(whole ? sum : sum / weight_sum);
-  }
-
- private:
-  [[nodiscard]] float coefficient(std::int64_t column, std::int64_t row) const {
-    return band_.heights(mirror_index(column, axis_x_.samples()) - band_.first_column,
-                         mirror_index(row, axis_z_.samples()) - band_.first_row);
-  }
-
-  [[nodiscard]] bool is_void(std::int64_t column, std::int64_t row) const {
-    if (band_.voids.data() == nullptr) return std::isnan(coefficient(column, row));
-    return band_.voids(mirror_index(column, axis_x_.samples()) - band_.first_column,
-                       mirror_index(row, axis_z_.samples()) - band_.first_row) != 0;
-  }
-
-  /// Rows that the kernel itself does not read may lie outside the band; the nearest kernel has but one.
-  [[nodiscard]] bool all_nearest_void(double u, double v) const {
-    if (taps_ == 1) return false;
-    for (const double row : {std::floor(v), std::ceil(v)}) {
-      for (const double column : {std::floor(u), std::ceil(u)}) {
-        if (!is_void(static_cast<std::int64_t>(column), static_cast<std::int64_t>(row))) return false;
-      }
-    }
-    return true;
-  }
-
-  const SourceBand& band_;
-  const SourceAxis& axis_x_;
-  const SourceAxis& axis_z_;
-  int taps_;
-};
-
-/// The elevation outside that the edge and its mirror place inside ask for; the edge's own where the latter is void.
-float continue_slope(float edge, float mirrored) {
-  const float height = 2.0F * edge - mirrored;
-  return std::isnan(height) ? edge : height;
-}
-
 }  // namespace
 
 ColumnTaps make_column_taps(const SourceAxis& axis, const Kernel& kernel, std::span<const double> world_x) {
@@ -213,6 +148,15 @@ ColumnTaps make_column_taps(const SourceAxis& axis, const Kernel& kernel, std::s
       taps.weights[static_cast<std::size_t>(t) * taps.count + i] = at.weights[static_cast<std::size_t>(t)];
     }
   }
+  if (axis.wraps()) {
+    // Whole turns away from the others, a tap would stretch the line all the way round.
+    const std::int64_t round = axis.samples();
+    for (std::int64_t& tap : first) {
+      const std::int64_t turned = tap - first.front() + round / 2;
+      const std::int64_t within = ((turned % round) + round) % round;
+      tap = first.front() + within - round / 2;
+    }
+  }
   const auto [low, high] = std::minmax_element(first.begin(), first.end());
   taps.first = *low;
   taps.width = *high - *low + kernel.taps();
@@ -228,8 +172,8 @@ void add_columns_needed(const SourceAxis& axis, const ColumnTaps& taps, RowRange
   };
   add(std::clamp<std::int64_t>(taps.first, 0, last));
   add(std::clamp<std::int64_t>(taps.first + taps.width - 1, 0, last));
-  for (std::int64_t k = taps.first; k < 0; ++k) add(mirror_index(k, axis.samples()));
-  for (std::int64_t k = last + 1; k < taps.first + taps.width; ++k) add(mirror_index(k, axis.samples()));
+  for (std::int64_t k = taps.first; k < 0; ++k) add(axis.index(k));
+  for (std::int64_t k = last + 1; k < taps.first + taps.width; ++k) add(axis.index(k));
 }
 
 RowSampler::RowSampler(const SourceAxis& axis_x, const SourceAxis& axis_z, const Kernel& kernel,
@@ -244,7 +188,7 @@ void RowSampler::add_rows_needed(double world_z, RowRange& range) const {
   const auto add = [&](double v) {
     const std::int64_t first = kernel_.at(v).first;
     for (std::int64_t row = first; row < first + kernel_.taps(); ++row) {
-      const std::int64_t mirrored = mirror_index(row, axis_z_.samples());
+      const std::int64_t mirrored = axis_z_.index(row);
       range.first = std::min(range.first, mirrored);
       range.last = std::max(range.last, mirrored);
     }
@@ -276,10 +220,14 @@ void RowSampler::resample_near_voids(const SourceBand& band, double v, const Col
     scratch.void_line.resize(scratch.line.size());
     find_voids(band, rows, kernel_.taps(), axis_x_, axis_z_, columns, scratch.void_line, scratch.near_void);
   }
-  const VoidAwareSampler void_aware(band, axis_x_, axis_z_, kernel_.taps());
+  const VoidRule rule(band, axis_x_, axis_z_, kernel_.taps());
   for (std::size_t c = 0; c < values.size(); ++c) {
-    if (std::isnan(values[c]) || scratch.near_void[c] != 0)
-      values[c] = void_aware.at(columns.position[c], v, columns, c, rows);
+    if (!std::isnan(values[c]) && scratch.near_void[c] == 0) continue;
+    TapWeights taps{columns.first + columns.start[c], {}};
+    for (std::size_t t = 0; t < static_cast<std::size_t>(kernel_.taps()); ++t) {
+      taps.weights[t] = columns.weights[t * columns.count + c];
+    }
+    values[c] = rule.at(columns.position[c], v, taps, rows);
   }
 }
 

@@ -2,33 +2,15 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <span>
 #include <vector>
 
-#include "isohf/base/view.h"
 #include "isohf/surface/kernels.h"
 #include "isohf/surface/source_axis.h"
+#include "isohf/surface/source_band.h"
 #include "isohf/surface/source_scan.h"
 
 namespace isohf {
-
-/// A run of source rows, or of columns, both ends included.
-struct RowRange {
-  std::int64_t first;
-  std::int64_t last;
-};
-
-/// Consecutive rows of the source, whole or in part, as heights relative to a datum, NaN where void: what a kernel's
-/// taps read (coefficients, where the kernel has a prefilter).
-struct SourceBand {
-  View2D<const float> heights;
-  std::int64_t first_row = 0;  ///< source row of heights.row(0)
-  /// As large as heights, not 0 where the sample is void: coefficients go on into voids (Prefilter). No data where the
-  /// NaN among heights are the voids.
-  View2D<const char> voids = {};
-  std::int64_t first_column = 0;  ///< source column of heights(0, ...)
-};
 
 /// Where the vertices of a row read the source's columns: their taps, and those of the source's two edges after them,
 /// which continued vertices read as well. The line they read holds `width` coefficients, from unmirrored source column
@@ -59,7 +41,7 @@ class RowSampler {
   RowSampler(const SourceAxis& axis_x, const SourceAxis& axis_z, const Kernel& kernel, const ElevationRange& limits);
 
   /// What add_rows_needed starts from.
-  [[nodiscard]] static RowRange no_rows() { return {std::numeric_limits<std::int64_t>::max(), 0}; }
+  [[nodiscard]] static RowRange no_rows() { return RowRange::none(); }
   /// Widens `range` by the source rows that a row of vertices reads.
   void add_rows_needed(double world_z, RowRange& range) const;
 

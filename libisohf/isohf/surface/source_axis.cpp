@@ -42,6 +42,19 @@ SourceAxis::SourceAxis(std::int64_t samples, double first_world, double spacing_
       outside_(outside),
       continued_(std::min(std::max(continued_world / spacing_world, reach_), static_cast<double>(samples - 1))) {}
 
+SourceAxis SourceAxis::wrapping(std::int64_t samples, double first_world, double spacing_world) {
+  SourceAxis axis(samples, first_world, spacing_world, Registration::kPoint, Outside::kClamp, 0.0);
+  axis.wraps_ = true;
+  return axis;
+}
+
+SourceAxis SourceAxis::of_positions(std::int64_t samples, Registration registration, Outside outside,
+                                    double continued) {
+  SourceAxis axis(samples, 0.0, 1.0, registration, outside, continued);
+  axis.ends_ = outside == Outside::kCover;
+  return axis;
+}
+
 std::int64_t SourceAxis::continued_samples() const {
   return static_cast<std::int64_t>(std::ceil(continued_));
 }
@@ -49,11 +62,17 @@ std::int64_t SourceAxis::continued_samples() const {
 SourceAxis::Place SourceAxis::place(double world) const {
   const double u = (world - first_world_) / spacing_world_;
   const auto last = static_cast<double>(samples_ - 1);
+  if (wraps_) {
+    const auto round = static_cast<double>(samples_);
+    const double position = u - round * std::floor(u / round);
+    return {position < round ? position : 0.0};
+  }
   if (u >= 0.0 && u <= last) return {u};
   const double edge = u < 0.0 ? 0.0 : last;
   const double beyond = std::abs(u - edge);
   if (outside_ == Outside::kVoid && beyond > reach_ + kEndTolerance) return {edge, edge, false, false};
   if (outside_ == Outside::kClamp || beyond <= kEndTolerance) return {edge};
+  if (ends_ && beyond > continued_ + kEndTolerance) return {edge, edge, false, false};
   const double inside = std::min(beyond, continued_);
   return {u < 0.0 ? inside : last - inside, edge, true, true};
 }

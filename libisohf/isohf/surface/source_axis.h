@@ -4,6 +4,7 @@
 #include <string>
 
 #include "isohf/surface/heightmap.h"
+#include "isohf/surface/kernels.h"
 
 namespace isohf {
 
@@ -31,10 +32,10 @@ class SourceAxis {
   /// Where a world coordinate reads the source. Beyond the first or last sample by d, a continued surface has the
   /// elevation 2 F(edge) - F(position), with the position mirrored: as far inside as the coordinate lies outside.
   struct Place {
-    double position;    ///< in samples, within [0, n-1]
+    double position;    ///< in samples, within [0, n-1]; in [0, n) on an axis that wraps
     double edge = 0.0;  ///< 0 or n-1, where continued
     bool continued = false;
-    bool has_elevation = true;  ///< false where Outside::kVoid leaves none
+    bool has_elevation = true;  ///< false where Outside leaves none
   };
 
   /// samples >= 1; first_world, spacing_world and continued_world in world units, spacing > 0; continued_world is how
@@ -42,7 +43,21 @@ class SourceAxis {
   SourceAxis(std::int64_t samples, double first_world, double spacing_world, Registration registration, Outside outside,
              double continued_world);
 
+  /// An axis that goes all the way round: the sample behind the last one is the first.
+  [[nodiscard]] static SourceAxis wrapping(std::int64_t samples, double first_world, double spacing_world);
+  /// An axis whose world coordinates are positions, in samples, of a source that was projected. Where the slope has
+  /// gone on for `continued` samples, Outside::kCover ends: such a source fills no rectangle of the world, and a level
+  /// plain all around it would be made up.
+  [[nodiscard]] static SourceAxis of_positions(std::int64_t samples, Registration registration, Outside outside,
+                                               double continued);
+
   [[nodiscard]] std::int64_t samples() const { return samples_; }
+  [[nodiscard]] bool wraps() const { return wraps_; }
+  /// The sample that stands in for sample k, any k: mirrored at the ends (mirror_index), or counted round.
+  [[nodiscard]] std::int64_t index(std::int64_t k) const {
+    if (k >= 0 && k < samples_) return k;
+    return wraps_ ? ((k % samples_) + samples_) % samples_ : mirror_index(k, samples_);
+  }
   /// Whole samples inside the edge that a continued place may read.
   [[nodiscard]] std::int64_t continued_samples() const;
 
@@ -57,6 +72,8 @@ class SourceAxis {
   double reach_;  ///< how far the covered ground goes beyond the first and last samples, in samples
   Outside outside_;
   double continued_;  ///< in samples
+  bool wraps_ = false;
+  bool ends_ = false;  ///< nothing lies beyond the continuation
 };
 
 }  // namespace isohf

@@ -12,8 +12,12 @@ namespace {
 ColumnTaps taps_of_tile(const TileGrid& grid, const SourceAxis& axis, const Kernel& kernel, TileIndex tile,
                         int parity) {
   std::vector<double> world_x(static_cast<std::size_t>(grid.shape().columns()));
+  const std::int64_t round = grid.tile_columns() * 2 * grid.shape().cell_columns();
   for (std::size_t c = 0; c < world_x.size(); ++c) {
-    world_x[c] = grid.world_from_lattice(grid.lattice_vertex(tile, {static_cast<int>(c), parity})).x;
+    LatticeVertex vertex = grid.lattice_vertex(tile, {static_cast<int>(c), parity});
+    // The same vertex has the same bits on both sides of the join.
+    if (axis.wraps()) vertex.x = ((vertex.x % round) + round) % round;
+    world_x[c] = grid.world_from_lattice(vertex).x;
   }
   return make_column_taps(axis, kernel, world_x);
 }

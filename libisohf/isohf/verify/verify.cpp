@@ -233,10 +233,13 @@ class Verification {
       for (std::size_t i = 0; i < shared_.size(); ++i) {
         const TileIndex step = kComparedNeighbours[i];
         if (step.row == 0) {
-          if (column + 1 < current.size()) compared[column] += compare(index, tile, current[column + 1], i, false);
+          const bool joins = archive_.metadata().wraps_x;
+          if (column + 1 == current.size() && !joins) continue;
+          compared[column] += compare(index, tile, current[(column + 1) % current.size()], i, false);
           continue;
         }
-        const std::int64_t other = index.column - step.column;
+        std::int64_t other = index.column - step.column;
+        if (archive_.metadata().wraps_x) other = (other + grid_.tile_columns()) % grid_.tile_columns();
         if (above.empty() || other < 0 || other >= grid_.tile_columns()) continue;
         compared[column] += compare(index, tile, above[static_cast<std::size_t>(other)], i, true);
       }

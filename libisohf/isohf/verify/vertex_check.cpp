@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "isohf/base/error.h"
+#include "isohf/restore/archive_geometry.h"
 #include "isohf/surface/band_reader.h"
 #include "isohf/surface/source_scan.h"
-#include "isohf/surface/tile_cutter.h"
 
 namespace isohf {
 namespace {
@@ -40,14 +40,14 @@ class VertexCheck {
   }
 
   VertexReport run(const std::function<void(std::int64_t, std::int64_t)>& progress, const std::atomic<bool>& cancel) {
-    const TileCutter cutter = make_cutter();
-    BandReader reader(source_, datum_, prefilter_);
+    const auto cutter = make_cutter(grid_, archive_geometry(metadata_), kernel_, {lowest_ - datum_, highest_ - datum_});
+    BandReader reader(source_, datum_, prefilter_, archive_geometry(metadata_).wraps_x);
     std::vector<VertexReport> tiles(static_cast<std::size_t>(grid_.tile_columns()));
     for (std::int64_t row = 0; row < grid_.tile_rows(); ++row) {
       if (cancel.load(std::memory_order_relaxed)) throw Error(ErrorCode::kCancelled, "interrupted");
-      const auto band = reader.read(cutter.rows_needed(row));
+      const auto band = reader.read(cutter->rows_needed(row));
       oneapi::tbb::parallel_for(std::int64_t{0}, grid_.tile_columns(), [&](std::int64_t column) {
-        tiles[static_cast<std::size_t>(column)] = check_tile(cutter, *band, {column, row});
+        tiles[static_cast<std::size_t>(column)] = check_tile(*cutter, *band, {column, row});
       });
       for (const VertexReport& tile : tiles) add(tile);
       if (progress) progress(row + 1, grid_.tile_rows());
@@ -56,18 +56,7 @@ class VertexCheck {
   }
 
  private:
-  [[nodiscard]] TileCutter make_cutter() const {
-    const SourceRecord& source = metadata_.source;
-    const Registration registration = source.registration == "area" ? Registration::kArea : Registration::kPoint;
-    const Outside outside = outside_from_string(metadata_.outside);
-    const SourceAxis x(source.width, source.first_sample_x, source.spacing_x, registration, outside,
-                       kContinuedSteps * 2.0 * grid_.sigma_x());
-    const SourceAxis z(source.height, source.first_sample_z, source.spacing_z, registration, outside,
-                       kContinuedSteps * grid_.sigma_z());
-    return {grid_, x, z, kernel_, {lowest_ - datum_, highest_ - datum_}};
-  }
-
-  [[nodiscard]] VertexReport check_tile(const TileCutter& cutter, const Band& band, TileIndex tile) const {
+  [[nodiscard]] VertexReport check_tile(const VertexCutter& cutter, const Band& band, TileIndex tile) const {
     std::vector<float> heights(static_cast<std::size_t>(grid_.shape().stored_vertex_count()));
     cutter.cut(tile, band.view(), heights);
     const std::vector<double> stored = archive_.read_elevations(tile);

@@ -1,0 +1,39 @@
+#include "options_ground.h"
+
+#include "isohf/surface/closed_source.h"
+
+namespace isohf::cli {
+
+void add_ground_options(CommandLine& line, GroundRequest& request) {
+  line.group("Ground");
+  line.option("--projection", "KIND",
+              "How degrees become metres: equirectangular, local, transverse-mercator, utm, lambert-conformal, "
+              "polar-stereographic, none, or chosen by extent (default auto); parameters may follow, as in utm:32N",
+              [&](const std::string& text) { request.projection = ProjectionRequest::parse(text); });
+  line.flag("--wrap-x", "Join the East edge of an input all the way round to its West edge", request.wrap_x);
+}
+
+void add_geoid_option(CommandLine& line, GeoidRequest& request) {
+  line.option("--geoid", "FILE.pgm[:WAY]",
+              "Move elevations by a geoid of GeographicLib's: to-ellipsoidal, from heights above it (default), or "
+              "to-orthometric",
+              [&](const std::string& text) { request = GeoidRequest::parse(text); });
+}
+
+std::unique_ptr<HeightSource> with_geoid(std::unique_ptr<HeightSource> source, const GeoidRequest& request) {
+  if (request.path.empty()) return source;
+  return std::make_unique<GeoidSource>(std::move(source), request);
+}
+
+std::unique_ptr<HeightSource> laid_out(std::unique_ptr<HeightSource> source, const GeoidRequest& geoid,
+                                       const GroundRequest& ground) {
+  if (ground.wrap_x) source = without_repeated_column(std::move(source));
+  return with_geoid(std::move(source), geoid);
+}
+
+std::unique_ptr<HeightSource> without_repeated_column(std::unique_ptr<HeightSource> source) {
+  if (closure_of(source->info()) != Closure::kRepeated) return source;
+  return std::make_unique<ClosedSource>(std::move(source));
+}
+
+}  // namespace isohf::cli

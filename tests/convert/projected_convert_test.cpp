@@ -1,0 +1,327 @@
+/// Archives of sources in degrees: sizes on the ground against geodesics, heights at their places, joined globes.
+
+#include <gtest/gtest.h>
+
+#include <GeographicLib/Geodesic.hpp>
+#include <GeographicLib/PolygonArea.hpp>
+#include <bit>
+#include <cmath>
+#include <filesystem>
+
+#include "isohf/archive/reader.h"
+#include "isohf/base/error.h"
+#include "isohf/convert/convert.h"
+#include "isohf/projection/projection.h"
+#include "isohf/restore/archive_geometry.h"
+#include "isohf/verify/against_source.h"
+#include "isohf/verify/verify.h"
+#include "isohf/verify/vertex_check.h"
+#include "support/memory_source.h"
+#include "support/temporary_folder.h"
+
+namespace isohf {
+namespace {
+
+using Source = test::MemorySource<float>;
+constexpr double kDegree = M_PI / 180.0;
+
+double land(double longitude, double latitude) {
+  return 500.0 + 300.0 * std::sin(0.9 * longitude) * std::cos(1.1 * latitude) + 8.0 * latitude;
+}
+
+struct Ground {
+  const char* body;
+  Ellipsoid ellipsoid;
+  GeoExtent extent;
+};
+
+std::unique_ptr<Source> source_over(const Ground& ground, std::int64_t width, std::int64_t height,
+                                    Registration registration = Registration::kArea) {
+  const GeoExtent& e = ground.extent;
+  const bool area = registration == Registration::kArea;
+  const double dx = (e.east - e.west) / static_cast<double>(area ? width : width - 1);
+  const double dz = (e.north - e.south) / static_cast<double>(area ? height : height - 1);
+  const double first_x = e.west + (area ? dx / 2.0 : 0.0);
+  const double first_y = e.north - (area ? dz / 2.0 : 0.0);
+  auto source = std::make_unique<Source>(SampleType::kFloat32, width, height, [&](std::int64_t c, std::int64_t r) {
+    return land(first_x + static_cast<double>(c) * dx, first_y - static_cast<double>(r) * dz);
+  });
+  Georeference& place = source->mutable_info().georeference;
+  place.registration = registration;
+  place.unit = HorizontalUnit::kDegree;
+  place.spacing_x = dx;
+  place.spacing_y = dz;
+  place.has_origin = true;
+  place.origin_x = first_x;
+  place.origin_y = first_y;
+  place.system.body = ground.body;
+  place.system.semi_major_axis_m = ground.ellipsoid.semi_major_axis_m;
+  place.system.inverse_flattening = ground.ellipsoid.inverse_flattening;
+  source->mutable_info().vertical_unit = "metre";
+  return source;
+}
+
+ConvertOptions options_for(const std::string& projection) {
+  ConvertOptions options;
+  options.plan.shape = {36, 35};
+  options.plan.levels = 2;
+  options.plan.ground.projection = ProjectionRequest::parse(projection);
+  options.step = 0.02;
+  options.filter = "catmull-rom";
+  options.producer = "isohf test";
+  return options;
+}
+
+ConvertSummary run(HeightSource& source, const std::string& output, const ConvertOptions& options) {
+  const std::atomic<bool> cancel = false;
+  return convert(source, output, options, {}, cancel);
+}
+
+const Ground kGrounds[] = {{"Earth", {}, {-3.0, 42.0, 5.0, 50.0}},
+                           {"Mars", {3396190.0, 169.894447223612}, {130.0, -12.0, 142.0, -2.0}}};
+
+/// The map place of a stored vertex.
+GeoPoint place_of(const Metadata& metadata, const Projection& map, TileIndex tile, GridVertex vertex) {
+  const WorldPoint world = metadata.grid.world_from_lattice(metadata.grid.lattice_vertex(tile, vertex));
+  return map.inverse({metadata.projection->origin.easting + world.x, metadata.projection->origin.northing - world.z});
+}
+
+TEST(ProjectedArchive, EdgesAndTrianglesHaveTheirGeodesicSizeWithinTheStatedError) {
+  const test::TemporaryFolder folder;
+  for (const Ground& ground : kGrounds) {
+    for (const std::string kind : {"equirectangular", "local", "transverse-mercator", "utm", "lambert-conformal"}) {
+      if (kind == "utm" && std::string(ground.body) != "Earth") continue;
+      SCOPED_TRACE(kind + " on " + ground.body);
+      const auto owner = source_over(ground, 160, 200);
+      Source& source = *owner;
+      ConvertOptions options = options_for(kind);
+      options.overwrite = true;
+      const Metadata metadata = run(source, folder / "a.isohf", options).metadata;
+      ASSERT_TRUE(metadata.projection);
+      const Projection map(metadata.projection->spec);
+      EXPECT_EQ(metadata.projection->spec.ellipsoid.semi_major_axis_m, ground.ellipsoid.semi_major_axis_m);
+      const GeographicLib::Geodesic geodesic(ground.ellipsoid.semi_major_axis_m, ground.ellipsoid.flattening());
+      // A triangle's side is not short beside the body: over its 5 km a scale changes by less than this.
+      constexpr double kChange = 1e-3;
+      const double stated = metadata.projection->worst_scale_error + kChange;
+      const TileGrid& grid = metadata.grid;
+      std::int64_t edges = 0;
+      for (std::int64_t t = 0; t < grid.tile_count(); ++t) {
+        for (int r = 2; r < grid.shape().rows() - 2; r += 3) {
+          for (int c = 3; c < grid.shape().columns() - 4; c += 4) {
+            // A vertex, the one East of it and one between them on the row below.
+            const GridVertex corners[3] = {{c, r}, {c + 1, r}, {c + (r % 2 == 0 ? 0 : 1), r + 1}};
+            GeoPoint at[3];
+            WorldPoint world[3];
+            bool inside = true;
+            for (int k = 0; k < 3; ++k) {
+              at[k] = place_of(metadata, map, grid.tile_at(t), corners[k]);
+              world[k] = grid.world_from_lattice(grid.lattice_vertex(grid.tile_at(t), corners[k]));
+              inside = inside && at[k].latitude > ground.extent.south && at[k].latitude < ground.extent.north &&
+                       at[k].longitude > ground.extent.west && at[k].longitude < ground.extent.east;
+            }
+            if (!inside) continue;
+            GeographicLib::PolygonArea polygon(geodesic);
+            for (int k = 0; k < 3; ++k) {
+              const int next = (k + 1) % 3;
+              double length = 0.0;
+              geodesic.Inverse(at[k].latitude, at[k].longitude, at[next].latitude, at[next].longitude, length);
+              const double drawn = std::hypot(world[next].x - world[k].x, world[next].z - world[k].z);
+              ASSERT_NEAR(drawn / length, 1.0, stated);
+              polygon.AddPoint(at[k].latitude, at[k].longitude);
+              ++edges;
+            }
+            double perimeter = 0.0;
+            double area = 0.0;
+            polygon.Compute(false, true, perimeter, area);
+            const double drawn = 0.5 * std::abs((world[1].x - world[0].x) * (world[2].z - world[0].z) -
+                                                (world[2].x - world[0].x) * (world[1].z - world[0].z));
+            ASSERT_NEAR(drawn / std::abs(area), 1.0, 2.0 * stated + stated * stated);
+          }
+        }
+      }
+      EXPECT_GT(edges, 500);
+    }
+  }
+}
+
+TEST(ProjectedArchive, HeightsLieAtTheirLongitudeAndLatitude) {
+  const test::TemporaryFolder folder;
+  for (const Ground& ground : kGrounds) {
+    for (const std::string kind : {"equirectangular", "local", "transverse-mercator", "lambert-conformal"}) {
+      SCOPED_TRACE(kind + " on " + ground.body);
+      const auto owner = source_over(ground, 300, 300);
+      Source& source = *owner;
+      ConvertOptions options = options_for(kind);
+      options.overwrite = true;
+      (void)run(source, folder / "a.isohf", options);
+      const ArchiveReader archive(folder / "a.isohf");
+      const Metadata& metadata = archive.metadata();
+      const Projection map(metadata.projection->spec);
+      std::int64_t compared = 0;
+      for (std::int64_t t = 0; t < metadata.grid.tile_count(); ++t) {
+        const std::vector<double> heights = archive.read_elevations(metadata.grid.tile_at(t));
+        const TileShape& shape = metadata.grid.shape();
+        for (int r = 0; r < shape.rows(); ++r) {
+          for (int c = 0; c < shape.columns(); ++c) {
+            const GeoPoint at = place_of(metadata, map, metadata.grid.tile_at(t), {c, r});
+            const GeoExtent& e = ground.extent;
+            const double margin = 0.1;  // two samples: mirrored taps bend at the edge
+            if (at.longitude < e.west + margin || at.longitude > e.east - margin) continue;
+            if (at.latitude < e.south + margin || at.latitude > e.north - margin) continue;
+            // Slopes of up to 340 a degree: 0.01 sample is 0.14; a waves' 0.03 of a radian a sample errs by 0.01.
+            ASSERT_NEAR(heights[static_cast<std::size_t>(r * shape.columns() + c)], land(at.longitude, at.latitude),
+                        0.2);
+            ++compared;
+          }
+        }
+      }
+      EXPECT_GT(compared, 50000);
+    }
+  }
+}
+
+TEST(ProjectedArchive, BytesDoNotDependOnThreads) {
+  const test::TemporaryFolder folder;
+  const auto owner = source_over(kGrounds[0], 200, 220);
+  Source& source = *owner;
+  std::string hash;
+  for (const int threads : {1, 2, 5}) {
+    ConvertOptions options = options_for("lambert-conformal");
+    options.filter = "bspline3";
+    options.threads = threads;
+    options.overwrite = true;
+    (void)run(source, folder / "a.isohf", options);
+    const std::string found = ArchiveReader(folder / "a.isohf").metadata().content_sha256;
+    EXPECT_EQ(hash.empty() ? found : hash, found);
+    hash = found;
+  }
+}
+
+TEST(ProjectedArchive, PassesEveryCheckAgainstItsSource) {
+  const test::TemporaryFolder folder;
+  const std::atomic<bool> cancel = false;
+  const Ground cap{"Earth", {}, {-180.0, 60.0, 180.0, 90.0}};
+  const Ground across{"Earth", {}, {178.0, 60.0, 185.0, 66.0}};
+  for (const auto& [kind, ground] : {std::pair{"local", kGrounds[0]}, std::pair{"lambert-conformal", kGrounds[1]},
+                                     std::pair{"transverse-mercator", across}, std::pair{"polar-stereographic", cap}}) {
+    for (const char* filter : {"bilinear", "bspline3", "lanczos6"}) {
+      SCOPED_TRACE(std::string(kind) + " " + filter);
+      const auto owner = source_over(ground, 240, 150);
+      Source& source = *owner;
+      for (int i = 0; i < 40; ++i) source.at(37 + i % 8, 60 + i / 8) = std::numeric_limits<float>::quiet_NaN();
+      ConvertOptions options = options_for(kind);
+      options.filter = filter;
+      options.overwrite = true;
+      (void)run(source, folder / "a.isohf", options);
+      EXPECT_TRUE(verify_archive(folder / "a.isohf", {}).passed());
+      const ArchiveReader archive(folder / "a.isohf");
+      const VertexReport vertices = check_vertices(archive, source, 0, {}, cancel);
+      EXPECT_EQ(vertices.wrong, 0);
+      EXPECT_GT(vertices.vertices, 10000);
+      const AccuracyReport accuracy = compare_with_source(archive, source, 2000, 0, {}, cancel);
+      EXPECT_EQ(accuracy.samples, 240 * 150);
+      EXPECT_EQ(accuracy.samples_void, 40);
+      EXPECT_EQ(accuracy.lost_inside, 0);
+      EXPECT_EQ(accuracy.invented_inside, 0);
+      EXPECT_GT(accuracy.samples_compared, 240 * 150 - 400);
+      // Waves of 7 degrees are 4.7 samples on the cap, and over a hundred elsewhere.
+      EXPECT_LT(accuracy.rms, std::string(kind) == "polar-stereographic" ? 100.0 : 30.0);
+    }
+  }
+}
+
+TEST(ProjectedArchive, LosslessAndTexturesKeepRows) {
+  const test::TemporaryFolder folder;
+  const auto owner = source_over(kGrounds[0], 200, 220);
+  Source& source = *owner;
+  ConvertOptions options = options_for("auto");
+  options.lossless = true;
+  const Metadata metadata = run(source, folder / "a.isohf", options).metadata;
+  EXPECT_EQ(metadata.projection->spec.kind, ProjectionKind::kEquirectangular);
+  options.plan.ground.projection = ProjectionRequest::parse("local");
+  EXPECT_THROW((void)run(source, folder / "b.isohf", options), Error);
+}
+
+TEST(JoinedGlobe, TilesAcrossTheJoinShareTheirVertices) {
+  const test::TemporaryFolder folder;
+  const auto round_land = [](double longitude, double latitude) {
+    return 100.0 * std::cos(latitude * kDegree) * std::cos(3.0 * longitude * kDegree) +
+           40.0 * std::sin(longitude * kDegree);
+  };
+  for (const Registration registration : {Registration::kArea, Registration::kPoint}) {
+    for (const char* filter : {"bilinear", "catmull-rom", "bspline3", "lanczos3"}) {
+      SCOPED_TRACE(filter);
+      Source source(SampleType::kFloat32, 360, 181, [&](std::int64_t c, std::int64_t r) {
+        return round_land(static_cast<double>(c) - 180.0, 90.0 - static_cast<double>(r));
+      });
+      Georeference& place = source.mutable_info().georeference;
+      place.registration = registration;
+      place.unit = HorizontalUnit::kDegree;
+      place.has_origin = true;
+      place.origin_x = -180.0;
+      place.origin_y = 90.0;
+      ConvertOptions options = options_for("auto");
+      options.plan.ground.wrap_x = true;
+      options.filter = filter;
+      options.overwrite = true;
+      (void)run(source, folder / "a.isohf", options);
+      const ArchiveReader archive(folder / "a.isohf");
+      const TileGrid& grid = archive.grid();
+      EXPECT_TRUE(archive.metadata().wraps_x);
+      // A whole number of tiles goes round.
+      EXPECT_NEAR(grid.world_width(), 2.0 * M_PI * 6378137.0, 1e-3);
+      const TileShape& shape = grid.shape();
+      std::int64_t shared = 0;
+      for (std::int64_t row = 0; row < grid.tile_rows(); ++row) {
+        const std::vector<double> east = archive.read_elevations({grid.tile_columns() - 1, row});
+        const std::vector<double> west = archive.read_elevations({0, row});
+        const std::int64_t round = grid.tile_columns() * 2 * shape.cell_columns();
+        for (int r = 0; r < shape.rows(); ++r) {
+          for (int c = 0; c < shape.columns(); ++c) {
+            for (int other = 0; other < shape.columns(); ++other) {
+              const LatticeVertex a = grid.lattice_vertex({grid.tile_columns() - 1, row}, {c, r});
+              const LatticeVertex b = grid.lattice_vertex({0, row}, {other, r});
+              if (a.x != b.x + round) continue;
+              ++shared;
+              ASSERT_EQ(east[static_cast<std::size_t>(r * shape.columns() + c)],
+                        west[static_cast<std::size_t>(r * shape.columns() + other)]);
+            }
+          }
+        }
+        // No seam: heights at the join are the land's, though every tap East of it lies on the other side.
+        for (int r = 1; r < shape.rows() - 1; ++r) {
+          const WorldPoint world = grid.world_from_lattice(grid.lattice_vertex({0, row}, {1, r}));
+          const double latitude = 90.0 - world.z / (6378137.0 * (1.0 - 0.00669438) * kDegree) +
+                                  (registration == Registration::kArea ? 0.5 : 0.0);
+          if (std::abs(latitude) > 87.0) continue;
+          const double longitude = registration == Registration::kArea ? -180.5 : -180.0;
+          EXPECT_NEAR(west[static_cast<std::size_t>(r * shape.columns() + 1)], round_land(longitude, latitude), 1.0);
+        }
+      }
+      EXPECT_GE(shared, grid.tile_rows() * shape.rows() * 3);
+      EXPECT_TRUE(verify_archive(folder / "a.isohf", {}).passed());
+      const std::atomic<bool> cancel = false;
+      EXPECT_EQ(check_vertices(archive, source, 0, {}, cancel).wrong, 0);
+    }
+  }
+}
+
+TEST(JoinedGlobe, AnInputThatDoesNotGoRoundIsRefused) {
+  const test::TemporaryFolder folder;
+  const auto owner = source_over(kGrounds[0], 200, 220);
+  Source& source = *owner;
+  ConvertOptions options = options_for("auto");
+  options.plan.ground.wrap_x = true;
+  try {
+    (void)run(source, folder / "a.isohf", options);
+    ADD_FAILURE() << "was taken";
+  } catch (const Error& error) {
+    EXPECT_STREQ(error.what(),
+                 "memory: --wrap-x needs columns all the way round, 360 degrees; this input's 200 columns 0.04 apart "
+                 "make 8");
+  }
+}
+
+}  // namespace
+}  // namespace isohf
