@@ -188,8 +188,7 @@ Accuracy compare(const VerifyCommandOptions& options, const std::atomic<bool>& c
   if (!inputs.overlap_given && record.mosaic && record.mosaic->overlap == "first") inputs.overlap = OverlapRule::kFirst;
   GroundRequest ground;
   ground.wrap_x = metadata.wraps_x;
-  OpenedInputs opened =
-      open_inputs(expand_inputs(inputs.names, inputs.recursive), inputs, open, options.work.threads);
+  OpenedInputs opened = open_inputs(expand_inputs(inputs.names, inputs.recursive), inputs, open, options.work.threads);
   const std::unique_ptr<HeightSource> source = laid_out(std::move(opened.source), options.geoid, ground);
   return measure_accuracy(options.archive, *source, options.random_points, !options.no_ortho, options.work,
                           options.common, cancel);

@@ -3,6 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <limits>
+#include <utility>
+
 #include "archive/tiles.h"
 #include "isohf/base/error.h"
 
@@ -134,6 +137,62 @@ TEST(CodeType, HasNames) {
     EXPECT_EQ(code_type_from_string(to_string(type)), type);
   }
   EXPECT_THROW(static_cast<void>(code_type_from_string("u32")), Error);
+}
+
+Metadata projected() {
+  Metadata metadata = full();
+  ProjectionRecord record;
+  record.spec.kind = ProjectionKind::kLambertConformal;
+  record.spec.ellipsoid = {3396190.0, 169.894447223612};
+  record.spec.longitude_0 = 137.1234;
+  record.spec.latitude_0 = -4.5;
+  record.spec.parallel_1 = -8.0;
+  record.spec.parallel_2 = -1.0 / 3.0;
+  record.origin = {-12345.678, 23456.789};
+  record.worst_scale_error = 0.0123;
+  record.worst_place = {130.0, -12.0};
+  record.why = "asked for";
+  metadata.projection = record;
+  metadata.wraps_x = true;
+  return metadata;
+}
+
+TEST(Metadata, ProjectionsComeBackAsTheyWere) {
+  const std::string json = format_metadata(projected());
+  const Metadata back = parse_metadata(json);
+  EXPECT_EQ(format_metadata(back), json);
+  ASSERT_TRUE(back.projection);
+  EXPECT_EQ(back.projection->spec, projected().projection->spec);
+  EXPECT_EQ(back.projection->origin.easting, -12345.678);
+  EXPECT_EQ(back.projection->worst_scale_error, 0.0123);
+  EXPECT_EQ(back.projection->why, "asked for");
+  EXPECT_TRUE(back.wraps_x);
+  Metadata endless = projected();
+  endless.projection->worst_scale_error = std::numeric_limits<double>::infinity();
+  EXPECT_EQ(parse_metadata(format_metadata(endless)).projection->worst_scale_error,
+            std::numeric_limits<double>::infinity());
+}
+
+TEST(Metadata, OldArchivesHaveNoProjectionAndDoNotJoin) {
+  std::string json = replaced(format_metadata(full()), "\n \"projection\": null,", "");
+  json = replaced(json, "\n \"wraps_x\": false,", "");
+  const Metadata back = parse_metadata(json);
+  EXPECT_FALSE(back.projection);
+  EXPECT_FALSE(back.wraps_x);
+}
+
+TEST(Metadata, RefusesProjectionsThatMakeNoMap) {
+  const std::string json = format_metadata(projected());
+  for (const auto& [from, to] :
+       {std::pair{"\"lambert-conformal\"", "\"mercator\""}, std::pair{"\"lambert-conformal\"", "\"none\""},
+        std::pair{"\"lambert-conformal\"", "7"},
+        std::pair{"\"semi_major_axis_m\": 3396190.0,\n  \"inverse_flattening\": 169",
+                  "\"semi_major_axis_m\": -1.0,\n  \"inverse_flattening\": 169"},
+        std::pair{"\"inverse_flattening\": 169.894447223612", "\"inverse_flattening\": 0.5"},
+        std::pair{"\"longitude_0\": 137.1234", "\"longitude_0\": null"},
+        std::pair{"\"utm_zone\": null", "\"utm_zone\": 61"}, std::pair{"\"wraps_x\": true", "\"wraps_x\": 1"}}) {
+    EXPECT_THROW((void)parse_metadata(replaced(json, from, to)), Error) << to;
+  }
 }
 
 }  // namespace

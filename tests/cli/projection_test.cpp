@@ -147,14 +147,14 @@ TEST_F(ProjectionCommand, RestoreGivesARasterOfTheMap) {
   if (run_program({"/bin/sh", "-c", "command -v gdallocationinfo >/dev/null"}).exit_code != 0) {
     GTEST_SKIP() << "gdal-bin is not here";
   }
-  for (const char* kind : {"local", "transverse-mercator:9,0.9996", "lambert-conformal:-30,30,5", "polar-stereographic:50"}) {
+  for (const char* kind :
+       {"local", "transverse-mercator:9,0.9996", "lambert-conformal:-30,30,5", "polar-stereographic:50"}) {
     converts({"--projection", kind});
     ASSERT_EQ(isohf({"restore", folder / "a.isohf", folder / (std::string(kind).substr(0, 5) + ".tif")}).exit_code, 0);
   }
   for (const char* raster : {"a.tif", "b.tif", "local.tif", "trans.tif", "lambe.tif", "polar.tif"}) {
     const RunResult found = run_program(
-        {"/bin/sh", "-c",
-         "GDAL_PAM_ENABLED=NO gdallocationinfo -valonly -wgs84 " + (folder / raster) + " 6.4 47.1"});
+        {"/bin/sh", "-c", "GDAL_PAM_ENABLED=NO gdallocationinfo -valonly -wgs84 " + (folder / raster) + " 6.4 47.1"});
     ASSERT_EQ(found.exit_code, 0) << found.err;
     // Its nearest pixel: half a pixel of up to 280 a degree either way.
     EXPECT_NEAR(std::stod(found.out), land(6.4, 47.1), 0.03 * 560.0) << raster;
