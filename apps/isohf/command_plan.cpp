@@ -74,10 +74,9 @@ std::optional<PlanOptions> parse(const Arguments& arguments) {
   options.inputs.names.insert(options.inputs.names.end(), names.begin(), names.end());
   const auto refuse = [](const std::string& why) { throw Error(ErrorCode::kInvalidArgument, "plan: " + why); };
   if (options.inputs.names.empty()) {
-    for (const char* option :
-         {"--density", "--spacing", "--tiles", "--fit", "--outside", "--channel", "--registration", "--nodata",
-          "--z-scale", "--z-offset", "--sample-spacing", "--overlap", "--require-complete", "--recursive",
-          "--projection", "--wrap-x", "--geoid"}) {
+    for (const char* option : {"--density", "--spacing", "--tiles", "--fit", "--outside", "--channel", "--registration",
+                               "--nodata", "--z-scale", "--z-offset", "--sample-spacing", "--overlap",
+                               "--require-complete", "--recursive", "--projection", "--wrap-x", "--geoid"}) {
       if (line.given(option)) refuse(std::string(option) + " needs an INPUT");
     }
   } else if (line.given("--limit")) {
@@ -188,11 +187,10 @@ int run(const PlanOptions& options) {
   } else if (options.inputs.names.empty()) {
     list_candidates(options);
   } else {
-    const std::unique_ptr<HeightSource> source =
-        laid_out(open_inputs(expand_inputs(options.inputs.names, options.inputs.recursive), options.inputs,
-                             options.open, 0)
-                     .source,
-                 options.geoid, options.request.ground);
+    const std::unique_ptr<HeightSource> source = laid_out(
+        open_inputs(expand_inputs(options.inputs.names, options.inputs.recursive), options.inputs, options.open, 0)
+            .source,
+        options.geoid, options.request.ground);
     ConvertOptions convert;
     convert.plan = options.request;
     convert.code_type = options.code_type;

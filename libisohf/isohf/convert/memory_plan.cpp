@@ -62,8 +62,7 @@ class Estimate {
     const TileGrid& grid = plan.grid;
     // Source rows and columns of a tile with its padding and the taps around it.
     const int taps = Kernel::make(filter_from_string(options.filter)).taps();
-    tile_rows_ =
-        std::min(rounded(plan.band_rows) + taps + 2, info_.height);
+    tile_rows_ = std::min(rounded(plan.band_rows) + taps + 2, info_.height);
     tile_columns_ =
         std::min(rounded(grid.shape().columns() * 2.0 * grid.sigma_x() / plan.frame.spacing_x) + taps + 2, info_.width);
     reads_whole_rows_ = plan.frame.warp || plan.frame.wraps_x;

@@ -46,7 +46,7 @@ class TileSource {
 
   const Conversion& job_;
   std::unique_ptr<VertexCutter> cutter_;
-  bool cuts_windows_;                     ///< tiles have their own pieces of the source
+  bool cuts_windows_;  ///< tiles have their own pieces of the source
   bool reads_whole_rows_;
   std::vector<RowRange> columns_needed_;  ///< by tile column
   SourceRows rows_;
