@@ -188,7 +188,7 @@ TEST(LosslessOptions, EveryWayOfConvertingGivesTheSamplesBack) {
     convert.insert(convert.end(), way.options.begin(), way.options.end());
     const RunResult converted = run_isohf(convert);
     ASSERT_EQ(converted.exit_code, 0) << converted.err;
-    const std::string back = folder / restored_name(way.file);
+    const std::string back = folder / restored_name(input);
     const RunResult restored = run_isohf({"restore", folder / "a.isohf", back, "--overwrite", "--quiet"});
     ASSERT_EQ(restored.exit_code, 0) << restored.err;
     EXPECT_TRUE(read_samples(back).raw == read_samples(input).raw);
