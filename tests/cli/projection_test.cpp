@@ -174,6 +174,8 @@ TEST_F(ProjectionCommand, WhatDoesNotGoTogetherIsRefusedInOneLine) {
   refuses({"convert", wide, out, "--geoid", folder / "egm.pgm", "--lossless"}, "give one of the two");
   converts({"--projection", "utm"});
   refuses({"restore", folder / "a.isohf", folder / "b.tif", "--like", wide}, "--like does not go through projections");
+  write_degrees(folder / "small", 40, 30, 2.0, 42.0, 0.05, land);
+  refuses({"verify", folder / "a.isohf", "--against", folder / "small.flt"}, "40x30 samples");
   fs::remove(folder / "wide.prj");
   write_degrees(folder / "metres", 20, 20, 0.0, 0.0, 30.0, land);
   fs::remove(folder / "metres.prj");

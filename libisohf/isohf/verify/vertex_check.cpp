@@ -1,5 +1,6 @@
 #include "isohf/verify/vertex_check.h"
 
+#include <fmt/format.h>
 #include <oneapi/tbb/parallel_for.h>
 #include <oneapi/tbb/task_arena.h>
 
@@ -25,6 +26,12 @@ class VertexCheck {
         source_(source),
         kernel_(Kernel::make(filter_from_string(metadata_.filter))),
         prefilter_(Prefilter::make(kernel_.filter(), acquisition_from_string(metadata_.acquisition))) {
+    const SourceInfo& info = source.info();
+    if (info.width != metadata_.source.width || info.height != metadata_.source.height) {
+      throw Error(ErrorCode::kInvalidArgument,
+                  fmt::format("{}: {}x{} samples, {} was made from {}x{}", info.path, info.width, info.height,
+                              archive.path(), metadata_.source.width, metadata_.source.height));
+    }
     const Quantisation& q = metadata_.quantisation;
     const Statistics& statistics = metadata_.statistics;
     const ElevationRange range{statistics.min.value_or(0.0), statistics.max.value_or(0.0)};
