@@ -127,6 +127,13 @@ std::optional<ConvertCommandOptions> parse(const Arguments& arguments) {
               "How the input's samples were taken: point, box, tent, gaussian:SIGMA or fir:FILE (default " +
                   options.convert.acquisition + ")",
               options.convert.acquisition);
+  line.group("Size and speed");
+  line.option("--level", "N",
+              fmt::format("Effort to make the archive small, {} to {} (default {}); the elevations are the same",
+                          kMinLevel, kMaxLevel, kDefaultLevel),
+              [&](const std::string& text) {
+                options.convert.level = static_cast<int>(parse_whole_number(text, kMinLevel, kMaxLevel));
+              });
   line.group("Shadows");
   line.option_or_numbers(
       "--shadow-seeds", "[DEG,...]", "all",

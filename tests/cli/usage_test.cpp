@@ -70,8 +70,8 @@ TEST(Usage, HelpKnowsTheOptionsOfTheTask) {
        {"--input",   "--output",      "--overwrite",      "--resume",      "--channel",  "--registration", "--nodata",
         "--z-scale", "--z-offset",    "--sample-spacing", "--density",     "--spacing",  "--tiles",        "--fit",
         "--outside", "--shape",       "--levels",         "--triangles",   "--vertices", "--type",         "--z-range",
-        "--step",    "--clamp-range", "--filter",         "--acquisition", "--threads",  "--progress",     "--memory",
-        "--json",    "--quiet",       "--verbose",        "--config",      "--help"}) {
+        "--step",    "--clamp-range", "--filter",         "--acquisition", "--level",    "--threads",      "--progress",
+        "--memory",  "--json",        "--quiet",          "--verbose",     "--config",   "--help"}) {
     EXPECT_TRUE(convert.contains(option)) << option;
   }
 }

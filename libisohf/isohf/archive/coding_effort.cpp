@@ -1,9 +1,10 @@
 #include "isohf/archive/coding_effort.h"
 
 #include <array>
+#include <string>
 
 #include "isohf/archive/tile_codec.h"
-#include "isohf/base/assert.h"
+#include "isohf/base/error.h"
 
 namespace isohf {
 
@@ -15,7 +16,7 @@ constexpr std::array<CodingEffort, kMaxLevel> kEfforts = {{
     {.fit = {1, 15, 1, 0, 1, 0, false}, .context_thinning = 15, .has_pairs = true},
     {.fit = {2, 9, 1, 0, 1, 0, false}, .context_thinning = 3, .has_pairs = true},
     {.fit = {3, 7, 1, 0, 1, 0, false}, .context_thinning = 3, .has_pairs = true},
-    {.fit = {1, 7, 2, 1, 5, 3, false}, .context_thinning = 3, .has_pairs = true},
+    {.fit = {1, 7, 2, 1, 5, 2, false}, .context_thinning = 5, .has_pairs = true},
     {.fit = {2, 5, 2, 1, 3, 3, false}, .context_thinning = 3, .has_pairs = true},
     {.fit = {2, 5, 2, 2, 3, 3, false}, .context_thinning = 3, .has_pairs = true},
     {.fit = {2, 5, 2, 1, 3, 3, true}, .context_thinning = 3, .has_pairs = true},
@@ -28,7 +29,10 @@ constexpr std::array<CodingEffort, kMaxLevel> kEfforts = {{
 }  // namespace
 
 CodingEffort coding_effort(int level) {
-  ISOHF_ASSERT(level >= kMinLevel && level <= kMaxLevel);
+  if (level < kMinLevel || level > kMaxLevel) {
+    throw Error(ErrorCode::kInvalidArgument, "level " + std::to_string(level) + ", must be " +
+                                                 std::to_string(kMinLevel) + " to " + std::to_string(kMaxLevel));
+  }
   return kEfforts[static_cast<std::size_t>(level - kMinLevel)];
 }
 

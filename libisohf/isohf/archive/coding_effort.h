@@ -13,7 +13,7 @@ struct CodingEffort {
   bool has_pairs = true;             ///< symbols may be paired
 };
 
-/// The effort of a level, kMinLevel to kMaxLevel.
+/// The effort of a level. Throws Error{kInvalidArgument} where it is not kMinLevel to kMaxLevel.
 [[nodiscard]] CodingEffort coding_effort(int level);
 
 }  // namespace isohf

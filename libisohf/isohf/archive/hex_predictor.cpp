@@ -45,7 +45,13 @@ ISOHF_VECTORISED(void, predict_codes_widely,
                  (at, weights, begin, end, low, high, out)) {
   predict_places<kWeightCount, std::int32_t, std::uint32_t>(at, weights, begin, end, low, high, out);
 }
-ISOHF_VECTORISED(void, predict_floats,
+ISOHF_VECTORISED(void, predict_floats_near,
+                 (const Neighbours<std::int64_t>& at, const PredictorWeights& weights, int begin, int end,
+                  std::int64_t low, std::int64_t high, std::int64_t* __restrict out),
+                 (at, weights, begin, end, low, high, out)) {
+  predict_places<kNearWeightCount, std::int64_t, std::uint64_t>(at, weights, begin, end, low, high, out);
+}
+ISOHF_VECTORISED(void, predict_floats_widely,
                  (const Neighbours<std::int64_t>& at, const PredictorWeights& weights, int begin, int end,
                   std::int64_t low, std::int64_t high, std::int64_t* __restrict out),
                  (at, weights, begin, end, low, high, out)) {
@@ -56,15 +62,40 @@ ISOHF_VECTORISED(void, predict_floats,
 template <std::size_t kTerms, typename Wide, typename Unsigned>
 [[gnu::always_inline]] inline void sum_above(const Neighbours<Wide>& at, const PredictorWeights& weights, int begin,
                                              int end, Wide* __restrict out) {
+  std::array<Unsigned, kTerms> w{};
+  std::array<const Wide*, kTerms> from{};
   Unsigned anchor = 1U << kWeightBits;
-  for (std::size_t i = 0; i < kTerms; ++i) anchor -= static_cast<Unsigned>(Wide{weights[i]});
+  for (std::size_t i = 0; i < kTerms; ++i) {
+    w[i] = static_cast<Unsigned>(Wide{weights[i]});
+    from[i] = at.of_weight(i);
+    anchor -= w[i];
+  }
   for (int c = begin; c < end; ++c) {
     Unsigned sum = anchor * static_cast<Unsigned>(at.north[c]);
     for (std::size_t i = 1; i < kTerms; ++i) {
-      if (i != 2) sum += static_cast<Unsigned>(Wide{weights[i]}) * static_cast<Unsigned>(at.of_weight(i)[c]);
+      if (i != 2) sum += w[i] * static_cast<Unsigned>(from[i][c]);
     }
     out[c] = static_cast<Wide>(sum);
   }
+}
+
+ISOHF_VECTORISED(void, sum_codes_above,
+                 (const Neighbours<std::int32_t>& at, const PredictorWeights& weights, int begin, int end,
+                  std::int32_t* __restrict out),
+                 (at, weights, begin, end, out)) {
+  sum_above<kWeightCount, std::int32_t, std::uint32_t>(at, weights, begin, end, out);
+}
+ISOHF_VECTORISED(void, sum_floats_above,
+                 (const Neighbours<std::int64_t>& at, const PredictorWeights& weights, int begin, int end,
+                  std::int64_t* __restrict out),
+                 (at, weights, begin, end, out)) {
+  sum_above<kNearWeightCount, std::int64_t, std::uint64_t>(at, weights, begin, end, out);
+}
+ISOHF_VECTORISED(void, sum_floats_widely_above,
+                 (const Neighbours<std::int64_t>& at, const PredictorWeights& weights, int begin, int end,
+                  std::int64_t* __restrict out),
+                 (at, weights, begin, end, out)) {
+  sum_above<kWeightCount, std::int64_t, std::uint64_t>(at, weights, begin, end, out);
 }
 
 }  // namespace
@@ -87,7 +118,11 @@ void predict_row(const Lattice<std::int64_t>& lattice, int r, const Predictors& 
                  std::int64_t high, std::span<std::int64_t> halves) {
   const Neighbours at(lattice, r);
   predictors.for_stretches(r, at.first, at.last, [&](const PredictorWeights& weights, int begin, int end) {
-    predict_floats(at, weights, begin, end, low, high, halves.data());
+    if (predictors.is_wide) {
+      predict_floats_widely(at, weights, begin, end, low, high, halves.data());
+    } else {
+      predict_floats_near(at, weights, begin, end, low, high, halves.data());
+    }
   });
 }
 
@@ -95,7 +130,7 @@ void predict_row_from_above(const Lattice<std::int32_t>& lattice, int r, const P
                             std::span<std::int32_t> parts) {
   const Neighbours at(lattice, r);
   predictors.for_stretches(r, at.first, at.last, [&](const PredictorWeights& weights, int begin, int end) {
-    sum_above<kWeightCount, std::int32_t, std::uint32_t>(at, weights, begin, end, parts.data());
+    sum_codes_above(at, weights, begin, end, parts.data());
   });
 }
 
@@ -103,7 +138,11 @@ void predict_row_from_above(const Lattice<std::int64_t>& lattice, int r, const P
                             std::span<std::int64_t> parts) {
   const Neighbours at(lattice, r);
   predictors.for_stretches(r, at.first, at.last, [&](const PredictorWeights& weights, int begin, int end) {
-    sum_above<kWeightCount, std::int64_t, std::uint64_t>(at, weights, begin, end, parts.data());
+    if (predictors.is_wide) {
+      sum_floats_widely_above(at, weights, begin, end, parts.data());
+    } else {
+      sum_floats_above(at, weights, begin, end, parts.data());
+    }
   });
 }
 

@@ -299,7 +299,7 @@ const std::set<std::string>& known_members() {
   static const std::set<std::string> names = {"format",   "version",        "producer",    "tile_shape", "tiles",
                                               "extent",   "lattice",        "samples",     "units",      "valid",
                                               "outside",  "filter",         "acquisition", "source",     "statistics",
-                                              "textures", "content_sha256", "projection",  "wraps_x"};
+                                              "textures", "content_sha256", "projection",  "wraps_x",    "level"};
   return names;
 }
 
@@ -400,6 +400,7 @@ std::string format_metadata(const Metadata& metadata) {
   json["wraps_x"] = metadata.wraps_x;
   json["filter"] = metadata.filter;
   json["acquisition"] = metadata.acquisition;
+  if (metadata.level) json["level"] = *metadata.level;
   json["source"] = source_to_json(metadata.source);
   json["statistics"] = statistics_to_json(metadata.statistics);
   json["textures"] = metadata.textures;
@@ -442,6 +443,7 @@ Metadata parse_metadata(const std::string& text) {
   metadata.wraps_x = root.optional_flag("wraps_x");
   metadata.filter = root.text("filter");
   metadata.acquisition = root.text("acquisition");
+  if (root.has("level")) metadata.level = static_cast<int>(root.integer("level", 1, 12));
   metadata.source = source_from_json(root.object("source"));
   metadata.statistics = statistics_from_json(root.object("statistics"));
   const Json& textures = root.required("textures");

@@ -111,6 +111,7 @@ struct Metadata {
   std::string outside = "cover";               ///< what lies beyond: "cover", "clamp" or "void"
   std::string filter = "bilinear";
   std::string acquisition = "point";
+  std::optional<int> level;  ///< that the tiles were coded at; tells readers nothing
   SourceRecord source;
   Statistics statistics;
   std::vector<std::string> textures;

@@ -16,6 +16,7 @@ constexpr std::size_t kMaxTerms = kWeightCount + 1;  // the neighbours less NE, 
 constexpr std::size_t kBlockWidth = kBlockPlaces;
 constexpr int kRowsToThin = 96;  // below, all rows take part
 constexpr std::size_t kLanes = 8;
+constexpr std::size_t kPairs = 4;
 
 /// Entries of a lower triangle, filled up to whole lanes.
 constexpr std::size_t triangle(std::size_t terms) {
@@ -42,22 +43,43 @@ ISOHF_VECTORISED(void, scale_code_blocks,
 }
 
 /// Sums of products of all pairs of terms, `terms` arrays of `count` floats that lie `stride` apart; count is a
-/// multiple of 8. Eight sums a pair and then their tree: the same order on every machine.
+/// multiple of 8. Eight sums a pair and then their tree: the same order on every machine. Pairs are worked on by fours:
+/// three more terms than there are must be readable, and three more sums are written than there are pairs.
 ISOHF_VECTORISED(void, multiply_pairs,
                  (const float* values, std::size_t terms, std::size_t stride, std::size_t count, float* __restrict out),
                  (values, terms, stride, count, out)) {
-  using Lanes = float __attribute__((vector_size(4 * kLanes), aligned(4), may_alias));
+  using Eight = float __attribute__((vector_size(4 * kLanes), aligned(4), may_alias));
+  using Four = float __attribute__((vector_size(16), aligned(4), may_alias));
   for (std::size_t i = 0; i < terms; ++i) {
     const float* const a = values + i * stride;
-    for (std::size_t j = 0; j <= i; ++j) {
+    for (std::size_t j = 0; j <= i; j += kPairs) {
       const float* const b = values + j * stride;
-      Lanes sum = {};
+      Eight sums[kPairs] = {};
       for (std::size_t k = 0; k < count; k += kLanes) {
-        sum += *reinterpret_cast<const Lanes*>(a + k) * *reinterpret_cast<const Lanes*>(b + k);
+        const Eight factor = *reinterpret_cast<const Eight*>(a + k);
+        for (std::size_t pair = 0; pair < kPairs; ++pair) {
+          sums[pair] += factor * *reinterpret_cast<const Eight*>(b + pair * stride + k);
+        }
       }
-      *out++ = ((sum[0] + sum[4]) + (sum[2] + sum[6])) + ((sum[1] + sum[5]) + (sum[3] + sum[7]));
+      Four halves[kPairs];
+      for (std::size_t pair = 0; pair < kPairs; ++pair) {
+        halves[pair] = __builtin_shufflevector(sums[pair], sums[pair], 0, 1, 2, 3) +
+                       __builtin_shufflevector(sums[pair], sums[pair], 4, 5, 6, 7);
+      }
+      const Four first = __builtin_shufflevector(halves[0], halves[1], 0, 4, 1, 5) +
+                         __builtin_shufflevector(halves[0], halves[1], 2, 6, 3, 7);
+      const Four second = __builtin_shufflevector(halves[2], halves[3], 0, 4, 1, 5) +
+                          __builtin_shufflevector(halves[2], halves[3], 2, 6, 3, 7);
+      *reinterpret_cast<Four*>(out + j) =
+          __builtin_shufflevector(first, second, 0, 1, 4, 5) + __builtin_shufflevector(first, second, 2, 3, 6, 7);
     }
+    out += i + 1;
   }
+}
+
+ISOHF_VECTORISED(void, add_moments, (const float* moments, std::size_t count, double* __restrict sum),
+                 (moments, count, sum)) {
+  for (std::size_t i = 0; i < count; ++i) sum[i] += double{moments[i]};
 }
 
 /// A quadratic form of a block, given the products of its variables.
@@ -110,8 +132,8 @@ class BlockMoments {
         errors_(scale_.size()),
         halves_(scale_.size()),
         stride_(scale_.size() * kBlockWidth),
-        values_(terms_ * stride_),
-        moments_(triangle(terms_) * static_cast<std::size_t>(across_ * down_)) {}
+        values_((terms_ + kPairs - 1) * stride_),
+        moments_(triangle(terms_) * static_cast<std::size_t>(across_ * down_) + kPairs) {}
 
   [[nodiscard]] std::size_t terms() const { return terms_; }
   [[nodiscard]] std::size_t size() const { return static_cast<std::size_t>(across_ * down_); }
@@ -120,21 +142,41 @@ class BlockMoments {
 
   /// Takes the rows `start`, `start` + step, ... with their errors as `predictors` leave them.
   void measure(const Predictors& predictors, int start, int step) {
+    const auto across = static_cast<std::size_t>(across_);
+    take_bands(predictors, start, step, [&](int band, std::size_t count) {
+      for (std::size_t block = 0; block < across; ++block) {
+        float* const out = moments_.data() + triangle(terms_) * (static_cast<std::size_t>(band) * across + block);
+        multiply_pairs(values_.data() + block * count, terms_, stride_, count, out);
+        std::fill(out + terms_ * (terms_ + 1) / 2, out + triangle(terms_), 0.0F);
+      }
+    });
+  }
+
+  /// The sum of all blocks' moments alone.
+  [[nodiscard]] std::vector<double> measure_whole(const Predictors& predictors, int start, int step) {
+    std::vector<double> sum(triangle(terms_));
+    std::vector<float> of_band(sum.size() + kPairs);
+    take_bands(predictors, start, step, [&](int, std::size_t count) {
+      multiply_pairs(values_.data(), terms_, stride_, static_cast<std::size_t>(across_) * count, of_band.data());
+      add_moments(of_band.data(), terms_ * (terms_ + 1) / 2, sum.data());
+    });
+    return sum;
+  }
+
+ private:
+  /// Calls `use(band, count)` for each row of blocks once its values are there, `count` for a block.
+  template <typename Use>
+  void take_bands(const Predictors& predictors, int start, int step, const Use& use) {
     int row = start;
     for (int band = 0; band < down_; ++band) {
       const int end = std::min((band + 1) * kBlockPlaces, lattice_.rows());
       int rows = 0;
       for (int r = row; r < end; r += step) ++rows;
       for (int slot = 0; row < end; row += step, ++slot) take_row(row, slot, rows, predictors);
-      const std::size_t count = kBlockWidth * static_cast<std::size_t>(rows);
-      for (int block = 0; block < across_; ++block) {
-        float* const out = moments_.data() + triangle(terms_) * static_cast<std::size_t>(band * across_ + block);
-        multiply_pairs(values_.data() + static_cast<std::size_t>(block) * count, terms_, stride_, count, out);
-      }
+      use(band, kBlockWidth * static_cast<std::size_t>(rows));
     }
   }
 
- private:
   void take_row(int r, int slot, int slots, const Predictors& predictors) {
     const Neighbours<Wide> at(lattice_, r);
     predict_row<Wide>(lattice_, r, predictors, low_, high_, halves_);
@@ -253,15 +295,15 @@ class Fit {
 
   Predictors run() {
     for (int pass = 0; pass < effort_.passes; ++pass) {
-      measure(pass, effort_.pass_thinning);
-      const std::vector<double> sum = sum_of_blocks([](std::size_t) { return true; });
-      const auto solution = solve(sum, moments_.terms());
+      const auto [start, step] = rows_of(pass, effort_.pass_thinning);
+      const auto solution = solve(moments_.measure_whole(predictors_, start, step), moments_.terms());
       const auto weights = solution ? changed(predictors_.weights[0], *solution) : std::nullopt;
       if (!weights) break;
       predictors_.weights[0] = *weights;
     }
     for (int round = 0; round < effort_.rounds && effort_.predictors > 1; ++round) {
-      measure(round, effort_.round_thinning);
+      const auto [start, step] = rows_of(round, effort_.round_thinning);
+      moments_.measure(predictors_, start, step);
       split();
       if (predictors_.map.empty()) break;
     }
@@ -269,9 +311,10 @@ class Fit {
   }
 
  private:
-  void measure(int turn, int thinning) {
+  /// The first row that takes part, and how far apart they are.
+  [[nodiscard]] std::pair<int, int> rows_of(int turn, int thinning) const {
     const int step = rows_ >= kRowsToThin ? thinning : 1;
-    moments_.measure(predictors_, 3 + turn % step, step);
+    return {3 + turn % step, step};
   }
 
   template <typename Takes>
@@ -280,8 +323,7 @@ class Fit {
     std::vector<double> sum(count);
     for (std::size_t block = 0; block < moments_.size(); ++block) {
       if (!takes(block)) continue;
-      const float* const moments = moments_.of_block(block);
-      for (std::size_t i = 0; i < count; ++i) sum[i] += double{moments[i]};
+      add_moments(moments_.of_block(block), count, sum.data());
     }
     return sum;
   }

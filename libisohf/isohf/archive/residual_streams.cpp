@@ -145,25 +145,27 @@ std::uint8_t choose_activity_shift(const Residuals<Folded>& residuals) {
 template <typename Folded>
 Streams make_streams(const Residuals<Folded>& residuals, const CodingEffort& effort, PayloadHeader& header) {
   const std::size_t count = residuals.count;
-  Scratch<std::uint8_t> symbols(count);
-  find_symbols(residuals.folded.data(), count, symbols.data());
+  Streams streams;
+  streams.single = std::make_unique_for_overwrite<std::uint8_t[]>(count);
+  std::uint8_t* const symbols = streams.single.get();
+  find_symbols(residuals.folded.data(), count, symbols);
   const std::span<const std::uint16_t> activities(residuals.activities.data(), count);
   const std::vector<std::uint32_t> histogram = count_activities(activities);
-  header.thresholds = choose_thresholds({symbols.data(), count}, activities, histogram, effort.context_thinning);
+  header.thresholds = choose_thresholds({symbols, count}, activities, histogram, effort.context_thinning);
   Scratch<Folded> sorted(count);
   header.symbol_counts = sort_by_context(residuals, header.thresholds, histogram, sorted.data());
-  find_symbols(sorted.data(), count, symbols.data());
-  Streams streams;
+  find_symbols(sorted.data(), count, symbols);
   streams.extra = pack_extra_bits(sorted.data(), count);
-  const auto* from = reinterpret_cast<const std::byte*>(symbols.data());
+  auto from = std::as_bytes(std::span<const std::uint8_t>(symbols, count));
+  streams.paired.reserve(header.symbol_counts.size());
   for (std::size_t i = 0; i < header.symbol_counts.size(); ++i) {
-    const std::span<const std::byte> stream(from, header.symbol_counts[i]);
-    from += stream.size();
-    streams.symbols.emplace_back(stream.begin(), stream.end());
-    if (!effort.has_pairs || !pairs_pay(stream)) continue;
-    std::vector<std::byte> pairs = pair_symbols(stream);
-    if (pairs.size() > stream.size()) continue;  // max_payload_bytes holds for either
-    streams.symbols.back() = std::move(pairs);
+    streams.symbols.push_back(from.first(header.symbol_counts[i]));
+    from = from.subspan(header.symbol_counts[i]);
+    if (!effort.has_pairs || !pairs_pay(streams.symbols.back())) continue;
+    std::vector<std::byte> pairs = pair_symbols(streams.symbols.back());
+    if (pairs.size() > streams.symbols.back().size()) continue;  // max_payload_bytes holds for either
+    streams.paired.push_back(std::move(pairs));
+    streams.symbols.back() = streams.paired.back();
     header.paired = static_cast<std::uint16_t>(header.paired | 1U << i);
   }
   return streams;

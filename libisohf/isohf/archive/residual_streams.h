@@ -2,6 +2,8 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
+#include <span>
 #include <vector>
 
 #include "isohf/archive/coding_effort.h"
@@ -36,7 +38,9 @@ struct Residuals {
 
 /// The streams as they are stored: symbols by context, paired where that pays, and the extra bits.
 struct Streams {
-  std::vector<std::vector<std::byte>> symbols;
+  std::vector<std::span<const std::byte>> symbols;  ///< of `single` or `paired`
+  std::unique_ptr<std::uint8_t[]> single;
+  std::vector<std::vector<std::byte>> paired;
   std::vector<std::byte> extra;
 };
 

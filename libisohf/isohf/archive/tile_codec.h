@@ -55,7 +55,7 @@ inline constexpr int kDefaultLevel = 5;
 
 /// Codes one tile: hexagonal prediction, residuals in context streams, Deflate. Deterministic; thread-safe.
 /// `tile` holds shape.stored_vertex_count() samples; `level` is kMinLevel to kMaxLevel. Never fails on data; throws
-/// Error{kOutOfMemory}.
+/// Error{kOutOfMemory}, and Error{kInvalidArgument} for another level.
 [[nodiscard]] EncodedTile encode_tile(const TileShape& shape, const TileCodes& tile, int level = kDefaultLevel);
 
 /// Decodes one tile from its inflated payload. Trusts nothing: throws Error{kCorrupt} for whatever encode_tile would

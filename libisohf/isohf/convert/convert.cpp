@@ -57,7 +57,7 @@ void make_tile(const Conversion& job, const TileSource& source, const Stages& st
   const QuantiserCounts counts = quantise(job.quantisation, job.datum, heights, codes);
   if (counts.below + counts.above > 0 && !job.options.clamp_range) refuse_overflow(job, tile.index, counts);
   EncodedTile& encoded = tile.encoded;
-  encoded = encode_tile(shape, codes);
+  encoded = encode_tile(shape, codes, job.options.level);
   encoded.statistics = tile_statistics(shape, codes, job.quantisation);
   encoded.statistics.clamped = counts.below + counts.above;
   encoded.statistics.worst_rounding = counts.worst_rounding;

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "isohf/archive/texture_info.h"
+#include "isohf/archive/tile_codec.h"
 #include "isohf/convert/plan.h"
 #include "isohf/surface/height_source.h"
 #include "isohf/surface/photo_source.h"
@@ -57,8 +58,9 @@ struct ConvertOptions {
   std::string scratch_folder = ".";  ///< where rows go that memory has no room for, in a file without a name
   bool overwrite = false;
   bool resume = false;
-  bool lossless = false;  ///< write residuals beside the tiles, so that the source's samples come back bit for bit
-  std::string producer;   ///< "isohf 0.1.0"
+  int level = kDefaultLevel;  ///< kMinLevel to kMaxLevel: the higher, the fewer bytes and the slower
+  bool lossless = false;      ///< write residuals beside the tiles, so that the source's samples come back bit for bit
+  std::string producer;       ///< "isohf 0.1.0"
   SourceNote source_note;
 };
 

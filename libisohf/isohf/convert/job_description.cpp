@@ -58,7 +58,7 @@ std::string heights_fingerprint(const SourceInfo& info, const Plan& plan, const 
   return fmt::format(
       "{} | {} {} bytes {}.{:09} {}x{} {} channel '{}' scale {} {} void {} | shape {}x{}/{} tiles {}x{} extent {} {} "
       "first {} {} "
-      "spacing {} {} {} | {} range {} step {} clamp {} | {} {} | seeds {}",
+      "spacing {} {} {} | {} range {} step {} clamp {} | {} {} | level {} | seeds {}",
       options.producer, std::filesystem::path(info.path).filename().string(), ignored ? 0 : size,
       known ? status.st_mtim.tv_sec : 0, known ? status.st_mtim.tv_nsec : 0, info.width, info.height,
       to_string(info.sample_type), info.channel, info.z_scale, info.z_offset,
@@ -68,7 +68,7 @@ std::string heights_fingerprint(const SourceInfo& info, const Plan& plan, const 
       plan.frame.spacing_z, to_string(plan.outside), to_string(options.code_type),
       options.z_range ? fmt::format("{}:{}", options.z_range->first, options.z_range->second) : "data",
       options.step ? fmt::format("{}", *options.step) : "auto", options.clamp_range, options.filter,
-      options.acquisition,
+      options.acquisition, options.level,
       options.shadow_seeds
           ? fmt::format("{} [{}]", options.shadow_seeds->sun_min_deg, fmt::join(options.shadow_seeds->sun_deg, " "))
           : "none");
@@ -118,6 +118,7 @@ Metadata describe_job(const SourceInfo& info, const Plan& plan, const ConvertOpt
   metadata.wraps_x = plan.frame.wraps_x;
   metadata.filter = options.filter;
   metadata.acquisition = options.acquisition;
+  metadata.level = options.level;
   metadata.source = record_of(info, plan.frame, options.source_note);
   metadata.producer = options.producer;
   return metadata;
