@@ -53,18 +53,28 @@ std::string place_name(const MosaicPlan& plan, const SampleRectangle& at) {
   return fmt::format("x {:.10g}...{:.10g}, y {:.10g}...{:.10g}", x0, x1, y0, y1);
 }
 
+bool lies_in(const Window& region, const SampleRectangle& place) {
+  return place.column < region.column + region.columns && region.column < place.column + place.columns &&
+         place.row < region.row + region.rows && region.row < place.row + place.rows;
+}
+
 /// Distance of neighbouring places on one axis, where all members begin at multiples of it and most fill about one.
 std::optional<std::int64_t> pitch_of(const std::set<std::int64_t>& begins, std::vector<std::int64_t> sizes) {
   const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
   std::nth_element(sizes.begin(), middle, sizes.end());
   if (begins.size() == 1) return *std::max_element(sizes.begin(), sizes.end());
-  std::int64_t pitch = *std::next(begins.begin()) - *begins.begin();
-  for (auto at = begins.begin(); std::next(at) != begins.end(); ++at) pitch = std::min(pitch, *std::next(at) - *at);
-  if (2 * pitch < *middle || *middle < pitch / 2) return std::nullopt;
-  for (const std::int64_t begin : begins) {
-    if ((begin - *begins.begin()) % pitch != 0) return std::nullopt;
+  const auto holds = [&](std::int64_t pitch) {
+    return pitch > 0 && std::all_of(begins.begin(), begins.end(),
+                                    [&](std::int64_t begin) { return (begin - *begins.begin()) % pitch == 0; });
+  };
+  std::int64_t nearest = *std::next(begins.begin()) - *begins.begin();
+  for (auto at = begins.begin(); std::next(at) != begins.end(); ++at) nearest = std::min(nearest, *std::next(at) - *at);
+  if (nearest <= *middle) return 2 * nearest >= *middle && holds(nearest) ? std::optional(nearest) : std::nullopt;
+  // No two are neighbours: side by side, or with a post in common.
+  for (const std::int64_t pitch : {*middle, *middle - 1}) {
+    if (holds(pitch)) return pitch;
   }
-  return pitch;
+  return std::nullopt;
 }
 
 void find_missing_places(const MosaicPlan& plan, MosaicHoles& holes) {
@@ -104,26 +114,28 @@ void find_missing_places(const MosaicPlan& plan, MosaicHoles& holes) {
       for (std::int64_t x = x0; x < x1; ++x) taken[static_cast<std::size_t>(y * across + x)] = true;
     }
   }
-  holes.tiles = across * down;
-  for (std::int64_t i = 0; i < holes.tiles; ++i) {
+  for (std::int64_t i = 0; i < across * down; ++i) {
+    const SampleRectangle place{*columns.begin() + i % across * *pitch_x, *rows.begin() + i / across * *pitch_y,
+                                *pitch_x, *pitch_y};
+    if (!lies_in(plan.region, place)) continue;
+    ++holes.tiles;
     if (taken[static_cast<std::size_t>(i)]) continue;
     ++holes.tiles_missing;
-    if (holes.missing.size() < MosaicHoles::kMostNamed) {
-      holes.missing.push_back(place_name(
-          plan, {*columns.begin() + i % across * *pitch_x, *rows.begin() + i / across * *pitch_y, *pitch_x, *pitch_y}));
-    }
+    if (holes.missing.size() < MosaicHoles::kMostNamed) holes.missing.push_back(place_name(plan, place));
   }
 }
 
-/// Counts the samples in no rectangle and remembers the first stretch of them.
+/// Counts the samples of the region in no rectangle and remembers the first stretch of them.
 std::int64_t uncovered(const MosaicPlan& plan, std::optional<SampleRectangle>& first) {
   std::vector<SampleRectangle> members = grounds(plan, 0.5);
   std::sort(members.begin(), members.end(),
             [](const SampleRectangle& a, const SampleRectangle& b) { return a.row < b.row; });
-  std::set<std::int64_t> cuts = {0, plan.info.height};
+  const Window& region = plan.region;
+  const auto in_region = [&](std::int64_t row) { return std::clamp(row, region.row, region.row + region.rows); };
+  std::set<std::int64_t> cuts = {region.row, region.row + region.rows};
   for (const SampleRectangle& member : members) {
-    cuts.insert(std::min(member.row, plan.info.height));
-    cuts.insert(std::min(member.row + member.rows, plan.info.height));
+    cuts.insert(in_region(member.row));
+    cuts.insert(in_region(member.row + member.rows));
   }
   std::int64_t count = 0;
   std::vector<SampleRectangle> active;
@@ -139,8 +151,10 @@ std::int64_t uncovered(const MosaicPlan& plan, std::optional<SampleRectangle>& f
     }
     std::sort(active.begin(), active.end(),
               [](const SampleRectangle& a, const SampleRectangle& b) { return a.column < b.column; });
-    std::int64_t reached = 0;
+    std::int64_t reached = region.column;
+    const std::int64_t east = region.column + region.columns;
     const auto skip_to = [&](std::int64_t column) {
+      column = std::min(column, east);
       if (column <= reached) return;
       count += (column - reached) * rows;
       if (!first) first = SampleRectangle{reached, top, column - reached, rows};
@@ -149,7 +163,7 @@ std::int64_t uncovered(const MosaicPlan& plan, std::optional<SampleRectangle>& f
       skip_to(member.column);
       reached = std::max(reached, member.column + member.columns);
     }
-    skip_to(plan.info.width);
+    skip_to(east);
   }
   return count;
 }

@@ -278,13 +278,16 @@ std::vector<PlacedMember> survey(const std::vector<std::string>& paths, const Op
 
 }  // namespace
 
-MosaicPlan plan_mosaic(const std::vector<std::string>& paths, const OpenOptions& options) {
+MosaicPlan plan_mosaic(const std::vector<std::string>& paths, const OpenOptions& options,
+                       const std::optional<BoundingBox>& box) {
   if (paths.empty()) throw Error(ErrorCode::kInvalidArgument, "a mosaic of no files");
   refuse_duplicates(paths);
   MosaicPlan plan;
   std::vector<PlacedMember> members = survey(paths, options, plan);
   if (plan.info.georeference.unit == HorizontalUnit::kDegree) join_antimeridian(members);
   place_members(std::move(members), plan);
+  plan.info.path = fmt::format("mosaic of {} files", paths.size());
+  plan.region = box ? samples_in(*box, plan.info) : Window{0, 0, plan.info.width, plan.info.height};
   plan.holes = find_holes(plan);
   const bool interpolated = plan.layers.size() > 1 || !plan.is_on_grid(plan.layers.front());
   plan.samples = choose_mosaic_samples(plan.kinds, plan.holes.samples > 0, interpolated);

@@ -1,9 +1,11 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "formats/cropped_source.h"
 #include "formats/mosaic_samples.h"
 #include "formats/registry.h"
 #include "isohf/surface/heightmap.h"
@@ -60,7 +62,8 @@ struct MosaicPlan {
   /// From the coarsest to the finest, and that is the order in which they are laid over each other. A layer that has
   /// the mosaic's spacing is on its grid; others are interpolated.
   std::vector<MosaicLayer> layers;
-  MosaicHoles holes;
+  Window region;                  ///< the samples that matter: all, or those of a box
+  MosaicHoles holes;              ///< in the region
   std::int64_t block_height = 1;  ///< the members' largest
 
   [[nodiscard]] bool is_on_grid(const MosaicLayer& layer) const {
@@ -73,6 +76,8 @@ struct MosaicPlan {
 /// joined the shorter way.
 /// Throws Error naming the file at fault: as open_source does; kInvalidArgument for a file that is named twice, does
 /// not say where it lies, lies off the grid of others of its resolution by more than kSnapTolerance, or disagrees.
-[[nodiscard]] MosaicPlan plan_mosaic(const std::vector<std::string>& paths, const OpenOptions& options);
+/// box: the part that will be read; holes elsewhere do not matter.
+[[nodiscard]] MosaicPlan plan_mosaic(const std::vector<std::string>& paths, const OpenOptions& options,
+                                     const std::optional<BoundingBox>& box = std::nullopt);
 
 }  // namespace isohf

@@ -133,6 +133,7 @@ MosaicSource::MosaicSource(std::string path, MosaicPlan plan, const OpenOptions&
     : plan_(std::move(plan)), rule_(rule), pool_(options) {
   plan_.info.path = std::move(path);
   choose_strips();
+  strip_columns_ = plan_.info.width;
 }
 
 void MosaicSource::choose_strips() {
@@ -167,9 +168,14 @@ void MosaicSource::read_window(const Window& window, std::span<std::byte> sample
   ISOHF_ASSERT(window.column >= 0 && window.row >= 0 && window.columns >= 0 && window.rows >= 0);
   ISOHF_ASSERT(window.column + window.columns <= info.width && window.row + window.rows <= info.height);
   ISOHF_ASSERT(samples.size() == bytes_of(window));
-  const bool whole = window.columns == info.width;
-  const std::size_t sample_bytes = size_bytes(info.sample_type);
-  const std::size_t row_bytes = static_cast<std::size_t>(window.columns) * sample_bytes;
+  // Passes read the same columns again and again; the first window of others is read as it is.
+  const bool follows = window.column == strip_column_ && window.columns == strip_columns_;
+  if (!follows) {
+    strip_number_ = -1;
+    strip_column_ = window.column;
+    strip_columns_ = window.columns;
+  }
+  const std::size_t row_bytes = static_cast<std::size_t>(window.columns) * size_bytes(info.sample_type);
   const std::int64_t end = window.row + window.rows;
   for (std::int64_t row = window.row; row < end;) {
     const std::int64_t strip = row / info.block_height;
@@ -178,18 +184,12 @@ void MosaicSource::read_window(const Window& window, std::span<std::byte> sample
     const std::int64_t rows = std::min(end, bottom) - row;
     const auto out = samples.subspan(static_cast<std::size_t>(row - window.row) * row_bytes,
                                      static_cast<std::size_t>(rows) * row_bytes);
-    const bool in_one_go = !whole || (row == top && row + rows == bottom);
+    const bool in_one_go = !follows || (row == top && row + rows == bottom);
     if (strip != strip_number_ && in_one_go) {
       compose({window.column, row, window.columns, rows}, out);
     } else {
       read_strip(strip);
-      const std::size_t strip_row = static_cast<std::size_t>(info.width) * sample_bytes;
-      const std::byte* from = strip_.data() + static_cast<std::size_t>(row - top) * strip_row +
-                              static_cast<std::size_t>(window.column) * sample_bytes;
-      for (std::int64_t r = 0; r < rows; ++r) {
-        std::memcpy(out.data() + static_cast<std::size_t>(r) * row_bytes, from, row_bytes);
-        from += strip_row;
-      }
+      std::memcpy(out.data(), strip_.data() + static_cast<std::size_t>(row - top) * row_bytes, out.size());
     }
     row += rows;
   }
@@ -198,7 +198,7 @@ void MosaicSource::read_window(const Window& window, std::span<std::byte> sample
 void MosaicSource::read_strip(std::int64_t strip) {
   if (strip == strip_number_) return;
   const std::int64_t top = strip * plan_.info.block_height;
-  const Window window{0, top, plan_.info.width, std::min(plan_.info.block_height, plan_.info.height - top)};
+  const Window window{strip_column_, top, strip_columns_, std::min(plan_.info.block_height, plan_.info.height - top)};
   strip_number_ = -1;
   strip_.resize(bytes_of(window));
   compose(window, strip_);

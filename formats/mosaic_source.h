@@ -56,6 +56,8 @@ class MosaicSource final : public HeightSource {
   ReaderPool pool_;
   std::vector<std::byte> strip_;  ///< rows of the strip that was read last
   std::int64_t strip_number_ = -1;
+  std::int64_t strip_column_ = 0;  ///< the columns that strips hold: those that were asked for last
+  std::int64_t strip_columns_ = 0;
 };
 
 }  // namespace isohf

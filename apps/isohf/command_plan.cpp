@@ -76,7 +76,7 @@ std::optional<PlanOptions> parse(const Arguments& arguments) {
   if (options.inputs.names.empty()) {
     for (const char* option : {"--density", "--spacing", "--tiles", "--fit", "--outside", "--channel", "--registration",
                                "--nodata", "--z-scale", "--z-offset", "--sample-spacing", "--overlap",
-                               "--require-complete", "--recursive", "--projection", "--wrap-x", "--geoid"}) {
+                               "--require-complete", "--recursive", "--projection", "--wrap-x", "--geoid", "--bbox"}) {
       if (line.given(option)) refuse(std::string(option) + " needs an INPUT");
     }
   } else if (line.given("--limit")) {

@@ -91,7 +91,7 @@ std::optional<VerifyCommandOptions> parse(const Arguments& arguments) {
   if (options.against.names.empty()) {
     for (const char* option :
          {"--random", "--no-ortho", "--max-error", "--max-rms", "--channel", "--registration", "--nodata", "--z-scale",
-          "--z-offset", "--sample-spacing", "--overlap", "--require-complete", "--recursive", "--geoid"}) {
+          "--z-offset", "--sample-spacing", "--overlap", "--require-complete", "--recursive", "--geoid", "--bbox"}) {
       if (line.given(option)) {
         throw Error(ErrorCode::kInvalidArgument, std::string("verify: ") + option + " needs --against INPUT");
       }

@@ -63,9 +63,20 @@ std::string fingerprint_of(const MosaicPlan& plan, OverlapRule rule) {
   return fmt::format("mosaic {} {} files {}", to_string(rule), members.size(), sha256_of(text));
 }
 
+void take_box(const SourceInputs& inputs, OpenedInputs& opened) {
+  if (!inputs.box) return;
+  const BoundingBox& box = *inputs.box;
+  opened.source = crop(std::move(opened.source), box);
+  if (!opened.note.fingerprint.empty()) opened.note.fingerprint += " ";
+  opened.note.fingerprint += fmt::format("bbox {} {} {} {}", box.west, box.south, box.east, box.north);
+}
+
 }  // namespace
 
 void add_mosaic_options(CommandLine& line, SourceInputs& inputs) {
+  line.option("--bbox", "W,S,E,N",
+              "Only the part between these coordinates of the input's reference system, whole samples",
+              [&](const std::string& text) { inputs.box = bounding_box_from_string(text); });
   line.group("Several inputs");
   line.option(
       "--overlap", "RULE",
@@ -86,11 +97,12 @@ OpenedInputs open_inputs(std::vector<std::string> files, const SourceInputs& inp
   if (files.size() == 1) {
     opened.source = open_source(files.front(), options);
     opened.files = std::move(files);
+    take_box(inputs, opened);
     return opened;
   }
   const std::string name = fmt::format("mosaic of {} files", files.size());
   oneapi::tbb::task_arena arena(threads > 0 ? threads : oneapi::tbb::task_arena::automatic);
-  MosaicPlan plan = arena.execute([&] { return plan_mosaic(files, options); });
+  MosaicPlan plan = arena.execute([&] { return plan_mosaic(files, options, inputs.box); });
   if (inputs.require_complete && plan.holes.samples > 0) {
     throw Error(ErrorCode::kIo, name + ": --require-complete: " + plan.holes.describe(MosaicHoles::kMostNamed));
   }
@@ -99,6 +111,7 @@ OpenedInputs open_inputs(std::vector<std::string> files, const SourceInputs& inp
   opened.note.fingerprint = fingerprint_of(plan, inputs.overlap);
   opened.source = std::make_unique<MosaicSource>(name, std::move(plan), options, inputs.overlap);
   opened.files = std::move(files);
+  take_box(inputs, opened);
   return opened;
 }
 

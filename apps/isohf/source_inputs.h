@@ -1,10 +1,12 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "command_line.h"
+#include "formats/cropped_source.h"
 #include "formats/mosaic_source.h"
 #include "formats/registry.h"
 #include "isohf/convert/convert.h"
@@ -18,9 +20,10 @@ struct SourceInputs {
   bool overlap_given = false;
   bool require_complete = false;
   bool recursive = false;
+  std::optional<BoundingBox> box;  ///< of the whole, only this part
 };
 
-/// The group "Several inputs": --overlap, --require-complete, --recursive.
+/// --bbox, and the group "Several inputs": --overlap, --require-complete, --recursive.
 void add_mosaic_options(CommandLine& line, SourceInputs& inputs);
 
 /// Inputs, opened as one source.

@@ -258,6 +258,27 @@ TEST_F(MosaicCommand, VerifyTakesTheOverlapRuleFromTheArchive) {
   EXPECT_FALSE(first == convert({tiles}, {}));
 }
 
+TEST_F(MosaicCommand, ABoxOfPiecesIsThatOfTheWhole) {
+  const CutRaster raster = hills(placed_spec(190, 140, SampleType::kInt16, Registration::kArea));
+  raster.cut(folder / "whole.tif", {0, 0, 190, 140});
+  raster.cut(folder / "part.tif", {30, 20, 100, 80});
+  const std::string pieces = subfolder("pieces");
+  write_pieces(raster, pieces, regular_cut(190, 140, 45));
+  std::filesystem::remove(pieces + "piece4.tif");  // in the North-East, outside the box
+  const Words options = {"--source-name", "hills", "--shape", "52x67"};
+  Words in_box = options;
+  in_box.insert(in_box.end(), {"--bbox", "500900,5197015,503900,5199415"});
+  const std::string part = convert({folder / "part.tif"}, options);
+  EXPECT_TRUE(part == convert({folder / "whole.tif"}, in_box));
+  in_box.emplace_back("--require-complete");
+  EXPECT_TRUE(part == convert({pieces}, in_box));
+  EXPECT_EQ(metadata().at("source").at("width"), 100);
+  const RunResult verified = run_isohf(
+      {"verify", folder / "out.isohf", "--no-ortho", "--against", pieces, "--bbox", "500900,5197015,503900,5199415"});
+  EXPECT_EQ(verified.exit_code, 0) << verified.out << verified.err;
+  EXPECT_EQ(run_isohf({"convert", folder / "whole.tif", folder / "x.isohf", "--bbox", "1,2,3,4"}).exit_code, 2);
+}
+
 TEST_F(MosaicCommand, FourHundredFilesGoThroughFewHandles) {
   const CutRaster raster = hills(placed_spec(200, 200, SampleType::kInt16, Registration::kPoint));
   raster.cut(folder / "whole.tif", {0, 0, 200, 200});

@@ -196,7 +196,7 @@ TEST(MosaicSource, IntegersWithoutAVoidGetALargerTypeForGaps) {
   const auto mosaic = open_mosaic(write_pieces(raster, folder / "", {{0, 0, 10, 10}, {20, 0, 10, 10}}));
   EXPECT_EQ(mosaic->info().sample_type, SampleType::kInt32);
   EXPECT_THAT(mosaic->info().warnings, ::testing::ElementsAre(HasSubstr("uint16 has no number to spare for voids"),
-                                                              HasSubstr("100 samples lie in no file")));
+                                                              HasSubstr("1 of 3 tiles are missing (100 samples)")));
   const std::vector<double> found = elevations(*mosaic);
   for (std::int64_t c = 0; c < 30; ++c) {
     EXPECT_EQ(std::isnan(at(found, *mosaic, c, 3)), c >= 10 && c < 20);
