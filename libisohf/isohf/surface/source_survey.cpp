@@ -126,17 +126,15 @@ std::string SourceSurvey::warning() const {
     if (warning.find("--nodata") != std::string::npos) return {};
   }
   std::string values;
-  std::string list;
-  bool many = false;
+  std::string list;  // one value: --nodata takes no more
   for (const UndeclaredVoid& found : undeclared_voids()) {
     values += fmt::format("{}{} samples hold {:.9g}{}", values.empty() ? "" : ", ", found.count, found.value,
                           found.many_values ? " or the like" : "");
-    list += fmt::format("{}{:.9g}", list.empty() ? "" : ",", found.value);
-    many = many || found.many_values;
+    if (list.empty()) list = fmt::format("{:.9g}", found.value);
   }
   if (values.empty()) return {};
   return fmt::format("{}, far from all others ({:.6g} to {:.6g}): if that means no elevation, give --{}", values,
-                     others_.range.min, others_.range.max, many ? "valid-range LO:HI" : "nodata " + list);
+                     others_.range.min, others_.range.max, "nodata " + list);
 }
 
 }  // namespace isohf
