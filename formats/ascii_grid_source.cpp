@@ -127,7 +127,7 @@ class AsciiGridSource final : public HeightSource {
       header.require_only(known_words());
       header.read_size(info_);
       header.read_place(info_);
-      marked_ = header.has("nodatavalue") || header.has("nodata") || options.void_value.has_value();
+      marked_ = header.has("nodatavalue") || header.has("nodata") || !options.void_values.empty();
     }
     require_room();
     scan(word, any);

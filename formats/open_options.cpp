@@ -43,13 +43,16 @@ void require_finite(const std::optional<double>& value, const SourceInfo& info, 
   }
 }
 
-void override_void(SourceInfo& info, double value) {
-  const std::optional<double> stored = void_value_as_stored(info.sample_type, value);
-  if (!stored) {
-    throw Error(ErrorCode::kInvalidArgument, fmt::format("{}: void value is {}, which no {} sample can hold", info.path,
-                                                         value, to_string(info.sample_type)));
+void override_voids(SourceInfo& info, const std::vector<double>& values) {
+  info.void_values.clear();
+  for (const double value : values) {
+    const std::optional<double> stored = void_value_as_stored(info.sample_type, value);
+    if (!stored) {
+      throw Error(ErrorCode::kInvalidArgument, fmt::format("{}: void value is {}, which no {} sample can hold",
+                                                           info.path, value, to_string(info.sample_type)));
+    }
+    info.void_values.push_back(*stored);
   }
-  info.void_values = {*stored};
 }
 
 void override_spacing(SourceInfo& info, double spacing_m) {
@@ -111,7 +114,7 @@ void apply_open_options(SourceInfo& info, const OpenOptions& options) {
                 fmt::format("{}: the spacing is {} m, must be positive", info.path, *options.spacing));
   }
   if (options.registration) info.georeference.registration = *options.registration;
-  if (options.void_value) override_void(info, *options.void_value);
+  if (!options.void_values.empty()) override_voids(info, options.void_values);
   if (options.z_scale) info.z_scale = *options.z_scale;
   if (options.z_offset) info.z_offset = *options.z_offset;
   if (options.spacing) override_spacing(info, *options.spacing);

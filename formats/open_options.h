@@ -15,7 +15,7 @@ namespace isohf {
 /// Lets what the user says override what the file says; every reader calls it last, on a complete `info`.
 ///
 /// registration replaces only the meaning of the samples: the place of sample (0, 0) stays where the file puts it.
-/// void_value replaces the list of void values; the valid range of special pixels stays.
+/// void_values replace the list of void values; the valid range of special pixels stays.
 /// spacing is in metres: coordinates in metres (feet, kilometres) keep their origin, now in metres; others lose it,
 /// with a warning when the file had a unit. Throws Error{kInvalidArgument}: a value that is not finite, a spacing <= 0,
 /// a scale of 0, a void value that the sample type cannot hold. `options.channel` is the reader's own business.

@@ -23,11 +23,12 @@ struct OpenOptions {
   std::string channel;                       ///< channel name or zero-based number; empty: the reader's choice
   std::string part;                          ///< of a file of several parts: name or zero-based number
   std::optional<Registration> registration;  ///< overrides the file's
-  std::optional<double> void_value;          ///< overrides the file's void values
+  std::vector<double> void_values;           ///< override the file's; empty: the file's
   std::optional<double> z_scale;             ///< elevation = raw * z_scale + z_offset; overrides the file's
   std::optional<double> z_offset;
   std::optional<double> spacing;  ///< sample spacing in metres, for files that do not say; overrides
   std::optional<RawLayout> raw;   ///< the file is nothing but these samples, whatever its name and content say
+  VoidTreatment voids;            ///< for whoever wraps the source in a FilledSource; open_source does not
 };
 
 /// One row of a table of formats.

@@ -30,6 +30,7 @@
 #include "plan_report.h"
 #include "source_inputs.h"
 #include "standard_output.h"
+#include "void_counts_output.h"
 
 namespace isohf::cli {
 namespace {
@@ -220,7 +221,8 @@ Measured measure(const ConvertSummary& summary) {
   return measured;
 }
 
-ordered_json json_from(const ConvertCommandOptions& options, const ConvertSummary& summary) {
+ordered_json json_from(const ConvertCommandOptions& options, const ConvertSummary& summary,
+                       const std::optional<VoidCounts>& voids) {
   const Measured measured = measure(summary);
   return {{"input", options.input},
           {"files", summary.metadata.source.mosaic ? summary.metadata.source.mosaic->files : 1},
@@ -238,6 +240,7 @@ ordered_json json_from(const ConvertCommandOptions& options, const ConvertSummar
           {"ratio_to_raw_16_bit", measured.ratio},
           {"bits_per_sample", measured.bits_per_sample},
           {"source_samples", summary.source_samples},
+          {"source_voids", json_from_voids(voids)},
           {"lattice_samples", summary.lattice_samples},
           {"step", summary.step},
           {"worst_rounding", summary.worst_rounding},
@@ -248,7 +251,8 @@ ordered_json json_from(const ConvertCommandOptions& options, const ConvertSummar
           {"metadata", ordered_json::parse(ArchiveReader(options.output).metadata_json())}};
 }
 
-std::string text_from(const ConvertCommandOptions& options, const ConvertSummary& summary) {
+std::string text_from(const ConvertCommandOptions& options, const ConvertSummary& summary,
+                      const std::optional<VoidCounts>& voids) {
   const Measured measured = measure(summary);
   const Metadata& metadata = summary.metadata;
   const TileShape& shape = metadata.grid.shape();
@@ -280,6 +284,7 @@ std::string text_from(const ConvertCommandOptions& options, const ConvertSummary
                                100.0 * static_cast<double>(summary.seed_bytes) / tile_bytes));
   }
   if (summary.texture) say("textures", describe_textures(*summary.texture, summary.pixels_per_texel));
+  if (voids && voids->found > 0) say("voids", text_from_voids(*voids));
   if (metadata.statistics.clamped > 0) {
     say("clamped", fmt::format("{} vertices moved into the range", describe_count(metadata.statistics.clamped)));
   }
@@ -351,6 +356,7 @@ int run(ConvertCommandOptions options) {
     throw Error(ErrorCode::kIo, fmt::format("{}: {} tiles written, {} expected", options.output, summary.tiles_written,
                                             summary.tiles_expected));
   }
+  const std::optional<VoidCounts> voids = counts_of_voids(*source, summary.source_voids);
   std::optional<Accuracy> accuracy;
   if (options.report) {
     accuracy = measure_accuracy(options.output, *source, kRandomPoints, true, options.work, common, cancel);
@@ -358,11 +364,11 @@ int run(ConvertCommandOptions options) {
   }
   StandardOutput out;
   if (common.json) {
-    ordered_json document = json_from(options, summary);
+    ordered_json document = json_from(options, summary, voids);
     if (accuracy) document["report"] = json_from(*accuracy);
     out.write(json_text(document));
   } else if (!common.quiet) {
-    out.write(text_from(options, summary));
+    out.write(text_from(options, summary, voids));
     if (accuracy) out.write(text_from(*accuracy, options.input));
   }
   out.finish();

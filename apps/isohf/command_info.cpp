@@ -58,9 +58,9 @@ std::optional<InfoOptions> parse(const Arguments& arguments) {
   line.footer(kFooter);
   if (!line.parse(arguments)) return std::nullopt;
   line.require("INPUT", options.input);
-  for (const char* option :
-       {"--stats", "--channel", "--registration", "--nodata", "--z-scale", "--z-offset", "--raw", "--sample-spacing"}) {
-    if (line.given(option)) options.for_rasters.emplace_back(option);
+  if (line.given("--stats")) options.for_rasters.emplace_back("--stats");
+  for (const std::string& option : source_options()) {
+    if (line.given(option)) options.for_rasters.push_back(option);
   }
   return options;
 }

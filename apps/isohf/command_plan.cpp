@@ -74,10 +74,12 @@ std::optional<PlanOptions> parse(const Arguments& arguments) {
   options.inputs.names.insert(options.inputs.names.end(), names.begin(), names.end());
   const auto refuse = [](const std::string& why) { throw Error(ErrorCode::kInvalidArgument, "plan: " + why); };
   if (options.inputs.names.empty()) {
-    for (const char* option : {"--density", "--spacing", "--tiles", "--fit", "--outside", "--channel", "--registration",
-                               "--nodata", "--z-scale", "--z-offset", "--sample-spacing", "--overlap",
-                               "--require-complete", "--recursive", "--projection", "--wrap-x", "--geoid", "--bbox"}) {
-      if (line.given(option)) refuse(std::string(option) + " needs an INPUT");
+    std::vector<std::string> for_inputs = {
+        "--density",          "--spacing",   "--tiles",      "--fit",    "--outside", "--overlap",
+        "--require-complete", "--recursive", "--projection", "--wrap-x", "--geoid",   "--bbox"};
+    for_inputs.insert(for_inputs.end(), source_options().begin(), source_options().end());
+    for (const std::string& option : for_inputs) {
+      if (line.given(option)) refuse(option + " needs an INPUT");
     }
   } else if (line.given("--limit")) {
     refuse("--limit is for lists of candidates, without an INPUT");

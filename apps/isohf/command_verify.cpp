@@ -89,11 +89,12 @@ std::optional<VerifyCommandOptions> parse(const Arguments& arguments) {
   if (options.list_checks) return options;
   line.require("ARCHIVE", options.archive);
   if (options.against.names.empty()) {
-    for (const char* option :
-         {"--random", "--no-ortho", "--max-error", "--max-rms", "--channel", "--registration", "--nodata", "--z-scale",
-          "--z-offset", "--sample-spacing", "--overlap", "--require-complete", "--recursive", "--geoid", "--bbox"}) {
+    std::vector<std::string> for_inputs = {"--random",           "--no-ortho",  "--max-error", "--max-rms", "--overlap",
+                                           "--require-complete", "--recursive", "--geoid",     "--bbox"};
+    for_inputs.insert(for_inputs.end(), source_options().begin(), source_options().end());
+    for (const std::string& option : for_inputs) {
       if (line.given(option)) {
-        throw Error(ErrorCode::kInvalidArgument, std::string("verify: ") + option + " needs --against INPUT");
+        throw Error(ErrorCode::kInvalidArgument, "verify: " + option + " needs --against INPUT");
       }
     }
   }
@@ -182,6 +183,9 @@ Accuracy compare(const VerifyCommandOptions& options, const std::atomic<bool>& c
   const Metadata metadata = ArchiveReader(options.archive).metadata();
   const SourceRecord& record = metadata.source;
   if (open.channel.empty()) open.channel = record.channel;
+  if (open.void_values.empty() && !record.mosaic) open.void_values = record.void_values;
+  if (!open.voids.valid_range) open.voids.valid_range = record.valid_range;
+  if (open.voids.distance() == 0 && record.fill_distance > 0) open.voids.fill_distance = record.fill_distance;
   if (!open.registration)
     open.registration = record.registration == "area" ? Registration::kArea : Registration::kPoint;
   SourceInputs inputs = options.against;

@@ -4,6 +4,7 @@
 
 #include "formats/raw_source.h"
 #include "isohf/base/error.h"
+#include "isohf/surface/filled_source.h"
 #include "option_values.h"
 
 namespace isohf::cli {
@@ -31,14 +32,21 @@ void add_source_options(CommandLine& line, OpenOptions& options) {
                 if (word == 0) options.registration = Registration::kArea;
                 if (word == 1) options.registration = Registration::kPoint;
               });
-  line.option("--nodata", "VALUE", "Raw value that means 'no elevation', instead of the file's; NaN always does",
+  line.option("--nodata", "VALUE,...", "Raw values that mean 'no elevation', instead of the file's; NaN always does",
               [&](const std::string& text) {
-                double value = 0.0;
-                if (!read_number(text, value)) {
-                  throw Error(ErrorCode::kInvalidArgument, "found '" + text + "', must be a number or nan");
+                try {
+                  options.void_values = parse_numbers(text);
+                } catch (const Error&) {
+                  throw Error(ErrorCode::kInvalidArgument,
+                              "found '" + text + "', must be a number or nan, or several with commas between them");
                 }
-                options.void_value = value;
               });
+  line.option("--valid-range", "LO:HI", "Elevations outside are void (default: all are valid)",
+              [&](const std::string& text) { options.voids.valid_range = parse_range(text); });
+  line.flag("--fill", "Fill voids smoothly, up to --fill-distance from the nearest elevation", options.voids.fill);
+  line.option(
+      "--fill-distance", "D", "Fill voids, as far as D samples, 1 to 4096 (default 100)",
+      [&](const std::string& text) { options.voids.fill_distance = parse_whole_number(text, 1, kMaxFillDistance); });
   line.option("--z-scale", "FACTOR", "elevation = raw * FACTOR + z-offset, instead of the file's (default 1)",
               [&](const std::string& text) {
                 const double scale = parse_number(text);
@@ -53,6 +61,17 @@ void add_source_options(CommandLine& line, OpenOptions& options) {
               [&](const std::string& text) { options.raw = raw_layout_from_string(text); });
   line.option("--sample-spacing", "METRES", "Distance of neighbouring samples, instead of the file's",
               [&](const std::string& text) { options.spacing = parse_positive_number(text); });
+}
+
+std::unique_ptr<HeightSource> open_input(const std::string& path, const OpenOptions& options) {
+  return with_voids_treated(open_source(path, options), options.voids);
+}
+
+const std::vector<std::string>& source_options() {
+  static const std::vector<std::string> names = {"--channel", "--part", "--encoding",      "--registration",
+                                                 "--nodata",  "--fill", "--fill-distance", "--valid-range",
+                                                 "--z-scale", "--raw",  "--z-offset",      "--sample-spacing"};
+  return names;
 }
 
 }  // namespace isohf::cli

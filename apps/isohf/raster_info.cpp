@@ -18,8 +18,10 @@
 #include "isohf/surface/source_rows.h"
 #include "isohf/surface/source_survey.h"
 #include "json_output.h"
+#include "options_source.h"
 #include "progress.h"
 #include "standard_output.h"
+#include "void_counts_output.h"
 
 namespace isohf::cli {
 namespace {
@@ -41,6 +43,7 @@ struct RasterInfo {
   const char* registration_from = "";                ///< "option", "file" or "default"
   std::optional<Bounds> bounds;
   std::optional<SourceSurvey> survey;
+  std::optional<VoidCounts> voids;
 };
 
 Registration registration_used(const Georeference& place) {
@@ -170,6 +173,7 @@ std::string text_from(const RasterInfo& raster) {
     }
     say("samples",
         fmt::format("{}, {} of them void", describe_count(scan.valid + scan.voids), describe_count(scan.voids)));
+    if (raster.voids && (info.valid_range || info.fill_distance > 0)) say("treated", text_from_voids(*raster.voids));
   }
   return text;
 }
@@ -241,6 +245,7 @@ ordered_json json_from(const RasterInfo& raster, const std::vector<std::string>&
   json["void_values"] = voids;
   json["valid_samples"] = {{"min", number_or_text(info.valid_min)}, {"max", number_or_text(info.valid_max)}};
   json["statistics"] = raster.survey ? json_from(*raster.survey) : ordered_json(nullptr);
+  json["voids"] = json_from_voids(raster.voids);
   json["warnings"] = warnings;
   return json;
 }
@@ -262,7 +267,7 @@ bool is_archive(const std::string& path, const OpenOptions& options) {
 
 void print_raster_info(const std::string& path, const OpenOptions& options, bool with_statistics,
                        const WorkOptions& work, const CommonOptions& common) {
-  const std::unique_ptr<HeightSource> source = open_source(path, options);
+  const std::unique_ptr<HeightSource> source = open_input(path, options);
   RasterInfo raster;
   raster.source = source->info();
   const Format* const format = native_format_of(path, options);
@@ -275,6 +280,7 @@ void print_raster_info(const std::string& path, const OpenOptions& options, bool
   std::vector<std::string> warnings = raster.source.warnings;
   if (with_statistics) {
     raster.survey = survey(*source, work, common);
+    raster.voids = counts_of_voids(*source, raster.survey->scan().voids);
     if (const std::string warning = raster.survey->warning(); !warning.empty()) warnings.push_back(warning);
   }
   if (!common.quiet) {

@@ -9,6 +9,7 @@
 
 #include "isohf/archive/content_hash.h"
 #include "isohf/base/error.h"
+#include "isohf/surface/filled_source.h"
 #include "option_values.h"
 
 namespace isohf::cli {
@@ -95,7 +96,7 @@ OpenedInputs open_inputs(std::vector<std::string> files, const SourceInputs& inp
                          int threads) {
   OpenedInputs opened;
   if (files.size() == 1) {
-    opened.source = open_source(files.front(), options);
+    opened.source = with_voids_treated(open_source(files.front(), options), options.voids);
     opened.files = std::move(files);
     take_box(inputs, opened);
     return opened;
@@ -109,7 +110,9 @@ OpenedInputs open_inputs(std::vector<std::string> files, const SourceInputs& inp
   opened.note.name = name;
   opened.note.mosaic = record_of(plan, inputs.overlap);
   opened.note.fingerprint = fingerprint_of(plan, inputs.overlap);
-  opened.source = std::make_unique<MosaicSource>(name, std::move(plan), options, inputs.overlap);
+  // Voids are filled across the files' borders.
+  opened.source =
+      with_voids_treated(std::make_unique<MosaicSource>(name, std::move(plan), options, inputs.overlap), options.voids);
   opened.files = std::move(files);
   take_box(inputs, opened);
   return opened;

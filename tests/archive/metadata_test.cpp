@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
 #include <utility>
 
@@ -49,6 +50,31 @@ TEST(Metadata, ComesBackAsItWas) {
   EXPECT_EQ(back.tiles_stored, 17);
   ASSERT_EQ(back.extensions.size(), 2U);
   EXPECT_EQ(back.extensions[0], metadata.extensions[0]);
+}
+
+TEST(Metadata, RecordsHowVoidsWereTreated) {
+  Metadata metadata = full();
+  metadata.source.void_values = {-9999.0, std::nan(""), HUGE_VAL};
+  metadata.source.valid_range = {-500.0, 9000.5};
+  metadata.source.fill_distance = 100;
+  const std::string json = format_metadata(metadata);
+  const SourceRecord back = parse_metadata(json).source;
+  ASSERT_EQ(back.void_values.size(), 3U);
+  EXPECT_EQ(back.void_values[0], -9999.0);
+  EXPECT_TRUE(std::isnan(back.void_values[1]));
+  EXPECT_EQ(back.void_values[2], HUGE_VAL);
+  EXPECT_EQ(back.valid_range, metadata.source.valid_range);
+  EXPECT_EQ(back.fill_distance, 100);
+  for (const char* wrong : {"\"fill_distance\": -1", "\"fill_distance\": 1.5", "\"fill_distance\": \"far\""}) {
+    EXPECT_THROW((void)parse_metadata(replaced(json, "\"fill_distance\": 100", wrong)), Error) << wrong;
+  }
+  EXPECT_THROW((void)parse_metadata(replaced(json, "\"nan\"", "\"none\"")), Error);
+  EXPECT_THROW((void)parse_metadata(replaced(json, "9000.5", "\"high\"")), Error);
+  // Archives of the first builds say nothing of voids.
+  const SourceRecord old =
+      parse_metadata(replaced(json, "\"voids\": {\n   \"values\"", "\"other\": {\n   \"values\"")).source;
+  EXPECT_TRUE(old.void_values.empty());
+  EXPECT_EQ(old.fill_distance, 0);
 }
 
 TEST(Metadata, BeginsWithFormatAndVersion) {

@@ -164,7 +164,7 @@ TEST_F(AsciiGrid, WarnsOfAVoidValueThatTheHeaderDoesNotName) {
   EXPECT_THAT(warnings("ncols 2\nnrows 1\n-32768.0 1\n"), ElementsAre(HasSubstr("--nodata -32768")));
   EXPECT_THAT(warnings("ncols 2\nnrows 1\n-999 1\n"), IsEmpty());
   OpenOptions options;
-  options.void_value = -9999.0;
+  options.void_values = {-9999.0};
   EXPECT_THAT(warnings("ncols 2\nnrows 1\n-9999 1\n", options), IsEmpty());
 }
 

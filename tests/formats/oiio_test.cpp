@@ -92,7 +92,7 @@ TEST_F(OiioModule, ReadsTheChannelAskedFor) {
 TEST_F(OiioModule, AppliesTheOpenOptions) {
   OpenOptions options;
   options.z_scale = 0.5;
-  options.void_value = 7.0;
+  options.void_values = {7.0};
   const auto source = open_source(write_graymap(), options);
   EXPECT_EQ(source->info().z_scale, 0.5);
   EXPECT_EQ(source->info().void_values, std::vector<double>{7.0});

@@ -50,7 +50,7 @@ TEST(ApplyOpenOptions, OverridesWhatTheFileSays) {
   SourceInfo info = sample_info(SampleType::kFloat32);
   OpenOptions options;
   options.registration = Registration::kPoint;
-  options.void_value = -9999.0;
+  options.void_values = {-9999.0};
   options.z_scale = 0.5;
   options.z_offset = 7.0;
   apply_open_options(info, options);
@@ -118,7 +118,7 @@ TEST(ApplyOpenOptions, RefusesValuesWithoutMeaning) {
   EXPECT_TRUE(refused([](OpenOptions& o) { o.z_scale = 0.0; }));
   EXPECT_TRUE(refused([](OpenOptions& o) { o.z_scale = std::numeric_limits<double>::infinity(); }));
   EXPECT_TRUE(refused([](OpenOptions& o) { o.z_offset = std::nan(""); }));
-  EXPECT_TRUE(refused([](OpenOptions& o) { o.void_value = -9999.0; }));
+  EXPECT_TRUE(refused([](OpenOptions& o) { o.void_values = {-9999.0}; }));
 }
 
 }  // namespace

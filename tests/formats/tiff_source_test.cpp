@@ -157,7 +157,7 @@ TEST_F(TiffSource, TakesVoidsAndScaleFromGdalTags) {
   EXPECT_TRUE(info.warnings.empty());
   OpenOptions options;
   options.z_scale = 3.0;
-  options.void_value = 5.0;
+  options.void_values = {5.0};
   EXPECT_EQ(info_of(tiff, options).z_scale, 3.0);
   EXPECT_EQ(info_of(tiff, options).void_values, Values{5});
 }

@@ -101,6 +101,38 @@ Json text_or_null(const std::string& text) {
   return text.empty() ? Json(nullptr) : Json(text);
 }
 
+/// JSON has no numbers that are not finite.
+Json voids_to_json(const SourceRecord& source) {
+  Json values = Json::array();
+  for (const double value : source.void_values) {
+    values.push_back(std::isfinite(value) ? Json(value) : Json(std::isnan(value) ? "nan" : value > 0 ? "inf" : "-inf"));
+  }
+  Json range = nullptr;
+  if (source.valid_range) range = {source.valid_range->first, source.valid_range->second};
+  return {{"values", values}, {"valid_range", range}, {"fill_distance", source.fill_distance}};
+}
+
+/// Archives of the first builds have none.
+void voids_from_json(const ObjectReader& json, SourceRecord& source) {
+  if (!json.has("voids")) return;
+  const ObjectReader voids = json.object("voids");
+  const auto number = [&](const Json& value) {
+    if (value.is_number()) return value.get<double>();
+    const std::string text = value.is_string() ? value.get<std::string>() : "";
+    if (text == "nan") return std::numeric_limits<double>::quiet_NaN();
+    if (text == "inf" || text == "-inf") return text == "inf" ? HUGE_VAL : -HUGE_VAL;
+    refuse(voids.path("values"), "holds something that is no number");
+  };
+  if (!voids.required("values").is_array()) refuse(voids.path("values"), "is no array");
+  for (const Json& value : voids.required("values")) source.void_values.push_back(number(value));
+  source.fill_distance = voids.integer("fill_distance", 0, std::numeric_limits<std::int32_t>::max());
+  if (!voids.has("valid_range")) return;
+  const Json& range = voids.required("valid_range");
+  const bool is_pair = range.is_array() && range.size() == 2 && range[0].is_number() && range[1].is_number();
+  if (!is_pair) refuse(voids.path("valid_range"), "is no array of two numbers");
+  source.valid_range = {range[0].get<double>(), range[1].get<double>()};
+}
+
 Json source_to_json(const SourceRecord& source) {
   Json json;
   json["name"] = source.name;
@@ -111,6 +143,7 @@ Json source_to_json(const SourceRecord& source) {
   json["channel"] = text_or_null(source.channel);
   json["z_scale"] = source.z_scale;
   json["z_offset"] = source.z_offset;
+  json["voids"] = voids_to_json(source);
   json["registration"] = source.registration;
   json["first_sample"] = {{"x", source.first_sample_x}, {"z", source.first_sample_z}};
   json["spacing"] = {{"x", source.spacing_x}, {"z", source.spacing_z}};
@@ -155,6 +188,7 @@ SourceRecord source_from_json(const ObjectReader& json) {
   source.channel = json.optional_text("channel");
   source.z_scale = json.optional_number("z_scale").value_or(1.0);
   source.z_offset = json.optional_number("z_offset").value_or(0.0);
+  voids_from_json(json, source);
   source.registration = json.text("registration");
   source.first_sample_x = json.object("first_sample").number("x");
   source.first_sample_z = json.object("first_sample").number("z");

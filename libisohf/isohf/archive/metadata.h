@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "isohf/lattice/tile_grid.h"
@@ -67,8 +68,11 @@ struct SourceRecord {
   std::string channel;
   double z_scale = 1;  ///< elevation = raw sample * z_scale + z_offset, in vertical units
   double z_offset = 0;
-  std::string registration;   ///< "area", "point": as used
-  double first_sample_x = 0;  ///< world place of sample (0, 0)
+  std::vector<double> void_values;                       ///< raw values that meant "no elevation"
+  std::optional<std::pair<double, double>> valid_range;  ///< elevations outside were void, by the user's choice
+  std::int64_t fill_distance = 0;  ///< voids up to so many samples from an elevation were filled; 0: none
+  std::string registration;        ///< "area", "point": as used
+  double first_sample_x = 0;       ///< world place of sample (0, 0)
   double first_sample_z = 0;
   double spacing_x = 1;  ///< world units between neighbouring columns and rows
   double spacing_z = 1;

@@ -117,7 +117,7 @@ ElevationRange measure_surface(const Conversion& job, const ElevationRange& limi
 
 }  // namespace
 
-void choose_codes(Conversion& job, std::vector<std::string>& warnings, const ProgressCallback& progress) {
+void choose_codes(Conversion& job, ConvertSummary& summary, const ProgressCallback& progress) {
   const SourceInfo& info = job.source.info();
   const QuantisationRequest request{job.options.code_type, job.options.step};
   if (job.options.z_range) {
@@ -135,8 +135,11 @@ void choose_codes(Conversion& job, std::vector<std::string>& warnings, const Pro
                 fmt::format("{}: all {} samples are void or not finite, there is no elevation to convert", info.path,
                             found.voids));
   }
-  warn_of_unit_range(info, found.range, warnings);
-  if (const std::string warning = survey.warning(); !warning.empty()) warnings.push_back(info.path + ": " + warning);
+  summary.source_voids = found.voids;
+  warn_of_unit_range(info, found.range, summary.warnings);
+  if (const std::string warning = survey.warning(); !warning.empty()) {
+    summary.warnings.push_back(info.path + ": " + warning);
+  }
   job.datum = choose_datum(info, found.range);
   if (job.plan.outside == Outside::kCover) found.range = edge.widen(found.range);
   job.quantisation = choose_quantisation(request, found.range, info);

@@ -65,6 +65,6 @@ struct Conversion {
 };
 
 /// The first pass over the source, where one is needed, and what follows from it: datum, scale and offset.
-void choose_codes(Conversion& job, std::vector<std::string>& warnings, const ProgressCallback& progress);
+void choose_codes(Conversion& job, ConvertSummary& summary, const ProgressCallback& progress);
 
 }  // namespace isohf

@@ -180,6 +180,12 @@ ConvertSummary convert(HeightSource& source, const std::string& output, const Co
   const oneapi::tbb::global_control workers(oneapi::tbb::global_control::max_allowed_parallelism,
                                             static_cast<std::size_t>(threads));
 
+  if (options.lossless && info.fill_distance > 0 && &source.as_stored() == &source) {
+    throw Error(ErrorCode::kInvalidArgument,
+                fmt::format("{}: --lossless keeps the samples as they were before --fill, which are out of reach "
+                            "behind --bbox, --wrap-x and --geoid; leave one of them out",
+                            info.path));
+  }
   ArchiveWriter writer(output, plan.grid,
                        {options.overwrite, options.resume, job_fingerprint(info, plan, options),
                         metadata_room(describe_job(info, plan, options, {}))});
@@ -193,7 +199,7 @@ ConvertSummary convert(HeightSource& source, const std::string& output, const Co
   try {
     oneapi::tbb::task_arena arena(threads);
     arena.execute([&] {
-      choose_codes(job, summary.warnings, progress);
+      choose_codes(job, summary, progress);
       if (options.shadow_seeds) {
         // Lengths of both kinds are compared as metres where both are known to be.
         const bool known = plan.frame.in_metres && !info.vertical_unit.empty();
@@ -204,7 +210,7 @@ ConvertSummary convert(HeightSource& source, const std::string& output, const Co
       if (options.lossless) {
         ProgressMeter meter(progress, ConvertProgress::Pass::kResiduals, info.height);
         lossless = write_residuals(
-            source, plan.frame, plan.grid, job.quantisation, memory.members_at_once, writer,
+            source.as_stored(), plan.frame, plan.grid, job.quantisation, memory.members_at_once, writer,
             [&](std::int64_t rows) { meter.report(rows, writer.bytes_written()); }, cancel);
       }
     });

@@ -87,8 +87,9 @@ struct ConvertSummary {
   std::uint64_t archive_bytes = 0;
   std::uint64_t residual_bytes = 0;  ///< of these, residuals; 0 where not lossless
   std::uint64_t source_samples = 0;
-  std::uint64_t lattice_samples = 0;  ///< C*R for every tile
-  double step = 0.0;                  ///< elevation of one code
+  std::optional<std::int64_t> source_voids;  ///< of these, void; nullopt where the first pass was spared (z_range)
+  std::uint64_t lattice_samples = 0;         ///< C*R for every tile
+  double step = 0.0;                         ///< elevation of one code
   double worst_rounding = 0.0;
   std::uint64_t tile_bytes = 0;  ///< of all tiles, compressed
   std::uint64_t seed_bytes = 0;  ///< of shadow seeds, compressed

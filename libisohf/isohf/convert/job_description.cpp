@@ -22,6 +22,9 @@ SourceRecord record_of(const SourceInfo& info, const SourceFrame& frame, const S
   record.channel = info.channel;
   record.z_scale = info.z_scale;
   record.z_offset = info.z_offset;
+  record.void_values = info.void_values;
+  record.valid_range = info.valid_range;
+  record.fill_distance = info.fill_distance;
   record.registration = to_string(frame.registration);
   record.first_sample_x = frame.first_sample_x;
   record.first_sample_z = frame.first_sample_z;
@@ -49,6 +52,11 @@ SourceRecord record_of(const SourceInfo& info, const SourceFrame& frame, const S
   return record;
 }
 
+std::string describe_voids(const SourceInfo& info) {
+  return fmt::format("[{}] {}:{} fill {}", fmt::join(info.void_values, " "), info.valid_min, info.valid_max,
+                     info.fill_distance);
+}
+
 std::string heights_fingerprint(const SourceInfo& info, const Plan& plan, const ConvertOptions& options) {
   std::error_code ignored;
   const auto size = std::filesystem::file_size(info.path, ignored);
@@ -61,8 +69,7 @@ std::string heights_fingerprint(const SourceInfo& info, const Plan& plan, const 
       "spacing {} {} {} | {} range {} step {} clamp {} | {} {} | level {} | seeds {}",
       options.producer, std::filesystem::path(info.path).filename().string(), ignored ? 0 : size,
       known ? status.st_mtim.tv_sec : 0, known ? status.st_mtim.tv_nsec : 0, info.width, info.height,
-      to_string(info.sample_type), info.channel, info.z_scale, info.z_offset,
-      info.void_values.empty() ? std::string("none") : fmt::format("{}", info.void_values.front()), shape.columns(),
+      to_string(info.sample_type), info.channel, info.z_scale, info.z_offset, describe_voids(info), shape.columns(),
       shape.rows(), shape.levels(), plan.grid.tile_columns(), plan.grid.tile_rows(), plan.grid.extent_x(),
       plan.grid.extent_z(), plan.frame.first_sample_x, plan.frame.first_sample_z, plan.frame.spacing_x,
       plan.frame.spacing_z, to_string(plan.outside), to_string(options.code_type),

@@ -41,6 +41,9 @@ class HeightSource {
   /// How many bytes are kept at most once that was asked; more where the source cannot do with so few, 0 where there
   /// are none to speak of.
   [[nodiscard]] virtual std::uint64_t buffer_bytes(std::uint64_t /*limit*/) const { return 0; }
+
+  /// The source whose samples are the file's own: this one, or what it is made of where it changes them.
+  [[nodiscard]] virtual HeightSource& as_stored() { return *this; }
 };
 
 /// Raw samples -> elevations, relative to `datum`: float(raw * z_scale + z_offset - datum), NaN where void.

@@ -5,6 +5,7 @@
 #include <limits>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace isohf {
@@ -54,6 +55,21 @@ struct Georeference {
   ReferenceSystem system;
 };
 
+/// How far voids are filled, in samples: where nothing else is said, and at most.
+inline constexpr std::int64_t kDefaultFillDistance = 100;
+inline constexpr std::int64_t kMaxFillDistance = 4096;
+
+/// What is to become of voids, and of samples that should be some.
+struct VoidTreatment {
+  std::optional<std::pair<double, double>> valid_range;  ///< elevations outside are void
+  bool fill = false;
+  std::optional<std::int64_t> fill_distance;  ///< 1 to kMaxFillDistance samples; fills, whatever `fill` says
+
+  /// How far voids are filled; 0: none are.
+  [[nodiscard]] std::int64_t distance() const { return fill_distance.value_or(fill ? kDefaultFillDistance : 0); }
+  [[nodiscard]] bool does_anything() const { return valid_range || distance() > 0; }
+};
+
 /// All that is known of a raster of elevations before a sample is read.
 struct SourceInfo {
   std::string path;         ///< for messages
@@ -66,6 +82,10 @@ struct SourceInfo {
   /// Raw values outside [valid_min, valid_max] are void as well (special pixel ranges); infinite where unbounded.
   double valid_min = -std::numeric_limits<double>::infinity();
   double valid_max = std::numeric_limits<double>::infinity();
+  /// What a FilledSource was asked to do, for the record: elevations outside are void; voids up to so many samples from
+  /// an elevation are filled, 0: none.
+  std::optional<std::pair<double, double>> valid_range;
+  std::int64_t fill_distance = 0;
   double z_scale = 1.0;  ///< elevation = raw * z_scale + z_offset, in vertical units
   double z_offset = 0.0;
   std::string vertical_unit;  ///< "metre", "foot", ...; empty where unknown
