@@ -43,7 +43,7 @@ class AsciiGrid : public ::testing::Test {
 
   [[nodiscard]] std::string write(const std::string& text, const std::string& name = "grid.asc") const {
     std::filesystem::remove(folder_ / name);
-    write_bytes(folder_ / name, text.data(), text.size());
+    write_bytes(folder_ / name, {text.data(), text.size()});
     return folder_ / name;
   }
 

@@ -335,7 +335,7 @@ TEST(ExrSource, ReadsPartsOfAMultiPartFile) {
   EXPECT_THAT(error_of([&] { (void)open_exr(path, wrong); }).what(), HasSubstr("has no part \"sky\""));
   wrong.part = "3";
   EXPECT_THAT(error_of([&] { (void)open_exr(path, wrong); }).what(), HasSubstr("in parts 0...2"));
-  write_bytes(folder / "a.asc", "ncols 1\nnrows 1\n1\n", 20);
+  write_bytes(folder / "a.asc", "ncols 1\nnrows 1\n1\n");
   EXPECT_THAT(error_of([&] { (void)open_source(folder / "a.asc", wrong); }).what(), HasSubstr("--part is for OpenEXR"));
 }
 
@@ -386,7 +386,7 @@ TEST(ExrSource, ReportsEveryTruncation) {
     const auto bytes = file_bytes(path);
     const std::string cut = folder / "cut.exr";
     for (std::size_t length = 0; length < bytes.size(); length += length < 700 ? 1 : 7) {
-      write_bytes(cut, bytes.data(), length);
+      write_bytes(cut, {bytes.data(), length});
       SCOPED_TRACE(fmt::format("{} of {} bytes", length, bytes.size()));
       expect_right_or_refused(cut, samples.plane(0));
     }
@@ -405,7 +405,7 @@ TEST(ExrSource, SurvivesEveryHeaderByteWrong) {
     for (const char wrong : {'\0', '\x01', '\x7F', '\xFF'}) {
       auto changed = bytes;
       changed[at] = wrong;
-      write_bytes(bad, changed.data(), changed.size());
+      write_bytes(bad, {changed.data(), changed.size()});
       try {
         // Other samples may come out (a header says what the bytes mean); a crash or another exception must not.
         (void)read_whole(*open_exr(bad, {}));
@@ -427,7 +427,7 @@ TEST(ExrSource, RefusesAbsurdSizesBeforeAllocating) {
     const std::string text(changed.begin(), changed.end());
     const std::size_t at = text.find(attribute) + skip;
     std::memcpy(changed.data() + at, values.data(), values.size() * 4);
-    write_bytes(path, changed.data(), changed.size());
+    write_bytes(path, {changed.data(), changed.size()});
     return error_of([&] { (void)open_exr(path, {}); });
   };
   constexpr std::int32_t kHuge = 0x3FFFFFFF;

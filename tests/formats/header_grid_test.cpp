@@ -22,7 +22,7 @@ class HeaderGrid : public ::testing::Test {
  protected:
   void write(const std::string& name, const std::string& text) const {
     std::filesystem::remove(folder_ / name);
-    write_bytes(folder_ / name, text.data(), text.size());
+    write_bytes(folder_ / name, {text.data(), text.size()});
   }
 
   [[nodiscard]] std::unique_ptr<HeightSource> open(const std::string& header, const std::string& data,

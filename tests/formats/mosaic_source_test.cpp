@@ -105,7 +105,7 @@ TEST(MosaicSource, DegreeTilesShareTheirPosts) {
         }
       }
       const std::string name = "N" + std::to_string(45 - row) + "E00" + std::to_string(6 + column) + ".hgt";
-      write_bytes(folder / name, bytes.data(), bytes.size());
+      write_bytes(folder / name, {bytes.data(), bytes.size()});
     }
   }
   const auto mosaic =
@@ -126,7 +126,7 @@ TEST(MosaicSource, BothSidesOfThe180thMeridianJoin) {
   for (const auto& [name, value] : {std::pair("N10E179.hgt", 1), std::pair("N10W180.hgt", 2)}) {
     std::string bytes;
     for (int i = 0; i < 11 * 11; ++i) bytes += {'\0', static_cast<char>(value)};
-    write_bytes(folder / name, bytes.data(), bytes.size());
+    write_bytes(folder / name, {bytes.data(), bytes.size()});
   }
   const auto mosaic = open_mosaic({folder / "N10W180.hgt", folder / "N10E179.hgt"});
   EXPECT_EQ(mosaic->info().width, 21);
@@ -145,7 +145,7 @@ TEST(MosaicSource, MissingTilesAreVoidAndNamed) {
     std::string bytes;
     for (int i = 0; i < 11 * 11; ++i) bytes += {'\1', '\0'};
     paths.push_back(folder / name);
-    write_bytes(paths.back(), bytes.data(), bytes.size());
+    write_bytes(paths.back(), {bytes.data(), bytes.size()});
   }
   const auto mosaic = open_mosaic(paths);
   const MosaicHoles& holes = mosaic->plan().holes;

@@ -31,7 +31,7 @@ class OiioModule : public ::testing::Test {
       }
     }
     const std::string path = folder_ / "ground.pgm";
-    write_bytes(path, bytes.data(), bytes.size());
+    write_bytes(path, {bytes.data(), bytes.size()});
     return path;
   }
 
@@ -40,7 +40,7 @@ class OiioModule : public ::testing::Test {
     std::string bytes = "P6\n4 2\n255\n";
     for (char value = 0; value < 24; ++value) bytes.push_back(value);
     const std::string path = folder_ / "colours.ppm";
-    write_bytes(path, bytes.data(), bytes.size());
+    write_bytes(path, {bytes.data(), bytes.size()});
     return path;
   }
 
@@ -105,13 +105,13 @@ TEST_F(OiioModule, ReportsTruncationAndForeignFilesInOneLine) {
   const auto bytes = file_bytes(whole);
   const std::string cut = folder_ / "cut.pgm";
   for (std::size_t length = 1; length < bytes.size(); length += 13) {
-    write_bytes(cut, bytes.data(), length);
+    write_bytes(cut, {bytes.data(), length});
     const Error error = error_of([&] { (void)read_whole(*open_source(cut, {})); });
     EXPECT_THAT(error.what(), HasSubstr(cut));
     EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos) << error.what();
   }
   const std::string text = folder_ / "notes.txt";
-  write_bytes(text, "this is no raster", 17);
+  write_bytes(text, "this is no raster");
   const Error error = error_of([&] { (void)open_source(text, {}); });
   EXPECT_EQ(error.code(), ErrorCode::kUnsupported);
   EXPECT_THAT(error.what(), HasSubstr("unknown format; read natively: OpenEXR (.exr)"));

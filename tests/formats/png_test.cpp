@@ -310,7 +310,7 @@ TEST(PngSource, ReportsEveryTruncation) {
     write_picture(path, picture);
     const auto bytes = file_bytes(path);
     for (std::size_t length = 0; length < bytes.size(); ++length) {
-      write_bytes(cut, bytes.data(), length);
+      write_bytes(cut, {bytes.data(), length});
       SCOPED_TRACE(fmt::format("{} of {} bytes", length, bytes.size()));
       const Error error = error_of([&] { (void)read_whole(*open_png(cut, {})); });
       EXPECT_EQ(error.code(), ErrorCode::kCorrupt);
@@ -327,7 +327,7 @@ TEST(PngSource, NamesTheRowThatIsMissingAndReadsTheOnesBefore) {
   picture.height = 400;
   write_picture(path, picture);
   const auto bytes = file_bytes(path);
-  write_bytes(path, bytes.data(), bytes.size() * 9 / 10);
+  write_bytes(path, {bytes.data(), bytes.size() * 9 / 10});
   const auto source = open_png(path, {});
   EXPECT_THAT(error_of([&] { (void)read_whole(*source); }).what(), HasSubstr("PNG row "));
   const Window top = {0, 0, picture.width, 5};
@@ -347,7 +347,7 @@ TEST(PngSource, NeverDeliversASampleThatAFlippedBitChanged) {
     for (std::size_t at = 8; at < bytes.size(); ++at) {
       auto changed = bytes;
       changed[at] = static_cast<char>(changed[at] ^ 0x10);
-      write_bytes(path, changed.data(), changed.size());
+      write_bytes(path, {changed.data(), changed.size()});
       try {
         EXPECT_EQ(read_whole(*open_png(path, {})), expected_whole(picture)) << "byte " << at;
       } catch (const Error& error) {
@@ -374,7 +374,7 @@ void write_header_only(const std::string& path, std::uint32_t width, std::uint32
   put(~crc);
   for (const char c : std::string("\0\0\0\0IDAT", 8)) bytes.push_back(static_cast<unsigned char>(c));
   put(0x35AF061EU);
-  write_bytes(path, reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  write_bytes(path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
 }
 
 TEST(PngSource, RefusesAbsurdSizesBeforeAllocating) {

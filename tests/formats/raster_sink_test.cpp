@@ -227,7 +227,7 @@ TEST(RasterSink, WritesSidecarsWithTheRasterOrNotAtAll) {
   EXPECT_TRUE(std::filesystem::exists(folder / "a.hdr"));
   EXPECT_TRUE(std::filesystem::exists(folder / "a.prj"));
   write(folder / "a.asc", spec, noise(spec), 4);  // the .prj is there already, and the same
-  write_bytes(folder / "b.hdr", "mine", 4);
+  write_bytes(folder / "b.hdr", "mine");
   const Error error = error_of([&] { (void)create_raster(folder / "b.flt", spec); });
   EXPECT_EQ(error.what(), folder / "b.flt: " + (folder / "b.hdr: exists already (--overwrite replaces it)"));
   EXPECT_EQ(file_bytes(folder / "b.hdr"), (std::vector<char>{'m', 'i', 'n', 'e'}));
@@ -250,8 +250,8 @@ TEST(RasterSink, RefusesADescriptionThatIsWrong) {
   const std::string good = R"({"width": 2, "height": 2, "sample_type": "uint16", "byte_order": "little")";
   const auto says = [&](const std::string& json) {
     std::filesystem::remove(path + ".json");
-    write_bytes(path, "12345678", 8);
-    write_bytes(path + ".json", json.data(), json.size());
+    write_bytes(path, "12345678");
+    write_bytes(path + ".json", {json.data(), json.size()});
     const Error error = error_of([&] { (void)open_source(path, {}); });
     EXPECT_EQ(error.code(), ErrorCode::kCorrupt);
     return std::string(error.what());

@@ -24,7 +24,7 @@ OpenOptions raw(const std::string& layout) {
 std::string write(const ScratchFolder& folder, const std::string& name, std::size_t bytes) {
   std::vector<char> data(bytes);
   for (std::size_t i = 0; i < bytes; ++i) data[i] = static_cast<char>(i * 37 + 5);
-  write_bytes(folder / name, data.data(), data.size());
+  write_bytes(folder / name, {data.data(), data.size()});
   return folder / name;
 }
 
@@ -139,7 +139,7 @@ TEST(RawSource, AsksForALayoutByName) {
 
 TEST(RawSource, GoesBeforeNameAndContent) {
   const ScratchFolder folder;
-  write_bytes(folder / "a.png", "\x89PNG\r\n\x1A\n", 8);
+  write_bytes(folder / "a.png", "\x89PNG\r\n\x1A\n");
   EXPECT_EQ(open_source(folder / "a.png", raw("2x2:u16be"))->info().format, "raw samples");
   OpenOptions channel = raw("2x2:u16be");
   channel.channel = "1";
@@ -149,7 +149,7 @@ TEST(RawSource, GoesBeforeNameAndContent) {
 TEST(RawSource, TakesFloatsBeyondAnyHeightAsVoid) {
   const ScratchFolder folder;
   const std::array<float, 4> samples = {1.0F, -3.4e38F, NAN, 8848.0F};
-  write_bytes(folder / "a.f32", reinterpret_cast<const char*>(samples.data()), sizeof(samples));
+  write_bytes(folder / "a.f32", {reinterpret_cast<const char*>(samples.data()), sizeof(samples)});
   const auto source = open_source(folder / "a.f32", raw("4x1:f32le"));
   const auto read = read_whole(*source);
   for (std::size_t i = 0; i < 4; ++i) {

@@ -33,7 +33,7 @@ TEST(OpenSource, NamesWhatIsWrongWithAPath) {
   EXPECT_THAT(refusal(folder / ".").what(), HasSubstr("is a folder"));
 
   const std::string empty = folder / "empty.tif";
-  write_bytes(empty, "", 0);
+  write_bytes(empty, "");
   EXPECT_EQ(refusal(empty).code(), ErrorCode::kCorrupt);
   EXPECT_EQ(refusal(empty).what(), empty + ": is empty (0 bytes)");
 
@@ -46,7 +46,7 @@ TEST(OpenSource, ReportsAFileThatMayNotBeRead) {
   if (::geteuid() == 0) GTEST_SKIP() << "root may read everything";
   const ScratchFolder folder;
   const std::string path = folder / "secret.exr";
-  write_bytes(path, "abcdefgh", 8);
+  write_bytes(path, "abcdefgh");
   ASSERT_EQ(::chmod(path.c_str(), 0), 0);
   EXPECT_EQ(refusal(path).code(), ErrorCode::kIo);
   EXPECT_THAT(refusal(path).what(), HasSubstr("cannot be opened: Permission denied"));
@@ -56,7 +56,7 @@ TEST(OpenSource, ListsWhatIsReadWhenTheFormatIsUnknown) {
   const ScratchFolder folder;
   for (const char* name : {"notes.txt", "no_extension", "wrong.exr"}) {
     const std::string path = folder / name;
-    write_bytes(path, "this is no raster", 17);
+    write_bytes(path, "this is no raster");
     const Error error = refusal(path);
     EXPECT_EQ(error.code(), ErrorCode::kUnsupported);
     EXPECT_THAT(error.what(), HasSubstr("unknown format"));
@@ -132,17 +132,17 @@ TEST(Formats, ListEveryExtensionThatIsWritten) {
 TEST(Formats, TheOneOfAFileIsFoundWithoutOpeningIt) {
   const ScratchFolder folder;
   const std::string path = folder / "a.raw";
-  write_bytes(path, "0123456789abcdef", 16);
+  write_bytes(path, "0123456789abcdef");
   ASSERT_NE(native_format_of(path, {}), nullptr);
   EXPECT_EQ(std::string(native_format_of(path, {})->name), "raw samples");
   const std::string tiff = folder / "b.raw";  // the content decides
-  write_bytes(tiff, "II*\0\10\0\0\0", 8);
+  write_bytes(tiff, std::string_view("II*\0\10\0\0\0", 8));
   EXPECT_EQ(std::string(native_format_of(tiff, {})->name), "TIFF");
   OpenOptions raw;
   raw.raw = RawLayout{4, 4, SampleType::kUint8, false};
   EXPECT_EQ(std::string(native_format_of(tiff, raw)->name), "raw samples");
   const std::string other = folder / "c.txt";
-  write_bytes(other, "what is this", 12);
+  write_bytes(other, "what is this");
   EXPECT_EQ(native_format_of(other, {}), nullptr);
 }
 
