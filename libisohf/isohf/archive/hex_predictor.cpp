@@ -8,19 +8,31 @@ namespace {
 
 constexpr int kHalvesBits = kWeightBits - 1;
 
+template <std::size_t kTerms, typename Wide, typename Unsigned>
+struct WeightedRows {
+  std::array<Unsigned, kTerms> w{};
+  std::array<const Wide*, kTerms> from{};
+  Unsigned anchor = 1U << kWeightBits;  ///< the weight of North, so that all weights sum up to 1
+};
+
+template <std::size_t kTerms, typename Wide, typename Unsigned>
+[[gnu::always_inline]] inline WeightedRows<kTerms, Wide, Unsigned> weighted_rows(const Neighbours<Wide>& at,
+                                                                                 const PredictorWeights& weights) {
+  WeightedRows<kTerms, Wide, Unsigned> rows;
+  for (std::size_t i = 0; i < kTerms; ++i) {
+    rows.w[i] = static_cast<Unsigned>(Wide{weights[i]});
+    rows.from[i] = at.of_weight(i);
+    rows.anchor -= rows.w[i];
+  }
+  return rows;
+}
+
 /// `out` is none of the lattice's rows; the compiler has to be told so, or it does not vectorise. Sums of codes are
 /// taken modulo 2^32, which they leave in part but not in whole.
 template <std::size_t kTerms, typename Wide, typename Unsigned>
 [[gnu::always_inline]] inline void predict_places(const Neighbours<Wide>& at, const PredictorWeights& weights,
                                                   int begin, int end, Wide low, Wide high, Wide* __restrict out) {
-  std::array<Unsigned, kTerms> w{};
-  std::array<const Wide*, kTerms> from{};
-  Unsigned anchor = 1U << kWeightBits;
-  for (std::size_t i = 0; i < kTerms; ++i) {
-    w[i] = static_cast<Unsigned>(Wide{weights[i]});
-    from[i] = at.of_weight(i);
-    anchor -= w[i];
-  }
+  const auto [w, from, anchor] = weighted_rows<kTerms, Wide, Unsigned>(at, weights);
   const Wide least = 2 * low;
   const Wide most = 2 * high - 1;
   for (int c = begin; c < end; ++c) {
@@ -62,14 +74,7 @@ ISOHF_VECTORISED(void, predict_floats_widely,
 template <std::size_t kTerms, typename Wide, typename Unsigned>
 [[gnu::always_inline]] inline void sum_above(const Neighbours<Wide>& at, const PredictorWeights& weights, int begin,
                                              int end, Wide* __restrict out) {
-  std::array<Unsigned, kTerms> w{};
-  std::array<const Wide*, kTerms> from{};
-  Unsigned anchor = 1U << kWeightBits;
-  for (std::size_t i = 0; i < kTerms; ++i) {
-    w[i] = static_cast<Unsigned>(Wide{weights[i]});
-    from[i] = at.of_weight(i);
-    anchor -= w[i];
-  }
+  const auto [w, from, anchor] = weighted_rows<kTerms, Wide, Unsigned>(at, weights);
   for (int c = begin; c < end; ++c) {
     Unsigned sum = anchor * static_cast<Unsigned>(at.north[c]);
     for (std::size_t i = 1; i < kTerms; ++i) {
