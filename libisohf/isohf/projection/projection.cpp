@@ -11,7 +11,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <optional>
+#include <type_traits>
 
 #include "isohf/base/error.h"
 
@@ -36,6 +36,8 @@ double MapScale::error() const {
 class Projection::Map {
  public:
   explicit Map(const ProjectionSpec& map_spec) : spec(map_spec) {}
+  /// Throws where the parameters make no map.
+  [[nodiscard]] static std::shared_ptr<const Map> make(const ProjectionSpec& spec);
   virtual ~Map() = default;
   Map(const Map&) = delete;
   Map& operator=(const Map&) = delete;
@@ -48,9 +50,8 @@ class Projection::Map {
 
   class Equirectangular;
   class Local;
-  class TransverseMercator;
-  class LambertConformal;
-  class PolarStereographic;
+  template <typename Library, typename Side>
+  class Conformal;
 };
 
 class Projection::Map::Equirectangular final : public Map {
@@ -103,22 +104,27 @@ class Projection::Map::Local final : public Map {
   GeographicLib::AzimuthalEquidistant map_;
 };
 
-class Projection::Map::TransverseMercator final : public Map {
+/// One of GeographicLib's conformal maps, whose functions are called alike. `Side` is what they take first: the
+/// longitude in the middle, or whether the pole is the North one.
+template <typename Library, typename Side>
+class Projection::Map::Conformal final : public Map {
  public:
-  explicit TransverseMercator(const ProjectionSpec& map_spec)
-      : Map(map_spec), map_(spec.ellipsoid.semi_major_axis_m, spec.ellipsoid.flattening(), spec.scale_0) {
-    double x = 0.0;
-    map_.Forward(0.0, spec.latitude_0, 0.0, x, northing_0_);
+  Conformal(const ProjectionSpec& map_spec, const Library& map, Side side) : Map(map_spec), map_(map), side_(side) {
+    // Around a pole, latitude_0 has no meaning.
+    if constexpr (!std::is_same_v<Side, bool>) {
+      double x = 0.0;
+      map_.Forward(side_, spec.latitude_0, 0.0, x, northing_0_);
+    }
   }
   [[nodiscard]] MapPoint forward(double longitude, double latitude) const override {
     MapPoint at;
-    map_.Forward(0.0, latitude, longitude, at.easting, at.northing);
+    map_.Forward(side_, latitude, longitude, at.easting, at.northing);
     at.northing -= northing_0_;
     return at;
   }
   [[nodiscard]] GeoPoint inverse(double x, double y) const override {
     GeoPoint at;
-    map_.Reverse(0.0, x, y + northing_0_, at.latitude, at.longitude);
+    map_.Reverse(side_, x, y + northing_0_, at.latitude, at.longitude);
     return at;
   }
   [[nodiscard]] MapScale scale(double longitude, double latitude) const override {
@@ -126,102 +132,47 @@ class Projection::Map::TransverseMercator final : public Map {
     double y = 0.0;
     double gamma = 0.0;
     double k = 1.0;
-    map_.Forward(0.0, latitude, longitude, x, y, gamma, k);
+    map_.Forward(side_, latitude, longitude, x, y, gamma, k);
     return {k, k};
   }
 
  private:
-  GeographicLib::TransverseMercator map_;
+  Library map_;
+  Side side_;
   double northing_0_ = 0.0;
 };
 
-class Projection::Map::LambertConformal final : public Map {
- public:
-  explicit LambertConformal(const ProjectionSpec& map_spec)
-      : Map(map_spec),
-        map_(spec.ellipsoid.semi_major_axis_m, spec.ellipsoid.flattening(), spec.parallel_1, spec.parallel_2, 1.0) {
-    double x = 0.0;
-    map_.Forward(0.0, spec.latitude_0, 0.0, x, northing_0_);
+std::shared_ptr<const Projection::Map> Projection::Map::make(const ProjectionSpec& spec) {
+  const double radius_m = spec.ellipsoid.semi_major_axis_m;
+  const double flattening = spec.ellipsoid.flattening();
+  const auto conformal = [&spec]<typename Library, typename Side>(const Library& map, Side side) {
+    return std::make_shared<Conformal<Library, Side>>(spec, map, side);
+  };
+  switch (spec.kind) {
+    case ProjectionKind::kEquirectangular:
+      return std::make_shared<Equirectangular>(spec);
+    case ProjectionKind::kLocal:
+      return std::make_shared<Local>(spec);
+    case ProjectionKind::kTransverseMercator:
+    case ProjectionKind::kUtm:
+      return conformal(GeographicLib::TransverseMercator(radius_m, flattening, spec.scale_0), 0.0);
+    case ProjectionKind::kLambertConformal:
+      return conformal(
+          GeographicLib::LambertConformalConic(radius_m, flattening, spec.parallel_1, spec.parallel_2, 1.0), 0.0);
+    case ProjectionKind::kPolarStereographic: {
+      GeographicLib::PolarStereographic map(radius_m, flattening, 1.0);
+      map.SetScale(std::abs(spec.parallel_1), 1.0);
+      return conformal(map, spec.parallel_1 > 0.0);
+    }
+    case ProjectionKind::kNone:
+      break;
   }
-  [[nodiscard]] MapPoint forward(double longitude, double latitude) const override {
-    MapPoint at;
-    map_.Forward(0.0, latitude, longitude, at.easting, at.northing);
-    at.northing -= northing_0_;
-    return at;
-  }
-  [[nodiscard]] GeoPoint inverse(double x, double y) const override {
-    GeoPoint at;
-    map_.Reverse(0.0, x, y + northing_0_, at.latitude, at.longitude);
-    return at;
-  }
-  [[nodiscard]] MapScale scale(double longitude, double latitude) const override {
-    double x = 0.0;
-    double y = 0.0;
-    double gamma = 0.0;
-    double k = 1.0;
-    map_.Forward(0.0, latitude, longitude, x, y, gamma, k);
-    return {k, k};
-  }
-
- private:
-  GeographicLib::LambertConformalConic map_;
-  double northing_0_ = 0.0;
-};
-
-class Projection::Map::PolarStereographic final : public Map {
- public:
-  explicit PolarStereographic(const ProjectionSpec& map_spec)
-      : Map(map_spec),
-        map_(spec.ellipsoid.semi_major_axis_m, spec.ellipsoid.flattening(), 1.0),
-        is_north_(spec.parallel_1 > 0.0) {
-    map_.SetScale(std::abs(spec.parallel_1), 1.0);
-  }
-  [[nodiscard]] MapPoint forward(double longitude, double latitude) const override {
-    MapPoint at;
-    map_.Forward(is_north_, latitude, longitude, at.easting, at.northing);
-    return at;
-  }
-  [[nodiscard]] GeoPoint inverse(double x, double y) const override {
-    GeoPoint at;
-    map_.Reverse(is_north_, x, y, at.latitude, at.longitude);
-    return at;
-  }
-  [[nodiscard]] MapScale scale(double longitude, double latitude) const override {
-    double x = 0.0;
-    double y = 0.0;
-    double gamma = 0.0;
-    double k = 1.0;
-    map_.Forward(is_north_, latitude, longitude, x, y, gamma, k);
-    return {k, k};
-  }
-
- private:
-  GeographicLib::PolarStereographic map_;
-  bool is_north_;
-};
+  throw Error(ErrorCode::kInvalidArgument, "projection none makes no map");
+}
 
 Projection::Projection(const ProjectionSpec& spec) {
   try {
-    switch (spec.kind) {
-      case ProjectionKind::kEquirectangular:
-        map_ = std::make_shared<Map::Equirectangular>(spec);
-        break;
-      case ProjectionKind::kLocal:
-        map_ = std::make_shared<Map::Local>(spec);
-        break;
-      case ProjectionKind::kTransverseMercator:
-      case ProjectionKind::kUtm:
-        map_ = std::make_shared<Map::TransverseMercator>(spec);
-        break;
-      case ProjectionKind::kLambertConformal:
-        map_ = std::make_shared<Map::LambertConformal>(spec);
-        break;
-      case ProjectionKind::kPolarStereographic:
-        map_ = std::make_shared<Map::PolarStereographic>(spec);
-        break;
-      case ProjectionKind::kNone:
-        throw Error(ErrorCode::kInvalidArgument, "projection none makes no map");
-    }
+    map_ = Map::make(spec);
   } catch (const std::exception& error) {
     throw Error(ErrorCode::kInvalidArgument, fmt::format("projection {}: {}", to_string(spec.kind), error.what()));
   }
