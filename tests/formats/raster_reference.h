@@ -11,11 +11,11 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "isohf/base/error.h"
 #include "isohf/surface/height_source.h"
+#include "support/write_bytes.h"
 
 /// What the tests of raster readers share: scratch folders, whole-raster reads, and the reference values of real files.
 namespace isohf::testing {
@@ -42,11 +42,6 @@ class ScratchFolder {
 inline std::vector<char> file_bytes(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
   return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-}
-
-inline void write_bytes(const std::string& path, std::string_view bytes) {
-  std::ofstream file(path, std::ios::binary | std::ios::trunc);
-  file.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
 }
 
 inline std::vector<std::byte> read_window(HeightSource& source, const Window& window) {

@@ -5,18 +5,14 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <fstream>
 #include <string>
 #include <vector>
 
 #include "isohf/base/error.h"
 #include "isohf/surface/height_source.h"
+#include "support/write_bytes.h"
 
 namespace isohf::testing {
-
-inline void write_bytes(const std::string& path, const std::string& bytes) {
-  std::ofstream(path, std::ios::binary).write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-}
 
 /// Reads the North-West corner, 512 x 64 samples at most.
 inline void read_corner(HeightSource& source) {
