@@ -21,7 +21,8 @@ isohf_build() {
   log=$folder/last_build.log
   if [[ ! -f $folder/build.ninja ]]; then
     local launcher=()
-    command -v ccache >/dev/null && launcher=(-DCMAKE_CXX_COMPILER_LAUNCHER=ccache)
+    command -v ccache >/dev/null &&
+      launcher=(-DCMAKE_CXX_COMPILER_LAUNCHER=ccache -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON)
     (cd "$root" && cmake --preset "$preset" "${launcher[@]}") >"$log" 2>&1 || { cat "$log" >&2; return 1; }
   fi
   [[ -f $folder/.ninja_log ]] || echo "isohf: building ${folder#"$root"/}; the first time takes some minutes" >&2
