@@ -21,8 +21,7 @@ std::optional<Georeference> place_from_tags(const std::string& path, std::int64_
   const RawFile file(path);
   std::array<std::byte, 4> head{};
   if (file.read_some(0, head) != head.size() || !looks_like_tiff(head)) return std::nullopt;
-  TiffHandle handle(file, read_directories(file).main, false);
-  const GeoTiffPlace place = place_from_geotiff(handle.read_tags().geo, rows);
+  const GeoTiffPlace place = place_from_geotiff(open_main_image(file).handle->read_tags().geo, rows);
   if (!place.placed || !place.georeference.has_origin) return std::nullopt;
   if (place.rows_from_south) refuse_south_up();
   return place.georeference;

@@ -73,15 +73,14 @@ struct TiffBlocks::Unit {
   ErrorCode code = ErrorCode::kCorrupt;
 };
 
-TiffBlocks::TiffBlocks(const RawFile& file, const TiffLayout& layout, std::uint32_t directory, int channel)
+TiffBlocks::TiffBlocks(const RawFile& file, const TiffLayout& layout, TiffMainImage image, int channel)
     : file_(file),
       layout_(layout),
-      directory_(directory),
+      directory_(image.directories.main),
       channel_(channel),
       plane_(layout.separate ? channel : 0),
       sample_bytes_(static_cast<std::size_t>(layout.sample_bytes())),
-      handles_(file, directory),
-      spans_(handles_.take()) {
+      handles_(file, directory_) {
   const std::uint64_t pixel_bytes = to_unsigned(layout_.interleaved() * layout_.sample_bytes());
   // Sizes below stay under 2^63: each factor is a 32-bit number, and the products are checked one by one.
   const std::uint64_t row_bytes = to_unsigned(layout_.block_width) * pixel_bytes;
@@ -104,11 +103,12 @@ TiffBlocks::TiffBlocks(const RawFile& file, const TiffLayout& layout, std::uint3
                             layout_.tiled ? "tiles" : "strips", layout_.table_entries, per_plane * planes));
   }
   block_count_ = per_plane;
-  check_blocks();
+  check_blocks(*image.handle);
   choose_mode(block_bytes);
+  handles_.give_back(std::move(image.handle));
 }
 
-void TiffBlocks::check_blocks() {
+void TiffBlocks::check_blocks(TiffHandle& handle) {
   const std::uint64_t first = layout_.block_index(plane_, 0, 0);
   const std::uint64_t expansion = largest_expansion(layout_.compression);
   const std::uint64_t row_bytes =
@@ -117,7 +117,7 @@ void TiffBlocks::check_blocks() {
   std::uint64_t largest = 0;
   for (std::uint64_t i = 0; i < block_count_; ++i) {
     if (block_count_ > kMostCheckedBlocks && i == kMostCheckedBlocks / 2) i = block_count_ - kMostCheckedBlocks / 2;
-    const TiffBlockSpan span = spans_->block_span(first + i);
+    const TiffBlockSpan span = handle.block_span(first + i);
     if (span.size_bytes == 0) {
       ++missing_;
       continue;
@@ -220,23 +220,25 @@ void TiffBlocks::read(const Window& window, std::span<std::byte> samples) {
 void TiffBlocks::read_direct(const Window& window, std::span<std::byte> samples) {
   const std::size_t out_row_bytes = to_unsigned(window.columns) * sample_bytes_;
   const std::int64_t end = window.row + window.rows;
+  std::unique_ptr<TiffHandle> handle = handles_.take();
   for (std::int64_t row = window.row; row < end;) {
     const std::int64_t strip = row / layout_.block_height;
     const std::int64_t first = strip * layout_.block_height;
     const std::int64_t rows = std::min(end, first + layout_.block_height) - row;
     std::byte* out = samples.data() + to_unsigned(row - window.row) * out_row_bytes;
-    const TiffBlockSpan span = spans_->block_span(layout_.block_index(plane_, 0, strip));
+    const TiffBlockSpan span = handle->block_span(layout_.block_index(plane_, 0, strip));
     if (span.size_bytes == 0) {
       fill(out, rows * window.columns);
     } else {
-      read_strip_rows({window.column, row, window.columns, rows}, span, row - first, out);
+      read_strip_rows({window.column, row, window.columns, rows}, span, row - first, out, handle->scratch);
     }
     row += rows;
   }
+  handles_.give_back(std::move(handle));
 }
 
-void TiffBlocks::read_strip_rows(const Window& part, TiffBlockSpan strip, std::int64_t first_strip_row,
-                                 std::byte* out) {
+void TiffBlocks::read_strip_rows(const Window& part, TiffBlockSpan strip, std::int64_t first_strip_row, std::byte* out,
+                                 std::vector<std::byte>& scratch) {
   const std::uint64_t pixel_bytes = to_unsigned(layout_.interleaved()) * sample_bytes_;
   const std::uint64_t row_bytes = to_unsigned(layout_.width) * pixel_bytes;
   const std::uint64_t begin = strip.offset_bytes + to_unsigned(first_strip_row) * row_bytes;
@@ -246,7 +248,6 @@ void TiffBlocks::read_strip_rows(const Window& part, TiffBlockSpan strip, std::i
     file_.read(begin, {out, out_bytes});
   } else {
     // Whole rows go in chunks of many; parts of rows one by one, each in chunks of columns.
-    std::vector<std::byte>& scratch = spans_->scratch;
     const std::int64_t run = whole_rows ? part.columns * part.rows : part.columns;
     const auto chunk = static_cast<std::int64_t>(std::max<std::uint64_t>(1, kChunk / pixel_bytes));
     for (std::int64_t row = 0; row < (whole_rows ? 1 : part.rows); ++row) {
@@ -381,7 +382,7 @@ void TiffBlocks::decode_rows(const Unit& unit) {
   for (; row < end; ++row) {
     std::byte* out = row < first ? nullptr : unit.bytes + to_unsigned(row - first) * row_bytes;
     const std::int64_t strip = row / layout_.block_height;
-    const bool stored = spans_->block_span(layout_.block_index(plane_, 0, strip)).size_bytes != 0;
+    const bool stored = in_order_->block_span(layout_.block_index(plane_, 0, strip)).size_bytes != 0;
     if (!stored) {
       if (out != nullptr) fill(out, layout_.width);
       continue;

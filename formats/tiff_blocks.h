@@ -22,10 +22,10 @@ namespace isohf {
 ///    beyond those decodes the strip again from its start.
 class TiffBlocks {
  public:
-  /// `channel` is the sample of each pixel to read. Checks every block's place in the file.
+  /// `channel` is the sample of each pixel of `image` to read. Checks every block's place in the file.
   /// Throws Error: kCorrupt for blocks that lie outside the file or are absurdly large, kUnsupported for sizes beyond
   /// isohf's bounds.
-  TiffBlocks(const RawFile& file, const TiffLayout& layout, std::uint32_t directory, int channel);
+  TiffBlocks(const RawFile& file, const TiffLayout& layout, TiffMainImage image, int channel);
 
   /// Samples of blocks that are not stored; 0 without. One sample in host byte order.
   void set_fill(std::span<const std::byte> sample);
@@ -48,9 +48,10 @@ class TiffBlocks {
   struct Unit;
 
   void choose_mode(std::uint64_t largest_block_bytes);
-  void check_blocks();
+  void check_blocks(TiffHandle& handle);
   void read_direct(const Window& window, std::span<std::byte> samples);
-  void read_strip_rows(const Window& part, TiffBlockSpan strip, std::int64_t first_strip_row, std::byte* out);
+  void read_strip_rows(const Window& part, TiffBlockSpan strip, std::int64_t first_strip_row, std::byte* out,
+                       std::vector<std::byte>& scratch);
   void read_units(const Window& window, std::span<std::byte> samples);
   void decode_units(std::span<Unit> units);
   void decode_unit(const Unit& unit, TiffHandle& handle) const;
@@ -71,7 +72,6 @@ class TiffBlocks {
   std::array<std::byte, 8> fill_ = {};
   std::optional<BlockCache> cache_;
   mutable TiffHandlePool handles_;
-  std::unique_ptr<TiffHandle> spans_;     // for lookups in the table of blocks
   std::unique_ptr<TiffHandle> in_order_;  // Mode::kRows
   std::int64_t next_row_ = -1;            // the row that in_order_ delivers next; -1: none
   bool map_strips_ = false;

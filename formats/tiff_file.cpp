@@ -83,6 +83,13 @@ struct TiffHandle::Impl {
     TIFFOpenOptionsFree(options);
     if (tif == nullptr) fail("is not a readable TIFF file");
   }
+  [[nodiscard]] static std::unique_ptr<Impl> on_directory(const RawFile& file, std::uint32_t directory, bool mapped) {
+    auto impl = std::make_unique<Impl>(file, mapped);
+    if (directory != 0 && TIFFSetDirectory(impl->tif, directory) != 1) {
+      impl->fail(fmt::format("directory {} cannot be read", directory));
+    }
+    return impl;
+  }
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
   ~Impl() {
@@ -269,10 +276,9 @@ struct TiffHandle::Impl {
 };
 
 TiffHandle::TiffHandle(const RawFile& file, std::uint32_t directory, bool mapped)
-    : impl_(std::make_unique<Impl>(file, mapped)) {
-  if (directory != 0 && TIFFSetDirectory(impl_->tif, directory) != 1) {
-    impl_->fail(fmt::format("directory {} cannot be read", directory));
-  }
+    : TiffHandle(Impl::on_directory(file, directory, mapped)) {}
+
+TiffHandle::TiffHandle(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {
   // Sub-sampled colour comes out as one value per sample.
   if (impl_->field<std::uint16_t>(TIFFTAG_COMPRESSION, COMPRESSION_NONE) == COMPRESSION_JPEG &&
       impl_->field<std::uint16_t>(TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MINISBLACK) == PHOTOMETRIC_YCBCR) {
@@ -384,12 +390,13 @@ TiffTags TiffHandle::read_tags() {
   return tags;
 }
 
-TiffDirectories read_directories(const RawFile& file) {
-  TiffHandle::Impl walk(file, false);
+TiffMainImage open_main_image(const RawFile& file) {
+  auto walk = std::make_unique<TiffHandle::Impl>(file, false);
   TiffDirectories found;
   bool has_main = false;
+  bool walked = false;
   for (std::uint32_t i = 0; i < kMostDirectories; ++i) {
-    const auto kind = walk.field<std::uint32_t>(TIFFTAG_SUBFILETYPE, 0);
+    const auto kind = walk->field<std::uint32_t>(TIFFTAG_SUBFILETYPE, 0);
     const bool mask = (kind & FILETYPE_MASK) != 0;
     const bool reduced = (kind & FILETYPE_REDUCEDIMAGE) != 0;
     if (mask && !reduced) found.has_mask = true;
@@ -398,9 +405,13 @@ TiffDirectories read_directories(const RawFile& file) {
       if (!has_main) found.main = i;
       has_main = true;
     }
-    if (TIFFLastDirectory(walk.tif) != 0 || TIFFReadDirectory(walk.tif) != 1) break;
+    if (TIFFLastDirectory(walk->tif) != 0) break;
+    walked = true;
+    if (TIFFReadDirectory(walk->tif) != 1) break;
   }
-  return found;
+  // A walk leaves the handle elsewhere, with what libtiff said of other images.
+  if (walked) walk = TiffHandle::Impl::on_directory(file, found.main, false);
+  return {found, std::unique_ptr<TiffHandle>(new TiffHandle(std::move(walk)))};
 }
 
 std::unique_ptr<TiffHandle> TiffHandlePool::take() {

@@ -71,6 +71,8 @@ struct TiffDirectories {
   bool has_more_pages = false;  ///< another is a full-size image
 };
 
+struct TiffMainImage;
+
 /// One libtiff handle on a directory; not thread-safe. Nothing of libtiff shows outside its source file.
 class TiffHandle {
  public:
@@ -99,13 +101,21 @@ class TiffHandle {
   std::vector<std::byte> scratch;
 
  private:
-  friend TiffDirectories read_directories(const RawFile& file);
+  friend TiffMainImage open_main_image(const RawFile& file);
   struct Impl;
+  explicit TiffHandle(std::unique_ptr<Impl> impl);
   std::unique_ptr<Impl> impl_;
 };
 
+/// What a file holds, and a handle on its main image.
+struct TiffMainImage {
+  TiffDirectories directories;
+  std::unique_ptr<TiffHandle> handle;
+};
+
+/// Opens the file once where it holds one image: of ten thousand small files in a mosaic, opening is most of the work.
 /// Throws Error{kCorrupt} where not even the first directory can be read.
-[[nodiscard]] TiffDirectories read_directories(const RawFile& file);
+[[nodiscard]] TiffMainImage open_main_image(const RawFile& file);
 
 /// Handles on one directory for any number of threads, opened when first needed.
 class TiffHandlePool {

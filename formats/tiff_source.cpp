@@ -181,17 +181,16 @@ class TiffSource final : public HeightSource {
  public:
   TiffSource(const std::string& path, const OpenOptions& options) : file_(path) {
     info_.path = path;
-    const TiffDirectories directories = read_directories(file_);
-    TiffHandle handle(file_, directories.main, false);
-    const TiffTags tags = handle.read_tags();
-    layout_ = handle.read_layout();
+    TiffMainImage image = open_main_image(file_);
+    const TiffTags tags = image.handle->read_tags();
+    layout_ = image.handle->read_layout();
     try {
-      describe(directories, tags, options);
+      describe(image.directories, tags, options);
     } catch (const Error& error) {
       throw error.within(path);
     }
     apply_open_options(info_, options);
-    blocks_.emplace(file_, layout_, directories.main, channel_);
+    blocks_.emplace(file_, layout_, std::move(image), channel_);
     describe_missing_blocks();
   }
 

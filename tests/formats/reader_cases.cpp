@@ -65,22 +65,18 @@ std::string written(const ScratchFolder& folder, const std::string& name, std::i
   return text_of(folder / name);
 }
 
-/// A TIFF whose tags come first, so that mutations of the beginning meet them: 8 x 6 int16 in strips of two rows.
-std::string plain_tiff(bool big_endian) {
+struct TiffTag {
+  std::uint32_t tag, type, count, value;
+};
+
+/// A TIFF whose tags come first, so that mutations of the beginning meet them, without a table or sample of its own.
+std::string tiff_head(bool big_endian, const std::vector<TiffTag>& tags) {
   std::string bytes = big_endian ? std::string("MM\0*\0\0\0\x08", 8) : std::string("II*\0\x08\0\0\0", 8);
   const auto put = [&](std::uint32_t value, int size) {
     for (int b = 0; b < size; ++b) bytes += static_cast<char>(value >> (8 * (big_endian ? size - 1 - b : b)) & 0xFFU);
   };
-  struct Tag {
-    std::uint32_t tag, type, count, value;
-  };
-  constexpr std::uint32_t kEntries = 10;
-  constexpr std::uint32_t kEnd = 8 + 2 + kEntries * 12 + 4;
-  const std::vector<Tag> tags = {{256, 3, 1, 8},         {257, 3, 1, 6},    {258, 3, 1, 16}, {259, 3, 1, 1},
-                                 {262, 3, 1, 1},         {273, 4, 3, kEnd}, {277, 3, 1, 1},  {278, 3, 1, 2},
-                                 {279, 4, 3, kEnd + 12}, {339, 3, 1, 2}};
-  put(kEntries, 2);
-  for (const Tag& tag : tags) {
+  put(static_cast<std::uint32_t>(tags.size()), 2);
+  for (const TiffTag& tag : tags) {
     put(tag.tag, 2);
     put(tag.type, 2);
     put(tag.count, 4);
@@ -93,9 +89,60 @@ std::string plain_tiff(bool big_endian) {
     }
   }
   put(0, 4);
-  for (std::uint32_t i = 0; i < 3; ++i) put(kEnd + 24 + 32 * i, 4);
-  for (std::uint32_t i = 0; i < 3; ++i) put(32, 4);
+  return bytes;
+}
+
+constexpr std::uint32_t tiff_head_bytes(std::uint32_t tags) {
+  return 8 + 2 + tags * 12 + 4;
+}
+
+/// 8 x 6 int16 in strips of two rows.
+std::string striped_tiff(bool big_endian) {
+  constexpr std::uint32_t kEnd = tiff_head_bytes(10);
+  std::string bytes = tiff_head(big_endian, {{256, 3, 1, 8},
+                                             {257, 3, 1, 6},
+                                             {258, 3, 1, 16},
+                                             {259, 3, 1, 1},
+                                             {262, 3, 1, 1},
+                                             {273, 4, 3, kEnd},
+                                             {277, 3, 1, 1},
+                                             {278, 3, 1, 2},
+                                             {279, 4, 3, kEnd + 12},
+                                             {339, 3, 1, 2}});
+  for (const std::uint32_t value : {kEnd + 24, kEnd + 56, kEnd + 88, 32U, 32U, 32U}) {
+    for (unsigned b = 0; b < 4; ++b) bytes += static_cast<char>(value >> (8 * (big_endian ? 3 - b : b)) & 0xFFU);
+  }
   return bytes + counting(48, 2);
+}
+
+/// 20 x 18 bytes in four tiles of 16 x 16, deflated, with the horizontal predictor.
+std::string tiled_tiff() {
+  constexpr std::uint32_t kEnd = tiff_head_bytes(12);
+  std::string bytes = tiff_head(false, {{256, 3, 1, 20},
+                                        {257, 3, 1, 18},
+                                        {258, 3, 1, 8},
+                                        {259, 3, 1, 8},
+                                        {262, 3, 1, 1},
+                                        {277, 3, 1, 1},
+                                        {317, 3, 1, 2},
+                                        {322, 3, 1, 16},
+                                        {323, 3, 1, 16},
+                                        {324, 4, 4, kEnd},
+                                        {325, 4, 4, kEnd + 16},
+                                        {339, 3, 1, 1}});
+  std::string tile(std::size_t{16} * 16, '\0');
+  for (std::size_t i = 0; i < tile.size(); ++i) tile[i] = static_cast<char>(i * 37 % 61);
+  uLongf size = compressBound(static_cast<uLong>(tile.size()));
+  std::string packed(size, '\0');
+  compress(reinterpret_cast<Bytef*>(packed.data()), &size, reinterpret_cast<const Bytef*>(tile.data()),
+           static_cast<uLong>(tile.size()));
+  packed.resize(size);
+  const auto put = [&](std::size_t value) {
+    for (unsigned b = 0; b < 4; ++b) bytes += static_cast<char>(value >> (8 * b) & 0xFFU);
+  };
+  for (std::size_t i = 0; i < 4; ++i) put(kEnd + 32 + i * packed.size());
+  for (int i = 0; i < 4; ++i) put(packed.size());
+  return bytes + packed + packed + packed + packed;
 }
 
 std::string pds3() {
@@ -220,10 +267,10 @@ std::vector<ReaderCase> reader_cases() {
   std::vector<ReaderCase> cases = {
       {"ExrScanLines", "a.exr", written(folder, "a.exr", 5, 4, SampleType::kFloat32), open_exr, {}},
       {"ExrChannels", "a.exr", written(folder, "a.exr", 4, 3, SampleType::kFloat16, 4), open_exr, {}},
-      {"TiffTagsFirst", "a.tif", plain_tiff(false), open_tiff, {}},
-      {"TiffBigEndian", "a.tif", plain_tiff(true), open_tiff, {}},
+      {"TiffTagsFirst", "a.tif", striped_tiff(false), open_tiff, {}},
+      {"TiffBigEndian", "a.tif", striped_tiff(true), open_tiff, {}},
       {"TiffStripsDeflated", "a.tif", written(folder, "a.tif", 9, 7, SampleType::kInt16), open_tiff, {}},
-      {"TiffTiles", "a.tif", written(folder, "a.tif", 257, 258, SampleType::kUint8), open_tiff, {}},
+      {"TiffTiles", "a.tif", tiled_tiff(), open_tiff, {}},
       {"PngGray16", "a.png", written(folder, "a.png", 6, 5, SampleType::kUint16), open_png, {}},
       {"PngPacked", "a.png", written(folder, "a.png", 6, 5, SampleType::kUint8, 3), open_png, packed},
       {"EsriAsciiGrid", "a.asc", esri + numbers, open_ascii_grid, {}},
@@ -279,8 +326,7 @@ std::vector<ReaderCase> reader_cases() {
   find("UsgsDem").shortest_valid = find("UsgsDem").bytes.find_last_not_of(' ') + 1;
   find("RawDescription").shortest_valid = find("RawDescription").bytes.size() - 1;
   find("TiffStripsDeflated").shortest_valid = 1;  // the tags that isohf writes come last, and not all are needed
-  find("TiffTiles").shortest_valid = 1;
-  find("Hgt").shortest_valid = 1;  // another square
+  find("Hgt").shortest_valid = 1;                 // another square
   return cases;
 }
 
