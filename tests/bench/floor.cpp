@@ -1,9 +1,8 @@
 // What a conversion cannot do without: reading its input, and compressing what it ends up with. Reads the whole raster
-// with isohf's own reader, then compresses the payloads of an archive's tiles again with libdeflate, at the level that
-// comes nearest to the archive's size; both timed, on THREADS threads.
-// usage: floor RASTER PAYLOADS ARCHIVE_TILE_BYTES THREADS
-// PAYLOADS is one payload after the other, each behind its length as a little-endian 32-bit number (scripts/bench makes
-// it). Prints one JSON object.
+// with isohf's own reader, then compresses the payloads of an archive's tiles again with libdeflate, at some levels and
+// at the one that comes nearest to the archive's size; all timed, on THREADS threads. usage: floor RASTER PAYLOADS
+// ARCHIVE_TILE_BYTES THREADS PAYLOADS is one payload after the other, each behind its length as a little-endian 32-bit
+// number (scripts/bench makes it). Prints one JSON object.
 
 #include <fmt/format.h>
 #include <libdeflate.h>
@@ -19,6 +18,7 @@
 #include <cstdio>
 #include <cstring>
 #include <memory>
+#include <set>
 #include <span>
 #include <string>
 #include <vector>
@@ -84,32 +84,40 @@ double read_all(isohf::HeightSource& source) {
   return seconds_since(start);
 }
 
-void run(const std::string& raster, const std::string& payload_file, double archive_bytes) {
-  const isohf::MappedFile file(payload_file);
-  const std::vector<std::span<const std::byte>> payloads = payloads_in(file.bytes());
-  // A sample of the tiles tells the level; the first use of each also wakes the threads.
+/// The level whose bytes come nearest to the archive's, told by a sample of the payloads.
+int nearest_level(std::span<const std::span<const std::byte>> payloads, double archive_bytes) {
   const std::size_t stride = std::max<std::size_t>(1, payloads.size() / 50);
-  const std::size_t all = deflated_bytes(payloads, 1, 1);
+  const auto all = static_cast<double>(deflated_bytes(payloads, 1, 1));
   const auto part = static_cast<double>(deflated_bytes(payloads, 1, stride));
   int level = 1;
   double nearest = HUGE_VAL;
   for (int candidate = 1; candidate <= 12; ++candidate) {
-    const double bytes =
-        static_cast<double>(deflated_bytes(payloads, candidate, stride)) / part * static_cast<double>(all);
-    const double off = std::abs(bytes - archive_bytes);
-    if (off < nearest) {
-      nearest = off;
+    const double bytes = static_cast<double>(deflated_bytes(payloads, candidate, stride)) / part * all;
+    if (std::abs(bytes - archive_bytes) < nearest) {
+      nearest = std::abs(bytes - archive_bytes);
       level = candidate;
     }
   }
-  const std::unique_ptr<isohf::HeightSource> source = isohf::open_source(raster, {});
-  const double read_seconds = read_all(*source);
-  const auto start = Clock::now();
-  const std::size_t bytes = deflated_bytes(payloads, level, 1);
-  const double deflate_seconds = seconds_since(start);
-  fmt::print(R"({{"read_s": {:.4f}, "deflate_s": {:.4f}, "level": {}, "bytes": {}, "payload_bytes": {}}})"
+  return level;
+}
+
+void run(const std::string& raster, const std::string& payload_file, double archive_bytes) {
+  const isohf::MappedFile file(payload_file);
+  const std::vector<std::span<const std::byte>> payloads = payloads_in(file.bytes());
+  const int nearest = nearest_level(payloads, archive_bytes);
+  const double read_seconds = read_all(*isohf::open_source(raster, {}));
+  std::set<int> levels = {1, 3, 6, 9, 12};
+  levels.insert(nearest);
+  std::string deflated;
+  for (const int level : levels) {
+    const auto start = Clock::now();
+    const std::size_t bytes = deflated_bytes(payloads, level, 1);
+    deflated += fmt::format(R"({}{{"level": {}, "deflate_s": {:.4f}, "bytes": {}}})", deflated.empty() ? "" : ", ",
+                            level, seconds_since(start), bytes);
+  }
+  fmt::print(R"({{"read_s": {:.4f}, "nearest": {}, "payload_bytes": {}, "levels": [{}]}})"
              "\n",
-             read_seconds, deflate_seconds, level, bytes, file.bytes().size() - 4 * payloads.size());
+             read_seconds, nearest, file.bytes().size() - 4 * payloads.size(), deflated);
 }
 
 }  // namespace
