@@ -9,6 +9,7 @@
 #include <memory>
 #include <new>
 
+#include "isohf/archive/literal_inflater.h"
 #include "isohf/base/error.h"
 
 namespace isohf {
@@ -411,6 +412,7 @@ std::vector<std::byte> deflate_bytes(std::span<const std::byte> bytes, int level
 }
 
 void inflate_exactly(std::span<const std::byte> deflated, std::span<std::byte> out) {
+  if (inflate_literals(deflated, out)) return;
   thread_local const std::unique_ptr<libdeflate_decompressor, decltype(&libdeflate_free_decompressor)> decompressor(
       libdeflate_alloc_decompressor(), &libdeflate_free_decompressor);
   if (decompressor == nullptr) throw Error(ErrorCode::kOutOfMemory, "no memory for a decompressor");

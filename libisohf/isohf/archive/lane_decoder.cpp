@@ -11,16 +11,57 @@
 #include "isohf/base/assert.h"
 #include "isohf/base/error.h"
 #include "isohf/base/vectorised.h"
+#if defined(ISOHF_HAS_WIDE)
+#include <immintrin.h>
+#pragma GCC diagnostic ignored "-Wpsabi"  // kernels are inlined: their vectors cross no boundary
+#endif
 
 namespace isohf {
 namespace {
 
 constexpr std::size_t kLanes = kDecoderLanes;
 
-/// What a stretch of places is predicted with: a weight of each lane, one term after the other; NE's comes first.
-using StretchWeights = std::array<PerLane<std::int32_t>, kWeightCount + 1>;
+/// A sample less 2^15, so that it fits 16 bits with a sign. Weights add up to 2^12, hence the sum of weighted samples
+/// is that of the shifted ones and 2^27.
+constexpr std::int32_t kSampleShift = 1 << 15;
+constexpr std::int32_t kSumShift = kSampleShift << kWeightBits;
 
-/// The rows of all lanes, lane by lane at each place.
+/// Two neighbouring samples, shifted, of each lane: that of the place in the low half, that East of it in the high
+/// half. One multiplication by a pair of weights does for both.
+constexpr std::int32_t pair_of(std::int32_t west, std::int32_t east) {
+  return static_cast<std::int32_t>((static_cast<std::uint32_t>(west) & 0xffffU) | static_cast<std::uint32_t>(east)
+                                                                                      << 16U);
+}
+
+/// A pair of terms: the place of its western sample from the predicted one, on which row, and the weights of both; a
+/// negative one for none.
+enum class LaneRow : std::uint8_t { kOwn, kNorth, kFar, kFarther };
+constexpr int kAnchor = static_cast<int>(kWeightCount);  // NE's weight
+struct TermPair {
+  LaneRow row;
+  int place;
+  int west;
+  int east;
+};
+constexpr std::size_t kNearPairs = 8;
+constexpr std::array<TermPair, 11> kTermPairs = {{
+    {LaneRow::kOwn, -2, 2, 0},
+    {LaneRow::kNorth, -1, 1, kAnchor},
+    {LaneRow::kNorth, 1, 3, 14},
+    {LaneRow::kNorth, -3, 15, 4},
+    {LaneRow::kFar, -1, 7, 5},
+    {LaneRow::kFar, 1, 6, 8},
+    {LaneRow::kFar, -3, 17, 9},
+    {LaneRow::kFarther, -1, 11, 10},
+    {LaneRow::kFar, 3, 16, -1},
+    {LaneRow::kFarther, 1, 12, -1},
+    {LaneRow::kFarther, -2, 13, -1},
+}};
+
+/// What a stretch of places is predicted with: a pair of weights of each lane, one pair of terms after the other.
+using StretchWeights = std::array<PerLane<std::int32_t>, kTermPairs.size()>;
+
+/// The rows of all lanes, lane by lane at each place; samples in pairs.
 struct LaneRows {
   std::int32_t* own;
   const std::int32_t* north;
@@ -30,7 +71,7 @@ struct LaneRows {
   const std::uint8_t* is_void;  ///< by place and lane; nullptr where no lane has voids in the row
 };
 
-/// The samples' range, and whether a sample has left it.
+/// The samples' range, and whether a sample has left it; shifted.
 struct LaneRange {
   PerLane<std::int32_t> low{};
   PerLane<std::int32_t> high{};
@@ -38,111 +79,143 @@ struct LaneRange {
   PerLane<std::int32_t> most_seen{};
 };
 
-/// Predictions completed by residuals, from West to East. Sums modulo 2^32, as the plain decoder has them.
-template <std::size_t kTerms, bool kWithVoids>
+using Ints = std::int32_t __attribute__((vector_size(4 * kLanes), aligned(4), may_alias));
+using Words = std::uint32_t __attribute__((vector_size(4 * kLanes), aligned(4), may_alias));
+using Shorts = std::uint16_t __attribute__((vector_size(2 * kLanes), aligned(2), may_alias));
+
+/// Both samples of a pair times their weights, added up.
+template <bool kIsWide>
+[[gnu::always_inline]] inline Words weigh(const std::int32_t* samples, const std::int32_t* weights) {
+#if defined(ISOHF_HAS_WIDE)
+  if constexpr (kIsWide) {
+    using Halves = short __attribute__((vector_size(4 * kLanes), aligned(4), may_alias));
+    return (Words)__builtin_ia32_pmaddwd256(*reinterpret_cast<const Halves*>(samples),
+                                            *reinterpret_cast<const Halves*>(weights));
+  }
+#endif
+  Words out;
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    const auto half = [](std::int32_t pair) { return std::int32_t{static_cast<std::int16_t>(pair)}; };
+    out[lane] = static_cast<std::uint32_t>(half(samples[lane]) * half(weights[lane])) +
+                static_cast<std::uint32_t>((samples[lane] >> 16) * (weights[lane] >> 16));
+  }
+  return out;
+}
+
+/// One of two, by the lowest bit of each lane.
+template <bool kIsWide>
+[[gnu::always_inline]] inline Ints choose_by_lowest(Ints bits, Ints where_set, Ints otherwise) {
+  const Ints signs = (Ints)((Words)bits << 31U);
+#if defined(ISOHF_HAS_WIDE)
+  if constexpr (kIsWide) {
+    using Floats = float __attribute__((vector_size(4 * kLanes)));
+    return (Ints)__builtin_ia32_blendvps256((Floats)otherwise, (Floats)where_set, (Floats)signs);
+  }
+#endif
+  return signs < 0 ? where_set : otherwise;
+}
+
+/// Predictions completed by residuals, from West to East. What each place waits for is kept short: it is all that a row
+/// takes. Sums modulo 2^32, as the plain decoder has them. Writes the
+/// pair West of each sample, and not the last sample's own.
+template <bool kIsWide, std::size_t kPairs, bool kWithVoids>
 [[gnu::always_inline]] inline void restore_places(const LaneRows& rows, const StretchWeights& weights, int begin,
                                                   int end, LaneRange& range) {
-  using Ints = std::int32_t __attribute__((vector_size(4 * kLanes), aligned(4), may_alias));
-  using Words = std::uint32_t __attribute__((vector_size(4 * kLanes), aligned(4), may_alias));
-  using Shorts = std::uint16_t __attribute__((vector_size(2 * kLanes), aligned(2), may_alias));
   using Bytes = std::int8_t __attribute__((vector_size(kLanes), aligned(1), may_alias));
   constexpr std::ptrdiff_t kStep = kLanes;
-  const std::array<const std::int32_t*, kWeightCount + 1> from = {
-      rows.north,
-      rows.own - kStep,
-      rows.north - kStep,
-      rows.own - 2 * kStep,
-      rows.north + kStep,
-      rows.north - 2 * kStep,
-      rows.far,
-      rows.far + kStep,
-      rows.far - kStep,
-      rows.far + 2 * kStep,
-      rows.far - 2 * kStep,
-      rows.farther,
-      rows.farther - kStep,
-      rows.farther + kStep,
-      rows.farther - 2 * kStep,
-      rows.north + 2 * kStep,
-      rows.north - 3 * kStep,
-      rows.far + 3 * kStep,
-      rows.far - 3 * kStep,
+  const auto row_of = [&](LaneRow row) -> const std::int32_t* {
+    return row == LaneRow::kNorth ? rows.north : row == LaneRow::kFar ? rows.far : rows.farther;
   };
-  constexpr std::size_t kWest = 1;
-  constexpr std::size_t kFarWest = 3;
-  const auto* const weight = reinterpret_cast<const Words*>(weights.data());
   const Ints low = *reinterpret_cast<const Ints*>(range.low.data());
   const Ints high = *reinterpret_cast<const Ints*>(range.high.data());
   const Ints least = 2 * low;
   const Ints most = 2 * high - 1;
   Ints least_seen = *reinterpret_cast<const Ints*>(range.least_seen.data());
   Ints most_seen = *reinterpret_cast<const Ints*>(range.most_seen.data());
-  Ints west = *reinterpret_cast<const Ints*>(rows.own + (begin - 1) * kStep);
-  Ints far_west = *reinterpret_cast<const Ints*>(rows.own + (begin - 2) * kStep);
+  Words west_pair = *reinterpret_cast<const Words*>(rows.own + (begin - 2) * kStep);
   for (int place = begin; place < end; ++place) {
     const std::ptrdiff_t at = place * kStep;
-    Words sum = weight[kFarWest] * (Words)far_west;
-    for (std::size_t term = 0; term < kTerms; ++term) {
-      if (term != kWest && term != kFarWest) sum += weight[term] * *reinterpret_cast<const Words*>(from[term] + at);
+    Words above = {};
+    for (std::size_t pair = 1; pair < kPairs; ++pair) {
+      const TermPair term = kTermPairs[pair];
+      above += weigh<kIsWide>(row_of(term.row) + at + term.place * kStep, weights[pair].data());
     }
-    sum += weight[kWest] * (Words)west;
+    const Words folded = __builtin_convertvector(*reinterpret_cast<const Shorts*>(rows.folded + at), Words);
+    const Ints residual = (Ints)((folded >> 1U) ^ -(folded & 1U));
+    const Words sum = above + weigh<kIsWide>(reinterpret_cast<const std::int32_t*>(&west_pair), weights[0].data());
+    // Shifted samples are predicted as samples are: 2^27 more in the sum are 2^16 more in the halves, an even number.
     Ints halves = (Ints)sum >> (kWeightBits - 1);
     halves = halves < least ? least : halves;
     halves = halves > most ? most : halves;
-    const Words folded = __builtin_convertvector(*reinterpret_cast<const Shorts*>(rows.folded + at), Words);
-    const Ints residual = (Ints)((folded >> 1U) ^ -(folded & 1U));
-    const Ints turned = -(halves & 1);  // -1 where the residual is added, 0 where it is taken off
-    const Ints sample = (((halves + 1) >> 1) + ((residual ^ ~turned) - ~turned)) & 0xffff;
-    far_west = west;
-    west = sample;
+    Words high_half = (Words)(((halves + 1) >> 1) + choose_by_lowest<kIsWide>(halves, residual, -residual)) << 16U;
+    Ints own = (Ints)high_half >> 16;
     if constexpr (kWithVoids) {
-      const Ints north = *reinterpret_cast<const Ints*>(rows.north + at);
+      const Ints north = (Ints)(*reinterpret_cast<const Words*>(rows.north + at) << 16U) >> 16;
       const Ints is_void = __builtin_convertvector(*reinterpret_cast<const Bytes*>(rows.is_void + at), Ints);
-      west = is_void != 0 ? (far_west + north) >> 1 : sample;
+      own = is_void != 0 ? (((Ints)west_pair >> 16) + north) >> 1 : own;
+      high_half = (Words)own << 16U;
     }
-    least_seen = west < least_seen ? west : least_seen;
-    most_seen = west > most_seen ? west : most_seen;
-    *reinterpret_cast<Ints*>(rows.own + at) = west;
+    least_seen = own < least_seen ? own : least_seen;
+    most_seen = own > most_seen ? own : most_seen;
+    west_pair = west_pair >> 16U | high_half;
+    *reinterpret_cast<Words*>(rows.own + at - kStep) = west_pair;
   }
   *reinterpret_cast<Ints*>(range.least_seen.data()) = least_seen;
   *reinterpret_cast<Ints*>(range.most_seen.data()) = most_seen;
 }
 
-ISOHF_VECTORISED(void, restore_near,
-                 (const LaneRows& rows, const StretchWeights& weights, int begin, int end, LaneRange& range),
-                 (rows, weights, begin, end, range)) {
-  restore_places<kNearWeightCount + 1, false>(rows, weights, begin, end, range);
+ISOHF_TWO_WAYS(void, restore_near,
+               (const LaneRows& rows, const StretchWeights& weights, int begin, int end, LaneRange& range),
+               (rows, weights, begin, end, range)) {
+  restore_places<kIsWide, kNearPairs, false>(rows, weights, begin, end, range);
 }
-ISOHF_VECTORISED(void, restore_widely,
-                 (const LaneRows& rows, const StretchWeights& weights, int begin, int end, LaneRange& range),
-                 (rows, weights, begin, end, range)) {
-  restore_places<kWeightCount + 1, false>(rows, weights, begin, end, range);
+ISOHF_TWO_WAYS(void, restore_widely,
+               (const LaneRows& rows, const StretchWeights& weights, int begin, int end, LaneRange& range),
+               (rows, weights, begin, end, range)) {
+  restore_places<kIsWide, kTermPairs.size(), false>(rows, weights, begin, end, range);
 }
-ISOHF_VECTORISED(void, restore_with_voids,
-                 (const LaneRows& rows, const StretchWeights& weights, int begin, int end, LaneRange& range),
-                 (rows, weights, begin, end, range)) {
-  restore_places<kWeightCount + 1, true>(rows, weights, begin, end, range);
+ISOHF_TWO_WAYS(void, restore_with_voids,
+               (const LaneRows& rows, const StretchWeights& weights, int begin, int end, LaneRange& range),
+               (rows, weights, begin, end, range)) {
+  restore_places<kIsWide, kTermPairs.size(), true>(rows, weights, begin, end, range);
 }
 
-/// The samples of eight places from first on, lane by lane: a transposed square.
+/// The samples of eight places from first on, lane by lane: the pairs of every other place, a transposed square.
 ISOHF_VECTORISED(void, turn_square, (const std::int32_t* samples, const PerLane<std::uint16_t*>& codes, int first),
                  (samples, codes, first)) {
-  using Ints = std::int32_t __attribute__((vector_size(4 * kLanes), aligned(4), may_alias));
-  using Shorts = std::uint16_t __attribute__((vector_size(2 * kLanes), aligned(2), may_alias));
-  Shorts rows[kLanes];
-  for (std::size_t i = 0; i < kLanes; ++i) {
-    rows[i] = __builtin_convertvector(*reinterpret_cast<const Ints*>(samples + i * kLanes), Shorts);
+  using Long = std::uint64_t __attribute__((vector_size(8 * kLanes / 2), aligned(4), may_alias));
+  using Quad = std::uint32_t __attribute__((vector_size(16), aligned(2), may_alias));
+  Words pairs[4];
+  for (std::size_t i = 0; i < 4; ++i) {
+    pairs[i] = *reinterpret_cast<const Words*>(samples + 2 * i * kLanes) ^ 0x80008000U;
   }
-  // Each step interleaves rows that lie four apart; after three, rows are columns.
-  for (int step = 0; step < 3; ++step) {
-    Shorts next[kLanes];
-    for (std::size_t i = 0; i < kLanes / 2; ++i) {
-      next[2 * i] = __builtin_shufflevector(rows[i], rows[i + 4], 0, 8, 1, 9, 2, 10, 3, 11);
-      next[2 * i + 1] = __builtin_shufflevector(rows[i], rows[i + 4], 4, 12, 5, 13, 6, 14, 7, 15);
-    }
-    for (std::size_t i = 0; i < kLanes; ++i) rows[i] = next[i];
+  // Within each half of the lanes: rows of four lanes become columns.
+  const Long a = (Long)__builtin_shufflevector(pairs[0], pairs[1], 0, 8, 1, 9, 4, 12, 5, 13);
+  const Long b = (Long)__builtin_shufflevector(pairs[0], pairs[1], 2, 10, 3, 11, 6, 14, 7, 15);
+  const Long c = (Long)__builtin_shufflevector(pairs[2], pairs[3], 0, 8, 1, 9, 4, 12, 5, 13);
+  const Long d = (Long)__builtin_shufflevector(pairs[2], pairs[3], 2, 10, 3, 11, 6, 14, 7, 15);
+  const Words turned[4] = {
+      (Words)__builtin_shufflevector(a, c, 0, 4, 2, 6), (Words)__builtin_shufflevector(a, c, 1, 5, 3, 7),
+      (Words)__builtin_shufflevector(b, d, 0, 4, 2, 6), (Words)__builtin_shufflevector(b, d, 1, 5, 3, 7)};
+  for (std::size_t lane = 0; lane < 4; ++lane) {
+    *reinterpret_cast<Quad*>(codes[lane] + first) = __builtin_shufflevector(turned[lane], turned[lane], 0, 1, 2, 3);
+    *reinterpret_cast<Quad*>(codes[lane + 4] + first) = __builtin_shufflevector(turned[lane], turned[lane], 4, 5, 6, 7);
   }
-  for (std::size_t lane = 0; lane < kLanes; ++lane) *reinterpret_cast<Shorts*>(codes[lane] + first) = rows[lane];
+}
+
+/// A sample that a pair of all lanes holds, its eastern one or the other, twice in each of `count` pairs.
+void repeat_sample(const std::int32_t* pairs, bool is_eastern, std::int32_t* out, int count) {
+  PerLane<std::int32_t> twice{};
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    const std::int32_t sample = is_eastern ? pairs[lane] >> 16 : pairs[lane];
+    twice[lane] = pair_of(sample, sample);
+  }
+  for (int i = 0; i < count; ++i) std::copy(twice.begin(), twice.end(), out + i * static_cast<std::ptrdiff_t>(kLanes));
+}
+
+/// The code of one lane's sample.
+std::int32_t code_of(std::int32_t pair) {
+  return (pair & 0xffff) ^ kSampleShift;
 }
 
 /// The samples of all lanes, on their way from residuals to codes.
@@ -156,9 +229,10 @@ class LaneSamples {
   void open(const PayloadHeader& header) {
     const std::size_t lane = headers_.size();
     headers_.push_back(&header);
-    for (std::size_t i = lane; i < samples_.size(); i += kLanes) samples_[i] = header.base;
-    range.low[lane] = header.low;
-    range.high[lane] = header.high;
+    const std::int32_t base = header.base - kSampleShift;
+    for (std::size_t i = lane; i < samples_.size(); i += kLanes) samples_[i] = pair_of(base, base);
+    range.low[lane] = header.low - kSampleShift;
+    range.high[lane] = header.high - kSampleShift;
     is_wide_ |= header.predictors.is_wide;
   }
 
@@ -168,7 +242,7 @@ class LaneSamples {
     const int last = r % 2 == 0 ? columns_ - 2 : columns_ - 1;
     const auto step = static_cast<std::ptrdiff_t>(kLanes);
     const std::int32_t* const north = row(r - 1) + r % 2 * step;
-    for (int place : {first - 1, first - 2}) std::copy_n(north + first * step, kLanes, row(r) + place * step);
+    repeat_sample(north + first * step, false, row(r) + (first - 2) * step, 1);
     if (r <= 3 || r % kBlockPlaces == 0) gather_weights(r);
     range.least_seen = range.low;
     range.most_seen = range.high;
@@ -187,17 +261,15 @@ class LaneSamples {
       }
     }
     std::int32_t* const own = row(r);
-    for (int place = -kLaneMargin; place < first; ++place) std::copy_n(own + first * step, kLanes, own + place * step);
-    for (int place = last + 1; place < columns_ + kLaneMargin; ++place) {
-      std::copy_n(own + last * step, kLanes, own + place * step);
-    }
+    repeat_sample(own + first * step, false, own - kLaneMargin * step, first + kLaneMargin);
+    repeat_sample(own + (last - 1) * step, true, own + last * step, columns_ + kLaneMargin - last);
   }
 
   [[nodiscard]] bool is_in_range(std::size_t lane) const {
     return range.least_seen[lane] >= range.low[lane] && range.most_seen[lane] <= range.high[lane];
   }
 
-  /// The samples of row r by place and lane.
+  /// The samples of row r by place and lane, in pairs.
   [[nodiscard]] const std::int32_t* samples(int r) { return row(r); }
 
   LaneRange range;
@@ -222,11 +294,13 @@ class LaneSamples {
         }
         const PredictorWeights& weights = r > 2 ? predictors.weights[index] : predictors.of_row(r);
         std::int32_t anchor = 1 << kWeightBits;
-        for (std::size_t i = 0; i < kWeightCount; ++i) {
-          weights_[stretch][i + 1][lane] = weights[i];
-          anchor -= weights[i];
+        for (const std::int16_t weight : weights) anchor -= weight;
+        const auto weight_of = [&](int i) -> std::int32_t {
+          return i < 0 ? 0 : i == kAnchor ? anchor : weights[static_cast<std::size_t>(i)];
+        };
+        for (std::size_t pair = 0; pair < kTermPairs.size(); ++pair) {
+          weights_[stretch][pair][lane] = pair_of(weight_of(kTermPairs[pair].west), weight_of(kTermPairs[pair].east));
         }
-        weights_[stretch][0][lane] = anchor;
       }
     }
   }
@@ -248,7 +322,7 @@ bool restore_slid(const LaneResiduals& residuals, std::size_t lane, const Payloa
     if (residuals.void_row(lane) != nullptr && residuals.void_row(lane)[column] != 0) continue;
     const std::ptrdiff_t step = kLanes;
     const std::int32_t* const at = samples + (side == 0 ? 1 : columns - 3) * step + static_cast<std::ptrdiff_t>(lane);
-    const auto prediction = static_cast<std::uint32_t>((at[0] + at[step]) >> 1);
+    const auto prediction = static_cast<std::uint32_t>((code_of(at[0]) + code_of(at[step])) >> 1);
     const auto sample = static_cast<std::int32_t>((prediction - unzigzag(residuals.slid(lane, side))) & 0xffffU);
     codes[column] = static_cast<std::uint16_t>(sample);
     is_good &= sample >= header.low && sample <= header.high;
@@ -265,7 +339,8 @@ void write_places(const std::int32_t* samples, const PerLane<std::uint16_t*>& co
   }
   for (; place <= last; ++place) {
     for (std::size_t lane = 0; lane < lanes; ++lane) {
-      codes[lane][place] = static_cast<std::uint16_t>(samples[static_cast<std::size_t>(place) * kLanes + lane]);
+      codes[lane][place] =
+          static_cast<std::uint16_t>(code_of(samples[static_cast<std::size_t>(place) * kLanes + lane]));
     }
   }
 }

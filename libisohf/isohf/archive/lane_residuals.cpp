@@ -10,6 +10,8 @@ namespace isohf {
 namespace {
 
 constexpr std::ptrdiff_t kStep = kDecoderLanes;
+/// Between two lanes' tables: not a power of two, or what they all use most would fall into the same sets of the cache.
+constexpr std::size_t kTableStride = kActivityLimit + 576;
 
 ISOHF_VECTORISED(void, find_lane_activities,
                  (const std::uint8_t* north, const std::uint8_t* far, std::ptrdiff_t begin, std::ptrdiff_t end,
@@ -55,7 +57,7 @@ void take_lanes(const std::uint16_t* activities, const std::uint8_t* tables,
 #pragma GCC unroll 8
     for (std::size_t lane = 0; lane < kCount; ++lane) {
       const auto i = at + static_cast<std::ptrdiff_t>(lane);
-      const std::size_t context = tables[lane * kActivityLimit + activities[i]];
+      const std::size_t context = tables[lane * kTableStride + activities[i]];
       folded[i] = *next[lane][context]++;
     }
   }
@@ -89,7 +91,7 @@ bool LanePayload::open(const TileShape& shape, CodeType type, std::span<const st
 
 bool LanePayload::expand(int columns, std::span<const std::span<const std::byte>> symbols,
                          std::span<const std::byte> extra, std::size_t count) {
-  std::vector<std::byte> padded(extra.size() + 8);
+  std::vector<std::byte> padded(extra.size() + kExpanderSlack);
   std::copy(extra.begin(), extra.end(), padded.begin());
   // A row may run past a context's last residual, and past the last of all; that is told when it is done.
   const auto spare = static_cast<std::size_t>(columns) + 2;
@@ -116,7 +118,7 @@ const std::uint8_t* LanePayload::void_row(int columns, int r) const {
 
 LaneResiduals::LaneResiduals(int columns)
     : columns_(columns),
-      tables_(kDecoderLanes * kActivityLimit),
+      tables_(kDecoderLanes * kTableStride),
       activities_(kDecoderLanes * static_cast<std::size_t>(columns)),
       folded_(activities_.size()),
       nothing_(static_cast<std::size_t>(columns) + 2),
@@ -126,7 +128,7 @@ LaneResiduals::LaneResiduals(int columns)
 
 void LaneResiduals::open(const LanePayload& payload) {
   const auto table = context_table(payload.header.thresholds);
-  std::copy(table.begin(), table.end(), tables_.begin() + static_cast<std::ptrdiff_t>(count_ * kActivityLimit));
+  std::copy(table.begin(), table.end(), tables_.begin() + static_cast<std::ptrdiff_t>(count_ * kTableStride));
   std::copy_n(payload.starts.begin(), kMaxContexts, next_[count_].begin());
   shifts_[count_] = payload.header.activity_shift;
   payloads_[count_] = &payload;
@@ -153,7 +155,7 @@ void LaneResiduals::take_around_voids(std::size_t lane, int r, int first, int la
     const std::size_t i = static_cast<std::size_t>(place) * kDecoderLanes + lane;
     const bool is_void = void_rows_[lane] != nullptr && void_rows_[lane][column_of_place(columns_, r, place)] != 0;
     is_void_[i] = is_void ? 1 : 0;
-    folded_[i] = is_void ? std::uint16_t{0} : *next_[lane][tables_[lane * kActivityLimit + activities_[i]]]++;
+    folded_[i] = is_void ? std::uint16_t{0} : *next_[lane][tables_[lane * kTableStride + activities_[i]]]++;
   }
 }
 
@@ -163,7 +165,7 @@ void LaneResiduals::take_slid(std::size_t lane) {
     if (void_rows_[lane] != nullptr && void_rows_[lane][column_of_slid(columns_, side)] != 0) continue;
     const std::ptrdiff_t at = (side == 0 ? 1 : columns_ - 3) * kStep;
     const std::uint16_t activity = activity_of_slid(row[at], row[at + kStep]);
-    slid_[static_cast<std::size_t>(side)][lane] = *next_[lane][tables_[lane * kActivityLimit + activity]]++;
+    slid_[static_cast<std::size_t>(side)][lane] = *next_[lane][tables_[lane * kTableStride + activity]]++;
   }
 }
 
