@@ -7,7 +7,7 @@
 #include <cmath>
 #include <utility>
 
-#include "isohf/base/assert.h"
+#include "formats/windowed_source.h"
 #include "isohf/base/error.h"
 
 namespace isohf {
@@ -72,34 +72,15 @@ Part part_in(const BoundingBox& box, const SourceInfo& info) {
           columns.cut || rows.cut};
 }
 
-class CroppedSource final : public HeightSource {
+class CroppedSource final : public WindowedSource {
  public:
   CroppedSource(std::unique_ptr<HeightSource> source, const Part& part)
-      : source_(std::move(source)), part_(part.window), info_(source_->info()) {
-    info_.width = part_.columns;
-    info_.height = part_.rows;
-    info_.block_width = std::min(info_.block_width, info_.width);
-    Georeference& place = info_.georeference;
-    place.origin_x += static_cast<double>(part_.column) * place.spacing_x;
-    place.origin_y -= static_cast<double>(part_.row) * place.spacing_y;
-    if (part.cut) {
-      info_.warnings.push_back(fmt::format("--bbox reaches beyond {}; what lies in both is taken, {} x {} samples",
-                                           info_.path, info_.width, info_.height));
-    }
+      : WindowedSource(std::move(source), part.window) {
+    if (!part.cut) return;
+    mutable_info().warnings.push_back(
+        fmt::format("--bbox reaches beyond {}; what lies in both is taken, {} x {} samples", info().path, info().width,
+                    info().height));
   }
-
-  [[nodiscard]] const SourceInfo& info() const override { return info_; }
-
-  void read_window(const Window& window, std::span<std::byte> samples) override {
-    ISOHF_ASSERT(window.column >= 0 && window.row >= 0);
-    ISOHF_ASSERT(window.column + window.columns <= info_.width && window.row + window.rows <= info_.height);
-    source_->read_window({part_.column + window.column, part_.row + window.row, window.columns, window.rows}, samples);
-  }
-
- private:
-  std::unique_ptr<HeightSource> source_;
-  Window part_;
-  SourceInfo info_;
 };
 
 }  // namespace

@@ -1,6 +1,6 @@
 #include "options_ground.h"
 
-#include "isohf/surface/closed_source.h"
+#include "formats/closed_source.h"
 
 namespace isohf::cli {
 

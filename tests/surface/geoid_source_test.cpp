@@ -9,7 +9,6 @@
 #include <filesystem>
 
 #include "isohf/base/error.h"
-#include "isohf/surface/closed_source.h"
 #include "support/memory_source.h"
 #include "support/small_geoid.h"
 #include "support/temporary_folder.h"
@@ -140,17 +139,6 @@ TEST(GeoidSource, WhatItCannotUseIsRefusedInOneLine) {
               HasSubstr("--geoid needs an input in degrees"));
   EXPECT_THAT(refusal_of([&] { open("a.pgm", [](SourceInfo& i) { i.georeference.system.body = "Mars"; }); }),
               HasSubstr("holds for the Earth, the input shows Mars"));
-}
-
-TEST(ClosedSource, LeavesOutTheLastColumn) {
-  auto inner = globe<float>(SampleType::kFloat32);
-  ClosedSource source(std::move(inner));
-  EXPECT_EQ(source.info().width, 71);
-  ASSERT_EQ(source.info().warnings.size(), 1U);
-  EXPECT_THAT(source.info().warnings[0], HasSubstr("column 71 is the first one again"));
-  std::vector<float> row(71);
-  source.read_window({0, 2, 71, 1}, std::as_writable_bytes(std::span(row)));
-  EXPECT_EQ(row[70], 100.0F + 210.0F + 10.0F);
 }
 
 }  // namespace

@@ -181,10 +181,11 @@ ConvertSummary convert(HeightSource& source, const std::string& output, const Co
                                             static_cast<std::size_t>(threads));
 
   if (options.lossless && info.fill_distance > 0 && &source.as_stored() == &source) {
-    throw Error(ErrorCode::kInvalidArgument,
-                fmt::format("{}: --lossless keeps the samples as they were before --fill, which are out of reach "
-                            "behind --bbox, --wrap-x and --geoid; leave one of them out",
-                            info.path));
+    throw Error(
+        ErrorCode::kInvalidArgument,
+        fmt::format("{}: --lossless keeps the samples as they were before --fill, which are out of reach; leave "
+                    "one of the two out",
+                    info.path));
   }
   ArchiveWriter writer(output, plan.grid,
                        {options.overwrite, options.resume, job_fingerprint(info, plan, options),

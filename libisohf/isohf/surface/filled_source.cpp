@@ -156,14 +156,18 @@ void FilledSource::read_window(const Window& window, std::span<std::byte> sample
   ISOHF_ASSERT(samples.size() == static_cast<std::size_t>(window.columns * window.rows) * size);
   if (samples.empty()) return;
   if (window.columns == info_.width) return read_rows(window.row, window.row + window.rows, samples);
-  // Whole rows are filled at once; nobody reads narrower windows often.
+  // Whole rows are filled at once, a few of them at a time: of a --bbox all windows are narrower.
   const auto row_bytes = static_cast<std::size_t>(info_.width) * size;
-  std::vector<std::byte> rows(static_cast<std::size_t>(window.rows) * row_bytes);
-  read_rows(window.row, window.row + window.rows, rows);
   const std::size_t out_bytes = static_cast<std::size_t>(window.columns) * size;
-  for (std::size_t row = 0; row < static_cast<std::size_t>(window.rows); ++row) {
-    std::memcpy(samples.data() + row * out_bytes,
-                rows.data() + row * row_bytes + static_cast<std::size_t>(window.column) * size, out_bytes);
+  std::vector<std::byte> rows(static_cast<std::size_t>(std::min(window.rows, VoidFiller::kRowsAtOnce)) * row_bytes);
+  for (std::int64_t first = 0; first < window.rows; first += VoidFiller::kRowsAtOnce) {
+    const auto count = static_cast<std::size_t>(std::min(window.rows - first, VoidFiller::kRowsAtOnce));
+    read_rows(window.row + first, window.row + first + static_cast<std::int64_t>(count),
+              std::span(rows).first(count * row_bytes));
+    for (std::size_t row = 0; row < count; ++row) {
+      std::memcpy(samples.data() + (static_cast<std::size_t>(first) + row) * out_bytes,
+                  rows.data() + row * row_bytes + static_cast<std::size_t>(window.column) * size, out_bytes);
+    }
   }
 }
 
@@ -240,7 +244,10 @@ std::uint64_t fill_memory_bytes(const SourceInfo& info) {
   const double held = std::min(rows, height) * width * (static_cast<double>(size_bytes(info.sample_type)) + 1.0);
   const double heights = std::min(step, height) * width * 4.0;
   const auto box_rows = static_cast<double>(VoidFiller::kRowsAtOnce + 2 * VoidFiller::smoothing_reach());
-  return static_cast<std::uint64_t>(held + heights + (fills ? box_rows * width * 19.0 : 0.0));
+  // Rows of which only a part is wanted.
+  const double narrow =
+      static_cast<double>(VoidFiller::kRowsAtOnce) * width * static_cast<double>(size_bytes(info.sample_type));
+  return static_cast<std::uint64_t>(held + heights + narrow + (fills ? box_rows * width * 19.0 : 0.0));
 }
 
 std::uint64_t FilledSource::buffer_bytes(std::uint64_t limit) const {

@@ -10,6 +10,7 @@
 #include <limits>
 
 #include "isohf/base/error.h"
+#include "isohf/surface/source_rows.h"
 
 namespace isohf {
 namespace {
@@ -95,6 +96,9 @@ class GeoidSource::Model {
                                               "(geographiclib-get-geoids)",
                                               path));
     }
+    // Twice as many columns as rows, less one, of two bytes: a little more than there are.
+    std::error_code ignored;
+    per_degree_ = std::sqrt(static_cast<double>(std::filesystem::file_size(file, ignored))) / 360.0;
     try {
       const std::string folder = file.parent_path().empty() ? "." : file.parent_path().string();
       geoid_ = std::make_unique<GeographicLib::Geoid>(file.stem().string(), folder);
@@ -115,6 +119,12 @@ class GeoidSource::Model {
     }
   }
 
+  /// Of the strip that is kept, so many degrees of longitude wide.
+  [[nodiscard]] std::uint64_t strip_bytes(double degrees) const {
+    return static_cast<std::uint64_t>((degrees * per_degree_ + 8.0) * (kStrip * per_degree_ + 8.0) *
+                                      sizeof(std::uint16_t));
+  }
+
  private:
   void keep(double latitude, double west, double east) {
     if (latitude <= north_ && latitude >= south_ && west >= west_ && east <= east_) return;
@@ -127,6 +137,7 @@ class GeoidSource::Model {
 
   std::string path_;
   std::unique_ptr<GeographicLib::Geoid> geoid_;
+  double per_degree_ = 0.0;  ///< its samples
   double north_ = kNoStrip;
   double south_ = kNoStrip;
   double west_ = kNoStrip;
@@ -175,28 +186,39 @@ void GeoidSource::read_window(const Window& window, std::span<std::byte> samples
   const SourceInfo& from = source_->info();
   const Georeference& place = info_.georeference;
   const auto columns = static_cast<std::size_t>(window.columns);
-  raw_.resize(columns * static_cast<std::size_t>(window.rows) * size_bytes(from.sample_type));
+  const std::size_t row_bytes = columns * size_bytes(from.sample_type);
+  raw_.resize(row_bytes * static_cast<std::size_t>(window.rows));
   source_->read_window(window, raw_);
-  std::vector<double> elevations;
-  elevations_from(from, raw_, elevations);
-  std::vector<double> shift(columns);
+  shift_.resize(columns);
   const double factor = sign_ / info_.metres_per_vertical_unit;
+  std::byte* out = samples.data();
   for (std::int64_t r = 0; r < window.rows; ++r) {
+    elevations_from(from, std::span(raw_).subspan(static_cast<std::size_t>(r) * row_bytes, row_bytes), elevations_);
     const double latitude = place.origin_y - place.spacing_y * static_cast<double>(window.row + r);
     const double longitude = place.origin_x + place.spacing_x * static_cast<double>(window.column);
     // Half a pixel beyond a pole there is no other latitude.
-    model_->row(std::clamp(latitude, -90.0, 90.0), longitude, place.spacing_x, shift);
-    double* const row = elevations.data() + static_cast<std::size_t>(r) * columns;
-    for (std::size_t c = 0; c < columns; ++c) row[c] += factor * shift[c];
+    model_->row(std::clamp(latitude, -90.0, 90.0), longitude, place.spacing_x, shift_);
+    for (std::size_t c = 0; c < columns; ++c) elevations_[c] += factor * shift_[c];
+    if (info_.sample_type == SampleType::kFloat64) {
+      std::memcpy(out, elevations_.data(), columns * sizeof(double));
+      out += columns * sizeof(double);
+      continue;
+    }
+    for (std::size_t c = 0; c < columns; ++c, out += sizeof(float)) {
+      const auto height = static_cast<float>(elevations_[c]);
+      std::memcpy(out, &height, sizeof height);
+    }
   }
-  if (info_.sample_type == SampleType::kFloat64) {
-    std::memcpy(samples.data(), elevations.data(), elevations.size() * sizeof(double));
-    return;
-  }
-  for (std::size_t i = 0; i < elevations.size(); ++i) {
-    const auto height = static_cast<float>(elevations[i]);
-    std::memcpy(samples.data() + i * sizeof height, &height, sizeof height);
-  }
+}
+
+std::uint64_t GeoidSource::buffer_bytes(std::uint64_t limit) const {
+  // Who limits buffers reads about half as much at once as they may hold.
+  const ReadStep step = ReadStep::make(info_, limit / 2);
+  const std::uint64_t window = step.most_bytes(info_) / size_bytes(info_.sample_type);
+  const std::uint64_t row = 2 * sizeof(double) * static_cast<std::uint64_t>(info_.width);
+  const double columns = std::min(static_cast<double>(info_.width) * info_.georeference.spacing_x, 360.0);
+  return source_->buffer_bytes(limit) + window * size_bytes(source_->info().sample_type) + row +
+         model_->strip_bytes(columns);
 }
 
 }  // namespace isohf
