@@ -300,8 +300,8 @@ class Exporter {
   void each_rows(const char* stage, Take take) {
     const SampleGrid& grid = grid_.samples;
     SurfaceRows surface(
-        archive_.grid(), archive_.metadata().quantisation, [&](TileIndex tile) { return archive_.read_tile(tile); },
-        grid, options_.method);
+        archive_.grid(), archive_.metadata().wraps_x, archive_.metadata().quantisation,
+        [&](TileIndex tile) { return archive_.read_tile(tile); }, grid, options_.method);
     const std::int64_t rows_at_once = std::max<std::int64_t>((std::int64_t{1} << 20U) / grid.width, 1);
     for (std::int64_t row = 0; row < grid.height; row += rows_at_once) {
       const std::int64_t rows = std::min(rows_at_once, grid.height - row);

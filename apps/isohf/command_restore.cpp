@@ -213,8 +213,8 @@ class Restorer {
     const SampleStore store(mapping, void_value, options_.clamp_range);
     const std::unique_ptr<RasterSink> sink = open(mapping, void_value);
     SurfaceRows surface(
-        archive_.grid(), metadata.quantisation, [&](TileIndex tile) { return archive_.read_tile(tile); }, grid_,
-        options_.method.value_or(RestoreMethod::kHex));
+        archive_.grid(), metadata.wraps_x, metadata.quantisation,
+        [&](TileIndex tile) { return archive_.read_tile(tile); }, grid_, options_.method.value_or(RestoreMethod::kHex));
     const std::int64_t rows_at_once = std::max<std::int64_t>((std::int64_t{1} << 20U) / grid_.width, 1);
     Restored restored;
     for (std::int64_t row = 0; row < grid_.height; row += rows_at_once) {

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <numeric>
@@ -50,7 +51,8 @@ TEST(QuinticSpline, ResponseIsTheFilterAndTheSplineInOne) {
 
 /// Tiles of heights that are a function of the place, sampled at every stored vertex.
 template <typename Height>
-SurfaceRows surface_of(const TileGrid& grid, const SampleGrid& samples, RestoreMethod method, Height height) {
+SurfaceRows surface_of(const TileGrid& grid, const SampleGrid& samples, RestoreMethod method, Height height,
+                       bool wraps_x = false) {
   const auto read = [grid, height](TileIndex tile) {
     TileCodes codes;
     codes.type = CodeType::kF32;
@@ -62,7 +64,7 @@ SurfaceRows surface_of(const TileGrid& grid, const SampleGrid& samples, RestoreM
     }
     return codes;
   };
-  return {grid, {CodeType::kF32, 0.0, 1.0}, read, samples, method};
+  return {grid, wraps_x, {CodeType::kF32, 0.0, 1.0}, read, samples, method};
 }
 
 TileGrid three_by_two() {
@@ -86,6 +88,33 @@ TEST(SurfaceRows, HoldsPlanesWhereverTilesMeet) {
       }
     }
   }
+}
+
+TEST(SurfaceRows, GoRoundWhereTheWorldDoes) {
+  const TileGrid grid = three_by_two();
+  const double round = grid.world_width();
+  // The same waves, once with the seam in the middle.
+  const auto waves = [&](double x, double) { return 1000.0 * std::sin(2.0 * M_PI * x / round + 0.4); };
+  const auto shifted = [&](double x, double z) { return waves(x + grid.extent_x(), z); };
+  const SampleGrid samples{96, 20, 0.25, 3.0, round / 96.0, 1.0};
+  const auto all = [&](const auto& height, bool wraps_x) {
+    SurfaceRows rows = surface_of(grid, samples, RestoreMethod::kHex, height, wraps_x);
+    std::vector<double> heights(96 * 20);
+    rows.read(0, 20, heights);
+    return heights;
+  };
+  const std::vector<double> a = all(waves, true);
+  const std::vector<double> b = all(shifted, true);
+  const std::vector<double> open = all(waves, false);
+  double bent = 0.0;
+  for (std::size_t r = 0; r < 20; ++r) {
+    for (std::size_t c = 0; c < 96; ++c) {
+      // A row that goes round begins nowhere; vertices are floats.
+      EXPECT_NEAR(a[r * 96 + (c + 32) % 96], b[r * 96 + c], 1e-3);
+      bent = std::max(bent, std::abs(open[r * 96 + c] - a[r * 96 + c]));
+    }
+  }
+  EXPECT_GT(bent, 1.0) << "mirrored ends are no seam: the test would not see one";
 }
 
 TEST(SurfaceRows, GivesTheSameBitsHoweverItIsCut) {

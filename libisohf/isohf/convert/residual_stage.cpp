@@ -79,7 +79,7 @@ LosslessRecord write_residuals(HeightSource& source, const SourceFrame& frame, c
   record.rows_per_member = rows_per_member(info);
   writer.flush_tiles();
   SurfaceRows surface(
-      grid, quantisation, [&](TileIndex tile) { return writer.read_tile(tile, quantisation); },
+      grid, frame.wraps_x, quantisation, [&](TileIndex tile) { return writer.read_tile(tile, quantisation); },
       {frame.width, frame.height, frame.first_sample_x, frame.first_sample_z, frame.spacing_x, frame.spacing_z},
       record.method);
   Sha256 hash;

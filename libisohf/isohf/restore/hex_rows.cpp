@@ -47,6 +47,15 @@ double beta5(double x) {
   return rest * rest * rest * rest * rest / 120.0;
 }
 
+/// Vertices that a row which goes round is continued by: as far as the prefilter reaches (QuinticResponse::kHalo), and
+/// the spline itself.
+constexpr std::int64_t kRound = QuinticResponse::kHalo + 4;
+
+/// Whether the vertices of a tile's row lie half a column step further West.
+bool is_shifted(std::int64_t tile_row) {
+  return tile_row % 2 == 0;
+}
+
 /// Fills voids between two valid samples along the straight line, beyond the outermost with its value. False where
 /// there is no valid one.
 bool fill_voids(std::span<double> line) {
@@ -114,12 +123,16 @@ void quintic_prefilter(std::span<double> line) {
   for (double& value : line) value *= 120.0;
 }
 
-HexRows::HexRows(const TileGrid& grid, std::vector<double> columns_x) : grid_(grid) {
+HexRows::HexRows(const TileGrid& grid, std::vector<double> columns_x, bool wraps_x) : grid_(grid), wraps_x_(wraps_x) {
   // Even k are odd z, with vertices at object-space x = -1, 1, ...; odd k have them at -2, 0, ...
   for (const double x : columns_x) {
     const double half_steps = x / grid.sigma_x();
     taps_[0].push_back(quintic_weights((half_steps + 1.0) / 2.0));
     taps_[1].push_back(quintic_weights((half_steps + 2.0) / 2.0));
+  }
+  if (!wraps_x) return;
+  for (std::vector<QuinticWeights>& taps : taps_) {
+    for (QuinticWeights& at : taps) at.first += kRound - 1;
   }
 }
 
@@ -127,12 +140,12 @@ std::int64_t HexRows::tile_row_of(std::int64_t row) const {
   return std::clamp<std::int64_t>((row - 1) / grid_.shape().cell_rows(), 0, grid_.tile_rows() - 1);
 }
 
-bool HexRows::straighten(std::int64_t row, const std::vector<std::vector<double>>& tiles, std::span<double> heights,
-                         std::span<char> near_void) const {
+/// The vertices of a lattice row, padding included; of a row that goes round, kRound more on either side instead.
+std::vector<double> HexRows::line_of(std::int64_t row, const std::vector<std::vector<double>>& tiles) const {
   const std::int64_t columns = grid_.shape().columns();
   const std::int64_t cells = grid_.shape().cell_columns();
   const std::int64_t r = row - tile_row_of(row) * grid_.shape().cell_rows();
-  const bool shifted = r % 2 == 0;
+  const bool shifted = is_shifted(r);
   std::vector<double> line(static_cast<std::size_t>(cells * grid_.tile_columns() + (shifted ? 2 : 3)));
   for (std::size_t t = 0; t < tiles.size(); ++t) {
     const double* from = tiles[t].data() + r * columns;
@@ -145,6 +158,19 @@ bool HexRows::straighten(std::int64_t row, const std::vector<std::vector<double>
       std::copy(from, from + columns - 1, to);
     }
   }
+  if (!wraps_x_) return line;
+  const std::int64_t period = cells * grid_.tile_columns();
+  std::vector<double> round;
+  for (std::int64_t k = -kRound; k < period + kRound; ++k) {
+    round.push_back(line[static_cast<std::size_t>(1 + (k % period + period) % period)]);
+  }
+  return round;
+}
+
+bool HexRows::straighten(std::int64_t row, const std::vector<std::vector<double>>& tiles, std::span<double> heights,
+                         std::span<char> near_void) const {
+  const bool shifted = is_shifted(row - tile_row_of(row) * grid_.shape().cell_rows());
+  std::vector<double> line = line_of(row, tiles);
   std::vector<char> voids;
   if (std::any_of(line.begin(), line.end(), [](double h) { return std::isnan(h); })) {
     for (const double height : line) voids.push_back(std::isnan(height) ? 1 : 0);

@@ -36,7 +36,8 @@ void quintic_prefilter(std::span<double> line);
 class HexRows {
  public:
   /// columns_x [n]  the world x of the columns that are wanted, increasing
-  HexRows(const TileGrid& grid, std::vector<double> columns_x);
+  /// wraps_x        rows go all the way round: behind their East end they begin again
+  HexRows(const TileGrid& grid, std::vector<double> columns_x, bool wraps_x);
 
   [[nodiscard]] std::int64_t rows() const { return grid_.tile_rows() * grid_.shape().cell_rows() + 3; }
   [[nodiscard]] std::int64_t tile_row_of(std::int64_t row) const;
@@ -51,7 +52,10 @@ class HexRows {
                   std::span<char> near_void) const;
 
  private:
+  [[nodiscard]] std::vector<double> line_of(std::int64_t row, const std::vector<std::vector<double>>& tiles) const;
+
   TileGrid grid_;
+  bool wraps_x_;
   std::array<std::vector<QuinticWeights>, 2> taps_;  ///< on padding-first rows (even k), and on odd ones
 };
 

@@ -87,7 +87,7 @@ LosslessReader::LosslessReader(const ArchiveReader& archive, const LosslessRecor
     : archive_(archive),
       record_(record),
       surface_(
-          archive.grid(), archive.metadata().quantisation,
+          archive.grid(), archive.metadata().wraps_x, archive.metadata().quantisation,
           [&archive](TileIndex tile) { return archive.read_tile(tile); }, source_grid(archive.metadata().source),
           record.method) {}
 

@@ -51,14 +51,14 @@ SampleGrid source_grid(const SourceRecord& source) {
           source.first_sample_z, source.spacing_x, source.spacing_z};
 }
 
-SurfaceRows::SurfaceRows(const TileGrid& grid, const Quantisation& quantisation, ReadTile read_tile,
+SurfaceRows::SurfaceRows(const TileGrid& grid, bool wraps_x, const Quantisation& quantisation, ReadTile read_tile,
                          const SampleGrid& samples, RestoreMethod method)
     : grid_(grid),
       quantisation_(quantisation),
       read_tile_(std::move(read_tile)),
       samples_(samples),
       method_(method),
-      hex_(grid, method == RestoreMethod::kHex ? columns_of(samples) : std::vector<double>{}) {
+      hex_(grid, method == RestoreMethod::kHex ? columns_of(samples) : std::vector<double>{}, wraps_x) {
   if (samples.width < 1 || samples.height < 1 || !(samples.spacing_x > 0.0) || !(samples.spacing_z > 0.0)) {
     throw Error(ErrorCode::kInvalidArgument,
                 fmt::format("a grid of {}x{} samples {} x {} apart, must have at least one and positive spacing",

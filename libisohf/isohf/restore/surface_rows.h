@@ -47,8 +47,9 @@ class SurfaceRows {
   /// Decodes one tile, wholly void ones too; called from many threads at once.
   using ReadTile = std::function<TileCodes(TileIndex)>;
 
-  SurfaceRows(const TileGrid& grid, const Quantisation& quantisation, ReadTile read_tile, const SampleGrid& samples,
-              RestoreMethod method);
+  /// wraps_x  the grid's East edge is its West edge
+  SurfaceRows(const TileGrid& grid, bool wraps_x, const Quantisation& quantisation, ReadTile read_tile,
+              const SampleGrid& samples, RestoreMethod method);
 
   /// Rows `first` to `first + rows - 1`; calls come in increasing order.
   /// elevations [rows * width] out, vertical units; NaN where the surface has a void or ends.
