@@ -125,6 +125,19 @@ Arguments with_values(const Arguments& given, const std::map<std::string, Lone>&
   return out;
 }
 
+/// CLI11's "--at: 2 required X Z missing" in the words of this program.
+std::string why_mismatched(const std::string& text) {
+  const std::size_t required = text.find(" required ");
+  const std::size_t missing = text.find(" missing");
+  if (required == std::string::npos || missing == std::string::npos) return text;
+  const std::size_t colon = text.find(": ");
+  const std::string option = text.substr(0, colon);
+  const std::string count = text.substr(colon + 2, required - colon - 2);
+  if (count == "1") return option + " lacks its value";
+  const std::size_t value = required + std::string(" required ").size();
+  return fmt::format("{} takes {} values: {} {}", option, count, option, text.substr(value, missing - value));
+}
+
 }  // namespace
 
 std::string nearest_word(const std::string& text, const std::vector<std::string>& candidates) {
@@ -312,9 +325,7 @@ bool CommandLine::parse(const Arguments& given) {
   } catch (const CLI::ExtrasError&) {
     fail(state_->why_unexpected());
   } catch (const CLI::ArgumentMismatch& error) {
-    // "--density: 1 required RATIO missing"
-    const std::string text = error.what();
-    fail(text.find("missing") == std::string::npos ? text : text.substr(0, text.find(':')) + " lacks its value");
+    fail(why_mismatched(error.what()));
   } catch (const CLI::ExcludesError& error) {
     fail(std::string(error.what()) + "; at most one of them may be given");
   } catch (const CLI::FileError& error) {

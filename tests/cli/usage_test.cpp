@@ -104,7 +104,7 @@ TEST(Usage, MissingAndSuperfluousArgumentsAreNamed) {
   expect_usage_error({"verify"}, "no ARCHIVE given");
   expect_usage_error({"sample"}, "no ARCHIVE given");
   expect_usage_error({"convert", "a.tif", "b.isohf", "--density"}, "--density lacks its value");
-  expect_usage_error({"sample", "a.isohf", "--at", "1"}, "--at lacks its value");
+  expect_usage_error({"sample", "a.isohf", "--at", "1"}, "--at takes 2 values: --at X Z");
   expect_usage_error({"convert", "-o", "a", "-o", "b", "c"}, "--output is given 2 times");
 }
 
