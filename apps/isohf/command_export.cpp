@@ -32,8 +32,8 @@ using nlohmann::ordered_json;
 
 constexpr const char* kFooter =
     R"(Without options the samples lie where the source's lay. The format follows from OUTPUT's extension; .tif,
-.exr, .flt, .asc, .r32 and .npy take elevations as float32, .hgt as int16, .png and .r16 as uint16 over the
-range of elevations that there is, with scale and offset in OUTPUT.json. Many tiles share one scale.
+.exr, .flt, .asc, .r32 and .npy take elevations as float32, .hgt as int16, .png, .r16 and .raw as uint16
+over the range of elevations that there is, with scale and offset in OUTPUT.json. Many tiles share one scale.
 With --tile-size or --tiles OUTPUT is cut: NAME_x0_y0.r16 is the North-West tile, x counts East, y South.
 Where the size is left open it becomes the nearest one that makes whole tiles.
 
@@ -96,7 +96,7 @@ std::optional<ExportOptions> parse(const Arguments& arguments) {
   line.group("Arguments");
   line.positional("ARCHIVE", "-i,--input", "Archive to read", options.archive);
   line.positional("OUTPUT", "-o,--output",
-                  "Raster to write: NAME.tif, .exr, .png, .hgt, .asc, .flt, .r16, .r32 or .npy", options.output);
+                  "Raster to write: NAME.tif, .exr, .png, .hgt, .asc, .flt, .r16, .raw, .r32 or .npy", options.output);
   line.flag("--overwrite", "Replace OUTPUT where it exists", options.overwrite);
   line.group("Grid");
   line.option("--size", "WxH", "So many samples over the ground (default: the source's samples)",
@@ -121,7 +121,7 @@ std::optional<ExportOptions> parse(const Arguments& arguments) {
               "Elevations of the lowest and highest sample of an integer type (default of u8 and "
               "u16: those that there are, which takes another pass)",
               [&](const std::string& text) { options.z_range = parse_range(text); });
-  line.option("--z-scale", "FACTOR", "elevation = sample * FACTOR + z-offset",
+  line.option("--z-scale", "FACTOR", "elevation = sample * FACTOR + z-offset (default 1)",
               [&](const std::string& text) { options.z_scale = parse_positive_number(text); });
   line.option("--z-offset", "NUMBER", "See --z-scale (default 0)",
               [&](const std::string& text) { options.z_offset = parse_number(text); });

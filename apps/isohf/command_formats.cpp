@@ -22,7 +22,8 @@ using nlohmann::ordered_json;
 
 constexpr const char* kFooter =
     R"(Inputs are recognised by their first bytes; the extension decides only where a format has no signature.
-Every input takes --registration, --nodata, --valid-range, --fill, --z-scale, --z-offset and --sample-spacing.
+Every input takes --registration, --nodata, --valid-range, --fill, --fill-distance, --z-scale, --z-offset and
+--sample-spacing.
 
 Examples:
   isohf formats

@@ -209,7 +209,8 @@ void CommandLine::positional(const std::string& name, const std::string& flags, 
 
 void CommandLine::positionals(const std::string& usage, const std::string& description,
                               std::vector<std::string>& values) {
-  const std::string name = usage.substr(0, usage.find_first_of(" ."));
+  const std::size_t first = usage.find_first_not_of('[');
+  const std::string name = usage.substr(first, usage.find_first_of(" .") - first);
   state_->app.add_option(name, values, description)->type_name(usage)->group(state_->group);
   state_->usage_positionals += " " + usage;
 }

@@ -28,7 +28,8 @@ class CommandLine {
   /// A value without a name; `flags` ("-i,--input") name it as well.
   void positional(const std::string& name, const std::string& flags, const std::string& description,
                   std::string& value);
-  /// All values without a name that no other positional takes; `usage` is how they are shown: "INPUT... OUTPUT".
+  /// All values without a name that no other positional takes; `usage` is how they are shown: "INPUT... OUTPUT",
+  /// "[INPUT...]".
   void positionals(const std::string& usage, const std::string& description, std::vector<std::string>& values);
   void option(const std::string& flags, const std::string& value_name, const std::string& description, Take take);
   void option(const std::string& flags, const std::string& value_name, const std::string& description,

@@ -52,7 +52,7 @@ std::optional<PlanOptions> parse(const Arguments& arguments) {
   CommandLine line("plan", "Lists tile shapes, or what convert would make of an input.");
   line.group("Arguments");
   std::vector<std::string> names;
-  line.positionals("INPUT...",
+  line.positionals("[INPUT...]",
                    "Rasters of elevations: files, folders, \"patterns*\" and @lists, which form one source (default: "
                    "none, list shapes)",
                    names);

@@ -38,11 +38,11 @@ constexpr const char* kFooter =
     R"(The raster has the samples of the archive's source, at their places, unless another grid is asked for. An
 archive made with --lossless gives the source's samples bit for bit, and their SHA-256 is checked; with
 --method it gives what its surface alone holds.
-Samples are raw numbers in the source's scale and type; only .tif, and the .json beside .png and .r16, have
-room for scale and offset.
+Samples are raw numbers in the source's scale and type; only .tif, and the .json beside .png, .r16, .raw
+and .r32, have room for scale and offset.
 Methods: hex, quintic B-splines along the lattice rows and then down the columns, is nearest to the source;
 barycentric is what a renderer shows. The format follows from RASTER's extension: .tif, .exr,
-.png, .hgt, .asc, .flt, .r16, .r32 or .npy.
+.png, .hgt, .asc, .flt, .r16, .raw, .r32 or .npy.
 
 Examples:
   isohf restore dem.isohf back.tif
@@ -69,7 +69,7 @@ std::optional<RestoreOptions> parse(const Arguments& arguments) {
   line.group("Arguments");
   line.positional("ARCHIVE", "-i,--input", "Archive to read", options.archive);
   line.positional("RASTER", "-o,--output",
-                  "Raster to write: NAME.tif, .exr, .png, .hgt, .asc, .flt, .r16, .r32 or .npy", options.output);
+                  "Raster to write: NAME.tif, .exr, .png, .hgt, .asc, .flt, .r16, .raw, .r32 or .npy", options.output);
   line.flag("--overwrite", "Replace RASTER where it exists", options.overwrite);
   line.group("Grid");
   line.option(

@@ -81,6 +81,7 @@ std::optional<VerifyCommandOptions> parse(const Arguments& arguments) {
               limit(options.max_rms));
   add_source_options(line, options.open);
   add_mosaic_options(line, options.against);
+  line.group("Ground");
   add_geoid_option(line, options.geoid);
   add_work_options(line, options.work);
   add_common_options(line, options.common);

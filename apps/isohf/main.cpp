@@ -62,6 +62,7 @@ Of commands that take a while:
       --progress MODE auto, plain, json or none; on standard error
 Of commands that write a file:
       --overwrite     Replace the output where it exists
+Of convert:
       --resume        Continue an interrupted run
       --memory SIZE   Stay within that much, as in 400M
 Alone:

@@ -16,12 +16,14 @@ void add_source_options(CommandLine& line, OpenOptions& options) {
               "or first fitting one)",
               options.channel);
   line.option("--part", "NAME|N", "Part of an OpenEXR file of several: its name, or its number from 0", options.part);
-  line.option("--encoding", "NAME",
-              "The colours of a PNG are packed elevations: terrarium, mapbox or rgba-float; never guessed",
-              [&](const std::string& text) {
-                (void)parse_word(text, {"terrarium", "mapbox", "rgba-float"});
-                options.channel = text;  // one more channel of the picture, as which archives record it
-              });
+  line.option(
+      "--encoding", "NAME",
+      "The colours of an 8-bit PNG are packed elevations: terrarium, mapbox or rgba-float (default: decoded, with a "
+      "warning, where the bytes leave no doubt)",
+      [&](const std::string& text) {
+        (void)parse_word(text, {"terrarium", "mapbox", "rgba-float"});
+        options.channel = text;  // one more channel of the picture, as which archives record it
+      });
   line.exclusive({"--channel", "--encoding"});
   line.option("--registration", "KIND",
               "Where samples lie: area (middle of a pixel), point (on posts), or auto: as the file says, else posts "
@@ -45,15 +47,16 @@ void add_source_options(CommandLine& line, OpenOptions& options) {
               [&](const std::string& text) { options.voids.valid_range = parse_range(text); });
   line.flag("--fill", "Fill voids smoothly, up to --fill-distance from the nearest elevation", options.voids.fill);
   line.option(
-      "--fill-distance", "D", "Fill voids, as far as D samples, 1 to 4096 (default 100)",
+      "--fill-distance", "D", "Fill voids as far as D samples, 1 to 4096 (default 100); needs no --fill",
       [&](const std::string& text) { options.voids.fill_distance = parse_whole_number(text, 1, kMaxFillDistance); });
-  line.option("--z-scale", "FACTOR", "elevation = raw * FACTOR + z-offset, instead of the file's (default 1)",
+  line.option("--z-scale", "FACTOR",
+              "elevation = raw * FACTOR + z-offset, instead of the file's (default: the file's, else 1)",
               [&](const std::string& text) {
                 const double scale = parse_number(text);
                 if (scale == 0.0) throw Error(ErrorCode::kInvalidArgument, "found '" + text + "', must not be 0");
                 options.z_scale = scale;
               });
-  line.option("--z-offset", "NUMBER", "See --z-scale (default 0)",
+  line.option("--z-offset", "NUMBER", "See --z-scale (default: the file's, else 0)",
               [&](const std::string& text) { options.z_offset = parse_number(text); });
   line.option("--raw", "WxH:TYPE",
               "The input is nothing but samples: columns, rows, and u8, i8, or u16, i16, u32, i32, f32, f64 with le or "

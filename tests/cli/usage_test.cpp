@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <map>
 #include <regex>
 #include <set>
 
@@ -14,8 +15,8 @@ namespace {
 
 using testing::HasSubstr;
 
-const std::vector<std::string> kCommands = {"plan",   "convert", "info",    "verify",    "restore",
-                                            "sample", "shade",   "formats", "experiment"};
+const std::vector<std::string> kCommands = {"plan",   "convert", "info",  "verify",  "restore",
+                                            "export", "sample",  "shade", "formats", "experiment"};
 
 std::set<std::string> long_options_in(const std::string& text) {
   std::set<std::string> found;
@@ -76,11 +77,40 @@ TEST(Usage, HelpKnowsTheOptionsOfTheTask) {
   }
 }
 
-TEST(Usage, TheManualKnowsEveryOption) {
-  const std::set<std::string> manual = long_options_in(read_file(ISOHF_SOURCE_DIR "/docs/cli.md"));
+/// The options that --help describes, not those that its text merely names: where a line begins with an option, or with
+/// its letter and the option.
+std::set<std::string> options_described_in(const std::string& help) {
+  std::set<std::string> described;
+  const std::regex option("\n +(-[A-Za-z], )?(--[a-z][a-z0-9-]+)");
+  for (std::sregex_iterator at(help.begin(), help.end(), option), end; at != end; ++at) described.insert((*at)[2]);
+  return described;
+}
+
+/// The options that a part of the manual names, from its heading "## ..." to the next such.
+std::set<std::string> options_in_section(const std::string& manual, const std::string& heading) {
+  const std::size_t begin = manual.find("\n## " + heading + "\n");
+  EXPECT_NE(begin, std::string::npos) << heading;
+  if (begin == std::string::npos) return {};
+  return long_options_in(manual.substr(begin, manual.find("\n## ", begin + 1) - begin));
+}
+
+TEST(Usage, TheManualKnowsEveryOptionInTheCommandsOwnPart) {
+  const std::string manual = read_file(ISOHF_SOURCE_DIR "/docs/cli.md");
+  // What a part says to hold as elsewhere.
+  const std::map<std::string, std::vector<std::string>> also = {{"plan", {"Input options", "convert"}},
+                                                                {"convert", {"Input options"}},
+                                                                {"info", {"Input options"}},
+                                                                {"verify", {"Input options"}}};
   for (const std::string& command : kCommands) {
-    for (const std::string& option : long_options_in(run_isohf({command, "--help"}).out)) {
-      EXPECT_TRUE(manual.contains(option)) << command << " " << option;
+    std::set<std::string> named = options_in_section(manual, "Common options");
+    // In the manual's first lines.
+    named.insert({"--input", "--output"});
+    named.merge(options_in_section(manual, command));
+    if (const auto others = also.find(command); others != also.end()) {
+      for (const std::string& heading : others->second) named.merge(options_in_section(manual, heading));
+    }
+    for (const std::string& option : options_described_in(run_isohf({command, "--help"}).out)) {
+      EXPECT_TRUE(named.contains(option)) << command << " " << option;
     }
   }
 }
@@ -214,11 +244,7 @@ TEST(Usage, BashCompletesEveryCommandOptionAndWord) {
     EXPECT_THAT(commands, HasSubstr(" " + command + " "));
     const std::string help = run_isohf({command, "--help"}).out;
     const std::set<std::string> offered = long_options_in(completions_of(" " + command + " --", 2));
-    // Where a line of the help begins with an option, or with its letter and the option.
-    const std::regex option("\n +(-[A-Za-z], )?(--[a-z][a-z0-9-]+)");
-    std::set<std::string> described;
-    for (std::sregex_iterator at(help.begin(), help.end(), option), end; at != end; ++at) described.insert((*at)[2]);
-    EXPECT_EQ(offered, described) << command;
+    EXPECT_EQ(offered, options_described_in(help)) << command;
   }
   EXPECT_EQ(completions_of(" restore --method h", 3), "hex\n");
   EXPECT_EQ(completions_of(" shade --palette g", 3), "gray\n");
