@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 #include <sys/mman.h>
+#include <sys/stat.h>
 #include <tiffio.h>
 
 #include <algorithm>
@@ -176,6 +177,18 @@ struct TiffHandle::Impl {
     return 1;
   }
 
+  /// The system kills a process that looks at mapped bytes which another one has cut off the file. Between this look
+  /// and the decoder's there is still a moment in which that can happen.
+  void check_map() const {
+    if (map_base == nullptr) return;
+    struct stat status = {};
+    if (::fstat(file.descriptor(), &status) == 0 && static_cast<std::uint64_t>(status.st_size) < map_bytes) {
+      throw Error(ErrorCode::kIo, fmt::format("{}: has {} bytes, had {} when it was opened: another program cut it; no "
+                                              "file may be changed while it is read",
+                                              file.path(), status.st_size, map_bytes));
+    }
+  }
+
   static void on_unmap(thandle_t self, void* base, toff_t size) {
     ::munmap(base, size);
     static_cast<Impl*>(self)->map_base = nullptr;
@@ -300,6 +313,7 @@ void TiffHandle::decode_block(std::uint64_t index, bool tiled, std::span<std::by
 
 void TiffHandle::decode_row(std::int64_t row, std::int64_t plane, std::span<std::byte> bytes) {
   impl_->forget_messages();
+  impl_->check_map();
   const int result =
       TIFFReadScanline(impl_->tif, bytes.data(), static_cast<std::uint32_t>(row), static_cast<std::uint16_t>(plane));
   if (result != 1 || impl_->invented()) impl_->fail(fmt::format("row {} cannot be decoded", row));

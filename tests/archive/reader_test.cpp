@@ -5,9 +5,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
 #include <cstdlib>
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <thread>
@@ -119,6 +121,36 @@ TEST_F(ArchiveReaderTest, RefusesEveryTruncation) {
     const std::vector<std::byte> cut(good_.begin(), good_.begin() + static_cast<std::ptrdiff_t>(size));
     test::write_file(path(), cut);
     EXPECT_THROW(ArchiveReader{path()}, Error) << size;
+  }
+}
+
+/// The error's text; it must be one of input and output.
+std::string io_error_of(const std::function<void()>& deed) {
+  try {
+    deed();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::kIo);
+    return error.what();
+  }
+  return "no error";
+}
+
+TEST_F(ArchiveReaderTest, SaysThatAnotherProgramCutTheOpenFile) {
+  ASSERT_GT(good_.size(), 2 * 4096U);  // so that whole pages of a map go with what is cut
+  const auto is_told = HasSubstr(": another program cut it");
+  for (const std::size_t left : {std::size_t{0}, std::size_t{100}, std::size_t{4096}, good_.size() - 4097}) {
+    SCOPED_TRACE(left);
+    test::write_file(path(), good_);
+    const ArchiveReader reader(path());
+    const ArchiveReader knows_members(path());
+    const MemberEntry member = knows_members.members().back();
+    std::filesystem::resize_file(path(), left);
+    const TileIndex last = grid_.tile_at(grid_.tile_count() - 1);
+    EXPECT_THAT(io_error_of([&] { (void)reader.read_tile(last); }), is_told);
+    EXPECT_THAT(io_error_of([&] { (void)reader.read_tiles(std::array{last}); }), is_told);
+    EXPECT_THAT(io_error_of([&] { (void)reader.members(); }), is_told);
+    EXPECT_THAT(io_error_of([&] { (void)knows_members.read_member(member); }), is_told);
+    EXPECT_THAT(reader.check_structure(), testing::Contains(is_told));
   }
 }
 

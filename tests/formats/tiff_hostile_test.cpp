@@ -225,5 +225,28 @@ TEST_F(TiffHostile, NothingIsPrinted) {
   EXPECT_EQ(::testing::internal::GetCapturedStdout(), "");
 }
 
+/// Strips too large to be read at once are mapped.
+TEST_F(TiffHostile, FileThatIsCutWhileItIsReadIsAnError) {
+  constexpr std::int64_t kWidth = 8192;
+  constexpr std::int64_t kHeight = 4300;
+  constexpr int kPackBits = 32773;
+  TiffBytes tiff;
+  // "One byte follows: 0", over and over: 70 MB.
+  tiff.image(kWidth, kHeight, 8, 1, kHeight, kPackBits).block(std::string(2 * kWidth * kHeight, '\0'));
+  const std::string path = tiff.write(folder() / "a.tif");
+  const std::unique_ptr<HeightSource> source = open_tiff(path, {});
+  std::vector<std::byte> row(kWidth, std::byte{1});
+  source->read_window({0, 0, kWidth, 1}, row);
+  EXPECT_EQ(row, std::vector<std::byte>(kWidth, std::byte{0}));
+  std::filesystem::resize_file(path, 4096);
+  try {
+    source->read_window({0, kHeight - 1, kWidth, 1}, row);
+    ADD_FAILURE() << "no error";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::kIo);
+    EXPECT_NE(std::string(error.what()).find("a.tif: has 4096 bytes, had "), std::string::npos) << error.what();
+  }
+}
+
 }  // namespace
 }  // namespace isohf

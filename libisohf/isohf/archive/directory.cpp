@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "isohf/archive/deflate.h"
 #include "isohf/base/error.h"
@@ -146,15 +147,14 @@ void check_profile(std::span<const std::byte> file, const ZipEnd& end, const Com
   }
 }
 
-std::vector<std::byte> read_data(std::span<const std::byte> file, const ZipEntry& entry, std::uint64_t data_offset) {
-  const auto data = file.subspan(data_offset, entry.compressed_bytes);
+std::vector<std::byte> member_from(std::vector<std::byte> data, const ZipEntry& entry) {
   std::vector<std::byte> bytes;
   if (entry.method == static_cast<std::uint16_t>(ZipMethod::kStored)) {
     if (entry.bytes != entry.compressed_bytes) {
       throw Error(ErrorCode::kCorrupt, fmt::format("{}: is stored, but states {} bytes of {}", describe(entry),
                                                    entry.compressed_bytes, entry.bytes));
     }
-    bytes.assign(data.begin(), data.end());
+    bytes = std::move(data);
   } else if (entry.method == static_cast<std::uint16_t>(ZipMethod::kDeflated)) {
     // Deflate makes at most 1032 bytes of one: a larger claim is not worth the memory.
     if (entry.bytes / 1032 > entry.compressed_bytes) {

@@ -40,9 +40,9 @@ using Complain = std::function<void(const std::string&)>;
 /// writer makes it, members back to back from byte 0 on, metadata first, index last and right before the directory.
 void check_profile(std::span<const std::byte> file, const ZipEnd& end, const Complain& complain);
 
-/// The data of a member, inflated where it is deflated, its CRC checked. Throws Error{kCorrupt, kUnsupported}.
-[[nodiscard]] std::vector<std::byte> read_data(std::span<const std::byte> file, const ZipEntry& entry,
-                                               std::uint64_t data_offset);
+/// A member of its data as they are in the file: inflated where they are deflated, the CRC checked.
+/// Throws Error{kCorrupt, kUnsupported}.
+[[nodiscard]] std::vector<std::byte> member_from(std::vector<std::byte> data, const ZipEntry& entry);
 
 /// "member "a/b" at byte 4711".
 [[nodiscard]] std::string describe(const ZipEntry& entry);

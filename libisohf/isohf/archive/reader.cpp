@@ -63,9 +63,8 @@ struct ArchiveReader::State {
   std::optional<Metadata> metadata;
   std::vector<std::string> warnings;
   bool by_directory = false;
-  std::span<const std::byte> records;  ///< the index in the file,
-  std::vector<Listed> listed;          ///< or the tiles of the directory, by flat index
-  std::uint64_t data_end = 0;          ///< tiles lie before it
+  std::vector<Listed> listed;  ///< with `by_directory`: its tiles, by flat index
+  std::uint64_t data_end = 0;  ///< tiles lie before it; without `by_directory` the index begins there
   mutable std::once_flag members_read;
   mutable std::vector<MemberEntry> members;
 
@@ -76,16 +75,28 @@ struct ArchiveReader::State {
   [[nodiscard]] const Listed* find_listed(std::int64_t flat) const;
   [[nodiscard]] TileEntry record(std::int64_t flat) const;
   [[nodiscard]] TileEntry checked_record(std::int64_t flat, TileIndex tile) const;
-  void check_local_header(const TileEntry& entry, TileIndex tile) const;
+  [[nodiscard]] std::vector<std::byte> read(std::uint64_t offset_bytes, std::uint64_t size_bytes) const;
+  [[nodiscard]] std::vector<std::byte> member(const ZipEntry& entry, std::uint64_t data_offset) const;
   [[nodiscard]] std::vector<std::byte> payload(const TileEntry& entry, TileIndex tile) const;
   void read_members() const;
   void check_against_index(const Directory& directory, const Complain& complain) const;
 };
 
+/// Not through the map: a file that was cut after it was opened is an error, not the end of the process.
+std::vector<std::byte> ArchiveReader::State::read(std::uint64_t offset_bytes, std::uint64_t size_bytes) const {
+  std::vector<std::byte> bytes(size_bytes);
+  mapped.read(offset_bytes, bytes);
+  return bytes;
+}
+
+std::vector<std::byte> ArchiveReader::State::member(const ZipEntry& entry, std::uint64_t data_offset) const {
+  return member_from(read(data_offset, entry.compressed_bytes), entry);
+}
+
 void ArchiveReader::State::open() {
   end = find_zip_end(file);
   const ZipEntry entry = metadata_entry(file, end);
-  const std::vector<std::byte> bytes = read_data(file, entry, checked_data_offset(file, entry));
+  const std::vector<std::byte> bytes = member(entry, checked_data_offset(file, entry));
   json.assign(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   try {
     metadata.emplace(parse_metadata(json));
@@ -111,7 +122,6 @@ bool ArchiveReader::State::use_index() {
   if (crc32(found) != footer->records_crc32) return false;
   const auto directory = file.subspan(end.directory_offset, footer->directory_bytes);
   if (crc32(directory) != footer->directory_crc32) return false;
-  records = found;
   data_end = start;
   return true;
 }
@@ -150,7 +160,7 @@ void ArchiveReader::State::take_ranges_from_index(const Directory& directory) {
   if (member == directory.members.end() || member->entry.bytes != tiles * kIndexRecordBytes + kIndexFooterBytes) return;
   std::vector<std::byte> old;
   try {
-    old = read_data(file, member->entry, member->data_offset);
+    old = this->member(member->entry, member->data_offset);
   } catch (const Error&) {
     return;  // tiles are read without it
   }
@@ -179,7 +189,9 @@ TileEntry ArchiveReader::State::record(std::int64_t flat) const {
     return tile == nullptr ? TileEntry{} : tile->entry;
   }
   const std::uint64_t at = static_cast<std::uint64_t>(flat) * kIndexRecordBytes;
-  const auto entry = parse_index_record(records.subspan(at, kIndexRecordBytes));
+  std::array<std::byte, kIndexRecordBytes> bytes{};
+  mapped.read(data_end + at, bytes);
+  const auto entry = parse_index_record(bytes);
   if (!entry) {
     throw Error(ErrorCode::kCorrupt,
                 fmt::format("member \"{}\" at byte {}: the record of tile {} has reserved bits set", kIndexName,
@@ -205,25 +217,22 @@ TileEntry ArchiveReader::State::checked_record(std::int64_t flat, TileIndex tile
   return entry;
 }
 
-/// The local header must say what the index says, or the offset is not a tile's.
-void ArchiveReader::State::check_local_header(const TileEntry& entry, TileIndex tile) const {
-  ZipMember member{tile_name(tile),        ZipMethod::kDeflated, entry.payload_crc32,
-                   entry.compressed_bytes, entry.payload_bytes,  0};
-  const std::uint64_t bytes = local_header_bytes(member);
+std::vector<std::byte> ArchiveReader::State::payload(const TileEntry& entry, TileIndex tile) const {
+  const bool is_deflated = !by_directory || find_listed(metadata->grid.flat_index(tile))->deflated;
   std::vector<std::byte> header;
-  append_local_header(member, header);
-  if (entry.offset_bytes < bytes ||
-      !std::equal(header.begin(), header.end(),
-                  file.begin() + static_cast<std::ptrdiff_t>(entry.offset_bytes - bytes))) {
+  if (!by_directory) {
+    append_local_header(
+        {tile_name(tile), ZipMethod::kDeflated, entry.payload_crc32, entry.compressed_bytes, entry.payload_bytes, 0},
+        header);
+  }
+  const std::uint64_t before = std::min<std::uint64_t>(header.size(), entry.offset_bytes);
+  const std::vector<std::byte> stored = read(entry.offset_bytes - before, before + entry.compressed_bytes);
+  // The local header must say what the index says, or the offset is not a tile's.
+  if (before < header.size() || !std::equal(header.begin(), header.end(), stored.begin())) {
     throw Error(ErrorCode::kCorrupt, "its local header does not say what the index says");
   }
-}
-
-std::vector<std::byte> ArchiveReader::State::payload(const TileEntry& entry, TileIndex tile) const {
-  const auto data = file.subspan(entry.offset_bytes, entry.compressed_bytes);
+  const auto data = std::span(stored).subspan(before);
   std::vector<std::byte> bytes;
-  const bool is_deflated = !by_directory || find_listed(metadata->grid.flat_index(tile))->deflated;
-  if (!by_directory) check_local_header(entry, tile);
   if (is_deflated) {
     bytes.resize(entry.payload_bytes);
     inflate_exactly(data, bytes);
@@ -239,6 +248,7 @@ std::vector<std::byte> ArchiveReader::State::payload(const TileEntry& entry, Til
 }
 
 void ArchiveReader::State::read_members() const {
+  mapped.check_size();
   const Directory directory =
       read_directory(file, end, std::nullopt, [](const std::string& what) { throw Error(ErrorCode::kCorrupt, what); });
   std::vector<MemberEntry> found;
@@ -369,8 +379,7 @@ std::vector<TileCodes> ArchiveReader::read_tiles(std::span<const TileIndex> tile
 bool ArchiveReader::zlib_reads(TileIndex tile) const {
   const TileEntry entry = tile_entry(tile);
   if (!entry.stored || state_->by_directory) return true;  // zipped again by another program: not our stream
-  return zlib_inflates_to(state_->file.subspan(entry.offset_bytes, entry.compressed_bytes),
-                          state_->payload(entry, tile));
+  return zlib_inflates_to(state_->read(entry.offset_bytes, entry.compressed_bytes), state_->payload(entry, tile));
 }
 
 std::vector<double> ArchiveReader::read_elevations(TileIndex tile) const {
@@ -403,7 +412,7 @@ std::vector<std::byte> ArchiveReader::read_member(const MemberEntry& member) con
   entry.bytes = member.bytes;
   entry.header_offset = member.offset_bytes;
   try {
-    return read_data(state_->file, entry, member.offset_bytes);
+    return state_->member(entry, member.offset_bytes);
   } catch (const Error& error) {
     throw error.within(path());
   }
@@ -414,13 +423,14 @@ std::vector<std::string> ArchiveReader::check_structure() const {
   std::vector<std::string> found = state.warnings;
   const auto complain = [&](const std::string& what) { found.push_back(what); };
   try {
+    state.mapped.check_size();
     const Directory directory = read_directory(state.file, state.end, grid(), complain);
     if (!state.by_directory) {
       state.check_against_index(directory, complain);
       check_profile(state.file, state.end, complain);
     }
     for (const Directory::Member& member : directory.members) {
-      static_cast<void>(read_data(state.file, member.entry, member.data_offset));
+      static_cast<void>(state.member(member.entry, member.data_offset));
     }
   } catch (const Error& error) {
     complain(error.what());

@@ -143,17 +143,30 @@ void File::close() {
   if (descriptor_ >= 0 && ::close(std::exchange(descriptor_, -1)) != 0) fail(path_, "cannot close", errno);
 }
 
-MappedFile::MappedFile(const std::string& path) : path_(path) {
-  const File file(path, File::Mode::kRead);
-  size_ = file.size_bytes();
+MappedFile::MappedFile(const std::string& path) : file_(path, File::Mode::kRead) {
+  size_ = file_.size_bytes();
   if (size_ == 0) return;
-  void* mapped = ::mmap(nullptr, size_, PROT_READ, MAP_SHARED, file.descriptor_, 0);
+  void* mapped = ::mmap(nullptr, size_, PROT_READ, MAP_SHARED, file_.descriptor_, 0);
   if (mapped == MAP_FAILED) fail(path, "cannot map", errno);
   data_ = static_cast<const std::byte*>(mapped);
 }
 
 MappedFile::~MappedFile() {
   if (data_ != nullptr) ::munmap(const_cast<std::byte*>(data_), size_);
+}
+
+void MappedFile::read(std::uint64_t offset_bytes, std::span<std::byte> out) const {
+  if (file_.read_at(offset_bytes, out) == out.size()) return;
+  check_size();
+  throw Error(ErrorCode::kIo, fmt::format("ends before byte {}", offset_bytes + out.size()));
+}
+
+void MappedFile::check_size() const {
+  if (const std::uint64_t now = file_.size_bytes(); now < size_) {
+    throw Error(ErrorCode::kIo, fmt::format("has {} bytes, had {} when it was opened: another program cut it; no "
+                                            "file may be changed while it is read",
+                                            now, size_));
+  }
 }
 
 bool rename_file(const std::string& from, const std::string& to, bool overwrite) {

@@ -50,6 +50,9 @@ class File {
 };
 
 /// A whole file, mapped for reading.
+///
+/// The system kills a process that looks at mapped bytes which another one has cut off the file meanwhile. So read()
+/// fetches what is needed long after opening, and check_size() goes before every walk over bytes().
 class MappedFile {
  public:
   /// Throws Error{kIo} where the file cannot be opened or mapped. An empty file maps to an empty span.
@@ -59,10 +62,15 @@ class MappedFile {
   MappedFile& operator=(const MappedFile&) = delete;
 
   [[nodiscard]] std::span<const std::byte> bytes() const { return {data_, size_}; }
-  [[nodiscard]] const std::string& path() const { return path_; }
+  [[nodiscard]] const std::string& path() const { return file_.path(); }
+
+  /// Copies bytes out of the file, not the map. Throws Error{kIo} without the path where the file has become shorter.
+  void read(std::uint64_t offset_bytes, std::span<std::byte> out) const;
+  /// Throws Error{kIo} without the path where the file has become shorter than it was when it was opened.
+  void check_size() const;
 
  private:
-  std::string path_;
+  File file_;
   const std::byte* data_ = nullptr;
   std::size_t size_ = 0;
 };
