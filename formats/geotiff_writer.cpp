@@ -206,8 +206,9 @@ GeoTags geotiff_tags(const Georeference& georeference, const std::optional<Proje
   GeoTags tags;
   const bool has_unit = georeference.unit != HorizontalUnit::kUnknown;
   const bool has_spacing = georeference.spacing_x != 1.0 || georeference.spacing_y != 1.0;
-  if (!has_unit && !has_spacing && !georeference.has_origin) return tags;
-  tags.pixel_scale = {georeference.spacing_x, georeference.spacing_y, 0.0};
+  const bool is_area = georeference.registration == Registration::kArea;
+  if (!has_unit && !has_spacing && !georeference.has_origin && !is_area) return tags;
+  if (has_spacing || georeference.has_origin) tags.pixel_scale = {georeference.spacing_x, georeference.spacing_y, 0.0};
   if (georeference.has_origin) {
     const double to_corner = georeference.registration == Registration::kPoint ? 0.0 : 0.5;
     tags.tiepoints = {0.0,

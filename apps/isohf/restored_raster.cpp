@@ -99,7 +99,9 @@ RasterSpec restored_raster(const Metadata& metadata, const SampleGrid& grid, Sam
   place.system = horizontal_system(source);
   place.system.vertical_datum = source.vertical_datum;
   place.system.vertical_epsg = source.vertical_epsg;
-  if (place.has_origin) spec.georeference = place;
+  // Without a position a point of unit spacing is what a raster that says nothing is taken for.
+  const bool has_spacing = place.spacing_x != 1.0 || place.spacing_y != 1.0;
+  if (place.has_origin || has_spacing || place.registration == Registration::kArea) spec.georeference = place;
   return spec;
 }
 

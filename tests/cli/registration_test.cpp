@@ -149,12 +149,15 @@ class RegistrationOf : public testing::Test {
     arguments.insert(arguments.end(), options.begin(), options.end());
     const json before = json::parse(run_isohf(arguments).out);
     const json after = info(folder / "back.tif");
-    if (!before.at("origin").is_null()) {  // a TIFF without a georeference says nothing of registration
-      EXPECT_EQ(after.at("registration"), before.at("registration"));
+    EXPECT_EQ(after.at("registration"), before.at("registration"));
+    EXPECT_EQ(after.at("origin").is_null(), before.at("origin").is_null());
+    for (const char* axis : {"x", "y"}) {
+      EXPECT_NEAR(after.at("spacing").at(axis).get<double>(), before.at("spacing").at(axis).get<double>(), 1e-9);
+    }
+    if (!before.at("origin").is_null()) {
       for (const char* axis : {"x", "y"}) {
         EXPECT_NEAR(after.at("origin").at(axis).get<double>(), before.at("origin").at(axis).get<double>(),
                     kShift * kSpacing);
-        EXPECT_NEAR(after.at("spacing").at(axis).get<double>(), kSpacing, 1e-9);
       }
     }
     const auto source = open_source(folder / "back.tif", {});
@@ -223,6 +226,23 @@ TEST_F(RegistrationOf, ExrAndPngAreWhatTheUserSays) {
     expect_all(folder / name, true, {"--sample-spacing", "10", "--registration", "area"});
     expect_all(folder / name, false, {"--sample-spacing", "10", "--registration", "point"});
     expect_all(folder / name, false, {"--sample-spacing", "10"});  // without a georeference: posts
+  }
+}
+
+TEST_F(RegistrationOf, SurvivesRestoringASourceWithoutGeoreference) {
+  write_ramp<float>(folder / "r.exr", SampleType::kFloat32, std::nullopt);
+  for (const char* registration : {"area", "point"}) {
+    convert(folder / "r.exr", {"--registration", registration});
+    for (const char* extension : {".tif", ".r32"}) {
+      const std::string path = folder / ("back" + std::string(extension));
+      const RunResult result = run_isohf({"restore", folder / "a.isohf", path, "--overwrite", "-q"});
+      ASSERT_EQ(result.exit_code, 0) << result.err;
+      const json found = info(path);
+      EXPECT_EQ(found.at("registration"), registration) << path;
+      EXPECT_TRUE(found.at("origin").is_null()) << path;
+      EXPECT_EQ(found.at("spacing").at("x"), 1.0) << path;
+      EXPECT_EQ(found.at("warnings").size(), 0U) << path;
+    }
   }
 }
 
