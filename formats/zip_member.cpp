@@ -4,6 +4,7 @@
 #include <zlib.h>
 
 #include <algorithm>
+#include <optional>
 
 #include "formats/text_tokens.h"
 #include "isohf/base/bytes.h"
@@ -17,7 +18,16 @@ constexpr std::uint32_t kEntrySignature = 0x02014B50;
 constexpr std::uint32_t kHeaderSignature = 0x04034B50;
 constexpr std::size_t kEndBytes = 22;
 constexpr std::size_t kHeaderBytes = 30;
-constexpr std::uint32_t kZip64 = 0xFFFFFFFF;
+constexpr std::uint32_t kEnd64Signature = 0x06064B50;
+constexpr std::uint32_t kLocatorSignature = 0x07064B50;
+constexpr std::size_t kEnd64Bytes = 56;
+constexpr std::size_t kLocatorBytes = 20;
+/// A field of these bits has its number in the Zip64 records instead.
+constexpr std::uint16_t kElsewhere16 = 0xFFFF;
+constexpr std::uint32_t kElsewhere32 = 0xFFFFFFFF;
+constexpr std::uint16_t kZip64Field = 0x0001;
+/// Millions of members: no raster's archive has so many, damaged sizes do.
+constexpr std::uint64_t kMostDirectoryBytes = std::uint64_t{256} << 20U;
 /// The comment after the end record has at most 65535 bytes.
 constexpr std::uint64_t kLongestTail = kEndBytes + 65535;
 
@@ -26,10 +36,32 @@ constexpr std::uint64_t kLongestTail = kEndBytes + 65535;
 }
 
 struct End {
-  std::uint16_t entries = 0;
-  std::uint32_t directory_bytes = 0;
-  std::uint32_t directory_offset = 0;
+  std::uint64_t entries = 0;
+  std::uint64_t directory_bytes = 0;
+  std::uint64_t directory_offset = 0;
 };
+
+/// The Zip64 end record, by the locator that lies right before the end record at `end_offset`; nullopt without one.
+std::optional<End> find_end64(const RawFile& file, std::uint64_t end_offset) {
+  if (end_offset < kLocatorBytes + kEnd64Bytes) return std::nullopt;
+  std::vector<std::byte> bytes(kLocatorBytes);
+  file.read(end_offset - kLocatorBytes, bytes);
+  ByteReader locator(bytes);
+  if (locator.read<std::uint32_t>() != kLocatorSignature) return std::nullopt;
+  (void)locator.read_bytes(4);  // disk
+  const auto offset = locator.read<std::uint64_t>();
+  if (offset > end_offset - kLocatorBytes - kEnd64Bytes) corrupt(file, "its Zip64 directory's end lies outside");
+  bytes.resize(kEnd64Bytes);
+  file.read(offset, bytes);
+  ByteReader in(bytes, offset);
+  if (in.read<std::uint32_t>() != kEnd64Signature) corrupt(file, "its Zip64 directory's end is damaged");
+  (void)in.read_bytes(28);  // size of this record, versions, disk numbers, entries on this disk
+  End end;
+  end.entries = in.read<std::uint64_t>();
+  end.directory_bytes = in.read<std::uint64_t>();
+  end.directory_offset = in.read<std::uint64_t>();
+  return end;
+}
 
 End find_end(const RawFile& file) {
   std::vector<std::byte> tail(static_cast<std::size_t>(std::min(kLongestTail, file.size_bytes())));
@@ -43,9 +75,33 @@ End find_end(const RawFile& file) {
     end.entries = in.read<std::uint16_t>();
     end.directory_bytes = in.read<std::uint32_t>();
     end.directory_offset = in.read<std::uint32_t>();
+    // 65535 members are as good a number as any where there is no Zip64 record.
+    const bool elsewhere = end.directory_bytes == kElsewhere32 || end.directory_offset == kElsewhere32;
+    if (!elsewhere && end.entries != kElsewhere16) return end;
+    if (const auto end64 = find_end64(file, file.size_bytes() - tail.size() + at)) return *end64;
+    if (elsewhere) corrupt(file, "is damaged: its Zip64 directory's end is not there");
     return end;
   }
   corrupt(file, "is truncated or no zip archive: its directory's end is not there");
+}
+
+/// Takes the numbers that their own fields had no room for, in the order of the standard.
+void read_zip64_field(std::span<const std::byte> extra, ZipMember& member) {
+  ByteReader in(extra);
+  while (in.remaining() >= 4) {
+    const auto kind = in.read<std::uint16_t>();
+    const std::size_t bytes = in.read<std::uint16_t>();
+    if (kind != kZip64Field) {
+      (void)in.read_bytes(bytes);
+      continue;
+    }
+    ByteReader numbers(in.read_bytes(bytes));
+    for (std::uint64_t* const number : {&member.size_bytes, &member.stored_bytes, &member.header_offset_bytes}) {
+      if (*number == kElsewhere32) *number = numbers.read<std::uint64_t>();
+    }
+    return;
+  }
+  throw Error(ErrorCode::kCorrupt, member.name + ": its Zip64 field is not there");
 }
 
 ZipMember read_entry(const RawFile& file, ByteReader& in) {
@@ -65,7 +121,12 @@ ZipMember read_entry(const RawFile& file, ByteReader& in) {
   member.header_offset_bytes = in.read<std::uint32_t>();
   const auto name = in.read_bytes(name_bytes);
   member.name = one_line({reinterpret_cast<const char*>(name.data()), name.size()});
-  (void)in.read_bytes(extra_bytes + comment_bytes);
+  const auto extra = in.read_bytes(extra_bytes);
+  (void)in.read_bytes(comment_bytes);
+  if (member.size_bytes == kElsewhere32 || member.stored_bytes == kElsewhere32 ||
+      member.header_offset_bytes == kElsewhere32) {
+    read_zip64_field(extra, member);
+  }
   return member;
 }
 
@@ -98,16 +159,19 @@ void inflate_raw(const RawFile& file, const ZipMember& member, std::vector<std::
 
 std::vector<ZipMember> zip_members(const RawFile& file) {
   const End end = find_end(file);
-  if (end.directory_offset == kZip64) throw Error(ErrorCode::kUnsupported, file.path() + ": is a Zip64 archive");
-  if (std::uint64_t{end.directory_offset} + end.directory_bytes > file.size_bytes()) {
+  if (end.directory_offset > file.size_bytes() || end.directory_bytes > file.size_bytes() - end.directory_offset) {
     corrupt(file, "the zip directory lies outside the file");
   }
-  std::vector<std::byte> directory(end.directory_bytes);
+  if (end.directory_bytes > kMostDirectoryBytes) {
+    throw Error(ErrorCode::kUnsupported, fmt::format("{}: the zip directory has {} bytes, at most {} are read",
+                                                     file.path(), end.directory_bytes, kMostDirectoryBytes));
+  }
+  std::vector<std::byte> directory(static_cast<std::size_t>(end.directory_bytes));
   file.read(end.directory_offset, directory);
   std::vector<ZipMember> members;
   try {
     ByteReader in(directory, end.directory_offset);
-    for (int i = 0; i < end.entries; ++i) members.push_back(read_entry(file, in));
+    for (std::uint64_t i = 0; i < end.entries; ++i) members.push_back(read_entry(file, in));
   } catch (const Error& error) {
     throw error.within(file.path() + ": zip directory");
   }
@@ -121,6 +185,7 @@ std::uint64_t zip_member_begin(const RawFile& file, const ZipMember& member) {
         fmt::format("{}: {} is {}; stored and deflated members are read", file.path(), member.name,
                     member.encrypted ? std::string("encrypted") : fmt::format("packed by method {}", member.method)));
   }
+  if (member.header_offset_bytes > file.size_bytes()) corrupt(file, member.name + " lies outside the file");
   std::vector<std::byte> header(kHeaderBytes);
   file.read(member.header_offset_bytes, header);
   ByteReader fields(header);

@@ -9,7 +9,7 @@
 
 namespace isohf {
 
-/// One file of a zip archive (PKWARE APPNOTE 6.3, without Zip64).
+/// One file of a zip archive (PKWARE APPNOTE 6.3, Zip64 included).
 struct ZipMember {
   std::string name;
   std::uint16_t method = 0;  ///< 0 stored, 8 deflated

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cstring>
+
 #include <filesystem>
 #include <fstream>
 
@@ -34,8 +36,9 @@ std::vector<std::byte> tile(int columns, int rows) {
   return bytes;
 }
 
-std::vector<std::byte> zipped(const std::string& name, const std::vector<std::byte>& contents, bool deflated) {
-  return testing::zip_archive({{name, contents}}, deflated);
+std::vector<std::byte> zipped(const std::string& name, const std::vector<std::byte>& contents, bool deflated,
+                              bool zip64 = false) {
+  return testing::zip_archive({{name, contents}}, deflated, zip64);
 }
 
 ErrorCode code_of(const std::string& path, const OpenOptions& options = {}) {
@@ -131,8 +134,9 @@ TEST_F(HgtSource, WindowsEqualTheWhole) {
 }
 
 TEST_F(HgtSource, ReadsStoredAndDeflatedMembers) {
-  for (const bool deflated : {false, true}) {
-    const auto source = open_hgt(write("any.hgt.zip", zipped("folder/S10W070.hgt", tile(11, 11), deflated)), {});
+  for (const int kind : {0, 1, 2, 3}) {
+    const auto zip = zipped("folder/S10W070.hgt", tile(11, 11), kind % 2 == 1, kind >= 2);
+    const auto source = open_hgt(write("any.hgt.zip", zip), {});
     EXPECT_EQ(source->info().georeference.origin_y, -9.0);
     EXPECT_EQ(source->info().georeference.origin_x, -70.0);
     EXPECT_EQ(testing::value_at(SampleType::kInt16, testing::read_all(*source), 120), 20);
@@ -147,10 +151,32 @@ TEST_F(HgtSource, SaysWhenAnArchiveHoldsAnotherTileThanItsNameSays) {
 }
 
 TEST_F(HgtSource, RefusesEveryTruncatedArchive) {
-  const auto zip = zipped("N01E001.hgt", tile(5, 5), true);
-  for (std::size_t length = 0; length < zip.size(); ++length) {
-    const auto path = write("N01E001.hgt.zip", {zip.begin(), zip.begin() + static_cast<std::ptrdiff_t>(length)});
-    EXPECT_EQ(code_of(path), ErrorCode::kCorrupt) << length;
+  for (const bool zip64 : {false, true}) {
+    const auto zip = zipped("N01E001.hgt", tile(5, 5), true, zip64);
+    for (std::size_t length = 0; length < zip.size(); ++length) {
+      const auto path = write("N01E001.hgt.zip", {zip.begin(), zip.begin() + static_cast<std::ptrdiff_t>(length)});
+      EXPECT_EQ(code_of(path), ErrorCode::kCorrupt) << length;
+    }
+  }
+}
+
+TEST_F(HgtSource, RefusesAZip64ArchiveWhoseRecordsAreElsewhere) {
+  const auto zip = zipped("N01E001.hgt", tile(5, 5), true, true);
+  constexpr std::size_t kEnd = 22;
+  constexpr std::size_t kLocator = 20;
+  constexpr std::size_t kEnd64 = 56;
+  const auto changed = [&](std::size_t from_end, std::uint64_t value) {
+    auto damaged = zip;
+    std::memcpy(damaged.data() + damaged.size() - from_end, &value, sizeof value);
+    return code_of(write("N01E001.hgt.zip", damaged));
+  };
+  for (const std::uint64_t far : {std::uint64_t{1} << 40U, ~std::uint64_t{0}, std::uint64_t{zip.size()}}) {
+    EXPECT_EQ(changed(kEnd + kLocator - 8, far), ErrorCode::kCorrupt);           // of the end record
+    EXPECT_EQ(changed(kEnd + kLocator + 8, far), ErrorCode::kCorrupt);           // of the directory
+    EXPECT_EQ(changed(kEnd + kLocator + 16, far), ErrorCode::kCorrupt);          // its size
+    EXPECT_EQ(changed(kEnd + kLocator + 24, far), ErrorCode::kCorrupt);          // the number of members
+    EXPECT_EQ(changed(kEnd + kLocator + kEnd64 + 8, far), ErrorCode::kCorrupt);  // the member's header
+    EXPECT_EQ(changed(kEnd + kLocator, far), ErrorCode::kCorrupt);               // the locator's signature
   }
 }
 

@@ -231,8 +231,8 @@ std::vector<std::byte> bytes_of(const std::string& text) {
   return {bytes.begin(), bytes.end()};
 }
 
-std::string zip(const std::string& name, const std::string& contents) {
-  const auto archive = zip_archive({{name, bytes_of(contents)}}, true);
+std::string zip(const std::string& name, const std::string& contents, bool zip64 = false) {
+  const auto archive = zip_archive({{name, bytes_of(contents)}}, true, zip64);
   return {reinterpret_cast<const char*>(archive.data()), archive.size()};
 }
 
@@ -285,6 +285,7 @@ std::vector<ReaderCase> reader_cases() {
       {"Isis3Label", "a.lbl", isis3_label("^Core = core.cub\n    "), open_isis3, {}},
       {"Npy", "a.npy", npy(), open_npy, {}},
       {"Npz", "a.npz", zip("z.npy", npy()), open_npz, {}},
+      {"NpzZip64", "a.npz", zip("z.npy", npy(), true), open_npz, {}},
       {"Dted", "a.dt0", dted(), open_dted, {}},
       {"UsgsDem", "a.dem", usgs_dem(), open_usgs_dem, {}},
       {"Hgt", "N10E010.hgt", counting(25, 2), open_hgt, {}},
