@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <cmath>
 #include <limits>
 #include <random>
 
@@ -87,6 +88,35 @@ TEST_F(Simd, QuantisesToTheSameCodes) {
     EXPECT_EQ(wide_counts.below, plain_counts.below);
     EXPECT_EQ(wide_counts.above, plain_counts.above);
     EXPECT_EQ(wide_counts.worst_rounding, plain_counts.worst_rounding);
+  }
+}
+
+TEST_F(Simd, RaisesFloatsToTheSameBits) {
+  std::mt19937 random(4);
+  std::uniform_real_distribution<float> height(-9000.0F, 9000.0F);
+  for (const std::size_t count : {std::size_t{0}, std::size_t{1}, std::size_t{31}, std::size_t{4099}}) {
+    TileCodes heights;
+    heights.type = CodeType::kF32;
+    for (std::size_t i = 0; i < count; ++i) {
+      heights.heights.push_back(random() % 17 == 0 ? std::numeric_limits<float>::quiet_NaN() : height(random));
+    }
+    for (const double datum : {0.0, 0.1, -123456.789}) {
+      float worst = 0.0F;  // by definition
+      TileCodes expected;
+      expected.type = CodeType::kF32;
+      for (const float value : heights.heights) {
+        expected.heights.push_back(static_cast<float>(double{value} + datum));
+        const auto off = static_cast<float>(std::abs(double{expected.heights.back()} - (double{value} + datum)));
+        worst = off > worst ? off : worst;
+      }
+      TileCodes wide;
+      EXPECT_EQ(quantise({CodeType::kF32, 0.0, 1.0}, datum, heights.heights, wide).worst_rounding, double{worst});
+      EXPECT_TRUE(test::same_samples(wide, expected));
+      const PlainTwins plain_twins;
+      TileCodes plain;
+      EXPECT_EQ(quantise({CodeType::kF32, 0.0, 1.0}, datum, heights.heights, plain).worst_rounding, double{worst});
+      EXPECT_TRUE(test::same_samples(plain, expected));
+    }
   }
 }
 

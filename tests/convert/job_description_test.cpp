@@ -44,6 +44,16 @@ TEST(JobFingerprint, TellsTreatmentsOfVoidsApart) {
   }
 }
 
+TEST(JobFingerprint, TellsLevelsApart) {
+  const SourceInfo info = source_info();
+  std::set<std::string> found;
+  for (int level = kMinLevel; level <= kMaxLevel; ++level) {
+    ConvertOptions options;
+    options.level = level;
+    EXPECT_TRUE(found.insert(job_fingerprint(info, make_plan(info, options.plan), options)).second) << level;
+  }
+}
+
 TEST(DescribeJob, RecordsTheTreatmentOfVoids) {
   SourceInfo info = source_info();
   info.void_values = {-9999.0};

@@ -100,8 +100,8 @@ std::vector<std::byte> pack_extra_bits(const std::uint32_t* folded, std::size_t 
   return packer.finish();
 }
 
-/// The residuals context by context, each context's in order, and how many there are of each. The last half is sorted
-/// from its end, beside the first: one alone would wait for its own pointers.
+}  // namespace
+
 template <typename Folded>
 std::vector<std::uint32_t> sort_by_context(const Residuals<Folded>& residuals,
                                            std::span<const std::uint16_t> thresholds,
@@ -127,8 +127,6 @@ std::vector<std::uint32_t> sort_by_context(const Residuals<Folded>& residuals,
   if (count % 2 != 0) *to[table[activities[count / 2]]] = folded[count / 2];
   return counts;
 }
-
-}  // namespace
 
 template <typename Folded>
 std::uint8_t choose_activity_shift(const Residuals<Folded>& residuals) {
@@ -171,6 +169,12 @@ Streams make_streams(const Residuals<Folded>& residuals, const CodingEffort& eff
   return streams;
 }
 
+template std::vector<std::uint32_t> sort_by_context(const Residuals<std::uint16_t>& residuals,
+                                                    std::span<const std::uint16_t> thresholds,
+                                                    std::span<const std::uint32_t> histogram, std::uint16_t* sorted);
+template std::vector<std::uint32_t> sort_by_context(const Residuals<std::uint32_t>& residuals,
+                                                    std::span<const std::uint16_t> thresholds,
+                                                    std::span<const std::uint32_t> histogram, std::uint32_t* sorted);
 template std::uint8_t choose_activity_shift(const Residuals<std::uint16_t>& residuals);
 template std::uint8_t choose_activity_shift(const Residuals<std::uint32_t>& residuals);
 template Streams make_streams(const Residuals<std::uint16_t>& residuals, const CodingEffort& effort,

@@ -48,6 +48,14 @@ struct Streams {
 template <typename Folded>
 [[nodiscard]] std::uint8_t choose_activity_shift(const Residuals<Folded>& residuals);
 
+/// Puts the residuals context by context into `sorted`, each context's in order, and returns how many there are of
+/// each; `histogram` is count_activities of them. The last half is sorted from its end, beside the first: one alone
+/// would wait for its own pointers.
+template <typename Folded>
+[[nodiscard]] std::vector<std::uint32_t> sort_by_context(const Residuals<Folded>& residuals,
+                                                         std::span<const std::uint16_t> thresholds,
+                                                         std::span<const std::uint32_t> histogram, Folded* sorted);
+
 /// Cuts the residuals into contexts, as many as pay; completes the header's thresholds, counts and pairs.
 template <typename Folded>
 [[nodiscard]] Streams make_streams(const Residuals<Folded>& residuals, const CodingEffort& effort,

@@ -8,6 +8,7 @@
 #include "isohf/archive/content_hash.h"
 #include "isohf/archive/deflate.h"
 #include "isohf/archive/predictor_fit.h"
+#include "isohf/archive/residual_fold.h"
 #include "isohf/archive/residual_streams.h"
 #include "isohf/archive/tile_payload.h"
 #include "isohf/archive/void_mask.h"
@@ -60,18 +61,6 @@ void load(Lattice<Wide>& lattice, const Voids& voids, Wide base, const SampleAt&
     }
     lattice.close_row(r);
   }
-}
-
-ISOHF_VECTORISED(void, fold_row,
-                 (const std::int32_t* own, const std::int32_t* halves, int count, std::uint16_t* __restrict out),
-                 (own, halves, count, out)) {
-  for (int i = 0; i < count; ++i) {
-    const auto difference = static_cast<std::int16_t>(oriented_difference(own[i], halves[i]));
-    out[i] = static_cast<std::uint16_t>(zigzag(difference));
-  }
-}
-void fold_row(const std::int64_t* own, const std::int64_t* halves, int count, std::uint32_t* out) {
-  for (int i = 0; i < count; ++i) out[i] = zigzag(static_cast<std::int32_t>(oriented_difference(own[i], halves[i])));
 }
 
 std::uint16_t fold(std::int32_t difference) {
