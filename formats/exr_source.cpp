@@ -219,7 +219,34 @@ class ExrSource final : public HeightSource {
     }
   }
 
+  void limit_buffers(std::uint64_t bytes) override {
+    band_bytes_ = static_cast<std::int64_t>(std::min<std::uint64_t>(bytes, kBandBytes));
+    band_ = {};
+    samples_ = {};
+  }
+  /// Of the band, and of OpenEXR's chunks with all their channels: two for each of its threads, and about as much again
+  /// as stored and once more while they are decoded.
+  [[nodiscard]] std::uint64_t buffer_bytes(std::uint64_t limit) const override {
+    const auto bytes = static_cast<std::int64_t>(std::min<std::uint64_t>(limit, kBandBytes));
+    const std::int64_t rows = std::min(band_rows(info_.width, bytes), info_.height);
+    std::int64_t pixel_bytes = 0;
+    const Imf::ChannelList& channels = file_.header(channel_.part).channels();
+    for (auto at = channels.begin(); at != channels.end(); ++at) {
+      pixel_bytes += static_cast<std::int64_t>(size_bytes(sample_type_of(at.channel().type)));
+    }
+    const std::int64_t chunks = std::max(2 * Imf::globalThreadCount(), 1);
+    const std::int64_t chunk_bytes = 3 * info_.block_width * info_.block_height * pixel_bytes;
+    return static_cast<std::uint64_t>(rows * info_.width * static_cast<std::int64_t>(sample_bytes_) +
+                                      chunks * chunk_bytes);
+  }
+
  private:
+  /// Rows of whole chunks of so many columns that `bytes` have room for.
+  [[nodiscard]] std::int64_t band_rows(std::int64_t columns, std::int64_t bytes) const {
+    const std::int64_t affordable = bytes / (columns * static_cast<std::int64_t>(sample_bytes_));
+    return std::max(affordable / info_.block_height * info_.block_height, info_.block_height);
+  }
+
   void describe(const std::string& path, const std::vector<Channel>& channels, bool chosen_here) {
     const Imf::Header& header = file_.header(channel_.part);
     const Imath::Box2i& data = header.dataWindow();
@@ -273,9 +300,7 @@ class ExrSource final : public HeightSource {
     band.columns = up(window.column + window.columns, info_.block_width, info_.width) - band.column;
     band.row = down(row, info_.block_height);
     const std::int64_t wanted = up(window.row + window.rows, info_.block_height, info_.height) - band.row;
-    const std::int64_t affordable = kBandBytes / (band.columns * static_cast<std::int64_t>(sample_bytes_));
-    const std::int64_t whole_chunks = std::max(down(affordable, info_.block_height), info_.block_height);
-    band.rows = std::min({wanted, whole_chunks, info_.height - band.row});
+    band.rows = std::min({wanted, band_rows(band.columns, band_bytes_), info_.height - band.row});
     band_ = {};  // what is there is overwritten, even if decoding fails half-way
     translated(fmt::format("{}: rows {} to {}", info_.path, band.row, band.row + band.rows - 1), [&] { decode(band); });
     band_ = band;
@@ -306,6 +331,7 @@ class ExrSource final : public HeightSource {
   Imath::V2i origin_;
   SourceInfo info_;
   std::size_t sample_bytes_ = 0;
+  std::int64_t band_bytes_ = kBandBytes;
   Window band_;                     ///< what samples_ holds
   std::vector<std::byte> samples_;  ///< decoded chunks of the channel
 };

@@ -17,6 +17,7 @@ struct IsohfOiioRaster {
   OIIO::ImageSpec spec;
   OIIO::TypeDesc type;
   int channel = 0;
+  std::int64_t band_bytes = 0;
   std::vector<unsigned char> band;  ///< rows read around a window that does not end where the file's blocks do
 };
 
@@ -99,6 +100,7 @@ void open_raster(IsohfOiioRaster& raster, const char* path, const std::string& c
   raster.spec = raster.input->spec();
   const OIIO::ImageSpec& spec = raster.spec;
   check(spec);
+  raster.band_bytes = kBandBytes;
   raster.channel = channel_index(spec, channel);
   raster.type = spec.channelformat(raster.channel);
   info.width = spec.width;
@@ -130,6 +132,13 @@ void read_rows(IsohfOiioRaster& raster, int begin, int end, void* out) {
               "rows " + std::to_string(begin) + " to " + std::to_string(end - 1) + ": " + raster.input->geterror());
 }
 
+/// Rows of blocks that a band has room for, at least one.
+std::int64_t band_rows(const IsohfOiioRaster& raster, std::int64_t bytes) {
+  const std::int64_t step = raster.spec.tile_width > 0 ? raster.spec.tile_height : 1;
+  const std::int64_t row_bytes = std::int64_t{raster.spec.width} * static_cast<std::int64_t>(raster.type.size());
+  return std::max(bytes / row_bytes / step * step, step);
+}
+
 void read_window(IsohfOiioRaster& raster, int column, int row, int columns, int rows, unsigned char* out) {
   const OIIO::ImageSpec& spec = raster.spec;
   const bool tiled = spec.tile_width > 0;
@@ -138,13 +147,12 @@ void read_window(IsohfOiioRaster& raster, int column, int row, int columns, int 
   const std::size_t row_bytes = static_cast<std::size_t>(spec.width) * size;
   const std::size_t out_bytes = static_cast<std::size_t>(columns) * size;
   const std::int64_t step = tiled ? spec.tile_height : 1;
-  const std::int64_t fitting = kBandBytes / static_cast<std::int64_t>(row_bytes) / step * step;
-  const std::int64_t band_rows = std::max(fitting, step);
+  const std::int64_t most_rows = band_rows(raster, raster.band_bytes);
   const int end = row + rows;
   while (row < end) {
     const auto begin = static_cast<int>(row / step * step);
     const std::int64_t wanted = (end - begin + step - 1) / step * step;
-    const auto stop = static_cast<int>(std::min<std::int64_t>(begin + std::min(wanted, band_rows), spec.height));
+    const auto stop = static_cast<int>(std::min<std::int64_t>(begin + std::min(wanted, most_rows), spec.height));
     raster.band.resize(static_cast<std::size_t>(stop - begin) * row_bytes);
     read_rows(raster, begin, stop, raster.band.data());
     for (; row < std::min(stop, end); ++row, out += out_bytes) {
@@ -175,6 +183,17 @@ int module_read(IsohfOiioRaster* raster, int64_t column, int64_t row, int64_t co
     read_window(*raster, static_cast<int>(column), static_cast<int>(row), static_cast<int>(columns),
                 static_cast<int>(rows), static_cast<unsigned char*>(samples));
   });
+}
+
+void module_bound(IsohfOiioRaster* raster, int64_t bytes) {
+  raster->band_bytes = std::min(kBandBytes, bytes);
+  raster->band = {};
+}
+
+int64_t module_buffer_bytes(const IsohfOiioRaster* raster, int64_t bytes) {
+  const OIIO::ImageSpec& spec = raster->spec;
+  return std::min<std::int64_t>(band_rows(*raster, std::min(kBandBytes, bytes)), spec.height) * spec.width *
+         static_cast<std::int64_t>(raster->type.size());
 }
 
 void module_close(IsohfOiioRaster* raster) {
@@ -218,15 +237,9 @@ const char* module_extensions() {
 }  // namespace
 
 extern "C" __attribute__((visibility("default"))) const IsohfOiioModule* isohf_oiio_module() {
-  static const IsohfOiioModule module = {ISOHF_OIIO_ABI,
-                                         module_open,
-                                         module_read,
-                                         module_close,
-                                         isohf_oiio_open_photo,
-                                         isohf_oiio_read_photo,
-                                         isohf_oiio_bound_photo,
-                                         isohf_oiio_close_photo,
-                                         module_library,
-                                         module_extensions};
+  static const IsohfOiioModule module = {ISOHF_OIIO_ABI,         module_open,           module_read,
+                                         module_bound,           module_buffer_bytes,   module_close,
+                                         isohf_oiio_open_photo,  isohf_oiio_read_photo, isohf_oiio_bound_photo,
+                                         isohf_oiio_close_photo, module_library,        module_extensions};
   return &module;
 }

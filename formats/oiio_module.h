@@ -12,7 +12,7 @@
 extern "C" {
 
 /// Raised whenever anything below changes; the loader refuses any other.
-#define ISOHF_OIIO_ABI 3
+#define ISOHF_OIIO_ABI 4
 
 typedef struct IsohfOiioRaster IsohfOiioRaster;
 
@@ -51,6 +51,10 @@ typedef int (*IsohfOiioOpen)(const char* path, const char* channel, IsohfOiioRas
 /// Reads a window of raw samples in the host's byte order; `bytes` is the size of `samples`.
 typedef int (*IsohfOiioRead)(IsohfOiioRaster* raster, int64_t column, int64_t row, int64_t columns, int64_t rows,
                              void* samples, size_t bytes, IsohfOiioMessage* message);
+/// Bounds what is kept of decoded samples from one call to the next; the second says what that takes, since a row of
+/// blocks is the least. What OpenImageIO keeps itself is not counted.
+typedef void (*IsohfOiioBound)(IsohfOiioRaster* raster, int64_t bytes);
+typedef int64_t (*IsohfOiioBufferBytes)(const IsohfOiioRaster* raster, int64_t bytes);
 typedef void (*IsohfOiioClose)(IsohfOiioRaster* raster);
 
 /// Opens a photo and fills `info`. Photos are read by any number of threads at once.
@@ -70,6 +74,8 @@ typedef struct IsohfOiioModule {
   int32_t abi;
   IsohfOiioOpen open;
   IsohfOiioRead read;
+  IsohfOiioBound bound;
+  IsohfOiioBufferBytes buffer_bytes;
   IsohfOiioClose close;
   IsohfOiioOpenPhoto open_photo;
   IsohfOiioReadPhoto read_photo;

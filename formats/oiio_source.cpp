@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <sstream>
 
 #include "formats/libraries.h"
@@ -61,7 +62,16 @@ class OiioSource final : public HeightSource {
     if (result != 0) throw Error(oiio_error_code(result), fmt::format("{}: {}", info_.path, message.text));
   }
 
+  void limit_buffers(std::uint64_t bytes) override { module_.bound(raster_, signed_bytes(bytes)); }
+  [[nodiscard]] std::uint64_t buffer_bytes(std::uint64_t limit) const override {
+    return static_cast<std::uint64_t>(module_.buffer_bytes(raster_, signed_bytes(limit)));
+  }
+
  private:
+  static std::int64_t signed_bytes(std::uint64_t bytes) {
+    return static_cast<std::int64_t>(std::min<std::uint64_t>(bytes, INT64_MAX));
+  }
+
   const IsohfOiioModule& module_;
   IsohfOiioRaster* raster_ = nullptr;
   SourceInfo info_;

@@ -172,9 +172,7 @@ class PngSource final : public HeightSource {
     choose_channel(options.channel);
     if (channels_ > 2 && options.channel.empty()) decide_on_colours();
     apply_open_options(info_, options);
-    const std::size_t row_bytes = header_.width * sample_bytes_;
-    kept_rows_ = header_.interlaced ? header_.height : std::clamp<std::size_t>(kKeptBytes / row_bytes, 1, kMaxKeptRows);
-    kept_rows_ = std::min<std::size_t>(kept_rows_, header_.height);
+    kept_rows_ = rows_within(kKeptBytes);
   }
 
   [[nodiscard]] const SourceInfo& info() const override { return info_; }
@@ -195,7 +193,29 @@ class PngSource final : public HeightSource {
     }
   }
 
+  void limit_buffers(std::uint64_t bytes) override {
+    const std::size_t rows = rows_within(bytes);
+    if (rows >= kept_rows_) return;
+    if (next_row_ > 0) restart();
+    kept_rows_ = rows;
+    kept_ = {};
+  }
+  /// The kept rows, and a decoded one here and in libpng; of an interlaced picture all rows twice while it is decoded.
+  [[nodiscard]] std::uint64_t buffer_bytes(std::uint64_t limit) const override {
+    const std::uint64_t rows = rows_within(limit);
+    const std::uint64_t decoded = header_.interlaced ? header_.height : 2;
+    return rows * header_.width * sample_bytes_ + decoded * header_.row_bytes;
+  }
+
  private:
+  /// How many decoded rows may be kept.
+  [[nodiscard]] std::size_t rows_within(std::uint64_t bytes) const {
+    if (header_.interlaced) return header_.height;
+    const std::uint64_t most = std::min<std::uint64_t>(kMaxKeptRows, header_.height);
+    const std::uint64_t fitting = std::min<std::uint64_t>(bytes, kKeptBytes) / (header_.width * sample_bytes_);
+    return static_cast<std::size_t>(std::clamp<std::uint64_t>(fitting, 1, most));
+  }
+
   /// Opens the file anew; the next row decoded is the first.
   void restart() {
     next_row_ = 0;

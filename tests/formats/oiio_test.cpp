@@ -68,6 +68,16 @@ TEST_F(OiioModule, ReadsWhatNoNativeReaderKnows) {
   }
 }
 
+TEST_F(OiioModule, KeepsNoMoreThanItIsAskedTo) {
+  const auto source = open_source(write_graymap(), {});
+  EXPECT_EQ(source->buffer_bytes(1), 2U * kWidth);
+  EXPECT_EQ(source->buffer_bytes(9 * kWidth), 4U * 2 * kWidth);
+  EXPECT_EQ(source->buffer_bytes(UINT64_MAX), 2U * kWidth * kHeight);
+  const auto whole = read_window(*source, {2, 1, 9, 15});
+  source->limit_buffers(1);
+  EXPECT_EQ(read_window(*source, {2, 1, 9, 15}), whole);
+}
+
 TEST_F(OiioModule, ReadsTheChannelAskedFor) {
   const std::string path = write_pixmap();
   const auto first = open_source(path, {});
