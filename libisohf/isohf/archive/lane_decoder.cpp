@@ -13,6 +13,8 @@
 #include "isohf/base/vectorised.h"
 #if defined(ISOHF_HAS_WIDE)
 #include <immintrin.h>
+#endif
+#if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC diagnostic ignored "-Wpsabi"  // kernels are inlined: their vectors cross no boundary
 #endif
 
@@ -24,7 +26,6 @@ constexpr std::size_t kLanes = kDecoderLanes;
 /// A sample less 2^15, so that it fits 16 bits with a sign. Weights add up to 2^12, hence the sum of weighted samples
 /// is that of the shifted ones and 2^27.
 constexpr std::int32_t kSampleShift = 1 << 15;
-constexpr std::int32_t kSumShift = kSampleShift << kWeightBits;
 
 /// Two neighbouring samples, shifted, of each lane: that of the place in the low half, that East of it in the high
 /// half. One multiplication by a pair of weights does for both.
