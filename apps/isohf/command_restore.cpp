@@ -133,8 +133,10 @@ class Restorer {
     if (cancel_.load()) throw Error(ErrorCode::kCancelled, "interrupted");
   }
 
-  [[nodiscard]] std::unique_ptr<RasterSink> open(const SampleMapping& mapping, std::optional<double> void_value) const {
-    RasterSpec spec = restored_raster(archive_.metadata(), grid_, mapping.type);
+  [[nodiscard]] std::unique_ptr<RasterSink> open(const SampleMapping& mapping, std::optional<double> void_value,
+                                                 bool is_source) const {
+    RasterSpec spec = is_source ? source_raster(archive_.metadata(), mapping.type)
+                                : restored_raster(archive_.metadata(), grid_, mapping.type);
     spec.z_scale = mapping.z_scale;
     spec.z_offset = mapping.z_offset;
     if (void_value && !std::isnan(*void_value)) spec.void_value = void_value;
@@ -162,7 +164,7 @@ class Restorer {
       throw Error(ErrorCode::kInvalidArgument, fmt::format("{}: {} does not hold the void value {}; write .tif",
                                                            options_.output, to_string(written.type), *void_value));
     }
-    const std::unique_ptr<RasterSink> sink = open(written, void_value);
+    const std::unique_ptr<RasterSink> sink = open(written, void_value, true);
     LosslessReader reader(archive_, record);
     Sha256 hash;
     std::int64_t row = 0;
@@ -211,7 +213,7 @@ class Restorer {
     const bool has_voids = may_have_voids(metadata, grid_) || raster_kind(options_.output) == RasterKind::kHgt;
     const auto void_value = has_voids ? usual_void(mapping.type) : std::nullopt;
     const SampleStore store(mapping, void_value, options_.clamp_range);
-    const std::unique_ptr<RasterSink> sink = open(mapping, void_value);
+    const std::unique_ptr<RasterSink> sink = open(mapping, void_value, false);
     SurfaceRows surface(
         archive_.grid(), metadata.wraps_x, metadata.quantisation,
         [&](TileIndex tile) { return archive_.read_tile(tile); }, grid_, options_.method.value_or(RestoreMethod::kHex));
@@ -238,9 +240,9 @@ class Restorer {
 int run(const RestoreOptions& options) {
   check_output_file(options.archive, options.output, options.overwrite);
   const ArchiveReader archive(options.archive);
-  const SampleGrid grid = asked_grid(options, archive.metadata());
   const bool wants_source = options.like.empty() && !options.size && !options.spacing && !options.method;
   const std::optional<LosslessRecord> record = wants_source ? lossless_record(archive.metadata()) : std::nullopt;
+  const SampleGrid grid = record ? source_grid(archive.metadata().source) : asked_grid(options, archive.metadata());
   const std::atomic<bool>& cancel = watch_interrupts();
   Restored restored;
   oneapi::tbb::task_arena arena(options.work.threads > 0 ? options.work.threads : oneapi::tbb::task_arena::automatic);

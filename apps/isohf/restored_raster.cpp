@@ -26,6 +26,43 @@ HorizontalUnit unit_of(const std::string& name) {
   return name == "degree" ? HorizontalUnit::kDegree : HorizontalUnit::kUnknown;
 }
 
+RasterSpec plain_raster(const Metadata& metadata, const SampleGrid& grid, SampleType type) {
+  RasterSpec spec;
+  spec.width = grid.width;
+  spec.height = grid.height;
+  spec.sample_type = type;
+  spec.describe = true;
+  if (metadata.vertical_unit != "unknown") spec.vertical_unit = metadata.vertical_unit;
+  return spec;
+}
+
+/// By the source's place, for grids whose rows are its rows.
+RasterSpec raster_in_source_system(const Metadata& metadata, const SampleGrid& grid, SampleType type) {
+  const SourceRecord& source = metadata.source;
+  RasterSpec spec = plain_raster(metadata, grid, type);
+  Georeference place;
+  place.registration = source.registration == "area" ? Registration::kArea : Registration::kPoint;
+  place.unit = unit_of(source.crs_unit);
+  // World units to the source's own.
+  const double per_x = source.crs_spacing_x > 0.0 ? source.crs_spacing_x / source.spacing_x : 1.0;
+  const double per_z = source.crs_spacing_y > 0.0 ? source.crs_spacing_y / source.spacing_z : 1.0;
+  const bool is_source_grid = grid.spacing_x == source.spacing_x && grid.spacing_z == source.spacing_z;
+  place.spacing_x = is_source_grid && source.crs_spacing_x > 0.0 ? source.crs_spacing_x : grid.spacing_x * per_x;
+  place.spacing_y = is_source_grid && source.crs_spacing_y > 0.0 ? source.crs_spacing_y : grid.spacing_z * per_z;
+  place.has_origin = source.origin_x.has_value() && source.origin_y.has_value();
+  if (place.has_origin) {
+    place.origin_x = *source.origin_x + (grid.first_x - source.first_sample_x) * per_x;
+    place.origin_y = *source.origin_y - (grid.first_z - source.first_sample_z) * per_z;
+  }
+  place.system = horizontal_system(source);
+  place.system.vertical_datum = source.vertical_datum;
+  place.system.vertical_epsg = source.vertical_epsg;
+  // Without a position a point of unit spacing is what a raster that says nothing is taken for.
+  const bool has_spacing = place.spacing_x != 1.0 || place.spacing_y != 1.0;
+  if (place.has_origin || has_spacing || place.registration == Registration::kArea) spec.georeference = place;
+  return spec;
+}
+
 }  // namespace
 
 RasterKind raster_kind(const std::string& path) {
@@ -70,39 +107,15 @@ SampleType restored_type(const std::string& path, SampleType source_type) {
 }
 
 RasterSpec restored_raster(const Metadata& metadata, const SampleGrid& grid, SampleType type) {
-  const SourceRecord& source = metadata.source;
-  RasterSpec spec;
-  spec.width = grid.width;
-  spec.height = grid.height;
-  spec.sample_type = type;
-  spec.describe = true;
-  if (metadata.vertical_unit != "unknown") spec.vertical_unit = metadata.vertical_unit;
-  if (is_warped(metadata)) {
-    spec.georeference = map_georeference(metadata, grid);
-    if (!spec.georeference->system.epsg) spec.projection = metadata.projection->spec;
-    return spec;
-  }
-  Georeference place;
-  place.registration = source.registration == "area" ? Registration::kArea : Registration::kPoint;
-  place.unit = unit_of(source.crs_unit);
-  // World units to the source's own.
-  const double per_x = source.crs_spacing_x > 0.0 ? source.crs_spacing_x / source.spacing_x : 1.0;
-  const double per_z = source.crs_spacing_y > 0.0 ? source.crs_spacing_y / source.spacing_z : 1.0;
-  const bool is_source_grid = grid.spacing_x == source.spacing_x && grid.spacing_z == source.spacing_z;
-  place.spacing_x = is_source_grid && source.crs_spacing_x > 0.0 ? source.crs_spacing_x : grid.spacing_x * per_x;
-  place.spacing_y = is_source_grid && source.crs_spacing_y > 0.0 ? source.crs_spacing_y : grid.spacing_z * per_z;
-  place.has_origin = source.origin_x.has_value() && source.origin_y.has_value();
-  if (place.has_origin) {
-    place.origin_x = *source.origin_x + (grid.first_x - source.first_sample_x) * per_x;
-    place.origin_y = *source.origin_y - (grid.first_z - source.first_sample_z) * per_z;
-  }
-  place.system = horizontal_system(source);
-  place.system.vertical_datum = source.vertical_datum;
-  place.system.vertical_epsg = source.vertical_epsg;
-  // Without a position a point of unit spacing is what a raster that says nothing is taken for.
-  const bool has_spacing = place.spacing_x != 1.0 || place.spacing_y != 1.0;
-  if (place.has_origin || has_spacing || place.registration == Registration::kArea) spec.georeference = place;
+  if (!is_warped(metadata)) return raster_in_source_system(metadata, grid, type);
+  RasterSpec spec = plain_raster(metadata, grid, type);
+  spec.georeference = map_georeference(metadata, grid);
+  if (!spec.georeference->system.epsg) spec.projection = metadata.projection->spec;
   return spec;
+}
+
+RasterSpec source_raster(const Metadata& metadata, SampleType type) {
+  return raster_in_source_system(metadata, source_grid(metadata.source), type);
 }
 
 Georeference map_georeference(const Metadata& metadata, const SampleGrid& grid) {

@@ -23,6 +23,9 @@ enum class RasterKind { kTiff, kExr, kPng, kHgt, kAsc, kFlt, kRaw16, kRaw32, kNp
 /// What a raster of that grid is: size, place and reference system as the source's, so far as they are known.
 [[nodiscard]] RasterSpec restored_raster(const Metadata& metadata, const SampleGrid& grid, SampleType type);
 
+/// The source's own raster, in its own reference system also where it was projected.
+[[nodiscard]] RasterSpec source_raster(const Metadata& metadata, SampleType type);
+
 /// Where a grid of the world lies on the map that the archive's source was projected to (is_warped), its samples areas.
 [[nodiscard]] Georeference map_georeference(const Metadata& metadata, const SampleGrid& grid);
 

@@ -166,8 +166,6 @@ TEST_F(ProjectionCommand, WhatDoesNotGoTogetherIsRefusedInOneLine) {
   const std::string out = folder / "b.isohf";
   refuses({"convert", wide, out, "--projection", "mercator"}, "--projection: found 'mercator', must be one of auto");
   refuses({"convert", wide, out, "--projection", "polar-stereographic:-60"}, "--projection lambert-conformal works");
-  refuses({"convert", wide, out, "--projection", "utm", "--lossless"},
-          "--lossless needs the input's rows to stay rows; --projection equirectangular works");
   refuses({"convert", wide, out, "--wrap-x"}, "240 columns 0.05 apart make 12");
   refuses({"convert", wide, out, "--geoid", "egm.tif"}, "must be a geoid's FILE.pgm");
   refuses({"convert", wide, out, "--geoid", folder / "egm.pgm"}, "egm.pgm: no such file", 1);
@@ -182,12 +180,49 @@ TEST_F(ProjectionCommand, WhatDoesNotGoTogetherIsRefusedInOneLine) {
   refuses({"convert", folder / "metres.flt", out, "--projection", "utm"}, "needs an input in degrees");
 }
 
-TEST_F(ProjectionCommand, LosslessKeepsRowsByItself) {
-  converts({"--lossless"});
-  const json info = json::parse(isohf({"info", folder / "a.isohf", "--json"}).out).at("metadata");
-  EXPECT_EQ(info.at("projection").at("kind"), "equirectangular");
-  EXPECT_THAT(info.at("projection").at("why").get<std::string>(), HasSubstr("--lossless"));
-  ASSERT_EQ(isohf({"restore", folder / "a.isohf", folder / "a.tif"}).exit_code, 0);
+TEST_F(ProjectionCommand, LosslessGivesTheInputBackThroughEveryKind) {
+  const std::string input = read_file(folder / "wide.flt");
+  const std::string plain = [&] {
+    converts({"--projection", "equirectangular", "--lossless"});
+    return read_file(folder / "a.isohf");
+  }();
+  for (const std::string kind :
+       {"auto", "local", "transverse-mercator", "utm", "lambert-conformal", "polar-stereographic:45"}) {
+    SCOPED_TRACE(kind);
+    converts({"--projection", kind, "--lossless", "-j", "1"});
+    const std::string one = read_file(folder / "a.isohf");
+    converts({"--projection", kind, "--lossless", "-j", "3"});
+    EXPECT_TRUE(read_file(folder / "a.isohf") == one);
+    EXPECT_LT(one.size(), 2 * plain.size());
+    EXPECT_EQ(isohf({"verify", folder / "a.isohf"}).exit_code, 0);
+    const RunResult restored = isohf({"restore", folder / "a.isohf", folder / "back.flt", "--overwrite"});
+    ASSERT_EQ(restored.exit_code, 0) << restored.err;
+    EXPECT_THAT(restored.out, HasSubstr("240 x 160 samples, the source's own samples"));
+    EXPECT_TRUE(read_file(folder / "back.flt") == input);
+    // In degrees, where they were.
+    const auto back = open_source(folder / "back.flt", {});
+    EXPECT_EQ(back->info().georeference.unit, HorizontalUnit::kDegree);
+    EXPECT_NEAR(back->info().georeference.origin_x, 2.025, 1e-9);
+    EXPECT_NEAR(back->info().georeference.origin_y, 49.975, 1e-9);
+    EXPECT_DOUBLE_EQ(back->info().georeference.spacing_x, 0.05);
+    // What else is asked for is a raster of the map.
+    ASSERT_EQ(isohf({"restore", folder / "a.isohf", folder / "map.tif", "--overwrite", "--method", "hex"}).exit_code,
+              0);
+    EXPECT_EQ(open_source(folder / "map.tif", {})->info().georeference.unit, HorizontalUnit::kMetre);
+  }
+}
+
+TEST_F(ProjectionCommand, LosslessKeepsVoidsAndGroundBeyondTheMap) {
+  // To the pole, all the way round, with holes that are filled.
+  write_degrees(folder / "cap", 360, 40, -180.0, 50.0, 1.0, [](double longitude, double latitude) {
+    if (std::hypot(longitude - 30.0, latitude - 70.0) < 4.0) return -9999.0;
+    return 50.0 * (90.0 - latitude) * (1.0 + 0.2 * std::cos(longitude * M_PI / 180.0));
+  });
+  const RunResult made = isohf({"convert", folder / "cap.flt", folder / "a.isohf", "--lossless", "--fill"});
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  EXPECT_THAT(made.out, HasSubstr("polar-stereographic"));
+  ASSERT_EQ(isohf({"restore", folder / "a.isohf", folder / "back.flt"}).exit_code, 0);
+  EXPECT_TRUE(read_file(folder / "back.flt") == read_file(folder / "cap.flt"));
 }
 
 TEST_F(ProjectionCommand, ShadowsPicturesAndReportsOfAMapAreMade) {

@@ -151,12 +151,8 @@ void throw_if_cancelled(const std::atomic<bool>& cancel) {
 
 PlanRequest plan_request(const ConvertOptions& options) {
   PlanRequest request = options.plan;
-  // Both are laid out along the source's rows.
-  if (options.lossless) {
-    request.ground.keeps_rows = "--lossless";
-  } else if (options.texture) {
-    request.ground.keeps_rows = "--texture";
-  }
+  // Photos are laid out along the source's rows.
+  if (options.texture) request.ground.keeps_rows = "--texture";
   return request;
 }
 

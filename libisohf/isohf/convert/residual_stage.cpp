@@ -60,6 +60,13 @@ std::uint64_t residual_stage_memory_bytes(const SourceInfo& info, const Plan& pl
       std::min(static_cast<double>(members_at_once), std::ceil(static_cast<double>(info.height) / rows));
   const double bands = members * rows * width * (2.0 * sample + 8.0);
   const double encoding = threads * rows * width * (5.0 + 5.0 * sample);
+  if (plan.frame.warp) {
+    // A place for each sample of a member, tiles that are kept, and one in each thread.
+    const double tile_bytes = 8.0 * static_cast<double>(shape.stored_vertex_count());
+    const double mesh = 16.0 * static_cast<double>(PlaceMesh::value_count(info.width, info.height));
+    return static_cast<std::uint64_t>(bands + encoding + rows * width * 16.0 + mesh + threads * 2.0 * tile_bytes +
+                                      static_cast<double>(ScatteredSurface::kKeptBytes));
+  }
   const double tile_rows = std::ceil(rows * plan.frame.spacing_z / plan.grid.extent_z()) + 1.0;
   const double tiles = tile_rows * static_cast<double>(plan.grid.tile_columns()) * 8.0 *
                        static_cast<double>(shape.stored_vertex_count());
@@ -78,10 +85,19 @@ LosslessRecord write_residuals(HeightSource& source, const SourceFrame& frame, c
   record.void_values = info.void_values;
   record.rows_per_member = rows_per_member(info);
   writer.flush_tiles();
-  SurfaceRows surface(
+  std::optional<PlaceMesh> places;
+  if (frame.warp) {
+    const ExactWarp warp(*frame.warp);
+    places.emplace(info.width, info.height, [&](double column, double row) {
+      return warp.world_from_source({column, row});
+    });
+    record.at_places = true;
+    writer.add_member(kPlacesName, bytes_of(*places), true);
+  }
+  SamplePredictor surface(
       grid, frame.wraps_x, quantisation, [&](TileIndex tile) { return writer.read_tile(tile, quantisation); },
       {frame.width, frame.height, frame.first_sample_x, frame.first_sample_z, frame.spacing_x, frame.spacing_z},
-      record.method);
+      record.method, std::move(places));
   Sha256 hash;
   for (std::int64_t row = 0; row < info.height;) {
     std::vector<ResidualBand> bands;

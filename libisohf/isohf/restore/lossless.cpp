@@ -1,17 +1,23 @@
 #include "isohf/restore/lossless.h"
 
 #include <fmt/format.h>
+#include <oneapi/tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <utility>
 
+#include "isohf/base/bytes.h"
 #include "isohf/base/error.h"
 
 namespace isohf {
 namespace {
 
 using Json = nlohmann::ordered_json;
+
+/// The prediction of a source that was projected.
+constexpr const char* kAtPlaces = "places";
 
 /// JSON has no numbers that are not finite.
 Json json_from(double value) {
@@ -36,6 +42,17 @@ void check(const LosslessRecord& record, const Metadata& metadata) {
   if (!fits) throw Error(ErrorCode::kCorrupt, "metadata: lossless does not fit the source's record");
 }
 
+PlaceMesh read_places(const ArchiveReader& archive, const LosslessRecord& record) {
+  const auto bytes = archive.read_member(kPlacesName);
+  const std::string where = fmt::format("{}: member \"{}\"", archive.path(), kPlacesName);
+  if (!bytes) throw Error(ErrorCode::kCorrupt, where + " is missing");
+  try {
+    return places_from_bytes(record.width, record.height, *bytes);
+  } catch (const Error& error) {
+    throw error.within(where);
+  }
+}
+
 }  // namespace
 
 std::string format_lossless(const LosslessRecord& record) {
@@ -47,7 +64,7 @@ std::string format_lossless(const LosslessRecord& record) {
                      {"z_scale", record.mapping.z_scale},
                      {"z_offset", record.mapping.z_offset},
                      {"void_values", voids},
-                     {"prediction", to_string(record.method)},
+                     {"prediction", record.at_places ? kAtPlaces : to_string(record.method)},
                      {"rows_per_member", record.rows_per_member},
                      {"residual_bytes", record.residual_bytes},
                      {"sha256", record.sha256}};
@@ -66,7 +83,9 @@ std::optional<LosslessRecord> lossless_record(const Metadata& metadata) {
     record.width = json.at("width").get<std::int64_t>();
     record.height = json.at("height").get<std::int64_t>();
     for (const Json& value : json.at("void_values")) record.void_values.push_back(number_from(value));
-    record.method = restore_method_from_string(json.at("prediction").get<std::string>());
+    const auto prediction = json.at("prediction").get<std::string>();
+    record.at_places = prediction == kAtPlaces;
+    record.method = record.at_places ? RestoreMethod::kBarycentric : restore_method_from_string(prediction);
     record.rows_per_member = json.at("rows_per_member").get<std::int64_t>();
     record.residual_bytes = json.at("residual_bytes").get<std::uint64_t>();
     record.sha256 = json.at("sha256").get<std::string>();
@@ -83,13 +102,52 @@ std::string residual_name(std::int64_t first_row) {
   return fmt::format("residual/{:08}", first_row);
 }
 
+std::vector<std::byte> bytes_of(const PlaceMesh& places) {
+  std::vector<std::byte> bytes;
+  ByteWriter writer(bytes);
+  for (const double value : places.values()) writer.write(value);
+  return bytes;
+}
+
+PlaceMesh places_from_bytes(std::int64_t width, std::int64_t height, std::span<const std::byte> bytes) {
+  const std::size_t count = PlaceMesh::value_count(width, height);
+  if (bytes.size() != count * sizeof(double)) {
+    throw Error(ErrorCode::kCorrupt, fmt::format("has {} bytes, must have {}", bytes.size(), count * sizeof(double)));
+  }
+  ByteReader reader(bytes);
+  std::vector<double> values(count);
+  for (double& value : values) value = reader.read<double>();
+  return {width, height, std::move(values)};
+}
+
+SamplePredictor::SamplePredictor(const TileGrid& grid, bool wraps_x, const Quantisation& quantisation,
+                                 SurfaceRows::ReadTile read_tile, const SampleGrid& samples, RestoreMethod method,
+                                 std::optional<PlaceMesh> places)
+    : samples_(samples), places_(std::move(places)) {
+  if (places_) {
+    scattered_ = std::make_unique<ScatteredSurface>(grid, quantisation, std::move(read_tile));
+  } else {
+    rows_ = std::make_unique<SurfaceRows>(grid, wraps_x, quantisation, std::move(read_tile), samples, method);
+  }
+}
+
+void SamplePredictor::read(std::int64_t first, std::int64_t rows, std::span<double> predicted) {
+  if (rows_) return rows_->read(first, rows, predicted);
+  std::vector<WorldPoint> at(predicted.size());
+  const auto width = static_cast<std::size_t>(samples_.width);
+  oneapi::tbb::parallel_for(std::int64_t{0}, rows, [&](std::int64_t row) {
+    places_->row(first + row, std::span(at).subspan(static_cast<std::size_t>(row) * width, width));
+  });
+  scattered_->read(at, predicted);
+}
+
 LosslessReader::LosslessReader(const ArchiveReader& archive, const LosslessRecord& record)
     : archive_(archive),
       record_(record),
       surface_(
           archive.grid(), archive.metadata().wraps_x, archive.metadata().quantisation,
           [&archive](TileIndex tile) { return archive.read_tile(tile); }, source_grid(archive.metadata().source),
-          record.method) {}
+          record.method, record.at_places ? std::optional(read_places(archive, record)) : std::nullopt) {}
 
 std::vector<std::byte> LosslessReader::read_next() {
   const std::int64_t rows = std::min(record_.rows_per_member, record_.height - next_row_);

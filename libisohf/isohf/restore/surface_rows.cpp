@@ -51,6 +51,19 @@ SampleGrid source_grid(const SourceRecord& source) {
           source.first_sample_z, source.spacing_x, source.spacing_z};
 }
 
+std::vector<double> elevations_of(const TileCodes& tile, const Quantisation& quantisation) {
+  std::vector<double> elevations;
+  if (tile.type == CodeType::kF32) {
+    elevations.assign(tile.heights.begin(), tile.heights.end());
+    return elevations;
+  }
+  elevations.reserve(tile.codes.size());
+  for (const std::uint32_t code : tile.codes) {
+    elevations.push_back(code == quantisation.void_code() ? kVoid : quantisation.offset + quantisation.scale * code);
+  }
+  return elevations;
+}
+
 SurfaceRows::SurfaceRows(const TileGrid& grid, bool wraps_x, const Quantisation& quantisation, ReadTile read_tile,
                          const SampleGrid& samples, RestoreMethod method)
     : grid_(grid),
@@ -78,17 +91,8 @@ const SurfaceRows::TileRow& SurfaceRows::tile_row(std::int64_t row) {
   made.elevations.resize(static_cast<std::size_t>(grid_.tile_columns()));
   std::atomic<bool> any = false;
   oneapi::tbb::parallel_for(std::size_t{0}, made.elevations.size(), [&](std::size_t column) {
-    const TileCodes tile = read_tile_({static_cast<std::int64_t>(column), row});
     std::vector<double>& elevations = made.elevations[column];
-    if (tile.type == CodeType::kF32) {
-      elevations.assign(tile.heights.begin(), tile.heights.end());
-    } else {
-      elevations.reserve(tile.codes.size());
-      for (const std::uint32_t code : tile.codes) {
-        elevations.push_back(code == quantisation_.void_code() ? kVoid
-                                                               : quantisation_.offset + quantisation_.scale * code);
-      }
-    }
+    elevations = elevations_of(read_tile_({static_cast<std::int64_t>(column), row}), quantisation_);
     if (std::any_of(elevations.begin(), elevations.end(), [](double h) { return std::isnan(h); })) any = true;
   });
   made.has_voids = any;

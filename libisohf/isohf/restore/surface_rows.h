@@ -37,6 +37,9 @@ struct SampleGrid {
 /// The grid of the source that an archive was made from.
 [[nodiscard]] SampleGrid source_grid(const SourceRecord& source);
 
+/// The C*R elevations of a tile, vertical units; NaN where void.
+[[nodiscard]] std::vector<double> elevations_of(const TileCodes& tile, const Quantisation& quantisation);
+
 /// The surface of an archive at the samples of a grid, row by row from North to South.
 ///
 /// Keeps the tile rows and lattice rows that the next rows may need: memory grows with the width, not the height.
