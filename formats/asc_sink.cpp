@@ -1,13 +1,14 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <cstring>
 #include <iterator>
+#include <type_traits>
 
 #include "formats/output_stream.h"
 #include "formats/raster_encoder.h"
 #include "formats/raster_sidecars.h"
 #include "isohf/base/error.h"
+#include "isohf/surface/sample_types.h"
 
 namespace isohf {
 namespace {
@@ -33,39 +34,18 @@ class AscEncoder final : public RasterEncoder {
 
  private:
   void append_row(std::span<const std::byte> row) {
-    switch (type_) {
-      case SampleType::kUint8:
-        return append<std::uint8_t>(row, [](std::uint8_t z) { return static_cast<int>(z); });
-      case SampleType::kInt8:
-        return append<std::int8_t>(row, [](std::int8_t z) { return static_cast<int>(z); });
-      case SampleType::kUint16:
-        return append<std::uint16_t>(row, [](std::uint16_t z) { return static_cast<int>(z); });
-      case SampleType::kInt16:
-        return append<std::int16_t>(row, [](std::int16_t z) { return static_cast<int>(z); });
-      case SampleType::kUint32:
-        return append<std::uint32_t>(row, [](std::uint32_t z) { return z; });
-      case SampleType::kInt32:
-        return append<std::int32_t>(row, [](std::int32_t z) { return z; });
-      case SampleType::kFloat16:
-        return append<std::uint16_t>(row, [this](std::uint16_t z) { return or_void(float_from_half(z)); });
-      case SampleType::kFloat32:
-        return append<float>(row, [this](float z) { return or_void(z); });
-      case SampleType::kFloat64:
-        return append<double>(row, [this](double z) { return or_void(z); });
-    }
+    with_stored_type(type_, [&](auto sample) { append<decltype(sample)>(row); });
   }
 
-  template <typename Float>
-  Float or_void(Float z) const {
-    return std::isfinite(z) ? z : static_cast<Float>(void_);
-  }
-
-  template <typename Sample, typename Number>
-  void append(std::span<const std::byte> row, Number number) {
-    for (std::size_t at = 0; at < row.size(); at += sizeof(Sample)) {
-      Sample sample;
-      std::memcpy(&sample, row.data() + at, sizeof(sample));
-      fmt::format_to(std::back_inserter(line_), "{} ", number(sample));
+  template <typename T>
+  void append(std::span<const std::byte> row) {
+    for (std::size_t at = 0; at < row.size(); at += sizeof(T)) {
+      // The sign makes an int of what would pass for a character.
+      auto number = +number_of(stored_at<T>(row.data() + at));
+      if constexpr (std::is_floating_point_v<decltype(number)>) {
+        if (!std::isfinite(number)) number = static_cast<decltype(number)>(void_);
+      }
+      fmt::format_to(std::back_inserter(line_), "{} ", number);
     }
   }
 

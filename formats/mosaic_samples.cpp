@@ -12,6 +12,7 @@
 
 #include "formats/open_options.h"
 #include "isohf/base/assert.h"
+#include "isohf/surface/sample_types.h"
 
 namespace isohf {
 namespace {
@@ -19,50 +20,10 @@ namespace {
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// A half-precision sample; the others are stored as the type they count in.
-struct Half {
-  std::uint16_t bits;
-};
-
+/// A stored sample as a number.
 template <typename T>
-double widen(T value) {
-  if constexpr (std::is_same_v<T, Half>) {
-    return static_cast<double>(float_from_half(value.bits));
-  } else {
-    return static_cast<double>(value);
-  }
-}
-
-template <typename T>
-T load(const std::byte* at) {
-  T value;
-  std::memcpy(&value, at, sizeof(T));
-  return value;
-}
-
-/// Calls visit(T{}) with the type that holds a sample.
-template <typename Visit>
-void with_type(SampleType type, Visit visit) {
-  switch (type) {
-    case SampleType::kUint8:
-      return visit(std::uint8_t{});
-    case SampleType::kInt8:
-      return visit(std::int8_t{});
-    case SampleType::kUint16:
-      return visit(std::uint16_t{});
-    case SampleType::kInt16:
-      return visit(std::int16_t{});
-    case SampleType::kUint32:
-      return visit(std::uint32_t{});
-    case SampleType::kInt32:
-      return visit(std::int32_t{});
-    case SampleType::kFloat16:
-      return visit(Half{});
-    case SampleType::kFloat32:
-      return visit(float{});
-    case SampleType::kFloat64:
-      return visit(double{});
-  }
+double load(const std::byte* at) {
+  return static_cast<double>(number_of(stored_at<T>(at)));
 }
 
 bool is_bounded(const SampleKind& kind) {
@@ -74,27 +35,28 @@ bool is_void(const SampleKind& kind, double number) {
   return std::find(kind.void_values.begin(), kind.void_values.end(), number) != kind.void_values.end();
 }
 
-double lowest_of(SampleType type) {
+struct Limits {
   double lowest = 0.0;
-  with_type(type, [&](auto zero) {
-    using T = decltype(zero);
-    if constexpr (std::is_integral_v<T>) lowest = static_cast<double>(std::numeric_limits<T>::lowest());
-  });
-  return lowest;
-}
-
-double highest_of(SampleType type) {
   double highest = 0.0;
-  with_type(type, [&](auto zero) {
-    using T = decltype(zero);
-    if constexpr (std::is_integral_v<T>) highest = static_cast<double>(std::numeric_limits<T>::max());
+};
+
+/// Of an integer type; both are 0 for floating ones.
+Limits limits_of(SampleType type) {
+  return with_stored_type(type, [](auto sample) -> Limits {
+    using T = decltype(sample);
+    if constexpr (std::is_integral_v<T>) {
+      return {static_cast<double>(std::numeric_limits<T>::lowest()),
+              static_cast<double>(std::numeric_limits<T>::max())};
+    } else {
+      return {};
+    }
   });
-  return highest;
 }
 
 /// Whether some sample of this kind could be an elevation of that raw number.
 bool may_hold_elevation(const SampleKind& kind, double number) {
-  if (!is_floating(kind.type) && (number < lowest_of(kind.type) || number > highest_of(kind.type))) return false;
+  if (!is_floating(kind.type) && (number < limits_of(kind.type).lowest || number > limits_of(kind.type).highest))
+    return false;
   return !is_void(kind, number);
 }
 
@@ -102,7 +64,7 @@ bool may_hold_elevation(const SampleKind& kind, double number) {
 SampleType integer_for(double low, double high) {
   for (const SampleType type : {SampleType::kUint8, SampleType::kInt8, SampleType::kUint16, SampleType::kInt16,
                                 SampleType::kUint32, SampleType::kInt32}) {
-    if (low >= lowest_of(type) && high <= highest_of(type)) return type;
+    if (low >= limits_of(type).lowest && high <= limits_of(type).highest) return type;
   }
   return SampleType::kFloat64;
 }
@@ -121,8 +83,8 @@ SampleType common_type(const std::vector<SampleKind>& kinds, bool floating) {
     same = same && kind.type == kinds.front().type;
     narrow = narrow && has_24_bits(kind.type);
     floating = floating || is_floating(kind.type);
-    low = std::min(low, lowest_of(kind.type));
-    high = std::max(high, highest_of(kind.type));
+    low = std::min(low, limits_of(kind.type).lowest);
+    high = std::max(high, limits_of(kind.type).highest);
   }
   // float16 holds what it is given, but not what is computed between its numbers.
   if (same && (!floating || (is_floating(kinds.front().type) && kinds.front().type != SampleType::kFloat16))) {
@@ -152,7 +114,7 @@ std::optional<double> common_void(const std::vector<SampleKind>& kinds, SampleTy
     candidates.insert(candidates.end(), kind.void_values.begin(), kind.void_values.end());
   }
   std::sort(candidates.begin(), candidates.end());
-  candidates.push_back(lowest_of(type));
+  candidates.push_back(limits_of(type).lowest);
   for (const double candidate : candidates) {
     if (!void_value_as_stored(type, candidate)) continue;
     const auto is_taken = [&](const SampleKind& kind) { return may_hold_elevation(kind, candidate); };
@@ -163,9 +125,9 @@ std::optional<double> common_void(const std::vector<SampleKind>& kinds, SampleTy
 
 std::vector<std::byte> sample_of(SampleType type, double number) {
   std::vector<std::byte> bytes(size_bytes(type));
-  with_type(type, [&](auto zero) {
+  with_stored_type(type, [&](auto zero) {
     using T = decltype(zero);
-    if constexpr (std::is_same_v<T, Half>) {
+    if constexpr (std::is_same_v<T, StoredHalf>) {
       std::uint16_t bits = 0x7E00;  // a NaN
       for (std::uint32_t candidate = 0; std::isfinite(number) && candidate < 0x10000; ++candidate) {
         if (static_cast<double>(float_from_half(static_cast<std::uint16_t>(candidate))) == number) {
@@ -187,8 +149,8 @@ std::optional<double> gap_of(const SampleKind& kind) {
     if (std::isfinite(value)) return value;
   }
   if (is_floating(kind.type)) return kNaN;
-  if (kind.valid_min > lowest_of(kind.type)) return lowest_of(kind.type);
-  if (kind.valid_max < highest_of(kind.type)) return highest_of(kind.type);
+  if (kind.valid_min > limits_of(kind.type).lowest) return limits_of(kind.type).lowest;
+  if (kind.valid_max < limits_of(kind.type).highest) return limits_of(kind.type).highest;
   return std::nullopt;
 }
 
@@ -201,7 +163,7 @@ MosaicSamples widened(const SampleKind& kind) {
   MosaicSamples samples;
   samples.kind = plain_kind(wider(kind.type), kind);
   const bool floating = is_floating(samples.kind.type);
-  if (!floating) samples.kind.void_values = {lowest_of(samples.kind.type)};
+  if (!floating) samples.kind.void_values = {limits_of(samples.kind.type).lowest};
   samples.gap = sample_of(samples.kind.type, floating ? kNaN : samples.kind.void_values.front());
   samples.notes.push_back(fmt::format("{} has no number to spare for voids in all files; samples become {}",
                                       to_string(kind.type), to_string(samples.kind.type)));
@@ -306,10 +268,10 @@ void convert_samples(const SampleKind& from, std::span<const std::byte> raw, con
       samples_from_numbers(to.kind.type, {numbers, part}, {target, part * to_bytes});
       continue;
     }
-    with_type(to.kind.type, [&](auto zero) {
+    with_stored_type(to.kind.type, [&](auto zero) {
       using T = decltype(zero);
       if constexpr (std::is_integral_v<T>) {
-        const T gap = load<T>(to.gap.data());
+        const T gap = stored_at<T>(to.gap.data());
         for (std::size_t i = 0; i < part; ++i) {
           const T value = std::isnan(numbers[i]) ? gap : static_cast<T>(numbers[i]);
           std::memcpy(target + i * sizeof(T), &value, sizeof(T));
@@ -327,7 +289,7 @@ void lay_over(const SampleKind& kind, std::span<const std::byte> upper, std::spa
     std::memcpy(lower.data(), upper.data(), upper.size());
     return;
   }
-  with_type(kind.type, [&](auto zero) {
+  with_stored_type(kind.type, [&](auto zero) {
     using T = decltype(zero);
     if constexpr (std::is_integral_v<T>) {
       if (kind.void_values.size() == 1 && !is_bounded(kind)) {
@@ -337,7 +299,7 @@ void lay_over(const SampleKind& kind, std::span<const std::byte> upper, std::spa
     for (std::size_t i = 0; i < count; ++i) {
       const std::byte* const above = upper.data() + i * sizeof(T);
       std::byte* const below = lower.data() + i * sizeof(T);
-      if (!is_void(kind, widen(load<T>(above))) || is_void(kind, widen(load<T>(below)))) {
+      if (!is_void(kind, load<T>(above)) || is_void(kind, load<T>(below))) {
         std::memcpy(below, above, sizeof(T));
       }
     }
@@ -345,10 +307,10 @@ void lay_over(const SampleKind& kind, std::span<const std::byte> upper, std::spa
 }
 
 void numbers_from_samples(const SampleKind& kind, std::span<const std::byte> raw, std::span<double> numbers) {
-  with_type(kind.type, [&](auto zero) {
+  with_stored_type(kind.type, [&](auto zero) {
     using T = decltype(zero);
     ISOHF_ASSERT(raw.size() == numbers.size() * sizeof(T));
-    for (std::size_t i = 0; i < numbers.size(); ++i) numbers[i] = widen(load<T>(raw.data() + i * sizeof(T)));
+    for (std::size_t i = 0; i < numbers.size(); ++i) numbers[i] = load<T>(raw.data() + i * sizeof(T));
   });
   for (double& number : numbers) number = is_void(kind, number) ? kNaN : number;
 }

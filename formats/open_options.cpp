@@ -7,8 +7,10 @@
 #include <cmath>
 #include <limits>
 #include <string>
+#include <type_traits>
 
 #include "isohf/base/error.h"
+#include "isohf/surface/sample_types.h"
 
 namespace isohf {
 namespace {
@@ -77,28 +79,19 @@ void override_spacing(SourceInfo& info, double spacing_m) {
 }  // namespace
 
 std::optional<double> void_value_as_stored(SampleType type, double value) {
-  switch (type) {
-    case SampleType::kUint8:
-      return integer_as_stored<std::uint8_t>(value);
-    case SampleType::kInt8:
-      return integer_as_stored<std::int8_t>(value);
-    case SampleType::kUint16:
-      return integer_as_stored<std::uint16_t>(value);
-    case SampleType::kInt16:
-      return integer_as_stored<std::int16_t>(value);
-    case SampleType::kUint32:
-      return integer_as_stored<std::uint32_t>(value);
-    case SampleType::kInt32:
-      return integer_as_stored<std::int32_t>(value);
-    case SampleType::kFloat16:
+  return with_stored_type(type, [value](auto stored) -> std::optional<double> {
+    using T = decltype(stored);
+    if constexpr (std::is_same_v<T, StoredHalf>) {
       return float_as_stored(value, 11, 65504.0, -24);
-    case SampleType::kFloat32:
+    } else if constexpr (std::is_same_v<T, float>) {
       return float_as_stored(value, std::numeric_limits<float>::digits,
                              static_cast<double>(std::numeric_limits<float>::max()), -149);
-    case SampleType::kFloat64:
+    } else if constexpr (std::is_same_v<T, double>) {
       return value;
-  }
-  return std::nullopt;
+    } else {
+      return integer_as_stored<T>(value);
+    }
+  });
 }
 
 void apply_open_options(SourceInfo& info, const OpenOptions& options) {

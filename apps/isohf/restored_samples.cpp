@@ -11,17 +11,14 @@
 #include <cstring>
 #include <limits>
 #include <tuple>
+#include <type_traits>
 #include <utility>
 
 #include "isohf/base/error.h"
+#include "isohf/surface/sample_types.h"
 
 namespace isohf::cli {
 namespace {
-
-template <typename T>
-std::pair<double, double> range() {
-  return {static_cast<double>(std::numeric_limits<T>::lowest()), static_cast<double>(std::numeric_limits<T>::max())};
-}
 
 template <typename T>
 void put(T value, std::byte* raw) {
@@ -37,27 +34,15 @@ void store_nan(SampleType type, std::byte* raw) {
 }  // namespace
 
 std::pair<double, double> sample_range(SampleType type) {
-  switch (type) {
-    case SampleType::kUint8:
-      return range<std::uint8_t>();
-    case SampleType::kInt8:
-      return range<std::int8_t>();
-    case SampleType::kUint16:
-      return range<std::uint16_t>();
-    case SampleType::kInt16:
-      return range<std::int16_t>();
-    case SampleType::kUint32:
-      return range<std::uint32_t>();
-    case SampleType::kInt32:
-      return range<std::int32_t>();
-    case SampleType::kFloat16:
+  return with_stored_type(type, [](auto stored) -> std::pair<double, double> {
+    using T = decltype(stored);
+    if constexpr (std::is_same_v<T, StoredHalf>) {
       return {-65504.0, 65504.0};  // (2 - 2^-10) * 2^15
-    case SampleType::kFloat32:
-      return range<float>();
-    case SampleType::kFloat64:
-      break;
-  }
-  return range<double>();
+    } else {
+      return {static_cast<double>(std::numeric_limits<T>::lowest()),
+              static_cast<double>(std::numeric_limits<T>::max())};
+    }
+  });
 }
 
 std::optional<double> usual_void(SampleType type) {

@@ -10,6 +10,7 @@
 
 #include "isohf/base/assert.h"
 #include "isohf/base/bytes.h"
+#include "isohf/surface/sample_types.h"
 
 namespace isohf {
 namespace {
@@ -85,36 +86,23 @@ struct Floating {
   }
 };
 
-template <typename Action>
-auto with_type(SampleType type, Action action) {
-  switch (type) {
-    case SampleType::kUint8:
-      return action(Integer<std::uint8_t>());
-    case SampleType::kInt8:
-      return action(Integer<std::int8_t>());
-    case SampleType::kUint16:
-      return action(Integer<std::uint16_t>());
-    case SampleType::kInt16:
-      return action(Integer<std::int16_t>());
-    case SampleType::kUint32:
-      return action(Integer<std::uint32_t>());
-    case SampleType::kInt32:
-      return action(Integer<std::int32_t>());
-    case SampleType::kFloat16:
-      return action(Half());
-    case SampleType::kFloat32:
-      return action(Floating<float, std::uint32_t>());
-    case SampleType::kFloat64:
-      break;
-  }
-  return action(Floating<double, std::uint64_t>());
+template <typename T>
+Integer<T> coding_of(T /*stored*/) {
+  return {};
+}
+Half coding_of(StoredHalf /*stored*/) {
+  return {};
+}
+Floating<float, std::uint32_t> coding_of(float /*stored*/) {
+  return {};
+}
+Floating<double, std::uint64_t> coding_of(double /*stored*/) {
+  return {};
 }
 
-template <typename Bits>
-Bits load(const std::byte* at) {
-  Bits bits;
-  std::memcpy(&bits, at, sizeof(Bits));
-  return bits;
+template <typename Action>
+auto with_type(SampleType type, Action action) {
+  return with_stored_type(type, [&](auto stored) { return action(coding_of(stored)); });
 }
 
 /// Residual 0, -1, 1, -2, ... as 0, 1, 2, 3, ...
@@ -172,7 +160,7 @@ ResidualPayload encode(const SampleMapping& mapping, std::int64_t width, std::sp
   Neighbours neighbours(width);
   bool any_masked = false;
   for (std::size_t i = 0; i < predicted.size(); ++i) {
-    const Bits bits = load<Bits>(raw.data() + i * sizeof(Bits));
+    const Bits bits = stored_at<Bits>(raw.data() + i * sizeof(Bits));
     if (std::isnan(predicted[i]) || is_void[i] != 0) {
       kept.push_back(bits);
       if (std::isnan(predicted[i])) continue;
@@ -270,27 +258,8 @@ bool store_sample(const SampleMapping& mapping, double elevation, std::byte* raw
 }
 
 double load_sample(SampleType type, const std::byte* raw) {
-  switch (type) {
-    case SampleType::kUint8:
-      return load<std::uint8_t>(raw);
-    case SampleType::kInt8:
-      return load<std::int8_t>(raw);
-    case SampleType::kUint16:
-      return load<std::uint16_t>(raw);
-    case SampleType::kInt16:
-      return load<std::int16_t>(raw);
-    case SampleType::kUint32:
-      return load<std::uint32_t>(raw);
-    case SampleType::kInt32:
-      return load<std::int32_t>(raw);
-    case SampleType::kFloat16:
-      return double{float_from_half(load<std::uint16_t>(raw))};
-    case SampleType::kFloat32:
-      return double{load<float>(raw)};
-    case SampleType::kFloat64:
-      break;
-  }
-  return load<double>(raw);
+  return with_stored_type(
+      type, [raw](auto stored) { return static_cast<double>(number_of(stored_at<decltype(stored)>(raw))); });
 }
 
 ResidualPayload encode_residuals(const SampleMapping& mapping, std::int64_t width, std::span<const std::byte> raw,

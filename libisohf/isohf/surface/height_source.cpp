@@ -2,24 +2,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <type_traits>
 #include <vector>
 
 #include "isohf/base/assert.h"
+#include "isohf/surface/sample_types.h"
 
 namespace isohf {
 namespace {
 
 constexpr float kVoid = std::numeric_limits<float>::quiet_NaN();
-
-template <typename T>
-T load(const std::byte* at) {
-  T value;
-  std::memcpy(&value, at, sizeof(T));
-  return value;
-}
 
 /// Whether some sample of type W can be equal to `value`; where none can, conversions to W have no meaning.
 template <typename W>
@@ -62,13 +55,13 @@ struct RawRange {
 
 /// Raw samples to heights, and to voids where some are equal to a void value or lie outside the valid range. Loops
 /// choose and do not branch, so that they vectorise.
-template <typename T, typename Widen>
-void convert(const SourceInfo& info, double datum, const std::byte* raw, std::span<float> heights, Widen widen) {
-  using Wide = decltype(widen(T{}));
+template <typename T>
+void convert(const SourceInfo& info, double datum, const std::byte* raw, std::span<float> heights) {
+  using Wide = decltype(number_of(T{}));
   const double scale = info.z_scale;
   const double offset = info.z_offset - datum;
   const std::size_t count = heights.size();
-  const auto sample = [&](std::size_t i) { return widen(load<T>(raw + i * sizeof(T))); };
+  const auto sample = [&](std::size_t i) { return number_of(stored_at<T>(raw + i * sizeof(T))); };
   const auto convert_all = [&](auto is_void) {
     if (scale == 1.0 && offset == 0.0) {
       for (std::size_t i = 0; i < count; ++i) {
@@ -116,27 +109,7 @@ void convert(const SourceInfo& info, double datum, const std::byte* raw, std::sp
 void heights_from_samples(const SourceInfo& info, double datum, std::span<const std::byte> raw,
                           std::span<float> heights) {
   ISOHF_ASSERT(raw.size() == heights.size() * size_bytes(info.sample_type));
-  const auto same = [](auto value) { return value; };
-  switch (info.sample_type) {
-    case SampleType::kUint8:
-      return convert<std::uint8_t>(info, datum, raw.data(), heights, same);
-    case SampleType::kInt8:
-      return convert<std::int8_t>(info, datum, raw.data(), heights, same);
-    case SampleType::kUint16:
-      return convert<std::uint16_t>(info, datum, raw.data(), heights, same);
-    case SampleType::kInt16:
-      return convert<std::int16_t>(info, datum, raw.data(), heights, same);
-    case SampleType::kUint32:
-      return convert<std::uint32_t>(info, datum, raw.data(), heights, same);
-    case SampleType::kInt32:
-      return convert<std::int32_t>(info, datum, raw.data(), heights, same);
-    case SampleType::kFloat16:
-      return convert<std::uint16_t>(info, datum, raw.data(), heights, float_from_half);
-    case SampleType::kFloat32:
-      return convert<float>(info, datum, raw.data(), heights, same);
-    case SampleType::kFloat64:
-      return convert<double>(info, datum, raw.data(), heights, same);
-  }
+  with_stored_type(info.sample_type, [&](auto sample) { convert<decltype(sample)>(info, datum, raw.data(), heights); });
 }
 
 }  // namespace isohf

@@ -8,26 +8,16 @@
 #include <type_traits>
 
 #include "isohf/base/assert.h"
+#include "isohf/surface/sample_types.h"
 
 namespace isohf {
 namespace {
-
-/// Half-precision bits; a type of its own, so that it is no integer.
-struct Half {
-  std::uint16_t bits;
-};
 
 constexpr double kMaxHalf = 65504.0;
 
 template <typename T>
 double load(const std::byte* at) {
-  T value;
-  std::memcpy(&value, at, sizeof value);
-  if constexpr (std::is_same_v<T, Half>) {
-    return static_cast<double>(float_from_half(value.bits));
-  } else {
-    return static_cast<double>(value);
-  }
+  return static_cast<double>(number_of(stored_at<T>(at)));
 }
 
 /// Half-precision numbers are multiples of 2^-24, and of 2^(e-10) from 2^e on.
@@ -47,7 +37,7 @@ std::uint16_t half_bits(double raw) {
 template <typename T>
 void store(double raw, std::byte* at) {
   T value;
-  if constexpr (std::is_same_v<T, Half>) {
+  if constexpr (std::is_same_v<T, StoredHalf>) {
     value.bits = half_bits(raw);
   } else {
     value = static_cast<T>(raw);
@@ -57,7 +47,7 @@ void store(double raw, std::byte* at) {
 
 template <typename T>
 double nearest(double raw) {
-  if constexpr (std::is_same_v<T, Half>) {
+  if constexpr (std::is_same_v<T, StoredHalf>) {
     const double step = half_step(raw);
     return std::clamp(std::nearbyint(raw / step) * step, -kMaxHalf, kMaxHalf);
   } else if constexpr (std::is_floating_point_v<T>) {
@@ -71,7 +61,7 @@ double nearest(double raw) {
 
 template <typename T>
 double next(double raw) {
-  if constexpr (std::is_same_v<T, Half>) {
+  if constexpr (std::is_same_v<T, StoredHalf>) {
     // Towards zero the step just below a power of two is the smaller one.
     const double beyond = raw < 0.0 ? half_step(std::nextafter(raw, 0.0)) : half_step(raw);
     return std::min(raw + beyond, kMaxHalf);
@@ -91,52 +81,26 @@ double previous(double raw) {
   }
 }
 
-/// Calls `with.template operator()<T>()` for the type that holds such samples.
-template <typename With>
-auto for_type(SampleType type, With with) {
-  switch (type) {
-    case SampleType::kUint8:
-      return with(std::uint8_t{});
-    case SampleType::kInt8:
-      return with(std::int8_t{});
-    case SampleType::kUint16:
-      return with(std::uint16_t{});
-    case SampleType::kInt16:
-      return with(std::int16_t{});
-    case SampleType::kUint32:
-      return with(std::uint32_t{});
-    case SampleType::kInt32:
-      return with(std::int32_t{});
-    case SampleType::kFloat16:
-      return with(Half{});
-    case SampleType::kFloat32:
-      return with(float{});
-    case SampleType::kFloat64:
-      break;
-  }
-  return with(double{});
-}
-
 }  // namespace
 
 LoadSample load_sample(SampleType type) {
-  return for_type(type, [](auto sample) -> LoadSample { return load<decltype(sample)>; });
+  return with_stored_type(type, [](auto sample) -> LoadSample { return load<decltype(sample)>; });
 }
 
 StoreSample store_sample(SampleType type) {
-  return for_type(type, [](auto sample) -> StoreSample { return store<decltype(sample)>; });
+  return with_stored_type(type, [](auto sample) -> StoreSample { return store<decltype(sample)>; });
 }
 
 double nearest_sample(SampleType type, double raw) {
-  return for_type(type, [raw](auto sample) { return nearest<decltype(sample)>(raw); });
+  return with_stored_type(type, [raw](auto sample) { return nearest<decltype(sample)>(raw); });
 }
 
 double next_sample(SampleType type, double raw) {
-  return for_type(type, [raw](auto sample) { return next<decltype(sample)>(raw); });
+  return with_stored_type(type, [raw](auto sample) { return next<decltype(sample)>(raw); });
 }
 
 double previous_sample(SampleType type, double raw) {
-  return for_type(type, [raw](auto sample) { return previous<decltype(sample)>(raw); });
+  return with_stored_type(type, [raw](auto sample) { return previous<decltype(sample)>(raw); });
 }
 
 }  // namespace isohf

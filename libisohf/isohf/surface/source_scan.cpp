@@ -2,24 +2,18 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <type_traits>
+
+#include "isohf/surface/sample_types.h"
 
 namespace isohf {
 namespace {
 
+/// Range of the valid raw samples.
 template <typename T>
-T load(const std::byte* at) {
-  T value;
-  std::memcpy(&value, at, sizeof(T));
-  return value;
-}
-
-/// Range of the valid raw samples; W widens a stored sample to a number that compares.
-template <typename T, typename Widen>
-void scan(const SourceInfo& info, std::span<const std::byte> raw, SourceScan& scan, Widen widen) {
-  using Wide = decltype(widen(T{}));
+void scan(const SourceInfo& info, std::span<const std::byte> raw, SourceScan& scan) {
+  using Wide = decltype(number_of(T{}));
   const std::size_t count = raw.size() / sizeof(T);
   Wide low = std::numeric_limits<Wide>::max();
   Wide high = std::numeric_limits<Wide>::lowest();
@@ -38,12 +32,12 @@ void scan(const SourceInfo& info, std::span<const std::byte> raw, SourceScan& sc
     const bool has_void = !info.void_values.empty();
     const double void_value = has_void ? info.void_values.front() : 0.0;
     for (std::size_t i = 0; i < count; ++i) {
-      const Wide value = widen(load<T>(raw.data() + i * sizeof(T)));
+      const Wide value = number_of(stored_at<T>(raw.data() + i * sizeof(T)));
       accept(value, is_number(value) && !(has_void && static_cast<double>(value) == void_value));
     }
   } else {
     for (std::size_t i = 0; i < count; ++i) {
-      const Wide value = widen(load<T>(raw.data() + i * sizeof(T)));
+      const Wide value = number_of(stored_at<T>(raw.data() + i * sizeof(T)));
       const auto number = static_cast<double>(value);
       bool is_valid = is_number(value) && number >= info.valid_min && number <= info.valid_max;
       for (const double void_value : info.void_values) is_valid = is_valid && number != void_value;
@@ -61,15 +55,15 @@ void scan(const SourceInfo& info, std::span<const std::byte> raw, SourceScan& sc
   scan.valid += valid;
 }
 
-template <typename T, typename Widen>
-double sum(const SourceInfo& info, std::span<const std::byte> raw, Widen widen) {
+template <typename T>
+double sum(const SourceInfo& info, std::span<const std::byte> raw) {
   constexpr std::size_t kRun = 4096;  // sums of sums: rounding grows with the root of the count
   const std::size_t count = raw.size() / sizeof(T);
   double total = 0.0;
   for (std::size_t first = 0; first < count; first += kRun) {
     double run = 0.0;
     for (std::size_t i = first; i < std::min(first + kRun, count); ++i) {
-      const auto number = static_cast<double>(widen(load<T>(raw.data() + i * sizeof(T))));
+      const auto number = static_cast<double>(number_of(stored_at<T>(raw.data() + i * sizeof(T))));
       bool is_valid = std::isfinite(number) && number >= info.valid_min && number <= info.valid_max;
       for (const double void_value : info.void_values) is_valid = is_valid && number != void_value;
       run += is_valid ? number : 0.0;
@@ -82,52 +76,11 @@ double sum(const SourceInfo& info, std::span<const std::byte> raw, Widen widen) 
 }  // namespace
 
 double sum_of_samples(const SourceInfo& info, std::span<const std::byte> raw) {
-  const auto same = [](auto value) { return value; };
-  switch (info.sample_type) {
-    case SampleType::kUint8:
-      return sum<std::uint8_t>(info, raw, same);
-    case SampleType::kInt8:
-      return sum<std::int8_t>(info, raw, same);
-    case SampleType::kUint16:
-      return sum<std::uint16_t>(info, raw, same);
-    case SampleType::kInt16:
-      return sum<std::int16_t>(info, raw, same);
-    case SampleType::kUint32:
-      return sum<std::uint32_t>(info, raw, same);
-    case SampleType::kInt32:
-      return sum<std::int32_t>(info, raw, same);
-    case SampleType::kFloat16:
-      return sum<std::uint16_t>(info, raw, float_from_half);
-    case SampleType::kFloat32:
-      return sum<float>(info, raw, same);
-    case SampleType::kFloat64:
-      return sum<double>(info, raw, same);
-  }
-  return 0.0;
+  return with_stored_type(info.sample_type, [&](auto sample) { return sum<decltype(sample)>(info, raw); });
 }
 
 void scan_samples(const SourceInfo& info, std::span<const std::byte> raw, SourceScan& found) {
-  const auto same = [](auto value) { return value; };
-  switch (info.sample_type) {
-    case SampleType::kUint8:
-      return scan<std::uint8_t>(info, raw, found, same);
-    case SampleType::kInt8:
-      return scan<std::int8_t>(info, raw, found, same);
-    case SampleType::kUint16:
-      return scan<std::uint16_t>(info, raw, found, same);
-    case SampleType::kInt16:
-      return scan<std::int16_t>(info, raw, found, same);
-    case SampleType::kUint32:
-      return scan<std::uint32_t>(info, raw, found, same);
-    case SampleType::kInt32:
-      return scan<std::int32_t>(info, raw, found, same);
-    case SampleType::kFloat16:
-      return scan<std::uint16_t>(info, raw, found, float_from_half);
-    case SampleType::kFloat32:
-      return scan<float>(info, raw, found, same);
-    case SampleType::kFloat64:
-      return scan<double>(info, raw, found, same);
-  }
+  with_stored_type(info.sample_type, [&](auto sample) { scan<decltype(sample)>(info, raw, found); });
 }
 
 double choose_datum(const SourceInfo& info, const ElevationRange& range) {
