@@ -91,4 +91,9 @@ QuantiserCounts quantise(const Quantisation& quantisation, double datum, std::sp
   return counts;
 }
 
+CodeLimits code_limits(const Quantisation& quantisation) {
+  if (quantisation.type == CodeType::kF32) return {-HUGE_VAL, HUGE_VAL};
+  return {quantisation.offset, elevation_from_code(quantisation, quantisation.max_code())};
+}
+
 }  // namespace isohf

@@ -21,6 +21,13 @@ struct QuantiserCounts {
 QuantiserCounts quantise(const Quantisation& quantisation, double datum, std::span<const float> heights,
                          TileCodes& tile);
 
+/// The elevations of the first and the last code, which nothing stored lies beyond; infinities for floats.
+struct CodeLimits {
+  double lowest;
+  double highest;
+};
+[[nodiscard]] CodeLimits code_limits(const Quantisation& quantisation);
+
 /// The elevation that a code stands for.
 [[nodiscard]] inline double elevation_from_code(const Quantisation& quantisation, std::uint32_t code) {
   return quantisation.offset + quantisation.scale * code;

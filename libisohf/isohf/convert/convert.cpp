@@ -42,11 +42,11 @@ struct Stages {
 };
 
 [[noreturn]] void refuse_overflow(const Conversion& job, TileIndex tile, const QuantiserCounts& counts) {
+  const CodeLimits limits = code_limits(job.quantisation);
   throw Error(ErrorCode::kInvalidArgument,
               fmt::format("tile ({},{}): {} elevations lie outside the z range {} to {}; widen --z-range, or give "
                           "--clamp-range to move them to its ends",
-                          tile.column, tile.row, counts.below + counts.above, job.quantisation.offset,
-                          elevation_from_code(job.quantisation, job.quantisation.max_code())));
+                          tile.column, tile.row, counts.below + counts.above, limits.lowest, limits.highest));
 }
 
 void make_tile(const Conversion& job, const TileSource& source, const Stages& stages, bool is_new, TileJob& tile) {
@@ -70,12 +70,8 @@ void make_tile(const Conversion& job, const TileSource& source, const Stages& st
 /// number of parts of the source: one that is being cut and one that is being read.
 void write_tiles(const Conversion& job, ArchiveWriter& writer, const Stages& stages, const ProgressCallback& callback) {
   const TileGrid& grid = job.plan.grid;
-  const Quantisation& codes = job.quantisation;
-  ElevationRange limits{-HUGE_VAL, HUGE_VAL};
-  if (codes.type != CodeType::kF32) {
-    limits = {codes.offset - job.datum, elevation_from_code(codes, codes.max_code()) - job.datum};
-  }
-  TileSource source(job, limits);
+  const CodeLimits limits = code_limits(job.quantisation);
+  TileSource source(job, {limits.lowest - job.datum, limits.highest - job.datum});
   ProgressMeter meter(callback, ConvertProgress::Pass::kTiles, grid.tile_count());
   const std::int64_t first_new = writer.next_tile();
   std::int64_t next = stages.seeds != nullptr ? SeedStage::first_tile_needed(grid, first_new) : first_new;

@@ -16,8 +16,8 @@ namespace {
 constexpr std::int64_t kTileSide = 256;
 
 ElevationRange code_range(const Quantisation& codes, double datum) {
-  if (codes.type == CodeType::kF32) return {-HUGE_VAL, HUGE_VAL};
-  return {codes.offset - datum, elevation_from_code(codes, codes.max_code()) - datum};
+  const CodeLimits limits = code_limits(codes);
+  return {limits.lowest - datum, limits.highest - datum};
 }
 
 void elevations_from_codes(const Quantisation& quantisation, const TileCodes& codes, std::vector<double>& out) {

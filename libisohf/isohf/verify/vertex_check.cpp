@@ -9,6 +9,7 @@
 #include <limits>
 #include <vector>
 
+#include "isohf/archive/quantise.h"
 #include "isohf/base/error.h"
 #include "isohf/restore/archive_geometry.h"
 #include "isohf/surface/band_reader.h"
@@ -25,7 +26,8 @@ class VertexCheck {
         grid_(archive.grid()),
         source_(source),
         kernel_(Kernel::make(filter_from_string(metadata_.filter))),
-        prefilter_(Prefilter::make(kernel_.filter(), acquisition_from_string(metadata_.acquisition))) {
+        prefilter_(Prefilter::make(kernel_.filter(), acquisition_from_string(metadata_.acquisition))),
+        limits_(code_limits(metadata_.quantisation)) {
     const SourceInfo& info = source.info();
     if (info.width != metadata_.source.width || info.height != metadata_.source.height) {
       throw Error(ErrorCode::kInvalidArgument,
@@ -37,8 +39,6 @@ class VertexCheck {
     const ElevationRange range{statistics.min.value_or(0.0), statistics.max.value_or(0.0)};
     datum_ = choose_datum(source.info(), range);
     const bool is_float = q.type == CodeType::kF32;
-    lowest_ = is_float ? -HUGE_VAL : q.offset;
-    highest_ = is_float ? HUGE_VAL : q.offset + q.scale * q.max_code();
     // Heights are floats relative to a datum that need not be the one that was used; elevations in f32 are floats.
     const double largest = std::max(std::abs(range.min), std::abs(range.max)) + std::abs(datum_);
     const double rounding = 4.0 * largest * double{std::numeric_limits<float>::epsilon()};
@@ -47,7 +47,8 @@ class VertexCheck {
   }
 
   VertexReport run(const std::function<void(std::int64_t, std::int64_t)>& progress, const std::atomic<bool>& cancel) {
-    const auto cutter = make_cutter(grid_, archive_geometry(metadata_), kernel_, {lowest_ - datum_, highest_ - datum_});
+    const auto cutter =
+        make_cutter(grid_, archive_geometry(metadata_), kernel_, {limits_.lowest - datum_, limits_.highest - datum_});
     BandReader reader(source_, datum_, prefilter_, archive_geometry(metadata_).wraps_x);
     std::vector<VertexReport> tiles(static_cast<std::size_t>(grid_.tile_columns()));
     for (std::int64_t row = 0; row < grid_.tile_rows(); ++row) {
@@ -76,7 +77,7 @@ class VertexCheck {
         found.wrong += both ? 0 : 1;
         continue;
       }
-      const double held = std::clamp(resampled, lowest_, highest_);
+      const double held = std::clamp(resampled, limits_.lowest, limits_.highest);
       if (can_clamp_ && std::abs(held - resampled) > report_.bound && stored[i] == held) {
         ++found.clamped;
         continue;
@@ -106,8 +107,7 @@ class VertexCheck {
   Kernel kernel_;
   Prefilter prefilter_;
   double datum_ = 0.0;
-  double lowest_ = 0.0;
-  double highest_ = 0.0;
+  const CodeLimits limits_;
   bool can_clamp_ = false;
   VertexReport report_;
 };
