@@ -5,6 +5,8 @@
 #include <bit>
 #include <cmath>
 #include <map>
+#include <random>
+#include <string>
 #include <vector>
 
 #include "isohf/projection/choose_projection.h"
@@ -46,37 +48,70 @@ std::vector<Scene> scenes() {
   };
 }
 
-TEST(SourceWarp, PositionsAreWithinAHundredthOfASample) {
-  for (const Scene& scene : scenes()) {
-    SCOPED_TRACE(scene.name);
-    const ExactWarp exact(scene.place);
-    const SourceWarp warp(scene.grid, scene.place, 8.0);
-    const TileShape& shape = scene.grid.shape();
-    std::vector<double> u(static_cast<std::size_t>(shape.stored_vertex_count()));
-    std::vector<double> v(u.size());
-    double worst = 0.0;
-    std::int64_t inside = 0;
-    for (std::int64_t tile = 0; tile < scene.grid.tile_count(); ++tile) {
-      const TileIndex index = scene.grid.tile_at(tile);
-      warp.positions(index, u, v);
-      for (int r = 0; r < shape.rows(); ++r) {
-        for (int c = 0; c < shape.columns(); ++c) {
-          const auto i = static_cast<std::size_t>(r * shape.columns() + c);
-          const SourcePosition at =
-              exact.source_from_world(scene.grid.world_from_lattice(scene.grid.lattice_vertex(index, {c, r})));
-          const bool matters = at.u >= -8.0 && at.u <= static_cast<double>(scene.place.width) + 7.0 && at.v >= -8.0 &&
-                               at.v <= static_cast<double>(scene.place.height) + 7.0;
-          if (!matters) continue;
-          ++inside;
-          ASSERT_FALSE(std::isnan(u[i])) << "tile " << tile << " vertex " << c << "," << r << " at " << at.u << ","
-                                         << at.v;
-          worst = std::max(worst, std::abs(std::remainder(u[i] - at.u, scene.place.columns_round())));
-          worst = std::max(worst, std::abs(v[i] - at.v));
-        }
+/// Compares the position of every vertex that matters with the projection's; at least one of `of_every` must.
+void expect_close(const Scene& scene, std::int64_t of_every) {
+  SCOPED_TRACE(scene.name);
+  const ExactWarp exact(scene.place);
+  const SourceWarp warp(scene.grid, scene.place, 8.0);
+  const TileShape& shape = scene.grid.shape();
+  std::vector<double> u(static_cast<std::size_t>(shape.stored_vertex_count()));
+  std::vector<double> v(u.size());
+  double worst = 0.0;
+  std::int64_t inside = 0;
+  for (std::int64_t tile = 0; tile < scene.grid.tile_count(); ++tile) {
+    const TileIndex index = scene.grid.tile_at(tile);
+    warp.positions(index, u, v);
+    for (int r = 0; r < shape.rows(); ++r) {
+      for (int c = 0; c < shape.columns(); ++c) {
+        const auto i = static_cast<std::size_t>(r * shape.columns() + c);
+        const SourcePosition at =
+            exact.source_from_world(scene.grid.world_from_lattice(scene.grid.lattice_vertex(index, {c, r})));
+        const bool matters = at.u >= -8.0 && at.u <= static_cast<double>(scene.place.width) + 7.0 && at.v >= -8.0 &&
+                             at.v <= static_cast<double>(scene.place.height) + 7.0;
+        if (!matters) continue;
+        ++inside;
+        ASSERT_FALSE(std::isnan(u[i])) << "tile " << tile << " vertex " << c << "," << r << " at " << at.u << ","
+                                       << at.v;
+        worst = std::max(worst, std::abs(std::remainder(u[i] - at.u, scene.place.columns_round())));
+        worst = std::max(worst, std::abs(v[i] - at.v));
       }
     }
-    EXPECT_LE(worst, SourceWarp::kTolerance);
-    EXPECT_GT(inside, scene.grid.tile_count() * shape.stored_vertex_count() / 8);
+  }
+  EXPECT_LE(worst, SourceWarp::kTolerance);
+  EXPECT_GT(inside, scene.grid.tile_count() * shape.stored_vertex_count() / of_every);
+}
+
+TEST(SourceWarp, PositionsAreWithinAHundredthOfASample) {
+  for (const Scene& scene : scenes()) expect_close(scene, 8);
+}
+
+TEST(SourceWarp, PositionsAreWithinAHundredthOfASampleAnywhere) {
+  const Ellipsoid mars{3396190.0, 169.894447223612};
+  constexpr std::uint32_t kSeed = 20240617;
+  SCOPED_TRACE("seed " + std::to_string(kSeed));
+  std::mt19937 random(kSeed);
+  const auto between = [&](double low, double high) {
+    return low + (high - low) * static_cast<double>(random()) / static_cast<double>(std::mt19937::max());
+  };
+  for (const std::string kind : {"local", "transverse-mercator", "utm", "lambert-conformal", "polar-stereographic"}) {
+    for (const bool on_mars : {false, true}) {
+      for (int i = 0; i < 6; ++i) {
+        const double size = between(0.3, 5.0);
+        // The first ones lie at the antimeridian, the second ones as near to a pole as the kind goes.
+        const double west = i == 0 ? 180.0 - size * between(0.2, 0.8) : between(-180.0, 180.0);
+        const bool is_polar = kind == "polar-stereographic";
+        const double most = is_polar ? 90.0 : 84.0;
+        const double far = i == 1 ? most - size : between(is_polar ? 50.0 : 0.0, most - size);
+        const bool in_south = random() % 2 == 0;
+        const double south = in_south ? -far - size : far;
+        const auto samples = static_cast<std::int64_t>(between(100.0, 3000.0));
+        const GeoExtent ground{west, south, west + size, south + size};
+        SCOPED_TRACE(::testing::Message() << (on_mars ? "Mars " : "Earth ") << west << " " << south << " " << size);
+        if (kind == "utm" && on_mars) continue;  // of the Earth
+        // Beside a pole the ground is a sliver of its square.
+        expect_close(make_scene(kind, ground, samples, samples, false, on_mars ? mars : Ellipsoid{}), 100);
+      }
+    }
   }
 }
 
