@@ -10,6 +10,14 @@ target_compile_options(isohf_options INTERFACE
 if(ISOHF_WERROR)
   target_compile_options(isohf_options INTERFACE -Werror)
 endif()
+if(ISOHF_FUZZ)
+  if(NOT CMAKE_CXX_COMPILER_ID MATCHES "Clang")
+    message(FATAL_ERROR "ISOHF_FUZZ needs clang: -DCMAKE_CXX_COMPILER=clang++-14")
+  endif()
+  # Every target counts the edges that it takes; only the fuzz targets have libFuzzer's main().
+  target_compile_options(isohf_options INTERFACE -fsanitize=fuzzer-no-link)
+  target_link_options(isohf_options INTERFACE -fsanitize=fuzzer-no-link)
+endif()
 if(ISOHF_SANITIZE)
   # Left out are the checks that double compile time and that AddressSanitizer makes as well (a null pointer faults) or
   # that this code has no use for (no downcasts).

@@ -170,6 +170,17 @@ TEST_P(ReaderMutation, SurvivesTenThousandDamagedFiles) {
   EXPECT_TRUE(read < rounds || each.name == "EhdrProjection");
 }
 
+/// What scripts/fuzz found.
+TEST_P(ReaderMutation, RefusesOrReadsEveryKeptFile) {
+  const auto kept = std::filesystem::path(ISOHF_SOURCE_DIR) / "tests/fuzz/corpus/reader" / tested().name;
+  if (!std::filesystem::is_directory(kept)) return;
+  for (const auto& entry : std::filesystem::directory_iterator(kept)) {
+    SCOPED_TRACE(entry.path().string());
+    const std::vector<char> bytes = file_bytes(entry.path().string());
+    (void)outcome({bytes.begin(), bytes.end()});
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Formats, ReaderMutation, ::testing::Range<std::size_t>(0, cases().size()),
                          [](const ::testing::TestParamInfo<std::size_t>& each) { return cases()[each.param].name; });
 
