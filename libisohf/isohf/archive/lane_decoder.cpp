@@ -10,6 +10,7 @@
 #include "isohf/archive/tile_payload.h"
 #include "isohf/base/assert.h"
 #include "isohf/base/error.h"
+#include "isohf/base/unaligned.h"
 #include "isohf/base/vectorised.h"
 #if defined(ISOHF_HAS_WIDE)
 #include <immintrin.h>
@@ -80,18 +81,17 @@ struct LaneRange {
   PerLane<std::int32_t> most_seen{};
 };
 
-using Ints = std::int32_t __attribute__((vector_size(4 * kLanes), aligned(4), may_alias));
-using Words = std::uint32_t __attribute__((vector_size(4 * kLanes), aligned(4), may_alias));
-using Shorts = std::uint16_t __attribute__((vector_size(2 * kLanes), aligned(2), may_alias));
+using Ints = std::int32_t __attribute__((vector_size(4 * kLanes)));
+using Words = std::uint32_t __attribute__((vector_size(4 * kLanes)));
+using Shorts = std::uint16_t __attribute__((vector_size(2 * kLanes)));
 
 /// Both samples of a pair times their weights, added up.
 template <bool kIsWide>
 [[gnu::always_inline]] inline Words weigh(const std::int32_t* samples, const std::int32_t* weights) {
 #if defined(ISOHF_HAS_WIDE)
   if constexpr (kIsWide) {
-    using Halves = short __attribute__((vector_size(4 * kLanes), aligned(4), may_alias));
-    return (Words)__builtin_ia32_pmaddwd256(*reinterpret_cast<const Halves*>(samples),
-                                            *reinterpret_cast<const Halves*>(weights));
+    using Halves = short __attribute__((vector_size(4 * kLanes)));
+    return (Words)__builtin_ia32_pmaddwd256(unaligned<Halves>(samples).value, unaligned<Halves>(weights).value);
   }
 #endif
   Words out;
@@ -122,18 +122,18 @@ template <bool kIsWide>
 template <bool kIsWide, std::size_t kPairs, bool kWithVoids>
 [[gnu::always_inline]] inline void restore_places(const LaneRows& rows, const StretchWeights& weights, int begin,
                                                   int end, LaneRange& range) {
-  using Bytes = std::int8_t __attribute__((vector_size(kLanes), aligned(1), may_alias));
+  using Bytes = std::int8_t __attribute__((vector_size(kLanes)));
   constexpr std::ptrdiff_t kStep = kLanes;
   const auto row_of = [&](LaneRow row) -> const std::int32_t* {
     return row == LaneRow::kNorth ? rows.north : row == LaneRow::kFar ? rows.far : rows.farther;
   };
-  const Ints low = *reinterpret_cast<const Ints*>(range.low.data());
-  const Ints high = *reinterpret_cast<const Ints*>(range.high.data());
+  const Ints low = unaligned<Ints>(range.low.data()).value;
+  const Ints high = unaligned<Ints>(range.high.data()).value;
   const Ints least = 2 * low;
   const Ints most = 2 * high - 1;
-  Ints least_seen = *reinterpret_cast<const Ints*>(range.least_seen.data());
-  Ints most_seen = *reinterpret_cast<const Ints*>(range.most_seen.data());
-  Words west_pair = *reinterpret_cast<const Words*>(rows.own + (begin - 2) * kStep);
+  Ints least_seen = unaligned<Ints>(range.least_seen.data()).value;
+  Ints most_seen = unaligned<Ints>(range.most_seen.data()).value;
+  Words west_pair = unaligned<Words>(rows.own + (begin - 2) * kStep).value;
   for (int place = begin; place < end; ++place) {
     const std::ptrdiff_t at = place * kStep;
     Words above = {};
@@ -141,7 +141,7 @@ template <bool kIsWide, std::size_t kPairs, bool kWithVoids>
       const TermPair term = kTermPairs[pair];
       above += weigh<kIsWide>(row_of(term.row) + at + term.place * kStep, weights[pair].data());
     }
-    const Words folded = __builtin_convertvector(*reinterpret_cast<const Shorts*>(rows.folded + at), Words);
+    const Words folded = __builtin_convertvector(unaligned<Shorts>(rows.folded + at).value, Words);
     const Ints residual = (Ints)((folded >> 1U) ^ -(folded & 1U));
     const Words sum = above + weigh<kIsWide>(reinterpret_cast<const std::int32_t*>(&west_pair), weights[0].data());
     // Shifted samples are predicted as samples are: 2^27 more in the sum are 2^16 more in the halves, an even number.
@@ -151,18 +151,18 @@ template <bool kIsWide, std::size_t kPairs, bool kWithVoids>
     Words high_half = (Words)(((halves + 1) >> 1) + choose_by_lowest<kIsWide>(halves, residual, -residual)) << 16U;
     Ints own = (Ints)high_half >> 16;
     if constexpr (kWithVoids) {
-      const Ints north = (Ints)(*reinterpret_cast<const Words*>(rows.north + at) << 16U) >> 16;
-      const Ints is_void = __builtin_convertvector(*reinterpret_cast<const Bytes*>(rows.is_void + at), Ints);
+      const Ints north = (Ints)(unaligned<Words>(rows.north + at).value << 16U) >> 16;
+      const Ints is_void = __builtin_convertvector(unaligned<Bytes>(rows.is_void + at).value, Ints);
       own = is_void != 0 ? (((Ints)west_pair >> 16) + north) >> 1 : own;
       high_half = (Words)own << 16U;
     }
     least_seen = own < least_seen ? own : least_seen;
     most_seen = own > most_seen ? own : most_seen;
     west_pair = west_pair >> 16U | high_half;
-    *reinterpret_cast<Words*>(rows.own + at - kStep) = west_pair;
+    unaligned<Words>(rows.own + at - kStep).value = west_pair;
   }
-  *reinterpret_cast<Ints*>(range.least_seen.data()) = least_seen;
-  *reinterpret_cast<Ints*>(range.most_seen.data()) = most_seen;
+  unaligned<Ints>(range.least_seen.data()).value = least_seen;
+  unaligned<Ints>(range.most_seen.data()).value = most_seen;
 }
 
 ISOHF_TWO_WAYS(void, restore_near,
@@ -184,11 +184,11 @@ ISOHF_TWO_WAYS(void, restore_with_voids,
 /// The samples of eight places from first on, lane by lane: the pairs of every other place, a transposed square.
 ISOHF_VECTORISED(void, turn_square, (const std::int32_t* samples, const PerLane<std::uint16_t*>& codes, int first),
                  (samples, codes, first)) {
-  using Long = std::uint64_t __attribute__((vector_size(8 * kLanes / 2), aligned(4), may_alias));
-  using Quad = std::uint32_t __attribute__((vector_size(16), aligned(2), may_alias));
+  using Long = std::uint64_t __attribute__((vector_size(8 * kLanes / 2)));
+  using Quad = std::uint32_t __attribute__((vector_size(16)));
   Words pairs[4];
   for (std::size_t i = 0; i < 4; ++i) {
-    pairs[i] = *reinterpret_cast<const Words*>(samples + 2 * i * kLanes) ^ 0x80008000U;
+    pairs[i] = unaligned<Words>(samples + 2 * i * kLanes).value ^ 0x80008000U;
   }
   // Within each half of the lanes: rows of four lanes become columns.
   const Long a = (Long)__builtin_shufflevector(pairs[0], pairs[1], 0, 8, 1, 9, 4, 12, 5, 13);
@@ -199,8 +199,8 @@ ISOHF_VECTORISED(void, turn_square, (const std::int32_t* samples, const PerLane<
       (Words)__builtin_shufflevector(a, c, 0, 4, 2, 6), (Words)__builtin_shufflevector(a, c, 1, 5, 3, 7),
       (Words)__builtin_shufflevector(b, d, 0, 4, 2, 6), (Words)__builtin_shufflevector(b, d, 1, 5, 3, 7)};
   for (std::size_t lane = 0; lane < 4; ++lane) {
-    *reinterpret_cast<Quad*>(codes[lane] + first) = __builtin_shufflevector(turned[lane], turned[lane], 0, 1, 2, 3);
-    *reinterpret_cast<Quad*>(codes[lane + 4] + first) = __builtin_shufflevector(turned[lane], turned[lane], 4, 5, 6, 7);
+    unaligned<Quad>(codes[lane] + first).value = __builtin_shufflevector(turned[lane], turned[lane], 0, 1, 2, 3);
+    unaligned<Quad>(codes[lane + 4] + first).value = __builtin_shufflevector(turned[lane], turned[lane], 4, 5, 6, 7);
   }
 }
 

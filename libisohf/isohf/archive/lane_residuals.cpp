@@ -4,6 +4,7 @@
 
 #include "isohf/archive/residual_expander.h"
 #include "isohf/archive/void_mask.h"
+#include "isohf/base/unaligned.h"
 #include "isohf/base/vectorised.h"
 
 namespace isohf {
@@ -31,12 +32,12 @@ ISOHF_VECTORISED(void, shift_lanes,
                  (const std::uint16_t* folded, std::ptrdiff_t begin, std::ptrdiff_t end,
                   const PerLane<std::int32_t>& shifts, std::uint16_t* __restrict shifted),
                  (folded, begin, end, shifts, shifted)) {
-  using Ints = std::int32_t __attribute__((vector_size(4 * kDecoderLanes), aligned(4), may_alias));
-  using Shorts = std::uint16_t __attribute__((vector_size(2 * kDecoderLanes), aligned(2), may_alias));
-  const Ints shift = *reinterpret_cast<const Ints*>(shifts.data());
+  using Ints = std::int32_t __attribute__((vector_size(4 * kDecoderLanes)));
+  using Shorts = std::uint16_t __attribute__((vector_size(2 * kDecoderLanes)));
+  const Ints shift = unaligned<Ints>(shifts.data()).value;
   for (std::ptrdiff_t at = begin; at < end; at += kStep) {
-    const Ints wide = __builtin_convertvector(*reinterpret_cast<const Shorts*>(folded + at), Ints) >> shift;
-    *reinterpret_cast<Shorts*>(shifted + at) = __builtin_convertvector(wide, Shorts);
+    const Ints wide = __builtin_convertvector(unaligned<Shorts>(folded + at).value, Ints) >> shift;
+    unaligned<Shorts>(shifted + at).value = __builtin_convertvector(wide, Shorts);
   }
 }
 

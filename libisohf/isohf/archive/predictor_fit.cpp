@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "isohf/archive/neighbours.h"
+#include "isohf/base/unaligned.h"
 #include "isohf/base/vectorised.h"
 
 namespace isohf {
@@ -48,17 +49,17 @@ ISOHF_VECTORISED(void, scale_code_blocks,
 ISOHF_VECTORISED(void, multiply_pairs,
                  (const float* values, std::size_t terms, std::size_t stride, std::size_t count, float* __restrict out),
                  (values, terms, stride, count, out)) {
-  using Eight = float __attribute__((vector_size(4 * kLanes), aligned(4), may_alias));
-  using Four = float __attribute__((vector_size(16), aligned(4), may_alias));
+  using Eight = float __attribute__((vector_size(4 * kLanes)));
+  using Four = float __attribute__((vector_size(16)));
   for (std::size_t i = 0; i < terms; ++i) {
     const float* const a = values + i * stride;
     for (std::size_t j = 0; j <= i; j += kPairs) {
       const float* const b = values + j * stride;
       Eight sums[kPairs] = {};
       for (std::size_t k = 0; k < count; k += kLanes) {
-        const Eight factor = *reinterpret_cast<const Eight*>(a + k);
+        const Eight factor = unaligned<Eight>(a + k).value;
         for (std::size_t pair = 0; pair < kPairs; ++pair) {
-          sums[pair] += factor * *reinterpret_cast<const Eight*>(b + pair * stride + k);
+          sums[pair] += factor * unaligned<Eight>(b + pair * stride + k).value;
         }
       }
       Four halves[kPairs];
@@ -70,7 +71,7 @@ ISOHF_VECTORISED(void, multiply_pairs,
                          __builtin_shufflevector(halves[0], halves[1], 2, 6, 3, 7);
       const Four second = __builtin_shufflevector(halves[2], halves[3], 0, 4, 1, 5) +
                           __builtin_shufflevector(halves[2], halves[3], 2, 6, 3, 7);
-      *reinterpret_cast<Four*>(out + j) =
+      unaligned<Four>(out + j).value =
           __builtin_shufflevector(first, second, 0, 1, 4, 5) + __builtin_shufflevector(first, second, 2, 3, 6, 7);
     }
     out += i + 1;

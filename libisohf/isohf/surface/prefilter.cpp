@@ -14,6 +14,7 @@
 
 #include "isohf/base/assert.h"
 #include "isohf/base/error.h"
+#include "isohf/base/unaligned.h"
 
 // The one hot loop is compiled for wider vectors as well and chosen when the program starts. Each lane does the same
 // operations in the same order, and products are never fused with sums, so all choices give the same bits.
@@ -45,7 +46,7 @@ double spectrum_at(const std::vector<double>& even, std::size_t j, const std::ve
 
 /// Eight neighbouring samples in one vector, or in as many as the machine needs; loads need no alignment. Left to
 /// itself the compiler would vectorise over k.
-using Pack = double __attribute__((vector_size(64), aligned(8), may_alias));
+using Pack = double __attribute__((vector_size(64)));
 constexpr std::int64_t kPack = 8;
 static_assert(kBlock == 4 * kPack);
 
@@ -53,21 +54,21 @@ static_assert(kBlock == 4 * kPack);
 ISOHF_VECTOR_CLONES
 void convolve(const double* x, std::int64_t step, const double* p, std::int64_t halo, std::int64_t blocks, float* out,
               std::int64_t out_step) {
-  const auto at = [](const double* place) -> const Pack& { return *reinterpret_cast<const Pack*>(place); };
+  const auto at = [](const double* place) -> const Unaligned<Pack>& { return unaligned<Pack>(place); };
   for (std::int64_t b = 0; b < blocks; ++b) {
     const double* centre = x + b * kBlock;
     // Four sums side by side: each addition waits for the one before it.
-    Pack sum0 = p[0] * at(centre);
-    Pack sum1 = p[0] * at(centre + kPack);
-    Pack sum2 = p[0] * at(centre + 2 * kPack);
-    Pack sum3 = p[0] * at(centre + 3 * kPack);
+    Pack sum0 = p[0] * at(centre).value;
+    Pack sum1 = p[0] * at(centre + kPack).value;
+    Pack sum2 = p[0] * at(centre + 2 * kPack).value;
+    Pack sum3 = p[0] * at(centre + 3 * kPack).value;
     for (std::int64_t k = 1; k <= halo; ++k) {
       const double* before = centre - k * step;
       const double* after = centre + k * step;
-      sum0 += p[k] * (at(before) + at(after));
-      sum1 += p[k] * (at(before + kPack) + at(after + kPack));
-      sum2 += p[k] * (at(before + 2 * kPack) + at(after + 2 * kPack));
-      sum3 += p[k] * (at(before + 3 * kPack) + at(after + 3 * kPack));
+      sum0 += p[k] * (at(before).value + at(after).value);
+      sum1 += p[k] * (at(before + kPack).value + at(after + kPack).value);
+      sum2 += p[k] * (at(before + 2 * kPack).value + at(after + 2 * kPack).value);
+      sum3 += p[k] * (at(before + 3 * kPack).value + at(after + 3 * kPack).value);
     }
     float* target = out + b * out_step;
     for (const Pack& sum : {sum0, sum1, sum2, sum3}) {
