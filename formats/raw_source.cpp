@@ -7,15 +7,11 @@
 #include <cctype>
 #include <charconv>
 #include <cmath>
-#include <filesystem>
-#include <limits>
-#include <nlohmann/json.hpp>
-#include <optional>
 
 #include "formats/open_options.h"
 #include "formats/plain_samples.h"
+#include "formats/raster_description.h"
 #include "formats/raw_file.h"
-#include "formats/units.h"
 #include "isohf/base/error.h"
 
 namespace isohf {
@@ -91,110 +87,9 @@ std::string square(std::uint64_t bytes, std::string_view type, std::size_t sampl
               fmt::format("{}: raw samples have no header; --raw WxH:TYPE must say what they are ({})", path, hint));
 }
 
-/// What isohf writes beside raw samples (raster_sidecars.h): all but the reference system's text.
-class RawDescription {
- public:
-  explicit RawDescription(const std::string& raw_path) : path_(raw_path + ".json") {
-    const RawFile file(path_);
-    if (file.size_bytes() > kMostBytes)
-      refuse(fmt::format("has {} bytes, must have {} at most", file.size_bytes(), kMostBytes));
-    std::string text(static_cast<std::size_t>(file.size_bytes()), '\0');
-    file.read(0, std::as_writable_bytes(std::span(text)));
-    json_ = nlohmann::json::parse(text, nullptr, false);
-    if (!json_.is_object()) refuse("is not a JSON object");
-  }
-
-  [[nodiscard]] RawLayout layout() const {
-    RawLayout layout;
-    constexpr double kMostSide = 2147483647.0;
-    const double width = number("width").value_or(0.0);
-    const double height = number("height").value_or(0.0);
-    for (const double side : {width, height}) {
-      if (!(side >= 1.0 && side <= kMostSide) || side != std::floor(side)) {
-        refuse("has no width and height, whole numbers from 1");
-      }
-    }
-    layout.width = static_cast<std::int64_t>(width);
-    layout.height = static_cast<std::int64_t>(height);
-    try {
-      layout.type = sample_type_from_string(word("sample_type"));
-    } catch (const Error& error) {
-      refuse(fmt::format("sample_type: {}", error.what()));
-    }
-    const std::string order = word("byte_order");
-    if (order != "little" && order != "big") refuse("byte_order is neither little nor big");
-    layout.big_endian = order == "big";
-    return layout;
-  }
-
-  void describe(SourceInfo& info) const {
-    info.z_scale = number("z_scale").value_or(1.0);
-    info.z_offset = number("z_offset").value_or(0.0);
-    if (info.z_scale == 0.0) refuse("z_scale is 0");
-    if (const auto value = number("void_value")) {
-      const auto stored = void_value_as_stored(info.sample_type, *value);
-      if (!stored)
-        refuse(fmt::format("void_value is {}, which no {} sample can hold", *value, to_string(info.sample_type)));
-      info.void_values = {*stored};
-    }
-    if (word("vertical_unit") != "unknown") info.vertical_unit = word("vertical_unit");
-    if (const auto unit = linear_unit(info.vertical_unit)) info.metres_per_vertical_unit = unit->metres;
-    Georeference& place = info.georeference;
-    const std::string registration = word("registration");
-    place.registration = registration == "area"    ? Registration::kArea
-                         : registration == "point" ? Registration::kPoint
-                                                   : Registration::kUnknown;
-    place.unit = word("horizontal_unit") == "degree"  ? HorizontalUnit::kDegree
-                 : word("horizontal_unit") == "metre" ? HorizontalUnit::kMetre
-                                                      : HorizontalUnit::kUnknown;
-    place.metres_per_unit = number("metres_per_unit").value_or(1.0);
-    place.spacing_x = number("spacing_x").value_or(1.0);
-    place.spacing_y = number("spacing_y").value_or(1.0);
-    if (!(place.spacing_x > 0.0) || !(place.spacing_y > 0.0) || !(place.metres_per_unit > 0.0)) {
-      refuse("a spacing or metres_per_unit is not positive");
-    }
-    const auto x = number("origin_x");
-    const auto y = number("origin_y");
-    place.has_origin = x.has_value() && y.has_value();
-    place.origin_x = x.value_or(0.0);
-    place.origin_y = y.value_or(0.0);
-    place.system.name = word("crs_name");
-    place.system.body = word("body");
-    if (const auto code = number("crs_epsg"); code && *code > 0 && *code < 1e6)
-      place.system.epsg = static_cast<int>(*code);
-  }
-
- private:
-  static constexpr std::uint64_t kMostBytes = 65536;
-
-  [[noreturn]] void refuse(const std::string& what) const { throw Error(ErrorCode::kCorrupt, path_ + ": " + what); }
-  /// nullopt where it is absent or null.
-  [[nodiscard]] std::optional<double> number(const char* key) const {
-    const auto found = json_.find(key);
-    if (found == json_.end() || found->is_null()) return std::nullopt;
-    if (!found->is_number() || !std::isfinite(found->get<double>())) refuse(fmt::format("{} is no number", key));
-    return found->get<double>();
-  }
-  /// Empty where it is absent.
-  [[nodiscard]] std::string word(const char* key) const {
-    const auto found = json_.find(key);
-    if (found == json_.end()) return {};
-    if (!found->is_string()) refuse(fmt::format("{} is no text", key));
-    return found->get<std::string>();
-  }
-
-  std::string path_;
-  nlohmann::json json_;
-};
-
-bool has_description(const std::string& path) {
-  std::error_code ignored;
-  return std::filesystem::is_regular_file(path + ".json", ignored);
-}
-
 class RawSource final : public HeightSource {
  public:
-  RawSource(const std::string& path, const RawLayout& layout, const RawDescription* description,
+  RawSource(const std::string& path, const RawLayout& layout, const RasterDescription* description,
             const OpenOptions& options)
       : file_(path) {
     info_.path = path;
@@ -261,8 +156,8 @@ RawLayout raw_layout_from_string(std::string_view text) {
 
 std::unique_ptr<HeightSource> open_raw(const std::string& path, const OpenOptions& options) {
   if (options.raw) return std::make_unique<RawSource>(path, *options.raw, nullptr, options);
-  if (!has_description(path)) refuse_without_layout(path);
-  const RawDescription description(path);
+  if (!has_raster_description(path)) refuse_without_layout(path);
+  const RasterDescription description(path);
   return std::make_unique<RawSource>(path, description.layout(), &description, options);
 }
 

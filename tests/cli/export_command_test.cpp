@@ -42,6 +42,14 @@ Raster read_raster(const std::string& path, const OpenOptions& options = {}) {
   return raster;
 }
 
+/// The numbers as stored, whatever the file beside them says that they mean.
+Raster read_codes(const std::string& path) {
+  OpenOptions options;
+  options.z_scale = 1.0;
+  options.z_offset = 0.0;
+  return read_raster(path, options);
+}
+
 class ExportCommand : public ::testing::Test {
  protected:
   void SetUp() override { ASSERT_EQ(run_isohf({"convert", kCoast, folder_ / "coast.isohf", "-q"}).exit_code, 0); }
@@ -76,14 +84,7 @@ TEST_F(ExportCommand, WritesTheSamePlaceAndElevationsInEveryFormat) {
   for (const std::string name : {"b.exr", "b.flt", "c.asc", "d.r16", "e.r32", "f.npy", "g.png"}) {
     SCOPED_TRACE(name);
     const json summary = exported({folder_ / name});
-    OpenOptions options;
-    if (name == "g.png") {  // what the file beside it says
-      const auto beside = json::parse(std::ifstream(folder_ / "g.png.json"));
-      options.z_scale = beside.at("z_scale").get<double>();
-      options.z_offset = beside.at("z_offset").get<double>();
-      EXPECT_EQ(beside.at("origin_x").get<double>(), tif.info.georeference.origin_x);
-    }
-    const Raster raster = read_raster(folder_ / name, options);
+    const Raster raster = read_raster(folder_ / name);
     ASSERT_EQ(raster.info.width, tif.info.width);
     ASSERT_EQ(raster.info.height, tif.info.height);
     const bool whole_numbers = name == "d.r16" || name == "g.png";
@@ -92,7 +93,7 @@ TEST_F(ExportCommand, WritesTheSamePlaceAndElevationsInEveryFormat) {
     for (std::size_t i = 0; i < tif.elevations.size(); ++i) {
       ASSERT_NEAR(raster.elevations[i], tif.elevations[i], tolerance) << i;
     }
-    if (name == "b.exr" || name == "f.npy" || name == "g.png") continue;
+    if (name == "b.exr" || name == "f.npy") continue;
     EXPECT_EQ(raster.info.georeference.has_origin, tif.info.georeference.has_origin);
     EXPECT_DOUBLE_EQ(raster.info.georeference.origin_x, tif.info.georeference.origin_x);
     EXPECT_DOUBLE_EQ(raster.info.georeference.origin_y, tif.info.georeference.origin_y);
@@ -119,7 +120,7 @@ TEST_F(ExportCommand, IsReadByGdalWithTheSamePlaceAndElevations) {
         ASSERT_EQ(translated.exit_code, 0) << translated.err;
         const auto told =
             json::parse(run_program({"/usr/bin/env", "GDAL_PAM_ENABLED=NO", "gdalinfo", "-json", folder_ / name}).out);
-        const Raster ours = read_raster(folder_ / name);
+        const Raster ours = extension == ".png" ? read_codes(folder_ / name) : read_raster(folder_ / name);
         ASSERT_EQ(told.at("size").at(0), ours.info.width);
         ASSERT_EQ(told.at("size").at(1), ours.info.height);
         std::vector<double> theirs(ours.elevations.size());
@@ -224,7 +225,7 @@ TEST_F(ExportCommand, TakesAPartOfTheSourcesGrid) {
 
 TEST_F(ExportCommand, SpreadsElevationsOverTheRangeAskedFor) {
   const json measured = exported({folder_ / "a.png"});
-  const Raster codes = read_raster(folder_ / "a.png");
+  const Raster codes = read_codes(folder_ / "a.png");
   const auto [low, high] = std::minmax_element(codes.elevations.begin(), codes.elevations.end());
   EXPECT_EQ(*low, 0.0);
   EXPECT_EQ(*high, 65535.0);
