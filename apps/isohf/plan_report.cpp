@@ -88,7 +88,7 @@ std::string text_from_plan(const SourceInfo& info, const Plan& plan, const Memor
 
 void print_plan(const HeightSource& source, const ConvertOptions& options, const CommonOptions& common) {
   const SourceInfo& info = source.info();
-  const Plan plan = make_plan(info, plan_request(options));
+  const Plan plan = make_plan(info, options.plan);
   const MemoryPlan memory = plan_memory(source, plan, options);
   if (!common.quiet) {
     for (const std::string& warning : info.warnings) print_warning(warning);
@@ -103,7 +103,7 @@ void print_plan(const HeightSource& source, const ConvertOptions& options, const
 }
 
 void print_plan_notes(const HeightSource& source, const ConvertOptions& options) {
-  const Plan plan = make_plan(source.info(), plan_request(options));
+  const Plan plan = make_plan(source.info(), options.plan);
   std::istringstream lines(text_from_plan(source.info(), plan, plan_memory(source, plan, options), options.code_type));
   for (std::string line; std::getline(lines, line);) print_note("isohf: " + line);
 }

@@ -16,7 +16,6 @@
 #include "isohf/verify/against_source.h"
 #include "isohf/verify/verify.h"
 #include "isohf/verify/vertex_check.h"
-#include "support/memory_photo.h"
 #include "support/memory_source.h"
 #include "support/temporary_folder.h"
 
@@ -244,19 +243,6 @@ TEST(ProjectedArchive, LosslessDoesNotDecideTheProjection) {
   EXPECT_EQ(with.projection->spec, without.projection->spec);
   options.plan.ground.projection = ProjectionRequest::parse("local");
   EXPECT_EQ(run(source, folder / "c.isohf", options).metadata.projection->spec.kind, ProjectionKind::kLocal);
-}
-
-TEST(ProjectedArchive, TexturesKeepRows) {
-  const test::TemporaryFolder folder;
-  const auto owner = source_over(kGrounds[0], 200, 220);
-  Source& source = *owner;
-  test::MemoryPhoto photo(200, 220, 3, test::noise);
-  ConvertOptions options = options_for("auto");
-  options.texture.emplace().photo = &photo;
-  const Metadata metadata = run(source, folder / "a.isohf", options).metadata;
-  EXPECT_EQ(metadata.projection->spec.kind, ProjectionKind::kEquirectangular);
-  options.plan.ground.projection = ProjectionRequest::parse("local");
-  EXPECT_THROW((void)run(source, folder / "b.isohf", options), Error);
 }
 
 TEST(JoinedGlobe, TilesAcrossTheJoinShareTheirVertices) {

@@ -28,7 +28,7 @@ struct TextureInfo {
   std::int64_t photo_width = 0;
   std::int64_t photo_height = 0;
   std::string placed_by;  ///< "georeference" or "source"
-  WorldBounds placement;  ///< the photo's outer pixel edges
+  WorldBounds placement;  ///< the photo's outer pixel edges; around what it shows of the source, where projected
   std::int64_t members = 0;
   std::uint64_t bytes = 0;  ///< of all members
 

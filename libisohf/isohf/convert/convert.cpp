@@ -145,18 +145,11 @@ void throw_if_cancelled(const std::atomic<bool>& cancel) {
   if (cancel.load(std::memory_order_relaxed)) throw Error(ErrorCode::kCancelled, "interrupted");
 }
 
-PlanRequest plan_request(const ConvertOptions& options) {
-  PlanRequest request = options.plan;
-  // Photos are laid out along the source's rows.
-  if (options.texture) request.ground.keeps_rows = "--texture";
-  return request;
-}
-
 ConvertSummary convert(HeightSource& source, const std::string& output, const ConvertOptions& options,
                        const ProgressCallback& progress, const std::atomic<bool>& cancel) {
   const auto start = std::chrono::steady_clock::now();
   const SourceInfo& info = source.info();
-  const Plan plan = make_plan(info, plan_request(options));
+  const Plan plan = make_plan(info, options.plan);
   if (options.z_range) check_range(*options.z_range);
   if (options.shadow_seeds) check_seed_request(*options.shadow_seeds, plan.grid);
   const int threads = threads_of(options);

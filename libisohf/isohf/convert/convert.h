@@ -64,9 +64,6 @@ struct ConvertOptions {
   SourceNote source_note;
 };
 
-/// The plan's request, with what the other options ask of it.
-[[nodiscard]] PlanRequest plan_request(const ConvertOptions& options);
-
 /// What a conversion reports while it runs. Called from one thread at a time, a few times a second at most.
 struct ConvertProgress {
   enum class Pass { kRange, kTiles, kResiduals };

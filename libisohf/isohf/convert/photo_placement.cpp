@@ -2,9 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "isohf/base/error.h"
+#include "isohf/projection/projected_extent.h"
 
 namespace isohf {
 namespace {
@@ -70,9 +72,7 @@ void place_over_source(const PhotoInfo& photo, const SourceInfo& source, const S
                   photo.path, photo.width, photo.height, source.width, source.height, stretch));
 }
 
-}  // namespace
-
-PhotoPlacement place_photo(const PhotoInfo& photo, const SourceInfo& source, const SourceFrame& frame) {
+PhotoPlacement place_on_rows(const PhotoInfo& photo, const SourceInfo& source, const SourceFrame& frame) {
   PhotoPlacement placement;
   if (photo.georeference && source.georeference.has_origin) {
     place_by_georeference(photo, source, frame, placement);
@@ -94,6 +94,75 @@ PhotoPlacement place_photo(const PhotoInfo& photo, const SourceInfo& source, con
                             ground.z0, ground.z1));
   }
   return placement;
+}
+
+/// A world of degrees, East and South of the source's North-West corner.
+SourceFrame degrees_of(const SourceInfo& source, const SourceFrame& frame) {
+  SourceFrame degrees;
+  degrees.width = frame.width;
+  degrees.height = frame.height;
+  degrees.registration = frame.registration;
+  degrees.spacing_x = source.georeference.spacing_x;
+  degrees.spacing_z = source.georeference.spacing_y;
+  if (frame.registration == Registration::kArea) {
+    degrees.first_sample_x = degrees.spacing_x / 2.0;
+    degrees.first_sample_z = degrees.spacing_z / 2.0;
+  }
+  return degrees;
+}
+
+/// The photo with its longitudes counted from the turn that lies nearest to the source's.
+PhotoInfo on_the_same_turn(const PhotoInfo& photo, const SourceInfo& source) {
+  PhotoInfo turned = photo;
+  if (!turned.georeference) return turned;
+  const auto middle = [](const Georeference& place, std::int64_t width) {
+    return place.origin_x + place.spacing_x * static_cast<double>(width - 1) / 2.0;
+  };
+  const double apart = middle(source.georeference, source.width) - middle(*turned.georeference, turned.width);
+  turned.georeference->origin_x += 360.0 * std::round(apart / 360.0);
+  return turned;
+}
+
+PhotoPlacement place_by_projection(const PhotoInfo& photo, const SourceInfo& source, const SourceFrame& frame) {
+  const SourceFrame degrees = degrees_of(source, frame);
+  PhotoPlacement placement = place_on_rows(on_the_same_turn(photo, source), source, degrees);
+  const PhotoFrame in_degrees = placement.frame;
+  const Georeference& there = source.georeference;
+  const double west = there.origin_x - degrees.first_sample_x;
+  const double north = there.origin_y + degrees.first_sample_z;
+  WarpPlace warp = *frame.warp;
+  warp.first_sample = {west + in_degrees.first_pixel_x, north - in_degrees.first_pixel_z};
+  warp.degrees_x = in_degrees.spacing_x;
+  warp.degrees_z = in_degrees.spacing_z;
+  warp.width = photo.width;
+  warp.height = photo.height;
+
+  WorldBounds shown = degrees.bounds();
+  const bool goes_round = placement.bounds.x1 - placement.bounds.x0 > 360.0 - 0.5 * warp.degrees_x;
+  if (!goes_round) {
+    shown.x0 = std::max(shown.x0, placement.bounds.x0);
+    shown.x1 = std::min(shown.x1, placement.bounds.x1);
+  }
+  shown.z0 = std::max(shown.z0, placement.bounds.z0);
+  shown.z1 = std::min(shown.z1, placement.bounds.z1);
+  const GeoExtent ground{west + shown.x0, std::max(north - shown.z1, -90.0), west + shown.x1,
+                         std::min(north - shown.z0, 90.0)};
+  const MapBounds map = projected_bounds(Projection(warp.projection), ground);
+  placement.bounds = {map.west - warp.origin.easting, warp.origin.northing - map.north, map.east - warp.origin.easting,
+                      warp.origin.northing - map.south};
+  const double scale_x = frame.spacing_x / there.spacing_x;
+  const double scale_z = frame.spacing_z / there.spacing_y;
+  placement.frame = {placement.bounds.x0 + 0.5 * warp.degrees_x * scale_x,
+                     placement.bounds.z0 + 0.5 * warp.degrees_z * scale_z, warp.degrees_x * scale_x,
+                     warp.degrees_z * scale_z};
+  placement.warp = warp;
+  return placement;
+}
+
+}  // namespace
+
+PhotoPlacement place_photo(const PhotoInfo& photo, const SourceInfo& source, const SourceFrame& frame) {
+  return frame.warp ? place_by_projection(photo, source, frame) : place_on_rows(photo, source, frame);
 }
 
 }  // namespace isohf

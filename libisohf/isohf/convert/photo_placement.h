@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,8 +12,9 @@ namespace isohf {
 
 /// Where a photo lies over the source's ground.
 struct PhotoPlacement {
-  PhotoFrame frame;
-  WorldBounds bounds;  ///< outer edges of its pixels
+  PhotoFrame frame;    ///< in the middle of the source, where projected
+  WorldBounds bounds;  ///< outer edges of its pixels; a rectangle around what it shows of the source, where projected
+  std::optional<WarpPlace> warp;  ///< where rows of the photo are no rows of the world
   bool by_georeference = false;
   std::vector<std::string> warnings;
 };

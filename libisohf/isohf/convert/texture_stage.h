@@ -2,11 +2,13 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "isohf/archive/writer.h"
 #include "isohf/convert/convert.h"
+#include "isohf/surface/projected_photo.h"
 #include "isohf/surface/texture_cutter.h"
 
 namespace isohf {
@@ -24,7 +26,7 @@ class TextureStage {
   [[nodiscard]] std::uint64_t memory_bytes() const { return memory_bytes_; }
   [[nodiscard]] const std::vector<std::string>& warnings() const { return warnings_; }
   /// Photo pixels under the side of a texel, the larger of both directions.
-  [[nodiscard]] double pixels_per_texel() const;
+  [[nodiscard]] double pixels_per_texel() const { return pixels_per_texel_; }
 
   /// The members of a tile, the coarsest level first; none where the photo does not show it. Any thread.
   using Encoded = std::vector<std::vector<std::byte>>;
@@ -37,11 +39,15 @@ class TextureStage {
   [[nodiscard]] TextureInfo info(const ArchiveWriter& writer) const;
 
  private:
-  TextureStage(PhotoSource& photo, TextureInfo info, const TextureCutter& cutter);
+  struct Layout;
+  TextureStage(PhotoSource& photo, TextureInfo info, Layout layout);
+  [[nodiscard]] bool shows(TileIndex tile) const;
 
-  PhotoSource& photo_;
+  std::unique_ptr<ProjectedPhoto> projected_;  ///< of the user's photo; nullptr where its rows are the world's
+  PhotoSource& photo_;                         ///< that one, or the user's
   TextureInfo info_;
   TextureCutter cutter_;
+  double pixels_per_texel_;
   std::vector<std::string> warnings_;
   std::uint64_t memory_bytes_ = 0;
 };
