@@ -19,7 +19,8 @@ namespace {
 constexpr std::size_t kMostPlaces = 128;
 constexpr std::uint64_t kFirstStride = std::uint64_t{1} << 20U;
 constexpr std::size_t kStoredBytes = std::size_t{1} << 16U;
-constexpr std::size_t kScratchBytes = std::size_t{1} << 16U;
+/// zlib copies its window of 32 KiB aside after every call: few calls, and what they fill fits the second cache.
+constexpr std::size_t kScratchBytes = std::size_t{1} << 18U;
 constexpr int kGzipWindow = 16 + MAX_WBITS;
 constexpr int kRawWindow = -MAX_WBITS;
 
@@ -54,6 +55,8 @@ class Decoder {
     return result;
   }
   void begin_member() { inflateReset(&stream_); }
+  /// Goes on without gzip's checksum, whose length it still verifies.
+  void trust() { inflateValidate(&stream_, 0); }
   [[nodiscard]] const char* message() const { return stream_.msg != nullptr ? stream_.msg : "no valid data"; }
 
   std::uint64_t stored_at = 0;
@@ -80,6 +83,8 @@ struct InflatedBytes::State {
   void restart(const Decoder* place) {
     const int window = kind == Kind::kGzip ? kGzipWindow : kRawWindow;
     decoder = place == nullptr ? std::make_unique<Decoder>(window) : std::make_unique<Decoder>(*place);
+    // All of it has been verified once.
+    if (checked) decoder->trust();
     pending = {};
     ended = false;
   }
@@ -142,6 +147,7 @@ struct InflatedBytes::State {
   std::span<std::byte> pending;  ///< of `stored`, not yet used
   std::unique_ptr<Decoder> decoder;
   bool ended = false;
+  bool checked = false;
   std::list<Decoder> places;  ///< by rising offset
   std::uint64_t stride = kFirstStride;
   std::uint64_t next_place = kFirstStride;
@@ -154,10 +160,13 @@ InflatedBytes::InflatedBytes(std::string name, ReadStored read_stored, Kind kind
   std::vector<std::byte> scratch(kScratchBytes);
   while (!state_->ended) {
     const std::size_t got = state_->inflate_into(scratch);
-    state_->crc = ::crc32_z(state_->crc, reinterpret_cast<const Bytef*>(scratch.data()), got);
+    if (kind == Kind::kRawDeflate) {  // gzip has one of its own, which zlib verifies
+      state_->crc = ::crc32_z(state_->crc, reinterpret_cast<const Bytef*>(scratch.data()), got);
+    }
     state_->size += got;
     if (!state_->ended) state_->keep_place();
   }
+  state_->checked = true;
 }
 
 InflatedBytes::~InflatedBytes() = default;

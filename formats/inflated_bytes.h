@@ -18,15 +18,15 @@ class InflatedBytes {
   /// Reads up to bytes.size() stored bytes at an offset; returns how many there were.
   using ReadStored = std::function<std::size_t(std::uint64_t offset_bytes, std::span<std::byte> bytes)>;
 
-  /// `name` begins the messages. Gzip's own checksums and lengths are verified, of members that follow each other too.
-  /// Throws Error{kCorrupt} where the data are damaged or cut off.
+  /// `name` begins the messages. Gzip's own checksums and lengths are verified here, of members that follow each other
+  /// too. Throws Error{kCorrupt} where the data are damaged or cut off.
   InflatedBytes(std::string name, ReadStored read_stored, Kind kind);
   InflatedBytes(const InflatedBytes&) = delete;
   InflatedBytes& operator=(const InflatedBytes&) = delete;
   ~InflatedBytes();
 
   [[nodiscard]] std::uint64_t size_bytes() const;
-  [[nodiscard]] std::uint32_t crc32() const;
+  [[nodiscard]] std::uint32_t crc32() const;  ///< of kRawDeflate's contents; 0 of gzip's, which are verified
   /// Returns how many of the bytes there were before the end. Throws Error{kIo, kCorrupt}.
   std::size_t read_some(std::uint64_t offset_bytes, std::span<std::byte> bytes);
 
