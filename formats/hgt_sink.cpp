@@ -1,7 +1,10 @@
 #include <fmt/format.h>
 
+#include <cmath>
+#include <optional>
 #include <vector>
 
+#include "formats/hgt_name.h"
 #include "formats/output_stream.h"
 #include "formats/raster_encoder.h"
 #include "formats/raw_file.h"
@@ -33,6 +36,31 @@ bool is_tile_size(std::int64_t width, std::int64_t height) {
   return (height == 3601 && (width == 3601 || width == 1801)) || (height == 1201 && width == 1201);
 }
 
+/// Nothing in the file says where it lies but its name, which readers believe: it must be true.
+void check_place(const std::string& path, const RasterSpec& spec) {
+  const std::optional<HgtCorner> named = hgt_corner_of(path);
+  if (!named || !spec.georeference || !spec.georeference->has_origin) return;
+  const Georeference& place = *spec.georeference;
+  const double west_off = std::remainder(place.origin_x - named->longitude, 360.0);
+  const double north_off = place.origin_y - (named->latitude + 1);
+  const double column = 1.0 / static_cast<double>(spec.width - 1);
+  const double row = 1.0 / static_cast<double>(spec.height - 1);
+  // A thousandth of a sample, anywhere in the tile.
+  const bool is_there = place.unit == HorizontalUnit::kDegree && std::abs(west_off) < column / 1000.0 &&
+                        std::abs(north_off) < row / 1000.0 &&
+                        std::abs(place.spacing_x - column) < column * column / 1000.0 &&
+                        std::abs(place.spacing_y - row) < row * row / 1000.0;
+  if (is_there) return;
+  throw Error(
+      ErrorCode::kInvalidArgument,
+      fmt::format("the name of an HGT tile says where it lies, here {} to {} East and {} to {} North in degrees; "
+                  "these samples lie at {} to {} and {} to {}{}; give the file the name of its place",
+                  named->longitude, named->longitude + 1, named->latitude, named->latitude + 1, place.origin_x,
+                  place.origin_x + place.spacing_x * static_cast<double>(spec.width - 1),
+                  place.origin_y - place.spacing_y * static_cast<double>(spec.height - 1), place.origin_y,
+                  place.unit == HorizontalUnit::kDegree ? "" : ", not in degrees"));
+}
+
 }  // namespace
 
 std::unique_ptr<RasterEncoder> encode_hgt(const std::string& path, const RasterSpec& spec) {
@@ -48,6 +76,7 @@ std::unique_ptr<RasterEncoder> encode_hgt(const std::string& path, const RasterS
   if (spec.void_value && *spec.void_value != kVoid) {
     throw Error(ErrorCode::kUnsupported, fmt::format("HGT's void value is -32768, not {}", *spec.void_value));
   }
+  check_place(path, spec);
   return std::make_unique<HgtEncoder>(path);
 }
 

@@ -9,6 +9,7 @@
 #include <optional>
 #include <vector>
 
+#include "formats/hgt_name.h"
 #include "formats/open_options.h"
 #include "formats/raw_file.h"
 #include "formats/zip_member.h"
@@ -34,29 +35,6 @@ bool ends_with(const std::string& text, std::string_view ending) {
 std::string file_name(const std::string& path) {
   const std::size_t slash = path.find_last_of('/');
   return slash == std::string::npos ? path : path.substr(slash + 1);
-}
-
-struct Corner {
-  int longitude = 0;
-  int latitude = 0;
-};
-
-/// "N44E006..." or "s35e145...": hemisphere, two digits, hemisphere, three digits.
-std::optional<Corner> south_west_corner(const std::string& name) {
-  const std::string text = lower(file_name(name));
-  const auto digits = [&](std::size_t begin, std::size_t count) {
-    int value = 0;
-    for (std::size_t i = begin; i < begin + count; ++i) {
-      if (std::isdigit(static_cast<unsigned char>(text[i])) == 0) return -1;
-      value = value * 10 + (text[i] - '0');
-    }
-    return value;
-  };
-  if (text.size() < 7 || (text[0] != 'n' && text[0] != 's') || (text[3] != 'e' && text[3] != 'w')) return std::nullopt;
-  const int latitude = digits(1, 2);
-  const int longitude = digits(4, 3);
-  if (latitude < 0 || latitude > 90 || longitude < 0 || longitude > 180) return std::nullopt;
-  return Corner{text[3] == 'w' ? -longitude : longitude, text[0] == 's' ? -latitude : latitude};
 }
 
 struct Size {
@@ -122,8 +100,8 @@ class HgtSource final : public HeightSource {
                   fmt::format("{}: {} .hgt files are in the archive, must be 1", info_.path, tiles.size()));
     }
     unpacked_ = read_zip_member(file_, tiles.front(), kMostUnpackedBytes);
-    const std::optional<Corner> inside = south_west_corner(tiles.front().name);
-    const std::optional<Corner> outside = south_west_corner(info_.path);
+    const std::optional<HgtCorner> inside = hgt_corner_of(tiles.front().name);
+    const std::optional<HgtCorner> outside = hgt_corner_of(info_.path);
     if (inside && outside && (inside->latitude != outside->latitude || inside->longitude != outside->longitude)) {
       info_.warnings.push_back(fmt::format("the archive is called {} and holds {}; the latter says where the tile lies",
                                            file_name(info_.path), file_name(tiles.front().name)));
@@ -164,7 +142,7 @@ class HgtSource final : public HeightSource {
     geo.system.inverse_flattening = 298.257223563;
     geo.system.vertical_epsg = 5773;
     geo.system.vertical_datum = "EGM96";
-    if (const std::optional<Corner> corner = south_west_corner(name)) {
+    if (const std::optional<HgtCorner> corner = hgt_corner_of(name)) {
       geo.has_origin = true;
       geo.origin_x = corner->longitude;
       geo.origin_y = corner->latitude + 1;

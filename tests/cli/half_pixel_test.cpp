@@ -1,6 +1,7 @@
 /// The half-pixel test of what is written: a ramp of areas or of points, converted, then restored and exported to every
 /// format, lies where it lay when our readers, a second conversion, or GDAL read the file.
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -263,6 +264,19 @@ TEST_F(HalfPixel, HgtTilesLieWhereTheirNameSays) {
     // Floats of up to 5500 m.
     ASSERT_NEAR(json::parse(line).at("elevation").get<double>(), elevation, 10 * kRounding);
   }
+}
+
+TEST_F(HalfPixel, HgtTilesAreNotWrittenUnderTheNameOfAnotherPlace) {
+  write_ramp(folder_ / "tile.tif", kTile, Registration::kPoint, SampleType::kInt16);
+  convert(folder_ / "tile.tif", "a.isohf", {"--lossless", "--projection", "equirectangular"});
+  const std::vector<std::string> before = folder_.names();
+  for (const char* name : {"N44E006.hgt", "n10e021.hgt", "S10E020.hgt"}) {
+    const RunResult refused = run_isohf({"restore", folder_ / "a.isohf", folder_ / name, "-q"});
+    EXPECT_EQ(refused.exit_code, 2) << name;
+    EXPECT_THAT(refused.err, ::testing::HasSubstr(
+                                 "these samples lie at 20 to 21 and 10 to 11; give the file the name of its place"));
+  }
+  EXPECT_EQ(folder_.names(), before);
 }
 
 TEST_F(HalfPixel, GdalFindsEverySampleWhereWeDo) {
