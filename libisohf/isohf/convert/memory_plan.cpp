@@ -161,8 +161,8 @@ class Estimate {
                                                                           static_cast<double>(tile_columns_));
     // Strips of columns that the threads filter, doubles.
     const double strips = threads_ * 64.0 * 12.0 * static_cast<double>(tile_rows_ + 2 * prefilter_.halo());
-    // Pieces of changing sizes leave gaps in the heap (measured).
-    const double gaps = memory.scratch_rows > 0 ? 1.12 : 1.0;
+    // Pieces of changing sizes leave gaps in the heap, in that of every thread (measured).
+    const double gaps = memory.scratch_rows > 0 ? 1.0 + 0.2 * threads_ : 1.0;
     const std::uint64_t bands =
         BandReader::memory_bytes(prefilter_, parts_in_flight(memory, memory.tile_columns_at_once), tile_rows_,
                                  static_cast<std::int64_t>(columns), info_);
