@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "archive_places.h"
 #include "command.h"
 #include "describe.h"
 #include "export_tiles.h"
@@ -19,11 +20,13 @@
 #include "json_output.h"
 #include "option_values.h"
 #include "options_common.h"
+#include "options_raster.h"
 #include "output_file.h"
 #include "output_grid.h"
 #include "restored_raster.h"
 #include "restored_samples.h"
 #include "standard_output.h"
+#include "surface_scan.h"
 
 namespace isohf::cli {
 namespace {
@@ -47,12 +50,8 @@ Examples:
 struct ExportOptions {
   CommonOptions common;
   WorkOptions work;
-  std::string archive;
-  std::string output;
-  std::optional<GridSize> size;
-  std::optional<double> spacing;
-  std::optional<std::array<double, 4>> bbox;  ///< West, South, East, North
-  RestoreMethod method = RestoreMethod::kHex;
+  RasterOptions raster;
+  std::optional<BoundingBox> bbox;
   std::optional<SampleType> type;
   std::optional<std::pair<double, double>> z_range;
   std::optional<double> z_scale;
@@ -60,27 +59,15 @@ struct ExportOptions {
   std::optional<GridSize> tiles;
   std::optional<GridSize> tile_size;
   std::int64_t overlap = 0;
-  bool clamp_range = false;
-  bool overwrite = false;
-};
 
-constexpr std::int64_t kMostSide = std::int64_t{1} << 31U;
+  [[nodiscard]] RestoreMethod method() const { return raster.method.value_or(RestoreMethod::kHex); }
+};
 
 /// "1009" is a square.
 GridSize parse_side_or_size(const std::string& text) {
   if (text.find_first_of("xX") != std::string::npos) return parse_size(text, 1, kMostSide);
   const std::int64_t side = parse_whole_number(text, 1, kMostSide);
   return {side, side};
-}
-
-std::array<double, 4> parse_bbox(const std::string& text) {
-  const std::vector<double> numbers = parse_numbers(text);
-  if (numbers.size() != 4 || !std::all_of(numbers.begin(), numbers.end(), [](double v) { return std::isfinite(v); }) ||
-      !(numbers[0] < numbers[2]) || !(numbers[1] < numbers[3])) {
-    throw Error(ErrorCode::kInvalidArgument,
-                "found '" + text + "', must be WEST,SOUTH,EAST,NORTH with WEST < EAST and SOUTH < NORTH");
-  }
-  return {numbers[0], numbers[1], numbers[2], numbers[3]};
 }
 
 SampleType parse_type(const std::string& text) {
@@ -93,20 +80,13 @@ SampleType parse_type(const std::string& text) {
 std::optional<ExportOptions> parse(const Arguments& arguments) {
   ExportOptions options;
   CommandLine line("export", "Writes the surface of an archive as a raster of elevations.");
-  line.group("Arguments");
-  line.positional("ARCHIVE", "-i,--input", "Archive to read", options.archive);
-  line.positional("OUTPUT", "-o,--output",
-                  "Raster to write: NAME.tif, .exr, .png, .hgt, .asc, .flt, .r16, .raw, .r32 or .npy", options.output);
-  line.flag("--overwrite", "Replace OUTPUT where it exists", options.overwrite);
+  add_raster_arguments(line, "OUTPUT", options.raster);
   line.group("Grid");
-  line.option("--size", "WxH", "So many samples over the ground (default: the source's samples)",
-              [&](const std::string& text) { options.size = parse_size(text, 1, kMostSide); });
-  line.option("--spacing", "D", "Samples D world units apart",
-              [&](const std::string& text) { options.spacing = parse_positive_number(text); });
-  line.option("--bbox", "W,S,E,N", "Only this part of the ground, in the source's coordinates",
-              [&](const std::string& text) { options.bbox = parse_bbox(text); });
-  line.option("--method", "NAME", "hex or barycentric (default hex)",
-              [&](const std::string& text) { options.method = restore_method_from_string(text); });
+  add_size_options(line, "So many samples over the ground (default: the source's samples)", options.raster);
+  line.option("--bbox", "W,S,E,N",
+              "Only this part of the ground, in the source's coordinates; across the 180th meridian W is above E",
+              [&](const std::string& text) { options.bbox = bounding_box_from_string(text); });
+  add_method_option(line, "hex", options.raster);
   line.group("Tiles");
   line.option("--tile-size", "N|WxH", "Cut into tiles of so many samples, each into a file of its own",
               [&](const std::string& text) { options.tile_size = parse_side_or_size(text); });
@@ -125,16 +105,14 @@ std::optional<ExportOptions> parse(const Arguments& arguments) {
               [&](const std::string& text) { options.z_scale = parse_positive_number(text); });
   line.option("--z-offset", "NUMBER", "See --z-scale (default 0)",
               [&](const std::string& text) { options.z_offset = parse_number(text); });
-  line.flag("--clamp-range", "Move samples that the type does not hold to its ends, instead of refusing",
-            options.clamp_range);
+  add_clamp_option(line, "the type", options.raster);
   add_work_options(line, options.work);
   add_common_options(line, options.common);
   line.footer(kFooter);
   line.exclusive({"--z-range", "--z-scale"});
   line.exclusive({"--z-range", "--z-offset"});
   if (!line.parse(arguments)) return std::nullopt;
-  line.require("ARCHIVE", options.archive);
-  line.require("OUTPUT", options.output);
+  require_raster_arguments(line, "OUTPUT", options.raster);
   if (options.overlap > 0 && !options.tiles && !options.tile_size) {
     throw Error(ErrorCode::kInvalidArgument, "export: --overlap needs --tiles or --tile-size");
   }
@@ -171,23 +149,24 @@ struct ExportGrid {
 ExportGrid asked_grid(const ExportOptions& options, const Metadata& metadata) {
   WorldBounds ground = metadata.valid;
   if (options.bbox) {
-    const auto& [west, south, east, north] = *options.bbox;
-    ground = world_bounds(metadata, west, south, east, north);
+    ground = world_bounds(metadata, *options.bbox);
     const TileGrid& tiles = metadata.grid;
     if (!(ground.x0 < tiles.world_width() && ground.x1 > 0.0 && ground.z0 < tiles.world_height() && ground.z1 > 0.0)) {
-      throw Error(ErrorCode::kInvalidArgument, options.archive + ": --bbox lies outside of what the archive covers");
+      throw Error(ErrorCode::kInvalidArgument,
+                  options.raster.archive + ": --bbox lies outside of what the archive covers");
     }
   }
   const bool area = samples_are_areas(metadata);
   ExportGrid grid;
-  if (options.size || options.spacing) {
-    grid.samples = grid_over(ground, area, options.size, options.spacing);
+  if (options.raster.size || options.raster.spacing) {
+    grid.samples = grid_over(ground, area, options.raster.size, options.raster.spacing);
   } else {
     grid.samples = natural_grid(metadata);
     if (options.bbox) grid.samples = part_of_source_grid(grid.samples, ground);
   }
   GridSize size{grid.samples.width, grid.samples.height};
-  grid.cut = cut_into_tiles(size, !options.size && !options.spacing, options.tiles, options.tile_size, options.overlap);
+  grid.cut = cut_into_tiles(size, !options.raster.size && !options.raster.spacing, options.tiles, options.tile_size,
+                            options.overlap);
   if (size != GridSize{grid.samples.width, grid.samples.height}) {
     grid.samples = grid_over(ground, area, size, std::nullopt);
   }
@@ -224,20 +203,16 @@ class Exporter {
       : options_(options),
         archive_(archive),
         grid_(grid),
-        cancel_(cancel),
-        display_(options.work.progress, options.common.quiet, options.common.verbose) {}
+        display_(options.work.progress, options.common.quiet, options.common.verbose),
+        scan_(archive, grid.samples, options.method(), display_, cancel) {}
 
   void run() {
-    has_voids = may_have_voids(archive_.metadata(), grid_.samples) || raster_kind(options_.output) == RasterKind::kHgt;
+    has_voids = needs_void(archive_.metadata(), grid_.samples, options_.raster.output);
     mapping = choose_mapping();
-    if ((mapping.z_scale != 1.0 || mapping.z_offset != 0.0) && !has_scale(raster_kind(options_.output)) &&
-        !options_.common.quiet) {
-      print_warning(fmt::format("{}: has no place for what its numbers mean: elevation = sample * {} + {}",
-                                options_.output, mapping.z_scale, mapping.z_offset));
-    }
+    if (!options_.common.quiet) warn_of_lost_scale(options_.raster.output, mapping);
     const auto void_value = has_voids ? usual_void(mapping.type) : std::nullopt;
-    const SampleStore store(mapping, void_value, options_.clamp_range);
-    ExportTiles tiles(options_.output, grid_.cut, grid_.samples.width);
+    const SampleStore store(mapping, void_value, options_.raster.clamp_range);
+    ExportTiles tiles(options_.raster.output, grid_.cut, grid_.samples.width);
     const auto spec_of = [&](std::int64_t column, std::int64_t row) {
       SampleGrid part = grid_.samples;
       part.width = grid_.cut.columns;
@@ -245,18 +220,16 @@ class Exporter {
       part.first_x += static_cast<double>(column * (grid_.cut.columns - grid_.cut.overlap)) * part.spacing_x;
       part.first_z += static_cast<double>(row * (grid_.cut.rows - grid_.cut.overlap)) * part.spacing_z;
       RasterSpec spec = restored_raster(archive_.metadata(), part, mapping.type);
-      spec.z_scale = mapping.z_scale;
-      spec.z_offset = mapping.z_offset;
-      spec.void_value = void_value;
-      spec.overwrite = options_.overwrite;
+      set_mapping(spec, mapping, void_value);
+      spec.overwrite = options_.raster.overwrite;
       return spec;
     };
     for (std::int64_t group = 0; group < tiles.groups(); ++group) {
       tiles.begin_group(group, spec_of);
       counts = {};
-      each_rows("export", [&](std::int64_t row, std::span<const double> elevations) {
-        tiles.write(row,
-                    store_rows(store, mapping.type, options_.output, grid_.samples.width, row, elevations, counts));
+      scan_.run("export", [&](std::int64_t row, std::span<const double> elevations) {
+        tiles.write(
+            row, store_rows(store, mapping.type, options_.raster.output, grid_.samples.width, row, elevations, counts));
       });
     }
     tiles.keep();
@@ -270,7 +243,7 @@ class Exporter {
 
  private:
   SampleMapping choose_mapping() {
-    const SampleType type = options_.type.value_or(default_type(options_.output));
+    const SampleType type = options_.type.value_or(default_type(options_.raster.output));
     if (options_.z_scale || options_.z_offset) {
       return {type, options_.z_scale.value_or(1.0), options_.z_offset.value_or(0.0)};
     }
@@ -284,7 +257,7 @@ class Exporter {
     double low = std::numeric_limits<double>::infinity();
     double high = -low;
     bool voids = false;
-    each_rows("range", [&](std::int64_t, std::span<const double> elevations) {
+    scan_.run("range", [&](std::int64_t, std::span<const double> elevations) {
       for (const double z : elevations) {
         voids = voids || std::isnan(z);
         low = z < low ? z : low;
@@ -295,36 +268,18 @@ class Exporter {
     return low <= high ? spread(type, {low, high}, has_voids) : SampleMapping{type, 1.0, 0.0};
   }
 
-  /// Calls `take` with a few rows after the other.
-  template <typename Take>
-  void each_rows(const char* stage, Take take) {
-    const SampleGrid& grid = grid_.samples;
-    SurfaceRows surface(
-        archive_.grid(), archive_.metadata().wraps_x, archive_.metadata().quantisation,
-        [&](TileIndex tile) { return archive_.read_tile(tile); }, grid, options_.method);
-    const std::int64_t rows_at_once = std::max<std::int64_t>((std::int64_t{1} << 20U) / grid.width, 1);
-    for (std::int64_t row = 0; row < grid.height; row += rows_at_once) {
-      const std::int64_t rows = std::min(rows_at_once, grid.height - row);
-      std::vector<double> elevations(static_cast<std::size_t>(rows * grid.width));
-      surface.read(row, rows, elevations);
-      take(row, std::span<const double>(elevations));
-      display_.update(stage, "rows", row + rows, grid.height);
-      if (cancel_.load()) throw Error(ErrorCode::kCancelled, "interrupted");
-    }
-  }
-
   const ExportOptions& options_;
   const ArchiveReader& archive_;
   ExportGrid grid_;
-  const std::atomic<bool>& cancel_;
   ProgressDisplay display_;
+  SurfaceScan scan_;
 };
 
 int run(const ExportOptions& options) {
-  const ArchiveReader archive(options.archive);
+  const ArchiveReader archive(options.raster.archive);
   const ExportGrid grid = asked_grid(options, archive.metadata());
-  for (const std::string& file : ExportTiles(options.output, grid.cut, grid.samples.width).names()) {
-    check_output_file(options.archive, file, options.overwrite);
+  for (const std::string& file : ExportTiles(options.raster.output, grid.cut, grid.samples.width).names()) {
+    check_output_file(options.raster.archive, file, options.raster.overwrite);
   }
   Exporter exporter(options, archive, grid, watch_interrupts());
   oneapi::tbb::task_arena arena(options.work.threads > 0 ? options.work.threads : oneapi::tbb::task_arena::automatic);
@@ -333,9 +288,9 @@ int run(const ExportOptions& options) {
   const SampleMapping& mapping = exporter.mapping;
   StandardOutput out;
   if (options.common.json) {
-    out.write(json_text({{"archive", options.archive},
-                         {"output", options.output},
-                         {"method", to_string(options.method)},
+    out.write(json_text({{"archive", options.raster.archive},
+                         {"output", options.raster.output},
+                         {"method", to_string(options.method())},
                          {"width", samples.width},
                          {"height", samples.height},
                          {"first_sample", {{"x", samples.first_x}, {"z", samples.first_z}}},
@@ -366,7 +321,7 @@ int run(const ExportOptions& options) {
     if (exporter.counts.clamped > 0) {
       what += fmt::format(", {} moved into the range", describe_count(exporter.counts.clamped));
     }
-    out.write(fmt::format("{}: {}\n", options.output, what));
+    out.write(fmt::format("{}: {}\n", options.raster.output, what));
   }
   out.finish();
   return kExitDone;

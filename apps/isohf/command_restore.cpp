@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "archive_places.h"
 #include "command.h"
 #include "describe.h"
 #include "formats/registry.h"
@@ -22,12 +23,14 @@
 #include "json_output.h"
 #include "option_values.h"
 #include "options_common.h"
+#include "options_raster.h"
 #include "output_file.h"
 #include "output_grid.h"
 #include "restored_raster.h"
 #include "restored_samples.h"
 #include "source_inputs.h"
 #include "standard_output.h"
+#include "surface_scan.h"
 
 namespace isohf::cli {
 namespace {
@@ -53,45 +56,29 @@ Examples:
 struct RestoreOptions {
   CommonOptions common;
   WorkOptions work;
-  std::string archive;
-  std::string output;
+  RasterOptions raster;
   std::string like;
-  std::optional<std::pair<std::int64_t, std::int64_t>> size;
-  std::optional<double> spacing;
-  std::optional<RestoreMethod> method;
-  bool overwrite = false;
-  bool clamp_range = false;
 };
 
 std::optional<RestoreOptions> parse(const Arguments& arguments) {
   RestoreOptions options;
   CommandLine line("restore", "Turns an archive back into a raster of elevations.");
-  line.group("Arguments");
-  line.positional("ARCHIVE", "-i,--input", "Archive to read", options.archive);
-  line.positional("RASTER", "-o,--output",
-                  "Raster to write: NAME.tif, .exr, .png, .hgt, .asc, .flt, .r16, .raw, .r32 or .npy", options.output);
-  line.flag("--overwrite", "Replace RASTER where it exists", options.overwrite);
+  add_raster_arguments(line, "RASTER", options.raster);
   line.group("Grid");
   line.option(
       "--like", "INPUT",
       "The grid of this raster, or of a folder, \"pattern*\" or @list of them (default: of the archive's source)",
       options.like);
-  line.option("--size", "WxH", "So many samples over the source's ground",
-              [&](const std::string& text) { options.size = parse_size(text, 1, std::int64_t{1} << 31U); });
-  line.option("--spacing", "D", "Samples D world units apart",
-              [&](const std::string& text) { options.spacing = parse_positive_number(text); });
-  line.option("--method", "NAME", "hex or barycentric (default hex; the source's own samples where they are kept)",
-              [&](const std::string& text) { options.method = restore_method_from_string(text); });
-  line.flag("--clamp-range", "Move samples that RASTER's type does not hold to its ends, instead of refusing",
-            options.clamp_range);
+  add_size_options(line, "So many samples over the source's ground", options.raster);
+  add_method_option(line, "hex; the source's own samples where they are kept", options.raster);
+  add_clamp_option(line, "RASTER's type", options.raster);
   add_work_options(line, options.work);
   add_common_options(line, options.common);
   line.footer(kFooter);
   line.exclusive({"--like", "--size"});
   line.exclusive({"--like", "--spacing"});
   if (!line.parse(arguments)) return std::nullopt;
-  line.require("ARCHIVE", options.archive);
-  line.require("RASTER", options.output);
+  require_raster_arguments(line, "RASTER", options.raster);
   return options;
 }
 
@@ -102,12 +89,12 @@ SampleGrid asked_grid(const RestoreOptions& options, const Metadata& metadata) {
           ErrorCode::kInvalidArgument,
           fmt::format("{}: --like does not go through projections, and this archive's input was projected ({}); "
                       "give --size or --spacing, and bring the raster to that grid (gdalwarp)",
-                      options.archive, describe_projection(metadata.projection->spec)));
+                      options.raster.archive, describe_projection(metadata.projection->spec)));
     }
     return grid_like(metadata, open_inputs(expand_inputs({options.like}, false), {}, {}, 0).source->info());
   }
-  if (!options.size && !options.spacing) return natural_grid(metadata);
-  return grid_over(metadata.valid, samples_are_areas(metadata), options.size, options.spacing);
+  if (!options.raster.size && !options.raster.spacing) return natural_grid(metadata);
+  return grid_over(metadata.valid, samples_are_areas(metadata), options.raster.size, options.raster.spacing);
 }
 
 struct Restored {
@@ -128,41 +115,31 @@ class Restorer {
   Restored run(const std::optional<LosslessRecord>& record) { return record ? run_lossless(*record) : run_surface(); }
 
  private:
-  void report(std::int64_t rows) {
-    display_.update("restore", "rows", rows, grid_.height);
-    if (cancel_.load()) throw Error(ErrorCode::kCancelled, "interrupted");
-  }
-
   [[nodiscard]] std::unique_ptr<RasterSink> open(const SampleMapping& mapping, std::optional<double> void_value,
                                                  bool is_source) const {
     RasterSpec spec = is_source ? source_raster(archive_.metadata(), mapping.type)
                                 : restored_raster(archive_.metadata(), grid_, mapping.type);
-    spec.z_scale = mapping.z_scale;
-    spec.z_offset = mapping.z_offset;
-    if (void_value && !std::isnan(*void_value)) spec.void_value = void_value;
-    spec.overwrite = options_.overwrite;
-    std::unique_ptr<RasterSink> sink = create_raster(options_.output, spec);
-    const bool scaled = mapping.z_scale != 1.0 || mapping.z_offset != 0.0;
-    if (scaled && !has_scale(raster_kind(options_.output)) && !options_.common.quiet) {
-      print_warning(fmt::format("{}: has no place for what its raw numbers mean: elevation = raw * {} + {}",
-                                options_.output, mapping.z_scale, mapping.z_offset));
-    }
+    set_mapping(spec, mapping, void_value);
+    spec.overwrite = options_.raster.overwrite;
+    std::unique_ptr<RasterSink> sink = create_raster(options_.raster.output, spec);
+    if (!options_.common.quiet) warn_of_lost_scale(options_.raster.output, mapping);
     return sink;
   }
 
   Restored run_lossless(const LosslessRecord& record) {
     const SampleMapping kept = record.mapping;
     SampleMapping written = kept;
-    written.type = restored_type(options_.output, kept.type);
+    written.type = restored_type(options_.raster.output, kept.type);
     auto void_value = record.void_values.empty() ? std::nullopt : std::optional(record.void_values.front());
     // OpenEXR has no void value; what came from there has none but the user's.
-    const bool voids_to_nan = raster_kind(options_.output) == RasterKind::kExr && is_floating(written.type) &&
+    const bool voids_to_nan = raster_kind(options_.raster.output) == RasterKind::kExr && is_floating(written.type) &&
                               archive_.metadata().source.format != "OpenEXR";
     const bool as_kept = written.type == kept.type && !voids_to_nan;
     if (voids_to_nan) void_value.reset();
     if (void_value && !as_kept && !SampleStore(written, std::nullopt, false).holds(*void_value)) {
-      throw Error(ErrorCode::kInvalidArgument, fmt::format("{}: {} does not hold the void value {}; write .tif",
-                                                           options_.output, to_string(written.type), *void_value));
+      throw Error(ErrorCode::kInvalidArgument,
+                  fmt::format("{}: {} does not hold the void value {}; write .tif", options_.raster.output,
+                              to_string(written.type), *void_value));
     }
     const std::unique_ptr<RasterSink> sink = open(written, void_value, true);
     LosslessReader reader(archive_, record);
@@ -173,11 +150,11 @@ class Restorer {
       hash.add(raw);
       sink->write_rows(as_kept ? raw : in_type(raw, record, written.type, row, voids_to_nan));
       row += static_cast<std::int64_t>(raw.size() / size_bytes(kept.type)) / record.width;
-      report(row);
+      report_rows(display_, "restore", row, grid_.height, cancel_);
     }
     if (const std::string found = hex(hash.finish()); found != record.sha256) {
       throw Error(ErrorCode::kCorrupt, fmt::format("{}: the restored samples have the SHA-256 {}, the source's is {}",
-                                                   options_.archive, found, record.sha256));
+                                                   options_.raster.archive, found, record.sha256));
     }
     sink->finish();
     return {{}, true};
@@ -200,7 +177,8 @@ class Restorer {
                         (outcome == SampleStore::Outcome::kStored && load_sample(to, at) == value);
       const auto place = static_cast<std::int64_t>(i);
       if (!same) {
-        refuse_sample(options_.output, to, place % grid_.width, first_row + place / grid_.width, value, "write .tif");
+        refuse_sample(options_.raster.output, to, place % grid_.width, first_row + place / grid_.width, value,
+                      "write .tif");
       }
     }
     return out;
@@ -208,24 +186,19 @@ class Restorer {
 
   Restored run_surface() {
     const Metadata& metadata = archive_.metadata();
-    const SampleMapping mapping{restored_type(options_.output, sample_type_from_string(metadata.source.sample_type)),
-                                metadata.source.z_scale, metadata.source.z_offset};
-    const bool has_voids = may_have_voids(metadata, grid_) || raster_kind(options_.output) == RasterKind::kHgt;
+    const SampleMapping mapping{
+        restored_type(options_.raster.output, sample_type_from_string(metadata.source.sample_type)),
+        metadata.source.z_scale, metadata.source.z_offset};
+    const bool has_voids = needs_void(metadata, grid_, options_.raster.output);
     const auto void_value = has_voids ? usual_void(mapping.type) : std::nullopt;
-    const SampleStore store(mapping, void_value, options_.clamp_range);
+    const SampleStore store(mapping, void_value, options_.raster.clamp_range);
     const std::unique_ptr<RasterSink> sink = open(mapping, void_value, false);
-    SurfaceRows surface(
-        archive_.grid(), metadata.wraps_x, metadata.quantisation,
-        [&](TileIndex tile) { return archive_.read_tile(tile); }, grid_, options_.method.value_or(RestoreMethod::kHex));
-    const std::int64_t rows_at_once = std::max<std::int64_t>((std::int64_t{1} << 20U) / grid_.width, 1);
+    const SurfaceScan scan(archive_, grid_, options_.raster.method.value_or(RestoreMethod::kHex), display_, cancel_);
     Restored restored;
-    for (std::int64_t row = 0; row < grid_.height; row += rows_at_once) {
-      const std::int64_t rows = std::min(rows_at_once, grid_.height - row);
-      std::vector<double> elevations(static_cast<std::size_t>(rows * grid_.width));
-      surface.read(row, rows, elevations);
-      sink->write_rows(store_rows(store, mapping.type, options_.output, grid_.width, row, elevations, restored.counts));
-      report(row + rows);
-    }
+    scan.run("restore", [&](std::int64_t row, std::span<const double> elevations) {
+      sink->write_rows(
+          store_rows(store, mapping.type, options_.raster.output, grid_.width, row, elevations, restored.counts));
+    });
     sink->finish();
     return restored;
   }
@@ -238,9 +211,10 @@ class Restorer {
 };
 
 int run(const RestoreOptions& options) {
-  check_output_file(options.archive, options.output, options.overwrite);
-  const ArchiveReader archive(options.archive);
-  const bool wants_source = options.like.empty() && !options.size && !options.spacing && !options.method;
+  check_output_file(options.raster.archive, options.raster.output, options.raster.overwrite);
+  const ArchiveReader archive(options.raster.archive);
+  const bool wants_source =
+      options.like.empty() && !options.raster.size && !options.raster.spacing && !options.raster.method;
   const std::optional<LosslessRecord> record = wants_source ? lossless_record(archive.metadata()) : std::nullopt;
   const SampleGrid grid = record ? source_grid(archive.metadata().source) : asked_grid(options, archive.metadata());
   const std::atomic<bool>& cancel = watch_interrupts();
@@ -253,11 +227,12 @@ int run(const RestoreOptions& options) {
     print_error(error.what());
     return kExitDifferences;
   }
-  const std::string how = restored.is_source ? "source" : to_string(options.method.value_or(RestoreMethod::kHex));
+  const std::string how =
+      restored.is_source ? "source" : to_string(options.raster.method.value_or(RestoreMethod::kHex));
   StandardOutput out;
   if (options.common.json) {
-    out.write(json_text({{"archive", options.archive},
-                         {"output", options.output},
+    out.write(json_text({{"archive", options.raster.archive},
+                         {"output", options.raster.output},
                          {"method", how},
                          {"width", grid.width},
                          {"height", grid.height},
@@ -271,7 +246,7 @@ int run(const RestoreOptions& options) {
     if (!restored.is_source) what = fmt::format("method {}, {} voids", how, describe_count(restored.counts.voids));
     if (restored.counts.clamped > 0)
       what += fmt::format(", {} moved into the range", describe_count(restored.counts.clamped));
-    out.write(fmt::format("{}: {} x {} samples, {}\n", options.output, grid.width, grid.height, what));
+    out.write(fmt::format("{}: {} x {} samples, {}\n", options.raster.output, grid.width, grid.height, what));
   }
   out.finish();
   return kExitDone;

@@ -1,15 +1,16 @@
 #include "restored_raster.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cctype>
 #include <cmath>
 #include <filesystem>
 
-#include "isohf/base/error.h"
-#include "isohf/convert/plan.h"
-#include "isohf/projection/projected_extent.h"
 #include "isohf/projection/projection_wkt.h"
 #include "isohf/restore/archive_geometry.h"
+#include "output_grid.h"
+#include "standard_output.h"
 
 namespace isohf::cli {
 namespace {
@@ -19,11 +20,6 @@ std::string extension_of(const std::string& path) {
   std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   return extension;
-}
-
-HorizontalUnit unit_of(const std::string& name) {
-  if (name == "metre") return HorizontalUnit::kMetre;
-  return name == "degree" ? HorizontalUnit::kDegree : HorizontalUnit::kUnknown;
 }
 
 RasterSpec plain_raster(const Metadata& metadata, const SampleGrid& grid, SampleType type) {
@@ -42,7 +38,7 @@ RasterSpec raster_in_source_system(const Metadata& metadata, const SampleGrid& g
   RasterSpec spec = plain_raster(metadata, grid, type);
   Georeference place;
   place.registration = source.registration == "area" ? Registration::kArea : Registration::kPoint;
-  place.unit = unit_of(source.crs_unit);
+  place.unit = horizontal_unit(source);
   // World units to the source's own.
   const double per_x = source.crs_spacing_x > 0.0 ? source.crs_spacing_x / source.spacing_x : 1.0;
   const double per_z = source.crs_spacing_y > 0.0 ? source.crs_spacing_y / source.spacing_z : 1.0;
@@ -157,6 +153,11 @@ SampleGrid natural_grid(const Metadata& metadata) {
   return grid;
 }
 
+HorizontalUnit horizontal_unit(const SourceRecord& source) {
+  if (source.crs_unit == "metre") return HorizontalUnit::kMetre;
+  return source.crs_unit == "degree" ? HorizontalUnit::kDegree : HorizontalUnit::kUnknown;
+}
+
 ReferenceSystem horizontal_system(const SourceRecord& source) {
   ReferenceSystem system;
   system.name = source.crs_name;
@@ -168,52 +169,20 @@ ReferenceSystem horizontal_system(const SourceRecord& source) {
   return system;
 }
 
-WorldBounds world_bounds(const Metadata& metadata, double west, double south, double east, double north) {
-  const SourceRecord& source = metadata.source;
-  if (!source.origin_x || !source.origin_y || !(source.crs_spacing_x > 0.0) || !(source.crs_spacing_y > 0.0)) {
-    throw Error(ErrorCode::kInvalidArgument, "the archive does not say where its source lay; coordinates mean nothing");
-  }
-  if (is_warped(metadata)) {
-    const ProjectionRecord& on = *metadata.projection;
-    const MapBounds map = projected_bounds(Projection(on.spec), {west, south, east, north});
-    if (!std::isfinite(map.west)) {
-      throw Error(ErrorCode::kInvalidArgument, "the archive's map has no place for a part of that");
-    }
-    return {map.west - on.origin.easting, on.origin.northing - map.north, map.east - on.origin.easting,
-            on.origin.northing - map.south};
-  }
-  const double to_x = source.spacing_x / source.crs_spacing_x;
-  const double to_z = source.spacing_z / source.crs_spacing_y;
-  WorldBounds bounds;
-  bounds.x0 = source.first_sample_x + (west - *source.origin_x) * to_x;
-  bounds.x1 = source.first_sample_x + (east - *source.origin_x) * to_x;
-  bounds.z0 = source.first_sample_z + (*source.origin_y - north) * to_z;
-  bounds.z1 = source.first_sample_z + (*source.origin_y - south) * to_z;
-  return bounds;
+bool needs_void(const Metadata& metadata, const SampleGrid& grid, const std::string& output) {
+  return may_have_voids(metadata, grid) || raster_kind(output) == RasterKind::kHgt;
 }
 
-SampleGrid grid_like(const Metadata& metadata, const SourceInfo& other) {
-  const SourceRecord& source = metadata.source;
-  const Georeference& place = other.georeference;
-  const bool comparable = source.origin_x && source.origin_y && place.has_origin && source.crs_spacing_x > 0.0 &&
-                          source.crs_spacing_y > 0.0 && unit_of(source.crs_unit) == place.unit;
-  if (!comparable) {
-    const SourceFrame frame = make_source_frame(other);
-    return {frame.width,
-            frame.height,
-            metadata.valid.x0 + frame.first_sample_x,
-            metadata.valid.z0 + frame.first_sample_z,
-            frame.spacing_x,
-            frame.spacing_z};
-  }
-  const double to_x = source.spacing_x / source.crs_spacing_x;
-  const double to_z = source.spacing_z / source.crs_spacing_y;
-  return {other.width,
-          other.height,
-          source.first_sample_x + (place.origin_x - *source.origin_x) * to_x,
-          source.first_sample_z + (*source.origin_y - place.origin_y) * to_z,
-          place.spacing_x * to_x,
-          place.spacing_y * to_z};
+void set_mapping(RasterSpec& spec, const SampleMapping& mapping, std::optional<double> void_value) {
+  spec.z_scale = mapping.z_scale;
+  spec.z_offset = mapping.z_offset;
+  if (void_value && !std::isnan(*void_value)) spec.void_value = void_value;
+}
+
+void warn_of_lost_scale(const std::string& output, const SampleMapping& mapping) {
+  if ((mapping.z_scale == 1.0 && mapping.z_offset == 0.0) || has_scale(raster_kind(output))) return;
+  print_warning(fmt::format("{}: has no place for what its raw numbers mean: elevation = raw * {} + {}", output,
+                            mapping.z_scale, mapping.z_offset));
 }
 
 }  // namespace isohf::cli

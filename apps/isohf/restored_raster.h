@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "formats/raster_sink.h"
@@ -36,15 +37,18 @@ enum class RasterKind { kTiff, kExr, kPng, kHgt, kAsc, kFlt, kRaw16, kRaw32, kNp
 /// True where samples of rasters of the archive stand for areas: as the source's, or on a map.
 [[nodiscard]] bool samples_are_areas(const Metadata& metadata);
 
+[[nodiscard]] HorizontalUnit horizontal_unit(const SourceRecord& source);
+
 /// The source's body and horizontal reference system, as recorded.
 [[nodiscard]] ReferenceSystem horizontal_system(const SourceRecord& source);
 
-/// The part of the world between these coordinates of the source. Throws Error{kInvalidArgument} where the archive does
-/// not know where its source lay.
-[[nodiscard]] WorldBounds world_bounds(const Metadata& metadata, double west, double south, double east, double north);
+/// Whether a raster of the grid in `output` needs a value for voids.
+[[nodiscard]] bool needs_void(const Metadata& metadata, const SampleGrid& grid, const std::string& output);
 
-/// The grid of another raster of elevations, in the archive's world: by the origins of both where they are known in
-/// the same unit, else from the North-West corner.
-[[nodiscard]] SampleGrid grid_like(const Metadata& metadata, const SourceInfo& other);
+/// Puts into the spec what its raw numbers mean. A void value that is NaN goes without saying.
+void set_mapping(RasterSpec& spec, const SampleMapping& mapping, std::optional<double> void_value);
+
+/// A warning where scale or offset say something and the format of `output` has no place for them.
+void warn_of_lost_scale(const std::string& output, const SampleMapping& mapping);
 
 }  // namespace isohf::cli

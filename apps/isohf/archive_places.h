@@ -1,0 +1,21 @@
+#pragma once
+
+#include "formats/cropped_source.h"
+#include "isohf/archive/metadata.h"
+#include "isohf/restore/surface_rows.h"
+#include "isohf/surface/heightmap.h"
+
+namespace isohf::cli {
+
+/// The part of the world in a box of the source's coordinates. Longitudes are compared modulo 360 degrees; West above
+/// East crosses the 180th meridian.
+/// Throws Error{kInvalidArgument} where the archive does not know where its source lay, where West is not less than
+/// East in a source that is not in degrees, and where the ground lies at both ends of the archive, so that it is no
+/// rectangle there.
+[[nodiscard]] WorldBounds world_bounds(const Metadata& metadata, const BoundingBox& box);
+
+/// The grid of another raster of elevations, in the archive's world: by the origins of both where they are known in
+/// the same unit, else from the North-West corner.
+[[nodiscard]] SampleGrid grid_like(const Metadata& metadata, const SourceInfo& other);
+
+}  // namespace isohf::cli
