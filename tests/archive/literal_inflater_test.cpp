@@ -10,6 +10,7 @@
 
 #include "archive/tiles.h"
 #include "isohf/archive/deflate.h"
+#include "isohf/archive/deflate_writer.h"
 
 namespace isohf {
 namespace {

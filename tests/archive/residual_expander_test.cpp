@@ -5,7 +5,7 @@
 #include <random>
 #include <vector>
 
-#include "isohf/archive/tile_payload.h"
+#include "isohf/archive/residual_symbols.h"
 #include "isohf/base/simd.h"
 
 namespace isohf {

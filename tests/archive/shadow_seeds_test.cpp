@@ -8,7 +8,6 @@
 #include <random>
 
 #include "isohf/archive/deflate.h"
-#include "isohf/archive/tile_payload.h"
 #include "isohf/archive/zip_layout.h"
 #include "isohf/base/error.h"
 

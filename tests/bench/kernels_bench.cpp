@@ -10,10 +10,13 @@
 #include <memory>
 #include <vector>
 
+#include "isohf/archive/activities.h"
 #include "isohf/archive/coding_effort.h"
 #include "isohf/archive/content_hash.h"
 #include "isohf/archive/context_model.h"
 #include "isohf/archive/deflate.h"
+#include "isohf/archive/deflate_writer.h"
+#include "isohf/archive/hex_predictor.h"
 #include "isohf/archive/lane_decoder.h"
 #include "isohf/archive/pair_coding.h"
 #include "isohf/archive/predictor_fit.h"
@@ -21,6 +24,7 @@
 #include "isohf/archive/residual_expander.h"
 #include "isohf/archive/residual_fold.h"
 #include "isohf/archive/residual_streams.h"
+#include "isohf/archive/residual_symbols.h"
 #include "isohf/surface/height_source.h"
 
 namespace {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "isohf/archive/activities.h"
 #include "isohf/archive/code_cost.h"
 #include "isohf/archive/tile_payload.h"
 

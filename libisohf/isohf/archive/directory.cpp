@@ -147,7 +147,9 @@ void check_profile(std::span<const std::byte> file, const ZipEnd& end, const Com
   }
 }
 
-std::vector<std::byte> member_from(std::vector<std::byte> data, const ZipEntry& entry) {
+std::vector<std::byte> member_from(const MappedFile& file, const ZipEntry& entry, std::uint64_t data_offset) {
+  std::vector<std::byte> data(entry.compressed_bytes);
+  file.read(data_offset, data);
   std::vector<std::byte> bytes;
   if (entry.method == static_cast<std::uint16_t>(ZipMethod::kStored)) {
     if (entry.bytes != entry.compressed_bytes) {

@@ -8,6 +8,7 @@
 
 #include "isohf/archive/reader.h"
 #include "isohf/archive/zip_layout.h"
+#include "isohf/base/file.h"
 
 namespace isohf {
 
@@ -40,9 +41,11 @@ using Complain = std::function<void(const std::string&)>;
 /// writer makes it, members back to back from byte 0 on, metadata first, index last and right before the directory.
 void check_profile(std::span<const std::byte> file, const ZipEnd& end, const Complain& complain);
 
-/// A member of its data as they are in the file: inflated where they are deflated, the CRC checked.
-/// Throws Error{kCorrupt, kUnsupported}.
-[[nodiscard]] std::vector<std::byte> member_from(std::vector<std::byte> data, const ZipEntry& entry);
+/// A member whose data stand at `data_offset`, inflated where they are deflated, the CRC checked. Not through the map:
+/// a file that was cut after it was opened is an error, not the end of the process. Throws Error{kCorrupt,
+/// kUnsupported, kIo}.
+[[nodiscard]] std::vector<std::byte> member_from(const MappedFile& file, const ZipEntry& entry,
+                                                 std::uint64_t data_offset);
 
 /// "member "a/b" at byte 4711".
 [[nodiscard]] std::string describe(const ZipEntry& entry);

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 
+#include "isohf/archive/activities.h"
 #include "isohf/archive/residual_expander.h"
+#include "isohf/archive/sample_lattice.h"
 #include "isohf/archive/void_mask.h"
 #include "isohf/base/unaligned.h"
 #include "isohf/base/vectorised.h"

@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "isohf/archive/code_cost.h"
-#include "isohf/archive/deflate.h"
+#include "isohf/archive/huffman_code.h"
 #include "isohf/base/error.h"
 
 namespace isohf {

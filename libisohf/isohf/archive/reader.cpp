@@ -10,8 +10,7 @@
 #include "isohf/archive/deflate.h"
 #include "isohf/archive/directory.h"
 #include "isohf/archive/lane_decoder.h"
-#include "isohf/archive/tile_index.h"
-#include "isohf/archive/tile_payload.h"
+#include "isohf/archive/tile_table.h"
 #include "isohf/archive/zip_layout.h"
 #include "isohf/base/error.h"
 #include "isohf/base/file.h"
@@ -49,37 +48,20 @@ ZipEntry metadata_entry(std::span<const std::byte> file, const ZipEnd& end) {
 struct ArchiveReader::State {
   explicit State(const std::string& path) : mapped(path), file(mapped.bytes()) {}
 
-  /// A tile as the directory has it.
-  struct Listed {
-    std::int64_t flat;
-    TileEntry entry;
-    bool deflated;
-  };
-
   MappedFile mapped;
   std::span<const std::byte> file;
   ZipEnd end;
   std::string json;
   std::optional<Metadata> metadata;
   std::vector<std::string> warnings;
-  bool by_directory = false;
-  std::vector<Listed> listed;  ///< with `by_directory`: its tiles, by flat index
-  std::uint64_t data_end = 0;  ///< tiles lie before it; without `by_directory` the index begins there
+  std::optional<TileTable> tiles;
   mutable std::once_flag members_read;
   mutable std::vector<MemberEntry> members;
 
   void open();
-  [[nodiscard]] bool use_index();
-  void use_directory();
-  void take_ranges_from_index(const Directory& directory);
-  [[nodiscard]] const Listed* find_listed(std::int64_t flat) const;
-  [[nodiscard]] TileEntry record(std::int64_t flat) const;
-  [[nodiscard]] TileEntry checked_record(std::int64_t flat, TileIndex tile) const;
   [[nodiscard]] std::vector<std::byte> read(std::uint64_t offset_bytes, std::uint64_t size_bytes) const;
-  [[nodiscard]] std::vector<std::byte> member(const ZipEntry& entry, std::uint64_t data_offset) const;
   [[nodiscard]] std::vector<std::byte> payload(const TileEntry& entry, TileIndex tile) const;
   void read_members() const;
-  void check_against_index(const Directory& directory, const Complain& complain) const;
 };
 
 /// Not through the map: a file that was cut after it was opened is an error, not the end of the process.
@@ -89,14 +71,10 @@ std::vector<std::byte> ArchiveReader::State::read(std::uint64_t offset_bytes, st
   return bytes;
 }
 
-std::vector<std::byte> ArchiveReader::State::member(const ZipEntry& entry, std::uint64_t data_offset) const {
-  return member_from(read(data_offset, entry.compressed_bytes), entry);
-}
-
 void ArchiveReader::State::open() {
   end = find_zip_end(file);
   const ZipEntry entry = metadata_entry(file, end);
-  const std::vector<std::byte> bytes = member(entry, checked_data_offset(file, entry));
+  const std::vector<std::byte> bytes = member_from(mapped, entry, checked_data_offset(file, entry));
   json.assign(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   try {
     metadata.emplace(parse_metadata(json));
@@ -104,123 +82,15 @@ void ArchiveReader::State::open() {
     throw error.within(fmt::format("at byte {}", entry.header_offset));
   }
   json.erase(json.find_last_not_of(" \n") + 1);
-  if (!use_index()) use_directory();
-}
-
-/// Takes the index where it and the directory agree.
-bool ArchiveReader::State::use_index() {
-  const auto tiles = static_cast<std::uint64_t>(metadata->grid.tile_count());
-  const std::uint64_t bytes = tiles * kIndexRecordBytes + kIndexFooterBytes;
-  if (end.directory_offset < bytes) return false;
-  const std::uint64_t start = end.directory_offset - bytes;
-  const auto footer = parse_index_footer(file.subspan(end.directory_offset - kIndexFooterBytes, kIndexFooterBytes));
-  if (!footer || footer->record_count != tiles || footer->directory_bytes >= end.directory_bytes ||
-      footer->directory_entries + 1 != end.entries) {
-    return false;
+  tiles.emplace(mapped, end, *metadata);
+  if (tiles->by_directory()) {
+    warnings.emplace_back("index and ZIP directory do not agree, as after repacking; tiles are found by the directory");
   }
-  const auto found = file.subspan(start, tiles * kIndexRecordBytes);
-  if (crc32(found) != footer->records_crc32) return false;
-  const auto directory = file.subspan(end.directory_offset, footer->directory_bytes);
-  if (crc32(directory) != footer->directory_crc32) return false;
-  data_end = start;
-  return true;
-}
-
-void ArchiveReader::State::use_directory() {
-  by_directory = true;
-  data_end = end.directory_offset;
-  const Directory directory = read_directory(file, end, metadata->grid,
-                                             [](const std::string& what) { throw Error(ErrorCode::kCorrupt, what); });
-  const bool is_float = metadata->quantisation.type == CodeType::kF32;
-  for (const Directory::Tile& tile : directory.tiles) {
-    if (tile.entry.method != 0 && tile.entry.method != 8) {
-      throw Error(ErrorCode::kUnsupported, fmt::format("{}: compression method {}, only 0 and 8 are read",
-                                                       describe(tile.entry), tile.entry.method));
-    }
-    TileEntry entry;
-    entry.stored = true;
-    entry.offset_bytes = tile.data_offset;
-    entry.compressed_bytes = static_cast<std::uint32_t>(tile.entry.compressed_bytes);
-    entry.payload_bytes = static_cast<std::uint32_t>(tile.entry.bytes);
-    entry.payload_crc32 = tile.entry.crc32;
-    entry.has_voids = true;  // what is not known without decoding: the widest range
-    entry.code_min = is_float ? 0xff800000U : 0U;
-    entry.code_max = is_float ? 0x7f800000U : metadata->quantisation.max_code();
-    listed.push_back({tile.flat, entry, tile.entry.method == 8});
-  }
-  take_ranges_from_index(directory);
-  warnings.emplace_back("index and ZIP directory do not agree, as after repacking; tiles are found by the directory");
-}
-
-/// A repacked archive still has its old index as a member: what it says of tiles that are the same is true.
-void ArchiveReader::State::take_ranges_from_index(const Directory& directory) {
-  const auto member = std::find_if(directory.members.begin(), directory.members.end(),
-                                   [](const Directory::Member& m) { return m.entry.name == kIndexName; });
-  const auto tiles = static_cast<std::uint64_t>(metadata->grid.tile_count());
-  if (member == directory.members.end() || member->entry.bytes != tiles * kIndexRecordBytes + kIndexFooterBytes) return;
-  std::vector<std::byte> old;
-  try {
-    old = this->member(member->entry, member->data_offset);
-  } catch (const Error&) {
-    return;  // tiles are read without it
-  }
-  for (Listed& tile : listed) {
-    const auto at = static_cast<std::size_t>(tile.flat) * kIndexRecordBytes;
-    const auto found = parse_index_record(std::span(old).subspan(at, kIndexRecordBytes));
-    if (!found || !found->stored || found->payload_crc32 != tile.entry.payload_crc32 ||
-        found->payload_bytes != tile.entry.payload_bytes) {
-      continue;
-    }
-    tile.entry.code_min = found->code_min;
-    tile.entry.code_max = found->code_max;
-    tile.entry.has_voids = found->has_voids;
-  }
-}
-
-const ArchiveReader::State::Listed* ArchiveReader::State::find_listed(std::int64_t flat) const {
-  const auto found = std::lower_bound(listed.begin(), listed.end(), flat,
-                                      [](const Listed& tile, std::int64_t wanted) { return tile.flat < wanted; });
-  return found != listed.end() && found->flat == flat ? &*found : nullptr;
-}
-
-TileEntry ArchiveReader::State::record(std::int64_t flat) const {
-  if (by_directory) {
-    const Listed* const tile = find_listed(flat);
-    return tile == nullptr ? TileEntry{} : tile->entry;
-  }
-  const std::uint64_t at = static_cast<std::uint64_t>(flat) * kIndexRecordBytes;
-  std::array<std::byte, kIndexRecordBytes> bytes{};
-  mapped.read(data_end + at, bytes);
-  const auto entry = parse_index_record(bytes);
-  if (!entry) {
-    throw Error(ErrorCode::kCorrupt,
-                fmt::format("member \"{}\" at byte {}: the record of tile {} has reserved bits set", kIndexName,
-                            data_end + at, flat));
-  }
-  return *entry;
-}
-
-TileEntry ArchiveReader::State::checked_record(std::int64_t flat, TileIndex tile) const {
-  const TileEntry entry = record(flat);
-  if (!entry.stored) return entry;
-  const auto refuse = [&](const std::string& why) {
-    throw Error(ErrorCode::kCorrupt,
-                fmt::format("tile ({},{}) at byte {}: {}", tile.column, tile.row, entry.offset_bytes, why));
-  };
-  if (entry.offset_bytes > data_end || entry.compressed_bytes > data_end - entry.offset_bytes) {
-    refuse(fmt::format("its {} bytes reach past byte {}", entry.compressed_bytes, data_end));
-  }
-  const std::uint64_t most = max_payload_bytes(metadata->grid.shape(), metadata->quantisation.type);
-  if (entry.payload_bytes > most) {
-    refuse(fmt::format("states a payload of {} bytes, a tile of this shape has at most {}", entry.payload_bytes, most));
-  }
-  return entry;
 }
 
 std::vector<std::byte> ArchiveReader::State::payload(const TileEntry& entry, TileIndex tile) const {
-  const bool is_deflated = !by_directory || find_listed(metadata->grid.flat_index(tile))->deflated;
   std::vector<std::byte> header;
-  if (!by_directory) {
+  if (!tiles->by_directory()) {
     append_local_header(
         {tile_name(tile), ZipMethod::kDeflated, entry.payload_crc32, entry.compressed_bytes, entry.payload_bytes, 0},
         header);
@@ -233,7 +103,7 @@ std::vector<std::byte> ArchiveReader::State::payload(const TileEntry& entry, Til
   }
   const auto data = std::span(stored).subspan(before);
   std::vector<std::byte> bytes;
-  if (is_deflated) {
+  if (tiles->is_deflated(tile)) {
     bytes.resize(entry.payload_bytes);
     inflate_exactly(data, bytes);
   } else {
@@ -259,26 +129,6 @@ void ArchiveReader::State::read_members() const {
   members = std::move(found);
 }
 
-void ArchiveReader::State::check_against_index(const Directory& directory, const Complain& complain) const {
-  auto tile = directory.tiles.begin();
-  for (std::int64_t flat = 0; flat < metadata->grid.tile_count(); ++flat) {
-    const TileIndex index = metadata->grid.tile_at(flat);
-    const TileEntry entry = record(flat);
-    const bool is_listed = tile != directory.tiles.end() && tile->flat == flat;
-    if (entry.stored != is_listed) {
-      complain(fmt::format(
-          "tile ({},{}): {}", index.column, index.row,
-          is_listed ? "the directory has it, the index has not" : "the index has it, the directory has not"));
-    } else if (is_listed &&
-               (entry.offset_bytes != tile->data_offset || entry.compressed_bytes != tile->entry.compressed_bytes ||
-                entry.payload_bytes != tile->entry.bytes || entry.payload_crc32 != tile->entry.crc32)) {
-      complain(fmt::format("tile ({},{}) at byte {}: index and directory do not agree", index.column, index.row,
-                           tile->data_offset));
-    }
-    while (tile != directory.tiles.end() && tile->flat == flat) ++tile;
-  }
-}
-
 ArchiveReader::ArchiveReader(const std::string& path) : state_(std::make_unique<State>(path)) {
   try {
     state_->open();
@@ -302,7 +152,7 @@ const std::string& ArchiveReader::metadata_json() const {
   return state_->json;
 }
 bool ArchiveReader::reads_by_directory() const {
-  return state_->by_directory;
+  return state_->tiles->by_directory();
 }
 const std::vector<std::string>& ArchiveReader::warnings() const {
   return state_->warnings;
@@ -314,7 +164,7 @@ TileEntry ArchiveReader::tile_entry(TileIndex tile) const {
                                                          tile.row, grid().tile_columns(), grid().tile_rows()));
   }
   try {
-    return state_->checked_record(grid().flat_index(tile), tile);
+    return state_->tiles->checked_record(tile);
   } catch (const Error& error) {
     throw error.within(path());
   }
@@ -378,7 +228,7 @@ std::vector<TileCodes> ArchiveReader::read_tiles(std::span<const TileIndex> tile
 
 bool ArchiveReader::zlib_reads(TileIndex tile) const {
   const TileEntry entry = tile_entry(tile);
-  if (!entry.stored || state_->by_directory) return true;  // zipped again by another program: not our stream
+  if (!entry.stored || reads_by_directory()) return true;  // zipped again by another program: not our stream
   return zlib_inflates_to(state_->read(entry.offset_bytes, entry.compressed_bytes), state_->payload(entry, tile));
 }
 
@@ -412,7 +262,7 @@ std::vector<std::byte> ArchiveReader::read_member(const MemberEntry& member) con
   entry.bytes = member.bytes;
   entry.header_offset = member.offset_bytes;
   try {
-    return state_->member(entry, member.offset_bytes);
+    return member_from(state_->mapped, entry, member.offset_bytes);
   } catch (const Error& error) {
     throw error.within(path());
   }
@@ -425,12 +275,12 @@ std::vector<std::string> ArchiveReader::check_structure() const {
   try {
     state.mapped.check_size();
     const Directory directory = read_directory(state.file, state.end, grid(), complain);
-    if (!state.by_directory) {
-      state.check_against_index(directory, complain);
+    if (!state.tiles->by_directory()) {
+      state.tiles->check_against(directory, complain);
       check_profile(state.file, state.end, complain);
     }
     for (const Directory::Member& member : directory.members) {
-      static_cast<void>(state.member(member.entry, member.data_offset));
+      static_cast<void>(member_from(state.mapped, member.entry, member.data_offset));
     }
   } catch (const Error& error) {
     complain(error.what());

@@ -3,7 +3,7 @@
 #include <array>
 #include <cstring>
 
-#include "isohf/archive/tile_payload.h"
+#include "isohf/archive/residual_symbols.h"
 #include "isohf/base/vectorised.h"
 #if defined(ISOHF_HAS_WIDE)
 #include <immintrin.h>

@@ -1,6 +1,7 @@
 #include "isohf/archive/residual_fold.h"
 
-#include "isohf/archive/tile_payload.h"
+#include "isohf/archive/hex_predictor.h"
+#include "isohf/archive/residual_symbols.h"
 #include "isohf/base/vectorised.h"
 
 namespace isohf {

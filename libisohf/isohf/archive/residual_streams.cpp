@@ -3,8 +3,10 @@
 #include <bit>
 #include <cstring>
 
+#include "isohf/archive/activities.h"
 #include "isohf/archive/context_model.h"
 #include "isohf/archive/pair_coding.h"
+#include "isohf/archive/residual_symbols.h"
 #include "isohf/base/vectorised.h"
 
 namespace isohf {

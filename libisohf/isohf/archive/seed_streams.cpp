@@ -3,7 +3,8 @@
 #include <fmt/format.h>
 
 #include "isohf/archive/deflate.h"
-#include "isohf/archive/tile_payload.h"
+#include "isohf/archive/deflate_writer.h"
+#include "isohf/archive/residual_symbols.h"
 #include "isohf/base/error.h"
 
 namespace isohf {

@@ -7,8 +7,9 @@
 #include <cmath>
 #include <limits>
 
+#include "isohf/archive/ordered_float.h"
+#include "isohf/archive/residual_symbols.h"
 #include "isohf/archive/seed_streams.h"
-#include "isohf/archive/tile_payload.h"
 #include "isohf/archive/zip_layout.h"
 #include "isohf/base/assert.h"
 #include "isohf/base/bytes.h"

@@ -4,12 +4,17 @@
 #include <bit>
 #include <cmath>
 
+#include "isohf/archive/activities.h"
 #include "isohf/archive/coding_effort.h"
 #include "isohf/archive/content_hash.h"
 #include "isohf/archive/deflate.h"
+#include "isohf/archive/deflate_writer.h"
+#include "isohf/archive/hex_predictor.h"
+#include "isohf/archive/ordered_float.h"
 #include "isohf/archive/predictor_fit.h"
 #include "isohf/archive/residual_fold.h"
 #include "isohf/archive/residual_streams.h"
+#include "isohf/archive/residual_symbols.h"
 #include "isohf/archive/tile_payload.h"
 #include "isohf/archive/void_mask.h"
 #include "isohf/base/assert.h"

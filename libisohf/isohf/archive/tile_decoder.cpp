@@ -3,7 +3,11 @@
 #include <algorithm>
 #include <limits>
 
+#include "isohf/archive/activities.h"
+#include "isohf/archive/hex_predictor.h"
 #include "isohf/archive/lane_decoder.h"
+#include "isohf/archive/ordered_float.h"
+#include "isohf/archive/residual_symbols.h"
 #include "isohf/archive/tile_codec.h"
 #include "isohf/archive/tile_payload.h"
 #include "isohf/archive/void_mask.h"

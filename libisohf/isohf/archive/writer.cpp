@@ -4,14 +4,13 @@
 
 #include <algorithm>
 #include <optional>
-#include <unordered_set>
 #include <vector>
 
 #include "isohf/archive/content_hash.h"
 #include "isohf/archive/deflate.h"
 #include "isohf/archive/journal.h"
 #include "isohf/archive/part_file.h"
-#include "isohf/archive/tile_index.h"
+#include "isohf/archive/written_contents.h"
 #include "isohf/archive/zip_layout.h"
 #include "isohf/base/assert.h"
 #include "isohf/base/bytes.h"
@@ -66,32 +65,19 @@ Digest job_digest(const TileGrid& grid, const WriterOptions& options) {
 }  // namespace
 
 struct ArchiveWriter::State {
-  /// A member that is no tile, and the tile that it stands before.
-  struct Placed {
-    std::int64_t before_tile;
-    ZipMember member;
-  };
-
   std::string path;
   TileGrid grid;
   WriterOptions options;
   PartFile part;
   std::optional<Journal> journal;
-  std::vector<std::byte> index;  ///< records of the tiles added so far
-  std::vector<Placed> members;
-  std::unordered_set<std::string> names;
-  ContentHash content;
-  TileStatistics statistics;
-  std::int64_t next = 0;
-  std::int64_t stored = 0;
-  std::uint64_t tile_bytes = 0;
+  WrittenContents contents;
   std::uint64_t journalled = 0;  ///< bytes of the part file that the journal's file vouches for
   std::uint64_t synced = 0;
   bool finished = false;
   bool keep = false;
 
   State(const std::string& target, const TileGrid& tile_grid, const WriterOptions& writer_options)
-      : path(target), grid(tile_grid), options(writer_options), part(part_path(target)) {}
+      : path(target), grid(tile_grid), options(writer_options), part(part_path(target)), contents(tile_grid) {}
 
   [[nodiscard]] ZipMember metadata_member() const {
     return {kMetadataName, ZipMethod::kStored, 0, options.metadata_bytes, options.metadata_bytes, 0};
@@ -100,14 +86,9 @@ struct ArchiveWriter::State {
   void start_over();
   void resume();
   [[nodiscard]] bool is_intact(const JournalRecord& record, std::uint64_t expected_offset) const;
-  void account(const JournalRecord& record);
-  void add_up(const TileStatistics& tile);
   void append(const ZipMember& member, std::span<const std::byte> data);
   void add_member(ZipMember member, std::span<const std::byte> data);
   void checkpoint();
-  [[nodiscard]] ZipMember tile_member(std::int64_t flat) const;
-  void for_each_directory_chunk(const ZipMember& metadata,
-                                const std::function<void(std::span<const std::byte>, std::uint64_t)>& at) const;
   void write_metadata(const std::string& json, ZipMember& member);
   void write_index_and_directory(const ZipMember& metadata);
 };
@@ -170,47 +151,11 @@ void ArchiveWriter::State::resume() {
     journal_end = opened.ends[i];
     kept = i + 1;
   }
-  for (std::size_t i = 0; i < kept && next < grid.tile_count(); ++i) account(opened.records[i]);
+  for (std::size_t i = 0; i < kept && contents.next_tile() < grid.tile_count(); ++i) contents.add(opened.records[i]);
   part.truncate(good_end);
   journal = std::move(opened.journal);
   journal->truncate(journal_end);
   journalled = synced = good_end;
-}
-
-/// Takes a step into index, directory and content hash.
-void ArchiveWriter::State::account(const JournalRecord& record) {
-  if (record.kind == JournalRecord::Kind::kMember) {
-    members.push_back({next, record.member});
-    names.insert(record.member.name);
-    return;
-  }
-  TileEntry entry;
-  entry.stored = record.kind == JournalRecord::Kind::kTile;
-  if (entry.stored) {
-    entry.offset_bytes = record.member.header_offset + local_header_bytes(record.member);
-    entry.compressed_bytes = static_cast<std::uint32_t>(record.member.compressed_bytes);
-    entry.payload_bytes = static_cast<std::uint32_t>(record.member.bytes);
-    entry.payload_crc32 = record.member.crc32;
-    entry.code_min = record.code_min;
-    entry.code_max = record.code_max;
-    entry.has_voids = record.has_voids;
-    ++stored;
-  }
-  tile_bytes += entry.compressed_bytes;
-  append_index_record(entry, index);
-  content.add_tile(record.digest);
-  add_up(record.statistics);
-  ++next;
-}
-
-void ArchiveWriter::State::add_up(const TileStatistics& tile) {
-  statistics.vertices += tile.vertices;
-  statistics.voids += tile.voids;
-  statistics.clamped += tile.clamped;
-  statistics.sum += tile.sum;
-  statistics.min = std::min(statistics.min, tile.min);
-  statistics.max = std::max(statistics.max, tile.max);
-  statistics.worst_rounding = std::max(statistics.worst_rounding, tile.worst_rounding);
 }
 
 void ArchiveWriter::State::append(const ZipMember& member, std::span<const std::byte> data) {
@@ -221,7 +166,7 @@ void ArchiveWriter::State::append(const ZipMember& member, std::span<const std::
     part.append(data);
   } catch (const Error& error) {
     throw Error(error.code(), fmt::format("{}; {} bytes were written and {} of {} tiles are in it", error.what(),
-                                          part.size_on_disk(), next, grid.tile_count()));
+                                          part.size_on_disk(), contents.next_tile(), grid.tile_count()));
   }
 }
 
@@ -235,41 +180,6 @@ void ArchiveWriter::State::checkpoint() {
   }
   journal->flush();
   journalled = part.position();
-}
-
-ZipMember ArchiveWriter::State::tile_member(std::int64_t flat) const {
-  const auto at = static_cast<std::size_t>(flat) * kIndexRecordBytes;
-  const auto entry = parse_index_record(std::span(index).subspan(at, kIndexRecordBytes));
-  ISOHF_ASSERT(entry.has_value());
-  ZipMember member{tile_name(grid.tile_at(flat)), ZipMethod::kDeflated, entry->payload_crc32,
-                   entry->compressed_bytes,       entry->payload_bytes, entry->offset_bytes};
-  if (entry->stored) member.header_offset -= local_header_bytes(member);
-  return member;
-}
-
-/// Hands the directory's entries over in file order, a few at a time, with their number; index.bin's is not among them.
-void ArchiveWriter::State::for_each_directory_chunk(
-    const ZipMember& metadata, const std::function<void(std::span<const std::byte>, std::uint64_t)>& at) const {
-  constexpr std::size_t kChunkBytes = std::size_t{1} << 16U;
-  std::vector<std::byte> chunk;
-  std::uint64_t entries = 0;
-  const auto add = [&](const ZipMember& member) {
-    append_directory_entry(member, chunk);
-    ++entries;
-    if (chunk.size() < kChunkBytes) return;
-    at(chunk, entries);
-    chunk.clear();
-    entries = 0;
-  };
-  add(metadata);
-  std::size_t placed = 0;
-  for (std::int64_t flat = 0; flat <= grid.tile_count(); ++flat) {
-    for (; placed < members.size() && members[placed].before_tile == flat; ++placed) add(members[placed].member);
-    if (flat == grid.tile_count()) break;
-    const ZipMember member = tile_member(flat);
-    if (member.bytes != 0) add(member);
-  }
-  at(chunk, entries);
 }
 
 void ArchiveWriter::State::write_metadata(const std::string& json, ZipMember& member) {
@@ -289,27 +199,10 @@ void ArchiveWriter::State::write_metadata(const std::string& json, ZipMember& me
 }
 
 void ArchiveWriter::State::write_index_and_directory(const ZipMember& metadata) {
-  IndexFooter footer;
-  footer.record_count = static_cast<std::uint64_t>(grid.tile_count());
-  footer.stored_count = static_cast<std::uint64_t>(stored);
-  footer.records_crc32 = crc32(index);
-  for_each_directory_chunk(metadata, [&](std::span<const std::byte> chunk, std::uint64_t entries) {
-    footer.directory_entries += entries;
-    footer.directory_bytes += chunk.size();
-    footer.directory_crc32 = crc32(chunk, footer.directory_crc32);
-  });
-  append_index_footer(footer, index);
+  const std::span<const std::byte> index = contents.finish_index(metadata);
   const ZipMember member{kIndexName, ZipMethod::kStored, crc32(index), index.size(), index.size(), part.position()};
   append(member, index);
-  index.resize(index.size() - kIndexFooterBytes);
-
-  const std::uint64_t directory_offset = part.position();
-  for_each_directory_chunk(metadata, [&](std::span<const std::byte> chunk, std::uint64_t) { part.append(chunk); });
-  std::vector<std::byte> tail;
-  append_directory_entry(member, tail);
-  append_end_records(footer.directory_entries + 1, directory_offset, part.position() + tail.size() - directory_offset,
-                     tail);
-  part.append(tail);
+  contents.append_directory(metadata, member, part);
 }
 
 ArchiveWriter::ArchiveWriter(const std::string& path, const TileGrid& grid, const WriterOptions& options) {
@@ -333,41 +226,36 @@ ArchiveWriter::~ArchiveWriter() {
 }
 
 std::int64_t ArchiveWriter::next_tile() const {
-  return state_->next;
+  return state_->contents.next_tile();
 }
 std::int64_t ArchiveWriter::tiles_stored() const {
-  return state_->stored;
+  return state_->contents.tiles_stored();
 }
 std::uint64_t ArchiveWriter::bytes_written() const {
   return state_->part.position();
 }
 std::uint64_t ArchiveWriter::tile_bytes() const {
-  return state_->tile_bytes;
+  return state_->contents.tile_bytes();
 }
 TileStatistics ArchiveWriter::statistics() const {
-  return state_->statistics;
+  return state_->contents.statistics();
 }
 
 ArchiveWriter::MemberTotals ArchiveWriter::members_in(const std::string& folder) const {
-  MemberTotals totals;
-  for (const State::Placed& placed : state_->members) {
-    if (!placed.member.name.starts_with(folder)) continue;
-    ++totals.members;
-    totals.bytes += placed.member.compressed_bytes;
-  }
-  return totals;
+  return state_->contents.members_in(folder);
 }
 
 void ArchiveWriter::add_tile(const EncodedTile& tile) {
   State& state = *state_;
-  ISOHF_ASSERT(state.next < state.grid.tile_count());
+  const std::int64_t flat = state.contents.next_tile();
+  ISOHF_ASSERT(flat < state.grid.tile_count());
   JournalRecord record;
   record.kind = tile.is_empty ? JournalRecord::Kind::kEmptyTile : JournalRecord::Kind::kTile;
   ISOHF_ASSERT(tile.content_digest.size() == record.digest.size());
   std::copy(tile.content_digest.begin(), tile.content_digest.end(), record.digest.begin());
   record.statistics = tile.statistics;
   if (!tile.is_empty) {
-    record.member = {tile_name(state.grid.tile_at(state.next)),
+    record.member = {tile_name(state.grid.tile_at(flat)),
                      ZipMethod::kDeflated,
                      tile.payload_crc32,
                      tile.deflated.size(),
@@ -380,7 +268,7 @@ void ArchiveWriter::add_tile(const EncodedTile& tile) {
     state.append(record.member, tile.deflated);
   }
   state.journal->add(record);
-  state.account(record);
+  state.contents.add(record);
   state.checkpoint();
 }
 
@@ -391,7 +279,7 @@ void ArchiveWriter::State::add_member(ZipMember member, std::span<const std::byt
   const std::string& name = member.name;
   if (const std::string why = why_bad_name(name); !why.empty()) refuse(why);
   if (name == kMetadataName || name == kIndexName || name.rfind("tiles/", 0) == 0) refuse("the name is taken");
-  if (names.count(name) != 0) refuse("it is there already");
+  if (contents.has_member(name)) refuse("it is there already");
   JournalRecord record;
   record.kind = JournalRecord::Kind::kMember;
   record.member = std::move(member);
@@ -399,7 +287,7 @@ void ArchiveWriter::State::add_member(ZipMember member, std::span<const std::byt
   record.data_crc32 = crc32(data);
   append(record.member, data);
   journal->add(record);
-  account(record);
+  contents.add(record);
   checkpoint();
 }
 
@@ -422,15 +310,13 @@ void ArchiveWriter::flush_tiles() {
 
 TileCodes ArchiveWriter::read_tile(TileIndex tile, const Quantisation& quantisation) const {
   const State& state = *state_;
-  const auto at = static_cast<std::size_t>(state.grid.flat_index(tile)) * kIndexRecordBytes;
-  const auto entry = parse_index_record(std::span(state.index).subspan(at, kIndexRecordBytes));
-  ISOHF_ASSERT(entry.has_value());
-  if (!entry->stored) return void_tile(state.grid.shape(), quantisation);
-  std::vector<std::byte> deflated(entry->compressed_bytes);
-  std::vector<std::byte> payload(entry->payload_bytes);
-  if (state.part.read_at(entry->offset_bytes, deflated) != deflated.size()) {
+  const TileEntry entry = state.contents.tile_entry(state.grid.flat_index(tile));
+  if (!entry.stored) return void_tile(state.grid.shape(), quantisation);
+  std::vector<std::byte> deflated(entry.compressed_bytes);
+  std::vector<std::byte> payload(entry.payload_bytes);
+  if (state.part.read_at(entry.offset_bytes, deflated) != deflated.size()) {
     throw Error(ErrorCode::kIo, fmt::format("{}: tile ({},{}) at byte {} cannot be read back", state.part.path(),
-                                            tile.column, tile.row, entry->offset_bytes));
+                                            tile.column, tile.row, entry.offset_bytes));
   }
   inflate_exactly(deflated, payload);
   return decode_tile(state.grid.shape(), quantisation.type, payload);
@@ -438,9 +324,9 @@ TileCodes ArchiveWriter::read_tile(TileIndex tile, const Quantisation& quantisat
 
 std::uint64_t ArchiveWriter::finish(Metadata metadata) {
   State& state = *state_;
-  ISOHF_ASSERT(state.next == state.grid.tile_count() && !state.finished);
-  metadata.tiles_stored = state.stored;
-  metadata.content_sha256 = state.content.finish(metadata);
+  ISOHF_ASSERT(state.contents.next_tile() == state.grid.tile_count() && !state.finished);
+  metadata.tiles_stored = state.contents.tiles_stored();
+  metadata.content_sha256 = state.contents.finish_hash(metadata);
   ZipMember member = state.metadata_member();
   state.part.flush();
   state.write_metadata(format_metadata(metadata), member);

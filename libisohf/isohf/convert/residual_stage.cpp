@@ -8,6 +8,7 @@
 
 #include "isohf/archive/content_hash.h"
 #include "isohf/archive/deflate.h"
+#include "isohf/archive/deflate_writer.h"
 #include "isohf/base/error.h"
 
 namespace isohf {

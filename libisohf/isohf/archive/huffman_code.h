@@ -1,0 +1,19 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+/// Canonical prefix codes as Deflate has them (RFC 1951, 3.2.2).
+
+namespace isohf {
+
+/// Shortest prefix code with no code longer than `limit` bits (nearly shortest where the limit bites); lengths are 0
+/// for symbols of frequency 0. A single symbol gets length 1.
+void build_code_lengths(std::span<const std::uint32_t> frequencies, unsigned limit, std::span<std::uint8_t> lengths);
+
+/// The codes of these lengths, 15 at most, bit-reversed as Deflate sends them; those of length 0 stay as they are.
+void assign_codes(std::span<const std::uint8_t> lengths, std::span<std::uint16_t> codes);
+
+}  // namespace isohf

@@ -1,0 +1,154 @@
+#include "isohf/archive/tile_table.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+
+#include "isohf/archive/deflate.h"
+#include "isohf/archive/tile_index.h"
+#include "isohf/archive/tile_payload.h"
+#include "isohf/base/error.h"
+
+namespace isohf {
+
+TileTable::TileTable(const MappedFile& file, const ZipEnd& end, const Metadata& metadata)
+    : file_(file), end_(end), metadata_(metadata) {
+  if (!use_index()) use_directory();
+}
+
+/// Takes the index where it and the directory agree.
+bool TileTable::use_index() {
+  const auto tiles = static_cast<std::uint64_t>(metadata_.grid.tile_count());
+  const std::uint64_t bytes = tiles * kIndexRecordBytes + kIndexFooterBytes;
+  if (end_.directory_offset < bytes) return false;
+  const std::uint64_t start = end_.directory_offset - bytes;
+  const auto footer =
+      parse_index_footer(file_.bytes().subspan(end_.directory_offset - kIndexFooterBytes, kIndexFooterBytes));
+  if (!footer || footer->record_count != tiles || footer->directory_bytes >= end_.directory_bytes ||
+      footer->directory_entries + 1 != end_.entries) {
+    return false;
+  }
+  const auto found = file_.bytes().subspan(start, tiles * kIndexRecordBytes);
+  if (crc32(found) != footer->records_crc32) return false;
+  const auto directory = file_.bytes().subspan(end_.directory_offset, footer->directory_bytes);
+  if (crc32(directory) != footer->directory_crc32) return false;
+  data_end_ = start;
+  return true;
+}
+
+void TileTable::use_directory() {
+  by_directory_ = true;
+  data_end_ = end_.directory_offset;
+  const Directory directory = read_directory(file_.bytes(), end_, metadata_.grid,
+                                             [](const std::string& what) { throw Error(ErrorCode::kCorrupt, what); });
+  const bool is_float = metadata_.quantisation.type == CodeType::kF32;
+  for (const Directory::Tile& tile : directory.tiles) {
+    if (tile.entry.method != 0 && tile.entry.method != 8) {
+      throw Error(ErrorCode::kUnsupported, fmt::format("{}: compression method {}, only 0 and 8 are read",
+                                                       describe(tile.entry), tile.entry.method));
+    }
+    TileEntry entry;
+    entry.stored = true;
+    entry.offset_bytes = tile.data_offset;
+    entry.compressed_bytes = static_cast<std::uint32_t>(tile.entry.compressed_bytes);
+    entry.payload_bytes = static_cast<std::uint32_t>(tile.entry.bytes);
+    entry.payload_crc32 = tile.entry.crc32;
+    entry.has_voids = true;  // what is not known without decoding: the widest range
+    entry.code_min = is_float ? 0xff800000U : 0U;
+    entry.code_max = is_float ? 0x7f800000U : metadata_.quantisation.max_code();
+    listed_.push_back({tile.flat, entry, tile.entry.method == 8});
+  }
+  take_ranges_from_index(directory);
+}
+
+/// A repacked archive still has its old index as a member: what it says of tiles that are the same is true.
+void TileTable::take_ranges_from_index(const Directory& directory) {
+  const auto member = std::find_if(directory.members.begin(), directory.members.end(),
+                                   [](const Directory::Member& m) { return m.entry.name == kIndexName; });
+  const auto tiles = static_cast<std::uint64_t>(metadata_.grid.tile_count());
+  if (member == directory.members.end() || member->entry.bytes != tiles * kIndexRecordBytes + kIndexFooterBytes) return;
+  std::vector<std::byte> old;
+  try {
+    old = member_from(file_, member->entry, member->data_offset);
+  } catch (const Error&) {
+    return;  // tiles are read without it
+  }
+  for (Listed& tile : listed_) {
+    const auto at = static_cast<std::size_t>(tile.flat) * kIndexRecordBytes;
+    const auto found = parse_index_record(std::span(old).subspan(at, kIndexRecordBytes));
+    if (!found || !found->stored || found->payload_crc32 != tile.entry.payload_crc32 ||
+        found->payload_bytes != tile.entry.payload_bytes) {
+      continue;
+    }
+    tile.entry.code_min = found->code_min;
+    tile.entry.code_max = found->code_max;
+    tile.entry.has_voids = found->has_voids;
+  }
+}
+
+const TileTable::Listed* TileTable::find_listed(std::int64_t flat) const {
+  const auto found = std::lower_bound(listed_.begin(), listed_.end(), flat,
+                                      [](const Listed& tile, std::int64_t wanted) { return tile.flat < wanted; });
+  return found != listed_.end() && found->flat == flat ? &*found : nullptr;
+}
+
+TileEntry TileTable::record(std::int64_t flat) const {
+  if (by_directory_) {
+    const Listed* const tile = find_listed(flat);
+    return tile == nullptr ? TileEntry{} : tile->entry;
+  }
+  const std::uint64_t at = static_cast<std::uint64_t>(flat) * kIndexRecordBytes;
+  std::array<std::byte, kIndexRecordBytes> bytes{};
+  file_.read(data_end_ + at, bytes);
+  const auto entry = parse_index_record(bytes);
+  if (!entry) {
+    throw Error(ErrorCode::kCorrupt,
+                fmt::format("member \"{}\" at byte {}: the record of tile {} has reserved bits set", kIndexName,
+                            data_end_ + at, flat));
+  }
+  return *entry;
+}
+
+TileEntry TileTable::checked_record(TileIndex tile) const {
+  const TileEntry entry = record(metadata_.grid.flat_index(tile));
+  if (!entry.stored) return entry;
+  const auto refuse = [&](const std::string& why) {
+    throw Error(ErrorCode::kCorrupt,
+                fmt::format("tile ({},{}) at byte {}: {}", tile.column, tile.row, entry.offset_bytes, why));
+  };
+  if (entry.offset_bytes > data_end_ || entry.compressed_bytes > data_end_ - entry.offset_bytes) {
+    refuse(fmt::format("its {} bytes reach past byte {}", entry.compressed_bytes, data_end_));
+  }
+  const std::uint64_t most = max_payload_bytes(metadata_.grid.shape(), metadata_.quantisation.type);
+  if (entry.payload_bytes > most) {
+    refuse(fmt::format("states a payload of {} bytes, a tile of this shape has at most {}", entry.payload_bytes, most));
+  }
+  return entry;
+}
+
+bool TileTable::is_deflated(TileIndex tile) const {
+  return !by_directory_ || find_listed(metadata_.grid.flat_index(tile))->deflated;
+}
+
+void TileTable::check_against(const Directory& directory, const Complain& complain) const {
+  auto tile = directory.tiles.begin();
+  for (std::int64_t flat = 0; flat < metadata_.grid.tile_count(); ++flat) {
+    const TileIndex index = metadata_.grid.tile_at(flat);
+    const TileEntry entry = record(flat);
+    const bool is_listed = tile != directory.tiles.end() && tile->flat == flat;
+    if (entry.stored != is_listed) {
+      complain(fmt::format(
+          "tile ({},{}): {}", index.column, index.row,
+          is_listed ? "the directory has it, the index has not" : "the index has it, the directory has not"));
+    } else if (is_listed &&
+               (entry.offset_bytes != tile->data_offset || entry.compressed_bytes != tile->entry.compressed_bytes ||
+                entry.payload_bytes != tile->entry.bytes || entry.payload_crc32 != tile->entry.crc32)) {
+      complain(fmt::format("tile ({},{}) at byte {}: index and directory do not agree", index.column, index.row,
+                           tile->data_offset));
+    }
+    while (tile != directory.tiles.end() && tile->flat == flat) ++tile;
+  }
+}
+
+}  // namespace isohf

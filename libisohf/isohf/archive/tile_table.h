@@ -1,0 +1,52 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "isohf/archive/directory.h"
+#include "isohf/archive/metadata.h"
+#include "isohf/archive/reader.h"
+#include "isohf/archive/zip_layout.h"
+#include "isohf/base/file.h"
+
+namespace isohf {
+
+/// Where the tiles of an archive stand: as its index says, or the ZIP directory where the two do not agree.
+class TileTable {
+ public:
+  /// File and metadata must outlive it. Throws Error{kCorrupt, kUnsupported} where neither can be used.
+  TileTable(const MappedFile& file, const ZipEnd& end, const Metadata& metadata);
+
+  [[nodiscard]] bool by_directory() const { return by_directory_; }
+
+  /// A tile's record, held against the file and what a tile may take. Throws Error{kCorrupt, kIo}.
+  [[nodiscard]] TileEntry checked_record(TileIndex tile) const;
+  /// Whether a stored tile is deflated, as all are that an index tells of.
+  [[nodiscard]] bool is_deflated(TileIndex tile) const;
+
+  /// Holds the index against a directory: one line for each tile that they do not agree on.
+  void check_against(const Directory& directory, const Complain& complain) const;
+
+ private:
+  /// A tile as the directory has it.
+  struct Listed {
+    std::int64_t flat;
+    TileEntry entry;
+    bool deflated;
+  };
+
+  [[nodiscard]] bool use_index();
+  void use_directory();
+  void take_ranges_from_index(const Directory& directory);
+  [[nodiscard]] const Listed* find_listed(std::int64_t flat) const;
+  [[nodiscard]] TileEntry record(std::int64_t flat) const;
+
+  const MappedFile& file_;
+  ZipEnd end_;
+  const Metadata& metadata_;
+  bool by_directory_ = false;
+  std::vector<Listed> listed_;  ///< with `by_directory_`: its tiles, by flat index
+  std::uint64_t data_end_ = 0;  ///< tiles lie before it; without `by_directory_` the index begins there
+};
+
+}  // namespace isohf
