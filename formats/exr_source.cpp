@@ -21,6 +21,7 @@
 
 #include "formats/exr_threads.h"
 #include "formats/open_options.h"
+#include "formats/place_beside.h"
 #include "formats/text_tokens.h"
 #include "isohf/base/assert.h"
 #include "isohf/base/error.h"
@@ -200,6 +201,7 @@ class ExrSource final : public HeightSource {
     }
     describe(path, channels, options.channel.empty());
     open_part();
+    read_place_beside(info_);
     apply_open_options(info_, options);
   }
 

@@ -334,7 +334,8 @@ void read_vertical(Keys& keys, GeoTiffPlace& place) {
 
 void read_system(Keys& keys, GeoTiffPlace& place, double& degrees) {
   ReferenceSystem& system = place.georeference.system;
-  const std::optional<int> model = keys.number(kModelType);
+  std::optional<int> model = keys.number(kModelType);
+  if (model == kUserDefined || model == 0) model.reset();  // what ESRI's strings come with: the other keys tell
   const std::optional<int> projected_crs = keys.number(kProjectedCrs);
   const bool projected = model ? *model == kModelProjected : projected_crs.has_value();
   const bool geographic = !projected && (model ? *model == kModelGeographic : keys.number(kGeodeticCrs).has_value());

@@ -13,11 +13,11 @@
 
 #include "formats/grid_header.h"
 #include "formats/open_options.h"
+#include "formats/place_beside.h"
 #include "formats/plain_samples.h"
 #include "formats/raw_file.h"
 #include "formats/text_tokens.h"
 #include "formats/wkt.h"
-#include "formats/world_file.h"
 #include "isohf/base/error.h"
 
 namespace isohf {
@@ -171,18 +171,11 @@ class HeaderGridSource final : public HeightSource {
   void read_world_file() {
     const std::optional<WorldFile> world = world_file_beside(info_.path);
     if (!world) return;
-    if (world->dy > 0.0) {
+    if (world->rows_from_south()) {
       throw Error(ErrorCode::kUnsupported, world->path + ": dy is positive; rows must run from North to South");
     }
     Georeference& place = info_.georeference;
-    if (!place.has_origin) {
-      place.has_origin = true;
-      place.spacing_x = world->dx;
-      place.spacing_y = -world->dy;
-      place.origin_x = world->x0;
-      place.origin_y = world->y0;
-      return;
-    }
+    if (!place.has_origin) return place_by(*world, info_.height, place);
     const double off = std::max({std::abs(world->x0 - place.origin_x), std::abs(world->dx - place.spacing_x),
                                  std::abs(world->y0 - place.origin_y), std::abs(-world->dy - place.spacing_y)});
     if (off > 1e-3 * std::min(place.spacing_x, place.spacing_y)) {

@@ -87,19 +87,23 @@ void check(const OIIO::ImageSpec& spec) {
   }
 }
 
-void open_raster(IsohfOiioRaster& raster, const char* path, const std::string& channel, IsohfOiioInfo& info) {
+/// False where the file is of no format that OpenImageIO knows.
+bool open_raster(IsohfOiioRaster& raster, const char* path, const std::string& channel, IsohfOiioInfo& info) {
   OIIO::ImageSpec config;
   config.attribute("oiio:UnassociatedAlpha", 1);  // numbers as stored, not multiplied by alpha
   config.attribute("oiio:RawColor", 1);
   raster.input = OIIO::ImageInput::open(path, &config);
   if (!raster.input) {
     const std::string why = OIIO::geterror();
-    const bool unknown = why.find("could not find a format reader") != std::string::npos;
-    throw Error(ErrorCode::kUnsupported, unknown ? "OpenImageIO does not know it either" : "OpenImageIO: " + why);
+    if (why.find("could not find a format reader") != std::string::npos) return false;
+    throw Error(ErrorCode::kCorrupt, "OpenImageIO: " + why);
   }
   raster.spec = raster.input->spec();
   const OIIO::ImageSpec& spec = raster.spec;
   check(spec);
+  const auto bits = static_cast<int>(8 * spec.format.size());
+  isohf::require_stored_numbers(raster.input->format_name(), bits, spec.get_int_attribute("oiio:BitsPerSample", bits),
+                                spec.format.is_floating_point(), path);
   raster.band_bytes = kBandBytes;
   raster.channel = channel_index(spec, channel);
   raster.type = spec.channelformat(raster.channel);
@@ -109,12 +113,17 @@ void open_raster(IsohfOiioRaster& raster, const char* path, const std::string& c
   info.block_height = spec.tile_width > 0 ? std::min(spec.tile_height, spec.height) : 1;
   info.sample_type = static_cast<int32_t>(sample_type_of(raster.type));
   put_text(info.format, raster.input->format_name());
-  if (spec.nchannels == 1) return;
-  put_text(info.channel, spec.channel_name(raster.channel));
-  if (channel.empty()) {
-    put_text(info.warning,
-             "channel " + std::string(spec.channel_name(0)) + " is read, of " + std::to_string(spec.nchannels));
+  std::string warning;
+  if (isohf::states_a_place(raster.input->format_name(), path)) {
+    warning = "the place that it states itself (GeoJP2) is not read; a world file beside it would be";
   }
+  if (spec.nchannels > 1) put_text(info.channel, spec.channel_name(raster.channel));
+  if (spec.nchannels > 1 && channel.empty()) {
+    warning += (warning.empty() ? "channel " : "; channel ") + std::string(spec.channel_name(0)) + " is read, of " +
+               std::to_string(spec.nchannels);
+  }
+  put_text(info.warning, warning);
+  return true;
 }
 
 /// Reads whole rows [begin, end) of the channel into `out`; in a tiled file begin and end lie between tiles.
@@ -166,12 +175,14 @@ void read_window(IsohfOiioRaster& raster, int column, int row, int columns, int 
 
 int module_open(const char* path, const char* channel, IsohfOiioRaster** raster, IsohfOiioInfo* info,
                 IsohfOiioMessage* message) {
-  return guarded(message, [&] {
+  bool known = true;
+  const int result = guarded(message, [&] {
     auto opened = std::make_unique<IsohfOiioRaster>();
     *info = {};
-    open_raster(*opened, path, channel, *info);
-    *raster = opened.release();
+    known = open_raster(*opened, path, channel, *info);
+    if (known) *raster = opened.release();
   });
+  return known ? result : ISOHF_OIIO_UNKNOWN;
 }
 
 int module_read(IsohfOiioRaster* raster, int64_t column, int64_t row, int64_t columns, int64_t rows, void* samples,

@@ -8,11 +8,14 @@
 /// sides may be built by different compilers, and no exception passes.
 ///
 /// Every function returns 0, or one more than the ErrorCode with a message of one line, without the path.
+/// IsohfOiioOpen returns ISOHF_OIIO_UNKNOWN for files of no format that OpenImageIO knows.
 
 extern "C" {
 
 /// Raised whenever anything below changes; the loader refuses any other.
-#define ISOHF_OIIO_ABI 4
+#define ISOHF_OIIO_ABI 5
+
+#define ISOHF_OIIO_UNKNOWN (-1)
 
 typedef struct IsohfOiioRaster IsohfOiioRaster;
 

@@ -42,6 +42,15 @@ int guarded(IsohfOiioMessage* message, Action action) {
   }
 }
 
+/// OpenImageIO hands out pictures: where it would deliver other numbers than the file holds, the file is refused.
+/// `bits` are those of a sample as delivered, `stored_bits` those in the file. Throws Error{kUnsupported} saying why,
+/// and what to do.
+void require_stored_numbers(const std::string& format, int bits, int stored_bits, bool is_floating,
+                            const std::string& path);
+
+/// Whether the file says where it lies in a way that OpenImageIO does not hand on: JPEG 2000 with the box of GeoJP2.
+bool states_a_place(const std::string& format, const std::string& path);
+
 }  // namespace isohf
 
 int isohf_oiio_open_photo(const char* path, IsohfOiioPhoto** photo, IsohfOiioPhotoInfo* info,

@@ -9,18 +9,19 @@
 #include "formats/libraries.h"
 #include "formats/oiio_loader.h"
 #include "formats/open_options.h"
+#include "formats/place_beside.h"
 #include "isohf/base/assert.h"
 #include "isohf/base/error.h"
 
 namespace isohf {
 namespace {
 
-std::string native_names() {
+[[noreturn]] void refuse_unknown(const std::string& path, const char* why) {
   std::string names;
   for (const Format& format : native_formats()) {
     names += fmt::format("{}{} ({})", names.empty() ? "" : ", ", format.name, fmt::join(format.extensions, " "));
   }
-  return names;
+  throw Error(ErrorCode::kUnsupported, fmt::format("{}: unknown format; read natively: {}; {}", path, names, why));
 }
 
 class OiioSource final : public HeightSource {
@@ -29,7 +30,8 @@ class OiioSource final : public HeightSource {
     IsohfOiioInfo found{};
     IsohfOiioMessage message{};
     const int result = module_.open(path.c_str(), options.channel.c_str(), &raster_, &found, &message);
-    if (result != 0) throw Error(oiio_error_code(result), message.text);
+    if (result == ISOHF_OIIO_UNKNOWN) refuse_unknown(path, "OpenImageIO does not know it either");
+    if (result != 0) throw Error(oiio_error_code(result), fmt::format("{}: {}", path, message.text));
     info_.path = path;
     info_.format = found.format;
     info_.width = found.width;
@@ -40,6 +42,7 @@ class OiioSource final : public HeightSource {
     info_.channel = found.channel;
     if (found.warning[0] != '\0') info_.warnings.emplace_back(found.warning);
     try {
+      read_place_beside(info_);
       apply_open_options(info_, options);
     } catch (...) {
       module_.close(raster_);
@@ -80,13 +83,13 @@ class OiioSource final : public HeightSource {
 }  // namespace
 
 std::unique_ptr<HeightSource> open_with_oiio(const std::string& path, const OpenOptions& options) {
+  const IsohfOiioModule* module = nullptr;
   try {
-    return std::make_unique<OiioSource>(oiio_module(), path, options);
+    module = &oiio_module();
   } catch (const Error& error) {
-    if (error.code() != ErrorCode::kUnsupported) throw error.within(path);
-    throw Error(error.code(),
-                fmt::format("{}: unknown format; read natively: {}; {}", path, native_names(), error.what()));
+    refuse_unknown(path, error.what());
   }
+  return std::make_unique<OiioSource>(*module, path, options);
 }
 
 OiioFormats oiio_formats() {

@@ -3,10 +3,10 @@
 #include <array>
 
 #include "formats/geotiff_keys.h"
+#include "formats/place_beside.h"
 #include "formats/raw_file.h"
 #include "formats/tiff_file.h"
 #include "formats/tiff_source.h"
-#include "formats/world_file.h"
 #include "isohf/base/error.h"
 
 namespace isohf {
@@ -34,13 +34,8 @@ std::optional<Georeference> photo_georeference(const std::string& path, std::int
   if (!place) {
     const std::optional<WorldFile> world = world_file_beside(path);
     if (!world) return std::nullopt;
-    if (world->dy > 0.0) refuse_south_up();
-    place.emplace();
-    place->spacing_x = world->dx;
-    place->spacing_y = -world->dy;
-    place->has_origin = true;
-    place->origin_x = world->x0;
-    place->origin_y = world->y0;
+    if (world->rows_from_south()) refuse_south_up();
+    place_by(*world, rows, place.emplace());
   }
   if (place->system.wkt.empty() && !place->system.epsg) place->system.wkt = prj_beside(path);
   return place;

@@ -17,6 +17,7 @@
 #include "formats/libraries.h"
 #include "formats/open_options.h"
 #include "formats/packed_elevations.h"
+#include "formats/place_beside.h"
 #include "formats/raster_description.h"
 #include "isohf/base/assert.h"
 #include "isohf/base/error.h"
@@ -172,7 +173,7 @@ class PngSource final : public HeightSource {
     sample_bytes_ = size_bytes(info_.sample_type);
     choose_channel(options.channel);
     if (channels_ > 2 && options.channel.empty()) decide_on_colours();
-    if (!packing_) describe();
+    read_beside();
     apply_open_options(info_, options);
     kept_rows_ = rows_within(kKeptBytes);
   }
@@ -269,17 +270,18 @@ class PngSource final : public HeightSource {
     if (wanted.empty() && channels_ == 2) info_.warnings.emplace_back("channel Y is read, not the alpha channel");
   }
 
-  /// What isohf wrote beside the picture says what its numbers mean; packed elevations say so themselves.
-  void describe() {
-    if (!has_raster_description(info_.path)) return;
-    const RasterDescription description(info_.path);
-    const std::string format = description.format();
-    if (format.empty()) {
+  /// What isohf wrote beside the picture says what its numbers mean and where they lie; a world file says the latter.
+  /// Packed elevations say themselves what they mean.
+  void read_beside() {
+    if (!packing_ && has_raster_description(info_.path)) {
+      const RasterDescription description(info_.path);
+      if (!description.format().empty()) {
+        description.require("png", info_);
+        return description.describe(info_);
+      }
       info_.warnings.emplace_back("the .json beside it names no format, as one of isohf's would: it is left aside");
-      return;
     }
-    description.require("png", info_);
-    description.describe(info_);
+    read_place_beside(info_);
   }
 
   /// All channels together are one elevation.

@@ -15,11 +15,12 @@
 #include "formats/gdal_tags.h"
 #include "formats/geotiff_keys.h"
 #include "formats/open_options.h"
+#include "formats/place_beside.h"
 #include "formats/raw_file.h"
 #include "formats/tiff_blocks.h"
 #include "formats/tiff_file.h"
 #include "formats/units.h"
-#include "formats/world_file.h"
+#include "formats/wkt.h"
 #include "isohf/base/assert.h"
 #include "isohf/base/error.h"
 
@@ -243,9 +244,10 @@ class TiffSource final : public HeightSource {
     info_.metres_per_vertical_unit = place.metres_per_vertical_unit;
     info_.warnings.insert(info_.warnings.end(), place.warnings.begin(), place.warnings.end());
     turned_ = place.rows_from_south;
-    if (!place.placed) place_from_world_file();
-    if (info_.georeference.system.wkt.empty() && !info_.georeference.system.epsg) {
-      info_.georeference.system.wkt = prj_beside(info_.path);
+    if (!place.placed) place_by_world_file();
+    const ReferenceSystem& system = info_.georeference.system;
+    if (info_.georeference.unit == HorizontalUnit::kUnknown && system.wkt.empty() && !system.epsg) {
+      read_prj_beside(info_);
     }
     if (layout_.orientation == kTopLeft) return;
     if (info_.georeference.has_origin) {
@@ -260,16 +262,11 @@ class TiffSource final : public HeightSource {
     }
   }
 
-  void place_from_world_file() {
+  void place_by_world_file() {
     const std::optional<WorldFile> world = world_file_beside(info_.path);
     if (!world) return;
-    Georeference& geo = info_.georeference;
-    turned_ = world->dy > 0.0;
-    geo.spacing_x = world->dx;
-    geo.spacing_y = std::abs(world->dy);
-    geo.has_origin = true;
-    geo.origin_x = world->x0;
-    geo.origin_y = world->y0 + (turned_ ? static_cast<double>(layout_.height - 1) * world->dy : 0.0);
+    turned_ = world->rows_from_south();
+    place_by(*world, layout_.height, info_.georeference);
   }
 
   void describe_missing_blocks() {

@@ -12,6 +12,8 @@ struct WorldFile {
   double dy = 0.0;
   double x0 = 0.0;
   double y0 = 0.0;
+
+  [[nodiscard]] bool rows_from_south() const { return dy > 0.0; }
 };
 
 /// Looks beside raster.tif for raster.tfw, raster.tifw, those of other formats (.jgw, .pgw, ...) and raster.wld (any of

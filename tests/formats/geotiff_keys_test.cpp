@@ -123,6 +123,17 @@ TEST(GeoTiffPlace, AnglesBecomeDegrees) {
   EXPECT_EQ(spacing(Keys().code(2054, 9999)), -1.0);
 }
 
+TEST(GeoTiffPlace, KeysTellTheKindOfAModelOfOnesOwn) {
+  // What gdal_translate -co GEOTIFF_KEYS_FLAVOR=ESRI_PE writes.
+  GeoTiffPlace place = place_from_geotiff(Keys().code(kModel, 32767).code(3072, 32611).code(3076, 9001).placed(), 100);
+  EXPECT_EQ(place.georeference.unit, HorizontalUnit::kMetre);
+  EXPECT_EQ(place.georeference.system.epsg, 32611);
+  place = place_from_geotiff(Keys().code(kModel, 32767).code(2048, 4326).placed(), 100);
+  EXPECT_EQ(place.georeference.unit, HorizontalUnit::kDegree);
+  place = place_from_geotiff(Keys().code(kModel, 32767).placed(), 100);
+  EXPECT_EQ(place.georeference.unit, HorizontalUnit::kUnknown);
+}
+
 TEST(GeoTiffPlace, EllipsoidsTellTheBody) {
   const auto system = [](Keys keys) { return place_from_geotiff(keys.placed(), 9).georeference.system; };
   EXPECT_EQ(system(Keys().code(kModel, 2).real(2057, 3396190.0).real(2058, 3396190.0)).body, "Mars");

@@ -99,6 +99,32 @@ TEST_F(OiioModule, ReadsTheChannelAskedFor) {
   EXPECT_EQ(error.what(), path + ": has no channel \"Z\"; it has R, G, B (or 0...2)");
 }
 
+TEST_F(OiioModule, RefusesFilesWhoseNumbersItWouldNotGet) {
+  const auto refuses = [&](const std::string& name, const std::string& bytes, const char* why) {
+    const std::string path = folder_ / name;
+    write_bytes(path, {bytes.data(), bytes.size()});
+    const Error error = error_of([&] { (void)open_source(path, {}); });
+    EXPECT_EQ(error.code(), ErrorCode::kUnsupported);
+    EXPECT_EQ(std::string(error.what()).rfind(path + ": " + why, 0), 0U) << error.what();
+  };
+  refuses("a.pgm", "P2\n# of metres\n2 2\n1000\n0 1 999 1000\n",
+          "the largest value is stated as 1000, and OpenImageIO");
+  refuses("b.pgm", std::string("P5 2 2 4095\n\0\1\0\2\0\3\0\4", 20), "the largest value is stated as 4095");
+  refuses("c.pgm", "P5 2 2 100\nabcd",
+          "the largest value is stated as 100, and OpenImageIO spreads the samples over 0 to 255");
+  std::string fits;
+  for (const char* card :
+       {"SIMPLE  =                    T", "BITPIX  =                   16", "NAXIS   =                    2",
+        "NAXIS1  =                    2", "NAXIS2  =                    2", "END"}) {
+    std::string line = card;
+    line.resize(80, ' ');
+    fits += line;
+  }
+  fits.resize(2880, ' ');
+  fits.resize(5760, '\0');
+  refuses("d.fits", fits, "OpenImageIO displaces the rows of FITS images; store the raster as TIFF or PNG");
+}
+
 TEST_F(OiioModule, AppliesTheOpenOptions) {
   OpenOptions options;
   options.z_scale = 0.5;

@@ -120,13 +120,18 @@ TEST_F(TiffSource, RefusesRotationAndMirrorImages) {
 
 TEST_F(TiffSource, PlacesBySidecarFilesWhereTheTagsDoNot) {
   std::ofstream(folder() / "a.tfw") << "30\n0\n0\n-20\n1000.5\n2000.5\n";
-  std::ofstream(folder() / "a.prj") << "PROJCS[\"somewhere\"]\n";
+  std::ofstream(folder() / "a.prj")
+      << "PROJCS[\"somewhere\",GEOGCS[\"S\",DATUM[\"S\",SPHEROID[\"S\",6378137,298]],"
+         "PRIMEM[\"Greenwich\",0],UNIT[\"Degree\",0.0174532925199433]],UNIT[\"Foot\",0.3048]]\n";
   SourceInfo info = info_of(small());
   EXPECT_EQ(info.georeference.spacing_x, 30);
   EXPECT_EQ(info.georeference.spacing_y, 20);
   EXPECT_EQ(info.georeference.origin_x, 1000.5);
   EXPECT_EQ(info.georeference.origin_y, 2000.5);
-  EXPECT_EQ(info.georeference.system.wkt, "PROJCS[\"somewhere\"]");
+  EXPECT_EQ(info.georeference.system.name, "somewhere");
+  EXPECT_EQ(info.georeference.system.wkt.rfind("PROJCS[\"somewhere\"", 0), 0U);
+  EXPECT_EQ(info.georeference.unit, HorizontalUnit::kMetre);
+  EXPECT_EQ(info.georeference.metres_per_unit, 0.3048);
   info = info_of(small().doubles(33550, {1, 1, 0}).doubles(33922, {0, 0, 0, 5, 6, 0}));
   EXPECT_EQ(info.georeference.spacing_x, 1);
   std::ofstream(folder() / "a.tfw") << "30\n0\n0\n20\n1000.5\n2000.5\n";

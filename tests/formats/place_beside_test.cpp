@@ -1,0 +1,88 @@
+#include "formats/place_beside.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "formats/raster_reference.h"
+#include "formats/registry.h"
+#include "isohf/base/error.h"
+
+namespace isohf::testing {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr const char* kDegrees =
+    R"(GEOGCS["GCS_WGS_1984",DATUM["D_WGS_1984",SPHEROID["WGS_1984",6378137,298.257223563]],PRIMEM["Greenwich",0],UNIT["Degree",0.0174532925199433]])";
+
+/// Pictures that say nothing of their place, and what lies beside them.
+class PlaceBeside : public ::testing::Test {
+ protected:
+  PlaceBeside() { set_module_folder(ISOHF_BIN_DIR); }
+
+  /// A graymap, which OpenImageIO reads.
+  std::string graymap(const std::string& name) {
+    write_bytes(folder_ / name, "P5\n4 2\n255\nabcdefgh");
+    return folder_ / name;
+  }
+  void beside(const std::string& name, const std::string& text) {
+    write_bytes(folder_ / name, {text.data(), text.size()});
+  }
+
+  ScratchFolder folder_;
+};
+
+TEST_F(PlaceBeside, WorldFileAndPrjPlaceAPicture) {
+  beside("a.prj", kDegrees);
+  const std::string data = std::string(ISOHF_SOURCE_DIR) + "/testdata/";
+  std::filesystem::copy_file(data + "peaks_256x256_uint16.png", folder_ / "a.png");
+  std::filesystem::copy_file(data + "ridges_161x161_float.exr", folder_ / "a.exr");
+  (void)graymap("a.pgm");
+  // Read by libpng, OpenEXR and OpenImageIO.
+  for (const auto& [picture, world] : {std::pair("a.png", "a.pgw"), {"a.exr", "a.erw"}, {"a.pgm", "a.pmw"}}) {
+    SCOPED_TRACE(picture);
+    beside(world, "0.5\n0\n0\n-0.25\n10.25\n50\n");
+    const Georeference place = open_source(folder_ / picture, {})->info().georeference;
+    EXPECT_TRUE(place.has_origin);
+    EXPECT_EQ(place.spacing_x, 0.5);
+    EXPECT_EQ(place.spacing_y, 0.25);
+    EXPECT_EQ(place.origin_x, 10.25);
+    EXPECT_EQ(place.origin_y, 50.0);
+    EXPECT_EQ(place.unit, HorizontalUnit::kDegree);
+    EXPECT_EQ(place.system.name, "GCS_WGS_1984");
+    EXPECT_EQ(place.system.semi_major_axis_m, 6378137.0);
+  }
+}
+
+TEST_F(PlaceBeside, PictureWithoutAWorldFileHasNoPlace) {
+  beside("a.prj", kDegrees);
+  const Georeference place = open_source(graymap("a.pgm"), {})->info().georeference;
+  EXPECT_FALSE(place.has_origin);
+  EXPECT_EQ(place.unit, HorizontalUnit::kUnknown);
+}
+
+TEST_F(PlaceBeside, RefusesPicturesWithNorthAtTheBottom) {
+  beside("a.wld", "0.5\n0\n0\n0.25\n10.25\n50\n");
+  const std::string path = graymap("a.pgm");
+  const Error error = error_of([&] { (void)open_source(path, {}); });
+  EXPECT_EQ(error.code(), ErrorCode::kUnsupported);
+  EXPECT_EQ(error.what(), folder_ / "a.wld" + ": dy is positive; rows must run from North to South");
+}
+
+TEST_F(PlaceBeside, SaysWhichWorldFileIsNone) {
+  beside("a.wld", "half a metre");
+  const std::string path = graymap("a.pgm");
+  EXPECT_THAT(error_of([&] { (void)open_source(path, {}); }).what(), HasSubstr("a.wld: is not a world file"));
+}
+
+TEST_F(PlaceBeside, WarnsOfDegreesThatNothingNames) {
+  beside("a.wld", "0.001\n0\n0\n-0.001\n10.25\n50\n");
+  const auto source = open_source(graymap("a.pgm"), {});
+  ASSERT_EQ(source->info().warnings.size(), 1U);
+  EXPECT_THAT(source->info().warnings[0], HasSubstr("look like degrees"));
+}
+
+}  // namespace
+}  // namespace isohf::testing
