@@ -201,7 +201,7 @@ class ExrSource final : public HeightSource {
     }
     describe(path, channels, options.channel.empty());
     open_part();
-    read_place_beside(info_);
+    read_place_beside(info_, channels.size() == 1 ? 1 : 0);
     apply_open_options(info_, options);
   }
 

@@ -41,7 +41,9 @@ std::string attribute(std::string_view tag, std::string_view name) {
   return end == std::string_view::npos ? std::string() : std::string(tag.substr(begin, end - begin));
 }
 
-void apply_item(const std::string& role, const std::string& text, SourceInfo& info) {
+}  // namespace
+
+void read_gdal_item(const std::string& role, const std::string& text, SourceInfo& info) {
   if (role == "unittype") {
     if (text.empty()) return;
     const std::optional<LinearUnit> unit = linear_unit(text);
@@ -51,13 +53,11 @@ void apply_item(const std::string& role, const std::string& text, SourceInfo& in
   }
   const std::optional<double> value = number_from(text);
   if (!value || !std::isfinite(*value) || (role == "scale" && *value == 0.0)) {
-    info.warnings.push_back(fmt::format("GDAL_METADATA gives the {} \"{}\", which is ignored", role, text));
+    info.warnings.push_back(fmt::format("GDAL gives the {} \"{}\", which is ignored", role, text));
     return;
   }
   (role == "scale" ? info.z_scale : info.z_offset) = *value;
 }
-
-}  // namespace
 
 void read_gdal_nodata(const std::string& text, SourceInfo& info) {
   const std::string shown = trimmed(text);
@@ -85,7 +85,7 @@ void read_gdal_metadata(const std::string& xml, int sample, SourceInfo& info) {
     if (text_end == std::string::npos) return;
     const std::string role = attribute(tag, "role");
     if (attribute(tag, "sample") == band && (role == "scale" || role == "offset" || role == "unittype")) {
-      apply_item(role, trimmed(std::string_view(xml).substr(at, text_end - at)), info);
+      read_gdal_item(role, trimmed(std::string_view(xml).substr(at, text_end - at)), info);
     }
     at = text_end;
   }

@@ -42,7 +42,7 @@ class OiioSource final : public HeightSource {
     info_.channel = found.channel;
     if (found.warning[0] != '\0') info_.warnings.emplace_back(found.warning);
     try {
-      read_place_beside(info_);
+      read_place_beside(info_, info_.channel.empty() ? 1 : 0);
       apply_open_options(info_, options);
     } catch (...) {
       module_.close(raster_);

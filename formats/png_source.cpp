@@ -281,7 +281,7 @@ class PngSource final : public HeightSource {
       }
       info_.warnings.emplace_back("the .json beside it names no format, as one of isohf's would: it is left aside");
     }
-    read_place_beside(info_);
+    read_place_beside(info_, packing_ ? 0 : static_cast<int>(channel_) + 1);
   }
 
   /// All channels together are one elevation.

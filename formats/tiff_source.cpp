@@ -12,6 +12,7 @@
 #include <optional>
 #include <vector>
 
+#include "formats/auxiliary_metadata.h"
 #include "formats/gdal_tags.h"
 #include "formats/geotiff_keys.h"
 #include "formats/open_options.h"
@@ -231,6 +232,8 @@ class TiffSource final : public HeightSource {
     place(tags);
     read_gdal_metadata(tags.gdal_metadata, channel_, info_);
     read_gdal_nodata(tags.gdal_nodata, info_);
+    read_files_beside();
+    check_orientation();
     if (is_floating(info_.sample_type) && info_.void_values.empty()) {
       info_.valid_min = -kBeyondAnyHeight;
       info_.valid_max = kBeyondAnyHeight;
@@ -244,11 +247,17 @@ class TiffSource final : public HeightSource {
     info_.metres_per_vertical_unit = place.metres_per_vertical_unit;
     info_.warnings.insert(info_.warnings.end(), place.warnings.begin(), place.warnings.end());
     turned_ = place.rows_from_south;
-    if (!place.placed) place_by_world_file();
-    const ReferenceSystem& system = info_.georeference.system;
-    if (info_.georeference.unit == HorizontalUnit::kUnknown && system.wkt.empty() && !system.epsg) {
-      read_prj_beside(info_);
-    }
+    is_placed_ = place.placed;
+  }
+
+  /// What the tags leave open may stand in other files.
+  void read_files_beside() {
+    read_auxiliary_metadata(info_, channel_ + 1);
+    if (!is_placed_ && !info_.georeference.has_origin) place_by_world_file();
+    if (!has_reference_system(info_.georeference)) read_prj_beside(info_);
+  }
+
+  void check_orientation() {
     if (layout_.orientation == kTopLeft) return;
     if (info_.georeference.has_origin) {
       info_.warnings.push_back(fmt::format(
@@ -288,7 +297,8 @@ class TiffSource final : public HeightSource {
   TiffLayout layout_;
   SourceInfo info_;
   int channel_ = 0;
-  bool turned_ = false;  // the stored rows run from South to North
+  bool is_placed_ = false;  // by its tags, if without an origin
+  bool turned_ = false;     // the stored rows run from South to North
   std::optional<TiffBlocks> blocks_;
 };
 

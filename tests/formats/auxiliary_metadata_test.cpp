@@ -1,0 +1,121 @@
+#include "formats/auxiliary_metadata.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "formats/raster_reference.h"
+#include "isohf/base/error.h"
+
+namespace isohf::testing {
+namespace {
+
+using ::testing::HasSubstr;
+
+/// What GDAL 3.6 writes beside a PNG, shortened; statistics and histograms are what most such files hold.
+constexpr const char* kAll = R"(<PAMDataset>
+  <SRS dataAxisToSRSAxisMapping="2,1">GEOGCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,298.257223563]],UNIT["degree",0.0174532925199433,AUTHORITY["EPSG","9122"]],AUTHORITY["EPSG","4326"]]</SRS>
+  <GeoTransform>  1.0000000000000000e+01,  5.0e-01,  0.0,  5.0e+01,  0.0, -2.5e-01</GeoTransform>
+  <Metadata domain="IMAGE_STRUCTURE"><MDI key="AREA_OR_POINT">Area</MDI></Metadata>
+  <Metadata><MDI key="AREA_OR_POINT">Point</MDI><MDI key="DataType">Generic</MDI></Metadata>
+  <PAMRasterBand band="1">
+    <NoDataValue>1</NoDataValue>
+  </PAMRasterBand>
+  <PAMRasterBand band="2">
+    <Description>a &lt;b&gt;</Description>
+    <NoDataValue>-3.2768E+04</NoDataValue>
+    <UnitType>ft</UnitType>
+    <Offset>100</Offset><Scale>0.1</Scale>
+    <Metadata><MDI key="STATISTICS_MINIMUM">7</MDI></Metadata>
+  </PAMRasterBand>
+</PAMDataset>
+)";
+
+class AuxiliaryMetadata : public ::testing::Test {
+ protected:
+  AuxiliaryMetadata() {
+    info_.path = folder_ / "a.png";
+    info_.sample_type = SampleType::kInt16;
+  }
+  void beside(const std::string& text) { write_bytes(info_.path + ".aux.xml", {text.data(), text.size()}); }
+  Error error_with(const std::string& text) {
+    beside(text);
+    return error_of([&] { read_auxiliary_metadata(info_, 1); });
+  }
+
+  ScratchFolder folder_;
+  SourceInfo info_;
+};
+
+TEST_F(AuxiliaryMetadata, IsNoneWithoutTheFile) {
+  read_auxiliary_metadata(info_, 1);
+  EXPECT_FALSE(info_.georeference.has_origin);
+  EXPECT_TRUE(info_.void_values.empty());
+}
+
+TEST_F(AuxiliaryMetadata, PlacesTheMiddleOfTheFirstPixel) {
+  beside(kAll);
+  read_auxiliary_metadata(info_, 0);
+  const Georeference& place = info_.georeference;
+  ASSERT_TRUE(place.has_origin);
+  EXPECT_EQ(place.origin_x, 10.25);
+  EXPECT_EQ(place.origin_y, 49.875);
+  EXPECT_EQ(place.spacing_x, 0.5);
+  EXPECT_EQ(place.spacing_y, 0.25);
+  EXPECT_EQ(place.registration, Registration::kPoint);
+  EXPECT_EQ(place.unit, HorizontalUnit::kDegree);
+  EXPECT_EQ(place.system.epsg, 4326);
+  EXPECT_TRUE(info_.void_values.empty()) << "of no band";
+}
+
+TEST_F(AuxiliaryMetadata, SaysWhatABandsNumbersMean) {
+  beside(kAll);
+  read_auxiliary_metadata(info_, 2);
+  EXPECT_EQ(info_.void_values, std::vector<double>{-32768.0});
+  EXPECT_EQ(info_.z_scale, 0.1);
+  EXPECT_EQ(info_.z_offset, 100.0);
+  EXPECT_EQ(info_.vertical_unit, "foot");
+  EXPECT_TRUE(info_.warnings.empty());
+}
+
+TEST_F(AuxiliaryMetadata, LeavesWhatTheRasterSaysItself) {
+  beside(kAll);
+  info_.void_values = {5.0};
+  info_.z_scale = 2.0;
+  info_.vertical_unit = "metre";
+  info_.georeference.has_origin = true;
+  info_.georeference.origin_x = 3.0;
+  info_.georeference.unit = HorizontalUnit::kMetre;
+  info_.georeference.registration = Registration::kArea;
+  read_auxiliary_metadata(info_, 2);
+  EXPECT_EQ(info_.void_values, std::vector<double>{5.0});
+  EXPECT_EQ(info_.z_scale, 2.0);
+  EXPECT_EQ(info_.z_offset, 0.0);
+  EXPECT_EQ(info_.vertical_unit, "metre");
+  EXPECT_EQ(info_.georeference.origin_x, 3.0);
+  EXPECT_EQ(info_.georeference.unit, HorizontalUnit::kMetre);
+  EXPECT_EQ(info_.georeference.registration, Registration::kArea);
+}
+
+TEST_F(AuxiliaryMetadata, SaysWhatIsWrongInOneLine) {
+  const std::string path = info_.path + ".aux.xml";
+  EXPECT_EQ(error_with("<PAMDataset>\n<SRS>x</PAMDataset>").what(),
+            path + ": line 2: mismatched tag; remove the file or have GDAL write it anew");
+  EXPECT_THAT(error_with("").what(), HasSubstr("no element found"));
+  Error error = error_with("<PAMDataset><GeoTransform>1, 2, 0, 4, 0</GeoTransform></PAMDataset>");
+  EXPECT_EQ(error.code(), ErrorCode::kCorrupt);
+  EXPECT_EQ(error.what(), path + ": GeoTransform is \"1, 2, 0, 4, 0\", must be six numbers");
+  for (const char* turned : {"1, 2, 0.1, 4, 0, -2", "1, 2, 0, 4, 0.1, -2", "1, -2, 0, 4, 0, -2", "1, 2, 0, 4, 0, 2"}) {
+    error = error_with(std::string("<PAMDataset><GeoTransform>") + turned + "</GeoTransform></PAMDataset>");
+    EXPECT_EQ(error.code(), ErrorCode::kUnsupported) << turned;
+  }
+}
+
+TEST_F(AuxiliaryMetadata, EveryTruncationIsAnError) {
+  const std::string all = kAll;
+  for (std::size_t length = 0; length + 2 < all.size(); ++length) {
+    EXPECT_EQ(error_with(all.substr(0, length)).code(), ErrorCode::kCorrupt) << length;
+  }
+}
+
+}  // namespace
+}  // namespace isohf::testing
