@@ -8,6 +8,7 @@
 #include "isohf/archive/reader.h"
 #include "isohf/archive/writer.h"
 #include "isohf/base/error.h"
+#include "support/temporary_folder.h"
 
 namespace isohf {
 namespace {
@@ -22,7 +23,7 @@ TEST(Archive, BringsBackTilesMembersAndMetadata) {
   for (const CodeType type : {CodeType::kU16, CodeType::kU8, CodeType::kF32}) {
     const TemporaryFolder folder;
     const TileGrid grid = small_grid();
-    const std::string path = folder.file("a.isohf");
+    const std::string path = folder / "a.isohf";
     test::make_archive(path, grid, type);
     EXPECT_EQ(folder.names(), std::vector<std::string>{"a.isohf"});
     const ArchiveReader reader(path);
@@ -44,7 +45,7 @@ TEST(Archive, IsReadByThePageAboutItsFormat) {
   // page_reader.py was written from docs/archive_format.md; it compares content hashes.
   if (std::system("command -v python3 >/dev/null 2>&1") != 0) GTEST_SKIP() << "python3 is not installed";
   const TemporaryFolder folder;
-  const std::string path = folder.file("a.isohf");
+  const std::string path = folder / "a.isohf";
   for (const TileShape& shape : {TileShape::make(5, 5, 1), TileShape::make(12, 11, 3), TileShape::make(24, 29, 1)}) {
     for (const CodeType type : {CodeType::kU16, CodeType::kU8, CodeType::kF32}) {
       std::filesystem::remove(path);
@@ -58,7 +59,7 @@ TEST(Archive, IsReadByThePageAboutItsFormat) {
 TEST(Archive, IsReadByThePageWithPredictorsOfEveryKind) {
   if (std::system("command -v python3 >/dev/null 2>&1") != 0) GTEST_SKIP() << "python3 is not installed";
   const TemporaryFolder folder;
-  const std::string path = folder.file("a.isohf");
+  const std::string path = folder / "a.isohf";
   const TileGrid grid = TileGrid::make(TileShape::make(68, 67, 1), 1, 1, 100.0, 1.0 / 3.0);
   for (const CodeType type : {CodeType::kU16, CodeType::kU8, CodeType::kF32}) {
     for (const int level : {kMinLevel, kDefaultLevel, kMaxLevel}) {

@@ -18,6 +18,7 @@
 #include "isohf/archive/deflate.h"
 #include "isohf/archive/zip_layout.h"
 #include "isohf/base/error.h"
+#include "support/temporary_folder.h"
 
 namespace isohf {
 namespace {
@@ -74,9 +75,9 @@ class ArchiveReaderTest : public testing::Test {
  protected:
   ArchiveReaderTest() : grid_(TileGrid::make(TileShape::make(5, 5, 1), 4, 3, 10.0, 10.0)) {
     test::make_archive(path(), grid_, CodeType::kU16);
-    good_ = test::read_file(path());
+    good_ = test::read_bytes(path());
   }
-  [[nodiscard]] std::string path() const { return folder_.file("a.isohf"); }
+  [[nodiscard]] std::string path() const { return folder_ / "a.isohf"; }
   [[nodiscard]] TileCodes tile(std::int64_t flat) const { return test::tile_of_archive(grid_, CodeType::kU16, flat); }
 
   /// Opens the bytes and reads all there is: what can be read must be right. The error's text where there is one.
@@ -219,13 +220,13 @@ TEST_F(ArchiveReaderTest, ReadsWhatZipMadeOfIt) {
   if (std::system("command -v zip unzip >/dev/null 2>&1") != 0) GTEST_SKIP() << "zip or unzip is not installed";
   for (const char* level : {"-0", "-9"}) {
     test::write_file(path(), good_);
-    const std::string out = folder_.file("out");
+    const std::string out = folder_ / "out";
     ASSERT_EQ(std::system(fmt::format("cd {0} && rm -rf out b.zip && mkdir out && cd out && unzip -q ../a.isohf && "
                                       "zip -q -r {1} ../b.zip .",
-                                      folder_.file("."), level)
+                                      folder_ / ".", level)
                               .c_str()),
               0);
-    EXPECT_EQ(read_all(test::read_file(folder_.file("b.zip"))), "by directory") << level;
+    EXPECT_EQ(read_all(test::read_bytes(folder_ / "b.zip")), "by directory") << level;
   }
 }
 
@@ -331,8 +332,8 @@ TEST_F(ArchiveReaderTest, SaysWhatItIsNot) {
   Parts parts(good_);
   parts.erase("isohf.json");
   EXPECT_THAT(read_all(parts.join()), HasSubstr("no member \"isohf.json\""));
-  EXPECT_THROW(ArchiveReader{folder_.file("absent")}, Error);
-  EXPECT_THROW(ArchiveReader{folder_.file(".")}, Error);
+  EXPECT_THROW(ArchiveReader{folder_ / "absent"}, Error);
+  EXPECT_THROW(ArchiveReader{folder_ / "."}, Error);
 }
 
 TEST_F(ArchiveReaderTest, RefusesTilesOutsideItsGrid) {

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <filesystem>
 #include <random>
 #include <string>
 #include <vector>
@@ -28,23 +27,6 @@ inline constexpr Kind kAllKinds[] = {Kind::kConstant,   Kind::kPlane,     Kind::
 
 /// NaN equals NaN; otherwise bits decide.
 [[nodiscard]] bool same_samples(const TileCodes& a, const TileCodes& b);
-
-/// A fresh folder that goes away with the object.
-class TemporaryFolder {
- public:
-  TemporaryFolder();
-  ~TemporaryFolder();
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-  [[nodiscard]] std::string file(const std::string& name) const { return (path_ / name).string(); }
-  [[nodiscard]] std::vector<std::string> names() const;  ///< sorted
-
- private:
-  std::filesystem::path path_;
-};
-
-[[nodiscard]] std::vector<std::byte> read_file(const std::string& path);
-void write_file(const std::string& path, const std::vector<std::byte>& bytes);
 
 /// Metadata for that grid with every member filled in.
 [[nodiscard]] Metadata make_metadata(const TileGrid& grid, CodeType type);

@@ -11,6 +11,7 @@
 #include "archive/tiles.h"
 #include "isohf/archive/reader.h"
 #include "isohf/base/error.h"
+#include "support/temporary_folder.h"
 
 namespace isohf {
 namespace {
@@ -66,20 +67,20 @@ TEST(ArchiveWriter, RefusesTargetsThatItMustNotWrite) {
   const TemporaryFolder folder;
   const TileGrid grid = small_grid();
   const auto open = [&](const std::string& path) { return [&grid, path] { ArchiveWriter(path, grid, {}); }; };
-  test::write_file(folder.file("there"), {std::byte{1}});
-  EXPECT_EQ(code_of(open(folder.file("there")), "--overwrite"), ErrorCode::kInvalidArgument);
-  EXPECT_EQ(code_of(open(folder.file(".")), "folder"), ErrorCode::kInvalidArgument);
-  EXPECT_EQ(code_of(open(folder.file("no/such")), "no/such"), ErrorCode::kIo);
+  test::write_file(folder / "there", "x");
+  EXPECT_EQ(code_of(open(folder / "there"), "--overwrite"), ErrorCode::kInvalidArgument);
+  EXPECT_EQ(code_of(open(folder / "."), "folder"), ErrorCode::kInvalidArgument);
+  EXPECT_EQ(code_of(open(folder / "no/such"), "no/such"), ErrorCode::kIo);
   EXPECT_EQ(code_of(open("/dev/null"), "/dev/null"), ErrorCode::kInvalidArgument);
   EXPECT_THAT(folder.names(), ElementsAre("there"));
-  EXPECT_EQ(test::read_file(folder.file("there")).size(), 1U);
+  EXPECT_EQ(test::read_bytes(folder / "there").size(), 1U);
 }
 
 TEST(ArchiveWriter, LeavesNothingWhereItIsNotFinished) {
   const TemporaryFolder folder;
   const TileGrid grid = small_grid();
   {
-    ArchiveWriter writer(folder.file("a"), grid, {});
+    ArchiveWriter writer(folder / "a", grid, {});
     add_tiles(writer, grid, 7);
     EXPECT_THAT(folder.names(), ElementsAre("a.part", "a.part.journal"));
   }
@@ -89,44 +90,44 @@ TEST(ArchiveWriter, LeavesNothingWhereItIsNotFinished) {
 TEST(ArchiveWriter, LetsOneProcessWriteATarget) {
   const TemporaryFolder folder;
   const TileGrid grid = small_grid();
-  ArchiveWriter writer(folder.file("a"), grid, {});
+  ArchiveWriter writer(folder / "a", grid, {});
   for (const bool resume : {false, true}) {
     EXPECT_EQ(code_of(
                   [&] {
-                    ArchiveWriter(folder.file("a"), grid, {true, resume, ""});
+                    ArchiveWriter(folder / "a", grid, {true, resume, ""});
                   },
                   "another process"),
               ErrorCode::kIo);
   }
   complete(writer, grid);  // unharmed
-  EXPECT_EQ(ArchiveReader(folder.file("a")).check_structure(), std::vector<std::string>{});
+  EXPECT_EQ(ArchiveReader(folder / "a").check_structure(), std::vector<std::string>{});
 }
 
 TEST(ArchiveWriter, KeepsWhatSomebodyElseMadeMeanwhile) {
   const TemporaryFolder folder;
   const TileGrid grid = small_grid();
   {
-    ArchiveWriter writer(folder.file("a"), grid, {});
-    test::write_file(folder.file("a"), {std::byte{1}});
+    ArchiveWriter writer(folder / "a", grid, {});
+    test::write_file(folder / "a", "x");
     EXPECT_EQ(code_of([&] { complete(writer, grid); }, "meanwhile"), ErrorCode::kIo);
   }
-  EXPECT_EQ(test::read_file(folder.file("a")).size(), 1U);
-  EXPECT_EQ(ArchiveReader(folder.file("a.part")).check_structure(), std::vector<std::string>{});
+  EXPECT_EQ(test::read_bytes(folder / "a").size(), 1U);
+  EXPECT_EQ(ArchiveReader(folder / "a.part").check_structure(), std::vector<std::string>{});
 }
 
 TEST(ArchiveWriter, ReplacesWhereItMay) {
   const TemporaryFolder folder;
   const TileGrid grid = small_grid();
-  test::write_file(folder.file("a"), {std::byte{1}});
-  ArchiveWriter writer(folder.file("a"), grid, {true, false, ""});
+  test::write_file(folder / "a", "x");
+  ArchiveWriter writer(folder / "a", grid, {true, false, ""});
   complete(writer, grid);
   EXPECT_THAT(folder.names(), ElementsAre("a"));
-  EXPECT_EQ(ArchiveReader(folder.file("a")).metadata().tiles_stored, 18);
+  EXPECT_EQ(ArchiveReader(folder / "a").metadata().tiles_stored, 18);
 }
 
 TEST(ArchiveWriter, RefusesMembersWithBadOrTakenNames) {
   const TemporaryFolder folder;
-  ArchiveWriter writer(folder.file("a"), small_grid(), {});
+  ArchiveWriter writer(folder / "a", small_grid(), {});
   writer.add_member("good", {}, false);
   for (const char* name : {"", "/a", "a/", "..", "a/../b", "./a", "a//b", "a\\b", "c:a", "a\nb", "good", "isohf.json",
                            "index.bin", "tiles/0/0.tile"}) {
@@ -137,7 +138,7 @@ TEST(ArchiveWriter, RefusesMembersWithBadOrTakenNames) {
 TEST(ArchiveWriter, SaysWhereTheMetadataDoNotFit) {
   const TemporaryFolder folder;
   const TileGrid grid = small_grid();
-  ArchiveWriter writer(folder.file("a"), grid, {});
+  ArchiveWriter writer(folder / "a", grid, {});
   add_tiles(writer, grid, 20);
   Metadata metadata = test::make_metadata(grid, CodeType::kU16);
   metadata.source.crs_wkt = std::string(20000, 'x');
@@ -148,12 +149,12 @@ TEST(ArchiveWriter, SaysWhereTheMetadataDoNotFit) {
 class Resume : public testing::Test {
  protected:
   Resume() : grid_(small_grid()) {
-    ArchiveWriter writer(folder_.file("whole"), grid_, {false, false, "job"});
+    ArchiveWriter writer(folder_ / "whole", grid_, {false, false, "job"});
     complete(writer, grid_);
-    whole_ = test::read_file(folder_.file("whole"));
+    whole_ = test::read_bytes(folder_ / "whole");
   }
   void stop_at(std::int64_t tiles) {
-    ArchiveWriter writer(folder_.file("a"), grid_, {true, false, "job"});
+    ArchiveWriter writer(folder_ / "a", grid_, {true, false, "job"});
     add_tiles(writer, grid_, tiles);
     writer.keep_part();
   }
@@ -161,16 +162,16 @@ class Resume : public testing::Test {
   std::int64_t go_on() {
     std::int64_t first = 0;
     {
-      ArchiveWriter writer(folder_.file("a"), grid_, {true, true, "job"});
+      ArchiveWriter writer(folder_ / "a", grid_, {true, true, "job"});
       first = writer.next_tile();
       complete(writer, grid_);
     }
-    EXPECT_EQ(test::read_file(folder_.file("a")), whole_);
+    EXPECT_EQ(test::read_bytes(folder_ / "a"), whole_);
     EXPECT_THAT(folder_.names(), ElementsAre("a", "whole"));
     return first;
   }
-  [[nodiscard]] std::string part() const { return folder_.file("a.part"); }
-  [[nodiscard]] std::string journal() const { return folder_.file("a.part.journal"); }
+  [[nodiscard]] std::string part() const { return folder_ / "a.part"; }
+  [[nodiscard]] std::string journal() const { return folder_ / "a.part.journal"; }
 
   TemporaryFolder folder_;
   TileGrid grid_;
@@ -190,8 +191,8 @@ TEST_F(Resume, StartsOverWhereThereIsNothing) {
 
 TEST_F(Resume, SurvivesEveryLengthOfAJournal) {
   stop_at(9);
-  const std::vector<std::byte> part_bytes = test::read_file(part());
-  const std::vector<std::byte> journal_bytes = test::read_file(journal());
+  const std::vector<std::byte> part_bytes = test::read_bytes(part());
+  const std::vector<std::byte> journal_bytes = test::read_bytes(journal());
   std::int64_t before = 0;
   for (std::size_t size = 0; size <= journal_bytes.size(); size += 7) {
     test::write_file(part(), part_bytes);
@@ -204,8 +205,8 @@ TEST_F(Resume, SurvivesEveryLengthOfAJournal) {
 
 TEST_F(Resume, GoesBackToTheLastTileThatIsWhole) {
   stop_at(9);
-  const std::vector<std::byte> part_bytes = test::read_file(part());
-  const std::vector<std::byte> journal_bytes = test::read_file(journal());
+  const std::vector<std::byte> part_bytes = test::read_bytes(part());
+  const std::vector<std::byte> journal_bytes = test::read_bytes(journal());
   for (std::size_t at = 16000; at < part_bytes.size(); at += 61) {
     for (const bool cut : {false, true}) {
       std::vector<std::byte> damaged = part_bytes;
@@ -223,32 +224,32 @@ TEST_F(Resume, GoesBackToTheLastTileThatIsWhole) {
 
 TEST_F(Resume, RefusesThePartOfAnotherJob) {
   stop_at(5);
-  const std::vector<std::byte> before = test::read_file(part());
+  const std::vector<std::byte> before = test::read_bytes(part());
   EXPECT_EQ(code_of(
                 [&] {
-                  ArchiveWriter(folder_.file("a"), grid_, {true, true, "other"});
+                  ArchiveWriter(folder_ / "a", grid_, {true, true, "other"});
                 },
                 "other"),
             ErrorCode::kInvalidArgument);
-  EXPECT_EQ(test::read_file(part()), before);
+  EXPECT_EQ(test::read_bytes(part()), before);
   EXPECT_EQ(go_on(), 5);
 }
 
 TEST_F(Resume, DropsAnOldPartWithoutBeingAsked) {
   stop_at(5);
   {
-    ArchiveWriter writer(folder_.file("a"), grid_, {true, false, "job"});
+    ArchiveWriter writer(folder_ / "a", grid_, {true, false, "job"});
     EXPECT_EQ(writer.next_tile(), 0);
     complete(writer, grid_);
   }
-  EXPECT_EQ(test::read_file(folder_.file("a")), whole_);
+  EXPECT_EQ(test::read_bytes(folder_ / "a"), whole_);
 }
 
 TEST_F(Resume, GoesOnAfterAKill) {
   const pid_t child = ::fork();
   ASSERT_GE(child, 0);
   if (child == 0) {
-    ArchiveWriter writer(folder_.file("a"), grid_, {true, false, "job"});
+    ArchiveWriter writer(folder_ / "a", grid_, {true, false, "job"});
     add_tiles(writer, grid_, 13);
     ::kill(::getpid(), SIGKILL);
   }
@@ -271,7 +272,7 @@ TEST(ArchiveWriter, SaysThatTheDiskIsFullAndLeavesNothing) {
     ::setrlimit(RLIMIT_FSIZE, &limit);
     int result = 1;
     try {
-      ArchiveWriter writer(folder.file("a"), grid, {});
+      ArchiveWriter writer(folder / "a", grid, {});
       const EncodedTile tile =
           encode_tile(grid.shape(), test::make_tile(grid.shape(), CodeType::kU16, test::Kind::kNoise, 1));
       while (writer.next_tile() < grid.tile_count()) writer.add_tile(tile);

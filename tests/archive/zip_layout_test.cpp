@@ -10,6 +10,7 @@
 #include "isohf/archive/reader.h"
 #include "isohf/archive/tile_index.h"
 #include "isohf/base/error.h"
+#include "support/temporary_folder.h"
 
 namespace isohf {
 namespace {
@@ -92,7 +93,7 @@ void write_at(const std::string& path, std::uint64_t offset, const std::vector<s
 TEST(ZipLayout, ReachesTilesBeyondFourGibibytes) {
   // metadata, five GiB of a hole as a member, one tile, the index.
   const test::TemporaryFolder folder;
-  const std::string path = folder.file("large.isohf");
+  const std::string path = folder / "large.isohf";
   const TileGrid grid = TileGrid::make(TileShape::make(12, 11, 3), 1, 1, 1.0, 1.0);
   const TileCodes tile = test::make_tile(grid.shape(), CodeType::kU16, test::Kind::kTerrain, 1);
   const EncodedTile encoded = encode_tile(grid.shape(), tile);

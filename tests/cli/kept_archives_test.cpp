@@ -10,6 +10,7 @@
 
 #include "formats/registry.h"
 #include "support/run_program.h"
+#include "support/samples.h"
 #include "support/temporary_folder.h"
 
 namespace isohf::test {
@@ -29,11 +30,7 @@ const std::map<std::string, std::string> kContents = {
 };
 
 std::vector<std::byte> samples_of(const std::string& path) {
-  const auto source = open_source(path, {});
-  const SourceInfo& info = source->info();
-  std::vector<std::byte> samples(static_cast<std::size_t>(info.width * info.height) * size_bytes(info.sample_type));
-  source->read_window({0, 0, info.width, info.height}, samples);
-  return samples;
+  return read_whole(*open_source(path, {}));
 }
 
 TEST(KeptArchives, AreAllKnown) {

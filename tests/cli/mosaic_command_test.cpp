@@ -16,11 +16,6 @@
 namespace isohf::test {
 namespace {
 
-using isohf::testing::CutRaster;
-using isohf::testing::placed_spec;
-using isohf::testing::ragged_cut;
-using isohf::testing::regular_cut;
-using isohf::testing::write_pieces;
 using nlohmann::json;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
@@ -31,7 +26,7 @@ using Words = std::vector<std::string>;
 CutRaster hills(const RasterSpec& like) {
   RasterSpec spec = like;
   spec.void_value = -9999.0;
-  return isohf::testing::raster_of<std::int16_t>(spec, [](std::int64_t column, std::int64_t row) {
+  return raster_of<std::int16_t>(spec, [](std::int64_t column, std::int64_t row) {
     const auto c = static_cast<double>(column);
     const auto r = static_cast<double>(row);
     if (std::hypot(c - 120.0, r - 60.0) < 13.0) return -9999.0;

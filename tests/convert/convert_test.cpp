@@ -4,8 +4,6 @@
 
 #include <cmath>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <limits>
 #include <random>
 #include <string>
@@ -17,6 +15,7 @@
 #include "isohf/verify/against_source.h"
 #include "isohf/verify/verify.h"
 #include "support/memory_source.h"
+#include "support/temporary_folder.h"
 
 namespace isohf {
 namespace {
@@ -25,15 +24,7 @@ namespace fs = std::filesystem;
 
 class Convert : public testing::Test {
  protected:
-  void SetUp() override {
-    folder_ = fs::path(testing::TempDir()) /
-              (std::string("isohf_convert_") + testing::UnitTest::GetInstance()->current_test_info()->name());
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
-  [[nodiscard]] std::string path(const std::string& name) const { return (folder_ / name).string(); }
+  [[nodiscard]] std::string path(const std::string& name) const { return folder_ / name; }
 
   static ConvertOptions small_tiles(Filter filter = Filter::kBilinear) {
     ConvertOptions options;
@@ -49,12 +40,7 @@ class Convert : public testing::Test {
     return convert(source, output, options, {}, cancel);
   }
 
-  static std::string bytes_of(const std::string& file) {
-    std::ifstream in(file, std::ios::binary);
-    return {std::istreambuf_iterator<char>(in), {}};
-  }
-
-  fs::path folder_;
+  const test::TemporaryFolder folder_;
 };
 
 test::MemorySource<std::int16_t> hills(std::int64_t width = 90, std::int64_t height = 75) {
@@ -137,7 +123,7 @@ TEST_F(Convert, TheBytesAreTheSameForAnyNumberOfThreads) {
       options.threads = threads;
       options.overwrite = true;
       (void)run(source, path("t.isohf"), options);
-      const std::string bytes = bytes_of(path("t.isohf"));
+      const std::string bytes = test::read_file(path("t.isohf"));
       if (first.empty()) first = bytes;
       EXPECT_TRUE(bytes == first) << threads << " threads, " << to_string(filter);
     }
@@ -209,7 +195,7 @@ TEST_F(Convert, NothingButVoidsIsRefusedAndLeavesNothing) {
   test::MemorySource<float> source(SampleType::kFloat32, 30, 30,
                                    [](std::int64_t, std::int64_t) { return std::numeric_limits<double>::quiet_NaN(); });
   EXPECT_THROW((void)run(source, path("nan.isohf"), small_tiles()), Error);
-  EXPECT_TRUE(fs::is_empty(folder_));
+  EXPECT_TRUE(fs::is_empty(folder_.path()));
 }
 
 TEST_F(Convert, ACancelledJobIsResumedToTheSameBytes) {
@@ -232,7 +218,7 @@ TEST_F(Convert, ACancelledJobIsResumedToTheSameBytes) {
   ConvertOptions again = options;
   again.resume = true;
   (void)run(source, path("parts.isohf"), again);
-  EXPECT_TRUE(bytes_of(path("parts.isohf")) == bytes_of(path("whole.isohf")));
+  EXPECT_TRUE(test::read_file(path("parts.isohf")) == test::read_file(path("whole.isohf")));
 }
 
 TEST_F(Convert, ValuesThatLookLikeFractionsAreWarnedOf) {

@@ -7,10 +7,13 @@
 
 #include "formats/ascii_grid_source.h"
 #include "formats/raster_reference.h"
-#include "formats/real_files.h"
+#include "formats/reader_failure.h"
 #include "isohf/base/error.h"
+#include "support/real_files.h"
+#include "support/samples.h"
+#include "support/temporary_folder.h"
 
-namespace isohf::testing {
+namespace isohf::test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -30,33 +33,23 @@ class AsciiGrid : public ::testing::Test {
     return error_of([&] { (void)open(text); });
   }
 
-  [[nodiscard]] std::vector<double> values(HeightSource& source) const {
-    const auto raw = read_whole(source);
-    std::vector<double> all;
-    for (std::size_t i = 0; i < raw.size() / size_bytes(source.info().sample_type); ++i) {
-      all.push_back(value_at(source.info().sample_type, raw, i));
-    }
-    return all;
-  }
-
-  [[nodiscard]] std::vector<double> values(const std::string& text) const { return values(*open(text)); }
+  [[nodiscard]] std::vector<double> values(const std::string& text) const { return values_of(*open(text)); }
 
   [[nodiscard]] std::string write(const std::string& text, const std::string& name = "grid.asc") const {
-    std::filesystem::remove(folder_ / name);
-    write_bytes(folder_ / name, {text.data(), text.size()});
+    write_file(folder_ / name, text);
     return folder_ / name;
   }
 
-  ScratchFolder folder_;
+  TemporaryFolder folder_;
 };
 
 TEST_F(AsciiGrid, DeliversRealFilesAsTheReferenceDoes) {
   const auto files = real_files({".asc"});
-  if (files.empty()) GTEST_SKIP() << "the real files are not there";
+  if (files.empty()) GTEST_SKIP() << kNoRealFiles;
   for (const auto& file : files) {
     SCOPED_TRACE(file.string());
     const auto source = open_source(file.string(), {});
-    expect_as_reference(*source, reference_of(file), false);
+    expect_as_reference(*source, reference_of(file));
     EXPECT_EQ(source->info().format, "ESRI ASCII grid");
   }
 }
@@ -69,7 +62,7 @@ TEST_F(AsciiGrid, ReadsWholeNumbersAsIntegers) {
   EXPECT_EQ(info.sample_type, SampleType::kInt32);
   EXPECT_THAT(info.void_values, ElementsAre(-9999.0));
   EXPECT_THAT(info.warnings, IsEmpty());
-  EXPECT_THAT(values(*source), ElementsAre(1, 2, 3, 4, 5, -9999));
+  EXPECT_THAT(values_of(*source), ElementsAre(1, 2, 3, 4, 5, -9999));
   const Georeference& place = info.georeference;
   EXPECT_EQ(place.registration, Registration::kArea);
   EXPECT_EQ(place.unit, HorizontalUnit::kUnknown);
@@ -81,7 +74,7 @@ TEST_F(AsciiGrid, ReadsWholeNumbersAsIntegers) {
 TEST_F(AsciiGrid, ChoosesTheSampleTypeThatHoldsEveryNumber) {
   const auto type_of = [&](const std::string& number) {
     const auto source = open("ncols 2\nnrows 1\n7 " + number + "\n");
-    EXPECT_THAT(values(*source), ElementsAre(7, std::stod(number))) << number;
+    EXPECT_THAT(values_of(*source), ElementsAre(7, std::stod(number))) << number;
     return source->info().sample_type;
   };
   for (const char* number : {"2147483647", "-2147483648", "+5", "-0", "12.", "12.000", "0000000000012"}) {
@@ -103,7 +96,7 @@ TEST_F(AsciiGrid, TakesTheHeaderInAnyOrderAndCase) {
   EXPECT_EQ(info.georeference.spacing_x, 2.5);
   EXPECT_EQ(info.georeference.registration, Registration::kArea);
   EXPECT_THAT(info.void_values, ElementsAre(-1.5));
-  EXPECT_THAT(values(*source), ElementsAre(1, 2, 3, 4, 5, 6.5));
+  EXPECT_THAT(values_of(*source), ElementsAre(1, 2, 3, 4, 5, 6.5));
 }
 
 TEST_F(AsciiGrid, TakesTheVoidValueInAnySpelling) {
@@ -140,7 +133,7 @@ TEST_F(AsciiGrid, BreaksLinesAnywhere) {
 TEST_F(AsciiGrid, ReadsDecimalCommasAndSaysSo) {
   const auto source = open("ncols 3\nnrows 1\nxllcorner 1,5\nyllcorner 0\ncellsize 0,5\n1,25 -2,5 7\n");
   EXPECT_EQ(source->info().georeference.origin_x, 1.75);
-  EXPECT_THAT(values(*source), ElementsAre(1.25, -2.5, 7));
+  EXPECT_THAT(values_of(*source), ElementsAre(1.25, -2.5, 7));
   ASSERT_EQ(source->info().warnings.size(), 1U);
   EXPECT_THAT(source->info().warnings[0], HasSubstr("decimal commas"));
   EXPECT_THAT(refusal("ncols 3\nnrows 1\n1,5 2.5 3\n").what(), HasSubstr("line 3: \"2.5\" has a decimal point"));
@@ -226,8 +219,8 @@ TEST_F(AsciiGrid, ReadsAGrassHeader) {
   EXPECT_EQ(info.georeference.origin_y, 195.0);
   ASSERT_EQ(info.sample_type, SampleType::kFloat64);
   const auto all = read_whole(*source);
-  EXPECT_EQ(raw_value(info.sample_type, all.data() + 32), 5.0);
-  EXPECT_TRUE(std::isnan(raw_value(info.sample_type, all.data() + 40)));
+  EXPECT_EQ(value_at(info.sample_type, all, 4), 5.0);
+  EXPECT_TRUE(std::isnan(value_at(info.sample_type, all, 5)));
   EXPECT_THAT(info.warnings, IsEmpty());
 }
 
@@ -243,7 +236,7 @@ TEST_F(AsciiGrid, ReadsGrassNullTypeMultiplierAndDegrees) {
   EXPECT_EQ(info.georeference.spacing_y, 0.25);
   EXPECT_EQ(info.georeference.origin_x, -0.25);
   EXPECT_EQ(info.georeference.origin_y, 45.375);
-  EXPECT_EQ(raw_value(SampleType::kInt32, read_whole(*whole).data() + 20), 6.0);
+  EXPECT_EQ(value_at(SampleType::kInt32, read_whole(*whole), 5), 6.0);
 }
 
 TEST_F(AsciiGrid, RefusesAGrassHeaderThatIsWrong) {
@@ -310,7 +303,7 @@ TEST_F(AsciiGrid, DeliversEveryWindowInAnyOrder) {
       for (std::int64_t column = 0; column < 7; ++column) {
         for (std::int64_t rows = 1; rows <= 5 - row; ++rows) {
           for (std::int64_t columns = 1; columns <= 7 - column; ++columns) {
-            const auto part = testing::read_window(*source, {column, row, columns, rows});
+            const auto part = read_window(*source, {column, row, columns, rows});
             for (std::int64_t i = 0; i < columns * rows; ++i) {
               const auto at = static_cast<std::size_t>((row + i / columns) * 7 + column + i % columns);
               ASSERT_EQ(0, std::memcmp(part.data() + static_cast<std::size_t>(i) * size, all.data() + at * size, size));
@@ -331,7 +324,7 @@ TEST_F(AsciiGrid, FindsRowsOfALongFile) {
   std::mt19937 random(1);
   for (int i = 0; i < 200; ++i) {
     const auto row = static_cast<std::int64_t>(random() % kRows);
-    const auto pair = testing::read_window(*source, {0, row, 2, 1});
+    const auto pair = read_window(*source, {0, row, 2, 1});
     ASSERT_EQ(value_at(SampleType::kInt32, pair, 0), static_cast<double>(row));
     ASSERT_EQ(value_at(SampleType::kInt32, pair, 1), static_cast<double>(-row));
   }
@@ -374,7 +367,7 @@ TEST_F(AsciiGrid, SurvivesDamage) {
     }
     try {
       const auto source = open_ascii_grid(write(damaged), {});
-      EXPECT_EQ(values(*source).size(), static_cast<std::size_t>(source->info().width * source->info().height));
+      EXPECT_EQ(values_of(*source).size(), static_cast<std::size_t>(source->info().width * source->info().height));
       ++opened;
     } catch (const Error& error) {
       EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos) << error.what();
@@ -384,4 +377,4 @@ TEST_F(AsciiGrid, SurvivesDamage) {
 }
 
 }  // namespace
-}  // namespace isohf::testing
+}  // namespace isohf::test

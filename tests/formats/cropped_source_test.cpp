@@ -4,10 +4,11 @@
 #include <gtest/gtest.h>
 
 #include "formats/mosaic_pieces.h"
-#include "formats/raster_reference.h"
 #include "isohf/base/error.h"
+#include "support/samples.h"
+#include "support/temporary_folder.h"
 
-namespace isohf::testing {
+namespace isohf::test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -69,7 +70,7 @@ TEST(CroppedSource, BoxesOutsideOrWrongAreRefused) {
 }
 
 TEST(CroppedSource, HasTheSamplesOfItsPartOfFileAndMosaic) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const CutRaster raster = noise_raster(placed_spec(80, 70, SampleType::kInt16, Registration::kArea));
   raster.cut(folder / "whole.tif", {0, 0, 80, 70});
   const std::vector<std::string> pieces = write_pieces(raster, folder / "", ragged_cut(80, 70, 7, 12));
@@ -101,7 +102,7 @@ TEST(CroppedSource, HasTheSamplesOfItsPartOfFileAndMosaic) {
 }
 
 TEST(CroppedSource, HolesElsewhereDoNotMatter) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const CutRaster raster = noise_raster(placed_spec(60, 20, SampleType::kUint16, Registration::kArea));
   const auto pieces = write_pieces(raster, folder / "", {{0, 0, 20, 20}, {40, 0, 20, 20}});
   const double x = 500000.0;
@@ -116,4 +117,4 @@ TEST(CroppedSource, HolesElsewhereDoNotMatter) {
 }
 
 }  // namespace
-}  // namespace isohf::testing
+}  // namespace isohf::test

@@ -6,10 +6,12 @@
 #include <random>
 
 #include "formats/dted_source.h"
+#include "formats/raster_reference.h"
 #include "formats/reader_failure.h"
-#include "formats/real_files.h"
-#include "formats/scratch_folder.h"
 #include "isohf/base/error.h"
+#include "support/real_files.h"
+#include "support/samples.h"
+#include "support/temporary_folder.h"
 
 namespace isohf {
 namespace {
@@ -57,31 +59,33 @@ std::string cell(int columns = 4, int posts = 5) {
   return bytes;
 }
 
-class Dted : public testing::ScratchFolder {
+class Dted : public testing::Test {
  protected:
   std::string write(const std::string& bytes) const {
-    const std::string path = testing::fresh(folder() / "n43.dt0");
-    testing::write_bytes(path, bytes);
+    const std::string path = folder_ / "n43.dt0";
+    test::write_file(path, bytes);
     return path;
   }
 
   /// What opening and reading all of it says; empty where it works.
   std::string failure(const std::string& bytes, ErrorCode* code = nullptr) const {
     const std::string path = write(bytes);
-    return testing::failure_of(path, code, [&] {
+    return test::failure_of(path, code, [&] {
       const auto source = open_dted(path, {});
-      (void)testing::read_all(*source);
+      (void)test::read_whole(*source);
     });
   }
+
+  const test::TemporaryFolder folder_;
 };
 
 TEST_F(Dted, DeliversRealCellsAsTheReferenceDoes) {
-  const auto files = testing::real_files({".dt0", ".dt1", ".dt2"});
-  if (files.empty()) GTEST_SKIP() << "the real files are not there";
+  const auto files = test::real_files({".dt0", ".dt1", ".dt2"});
+  if (files.empty()) GTEST_SKIP() << test::kNoRealFiles;
   for (const auto& file : files) {
     SCOPED_TRACE(file.string());
     const auto source = open_source(file.string(), {});
-    testing::expect_as_reference(*source, testing::reference_of(file), false);
+    test::expect_as_reference(*source, test::reference_of(file));
     EXPECT_EQ(source->info().format, "DTED");
     EXPECT_EQ(source->info().vertical_unit, "metre");
     EXPECT_EQ(source->info().georeference.system.body, "Earth");
@@ -105,7 +109,7 @@ TEST_F(Dted, TurnsColumnsIntoRowsFromTheNorth) {
           std::vector<std::byte> part(static_cast<std::size_t>(columns * rows) * 2);
           source->read_window({c, r, columns, rows}, part);
           for (int i = 0; i < columns * rows; ++i) {
-            EXPECT_EQ(testing::value_at(SampleType::kInt16, part, static_cast<std::size_t>(i)),
+            EXPECT_EQ(test::value_at(SampleType::kInt16, part, static_cast<std::size_t>(i)),
                       height_at(c + i % columns, 4 - (r + i / columns)));
           }
         }

@@ -13,10 +13,14 @@
 
 #include "formats/exr_source.h"
 #include "formats/raster_reference.h"
+#include "formats/reader_failure.h"
 #include "formats/registry.h"
 #include "isohf/base/error.h"
+#include "support/real_files.h"
+#include "support/samples.h"
+#include "support/temporary_folder.h"
 
-namespace isohf::testing {
+namespace isohf::test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -135,7 +139,7 @@ void expect_reads_as(const std::string& path, const Picture& picture) {
 }
 
 TEST(ExrSource, ReadsEverySampleTypeCompressionAndLayout) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const std::string path = folder / "picture.exr";
   for (const Imf::PixelType type : {Imf::HALF, Imf::FLOAT, Imf::UINT}) {
     for (const Imf::Compression compression : {Imf::NO_COMPRESSION, Imf::RLE_COMPRESSION, Imf::ZIPS_COMPRESSION,
@@ -163,7 +167,7 @@ TEST(ExrSource, ReadsEverySampleTypeCompressionAndLayout) {
 }
 
 TEST(ExrSource, ReadsLossyHalvesAsTheLibraryDecodesThem) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   for (const Imf::Compression compression :
        {Imf::B44_COMPRESSION, Imf::B44A_COMPRESSION, Imf::DWAA_COMPRESSION, Imf::DWAB_COMPRESSION}) {
     Picture picture;
@@ -184,7 +188,7 @@ TEST(ExrSource, ReadsLossyHalvesAsTheLibraryDecodesThem) {
 }
 
 TEST(ExrSource, TakesTheDataWindowWhereverItLies) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   for (const Imath::V2i& origin : {Imath::V2i(30, 40), Imath::V2i(-500, -7), Imath::V2i(-3, 1000000)}) {
     for (const int tile_size : {0, 8}) {
       Picture picture;
@@ -198,7 +202,7 @@ TEST(ExrSource, TakesTheDataWindowWhereverItLies) {
 }
 
 TEST(ExrSource, WarnsWhenTheDisplayWindowDiffers) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const std::string path = folder / "windows.exr";
   Picture picture;
   Samples samples(picture);
@@ -215,7 +219,7 @@ TEST(ExrSource, WarnsWhenTheDisplayWindowDiffers) {
 }
 
 TEST(ExrSource, PrefersElevationChannelsAndSaysSo) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const std::vector<std::pair<std::vector<std::string>, std::string>> cases = {
       {{"A", "B", "G", "R"}, "R"}, {{"R", "Y"}, "Y"},          {{"R", "Z"}, "Z"},        {{"mask", "height"}, "height"},
       {{"G", "A"}, "A"},           {{"a.mask", "b.Z"}, "b.Z"}, {{"B", "depth"}, "depth"}};
@@ -233,7 +237,7 @@ TEST(ExrSource, PrefersElevationChannelsAndSaysSo) {
 }
 
 TEST(ExrSource, ReadsTheChannelAskedForByNameOrNumber) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const std::string path = folder / "channels.exr";
   Picture picture;
   picture.channels = {"B", "G", "R"};
@@ -251,7 +255,7 @@ TEST(ExrSource, ReadsTheChannelAskedForByNameOrNumber) {
 }
 
 TEST(ExrSource, ListsTheChannelsWhenTheOneAskedForIsMissing) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const std::string path = folder / "channels.exr";
   Picture picture;
   picture.channels = {"B", "G", "R"};
@@ -266,7 +270,7 @@ TEST(ExrSource, ListsTheChannelsWhenTheOneAskedForIsMissing) {
 }
 
 TEST(ExrSource, ReadsPartsOfAMultiPartFile) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const std::string path = folder / "parts.exr";
   std::vector<Picture> pictures(3);
   pictures[0].channels = {"mask"};
@@ -335,12 +339,12 @@ TEST(ExrSource, ReadsPartsOfAMultiPartFile) {
   EXPECT_THAT(error_of([&] { (void)open_exr(path, wrong); }).what(), HasSubstr("has no part \"sky\""));
   wrong.part = "3";
   EXPECT_THAT(error_of([&] { (void)open_exr(path, wrong); }).what(), HasSubstr("in parts 0...2"));
-  write_bytes(folder / "a.asc", "ncols 1\nnrows 1\n1\n");
+  write_file(folder / "a.asc", "ncols 1\nnrows 1\n1\n");
   EXPECT_THAT(error_of([&] { (void)open_source(folder / "a.asc", wrong); }).what(), HasSubstr("--part is for OpenEXR"));
 }
 
 TEST(ExrSource, RefusesSubsampledChannelsOnly) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const std::string path = folder / "chroma.exr";
   Picture picture;
   picture.width = picture.height = 8;
@@ -375,7 +379,7 @@ void expect_right_or_refused(const std::string& path, const std::vector<std::byt
 }
 
 TEST(ExrSource, ReportsEveryTruncation) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   for (const int tile_size : {0, 16}) {
     Picture picture;
     picture.tile_size = tile_size;
@@ -383,10 +387,10 @@ TEST(ExrSource, ReportsEveryTruncation) {
     const std::string path = folder / "whole.exr";
     write_picture(path, picture);
     const Samples samples(picture);
-    const auto bytes = file_bytes(path);
+    const auto bytes = read_file(path);
     const std::string cut = folder / "cut.exr";
     for (std::size_t length = 0; length < bytes.size(); length += length < 700 ? 1 : 7) {
-      write_bytes(cut, {bytes.data(), length});
+      write_file(cut, bytes.substr(0, length));
       SCOPED_TRACE(fmt::format("{} of {} bytes", length, bytes.size()));
       expect_right_or_refused(cut, samples.plane(0));
     }
@@ -394,18 +398,18 @@ TEST(ExrSource, ReportsEveryTruncation) {
 }
 
 TEST(ExrSource, SurvivesEveryHeaderByteWrong) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   Picture picture;
   picture.width = picture.height = 9;
   const std::string path = folder / "whole.exr";
   write_picture(path, picture);
-  const auto bytes = file_bytes(path);
+  const auto bytes = read_file(path);
   const std::string bad = folder / "bad.exr";
   for (std::size_t at = 4; at < std::min<std::size_t>(bytes.size(), 420); ++at) {
     for (const char wrong : {'\0', '\x01', '\x7F', '\xFF'}) {
       auto changed = bytes;
       changed[at] = wrong;
-      write_bytes(bad, {changed.data(), changed.size()});
+      write_file(bad, changed);
       try {
         // Other samples may come out (a header says what the bytes mean); a crash or another exception must not.
         (void)read_whole(*open_exr(bad, {}));
@@ -417,17 +421,16 @@ TEST(ExrSource, SurvivesEveryHeaderByteWrong) {
 }
 
 TEST(ExrSource, RefusesAbsurdSizesBeforeAllocating) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const std::string path = folder / "absurd.exr";
   Picture picture;
   write_picture(path, picture);
-  const auto bytes = file_bytes(path);
+  const auto bytes = read_file(path);
   const auto patched = [&](const std::string& attribute, std::size_t skip, std::vector<std::int32_t> values) {
     auto changed = bytes;
-    const std::string text(changed.begin(), changed.end());
-    const std::size_t at = text.find(attribute) + skip;
+    const std::size_t at = changed.find(attribute) + skip;
     std::memcpy(changed.data() + at, values.data(), values.size() * 4);
-    write_bytes(path, {changed.data(), changed.size()});
+    write_file(path, changed);
     return error_of([&] { (void)open_exr(path, {}); });
   };
   constexpr std::int32_t kHuge = 0x3FFFFFFF;
@@ -447,15 +450,15 @@ TEST(ExrSource, RefusesAbsurdSizesBeforeAllocating) {
 }
 
 TEST(ExrSource, AgreesWithReferenceReadersOnRealFiles) {
-  const auto files = references(".exr");
-  if (files.empty()) GTEST_SKIP() << "no shared terrain beside this checkout";
-  for (const Reference& file : files) {
-    SCOPED_TRACE(file.path);
-    const auto source = open_source(file.path, {});
-    expect_matches(*source, file.expected);
+  const auto files = real_files({".exr"});
+  if (files.empty()) GTEST_SKIP() << kNoRealFiles;
+  for (const auto& file : files) {
+    SCOPED_TRACE(file);
+    const auto source = open_source(file, {});
+    expect_as_reference(*source, reference_of(file));
     EXPECT_EQ(source->info().georeference.registration, Registration::kUnknown);
   }
 }
 
 }  // namespace
-}  // namespace isohf::testing
+}  // namespace isohf::test

@@ -4,12 +4,13 @@
 
 #include <random>
 
-#include "formats/raster_reference.h"
 #include "formats/raw_file.h"
 #include "formats/reader_failure.h"
 #include "formats/registry.h"
+#include "support/samples.h"
+#include "support/temporary_folder.h"
 
-namespace isohf::testing {
+namespace isohf::test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -36,11 +37,11 @@ std::string terrain(std::size_t bytes) {
 }
 
 TEST(Gzip, ReadsATileOfSeveralMegabytesInAnyOrder) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const std::string plain_path = folder / "N44E006.hgt";
   const std::string contents = terrain(std::size_t{1201} * 1201 * 2);
-  write_bytes(plain_path, contents);
-  write_bytes(plain_path + ".gz", gzipped(contents));
+  write_file(plain_path, contents);
+  write_file(plain_path + ".gz", gzipped(contents));
   const auto plain = open_source(plain_path, {});
   const auto packed = open_source(plain_path + ".gz", {});
   EXPECT_EQ(packed->info().format, "SRTM HGT");
@@ -58,20 +59,20 @@ TEST(Gzip, ReadsATileOfSeveralMegabytesInAnyOrder) {
 }
 
 TEST(Gzip, HoldsTextGridsWithTheirPrj) {
-  const ScratchFolder folder;
-  write_bytes(folder / "a.asc.gz", gzipped("ncols 2\nnrows 2\nxllcorner 5\nyllcorner 6\ncellsize 1\n1 2\n3 4\n"));
-  write_bytes(folder / "a.prj", R"(PROJCS["Here",GEOGCS["G",DATUM["D",SPHEROID["S",6378137,298]]],UNIT["metre",1]])");
+  const TemporaryFolder folder;
+  write_file(folder / "a.asc.gz", gzipped("ncols 2\nnrows 2\nxllcorner 5\nyllcorner 6\ncellsize 1\n1 2\n3 4\n"));
+  write_file(folder / "a.prj", R"(PROJCS["Here",GEOGCS["G",DATUM["D",SPHEROID["S",6378137,298]]],UNIT["metre",1]])");
   const auto source = open_source(folder / "a.asc.gz", {});
   EXPECT_EQ(source->info().format, "ESRI ASCII grid");
   EXPECT_EQ(source->info().georeference.system.name, "Here");
   const auto all = read_whole(*source);
-  EXPECT_EQ(raw_value(SampleType::kInt32, all.data() + 12), 4.0);
+  EXPECT_EQ(value_at(SampleType::kInt32, all, 3), 4.0);
   EXPECT_EQ(read_window(*source, {0, 0, 1, 1}), std::vector<std::byte>(all.begin(), all.begin() + 4));
 }
 
 TEST(Gzip, JoinsMembersAndPassesPaddingOver) {
-  const ScratchFolder folder;
-  write_bytes(folder / "a.gz", gzipped("first ") + gzipped("") + gzipped("second") + std::string(600, '\0'));
+  const TemporaryFolder folder;
+  write_file(folder / "a.gz", gzipped("first ") + gzipped("") + gzipped("second") + std::string(600, '\0'));
   const RawFile file(folder / "a.gz");
   ASSERT_EQ(file.size_bytes(), 12U);
   std::string text(12, '?');
@@ -81,14 +82,13 @@ TEST(Gzip, JoinsMembersAndPassesPaddingOver) {
 }
 
 TEST(Gzip, RefusesEveryTruncationAndEveryFlippedByte) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const std::string whole = gzipped(terrain(800));
   const std::string path = folder / "4.raw.gz";
   OpenOptions options;
   options.raw = RawLayout{20, 20, SampleType::kUint16, false};
   const auto failure = [&](const std::string& bytes, ErrorCode* code) {
-    std::filesystem::remove(path);
-    write_bytes(path, bytes);
+    write_file(path, bytes);
     return failure_of(path, code, [&] { read_corner(*open_source(path, options)); });
   };
   ErrorCode code = ErrorCode::kCancelled;
@@ -108,18 +108,18 @@ TEST(Gzip, RefusesEveryTruncationAndEveryFlippedByte) {
 }
 
 TEST(Gzip, SaysWhichFormatsItDoesNotReadInside) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const auto says = [&](const std::string& name, const std::string& contents) {
-    write_bytes(folder / name, gzipped(contents));
+    write_file(folder / name, gzipped(contents));
     return std::string(error_of([&] { (void)open_source(folder / name, {}); }).what());
   };
   EXPECT_THAT(says("a.tif.gz", std::string("II*\0\x08\0\0\0", 8) + std::string(90, ' ')),
               HasSubstr("is TIFF in gzip, which isohf does not read; gunzip it first"));
   EXPECT_THAT(says("a.txt.gz", "nothing that is known"), HasSubstr("is something unknown in gzip"));
   // A browser may have unpacked it already: the content decides.
-  write_bytes(folder / "b.asc.gz", "ncols 2\nnrows 1\n1 2\n");
+  write_file(folder / "b.asc.gz", "ncols 2\nnrows 1\n1 2\n");
   EXPECT_EQ(open_source(folder / "b.asc.gz", {})->info().width, 2);
 }
 
 }  // namespace
-}  // namespace isohf::testing
+}  // namespace isohf::test

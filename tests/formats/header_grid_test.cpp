@@ -6,10 +6,13 @@
 
 #include "formats/header_grid_source.h"
 #include "formats/raster_reference.h"
-#include "formats/real_files.h"
+#include "formats/reader_failure.h"
 #include "isohf/base/error.h"
+#include "support/real_files.h"
+#include "support/samples.h"
+#include "support/temporary_folder.h"
 
-namespace isohf::testing {
+namespace isohf::test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -20,10 +23,7 @@ constexpr const char* kSixteenBits = "NROWS 2\nNCOLS 3\nNBITS 16\nPIXELTYPE SIGN
 
 class HeaderGrid : public ::testing::Test {
  protected:
-  void write(const std::string& name, const std::string& text) const {
-    std::filesystem::remove(folder_ / name);
-    write_bytes(folder_ / name, {text.data(), text.size()});
-  }
+  void write(const std::string& name, const std::string& text) const { write_file(folder_ / name, text); }
 
   [[nodiscard]] std::unique_ptr<HeightSource> open(const std::string& header, const std::string& data,
                                                    const std::string& name = "grid.bil") const {
@@ -45,16 +45,16 @@ class HeaderGrid : public ::testing::Test {
     return data;
   }
 
-  ScratchFolder folder_;
+  TemporaryFolder folder_;
 };
 
 TEST_F(HeaderGrid, DeliversRealFilesAsTheReferenceDoes) {
   const auto files = real_files({".flt", ".bil"});
-  if (files.empty()) GTEST_SKIP() << "the real files are not there";
+  if (files.empty()) GTEST_SKIP() << kNoRealFiles;
   for (const auto& file : files) {
     SCOPED_TRACE(file.string());
     const auto source = open_source(file.string(), {});
-    expect_as_reference(*source, reference_of(file), false);
+    expect_as_reference(*source, reference_of(file));
     const bool has_prj = std::filesystem::exists(std::filesystem::path(file).replace_extension(".prj"));
     EXPECT_EQ(source->info().warnings.size(), has_prj ? 0U : 1U);  // degrees that nothing declares
     EXPECT_EQ(source->info().georeference.system.wkt.empty(), !has_prj);
@@ -81,9 +81,7 @@ TEST_F(HeaderGrid, ReadsGtopo30) {
     EXPECT_EQ(info.georeference.unit, HorizontalUnit::kDegree);
     EXPECT_EQ(info.georeference.system.epsg, 4326);
     EXPECT_EQ(info.georeference.origin_y, 89.99583333333334);
-    const auto all = read_whole(*source);
-    const std::vector<double> wanted = {-9999, 1, 2, 256, -1, 8824};
-    for (std::size_t i = 0; i < 6; ++i) EXPECT_EQ(raw_value(SampleType::kInt16, all.data() + 2 * i), wanted[i]);
+    EXPECT_THAT(values_of(*source), ElementsAre(-9999, 1, 2, 256, -1, 8824));
     EXPECT_THAT(info.warnings, ElementsAre(HasSubstr("no pixeltype")));
   }
 }
@@ -137,7 +135,7 @@ TEST_F(HeaderGrid, ReadsEveryTypeInBothByteOrdersAndEveryLayout) {
         for (std::int64_t r = 3; r >= 0; --r) {
           for (std::int64_t c = 0; c < 5; ++c) {
             for (std::int64_t n = 1; n <= 5 - c; ++n) {
-              const auto part = testing::read_window(*source, {c, r, n, 4 - r});
+              const auto part = read_window(*source, {c, r, n, 4 - r});
               for (std::int64_t i = 0; i < n * (4 - r); ++i) {
                 std::string wanted = data.substr(
                     7 + static_cast<std::size_t>(r + i / n) * row + static_cast<std::size_t>(c + i % n) * size, size);
@@ -266,4 +264,4 @@ TEST_F(HeaderGrid, SurvivesADamagedHeader) {
 }
 
 }  // namespace
-}  // namespace isohf::testing
+}  // namespace isohf::test

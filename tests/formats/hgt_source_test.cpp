@@ -7,22 +7,25 @@
 #include <filesystem>
 #include <fstream>
 
-#include "formats/real_files.h"
-#include "formats/scratch_folder.h"
+#include "formats/raster_reference.h"
 #include "formats/zip_archive.h"
 #include "isohf/base/error.h"
+#include "support/real_files.h"
+#include "support/samples.h"
+#include "support/temporary_folder.h"
 
 namespace isohf {
 namespace {
 
-class HgtSource : public testing::ScratchFolder {
+class HgtSource : public testing::Test {
  protected:
   std::string write(const std::string& name, const std::vector<std::byte>& bytes) const {
-    const std::string path = testing::fresh(folder() / name);
-    std::ofstream(path, std::ios::binary)
-        .write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+    const std::string path = folder_ / name;
+    test::write_file(path, bytes);
     return path;
   }
+
+  const test::TemporaryFolder folder_;
 };
 
 /// Big-endian samples 0, 1, 2, ... with a void in front.
@@ -38,13 +41,13 @@ std::vector<std::byte> tile(int columns, int rows) {
 
 std::vector<std::byte> zipped(const std::string& name, const std::vector<std::byte>& contents, bool deflated,
                               bool zip64 = false) {
-  return testing::zip_archive({{name, contents}}, deflated, zip64);
+  return test::zip_archive({{name, contents}}, deflated, zip64);
 }
 
 ErrorCode code_of(const std::string& path, const OpenOptions& options = {}) {
   try {
     const auto source = open_hgt(path, options);
-    (void)testing::read_all(*source);
+    (void)test::read_whole(*source);
   } catch (const Error& error) {
     EXPECT_NE(std::string(error.what()).find(path), std::string::npos) << error.what();
     return error.code();
@@ -54,12 +57,12 @@ ErrorCode code_of(const std::string& path, const OpenOptions& options = {}) {
 }
 
 TEST_F(HgtSource, DeliversRealFilesAsTheReferenceDoes) {
-  const auto files = testing::real_files({".hgt", ".hgt.zip"});
-  if (files.empty()) GTEST_SKIP() << "the real files are not there";
+  const auto files = test::real_files({".hgt", ".hgt.zip"});
+  if (files.empty()) GTEST_SKIP() << test::kNoRealFiles;
   for (const auto& file : files) {
     SCOPED_TRACE(file.string());
     const auto source = open_hgt(file.string(), {});
-    testing::expect_as_reference(*source, testing::reference_of(file), false);
+    test::expect_as_reference(*source, test::reference_of(file));
     EXPECT_TRUE(source->info().warnings.empty());
     EXPECT_EQ(source->info().georeference.system.vertical_datum, "EGM96");
     EXPECT_EQ(source->info().vertical_unit, "metre");
@@ -114,18 +117,17 @@ TEST_F(HgtSource, WindowsEqualTheWhole) {
   for (const std::string& path :
        {write("N01E001.hgt", tile(7, 7)), write("N01E001.hgt.zip", zipped("N01E001.hgt", tile(7, 7), true))}) {
     const auto source = open_hgt(path, {});
-    const auto whole = testing::read_all(*source);
-    EXPECT_EQ(testing::value_at(SampleType::kInt16, whole, 0), -32768);
-    EXPECT_EQ(testing::value_at(SampleType::kInt16, whole, 48), 48 - 100);
+    const auto whole = test::read_whole(*source);
+    EXPECT_EQ(test::value_at(SampleType::kInt16, whole, 0), -32768);
+    EXPECT_EQ(test::value_at(SampleType::kInt16, whole, 48), 48 - 100);
     for (std::int64_t r = 6; r >= 0; --r) {
       for (std::int64_t c = 0; c < 7; ++c) {
         for (std::int64_t n = 1; n <= 7 - c; ++n) {
           std::vector<std::byte> part(static_cast<std::size_t>(n * (7 - r)) * 2);
           source->read_window({c, r, n, 7 - r}, part);
           for (std::int64_t i = 0; i < n * (7 - r); ++i) {
-            EXPECT_EQ(
-                testing::value_at(SampleType::kInt16, part, static_cast<std::size_t>(i)),
-                testing::value_at(SampleType::kInt16, whole, static_cast<std::size_t>((r + i / n) * 7 + c + i % n)));
+            EXPECT_EQ(test::value_at(SampleType::kInt16, part, static_cast<std::size_t>(i)),
+                      test::value_at(SampleType::kInt16, whole, static_cast<std::size_t>((r + i / n) * 7 + c + i % n)));
           }
         }
       }
@@ -139,7 +141,7 @@ TEST_F(HgtSource, ReadsStoredAndDeflatedMembers) {
     const auto source = open_hgt(write("any.hgt.zip", zip), {});
     EXPECT_EQ(source->info().georeference.origin_y, -9.0);
     EXPECT_EQ(source->info().georeference.origin_x, -70.0);
-    EXPECT_EQ(testing::value_at(SampleType::kInt16, testing::read_all(*source), 120), 20);
+    EXPECT_EQ(test::value_at(SampleType::kInt16, test::read_whole(*source), 120), 20);
   }
 }
 
@@ -189,7 +191,7 @@ TEST_F(HgtSource, NeverCrashesOnADamagedArchive) {
       damaged[at] ^= static_cast<std::byte>(bits);
       try {
         const auto source = open_hgt(write("N01E001.hgt.zip", damaged), {});
-        auto raw = testing::read_all(*source);
+        auto raw = test::read_whole(*source);
         for (std::size_t i = 0; i + 1 < raw.size(); i += 2) std::swap(raw[i], raw[i + 1]);
         EXPECT_EQ(raw, intact) << at;
       } catch (const Error&) {
@@ -203,8 +205,8 @@ TEST_F(HgtSource, RefusesWhatIsNoTile) {
   EXPECT_EQ(code_of(write("N01E001.hgt", std::vector<std::byte>(2))), ErrorCode::kCorrupt);
   EXPECT_EQ(code_of(write("N01E001.hgt", std::vector<std::byte>(17))), ErrorCode::kCorrupt);
   EXPECT_EQ(code_of(write("N01E001.hgt", std::vector<std::byte>(2884800))), ErrorCode::kCorrupt);
-  EXPECT_EQ(code_of((folder() / "N02E002.hgt").string()), ErrorCode::kIo);
-  EXPECT_EQ(code_of(folder().string()), ErrorCode::kIo);
+  EXPECT_EQ(code_of(folder_ / "N02E002.hgt"), ErrorCode::kIo);
+  EXPECT_EQ(code_of(folder_.path()), ErrorCode::kIo);
   EXPECT_EQ(code_of(write("N01E001.hgt.zip", zipped("readme.txt", tile(3, 3), true))), ErrorCode::kUnsupported);
   OpenOptions options;
   options.channel = "R";

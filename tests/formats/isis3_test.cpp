@@ -7,10 +7,12 @@
 #include <random>
 
 #include "formats/isis3_source.h"
+#include "formats/raster_reference.h"
 #include "formats/reader_failure.h"
-#include "formats/real_files.h"
-#include "formats/scratch_folder.h"
 #include "isohf/base/error.h"
+#include "support/real_files.h"
+#include "support/samples.h"
+#include "support/temporary_folder.h"
 
 namespace isohf {
 namespace {
@@ -67,31 +69,33 @@ std::string tiles(int tile_columns, int tile_rows, int bands, bool big_endian) {
   return bytes;
 }
 
-class Isis3 : public testing::ScratchFolder {
+class Isis3 : public testing::Test {
  protected:
   std::string write(const std::string& bytes) const {
-    const std::string path = testing::fresh(folder() / "a.cub");
-    testing::write_bytes(path, bytes);
+    const std::string path = folder_ / "a.cub";
+    test::write_file(path, bytes);
     return path;
   }
 
   std::string failure(const std::string& bytes, ErrorCode* code = nullptr) const {
     const std::string path = write(bytes);
-    return testing::failure_of(path, code, [&] {
+    return test::failure_of(path, code, [&] {
       const auto source = open_isis3(path, {});
-      testing::read_corner(*source);
+      test::read_corner(*source);
     });
   }
+
+  const test::TemporaryFolder folder_;
 };
 
 TEST_F(Isis3, DeliversRealCubesAsTheReferenceDoes) {
-  const auto files = testing::real_files({".cub"});
-  if (files.empty()) GTEST_SKIP() << "the real files are not there";
+  const auto files = test::real_files({".cub"});
+  if (files.empty()) GTEST_SKIP() << test::kNoRealFiles;
   for (const auto& file : files) {
     SCOPED_TRACE(file.string());
     const auto source = open_source(file.string(), {});
-    const auto ref = testing::reference_of(file);
-    testing::expect_as_reference(*source, ref, false);
+    const auto ref = test::reference_of(file);
+    test::expect_as_reference(*source, ref);
     const SourceInfo& info = source->info();
     EXPECT_EQ(info.format, "ISIS3 cube");
     EXPECT_EQ(info.georeference.unit, HorizontalUnit::kMetre);
@@ -121,7 +125,7 @@ TEST_F(Isis3, WindowsEqualTheWholeInEveryLayout) {
                 std::vector<std::byte> part(static_cast<std::size_t>(columns * rows) * 2);
                 source->read_window({c, r, columns, rows}, part);
                 for (int i = 0; i < columns * rows; ++i) {
-                  ASSERT_EQ(testing::value_at(SampleType::kInt16, part, static_cast<std::size_t>(i)),
+                  ASSERT_EQ(test::value_at(SampleType::kInt16, part, static_cast<std::size_t>(i)),
                             height_at(band, c + i % columns, r + i / columns));
                 }
               }
@@ -136,17 +140,17 @@ TEST_F(Isis3, WindowsEqualTheWholeInEveryLayout) {
 TEST_F(Isis3, FollowsADetachedLabelToItsCore) {
   const std::string whole = label(kTiles, 1, kWord) + tiles(3, 2, 1, false);
   std::string text = label(std::string("^Core = DATA.cub\n") + kTiles, 1, kWord);
-  testing::write_bytes(testing::fresh(folder() / "whole.cub"), whole);
-  testing::write_bytes(testing::fresh(folder() / "data.CUB"), std::string(kLabelBytes, 'x') + tiles(3, 2, 1, false));
-  const std::string path = testing::fresh(folder() / "outside.lbl");
-  testing::write_bytes(path, text);
-  const auto expected = open_source((folder() / "whole.cub").string(), {});
+  test::write_file(folder_ / "whole.cub", whole);
+  test::write_file(folder_ / "data.CUB", std::string(kLabelBytes, 'x') + tiles(3, 2, 1, false));
+  const std::string path = folder_ / "outside.lbl";
+  test::write_file(path, text);
+  const auto expected = open_source(folder_ / "whole.cub", {});
   const auto source = open_source(path, {});
-  EXPECT_EQ(testing::read_all(*source), testing::read_all(*expected));
+  EXPECT_EQ(test::read_whole(*source), test::read_whole(*expected));
   EXPECT_EQ(source->info().georeference.origin_x, expected->info().georeference.origin_x);
-  std::filesystem::remove(folder() / "data.CUB");
+  std::filesystem::remove(folder_ / "data.CUB");
   ErrorCode code = ErrorCode::kCancelled;
-  EXPECT_THAT(testing::failure_of(path, &code, [&] { (void)open_source(path, {}); }),
+  EXPECT_THAT(test::failure_of(path, &code, [&] { (void)open_source(path, {}); }),
               HasSubstr("^Core names DATA.cub, which must be a file beside the label"));
   EXPECT_EQ(code, ErrorCode::kIo);
 }
@@ -189,8 +193,8 @@ TEST_F(Isis3, TakesSpecialPixelsForVoids) {
     const auto source =
         open_source(write(label(kTiles, 1, fmt::format("Type = {}", kind.name)) + std::string(2000, '\1')), {});
     EXPECT_EQ(source->info().sample_type, kind.type);
-    for (const double value : kind.special) EXPECT_TRUE(testing::is_void(source->info(), value)) << value;
-    for (const double value : kind.plain) EXPECT_FALSE(testing::is_void(source->info(), value)) << value;
+    for (const double value : kind.special) EXPECT_TRUE(test::is_void(source->info(), value)) << value;
+    for (const double value : kind.plain) EXPECT_FALSE(test::is_void(source->info(), value)) << value;
   }
 }
 

@@ -2,11 +2,12 @@
 
 #include <gtest/gtest.h>
 
-#include "formats/raster_reference.h"
 #include "formats/raster_sink.h"
 #include "formats/registry.h"
+#include "support/samples.h"
+#include "support/temporary_folder.h"
 
-namespace isohf::testing {
+namespace isohf::test {
 namespace {
 
 constexpr std::int64_t kWidth = 700;
@@ -27,7 +28,7 @@ std::vector<std::byte> write_counting(const std::string& path, SampleType type) 
 }
 
 TEST(LimitedBuffers, DeliverTheSameSamplesInAnyOrder) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   for (const auto& [name, type] : {std::pair{"a.exr", SampleType::kFloat16}, {"a.png", SampleType::kUint16}}) {
     SCOPED_TRACE(name);
     const auto samples = write_counting(folder / name, type);
@@ -47,7 +48,7 @@ TEST(LimitedBuffers, DeliverTheSameSamplesInAnyOrder) {
 }
 
 TEST(LimitedBuffers, AreCountedByTheRow) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   (void)write_counting(folder / "a.png", SampleType::kUint16);
   const auto png = open_source(folder / "a.png", {});
   // A kept row at least, one that is decoded and one of libpng's.
@@ -64,4 +65,4 @@ TEST(LimitedBuffers, AreCountedByTheRow) {
 }
 
 }  // namespace
-}  // namespace isohf::testing
+}  // namespace isohf::test

@@ -11,7 +11,7 @@
 #include "formats/raster_sink.h"
 #include "isohf/surface/height_source.h"
 
-namespace isohf::testing {
+namespace isohf::test {
 
 /// A raster in memory that is cut into files.
 struct CutRaster {
@@ -144,4 +144,4 @@ inline std::unique_ptr<MosaicSource> open_mosaic(const std::vector<std::string>&
   return std::make_unique<MosaicSource>("mosaic", plan_mosaic(paths, options), options, rule);
 }
 
-}  // namespace isohf::testing
+}  // namespace isohf::test

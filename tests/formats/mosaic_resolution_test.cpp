@@ -7,9 +7,10 @@
 
 #include "formats/mosaic_pieces.h"
 #include "formats/mosaic_samples.h"
-#include "formats/raster_reference.h"
+#include "support/samples.h"
+#include "support/temporary_folder.h"
 
-namespace isohf::testing {
+namespace isohf::test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -52,7 +53,7 @@ CutRaster plane(const RasterSpec& spec) {
 TEST(MosaicResolution, ACoarserFileContinuesThePlaneOfAFinerOne) {
   for (const Registration registration : {Registration::kArea, Registration::kPoint}) {
     SCOPED_TRACE(to_string(registration));
-    const ScratchFolder folder;
+    const TemporaryFolder folder;
     const RasterSpec fine =
         placed_spec(registration == Registration::kArea ? 60 : 61, 31, SampleType::kFloat32, registration);
     const CutRaster whole_plane = plane(fine);
@@ -85,7 +86,7 @@ TEST(MosaicResolution, ACoarserFileContinuesThePlaneOfAFinerOne) {
 TEST(MosaicResolution, CoarserFilesHaveNoSeamBetweenThem) {
   for (const Registration registration : {Registration::kArea, Registration::kPoint}) {
     SCOPED_TRACE(to_string(registration));
-    const ScratchFolder folder;
+    const TemporaryFolder folder;
     const RasterSpec fine = placed_spec(121, 81, SampleType::kInt16, registration);
     raster_of<std::int16_t>(fine, [](auto, auto) { return 7; }).cut(folder / "fine.tif", {0, 0, 5, 5});
     RasterSpec rough = coarser(fine, 2);
@@ -117,7 +118,7 @@ TEST(MosaicResolution, CoarserFilesHaveNoSeamBetweenThem) {
 }
 
 TEST(MosaicResolution, FinerFilesLieOverCoarserOnesWhateverTheOrder) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const RasterSpec fine = placed_spec(20, 20, SampleType::kInt16, Registration::kPoint);
   raster_of<std::int16_t>(fine, [](auto, auto) { return 7; }).cut(folder / "fine.tif", {0, 0, 10, 10});
   const RasterSpec rough = coarser(placed_spec(21, 21, SampleType::kInt16, Registration::kPoint), 2);
@@ -132,7 +133,7 @@ TEST(MosaicResolution, FinerFilesLieOverCoarserOnesWhateverTheOrder) {
 }
 
 TEST(MosaicResolution, FilesOfSeveralTypesScalesAndVoidsKeepTheirElevations) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   RasterSpec spec = placed_spec(30, 5, SampleType::kUint8, Registration::kArea);
   spec.void_value = 255.0;
   raster_of<std::uint8_t>(spec, [](auto c, auto) { return c == 3 ? 255 : c; }).cut(folder / "a.tif", {0, 0, 10, 5});
@@ -210,4 +211,4 @@ TEST(MosaicSamples, TheCommonVoidIsNoElevationOfAnyFile) {
 }
 
 }  // namespace
-}  // namespace isohf::testing
+}  // namespace isohf::test

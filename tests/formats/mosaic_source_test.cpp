@@ -8,10 +8,11 @@
 #include <filesystem>
 
 #include "formats/mosaic_pieces.h"
-#include "formats/raster_reference.h"
 #include "isohf/base/error.h"
+#include "support/samples.h"
+#include "support/temporary_folder.h"
 
-namespace isohf::testing {
+namespace isohf::test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -51,7 +52,7 @@ TEST(MosaicSource, PiecesGiveTheWholeBitForBitInEveryType) {
   for (const SampleType type : kAllTypes) {
     for (const Registration registration : {Registration::kArea, Registration::kPoint}) {
       SCOPED_TRACE(to_string(type) + " " + to_string(registration));
-      const ScratchFolder folder;
+      const TemporaryFolder folder;
       const CutRaster raster = noise_raster(placed_spec(97, 61, type, registration));
       raster.cut(folder / "whole.tif", {0, 0, 97, 61});
       std::vector<std::string> paths = write_pieces(raster, folder / "", ragged_cut(97, 61, 5, 20));
@@ -76,7 +77,7 @@ TEST(MosaicSource, PiecesGiveTheWholeBitForBitInEveryType) {
 }
 
 TEST(MosaicSource, AnyWindowInAnyOrderIsThatOfTheWhole) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const CutRaster raster = noise_raster(placed_spec(150, 130, SampleType::kInt16, Registration::kArea));
   const auto mosaic = open_mosaic(write_pieces(raster, folder / "", ragged_cut(150, 130, 8, 30)));
   std::mt19937 random(3);
@@ -91,7 +92,7 @@ TEST(MosaicSource, AnyWindowInAnyOrderIsThatOfTheWhole) {
 }
 
 TEST(MosaicSource, DegreeTilesShareTheirPosts) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   // 61 posts a degree; two by two tiles.
   const auto height = [](std::int64_t c, std::int64_t r) { return static_cast<int>(c * 7 + r * 131) % 3000 - 40; };
   for (int row = 0; row < 2; ++row) {
@@ -105,7 +106,7 @@ TEST(MosaicSource, DegreeTilesShareTheirPosts) {
         }
       }
       const std::string name = "N" + std::to_string(45 - row) + "E00" + std::to_string(6 + column) + ".hgt";
-      write_bytes(folder / name, {bytes.data(), bytes.size()});
+      write_file(folder / name, bytes);
     }
   }
   const auto mosaic =
@@ -122,11 +123,11 @@ TEST(MosaicSource, DegreeTilesShareTheirPosts) {
 }
 
 TEST(MosaicSource, BothSidesOfThe180thMeridianJoin) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   for (const auto& [name, value] : {std::pair("N10E179.hgt", 1), std::pair("N10W180.hgt", 2)}) {
     std::string bytes;
     for (int i = 0; i < 11 * 11; ++i) bytes += {'\0', static_cast<char>(value)};
-    write_bytes(folder / name, {bytes.data(), bytes.size()});
+    write_file(folder / name, bytes);
   }
   const auto mosaic = open_mosaic({folder / "N10W180.hgt", folder / "N10E179.hgt"});
   EXPECT_EQ(mosaic->info().width, 21);
@@ -139,13 +140,13 @@ TEST(MosaicSource, BothSidesOfThe180thMeridianJoin) {
 }
 
 TEST(MosaicSource, MissingTilesAreVoidAndNamed) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   std::vector<std::string> paths;
   for (const char* name : {"N45E006.hgt", "N45E008.hgt", "N44E007.hgt", "N44E006.hgt"}) {
     std::string bytes;
     for (int i = 0; i < 11 * 11; ++i) bytes += {'\1', '\0'};
     paths.push_back(folder / name);
-    write_bytes(paths.back(), {bytes.data(), bytes.size()});
+    write_file(paths.back(), bytes);
   }
   const auto mosaic = open_mosaic(paths);
   const MosaicHoles& holes = mosaic->plan().holes;
@@ -159,7 +160,7 @@ TEST(MosaicSource, MissingTilesAreVoidAndNamed) {
 }
 
 TEST(MosaicSource, GroundInNoFileOfARaggedCutIsCounted) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   RasterSpec spec = placed_spec(90, 70, SampleType::kInt16, Registration::kArea);
   spec.void_value = -9999.0;
   const CutRaster raster = raster_of<std::int16_t>(spec, [](auto c, auto r) { return c + 100 * r; });
@@ -191,7 +192,7 @@ TEST(MosaicSource, GroundInNoFileOfARaggedCutIsCounted) {
 }
 
 TEST(MosaicSource, IntegersWithoutAVoidGetALargerTypeForGaps) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const CutRaster raster = noise_raster(placed_spec(30, 10, SampleType::kUint16, Registration::kArea));
   const auto mosaic = open_mosaic(write_pieces(raster, folder / "", {{0, 0, 10, 10}, {20, 0, 10, 10}}));
   EXPECT_EQ(mosaic->info().sample_type, SampleType::kInt32);
@@ -204,7 +205,7 @@ TEST(MosaicSource, IntegersWithoutAVoidGetALargerTypeForGaps) {
 }
 
 TEST(MosaicSource, OverlapShowsTheLastOrTheFirstAndVoidsWhatLiesBelow) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   RasterSpec spec = placed_spec(20, 4, SampleType::kInt16, Registration::kArea);
   spec.void_value = -1.0;
   raster_of<std::int16_t>(spec, [](auto c, auto) {
@@ -228,7 +229,7 @@ TEST(MosaicSource, OverlapShowsTheLastOrTheFirstAndVoidsWhatLiesBelow) {
 }
 
 TEST(MosaicSource, OriginsRoundedInTheFileAreSnappedAndSaid) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   CutRaster raster = raster_of<float>(placed_spec(40, 10, SampleType::kFloat32, Registration::kArea),
                                       [](auto c, auto r) { return 0.25 * static_cast<double>(c + r); });
   raster.cut(folder / "a.tif", {0, 0, 20, 10});
@@ -246,7 +247,7 @@ TEST(MosaicSource, OriginsRoundedInTheFileAreSnappedAndSaid) {
 }
 
 TEST(MosaicSource, FilesThatDisagreeAreRefusedByName) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const RasterSpec spec = placed_spec(20, 10, SampleType::kFloat32, Registration::kArea);
   raster_of<float>(spec, [](auto, auto) { return 1.0; }).cut(folder / "a.tif", {0, 0, 10, 10});
   const auto refused = [&](const std::function<void(RasterSpec&)>& change) {
@@ -280,7 +281,7 @@ TEST(MosaicSource, FilesThatDisagreeAreRefusedByName) {
 }
 
 TEST(MosaicSource, AChangedOrBrokenMemberIsAnErrorThatNamesIt) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const CutRaster raster = noise_raster(placed_spec(40, 10, SampleType::kInt16, Registration::kArea));
   const std::vector<std::string> paths = write_pieces(raster, folder / "", {{0, 0, 20, 10}, {20, 0, 20, 10}});
   const auto mosaic = open_mosaic(paths);
@@ -297,7 +298,7 @@ TEST(MosaicSource, AChangedOrBrokenMemberIsAnErrorThatNamesIt) {
 }
 
 TEST(MosaicSource, EveryMemberIsOpenedOnceInAPassOverSmallOnes) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const CutRaster raster = noise_raster(placed_spec(160, 160, SampleType::kInt16, Registration::kArea));
   const auto mosaic = open_mosaic(write_pieces(raster, folder / "", regular_cut(160, 160, 16)));
   ASSERT_EQ(mosaic->plan().layers.front().members.size(), 100U);
@@ -317,4 +318,4 @@ TEST(MosaicSource, EveryMemberIsOpenedOnceInAPassOverSmallOnes) {
 }
 
 }  // namespace
-}  // namespace isohf::testing
+}  // namespace isohf::test

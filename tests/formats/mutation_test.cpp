@@ -12,12 +12,13 @@
 #include <random>
 #include <set>
 
-#include "formats/raster_reference.h"
 #include "formats/reader_cases.h"
 #include "formats/reader_failure.h"
 #include "isohf/base/error.h"
+#include "support/samples.h"
+#include "support/temporary_folder.h"
 
-namespace isohf::testing {
+namespace isohf::test {
 namespace {
 
 /// Of each file; ISOHF_MUTATIONS asks for another number.
@@ -39,21 +40,15 @@ const std::vector<ReaderCase>& cases() {
 }
 
 /// A folder in memory where there is one: tens of thousands of files are written.
-std::filesystem::path fast_folder() {
-  const std::filesystem::path shared = "/dev/shm";
-  std::error_code ignored;
-  std::string pattern =
-      ((std::filesystem::is_directory(shared, ignored) ? shared : std::filesystem::temp_directory_path()) /
-       "isohf_mutations_XXXXXX")
-          .string();
-  return ::mkdtemp(pattern.data());
+std::filesystem::path fast_parent() {
+  const std::filesystem::path in_memory = "/dev/shm";
+  return std::filesystem::is_directory(in_memory) ? in_memory : std::filesystem::temp_directory_path();
 }
 
 class ReaderMutation : public ::testing::TestWithParam<std::size_t> {
  protected:
   void SetUp() override {
-    folder_ = fast_folder();
-    for (const auto& [name, bytes] : tested().beside) testing::write_bytes(folder_ / name, bytes);
+    for (const auto& [name, bytes] : tested().beside) write_file(folder_ / name, bytes);
     if (kSanitized) return;  // it reserves terabytes itself
     // What a few bytes claim must not be believed: an allocation of more than this fails, and is no Error.
     ::rlimit limit{};
@@ -61,20 +56,15 @@ class ReaderMutation : public ::testing::TestWithParam<std::size_t> {
     limit.rlim_cur = rlim_t{4} << 30U;
     ::setrlimit(RLIMIT_AS, &limit);
   }
-  void TearDown() override {
-    std::error_code ignored;
-    std::filesystem::remove_all(folder_, ignored);
-  }
 
   [[nodiscard]] const ReaderCase& tested() const { return cases()[GetParam()]; }
 
   /// Reads the first and the last samples; returns what went wrong, empty where nothing did.
   [[nodiscard]] std::string outcome(const std::string& bytes) const {
-    const std::filesystem::path path = folder_ / tested().file_name;
-    testing::write_bytes(path, bytes);
+    const std::string path = folder_ / tested().file_name;
+    write_file(path, bytes);
     try {
-      const std::string opened = tested().opened.empty() ? path.string() : (folder_ / tested().opened).string();
-      const auto source = tested().open(opened, tested().options);
+      const auto source = tested().open(tested().opened.empty() ? path : folder_ / tested().opened, tested().options);
       const SourceInfo& info = source->info();
       read_corner(*source);
       const Window last{info.width - std::min<std::int64_t>(info.width, 64),
@@ -85,7 +75,7 @@ class ReaderMutation : public ::testing::TestWithParam<std::size_t> {
       return {};
     } catch (const Error& error) {
       const std::string message = error.what();
-      EXPECT_EQ(message.rfind(folder_.string(), 0), 0U) << message;
+      EXPECT_EQ(message.rfind(folder_.path(), 0), 0U) << message;
       expect_one_line(message);
       return message.empty() ? "an empty message" : message;
     }
@@ -95,7 +85,7 @@ class ReaderMutation : public ::testing::TestWithParam<std::size_t> {
     EXPECT_EQ(message.find_first_of("\n\r"), std::string::npos) << message;
   }
 
-  std::filesystem::path folder_;
+  const TemporaryFolder folder_{fast_parent()};
 };
 
 /// One to four changes, most of them near the beginning, where headers are.
@@ -162,7 +152,7 @@ TEST_P(ReaderMutation, SurvivesTenThousandDamagedFiles) {
     read += outcome(damaged).empty() ? 1 : 0;
     if (!HasFailure()) continue;
     const std::string kept = (std::filesystem::temp_directory_path() / ("mutation_" + each.file_name)).string();
-    testing::write_bytes(kept, damaged);
+    write_file(kept, damaged);
     FAIL() << "round " << round << " of seed " << kSeed << "; the file is kept as " << kept;
   }
   std::cout << rounds << " mutations from seed " << kSeed << ": " << read << " read, " << rounds - read << " refused\n";
@@ -176,8 +166,7 @@ TEST_P(ReaderMutation, RefusesOrReadsEveryKeptFile) {
   if (!std::filesystem::is_directory(kept)) return;
   for (const auto& entry : std::filesystem::directory_iterator(kept)) {
     SCOPED_TRACE(entry.path().string());
-    const std::vector<char> bytes = file_bytes(entry.path().string());
-    (void)outcome({bytes.begin(), bytes.end()});
+    (void)outcome(read_file(entry.path()));
   }
 }
 
@@ -187,10 +176,10 @@ INSTANTIATE_TEST_SUITE_P(Formats, ReaderMutation, ::testing::Range<std::size_t>(
 /// A reader that is not in the table is one that nobody damages.
 TEST(ReaderCases, HaveAFileForEveryNativeFormat) {
   std::set<std::string> covered;
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   for (const ReaderCase& each : cases()) {
-    for (const auto& [name, bytes] : each.beside) testing::write_bytes(folder / name, bytes);
-    testing::write_bytes(folder / each.file_name, each.bytes);
+    for (const auto& [name, bytes] : each.beside) write_file(folder / name, bytes);
+    write_file(folder / each.file_name, each.bytes);
     const std::string opened = folder / (each.opened.empty() ? each.file_name : each.opened);
     covered.insert(native_format_of(opened, each.options)->name);
     for (const auto& entry : std::filesystem::directory_iterator(folder / ".")) std::filesystem::remove(entry);
@@ -203,4 +192,4 @@ TEST(ReaderCases, HaveAFileForEveryNativeFormat) {
 }
 
 }  // namespace
-}  // namespace isohf::testing
+}  // namespace isohf::test

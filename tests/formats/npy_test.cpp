@@ -6,11 +6,13 @@
 #include <random>
 
 #include "formats/npy_source.h"
+#include "formats/raster_reference.h"
 #include "formats/reader_failure.h"
-#include "formats/real_files.h"
-#include "formats/scratch_folder.h"
 #include "formats/zip_archive.h"
 #include "isohf/base/error.h"
+#include "support/real_files.h"
+#include "support/samples.h"
+#include "support/temporary_folder.h"
 
 namespace isohf {
 namespace {
@@ -39,37 +41,39 @@ std::string counting(int size, bool big_endian) {
   return bytes;
 }
 
-class Npy : public testing::ScratchFolder {
+class Npy : public testing::Test {
  protected:
   std::string write(const std::string& bytes, const std::string& name = "a.npy") const {
-    const std::string path = testing::fresh(folder() / name);
-    testing::write_bytes(path, bytes);
+    const std::string path = folder_ / name;
+    test::write_file(path, bytes);
     return path;
   }
 
   std::string failure(const std::string& bytes, ErrorCode* code = nullptr, const std::string& name = "a.npy") const {
     const std::string path = write(bytes, name);
-    return testing::failure_of(path, code, [&] {
+    return test::failure_of(path, code, [&] {
       const auto source = open_source(path, {});
-      testing::read_corner(*source);
+      test::read_corner(*source);
     });
   }
+
+  const test::TemporaryFolder folder_;
 };
 
 TEST_F(Npy, DeliversARealArray) {
-  const auto file = testing::real_data() / "derived" / "gale.npy";
-  if (!std::filesystem::exists(file)) GTEST_SKIP() << "the real files are not there";
+  const auto file = test::real_data() / "derived" / "gale.npy";
+  if (!std::filesystem::exists(file)) GTEST_SKIP() << test::kNoRealFiles;
   const auto source = open_source(file.string(), {});
-  const auto ref = testing::reference_of(file);
+  const auto ref = test::reference_of(file);
   EXPECT_EQ(source->info().width, ref.at("width").get<int>());
   EXPECT_EQ(source->info().height, ref.at("height").get<int>());
   EXPECT_EQ(source->info().format, "NumPy");
   EXPECT_FALSE(source->info().georeference.has_origin);
-  const auto raw = testing::read_all(*source);
+  const auto raw = test::read_whole(*source);
   for (const char* list : {"pixels", "corners"}) {
     for (const auto& pixel : ref.at(list)) {
       const auto at = static_cast<std::size_t>(pixel.at("row").get<int>() * 348 + pixel.at("col").get<int>());
-      EXPECT_EQ(testing::value_at(SampleType::kFloat32, raw, at), pixel.at("raw").get<double>());
+      EXPECT_EQ(test::value_at(SampleType::kFloat32, raw, at), pixel.at("raw").get<double>());
     }
   }
 }
@@ -89,12 +93,12 @@ TEST_F(Npy, ReadsEveryTypeOrderAndVersion) {
         const auto source = open_source(write(array(order + std::string(name), "(2, 3)", data, version)), {});
         ASSERT_EQ(source->info().sample_type, type);
         ASSERT_EQ(source->info().width, 3);
-        const auto raw = testing::read_all(*source);
+        const auto raw = test::read_whole(*source);
         const std::string little = counting(size, false);
         EXPECT_TRUE(std::equal(raw.begin(), raw.end(), std::as_bytes(std::span(little)).begin()));
         std::vector<std::byte> last(static_cast<std::size_t>(size) * 2);
         source->read_window({2, 0, 1, 2}, last);
-        EXPECT_EQ(testing::value_at(type, last, 1), testing::value_at(type, raw, 5));
+        EXPECT_EQ(test::value_at(type, last, 1), test::value_at(type, raw, 5));
       }
     }
   }
@@ -115,26 +119,26 @@ TEST_F(Npy, ReadsFortranOrder) {
   for (const bool big_endian : {false, true}) {
     const std::string type = big_endian ? ">i2" : "<i2";
     const auto source = open_source(write(array(type, "(2, 3)", counting(2, big_endian), 1, "True")), {});
-    const auto raw = testing::read_all(*source);
+    const auto raw = test::read_whole(*source);
     const std::vector<double> wanted = {1, 3, 5, 2, 4, 6};
-    for (std::size_t i = 0; i < 6; ++i) EXPECT_EQ(testing::value_at(SampleType::kInt16, raw, i), wanted[i]);
+    for (std::size_t i = 0; i < 6; ++i) EXPECT_EQ(test::value_at(SampleType::kInt16, raw, i), wanted[i]);
     std::vector<std::byte> part(4);
     source->read_window({1, 1, 2, 1}, part);
-    EXPECT_EQ(testing::value_at(SampleType::kInt16, part, 0), 4.0);
-    EXPECT_EQ(testing::value_at(SampleType::kInt16, part, 1), 6.0);
+    EXPECT_EQ(test::value_at(SampleType::kInt16, part, 0), 4.0);
+    EXPECT_EQ(test::value_at(SampleType::kInt16, part, 1), 6.0);
   }
 }
 
 TEST_F(Npy, PicksAnArrayOfAnArchive) {
   const auto entry = [](const std::string& name, const std::string& contents) {
-    return testing::ZipEntry{name, std::vector<std::byte>(std::as_bytes(std::span(contents)).begin(),
-                                                          std::as_bytes(std::span(contents)).end())};
+    return test::ZipEntry{name, std::vector<std::byte>(std::as_bytes(std::span(contents)).begin(),
+                                                       std::as_bytes(std::span(contents)).end())};
   };
   for (const int kind : {0, 1, 2, 3}) {
-    const auto zip = testing::zip_archive({entry("dx.npy", array("<f8", "()", std::string(8, '\0'))),
-                                           entry("low.npy", array("<i2", "(2, 3)", counting(2, false))),
-                                           entry("high.npy", array(">i4", "(3, 2)", counting(4, true)))},
-                                          kind % 2 == 1, kind >= 2);
+    const auto zip = test::zip_archive({entry("dx.npy", array("<f8", "()", std::string(8, '\0'))),
+                                        entry("low.npy", array("<i2", "(2, 3)", counting(2, false))),
+                                        entry("high.npy", array(">i4", "(3, 2)", counting(4, true)))},
+                                       kind % 2 == 1, kind >= 2);
     const std::string path = write({reinterpret_cast<const char*>(zip.data()), zip.size()}, "a.npz");
     const auto first = open_source(path, {});
     EXPECT_EQ(first->info().width, 3);
@@ -145,13 +149,13 @@ TEST_F(Npy, PicksAnArrayOfAnArchive) {
     const auto high = open_source(path, options);
     EXPECT_EQ(high->info().width, 2);
     EXPECT_TRUE(high->info().warnings.empty());
-    const auto raw = testing::read_all(*high);
+    const auto raw = test::read_whole(*high);
     for (std::size_t i = 0; i < 6; ++i)
-      EXPECT_EQ(testing::value_at(SampleType::kInt32, raw, i), static_cast<double>(i + 1));
+      EXPECT_EQ(test::value_at(SampleType::kInt32, raw, i), static_cast<double>(i + 1));
     const auto says = [&](const char* channel) {
       options.channel = channel;
       ErrorCode code = ErrorCode::kCancelled;
-      return testing::failure_of(path, &code, [&] { (void)open_source(path, options); });
+      return test::failure_of(path, &code, [&] { (void)open_source(path, options); });
     };
     EXPECT_THAT(says("nothing"), HasSubstr("there is no array \"nothing\"; there are dx, low, high"));
     EXPECT_THAT(says("dx"), HasSubstr("must have 2 dimensions (array dx)"));
@@ -165,20 +169,20 @@ TEST_F(Npy, PicksAnArrayOfAnArchive) {
 }
 
 TEST_F(Npy, DeliversARealArchive) {
-  const auto file = testing::real_data() / "jacksboro_fault_dem.npz";
-  if (!std::filesystem::exists(file)) GTEST_SKIP() << "the real files are not there";
+  const auto file = test::real_data() / "jacksboro_fault_dem.npz";
+  if (!std::filesystem::exists(file)) GTEST_SKIP() << test::kNoRealFiles;
   const auto source = open_source(file.string(), {});
-  const auto ref = testing::reference_of(file);
+  const auto ref = test::reference_of(file);
   EXPECT_EQ(source->info().channel, "elevation");
   EXPECT_TRUE(source->info().warnings.empty());
   ASSERT_EQ(source->info().width, ref.at("width").get<int>());
   ASSERT_EQ(source->info().height, ref.at("height").get<int>());
   ASSERT_EQ(source->info().sample_type, SampleType::kInt16);
-  const auto raw = testing::read_all(*source);
+  const auto raw = test::read_whole(*source);
   for (const char* list : {"pixels", "corners"}) {
     for (const auto& pixel : ref.at(list)) {
       const auto at = static_cast<std::size_t>(pixel.at("row").get<int>() * 403 + pixel.at("col").get<int>());
-      EXPECT_EQ(testing::value_at(SampleType::kInt16, raw, at), pixel.at("raw").get<double>());
+      EXPECT_EQ(test::value_at(SampleType::kInt16, raw, at), pixel.at("raw").get<double>());
     }
   }
 }

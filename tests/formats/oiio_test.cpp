@@ -1,11 +1,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "formats/raster_reference.h"
+#include "formats/reader_failure.h"
 #include "formats/registry.h"
 #include "isohf/base/error.h"
+#include "support/samples.h"
+#include "support/temporary_folder.h"
 
-namespace isohf::testing {
+namespace isohf::test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -13,7 +15,7 @@ using ::testing::HasSubstr;
 constexpr int kWidth = 23;
 constexpr int kHeight = 17;
 
-int value_at(int column, int row) {
+int ground_at(int column, int row) {
   return column * 1000 + row * 7;
 }
 
@@ -26,12 +28,12 @@ class OiioModule : public ::testing::Test {
     std::string bytes = "P5\n23 17\n65535\n";
     for (int row = 0; row < kHeight; ++row) {
       for (int column = 0; column < kWidth; ++column) {
-        bytes.push_back(static_cast<char>(value_at(column, row) >> 8));
-        bytes.push_back(static_cast<char>(value_at(column, row) & 0xFF));
+        bytes.push_back(static_cast<char>(ground_at(column, row) >> 8));
+        bytes.push_back(static_cast<char>(ground_at(column, row) & 0xFF));
       }
     }
     const std::string path = folder_ / "ground.pgm";
-    write_bytes(path, {bytes.data(), bytes.size()});
+    write_file(path, bytes);
     return path;
   }
 
@@ -40,11 +42,11 @@ class OiioModule : public ::testing::Test {
     std::string bytes = "P6\n4 2\n255\n";
     for (char value = 0; value < 24; ++value) bytes.push_back(value);
     const std::string path = folder_ / "colours.ppm";
-    write_bytes(path, {bytes.data(), bytes.size()});
+    write_file(path, bytes);
     return path;
   }
 
-  ScratchFolder folder_;
+  TemporaryFolder folder_;
 };
 
 TEST_F(OiioModule, ReadsWhatNoNativeReaderKnows) {
@@ -60,9 +62,9 @@ TEST_F(OiioModule, ReadsWhatNoNativeReaderKnows) {
     const auto samples = read_window(*source, window);
     for (int row = 0; row < window.rows; ++row) {
       for (int column = 0; column < window.columns; ++column) {
-        const auto at = static_cast<std::size_t>(row * window.columns + column) * 2;
-        EXPECT_EQ(raw_value(info.sample_type, samples.data() + at),
-                  value_at(static_cast<int>(window.column) + column, static_cast<int>(window.row) + row));
+        const auto at = static_cast<std::size_t>(row * window.columns + column);
+        EXPECT_EQ(value_at(info.sample_type, samples, at),
+                  ground_at(static_cast<int>(window.column) + column, static_cast<int>(window.row) + row));
       }
     }
   }
@@ -102,7 +104,7 @@ TEST_F(OiioModule, ReadsTheChannelAskedFor) {
 TEST_F(OiioModule, RefusesFilesWhoseNumbersItWouldNotGet) {
   const auto refuses = [&](const std::string& name, const std::string& bytes, const char* why) {
     const std::string path = folder_ / name;
-    write_bytes(path, {bytes.data(), bytes.size()});
+    write_file(path, bytes);
     const Error error = error_of([&] { (void)open_source(path, {}); });
     EXPECT_EQ(error.code(), ErrorCode::kUnsupported);
     EXPECT_EQ(std::string(error.what()).rfind(path + ": " + why, 0), 0U) << error.what();
@@ -138,16 +140,16 @@ TEST_F(OiioModule, AppliesTheOpenOptions) {
 
 TEST_F(OiioModule, ReportsTruncationAndForeignFilesInOneLine) {
   const std::string whole = write_graymap();
-  const auto bytes = file_bytes(whole);
+  const auto bytes = read_file(whole);
   const std::string cut = folder_ / "cut.pgm";
   for (std::size_t length = 1; length < bytes.size(); length += 13) {
-    write_bytes(cut, {bytes.data(), length});
+    write_file(cut, bytes.substr(0, length));
     const Error error = error_of([&] { (void)read_whole(*open_source(cut, {})); });
     EXPECT_THAT(error.what(), HasSubstr(cut));
     EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos) << error.what();
   }
   const std::string text = folder_ / "notes.txt";
-  write_bytes(text, "this is no raster");
+  write_file(text, "this is no raster");
   const Error error = error_of([&] { (void)open_source(text, {}); });
   EXPECT_EQ(error.code(), ErrorCode::kUnsupported);
   EXPECT_THAT(error.what(), HasSubstr("unknown format; read natively: OpenEXR (.exr)"));
@@ -156,4 +158,4 @@ TEST_F(OiioModule, ReportsTruncationAndForeignFilesInOneLine) {
 }
 
 }  // namespace
-}  // namespace isohf::testing
+}  // namespace isohf::test

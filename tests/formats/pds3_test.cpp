@@ -6,32 +6,36 @@
 #include <random>
 
 #include "formats/pds3_source.h"
+#include "formats/raster_reference.h"
 #include "formats/reader_failure.h"
-#include "formats/real_files.h"
-#include "formats/scratch_folder.h"
 #include "isohf/base/error.h"
+#include "support/real_files.h"
+#include "support/samples.h"
+#include "support/temporary_folder.h"
 
 namespace isohf {
 namespace {
 
 using ::testing::HasSubstr;
 
-class Pds3 : public testing::ScratchFolder {
+class Pds3 : public testing::Test {
  protected:
   std::string write(const std::string& name, const std::string& bytes) const {
-    const std::string path = testing::fresh(folder() / name);
-    testing::write_bytes(path, bytes);
+    const std::string path = folder_ / name;
+    test::write_file(path, bytes);
     return path;
   }
 
   /// What opening and reading the first samples of `bytes` says; empty where it works.
   std::string failure(const std::string& bytes, ErrorCode* code = nullptr) {
     const std::string path = write("a.img", bytes);
-    return testing::failure_of(path, code, [&] {
+    return test::failure_of(path, code, [&] {
       const auto source = open_pds3(path, {});
-      testing::read_corner(*source);
+      test::read_corner(*source);
     });
   }
+
+  const test::TemporaryFolder folder_;
 };
 
 const char* const kImage =
@@ -69,15 +73,15 @@ std::string map(const std::string& fields) {
 }
 
 TEST_F(Pds3, PlacesTheRealMarsByLabelOrData) {
-  const auto lbl = testing::real_data() / "megt90n000cb.lbl";
-  if (!std::filesystem::exists(lbl)) GTEST_SKIP() << "the real files are not there";
+  const auto lbl = test::real_data() / "megt90n000cb.lbl";
+  if (!std::filesystem::exists(lbl)) GTEST_SKIP() << test::kNoRealFiles;
   for (const char* name : {"megt90n000cb.lbl", "megt90n000cb.img"}) {
-    const auto source = open_source((testing::real_data() / name).string(), {});
+    const auto source = open_source((test::real_data() / name).string(), {});
     // GDAL reads this label's 1-based offsets as 0-based, one pixel off; the reference has the label's bounds besides.
-    auto ref = testing::reference_of("megt90n000cb.img");
+    auto ref = test::reference_of("megt90n000cb.img");
     ref["geotransform"] = ref.at("geotransform_from_label_bounds_deg");
     ref["crs"] = nullptr;
-    testing::expect_as_reference(*source, ref, false);
+    test::expect_as_reference(*source, ref);
     const SourceInfo& info = source->info();
     EXPECT_EQ(info.format, "PDS3");
     EXPECT_EQ(info.georeference.unit, HorizontalUnit::kDegree);
@@ -91,26 +95,26 @@ TEST_F(Pds3, PlacesTheRealMarsByLabelOrData) {
 }
 
 TEST_F(Pds3, ReadsTheRealAttachedLabel) {
-  const auto file = testing::real_data() / "derived" / "mola_crop_attached.img";
-  if (!std::filesystem::exists(file)) GTEST_SKIP() << "the real files are not there";
+  const auto file = test::real_data() / "derived" / "mola_crop_attached.img";
+  if (!std::filesystem::exists(file)) GTEST_SKIP() << test::kNoRealFiles;
   const auto source = open_source(file.string(), {});
-  auto ref = testing::reference_of(file);
+  auto ref = test::reference_of(file);
   // The label has no map: neither place nor spacing.
   EXPECT_FALSE(source->info().georeference.has_origin);
   EXPECT_EQ(source->info().georeference.system.body, "Mars");
   EXPECT_EQ(source->info().void_values, std::vector<double>{-32768.0});
-  const auto raw = testing::read_all(*source);
+  const auto raw = test::read_whole(*source);
   for (const char* list : {"pixels", "corners"}) {
     for (const auto& pixel : ref.at(list)) {
       const auto at = static_cast<std::size_t>(pixel.at("row").get<int>() * 700 + pixel.at("col").get<int>());
-      EXPECT_EQ(testing::value_at(SampleType::kInt16, raw, at), pixel.at("raw").get<double>());
+      EXPECT_EQ(test::value_at(SampleType::kInt16, raw, at), pixel.at("raw").get<double>());
     }
   }
 }
 
 TEST_F(Pds3, ReadsTheRealMoonBehindItsLabelNotInside) {
-  const auto file = testing::real_data() / "ldem_4_cropped.img";
-  if (!std::filesystem::exists(file)) GTEST_SKIP() << "the real files are not there";
+  const auto file = test::real_data() / "ldem_4_cropped.img";
+  if (!std::filesystem::exists(file)) GTEST_SKIP() << test::kNoRealFiles;
   const auto source = open_source(file.string(), {});
   const SourceInfo& info = source->info();
   EXPECT_EQ(info.width, 1440);
@@ -127,10 +131,10 @@ TEST_F(Pds3, ReadsTheRealMoonBehindItsLabelNotInside) {
   ASSERT_EQ(info.warnings.size(), 1U);
   EXPECT_THAT(info.warnings.front(),
               HasSubstr("^IMAGE points at byte 2904, inside the label, which ends at byte 2924"));
-  const auto raw = testing::read_all(*source);
-  EXPECT_EQ(testing::value_at(SampleType::kInt16, raw, 0), -10);
+  const auto raw = test::read_whole(*source);
+  EXPECT_EQ(test::value_at(SampleType::kInt16, raw, 0), -10);
   for (std::size_t i = 0; i < 1440; ++i) {
-    EXPECT_LT(std::abs(testing::value_at(SampleType::kInt16, raw, i)), 2000) << i;
+    EXPECT_LT(std::abs(test::value_at(SampleType::kInt16, raw, i)), 2000) << i;
   }
 }
 
@@ -158,9 +162,8 @@ TEST_F(Pds3, ReadsEverySampleType) {
     image = replaced(image, "SAMPLE_BITS = 16", "SAMPLE_BITS = " + std::to_string(kind.bits));
     const auto source = open_source(write("t.img", attached(image) + samples(12, kind.bits / 8, kind.big_endian)), {});
     EXPECT_EQ(source->info().sample_type, kind.type);
-    const auto raw = testing::read_all(*source);
-    for (std::size_t i = 0; i < 12; ++i)
-      EXPECT_EQ(testing::value_at(kind.type, raw, i), 100.0 + static_cast<double>(i));
+    const auto raw = test::read_whole(*source);
+    for (std::size_t i = 0; i < 12; ++i) EXPECT_EQ(test::value_at(kind.type, raw, i), 100.0 + static_cast<double>(i));
   }
   for (const bool big_endian : {false, true}) {
     const std::string image = replaced(replaced(kImage, "MSB_INTEGER", big_endian ? "IEEE_REAL" : "PC_REAL"),
@@ -171,11 +174,11 @@ TEST_F(Pds3, ReadsEverySampleType) {
       for (int b = 0; b < 4; ++b) data.push_back(static_cast<char>(bits >> (8 * (big_endian ? 3 - b : b))));
     }
     const auto source = open_source(write("f.img", attached(image) + data + std::string(36, '\0')), {});
-    const auto raw = testing::read_all(*source);
+    const auto raw = test::read_whole(*source);
     ASSERT_EQ(source->info().sample_type, SampleType::kFloat32);
-    EXPECT_EQ(testing::value_at(SampleType::kFloat32, raw, 0), 1.5);
-    EXPECT_TRUE(testing::is_void(source->info(), testing::value_at(SampleType::kFloat32, raw, 1)));
-    EXPECT_FALSE(testing::is_void(source->info(), testing::value_at(SampleType::kFloat32, raw, 2)));
+    EXPECT_EQ(test::value_at(SampleType::kFloat32, raw, 0), 1.5);
+    EXPECT_TRUE(test::is_void(source->info(), test::value_at(SampleType::kFloat32, raw, 1)));
+    EXPECT_FALSE(test::is_void(source->info(), test::value_at(SampleType::kFloat32, raw, 2)));
     ASSERT_EQ(source->info().void_values.size(), 1U);
   }
 }
@@ -196,9 +199,9 @@ TEST_F(Pds3, ReadsVaxFloats) {
       replaced(replaced(kImage, "MSB_INTEGER", "VAX_REAL"), "SAMPLE_BITS = 16", "SAMPLE_BITS = 32");
   const auto source = open_pds3(write("vax.img", attached(image) + data), {});
   ASSERT_EQ(source->info().sample_type, SampleType::kFloat32);
-  const auto raw = testing::read_all(*source);
+  const auto raw = test::read_whole(*source);
   for (std::size_t i = 0; i < 12; ++i) {
-    EXPECT_EQ(testing::value_at(SampleType::kFloat32, raw, i), wanted[i]) << i;
+    EXPECT_EQ(test::value_at(SampleType::kFloat32, raw, i), wanted[i]) << i;
   }
 }
 
@@ -234,7 +237,7 @@ TEST_F(Pds3, WindowsEqualTheWholeInEveryLayout) {
               std::vector<std::byte> part(static_cast<std::size_t>(n * (3 - r)) * 2);
               source->read_window({c, r, n, 3 - r}, part);
               for (int i = 0; i < n * (3 - r); ++i) {
-                EXPECT_EQ(testing::value_at(SampleType::kInt16, part, static_cast<std::size_t>(i)),
+                EXPECT_EQ(test::value_at(SampleType::kInt16, part, static_cast<std::size_t>(i)),
                           value(band, r + i / n, c + i % n));
               }
             }
@@ -249,7 +252,7 @@ TEST_F(Pds3, FollowsEveryPointer) {
   const std::string data = samples(12, 2, true);
   const std::string label = replaced(attached(), "RECORD_BYTES = 512\r\n", "RECORD_BYTES = 8\r\n");
   const auto first = [&](const std::string& path) {
-    return testing::value_at(SampleType::kInt16, testing::read_all(*open_source(path, {})), 0);
+    return test::value_at(SampleType::kInt16, test::read_whole(*open_source(path, {})), 0);
   };
   EXPECT_EQ(first(write("p.img", replaced(label, "^IMAGE = 3", "^IMAGE = 129") + data)), 100);
   EXPECT_EQ(first(write("p.img", replaced(label, "^IMAGE = 3", "^IMAGE = 1036 <BYTES>") + data + data)), 101);

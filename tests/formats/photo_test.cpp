@@ -7,34 +7,25 @@
 #include <fstream>
 
 #include "formats/photo_place.h"
+#include "formats/reader_failure.h"
 #include "formats/registry.h"
 #include "formats/tiff_bytes.h"
 #include "isohf/base/error.h"
 #include "support/memory_photo.h"
+#include "support/temporary_folder.h"
 
-namespace isohf::testing {
+namespace isohf::test {
 namespace {
 
-using test::noise;
 using ::testing::HasSubstr;
 
-template <typename Action>
-Error error_of(Action action) {
-  try {
-    action();
-  } catch (const Error& error) {
-    return error;
-  }
-  return {ErrorCode::kCancelled, "nothing was thrown"};
-}
-
-class Photo : public ScratchFolder {
+class Photo : public ::testing::Test {
  protected:
   Photo() { set_module_folder(ISOHF_BIN_DIR); }
 
   std::string write(const std::string& name, const std::string& bytes) {
-    const std::string path = (folder() / name).string();
-    std::ofstream(path, std::ios::binary).write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+    const std::string path = folder_ / name;
+    write_file(path, bytes);
     return path;
   }
   /// A portable pixmap (3) or graymap (1) of noise.
@@ -48,6 +39,8 @@ class Photo : public ScratchFolder {
     }
     return write(name, bytes);
   }
+
+  const TemporaryFolder folder_;
 };
 
 std::vector<std::uint8_t> window_of(PhotoSource& photo, const Window& window) {
@@ -166,14 +159,13 @@ TEST_F(Photo, ReadsWorldFilesOfItsOwnExtension) {
 }
 
 TEST_F(Photo, ReportsAMissingAndADamagedFileInOneLine) {
-  EXPECT_EQ(error_of([&] { (void)open_photo((folder() / "none.jpg").string()); }).code(), ErrorCode::kIo);
+  EXPECT_EQ(error_of([&] { (void)open_photo(folder_ / "none.jpg"); }).code(), ErrorCode::kIo);
   const std::string text = write("notes.txt", "this is no picture");
   const Error unknown = error_of([&] { (void)open_photo(text); });
   EXPECT_EQ(unknown.code(), ErrorCode::kUnsupported);
   EXPECT_THAT(unknown.what(), HasSubstr(text));
   const std::string whole = write_pixmap("whole.ppm", 40, 30, 3);
-  std::ifstream file(whole, std::ios::binary);
-  const std::string bytes{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  const std::string bytes = read_file(whole);
   for (std::size_t length = 1; length < bytes.size(); length += 97) {
     const std::string cut = write("cut.ppm", bytes.substr(0, length));
     const Error error = error_of([&] {
@@ -186,4 +178,4 @@ TEST_F(Photo, ReportsAMissingAndADamagedFileInOneLine) {
 }
 
 }  // namespace
-}  // namespace isohf::testing
+}  // namespace isohf::test

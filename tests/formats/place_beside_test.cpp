@@ -5,11 +5,12 @@
 
 #include <filesystem>
 
-#include "formats/raster_reference.h"
+#include "formats/reader_failure.h"
 #include "formats/registry.h"
 #include "isohf/base/error.h"
+#include "support/temporary_folder.h"
 
-namespace isohf::testing {
+namespace isohf::test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -24,14 +25,12 @@ class PlaceBeside : public ::testing::Test {
 
   /// A graymap, which OpenImageIO reads.
   std::string graymap(const std::string& name) {
-    write_bytes(folder_ / name, "P5\n4 2\n255\nabcdefgh");
+    write_file(folder_ / name, "P5\n4 2\n255\nabcdefgh");
     return folder_ / name;
   }
-  void beside(const std::string& name, const std::string& text) {
-    write_bytes(folder_ / name, {text.data(), text.size()});
-  }
+  void beside(const std::string& name, const std::string& text) { write_file(folder_ / name, text); }
 
-  ScratchFolder folder_;
+  TemporaryFolder folder_;
 };
 
 TEST_F(PlaceBeside, WorldFileAndPrjPlaceAPicture) {
@@ -85,4 +84,4 @@ TEST_F(PlaceBeside, WarnsOfDegreesThatNothingNames) {
 }
 
 }  // namespace
-}  // namespace isohf::testing
+}  // namespace isohf::test

@@ -8,10 +8,14 @@
 
 #include "formats/png_source.h"
 #include "formats/raster_reference.h"
+#include "formats/reader_failure.h"
 #include "formats/registry.h"
 #include "isohf/base/error.h"
+#include "support/real_files.h"
+#include "support/samples.h"
+#include "support/temporary_folder.h"
 
-namespace isohf::testing {
+namespace isohf::test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -97,7 +101,7 @@ std::vector<std::byte> expected_whole(const Picture& picture, std::uint32_t chan
 }
 
 TEST(PngSource, ReadsEveryDepthAndChannelAsStored) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const std::string path = folder / "picture.png";
   const std::vector<std::pair<int, std::vector<int>>> kinds = {{PNG_COLOR_TYPE_GRAY, {1, 2, 4, 8, 16}},
                                                                {PNG_COLOR_TYPE_GRAY_ALPHA, {8, 16}},
@@ -130,7 +134,7 @@ TEST(PngSource, ReadsEveryDepthAndChannelAsStored) {
 }
 
 TEST(PngSource, DeliversWindowsInAnyOrder) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const std::string path = folder / "tall.png";
   Picture picture;
   picture.height = 3000;  // more rows than are kept
@@ -144,7 +148,7 @@ TEST(PngSource, DeliversWindowsInAnyOrder) {
 }
 
 TEST(PngSource, WantsToKnowWhatTheColoursOfAPictureAre) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const std::string path = folder / "picture.png";
   Picture picture;
   picture.bit_depth = 8;
@@ -180,15 +184,13 @@ TEST(PngSource, WantsToKnowWhatTheColoursOfAPictureAre) {
 }
 
 TEST(PngSource, UnpacksElevationsAsTheReferenceDoes) {
-  const auto data = shared_data();
-  if (!data) GTEST_SKIP() << "no shared terrain beside this checkout";
+  if (real_files().empty()) GTEST_SKIP() << kNoRealFiles;
   for (const auto& [name, encoding] : {std::pair{"terrarium.png", "terrarium"},
                                        {"derived/n44e006_mapbox.png", "mapbox"},
                                        {"gale_rgba_float_16_57775_31917.png", "rgba-float"}}) {
     SCOPED_TRACE(name);
-    const std::string path = (*data / name).string();
-    const auto expected = nlohmann::json::parse(
-        std::ifstream(*data / "ref" / (std::filesystem::path(name).filename().string() + ".json")));
+    const std::string path = real_data() / name;
+    const auto expected = reference_of(path);
     OpenOptions options;
     options.channel = encoding;
     const auto source = open_source(path, options);
@@ -200,8 +202,9 @@ TEST(PngSource, UnpacksElevationsAsTheReferenceDoes) {
     const auto all = read_whole(*source);
     double low = 1e9;
     double high = -1e9;
-    for (std::size_t at = 0; at < all.size(); at += 4) {
-      const double value = raw_value(info.sample_type, all.data() + at) * info.z_scale + info.z_offset;
+    std::vector<double> elevations = values_of(info.sample_type, all);
+    for (double& value : elevations) {
+      value = value * info.z_scale + info.z_offset;
       low = std::min(low, value);
       high = std::max(high, value);
     }
@@ -209,8 +212,7 @@ TEST(PngSource, UnpacksElevationsAsTheReferenceDoes) {
     EXPECT_DOUBLE_EQ(high, expected.at("max").get<double>());
     for (const auto& pixel : expected.at("pixels")) {
       const auto at = static_cast<std::size_t>(pixel.at("row").get<int>() * info.width + pixel.at("col").get<int>());
-      EXPECT_DOUBLE_EQ(raw_value(info.sample_type, all.data() + 4 * at) * info.z_scale + info.z_offset,
-                       pixel.at("value").get<double>());
+      EXPECT_DOUBLE_EQ(elevations[at], pixel.at("value").get<double>());
     }
     // The bytes leave no doubt: the same without being told, and a warning says so.
     const auto untold = open_source(path, {});
@@ -227,7 +229,7 @@ TEST(PngSource, UnpacksElevationsAsTheReferenceDoes) {
 }
 
 TEST(PngSource, TakesTransparentPixelsOfPackedElevationsAsVoid) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const std::string path = folder / "packed.png";
   Picture picture;
   picture.bit_depth = 8;
@@ -237,15 +239,14 @@ TEST(PngSource, TakesTransparentPixelsOfPackedElevationsAsVoid) {
   options.channel = "mapbox";
   const auto source = open_source(path, options);
   EXPECT_EQ(source->info().void_values, std::vector<double>{-1.0});
-  const auto all = read_whole(*source);
+  const std::vector<double> values = values_of(*source);
   int voids = 0;
   for (std::uint32_t row = 0; row < picture.height; ++row) {
     for (std::uint32_t column = 0; column < picture.width; ++column) {
-      const auto at = static_cast<std::size_t>(row * picture.width + column) * 4;
       const auto channel = [&](std::uint32_t c) { return static_cast<double>(picture.value(column, row, c)); };
       const bool is_void = channel(3) == 0.0;
       voids += is_void ? 1 : 0;
-      ASSERT_EQ(raw_value(SampleType::kInt32, all.data() + at),
+      ASSERT_EQ(values[row * picture.width + column],
                 is_void ? -1.0 : channel(0) * 65536 + channel(1) * 256 + channel(2));
     }
   }
@@ -253,7 +254,7 @@ TEST(PngSource, TakesTransparentPixelsOfPackedElevationsAsVoid) {
 }
 
 TEST(PngSource, UnpacksNothingButColoursOfEightBits) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const std::string path = folder / "picture.png";
   for (const auto& [color_type, depth, encoding] : {std::tuple{PNG_COLOR_TYPE_GRAY, 8, "terrarium"},
                                                     {PNG_COLOR_TYPE_RGB, 16, "mapbox"},
@@ -271,7 +272,7 @@ TEST(PngSource, UnpacksNothingButColoursOfEightBits) {
 }
 
 TEST(PngSource, TakesTransparentGrayAsVoid) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const std::string path = folder / "holes.png";
   Picture picture;
   picture.transparent_gray = 777;
@@ -280,7 +281,7 @@ TEST(PngSource, TakesTransparentGrayAsVoid) {
 }
 
 TEST(PngSource, RefusesPalettesAndUnknownChannels) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const std::string path = folder / "picture.png";
   Picture picture;
   picture.bit_depth = 2;
@@ -301,16 +302,16 @@ TEST(PngSource, RefusesPalettesAndUnknownChannels) {
 }
 
 TEST(PngSource, ReportsEveryTruncation) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const std::string cut = folder / "cut.png";
   for (const bool interlaced : {false, true}) {
     Picture picture;
     picture.interlaced = interlaced;
     const std::string path = folder / "whole.png";
     write_picture(path, picture);
-    const auto bytes = file_bytes(path);
+    const auto bytes = read_file(path);
     for (std::size_t length = 0; length < bytes.size(); ++length) {
-      write_bytes(cut, {bytes.data(), length});
+      write_file(cut, bytes.substr(0, length));
       SCOPED_TRACE(fmt::format("{} of {} bytes", length, bytes.size()));
       const Error error = error_of([&] { (void)read_whole(*open_png(cut, {})); });
       EXPECT_EQ(error.code(), ErrorCode::kCorrupt);
@@ -320,14 +321,14 @@ TEST(PngSource, ReportsEveryTruncation) {
 }
 
 TEST(PngSource, NamesTheRowThatIsMissingAndReadsTheOnesBefore) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const std::string path = folder / "cut.png";
   Picture picture;
   picture.width = 1000;  // tens of kilobytes: libpng reads 8 KiB ahead
   picture.height = 400;
   write_picture(path, picture);
-  const auto bytes = file_bytes(path);
-  write_bytes(path, {bytes.data(), bytes.size() * 9 / 10});
+  const auto bytes = read_file(path);
+  write_file(path, bytes.substr(0, bytes.size() * 9 / 10));
   const auto source = open_png(path, {});
   EXPECT_THAT(error_of([&] { (void)read_whole(*source); }).what(), HasSubstr("PNG row "));
   const Window top = {0, 0, picture.width, 5};
@@ -336,18 +337,18 @@ TEST(PngSource, NamesTheRowThatIsMissingAndReadsTheOnesBefore) {
 }
 
 TEST(PngSource, NeverDeliversASampleThatAFlippedBitChanged) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const std::string path = folder / "flipped.png";
   for (const bool interlaced : {false, true}) {
     Picture picture;
     picture.width = picture.height = 16;
     picture.interlaced = interlaced;
     write_picture(path, picture);
-    const auto bytes = file_bytes(path);
+    const auto bytes = read_file(path);
     for (std::size_t at = 8; at < bytes.size(); ++at) {
       auto changed = bytes;
       changed[at] = static_cast<char>(changed[at] ^ 0x10);
-      write_bytes(path, {changed.data(), changed.size()});
+      write_file(path, changed);
       try {
         EXPECT_EQ(read_whole(*open_png(path, {})), expected_whole(picture)) << "byte " << at;
       } catch (const Error& error) {
@@ -359,26 +360,26 @@ TEST(PngSource, NeverDeliversASampleThatAFlippedBitChanged) {
 
 /// A PNG header with a right checksum and any numbers.
 void write_header_only(const std::string& path, std::uint32_t width, std::uint32_t height, int interlace) {
-  std::vector<unsigned char> bytes = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1A, '\n', 0, 0, 0, 13, 'I', 'H', 'D', 'R'};
+  std::string bytes("\x89PNG\r\n\x1A\n\0\0\0\rIHDR", 16);
   const auto put = [&](std::uint32_t value) {
-    for (const unsigned shift : {24U, 16U, 8U, 0U}) bytes.push_back(static_cast<unsigned char>(value >> shift));
+    for (const unsigned shift : {24U, 16U, 8U, 0U}) bytes.push_back(static_cast<char>(value >> shift));
   };
   put(width);
   put(height);
-  for (const int field : {16, 0, 0, 0, interlace}) bytes.push_back(static_cast<unsigned char>(field));
+  for (const int field : {16, 0, 0, 0, interlace}) bytes.push_back(static_cast<char>(field));
   std::uint32_t crc = 0xFFFFFFFFU;
   for (std::size_t at = 12; at < bytes.size(); ++at) {
-    crc ^= bytes[at];
+    crc ^= static_cast<unsigned char>(bytes[at]);
     for (int bit = 0; bit < 8; ++bit) crc = (crc >> 1U) ^ ((crc & 1U) != 0 ? 0xEDB88320U : 0U);
   }
   put(~crc);
-  for (const char c : std::string("\0\0\0\0IDAT", 8)) bytes.push_back(static_cast<unsigned char>(c));
+  bytes += std::string("\0\0\0\0IDAT", 8);
   put(0x35AF061EU);
-  write_bytes(path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+  write_file(path, bytes);
 }
 
 TEST(PngSource, RefusesAbsurdSizesBeforeAllocating) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const std::string path = folder / "absurd.png";
   for (const auto& [width, height] : {std::pair{0x7FFFFFFFU, 1U}, {0x7FFFFFFFU, 0x7FFFFFFFU}, {100000U, 100000U}}) {
     write_header_only(path, width, height, 0);
@@ -393,13 +394,14 @@ TEST(PngSource, RefusesAbsurdSizesBeforeAllocating) {
 }
 
 TEST(PngSource, AgreesWithReferenceReadersOnRealFiles) {
-  const auto files = references(".png");
-  if (files.empty()) GTEST_SKIP() << "no shared terrain beside this checkout";
-  for (const Reference& file : files) {
-    SCOPED_TRACE(file.path);
-    const auto source = open_source(file.path, {});
-    if (file.expected.at("dtype") == "UInt16") {
-      expect_matches(*source, file.expected);
+  const auto files = real_files({".png"});
+  if (files.empty()) GTEST_SKIP() << kNoRealFiles;
+  for (const auto& file : files) {
+    SCOPED_TRACE(file);
+    const auto source = open_source(file, {});
+    const auto ref = reference_of(file);
+    if (ref.at("dtype") == "UInt16") {
+      expect_as_reference(*source, ref);
       EXPECT_TRUE(source->info().warnings.empty());
     } else {  // UnpacksElevationsAsTheReferenceDoes compares them
       EXPECT_EQ(source->info().warnings.size(), 1U);
@@ -408,4 +410,4 @@ TEST(PngSource, AgreesWithReferenceReadersOnRealFiles) {
 }
 
 }  // namespace
-}  // namespace isohf::testing
+}  // namespace isohf::test

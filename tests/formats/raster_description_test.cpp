@@ -8,12 +8,14 @@
 #include <fstream>
 #include <iterator>
 
-#include "formats/raster_reference.h"
 #include "formats/raster_sink.h"
+#include "formats/reader_failure.h"
 #include "formats/registry.h"
 #include "isohf/base/error.h"
+#include "support/samples.h"
+#include "support/temporary_folder.h"
 
-namespace isohf::testing {
+namespace isohf::test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -57,7 +59,7 @@ std::vector<float> elevations_of(HeightSource& source) {
 }
 
 TEST(RasterDescription, GivesAPngPlaceAndMeaning) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const std::string path = folder / "a.png";
   write_picture(path);
   const auto source = open_source(path, {});
@@ -82,7 +84,7 @@ TEST(RasterDescription, GivesAPngPlaceAndMeaning) {
 }
 
 TEST(RasterDescription, IsOverruledByTheUser) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const std::string path = folder / "a.png";
   write_picture(path);
   OpenOptions options;
@@ -99,11 +101,11 @@ TEST(RasterDescription, IsOverruledByTheUser) {
 }
 
 TEST(RasterDescription, OfAnotherProgramIsLeftAsideWithAWarning) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const std::string path = folder / "a.png";
   write_picture(path);
   std::filesystem::remove(path + ".json");
-  write_bytes(path + ".json", R"({"z_scale": 9, "tiles": []})");
+  write_file(path + ".json", R"({"z_scale": 9, "tiles": []})");
   const auto source = open_source(path, {});
   EXPECT_EQ(source->info().z_scale, 1.0);
   ASSERT_EQ(source->info().warnings.size(), 1U);
@@ -111,14 +113,14 @@ TEST(RasterDescription, OfAnotherProgramIsLeftAsideWithAWarning) {
 }
 
 TEST(RasterDescription, IsRefusedWhereItIsDamaged) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const std::string path = folder / "a.png";
   write_picture(path);
   std::ifstream in(path + ".json");
   const std::string good{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
   const auto error_with = [&](const std::string& text) {
     std::filesystem::remove(path + ".json");
-    write_bytes(path + ".json", {text.data(), text.size()});
+    write_file(path + ".json", text);
     const Error error = error_of([&] { (void)open_source(path, {}); });
     const std::string what = error.what();
     EXPECT_EQ(error.code(), ErrorCode::kCorrupt);
@@ -155,4 +157,4 @@ TEST(RasterDescription, IsRefusedWhereItIsDamaged) {
 }
 
 }  // namespace
-}  // namespace isohf::testing
+}  // namespace isohf::test

@@ -1,160 +1,104 @@
 #pragma once
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <filesystem>
 #include <fstream>
-#include <limits>
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <string>
 #include <vector>
 
-#include "isohf/base/error.h"
-#include "isohf/surface/height_source.h"
-#include "support/write_bytes.h"
+#include "support/real_files.h"
+#include "support/samples.h"
 
-/// What the tests of raster readers share: scratch folders, whole-raster reads, and the reference values of real files.
-namespace isohf::testing {
+namespace isohf::test {
 
-/// A folder that goes away with the test.
-class ScratchFolder {
- public:
-  ScratchFolder() {
-    std::string pattern = (std::filesystem::temp_directory_path() / "isohf_test_XXXXXX").string();
-    folder_ = ::mkdtemp(pattern.data());
+/// What another reader, GDAL for most, found in one of the real files.
+inline nlohmann::json reference_of(const std::filesystem::path& file) {
+  return nlohmann::json::parse(std::ifstream(real_data() / "ref" / (file.filename().string() + ".json")));
+}
+
+/// GDAL's rows of some files run from South to North, ours never do: its row r is then our row height - 1 - r.
+inline bool is_turned(const nlohmann::json& ref) {
+  return ref.at("geotransform").is_array() && ref.at("geotransform")[5].get<double>() > 0.0;
+}
+
+inline std::int64_t our_row(const nlohmann::json& ref, const nlohmann::json& pixel, std::int64_t height) {
+  const std::int64_t row = pixel.at("row");
+  return is_turned(ref) ? height - 1 - row : row;
+}
+
+/// GDAL's geotransform names the corner of the pixel, isohf the sample itself.
+inline void expect_reference_place(const Georeference& place, const nlohmann::json& gt, std::int64_t height) {
+  if (gt.is_null()) {
+    EXPECT_FALSE(place.has_origin);
+    return;
   }
-  ScratchFolder(const ScratchFolder&) = delete;
-  ScratchFolder& operator=(const ScratchFolder&) = delete;
-  ~ScratchFolder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(folder_, ignored);
+  const double dx = gt[1];
+  const double dy = gt[5];
+  // Sums of half pixels in another order differ in the last bits of coordinates up to 1e7.
+  const double tolerance = 1e-9 * std::max({1.0, std::abs(gt[0].get<double>()), std::abs(gt[3].get<double>())});
+  EXPECT_TRUE(place.has_origin);
+  EXPECT_NEAR(place.spacing_x, dx, 1e-15 * dx);
+  EXPECT_NEAR(place.spacing_y, std::abs(dy), 1e-15 * std::abs(dy));
+  EXPECT_NEAR(place.origin_x, gt[0].get<double>() + dx / 2, tolerance);
+  const double first_row = dy > 0.0 ? static_cast<double>(height) - 0.5 : 0.5;
+  EXPECT_NEAR(place.origin_y, gt[3].get<double>() + first_row * dy, tolerance);
+}
+
+/// Holds what `source` delivers against the reference of the same file.
+inline void expect_as_reference(HeightSource& source, const nlohmann::json& ref) {
+  const SourceInfo& info = source.info();
+  ASSERT_EQ(info.width, ref.at("width").get<std::int64_t>());
+  ASSERT_EQ(info.height, ref.at("height").get<std::int64_t>());
+  std::string type = ref.at("dtype");
+  std::transform(type.begin(), type.end(), type.begin(), [](unsigned char c) { return std::tolower(c); });
+  EXPECT_EQ(to_string(info.sample_type), type);
+
+  const Georeference& geo = info.georeference;
+  expect_reference_place(geo, ref.at("geotransform"), info.height);
+  if (ref.at("area_or_point").is_string()) {
+    EXPECT_EQ(geo.registration, ref.at("area_or_point") == "Point" ? Registration::kPoint : Registration::kArea);
   }
-  [[nodiscard]] std::string operator/(const std::string& name) const { return (folder_ / name).string(); }
-
- private:
-  std::filesystem::path folder_;
-};
-
-inline std::vector<char> file_bytes(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-}
-
-inline std::vector<std::byte> read_window(HeightSource& source, const Window& window) {
-  std::vector<std::byte> samples(static_cast<std::size_t>(window.columns * window.rows) *
-                                 size_bytes(source.info().sample_type));
-  source.read_window(window, samples);
-  return samples;
-}
-
-inline Window whole(const HeightSource& source) {
-  return {0, 0, source.info().width, source.info().height};
-}
-
-inline std::vector<std::byte> read_whole(HeightSource& source) {
-  return read_window(source, whole(source));
-}
-
-/// One raw sample as a double.
-inline double raw_value(SampleType type, const std::byte* at) {
-  const auto load = [&](auto value) {
-    std::memcpy(&value, at, sizeof value);
-    return value;
-  };
-  switch (type) {
-    case SampleType::kUint8:
-      return load(std::uint8_t{});
-    case SampleType::kInt8:
-      return load(std::int8_t{});
-    case SampleType::kUint16:
-      return load(std::uint16_t{});
-    case SampleType::kInt16:
-      return load(std::int16_t{});
-    case SampleType::kUint32:
-      return load(std::uint32_t{});
-    case SampleType::kInt32:
-      return load(std::int32_t{});
-    case SampleType::kFloat16:
-      return static_cast<double>(float_from_half(load(std::uint16_t{})));
-    case SampleType::kFloat32:
-      return static_cast<double>(load(float{}));
-    case SampleType::kFloat64:
-      return load(double{});
+  if (ref.at("crs").is_object() && ref.at("crs").at("epsg").is_number()) {
+    EXPECT_EQ(geo.system.epsg, ref.at("crs").at("epsg").get<int>());
   }
-  return std::numeric_limits<double>::quiet_NaN();
-}
+  EXPECT_EQ(info.z_scale, ref.at("scale").get<double>());
+  EXPECT_EQ(info.z_offset, ref.at("offset").get<double>());
 
-/// The folder of real terrain beside the repository; nullopt where a checkout has none.
-inline std::optional<std::filesystem::path> shared_data() {
-  const std::filesystem::path folder = std::filesystem::path(ISOHF_SOURCE_DIR) / ".." / "shared" / "data";
-  if (!std::filesystem::is_directory(folder)) return std::nullopt;
-  return folder;
-}
-
-struct Reference {
-  std::string path;
-  nlohmann::json expected;
-};
-
-/// Every real file whose name ends in `extension`, with the values that another reader found in it.
-inline std::vector<Reference> references(const std::string& extension) {
-  std::vector<Reference> found;
-  const auto folder = shared_data();
-  if (!folder) return found;
-  for (const auto& entry : std::filesystem::directory_iterator(*folder / "ref")) {
-    const std::string name = entry.path().stem().string();
-    if (entry.path().extension() != ".json" || std::filesystem::path(name).extension() != extension) continue;
-    for (const auto& candidate : {*folder / name, *folder / "derived" / name}) {
-      if (std::filesystem::exists(candidate)) {
-        found.push_back({candidate.string(), nlohmann::json::parse(std::ifstream(entry.path()))});
+  const std::vector<double> values = values_of(info.sample_type, read_whole(source));
+  double lowest = INFINITY;
+  double highest = -INFINITY;
+  double sum = 0.0;
+  std::int64_t voids = 0;
+  for (const double value : values) {
+    if (is_void(info, value)) {
+      ++voids;
+      continue;
+    }
+    lowest = std::min(lowest, value);
+    highest = std::max(highest, value);
+    sum += value;
+  }
+  EXPECT_EQ(voids, ref.at("nodata_count").get<std::int64_t>() + ref.at("inf_count").get<std::int64_t>());
+  EXPECT_EQ(lowest, ref.at("raw_min").get<double>());
+  EXPECT_EQ(highest, ref.at("raw_max").get<double>());
+  const double mean = sum / static_cast<double>(static_cast<std::int64_t>(values.size()) - voids);
+  // The reference sums in another order.
+  EXPECT_NEAR(mean, ref.at("raw_mean").get<double>(), 1e-9 * std::max(1.0, std::abs(mean)));
+  for (const char* list : {"pixels", "corners"}) {
+    for (const auto& pixel : ref.at(list)) {
+      const std::int64_t column = pixel.at("col");
+      const double value = values[static_cast<std::size_t>(our_row(ref, pixel, info.height) * info.width + column)];
+      if (pixel.at("raw").is_string()) {
+        EXPECT_FALSE(std::isfinite(value)) << pixel;
+      } else {
+        EXPECT_EQ(value, pixel.at("raw").get<double>()) << pixel;
       }
     }
   }
-  return found;
 }
 
-/// Compares size, listed pixels, minimum and maximum of the raw samples, voids left out.
-inline void expect_matches(HeightSource& source, const nlohmann::json& expected) {
-  const SourceInfo& info = source.info();
-  ASSERT_EQ(info.width, expected.at("width").get<std::int64_t>());
-  ASSERT_EQ(info.height, expected.at("height").get<std::int64_t>());
-  std::string type = expected.at("dtype").get<std::string>();
-  for (char& c : type) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  EXPECT_EQ(to_string(info.sample_type), type);
-  const std::size_t size = size_bytes(info.sample_type);
-  const auto samples = read_whole(source);
-  for (const auto& pixel : expected.at("pixels")) {
-    if (!pixel.at("raw").is_number()) continue;
-    const auto at = static_cast<std::size_t>(pixel.at("row").get<std::int64_t>() * info.width +
-                                             pixel.at("col").get<std::int64_t>());
-    EXPECT_EQ(raw_value(info.sample_type, samples.data() + at * size), pixel.at("raw").get<double>())
-        << "column " << pixel.at("col") << " row " << pixel.at("row");
-  }
-  double lowest = std::numeric_limits<double>::infinity();
-  double highest = -lowest;
-  for (std::size_t at = 0; at < samples.size(); at += size) {
-    const double value = raw_value(info.sample_type, samples.data() + at);
-    lowest = std::min(lowest, value);
-    highest = std::max(highest, value);
-  }
-  EXPECT_EQ(lowest, expected.at("raw_min").get<double>());
-  EXPECT_EQ(highest, expected.at("raw_max").get<double>());
-}
-
-/// The code and message of the Error that `action` throws; fails the test where it throws none.
-template <typename Action>
-Error error_of(Action action) {
-  try {
-    action();
-  } catch (const Error& error) {
-    return error;
-  }
-  ADD_FAILURE() << "no error";
-  return {ErrorCode::kCancelled, ""};
-}
-
-}  // namespace isohf::testing
+}  // namespace isohf::test

@@ -5,13 +5,17 @@
 #include <sys/resource.h>
 
 #include <csignal>
+#include <nlohmann/json.hpp>
 #include <random>
 
-#include "formats/raster_reference.h"
+#include "formats/reader_failure.h"
 #include "formats/registry.h"
 #include "isohf/base/error.h"
+#include "support/real_files.h"
+#include "support/samples.h"
+#include "support/temporary_folder.h"
 
-namespace isohf::testing {
+namespace isohf::test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -70,7 +74,7 @@ bool can_store(const std::string& extension, SampleType type) {
 }
 
 TEST(RasterSink, RoundTripsEverySampleTypeAndChannel) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   for (const std::string extension : {".tif", ".TIFF", ".exr", ".png"}) {
     for (const SampleType type : kAllTypes) {
       if (!can_store(extension, type)) continue;
@@ -99,7 +103,7 @@ TEST(RasterSink, RoundTripsEverySampleTypeAndChannel) {
 }
 
 TEST(RasterSink, RoundTripsManyStripsAndLongRows) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   for (const auto& [width, height] : {std::pair{3000, 400}, {200000, 3}, {1, 5000}}) {
     for (const std::string extension : {".tif", ".exr"}) {
       const RasterSpec spec = spec_of(width, height, SampleType::kFloat32);
@@ -129,21 +133,14 @@ RasterSpec placed(std::int64_t width, std::int64_t height, SampleType type, doub
 }
 
 /// The same samples as numbers; NaN for what is void.
-std::vector<double> values_of(HeightSource& source) {
-  const SourceInfo& info = source.info();
-  const auto raw = read_whole(source);
-  std::vector<double> values;
-  for (std::size_t at = 0; at < raw.size(); at += size_bytes(info.sample_type)) {
-    const double value = raw_value(info.sample_type, raw.data() + at);
-    const bool is_void = !std::isfinite(value) || value < info.valid_min || value > info.valid_max ||
-                         std::find(info.void_values.begin(), info.void_values.end(), value) != info.void_values.end();
-    values.push_back(is_void ? std::nan("") : value);
-  }
+std::vector<double> values_or_nan(HeightSource& source) {
+  std::vector<double> values = values_of(source);
+  for (double& value : values) value = is_void(source.info(), value) ? std::nan("") : value;
   return values;
 }
 
 TEST(RasterSink, GridsAndPlainSamplesReadBackWithPlaceAndVoids) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   int round = 0;
   for (const std::string extension : {".asc", ".flt", ".r16", ".r32", ".raw", ".npy"}) {
     for (const double spacing_y : {10.0, 12.5}) {
@@ -187,7 +184,7 @@ TEST(RasterSink, GridsAndPlainSamplesReadBackWithPlaceAndVoids) {
         const SourceInfo& info = source->info();
         ASSERT_EQ(info.width, 5);
         ASSERT_EQ(info.height, 4);
-        std::vector<double> found = values_of(*source);
+        std::vector<double> found = values_or_nan(*source);
         if (extension == ".npy") {  // has no void value
           EXPECT_EQ(info.sample_type, type);
           if (!is_floating(type)) wanted[9] = 7.0;
@@ -219,7 +216,7 @@ TEST(RasterSink, GridsAndPlainSamplesReadBackWithPlaceAndVoids) {
 }
 
 TEST(RasterSink, WritesSidecarsWithTheRasterOrNotAtAll) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const RasterSpec spec = placed(6, 4, SampleType::kFloat32, 10.0);
   { const auto abandoned = create_raster(folder / "a.flt", spec); }
   EXPECT_TRUE(std::filesystem::is_empty(folder / "."));
@@ -227,10 +224,10 @@ TEST(RasterSink, WritesSidecarsWithTheRasterOrNotAtAll) {
   EXPECT_TRUE(std::filesystem::exists(folder / "a.hdr"));
   EXPECT_TRUE(std::filesystem::exists(folder / "a.prj"));
   write(folder / "a.asc", spec, noise(spec), 4);  // the .prj is there already, and the same
-  write_bytes(folder / "b.hdr", "mine");
+  write_file(folder / "b.hdr", "mine");
   const Error error = error_of([&] { (void)create_raster(folder / "b.flt", spec); });
   EXPECT_EQ(error.what(), folder / "b.flt: " + (folder / "b.hdr: exists already (--overwrite replaces it)"));
-  EXPECT_EQ(file_bytes(folder / "b.hdr"), (std::vector<char>{'m', 'i', 'n', 'e'}));
+  EXPECT_EQ(read_file(folder / "b.hdr"), "mine");
   RasterSpec picture = placed(6, 4, SampleType::kUint16, 10.0);
   write(folder / "c.png", picture, noise(picture), 4);
   EXPECT_FALSE(std::filesystem::exists(folder / "c.png.json"));
@@ -245,13 +242,12 @@ TEST(RasterSink, WritesSidecarsWithTheRasterOrNotAtAll) {
 }
 
 TEST(RasterSink, RefusesADescriptionThatIsWrong) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const std::string path = folder / "a.r16";
   const std::string good = R"({"width": 2, "height": 2, "sample_type": "uint16", "byte_order": "little")";
   const auto says = [&](const std::string& json) {
-    std::filesystem::remove(path + ".json");
-    write_bytes(path, "12345678");
-    write_bytes(path + ".json", {json.data(), json.size()});
+    write_file(path, "12345678");
+    write_file(path + ".json", json);
     const Error error = error_of([&] { (void)open_source(path, {}); });
     EXPECT_EQ(error.code(), ErrorCode::kCorrupt);
     return std::string(error.what());
@@ -270,17 +266,17 @@ TEST(RasterSink, RefusesADescriptionThatIsWrong) {
 }
 
 TEST(RasterSink, BeginsBigTiffWhereClassicTiffEnds) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   for (const auto& [side, magic] : {std::pair{1000, 42}, {40000, 43}}) {
     const auto sink = create_raster(folder / "large.tif", spec_of(side, side, SampleType::kFloat32));
-    const std::vector<char> head = file_bytes(folder / "large.tif.part");
+    const std::string head = read_file(folder / "large.tif.part");
     ASSERT_GE(head.size(), 4U);
     EXPECT_EQ(head[2], magic);
   }
 }
 
 TEST(RasterSink, WritesHgtTilesOfTheSizesThatExist) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const RasterSpec spec = spec_of(1201, 1201, SampleType::kInt16);
   const auto samples = noise(spec);
   const std::string path = folder / "N44E006.hgt";
@@ -297,7 +293,7 @@ TEST(RasterSink, WritesHgtTilesOfTheSizesThatExist) {
 }
 
 TEST(RasterSink, KeepsVoidScaleAndUnitInTiff) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const std::string path = folder / "void.tif";
   for (const auto& [type, value] : {std::pair{SampleType::kInt16, -32768.0},
                                     {SampleType::kFloat32, static_cast<double>(-3.4028235e38F)},
@@ -342,12 +338,12 @@ void expect_same_place(const Georeference& a, const Georeference& b) {
 }
 
 TEST(RasterSink, KeepsTheGeoreferenceOfRealFilesInTiff) {
-  const auto files = references(".tif");
-  if (files.empty()) GTEST_SKIP() << "no shared terrain beside this checkout";
-  const ScratchFolder folder;
-  for (const Reference& file : files) {
-    SCOPED_TRACE(file.path);
-    const SourceInfo original = open_source(file.path, {})->info();
+  const auto files = real_files({".tif"});
+  if (files.empty()) GTEST_SKIP() << kNoRealFiles;
+  const TemporaryFolder folder;
+  for (const auto& file : files) {
+    SCOPED_TRACE(file);
+    const SourceInfo original = open_source(file, {})->info();
     RasterSpec spec = spec_of(6, 4, original.sample_type);
     spec.georeference = original.georeference;
     spec.vertical_unit = original.vertical_unit;
@@ -364,7 +360,7 @@ TEST(RasterSink, KeepsTheGeoreferenceOfRealFilesInTiff) {
 }
 
 TEST(RasterSink, KeepsTransparentGrayInPng) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const std::string path = folder / "void.png";
   RasterSpec spec = spec_of(5, 4, SampleType::kUint16);
   spec.void_value = 65535.0;
@@ -375,7 +371,7 @@ TEST(RasterSink, KeepsTransparentGrayInPng) {
 }
 
 TEST(RasterSink, LeavesNothingBehindUnlessFinished) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   for (const char* extension : {".tif", ".exr", ".png"}) {
     const std::string path = folder / (std::string("half") + extension);
     const RasterSpec spec =
@@ -396,7 +392,7 @@ TEST(RasterSink, LeavesNothingBehindUnlessFinished) {
 }
 
 TEST(RasterSink, ReplacesAFileOnlyWhenTold) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const std::string path = folder / "here.tif";
   RasterSpec spec = spec_of(4, 4, SampleType::kInt16);
   write(path, spec, noise(spec), 4);
@@ -414,7 +410,7 @@ TEST(RasterSink, ReplacesAFileOnlyWhenTold) {
 }
 
 TEST(RasterSink, RefusesWhatItCannotWriteAndLeavesNothing) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const RasterSpec good = spec_of(4, 4, SampleType::kFloat32);
   Error error = error_of([&] { (void)create_raster(folder / "a.jpg", good); });
   EXPECT_EQ(error.code(), ErrorCode::kUnsupported);
@@ -458,7 +454,7 @@ class FileSizeLimit {
 };
 
 TEST(RasterSink, ReportsADiskThatIsFull) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   for (const std::string name : {"full.tif", "full.exr", "full.png", "N00E000.hgt", "full.asc", "full.npy"}) {
     const RasterSpec spec = spec_of(1201, 1201,
                                     name == "full.exr"   ? SampleType::kFloat32
@@ -482,4 +478,4 @@ TEST(RasterSink, ReportsADiskThatIsFull) {
 }
 
 }  // namespace
-}  // namespace isohf::testing
+}  // namespace isohf::test

@@ -6,10 +6,13 @@
 #include <array>
 
 #include "formats/raster_reference.h"
-#include "formats/real_files.h"
+#include "formats/reader_failure.h"
 #include "isohf/base/error.h"
+#include "support/real_files.h"
+#include "support/samples.h"
+#include "support/temporary_folder.h"
 
-namespace isohf::testing {
+namespace isohf::test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -21,16 +24,16 @@ OpenOptions raw(const std::string& layout) {
   return options;
 }
 
-std::string write(const ScratchFolder& folder, const std::string& name, std::size_t bytes) {
-  std::vector<char> data(bytes);
+std::string write(const TemporaryFolder& folder, const std::string& name, std::size_t bytes) {
+  std::string data(bytes, '\0');
   for (std::size_t i = 0; i < bytes; ++i) data[i] = static_cast<char>(i * 37 + 5);
-  write_bytes(folder / name, {data.data(), data.size()});
+  write_file(folder / name, data);
   return folder / name;
 }
 
 TEST(RawSource, DeliversRealFilesAsTheReferenceDoes) {
   const auto files = real_files({".r16"});
-  if (files.empty()) GTEST_SKIP() << "the real files are not there";
+  if (files.empty()) GTEST_SKIP() << kNoRealFiles;
   for (const auto& file : files) {
     SCOPED_TRACE(file.string());
     const auto expected = reference_of(file);
@@ -40,7 +43,7 @@ TEST(RawSource, DeliversRealFilesAsTheReferenceDoes) {
     EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
     EXPECT_THAT(error.what(), HasSubstr("--raw " + size + "x" + size + ":u16le"));
     const auto source = open_source(file.string(), raw(size + "x" + size + ":u16le"));
-    expect_matches(*source, expected);
+    expect_as_reference(*source, expected);
     EXPECT_EQ(source->info().georeference.registration, Registration::kUnknown);
     EXPECT_FALSE(source->info().georeference.has_origin);
   }
@@ -67,7 +70,7 @@ TEST(RawLayout, IsReadFromItsText) {
 }
 
 TEST(RawSource, ReadsEveryTypeInBothByteOrders) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   constexpr std::array<std::pair<const char*, SampleType>, 8> kTypes = {{{"u8", SampleType::kUint8},
                                                                          {"i8", SampleType::kInt8},
                                                                          {"u16", SampleType::kUint16},
@@ -80,7 +83,7 @@ TEST(RawSource, ReadsEveryTypeInBothByteOrders) {
     const std::size_t size = size_bytes(type);
     for (const std::string order : {"le", "be"}) {
       const std::string path = write(folder, "samples", 15 * size);
-      auto wanted = file_bytes(path);
+      auto wanted = read_file(path);
       if (order == "be") {
         for (std::size_t i = 0; i < wanted.size(); i += size) {
           std::reverse(wanted.begin() + static_cast<std::ptrdiff_t>(i),
@@ -92,7 +95,7 @@ TEST(RawSource, ReadsEveryTypeInBothByteOrders) {
       for (std::int64_t row = 0; row < 3; ++row) {
         for (std::int64_t column = 0; column < 5; ++column) {
           for (std::int64_t columns = 1; columns <= 5 - column; ++columns) {
-            const auto part = testing::read_window(*source, {column, row, columns, 3 - row});
+            const auto part = read_window(*source, {column, row, columns, 3 - row});
             for (std::int64_t i = 0; i < columns * (3 - row); ++i) {
               const auto at = static_cast<std::size_t>((row + i / columns) * 5 + column + i % columns);
               ASSERT_EQ(0,
@@ -107,7 +110,7 @@ TEST(RawSource, ReadsEveryTypeInBothByteOrders) {
 }
 
 TEST(RawSource, WantsExactlyTheBytesOfItsLayout) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   for (std::size_t bytes = 1; bytes < 30; ++bytes) {
     const std::string path = write(folder, "terrain.r16", bytes);
     if (bytes == 24) {
@@ -122,7 +125,7 @@ TEST(RawSource, WantsExactlyTheBytesOfItsLayout) {
 }
 
 TEST(RawSource, AsksForALayoutByName) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const auto what = [&](const std::string& name, std::size_t bytes) {
     const Error error = error_of([&] { (void)open_source(write(folder, name, bytes), {}); });
     EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
@@ -138,8 +141,8 @@ TEST(RawSource, AsksForALayoutByName) {
 }
 
 TEST(RawSource, GoesBeforeNameAndContent) {
-  const ScratchFolder folder;
-  write_bytes(folder / "a.png", "\x89PNG\r\n\x1A\n");
+  const TemporaryFolder folder;
+  write_file(folder / "a.png", "\x89PNG\r\n\x1A\n");
   EXPECT_EQ(open_source(folder / "a.png", raw("2x2:u16be"))->info().format, "raw samples");
   OpenOptions channel = raw("2x2:u16be");
   channel.channel = "1";
@@ -147,9 +150,9 @@ TEST(RawSource, GoesBeforeNameAndContent) {
 }
 
 TEST(RawSource, TakesFloatsBeyondAnyHeightAsVoid) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const std::array<float, 4> samples = {1.0F, -3.4e38F, NAN, 8848.0F};
-  write_bytes(folder / "a.f32", {reinterpret_cast<const char*>(samples.data()), sizeof(samples)});
+  write_file(folder / "a.f32", std::as_bytes(std::span(samples)));
   const auto source = open_source(folder / "a.f32", raw("4x1:f32le"));
   const auto read = read_whole(*source);
   for (std::size_t i = 0; i < 4; ++i) {
@@ -158,4 +161,4 @@ TEST(RawSource, TakesFloatsBeyondAnyHeightAsVoid) {
 }
 
 }  // namespace
-}  // namespace isohf::testing
+}  // namespace isohf::test

@@ -13,20 +13,15 @@
 #include "formats/npy_source.h"
 #include "formats/pds3_source.h"
 #include "formats/png_source.h"
-#include "formats/raster_reference.h"
 #include "formats/raster_sink.h"
 #include "formats/raw_source.h"
 #include "formats/tiff_source.h"
 #include "formats/usgs_dem_source.h"
 #include "formats/zip_archive.h"
+#include "support/temporary_folder.h"
 
-namespace isohf::testing {
+namespace isohf::test {
 namespace {
-
-std::string text_of(const std::string& path) {
-  const std::vector<char> bytes = file_bytes(path);
-  return {bytes.begin(), bytes.end()};
-}
 
 /// `count` numbers of `size` bytes, little-endian, rising.
 std::string counting(int count, int size) {
@@ -38,7 +33,7 @@ std::string counting(int count, int size) {
 }
 
 /// Written by isohf's own writer.
-std::string written(const ScratchFolder& folder, const std::string& name, std::int64_t width, std::int64_t height,
+std::string written(const TemporaryFolder& folder, const std::string& name, std::int64_t width, std::int64_t height,
                     SampleType type, int channels = 1) {
   RasterSpec spec;
   spec.width = width;
@@ -62,7 +57,7 @@ std::string written(const ScratchFolder& folder, const std::string& name, std::i
   for (std::size_t i = 0; i < samples.size(); ++i) samples[i] = static_cast<std::byte>(i * 37 % 61);
   sink->write_rows(samples);
   sink->finish();
-  return text_of(folder / name);
+  return read_file(folder / name);
 }
 
 struct TiffTag {
@@ -258,7 +253,7 @@ const char* const kWkt =
 }  // namespace
 
 std::vector<ReaderCase> reader_cases() {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const std::string esri = "ncols 4\nnrows 3\nxllcorner 100\nyllcorner 200.5\ncellsize 10\nNODATA_value -9999\n";
   const std::string numbers = "1 2.5 3 4\n5 -9999 7e1 8\n9 10 nan 12\n";
   const std::string grass = "north: 200\nsouth: 180\neast: 130\nwest: 100\nrows: 2\ncols: 3\nnull: -1\ntype: int\n";
@@ -309,7 +304,7 @@ std::vector<ReaderCase> reader_cases() {
   find("Isis3Label").beside = {{"core.cub", counting(24, 2)}};
   ReaderCase& raw = find("RawDescription");
   (void)written(folder, "a.r16", 4, 3, SampleType::kUint16);
-  raw.bytes = text_of(folder / "a.r16.json");
+  raw.bytes = read_file(folder / "a.r16.json");
   raw.opened = "a.r16";
   raw.beside = {{"a.r16", counting(12, 2)}};
   for (const char* name :
@@ -331,4 +326,4 @@ std::vector<ReaderCase> reader_cases() {
   return cases;
 }
 
-}  // namespace isohf::testing
+}  // namespace isohf::test

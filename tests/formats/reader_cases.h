@@ -7,7 +7,7 @@
 
 #include "formats/registry.h"
 
-namespace isohf::testing {
+namespace isohf::test {
 
 /// A small valid file of one format, and the reader that must survive whatever becomes of it.
 struct ReaderCase {
@@ -28,4 +28,4 @@ struct ReaderCase {
 /// own, which is removed again.
 [[nodiscard]] std::vector<ReaderCase> reader_cases();
 
-}  // namespace isohf::testing
+}  // namespace isohf::test

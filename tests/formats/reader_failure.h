@@ -3,23 +3,18 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cstddef>
 #include <cstdint>
 #include <string>
-#include <vector>
 
 #include "isohf/base/error.h"
-#include "isohf/surface/height_source.h"
-#include "support/write_bytes.h"
+#include "support/samples.h"
 
-namespace isohf::testing {
+namespace isohf::test {
 
 /// Reads the North-West corner, 512 x 64 samples at most.
 inline void read_corner(HeightSource& source) {
   const SourceInfo& info = source.info();
-  const Window window = {0, 0, std::min<std::int64_t>(info.width, 512), std::min<std::int64_t>(info.height, 64)};
-  std::vector<std::byte> raw(static_cast<std::size_t>(window.columns * window.rows) * size_bytes(info.sample_type));
-  source.read_window(window, raw);
+  (void)read_window(source, {0, 0, std::min<std::int64_t>(info.width, 512), std::min<std::int64_t>(info.height, 64)});
 }
 
 /// What `use` throws: one line that begins with the path; empty where it works.
@@ -37,4 +32,16 @@ std::string failure_of(const std::string& path, ErrorCode* code, const Use& use)
   }
 }
 
-}  // namespace isohf::testing
+/// The Error that `action` throws; fails the test where it throws none.
+template <typename Action>
+Error error_of(const Action& action) {
+  try {
+    action();
+  } catch (const Error& error) {
+    return error;
+  }
+  ADD_FAILURE() << "no error";
+  return {ErrorCode::kCancelled, ""};
+}
+
+}  // namespace isohf::test

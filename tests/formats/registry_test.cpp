@@ -9,11 +9,14 @@
 #include <set>
 #include <string>
 
-#include "formats/raster_reference.h"
 #include "formats/raster_sink.h"
+#include "formats/reader_failure.h"
 #include "isohf/base/error.h"
+#include "support/real_files.h"
+#include "support/samples.h"
+#include "support/temporary_folder.h"
 
-namespace isohf::testing {
+namespace isohf::test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -24,7 +27,7 @@ Error refusal(const std::string& path) {
 }
 
 TEST(OpenSource, NamesWhatIsWrongWithAPath) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const std::string missing = folder / "missing.exr";
   EXPECT_EQ(refusal(missing).code(), ErrorCode::kIo);
   EXPECT_EQ(refusal(missing).what(), missing + ": no such file");
@@ -33,7 +36,7 @@ TEST(OpenSource, NamesWhatIsWrongWithAPath) {
   EXPECT_THAT(refusal(folder / ".").what(), HasSubstr("is a folder"));
 
   const std::string empty = folder / "empty.tif";
-  write_bytes(empty, "");
+  write_file(empty, "");
   EXPECT_EQ(refusal(empty).code(), ErrorCode::kCorrupt);
   EXPECT_EQ(refusal(empty).what(), empty + ": is empty (0 bytes)");
 
@@ -44,19 +47,19 @@ TEST(OpenSource, NamesWhatIsWrongWithAPath) {
 
 TEST(OpenSource, ReportsAFileThatMayNotBeRead) {
   if (::geteuid() == 0) GTEST_SKIP() << "root may read everything";
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const std::string path = folder / "secret.exr";
-  write_bytes(path, "abcdefgh");
+  write_file(path, "abcdefgh");
   ASSERT_EQ(::chmod(path.c_str(), 0), 0);
   EXPECT_EQ(refusal(path).code(), ErrorCode::kIo);
   EXPECT_THAT(refusal(path).what(), HasSubstr("cannot be opened: Permission denied"));
 }
 
 TEST(OpenSource, ListsWhatIsReadWhenTheFormatIsUnknown) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   for (const char* name : {"notes.txt", "no_extension", "wrong.exr"}) {
     const std::string path = folder / name;
-    write_bytes(path, "this is no raster");
+    write_file(path, "this is no raster");
     const Error error = refusal(path);
     EXPECT_EQ(error.code(), ErrorCode::kUnsupported);
     EXPECT_THAT(error.what(), HasSubstr("unknown format"));
@@ -68,27 +71,25 @@ TEST(OpenSource, ListsWhatIsReadWhenTheFormatIsUnknown) {
 }
 
 TEST(OpenSource, GoesByContentNotByName) {
-  const auto data = shared_data();
-  if (!data) GTEST_SKIP() << "no shared terrain beside this checkout";
-  const ScratchFolder folder;
+  if (real_files().empty()) GTEST_SKIP() << kNoRealFiles;
+  const TemporaryFolder folder;
   for (const auto& [name, format] : {std::pair{"t3d_peak1.exr", "OpenEXR"},
                                      {"earth_0_0_0.png", "PNG"},
                                      {"float_nan.tif", "GeoTIFF"},
                                      {"N44E006.hgt", "SRTM HGT"}}) {
-    EXPECT_EQ(open_source((*data / name).string(), {})->info().format, format);
+    EXPECT_EQ(open_source(real_data() / name, {})->info().format, format);
     const bool has_signature = std::string(format) != "SRTM HGT";
     const std::string renamed = folder / (has_signature ? "N44E006.hgt" : "UPPER_N44E006.HGT");
-    std::filesystem::copy_file(*data / name, renamed, std::filesystem::copy_options::overwrite_existing);
+    std::filesystem::copy_file(real_data() / name, renamed, std::filesystem::copy_options::overwrite_existing);
     EXPECT_EQ(open_source(renamed, {})->info().format, format);
   }
 }
 
 /// The native readers must not pull in the libraries of others: they cost start-up time.
 TEST(OpenSource, LoadsNoOtherImageLibraryForNativeFormats) {
-  const auto data = shared_data();
-  if (!data) GTEST_SKIP() << "no shared terrain beside this checkout";
+  if (real_files().empty()) GTEST_SKIP() << kNoRealFiles;
   for (const char* name : {"t3d_peak1.exr", "earth_0_0_0.png", "mt_fuji_90m.tif", "N44E006.hgt"}) {
-    const auto source = open_source((*data / name).string(), {});
+    const auto source = open_source(real_data() / name, {});
     (void)read_window(*source, {0, 0, source->info().width, 2});
   }
   std::ifstream maps("/proc/self/maps");
@@ -130,21 +131,21 @@ TEST(Formats, ListEveryExtensionThatIsWritten) {
 }
 
 TEST(Formats, TheOneOfAFileIsFoundWithoutOpeningIt) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const std::string path = folder / "a.raw";
-  write_bytes(path, "0123456789abcdef");
+  write_file(path, "0123456789abcdef");
   ASSERT_NE(native_format_of(path, {}), nullptr);
   EXPECT_EQ(std::string(native_format_of(path, {})->name), "raw samples");
   const std::string tiff = folder / "b.raw";  // the content decides
-  write_bytes(tiff, std::string_view("II*\0\10\0\0\0", 8));
+  write_file(tiff, std::string_view("II*\0\10\0\0\0", 8));
   EXPECT_EQ(std::string(native_format_of(tiff, {})->name), "TIFF");
   OpenOptions raw;
   raw.raw = RawLayout{4, 4, SampleType::kUint8, false};
   EXPECT_EQ(std::string(native_format_of(tiff, raw)->name), "raw samples");
   const std::string other = folder / "c.txt";
-  write_bytes(other, "what is this");
+  write_file(other, "what is this");
   EXPECT_EQ(native_format_of(other, {}), nullptr);
 }
 
 }  // namespace
-}  // namespace isohf::testing
+}  // namespace isohf::test

@@ -10,12 +10,14 @@
 #include <string>
 
 #include "formats/open_options.h"
-#include "formats/real_files.h"
+#include "formats/raster_reference.h"
 #include "formats/registry.h"
 #include "isohf/convert/plan.h"
 #include "isohf/surface/source_survey.h"
+#include "support/real_files.h"
+#include "support/samples.h"
 
-namespace isohf::testing {
+namespace isohf::test {
 namespace {
 
 /// What a user has to say about a file.
@@ -70,7 +72,7 @@ void expect_place(const SourceInfo& info, const nlohmann::json& ref) {
 
 void expect_samples(HeightSource& source, const nlohmann::json& ref, std::int64_t more_rows) {
   const SourceInfo& info = source.info();
-  const std::vector<std::byte> raw = read_all(source);
+  const std::vector<std::byte> raw = read_whole(source);
   SourceSurvey survey(info, true);
   survey.add(raw);
   const SourceScan scan = survey.scan();
@@ -85,11 +87,9 @@ void expect_samples(HeightSource& source, const nlohmann::json& ref, std::int64_
   EXPECT_NEAR(scan.range.max, most, tolerance(most));
   // Sums in another order.
   EXPECT_NEAR(survey.mean().value_or(NAN), ref.at("mean").get<double>(), 1e-9 * std::max(1.0, std::abs(most)));
-  const bool turned = ref.at("geotransform").is_array() && ref.at("geotransform")[5].get<double>() > 0.0;
   for (const char* list : {"pixels", "corners"}) {
     for (const auto& pixel : ref.at(list)) {
-      const std::int64_t row =
-          turned ? info.height - 1 - pixel.at("row").get<std::int64_t>() : pixel.at("row").get<std::int64_t>();
+      const std::int64_t row = our_row(ref, pixel, info.height);
       const std::int64_t column = pixel.at("col");
       if (row >= info.height) continue;
       const double sample = value_at(info.sample_type, raw, static_cast<std::size_t>(row * info.width + column));
@@ -111,7 +111,7 @@ std::filesystem::path file_of(const std::string& name) {
 }
 
 TEST(SharedData, EveryFileIsReadAsItsReferenceSays) {
-  if (!std::filesystem::is_directory(real_data() / "ref")) GTEST_SKIP() << "the real files are not there";
+  if (!std::filesystem::is_directory(real_data() / "ref")) GTEST_SKIP() << kNoRealFiles;
   std::set<std::string> seen;
   for (const auto& entry : std::filesystem::directory_iterator(real_data() / "ref")) {
     const std::string name = entry.path().stem().string();
@@ -136,10 +136,10 @@ TEST(SharedData, EveryFileIsReadAsItsReferenceSays) {
 
 TEST(SharedData, LabelTextIsNoElevation) {
   const auto file = real_data() / "ldem_4_cropped.img";
-  if (!std::filesystem::exists(file)) GTEST_SKIP() << "the real files are not there";
+  if (!std::filesystem::exists(file)) GTEST_SKIP() << kNoRealFiles;
   const auto source = open_source(file.string(), {});
   SourceSurvey survey(source->info(), false);
-  survey.add(read_all(*source));
+  survey.add(read_whole(*source));
   // The Moon's North pole lies within a kilometre of the mean radius; the text would be 10 km above it.
   EXPECT_GT(survey.scan().range.min, 1737400.0 - 1000.0);
   EXPECT_LT(survey.scan().range.max, 1737400.0 + 1000.0);
@@ -147,4 +147,4 @@ TEST(SharedData, LabelTextIsNoElevation) {
 }
 
 }  // namespace
-}  // namespace isohf::testing
+}  // namespace isohf::test

@@ -4,14 +4,12 @@
 #include <bit>
 #include <cstdint>
 #include <cstring>
-#include <filesystem>
-#include <fstream>
 #include <string>
 #include <vector>
 
-#include "formats/scratch_folder.h"
+#include "support/temporary_folder.h"
 
-namespace isohf::testing {
+namespace isohf::test {
 
 /// Builds TIFF files byte by byte, also ones that no library would write. The directory comes first, then the arrays,
 /// then the blocks, so that every truncation cuts something else.
@@ -76,10 +74,9 @@ class TiffBytes {
     return lay_out(offsets);
   }
 
-  [[nodiscard]] std::string write(const std::filesystem::path& path) const {
-    const std::string bytes = build();
-    std::ofstream(fresh(path), std::ios::binary).write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-    return path.string();
+  [[nodiscard]] std::string write(const std::string& path) const {
+    write_file(path, build());
+    return path;
   }
 
  private:
@@ -152,4 +149,4 @@ class TiffBytes {
   std::vector<std::string> blocks_;
 };
 
-}  // namespace isohf::testing
+}  // namespace isohf::test

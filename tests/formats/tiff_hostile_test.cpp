@@ -5,16 +5,15 @@
 #include <sys/resource.h>
 #include <zlib.h>
 
-#include "formats/real_files.h"
-#include "formats/scratch_folder.h"
 #include "formats/tiff_bytes.h"
 #include "formats/tiff_source.h"
 #include "isohf/base/error.h"
+#include "support/temporary_folder.h"
 
 namespace isohf {
 namespace {
 
-using testing::TiffBytes;
+using test::TiffBytes;
 
 std::string ramp(std::size_t samples, int first = 0) {
   std::string bytes;
@@ -46,11 +45,11 @@ TiffBytes small(int compression, bool big_endian = false, bool big_tiff = false)
   return tiff;
 }
 
-class TiffHostile : public testing::ScratchFolder {
+class TiffHostile : public testing::Test {
  protected:
   std::string write(const std::string& bytes) const {
-    const std::string path = testing::fresh(folder() / "a.tif");
-    std::ofstream(path, std::ios::binary).write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+    const std::string path = folder_ / "a.tif";
+    test::write_file(path, bytes);
     return path;
   }
 
@@ -74,6 +73,7 @@ class TiffHostile : public testing::ScratchFolder {
   }
 
   std::string message_;
+  const test::TemporaryFolder folder_;
 };
 
 TEST_F(TiffHostile, EveryTruncationIsReported) {
@@ -212,8 +212,8 @@ TEST_F(TiffHostile, WhatIsNoTiffIsRefused) {
   EXPECT_EQ(failure(""), ErrorCode::kCorrupt);
   EXPECT_EQ(failure("II"), ErrorCode::kCorrupt);
   EXPECT_EQ(failure(std::string(1000, 'x')), ErrorCode::kCorrupt);
-  EXPECT_THROW((void)open_tiff((folder() / "absent.tif").string(), {}), Error);
-  EXPECT_THROW((void)open_tiff(folder().string(), {}), Error);
+  EXPECT_THROW((void)open_tiff(folder_ / "absent.tif", {}), Error);
+  EXPECT_THROW((void)open_tiff(folder_.path(), {}), Error);
 }
 
 TEST_F(TiffHostile, NothingIsPrinted) {
@@ -233,7 +233,7 @@ TEST_F(TiffHostile, FileThatIsCutWhileItIsReadIsAnError) {
   TiffBytes tiff;
   // "One byte follows: 0", over and over: 70 MB.
   tiff.image(kWidth, kHeight, 8, 1, kHeight, kPackBits).block(std::string(2 * kWidth * kHeight, '\0'));
-  const std::string path = tiff.write(folder() / "a.tif");
+  const std::string path = tiff.write(folder_ / "a.tif");
   const std::unique_ptr<HeightSource> source = open_tiff(path, {});
   std::vector<std::byte> row(kWidth, std::byte{1});
   source->read_window({0, 0, kWidth, 1}, row);

@@ -8,9 +8,9 @@
 #include <set>
 #include <tuple>
 
-#include "formats/scratch_folder.h"
 #include "formats/tiff_source.h"
 #include "isohf/base/error.h"
+#include "support/temporary_folder.h"
 
 namespace isohf {
 namespace {
@@ -100,8 +100,9 @@ std::vector<std::byte> block_bytes(const Storage& s, int plane, std::int64_t lef
 bool write_tiff(const std::string& path, const Storage& s) {
   TIFFSetErrorHandler(nullptr);
   TIFFSetWarningHandler(nullptr);
+  std::filesystem::remove(path);  // as write_file does
   const std::string mode = std::string("w") + (s.big_endian ? "b" : "l") + (s.big_tiff ? "8" : "");
-  TIFF* tif = TIFFOpen(testing::fresh(path).c_str(), mode.c_str());
+  TIFF* tif = TIFFOpen(path.c_str(), mode.c_str());
   set_tags(tif, s);
   const std::int64_t columns = s.tile != 0 ? s.tile : s.width;
   const std::int64_t block_rows = s.tile != 0 ? s.tile : std::min<std::int64_t>(s.rows_per_strip, s.height);
@@ -130,9 +131,9 @@ void expect_window(HeightSource& source, const Storage& s, int channel, Window w
       << s << " window " << w.column << ' ' << w.row << ' ' << w.columns << ' ' << w.rows;
 }
 
-class TiffLayouts : public testing::ScratchFolder {
+class TiffLayouts : public testing::Test {
  protected:
-  std::string path() const { return (folder() / "a.tif").string(); }
+  std::string path() const { return folder_ / "a.tif"; }
 
   void expect_through(const Storage& s) {
     ASSERT_TRUE(write_tiff(path(), s)) << s;
@@ -145,6 +146,8 @@ class TiffLayouts : public testing::ScratchFolder {
       expect_window(*source, s, channel, {0, 0, s.width, s.height});
     }
   }
+
+  const test::TemporaryFolder folder_;
 };
 
 constexpr SampleType kTypes[] = {SampleType::kUint8,   SampleType::kInt8,    SampleType::kUint16,

@@ -1,27 +1,28 @@
 #include <gtest/gtest.h>
 
-#include "formats/real_files.h"
+#include "formats/raster_reference.h"
 #include "formats/tiff_source.h"
+#include "support/real_files.h"
 
 namespace isohf {
 namespace {
 
 TEST(TiffRealFiles, AreDeliveredAsInTheReference) {
-  const auto files = testing::real_files({".tif", ".TIF"});
-  if (files.empty()) GTEST_SKIP() << "the real files are not there";
+  const auto files = test::real_files({".tif", ".TIF"});
+  if (files.empty()) GTEST_SKIP() << test::kNoRealFiles;
   for (const auto& file : files) {
     SCOPED_TRACE(file.string());
     const auto source = open_tiff(file.string(), {});
-    testing::expect_as_reference(*source, testing::reference_of(file), file.filename() == "float_nan.tif");
+    test::expect_as_reference(*source, test::reference_of(file));
     EXPECT_TRUE(source->info().warnings.empty()) << source->info().warnings.front();
     EXPECT_EQ(source->info().format, "GeoTIFF");
   }
 }
 
 TEST(TiffRealFiles, TellTheirBodies) {
-  if (testing::real_files({".tif"}).empty()) GTEST_SKIP() << "the real files are not there";
+  if (test::real_files({".tif"}).empty()) GTEST_SKIP() << test::kNoRealFiles;
   const auto system = [](const std::string& name) {
-    return open_tiff((testing::real_data() / name).string(), {})->info().georeference.system;
+    return open_tiff((test::real_data() / name).string(), {})->info().georeference.system;
   };
   EXPECT_EQ(system("missionDEM_gale_hirise.tif").body, "Mars");
   EXPECT_EQ(system("missionDEM_gale_hirise.tif").semi_major_axis_m, 3396190.0);

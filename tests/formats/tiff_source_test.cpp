@@ -5,15 +5,15 @@
 
 #include <cmath>
 
-#include "formats/real_files.h"
-#include "formats/scratch_folder.h"
 #include "formats/tiff_bytes.h"
 #include "isohf/base/error.h"
+#include "support/samples.h"
+#include "support/temporary_folder.h"
 
 namespace isohf {
 namespace {
 
-using testing::TiffBytes;
+using test::TiffBytes;
 
 template <typename T>
 std::string bytes_of(const std::vector<T>& values) {
@@ -27,10 +27,10 @@ TiffBytes small() {
   return tiff;
 }
 
-class TiffSource : public testing::ScratchFolder {
+class TiffSource : public testing::Test {
  protected:
   std::unique_ptr<HeightSource> open(const TiffBytes& tiff, const OpenOptions& options = {}) const {
-    return open_tiff(tiff.write(folder() / "a.tif"), options);
+    return open_tiff(tiff.write(folder_ / "a.tif"), options);
   }
 
   SourceInfo info_of(const TiffBytes& tiff, const OpenOptions& options = {}) const {
@@ -38,13 +38,7 @@ class TiffSource : public testing::ScratchFolder {
   }
 
   std::vector<double> values(const TiffBytes& tiff, const OpenOptions& options = {}) const {
-    const auto source = open(tiff, options);
-    const auto raw = testing::read_all(*source);
-    std::vector<double> result;
-    for (std::size_t i = 0; i < raw.size() / size_bytes(source->info().sample_type); ++i) {
-      result.push_back(testing::value_at(source->info().sample_type, raw, i));
-    }
-    return result;
+    return test::values_of(*open(tiff, options));
   }
 
   ErrorCode code_of(const TiffBytes& tiff, const OpenOptions& options = {}) const {
@@ -55,6 +49,8 @@ class TiffSource : public testing::ScratchFolder {
     }
     return ErrorCode::kCancelled;
   }
+
+  const test::TemporaryFolder folder_;
 };
 
 using Values = std::vector<double>;
@@ -86,10 +82,7 @@ TEST_F(TiffSource, TurnsAnImageStoredFromTheBottom) {
   EXPECT_EQ(values(small()), (Values{0, 1, 2, 3, 4, 5}));
   EXPECT_EQ(values(small().shorts(274, {4})), (Values{4, 5, 2, 3, 0, 1}));
   const auto source = open(small().shorts(274, {4}));
-  std::vector<std::byte> raw(4);
-  source->read_window({1, 0, 1, 2}, raw);
-  EXPECT_EQ(testing::value_at(SampleType::kInt16, raw, 0), 5);
-  EXPECT_EQ(testing::value_at(SampleType::kInt16, raw, 1), 3);
+  EXPECT_EQ(test::values_of(SampleType::kInt16, test::read_window(*source, {1, 0, 1, 2})), (Values{5, 3}));
 }
 
 TEST_F(TiffSource, TurnsAGeoreferenceThatRunsFromTheSouth) {
@@ -119,10 +112,10 @@ TEST_F(TiffSource, RefusesRotationAndMirrorImages) {
 }
 
 TEST_F(TiffSource, PlacesBySidecarFilesWhereTheTagsDoNot) {
-  std::ofstream(folder() / "a.tfw") << "30\n0\n0\n-20\n1000.5\n2000.5\n";
-  std::ofstream(folder() / "a.prj")
-      << "PROJCS[\"somewhere\",GEOGCS[\"S\",DATUM[\"S\",SPHEROID[\"S\",6378137,298]],"
-         "PRIMEM[\"Greenwich\",0],UNIT[\"Degree\",0.0174532925199433]],UNIT[\"Foot\",0.3048]]\n";
+  test::write_file(folder_ / "a.tfw", "30\n0\n0\n-20\n1000.5\n2000.5\n");
+  test::write_file(folder_ / "a.prj",
+                   "PROJCS[\"somewhere\",GEOGCS[\"S\",DATUM[\"S\",SPHEROID[\"S\",6378137,298]],"
+                   "PRIMEM[\"Greenwich\",0],UNIT[\"Degree\",0.0174532925199433]],UNIT[\"Foot\",0.3048]]\n");
   SourceInfo info = info_of(small());
   EXPECT_EQ(info.georeference.spacing_x, 30);
   EXPECT_EQ(info.georeference.spacing_y, 20);
@@ -134,12 +127,12 @@ TEST_F(TiffSource, PlacesBySidecarFilesWhereTheTagsDoNot) {
   EXPECT_EQ(info.georeference.metres_per_unit, 0.3048);
   info = info_of(small().doubles(33550, {1, 1, 0}).doubles(33922, {0, 0, 0, 5, 6, 0}));
   EXPECT_EQ(info.georeference.spacing_x, 1);
-  std::ofstream(folder() / "a.tfw") << "30\n0\n0\n20\n1000.5\n2000.5\n";
+  test::write_file(folder_ / "a.tfw", "30\n0\n0\n20\n1000.5\n2000.5\n");
   EXPECT_EQ(info_of(small()).georeference.origin_y, 2040.5);
   EXPECT_EQ(values(small()), (Values{4, 5, 2, 3, 0, 1}));
-  std::ofstream(folder() / "a.tfw") << "30\n1\n0\n20\n1000.5\n2000.5\n";
+  test::write_file(folder_ / "a.tfw", "30\n1\n0\n20\n1000.5\n2000.5\n");
   EXPECT_EQ(code_of(small()), ErrorCode::kUnsupported);
-  std::ofstream(folder() / "a.tfw") << "thirty";
+  test::write_file(folder_ / "a.tfw", "thirty");
   EXPECT_EQ(code_of(small()), ErrorCode::kCorrupt);
 }
 
@@ -193,7 +186,7 @@ TEST_F(TiffSource, TakesFloatsBeyondAnyHeightForVoidsWhereNoneAreDeclared) {
   tiff.image(3, 1, 32, 3, 1).block(bytes_of<float>({std::numeric_limits<float>::lowest(), 1.0F, 1e31F}));
   const auto source = open(tiff);
   std::vector<float> heights(3);
-  heights_from_samples(source->info(), 0.0, testing::read_all(*source), heights);
+  heights_from_samples(source->info(), 0.0, test::read_whole(*source), heights);
   EXPECT_TRUE(std::isnan(heights[0]));
   EXPECT_EQ(heights[1], 1.0F);
   EXPECT_TRUE(std::isnan(heights[2]));

@@ -7,9 +7,11 @@
 #include <algorithm>
 #include <random>
 
+#include "formats/raster_reference.h"
 #include "formats/reader_failure.h"
-#include "formats/real_files.h"
-#include "formats/scratch_folder.h"
+#include "support/real_files.h"
+#include "support/samples.h"
+#include "support/temporary_folder.h"
 
 namespace isohf {
 namespace {
@@ -111,33 +113,27 @@ Dem long_dem(int columns, int rows) {
   return dem;
 }
 
-class UsgsDem : public testing::ScratchFolder {
+class UsgsDem : public testing::Test {
  protected:
   std::string write(const std::string& bytes, const std::string& name = "a.dem") const {
-    const std::string path = testing::fresh(folder() / name);
-    testing::write_bytes(path, bytes);
+    const std::string path = folder_ / name;
+    test::write_file(path, bytes);
     return path;
   }
   std::string failure(const std::string& bytes, ErrorCode* code = nullptr) const {
     const std::string path = write(bytes);
-    return testing::failure_of(path, code, [&] { testing::read_corner(*open_usgs_dem(path, {})); });
+    return test::failure_of(path, code, [&] { test::read_corner(*open_usgs_dem(path, {})); });
   }
   std::string failure(const Dem& dem) const { return failure(header(dem) + body(dem)); }
-  static std::vector<double> values(HeightSource& source) {
-    const auto raw = testing::read_all(source);
-    std::vector<double> all;
-    for (std::size_t i = 0; i < raw.size() / size_bytes(source.info().sample_type); ++i) {
-      all.push_back(testing::value_at(source.info().sample_type, raw, i));
-    }
-    return all;
-  }
+
+  const test::TemporaryFolder folder_;
 };
 
 TEST_F(UsgsDem, DeliversTheRealFileAsTheReferenceDoes) {
-  const auto file = testing::real_data() / "derived" / "besseggen_utm.dem";
-  if (!std::filesystem::exists(file)) GTEST_SKIP() << "the real files are not there";
+  const auto file = test::real_data() / "derived" / "besseggen_utm.dem";
+  if (!std::filesystem::exists(file)) GTEST_SKIP() << test::kNoRealFiles;
   const auto source = open_source(file.string(), {});
-  const auto ref = testing::reference_of(file);
+  const auto ref = test::reference_of(file);
   const SourceInfo& info = source->info();
   // The profiles begin at y = 6818005 and have 200 posts. GDAL moves the grid to multiples of its spacing, half a post
   // off, and adds a row of voids in the South.
@@ -150,7 +146,7 @@ TEST_F(UsgsDem, DeliversTheRealFileAsTheReferenceDoes) {
   EXPECT_EQ(info.georeference.spacing_y, 10.0);
   EXPECT_EQ(info.georeference.system.epsg, ref.at("crs").at("epsg").get<int>());
   EXPECT_EQ(info.sample_type, SampleType::kInt16);
-  const std::vector<double> all = values(*source);
+  const std::vector<double> all = test::values_of(*source);
   double sum = 0.0;
   for (const double value : all) sum += value;
   EXPECT_EQ(*std::min_element(all.begin(), all.end()), ref.at("raw_min").get<double>());
@@ -177,7 +173,7 @@ TEST_F(UsgsDem, TurnsProfilesOfDifferentLengthsIntoRows) {
     EXPECT_EQ(info.format, "USGS DEM");
     ASSERT_EQ(info.width, 3);
     ASSERT_EQ(info.height, 4);
-    EXPECT_EQ(values(*source), kSmall);
+    EXPECT_EQ(test::values_of(*source), kSmall);
     EXPECT_EQ(info.georeference.registration, Registration::kPoint);
     EXPECT_EQ(info.georeference.origin_x, 300000.0);
     EXPECT_EQ(info.georeference.origin_y, 4200090.0);
@@ -194,11 +190,11 @@ TEST_F(UsgsDem, WindowsEqualTheWholeAcrossRecords) {
   for (const std::string& bytes : {records, as_lines(records, "\n", false)}) {
     const auto source = open_source(write(bytes), {});
     ASSERT_EQ(source->info().height, 700);
-    const auto whole = testing::read_all(*source);
+    const auto whole = test::read_whole(*source);
     for (int r = 0; r < 700; ++r) {
       for (int c = 0; c < 4; ++c) {
         const auto at = static_cast<std::size_t>(4 * r + c);
-        ASSERT_EQ(testing::value_at(SampleType::kInt16, whole, at), 1000 * c + 699 - r - 40);
+        ASSERT_EQ(test::value_at(SampleType::kInt16, whole, at), 1000 * c + 699 - r - 40);
       }
     }
     std::mt19937 random(6);
@@ -239,7 +235,7 @@ TEST_F(UsgsDem, ReadsSecondsFeetAndTenthsAboveALocalDatum) {
   EXPECT_EQ(info.z_scale, 0.1);
   EXPECT_EQ(info.z_offset, 100.0);
   EXPECT_EQ(info.sample_type, SampleType::kInt16);
-  EXPECT_EQ(values(*source), kSmall);
+  EXPECT_EQ(test::values_of(*source), kSmall);
 }
 
 TEST_F(UsgsDem, NamesWhatItRefuses) {

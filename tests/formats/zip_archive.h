@@ -11,7 +11,7 @@
 
 #include "isohf/base/bytes.h"
 
-namespace isohf::testing {
+namespace isohf::test {
 
 struct ZipEntry {
   std::string name;
@@ -104,4 +104,4 @@ inline std::vector<std::byte> zip_archive(const std::vector<ZipEntry>& entries, 
   return zip;
 }
 
-}  // namespace isohf::testing
+}  // namespace isohf::test

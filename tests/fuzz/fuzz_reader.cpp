@@ -11,24 +11,20 @@
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <iostream>
 #include <vector>
 
 #include "formats/reader_cases.h"
 #include "isohf/base/error.h"
 #include "isohf/surface/height_source.h"
+#include "support/temporary_folder.h"
 
-namespace isohf::testing {
+namespace isohf::test {
 namespace {
 
 [[noreturn]] void stop(const std::string& why) {
   std::cerr << "fuzz_reader: " << why << std::endl;
   std::abort();
-}
-
-void write_file(const std::filesystem::path& path, const std::string& bytes) {
-  std::ofstream(path, std::ios::binary).write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
 }
 
 void write_seeds(const std::filesystem::path& folder) {
@@ -49,22 +45,14 @@ struct Chosen {
         std::find_if(cases.begin(), cases.end(), [&](const ReaderCase& candidate) { return candidate.name == name; });
     if (found == cases.end()) stop(std::string("no case is called ") + name);
     each = *found;
-    std::string pattern = "/dev/shm/isohf_fuzz_XXXXXX";
-    if (::mkdtemp(pattern.data()) == nullptr) stop("no folder can be made in /dev/shm");
-    folder = pattern;
     for (const auto& [beside, bytes] : each.beside) write_file(folder / beside, bytes);
     damaged = folder / each.file_name;
     opened = each.opened.empty() ? damaged : folder / each.opened;
   }
-  Chosen(const Chosen&) = delete;
-  Chosen& operator=(const Chosen&) = delete;
-  ~Chosen() {
-    std::error_code ignored;
-    std::filesystem::remove_all(folder, ignored);
-  }
 
   ReaderCase each;
-  std::filesystem::path folder, damaged, opened;
+  const TemporaryFolder folder{"/dev/shm"};
+  std::string damaged, opened;
 };
 
 void require_one_line(const std::string& text) {
@@ -84,28 +72,28 @@ void read_some(HeightSource& source) {
 }
 
 }  // namespace
-}  // namespace isohf::testing
+}  // namespace isohf::test
 
 extern "C" int LLVMFuzzerInitialize(int* /*count*/, char*** /*arguments*/) {
   if (const char* folder = std::getenv("ISOHF_READER_SEEDS"); folder != nullptr) {
-    isohf::testing::write_seeds(folder);
+    isohf::test::write_seeds(folder);
     std::exit(0);
   }
   return 0;
 }
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  using isohf::testing::stop;
-  static const isohf::testing::Chosen chosen;
+  using isohf::test::stop;
+  static const isohf::test::Chosen chosen;
   const int file = ::open(chosen.damaged.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
   if (file < 0 || ::write(file, data, size) != static_cast<ssize_t>(size)) stop("the file cannot be written");
   ::close(file);
   try {
-    isohf::testing::read_some(*chosen.each.open(chosen.opened.string(), chosen.each.options));
+    isohf::test::read_some(*chosen.each.open(chosen.opened, chosen.each.options));
   } catch (const isohf::Error& error) {
     const std::string message = error.what();
-    if (message.rfind(chosen.folder.string(), 0) != 0) stop("names no file: " + message);
-    isohf::testing::require_one_line(message);
+    if (message.rfind(chosen.folder.path(), 0) != 0) stop("names no file: " + message);
+    isohf::test::require_one_line(message);
   }
   return 0;
 }

@@ -4,11 +4,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <filesystem>
-#include <fstream>
 #include <functional>
 
 #include "isohf/base/error.h"
+#include "support/temporary_folder.h"
 
 namespace isohf {
 namespace {
@@ -63,30 +62,31 @@ TEST(Acquisition, OtherTextsAreRefused) {
 }
 
 TEST(Acquisition, FirIsReadFromItsFile) {
-  const std::filesystem::path path = std::filesystem::temp_directory_path() / "isohf_acquisition_test_taps.txt";
-  std::ofstream(path) << "1 2 1\n";
-  const Acquisition fir = acquisition_from_string("fir:" + path.string());
+  const test::TemporaryFolder folder;
+  const std::string path = folder / "taps.txt";
+  test::write_file(path, "1 2 1\n");
+  const Acquisition fir = acquisition_from_string("fir:" + path);
   EXPECT_EQ(fir.taps, (std::vector<double>{0.25, 0.5, 0.25}));
-  EXPECT_EQ(to_string(fir), "fir:" + path.string());
+  EXPECT_EQ(to_string(fir), "fir:" + path);
   std::filesystem::remove(path);
   try {
-    (void)acquisition_from_string("fir:" + path.string());
+    (void)acquisition_from_string("fir:" + path);
     FAIL() << "a missing file was read";
   } catch (const Error& error) {
     EXPECT_EQ(error.code(), ErrorCode::kIo);
-    EXPECT_THAT(error.what(), HasSubstr(path.string()));
+    EXPECT_THAT(error.what(), HasSubstr(path));
   }
   EXPECT_THROW((void)acquisition_from_string("fir:"), Error);
-  EXPECT_THROW((void)acquisition_from_string("fir:" + std::filesystem::temp_directory_path().string()), Error);
+  EXPECT_THROW((void)acquisition_from_string("fir:" + folder.path()), Error);
 }
 
 TEST(Acquisition, FirFilesOfMoreThan64KibibytesAreRefused) {
-  const std::filesystem::path path = std::filesystem::temp_directory_path() / "isohf_acquisition_test_long.txt";
-  std::ofstream(path) << "1" << std::string(65536, ' ');
-  EXPECT_THAT(refusal([&] { (void)acquisition_from_string("fir:" + path.string()); }), HasSubstr("65536 bytes"));
-  std::ofstream(path) << "1" << std::string(65535, ' ');
-  EXPECT_EQ(acquisition_from_string("fir:" + path.string()).taps.size(), 1U);
-  std::filesystem::remove(path);
+  const test::TemporaryFolder folder;
+  const std::string path = folder / "long.txt";
+  test::write_file(path, "1" + std::string(65536, ' '));
+  EXPECT_THAT(refusal([&] { (void)acquisition_from_string("fir:" + path); }), HasSubstr("65536 bytes"));
+  test::write_file(path, "1" + std::string(65535, ' '));
+  EXPECT_EQ(acquisition_from_string("fir:" + path).taps.size(), 1U);
 }
 
 TEST(Acquisition, FirTextTakesCommentsAndAnySpace) {

@@ -8,7 +8,7 @@
 #include <random>
 #include <vector>
 
-namespace isohf::testing {
+namespace isohf::test {
 namespace {
 
 constexpr std::size_t kCount = 9001;  // two whole runs and a part of one
@@ -71,4 +71,4 @@ TEST(SourceScan, SumsARunOfTheLargestSamples) {
 }
 
 }  // namespace
-}  // namespace isohf::testing
+}  // namespace isohf::test

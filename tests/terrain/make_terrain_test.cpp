@@ -5,11 +5,10 @@
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <string>
 #include <vector>
 
+#include "support/temporary_folder.h"
 #include "terrain.h"
 
 namespace isohf::terrain {
@@ -17,31 +16,19 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A folder of its own for each test, removed with all that is in it.
 class MakeTerrain : public testing::Test {
  protected:
-  MakeTerrain() {
-    const auto* test = testing::UnitTest::GetInstance()->current_test_info();
-    folder_ = fs::path(testing::TempDir()) / (std::string("make_terrain_") + test->name());
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-  }
-  ~MakeTerrain() override { fs::remove_all(folder_); }
-
   /// Exit code of make_terrain; its standard error goes to the file "stderr".
   int run(const std::string& arguments) {
     const std::string command =
-        "cd '" + folder_.string() + "' && '" ISOHF_BIN_DIR "/make_terrain' " + arguments + " >stdout 2>stderr";
+        "cd '" + folder_.path() + "' && '" ISOHF_BIN_DIR "/make_terrain' " + arguments + " >stdout 2>stderr";
     const int status = std::system(command.c_str());
     return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
   }
 
-  std::string bytes(const std::string& name) const {
-    std::ifstream file(folder_ / name, std::ios::binary);
-    return {std::istreambuf_iterator<char>(file), {}};
-  }
+  std::string bytes(const std::string& name) const { return test::read_file(folder_ / name); }
 
-  fs::path folder_;
+  const test::TemporaryFolder folder_;
 };
 
 TEST_F(MakeTerrain, GivesTheSameBytesForAnyNumberOfThreads) {
@@ -104,7 +91,7 @@ TEST_F(MakeTerrain, RefusesWhatAFormatCannotHoldAndLeavesNoFile) {
   for (const char* arguments : refused) {
     EXPECT_EQ(run(arguments), 2) << arguments;
     EXPECT_NE(bytes("stderr"), "") << arguments;
-    for (const auto& entry : fs::directory_iterator(folder_)) {
+    for (const auto& entry : fs::directory_iterator(folder_.path())) {
       EXPECT_TRUE(entry.path().filename() == "stdout" || entry.path().filename() == "stderr") << arguments << entry;
     }
   }

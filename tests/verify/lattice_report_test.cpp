@@ -3,27 +3,18 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <filesystem>
 
 #include "isohf/convert/convert.h"
 #include "isohf/verify/against_source.h"
 #include "support/memory_source.h"
+#include "support/temporary_folder.h"
 #include "support/trigonometric_field.h"
 
 namespace isohf {
 namespace {
 
-namespace fs = std::filesystem;
-
 class LatticeReports : public testing::Test {
  protected:
-  void SetUp() override {
-    path_ = (fs::path(testing::TempDir()) / (std::string("isohf_lattice_report_") +
-                                             testing::UnitTest::GetInstance()->current_test_info()->name() + ".isohf"))
-                .string();
-  }
-  void TearDown() override { fs::remove(path_); }
-
   static ConvertOptions options(double density) {
     ConvertOptions options;
     options.plan.density = density;
@@ -48,7 +39,8 @@ class LatticeReports : public testing::Test {
     return both;
   }
 
-  std::string path_;
+  const test::TemporaryFolder folder_;
+  const std::string path_ = folder_ / "a.isohf";
 };
 
 /// Waves of all directions, none shorter than 512/18 samples.

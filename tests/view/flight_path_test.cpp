@@ -2,23 +2,20 @@
 
 #include <gtest/gtest.h>
 
-#include <filesystem>
-#include <fstream>
-
 #include "isohf/base/error.h"
+#include "support/temporary_folder.h"
 
 namespace isohf::view {
 namespace {
 
-std::string file_with(const std::string& text) {
-  const auto path = std::filesystem::temp_directory_path() / "isohf_flight_path_test.txt";
-  std::ofstream(path) << text;
-  return path.string();
+FlightPath read(const std::string& text) {
+  const test::TemporaryFolder folder;
+  test::write_file(folder / "path.txt", text);
+  return FlightPath::read(folder / "path.txt");
 }
 
 TEST(FlightPath, PassesThroughItsPlaces) {
-  const FlightPath path =
-      FlightPath::read(file_with("0 1 2 3 4 5 6\n\n# half way\n1 2 2 3 4 5 7\r\n3 9 2 3 4 5 8 # end\n"));
+  const FlightPath path = read("0 1 2 3 4 5 6\n\n# half way\n1 2 2 3 4 5 7\r\n3 9 2 3 4 5 8 # end\n");
   EXPECT_EQ(path.begin_s(), 0.0);
   EXPECT_EQ(path.end_s(), 3.0);
   EXPECT_EQ(path.at(0.0).eye, (Vec3{1, 2, 3}));
@@ -31,11 +28,11 @@ TEST(FlightPath, PassesThroughItsPlaces) {
 
 TEST(FlightPath, RefusesWhatIsNoFlight) {
   EXPECT_THROW(FlightPath::read("/nowhere/flight.txt"), Error);
-  EXPECT_THROW(FlightPath::read(file_with("")), Error);
-  EXPECT_THROW(FlightPath::read(file_with("0 1 2 3 4 5 6\n")), Error);
-  EXPECT_THROW(FlightPath::read(file_with("0 1 2 3 4 5 6\n0 1 2 3 4 5 6\n")), Error);
-  EXPECT_THROW(FlightPath::read(file_with("0 1 2 3 4 5\n1 1 2 3 4 5 6\n")), Error);
-  EXPECT_THROW(FlightPath::read(file_with("0 1 2 3 4 5 6 7\n1 1 2 3 4 5 6\n")), Error);
+  EXPECT_THROW(read(""), Error);
+  EXPECT_THROW(read("0 1 2 3 4 5 6\n"), Error);
+  EXPECT_THROW(read("0 1 2 3 4 5 6\n0 1 2 3 4 5 6\n"), Error);
+  EXPECT_THROW(read("0 1 2 3 4 5\n1 1 2 3 4 5 6\n"), Error);
+  EXPECT_THROW(read("0 1 2 3 4 5 6 7\n1 1 2 3 4 5 6\n"), Error);
 }
 
 }  // namespace

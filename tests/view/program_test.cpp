@@ -1,65 +1,37 @@
 // The real program, run as a person runs it.
 #include <gtest/gtest.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
-#include <array>
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
-#include <filesystem>
-#include <fstream>
-#include <sstream>
 
 #include "gl_test.h"
 #include "support/analytic_archive.h"
+#include "support/run_program.h"
+#include "support/temporary_folder.h"
 
 namespace isohf {
 namespace {
 
-struct Outcome {
-  int exit_code = -1;
-  std::string out;
-  std::string err;
-};
+using Outcome = test::RunResult;
 
 class ViewProgramTest : public test::GlTest {
  protected:
   void SetUp() override {
     GlTest::SetUp();
     if (IsSkipped()) return;
-    folder_ = std::filesystem::temp_directory_path() /
-              ("isohf_view_" + std::string(testing::UnitTest::GetInstance()->current_test_info()->name()) + "_" +
-               std::to_string(::getpid()));
-    std::filesystem::create_directories(folder_);
     test::write_analytic_archive(path("good.isohf"), grid());
   }
-  void TearDown() override {
-    if (!folder_.empty()) std::filesystem::remove_all(folder_);
-  }
-
   static TileGrid grid() { return TileGrid::make(TileShape::make(36, 43, 3), 3, 2, 320.0, 320.0); }
-  [[nodiscard]] std::string path(const std::string& name) const { return (folder_ / name).string(); }
-  [[nodiscard]] std::string text(const std::string& name) const {
-    std::ifstream file(path(name));
-    std::ostringstream all;
-    all << file.rdbuf();
-    return all.str();
+  [[nodiscard]] std::string path(const std::string& name) const { return folder_ / name; }
+  [[nodiscard]] std::string text(const std::string& name) const { return test::read_file(path(name)); }
+  [[nodiscard]] static Outcome run(const std::string& arguments, const std::string& before = "") {
+    return test::run_program({"/bin/sh", "-c", before + " '" ISOHF_BIN_DIR "/isohf-view' " + arguments});
   }
-  [[nodiscard]] Outcome run(const std::string& arguments, const std::string& before = "") const {
-    const std::string command =
-        before + " '" + ISOHF_BIN_DIR + "/isohf-view' " + arguments + " >'" + path("out") + "' 2>'" + path("err") + "'";
-    const int status = std::system(command.c_str());
-    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, text("out"), text("err")};
-  }
-  [[nodiscard]] static bool is_png(const std::string& file) {
-    std::ifstream in(file, std::ios::binary);
-    std::array<char, 4> head{};
-    in.read(head.data(), 4);
-    return in && head[1] == 'P' && head[2] == 'N' && head[3] == 'G';
-  }
+  [[nodiscard]] bool is_png(const std::string& name) const { return text(name).substr(1, 3) == "PNG"; }
 
  private:
-  std::filesystem::path folder_;
+  const test::TemporaryFolder folder_;
 };
 
 TEST_F(ViewProgramTest, WritesScreenshots) {
@@ -69,7 +41,7 @@ TEST_F(ViewProgramTest, WritesScreenshots) {
             " --sun 90,12 --position 480,300,900 --look-at 480,0,300 --screenshot " + path(mode + ".png"));
     EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
     EXPECT_EQ(outcome.err, "");
-    EXPECT_TRUE(is_png(path(mode + ".png"))) << mode;
+    EXPECT_TRUE(is_png(mode + ".png")) << mode;
   }
 }
 
@@ -88,10 +60,9 @@ TEST_F(ViewProgramTest, VerifiesGoodAndBadArchives) {
 }
 
 TEST_F(ViewProgramTest, FliesAndCountsEachFrame) {
-  {
-    std::ofstream file(path("path.txt"));
-    file << "# seconds, eye, target\n0 100 200 600  480 0 100\n2 500 150 500  480 0 0\n4 900 180 300 480 0 300\n";
-  }
+  test::write_file(
+      path("path.txt"),
+      "# seconds, eye, target\n0 100 200 600  480 0 100\n2 500 150 500  480 0 0\n4 900 180 300 480 0 300\n");
   const Outcome outcome = run(path("good.isohf") + " --size 160x120 --flight " + path("path.txt") +
                               " --frames 12 --baseline --csv " + path("frames.csv") + " --plot " + path("frames.svg"));
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
@@ -108,10 +79,7 @@ TEST_F(ViewProgramTest, DrawsArchivesThatAreVoidOrOneTile) {
     std::fill(codes.begin(), codes.end(), std::uint16_t{65535});
   });
   test::write_analytic_archive(path("one.isohf"), TileGrid::make(TileShape::make(5, 5, 1), 1, 1, 10.0, 10.0));
-  {
-    std::ofstream file(path("path.txt"));
-    file << "0 100 200 600  480 0 100\n2 500 150 500  480 0 0\n";
-  }
+  test::write_file(path("path.txt"), "0 100 200 600  480 0 100\n2 500 150 500  480 0 0\n");
   for (const std::string archive : {"void.isohf", "one.isohf"}) {
     for (const std::string& action :
          {"--screenshot " + path("a.png"), std::string("--verify"), std::string("--sweep --steps 4"),
@@ -131,11 +99,8 @@ TEST_F(ViewProgramTest, GrowsNoMoreThanItsMemoryBound) {
 #endif
   const TileGrid wide = TileGrid::make(TileShape::make(68, 83, 4), 50, 40, 640.0, 640.0);
   test::write_analytic_archive(path("wide.isohf"), wide);
-  {
-    // Across it all, looking up: what the driver takes for triangles would hide what tiles take.
-    std::ofstream file(path("up.txt"));
-    file << "0 1000 200 9000  1001 99000 9000\n9 30000 200 9000  30001 99000 9000\n";
-  }
+  // Across it all, looking up: what the driver takes for triangles would hide what tiles take.
+  test::write_file(path("up.txt"), "0 1000 200 9000  1001 99000 9000\n9 30000 200 9000  30001 99000 9000\n");
   const auto grown_mib = [&](int bound_mib) {
     const Outcome outcome = run(path("wide.isohf") + " --size 64x48 --far 9000 --frames 300 --flight " +
                                 path("up.txt") + " --memory " + std::to_string(bound_mib) + " --upload 1");
@@ -170,7 +135,7 @@ TEST_F(ViewProgramTest, RefusesInOneLine) {
   Outcome outcome = run(path("missing.isohf") + " --verify");
   EXPECT_EQ(outcome.exit_code, 1);
   EXPECT_TRUE(one_line(outcome)) << outcome.err;
-  { std::ofstream(path("text.isohf")) << "this is no archive\n"; }
+  test::write_file(path("text.isohf"), "this is no archive\n");
   outcome = run(path("text.isohf") + " --verify");
   EXPECT_EQ(outcome.exit_code, 1);
   EXPECT_TRUE(one_line(outcome)) << outcome.err;
@@ -205,7 +170,7 @@ TEST_F(ViewProgramTest, OpensAWindow) {
       run(path("good.isohf") + " --window --size 400x300 --frames 10 --screenshot " + path("window.png"),
           "xvfb-run -a -s '-screen 0 800x600x24'");
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
-  EXPECT_TRUE(is_png(path("window.png")));
+  EXPECT_TRUE(is_png("window.png"));
 }
 
 }  // namespace
