@@ -8,6 +8,7 @@
 #include <cctype>
 #include <charconv>
 #include <cstring>
+#include <limits>
 #include <optional>
 #include <string_view>
 #include <vector>
@@ -127,18 +128,35 @@ class HeaderParser {
   std::size_t at_ = 0;
 };
 
+/// Whole numbers of 64 bits are delivered as float64, NumPy's integers by default among them.
+enum class Wide { kNo, kSigned, kUnsigned };
+
 std::optional<SampleType> sample_type(std::string_view kind) {
-  constexpr std::array<std::pair<std::string_view, SampleType>, 9> kTypes = {{{"u1", SampleType::kUint8},
-                                                                              {"i1", SampleType::kInt8},
-                                                                              {"u2", SampleType::kUint16},
-                                                                              {"i2", SampleType::kInt16},
-                                                                              {"u4", SampleType::kUint32},
-                                                                              {"i4", SampleType::kInt32},
-                                                                              {"f2", SampleType::kFloat16},
-                                                                              {"f4", SampleType::kFloat32},
-                                                                              {"f8", SampleType::kFloat64}}};
+  constexpr std::array<std::pair<std::string_view, SampleType>, 11> kTypes = {{{"u1", SampleType::kUint8},
+                                                                               {"i1", SampleType::kInt8},
+                                                                               {"u2", SampleType::kUint16},
+                                                                               {"i2", SampleType::kInt16},
+                                                                               {"u4", SampleType::kUint32},
+                                                                               {"i4", SampleType::kInt32},
+                                                                               {"u8", SampleType::kFloat64},
+                                                                               {"i8", SampleType::kFloat64},
+                                                                               {"f2", SampleType::kFloat16},
+                                                                               {"f4", SampleType::kFloat32},
+                                                                               {"f8", SampleType::kFloat64}}};
   const auto* const found = std::find_if(kTypes.begin(), kTypes.end(), [&](const auto& t) { return t.first == kind; });
   return found == kTypes.end() ? std::nullopt : std::optional(found->second);
+}
+
+/// A whole number as the float64 that it is; false where it is none.
+template <typename Whole>
+bool widen(std::byte* at, Whole& number) {
+  std::memcpy(&number, at, sizeof number);
+  const auto value = static_cast<double>(number);
+  // 2^63 and 2^64 are not in the types' ranges, but what their largest numbers round to.
+  constexpr double kEnd = std::numeric_limits<Whole>::is_signed ? 0x1p63 : 0x1p64;
+  if (value >= kEnd || static_cast<Whole>(value) != number) return false;
+  std::memcpy(at, &value, sizeof value);
+  return true;
 }
 
 class NpySource final : public HeightSource {
@@ -167,6 +185,8 @@ class NpySource final : public HeightSource {
     } else {
       read_plain_samples(file_, info_, layout_, window, samples);
     }
+    if (wide_ == Wide::kSigned) widen_all<std::int64_t>(window, samples);
+    if (wide_ == Wide::kUnsigned) widen_all<std::uint64_t>(window, samples);
   }
 
  private:
@@ -199,15 +219,21 @@ class NpySource final : public HeightSource {
     const std::optional<SampleType> type = sample_type(std::string_view(header.descr).substr(order == '?' ? 0 : 1));
     if (!type || std::string_view("<>=|").find(order) == std::string_view::npos ||
         (order == '|' && size_bytes(*type) > 1)) {
-      unsupported(fmt::format("the array's type is '{}'; integers of 8 to 32 bits and floats of 16 to 64 are read",
+      unsupported(fmt::format("the array's type is '{}'; integers of 8 to 64 bits and floats of 16 to 64 are read",
                               header.descr));
     }
-    if (header.shape.size() != 2) {
+    std::vector<std::int64_t> shape = header.shape;
+    while (shape.size() > 2 && std::find(shape.begin(), shape.end(), 1) != shape.end()) {
+      shape.erase(std::find(shape.begin(), shape.end(), 1));  // (1, rows, columns) is a raster as well
+    }
+    if (shape.size() != 2) {
       unsupported(fmt::format("the array's shape is ({}), must have 2 dimensions", fmt::join(header.shape, ", ")));
     }
-    fortran_order_ = header.fortran_order && header.shape[0] > 1 && header.shape[1] > 1;
-    info_.height = header.shape[0];
-    info_.width = header.shape[1];
+    fortran_order_ = header.fortran_order && shape[0] > 1 && shape[1] > 1;
+    if (header.descr.ends_with("i8")) wide_ = Wide::kSigned;
+    if (header.descr.ends_with("u8")) wide_ = Wide::kUnsigned;
+    info_.height = shape[0];
+    info_.width = shape[1];
     if (info_.width < 1 || info_.height < 1 || info_.width > kMostSide || info_.height > kMostSide) {
       throw Error(ErrorCode::kCorrupt, fmt::format("{}: the array's shape is ({}), must be from 1 to {}", info_.path,
                                                    fmt::join(header.shape, ", "), kMostSide));
@@ -248,9 +274,23 @@ class NpySource final : public HeightSource {
     if (layout_.big_endian != (std::endian::native == std::endian::big)) swap_byte_order(samples, size);
   }
 
+  template <typename Whole>
+  void widen_all(const Window& window, std::span<std::byte> samples) const {
+    for (std::size_t at = 0; at < samples.size(); at += sizeof(Whole)) {
+      Whole number{};
+      if (widen(samples.data() + at, number)) continue;
+      const auto index = static_cast<std::int64_t>(at / sizeof(Whole));
+      throw Error(
+          ErrorCode::kUnsupported,
+          fmt::format("{}: sample ({}, {}) is {}, which float64 does not hold; store the array as float64", info_.path,
+                      window.column + index % window.columns, window.row + index / window.columns, number));
+    }
+  }
+
   RawFile file_;
   PlainLayout layout_;
   bool fortran_order_ = false;
+  Wide wide_ = Wide::kNo;
   std::vector<std::byte> column_;
   SourceInfo info_;
 };

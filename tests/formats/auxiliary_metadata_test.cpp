@@ -3,11 +3,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "formats/reader_failure.h"
+#include "formats/raster_reference.h"
 #include "isohf/base/error.h"
-#include "support/temporary_folder.h"
 
-namespace isohf::test {
+namespace isohf::testing {
 namespace {
 
 using ::testing::HasSubstr;
@@ -37,13 +36,13 @@ class AuxiliaryMetadata : public ::testing::Test {
     info_.path = folder_ / "a.png";
     info_.sample_type = SampleType::kInt16;
   }
-  void beside(const std::string& text) { write_file(info_.path + ".aux.xml", text); }
+  void beside(const std::string& text) { write_bytes(info_.path + ".aux.xml", {text.data(), text.size()}); }
   Error error_with(const std::string& text) {
     beside(text);
     return error_of([&] { read_auxiliary_metadata(info_, 1); });
   }
 
-  TemporaryFolder folder_;
+  ScratchFolder folder_;
   SourceInfo info_;
 };
 
@@ -119,4 +118,4 @@ TEST_F(AuxiliaryMetadata, EveryTruncationIsAnError) {
 }
 
 }  // namespace
-}  // namespace isohf::test
+}  // namespace isohf::testing

@@ -104,12 +104,50 @@ TEST_F(Npy, ReadsEveryTypeOrderAndVersion) {
   }
 }
 
+TEST_F(Npy, ReadsWholeNumbersOf64BitsAsFloatsThatHoldThem) {
+  for (const char* type : {"<i8", ">i8", "<u8", ">u8"}) {
+    for (const char* order : {"False", "True"}) {
+      SCOPED_TRACE(fmt::format("{} {}", type, order));
+      const auto source = open_source(write(array(type, "(2, 3)", counting(8, type[0] == '>'), 1, order)), {});
+      ASSERT_EQ(source->info().sample_type, SampleType::kFloat64);
+      std::vector<std::byte> last(16);
+      source->read_window({2, 0, 1, 2}, last);
+      EXPECT_EQ(test::value_at(SampleType::kFloat64, last, 0), order[0] == 'F' ? 3.0 : 5.0);
+      EXPECT_EQ(test::value_at(SampleType::kFloat64, last, 1), 6.0);
+    }
+  }
+  const auto number = [&](const char* type, const std::string& bytes) { return array(type, "(1, 1)", bytes); };
+  const std::string lowest("\0\0\0\0\0\0\0\x80", 8);
+  EXPECT_EQ(test::value_at(SampleType::kFloat64, test::read_whole(*open_source(write(number("<i8", lowest)), {})), 0),
+            -0x1p63);
+  EXPECT_EQ(test::value_at(SampleType::kFloat64, test::read_whole(*open_source(write(number("<u8", lowest)), {})), 0),
+            0x1p63);
+  const std::string ones(8, '\xff');
+  EXPECT_EQ(test::value_at(SampleType::kFloat64, test::read_whole(*open_source(write(number("<i8", ones)), {})), 0),
+            -1);
+  EXPECT_THAT(
+      failure(number("<u8", ones)),
+      HasSubstr("sample (0, 0) is 18446744073709551615, which float64 does not hold; store the array as float64"));
+  EXPECT_THAT(failure(number("<i8", std::string("\1\0\0\0\0\0\x20\0", 8))),
+              HasSubstr("is 9007199254740993, which float64 does not hold"));
+  EXPECT_THAT(failure(number("<i8", std::string(7, '\xff') + '\x7f')), HasSubstr("is 9223372036854775807, which"));
+}
+
+TEST_F(Npy, DimensionsOfOneAreNone) {
+  const std::string data = counting(2, false);
+  for (const char* shape : {"(1, 2, 3)", "(2, 1, 3)", "(2, 3, 1)", "(1, 2, 3, 1)"}) {
+    const auto source = open_source(write(array("<i2", shape, data)), {});
+    EXPECT_EQ(source->info().width, 3) << shape;
+    EXPECT_EQ(source->info().height, 2) << shape;
+  }
+}
+
 TEST_F(Npy, SaysWhatItDoesNotRead) {
   const std::string data(64, '\0');
-  EXPECT_THAT(failure(array("<i8", "(2, 3)", data)), HasSubstr("the array's type is '<i8'"));
+  EXPECT_THAT(failure(array("<c8", "(2, 3)", data)), HasSubstr("the array's type is '<c8'"));
   EXPECT_THAT(failure(array("|i2", "(2, 3)", data)), HasSubstr("the array's type is '|i2'"));
   EXPECT_THAT(failure(array("<i2", "(6,)", data)), HasSubstr("the array's shape is (6), must have 2 dimensions"));
-  EXPECT_THAT(failure(array("<i2", "(2, 3, 1)", data)), HasSubstr("must have 2 dimensions"));
+  EXPECT_THAT(failure(array("<i2", "(2, 3, 2)", data)), HasSubstr("must have 2 dimensions"));
   EXPECT_THAT(failure(array("<i2", "(2, 0)", data)), HasSubstr("must be from 1"));
   EXPECT_THAT(failure(array("<i2", "(2, 3)", data, 4)), HasSubstr("NumPy format 4"));
   EXPECT_THAT(failure("PK\x03\x04 anything", nullptr, "a.npz"), HasSubstr("is too short for a zip archive"));
