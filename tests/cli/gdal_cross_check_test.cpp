@@ -5,14 +5,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
-#include <random>
-#include <sstream>
 
-#include "formats/registry.h"
+#include "support/gdal_answers.h"
 #include "support/run_program.h"
 #include "support/temporary_folder.h"
 
@@ -20,20 +17,6 @@ namespace isohf::test {
 namespace {
 
 using nlohmann::json;
-
-/// Runs one of GDAL's programs; statistics go to no file beside the raster. ASCII grids are read as float64, which
-/// holds the numbers as written; GDAL would round them to float32.
-RunResult run_gdal(std::vector<std::string> command, const std::string& input = {}) {
-  command.insert(command.begin(), {"/usr/bin/env", "GDAL_PAM_ENABLED=NO", "AAIGRID_DATATYPE=Float64"});
-  RunOptions options;
-  options.input = input;
-  return run_program(command, options);
-}
-
-bool has_gdal() {
-  return run_gdal({"gdalinfo", "--version"}).exit_code == 0 &&
-         run_gdal({"gdallocationinfo", "--help"}).exit_code != 127;
-}
 
 /// Links to all files of the shared data in one folder: gdalinfo -stats leaves files beside EHdr grids whatever it is
 /// told. Returns those that are rasters.
@@ -75,19 +58,6 @@ Difference known_difference(const std::string& name) {
   return found == kKnown.end() ? Difference::kNone : found->second.difference;
 }
 
-void expect_same_place(const json& ours, const json& gdal) {
-  const auto& gt = gdal.at("geoTransform");
-  const double dx = gt[1];
-  const double dy = std::abs(gt[5].get<double>());
-  const double height = gdal.at("size")[1];
-  const double north = gt[5].get<double>() > 0.0 ? gt[3].get<double>() + dy * height : gt[3].get<double>();
-  ASSERT_FALSE(ours.at("origin").is_null());
-  EXPECT_NEAR(ours.at("origin").at("x").get<double>(), gt[0].get<double>() + dx / 2, 1e-6 * dx);
-  EXPECT_NEAR(ours.at("origin").at("y").get<double>(), north - dy / 2, 1e-6 * dy);
-  EXPECT_NEAR(ours.at("spacing").at("x").get<double>(), dx, 1e-9 * dx);
-  EXPECT_NEAR(ours.at("spacing").at("y").get<double>(), dy, 1e-9 * dy);
-}
-
 /// GDAL's statistics are of samples, isohf's of elevations.
 void expect_same_statistics(const json& ours, const json& band, int void_rows_of_theirs) {
   const json& statistics = ours.at("statistics");
@@ -115,60 +85,6 @@ void expect_same_statistics(const json& ours, const json& band, int void_rows_of
     const double theirs = samples + ours.at("width").get<double>() * void_rows_of_theirs;
     const double valid = 100.0 * (samples - statistics.at("voids").get<double>()) / theirs;
     EXPECT_NEAR(valid, std::stod(found->at("STATISTICS_VALID_PERCENT").get<std::string>()), 0.0101);
-  }
-}
-
-double sample_as_number(SampleType type, const std::byte* at) {
-  const auto load = [&](auto value) {
-    std::memcpy(&value, at, sizeof value);
-    return static_cast<double>(value);
-  };
-  switch (type) {
-    case SampleType::kUint8:
-      return load(std::uint8_t{});
-    case SampleType::kUint16:
-      return load(std::uint16_t{});
-    case SampleType::kInt16:
-      return load(std::int16_t{});
-    case SampleType::kInt32:
-      return load(std::int32_t{});
-    case SampleType::kFloat32:
-      return load(float{});
-    case SampleType::kFloat64:
-      return load(double{});
-    default:
-      ADD_FAILURE() << "no file of GDAL's has samples of type " << to_string(type);
-      return 0.0;
-  }
-}
-
-/// Fifty samples at random places.
-void expect_same_samples(const std::string& file, bool turned) {
-  const auto source = open_source(file, {});
-  const SourceInfo& info = source->info();
-  std::mt19937 random(11);
-  std::string places;
-  std::vector<double> expected;
-  for (int i = 0; i < 50; ++i) {
-    const auto column = static_cast<std::int64_t>(random() % static_cast<std::uint64_t>(info.width));
-    const auto row = static_cast<std::int64_t>(random() % static_cast<std::uint64_t>(info.height));
-    std::vector<std::byte> raw(size_bytes(info.sample_type));
-    source->read_window({column, row, 1, 1}, raw);
-    expected.push_back(sample_as_number(info.sample_type, raw.data()));
-    places += std::to_string(column) + " " + std::to_string(turned ? info.height - 1 - row : row) + "\n";
-  }
-  const RunResult result = run_gdal({"gdallocationinfo", "-valonly", file}, places);
-  ASSERT_EQ(result.exit_code, 0) << result.err;
-  std::istringstream values(result.out);
-  for (const double sample : expected) {
-    std::string text;
-    ASSERT_TRUE(values >> text);
-    const double theirs = std::stod(text);
-    if (std::isnan(sample)) {
-      EXPECT_TRUE(std::isnan(theirs));
-    } else {
-      EXPECT_NEAR(sample, theirs, 1e-13 * std::max(1.0, std::abs(theirs)));
-    }
   }
 }
 

@@ -1,0 +1,176 @@
+/// One raster in the ways in which GDAL stores rasters, against what GDAL says of each.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "formats/registry.h"
+#include "support/gdal_answers.h"
+#include "support/run_program.h"
+#include "support/temporary_folder.h"
+
+namespace isohf::test {
+namespace {
+
+using nlohmann::json;
+using ::testing::HasSubstr;
+
+struct Variant {
+  const char* name;
+  std::vector<std::string> options;  ///< of gdal_translate
+};
+
+class GdalVariants : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    if (!has_gdal()) GTEST_SKIP() << "gdalinfo and gdallocationinfo are not installed (Debian: gdal-bin)";
+    set_module_folder(ISOHF_BIN_DIR);
+    const std::string coast = std::string(ISOHF_SOURCE_DIR) + "/testdata/coast_512x384_int16.tif";
+    translate(coast, "whole.tif", {"-srcwin", "150", "100", "160", "140"});
+    translate(coast, "real.tif",
+              {"-srcwin", "150", "100", "160", "140", "-ot", "Float32", "-scale", "0", "3000", "0", "1000"});
+  }
+
+  void translate(const std::string& from, const std::string& to, std::vector<std::string> options) {
+    options.insert(options.begin(), {"gdal_translate", "-q", from, folder_ / to});
+    const RunResult result = run_gdal(options, {}, true);
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+  }
+
+  /// Expects of the variant what GDAL says: size, type, place, void value and samples.
+  void expect_same(const std::string& from, const Variant& variant) {
+    SCOPED_TRACE(variant.name);
+    ASSERT_NO_FATAL_FAILURE(translate(folder_ / from, variant.name, variant.options));
+    const std::string file = folder_ / variant.name;
+    const json gdal = json::parse(run_gdal({"gdalinfo", "-json", file}, {}, true).out);
+    const RunResult result = run_isohf({"info", file, "--json", "--quiet"});
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    const json ours = json::parse(result.out);
+    EXPECT_EQ(ours.at("width"), gdal.at("size")[0]);
+    EXPECT_EQ(ours.at("height"), gdal.at("size")[1]);
+    const json& band = gdal.at("bands")[0];
+    if (band.contains("noDataValue") && band.at("noDataValue").is_number()) {
+      ASSERT_EQ(ours.at("void_values").size(), 1U);
+      const double theirs = band.at("noDataValue");  // of floats eight digits are printed
+      EXPECT_NEAR(ours.at("void_values")[0].get<double>(), theirs, 1e-7 * std::abs(theirs));
+    }
+    EXPECT_EQ(ours.at("z_scale"), band.value("scale", 1.0));
+    EXPECT_EQ(ours.at("z_offset"), band.value("offset", 0.0));
+    ASSERT_TRUE(gdal.contains("geoTransform"));
+    expect_same_place(ours, gdal);
+    expect_same_samples(file, gdal.at("geoTransform")[5] > 0.0);
+  }
+
+  /// Expects one line of error, with `why` in it.
+  void expect_refused(const Variant& variant, const char* why) {
+    SCOPED_TRACE(variant.name);
+    ASSERT_NO_FATAL_FAILURE(translate(folder_ / "whole.tif", variant.name, variant.options));
+    const RunResult result = run_isohf({"info", folder_ / variant.name});
+    EXPECT_EQ(result.exit_code, 1);
+    EXPECT_THAT(result.err, HasSubstr(why));
+    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1);
+  }
+
+  TemporaryFolder folder_;
+};
+
+TEST_F(GdalVariants, TiffCompressionsAndLayouts) {
+  for (const Variant& variant : std::vector<Variant>{
+           {"lzw.tif", {"-co", "COMPRESS=LZW", "-co", "PREDICTOR=2"}},
+           {"lerc.tif", {"-co", "COMPRESS=LERC"}},
+           {"lerc_deflate.tif", {"-co", "COMPRESS=LERC_DEFLATE"}},
+           {"lerc_zstd.tif", {"-co", "COMPRESS=LERC_ZSTD", "-co", "TILED=YES"}},
+           {"lzma.tif", {"-co", "COMPRESS=LZMA"}},
+           {"zstd.tif", {"-co", "COMPRESS=ZSTD", "-co", "PREDICTOR=2", "-co", "TILED=YES"}},
+           {"packbits.tif", {"-co", "COMPRESS=PACKBITS"}},
+           {"big_endian.tif", {"-co", "ENDIANNESS=BIG", "-co", "COMPRESS=DEFLATE", "-co", "PREDICTOR=2"}},
+           {"bigtiff.tif", {"-co", "BIGTIFF=YES", "-co", "TILED=YES", "-co", "BLOCKXSIZE=16", "-co", "BLOCKYSIZE=32"}},
+           {"sparse.tif", {"-co", "SPARSE_OK=YES", "-a_nodata", "0"}},
+           {"cog.tif", {"-of", "COG", "-co", "BLOCKSIZE=64"}},
+           {"planes.tif", {"-b", "1", "-co", "INTERLEAVE=BAND"}},
+           {"geotiff11.tif", {"-co", "GEOTIFF_VERSION=1.1"}},
+           {"esri.tif", {"-co", "GEOTIFF_KEYS_FLAVOR=ESRI_PE"}},
+           {"world.tif", {"-co", "PROFILE=BASELINE", "-co", "TFW=YES"}},
+           {"aux.tif", {"-co", "PROFILE=BASELINE", "-a_nodata", "-32768", "-a_scale", "0.5", "-a_offset", "10"}},
+           {"scaled.tif", {"-a_scale", "0.1", "-a_offset", "100"}}}) {
+    expect_same("whole.tif", variant);
+  }
+  for (const Variant& variant :
+       std::vector<Variant>{{"float_deflate.tif", {"-co", "COMPRESS=DEFLATE", "-co", "PREDICTOR=3"}},
+                            {"float_lerc.tif", {"-co", "COMPRESS=LERC", "-co", "MAX_Z_ERROR=0"}},
+                            {"float_zstd.tif", {"-co", "COMPRESS=ZSTD", "-co", "PREDICTOR=3", "-co", "TILED=YES"}},
+                            {"half.tif", {"-co", "NBITS=16"}},
+                            {"float24.tif", {"-co", "NBITS=24"}}}) {
+    expect_same("real.tif", variant);
+  }
+}
+
+TEST_F(GdalVariants, TiffSampleTypes) {
+  for (const char* type : {"Byte", "UInt16", "UInt32", "Int32", "Float32", "Float64"}) {
+    const std::string name = std::string(type) + ".tif";
+    expect_same("whole.tif", {name.c_str(), {"-ot", type, "-a_nodata", "none"}});
+  }
+  expect_refused({"twelve.tif", {"-ot", "UInt16", "-co", "NBITS=12", "-a_nodata", "none"}}, "12 bit unsigned integer");
+  expect_refused({"complex.tif", {"-ot", "CInt16", "-a_nodata", "none"}}, "complex integer");
+}
+
+TEST_F(GdalVariants, PlacesAndReferenceSystems) {
+  const std::vector<std::string> corners = {"-a_ullr", "10", "50", "11", "49.5", "-a_srs"};
+  const auto in = [&](const char* system) {
+    std::vector<std::string> options = corners;
+    options.emplace_back(system);
+    return options;
+  };
+  expect_same("whole.tif", {"degrees.tif", in("EPSG:4326")});
+  expect_same("whole.tif", {"heights.tif", in("EPSG:4326+5773")});
+  expect_same("whole.tif", {"mars.tif", in("ESRI:104905")});
+  expect_same("whole.tif", {"feet.tif", in("EPSG:2227")});
+  expect_same("whole.tif", {"point.tif", {"-mo", "AREA_OR_POINT=Point"}});
+  expect_same("whole.tif", {"south.tif", {"-a_ullr", "10", "49", "11", "50", "-a_srs", "EPSG:4326"}});
+}
+
+TEST_F(GdalVariants, OtherFormats) {
+  for (const Variant& variant :
+       std::vector<Variant>{{"a.asc", {"-of", "AAIGrid"}},
+                            {"b.bil", {"-of", "EHdr"}},
+                            {"c.cub", {"-of", "ISIS3"}},
+                            {"d.lbl", {"-of", "ISIS3", "-co", "DATA_LOCATION=EXTERNAL"}},
+                            {"e.lbl", {"-of", "ISIS3", "-co", "DATA_LOCATION=GEOTIFF"}},
+                            {"f.png", {"-of", "PNG", "-ot", "UInt16", "-a_nodata", "none"}},
+                            {"g.png", {"-of", "PNG", "-ot", "UInt16", "-a_nodata", "7", "-co", "WORLDFILE=YES"}}}) {
+    expect_same("whole.tif", variant);
+  }
+  for (const Variant& variant : std::vector<Variant>{
+           {"r.flt", {"-of", "EHdr"}},
+           {"s.asc", {"-of", "AAIGrid", "-co", "DECIMAL_PRECISION=9"}},
+           {"t.cub", {"-of", "ISIS3", "-co", "TILED=YES", "-co", "BLOCKXSIZE=64", "-co", "BLOCKYSIZE=64"}}}) {
+    expect_same("real.tif", variant);
+  }
+  expect_refused({"envi.bil", {"-of", "ENVI"}}, "envi.hdr: is an ENVI header");
+}
+
+TEST_F(GdalVariants, ThroughOpenImageIo) {
+  if (!std::filesystem::exists(std::string(ISOHF_BIN_DIR) + "/isohf_oiio.so")) GTEST_SKIP() << "no OpenImageIO module";
+  const std::vector<std::string> jpeg2000 = {"-of", "JP2OpenJPEG", "-co", "REVERSIBLE=YES", "-co", "QUALITY=100"};
+  const auto of = [&](const char* name, std::vector<std::string> more) {
+    more.insert(more.begin(), jpeg2000.begin(), jpeg2000.end());
+    return Variant{name, more};
+  };
+  for (const Variant& variant :
+       {of("unsigned.jp2", {"-ot", "UInt16"}), Variant{"grey.pgm", {"-of", "PNM", "-ot", "UInt16"}},
+        Variant{"grey.bmp", {"-of", "BMP", "-ot", "Byte", "-scale"}}}) {
+    SCOPED_TRACE(variant.name);
+    ASSERT_NO_FATAL_FAILURE(translate(folder_ / "whole.tif", variant.name, variant.options));
+    expect_same_samples(folder_ / variant.name, false);
+  }
+  expect_refused(of("signed.jp2", {}), "the samples are signed, which OpenImageIO reads as if they were not");
+  expect_refused(of("twelve.jp2", {"-ot", "UInt16", "-co", "NBITS=12"}), "the samples have 12 bits, and OpenImageIO");
+  expect_refused({"a.fits", {"-of", "FITS"}}, "OpenImageIO displaces the rows of FITS images");
+}
+
+}  // namespace
+}  // namespace isohf::test
