@@ -1,6 +1,7 @@
 #include "isohf/archive/block_moments.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "isohf/archive/neighbours.h"
@@ -13,6 +14,16 @@ namespace {
 constexpr std::size_t kBlockWidth = kBlockPlaces;
 constexpr std::size_t kPairs = 4;
 
+/// Differences of samples as floats: exact as doubles, then rounded once. Floats' differences have 34 bits at most, and
+/// machines that turn no 64-bit integers into doubles add them to the lowest bits of 1.5 * 2^52.
+[[gnu::always_inline]] inline float as_float(std::int32_t difference) {
+  return static_cast<float>(difference);
+}
+[[gnu::always_inline]] inline float as_float(std::int64_t difference) {
+  constexpr double kBase = 6755399441055744.0;
+  return static_cast<float>(std::bit_cast<double>(std::bit_cast<std::int64_t>(kBase) + difference) - kBase);
+}
+
 /// Neighbours of one row less NE, scaled: blocks of kBlockWidth places, `stride` apart.
 template <typename Wide>
 [[gnu::always_inline]] inline void scale_blocks(const Wide* samples, const Wide* anchor, const float* scale, int blocks,
@@ -21,12 +32,18 @@ template <typename Wide>
     float* const to = out + block * stride;
     const std::ptrdiff_t from = std::ptrdiff_t{block} * kBlockPlaces;
     for (std::ptrdiff_t i = 0; i < kBlockPlaces; ++i) {
-      to[i] = static_cast<float>(samples[from + i] - anchor[from + i]) * scale[from + i];
+      to[i] = as_float(samples[from + i] - anchor[from + i]) * scale[from + i];
     }
   }
 }
 ISOHF_VECTORISED(void, scale_code_blocks,
                  (const std::int32_t* samples, const std::int32_t* anchor, const float* scale, int blocks,
+                  std::ptrdiff_t stride, float* __restrict out),
+                 (samples, anchor, scale, blocks, stride, out)) {
+  scale_blocks(samples, anchor, scale, blocks, stride, out);
+}
+ISOHF_VECTORISED(void, scale_float_blocks,
+                 (const std::int64_t* samples, const std::int64_t* anchor, const float* scale, int blocks,
                   std::ptrdiff_t stride, float* __restrict out),
                  (samples, anchor, scale, blocks, stride, out)) {
   scale_blocks(samples, anchor, scale, blocks, stride, out);
@@ -88,10 +105,15 @@ ISOHF_VECTORISED(double, weigh_all, (const float* moments, const double* product
 template <typename Wide>
 [[gnu::always_inline]] inline void find_errors(const Wide* own, const Wide* halves, int first, int last,
                                                float* __restrict errors) {
-  for (int c = first; c <= last; ++c) errors[c] = 0.5F * static_cast<float>(2 * own[c] - halves[c]);
+  for (int c = first; c <= last; ++c) errors[c] = 0.5F * as_float(2 * own[c] - halves[c]);
 }
 ISOHF_VECTORISED(void, find_code_errors,
                  (const std::int32_t* own, const std::int32_t* halves, int first, int last, float* __restrict errors),
+                 (own, halves, first, last, errors)) {
+  find_errors(own, halves, first, last, errors);
+}
+ISOHF_VECTORISED(void, find_float_errors,
+                 (const std::int64_t* own, const std::int64_t* halves, int first, int last, float* __restrict errors),
                  (own, halves, first, last, errors)) {
   find_errors(own, halves, first, last, errors);
 }
@@ -169,7 +191,7 @@ void BlockMoments<Wide>::take_row(int r, int slot, int slots, const Predictors& 
   if constexpr (sizeof(Wide) == 4) {
     find_code_errors(at.own, halves_.data(), at.first, at.last, errors_.data());
   } else {
-    find_errors(at.own, halves_.data(), at.first, at.last, errors_.data());
+    find_float_errors(at.own, halves_.data(), at.first, at.last, errors_.data());
   }
   std::fill(scale_.begin(), scale_.end(), 0.0F);  // WW of the first two and the East of the last are not of the row
   weigh_by_errors(errors_.data(), at.first, at.last, scale_.data());
@@ -178,7 +200,7 @@ void BlockMoments<Wide>::take_row(int r, int slot, int slots, const Predictors& 
     if constexpr (sizeof(Wide) == 4) {
       scale_code_blocks(at.of_weight(term), at.north, scale_.data(), across_, stride, to);
     } else {
-      scale_blocks(at.of_weight(term), at.north, scale_.data(), across_, stride, to);
+      scale_float_blocks(at.of_weight(term), at.north, scale_.data(), across_, stride, to);
     }
   }
   float* const to = out + (terms_ - 1) * stride_;
