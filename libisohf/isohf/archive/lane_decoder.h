@@ -11,9 +11,9 @@ namespace isohf {
 /// before, the samples of other tiles do not.
 inline constexpr std::size_t kDecoderLanes = 8;
 
-/// Decodes up to kDecoderLanes payloads of 16- or 8-bit codes into `tiles`, of the same number: the fast twin of
-/// decode_tile's loop. `decoded[i]` tells whether tile i was; where not, the payload is not one for this decoder
-/// (floats, equal samples) or is broken, and decode_tile has the answer.
+/// Decodes up to kDecoderLanes payloads into `tiles`, of the same number: the fast twin of decode_tile's loop.
+/// `decoded[i]` tells whether tile i was; where not, the payload is not one for this decoder (equal samples) or is
+/// broken, and decode_tile has the answer.
 void decode_lanes(const TileShape& shape, CodeType type, std::span<const std::span<const std::byte>> payloads,
                   std::span<TileCodes> tiles, std::span<bool> decoded);
 

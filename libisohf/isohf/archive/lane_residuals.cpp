@@ -43,6 +43,20 @@ ISOHF_VECTORISED(void, shift_lanes,
   }
 }
 
+/// Those of floats, as far as they fit 16 bits.
+ISOHF_VECTORISED(void, shift_float_lanes,
+                 (const std::uint32_t* folded, std::ptrdiff_t begin, std::ptrdiff_t end,
+                  const PerLane<std::int32_t>& shifts, std::uint16_t* __restrict shifted),
+                 (folded, begin, end, shifts, shifted)) {
+  using Words = std::uint32_t __attribute__((vector_size(4 * kDecoderLanes)));
+  using Shorts = std::uint16_t __attribute__((vector_size(2 * kDecoderLanes)));
+  const Words shift = unaligned<Words>(shifts.data()).value;
+  for (std::ptrdiff_t at = begin; at < end; at += kStep) {
+    const Words wide = unaligned<Words>(folded + at).value >> shift;
+    unaligned<Shorts>(shifted + at).value = __builtin_convertvector(wide < 0xffffU ? wide : Words{} + 0xffffU, Shorts);
+  }
+}
+
 ISOHF_VECTORISED(void, limit_magnitudes,
                  (const std::uint16_t* __restrict shifted, std::ptrdiff_t begin, std::ptrdiff_t end,
                   std::uint8_t* __restrict magnitudes),
@@ -53,9 +67,9 @@ ISOHF_VECTORISED(void, limit_magnitudes,
 }
 
 /// One residual for each of kCount lanes at each place. Lanes in turn: one alone would wait for its own pointers.
-template <std::size_t kCount>
+template <std::size_t kCount, typename Folded>
 void take_lanes(const std::uint16_t* activities, const std::uint8_t* tables,
-                std::array<const std::uint16_t*, kMaxContexts>* next, int first, int last, std::uint16_t* folded) {
+                std::array<const Folded*, kMaxContexts>* next, int first, int last, Folded* folded) {
   for (std::ptrdiff_t at = first * kStep; at <= last * kStep; at += kStep) {
 #pragma GCC unroll 8
     for (std::size_t lane = 0; lane < kCount; ++lane) {
@@ -68,7 +82,8 @@ void take_lanes(const std::uint16_t* activities, const std::uint8_t* tables,
 
 }  // namespace
 
-bool LanePayload::open(const TileShape& shape, CodeType type, std::span<const std::byte> payload) {
+template <typename Folded>
+bool LanePayload<Folded>::open(const TileShape& shape, CodeType type, std::span<const std::byte> payload) {
   if (payload.size() > max_payload_bytes(shape, type)) return false;
   ByteReader reader(payload);
   header = read_payload_header(shape, type, reader);
@@ -92,15 +107,16 @@ bool LanePayload::open(const TileShape& shape, CodeType type, std::span<const st
   return count == samples - voids && expand(shape.columns(), symbols, extra, count);
 }
 
-bool LanePayload::expand(int columns, std::span<const std::span<const std::byte>> symbols,
-                         std::span<const std::byte> extra, std::size_t count) {
+template <typename Folded>
+bool LanePayload<Folded>::expand(int columns, std::span<const std::span<const std::byte>> symbols,
+                                 std::span<const std::byte> extra, std::size_t count) {
   std::vector<std::byte> padded(extra.size() + kExpanderSlack);
   std::copy(extra.begin(), extra.end(), padded.begin());
   // A row may run past a context's last residual, and past the last of all; that is told when it is done.
   const auto spare = static_cast<std::size_t>(columns) + 2;
-  folded = std::make_unique_for_overwrite<std::uint16_t[]>(count + spare);
-  std::fill_n(folded.get() + count, spare, std::uint16_t{0});
-  std::uint16_t* to = folded.get();
+  folded = std::make_unique_for_overwrite<Folded[]>(count + spare);
+  std::fill_n(folded.get() + count, spare, Folded{0});
+  Folded* to = folded.get();
   std::uint64_t position = 0;
   for (std::size_t i = 0; i < symbols.size(); ++i) {
     position = expand_residuals(symbols[i], std::span(padded).first(extra.size()), position, to);
@@ -113,13 +129,15 @@ bool LanePayload::expand(int columns, std::span<const std::span<const std::byte>
   return position % 8 == 0 || (std::to_integer<unsigned>(extra[position / 8]) >> (position % 8)) == 0;
 }
 
-const std::uint8_t* LanePayload::void_row(int columns, int r) const {
+template <typename Folded>
+const std::uint8_t* LanePayload<Folded>::void_row(int columns, int r) const {
   if (is_void.empty()) return nullptr;
   const std::uint8_t* const row = is_void.data() + static_cast<std::ptrdiff_t>(r) * columns;
   return std::find(row, row + columns, std::uint8_t{1}) == row + columns ? nullptr : row;
 }
 
-LaneResiduals::LaneResiduals(int columns)
+template <typename Folded>
+LaneResiduals<Folded>::LaneResiduals(int columns)
     : columns_(columns),
       tables_(kDecoderLanes * kTableStride),
       activities_(kDecoderLanes * static_cast<std::size_t>(columns)),
@@ -129,7 +147,8 @@ LaneResiduals::LaneResiduals(int columns)
   for (auto& row : magnitudes_) row.resize(kDecoderLanes * (static_cast<std::size_t>(columns) + 2 * kLaneMargin));
 }
 
-void LaneResiduals::open(const LanePayload& payload) {
+template <typename Folded>
+void LaneResiduals<Folded>::open(const LanePayload<Folded>& payload) {
   const auto table = context_table(payload.header.thresholds);
   std::copy(table.begin(), table.end(), tables_.begin() + static_cast<std::ptrdiff_t>(count_ * kTableStride));
   std::copy_n(payload.starts.begin(), kMaxContexts, next_[count_].begin());
@@ -139,11 +158,13 @@ void LaneResiduals::open(const LanePayload& payload) {
   ++count_;
 }
 
-std::uint8_t* LaneResiduals::magnitudes(std::size_t back) {
+template <typename Folded>
+std::uint8_t* LaneResiduals<Folded>::magnitudes(std::size_t back) {
   return magnitudes_[back].data() + kLaneMargin * kStep;
 }
 
-void LaneResiduals::take_places(int first, int last) {
+template <typename Folded>
+void LaneResiduals<Folded>::take_places(int first, int last) {
   const auto take = [&](auto lanes) {
     take_lanes<lanes.value>(activities_.data(), tables_.data(), next_.data(), first, last, folded_.data());
   };
@@ -153,16 +174,18 @@ void LaneResiduals::take_places(int first, int last) {
   take(std::integral_constant<std::size_t, kDecoderLanes>());
 }
 
-void LaneResiduals::take_around_voids(std::size_t lane, int r, int first, int last) {
+template <typename Folded>
+void LaneResiduals<Folded>::take_around_voids(std::size_t lane, int r, int first, int last) {
   for (int place = first; place <= last; ++place) {
     const std::size_t i = static_cast<std::size_t>(place) * kDecoderLanes + lane;
     const bool is_void = void_rows_[lane] != nullptr && void_rows_[lane][column_of_place(columns_, r, place)] != 0;
     is_void_[i] = is_void ? 1 : 0;
-    folded_[i] = is_void ? std::uint16_t{0} : *next_[lane][tables_[lane * kTableStride + activities_[i]]]++;
+    folded_[i] = is_void ? Folded{0} : *next_[lane][tables_[lane * kTableStride + activities_[i]]]++;
   }
 }
 
-void LaneResiduals::take_slid(std::size_t lane) {
+template <typename Folded>
+void LaneResiduals<Folded>::take_slid(std::size_t lane) {
   const std::uint8_t* const row = magnitudes(0) + lane;
   for (int side = 0; side < 2; ++side) {
     if (void_rows_[lane] != nullptr && void_rows_[lane][column_of_slid(columns_, side)] != 0) continue;
@@ -172,7 +195,8 @@ void LaneResiduals::take_slid(std::size_t lane) {
   }
 }
 
-void LaneResiduals::take_row(int r) {
+template <typename Folded>
+void LaneResiduals<Folded>::take_row(int r) {
   const int first = r % 2 == 0 ? 1 : 0;
   const int last = r % 2 == 0 ? columns_ - 2 : columns_ - 1;
   has_voids_ = false;
@@ -192,9 +216,7 @@ void LaneResiduals::take_row(int r) {
   } else {
     take_places(first, last);
   }
-  const bool has_shifts = std::any_of(shifts_.begin(), shifts_.end(), [](std::int32_t shift) { return shift != 0; });
-  if (has_shifts) shift_lanes(folded_.data(), first * kStep, (last + 1) * kStep, shifts_, activities_.data());
-  limit_magnitudes(has_shifts ? activities_.data() : folded_.data(), first * kStep, (last + 1) * kStep, magnitudes(0));
+  find_magnitudes(first * kStep, (last + 1) * kStep);
   for (std::size_t lane = 0; lane < count_; ++lane) {
     if (!is_good_[lane]) continue;
     if (r % 2 == 0) take_slid(lane);
@@ -205,7 +227,21 @@ void LaneResiduals::take_row(int r) {
   close_row(first, last);
 }
 
-void LaneResiduals::close_row(int first, int last) {
+template <typename Folded>
+void LaneResiduals<Folded>::find_magnitudes(std::ptrdiff_t begin, std::ptrdiff_t end) {
+  const std::uint16_t* shifted = activities_.data();
+  if constexpr (sizeof(Folded) == 4) {
+    shift_float_lanes(folded_.data(), begin, end, shifts_, activities_.data());
+  } else {
+    const bool has_shifts = std::any_of(shifts_.begin(), shifts_.end(), [](std::int32_t shift) { return shift != 0; });
+    if (has_shifts) shift_lanes(folded_.data(), begin, end, shifts_, activities_.data());
+    if (!has_shifts) shifted = folded_.data();
+  }
+  limit_magnitudes(shifted, begin, end, magnitudes(0));
+}
+
+template <typename Folded>
+void LaneResiduals<Folded>::close_row(int first, int last) {
   std::uint8_t* const row = magnitudes(0);
   for (int place = -kLaneMargin; place < first; ++place) std::copy_n(row + first * kStep, kStep, row + place * kStep);
   for (int place = last + 1; place < columns_ + kLaneMargin; ++place) {
@@ -214,5 +250,10 @@ void LaneResiduals::close_row(int first, int last) {
   magnitudes_[2].swap(magnitudes_[1]);
   magnitudes_[1].swap(magnitudes_[0]);
 }
+
+template struct LanePayload<std::uint16_t>;
+template struct LanePayload<std::uint32_t>;
+template class LaneResiduals<std::uint16_t>;
+template class LaneResiduals<std::uint32_t>;
 
 }  // namespace isohf

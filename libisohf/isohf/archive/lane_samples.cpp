@@ -218,7 +218,7 @@ void LaneSamples::open(const PayloadHeader& header) {
   is_wide_ |= header.predictors.is_wide;
 }
 
-void LaneSamples::restore_row(int r, const LaneResiduals& residuals) {
+void LaneSamples::restore_row(int r, const LaneResiduals<std::uint16_t>& residuals) {
   const int first = Lattice<std::int32_t>::first(r);
   const int last = r % 2 == 0 ? columns_ - 2 : columns_ - 1;
   const auto step = static_cast<std::ptrdiff_t>(kLanes);
@@ -245,7 +245,7 @@ void LaneSamples::restore_row(int r, const LaneResiduals& residuals) {
   repeat_sample(own + (last - 1) * step, true, own + last * step, columns_ + kLaneMargin - last);
 }
 
-std::int32_t LaneSamples::code(int r, int place, std::size_t lane) const {
+std::int32_t LaneSamples::sample(int r, int place, std::size_t lane) const {
   return code_of(row(r)[place * static_cast<std::ptrdiff_t>(kLanes) + static_cast<std::ptrdiff_t>(lane)]);
 }
 
@@ -259,7 +259,7 @@ void LaneSamples::write_row(int r, const PerLane<std::uint16_t*>& codes) const {
   }
   for (; place <= last; ++place) {
     for (std::size_t lane = 0; lane < headers_.size(); ++lane) {
-      codes[lane][place] = static_cast<std::uint16_t>(code(r, place, lane));
+      codes[lane][place] = static_cast<std::uint16_t>(sample(r, place, lane));
     }
   }
 }
@@ -272,12 +272,7 @@ void LaneSamples::gather_weights(int r) {
   weights_.assign(has_map ? static_cast<std::size_t>(Predictors::blocks_across(columns_)) : 1, StretchWeights{});
   for (std::size_t stretch = 0; stretch < weights_.size(); ++stretch) {
     for (std::size_t lane = 0; lane < headers_.size(); ++lane) {
-      const Predictors& predictors = headers_[lane]->predictors;
-      std::size_t index = 0;
-      if (!predictors.map.empty()) {
-        index = predictors.map[static_cast<std::size_t>(r / kBlockPlaces * predictors.block_columns) + stretch];
-      }
-      const PredictorWeights& weights = r > 2 ? predictors.weights[index] : predictors.of_row(r);
+      const PredictorWeights& weights = headers_[lane]->predictors.of_block(r, stretch);
       std::int32_t anchor = 1 << kWeightBits;
       for (const std::int16_t weight : weights) anchor -= weight;
       const auto weight_of = [&](int i) -> std::int32_t {

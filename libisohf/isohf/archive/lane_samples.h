@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "isohf/archive/lane_range.h"
 #include "isohf/archive/lane_residuals.h"
 #include "isohf/archive/tile_payload.h"
 
@@ -14,32 +15,30 @@ namespace isohf {
 inline constexpr std::size_t kLaneTermPairs = 11;
 using StretchWeights = std::array<PerLane<std::int32_t>, kLaneTermPairs>;
 
-/// The range of each lane's samples, and the least and the most that the row had; shifted (lane_samples.cpp).
-struct LaneRange {
-  PerLane<std::int32_t> low{};
-  PerLane<std::int32_t> high{};
-  PerLane<std::int32_t> least_seen{};
-  PerLane<std::int32_t> most_seen{};
-};
-
 /// The samples of tiles that are decoded side by side, on their way from residuals to codes, row by row.
 class LaneSamples {
  public:
+  using Folded = std::uint16_t;
+  using Stored = std::uint16_t;
+
   explicit LaneSamples(const TileShape& shape);
 
   /// Lanes are opened in order. The header must outlive this.
   void open(const PayloadHeader& header);
 
   /// Restores row r from the residuals taken last.
-  void restore_row(int r, const LaneResiduals& residuals);
+  void restore_row(int r, const LaneResiduals<std::uint16_t>& residuals);
 
   /// Whether no sample of that row has left its lane's range.
-  [[nodiscard]] bool is_in_range(std::size_t lane) const {
-    return range_.least_seen[lane] >= range_.low[lane] && range_.most_seen[lane] <= range_.high[lane];
-  }
+  [[nodiscard]] bool is_in_range(std::size_t lane) const { return range_.is_kept(lane); }
 
-  /// A lane's code at a place of row r, which is among the last three.
-  [[nodiscard]] std::int32_t code(int r, int place, std::size_t lane) const;
+  /// A lane's sample at a place of row r, which is among the last three.
+  [[nodiscard]] std::int32_t sample(int r, int place, std::size_t lane) const;
+  /// A sum as samples have it, and a sample as it is stored.
+  [[nodiscard]] static std::int32_t wrapped(std::uint32_t sum) { return static_cast<std::int32_t>(sum & 0xffffU); }
+  [[nodiscard]] static std::uint16_t stored(std::int32_t sample, std::size_t) {
+    return static_cast<std::uint16_t>(sample);
+  }
 
   /// Writes row r by place, each lane's codes to where those of its place 0 stand; columns of slid vertices get nothing
   /// of use. All lanes need a place to write to, also those without a tile.
@@ -56,7 +55,7 @@ class LaneSamples {
   int columns_;
   std::ptrdiff_t stride_;
   bool is_wide_ = false;
-  LaneRange range_;
+  LaneRange range_;  ///< shifted (lane_samples.cpp)
   std::vector<const PayloadHeader*> headers_;
   std::vector<std::int32_t> samples_;  ///< four rows, by place and lane, in pairs
   std::vector<StretchWeights> weights_;

@@ -38,6 +38,12 @@ struct Predictors {
   [[nodiscard]] const PredictorWeights& of_row(int r) const {
     return r == 0 ? kFirstRowWeights : r == 1 ? kSecondRowWeights : kThirdRowWeights;
   }
+  /// The weights of row r in one of the blocks that it runs through.
+  [[nodiscard]] const PredictorWeights& of_block(int r, std::size_t block_column) const {
+    if (r <= 2) return of_row(r);
+    if (map.empty()) return weights.front();
+    return weights[map[static_cast<std::size_t>(r / kBlockPlaces * block_columns) + block_column]];
+  }
   /// Calls `use(weights, begin, end)` for stretches of places [begin, end) that have the same weights, from `first` to
   /// `last` of row r.
   template <typename Use>
