@@ -109,7 +109,8 @@ bool read_whole(std::string_view word, std::int32_t& value) {
 
 class AsciiGridSource final : public HeightSource {
  public:
-  AsciiGridSource(const std::string& path, const OpenOptions& options) : file_(path), words_(file_), grass_(path) {
+  AsciiGridSource(const std::string& path, const OpenOptions& options)
+      : file_(path, options.unpacked_bytes), words_(file_), grass_(path) {
     info_.path = path;
     info_.format = "ESRI ASCII grid";
     if (!options.channel.empty() && options.channel != "0") {
@@ -166,6 +167,9 @@ class AsciiGridSource final : public HeightSource {
       }
     }
   }
+
+  void limit_buffers(std::uint64_t bytes) override { file_.limit_buffers(bytes); }
+  [[nodiscard]] std::uint64_t buffer_bytes(std::uint64_t limit) const override { return file_.buffer_bytes(limit); }
 
  private:
   [[noreturn]] void refuse(ErrorCode code, const std::string& what) const {

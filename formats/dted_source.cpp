@@ -48,7 +48,7 @@ int elevation(std::byte high, std::byte low) {
 
 class DtedSource final : public HeightSource {
  public:
-  DtedSource(const std::string& path, const OpenOptions& options) : file_(path) {
+  DtedSource(const std::string& path, const OpenOptions& options) : file_(path, options.unpacked_bytes) {
     info_.path = path;
     if (!options.channel.empty() && options.channel != "0") {
       throw Error(ErrorCode::kInvalidArgument,
@@ -79,6 +79,9 @@ class DtedSource final : public HeightSource {
       }
     }
   }
+
+  void limit_buffers(std::uint64_t bytes) override { file_.limit_buffers(bytes); }
+  [[nodiscard]] std::uint64_t buffer_bytes(std::uint64_t limit) const override { return file_.buffer_bytes(limit); }
 
  private:
   [[noreturn]] void corrupt(std::string_view label, const std::string& what) const {

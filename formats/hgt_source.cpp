@@ -19,7 +19,6 @@
 namespace isohf {
 namespace {
 
-constexpr std::uint64_t kMostUnpackedBytes = std::uint64_t{64} << 20U;
 constexpr std::int64_t kSampleBytes = 2;
 
 std::string lower(std::string text) {
@@ -54,15 +53,15 @@ std::optional<Size> size_of_tile(std::uint64_t bytes) {
 
 class HgtSource final : public HeightSource {
  public:
-  HgtSource(const std::string& path, const OpenOptions& options) : file_(path) {
+  HgtSource(const std::string& path, const OpenOptions& options) {
     info_.path = path;
     std::string name = path;
-    std::uint64_t bytes = file_.size_bytes();
     if (ends_with(lower(path), ".zip")) {
-      name = unpack();
-      bytes = unpacked_.size();
+      name = open_member(options.unpacked_bytes);
+    } else {
+      file_.emplace(path, options.unpacked_bytes);
     }
-    describe(name, bytes, options);
+    describe(name, file_->size_bytes(), options);
     apply_open_options(info_, options);
   }
 
@@ -78,28 +77,26 @@ class HgtSource final : public HeightSource {
     const std::size_t run_bytes = whole ? samples.size() : static_cast<std::size_t>(window.columns * kSampleBytes);
     for (std::int64_t i = 0; i < runs; ++i) {
       const auto offset = static_cast<std::uint64_t>(((window.row + i) * info_.width + window.column) * kSampleBytes);
-      const auto out = samples.subspan(static_cast<std::size_t>(i) * run_bytes, run_bytes);
-      if (unpacked_.empty()) {
-        file_.read(offset, out);
-      } else {
-        std::memcpy(out.data(), unpacked_.data() + offset, out.size());
-      }
+      file_->read(offset, samples.subspan(static_cast<std::size_t>(i) * run_bytes, run_bytes));
     }
     swap_byte_order(samples, kSampleBytes);
   }
 
+  void limit_buffers(std::uint64_t bytes) override { file_->limit_buffers(bytes); }
+  [[nodiscard]] std::uint64_t buffer_bytes(std::uint64_t limit) const override { return file_->buffer_bytes(limit); }
+
  private:
-  /// Returns the name that says where the tile lies.
-  std::string unpack() {
+  /// Opens the tile of a zip archive; returns the name that says where it lies.
+  std::string open_member(std::uint64_t unpacked_bytes) {
     std::vector<ZipMember> tiles;
-    for (ZipMember& member : zip_members(file_)) {
+    for (ZipMember& member : zip_members(RawFile(info_.path))) {
       if (ends_with(lower(member.name), ".hgt")) tiles.push_back(std::move(member));
     }
     if (tiles.size() != 1) {
       throw Error(ErrorCode::kUnsupported,
                   fmt::format("{}: {} .hgt files are in the archive, must be 1", info_.path, tiles.size()));
     }
-    unpacked_ = read_zip_member(file_, tiles.front(), kMostUnpackedBytes);
+    file_.emplace(info_.path, tiles.front(), unpacked_bytes);
     const std::optional<HgtCorner> inside = hgt_corner_of(tiles.front().name);
     const std::optional<HgtCorner> outside = hgt_corner_of(info_.path);
     if (inside && outside && (inside->latitude != outside->latitude || inside->longitude != outside->longitude)) {
@@ -157,8 +154,7 @@ class HgtSource final : public HeightSource {
     }
   }
 
-  RawFile file_;
-  std::vector<std::byte> unpacked_;  // of a zipped tile; empty: read from the file
+  std::optional<RawFile> file_;
   SourceInfo info_;
 };
 

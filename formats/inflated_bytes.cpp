@@ -21,6 +21,9 @@ constexpr std::uint64_t kFirstStride = std::uint64_t{1} << 20U;
 constexpr std::size_t kStoredBytes = std::size_t{1} << 16U;
 /// zlib copies its window of 32 KiB aside after every call: few calls, and what they fill fits the second cache.
 constexpr std::size_t kScratchBytes = std::size_t{1} << 18U;
+constexpr std::size_t kPieceBytes = std::size_t{1} << 20U;
+/// zlib's state with its window, in blocks of the heap.
+constexpr std::uint64_t kDecoderBytes = std::uint64_t{48} << 10U;
 constexpr int kGzipWindow = 16 + MAX_WBITS;
 constexpr int kRawWindow = -MAX_WBITS;
 
@@ -107,6 +110,16 @@ struct InflatedBytes::State {
     return wanted - out.size();
   }
 
+  /// Keeps places as it goes; data that ended no earlier when they were checked must not now.
+  void inflate_checked(std::span<std::byte> out) {
+    while (!out.empty()) {
+      const auto piece = out.first(std::min(out.size(), kPieceBytes));
+      if (inflate_into(piece) != piece.size()) corrupt("has changed since it was opened");
+      if (!ended) keep_place();
+      out = out.subspan(piece.size());
+    }
+  }
+
   /// Another member may follow; zero bytes are padding.
   void end_member() {
     if (kind == Kind::kRawDeflate) {
@@ -169,7 +182,19 @@ InflatedBytes::InflatedBytes(std::string name, ReadStored read_stored, Kind kind
   state_->checked = true;
 }
 
+InflatedBytes::InflatedBytes(std::string name, ReadStored read_stored, Kind kind, std::uint64_t size_bytes)
+    : state_(std::make_unique<State>(std::move(name), std::move(read_stored), kind)) {
+  state_->size = size_bytes;
+  state_->checked = true;
+  state_->restart(nullptr);
+}
+
 InflatedBytes::~InflatedBytes() = default;
+
+std::uint64_t InflatedBytes::memory_bytes(std::uint64_t size_bytes) {
+  const std::uint64_t places = std::min<std::uint64_t>(size_bytes / kFirstStride, kMostPlaces);
+  return (places + 1) * kDecoderBytes + kStoredBytes + kScratchBytes;
+}
 
 std::uint64_t InflatedBytes::size_bytes() const {
   return state_->size;
@@ -193,9 +218,11 @@ std::size_t InflatedBytes::read_some(std::uint64_t offset_bytes, std::span<std::
     while (state.decoder->inflated_at < offset_bytes) {
       scratch.resize(
           static_cast<std::size_t>(std::min<std::uint64_t>(kScratchBytes, offset_bytes - state.decoder->inflated_at)));
-      if (state.inflate_into(scratch) != scratch.size()) state.corrupt("has changed since it was opened");
+      state.inflate_checked(scratch);
     }
-    return state.inflate_into(bytes);
+    bytes = bytes.first(static_cast<std::size_t>(std::min<std::uint64_t>(bytes.size(), state.size - offset_bytes)));
+    state.inflate_checked(bytes);
+    return bytes.size();
   } catch (...) {
     state.restart(nullptr);
     throw;

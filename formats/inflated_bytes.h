@@ -9,9 +9,9 @@
 
 namespace isohf {
 
-/// The contents of deflated data, readable at any offset. Opening inflates all of it once, checks it, and keeps the
-/// decoder's state at up to 128 places (6 MiB); a read goes on from the last one's end or from the nearest place
-/// before. One thread at a time.
+/// The contents of deflated data, readable at any offset, without holding them. Opening inflates all of it once and
+/// checks it. The decoder's state is kept at up to 128 places (6 MiB) where it came by; a read goes on from the last
+/// one's end or from the nearest place before. One thread at a time.
 class InflatedBytes {
  public:
   enum class Kind { kGzip, kRawDeflate };
@@ -21,12 +21,18 @@ class InflatedBytes {
   /// `name` begins the messages. Gzip's own checksums and lengths are verified here, of members that follow each other
   /// too. Throws Error{kCorrupt} where the data are damaged or cut off.
   InflatedBytes(std::string name, ReadStored read_stored, Kind kind);
+  /// Of data that have been checked and give `size_bytes` bytes: opening reads nothing.
+  InflatedBytes(std::string name, ReadStored read_stored, Kind kind, std::uint64_t size_bytes);
   InflatedBytes(const InflatedBytes&) = delete;
   InflatedBytes& operator=(const InflatedBytes&) = delete;
   ~InflatedBytes();
 
+  /// What reading contents of this size takes, places and working memory.
+  [[nodiscard]] static std::uint64_t memory_bytes(std::uint64_t size_bytes);
+
   [[nodiscard]] std::uint64_t size_bytes() const;
-  [[nodiscard]] std::uint32_t crc32() const;  ///< of kRawDeflate's contents; 0 of gzip's, which are verified
+  /// Of kRawDeflate's contents; 0 of gzip's, which are verified, and of what had been checked before.
+  [[nodiscard]] std::uint32_t crc32() const;
   /// Returns how many of the bytes there were before the end. Throws Error{kIo, kCorrupt}.
   std::size_t read_some(std::uint64_t offset_bytes, std::span<std::byte> bytes);
 

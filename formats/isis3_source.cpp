@@ -60,9 +60,9 @@ class Isis3Source final : public HeightSource {
   Isis3Source(const std::string& path, const OpenOptions& options) {
     info_.path = path;
     info_.format = "ISIS3 cube";
-    const LabelText label = read_label(path);
+    const LabelText label = read_label(path, options.unpacked_bytes);
     const LabelBlock& cube = inner(label.root, "ISISCUBE");
-    read_core(inner(cube, "CORE"), label.end_bytes);
+    read_core(inner(cube, "CORE"), label.end_bytes, options.unpacked_bytes);
     read_mapping(cube);
     first_bytes_ += static_cast<std::uint64_t>(choose_band(info_, options, bands_)) * band_bytes_;
     apply_open_options(info_, options);
@@ -87,6 +87,9 @@ class Isis3Source final : public HeightSource {
     if (big_endian_) swap_byte_order(samples, static_cast<std::size_t>(size_));
   }
 
+  void limit_buffers(std::uint64_t bytes) override { file_->limit_buffers(bytes); }
+  [[nodiscard]] std::uint64_t buffer_bytes(std::uint64_t limit) const override { return file_->buffer_bytes(limit); }
+
  private:
   [[nodiscard]] const LabelBlock& inner(const LabelBlock& block, const char* name) const {
     for (const LabelBlock& each : block.blocks) {
@@ -96,7 +99,7 @@ class Isis3Source final : public HeightSource {
                                                  name, block.name.empty() ? "the label" : block.name));
   }
 
-  void read_core(const LabelBlock& core, std::uint64_t label_bytes) {
+  void read_core(const LabelBlock& core, std::uint64_t label_bytes, std::uint64_t unpacked_bytes) {
     const LabelFields fields(info_.path, core);
     std::uint64_t first_free = label_bytes;
     std::string data_path = info_.path;
@@ -104,7 +107,7 @@ class Isis3Source final : public HeightSource {
       data_path = core_file(fields, core.entry("^CORE")->line);
       first_free = 0;
     }
-    file_.emplace(data_path);
+    file_.emplace(data_path, unpacked_bytes);
     const LabelFields dimensions(info_.path, inner(core, "DIMENSIONS"));
     info_.width = dimensions.count("SAMPLES", 1, kMostSamples);
     info_.height = dimensions.count("LINES", 1, kMostSamples);

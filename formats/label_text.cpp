@@ -262,8 +262,8 @@ LabelText parse_label(const std::string& path, std::string_view text) {
   return Parser(path, text).parse();
 }
 
-LabelText read_label(const std::string& path) {
-  const RawFile file(path);
+LabelText read_label(const std::string& path, std::uint64_t unpacked_bytes) {
+  const RawFile file(path, unpacked_bytes);
   std::string text(static_cast<std::size_t>(std::min<std::uint64_t>(file.size_bytes(), kMostLabelBytes)), '\0');
   text.resize(file.read_some(0, std::as_writable_bytes(std::span(text))));
   return parse_label(path, text);

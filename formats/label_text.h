@@ -47,7 +47,8 @@ struct LabelText {
 [[nodiscard]] LabelText parse_label(const std::string& path, std::string_view text);
 
 /// Reads the label that starts the file at `path`, at most 1 MiB of it. Throws as parse_label, and Error{kIo}.
-[[nodiscard]] LabelText read_label(const std::string& path);
+/// unpacked_bytes  as in OpenOptions
+[[nodiscard]] LabelText read_label(const std::string& path, std::uint64_t unpacked_bytes);
 
 /// A decimal number or a based integer (16#FF7FFFFB#); nullopt for all else ("N/A", "NULL").
 [[nodiscard]] std::optional<double> number_of(const LabelValue& value);

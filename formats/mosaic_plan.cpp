@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <oneapi/tbb/parallel_for.h>
+#include <oneapi/tbb/task_arena.h>
 #include <sys/stat.h>
 
 #include <algorithm>
@@ -254,8 +255,12 @@ std::vector<PlacedMember> survey(const std::vector<std::string>& paths, const Op
   struct Opened {
     SourceInfo info;
     FileStamp stamp;
+    std::uint64_t reader_bytes = 0;
     std::exception_ptr failure;
   };
+  plan.readers_at_once = oneapi::tbb::this_task_arena::max_concurrency();
+  OpenOptions share = options;
+  share.unpacked_bytes /= static_cast<std::uint64_t>(plan.readers_at_once);
   Survey found(plan);
   const std::size_t at_once = std::min(kOpenedAtOnce, most_open_rasters());
   for (std::size_t from = 0; from < paths.size(); from += at_once) {
@@ -263,13 +268,16 @@ std::vector<PlacedMember> survey(const std::vector<std::string>& paths, const Op
     oneapi::tbb::parallel_for(std::size_t{0}, opened.size(), [&](std::size_t i) {
       try {
         opened[i].stamp = FileStamp::of(paths[from + i]);
-        opened[i].info = open_source(paths[from + i], options)->info();
+        const std::unique_ptr<HeightSource> source = open_source(paths[from + i], share);
+        opened[i].info = source->info();
+        opened[i].reader_bytes = source->buffer_bytes(UINT64_MAX);
       } catch (...) {
         opened[i].failure = std::current_exception();
       }
     });
     for (std::size_t i = 0; i < opened.size(); ++i) {
       if (opened[i].failure) std::rethrow_exception(opened[i].failure);
+      plan.reader_bytes = std::max(plan.reader_bytes, opened[i].reader_bytes);
       found.add(paths[from + i], std::move(opened[i].info), opened[i].stamp);
     }
   }

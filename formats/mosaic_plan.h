@@ -62,9 +62,11 @@ struct MosaicPlan {
   /// From the coarsest to the finest, and that is the order in which they are laid over each other. A layer that has
   /// the mosaic's spacing is on its grid; others are interpolated.
   std::vector<MosaicLayer> layers;
-  Window region;                  ///< the samples that matter: all, or those of a box
-  MosaicHoles holes;              ///< in the region
-  std::int64_t block_height = 1;  ///< the members' largest
+  Window region;                   ///< the samples that matter: all, or those of a box
+  MosaicHoles holes;               ///< in the region
+  std::int64_t block_height = 1;   ///< the members' largest
+  std::uint64_t reader_bytes = 0;  ///< that a member's reader keeps at most
+  int readers_at_once = 1;         ///< as many threads read, each a member of its own
 
   [[nodiscard]] bool is_on_grid(const MosaicLayer& layer) const {
     return layer.spacing_x == info.georeference.spacing_x && layer.spacing_y == info.georeference.spacing_y;

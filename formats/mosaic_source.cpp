@@ -25,6 +25,24 @@ constexpr std::size_t kBatchBytes = std::size_t{8} << 20U;
 /// Coordinates this close to a sample, in samples, are its place: they are computed from origins and spacings.
 constexpr double kOnSample = 1e-6;
 
+/// Between two reads of strips, all open readers together may keep this many times what one source would.
+constexpr std::uint64_t kOpenReaders = 32;
+
+std::uint64_t idle_bytes_within(std::uint64_t limit) {
+  return limit < ReaderPool::kMostIdleBytes / kOpenReaders ? kOpenReaders * limit : ReaderPool::kMostIdleBytes;
+}
+
+/// The most members that begin in one row: as many are read for a strip of a regular grid.
+std::uint64_t members_side_by_side(const MosaicLayer& layer) {
+  std::uint64_t most = 1;
+  std::uint64_t here = 1;
+  for (std::size_t i = 1; i < layer.members.size(); ++i) {
+    here = layer.members[i].row == layer.members[i - 1].row ? here + 1 : 1;
+    most = std::max(most, here);
+  }
+  return most;
+}
+
 /// A place between the samples of a coarser layer, on one axis.
 struct Between {
   std::int64_t first = 0;    ///< the sample at or before it; -1 and the last one have but one neighbour inside
@@ -126,13 +144,14 @@ struct MosaicSource::Part {
   Window own;               ///< in the member
   std::int64_t column = 0;  ///< of its first sample in the window
   std::int64_t row = 0;
-  std::vector<std::byte> samples;  ///< of the mosaic's kind
+  std::span<std::byte> samples;  ///< of the mosaic's kind
 };
 
 MosaicSource::MosaicSource(std::string path, MosaicPlan plan, const OpenOptions& options, OverlapRule rule)
-    : plan_(std::move(plan)), rule_(rule), pool_(options) {
+    : plan_(std::move(plan)), rule_(rule), unpacked_bytes_(options.unpacked_bytes), pool_(options) {
   plan_.info.path = std::move(path);
   choose_strips();
+  share_memory(ReaderPool::kMostIdleBytes);
   strip_columns_ = plan_.info.width;
 }
 
@@ -157,6 +176,34 @@ void MosaicSource::choose_strips() {
     rows = std::max<std::int64_t>(1, kMostStripBytes / row_bytes);
   }
   info.block_height = std::min(rows, info.height);
+}
+
+/// Packed members are held only where all those of a strip can be: opening one anew for each strip costs more than
+/// going on from where it was. Where they are more than may be open, they are opened anew anyhow.
+void MosaicSource::share_memory(std::uint64_t idle_bytes) {
+  pool_.limit_idle(idle_bytes);
+  std::uint64_t each = unpacked_bytes_ / static_cast<std::uint64_t>(plan_.readers_at_once);
+  const std::uint64_t members = members_side_by_side(plan_.layers.back());
+  if (members <= pool_.most_open()) each = std::min(each, std::min(idle_bytes, unpacked_bytes_) / members);
+  pool_.limit_unpacked(each);
+}
+
+void MosaicSource::limit_buffers(std::uint64_t bytes) {
+  share_memory(idle_bytes_within(bytes));
+}
+
+std::uint64_t MosaicSource::buffer_bytes(std::uint64_t limit) const {
+  const std::uint64_t strip = static_cast<std::uint64_t>(plan_.info.block_height) *
+                              static_cast<std::uint64_t>(plan_.info.width) * size_bytes(plan_.info.sample_type);
+  std::uint64_t members = 0;
+  for (const MosaicLayer& layer : plan_.layers) members += layer.members.size();
+  const std::uint64_t reading = static_cast<std::uint64_t>(plan_.readers_at_once) * plan_.reader_bytes;
+  const std::uint64_t open = std::min<std::uint64_t>(members, pool_.most_open()) * plan_.reader_bytes;
+  std::int64_t widest = 0;
+  for (const MosaicMember& member : plan_.layers.back().members) widest = std::max(widest, member.width);
+  const std::size_t part = bytes_of({0, 0, widest, plan_.info.block_height});
+  const std::uint64_t parts = std::min<std::uint64_t>(strip, std::max(part, kBatchBytes));
+  return strip + parts + std::min(open, reading + idle_bytes_within(limit));
 }
 
 std::size_t MosaicSource::bytes_of(const Window& window) const {
@@ -240,7 +287,6 @@ std::vector<MosaicSource::Part> MosaicSource::parts_in(std::size_t layer, const 
 void MosaicSource::read_part(Part& part) {
   const MosaicMember& member = *part.member;
   const SampleKind& kind = plan_.kinds[member.kind];
-  part.samples.resize(bytes_of(part.own));
   std::unique_ptr<HeightSource> reader = pool_.take(member.order, member);
   const auto read = [&](std::span<std::byte> raw) {
     try {
@@ -267,6 +313,12 @@ void MosaicSource::draw(std::size_t layer, const Window& window, std::span<std::
       bytes += bytes_of(parts[end].own);
       ++end;
     } while (end < parts.size() && end - from < pool_.most_open() && bytes + bytes_of(parts[end].own) <= kBatchBytes);
+    if (parts_.size() < bytes) parts_ = std::vector<std::byte>(bytes);
+    std::size_t begin = 0;
+    for (std::size_t i = from; i < end; ++i) {
+      parts[i].samples = std::span(parts_).subspan(begin, bytes_of(parts[i].own));
+      begin += parts[i].samples.size();
+    }
     oneapi::tbb::parallel_for(from, end, [&](std::size_t i) { read_part(parts[i]); });
     // Rows are laid over each other side by side, the parts of each in their order.
     oneapi::tbb::parallel_for(std::int64_t{0}, window.rows, [&](std::int64_t row) {
@@ -275,11 +327,10 @@ void MosaicSource::draw(std::size_t layer, const Window& window, std::span<std::
         if (row < part.row || row >= part.row + part.own.rows) continue;
         const std::size_t part_bytes = static_cast<std::size_t>(part.own.columns) * sample_bytes;
         lay_over(plan_.samples.kind,
-                 std::span(part.samples).subspan(static_cast<std::size_t>(row - part.row) * part_bytes, part_bytes),
+                 part.samples.subspan(static_cast<std::size_t>(row - part.row) * part_bytes, part_bytes),
                  out.subspan(static_cast<std::size_t>(row * window.columns + part.column) * sample_bytes, part_bytes));
       }
     });
-    for (std::size_t i = from; i < end; ++i) parts[i].samples = {};
     from = end;
   }
 }

@@ -161,7 +161,7 @@ bool widen(std::byte* at, Whole& number) {
 
 class NpySource final : public HeightSource {
  public:
-  NpySource(const std::string& path, const OpenOptions& options) : file_(path) {
+  NpySource(const std::string& path, const OpenOptions& options) : file_(path, options.unpacked_bytes) {
     info_.path = path;
     info_.format = "NumPy";
     read_header();
@@ -169,7 +169,8 @@ class NpySource final : public HeightSource {
     apply_open_options(info_, options);
   }
   /// One array of an .npz.
-  NpySource(const std::string& path, const ZipMember& member) : file_(path, member) {
+  NpySource(const std::string& path, const ZipMember& member, const OpenOptions& options)
+      : file_(path, member, options.unpacked_bytes) {
     info_.path = path;
     info_.format = "NumPy";
     read_header();
@@ -188,6 +189,9 @@ class NpySource final : public HeightSource {
     if (wide_ == Wide::kSigned) widen_all<std::int64_t>(window, samples);
     if (wide_ == Wide::kUnsigned) widen_all<std::uint64_t>(window, samples);
   }
+
+  void limit_buffers(std::uint64_t bytes) override { file_.limit_buffers(bytes); }
+  [[nodiscard]] std::uint64_t buffer_bytes(std::uint64_t limit) const override { return file_.buffer_bytes(limit); }
 
  private:
   void read_header() {
@@ -301,9 +305,10 @@ std::string array_name(const ZipMember& member) {
 }
 
 /// An array that is a raster; nullptr where its shape or type make it none and nobody asked for it by name.
-std::unique_ptr<NpySource> open_array(const std::string& path, const ZipMember& member, bool wanted) {
+std::unique_ptr<NpySource> open_array(const std::string& path, const ZipMember& member, bool wanted,
+                                      const OpenOptions& options) {
   try {
-    return std::make_unique<NpySource>(path, member);
+    return std::make_unique<NpySource>(path, member, options);
   } catch (const Error& error) {
     if (!wanted && error.code() == ErrorCode::kUnsupported) return nullptr;
     throw Error(error.code(), fmt::format("{} (array {})", error.what(), array_name(member)));
@@ -331,7 +336,7 @@ std::unique_ptr<HeightSource> open_npz(const std::string& path, const OpenOption
     const std::string array = array_name(member);
     const bool wanted = options.channel == array;
     if (wanted || options.channel.empty()) {
-      std::unique_ptr<NpySource> source = open_array(path, member, wanted);
+      std::unique_ptr<NpySource> source = open_array(path, member, wanted, options);
       rasters += source ? 1 : 0;
       if (source && !chosen) {
         chosen = std::move(source);

@@ -47,7 +47,7 @@ class Pds3Source final : public HeightSource {
  public:
   Pds3Source(const std::string& path, const OpenOptions& options) : label_path_(path) {
     if (has_pds3_label(path)) label_path_ = file_beside(path, std::filesystem::path(path).stem().string() + ".lbl");
-    const LabelText label = read_label(label_path_);
+    const LabelText label = read_label(label_path_, options.unpacked_bytes);
     const LabelBlock& image = only_image(label.root);
     const LabelFields fields(label_path_, image);
     info_.path = path;
@@ -58,7 +58,7 @@ class Pds3Source final : public HeightSource {
       throw Error(ErrorCode::kUnsupported,
                   fmt::format("{}: its label {} describes {} instead", path, label_path_, data_path_));
     }
-    file_.emplace(data_path_);
+    file_.emplace(data_path_, options.unpacked_bytes);
     check_size(label);
     describe(fields, label.root);
     const std::int64_t band = choose_band(info_, options, layout_.bands);
@@ -98,6 +98,9 @@ class Pds3Source final : public HeightSource {
       std::memcpy(samples.data() + at, &value, sizeof(value));
     }
   }
+
+  void limit_buffers(std::uint64_t bytes) override { file_->limit_buffers(bytes); }
+  [[nodiscard]] std::uint64_t buffer_bytes(std::uint64_t limit) const override { return file_->buffer_bytes(limit); }
 
  private:
   [[nodiscard]] const LabelBlock& only_image(const LabelBlock& root) const {

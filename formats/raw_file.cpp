@@ -49,6 +49,13 @@ std::uint32_t crc_of(const RawFile& file) {
   return static_cast<std::uint32_t>(crc);
 }
 
+/// Whoever leaves readers this much can spare what modest contents take as well.
+constexpr std::uint64_t kRoomyBytes = std::uint64_t{4} << 20U;
+
+bool may_hold(std::uint64_t contents_bytes, std::uint64_t limit) {
+  return contents_bytes <= (limit >= kRoomyBytes ? std::max(limit, RawFile::kMostHeldBytes) : limit);
+}
+
 }  // namespace
 
 bool is_gzip_name(const std::string& path) {
@@ -61,7 +68,7 @@ std::string without_gzip(const std::string& path) {
   return is_gzip_name(path) ? path.substr(0, path.size() - 3) : path;
 }
 
-RawFile::RawFile(const std::string& path) : path_(path) {
+RawFile::RawFile(const std::string& path, std::uint64_t held_bytes) : path_(path) {
   descriptor_ = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
   if (descriptor_ < 0) fail(path, "cannot open", errno);
   struct stat status = {};
@@ -80,7 +87,7 @@ RawFile::RawFile(const std::string& path) : path_(path) {
   try {
     std::array<std::byte, 3> head = {};
     if (looks_like_gzip(std::span(head).first(read_stored(0, head)))) {
-      inflate(0, size_bytes_, InflatedBytes::Kind::kGzip);
+      unpack_gzip(held_bytes);
     }
   } catch (...) {
     ::close(descriptor_);
@@ -88,20 +95,41 @@ RawFile::RawFile(const std::string& path) : path_(path) {
   }
 }
 
-RawFile::RawFile(const std::string& path, const ZipMember& member) : RawFile(path) {
+RawFile::RawFile(const std::string& path, const ZipMember& member, std::uint64_t held_bytes)
+    : RawFile(path, held_bytes) {
+  unpack_member(member, held_bytes);
+}
+
+void RawFile::unpack_gzip(std::uint64_t held_bytes) {
+  packed_ = {0, size_bytes_, InflatedBytes::Kind::kGzip};
+  held_bytes = std::min(held_bytes, kMostHeldBytes);
+  if (packed_.stored_bytes <= held_bytes) held_ = UnpackedBytes::from_gzip(stored_bytes(), held_bytes);
+  if (!held_) inflated_ = std::make_unique<InflatedBytes>(path_, packed_reader(), packed_.kind);
+  size_bytes_ = held_ ? held_->bytes().size() : inflated_->size_bytes();
+}
+
+void RawFile::unpack_member(const ZipMember& member, std::uint64_t held_bytes) {
   const std::uint64_t begin = zip_member_begin(*this, member);
-  std::uint32_t crc = 0;
   if (member.method == 0) {
     begin_bytes_ = begin;
     size_bytes_ = member.stored_bytes;
-    crc = crc_of(*this);
   } else {
-    inflate(begin, member.stored_bytes, InflatedBytes::Kind::kRawDeflate);
-    crc = inflated_->crc32();
+    packed_ = {begin, member.stored_bytes, InflatedBytes::Kind::kRawDeflate};
+    held_bytes = std::min(held_bytes, kMostHeldBytes);
+    if (member.stored_bytes <= held_bytes && member.size_bytes <= held_bytes) {
+      held_ = UnpackedBytes::from_deflated(stored_bytes(), member.size_bytes, member.crc32);
+    }
+    if (held_) {
+      size_bytes_ = member.size_bytes;
+      return;
+    }
+    inflated_ = std::make_unique<InflatedBytes>(path_, packed_reader(), packed_.kind);
+    size_bytes_ = inflated_->size_bytes();
   }
+  const std::uint32_t crc = inflated_ ? inflated_->crc32() : crc_of(*this);
   if (size_bytes_ != member.size_bytes || crc != member.crc32) {
     throw Error(ErrorCode::kCorrupt,
-                fmt::format("{}: {} is damaged: its {} do not match", path, member.name,
+                fmt::format("{}: {} is damaged: its {} do not match", path_, member.name,
                             size_bytes_ != member.size_bytes ? "size and the zip directory's" : "CRC and bytes"));
   }
 }
@@ -110,19 +138,38 @@ RawFile::~RawFile() {
   ::close(descriptor_);
 }
 
-void RawFile::inflate(std::uint64_t begin_bytes, std::uint64_t stored_bytes, InflatedBytes::Kind kind) {
-  const auto read = [this, begin_bytes, stored_bytes](std::uint64_t offset, std::span<std::byte> bytes) {
-    if (offset >= stored_bytes) return std::size_t{0};
-    const std::uint64_t most = std::min<std::uint64_t>(bytes.size(), stored_bytes - offset);
-    return read_stored(begin_bytes + offset, bytes.first(static_cast<std::size_t>(most)));
+std::vector<std::byte> RawFile::stored_bytes() const {
+  std::vector<std::byte> stored(static_cast<std::size_t>(packed_.stored_bytes));
+  stored.resize(read_stored(packed_.begin_bytes, stored));
+  return stored;
+}
+
+InflatedBytes::ReadStored RawFile::packed_reader() const {
+  return [this](std::uint64_t offset, std::span<std::byte> bytes) {
+    if (offset >= packed_.stored_bytes) return std::size_t{0};
+    const std::uint64_t most = std::min<std::uint64_t>(bytes.size(), packed_.stored_bytes - offset);
+    return read_stored(packed_.begin_bytes + offset, bytes.first(static_cast<std::size_t>(most)));
   };
-  inflated_ = std::make_unique<InflatedBytes>(path_, read, kind);
-  size_bytes_ = inflated_->size_bytes();
+}
+
+void RawFile::limit_buffers(std::uint64_t limit) {
+  if (!held_ || may_hold(size_bytes_, limit)) return;
+  inflated_ = std::make_unique<InflatedBytes>(path_, packed_reader(), packed_.kind, size_bytes_);
+  held_.reset();
+}
+
+std::uint64_t RawFile::buffer_bytes(std::uint64_t limit) const {
+  if (held_ && may_hold(size_bytes_, limit)) return size_bytes_;
+  return held_ || inflated_ ? InflatedBytes::memory_bytes(size_bytes_) : 0;
 }
 
 std::size_t RawFile::read_some(std::uint64_t offset_bytes, std::span<std::byte> bytes) const {
   if (offset_bytes >= size_bytes_) return 0;
   bytes = bytes.first(static_cast<std::size_t>(std::min<std::uint64_t>(bytes.size(), size_bytes_ - offset_bytes)));
+  if (held_) {
+    std::memcpy(bytes.data(), held_->bytes().data() + offset_bytes, bytes.size());
+    return bytes.size();
+  }
   if (!inflated_) return read_stored(begin_bytes_ + offset_bytes, bytes);
   const std::lock_guard lock(one_inflates_);
   return inflated_->read_some(offset_bytes, bytes);

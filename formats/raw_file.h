@@ -4,10 +4,13 @@
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "formats/inflated_bytes.h"
+#include "formats/unpacked_bytes.h"
 
 namespace isohf {
 
@@ -20,15 +23,20 @@ struct ZipMember;
 
 /// A regular file open for reading at any offset, by several threads at once. Closes itself.
 ///
-/// Of a file that is called .gz and is gzip, all members speak of what is inside; opening reads it once, and reading
-/// backwards costs more than forwards (inflated_bytes.h).
+/// Of a file that is called .gz and is gzip, all members speak of what is inside. Opening unpacks it once and checks
+/// it; up to a size it is held from then on, beyond it is inflated again piece by piece, for which backwards costs more
+/// than forwards (inflated_bytes.h).
 class RawFile {
  public:
+  /// No more than this is held in memory of what a file has inside; while it is unpacked, the packed bytes as well.
+  static constexpr std::uint64_t kMostHeldBytes = std::uint64_t{64} << 20U;
+
+  /// held_bytes  most to be held, up to kMostHeldBytes
   /// Throws Error{kIo} naming the path: missing, unreadable, not a regular file; Error{kCorrupt}: damaged gzip data.
-  explicit RawFile(const std::string& path);
+  explicit RawFile(const std::string& path, std::uint64_t held_bytes = kMostHeldBytes);
   /// The contents of one member of a zip archive: stored or deflated, checked against size and CRC.
   /// Throws also Error{kUnsupported}: encrypted, or packed by another method.
-  RawFile(const std::string& path, const ZipMember& member);
+  RawFile(const std::string& path, const ZipMember& member, std::uint64_t held_bytes = kMostHeldBytes);
   RawFile(const RawFile&) = delete;
   RawFile& operator=(const RawFile&) = delete;
   ~RawFile();
@@ -45,14 +53,32 @@ class RawFile {
   /// Fills `bytes`. Throws Error{kIo}, and Error{kCorrupt} where the file ends early.
   void read(std::uint64_t offset_bytes, std::span<std::byte> bytes) const;
 
+  /// As HeightSource's: contents that are more than `limit`, or modest ones where it leaves no room for such, are no
+  /// longer held but inflated piece by piece. No other thread reads meanwhile.
+  void limit_buffers(std::uint64_t limit);
+  /// 0 where nothing is packed.
+  [[nodiscard]] std::uint64_t buffer_bytes(std::uint64_t limit) const;
+
  private:
+  /// Where packed contents lie in the file.
+  struct Packed {
+    std::uint64_t begin_bytes = 0;
+    std::uint64_t stored_bytes = 0;
+    InflatedBytes::Kind kind = InflatedBytes::Kind::kGzip;
+  };
+
   std::size_t read_stored(std::uint64_t offset_bytes, std::span<std::byte> bytes) const;
-  void inflate(std::uint64_t begin_bytes, std::uint64_t stored_bytes, InflatedBytes::Kind kind);
+  [[nodiscard]] std::vector<std::byte> stored_bytes() const;
+  [[nodiscard]] InflatedBytes::ReadStored packed_reader() const;
+  void unpack_gzip(std::uint64_t held_bytes);
+  void unpack_member(const ZipMember& member, std::uint64_t held_bytes);
 
   std::string path_;
   int descriptor_ = -1;
   std::uint64_t begin_bytes_ = 0;  // of a stored zip member
   std::uint64_t size_bytes_ = 0;
+  Packed packed_;
+  std::optional<UnpackedBytes> held_;
   std::unique_ptr<InflatedBytes> inflated_;
   mutable std::mutex one_inflates_;
 };

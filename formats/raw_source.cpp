@@ -91,7 +91,7 @@ class RawSource final : public HeightSource {
  public:
   RawSource(const std::string& path, const RawLayout& layout, const RasterDescription* description,
             const OpenOptions& options)
-      : file_(path) {
+      : file_(path, options.unpacked_bytes) {
     info_.path = path;
     info_.format = "raw samples";
     if (!options.channel.empty() && options.channel != "0") {
@@ -123,6 +123,9 @@ class RawSource final : public HeightSource {
   void read_window(const Window& window, std::span<std::byte> samples) override {
     read_plain_samples(file_, info_, layout_, window, samples);
   }
+
+  void limit_buffers(std::uint64_t bytes) override { file_.limit_buffers(bytes); }
+  [[nodiscard]] std::uint64_t buffer_bytes(std::uint64_t limit) const override { return file_.buffer_bytes(limit); }
 
  private:
   RawFile file_;

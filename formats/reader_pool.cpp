@@ -17,17 +17,6 @@ namespace {
 constexpr std::size_t kMostOpen = 64;
 /// Left to the archive, its journal, the terminal, shared libraries and whatever the caller has open.
 constexpr std::size_t kFilesForOthers = 32;
-/// What readers that nobody uses may keep of decoded blocks.
-constexpr std::uint64_t kMostIdleBytes = std::uint64_t{256} << 20U;
-/// Readers keep two rows of blocks, or this much where that is more.
-constexpr std::uint64_t kReaderCacheBytes = std::uint64_t{16} << 20U;
-
-/// At most so many bytes of samples does a reader keep.
-std::uint64_t memory_of(const SourceInfo& info) {
-  const auto row_bytes = static_cast<std::uint64_t>(info.width) * size_bytes(info.sample_type);
-  const std::uint64_t blocks = 2 * static_cast<std::uint64_t>(std::max<std::int64_t>(info.block_height, 1)) * row_bytes;
-  return std::min(static_cast<std::uint64_t>(info.height) * row_bytes, std::max(kReaderCacheBytes, blocks));
-}
 
 }  // namespace
 
@@ -52,6 +41,19 @@ void ReaderPool::close_oldest(std::list<Idle>& closed) {
   idle_bytes_ -= idle_.front().bytes;
   places_.erase(idle_.front().key);
   closed.splice(closed.end(), idle_, idle_.begin());
+}
+
+void ReaderPool::close_surplus(std::list<Idle>& closed) {
+  // One alone may keep more: it was allowed to while it was read.
+  const auto too_much = [&] { return idle_bytes_ > most_idle_bytes_ && lent_ + idle_.size() > 1; };
+  while (!idle_.empty() && (lent_ + idle_.size() > most_open_ || too_much())) close_oldest(closed);
+}
+
+void ReaderPool::limit_idle(std::uint64_t bytes) {
+  std::list<Idle> closed;  // destroyed without the lock
+  const std::lock_guard lock(mutex_);
+  most_idle_bytes_ = std::min(bytes, kMostIdleBytes);
+  close_surplus(closed);
 }
 
 std::unique_ptr<HeightSource> ReaderPool::take(std::int64_t key, const MosaicMember& member) {
@@ -91,13 +93,13 @@ std::unique_ptr<HeightSource> ReaderPool::take(std::int64_t key, const MosaicMem
 
 void ReaderPool::give_back(std::int64_t key, std::unique_ptr<HeightSource> reader) {
   std::list<Idle> closed;
-  const std::uint64_t bytes = memory_of(reader->info());
+  const std::uint64_t bytes = reader->buffer_bytes(UINT64_MAX);
   const std::lock_guard lock(mutex_);
   --lent_;
   idle_.push_back({key, std::move(reader), bytes});
   places_[key] = std::prev(idle_.end());
   idle_bytes_ += bytes;
-  while (lent_ + idle_.size() > most_open_ || (idle_bytes_ > kMostIdleBytes && idle_.size() > 1)) close_oldest(closed);
+  close_surplus(closed);
 }
 
 }  // namespace isohf

@@ -30,12 +30,19 @@ struct FileStamp {
 /// Any number of threads, each with a member of its own.
 class ReaderPool {
  public:
+  static constexpr std::uint64_t kMostIdleBytes = std::uint64_t{256} << 20U;
+
   explicit ReaderPool(OpenOptions options);
 
   /// The member's reader, for one thread until it is given back. `key` is the member's alone.
   /// Throws Error: kIo where the file is not what it was; else as open_source does.
   [[nodiscard]] std::unique_ptr<HeightSource> take(std::int64_t key, const MosaicMember& member);
   void give_back(std::int64_t key, std::unique_ptr<HeightSource> reader);
+
+  /// Readers that nobody uses keep no more than this; kMostIdleBytes to begin with.
+  void limit_idle(std::uint64_t bytes);
+  /// What every reader that is opened from now on may hold of packed contents (OpenOptions::unpacked_bytes).
+  void limit_unpacked(std::uint64_t bytes) { options_.unpacked_bytes = bytes; }
 
   [[nodiscard]] std::size_t most_open() const { return most_open_; }
   [[nodiscard]] std::int64_t times_opened() const { return times_opened_; }  ///< for measurements
@@ -47,6 +54,7 @@ class ReaderPool {
     std::uint64_t bytes;
   };
   void close_oldest(std::list<Idle>& closed);
+  void close_surplus(std::list<Idle>& closed);
 
   OpenOptions options_;
   std::size_t most_open_;
@@ -55,6 +63,7 @@ class ReaderPool {
   std::unordered_map<std::int64_t, std::list<Idle>::iterator> places_;
   std::size_t lent_ = 0;
   std::uint64_t idle_bytes_ = 0;
+  std::uint64_t most_idle_bytes_ = kMostIdleBytes;
   std::int64_t times_opened_ = 0;
 };
 

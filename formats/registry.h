@@ -28,7 +28,10 @@ struct OpenOptions {
   std::optional<double> z_offset;
   std::optional<double> spacing;  ///< sample spacing in metres, for files that do not say; overrides
   std::optional<RawLayout> raw;   ///< the file is nothing but these samples, whatever its name and content say
-  VoidTreatment voids;            ///< for whoever wraps the source in a FilledSource; open_source does not
+  /// What all files that are open at once may hold of the contents that they have packed (.gz, .zip): contents that
+  /// do not fit are unpacked piece by piece whenever they are read.
+  std::uint64_t unpacked_bytes = std::uint64_t{256} << 20U;
+  VoidTreatment voids;  ///< for whoever wraps the source in a FilledSource; open_source does not
 };
 
 /// One row of a table of formats.

@@ -91,7 +91,7 @@ struct Profile {
 
 class UsgsDemSource final : public HeightSource {
  public:
-  UsgsDemSource(const std::string& path, const OpenOptions& options) : file_(path) {
+  UsgsDemSource(const std::string& path, const OpenOptions& options) : file_(path, options.unpacked_bytes) {
     info_.path = path;
     info_.format = "USGS DEM";
     (void)choose_band(info_, options, 1);
@@ -122,6 +122,9 @@ class UsgsDemSource final : public HeightSource {
       read_columns<std::int32_t>(window, samples);
     }
   }
+
+  void limit_buffers(std::uint64_t bytes) override { file_.limit_buffers(bytes); }
+  [[nodiscard]] std::uint64_t buffer_bytes(std::uint64_t limit) const override { return file_.buffer_bytes(limit); }
 
  private:
   [[noreturn]] void corrupt(const std::string& where, const std::string& what) const {

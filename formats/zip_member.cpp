@@ -1,7 +1,6 @@
 #include "formats/zip_member.h"
 
 #include <fmt/core.h>
-#include <zlib.h>
 
 #include <algorithm>
 #include <optional>
@@ -130,31 +129,6 @@ ZipMember read_entry(const RawFile& file, ByteReader& in) {
   return member;
 }
 
-void inflate_raw(const RawFile& file, const ZipMember& member, std::vector<std::byte>& in,
-                 std::vector<std::byte>& out) {
-  z_stream stream = {};
-  if (inflateInit2(&stream, -MAX_WBITS) != Z_OK)
-    throw Error(ErrorCode::kOutOfMemory, file.path() + ": no memory to inflate");
-  // One spare byte of output tells a member that is longer than it says.
-  std::byte spare = {};
-  stream.next_in = reinterpret_cast<Bytef*>(in.data());
-  stream.avail_in = static_cast<uInt>(in.size());
-  stream.next_out = reinterpret_cast<Bytef*>(out.data());
-  stream.avail_out = static_cast<uInt>(out.size());
-  int result = out.empty() ? Z_OK : inflate(&stream, Z_NO_FLUSH);
-  if (result == Z_OK && stream.avail_out == 0) {
-    stream.next_out = reinterpret_cast<Bytef*>(&spare);
-    stream.avail_out = 1;
-    result = inflate(&stream, Z_FINISH);
-  }
-  const std::uint64_t got = stream.total_out;
-  inflateEnd(&stream);
-  if (result != Z_STREAM_END || got != out.size()) {
-    corrupt(file,
-            fmt::format("{} is damaged: inflated to {} bytes, the directory says {}", member.name, got, out.size()));
-  }
-}
-
 }  // namespace
 
 std::vector<ZipMember> zip_members(const RawFile& file) {
@@ -198,27 +172,6 @@ std::uint64_t zip_member_begin(const RawFile& file, const ZipMember& member) {
     corrupt(file, member.name + " lies outside the file");
   }
   return begin;
-}
-
-std::vector<std::byte> read_zip_member(const RawFile& file, const ZipMember& member, std::uint64_t most_bytes) {
-  const std::uint64_t begin = zip_member_begin(file, member);
-  if (member.size_bytes > most_bytes || member.stored_bytes > most_bytes) {
-    throw Error(ErrorCode::kUnsupported, fmt::format("{}: {} has {} bytes, at most {} are unpacked", file.path(),
-                                                     member.name, member.size_bytes, most_bytes));
-  }
-  std::vector<std::byte> stored(static_cast<std::size_t>(member.stored_bytes));
-  file.read(begin, stored);
-  std::vector<std::byte> contents;
-  if (member.method == 0) {
-    if (member.size_bytes != member.stored_bytes) corrupt(file, member.name + ": the zip directory contradicts itself");
-    contents = std::move(stored);
-  } else {
-    contents.resize(static_cast<std::size_t>(member.size_bytes));
-    inflate_raw(file, member, stored, contents);
-  }
-  const uLong crc = crc32_z(0, reinterpret_cast<const Bytef*>(contents.data()), contents.size());
-  if (crc != member.crc32) corrupt(file, member.name + " is damaged: its CRC does not match");
-  return contents;
 }
 
 }  // namespace isohf

@@ -27,9 +27,4 @@ struct ZipMember {
 /// methods other than stored and deflated; kCorrupt.
 [[nodiscard]] std::uint64_t zip_member_begin(const RawFile& file, const ZipMember& member);
 
-/// The contents of `member`, checked against its size and CRC. Throws Error: kUnsupported beyond `most_bytes`, for
-/// encrypted members and for other methods; kCorrupt.
-[[nodiscard]] std::vector<std::byte> read_zip_member(const RawFile& file, const ZipMember& member,
-                                                     std::uint64_t most_bytes);
-
 }  // namespace isohf

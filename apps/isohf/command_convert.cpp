@@ -183,6 +183,10 @@ std::optional<ConvertCommandOptions> parse(const Arguments& arguments) {
   check_texture_options(options.texture);
   if (!line.given("--tmpdir")) options.convert.scratch_folder = folder_of(options.output);
   options.convert.threads = options.work.threads;
+  if (options.convert.memory_bytes != 0) {
+    // What is packed shares the memory with what is read from it, and with the tiles.
+    options.open.unpacked_bytes = std::min(options.open.unpacked_bytes, options.convert.memory_bytes / 3);
+  }
   options.convert.producer = "isohf " ISOHF_VERSION;
   return options;
 }

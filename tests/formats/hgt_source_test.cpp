@@ -189,12 +189,24 @@ TEST_F(HgtSource, NeverCrashesOnADamagedArchive) {
     for (const int bits : {0x01, 0x80, 0xFF}) {
       auto damaged = zip;
       damaged[at] ^= static_cast<std::byte>(bits);
-      try {
-        const auto source = open_hgt(write("N01E001.hgt.zip", damaged), {});
-        auto raw = test::read_whole(*source);
-        for (std::size_t i = 0; i + 1 < raw.size(); i += 2) std::swap(raw[i], raw[i + 1]);
-        EXPECT_EQ(raw, intact) << at;
-      } catch (const Error&) {
+      const std::string path = write("N01E001.hgt.zip", damaged);
+      std::string found;
+      for (const std::uint64_t held : {std::uint64_t{1} << 20U, std::uint64_t{0}}) {
+        OpenOptions options;
+        options.unpacked_bytes = held;
+        std::string failure;
+        try {
+          const auto source = open_hgt(path, options);
+          auto raw = test::read_whole(*source);
+          for (std::size_t i = 0; i + 1 < raw.size(); i += 2) std::swap(raw[i], raw[i + 1]);
+          EXPECT_EQ(raw, intact) << at;
+        } catch (const Error& error) {
+          failure = error.what();
+        }
+        if (held == 0) {
+          EXPECT_EQ(failure, found) << at;
+        }
+        found = failure;
       }
     }
   }
