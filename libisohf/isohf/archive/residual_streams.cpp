@@ -26,8 +26,25 @@ ISOHF_VECTORISED(void, find_small_symbols,
 void find_symbols(const std::uint16_t* folded, std::size_t count, std::uint8_t* symbols) {
   find_small_symbols(folded, count, symbols);
 }
+
+/// Half a residual of 32 bits as a float, of the same octave less one and the same eighth: half, so that it has a sign
+/// to spare; and with the bit eight below the highest one cleared, so that no carry of rounding gets past it.
+constexpr std::uint32_t bits_of_half(std::uint32_t folded) {
+  const std::uint32_t kept = folded & ~(folded >> 8U);
+  return std::bit_cast<std::uint32_t>(static_cast<float>(static_cast<std::int32_t>(kept >> 1U)));
+}
+
+ISOHF_VECTORISED(void, find_large_symbols,
+                 (const std::uint32_t* __restrict folded, std::size_t count, std::uint8_t* __restrict symbols),
+                 (folded, count, symbols)) {
+  constexpr std::uint32_t kFirst = (127 + 3) * 8 - kFirstSplitSymbol;
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::uint32_t split = (bits_of_half(folded[i]) >> 20U) - kFirst;
+    symbols[i] = static_cast<std::uint8_t>(folded[i] < kFirstSplitSymbol ? folded[i] : split);
+  }
+}
 void find_symbols(const std::uint32_t* folded, std::size_t count, std::uint8_t* symbols) {
-  for (std::size_t i = 0; i < count; ++i) symbols[i] = static_cast<std::uint8_t>(symbol_of(folded[i]));
+  find_large_symbols(folded, count, symbols);
 }
 
 /// Bits one after the other, the lowest of a byte first.
@@ -44,6 +61,15 @@ class BitPacker {
     to_ += 4;
     bits_ >>= 32U;
     bit_count_ -= 32;
+  }
+  /// As many as 56 bits; where all are put so.
+  void put_many(std::uint64_t bits, unsigned count) {
+    bits_ |= bits << bit_count_;
+    std::memcpy(to_, &bits_, 8);
+    bit_count_ += count;
+    to_ += bit_count_ / 8;
+    bits_ >>= bit_count_ / 8 * 8;
+    bit_count_ %= 8;
   }
   [[nodiscard]] std::vector<std::byte> finish() {
     std::memcpy(to_, &bits_, 8);
@@ -80,9 +106,16 @@ ISOHF_VECTORISED(void, join_extra_bits,
   }
 }
 
-void put_extra_bits(BitPacker& packer, std::uint32_t folded) {
-  const unsigned count = extra_bits_of_symbol(symbol_of(folded));
-  packer.put(folded & ((1U << count) - 1), count);
+/// The extra bits of residuals of floats, and how many these are.
+ISOHF_VECTORISED(void, find_extra_bits,
+                 (const std::uint32_t* __restrict folded, std::size_t count, std::uint32_t* __restrict bits,
+                  std::uint32_t* __restrict counts),
+                 (folded, count, bits, counts)) {
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::int32_t octave = static_cast<std::int32_t>(bits_of_half(folded[i]) >> 23U) - 129;
+    counts[i] = static_cast<std::uint32_t>(octave < 0 ? 0 : octave);
+    bits[i] = folded[i] & ((1U << counts[i]) - 1);
+  }
 }
 
 /// The bits of the residuals that their symbols leave out.
@@ -93,12 +126,23 @@ std::vector<std::byte> pack_extra_bits(const std::uint16_t* folded, std::size_t 
   Scratch<std::uint32_t> counts(pairs);
   join_extra_bits(folded, pairs, bits.data(), counts.data());
   for (std::size_t i = 0; i < pairs; ++i) packer.put(bits.data()[i], counts.data()[i]);
-  if (count % 2 != 0) put_extra_bits(packer, folded[count - 1]);
+  if (count % 2 != 0) {
+    const unsigned last = extra_bits_of_symbol(symbol_of(folded[count - 1]));
+    packer.put(folded[count - 1] & ((1U << last) - 1), last);
+  }
   return packer.finish();
 }
 std::vector<std::byte> pack_extra_bits(const std::uint32_t* folded, std::size_t count) {
   BitPacker packer(count * 4);
-  for (std::size_t i = 0; i < count; ++i) put_extra_bits(packer, folded[i]);
+  Scratch<std::uint32_t> bits(count);
+  Scratch<std::uint32_t> counts(count);
+  find_extra_bits(folded, count, bits.data(), counts.data());
+  std::size_t i = 0;
+  for (; i + 2 <= count; i += 2) {
+    const std::uint64_t second = bits.data()[i + 1];
+    packer.put_many(bits.data()[i] | second << counts.data()[i], counts.data()[i] + counts.data()[i + 1]);
+  }
+  if (i < count) packer.put_many(bits.data()[i], counts.data()[i]);
   return packer.finish();
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <limits>
 
 #include "isohf/archive/activities.h"
 #include "isohf/archive/coding_effort.h"
@@ -18,6 +19,7 @@
 #include "isohf/archive/tile_payload.h"
 #include "isohf/archive/void_mask.h"
 #include "isohf/base/assert.h"
+#include "isohf/base/scratch.h"
 #include "isohf/base/vectorised.h"
 
 namespace isohf {
@@ -80,11 +82,16 @@ ISOHF_VECTORISED(void, find_code_magnitudes,
                  (folded, count, shift, out)) {
   for (int i = 0; i < count; ++i) out[i] = magnitude(folded[i], shift);
 }
+ISOHF_VECTORISED(void, find_float_magnitudes,
+                 (const std::uint32_t* folded, int count, unsigned shift, std::uint8_t* __restrict out),
+                 (folded, count, shift, out)) {
+  for (int i = 0; i < count; ++i) out[i] = magnitude(folded[i], shift);
+}
 void find_magnitudes(const std::uint16_t* folded, int count, unsigned shift, std::uint8_t* out) {
   find_code_magnitudes(folded, count, shift, out);
 }
 void find_magnitudes(const std::uint32_t* folded, int count, unsigned shift, std::uint8_t* out) {
-  for (int i = 0; i < count; ++i) out[i] = magnitude(folded[i], shift);
+  find_float_magnitudes(folded, count, shift, out);
 }
 
 /// The columns of a tile's samples in coding order, row by row; a row has as many samples as columns.
@@ -234,35 +241,67 @@ EncodedTile encode_codes(const TileShape& shape, const TileCodes& tile, const Co
   return encoded;
 }
 
+/// How many floats are void, and the bits, but their signs, that any other has.
+struct FloatBits {
+  std::int32_t used = 0;
+  std::int32_t voids = 0;
+};
+ISOHF_VECTORISED(FloatBits, bits_of_floats, (const float* heights, std::size_t count), (heights, count)) {
+  std::int32_t used = 0;
+  std::int32_t voids = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::int32_t magnitude = std::bit_cast<std::int32_t>(heights[i]) & 0x7fffffff;
+    const bool is_void = magnitude > 0x7f800000;
+    used |= is_void ? 0 : magnitude;
+    voids += is_void ? 1 : 0;
+  }
+  return {used, voids};
+}
+
+/// ordered_from_float of all, and the least and the most of those that are no voids.
+ISOHF_VECTORISED(CodeRange, order_floats,
+                 (const float* heights, std::size_t count, unsigned dropped, std::int32_t* __restrict ordered),
+                 (heights, count, dropped, ordered)) {
+  std::int32_t low = std::numeric_limits<std::int32_t>::max();
+  std::int32_t high = std::numeric_limits<std::int32_t>::min();
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::int32_t bits = std::bit_cast<std::int32_t>(heights[i]);
+    const std::int32_t magnitude = bits & 0x7fffffff;
+    const bool is_void = magnitude > 0x7f800000;
+    const std::int32_t value = (magnitude >> dropped) ^ (bits >> 31);
+    ordered[i] = value;
+    const std::int32_t least = is_void ? low : value;
+    const std::int32_t most = is_void ? high : value;
+    low = least < low ? least : low;
+    high = most > high ? most : high;
+  }
+  return {low, high, 0};
+}
+
 EncodedTile encode_floats(const TileShape& shape, const TileCodes& tile, const CodingEffort& effort) {
   const std::span<const float> heights = tile.heights;
-  std::uint32_t used_bits = 0;
-  for (const float height : heights) {
-    if (!std::isnan(height)) used_bits |= std::bit_cast<std::uint32_t>(height) & 0x7fffffffU;
-  }
+  const FloatBits bits = bits_of_floats(heights.data(), heights.size());
   EncodedTile encoded;
   encoded.content_digest = tile_content_digest(tile);
   const auto is_void = [](float height) { return std::isnan(height); };
-  const Voids voids = find_voids(heights, std::count_if(heights.begin(), heights.end(), is_void), is_void);
+  const Voids voids = find_voids(heights, bits.voids, is_void);
   encoded.has_voids = voids.count != 0;
   encoded.is_empty = voids.count == shape.stored_vertex_count();
   if (encoded.is_empty) return encoded;
 
   PayloadHeader header;
   header.type = CodeType::kF32;
-  header.dropped_bits = used_bits == 0 ? 0 : static_cast<std::uint8_t>(std::countr_zero(used_bits));
-  const auto ordered = [&](float height) { return ordered_from_float(height, header.dropped_bits); };
-  header.base = ordered(*std::find_if_not(heights.begin(), heights.end(), is_void));
-  header.low = header.high = header.base;
-  for (const float height : heights) {
-    if (is_void(height)) continue;
-    header.low = std::min(header.low, ordered(height));
-    header.high = std::max(header.high, ordered(height));
-  }
+  header.dropped_bits =
+      bits.used == 0 ? 0 : static_cast<std::uint8_t>(std::countr_zero(static_cast<std::uint32_t>(bits.used)));
+  Scratch<std::int32_t> ordered(heights.size());
+  const CodeRange range = order_floats(heights.data(), heights.size(), header.dropped_bits, ordered.data());
+  header.base = ordered_from_float(*std::find_if_not(heights.begin(), heights.end(), is_void), header.dropped_bits);
+  header.low = range.low;
+  header.high = range.high;
   encoded.code_min = std::bit_cast<std::uint32_t>(float_from_ordered(header.low, header.dropped_bits));
   encoded.code_max = std::bit_cast<std::uint32_t>(float_from_ordered(header.high, header.dropped_bits));
   encode_samples<std::int64_t, std::uint32_t>(
-      shape, header, voids, [&](std::size_t i) { return std::int64_t{ordered(heights[i])}; }, effort, encoded);
+      shape, header, voids, [&](std::size_t i) { return std::int64_t{ordered.data()[i]}; }, effort, encoded);
   return encoded;
 }
 

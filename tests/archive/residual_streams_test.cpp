@@ -1,0 +1,80 @@
+#include "isohf/archive/residual_streams.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <limits>
+#include <random>
+#include <vector>
+
+#include "isohf/archive/coding_effort.h"
+#include "isohf/archive/residual_expander.h"
+#include "isohf/archive/tile_codec.h"
+#include "isohf/base/simd.h"
+
+namespace isohf {
+namespace {
+
+/// Whatever has few bits besides its highest: ends of octaves and of their eighths, and their neighbours.
+template <typename Folded>
+std::vector<Folded> residuals_at_all_ends() {
+  constexpr auto kMost = std::uint64_t{std::numeric_limits<Folded>::max()};
+  std::vector<Folded> residuals;
+  const auto add = [&](std::uint64_t value) {
+    if (value <= kMost) residuals.push_back(static_cast<Folded>(value));
+  };
+  for (unsigned octave = 3; octave <= 32; ++octave) {
+    for (std::uint64_t eighth = 8; eighth < 16; ++eighth) {
+      const std::uint64_t start = (eighth << octave) >> 3U;
+      for (unsigned bit = 0; bit <= octave; ++bit) {
+        add(start - 1 - (std::uint64_t{1} << bit >> 1U));
+        add(start + (std::uint64_t{1} << bit >> 1U));
+      }
+    }
+  }
+  for (std::uint64_t value = 0; value < 70000; ++value) add(value);
+  std::shuffle(residuals.begin(), residuals.end(), std::mt19937(1));
+  return residuals;
+}
+
+template <typename Folded>
+void expect_read_again(const std::vector<Folded>& values) {
+  Residuals<Folded> residuals(values.size(), false);
+  std::copy(values.begin(), values.end(), residuals.folded.data());
+  std::fill_n(residuals.activities.data(), values.size(), std::uint16_t{0});  // so all are of one context
+  CodingEffort effort = coding_effort(kDefaultLevel);
+  effort.has_pairs = false;
+  PayloadHeader header;
+  Streams streams = make_streams(residuals, effort, header);
+  ASSERT_EQ(streams.symbols.size(), 1U);
+  const std::size_t extra_bytes = streams.extra.size();
+  streams.extra.resize(extra_bytes + kExpanderSlack);
+  std::vector<Folded> back(values.size());
+  const std::uint64_t bits =
+      expand_residuals(streams.symbols[0], std::span(streams.extra).first(extra_bytes), 0, back.data());
+  EXPECT_EQ((bits + 7) / 8, extra_bytes);
+  EXPECT_EQ(back, values);
+}
+
+class ResidualStreams : public testing::TestWithParam<bool> {
+ protected:
+  void SetUp() override { set_simd(GetParam()); }
+  void TearDown() override { set_simd(true); }
+};
+
+TEST_P(ResidualStreams, HoldEveryResidual) {
+  for (const std::size_t dropped : {std::size_t{0}, std::size_t{1}}) {  // even and odd numbers of them
+    auto of_codes = residuals_at_all_ends<std::uint16_t>();
+    auto of_floats = residuals_at_all_ends<std::uint32_t>();
+    of_codes.resize(of_codes.size() - dropped);
+    of_floats.resize(of_floats.size() - dropped);
+    expect_read_again(of_codes);
+    expect_read_again(of_floats);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Twins, ResidualStreams, testing::Bool());
+
+}  // namespace
+}  // namespace isohf
