@@ -4,10 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <string>
 
 #include "isohf/base/error.h"
 #include "isohf/convert/plan.h"
 #include "isohf/projection/projected_extent.h"
+#include "isohf/projection/projection_wkt.h"
 #include "isohf/restore/archive_geometry.h"
 #include "restored_raster.h"
 
@@ -65,6 +68,87 @@ BoundingBox turned(const BoundingBox& box, const Metadata& metadata, const Bound
                   text_of(asked), west, east, again.west, east, west, there.east));
 }
 
+std::string describe_unit(HorizontalUnit unit) {
+  return unit == HorizontalUnit::kDegree ? "degrees" : unit == HorizontalUnit::kMetre ? "metres" : "an unknown unit";
+}
+
+std::string describe_system(const ReferenceSystem& system) {
+  if (system.epsg) return fmt::format("EPSG:{}", *system.epsg);
+  return system.name.empty() ? "no named reference system" : "\"" + system.name + "\"";
+}
+
+/// Refuses coordinates that are known to mean another ground than the source's.
+void check_same_system(const Metadata& metadata, const SourceInfo& other) {
+  const SourceRecord& source = metadata.source;
+  const Georeference& place = other.georeference;
+  const HorizontalUnit unit = horizontal_unit(source);
+  const bool units_known = unit != HorizontalUnit::kUnknown && place.unit != HorizontalUnit::kUnknown;
+  if (units_known && unit != place.unit) {
+    refuse(fmt::format(
+        "{}: is in {}, the archive's source in {}; bring it to the source's reference system, {} "
+        "(gdalwarp)",
+        other.path, describe_unit(place.unit), describe_unit(unit), describe_system(horizontal_system(source))));
+  }
+  if (!source.body.empty() && !place.system.body.empty() && source.body != place.system.body) {
+    refuse(fmt::format("{}: is of {}, the archive of {}", other.path, place.system.body, source.body));
+  }
+  // Datums of the ellipsoids of WGS 84 and GRS 80 lie within metres of each other, those of others a hundred apart.
+  constexpr double kSameEllipsoid = 1e-5;
+  const auto& theirs = place.system.semi_major_axis_m;
+  const std::optional<double> ours =
+      metadata.projection ? metadata.projection->spec.ellipsoid.semi_major_axis_m : source.semi_major_axis_m;
+  const bool same_ellipsoid = !theirs || !ours || std::abs(*theirs - *ours) <= kSameEllipsoid * *ours;
+  bool same = same_ellipsoid;
+  if (unit == HorizontalUnit::kMetre && units_known) {
+    const double metres = source.spacing_x / source.crs_spacing_x;
+    same = same && std::abs(place.metres_per_unit - metres) <= 1e-9 * metres &&
+           (!source.crs_epsg || !place.system.epsg || source.crs_epsg == place.system.epsg);
+  }
+  if (same) return;
+  refuse(fmt::format("{}: is in {}, the archive's source in {}; bring it to that (gdalwarp)", other.path,
+                     describe_system(place.system), describe_system(horizontal_system(source))));
+}
+
+/// Whether a reference system is that which rasters of the archive's map are written in.
+bool is_own_map(const Metadata& metadata, const SourceInfo& other) {
+  const Georeference own = map_georeference(metadata, natural_grid(metadata));
+  const Georeference& place = other.georeference;
+  if (place.unit != HorizontalUnit::kMetre || place.metres_per_unit != 1.0) return false;
+  if (own.system.epsg || place.system.epsg) return own.system.epsg == place.system.epsg;
+  if (!place.system.wkt.empty()) return own.system.wkt == place.system.wkt;
+  if (own.system.name != place.system.name) return false;
+  // The name has no body in it.
+  if (place.system.semi_major_axis_m) return own.system.semi_major_axis_m == place.system.semi_major_axis_m;
+  return !place.system.body.empty() && own.system.body == place.system.body;
+}
+
+/// The grid of a raster beside an archive whose rows are no rows of its source.
+OutputGrid grid_through_map(const Metadata& metadata, const SourceInfo& other) {
+  const ProjectionRecord& on = *metadata.projection;
+  const Georeference& place = other.georeference;
+  if (place.has_origin && is_own_map(metadata, other)) {
+    return OutputGrid({other.width, other.height, place.origin_x - on.origin.easting,
+                       on.origin.northing - place.origin_y, place.spacing_x, place.spacing_y});
+  }
+  const std::string map = describe_projection(on.spec);
+  if (!place.has_origin || place.unit != HorizontalUnit::kDegree) {
+    refuse(fmt::format(
+        "{}: {}; the archive's input was in degrees and was projected, so that only a raster in degrees "
+        "or on that map ({}) has a place there; bring it to degrees (gdalwarp)",
+        other.path,
+        place.has_origin ? fmt::format("is in {} of {}", describe_unit(place.unit), describe_system(place.system))
+                         : std::string("does not say where it lies"),
+        map));
+  }
+  check_same_system(metadata, other);
+  OutputGrid grid;
+  grid.world.width = other.width;
+  grid.world.height = other.height;
+  grid.degrees = GeoGrid{other.width, other.height, {place.origin_x, place.origin_y}, place.spacing_x, place.spacing_y};
+  if (place.registration != Registration::kUnknown) grid.registration = place.registration;
+  return grid;
+}
+
 }  // namespace
 
 WorldBounds world_bounds(const Metadata& metadata, const BoundingBox& asked) {
@@ -94,28 +178,31 @@ WorldBounds world_bounds(const Metadata& metadata, const BoundingBox& asked) {
   return bounds;
 }
 
-SampleGrid grid_like(const Metadata& metadata, const SourceInfo& other) {
+OutputGrid grid_like(const Metadata& metadata, const SourceInfo& other) {
+  if (is_warped(metadata)) return grid_through_map(metadata, other);
   const SourceRecord& source = metadata.source;
   const Georeference& place = other.georeference;
-  const bool comparable = source.origin_x && source.origin_y && place.has_origin && source.crs_spacing_x > 0.0 &&
-                          source.crs_spacing_y > 0.0 && horizontal_unit(source) == place.unit;
-  if (!comparable) {
+  const HorizontalUnit unit = horizontal_unit(source);
+  const bool placed = source.origin_x && source.origin_y && place.has_origin && source.crs_spacing_x > 0.0 &&
+                      source.crs_spacing_y > 0.0;
+  if (placed) check_same_system(metadata, other);
+  if (!placed || unit != place.unit) {
     const SourceFrame frame = make_source_frame(other);
-    return {frame.width,
-            frame.height,
-            metadata.valid.x0 + frame.first_sample_x,
-            metadata.valid.z0 + frame.first_sample_z,
-            frame.spacing_x,
-            frame.spacing_z};
+    return OutputGrid({frame.width, frame.height, metadata.valid.x0 + frame.first_sample_x,
+                       metadata.valid.z0 + frame.first_sample_z, frame.spacing_x, frame.spacing_z});
   }
   const double to_x = source.spacing_x / source.crs_spacing_x;
   const double to_z = source.spacing_z / source.crs_spacing_y;
-  return {other.width,
-          other.height,
-          source.first_sample_x + (place.origin_x - *source.origin_x) * to_x,
-          source.first_sample_z + (*source.origin_y - place.origin_y) * to_z,
-          place.spacing_x * to_x,
-          place.spacing_y * to_z};
+  double east = place.origin_x - *source.origin_x;
+  if (unit == HorizontalUnit::kDegree) {
+    // As many turns on as bring the middles nearest to each other.
+    const double apart = east + 0.5 * (static_cast<double>(other.width - 1) * place.spacing_x -
+                                       static_cast<double>(source.width - 1) * source.crs_spacing_x);
+    east -= kTurn * std::round(apart / kTurn);
+  }
+  return OutputGrid({other.width, other.height, source.first_sample_x + east * to_x,
+                     source.first_sample_z + (*source.origin_y - place.origin_y) * to_z, place.spacing_x * to_x,
+                     place.spacing_y * to_z});
 }
 
 }  // namespace isohf::cli

@@ -2,8 +2,8 @@
 
 #include "formats/cropped_source.h"
 #include "isohf/archive/metadata.h"
-#include "isohf/restore/surface_rows.h"
 #include "isohf/surface/heightmap.h"
+#include "output_grid.h"
 
 namespace isohf::cli {
 
@@ -14,8 +14,10 @@ namespace isohf::cli {
 /// rectangle there.
 [[nodiscard]] WorldBounds world_bounds(const Metadata& metadata, const BoundingBox& box);
 
-/// The grid of another raster of elevations, in the archive's world: by the origins of both where they are known in
-/// the same unit, else from the North-West corner.
-[[nodiscard]] SampleGrid grid_like(const Metadata& metadata, const SourceInfo& other);
+/// The grid of another raster of elevations, in the archive's world or, where the archive's input was projected, in
+/// degrees. By the origins of both; from the North-West corner where one has none, or a unit that is not known, but
+/// never so through a projection: there it is in degrees, or on the archive's own map.
+/// Throws Error{kInvalidArgument} where the two are known to be in different units, reference systems or bodies.
+[[nodiscard]] OutputGrid grid_like(const Metadata& metadata, const SourceInfo& other);
 
 }  // namespace isohf::cli

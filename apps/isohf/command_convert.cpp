@@ -31,6 +31,7 @@
 #include "source_inputs.h"
 #include "standard_output.h"
 #include "void_counts_output.h"
+#include "work_arena.h"
 
 namespace isohf::cli {
 namespace {
@@ -363,6 +364,7 @@ int run(ConvertCommandOptions options) {
   const std::optional<VoidCounts> voids = counts_of_voids(*source, summary.source_voids);
   std::optional<Accuracy> accuracy;
   if (options.report) {
+    const WorkArena threads(options.work.threads);
     accuracy = measure_accuracy(options.output, *source, kRandomPoints, true, options.work, common, cancel);
     if (*options.report != "-") write_report(options, *accuracy);
   }

@@ -1,7 +1,6 @@
 /// isohf export: the surface of an archive as an ortho raster of any grid, whole or cut into tiles.
 
 #include <fmt/format.h>
-#include <oneapi/tbb/task_arena.h>
 
 #include <algorithm>
 #include <array>
@@ -27,6 +26,7 @@
 #include "restored_samples.h"
 #include "standard_output.h"
 #include "surface_scan.h"
+#include "work_arena.h"
 
 namespace isohf::cli {
 namespace {
@@ -204,10 +204,10 @@ class Exporter {
         archive_(archive),
         grid_(grid),
         display_(options.work.progress, options.common.quiet, options.common.verbose),
-        scan_(archive, grid.samples, options.method(), display_, cancel) {}
+        scan_(archive, OutputGrid(grid.samples), options.method(), display_, cancel) {}
 
   void run() {
-    has_voids = needs_void(archive_.metadata(), grid_.samples, options_.raster.output);
+    has_voids = needs_void(archive_.metadata(), OutputGrid(grid_.samples), options_.raster.output);
     mapping = choose_mapping();
     if (!options_.common.quiet) warn_of_lost_scale(options_.raster.output, mapping);
     const auto void_value = has_voids ? usual_void(mapping.type) : std::nullopt;
@@ -219,7 +219,7 @@ class Exporter {
       part.height = grid_.cut.rows;
       part.first_x += static_cast<double>(column * (grid_.cut.columns - grid_.cut.overlap)) * part.spacing_x;
       part.first_z += static_cast<double>(row * (grid_.cut.rows - grid_.cut.overlap)) * part.spacing_z;
-      RasterSpec spec = restored_raster(archive_.metadata(), part, mapping.type);
+      RasterSpec spec = restored_raster(archive_.metadata(), OutputGrid(part), mapping.type);
       set_mapping(spec, mapping, void_value);
       spec.overwrite = options_.raster.overwrite;
       return spec;
@@ -282,7 +282,7 @@ int run(const ExportOptions& options) {
     check_output_file(options.raster.archive, file, options.raster.overwrite);
   }
   Exporter exporter(options, archive, grid, watch_interrupts());
-  oneapi::tbb::task_arena arena(options.work.threads > 0 ? options.work.threads : oneapi::tbb::task_arena::automatic);
+  WorkArena arena(options.work.threads);
   arena.execute([&] { exporter.run(); });
   const SampleGrid& samples = grid.samples;
   const SampleMapping& mapping = exporter.mapping;

@@ -1,7 +1,6 @@
 /// isohf restore: an archive becomes a raster of elevations again.
 
 #include <fmt/format.h>
-#include <oneapi/tbb/task_arena.h>
 
 #include <algorithm>
 #include <cmath>
@@ -31,6 +30,7 @@
 #include "source_inputs.h"
 #include "standard_output.h"
 #include "surface_scan.h"
+#include "work_arena.h"
 
 namespace isohf::cli {
 namespace {
@@ -43,6 +43,8 @@ archive made with --lossless gives the source's samples bit for bit, and their S
 --method it gives what its surface alone holds.
 Samples are raw numbers in the source's scale and type; only .tif, and the .json beside .png, .r16, .raw
 and .r32, have room for scale and offset.
+An archive whose input was projected takes --like of a raster in degrees, each of whose samples then goes
+through the projection, or of one on its own map.
 Methods: hex, quintic B-splines along the lattice rows and then down the columns, is nearest to the source;
 barycentric is what a renderer shows. The format follows from RASTER's extension: .tif, .exr,
 .png, .hgt, .asc, .flt, .r16, .raw, .r32 or .npy.
@@ -82,19 +84,38 @@ std::optional<RestoreOptions> parse(const Arguments& arguments) {
   return options;
 }
 
-SampleGrid asked_grid(const RestoreOptions& options, const Metadata& metadata) {
+OutputGrid asked_grid(const RestoreOptions& options, const Metadata& metadata) {
+  const RasterOptions& raster = options.raster;
   if (!options.like.empty()) {
-    if (is_warped(metadata)) {
+    const OpenedInputs like = open_inputs(expand_inputs({options.like}, false), {}, {}, options.work.threads);
+    OutputGrid grid = grid_like(metadata, like.source->info());
+    if (grid.degrees && raster.method == RestoreMethod::kHex) {
       throw Error(
           ErrorCode::kInvalidArgument,
-          fmt::format("{}: --like does not go through projections, and this archive's input was projected ({}); "
-                      "give --size or --spacing, and bring the raster to that grid (gdalwarp)",
-                      options.raster.archive, describe_projection(metadata.projection->spec)));
+          fmt::format("{}: its rows are no rows of the archive, whose input was projected ({}), and --method hex "
+                      "goes along rows; leave it out, or give --method barycentric",
+                      options.like, describe_projection(metadata.projection->spec)));
     }
-    return grid_like(metadata, open_inputs(expand_inputs({options.like}, false), {}, {}, 0).source->info());
+    return grid;
   }
-  if (!options.raster.size && !options.raster.spacing) return natural_grid(metadata);
-  return grid_over(metadata.valid, samples_are_areas(metadata), options.raster.size, options.raster.spacing);
+  if (!raster.size && !raster.spacing) return OutputGrid(natural_grid(metadata));
+  return OutputGrid(grid_over(metadata.valid, samples_are_areas(metadata), raster.size, raster.spacing));
+}
+
+/// Rows of another map than the archive's are read on the triangles.
+RestoreMethod method_of(const RestoreOptions& options, const OutputGrid& grid) {
+  return grid.degrees ? RestoreMethod::kBarycentric : options.raster.method.value_or(RestoreMethod::kHex);
+}
+
+/// Where the first sample lies and how far the others, for JSON.
+ordered_json json_from(const OutputGrid& grid) {
+  if (grid.degrees) {
+    const GeoGrid& on = *grid.degrees;
+    return {{"first_sample", {{"longitude", on.first_sample.longitude}, {"latitude", on.first_sample.latitude}}},
+            {"spacing", {{"longitude", on.degrees_x}, {"latitude", on.degrees_y}}}};
+  }
+  return {{"first_sample", {{"x", grid.world.first_x}, {"z", grid.world.first_z}}},
+          {"spacing", {{"x", grid.world.spacing_x}, {"z", grid.world.spacing_z}}}};
 }
 
 struct Restored {
@@ -104,7 +125,7 @@ struct Restored {
 
 class Restorer {
  public:
-  Restorer(const RestoreOptions& options, const ArchiveReader& archive, const SampleGrid& grid,
+  Restorer(const RestoreOptions& options, const ArchiveReader& archive, const OutputGrid& grid,
            const std::atomic<bool>& cancel)
       : options_(options),
         archive_(archive),
@@ -150,7 +171,7 @@ class Restorer {
       hash.add(raw);
       sink->write_rows(as_kept ? raw : in_type(raw, record, written.type, row, voids_to_nan));
       row += static_cast<std::int64_t>(raw.size() / size_bytes(kept.type)) / record.width;
-      report_rows(display_, "restore", row, grid_.height, cancel_);
+      report_rows(display_, "restore", row, grid_.world.height, cancel_);
     }
     if (const std::string found = hex(hash.finish()); found != record.sha256) {
       throw Error(ErrorCode::kCorrupt, fmt::format("{}: the restored samples have the SHA-256 {}, the source's is {}",
@@ -177,8 +198,8 @@ class Restorer {
                         (outcome == SampleStore::Outcome::kStored && load_sample(to, at) == value);
       const auto place = static_cast<std::int64_t>(i);
       if (!same) {
-        refuse_sample(options_.raster.output, to, place % grid_.width, first_row + place / grid_.width, value,
-                      "write .tif");
+        refuse_sample(options_.raster.output, to, place % grid_.world.width, first_row + place / grid_.world.width,
+                      value, "write .tif");
       }
     }
     return out;
@@ -193,11 +214,11 @@ class Restorer {
     const auto void_value = has_voids ? usual_void(mapping.type) : std::nullopt;
     const SampleStore store(mapping, void_value, options_.raster.clamp_range);
     const std::unique_ptr<RasterSink> sink = open(mapping, void_value, false);
-    const SurfaceScan scan(archive_, grid_, options_.raster.method.value_or(RestoreMethod::kHex), display_, cancel_);
+    const SurfaceScan scan(archive_, grid_, method_of(options_, grid_), display_, cancel_);
     Restored restored;
     scan.run("restore", [&](std::int64_t row, std::span<const double> elevations) {
       sink->write_rows(
-          store_rows(store, mapping.type, options_.raster.output, grid_.width, row, elevations, restored.counts));
+          store_rows(store, mapping.type, options_.raster.output, grid_.world.width, row, elevations, restored.counts));
     });
     sink->finish();
     return restored;
@@ -205,21 +226,22 @@ class Restorer {
 
   const RestoreOptions& options_;
   const ArchiveReader& archive_;
-  SampleGrid grid_;
+  OutputGrid grid_;
   const std::atomic<bool>& cancel_;
   ProgressDisplay display_;
 };
 
 int run(const RestoreOptions& options) {
   check_output_file(options.raster.archive, options.raster.output, options.raster.overwrite);
+  WorkArena arena(options.work.threads);
   const ArchiveReader archive(options.raster.archive);
   const bool wants_source =
       options.like.empty() && !options.raster.size && !options.raster.spacing && !options.raster.method;
   const std::optional<LosslessRecord> record = wants_source ? lossless_record(archive.metadata()) : std::nullopt;
-  const SampleGrid grid = record ? source_grid(archive.metadata().source) : asked_grid(options, archive.metadata());
+  const OutputGrid grid =
+      record ? OutputGrid(source_grid(archive.metadata().source)) : asked_grid(options, archive.metadata());
   const std::atomic<bool>& cancel = watch_interrupts();
   Restored restored;
-  oneapi::tbb::task_arena arena(options.work.threads > 0 ? options.work.threads : oneapi::tbb::task_arena::automatic);
   try {
     arena.execute([&] { restored = Restorer(options, archive, grid, cancel).run(record); });
   } catch (const Error& error) {
@@ -227,17 +249,17 @@ int run(const RestoreOptions& options) {
     print_error(error.what());
     return kExitDifferences;
   }
-  const std::string how =
-      restored.is_source ? "source" : to_string(options.raster.method.value_or(RestoreMethod::kHex));
+  const std::string how = restored.is_source ? "source" : to_string(method_of(options, grid));
   StandardOutput out;
   if (options.common.json) {
+    const ordered_json places = json_from(grid);
     out.write(json_text({{"archive", options.raster.archive},
                          {"output", options.raster.output},
                          {"method", how},
-                         {"width", grid.width},
-                         {"height", grid.height},
-                         {"first_sample", {{"x", grid.first_x}, {"z", grid.first_z}}},
-                         {"spacing", {{"x", grid.spacing_x}, {"z", grid.spacing_z}}},
+                         {"width", grid.world.width},
+                         {"height", grid.world.height},
+                         {"first_sample", places.at("first_sample")},
+                         {"spacing", places.at("spacing")},
                          {"source_samples", restored.is_source},
                          {"voids", restored.is_source ? ordered_json(nullptr) : ordered_json(restored.counts.voids)},
                          {"clamped", restored.counts.clamped}}));
@@ -246,7 +268,8 @@ int run(const RestoreOptions& options) {
     if (!restored.is_source) what = fmt::format("method {}, {} voids", how, describe_count(restored.counts.voids));
     if (restored.counts.clamped > 0)
       what += fmt::format(", {} moved into the range", describe_count(restored.counts.clamped));
-    out.write(fmt::format("{}: {} x {} samples, {}\n", options.raster.output, grid.width, grid.height, what));
+    out.write(
+        fmt::format("{}: {} x {} samples, {}\n", options.raster.output, grid.world.width, grid.world.height, what));
   }
   out.finish();
   return kExitDone;

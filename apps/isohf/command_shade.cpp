@@ -1,8 +1,6 @@
 /// isohf shade: a picture of an archive's surface, with the shadows that it casts.
 
 #include <fmt/format.h>
-#include <oneapi/tbb/global_control.h>
-#include <oneapi/tbb/task_arena.h>
 
 #include <algorithm>
 #include <chrono>
@@ -24,6 +22,7 @@
 #include "restored_raster.h"
 #include "shade_picture.h"
 #include "standard_output.h"
+#include "work_arena.h"
 
 namespace isohf::cli {
 namespace {
@@ -199,10 +198,7 @@ int run(ShadeOptions options) {
   const auto sink = create_raster(options.output, spec);
 
   const std::atomic<bool>& cancel = watch_interrupts();
-  const int threads = options.work.threads > 0 ? options.work.threads : oneapi::tbb::this_task_arena::max_concurrency();
-  const oneapi::tbb::global_control workers(oneapi::tbb::global_control::max_allowed_parallelism,
-                                            static_cast<std::size_t>(threads));
-  oneapi::tbb::task_arena arena(threads);
+  WorkArena arena(options.work.threads);
   const ShadeReport report = arena.execute([&] {
     ProgressDisplay display(options.work.progress, common.quiet, common.verbose);
     return render_shade(

@@ -21,6 +21,7 @@
 #include "options_source.h"
 #include "source_inputs.h"
 #include "standard_output.h"
+#include "work_arena.h"
 
 namespace isohf::cli {
 namespace {
@@ -216,6 +217,7 @@ int run(const VerifyCommandOptions& options) {
     return kExitDone;
   }
   const std::atomic<bool>& cancel = watch_interrupts();
+  const WorkArena threads(options.work.threads);
   VerifyReport report = check(options, cancel);
   std::optional<Accuracy> accuracy;
   // An archive that is not whole has no surface to measure.

@@ -5,9 +5,21 @@
 #include <utility>
 
 #include "isohf/archive/metadata.h"
+#include "isohf/restore/geo_rows.h"
 #include "isohf/restore/surface_rows.h"
+#include "isohf/surface/heightmap.h"
 
 namespace isohf::cli {
+
+/// The samples of a raster that is written.
+struct OutputGrid {
+  OutputGrid() = default;
+  explicit OutputGrid(const SampleGrid& grid) : world(grid) {}
+
+  SampleGrid world;                ///< where they lie; but for width and height it says nothing where `degrees` is set
+  std::optional<GeoGrid> degrees;  ///< samples in degrees, whose rows are no rows of the archive's world
+  Registration registration = Registration::kArea;  ///< of those
+};
 
 using GridSize = std::pair<std::int64_t, std::int64_t>;  ///< columns, rows
 

@@ -32,6 +32,13 @@ RasterSpec plain_raster(const Metadata& metadata, const SampleGrid& grid, Sample
   return spec;
 }
 
+ReferenceSystem full_system(const SourceRecord& source) {
+  ReferenceSystem system = horizontal_system(source);
+  system.vertical_datum = source.vertical_datum;
+  system.vertical_epsg = source.vertical_epsg;
+  return system;
+}
+
 /// By the source's place, for grids whose rows are its rows.
 RasterSpec raster_in_source_system(const Metadata& metadata, const SampleGrid& grid, SampleType type) {
   const SourceRecord& source = metadata.source;
@@ -50,12 +57,26 @@ RasterSpec raster_in_source_system(const Metadata& metadata, const SampleGrid& g
     place.origin_x = *source.origin_x + (grid.first_x - source.first_sample_x) * per_x;
     place.origin_y = *source.origin_y - (grid.first_z - source.first_sample_z) * per_z;
   }
-  place.system = horizontal_system(source);
-  place.system.vertical_datum = source.vertical_datum;
-  place.system.vertical_epsg = source.vertical_epsg;
+  place.system = full_system(source);
   // Without a position a point of unit spacing is what a raster that says nothing is taken for.
   const bool has_spacing = place.spacing_x != 1.0 || place.spacing_y != 1.0;
   if (place.has_origin || has_spacing || place.registration == Registration::kArea) spec.georeference = place;
+  return spec;
+}
+
+/// Of the archive's reference system in degrees.
+RasterSpec raster_in_degrees(const Metadata& metadata, const OutputGrid& grid, SampleType type) {
+  RasterSpec spec = plain_raster(metadata, grid.world, type);
+  Georeference place;
+  place.registration = grid.registration;
+  place.unit = HorizontalUnit::kDegree;
+  place.spacing_x = grid.degrees->degrees_x;
+  place.spacing_y = grid.degrees->degrees_y;
+  place.has_origin = true;
+  place.origin_x = grid.degrees->first_sample.longitude;
+  place.origin_y = grid.degrees->first_sample.latitude;
+  place.system = full_system(metadata.source);
+  spec.georeference = place;
   return spec;
 }
 
@@ -102,10 +123,11 @@ SampleType restored_type(const std::string& path, SampleType source_type) {
   return source_type;
 }
 
-RasterSpec restored_raster(const Metadata& metadata, const SampleGrid& grid, SampleType type) {
-  if (!is_warped(metadata)) return raster_in_source_system(metadata, grid, type);
-  RasterSpec spec = plain_raster(metadata, grid, type);
-  spec.georeference = map_georeference(metadata, grid);
+RasterSpec restored_raster(const Metadata& metadata, const OutputGrid& grid, SampleType type) {
+  if (grid.degrees) return raster_in_degrees(metadata, grid, type);
+  if (!is_warped(metadata)) return raster_in_source_system(metadata, grid.world, type);
+  RasterSpec spec = plain_raster(metadata, grid.world, type);
+  spec.georeference = map_georeference(metadata, grid.world);
   if (!spec.georeference->system.epsg) spec.projection = metadata.projection->spec;
   return spec;
 }
@@ -169,8 +191,8 @@ ReferenceSystem horizontal_system(const SourceRecord& source) {
   return system;
 }
 
-bool needs_void(const Metadata& metadata, const SampleGrid& grid, const std::string& output) {
-  return may_have_voids(metadata, grid) || raster_kind(output) == RasterKind::kHgt;
+bool needs_void(const Metadata& metadata, const OutputGrid& grid, const std::string& output) {
+  return grid.degrees || may_have_voids(metadata, grid.world) || raster_kind(output) == RasterKind::kHgt;
 }
 
 void set_mapping(RasterSpec& spec, const SampleMapping& mapping, std::optional<double> void_value) {

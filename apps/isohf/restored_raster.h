@@ -7,6 +7,7 @@
 #include "isohf/archive/reader.h"
 #include "isohf/restore/residual_codec.h"
 #include "isohf/restore/surface_rows.h"
+#include "output_grid.h"
 
 namespace isohf::cli {
 
@@ -22,7 +23,7 @@ enum class RasterKind { kTiff, kExr, kPng, kHgt, kAsc, kFlt, kRaw16, kRaw32, kNp
 [[nodiscard]] SampleType restored_type(const std::string& path, SampleType source_type);
 
 /// What a raster of that grid is: size, place and reference system as the source's, so far as they are known.
-[[nodiscard]] RasterSpec restored_raster(const Metadata& metadata, const SampleGrid& grid, SampleType type);
+[[nodiscard]] RasterSpec restored_raster(const Metadata& metadata, const OutputGrid& grid, SampleType type);
 
 /// The source's own raster, in its own reference system also where it was projected.
 [[nodiscard]] RasterSpec source_raster(const Metadata& metadata, SampleType type);
@@ -43,7 +44,7 @@ enum class RasterKind { kTiff, kExr, kPng, kHgt, kAsc, kFlt, kRaw16, kRaw32, kNp
 [[nodiscard]] ReferenceSystem horizontal_system(const SourceRecord& source);
 
 /// Whether a raster of the grid in `output` needs a value for voids.
-[[nodiscard]] bool needs_void(const Metadata& metadata, const SampleGrid& grid, const std::string& output);
+[[nodiscard]] bool needs_void(const Metadata& metadata, const OutputGrid& grid, const std::string& output);
 
 /// Puts into the spec what its raw numbers mean. A void value that is NaN goes without saying.
 void set_mapping(RasterSpec& spec, const SampleMapping& mapping, std::optional<double> void_value);

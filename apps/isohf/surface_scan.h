@@ -8,6 +8,7 @@
 
 #include "isohf/archive/reader.h"
 #include "isohf/restore/surface_rows.h"
+#include "output_grid.h"
 #include "progress.h"
 
 namespace isohf::cli {
@@ -18,16 +19,20 @@ class SurfaceScan {
   /// Some whole rows from `first_row` on; NaN where void.
   using Take = std::function<void(std::int64_t first_row, std::span<const double> elevations)>;
 
+  /// method   between vertices; a grid in degrees is read on the triangles, whatever it says
   /// `display` is told how far it has come; `cancel` is looked at between two calls of `take`.
-  SurfaceScan(const ArchiveReader& archive, const SampleGrid& grid, RestoreMethod method, ProgressDisplay& display,
+  SurfaceScan(const ArchiveReader& archive, const OutputGrid& grid, RestoreMethod method, ProgressDisplay& display,
               const std::atomic<bool>& cancel);
 
   /// Works on the caller's oneTBB arena; about a million samples at a time. Throws Error{kCancelled}.
   void run(const std::string& stage, const Take& take) const;
 
  private:
+  template <typename Surface>
+  void run_over(Surface& surface, const std::string& stage, const Take& take) const;
+
   const ArchiveReader& archive_;
-  SampleGrid grid_;
+  OutputGrid grid_;
   RestoreMethod method_;
   ProgressDisplay& display_;
   const std::atomic<bool>& cancel_;

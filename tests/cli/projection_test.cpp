@@ -155,7 +155,6 @@ TEST_F(ProjectionCommand, WhatDoesNotGoTogetherIsRefusedInOneLine) {
   refuses({"convert", wide, out, "--geoid", folder / "egm.pgm"}, "egm.pgm: no such file", 1);
   refuses({"convert", wide, out, "--geoid", folder / "egm.pgm", "--lossless"}, "give one of the two");
   converts({"--projection", "utm"});
-  refuses({"restore", folder / "a.isohf", folder / "b.tif", "--like", wide}, "--like does not go through projections");
   write_degrees(folder / "small", 40, 30, 2.0, 42.0, 0.05, land);
   refuses({"verify", folder / "a.isohf", "--against", folder / "small.flt"}, "40x30 samples");
   fs::remove(folder / "wide.prj");

@@ -115,6 +115,22 @@ TEST_F(RestoreCommand, SaysInOneLineWhatItWrote) {
             folder / "exact.tif" + ": 512 x 384 samples, the source's own samples, SHA-256 as stated\n");
 }
 
+TEST_F(RestoreCommand, MoreThreadsThanCoresAreNoWordOnStandardError) {
+  convert(kCoast);
+  for (const std::vector<std::string>& command :
+       std::vector<std::vector<std::string>>{{"restore", folder / "a.isohf", folder / "back.tif"},
+                                             {"export", folder / "a.isohf", folder / "back.tif", "--overwrite"},
+                                             {"verify", folder / "a.isohf", "--against", kCoast, "--no-ortho"},
+                                             {"shade", folder / "a.isohf", "-o", folder / "back.png"},
+                                             {"convert", kCoast, folder / "b.isohf", "--report"}}) {
+    std::vector<std::string> arguments = command;
+    arguments.insert(arguments.end(), {"-j", "300"});
+    const RunResult result = run_isohf(arguments);
+    EXPECT_EQ(result.exit_code, 0) << command.front();
+    EXPECT_EQ(result.err, "") << command.front();
+  }
+}
+
 TEST_F(RestoreCommand, KeepsThePlaceTypeAndReferenceSystemOfTheSource) {
   convert(kCoast);
   const Raster source = read_raster(kCoast);
