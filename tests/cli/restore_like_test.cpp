@@ -16,6 +16,7 @@
 #include "formats/registry.h"
 #include "support/degree_grid.h"
 #include "support/run_program.h"
+#include "support/samples.h"
 #include "support/temporary_folder.h"
 
 namespace isohf::test {
@@ -43,11 +44,8 @@ struct Raster {
 Raster read_raster(const std::string& path) {
   const auto source = open_source(path, {});
   Raster raster{source->info(), {}};
-  const auto count = static_cast<std::size_t>(raster.info.width * raster.info.height);
-  std::vector<std::byte> raw(count * size_bytes(raster.info.sample_type));
-  source->read_window({0, 0, raster.info.width, raster.info.height}, raw);
-  raster.heights.resize(count);
-  heights_from_samples(raster.info, 0.0, raw, raster.heights);
+  raster.heights.resize(static_cast<std::size_t>(raster.info.width * raster.info.height));
+  heights_from_samples(raster.info, 0.0, read_whole(*source), raster.heights);
   return raster;
 }
 
