@@ -14,6 +14,7 @@
 #include "formats/grass_header.h"
 #include "formats/grid_header.h"
 #include "formats/header_grid_source.h"
+#include "formats/letter_case.h"
 #include "formats/open_options.h"
 #include "formats/raw_file.h"
 #include "formats/text_tokens.h"
@@ -365,10 +366,7 @@ bool looks_like_ascii_grid(std::span<const std::byte> head) {
 
 std::unique_ptr<HeightSource> open_ascii_grid(const std::string& path, const OpenOptions& options) {
   // The header of a binary grid begins with the same words.
-  std::string ending = path.substr(path.size() - std::min<std::size_t>(path.size(), 4));
-  std::transform(ending.begin(), ending.end(), ending.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  if (ending == ".hdr") return open_header_grid(path, options);
+  if (lower_case(path).ends_with(".hdr")) return open_header_grid(path, options);
   return std::make_unique<AsciiGridSource>(path, options);
 }
 

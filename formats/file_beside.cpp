@@ -1,19 +1,10 @@
 #include "formats/file_beside.h"
 
-#include <algorithm>
-#include <cctype>
 #include <filesystem>
 
+#include "formats/letter_case.h"
+
 namespace isohf {
-namespace {
-
-std::string lower(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return text;
-}
-
-}  // namespace
 
 std::string file_beside(const std::string& beside, const std::string& name) {
   const std::filesystem::path folder = std::filesystem::path(beside).parent_path();
@@ -22,7 +13,7 @@ std::string file_beside(const std::string& beside, const std::string& name) {
   std::string found;
   for (const auto& entry : std::filesystem::directory_iterator(folder.empty() ? "." : folder, ignored)) {
     const std::string candidate = entry.path().filename().string();
-    if (lower(candidate) == lower(name) && (found.empty() || candidate < found)) found = candidate;
+    if (lower_case(candidate) == lower_case(name) && (found.empty() || candidate < found)) found = candidate;
   }
   return found.empty() ? found : (folder / found).string();
 }

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 
+#include "formats/letter_case.h"
 #include "formats/text_tokens.h"
 #include "isohf/base/error.h"
 
@@ -16,13 +17,6 @@ namespace {
 
 constexpr std::array<std::string_view, 9> kNameTexts = {"north", "south", "east", "west",      "rows",
                                                         "cols",  "null",  "type", "multiplier"};
-
-std::string lower(std::string_view text) {
-  std::string result(text);
-  std::transform(result.begin(), result.end(), result.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return result;
-}
 
 /// "45:30:00.5N" in degrees, South and West negative; false where the text is none.
 bool read_degrees(std::string_view text, double& degrees) {
@@ -55,7 +49,7 @@ bool read_degrees(std::string_view text, double& degrees) {
 }  // namespace
 
 std::size_t GrassHeader::find(std::string_view name) {
-  const std::string plain = lower(name);
+  const std::string plain = lower_case(name);
   return static_cast<std::size_t>(std::find(kNameTexts.begin(), kNameTexts.end(), plain) - kNameTexts.begin());
 }
 
@@ -97,7 +91,7 @@ double GrassHeader::edge(Name name, bool& degrees) const {
 }
 
 bool GrassHeader::is_whole() const {
-  return lower(values_[kType].text) == "int";
+  return lower_case(values_[kType].text) == "int";
 }
 
 double GrassHeader::null_value() const {
@@ -133,7 +127,7 @@ void GrassHeader::read(SourceInfo& info) const {
   place.has_origin = true;
   place.origin_x = west + place.spacing_x / 2.0;
   place.origin_y = north - place.spacing_y / 2.0;
-  const std::string type = lower(values_[kType].text);
+  const std::string type = lower_case(values_[kType].text);
   if (!type.empty() && type != "int" && type != "float" && type != "double") refuse(kType, "int, float or double");
   if (!values_[kMultiplier].text.empty()) {
     double scale = 0.0;

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cmath>
 #include <filesystem>
 #include <optional>
@@ -12,6 +11,7 @@
 #include <vector>
 
 #include "formats/grid_header.h"
+#include "formats/letter_case.h"
 #include "formats/open_options.h"
 #include "formats/place_beside.h"
 #include "formats/plain_samples.h"
@@ -34,15 +34,8 @@ constexpr std::array<std::string_view, 25> kWords = {
     "xdim",      "ydim",      "bandrowbytes", "cellsize",     "dx",          "dy",     "xllcorner",
     "yllcorner", "xllcenter", "yllcenter",    "totalrowbytes"};
 
-std::string lower(std::string_view text) {
-  std::string result(text);
-  std::transform(result.begin(), result.end(), result.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return result;
-}
-
 std::string extension_of(const std::string& path) {
-  return lower(std::filesystem::path(path).extension().string());
+  return lower_case(std::filesystem::path(path).extension().string());
 }
 
 /// The first two words of a line, empty where it has fewer.
@@ -187,7 +180,7 @@ class HeaderGridSource final : public HeightSource {
   void require_one_band(const GridHeader& header) const {
     const std::int64_t bands = header.count({"nbands"}, 1).value_or(1);
     if (bands != 1) refuse(ErrorCode::kUnsupported, fmt::format("nbands is {}; isohf reads grids of one band", bands));
-    const std::string layout = lower(header.text({"layout"}).value_or("bil"));
+    const std::string layout = lower_case(header.text({"layout"}).value_or("bil"));
     if (layout != "bil" && layout != "bip" && layout != "bsq") {
       refuse(ErrorCode::kUnsupported, fmt::format("layout is \"{}\", must be BIL, BIP or BSQ", printable(layout)));
     }
@@ -195,7 +188,7 @@ class HeaderGridSource final : public HeightSource {
 
   void read_type(const GridHeader& header, bool grid_float) {
     const std::int64_t bits = header.count({"nbits"}, 1).value_or(grid_float ? 32 : 8);
-    const std::string given = lower(header.text({"pixeltype"}).value_or(""));
+    const std::string given = lower_case(header.text({"pixeltype"}).value_or(""));
     std::string type = given;
     if (type.empty()) type = grid_float ? "float" : bits == 8 ? "unsignedint" : "signedint";
     struct Row {
@@ -229,7 +222,7 @@ class HeaderGridSource final : public HeightSource {
 
   void read_byte_order(const GridHeader& header) {
     const auto given = header.text({"byteorder"});
-    const std::string order = lower(given.value_or("i"));
+    const std::string order = lower_case(given.value_or("i"));
     if (order == "m" || order == "msbfirst" || order == "msb") {
       layout_.big_endian = true;
     } else if (order != "i" && order != "lsbfirst" && order != "lsb") {

@@ -2,14 +2,13 @@
 
 #include <fmt/core.h>
 
-#include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <cstring>
 #include <optional>
 #include <vector>
 
 #include "formats/hgt_name.h"
+#include "formats/letter_case.h"
 #include "formats/open_options.h"
 #include "formats/raw_file.h"
 #include "formats/zip_member.h"
@@ -20,16 +19,6 @@ namespace isohf {
 namespace {
 
 constexpr std::int64_t kSampleBytes = 2;
-
-std::string lower(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return text;
-}
-
-bool ends_with(const std::string& text, std::string_view ending) {
-  return text.size() >= ending.size() && text.compare(text.size() - ending.size(), ending.size(), ending) == 0;
-}
 
 std::string file_name(const std::string& path) {
   const std::size_t slash = path.find_last_of('/');
@@ -56,7 +45,7 @@ class HgtSource final : public HeightSource {
   HgtSource(const std::string& path, const OpenOptions& options) {
     info_.path = path;
     std::string name = path;
-    if (ends_with(lower(path), ".zip")) {
+    if (lower_case(path).ends_with(".zip")) {
       name = open_member(options.unpacked_bytes);
     } else {
       file_.emplace(path, options.unpacked_bytes);
@@ -90,7 +79,7 @@ class HgtSource final : public HeightSource {
   std::string open_member(std::uint64_t unpacked_bytes) {
     std::vector<ZipMember> tiles;
     for (ZipMember& member : zip_members(RawFile(info_.path))) {
-      if (ends_with(lower(member.name), ".hgt")) tiles.push_back(std::move(member));
+      if (lower_case(member.name).ends_with(".hgt")) tiles.push_back(std::move(member));
     }
     if (tiles.size() != 1) {
       throw Error(ErrorCode::kUnsupported,
@@ -161,8 +150,8 @@ class HgtSource final : public HeightSource {
 }  // namespace
 
 bool is_hgt_name(const std::string& path) {
-  const std::string name = lower(without_gzip(path));
-  return ends_with(name, ".hgt") || ends_with(name, ".hgt.zip");
+  const std::string name = lower_case(without_gzip(path));
+  return name.ends_with(".hgt") || name.ends_with(".hgt.zip");
 }
 
 std::unique_ptr<HeightSource> open_hgt(const std::string& path, const OpenOptions& options) {

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <span>
 
+#include "formats/letter_case.h"
 #include "formats/raw_file.h"
 #include "isohf/base/error.h"
 
@@ -16,20 +17,6 @@ namespace {
 
 constexpr std::size_t kMostLabelBytes = std::size_t{1} << 20U;
 constexpr std::size_t kDeepestBlock = 16;
-
-std::string upper(std::string_view text) {
-  std::string result(text);
-  std::transform(result.begin(), result.end(), result.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
-  return result;
-}
-
-std::string lower(std::string_view text) {
-  std::string result(text);
-  std::transform(result.begin(), result.end(), result.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return result;
-}
 
 bool is_space(char c) {
   return c == ' ' || (c >= '\t' && c <= '\r');
@@ -46,13 +33,13 @@ class Parser {
     while (true) {
       skip_blank();
       const int line = line_;
-      const std::string key = upper(bare());
+      const std::string key = upper_case(bare());
       if (key.empty()) fail(line, fmt::format("found {}, must be a keyword", what_is_here()));
       if (key == "END") break;
       if (key == "OBJECT" || key == "GROUP" || key == "BEGIN_OBJECT" || key == "BEGIN_GROUP") {
         if (!skip_equals()) fail(line, key + " has no name");
         if (open.size() > kDeepestBlock) fail(line, fmt::format("blocks lie deeper than {}", kDeepestBlock));
-        open.push_back({upper(scalar(key)), line, {}, {}});
+        open.push_back({upper_case(scalar(key)), line, {}, {}});
       } else if (key == "END_OBJECT" || key == "END_GROUP") {
         close(open, line, key);
       } else {
@@ -159,7 +146,7 @@ class Parser {
     const std::size_t begin = ++at_;
     while (at_ < text_.size() && text_[at_] != '>' && text_[at_] >= ' ') ++at_;
     if (at_ >= text_.size() || text_[at_] != '>') fail(line_, fmt::format("the unit of {} has no closing >", key));
-    return lower(text_.substr(begin, at_++ - begin));
+    return lower_case(text_.substr(begin, at_++ - begin));
   }
 
   /// A list; lists within it are read as one with it.
@@ -200,7 +187,7 @@ class Parser {
     }
     // Some labels leave a value out: KEY =, and the next line is a statement of its own.
     const auto [at, before] = std::pair(at_, line_);
-    const std::string next = before > line ? upper(bare()) : "";
+    const std::string next = before > line ? upper_case(bare()) : "";
     if (next == "END" || next == "END_OBJECT" || next == "END_GROUP" || (!next.empty() && skip_equals())) {
       at_ = at;
       line_ = before;
@@ -214,7 +201,7 @@ class Parser {
 
   void close(std::vector<LabelBlock>& open, int line, const std::string& key) {
     std::string name;
-    if (skip_equals()) name = upper(scalar(key));
+    if (skip_equals()) name = upper_case(scalar(key));
     if (open.size() < 2) fail(line, key + " without a beginning");
     if (!name.empty() && name != open.back().name) {
       fail(line, fmt::format("{} = {} ends block {} of line {}", key, name, open.back().name, open.back().line));
@@ -297,7 +284,7 @@ std::optional<std::string> LabelFields::text(std::string_view key) const {
 
 std::optional<std::string> LabelFields::word(std::string_view key) const {
   const std::optional<std::string> found = text(key);
-  return found ? std::optional(upper(*found)) : std::nullopt;
+  return found ? std::optional(upper_case(*found)) : std::nullopt;
 }
 
 std::optional<double> LabelFields::number(std::string_view key) const {

@@ -15,6 +15,7 @@
 
 #include "formats/file_beside.h"
 #include "formats/label_text.h"
+#include "formats/letter_case.h"
 #include "formats/open_options.h"
 #include "formats/pds3_layout.h"
 #include "formats/pds3_place.h"
@@ -25,12 +26,6 @@
 
 namespace isohf {
 namespace {
-
-std::string lower(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return text;
-}
 
 /// A VAX F-float, its bytes as stored, as an IEEE float: words in the other order, no leading 1 in front of the point,
 /// exponents up to 127; its reserved operand is a NaN. The smallest ones lose bits, which are no elevation.
@@ -199,7 +194,7 @@ class Pds3Source final : public HeightSource {
     const std::string unit = image.word("UNIT").value_or("N/A");
     if (unit != "N/A" && unit != "UNK" && unit != "NULL") {
       const std::optional<LinearUnit> length = linear_unit(unit);
-      info_.vertical_unit = length ? length->name : lower(unit);
+      info_.vertical_unit = length ? length->name : lower_case(unit);
       info_.metres_per_vertical_unit = length ? length->metres : 1.0;
     }
     for (const char* key : {"MISSING_CONSTANT", "MISSING", "NULL", "NULL_CONSTANT", "CORE_NULL", "INVALID_CONSTANT",
@@ -279,7 +274,7 @@ bool looks_like_pds3(std::span<const std::byte> head) {
 }
 
 bool has_pds3_label(const std::string& path) {
-  if (lower(std::filesystem::path(path).extension().string()) != ".img") return false;
+  if (lower_case(std::filesystem::path(path).extension().string()) != ".img") return false;
   std::array<std::byte, 128> head = {};
   const auto is_label = [&](const std::string& file) {
     const RawFile raw(file);

@@ -2,11 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cctype>
 #include <fstream>
 #include <limits>
 
+#include "formats/letter_case.h"
 #include "formats/libraries.h"
 #include "formats/output_part.h"
 #include "formats/output_stream.h"
@@ -40,10 +39,7 @@ const std::vector<Writer>& writers() {
 std::string lower_extension(const std::string& path) {
   const std::size_t dot = path.rfind('.');
   if (dot == std::string::npos || path.find('/', dot) != std::string::npos) return {};
-  std::string extension = path.substr(dot);
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return extension;
+  return lower_case(path.substr(dot));
 }
 
 const Writer& writer_for(const std::string& path) {

@@ -8,12 +8,12 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cerrno>
 #include <cstring>
 #include <system_error>
 #include <vector>
 
+#include "formats/letter_case.h"
 #include "formats/zip_member.h"
 #include "isohf/base/error.h"
 
@@ -59,9 +59,7 @@ bool may_hold(std::uint64_t contents_bytes, std::uint64_t limit) {
 }  // namespace
 
 bool is_gzip_name(const std::string& path) {
-  const std::size_t dot = path.size() - std::min<std::size_t>(path.size(), 3);
-  return dot > 0 && path[dot] == '.' && std::tolower(static_cast<unsigned char>(path[dot + 1])) == 'g' &&
-         std::tolower(static_cast<unsigned char>(path[dot + 2])) == 'z';
+  return path.size() > 3 && lower_case(std::string_view(path).substr(path.size() - 3)) == ".gz";
 }
 
 std::string without_gzip(const std::string& path) {

@@ -4,10 +4,10 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <charconv>
 #include <cmath>
 
+#include "formats/letter_case.h"
 #include "formats/open_options.h"
 #include "formats/plain_samples.h"
 #include "formats/raster_description.h"
@@ -67,9 +67,7 @@ std::string square(std::uint64_t bytes, std::string_view type, std::size_t sampl
 
 [[noreturn]] void refuse_without_layout(const std::string& path) {
   const std::uint64_t bytes = RawFile(path).size_bytes();
-  std::string ending = path.substr(std::min(path.find_last_of('.') + 1, path.size()));
-  std::transform(ending.begin(), ending.end(), ending.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string ending = lower_case(path.substr(std::min(path.find_last_of('.') + 1, path.size())));
   std::string example;
   if (ending == "r8") {
     example = square(bytes, "u8", 1);

@@ -7,7 +7,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cerrno>
 #include <cstring>
 #include <span>
@@ -18,6 +17,7 @@
 #include "formats/header_grid_source.h"
 #include "formats/hgt_source.h"
 #include "formats/isis3_source.h"
+#include "formats/letter_case.h"
 #include "formats/libraries.h"
 #include "formats/npy_source.h"
 #include "formats/oiio_source.h"
@@ -112,12 +112,9 @@ Head read_head(const std::string& path) {
 }
 
 bool has_extension(const std::string& path, const Format& format) {
-  std::string lower = without_gzip(path);
-  std::transform(lower.begin(), lower.end(), lower.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string name = lower_case(without_gzip(path));
   return std::any_of(format.extensions.begin(), format.extensions.end(), [&](const std::string& extension) {
-    return lower.size() > extension.size() &&
-           lower.compare(lower.size() - extension.size(), extension.size(), extension) == 0;
+    return name.size() > extension.size() && name.ends_with(extension);
   });
 }
 

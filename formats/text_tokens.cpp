@@ -4,11 +4,11 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <charconv>
 #include <cstring>
 #include <limits>
 
+#include "formats/letter_case.h"
 #include "isohf/base/error.h"
 
 namespace isohf {
@@ -20,9 +20,7 @@ constexpr std::size_t kBufferBytes = std::size_t{1} << 18U;
 bool read_special(std::string_view word, double& value) {
   const bool negative = !word.empty() && word.front() == '-';
   if (!word.empty() && (word.front() == '-' || word.front() == '+')) word.remove_prefix(1);
-  std::string text(word.substr(0, 16));
-  std::transform(text.begin(), text.end(), text.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string text = lower_case(word.substr(0, 16));
   const auto is_any = [&](std::initializer_list<std::string_view> spellings) {
     return std::find(spellings.begin(), spellings.end(), text) != spellings.end();
   };

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <cctype>
 #include <charconv>
 #include <cstring>
 #include <optional>
@@ -15,6 +14,7 @@
 #include "formats/auxiliary_metadata.h"
 #include "formats/gdal_tags.h"
 #include "formats/geotiff_keys.h"
+#include "formats/letter_case.h"
 #include "formats/open_options.h"
 #include "formats/place_beside.h"
 #include "formats/raw_file.h"
@@ -115,10 +115,7 @@ int choose_channel(const TiffLayout& layout, const std::string& wanted, SourceIn
   const auto label = [&](std::size_t i) { return names[i].empty() ? std::to_string(i) : names[i]; };
   std::size_t chosen = 0;
   if (!wanted.empty()) {
-    std::string upper = wanted;
-    std::transform(upper.begin(), upper.end(), upper.begin(),
-                   [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
-    chosen = static_cast<std::size_t>(std::find(names.begin(), names.end(), upper) - names.begin());
+    chosen = static_cast<std::size_t>(std::find(names.begin(), names.end(), upper_case(wanted)) - names.begin());
     if (chosen == names.size()) {
       const auto [end, failure] = std::from_chars(wanted.data(), wanted.data() + wanted.size(), chosen);
       if (failure != std::errc() || end != wanted.data() + wanted.size()) chosen = names.size();

@@ -4,6 +4,8 @@
 #include <array>
 #include <cctype>
 
+#include "formats/letter_case.h"
+
 namespace isohf {
 namespace {
 
@@ -59,13 +61,6 @@ constexpr std::array<BodyRow, 19> kBodies = {{
     {"Ryugu", 0.0, 0.0},
 }};
 
-std::string lower(std::string_view text) {
-  std::string result(text);
-  std::transform(result.begin(), result.end(), result.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return result;
-}
-
 /// Whether `word` stands in `text` as a word of its own: "Mars_2000" and "GCS Mars" yes, "marsh" no.
 bool has_word(const std::string& text, const std::string& word) {
   const auto is_letter = [&](std::size_t i) {
@@ -87,7 +82,7 @@ std::optional<LinearUnit> linear_unit(int epsg) {
 }
 
 std::optional<LinearUnit> linear_unit(std::string_view name) {
-  const std::string wanted = lower(name);
+  const std::string wanted = lower_case(name);
   if (wanted.empty()) return std::nullopt;
   for (const UnitRow& row : kUnits) {
     if (std::find(row.spellings.begin(), row.spellings.end(), wanted) != row.spellings.end()) {
@@ -98,9 +93,9 @@ std::optional<LinearUnit> linear_unit(std::string_view name) {
 }
 
 std::string body_of(std::string_view name, std::optional<double> semi_major_axis_m) {
-  const std::string text = lower(name);
+  const std::string text = lower_case(name);
   for (const BodyRow& body : kBodies) {
-    if (has_word(text, lower(body.name))) return body.name;
+    if (has_word(text, lower_case(body.name))) return body.name;
   }
   if (has_word(text, "lunar")) return "Moon";
   if (!semi_major_axis_m || !(*semi_major_axis_m > 0.0)) return {};

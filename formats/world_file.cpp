@@ -11,6 +11,7 @@
 #include <sstream>
 #include <vector>
 
+#include "formats/letter_case.h"
 #include "formats/raw_file.h"
 #include "isohf/base/error.h"
 
@@ -43,9 +44,7 @@ std::vector<std::string> spellings(const std::vector<std::string>& extensions) {
 
 /// .jgw and .jpgw for .jpg: the first and last letter and a w, or all of them.
 std::vector<std::string> world_extensions(const std::string& raster_path) {
-  std::string own = std::filesystem::path(raster_path).extension().string();
-  std::transform(own.begin(), own.end(), own.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string own = lower_case(std::filesystem::path(raster_path).extension().string());
   if (own == ".flt") return {".flw", ".ftw", ".fltw", ".wld"};
   if (own.size() < 3 || own == ".tif" || own == ".tiff") return {".tfw", ".tifw", ".wld"};
   return {fmt::format(".{}{}w", own[1], own.back()), own + "w", ".wld"};
