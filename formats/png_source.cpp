@@ -1,23 +1,19 @@
 #include "formats/png_source.h"
 
 #include <fmt/format.h>
-#include <png.h>
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
-#include <csetjmp>
-#include <cstdio>
 #include <cstring>
 #include <filesystem>
 #include <optional>
 #include <span>
 #include <vector>
 
-#include "formats/libraries.h"
 #include "formats/open_options.h"
 #include "formats/packed_elevations.h"
 #include "formats/place_beside.h"
+#include "formats/png_decoder.h"
 #include "formats/raster_description.h"
 #include "isohf/base/assert.h"
 #include "isohf/base/error.h"
@@ -33,130 +29,6 @@ constexpr std::uint64_t kMaxCompressionRatio = 1032;
 /// Decoded rows of the channel that are kept for a reader whose windows overlap.
 constexpr std::size_t kKeptBytes = std::size_t{8} << 20U;
 constexpr std::size_t kMaxKeptRows = 1024;
-
-/// What the header says, after the reader's transformations.
-struct PngHeader {
-  std::uint32_t width = 0;
-  std::uint32_t height = 0;
-  int bit_depth = 0;
-  int color_type = 0;
-  bool interlaced = false;
-  bool has_transparent_gray = false;
-  std::uint16_t transparent_gray = 0;
-  std::size_t row_bytes = 0;  ///< packed as in the file until the decoder is started
-};
-
-/// libpng's decoder, started once. libpng leaves a failed call by longjmp: each member that calls it holds nothing but
-/// trivial objects, returns false on failure, and leaves the reason in message().
-class PngDecoder {
- public:
-  PngDecoder() = default;
-  PngDecoder(const PngDecoder&) = delete;
-  PngDecoder& operator=(const PngDecoder&) = delete;
-  ~PngDecoder() { close(); }
-
-  /// Opens the file and reads what stands before the first row.
-  [[nodiscard]] bool open(const char* path, PngHeader& header) {
-    close();
-    file_ = std::fopen(path, "rb");
-    if (file_ == nullptr) return fail(std::strerror(errno));
-    png_ = png_create_read_struct(PNG_LIBPNG_VER_STRING, this, on_error, on_warning);
-    info_ = png_ != nullptr ? png_create_info_struct(png_) : nullptr;
-    if (info_ == nullptr) return fail("out of memory");
-    return read_header(header);
-  }
-
-  /// Allocates for rows of the header's size.
-  [[nodiscard]] bool start(PngHeader& header) {
-    if (setjmp(png_jmpbuf(png_)) != 0) return false;  // NOLINT(cert-err52-cpp)
-    if (header.bit_depth < 8) png_set_packing(png_);  // a byte each, values as stored
-    if (header.bit_depth == 16) png_set_swap(png_);   // PNG is big-endian, we are not
-    if (header.interlaced) (void)png_set_interlace_handling(png_);
-    png_read_update_info(png_, info_);
-    header.row_bytes = png_get_rowbytes(png_, info_);
-    return true;
-  }
-
-  /// Decodes the next row, or in an interlaced picture all rows at once.
-  [[nodiscard]] bool read_row(png_bytep row) {
-    if (setjmp(png_jmpbuf(png_)) != 0) return false;  // NOLINT(cert-err52-cpp): libpng's way to return errors
-    png_read_row(png_, row, nullptr);
-    return true;
-  }
-  [[nodiscard]] bool read_image(png_bytepp rows) {
-    if (setjmp(png_jmpbuf(png_)) != 0) return false;  // NOLINT(cert-err52-cpp)
-    png_read_image(png_, rows);
-    return true;
-  }
-
-  /// Checks what follows the last row: the last checksums.
-  [[nodiscard]] bool finish() {
-    if (setjmp(png_jmpbuf(png_)) != 0) return false;  // NOLINT(cert-err52-cpp)
-    png_read_end(png_, nullptr);
-    return true;
-  }
-
-  [[nodiscard]] bool has_file() const { return file_ != nullptr; }
-  [[nodiscard]] const char* message() const { return message_.data(); }
-
- private:
-  static void on_error(png_structp png, png_const_charp text) {
-    static_cast<PngDecoder*>(png_get_error_ptr(png))->fail(text);
-    png_longjmp(png, 1);
-  }
-  static void on_warning(png_structp, png_const_charp) {}
-
-  bool fail(const char* text) {
-    std::snprintf(message_.data(), message_.size(), "%s", text);
-    return false;
-  }
-
-  [[nodiscard]] bool read_header(PngHeader& header) {
-    if (setjmp(png_jmpbuf(png_)) != 0) return false;  // NOLINT(cert-err52-cpp)
-    png_set_user_limits(png_, PNG_UINT_31_MAX, PNG_UINT_31_MAX);
-    png_init_io(png_, file_);
-    png_read_info(png_, info_);
-    header.width = png_get_image_width(png_, info_);
-    header.height = png_get_image_height(png_, info_);
-    header.bit_depth = png_get_bit_depth(png_, info_);
-    header.color_type = png_get_color_type(png_, info_);
-    header.interlaced = png_get_interlace_type(png_, info_) != PNG_INTERLACE_NONE;
-    png_color_16p transparent = nullptr;
-    if (header.color_type == PNG_COLOR_TYPE_GRAY && png_get_tRNS(png_, info_, nullptr, nullptr, &transparent) != 0 &&
-        transparent != nullptr) {
-      header.has_transparent_gray = true;
-      header.transparent_gray = transparent->gray;
-    }
-    header.row_bytes = png_get_rowbytes(png_, info_);
-    return true;
-  }
-
-  void close() {
-    if (png_ != nullptr) png_destroy_read_struct(&png_, &info_, nullptr);
-    if (file_ != nullptr) std::fclose(file_);
-    png_ = nullptr;
-    info_ = nullptr;
-    file_ = nullptr;
-  }
-
-  std::FILE* file_ = nullptr;
-  png_structp png_ = nullptr;
-  png_infop info_ = nullptr;
-  std::array<char, 256> message_{};
-};
-
-std::vector<std::string> channels_of(int color_type) {
-  switch (color_type) {
-    case PNG_COLOR_TYPE_GRAY:
-      return {"Y"};
-    case PNG_COLOR_TYPE_GRAY_ALPHA:
-      return {"Y", "A"};
-    case PNG_COLOR_TYPE_RGB:
-      return {"R", "G", "B"};
-    default:
-      return {"R", "G", "B", "A"};
-  }
-}
 
 /// Rows of one channel, decoded in order.
 class PngSource final : public HeightSource {
@@ -222,11 +94,11 @@ class PngSource final : public HeightSource {
   /// Opens the file anew; the next row decoded is the first.
   void restart() {
     next_row_ = 0;
-    if (!decoder_.open(info_.path.c_str(), header_)) {
+    if (!decoder_.open(info_.path, header_)) {
       throw Error(decoder_.has_file() ? ErrorCode::kCorrupt : ErrorCode::kIo,
                   fmt::format("{}: PNG header: {}", info_.path, decoder_.message()));
     }
-    if (header_.color_type == PNG_COLOR_TYPE_PALETTE) {
+    if (header_.has_palette) {
       throw Error(ErrorCode::kUnsupported,
                   info_.path + ": PNG with a palette: its numbers are colours, not elevations");
     }
@@ -254,7 +126,7 @@ class PngSource final : public HeightSource {
   }
 
   void choose_channel(const std::string& wanted) {
-    const std::vector<std::string> channels = channels_of(header_.color_type);
+    const std::vector<const char*>& channels = header_.channels;
     channels_ = channels.size();
     if (const auto packing = packing_from_string(wanted)) return unpack(*packing);
     const auto is_wanted = [&](std::size_t at) { return wanted == channels[at] || wanted == std::to_string(at); };
@@ -305,8 +177,8 @@ class PngSource final : public HeightSource {
     if (header_.bit_depth == 8 && !header_.interlaced) {
       row_.resize(header_.row_bytes);
       const std::size_t rows = std::min<std::size_t>(kRowsLookedAt, header_.height);
-      for (std::size_t row = 0; row < rows && decoder_.read_row(row_.data()); ++row) {
-        evidence.add(std::as_bytes(std::span(row_)));
+      for (std::size_t row = 0; row < rows && decoder_.read_row(row_); ++row) {
+        evidence.add(row_);
       }
       restart();
       if (const std::optional<Packing> packing = evidence.packing()) {
@@ -326,7 +198,7 @@ class PngSource final : public HeightSource {
         ErrorCode::kInvalidArgument,
         fmt::format("{}: is a colour picture with channels {}; say which one holds elevations (--channel R), or "
                     "how they are packed into all (--encoding terrarium, mapbox or rgba-float)",
-                    info_.path, fmt::join(channels_of(header_.color_type), ", ")));
+                    info_.path, fmt::join(header_.channels, ", ")));
   }
 
   [[nodiscard]] std::byte* kept_row(std::size_t row) {
@@ -337,25 +209,25 @@ class PngSource final : public HeightSource {
     if (kept_.empty()) kept_.resize(kept_rows_ * header_.width * sample_bytes_);
     if (header_.interlaced) return decode_all();
     row_.resize(header_.row_bytes);
-    if (!decoder_.read_row(row_.data())) fail(fmt::format("PNG row {}", next_row_));
+    if (!decoder_.read_row(row_)) fail(fmt::format("PNG row {}", next_row_));
     if (next_row_ + 1 == header_.height && !decoder_.finish()) fail(fmt::format("PNG row {}", next_row_));
     pick_channel(row_.data(), kept_row(next_row_));
     ++next_row_;
   }
 
   void decode_all() {
-    std::vector<png_byte> picture(header_.row_bytes * header_.height);
-    std::vector<png_bytep> rows(header_.height);
-    for (std::size_t row = 0; row < rows.size(); ++row) rows[row] = picture.data() + row * header_.row_bytes;
-    if (!decoder_.read_image(rows.data()) || !decoder_.finish()) fail("interlaced PNG");
-    for (std::size_t row = 0; row < rows.size(); ++row) pick_channel(rows[row], kept_row(row));
+    std::vector<std::byte> picture(header_.row_bytes * header_.height);
+    if (!decoder_.read_picture(picture, header_) || !decoder_.finish()) fail("interlaced PNG");
+    for (std::size_t row = 0; row < header_.height; ++row) {
+      pick_channel(picture.data() + row * header_.row_bytes, kept_row(row));
+    }
     next_row_ = header_.height;
   }
 
-  void pick_channel(const png_byte* pixels, std::byte* out) const {
+  void pick_channel(const std::byte* pixels, std::byte* out) const {
     if (packing_) {
       const std::span all(pixels, header_.width * channels_);
-      return unpack_elevations(*packing_, channels_, std::as_bytes(all), {out, header_.width * sample_bytes_});
+      return unpack_elevations(*packing_, channels_, all, {out, header_.width * sample_bytes_});
     }
     const std::size_t pixel_bytes = channels_ * sample_bytes_;
     if (channels_ == 1) {
@@ -384,7 +256,7 @@ class PngSource final : public HeightSource {
   std::size_t next_row_ = 0;   ///< the row that the decoder delivers next
   std::size_t kept_rows_ = 0;  ///< rows next_row_ - kept_rows_ ... next_row_ - 1 are in kept_, at row % kept_rows_
   std::vector<std::byte> kept_;
-  std::vector<png_byte> row_;
+  std::vector<std::byte> row_;
 };
 
 }  // namespace
@@ -395,10 +267,6 @@ bool looks_like_png(std::span<const std::byte> head) {
 
 std::unique_ptr<HeightSource> open_png(const std::string& path, const OpenOptions& options) {
   return std::make_unique<PngSource>(path, options);
-}
-
-std::string png_library() {
-  return std::string("libpng ") + png_get_libpng_ver(nullptr);
 }
 
 }  // namespace isohf

@@ -1,15 +1,14 @@
 #include "formats/tiff_blocks.h"
 
-#include <fmt/core.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <cstring>
-#include <limits>
 #include <string>
 #include <vector>
 
+#include "formats/tiff_block_table.h"
 #include "isohf/base/assert.h"
 #include "isohf/base/error.h"
 
@@ -17,8 +16,6 @@ namespace isohf {
 namespace {
 
 constexpr std::uint64_t kMiB = 1U << 20U;
-/// A block or row that would decode to more is refused: no elevation raster has such, damaged headers do.
-constexpr std::uint64_t kLargestBlock = 1024 * kMiB;
 /// Strips that decode to more are decoded row by row.
 constexpr std::uint64_t kLargestBufferedStrip = 16 * kMiB;
 /// Compressed strips beyond this are mapped instead of read.
@@ -27,26 +24,6 @@ constexpr std::uint64_t kSmallestCache = 16 * kMiB;
 constexpr std::uint64_t kLargestCache = 1024 * kMiB;
 /// Bytes per pread when pixels are picked apart or rows are not contiguous.
 constexpr std::uint64_t kChunk = 1 * kMiB;
-/// Tables longer than this are checked at their ends only.
-constexpr std::uint64_t kMostCheckedBlocks = 1U << 22U;
-
-/// How many bytes one stored byte can become at most, with room to spare; 0 where no bound is known.
-/// PackBits: 2 bytes for 128. DEFLATE: 258 bytes for 2 bits. LZW: at most 3838 bytes for one code of 12 bits.
-std::uint64_t largest_expansion(std::uint16_t compression) {
-  switch (compression) {
-    case 1:
-      return 1;
-    case 32773:
-      return 64;
-    case 8:
-    case 32946:
-      return 1100;
-    case 5:
-      return 2600;
-    default:
-      return 0;
-  }
-}
 
 template <typename Word>
 void pick(const std::byte* pixels, std::byte* out, std::int64_t count, std::int64_t stride, std::int64_t first) {
@@ -81,69 +58,12 @@ TiffBlocks::TiffBlocks(const RawFile& file, const TiffLayout& layout, TiffMainIm
       plane_(layout.separate ? channel : 0),
       sample_bytes_(static_cast<std::size_t>(layout.sample_bytes())),
       handles_(file, directory_) {
-  const std::uint64_t pixel_bytes = to_unsigned(layout_.interleaved() * layout_.sample_bytes());
-  // Sizes below stay under 2^63: each factor is a 32-bit number, and the products are checked one by one.
-  const std::uint64_t row_bytes = to_unsigned(layout_.block_width) * pixel_bytes;
-  const auto too_large = [&](const std::string& what, std::uint64_t bytes) {
-    throw Error(ErrorCode::kCorrupt, fmt::format("{}: {} would decode to {} bytes, at most {} are read", file_.path(),
-                                                 what, bytes, kLargestBlock));
-  };
-  if (row_bytes > kLargestBlock) too_large(layout_.tiled ? "a row of a tile" : "a row", row_bytes);
-  const std::uint64_t block_bytes = row_bytes * to_unsigned(layout_.block_height);
-  if (layout_.tiled && block_bytes > kLargestBlock) too_large("a tile", block_bytes);
-  const auto planes = to_unsigned(layout_.separate ? layout_.samples_per_pixel : 1);
-  const std::uint64_t per_plane = to_unsigned(layout_.blocks_across) * to_unsigned(layout_.blocks_down);
-  if (per_plane > std::numeric_limits<std::uint32_t>::max() / planes) {
-    throw Error(ErrorCode::kCorrupt, fmt::format("{}: {} x {} blocks, more than a TIFF file can hold", file_.path(),
-                                                 layout_.blocks_across, layout_.blocks_down));
-  }
-  if (layout_.table_entries < per_plane * planes) {
-    throw Error(ErrorCode::kCorrupt,
-                fmt::format("{}: the table of {} has {} entries, the image needs {}", file_.path(),
-                            layout_.tiled ? "tiles" : "strips", layout_.table_entries, per_plane * planes));
-  }
-  block_count_ = per_plane;
-  check_blocks(*image.handle);
-  choose_mode(block_bytes);
+  const TiffBlockTable table = check_tiff_blocks(file_, layout_, plane_, *image.handle);
+  block_count_ = table.count;
+  missing_ = table.missing;
+  map_strips_ = table.largest_stored_bytes > kLargestReadStrip;
+  choose_mode(table.block_bytes);
   handles_.give_back(std::move(image.handle));
-}
-
-void TiffBlocks::check_blocks(TiffHandle& handle) {
-  const std::uint64_t first = layout_.block_index(plane_, 0, 0);
-  const std::uint64_t expansion = largest_expansion(layout_.compression);
-  const std::uint64_t row_bytes =
-      to_unsigned(layout_.block_width) * to_unsigned(layout_.interleaved() * layout_.sample_bytes());
-  const char* kind = layout_.tiled ? "tile" : "strip";
-  std::uint64_t largest = 0;
-  for (std::uint64_t i = 0; i < block_count_; ++i) {
-    if (block_count_ > kMostCheckedBlocks && i == kMostCheckedBlocks / 2) i = block_count_ - kMostCheckedBlocks / 2;
-    const TiffBlockSpan span = handle.block_span(first + i);
-    if (span.size_bytes == 0) {
-      ++missing_;
-      continue;
-    }
-    const auto down = static_cast<std::int64_t>(i / to_unsigned(layout_.blocks_across));
-    const std::uint64_t decoded = row_bytes * to_unsigned(layout_.stored_rows(down));
-    // Writers may round a plain strip's size up; what counts is what its rows need.
-    const std::uint64_t needed = layout_.compression == 1 ? decoded : span.size_bytes;
-    if (expansion == 1 && span.size_bytes < decoded) {
-      throw Error(ErrorCode::kCorrupt, fmt::format("{}: {} {} has {} bytes, its samples need {}", file_.path(), kind, i,
-                                                   span.size_bytes, decoded));
-    }
-    if (span.offset_bytes > file_.size_bytes() || needed > file_.size_bytes() - span.offset_bytes) {
-      throw Error(ErrorCode::kCorrupt,
-                  fmt::format("{}: truncated: {} {} of {} has {} bytes from byte {} on, the file has {} bytes in all",
-                              file_.path(), kind, i, block_count_, needed, span.offset_bytes, file_.size_bytes()));
-    }
-    if (expansion != 0 && decoded / expansion > span.size_bytes) {
-      throw Error(
-          ErrorCode::kCorrupt,
-          fmt::format("{}: {} {} has {} bytes ({}), which cannot hold its {} samples' {} bytes", file_.path(), kind, i,
-                      span.size_bytes, tiff_compression_name(layout_.compression), decoded / sample_bytes_, decoded));
-    }
-    largest = std::max(largest, span.size_bytes);
-  }
-  map_strips_ = largest > kLargestReadStrip;
 }
 
 void TiffBlocks::choose_mode(std::uint64_t largest_block_bytes) {

@@ -9,6 +9,7 @@
 #include "formats/block_cache.h"
 #include "formats/raw_file.h"
 #include "formats/tiff_file.h"
+#include "formats/tiff_handle_pool.h"
 #include "isohf/surface/height_source.h"
 
 namespace isohf {
@@ -48,7 +49,6 @@ class TiffBlocks {
   struct Unit;
 
   void choose_mode(std::uint64_t largest_block_bytes);
-  void check_blocks(TiffHandle& handle);
   void read_direct(const Window& window, std::span<std::byte> samples);
   void read_strip_rows(const Window& part, TiffBlockSpan strip, std::int64_t first_strip_row, std::byte* out,
                        std::vector<std::byte>& scratch);

@@ -7,14 +7,15 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cstdarg>
 #include <cstdio>
 #include <exception>
+#include <optional>
 #include <utility>
 
 #include "formats/libraries.h"
 #include "formats/text_tokens.h"
+#include "formats/tiff_directory.h"
 #include "isohf/base/error.h"
 
 namespace isohf {
@@ -36,39 +37,6 @@ constexpr std::uint32_t kGdalMetadataTag = 42112;
 constexpr std::uint32_t kGdalNodataTag = 42113;
 
 }  // namespace
-
-std::int64_t TiffLayout::stored_rows(std::int64_t down) const {
-  return tiled ? block_height : std::min(block_height, height - down * block_height);
-}
-
-std::string tiff_compression_name(std::uint16_t compression) {
-  constexpr std::array<std::pair<std::uint16_t, const char*>, 20> kNames = {{
-      {COMPRESSION_NONE, "none"},
-      {COMPRESSION_CCITTRLE, "CCITT RLE"},
-      {COMPRESSION_CCITTFAX3, "CCITT fax 3"},
-      {COMPRESSION_CCITTFAX4, "CCITT fax 4"},
-      {COMPRESSION_LZW, "LZW"},
-      {COMPRESSION_OJPEG, "old JPEG"},
-      {COMPRESSION_JPEG, "JPEG"},
-      {COMPRESSION_PACKBITS, "PackBits"},
-      {COMPRESSION_PIXARLOG, "PixarLog"},
-      {COMPRESSION_DEFLATE, "DEFLATE"},
-      {COMPRESSION_ADOBE_DEFLATE, "DEFLATE"},
-      {COMPRESSION_JBIG, "JBIG"},
-      {COMPRESSION_SGILOG, "SGILog"},
-      {COMPRESSION_JP2000, "JPEG 2000"},
-      {COMPRESSION_LERC, "LERC"},
-      {COMPRESSION_LZMA, "LZMA"},
-      {COMPRESSION_ZSTD, "ZSTD"},
-      {COMPRESSION_WEBP, "WebP"},
-      {COMPRESSION_JXL, "JPEG XL"},
-      {COMPRESSION_THUNDERSCAN, "ThunderScan"},
-  }};
-  for (const auto& [code, name] : kNames) {
-    if (code == compression) return name;
-  }
-  return std::to_string(compression);
-}
 
 /// The libtiff handle with its input, its messages and the callbacks that connect them.
 struct TiffHandle::Impl {
@@ -257,24 +225,9 @@ struct TiffHandle::Impl {
     return value;
   }
 
-  /// The count of tag `wanted` in the directory as it stands in the file; nullopt where it is absent. libtiff pads
-  /// short tables with zeros, which would pass for blocks that a sparse file leaves out.
   [[nodiscard]] std::optional<std::uint64_t> stored_count(std::uint16_t wanted) const {
-    const bool big_tiff = TIFFIsBigTIFF(tif) != 0;
-    const bool swapped = TIFFIsByteSwapped(tif) != 0;
-    const auto number = [&](std::uint64_t offset, std::size_t bytes) {
-      std::array<std::byte, 8> stored = {};
-      file.read(offset, std::span(stored).first(bytes));
-      if (swapped) std::reverse(stored.begin(), stored.begin() + static_cast<std::ptrdiff_t>(bytes));
-      return std::bit_cast<std::uint64_t>(stored);  // little-endian, which base/bytes.h asserts
-    };
-    const std::uint64_t directory = TIFFCurrentDirOffset(tif);
-    const std::uint64_t entries = number(directory, big_tiff ? 8 : 2);
-    for (std::uint64_t i = 0; i < entries; ++i) {
-      const std::uint64_t entry = directory + (big_tiff ? 8 + 20 * i : 2 + 12 * i);
-      if (number(entry, 2) == wanted) return number(entry + 4, big_tiff ? 8 : 4);
-    }
-    return std::nullopt;
+    return tiff_stored_count(file, {TIFFCurrentDirOffset(tif), TIFFIsBigTIFF(tif) != 0, TIFFIsByteSwapped(tif) != 0},
+                             wanted);
   }
 
   const RawFile& file;
@@ -426,23 +379,6 @@ TiffMainImage open_main_image(const RawFile& file) {
   // A walk leaves the handle elsewhere, with what libtiff said of other images.
   if (walked) walk = TiffHandle::Impl::on_directory(file, found.main, false);
   return {found, std::unique_ptr<TiffHandle>(new TiffHandle(std::move(walk)))};
-}
-
-std::unique_ptr<TiffHandle> TiffHandlePool::take() {
-  {
-    const std::lock_guard lock(mutex_);
-    if (!idle_.empty()) {
-      std::unique_ptr<TiffHandle> handle = std::move(idle_.back());
-      idle_.pop_back();
-      return handle;
-    }
-  }
-  return std::make_unique<TiffHandle>(*file_, directory_, false);
-}
-
-void TiffHandlePool::give_back(std::unique_ptr<TiffHandle> handle) {
-  const std::lock_guard lock(mutex_);
-  idle_.push_back(std::move(handle));
 }
 
 std::string tiff_library() {

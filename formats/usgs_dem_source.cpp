@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -12,9 +11,10 @@
 #include <string_view>
 #include <vector>
 
+#include "formats/fortran_fields.h"
 #include "formats/open_options.h"
 #include "formats/raw_file.h"
-#include "formats/text_tokens.h"
+#include "formats/usgs_dem_header.h"
 #include "isohf/base/assert.h"
 #include "isohf/base/error.h"
 
@@ -26,9 +26,9 @@ constexpr std::size_t kProfileHeadBytes = 144;
 constexpr std::int64_t kPostsInFirst = 146;  // record of a profile, behind its head
 constexpr std::int64_t kPostsInNext = 170;
 constexpr std::size_t kPostBytes = 6;
-constexpr std::int64_t kMostPosts = 999999;  // a field of six digits
+constexpr std::int64_t kMostPosts = UsgsDemHeader::kMostPosts;
 constexpr std::int64_t kRowsAtOnce = 256;
-constexpr std::int64_t kVoid = -32767;
+constexpr std::int64_t kVoid = UsgsDemHeader::kVoid;
 /// Of a spacing; the coordinates have fifteen digits.
 constexpr double kOffGrid = 0.01;
 
@@ -40,27 +40,6 @@ std::int64_t record_of(std::int64_t post) {
 std::size_t byte_of(std::int64_t post) {
   if (post < kPostsInFirst) return kProfileHeadBytes + static_cast<std::size_t>(post) * kPostBytes;
   return static_cast<std::size_t>((post - kPostsInFirst) % kPostsInNext) * kPostBytes;
-}
-
-std::string_view trimmed(std::string_view text) {
-  text.remove_prefix(std::min(text.find_first_not_of(' '), text.size()));
-  return text.substr(0, text.find_last_not_of(' ') + 1);
-}
-
-/// A Fortran number, whose exponent is a D as often as an E; nullopt where the field holds none.
-std::optional<double> fortran_number(std::string_view field) {
-  std::string text(trimmed(field));
-  for (char& c : text) c = c == 'D' || c == 'd' ? 'E' : c;
-  double value = 0.0;
-  if (text.empty() || !read_decimal(text, value) || !std::isfinite(value)) return std::nullopt;
-  return value;
-}
-
-std::optional<std::int64_t> whole_number(std::string_view field) {
-  const std::string_view text = trimmed(field);
-  std::int64_t value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  return error == std::errc{} && end == text.data() + text.size() ? std::optional(value) : std::nullopt;
 }
 
 /// An elevation in six characters; false where they are none. The hot path.
@@ -97,13 +76,11 @@ class UsgsDemSource final : public HeightSource {
     (void)choose_band(info_, options, 1);
     find_record_ends();
     std::uint64_t at = 0;
-    header_ = record(at);
-    if (header_.size() < 864) corrupt("the type A record", fmt::format("has {} bytes, must have 864", header_.size()));
-    header_.resize(kRecordBytes, ' ');
-    read_grid();
+    UsgsDemHeader header(path, record(at));
+    header.read_grid(info_);
     read_profiles(at);
-    place_profiles();
-    read_system();
+    place_profiles(header);
+    header.read_system(info_);
     info_.block_width = info_.width;
     info_.block_height = std::min(info_.height, kRowsAtOnce);
     apply_open_options(info_, options);
@@ -129,20 +106,6 @@ class UsgsDemSource final : public HeightSource {
  private:
   [[noreturn]] void corrupt(const std::string& where, const std::string& what) const {
     throw Error(ErrorCode::kCorrupt, fmt::format("{}: {}: {}", info_.path, where, what));
-  }
-
-  [[nodiscard]] std::string_view field(std::size_t first, std::size_t size) const {
-    return std::string_view(header_).substr(first - 1, size);  // the standard counts from 1
-  }
-  [[nodiscard]] std::int64_t whole(std::size_t first, std::size_t size, const char* name, std::int64_t lowest,
-                                   std::int64_t highest) const {
-    const std::optional<std::int64_t> value = whole_number(field(first, size));
-    if (!value || *value < lowest || *value > highest) {
-      corrupt("the type A record",
-              fmt::format("the {} at byte {} is \"{}\", must be a whole number from {} to {}", name, first - 1,
-                          printable(trimmed(field(first, size))), lowest, highest));
-    }
-    return *value;
   }
 
   /// Records are 1024 bytes, or lines of at most so many.
@@ -171,44 +134,6 @@ class UsgsDemSource final : public HeightSource {
     text.resize(std::min(end, text.size()));
     if (!text.empty() && text.back() == '\r') text.pop_back();
     return text;
-  }
-
-  void read_grid() {
-    if (whole(151, 6, "elevation pattern", 1, 4) != 1) {
-      throw Error(ErrorCode::kUnsupported, info_.path + ": the elevation pattern is not regular (1), which is read");
-    }
-    unit_ = whole(529, 6, "unit of the ground coordinates", 0, 3);
-    if (unit_ == 0)
-      throw Error(ErrorCode::kUnsupported,
-                  info_.path + ": the ground coordinates are radians; feet, metres and seconds are read");
-    if (const auto angle = fortran_number(field(787, 24)); angle && *angle != 0.0) {
-      throw Error(
-          ErrorCode::kUnsupported,
-          fmt::format("{}: the grid is turned by {} radians; only grids along the axes are read", info_.path, *angle));
-    }
-    const std::array<const char*, 3> names = {"x", "y", "vertical"};
-    std::array<double, 3> resolution = {};
-    for (std::size_t i = 0; i < 3; ++i) {
-      const auto value = fortran_number(field(817 + 12 * i, 12));
-      if (!value || !(*value > 0.0)) {
-        corrupt("the type A record",
-                fmt::format("the {} resolution at byte {} is not a positive number", names[i], 816 + 12 * i));
-      }
-      resolution[i] = *value;
-    }
-    dx_ = resolution[0];
-    dy_ = resolution[1];
-    info_.z_scale = resolution[2];
-    info_.width = whole(859, 6, "number of profiles", 1, kMostPosts);
-    const std::int64_t unit = whole(535, 6, "unit of the elevations", 1, 2);
-    info_.vertical_unit = unit == 1 ? "foot" : "metre";
-    info_.metres_per_vertical_unit = unit == 1 ? 0.3048 : 1.0;
-    // A range that the header does not say is taken for one that fits.
-    const double low = fortran_number(field(739, 24)).value_or(0.0) / info_.z_scale;
-    const double high = fortran_number(field(763, 24)).value_or(0.0) / info_.z_scale;
-    const bool small = low >= -32767.0 && high <= 32767.0;
-    info_.sample_type = small ? SampleType::kInt16 : SampleType::kInt32;
-    info_.void_values = {static_cast<double>(kVoid)};
   }
 
   void read_profiles(std::uint64_t at) {
@@ -266,77 +191,38 @@ class UsgsDemSource final : public HeightSource {
     }
   }
 
-  void place_profiles() {
+  void place_profiles(const UsgsDemHeader& header) {
+    const double dx = header.spacing_x();
+    const double dy = header.spacing_y();
     double south = profiles_.front().y;
     for (const Profile& profile : profiles_) south = std::min(south, profile.y);
     double rows = 0.0;
     for (std::size_t i = 0; i < profiles_.size(); ++i) {
       Profile& profile = profiles_[i];
-      const double x = (profile.x - profiles_.front().x) / dx_;
-      const double y = (profile.y - south) / dy_;
+      const double x = (profile.x - profiles_.front().x) / dx;
+      const double y = (profile.y - south) / dy;
       if (!(std::abs(x - static_cast<double>(i)) < kOffGrid) || !(std::abs(y - std::nearbyint(y)) < kOffGrid) ||
           !(y < static_cast<double>(kMostPosts))) {
         throw Error(
             ErrorCode::kUnsupported,
             fmt::format("{}: profile {} begins at ({}, {}), which is no post of the grid of {} x {} from ({}, {})",
-                        info_.path, i + 1, profile.x, profile.y, dx_, dy_, profiles_.front().x, south));
+                        info_.path, i + 1, profile.x, profile.y, dx, dy, profiles_.front().x, south));
       }
       profile.first = static_cast<std::int64_t>(std::nearbyint(y));
       rows = std::max(rows, static_cast<double>(profile.first + profile.posts));
     }
     info_.height = static_cast<std::int64_t>(rows);
     Georeference& place = info_.georeference;
-    const double unit = unit_ == 3 ? 3600.0 : 1.0;  // seconds become degrees
+    const bool degrees = header.unit() == UsgsDemHeader::Unit::kSecond;
+    const double unit = degrees ? 3600.0 : 1.0;
     place.registration = Registration::kPoint;
-    place.unit = unit_ == 3 ? HorizontalUnit::kDegree : HorizontalUnit::kMetre;
-    if (unit_ == 1) place.metres_per_unit = 0.3048;
-    place.spacing_x = dx_ / unit;
-    place.spacing_y = dy_ / unit;
+    place.unit = degrees ? HorizontalUnit::kDegree : HorizontalUnit::kMetre;
+    if (header.unit() == UsgsDemHeader::Unit::kFoot) place.metres_per_unit = 0.3048;
+    place.spacing_x = dx / unit;
+    place.spacing_y = dy / unit;
     place.has_origin = true;
     place.origin_x = profiles_.front().x / unit;
-    place.origin_y = (south + (rows - 1.0) * dy_) / unit;
-  }
-
-  void read_system() {
-    struct Datum {
-      const char* name;
-      int geographic;
-      int utm_north;
-      int utm_south;
-      double semi_major_axis_m;
-      double inverse_flattening;
-    };
-    constexpr std::array<Datum, 4> kDatums = {{{"NAD27", 4267, 26700, 0, 6378206.4, 294.9786982},
-                                               {"WGS 72", 4322, 32200, 32300, 6378135.0, 298.26},
-                                               {"WGS 84", 4326, 32600, 32700, 6378137.0, 298.257223563},
-                                               {"NAD83", 4269, 26900, 0, 6378137.0, 298.257222101}}};
-    ReferenceSystem& system = info_.georeference.system;
-    system.body = "Earth";
-    const std::int64_t kind = whole(157, 6, "ground reference system", -9999, 99);
-    const auto datum = whole_number(field(891, 2));
-    const Datum* known = datum && *datum >= 1 && *datum <= 4 ? &kDatums[static_cast<std::size_t>(*datum - 1)] : nullptr;
-    if (known != nullptr) {
-      system.semi_major_axis_m = known->semi_major_axis_m;
-      system.inverse_flattening = known->inverse_flattening;
-    } else {
-      info_.warnings.emplace_back("the header names no horizontal datum that isohf knows (old files mean NAD27)");
-    }
-    const std::string name = known != nullptr ? known->name : "unknown datum";
-    system.name = name;
-    if (kind == 0) {
-      if (known != nullptr) system.epsg = known->geographic;
-    } else if (kind == 1) {
-      const std::int64_t zone = whole(163, 6, "UTM zone", -60, 60);
-      system.name = fmt::format("{} / UTM zone {}{}", name, std::abs(zone), zone < 0 ? 'S' : 'N');
-      const int base = known == nullptr ? 0 : zone < 0 ? known->utm_south : known->utm_north;
-      if (base != 0 && zone != 0) system.epsg = base + static_cast<int>(std::abs(zone));
-    } else {
-      system.name = fmt::format("{} / {} zone {}", name, kind == 2 ? "State Plane" : "unknown projection",
-                                trimmed(field(163, 6)));
-    }
-    const std::int64_t vertical = whole_number(field(889, 2)).value_or(0);
-    system.vertical_datum = vertical == 1 ? "mean sea level" : vertical == 2 ? "NGVD29" : vertical == 3 ? "NAVD88" : "";
-    if (vertical == 3 && info_.vertical_unit == "metre") system.vertical_epsg = 5703;
+    place.origin_y = (south + (rows - 1.0) * dy) / unit;
   }
 
   template <typename Sample>
@@ -401,10 +287,6 @@ class UsgsDemSource final : public HeightSource {
 
   RawFile file_;
   bool lines_ = false;
-  std::string header_;
-  std::int64_t unit_ = 2;
-  double dx_ = 1.0;
-  double dy_ = 1.0;
   std::vector<Profile> profiles_;
   std::string text_;  // of the records below
   std::vector<std::string_view> records_;
