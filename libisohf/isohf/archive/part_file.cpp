@@ -20,11 +20,16 @@ File open_locked(const std::string& path) {
               fmt::format("{}: another process is writing it; wait for it, or name another target", path));
 }
 
+std::vector<std::byte> room_for(std::size_t bytes) {
+  std::vector<std::byte> buffer;
+  buffer.reserve(bytes);
+  return buffer;
+}
+
 }  // namespace
 
-PartFile::PartFile(const std::string& path) : file_(open_locked(path)) {
-  buffer_.reserve(kBufferBytes);
-}
+// The buffer before the file: where there is no memory for it, no file must be left.
+PartFile::PartFile(const std::string& path) : buffer_(room_for(kBufferBytes)), file_(open_locked(path)) {}
 
 void PartFile::append(std::span<const std::byte> bytes) {
   if (buffer_.size() + bytes.size() > kBufferBytes) flush();

@@ -33,8 +33,8 @@ class PartFile {
   void close() { file_.close(); }
 
  private:
-  File file_;
   std::vector<std::byte> buffer_;
+  File file_;
   std::uint64_t flushed_ = 0;
 };
 

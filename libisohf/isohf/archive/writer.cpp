@@ -68,16 +68,16 @@ struct ArchiveWriter::State {
   std::string path;
   TileGrid grid;
   WriterOptions options;
-  PartFile part;
-  std::optional<Journal> journal;
   WrittenContents contents;
+  PartFile part;  ///< behind all that may not fit in memory: no destructor would remove the file
+  std::optional<Journal> journal;
   std::uint64_t journalled = 0;  ///< bytes of the part file that the journal's file vouches for
   std::uint64_t synced = 0;
   bool finished = false;
   bool keep = false;
 
   State(const std::string& target, const TileGrid& tile_grid, const WriterOptions& writer_options)
-      : path(target), grid(tile_grid), options(writer_options), part(part_path(target)), contents(tile_grid) {}
+      : path(target), grid(tile_grid), options(writer_options), contents(tile_grid), part(part_path(target)) {}
 
   [[nodiscard]] ZipMember metadata_member() const {
     return {kMetadataName, ZipMethod::kStored, 0, options.metadata_bytes, options.metadata_bytes, 0};
