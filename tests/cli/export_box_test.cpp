@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "formats/registry.h"
 #include "support/degree_grid.h"
+#include "support/raster.h"
 #include "support/run_program.h"
 #include "support/temporary_folder.h"
 
@@ -25,11 +25,6 @@ using testing::HasSubstr;
 double land(double longitude, double latitude) {
   return 500.0 + 300.0 * std::sin(longitude * M_PI / 180.0 * 40.0) + 20.0 * latitude;
 }
-
-struct Raster {
-  SourceInfo info;
-  std::vector<float> elevations;
-};
 
 class ExportBox : public testing::Test {
  protected:
@@ -45,13 +40,7 @@ class ExportBox : public testing::Test {
         run_isohf({"export", folder / "a.isohf", folder / "a.tif", "--overwrite", "--bbox", box, "-q"});
     EXPECT_EQ(result.exit_code, 0) << result.err;
     EXPECT_EQ(result.err, "");
-    if (result.exit_code != 0) return {};
-    const auto source = open_source(folder / "a.tif", {});
-    Raster raster{source->info(), {}};
-    raster.elevations.resize(static_cast<std::size_t>(raster.info.width * raster.info.height));
-    source->read_window({0, 0, raster.info.width, raster.info.height},
-                        std::as_writable_bytes(std::span(raster.elevations)));
-    return raster;
+    return result.exit_code == 0 ? read_raster(folder / "a.tif") : Raster{};
   }
 
   [[nodiscard]] std::string refused(const std::string& box) const {

@@ -9,7 +9,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "formats/registry.h"
+#include "support/raster.h"
 #include "support/run_program.h"
 #include "support/temporary_folder.h"
 
@@ -21,26 +21,6 @@ using testing::HasSubstr;
 
 const std::string kVoids = ISOHF_SOURCE_DIR "/testdata/voids_200x150_int16.tif";
 const std::string kCoast = ISOHF_SOURCE_DIR "/testdata/coast_512x384_int16.tif";
-
-struct Raster {
-  SourceInfo info;
-  std::vector<double> elevations;  ///< NaN where void
-  [[nodiscard]] double at(std::int64_t column, std::int64_t row) const {
-    return elevations[static_cast<std::size_t>(row * info.width + column)];
-  }
-};
-
-Raster read_raster(const std::string& path, const OpenOptions& options = {}) {
-  const auto source = open_source(path, options);
-  Raster raster{source->info(), {}};
-  const auto count = static_cast<std::size_t>(raster.info.width * raster.info.height);
-  std::vector<std::byte> raw(count * size_bytes(raster.info.sample_type));
-  source->read_window({0, 0, raster.info.width, raster.info.height}, raw);
-  std::vector<float> heights(count);
-  heights_from_samples(raster.info, 0.0, raw, heights);
-  raster.elevations.assign(heights.begin(), heights.end());
-  return raster;
-}
 
 /// The numbers as stored, whatever the file beside them says that they mean.
 Raster read_codes(const std::string& path) {

@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "support/gdal_answers.h"
+#include "support/real_files.h"
 #include "support/run_program.h"
 #include "support/temporary_folder.h"
 
@@ -20,22 +21,17 @@ using nlohmann::json;
 
 /// Links to all files of the shared data in one folder: gdalinfo -stats leaves files beside EHdr grids whatever it is
 /// told. Returns those that are rasters.
-std::vector<std::filesystem::path> link_shared_files(const TemporaryFolder& folder) {
-  const std::filesystem::path root = std::filesystem::path(ISOHF_SOURCE_DIR) / ".." / "shared" / "data";
-  std::vector<std::filesystem::path> files;
-  for (const auto& from : {root, root / "derived"}) {
-    std::error_code error;
-    for (const auto& entry : std::filesystem::directory_iterator(from, error)) {
-      if (!entry.is_regular_file()) continue;
-      const std::filesystem::path link = folder / entry.path().filename().string();
-      std::filesystem::create_symlink(std::filesystem::canonical(entry.path()), link);
-      // Not sidecars, text, and samples without a header, which GDAL cannot open either.
-      const std::string ending = entry.path().extension();
-      if (ending != ".md" && ending != ".hdr" && ending != ".prj" && ending != ".r16") files.push_back(link);
-    }
+std::vector<std::filesystem::path> link_real_files(const TemporaryFolder& folder) {
+  std::vector<std::filesystem::path> links;
+  for (const auto& file : real_files()) {
+    const std::filesystem::path link = folder / file.filename();
+    std::filesystem::create_symlink(std::filesystem::canonical(file), link);
+    // Not sidecars, text, and samples without a header, which GDAL cannot open either.
+    const std::string ending = file.extension();
+    if (ending != ".md" && ending != ".hdr" && ending != ".prj" && ending != ".r16") links.push_back(link);
   }
-  std::sort(files.begin(), files.end());
-  return files;
+  std::sort(links.begin(), links.end());
+  return links;
 }
 
 /// Where the two differ on purpose.
@@ -90,8 +86,8 @@ void expect_same_statistics(const json& ours, const json& band, int void_rows_of
 
 TEST(GdalCrossCheck, SaysTheSameOfEveryFileThatBothRead) {
   const TemporaryFolder folder;
-  const std::vector<std::filesystem::path> files = link_shared_files(folder);
-  if (files.empty()) GTEST_SKIP() << "the shared data folder is not here";
+  const std::vector<std::filesystem::path> files = link_real_files(folder);
+  if (files.empty()) GTEST_SKIP() << kNoRealFiles;
   if (!has_gdal()) GTEST_SKIP() << "gdalinfo and gdallocationinfo are not installed (Debian: gdal-bin)";
   int compared = 0;
   for (const std::filesystem::path& path : files) {

@@ -16,6 +16,8 @@
 #include "formats/registry.h"
 #include "isohf/archive/reader.h"
 #include "isohf/projection/projection.h"
+#include "support/degree_grid.h"
+#include "support/raster.h"
 #include "support/run_program.h"
 #include "support/sanitizers.h"
 #include "support/small_geoid.h"
@@ -53,21 +55,9 @@ struct Ground {
   }
   /// A part of it as GridFloat.
   void write(const std::string& stem, const Window& part) const {
-    std::ofstream samples(stem + ".flt", std::ios::binary);
-    for (std::int64_t r = part.row; r < part.row + part.rows; ++r) {
-      for (std::int64_t c = part.column; c < part.column + part.columns; ++c) {
-        const float value = sample(c, r);
-        samples.write(reinterpret_cast<const char*>(&value), sizeof value);
-      }
-    }
-    std::ofstream header(stem + ".hdr");
-    header.precision(17);
-    header << "ncols " << part.columns << "\nnrows " << part.rows << "\nxllcorner "
-           << west + static_cast<double>(part.column) * cell << "\nyllcorner "
-           << south + static_cast<double>(rows - part.row - part.rows) * cell << "\ncellsize " << cell
-           << "\nNODATA_value -9999\nbyteorder LSBFIRST\n";
-    std::ofstream(stem + ".prj") << "GEOGCS[\"WGS 84\",DATUM[\"WGS_1984\",SPHEROID[\"WGS 84\",6378137,298.257223563]],"
-                                    "PRIMEM[\"Greenwich\",0],UNIT[\"degree\",0.0174532925199433]]";
+    write_gridfloat(stem, part.columns, part.rows, west + static_cast<double>(part.column) * cell,
+                    south + static_cast<double>(rows - part.row - part.rows) * cell, cell,
+                    [&](std::int64_t c, std::int64_t r) { return sample(part.column + c, part.row + r); });
   }
   /// The whole, and a folder of pieces that do not fit tiles.
   void write_whole_and_pieces(const TemporaryFolder& folder) const {
@@ -181,8 +171,8 @@ class GeographicCombinations : public testing::Test {
   void raster_holds(const Combination& at, const std::string& path,
                     const std::function<bool(double longitude, double latitude)>& inside) {
     const Metadata metadata = ArchiveReader(folder / "a.isohf").metadata();
-    const auto source = open_source(path, {});
-    const SourceInfo& info = source->info();
+    const Raster raster = read_raster(path);
+    const SourceInfo& info = raster.info;
     const Georeference& place = info.georeference;
     ASSERT_TRUE(place.has_origin);
     const bool on_map = place.unit == HorizontalUnit::kMetre;
@@ -190,10 +180,6 @@ class GeographicCombinations : public testing::Test {
     EXPECT_EQ(on_map, warped);
     std::optional<Projection> map;
     if (on_map) map.emplace(metadata.projection->spec);
-    std::vector<std::byte> raw(static_cast<std::size_t>(info.width * info.height) * size_bytes(info.sample_type));
-    source->read_window({0, 0, info.width, info.height}, raw);
-    std::vector<float> heights(static_cast<std::size_t>(info.width * info.height));
-    heights_from_samples(info, 0.0, raw, heights);
     std::int64_t compared = 0;
     double worst = 0.0;
     for (std::int64_t r = 0; r < info.height; ++r) {
@@ -202,7 +188,7 @@ class GeographicCombinations : public testing::Test {
         const double y = place.origin_y - static_cast<double>(r) * place.spacing_y;
         const GeoPoint there = map ? map->inverse({x, y}) : GeoPoint{x, y};
         if (!inside(there.longitude, there.latitude)) continue;
-        const float height = heights[static_cast<std::size_t>(r * info.width + c)];
+        const float height = raster.at(c, r);
         ++compared;
         const double error = std::abs(height - expected(at, there.longitude, there.latitude));
         if (!(error <= worst)) worst = error;  // a NaN stays

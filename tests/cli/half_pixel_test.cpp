@@ -10,7 +10,8 @@
 #include <sstream>
 
 #include "formats/raster_sink.h"
-#include "formats/registry.h"
+#include "support/place_at.h"
+#include "support/raster.h"
 #include "support/run_program.h"
 #include "support/temporary_folder.h"
 
@@ -54,15 +55,9 @@ void write_ramp(const std::string& path, const Ramp& ramp, Registration registra
   spec.sample_type = type;
   spec.vertical_unit = "metre";
   spec.overwrite = true;
-  Georeference& place = spec.georeference.emplace();
-  place.registration = registration;
-  place.unit = ramp.unit;
-  place.spacing_x = ramp.spacing_x;
-  place.spacing_y = ramp.spacing_y;
-  place.has_origin = true;
-  place.origin_x = ramp.west;
-  place.origin_y = ramp.north;
-  place.system.epsg = ramp.unit == HorizontalUnit::kDegree ? 4326 : 32632;
+  spec.georeference = place_at(registration, ramp.unit, ramp.west, ramp.north, ramp.spacing_x,
+                               ramp.unit == HorizontalUnit::kDegree ? 4326 : 32632);
+  spec.georeference->spacing_y = ramp.spacing_y;
   std::vector<std::int16_t> whole;
   std::vector<float> floats;
   for (std::int64_t row = 0; row < ramp.height; ++row) {
@@ -71,25 +66,8 @@ void write_ramp(const std::string& path, const Ramp& ramp, Registration registra
       floats.push_back(whole.back());
     }
   }
-  const auto sink = create_raster(path, spec);
-  sink->write_rows(type == SampleType::kInt16 ? std::as_bytes(std::span(whole)) : std::as_bytes(std::span(floats)));
-  sink->finish();
-}
-
-struct Raster {
-  SourceInfo info;
-  std::vector<float> elevations;
-};
-
-Raster read_raster(const std::string& path, const OpenOptions& options = {}) {
-  const auto source = open_source(path, options);
-  Raster raster{source->info(), {}};
-  const auto count = static_cast<std::size_t>(raster.info.width * raster.info.height);
-  std::vector<std::byte> raw(count * size_bytes(raster.info.sample_type));
-  source->read_window({0, 0, raster.info.width, raster.info.height}, raw);
-  raster.elevations.resize(count);
-  heights_from_samples(raster.info, 0.0, raw, raster.elevations);
-  return raster;
+  write_raster(path, spec,
+               type == SampleType::kInt16 ? std::as_bytes(std::span(whole)) : std::as_bytes(std::span(floats)));
 }
 
 struct Written {

@@ -11,6 +11,8 @@
 #include "formats/raw_source.h"
 #include "formats/registry.h"
 #include "isohf/base/error.h"
+#include "support/raster.h"
+#include "support/real_files.h"
 #include "support/run_program.h"
 #include "support/sanitizers.h"
 #include "support/temporary_folder.h"
@@ -27,20 +29,6 @@ std::string lower_extension(const fs::path& path) {
   return extension;
 }
 
-/// Every file of the data and derived folders; absent from a bare checkout.
-std::vector<fs::path> shared_files() {
-  std::vector<fs::path> found;
-  const fs::path root = ISOHF_SOURCE_DIR "/../shared/data";
-  for (const fs::path& folder : {root, root / "derived"}) {
-    std::error_code error;
-    for (const auto& entry : fs::directory_iterator(folder, error)) {
-      if (entry.is_regular_file()) found.push_back(entry.path());
-    }
-  }
-  std::sort(found.begin(), found.end());
-  return found;
-}
-
 /// Files are shared out to several tests by the first letter of their names, so that they can run side by side.
 struct Share {
   const char* name;
@@ -53,12 +41,6 @@ bool is_in(const Share& share, const fs::path& file) {
   return letter >= share.first && letter <= share.last;
 }
 
-struct Samples {
-  SourceInfo info;
-  std::vector<std::byte> raw;
-  std::vector<float> elevations;  ///< NaN where void
-};
-
 /// What --raw has to say of a .r16 file: the ones in the folder are squares. Empty for all others.
 std::string raw_layout(const fs::path& file) {
   if (lower_extension(file) != ".r16") return {};
@@ -66,25 +48,13 @@ std::string raw_layout(const fs::path& file) {
   return std::to_string(side) + "x" + std::to_string(side) + ":u16le";
 }
 
-std::unique_ptr<HeightSource> open_file(const fs::path& file) {
+OpenOptions options_for(const fs::path& file) {
   OpenOptions options;
   if (const std::string layout = raw_layout(file); !layout.empty()) options.raw = raw_layout_from_string(layout);
-  return open_source(file, options);
+  return options;
 }
 
-/// As the program reads it: the archive's channel where there are several.
-Samples read_samples(const std::string& path) {
-  const std::unique_ptr<HeightSource> source = open_file(path);
-  Samples samples{source->info(), {}, {}};
-  const auto count = static_cast<std::size_t>(samples.info.width * samples.info.height);
-  samples.raw.resize(count * size_bytes(samples.info.sample_type));
-  source->read_window({0, 0, samples.info.width, samples.info.height}, samples.raw);
-  samples.elevations.resize(count);
-  heights_from_samples(samples.info, 0.0, samples.raw, samples.elevations);
-  return samples;
-}
-
-void expect_same(const Samples& found, const Samples& expected) {
+void expect_same(const Raster& found, const Raster& expected) {
   ASSERT_EQ(found.info.width, expected.info.width);
   ASSERT_EQ(found.info.height, expected.info.height);
   ASSERT_EQ(to_string(found.info.sample_type), to_string(expected.info.sample_type));
@@ -97,7 +67,8 @@ void expect_same(const Samples& found, const Samples& expected) {
 /// The format of the source, so far as isohf writes it; no PNG of elevations that were packed into its colours.
 std::string restored_name(const fs::path& file) {
   const std::string extension = lower_extension(file);
-  if (extension == ".png" && size_bytes(open_file(file)->info().sample_type) > 2) return "back.tif";
+  if (extension == ".png" && size_bytes(open_source(file, options_for(file))->info().sample_type) > 2)
+    return "back.tif";
   for (const char* own : {".tif", ".exr", ".png", ".hgt"}) {
     if (extension == own) return std::string("back") + own;
   }
@@ -117,14 +88,14 @@ void expect_restored(const fs::path& file, const TemporaryFolder& folder) {
   if (lower_extension(file) == ".hgt") {
     EXPECT_TRUE(read_file(back) == read_file(file)) << "the whole file is not the same";
   }
-  expect_same(read_samples(back), read_samples(file));
+  expect_same(read_raster(back), read_raster(file, options_for(file)));
 }
 
 class LosslessRealData : public testing::TestWithParam<Share> {};
 
 TEST_P(LosslessRealData, ComesBackBitForBit) {
-  const std::vector<fs::path> files = shared_files();
-  if (files.empty()) GTEST_SKIP() << "the shared data folder is not here";
+  const std::vector<fs::path> files = real_files();
+  if (files.empty()) GTEST_SKIP() << kNoRealFiles;
   const TemporaryFolder folder;
   std::vector<std::string> restored;
   std::vector<std::string> not_read;
@@ -132,7 +103,7 @@ TEST_P(LosslessRealData, ComesBackBitForBit) {
     if (!is_in(GetParam(), file) || (kSanitized && fs::file_size(file) > (std::uintmax_t{1} << 20U))) continue;
     SCOPED_TRACE(file);
     try {
-      const auto source = open_file(file);
+      const auto source = open_source(file, options_for(file));
       // One row is no surface: ldem_4_cropped.img.
       if (std::min(source->info().width, source->info().height) < 2) {
         not_read.push_back(file.filename());
@@ -192,7 +163,7 @@ TEST(LosslessOptions, EveryWayOfConvertingGivesTheSamplesBack) {
     const std::string back = folder / restored_name(input);
     const RunResult restored = run_isohf({"restore", folder / "a.isohf", back, "--overwrite", "--quiet"});
     ASSERT_EQ(restored.exit_code, 0) << restored.err;
-    EXPECT_TRUE(read_samples(back).raw == read_samples(input).raw);
+    EXPECT_TRUE(read_raster(back).raw == read_raster(input).raw);
     const RunResult verified = run_isohf({"verify", folder / "a.isohf", "--quiet"});
     EXPECT_EQ(verified.exit_code, 0) << verified.out << verified.err;
   }

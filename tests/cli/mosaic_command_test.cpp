@@ -10,6 +10,7 @@
 
 #include "formats/mosaic_pieces.h"
 #include "support/plain_tiff.h"
+#include "support/real_files.h"
 #include "support/run_program.h"
 #include "support/temporary_folder.h"
 
@@ -337,8 +338,8 @@ TEST_F(MosaicCommand, ResumeRefusesOtherMembers) {
 }
 
 TEST_F(MosaicCommand, ARealRasterInPiecesHasNoSeam) {
-  const std::string path = ISOHF_SOURCE_DIR "/../shared/data/srtm_bigtujunga30m_utm11.tif";
-  if (!std::filesystem::exists(path)) GTEST_SKIP() << "the shared data folder is not here";
+  const std::string path = real_data() / "srtm_bigtujunga30m_utm11.tif";
+  if (!std::filesystem::exists(path)) GTEST_SKIP() << kNoRealFiles;
   const auto source = open_source(path, {});
   const SourceInfo& info = source->info();
   CutRaster raster;
@@ -356,8 +357,8 @@ TEST_F(MosaicCommand, ARealRasterInPiecesHasNoSeam) {
 }
 
 TEST_F(MosaicCommand, RealDegreeTilesJoin) {
-  const std::string data = ISOHF_SOURCE_DIR "/../shared/data/";
-  if (!std::filesystem::exists(data + "N44E006.hgt")) GTEST_SKIP() << "the shared data folder is not here";
+  const std::string data = real_data().string() + "/";
+  if (!std::filesystem::exists(data + "N44E006.hgt")) GTEST_SKIP() << kNoRealFiles;
   convert({data + "N44E007.hgt", data + "N44E006.hgt"}, {"--lossless"});
   const auto west = open_source(data + "N44E006.hgt", {});
   const auto east = open_source(data + "N44E007.hgt", {});

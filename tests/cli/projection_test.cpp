@@ -14,6 +14,7 @@
 
 #include "formats/registry.h"
 #include "support/degree_grid.h"
+#include "support/real_files.h"
 #include "support/run_program.h"
 #include "support/small_geoid.h"
 #include "support/temporary_folder.h"
@@ -291,8 +292,8 @@ TEST_F(ProjectionCommand, AGeoidMovesElevationsAndTheirDatum) {
 }
 
 TEST(MarsMegdr, LandsAtItsRadiusAndLongitude) {
-  const std::string label = ISOHF_SOURCE_DIR "/../shared/data/megt90n000cb.lbl";
-  if (!fs::exists(label)) GTEST_SKIP() << "the shared data folder is not here";
+  const std::string label = real_data() / "megt90n000cb.lbl";
+  if (!fs::exists(label)) GTEST_SKIP() << kNoRealFiles;
   const TemporaryFolder folder;
   const auto source = open_source(label, {});
   const Georeference& place = source->info().georeference;

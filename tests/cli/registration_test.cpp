@@ -10,7 +10,8 @@
 #include <sstream>
 
 #include "formats/raster_sink.h"
-#include "formats/registry.h"
+#include "support/place_at.h"
+#include "support/raster.h"
 #include "support/run_program.h"
 #include "support/temporary_folder.h"
 
@@ -43,24 +44,14 @@ void write_ramp(const std::string& path, SampleType type, std::optional<Registra
   spec.width = kWidth;
   spec.height = kHeight;
   spec.sample_type = type;
-  if (registration) {
-    spec.georeference.emplace();
-    spec.georeference->registration = *registration;
-    spec.georeference->unit = HorizontalUnit::kMetre;
-    spec.georeference->spacing_x = spec.georeference->spacing_y = kSpacing;
-    spec.georeference->has_origin = true;
-    spec.georeference->origin_x = kWest;
-    spec.georeference->origin_y = kNorth;
-  }
+  if (registration) spec.georeference = place_at(*registration, HorizontalUnit::kMetre, kWest, kNorth, kSpacing);
   std::vector<T> samples;
   for (std::int64_t r = 0; r < kHeight; ++r) {
     for (std::int64_t c = 0; c < kWidth; ++c) {
       samples.push_back(static_cast<T>(ramp(static_cast<double>(c), static_cast<double>(r))));
     }
   }
-  const auto sink = create_raster(path, spec);
-  sink->write_rows(std::as_bytes(std::span(samples)));
-  sink->finish();
+  write_raster(path, spec, std::as_bytes(std::span(samples)));
 }
 
 std::string ascii_ramp(const char* kind) {
@@ -160,21 +151,16 @@ class RegistrationOf : public testing::Test {
                     kShift * kSpacing);
       }
     }
-    const auto source = open_source(folder / "back.tif", {});
-    const SourceInfo& restored = source->info();
-    ASSERT_EQ(restored.width, kWidth);
-    ASSERT_EQ(restored.height, kHeight);
-    std::vector<std::byte> raw(static_cast<std::size_t>(kWidth * kHeight) * size_bytes(restored.sample_type));
-    source->read_window({0, 0, kWidth, kHeight}, raw);
-    std::vector<float> heights(static_cast<std::size_t>(kWidth * kHeight));
-    heights_from_samples(restored, 0.0, raw, heights);
+    const Raster restored = read_raster(folder / "back.tif");
+    ASSERT_EQ(restored.info.width, kWidth);
+    ASSERT_EQ(restored.info.height, kHeight);
     double sum = 0.0;
     int count = 0;
     constexpr std::int64_t kMargin = 24;  // at the edges, where the ramp goes on for two steps alone, splines swing
     for (std::int64_t r = kMargin; r < kHeight - kMargin; ++r) {
       for (std::int64_t c = kMargin; c < kWidth - kMargin; ++c) {
         const double expected = ramp(static_cast<double>(c), static_cast<double>(r));
-        const double found = double{heights[static_cast<std::size_t>(r * kWidth + c)]};
+        const double found = double{restored.at(c, r)};
         ASSERT_NEAR(found, expected, 2 * kRounding) << c << ", " << r;
         sum += found - expected;
         ++count;

@@ -11,9 +11,9 @@
 #include <sstream>
 
 #include "formats/raster_sink.h"
-#include "formats/registry.h"
 #include "isohf/archive/reader.h"
 #include "support/plain_tiff.h"
+#include "support/raster.h"
 #include "support/run_program.h"
 #include "support/temporary_folder.h"
 
@@ -28,37 +28,16 @@ const std::string kPeaks = ISOHF_SOURCE_DIR "/testdata/peaks_256x256_uint16.png"
 const std::string kRidges = ISOHF_SOURCE_DIR "/testdata/ridges_161x161_float.exr";
 const std::string kVoids = ISOHF_SOURCE_DIR "/testdata/voids_200x150_int16.tif";
 
-struct Raster {
-  SourceInfo info;
-  std::vector<float> heights;  ///< NaN where void
-  [[nodiscard]] float at(std::int64_t column, std::int64_t row) const {
-    return heights[static_cast<std::size_t>(row * info.width + column)];
-  }
-};
-
-Raster read_raster(const std::string& path) {
-  const auto source = open_source(path, {});
-  Raster raster{source->info(), {}};
-  const auto count = static_cast<std::size_t>(raster.info.width * raster.info.height);
-  std::vector<std::byte> raw(count * size_bytes(raster.info.sample_type));
-  source->read_window({0, 0, raster.info.width, raster.info.height}, raw);
-  raster.heights.resize(count);
-  heights_from_samples(raster.info, 0.0, raw, raster.heights);
-  return raster;
-}
-
 /// Stripes of 0 and 255, which a spline overshoots.
 void write_stripes(const std::string& path) {
   RasterSpec spec;
   spec.width = 64;
   spec.height = 64;
   spec.sample_type = SampleType::kUint8;
-  const auto sink = create_raster(path, spec);
   std::vector<std::byte> rows(64 * 64);
   for (std::size_t i = 0; i < rows.size(); ++i)
     rows[i] = std::byte{i % 64 / 8 % 2 == 0 ? std::uint8_t{0} : std::uint8_t{255}};
-  sink->write_rows(rows);
-  sink->finish();
+  write_raster(path, spec, rows);
 }
 
 class RestoreCommand : public testing::Test {
@@ -154,11 +133,11 @@ TEST_F(RestoreCommand, HexIsNearerToTheSourceThanTheTriangles) {
   const Raster source = read_raster(kRidges);
   const auto rms = [&](const Raster& back) {
     double sum = 0.0;
-    for (std::size_t i = 0; i < back.heights.size(); ++i) {
-      const double error = static_cast<double>(back.heights[i]) - static_cast<double>(source.heights[i]);
+    for (std::size_t i = 0; i < back.elevations.size(); ++i) {
+      const double error = static_cast<double>(back.elevations[i]) - static_cast<double>(source.elevations[i]);
       sum += error * error;
     }
-    return std::sqrt(sum / static_cast<double>(back.heights.size()));
+    return std::sqrt(sum / static_cast<double>(back.elevations.size()));
   };
   const double hex = rms(restore("hex.exr", {"--method", "hex"}));
   const double triangles = rms(restore("seen.exr", {"--method", "barycentric"}));
@@ -185,9 +164,9 @@ TEST_F(RestoreCommand, BarycentricGivesWhatSamplePrints) {
   std::size_t i = 0;
   for (std::string line; std::getline(lines, line); ++i) {
     // Places were printed with six decimals, on slopes of up to some hundred.
-    EXPECT_NEAR(std::stod(line), static_cast<double>(back.heights.at(i)), 0.01) << line;
+    EXPECT_NEAR(std::stod(line), static_cast<double>(back.elevations.at(i)), 0.01) << line;
   }
-  EXPECT_EQ(i, back.heights.size());
+  EXPECT_EQ(i, back.elevations.size());
 }
 
 TEST_F(RestoreCommand, SizeAndSpacingCoverTheSourcesGround) {
@@ -205,7 +184,7 @@ TEST_F(RestoreCommand, SizeAndSpacingCoverTheSourcesGround) {
   EXPECT_NEAR(place.origin_y + first * place.spacing_y, north, 1e-6);
   const double span = source.spacing_x * (first > 0.0 ? 200.0 : 199.0);
   EXPECT_NEAR(place.spacing_x * (first > 0.0 ? 100.0 : 99.0), span, 1e-6);
-  EXPECT_GT(std::count_if(half.heights.begin(), half.heights.end(), [](float h) { return std::isnan(h); }), 0);
+  EXPECT_GT(std::count_if(half.elevations.begin(), half.elevations.end(), [](float h) { return std::isnan(h); }), 0);
 
   const json said = json::parse(run("spaced.tif", {"--spacing", "50", "--json"}).out);
   const Raster spaced = read_raster(folder / "spaced.tif");
@@ -223,14 +202,24 @@ TEST_F(RestoreCommand, LikeTakesTheOtherRastersGrid) {
   const Raster like_half = restore("like.tif", {"--like", folder / "half.tif"});
   EXPECT_EQ(like_half.info.width, 100);
   EXPECT_NEAR(like_half.info.georeference.origin_x, half.info.georeference.origin_x, 1e-6);
-  for (std::size_t i = 0; i < half.heights.size(); ++i) {
-    ASSERT_EQ(std::isnan(half.heights[i]), std::isnan(like_half.heights[i])) << i;
-    if (std::isnan(half.heights[i])) continue;
-    EXPECT_NEAR(half.heights[i], like_half.heights[i], 1.0F) << i;  // rounding ties
+  for (std::size_t i = 0; i < half.elevations.size(); ++i) {
+    ASSERT_EQ(std::isnan(half.elevations[i]), std::isnan(like_half.elevations[i])) << i;
+    if (std::isnan(half.elevations[i])) continue;
+    EXPECT_NEAR(half.elevations[i], like_half.elevations[i], 1.0F) << i;  // rounding ties
   }
-  // Far away there is nothing.
-  const Raster far = restore("far.tif", {"--like", kCoast});
-  EXPECT_EQ(far.info.width, 512);
+  // A larger raster from the same corner on: the same samples, and nothing where the archive has no tile.
+  const Raster larger = restore("larger.tif", {"--like", kCoast});
+  EXPECT_EQ(larger.info.width, 512);
+  for (std::int64_t r = 0; r < 384; ++r) {
+    for (std::int64_t c = 0; c < 512; ++c) {
+      const float found = larger.at(c, r);
+      if (c < 200 && r < 150) {
+        ASSERT_TRUE(found == plain.at(c, r) || (std::isnan(found) && std::isnan(plain.at(c, r)))) << c << ", " << r;
+      } else if (c > 300 || r > 250) {
+        ASSERT_TRUE(std::isnan(found)) << c << ", " << r;
+      }
+    }
+  }
 }
 
 TEST_F(RestoreCommand, WritesEveryFormat) {
@@ -238,8 +227,9 @@ TEST_F(RestoreCommand, WritesEveryFormat) {
   const Raster source = read_raster(kPeaks);
   for (const char* name : {"back.tif", "back.exr", "back.png"}) {
     const Raster back = restore(name);
-    ASSERT_EQ(back.heights.size(), source.heights.size());
-    for (std::size_t i = 0; i < back.heights.size(); i += 37) EXPECT_NEAR(back.heights[i], source.heights[i], 2000.0F);
+    ASSERT_EQ(back.elevations.size(), source.elevations.size());
+    for (std::size_t i = 0; i < back.elevations.size(); i += 37)
+      EXPECT_NEAR(back.elevations[i], source.elevations[i], 2000.0F);
   }
   convert(kCoast);
   const Raster tile = restore("back.hgt", {"--size", "1201x1201"});
@@ -252,11 +242,11 @@ TEST_F(RestoreCommand, ExactSamplesGoIntoEveryFormatThatHoldsThem) {
   const Raster source = read_raster(kVoids);
   for (const char* name : {"back.tif", "back.exr"}) {
     const Raster back = restore(name);
-    ASSERT_EQ(back.heights.size(), source.heights.size());
-    for (std::size_t i = 0; i < back.heights.size(); ++i) {
+    ASSERT_EQ(back.elevations.size(), source.elevations.size());
+    for (std::size_t i = 0; i < back.elevations.size(); ++i) {
       // OpenEXR has no void value: there voids are NaN.
-      ASSERT_TRUE(back.heights[i] == source.heights[i] ||
-                  (std::isnan(back.heights[i]) && std::isnan(source.heights[i])))
+      ASSERT_TRUE(back.elevations[i] == source.elevations[i] ||
+                  (std::isnan(back.elevations[i]) && std::isnan(source.elevations[i])))
           << i;
     }
   }
@@ -274,10 +264,10 @@ TEST_F(RestoreCommand, SamplesThatTheTypeDoesNotHoldAreRefusedOrClamped) {
   EXPECT_THAT(clamped.out, HasSubstr("moved into the range"));
   const Raster back = read_raster(folder / "back.png");
   // No void value takes a number away from a raster without voids.
-  EXPECT_EQ(*std::max_element(back.heights.begin(), back.heights.end()), 255.0F);
-  EXPECT_EQ(std::count_if(back.heights.begin(), back.heights.end(), [](float h) { return std::isnan(h); }), 0);
+  EXPECT_EQ(*std::max_element(back.elevations.begin(), back.elevations.end()), 255.0F);
+  EXPECT_EQ(std::count_if(back.elevations.begin(), back.elevations.end(), [](float h) { return std::isnan(h); }), 0);
   const Raster wide = restore("back.exr");
-  EXPECT_GT(*std::max_element(wide.heights.begin(), wide.heights.end()), 255.0F);
+  EXPECT_GT(*std::max_element(wide.elevations.begin(), wide.elevations.end()), 255.0F);
 }
 
 TEST_F(RestoreCommand, VoidsAndSamplesOfTheVoidValueStayApart) {
@@ -286,7 +276,7 @@ TEST_F(RestoreCommand, VoidsAndSamplesOfTheVoidValueStayApart) {
   // 255 stands for the voids here, so that no sample may be 255.
   expect_refused(run("back.tif"), 2, "is 255, which uint8 does not hold");
   const Raster back = restore("back.tif", {"--clamp-range"});
-  EXPECT_EQ(*std::max_element(back.heights.begin(), back.heights.end(),
+  EXPECT_EQ(*std::max_element(back.elevations.begin(), back.elevations.end(),
                               [](float a, float b) { return std::isnan(a) || a < b; }),
             254.0F);
 }
@@ -408,7 +398,7 @@ TEST_P(LosslessInterrupt, ResumingGivesTheSameBytes) {
   ASSERT_EQ(run_program(command("straight.isohf", false)).exit_code, 0);
   EXPECT_TRUE(read_file(folder / "a.isohf") == read_file(folder / "straight.isohf"));
   (void)restore("back.tif");
-  const auto samples = [](const std::string& path) { return read_raster(path).heights; };
+  const auto samples = [](const std::string& path) { return read_raster(path).elevations; };
   EXPECT_TRUE(samples(folder / "back.tif") == samples(folder / "big.tif"));
 }
 

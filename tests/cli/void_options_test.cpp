@@ -10,7 +10,9 @@
 #include <vector>
 
 #include "formats/raster_sink.h"
+#include "support/place_at.h"
 #include "support/plain_tiff.h"
+#include "support/raster.h"
 #include "support/run_program.h"
 #include "support/temporary_folder.h"
 
@@ -111,13 +113,8 @@ void write_piece(const std::string& path, std::int64_t first, std::int64_t colum
   spec.height = kRows;
   spec.sample_type = SampleType::kInt16;
   spec.void_value = -32768;
-  spec.georeference.emplace();
-  spec.georeference->registration = Registration::kArea;
-  spec.georeference->unit = HorizontalUnit::kMetre;
-  spec.georeference->spacing_x = spec.georeference->spacing_y = 30.0;
-  spec.georeference->has_origin = true;
-  spec.georeference->origin_x = 400000.0 + 30.0 * static_cast<double>(first);
-  spec.georeference->origin_y = 5000000.0;
+  spec.georeference = place_at(Registration::kArea, HorizontalUnit::kMetre,
+                               400000.0 + 30.0 * static_cast<double>(first), 5000000.0, 30.0);
   std::vector<std::int16_t> samples;
   for (std::int64_t r = 0; r < kRows; ++r) {
     for (std::int64_t c = first; c < first + columns; ++c) {
@@ -125,9 +122,7 @@ void write_piece(const std::string& path, std::int64_t first, std::int64_t colum
       samples.push_back(static_cast<std::int16_t>(is_void ? -32768 : 500 + (c * c + 7 * r * c) % 97));
     }
   }
-  const auto sink = create_raster(path, spec);
-  sink->write_rows(std::as_bytes(std::span(samples)));
-  sink->finish();
+  write_raster(path, spec, std::as_bytes(std::span(samples)));
 }
 
 TEST_F(VoidOptions, FillingReachesOverTheBordersOfAMosaic) {

@@ -17,6 +17,7 @@
 #include "isohf/verify/verify.h"
 #include "isohf/verify/vertex_check.h"
 #include "support/memory_source.h"
+#include "support/place_at.h"
 #include "support/temporary_folder.h"
 
 namespace isohf {
@@ -47,13 +48,8 @@ std::unique_ptr<Source> source_over(const Ground& ground, std::int64_t width, st
     return land(first_x + static_cast<double>(c) * dx, first_y - static_cast<double>(r) * dz);
   });
   Georeference& place = source->mutable_info().georeference;
-  place.registration = registration;
-  place.unit = HorizontalUnit::kDegree;
-  place.spacing_x = dx;
+  place = test::place_at(registration, HorizontalUnit::kDegree, first_x, first_y, dx);
   place.spacing_y = dz;
-  place.has_origin = true;
-  place.origin_x = first_x;
-  place.origin_y = first_y;
   place.system.body = ground.body;
   place.system.semi_major_axis_m = ground.ellipsoid.semi_major_axis_m;
   place.system.inverse_flattening = ground.ellipsoid.inverse_flattening;
@@ -257,12 +253,7 @@ TEST(JoinedGlobe, TilesAcrossTheJoinShareTheirVertices) {
       Source source(SampleType::kFloat32, 360, 181, [&](std::int64_t c, std::int64_t r) {
         return round_land(static_cast<double>(c) - 180.0, 90.0 - static_cast<double>(r));
       });
-      Georeference& place = source.mutable_info().georeference;
-      place.registration = registration;
-      place.unit = HorizontalUnit::kDegree;
-      place.has_origin = true;
-      place.origin_x = -180.0;
-      place.origin_y = 90.0;
+      source.mutable_info().georeference = test::place_at(registration, HorizontalUnit::kDegree, -180.0, 90.0, 1.0);
       ConvertOptions options = options_for("auto");
       options.plan.ground.wrap_x = true;
       options.filter = filter;

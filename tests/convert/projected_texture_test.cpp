@@ -13,6 +13,7 @@
 #include "isohf/verify/verify.h"
 #include "support/memory_photo.h"
 #include "support/memory_source.h"
+#include "support/place_at.h"
 #include "support/temporary_folder.h"
 
 namespace isohf {
@@ -32,15 +33,9 @@ struct Raster {
   [[nodiscard]] double dx() const { return (extent.east - extent.west) / static_cast<double>(width); }
   [[nodiscard]] double dy() const { return (extent.north - extent.south) / static_cast<double>(height); }
   [[nodiscard]] Georeference place() const {
-    Georeference place;
-    place.registration = Registration::kArea;
-    place.unit = HorizontalUnit::kDegree;
-    place.spacing_x = dx();
+    Georeference place = test::place_at(Registration::kArea, HorizontalUnit::kDegree, extent.west + dx() / 2.0,
+                                        extent.north - dy() / 2.0, dx(), 4326);
     place.spacing_y = dy();
-    place.has_origin = true;
-    place.origin_x = extent.west + dx() / 2.0;
-    place.origin_y = extent.north - dy() / 2.0;
-    place.system.epsg = 4326;
     return place;
   }
 };

@@ -15,6 +15,7 @@
 #include "isohf/verify/verify.h"
 #include "support/memory_photo.h"
 #include "support/memory_source.h"
+#include "support/place_at.h"
 #include "support/temporary_folder.h"
 
 namespace isohf {
@@ -63,15 +64,7 @@ std::string message_of(const std::function<void()>& action) {
 
 /// 30 m pixels from (500000, 4000000) on.
 Georeference utm(double origin_x, double origin_y, double spacing, int epsg = 32632) {
-  Georeference place;
-  place.registration = Registration::kArea;
-  place.unit = HorizontalUnit::kMetre;
-  place.spacing_x = place.spacing_y = spacing;
-  place.has_origin = true;
-  place.origin_x = origin_x;
-  place.origin_y = origin_y;
-  place.system.epsg = epsg;
-  return place;
+  return test::place_at(Registration::kArea, HorizontalUnit::kMetre, origin_x, origin_y, spacing, epsg);
 }
 
 TEST(PhotoPlacement, CoversTheAreaOfPixelsOrTheSpanOfPosts) {

@@ -5,6 +5,7 @@
 
 #include "formats/mosaic_pieces.h"
 #include "isohf/base/error.h"
+#include "support/place_at.h"
 #include "support/samples.h"
 #include "support/temporary_folder.h"
 
@@ -18,13 +19,7 @@ SourceInfo placed(Registration registration, double x, double y, double spacing,
   SourceInfo info;
   info.path = "a.tif";
   info.width = info.height = side;
-  Georeference& place = info.georeference;
-  place.registration = registration;
-  place.unit = degrees ? HorizontalUnit::kDegree : HorizontalUnit::kMetre;
-  place.has_origin = true;
-  place.origin_x = x;
-  place.origin_y = y;
-  place.spacing_x = place.spacing_y = spacing;
+  info.georeference = place_at(registration, degrees ? HorizontalUnit::kDegree : HorizontalUnit::kMetre, x, y, spacing);
   return info;
 }
 

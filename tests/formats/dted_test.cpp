@@ -9,6 +9,7 @@
 #include "formats/raster_reference.h"
 #include "formats/reader_failure.h"
 #include "isohf/base/error.h"
+#include "support/every_window.h"
 #include "support/real_files.h"
 #include "support/samples.h"
 #include "support/temporary_folder.h"
@@ -102,20 +103,9 @@ TEST_F(Dted, TurnsColumnsIntoRowsFromTheNorth) {
   EXPECT_DOUBLE_EQ(info.georeference.origin_x, -80.0);
   EXPECT_DOUBLE_EQ(info.georeference.origin_y, 43.0 + 60.0 / 3600.0);
   EXPECT_EQ(info.void_values, std::vector<double>{-32767.0});
-  for (int r = 4; r >= 0; --r) {
-    for (int rows = 1; rows <= 5 - r; ++rows) {
-      for (int c = 0; c < 4; ++c) {
-        for (int columns = 1; columns <= 4 - c; ++columns) {
-          std::vector<std::byte> part(static_cast<std::size_t>(columns * rows) * 2);
-          source->read_window({c, r, columns, rows}, part);
-          for (int i = 0; i < columns * rows; ++i) {
-            EXPECT_EQ(test::value_at(SampleType::kInt16, part, static_cast<std::size_t>(i)),
-                      height_at(c + i % columns, 4 - (r + i / columns)));
-          }
-        }
-      }
-    }
-  }
+  test::expect_every_window(*source, test::stored<std::int16_t>(4, 5, [](std::int64_t c, std::int64_t r) {
+    return height_at(static_cast<int>(c), static_cast<int>(4 - r));
+  }));
 }
 
 TEST_F(Dted, FindsTheCellBehindATapeRecord) {

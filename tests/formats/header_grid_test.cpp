@@ -8,6 +8,7 @@
 #include "formats/raster_reference.h"
 #include "formats/reader_failure.h"
 #include "isohf/base/error.h"
+#include "support/every_window.h"
 #include "support/real_files.h"
 #include "support/samples.h"
 #include "support/temporary_folder.h"
@@ -132,19 +133,13 @@ TEST_F(HeaderGrid, ReadsEveryTypeInBothByteOrdersAndEveryLayout) {
             data, std::string("grid.") + layout);
         EXPECT_THAT(source->info().warnings, IsEmpty());
         EXPECT_EQ(source->info().sample_type, kind.type);
-        for (std::int64_t r = 3; r >= 0; --r) {
-          for (std::int64_t c = 0; c < 5; ++c) {
-            for (std::int64_t n = 1; n <= 5 - c; ++n) {
-              const auto part = read_window(*source, {c, r, n, 4 - r});
-              for (std::int64_t i = 0; i < n * (4 - r); ++i) {
-                std::string wanted = data.substr(
-                    7 + static_cast<std::size_t>(r + i / n) * row + static_cast<std::size_t>(c + i % n) * size, size);
-                if (big) std::reverse(wanted.begin(), wanted.end());
-                ASSERT_EQ(0, std::memcmp(part.data() + static_cast<std::size_t>(i) * size, wanted.data(), size));
-              }
-            }
-          }
+        std::string wanted;
+        for (std::size_t i = 0; i < 20; ++i) {
+          std::string sample = data.substr(7 + i / 5 * row + i % 5 * size, size);
+          if (big) std::reverse(sample.begin(), sample.end());
+          wanted += sample;
         }
+        expect_every_window(*source, std::as_bytes(std::span(wanted)));
       }
     }
     std::filesystem::remove(folder_ / "grid.bil");

@@ -10,6 +10,7 @@
 #include "formats/raster_reference.h"
 #include "formats/zip_archive.h"
 #include "isohf/base/error.h"
+#include "support/every_window.h"
 #include "support/real_files.h"
 #include "support/samples.h"
 #include "support/temporary_folder.h"
@@ -28,11 +29,16 @@ class HgtSource : public testing::Test {
   const test::TemporaryFolder folder_;
 };
 
-/// Big-endian samples 0, 1, 2, ... with a void in front.
+/// A void in front, then rising.
+int sample(int i) {
+  return i == 0 ? -32768 : i % 9000 - 100;
+}
+
+/// The same big-endian.
 std::vector<std::byte> tile(int columns, int rows) {
   std::vector<std::byte> bytes;
   for (int i = 0; i < columns * rows; ++i) {
-    const int value = i == 0 ? -32768 : i % 9000 - 100;
+    const int value = sample(i);
     bytes.push_back(static_cast<std::byte>((value >> 8) & 0xFF));
     bytes.push_back(static_cast<std::byte>(value & 0xFF));
   }
@@ -117,21 +123,9 @@ TEST_F(HgtSource, WindowsEqualTheWhole) {
   for (const std::string& path :
        {write("N01E001.hgt", tile(7, 7)), write("N01E001.hgt.zip", zipped("N01E001.hgt", tile(7, 7), true))}) {
     const auto source = open_hgt(path, {});
-    const auto whole = test::read_whole(*source);
-    EXPECT_EQ(test::value_at(SampleType::kInt16, whole, 0), -32768);
-    EXPECT_EQ(test::value_at(SampleType::kInt16, whole, 48), 48 - 100);
-    for (std::int64_t r = 6; r >= 0; --r) {
-      for (std::int64_t c = 0; c < 7; ++c) {
-        for (std::int64_t n = 1; n <= 7 - c; ++n) {
-          std::vector<std::byte> part(static_cast<std::size_t>(n * (7 - r)) * 2);
-          source->read_window({c, r, n, 7 - r}, part);
-          for (std::int64_t i = 0; i < n * (7 - r); ++i) {
-            EXPECT_EQ(test::value_at(SampleType::kInt16, part, static_cast<std::size_t>(i)),
-                      test::value_at(SampleType::kInt16, whole, static_cast<std::size_t>((r + i / n) * 7 + c + i % n)));
-          }
-        }
-      }
-    }
+    test::expect_every_window(*source, test::stored<std::int16_t>(7, 7, [](std::int64_t c, std::int64_t r) {
+      return sample(static_cast<int>(7 * r + c));
+    }));
   }
 }
 

@@ -10,6 +10,7 @@
 #include "formats/raster_reference.h"
 #include "formats/reader_failure.h"
 #include "isohf/base/error.h"
+#include "support/every_window.h"
 #include "support/real_files.h"
 #include "support/samples.h"
 #include "support/temporary_folder.h"
@@ -118,20 +119,9 @@ TEST_F(Isis3, WindowsEqualTheWholeInEveryLayout) {
         options.channel = std::to_string(band);
         const auto source =
             open_source(write(label(layout, 2, pixels) + tiles(tile_columns, tile_rows, 2, big_endian)), options);
-        for (int r = 0; r < 4; ++r) {
-          for (int rows = 1; rows <= 4 - r; ++rows) {
-            for (int c = 0; c < 5; ++c) {
-              for (int columns = 1; columns <= 5 - c; ++columns) {
-                std::vector<std::byte> part(static_cast<std::size_t>(columns * rows) * 2);
-                source->read_window({c, r, columns, rows}, part);
-                for (int i = 0; i < columns * rows; ++i) {
-                  ASSERT_EQ(test::value_at(SampleType::kInt16, part, static_cast<std::size_t>(i)),
-                            height_at(band, c + i % columns, r + i / columns));
-                }
-              }
-            }
-          }
-        }
+        test::expect_every_window(*source, test::stored<std::int16_t>(5, 4, [&](std::int64_t c, std::int64_t r) {
+          return height_at(band, static_cast<int>(c), static_cast<int>(r));
+        }));
       }
     }
   }

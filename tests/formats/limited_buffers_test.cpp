@@ -4,6 +4,7 @@
 
 #include "formats/raster_sink.h"
 #include "formats/registry.h"
+#include "support/raster.h"
 #include "support/samples.h"
 #include "support/temporary_folder.h"
 
@@ -21,9 +22,7 @@ std::vector<std::byte> write_counting(const std::string& path, SampleType type) 
   spec.sample_type = type;
   std::vector<std::byte> samples(kRowBytes * kHeight);
   for (std::size_t i = 0; i < samples.size(); ++i) samples[i] = static_cast<std::byte>(i * 37 % 61);
-  const auto sink = create_raster(path, spec);
-  sink->write_rows(samples);
-  sink->finish();
+  write_raster(path, spec, samples);
   return samples;
 }
 

@@ -8,8 +8,9 @@
 #include <vector>
 
 #include "formats/mosaic_source.h"
-#include "formats/raster_sink.h"
 #include "isohf/surface/height_source.h"
+#include "support/place_at.h"
+#include "support/raster.h"
 
 namespace isohf::test {
 
@@ -40,11 +41,7 @@ struct CutRaster {
   }
 
   /// Writes a piece as GeoTIFF.
-  void cut(const std::string& path, const Window& window) const {
-    const auto sink = create_raster(path, spec_of(window));
-    sink->write_rows(part(window));
-    sink->finish();
-  }
+  void cut(const std::string& path, const Window& window) const { write_raster(path, spec_of(window), part(window)); }
 };
 
 /// A georeferenced raster without samples: EPSG 32632, 30 m, or WGS 84 with `degrees`.
@@ -54,15 +51,8 @@ inline RasterSpec placed_spec(std::int64_t width, std::int64_t height, SampleTyp
   spec.width = width;
   spec.height = height;
   spec.sample_type = type;
-  Georeference place;
-  place.registration = registration;
-  place.unit = degrees ? HorizontalUnit::kDegree : HorizontalUnit::kMetre;
-  place.spacing_x = place.spacing_y = degrees ? 1.0 / 1200.0 : 30.0;
-  place.has_origin = true;
-  place.origin_x = degrees ? 7.0 : 500015.0;
-  place.origin_y = degrees ? 46.0 : 5200000.0;
-  place.system.epsg = degrees ? 4326 : 32632;
-  spec.georeference = place;
+  spec.georeference = degrees ? place_at(registration, HorizontalUnit::kDegree, 7.0, 46.0, 1.0 / 1200.0, 4326)
+                              : place_at(registration, HorizontalUnit::kMetre, 500015.0, 5200000.0, 30.0, 32632);
   return spec;
 }
 

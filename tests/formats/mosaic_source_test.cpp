@@ -270,9 +270,7 @@ TEST(MosaicSource, FilesThatDisagreeAreRefusedByName) {
   std::filesystem::remove(folder / "b.tif");
   RasterSpec unplaced = spec;
   unplaced.georeference.reset();
-  const auto sink = create_raster(folder / "b.tif", unplaced);
-  sink->write_rows(std::vector<std::byte>(20 * 10 * 4));
-  sink->finish();
+  write_raster(folder / "b.tif", unplaced, std::vector<std::byte>(20 * 10 * 4));
   EXPECT_THAT(why_refused({folder / "a.tif", folder / "b.tif"}), HasSubstr("b.tif: does not say where it lies"));
   EXPECT_THAT(why_refused({folder / "a.tif", folder / "a.tif"}), HasSubstr("a.tif: is named twice"));
   std::filesystem::create_symlink(folder / "a.tif", folder / "link.tif");

@@ -163,7 +163,7 @@ TEST_P(ReaderMutation, SurvivesTenThousandDamagedFiles) {
 /// What scripts/fuzz found.
 TEST_P(ReaderMutation, RefusesOrReadsEveryKeptFile) {
   const auto kept = std::filesystem::path(ISOHF_SOURCE_DIR) / "tests/fuzz/corpus/reader" / tested().name;
-  if (!std::filesystem::is_directory(kept)) return;
+  if (!std::filesystem::is_directory(kept)) GTEST_SKIP() << "nothing was found of this reader";
   for (const auto& entry : std::filesystem::directory_iterator(kept)) {
     SCOPED_TRACE(entry.path().string());
     (void)outcome(read_file(entry.path()));

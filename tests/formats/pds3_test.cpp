@@ -9,6 +9,7 @@
 #include "formats/raster_reference.h"
 #include "formats/reader_failure.h"
 #include "isohf/base/error.h"
+#include "support/every_window.h"
 #include "support/real_files.h"
 #include "support/samples.h"
 #include "support/temporary_folder.h"
@@ -231,18 +232,9 @@ TEST_F(Pds3, WindowsEqualTheWholeInEveryLayout) {
         OpenOptions options;
         options.channel = std::to_string(band);
         const auto source = open_source(write("b.img", attached(image) + data), options);
-        for (int r = 0; r < 3; ++r) {
-          for (int c = 0; c < 4; ++c) {
-            for (int n = 1; n <= 4 - c; ++n) {
-              std::vector<std::byte> part(static_cast<std::size_t>(n * (3 - r)) * 2);
-              source->read_window({c, r, n, 3 - r}, part);
-              for (int i = 0; i < n * (3 - r); ++i) {
-                EXPECT_EQ(test::value_at(SampleType::kInt16, part, static_cast<std::size_t>(i)),
-                          value(band, r + i / n, c + i % n));
-              }
-            }
-          }
-        }
+        test::expect_every_window(*source, test::stored<std::int16_t>(4, 3, [&](std::int64_t c, std::int64_t r) {
+          return value(band, static_cast<int>(r), static_cast<int>(c));
+        }));
       }
     }
   }

@@ -12,6 +12,8 @@
 #include "formats/reader_failure.h"
 #include "formats/registry.h"
 #include "isohf/base/error.h"
+#include "support/place_at.h"
+#include "support/raster.h"
 #include "support/samples.h"
 #include "support/temporary_folder.h"
 
@@ -33,23 +35,14 @@ RasterSpec picture_spec() {
   spec.z_offset = -400.0;
   spec.vertical_unit = "metre";
   spec.void_value = 7.0;
-  Georeference& place = spec.georeference.emplace();
-  place.registration = Registration::kPoint;
-  place.unit = HorizontalUnit::kDegree;
-  place.spacing_x = 1.0 / 1200;
-  place.spacing_y = 1.0 / 3600;
-  place.has_origin = true;
-  place.origin_x = -7.1;
-  place.origin_y = 45.3;
-  place.system.epsg = 4326;
+  spec.georeference = place_at(Registration::kPoint, HorizontalUnit::kDegree, -7.1, 45.3, 1.0 / 1200, 4326);
+  spec.georeference->spacing_y = 1.0 / 3600;
   return spec;
 }
 
 void write_picture(const std::string& path) {
   const std::uint16_t codes[] = {0, 100, 65535, 7};
-  const auto sink = create_raster(path, picture_spec());
-  sink->write_rows(std::as_bytes(std::span(codes)));
-  sink->finish();
+  write_raster(path, picture_spec(), std::as_bytes(std::span(codes)));
 }
 
 std::vector<float> elevations_of(HeightSource& source) {

@@ -11,6 +11,8 @@
 #include "formats/reader_failure.h"
 #include "formats/registry.h"
 #include "isohf/base/error.h"
+#include "support/place_at.h"
+#include "support/raster.h"
 #include "support/real_files.h"
 #include "support/samples.h"
 #include "support/temporary_folder.h"
@@ -117,18 +119,10 @@ TEST(RasterSink, RoundTripsManyStripsAndLongRows) {
 
 RasterSpec placed(std::int64_t width, std::int64_t height, SampleType type, double spacing_y) {
   RasterSpec spec = spec_of(width, height, type);
-  Georeference place;
-  place.registration = Registration::kArea;
-  place.unit = HorizontalUnit::kMetre;
-  place.spacing_x = 10.0;
-  place.spacing_y = spacing_y;
-  place.has_origin = true;
-  place.origin_x = 500005.0;
-  place.origin_y = 4000195.0;
-  place.system.name = "WGS 84 / UTM zone 32N";
-  place.system.epsg = 32632;
-  place.system.body = "Earth";
-  spec.georeference = place;
+  spec.georeference = place_at(Registration::kArea, HorizontalUnit::kMetre, 500005.0, 4000195.0, 10.0, 32632);
+  spec.georeference->spacing_y = spacing_y;
+  spec.georeference->system.name = "WGS 84 / UTM zone 32N";
+  spec.georeference->system.body = "Earth";
   return spec;
 }
 
@@ -306,9 +300,7 @@ TEST(RasterSink, KeepsVoidScaleAndUnitInTiff) {
     spec.vertical_unit = "foot";
     spec.metres_per_vertical_unit = 0.3048;
     spec.overwrite = true;
-    const auto sink = create_raster(path, spec);
-    sink->write_rows(noise(spec));
-    sink->finish();
+    write_raster(path, spec, noise(spec));
     const auto source = open_source(path, {});
     EXPECT_EQ(source->info().void_values, std::vector<double>{value});
     EXPECT_EQ(source->info().z_scale, 0.1);
@@ -350,9 +342,7 @@ TEST(RasterSink, KeepsTheGeoreferenceOfRealFilesInTiff) {
     spec.metres_per_vertical_unit = original.metres_per_vertical_unit;
     spec.overwrite = true;
     const std::string path = folder / "copy.tif";
-    const auto sink = create_raster(path, spec);
-    sink->write_rows(noise(spec));
-    sink->finish();
+    write_raster(path, spec, noise(spec));
     const auto source = open_source(path, {});
     expect_same_place(original.georeference, source->info().georeference);
     EXPECT_EQ(original.vertical_unit, source->info().vertical_unit);

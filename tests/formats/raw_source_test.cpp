@@ -8,6 +8,7 @@
 #include "formats/raster_reference.h"
 #include "formats/reader_failure.h"
 #include "isohf/base/error.h"
+#include "support/every_window.h"
 #include "support/real_files.h"
 #include "support/samples.h"
 #include "support/temporary_folder.h"
@@ -92,19 +93,8 @@ TEST(RawSource, ReadsEveryTypeInBothByteOrders) {
       }
       const auto source = open_source(path, raw(std::string("5x3:") + name + (size == 1 ? "" : order)));
       EXPECT_EQ(source->info().sample_type, type);
-      for (std::int64_t row = 0; row < 3; ++row) {
-        for (std::int64_t column = 0; column < 5; ++column) {
-          for (std::int64_t columns = 1; columns <= 5 - column; ++columns) {
-            const auto part = read_window(*source, {column, row, columns, 3 - row});
-            for (std::int64_t i = 0; i < columns * (3 - row); ++i) {
-              const auto at = static_cast<std::size_t>((row + i / columns) * 5 + column + i % columns);
-              ASSERT_EQ(0,
-                        std::memcmp(part.data() + static_cast<std::size_t>(i) * size, wanted.data() + at * size, size))
-                  << name << order;
-            }
-          }
-        }
-      }
+      SCOPED_TRACE(name + order);
+      expect_every_window(*source, std::as_bytes(std::span(wanted)));
     }
   }
 }

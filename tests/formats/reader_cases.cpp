@@ -18,6 +18,8 @@
 #include "formats/tiff_source.h"
 #include "formats/usgs_dem_source.h"
 #include "formats/zip_archive.h"
+#include "support/place_at.h"
+#include "support/raster.h"
 #include "support/temporary_folder.h"
 
 namespace isohf::test {
@@ -41,22 +43,12 @@ std::string written(const TemporaryFolder& folder, const std::string& name, std:
   spec.sample_type = type;
   spec.channels = channels;
   spec.overwrite = true;
-  Georeference place;
-  place.registration = Registration::kArea;
-  place.unit = HorizontalUnit::kMetre;
-  place.has_origin = true;
-  place.spacing_x = place.spacing_y = 10.0;
-  place.origin_x = 5e5;
-  place.origin_y = 4e6;
-  place.system.name = "WGS 84 / UTM zone 32N";
-  place.system.epsg = 32632;
-  spec.georeference = place;
+  spec.georeference = place_at(Registration::kArea, HorizontalUnit::kMetre, 5e5, 4e6, 10.0, 32632);
+  spec.georeference->system.name = "WGS 84 / UTM zone 32N";
   if (!is_floating(type)) spec.void_value = 0.0;
-  const auto sink = create_raster(folder / name, spec);
   std::vector<std::byte> samples(static_cast<std::size_t>(width * height * channels) * size_bytes(type));
   for (std::size_t i = 0; i < samples.size(); ++i) samples[i] = static_cast<std::byte>(i * 37 % 61);
-  sink->write_rows(samples);
-  sink->finish();
+  write_raster(folder / name, spec, samples);
   return read_file(folder / name);
 }
 

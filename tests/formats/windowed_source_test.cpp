@@ -12,6 +12,7 @@
 #include "isohf/surface/filled_source.h"
 #include "isohf/surface/geoid_source.h"
 #include "support/memory_source.h"
+#include "support/place_at.h"
 #include "support/small_geoid.h"
 #include "support/temporary_folder.h"
 
@@ -32,13 +33,7 @@ class GlobeSource final : public MemorySource<std::int16_t> {
     info.void_values = {-32768.0};
     info.block_width = 8;
     info.block_height = 4;
-    Georeference& place = info.georeference;
-    place.registration = Registration::kPoint;
-    place.unit = HorizontalUnit::kDegree;
-    place.spacing_x = place.spacing_y = 5.0;
-    place.has_origin = true;
-    place.origin_x = -180.0;
-    place.origin_y = 90.0;
+    info.georeference = place_at(Registration::kPoint, HorizontalUnit::kDegree, -180.0, 90.0, 5.0);
   }
   void limit_buffers(std::uint64_t bytes) override { limit = bytes; }
   [[nodiscard]] std::uint64_t buffer_bytes(std::uint64_t asked) const override { return std::min(asked, kUnlimited); }

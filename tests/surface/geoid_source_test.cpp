@@ -10,6 +10,7 @@
 
 #include "isohf/base/error.h"
 #include "support/memory_source.h"
+#include "support/place_at.h"
 #include "support/small_geoid.h"
 #include "support/temporary_folder.h"
 
@@ -28,13 +29,8 @@ template <typename T>
 std::unique_ptr<MemorySource<T>> globe(SampleType type) {
   auto source = std::make_unique<MemorySource<T>>(
       type, 72, 37, [](std::int64_t c, std::int64_t r) { return static_cast<double>(100 + 3 * c + 5 * r); });
-  Georeference& place = source->mutable_info().georeference;
-  place.registration = Registration::kPoint;
-  place.unit = HorizontalUnit::kDegree;
-  place.spacing_x = place.spacing_y = 5.0;
-  place.has_origin = true;
-  place.origin_x = -180.0;
-  place.origin_y = 90.0;
+  source->mutable_info().georeference =
+      test::place_at(Registration::kPoint, HorizontalUnit::kDegree, -180.0, 90.0, 5.0);
   return source;
 }
 

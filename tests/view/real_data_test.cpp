@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "gl_test.h"
+#include "support/real_files.h"
 #include "support/run_program.h"
 #include "support/temporary_folder.h"
 
@@ -30,7 +31,7 @@ TEST_F(RealDataViewTest, PassesVerify) {
   const TemporaryFolder folder;
   int checked = 0;
   for (const RealFile& file : files) {
-    const std::string source = ISOHF_SOURCE_DIR "/../shared/data/" + file.name;
+    const std::string source = real_data() / file.name;
     if (!std::filesystem::exists(source)) continue;
     SCOPED_TRACE(file.name);
     std::vector<std::string> command{"convert", source, folder / "a.isohf", "--overwrite", "--quiet"};
@@ -43,7 +44,7 @@ TEST_F(RealDataViewTest, PassesVerify) {
     EXPECT_EQ(verified.err, "");
     ++checked;
   }
-  if (checked == 0) GTEST_SKIP() << "the shared data folder is not here";
+  if (checked == 0) GTEST_SKIP() << kNoRealFiles;
 }
 
 }  // namespace
