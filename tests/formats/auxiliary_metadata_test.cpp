@@ -3,10 +3,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "formats/raster_reference.h"
+#include "formats/reader_failure.h"
 #include "isohf/base/error.h"
+#include "support/temporary_folder.h"
 
-namespace isohf::testing {
+namespace isohf::test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -36,13 +37,13 @@ class AuxiliaryMetadata : public ::testing::Test {
     info_.path = folder_ / "a.png";
     info_.sample_type = SampleType::kInt16;
   }
-  void beside(const std::string& text) { write_bytes(info_.path + ".aux.xml", {text.data(), text.size()}); }
+  void beside(const std::string& text) { write_file(info_.path + ".aux.xml", text); }
   Error error_with(const std::string& text) {
     beside(text);
     return error_of([&] { read_auxiliary_metadata(info_, 1); });
   }
 
-  ScratchFolder folder_;
+  TemporaryFolder folder_;
   SourceInfo info_;
 };
 
@@ -118,4 +119,4 @@ TEST_F(AuxiliaryMetadata, EveryTruncationIsAnError) {
 }
 
 }  // namespace
-}  // namespace isohf::testing
+}  // namespace isohf::test
