@@ -1,0 +1,104 @@
+#include "bench/coded_tiles.h"
+
+#include <cmath>
+
+#include "isohf/archive/activities.h"
+#include "isohf/archive/coding_effort.h"
+#include "isohf/archive/context_model.h"
+#include "isohf/archive/deflate.h"
+#include "isohf/archive/hex_predictor.h"
+#include "isohf/archive/predictor_fit.h"
+#include "isohf/archive/quantise.h"
+#include "isohf/archive/residual_fold.h"
+#include "isohf/archive/residual_streams.h"
+#include "isohf/archive/residual_symbols.h"
+
+namespace isohf::bench {
+
+std::vector<float> terrain(std::size_t tile) {
+  std::vector<float> heights;
+  std::uint32_t state = static_cast<std::uint32_t>(tile) + 1;
+  for (int r = 0; r < kShape.rows(); ++r) {
+    for (int c = 0; c < kShape.columns(); ++c) {
+      const double x = c + 190.0 * static_cast<double>(tile);
+      const double z = r;
+      state = state * 1664525U + 1013904223U;
+      const double noise =
+          (static_cast<double>(state >> 16U) / 65536.0 - 0.5) * (1.0 + std::sin(x * 0.031 + z * 0.017));
+      heights.push_back(static_cast<float>(900.0 + 400.0 * std::sin(x * 0.02) * std::cos(z * 0.017) +
+                                           60.0 * std::sin(x * 0.13 + z * 0.09) + 12.0 * noise));
+    }
+  }
+  return heights;
+}
+
+Coded::Coded(CodeType of) : type(of) {
+  const Quantisation quantisation{type, 0.0, type == CodeType::kU8 ? 6.0 : 0.5};
+  for (std::size_t i = 0; i < kTiles; ++i) {
+    quantise(quantisation, 0.0, terrain(i), tiles.emplace_back());
+    encoded.push_back(encode_tile(kShape, tiles.back()));
+    payloads.emplace_back(encoded.back().payload_bytes);
+    inflate_exactly(encoded.back().deflated, payloads.back());
+  }
+}
+
+const Coded& coded(CodeType type) {
+  static const Coded u16(CodeType::kU16);
+  static const Coded u8(CodeType::kU8);
+  static const Coded f32(CodeType::kF32);
+  return type == CodeType::kU16 ? u16 : type == CodeType::kU8 ? u8 : f32;
+}
+
+Inside::Inside() : lattice(kShape), residuals(samples(), false), sorted(samples()) {
+  const std::vector<std::uint16_t>& codes = coded(CodeType::kU16).tiles[0].codes;
+  const auto columns = static_cast<std::size_t>(kShape.columns());
+  lattice.fill_rows_above(codes[0]);
+  for (int r = 0; r < kShape.rows(); ++r) {
+    const std::size_t at = static_cast<std::size_t>(r) * columns;
+    std::copy_n(codes.begin() + static_cast<std::ptrdiff_t>(at), columns, lattice.row(r));
+    lattice.close_row(r);
+  }
+  predictors = fit_predictors<std::int32_t>(lattice, 0, 65534, coding_effort(kDefaultLevel).fit);
+  std::vector<std::int32_t> halves(columns);
+  std::vector<std::vector<std::uint8_t>> magnitudes(3, std::vector<std::uint8_t>(columns + 8));
+  for (int r = 0; r < kShape.rows(); ++r) {
+    const std::size_t at = static_cast<std::size_t>(r) * columns;
+    predict_row<std::int32_t>(lattice, r, predictors, 0, 65534, halves);
+    fold_row(lattice.row(r), halves.data(), kShape.columns(), residuals.folded.data() + at);
+    for (std::size_t c = 0; c < columns; ++c) magnitudes[0][c + 3] = magnitude(residuals.folded.data()[at + c], 0);
+    find_activities(magnitudes[1].data() + 3, magnitudes[2].data() + 3, 0, kShape.columns() - 1,
+                    residuals.activities.data() + at);
+    std::swap(magnitudes[2], magnitudes[1]);
+    std::swap(magnitudes[1], magnitudes[0]);
+  }
+  for (std::size_t i = 0; i < samples(); ++i) {
+    symbols.push_back(static_cast<std::uint8_t>(symbol_of(residuals.folded.data()[i])));
+  }
+  histogram = count_activities({residuals.activities.data(), samples()});
+  thresholds = choose_thresholds(symbols, {residuals.activities.data(), samples()}, histogram,
+                                 coding_effort(kDefaultLevel).context_thinning);
+  streams = make_streams(residuals, coding_effort(kDefaultLevel), header);
+  const auto counts = sort_by_context(residuals, thresholds, histogram, sorted.data());
+  least.assign(counts[0], std::byte{0});
+  for (std::size_t i = 0; i < counts[0]; ++i) least[i] = static_cast<std::byte>(symbol_of(sorted.data()[i]));
+}
+
+Inside& inside() {
+  static Inside made;
+  return made;
+}
+
+namespace {
+
+std::size_t sample_bytes(CodeType type) {
+  return type == CodeType::kU16 ? 2 : type == CodeType::kU8 ? 1 : 4;
+}
+
+}  // namespace
+
+void set_samples(benchmark::State& state, std::size_t samples, CodeType type) {
+  state.SetBytesProcessed(static_cast<std::int64_t>(samples * sample_bytes(type)) * state.iterations());
+  state.SetItemsProcessed(static_cast<std::int64_t>(samples) * state.iterations());
+}
+
+}  // namespace isohf::bench

@@ -1,0 +1,110 @@
+// The decoding half of kernels_bench.
+
+#include <benchmark/benchmark.h>
+
+#include <array>
+#include <vector>
+
+#include "bench/coded_tiles.h"
+#include "isohf/archive/deflate.h"
+#include "isohf/archive/lane_decoder.h"
+#include "isohf/archive/pair_coding.h"
+#include "isohf/archive/residual_expander.h"
+#include "isohf/archive/residual_symbols.h"
+
+namespace isohf::bench {
+namespace {
+
+void inflate(benchmark::State& state) {
+  const Coded& of = coded(static_cast<CodeType>(state.range(0)));
+  std::vector<std::byte> out(of.payloads[0].size());
+  for (auto _ : state) {
+    inflate_exactly(of.encoded[0].deflated, out);
+    benchmark::DoNotOptimize(out.data());
+    benchmark::ClobberMemory();
+  }
+  set_samples(state, Inside::samples(), of.type);
+  state.SetLabel(to_string(of.type));
+}
+BENCHMARK(inflate)->Name("inflate")->DenseRange(0, 2);
+
+void unpair(benchmark::State& state) {
+  const std::vector<std::byte> pairs = pair_symbols(inside().least);
+  std::vector<std::byte> out(inside().least.size());
+  for (auto _ : state) {
+    ByteReader reader(pairs);
+    unpair_symbols(reader, out);
+    benchmark::DoNotOptimize(out.data());
+    benchmark::ClobberMemory();
+  }
+  set_samples(state, out.size());
+}
+BENCHMARK(unpair)->Name("symbols out of pairs");
+
+void expand(benchmark::State& state) {
+  std::vector<std::byte> symbols;
+  const std::uint16_t* const sorted = inside().sorted.data();
+  for (std::size_t i = 0; i < Inside::samples(); ++i) symbols.push_back(static_cast<std::byte>(symbol_of(sorted[i])));
+  std::vector<std::byte> extra = inside().streams.extra;
+  const std::size_t extra_bytes = extra.size();
+  extra.resize(extra_bytes + kExpanderSlack);
+  Scratch<std::uint16_t> folded(Inside::samples());
+  for (auto _ : state) {
+    if (expand_residuals(symbols, std::span(extra).first(extra_bytes), 0, folded.data()) == kNotExpanded) {
+      state.SkipWithError("the extra bits do not fit the symbols");
+    }
+    benchmark::ClobberMemory();
+  }
+  set_samples(state, Inside::samples());
+}
+BENCHMARK(expand)->Name("extra bits to symbols");
+
+void decode_side_by_side(benchmark::State& state) {
+  const Coded& of = coded(static_cast<CodeType>(state.range(1)));
+  const auto count = static_cast<std::size_t>(state.range(0));
+  const std::vector<std::span<const std::byte>> payloads(of.payloads.begin(),
+                                                         of.payloads.begin() + static_cast<std::ptrdiff_t>(count));
+  for (auto _ : state) {
+    std::vector<TileCodes> tiles(count);
+    std::array<bool, kTiles> is_decoded{};
+    decode_lanes(kShape, of.type, payloads, tiles, std::span(is_decoded).first(count));
+    if (!is_decoded[0]) state.SkipWithError("is not decoded in lanes");
+    benchmark::DoNotOptimize(tiles.data());
+  }
+  set_samples(state, count * Inside::samples(), of.type);
+  state.SetLabel(to_string(of.type));
+}
+BENCHMARK(decode_side_by_side)->Name("decode, tiles side by side")->ArgsProduct({{1, kTiles}, {0, 1, 2}});
+
+void decode_one(benchmark::State& state) {
+  const Coded& of = coded(static_cast<CodeType>(state.range(0)));
+  for (auto _ : state) {
+    const TileCodes tile = decode_tile(kShape, of.type, of.payloads[0]);
+    benchmark::DoNotOptimize(&tile);
+  }
+  set_samples(state, Inside::samples(), of.type);
+  state.SetLabel(to_string(of.type));
+}
+BENCHMARK(decode_one)->Name("decode, one tile")->DenseRange(0, 2);
+
+void decode_all(benchmark::State& state) {
+  const Coded& of = coded(static_cast<CodeType>(state.range(0)));
+  std::vector<std::vector<std::byte>> payloads = of.payloads;
+  for (auto _ : state) {
+    for (std::size_t i = 0; i < kTiles; ++i) inflate_exactly(of.encoded[i].deflated, payloads[i]);
+    const std::vector<std::span<const std::byte>> spans(payloads.begin(), payloads.end());
+    std::vector<TileCodes> tiles(kTiles);
+    std::array<bool, kTiles> is_decoded{};
+    decode_lanes(kShape, of.type, spans, tiles, is_decoded);
+    for (std::size_t i = 0; i < kTiles; ++i) {
+      if (!is_decoded[i]) tiles[i] = decode_tile(kShape, of.type, payloads[i]);
+    }
+    benchmark::DoNotOptimize(tiles.data());
+  }
+  set_samples(state, kTiles * Inside::samples(), of.type);
+  state.SetLabel(to_string(of.type));
+}
+BENCHMARK(decode_all)->Name("inflate and decode, eight tiles")->DenseRange(0, 2);
+
+}  // namespace
+}  // namespace isohf::bench
