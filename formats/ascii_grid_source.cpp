@@ -17,6 +17,7 @@
 #include "formats/letter_case.h"
 #include "formats/open_options.h"
 #include "formats/raw_file.h"
+#include "formats/row_places.h"
 #include "formats/text_tokens.h"
 #include "formats/wkt.h"
 #include "isohf/base/assert.h"
@@ -25,7 +26,6 @@
 namespace isohf {
 namespace {
 
-constexpr std::size_t kMostPlaces = 65536;
 const std::vector<std::string_view>& known_words() {
   static const std::vector<std::string_view> words = {
       "ncols", "ncol",      "nrows",       "nrow",   "xllcorner", "yllcorner", "xllcenter", "xllcentre", "yllcenter",
@@ -232,7 +232,7 @@ class AsciiGridSource final : public HeightSource {
     for (std::int64_t row = 0; row < info_.height; ++row) {
       for (std::int64_t column = 0; column < info_.width; ++column) {
         if (!any) refuse_short(row, column);
-        if (column == 0) note_row(row, words_.offset_of(word));
+        if (column == 0) places_.note(row, words_.offset_of(word));
         whole = check(word) && whole;
         end_of_last_ = words_.offset_of(word) + word.size();
         any = words_.next(word);
@@ -298,24 +298,13 @@ class AsciiGridSource final : public HeightSource {
       marker_ = value < -9999.0 ? "-32768" : "-9999";
   }
 
-  void note_row(std::int64_t row, std::uint64_t offset) {
-    if (row % stride_ != 0) return;
-    if (places_.size() == kMostPlaces) {
-      for (std::size_t i = 0; i < kMostPlaces / 2; ++i) places_[i] = places_[2 * i];
-      places_.resize(kMostPlaces / 2);
-      stride_ *= 2;
-      if (row % stride_ != 0) return;
-    }
-    places_.push_back(offset);
-  }
-
   /// Makes the number at (row, column) the next one to be read.
   void go_to(std::int64_t row, std::int64_t column) {
     const std::int64_t wanted = row * info_.width + column;
-    const std::int64_t place = row / stride_;
-    const std::int64_t noted = place * stride_ * info_.width;
+    const RowPlaces::Place place = places_.before(row);
+    const std::int64_t noted = place.row * info_.width;
     if (next_ < noted || next_ > wanted) {
-      words_.seek(places_[static_cast<std::size_t>(place)]);
+      words_.seek(place.offset_bytes);
       next_ = noted;
     }
     std::string_view word;
@@ -346,8 +335,7 @@ class AsciiGridSource final : public HeightSource {
   bool is_grass_ = false;
   bool is_esri_ = false;
   SourceInfo info_;
-  std::vector<std::uint64_t> places_;  // of every stride_-th row
-  std::int64_t stride_ = 1;
+  RowPlaces places_;
   std::int64_t next_ = std::numeric_limits<std::int64_t>::max();  // number that words_ reads next, counted by rows
   std::uint64_t end_of_last_ = 0;
   char decimal_ = 0;

@@ -25,6 +25,7 @@
 #include "formats/png_source.h"
 #include "formats/raw_file.h"
 #include "formats/raw_source.h"
+#include "formats/surfer_grid_source.h"
 #include "formats/tiff_source.h"
 #include "formats/usgs_dem_source.h"
 #include "isohf/base/error.h"
@@ -58,6 +59,7 @@ const std::vector<Reader>& readers() {
       {{"USGS DEM", {".dem"}}, looks_like_usgs_dem, open_usgs_dem, nullptr, true},
       {{"GTOPO30", {".dem"}}, nullptr, open_header_grid},
       {{"DTED", {".dt0", ".dt1", ".dt2"}}, looks_like_dted, open_dted, nullptr, true},
+      {{"Surfer grid", {".grd"}}, looks_like_surfer_grid, open_surfer_grid, nullptr, true},
       {{"SRTM HGT", {".hgt", ".hgt.zip"}}, nullptr, open_hgt, nullptr, true},
       {{"raw samples",
         {".r8", ".r16", ".r32", ".f32", ".f64", ".raw"},

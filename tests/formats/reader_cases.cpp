@@ -15,6 +15,7 @@
 #include "formats/png_source.h"
 #include "formats/raster_sink.h"
 #include "formats/raw_source.h"
+#include "formats/surfer_grid_source.h"
 #include "formats/tiff_source.h"
 #include "formats/usgs_dem_source.h"
 #include "formats/zip_archive.h"
@@ -43,6 +44,7 @@ std::string written(const TemporaryFolder& folder, const std::string& name, std:
   spec.sample_type = type;
   spec.channels = channels;
   spec.overwrite = true;
+  spec.describe = name == "described.png";
   spec.georeference = place_at(Registration::kArea, HorizontalUnit::kMetre, 5e5, 4e6, 10.0, 32632);
   spec.georeference->system.name = "WGS 84 / UTM zone 32N";
   if (!is_floating(type)) spec.void_value = 0.0;
@@ -235,6 +237,27 @@ std::string gzip(const std::string& contents) {
   return bytes;
 }
 
+/// As written where a format is little-endian.
+template <typename T>
+std::string little(T value) {
+  return {reinterpret_cast<const char*>(&value), sizeof(value)};
+}
+
+std::string surfer6() {
+  std::string bytes = "DSBB" + little(std::int16_t{4}) + little(std::int16_t{3});
+  for (const double value : {100.0, 130.0, 200.0, 220.0, 0.0, 9.0}) bytes += little(value);
+  for (int i = 0; i < 12; ++i) bytes += little(i == 5 ? 1.70141e38F : static_cast<float>(i));
+  return bytes;
+}
+
+std::string surfer7() {
+  std::string bytes = "DSRB" + little(4) + little(1) + "GRID" + little(72) + little(3) + little(4);
+  for (const double value : {100.0, 200.0, 10.0, 10.0, 0.0, 9.0, 0.0, 1.70141e38}) bytes += little(value);
+  bytes += "DATA" + little(96);
+  for (int i = 0; i < 12; ++i) bytes += little(static_cast<double>(i));
+  return bytes;
+}
+
 const char* const kEhdr =
     "BYTEORDER M\nLAYOUT BIL\nNROWS 3\nNCOLS 4\nNBANDS 1\nNBITS 16\nBANDROWBYTES 8\nTOTALROWBYTES 8\nBANDGAPBYTES 0\n"
     "PIXELTYPE SIGNEDINT\nNODATA -9999\nULXMAP 100.5\nULYMAP 200.5\nXDIM 0.5\nYDIM 0.5\n";
@@ -251,6 +274,8 @@ std::vector<ReaderCase> reader_cases() {
   const std::string grass = "north: 200\nsouth: 180\neast: 130\nwest: 100\nrows: 2\ncols: 3\nnull: -1\ntype: int\n";
   OpenOptions packed;
   packed.channel = "terrarium";
+  OpenOptions streamed;
+  streamed.unpacked_bytes = 0;
   std::vector<ReaderCase> cases = {
       {"ExrScanLines", "a.exr", written(folder, "a.exr", 5, 4, SampleType::kFloat32), open_exr, {}},
       {"ExrChannels", "a.exr", written(folder, "a.exr", 4, 3, SampleType::kFloat16, 4), open_exr, {}},
@@ -277,6 +302,11 @@ std::vector<ReaderCase> reader_cases() {
       {"UsgsDem", "a.dem", usgs_dem(), open_usgs_dem, {}},
       {"Hgt", "N10E010.hgt", counting(25, 2), open_hgt, {}},
       {"ZippedHgt", "N10E010.hgt.zip", zip("N10E010.hgt", counting(25, 2)), open_hgt, {}},
+      {"SurferText", "a.grd", "DSAA\n4 3\n100 130\n200 220\n0 9\n" + numbers, open_surfer_grid, {}},
+      {"Surfer6", "a.grd", surfer6(), open_surfer_grid, {}},
+      {"Surfer7", "a.grd", surfer7(), open_surfer_grid, {}},
+      {"StreamedAsciiGrid", "a.asc.gz", gzip(esri + numbers), open_ascii_grid, streamed},
+      {"PngDescription", "described.png.json", "", open_png, {}},
       {"RawDescription", "a.r16.json", "", open_raw, {}},
   };
   const auto find = [&](const char* name) -> ReaderCase& {
@@ -299,8 +329,12 @@ std::vector<ReaderCase> reader_cases() {
   raw.bytes = read_file(folder / "a.r16.json");
   raw.opened = "a.r16";
   raw.beside = {{"a.r16", counting(12, 2)}};
-  for (const char* name :
-       {"EsriAsciiGrid", "GrassAsciiGrid", "Pds3", "Isis3", "Isis3Label", "Dted", "UsgsDem", "RawDescription", "Npy"}) {
+  ReaderCase& picture = find("PngDescription");
+  picture.opened = "described.png";
+  picture.beside = {{picture.opened, written(folder, picture.opened, 6, 5, SampleType::kUint16)}};
+  picture.bytes = read_file(folder / picture.file_name);
+  for (const char* name : {"EsriAsciiGrid", "GrassAsciiGrid", "Pds3", "Isis3", "Isis3Label", "Dted", "UsgsDem",
+                           "PngDescription", "RawDescription", "Npy", "SurferText"}) {
     find(name).text = true;
   }
   // The last digits of a text can be missing without trace; a world file, a .prj and a label's last words are not
@@ -312,6 +346,8 @@ std::vector<ReaderCase> reader_cases() {
   find("EhdrProjection").shortest_valid = 1;
   find("Isis3Label").shortest_valid = find("Isis3Label").bytes.size() - 1;
   find("UsgsDem").shortest_valid = find("UsgsDem").bytes.find_last_not_of(' ') + 1;
+  find("SurferText").shortest_valid = find("SurferText").bytes.size() - 2;
+  find("PngDescription").shortest_valid = find("PngDescription").bytes.size() - 1;
   find("RawDescription").shortest_valid = find("RawDescription").bytes.size() - 1;
   find("TiffStripsDeflated").shortest_valid = 1;  // the tags that isohf writes come last, and not all are needed
   find("Hgt").shortest_valid = 1;                 // another square
