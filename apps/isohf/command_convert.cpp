@@ -338,14 +338,13 @@ int run(ConvertCommandOptions options) {
     print_plan(*source, options.convert, common);
     return kExitDone;
   }
-  if (common.verbose && !common.quiet) {
-    print_plan_notes(*source, options.convert);
-  }
+  const Plan plan = make_plan(source->info(), options.convert.plan);
+  if (common.verbose && !common.quiet) print_plan_notes(*source, plan, options.convert);
   const std::atomic<bool>& cancel = watch_interrupts();
   ConvertSummary summary = [&] {
     ProgressDisplay display(options.work.progress, common.quiet, common.verbose);
     return convert(
-        *source, options.output, options.convert,
+        *source, plan, options.output, options.convert,
         [&](const ConvertProgress& at) {
           using Pass = ConvertProgress::Pass;
           const char* const pass =

@@ -5,12 +5,12 @@
 #include <glob.h>
 
 #include <algorithm>
-#include <cctype>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <set>
 
+#include "formats/letter_case.h"
 #include "formats/registry.h"
 #include "isohf/base/error.h"
 
@@ -34,14 +34,8 @@ const std::set<std::string>& raster_extensions() {
   return known;
 }
 
-std::string lower(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return text;
-}
-
 bool has_raster_name(const fs::path& path) {
-  std::string name = lower(path.filename().string());
+  std::string name = lower_case(path.filename().string());
   if (name.starts_with(".")) return false;
   if (name.ends_with(".gz")) name.resize(name.size() - 3);
   return std::any_of(raster_extensions().begin(), raster_extensions().end(), [&](const std::string& extension) {
@@ -51,7 +45,7 @@ bool has_raster_name(const fs::path& path) {
 
 /// A detached label is read with the image beside it.
 bool is_label_of_another(const fs::path& path) {
-  if (lower(path.extension().string()) != ".lbl") return false;
+  if (lower_case(path.extension().string()) != ".lbl") return false;
   for (const char* extension : {".img", ".IMG", ".Img"}) {
     std::error_code ignored;
     if (fs::exists(fs::path(path).replace_extension(extension), ignored)) return true;

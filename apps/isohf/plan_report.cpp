@@ -102,8 +102,7 @@ void print_plan(const HeightSource& source, const ConvertOptions& options, const
   out.finish();
 }
 
-void print_plan_notes(const HeightSource& source, const ConvertOptions& options) {
-  const Plan plan = make_plan(source.info(), options.plan);
+void print_plan_notes(const HeightSource& source, const Plan& plan, const ConvertOptions& options) {
   std::istringstream lines(text_from_plan(source.info(), plan, plan_memory(source, plan, options), options.code_type));
   for (std::string line; std::getline(lines, line);) print_note("isohf: " + line);
 }

@@ -11,6 +11,6 @@ namespace isohf::cli {
 void print_plan(const HeightSource& source, const ConvertOptions& options, const CommonOptions& common);
 
 /// The same text on standard error, for -v.
-void print_plan_notes(const HeightSource& source, const ConvertOptions& options);
+void print_plan_notes(const HeightSource& source, const Plan& plan, const ConvertOptions& options);
 
 }  // namespace isohf::cli

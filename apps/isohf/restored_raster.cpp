@@ -7,6 +7,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "formats/letter_case.h"
 #include "isohf/projection/projection_wkt.h"
 #include "isohf/restore/archive_geometry.h"
 #include "output_grid.h"
@@ -14,13 +15,6 @@
 
 namespace isohf::cli {
 namespace {
-
-std::string extension_of(const std::string& path) {
-  std::string extension = std::filesystem::path(path).extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return extension;
-}
 
 RasterSpec plain_raster(const Metadata& metadata, const SampleGrid& grid, SampleType type) {
   RasterSpec spec;
@@ -83,7 +77,7 @@ RasterSpec raster_in_degrees(const Metadata& metadata, const OutputGrid& grid, S
 }  // namespace
 
 RasterKind raster_kind(const std::string& path) {
-  const std::string extension = extension_of(path);
+  const std::string extension = lower_case(std::filesystem::path(path).extension().string());
   if (extension == ".tif" || extension == ".tiff") return RasterKind::kTiff;
   if (extension == ".exr") return RasterKind::kExr;
   if (extension == ".png") return RasterKind::kPng;

@@ -147,9 +147,13 @@ void throw_if_cancelled(const std::atomic<bool>& cancel) {
 
 ConvertSummary convert(HeightSource& source, const std::string& output, const ConvertOptions& options,
                        const ProgressCallback& progress, const std::atomic<bool>& cancel) {
+  return convert(source, make_plan(source.info(), options.plan), output, options, progress, cancel);
+}
+
+ConvertSummary convert(HeightSource& source, const Plan& plan, const std::string& output, const ConvertOptions& options,
+                       const ProgressCallback& progress, const std::atomic<bool>& cancel) {
   const auto start = std::chrono::steady_clock::now();
   const SourceInfo& info = source.info();
-  const Plan plan = make_plan(info, options.plan);
   if (options.z_range) check_range(*options.z_range);
   if (options.shadow_seeds) check_seed_request(*options.shadow_seeds, plan.grid);
   const int threads = threads_of(options);

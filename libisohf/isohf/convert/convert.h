@@ -105,5 +105,8 @@ struct ConvertSummary {
 /// Throws Error as the source, the plan and the writer do.
 ConvertSummary convert(HeightSource& source, const std::string& output, const ConvertOptions& options,
                        const std::function<void(const ConvertProgress&)>& progress, const std::atomic<bool>& cancel);
+/// The same by a plan that make_plan() has made of this source and options.plan.
+ConvertSummary convert(HeightSource& source, const Plan& plan, const std::string& output, const ConvertOptions& options,
+                       const std::function<void(const ConvertProgress&)>& progress, const std::atomic<bool>& cancel);
 
 }  // namespace isohf
