@@ -82,8 +82,10 @@ class HgtSource final : public HeightSource {
       if (lower_case(member.name).ends_with(".hgt")) tiles.push_back(std::move(member));
     }
     if (tiles.size() != 1) {
-      throw Error(ErrorCode::kUnsupported,
-                  fmt::format("{}: {} .hgt files are in the archive, must be 1", info_.path, tiles.size()));
+      throw Error(
+          ErrorCode::kUnsupported,
+          fmt::format("{}: {} .hgt files are in the archive, must be 1; unpack it, a folder of them is one input",
+                      info_.path, tiles.size()));
     }
     file_.emplace(info_.path, tiles.front(), unpacked_bytes);
     const std::optional<HgtCorner> inside = hgt_corner_of(tiles.front().name);
@@ -152,6 +154,17 @@ class HgtSource final : public HeightSource {
 bool is_hgt_name(const std::string& path) {
   const std::string name = lower_case(without_gzip(path));
   return name.ends_with(".hgt") || name.ends_with(".hgt.zip");
+}
+
+bool is_zip_of_hgt(const std::string& path) {
+  if (!lower_case(path).ends_with(".zip")) return false;
+  try {
+    const std::vector<ZipMember> members = zip_members(RawFile(path));
+    return std::any_of(members.begin(), members.end(),
+                       [](const ZipMember& member) { return lower_case(member.name).ends_with(".hgt"); });
+  } catch (const Error&) {
+    return false;  // is something else, or too damaged to say
+  }
 }
 
 std::unique_ptr<HeightSource> open_hgt(const std::string& path, const OpenOptions& options) {

@@ -38,7 +38,7 @@ struct Reader {
   Format format;
   bool (*recognises)(std::span<const std::byte> head);  ///< nullptr: the extension decides
   std::unique_ptr<HeightSource> (*open)(const std::string& path, const OpenOptions& options);
-  /// Whether a file beside `path` describes it; nullptr where the format has no such files.
+  /// Whether `path` is one by what stands inside or beside it, whatever its name; nullptr: that is not looked for.
   bool (*described)(const std::string& path) = nullptr;
   bool in_gzip = false;  ///< reads what is inside a .gz
 };
@@ -60,7 +60,7 @@ const std::vector<Reader>& readers() {
       {{"GTOPO30", {".dem"}}, nullptr, open_header_grid},
       {{"DTED", {".dt0", ".dt1", ".dt2"}}, looks_like_dted, open_dted, nullptr, true},
       {{"Surfer grid", {".grd"}}, looks_like_surfer_grid, open_surfer_grid, nullptr, true},
-      {{"SRTM HGT", {".hgt", ".hgt.zip"}}, nullptr, open_hgt, nullptr, true},
+      {{"SRTM HGT", {".hgt", ".hgt.zip"}}, nullptr, open_hgt, is_zip_of_hgt, true},
       {{"raw samples",
         {".r8", ".r16", ".r32", ".f32", ".f64", ".raw"},
         nullptr,

@@ -206,6 +206,17 @@ TEST_F(HgtSource, NeverCrashesOnADamagedArchive) {
   }
 }
 
+TEST_F(HgtSource, IsFoundInAnArchiveOfAnotherName) {
+  const std::string path = write("NASADEM_HGT_n44e006.zip", zipped("n44e006.hgt", tile(7, 7), true));
+  EXPECT_TRUE(is_zip_of_hgt(path));
+  const auto source = open_source(path, {});
+  EXPECT_EQ(source->info().format, "SRTM HGT");
+  EXPECT_EQ(source->info().georeference.origin_y, 45.0);
+  EXPECT_FALSE(is_zip_of_hgt(write("other.zip", zipped("readme.txt", tile(3, 3), true))));
+  EXPECT_FALSE(is_zip_of_hgt(write("none.zip", tile(3, 3))));
+  EXPECT_FALSE(is_zip_of_hgt(folder_ / "absent.zip"));
+}
+
 TEST_F(HgtSource, RefusesWhatIsNoTile) {
   EXPECT_EQ(code_of(write("N01E001.hgt", {})), ErrorCode::kCorrupt);
   EXPECT_EQ(code_of(write("N01E001.hgt", std::vector<std::byte>(2))), ErrorCode::kCorrupt);
