@@ -160,6 +160,24 @@ TEST_F(Convert, VoidsStayVoidAndAreCounted) {
   }
 }
 
+TEST_F(Convert, AHoleOnOneSideAloneIsCountedAsAFault) {
+  auto whole = hills();
+  auto holed = hills();
+  holed.mutable_info().void_values = {-32768.0};
+  for (std::int64_t r = 20; r < 50; ++r) {
+    for (std::int64_t c = 30; c < 60; ++c) holed.at(c, r) = -32768;
+  }
+  (void)run(whole, path("whole.isohf"), small_tiles());
+  (void)run(holed, path("holed.isohf"), small_tiles());
+  const std::atomic<bool> cancel = false;
+  const AccuracyReport invented = compare_with_source(ArchiveReader(path("whole.isohf")), holed, 0, 0, {}, cancel);
+  EXPECT_GT(invented.invented_inside, 400);  // of 30 x 30, but for a few samples at each side
+  EXPECT_EQ(invented.lost_inside, 0);
+  const AccuracyReport lost = compare_with_source(ArchiveReader(path("holed.isohf")), whole, 0, 0, {}, cancel);
+  EXPECT_GT(lost.lost_inside, 400);
+  EXPECT_EQ(lost.invented_inside, 0);
+}
+
 TEST_F(Convert, EveryFilterStaysInsideItsCodes) {
   // Steps of full height make every kernel with negative lobes overshoot.
   test::MemorySource<float> source(SampleType::kFloat32, 64, 64, [](std::int64_t c, std::int64_t r) {
