@@ -215,6 +215,14 @@ TEST_F(ProjectionCommand, ShadowsPicturesAndReportsOfAMapAreMade) {
   EXPECT_EQ(report.at("samples"), 240 * 160);
   EXPECT_FALSE(report.contains("ortho"));
   ASSERT_EQ(isohf({"shade", folder / "a.isohf", "-o", folder / "a.tif", "--size", "300x200"}).exit_code, 0);
+  ASSERT_EQ(isohf({"export", folder / "a.isohf", folder / "b.tif", "--size", "300x200"}).exit_code, 0);
+  OpenOptions green;
+  green.channel = "1";
+  const Georeference drawn = open_source(folder / "a.tif", green)->info().georeference;
+  const Georeference exported = open_source(folder / "b.tif", {})->info().georeference;
+  EXPECT_NEAR(drawn.origin_x, exported.origin_x, 1e-6);
+  EXPECT_NEAR(drawn.origin_y, exported.origin_y, 1e-6);
+  EXPECT_NEAR(drawn.spacing_x, exported.spacing_x, 1e-9);
   EXPECT_EQ(isohf({"verify", folder / "a.isohf"}).exit_code, 0);
 }
 

@@ -7,7 +7,9 @@
 
 #include "formats/registry.h"
 #include "isohf/archive/reader.h"
+#include "support/place_at.h"
 #include "support/plain_tiff.h"
+#include "support/raster.h"
 #include "support/run_program.h"
 #include "support/temporary_folder.h"
 
@@ -26,6 +28,7 @@ constexpr std::int16_t kVoid = -32768;
 struct Channel {
   std::int64_t width = 0;
   std::int64_t height = 0;
+  Georeference place;
   std::vector<std::byte> bytes;
   [[nodiscard]] int at(std::int64_t column, std::int64_t row) const {
     return static_cast<int>(bytes[static_cast<std::size_t>(row * width + column)]);
@@ -36,10 +39,7 @@ Channel read_channel(const std::string& path, const std::string& channel) {
   OpenOptions options;
   options.channel = channel;
   const auto source = open_source(path, options);
-  Channel out{source->info().width, source->info().height, {}};
-  out.bytes.resize(static_cast<std::size_t>(out.width * out.height));
-  source->read_window({0, 0, out.width, out.height}, out.bytes);
-  return out;
+  return {source->info().width, source->info().height, source->info().georeference, read_whole(*source)};
 }
 
 class ShadeCommand : public testing::Test {
@@ -144,6 +144,42 @@ TEST_F(ShadeCommand, VoidsAreTransparent) {
   const Channel alpha = read_channel(draw({"--size", "200x120"}), "3");
   EXPECT_EQ(alpha.at(5, 5), 0);
   EXPECT_EQ(alpha.at(60, 60), 255);
+}
+
+// The picture of a ramp under a western sun is the mirror image of its mirror image under an eastern one: a picture
+// that lay half a pixel off would be a pixel off, 5 of 255 grey levels here. --fit: colours are spread over all of the
+// tiles.
+TEST_F(ShadeCommand, PixelsLieOnTheGroundThatTheyShow) {
+  constexpr std::int64_t kSide = 12;
+  const auto drawn = [&](bool rises_east) {
+    std::vector<float> heights;
+    for (std::int64_t i = 0; i < kSide * kSide; ++i) {
+      heights.push_back(static_cast<float>(rises_east ? i % kSide : kSide - 1 - i % kSide));
+    }
+    RasterSpec spec;
+    spec.width = spec.height = kSide;
+    spec.sample_type = SampleType::kFloat32;
+    spec.georeference = place_at(Registration::kArea, HorizontalUnit::kMetre, 500005.0, 4000195.0, 10.0, 32632);
+    spec.overwrite = true;
+    write_raster(folder / "ramp.tif", spec, std::as_bytes(std::span(heights)));
+    EXPECT_EQ(run_isohf({"convert", folder / "ramp.tif", folder / "a.isohf", "--overwrite", "-q", "--fit"}).exit_code,
+              0);
+    const RunResult shaded = run_isohf({"shade", folder / "a.isohf", folder / "a.tif", "--overwrite", "-q", "--palette",
+                                        "gray", "--azimuth", rises_east ? "W" : "E", "--size", "12x12"});
+    EXPECT_EQ(shaded.exit_code, 0) << shaded.err;
+    const Channel green = read_channel(folder / "a.tif", "1");
+    EXPECT_NEAR(green.place.origin_x, 500005.0, 1e-6);
+    EXPECT_NEAR(green.place.origin_y, 4000195.0, 1e-6);
+    EXPECT_NEAR(green.place.spacing_x, 10.0, 1e-9);
+    EXPECT_EQ(green.place.registration, Registration::kArea);
+    return green;
+  };
+  const Channel east = drawn(true);
+  const Channel west = drawn(false);
+  for (std::int64_t c = 1; c < kSide - 1; ++c) {
+    EXPECT_NEAR(east.at(c, 6), west.at(kSide - 1 - c, 6), 1) << c;
+    EXPECT_GE(east.at(c, 6) - east.at(c - 1, 6), 4) << c;
+  }
 }
 
 TEST_F(ShadeCommand, AnySizeWorks) {
