@@ -56,8 +56,8 @@ class MosaicSource final : public HeightSource {
   OverlapRule rule_;
   std::uint64_t unpacked_bytes_;  ///< that all members together may hold
   ReaderPool pool_;
-  std::vector<std::byte>
-      parts_;  ///< of members that are read side by side; here because every thread's heap would grow
+  /// Of members that are read side by side; here because every thread's heap would grow.
+  std::vector<std::byte> parts_;
   std::vector<std::byte> strip_;  ///< rows of the strip that was read last
   std::int64_t strip_number_ = -1;
   std::int64_t strip_column_ = 0;  ///< the columns that strips hold: those that were asked for last

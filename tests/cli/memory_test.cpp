@@ -18,7 +18,7 @@ namespace {
 using testing::HasSubstr;
 
 constexpr std::int64_t kWidth = 60000;
-constexpr std::int64_t kHeight = 300;
+constexpr std::int64_t kHeight = kSanitized ? 100 : 300;
 
 /// Small but wide: hills as 16-bit samples without a header.
 std::string wide_raster() {
@@ -107,6 +107,7 @@ TEST(Memory, TheDryRunSaysTheLeastAndConvertTakesIt) {
 }
 
 TEST(Memory, CountsPackedTilesAloneAndInAMosaic) {
+  if (kSanitized) GTEST_SKIP() << "memory is what this is about; PackedTile and PackedMosaic run under the sanitizers";
   const TemporaryFolder folder;
   constexpr std::size_t kSide = 3601;
   std::string tile(kSide * kSide * 2, '\0');  // 26 MB
@@ -118,7 +119,6 @@ TEST(Memory, CountsPackedTilesAloneAndInAMosaic) {
   const std::string packed = gzipped(tile);
   std::vector<std::string> tiles;
   for (const char* name : {"N45E006.hgt.gz", "N45E007.hgt.gz", "N45E008.hgt.gz"}) {
-    if (kSanitized && !tiles.empty()) break;
     tiles.push_back(folder / name);
     write_file(tiles.back(), packed);
   }
@@ -138,11 +138,7 @@ TEST(Memory, CountsPackedTilesAloneAndInAMosaic) {
       if (inputs.size() > 1 && memory == std::string("36")) continue;  // a strip of three tiles takes more
       const double peak = convert(inputs, memory);
       EXPECT_TRUE(read_file(folder / "a.isohf") == expected) << memory;
-#ifndef __SANITIZE_ADDRESS__
       EXPECT_LE(peak, 1.1e6 * std::stod(memory));
-#else
-      (void)peak;
-#endif
     }
   }
 }

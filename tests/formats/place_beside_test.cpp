@@ -37,10 +37,9 @@ TEST_F(PlaceBeside, WorldFileAndPrjPlaceAPicture) {
   beside("a.prj", kDegrees);
   const std::string data = std::string(ISOHF_SOURCE_DIR) + "/testdata/";
   std::filesystem::copy_file(data + "peaks_256x256_uint16.png", folder_ / "a.png");
-  std::filesystem::copy_file(data + "ridges_161x161_float.exr", folder_ / "a.exr");
   (void)graymap("a.pgm");
-  // Read by libpng, OpenEXR and OpenImageIO.
-  for (const auto& [picture, world] : {std::pair("a.png", "a.pgw"), {"a.exr", "a.erw"}, {"a.pgm", "a.pmw"}}) {
+  // Read by libpng and OpenImageIO; OpenEXR has its threads and a test of its own (ExrSource).
+  for (const auto& [picture, world] : {std::pair("a.png", "a.pgw"), {"a.pgm", "a.pmw"}}) {
     SCOPED_TRACE(picture);
     beside(world, "0.5\n0\n0\n-0.25\n10.25\n50\n");
     const Georeference place = open_source(folder_ / picture, {})->info().georeference;
