@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstring>
 
+#include "isohf/archive/byte_counts.h"
 #include "isohf/archive/huffman_code.h"
 
 namespace isohf {
@@ -122,21 +123,6 @@ void DeflateWriter::finish() {
 }
 
 namespace {
-
-/// How often each byte occurs. Four tables: one alone would wait for its own counts where bytes repeat.
-std::array<std::uint32_t, 256> count_bytes(std::span<const std::byte> bytes) {
-  std::array<std::array<std::uint32_t, 256>, 4> counts{};
-  const auto count = [&](std::size_t lane, std::size_t i) { ++counts[lane][std::to_integer<std::size_t>(bytes[i])]; };
-  std::size_t i = 0;
-  for (; i + 4 <= bytes.size(); i += 4) {
-    for (std::size_t lane = 0; lane < 4; ++lane) count(lane, i + lane);
-  }
-  for (; i < bytes.size(); ++i) count(0, i);
-  for (std::size_t byte = 0; byte < 256; ++byte) {
-    counts[0][byte] += counts[1][byte] + counts[2][byte] + counts[3][byte];
-  }
-  return counts[0];
-}
 
 /// Whole bits that one occurrence of each byte costs, rounded up, and so the run from which on a match is cheaper.
 std::array<std::uint32_t, 256> shortest_worthwhile_runs(const std::array<std::uint32_t, 256>& counts,

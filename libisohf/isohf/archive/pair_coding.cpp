@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "isohf/archive/byte_counts.h"
 #include "isohf/archive/code_cost.h"
 #include "isohf/archive/huffman_code.h"
 #include "isohf/base/error.h"
@@ -15,10 +16,8 @@ constexpr std::size_t kFewSymbols = 256;     // below, a larger table eats the g
 constexpr std::uint64_t kBitsPerSymbol = 4;  // of a code length in a block header
 constexpr unsigned kCodeLimit = 15;
 
-using Counts = std::array<std::uint32_t, 256>;
-
 /// What a Huffman code of these takes, table included.
-std::uint64_t huffman_bits(const Counts& counts) {
+std::uint64_t huffman_bits(const ByteCounts& counts) {
   std::array<std::uint8_t, 256> lengths{};
   build_code_lengths(counts, kCodeLimit, lengths);
   std::uint64_t bits = 0;
@@ -29,7 +28,7 @@ std::uint64_t huffman_bits(const Counts& counts) {
 }
 
 /// A bound from below of the same: fast, and close for codes of many symbols.
-std::uint64_t entropy_bits(const Counts& counts) {
+std::uint64_t entropy_bits(const ByteCounts& counts) {
   std::uint64_t total = 0;
   std::uint64_t parts = 0;
   std::uint64_t used = 0;
@@ -66,13 +65,18 @@ void encode_pairs(std::span<const std::byte> symbols, const Put& put) {
 
 bool pairs_pay(std::span<const std::byte> symbols) {
   if (symbols.size() < kFewSymbols) return false;
-  Counts single{};
-  for (const std::byte symbol : symbols) ++single[std::to_integer<std::size_t>(symbol)];
+  const ByteCounts single = count_bytes(symbols);
   // Codes of many likely symbols waste little; so most contexts are done with here.
   if (*std::max_element(single.begin(), single.end()) < symbols.size() / 5) return false;
-  Counts paired{};
-  encode_pairs(symbols, [&](unsigned byte) { ++paired[byte]; });
-  const std::uint64_t bits = entropy_bits(paired);
+  // Two tables in turn, for the reason that count_bytes has four.
+  std::array<ByteCounts, 2> paired{};
+  std::size_t turn = 0;
+  encode_pairs(symbols, [&](unsigned byte) {
+    ++paired[turn][byte];
+    turn ^= 1U;
+  });
+  for (std::size_t byte = 0; byte < paired[0].size(); ++byte) paired[0][byte] += paired[1][byte];
+  const std::uint64_t bits = entropy_bits(paired[0]);
   return bits + bits / 64 < huffman_bits(single);
 }
 
