@@ -1,29 +1,14 @@
 #include "isohf/archive/deflate_writer.h"
 
 #include <gtest/gtest.h>
-#include <zlib.h>
 
 #include <random>
 
+#include "archive/zlib_inflate.h"
 #include "isohf/archive/deflate.h"
 
 namespace isohf {
 namespace {
-
-std::vector<std::byte> inflate_with_zlib(const std::vector<std::byte>& deflated, std::size_t size) {
-  std::vector<std::byte> out(size + 1);
-  z_stream stream{};
-  stream.next_in = const_cast<Bytef*>(reinterpret_cast<const Bytef*>(deflated.data()));
-  stream.avail_in = static_cast<uInt>(deflated.size());
-  stream.next_out = reinterpret_cast<Bytef*>(out.data());
-  stream.avail_out = static_cast<uInt>(out.size());
-  EXPECT_EQ(inflateInit2(&stream, -MAX_WBITS), Z_OK);
-  EXPECT_EQ(inflate(&stream, Z_FINISH), Z_STREAM_END) << (stream.msg == nullptr ? "" : stream.msg);
-  EXPECT_EQ(stream.avail_in, 0U);
-  out.resize(stream.total_out);
-  inflateEnd(&stream);
-  return out;
-}
 
 /// Bytes with values below `values`, each repeated up to `run` times.
 std::vector<std::byte> make_bytes(std::size_t size, unsigned values, unsigned run, std::uint32_t seed) {
@@ -49,7 +34,7 @@ TEST(DeflateWriter, IsReadByZlib) {
         writer.add(all.first(size / 3));
         writer.add(all.subspan(size / 3));
         writer.finish();
-        ASSERT_EQ(inflate_with_zlib(deflated, size), bytes);
+        ASSERT_EQ(test::inflate_with_zlib(deflated, size), bytes);
         std::vector<std::byte> back(size);
         inflate_exactly(deflated, back);
         ASSERT_EQ(back, bytes);

@@ -1,13 +1,13 @@
 #include "isohf/archive/tile_codec.h"
 
 #include <gtest/gtest.h>
-#include <zlib.h>
 
 #include <bit>
 #include <cstring>
 #include <random>
 
 #include "archive/tiles.h"
+#include "archive/zlib_inflate.h"
 #include "isohf/archive/content_hash.h"
 #include "isohf/archive/deflate.h"
 #include "isohf/archive/tile_payload.h"
@@ -31,22 +31,6 @@ std::vector<std::byte> payload_of(const EncodedTile& tile) {
   return payload;
 }
 
-/// What zlib, which knows nothing of us, makes of the stream.
-std::vector<std::byte> inflate_with_zlib(const EncodedTile& tile) {
-  std::vector<std::byte> out(tile.payload_bytes + 1);
-  z_stream stream{};
-  stream.next_in = const_cast<Bytef*>(reinterpret_cast<const Bytef*>(tile.deflated.data()));
-  stream.avail_in = static_cast<uInt>(tile.deflated.size());
-  stream.next_out = reinterpret_cast<Bytef*>(out.data());
-  stream.avail_out = static_cast<uInt>(out.size());
-  EXPECT_EQ(inflateInit2(&stream, -MAX_WBITS), Z_OK);
-  EXPECT_EQ(inflate(&stream, Z_FINISH), Z_STREAM_END) << (stream.msg == nullptr ? "" : stream.msg);
-  EXPECT_EQ(stream.avail_in, 0U);
-  out.resize(stream.total_out);
-  inflateEnd(&stream);
-  return out;
-}
-
 TEST(TileCodec, BringsBackEverySampleOfEveryKindOfTile) {
   for (const TileShape& shape : shapes()) {
     for (const CodeType type : kAllTypes) {
@@ -60,7 +44,7 @@ TEST(TileCodec, BringsBackEverySampleOfEveryKindOfTile) {
           ASSERT_EQ(encoded.is_empty, kind == Kind::kAllVoid);
           if (encoded.is_empty) continue;
           const std::vector<std::byte> payload = payload_of(encoded);
-          EXPECT_EQ(payload, inflate_with_zlib(encoded));
+          EXPECT_EQ(payload, test::inflate_with_zlib(encoded.deflated, encoded.payload_bytes));
           EXPECT_EQ(crc32(payload), encoded.payload_crc32);
           EXPECT_LE(payload.size(), max_payload_bytes(shape, type));
           ASSERT_TRUE(test::same_samples(decode_tile(shape, type, payload), tile));

@@ -39,6 +39,25 @@ constexpr auto kMatchCodes = make_match_codes();
 
 }  // namespace
 
+/// Bits on their way to memory that has room for them.
+struct DeflateWriter::BitsOut {
+  std::byte* next;
+  std::uint64_t bits;
+  unsigned count;
+
+  void put(std::uint64_t value, unsigned length) {
+    bits |= value << count;
+    count += length;
+  }
+  void flush_words() {
+    if (count < 32) return;
+    std::memcpy(next, &bits, 4);
+    next += 4;
+    bits >>= 32U;
+    count -= 32;
+  }
+};
+
 struct DeflateWriter::Header {
   unsigned literal_count = 257;
   unsigned distance_length = 0;     ///< of the only distance code, 0 where there are no matches
@@ -241,62 +260,46 @@ void DeflateWriter::write_header(const Header& header) {
   }
 }
 
-void DeflateWriter::write_tokens(const Code& code, unsigned distance_bits) {
-  // The distance is always 1: code 0, all zero bits. 26 bits at most a token, so 4 bytes' room each.
+template <typename Write>
+void DeflateWriter::write_codes(const Code& code, std::size_t most_bytes, Write write) {
   const std::size_t at = out_->size();
-  out_->resize(at + 4 * tokens_.size() + 16);
-  std::byte* to = out_->data() + at;
-  std::uint64_t bits = bits_;
-  unsigned count = bit_count_;
-  for (const std::uint16_t token : tokens_) {
-    if (token < 256) {
-      bits |= std::uint64_t{code.codes[token]} << count;
-      count += code.lengths[token];
-    } else {
-      const MatchCode& match = kMatchCodes[token - 256U];
-      bits |= std::uint64_t{code.codes[match.symbol]} << count;
-      count += code.lengths[match.symbol];
-      bits |= std::uint64_t{match.extra} << count;
-      count += match.extra_bits + distance_bits;
-    }
-    if (count >= 32) {
-      std::memcpy(to, &bits, 4);
-      to += 4;
-      bits >>= 32U;
-      count -= 32;
-    }
-  }
-  out_->resize(static_cast<std::size_t>(to - out_->data()));
-  bits_ = bits;
-  bit_count_ = count;
+  out_->resize(at + most_bytes + 16);
+  BitsOut to = {out_->data() + at, bits_, bit_count_};
+  write(to);
+  out_->resize(static_cast<std::size_t>(to.next - out_->data()));
+  bits_ = to.bits;
+  bit_count_ = to.count;
   put(code.codes[kEndOfBlock], code.lengths[kEndOfBlock]);
 }
 
-void DeflateWriter::write_literals(const Code& code, std::span<const std::byte> bytes) {
-  const std::size_t at = out_->size();
-  out_->resize(at + 2 * bytes.size() + 16);
-  std::byte* to = out_->data() + at;
-  std::uint64_t bits = bits_;
-  unsigned count = bit_count_;
-  const auto add = [&](std::byte byte) {
-    const auto symbol = std::to_integer<std::size_t>(byte);
-    bits |= std::uint64_t{code.codes[symbol]} << count;
-    count += code.lengths[symbol];
-  };
-  for (std::size_t i = 0; i < bytes.size(); i += 2) {
-    add(bytes[i]);
-    if (i + 1 < bytes.size()) add(bytes[i + 1]);
-    if (count >= 32) {  // 31 + 2·15 bits fit
-      std::memcpy(to, &bits, 4);
-      to += 4;
-      bits >>= 32U;
-      count -= 32;
+void DeflateWriter::write_tokens(const Code& code, unsigned distance_bits) {
+  // The distance is always 1: code 0, all zero bits. 26 bits at most a token, so 4 bytes' room each.
+  write_codes(code, 4 * tokens_.size(), [&](BitsOut& to) {
+    for (const std::uint16_t token : tokens_) {
+      if (token < 256) {
+        to.put(code.codes[token], code.lengths[token]);
+      } else {
+        const MatchCode& match = kMatchCodes[token - 256U];
+        to.put(code.codes[match.symbol], code.lengths[match.symbol]);
+        to.put(match.extra, match.extra_bits + distance_bits);
+      }
+      to.flush_words();
     }
-  }
-  out_->resize(static_cast<std::size_t>(to - out_->data()));
-  bits_ = bits;
-  bit_count_ = count;
-  put(code.codes[kEndOfBlock], code.lengths[kEndOfBlock]);
+  });
+}
+
+void DeflateWriter::write_literals(const Code& code, std::span<const std::byte> bytes) {
+  write_codes(code, 2 * bytes.size(), [&](BitsOut& to) {
+    const auto add = [&](std::byte byte) {
+      const auto symbol = std::to_integer<std::size_t>(byte);
+      to.put(code.codes[symbol], code.lengths[symbol]);
+    };
+    for (std::size_t i = 0; i < bytes.size(); i += 2) {
+      add(bytes[i]);
+      if (i + 1 < bytes.size()) add(bytes[i + 1]);
+      to.flush_words();  // 31 + 2·15 bits fit
+    }
+  });
 }
 
 }  // namespace isohf

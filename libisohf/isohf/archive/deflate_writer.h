@@ -30,6 +30,7 @@ class DeflateWriter {
   };
   /// How a dynamic block describes its code.
   struct Header;
+  struct BitsOut;
 
   static Header describe(const Code& code, bool has_matches);
   void put(std::uint64_t bits, unsigned count);
@@ -37,6 +38,9 @@ class DeflateWriter {
   void write_block(std::span<const std::byte> bytes);
   void write_stored(std::span<const std::byte> bytes);
   void write_header(const Header& header);
+  /// What write(BitsOut&) puts, most_bytes at most, and the end of the block.
+  template <typename Write>
+  void write_codes(const Code& code, std::size_t most_bytes, Write write);
   void write_literals(const Code& code, std::span<const std::byte> bytes);
   void write_tokens(const Code& code, unsigned distance_bits);
 

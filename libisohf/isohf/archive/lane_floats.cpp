@@ -17,13 +17,12 @@ namespace isohf {
 namespace {
 
 constexpr std::size_t kLanes = kDecoderLanes;
-constexpr std::ptrdiff_t kStep = kLanes;
+constexpr std::ptrdiff_t kStep = LaneRing::kStep;
 
 using Ints = std::int32_t __attribute__((vector_size(4 * kLanes)));
 using Words = std::uint32_t __attribute__((vector_size(4 * kLanes)));
 
 /// Where the sample of each weight stands from the predicted one (Neighbours::of_weight), NE's last.
-enum class LaneRow : std::uint8_t { kOwn, kNorth, kFar, kFarther };
 struct Term {
   LaneRow row;
   int place;
@@ -38,19 +37,7 @@ constexpr std::array<Term, kWeightCount + 1> kTerms = {{
     {LaneRow::kFar, 3},     {LaneRow::kFar, -3},     {LaneRow::kNorth, 0},
 }};
 
-/// The rows of all lanes, lane by lane at each place.
-struct LaneRows {
-  std::int32_t* own;
-  const std::int32_t* north;
-  const std::int32_t* far;
-  const std::int32_t* farther;
-  const std::uint32_t* folded;
-  const std::uint8_t* is_void;  ///< by place and lane; told where a lane has voids in the row
-
-  [[nodiscard]] const std::int32_t* of(LaneRow row) const {
-    return row == LaneRow::kNorth ? north : row == LaneRow::kFar ? far : farther;
-  }
-};
+using Rows = LaneRows<std::uint32_t>;
 
 /// Sums are those of samples and weights and half a sample, 2^11: bits from the twelfth on are the prediction, and the
 /// eleventh is set where it was not rounded up. At (low << 12) + 2^11 they reach the range, at (high << 12) + 2^11 they
@@ -63,7 +50,7 @@ constexpr bool is_summed_above(std::size_t term, bool is_near) {
 
 /// A place lane by lane: what the other kernel does for all at once.
 template <bool kIsNear, bool kWithVoids>
-[[gnu::always_inline]] inline void restore_place_plainly(const LaneRows& rows, const FloatStretch& weights, int place,
+[[gnu::always_inline]] inline void restore_place_plainly(const Rows& rows, const FloatStretch& weights, int place,
                                                          LaneRange& range) {
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
     const std::ptrdiff_t at = place * kStep + static_cast<std::ptrdiff_t>(lane);
@@ -75,7 +62,7 @@ template <bool kIsNear, bool kWithVoids>
                          std::int64_t{weights[kFarWest].all[lane]} * rows.own[at - 2 * kStep];
       for (std::size_t term = 0; term < kTerms.size(); ++term) {
         if (!is_summed_above(term, kIsNear)) continue;
-        sum += std::int64_t{weights[term].all[lane]} * rows.of(kTerms[term].row)[at + kTerms[term].place * kStep];
+        sum += std::int64_t{weights[term].all[lane]} * rows.above(kTerms[term].row)[at + kTerms[term].place * kStep];
       }
       const std::uint32_t residual = unzigzag(rows.folded[at]);
       const std::int64_t low = range.low[lane];
@@ -128,7 +115,7 @@ template <bool kIsWide>
 }
 
 template <bool kIsWide, bool kIsNear, bool kWithVoids>
-[[gnu::always_inline]] inline void restore_places_widely(const LaneRows& rows, const FloatStretch& weights, int begin,
+[[gnu::always_inline]] inline void restore_places_widely(const Rows& rows, const FloatStretch& weights, int begin,
                                                          int end, LaneRange& range) {
   using Bytes = std::int8_t __attribute__((vector_size(kLanes)));
   const auto bound_of = [](Ints value) { return (Longs)((LongWords)value << 32U) >> (32 - kWeightBits); };
@@ -151,7 +138,7 @@ template <bool kIsWide, bool kIsNear, bool kWithVoids>
 #pragma GCC unroll 19
     for (std::size_t term = 0; term < kTerms.size(); ++term) {
       if (!is_summed_above(term, kIsNear)) continue;
-      const Ints samples = unaligned<Ints>(rows.of(kTerms[term].row) + at + kTerms[term].place * kStep).value;
+      const Ints samples = unaligned<Ints>(rows.above(kTerms[term].row) + at + kTerms[term].place * kStep).value;
       even += multiply<kIsWide>(samples, weights[term].all);
       odd += multiply<kIsWide>(odd_lanes(samples), weights[term].of_odd);
     }
@@ -189,7 +176,7 @@ template <bool kIsWide, bool kIsNear, bool kWithVoids>
 #endif
 
 template <bool kIsWide, bool kIsNear, bool kWithVoids>
-[[gnu::always_inline]] inline void restore_places(const LaneRows& rows, const FloatStretch& weights, int begin, int end,
+[[gnu::always_inline]] inline void restore_places(const Rows& rows, const FloatStretch& weights, int begin, int end,
                                                   LaneRange& range) {
 #if defined(ISOHF_HAS_WIDE)
   if constexpr (kIsWide) return restore_places_widely<kIsWide, kIsNear, kWithVoids>(rows, weights, begin, end, range);
@@ -200,17 +187,17 @@ template <bool kIsWide, bool kIsNear, bool kWithVoids>
 }
 
 ISOHF_TWO_WAYS(void, restore_near,
-               (const LaneRows& rows, const FloatStretch& weights, int begin, int end, LaneRange& range),
+               (const Rows& rows, const FloatStretch& weights, int begin, int end, LaneRange& range),
                (rows, weights, begin, end, range)) {
   restore_places<kIsWide, true, false>(rows, weights, begin, end, range);
 }
 ISOHF_TWO_WAYS(void, restore_widely,
-               (const LaneRows& rows, const FloatStretch& weights, int begin, int end, LaneRange& range),
+               (const Rows& rows, const FloatStretch& weights, int begin, int end, LaneRange& range),
                (rows, weights, begin, end, range)) {
   restore_places<kIsWide, false, false>(rows, weights, begin, end, range);
 }
 ISOHF_TWO_WAYS(void, restore_with_voids,
-               (const LaneRows& rows, const FloatStretch& weights, int begin, int end, LaneRange& range),
+               (const Rows& rows, const FloatStretch& weights, int begin, int end, LaneRange& range),
                (rows, weights, begin, end, range)) {
   restore_places<kIsWide, false, true>(rows, weights, begin, end, range);
 }
@@ -254,75 +241,51 @@ void repeat_sample(const std::int32_t* from, std::int32_t* out, int count) {
 
 }  // namespace
 
-LaneFloats::LaneFloats(const TileShape& shape)
-    : columns_(shape.columns()),
-      stride_(kStep * (columns_ + 2 * kLaneMargin)),
-      samples_(4 * static_cast<std::size_t>(stride_)) {}
+LaneFloats::LaneFloats(const TileShape& shape) : columns_(shape.columns()), ring_(columns_), stretches_(columns_) {}
 
 void LaneFloats::open(const PayloadHeader& header) {
-  const std::size_t lane = headers_.size();
-  headers_.push_back(&header);
-  for (std::size_t i = lane; i < samples_.size(); i += kLanes) samples_[i] = header.base;
+  const std::size_t lane = stretches_.lanes();
+  stretches_.open(header);
+  ring_.fill(lane, header.base);
   range_.low[lane] = header.low;
   range_.high[lane] = header.high;
   dropped_[lane] = header.dropped_bits;
-  is_wide_ |= header.predictors.is_wide;
 }
 
 void LaneFloats::restore_row(int r, const LaneResiduals<std::uint32_t>& residuals) {
   const int first = Lattice<std::int64_t>::first(r);
   const int last = r % 2 == 0 ? columns_ - 2 : columns_ - 1;
-  std::int32_t* const own = row(r);
-  const std::int32_t* const north = row(r - 1) + r % 2 * kStep;
-  repeat_sample(north + first * kStep, own + (first - 2) * kStep, 2);
-  if (r <= 3 || r % kBlockPlaces == 0) gather_weights(r);
+  const Rows rows = ring_.around(r, residuals);
+  repeat_sample(rows.north + first * kStep, rows.own + (first - 2) * kStep, 2);
+  stretches_.take_row(r, [](FloatStretch& weights, std::size_t lane, const PredictorWeights& of_lane, int anchor) {
+    for (std::size_t term = 0; term < kTerms.size(); ++term) {
+      weights[term].all[lane] = term < kWeightCount ? of_lane[term] : anchor;
+      if (lane % 2 != 0) weights[term].of_odd[lane - 1] = weights[term].all[lane];
+    }
+  });
   range_.least_seen = range_.low;
   range_.most_seen = range_.high;
-  const LaneRows rows = {own, north, row(r - 2), row(r - 3) + r % 2 * kStep, residuals.folded(), residuals.is_void()};
-  for (std::size_t stretch = 0; stretch < weights_.size(); ++stretch) {
-    const int begin = std::max(first, static_cast<int>(stretch) * kBlockPlaces);
-    const bool is_last = stretch + 1 == weights_.size();
-    const int end = is_last ? last + 1 : std::min(last + 1, static_cast<int>(stretch + 1) * kBlockPlaces);
+  stretches_.for_each(first, last, [&](const FloatStretch& weights, int begin, int end) {
     if (residuals.has_voids()) {
-      restore_with_voids(rows, weights_[stretch], begin, end, range_);
-    } else if (is_wide_) {
-      restore_widely(rows, weights_[stretch], begin, end, range_);
+      restore_with_voids(rows, weights, begin, end, range_);
+    } else if (stretches_.is_wide()) {
+      restore_widely(rows, weights, begin, end, range_);
     } else {
-      restore_near(rows, weights_[stretch], begin, end, range_);
+      restore_near(rows, weights, begin, end, range_);
     }
-  }
-  repeat_sample(own + first * kStep, own - kLaneMargin * kStep, first + kLaneMargin);
-  repeat_sample(own + last * kStep, own + (last + 1) * kStep, columns_ + kLaneMargin - last - 1);
+  });
+  repeat_sample(rows.own + first * kStep, rows.own - kLaneMargin * kStep, first + kLaneMargin);
+  repeat_sample(rows.own + last * kStep, rows.own + (last + 1) * kStep, columns_ + kLaneMargin - last - 1);
 }
 
 void LaneFloats::write_row(int r, const PerLane<float*>& heights) const {
   const auto step = static_cast<int>(kLanes);
   const int last = r % 2 == 0 ? columns_ - 2 : columns_ - 1;
   int place = Lattice<std::int64_t>::first(r);
-  for (; place + step <= last + 1; place += step) turn_square(row(r) + place * kStep, dropped_, heights, place);
+  for (; place + step <= last + 1; place += step) turn_square(ring_.row(r) + place * kStep, dropped_, heights, place);
   for (; place <= last; ++place) {
-    for (std::size_t lane = 0; lane < headers_.size(); ++lane)
+    for (std::size_t lane = 0; lane < stretches_.lanes(); ++lane)
       heights[lane][place] = stored(sample(r, place, lane), lane);
-  }
-}
-
-/// The weights of all lanes for row r and those below it in its blocks: one stretch where no lane has a map.
-void LaneFloats::gather_weights(int r) {
-  const bool has_map = r > 2 && std::any_of(headers_.begin(), headers_.end(), [](const PayloadHeader* header) {
-                         return !header->predictors.map.empty();
-                       });
-  weights_.assign(has_map ? static_cast<std::size_t>(Predictors::blocks_across(columns_)) : 1, FloatStretch{});
-  for (std::size_t stretch = 0; stretch < weights_.size(); ++stretch) {
-    for (std::size_t lane = 0; lane < headers_.size(); ++lane) {
-      const PredictorWeights& of_lane = headers_[lane]->predictors.of_block(r, stretch);
-      std::int32_t anchor = 1 << kWeightBits;
-      for (const std::int16_t weight : of_lane) anchor -= weight;
-      for (std::size_t term = 0; term < kTerms.size(); ++term) {
-        FloatWeights& weights = weights_[stretch][term];
-        weights.all[lane] = term < kWeightCount ? of_lane[term] : anchor;
-        if (lane % 2 != 0) weights.of_odd[lane - 1] = weights.all[lane];
-      }
-    }
   }
 }
 

@@ -3,10 +3,10 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <vector>
 
 #include "isohf/archive/lane_range.h"
 #include "isohf/archive/lane_residuals.h"
+#include "isohf/archive/lane_rows.h"
 #include "isohf/archive/ordered_float.h"
 #include "isohf/archive/tile_payload.h"
 
@@ -41,7 +41,7 @@ class LaneFloats {
 
   /// A lane's sample at a place of row r, which is among the last three.
   [[nodiscard]] std::int32_t sample(int r, int place, std::size_t lane) const {
-    return row(r)[place * static_cast<std::ptrdiff_t>(kDecoderLanes) + static_cast<std::ptrdiff_t>(lane)];
+    return ring_.row(r)[place * LaneRing::kStep + static_cast<std::ptrdiff_t>(lane)];
   }
   /// A sum as samples have it, and a sample as it is stored.
   [[nodiscard]] static std::int32_t wrapped(std::uint32_t sum) { return static_cast<std::int32_t>(sum); }
@@ -54,21 +54,11 @@ class LaneFloats {
   void write_row(int r, const PerLane<float*>& heights) const;
 
  private:
-  [[nodiscard]] std::int32_t* row(int r) { return samples_.data() + offset(r); }
-  [[nodiscard]] const std::int32_t* row(int r) const { return samples_.data() + offset(r); }
-  [[nodiscard]] std::ptrdiff_t offset(int r) const {
-    return (r & 3) * stride_ + static_cast<std::ptrdiff_t>(kDecoderLanes) * kLaneMargin;
-  }
-  void gather_weights(int r);
-
   int columns_;
-  std::ptrdiff_t stride_;
-  bool is_wide_ = false;
   LaneRange range_;
   PerLane<std::int32_t> dropped_{};
-  std::vector<const PayloadHeader*> headers_;
-  std::vector<std::int32_t> samples_;  ///< four rows, by place and lane
-  std::vector<FloatStretch> weights_;
+  LaneRing ring_;
+  LaneStretches<FloatStretch> stretches_;
 };
 
 }  // namespace isohf

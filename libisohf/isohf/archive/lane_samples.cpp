@@ -16,6 +16,7 @@ namespace isohf {
 namespace {
 
 constexpr std::size_t kLanes = kDecoderLanes;
+constexpr std::ptrdiff_t kStep = LaneRing::kStep;
 
 /// A sample less 2^15, so that it fits 16 bits with a sign. Weights add up to 2^12, hence the sum of weighted samples
 /// is that of the shifted ones and 2^27.
@@ -30,7 +31,6 @@ constexpr std::int32_t pair_of(std::int32_t west, std::int32_t east) {
 
 /// A pair of terms: the place of its western sample from the predicted one, on which row, and the weights of both; a
 /// negative one for none.
-enum class LaneRow : std::uint8_t { kOwn, kNorth, kFar, kFarther };
 constexpr int kAnchor = static_cast<int>(kWeightCount);  // NE's weight
 struct TermPair {
   LaneRow row;
@@ -53,16 +53,7 @@ constexpr std::array<TermPair, kLaneTermPairs> kTermPairs = {{
     {LaneRow::kFarther, -2, 13, -1},
 }};
 
-/// The rows of all lanes, lane by lane at each place; samples in pairs.
-struct LaneRows {
-  std::int32_t* own;
-  const std::int32_t* north;
-  const std::int32_t* far;
-  const std::int32_t* farther;
-  const std::uint16_t* folded;
-  const std::uint8_t* is_void;  ///< by place and lane; nullptr where no lane has voids in the row
-};
-
+using Rows = LaneRows<std::uint16_t>;
 using Ints = std::int32_t __attribute__((vector_size(4 * kLanes)));
 using Words = std::uint32_t __attribute__((vector_size(4 * kLanes)));
 using Shorts = std::uint16_t __attribute__((vector_size(2 * kLanes)));
@@ -102,13 +93,9 @@ template <bool kIsWide>
 /// takes. Sums modulo 2^32, as the plain decoder has them. Writes the pair West of each sample, and not the last
 /// sample's own.
 template <bool kIsWide, std::size_t kPairs, bool kWithVoids>
-[[gnu::always_inline]] inline void restore_places(const LaneRows& rows, const StretchWeights& weights, int begin,
-                                                  int end, LaneRange& range) {
+[[gnu::always_inline]] inline void restore_places(const Rows& rows, const StretchWeights& weights, int begin, int end,
+                                                  LaneRange& range) {
   using Bytes = std::int8_t __attribute__((vector_size(kLanes)));
-  constexpr std::ptrdiff_t kStep = kLanes;
-  const auto row_of = [&](LaneRow row) -> const std::int32_t* {
-    return row == LaneRow::kNorth ? rows.north : row == LaneRow::kFar ? rows.far : rows.farther;
-  };
   const Ints low = unaligned<Ints>(range.low.data()).value;
   const Ints high = unaligned<Ints>(range.high.data()).value;
   const Ints least = 2 * low;
@@ -121,7 +108,7 @@ template <bool kIsWide, std::size_t kPairs, bool kWithVoids>
     Words above = {};
     for (std::size_t pair = 1; pair < kPairs; ++pair) {
       const TermPair term = kTermPairs[pair];
-      above += weigh<kIsWide>(row_of(term.row) + at + term.place * kStep, weights[pair].data());
+      above += weigh<kIsWide>(rows.above(term.row) + at + term.place * kStep, weights[pair].data());
     }
     const Words folded = __builtin_convertvector(unaligned<Shorts>(rows.folded + at).value, Words);
     const Ints residual = (Ints)((folded >> 1U) ^ -(folded & 1U));
@@ -148,17 +135,17 @@ template <bool kIsWide, std::size_t kPairs, bool kWithVoids>
 }
 
 ISOHF_TWO_WAYS(void, restore_near,
-               (const LaneRows& rows, const StretchWeights& weights, int begin, int end, LaneRange& range),
+               (const Rows& rows, const StretchWeights& weights, int begin, int end, LaneRange& range),
                (rows, weights, begin, end, range)) {
   restore_places<kIsWide, kNearPairs, false>(rows, weights, begin, end, range);
 }
 ISOHF_TWO_WAYS(void, restore_widely,
-               (const LaneRows& rows, const StretchWeights& weights, int begin, int end, LaneRange& range),
+               (const Rows& rows, const StretchWeights& weights, int begin, int end, LaneRange& range),
                (rows, weights, begin, end, range)) {
   restore_places<kIsWide, kTermPairs.size(), false>(rows, weights, begin, end, range);
 }
 ISOHF_TWO_WAYS(void, restore_with_voids,
-               (const LaneRows& rows, const StretchWeights& weights, int begin, int end, LaneRange& range),
+               (const Rows& rows, const StretchWeights& weights, int begin, int end, LaneRange& range),
                (rows, weights, begin, end, range)) {
   restore_places<kIsWide, kTermPairs.size(), true>(rows, weights, begin, end, range);
 }
@@ -193,7 +180,7 @@ void repeat_sample(const std::int32_t* pairs, bool is_eastern, std::int32_t* out
     const std::int32_t sample = is_eastern ? pairs[lane] >> 16 : pairs[lane];
     twice[lane] = pair_of(sample, sample);
   }
-  for (int i = 0; i < count; ++i) std::copy(twice.begin(), twice.end(), out + i * static_cast<std::ptrdiff_t>(kLanes));
+  for (int i = 0; i < count; ++i) std::copy(twice.begin(), twice.end(), out + i * kStep);
 }
 
 /// The code of one lane's sample.
@@ -203,84 +190,58 @@ std::int32_t code_of(std::int32_t pair) {
 
 }  // namespace
 
-LaneSamples::LaneSamples(const TileShape& shape)
-    : columns_(shape.columns()),
-      stride_(static_cast<std::ptrdiff_t>(kLanes) * (columns_ + 2 * kLaneMargin)),
-      samples_(4 * static_cast<std::size_t>(stride_)) {}
+LaneSamples::LaneSamples(const TileShape& shape) : columns_(shape.columns()), ring_(columns_), stretches_(columns_) {}
 
 void LaneSamples::open(const PayloadHeader& header) {
-  const std::size_t lane = headers_.size();
-  headers_.push_back(&header);
+  const std::size_t lane = stretches_.lanes();
+  stretches_.open(header);
   const std::int32_t base = header.base - kSampleShift;
-  for (std::size_t i = lane; i < samples_.size(); i += kLanes) samples_[i] = pair_of(base, base);
+  ring_.fill(lane, pair_of(base, base));
   range_.low[lane] = header.low - kSampleShift;
   range_.high[lane] = header.high - kSampleShift;
-  is_wide_ |= header.predictors.is_wide;
 }
 
 void LaneSamples::restore_row(int r, const LaneResiduals<std::uint16_t>& residuals) {
   const int first = Lattice<std::int32_t>::first(r);
   const int last = r % 2 == 0 ? columns_ - 2 : columns_ - 1;
-  const auto step = static_cast<std::ptrdiff_t>(kLanes);
-  const std::int32_t* const north = row(r - 1) + r % 2 * step;
-  repeat_sample(north + first * step, false, row(r) + (first - 2) * step, 1);
-  if (r <= 3 || r % kBlockPlaces == 0) gather_weights(r);
+  const Rows rows = ring_.around(r, residuals);
+  repeat_sample(rows.north + first * kStep, false, rows.own + (first - 2) * kStep, 1);
+  stretches_.take_row(r, [](StretchWeights& weights, std::size_t lane, const PredictorWeights& of_lane, int anchor) {
+    const auto weight_of = [&](int i) -> std::int32_t {
+      return i < 0 ? 0 : i == kAnchor ? anchor : of_lane[static_cast<std::size_t>(i)];
+    };
+    for (std::size_t pair = 0; pair < kTermPairs.size(); ++pair) {
+      weights[pair][lane] = pair_of(weight_of(kTermPairs[pair].west), weight_of(kTermPairs[pair].east));
+    }
+  });
   range_.least_seen = range_.low;
   range_.most_seen = range_.high;
-  const LaneRows rows = {row(r), north, row(r - 2), row(r - 3) + r % 2 * step, residuals.folded(), residuals.is_void()};
-  for (std::size_t stretch = 0; stretch < weights_.size(); ++stretch) {
-    const int begin = std::max(first, static_cast<int>(stretch) * kBlockPlaces);
-    const bool is_last = stretch + 1 == weights_.size();
-    const int end = is_last ? last + 1 : std::min(last + 1, static_cast<int>(stretch + 1) * kBlockPlaces);
+  stretches_.for_each(first, last, [&](const StretchWeights& weights, int begin, int end) {
     if (residuals.has_voids()) {
-      restore_with_voids(rows, weights_[stretch], begin, end, range_);
-    } else if (is_wide_) {
-      restore_widely(rows, weights_[stretch], begin, end, range_);
+      restore_with_voids(rows, weights, begin, end, range_);
+    } else if (stretches_.is_wide()) {
+      restore_widely(rows, weights, begin, end, range_);
     } else {
-      restore_near(rows, weights_[stretch], begin, end, range_);
+      restore_near(rows, weights, begin, end, range_);
     }
-  }
-  std::int32_t* const own = row(r);
-  repeat_sample(own + first * step, false, own - kLaneMargin * step, first + kLaneMargin);
-  repeat_sample(own + (last - 1) * step, true, own + last * step, columns_ + kLaneMargin - last);
+  });
+  repeat_sample(rows.own + first * kStep, false, rows.own - kLaneMargin * kStep, first + kLaneMargin);
+  repeat_sample(rows.own + (last - 1) * kStep, true, rows.own + last * kStep, columns_ + kLaneMargin - last);
 }
 
 std::int32_t LaneSamples::sample(int r, int place, std::size_t lane) const {
-  return code_of(row(r)[place * static_cast<std::ptrdiff_t>(kLanes) + static_cast<std::ptrdiff_t>(lane)]);
+  return code_of(ring_.row(r)[place * kStep + static_cast<std::ptrdiff_t>(lane)]);
 }
 
 void LaneSamples::write_row(int r, const PerLane<std::uint16_t*>& codes) const {
-  const std::int32_t* const samples = row(r);
+  const std::int32_t* const samples = ring_.row(r);
   const auto step = static_cast<int>(kLanes);
   const int last = r % 2 == 0 ? columns_ - 2 : columns_ - 1;
   int place = Lattice<std::int32_t>::first(r);
-  for (; place + step <= last + 1; place += step) {
-    turn_square(samples + place * static_cast<std::ptrdiff_t>(kLanes), codes, place);
-  }
+  for (; place + step <= last + 1; place += step) turn_square(samples + place * kStep, codes, place);
   for (; place <= last; ++place) {
-    for (std::size_t lane = 0; lane < headers_.size(); ++lane) {
+    for (std::size_t lane = 0; lane < stretches_.lanes(); ++lane) {
       codes[lane][place] = static_cast<std::uint16_t>(sample(r, place, lane));
-    }
-  }
-}
-
-/// The weights of all lanes for row r and those below it in its blocks: one stretch where no lane has a map.
-void LaneSamples::gather_weights(int r) {
-  const bool has_map = r > 2 && std::any_of(headers_.begin(), headers_.end(), [](const PayloadHeader* header) {
-                         return !header->predictors.map.empty();
-                       });
-  weights_.assign(has_map ? static_cast<std::size_t>(Predictors::blocks_across(columns_)) : 1, StretchWeights{});
-  for (std::size_t stretch = 0; stretch < weights_.size(); ++stretch) {
-    for (std::size_t lane = 0; lane < headers_.size(); ++lane) {
-      const PredictorWeights& weights = headers_[lane]->predictors.of_block(r, stretch);
-      std::int32_t anchor = 1 << kWeightBits;
-      for (const std::int16_t weight : weights) anchor -= weight;
-      const auto weight_of = [&](int i) -> std::int32_t {
-        return i < 0 ? 0 : i == kAnchor ? anchor : weights[static_cast<std::size_t>(i)];
-      };
-      for (std::size_t pair = 0; pair < kTermPairs.size(); ++pair) {
-        weights_[stretch][pair][lane] = pair_of(weight_of(kTermPairs[pair].west), weight_of(kTermPairs[pair].east));
-      }
     }
   }
 }

@@ -3,10 +3,10 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <vector>
 
 #include "isohf/archive/lane_range.h"
 #include "isohf/archive/lane_residuals.h"
+#include "isohf/archive/lane_rows.h"
 #include "isohf/archive/tile_payload.h"
 
 namespace isohf {
@@ -45,20 +45,10 @@ class LaneSamples {
   void write_row(int r, const PerLane<std::uint16_t*>& codes) const;
 
  private:
-  [[nodiscard]] std::int32_t* row(int r) { return samples_.data() + offset(r); }
-  [[nodiscard]] const std::int32_t* row(int r) const { return samples_.data() + offset(r); }
-  [[nodiscard]] std::ptrdiff_t offset(int r) const {
-    return (r & 3) * stride_ + static_cast<std::ptrdiff_t>(kDecoderLanes) * kLaneMargin;
-  }
-  void gather_weights(int r);
-
   int columns_;
-  std::ptrdiff_t stride_;
-  bool is_wide_ = false;
   LaneRange range_;  ///< shifted (lane_samples.cpp)
-  std::vector<const PayloadHeader*> headers_;
-  std::vector<std::int32_t> samples_;  ///< four rows, by place and lane, in pairs
-  std::vector<StretchWeights> weights_;
+  LaneRing ring_;    ///< pairs of samples
+  LaneStretches<StretchWeights> stretches_;
 };
 
 }  // namespace isohf
