@@ -8,8 +8,10 @@
 #include <filesystem>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
+#include "formats/masked_source.h"
 #include "formats/open_options.h"
 #include "formats/packed_elevations.h"
 #include "formats/place_beside.h"
@@ -51,6 +53,9 @@ class PngSource final : public HeightSource {
   }
 
   [[nodiscard]] const SourceInfo& info() const override { return info_; }
+
+  /// Whether the picture's other channel says which of the grey samples are transparent.
+  [[nodiscard]] bool is_beside_opacity() const { return channels_ == 2 && channel_ == 0; }
 
   void read_window(const Window& window, std::span<std::byte> samples) override {
     ISOHF_ASSERT(window.column >= 0 && window.row >= 0 && window.columns >= 0 && window.rows >= 0 &&
@@ -139,7 +144,6 @@ class PngSource final : public HeightSource {
     }
     if (channels_ == 1) return;
     info_.channel = channels[channel_];
-    if (wanted.empty() && channels_ == 2) info_.warnings.emplace_back("channel Y is read, not the alpha channel");
   }
 
   /// What isohf wrote beside the picture says what its numbers mean and where they lie; a world file says the latter.
@@ -266,7 +270,11 @@ bool looks_like_png(std::span<const std::byte> head) {
 }
 
 std::unique_ptr<HeightSource> open_png(const std::string& path, const OpenOptions& options) {
-  return std::make_unique<PngSource>(path, options);
+  auto source = std::make_unique<PngSource>(path, options);
+  if (!options.channel.empty() || !source->is_beside_opacity()) return source;
+  OpenOptions opacity;
+  opacity.channel = "A";
+  return mask_transparent(std::move(source), std::make_unique<PngSource>(path, opacity));
 }
 
 }  // namespace isohf

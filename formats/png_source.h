@@ -15,8 +15,8 @@ namespace isohf {
 
 /// Opens one channel of a PNG file: the stored numbers, 8 or 16 bits, with no gamma, colour management or alpha
 /// applied. Gray of 1, 2 and 4 bits comes as uint8 with the stored value (0...15, not stretched to 0...255). The gray
-/// value that a tRNS chunk calls transparent is void. What NAME.png.json says (raster_description.h) is taken over,
-/// but for packed elevations.
+/// value that a tRNS chunk calls transparent is void; without options.channel so is gray whose opacity is 0. What
+/// NAME.png.json says (raster_description.h) is taken over, but for packed elevations.
 ///
 /// options.channel is Y or A (gray), R, G, B or A (colour), or 0...3; without it the first one, with a warning for a
 /// colour picture, whose channels may be the bytes of packed elevations; or terrarium, mapbox or rgba-float for those

@@ -16,6 +16,7 @@
 #include "formats/raw_file.h"
 #include "formats/row_places.h"
 #include "formats/text_tokens.h"
+#include "formats/turned_rows.h"
 #include "formats/wkt.h"
 #include "isohf/base/assert.h"
 #include "isohf/base/bytes.h"
@@ -65,19 +66,13 @@ class SurferGridSource final : public HeightSource {
   [[nodiscard]] const SourceInfo& info() const override { return info_; }
 
   void read_window(const Window& window, std::span<std::byte> samples) override {
-    // The same rows as the file has them: from the South.
-    const Window stored{window.column, info_.height - window.row - window.rows, window.columns, window.rows};
+    const Window stored = turned(window, info_.height);
     if (words_) {
       read_text(stored, samples);
     } else {
       read_plain_samples(file_, info_, layout_, stored, samples);
     }
-    const std::size_t row_bytes = static_cast<std::size_t>(window.columns) * size_bytes(info_.sample_type);
-    const auto rows = static_cast<std::size_t>(window.rows);
-    for (std::size_t row = 0; row < rows / 2; ++row) {
-      std::byte* const upper = samples.data() + row * row_bytes;
-      std::swap_ranges(upper, upper + row_bytes, samples.data() + (rows - 1 - row) * row_bytes);
-    }
+    turn_rows(samples, static_cast<std::size_t>(window.columns) * size_bytes(info_.sample_type));
   }
 
   void limit_buffers(std::uint64_t bytes) override { file_.limit_buffers(bytes); }

@@ -357,6 +357,13 @@ TiffTags TiffHandle::read_tags() {
   return tags;
 }
 
+TiffMainImage open_image(const RawFile& file, std::uint32_t directory) {
+  TiffMainImage image;
+  image.directories.main = directory;
+  image.handle = std::make_unique<TiffHandle>(file, directory, false);
+  return image;
+}
+
 TiffMainImage open_main_image(const RawFile& file) {
   auto walk = std::make_unique<TiffHandle::Impl>(file, false);
   TiffDirectories found;
@@ -366,7 +373,7 @@ TiffMainImage open_main_image(const RawFile& file) {
     const auto kind = walk->field<std::uint32_t>(TIFFTAG_SUBFILETYPE, 0);
     const bool mask = (kind & FILETYPE_MASK) != 0;
     const bool reduced = (kind & FILETYPE_REDUCEDIMAGE) != 0;
-    if (mask && !reduced) found.has_mask = true;
+    if (mask && !reduced && has_main && !found.has_more_pages && !found.mask) found.mask = i;
     if (!mask && !reduced) {
       if (has_main) found.has_more_pages = true;
       if (!has_main) found.main = i;
@@ -374,7 +381,8 @@ TiffMainImage open_main_image(const RawFile& file) {
     }
     if (TIFFLastDirectory(walk->tif) != 0) break;
     walked = true;
-    if (TIFFReadDirectory(walk->tif) != 1) break;
+    found.has_broken = TIFFReadDirectory(walk->tif) != 1;
+    if (found.has_broken) break;
   }
   // A walk leaves the handle elsewhere, with what libtiff said of other images.
   if (walked) walk = TiffHandle::Impl::on_directory(file, found.main, false);

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -29,9 +30,10 @@ struct TiffBlockSpan {
 
 /// The directories (images) of a file.
 struct TiffDirectories {
-  std::uint32_t main = 0;       ///< the first that is neither a reduced image nor a mask
-  bool has_mask = false;        ///< another is a transparency mask
-  bool has_more_pages = false;  ///< another is a full-size image
+  std::uint32_t main = 0;             ///< the first that is neither a reduced image nor a mask
+  std::optional<std::uint32_t> mask;  ///< the main image's transparency mask, which follows it
+  bool has_more_pages = false;        ///< another is a full-size image
+  bool has_broken = false;            ///< one behind the last that was read is broken
 };
 
 struct TiffMainImage;
@@ -75,6 +77,9 @@ struct TiffMainImage {
   TiffDirectories directories;
   std::unique_ptr<TiffHandle> handle;
 };
+
+/// A handle on another directory of the file, as its main image. Throws Error{kCorrupt} where it cannot be read.
+[[nodiscard]] TiffMainImage open_image(const RawFile& file, std::uint32_t directory);
 
 /// Opens the file once where it holds one image: of ten thousand small files in a mosaic, opening is most of the work.
 /// Throws Error{kCorrupt} where not even the first directory can be read.

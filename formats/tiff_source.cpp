@@ -8,18 +8,23 @@
 #include <bit>
 #include <charconv>
 #include <cstring>
+#include <filesystem>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "formats/auxiliary_metadata.h"
 #include "formats/gdal_tags.h"
 #include "formats/geotiff_keys.h"
 #include "formats/letter_case.h"
+#include "formats/masked_source.h"
 #include "formats/open_options.h"
 #include "formats/place_beside.h"
 #include "formats/raw_file.h"
 #include "formats/tiff_blocks.h"
 #include "formats/tiff_file.h"
+#include "formats/tiff_mask.h"
+#include "formats/turned_rows.h"
 #include "formats/units.h"
 #include "formats/wkt.h"
 #include "isohf/base/assert.h"
@@ -96,6 +101,12 @@ void require_heights(const TiffLayout& layout) {
   throw Error(ErrorCode::kUnsupported, fmt::format("the image has {}; isohf reads grey and RGB images", what));
 }
 
+/// Whether a pixel has two samples, an elevation and its opacity.
+bool has_grey_and_opacity(const TiffLayout& layout) {
+  const bool is_grey = layout.photometric == kMinIsWhite || layout.photometric == kMinIsBlack;
+  return is_grey && layout.samples_per_pixel == 2 && layout.alpha_sample == 1;
+}
+
 /// "R", "G", "B" or "Y" and "A"; empty where a sample has no name.
 std::vector<std::string> channel_names(const TiffLayout& layout) {
   std::vector<std::string> names(layout.samples_per_pixel);
@@ -134,7 +145,7 @@ int choose_channel(const TiffLayout& layout, const std::string& wanted, SourceIn
   if (wanted.empty() && colour && layout.bits_per_sample == 8) {
     info.warnings.push_back(
         fmt::format("this is an 8 bit colour picture; its channel {} is read as elevation", label(0)));
-  } else if (wanted.empty() && names.size() > 1) {
+  } else if (wanted.empty() && names.size() > 1 && !has_grey_and_opacity(layout)) {
     info.warnings.push_back(fmt::format("there are {} channels; channel {} is read", names.size(), label(0)));
   }
   return static_cast<int>(chosen);
@@ -195,15 +206,21 @@ class TiffSource final : public HeightSource {
 
   [[nodiscard]] const SourceInfo& info() const override { return info_; }
 
+  /// What tells which samples are transparent; null where nothing does.
+  [[nodiscard]] std::unique_ptr<HeightSource> open_opacity() const {
+    if (mask_) return open_tiff_mask(info_.path, *mask_, turned_);
+    const std::string beside = info_.path + ".msk";  // as GDAL writes them
+    if (std::filesystem::exists(beside)) return open_tiff_mask(beside, 0, turned_);
+    if (!has_grey_and_opacity(layout_) || channel_ != 0) return nullptr;
+    OpenOptions options;
+    options.channel = "A";
+    return std::make_unique<TiffSource>(info_.path, options);
+  }
+
   void read_window(const Window& window, std::span<std::byte> samples) override {
     if (!turned_) return blocks_->read(window, samples);
-    blocks_->read({window.column, info_.height - window.row - window.rows, window.columns, window.rows}, samples);
-    const std::size_t row_bytes = static_cast<std::size_t>(window.columns) * size_bytes(info_.sample_type);
-    const auto rows = static_cast<std::size_t>(window.rows);
-    for (std::size_t row = 0; row < rows / 2; ++row) {
-      std::byte* upper = samples.data() + row * row_bytes;
-      std::swap_ranges(upper, upper + row_bytes, samples.data() + (rows - 1 - row) * row_bytes);
-    }
+    blocks_->read(turned(window, info_.height), samples);
+    turn_rows(samples, static_cast<std::size_t>(window.columns) * size_bytes(info_.sample_type));
   }
 
   // From the South the windows of a caller do not begin where blocks do.
@@ -225,7 +242,9 @@ class TiffSource final : public HeightSource {
     channel_ = choose_channel(layout_, options.channel, info_);
     if (directories.has_more_pages)
       info_.warnings.emplace_back("there are several images in the file; the first is read");
-    if (directories.has_mask) info_.warnings.emplace_back("the file has a transparency mask, which is not applied");
+    if (directories.has_broken)
+      info_.warnings.emplace_back("a directory behind the image is damaged; a transparency mask there is not applied");
+    mask_ = directories.mask;
     place(tags);
     read_gdal_metadata(tags.gdal_metadata, channel_, info_);
     read_gdal_nodata(tags.gdal_nodata, info_);
@@ -294,6 +313,7 @@ class TiffSource final : public HeightSource {
   TiffLayout layout_;
   SourceInfo info_;
   int channel_ = 0;
+  std::optional<std::uint32_t> mask_;
   bool is_placed_ = false;  // by its tags, if without an origin
   bool turned_ = false;     // the stored rows run from South to North
   std::optional<TiffBlocks> blocks_;
@@ -311,7 +331,10 @@ bool looks_like_tiff(std::span<const std::byte> head) {
 }
 
 std::unique_ptr<HeightSource> open_tiff(const std::string& path, const OpenOptions& options) {
-  return std::make_unique<TiffSource>(path, options);
+  auto source = std::make_unique<TiffSource>(path, options);
+  std::unique_ptr<HeightSource> opacity = options.channel.empty() ? source->open_opacity() : nullptr;
+  if (!opacity) return source;
+  return mask_transparent(std::move(source), std::move(opacity));
 }
 
 }  // namespace isohf

@@ -20,6 +20,8 @@ namespace isohf {
 /// Rows are delivered from North to South: a raster stored from South to North (by its transformation, or by
 /// orientation bottom-left where it has no georeference) is turned. Without GeoTIFF tags a world file beside it places
 /// the raster. Void is what GDAL_NODATA says; in a float raster without it, whatever lies beyond 1e30, such as -3.4e38.
+/// Where no channel is asked for, samples that are transparent are void as well: by a mask in the file, one that lies
+/// beside it (.msk), or the opacity of a grey image of two channels (masked_source.h).
 /// Blocks that a sparse file leaves out read as the void value, else as 0, with a warning.
 ///
 /// Full-width windows from North to South decode every block once, on all threads of the caller's arena; memory is

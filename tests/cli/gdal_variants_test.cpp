@@ -30,9 +30,10 @@ class GdalVariants : public ::testing::Test {
     if (!has_gdal()) GTEST_SKIP() << "gdalinfo and gdallocationinfo are not installed (Debian: gdal-bin)";
     set_module_folder(ISOHF_BIN_DIR);
     const std::string coast = std::string(ISOHF_SOURCE_DIR) + "/testdata/coast_512x384_int16.tif";
-    translate(coast, "whole.tif", {"-srcwin", "150", "100", "160", "140"});
+    // A coast: sea at 0, and land.
+    translate(coast, "whole.tif", {"-srcwin", "264", "100", "160", "140"});
     translate(coast, "real.tif",
-              {"-srcwin", "150", "100", "160", "140", "-ot", "Float32", "-scale", "0", "3000", "0", "1000"});
+              {"-srcwin", "264", "100", "160", "140", "-ot", "Float32", "-scale", "0", "3000", "0", "1000"});
   }
 
   void translate(const std::string& from, const std::string& to, std::vector<std::string> options) {
@@ -107,6 +108,49 @@ TEST_F(GdalVariants, TiffCompressionsAndLayouts) {
                             {"float24.tif", {"-co", "NBITS=24"}}}) {
     expect_same("real.tif", variant);
   }
+}
+
+TEST_F(GdalVariants, TransparentSamplesAreVoids) {
+  // The sea, at 0, becomes transparent.
+  translate(folder_ / "whole.tif", "sea.tif", {"-a_nodata", "0"});
+  const auto elevations = [](const std::string& path) {
+    const std::unique_ptr<HeightSource> source = open_source(path, {});
+    const SourceInfo& info = source->info();
+    const auto count = static_cast<std::size_t>(info.width * info.height);
+    std::vector<std::byte> raw(count * size_bytes(info.sample_type));
+    source->read_window({0, 0, info.width, info.height}, raw);
+    std::vector<float> out(count);
+    heights_from_samples(info, 0.0, raw, out);
+    for (float& height : out) height = std::isnan(height) ? -1e9F : height;
+    return out;
+  };
+  const std::vector<float> expected = elevations(folder_ / "sea.tif");
+  const auto voids = std::count(expected.begin(), expected.end(), -1e9F);
+  ASSERT_GT(voids, 1000);
+  ASSERT_LT(voids, static_cast<std::ptrdiff_t>(expected.size()) - 1000);
+  const std::vector<std::string> inside = {
+      "-mask", "mask,1", "-a_nodata", "none", "--config", "GDAL_TIFF_INTERNAL_MASK", "YES"};
+  const auto with = [](std::vector<std::string> options, const std::vector<std::string>& more) {
+    options.insert(options.end(), more.begin(), more.end());
+    return options;
+  };
+  for (const Variant& variant : std::vector<Variant>{
+           {"inside.tif", inside},
+           {"tiles.tif", with(inside, {"-co", "TILED=YES", "-co", "BLOCKXSIZE=32", "-co", "BLOCKYSIZE=16"})},
+           {"deflated.tif", with(inside, {"-co", "COMPRESS=DEFLATE", "-co", "PREDICTOR=2"})},
+           {"cog.tif", {"-of", "COG", "-mask", "mask,1", "-a_nodata", "none"}},
+           {"beside.tif", {"-mask", "mask,1", "-a_nodata", "none", "--config", "GDAL_TIFF_INTERNAL_MASK", "NO"}},
+           {"both.tif", with(inside, {"-a_nodata", "-9999"})}}) {
+    SCOPED_TRACE(variant.name);
+    ASSERT_NO_FATAL_FAILURE(translate(folder_ / "sea.tif", variant.name, variant.options));
+    EXPECT_TRUE(elevations(folder_ / variant.name) == expected);
+  }
+  ASSERT_EQ(run_gdal({"gdalwarp", "-q", "-dstalpha", folder_ / "sea.tif", folder_ / "alpha.tif"}).exit_code, 0);
+  EXPECT_TRUE(elevations(folder_ / "alpha.tif") == expected);
+  ASSERT_NO_FATAL_FAILURE(translate(folder_ / "alpha.tif", "alpha.png", {"-of", "PNG", "-ot", "UInt16"}));
+  std::vector<float> unsigned_land = expected;
+  for (float& height : unsigned_land) height = height > -1e9F ? std::max(height, 0.0F) : height;
+  EXPECT_TRUE(elevations(folder_ / "alpha.png") == unsigned_land);
 }
 
 TEST_F(GdalVariants, TiffSampleTypes) {

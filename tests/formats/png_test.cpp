@@ -177,7 +177,7 @@ TEST(PngSource, WantsToKnowWhatTheColoursOfAPictureAre) {
   write_picture(path, picture);
   const auto source = open_png(path, {});
   ASSERT_EQ(source->info().warnings.size(), 1U);
-  EXPECT_THAT(source->info().warnings[0], HasSubstr("alpha"));
+  EXPECT_THAT(source->info().warnings[0], HasSubstr("transparent"));
   picture.color_type = PNG_COLOR_TYPE_GRAY;
   write_picture(path, picture);
   EXPECT_TRUE(open_png(path, {})->info().warnings.empty());
@@ -269,6 +269,28 @@ TEST(PngSource, UnpacksNothingButColoursOfEightBits) {
     EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
     EXPECT_THAT(error.what(), HasSubstr(fmt::format("encoding {} packs an elevation", encoding)));
   }
+}
+
+TEST(PngSource, TakesGreyPixelsWithoutOpacityAsVoid) {
+  const TemporaryFolder folder;
+  Picture picture;
+  picture.color_type = PNG_COLOR_TYPE_GRAY_ALPHA;
+  picture.bit_depth = 8;
+  write_picture(folder / "a.png", picture);
+  const auto source = open_png(folder / "a.png", {});
+  ASSERT_EQ(source->info().sample_type, SampleType::kInt16);
+  ASSERT_EQ(source->info().void_values.size(), 1U);
+  std::vector<std::int16_t> samples(std::size_t{picture.width} * picture.height);
+  source->read_window({0, 0, picture.width, picture.height}, std::as_writable_bytes(std::span(samples)));
+  std::int64_t voids = 0;
+  for (std::uint32_t i = 0; i < samples.size(); ++i) {
+    const std::uint32_t column = i % picture.width;
+    const std::uint32_t row = i / picture.width;
+    const bool is_void = picture.value(column, row, 1) == 0;
+    ASSERT_EQ(samples[i], is_void ? source->info().void_values[0] : picture.value(column, row, 0));
+    voids += is_void ? 1 : 0;
+  }
+  EXPECT_GT(voids, 0);
 }
 
 TEST(PngSource, TakesTransparentGrayAsVoid) {

@@ -16,6 +16,7 @@
 #include "formats/raster_sink.h"
 #include "formats/raw_source.h"
 #include "formats/surfer_grid_source.h"
+#include "formats/tiff_bytes.h"
 #include "formats/tiff_source.h"
 #include "formats/usgs_dem_source.h"
 #include "formats/zip_archive.h"
@@ -54,71 +55,16 @@ std::string written(const TemporaryFolder& folder, const std::string& name, std:
   return read_file(folder / name);
 }
 
-struct TiffTag {
-  std::uint32_t tag, type, count, value;
-};
-
-/// A TIFF whose tags come first, so that mutations of the beginning meet them, without a table or sample of its own.
-std::string tiff_head(bool big_endian, const std::vector<TiffTag>& tags) {
-  std::string bytes = big_endian ? std::string("MM\0*\0\0\0\x08", 8) : std::string("II*\0\x08\0\0\0", 8);
-  const auto put = [&](std::uint32_t value, int size) {
-    for (int b = 0; b < size; ++b) bytes += static_cast<char>(value >> (8 * (big_endian ? size - 1 - b : b)) & 0xFFU);
-  };
-  put(static_cast<std::uint32_t>(tags.size()), 2);
-  for (const TiffTag& tag : tags) {
-    put(tag.tag, 2);
-    put(tag.type, 2);
-    put(tag.count, 4);
-    const bool small = tag.type == 3;
-    if (small && big_endian) {
-      put(tag.value, 2);
-      put(0, 2);
-    } else {
-      put(tag.value, 4);
-    }
-  }
-  put(0, 4);
-  return bytes;
-}
-
-constexpr std::uint32_t tiff_head_bytes(std::uint32_t tags) {
-  return 8 + 2 + tags * 12 + 4;
-}
-
-/// 8 x 6 int16 in strips of two rows.
-std::string striped_tiff(bool big_endian) {
-  constexpr std::uint32_t kEnd = tiff_head_bytes(10);
-  std::string bytes = tiff_head(big_endian, {{256, 3, 1, 8},
-                                             {257, 3, 1, 6},
-                                             {258, 3, 1, 16},
-                                             {259, 3, 1, 1},
-                                             {262, 3, 1, 1},
-                                             {273, 4, 3, kEnd},
-                                             {277, 3, 1, 1},
-                                             {278, 3, 1, 2},
-                                             {279, 4, 3, kEnd + 12},
-                                             {339, 3, 1, 2}});
-  for (const std::uint32_t value : {kEnd + 24, kEnd + 56, kEnd + 88, 32U, 32U, 32U}) {
-    for (unsigned b = 0; b < 4; ++b) bytes += static_cast<char>(value >> (8 * (big_endian ? 3 - b : b)) & 0xFFU);
-  }
-  return bytes + counting(48, 2);
+/// 8 x 6 int16 in strips of two rows. Tags come first, so that mutations of the beginning meet them.
+TiffBytes striped_tiff(bool big_endian) {
+  TiffBytes tiff(big_endian);
+  tiff.image(8, 6, 16, 2, 2);
+  for (int strip = 0; strip < 3; ++strip) tiff.block(counting(48, 2).substr(static_cast<std::size_t>(strip) * 32, 32));
+  return tiff;
 }
 
 /// 20 x 18 bytes in four tiles of 16 x 16, deflated, with the horizontal predictor.
-std::string tiled_tiff() {
-  constexpr std::uint32_t kEnd = tiff_head_bytes(12);
-  std::string bytes = tiff_head(false, {{256, 3, 1, 20},
-                                        {257, 3, 1, 18},
-                                        {258, 3, 1, 8},
-                                        {259, 3, 1, 8},
-                                        {262, 3, 1, 1},
-                                        {277, 3, 1, 1},
-                                        {317, 3, 1, 2},
-                                        {322, 3, 1, 16},
-                                        {323, 3, 1, 16},
-                                        {324, 4, 4, kEnd},
-                                        {325, 4, 4, kEnd + 16},
-                                        {339, 3, 1, 1}});
+TiffBytes tiled_tiff() {
   std::string tile(std::size_t{16} * 16, '\0');
   for (std::size_t i = 0; i < tile.size(); ++i) tile[i] = static_cast<char>(i * 37 % 61);
   uLongf size = compressBound(static_cast<uLong>(tile.size()));
@@ -126,12 +72,17 @@ std::string tiled_tiff() {
   compress(reinterpret_cast<Bytef*>(packed.data()), &size, reinterpret_cast<const Bytef*>(tile.data()),
            static_cast<uLong>(tile.size()));
   packed.resize(size);
-  const auto put = [&](std::size_t value) {
-    for (unsigned b = 0; b < 4; ++b) bytes += static_cast<char>(value >> (8 * b) & 0xFFU);
-  };
-  for (std::size_t i = 0; i < 4; ++i) put(kEnd + 32 + i * packed.size());
-  for (int i = 0; i < 4; ++i) put(packed.size());
-  return bytes + packed + packed + packed + packed;
+  TiffBytes tiff;
+  tiff.image(20, 18, 8, 1, 16, 8).tiles(16, 16).shorts(317, {2});
+  for (int i = 0; i < 4; ++i) tiff.block(packed);
+  return tiff;
+}
+
+/// With a transparency mask of bits.
+TiffBytes masked_tiff() {
+  TiffBytes mask;
+  mask.image(8, 6, 1, 1, 6).longs(254, {4}).shorts(262, {4}).block("\x7e\xff\x81\x3c\xf0\x0f");
+  return striped_tiff(false).next(mask);
 }
 
 std::string pds3() {
@@ -279,10 +230,11 @@ std::vector<ReaderCase> reader_cases() {
   std::vector<ReaderCase> cases = {
       {"ExrScanLines", "a.exr", written(folder, "a.exr", 5, 4, SampleType::kFloat32), open_exr, {}},
       {"ExrChannels", "a.exr", written(folder, "a.exr", 4, 3, SampleType::kFloat16, 4), open_exr, {}},
-      {"TiffTagsFirst", "a.tif", striped_tiff(false), open_tiff, {}},
-      {"TiffBigEndian", "a.tif", striped_tiff(true), open_tiff, {}},
+      {"TiffTagsFirst", "a.tif", striped_tiff(false).build(), open_tiff, {}},
+      {"TiffBigEndian", "a.tif", striped_tiff(true).build(), open_tiff, {}},
       {"TiffStripsDeflated", "a.tif", written(folder, "a.tif", 9, 7, SampleType::kInt16), open_tiff, {}},
-      {"TiffTiles", "a.tif", tiled_tiff(), open_tiff, {}},
+      {"TiffTiles", "a.tif", tiled_tiff().build(), open_tiff, {}},
+      {"TiffMasked", "a.tif", masked_tiff().build(), open_tiff, {}},
       {"PngGray16", "a.png", written(folder, "a.png", 6, 5, SampleType::kUint16), open_png, {}},
       {"PngPacked", "a.png", written(folder, "a.png", 6, 5, SampleType::kUint8, 3), open_png, packed},
       {"EsriAsciiGrid", "a.asc", esri + numbers, open_ascii_grid, {}},
@@ -350,6 +302,7 @@ std::vector<ReaderCase> reader_cases() {
   find("PngDescription").shortest_valid = find("PngDescription").bytes.size() - 1;
   find("RawDescription").shortest_valid = find("RawDescription").bytes.size() - 1;
   find("TiffStripsDeflated").shortest_valid = 1;  // the tags that isohf writes come last, and not all are needed
+  find("TiffMasked").shortest_valid = 1;          // the mask's directory, without which the image opens with a warning
   find("Hgt").shortest_valid = 1;                 // another square
   return cases;
 }

@@ -56,6 +56,12 @@ class TiffBytes {
     return longs(322, {columns}).longs(323, {rows});
   }
 
+  /// The directory that follows this one, of the same byte order and kind.
+  TiffBytes& next(const TiffBytes& following) {
+    next_ = {following};
+    return *this;
+  }
+
   /// `bytes` of host-order samples in the file's order.
   [[nodiscard]] std::string ordered(std::string bytes, std::size_t sample_bytes) const {
     if (big_endian_) {
@@ -68,10 +74,12 @@ class TiffBytes {
   }
 
   [[nodiscard]] std::string build() const {
-    // Laid out twice: offsets need sizes only, which the first round settles.
-    std::vector<std::uint64_t> offsets(blocks_.size(), 0);
-    std::string file = lay_out(offsets);
-    return lay_out(offsets);
+    std::string out = big_endian_ ? "MM" : "II";
+    append(out, big_tiff_ ? 43 : 42, 2);
+    if (big_tiff_) append(out, 8, 2), append(out, 0, 2);
+    append(out, big_tiff_ ? 16 : 8, big_tiff_ ? 8 : 4);
+    append_directory(out);
+    return out;
   }
 
   [[nodiscard]] std::string write(const std::string& path) const {
@@ -99,7 +107,19 @@ class TiffBytes {
     }
   }
 
-  std::string lay_out(std::vector<std::uint64_t>& offsets) const {
+  void append_directory(std::string& out) const {
+    // Laid out twice: offsets need sizes only, which the first round settles.
+    std::vector<std::uint64_t> offsets(blocks_.size(), 0);
+    std::uint64_t end = out.size() + lay_out(out.size(), offsets, 0).size();
+    end += end % 2;
+    out += lay_out(out.size(), offsets, next_.empty() ? 0 : end);
+    if (next_.empty()) return;
+    out.resize(end, '\0');
+    next_.front().append_directory(out);
+  }
+
+  /// The directory at `start` in the file, its arrays and its blocks, whose offsets are told.
+  std::string lay_out(std::uint64_t start, std::vector<std::uint64_t>& offsets, std::uint64_t next_directory) const {
     TiffBytes all = *this;
     const auto has = [&](std::uint16_t tag) {
       return std::any_of(entries_.begin(), entries_.end(), [&](const Entry& e) { return e.tag == tag; });
@@ -112,13 +132,9 @@ class TiffBytes {
     std::sort(all.entries_.begin(), all.entries_.end(), [](const Entry& a, const Entry& b) { return a.tag < b.tag; });
 
     const int offset_bytes = big_tiff_ ? 8 : 4;
-    const std::uint64_t header = big_tiff_ ? 16 : 8;
     const std::uint64_t directory =
         (big_tiff_ ? 8 : 2) + all.entries_.size() * (big_tiff_ ? 20 : 12) + static_cast<std::uint64_t>(offset_bytes);
-    std::string out = big_endian_ ? "MM" : "II";
-    append(out, big_tiff_ ? 43 : 42, 2);
-    if (big_tiff_) append(out, 8, 2), append(out, 0, 2);
-    append(out, header, offset_bytes);
+    std::string out;
     append(out, all.entries_.size(), big_tiff_ ? 8 : 2);
     std::string arrays;
     for (const Entry& entry : all.entries_) {
@@ -128,15 +144,15 @@ class TiffBytes {
       if (entry.bytes.size() <= static_cast<std::size_t>(offset_bytes)) {
         out += entry.bytes + std::string(static_cast<std::size_t>(offset_bytes) - entry.bytes.size(), '\0');
       } else {
-        append(out, header + directory + arrays.size(), offset_bytes);
+        append(out, start + directory + arrays.size(), offset_bytes);
         arrays += entry.bytes;
         if (arrays.size() % 2 != 0) arrays.push_back('\0');
       }
     }
-    append(out, 0, offset_bytes);
+    append(out, next_directory, offset_bytes);
     out += arrays;
     for (std::size_t i = 0; i < blocks_.size(); ++i) {
-      offsets[i] = blocks_[i].empty() ? 0 : out.size();
+      offsets[i] = blocks_[i].empty() ? 0 : start + out.size();
       out += blocks_[i];
     }
     return out;
@@ -147,6 +163,7 @@ class TiffBytes {
   bool tiled_ = false;
   std::vector<Entry> entries_;
   std::vector<std::string> blocks_;
+  std::vector<TiffBytes> next_;  ///< one or none
 };
 
 }  // namespace isohf::test
