@@ -11,7 +11,7 @@
 #include "formats/letter_case.h"
 #include "formats/open_options.h"
 #include "formats/raw_file.h"
-#include "formats/zip_member.h"
+#include "formats/zipped_file.h"
 #include "isohf/base/assert.h"
 #include "isohf/base/error.h"
 
@@ -77,8 +77,8 @@ class HgtSource final : public HeightSource {
  private:
   /// Opens the tile of a zip archive; returns the name that says where it lies.
   std::string open_member(std::uint64_t unpacked_bytes) {
-    std::vector<ZipMember> tiles;
-    for (ZipMember& member : zip_members(RawFile(info_.path))) {
+    std::vector<ZippedFile> tiles;
+    for (ZippedFile& member : zipped_files(RawFile(info_.path))) {
       if (lower_case(member.name).ends_with(".hgt")) tiles.push_back(std::move(member));
     }
     if (tiles.size() != 1) {
@@ -159,9 +159,9 @@ bool is_hgt_name(const std::string& path) {
 bool is_zip_of_hgt(const std::string& path) {
   if (!lower_case(path).ends_with(".zip")) return false;
   try {
-    const std::vector<ZipMember> members = zip_members(RawFile(path));
+    const std::vector<ZippedFile> members = zipped_files(RawFile(path));
     return std::any_of(members.begin(), members.end(),
-                       [](const ZipMember& member) { return lower_case(member.name).ends_with(".hgt"); });
+                       [](const ZippedFile& member) { return lower_case(member.name).ends_with(".hgt"); });
   } catch (const Error&) {
     return false;  // is something else, or too damaged to say
   }

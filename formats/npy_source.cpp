@@ -17,7 +17,7 @@
 #include "formats/plain_samples.h"
 #include "formats/raw_file.h"
 #include "formats/text_tokens.h"
-#include "formats/zip_member.h"
+#include "formats/zipped_file.h"
 #include "isohf/base/assert.h"
 #include "isohf/base/error.h"
 
@@ -169,7 +169,7 @@ class NpySource final : public HeightSource {
     apply_open_options(info_, options);
   }
   /// One array of an .npz.
-  NpySource(const std::string& path, const ZipMember& member, const OpenOptions& options)
+  NpySource(const std::string& path, const ZippedFile& member, const OpenOptions& options)
       : file_(path, member, options.unpacked_bytes) {
     info_.path = path;
     info_.format = "NumPy";
@@ -300,12 +300,12 @@ class NpySource final : public HeightSource {
 };
 
 /// "elevation.npy" is the array elevation.
-std::string array_name(const ZipMember& member) {
+std::string array_name(const ZippedFile& member) {
   return member.name.ends_with(".npy") ? member.name.substr(0, member.name.size() - 4) : member.name;
 }
 
 /// An array that is a raster; nullptr where its shape or type make it none and nobody asked for it by name.
-std::unique_ptr<NpySource> open_array(const std::string& path, const ZipMember& member, bool wanted,
+std::unique_ptr<NpySource> open_array(const std::string& path, const ZippedFile& member, bool wanted,
                                       const OpenOptions& options) {
   try {
     return std::make_unique<NpySource>(path, member, options);
@@ -327,12 +327,12 @@ std::unique_ptr<HeightSource> open_npy(const std::string& path, const OpenOption
 }
 
 std::unique_ptr<HeightSource> open_npz(const std::string& path, const OpenOptions& options) {
-  const std::vector<ZipMember> members = zip_members(RawFile(path));
+  const std::vector<ZippedFile> members = zipped_files(RawFile(path));
   std::unique_ptr<NpySource> chosen;
   std::string name;
   std::string names;
   std::size_t rasters = 0;
-  for (const ZipMember& member : members) {
+  for (const ZippedFile& member : members) {
     const std::string array = array_name(member);
     const bool wanted = options.channel == array;
     if (wanted || options.channel.empty()) {

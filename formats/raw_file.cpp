@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "formats/letter_case.h"
-#include "formats/zip_member.h"
+#include "formats/zipped_file.h"
 #include "isohf/base/error.h"
 
 namespace isohf {
@@ -93,7 +93,7 @@ RawFile::RawFile(const std::string& path, std::uint64_t held_bytes) : path_(path
   }
 }
 
-RawFile::RawFile(const std::string& path, const ZipMember& member, std::uint64_t held_bytes)
+RawFile::RawFile(const std::string& path, const ZippedFile& member, std::uint64_t held_bytes)
     : RawFile(path, held_bytes) {
   unpack_member(member, held_bytes);
 }
@@ -106,8 +106,8 @@ void RawFile::unpack_gzip(std::uint64_t held_bytes) {
   size_bytes_ = held_ ? held_->bytes().size() : inflated_->size_bytes();
 }
 
-void RawFile::unpack_member(const ZipMember& member, std::uint64_t held_bytes) {
-  const std::uint64_t begin = zip_member_begin(*this, member);
+void RawFile::unpack_member(const ZippedFile& member, std::uint64_t held_bytes) {
+  const std::uint64_t begin = zipped_file_begin(*this, member);
   if (member.method == 0) {
     begin_bytes_ = begin;
     size_bytes_ = member.stored_bytes;

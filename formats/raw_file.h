@@ -14,7 +14,7 @@
 
 namespace isohf {
 
-struct ZipMember;
+struct ZippedFile;
 
 /// Whether the name ends in .gz, in any case.
 [[nodiscard]] bool is_gzip_name(const std::string& path);
@@ -36,7 +36,7 @@ class RawFile {
   explicit RawFile(const std::string& path, std::uint64_t held_bytes = kMostHeldBytes);
   /// The contents of one member of a zip archive: stored or deflated, checked against size and CRC.
   /// Throws also Error{kUnsupported}: encrypted, or packed by another method.
-  RawFile(const std::string& path, const ZipMember& member, std::uint64_t held_bytes = kMostHeldBytes);
+  RawFile(const std::string& path, const ZippedFile& member, std::uint64_t held_bytes = kMostHeldBytes);
   RawFile(const RawFile&) = delete;
   RawFile& operator=(const RawFile&) = delete;
   ~RawFile();
@@ -71,7 +71,7 @@ class RawFile {
   [[nodiscard]] std::vector<std::byte> stored_bytes() const;
   [[nodiscard]] InflatedBytes::ReadStored packed_reader() const;
   void unpack_gzip(std::uint64_t held_bytes);
-  void unpack_member(const ZipMember& member, std::uint64_t held_bytes);
+  void unpack_member(const ZippedFile& member, std::uint64_t held_bytes);
 
   std::string path_;
   int descriptor_ = -1;

@@ -4,7 +4,7 @@
 
 #include "camera.h"
 #include "gl_test.h"
-#include "memory_source.h"
+#include "memory_tiles.h"
 #include "offscreen.h"
 #include "png_file.h"
 #include "session.h"
@@ -21,7 +21,7 @@ TileGrid small_grid() {
 }
 
 TEST_F(RendererTest, DrawsEveryVisibleTileWithAtMostTwoCallsAPass) {
-  const test::MemorySource source(small_grid());
+  const test::MemoryTiles source(small_grid());
   const SharedGeometry shared(source.grid().shape(), make_index_arrays(source.grid().shape()));
   TileBox box(source, shared, {});
   Renderer renderer(source, shared);
@@ -57,7 +57,7 @@ TEST_F(RendererTest, DrawsEveryVisibleTileWithAtMostTwoCallsAPass) {
 /// The largest change of any pixel between small steps of level, fading and switching.
 TEST_F(RendererTest, FadesBetweenLevelsWithoutJumps) {
   // Low, and southwards: hills cover hills, and strips run from near to far.
-  const test::MemorySource source(small_grid());
+  const test::MemoryTiles source(small_grid());
   Options options;
   options.view.width = 320;
   options.view.height = 240;

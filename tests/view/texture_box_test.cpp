@@ -10,7 +10,7 @@
 #include "camera.h"
 #include "gl_test.h"
 #include "isohf/surface/texture_cutter.h"
-#include "memory_source.h"
+#include "memory_tiles.h"
 #include "offscreen.h"
 #include "session.h"
 #include "support/memory_photo.h"
@@ -59,7 +59,7 @@ class TexturedPlain final : public TileSource {
   static double width(const MemoryPhoto& photo) { return static_cast<double>(photo.info().width); }
   static double height(const MemoryPhoto& photo) { return static_cast<double>(photo.info().height); }
 
-  test::MemorySource plain_;
+  test::MemoryTiles plain_;
   MemoryPhoto& photo_;
   TextureCutter cutter_;
   TextureInfo info_;

@@ -6,13 +6,13 @@
 #include <thread>
 
 #include "gl_test.h"
-#include "memory_source.h"
+#include "memory_tiles.h"
 
 namespace isohf::view {
 namespace {
 
 using std::chrono::milliseconds;
-using test::MemorySource;
+using test::MemoryTiles;
 
 TileGrid wide_grid() {
   return TileGrid::make(TileShape::make(12, 11, 3), 30, 20, 100.0, 100.0);
@@ -27,7 +27,7 @@ class TileBoxTest : public test::GlTest {
 };
 
 TEST_F(TileBoxTest, HoldsTheBoundingSquareOfTheCircle) {
-  const MemorySource source(wide_grid());
+  const MemoryTiles source(wide_grid());
   const SharedGeometry shared(source.grid().shape(), make_index_arrays(source.grid().shape()));
   TileBox box(source, shared, {});
   box.finish({1550.0, 1050.0}, 220.0);
@@ -42,7 +42,7 @@ TEST_F(TileBoxTest, HoldsTheBoundingSquareOfTheCircle) {
 }
 
 TEST_F(TileBoxTest, SwapsOnlyWhatEntersWhenItMovesByOneTile) {
-  const MemorySource source(wide_grid());
+  const MemoryTiles source(wide_grid());
   const SharedGeometry shared(source.grid().shape(), make_index_arrays(source.grid().shape()));
   TileBox box(source, shared, {});
   box.finish({1050.0, 1050.0}, 300.0);
@@ -55,7 +55,7 @@ TEST_F(TileBoxTest, SwapsOnlyWhatEntersWhenItMovesByOneTile) {
 }
 
 TEST_F(TileBoxTest, NeverExceedsItsMemoryAndSaysHowFarItReaches) {
-  const MemorySource source(wide_grid());
+  const MemoryTiles source(wide_grid());
   const SharedGeometry shared(source.grid().shape(), make_index_arrays(source.grid().shape()));
   for (const std::uint64_t tiles : {20, 60, 130}) {
     const TileBoxLimits limits = limits_for(tiles, 2);
@@ -77,7 +77,7 @@ TEST_F(TileBoxTest, NeverWaitsForATile) {
   // No tile can be read until the gate opens; an update that waited for one would never come back.
   std::promise<void> gate;
   const std::shared_future<void> opened = gate.get_future().share();
-  const MemorySource source(wide_grid(), {}, [&] { opened.wait(); });
+  const MemoryTiles source(wide_grid(), {}, [&] { opened.wait(); });
   const SharedGeometry shared(source.grid().shape(), make_index_arrays(source.grid().shape()));
   TileBox box(source, shared, limits_for(1000, 4));
   for (int frame = 0; frame < 10; ++frame) {
@@ -92,7 +92,7 @@ TEST_F(TileBoxTest, NeverWaitsForATile) {
 
 TEST_F(TileBoxTest, ShowsTheSameBytesWhateverTheRoute) {
   // After any flight, each resident tile's buffer holds that tile's codes and no other's.
-  const MemorySource source(wide_grid());
+  const MemoryTiles source(wide_grid());
   const SharedGeometry shared(source.grid().shape(), make_index_arrays(source.grid().shape()));
   TileBox box(source, shared, limits_for(80, 3));
   for (int step = 0; step < 40; ++step) {
@@ -111,7 +111,7 @@ TEST_F(TileBoxTest, ShowsTheSameBytesWhateverTheRoute) {
   EXPECT_GT(seen, 40);
 }
 
-std::vector<std::uint16_t> shadow_of(const MemorySource& source, TileIndex tile, const RowSun& sun) {
+std::vector<std::uint16_t> shadow_of(const MemoryTiles& source, TileIndex tile, const RowSun& sun) {
   std::vector<std::uint16_t> codes(static_cast<std::size_t>(source.grid().shape().stored_vertex_count()));
   std::vector<std::uint16_t> shadow(codes.size());
   source.read_lit(tile, sun, codes, shadow);
@@ -119,7 +119,7 @@ std::vector<std::uint16_t> shadow_of(const MemorySource& source, TileIndex tile,
 }
 
 TEST_F(TileBoxTest, ShadesAllTilesAnewWhenTheSunMoves) {
-  MemorySource source(wide_grid());
+  MemoryTiles source(wide_grid());
   source.set_seeds({});
   const SharedGeometry shared(source.grid().shape(), make_index_arrays(source.grid().shape()));
   TileBox box(source, shared, limits_for(400, 4));
@@ -146,7 +146,7 @@ TEST_F(TileBoxTest, KeepsOldShadowsUntilNewOnesAreThere) {
   std::promise<void> gate;
   const std::shared_future<void> opened = gate.get_future().share();
   std::atomic<bool> closed{false};
-  MemorySource source(wide_grid(), {}, [&] {
+  MemoryTiles source(wide_grid(), {}, [&] {
     if (closed) opened.wait();
   });
   source.set_seeds({});
@@ -169,7 +169,7 @@ TEST_F(TileBoxTest, KeepsOldShadowsUntilNewOnesAreThere) {
 }
 
 TEST_F(TileBoxTest, ShowsTilesWithBrokenSeedsWithoutShadows) {
-  MemorySource source(wide_grid());
+  MemoryTiles source(wide_grid());
   source.set_seeds({}, [](TileIndex tile, LightTravel, std::vector<double>&) {
     if (tile == TileIndex{7, 9}) throw Error(ErrorCode::kCorrupt, "seeds of tile (7,9)");
   });
@@ -183,7 +183,7 @@ TEST_F(TileBoxTest, ShowsTilesWithBrokenSeedsWithoutShadows) {
 }
 
 TEST_F(TileBoxTest, RefusesTooLittleMemory) {
-  const MemorySource source(wide_grid());
+  const MemoryTiles source(wide_grid());
   const SharedGeometry shared(source.grid().shape(), make_index_arrays(source.grid().shape()));
   EXPECT_THROW(TileBox(source, shared, limits_for(7, 1)), Error);
 }

@@ -3,12 +3,12 @@
 #include <gmock/gmock.h>
 
 #include "gl_test.h"
-#include "memory_source.h"
+#include "memory_tiles.h"
 
 namespace isohf::view {
 namespace {
 
-using test::MemorySource;
+using test::MemoryTiles;
 
 TileGrid tiny_grid() {
   return TileGrid::make(TileShape::make(20, 27, 3), 3, 2, 480.0, 496.0);
@@ -34,7 +34,7 @@ VerifyOptions quick(bool seams) {
 class VerifyViewTest : public test::GlTest {};
 
 TEST_F(VerifyViewTest, PassesOnSoundTiles) {
-  const MemorySource source(tiny_grid());
+  const MemoryTiles source(tiny_grid());
   const VerifyReport report = verify_view(source, make_index_arrays(source.grid().shape()));
   EXPECT_TRUE(report.passed()) << text_of(report);
   EXPECT_EQ(report.tiles, 6);
@@ -45,7 +45,7 @@ TEST_F(VerifyViewTest, PassesOnSoundTiles) {
 TEST_F(VerifyViewTest, PassesWhereTilesHaveVoids) {
   // A hole across a corner of four tiles, by world place so that all four agree, and one tile wholly void.
   const TileGrid grid = tiny_grid();
-  const MemorySource source(grid, [&](TileIndex tile, std::vector<std::uint16_t>& codes) {
+  const MemoryTiles source(grid, [&](TileIndex tile, std::vector<std::uint16_t>& codes) {
     for (int row = 0; row < grid.shape().rows(); ++row) {
       for (int column = 0; column < grid.shape().columns(); ++column) {
         const LatticeVertex at = grid.lattice_vertex(tile, {column, row});
@@ -61,7 +61,7 @@ TEST_F(VerifyViewTest, PassesWhereTilesHaveVoids) {
 
 TEST_F(VerifyViewTest, PassesOnOddShapes) {
   for (const auto& [columns, rows, levels] : {std::array{5, 5, 1}, std::array{6, 5, 1}, std::array{12, 11, 3}}) {
-    const MemorySource source(TileGrid::make(TileShape::make(columns, rows, levels), 2, 2, 10.0, 10.0));
+    const MemoryTiles source(TileGrid::make(TileShape::make(columns, rows, levels), 2, 2, 10.0, 10.0));
     const VerifyReport report = verify_view(source, make_index_arrays(source.grid().shape()));
     EXPECT_TRUE(report.passed()) << columns << "x" << rows << "\n" << text_of(report);
   }
@@ -69,7 +69,7 @@ TEST_F(VerifyViewTest, PassesOnOddShapes) {
 
 /// Every finding names the level at fault, and one of them is of the check that a person would look for.
 void expect_found(const IndexArrays& arrays, Check check, int level, const std::string& what, bool seams = false) {
-  const MemorySource source(tiny_grid());
+  const MemoryTiles source(tiny_grid());
   const VerifyReport report = verify_view(source, arrays, quick(seams));
   EXPECT_FALSE(report.passed()) << what;
   const bool named = std::any_of(report.findings.begin(), report.findings.end(), [&](const Finding& finding) {
@@ -143,9 +143,9 @@ TEST_F(VerifyViewTest, SeesCracksInPictures) {
   expect_found(broken, Check::kCrack, 0, "the last triangles are missing", true);
 }
 
-void expect_tile_found(const MemorySource::Alter& alter, Check check, const std::string& what) {
+void expect_tile_found(const MemoryTiles::Alter& alter, Check check, const std::string& what) {
   const TileIndex bad{1, 1};
-  const MemorySource source(tiny_grid(), [&](TileIndex tile, std::vector<std::uint16_t>& codes) {
+  const MemoryTiles source(tiny_grid(), [&](TileIndex tile, std::vector<std::uint16_t>& codes) {
     if (tile == bad) alter(tile, codes);
   });
   const VerifyReport report = verify_view(source, make_index_arrays(source.grid().shape()), quick(false));
@@ -200,7 +200,7 @@ ShadowSeedInfo low_suns() {
 }
 
 TEST_F(VerifyViewTest, PassesOnSoundShadows) {
-  MemorySource source(tiny_grid());
+  MemoryTiles source(tiny_grid());
   source.set_seeds(low_suns());
   const VerifyReport report = verify_view(source, make_index_arrays(source.grid().shape()), quick(false));
   EXPECT_TRUE(report.passed()) << text_of(report);
@@ -212,7 +212,7 @@ TEST_F(VerifyViewTest, PassesOnSoundShadows) {
 
 TEST_F(VerifyViewTest, PassesOnShadowsAcrossVoids) {
   const TileGrid grid = tiny_grid();
-  MemorySource source(grid, [&](TileIndex tile, std::vector<std::uint16_t>& codes) {
+  MemoryTiles source(grid, [&](TileIndex tile, std::vector<std::uint16_t>& codes) {
     for (int row = 0; row < grid.shape().rows(); ++row) {
       for (int column = 0; column < grid.shape().columns(); ++column) {
         const LatticeVertex at = grid.lattice_vertex(tile, {column, row});
@@ -229,7 +229,7 @@ TEST_F(VerifyViewTest, PassesOnShadowsAcrossVoids) {
 
 /// Tile (1,1) alone is told something wrong of the shadows that enter it; findings name it, a vertex and the sun.
 void expect_seeds_found(const std::function<void(std::vector<double>&)>& spoil, const std::string& what) {
-  MemorySource source(tiny_grid());
+  MemoryTiles source(tiny_grid());
   source.set_seeds(low_suns(), [&](TileIndex tile, LightTravel travel, std::vector<double>& entering) {
     if (tile == TileIndex{1, 1} && travel == LightTravel::kWestward) spoil(entering);
   });
@@ -258,7 +258,7 @@ TEST_F(VerifyViewTest, FindsBrokenSeeds) {
 }
 
 TEST_F(VerifyViewTest, NamesTilesWhoseSeedsCannotBeRead) {
-  MemorySource source(tiny_grid());
+  MemoryTiles source(tiny_grid());
   source.set_seeds(low_suns(), [](TileIndex tile, LightTravel, std::vector<double>&) {
     if (tile == TileIndex{2, 0}) throw Error(ErrorCode::kCorrupt, "member \"seeds/0/2.seed\" is broken");
   });

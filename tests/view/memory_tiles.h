@@ -19,11 +19,11 @@ namespace isohf::test {
 
 /// The analytic surface as a tile source; `alter` may change a tile's codes, `before_read` may hold up whoever reads.
 /// With seeds() it has shadows, of the surface as altered.
-class MemorySource final : public view::TileSource {
+class MemoryTiles final : public view::TileSource {
  public:
   using Alter = std::function<void(TileIndex, std::vector<std::uint16_t>&)>;
 
-  explicit MemorySource(const TileGrid& grid, Alter alter = {}, std::function<void()> before_read = {})
+  explicit MemoryTiles(const TileGrid& grid, Alter alter = {}, std::function<void()> before_read = {})
       : grid_(grid), alter_(std::move(alter)), before_read_(std::move(before_read)) {
     for (std::int64_t flat = 0; flat < grid.tile_count(); ++flat) bounds_.push_back(measure(grid.tile_at(flat)));
   }

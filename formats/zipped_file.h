@@ -10,7 +10,7 @@
 namespace isohf {
 
 /// One file of a zip archive (PKWARE APPNOTE 6.3, Zip64 included).
-struct ZipMember {
+struct ZippedFile {
   std::string name;
   std::uint16_t method = 0;  ///< 0 stored, 8 deflated
   bool encrypted = false;
@@ -21,10 +21,10 @@ struct ZipMember {
 };
 
 /// The directory of the archive. Throws Error{kCorrupt, kIo} naming the file.
-[[nodiscard]] std::vector<ZipMember> zip_members(const RawFile& file);
+[[nodiscard]] std::vector<ZippedFile> zipped_files(const RawFile& file);
 
 /// Where the stored bytes of `member` begin in the file. Throws Error: kUnsupported for encrypted members and for
 /// methods other than stored and deflated; kCorrupt.
-[[nodiscard]] std::uint64_t zip_member_begin(const RawFile& file, const ZipMember& member);
+[[nodiscard]] std::uint64_t zipped_file_begin(const RawFile& file, const ZippedFile& member);
 
 }  // namespace isohf

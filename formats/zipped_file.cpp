@@ -1,4 +1,4 @@
-#include "formats/zip_member.h"
+#include "formats/zipped_file.h"
 
 #include <fmt/core.h>
 
@@ -85,7 +85,7 @@ End find_end(const RawFile& file) {
 }
 
 /// Takes the numbers that their own fields had no room for, in the order of the standard.
-void read_zip64_field(std::span<const std::byte> extra, ZipMember& member) {
+void read_zip64_field(std::span<const std::byte> extra, ZippedFile& member) {
   ByteReader in(extra);
   while (in.remaining() >= 4) {
     const auto kind = in.read<std::uint16_t>();
@@ -103,10 +103,10 @@ void read_zip64_field(std::span<const std::byte> extra, ZipMember& member) {
   throw Error(ErrorCode::kCorrupt, member.name + ": its Zip64 field is not there");
 }
 
-ZipMember read_entry(const RawFile& file, ByteReader& in) {
+ZippedFile read_entry(const RawFile& file, ByteReader& in) {
   if (in.read<std::uint32_t>() != kEntrySignature) corrupt(file, "the zip directory is damaged");
   (void)in.read_bytes(4);  // versions
-  ZipMember member;
+  ZippedFile member;
   member.encrypted = (in.read<std::uint16_t>() & 1U) != 0;
   member.method = in.read<std::uint16_t>();
   (void)in.read_bytes(4);  // time and date
@@ -131,7 +131,7 @@ ZipMember read_entry(const RawFile& file, ByteReader& in) {
 
 }  // namespace
 
-std::vector<ZipMember> zip_members(const RawFile& file) {
+std::vector<ZippedFile> zipped_files(const RawFile& file) {
   const End end = find_end(file);
   if (end.directory_offset > file.size_bytes() || end.directory_bytes > file.size_bytes() - end.directory_offset) {
     corrupt(file, "the zip directory lies outside the file");
@@ -142,7 +142,7 @@ std::vector<ZipMember> zip_members(const RawFile& file) {
   }
   std::vector<std::byte> directory(static_cast<std::size_t>(end.directory_bytes));
   file.read(end.directory_offset, directory);
-  std::vector<ZipMember> members;
+  std::vector<ZippedFile> members;
   try {
     ByteReader in(directory, end.directory_offset);
     for (std::uint64_t i = 0; i < end.entries; ++i) members.push_back(read_entry(file, in));
@@ -152,7 +152,7 @@ std::vector<ZipMember> zip_members(const RawFile& file) {
   return members;
 }
 
-std::uint64_t zip_member_begin(const RawFile& file, const ZipMember& member) {
+std::uint64_t zipped_file_begin(const RawFile& file, const ZippedFile& member) {
   if (member.encrypted || (member.method != 0 && member.method != 8)) {
     throw Error(
         ErrorCode::kUnsupported,
