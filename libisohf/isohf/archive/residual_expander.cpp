@@ -65,8 +65,8 @@ std::uint64_t expand_widely(const std::byte* symbols, std::size_t count, const s
   };
   std::size_t i = 0;
   for (; i + 16 <= count; i += 16) {
-    const __m128i symbol = _mm_loadu_si128(reinterpret_cast<const __m128i*>(symbols + i));
-    auto* const to = reinterpret_cast<__m128i*>(folded + i);
+    const __m128i symbol = _mm_loadu_si128(static_cast<const __m128i*>(static_cast<const void*>(symbols + i)));
+    auto* const to = static_cast<__m128i*>(static_cast<void*>(folded + i));
     if (_mm_testz_si128(symbol, _mm_set1_epi8(-16)) != 0) {  // residuals themselves
       _mm_storeu_si128(to, _mm_unpacklo_epi8(symbol, zero));
       _mm_storeu_si128(to + 1, _mm_unpackhi_epi8(symbol, zero));
