@@ -54,7 +54,8 @@ class GdalVariants : public ::testing::Test {
     EXPECT_EQ(ours.at("width"), gdal.at("size")[0]);
     EXPECT_EQ(ours.at("height"), gdal.at("size")[1]);
     const json& band = gdal.at("bands")[0];
-    if (band.contains("noDataValue") && band.at("noDataValue").is_number()) {
+    // Surfer's blank is the limit of a range.
+    if (!file.ends_with(".grd") && band.contains("noDataValue") && band.at("noDataValue").is_number()) {
       ASSERT_EQ(ours.at("void_values").size(), 1U);
       const double theirs = band.at("noDataValue");  // of floats eight digits are printed
       EXPECT_NEAR(ours.at("void_values")[0].get<double>(), theirs, 1e-7 * std::abs(theirs));
@@ -191,6 +192,9 @@ TEST_F(GdalVariants, OtherFormats) {
   for (const Variant& variant : std::vector<Variant>{
            {"r.flt", {"-of", "EHdr"}},
            {"s.asc", {"-of", "AAIGrid", "-co", "DECIMAL_PRECISION=9"}},
+           {"text.grd", {"-of", "GSAG"}},
+           {"six.grd", {"-of", "GSBG"}},
+           {"seven.grd", {"-of", "GS7BG"}},
            {"t.cub", {"-of", "ISIS3", "-co", "TILED=YES", "-co", "BLOCKXSIZE=64", "-co", "BLOCKYSIZE=64"}}}) {
     expect_same("real.tif", variant);
   }

@@ -97,8 +97,8 @@ TEST(MemoryPlan, TheArchiveDoesNotDependOnTheLimit) {
     source.mutable_info().block_width = tiled ? 64 : 700;
     source.mutable_info().block_height = tiled ? 48 : 1;
     for (const char* filter : {"bilinear", "catmull-rom", "bspline3", "bspline5"}) {
-      if (test::kSanitized && tiled == (std::string(filter) == "bspline3" || std::string(filter) == "bilinear"))
-        continue;
+      // One filter that works on tiles' pieces, one that works on bands.
+      if (test::kSanitized && filter != std::string(tiled ? "bspline3" : "catmull-rom")) continue;
       ConvertOptions options;
       options.plan.shape = {20, 19};
       options.plan.levels = 4;
@@ -122,7 +122,7 @@ TEST(MemoryPlan, TheArchiveDoesNotDependOnTheLimit) {
       EXPECT_EQ(folder.names(), (std::vector<std::string>{"any.isohf", "bound.isohf"}));
     }
   }
-  EXPECT_GE(in_scratch, test::kSanitized ? 4 : 8);
+  EXPECT_GE(in_scratch, test::kSanitized ? 2 : 8);
 }
 
 TEST(MemoryPlan, AScratchFileHoldsAllRowsOfTilesInFlightOfANarrowRaster) {
