@@ -70,19 +70,17 @@ RunningProgram::RunningProgram(const std::vector<std::string>& command, const Ru
   Pipe in;
   Pipe out;
   Pipe err;
+  // Before the program can write: one that is quick would find a reader.
+  if (options.close_output) close_if_open(out.read_end);
   pid_ = ::fork();
   if (pid_ < 0) give_up("fork");
-  if (pid_ == 0) {
-    if (options.close_output) ::close(out.read_end);
-    become(command, options, in.read_end, out.write_end, err.write_end);
-  }
+  if (pid_ == 0) become(command, options, in.read_end, out.write_end, err.write_end);
   ::close(in.read_end);
   ::close(out.write_end);
   ::close(err.write_end);
   in_ = in.write_end;
   out_ = out.read_end;
   err_ = err.read_end;
-  if (options.close_output) close_if_open(out_);
   ::fcntl(in_, F_SETFL, O_NONBLOCK);
 }
 
