@@ -7,6 +7,7 @@
 
 #include "support/plain_tiff.h"
 #include "support/run_program.h"
+#include "support/sanitizers.h"
 #include "support/temporary_folder.h"
 
 namespace isohf::test {
@@ -14,7 +15,8 @@ namespace {
 
 class Interrupt : public testing::Test {
  protected:
-  Interrupt() { write_sparse_tiff(folder / "big.tif", 7000, 5000); }
+  /// Its tiles take half a second, however fast: the signal must arrive before they are done.
+  Interrupt() { write_sparse_tiff(folder / "big.tif", 7000, kSanitized ? 5000 : 20000); }
 
   std::vector<std::string> command(const std::string& output, const std::vector<std::string>& more = {}) const {
     std::vector<std::string> all = {isohf_path(), "convert", folder / "big.tif", folder / output,
