@@ -210,7 +210,8 @@ class TiffSource final : public HeightSource {
   [[nodiscard]] std::unique_ptr<HeightSource> open_opacity() const {
     if (mask_) return open_tiff_mask(info_.path, *mask_, turned_);
     const std::string beside = info_.path + ".msk";  // as GDAL writes them
-    if (std::filesystem::exists(beside)) return open_tiff_mask(beside, 0, turned_);
+    std::error_code error;
+    if (std::filesystem::is_regular_file(beside, error)) return open_tiff_mask(beside, 0, turned_);
     if (!has_grey_and_opacity(layout_) || channel_ != 0) return nullptr;
     OpenOptions options;
     options.channel = "A";

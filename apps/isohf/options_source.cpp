@@ -12,8 +12,8 @@ namespace isohf::cli {
 void add_source_options(CommandLine& line, OpenOptions& options) {
   line.group("Input");
   line.option("--channel", "NAME|N",
-              "Channel of elevations: its name, or its number from 0 (default: the file's only "
-              "or first fitting one)",
+              "Channel of elevations: its name, or its number from 0, read alone, without masks and opacity "
+              "(default: the file's only or first fitting one, with them)",
               options.channel);
   line.option("--part", "NAME|N", "Part of an OpenEXR file of several: its name, or its number from 0", options.part);
   line.option(

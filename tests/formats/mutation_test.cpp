@@ -16,6 +16,7 @@
 #include "formats/reader_failure.h"
 #include "isohf/base/error.h"
 #include "support/samples.h"
+#include "support/sanitizers.h"
 #include "support/temporary_folder.h"
 
 namespace isohf::test {
@@ -27,12 +28,6 @@ int mutations() {
   return wanted != nullptr ? std::stoi(wanted) : 10000;
 }
 constexpr unsigned kSeed = 20040808;
-
-#if defined(__SANITIZE_ADDRESS__)
-constexpr bool kSanitized = true;
-#else
-constexpr bool kSanitized = false;
-#endif
 
 const std::vector<ReaderCase>& cases() {
   static const std::vector<ReaderCase> all = reader_cases();

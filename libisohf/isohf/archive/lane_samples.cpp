@@ -29,9 +29,9 @@ constexpr std::int32_t pair_of(std::int32_t west, std::int32_t east) {
                                                                                       << 16U);
 }
 
+constexpr int kAnchor = static_cast<int>(kWeightCount);  // NE's weight
 /// A pair of terms: the place of its western sample from the predicted one, on which row, and the weights of both; a
 /// negative one for none.
-constexpr int kAnchor = static_cast<int>(kWeightCount);  // NE's weight
 struct TermPair {
   LaneRow row;
   int place;
