@@ -1,21 +1,8 @@
 #pragma once
 
-#include <string>
-#include <vector>
+#include "program.h"
 
 namespace isohf::cli {
-
-/// What follows the command's name on the command line.
-using Arguments = std::vector<std::string>;
-
-/// How the program ends (docs/cli.md).
-enum ExitCode : int {
-  kExitDone = 0,
-  kExitFailed = 1,
-  kExitUsage = 2,
-  kExitDifferences = 3,  ///< verify found something, restore not what --lossless kept
-  kExitInterrupted = 130,
-};
 
 /// A command: parses its arguments, which touches no file but --config, and runs. Throws Error.
 using CommandFunction = int (*)(const Arguments& arguments);

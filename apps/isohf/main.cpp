@@ -3,10 +3,7 @@
 #include <fmt/core.h>
 #include <malloc.h>
 
-#include <csignal>
 #include <cstdlib>
-#include <exception>
-#include <new>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -95,7 +92,32 @@ void print_usage() {
   out.finish();
 }
 
-int run(Arguments arguments) {
+/// Keeps freed memory in the process. Tiles come and go by the thousand, a few hundred kilobytes each; the system would
+/// clear every page of each anew, a quarter of the time that large inputs take.
+void keep_freed_memory() {
+#if defined(__GLIBC__)
+  constexpr int kMappedFrom = 4 << 20;
+  constexpr int kKept = 256 << 20;
+  ::mallopt(M_MMAP_THRESHOLD, kMappedFrom);
+  ::mallopt(M_TRIM_THRESHOLD, kKept);
+#endif
+}
+
+/// `setting`: "off" runs the plain twins of vectorised code, for tests and for finding faults.
+void choose_simd(const char* setting) {
+  const std::string_view text = setting == nullptr ? "on" : setting;
+  if (text != "on" && text != "off") {
+    throw Error(ErrorCode::kInvalidArgument,
+                fmt::format("the environment variable ISOHF_SIMD is '{}', must be on or off", text));
+  }
+  set_simd(text == "on");
+}
+
+int run(const Arguments& given) {
+  keep_freed_memory();
+  if (const char* folder = std::getenv("ISOHF_MODULE_PATH"); folder != nullptr) set_module_folder(folder);
+  choose_simd(std::getenv("ISOHF_SIMD"));
+  Arguments arguments = given;
   if (arguments.empty()) {
     throw Error(ErrorCode::kInvalidArgument, "no command given (isohf --help lists the commands)");
   }
@@ -131,56 +153,9 @@ int run(Arguments arguments) {
                                                " (isohf --help lists the commands)");
 }
 
-int exit_code_for(ErrorCode code) {
-  if (code == ErrorCode::kInvalidArgument) return kExitUsage;
-  if (code == ErrorCode::kCancelled) return kExitInterrupted;
-  return kExitFailed;
-}
-
-/// Keeps freed memory in the process. Tiles come and go by the thousand, a few hundred kilobytes each; the system would
-/// clear every page of each anew, a quarter of the time that large inputs take.
-void keep_freed_memory() {
-#if defined(__GLIBC__)
-  constexpr int kMappedFrom = 4 << 20;
-  constexpr int kKept = 256 << 20;
-  ::mallopt(M_MMAP_THRESHOLD, kMappedFrom);
-  ::mallopt(M_TRIM_THRESHOLD, kKept);
-#endif
-}
-
-/// `setting`: "off" runs the plain twins of vectorised code, for tests and for finding faults.
-void choose_simd(const char* setting) {
-  const std::string_view text = setting == nullptr ? "on" : setting;
-  if (text != "on" && text != "off") {
-    throw Error(ErrorCode::kInvalidArgument,
-                fmt::format("the environment variable ISOHF_SIMD is '{}', must be on or off", text));
-  }
-  set_simd(text == "on");
-}
-
 }  // namespace
 }  // namespace isohf::cli
 
 int main(int argc, char** argv) {
-  using namespace isohf::cli;
-  // A closed pipe or a file over its size limit is an error that write() reports, not a reason to die.
-  std::signal(SIGPIPE, SIG_IGN);
-  std::signal(SIGXFSZ, SIG_IGN);
-  keep_freed_memory();
-  if (const char* folder = std::getenv("ISOHF_MODULE_PATH"); folder != nullptr) isohf::set_module_folder(folder);
-  try {
-    choose_simd(std::getenv("ISOHF_SIMD"));
-    return run(Arguments(argv + (argc > 0 ? 1 : 0), argv + argc));
-  } catch (const OutputClosed&) {
-    return kExitFailed;
-  } catch (const isohf::Error& error) {
-    print_error(error.what());
-    return exit_code_for(error.code());
-  } catch (const std::bad_alloc&) {
-    print_error("out of memory");
-    return kExitFailed;
-  } catch (const std::exception& error) {
-    print_error(std::string("internal error: ") + error.what());
-    return kExitFailed;
-  }
+  return isohf::cli::run_program("isohf", argc, argv, isohf::cli::run);
 }

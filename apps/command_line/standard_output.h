@@ -24,9 +24,9 @@ class StandardOutput {
 /// Thrown where standard output's reader has gone; main() ends quietly.
 struct OutputClosed {};
 
-/// One line on standard error: "isohf: warning: ...".
+/// One line on standard error: "PROGRAM: warning: ...".
 void print_warning(const std::string& text);
-/// One line on standard error: "isohf: ...".
+/// One line on standard error: "PROGRAM: ...".
 void print_error(const std::string& text);
 /// One line on standard error as it stands.
 void print_note(const std::string& text);

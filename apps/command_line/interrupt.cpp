@@ -3,7 +3,7 @@
 #include <unistd.h>
 #include <csignal>
 
-#include "command.h"
+#include "program.h"
 
 namespace isohf::cli {
 namespace {

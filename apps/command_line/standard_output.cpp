@@ -6,6 +6,7 @@
 #include <cstring>
 
 #include "isohf/base/error.h"
+#include "program.h"
 
 namespace isohf::cli {
 namespace {
@@ -52,10 +53,10 @@ void StandardOutput::flush() {
 }
 
 void print_warning(const std::string& text) {
-  write_line_to_stderr("isohf: warning: " + text);
+  write_line_to_stderr(program_name() + ": warning: " + text);
 }
 void print_error(const std::string& text) {
-  write_line_to_stderr("isohf: " + text);
+  write_line_to_stderr(program_name() + ": " + text);
 }
 void print_note(const std::string& text) {
   write_line_to_stderr(text);

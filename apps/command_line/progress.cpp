@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "describe.h"
+#include "program.h"
 #include "standard_output.h"
 
 namespace isohf::cli {
@@ -64,7 +65,7 @@ void ProgressDisplay::update(const std::string& what, const std::string& unit, s
   if (rate > 0.0) text += fmt::format("  {:.4g} {}/s", rate, unit);
   if (rate > 0.0 && !is_last) text += fmt::format("  {} left", describe_seconds(left));
   if (style_ == Style::kLines) {
-    print_note("isohf: " + text);
+    print_note(program_name() + ": " + text);
     return;
   }
   const auto cells = static_cast<std::size_t>(part * kBarCells);
