@@ -16,7 +16,7 @@ class OiioPhoto final : public PhotoSource {
     IsohfOiioPhotoInfo found{};
     IsohfOiioMessage message{};
     const int result = module_.open_photo(path.c_str(), &photo_, &found, &message);
-    if (result != 0) throw Error(oiio_error_code(result), message.text);
+    if (result != 0) throw Error(module_error_code(result), message.text);
     info_.path = path;
     info_.format = found.format;
     info_.width = found.width;
@@ -41,7 +41,7 @@ class OiioPhoto final : public PhotoSource {
     IsohfOiioMessage message{};
     const int result = module_.read_photo(photo_, window.column, window.row, window.columns, window.rows,
                                           samples.data(), samples.size(), &message);
-    if (result != 0) throw Error(oiio_error_code(result), fmt::format("{}: {}", info_.path, message.text));
+    if (result != 0) throw Error(module_error_code(result), fmt::format("{}: {}", info_.path, message.text));
   }
 
  private:

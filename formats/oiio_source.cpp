@@ -31,7 +31,7 @@ class OiioSource final : public HeightSource {
     IsohfOiioMessage message{};
     const int result = module_.open(path.c_str(), options.channel.c_str(), &raster_, &found, &message);
     if (result == ISOHF_OIIO_UNKNOWN) refuse_unknown(path, "OpenImageIO does not know it either");
-    if (result != 0) throw Error(oiio_error_code(result), fmt::format("{}: {}", path, message.text));
+    if (result != 0) throw Error(module_error_code(result), fmt::format("{}: {}", path, message.text));
     info_.path = path;
     info_.format = found.format;
     info_.width = found.width;
@@ -62,7 +62,7 @@ class OiioSource final : public HeightSource {
     IsohfOiioMessage message{};
     const int result = module_.read(raster_, window.column, window.row, window.columns, window.rows, samples.data(),
                                     samples.size(), &message);
-    if (result != 0) throw Error(oiio_error_code(result), fmt::format("{}: {}", info_.path, message.text));
+    if (result != 0) throw Error(module_error_code(result), fmt::format("{}: {}", info_.path, message.text));
   }
 
   void limit_buffers(std::uint64_t bytes) override { module_.bound(raster_, signed_bytes(bytes)); }

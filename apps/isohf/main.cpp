@@ -65,7 +65,7 @@ Of convert:
 Alone:
       --version       Print the version
 
-ISOHF_MODULE_PATH names the folder of the OpenImageIO reader (default: beside the program, then ../lib/isohf).
+ISOHF_MODULE_PATH names the folder of the OpenImageIO and PROJ modules (default: beside the program, then ../lib/isohf).
 ISOHF_SIMD=off runs the plain twins of vectorised code: slower, and the same bytes.
 
 Results go to standard output, everything else to standard error.

@@ -1,20 +1,13 @@
 #pragma once
 
 #include "isohf/projection/projection.h"
+#include "isohf/projection/reference_map.h"
 
 namespace isohf {
 
-/// The least rectangle of a map around a ground, metres.
-struct MapBounds {
-  double west = 0.0;
-  double south = 0.0;
-  double east = 0.0;
-  double north = 0.0;
-};
-
-/// Bounds of a ground's image, found by walking along its four sides in many short steps. The curve between two of
-/// these places is allowed for: the bounds hold it, and exceed the image by less than 1e-5 of its size. NaN where a
-/// place on the way has no image.
+/// Bounds, metres, of a ground's image, found by walking along its four sides in many short steps. The curve between
+/// two of these places is allowed for: the bounds hold it, and exceed the image by less than 1e-5 of its size. NaN
+/// where a place on the way has no image.
 [[nodiscard]] MapBounds projected_bounds(const Projection& projection, const GeoExtent& ground);
 
 /// The worst scale on a ground, and where.

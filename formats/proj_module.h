@@ -1,0 +1,62 @@
+#pragma once
+
+#include <stddef.h>  // NOLINT(modernize-deprecated-headers): the boundary is C
+#include <stdint.h>  // NOLINT(modernize-deprecated-headers)
+
+/// The boundary between isohf and the module that understands reference systems through PROJ, isohf_proj.so. It is
+/// loaded only where a system has to be understood: PROJ brings a database and some twenty libraries with it. Only C
+/// types cross, as in oiio_module.h. The network stays off.
+///
+/// Functions that can fail return 0, or one more than the ErrorCode with a message of one line.
+
+extern "C" {
+
+/// Raised whenever anything below changes; the loader refuses any other.
+#define ISOHF_PROJ_ABI 1
+
+typedef struct IsohfProjSystem IsohfProjSystem;
+
+/// The horizontal part of a system.
+typedef struct IsohfProjInfo {
+  char name[256];          ///< "WGS 84 / UTM zone 32N"
+  char authority[32];      ///< "EPSG", "ESRI", "IAU_2015", ...; empty where the text gives none
+  char code[32];           ///< "32632"
+  char datum[256];         ///< "World Geodetic System 1984", or of the geographic system where it has but an ensemble
+  int32_t is_projected;    ///< 0: longitudes and latitudes
+  int32_t is_compound;     ///< heights belong to it
+  double metres_per_unit;  ///< of both axes; degrees in a unit where not projected
+  double semi_major_axis_m;
+  double inverse_flattening;  ///< 0 for a sphere
+  size_t wkt_bytes;           ///< of the WKT, with the 0 behind it
+} IsohfProjInfo;
+
+typedef struct IsohfProjMessage {
+  char text[512];
+} IsohfProjMessage;
+
+/// Understands `text`: "EPSG:2154", WKT of any version and dialect, a PROJ string, PROJJSON.
+typedef int (*IsohfProjOpen)(const char* text, IsohfProjSystem** system, IsohfProjInfo* info,
+                             IsohfProjMessage* message);
+/// WKT2 (ISO 19162:2019) of all of the system, on one line; `wkt` holds `wkt_bytes`.
+typedef void (*IsohfProjWkt)(const IsohfProjSystem* system, char* wkt);
+/// Coordinates of the system, East before North and in its units, to degrees from Greenwich, and back, in place: x and
+/// y of `count` places. NaN where there is no such place. Any number of threads at once.
+typedef void (*IsohfProjMove)(const IsohfProjSystem* system, double* places, size_t count);
+typedef void (*IsohfProjClose)(IsohfProjSystem* system);
+/// "PROJ 9.1.1"; stays valid.
+typedef const char* (*IsohfProjText)(void);
+
+typedef struct IsohfProjModule {
+  int32_t abi;
+  IsohfProjOpen open;
+  IsohfProjWkt wkt;
+  IsohfProjMove to_geo;
+  IsohfProjMove from_geo;
+  IsohfProjClose close;
+  IsohfProjText library;
+} IsohfProjModule;
+
+/// The one symbol that the module exports, and its name.
+const IsohfProjModule* isohf_proj_module(void);
+#define ISOHF_PROJ_SYMBOL "isohf_proj_module"
+}

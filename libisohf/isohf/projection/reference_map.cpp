@@ -1,0 +1,146 @@
+#include "isohf/projection/reference_map.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+namespace isohf {
+namespace {
+
+constexpr int kPlaces = 33;
+constexpr double kDegree = M_PI / 180.0;
+/// Half of the step of differences, for the body's axis: of 40 m on the Earth. Their error is a square of it.
+constexpr double kStep = 3e-6;
+
+using Vector = std::array<double, 3>;
+
+double dot(const Vector& a, const Vector& b) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+/// From the body's middle, metres: what lies next to each other on the ground does so here, at poles and across the
+/// 180th meridian as well.
+Vector place_in_space(const Ellipsoid& body, GeoPoint place) {
+  const double f = body.flattening();
+  const double e2 = f * (2.0 - f);
+  const double sine = std::sin(place.latitude * kDegree);
+  const double normal = body.semi_major_axis_m / std::sqrt(1.0 - e2 * sine * sine);
+  const double from_axis = normal * std::cos(place.latitude * kDegree);
+  return {from_axis * std::cos(place.longitude * kDegree), from_axis * std::sin(place.longitude * kDegree),
+          normal * (1.0 - e2) * sine};
+}
+
+double between(double a, double b, int step) {
+  return step == kPlaces - 1 ? b : a + (b - a) * (static_cast<double>(step) / (kPlaces - 1));
+}
+
+/// Grows by longitudes on the turn nearest to the first one's, and by latitudes.
+void include(GeoExtent& extent, const GeoPoint& middle, const GeoPoint& place) {
+  const double longitude = middle.longitude + std::remainder(place.longitude - middle.longitude, 360.0);
+  extent.west = std::min(extent.west, longitude);
+  extent.east = std::max(extent.east, longitude);
+  extent.south = std::min(extent.south, place.latitude);
+  extent.north = std::max(extent.north, place.latitude);
+}
+
+bool holds(const MapBounds& bounds, const MapPoint& place) {
+  return place.easting >= bounds.west && place.easting <= bounds.east && place.northing >= bounds.south &&
+         place.northing <= bounds.north;
+}
+
+}  // namespace
+
+double PlaceScale::error() const {
+  return std::max(std::abs(least - 1.0), std::abs(most - 1.0));
+}
+
+double PlaceScale::mean() const {
+  return std::sqrt(areal);
+}
+
+PlaceScale scale_at(const ReferenceMap& map, MapPoint place) {
+  const double metres = map.metres_per_unit();
+  const double step = kStep * map.ellipsoid().semi_major_axis_m / metres;
+  const auto along = [&](double easting, double northing) {
+    const Vector a =
+        place_in_space(map.ellipsoid(), map.geo_from_map({place.easting - easting, place.northing - northing}));
+    const Vector b =
+        place_in_space(map.ellipsoid(), map.geo_from_map({place.easting + easting, place.northing + northing}));
+    const double length = 2.0 * std::hypot(easting, northing);
+    return Vector{(b[0] - a[0]) / length, (b[1] - a[1]) / length, (b[2] - a[2]) / length};
+  };
+  const Vector east = along(step, 0.0);
+  const Vector north = along(0.0, step);
+  // The ground's metres for a unit of the map: g = J^T J, whose eigenvalues are squares of 1 / scale.
+  const double g11 = dot(east, east);
+  const double g12 = dot(east, north);
+  const double g22 = dot(north, north);
+  const double half_trace = (g11 + g22) / 2.0;
+  const double spread = std::hypot((g11 - g22) / 2.0, g12);
+  PlaceScale scale;
+  scale.ground_m_per_easting = std::sqrt(g11);
+  scale.ground_m_per_northing = std::sqrt(g22);
+  scale.least = metres / std::sqrt(half_trace + spread);
+  const double determinant = g11 * g22 - g12 * g12;
+  scale.areal = metres * metres / std::sqrt(determinant);
+  scale.most = scale.areal / scale.least;
+  scale.angular_deg = 2.0 * std::asin((scale.most - scale.least) / (scale.most + scale.least)) / kDegree;
+  // A direction of the ground is J times one of the map.
+  const GeoPoint geo = map.geo_from_map(place);
+  const double sine = std::sin(geo.latitude * kDegree);
+  const Vector to_east = {-std::sin(geo.longitude * kDegree), std::cos(geo.longitude * kDegree), 0.0};
+  const Vector to_north = {-sine * std::cos(geo.longitude * kDegree), -sine * std::sin(geo.longitude * kDegree),
+                           std::cos(geo.latitude * kDegree)};
+  const auto scale_towards = [&](const Vector& direction) {
+    const double a = dot(east, direction);
+    const double b = dot(north, direction);
+    return metres * std::hypot((g22 * a - g12 * b) / determinant, (g11 * b - g12 * a) / determinant);
+  };
+  scale.meridional = scale_towards(to_north);
+  scale.parallel = scale_towards(to_east);
+  if (std::isfinite(scale.areal + scale.meridional + scale.parallel)) return scale;
+  constexpr double kNowhere = std::numeric_limits<double>::quiet_NaN();
+  return {kNowhere, kNowhere, kNowhere, kNowhere, kNowhere, kNowhere, kNowhere, kNowhere};
+}
+
+std::optional<MapGround> ground_under(const ReferenceMap& map, const MapBounds& bounds) {
+  MapGround ground;
+  ground.centre = map.geo_from_map(bounds.middle());
+  GeoPoint first = ground.centre;
+  ground.extent = {HUGE_VAL, HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
+  ground.least_scale = HUGE_VAL;
+  ground.most_scale = 0.0;
+  ground.worst_error = -1.0;
+  double sum = 0.0;
+  int count = 0;
+  for (int row = 0; row < kPlaces; ++row) {
+    for (int column = 0; column < kPlaces; ++column) {
+      const MapPoint place{between(bounds.west, bounds.east, column), between(bounds.north, bounds.south, row)};
+      const GeoPoint geo = map.geo_from_map(place);
+      if (!std::isfinite(geo.longitude) || !std::isfinite(geo.latitude)) continue;
+      if (!std::isfinite(first.longitude)) first = geo;
+      include(ground.extent, first, geo);
+      const PlaceScale scale = scale_at(map, place);
+      if (!std::isfinite(scale.areal)) continue;
+      ++count;
+      sum += scale.mean();
+      ground.least_scale = std::min(ground.least_scale, scale.least);
+      ground.most_scale = std::max(ground.most_scale, scale.most);
+      if (scale.error() <= ground.worst_error) continue;
+      ground.worst_error = scale.error();
+      ground.worst_place = geo;
+    }
+  }
+  if (count == 0) return std::nullopt;
+  ground.mean_scale = sum / count;
+  for (const double pole : {90.0, -90.0}) {
+    if (!holds(bounds, map.map_from_geo({first.longitude, pole}))) continue;
+    (pole > 0.0 ? ground.extent.north : ground.extent.south) = pole;
+    ground.extent.west = first.longitude - 180.0;
+    ground.extent.east = first.longitude + 180.0;
+  }
+  return ground;
+}
+
+}  // namespace isohf

@@ -1,0 +1,72 @@
+#pragma once
+
+#include <optional>
+
+#include "isohf/projection/projection_spec.h"
+
+namespace isohf {
+
+/// A horizontal reference system that is understood: its coordinates <-> places on the body. Longitudes and latitudes
+/// are those of the system's own datum, counted from Greenwich. Immutable and thread-safe.
+class ReferenceMap {
+ public:
+  ReferenceMap() = default;
+  ReferenceMap(const ReferenceMap&) = delete;
+  ReferenceMap& operator=(const ReferenceMap&) = delete;
+  virtual ~ReferenceMap() = default;
+
+  /// longitude in [-180, 180]. NaN where the map shows no place. Coordinates are in units of metres_per_unit().
+  [[nodiscard]] virtual GeoPoint geo_from_map(MapPoint place) const = 0;
+  /// NaN where the map has no place for it.
+  [[nodiscard]] virtual MapPoint map_from_geo(GeoPoint place) const = 0;
+  [[nodiscard]] virtual double metres_per_unit() const = 0;
+  [[nodiscard]] virtual const Ellipsoid& ellipsoid() const = 0;
+};
+
+/// The rectangle of a map that a raster covers, in the map's units.
+struct MapBounds {
+  double west = 0.0;
+  double south = 0.0;
+  double east = 0.0;
+  double north = 0.0;
+
+  [[nodiscard]] MapPoint middle() const { return {(west + east) / 2.0, (south + north) / 2.0}; }
+};
+
+/// Scales at a place of a map: length on the map for length on the ground.
+struct PlaceScale {
+  double least = 1.0;  ///< over all directions
+  double most = 1.0;
+  double meridional = 1.0;
+  double parallel = 1.0;
+  double areal = 1.0;
+  double angular_deg = 0.0;           ///< the largest change of an angle between two directions, twice over
+  double ground_m_per_easting = 1.0;  ///< metres on the ground along one unit of easting, and of northing
+  double ground_m_per_northing = 1.0;
+
+  /// Of a length, the larger of the two's deviations from 1.
+  [[nodiscard]] double error() const;
+  /// Of lengths, over all directions.
+  [[nodiscard]] double mean() const;
+};
+/// NaN in every member where the map shows no place, or ends.
+[[nodiscard]] PlaceScale scale_at(const ReferenceMap& map, MapPoint place);
+
+/// What lies under a rectangle of a map.
+struct MapGround {
+  GeoPoint centre;          ///< under the rectangle's
+  GeoExtent extent;         ///< the least one that holds the ground; all longitudes where a pole is inside
+  double mean_scale = 1.0;  ///< of places evenly spread over the map: of lengths, over all directions
+  double least_scale = 1.0;
+  double most_scale = 1.0;
+  double worst_error = 0.0;  ///< the largest deviation of a scale from 1
+  GeoPoint worst_place;
+
+  /// Beyond this lengths of the map are no lengths of the ground (docs/decisions/0029).
+  static constexpr double kTrueEnough = 0.02;
+};
+/// Looks at 33 x 33 places, the sides included. Places that the map does not show are passed over; nullopt where it
+/// shows none of them.
+[[nodiscard]] std::optional<MapGround> ground_under(const ReferenceMap& map, const MapBounds& bounds);
+
+}  // namespace isohf

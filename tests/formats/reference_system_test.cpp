@@ -1,0 +1,219 @@
+#include "formats/reference_system.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <GeographicLib/UTMUPS.hpp>
+#include <cmath>
+#include <random>
+#include <thread>
+#include <vector>
+
+#include "formats/reader_failure.h"
+#include "formats/registry.h"
+#include "isohf/base/error.h"
+
+namespace isohf::test {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+constexpr double kDegree = M_PI / 180.0;
+constexpr double kWgs84 = 6378137.0;
+constexpr double kE2 = 0.00669437999014;  // to its last digit; the tests ask for 1e-9
+
+class UnderstandSystem : public testing::Test {
+ protected:
+  UnderstandSystem() { set_module_folder(ISOHF_BIN_DIR); }
+};
+
+TEST_F(UnderstandSystem, SaysNameCodeUnitAndEllipsoid) {
+  const auto utm = understand_system("EPSG:32632");
+  EXPECT_EQ(utm->description().name, "WGS 84 / UTM zone 32N");
+  EXPECT_EQ(utm->description().authority, "EPSG");
+  EXPECT_EQ(utm->description().code, "32632");
+  EXPECT_TRUE(utm->description().is_projected);
+  EXPECT_EQ(utm->description().unit, 1.0);
+  EXPECT_EQ(utm->ellipsoid(), Ellipsoid{});
+  EXPECT_THAT(utm->description().wkt2, StartsWith("PROJCRS[\"WGS 84 / UTM zone 32N\""));
+  EXPECT_EQ(utm->description().wkt2.find('\n'), std::string::npos);
+
+  EXPECT_NEAR(understand_system("EPSG:2263")->description().unit, 1200.0 / 3937.0, 1e-15);
+  const auto degrees = understand_system("EPSG:4326");
+  EXPECT_FALSE(degrees->description().is_projected);
+  EXPECT_NEAR(degrees->description().unit, 1.0, 1e-15);
+  const auto compound = understand_system("EPSG:32632+5773");
+  EXPECT_TRUE(compound->description().is_compound);
+  EXPECT_EQ(compound->description().code, "32632");
+}
+
+TEST_F(UnderstandSystem, TakesWktOfEveryVersionAndProjStrings) {
+  const MapPoint expected = understand_system("EPSG:32632")->map_from_geo({6.865, 45.833});
+  const std::string wkt1 =
+      "PROJCS[\"WGS_1984_UTM_Zone_32N\",GEOGCS[\"GCS_WGS_1984\",DATUM[\"D_WGS_1984\",SPHEROID[\"WGS_1984\",6378137.0,"
+      "298.257223563]],PRIMEM[\"Greenwich\",0.0],UNIT[\"Degree\",0.0174532925199433]],PROJECTION[\"Transverse_"
+      "Mercator\"],"
+      "PARAMETER[\"False_Easting\",500000.0],PARAMETER[\"False_Northing\",0.0],PARAMETER[\"Central_Meridian\",9.0],"
+      "PARAMETER[\"Scale_Factor\",0.9996],PARAMETER[\"Latitude_Of_Origin\",0.0],UNIT[\"Meter\",1.0]]";
+  for (const std::string& text :
+       {wkt1, understand_system("EPSG:32632")->description().wkt2,
+        understand_system("EPSG:32632+5773")->description().wkt2, std::string("+proj=utm +zone=32 +datum=WGS84")}) {
+    const MapPoint found = understand_system(text)->map_from_geo({6.865, 45.833});
+    EXPECT_NEAR(found.easting, expected.easting, 1e-6) << text;
+    EXPECT_NEAR(found.northing, expected.northing, 1e-6) << text;
+  }
+}
+
+TEST_F(UnderstandSystem, RefusesInOneLineWhatIsNoSystem) {
+  for (const char* text :
+       {"EPSG:999999", "nonsense", "", "EPSG:5773", "LOCAL_CS[\"a\",UNIT[\"metre\",1]]", "EPSG:2053"}) {
+    const Error error = error_of([&] { (void)understand_system(text); });
+    EXPECT_EQ(error.code(), ErrorCode::kUnsupported) << text;
+    EXPECT_THAT(error.what(), StartsWith(std::string("the reference system ") + text));
+    EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos);
+  }
+}
+
+/// GeographicLib computes zones to nanometres.
+TEST_F(UnderstandSystem, UtmAgreesWithGeographicLibAndComesBack) {
+  std::mt19937 random(20);
+  std::uniform_real_distribution<double> across(-3.0, 3.0);
+  std::uniform_real_distribution<double> along(0.0, 84.0);
+  for (const bool north : {true, false}) {
+    for (int zone = 1; zone <= 60; zone += 7) {
+      const auto utm = understand_system("EPSG:" + std::to_string((north ? 32600 : 32700) + zone));
+      for (int i = 0; i < 20; ++i) {
+        const GeoPoint place{6.0 * zone - 183.0 + across(random), (north ? 1.0 : -0.95) * along(random)};
+        int found_zone = 0;
+        bool found_north = false;
+        MapPoint expected;
+        GeographicLib::UTMUPS::Forward(place.latitude, place.longitude, found_zone, found_north, expected.easting,
+                                       expected.northing, zone);
+        const MapPoint found = utm->map_from_geo(place);
+        EXPECT_NEAR(found.easting, expected.easting, 1e-6);
+        EXPECT_NEAR(found.northing, expected.northing, 1e-6);
+        const GeoPoint back = utm->geo_from_map(found);
+        constexpr double kMicrometre = 1e-6 / 111000.0;
+        EXPECT_NEAR(back.latitude, place.latitude, kMicrometre);
+        EXPECT_NEAR(std::remainder(back.longitude - place.longitude, 360.0) * std::cos(place.latitude * kDegree), 0.0,
+                    kMicrometre);
+      }
+    }
+  }
+}
+
+TEST_F(UnderstandSystem, LongitudesCountFromGreenwichInDegreesWhateverTheSystemDoes) {
+  // Paris lies 2.33722917 degrees East of Greenwich; Lambert zone II extended has its origin there, in grads.
+  const auto lambert = understand_system("EPSG:27572");
+  const GeoPoint paris = lambert->geo_from_map({600000.0, 2200000.0});
+  EXPECT_NEAR(paris.longitude, 2.33722917, 1e-8);
+  EXPECT_NEAR(paris.latitude, 46.8, 1e-9);  // 52 grads
+  const MapPoint back = lambert->map_from_geo(paris);
+  EXPECT_NEAR(back.easting, 600000.0, 1e-6);
+  EXPECT_NEAR(back.northing, 2200000.0, 1e-6);
+}
+
+TEST_F(UnderstandSystem, CoordinatesAreInTheUnitsAskedFor) {
+  const GeoPoint place{-73.9857, 40.7484};
+  const MapPoint feet = understand_system("EPSG:2263")->map_from_geo(place);
+  EXPECT_NEAR(feet.easting, 988216.0, 2000.0);  // midtown Manhattan
+  const auto metres = understand_system("EPSG:2263", 1.0);
+  EXPECT_EQ(metres->metres_per_unit(), 1.0);
+  const MapPoint there = metres->map_from_geo(place);
+  EXPECT_NEAR(there.easting, feet.easting * 1200.0 / 3937.0, 1e-6);
+  EXPECT_NEAR(metres->geo_from_map(there).longitude, place.longitude, 1e-11);
+}
+
+TEST_F(UnderstandSystem, PlacesBeyondTheMapAreNone) {
+  const auto mercator = understand_system("EPSG:3857");
+  EXPECT_TRUE(std::isnan(mercator->map_from_geo({0.0, 91.0}).northing));
+  const auto mollweide = understand_system("ESRI:54009");
+  EXPECT_TRUE(std::isnan(mollweide->geo_from_map({17e6, 8e6}).latitude));
+  // One that fails must not spoil the next.
+  EXPECT_NEAR(mollweide->geo_from_map({0.0, 0.0}).latitude, 0.0, 1e-12);
+}
+
+TEST_F(UnderstandSystem, ThreadsShareIt) {
+  const auto utm = understand_system("EPSG:32632");
+  const MapPoint expected = utm->map_from_geo({8.0, 47.0});
+  std::vector<std::thread> threads;
+  std::vector<int> wrong(8, 0);
+  for (int& count : wrong) {
+    threads.emplace_back([&utm, &count, expected] {
+      for (int i = 0; i < 2000; ++i) {
+        const MapPoint found = utm->map_from_geo({8.0, 47.0});
+        if (found.easting != expected.easting || found.northing != expected.northing) ++count;
+      }
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_THAT(wrong, testing::Each(0));
+}
+
+/// Lengths of a Mercator map of the sphere, laid over the ellipsoid: a / (N cos) along the parallel and a / (M cos)
+/// along the meridian.
+TEST_F(UnderstandSystem, ScalesOfWebMercatorAreThoseOfTheEllipsoid) {
+  const auto mercator = understand_system("EPSG:3857");
+  for (const double latitude : {-80.0, -44.5, 0.0, 12.0, 44.5, 71.0}) {
+    const double sine = std::sin(latitude * kDegree);
+    const double cosine = std::cos(latitude * kDegree);
+    const double root = std::sqrt(1.0 - kE2 * sine * sine);
+    const double parallel = root / cosine;
+    const double meridional = root * root * root / ((1.0 - kE2) * cosine);
+    const PlaceScale scale = scale_at(*mercator, mercator->map_from_geo({6.5, latitude}));
+    constexpr double kTolerance = 1e-9;
+    EXPECT_NEAR(scale.parallel / parallel, 1.0, kTolerance) << latitude;
+    EXPECT_NEAR(scale.meridional / meridional, 1.0, kTolerance) << latitude;
+    EXPECT_NEAR(scale.least / std::min(parallel, meridional), 1.0, kTolerance);
+    EXPECT_NEAR(scale.most / std::max(parallel, meridional), 1.0, kTolerance);
+    EXPECT_NEAR(scale.areal / (parallel * meridional), 1.0, kTolerance);
+    EXPECT_NEAR(scale.ground_m_per_easting, 1.0 / parallel, kTolerance);
+    EXPECT_NEAR(scale.ground_m_per_northing, 1.0 / meridional, kTolerance);
+    const double turned = 2.0 * std::asin(std::abs(meridional - parallel) / (meridional + parallel)) / kDegree;
+    EXPECT_NEAR(scale.angular_deg, turned, 1e-6);
+  }
+  // 40 % too long at 44.5 North.
+  EXPECT_NEAR(scale_at(*mercator, mercator->map_from_geo({6.5, 44.5})).parallel, 1.39975, 1e-4);
+}
+
+TEST_F(UnderstandSystem, ScalesHoldAtAPoleAndAcrossTheAntimeridian) {
+  const auto ups = understand_system("EPSG:5041");
+  const PlaceScale pole = scale_at(*ups, {2000000.0, 2000000.0});
+  EXPECT_NEAR(pole.least, 0.994, 1e-8);
+  EXPECT_NEAR(pole.most, 0.994, 1e-8);
+  const auto pacific = understand_system("EPSG:3832");  // Mercator around 150 East
+  const PlaceScale antimeridian = scale_at(*pacific, pacific->map_from_geo({180.0, 0.0}));
+  EXPECT_NEAR(antimeridian.parallel, 1.0, 1e-9);
+  const auto feet = understand_system("EPSG:2263");
+  EXPECT_NEAR(scale_at(*feet, {984250.0, 200000.0}).mean(), 1.0, 1e-4);
+}
+
+TEST_F(UnderstandSystem, GroundUnderARectangleHasItsScalesAndItsPlaces) {
+  const auto mercator = understand_system("EPSG:3857");
+  const MapPoint low = mercator->map_from_geo({6.0, 44.0});
+  const MapPoint high = mercator->map_from_geo({7.0, 45.0});
+  const auto ground = ground_under(*mercator, {low.easting, low.northing, high.easting, high.northing});
+  ASSERT_TRUE(ground);
+  EXPECT_NEAR(ground->extent.west, 6.0, 1e-9);
+  EXPECT_NEAR(ground->extent.north, 45.0, 1e-9);
+  EXPECT_NEAR(ground->centre.longitude, 6.5, 1e-9);
+  EXPECT_NEAR(ground->centre.latitude, 44.5, 0.01);
+  const double cosine = std::cos(44.5 * kDegree);
+  EXPECT_NEAR(ground->mean_scale, 1.0 / cosine, 0.002);
+  EXPECT_NEAR(ground->most_scale, std::pow(1.0 - kE2 / 2.0, 1.5) / ((1.0 - kE2) * std::cos(45.0 * kDegree)), 1e-8);
+  EXPECT_NEAR(ground->worst_error, ground->most_scale - 1.0, 1e-12);
+  EXPECT_NEAR(ground->worst_place.latitude, 45.0, 1e-9);
+
+  const auto polar = understand_system("EPSG:3413");
+  const auto cap = ground_under(*polar, {-3e6, -3e6, 3e6, 3e6});
+  ASSERT_TRUE(cap);
+  EXPECT_EQ(cap->extent.north, 90.0);
+  EXPECT_NEAR(cap->extent.east - cap->extent.west, 360.0, 1e-9);
+  const auto fiji = ground_under(*mercator, {19.9e6, -2e6, 20.2e6, -1.8e6});
+  ASSERT_TRUE(fiji);
+  EXPECT_LT(fiji->extent.east - fiji->extent.west, 3.0);
+}
+
+}  // namespace
+}  // namespace isohf::test
