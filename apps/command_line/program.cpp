@@ -1,7 +1,12 @@
 #include "program.h"
 
+#include <unistd.h>
+
+#include <cerrno>
 #include <csignal>
+#include <cstring>
 #include <exception>
+#include <filesystem>
 #include <new>
 
 #include "isohf/base/error.h"
@@ -46,6 +51,22 @@ int run_program(const char* name, int argc, char** argv, int (*body)(const Argum
     print_error(std::string("internal error: ") + error.what());
     return kExitFailed;
   }
+}
+
+void become_program(const std::string& name, const Arguments& arguments) {
+  std::vector<char*> words = {const_cast<char*>(name.c_str())};
+  for (const std::string& argument : arguments) words.push_back(const_cast<char*>(argument.c_str()));
+  words.push_back(nullptr);
+  // What run_program() ignores would stay ignored.
+  std::signal(SIGPIPE, SIG_DFL);
+  std::signal(SIGXFSZ, SIG_DFL);
+  std::error_code unknown;
+  const std::filesystem::path here = std::filesystem::read_symlink("/proc/self/exe", unknown).parent_path();
+  if (!unknown) ::execv((here / name).c_str(), words.data());
+  ::execvp(name.c_str(), words.data());
+  const std::string why =
+      errno == ENOENT ? "is not installed, neither beside isohf nor on the path" : std::strerror(errno);
+  throw Error(ErrorCode::kUnsupported, name + ": " + why);
 }
 
 }  // namespace isohf::cli

@@ -24,4 +24,8 @@ int run_program(const char* name, int argc, char** argv, int (*body)(const Argum
 /// The name that run_program() was given.
 [[nodiscard]] const std::string& program_name();
 
+/// Becomes the program `name`, which lies beside this one or on the path, with the same descriptors. Throws Error where
+/// it is not installed.
+[[noreturn]] void become_program(const std::string& name, const Arguments& arguments);
+
 }  // namespace isohf::cli

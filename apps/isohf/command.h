@@ -9,7 +9,6 @@ using CommandFunction = int (*)(const Arguments& arguments);
 
 int command_convert(const Arguments& arguments);
 int command_export(const Arguments& arguments);
-int command_experiment(const Arguments& arguments);
 int command_formats(const Arguments& arguments);
 int command_info(const Arguments& arguments);
 int command_plan(const Arguments& arguments);

@@ -34,7 +34,8 @@ constexpr Command kCommands[] = {
     {"sample", "Print elevation and normal at places", command_sample},
     {"shade", "Draw a picture of the surface with its shadows", command_shade},
     {"formats", "List what can be read and written", command_formats},
-    {"experiment", "Measure iso and ortho meshes against sine waves, as the paper does", command_experiment},
+    {"experiment", "Measure iso and ortho meshes against sine waves, as the paper does",
+     [](const Arguments& arguments) -> int { become_program("isohf-experiment", arguments); }},
 };
 
 constexpr const char* kVersion = "isohf " ISOHF_VERSION "\n";

@@ -9,11 +9,11 @@
 
 #include "flight_path.h"
 #include "isohf/base/error.h"
-#include "isohf/experiment/svg_chart.h"
 #include "offscreen.h"
 #include "process_memory.h"
 #include "session.h"
 #include "static_mesh.h"
+#include "svg_chart.h"
 #include "text_file.h"
 
 namespace isohf::view {
@@ -72,15 +72,15 @@ std::string plot_of(const FlightTotals& totals, const std::string& title) {
   constexpr std::size_t kPoints = 60;
   const std::size_t frames = totals.frame_ms.size();
   const std::size_t together = (frames + kPoints - 1) / kPoints;
-  experiment::Chart chart;
-  chart.title = title;
-  chart.x_label = "seconds along the flight";
-  chart.y_label = "milliseconds";
-  chart.note = fmt::format("{} frames, {} a point; update() is all that a frame does for paging", frames, together);
-  chart.curves = {{"frame, worst", "#b03a2e", true, {}, {}},
-                  {"frame, mean", "#b03a2e", false, {}, {}},
-                  {"update(), worst", "#1f618d", true, {}, {}},
-                  {"update(), mean", "#1f618d", false, {}, {}}};
+  chart::Chart drawing;
+  drawing.title = title;
+  drawing.x_label = "seconds along the flight";
+  drawing.y_label = "milliseconds";
+  drawing.note = fmt::format("{} frames, {} a point; update() is all that a frame does for paging", frames, together);
+  drawing.curves = {{"frame, worst", "#b03a2e", true, {}, {}},
+                    {"frame, mean", "#b03a2e", false, {}, {}},
+                    {"update(), worst", "#1f618d", true, {}, {}},
+                    {"update(), mean", "#1f618d", false, {}, {}}};
   for (std::size_t first = 0; first < frames; first += together) {
     const std::size_t last = std::min(frames, first + together);
     const auto add = [&](const std::vector<double>& ms, std::size_t curve) {
@@ -88,14 +88,14 @@ std::string plot_of(const FlightTotals& totals, const std::string& title) {
       const auto to = ms.begin() + static_cast<std::ptrdiff_t>(last);
       constexpr double kLeast_ms = 1e-3;  // the axis is logarithmic
       const double mean = std::accumulate(from, to, 0.0) / static_cast<double>(last - first);
-      chart.curves[curve].y.push_back(std::max(kLeast_ms, *std::max_element(from, to)));
-      chart.curves[curve + 1].y.push_back(std::max(kLeast_ms, mean));
+      drawing.curves[curve].y.push_back(std::max(kLeast_ms, *std::max_element(from, to)));
+      drawing.curves[curve + 1].y.push_back(std::max(kLeast_ms, mean));
     };
     add(totals.frame_ms, 0);
     add(totals.update_ms, 2);
-    for (experiment::Curve& curve : chart.curves) curve.x.push_back(totals.time_s[first]);
+    for (chart::Curve& curve : drawing.curves) curve.x.push_back(totals.time_s[first]);
   }
-  return experiment::line_chart(chart, experiment::Scale::kLogarithmic);
+  return chart::line_chart(drawing, chart::Scale::kLogarithmic);
 }
 
 /// The rasteriser's limit, at a few places along the flight.

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "isohf/experiment/experiment.h"
+#include "experiment.h"
 
 /// Erratum E19: what section 2's experiment gives, against closed forms.
 

@@ -1,4 +1,4 @@
-#include "isohf/experiment/experiment.h"
+#include "experiment.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -6,8 +6,8 @@
 #include <atomic>
 #include <nlohmann/json.hpp>
 
+#include "figures.h"
 #include "isohf/base/error.h"
-#include "isohf/experiment/figures.h"
 #include "support/run_program.h"
 #include "support/temporary_folder.h"
 

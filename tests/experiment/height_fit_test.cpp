@@ -1,4 +1,4 @@
-#include "isohf/experiment/height_fit.h"
+#include "height_fit.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <numbers>
 
 #include "isohf/base/error.h"
-#include "isohf/experiment/reconstruction_error.h"
+#include "reconstruction_error.h"
 
 namespace isohf::experiment {
 namespace {

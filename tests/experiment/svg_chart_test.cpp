@@ -1,9 +1,9 @@
-#include "isohf/experiment/svg_chart.h"
+#include "svg_chart.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace isohf::experiment {
+namespace isohf::chart {
 namespace {
 
 using testing::HasSubstr;
@@ -30,4 +30,4 @@ TEST(SvgChart, DrawsASinglePoint) {
 }
 
 }  // namespace
-}  // namespace isohf::experiment
+}  // namespace isohf::chart

@@ -1,4 +1,4 @@
-#include "isohf/experiment/experiment.h"
+#include "experiment.h"
 
 #include <fmt/format.h>
 #include <oneapi/tbb/global_control.h>
@@ -12,11 +12,11 @@
 #include <numbers>
 #include <utility>
 
+#include "height_fit.h"
 #include "isohf/base/error.h"
-#include "isohf/experiment/height_fit.h"
-#include "isohf/experiment/reconstruction_error.h"
-#include "isohf/experiment/sine_wave.h"
-#include "isohf/experiment/test_mesh.h"
+#include "reconstruction_error.h"
+#include "sine_wave.h"
+#include "test_mesh.h"
 
 namespace isohf::experiment {
 namespace {

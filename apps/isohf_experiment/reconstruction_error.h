@@ -4,8 +4,8 @@
 #include <complex>
 #include <span>
 
-#include "isohf/experiment/sine_wave.h"
-#include "isohf/experiment/test_mesh.h"
+#include "sine_wave.h"
+#include "test_mesh.h"
 
 /// How far a mesh is from the wave that it stands for.
 

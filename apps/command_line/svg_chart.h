@@ -5,7 +5,7 @@
 
 /// Small charts as SVG text. Deterministic: the same data give the same bytes.
 
-namespace isohf::experiment {
+namespace isohf::chart {
 
 struct Curve {
   std::string label;
@@ -30,4 +30,4 @@ enum class Scale { kFromZero, kLogarithmic };
 /// Closed curves about the origin: y is the radius, x the angle from the right towards the top.
 [[nodiscard]] std::string polar_chart(const Chart& chart);
 
-}  // namespace isohf::experiment
+}  // namespace isohf::chart

@@ -4,7 +4,7 @@
 #include <complex>
 #include <vector>
 
-#include "isohf/experiment/test_mesh.h"
+#include "test_mesh.h"
 
 /// Plane sine waves, seen from the triangles of a mesh.
 

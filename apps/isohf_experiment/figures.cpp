@@ -1,11 +1,11 @@
-#include "isohf/experiment/figures.h"
+#include "figures.h"
 
 #include <fmt/format.h>
 
 #include <cmath>
 #include <numbers>
 
-#include "isohf/experiment/svg_chart.h"
+#include "svg_chart.h"
 
 namespace isohf::experiment {
 namespace {
@@ -14,7 +14,7 @@ constexpr double kDegrees = 180.0 / std::numbers::pi;
 constexpr double kFigure3Triangles = 5000;
 constexpr double kFigure3Frequency = 0.9;
 
-Curve curve_of(MeshKind kind) {
+chart::Curve curve_of(MeshKind kind) {
   switch (kind) {
     case MeshKind::kIso:
       return {"isometric", "#c0392b", false, {}, {}};
@@ -68,20 +68,21 @@ std::string figure2_csv(const ExperimentResult& result) {
 }
 
 std::string figure2_svg(const ExperimentResult& result) {
-  Chart chart = {"Mean shading error (the paper's Fig. 2)",
-                 "triangles",
-                 "mean |difference of Lambert shading|",
-                 "averaged over the waves below each mesh's Nyquist frequency; coarse meshes leave the short ones out",
-                 {}};
+  chart::Chart drawing = {
+      "Mean shading error (the paper's Fig. 2)",
+      "triangles",
+      "mean |difference of Lambert shading|",
+      "averaged over the waves below each mesh's Nyquist frequency; coarse meshes leave the short ones out",
+      {}};
   for (const MeshKind kind : kMeshKinds) {
-    Curve curve = curve_of(kind);
+    chart::Curve curve = curve_of(kind);
     for (const std::int64_t triangles : result.settings.triangles) {
       curve.x.push_back(static_cast<double>(triangles));
       curve.y.push_back(average_errors(result, kind, triangles).shading);
     }
-    chart.curves.push_back(std::move(curve));
+    drawing.curves.push_back(std::move(curve));
   }
-  return line_chart(chart, Scale::kFromZero);
+  return chart::line_chart(drawing, chart::Scale::kFromZero);
 }
 
 Figure3Case figure3_case(const ExperimentResult& result) {
@@ -118,13 +119,14 @@ std::string figure3_csv(const ExperimentResult& result) {
 
 std::string figure3_svg(const ExperimentResult& result) {
   const Figure3Case at = figure3_case(result);
-  Chart chart = {"Mean elevation error against orientation (the paper's Fig. 3)",
-                 "",
-                 fmt::format("frequency {:.2f}, {} triangles; radius: error in amplitudes", at.frequency, at.triangles),
-                 "angle: direction of the wave seen from the grid's rows; consistent diagonals run along 45°",
-                 {}};
+  chart::Chart drawing = {
+      "Mean elevation error against orientation (the paper's Fig. 3)",
+      "",
+      fmt::format("frequency {:.2f}, {} triangles; radius: error in amplitudes", at.frequency, at.triangles),
+      "angle: direction of the wave seen from the grid's rows; consistent diagonals run along 45°",
+      {}};
   for (const MeshKind kind : kMeshKinds) {
-    Curve curve = curve_of(kind);
+    chart::Curve curve = curve_of(kind);
     const std::vector<Trial> trials = figure3_trials(result, kind);
     for (const double half_turn : {0.0, std::numbers::pi}) {
       for (const Trial& trial : trials) {
@@ -132,9 +134,9 @@ std::string figure3_svg(const ExperimentResult& result) {
         curve.y.push_back(trial.errors.mean);
       }
     }
-    chart.curves.push_back(std::move(curve));
+    drawing.curves.push_back(std::move(curve));
   }
-  return polar_chart(chart);
+  return chart::polar_chart(drawing);
 }
 
 double share_of_lower_orientations(const ExperimentResult& result, MeshKind other, std::int64_t triangles,
@@ -161,28 +163,28 @@ std::string figure8_csv(const TileShape& shape) {
 }
 
 std::string figure8_svg(const TileShape& shape) {
-  Chart chart = {fmt::format("Triangles against level of detail, C = {}, R = {} (the paper's Fig. 8)", shape.columns(),
-                             shape.rows()),
-                 "level",
-                 "triangles",
-                 "Eq. 4 and Eq. 5; level 0 needs no stitch",
-                 {}};
-  Curve total = {"total", "#c0392b", false, {}, {}};
-  Curve strip = {"strip", "#1f5fbf", true, {}, {}};
-  Curve stitch = {"stitch", "#1f8f5f", true, {}, {}};
+  chart::Chart drawing = {fmt::format("Triangles against level of detail, C = {}, R = {} (the paper's Fig. 8)",
+                                      shape.columns(), shape.rows()),
+                          "level",
+                          "triangles",
+                          "Eq. 4 and Eq. 5; level 0 needs no stitch",
+                          {}};
+  chart::Curve total = {"total", "#c0392b", false, {}, {}};
+  chart::Curve strip = {"strip", "#1f5fbf", true, {}, {}};
+  chart::Curve stitch = {"stitch", "#1f8f5f", true, {}, {}};
   for (int level = 0; level < shape.levels(); ++level) {
     const auto in_strip = static_cast<double>(shape.strip_triangle_count(level));
     const auto in_stitch = static_cast<double>(shape.stitch_triangle_count(level));
-    for (Curve* curve : {&total, &strip}) curve->x.push_back(level);
+    for (chart::Curve* curve : {&total, &strip}) curve->x.push_back(level);
     total.y.push_back(in_strip + in_stitch);
     strip.y.push_back(in_strip);
     if (level == 0) continue;
     stitch.x.push_back(level);
     stitch.y.push_back(in_stitch);
   }
-  chart.curves = {total, strip};
-  if (!stitch.x.empty()) chart.curves.push_back(stitch);
-  return line_chart(chart, Scale::kLogarithmic);
+  drawing.curves = {total, strip};
+  if (!stitch.x.empty()) drawing.curves.push_back(stitch);
+  return chart::line_chart(drawing, chart::Scale::kLogarithmic);
 }
 
 }  // namespace isohf::experiment

@@ -1,4 +1,4 @@
-/// isohf experiment: section 2 of the paper, and its figures.
+/// isohf-experiment: section 2 of the paper, and its figures.
 
 #include <fmt/format.h>
 
@@ -9,14 +9,13 @@
 #include <optional>
 #include <utility>
 
-#include "command.h"
+#include "experiment.h"
+#include "figures.h"
 #include "interrupt.h"
 #include "isohf/base/error.h"
-#include "isohf/experiment/experiment.h"
-#include "isohf/experiment/figures.h"
-#include "json_output.h"
 #include "option_values.h"
 #include "options_common.h"
+#include "program.h"
 #include "standard_output.h"
 
 namespace isohf::cli {
@@ -207,7 +206,7 @@ int run(const ExperimentCommandOptions& options) {
   const std::vector<std::string> written = folder.write(result);
   StandardOutput out;
   if (options.common.json) {
-    out.write(json_text(summary_json(result, written)));
+    out.write(summary_json(result, written).dump(2, ' ', false, ordered_json::error_handler_t::replace) + "\n");
   } else if (!options.common.quiet) {
     out.write(summary_text(result));
     for (const std::string& path : written) out.write("wrote " + path + "\n");
@@ -216,11 +215,14 @@ int run(const ExperimentCommandOptions& options) {
   return kExitDone;
 }
 
-}  // namespace
-
-int command_experiment(const Arguments& arguments) {
+int experiment(const Arguments& arguments) {
   const std::optional<ExperimentCommandOptions> options = parse(arguments);
   return options ? run(*options) : static_cast<int>(kExitDone);
 }
 
+}  // namespace
 }  // namespace isohf::cli
+
+int main(int argc, char** argv) {
+  return isohf::cli::run_program("isohf", argc, argv, isohf::cli::experiment);
+}

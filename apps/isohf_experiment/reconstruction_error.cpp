@@ -1,4 +1,4 @@
-#include "isohf/experiment/reconstruction_error.h"
+#include "reconstruction_error.h"
 
 #include <algorithm>
 #include <cmath>

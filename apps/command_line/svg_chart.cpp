@@ -1,4 +1,4 @@
-#include "isohf/experiment/svg_chart.h"
+#include "svg_chart.h"
 
 #include <fmt/format.h>
 
@@ -7,7 +7,7 @@
 #include <iterator>
 #include <numbers>
 
-namespace isohf::experiment {
+namespace isohf::chart {
 namespace {
 
 constexpr double kWidth = 760;
@@ -224,4 +224,4 @@ std::string polar_chart(const Chart& chart) {
   return drawing.finish();
 }
 
-}  // namespace isohf::experiment
+}  // namespace isohf::chart

@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
-#include "isohf/experiment/sine_wave.h"
-#include "isohf/experiment/test_mesh.h"
+#include "sine_wave.h"
+#include "test_mesh.h"
 
 /// Vertex heights that bring a mesh as near to a wave as its triangles allow.
 

@@ -1,4 +1,4 @@
-#include "isohf/experiment/test_mesh.h"
+#include "test_mesh.h"
 
 #include <fmt/format.h>
 

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "isohf/experiment/experiment.h"
+#include "experiment.h"
 #include "isohf/lattice/tile_shape.h"
 
 /// The paper's figures from an experiment, as the text of CSV and SVG files. CSV: a heading line, then commas; numbers

@@ -1,4 +1,4 @@
-#include "isohf/experiment/height_fit.h"
+#include "height_fit.h"
 
 #include <Eigen/IterativeLinearSolvers>
 #include <Eigen/SparseCholesky>

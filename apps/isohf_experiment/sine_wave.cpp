@@ -1,4 +1,4 @@
-#include "isohf/experiment/sine_wave.h"
+#include "sine_wave.h"
 
 #include <cmath>
 #include <numbers>
