@@ -64,9 +64,10 @@ void add_code_type_option(CommandLine& line, CodeType& type) {
 void add_quantisation_options(CommandLine& line, ConvertOptions& options) {
   line.group("Elevations");
   add_code_type_option(line, options.code_type);
-  line.option("--z-range", "MIN:MAX", "Elevations of the first and last code (default: found in a first pass)",
+  line.option("--z-range", "MIN:MAX",
+              "Store nothing outside: elevations beyond are refused (default: found in a first pass)",
               [&](const std::string& text) { options.z_range = parse_range(text); });
-  line.flag("--clamp-range", "Move elevations outside --z-range to its end and count them, instead of refusing",
+  line.flag("--clamp-range", "Move elevations outside --z-range to its ends and count them, instead of refusing",
             options.clamp_range);
   line.option("--step", "S|finest|auto",
               "Elevation of one code: a number, the finest that the type holds, or chosen from the input's own step "
@@ -85,9 +86,10 @@ void add_quantisation_options(CommandLine& line, ConvertOptions& options) {
                   options.step = step;
                 }
               });
-  line.option("--max-error", "E", "Store every vertex's elevation to within E: steps of twice that",
-              [&](const std::string& text) { options.step = 2.0 * parse_positive_number(text); });
-  line.exclusive({"--step", "--max-error"});
+  line.option("--max-rounding", "E",
+              "Store every vertex's elevation to within E: steps of twice that (as MAX_Z_ERROR of LERC)",
+              [&](const std::string& text) { options.max_rounding = parse_positive_number(text); });
+  line.exclusive({"--step", "--max-rounding"});
 }
 
 }  // namespace isohf::cli

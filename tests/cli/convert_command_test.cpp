@@ -148,8 +148,8 @@ TEST_F(ConvertCommand, LevelsStoreTheSameElevationsInFewerBytes) {
   EXPECT_EQ(run_isohf({"convert", folder / "a.tif", folder / "x.isohf", "--level", "13"}).exit_code, 2);
 }
 
-TEST_F(ConvertCommand, MaxErrorBoundsEveryVertex) {
-  convert("a.isohf", {"--quiet", "--max-error", "0.125", "--filter", "bspline3"});
+TEST_F(ConvertCommand, MaxRoundingBoundsEveryVertex) {
+  convert("a.isohf", {"--quiet", "--max-rounding", "0.125", "--filter", "bspline3"});
   const json report =
       json::parse(run_isohf({"verify", folder / "a.isohf", "--against", folder / "a.tif", "--no-ortho", "--json"}).out);
   const json& vertices = report.at("against").at("vertices");
@@ -159,9 +159,9 @@ TEST_F(ConvertCommand, MaxErrorBoundsEveryVertex) {
   EXPECT_GT(vertices.at("worst").get<double>(), 0.12);
   EXPECT_LE(vertices.at("bound").get<double>(), 0.125 + 1e-3);
   const RunResult both =
-      run_isohf({"convert", folder / "a.tif", folder / "b.isohf", "--max-error", "1", "--step", "1"});
+      run_isohf({"convert", folder / "a.tif", folder / "b.isohf", "--max-rounding", "1", "--step", "1"});
   EXPECT_EQ(both.exit_code, 2);
-  EXPECT_THAT(both.err, HasSubstr("--max-error"));
+  EXPECT_THAT(both.err, HasSubstr("--max-rounding"));
 }
 
 TEST_F(ConvertCommand, ReportIsWhatVerifyFindsAndLeavesTheArchiveAsItIs) {

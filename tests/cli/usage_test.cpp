@@ -190,7 +190,7 @@ INSTANTIATE_TEST_SUITE_P(
         BadValue{"--z-range", "5:1", "MIN:MAX with MIN less than MAX"},
         BadValue{"--z-range", "1:1", "MIN:MAX with MIN less than MAX"},
         BadValue{"--z-range", "nan:1", "MIN:MAX, two finite numbers"},
-        BadValue{"--max-error", "0", "a number greater than 0"},
+        BadValue{"--max-rounding", "0", "a number greater than 0"},
         BadValue{"--step", "0", "a number greater than 0, finest or auto"},
         BadValue{"--step", "-1", "a number greater than 0, finest or auto"},
         BadValue{"--step", "fine", "a number greater than 0, finest or auto"},

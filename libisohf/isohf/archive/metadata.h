@@ -107,6 +107,8 @@ struct Metadata {
 
   TileGrid grid;
   Quantisation quantisation;
+  /// Elevations that nothing stored lies beyond, by the user's choice: offset and a whole number of steps more.
+  std::optional<std::pair<double, double>> z_range;
   std::string horizontal_unit = "unknown";  ///< world units: "metre" or "unknown"
   std::string vertical_unit = "unknown";    ///< "metre", "foot", ... or "unknown"
   WorldBounds valid;  ///< the part of the world that the source covers; a rectangle around it where it was projected

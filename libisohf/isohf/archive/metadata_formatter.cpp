@@ -122,6 +122,7 @@ std::string format_metadata(const Metadata& metadata) {
                      {"offset", quantisation.offset},
                      {"scale", quantisation.scale},
                      {"void", is_float ? Json("nan") : Json(quantisation.void_code())}};
+  if (metadata.z_range) json["samples"]["range"] = {metadata.z_range->first, metadata.z_range->second};
   json["units"] = {{"horizontal", metadata.horizontal_unit}, {"vertical", metadata.vertical_unit}};
   const WorldBounds& valid = metadata.valid;
   json["valid"] = {{"x0", valid.x0}, {"z0", valid.z0}, {"x1", valid.x1}, {"z1", valid.z1}};

@@ -68,6 +68,13 @@ class ObjectReader {
     if (!value.is_boolean()) refuse_metadata(path(key), "is neither true nor false");
     return value.get<bool>();
   }
+  [[nodiscard]] std::optional<std::pair<double, double>> optional_range(const char* key) const {
+    if (!has(key)) return std::nullopt;
+    const Json& range = required(key);
+    const bool is_pair = range.is_array() && range.size() == 2 && range[0].is_number() && range[1].is_number();
+    if (!is_pair) refuse_metadata(path(key), "is no array of two numbers");
+    return std::pair(range[0].get<double>(), range[1].get<double>());
+  }
   [[nodiscard]] std::string optional_text(const char* key) const { return has(key) ? text(key) : std::string(); }
 
   [[nodiscard]] const Json& required(const char* key) const {
@@ -96,11 +103,7 @@ void voids_from_json(const ObjectReader& json, SourceRecord& source) {
   if (!voids.required("values").is_array()) refuse_metadata(voids.path("values"), "is no array");
   for (const Json& value : voids.required("values")) source.void_values.push_back(number(value));
   source.fill_distance = voids.integer("fill_distance", 0, std::numeric_limits<std::int32_t>::max());
-  if (!voids.has("valid_range")) return;
-  const Json& range = voids.required("valid_range");
-  const bool is_pair = range.is_array() && range.size() == 2 && range[0].is_number() && range[1].is_number();
-  if (!is_pair) refuse_metadata(voids.path("valid_range"), "is no array of two numbers");
-  source.valid_range = {range[0].get<double>(), range[1].get<double>()};
+  source.valid_range = voids.optional_range("valid_range");
 }
 
 MosaicRecord mosaic_from_json(const ObjectReader& json) {
@@ -258,6 +261,10 @@ Metadata parse_metadata(const std::string& text) {
   check_version(root);
   Metadata metadata(grid_from_json(root));
   metadata.quantisation = quantisation_from_json(root);
+  metadata.z_range = root.object("samples").optional_range("range");
+  if (metadata.z_range && !(metadata.z_range->first <= metadata.z_range->second)) {
+    refuse_metadata("samples.range", "is not the smaller number first");
+  }
   metadata.tiles_stored = root.object("tiles").integer("stored", 0, metadata.grid.tile_count());
   metadata.horizontal_unit = root.object("units").text("horizontal");
   metadata.vertical_unit = root.object("units").text("vertical");

@@ -64,10 +64,22 @@ ISOHF_VECTORISED(float, raise_heights,
   return std::bit_cast<float>(worst);
 }
 
+/// The float that is nearest to `limit` on the side of `inner`, or `limit` itself.
+float float_within(double limit, float inner) {
+  const auto nearest = static_cast<float>(limit);
+  const bool beyond = inner > 0.0F ? double{nearest} < limit : double{nearest} > limit;
+  return beyond ? std::nextafter(nearest, inner) : nearest;
+}
+
 }  // namespace
 
 QuantiserCounts quantise(const Quantisation& quantisation, double datum, std::span<const float> heights,
                          TileCodes& tile) {
+  return quantise(quantisation, code_limits(quantisation), datum, heights, tile);
+}
+
+QuantiserCounts quantise(const Quantisation& quantisation, const CodeLimits& limits, double datum,
+                         std::span<const float> heights, TileCodes& tile) {
   QuantiserCounts counts;
   tile.type = quantisation.type;
   const std::size_t n = heights.size();
@@ -75,6 +87,10 @@ QuantiserCounts quantise(const Quantisation& quantisation, double datum, std::sp
     tile.codes.clear();
     tile.heights.resize(n);
     counts.worst_rounding = double{raise_heights(heights.data(), n, datum, tile.heights.data())};
+    if (std::isinf(limits.lowest) && std::isinf(limits.highest)) return counts;
+    const float lowest = float_within(limits.lowest, HUGE_VALF);
+    const float highest = float_within(limits.highest, -HUGE_VALF);
+    for (float& height : tile.heights) height = height < lowest ? lowest : (height > highest ? highest : height);
     return counts;
   }
   tile.heights.clear();
@@ -83,6 +99,9 @@ QuantiserCounts quantise(const Quantisation& quantisation, double datum, std::sp
   line.inverse = 1.0 / quantisation.scale;
   line.shift = (datum - quantisation.offset) * line.inverse;
   line.last = static_cast<double>(quantisation.max_code());
+  if (limits.highest < code_limits(quantisation).highest) {
+    line.last = std::round((limits.highest - quantisation.offset) / quantisation.scale);
+  }
   line.void_code = static_cast<std::int32_t>(quantisation.void_code());
   round_to_codes(heights.data(), n, line, tile.codes.data());
   counts.below = line.below;
@@ -94,6 +113,11 @@ QuantiserCounts quantise(const Quantisation& quantisation, double datum, std::sp
 CodeLimits code_limits(const Quantisation& quantisation) {
   if (quantisation.type == CodeType::kF32) return {-HUGE_VAL, HUGE_VAL};
   return {quantisation.offset, elevation_from_code(quantisation, quantisation.max_code())};
+}
+
+CodeLimits code_limits(const Metadata& metadata) {
+  if (metadata.z_range) return {metadata.z_range->first, metadata.z_range->second};
+  return code_limits(metadata.quantisation);
 }
 
 }  // namespace isohf

@@ -15,18 +15,23 @@ struct QuantiserCounts {
   double worst_rounding = 0.0;  ///< largest |stored - computed|, without the clamped ones, vertical units
 };
 
-/// Turns heights relative to `datum` into codes (or floats). NaN becomes the void code; elevations outside the codes'
-/// range become the first or last code and are counted.
-/// heights [n]   tile out, resized to n. Rounds halves up. O(n), vectorised.
-QuantiserCounts quantise(const Quantisation& quantisation, double datum, std::span<const float> heights,
-                         TileCodes& tile);
-
 /// The elevations of the first and the last code, which nothing stored lies beyond; infinities for floats.
 struct CodeLimits {
   double lowest;
   double highest;
 };
 [[nodiscard]] CodeLimits code_limits(const Quantisation& quantisation);
+/// The same where a range was asked for: that range.
+[[nodiscard]] CodeLimits code_limits(const Metadata& metadata);
+
+/// Turns heights relative to `datum` into codes (or floats). NaN becomes the void code; elevations beyond `limits`,
+/// which are code 0 and another one, become these and are counted where more than half a step beyond (floats: never).
+/// heights [n]   tile out, resized to n. Rounds halves up. O(n), vectorised.
+QuantiserCounts quantise(const Quantisation& quantisation, const CodeLimits& limits, double datum,
+                         std::span<const float> heights, TileCodes& tile);
+/// With all the codes that there are.
+QuantiserCounts quantise(const Quantisation& quantisation, double datum, std::span<const float> heights,
+                         TileCodes& tile);
 
 /// The elevation that a code stands for.
 [[nodiscard]] inline double elevation_from_code(const Quantisation& quantisation, std::uint32_t code) {

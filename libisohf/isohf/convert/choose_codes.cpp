@@ -115,17 +115,14 @@ ElevationRange measure_surface(const Conversion& job, const ElevationRange& limi
   return all.min <= all.max ? all : ElevationRange{};
 }
 
-}  // namespace
+QuantisationRequest request_of(const ConvertOptions& options) {
+  return {options.code_type, options.step, options.max_rounding};
+}
 
-void choose_codes(Conversion& job, ConvertSummary& summary, const ProgressCallback& progress) {
+/// By the range of the data.
+void choose_codes_by_data(Conversion& job, ConvertSummary& summary, const ProgressCallback& progress) {
   const SourceInfo& info = job.source.info();
-  const QuantisationRequest request{job.options.code_type, job.options.step};
-  if (job.options.z_range) {
-    const ElevationRange range{job.options.z_range->first, job.options.z_range->second};
-    job.datum = choose_datum(info, range);
-    job.quantisation = choose_quantisation(request, range, info);
-    return;
-  }
+  const QuantisationRequest request = request_of(job.options);
   const SourceAxes axes = make_axes(job.plan.grid, job.geometry());
   EdgeRange edge(info, axes.x.continued_samples(), axes.z.continued_samples());
   const SourceSurvey survey = survey_source(job, edge, progress);
@@ -147,13 +144,27 @@ void choose_codes(Conversion& job, ConvertSummary& summary, const ProgressCallba
   if (over == 0.0 || job.options.code_type == CodeType::kF32) return;
   // The surface may leave the samples' range. Where the codes reach far enough for the worst case at the same step,
   // nothing needs to be measured; voids, at which weights are renormalised, have no such bound.
-  const bool has_step = request.step ? *request.step != 0.0 : !is_floating(info.sample_type);
+  const bool has_step = request.max_rounding || (request.step ? *request.step != 0.0 : !is_floating(info.sample_type));
   const ElevationRange reach = widened(found.range, over);
   if (found.voids == 0 && has_step && has_codes_for(job.quantisation, reach)) {
     job.quantisation = choose_quantisation({request.type, job.quantisation.scale}, reach, info);
     return;
   }
   job.quantisation = choose_quantisation(request, measure_surface(job, found.range, progress), info);
+}
+
+}  // namespace
+
+void choose_codes(Conversion& job, ConvertSummary& summary, const ProgressCallback& progress) {
+  if (job.options.z_range) {
+    const ElevationRange range{job.options.z_range->first, job.options.z_range->second};
+    job.datum = choose_datum(job.source.info(), range);
+    job.quantisation = quantisation_of_range(request_of(job.options), range, job.source.info());
+    job.limits = {range.min, range.max};
+    return;
+  }
+  choose_codes_by_data(job, summary, progress);
+  job.limits = code_limits(job.quantisation);
 }
 
 }  // namespace isohf

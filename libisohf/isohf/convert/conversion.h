@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "isohf/archive/quantise.h"
 #include "isohf/convert/convert.h"
 #include "isohf/convert/memory_plan.h"
 #include "isohf/surface/kernels.h"
@@ -56,11 +57,12 @@ struct Conversion {
   const std::atomic<bool>& cancel;
   double datum = 0.0;
   Quantisation quantisation{};
+  CodeLimits limits{};  ///< of what is stored; the ends of options.z_range where it is given
 
   [[nodiscard]] SourceGeometry geometry() const { return plan.frame.geometry(plan.outside); }
-  /// Elevations beyond the source's edge are held within `limits`.
-  [[nodiscard]] std::unique_ptr<VertexCutter> cutter(const ElevationRange& limits) const {
-    return make_cutter(plan.grid, geometry(), kernel, limits);
+  /// Elevations beyond the source's edge are held within a range.
+  [[nodiscard]] std::unique_ptr<VertexCutter> cutter(const ElevationRange& held_within) const {
+    return make_cutter(plan.grid, geometry(), kernel, held_within);
   }
 };
 

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <optional>
 
@@ -26,11 +27,20 @@
 namespace isohf {
 namespace {
 
+/// Elevations of one tile beyond the limits.
+struct Outliers {
+  std::int64_t vertices = 0;  ///< of all that are stored
+  std::int64_t visible = 0;   ///< of these, visible
+  GridVertex worst{};
+  double elevation = 0.0;  ///< of the worst
+};
+
 /// A tile on its way through the pipeline.
 struct TileJob {
   TileIndex index{};
   std::shared_ptr<const TileSource::Part> part;
   EncodedTile encoded;
+  Outliers outliers;
   SeedStage::Tile seeds;
   TextureStage::Encoded texture;
 };
@@ -41,12 +51,37 @@ struct Stages {
   const TextureStage* textures = nullptr;
 };
 
-[[noreturn]] void refuse_overflow(const Conversion& job, TileIndex tile, const QuantiserCounts& counts) {
-  const CodeLimits limits = code_limits(job.quantisation);
+Outliers find_outliers(const TileShape& shape, const CodeLimits& limits, double datum, std::span<const float> heights) {
+  Outliers found;
+  // Resampled level ground is level but for the rounding of floats.
+  const double largest = std::max(std::abs(limits.lowest), std::abs(limits.highest)) + std::abs(datum);
+  double worst = 4.0 * largest * double{std::numeric_limits<float>::epsilon()};
+  const double rounding = worst;
+  std::size_t i = 0;
+  for (int r = 0; r < shape.rows(); ++r) {
+    for (int c = 0; c < shape.columns(); ++c) {
+      const double elevation = double{heights[i++]} + datum;
+      const double beyond = std::max(limits.lowest - elevation, elevation - limits.highest);  // NaN compares false
+      if (!(beyond > rounding)) continue;
+      ++found.vertices;
+      found.visible += is_visible(shape, {c, r}) ? 1 : 0;
+      if (beyond <= worst) continue;
+      worst = beyond;
+      found.worst = {c, r};
+      found.elevation = elevation;
+    }
+  }
+  return found;
+}
+
+[[noreturn]] void refuse_outliers(const Conversion& job, TileIndex tile, const Outliers& outliers) {
+  const TileGrid& grid = job.plan.grid;
+  const WorldPoint place = grid.world_from_lattice(grid.lattice_vertex(tile, outliers.worst));
   throw Error(ErrorCode::kInvalidArgument,
-              fmt::format("tile ({},{}): {} elevations lie outside the z range {} to {}; widen --z-range, or give "
-                          "--clamp-range to move them to its ends",
-                          tile.column, tile.row, counts.below + counts.above, limits.lowest, limits.highest));
+              fmt::format("{}: elevation {:.9g} at x {:.9g} z {:.9g}, in tile ({},{}), lies outside --z-range {}:{}, "
+                          "and {} more of the tile; widen the range, or give --clamp-range to move them to its ends",
+                          job.source.info().path, outliers.elevation, place.x, place.z, tile.column, tile.row,
+                          job.limits.lowest, job.limits.highest, outliers.vertices - 1));
 }
 
 void make_tile(const Conversion& job, const TileSource& source, const Stages& stages, bool is_new, TileJob& tile) {
@@ -54,12 +89,15 @@ void make_tile(const Conversion& job, const TileSource& source, const Stages& st
   std::vector<float> heights(static_cast<std::size_t>(shape.stored_vertex_count()));
   source.cut(tile.index, *tile.part, heights);
   TileCodes codes;
-  const QuantiserCounts counts = quantise(job.quantisation, job.datum, heights, codes);
-  if (counts.below + counts.above > 0 && !job.options.clamp_range) refuse_overflow(job, tile.index, counts);
+  const QuantiserCounts counts = quantise(job.quantisation, job.limits, job.datum, heights, codes);
+  // Without a range from the user the codes reach over all that there is.
+  if (job.options.z_range || counts.below + counts.above > 0) {
+    tile.outliers = find_outliers(shape, job.limits, job.datum, heights);
+  }
   EncodedTile& encoded = tile.encoded;
   encoded = encode_tile(shape, codes, job.options.level);
   encoded.statistics = tile_statistics(shape, codes, job.quantisation);
-  encoded.statistics.clamped = counts.below + counts.above;
+  encoded.statistics.clamped = tile.outliers.visible;
   encoded.statistics.worst_rounding = counts.worst_rounding;
   if (stages.seeds != nullptr) tile.seeds = stages.seeds->prepare(codes);
   tile.seeds.is_empty = encoded.is_empty;
@@ -70,8 +108,7 @@ void make_tile(const Conversion& job, const TileSource& source, const Stages& st
 /// number of parts of the source: one that is being cut and one that is being read.
 void write_tiles(const Conversion& job, ArchiveWriter& writer, const Stages& stages, const ProgressCallback& callback) {
   const TileGrid& grid = job.plan.grid;
-  const CodeLimits limits = code_limits(job.quantisation);
-  TileSource source(job, {limits.lowest - job.datum, limits.highest - job.datum});
+  TileSource source(job, {job.limits.lowest - job.datum, job.limits.highest - job.datum});
   ProgressMeter meter(callback, ConvertProgress::Pass::kTiles, grid.tile_count());
   const std::int64_t first_new = writer.next_tile();
   std::int64_t next = stages.seeds != nullptr ? SeedStage::first_tile_needed(grid, first_new) : first_new;
@@ -107,6 +144,7 @@ void write_tiles(const Conversion& job, ArchiveWriter& writer, const Stages& sta
   };
   std::int64_t written = next;
   const auto write = [&](TileJob* tile) {
+    if (tile->outliers.vertices > 0 && !job.options.clamp_range) refuse_outliers(job, tile->index, tile->outliers);
     if (written >= first_new) {
       if (stages.textures != nullptr) stages.textures->add(tile->index, tile->texture, writer);
       writer.add_tile(tile->encoded);
@@ -210,6 +248,12 @@ ConvertSummary convert(HeightSource& source, const Plan& plan, const std::string
       throw Error(
           ErrorCode::kInvalidArgument,
           fmt::format("{}: every one of the {} lattice vertices is void, nothing to write", info.path, all.vertices));
+    }
+    if (options.max_rounding && all.worst_rounding > *options.max_rounding * (1.0 + 1e-6)) {
+      throw Error(ErrorCode::kInvalidArgument,
+                  fmt::format("{}: elevations are rounded by up to {:.3g} as {}, more than --max-rounding {}; use that "
+                              "much, or another --type",
+                              info.path, all.worst_rounding, to_string(options.code_type), *options.max_rounding));
     }
     summary.metadata = describe_job(info, plan, options, job.quantisation);
     summary.metadata.statistics = total_statistics(all);

@@ -41,10 +41,13 @@ struct SourceNote {
 struct ConvertOptions {
   PlanRequest plan;
   CodeType code_type = CodeType::kU16;
-  /// Elevations of the first and last code; nullopt: taken from the data in a first pass.
+  /// Nothing stored lies beyond; the lower end is the first code, the upper end another one. nullopt: taken from the
+  /// data in a first pass.
   std::optional<std::pair<double, double>> z_range;
   /// Elevation step of one code; nullopt: chosen (docs/decisions). 0 asks for the finest that the code type holds.
   std::optional<double> step;
+  /// Instead of a step: every vertex is stored to within that (LERC's MAX_Z_ERROR), or convert() refuses.
+  std::optional<double> max_rounding;
   /// What to do with elevations outside z_range: false refuses, true moves them to its end and counts them.
   bool clamp_range = false;
   std::string filter = "bilinear";

@@ -74,8 +74,10 @@ std::string heights_fingerprint(const SourceInfo& info, const Plan& plan, const 
       plan.grid.extent_z(), plan.frame.first_sample_x, plan.frame.first_sample_z, plan.frame.spacing_x,
       plan.frame.spacing_z, to_string(plan.outside), to_string(options.code_type),
       options.z_range ? fmt::format("{}:{}", options.z_range->first, options.z_range->second) : "data",
-      options.step ? fmt::format("{}", *options.step) : "auto", options.clamp_range, options.filter,
-      options.acquisition, options.level,
+      options.max_rounding ? fmt::format("rounding {}", *options.max_rounding)
+      : options.step       ? fmt::format("{}", *options.step)
+                           : "auto",
+      options.clamp_range, options.filter, options.acquisition, options.level,
       options.shadow_seeds
           ? fmt::format("{} [{}]", options.shadow_seeds->sun_min_deg, fmt::join(options.shadow_seeds->sun_deg, " "))
           : "none");
@@ -115,6 +117,7 @@ Metadata describe_job(const SourceInfo& info, const Plan& plan, const ConvertOpt
                       const Quantisation& quantisation) {
   Metadata metadata(plan.grid);
   metadata.quantisation = quantisation;
+  metadata.z_range = options.z_range;
   metadata.horizontal_unit = plan.frame.in_metres ? "metre" : "unknown";
   metadata.vertical_unit = info.vertical_unit.empty() ? "unknown" : info.vertical_unit;
   metadata.valid = plan.frame.bounds();

@@ -13,6 +13,7 @@ namespace isohf {
 struct QuantisationRequest {
   CodeType type = CodeType::kU16;
   std::optional<double> step;  ///< elevation of one code; 0: the finest that the type holds; nullopt: chosen
+  std::optional<double> max_rounding = {};  ///< instead: steps of at most twice that
 };
 
 /// One scale and offset for the whole dataset.
@@ -23,6 +24,12 @@ struct QuantisationRequest {
 /// smallest one that fits.
 [[nodiscard]] Quantisation choose_quantisation(const QuantisationRequest& request, const ElevationRange& range,
                                                const SourceInfo& info);
+
+/// The same where the first code is to be range.min and another one range.max, so that nothing stored lies beyond and
+/// everything between them is stored to within half a step. A step that was asked for must divide the range, or it is
+/// refused with those that do; one that is chosen, or given by max_rounding, becomes so much finer that it does.
+[[nodiscard]] Quantisation quantisation_of_range(const QuantisationRequest& request, const ElevationRange& range,
+                                                 const SourceInfo& info);
 
 /// True where steps of this scale reach over the whole range with the codes that the type has.
 [[nodiscard]] bool has_codes_for(const Quantisation& quantisation, const ElevationRange& range);

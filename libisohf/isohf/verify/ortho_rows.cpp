@@ -15,8 +15,8 @@ namespace {
 
 constexpr std::int64_t kTileSide = 256;
 
-ElevationRange code_range(const Quantisation& codes, double datum) {
-  const CodeLimits limits = code_limits(codes);
+ElevationRange code_range(const Metadata& surface, double datum) {
+  const CodeLimits limits = code_limits(surface);
   return {limits.lowest - datum, limits.highest - datum};
 }
 
@@ -52,7 +52,7 @@ OrthoGround OrthoGround::make(const Metadata& surface, const Kernel& kernel, dou
   const double continued = kContinuedSteps * spacing;
   const SourceAxis x(source.width, source.first_sample_x, source.spacing_x, registration, outside, continued);
   const SourceAxis z(source.height, source.first_sample_z, source.spacing_z, registration, outside, continued);
-  return {surface, x, z, kernel, RowSampler(x, z, kernel, code_range(surface.quantisation, datum)), datum};
+  return {surface, x, z, kernel, RowSampler(x, z, kernel, code_range(surface, datum)), datum};
 }
 
 OrthoRows::OrthoRows(const OrthoGround& ground, double spacing, OrthoPhase phase, bool is_coded)
@@ -98,7 +98,7 @@ void OrthoRows::fill(std::int64_t index, const SourceBand& band, RowSampler::Scr
   ground_.sampler.sample(band, first_z_ + static_cast<double>(row) * spacing_, taps_, scratch, heights);
   TileCodes codes;
   const Quantisation& quantisation = ground_.surface.quantisation;
-  const QuantiserCounts counts = quantise(quantisation, ground_.datum, heights, codes);
+  const QuantiserCounts counts = quantise(quantisation, code_limits(ground_.surface), ground_.datum, heights, codes);
   clamped_[static_cast<std::size_t>(index)] = counts.below + counts.above;
   elevations_from_codes(quantisation, codes, kept_[static_cast<std::size_t>(row - first_row_)]);
   if (is_coded_) codes_[codes_.size() - static_cast<std::size_t>(opened() - index)] = std::move(codes);

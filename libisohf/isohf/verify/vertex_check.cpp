@@ -27,7 +27,7 @@ class VertexCheck {
         source_(source),
         kernel_(Kernel::make(filter_from_string(metadata_.filter))),
         prefilter_(Prefilter::make(kernel_.filter(), acquisition_from_string(metadata_.acquisition))),
-        limits_(code_limits(metadata_.quantisation)) {
+        limits_(code_limits(metadata_)) {
     const SourceInfo& info = source.info();
     if (info.width != metadata_.source.width || info.height != metadata_.source.height) {
       throw Error(ErrorCode::kInvalidArgument,
@@ -43,7 +43,7 @@ class VertexCheck {
     const double largest = std::max(std::abs(range.min), std::abs(range.max)) + std::abs(datum_);
     const double rounding = 4.0 * largest * double{std::numeric_limits<float>::epsilon()};
     report_.bound = (is_float ? 0.0 : 0.5 * q.scale) + rounding;
-    can_clamp_ = statistics.clamped > 0;
+    can_clamp_ = metadata_.z_range || statistics.clamped > 0;
   }
 
   VertexReport run(const std::function<void(std::int64_t, std::int64_t)>& progress, const std::atomic<bool>& cancel) {
@@ -78,7 +78,7 @@ class VertexCheck {
         continue;
       }
       const double held = std::clamp(resampled, limits_.lowest, limits_.highest);
-      if (can_clamp_ && std::abs(held - resampled) > report_.bound && stored[i] == held) {
+      if (can_clamp_ && held != resampled && std::abs(stored[i] - held) <= report_.bound) {
         ++found.clamped;
         continue;
       }
