@@ -58,8 +58,12 @@ class PhaseErrors {
     ++count_;
   }
   [[nodiscard]] Errors average() const {
-    return {sums_.elevation / sums_.area, std::sqrt(sums_.elevation_squared / sums_.area),
-            sums_.normal_rad / sums_.area, sums_.shading / sums_.area};
+    Errors errors = {sums_.elevation / sums_.area,         std::sqrt(sums_.elevation_squared / sums_.area),
+                     sums_.normal_rad / sums_.area,        sums_.shading / sums_.area,
+                     sums_.vertex_normal_rad / sums_.area, sums_.vertex_shading / sums_.area,
+                     sums_.defect_rad / sums_.vertices};
+    for (std::size_t i = 0; i < kAzimuths; ++i) errors.azimuth_shading[i] = sums_.azimuth_shading[i] / sums_.area;
+    return errors;
   }
   [[nodiscard]] double spread() const { return (most_ - least_) / average().mean; }
 
@@ -76,20 +80,18 @@ std::vector<double> phases_of(const ExperimentSettings& settings) {
   return phases;
 }
 
-PhaseErrors measure_fixed_mesh(const TestMesh& mesh, const ComplexHeights& heights, const SineWave& wave,
-                               double steepest, const std::vector<double>& phases) {
-  const ErrorMeter meter(mesh, wave, steepest);
+PhaseErrors measure_fixed_mesh(const TestMesh& mesh, const ComplexHeights& fitted, const SineWave& wave,
+                               double steepest, const ExperimentSettings& settings) {
+  const ErrorMeter meter(mesh, wave, steepest, settings.light);
   const ComplexHeights exact = wave_at_vertices(wave, mesh);
+  const std::vector<bool> all(mesh.triangles.size(), true);
+  std::vector<double> heights(fitted.size());
   PhaseErrors errors;
-  for (const double phase : phases) {
+  for (const double phase : phases_of(settings)) {
     const std::complex<double> turn = std::polar(1.0, phase);
+    for (std::size_t i = 0; i < fitted.size(); ++i) heights[i] = (turn * fitted[i]).imag();
     ErrorSums sums;
-    for (const MeshTriangle& t : mesh.triangles) {
-      if (!t.is_measured) continue;
-      std::array<double, 3> corners = {};
-      for (std::size_t i = 0; i < 3; ++i) corners[i] = (turn * heights[t.vertices[i]]).imag();
-      meter.add(t, turn * exact[t.vertices[0]], corners, sums);
-    }
+    meter.add(all, turn, exact, heights, sums);
     errors.add(sums);
   }
   return errors;
@@ -100,7 +102,7 @@ PhaseErrors measure_fixed_mesh(const TestMesh& mesh, const ComplexHeights& heigh
 PhaseErrors measure_best_diagonals(const Bench& bench, const ComplexHeights& start, const SineWave& wave,
                                    double steepest, const ExperimentSettings& settings) {
   const TestMesh& mesh = bench.both;
-  const ErrorMeter meter(mesh, wave, steepest);
+  const ErrorMeter meter(mesh, wave, steepest, settings.light);
   const ComplexHeights exact = wave_at_vertices(wave, mesh);
   const bool is_fitted = settings.heights == HeightRule::kLeastSquares;
   PhaseErrors errors;
@@ -116,13 +118,10 @@ PhaseErrors measure_best_diagonals(const Bench& bench, const ComplexHeights& sta
       DiagonalChoice second = descend(exact);
       if (second.square_error < choice.square_error) choice = std::move(second);
     }
+    std::vector<bool> takes(mesh.triangles.size());
+    for (std::size_t i = 0; i < takes.size(); ++i) takes[i] = ((i / 2) % 2 != 0) == choice.takes_other[i / 4];
     ErrorSums sums;
-    for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
-      const MeshTriangle& t = mesh.triangles[i];
-      if (!t.is_measured || (i / 2) % 2 != choice.takes_other[i / 4]) continue;
-      meter.add(t, turn * exact[t.vertices[0]],
-                {choice.heights[t.vertices[0]], choice.heights[t.vertices[1]], choice.heights[t.vertices[2]]}, sums);
-    }
+    meter.add(takes, turn, exact, choice.heights, sums);
     errors.add(sums);
   }
   return errors;
@@ -140,7 +139,6 @@ void run_task(const Task& task, const ExperimentSettings& settings, Trial* out) 
   const double angle_rad = 2.0 * std::numbers::pi * task.orientation / settings.orientations;
   const SineWave wave = {angle_rad, cycles_per_sample(task.frequency, bench.triangles, settings.nyquist_triangles)};
   const double steepest = task.frequency;  // one amplitude for all, 45 degrees at frequency 1
-  const std::vector<double> phases = phases_of(settings);
   const auto put = [&](MeshKind kind, std::size_t mesh_triangles, const PhaseErrors& errors) {
     out[static_cast<int>(kind)] = {kind,           bench.triangles,        static_cast<std::int64_t>(mesh_triangles),
                                    task.frequency, wave.cycles_per_sample, task.orientation,
@@ -151,7 +149,7 @@ void run_task(const Task& task, const ExperimentSettings& settings, Trial* out) 
     const ComplexHeights heights =
         settings.heights == HeightRule::kLeastSquares ? bench.fits[i].fit(wave) : wave_at_vertices(wave, mesh);
     const auto kind = static_cast<MeshKind>(i);
-    put(kind, mesh.triangles.size(), measure_fixed_mesh(mesh, heights, wave, steepest, phases));
+    put(kind, mesh.triangles.size(), measure_fixed_mesh(mesh, heights, wave, steepest, settings));
     if (kind == MeshKind::kOrthoConsistent) {
       put(MeshKind::kOrthoBest, mesh.triangles.size(),
           measure_best_diagonals(bench, heights, wave, steepest, settings));
@@ -252,20 +250,27 @@ ExperimentResult run_experiment(const ExperimentSettings& settings) {
 
 namespace {
 
+template <typename Change>
+void for_each_error(Errors& left, const Errors& right, Change change) {
+  for (double Errors::*member : {&Errors::mean, &Errors::rms, &Errors::normal_rad, &Errors::shading,
+                                 &Errors::vertex_normal_rad, &Errors::vertex_shading, &Errors::defect_rad}) {
+    change(left.*member, right.*member);
+  }
+  for (std::size_t i = 0; i < kAzimuths; ++i) change(left.azimuth_shading[i], right.azimuth_shading[i]);
+}
+
 template <typename Accepts>
 Errors average_of(const ExperimentResult& result, Accepts accepts) {
   Errors sum;
   int count = 0;
   for (const Trial& trial : result.trials) {
     if (!accepts(trial)) continue;
-    sum.mean += trial.errors.mean;
-    sum.rms += trial.errors.rms;
-    sum.normal_rad += trial.errors.normal_rad;
-    sum.shading += trial.errors.shading;
+    for_each_error(sum, trial.errors, [](double& total, double error) { total += error; });
     ++count;
   }
   const double n = std::max(count, 1);
-  return {sum.mean / n, sum.rms / n, sum.normal_rad / n, sum.shading / n};
+  for_each_error(sum, sum, [n](double& total, double) { total /= n; });
+  return sum;
 }
 
 }  // namespace

@@ -6,6 +6,8 @@
 #include <functional>
 #include <vector>
 
+#include "reconstruction_error.h"
+
 /// Section 2 of the paper: how well meshes of equal triangle counts stand for plane sine waves (erratum E19).
 ///
 /// What the paper leaves open is fixed here and in docs/experiment.md:
@@ -35,6 +37,7 @@ struct ExperimentSettings {
   int frequency_stride = 1;  ///< every how many of them; >= 1
   std::int64_t nyquist_triangles = 5000;
   HeightRule heights = HeightRule::kLeastSquares;
+  Light light;
   int threads = 0;  ///< 0: all cores. The result does not depend on it
   /// Called now and then, from any thread but never from two at once.
   std::function<void(std::int64_t done, std::int64_t total)> progress;
@@ -46,10 +49,14 @@ struct ExperimentSettings {
 
 /// Errors of a mesh, averaged over its measured area and the phases.
 struct Errors {
-  double mean = 0.0;        ///< of |elevation error|, amplitudes
-  double rms = 0.0;         ///< root of the mean square elevation error, amplitudes
-  double normal_rad = 0.0;  ///< angle between normals
-  double shading = 0.0;     ///< Lambert, light of 45 degrees in the wave's direction
+  double mean = 0.0;               ///< of |elevation error|, amplitudes
+  double rms = 0.0;                ///< root of the mean square elevation error, amplitudes
+  double normal_rad = 0.0;         ///< angle between normals, the face's
+  double shading = 0.0;            ///< Lambert, by settings.light, of faces
+  double vertex_normal_rad = 0.0;  ///< the same two by blended vertex normals
+  double vertex_shading = 0.0;
+  double defect_rad = 0.0;  ///< |angle defect| of a vertex: Gaussian curvature, which a plane wave has none of
+  std::array<double, kAzimuths> azimuth_shading = {};  ///< by vertex normals, under lights that stand still
 };
 
 /// One mesh against one orientation and frequency.

@@ -45,11 +45,13 @@ std::vector<Trial> figure3_trials(const ExperimentResult& result, MeshKind mesh)
 std::string trials_csv(const ExperimentResult& result) {
   std::string csv =
       "mesh,triangles,mesh_triangles,frequency,cycles_per_sample,orientation_deg,mean_error,rms_error,"
-      "normal_error_deg,shading_error,phase_spread\n";
+      "normal_error_deg,shading_error,vertex_normal_error_deg,vertex_shading_error,angle_defect_deg,phase_spread\n";
   for (const Trial& t : result.trials) {
-    csv += fmt::format("{},{},{},{:.2f},{:.6f},{:.2f},{:.6e},{:.6e},{:.6e},{:.6e},{:.3e}\n", to_string(t.mesh),
-                       t.triangles, t.mesh_triangles, t.frequency, t.cycles_per_sample, t.angle_rad * kDegrees,
-                       t.errors.mean, t.errors.rms, t.errors.normal_rad * kDegrees, t.errors.shading, t.phase_spread);
+    csv += fmt::format("{},{},{},{:.2f},{:.6f},{:.2f},{:.6e},{:.6e},{:.6e},{:.6e},{:.6e},{:.6e},{:.6e},{:.3e}\n",
+                       to_string(t.mesh), t.triangles, t.mesh_triangles, t.frequency, t.cycles_per_sample,
+                       t.angle_rad * kDegrees, t.errors.mean, t.errors.rms, t.errors.normal_rad * kDegrees,
+                       t.errors.shading, t.errors.vertex_normal_rad * kDegrees, t.errors.vertex_shading,
+                       t.errors.defect_rad * kDegrees, t.phase_spread);
   }
   return csv;
 }
@@ -115,6 +117,46 @@ std::string figure3_csv(const ExperimentResult& result) {
     }
   }
   return csv;
+}
+
+std::string azimuth_csv(const ExperimentResult& result) {
+  const std::int64_t triangles = figure3_case(result).triangles;
+  std::string csv = "azimuth_deg";
+  std::vector<Errors> columns;
+  for (const MeshKind kind : kMeshKinds) {
+    csv += std::string(",") + to_string(kind);
+    columns.push_back(average_errors(result, kind, triangles));
+  }
+  csv += "\n";
+  for (std::size_t i = 0; i < kAzimuths; ++i) {
+    csv += fmt::format("{}", 180 * i / kAzimuths);
+    for (const Errors& column : columns) csv += fmt::format(",{:.6e}", column.azimuth_shading[i]);
+    csv += "\n";
+  }
+  return csv;
+}
+
+std::string azimuth_svg(const ExperimentResult& result) {
+  const std::int64_t triangles = figure3_case(result).triangles;
+  const double elevation_deg = result.settings.light.elevation_rad * kDegrees;
+  chart::Chart drawing = {
+      "Mean shading error against the azimuth of a light that stands still",
+      "",
+      "",
+      fmt::format("{} triangles, vertex normals, light {:.0f} degrees high; East to the right, North up", triangles,
+                  elevation_deg),
+      {}};
+  for (const MeshKind kind : kMeshKinds) {
+    chart::Curve curve = curve_of(kind);
+    const Errors errors = average_errors(result, kind, triangles);
+    for (std::size_t i = 0; i < 2 * kAzimuths; ++i) {
+      // The chart counts from the right towards the top, azimuths from the top to the right.
+      curve.x.push_back(std::numbers::pi * static_cast<double>(i) / kAzimuths);
+      curve.y.push_back(errors.azimuth_shading[(kAzimuths / 2 + 2 * kAzimuths - i) % kAzimuths]);
+    }
+    drawing.curves.push_back(std::move(curve));
+  }
+  return chart::polar_chart(drawing);
 }
 
 std::string figure3_svg(const ExperimentResult& result) {

@@ -32,6 +32,11 @@ struct Figure3Case {
 [[nodiscard]] double share_of_lower_orientations(const ExperimentResult& result, MeshKind other, std::int64_t triangles,
                                                  double frequency);
 
+/// Shading errors by vertex normals under lights that stand still, against the light's azimuth: the means over all
+/// frequencies and orientations of the triangle count nearest to 5000.
+[[nodiscard]] std::string azimuth_csv(const ExperimentResult& result);
+[[nodiscard]] std::string azimuth_svg(const ExperimentResult& result);
+
 /// Fig. 8: triangles of strip and stitch at every level of a tile; the paper's is 2564x3075 with 10 levels.
 [[nodiscard]] std::string figure8_csv(const TileShape& shape);
 [[nodiscard]] std::string figure8_svg(const TileShape& shape);

@@ -46,6 +46,7 @@ struct ExperimentCommandOptions {
   std::vector<std::int64_t> triangles;
   std::int64_t nyquist_triangles = 5000;
   experiment::HeightRule heights = experiment::HeightRule::kLeastSquares;
+  experiment::Light light;
 };
 
 std::vector<std::int64_t> parse_counts(const std::string& text) {
@@ -79,6 +80,16 @@ std::optional<ExperimentCommandOptions> parse(const Arguments& arguments) {
       [&](const std::string& text) {
         options.heights = static_cast<experiment::HeightRule>(parse_word(text, {"least-squares", "interpolate"}));
       });
+  line.option("--light", "AZ,EL",
+              "A light that stands still: degrees clockwise from North, and above the ground (default: 45 high in the "
+              "direction of each wave)",
+              [&](const std::string& text) {
+                const std::vector<double> angles = parse_numbers(text);
+                if (angles.size() != 2 || !(angles[1] > 0.0 && angles[1] <= 90.0)) {
+                  throw Error(ErrorCode::kInvalidArgument, "found '" + text + "', must be AZ,EL with EL above 0 to 90");
+                }
+                options.light = {angles[0] * std::numbers::pi / 180.0, angles[1] * std::numbers::pi / 180.0};
+              });
   add_work_options(line, options.work);
   add_common_options(line, options.common);
   line.footer(kFooter);
@@ -105,10 +116,10 @@ class FigureFolder {
   std::vector<std::string> write(const ExperimentResult& result) const {
     if (folder_.empty()) return {};
     const TileShape huge = TileShape::make(2564, 3075, 10);
-    const std::string texts[] = {experiment::trials_csv(result),  experiment::figure2_csv(result),
-                                 experiment::figure2_svg(result), experiment::figure3_csv(result),
-                                 experiment::figure3_svg(result), experiment::figure8_csv(huge),
-                                 experiment::figure8_svg(huge)};
+    const std::string texts[] = {
+        experiment::trials_csv(result),  experiment::figure2_csv(result), experiment::figure2_svg(result),
+        experiment::figure3_csv(result), experiment::figure3_svg(result), experiment::figure8_csv(huge),
+        experiment::figure8_svg(huge),   experiment::azimuth_csv(result), experiment::azimuth_svg(result)};
     std::vector<std::string> written;
     for (std::size_t i = 0; i < std::size(kNames); ++i) {
       std::ofstream file(path(kNames[i]), std::ios::binary);
@@ -121,29 +132,56 @@ class FigureFolder {
   }
 
  private:
-  static constexpr const char* kNames[] = {"trials.csv", "fig2.csv", "fig2.svg", "fig3.csv",
-                                           "fig3.svg",   "fig8.csv", "fig8.svg"};
+  static constexpr const char* kNames[] = {"trials.csv", "fig2.csv", "fig2.svg",    "fig3.csv",   "fig3.svg",
+                                           "fig8.csv",   "fig8.svg", "azimuth.csv", "azimuth.svg"};
 
   [[nodiscard]] std::string path(const char* name) const { return folder_ + "/" + name; }
 
   std::string folder_;
 };
 
-std::string summary_text(const ExperimentResult& result) {
-  std::string text = fmt::format(
-      "{} waves, {} triangle counts; {} pairs of them above the Nyquist frequency left out\n\n"
-      "                            errors averaged                            iso error / this error\n"
-      "triangles mesh              mean       rms  normal(deg)   shading     mean    rms normal shading\n",
-      result.waves, result.settings.triangles.size(), result.left_out);
+/// One line a triangle count and mesh: an error, and iso's divided by it.
+struct ErrorColumn {
+  const char* heading;
+  double experiment::Errors::*error;
+  double scale;
+  int digits;
+};
+constexpr double kDegrees = 180.0 / std::numbers::pi;
+constexpr ErrorColumn kColumns[] = {{"mean", &experiment::Errors::mean, 1.0, 6},
+                                    {"rms", &experiment::Errors::rms, 1.0, 6},
+                                    {"face normal", &experiment::Errors::normal_rad, kDegrees, 4},
+                                    {"shading", &experiment::Errors::shading, 1.0, 6},
+                                    {"vertex normal", &experiment::Errors::vertex_normal_rad, kDegrees, 4},
+                                    {"shading", &experiment::Errors::vertex_shading, 1.0, 6},
+                                    {"curvature", &experiment::Errors::defect_rad, kDegrees, 4}};
+
+std::string table_of(const ExperimentResult& result, bool as_ratio) {
+  std::string text = fmt::format("{:>9} {:<12}", "triangles", "mesh");
+  for (const ErrorColumn& column : kColumns) text += fmt::format(" {:>13}", column.heading);
+  text += "\n";
   for (const std::int64_t triangles : result.settings.triangles) {
     const experiment::Errors iso = average_errors(result, MeshKind::kIso, triangles);
     for (const MeshKind kind : experiment::kMeshKinds) {
+      if (as_ratio && kind == MeshKind::kIso) continue;
       const experiment::Errors e = average_errors(result, kind, triangles);
-      text += fmt::format("{:>9} {:<12} {:>9.6f} {:>9.6f} {:>12.5f} {:>9.6f}   {:>6.3f} {:>6.3f} {:>6.3f}  {:>6.3f}\n",
-                          triangles, to_string(kind), e.mean, e.rms, e.normal_rad * 180.0 / std::numbers::pi, e.shading,
-                          iso.mean / e.mean, iso.rms / e.rms, iso.normal_rad / e.normal_rad, iso.shading / e.shading);
+      text += fmt::format("{:>9} {:<12}", triangles, to_string(kind));
+      for (const ErrorColumn& column : kColumns) {
+        const double error = e.*column.error;
+        text += as_ratio ? fmt::format(" {:>13.3f}", iso.*column.error / error)
+                         : fmt::format(" {:>13.{}f}", column.scale * error, column.digits);
+      }
+      text += "\n";
     }
   }
+  return text;
+}
+
+std::string summary_text(const ExperimentResult& result) {
+  std::string text = fmt::format(
+      "{} waves, {} triangle counts; {} pairs of them above the Nyquist frequency left out\n\nerrors, averaged\n",
+      result.waves, result.settings.triangles.size(), result.left_out);
+  text += table_of(result, false) + "\niso's error divided by the other mesh's\n" + table_of(result, true);
   const experiment::Figure3Case at = figure3_case(result);
   text +=
       fmt::format("\nFig. 3, {} triangles, frequency {:.2f}: iso's mean error is lower at", at.triangles, at.frequency);
@@ -152,7 +190,13 @@ std::string summary_text(const ExperimentResult& result) {
     text += fmt::format(" {:.0f} % of orientations ({})",
                         100.0 * share_of_lower_orientations(result, kind, at.triangles, at.frequency), to_string(kind));
   }
-  return text + "\nerrors in amplitudes; shading: Lambert's law, light at 45 degrees in the wave's direction\n";
+  const experiment::Light& light = result.settings.light;
+  text += fmt::format(
+      "\nmean and rms in amplitudes, normals and curvature (angle defect of a vertex) in degrees\n"
+      "shading: Lambert's law, by the normals before it, light {:.4g} degrees high {}\n",
+      light.elevation_rad * kDegrees,
+      light.azimuth_rad ? fmt::format("at azimuth {:.4g}", *light.azimuth_rad * kDegrees) : "in the wave's direction");
+  return text;
 }
 
 ordered_json summary_json(const ExperimentResult& result, const std::vector<std::string>& written) {
@@ -165,7 +209,11 @@ ordered_json summary_json(const ExperimentResult& result, const std::vector<std:
                       {"mean", e.mean},
                       {"rms", e.rms},
                       {"normal_rad", e.normal_rad},
-                      {"shading", e.shading}});
+                      {"shading", e.shading},
+                      {"vertex_normal_rad", e.vertex_normal_rad},
+                      {"vertex_shading", e.vertex_shading},
+                      {"angle_defect_rad", e.defect_rad},
+                      {"shading_by_azimuth", e.azimuth_shading}});
     }
   }
   const experiment::Figure3Case at = figure3_case(result);
@@ -193,6 +241,7 @@ int run(const ExperimentCommandOptions& options) {
   if (!options.triangles.empty()) settings.triangles = options.triangles;
   settings.nyquist_triangles = options.nyquist_triangles;
   settings.heights = options.heights;
+  settings.light = options.light;
   settings.threads = options.work.threads;
   settings.cancel = &watch_interrupts();
   ExperimentResult result;

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "figures.h"
@@ -68,6 +69,51 @@ TEST(Experiment, RefusesSettingsOutOfRangeAndStopsWhenAsked) {
   }
 }
 
+/// Averages of one mesh of 2000 triangles over waves that lie along one direction, heights interpolated.
+Errors along(MeshKind mesh, double cycles_per_sample, int orientation, int of, Light light = {}) {
+  ExperimentSettings settings;
+  settings.triangles = {2000};
+  settings.phases = 4;
+  settings.orientations = of;
+  settings.frequency_count = 1;
+  settings.heights = HeightRule::kInterpolate;
+  settings.light = light;
+  settings.nyquist_triangles = std::lround(2000.0 * std::pow(cycles_per_sample / 0.005, 2));
+  for (const Trial& t : run_experiment(settings).trials) {
+    if (t.mesh == mesh && t.orientation == orientation) return t.errors;
+  }
+  return {};
+}
+
+// Both waves have one slope. A face errs by the curvature across it, a vertex by the change of curvature.
+TEST(ErrorMeter, FaceNormalsErrByTheWaveNumberAndVertexNormalsByItsSquare) {
+  for (const MeshKind mesh : {MeshKind::kIso, MeshKind::kOrthoConsistent}) {
+    const Errors longer = along(mesh, 0.02, 1, 20);
+    const Errors shorter = along(mesh, 0.04, 1, 20);
+    EXPECT_NEAR(shorter.normal_rad / longer.normal_rad / 2.0, 1.0, 0.05) << to_string(mesh);
+    EXPECT_NEAR(shorter.vertex_normal_rad / longer.vertex_normal_rad / 4.0, 1.0, 0.05) << to_string(mesh);
+  }
+}
+
+// A sheet that is only folded has no Gaussian curvature: crests along the rows of iso, or along the diagonals of ortho.
+TEST(ErrorMeter, FoldedSheetsHaveNoAngleDefect) {
+  EXPECT_LT(along(MeshKind::kIso, 0.1, 2, 8).defect_rad, 1e-12);
+  EXPECT_LT(along(MeshKind::kOrthoConsistent, 0.1, 3, 8).defect_rad, 1e-12);
+  EXPECT_GT(along(MeshKind::kIso, 0.1, 1, 8).defect_rad, 1e-8);
+  EXPECT_GT(along(MeshKind::kOrthoConsistent, 0.1, 1, 8).defect_rad, 1e-8);
+}
+
+TEST(ErrorMeter, ALightOverheadHasNoAzimuthAndAFixedOneCountsWithItsOpposite) {
+  const double right_angle = std::acos(0.0);
+  const Errors noon = along(MeshKind::kIso, 0.1, 1, 8, {0.3, right_angle});
+  for (const double shading : noon.azimuth_shading) EXPECT_NEAR(shading, noon.vertex_shading, 1e-12);
+  const Errors east = along(MeshKind::kIso, 0.1, 1, 8, {right_angle, 0.5});
+  const Errors west = along(MeshKind::kIso, 0.1, 1, 8, {3.0 * right_angle, 0.5});
+  EXPECT_NEAR(east.vertex_shading, west.vertex_shading, 1e-12);
+  EXPECT_NEAR(east.vertex_shading, east.azimuth_shading[kAzimuths / 2], 1e-12);
+  EXPECT_NE(east.vertex_shading, east.azimuth_shading[0]);
+}
+
 // Fig. 8: strips fall fourfold a level, stitches grow, and from level 5 on little is saved (section 3.5).
 TEST(Figures, Figure8ShowsThePointOfDiminishingReturns) {
   const std::string csv = figure8_csv(TileShape::make(2564, 3075, 10));
@@ -93,7 +139,7 @@ TEST(ExperimentCommand, WritesItsFilesAndRefusesToReplaceThem) {
   EXPECT_EQ(result.err, "");
   const json document = json::parse(result.out);
   EXPECT_EQ(document.at("averages").size(), 4U);
-  EXPECT_EQ(document.at("files").size(), 7U);
+  EXPECT_EQ(document.at("files").size(), 9U);
   for (const json& path : document.at("files")) EXPECT_GT(std::filesystem::file_size(path.get<std::string>()), 50U);
   const RunResult again = run_isohf(command);
   EXPECT_EQ(again.exit_code, 2);

@@ -84,13 +84,15 @@ TEST(HeightFit, BeatsInterpolation) {
   for (const TestMesh& mesh : all_meshes(1000)) {
     const ComplexHeights exact = wave_at_vertices(wave, mesh);
     const ComplexHeights fitted = HeightFit(mesh).fit(wave);
-    const ErrorMeter meter(mesh, wave, 1.0);
+    TestMesh whole = mesh;
+    for (MeshTriangle& t : whole.triangles) t.is_measured = true;
+    const ErrorMeter meter(whole, wave, 1.0, {});
+    const std::vector<bool> all(whole.triangles.size(), true);
     const auto squared = [&](const ComplexHeights& heights) {
+      std::vector<double> phase_0;
+      for (const std::complex<double>& y : heights) phase_0.push_back(y.imag());
       ErrorSums sums;
-      for (const MeshTriangle& t : mesh.triangles) {
-        meter.add(t, exact[t.vertices[0]],
-                  {heights[t.vertices[0]].imag(), heights[t.vertices[1]].imag(), heights[t.vertices[2]].imag()}, sums);
-      }
+      meter.add(all, 1.0, exact, phase_0, sums);
       return sums.elevation_squared;
     };
     const double least = squared(fitted);
