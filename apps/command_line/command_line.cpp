@@ -1,198 +1,414 @@
 #include "command_line.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
-#include <map>
+#include <optional>
+#include <set>
 #include <utility>
 
+#include "config_file.h"
+#include "help_page.h"
 #include "isohf/base/error.h"
+#include "nearest_word.h"
 #include "standard_output.h"
 
 namespace isohf::cli {
 namespace {
 
-constexpr std::size_t kHelpWidth = 100;
-constexpr std::size_t kNameWidth = 28;
+using Values = std::vector<std::string>;
 
-/// Breaks `text` at blanks so that no line is longer than `width`; lines after the first start with `indent` blanks.
-std::string wrapped(const std::string& text, std::size_t indent, std::size_t width) {
-  std::string out;
-  std::size_t column = indent;
-  std::size_t from = 0;
-  while (from < text.size()) {
-    const std::size_t to = std::min(text.find(' ', from), text.size());
-    const std::size_t length = to - from;
-    if (column > indent && column + 1 + length > width) {
-      out += "\n" + std::string(indent, ' ');
-      column = indent;
-    } else if (column > indent) {
-      out += ' ';
-      ++column;
-    }
-    out.append(text, from, length);
-    column += length;
-    from = to + 1;
-  }
-  return out;
-}
+enum class Origin { kNowhere, kTopLevel, kSection, kCommandLine };
 
-/// Usage, then one list of options a group, "Common" last; two columns, wrapped, and nothing of CLI11's own notes.
-class HelpFormatter : public CLI::Formatter {
- public:
-  explicit HelpFormatter(std::string usage) : usage_(std::move(usage)) {}
-
-  [[nodiscard]] std::string make_help(const CLI::App* app, std::string /*name*/,
-                                      CLI::AppFormatMode /*mode*/) const override {
-    std::string help = fmt::format("{}\n\nUsage: isohf {}\n", app->get_description(), usage_);
-    std::vector<std::string> groups = app->get_groups();
-    std::stable_partition(groups.begin(), groups.end(), [](const std::string& group) { return group != "Common"; });
-    for (const std::string& group : groups) {
-      std::string lines;
-      for (const CLI::Option* option : app->get_options()) {
-        if (option->get_group() == group) lines += describe(option);
-      }
-      if (!lines.empty()) help += fmt::format("\n{}:\n{}", group, lines);
-    }
-    return help + "\n" + app->get_footer() + "\n";
-  }
-
- private:
-  static std::string describe(const CLI::Option* option) {
-    std::string line = "  ";
-    for (const std::string& flag : option->get_snames()) line += "-" + flag + ", ";
-    if (option->get_snames().empty() && !option->get_lnames().empty()) line += "    ";
-    for (const std::string& flag : option->get_lnames()) line += "--" + flag + " ";
-    if (option->get_lnames().empty() || option->get_type_size() != 0) line += option->get_type_name();
-    if (line.size() + 2 > kNameWidth) {
-      line += "\n" + std::string(kNameWidth, ' ');
-    } else {
-      line.resize(kNameWidth, ' ');
-    }
-    return line + wrapped(option->get_description(), kNameWidth, kHelpWidth) + "\n";
-  }
-
-  std::string usage_;
+/// An option where it was met: `where` names it in messages.
+struct Occurrence {
+  std::string where;
+  Values values;
 };
 
-std::size_t edit_distance(const std::string& a, const std::string& b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    std::size_t diagonal = row[0];
-    row[0] = i;
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      const std::size_t substituted = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
-      diagonal = row[j];
-      row[j] = std::min({row[j] + 1, row[j - 1] + 1, substituted});
-    }
+struct Option {
+  std::vector<std::string> names{};  ///< "-i", "--input"; none: a positional alone
+  std::string positional{};          ///< what it is called where it stands without a name
+  std::string value_name{};
+  std::string description{};
+  std::string group{};
+  std::size_t values = 1;  ///< 0: a flag
+  bool repeats = false;
+  std::optional<std::string> alone{};  ///< what it means without a value, if it may stand so
+  std::function<bool(const std::string&)> is_value = nullptr;
+  std::function<void(const Values&)> take = nullptr;  ///< the values of one occurrence
+  std::vector<Occurrence> found{};
+  Origin origin = Origin::kNowhere;
+
+  [[nodiscard]] std::string name() const { return names.empty() ? positional : names.back(); }
+  [[nodiscard]] bool is_called(const std::string& word) const {
+    return std::find(names.begin(), names.end(), word) != names.end();
   }
-  return row[b.size()];
-}
-
-}  // namespace
-
-namespace {
-
-/// An option that may stand without a value.
-struct Lone {
-  std::string meaning;
-  std::function<bool(const std::string&)> is_value;
+  [[nodiscard]] bool is_set() const { return !found.empty() && (values > 0 || found.back().values.front() == "true"); }
+  [[nodiscard]] bool takes_list() const { return value_name.find(',') != std::string::npos; }
 };
 
 bool is_numbers(const std::string& text) {
   return !text.empty() && text.find_first_not_of("0123456789.,") == std::string::npos;
 }
 
-/// Ties options that may stand alone to the values that follow them, or to what they mean alone.
-Arguments with_values(const Arguments& given, const std::map<std::string, Lone>& alone) {
-  Arguments out;
-  for (std::size_t i = 0; i < given.size(); ++i) {
-    const auto found = alone.find(given[i]);
-    if (found == alone.end()) {
-      out.push_back(given[i]);
-      if (given[i] == "--") {
-        out.insert(out.end(), given.begin() + static_cast<std::ptrdiff_t>(i) + 1, given.end());
-        break;
-      }
-      continue;
-    }
-    const bool has_value = i + 1 < given.size() && found->second.is_value(given[i + 1]);
-    out.push_back(given[i] + "=" + (has_value ? given[i + 1] : found->second.meaning));
-    if (has_value) ++i;
-  }
-  return out;
+[[noreturn]] void refuse(const std::string& why) {
+  throw Error(ErrorCode::kInvalidArgument, why);
 }
 
-/// CLI11's "--at: 2 required X Z missing" in the words of this program.
-std::string why_mismatched(const std::string& text) {
-  const std::size_t required = text.find(" required ");
-  const std::size_t missing = text.find(" missing");
-  if (required == std::string::npos || missing == std::string::npos) return text;
-  const std::size_t colon = text.find(": ");
-  const std::string option = text.substr(0, colon);
-  const std::string count = text.substr(colon + 2, required - colon - 2);
-  if (count == "1") return option + " lacks its value";
-  const std::size_t value = required + std::string(" required ").size();
-  return fmt::format("{} takes {} values: {} {}", option, count, option, text.substr(value, missing - value));
+std::span<const Command> all_commands;
+std::vector<DeclaredOption>* declared = nullptr;  ///< where parse() lists the options instead of parsing
+
+/// The names of the commands that know an option.
+std::vector<std::string> commands_with(const std::string& option) {
+  std::vector<std::string> names;
+  for (const Command& command : all_commands) {
+    const std::vector<DeclaredOption> options = options_of(command);
+    if (std::any_of(options.begin(), options.end(), [&](const auto& known) { return known.name == option; })) {
+      names.emplace_back(command.name);
+    }
+  }
+  return names;
+}
+
+/// Whether a --config file may hold it: what is asked for once is asked for on the command line.
+bool is_config_key(const std::string& option) {
+  return option != "--config" && option != "--help" && option != "--version";
+}
+
+std::vector<std::string> keys_of(const Command& command) {
+  std::vector<std::string> keys;
+  for (const DeclaredOption& option : options_of(command)) {
+    if (is_config_key(option.name)) keys.push_back(option.name.substr(2));
+  }
+  return keys;
+}
+
+/// What a value of the --config file comes down to on the command line.
+std::vector<Values> values_from(const Option& option, const ConfigValue& value) {
+  using Kind = ConfigValue::Kind;
+  const auto mismatch = [&](const std::string& required) {
+    refuse("found " + value.shown() + ", must be " + required);
+  };
+  const auto all_plain = [](const std::vector<ConfigValue>& items) {
+    return !items.empty() && std::all_of(items.begin(), items.end(), [](const ConfigValue& item) {
+      return item.kind == Kind::kText || item.kind == Kind::kNumber;
+    });
+  };
+  const auto texts = [](const std::vector<ConfigValue>& items) {
+    Values list;
+    for (const ConfigValue& item : items) list.push_back(item.text);
+    return list;
+  };
+  if (option.values == 0) {
+    if (value.kind != Kind::kBoolean) mismatch("true or false");
+    return {{value.text}};
+  }
+  if (value.kind == Kind::kBoolean) {
+    if (!option.alone) mismatch(option.value_name);
+    return value.text == "true" ? std::vector<Values>{{*option.alone}} : std::vector<Values>{};
+  }
+  if (option.values > 1) {
+    const std::string required = fmt::format("an array of {} values, or an array of such arrays", option.values);
+    if (value.kind != Kind::kArray) mismatch(required);
+    const bool is_one = all_plain(value.items);
+    std::vector<Values> found;
+    for (const ConfigValue& item : is_one ? std::vector<ConfigValue>{value} : value.items) {
+      if (item.items.size() != option.values || !all_plain(item.items)) mismatch(required);
+      found.push_back(texts(item.items));
+    }
+    return found;
+  }
+  if (value.kind != Kind::kArray) return {{value.text}};
+  if (!all_plain(value.items)) mismatch("an array of text or numbers, with something in it");
+  if (!option.repeats && !option.takes_list()) mismatch("one value");
+  const Values list = texts(value.items);
+  if (!option.repeats) return {{fmt::format("{}", fmt::join(list, ","))}};
+  std::vector<Values> found;
+  for (const std::string& text : list) found.push_back({text});
+  return found;
 }
 
 }  // namespace
 
-std::string nearest_word(const std::string& text, const std::vector<std::string>& candidates) {
-  std::string best;
-  std::size_t best_distance = std::max<std::size_t>(2, text.size() / 3) + 1;
-  for (const std::string& candidate : candidates) {
-    std::size_t distance = edit_distance(text, candidate);
-    if (text.size() >= 3 && candidate.compare(0, text.size(), text) == 0) distance = 1;
-    if (distance < best_distance) {
-      best_distance = distance;
-      best = candidate;
-    }
-  }
-  return best;
-}
-
 struct CommandLine::State {
-  State(const std::string& name, const std::string& summary) : command(name), app(summary, name) {}
-
   std::string command;
-  CLI::App app;
+  std::string summary;
   std::string group = "Options";
   std::string usage_positionals;
-  std::map<std::string, Lone> alone;  ///< options that may stand without a value, and what that means
+  std::string footer;
+  std::string config;
+  std::vector<Option> options;
+  std::vector<std::set<std::string>> exclusive;
 
-  /// The long name in "-q,--quiet" or "-i,--input,INPUT" as the user writes it.
-  static std::string long_name(const std::string& flags) {
-    const std::size_t from = flags.find("--");
-    return flags.substr(from, flags.find(',', from) - from);
+  [[nodiscard]] bool is_program() const { return program_name() == "isohf-" + command; }
+  [[nodiscard]] std::string invocation() const {
+    return is_program() ? program_name() : program_name() + " " + command;
+  }
+
+  Option& add(const std::string& flags, Option option) {
+    for (std::size_t from = 0; from < flags.size();) {
+      const std::size_t to = std::min(flags.find(',', from), flags.size());
+      const std::string name = flags.substr(from, to - from);
+      (name.starts_with("-") ? option.names.emplace_back() : option.positional) = name;
+      from = to + 1;
+    }
+    option.group = group;
+    return options.emplace_back(std::move(option));
+  }
+
+  Option* find(const std::string& name) {
+    const auto found =
+        std::find_if(options.begin(), options.end(), [&](const Option& option) { return option.is_called(name); });
+    return found == options.end() ? nullptr : &*found;
   }
 
   [[nodiscard]] std::vector<std::string> long_names() const {
     std::vector<std::string> names;
-    for (const CLI::Option* option : app.get_options()) {
-      for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+    for (const Option& option : options) {
+      if (!option.names.empty()) names.push_back(option.name());
     }
     return names;
   }
 
-  /// What is wrong with an argument that CLI11 could not place.
-  [[nodiscard]] std::string why_unexpected() const {
-    for (const std::string& extra : app.remaining()) {
-      if (extra.size() < 2 || extra[0] != '-') continue;
-      const std::string near = nearest_word(extra.substr(0, extra.find('=')), long_names());
-      return fmt::format("unknown option {}{}", extra, near.empty() ? "" : fmt::format("; did you mean {}?", near));
-    }
-    return fmt::format("'{}' is one argument too many", app.remaining().empty() ? "" : app.remaining().front());
+  [[noreturn]] void refuse_usage(const std::string& why) const {
+    refuse(fmt::format("{} ({} --help lists the options)", why, invocation()));
   }
+
+  [[noreturn]] void refuse_unknown(const std::string& name) const {
+    const std::string near = did_you_mean(name, long_names());
+    const std::vector<std::string> others = commands_with(name);
+    refuse_usage(fmt::format(
+        "unknown option {}{}", name,
+        !near.empty() || others.empty() ? near : fmt::format("; it belongs to {}", fmt::join(others, ", "))));
+  }
+
+  /// Whether an argument can be a value: neither a long option nor a letter of ours. "-5" can.
+  [[nodiscard]] bool can_be_value(const std::string& argument) {
+    return !argument.starts_with("--") && find(argument) == nullptr;
+  }
+
+  void place(const Arguments& arguments);
+  std::size_t place_named(const Arguments& arguments, std::size_t at);
+  std::size_t place_letters(const Arguments& arguments, std::size_t at);
+  std::size_t place_values(Option& option, const Arguments& arguments, std::size_t next);
+  void place_plain(const std::string& argument);
+  void read_config();
+  void check_entries(const std::vector<ConfigEntry>& entries);
+  void place_entries(const std::vector<ConfigEntry>& entries, Origin origin);
+  const Option* rival_of(const Option& option, Origin from);
+  void take();
+  void print_help() const;
 };
 
-CommandLine::CommandLine(const std::string& command, const std::string& summary)
-    : state_(std::make_unique<State>(command, summary)) {
-  state_->app.set_help_flag("-h,--help", "Print this help and exit");
-  state_->app.get_help_ptr()->group("Common");
-  state_->app.allow_config_extras(CLI::config_extras_mode::error);
+void CommandLine::State::place(const Arguments& arguments) {
+  Arguments plain;
+  for (std::size_t i = 0; i < arguments.size();) {
+    const std::string& argument = arguments[i];
+    if (argument == "--") {
+      plain.insert(plain.end(), arguments.begin() + static_cast<std::ptrdiff_t>(i) + 1, arguments.end());
+      break;
+    }
+    if (argument.starts_with("--")) {
+      i = place_named(arguments, i);
+    } else if (argument.size() > 1 && argument.front() == '-') {
+      i = place_letters(arguments, i);
+    } else {
+      plain.push_back(argument);
+      ++i;
+    }
+  }
+  for (const std::string& argument : plain) place_plain(argument);
+}
+
+/// An option by its long name at arguments[at]; the next argument to look at.
+std::size_t CommandLine::State::place_named(const Arguments& arguments, std::size_t at) {
+  const std::string& argument = arguments[at];
+  const std::size_t equals = argument.find('=');
+  const std::string name = argument.substr(0, equals);
+  Option* const option = find(name);
+  if (option == nullptr) refuse_unknown(name);
+  if (equals == std::string::npos) return place_values(*option, arguments, at + 1);
+  const std::string value = argument.substr(equals + 1);
+  if (option->values == 0 && value != "true" && value != "false") {
+    refuse_usage(fmt::format("{} is a flag and takes no value, found '{}'", name, value));
+  }
+  if (option->values > 1)
+    refuse_usage(fmt::format("{0} takes {1} values: {0} {2}", name, option->values, option->value_name));
+  option->found.push_back({name, {value}});
+  option->origin = Origin::kCommandLine;
+  return at + 1;
+}
+
+/// "-q", "-qv", "-j4" at arguments[at].
+std::size_t CommandLine::State::place_letters(const Arguments& arguments, std::size_t at) {
+  const std::string& argument = arguments[at];
+  for (std::size_t i = 1; i < argument.size(); ++i) {
+    Option* const option = find(std::string("-") + argument[i]);
+    if (option == nullptr) refuse_unknown(argument);
+    if (option->values == 0 || i + 1 == argument.size()) {
+      const std::size_t next = place_values(*option, arguments, at + 1);
+      if (i + 1 == argument.size()) return next;
+      continue;
+    }
+    option->found.push_back({option->name(), {argument.substr(i + 1)}});
+    option->origin = Origin::kCommandLine;
+    break;
+  }
+  return at + 1;
+}
+
+/// The values that follow an option's name; the next argument to look at.
+std::size_t CommandLine::State::place_values(Option& option, const Arguments& arguments, std::size_t next) {
+  Values values;
+  if (option.values == 0) values = {"true"};
+  const auto is_there = [&](std::size_t i) { return i < arguments.size() && can_be_value(arguments[i]); };
+  if (option.alone && !(is_there(next) && option.is_value(arguments[next]))) {
+    values = {*option.alone};
+  } else {
+    for (; values.size() < option.values; ++next) {
+      if (is_there(next)) {
+        values.push_back(arguments[next]);
+      } else if (option.values == 1) {
+        refuse_usage(fmt::format("{} lacks its value", option.name()));
+      } else {
+        refuse_usage(fmt::format("{0} takes {1} values: {0} {2}", option.name(), option.values, option.value_name));
+      }
+    }
+  }
+  option.found.push_back({option.name(), std::move(values)});
+  option.origin = Origin::kCommandLine;
+  return next;
+}
+
+/// An argument without a name, to the first place that is free.
+void CommandLine::State::place_plain(const std::string& argument) {
+  for (Option& option : options) {
+    if (option.positional.empty() || (!option.repeats && !option.found.empty())) continue;
+    option.found.push_back({option.positional, {argument}});
+    option.origin = Origin::kCommandLine;
+    return;
+  }
+  refuse_usage(fmt::format("'{}' is one argument too many", argument));
+}
+
+/// An option that excludes `option` and comes from `from`, or from where goes before it.
+const Option* CommandLine::State::rival_of(const Option& option, Origin from) {
+  for (const std::set<std::string>& names : exclusive) {
+    if (!names.contains(option.name())) continue;
+    for (const std::string& name : names) {
+      const Option* const other = find(name);
+      if (other != nullptr && other != &option && other->is_set() && other->origin >= from) return other;
+    }
+  }
+  return nullptr;
+}
+
+/// Every key must be an option's, in its section as at the top level.
+void CommandLine::State::check_entries(const std::vector<ConfigEntry>& entries) {
+  std::vector<std::string> own;
+  for (const std::string& name : long_names()) {
+    if (is_config_key(name)) own.push_back(name.substr(2));
+  }
+  for (const ConfigEntry& entry : entries) {
+    const auto other = std::find_if(all_commands.begin(), all_commands.end(),
+                                    [&](const Command& known) { return entry.section == known.name; });
+    const bool is_own = entry.section == command;
+    // A program of one command knows nothing of the others'.
+    if ((all_commands.empty() && !is_own) || (other != all_commands.end() && other->is_program)) continue;
+    if (!entry.section.empty() && !is_own && other == all_commands.end()) {
+      std::vector<std::string> names;
+      for (const Command& known : all_commands) names.emplace_back(known.name);
+      refuse(fmt::format("{}: no command is called [{}]{}", entry.where, entry.section,
+                         did_you_mean(entry.section, names)));
+    }
+    const std::vector<std::string> keys = other == all_commands.end() ? own : keys_of(*other);
+    if (std::find(keys.begin(), keys.end(), entry.key) != keys.end()) continue;
+    const std::vector<std::string> others =
+        is_config_key("--" + entry.key) ? commands_with("--" + entry.key) : std::vector<std::string>{};
+    if (entry.section.empty() && !others.empty()) continue;
+    const std::string near = did_you_mean(entry.key, keys);
+    refuse(fmt::format("{}: {} '{}'{}", entry.where,
+                       entry.section.empty() ? "no option is named" : fmt::format("{} has no option", entry.section),
+                       entry.key, others.empty() ? near : fmt::format("; it belongs to {}", fmt::join(others, ", "))));
+  }
+}
+
+void CommandLine::State::place_entries(const std::vector<ConfigEntry>& entries, Origin origin) {
+  const auto above = static_cast<Origin>(static_cast<int>(origin) + 1);
+  for (const ConfigEntry& entry : entries) {
+    if (entry.section != (origin == Origin::kSection ? command : "")) continue;
+    Option* const option = find("--" + entry.key);
+    if (option == nullptr || !is_config_key("--" + entry.key) || option->origin >= above ||
+        rival_of(*option, above) != nullptr)
+      continue;
+    const std::string where = entry.where + ": " + entry.key;
+    try {
+      for (Values& values : values_from(*option, entry.value)) option->found.push_back({where, std::move(values)});
+    } catch (const Error& error) {
+      throw error.within(where);
+    }
+    if (!option->found.empty()) option->origin = origin;
+  }
+}
+
+void CommandLine::State::read_config() {
+  const Option* const option = find("--config");
+  if (option->found.empty()) return;
+  if (option->found.size() > 1) refuse_usage(fmt::format("--config is given {} times", option->found.size()));
+  const std::vector<ConfigEntry> entries = read_config_file(option->found.front().values.front());
+  check_entries(entries);
+  place_entries(entries, Origin::kSection);
+  place_entries(entries, Origin::kTopLevel);
+}
+
+void CommandLine::State::take() {
+  for (const Option& option : options) {
+    if (option.found.empty()) continue;
+    if (const Option* const rival = option.is_set() ? rival_of(option, option.origin) : nullptr; rival != nullptr) {
+      refuse_usage(fmt::format("{} excludes {}; at most one of them may be given", option.found.front().where,
+                               rival->found.front().where));
+    }
+    if (option.values > 0 && !option.repeats && option.found.size() > 1) {
+      refuse(fmt::format("{} is given {} times", option.name(), option.found.size()));
+    }
+    for (const Occurrence& occurrence : option.found) {
+      try {
+        if (option.take) option.take(occurrence.values);
+      } catch (const Error& error) {
+        throw error.within(occurrence.where);
+      }
+    }
+  }
+}
+
+void CommandLine::State::print_help() const {
+  HelpPage page;
+  page.text(summary);
+  page.usage(invocation() + usage_positionals + " [options]");
+  std::vector<std::string> groups;
+  for (const Option& option : options) {
+    if (std::find(groups.begin(), groups.end(), option.group) == groups.end()) groups.push_back(option.group);
+  }
+  std::stable_partition(groups.begin(), groups.end(), [](const std::string& name) { return name != "Common"; });
+  for (const std::string& name : groups) {
+    page.heading(name + ":");
+    for (const Option& option : options) {
+      if (option.group != name) continue;
+      std::string left = fmt::format("{}", fmt::join(option.names, ", "));
+      if (left.starts_with("--")) left = "    " + left;
+      if (!option.value_name.empty()) left += (left.empty() ? "" : " ") + option.value_name;
+      page.row(left, option.description);
+    }
+  }
+  page.text(footer);
+  page.print();
+}
+
+CommandLine::CommandLine(const std::string& command, const std::string& summary) : state_(std::make_unique<State>()) {
+  state_->command = command;
+  state_->summary = summary;
 }
 
 CommandLine::~CommandLine() = default;
@@ -203,7 +419,7 @@ void CommandLine::group(const std::string& title) {
 
 void CommandLine::positional(const std::string& name, const std::string& flags, const std::string& description,
                              std::string& value) {
-  option(flags + "," + name, name, description, [&value](const std::string& text) { value = text; });
+  option(flags + "," + name, name, description, value);
   state_->usage_positionals += " " + name;
 }
 
@@ -211,29 +427,14 @@ void CommandLine::positionals(const std::string& usage, const std::string& descr
                               std::vector<std::string>& values) {
   const std::size_t first = usage.find_first_not_of('[');
   const std::string name = usage.substr(first, usage.find_first_of(" .") - first);
-  state_->app.add_option(name, values, description)->type_name(usage)->group(state_->group);
+  repeated(name, usage, description, values);
   state_->usage_positionals += " " + usage;
 }
 
 void CommandLine::option(const std::string& flags, const std::string& value_name, const std::string& description,
                          Take take) {
-  const std::string name = State::long_name(flags);
-  const auto callback = [name, take = std::move(take)](const std::vector<std::string>& values) {
-    if (values.size() != 1) {
-      throw Error(ErrorCode::kInvalidArgument, fmt::format("{} is given {} times", name, values.size()));
-    }
-    try {
-      take(values.front());
-    } catch (const Error& error) {
-      throw error.within(name);
-    }
-    return true;
-  };
-  state_->app.add_option(flags, callback, description)
-      ->type_name(value_name)
-      ->group(state_->group)
-      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
-      ->allow_extra_args(false);
+  const auto take_one = [take = std::move(take)](const Values& values) { take(values.front()); };
+  state_->add(flags, {.value_name = value_name, .description = description, .take = take_one});
 }
 
 void CommandLine::option(const std::string& flags, const std::string& value_name, const std::string& description,
@@ -250,101 +451,91 @@ void CommandLine::option_or_value(const std::string& flag, const std::string& va
                                   std::function<bool(const std::string&)> is_value, const std::string& description,
                                   Take take) {
   option(flag, value_name, description, std::move(take));
-  state_->alone[flag] = {alone, std::move(is_value)};
+  state_->options.back().alone = alone;
+  state_->options.back().is_value = std::move(is_value);
 }
 
 void CommandLine::repeated(const std::string& flags, const std::string& value_name, const std::string& description,
                            std::vector<std::string>& values) {
-  const auto callback = [&values](const std::vector<std::string>& found) {
-    values.insert(values.end(), found.begin(), found.end());
-    return true;
-  };
-  state_->app.add_option(flags, callback, description)
-      ->type_name(value_name)
-      ->group(state_->group)
-      ->expected(1)
-      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
-      ->allow_extra_args(false);
+  option(flags, value_name, description, [&values](const std::string& text) { values.push_back(text); });
+  state_->options.back().repeats = true;
 }
 
 void CommandLine::repeated_pair(const std::string& flags, const std::string& value_name, const std::string& description,
                                 std::function<void(const std::string&, const std::string&)> take) {
-  const std::string name = State::long_name(flags);
-  const auto callback = [name, take = std::move(take)](const std::vector<std::string>& values) {
-    try {
-      for (std::size_t i = 0; i + 1 < values.size(); i += 2) take(values[i], values[i + 1]);
-    } catch (const Error& error) {
-      throw error.within(name);
-    }
-    return true;
-  };
-  state_->app.add_option(flags, callback, description)
-      ->type_name(value_name)
-      ->group(state_->group)
-      ->type_size(2)
-      ->expected(1)
-      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
-      ->allow_extra_args(false);
+  const auto take_two = [take = std::move(take)](const Values& values) { take(values[0], values[1]); };
+  state_->add(flags,
+              {.value_name = value_name, .description = description, .values = 2, .repeats = true, .take = take_two});
 }
 
 void CommandLine::flag(const std::string& flags, const std::string& description, bool& value) {
-  state_->app.add_flag(flags, value, description)->group(state_->group);
+  const auto take = [&value](const Values& values) { value = values.front() == "true"; };
+  state_->add(flags, {.description = description, .values = 0, .take = take});
 }
 
 void CommandLine::exclusive(const std::vector<std::string>& options) {
-  for (std::size_t i = 0; i < options.size(); ++i) {
-    for (std::size_t j = i + 1; j < options.size(); ++j) {
-      state_->app.get_option(options[i])->excludes(state_->app.get_option(options[j]));
-    }
-  }
+  state_->exclusive.emplace_back(options.begin(), options.end());
 }
 
 void CommandLine::footer(const std::string& text) {
-  state_->app.footer(text);
+  state_->footer = text;
 }
 
-bool CommandLine::parse(const Arguments& given) {
-  CLI::App& app = state_->app;
-  const Arguments arguments = with_values(given, state_->alone);
-  app.set_config("--config", "",
-                 "Read options from a TOML or INI file: one 'long-option = value' a line; the command "
-                 "line wins")
-      ->type_name("FILE")
-      ->group("Common");
-  app.formatter(std::make_shared<HelpFormatter>(state_->command + state_->usage_positionals + " [options]"));
-  const auto fail = [&](const std::string& why) {
-    throw Error(ErrorCode::kInvalidArgument,
-                fmt::format("{}: {} (isohf {} --help lists the options)", state_->command, why, state_->command));
-  };
-  try {
-    app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));
-  } catch (const CLI::CallForHelp&) {
-    StandardOutput out;
-    out.write(app.help());
-    out.finish();
+bool CommandLine::parse(const Arguments& arguments) {
+  State& state = *state_;
+  bool help = false;
+  bool version = false;
+  group("Common");
+  option("--config", "FILE",
+         "Read options from a TOML file: 'long-option = value' for every command, or below [COMMAND] for one; the "
+         "command line wins",
+         state.config);
+  if (declared != nullptr) {
+    for (const Option& option : state.options) {
+      if (!option.names.empty()) {
+        const std::string letter = option.names.size() > 1 ? option.names.front() : "";
+        declared->push_back({option.name(), letter, option.group, option.values > 0});
+      }
+    }
     return false;
-  } catch (const CLI::ExtrasError&) {
-    fail(state_->why_unexpected());
-  } catch (const CLI::ArgumentMismatch& error) {
-    fail(why_mismatched(error.what()));
-  } catch (const CLI::ExcludesError& error) {
-    fail(std::string(error.what()) + "; at most one of them may be given");
-  } catch (const CLI::FileError& error) {
-    fail(std::string("--config: ") + error.what());
-  } catch (const CLI::ConfigError& error) {
-    // "INI was not able to parse density2"
-    const std::string text = error.what();
-    fail("--config: no option is named " + text.substr(text.rfind(' ') + 1));
-  } catch (const CLI::ParseError& error) {
-    fail(error.what());
+  }
+  flag("-h,--help", "Print this help and exit", help);
+  flag("-V,--version", "Print the version and exit", version);
+  const auto asks = [&](const char* letter, const char* name) {
+    const auto end = std::find(arguments.begin(), arguments.end(), "--");
+    return std::any_of(arguments.begin(), end, [&](const auto& word) { return word == letter || word == name; });
+  };
+  if (asks("-h", "--help")) {
+    state.print_help();
+    return false;
+  }
+  if (asks("-V", "--version")) {
+    print_version();
+    return false;
+  }
+  try {
+    state.place(arguments);
+    state.read_config();
+    state.take();
   } catch (const Error& error) {
-    throw error.within(state_->command);
+    if (state.is_program()) throw;
+    throw error.within(state.command);
   }
   return true;
 }
 
-bool CommandLine::given(const std::string& option) const {
-  return state_->app.get_option(option)->count() > 0;
+bool CommandLine::given(const std::string& name) const {
+  const Option* const option = state_->find(name);
+  return option != nullptr && option->origin >= Origin::kSection && option->is_set();
+}
+
+std::string CommandLine::first_given(const std::vector<std::string>& groups) const {
+  for (const Option& option : state_->options) {
+    if (std::find(groups.begin(), groups.end(), option.group) != groups.end() && given(option.name())) {
+      return option.name();
+    }
+  }
+  return {};
 }
 
 void CommandLine::require(const std::string& name, const std::vector<std::string>& values) const {
@@ -353,8 +544,29 @@ void CommandLine::require(const std::string& name, const std::vector<std::string
 
 void CommandLine::require(const std::string& name, const std::string& value) const {
   if (!value.empty()) return;
-  throw Error(ErrorCode::kInvalidArgument, fmt::format("{}: no {} given (usage: isohf {}{} [options])", state_->command,
-                                                       name, state_->command, state_->usage_positionals));
+  fail(fmt::format("no {} given (usage: {}{} [options])", name, state_->invocation(), state_->usage_positionals));
+}
+
+void CommandLine::fail(const std::string& why) const {
+  refuse((state_->is_program() ? "" : state_->command + ": ") + why);
+}
+
+std::vector<DeclaredOption> options_of(const Command& command) {
+  std::vector<DeclaredOption> found;
+  if (command.is_program) return found;
+  std::vector<DeclaredOption>* const before = std::exchange(declared, &found);
+  try {
+    command.run({});
+  } catch (...) {
+    declared = before;
+    throw;
+  }
+  declared = before;
+  return found;
+}
+
+void set_commands(std::span<const Command> commands) {
+  all_commands = commands;
 }
 
 }  // namespace isohf::cli

@@ -2,6 +2,7 @@
 
 #include <functional>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -9,12 +10,23 @@
 
 namespace isohf::cli {
 
-/// The command line of one command: its options, its help, and the parsing of both. The only user of CLI11.
+/// A command of the program.
+struct Command {
+  const char* name;
+  const char* summary;
+  int (*run)(const Arguments& arguments);  ///< parses, which touches no file but --config, and runs. Throws Error
+  bool is_program = false;                 ///< run() becomes a program of its own, whose options are not known here
+};
+
+/// The command line of one command: its options, its help, and the parsing of both.
 ///
 /// Options are listed in --help under the group that was named last, in the order of their declaration. Values arrive
 /// as text; the function that takes one throws Error{kInvalidArgument} with "found ..., must be ...", to which the
-/// option's name is added. An option that is given twice is an error. Every long option may also stand in the --config
-/// file.
+/// option's name, or file and line, are added. An option that is given twice is an error. Every long option may also
+/// stand in the --config file: at its top level, which is for every command that knows the option, or in the command's
+/// own section. A section goes before the top level, and the command line before both.
+///
+/// A program that is named after its command ("isohf-view" for "view") is called without it.
 class CommandLine {
  public:
   using Take = std::function<void(const std::string& text)>;
@@ -53,10 +65,16 @@ class CommandLine {
   /// What --help ends with: examples and notes.
   void footer(const std::string& text);
 
-  /// Parses. False: help was asked for and printed, there is nothing to run. Throws Error{kInvalidArgument}.
+  /// Parses. False: help or the version was asked for and printed, there is nothing to run. Throws
+  /// Error{kInvalidArgument}.
   [[nodiscard]] bool parse(const Arguments& arguments);
-  /// Whether parse() met the long option.
+  /// Whether the long option is on the command line or in the command's own section of the --config file. (The file's
+  /// top level is for all commands: what does not fit one of them there is no mistake.)
   [[nodiscard]] bool given(const std::string& option) const;
+  /// The first option of these groups that is given(); empty where none is.
+  [[nodiscard]] std::string first_given(const std::vector<std::string>& groups) const;
+  /// Throws Error{kInvalidArgument}: the options do not go together.
+  [[noreturn]] void fail(const std::string& why) const;
   /// Throws Error{kInvalidArgument} for a positional that is empty after parsing.
   void require(const std::string& name, const std::string& value) const;
   void require(const std::string& name, const std::vector<std::string>& values) const;
@@ -66,7 +84,17 @@ class CommandLine {
   std::unique_ptr<State> state_;
 };
 
-/// The candidate nearest to `text` by edit distance; empty where none is near.
-[[nodiscard]] std::string nearest_word(const std::string& text, const std::vector<std::string>& candidates);
+/// An option as its command declares it.
+struct DeclaredOption {
+  std::string name;    ///< "--threads"
+  std::string letter;  ///< "-j", or empty
+  std::string group;
+  bool takes_value = false;
+};
+
+/// The options of a command, which declares them and runs no further.
+[[nodiscard]] std::vector<DeclaredOption> options_of(const Command& command);
+/// Names the program's commands, so that an option of another one can be told from one that none knows.
+void set_commands(std::span<const Command> commands);
 
 }  // namespace isohf::cli

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "isohf/base/error.h"
+#include "nearest_word.h"
 
 namespace isohf::cli {
 namespace {
@@ -33,6 +34,14 @@ double parse_number(const std::string& text) {
 double parse_positive_number(const std::string& text) {
   double value = 0.0;
   if (!read_number(text, value) || !std::isfinite(value) || value <= 0.0) refuse(text, "a number greater than 0");
+  return value;
+}
+
+double parse_number_in(const std::string& text, double least, double most) {
+  double value = 0.0;
+  if (!read_number(text, value) || !(value >= least && value <= most)) {
+    refuse(text, fmt::format("a number from {} to {}", least, most));
+  }
   return value;
 }
 
@@ -108,7 +117,7 @@ std::size_t parse_word(const std::string& text, const std::vector<std::string>& 
     if (words[i] == text) return i;
     list += (i == 0 ? "" : i + 1 == words.size() ? " or " : ", ") + words[i];
   }
-  refuse(text, list);
+  refuse(text, list + did_you_mean(text, words));
 }
 
 }  // namespace isohf::cli

@@ -13,6 +13,7 @@ namespace isohf::cli {
 
 [[nodiscard]] double parse_number(const std::string& text);
 [[nodiscard]] double parse_positive_number(const std::string& text);
+[[nodiscard]] double parse_number_in(const std::string& text, double least, double most);
 /// `what` names the thing, for the message: "a whole number from 1 to 1024".
 [[nodiscard]] std::int64_t parse_whole_number(const std::string& text, std::int64_t least, std::int64_t most);
 /// "COLUMNSxROWS", as in 212x243; each part as parse_whole_number.

@@ -32,6 +32,12 @@ const std::string& program_name() {
   return name_of_program();
 }
 
+void print_version() {
+  StandardOutput out;
+  out.write(program_name() + " " ISOHF_VERSION "\n");
+  out.finish();
+}
+
 int run_program(const char* name, int argc, char** argv, int (*body)(const Arguments& arguments)) {
   name_of_program() = name;
   // A closed pipe or a file over its size limit is an error that write() reports, not a reason to die.

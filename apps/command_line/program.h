@@ -21,6 +21,9 @@ enum ExitCode : int {
 /// how messages and help call the program.
 int run_program(const char* name, int argc, char** argv, int (*body)(const Arguments& arguments));
 
+/// "isohf 0.1.0" on standard output.
+void print_version();
+
 /// The name that run_program() was given.
 [[nodiscard]] const std::string& program_name();
 

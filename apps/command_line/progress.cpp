@@ -8,6 +8,7 @@
 #include "describe.h"
 #include "program.h"
 #include "standard_output.h"
+#include "terminal.h"
 
 namespace isohf::cli {
 namespace {
@@ -16,7 +17,7 @@ using std::chrono::milliseconds;
 
 constexpr milliseconds kBarInterval{100};
 constexpr milliseconds kLineInterval{2000};
-constexpr int kBarCells = 24;
+constexpr std::size_t kBarCells = 24;
 
 void write_to_terminal(const std::string& text) {
   // A terminal that has gone away is no reason to stop.
@@ -30,7 +31,7 @@ ProgressDisplay::ProgressDisplay(ProgressMode mode, bool quiet, bool verbose) : 
   if (mode == ProgressMode::kJson) style_ = Style::kJson;
   if (mode == ProgressMode::kPlain) style_ = Style::kLines;
   if (mode == ProgressMode::kAuto) {
-    style_ = ::isatty(STDERR_FILENO) != 0 ? Style::kBar : verbose ? Style::kLines : Style::kNothing;
+    style_ = terminal_columns(STDERR_FILENO) > 0 ? Style::kBar : verbose ? Style::kLines : Style::kNothing;
   }
 }
 
@@ -68,9 +69,14 @@ void ProgressDisplay::update(const std::string& what, const std::string& unit, s
     print_note(program_name() + ": " + text);
     return;
   }
-  const auto cells = static_cast<std::size_t>(part * kBarCells);
-  write_to_terminal(
-      fmt::format("\r[{}{}] {}\x1b[K", std::string(cells, '#'), std::string(kBarCells - cells, '.'), text));
+  // A line that is wider than the terminal cannot be overwritten. The bar gives way before the figures do.
+  const std::size_t columns = terminal_columns(STDERR_FILENO);
+  const std::size_t room = columns > text.size() + 4 ? std::min(columns - text.size() - 4, kBarCells) : 0;
+  const auto cells = static_cast<std::size_t>(part * static_cast<double>(room));
+  if (columns > 0) text.resize(std::min(text.size(), columns - 1));
+  const std::string bar =
+      room == 0 ? "" : fmt::format("[{}{}] ", std::string(cells, '#'), std::string(room - cells, '.'));
+  write_to_terminal(fmt::format("\r{}{}\x1b[K", bar, text));
   bar_is_shown_ = true;
 }
 

@@ -7,18 +7,23 @@
 
 #include "isohf/base/error.h"
 #include "program.h"
+#include "terminal.h"
 
 namespace isohf::cli {
 namespace {
 
 constexpr std::size_t kBufferBytes = 1 << 16;
 
-/// Writes a line in one call, so that lines of two processes do not mix; what cannot be told is not told. Line breaks
-/// and control characters inside become blanks: an error is one line.
-void write_line_to_stderr(std::string line) {
-  for (char& c : line) {
+/// Line breaks and control characters become blanks: an error is one line.
+std::string one_line(std::string text) {
+  for (char& c : text) {
     if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = ' ';
   }
+  return text;
+}
+
+/// Writes a line in one call, so that lines of two processes do not mix; what cannot be told is not told.
+void write_line_to_stderr(std::string line) {
   line += '\n';
   const char* data = line.data();
   std::size_t left = line.size();
@@ -53,13 +58,14 @@ void StandardOutput::flush() {
 }
 
 void print_warning(const std::string& text) {
-  write_line_to_stderr(program_name() + ": warning: " + text);
+  write_line_to_stderr(program_name() + ": " + styled("warning:", Style::kWarning, STDERR_FILENO) + " " +
+                       one_line(text));
 }
 void print_error(const std::string& text) {
-  write_line_to_stderr(program_name() + ": " + text);
+  write_line_to_stderr(styled(program_name() + ":", Style::kError, STDERR_FILENO) + " " + one_line(text));
 }
 void print_note(const std::string& text) {
-  write_line_to_stderr(text);
+  write_line_to_stderr(one_line(text));
 }
 
 }  // namespace isohf::cli

@@ -4,8 +4,7 @@
 
 namespace isohf::cli {
 
-/// A command: parses its arguments, which touches no file but --config, and runs. Throws Error.
-using CommandFunction = int (*)(const Arguments& arguments);
+/// The commands, as Command::run is.
 
 int command_convert(const Arguments& arguments);
 int command_export(const Arguments& arguments);
@@ -16,5 +15,6 @@ int command_restore(const Arguments& arguments);
 int command_sample(const Arguments& arguments);
 int command_shade(const Arguments& arguments);
 int command_verify(const Arguments& arguments);
+int command_view(const Arguments& arguments);
 
 }  // namespace isohf::cli

@@ -42,7 +42,7 @@ struct InfoOptions {
   bool tiles = false;
   OpenOptions open;
   bool stats = false;
-  std::vector<std::string> for_rasters;  ///< options given that only rasters take
+  std::string for_rasters;  ///< an option given that only rasters take
 };
 
 std::optional<InfoOptions> parse(const Arguments& arguments) {
@@ -58,10 +58,7 @@ std::optional<InfoOptions> parse(const Arguments& arguments) {
   line.footer(kFooter);
   if (!line.parse(arguments)) return std::nullopt;
   line.require("INPUT", options.input);
-  if (line.given("--stats")) options.for_rasters.emplace_back("--stats");
-  for (const std::string& option : source_options()) {
-    if (line.given(option)) options.for_rasters.push_back(option);
-  }
+  options.for_rasters = line.given("--stats") ? "--stats" : line.first_given({"Input"});
   return options;
 }
 
@@ -293,7 +290,7 @@ int run(const InfoOptions& options) {
   }
   if (!options.for_rasters.empty()) {
     throw Error(ErrorCode::kInvalidArgument,
-                "info: " + options.for_rasters.front() + " is for rasters, " + options.input + " is an archive");
+                "info: " + options.for_rasters + " is for rasters, " + options.input + " is an archive");
   }
   const ArchiveReader archive(options.input);
   if (!options.common.quiet) {

@@ -59,6 +59,7 @@ std::optional<PlanOptions> parse(const Arguments& arguments) {
   line.repeated("-i,--input", "INPUT", "An input, before those without a name; may be given again",
                 options.inputs.names);
   add_shape_options(line, options.request);
+  line.group("Candidates");
   add_code_type_option(line, options.code_type);
   line.option("--limit", "N", "List at most N candidates (default 10)",
               [&](const std::string& text) { options.limit = static_cast<int>(parse_whole_number(text, 1, 1000000)); });
@@ -74,21 +75,15 @@ std::optional<PlanOptions> parse(const Arguments& arguments) {
   options.inputs.names.insert(options.inputs.names.end(), names.begin(), names.end());
   const auto refuse = [](const std::string& why) { throw Error(ErrorCode::kInvalidArgument, "plan: " + why); };
   if (options.inputs.names.empty()) {
-    std::vector<std::string> for_inputs = {
-        "--density",          "--spacing",   "--tiles",      "--fit",    "--outside", "--overlap",
-        "--require-complete", "--recursive", "--projection", "--wrap-x", "--geoid",   "--bbox"};
-    for_inputs.insert(for_inputs.end(), source_options().begin(), source_options().end());
-    for (const std::string& option : for_inputs) {
-      if (line.given(option)) refuse(option + " needs an INPUT");
-    }
+    const std::string option = line.first_given({"Lattice", "Ground", "Input", "Several inputs"});
+    if (!option.empty()) refuse(option + " needs an INPUT");
   } else if (line.given("--limit")) {
     refuse("--limit is for lists of candidates, without an INPUT");
   }
   if (options.table1) {
     if (!options.inputs.names.empty()) refuse("--table1 takes no INPUT");
-    for (const char* option : {"--shape", "--levels", "--triangles", "--vertices", "--limit"}) {
-      if (line.given(option)) refuse(std::string("--table1 takes no ") + option);
-    }
+    const std::string option = line.given("--limit") ? "--limit" : line.first_given({"Tile shape"});
+    if (!option.empty()) refuse("--table1 takes no " + option);
   }
   return options;
 }

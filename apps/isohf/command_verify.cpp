@@ -91,14 +91,8 @@ std::optional<VerifyCommandOptions> parse(const Arguments& arguments) {
   if (options.list_checks) return options;
   line.require("ARCHIVE", options.archive);
   if (options.against.names.empty()) {
-    std::vector<std::string> for_inputs = {"--random",           "--no-ortho",  "--max-error", "--max-rms", "--overlap",
-                                           "--require-complete", "--recursive", "--geoid",     "--bbox"};
-    for_inputs.insert(for_inputs.end(), source_options().begin(), source_options().end());
-    for (const std::string& option : for_inputs) {
-      if (line.given(option)) {
-        throw Error(ErrorCode::kInvalidArgument, "verify: " + option + " needs --against INPUT");
-      }
-    }
+    const std::string option = line.first_given({"Comparison", "Ground", "Input", "Several inputs"});
+    if (!option.empty()) throw Error(ErrorCode::kInvalidArgument, "verify: " + option + " needs --against INPUT");
   }
   return options;
 }

@@ -3,7 +3,9 @@
 #include <fmt/core.h>
 #include <malloc.h>
 
+#include <algorithm>
 #include <cstdlib>
+#include <initializer_list>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -11,18 +13,13 @@
 #include "command.h"
 #include "command_line.h"
 #include "formats/registry.h"
+#include "help_page.h"
 #include "isohf/base/error.h"
 #include "isohf/base/simd.h"
-#include "standard_output.h"
+#include "nearest_word.h"
 
 namespace isohf::cli {
 namespace {
-
-struct Command {
-  const char* name;
-  const char* summary;
-  CommandFunction run;
-};
 
 constexpr Command kCommands[] = {
     {"plan", "List tile shapes, or what convert would make of an input", command_plan},
@@ -33,64 +30,81 @@ constexpr Command kCommands[] = {
     {"export", "Write the surface as a raster of any grid, whole or cut into tiles", command_export},
     {"sample", "Print elevation and normal at places", command_sample},
     {"shade", "Draw a picture of the surface with its shadows", command_shade},
+    {"view", "Fly over an archive in a window, or draw it without one", command_view},
     {"formats", "List what can be read and written", command_formats},
     {"experiment", "Measure iso and ortho meshes against sine waves, as the paper does",
-     [](const Arguments& arguments) -> int { become_program("isohf-experiment", arguments); }},
+     [](const Arguments& arguments) -> int { become_program("isohf-experiment", arguments); }, true},
 };
 
-constexpr const char* kVersion = "isohf " ISOHF_VERSION "\n";
+constexpr const char* kSummary =
+    "Turns rasters of elevations (GeoTIFF, OpenEXR, PNG, SRTM .hgt, ...) into archives of isometric heightfield tiles, "
+    "and reads, checks and measures such archives.";
 
-constexpr const char* kUsage = R"(Usage: isohf COMMAND [arguments] [options]
+constexpr const char* kNotes = R"(Results go to standard output, everything else to standard error.
 
-Turns rasters of elevations (GeoTIFF, OpenEXR, PNG, SRTM .hgt, ...) into archives of isometric heightfield
-tiles, and reads, checks and measures such archives.
-
-Commands:
-)";
-
-constexpr const char* kAfterCommands = R"(
-Common options, after the command:
-  -h, --help          The command's arguments, options, defaults and examples
-      --json          One JSON document on standard output instead of text
-  -q, --quiet         Print nothing but errors
-  -v, --verbose       Say more on standard error
-      --config FILE   Read options from a TOML or INI file: one 'long-option = value' a line
-Of commands that take a while:
-  -j, --threads N     Threads (default: all cores); the result does not depend on it
-      --progress MODE auto, plain, json or none; on standard error
-Of commands that write a file:
-      --overwrite     Replace the output where it exists
-Of convert:
-      --resume        Continue an interrupted run
-      --memory SIZE   Stay within that much, as in 400M
-Alone:
-      --version       Print the version
+Exit codes: 0 done, 1 failed, 2 wrong usage, 3 verify or restore found differences, 130 interrupted.
 
 ISOHF_MODULE_PATH names the folder of the OpenImageIO and PROJ modules (default: beside the program, then ../lib/isohf).
 ISOHF_SIMD=off runs the plain twins of vectorised code: slower, and the same bytes.
-
-Results go to standard output, everything else to standard error.
-Exit codes: 0 done, 1 failed, 2 wrong usage, 3 verify or restore found differences, 130 interrupted.
+NO_COLOR turns colours off, CLICOLOR_FORCE=1 keeps them in pipes.
 
 Examples:
   isohf plan                              list tile shapes
-  isohf plan dem.tif                      what convert would do, without doing it
+  isohf plan dem.tif                      preview what convert would do
   isohf convert dem.tif dem.isohf
   isohf verify dem.isohf --against dem.tif
   isohf restore dem.isohf back.tif
   echo "1200.5 340" | isohf sample dem.isohf
-)";
+  isohf help convert)";
 
 void print_usage() {
-  StandardOutput out;
-  out.write(kUsage);
-  for (const Command& command : kCommands) {
-    std::string name = std::string("  ") + command.name;
-    name.resize(14, ' ');
-    out.write(name + command.summary + "\n");
+  HelpPage page;
+  page.text(kSummary);
+  page.usage("isohf COMMAND [arguments] [options]");
+  page.heading("Commands:");
+  for (const Command& command : kCommands) page.row(command.name, command.summary);
+  page.heading("Common options:");
+  page.row("-h, --help", "Print the arguments, options, defaults and examples of a command");
+  page.row("-V, --version", "Print the version");
+  page.row("    --json", "Print one JSON document on standard output instead of text");
+  page.row("-q, --quiet", "Print nothing but errors");
+  page.row("-v, --verbose", "Say more on standard error");
+  page.row("    --config FILE", "Read options from a TOML file");
+  page.text(kNotes);
+  page.print();
+}
+
+bool is_one_of(const std::string& word, std::initializer_list<const char*> words) {
+  return std::find(words.begin(), words.end(), word) != words.end();
+}
+
+/// Takes the common options that stand before the command; they go behind it.
+Arguments take_leading(Arguments& arguments) {
+  Arguments leading;
+  const std::vector<DeclaredOption> known = options_of(kCommands[0]);
+  while (!arguments.empty() && arguments.front().size() > 1 && arguments.front().front() == '-' &&
+         !is_one_of(arguments.front(), {"-h", "--help", "-V", "--version"})) {
+    const std::string& argument = arguments.front();
+    const std::string name = argument.substr(0, argument[1] == '-' ? argument.find('=') : 2);
+    std::vector<std::string> names = {"--help", "--version"};
+    const DeclaredOption* found = nullptr;
+    for (const DeclaredOption& option : known) {
+      if (option.group != "Common") continue;
+      names.push_back(option.name);
+      if (option.name == name || option.letter == name) found = &option;
+    }
+    if (found == nullptr) {
+      const std::string near = did_you_mean(name, names);
+      throw Error(ErrorCode::kInvalidArgument,
+                  fmt::format("found {} before the command{} (isohf --help)", name,
+                              near.empty() ? "; only common options may stand there, others follow it" : near));
+    }
+    const bool has_value = found->takes_value && name == argument && arguments.size() > 1;
+    const auto end = arguments.begin() + (has_value ? 2 : 1);
+    leading.insert(leading.end(), arguments.begin(), end);
+    arguments.erase(arguments.begin(), end);
   }
-  out.write(kAfterCommands);
-  out.finish();
+  return leading;
 }
 
 /// Keeps freed memory in the process. Tiles come and go by the thousand, a few hundred kilobytes each; the system would
@@ -118,40 +132,33 @@ int run(const Arguments& given) {
   keep_freed_memory();
   if (const char* folder = std::getenv("ISOHF_MODULE_PATH"); folder != nullptr) set_module_folder(folder);
   choose_simd(std::getenv("ISOHF_SIMD"));
+  set_commands(kCommands);
   Arguments arguments = given;
+  const Arguments leading = take_leading(arguments);
   if (arguments.empty()) {
     throw Error(ErrorCode::kInvalidArgument, "no command given (isohf --help lists the commands)");
   }
-  std::string name = arguments.front();
-  arguments.erase(arguments.begin());
-  if (name == "--version" || name == "version") {
-    StandardOutput out;
-    out.write(kVersion);
-    out.finish();
+  if (is_one_of(arguments.front(), {"-V", "--version", "version"})) {
+    print_version();
     return kExitDone;
   }
-  if (name == "--help" || name == "-h" || name == "help") {
-    if (name == "help" && !arguments.empty()) {
-      name = arguments.front();
-      arguments = {"--help"};
-    } else {
+  if (is_one_of(arguments.front(), {"-h", "--help", "help"})) {
+    if (arguments.size() == 1 || arguments[1].starts_with("-")) {
       print_usage();
       return kExitDone;
     }
+    arguments = {arguments[1], "--help"};
   }
-  std::vector<std::string> names;
+  const std::string name = arguments.front();
+  arguments.erase(arguments.begin());
+  arguments.insert(arguments.begin(), leading.begin(), leading.end());
+  std::vector<std::string> names = {"help"};
   for (const Command& command : kCommands) {
     if (name == command.name) return command.run(arguments);
     names.emplace_back(command.name);
   }
-  if (name.starts_with("-")) {
-    throw Error(ErrorCode::kInvalidArgument,
-                "found " + name + " where a command is required; options follow the command (isohf --help)");
-  }
-  const std::string near = nearest_word(name, names);
-  throw Error(ErrorCode::kInvalidArgument, "unknown command '" + name + "'" +
-                                               (near.empty() ? "" : "; did you mean " + near + "?") +
-                                               " (isohf --help lists the commands)");
+  throw Error(ErrorCode::kInvalidArgument,
+              fmt::format("unknown command '{}'{} (isohf --help lists the commands)", name, did_you_mean(name, names)));
 }
 
 }  // namespace

@@ -70,11 +70,4 @@ std::unique_ptr<HeightSource> open_input(const std::string& path, const OpenOpti
   return with_voids_treated(open_source(path, options), options.voids);
 }
 
-const std::vector<std::string>& source_options() {
-  static const std::vector<std::string> names = {"--channel", "--part", "--encoding",      "--registration",
-                                                 "--nodata",  "--fill", "--fill-distance", "--valid-range",
-                                                 "--z-scale", "--raw",  "--z-offset",      "--sample-spacing"};
-  return names;
-}
-
 }  // namespace isohf::cli

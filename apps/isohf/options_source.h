@@ -2,21 +2,18 @@
 
 #include <memory>
 #include <string>
-#include <vector>
 
 #include "command_line.h"
 #include "formats/registry.h"
 
 namespace isohf::cli {
 
-/// What a user may say about an input: --channel, --part, --encoding, --registration, --nodata, --valid-range, --fill,
+/// The group "Input", what a user may say about an input: --channel, --part, --encoding, --registration, --nodata,
+/// --valid-range, --fill,
 /// --fill-distance, --z-scale, --z-offset, --raw, --sample-spacing.
 void add_source_options(CommandLine& line, OpenOptions& options);
 
 /// Opens the input with all of them: its voids are treated as options.voids says.
 [[nodiscard]] std::unique_ptr<HeightSource> open_input(const std::string& path, const OpenOptions& options);
-
-/// The names of these options.
-[[nodiscard]] const std::vector<std::string>& source_options();
 
 }  // namespace isohf::cli

@@ -71,7 +71,7 @@ std::optional<ExperimentCommandOptions> parse(const Arguments& arguments) {
               options.folder);
   line.flag("--overwrite", "Replace files of DIR that exist", options.overwrite);
   line.flag("--quick", "A subset of the waves, in seconds", options.quick);
-  line.option("--triangles", "LIST", "Triangle counts (default 1000,2000,5000,10000)",
+  line.option("--triangles", "N,...", "Triangle counts (default 1000,2000,5000,10000)",
               [&](const std::string& text) { options.triangles = parse_counts(text); });
   line.option("--nyquist-triangles", "N", "Triangles whose square grid has its Nyquist frequency at 1 (default 5000)",
               [&](const std::string& text) { options.nyquist_triangles = parse_whole_number(text, 500, 1'000'000); });

@@ -5,11 +5,14 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <nlohmann/json.hpp>
 #include <numeric>
+#include <optional>
 
 #include "flight_path.h"
 #include "isohf/base/error.h"
 #include "offscreen.h"
+#include "print_result.h"
 #include "process_memory.h"
 #include "session.h"
 #include "static_mesh.h"
@@ -18,6 +21,8 @@
 
 namespace isohf::view {
 namespace {
+
+using nlohmann::ordered_json;
 
 double milliseconds_since(std::chrono::steady_clock::time_point begin) {
   return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
@@ -40,31 +45,76 @@ double mib(std::uint64_t bytes) {
   return static_cast<double>(bytes) / (1 << 20);
 }
 
-void print_flight(const FlightTotals& totals, const Options& options) {
+/// What a flight's figures come down to.
+struct FlightSummary {
+  std::size_t frames = 0;
+  double mean_ms = 0.0;
+  double median_ms = 0.0;
+  double percentile_99_ms = 0.0;
+  double worst_ms = 0.0;
+  double triangles_per_second = 0.0;
+  double update_mean_ms = 0.0;
+  double update_worst_ms = 0.0;
+};
+
+FlightSummary summary_of(const FlightTotals& totals) {
   std::vector<double> sorted = totals.frame_ms;
   std::sort(sorted.begin(), sorted.end());
-  double sum = 0.0;
-  for (const double ms : sorted) sum += ms;
-  const auto at = [&](double share) {
-    return sorted[static_cast<std::size_t>(share * static_cast<double>(sorted.size() - 1))];
-  };
-  fmt::print("frames: {}, ms: mean {:.2f}, median {:.2f}, 99 % {:.2f}, worst {:.2f}\n", sorted.size(),
-             sum / static_cast<double>(sorted.size()), at(0.5), at(0.99), sorted.back());
-  fmt::print("triangles: {} a frame, {:.2f} million a second\n",
-             grouped(totals.triangles / static_cast<std::int64_t>(sorted.size())),
-             static_cast<double>(totals.triangles) / sum / 1e3);
-  fmt::print("tile memory: at most {:.1f} MiB, bound {} MiB; uploaded {:.1f} MiB\n", mib(totals.most_bytes),
-             options.memory_mib, mib(totals.upload_bytes));
-  fmt::print("update(), all that a frame does for paging: ms: mean {:.3f}, worst {:.3f}\n",
-             std::accumulate(totals.update_ms.begin(), totals.update_ms.end(), 0.0) /
-                 static_cast<double>(totals.update_ms.size()),
-             *std::max_element(totals.update_ms.begin(), totals.update_ms.end()));
-  fmt::print(
-      "process: {:.1f} MiB of its own before the first tile, {:.1f} MiB at most; peak with mapped files {:.1f} MiB\n",
-      mib(totals.anonymous_before), mib(totals.most_anonymous), mib(process_memory().peak));
-  fmt::print("frames with more than 2 draw calls a visible tile and pass: {}\n", totals.over_two_calls);
-  fmt::print("tiles in view that were not there yet, a frame: {:.2f}\n",
-             static_cast<double>(totals.absent) / static_cast<double>(sorted.size()));
+  const auto frames = static_cast<double>(sorted.size());
+  const auto at = [&](double share) { return sorted[static_cast<std::size_t>(share * (frames - 1.0))]; };
+  const auto sum_of = [](const std::vector<double>& ms) { return std::accumulate(ms.begin(), ms.end(), 0.0); };
+  const double sum_ms = sum_of(sorted);
+  return {.frames = sorted.size(),
+          .mean_ms = sum_ms / frames,
+          .median_ms = at(0.5),
+          .percentile_99_ms = at(0.99),
+          .worst_ms = sorted.back(),
+          .triangles_per_second = static_cast<double>(totals.triangles) / sum_ms * 1e3,
+          .update_mean_ms = sum_of(totals.update_ms) / frames,
+          .update_worst_ms = *std::max_element(totals.update_ms.begin(), totals.update_ms.end())};
+}
+
+std::string text_from(const FlightTotals& totals, const Options& options) {
+  const FlightSummary summary = summary_of(totals);
+  const auto frames = static_cast<std::int64_t>(summary.frames);
+  return fmt::format(
+             "frames: {}, ms: mean {:.2f}, median {:.2f}, 99 % {:.2f}, worst {:.2f}\n"
+             "triangles: {} a frame, {:.2f} million a second\n",
+             frames, summary.mean_ms, summary.median_ms, summary.percentile_99_ms, summary.worst_ms,
+             grouped(totals.triangles / frames), summary.triangles_per_second / 1e6) +
+         fmt::format(
+             "tile memory: at most {:.1f} MiB, bound {} MiB; uploaded {:.1f} MiB\n"
+             "update(), all that a frame does for paging: ms: mean {:.3f}, worst {:.3f}\n",
+             mib(totals.most_bytes), options.memory_mib, mib(totals.upload_bytes), summary.update_mean_ms,
+             summary.update_worst_ms) +
+         fmt::format(
+             "process: {:.1f} MiB of its own before the first tile, {:.1f} MiB at most; peak with mapped files {:.1f} "
+             "MiB\n"
+             "frames with more than 2 draw calls a visible tile and pass: {}\n"
+             "tiles in view that were not there yet, a frame: {:.2f}\n",
+             mib(totals.anonymous_before), mib(totals.most_anonymous), mib(process_memory().peak),
+             totals.over_two_calls, static_cast<double>(totals.absent) / static_cast<double>(frames));
+}
+
+ordered_json json_from(const FlightTotals& totals, const Options& options) {
+  const FlightSummary summary = summary_of(totals);
+  return {{"archive", options.archive},
+          {"frames", summary.frames},
+          {"mean_ms", summary.mean_ms},
+          {"median_ms", summary.median_ms},
+          {"percentile_99_ms", summary.percentile_99_ms},
+          {"worst_ms", summary.worst_ms},
+          {"triangles", totals.triangles},
+          {"triangles_per_second", summary.triangles_per_second},
+          {"tile_memory_bytes", totals.most_bytes},
+          {"tile_memory_bound_bytes", options.memory_mib << 20},
+          {"uploaded_bytes", totals.upload_bytes},
+          {"update_mean_ms", summary.update_mean_ms},
+          {"update_worst_ms", summary.update_worst_ms},
+          {"process_before_bytes", totals.anonymous_before},
+          {"process_most_bytes", totals.most_anonymous},
+          {"frames_over_two_draw_calls", totals.over_two_calls},
+          {"absent_tiles", totals.absent}};
 }
 
 /// Frame times along the flight, a few frames a point, as SVG.
@@ -98,28 +148,46 @@ std::string plot_of(const FlightTotals& totals, const std::string& title) {
   return chart::line_chart(drawing, chart::Scale::kLogarithmic);
 }
 
-/// The rasteriser's limit, at a few places along the flight.
-void print_baseline(Session& session, const std::function<void(double)>& stand, const FlightPath& path) {
-  constexpr int kPlaces = 5;
+/// The rasteriser's limit, the sum over a few places along the flight.
+constexpr int kBaselinePlaces = 5;
+
+MeshSpeed baseline_of(Session& session, const std::function<void(double)>& stand, const FlightPath& path) {
   MeshSpeed sum;
   const auto add = [](MeshSpeed::Time& total, const MeshSpeed::Time& time) {
     total.wall_ms += time.wall_ms;
     total.processor_ms += time.processor_ms;
   };
-  for (int i = 0; i < kPlaces; ++i) {
-    stand(path.begin_s() + (path.end_s() - path.begin_s()) * (i + 0.5) / kPlaces);
+  for (int i = 0; i < kBaselinePlaces; ++i) {
+    stand(path.begin_s() + (path.end_s() - path.begin_s()) * (i + 0.5) / kBaselinePlaces);
     const MeshSpeed here = measure_static_mesh(session);
     sum.triangles += here.triangles;
     add(sum.ours, here.ours);
     add(sum.plain, here.plain);
   }
-  fmt::print("standing at {} places: {} triangles a frame\n", kPlaces, grouped(sum.triangles / kPlaces));
-  const auto print = [&](const char* name, const MeshSpeed::Time& time) {
-    fmt::print("  {} {:.2f} ms, {:.2f} million triangles a second; processor {:.2f} ms\n", name, time.wall_ms / kPlaces,
-               static_cast<double>(sum.triangles) / time.wall_ms / 1e3, time.processor_ms / kPlaces);
+  return sum;
+}
+
+std::string text_from(const MeshSpeed& sum) {
+  std::string text = fmt::format("standing at {} places: {} triangles a frame\n", kBaselinePlaces,
+                                 grouped(sum.triangles / kBaselinePlaces));
+  const auto add = [&](const char* name, const MeshSpeed::Time& time) {
+    text += fmt::format("  {} {:.2f} ms, {:.2f} million triangles a second; processor {:.2f} ms\n", name,
+                        time.wall_ms / kBaselinePlaces, static_cast<double>(sum.triangles) / time.wall_ms / 1e3,
+                        time.processor_ms / kBaselinePlaces);
   };
-  print("isohf-view:", sum.ours);
-  print("the same as a plain static mesh:", sum.plain);
+  add("isohf-view:", sum.ours);
+  add("the same as a plain static mesh:", sum.plain);
+  return text;
+}
+
+ordered_json json_from(const MeshSpeed& sum) {
+  const auto json = [](const MeshSpeed::Time& time) -> ordered_json {
+    return {{"wall_ms", time.wall_ms / kBaselinePlaces}, {"processor_ms", time.processor_ms / kBaselinePlaces}};
+  };
+  return {{"places", kBaselinePlaces},
+          {"triangles", sum.triangles / kBaselinePlaces},
+          {"isohf_view", json(sum.ours)},
+          {"static_mesh", json(sum.plain)}};
 }
 
 }  // namespace
@@ -183,10 +251,13 @@ void fly(const TileSource& source, const Options& options, const std::function<v
   plot.line(plot_of(totals, fmt::format("Flight over {} tiles, {} x {} pixels", source.grid().tile_count(),
                                         options.view.width, options.view.height)));
   plot.close();
-  print_flight(totals, options);
-  if (options.baseline) {
-    print_baseline(session, stand, path);
-  }
+  std::optional<MeshSpeed> baseline;
+  if (options.baseline) baseline = baseline_of(session, stand, path);
+  print_result(options.common, text_from(totals, options) + (baseline ? text_from(*baseline) : ""), [&] {
+    ordered_json document = json_from(totals, options);
+    if (baseline) document["baseline"] = json_from(*baseline);
+    return document;
+  });
 }
 
 }  // namespace isohf::view

@@ -1,178 +1,212 @@
 #include "options.h"
 
-#include <CLI/CLI.hpp>
 #include <array>
-#include <map>
+#include <cmath>
 #include <vector>
 
-#ifndef ISOHF_VERSION
-#define ISOHF_VERSION "0"
-#endif
+#include "isohf/base/error.h"
+#include "option_values.h"
 
 namespace isohf::view {
 namespace {
 
-constexpr const char* kDescription =
-    "View an isometric heightfield archive, or draw and check it without a screen.\n"
-    "Without --screenshot, --flight, --verify or --sweep a window opens.";
+using cli::CommandLine;
 
 constexpr const char* kFooter =
-    "Axes: x eastwards, y up, z southwards, world units of the archive, from its North-West corner.\n"
-    "Shadows need an archive with shadow seeds (isohf convert --shadow-seeds). They are those of light along the "
-    "rows,\n"
-    "from East or West: at azimuth 90 or 270 exactly the sun's, as isohf shade draws them. At other azimuths they are\n"
-    "those of the sun as it is seen in that plane, whose elevation has the tangent tan(elevation) / |sin(azimuth)|; a\n"
-    "sun due North or South casts none.\n"
-    "Memory: tiles and textures on the GPU and on their way there never take more than --memory MiB together, in an\n"
-    "archive with textures a third for tiles and two thirds for textures. Where the far distance would need more, it\n"
-    "is shortened and the figures say so; textures get coarser. Besides: the shared vertex and index arrays\n"
-    "(some bytes a vertex of one tile), the picture, and the memory-mapped archive.\n"
-    "Float archives are rounded for viewing to 65535 steps between their lowest and highest elevation.\n"
-    "Flight file: one line a place, 'seconds x y z look_x look_y look_z', # begins a comment; places are joined by\n"
-    "smooth curves.\n"
-    "Exit codes: 0 done, 1 failed, 2 usage, 3 --verify found differences, 130 interrupted.";
+    R"(Without --screenshot, --flight, --verify or --sweep a window opens; H shows its keys.
 
-Vec3 vec3_from(const std::vector<double>& values) {
-  return {values[0], values[1], values[2]};
+Positions are world units of the archive from its North-West corner: x eastwards, y up, z southwards.
+
+Shadows need an archive with shadow seeds (isohf convert --shadow-seeds). They follow light along the rows, from East or
+West: at azimuth 90 or 270 they are exactly the sun's, as isohf shade draws them. At other azimuths they are those of the
+sun as seen in that plane, whose elevation has the tangent tan(elevation) / |sin(azimuth)|; a sun due North or South casts
+none.
+
+Tiles and textures on the GPU and on their way there never take more than --memory together; in an archive with
+textures, a third goes to tiles and two thirds to textures. Where the far distance would need more, it is shortened and
+the figures say so; textures get coarser. The shared vertex and index arrays, the picture and the memory-mapped archive
+come on top. Float archives are rounded for viewing to 65535 steps between their lowest and highest elevation.
+
+A flight file holds one place a line, 'seconds x y z look_x look_y look_z'; # begins a comment. Smooth curves join the
+places.
+
+Exit codes: 0 done, 1 failed, 2 wrong usage, 3 --verify found differences, 130 interrupted.
+
+Examples:
+  isohf-view dem.isohf
+  isohf-view dem.isohf --screenshot view.png --sun 110,20 --exaggeration 1.5
+  isohf-view dem.isohf --flight path.txt --frames 600 --csv frames.csv
+  isohf-view dem.isohf --verify)";
+
+[[noreturn]] void refuse(const std::string& text, const std::string& required) {
+  throw Error(ErrorCode::kInvalidArgument, "found '" + text + "', must be " + required);
 }
 
-const std::map<std::string, ColourMode>& modes() {
-  static const std::map<std::string, ColourMode> kModes{
-      {"elevation", ColourMode::kElevation}, {"plain", ColourMode::kPlain},     {"levels", ColourMode::kLevels},
-      {"strips", ColourMode::kStrips},       {"texture", ColourMode::kTexture}, {"normals", ColourMode::kNormals}};
-  return kModes;
+/// "X,Y,Z", each as in a list of numbers.
+template <std::size_t N>
+std::array<double, N> parse_tuple(const std::string& text, const std::string& form) {
+  const std::vector<double> numbers = cli::parse_numbers(text);
+  if (numbers.size() != N) refuse(text, form);
+  std::array<double, N> tuple{};
+  for (std::size_t i = 0; i < N; ++i) {
+    if (!std::isfinite(numbers[i])) refuse(text, form);
+    tuple[i] = numbers[i];
+  }
+  return tuple;
 }
 
-/// Numbers as CLI11 collects them, before they become options.
-struct Raw {
-  std::vector<double> position;
-  std::vector<double> look_at;
-  std::vector<double> sun;
-  std::string size = "1280x720";
-  double fov_deg = 50.0;
-  std::vector<double> level;
-  double far_distance = 0.0;
-  double exaggeration = 1.0;
-  std::string shadows;
-  double shadow_softness = 0.0;
-};
-
-void add_picture_options(CLI::App& app, Options& options, Raw& raw) {
-  app.add_option("--size", raw.size, "Picture or window size in pixels, WIDTHxHEIGHT")->capture_default_str();
-  app.add_option("--position", raw.position, "Where the eye is: X,Y,Z")->delimiter(',')->expected(3);
-  app.add_option("--look-at", raw.look_at, "What it looks at: X,Y,Z")->delimiter(',')->expected(3);
-  app.add_flag("--fly", options.fly, "Begin with the fly camera rather than the orbit camera");
-  app.add_option("--sun", raw.sun, "AZIMUTH,ELEVATION in degrees, clockwise from North, above the horizon")
-      ->delimiter(',')
-      ->expected(2);
-  app.add_option("--shadows", raw.shadows, "Cast shadows, on or off; default: on where the archive has shadow seeds")
-      ->check(CLI::IsMember({"on", "off"}));
-  app.add_option("--shadow-softness", raw.shadow_softness,
-                 "The sun's apparent size at the caster's distance, world units; default: 2, or 0.5 % of the range of "
-                 "heights where that is less")
-      ->check(CLI::PositiveNumber);
-  app.add_option(
-         "--exaggeration", raw.exaggeration,
-         "Vertical exaggeration; default: 1, or less where the ground's unit is not known and heights would tower "
-         "over it")
-      ->check(CLI::PositiveNumber);
-  app.add_option("--mode", options.view.mode,
-                 "Colours; default: texture where the archive has textures, else elevation")
-      ->transform(CLI::CheckedTransformer(modes()));
-  app.add_option("--level", raw.level,
-                 "Draw every tile at this level of detail, fractional; two levels A,B: like a chessboard")
-      ->delimiter(',')
-      ->expected(1, 2)
-      ->check(CLI::Range(0.0, 12.0));
-  app.add_option("--triangle-size", options.view.triangle_px,
-                 "Area that triangles are meant to have, pixels: more is coarser and faster")
-      ->check(CLI::Range(0.01, 1e6))
-      ->capture_default_str();
-  app.add_option("--fov", raw.fov_deg, "Vertical field of view, degrees")
-      ->check(CLI::Range(1.0, 150.0))
-      ->capture_default_str();
-  app.add_option("--far", raw.far_distance, "Far distance, world units; default: all of the heightfield")
-      ->check(CLI::PositiveNumber);
-  app.add_flag("--wireframe", options.view.wireframe, "Draw the triangles' sides");
-  app.add_flag("--borders", options.view.borders, "Draw the tiles' borders");
-  app.add_flag("!--no-haze", options.view.haze, "No haze towards the far distance");
-  app.add_flag("--beyond", options.view.beyond, "Show tiles beyond the source's edge as well");
-  app.add_flag("!--no-overlay", options.overlay, "No figures on the picture");
-  app.add_flag("--switch", options.view.plain_switching, "Switch levels of detail at once instead of fading");
+Vec3 parse_place(const std::string& text) {
+  const auto [x, y, z] = parse_tuple<3>(text, "X,Y,Z, three numbers");
+  return {x, y, z};
 }
 
-bool parse_size(const std::string& text, ViewState& view) {
-  char rest = 0;
-  return std::sscanf(text.c_str(), "%dx%d%c", &view.width, &view.height, &rest) == 2 && view.width >= 16 &&
-         view.height >= 16 && view.width <= 16384 && view.height <= 16384;
+std::uint64_t parse_mebibytes(const std::string& text) {
+  const std::uint64_t bytes = cli::parse_bytes(text);
+  if (bytes < 1 << 20) refuse(text, "at least 1M: without a letter it counts bytes");
+  return bytes >> 20;
+}
+
+CommandLine::Take name_ending_with(const char* ending, std::string& name) {
+  return [ending, &name](const std::string& text) {
+    if (!text.ends_with(ending)) refuse(text, std::string("a file name that ends with ") + ending);
+    name = text;
+  };
+}
+
+void add_actions(CommandLine& line, Options& options, bool& window, bool& verify, bool& sweep) {
+  line.group("Actions");
+  line.option("--screenshot", "FILE.png", "Write a picture and end", name_ending_with(".png", options.screenshot));
+  line.option("--flight", "FILE", "Fly along the path in FILE without a screen and print figures", options.flight);
+  line.flag("--verify", "Check that archive, index arrays and shaders agree with the library", verify);
+  line.flag("--sweep", "Go from level 0 to 2 in small steps and measure how the picture changes", sweep);
+  line.flag("--window", "Open a window even with --screenshot, which then shows the window", window);
+  line.exclusive({"--screenshot", "--flight", "--verify", "--sweep"});
+  line.exclusive({"--window", "--flight", "--verify", "--sweep"});
+  line.option(
+      "--frames", "N", "Draw N frames of the flight (default 300), or close the window after N",
+      [&](const std::string& text) { options.frames = static_cast<int>(cli::parse_whole_number(text, 1, 10000000)); });
+  line.option("--steps", "N", "Sweep in N steps (default 80)", [&](const std::string& text) {
+    options.sweep_steps = static_cast<int>(cli::parse_whole_number(text, 4, 10000));
+  });
+  line.option("--csv", "FILE", "Write figures of each frame of the flight or step of the sweep", options.csv);
+  line.option("--plot", "FILE.svg", "Write a chart of the flight's frame times",
+              name_ending_with(".svg", options.plot));
+  line.flag("--baseline", "Measure a plain static mesh of the same triangles after the flight", options.baseline);
+  line.flag("--overwrite", "Replace files that exist", options.overwrite);
+}
+
+void add_light(CommandLine& line, Options& options) {
+  line.group("Light");
+  line.option("--sun", "AZIMUTH,ELEVATION", "Degrees, clockwise from North and above the horizon (default 300,35)",
+              [&](const std::string& text) {
+                const auto [azimuth, elevation] = parse_tuple<2>(text, "AZIMUTH,ELEVATION, two numbers");
+                options.sun_azimuth_deg = azimuth;
+                options.sun_elevation_deg = elevation;
+              });
+  line.option("--shadows", "on|off", "Draw cast shadows (default: on where the archive has shadow seeds)",
+              [&](const std::string& text) {
+                options.shadows = cli::parse_word(text, {"on", "off"}) == 0;
+              });
+  line.option("--shadow-softness", "K",
+              "Apparent size of the sun at the caster's distance, world units (default: 2, or 0.5 % of the range of "
+              "heights where that is less)",
+              [&](const std::string& text) { options.shadow_softness = cli::parse_positive_number(text); });
+}
+
+void add_picture(CommandLine& line, Options& options) {
+  line.group("Picture");
+  line.option("--size", "WxH", "Pixels of the picture or window (default 1280x720)", [&](const std::string& text) {
+    const auto [width, height] = cli::parse_size(text, 16, 16384);
+    options.view.width = static_cast<int>(width);
+    options.view.height = static_cast<int>(height);
+  });
+  line.option("--position", "X,Y,Z", "Put the eye there",
+              [&](const std::string& text) { options.position = parse_place(text); });
+  line.option("--look-at", "X,Y,Z", "Look there",
+              [&](const std::string& text) { options.look_at = parse_place(text); });
+  line.flag("--fly", "Begin with the fly camera rather than the orbit camera", options.fly);
+  line.option("--fov", "DEG", "Vertical field of view, 1 to 150 (default 50)", [&](const std::string& text) {
+    options.view.fov_y_rad = cli::parse_number_in(text, 1.0, 150.0) * std::acos(-1.0) / 180.0;
+  });
+  line.option("--far", "D", "Draw as far as D world units (default: all of the heightfield)",
+              [&](const std::string& text) { options.far_distance = cli::parse_positive_number(text); });
+  line.option("--exaggeration", "F",
+              "Draw heights F times as high (default 1, or less where the ground's unit is not known and heights would "
+              "tower over it)",
+              [&](const std::string& text) { options.exaggeration = cli::parse_positive_number(text); });
+  line.option("--mode", "NAME",
+              "Colour by elevation, plain, levels, strips, texture or normals (default: texture where the archive has "
+              "textures, else elevation)",
+              [&](const std::string& text) {
+                constexpr ColourMode kModes[] = {ColourMode::kElevation, ColourMode::kPlain,   ColourMode::kLevels,
+                                                 ColourMode::kStrips,    ColourMode::kTexture, ColourMode::kNormals};
+                options.view.mode =
+                    kModes[cli::parse_word(text, {"elevation", "plain", "levels", "strips", "texture", "normals"})];
+                options.mode_given = true;
+              });
+  line.option("--level", "L[,L2]",
+              "Draw every tile at this level of detail, 0 to 12, fractional; two levels alternate like a chessboard",
+              [&](const std::string& text) {
+                const std::vector<double> levels = cli::parse_numbers(text);
+                const auto is_level = [](double level) { return level >= 0.0 && level <= 12.0; };
+                if (levels.size() > 2 || !is_level(levels.front()) || !is_level(levels.back())) {
+                  refuse(text, "one or two numbers from 0 to 12");
+                }
+                options.view.fixed_level = levels.front();
+                if (levels.size() == 2) options.view.other_level = levels.back();
+              });
+  line.option("--triangle-size", "A", "Draw triangles of about A square pixels (default 4): more is coarser and faster",
+              [&](const std::string& text) { options.view.triangle_px = cli::parse_number_in(text, 0.01, 1e6); });
+  line.flag("--wireframe", "Draw the triangles' sides", options.view.wireframe);
+  line.flag("--borders", "Draw the tiles' borders", options.view.borders);
+  line.flag("--beyond", "Show tiles beyond the source's edge as well", options.view.beyond);
+  line.flag("--switch", "Switch levels of detail at once instead of fading", options.view.plain_switching);
 }
 
 }  // namespace
 
-ParsedOptions parse_options(int argc, char** argv) {
+std::optional<Options> parse_options(const cli::Arguments& arguments) {
   Options options;
-  Raw raw;
-  CLI::App app(kDescription, "isohf-view");
-  app.footer(kFooter);
-  app.set_version_flag("--version", std::string("isohf-view ") + ISOHF_VERSION);
-  app.add_option("archive", options.archive, "Archive to view")->required();
-  auto* screenshot = app.add_option("--screenshot", options.screenshot, "Write a picture, PNG, and end");
-  auto* flight = app.add_option("--flight", options.flight, "Fly along a path without a screen");
-  app.add_option("--frames", options.frames, "Frames of the flight (300), or after which the window closes")
-      ->check(CLI::Range(1, 10000000));
-  app.add_option("--csv", options.csv, "Write figures of each frame of the flight or step of the sweep");
-  app.add_option("--plot", options.plot, "Write a chart of the flight's frame times, SVG")->needs(flight);
-  app.add_flag("--baseline", options.baseline, "After the flight, measure a plain static mesh of the same triangles");
-  bool verify = false;
-  app.add_flag("--verify", verify, "Check that archive, index arrays and shaders agree with the library");
-  bool sweep = false;
-  app.add_flag("--sweep", sweep, "Go from level 0 to 2 in small steps and measure how the picture changes");
-  app.add_option("--steps", options.sweep_steps, "Steps of the sweep")
-      ->check(CLI::Range(4, 10000))
-      ->capture_default_str();
   bool window = false;
-  app.add_flag("--window", window, "Open a window even with --screenshot, which then shows the window");
-  app.add_option("--memory", options.memory_mib, "Bound of the memory that tiles take, MiB")
-      ->check(CLI::Range(1, 1 << 20))
-      ->capture_default_str();
-  app.add_option("--upload", options.upload_mib, "Most that goes to the GPU in one frame, MiB")
-      ->check(CLI::Range(1, 1024))
-      ->capture_default_str();
-  app.add_option("-j,--threads", options.threads, "Threads that decode tiles; default: one less than there are cores")
-      ->check(CLI::Range(1, 256));
-  add_picture_options(app, options, raw);
-  try {
-    app.parse(argc, argv);
-    if (!parse_size(raw.size, options.view)) {
-      throw CLI::ValidationError("--size", "'" + raw.size + "' is not WIDTHxHEIGHT, each 16 to 16384");
-    }
-    const int actions = (flight->count() > 0) + verify + sweep + (screenshot->count() > 0 && !window);
-    if (actions > 1 || (window && actions > 0)) {
-      throw CLI::ValidationError("--screenshot, --flight, --verify, --sweep, --window", "only one of them at a time");
-    }
-  } catch (const CLI::ParseError& error) {
-    const int code = app.exit(error);
-    return {std::nullopt, code == 0 ? 0 : 2};
-  }
-  options.mode_given = app.count("--mode") > 0;
-  if (!raw.level.empty()) options.view.fixed_level = raw.level[0];
-  if (raw.level.size() > 1) options.view.other_level = raw.level[1];
-  if (app.count("--far") > 0) options.far_distance = raw.far_distance;
-  if (app.count("--exaggeration") > 0) options.exaggeration = raw.exaggeration;
-  if (!raw.shadows.empty()) options.shadows = raw.shadows == "on";
-  if (app.count("--shadow-softness") > 0) options.shadow_softness = raw.shadow_softness;
-  if (!raw.position.empty()) options.position = vec3_from(raw.position);
-  if (!raw.look_at.empty()) options.look_at = vec3_from(raw.look_at);
-  if (!raw.sun.empty()) {
-    options.sun_azimuth_deg = raw.sun[0];
-    options.sun_elevation_deg = raw.sun[1];
-  }
-  options.view.fov_y_rad = raw.fov_deg * std::acos(-1.0) / 180.0;
-  if (screenshot->count() > 0 && !window) options.action = Options::Action::kScreenshot;
-  if (flight->count() > 0) options.action = Options::Action::kFlight;
+  bool verify = false;
+  bool sweep = false;
+  bool no_haze = false;
+  bool no_overlay = false;
+  CommandLine line("view", "Views an archive of an isometric heightfield, or draws and checks it without a screen.");
+  line.group("Arguments");
+  line.positional("ARCHIVE", "-i,--input", "Archive to view", options.archive);
+  add_actions(line, options, window, verify, sweep);
+  add_picture(line, options);
+  line.flag("--no-haze", "Leave out the haze towards the far distance", no_haze);
+  line.flag("--no-overlay", "Leave out the figures on the picture", no_overlay);
+  add_light(line, options);
+  line.group("Work");
+  line.option(
+      "-j,--threads", "N", "Decode tiles with N threads, 1 to 256 (default: one less than there are cores)",
+      [&](const std::string& text) { options.threads = static_cast<int>(cli::parse_whole_number(text, 1, 256)); });
+  line.option("--memory", "SIZE", "Hold tiles and textures in SIZE of memory (default 512M); as in 400M or 1.5GiB",
+              [&](const std::string& text) { options.memory_mib = parse_mebibytes(text); });
+  line.option("--upload", "SIZE", "Send at most SIZE to the GPU in one frame (default 4M)",
+              [&](const std::string& text) { options.upload_mib = parse_mebibytes(text); });
+  cli::add_common_options(line, options.common);
+  line.footer(kFooter);
+  if (!line.parse(arguments)) return std::nullopt;
+  line.require("ARCHIVE", options.archive);
+  const auto needs = [&](const char* option, bool is_met, const char* needed) {
+    if (line.given(option) && !is_met) line.fail(std::string(option) + " needs " + needed);
+  };
+  const bool flies = !options.flight.empty();
+  needs("--plot", flies, "--flight");
+  needs("--baseline", flies, "--flight");
+  needs("--csv", flies || sweep, "--flight or --sweep");
+  needs("--steps", sweep, "--sweep");
+  options.view.haze = !no_haze;
+  options.overlay = !no_overlay;
+  if (!options.screenshot.empty() && !window) options.action = Options::Action::kScreenshot;
+  if (flies) options.action = Options::Action::kFlight;
   if (verify) options.action = Options::Action::kVerify;
   if (sweep) options.action = Options::Action::kSweep;
-  return {options, 0};
+  return options;
 }
 
 }  // namespace isohf::view

@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 
+#include "options_common.h"
 #include "view_state.h"
 
 namespace isohf::view {
@@ -13,6 +14,7 @@ struct Options {
   enum class Action { kWindow, kScreenshot, kFlight, kVerify, kSweep };
 
   Action action = Action::kWindow;
+  cli::CommonOptions common;
   std::string archive;
   std::string screenshot;  ///< PNG to write; with kWindow: of the window, after `frames` frames
   std::string flight;
@@ -21,6 +23,7 @@ struct Options {
   int frames = 0;  ///< 0: window: until closed; flight: 300
   int sweep_steps = 80;
   bool baseline = false;
+  bool overwrite = false;
   bool overlay = true;           ///< figures on the screen
   std::optional<Vec3> position;  ///< world units, y before exaggeration
   std::optional<Vec3> look_at;
@@ -38,11 +41,7 @@ struct Options {
   ViewState view;   ///< size, mode, level, field of view, switches
 };
 
-/// Outcome of parsing: options, or the exit code of --help, --version or a usage error (already printed).
-struct ParsedOptions {
-  std::optional<Options> options;
-  int exit_code = 0;
-};
-[[nodiscard]] ParsedOptions parse_options(int argc, char** argv);
+/// nullopt: help or the version was asked for and printed. Throws Error{kInvalidArgument}.
+[[nodiscard]] std::optional<Options> parse_options(const cli::Arguments& arguments);
 
 }  // namespace isohf::view

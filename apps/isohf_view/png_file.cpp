@@ -3,6 +3,7 @@
 #include <png.h>
 
 #include <cerrno>
+#include <cstdio>
 #include <cstring>
 #include <vector>
 
@@ -19,10 +20,13 @@ void write_png(const std::string& path, int width, int height, std::span<const s
   image.width = static_cast<png_uint_32>(width);
   image.height = static_cast<png_uint_32>(height);
   image.format = PNG_FORMAT_RGB;
+  const std::string part = path + ".part";
   errno = 0;
-  if (png_image_write_to_file(&image, path.c_str(), 0, rgb.data(), 0, nullptr) == 0) {
+  if (png_image_write_to_file(&image, part.c_str(), 0, rgb.data(), 0, nullptr) == 0 ||
+      std::rename(part.c_str(), path.c_str()) != 0) {
     const std::string reason = errno != 0 ? std::strerror(errno) : image.message;
     png_image_free(&image);
+    std::remove(part.c_str());
     throw Error(ErrorCode::kIo, path + ": could not be written: " + reason);
   }
 }

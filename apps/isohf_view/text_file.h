@@ -9,16 +9,19 @@
 
 namespace isohf::view {
 
-/// A text file that is checked to the last byte; with an empty path nothing is written. Throws Error{kIo}.
+/// A text file that is checked to the last byte and has its name once it is complete: NAME.part until then. With an
+/// empty path nothing is written. Throws Error{kIo}.
 class TextFile {
  public:
   explicit TextFile(const std::string& path) : path_(path) {
     if (path.empty()) return;
-    file_ = std::fopen(path.c_str(), "w");
+    file_ = std::fopen(part().c_str(), "w");
     if (file_ == nullptr) fail();
   }
   ~TextFile() {
-    if (file_ != nullptr) std::fclose(file_);
+    if (file_ == nullptr) return;
+    std::fclose(file_);
+    std::remove(part().c_str());
   }
   TextFile(const TextFile&) = delete;
   TextFile& operator=(const TextFile&) = delete;
@@ -31,10 +34,11 @@ class TextFile {
     if (file_ == nullptr) return;
     std::FILE* file = file_;
     file_ = nullptr;
-    if (std::fclose(file) != 0) fail();
+    if (std::fclose(file) != 0 || std::rename(part().c_str(), path_.c_str()) != 0) fail();
   }
 
  private:
+  [[nodiscard]] std::string part() const { return path_ + ".part"; }
   [[noreturn]] void fail() const {
     throw Error(ErrorCode::kIo, path_ + ": could not be written: " + std::strerror(errno));
   }

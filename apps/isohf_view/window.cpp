@@ -9,7 +9,6 @@
 #include <array>
 #include <chrono>
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -19,6 +18,7 @@
 #include "offscreen.h"
 #include "png_file.h"
 #include "session.h"
+#include "standard_output.h"
 
 namespace isohf::view {
 namespace {
@@ -243,7 +243,7 @@ void run_window(const TileSource& source, const Options& options) {
       controls.wants_picture = false;
       const std::string name = next_picture_name();
       save_picture(session.view, name);
-      std::fprintf(stderr, "isohf-view: wrote %s\n", name.c_str());
+      if (!options.common.quiet) cli::print_note("isohf-view: wrote " + name);
     }
     glfwSwapBuffers(window.get());
     if (is_last) break;

@@ -46,10 +46,27 @@ TEST(Usage, HelpListsEveryCommandAndTheExitCodes) {
   }
 }
 
-TEST(Usage, VersionIsOneLine) {
-  const RunResult result = run_isohf({"--version"});
-  EXPECT_EQ(result.exit_code, 0);
-  EXPECT_TRUE(std::regex_match(result.out, std::regex("isohf [0-9]+\\.[0-9]+\\.[0-9]+\n"))) << result.out;
+TEST(Usage, VersionIsOneLineEverywhere) {
+  for (const std::vector<std::string>& arguments : std::vector<std::vector<std::string>>{
+           {"--version"}, {"-V"}, {"info", "-V"}, {"convert", "a.tif", "--version"}}) {
+    const RunResult result = run_isohf(arguments);
+    EXPECT_EQ(result.exit_code, 0);
+    EXPECT_EQ(result.err, "");
+    EXPECT_TRUE(std::regex_match(result.out, std::regex("isohf [0-9]+\\.[0-9]+\\.[0-9]+\n"))) << result.out;
+  }
+}
+
+TEST(Usage, CommonOptionsMayStandBeforeTheCommand) {
+  const TemporaryFolder folder;
+  EXPECT_EQ(run_isohf({"--json", "formats"}).out, run_isohf({"formats", "--json"}).out);
+  EXPECT_EQ(run_isohf({"-q", "-v", "formats"}).out, "");
+  EXPECT_EQ(run_isohf({"-q", "--help"}).out, run_isohf({"--help"}).out);
+  write_file(folder / "options.toml", "json = true\n");
+  EXPECT_THAT(run_isohf({"--config", folder / "options.toml", "formats"}).out, testing::StartsWith("{"));
+  EXPECT_THAT(run_isohf({"--config=" + (folder / "options.toml"), "formats"}).out, testing::StartsWith("{"));
+  expect_usage_error({"--jsn", "info", "a.isohf"}, "found --jsn before the command; did you mean --json?");
+  expect_usage_error({"--density", "1", "convert"}, "found --density before the command; only common options");
+  expect_usage_error({"-q"}, "no command given");
 }
 
 TEST(Usage, EveryCommandHasHelpWithExamplesAndNoLineIsTooLong) {
@@ -120,7 +137,6 @@ TEST(Usage, NearestCommandAndOptionAreNamed) {
   expect_usage_error({"plna"}, "unknown command 'plna'; did you mean plan?");
   expect_usage_error({"conv"}, "did you mean convert?");
   expect_usage_error({"xyzzy"}, "unknown command 'xyzzy' (");
-  expect_usage_error({"--json", "info", "a.isohf"}, "found --json where a command is required");
   expect_usage_error({"convert", "--densty", "1", "a.tif", "b.isohf"},
                      "unknown option --densty; did you mean --density?");
   expect_usage_error({"convert", "--densty=1", "a.tif", "b.isohf"}, "did you mean --density?");
@@ -211,23 +227,6 @@ TEST(Usage, OptionsThatContradictEachOtherAreRefused) {
   expect_usage_error({"plan", "--density", "1"}, "--density needs an INPUT");
   expect_usage_error({"plan", "--table1", "--levels", "3"}, "--table1 takes no --levels");
   expect_usage_error({"verify", "a", "--max-error", "1"}, "--max-error needs --against");
-}
-
-TEST(Usage, ConfigFileGivesOptionsAndTheCommandLineWins) {
-  const TemporaryFolder folder;
-  write_file(folder / "options.toml", "limit = 3\nlevels = 2\n");
-  const auto lines = [](const RunResult& result) { return std::count(result.out.begin(), result.out.end(), '\n'); };
-  const RunResult three = run_isohf({"plan", "--config", folder / "options.toml"});
-  const RunResult one = run_isohf({"plan", "--config", folder / "options.toml", "--limit", "1"});
-  EXPECT_EQ(three.exit_code, 0) << three.err;
-  EXPECT_EQ(lines(three), lines(one) + 2);
-  write_file(folder / "flags.toml", "# a comment\njson = true\nshape = \"212x243\"\n");
-  EXPECT_THAT(run_isohf({"plan", "--config", folder / "flags.toml"}).out, testing::StartsWith("{"));
-  write_file(folder / "bad.toml", "limitt = 3\n");
-  expect_usage_error({"plan", "--config", folder / "bad.toml"}, "--config: no option is named limitt");
-  write_file(folder / "bad2.toml", "limit = many\n");
-  expect_usage_error({"plan", "--config", folder / "bad2.toml"}, "--limit: found 'many', must be a whole number");
-  expect_usage_error({"plan", "--config", folder / "missing.toml"}, "missing.toml");
 }
 
 /// What TAB offers after the program's name and `words`, the last of which is begun.
