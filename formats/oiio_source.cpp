@@ -1,11 +1,11 @@
 #include "formats/oiio_source.h"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <sstream>
 
+#include "formats/foreign_file.h"
 #include "formats/libraries.h"
 #include "formats/oiio_loader.h"
 #include "formats/open_options.h"
@@ -16,12 +16,13 @@
 namespace isohf {
 namespace {
 
-[[noreturn]] void refuse_unknown(const std::string& path, const char* why) {
-  std::string names;
-  for (const Format& format : native_formats()) {
-    names += fmt::format("{}{} ({})", names.empty() ? "" : ", ", format.name, fmt::join(format.extensions, " "));
-  }
-  throw Error(ErrorCode::kUnsupported, fmt::format("{}: unknown format; read natively: {}; {}", path, names, why));
+/// `why` says what is missing where the module would have been asked.
+[[noreturn]] void refuse_unknown(const std::string& path, const std::string& why = {}) {
+  const ForeignFile found = foreign_file(path);
+  std::string text = path + ": unknown format";
+  if (!found.is.empty()) text += ": this is " + found.is;
+  text += found.help.empty() ? "; isohf formats lists what is read" : "; " + found.help;
+  throw Error(ErrorCode::kUnsupported, why.empty() || !found.help.empty() ? text : text + " (" + why + ")");
 }
 
 class OiioSource final : public HeightSource {
@@ -30,7 +31,7 @@ class OiioSource final : public HeightSource {
     IsohfOiioInfo found{};
     IsohfOiioMessage message{};
     const int result = module_.open(path.c_str(), options.channel.c_str(), &raster_, &found, &message);
-    if (result == ISOHF_OIIO_UNKNOWN) refuse_unknown(path, "OpenImageIO does not know it either");
+    if (result == ISOHF_OIIO_UNKNOWN) refuse_unknown(path);
     if (result != 0) throw Error(module_error_code(result), fmt::format("{}: {}", path, message.text));
     info_.path = path;
     info_.format = found.format;

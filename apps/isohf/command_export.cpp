@@ -17,6 +17,7 @@
 #include "interrupt.h"
 #include "isohf/base/error.h"
 #include "json_output.h"
+#include "open_archive.h"
 #include "option_values.h"
 #include "options_common.h"
 #include "options_raster.h"
@@ -276,7 +277,7 @@ class Exporter {
 };
 
 int run(const ExportOptions& options) {
-  const ArchiveReader archive(options.raster.archive);
+  const ArchiveReader archive = open_archive(options.raster.archive);
   const ExportGrid grid = asked_grid(options, archive.metadata());
   for (const std::string& file : ExportTiles(options.raster.output, grid.cut, grid.samples.width).names()) {
     check_output_file(options.raster.archive, file, options.raster.overwrite);

@@ -15,6 +15,7 @@
 #include "isohf/base/error.h"
 #include "isohf/restore/lossless.h"
 #include "json_output.h"
+#include "open_archive.h"
 #include "options_common.h"
 #include "options_source.h"
 #include "options_texture.h"
@@ -292,7 +293,7 @@ int run(const InfoOptions& options) {
     throw Error(ErrorCode::kInvalidArgument,
                 "info: " + options.for_rasters + " is for rasters, " + options.input + " is an archive");
   }
-  const ArchiveReader archive(options.input);
+  const ArchiveReader archive = open_archive(options.input);
   if (!options.common.quiet) {
     for (const std::string& warning : archive.warnings()) print_warning(warning);
   }

@@ -20,6 +20,7 @@
 #include "isohf/restore/archive_geometry.h"
 #include "isohf/restore/lossless.h"
 #include "json_output.h"
+#include "open_archive.h"
 #include "option_values.h"
 #include "options_common.h"
 #include "options_raster.h"
@@ -234,7 +235,7 @@ class Restorer {
 int run(const RestoreOptions& options) {
   check_output_file(options.raster.archive, options.raster.output, options.raster.overwrite);
   WorkArena arena(options.work.threads);
-  const ArchiveReader archive(options.raster.archive);
+  const ArchiveReader archive = open_archive(options.raster.archive);
   const bool wants_source =
       options.like.empty() && !options.raster.size && !options.raster.spacing && !options.raster.method;
   const std::optional<LosslessRecord> record = wants_source ? lossless_record(archive.metadata()) : std::nullopt;

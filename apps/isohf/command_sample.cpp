@@ -14,6 +14,7 @@
 #include "isohf/surface/normals.h"
 #include "json_output.h"
 #include "line_reader.h"
+#include "open_archive.h"
 #include "option_values.h"
 #include "options_common.h"
 #include "standard_output.h"
@@ -154,7 +155,7 @@ std::string json_from(const Sample& sample, WorldPoint place) {
 }
 
 int run(const SampleOptions& options) {
-  const ArchiveReader archive(options.archive);
+  const ArchiveReader archive = open_archive(options.archive);
   if (!options.common.quiet) {
     for (const std::string& warning : archive.warnings()) print_warning(warning);
   }

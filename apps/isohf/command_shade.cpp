@@ -16,6 +16,7 @@
 #include "isohf/base/error.h"
 #include "isohf/restore/archive_geometry.h"
 #include "json_output.h"
+#include "open_archive.h"
 #include "option_values.h"
 #include "options_common.h"
 #include "output_file.h"
@@ -176,7 +177,7 @@ int run(ShadeOptions options) {
   const auto start = std::chrono::steady_clock::now();
   const CommonOptions& common = options.common;
   check_output_file(options.archive, options.output, options.overwrite);
-  const ArchiveReader archive(options.archive);
+  const ArchiveReader archive = open_archive(options.archive);
   if (!common.quiet) {
     for (const std::string& warning : archive.warnings()) print_warning(warning);
   }

@@ -15,6 +15,7 @@
 #include "isohf/verify/findings.h"
 #include "isohf/verify/verify.h"
 #include "json_output.h"
+#include "open_archive.h"
 #include "option_values.h"
 #include "options_common.h"
 #include "options_ground.h"
@@ -176,7 +177,7 @@ VerifyReport check(const VerifyCommandOptions& options, const std::atomic<bool>&
 
 Accuracy compare(const VerifyCommandOptions& options, const std::atomic<bool>& cancel) {
   OpenOptions open = options.open;
-  const Metadata metadata = ArchiveReader(options.archive).metadata();
+  const Metadata metadata = open_archive(options.archive).metadata();
   const SourceRecord& record = metadata.source;
   if (open.channel.empty()) open.channel = record.channel;
   if (open.void_values.empty() && !record.mosaic) open.void_values = record.void_values;

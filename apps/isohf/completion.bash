@@ -1,20 +1,25 @@
-# bash completion for isohf. Commands and options are read from the program's own --help; only the values of a few options
-# are listed here.
+# bash completion for isohf and isohf-view. Commands and options are read from the programs' own --help; only the values of
+# a few options are listed here.
 _isohf() {
   local current=${COMP_WORDS[COMP_CWORD]} previous=${COMP_WORDS[COMP_CWORD - 1]} program=${COMP_WORDS[0]}
-  local command='' i
-  for ((i = 1; i < COMP_CWORD; ++i)); do
-    [[ ${COMP_WORDS[i]} == -* ]] || { command=${COMP_WORDS[i]}; break; }
-  done
+  local command='' help i
+  if [[ ${program##*/} == isohf-view ]]; then
+    command=view
+    help=$(NO_COLOR=1 "$program" --help 2>/dev/null)
+  else
+    for ((i = 1; i < COMP_CWORD; ++i)); do
+      [[ ${COMP_WORDS[i]} == --config ]] && { ((++i)); continue; }
+      [[ ${COMP_WORDS[i]} == -* || ${COMP_WORDS[i]} == help ]] || { command=${COMP_WORDS[i]}; break; }
+    done
+    help=$(NO_COLOR=1 "$program" $command --help 2>/dev/null)
+  fi
   COMPREPLY=()
-  if [[ -z $command ]]; then
+  if [[ -z $command && $current != -* && $previous != --config ]]; then
     local commands
-    commands=$("$program" --help 2>/dev/null | sed -n '/^Commands:/,/^$/s/^  \([a-z][a-z-]*\) .*/\1/p')
-    mapfile -t COMPREPLY < <(compgen -W "$commands help --help --version" -- "$current")
+    commands=$(sed -n '/^Commands:/,/^$/s/^  \([a-z][a-z-]*\) .*/\1/p' <<<"$help")
+    mapfile -t COMPREPLY < <(compgen -W "$commands help" -- "$current")
     return
   fi
-  local help
-  help=$("$program" "$command" --help 2>/dev/null)
   if [[ $current == -* ]]; then
     local options
     options=$(sed -n 's/^ \{2,6\}\(-[A-Za-z], \)\{0,1\}\(--[a-z][a-z0-9-]*\).*/\2/p' <<<"$help")
@@ -27,6 +32,7 @@ _isohf() {
     *' --acquisition') values='point box tent gaussian: fir:' ;;
     *' --overlap') values='last first' ;;
     *' --outside') values='cover clamp void' ;;
+    'export --type') values='u8 u16 i16 i32 f16 f32 f64' ;;
     *' --type') values='u16 u8 f32' ;;
     *' --encoding') values='terrarium mapbox rgba-float' ;;
     *' --registration') values='area point auto' ;;
@@ -37,6 +43,8 @@ _isohf() {
     *' --palette') values='elevation gray' ;;
     'experiment --fit') values='least-squares interpolate' ;;
     *' --texture-format') values='png jpeg' ;;
+    'view --mode') values='elevation plain levels strips texture normals' ;;
+    'view --shadows') values='on off' ;;
   esac
   if [[ -n $values ]]; then
     mapfile -t COMPREPLY < <(compgen -W "$values" -- "$current")
@@ -45,4 +53,4 @@ _isohf() {
     mapfile -t COMPREPLY < <(compgen -f -- "$current")
   fi
 }
-complete -F _isohf isohf
+complete -F _isohf isohf isohf-view

@@ -15,8 +15,8 @@ namespace {
 
 using testing::HasSubstr;
 
-const std::vector<std::string> kCommands = {"plan",   "convert", "info",  "verify",  "restore",
-                                            "export", "sample",  "shade", "formats", "experiment"};
+const std::vector<std::string> kCommands = {"plan",   "convert", "info", "verify",  "restore",   "export",
+                                            "sample", "shade",   "view", "formats", "experiment"};
 
 std::set<std::string> long_options_in(const std::string& text) {
   std::set<std::string> found;
@@ -240,6 +240,11 @@ TEST(Usage, BashCompletesCommandsAndOptions) {
   EXPECT_EQ(completions_of(" co", 1), "convert\n");
   EXPECT_EQ(completions_of(" convert --dens", 2), "--density\n");
   EXPECT_EQ(completions_of(" sample --a", 2), "--at --at-lonlat\n");
+  EXPECT_EQ(completions_of(" --js", 1), "--json\n");
+  EXPECT_EQ(completions_of(" --json co", 2), "convert\n");
+  EXPECT_EQ(completions_of(" --config my.toml co", 3), "convert\n");
+  EXPECT_EQ(completions_of(" help co", 2), "convert\n");
+  EXPECT_EQ(completions_of(" view --mode t", 3), "texture\n");
 }
 
 TEST(Usage, BashCompletesEveryCommandOptionAndWord) {

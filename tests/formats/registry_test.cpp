@@ -55,18 +55,37 @@ TEST(OpenSource, ReportsAFileThatMayNotBeRead) {
   EXPECT_THAT(refusal(path).what(), HasSubstr("cannot be opened: Permission denied"));
 }
 
-TEST(OpenSource, ListsWhatIsReadWhenTheFormatIsUnknown) {
+TEST(OpenSource, SaysThatTextIsNoRaster) {
   const TemporaryFolder folder;
   for (const char* name : {"notes.txt", "no_extension", "wrong.exr"}) {
     const std::string path = folder / name;
     write_file(path, "this is no raster");
     const Error error = refusal(path);
     EXPECT_EQ(error.code(), ErrorCode::kUnsupported);
-    EXPECT_THAT(error.what(), HasSubstr("unknown format"));
-    EXPECT_THAT(error.what(), HasSubstr("OpenEXR (.exr)"));
+    EXPECT_THAT(error.what(), HasSubstr(": unknown format: this is text; isohf formats lists what is read"));
     // This program has no module beside it.
     EXPECT_THAT(error.what(), HasSubstr("need the OpenImageIO module isohf_oiio.so"));
     EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos);
+  }
+}
+
+TEST(OpenSource, NamesForeignFilesAndTheCommandThatHelps) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "file.tif";
+  const std::pair<std::string, std::string> cases[] = {
+      {"%PDF-1.4\n", "this is a PDF document; isohf formats lists what is read"},
+      {"LASF\x01\x02", "this is a LAS point cloud; PDAL grids it: pdal translate " + path},
+      {std::string("PK\x03\x04") + std::string(26, '\0') + "isohf.json", "an isohf archive; isohf restore " + path},
+      {std::string("PK\x03\x04") + std::string(40, '\0'), "this is a ZIP file; unzip it first"},
+      {"\x89HDF\r\n", "this is an HDF5 or NetCDF file; gdal_translate " + path + " OUT.tif makes a GeoTIFF of it"},
+      {std::string("\x01\x02\x03", 3), "unknown format; isohf formats lists what is read"}};
+  for (const auto& [content, message] : cases) {
+    write_file(path, content);
+    const Error error = refusal(path);
+    EXPECT_EQ(error.code(), ErrorCode::kUnsupported);
+    EXPECT_THAT(error.what(), HasSubstr(message));
+    EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos);
+    EXPECT_LT(std::string(error.what()).size(), path.size() * 2 + 400);
   }
 }
 

@@ -27,7 +27,7 @@ class ProgramFixture : public GlTest {
     return run_program(command);
   }
   [[nodiscard]] std::string picture(const std::vector<std::string>& options) const {
-    std::vector<std::string> all{"--screenshot", folder_ / "a.png", "--size", "200x150"};
+    std::vector<std::string> all{"--screenshot", folder_ / "a.png", "--overwrite", "--size", "200x150"};
     all.insert(all.end(), options.begin(), options.end());
     const RunResult result = view(all);
     EXPECT_EQ(result.exit_code, 0) << result.err;

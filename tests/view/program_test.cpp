@@ -84,7 +84,7 @@ TEST_F(ViewProgramTest, DrawsArchivesThatAreVoidOrOneTile) {
     for (const std::string& action :
          {"--screenshot " + path("a.png"), std::string("--verify"), std::string("--sweep --steps 4"),
           "--frames 3 --baseline --plot " + path("a.svg") + " --flight " + path("path.txt")}) {
-      const Outcome outcome = run(path(archive) + " --size 100x80 " + action);
+      const Outcome outcome = run(path(archive) + " --size 100x80 --overwrite " + action);
       EXPECT_EQ(outcome.exit_code, 0) << archive << " " << action << "\n" << outcome.out << outcome.err;
       EXPECT_EQ(outcome.err, "") << archive << " " << action;
       EXPECT_EQ(outcome.out.find("nan"), std::string::npos) << outcome.out;
@@ -103,7 +103,7 @@ TEST_F(ViewProgramTest, GrowsNoMoreThanItsMemoryBound) {
   test::write_file(path("up.txt"), "0 1000 200 9000  1001 99000 9000\n9 30000 200 9000  30001 99000 9000\n");
   const auto grown_mib = [&](int bound_mib) {
     const Outcome outcome = run(path("wide.isohf") + " --size 64x48 --far 9000 --frames 300 --flight " +
-                                path("up.txt") + " --memory " + std::to_string(bound_mib) + " --upload 1");
+                                path("up.txt") + " --memory " + std::to_string(bound_mib) + "M --upload 1M");
     EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
     double before = 0.0;
     double most = 0.0;
@@ -140,7 +140,7 @@ TEST_F(ViewProgramTest, RefusesInOneLine) {
   EXPECT_EQ(outcome.exit_code, 1);
   EXPECT_TRUE(one_line(outcome)) << outcome.err;
   outcome = run(path("good.isohf") + " --level 9 --screenshot " + path("no.png"));
-  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_EQ(outcome.exit_code, 2);
   EXPECT_TRUE(one_line(outcome)) << outcome.err;
   // The driver is told to offer no more than OpenGL 2.1.
   outcome = run(path("good.isohf") + " --verify", "MESA_GL_VERSION_OVERRIDE=2.1");
@@ -153,15 +153,81 @@ TEST_F(ViewProgramTest, RefusesInOneLine) {
   EXPECT_TRUE(one_line(outcome)) << outcome.err;
 }
 
-TEST_F(ViewProgramTest, RefusesBadUsage) {
-  EXPECT_EQ(run("").exit_code, 2);
-  EXPECT_EQ(run(path("good.isohf") + " --size 3x").exit_code, 2);
-  EXPECT_EQ(run(path("good.isohf") + " --verify --sweep").exit_code, 2);
-  EXPECT_EQ(run(path("good.isohf") + " --mode puce").exit_code, 2);
-  EXPECT_EQ(run(path("good.isohf") + " --sun 3").exit_code, 2);
+TEST_F(ViewProgramTest, RefusesBadUsageInTheWordsOfIsohf) {
+  const auto refused = [&](const std::string& arguments, const std::string& message) {
+    const Outcome outcome = run(arguments);
+    EXPECT_EQ(outcome.exit_code, 2) << arguments;
+    EXPECT_EQ(outcome.out, "");
+    EXPECT_EQ(outcome.err.rfind("isohf-view: " + message, 0), 0U) << outcome.err;
+    EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
+  };
+  const std::string good = path("good.isohf");
+  refused("", "no ARCHIVE given (usage: isohf-view ARCHIVE [options])");
+  refused(good + " --size 3x", "--size: found '3x', must be COLUMNSxROWS");
+  refused(good + " --verify --sweep", "--verify excludes --sweep");
+  refused(good + " --mode textures", "--mode: found 'textures', must be elevation, ");
+  refused(good + " --sun 3", "--sun: found '3', must be AZIMUTH,ELEVATION");
+  refused(good + " --memory 512", "--memory: found '512', must be at least 1M");
+  refused(good + " --screenshot a.jpg", "--screenshot: found 'a.jpg', must be a file name that ends with .png");
+  refused(good + " --csv a.csv", "--csv needs --flight or --sweep");
+  refused(good + " --verfy", "unknown option --verfy; did you mean --verify?");
+  refused(good + " --config " + path("none.toml"), "--config: " + path("none.toml") + ": No such file");
+}
+
+TEST_F(ViewProgramTest, HelpAndVersionAreThoseOfEveryCommand) {
   const Outcome help = run("--help");
   EXPECT_EQ(help.exit_code, 0);
-  EXPECT_NE(help.out.find("never take more than --memory MiB"), std::string::npos);
+  EXPECT_NE(help.out.find("Usage: isohf-view ARCHIVE [options]\n"), std::string::npos);
+  EXPECT_NE(help.out.find("\nCommon:\n"), std::string::npos);
+  EXPECT_EQ(run("-V").out.rfind("isohf-view ", 0), 0U);
+}
+
+TEST_F(ViewProgramTest, ReplacesFilesOnlyWhenTold) {
+  const std::string shot = path("good.isohf") + " --size 64x48 --screenshot " + path("kept.png");
+  test::write_file(path("kept.png"), "mine");
+  const Outcome refused = run(shot);
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_EQ(text("kept.png"), "mine");
+  EXPECT_NE(refused.err.find("kept.png: exists"), std::string::npos) << refused.err;
+  EXPECT_EQ(run(shot + " --overwrite").exit_code, 0);
+  EXPECT_TRUE(is_png("kept.png"));
+}
+
+TEST_F(ViewProgramTest, PrintsJsonOrNothing) {
+  const std::string good = path("good.isohf");
+  const Outcome verified = run(good + " --verify --json");
+  EXPECT_EQ(verified.out.rfind("{\n  \"archive\": ", 0), 0U) << verified.out;
+  EXPECT_NE(verified.out.find("\"passed\": true"), std::string::npos);
+  const Outcome drawn = run(good + " --json --size 64x48 --screenshot " + path("json.png"));
+  EXPECT_NE(drawn.out.find("\"width\": 64"), std::string::npos) << drawn.out;
+  EXPECT_EQ(run(good + " --verify -q").out, "");
+  EXPECT_NE(run(good + " --sweep --steps 4 --size 64x48 --json").out.find("\"fading\""), std::string::npos);
+}
+
+TEST_F(ViewProgramTest, ReadsItsPartOfAConfigFileForAllCommands) {
+  test::write_file(path("all.toml"),
+                   "quiet = true\ndensity = 0.5\n[convert]\nlevel = 3\n[view]\nsize = \"64x48\"\nquiet = false\n"
+                   "json = true\nposition = [480, 300, 900]\n");
+  const Outcome drawn =
+      run(path("good.isohf") + " --config " + path("all.toml") + " --screenshot " + path("config.png"));
+  EXPECT_EQ(drawn.exit_code, 0) << drawn.err;
+  EXPECT_NE(drawn.out.find("\"width\": 64"), std::string::npos) << drawn.out;
+  test::write_file(path("wrong.toml"), "[view]\nsiez = \"64x48\"\n");
+  const Outcome wrong = run(path("good.isohf") + " --config " + path("wrong.toml"));
+  EXPECT_EQ(wrong.exit_code, 2);
+  EXPECT_NE(wrong.err.find("wrong.toml:2: view has no option 'siez'; did you mean size?"), std::string::npos)
+      << wrong.err;
+}
+
+TEST_F(ViewProgramTest, IsStartedByIsohfView) {
+  const Outcome drawn =
+      test::run_isohf({"view", path("good.isohf"), "--size", "64x48", "--screenshot", path("view.png"), "--json"});
+  EXPECT_EQ(drawn.exit_code, 0) << drawn.err;
+  EXPECT_TRUE(is_png("view.png"));
+  EXPECT_EQ(test::run_isohf({"-q", "view", path("good.isohf"), "--verify"}).out, "");
+  const Outcome refused = test::run_isohf({"view", path("good.isohf"), "--mode", "puce"});
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_EQ(refused.err.rfind("isohf: view: --mode: found 'puce'", 0), 0U) << refused.err;
 }
 
 TEST_F(ViewProgramTest, OpensAWindow) {

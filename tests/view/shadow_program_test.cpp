@@ -26,7 +26,7 @@ TEST_F(ShadowProgramTest, DrawsArchivesWithoutSeedsAndRefusesToShadeThem) {
   convert({});
   EXPECT_EQ(picture({"--sun", "90,6"}), picture({"--sun", "90,6", "--shadows", "off"}));
   const RunResult refused = view({"--shadows", "on", "--screenshot", folder_ / "b.png"});
-  EXPECT_EQ(refused.exit_code, 1);
+  EXPECT_EQ(refused.exit_code, 2);
   EXPECT_EQ(std::count(refused.err.begin(), refused.err.end(), '\n'), 1) << refused.err;
   EXPECT_NE(refused.err.find("--shadow-seeds"), std::string::npos);
   EXPECT_EQ(view({"--shadows", "dim", "--screenshot", folder_ / "b.png"}).exit_code, 2);

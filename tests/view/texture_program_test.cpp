@@ -24,13 +24,13 @@ TEST_F(TextureProgramTest, ShowsTexturesUnlessAskedForOtherColours) {
   convert({"--texture", folder_ / "photo.ppm"});
   const std::string textured = picture({});
   EXPECT_EQ(picture({"--mode", "texture"}), textured);
-  EXPECT_EQ(picture({"--memory", "16", "--threads", "3", "--upload", "1"}), textured);
+  EXPECT_EQ(picture({"--memory", "16M", "--threads", "3", "--upload", "1M"}), textured);
   const std::string elevation = picture({"--mode", "elevation"});
   EXPECT_NE(elevation, textured);
   convert({});
   EXPECT_EQ(picture({}), elevation);
   const RunResult refused = view({"--mode", "texture", "--screenshot", folder_ / "b.png"});
-  EXPECT_EQ(refused.exit_code, 1);
+  EXPECT_EQ(refused.exit_code, 2);
   EXPECT_EQ(std::count(refused.err.begin(), refused.err.end(), '\n'), 1) << refused.err;
   EXPECT_NE(refused.err.find("convert with --texture"), std::string::npos);
 }
@@ -39,7 +39,7 @@ TEST_F(TextureProgramTest, FliesWithTexturesBelowTheBound) {
   convert({"--texture", folder_ / "photo.ppm", "--texture-format", "png"});
   write_file(folder_ / "path.txt", "0 2000 3000 9000 9000 0 6000\n2 12000 1500 9000 18000 0 6000\n");
   const RunResult result = view({"--flight", folder_ / "path.txt", "--frames", "12", "--size", "160x120", "--memory",
-                                 "8", "--csv", folder_ / "frames.csv"});
+                                 "8M", "--csv", folder_ / "frames.csv"});
   EXPECT_EQ(result.exit_code, 0) << result.err;
   const std::string csv = read_file(folder_ / "frames.csv");
   EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 13);

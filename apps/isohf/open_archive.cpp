@@ -1,0 +1,35 @@
+#include "open_archive.h"
+
+#include <fmt/format.h>
+
+#include "formats/foreign_file.h"
+#include "formats/registry.h"
+#include "isohf/base/error.h"
+
+namespace isohf::cli {
+namespace {
+
+/// What the file is; empty where it may be an archive that is damaged.
+std::string otherwise(const std::string& path) {
+  if (const Format* const format = native_format_of(path, {}); format != nullptr) {
+    return fmt::format("is no isohf archive but a raster ({0}); isohf convert {1} -o OUT.isohf makes one", format->name,
+                       path);
+  }
+  const ForeignFile found = foreign_file(path);
+  if (found.is.empty() || found.is == "an isohf archive" || found.is == "a ZIP file") return {};
+  return "is no isohf archive but " + found.is;
+}
+
+}  // namespace
+
+ArchiveReader open_archive(const std::string& path) {
+  try {
+    return ArchiveReader(path);
+  } catch (const Error& error) {
+    const std::string found = error.code() == ErrorCode::kCorrupt ? otherwise(path) : "";
+    if (found.empty()) throw;
+    throw Error(ErrorCode::kUnsupported, path + ": " + found);
+  }
+}
+
+}  // namespace isohf::cli

@@ -1,0 +1,12 @@
+#pragma once
+
+#include <string>
+
+#include "isohf/archive/reader.h"
+
+namespace isohf::cli {
+
+/// Opens an archive. Of a file that is none the error says what it is instead, and which command would help.
+[[nodiscard]] ArchiveReader open_archive(const std::string& path);
+
+}  // namespace isohf::cli
