@@ -262,6 +262,14 @@ TEST(Usage, BashCompletesEveryCommandOptionAndWord) {
   EXPECT_EQ(completions_of(" convert --fit interpol", 3), "\n");
 }
 
+TEST(Usage, ScriptsEndWithCode2OnWrongOptions) {
+  for (const char* script : {"check", "setup", "flight", "accuracy_table"}) {
+    const std::string path = std::string(ISOHF_SOURCE_DIR "/scripts/") + script;
+    EXPECT_EQ(run_program({"/bin/bash", path, "--bogus"}).exit_code, 2) << script;
+    EXPECT_EQ(run_program({"/bin/bash", path, "--help"}).exit_code, 0) << script;
+  }
+}
+
 TEST(Usage, FailureToWriteStandardOutputIsReported) {
   RunOptions full;
   full.output_path = "/dev/full";
