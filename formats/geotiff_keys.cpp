@@ -9,7 +9,9 @@
 #include <numbers>
 #include <optional>
 
+#include "formats/reference_system.h"
 #include "formats/units.h"
+#include "formats/wkt.h"
 #include "isohf/base/error.h"
 
 namespace isohf {
@@ -249,12 +251,21 @@ void read_ellipsoid(Keys& keys, ReferenceSystem& system) {
   }
 }
 
+constexpr std::string_view kEsri = "ESRI PE String = ";
+
+/// The WKT in one of the citations, as ArcGIS writes it; empty where none has any.
+std::string esri_wkt(Keys& keys) {
+  for (const Key key : {kProjectedCitation, kCitation, kGeodeticCitation}) {
+    if (const std::string text = keys.text(key); text.starts_with(kEsri)) return text.substr(kEsri.size());
+  }
+  return {};
+}
+
 /// "GCS Name = A|Datum = B" is A; an ESRI string is its first quoted name, and the whole of it the WKT.
 void read_name(Keys& keys, bool projected, ReferenceSystem& system) {
   std::string name = projected ? keys.text(kProjectedCitation) : keys.text(kGeodeticCitation);
   if (name.empty()) name = keys.text(kCitation);
   if (name.empty()) name = keys.text(kGeodeticCitation);
-  constexpr std::string_view kEsri = "ESRI PE String = ";
   if (name.rfind(kEsri, 0) == 0) {
     system.wkt = name.substr(kEsri.size());
     const std::size_t open = system.wkt.find('"');
@@ -267,6 +278,25 @@ void read_name(Keys& keys, bool projected, ReferenceSystem& system) {
   system.name = name;
 }
 
+/// The unit of a map whose file has no key for it: that of its WKT or of its code.
+void assume_unit(const std::string& wkt, GeoTiffPlace& place) {
+  Georeference& geo = place.georeference;
+  Georeference told;
+  if (!wkt.empty() && read_wkt(wkt, told) && told.unit == HorizontalUnit::kMetre) {
+    geo.metres_per_unit = told.metres_per_unit;
+    return;
+  }
+  // These are in metres, and in nearly every file.
+  if (!geo.system.epsg || ellipsoid_of_crs(*geo.system.epsg)) return;
+  try {
+    const auto system = understand_system(system_text(geo.system));
+    if (system->description().is_projected) geo.metres_per_unit = system->description().unit;
+  } catch (const Error& error) {
+    place.warnings.push_back(fmt::format(
+        "the file does not say its unit, and that of its code is not known: metres are taken; {}", error.what()));
+  }
+}
+
 void read_horizontal_unit(Keys& keys, bool projected, GeoTiffPlace& place, double& degrees) {
   Georeference& geo = place.georeference;
   degrees = 1.0;
@@ -274,13 +304,15 @@ void read_horizontal_unit(Keys& keys, bool projected, GeoTiffPlace& place, doubl
     geo.unit = HorizontalUnit::kMetre;
     const std::optional<int> code = keys.code(kLinearUnits);
     const std::optional<double> size = keys.real(kLinearUnitSize);
-    if (size && *size > 0.0) {
+    if (!size && !code) {
+      assume_unit(esri_wkt(keys), place);
+    } else if (size && *size > 0.0) {
       geo.metres_per_unit = *size;
-    } else if (const auto unit = code ? linear_unit(*code) : LinearUnit{"metre", 1.0}) {
+    } else if (const auto unit = code ? linear_unit(*code) : std::nullopt) {
       geo.metres_per_unit = unit->metres;
     } else {
       geo.unit = HorizontalUnit::kUnknown;
-      place.warnings.push_back(fmt::format("linear unit {} is not known: the spacing has no unit", *code));
+      place.warnings.push_back(fmt::format("linear unit {} is not known: the spacing has no unit", code.value_or(0)));
     }
     return;
   }
@@ -337,6 +369,14 @@ void read_system(Keys& keys, GeoTiffPlace& place, double& degrees) {
   std::optional<int> model = keys.number(kModelType);
   if (model == kUserDefined || model == 0) model.reset();  // what ESRI's strings come with: the other keys tell
   const std::optional<int> projected_crs = keys.number(kProjectedCrs);
+  const std::string esri = esri_wkt(keys);
+  if (Georeference told; !model && !projected_crs && !esri.empty() && read_wkt(esri, told)) {
+    place.georeference.unit = told.unit;
+    place.georeference.metres_per_unit = told.metres_per_unit;
+    system = told.system;
+    read_vertical(keys, place);
+    return;
+  }
   const bool projected = model ? *model == kModelProjected : projected_crs.has_value();
   const bool geographic = !projected && (model ? *model == kModelGeographic : keys.number(kGeodeticCrs).has_value());
   degrees = 1.0;

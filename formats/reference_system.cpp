@@ -33,7 +33,9 @@ class ProjSystem final : public UnderstoodSystem {
     description_.datum = info.datum;
     description_.is_projected = info.is_projected != 0;
     description_.is_compound = info.is_compound != 0;
-    description_.unit = info.metres_per_unit;
+    // PROJ's database has 15 digits of it.
+    constexpr double kUsFoot = 1200.0 / 3937.0;
+    description_.unit = std::abs(info.metres_per_unit - kUsFoot) < 1e-14 ? kUsFoot : info.metres_per_unit;
     description_.ellipsoid = {info.semi_major_axis_m, info.inverse_flattening};
     description_.wkt2.resize(info.wkt_bytes);
     module_.wkt(system_, description_.wkt2.data());

@@ -53,6 +53,14 @@ std::string describe_projection(const ProjectionRecord& record) {
                      longitude, record.worst_place.latitude, record.why);
 }
 
+std::string describe_map_scale(const MapGround& ground) {
+  return fmt::format(
+      "lengths on the input's map are {:.5g} times those on the ground, {:.5g} to {:.5g}; off by {:.3g} % at longitude "
+      "{:.6g}, latitude {:.6g}",
+      ground.mean_scale, ground.least_scale, ground.most_scale, 100.0 * ground.worst_error,
+      ground.worst_place.longitude, ground.worst_place.latitude);
+}
+
 int raw_bytes(CodeType type) {
   switch (type) {
     case CodeType::kU8:

@@ -18,6 +18,9 @@ namespace isohf::cli {
 /// The projection, how far lengths err and where, and why it was taken.
 [[nodiscard]] std::string describe_projection(const ProjectionRecord& record);
 
+/// Lengths on a source's own map for those on the ground.
+[[nodiscard]] std::string describe_map_scale(const MapGround& ground);
+
 /// Bytes of one stored elevation before coding.
 [[nodiscard]] int raw_bytes(CodeType type);
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "archive_places.h"
 #include "describe.h"
 #include "isohf/archive/reader.h"
 #include "isohf/restore/archive_geometry.h"
@@ -139,7 +140,8 @@ ordered_json json_from(const AccuracyReport& report) {
 
 Accuracy measure_accuracy(const std::string& archive, HeightSource& source, std::int64_t random_points, bool with_ortho,
                           const WorkOptions& work, const CommonOptions& common, const std::atomic<bool>& cancel) {
-  const ArchiveReader reader(archive);
+  ArchiveReader reader(archive);
+  if (is_warped(reader.metadata())) understand_source(reader);
   ProgressDisplay display(work.progress, common.quiet, common.verbose);
   Accuracy accuracy;
   accuracy.vertices = check_vertices(

@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 
+#include "formats/reference_system.h"
 #include "isohf/base/error.h"
 #include "isohf/convert/plan.h"
 #include "isohf/projection/projected_extent.h"
@@ -131,6 +132,12 @@ OutputGrid grid_through_map(const Metadata& metadata, const SourceInfo& other) {
                        on.origin.northing - place.origin_y, place.spacing_x, place.spacing_y});
   }
   const std::string map = describe_projection(on.spec);
+  if (horizontal_unit(metadata.source) != HorizontalUnit::kDegree) {
+    refuse(
+        fmt::format("{}: the archive's input was laid on another map; only a raster on that ({}) has a place there; "
+                    "bring it there (gdalwarp)",
+                    other.path, map));
+  }
   if (!place.has_origin || place.unit != HorizontalUnit::kDegree) {
     refuse(fmt::format(
         "{}: {}; the archive's input was in degrees and was projected, so that only a raster in degrees "
@@ -151,6 +158,18 @@ OutputGrid grid_through_map(const Metadata& metadata, const SourceInfo& other) {
 
 }  // namespace
 
+void understand_source(ArchiveReader& archive) {
+  const SourceRecord& source = archive.metadata().source;
+  if (source.map || horizontal_unit(source) != HorizontalUnit::kMetre) return;
+  const std::string text = system_text(horizontal_system(source));
+  if (text.empty()) refuse(archive.path() + ": names no reference system: it cannot be told where its metres lie");
+  try {
+    archive.set_source_map(understand_system(text, source.metres_per_unit));
+  } catch (const Error& error) {
+    throw Error(error.code(), archive.path() + ": " + error.what());
+  }
+}
+
 WorldBounds world_bounds(const Metadata& metadata, const BoundingBox& asked) {
   const SourceRecord& source = metadata.source;
   if (!source.origin_x || !source.origin_y || !(source.crs_spacing_x > 0.0) || !(source.crs_spacing_y > 0.0)) {
@@ -162,7 +181,10 @@ WorldBounds world_bounds(const Metadata& metadata, const BoundingBox& asked) {
   if (!(box.west < box.east)) refuse(fmt::format("{}: West must be less than East", text_of(asked)));
   if (is_warped(metadata)) {
     const ProjectionRecord& on = *metadata.projection;
-    const MapBounds map = projected_bounds(Projection(on.spec), {box.west, box.south, box.east, box.north});
+    const Projection world(on.spec);
+    const MapBounds map =
+        degrees ? projected_bounds(world, GeoExtent{box.west, box.south, box.east, box.north})
+                : projected_bounds(world, *source.map, MapBounds{box.west, box.south, box.east, box.north});
     if (!std::isfinite(map.west)) refuse("the archive's map has no place for a part of that");
     return {map.west - on.origin.easting, on.origin.northing - map.north, map.east - on.origin.easting,
             on.origin.northing - map.south};

@@ -1,11 +1,15 @@
 #pragma once
 
 #include "formats/cropped_source.h"
-#include "isohf/archive/metadata.h"
+#include "isohf/archive/reader.h"
 #include "isohf/surface/heightmap.h"
 #include "output_grid.h"
 
 namespace isohf::cli {
+
+/// Has the reference system understood that the archive's source lies on (SourceRecord::map), where that is a map.
+/// Throws Error, naming the archive, where it cannot be.
+void understand_source(ArchiveReader& archive);
 
 /// The part of the world in a box of the source's coordinates. Longitudes are compared modulo 360 degrees; West above
 /// East crosses the 180th meridian.

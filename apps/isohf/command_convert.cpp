@@ -269,6 +269,10 @@ std::string text_from(const ConvertCommandOptions& options, const ConvertSummary
                            describe_count(summary.tiles_written), describe_count(summary.tiles_expected),
                            describe_count(summary.tiles_void), metadata.grid.tile_columns(), metadata.grid.tile_rows(),
                            shape.columns(), shape.rows()));
+  if (metadata.source.ground) say("map scale", describe_map_scale(*metadata.source.ground));
+  if (const std::string& why = options.convert.plan.ground.why_no_map; !why.empty()) {
+    say("map scale", "not known: " + why);
+  }
   if (metadata.projection) say("projection", describe_projection(*metadata.projection));
   say("size", fmt::format("elevations take {}, {:.3f} bits a sample: {:.2f} times smaller than raw 16-bit samples",
                           describe_bytes(summary.tile_bytes), measured.bits_per_sample, measured.ratio));
@@ -327,6 +331,7 @@ int run(ConvertCommandOptions options) {
   OpenedInputs opened = open_inputs(std::move(files), options.inputs, options.open, options.work.threads);
   const std::unique_ptr<HeightSource> source =
       laid_out(std::move(opened.source), options.geoid, options.convert.plan.ground);
+  understand_ground(source->info(), options.convert.plan.ground);
   options.input = source->info().path;
   options.convert.source_note = opened.note;
   if (!options.source_name.empty()) {

@@ -16,6 +16,7 @@
 #include "export_tiles.h"
 #include "interrupt.h"
 #include "isohf/base/error.h"
+#include "isohf/restore/archive_geometry.h"
 #include "json_output.h"
 #include "open_archive.h"
 #include "option_values.h"
@@ -277,7 +278,8 @@ class Exporter {
 };
 
 int run(const ExportOptions& options) {
-  const ArchiveReader archive = open_archive(options.raster.archive);
+  ArchiveReader archive = open_archive(options.raster.archive);
+  if (options.bbox && is_warped(archive.metadata())) understand_source(archive);
   const ExportGrid grid = asked_grid(options, archive.metadata());
   for (const std::string& file : ExportTiles(options.raster.output, grid.cut, grid.samples.width).names()) {
     check_output_file(options.raster.archive, file, options.raster.overwrite);

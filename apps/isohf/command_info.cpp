@@ -20,6 +20,7 @@
 #include "options_source.h"
 #include "options_texture.h"
 #include "raster_info.h"
+#include "source_place.h"
 #include "standard_output.h"
 
 namespace isohf::cli {
@@ -138,6 +139,7 @@ void print_json(const ArchiveReader& archive, bool tiles) {
                            {"metadata", ordered_json::parse(archive.metadata_json())},
                            {"shape", json_from(archive.grid().shape())},
                            {"grid", json_from(archive.grid())},
+                           {"lossless", lossless_record(archive.metadata()).has_value()},
                            {"tile_bytes", derived.tile_bytes},
                            {"lattice_samples", derived.samples},
                            {"bits_per_sample", derived.bits_per_sample},
@@ -145,6 +147,7 @@ void print_json(const ArchiveReader& archive, bool tiles) {
                            {"reads_by_directory", archive.reads_by_directory()},
                            {"warnings", archive.warnings()},
                            {"members", members}};
+  add_source_place(source_place(archive.metadata()), document);
   if (tiles) document["tiles"] = json_from_tiles(archive);
   StandardOutput out;
   out.write(json_text(document));
@@ -244,6 +247,7 @@ std::string describe_archive(const ArchiveReader& archive) {
                             source.channel.empty() ? "" : ", channel " + source.channel, source.registration));
   if (source.mosaic) say("joined from", describe_mosaic(*source.mosaic));
   say("reference", describe_crs(source));
+  if (const auto place = source_place(metadata)) text += text_from(*place);
   say("filter", fmt::format("{}, acquisition {}", metadata.filter, metadata.acquisition));
   say("size",
       fmt::format("elevations take {}, {:.3f} bits a stored sample: {:.2f} times smaller than raw 16-bit samples",
@@ -257,6 +261,8 @@ std::string describe_archive(const ArchiveReader& archive) {
                                 source.sample_type, describe_bytes(record->residual_bytes),
                                 8.0 * static_cast<double>(record->residual_bytes) /
                                     (static_cast<double>(record->width) * static_cast<double>(record->height))));
+  } else {
+    say("lossless", "no: restore resamples the surface");
   }
   const std::string members = describe_members(archive.members());
   say("members", members + (members.empty() ? "" : " beside the tiles"));

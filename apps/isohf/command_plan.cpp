@@ -190,6 +190,7 @@ int run(const PlanOptions& options) {
         options.geoid, options.request.ground);
     ConvertOptions convert;
     convert.plan = options.request;
+    understand_ground(source->info(), convert.plan.ground);
     convert.code_type = options.code_type;
     print_plan(*source, convert, options.common);
   }

@@ -165,6 +165,7 @@ int run(const SampleOptions& options) {
   if (options.reads_degrees || !options.geo_places.empty()) {
     try {
       geo.emplace(archive.metadata());
+      geo->require_geo();
     } catch (const Error& error) {
       throw Error(error.code(), options.archive + ": " + error.what());
     }

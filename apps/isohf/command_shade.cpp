@@ -164,6 +164,7 @@ std::optional<Georeference> georeference_of(const Metadata& metadata, const Shad
   place.unit = source.crs_unit == "metre"    ? HorizontalUnit::kMetre
                : source.crs_unit == "degree" ? HorizontalUnit::kDegree
                                              : HorizontalUnit::kUnknown;
+  place.metres_per_unit = source.metres_per_unit;
   place.spacing_x = pixel_x * units_x;
   place.spacing_y = pixel_z * units_z;
   place.has_origin = true;

@@ -1,16 +1,31 @@
 #include "options_ground.h"
 
 #include "formats/closed_source.h"
+#include "formats/reference_system.h"
+#include "isohf/base/error.h"
 
 namespace isohf::cli {
 
 void add_ground_options(CommandLine& line, GroundRequest& request) {
   line.group("Ground");
   line.option("--projection", "KIND",
-              "How degrees become metres: equirectangular, local, transverse-mercator, utm, lambert-conformal, "
-              "polar-stereographic, none, or chosen by extent (default auto); parameters may follow, as in utm:32N",
+              "How degrees become metres, and other maps truer ones: equirectangular, local, transverse-mercator, utm, "
+              "lambert-conformal, "
+              "polar-stereographic, none, or chosen by extent (default: auto of degrees, none of maps); parameters may "
+              "follow, as in utm:32N",
               [&](const std::string& text) { request.projection = ProjectionRequest::parse(text); });
   line.flag("--wrap-x", "Join the East edge of an input all the way round to its West edge", request.wrap_x);
+}
+
+void understand_ground(const SourceInfo& info, GroundRequest& request) {
+  const Georeference& place = info.georeference;
+  const std::string text = system_text(place.system);
+  if (place.unit != HorizontalUnit::kMetre || !place.has_origin || text.empty()) return;
+  try {
+    request.source_map = understand_system(text, place.metres_per_unit);
+  } catch (const Error& error) {
+    request.why_no_map = error.what();
+  }
 }
 
 void add_geoid_option(CommandLine& line, GeoidRequest& request) {

@@ -11,6 +11,10 @@ namespace isohf::cli {
 /// How a source in degrees is laid out on the ground plane: --projection, --wrap-x.
 void add_ground_options(CommandLine& line, GroundRequest& request);
 
+/// Has a source on a map of its own understood, for its scales and for --projection; where that cannot be,
+/// request.why_no_map says why.
+void understand_ground(const SourceInfo& info, GroundRequest& request);
+
 /// --geoid FILE.pgm[:to-ellipsoidal|to-orthometric].
 void add_geoid_option(CommandLine& line, GeoidRequest& request);
 

@@ -17,36 +17,41 @@ using nlohmann::ordered_json;
 ordered_json json_from_plan(const SourceInfo& info, const Plan& plan, const MemoryPlan& memory, CodeType code_type) {
   const std::uint64_t raw =
       static_cast<std::uint64_t>(plan.lattice_samples) * static_cast<std::uint64_t>(raw_bytes(code_type));
-  return {{"input",
-           {{"path", info.path},
-            {"format", info.format},
-            {"width", info.width},
-            {"height", info.height},
-            {"sample_type", to_string(info.sample_type)},
-            {"channel", info.channel},
-            {"registration", to_string(plan.frame.registration)},
-            {"spacing_x", plan.frame.spacing_x},
-            {"spacing_z", plan.frame.spacing_z},
-            {"in_metres", plan.frame.in_metres},
-            {"warnings", info.warnings}}},
-          {"shape", json_from(plan.grid.shape())},
-          {"grid", json_from(plan.grid)},
-          {"density", plan.density},
-          {"outside", to_string(plan.outside)},
-          {"projection", plan.frame.projection ? ordered_json::parse(format_projection(*plan.frame.projection))
-                                               : ordered_json(nullptr)},
-          {"wraps_x", plan.frame.wraps_x},
-          {"covered", json_from(plan.frame.bounds())},
-          {"lattice_samples", plan.lattice_samples},
-          {"code_type", to_string(code_type)},
-          {"raw_bytes", raw},
-          {"estimated_archive_bytes", plan.estimated_bytes},
-          {"estimated_memory_bytes", memory.bytes},
-          {"least_memory_bytes", memory.least_bytes},
-          {"scratch_bytes", memory.scratch_bytes}};
+  return {
+      {"input",
+       {{"path", info.path},
+        {"format", info.format},
+        {"width", info.width},
+        {"height", info.height},
+        {"sample_type", to_string(info.sample_type)},
+        {"channel", info.channel},
+        {"registration", to_string(plan.frame.registration)},
+        {"spacing_x", plan.frame.spacing_x},
+        {"spacing_z", plan.frame.spacing_z},
+        {"in_metres", plan.frame.in_metres},
+        {"warnings", info.warnings}}},
+      {"shape", json_from(plan.grid.shape())},
+      {"grid", json_from(plan.grid)},
+      {"density", plan.density},
+      {"outside", to_string(plan.outside)},
+      {"projection",
+       plan.frame.projection ? ordered_json::parse(format_projection(*plan.frame.projection)) : ordered_json(nullptr)},
+      {"ground", plan.frame.ground ? ordered_json::parse(format_ground(*plan.frame.ground)) : ordered_json(nullptr)},
+      {"wraps_x", plan.frame.wraps_x},
+      {"covered", json_from(plan.frame.bounds())},
+      {"lattice_samples", plan.lattice_samples},
+      {"code_type", to_string(code_type)},
+      {"raw_bytes", raw},
+      {"estimated_archive_bytes", plan.estimated_bytes},
+      {"estimated_memory_bytes", memory.bytes},
+      {"least_memory_bytes", memory.least_bytes},
+      {"scratch_bytes", memory.scratch_bytes}};
 }
 
-std::string text_from_plan(const SourceInfo& info, const Plan& plan, const MemoryPlan& memory, CodeType code_type) {
+std::string text_from_plan(const SourceInfo& info, const Plan& plan, const MemoryPlan& memory,
+                           const ConvertOptions& options) {
+  const CodeType code_type = options.code_type;
+  const GroundRequest& ground = options.plan.ground;
   const TileGrid& grid = plan.grid;
   const TileShape& shape = grid.shape();
   const bool metres = plan.frame.in_metres;
@@ -70,6 +75,8 @@ std::string text_from_plan(const SourceInfo& info, const Plan& plan, const Memor
                             describe_length(grid.world_height(), metres)));
   say("input lies in", fmt::format("x {:.6g}..{:.6g}, z {:.6g}..{:.6g}; beyond it: {}", covered.x0, covered.x1,
                                    covered.z0, covered.z1, to_string(plan.outside)));
+  if (plan.frame.ground) say("map scale", describe_map_scale(*plan.frame.ground));
+  if (!ground.why_no_map.empty()) say("map scale", "not known: " + ground.why_no_map);
   if (plan.frame.projection) say("projection", describe_projection(*plan.frame.projection));
   if (plan.frame.wraps_x) say("joins", "the East edge is the West edge");
   const std::uint64_t raw =
@@ -92,18 +99,21 @@ void print_plan(const HeightSource& source, const ConvertOptions& options, const
   const MemoryPlan memory = plan_memory(source, plan, options);
   if (!common.quiet) {
     for (const std::string& warning : info.warnings) print_warning(warning);
+    if (const std::string warning = scale_warning(info, plan.frame, options.plan.ground.projection); !warning.empty()) {
+      print_warning(warning);
+    }
   }
   StandardOutput out;
   if (common.json) {
     out.write(json_text(json_from_plan(info, plan, memory, options.code_type)));
   } else if (!common.quiet) {
-    out.write(text_from_plan(info, plan, memory, options.code_type));
+    out.write(text_from_plan(info, plan, memory, options));
   }
   out.finish();
 }
 
 void print_plan_notes(const HeightSource& source, const Plan& plan, const ConvertOptions& options) {
-  std::istringstream lines(text_from_plan(source.info(), plan, plan_memory(source, plan, options), options.code_type));
+  std::istringstream lines(text_from_plan(source.info(), plan, plan_memory(source, plan, options), options));
   for (std::string line; std::getline(lines, line);) print_note("isohf: " + line);
 }
 

@@ -20,6 +20,7 @@
 #include "json_output.h"
 #include "options_source.h"
 #include "progress.h"
+#include "source_place.h"
 #include "standard_output.h"
 #include "void_counts_output.h"
 
@@ -28,20 +29,12 @@ namespace {
 
 using nlohmann::ordered_json;
 
-/// The ground that the samples stand for, in the units of the georeference; nullopt where it has no origin.
-struct Bounds {
-  double west = 0.0;
-  double south = 0.0;
-  double east = 0.0;
-  double north = 0.0;
-};
-
 struct RasterInfo {
   SourceInfo source;
   std::string library;
   Registration registration = Registration::kPoint;  ///< as used
   const char* registration_from = "";                ///< "option", "file" or "default"
-  std::optional<Bounds> bounds;
+  std::optional<SourcePlace> place;
   std::optional<SourceSurvey> survey;
   std::optional<VoidCounts> voids;
 };
@@ -49,16 +42,6 @@ struct RasterInfo {
 Registration registration_used(const Georeference& place) {
   if (place.registration != Registration::kUnknown) return place.registration;
   return place.has_origin ? Registration::kArea : Registration::kPoint;
-}
-
-std::optional<Bounds> bounds_of(const SourceInfo& info, Registration registration) {
-  const Georeference& place = info.georeference;
-  if (!place.has_origin) return std::nullopt;
-  const double margin = registration == Registration::kArea ? 0.5 : 0.0;
-  return Bounds{place.origin_x - margin * place.spacing_x,
-                place.origin_y - (static_cast<double>(info.height - 1) + margin) * place.spacing_y,
-                place.origin_x + (static_cast<double>(info.width - 1) + margin) * place.spacing_x,
-                place.origin_y + margin * place.spacing_y};
 }
 
 SourceSurvey survey(HeightSource& source, const WorkOptions& work, const CommonOptions& common) {
@@ -152,10 +135,7 @@ std::string text_from(const RasterInfo& raster) {
   }
   say("spacing", fmt::format("{:.12g} between columns, {:.12g} between rows{}", place.spacing_x, place.spacing_y,
                              place.has_origin ? "" : fmt::format(" ({})", describe_unit(place))));
-  if (raster.bounds) {
-    say("bounds", fmt::format("{:.12g} to {:.12g} East, {:.12g} to {:.12g} North", raster.bounds->west,
-                              raster.bounds->east, raster.bounds->south, raster.bounds->north));
-  }
+  if (raster.place) text += text_from(*raster.place);
   say("registration", describe_registration(raster));
   say("reference", describe_reference(place.system));
   say("elevations", (info.z_scale == 1.0 && info.z_offset == 0.0
@@ -227,11 +207,7 @@ ordered_json json_from(const RasterInfo& raster, const std::vector<std::string>&
   json["spacing"] = {{"x", place.spacing_x}, {"y", place.spacing_y}};
   json["unit"] = unit_name(place);
   json["metres_per_unit"] = place.unit == HorizontalUnit::kMetre ? ordered_json(place.metres_per_unit) : nullptr;
-  json["bounds"] = raster.bounds ? ordered_json{{"west", raster.bounds->west},
-                                                {"south", raster.bounds->south},
-                                                {"east", raster.bounds->east},
-                                                {"north", raster.bounds->north}}
-                                 : ordered_json(nullptr);
+  add_source_place(raster.place, json);
   json["registration"] = to_string(raster.registration);
   json["registration_from"] = raster.registration_from;
   json["crs"] = {{"name", or_null(system.name)}, {"epsg", or_null(system.epsg)}, {"wkt", or_null(system.wkt)}};
@@ -276,7 +252,8 @@ void print_raster_info(const std::string& path, const OpenOptions& options, bool
   raster.registration = registration_used(place);
   raster.registration_from =
       options.registration ? "option" : (place.registration != Registration::kUnknown ? "file" : "default");
-  raster.bounds = bounds_of(raster.source, raster.registration);
+  raster.place =
+      source_place(place, raster.source.width, raster.source.height, raster.registration == Registration::kArea);
   std::vector<std::string> warnings = raster.source.warnings;
   if (with_statistics) {
     raster.survey = survey(*source, work, common);

@@ -40,6 +40,7 @@ RasterSpec raster_in_source_system(const Metadata& metadata, const SampleGrid& g
   Georeference place;
   place.registration = source.registration == "area" ? Registration::kArea : Registration::kPoint;
   place.unit = horizontal_unit(source);
+  place.metres_per_unit = source.metres_per_unit;
   // World units to the source's own.
   const double per_x = source.crs_spacing_x > 0.0 ? source.crs_spacing_x / source.spacing_x : 1.0;
   const double per_z = source.crs_spacing_y > 0.0 ? source.crs_spacing_y / source.spacing_z : 1.0;
@@ -141,9 +142,11 @@ Georeference map_georeference(const Metadata& metadata, const SampleGrid& grid) 
   place.has_origin = true;
   place.origin_x = on.origin.easting + grid.first_x;
   place.origin_y = on.origin.northing - grid.first_z;
-  place.system.epsg = projection_epsg(on.spec, source.crs_epsg);
+  // A map's own code and name are none of degrees.
+  const bool in_degrees = horizontal_unit(source) == HorizontalUnit::kDegree;
+  place.system.epsg = projection_epsg(on.spec, in_degrees ? source.crs_epsg : std::nullopt);
   place.system.name = describe_projection(on.spec);
-  if (!place.system.epsg) place.system.wkt = projection_wkt(on.spec, source.crs_name);
+  if (!place.system.epsg) place.system.wkt = projection_wkt(on.spec, in_degrees ? source.crs_name : "");
   place.system.body = source.body;
   place.system.semi_major_axis_m = on.spec.ellipsoid.semi_major_axis_m;
   place.system.inverse_flattening = on.spec.ellipsoid.inverse_flattening;

@@ -19,8 +19,8 @@ WarpPlace place_for(const MemoryPhoto& photo, double west, double north, double 
   place.projection.longitude_0 = 20.0;
   place.projection.latitude_0 = 70.0;
   place.first_sample = {west, north};
-  place.degrees_x = degrees;
-  place.degrees_z = degrees;
+  place.step_x = degrees;
+  place.step_z = degrees;
   place.width = photo.info().width;
   place.height = photo.info().height;
   return place;

@@ -99,8 +99,8 @@ TEST(WarpedCutter, ReproducesAPlaneOfTheSourceAtEveryVertex) {
       source.for_each_vertex(filter, Outside::kCover, [&](float height, SourcePosition at, LatticeVertex) {
         if (!source.is_inside(at, 3.0)) return;
         const WarpPlace& place = *source.geometry.warp;
-        const double expected = slope(place.first_sample.longitude + at.u * place.degrees_x,
-                                      place.first_sample.latitude - at.v * place.degrees_z);
+        const double expected =
+            slope(place.first_sample.easting + at.u * place.step_x, place.first_sample.northing - at.v * place.step_z);
         // A hundredth of a sample at most, of slopes of 1 and 1.75 a sample; and the float's rounding.
         ASSERT_NEAR(height, expected, 0.0275 + 1e-3) << request;
       });
@@ -120,8 +120,8 @@ TEST(WarpedCutter, GoesRoundTheSeamAndOverThePole) {
     source.for_each_vertex(filter, Outside::kCover, [&](float height, SourcePosition at, LatticeVertex) {
       if (!source.is_inside(at, 0.0)) return;
       const WarpPlace& place = *source.geometry.warp;
-      const double expected = waves(place.first_sample.longitude + at.u * place.degrees_x,
-                                    place.first_sample.latitude - at.v * place.degrees_z);
+      const double expected =
+          waves(place.first_sample.easting + at.u * place.step_x, place.first_sample.northing - at.v * place.step_z);
       near_seam += at.u < 1.0 || at.u > 718.0 ? 1 : 0;
       // Linear along meridians; a cosine of half-degree samples errs by radius * 12 * (half a sample)^2 / 2 < 0.005
       // when interpolated, and a hundredth of a sample is 0.03 along a meridian and 0.03 across at 30 degrees.
@@ -182,10 +182,10 @@ TEST(WarpedCutter, BeyondTheSourceFollowsTheRule) {
     if (beyond(at) == 0.0 || beyond(at) > reach - 0.6) return;
     // The plane goes on.
     const WarpPlace& place = *source.geometry.warp;
-    EXPECT_NEAR(height,
-                slope(place.first_sample.longitude + at.u * place.degrees_x,
-                      place.first_sample.latitude - at.v * place.degrees_z),
-                0.06);
+    EXPECT_NEAR(
+        height,
+        slope(place.first_sample.easting + at.u * place.step_x, place.first_sample.northing - at.v * place.step_z),
+        0.06);
     ++continued;
   });
   EXPECT_GT(continued, 100);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -8,6 +9,7 @@
 
 #include "isohf/lattice/tile_grid.h"
 #include "isohf/projection/projection_spec.h"
+#include "isohf/projection/reference_map.h"
 
 namespace isohf {
 
@@ -80,7 +82,8 @@ struct SourceRecord {
   std::optional<double> origin_y;
   double crs_spacing_x = 0;  ///< CRS units between neighbouring columns and rows, as found; 0 where unknown
   double crs_spacing_y = 0;
-  std::string crs_unit;  ///< "metre", "degree", "unknown"
+  std::string crs_unit;          ///< "metre", "degree", "unknown"
+  double metres_per_unit = 1.0;  ///< of a linear unit: "metre" is feet as well
   std::string crs_name;
   std::optional<int> crs_epsg;
   std::string crs_wkt;
@@ -90,9 +93,12 @@ struct SourceRecord {
   std::string vertical_datum;
   std::optional<int> vertical_epsg;
   std::optional<MosaicRecord> mosaic;  ///< nullopt: a single file
+  std::optional<MapGround> ground;     ///< under a source on a map that was understood
+  /// Its reference system, where who reads the archive has understood it; never stored.
+  std::shared_ptr<const ReferenceMap> map;
 };
 
-/// The map on which world space lies: metres, made from the source's degrees.
+/// The map on which world space lies, metres, where it is another one than the source's.
 struct ProjectionRecord {
   ProjectionSpec spec;
   MapPoint origin;                 ///< map place of world (0, 0); x goes East from there, z South
@@ -134,6 +140,8 @@ struct Metadata {
 [[nodiscard]] std::string format_metadata(const Metadata& metadata);
 /// The projection alone, as metadata have it: JSON text.
 [[nodiscard]] std::string format_projection(const ProjectionRecord& record);
+/// The ground under a source on a map alone, in the same way.
+[[nodiscard]] std::string format_ground(const MapGround& ground);
 /// Room to set aside for these metadata (WriterOptions::metadata_bytes) while statistics, hash and extensions are yet
 /// to come: 16384 bytes, or as much more as a long WKT takes.
 [[nodiscard]] std::uint32_t metadata_room(const Metadata& draft);

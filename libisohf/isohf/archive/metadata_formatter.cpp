@@ -32,6 +32,19 @@ Json voids_to_json(const SourceRecord& source) {
   return {{"values", values}, {"valid_range", range}, {"fill_distance", source.fill_distance}};
 }
 
+Json ground_to_json(const MapGround& ground) {
+  const GeoExtent& extent = ground.extent;
+  return {{"centre", {{"longitude", ground.centre.longitude}, {"latitude", ground.centre.latitude}}},
+          {"bounds", {{"west", extent.west}, {"south", extent.south}, {"east", extent.east}, {"north", extent.north}}},
+          {"map_scale",
+           {{"mean", ground.mean_scale},
+            {"least", ground.least_scale},
+            {"most", ground.most_scale},
+            {"worst_error", ground.worst_error},
+            {"longitude", ground.worst_place.longitude},
+            {"latitude", ground.worst_place.latitude}}}};
+}
+
 Json source_to_json(const SourceRecord& source) {
   Json json;
   json["name"] = source.name;
@@ -50,6 +63,8 @@ Json source_to_json(const SourceRecord& source) {
                  {"wkt", text_or_null(source.crs_wkt)},   {"unit", text_or_null(source.crs_unit)},
                  {"origin_x", or_null(source.origin_x)},  {"origin_y", or_null(source.origin_y)},
                  {"spacing_x", source.crs_spacing_x},     {"spacing_y", source.crs_spacing_y}};
+  if (source.metres_per_unit != 1.0) json["crs"]["metres_per_unit"] = source.metres_per_unit;
+  if (source.ground) json["ground"] = ground_to_json(*source.ground);
   json["body"] = {{"name", text_or_null(source.body)},
                   {"semi_major_axis_m", or_null(source.semi_major_axis_m)},
                   {"inverse_flattening", or_null(source.inverse_flattening)}};
@@ -145,6 +160,10 @@ std::string format_metadata(const Metadata& metadata) {
   }
   // Text of unknown encoding (a WKT, a file name) must not make the whole unreadable.
   return json.dump(1, ' ', false, Json::error_handler_t::replace);
+}
+
+std::string format_ground(const MapGround& ground) {
+  return ground_to_json(ground).dump();
 }
 
 std::string format_projection(const ProjectionRecord& record) {

@@ -120,6 +120,21 @@ MosaicRecord mosaic_from_json(const ObjectReader& json) {
   return mosaic;
 }
 
+MapGround ground_from_json(const ObjectReader& json) {
+  MapGround ground;
+  const auto place = [](const ObjectReader& at) { return GeoPoint{at.number("longitude"), at.number("latitude")}; };
+  ground.centre = place(json.object("centre"));
+  const ObjectReader bounds = json.object("bounds");
+  ground.extent = {bounds.number("west"), bounds.number("south"), bounds.number("east"), bounds.number("north")};
+  const ObjectReader scale = json.object("map_scale");
+  ground.mean_scale = scale.number("mean");
+  ground.least_scale = scale.number("least");
+  ground.most_scale = scale.number("most");
+  ground.worst_error = scale.number("worst_error");
+  ground.worst_place = place(scale);
+  return ground;
+}
+
 SourceRecord source_from_json(const ObjectReader& json) {
   SourceRecord source;
   source.name = json.text("name");
@@ -145,6 +160,11 @@ SourceRecord source_from_json(const ObjectReader& json) {
   source.origin_y = crs.optional_number("origin_y");
   source.crs_spacing_x = crs.number("spacing_x");
   source.crs_spacing_y = crs.number("spacing_y");
+  // Archives of the first builds tell it by the spacings alone.
+  const bool is_plain = !json.has("ground") && source.crs_unit == "metre" && source.crs_spacing_x > 0.0;
+  source.metres_per_unit =
+      crs.optional_number("metres_per_unit").value_or(is_plain ? source.spacing_x / source.crs_spacing_x : 1.0);
+  if (json.has("ground")) source.ground = ground_from_json(json.object("ground"));
   const ObjectReader body = json.object("body");
   source.body = body.optional_text("name");
   source.semi_major_axis_m = body.optional_number("semi_major_axis_m");

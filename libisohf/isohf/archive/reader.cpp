@@ -148,6 +148,9 @@ std::uint64_t ArchiveReader::size_bytes() const {
 const Metadata& ArchiveReader::metadata() const {
   return *state_->metadata;
 }
+void ArchiveReader::set_source_map(std::shared_ptr<const ReferenceMap> map) {
+  state_->metadata->source.map = std::move(map);
+}
 const std::string& ArchiveReader::metadata_json() const {
   return state_->json;
 }

@@ -51,6 +51,8 @@ class ArchiveReader {
   [[nodiscard]] const Metadata& metadata() const;
   [[nodiscard]] const TileGrid& grid() const { return metadata().grid; }
   [[nodiscard]] const std::string& metadata_json() const;  ///< as stored, for --json
+  /// Has metadata().source.map be what the source's reference system was understood as.
+  void set_source_map(std::shared_ptr<const ReferenceMap> map);
 
   /// True where the index disagreed with the ZIP directory and tiles are found by the directory instead.
   [[nodiscard]] bool reads_by_directory() const;

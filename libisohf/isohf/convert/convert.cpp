@@ -219,6 +219,9 @@ ConvertSummary convert(HeightSource& source, const Plan& plan, const std::string
                         metadata_room(describe_job(info, plan, options, {}))});
   ConvertSummary summary(plan.grid);
   summary.warnings = info.warnings;
+  if (const std::string warning = scale_warning(info, plan.frame, options.plan.ground.projection); !warning.empty()) {
+    summary.warnings.push_back(warning);
+  }
   if (textures)
     summary.warnings.insert(summary.warnings.end(), textures->warnings().begin(), textures->warnings().end());
   Conversion job{source, options, plan, memory, kernel, std::move(prefilter), cancel};

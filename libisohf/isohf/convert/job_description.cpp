@@ -41,6 +41,8 @@ SourceRecord record_of(const SourceInfo& info, const SourceFrame& frame, const S
     record.crs_spacing_x = place.spacing_x;
     record.crs_spacing_y = place.spacing_y;
   }
+  if (place.unit == HorizontalUnit::kMetre) record.metres_per_unit = place.metres_per_unit;
+  record.ground = frame.ground;
   record.crs_name = place.system.name;
   record.crs_epsg = place.system.epsg;
   record.crs_wkt = place.system.wkt;

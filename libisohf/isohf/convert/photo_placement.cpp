@@ -96,25 +96,25 @@ PhotoPlacement place_on_rows(const PhotoInfo& photo, const SourceInfo& source, c
   return placement;
 }
 
-/// A world of degrees, East and South of the source's North-West corner.
-SourceFrame degrees_of(const SourceInfo& source, const SourceFrame& frame) {
-  SourceFrame degrees;
-  degrees.width = frame.width;
-  degrees.height = frame.height;
-  degrees.registration = frame.registration;
-  degrees.spacing_x = source.georeference.spacing_x;
-  degrees.spacing_z = source.georeference.spacing_y;
+/// A world of the source's own units, East and South of its North-West corner.
+SourceFrame own_units_of(const SourceInfo& source, const SourceFrame& frame) {
+  SourceFrame own;
+  own.width = frame.width;
+  own.height = frame.height;
+  own.registration = frame.registration;
+  own.spacing_x = source.georeference.spacing_x;
+  own.spacing_z = source.georeference.spacing_y;
   if (frame.registration == Registration::kArea) {
-    degrees.first_sample_x = degrees.spacing_x / 2.0;
-    degrees.first_sample_z = degrees.spacing_z / 2.0;
+    own.first_sample_x = own.spacing_x / 2.0;
+    own.first_sample_z = own.spacing_z / 2.0;
   }
-  return degrees;
+  return own;
 }
 
 /// The photo with its longitudes counted from the turn that lies nearest to the source's.
 PhotoInfo on_the_same_turn(const PhotoInfo& photo, const SourceInfo& source) {
   PhotoInfo turned = photo;
-  if (!turned.georeference) return turned;
+  if (!turned.georeference || source.georeference.unit != HorizontalUnit::kDegree) return turned;
   const auto middle = [](const Georeference& place, std::int64_t width) {
     return place.origin_x + place.spacing_x * static_cast<double>(width - 1) / 2.0;
   };
@@ -124,37 +124,38 @@ PhotoInfo on_the_same_turn(const PhotoInfo& photo, const SourceInfo& source) {
 }
 
 PhotoPlacement place_by_projection(const PhotoInfo& photo, const SourceInfo& source, const SourceFrame& frame) {
-  const SourceFrame degrees = degrees_of(source, frame);
-  PhotoPlacement placement = place_on_rows(on_the_same_turn(photo, source), source, degrees);
-  const PhotoFrame in_degrees = placement.frame;
+  const SourceFrame own_units = own_units_of(source, frame);
+  PhotoPlacement placement = place_on_rows(on_the_same_turn(photo, source), source, own_units);
+  const PhotoFrame in_own_units = placement.frame;
   const Georeference& there = source.georeference;
-  const double west = there.origin_x - degrees.first_sample_x;
-  const double north = there.origin_y + degrees.first_sample_z;
+  const double west = there.origin_x - own_units.first_sample_x;
+  const double north = there.origin_y + own_units.first_sample_z;
   WarpPlace warp = *frame.warp;
-  warp.first_sample = {west + in_degrees.first_pixel_x, north - in_degrees.first_pixel_z};
-  warp.degrees_x = in_degrees.spacing_x;
-  warp.degrees_z = in_degrees.spacing_z;
+  warp.first_sample = {west + in_own_units.first_pixel_x, north - in_own_units.first_pixel_z};
+  warp.step_x = in_own_units.spacing_x;
+  warp.step_z = in_own_units.spacing_z;
   warp.width = photo.width;
   warp.height = photo.height;
 
-  WorldBounds shown = degrees.bounds();
-  const bool goes_round = placement.bounds.x1 - placement.bounds.x0 > 360.0 - 0.5 * warp.degrees_x;
+  WorldBounds shown = own_units.bounds();
+  const bool goes_round = !warp.source_map && placement.bounds.x1 - placement.bounds.x0 > 360.0 - 0.5 * warp.step_x;
   if (!goes_round) {
     shown.x0 = std::max(shown.x0, placement.bounds.x0);
     shown.x1 = std::min(shown.x1, placement.bounds.x1);
   }
   shown.z0 = std::max(shown.z0, placement.bounds.z0);
   shown.z1 = std::min(shown.z1, placement.bounds.z1);
-  const GeoExtent ground{west + shown.x0, std::max(north - shown.z1, -90.0), west + shown.x1,
-                         std::min(north - shown.z0, 90.0)};
-  const MapBounds map = projected_bounds(Projection(warp.projection), ground);
+  const MapBounds ground{west + shown.x0, north - shown.z1, west + shown.x1, north - shown.z0};
+  const Projection world(warp.projection);
+  const MapBounds map = warp.source_map ? projected_bounds(world, *warp.source_map, ground)
+                                        : projected_bounds(world, {ground.west, std::max(ground.south, -90.0),
+                                                                   ground.east, std::min(ground.north, 90.0)});
   placement.bounds = {map.west - warp.origin.easting, warp.origin.northing - map.north, map.east - warp.origin.easting,
                       warp.origin.northing - map.south};
   const double scale_x = frame.spacing_x / there.spacing_x;
   const double scale_z = frame.spacing_z / there.spacing_y;
-  placement.frame = {placement.bounds.x0 + 0.5 * warp.degrees_x * scale_x,
-                     placement.bounds.z0 + 0.5 * warp.degrees_z * scale_z, warp.degrees_x * scale_x,
-                     warp.degrees_z * scale_z};
+  placement.frame = {placement.bounds.x0 + 0.5 * warp.step_x * scale_x,
+                     placement.bounds.z0 + 0.5 * warp.step_z * scale_z, warp.step_x * scale_x, warp.step_z * scale_z};
   placement.warp = warp;
   return placement;
 }

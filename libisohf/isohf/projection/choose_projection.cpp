@@ -161,6 +161,7 @@ class Choice {
                               std::abs(std::remainder(middle_.longitude - spec.longitude_0, 360.0));
     switch (spec.kind) {
       case Kind::kEquirectangular:
+        if (!problem_.in_degrees) return "it is for inputs in degrees, this one is on a map";
         if (!(std::abs(middle_.latitude) < 89.9)) {
           return fmt::format("its middle latitude is {:.6g} degrees, where a degree of longitude has no length",
                              middle_.latitude);

@@ -9,7 +9,7 @@ namespace isohf {
 /// Up to this scale error `auto` keeps degrees equirectangular (docs/decisions/0016).
 inline constexpr double kEquirectangularError = 0.02;
 
-/// A ground in degrees that is to become metres.
+/// A ground that is to lie on a map, metres.
 struct ProjectionProblem {
   std::string path;  ///< of the source, for messages
   std::string body;  ///< "Earth", ...; empty where unknown
@@ -19,6 +19,7 @@ struct ProjectionProblem {
   /// What needs the source's rows to stay rows, as in "--lossless": auto then takes no other kind than
   /// equirectangular, and others are refused. Empty where nothing does.
   std::string keeps_rows;
+  bool in_degrees = true;  ///< else on a map, whose rows are no parallels: equirectangular is no choice
 };
 
 struct ProjectionChoice {

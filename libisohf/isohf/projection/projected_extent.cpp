@@ -22,27 +22,26 @@ void include(double& low, double& high, double value) {
   if (!(value <= high)) high = value;
 }
 
-}  // namespace
-
-MapBounds projected_bounds(const Projection& projection, const GeoExtent& ground) {
+/// Bounds of what `image` makes of a rectangle's sides.
+template <typename Image>
+MapBounds bounds_of_image(const MapBounds& rectangle, const Image& image) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   MapBounds bounds{kInfinity, kInfinity, -kInfinity, -kInfinity};
-  const std::array<GeoPoint, 5> corners = {{{ground.west, ground.north},
-                                            {ground.east, ground.north},
-                                            {ground.east, ground.south},
-                                            {ground.west, ground.south},
-                                            {ground.west, ground.north}}};
+  const std::array<MapPoint, 5> corners = {{{rectangle.west, rectangle.north},
+                                            {rectangle.east, rectangle.north},
+                                            {rectangle.east, rectangle.south},
+                                            {rectangle.west, rectangle.south},
+                                            {rectangle.west, rectangle.north}}};
   double bend = 0.0;
   bool is_whole = true;
   for (std::size_t side = 0; side < 4; ++side) {
-    const GeoPoint& from = corners[side];
-    const GeoPoint& to = corners[side + 1];
+    const MapPoint& from = corners[side];
+    const MapPoint& to = corners[side + 1];
     MapPoint before;
     MapPoint last;
     for (int i = 0; i <= kStepsPerSide; ++i) {
-      // Sides of the extent may lie 360 degrees apart: longitudes are left as they are but for the first's sake.
-      const MapPoint at = projection.forward({between(from.longitude, to.longitude, i, kStepsPerSide),
-                                              between(from.latitude, to.latitude, i, kStepsPerSide)});
+      const MapPoint at = image(MapPoint{between(from.easting, to.easting, i, kStepsPerSide),
+                                         between(from.northing, to.northing, i, kStepsPerSide)});
       is_whole = is_whole && std::isfinite(at.easting) && std::isfinite(at.northing);
       include(bounds.west, bounds.east, at.easting);
       include(bounds.south, bounds.north, at.northing);
@@ -59,6 +58,19 @@ MapBounds projected_bounds(const Projection& projection, const GeoExtent& ground
   // An arc rises above its chord by an eighth of its second difference.
   const double rise = bend / 8.0;
   return {bounds.west - rise, bounds.south - rise, bounds.east + rise, bounds.north + rise};
+}
+
+}  // namespace
+
+MapBounds projected_bounds(const Projection& projection, const GeoExtent& ground) {
+  // Sides of the extent may lie 360 degrees apart: longitudes are left as they are but for the first's sake.
+  return bounds_of_image({ground.west, ground.south, ground.east, ground.north}, [&](const MapPoint& at) {
+    return projection.forward({at.easting, at.northing});
+  });
+}
+
+MapBounds projected_bounds(const Projection& projection, const ReferenceMap& map, const MapBounds& rectangle) {
+  return bounds_of_image(rectangle, [&](const MapPoint& at) { return projection.forward(map.geo_from_map(at)); });
 }
 
 ScaleError worst_scale_error(const Projection& projection, const GeoExtent& ground) {

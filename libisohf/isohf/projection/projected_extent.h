@@ -10,6 +10,10 @@ namespace isohf {
 /// where a place on the way has no image.
 [[nodiscard]] MapBounds projected_bounds(const Projection& projection, const GeoExtent& ground);
 
+/// The same of the image of a rectangle of another map.
+[[nodiscard]] MapBounds projected_bounds(const Projection& projection, const ReferenceMap& map,
+                                         const MapBounds& rectangle);
+
 /// The worst scale on a ground, and where.
 struct ScaleError {
   double worst = 0.0;  ///< deviation from 1: 0.01 for 1 %; infinite where a length has no bound

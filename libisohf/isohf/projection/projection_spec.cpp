@@ -116,6 +116,7 @@ ProjectionKind projection_kind_from_string(const std::string& text) {
 
 ProjectionRequest ProjectionRequest::parse(const std::string& text) {
   ProjectionRequest request;
+  request.is_given = true;
   if (text == "auto") return request;
   const std::size_t colon = std::min(text.find(':'), text.size());
   request.is_auto = false;

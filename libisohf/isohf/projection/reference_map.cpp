@@ -31,6 +31,17 @@ Vector place_in_space(const Ellipsoid& body, GeoPoint place) {
           normal * (1.0 - e2) * sine};
 }
 
+/// To this many digits nothing shows the last bits in which mathematical libraries differ: 1 mm, and 1 mm in 10 km.
+double rounded(double value, double grain) {
+  return std::round(value / grain) * grain;
+}
+constexpr double kDegreeGrain = 1e-8;
+constexpr double kScaleGrain = 1e-7;
+
+GeoPoint rounded(const GeoPoint& place) {
+  return {rounded(place.longitude, kDegreeGrain), rounded(place.latitude, kDegreeGrain)};
+}
+
 double between(double a, double b, int step) {
   return step == kPlaces - 1 ? b : a + (b - a) * (static_cast<double>(step) / (kPlaces - 1));
 }
@@ -127,13 +138,22 @@ std::optional<MapGround> ground_under(const ReferenceMap& map, const MapBounds& 
       sum += scale.mean();
       ground.least_scale = std::min(ground.least_scale, scale.least);
       ground.most_scale = std::max(ground.most_scale, scale.most);
-      if (scale.error() <= ground.worst_error) continue;
+      // Of places that are alike but for last bits the first one.
+      if (scale.error() <= ground.worst_error + kScaleGrain) continue;
       ground.worst_error = scale.error();
       ground.worst_place = geo;
     }
   }
   if (count == 0) return std::nullopt;
-  ground.mean_scale = sum / count;
+  ground.mean_scale = rounded(sum / count, kScaleGrain);
+  ground.least_scale = rounded(ground.least_scale, kScaleGrain);
+  ground.most_scale = rounded(ground.most_scale, kScaleGrain);
+  ground.worst_error = rounded(ground.worst_error, kScaleGrain);
+  ground.worst_place = rounded(ground.worst_place);
+  ground.centre = rounded(ground.centre);
+  for (double* const side : {&ground.extent.west, &ground.extent.south, &ground.extent.east, &ground.extent.north}) {
+    *side = rounded(*side, kDegreeGrain);
+  }
   for (const double pole : {90.0, -90.0}) {
     if (!holds(bounds, map.map_from_geo({first.longitude, pole}))) continue;
     (pole > 0.0 ? ground.extent.north : ground.extent.south) = pole;

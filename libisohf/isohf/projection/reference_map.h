@@ -65,8 +65,8 @@ struct MapGround {
   /// Beyond this lengths of the map are no lengths of the ground (docs/decisions/0029).
   static constexpr double kTrueEnough = 0.02;
 };
-/// Looks at 33 x 33 places, the sides included. Places that the map does not show are passed over; nullopt where it
-/// shows none of them.
+/// Looks at 33 x 33 places, the sides included, and rounds to 1e-8 degrees and scales to 1e-7. Places that the map does
+/// not show are passed over; nullopt where it shows none of them.
 [[nodiscard]] std::optional<MapGround> ground_under(const ReferenceMap& map, const MapBounds& bounds);
 
 }  // namespace isohf

@@ -15,6 +15,7 @@ namespace isohf {
 
 GeoRows::GeoRows(const Metadata& metadata, SurfaceRows::ReadTile read_tile, const GeoGrid& samples)
     : places_(metadata), samples_(samples), surface_(metadata.grid, metadata.quantisation, std::move(read_tile)) {
+  places_.require_geo();
   if (samples.width < 1 || samples.height < 1 || !(samples.degrees_x > 0.0) || !(samples.degrees_y > 0.0)) {
     throw Error(
         ErrorCode::kInvalidArgument,

@@ -102,18 +102,32 @@ std::int64_t block_start(std::int64_t at, std::int64_t size) {
 ExactWarp::ExactWarp(const WarpPlace& place)
     : place_(place),
       projection_(place.projection),
-      middle_longitude_(place.first_sample.longitude + place.degrees_x * static_cast<double>(place.width - 1) / 2.0),
+      middle_longitude_(place.first_sample.easting + place.step_x * static_cast<double>(place.width - 1) / 2.0),
       middle_u_(static_cast<double>(place.width - 1) / 2.0) {}
 
+SourcePosition ExactWarp::source_from_geo(GeoPoint geo) const {
+  if (place_.source_map) {
+    const MapPoint at = place_.source_map->map_from_geo(geo);
+    return {(at.easting - place_.first_sample.easting) / place_.step_x,
+            (place_.first_sample.northing - at.northing) / place_.step_z};
+  }
+  const double turn = std::remainder(geo.longitude - middle_longitude_, 360.0);
+  return {middle_u_ + turn / place_.step_x, (place_.first_sample.northing - geo.latitude) / place_.step_z};
+}
+
+GeoPoint ExactWarp::geo_from_world(WorldPoint world) const {
+  return projection_.inverse({place_.origin.easting + world.x, place_.origin.northing - world.z});
+}
+
 SourcePosition ExactWarp::source_from_world(WorldPoint world) const {
-  const GeoPoint at = projection_.inverse({place_.origin.easting + world.x, place_.origin.northing - world.z});
-  const double turn = std::remainder(at.longitude - middle_longitude_, 360.0);
-  return {middle_u_ + turn / place_.degrees_x, (place_.first_sample.latitude - at.latitude) / place_.degrees_z};
+  return source_from_geo(geo_from_world(world));
 }
 
 WorldPoint ExactWarp::world_from_source(SourcePosition source) const {
-  const MapPoint at = projection_.forward({place_.first_sample.longitude + source.u * place_.degrees_x,
-                                           place_.first_sample.latitude - source.v * place_.degrees_z});
+  const MapPoint there{place_.first_sample.easting + source.u * place_.step_x,
+                       place_.first_sample.northing - source.v * place_.step_z};
+  const MapPoint at = projection_.forward(place_.source_map ? place_.source_map->geo_from_map(there)
+                                                            : GeoPoint{there.easting, there.northing});
   return {at.easting - place_.origin.easting, place_.origin.northing - at.northing};
 }
 
@@ -312,7 +326,8 @@ void SourceWarp::positions(TileIndex tile, std::span<double> u, std::span<double
 }
 
 SourceWarp::RowBounds SourceWarp::row_bounds(std::int64_t tile_row) const {
-  // A latitude has its extremes over a rectangle of the map on its sides, but for a pole inside.
+  // A latitude, and the northing of another map, have their extremes over a rectangle of the map on its sides, but for
+  // a pole inside.
   const TileShape& shape = grid_.shape();
   constexpr std::int64_t kBeyond = 4;  // padding, in lattice units
   const std::int64_t first_z = tile_row * shape.cell_rows() - kBeyond;
@@ -352,13 +367,15 @@ SourceWarp::RowBounds SourceWarp::row_bounds(std::int64_t tile_row) const {
   }
   const WarpPlace& place = exact_.place();
   for (const double latitude : {90.0, -90.0}) {
-    const double v = (place.first_sample.latitude - latitude) / place.degrees_z;
-    const WorldPoint pole = exact_.world_from_source({0.0, v});
-    const bool inside = pole.x >= static_cast<double>(first_x) * grid_.sigma_x() &&
-                        pole.x <= static_cast<double>(last_x) * grid_.sigma_x() &&
-                        pole.z >= static_cast<double>(first_z) * grid_.sigma_z() &&
-                        pole.z <= static_cast<double>(last_z) * grid_.sigma_z();
+    const MapPoint pole = exact_.map_from_geo({place.projection.longitude_0, latitude});
+    const double x = pole.easting - place.origin.easting;
+    const double z = place.origin.northing - pole.northing;
+    const bool inside =
+        x >= static_cast<double>(first_x) * grid_.sigma_x() && x <= static_cast<double>(last_x) * grid_.sigma_x() &&
+        z >= static_cast<double>(first_z) * grid_.sigma_z() && z <= static_cast<double>(last_z) * grid_.sigma_z();
     if (!inside) continue;
+    const double v = exact_.source_from_geo({place.projection.longitude_0, latitude}).v;
+    is_whole = is_whole && !std::isnan(v);
     bounds.least = std::min(bounds.least, v);
     bounds.most = std::max(bounds.most, v);
   }

@@ -2,26 +2,32 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
+#include <memory>
 #include <span>
 #include <vector>
 
 #include "isohf/lattice/tile_grid.h"
 #include "isohf/projection/projection.h"
+#include "isohf/projection/reference_map.h"
 
 namespace isohf {
 
-/// A source in degrees on a projected world.
+/// A source on a projected world: in degrees, or on another map.
 struct WarpPlace {
   ProjectionSpec projection;
   MapPoint origin;         ///< where world (0, 0) lies on the map; x goes East from there, z South
-  GeoPoint first_sample;   ///< of source sample (0, 0)
-  double degrees_x = 1.0;  ///< between columns, > 0
-  double degrees_z = 1.0;  ///< between rows, > 0, southwards
+  MapPoint first_sample;   ///< of source sample (0, 0): longitude and latitude, or a place of source_map
+  double step_x = 1.0;     ///< between columns, > 0: degrees, or units of source_map
+  double step_z = 1.0;     ///< between rows, > 0, southwards
   std::int64_t width = 0;  ///< source samples
   std::int64_t height = 0;
+  std::shared_ptr<const ReferenceMap> source_map = nullptr;  ///< nullptr: the source is in degrees
 
-  /// Columns all the way round the body.
-  [[nodiscard]] double columns_round() const { return 360.0 / degrees_x; }
+  /// Columns all the way round the body; infinite on a map, which has ends.
+  [[nodiscard]] double columns_round() const {
+    return source_map ? std::numeric_limits<double>::infinity() : 360.0 / step_x;
+  }
 };
 
 /// A place in the source, in samples: u along columns, v along rows.
@@ -38,6 +44,11 @@ class ExactWarp {
   /// u is counted from the source's middle column, half way round to either side. NaN where the map shows no place.
   [[nodiscard]] SourcePosition source_from_world(WorldPoint world) const;
   [[nodiscard]] WorldPoint world_from_source(SourcePosition source) const;
+  /// NaN where the source has no place for it.
+  [[nodiscard]] SourcePosition source_from_geo(GeoPoint geo) const;
+  [[nodiscard]] GeoPoint geo_from_world(WorldPoint world) const;
+  /// On the world's map.
+  [[nodiscard]] MapPoint map_from_geo(GeoPoint geo) const { return projection_.forward(geo); }
   [[nodiscard]] const WarpPlace& place() const { return place_; }
 
  private:
