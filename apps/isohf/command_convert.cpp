@@ -121,10 +121,11 @@ std::optional<ConvertCommandOptions> parse(const Arguments& arguments) {
   add_shape_options(line, options.convert.plan);
   add_quantisation_options(line, options.convert);
   line.group("Reconstruction");
-  line.option("--filter", "NAME",
-              "nearest, bilinear, catmull-rom, bspline2, bspline3, bspline5, lanczos3 or lanczos6 (default " +
-                  options.convert.filter + ")",
-              [&](const std::string& text) { options.convert.filter = to_string(filter_from_string(text)); });
+  line.option(
+      "--filter", "NAME",
+      "nearest, bilinear, limited-cubic, catmull-rom, bspline2, bspline3, bspline5, lanczos3 or lanczos6 (default " +
+          options.convert.filter + ")",
+      [&](const std::string& text) { options.convert.filter = to_string(filter_from_string(text)); });
   line.option("--acquisition", "NAME",
               "How the input's samples were taken: point, box, tent, gaussian:SIGMA or fir:FILE (default " +
                   options.convert.acquisition + ")",

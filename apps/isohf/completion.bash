@@ -28,7 +28,7 @@ _isohf() {
   fi
   local values=''
   case "$command $previous" in
-    *' --filter') values='nearest bilinear catmull-rom bspline2 bspline3 bspline5 lanczos3 lanczos6' ;;
+    *' --filter') values='nearest bilinear limited-cubic catmull-rom bspline2 bspline3 bspline5 lanczos3 lanczos6' ;;
     *' --acquisition') values='point box tent gaussian: fir:' ;;
     *' --overlap') values='last first' ;;
     *' --outside') values='cover clamp void' ;;

@@ -9,7 +9,7 @@ import sys
 import textwrap
 
 DENSITIES = [(1.0, "1"), (0.25, "1/4"), (0.0625, "1/16")]
-FILTERS = ["bilinear", "bspline3"]
+FILTERS = ["limited-cubic", "bilinear", "bspline3"]
 SMALLEST_SIDE = 100  # samples; below, edges are most of the raster
 
 NOT_LAND = [

@@ -35,7 +35,7 @@ TEST_F(InfoCommand, SaysWhatTheArchiveHolds) {
   const RunResult result = run_isohf({"info", folder / "a.isohf"});
   EXPECT_EQ(result.exit_code, 0);
   EXPECT_EQ(result.err, "");
-  for (const char* part : {"28x35 (C x R), 2 levels", "a.tif", "200 x 100 float32", "bilinear", "wholly void",
+  for (const char* part : {"28x35 (C x R), 2 levels", "a.tif", "200 x 100 float32", "limited-cubic", "wholly void",
                            "bits a stored sample", "sha256 "}) {
     EXPECT_THAT(result.out, HasSubstr(part));
   }

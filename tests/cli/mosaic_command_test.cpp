@@ -78,8 +78,8 @@ TEST_F(MosaicCommand, PiecesGiveTheWholesFileByteForByteWithEveryFilter) {
     raster.cut(whole, {0, 0, 190, 140});
     const std::string pieces = subfolder(to_string(registration));
     write_pieces(raster, pieces, ragged_cut(190, 140, 21, 17));
-    for (const char* filter :
-         {"nearest", "bilinear", "catmull-rom", "bspline2", "bspline3", "bspline5", "lanczos3", "lanczos6"}) {
+    for (const char* filter : {"nearest", "bilinear", "limited-cubic", "catmull-rom", "bspline2", "bspline3",
+                               "bspline5", "lanczos3", "lanczos6"}) {
       const Words options = {"--shape", "52x67", "--filter", filter, "--source-name", "hills"};
       EXPECT_TRUE(convert({whole}, options) == convert({pieces}, options)) << filter;
     }

@@ -116,7 +116,7 @@ TEST_F(Convert, AQuadraticComesBackWithinTheBilinearBound) {
 
 TEST_F(Convert, TheBytesAreTheSameForAnyNumberOfThreads) {
   auto source = hills(400, 300);
-  for (const Filter filter : {Filter::kBilinear, Filter::kBspline3}) {
+  for (const Filter filter : {Filter::kBilinear, Filter::kLimitedCubic, Filter::kBspline3}) {
     std::string first;
     for (const int threads : {1, 2, 3, 7}) {
       ConvertOptions options = small_tiles(filter);
@@ -183,8 +183,8 @@ TEST_F(Convert, EveryFilterStaysInsideItsCodes) {
   test::MemorySource<float> source(SampleType::kFloat32, 64, 64, [](std::int64_t c, std::int64_t r) {
     return (c / 8 + r / 8) % 2 == 0 ? 0.0 : 1000.0;
   });
-  for (const char* filter :
-       {"nearest", "bilinear", "catmull-rom", "bspline2", "bspline3", "bspline5", "lanczos3", "lanczos6"}) {
+  for (const char* filter : {"nearest", "bilinear", "limited-cubic", "catmull-rom", "bspline2", "bspline3", "bspline5",
+                             "lanczos3", "lanczos6"}) {
     for (const double step : {0.0, 0.125}) {
       ConvertOptions options = small_tiles();
       options.filter = filter;

@@ -55,17 +55,48 @@ std::vector<float> TrigonometricField::samples() const {
   return all;
 }
 
+namespace {
+
+/// Missing taps of a line from its middle two outwards: each is the mirror image of one inside, at the last that was
+/// there as a point.
+template <typename Tap>
+void go_on(int taps, Tap tap) {
+  const int middle = taps / 2 - 1;
+  int last[] = {middle, middle + 1};
+  if (std::isnan(tap(last[0])) || std::isnan(tap(last[1]))) return;
+  bool ended[] = {false, false};
+  for (int distance = 1; distance <= middle; ++distance) {
+    for (const int side : {0, 1}) {
+      const int k = side == 0 ? middle - distance : middle + 1 + distance;
+      ended[side] = ended[side] || std::isnan(tap(k));
+      if (!ended[side]) last[side] = k;
+      if (std::isnan(tap(k))) tap(k) = 2.0 * tap(last[side]) - tap(2 * last[side] - k);
+    }
+  }
+}
+
+}  // namespace
+
 double evaluate(const Kernel& kernel, View2D<const float> coefficients, double u, double v) {
   return evaluate(kernel, coefficients, coefficients, u, v);
 }
 
 double evaluate(const Kernel& kernel, View2D<const float> coefficients, View2D<const float> samples, double u,
                 double v) {
-  const auto at = [](View2D<const float> view, std::int64_t c, std::int64_t r) {
-    return static_cast<double>(view(mirror_index(c, view.columns()), mirror_index(r, view.rows())));
+  const auto coefficient = [&](std::int64_t c, std::int64_t r) {
+    double height = 0.0;
+    continue_row(r, coefficients.rows(), kernel.edges(), [&](std::int64_t row, int row_weight) {
+      continue_row(c, coefficients.columns(), kernel.edges(), [&](std::int64_t column, int weight) {
+        height += row_weight * weight * static_cast<double>(coefficients(column, row));
+      });
+    });
+    return height;
+  };
+  const auto is_valid = [&](std::int64_t c, std::int64_t r) {
+    return !std::isnan(samples(mirror_index(c, samples.columns()), mirror_index(r, samples.rows())));
   };
   const auto is_void = [&](double c, double r) {
-    return std::isnan(at(samples, static_cast<std::int64_t>(c), static_cast<std::int64_t>(r)));
+    return !is_valid(static_cast<std::int64_t>(c), static_cast<std::int64_t>(r));
   };
   const double nothing = std::numeric_limits<double>::quiet_NaN();
   if (is_void(std::floor(u), std::floor(v)) && is_void(std::ceil(u), std::floor(v)) &&
@@ -74,26 +105,51 @@ double evaluate(const Kernel& kernel, View2D<const float> coefficients, View2D<c
   }
   const TapWeights across = kernel.at(u);
   const TapWeights down = kernel.at(v);
+  const int taps = kernel.taps();
+  std::vector<double> block(static_cast<std::size_t>(taps * taps));  // NaN where missing
+  const auto tap = [&](int i, int j) -> double& { return block[static_cast<std::size_t>(j * taps + i)]; };
+  const auto weight_of = [&](int i, int j) {
+    return static_cast<double>(across.weights[static_cast<std::size_t>(i)]) *
+           static_cast<double>(down.weights[static_cast<std::size_t>(j)]);
+  };
   double valid = 0.0;
-  double weight = 0.0;
-  double sum = 0.0;
-  bool whole = true;
-  for (int j = 0; j < kernel.taps(); ++j) {
-    for (int i = 0; i < kernel.taps(); ++i) {
-      const auto w = static_cast<double>(across.weights[static_cast<std::size_t>(i)]) *
-                     static_cast<double>(down.weights[static_cast<std::size_t>(j)]);
-      if (!std::isnan(at(samples, across.first + i, down.first + j))) valid += w;
-      const double c = at(coefficients, across.first + i, down.first + j);
-      if (std::isnan(c)) {
-        whole = false;
-        continue;
-      }
-      weight += w;
-      sum += w * c;
+  for (int j = 0; j < taps; ++j) {
+    for (int i = 0; i < taps; ++i) {
+      tap(i, j) = coefficient(across.first + i, down.first + j);
+      if (is_valid(across.first + i, down.first + j)) valid += weight_of(i, j);
     }
   }
   if (valid < 0.5) return nothing;
-  return whole ? sum : sum / weight;
+  if (kernel.edges() == Edges::kOdd && taps % 2 == 0) {
+    for (int line = 0; line < 2 * taps; ++line) {  // rows, then columns
+      go_on(taps, [&](int k) -> double& { return line < taps ? tap(k, line) : tap(line - taps, k); });
+    }
+  }
+  double weight = 0.0;
+  double sum = 0.0;
+  bool whole = true;
+  for (int j = 0; j < taps; ++j) {
+    for (int i = 0; i < taps; ++i) {
+      whole = whole && !std::isnan(tap(i, j));
+      if (std::isnan(tap(i, j))) continue;
+      weight += weight_of(i, j);
+      sum += weight_of(i, j) * tap(i, j);
+    }
+  }
+  const double height = whole ? sum : sum / weight;
+  if (!kernel.is_limited()) return height;
+  double least = std::numeric_limits<double>::infinity();
+  double most = -least;
+  for (const std::int64_t row : {down.first + 1, down.first + 2}) {
+    for (const std::int64_t column : {across.first + 1, across.first + 2}) {
+      const std::int64_t c = mirror_index(column, samples.columns());
+      const std::int64_t r = mirror_index(row, samples.rows());
+      if (std::isnan(samples(c, r))) continue;
+      least = std::min(least, static_cast<double>(coefficients(c, r)));
+      most = std::max(most, static_cast<double>(coefficients(c, r)));
+    }
+  }
+  return std::clamp(height, least, most);
 }
 
 double psnr_of_resampling(Filter filter, const TrigonometricField& field, int margin) {

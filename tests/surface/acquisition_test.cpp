@@ -154,8 +154,8 @@ TEST(SampledResponse, OfAGaussianAndNearestIsADifferenceOfErrorFunctions) {
 
 TEST(SampledResponse, SumsToOne) {
   const Acquisition fir = fir_from_text("1 3 -1 20 -1 3 1", "f");
-  for (const char* name :
-       {"nearest", "bilinear", "catmull-rom", "bspline2", "bspline3", "bspline5", "lanczos3", "lanczos6"}) {
+  for (const char* name : {"nearest", "bilinear", "limited-cubic", "catmull-rom", "bspline2", "bspline3", "bspline5",
+                           "lanczos3", "lanczos6"}) {
     const Kernel kernel = Kernel::make(filter_from_string(name));
     for (const Acquisition& acquisition :
          {Acquisition{}, acquisition_from_string("box"), acquisition_from_string("tent"),

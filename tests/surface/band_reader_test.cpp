@@ -111,7 +111,8 @@ TEST(BandReader, PartsOfTheColumnsHoldTheBitsOfTheWhole) {
 
 TEST(BandReader, TilesCutFromItsBandsFollowTheRuleForVoids) {
   const TileGrid grid = TileGrid::make(TileShape::make(12, 11, 2), 4, 4, 150.0, 150.0);
-  for (const char* name : {"bilinear", "catmull-rom", "bspline2", "bspline3", "bspline5", "lanczos3"}) {
+  for (const char* name :
+       {"bilinear", "limited-cubic", "catmull-rom", "bspline2", "bspline3", "bspline5", "lanczos3"}) {
     const Kernel kernel = Kernel::make(filter_from_string(name));
     for (const double void_share : {0.02, 0.3, 0.8}) {
       MemorySource source(61, 61, void_share);

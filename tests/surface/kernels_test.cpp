@@ -11,8 +11,9 @@
 namespace isohf {
 namespace {
 
-constexpr std::array<Filter, 8> kAll = {Filter::kNearest,  Filter::kBilinear, Filter::kCatmullRom, Filter::kBspline2,
-                                        Filter::kBspline3, Filter::kBspline5, Filter::kLanczos3,   Filter::kLanczos6};
+constexpr std::array<Filter, 9> kAll = {Filter::kNearest,    Filter::kBilinear, Filter::kLimitedCubic,
+                                        Filter::kCatmullRom, Filter::kBspline2, Filter::kBspline3,
+                                        Filter::kBspline5,   Filter::kLanczos3, Filter::kLanczos6};
 
 /// Positions over several samples, integers and halves among them.
 std::vector<double> positions() {
@@ -74,8 +75,8 @@ TEST(Kernel, TapsSurroundThePosition) {
 }
 
 TEST(Kernel, FirstMomentsVanishSoThatSlopesAreReproduced) {
-  for (const Filter filter :
-       {Filter::kBilinear, Filter::kCatmullRom, Filter::kBspline2, Filter::kBspline3, Filter::kBspline5}) {
+  for (const Filter filter : {Filter::kBilinear, Filter::kLimitedCubic, Filter::kCatmullRom, Filter::kBspline2,
+                              Filter::kBspline3, Filter::kBspline5}) {
     const Kernel kernel = Kernel::make(filter);
     for (const double u : positions()) EXPECT_NEAR(weighted(kernel, u, 1), 0.0, 1e-6) << to_string(filter) << " " << u;
   }
@@ -147,6 +148,45 @@ TEST(Kernel, ValueIsTheWeightOfOneSample) {
     EXPECT_EQ(kernel.value(kernel.support()), 0.0);
     EXPECT_EQ(kernel.value(-7.0), 0.0);
   }
+}
+
+TEST(Kernel, LimitedCubicAddsFourThirdsOfWhatCatmullRomAddsToAStraightLine) {
+  const auto line = Kernel::make(Filter::kBilinear);
+  const auto smooth = Kernel::make(Filter::kCatmullRom);
+  const auto limited = Kernel::make(Filter::kLimitedCubic);
+  for (double x = -2.5; x <= 2.5; x += 0.01) {
+    EXPECT_NEAR(limited.value(x), line.value(x) + 4.0 / 3.0 * (smooth.value(x) - line.value(x)), 1e-12) << x;
+  }
+}
+
+TEST(Edges, NamesRoundTripAndOthersAreRefused) {
+  for (const Edges edges : {Edges::kMirror, Edges::kOdd}) EXPECT_EQ(edges_from_string(to_string(edges)), edges);
+  EXPECT_THROW((void)edges_from_string("Odd"), Error);
+}
+
+TEST(ContinueRow, OddEdgesGoOnWithAPlaneAndMirrorsTurnBack) {
+  for (const std::int64_t count : {2, 3, 5, 9}) {
+    for (std::int64_t k = -25; k <= 25; ++k) {
+      const auto continued = [&](Edges edges, auto height_at) {
+        std::int64_t height = 0;
+        continue_row(k, count, edges, [&](std::int64_t at, int weight) {
+          ASSERT_TRUE(at >= 0 && at < count) << at;
+          height += weight * height_at(at);
+        });
+        return height;
+      };
+      const auto plane = [](std::int64_t at) { return 7 * at - 3; };
+      EXPECT_EQ(continued(Edges::kOdd, plane), plane(k)) << k << " of " << count;
+      EXPECT_EQ(continued(Edges::kMirror, plane), plane(mirror_index(k, count))) << k << " of " << count;
+    }
+  }
+  continue_row(-4, 1, Edges::kOdd, [](std::int64_t at, int weight) { EXPECT_TRUE(at == 0 && weight == 1); });
+  int terms = 0;
+  continue_row(-2, 9, Edges::kOdd, [&](std::int64_t at, int weight) {  // s[-2] = 2 s[0] - s[2]
+    EXPECT_EQ(at, terms == 0 ? 0 : 2);
+    EXPECT_EQ(weight, terms++ == 0 ? 2 : -1);
+  });
+  EXPECT_EQ(terms, 2);
 }
 
 TEST(MirrorIndex, ReflectsAboutTheEndSamples) {

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <functional>
@@ -52,35 +53,136 @@ struct Fixture {
   }
 };
 
-constexpr Filter kFilters[] = {Filter::kNearest,  Filter::kBilinear, Filter::kCatmullRom, Filter::kBspline2,
-                               Filter::kBspline3, Filter::kBspline5, Filter::kLanczos3,   Filter::kLanczos6};
+constexpr Filter kFilters[] = {Filter::kNearest,    Filter::kBilinear, Filter::kLimitedCubic,
+                               Filter::kCatmullRom, Filter::kBspline2, Filter::kBspline3,
+                               Filter::kBspline5,   Filter::kLanczos3, Filter::kLanczos6};
 
 float bumps(double x, double z) {
   return static_cast<float>(50.0 * std::sin(x * 0.03) + 30.0 * std::cos(z * 0.05 + x * 0.01));
 }
 
-TEST(TileCutter, ReproducesAPlaneAtEveryStoredVertexInside) {
+/// Those that reproduce slopes; B-splines without their prefilter, which changes nothing on a plane.
+constexpr Filter kSlopes[] = {Filter::kBilinear, Filter::kLimitedCubic, Filter::kCatmullRom,
+                              Filter::kBspline2, Filter::kBspline3,     Filter::kBspline5};
+
+TEST(TileCutter, ReproducesAPlaneToTheVeryEdgeOfTheSourceAndAsFarAsItGoesOn) {
   const auto plane = [](double x, double z) { return static_cast<float>(3.0 + 0.25 * x - 0.5 * z); };
   for (const Registration registration : {Registration::kArea, Registration::kPoint}) {
-    const Fixture source(60, 70, registration, plane);
+    const Fixture source(43, 44, registration, plane);
     const TileGrid grid = TileGrid::make(TileShape::make(12, 11, 2), 4, 4, 110.0, 110.0);
-    for (const Filter filter : {Filter::kBilinear, Filter::kCatmullRom, Filter::kBspline3}) {
+    const double last_x = source.first() + 10.0 * 42.0;
+    const double last_z = source.first() + 10.0 * 43.0;
+    for (const Filter filter : kSlopes) {
       for (std::int64_t tile = 0; tile < grid.tile_count(); ++tile) {
         const TileIndex index = grid.tile_at(tile);
         const std::vector<float> heights = source.cut(grid, index, filter, Outside::kCover);
         for (int r = 0; r < 11; ++r) {
           for (int c = 0; c < 12; ++c) {
             const WorldPoint world = grid.world_from_lattice(grid.lattice_vertex(index, {c, r}));
-            // Mirrored taps bend a plane near the border, but bilinear interpolation has none of them.
-            const bool near_border = world.x < 30.0 || world.z < 30.0;
-            if (near_border && filter != Filter::kBilinear) {
-              continue;
-            }
+            const double beyond =
+                std::max({source.first() - world.x, world.x - last_x, source.first() - world.z, world.z - last_z});
+            if (beyond > 25.0) continue;
             // A few float roundings of heights below 500.
             EXPECT_NEAR(heights[static_cast<std::size_t>(r * 12 + c)], plane(world.x, world.z), 2e-4);
           }
         }
       }
+    }
+  }
+}
+
+/// The four samples around a place, those that are no voids.
+std::vector<float> samples_around(const Fixture& source, WorldPoint world) {
+  std::vector<float> found;
+  const double u = (world.x - source.first()) / source.spacing;
+  const double v = (world.z - source.first()) / source.spacing;
+  for (const double row : {std::floor(v), std::ceil(v)}) {
+    for (const double column : {std::floor(u), std::ceil(u)}) {
+      const float sample = source.heights[static_cast<std::size_t>(row) * static_cast<std::size_t>(source.width) +
+                                          static_cast<std::size_t>(column)];
+      if (!std::isnan(sample)) found.push_back(sample);
+    }
+  }
+  return found;
+}
+
+/// Calls for every vertex between samples: its height, its place, the samples around it.
+template <typename Look>
+void for_each_vertex_inside(const Fixture& source, Filter filter, Look look) {
+  const TileGrid grid = TileGrid::make(TileShape::make(12, 11, 2), 4, 4, 107.0, 103.0);
+  for (std::int64_t tile = 0; tile < grid.tile_count(); ++tile) {
+    const std::vector<float> heights = source.cut(grid, grid.tile_at(tile), filter);
+    for (int r = 0; r < 11; ++r) {
+      for (int c = 0; c < 12; ++c) {
+        const WorldPoint world = grid.world_from_lattice(grid.lattice_vertex(grid.tile_at(tile), {c, r}));
+        if (world.x < source.first() || world.z < source.first()) continue;
+        if (world.x > source.first() + static_cast<double>(source.width - 1) * source.spacing) continue;
+        if (world.z > source.first() + static_cast<double>(source.height - 1) * source.spacing) continue;
+        look(heights[static_cast<std::size_t>(r * 12 + c)], world, samples_around(source, world));
+      }
+    }
+  }
+}
+
+TEST(TileCutter, LimitedCubicStaysWithinTheSamplesAroundEachVertex) {
+  std::mt19937 random(3);
+  for (const double void_share : {0.0, 0.1, 0.4}) {
+    Fixture source(42, 41, Registration::kPoint, bumps);
+    for (float& height : source.heights) {
+      height = static_cast<double>(random()) < void_share * 0x1p32 ? std::numeric_limits<float>::quiet_NaN()
+                                                                   : static_cast<float>(random() % 9000);
+    }
+    std::int64_t vertices = 0;
+    for_each_vertex_inside(source, Filter::kLimitedCubic,
+                           [&](float height, WorldPoint world, const std::vector<float>& around) {
+                             if (std::isnan(height)) return;
+                             ++vertices;
+                             ASSERT_FALSE(around.empty());
+                             const auto [least, most] = std::minmax_element(around.begin(), around.end());
+                             // Where a coordinate is that of a sample, the next one's count as around as well.
+                             const bool between = std::fmod(world.x, 10.0) != 0.0 && std::fmod(world.z, 10.0) != 0.0;
+                             if (!between) return;
+                             ASSERT_GE(height, *least) << world.x << "," << world.z;
+                             ASSERT_LE(height, *most) << world.x << "," << world.z;
+                           });
+    EXPECT_GT(vertices, 500);
+  }
+}
+
+TEST(TileCutter, LimitedCubicKeepsWaterFlatAtTheFootOfCliffs) {
+  std::mt19937 random(5);
+  const auto is_land = [](double x, double z) { return x + 0.7 * z + 25.0 * std::sin(0.07 * z) > 330.0; };
+  const Fixture source(42, 41, Registration::kPoint, [&](double x, double z) {
+    return is_land(x, z) ? 400.0F + static_cast<float>(random() % 300) : 12.34F;
+  });
+  std::map<Filter, std::int64_t> not_flat;
+  std::int64_t cells = 0;
+  for (const Filter filter : {Filter::kLimitedCubic, Filter::kCatmullRom}) {
+    for_each_vertex_inside(source, filter, [&](float height, WorldPoint, const std::vector<float>& around) {
+      if (std::any_of(around.begin(), around.end(), [](float sample) { return sample != 12.34F; })) return;
+      ++cells;
+      not_flat[filter] += height != 12.34F ? 1 : 0;
+    });
+  }
+  EXPECT_GT(cells, 500);
+  EXPECT_EQ(not_flat[Filter::kLimitedCubic], 0);
+  EXPECT_GT(not_flat[Filter::kCatmullRom], 20) << "no cliff's foot is there to ring";
+}
+
+TEST(TileCutter, PlanesAreExactNextToVoidsBetweenFourSamples) {
+  const auto plane = [](double x, double z) { return static_cast<float>(3.0 + 0.25 * x - 0.5 * z); };
+  std::mt19937 random(9);
+  for (const int voids : {20, 300}) {
+    Fixture source(42, 41, Registration::kPoint, plane);
+    for (int i = 0; i < voids; ++i) {
+      source.heights[random() % source.heights.size()] = std::numeric_limits<float>::quiet_NaN();
+    }
+    for (const Filter filter : {Filter::kLimitedCubic, Filter::kCatmullRom}) {
+      for_each_vertex_inside(source, filter, [&](float height, WorldPoint world, const std::vector<float>& around) {
+        if (around.size() < 4) return;
+        // A few float roundings of heights below 500.
+        ASSERT_NEAR(height, plane(world.x, world.z), 2e-4) << to_string(filter);
+      });
     }
   }
 }

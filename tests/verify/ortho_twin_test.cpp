@@ -93,8 +93,8 @@ struct BruteForce {
       for (std::int64_t c = 0; c < record.width; ++c) samples.push_back(source.at(c, r));
     }
     std::vector<float> coefficients = samples;
-    const Kernel kernel = Kernel::make(filter_from_string(metadata.filter));
-    Prefilter::make(kernel.filter(), acquisition_from_string(metadata.acquisition))
+    const Kernel kernel = Kernel::make(filter_from_string(metadata.filter), edges_from_string(metadata.edges));
+    Prefilter::make(kernel.filter(), acquisition_from_string(metadata.acquisition), kernel.edges())
         .filter({coefficients.data(), record.width, record.height});
     const View2D<const float> sample_view(samples.data(), record.width, record.height);
     const View2D<const float> view(coefficients.data(), record.width, record.height);

@@ -122,6 +122,7 @@ struct Metadata {
   bool wraps_x = false;                        ///< the East edge of the last tiles is the West edge of the first
   std::string outside = "cover";               ///< what lies beyond: "cover", "clamp" or "void"
   std::string filter = "bilinear";
+  std::string edges = "mirror";  ///< how samples went on beyond the source's ends: "mirror", "odd"
   std::string acquisition = "point";
   std::optional<int> level;  ///< that the tiles were coded at; tells readers nothing
   SourceRecord source;

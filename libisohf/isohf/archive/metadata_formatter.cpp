@@ -145,6 +145,7 @@ std::string format_metadata(const Metadata& metadata) {
   json["projection"] = projection_to_json(metadata.projection);
   json["wraps_x"] = metadata.wraps_x;
   json["filter"] = metadata.filter;
+  json["edges"] = metadata.edges;
   json["acquisition"] = metadata.acquisition;
   if (metadata.level) json["level"] = *metadata.level;
   json["source"] = source_to_json(metadata.source);

@@ -11,10 +11,10 @@ namespace isohf {
 constexpr int kMaxDepth = 64;
 
 bool is_format_member(const std::string& name) {
-  static const std::set<std::string> names = {"format",   "version",        "producer",    "tile_shape", "tiles",
-                                              "extent",   "lattice",        "samples",     "units",      "valid",
-                                              "outside",  "filter",         "acquisition", "source",     "statistics",
-                                              "textures", "content_sha256", "projection",  "wraps_x",    "level"};
+  static const std::set<std::string> names = {
+      "format",     "version",  "producer",       "tile_shape", "tiles",   "extent",      "lattice",
+      "samples",    "units",    "valid",          "outside",    "filter",  "acquisition", "source",
+      "statistics", "textures", "content_sha256", "projection", "wraps_x", "level",       "edges"};
   return names.count(name) != 0;
 }
 

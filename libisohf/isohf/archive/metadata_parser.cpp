@@ -294,6 +294,7 @@ Metadata parse_metadata(const std::string& text) {
   metadata.projection = projection_from_json(root);
   metadata.wraps_x = root.optional_flag("wraps_x");
   metadata.filter = root.text("filter");
+  if (root.has("edges")) metadata.edges = root.text("edges");
   metadata.acquisition = root.text("acquisition");
   if (root.has("level")) metadata.level = static_cast<int>(root.integer("level", 1, 12));
   metadata.source = source_from_json(root.object("source"));

@@ -143,10 +143,11 @@ void choose_codes_by_data(Conversion& job, ConvertSummary& summary, const Progre
   const double over = overshoot(job.kernel, job.prefilter);
   if (over == 0.0 || job.options.code_type == CodeType::kF32) return;
   // The surface may leave the samples' range. Where the codes reach far enough for the worst case at the same step,
-  // nothing needs to be measured; voids, at which weights are renormalised, have no such bound.
+  // nothing needs to be measured; next to voids and on a raster between whose ends little lies there is no such bound.
+  const bool is_large = std::min(info.width, info.height) > 2 * (job.prefilter.halo() + job.kernel.taps());
   const bool has_step = request.max_rounding || (request.step ? *request.step != 0.0 : !is_floating(info.sample_type));
   const ElevationRange reach = widened(found.range, over);
-  if (found.voids == 0 && has_step && has_codes_for(job.quantisation, reach)) {
+  if (found.voids == 0 && is_large && has_step && has_codes_for(job.quantisation, reach)) {
     job.quantisation = choose_quantisation({request.type, job.quantisation.scale}, reach, info);
     return;
   }

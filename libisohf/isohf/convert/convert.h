@@ -12,6 +12,7 @@
 #include "isohf/archive/tile_codec.h"
 #include "isohf/convert/plan.h"
 #include "isohf/surface/height_source.h"
+#include "isohf/surface/kernels.h"
 #include "isohf/surface/photo_source.h"
 
 namespace isohf {
@@ -50,7 +51,7 @@ struct ConvertOptions {
   std::optional<double> max_rounding;
   /// What to do with elevations outside z_range: false refuses, true moves them to its end and counts them.
   bool clamp_range = false;
-  std::string filter = "bilinear";
+  std::string filter = to_string(kDefaultFilter);
   std::string acquisition = "point";
   std::optional<ShadowSeedRequest> shadow_seeds;  ///< nullopt: none
   std::optional<TextureRequest> texture;          ///< nullopt: none

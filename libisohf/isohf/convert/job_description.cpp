@@ -129,6 +129,7 @@ Metadata describe_job(const SourceInfo& info, const Plan& plan, const ConvertOpt
   metadata.projection = plan.frame.projection;
   metadata.wraps_x = plan.frame.wraps_x;
   metadata.filter = options.filter;
+  metadata.edges = to_string(Edges::kOdd);
   metadata.acquisition = options.acquisition;
   metadata.level = options.level;
   metadata.source = record_of(info, plan.frame, options.source_note);

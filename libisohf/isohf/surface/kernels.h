@@ -7,12 +7,34 @@
 namespace isohf {
 
 /// Reconstruction kernels: how a height between samples follows from the samples around it.
-enum class Filter { kNearest, kBilinear, kCatmullRom, kBspline2, kBspline3, kBspline5, kLanczos3, kLanczos6 };
+enum class Filter {
+  kNearest,
+  kBilinear,
+  kLimitedCubic,
+  kCatmullRom,
+  kBspline2,
+  kBspline3,
+  kBspline5,
+  kLanczos3,
+  kLanczos6
+};
 
-/// "nearest", "bilinear", "catmull-rom", "bspline2", "bspline3", "bspline5", "lanczos3", "lanczos6".
+/// "nearest", "bilinear", "limited-cubic", "catmull-rom", "bspline2", "bspline3", "bspline5", "lanczos3", "lanczos6".
 [[nodiscard]] std::string to_string(Filter filter);
 /// The inverse of to_string; throws Error{kInvalidArgument} naming all of them for any other text.
 [[nodiscard]] Filter filter_from_string(const std::string& text);
+
+/// What `convert` uses where nobody says otherwise (docs/decisions/0027).
+inline constexpr Filter kDefaultFilter = Filter::kLimitedCubic;
+
+/// How a row of samples goes on beyond its ends, and into voids, for taps that reach there.
+enum class Edges {
+  kMirror,  ///< s[-k] = s[k]: bends a slope; archives that do not name a rule
+  kOdd,     ///< s[-k] = 2 s[0] - s[k], mirrored at the last sample as a point: planes stay planes
+};
+
+[[nodiscard]] std::string to_string(Edges edges);                ///< "mirror", "odd"
+[[nodiscard]] Edges edges_from_string(const std::string& text);  ///< throws Error{kInvalidArgument}
 
 inline constexpr int kMaxTaps = 12;
 
@@ -29,19 +51,26 @@ struct TapWeights {
 /// output of the matching Prefilter: a B-spline without its prefilter blurs.
 ///
 /// How to evaluate in two dimensions, with tap weights w[i] along the columns and v[j] along the rows:
-///   1. Beyond the raster's true ends a tap reads the mirrored coefficient (mirror_index). It is not a void.
+///   1. Beyond the raster's true ends a tap reads what stands in there by edges() (continue_row). It is not a void.
 ///   2. A point is void where all samples around it (columns floor(u) and ceil(u), rows likewise) are void.
 ///   3. Let W = sum of w[i] v[j] over the taps whose sample is not void. A point with W < 1/2 is void.
 ///   4. The value is the sum of w[i] v[j] c[i, j]. Where some of these coefficients are NaN, they are left out and the
 ///      sum is divided by the weight of the others; a Prefilter leaves none NaN where rule 2 holds, so that happens
-///      only to samples that are their own coefficients.
+///      only to samples that are their own coefficients. With Edges::kOdd and four samples around the point that are
+///      no voids, nothing is left out: the missing taps are continued like those beyond the raster's ends, first along
+///      each row whose two middle taps are samples, then row by row.
+///   5. Where is_limited(), a value beyond the range of the four samples around the point (of those that are no voids)
+///      is moved to its end.
 /// W is the plain sum, negative lobes included: the weights of the taps that were dropped then sum to at most 1/2, and
 /// the result stays an affine combination of heights, exact on level ground.
 class Kernel {
  public:
-  [[nodiscard]] static Kernel make(Filter filter);
+  [[nodiscard]] static Kernel make(Filter filter, Edges edges = Edges::kOdd);
 
   [[nodiscard]] Filter filter() const { return filter_; }
+  [[nodiscard]] Edges edges() const { return edges_; }
+  /// Rule 5 above.
+  [[nodiscard]] bool is_limited() const { return filter_ == Filter::kLimitedCubic; }
   /// Number of coefficients that one position reads: 1, 2, 3, 4, 6 or 12.
   [[nodiscard]] int taps() const { return taps_; }
   /// True where the kernel is 1 at 0 and 0 at all other integers, so that samples are their own coefficients.
@@ -57,14 +86,29 @@ class Kernel {
   [[nodiscard]] double value(double x) const;
 
  private:
-  Kernel(Filter filter, int taps) : filter_(filter), taps_(taps) {}
+  Kernel(Filter filter, int taps, Edges edges) : filter_(filter), taps_(taps), edges_(edges) {}
 
   Filter filter_;
   int taps_;
+  Edges edges_;
 };
 
 /// The sample that stands in for sample k of a row of `count`: whole-sample mirror at both ends, ... 2 1 0 1 2 ...
 /// count >= 1; any k.
 [[nodiscard]] std::int64_t mirror_index(std::int64_t k, std::int64_t count);
+
+/// Calls use(index, weight), weight 1, 2, -1 or -2, for samples whose weighted sum stands in for sample k of a row of
+/// `count`. count >= 1; any k.
+template <typename Use>
+void continue_row(std::int64_t k, std::int64_t count, Edges edges, Use use) {
+  if (edges == Edges::kMirror || count == 1) return use(mirror_index(k, count), 1);
+  int sign = 1;
+  for (; k < 0 || k >= count; sign = -sign) {
+    const std::int64_t end = k < 0 ? 0 : count - 1;
+    use(end, 2 * sign);
+    k = 2 * end - k;
+  }
+  use(k, sign);
+}
 
 }  // namespace isohf

@@ -94,8 +94,8 @@ struct Line {
 class LineFilter {
  public:
   /// taps as in Prefilter; voids up to `border` samples from a valid one receive coefficients as well.
-  LineFilter(const std::vector<double>& taps, std::int64_t border)
-      : taps_(taps), reach_(static_cast<std::int64_t>(taps.size()) - 1), border_(border) {}
+  LineFilter(const std::vector<double>& taps, std::int64_t border, Edges edges)
+      : taps_(taps), reach_(static_cast<std::int64_t>(taps.size()) - 1), border_(border), edges_(edges) {}
 
   /// Filters samples `from` to `to` of a line of `count`, run by run; out[0] is the coefficient at `from`. Places of
   /// out that no run reaches are left alone. out may be the line itself.
@@ -104,13 +104,12 @@ class LineFilter {
     const std::int64_t margin = reach_ + 2 * border_;
     const std::int64_t last = std::min(count, to + margin);
     std::int64_t begin = next_valid(line, std::max<std::int64_t>(0, from - margin), last);
-    // Runs with mirrored ends, and a last block that may go on beyond what is asked for.
+    // Runs with their ends continued, and a last block that may go on beyond what is asked for.
     samples_.resize(
         static_cast<std::size_t>(std::max<std::int64_t>(0, last - begin) + border_ + 2 * pad() + kBlock + reach_));
     while (begin < last) {
       double* run = samples_.data() + pad();
-      const std::int64_t first = begin <= border_ ? 0 : begin;  // bridged to its own mirror image
-      std::fill(run, run + (begin - first), static_cast<double>(line[begin]));
+      const std::int64_t first = begin <= border_ ? 0 : begin;  // as far as the source's own end
       std::int64_t end = begin;
       std::int64_t next = begin;
       while (next < last && next - end <= 2 * border_) {
@@ -118,10 +117,9 @@ class LineFilter {
         for (end = next; end < last && !std::isnan(line[end]); ++end) run[end - first] = static_cast<double>(line[end]);
         next = next_valid(line, end, last);
       }
-      if (next == count && count - end <= border_) {
-        std::fill(run + (end - first), run + (count - first), run[end - 1 - first]);
-        end = count;
-      }
+      const std::int64_t samples = end - begin;
+      if (next == count && count - end <= border_) end = count;
+      fill_to_ends(run + (begin - first), samples, first - begin, end - begin);
       const std::int64_t wanted = std::max(first - border_, from);
       filter_run(run, end - first, wanted - first, std::min(end + border_, to) - first,
                  {out.data + (wanted - from) * out.step, out.step});
@@ -130,7 +128,7 @@ class LineFilter {
   }
 
  private:
-  /// Mirrored samples before and after a run.
+  /// Samples before and after a run.
   [[nodiscard]] std::int64_t pad() const { return reach_ + border_; }
 
   static std::int64_t next_valid(Line<const float> line, std::int64_t at, std::int64_t last) {
@@ -146,12 +144,31 @@ class LineFilter {
     }
   }
 
+  /// Voids between the source's ends and the `count` samples nearest to them, at places `from` to 0 and count to `to`.
+  void fill_to_ends(double* samples, std::int64_t count, std::int64_t from, std::int64_t to) const {
+    const auto fill = [&](std::int64_t k) {
+      if (edges_ == Edges::kMirror) {  // bridged to its own mirror image
+        samples[k] = samples[k < 0 ? 0 : count - 1];
+      } else {
+        go_on(samples, count, k);
+      }
+    };
+    for (std::int64_t k = from; k < 0; ++k) fill(k);
+    for (std::int64_t k = count; k < to; ++k) fill(k);
+  }
+
+  void go_on(double* samples, std::int64_t count, std::int64_t k) const {
+    double height = 0.0;
+    continue_row(k, count, edges_, [&](std::int64_t at, int weight) { height += weight * samples[at]; });
+    samples[k] = height;
+  }
+
   /// out[0] receives the coefficient at `from`, and so on to `to`, of a run of `count` samples with room for pad() more
   /// on either side.
   void filter_run(double* run, std::int64_t count, std::int64_t from, std::int64_t to, Line<float> out) {
     if (from >= to) return;
-    for (std::int64_t k = -pad(); k < 0; ++k) run[k] = run[mirror_index(k, count)];
-    for (std::int64_t k = count; k < count + pad(); ++k) run[k] = run[mirror_index(k, count)];
+    for (std::int64_t k = -pad(); k < 0; ++k) go_on(run, count, k);
+    for (std::int64_t k = count; k < count + pad(); ++k) go_on(run, count, k);
     const std::int64_t blocks = round_up(to - from, kBlock) / kBlock;
     coefficients_.resize(static_cast<std::size_t>(blocks * kBlock));
     convolve(run + from, 1, taps_.data(), reach_, blocks, coefficients_.data(), kBlock);
@@ -161,6 +178,7 @@ class LineFilter {
   const std::vector<double>& taps_;
   std::int64_t reach_;
   std::int64_t border_;
+  Edges edges_;
   std::vector<double> samples_;
   std::vector<float> coefficients_;
 };
@@ -172,19 +190,21 @@ struct Strip {
   std::array<int, kStripColumns> has_void{};
 };
 
-/// Copies a strip of columns, rows begin to end of the band, mirrored at the band's ends; notes which have voids.
+/// Copies a strip of columns, rows begin to end of the band, continued at the band's ends; notes which have voids.
 void load_strip(View2D<const float> band, std::int64_t column, std::int64_t columns, std::int64_t begin,
-                std::int64_t end, Strip& strip) {
+                std::int64_t end, Edges edges, Strip& strip) {
   strip.has_void.fill(0);
   double* samples = strip.samples.data();
   int* has_void = strip.has_void.data();
   for (std::int64_t r = begin; r < end; ++r, samples += kStripColumns) {
-    const float* row = band.row(mirror_index(r, band.rows())) + column;
-    for (std::int64_t i = 0; i < columns; ++i) {
-      has_void[i] |= static_cast<int>(row[i] != row[i]);
-      samples[i] = static_cast<double>(row[i]);
-    }
-    std::fill(samples + columns, samples + kStripColumns, 0.0);
+    std::fill(samples, samples + kStripColumns, 0.0);
+    continue_row(r, band.rows(), edges, [&](std::int64_t at, int weight) {
+      const float* row = band.row(at) + column;
+      for (std::int64_t i = 0; i < columns; ++i) {
+        has_void[i] |= static_cast<int>(row[i] != row[i]);
+        samples[i] += weight * static_cast<double>(row[i]);
+      }
+    });
   }
 }
 
@@ -200,10 +220,10 @@ void in_parallel(std::int64_t count, std::int64_t grain, const Work& work) {
 
 }  // namespace
 
-Prefilter::Prefilter(std::vector<double> taps, int border, double worst_gain)
-    : taps_(std::move(taps)), border_(taps_.size() == 1 ? 0 : border), worst_gain_(worst_gain) {}
+Prefilter::Prefilter(std::vector<double> taps, int border, double worst_gain, Edges edges)
+    : taps_(std::move(taps)), border_(taps_.size() == 1 ? 0 : border), edges_(edges), worst_gain_(worst_gain) {}
 
-Prefilter Prefilter::make(Filter filter, const Acquisition& acquisition) {
+Prefilter Prefilter::make(Filter filter, const Acquisition& acquisition, Edges edges) {
   const Kernel kernel = Kernel::make(filter);
   const std::vector<double> response = sampled_response(kernel, acquisition);
   const std::vector<double> at_points = sampled_response(kernel, Acquisition{});
@@ -253,13 +273,13 @@ Prefilter Prefilter::make(Filter filter, const Acquisition& acquisition) {
                                                          to_string(acquisition), kLongestHalo));
   }
   if (taps.size() == 1) taps[0] = 1.0;
-  return {std::move(taps), (kernel.taps() + 1) / 2, worst_gain};
+  return {std::move(taps), (kernel.taps() + 1) / 2, worst_gain, edges};
 }
 
 void Prefilter::filter_rows(View2D<float> band, bool wraps) const {
   if (is_identity()) return;
   in_parallel(band.rows(), 4, [&](std::int64_t begin, std::int64_t end) {
-    LineFilter lines(taps_, border_);
+    LineFilter lines(taps_, border_, edges_);
     // All that a coefficient depends on, written down once more on either side.
     const std::int64_t beyond = wraps ? halo() : 0;
     std::vector<float> round(static_cast<std::size_t>(wraps ? band.columns() + 2 * beyond : 0));
@@ -292,11 +312,11 @@ void Prefilter::filter_columns(View2D<const float> band, std::int64_t first, Vie
     Strip strip;
     strip.samples.resize(static_cast<std::size_t>((rows + 2 * reach) * kStripColumns));
     strip.coefficients.resize(static_cast<std::size_t>(rows * kStripColumns));
-    LineFilter lines(taps_, border_);
+    LineFilter lines(taps_, border_, edges_);
     for (std::int64_t column = begin * kStripColumns; column < std::min(end * kStripColumns, band.columns());
          column += kStripColumns) {
       const std::int64_t columns = std::min(kStripColumns, band.columns() - column);
-      load_strip(band, column, columns, first - reach, first + rows + reach, strip);
+      load_strip(band, column, columns, first - reach, first + rows + reach, edges_, strip);
       // Columns do not touch each other: those with voids come out wrong here and are done again, run by run.
       convolve(strip.samples.data() + reach * kStripColumns, kStripColumns, taps_.data(), reach,
                rows * kStripColumns / kBlock, strip.coefficients.data(), kBlock);

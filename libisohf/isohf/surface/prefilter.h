@@ -18,13 +18,13 @@ namespace isohf {
 /// coefficient so depends on halo() samples on either side and on nothing else: however the work is cut into bands or
 /// blocks, the bits are the same. Sums are double, in order of k, and rounded to float once for each axis.
 ///
-/// Voids are NaN and never read as numbers: each run of samples is filtered alone, mirrored at its ends as the source
-/// is at its own (whole-sample mirror).
+/// Voids are NaN and never read as numbers: each run of samples is filtered alone, continued at its ends as the source
+/// is at its own (Edges).
 ///
 ///   samples        . . . . . . . s s s s s s . . s s s s s . . . . . . .      . void    s sample
 ///   coefficients   . . . . b b b c c c c c c l l c c c c c b b b . . . .      c of a sample
 ///
-/// The surface goes on by border() places into the voids (b), mirrored like the run, and straight across gaps of at
+/// The surface goes on by border() places into the voids (b), continued like the run, and straight across gaps of at
 /// most twice that (l), along rows and then along columns. So a kernel finds all its coefficients wherever a sample is
 /// next to it, and every sample keeps its height, next to voids too; voids must be told from the samples, no longer
 /// from the coefficients.
@@ -34,7 +34,7 @@ class Prefilter {
  public:
   /// The inverse exists and is stable where the spectrum of a is positive. It is refused, Error{kInvalidArgument} with
   /// the gain and its frequency, where the acquisition is to be amplified more than kMostGain times along one axis.
-  [[nodiscard]] static Prefilter make(Filter filter, const Acquisition& acquisition);
+  [[nodiscard]] static Prefilter make(Filter filter, const Acquisition& acquisition, Edges edges = Edges::kOdd);
 
   static constexpr double kMostGain = 100.0;
 
@@ -51,7 +51,7 @@ class Prefilter {
   [[nodiscard]] const std::vector<double>& impulse_response() const { return taps_; }
 
   /// Along every row of a band of whole rows, in place. `wraps`: the sample behind a row's last one is its first, and
-  /// nothing is mirrored.
+  /// no end is continued.
   void filter_rows(View2D<float> band, bool wraps = false) const;
 
   /// Along every column: out row r receives the coefficients of band row `first` + r.
@@ -64,10 +64,11 @@ class Prefilter {
   void filter(View2D<float> raster) const;
 
  private:
-  Prefilter(std::vector<double> taps, int border, double worst_gain);
+  Prefilter(std::vector<double> taps, int border, double worst_gain, Edges edges);
 
   std::vector<double> taps_;
   int border_;
+  Edges edges_;
   double worst_gain_;
 };
 

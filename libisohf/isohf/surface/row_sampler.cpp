@@ -1,6 +1,7 @@
 #include "isohf/surface/row_sampler.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -23,25 +24,107 @@ ISOHF_VECTORISED(void, add_weighted,
   for (std::int64_t k = 0; k < count; ++k) out[k] += weight * in[k];
 }
 
-/// line[k] = sum over the row taps of weight * band(column first + k), mirrored at the source's ends.
-void blend_rows(const SourceBand& band, const TapWeights& rows, int taps, const SourceAxis& axis_x,
+/// The weights of four rows at once, as weigh() and add_weighted() would one after the other.
+ISOHF_VECTORISED(void, weigh_four,
+                 (const std::array<const float*, 4>& in, const float* weights, std::int64_t count,
+                  float* __restrict out),
+                 (in, weights, count, out)) {
+  const float* __restrict a = in[0];
+  const float* __restrict b = in[1];
+  const float* __restrict c = in[2];
+  const float* __restrict d = in[3];
+  for (std::int64_t k = 0; k < count; ++k) {
+    out[k] = weights[0] * a[k] + weights[1] * b[k] + weights[2] * c[k] + weights[3] * d[k];
+  }
+}
+
+/// line[k] = sum over the row taps of weight * band(column first + k), continued at the source's ends.
+void blend_rows(const SourceBand& band, const TapWeights& rows, const Kernel& kernel, const SourceAxis& axis_x,
                 const SourceAxis& axis_z, const ColumnTaps& columns, std::span<float> line) {
   const std::int64_t inner_first = std::clamp<std::int64_t>(columns.first, 0, axis_x.samples());
   const std::int64_t inner_last =
       std::clamp<std::int64_t>(columns.first + columns.width, inner_first, axis_x.samples());
-  for (int t = 0; t < taps; ++t) {
-    const float weight = rows.weights[static_cast<std::size_t>(t)];
-    const float* source = band.heights.row(axis_z.index(rows.first + t) - band.first_row);
-    float* out = line.data() + (inner_first - columns.first);
+  const std::int64_t inner = inner_last - inner_first;
+  float* out = line.data() + (inner_first - columns.first);
+  const auto row_at = [&](std::int64_t row) { return band.heights.row(row - band.first_row); };
+  bool is_first = true;
+  const auto add_row = [&](std::int64_t row, float weight, bool is_inner_done) {
+    const float* source = row_at(row);
     const float* in = source + (inner_first - band.first_column);
-    const std::int64_t inner = inner_last - inner_first;
-    t == 0 ? weigh(in, weight, inner, out) : add_weighted(in, weight, inner, out);
-    const auto mirrored = [&](std::int64_t k) {
-      const float height = weight * source[axis_x.index(columns.first + k) - band.first_column];
-      line[static_cast<std::size_t>(k)] = t == 0 ? height : line[static_cast<std::size_t>(k)] + height;
+    if (!is_inner_done) is_first ? weigh(in, weight, inner, out) : add_weighted(in, weight, inner, out);
+    const auto beyond = [&](std::int64_t k) {
+      float height = 0.0F;
+      axis_x.stand_ins(columns.first + k, kernel.edges(), [&](std::int64_t column, int share) {
+        height += static_cast<float>(share) * source[column - band.first_column];
+      });
+      float& place = line[static_cast<std::size_t>(k)];
+      place = is_first ? weight * height : place + weight * height;
     };
-    for (std::int64_t k = 0; k < inner_first - columns.first; ++k) mirrored(k);
-    for (std::int64_t k = inner_last - columns.first; k < columns.width; ++k) mirrored(k);
+    for (std::int64_t k = 0; k < inner_first - columns.first; ++k) beyond(k);
+    for (std::int64_t k = inner_last - columns.first; k < columns.width; ++k) beyond(k);
+    is_first = false;
+  };
+  const bool is_inside = rows.first >= 0 && rows.first + kernel.taps() <= axis_z.samples();
+  const bool at_once = is_inside && kernel.taps() == 4;
+  if (at_once) {
+    const std::int64_t left = inner_first - band.first_column;
+    weigh_four({row_at(rows.first) + left, row_at(rows.first + 1) + left, row_at(rows.first + 2) + left,
+                row_at(rows.first + 3) + left},
+               rows.weights.data(), inner, out);
+  }
+  for (int t = 0; t < kernel.taps(); ++t) {
+    const float weight = rows.weights[static_cast<std::size_t>(t)];
+    axis_z.stand_ins(rows.first + t, kernel.edges(),
+                     [&](std::int64_t row, int share) { add_row(row, static_cast<float>(share) * weight, at_once); });
+  }
+}
+
+ISOHF_VECTORISED(void, range_of_two,
+                 (const float* __restrict a, const float* __restrict b, std::int64_t count, float* __restrict least,
+                  float* __restrict most),
+                 (a, b, count, least, most)) {
+  for (std::int64_t k = 0; k < count; ++k) {
+    least[k] = a[k] < b[k] ? a[k] : b[k];
+    most[k] = a[k] < b[k] ? b[k] : a[k];
+  }
+}
+ISOHF_VECTORISED(void, widen_to_next, (std::int64_t count, float* __restrict least, float* __restrict most),
+                 (count, least, most)) {
+  for (std::int64_t k = 0; k + 1 < count; ++k) {
+    least[k] = least[k + 1] < least[k] ? least[k + 1] : least[k];
+    most[k] = most[k + 1] > most[k] ? most[k + 1] : most[k];
+  }
+}
+
+/// The range of the four samples around a place between columns first + k and first + k + 1, and between the middle
+/// two of the rows. Mirrored at the source's ends: no other sample is there.
+void cell_ranges(const SourceBand& band, const TapWeights& rows, const SourceAxis& axis_x, const SourceAxis& axis_z,
+                 const ColumnTaps& columns, std::vector<float>& least, std::vector<float>& most) {
+  least.resize(static_cast<std::size_t>(columns.width));
+  most.resize(least.size());
+  const float* above = band.heights.row(axis_z.index(rows.first + 1) - band.first_row);
+  const float* below = band.heights.row(axis_z.index(rows.first + 2) - band.first_row);
+  const auto add = [&](std::int64_t column, std::int64_t count, std::int64_t k) {
+    const std::int64_t at = column - band.first_column;
+    range_of_two(above + at, below + at, count, least.data() + k, most.data() + k);
+  };
+  const std::int64_t inner_first = std::clamp<std::int64_t>(columns.first, 0, axis_x.samples());
+  const std::int64_t inner_last =
+      std::clamp<std::int64_t>(columns.first + columns.width, inner_first, axis_x.samples());
+  add(inner_first, inner_last - inner_first, inner_first - columns.first);
+  for (std::int64_t k = 0; k < inner_first - columns.first; ++k) add(axis_x.index(columns.first + k), 1, k);
+  for (std::int64_t k = inner_last - columns.first; k < columns.width; ++k) add(axis_x.index(columns.first + k), 1, k);
+  widen_to_next(columns.width, least.data(), most.data());
+}
+
+/// Rule 5 of kernels.h; a NaN stays.
+ISOHF_VECTORISED(void, hold_within_cells,
+                 (const ColumnTaps& columns, const float* __restrict least, const float* __restrict most,
+                  float* __restrict values),
+                 (columns, least, most, values)) {
+  const std::int32_t* __restrict start = columns.start.data();
+  for (std::size_t c = 0; c < columns.count; ++c) {
+    values[c] = held_within(values[c], least[start[c] + 1], most[start[c] + 1]);
   }
 }
 
@@ -202,9 +285,13 @@ void RowSampler::sample_at(const SourceBand& band, double v, const ColumnTaps& c
                            std::vector<float>& values) const {
   const TapWeights rows = kernel_.at(v);
   scratch.line.resize(static_cast<std::size_t>(columns.width));
-  blend_rows(band, rows, kernel_.taps(), axis_x_, axis_z_, columns, scratch.line);
+  blend_rows(band, rows, kernel_, axis_x_, axis_z_, columns, scratch.line);
   values.resize(columns.count);
   gather_columns(kernel_.taps(), columns, scratch.line.data(), values.data());
+  if (kernel_.is_limited()) {
+    cell_ranges(band, rows, axis_x_, axis_z_, columns, scratch.least, scratch.most);
+    hold_within_cells(columns, scratch.least.data(), scratch.most.data(), values.data());
+  }
   if (band.voids.data() != nullptr || has_nan(values.data(), values.size()))
     resample_near_voids(band, v, columns, rows, scratch, values);
   for (std::size_t i = 0; i < columns.continued.size(); ++i) {
@@ -220,7 +307,7 @@ void RowSampler::resample_near_voids(const SourceBand& band, double v, const Col
     scratch.void_line.resize(scratch.line.size());
     find_voids(band, rows, kernel_.taps(), axis_x_, axis_z_, columns, scratch.void_line, scratch.near_void);
   }
-  const VoidRule rule(band, axis_x_, axis_z_, kernel_.taps());
+  const VoidRule rule(band, axis_x_, axis_z_, kernel_);
   for (std::size_t c = 0; c < values.size(); ++c) {
     if (!std::isnan(values[c]) && scratch.near_void[c] == 0) continue;
     TapWeights taps{columns.first + columns.start[c], {}};
@@ -245,13 +332,10 @@ void RowSampler::sample(const SourceBand& band, double world_z, const ColumnTaps
     sample_at(band, place.edge, columns, scratch, scratch.edge_values);
     for (std::size_t c = 0; c < heights.size(); ++c) values[c] = continue_slope(scratch.edge_values[c], values[c]);
   }
-  const auto hold = [&](float height) {  // NaN stays NaN
-    return height < lowest_ ? lowest_ : (height > highest_ ? highest_ : height);
-  };
   if (place.continued) {
-    for (std::size_t c = 0; c < heights.size(); ++c) values[c] = hold(values[c]);
+    for (std::size_t c = 0; c < heights.size(); ++c) values[c] = held_within(values[c], lowest_, highest_);
   }
-  for (const std::size_t c : columns.continued) values[c] = hold(values[c]);
+  for (const std::size_t c : columns.continued) values[c] = held_within(values[c], lowest_, highest_);
   for (const std::size_t c : columns.outside) values[c] = kVoid;
   std::copy_n(values.begin(), heights.size(), heights.begin());
 }

@@ -48,6 +48,8 @@ class RowSampler {
   /// Memory that one thread uses again from row to row.
   struct Scratch {
     std::vector<float> line;
+    std::vector<float> least;
+    std::vector<float> most;
     std::vector<char> void_line;
     std::vector<char> near_void;
     std::vector<float> values;

@@ -58,6 +58,12 @@ class SourceAxis {
     if (k >= 0 && k < samples_) return k;
     return wraps_ ? ((k % samples_) + samples_) % samples_ : mirror_index(k, samples_);
   }
+  /// The same with weights, for heights (continue_row).
+  template <typename Use>
+  void stand_ins(std::int64_t k, Edges edges, Use use) const {
+    if (wraps_ || (k >= 0 && k < samples_)) return use(index(k), 1);
+    continue_row(k, samples_, edges, use);
+  }
   /// Whole samples inside the edge that a continued place may read.
   [[nodiscard]] std::int64_t continued_samples() const;
 

@@ -50,6 +50,14 @@ float blend(int taps, const float* from, std::int64_t stride, const TapWeights& 
   }
 }
 
+/// Rule 5 of kernels.h: `from` as in blend, of four taps.
+float held_within_cell(float height, const float* from, std::int64_t stride) {
+  const float* above = from + stride + 1;
+  const float* below = above + stride;
+  const auto [least, most] = std::minmax({above[0], above[1], below[0], below[1]});
+  return held_within(height, least, most);
+}
+
 bool any_void(const char* from, std::int64_t stride, int taps) {
   char any = 0;
   for (int j = 0; j < taps; ++j) {
@@ -100,23 +108,7 @@ struct WarpedCutter::Row {
 };
 
 float WarpedCutter::sample_inside(const SourceBand& band, double u, double v) const {
-  const TapWeights columns = kernel_.at(u);
-  const TapWeights rows = kernel_.at(v);
-  const int taps = kernel_.taps();
-  float sum = 0.0F;
-  bool near_void = false;
-  for (int j = 0; j < taps; ++j) {
-    const std::int64_t row = axis_z_.index(rows.first + j) - band.first_row;
-    float along = 0.0F;
-    for (int i = 0; i < taps; ++i) {
-      const std::int64_t column = axis_x_.index(columns.first + i) - band.first_column;
-      along += columns.weights[static_cast<std::size_t>(i)] * band.heights(column, row);
-      near_void = near_void || (band.voids.data() != nullptr && band.voids(column, row) != 0);
-    }
-    sum += rows.weights[static_cast<std::size_t>(j)] * along;
-  }
-  if (!near_void && !std::isnan(sum)) return sum;
-  return VoidRule(band, axis_x_, axis_z_, taps).at(u, v, columns, rows);
+  return VoidRule(band, axis_x_, axis_z_, kernel_).at(u, v, kernel_.at(u), kernel_.at(v));
 }
 
 float WarpedCutter::sample(const SourceBand& band, double u, double v) const {
@@ -135,9 +127,7 @@ float WarpedCutter::sample(const SourceBand& band, double u, double v) const {
   };
   float height = along_row(z.position);
   if (z.continued) height = continue_slope(along_row(z.edge), height);
-  if (x.continued || z.continued) {  // NaN stays NaN
-    height = height < lowest_ ? lowest_ : (height > highest_ ? highest_ : height);
-  }
+  if (x.continued || z.continued) height = held_within(height, lowest_, highest_);
   return height;
 }
 
@@ -160,8 +150,13 @@ void WarpedCutter::sample_row(const SourceBand& band, const double* u, const dou
         ISOHF_ASSERT(rows.first >= first_row && rows.first <= end_row);
         const std::int64_t at = (rows.first - first_row) * stride + columns.first - band.first_column;
         const bool near_void = band.voids.data() != nullptr && any_void(band.voids.data() + at, stride, taps);
-        heights[c] = near_void ? kVoid : blend(taps, band.heights.data() + at, stride, columns, rows);
-        if (std::isnan(heights[c])) heights[c] = VoidRule(band, axis_x_, axis_z_, taps).at(u[c], v[c], columns, rows);
+        const float* from = band.heights.data() + at;
+        heights[c] = near_void ? kVoid : blend(taps, from, stride, columns, rows);
+        if (std::isnan(heights[c])) {
+          heights[c] = VoidRule(band, axis_x_, axis_z_, kernel_).at(u[c], v[c], columns, rows);
+        } else if (kernel_.is_limited()) {
+          heights[c] = held_within_cell(heights[c], from, stride);
+        }
         continue;
       }
     }

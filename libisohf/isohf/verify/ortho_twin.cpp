@@ -66,8 +66,8 @@ class OrthoComparison {
         spacing_(spacing),
         range_{surface.statistics.min.value_or(0.0), surface.statistics.max.value_or(0.0)},
         datum_(choose_datum(info_, range_)),
-        kernel_(Kernel::make(filter_from_string(surface.filter))),
-        prefilter_(Prefilter::make(kernel_.filter(), acquisition_from_string(surface.acquisition))),
+        kernel_(Kernel::make(filter_from_string(surface.filter), edges_from_string(surface.edges))),
+        prefilter_(Prefilter::make(kernel_.filter(), acquisition_from_string(surface.acquisition), kernel_.edges())),
         ground_(OrthoGround::make(surface, kernel_, datum_, spacing)),
         in_full_(in_full) {
     for (const OrthoPhase& phase : kOrthoPhases) {

@@ -18,6 +18,7 @@ class Bench:
         self.options = options
         self.root = pathlib.Path(options.root)
         self.isohf = str(self.root / "build/bin/isohf")
+        self.convert = [self.isohf, "convert", "--filter", "bilinear"]  # as GDAL_OPTIONS resample
         self.work = self.root / "build/bench"
         self.work.mkdir(parents=True, exist_ok=True)
         self.results = {}

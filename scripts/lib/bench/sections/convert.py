@@ -32,9 +32,9 @@ def measure(bench):
     translated, warped = bench.work / "translate.tif", bench.work / "warp.tif"
     deflated, archive2 = deflated_copy(bench, source), bench.work / "iso2.isohf"
     jobs = {
-        "isohf convert": [bench.isohf, "convert", source, "-o", archive, "--overwrite", "--quiet"],
-        DEFLATED: [bench.isohf, "convert", deflated, "-o", archive2, "--overwrite", "--quiet"],
-        "isohf convert --step 1": [bench.isohf, "convert", source, "-o", step1, "--overwrite", "--quiet", "--step",
+        "isohf convert": [*bench.convert, source, "-o", archive, "--overwrite", "--quiet"],
+        DEFLATED: [*bench.convert, deflated, "-o", archive2, "--overwrite", "--quiet"],
+        "isohf convert --step 1": [*bench.convert, source, "-o", step1, "--overwrite", "--quiet", "--step",
                                    "1"],
         "gdal_translate": ["gdal_translate", *GDAL_OPTIONS, "-outsize", *size, source, translated],
         "gdalwarp -multi": ["gdalwarp", "-multi", "-overwrite", *GDAL_OPTIONS, "-ts", *size, source, warped],

@@ -21,7 +21,7 @@ def write_payloads(archive, path):
 def measure(bench):
     source = bench.input()
     archive, payloads = bench.work / "floor.isohf", bench.work / "floor.payloads"
-    convert = [bench.isohf, "convert", source, "-o", archive, "--overwrite", "--quiet"]
+    convert = [*bench.convert, source, "-o", archive, "--overwrite", "--quiet"]
     bench.run(*convert)
     tile_bytes = write_payloads(archive, payloads)
     jobs = {"isohf convert": convert,

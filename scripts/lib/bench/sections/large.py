@@ -6,7 +6,7 @@ def measure(bench):
     found, rows = {}, []
     for size in sizes:
         source, archive = bench.warm(bench.terrain(size)), bench.work / "large.isohf"
-        run = bench.run(bench.isohf, "convert", source, "-o", archive, "--overwrite", "--quiet")
+        run = bench.run(*bench.convert, source, "-o", archive, "--overwrite", "--quiet")
         samples = bench.info(archive)["lattice_samples"]
         found[size] = {**run, "samples": samples, "bytes": archive.stat().st_size}
         del found[size]["out"]

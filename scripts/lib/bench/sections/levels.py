@@ -19,7 +19,7 @@ def measure(bench):
     archive = bench.work / "levels.isohf"
     found = []
     for dem in dems:
-        bench.run(bench.isohf, "convert", dem, "-o", archive, "--overwrite", "--quiet", "--step", "1")
+        bench.run(*bench.convert, dem, "-o", archive, "--overwrite", "--quiet", "--step", "1")
         levels = json.loads(bench.run(bench.root / "build/bench/levels_bench", archive, bench.options.rounds)["out"])
         found.append({row["level"]: row for row in levels})
     archive.unlink()

@@ -17,7 +17,7 @@ def measure(bench):
     for size in sizes:
         source = bench.terrain(size)
         for kind, options in KINDS.items():
-            convert = [bench.isohf, "convert", source, "-o", archive, *options]
+            convert = [*bench.convert, source, "-o", archive, *options]
             least = json.loads(bench.run(*convert, "--dry-run", "--json")["out"])["least_memory_bytes"] / 1e6
             cells, digests, peaks = [], set(), {}
             for limit in limits:

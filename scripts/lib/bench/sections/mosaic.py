@@ -85,8 +85,8 @@ def measure(bench):
     build = f"gdalbuildvrt -q -overwrite -input_file_list {listed} {vrt}"
     options = " ".join(GDAL_OPTIONS)
     commands = {
-        "isohf convert TILES/": [bench.isohf, "convert", folder, "-o", archive, "--overwrite", "--quiet"],
-        "isohf convert WHOLE": [bench.isohf, "convert", whole, "-o", single, "--overwrite", "--quiet"],
+        "isohf convert TILES/": [*bench.convert, folder, "-o", archive, "--overwrite", "--quiet"],
+        "isohf convert WHOLE": [*bench.convert, whole, "-o", single, "--overwrite", "--quiet"],
         "gdalbuildvrt, gdal_translate": ["sh", "-c", f"{build} && gdal_translate {options} -outsize "
                                          f"{target} {vrt} {out}"],
         "gdalbuildvrt, gdalwarp -multi": ["sh", "-c", f"{build} && gdalwarp -multi -overwrite {options} -ts "

@@ -15,7 +15,7 @@ def measure(bench):
     source = bench.terrain(full)
     rounds = 1 if bench.options.small else min(bench.options.rounds, 3)
     archive = bench.work / "peers.isohf"
-    jobs = {"isohf convert --step 1": [bench.isohf, "convert", source, "-o", archive, "--overwrite", "--quiet", "--step",
+    jobs = {"isohf convert --step 1": [*bench.convert, source, "-o", archive, "--overwrite", "--quiet", "--step",
                                        "1"]}
     made = {"isohf convert --step 1": archive}
 

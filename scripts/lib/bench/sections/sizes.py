@@ -22,7 +22,7 @@ def measure(bench):
     rows, found = [], {}
     for dem in dems:
         archive, cog = bench.work / "size.isohf", bench.work / "size.tif"
-        us = bench.run(bench.isohf, "convert", dem, "-o", archive, "--overwrite", "--quiet", "--step", "1", "-j", "1")
+        us = bench.run(*bench.convert, dem, "-o", archive, "--overwrite", "--quiet", "--step", "1", "-j", "1")
         info = bench.info(archive)
         tile_bytes = info["tile_bytes"]
         source = info["metadata"]["source"]
