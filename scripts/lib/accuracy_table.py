@@ -171,7 +171,7 @@ def main():
 PAGE = """# What the iso lattice buys on real terrain
 
 Written by `scripts/accuracy_table`, which runs `isohf convert --report` on {count} elevation rasters, at three densities
-(lattice samples for one of the raster's) and with two filters. [cli.md](cli.md#verify) says what is measured.
+(lattice samples for one of the raster's) and with three filters. [cli.md](cli.md#verify) says what is measured.
 
 {reading}
 

@@ -207,6 +207,14 @@ TEST(Metadata, OldArchivesHaveNoProjectionAndDoNotJoin) {
   EXPECT_FALSE(back.wraps_x);
 }
 
+TEST(Metadata, OldArchivesMirroredTheirSourcesAtTheEdges) {
+  Metadata metadata = full();
+  metadata.edges = "odd";
+  const std::string json = format_metadata(metadata);
+  EXPECT_EQ(parse_metadata(json).edges, "odd");
+  EXPECT_EQ(parse_metadata(replaced(json, "\n \"edges\": \"odd\",", "")).edges, "mirror");
+}
+
 TEST(Metadata, RefusesProjectionsThatMakeNoMap) {
   const std::string json = format_metadata(projected());
   for (const auto& [from, to] :

@@ -22,8 +22,9 @@ using isohf::Kernel;
 using isohf::Prefilter;
 using isohf::View2D;
 
-constexpr Filter kFilters[] = {Filter::kNearest,  Filter::kBilinear, Filter::kCatmullRom, Filter::kBspline2,
-                               Filter::kBspline3, Filter::kBspline5, Filter::kLanczos3,   Filter::kLanczos6};
+constexpr Filter kFilters[] = {Filter::kNearest,    Filter::kBilinear, Filter::kLimitedCubic,
+                               Filter::kCatmullRom, Filter::kBspline2, Filter::kBspline3,
+                               Filter::kBspline5,   Filter::kLanczos3, Filter::kLanczos6};
 constexpr std::int64_t kLargest = 1201;
 
 struct Raster {
