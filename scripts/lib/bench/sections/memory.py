@@ -3,7 +3,7 @@
 import hashlib
 import json
 
-KINDS = {"bilinear": [], "bspline5": ["--filter", "bspline5"], "with seeds": ["--shadow-seeds"],
+KINDS = {"bilinear": ["--filter", "bilinear"], "bspline5": ["--filter", "bspline5"], "with seeds": ["--filter", "bilinear", "--shadow-seeds"],
          "--lossless": ["--lossless"]}
 LIMITS_MB = [None, 512, 256, 128, 64, 32]
 
@@ -17,7 +17,7 @@ def measure(bench):
     for size in sizes:
         source = bench.terrain(size)
         for kind, options in KINDS.items():
-            convert = [*bench.convert, source, "-o", archive, *options]
+            convert = [bench.isohf, "convert", source, "-o", archive, *options]
             least = json.loads(bench.run(*convert, "--dry-run", "--json")["out"])["least_memory_bytes"] / 1e6
             cells, digests, peaks = [], set(), {}
             for limit in limits:
