@@ -3,8 +3,8 @@
 import hashlib
 import json
 
-KINDS = {"bilinear": ["--filter", "bilinear"], "bspline5": ["--filter", "bspline5"], "with seeds": ["--filter", "bilinear", "--shadow-seeds"],
-         "--lossless": ["--lossless"]}
+KINDS = {"bilinear": ["--filter", "bilinear"], "bspline5": ["--filter", "bspline5"],
+         "with seeds": ["--filter", "bilinear", "--shadow-seeds"], "--lossless": ["--filter", "bilinear", "--lossless"]}
 LIMITS_MB = [None, 512, 256, 128, 64, 32]
 
 
