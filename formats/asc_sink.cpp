@@ -4,7 +4,6 @@
 #include <iterator>
 #include <type_traits>
 
-#include "formats/output_stream.h"
 #include "formats/raster_encoder.h"
 #include "formats/raster_sidecars.h"
 #include "isohf/base/error.h"
@@ -16,9 +15,9 @@ namespace {
 /// An ESRI ASCII grid: a line a row, every number in the fewest digits that give it back.
 class AscEncoder final : public RasterEncoder {
  public:
-  AscEncoder(const std::string& path, const RasterSpec& spec)
-      : out_(path), type_(spec.sample_type), width_(static_cast<std::size_t>(spec.width)), void_(grid_void(spec)) {
-    out_.write(ascii_grid_header(spec));
+  AscEncoder(OutputFile& out, const RasterSpec& spec)
+      : out_(out), type_(spec.sample_type), width_(static_cast<std::size_t>(spec.width)), void_(grid_void(spec)) {
+    out_.append(ascii_grid_header(spec));
   }
 
   void write(std::span<const std::byte> rows, std::int64_t count) override {
@@ -27,10 +26,10 @@ class AscEncoder final : public RasterEncoder {
       line_.clear();
       append_row(rows.subspan(static_cast<std::size_t>(row) * row_bytes, row_bytes));
       line_.data()[line_.size() - 1] = '\n';  // in the last blank's place
-      out_.write(std::string_view(line_.data(), line_.size()));
+      out_.append(std::string_view(line_.data(), line_.size()));
     }
   }
-  void close() override { out_.close(); }
+  void close() override {}
 
  private:
   void append_row(std::span<const std::byte> row) {
@@ -49,7 +48,7 @@ class AscEncoder final : public RasterEncoder {
     }
   }
 
-  OutputStream out_;
+  OutputFile& out_;
   SampleType type_;
   std::size_t width_;
   double void_;
@@ -58,11 +57,11 @@ class AscEncoder final : public RasterEncoder {
 
 }  // namespace
 
-std::unique_ptr<RasterEncoder> encode_asc(const std::string& path, const RasterSpec& spec) {
+std::unique_ptr<RasterEncoder> encode_asc(OutputFile& out, const RasterSpec& spec) {
   if (spec.channels != 1) {
-    throw Error(ErrorCode::kUnsupported, fmt::format("an ASCII grid stores one channel, not {}", spec.channels));
+    throw Error(ErrorCode::kInvalidArgument, fmt::format("an ASCII grid stores one channel, not {}", spec.channels));
   }
-  return std::make_unique<AscEncoder>(path, spec);
+  return std::make_unique<AscEncoder>(out, spec);
 }
 
 }  // namespace isohf

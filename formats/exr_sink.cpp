@@ -6,9 +6,7 @@
 #include <fmt/format.h>
 
 #include <array>
-#include <cerrno>
-#include <cstdio>
-#include <cstring>
+#include <exception>
 #include <optional>
 
 #include "formats/exr_threads.h"
@@ -21,46 +19,31 @@ namespace {
 /// The library writes the table of chunks in a destructor, which cannot report a full disk; this stream remembers.
 class CheckedStream final : public Imf::OStream {
  public:
-  explicit CheckedStream(const std::string& path) : OStream(path.c_str()), file_(std::fopen(path.c_str(), "wb")) {
-    if (file_ == nullptr) fail();
-  }
-  CheckedStream(const CheckedStream&) = delete;
-  CheckedStream& operator=(const CheckedStream&) = delete;
-  ~CheckedStream() override {
-    if (file_ != nullptr) std::fclose(file_);
-  }
+  explicit CheckedStream(OutputFile& out) : OStream(out.path().c_str()), out_(out) {}
 
   void write(const char c[], int n) override {
-    if (n > 0 && std::fwrite(c, 1, static_cast<std::size_t>(n), file_) != static_cast<std::size_t>(n)) fail();
+    if (n <= 0) return;
+    const std::string_view bytes(c, static_cast<std::size_t>(n));
+    try {
+      out_.write_at(position_, std::as_bytes(std::span(bytes)));
+    } catch (...) {
+      if (!error_) error_ = std::current_exception();
+      throw;
+    }
+    position_ += bytes.size();
   }
-  std::uint64_t tellp() override {
-    const auto position = ::ftello(file_);
-    if (position < 0) fail();
-    return static_cast<std::uint64_t>(position);
-  }
-  void seekp(std::uint64_t position) override {
-    if (::fseeko(file_, static_cast<off_t>(position), SEEK_SET) != 0) fail();
-  }
+  std::uint64_t tellp() override { return position_; }
+  void seekp(std::uint64_t position) override { position_ = position; }
 
-  /// Throws if anything has failed, here or before.
-  void close() {
-    std::FILE* file = file_;
-    file_ = nullptr;
-    if (std::fclose(file) != 0 && !error_) error_ = errno;
-    if (error_) throw_error();
+  /// Throws what has failed before.
+  void check() const {
+    if (error_) std::rethrow_exception(error_);
   }
 
  private:
-  [[noreturn]] void fail() {
-    if (!error_) error_ = errno;
-    throw_error();
-  }
-  [[noreturn]] void throw_error() const {
-    throw Error(ErrorCode::kIo, fmt::format("cannot be written: {}", std::strerror(*error_)));
-  }
-
-  std::FILE* file_;
-  std::optional<int> error_;
+  OutputFile& out_;
+  std::uint64_t position_ = 0;
+  std::exception_ptr error_;
 };
 
 Imf::PixelType pixel_type(SampleType type) {
@@ -72,7 +55,7 @@ Imf::PixelType pixel_type(SampleType type) {
     case SampleType::kUint32:
       return Imf::UINT;
     default:
-      throw Error(ErrorCode::kUnsupported,
+      throw Error(ErrorCode::kInvalidArgument,
                   fmt::format("OpenEXR stores float16, float32 and uint32, not {}", to_string(type)));
   }
 }
@@ -85,7 +68,7 @@ Imf::Header header_of(const RasterSpec& spec) {
 
 class ExrEncoder final : public RasterEncoder {
  public:
-  ExrEncoder(const std::string& path, const RasterSpec& spec) : spec_(spec), type_(pixel_type(spec.sample_type)) {
+  ExrEncoder(OutputFile& out, const RasterSpec& spec) : spec_(spec), type_(pixel_type(spec.sample_type)) {
     static constexpr std::array<const char*, 4> kColours = {"R", "G", "B", "A"};
     Imf::Header header = header_of(spec);
     for (int channel = 0; channel < spec.channels; ++channel) {
@@ -93,7 +76,7 @@ class ExrEncoder final : public RasterEncoder {
       header.channels().insert(names_.back(), Imf::Channel(type_));
     }
     start_exr_threads();
-    stream_.emplace(path);
+    stream_.emplace(out);
     translated([&] { file_.emplace(*stream_, header); });
   }
 
@@ -115,7 +98,7 @@ class ExrEncoder final : public RasterEncoder {
 
   void close() override {
     file_.reset();
-    stream_->close();
+    stream_->check();
   }
 
  private:
@@ -140,8 +123,8 @@ class ExrEncoder final : public RasterEncoder {
 
 }  // namespace
 
-std::unique_ptr<RasterEncoder> encode_exr(const std::string& path, const RasterSpec& spec) {
-  return std::make_unique<ExrEncoder>(path, spec);
+std::unique_ptr<RasterEncoder> encode_exr(OutputFile& out, const RasterSpec& spec) {
+  return std::make_unique<ExrEncoder>(out, spec);
 }
 
 }  // namespace isohf

@@ -17,9 +17,14 @@
 #include <cstring>
 #include <new>
 #include <optional>
+#include <set>
+#include <string>
+#include <tuple>
+#include <utility>
 #include <vector>
 
 #include "formats/exr_threads.h"
+#include "formats/letter_case.h"
 #include "formats/open_options.h"
 #include "formats/place_beside.h"
 #include "formats/text_tokens.h"
@@ -29,7 +34,14 @@
 namespace isohf {
 namespace {
 
-constexpr std::array<const char*, 7> kPreferredChannels = {"Y", "Z", "height", "Height", "elevation", "depth", "R"};
+/// Words for elevations, anywhere in the name of a channel or its layer, in any case.
+constexpr std::array kHeightWords = {"height", "elevation", "altitude", "dem"};
+/// Then channels called so, in any case; those of layers of normals and the like are something else.
+constexpr std::array kPreferredChannels = {"y", "z", "depth", "r"};
+constexpr std::array kOtherLayers = {"n", "normal", "normals", "uv", "st", "motion", "velocity", "tangent"};
+/// The order in which OpenImageIO, and so oiiotool, lists the channels of a layer; others follow by name.
+constexpr std::array kListedFirst = {"r",     "red", "g",  "green", "b",  "blue", "y",  "real", "imag",  "a",
+                                     "alpha", "ar",  "ra", "ag",    "ga", "ab",   "ba", "z",    "depth", "zback"};
 
 /// Rows are decoded in runs of at most about this size, so that several chunks are decoded at a time.
 constexpr std::int64_t kBandBytes = std::int64_t{8} << 20U;
@@ -52,9 +64,39 @@ std::string shown_name(const Channel& channel) {
   return one_line(full_name(channel));
 }
 
-std::string last_component(const std::string& name) {
-  const std::size_t dot = name.rfind('.');
-  return dot == std::string::npos ? name : name.substr(dot + 1);
+/// What stands between the dots of a name, in lower case.
+std::vector<std::string> components_of(const std::string& name) {
+  std::vector<std::string> components(1);
+  for (const char c : lower_case(name)) {
+    if (c == '.') {
+      components.emplace_back();
+    } else {
+      components.back() += c;
+    }
+  }
+  return components;
+}
+
+template <std::size_t count>
+std::size_t place_in(const std::array<const char*, count>& list, const std::string& word) {
+  return static_cast<std::size_t>(std::find(list.begin(), list.end(), word) - list.begin());
+}
+
+/// By layer, then as kListedFirst says, then by name. A layer of X, Y and Z is a vector, in that order.
+void sort_as_listed(std::vector<Channel>& channels) {
+  const auto layer_of = [](const Channel& channel) {
+    const std::size_t dot = channel.name.rfind('.');
+    return dot == std::string::npos ? std::string() : channel.name.substr(0, dot);
+  };
+  const auto last_of = [](const Channel& channel) { return components_of(channel.name).back(); };
+  std::set<std::pair<std::string, std::string>> there;
+  for (const Channel& channel : channels) there.emplace(layer_of(channel), last_of(channel));
+  const auto key = [&](const Channel& channel) {
+    const std::string layer = layer_of(channel);
+    const bool is_vector = there.contains({layer, "x"}) && there.contains({layer, "y"}) && there.contains({layer, "z"});
+    return std::tuple(layer, is_vector ? kListedFirst.size() : place_in(kListedFirst, last_of(channel)), channel.name);
+  };
+  std::ranges::stable_sort(channels, {}, key);
 }
 
 bool is_deep(const Imf::Header& header) {
@@ -65,6 +107,7 @@ std::vector<Channel> channels_of(const Imf::MultiPartInputFile& file) {
   std::vector<Channel> channels;
   for (int part = 0; part < file.parts(); ++part) {
     const Imf::Header& header = file.header(part);
+    std::vector<Channel> of_part;
     for (auto at = header.channels().begin(); at != header.channels().end(); ++at) {
       Channel channel;
       channel.part = part;
@@ -73,8 +116,11 @@ std::vector<Channel> channels_of(const Imf::MultiPartInputFile& file) {
       channel.type = at.channel().type;
       channel.subsampled = at.channel().xSampling != 1 || at.channel().ySampling != 1;
       channel.deep = is_deep(header);
-      channels.push_back(channel);
+      of_part.push_back(channel);
     }
+    if (of_part.empty()) continue;
+    sort_as_listed(of_part);
+    channels.insert(channels.end(), of_part.begin(), of_part.end());
   }
   return channels;
 }
@@ -125,14 +171,18 @@ Channel default_channel(const std::vector<Channel>& channels) {
     if (!channel.deep && (candidates.empty() || candidates.front().part == channel.part)) candidates.push_back(channel);
   }
   if (candidates.empty()) return channels.front();
-  for (const bool whole_name : {true, false}) {
-    for (const char* preferred : kPreferredChannels) {
-      for (const Channel& channel : candidates) {
-        if ((whole_name ? channel.name : last_component(channel.name)) == preferred) return channel;
-      }
-    }
-  }
-  return candidates.front();
+  // "height", then "height.Y" or "terrain.height", then "Y", then "beauty.Y", then what is left.
+  const auto rank = [](const Channel& channel) {
+    const std::vector<std::string> components = components_of(channel.name);
+    const bool whole = components.size() == 1;
+    std::size_t words = kHeightWords.size();
+    for (const std::string& component : components) words = std::min(words, place_in(kHeightWords, component));
+    if (words < kHeightWords.size()) return words + (whole ? 0 : kHeightWords.size());
+    const bool is_other = !whole && place_in(kOtherLayers, components.front()) < kOtherLayers.size();
+    return 2 * kHeightWords.size() + (whole ? 0 : kPreferredChannels.size() + 1) +
+           (is_other ? kPreferredChannels.size() : place_in(kPreferredChannels, components.back()));
+  };
+  return *std::ranges::min_element(candidates, {}, rank);
 }
 
 SampleType sample_type_of(Imf::PixelType type) {
@@ -261,8 +311,8 @@ class ExrSource final : public HeightSource {
     info_.channel = channels.size() > 1 || !channel_.part_name.empty() ? full_name(channel_) : std::string();
     sample_bytes_ = size_bytes(info_.sample_type);
     if (chosen_here && channels.size() > 1) {
-      info_.warnings.push_back(
-          fmt::format("channel {} is read, of {} ({})", shown_name(channel_), channels.size(), list_of(channels)));
+      info_.warnings.push_back(fmt::format("channel {} is read, of {} ({}); --channel chooses another",
+                                           shown_name(channel_), channels.size(), list_of(channels)));
     }
     if (data != display) {
       info_.warnings.push_back(fmt::format(

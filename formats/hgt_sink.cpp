@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "formats/hgt_name.h"
-#include "formats/output_stream.h"
 #include "formats/raster_encoder.h"
 #include "formats/raw_file.h"
 #include "isohf/base/error.h"
@@ -18,17 +17,17 @@ constexpr double kVoid = -32768.0;
 /// Big-endian int16, nothing else.
 class HgtEncoder final : public RasterEncoder {
  public:
-  explicit HgtEncoder(const std::string& path) : out_(path) {}
+  explicit HgtEncoder(OutputFile& out) : out_(out) {}
 
   void write(std::span<const std::byte> rows, std::int64_t /*count*/) override {
     swapped_.assign(rows.begin(), rows.end());
     swap_byte_order(swapped_, sizeof(std::int16_t));
-    out_.write(swapped_);
+    out_.append(swapped_);
   }
-  void close() override { out_.close(); }
+  void close() override {}
 
  private:
-  OutputStream out_;
+  OutputFile& out_;
   std::vector<std::byte> swapped_;
 };
 
@@ -63,21 +62,21 @@ void check_place(const std::string& path, const RasterSpec& spec) {
 
 }  // namespace
 
-std::unique_ptr<RasterEncoder> encode_hgt(const std::string& path, const RasterSpec& spec) {
+std::unique_ptr<RasterEncoder> encode_hgt(OutputFile& out, const RasterSpec& spec) {
   if (spec.sample_type != SampleType::kInt16 || spec.channels != 1) {
-    throw Error(ErrorCode::kUnsupported, fmt::format("HGT stores one channel of int16, not {} of {}", spec.channels,
-                                                     to_string(spec.sample_type)));
+    throw Error(ErrorCode::kInvalidArgument, fmt::format("HGT stores one channel of int16, not {} of {}", spec.channels,
+                                                         to_string(spec.sample_type)));
   }
   if (!is_tile_size(spec.width, spec.height)) {
-    throw Error(ErrorCode::kUnsupported,
+    throw Error(ErrorCode::kInvalidArgument,
                 fmt::format("an HGT tile has 1201 x 1201, 3601 x 3601 or 1801 x 3601 samples, not {} x {}", spec.width,
                             spec.height));
   }
   if (spec.void_value && *spec.void_value != kVoid) {
-    throw Error(ErrorCode::kUnsupported, fmt::format("HGT's void value is -32768, not {}", *spec.void_value));
+    throw Error(ErrorCode::kInvalidArgument, fmt::format("HGT's void value is -32768, not {}", *spec.void_value));
   }
-  check_place(path, spec);
-  return std::make_unique<HgtEncoder>(path);
+  check_place(out.path(), spec);
+  return std::make_unique<HgtEncoder>(out);
 }
 
 }  // namespace isohf

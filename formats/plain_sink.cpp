@@ -6,7 +6,6 @@
 #include <cstring>
 #include <vector>
 
-#include "formats/output_stream.h"
 #include "formats/raster_encoder.h"
 #include "formats/raster_sidecars.h"
 #include "isohf/base/error.h"
@@ -19,31 +18,31 @@ static_assert(std::endian::native == std::endian::little, "samples are written a
 /// The samples, little-endian, behind a header that may be empty. NaN in a grid of floats becomes its void value.
 class PlainEncoder final : public RasterEncoder {
  public:
-  PlainEncoder(const std::string& path, const std::string& header, std::optional<float> void_value)
-      : out_(path), void_value_(void_value) {
-    if (!header.empty()) out_.write(header);
+  PlainEncoder(OutputFile& out, const std::string& header, std::optional<float> void_value)
+      : out_(out), void_value_(void_value) {
+    if (!header.empty()) out_.append(header);
   }
 
   void write(std::span<const std::byte> rows, std::int64_t /*count*/) override {
-    if (!void_value_) return out_.write(rows);
+    if (!void_value_) return out_.append(rows);
     samples_.resize(rows.size() / sizeof(float));
     std::memcpy(samples_.data(), rows.data(), rows.size());
     std::replace_if(
         samples_.begin(), samples_.end(), [](float z) { return std::isnan(z); }, *void_value_);
-    out_.write(std::as_bytes(std::span(samples_)));
+    out_.append(std::as_bytes(std::span(samples_)));
   }
-  void close() override { out_.close(); }
+  void close() override {}
 
  private:
-  OutputStream out_;
+  OutputFile& out_;
   std::optional<float> void_value_;
   std::vector<float> samples_;
 };
 
 void require(const RasterSpec& spec, SampleType type, const char* format) {
   if (spec.sample_type == type && spec.channels == 1) return;
-  throw Error(ErrorCode::kUnsupported, fmt::format("{} stores one channel of {}, not {} of {}", format, to_string(type),
-                                                   spec.channels, to_string(spec.sample_type)));
+  throw Error(ErrorCode::kInvalidArgument, fmt::format("{} stores one channel of {}, not {} of {}", format,
+                                                       to_string(type), spec.channels, to_string(spec.sample_type)));
 }
 
 /// NumPy's header, version 1 (NEP 1): blanks fill it up to a multiple of 64 bytes.
@@ -67,23 +66,23 @@ std::string npy_header(const RasterSpec& spec) {
 
 }  // namespace
 
-std::unique_ptr<RasterEncoder> encode_r16(const std::string& path, const RasterSpec& spec) {
+std::unique_ptr<RasterEncoder> encode_r16(OutputFile& out, const RasterSpec& spec) {
   require(spec, SampleType::kUint16, ".r16");
-  return std::make_unique<PlainEncoder>(path, "", std::nullopt);
+  return std::make_unique<PlainEncoder>(out, "", std::nullopt);
 }
 
-std::unique_ptr<RasterEncoder> encode_r32(const std::string& path, const RasterSpec& spec) {
+std::unique_ptr<RasterEncoder> encode_r32(OutputFile& out, const RasterSpec& spec) {
   require(spec, SampleType::kFloat32, ".r32");
-  return std::make_unique<PlainEncoder>(path, "", std::nullopt);
+  return std::make_unique<PlainEncoder>(out, "", std::nullopt);
 }
 
-std::unique_ptr<RasterEncoder> encode_flt(const std::string& path, const RasterSpec& spec) {
+std::unique_ptr<RasterEncoder> encode_flt(OutputFile& out, const RasterSpec& spec) {
   require(spec, SampleType::kFloat32, "GridFloat");
-  return std::make_unique<PlainEncoder>(path, "", static_cast<float>(grid_void(spec)));
+  return std::make_unique<PlainEncoder>(out, "", static_cast<float>(grid_void(spec)));
 }
 
-std::unique_ptr<RasterEncoder> encode_npy(const std::string& path, const RasterSpec& spec) {
-  return std::make_unique<PlainEncoder>(path, npy_header(spec), std::nullopt);
+std::unique_ptr<RasterEncoder> encode_npy(OutputFile& out, const RasterSpec& spec) {
+  return std::make_unique<PlainEncoder>(out, npy_header(spec), std::nullopt);
 }
 
 }  // namespace isohf

@@ -2,11 +2,11 @@
 #include <png.h>
 
 #include <array>
-#include <cerrno>
 #include <cmath>
 #include <csetjmp>
 #include <cstdio>
-#include <cstring>
+#include <exception>
+#include <utility>
 
 #include "formats/raster_encoder.h"
 #include "isohf/base/error.h"
@@ -27,9 +27,7 @@ struct PngLayout {
 /// on failure, and leaves the reason in message().
 class PngEncoder final : public RasterEncoder {
  public:
-  PngEncoder(const std::string& path, const PngLayout& layout, std::size_t row_bytes) : row_bytes_(row_bytes) {
-    file_ = std::fopen(path.c_str(), "wb");
-    if (file_ == nullptr) fail_with_errno();
+  PngEncoder(OutputFile& out, const PngLayout& layout, std::size_t row_bytes) : out_(out), row_bytes_(row_bytes) {
     if (!start(layout)) {
       release();
       fail();
@@ -46,19 +44,31 @@ class PngEncoder final : public RasterEncoder {
 
   void close() override {
     if (!write_end()) fail();
-    std::FILE* file = file_;
-    file_ = nullptr;
-    if (std::fclose(file) != 0) fail_with_errno();
   }
 
  private:
   static void on_error(png_structp png, png_const_charp text) {
     auto& message = static_cast<PngEncoder*>(png_get_error_ptr(png))->message_;
-    std::snprintf(message.data(), message.size(), "%s%s%s", text, errno != 0 ? ": " : "",
-                  errno != 0 ? std::strerror(errno) : "");
+    std::snprintf(message.data(), message.size(), "%s", text);
     png_longjmp(png, 1);
   }
   static void on_warning(png_structp, png_const_charp) {}
+  static void on_write(png_structp png, png_bytep data, std::size_t count) {
+    if (!static_cast<PngEncoder*>(png_get_io_ptr(png))->append({reinterpret_cast<std::byte*>(data), count})) {
+      png_error(png, "output failed");
+    }
+  }
+  static void on_flush(png_structp) {}
+
+  [[nodiscard]] bool append(std::span<const std::byte> bytes) noexcept {
+    try {
+      out_.append(bytes);
+      return true;
+    } catch (...) {
+      failure_ = std::current_exception();  // not through libpng's frames
+      return false;
+    }
+  }
 
   [[nodiscard]] bool start(const PngLayout& layout) {
     png_ = png_create_write_struct(PNG_LIBPNG_VER_STRING, this, on_error, on_warning);
@@ -69,7 +79,7 @@ class PngEncoder final : public RasterEncoder {
     }
     if (setjmp(png_jmpbuf(png_)) != 0) return false;  // NOLINT(cert-err52-cpp): libpng's way to return errors
     png_set_user_limits(png_, PNG_UINT_31_MAX, PNG_UINT_31_MAX);
-    png_init_io(png_, file_);
+    png_set_write_fn(png_, this, on_write, on_flush);
     png_set_IHDR(png_, info_, layout.width, layout.height, layout.bit_depth, layout.color_type, PNG_INTERLACE_NONE,
                  PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
     if (layout.transparent_gray >= 0) {
@@ -83,14 +93,12 @@ class PngEncoder final : public RasterEncoder {
   }
 
   [[nodiscard]] bool write_row(png_const_bytep row) {
-    errno = 0;
     if (setjmp(png_jmpbuf(png_)) != 0) return false;  // NOLINT(cert-err52-cpp)
     png_write_row(png_, row);
     return true;
   }
 
   [[nodiscard]] bool write_end() {
-    errno = 0;
     if (setjmp(png_jmpbuf(png_)) != 0) return false;  // NOLINT(cert-err52-cpp)
     png_write_end(png_, nullptr);
     return true;
@@ -98,20 +106,16 @@ class PngEncoder final : public RasterEncoder {
 
   void release() {
     if (png_ != nullptr) png_destroy_write_struct(&png_, &info_);
-    if (file_ != nullptr) std::fclose(file_);
-    file_ = nullptr;
   }
 
-  [[noreturn]] void fail() const {
+  [[noreturn]] void fail() {
+    if (failure_) std::rethrow_exception(std::exchange(failure_, nullptr));
     throw Error(ErrorCode::kIo, fmt::format("PNG cannot be written: {}", message_.data()));
   }
-  [[noreturn]] static void fail_with_errno() {
-    const int error = errno;
-    throw Error(ErrorCode::kIo, fmt::format("cannot be written: {}", std::strerror(error)));
-  }
 
+  OutputFile& out_;
   std::size_t row_bytes_;
-  std::FILE* file_ = nullptr;
+  std::exception_ptr failure_;
   png_structp png_ = nullptr;
   png_infop info_ = nullptr;
   std::array<char, 256> message_{};
@@ -129,7 +133,7 @@ PngLayout layout_of(const RasterSpec& spec) {
       layout.bit_depth = 16;
       break;
     default:
-      throw Error(ErrorCode::kUnsupported,
+      throw Error(ErrorCode::kInvalidArgument,
                   fmt::format("PNG stores uint8 and uint16, not {}", to_string(spec.sample_type)));
   }
   layout.color_type = spec.channels == 1   ? PNG_COLOR_TYPE_GRAY
@@ -139,7 +143,7 @@ PngLayout layout_of(const RasterSpec& spec) {
     const double value = *spec.void_value;
     const double highest = layout.bit_depth == 8 ? 255.0 : 65535.0;
     if (!(value >= 0.0 && value <= highest) || value != std::floor(value)) {
-      throw Error(ErrorCode::kUnsupported, fmt::format("the void value {} is none of 0...{}", value, highest));
+      throw Error(ErrorCode::kInvalidArgument, fmt::format("the void value {} is none of 0...{}", value, highest));
     }
     layout.transparent_gray = static_cast<int>(value);
   }
@@ -148,8 +152,8 @@ PngLayout layout_of(const RasterSpec& spec) {
 
 }  // namespace
 
-std::unique_ptr<RasterEncoder> encode_png(const std::string& path, const RasterSpec& spec) {
-  return std::make_unique<PngEncoder>(path, layout_of(spec), row_bytes(spec));
+std::unique_ptr<RasterEncoder> encode_png(OutputFile& out, const RasterSpec& spec) {
+  return std::make_unique<PngEncoder>(out, layout_of(spec), row_bytes(spec));
 }
 
 }  // namespace isohf

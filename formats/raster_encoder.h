@@ -7,6 +7,7 @@
 #include <string>
 
 #include "formats/raster_sink.h"
+#include "isohf/base/output_file.h"
 
 namespace isohf {
 
@@ -20,20 +21,21 @@ class RasterEncoder {
 
   /// Stores `count` rows, those after the ones stored before.
   virtual void write(std::span<const std::byte> rows, std::int64_t count) = 0;
-  /// Writes what is pending and closes the file.
+  /// Writes what is pending.
   virtual void close() = 0;
 };
 
-/// Each opens `path`, an empty file that exists, and throws Error{kUnsupported} for a spec that it cannot store.
-[[nodiscard]] std::unique_ptr<RasterEncoder> encode_tiff(const std::string& path, const RasterSpec& spec);
-[[nodiscard]] std::unique_ptr<RasterEncoder> encode_exr(const std::string& path, const RasterSpec& spec);
-[[nodiscard]] std::unique_ptr<RasterEncoder> encode_png(const std::string& path, const RasterSpec& spec);
-[[nodiscard]] std::unique_ptr<RasterEncoder> encode_hgt(const std::string& path, const RasterSpec& spec);
-[[nodiscard]] std::unique_ptr<RasterEncoder> encode_r16(const std::string& path, const RasterSpec& spec);
-[[nodiscard]] std::unique_ptr<RasterEncoder> encode_r32(const std::string& path, const RasterSpec& spec);
-[[nodiscard]] std::unique_ptr<RasterEncoder> encode_flt(const std::string& path, const RasterSpec& spec);
-[[nodiscard]] std::unique_ptr<RasterEncoder> encode_npy(const std::string& path, const RasterSpec& spec);
-[[nodiscard]] std::unique_ptr<RasterEncoder> encode_asc(const std::string& path, const RasterSpec& spec);
+/// Each writes to `out`, which is empty and outlives it, and throws Error{kInvalidArgument} for a spec that it cannot
+/// store.
+[[nodiscard]] std::unique_ptr<RasterEncoder> encode_tiff(OutputFile& out, const RasterSpec& spec);
+[[nodiscard]] std::unique_ptr<RasterEncoder> encode_exr(OutputFile& out, const RasterSpec& spec);
+[[nodiscard]] std::unique_ptr<RasterEncoder> encode_png(OutputFile& out, const RasterSpec& spec);
+[[nodiscard]] std::unique_ptr<RasterEncoder> encode_hgt(OutputFile& out, const RasterSpec& spec);
+[[nodiscard]] std::unique_ptr<RasterEncoder> encode_r16(OutputFile& out, const RasterSpec& spec);
+[[nodiscard]] std::unique_ptr<RasterEncoder> encode_r32(OutputFile& out, const RasterSpec& spec);
+[[nodiscard]] std::unique_ptr<RasterEncoder> encode_flt(OutputFile& out, const RasterSpec& spec);
+[[nodiscard]] std::unique_ptr<RasterEncoder> encode_npy(OutputFile& out, const RasterSpec& spec);
+[[nodiscard]] std::unique_ptr<RasterEncoder> encode_asc(OutputFile& out, const RasterSpec& spec);
 
 /// Bytes of one row of all channels.
 [[nodiscard]] inline std::size_t row_bytes(const RasterSpec& spec) {

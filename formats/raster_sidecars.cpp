@@ -9,6 +9,8 @@
 #include <nlohmann/json.hpp>
 
 #include "formats/letter_case.h"
+#include "isohf/base/error.h"
+#include "isohf/base/output_file.h"
 
 namespace isohf {
 namespace {
@@ -111,6 +113,39 @@ double grid_void(const RasterSpec& spec) {
 
 std::string ascii_grid_header(const RasterSpec& spec) {
   return grid_words(spec);
+}
+
+std::vector<std::string> sidecar_paths(const std::string& path) {
+  const std::string extension = extension_of(path);
+  const auto beside = [&](const char* other) { return std::filesystem::path(path).replace_extension(other).string(); };
+  if (extension == ".flt") return {beside(".hdr"), beside(".prj")};
+  if (extension == ".asc") return {beside(".prj")};
+  const bool described = extension == ".r16" || extension == ".r32" || extension == ".raw" || extension == ".png";
+  return described ? std::vector<std::string>{path + ".json"} : std::vector<std::string>{};
+}
+
+void check_sidecar_target(const std::string& path) {
+  constexpr std::size_t kMostBytes = std::size_t{1} << 16U;
+  const std::vector<std::byte> bytes = head_of_file(path, kMostBytes);
+  if (bytes.empty()) return;
+  const std::string text = lower_case({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+  const std::string extension = extension_of(path);
+  bool is_kind = false;
+  if (extension == ".json") {
+    const auto json = nlohmann::json::parse(text, nullptr, false);
+    is_kind = json.is_object() && json.contains("width") && json.contains("sample_type");
+  } else if (extension == ".hdr") {
+    is_kind = text.find("ncols") != std::string::npos && text.find("nrows") != std::string::npos;
+  } else {
+    const std::size_t end = text.find_first_not_of("abcdefghijklmnopqrstuvwxyz_");
+    is_kind = end > 0 && end != std::string::npos && (text[end] == '[' || text.starts_with("projection"));
+  }
+  if (is_kind) return;
+  throw Error(
+      ErrorCode::kInvalidArgument,
+      fmt::format("exists and is no {} of a raster, which alone is replaced; remove it first, or choose another "
+                  "name for the raster",
+                  extension));
 }
 
 std::vector<Sidecar> sidecars_of(const std::string& path, const RasterSpec& spec) {

@@ -17,6 +17,13 @@ struct Sidecar {
 /// samples and, where spec.describe says so, PNG, and .prj for grids whose reference system has a WKT.
 [[nodiscard]] std::vector<Sidecar> sidecars_of(const std::string& path, const RasterSpec& spec);
 
+/// The names of all that may stand beside a raster of that name.
+[[nodiscard]] std::vector<std::string> sidecar_paths(const std::string& path);
+
+/// Throws Error{kInvalidArgument} without the path where another kind of file would be replaced: a Radiance picture or
+/// an ENVI header for .hdr, somebody else's .json.
+void check_sidecar_target(const std::string& path);
+
 /// The lines in front of an ESRI ASCII grid's numbers.
 [[nodiscard]] std::string ascii_grid_header(const RasterSpec& spec);
 

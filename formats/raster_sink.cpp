@@ -2,36 +2,37 @@
 
 #include <fmt/format.h>
 
-#include <fstream>
+#include <algorithm>
 #include <limits>
+#include <span>
 
 #include "formats/letter_case.h"
 #include "formats/libraries.h"
-#include "formats/output_part.h"
-#include "formats/output_stream.h"
 #include "formats/raster_encoder.h"
 #include "formats/raster_sidecars.h"
 #include "isohf/base/error.h"
+#include "isohf/base/output_file.h"
 
 namespace isohf {
 namespace {
 
 struct Writer {
   Format format;
-  std::unique_ptr<RasterEncoder> (*encode)(const std::string& path, const RasterSpec& spec);
+  std::unique_ptr<RasterEncoder> (*encode)(OutputFile& out, const RasterSpec& spec);
+  bool has_signature;  ///< by which its files are known; others begin in any way
 };
 
 const std::vector<Writer>& writers() {
   static const std::vector<Writer> table = {
-      {{"GeoTIFF", {".tif", ".tiff"}, tiff_library, "samples of any type"}, encode_tiff},
-      {{"OpenEXR", {".exr"}, exr_library, "float16, float32, uint32"}, encode_exr},
-      {{"PNG", {".png"}, png_library, "uint8, uint16"}, encode_png},
-      {{"SRTM HGT", {".hgt"}, nullptr, "int16; 1201x1201, 3601x3601 or 1801x3601"}, encode_hgt},
-      {{"ESRI ASCII grid", {".asc"}, nullptr, "samples of any type"}, encode_asc},
-      {{"GridFloat", {".flt"}, nullptr, "float32; with .hdr"}, encode_flt},
-      {{"raw 16 bit", {".r16", ".raw"}, nullptr, "uint16; with .json"}, encode_r16},
-      {{"raw 32 bit", {".r32"}, nullptr, "float32; with .json"}, encode_r32},
-      {{"NumPy", {".npy"}, nullptr, "samples of any type"}, encode_npy},
+      {{"GeoTIFF", {".tif", ".tiff"}, tiff_library, "samples of any type"}, encode_tiff, true},
+      {{"OpenEXR", {".exr"}, exr_library, "float16, float32, uint32"}, encode_exr, true},
+      {{"PNG", {".png"}, png_library, "uint8, uint16"}, encode_png, true},
+      {{"SRTM HGT", {".hgt"}, nullptr, "int16; 1201x1201, 3601x3601 or 1801x3601"}, encode_hgt, false},
+      {{"ESRI ASCII grid", {".asc"}, nullptr, "samples of any type"}, encode_asc, true},
+      {{"GridFloat", {".flt"}, nullptr, "float32; with .hdr"}, encode_flt, false},
+      {{"raw 16 bit", {".r16", ".raw"}, nullptr, "uint16; with .json"}, encode_r16, false},
+      {{"raw 32 bit", {".r32"}, nullptr, "float32; with .json"}, encode_r32, false},
+      {{"NumPy", {".npy"}, nullptr, "samples of any type"}, encode_npy, true},
   };
   return table;
 }
@@ -49,8 +50,8 @@ const Writer& writer_for(const std::string& path) {
       if (extension == known) return writer;
     }
   }
-  throw Error(ErrorCode::kUnsupported, fmt::format("no writer for the extension \"{}\"; there are {}", extension,
-                                                   fmt::join(writable_extensions(), " ")));
+  throw Error(ErrorCode::kInvalidArgument, fmt::format("no writer for the extension \"{}\"; there are {}", extension,
+                                                       fmt::join(writable_extensions(), " ")));
 }
 
 void check(const RasterSpec& spec) {
@@ -64,37 +65,60 @@ void check(const RasterSpec& spec) {
   }
 }
 
-/// Whether the file is there already, as it would be written: rasters of one name may share a .prj.
-bool holds(const Sidecar& sidecar) {
-  std::ifstream in(sidecar.path, std::ios::binary);
-  std::string text(sidecar.text.size() + 1, '\0');
-  in.read(text.data(), static_cast<std::streamsize>(text.size()));
-  return in.gcount() == static_cast<std::streamsize>(sidecar.text.size()) && text.starts_with(sidecar.text);
+/// What a file is that is to be replaced; empty where it is of the writer's kind, or empty.
+std::string other_kind(const std::string& path, const Writer& writer) {
+  constexpr std::size_t kHeadBytes = 256;
+  const std::vector<std::byte> head = head_of_file(path, kHeadBytes);
+  if (head.empty()) return {};
+  const std::string start(reinterpret_cast<const char*>(head.data()), std::min<std::size_t>(head.size(), 4));
+  if (start == "PK\x03\x04") return "a ZIP archive, as .isohf files are";
+  const Format* const found = format_of_head(head);
+  if (found == nullptr) return writer.has_signature ? fmt::format("no {}", writer.format.name) : "";
+  const bool same = std::ranges::any_of(found->extensions, [&](std::string_view extension) {
+    return std::ranges::count(writer.format.extensions, extension) > 0;
+  });
+  return same ? "" : fmt::format("of the kind {}", found->name);
 }
 
-std::vector<std::unique_ptr<OutputPart>> begin_sidecars(const std::string& path, const RasterSpec& spec) {
-  std::vector<std::unique_ptr<OutputPart>> parts;
+/// Throws, without the path, what OutputFile will throw, and where another kind of file stands there.
+void check_target(const std::string& path, const Writer& writer, bool overwrite) {
+  const std::string kind = other_kind(output_place(path, true), writer);
+  if (kind.empty()) return static_cast<void>(output_place(path, overwrite));
+  throw Error(ErrorCode::kInvalidArgument,
+              fmt::format("exists and is {}; a {} replaces only a file of its own kind, remove it first or choose "
+                          "another name",
+                          kind, writer.format.name));
+}
+
+/// Whether the file is there already, as it would be written: rasters of one name may share a .prj.
+bool holds(const Sidecar& sidecar) {
+  const std::vector<std::byte> found = head_of_file(sidecar.path, sidecar.text.size() + 1);
+  return std::ranges::equal(found, std::as_bytes(std::span(sidecar.text)));
+}
+
+std::vector<std::unique_ptr<OutputFile>> begin_sidecars(const std::string& path, const RasterSpec& spec) {
+  std::vector<std::unique_ptr<OutputFile>> files;
   for (const Sidecar& sidecar : sidecars_of(path, spec)) {
     if (holds(sidecar)) continue;
     try {
-      parts.push_back(std::make_unique<OutputPart>(sidecar.path, spec.overwrite));
-      OutputStream out(parts.back()->path());
-      out.write(sidecar.text);
-      out.close();
+      check_sidecar_target(sidecar.path);
+      files.push_back(std::make_unique<OutputFile>(sidecar.path, OutputFile::Options{spec.overwrite}));
+      files.back()->append(sidecar.text);
+      files.back()->flush();
     } catch (const Error& error) {
       throw error.within(sidecar.path);
     }
   }
-  return parts;
+  return files;
 }
 
 }  // namespace
 
-RasterSink::RasterSink(std::string path, const RasterSpec& spec, std::unique_ptr<OutputPart> part,
-                       std::vector<std::unique_ptr<OutputPart>> sidecars, std::unique_ptr<RasterEncoder> encoder)
+RasterSink::RasterSink(std::string path, const RasterSpec& spec, std::unique_ptr<OutputFile> file,
+                       std::vector<std::unique_ptr<OutputFile>> sidecars, std::unique_ptr<RasterEncoder> encoder)
     : path_(std::move(path)),
       spec_(spec),
-      part_(std::move(part)),
+      file_(std::move(file)),
       sidecars_(std::move(sidecars)),
       encoder_(std::move(encoder)) {}
 
@@ -125,9 +149,19 @@ void RasterSink::finish() {
   try {
     encoder_->close();
     encoder_.reset();
-    // What the name stands for is complete when it appears.
-    for (const auto& sidecar : sidecars_) sidecar->commit();
-    part_->commit();
+    // All is on the disk before anything gets its name, and what the raster's name stands for is complete when it
+    // appears. Whoever ends the program in between finds no raster, never old samples with a new description.
+    file_->sync();
+    for (const auto& sidecar : sidecars_) sidecar->sync();
+    if (!sidecars_.empty()) file_->remove_replaced();
+    for (const auto& sidecar : sidecars_) {
+      try {
+        sidecar->commit();
+      } catch (const Error& error) {
+        throw error.within(sidecar->path());
+      }
+    }
+    file_->commit();
   } catch (const Error& error) {
     throw error.within(path_);
   }
@@ -137,10 +171,20 @@ std::unique_ptr<RasterSink> create_raster(const std::string& path, const RasterS
   try {
     const Writer& writer = writer_for(path);
     check(spec);
-    auto part = std::make_unique<OutputPart>(path, spec.overwrite);
+    check_target(path, writer, spec.overwrite);
+    auto file = std::make_unique<OutputFile>(path, OutputFile::Options{spec.overwrite});
     auto sidecars = begin_sidecars(path, spec);
-    auto encoder = writer.encode(part->path(), spec);
-    return std::make_unique<RasterSink>(path, spec, std::move(part), std::move(sidecars), std::move(encoder));
+    auto encoder = writer.encode(*file, spec);
+    return std::make_unique<RasterSink>(path, spec, std::move(file), std::move(sidecars), std::move(encoder));
+  } catch (const Error& error) {
+    throw error.within(path);
+  }
+}
+
+void check_raster_target(const std::string& path, bool overwrite) {
+  try {
+    if (path == "-") static_cast<void>(output_place(path, overwrite));  // says so before the extension is looked at
+    check_target(path, writer_for(path), overwrite);
   } catch (const Error& error) {
     throw error.within(path);
   }

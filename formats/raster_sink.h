@@ -32,19 +32,20 @@ struct RasterSpec {
   bool overwrite = false;  ///< replace a file of that name
 };
 
-class OutputPart;
+class OutputFile;
 class RasterEncoder;
 
 /// A raster file that is written from its first row to its last.
 ///
-/// Everything goes to NAME.part, which finish() flushes to the disk and renames; a sink that is destroyed before leaves
-/// nothing behind. The files beside it (raster_sidecars.h) are finished first, in the same way. One thread calls.
+/// Everything goes to NAME.part (output_file.h), which finish() flushes to the disk and renames; a sink that is
+/// destroyed before leaves nothing behind. The files beside it (raster_sidecars.h) get their names first, when all are
+/// on the disk; samples and a description that do not belong together never stand beside each other. One thread calls.
 /// Memory: a few megabytes, a few rows where these are longer, and 256 rows for TIFF, of 64 MiB at most. TIFF strips
 /// are compressed on the caller's oneTBB arena; the bytes do not depend on the number of threads.
 class RasterSink {
  public:
-  RasterSink(std::string path, const RasterSpec& spec, std::unique_ptr<OutputPart> part,
-             std::vector<std::unique_ptr<OutputPart>> sidecars, std::unique_ptr<RasterEncoder> encoder);
+  RasterSink(std::string path, const RasterSpec& spec, std::unique_ptr<OutputFile> file,
+             std::vector<std::unique_ptr<OutputFile>> sidecars, std::unique_ptr<RasterEncoder> encoder);
   RasterSink(const RasterSink&) = delete;
   RasterSink& operator=(const RasterSink&) = delete;
   ~RasterSink();
@@ -61,8 +62,8 @@ class RasterSink {
  private:
   std::string path_;
   RasterSpec spec_;
-  std::unique_ptr<OutputPart> part_;  ///< outlives the encoder, which has it open
-  std::vector<std::unique_ptr<OutputPart>> sidecars_;
+  std::unique_ptr<OutputFile> file_;  ///< outlives the encoder, which writes to it
+  std::vector<std::unique_ptr<OutputFile>> sidecars_;
   std::unique_ptr<RasterEncoder> encoder_;
   std::int64_t rows_written_ = 0;
 };
@@ -74,9 +75,12 @@ class RasterSink {
 ///   3601 samples; void is -32768 .asc        one channel of any type, in decimal; NaN becomes the lowest float .flt
 ///   one float32 channel, with its .hdr; NaN becomes the lowest float .r16 .raw   one uint16 channel, little-endian,
 ///   nothing else; .r32 the same of float32; with NAME.r16.json .npy        NumPy, any type
-/// Throws Error naming the path: kUnsupported (no such extension, or samples that the format cannot hold),
-/// kInvalidArgument (sizes; the file exists and overwrite is not set), kIo.
+/// Throws Error naming the path: kInvalidArgument (no such extension; sizes, or samples that the format cannot hold;
+/// the file exists and overwrite is not set, or is of another kind), kIo.
 [[nodiscard]] std::unique_ptr<RasterSink> create_raster(const std::string& path, const RasterSpec& spec);
+
+/// Refuses a name that create_raster would refuse, before any work: Error naming the path.
+void check_raster_target(const std::string& path, bool overwrite);
 
 /// The extensions that create_raster knows: ".tif", ...
 [[nodiscard]] const std::vector<std::string>& writable_extensions();

@@ -154,6 +154,13 @@ const Format* native_format_of(const std::string& path, const OpenOptions& optio
   return reader != nullptr ? &reader->format : nullptr;
 }
 
+const Format* format_of_head(std::span<const std::byte> head) {
+  for (const Reader& reader : readers()) {
+    if (reader.recognises != nullptr && reader.recognises(head)) return &reader.format;
+  }
+  return nullptr;
+}
+
 std::string library_of(const Format& format) {
   return format.library != nullptr ? format.library() : "isohf";
 }

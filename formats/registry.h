@@ -1,8 +1,10 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -48,6 +50,9 @@ struct Format {
 /// The native format in which open_source() would read this file; nullptr where none knows it. Throws Error{kIo,
 /// kCorrupt} as open_source does for what is no readable file.
 [[nodiscard]] const Format* native_format_of(const std::string& path, const OpenOptions& options);
+
+/// The native format whose signature a file's first 256 bytes hold; nullptr where they hold none.
+[[nodiscard]] const Format* format_of_head(std::span<const std::byte> head);
 
 /// "libtiff 4.5.0", or "isohf".
 [[nodiscard]] std::string library_of(const Format& format);

@@ -52,6 +52,17 @@ struct TiffHandle::Impl {
     TIFFOpenOptionsFree(options);
     if (tif == nullptr) fail("is not a readable TIFF file");
   }
+
+  /// Throws where a part of the directory could not be read: libtiff goes on without the tag, be it void value, place
+  /// or reference system, and calls that a warning.
+  void check_directory() {
+    if (io_error) std::rethrow_exception(std::exchange(io_error, nullptr));
+    const auto lost = std::find_if(warnings.begin(), warnings.end(), [](const std::string& warning) {
+      return warning.starts_with("IO error during reading");
+    });
+    if (lost != warnings.end() && error.empty()) error = *lost;
+    if (!error.empty()) fail("a tag cannot be read, the file is damaged or cut off");
+  }
   [[nodiscard]] static std::unique_ptr<Impl> on_directory(const RawFile& file, std::uint32_t directory, bool mapped) {
     auto impl = std::make_unique<Impl>(file, mapped);
     if (directory != 0 && TIFFSetDirectory(impl->tif, directory) != 1) {
@@ -344,6 +355,7 @@ TiffLayout TiffHandle::read_layout() {
 
 TiffTags TiffHandle::read_tags() {
   Impl& impl = *impl_;
+  impl.check_directory();
   TiffTags tags;
   tags.geo.pixel_scale = impl.numbers<double>(kModelPixelScaleTag);
   tags.geo.tiepoints = impl.numbers<double>(kModelTiepointTag);
@@ -382,6 +394,7 @@ TiffMainImage open_main_image(const RawFile& file) {
     if (TIFFLastDirectory(walk->tif) != 0) break;
     walked = true;
     found.has_broken = TIFFReadDirectory(walk->tif) != 1;
+    if (found.has_broken && walk->io_error) std::rethrow_exception(walk->io_error);
     if (found.has_broken) break;
   }
   // A walk leaves the handle elsewhere, with what libtiff said of other images.

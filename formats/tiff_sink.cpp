@@ -8,6 +8,8 @@
 #include <cstdarg>
 #include <cstdio>
 #include <cstring>
+#include <exception>
+#include <utility>
 #include <vector>
 
 #include "formats/geotiff_writer.h"
@@ -63,16 +65,18 @@ std::string gdal_metadata(const RasterSpec& spec) {
 
 class TiffEncoder final : public RasterEncoder {
  public:
-  TiffEncoder(const std::string& path, const RasterSpec& spec) {
+  TiffEncoder(OutputFile& out, const RasterSpec& spec) : out_(out) {
     const double raw_bytes = static_cast<double>(row_bytes(spec)) * static_cast<double>(spec.height);
     TIFFOpenOptions* options = TIFFOpenOptionsAlloc();
     if (options == nullptr) throw Error(ErrorCode::kOutOfMemory, "libtiff ran out of memory");
     TIFFOpenOptionsSetErrorHandlerExtR(options, on_error, this);
     TIFFOpenOptionsSetWarningHandlerExtR(options, on_warning, this);
-    tiff_ = TIFFOpenExt(path.c_str(), raw_bytes > kClassicBytes ? "w8" : "w", options);
+    tiff_ = TIFFClientOpenExt(out.path().c_str(), raw_bytes > kClassicBytes ? "w8" : "w", this, on_read, on_write,
+                              on_seek, on_close, on_size, nullptr, nullptr, options);
     TIFFOpenOptionsFree(options);
     if (tiff_ == nullptr) fail();
     try {
+      out_.flush();  // a full disk shows before the work
       set_layout(spec);
       set_place(spec);
     } catch (...) {
@@ -95,7 +99,7 @@ class TiffEncoder final : public RasterEncoder {
     write_pending();
     if (TIFFWriteDirectory(tiff_) == 0) fail();
     release();
-    if (failed_) fail();
+    if (failed_ || failure_) fail();
   }
 
  private:
@@ -111,7 +115,46 @@ class TiffEncoder final : public RasterEncoder {
   }
   static int on_warning(TIFF*, void*, const char*, const char*, va_list) { return 1; }
 
-  [[noreturn]] void fail() const {
+  /// Runs what may throw, but not through libtiff's frames; what failed first is the reason.
+  template <typename Action>
+  tmsize_t guarded(Action action) noexcept {
+    try {
+      return static_cast<tmsize_t>(action());
+    } catch (...) {
+      if (!failure_) failure_ = std::current_exception();
+      return -1;
+    }
+  }
+  static tmsize_t on_read(thandle_t self, void* bytes, tmsize_t count) {
+    auto& encoder = *static_cast<TiffEncoder*>(self);
+    return encoder.guarded([&] {
+      encoder.out_.flush();
+      const std::size_t got =
+          encoder.out_.read_at(encoder.position_, {static_cast<std::byte*>(bytes), static_cast<std::size_t>(count)});
+      encoder.position_ += got;
+      return got;
+    });
+  }
+  static tmsize_t on_write(thandle_t self, void* bytes, tmsize_t count) {
+    auto& encoder = *static_cast<TiffEncoder*>(self);
+    return encoder.guarded([&] {
+      const std::span data(static_cast<const std::byte*>(bytes), static_cast<std::size_t>(count));
+      encoder.out_.write_at(encoder.position_, data);
+      encoder.position_ += data.size();
+      return count;
+    });
+  }
+  static toff_t on_seek(thandle_t self, toff_t offset, int whence) {
+    auto& encoder = *static_cast<TiffEncoder*>(self);
+    if (whence == SEEK_CUR) offset += encoder.position_;
+    if (whence == SEEK_END) offset += encoder.out_.position();
+    return encoder.position_ = offset;
+  }
+  static int on_close(thandle_t) { return 0; }
+  static toff_t on_size(thandle_t self) { return static_cast<TiffEncoder*>(self)->out_.position(); }
+
+  [[noreturn]] void fail() {
+    if (failure_) std::rethrow_exception(std::exchange(failure_, nullptr));
     throw Error(ErrorCode::kIo, "TIFF cannot be written: " + (message_.empty() ? "unknown reason" : message_));
   }
 
@@ -235,6 +278,9 @@ class TiffEncoder final : public RasterEncoder {
     tiff_ = nullptr;
   }
 
+  OutputFile& out_;
+  std::uint64_t position_ = 0;
+  std::exception_ptr failure_;  ///< of out_
   bool tiled_ = false;
   std::size_t row_bytes_ = 0;
   std::size_t strip_bytes_ = 0;
@@ -249,8 +295,8 @@ class TiffEncoder final : public RasterEncoder {
 
 }  // namespace
 
-std::unique_ptr<RasterEncoder> encode_tiff(const std::string& path, const RasterSpec& spec) {
-  return std::make_unique<TiffEncoder>(path, spec);
+std::unique_ptr<RasterEncoder> encode_tiff(OutputFile& out, const RasterSpec& spec) {
+  return std::make_unique<TiffEncoder>(out, spec);
 }
 
 }  // namespace isohf

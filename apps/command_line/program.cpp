@@ -10,6 +10,7 @@
 #include <new>
 
 #include "isohf/base/error.h"
+#include "isohf/base/file.h"
 #include "standard_output.h"
 
 namespace isohf::cli {
@@ -39,6 +40,7 @@ void print_version() {
 }
 
 int run_program(const char* name, int argc, char** argv, int (*body)(const Arguments& arguments)) {
+  occupy_standard_descriptors();
   name_of_program() = name;
   // A closed pipe or a file over its size limit is an error that write() reports, not a reason to die.
   std::signal(SIGPIPE, SIG_IGN);

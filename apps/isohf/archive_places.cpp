@@ -156,6 +156,18 @@ OutputGrid grid_through_map(const Metadata& metadata, const SourceInfo& other) {
   return grid;
 }
 
+/// Whether a raster and the archive's source share ground where the coordinates of both are of one kind.
+bool share_ground(const SourceRecord& source, const SourceInfo& other) {
+  const Georeference& place = other.georeference;
+  const auto overlap = [](double a0, double a1, double b0, double b1) { return a0 <= b1 && b0 <= a1; };
+  const double east = *source.origin_x + static_cast<double>(source.width) * source.crs_spacing_x;
+  const double south = *source.origin_y - static_cast<double>(source.height) * source.crs_spacing_y;
+  return overlap(*source.origin_x, east, place.origin_x,
+                 place.origin_x + static_cast<double>(other.width) * place.spacing_x) &&
+         overlap(south, *source.origin_y, place.origin_y - static_cast<double>(other.height) * place.spacing_y,
+                 place.origin_y);
+}
+
 }  // namespace
 
 void understand_source(ArchiveReader& archive) {
@@ -200,7 +212,7 @@ WorldBounds world_bounds(const Metadata& metadata, const BoundingBox& asked) {
   return bounds;
 }
 
-OutputGrid grid_like(const Metadata& metadata, const SourceInfo& other) {
+OutputGrid grid_like(const Metadata& metadata, const SourceInfo& other, std::vector<std::string>& warnings) {
   if (is_warped(metadata)) return grid_through_map(metadata, other);
   const SourceRecord& source = metadata.source;
   const Georeference& place = other.georeference;
@@ -208,7 +220,18 @@ OutputGrid grid_like(const Metadata& metadata, const SourceInfo& other) {
   const bool placed = source.origin_x && source.origin_y && place.has_origin && source.crs_spacing_x > 0.0 &&
                       source.crs_spacing_y > 0.0;
   if (placed) check_same_system(metadata, other);
-  if (!placed || unit != place.unit) {
+  const bool same_unit = unit == place.unit || (placed && share_ground(source, other));
+  if (placed && unit != place.unit) {
+    warnings.push_back(fmt::format(
+        "{}: does not say what its coordinates count (a .prj would); {}", other.path,
+        same_unit ? "they are taken for those of the archive's reference system, on whose ground they lie"
+                  : "on the archive's ground they do not lie, so its grid begins in the North-West corner there"));
+  }
+  if (!placed && source.origin_x) {
+    warnings.push_back(fmt::format(
+        "{}: does not say where it lies; its grid begins in the North-West corner of the archive", other.path));
+  }
+  if (!placed || !same_unit) {
     const SourceFrame frame = make_source_frame(other);
     return OutputGrid({frame.width, frame.height, metadata.valid.x0 + frame.first_sample_x,
                        metadata.valid.z0 + frame.first_sample_z, frame.spacing_x, frame.spacing_z});

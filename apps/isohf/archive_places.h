@@ -1,5 +1,8 @@
 #pragma once
 
+#include <string>
+#include <vector>
+
 #include "formats/cropped_source.h"
 #include "isohf/archive/reader.h"
 #include "isohf/surface/heightmap.h"
@@ -19,9 +22,11 @@ void understand_source(ArchiveReader& archive);
 [[nodiscard]] WorldBounds world_bounds(const Metadata& metadata, const BoundingBox& box);
 
 /// The grid of another raster of elevations, in the archive's world or, where the archive's input was projected, in
-/// degrees. By the origins of both; from the North-West corner where one has none, or a unit that is not known, but
-/// never so through a projection: there it is in degrees, or on the archive's own map.
+/// degrees. By the origins of both, also where one has no unit that is known and their grounds meet; else from the
+/// North-West corner, but never so through a projection: there it is in degrees, or on the archive's own map. A warning
+/// says what was taken for granted.
 /// Throws Error{kInvalidArgument} where the two are known to be in different units, reference systems or bodies.
-[[nodiscard]] OutputGrid grid_like(const Metadata& metadata, const SourceInfo& other);
+[[nodiscard]] OutputGrid grid_like(const Metadata& metadata, const SourceInfo& other,
+                                   std::vector<std::string>& warnings);
 
 }  // namespace isohf::cli

@@ -4,7 +4,6 @@
 #include <sys/resource.h>
 
 #include <cstdlib>
-#include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -12,11 +11,13 @@
 #include "accuracy_output.h"
 #include "command.h"
 #include "describe.h"
+#include "formats/letter_case.h"
 #include "input_files.h"
 #include "interrupt.h"
 #include "isohf/archive/reader.h"
 #include "isohf/base/error.h"
 #include "isohf/base/file.h"
+#include "isohf/base/output_file.h"
 #include "isohf/convert/convert.h"
 #include "isohf/surface/kernels.h"
 #include "json_output.h"
@@ -26,7 +27,7 @@
 #include "options_lattice.h"
 #include "options_source.h"
 #include "options_texture.h"
-#include "output_file.h"
+#include "output_kinds.h"
 #include "plan_report.h"
 #include "source_inputs.h"
 #include "standard_output.h"
@@ -58,7 +59,6 @@ struct ConvertCommandOptions {
   SourceInputs inputs;
   std::string input;  ///< what messages and reports call them: the file, or "mosaic of 12 files"
   std::string output;
-  bool output_is_last_name = false;  ///< without -o
   std::string source_name;
   OpenOptions open;
   TextureOptions texture;
@@ -69,28 +69,26 @@ struct ConvertCommandOptions {
   std::optional<std::string> report;
 };
 
-/// The last name is the output where -o names none and there is another.
+bool is_archive_name(const std::string& name) {
+  return lower_case(name).ends_with(".isohf");
+}
+
+/// The last name is the output where -o names none and it is called .isohf. Any other name is an input: a forgotten
+/// output must not cost the last of them.
 void take_output(std::vector<std::string> names, ConvertCommandOptions& options) {
   std::vector<std::string>& inputs = options.inputs.names;
   if (options.output.empty() && !names.empty() && inputs.size() + names.size() > 1) {
-    options.output = names.back();
-    options.output_is_last_name = true;
-    names.pop_back();
+    if (is_archive_name(names.back())) {
+      options.output = names.back();
+      names.pop_back();
+    } else if (!options.dry_run) {
+      throw Error(ErrorCode::kInvalidArgument,
+                  fmt::format("convert: no OUTPUT given: {0} is not called .isohf and counts as an input; name the "
+                              "archive NAME.isohf, or give -o {0} if that is meant",
+                              names.back()));
+    }
   }
   inputs.insert(inputs.end(), names.begin(), names.end());
-}
-
-/// A forgotten output must not cost the last of many inputs.
-void protect_last_input(const ConvertCommandOptions& options, std::size_t inputs) {
-  std::error_code error;
-  if (!options.output_is_last_name || inputs < 2 || options.output.ends_with(".isohf") ||
-      !std::filesystem::is_regular_file(options.output, error)) {
-    return;
-  }
-  throw Error(
-      ErrorCode::kInvalidArgument,
-      fmt::format("{0}: exists, and is taken for the output as the last of {1} names; say -o {0} if that is meant",
-                  options.output, inputs + 1));
 }
 
 std::optional<ConvertCommandOptions> parse(const Arguments& arguments) {
@@ -304,29 +302,15 @@ std::string text_from(const ConvertCommandOptions& options, const ConvertSummary
   return text;
 }
 
-void write_report(const ConvertCommandOptions& options, const Accuracy& accuracy) {
-  const std::string part = *options.report + ".part";
-  std::ofstream file(part, std::ios::binary);
-  file << json_text(json_from(accuracy));
-  file.close();
-  std::error_code failed;
-  if (file) std::filesystem::rename(part, *options.report, failed);
-  if (file && !failed) return;
-  std::error_code ignored;
-  std::filesystem::remove(part, ignored);
-  throw Error(ErrorCode::kIo, *options.report + ": cannot be written");
-}
-
 int run(ConvertCommandOptions options) {
   const CommonOptions& common = options.common;
   // What the output is can be told before anything is looked for.
-  if (!options.dry_run) check_output_file(options.inputs.names, options.output, options.convert.overwrite);
+  if (!options.dry_run) check_archive_output(options.inputs.names, options.output, options.convert.overwrite);
   std::vector<std::string> files = expand_inputs(options.inputs.names, options.inputs.recursive);
   if (!options.dry_run) {
-    protect_last_input(options, files.size());
-    check_output_file(files, options.output, options.convert.overwrite);
+    check_archive_output(files, options.output, options.convert.overwrite);
     if (options.report && *options.report != "-") {
-      check_output_file(files, *options.report, options.convert.overwrite);
+      check_report_output(files, *options.report, options.convert.overwrite);
     }
   }
   OpenedInputs opened = open_inputs(std::move(files), options.inputs, options.open, options.work.threads);
@@ -371,7 +355,9 @@ int run(ConvertCommandOptions options) {
   if (options.report) {
     const WorkArena threads(options.work.threads);
     accuracy = measure_accuracy(options.output, *source, kRandomPoints, true, options.work, common, cancel);
-    if (*options.report != "-") write_report(options, *accuracy);
+    if (*options.report != "-") {
+      write_output(*options.report, json_text(json_from(*accuracy)), options.convert.overwrite);
+    }
   }
   StandardOutput out;
   if (common.json) {

@@ -22,8 +22,8 @@
 #include "option_values.h"
 #include "options_common.h"
 #include "options_raster.h"
-#include "output_file.h"
 #include "output_grid.h"
+#include "output_kinds.h"
 #include "restored_raster.h"
 #include "restored_samples.h"
 #include "standard_output.h"
@@ -282,7 +282,7 @@ int run(const ExportOptions& options) {
   if (options.bbox && is_warped(archive.metadata())) understand_source(archive);
   const ExportGrid grid = asked_grid(options, archive.metadata());
   for (const std::string& file : ExportTiles(options.raster.output, grid.cut, grid.samples.width).names()) {
-    check_output_file(options.raster.archive, file, options.raster.overwrite);
+    check_raster_output({options.raster.archive}, file, options.raster.overwrite);
   }
   Exporter exporter(options, archive, grid, watch_interrupts());
   WorkArena arena(options.work.threads);

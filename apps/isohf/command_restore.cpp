@@ -24,8 +24,8 @@
 #include "option_values.h"
 #include "options_common.h"
 #include "options_raster.h"
-#include "output_file.h"
 #include "output_grid.h"
+#include "output_kinds.h"
 #include "restored_raster.h"
 #include "restored_samples.h"
 #include "source_inputs.h"
@@ -89,7 +89,11 @@ OutputGrid asked_grid(const RestoreOptions& options, const Metadata& metadata) {
   const RasterOptions& raster = options.raster;
   if (!options.like.empty()) {
     const OpenedInputs like = open_inputs(expand_inputs({options.like}, false), {}, {}, options.work.threads);
-    OutputGrid grid = grid_like(metadata, like.source->info());
+    std::vector<std::string> warnings;
+    OutputGrid grid = grid_like(metadata, like.source->info(), warnings);
+    for (const std::string& warning : warnings) {
+      if (!options.common.quiet) print_warning(warning);
+    }
     if (grid.degrees && raster.method == RestoreMethod::kHex) {
       throw Error(
           ErrorCode::kInvalidArgument,
@@ -233,7 +237,11 @@ class Restorer {
 };
 
 int run(const RestoreOptions& options) {
-  check_output_file(options.raster.archive, options.raster.output, options.raster.overwrite);
+  std::vector<std::string> inputs = {options.raster.archive};
+  if (!options.like.empty()) {
+    for (std::string& file : expand_inputs({options.like}, false)) inputs.push_back(std::move(file));
+  }
+  check_raster_output(inputs, options.raster.output, options.raster.overwrite);
   WorkArena arena(options.work.threads);
   const ArchiveReader archive = open_archive(options.raster.archive);
   const bool wants_source =

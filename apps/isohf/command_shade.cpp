@@ -19,7 +19,7 @@
 #include "open_archive.h"
 #include "option_values.h"
 #include "options_common.h"
-#include "output_file.h"
+#include "output_kinds.h"
 #include "restored_raster.h"
 #include "shade_picture.h"
 #include "standard_output.h"
@@ -177,7 +177,7 @@ std::optional<Georeference> georeference_of(const Metadata& metadata, const Shad
 int run(ShadeOptions options) {
   const auto start = std::chrono::steady_clock::now();
   const CommonOptions& common = options.common;
-  check_output_file(options.archive, options.output, options.overwrite);
+  check_raster_output({options.archive}, options.output, options.overwrite);
   const ArchiveReader archive = open_archive(options.archive);
   if (!common.quiet) {
     for (const std::string& warning : archive.warnings()) print_warning(warning);

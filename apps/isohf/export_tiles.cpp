@@ -28,7 +28,7 @@ ExportTiles::~ExportTiles() {
 }
 
 std::string ExportTiles::name(std::int64_t column, std::int64_t row) const {
-  if (files() == 1) return output_;
+  if (!cut_.asked) return output_;
   const std::filesystem::path path(output_);
   return (path.parent_path() /
           fmt::format("{}_x{}_y{}{}", path.stem().string(), column, row, path.extension().string()))

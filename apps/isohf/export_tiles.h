@@ -14,7 +14,7 @@
 namespace isohf::cli {
 
 /// The files that a raster is cut into: NAME_x0_y0.r16, the North-West one, and on to the East and South; NAME.r16
-/// where there is but one.
+/// where no tiles were asked for.
 ///
 /// Rows come from North to South, once for each group of tile columns: at most 64 columns are open at a time. What was
 /// written is removed again unless keep() is called.

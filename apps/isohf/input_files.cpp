@@ -10,6 +10,7 @@
 #include <iterator>
 #include <set>
 
+#include "formats/hgt_source.h"
 #include "formats/letter_case.h"
 #include "formats/registry.h"
 #include "isohf/base/error.h"
@@ -34,9 +35,11 @@ const std::set<std::string>& raster_extensions() {
   return known;
 }
 
+/// By its name; of a .zip by the names inside.
 bool has_raster_name(const fs::path& path) {
   std::string name = lower_case(path.filename().string());
   if (name.starts_with(".")) return false;
+  if (name.ends_with(".zip") && is_zip_of_hgt(path.string())) return true;
   if (name.ends_with(".gz")) name.resize(name.size() - 3);
   return std::any_of(raster_extensions().begin(), raster_extensions().end(), [&](const std::string& extension) {
     return name.size() > extension.size() && name.ends_with(extension);

@@ -97,7 +97,7 @@ TileCut cut_into_tiles(GridSize& size, bool free, const std::optional<GridSize>&
   };
   const AxisCut x = cut_axis(size.first, free, first(count), first(tile_size), overlap, "columns");
   const AxisCut z = cut_axis(size.second, free, second(count), second(tile_size), overlap, "rows");
-  return {x.tiles, z.tiles, x.samples, z.samples, overlap};
+  return {x.tiles, z.tiles, x.samples, z.samples, overlap, count || tile_size};
 }
 
 }  // namespace isohf::cli

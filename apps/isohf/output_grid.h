@@ -38,6 +38,7 @@ struct TileCut {
   std::int64_t columns = 0;  ///< of a tile
   std::int64_t rows = 0;
   std::int64_t overlap = 0;
+  bool asked = false;  ///< every file is named by its place then, even a single one
 };
 
 /// How a raster of `size` samples is cut. Where `free` is set, its size is nobody's wish: that of the nearest number of

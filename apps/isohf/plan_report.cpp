@@ -97,6 +97,7 @@ void print_plan(const HeightSource& source, const ConvertOptions& options, const
   const SourceInfo& info = source.info();
   const Plan plan = make_plan(info, options.plan);
   const MemoryPlan memory = plan_memory(source, plan, options);
+  check_memory(memory, options);
   if (!common.quiet) {
     for (const std::string& warning : info.warnings) print_warning(warning);
     if (const std::string warning = scale_warning(info, plan.frame, options.plan.ground.projection); !warning.empty()) {

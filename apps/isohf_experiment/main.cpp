@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <filesystem>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <optional>
@@ -13,6 +12,7 @@
 #include "figures.h"
 #include "interrupt.h"
 #include "isohf/base/error.h"
+#include "isohf/base/output_file.h"
 #include "option_values.h"
 #include "options_common.h"
 #include "program.h"
@@ -100,7 +100,7 @@ std::optional<ExperimentCommandOptions> parse(const Arguments& arguments) {
 /// The files of an output folder: refused before the experiment, written after it.
 class FigureFolder {
  public:
-  FigureFolder(std::string folder, bool overwrite) : folder_(std::move(folder)) {
+  FigureFolder(std::string folder, bool overwrite) : folder_(std::move(folder)), overwrite_(overwrite) {
     if (folder_.empty()) return;
     std::error_code failure;
     std::filesystem::create_directories(folder_, failure);
@@ -122,10 +122,7 @@ class FigureFolder {
         experiment::figure8_svg(huge),   experiment::azimuth_csv(result), experiment::azimuth_svg(result)};
     std::vector<std::string> written;
     for (std::size_t i = 0; i < std::size(kNames); ++i) {
-      std::ofstream file(path(kNames[i]), std::ios::binary);
-      file << texts[i];
-      file.close();
-      if (!file) throw Error(ErrorCode::kIo, path(kNames[i]) + ": cannot be written");
+      write_output(path(kNames[i]), texts[i], overwrite_);
       written.push_back(path(kNames[i]));
     }
     return written;
@@ -138,6 +135,7 @@ class FigureFolder {
   [[nodiscard]] std::string path(const char* name) const { return folder_ + "/" + name; }
 
   std::string folder_;
+  bool overwrite_;
 };
 
 /// One line a triangle count and mesh: an error, and iso's divided by it.

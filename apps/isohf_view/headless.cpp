@@ -150,7 +150,7 @@ int sweep(const TileSource& source, const Options& options) {
 
 void check_outputs(const Options& options) {
   for (const std::string& output : {options.screenshot, options.csv, options.plot}) {
-    if (!output.empty()) cli::check_output_file(options.archive, output, options.overwrite);
+    if (!output.empty()) cli::check_output_file({options.archive}, output, options.overwrite);
   }
 }
 

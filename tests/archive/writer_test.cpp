@@ -68,7 +68,7 @@ TEST(ArchiveWriter, RefusesTargetsThatItMustNotWrite) {
   const TileGrid grid = small_grid();
   const auto open = [&](const std::string& path) { return [&grid, path] { ArchiveWriter(path, grid, {}); }; };
   test::write_file(folder / "there", "x");
-  EXPECT_EQ(code_of(open(folder / "there"), "--overwrite"), ErrorCode::kInvalidArgument);
+  EXPECT_EQ(code_of(open(folder / "there"), "is no isohf archive"), ErrorCode::kInvalidArgument);
   EXPECT_EQ(code_of(open(folder / "."), "folder"), ErrorCode::kInvalidArgument);
   EXPECT_EQ(code_of(open(folder / "no/such"), "no/such"), ErrorCode::kIo);
   EXPECT_EQ(code_of(open("/dev/null"), "/dev/null"), ErrorCode::kInvalidArgument);
@@ -118,11 +118,25 @@ TEST(ArchiveWriter, KeepsWhatSomebodyElseMadeMeanwhile) {
 TEST(ArchiveWriter, ReplacesWhereItMay) {
   const TemporaryFolder folder;
   const TileGrid grid = small_grid();
-  test::write_file(folder / "a", "x");
-  ArchiveWriter writer(folder / "a", grid, {true, false, ""});
-  complete(writer, grid);
+  test::write_file(folder / "a", "");
+  for (int time = 0; time < 2; ++time) {  // an empty file, then an archive
+    ArchiveWriter writer(folder / "a", grid, {true, false, ""});
+    complete(writer, grid);
+  }
   EXPECT_THAT(folder.names(), ElementsAre("a"));
   EXPECT_EQ(ArchiveReader(folder / "a").metadata().tiles_stored, 18);
+  EXPECT_EQ(code_of([&] { ArchiveWriter(folder / "a", grid, {}); }, "exists; --overwrite"),
+            ErrorCode::kInvalidArgument);
+  for (const char* other : {"text", "PK\x03\x04 a ZIP archive of something else, longer than a header"}) {
+    test::write_file(folder / "b", other);
+    EXPECT_EQ(code_of(
+                  [&] {
+                    ArchiveWriter(folder / "b", grid, {true, false, ""});
+                  },
+                  "b: is no isohf archive"),
+              ErrorCode::kInvalidArgument);
+    EXPECT_EQ(test::read_file(folder / "b"), other);
+  }
 }
 
 TEST(ArchiveWriter, RefusesMembersWithBadOrTakenNames) {
@@ -278,9 +292,9 @@ TEST(ArchiveWriter, SaysThatTheDiskIsFullAndLeavesNothing) {
       while (writer.next_tile() < grid.tile_count()) writer.add_tile(tile);
     } catch (const Error& error) {
       const std::string message = error.what();
-      const bool is_clear = message.find("a.part") != std::string::npos &&
+      const bool is_clear = message.find("/a: cannot write") != std::string::npos &&
                             message.find("File too large") != std::string::npos &&
-                            message.find("bytes were written") != std::string::npos;
+                            message.find("of 160 tiles are done") != std::string::npos;
       result = error.code() == ErrorCode::kIo && is_clear ? 0 : 2;
     }
     ::_exit(result);

@@ -63,11 +63,13 @@ TEST_F(BadInput, UnreadableFileAndFolder) {
   write_hills("open.tif");
   ::chmod((folder / "secret.tif").c_str(), 0);
   ::chmod((folder / "open.tif").c_str(), 0444);
+  std::filesystem::create_directory(folder / "out");
+  ::chmod((folder / "out").c_str(), 0777);
   ::chmod(folder.path().c_str(), 0555);
   RunOptions plain_user;
   plain_user.without_privileges = true;
   if (run_isohf({"--version"}, plain_user).exit_code != 0) GTEST_SKIP() << "other users cannot run the program";
-  const RunResult input = run_isohf({"convert", folder / "secret.tif", folder / "out.isohf"}, plain_user);
+  const RunResult input = run_isohf({"convert", folder / "secret.tif", folder / "out/out.isohf"}, plain_user);
   EXPECT_EQ(input.exit_code, 1);
   EXPECT_THAT(input.err, HasSubstr("secret.tif: cannot be opened: Permission denied\n"));
   const RunResult output = run_isohf({"convert", folder / "open.tif", folder / "out.isohf"}, plain_user);
@@ -76,7 +78,7 @@ TEST_F(BadInput, UnreadableFileAndFolder) {
   EXPECT_THAT(output.err, HasSubstr("Permission denied\n"));
   EXPECT_EQ(std::count(output.err.begin(), output.err.end(), '\n'), 1) << output.err;
   ::chmod(folder.path().c_str(), 0755);
-  EXPECT_EQ(folder.names(), (std::vector<std::string>{"open.tif", "secret.tif"}));
+  EXPECT_EQ(folder.names(), (std::vector<std::string>{"open.tif", "out", "secret.tif"}));
 }
 
 TEST_F(BadInput, TruncatedFile) {
@@ -156,16 +158,17 @@ TEST_F(BadInput, OutputFolderIsMissing) {
 
 TEST_F(BadInput, OutputIsAFolder) {
   write_hills("a.tif");
-  const RunResult result = run_isohf({"convert", folder / "a.tif", folder.path(), "--overwrite"});
+  const RunResult result = run_isohf({"convert", folder / "a.tif", "-o", folder.path(), "--overwrite"});
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_THAT(result.err, HasSubstr("is a folder"));
 }
 
 TEST_F(BadInput, OutputExists) {
   write_hills("a.tif");
-  write_file(folder / "out.isohf", "precious");
+  ASSERT_EQ(run_isohf({"convert", folder / "a.tif", folder / "out.isohf"}).exit_code, 0);
+  const std::string before = read_file(folder / "out.isohf");
   expect_refused(folder / "a.tif", {"out.isohf: exists", "--overwrite"});
-  EXPECT_EQ(read_file(folder / "out.isohf"), "precious");
+  EXPECT_EQ(read_file(folder / "out.isohf"), before);
   // Said before the input is looked at.
   expect_refused(folder / "none.tif", {"out.isohf: exists"});
 }
@@ -176,7 +179,7 @@ TEST_F(BadInput, OutputIsTheInputByWhateverName) {
   ASSERT_EQ(::link((folder / "a.tif").c_str(), (folder / "hard.tif").c_str()), 0);
   const std::string before = read_file(folder / "a.tif");
   for (const char* name : {"a.tif", "symbolic.tif", "hard.tif", "./a.tif"}) {
-    const RunResult result = run_isohf({"convert", folder / "a.tif", folder / name, "--overwrite"});
+    const RunResult result = run_isohf({"convert", folder / "a.tif", "-o", folder / name, "--overwrite"});
     EXPECT_EQ(result.exit_code, 2);
     EXPECT_THAT(result.err, HasSubstr("is the input"));
   }
@@ -215,7 +218,7 @@ TEST_F(BadInput, MemoryLimitBelowTheNeed) {
   expect_refused(folder / "a.tif", {"--memory"}, {"--memory", "1M"});
 }
 
-TEST_F(BadInput, FullDisk) {
+TEST_F(BadInput, AFullDiskKeepsWhatIsDoneForAResume) {
   std::uint32_t state = 1;  // noise, which no codec makes small
   write_int16_tiff(folder / "noise.tif", 400, 400, [&](std::int64_t, std::int64_t) {
     state = state * 1664525U + 1013904223U;
@@ -228,7 +231,13 @@ TEST_F(BadInput, FullDisk) {
   EXPECT_EQ(result.out, "");
   EXPECT_THAT(result.err, HasSubstr("File too large"));
   EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
-  EXPECT_EQ(folder.names(), std::vector<std::string>{"noise.tif"});
+  EXPECT_THAT(result.err, HasSubstr("out.isohf: cannot write"));
+  EXPECT_THAT(result.err, HasSubstr("out.isohf.part keeps what is done, --resume goes on from there"));
+  EXPECT_EQ(folder.names(), (std::vector<std::string>{"noise.tif", "out.isohf.part", "out.isohf.part.journal"}));
+  EXPECT_EQ(run_isohf({"convert", folder / "noise.tif", folder / "out.isohf", "--resume", "-q"}).exit_code, 0);
+  EXPECT_EQ(run_isohf({"convert", folder / "noise.tif", folder / "whole.isohf", "-q"}).exit_code, 0);
+  EXPECT_EQ(read_file(folder / "out.isohf"), read_file(folder / "whole.isohf"));
+  EXPECT_EQ(folder.names(), (std::vector<std::string>{"noise.tif", "out.isohf", "whole.isohf"}));
 }
 
 }  // namespace

@@ -95,8 +95,8 @@ TEST_F(ConvertCommand, ProgressGoesToStandardErrorInTheFormAskedFor) {
 }
 
 TEST_F(ConvertCommand, OverwriteReplaces) {
-  write_file(folder / "a.isohf", "old");
-  EXPECT_NE(convert("a.isohf", {"--overwrite"}), "old");
+  const std::string old = convert("a.isohf", {"--density", "0.5"});
+  EXPECT_NE(convert("a.isohf", {"--overwrite"}), old);
   EXPECT_EQ(folder.names(), (std::vector<std::string>{"a.isohf", "a.tif"}));
 }
 
@@ -182,11 +182,11 @@ TEST_F(ConvertCommand, ReportIsWhatVerifyFindsAndLeavesTheArchiveAsItIs) {
 }
 
 TEST_F(ConvertCommand, AReportThatExistsIsRefusedBeforeConverting) {
-  write_file(folder / "r.json", "mine");
+  write_file(folder / "r.json", R"({"rms": 1})");
   const RunResult result = run_isohf({"convert", folder / "a.tif", folder / "a.isohf", "--report", folder / "r.json"});
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_THAT(result.err, HasSubstr("--overwrite"));
-  EXPECT_EQ(read_file(folder / "r.json"), "mine");
+  EXPECT_EQ(read_file(folder / "r.json"), R"({"rms": 1})");
   EXPECT_EQ(folder.names(), (std::vector<std::string>{"a.tif", "r.json"}));
 }
 

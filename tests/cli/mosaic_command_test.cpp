@@ -230,12 +230,12 @@ TEST_F(MosaicCommand, WhatIsNotThereOrTwiceThereIsNamed) {
   expect_error({"convert", "@" + (folder / "list.txt"), out}, 1, "list.txt: line 3: ");
   expect_error({"convert", a, b, a, out}, 2, "piece0.tif: is named twice among the inputs");
   expect_error({"convert", a, folder.path() + "/piece?.tif", "-o", b, "--overwrite"}, 2,
-               "piece1.tif: the output is one of the inputs");
+               "piece1.tif: exists and is a raster (TIFF)");
   expect_error({"convert", a, b, "--overwrite", "-o", b}, 2, "piece1.tif: the output is one of the inputs");
   // A forgotten output.
   raster.cut(folder / "piece2.tif", {0, 0, 50, 50});
   expect_error({"convert", a, b, folder / "piece2.tif", "--overwrite"}, 2,
-               "piece2.tif: exists, and is taken for the output as the last of 3 names; say -o");
+               "piece2.tif is not called .isohf and counts as an input");
   EXPECT_EQ(folder.names(), (Words{"blank.txt", "empty", "list.txt", "piece0.tif", "piece1.tif", "piece2.tif"}));
 }
 

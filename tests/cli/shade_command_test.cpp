@@ -212,7 +212,7 @@ TEST_F(ShadeCommand, RefusesWrongUsage) {
     EXPECT_EQ(code(wrong), 2) << wrong[0];
   }
   EXPECT_EQ(run_isohf({"shade", folder / "a.isohf", folder / "a.tif"}).exit_code, 2);  // exists
-  EXPECT_EQ(run_isohf({"shade", folder / "a.isohf", folder / "b.jpg"}).exit_code, 1);
+  EXPECT_EQ(run_isohf({"shade", folder / "a.isohf", folder / "b.jpg"}).exit_code, 2);
   EXPECT_EQ(run_isohf({"shade", folder / "missing.isohf", folder / "b.png"}).exit_code, 1);
   for (const std::string& name : folder.names()) EXPECT_THAT(name, testing::Not(HasSubstr("b.")));
 }

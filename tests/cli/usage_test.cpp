@@ -220,10 +220,10 @@ TEST(Usage, WrongFilterIsAnsweredWithTheRightOnes) {
 }
 
 TEST(Usage, OptionsThatContradictEachOtherAreRefused) {
-  expect_usage_error({"convert", "a", "b", "--density", "1", "--spacing", "2"}, "excludes");
-  expect_usage_error({"convert", "a", "b", "--shape", "5x5", "--triangles", "200"}, "excludes");
-  expect_usage_error({"convert", "a", "b", "--density", "1", "--density", "1"}, "--density is given 2 times");
-  expect_usage_error({"convert", "a", "b", "--clamp-range"}, "--clamp-range needs --z-range");
+  expect_usage_error({"convert", "a", "b.isohf", "--density", "1", "--spacing", "2"}, "excludes");
+  expect_usage_error({"convert", "a", "b.isohf", "--shape", "5x5", "--triangles", "200"}, "excludes");
+  expect_usage_error({"convert", "a", "b.isohf", "--density", "1", "--density", "1"}, "--density is given 2 times");
+  expect_usage_error({"convert", "a", "b.isohf", "--clamp-range"}, "--clamp-range needs --z-range");
   expect_usage_error({"plan", "--density", "1"}, "--density needs an INPUT");
   expect_usage_error({"plan", "--table1", "--levels", "3"}, "--table1 takes no --levels");
   expect_usage_error({"verify", "a", "--max-error", "1"}, "--max-error needs --against");

@@ -3,7 +3,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <cstring>
+
 #include "formats/mosaic_pieces.h"
+#include "formats/raster_sink.h"
+#include "formats/registry.h"
 #include "isohf/base/error.h"
 #include "support/place_at.h"
 #include "support/samples.h"
@@ -49,6 +54,56 @@ TEST(CroppedSource, LongitudesAreComparedModuloATurn) {
   EXPECT_EQ(window_in("179,7,-179,9", pacific), "2,2 5x5");
   EXPECT_EQ(window_in("-180,7,-179,9", pacific), "4,2 3x5");
   EXPECT_EQ(window_in("180,7,181,9", pacific), "4,2 3x5");
+}
+
+TEST(CroppedSource, ABoxAcrossTheSeamOfAGlobeIsJoined) {
+  for (const bool posts : {false, true}) {
+    // 10 degrees apart, from 0 on; posts have 360 again.
+    const RasterSpec spec = [&] {
+      RasterSpec made;
+      made.width = posts ? 37 : 36;
+      made.height = 18;
+      made.sample_type = SampleType::kInt16;
+      made.georeference = place_at(posts ? Registration::kPoint : Registration::kArea, HorizontalUnit::kDegree,
+                                   posts ? 0.0 : 5.0, 85.0, 10.0);
+      return made;
+    }();
+    std::vector<std::byte> samples(static_cast<std::size_t>(spec.width * spec.height) * 2);
+    const auto value = [](std::int64_t column, std::int64_t row) {
+      return static_cast<std::int16_t>(row * 100 + column % 36);
+    };
+    for (std::int64_t i = 0; i < spec.width * spec.height; ++i) {
+      const std::int16_t z = value(i % spec.width, i / spec.width);
+      std::memcpy(samples.data() + 2 * i, &z, 2);
+    }
+    const TemporaryFolder folder;
+    const auto sink = create_raster(folder / "globe.tif", spec);
+    sink->write_rows(samples);
+    sink->finish();
+    const auto joined = [&](const std::string& box) {
+      return crop(open_source(folder / "globe.tif", {}), bounding_box_from_string(box));
+    };
+    const auto source = joined("-60,-30,60,40");
+    const SourceInfo& info = source->info();
+    EXPECT_TRUE(info.warnings.empty());
+    EXPECT_EQ(info.width, posts ? 13 : 12);
+    EXPECT_EQ(info.georeference.origin_x, posts ? 300.0 : 305.0);
+    for (const Window window : {Window{0, 0, info.width, info.height}, {4, 2, 5, 3}, {0, 1, 2, 2}, {8, 0, 3, 4}}) {
+      std::vector<std::int16_t> found(static_cast<std::size_t>(window.columns * window.rows));
+      source->read_window(window, std::as_writable_bytes(std::span(found)));
+      for (std::int64_t i = 0; i < window.columns * window.rows; ++i) {
+        const std::int64_t column = window.column + i % window.columns + 30;
+        const std::int64_t row =
+            window.row + i / window.columns + std::llround((85.0 - info.georeference.origin_y) / 10.0);
+        EXPECT_EQ(found[static_cast<std::size_t>(i)], value(column, row)) << posts << " " << i;
+      }
+    }
+    EXPECT_EQ(joined("-180,-90,180,90")->info().width, 36);
+    EXPECT_EQ(joined("170,-90,-170,90")->info().width, posts ? 3 : 2);
+    EXPECT_EQ(joined("0,-90,360,90")->info().width, spec.width);
+  }
+  const SourceInfo gap = placed(Registration::kPoint, 10.0, 80.0, 1.0, 341, true);  // 10 to 350 East
+  EXPECT_THAT(window_in("-30,40,30,60", gap), HasSubstr("lies at both of its ends, columns 320 to 340 and 0 to 20"));
 }
 
 TEST(CroppedSource, BoxesOutsideOrWrongAreRefused) {

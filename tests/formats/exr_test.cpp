@@ -235,8 +235,18 @@ TEST(ExrSource, IsPlacedByAWorldFile) {
 TEST(ExrSource, PrefersElevationChannelsAndSaysSo) {
   const TemporaryFolder folder;
   const std::vector<std::pair<std::vector<std::string>, std::string>> cases = {
-      {{"A", "B", "G", "R"}, "R"}, {{"R", "Y"}, "Y"},          {{"R", "Z"}, "Z"},        {{"mask", "height"}, "height"},
-      {{"G", "A"}, "A"},           {{"a.mask", "b.Z"}, "b.Z"}, {{"B", "depth"}, "depth"}};
+      {{"A", "B", "G", "R"}, "R"},
+      {{"R", "Y"}, "Y"},
+      {{"R", "Z"}, "Z"},
+      {{"mask", "height"}, "height"},
+      {{"G", "A"}, "G"},
+      {{"a.mask", "b.Z"}, "b.Z"},
+      {{"B", "depth"}, "depth"},
+      {{"N.Y", "height.Y"}, "height.Y"},
+      {{"N.Z", "Z"}, "Z"},
+      {{"N.Y", "N.Z", "beauty.R"}, "beauty.R"},
+      {{"Y", "terrain.Height"}, "terrain.Height"},
+      {{"Y", "ELEVATION"}, "ELEVATION"}};
   for (const auto& [channels, chosen] : cases) {
     Picture picture;
     picture.channels = channels;
@@ -258,7 +268,8 @@ TEST(ExrSource, ReadsTheChannelAskedForByNameOrNumber) {
   write_picture(path, picture);
   const Samples samples(picture);
   for (std::size_t channel = 0; channel < 3; ++channel) {
-    for (const std::string& name : {picture.channels[channel], std::to_string(channel)}) {
+    // Numbers count as oiiotool lists the channels: R, G, B.
+    for (const std::string& name : {picture.channels[channel], std::to_string(2 - channel)}) {
       OpenOptions options;
       options.channel = name;
       const auto source = open_exr(path, options);
@@ -279,7 +290,7 @@ TEST(ExrSource, ListsTheChannelsWhenTheOneAskedForIsMissing) {
     options.channel = name;
     const Error error = error_of([&] { (void)open_exr(path, options); });
     EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
-    EXPECT_EQ(error.what(), fmt::format("{}: has no channel \"{}\"; it has B, G, R (or 0...2)", path, name));
+    EXPECT_EQ(error.what(), fmt::format("{}: has no channel \"{}\"; it has R, G, B (or 0...2)", path, name));
   }
 }
 

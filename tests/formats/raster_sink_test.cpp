@@ -1,8 +1,12 @@
 #include "formats/raster_sink.h"
 
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
+#include <sys/syscall.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <csignal>
 #include <nlohmann/json.hpp>
@@ -218,10 +222,10 @@ TEST(RasterSink, WritesSidecarsWithTheRasterOrNotAtAll) {
   EXPECT_TRUE(std::filesystem::exists(folder / "a.hdr"));
   EXPECT_TRUE(std::filesystem::exists(folder / "a.prj"));
   write(folder / "a.asc", spec, noise(spec), 4);  // the .prj is there already, and the same
-  write_file(folder / "b.hdr", "mine");
+  write_file(folder / "b.hdr", "ncols 3\nnrows 2\n");
   const Error error = error_of([&] { (void)create_raster(folder / "b.flt", spec); });
-  EXPECT_EQ(error.what(), folder / "b.flt: " + (folder / "b.hdr: exists already (--overwrite replaces it)"));
-  EXPECT_EQ(read_file(folder / "b.hdr"), "mine");
+  EXPECT_EQ(error.what(), folder / "b.flt: " + (folder / "b.hdr: exists; --overwrite replaces it"));
+  EXPECT_EQ(read_file(folder / "b.hdr"), "ncols 3\nnrows 2\n");
   RasterSpec picture = placed(6, 4, SampleType::kUint16, 10.0);
   write(folder / "c.png", picture, noise(picture), 4);
   EXPECT_FALSE(std::filesystem::exists(folder / "c.png.json"));
@@ -279,11 +283,12 @@ TEST(RasterSink, WritesHgtTilesOfTheSizesThatExist) {
   EXPECT_EQ(read_whole(*open_source(path, {})), samples);
   for (const auto& bad : {spec_of(1200, 1201, SampleType::kInt16), spec_of(1201, 1201, SampleType::kUint16),
                           spec_of(1201, 1201, SampleType::kInt16, 3)}) {
-    EXPECT_EQ(error_of([&] { (void)create_raster(folder / "N44E007.hgt", bad); }).code(), ErrorCode::kUnsupported);
+    EXPECT_EQ(error_of([&] { (void)create_raster(folder / "N44E007.hgt", bad); }).code(), ErrorCode::kInvalidArgument);
   }
   RasterSpec other_void = spec;
   other_void.void_value = -9999.0;
-  EXPECT_EQ(error_of([&] { (void)create_raster(folder / "N44E007.hgt", other_void); }).code(), ErrorCode::kUnsupported);
+  EXPECT_EQ(error_of([&] { (void)create_raster(folder / "N44E007.hgt", other_void); }).code(),
+            ErrorCode::kInvalidArgument);
 }
 
 TEST(RasterSink, KeepsVoidScaleAndUnitInTiff) {
@@ -357,7 +362,7 @@ TEST(RasterSink, KeepsTransparentGrayInPng) {
   write(path, spec, noise(spec), 4);
   EXPECT_EQ(open_source(path, {})->info().void_values, std::vector<double>{65535.0});
   spec.void_value = -1.0;
-  EXPECT_EQ(error_of([&] { (void)create_raster(folder / "no.png", spec); }).code(), ErrorCode::kUnsupported);
+  EXPECT_EQ(error_of([&] { (void)create_raster(folder / "no.png", spec); }).code(), ErrorCode::kInvalidArgument);
 }
 
 TEST(RasterSink, LeavesNothingBehindUnlessFinished) {
@@ -374,7 +379,7 @@ TEST(RasterSink, LeavesNothingBehindUnlessFinished) {
       EXPECT_THAT(error_of([&] { sink->finish(); }).what(), HasSubstr("finished after 8 of 16 rows"));
       EXPECT_EQ(error_of([&] { sink->write_rows(samples); }).code(), ErrorCode::kInvalidArgument);
       EXPECT_EQ(error_of([&] { sink->write_rows(std::span(samples).first(3)); }).code(), ErrorCode::kInvalidArgument);
-      EXPECT_THAT(error_of([&] { (void)create_raster(path, spec); }).what(), HasSubstr("being written by another"));
+      EXPECT_THAT(error_of([&] { (void)create_raster(path, spec); }).what(), HasSubstr("another process is writing"));
     }
     EXPECT_FALSE(std::filesystem::exists(path));
     EXPECT_FALSE(std::filesystem::exists(path + ".part"));
@@ -388,7 +393,7 @@ TEST(RasterSink, ReplacesAFileOnlyWhenTold) {
   write(path, spec, noise(spec), 4);
   const Error error = error_of([&] { (void)create_raster(path, spec); });
   EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
-  EXPECT_EQ(error.what(), path + ": exists already (--overwrite replaces it)");
+  EXPECT_EQ(error.what(), path + ": exists; --overwrite replaces it");
   spec.overwrite = true;
   { const auto abandoned = create_raster(path, spec); }
   EXPECT_EQ(open_source(path, {})->info().width, 4);
@@ -403,12 +408,12 @@ TEST(RasterSink, RefusesWhatItCannotWriteAndLeavesNothing) {
   const TemporaryFolder folder;
   const RasterSpec good = spec_of(4, 4, SampleType::kFloat32);
   Error error = error_of([&] { (void)create_raster(folder / "a.jpg", good); });
-  EXPECT_EQ(error.code(), ErrorCode::kUnsupported);
+  EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
   EXPECT_THAT(error.what(), HasSubstr("\".jpg\"; there are .tif .tiff .exr .png .hgt .asc .flt .r16 .raw .r32 .npy"));
-  EXPECT_EQ(error_of([&] { (void)create_raster(folder / "a", good); }).code(), ErrorCode::kUnsupported);
-  EXPECT_EQ(error_of([&] { (void)create_raster(folder / "a.png", good); }).code(), ErrorCode::kUnsupported);
+  EXPECT_EQ(error_of([&] { (void)create_raster(folder / "a", good); }).code(), ErrorCode::kInvalidArgument);
+  EXPECT_EQ(error_of([&] { (void)create_raster(folder / "a.png", good); }).code(), ErrorCode::kInvalidArgument);
   EXPECT_EQ(error_of([&] { (void)create_raster(folder / "a.exr", spec_of(4, 4, SampleType::kInt16)); }).code(),
-            ErrorCode::kUnsupported);
+            ErrorCode::kInvalidArgument);
   EXPECT_EQ(error_of([&] { (void)create_raster(folder / "none/a.tif", good); }).code(), ErrorCode::kIo);
   EXPECT_EQ(error_of([&] { (void)create_raster(folder / "a.tif", spec_of(0, 4, SampleType::kInt16)); }).code(),
             ErrorCode::kInvalidArgument);
@@ -420,6 +425,39 @@ TEST(RasterSink, RefusesWhatItCannotWriteAndLeavesNothing) {
   for ([[maybe_unused]] const auto& entry : std::filesystem::directory_iterator(folder / ".")) ++left;
   EXPECT_EQ(left, 1);
 }
+
+TEST(RasterSink, ReplacesOnlyItsOwnKind) {
+  const TemporaryFolder folder;
+  RasterSpec spec = placed(6, 4, SampleType::kFloat32, 10.0);
+  spec.overwrite = true;
+  const auto refused = [&](const std::string& name, const std::string& old, const std::string& raster) {
+    write_file(folder / name, old);
+    const Error error = error_of([&] { (void)create_raster(folder / raster, spec); });
+    EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
+    EXPECT_THAT(error.what(), HasSubstr(folder / name));
+    EXPECT_EQ(read_file(folder / name), old) << "lost";
+    std::filesystem::remove(folder / name);
+  };
+  refused("a.tif", "a text", "a.tif");
+  refused("a.tif", "\x89PNG\r\n\x1a\n", "a.tif");
+  refused("a.r32", "PK\x03\x04 an archive", "a.r32");
+  refused("a.flt", std::string("II*\0\x08\0\0\0", 8), "a.flt");
+  refused("a.hdr", "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n", "a.flt");
+  refused("a.hdr", "ENVI\nsamples = 4\n", "a.flt");
+  refused("a.prj", "my project: buy milk\n", "a.asc");
+  refused("a.r32.json", R"({"name": "somebody else's"})", "a.r32");
+  write_file(folder / "b.tif", "");
+  write(folder / "c.r32", spec, noise(spec), 4);
+  for (const std::string name : {"b.tif", "c.r32"}) {
+    const auto sink = create_raster(folder / name, spec);
+    sink->write_rows(noise(spec));
+    sink->finish();
+  }
+  EXPECT_EQ(open_source(folder / "b.tif", {})->info().width, 6);
+}
+
+/// Renames that still happen before the program dies; negative: it does not.
+int renames_until_death = -1;
 
 /// A limit on the size of files stands in for a full disk: writes fail in the same place.
 class FileSizeLimit {
@@ -467,5 +505,37 @@ TEST(RasterSink, ReportsADiskThatIsFull) {
   }
 }
 
+TEST(RasterSink, NeverLeavesOldSamplesBesideANewDescription) {
+  const TemporaryFolder folder;
+  RasterSpec spec = spec_of(6, 4, SampleType::kUint16);
+  const auto samples = noise(spec);
+  write(folder / "a.r16", spec, samples, 4);
+  const std::string old_description = read_file(folder / "a.r16.json");
+  spec.overwrite = true;
+  spec.z_scale = 0.25;
+  const ::pid_t child = ::fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    const auto sink = create_raster(folder / "a.r16", spec);
+    sink->write_rows(samples);
+    renames_until_death = 1;
+    sink->finish();
+    ::_exit(1);
+  }
+  int status = 0;
+  ASSERT_EQ(::waitpid(child, &status, 0), child);
+  ASSERT_EQ(WEXITSTATUS(status), 9);
+  EXPECT_TRUE(!std::filesystem::exists(folder / "a.r16") || read_file(folder / "a.r16.json") == old_description);
+  EXPECT_EQ(read_bytes(folder / "a.r16.part"), samples);  // nothing is lost
+}
+
 }  // namespace
 }  // namespace isohf::test
+
+// The program's own definition goes before the C library's.
+extern "C" int rename(const char* from, const char* to) noexcept {
+  using isohf::test::renames_until_death;
+  if (renames_until_death == 0) ::_exit(9);
+  if (renames_until_death > 0) --renames_until_death;
+  return static_cast<int>(::syscall(SYS_renameat2, AT_FDCWD, from, AT_FDCWD, to, 0U));
+}

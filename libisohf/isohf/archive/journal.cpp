@@ -121,6 +121,10 @@ void Journal::flush() {
   pending_.clear();
 }
 
+bool Journal::has_flushed_records() const {
+  return size_ > kHeaderBytes;
+}
+
 void Journal::truncate(std::uint64_t size_bytes) {
   file_.truncate(size_bytes);
   size_ = size_bytes;

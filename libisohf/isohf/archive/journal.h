@@ -42,6 +42,8 @@ class Journal {
   /// Remembers a step; it reaches the file with the next flush().
   void add(const JournalRecord& record);
   void flush();
+  /// Whether a later open() finds anything.
+  [[nodiscard]] bool has_flushed_records() const;
   /// Forgets everything behind the first `records` that open() returned. `sizes` as open() returned them.
   void truncate(std::uint64_t size_bytes);
 

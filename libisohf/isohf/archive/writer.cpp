@@ -9,12 +9,12 @@
 #include "isohf/archive/content_hash.h"
 #include "isohf/archive/deflate.h"
 #include "isohf/archive/journal.h"
-#include "isohf/archive/part_file.h"
 #include "isohf/archive/written_contents.h"
 #include "isohf/archive/zip_layout.h"
 #include "isohf/base/assert.h"
 #include "isohf/base/bytes.h"
 #include "isohf/base/error.h"
+#include "isohf/base/output_file.h"
 
 namespace isohf {
 namespace {
@@ -23,27 +23,7 @@ namespace {
 constexpr std::uint64_t kSyncBytes = std::uint64_t{256} << 20U;
 constexpr std::uint64_t kJournalBytes = std::uint64_t{4} << 20U;
 
-std::string part_path(const std::string& path) {
-  return path + ".part";
-}
-std::string journal_path(const std::string& path) {
-  return path + ".part.journal";
-}
-
-/// Refuses a target that must not be written, before anything is made.
-void check_target(const std::string& path, bool overwrite) {
-  switch (path_kind(path)) {
-    case PathKind::kAbsent:
-      return;
-    case PathKind::kFolder:
-      throw Error(ErrorCode::kInvalidArgument, path + ": is a folder, must be a file name");
-    case PathKind::kOther:
-      throw Error(ErrorCode::kInvalidArgument, path + ": is no ordinary file");
-    case PathKind::kFile:
-      break;
-  }
-  if (!overwrite) throw Error(ErrorCode::kInvalidArgument, path + ": exists; --overwrite replaces it");
-}
+constexpr std::size_t kBufferBytes = std::size_t{4} << 20U;
 
 Digest job_digest(const TileGrid& grid, const WriterOptions& options) {
   std::vector<std::byte> bytes;
@@ -69,7 +49,8 @@ struct ArchiveWriter::State {
   TileGrid grid;
   WriterOptions options;
   WrittenContents contents;
-  PartFile part;  ///< behind all that may not fit in memory: no destructor would remove the file
+  OutputFile part;  ///< behind all that may not fit in memory
+  std::string journal_path;
   std::optional<Journal> journal;
   std::uint64_t journalled = 0;  ///< bytes of the part file that the journal's file vouches for
   std::uint64_t synced = 0;
@@ -77,7 +58,22 @@ struct ArchiveWriter::State {
   bool keep = false;
 
   State(const std::string& target, const TileGrid& tile_grid, const WriterOptions& writer_options)
-      : path(target), grid(tile_grid), options(writer_options), contents(tile_grid), part(part_path(target)) {}
+      : path(target),
+        grid(tile_grid),
+        options(writer_options),
+        contents(tile_grid),
+        part(target, {options.overwrite, options.resume, kBufferBytes}),
+        journal_path(part.part_path() + ".journal") {}
+
+  /// Errors of the output file with its name.
+  template <typename Action>
+  auto named(Action action) const {
+    try {
+      return action();
+    } catch (const Error& error) {
+      throw error.within(path);
+    }
+  }
 
   [[nodiscard]] ZipMember metadata_member() const {
     return {kMetadataName, ZipMethod::kStored, 0, options.metadata_bytes, options.metadata_bytes, 0};
@@ -95,7 +91,7 @@ struct ArchiveWriter::State {
 
 void ArchiveWriter::State::start_over() {
   part.truncate(0);
-  journal = Journal::start(journal_path(path), job_digest(grid, options));
+  journal = Journal::start(journal_path, job_digest(grid, options));
   std::vector<std::byte> head;
   append_local_header(metadata_member(), head);
   head.resize(head.size() + options.metadata_bytes, std::byte{' '});
@@ -124,11 +120,11 @@ bool ArchiveWriter::State::is_intact(const JournalRecord& record, std::uint64_t 
 }
 
 void ArchiveWriter::State::resume() {
-  Journal::Opened opened = Journal::open(journal_path(path), job_digest(grid, options));
+  Journal::Opened opened = Journal::open(journal_path, job_digest(grid, options));
   if (!opened.matches) {
-    keep = true;
-    throw Error(ErrorCode::kInvalidArgument,
-                fmt::format("{}: belongs to another input or other options; start over without --resume", part.path()));
+    throw Error(
+        ErrorCode::kInvalidArgument,
+        fmt::format("{} belongs to another input or other options; start over without --resume", part.part_path()));
   }
   const std::uint64_t head = local_header_bytes(metadata_member()) + options.metadata_bytes;
   if (opened.records.empty() || part.size_on_disk() < head) {
@@ -165,20 +161,22 @@ void ArchiveWriter::State::append(const ZipMember& member, std::span<const std::
     part.append(header);
     part.append(data);
   } catch (const Error& error) {
-    throw Error(error.code(), fmt::format("{}; {} bytes were written and {} of {} tiles are in it", error.what(),
-                                          part.size_on_disk(), contents.next_tile(), grid.tile_count()));
+    throw Error(error.code(), fmt::format("{}: {}; {} of {} tiles are done", path, error.what(), contents.next_tile(),
+                                          grid.tile_count()));
   }
 }
 
 void ArchiveWriter::State::checkpoint() {
   if (part.position() - journalled < kJournalBytes) return;
-  // The part file first: what the journal says is then there, as long as the machine keeps running.
-  part.flush();
-  if (part.position() - synced >= kSyncBytes) {
-    part.sync();
-    synced = part.position();
-  }
-  journal->flush();
+  named([&] {
+    // The part file first: what the journal says is then there, as long as the machine keeps running.
+    part.flush();
+    if (part.position() - synced >= kSyncBytes) {
+      part.sync();
+      synced = part.position();
+    }
+    journal->flush();
+  });
   journalled = part.position();
 }
 
@@ -195,34 +193,43 @@ void ArchiveWriter::State::write_metadata(const std::string& json, ZipMember& me
   std::vector<std::byte> head;
   append_local_header(member, head);
   head.insert(head.end(), data.begin(), data.end());
-  part.overwrite(0, head);
+  named([&] { part.write_at(0, head); });
 }
 
 void ArchiveWriter::State::write_index_and_directory(const ZipMember& metadata) {
   const std::span<const std::byte> index = contents.finish_index(metadata);
   const ZipMember member{kIndexName, ZipMethod::kStored, crc32(index), index.size(), index.size(), part.position()};
   append(member, index);
-  contents.append_directory(metadata, member, part);
+  named([&] { contents.append_directory(metadata, member, part); });
+}
+
+bool is_archive_file(const std::string& path) {
+  // Its first member: a local header of 30 bytes, then the name.
+  const std::string start = std::string("PK\x03\x04") + std::string(26, '?') + kMetadataName;
+  const std::vector<std::byte> head = head_of_file(path, start.size());
+  return head.size() == start.size() &&
+         std::equal(head.begin(), head.end(), start.begin(),
+                    [](std::byte is, char wanted) { return wanted == '?' || is == static_cast<std::byte>(wanted); });
 }
 
 ArchiveWriter::ArchiveWriter(const std::string& path, const TileGrid& grid, const WriterOptions& options) {
-  check_target(path, options.overwrite);
-  state_ = std::make_unique<State>(path, grid, options);
   try {
-    options.resume ? state_->resume() : state_->start_over();
-  } catch (...) {
-    if (!state_->keep) {
-      remove_file(part_path(path));
-      remove_file(journal_path(path));
+    if (!head_of_file(path, 1).empty() && !is_archive_file(path)) {
+      throw Error(ErrorCode::kInvalidArgument,
+                  "is no isohf archive, and only such are replaced by one; remove it first, or choose another name");
     }
-    throw;
+    state_ = std::make_unique<State>(path, grid, options);
+    options.resume ? state_->resume() : state_->start_over();
+  } catch (const Error& error) {
+    if (state_ != nullptr && options.resume) state_->part.keep();
+    if (state_ != nullptr && !options.resume) remove_file(state_->journal_path);
+    throw error.within(path);
   }
 }
 
 ArchiveWriter::~ArchiveWriter() {
   if (state_ == nullptr || state_->finished || state_->keep) return;
-  remove_file(journal_path(state_->path));
-  remove_file(part_path(state_->path));
+  remove_file(state_->journal_path);
 }
 
 std::int64_t ArchiveWriter::next_tile() const {
@@ -305,7 +312,7 @@ void ArchiveWriter::add_deflated_member(const std::string& name, std::span<const
 }
 
 void ArchiveWriter::flush_tiles() {
-  state_->part.flush();
+  state_->named([&] { state_->part.flush(); });
 }
 
 TileCodes ArchiveWriter::read_tile(TileIndex tile, const Quantisation& quantisation) const {
@@ -328,30 +335,30 @@ std::uint64_t ArchiveWriter::finish(Metadata metadata) {
   metadata.tiles_stored = state.contents.tiles_stored();
   metadata.content_sha256 = state.contents.finish_hash(metadata);
   ZipMember member = state.metadata_member();
-  state.part.flush();
+  state.named([&] { state.part.flush(); });
   state.write_metadata(format_metadata(metadata), member);
   state.write_index_and_directory(member);
-  state.part.sync();
   const std::uint64_t size = state.part.position();
-  if (!rename_file(part_path(state.path), state.path, state.options.overwrite)) {
-    state.keep = true;
-    throw Error(ErrorCode::kIo, fmt::format("{}: was made by somebody else meanwhile; the finished archive is {}",
-                                            state.path, part_path(state.path)));
-  }
+  state.named([&] { state.part.commit(); });
   state.finished = true;
-  remove_file(journal_path(state.path));
-  sync_folder_of(state.path);
-  state.part.close();
+  remove_file(state.journal_path);
   return size;
 }
 
-void ArchiveWriter::keep_part() {
+bool ArchiveWriter::keep_part() noexcept {
   State& state = *state_;
+  if (state.finished || !state.journal) return false;
+  // Where the disk is full, what reached it counts; a resume checks it.
+  for (const auto& save : {std::function<void()>([&] { state.part.sync(); }), {[&] { state.journal->flush(); }}}) {
+    try {
+      save();
+    } catch (const std::exception&) {
+    }
+  }
+  if (!state.journal->has_flushed_records()) return false;
   state.keep = true;
-  if (state.finished || !state.journal) return;
-  state.part.sync();
-  state.journal->flush();
-  state.journalled = state.part.position();
+  state.part.keep();
+  return true;
 }
 
 }  // namespace isohf

@@ -21,6 +21,10 @@ struct WriterOptions {
   std::uint32_t metadata_bytes = 16384;
 };
 
+/// Whether a file begins as the archives that ArchiveWriter writes. No other file is ever replaced by one, but an empty
+/// one.
+[[nodiscard]] bool is_archive_file(const std::string& path);
+
 /// Writes an archive from its first byte to its last: tiles in flat-index order, members, then finish().
 ///
 /// Everything goes to NAME.part (and its journal NAME.part.journal), which finish() flushes to the disk and renames;
@@ -29,8 +33,9 @@ struct WriterOptions {
 /// Two processes cannot write the same archive at once: the second gets Error{kIo}. Memory: 32 bytes a tile.
 class ArchiveWriter {
  public:
-  /// Opens NAME.part beside `path`. Throws Error{kInvalidArgument} where `path` exists without overwrite, or names a
-  /// folder; Error{kIo} where the folder is missing or not writable.
+  /// Opens NAME.part beside `path`, or beside what it links to. Throws Error{kInvalidArgument} where `path` exists
+  /// without overwrite, or is no archive, or what OutputFile refuses; Error{kIo} where the folder is missing or not
+  /// writable.
   ArchiveWriter(const std::string& path, const TileGrid& grid, const WriterOptions& options);
   ~ArchiveWriter();
   ArchiveWriter(const ArchiveWriter&) = delete;
@@ -76,8 +81,9 @@ class ArchiveWriter {
   /// the finished part file stays).
   std::uint64_t finish(Metadata metadata);
 
-  /// Leaves NAME.part and its journal in place for a later resume.
-  void keep_part();
+  /// Leaves NAME.part and its journal in place for a later resume, where they hold anything; false where not. After it
+  /// nothing is added.
+  bool keep_part() noexcept;
 
  private:
   struct State;

@@ -108,7 +108,7 @@ std::span<const std::byte> WrittenContents::finish_index(const ZipMember& metada
   return index_;
 }
 
-void WrittenContents::append_directory(const ZipMember& metadata, const ZipMember& index, PartFile& part) const {
+void WrittenContents::append_directory(const ZipMember& metadata, const ZipMember& index, OutputFile& part) const {
   const std::uint64_t offset = part.position();
   std::uint64_t entries = 1;
   for_each_directory_chunk(metadata, [&](std::span<const std::byte> chunk, std::uint64_t in_chunk) {

@@ -8,9 +8,9 @@
 
 #include "isohf/archive/content_hash.h"
 #include "isohf/archive/journal.h"
-#include "isohf/archive/part_file.h"
 #include "isohf/archive/reader.h"
 #include "isohf/archive/writer.h"
+#include "isohf/base/output_file.h"
 
 namespace isohf {
 
@@ -37,7 +37,7 @@ class WrittenContents {
   /// The member index.bin; `metadata` is the entry that the directory begins with. Call once, when all is added.
   [[nodiscard]] std::span<const std::byte> finish_index(const ZipMember& metadata);
   /// Appends the directory, whose last entry is that of index.bin, and the end records.
-  void append_directory(const ZipMember& metadata, const ZipMember& index, PartFile& part) const;
+  void append_directory(const ZipMember& metadata, const ZipMember& index, OutputFile& part) const;
 
  private:
   /// A member that is no tile, and the tile that it stands before.

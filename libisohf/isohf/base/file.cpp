@@ -23,7 +23,7 @@ std::string reason(int error_number) {
 }
 
 [[noreturn]] void fail(const std::string& path, const std::string& deed, int error_number) {
-  throw Error(ErrorCode::kIo, fmt::format("{}: {}: {}", path, deed, reason(error_number)));
+  throw Error(ErrorCode::kIo, fmt::format("{}{}{}: {}", path, path.empty() ? "" : ": ", deed, reason(error_number)));
 }
 
 }  // namespace
@@ -34,8 +34,8 @@ std::string folder_of(const std::string& path) {
   return slash == 0 ? "/" : path.substr(0, slash);
 }
 
-File::File(const std::string& path, Mode mode) : path_(path) {
-  const int flags = O_CLOEXEC | (mode == Mode::kRead ? O_RDONLY | O_NONBLOCK : O_RDWR | O_CREAT);
+File::File(const std::string& path, Mode mode) : path_(path), name_(path) {
+  const int flags = O_CLOEXEC | (mode == Mode::kRead ? O_RDONLY | O_NONBLOCK : O_RDWR | O_CREAT | O_NOFOLLOW);
   do {
     descriptor_ = ::open(path.c_str(), flags, 0666);
   } while (descriptor_ < 0 && errno == EINTR);
@@ -51,7 +51,7 @@ File::File(const std::string& path, Mode mode) : path_(path) {
 
 File File::scratch(const std::string& folder, std::uint64_t size_bytes) {
   File file;
-  file.path_ = folder;
+  file.path_ = file.name_ = folder;
   file.descriptor_ = ::open(folder.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, 0600);
   if (file.descriptor_ < 0 && (errno == EOPNOTSUPP || errno == EISDIR || errno == EINVAL)) {  // no O_TMPFILE there
     std::string name = folder + "/isohf-scratch-XXXXXX";
@@ -70,12 +70,14 @@ File::~File() {
   if (descriptor_ >= 0) ::close(descriptor_);
 }
 
-File::File(File&& other) noexcept : path_(std::move(other.path_)), descriptor_(std::exchange(other.descriptor_, -1)) {}
+File::File(File&& other) noexcept
+    : path_(std::move(other.path_)), name_(std::move(other.name_)), descriptor_(std::exchange(other.descriptor_, -1)) {}
 
 File& File::operator=(File&& other) noexcept {
   if (this != &other) {
     if (descriptor_ >= 0) ::close(descriptor_);
     path_ = std::move(other.path_);
+    name_ = std::move(other.name_);
     descriptor_ = std::exchange(other.descriptor_, -1);
   }
   return *this;
@@ -83,13 +85,16 @@ File& File::operator=(File&& other) noexcept {
 
 std::uint64_t File::size_bytes() const {
   struct stat status {};
-  if (::fstat(descriptor_, &status) != 0) fail(path_, "cannot tell its size", errno);
+  if (::fstat(descriptor_, &status) != 0) fail(name_, "cannot tell its size", errno);
   return static_cast<std::uint64_t>(status.st_size);
 }
 
 bool File::try_lock() {
-  // A file system without locks gives no protection, but no reason to refuse either.
-  return ::flock(descriptor_, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK;
+  int result = 0;
+  do {
+    result = ::flock(descriptor_, LOCK_EX | LOCK_NB);
+  } while (result != 0 && errno == EINTR);
+  return result == 0 || errno != EWOULDBLOCK;
 }
 
 bool File::is_at_path() const {
@@ -104,7 +109,7 @@ void File::write_at(std::uint64_t offset_bytes, std::span<const std::byte> bytes
     const ssize_t done = ::pwrite(descriptor_, bytes.data(), bytes.size(), static_cast<off_t>(offset_bytes));
     if (done < 0) {
       if (errno == EINTR) continue;
-      fail(path_, fmt::format("cannot write {} bytes at byte {}", bytes.size(), offset_bytes), errno);
+      fail(name_, fmt::format("cannot write {} bytes at byte {}", bytes.size(), offset_bytes), errno);
     }
     bytes = bytes.subspan(static_cast<std::size_t>(done));
     offset_bytes += static_cast<std::uint64_t>(done);
@@ -118,7 +123,7 @@ std::size_t File::read_at(std::uint64_t offset_bytes, std::span<std::byte> bytes
         ::pread(descriptor_, bytes.data() + total, bytes.size() - total, static_cast<off_t>(offset_bytes + total));
     if (done < 0) {
       if (errno == EINTR) continue;
-      fail(path_, fmt::format("cannot read at byte {}", offset_bytes + total), errno);
+      fail(name_, fmt::format("cannot read at byte {}", offset_bytes + total), errno);
     }
     if (done == 0) break;
     total += static_cast<std::size_t>(done);
@@ -127,11 +132,19 @@ std::size_t File::read_at(std::uint64_t offset_bytes, std::span<std::byte> bytes
 }
 
 void File::truncate(std::uint64_t size_bytes) {
-  if (::ftruncate(descriptor_, static_cast<off_t>(size_bytes)) != 0) fail(path_, "cannot set its size", errno);
+  int result = 0;
+  do {
+    result = ::ftruncate(descriptor_, static_cast<off_t>(size_bytes));
+  } while (result != 0 && errno == EINTR);
+  if (result != 0) fail(name_, "cannot set its size", errno);
 }
 
 void File::sync() {
-  if (::fsync(descriptor_) != 0) fail(path_, "cannot flush to the disk", errno);
+  int result = 0;
+  do {
+    result = ::fsync(descriptor_);
+  } while (result != 0 && errno == EINTR);
+  if (result != 0 && errno != EINVAL && errno != ENOTSUP) fail(name_, "cannot flush to the disk", errno);
 }
 
 void File::start_writeback(std::uint64_t offset_bytes, std::uint64_t size_bytes) {
@@ -140,13 +153,13 @@ void File::start_writeback(std::uint64_t offset_bytes, std::uint64_t size_bytes)
 }
 
 void File::close() {
-  if (descriptor_ >= 0 && ::close(std::exchange(descriptor_, -1)) != 0) fail(path_, "cannot close", errno);
+  if (descriptor_ >= 0 && ::close(std::exchange(descriptor_, -1)) != 0) fail(name_, "cannot close", errno);
 }
 
 MappedFile::MappedFile(const std::string& path) : file_(path, File::Mode::kRead) {
   size_ = file_.size_bytes();
   if (size_ == 0) return;
-  void* mapped = ::mmap(nullptr, size_, PROT_READ, MAP_SHARED, file_.descriptor_, 0);
+  void* mapped = ::mmap(nullptr, size_, PROT_READ, MAP_SHARED, file_.descriptor(), 0);
   if (mapped == MAP_FAILED) fail(path, "cannot map", errno);
   data_ = static_cast<const std::byte*>(mapped);
 }
@@ -179,37 +192,35 @@ bool rename_file(const std::string& from, const std::string& to, bool overwrite)
   if (errno == EEXIST) return false;
   if (errno != EINVAL && errno != ENOSYS && errno != ENOTSUP) fail_rename(errno);
   // A file system without RENAME_NOREPLACE: a hard link is refused just as well where the name is taken.
-  if (::link(from.c_str(), to.c_str()) != 0) {
-    if (errno == EEXIST) return false;
-    fail_rename(errno);
+  if (::link(from.c_str(), to.c_str()) == 0) {
+    if (::unlink(from.c_str()) != 0) fail(from, "cannot remove", errno);
+    return true;
   }
-  if (::unlink(from.c_str()) != 0) fail(from, "cannot remove", errno);
+  if (errno == EEXIST) return false;
+  // One without hard links too: nothing but a look is left.
+  struct stat status {};
+  if (::lstat(to.c_str(), &status) == 0) return false;
+  if (::rename(from.c_str(), to.c_str()) != 0) fail_rename(errno);
   return true;
 }
 
 void sync_folder_of(const std::string& path) {
-  const std::string folder = folder_of(path);
-  const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (descriptor < 0) fail(folder, "cannot open", errno);
-  const int result = ::fsync(descriptor);
-  const int error_number = errno;
+  const int descriptor = ::open(folder_of(path).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (descriptor < 0) return;
+  ::fsync(descriptor);
   ::close(descriptor);
-  // Some file systems cannot flush a folder; the rename itself stands.
-  if (result != 0 && error_number != EINVAL && error_number != ENOTSUP) fail(folder, "cannot flush", error_number);
 }
 
 bool remove_file(const std::string& path) noexcept {
   return ::unlink(path.c_str()) == 0 || errno == ENOENT;
 }
 
-PathKind path_kind(const std::string& path) {
-  struct stat status {};
-  if (::stat(path.c_str(), &status) != 0) {
-    if (errno == ENOENT) return PathKind::kAbsent;
-    fail(path, "cannot look at it", errno);
+void occupy_standard_descriptors() noexcept {
+  for (const int descriptor : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    if (::fcntl(descriptor, F_GETFD) >= 0 || errno != EBADF) continue;
+    // The lowest free number is this one. Opened the wrong way round: EBADF, as for what is closed.
+    static_cast<void>(::open("/dev/null", descriptor == STDIN_FILENO ? O_WRONLY : O_RDONLY));
   }
-  if (S_ISREG(status.st_mode)) return PathKind::kFile;
-  return S_ISDIR(status.st_mode) ? PathKind::kFolder : PathKind::kOther;
 }
 
 }  // namespace isohf

@@ -7,12 +7,13 @@
 
 namespace isohf {
 
-/// An open file descriptor whose every failure is one Error{kIo} naming path, deed and reason. Movable, not copyable.
+/// An open file descriptor whose every failure is one Error{kIo} naming path (or what it is called), deed and reason.
+/// Movable, not copyable.
 class File {
  public:
   enum class Mode {
     kRead,       ///< must exist
-    kReadWrite,  ///< made where absent, kept where present
+    kReadWrite,  ///< made where absent, kept where present; no symbolic link
   };
 
   File() = default;
@@ -27,9 +28,13 @@ class File {
 
   [[nodiscard]] bool is_open() const { return descriptor_ >= 0; }
   [[nodiscard]] const std::string& path() const { return path_; }
+  [[nodiscard]] int descriptor() const { return descriptor_; }
   [[nodiscard]] std::uint64_t size_bytes() const;
+  /// From here on errors say nothing of the path.
+  void leave_path_to_caller() { name_.clear(); }
 
-  /// Takes the exclusive advisory lock; false where another process holds it.
+  /// Takes the exclusive advisory lock; false where another process holds it. A file system without locks gives no
+  /// protection, but no reason to refuse either.
   [[nodiscard]] bool try_lock();
   /// True while `path()` still names this very file.
   [[nodiscard]] bool is_at_path() const;
@@ -43,9 +48,8 @@ class File {
   void close();  ///< throws where the system reports a late error
 
  private:
-  friend class MappedFile;
-
   std::string path_;
+  std::string name_;  ///< in errors
   int descriptor_ = -1;
 };
 
@@ -82,14 +86,14 @@ class MappedFile {
 /// The folder that a path lies in; "." for a bare name.
 [[nodiscard]] std::string folder_of(const std::string& path);
 
-/// Makes a rename in the folder of `path` durable.
+/// Makes a rename in the folder of `path` durable, where the system lets it: the rename itself stands.
 void sync_folder_of(const std::string& path);
 
 /// Removes a file; an absent one is fine. Returns false where it could not be removed.
 bool remove_file(const std::string& path) noexcept;
 
-enum class PathKind { kAbsent, kFile, kFolder, kOther };
-/// What stands at a path, symbolic links followed. Throws Error{kIo} where the system does not say.
-[[nodiscard]] PathKind path_kind(const std::string& path);
+/// Opens the descriptors 0 to 2 that whoever started the program left closed, such that using them fails as before: no
+/// file that is opened later gets the number of standard output or standard error. The first thing in main().
+void occupy_standard_descriptors() noexcept;
 
 }  // namespace isohf

@@ -160,16 +160,6 @@ void write_tiles(const Conversion& job, ArchiveWriter& writer, const Stages& sta
                                                   make_filter<TileJob*, void>(filter_mode::serial_in_order, write));
 }
 
-[[noreturn]] void refuse_memory(const MemoryPlan& memory, const ConvertOptions& options) {
-  constexpr std::uint64_t kMega = 1000000;
-  const std::uint64_t least = (memory.least_bytes + kMega - 1) / kMega;
-  throw Error(
-      ErrorCode::kOutOfMemory,
-      fmt::format("--memory allows {} MB, this conversion needs at least {} MB; allow that much, or use smaller "
-                  "tiles (--shape, --triangles) or fewer --threads than {}",
-                  options.memory_bytes / kMega, least, threads_of(options)));
-}
-
 void check_range(const std::pair<double, double>& range) {
   if (!(std::isfinite(range.first) && std::isfinite(range.second) && range.first < range.second)) {
     throw Error(ErrorCode::kInvalidArgument,
@@ -202,7 +192,7 @@ ConvertSummary convert(HeightSource& source, const Plan& plan, const std::string
   const Kernel kernel = Kernel::make(filter_from_string(options.filter));
   Prefilter prefilter = Prefilter::make(kernel.filter(), acquisition_from_string(options.acquisition));
   const MemoryPlan memory = plan_memory(source, plan, options, textures ? textures->memory_bytes() : 0);
-  if (options.memory_bytes != 0 && memory.bytes > options.memory_bytes) refuse_memory(memory, options);
+  check_memory(memory, options);
   source.limit_buffers(memory.source_buffer_bytes);
   const oneapi::tbb::global_control workers(oneapi::tbb::global_control::max_allowed_parallelism,
                                             static_cast<std::size_t>(threads));
@@ -274,19 +264,22 @@ ConvertSummary convert(HeightSource& source, const Plan& plan, const std::string
     }
     if (lossless) summary.metadata.extensions.emplace_back(kLosslessName, format_lossless(*lossless));
     summary.residual_bytes = lossless ? lossless->residual_bytes : 0;
+    summary.tiles_expected = plan.grid.tile_count();
+    summary.tiles_written = writer.next_tile();
+    summary.tiles_void = summary.tiles_written - writer.tiles_stored();
+    if (summary.tiles_written != summary.tiles_expected) {
+      throw Error(ErrorCode::kIo, fmt::format("{}: {} tiles written, {} expected", output, summary.tiles_written,
+                                              summary.tiles_expected));
+    }
+    summary.tile_bytes = writer.tile_bytes();
+    summary.archive_bytes = writer.finish(summary.metadata);
   } catch (const Error& error) {
+    // What is done stays for a resume when the user or the system ended it.
     if (error.code() == ErrorCode::kCancelled) writer.keep_part();
-    throw;
+    if (error.code() != ErrorCode::kIo || !writer.keep_part()) throw;
+    throw Error(ErrorCode::kIo,
+                fmt::format("{}; {}.part keeps what is done, --resume goes on from there", error.what(), output));
   }
-  summary.tiles_expected = plan.grid.tile_count();
-  summary.tiles_written = writer.next_tile();
-  summary.tiles_void = summary.tiles_written - writer.tiles_stored();
-  if (summary.tiles_written != summary.tiles_expected) {
-    throw Error(ErrorCode::kIo, fmt::format("{}: {} tiles written, {} expected", output, summary.tiles_written,
-                                            summary.tiles_expected));
-  }
-  summary.tile_bytes = writer.tile_bytes();
-  summary.archive_bytes = writer.finish(summary.metadata);
   summary.metadata.tiles_stored = writer.tiles_stored();
   summary.source_samples = static_cast<std::uint64_t>(info.width) * static_cast<std::uint64_t>(info.height);
   summary.lattice_samples = static_cast<std::uint64_t>(plan.lattice_samples);

@@ -226,4 +226,15 @@ MemoryPlan plan_memory(const HeightSource& source, const Plan& plan, const Conve
   return plan_memory(source, plan, options, texture_bytes);
 }
 
+void check_memory(const MemoryPlan& memory, const ConvertOptions& options) {
+  if (options.memory_bytes == 0 || memory.bytes <= options.memory_bytes) return;
+  constexpr std::uint64_t kMega = 1000000;
+  const std::uint64_t least = (memory.least_bytes + kMega - 1) / kMega;
+  throw Error(
+      ErrorCode::kOutOfMemory,
+      fmt::format("--memory allows {} MB, this conversion needs at least {} MB; allow that much, or use smaller "
+                  "tiles (--shape, --triangles) or fewer --threads than {}",
+                  options.memory_bytes / kMega, least, threads_of(options)));
+}
+
 }  // namespace isohf

@@ -35,6 +35,10 @@ struct MemoryPlan {
 /// The same, with the textures that the options ask for.
 [[nodiscard]] MemoryPlan plan_memory(const HeightSource& source, const Plan& plan, const ConvertOptions& options);
 
+/// Throws Error{kOutOfMemory} where a plan takes more than options.memory_bytes allow: before a conversion, and where
+/// only its plan is asked for.
+void check_memory(const MemoryPlan& memory, const ConvertOptions& options);
+
 /// Threads that a conversion works with.
 [[nodiscard]] int threads_of(const ConvertOptions& options);
 /// Tiles in flight where each brings a texture along.

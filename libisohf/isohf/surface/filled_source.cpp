@@ -60,6 +60,9 @@ SourceInfo treated_info(const SourceInfo& info, const VoidTreatment& treatment) 
     const auto [raw_low, raw_high] = raw_range(info, *treatment.valid_range);
     treated.valid_min = std::max(info.valid_min, raw_low);
     treated.valid_max = std::min(info.valid_max, raw_high);
+    // What a reader takes for undeclared voids is in the range or it is not; a survey says so where it still is.
+    std::erase_if(treated.warnings,
+                  [](const std::string& warning) { return warning.find("--nodata") != warning.npos; });
   }
   treated.valid_range = treatment.valid_range;
   treated.fill_distance = treatment.distance();
