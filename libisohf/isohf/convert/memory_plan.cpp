@@ -1,11 +1,14 @@
 #include "isohf/convert/memory_plan.h"
 
+#include <fmt/format.h>
+
 #include <oneapi/tbb/task_arena.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 
+#include "isohf/base/error.h"
 #include "isohf/convert/residual_stage.h"
 #include "isohf/convert/seed_stage.h"
 #include "isohf/convert/texture_stage.h"
