@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "archive_places.h"
 #include "command.h"
 #include "isohf/archive/reader.h"
 #include "isohf/base/error.h"
@@ -38,6 +39,7 @@ blend over it, of length 1. A place without elevation gives 'void', one beyond t
 Examples:
   isohf sample dem.isohf --at 1200.5 340
   isohf sample dem.isohf --at-lonlat 6.865 45.833
+  isohf sample dem.isohf --at-crs 334000 5077500 --with-lonlat      in metres of the input's own map
   isohf sample dem.isohf < places.txt > elevations.txt)";
 
 struct SampleOptions {
@@ -45,7 +47,11 @@ struct SampleOptions {
   std::string archive;
   std::vector<WorldPoint> places;
   std::vector<GeoPoint> geo_places;
+  std::vector<MapPoint> source_places;
   bool reads_degrees = false;  ///< standard input holds longitudes and latitudes
+  bool reads_source = false;   ///< standard input holds coordinates of the source
+  bool with_degrees = false;   ///< answers hold them
+  bool with_source = false;
   std::uint64_t memory_bytes = std::uint64_t{256} << 20;
 };
 
@@ -58,15 +64,19 @@ std::optional<SampleOptions> parse(const Arguments& arguments) {
                      [&](const std::string& x, const std::string& z) {
                        options.places.push_back({parse_number(x), parse_number(z)});
                      });
-  line.repeated_pair("--at-lonlat", "LON LAT",
-                     "A place in degrees, for archives of inputs in degrees; may be given again",
+  line.repeated_pair("--at-lonlat", "LON LAT", "A place in degrees of the input's own datum; may be given again",
                      [&](const std::string& longitude, const std::string& latitude) {
                        options.geo_places.push_back({parse_number(longitude), parse_number(latitude)});
                      });
+  line.repeated_pair("--at-crs", "E N", "A place in the input's own coordinates; may be given again",
+                     [&](const std::string& easting, const std::string& northing) {
+                       options.source_places.push_back({parse_number(easting), parse_number(northing)});
+                     });
   line.flag("--lonlat", "Places on standard input are longitude and latitude, degrees", options.reads_degrees);
-  line.exclusive({"--at", "--at-lonlat"});
-  line.exclusive({"--at", "--lonlat"});
-  line.exclusive({"--at-lonlat", "--lonlat"});
+  line.flag("--crs", "Places on standard input are in the input's own coordinates", options.reads_source);
+  line.flag("--with-lonlat", "Add longitude and latitude to each line", options.with_degrees);
+  line.flag("--with-crs", "Add the input's own coordinates to each line", options.with_source);
+  line.exclusive({"--at", "--at-lonlat", "--at-crs", "--lonlat", "--crs"});
   add_memory_option(line, "Decoded tiles to keep (default 256M)", options.memory_bytes);
   add_common_options(line, options.common);
   line.footer(kFooter);
@@ -129,17 +139,47 @@ Sample sample_at(const TileGrid& grid, TileCache& cache, WorldPoint place) {
   return sample;
 }
 
+/// What answers say of their places.
+struct PlaceOutput {
+  const GeoPlaces* geo = nullptr;  ///< nullptr: no longitudes and latitudes
+  const GeoPlaces* source = nullptr;
+};
+
+std::string columns_from(const PlaceOutput& output, WorldPoint place) {
+  std::string text;
+  if (output.source != nullptr) {
+    const MapPoint at = output.source->source_from_world(place);
+    text += fmt::format(" {:.12g} {:.12g}", at.easting, at.northing);
+  }
+  if (output.geo != nullptr) {
+    const GeoPoint at = output.geo->geo_from_world(place);
+    text += fmt::format(" {:.12g} {:.12g}", at.longitude, at.latitude);
+  }
+  return text + '\n';
+}
+
 std::string text_from(const Sample& sample) {
-  if (!sample.inside) return "outside\n";
-  if (std::isnan(sample.elevation)) return "void\n";
-  return fmt::format("{:.9g} {:.7f} {:.7f} {:.7f} {} {}\n", sample.elevation, sample.normal[0], sample.normal[1],
+  if (!sample.inside) return "outside";
+  if (std::isnan(sample.elevation)) return "void";
+  return fmt::format("{:.9g} {:.7f} {:.7f} {:.7f} {} {}", sample.elevation, sample.normal[0], sample.normal[1],
                      sample.normal[2], sample.tile.column, sample.tile.row);
 }
 
-std::string json_from(const Sample& sample, WorldPoint place) {
+std::string json_from(const Sample& sample, WorldPoint place, const PlaceOutput& output) {
   // A place that the map does not show has no world coordinates.
   const auto number = [](double value) { return std::isnan(value) ? ordered_json(nullptr) : ordered_json(value); };
   ordered_json json = {{"x", number(place.x)}, {"z", number(place.z)}};
+  const auto pair = [&](const char* first, double a, const char* second, double b) {
+    return ordered_json{{first, number(a)}, {second, number(b)}};
+  };
+  if (output.source != nullptr) {
+    const MapPoint at = output.source->source_from_world(place);
+    json["crs"] = pair("x", at.easting, "y", at.northing);
+  }
+  if (output.geo != nullptr) {
+    const GeoPoint at = output.geo->geo_from_world(place);
+    json["lonlat"] = pair("longitude", at.longitude, "latitude", at.latitude);
+  }
   if (!sample.inside) {
     json["state"] = "outside";
   } else {
@@ -154,29 +194,48 @@ std::string json_from(const Sample& sample, WorldPoint place) {
   return json_line(json);
 }
 
+/// The archive's places; its source's map is understood where that is `needed` for them, or `welcome`.
+GeoPlaces places_of(ArchiveReader& archive, bool needs_geo, bool needs_source, bool is_welcome) {
+  const auto lacks = [](const GeoPlaces& places, bool geo, bool source) {
+    return (geo && !places.knows_geo()) || (source && !places.knows_source());
+  };
+  const GeoPlaces first(archive.metadata());
+  const bool is_needed = lacks(first, needs_geo, needs_source);
+  if (!is_needed && !(is_welcome && lacks(first, true, true))) return first;
+  try {
+    understand_source(archive);
+  } catch (const Error&) {
+    if (is_needed) throw;
+  }
+  GeoPlaces places(archive.metadata());
+  if (!lacks(places, needs_geo, needs_source)) return places;
+  throw Error(ErrorCode::kInvalidArgument, archive.path() + ": its source has no place in " +
+                                               (needs_geo ? "degrees" : "coordinates") +
+                                               "; give places in world units, --at X Z");
+}
+
 int run(const SampleOptions& options) {
-  const ArchiveReader archive = open_archive(options.archive);
+  ArchiveReader archive = open_archive(options.archive);
   if (!options.common.quiet) {
     for (const std::string& warning : archive.warnings()) print_warning(warning);
   }
   TileCache cache(archive, options.memory_bytes);
   StandardOutput out;
-  std::optional<GeoPlaces> geo;
-  if (options.reads_degrees || !options.geo_places.empty()) {
-    try {
-      geo.emplace(archive.metadata());
-      geo->require_geo();
-    } catch (const Error& error) {
-      throw Error(error.code(), options.archive + ": " + error.what());
-    }
-  }
+  const bool takes_geo = options.reads_degrees || !options.geo_places.empty();
+  const bool takes_source = options.reads_source || !options.source_places.empty();
+  const GeoPlaces places =
+      places_of(archive, takes_geo || options.with_degrees, takes_source || options.with_source, options.common.json);
+  PlaceOutput output;
+  if (options.with_degrees || (options.common.json && places.knows_geo())) output.geo = &places;
+  if (options.with_source || (options.common.json && places.knows_source())) output.source = &places;
   const auto answer = [&](WorldPoint place) {
     const Sample sample = sample_at(archive.grid(), cache, place);
-    out.write(options.common.json ? json_from(sample, place) : text_from(sample));
+    out.write(options.common.json ? json_from(sample, place, output) : text_from(sample) + columns_from(output, place));
   };
   for (const WorldPoint place : options.places) answer(place);
-  for (const GeoPoint place : options.geo_places) answer(geo->world_from_geo(place));
-  if (options.places.empty() && options.geo_places.empty()) {
+  for (const GeoPoint place : options.geo_places) answer(places.world_from_geo(place));
+  for (const MapPoint place : options.source_places) answer(places.world_from_source(place));
+  if (options.places.empty() && options.geo_places.empty() && options.source_places.empty()) {
     LineReader reader;
     while (const std::optional<std::string> line = reader.next([&] { out.flush(); })) {
       const std::size_t first = line->find_first_not_of(" \t");
@@ -187,7 +246,11 @@ int run(const SampleOptions& options) {
         throw Error(ErrorCode::kCorrupt, fmt::format("standard input, line {}: found '{}', must be 'x z', two numbers",
                                                      reader.line_number(), line->substr(0, 80)));
       }
-      answer(geo ? geo->world_from_geo({place.x, place.z}) : place);
+      if (takes_geo) {
+        answer(places.world_from_geo({place.x, place.z}));
+      } else {
+        answer(takes_source ? places.world_from_source({place.x, place.z}) : place);
+      }
     }
   }
   out.finish();

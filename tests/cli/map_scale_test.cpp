@@ -1,5 +1,6 @@
 /// Inputs on maps of their own through the program: what their lengths are worth, and truer maps for them.
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -8,6 +9,7 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <iterator>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
@@ -36,6 +38,12 @@ constexpr double kLatitude = 44.5;
 /// 10 % upwards to the North, on the ground.
 double slope(GeoPoint place) {
   return 500.0 + 0.1 * (place.latitude - kLatitude) * degree_lengths({}, kLatitude).along_meridian;
+}
+
+RunOptions with_input(const std::string& text) {
+  RunOptions options;
+  options.input = text;
+  return options;
 }
 
 class MapCommand : public testing::Test {
@@ -225,6 +233,69 @@ TEST_F(MapCommand, FeetSurvive) {
   }
 }
 
+TEST_F(MapCommand, SampleTakesAndGivesTheInputsOwnCoordinatesAndDegrees) {
+  convert("utm.tif", "a.isohf");
+  ASSERT_EQ(convert("web.tif", "b.isohf", {"--projection", "auto"}).exit_code, 0);
+  for (const auto& [archive, epsg] :
+       {std::pair<std::string, std::string>{"a.isohf", "EPSG:32632"}, {"b.isohf", "EPSG:3857"}}) {
+    SCOPED_TRACE(archive);
+    const GeoPoint place{6.51, 44.49};
+    const MapPoint there = understand_system(epsg)->map_from_geo(place);
+    const std::string crs = fmt::format("{:.6f} {:.6f}\n", there.easting, there.northing);
+    const auto sample = [&](const std::vector<std::string>& more, const std::string& input = "") {
+      std::vector<std::string> arguments = {"sample", folder / archive};
+      arguments.insert(arguments.end(), more.begin(), more.end());
+      const RunResult result = run_isohf(arguments, with_input(input));
+      EXPECT_EQ(result.exit_code, 0) << result.err;
+      EXPECT_EQ(result.err, "");
+      return result.out;
+    };
+    const json by_crs = json::parse(sample({"--crs", "--json"}, crs));
+    EXPECT_NEAR(by_crs.at("elevation").get<double>(), slope(place), 0.5);
+    EXPECT_NEAR(by_crs.at("lonlat").at("longitude").get<double>(), place.longitude, 1e-9);
+    EXPECT_NEAR(by_crs.at("lonlat").at("latitude").get<double>(), place.latitude, 1e-9);
+    EXPECT_NEAR(by_crs.at("crs").at("x").get<double>(), there.easting, 1e-5);
+    EXPECT_NEAR(by_crs.at("crs").at("y").get<double>(), there.northing, 1e-5);
+    const json by_geo = json::parse(sample({"--lonlat", "--json"}, "6.51,44.49\n"));
+    EXPECT_NEAR(by_geo.at("x").get<double>(), by_crs.at("x").get<double>(), 1e-5);
+    EXPECT_NEAR(by_geo.at("z").get<double>(), by_crs.at("z").get<double>(), 1e-5);
+
+    std::istringstream line(sample({"--crs", "--with-crs", "--with-lonlat"}, crs));
+    std::vector<double> columns((std::istream_iterator<double>(line)), {});
+    ASSERT_EQ(columns.size(), 10U);
+    EXPECT_NEAR(columns[6], there.easting, 1e-4);
+    EXPECT_NEAR(columns[7], there.northing, 1e-4);
+    EXPECT_NEAR(columns[8], place.longitude, 1e-8);
+    EXPECT_NEAR(columns[9], place.latitude, 1e-8);
+    EXPECT_THAT(sample({"--lonlat", "--with-lonlat"}, "0 0\n"), testing::StartsWith("outside "));
+  }
+}
+
+TEST_F(MapCommand, SampleWithoutTheModuleTakesWhatNeedsNone) {
+  convert("utm.tif", "a.isohf");
+  ASSERT_EQ(convert("web.tif", "b.isohf", {"--projection", "auto"}).exit_code, 0);
+  fs::create_directory(folder / "bin");
+  const std::string program = folder / "bin/isohf";
+  fs::copy_file(isohf_path(), program);
+  const auto run = [&](const std::string& archive, const std::string& way) {
+    const json centre = info("a.isohf").at("centre");
+    const bool by_crs = way == "--crs";
+    return run_program(
+        {program, "sample", folder / archive, way},
+        with_input(by_crs ? fmt::format("{} {}", centre.at("x").get<double>(), centre.at("y").get<double>())
+                          : "6.5 44.5"));
+  };
+  // Metres of the source are metres of the world; the ground's own map is ours.
+  EXPECT_EQ(run("a.isohf", "--crs").exit_code, 0);
+  EXPECT_EQ(run("b.isohf", "--lonlat").exit_code, 0);
+  for (const RunResult& result : {run("a.isohf", "--lonlat"), run("b.isohf", "--crs")}) {
+    EXPECT_EQ(result.exit_code, 1);
+    EXPECT_EQ(result.out, "");
+    EXPECT_THAT(result.err, HasSubstr(".isohf: reference systems need the PROJ module isohf_proj.so"));
+    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1);
+  }
+}
+
 /// What the dynamic linker loads while the program runs.
 std::string loaded_libraries(const std::vector<std::string>& arguments) {
   std::vector<std::string> command = {"/usr/bin/env", "LD_DEBUG=files", isohf_path()};
@@ -269,6 +340,14 @@ TEST_F(MapCommand, WithoutTheModuleAllElseWorksAndALineSaysWhatIsMissing) {
   EXPECT_EQ(std::count(asked.err.begin(), asked.err.end(), '\n'), 1);
   // With it, what an archive does not say is found out.
   EXPECT_NEAR(info("a.isohf").at("map_scale").at("mean").get<double>(), 1.4, 0.01);
+}
+
+TEST_F(MapCommand, WithoutProjsDatabaseALineSaysSo) {
+  const RunResult result = run_program(
+      {"/usr/bin/env", "PROJ_DATA=/nonexistent", isohf_path(), "convert", folder / "web.tif", folder / "a.isohf"});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_EQ(result.err, "");
+  EXPECT_THAT(result.out, HasSubstr("map scale    not known: the reference system EPSG:3857: PROJ finds no proj.db"));
 }
 
 TEST_F(MapCommand, ExportCutsABoxOfTheInputsOwnCoordinatesOutOfAnotherMap) {
