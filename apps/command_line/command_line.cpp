@@ -35,6 +35,7 @@ struct Option {
   std::string group{};
   std::size_t values = 1;  ///< 0: a flag
   bool repeats = false;
+  std::vector<std::string> words{};
   std::optional<std::string> alone{};  ///< what it means without a value, if it may stand so
   std::function<bool(const std::string&)> is_value = nullptr;
   std::function<void(const Values&)> take = nullptr;  ///< the values of one occurrence
@@ -142,7 +143,7 @@ struct CommandLine::State {
   std::vector<Option> options;
   std::vector<std::set<std::string>> exclusive;
 
-  [[nodiscard]] bool is_program() const { return program_name() == "isohf-" + command; }
+  [[nodiscard]] bool is_program() const { return program_name() == "isohf-" + command || program_name() == command; }
   [[nodiscard]] std::string invocation() const {
     return is_program() ? program_name() : program_name() + " " + command;
   }
@@ -377,7 +378,9 @@ void CommandLine::State::take() {
       try {
         if (option.take) option.take(occurrence.values);
       } catch (const Error& error) {
-        throw error.within(occurrence.where);
+        const std::string word = occurrence.values.front().substr(0, occurrence.values.front().find(':'));
+        throw Error(error.code(),
+                    fmt::format("{}: {}{}", occurrence.where, error.what(), did_you_mean(word, option.words)));
       }
     }
   }
@@ -471,6 +474,10 @@ void CommandLine::repeated_pair(const std::string& flags, const std::string& val
 void CommandLine::flag(const std::string& flags, const std::string& description, bool& value) {
   const auto take = [&value](const Values& values) { value = values.front() == "true"; };
   state_->add(flags, {.description = description, .values = 0, .take = take});
+}
+
+void CommandLine::words(const std::vector<std::string>& words) {
+  state_->options.back().words = words;
 }
 
 void CommandLine::exclusive(const std::vector<std::string>& options) {

@@ -59,6 +59,8 @@ class CommandLine {
   /// An option of two values that may be given again and again.
   void repeated_pair(const std::string& flags, const std::string& value_name, const std::string& description,
                      std::function<void(const std::string&, const std::string&)> take);
+  /// Words that the option declared last may begin with, to suggest the nearest where its value is refused.
+  void words(const std::vector<std::string>& words);
   void flag(const std::string& flags, const std::string& description, bool& value);
   /// At most one of these long options may be given.
   void exclusive(const std::vector<std::string>& options);

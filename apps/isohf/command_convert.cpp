@@ -19,6 +19,7 @@
 #include "isohf/base/file.h"
 #include "isohf/base/output_file.h"
 #include "isohf/convert/convert.h"
+#include "isohf/surface/acquisition.h"
 #include "isohf/surface/kernels.h"
 #include "json_output.h"
 #include "option_values.h"
@@ -111,8 +112,7 @@ std::optional<ConvertCommandOptions> parse(const Arguments& arguments) {
   add_source_options(line, options.open);
   add_mosaic_options(line, options.inputs);
   line.option("--source-name", "NAME",
-              "What the archive says it was made from, instead of the input's file name or a mosaic's files",
-              options.source_name);
+              "Record NAME as the source, instead of the input's file name or a mosaic's files", options.source_name);
   add_lattice_options(line, options.convert.plan);
   add_ground_options(line, options.convert.plan.ground);
   add_geoid_option(line, options.geoid);
@@ -124,10 +124,16 @@ std::optional<ConvertCommandOptions> parse(const Arguments& arguments) {
       "nearest, bilinear, limited-cubic, catmull-rom, bspline2, bspline3, bspline5, lanczos3 or lanczos6 (default " +
           options.convert.filter + ")",
       [&](const std::string& text) { options.convert.filter = to_string(filter_from_string(text)); });
+  line.words({"nearest", "bilinear", "limited-cubic", "catmull-rom", "bspline2", "bspline3", "bspline5", "lanczos3",
+              "lanczos6"});
   line.option("--acquisition", "NAME",
-              "How the input's samples were taken: point, box, tent, gaussian:SIGMA or fir:FILE (default " +
+              "Account for how samples were taken: point, box, tent, gaussian:SIGMA or fir:FILE (default " +
                   options.convert.acquisition + ")",
-              options.convert.acquisition);
+              [&](const std::string& text) {
+                (void)acquisition_from_string(text.starts_with("fir:") ? "point" : text);
+                options.convert.acquisition = text;
+              });
+  line.words({"point", "box", "tent", "gaussian", "fir"});
   line.group("Size and speed");
   line.option("--level", "N",
               fmt::format("Effort to make the archive small, {} to {} (default {}); the elevations are the same",
@@ -138,8 +144,8 @@ std::optional<ConvertCommandOptions> parse(const Arguments& arguments) {
   line.group("Shadows");
   line.option_or_numbers(
       "--shadow-seeds", "[DEG,...]", "all",
-      "Store what tiles cast over their neighbours, so that a tile's shadows need no other tile: for "
-      "every sun elevation from --sun-min on, or for the given ones, as in 5,15,30",
+      "Store the shadows that tiles cast over their neighbours, so that none needs another: for every sun elevation "
+      "from --sun-min on, or for the given ones, as in 5,15,30",
       [&](const std::string& text) {
         options.convert.shadow_seeds.emplace();
         if (text != "all") options.convert.shadow_seeds->sun_deg = parse_numbers(text);
@@ -159,7 +165,7 @@ std::optional<ConvertCommandOptions> parse(const Arguments& arguments) {
   add_work_options(line, options.work);
   add_memory_option(line, "Stay within SIZE of memory, to a tenth (default: as is fastest)",
                     options.convert.memory_bytes);
-  line.option("--tmpdir", "FOLDER", "Where a scratch file may go that --memory asks for (default: OUTPUT's folder)",
+  line.option("--tmpdir", "FOLDER", "Put the scratch file that --memory may need there (default: OUTPUT's folder)",
               options.convert.scratch_folder);
   add_common_options(line, options.common);
   line.footer(kFooter);

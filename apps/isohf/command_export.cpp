@@ -84,7 +84,7 @@ std::optional<ExportOptions> parse(const Arguments& arguments) {
   CommandLine line("export", "Writes the surface of an archive as a raster of elevations.");
   add_raster_arguments(line, "OUTPUT", options.raster);
   line.group("Grid");
-  add_size_options(line, "So many samples over the ground (default: the source's samples)", options.raster);
+  add_size_options(line, "Write so many samples over the ground (default: the source's samples)", options.raster);
   line.option("--bbox", "W,S,E,N",
               "Only this part of the ground, in the source's coordinates; across the 180th meridian W is above E",
               [&](const std::string& text) { options.bbox = bounding_box_from_string(text); });

@@ -84,7 +84,7 @@ std::string text_from(const OtherFormats& other) {
 
 int command_formats(const Arguments& arguments) {
   CommonOptions common;
-  CommandLine line("formats", "Lists what can be read and written, and by which library.");
+  CommandLine line("formats", "Lists the formats that are read and written, and the libraries that do it.");
   add_common_options(line, common);
   line.footer(kFooter);
   if (!line.parse(arguments)) return kExitDone;

@@ -49,7 +49,7 @@ struct InfoOptions {
 
 std::optional<InfoOptions> parse(const Arguments& arguments) {
   InfoOptions options;
-  CommandLine line("info", "Says what an archive or a raster holds.");
+  CommandLine line("info", "Describes an archive or a raster.");
   line.group("Arguments");
   line.positional("INPUT", "-i,--input", "Archive or raster to describe", options.input);
   line.flag("--tiles", "List an archive's tiles", options.tiles);

@@ -49,7 +49,7 @@ struct PlanOptions {
 
 std::optional<PlanOptions> parse(const Arguments& arguments) {
   PlanOptions options;
-  CommandLine line("plan", "Lists tile shapes, or what convert would make of an input.");
+  CommandLine line("plan", "Lists tile shapes, or previews a conversion.");
   line.group("Arguments");
   std::vector<std::string> names;
   line.positionals("[INPUT...]",

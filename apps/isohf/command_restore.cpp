@@ -72,7 +72,7 @@ std::optional<RestoreOptions> parse(const Arguments& arguments) {
       "--like", "INPUT",
       "The grid of this raster, or of a folder, \"pattern*\" or @list of them (default: of the archive's source)",
       options.like);
-  add_size_options(line, "So many samples over the source's ground", options.raster);
+  add_size_options(line, "Write so many samples over the source's ground", options.raster);
   add_method_option(line, "hex; the source's own samples where they are kept", options.raster);
   add_clamp_option(line, "RASTER's type", options.raster);
   add_work_options(line, options.work);

@@ -79,7 +79,7 @@ std::optional<ShadeOptions> parse(const Arguments& arguments) {
   line.group("Light");
   line.option("--sun-elevation", "DEG", "Height of the sun above the horizon, 0.01 to below 90 (default 15)",
               [&](const std::string& text) { request.sun_elevation_deg = parse_sun(text); });
-  line.option("--azimuth", "E|W", "Where the sun stands: East or West (default W)", [&](const std::string& text) {
+  line.option("--azimuth", "E|W", "Put the sun in the East or the West (default W)", [&](const std::string& text) {
     request.travel = parse_word(text, {"E", "W"}) == 0 ? LightTravel::kWestward : LightTravel::kEastward;
   });
   line.flag("--hillshade", "Shade slopes by how they face the sun", request.hillshade);

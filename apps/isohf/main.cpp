@@ -22,16 +22,16 @@ namespace isohf::cli {
 namespace {
 
 constexpr Command kCommands[] = {
-    {"plan", "List tile shapes, or what convert would make of an input", command_plan},
+    {"plan", "List tile shapes, or preview a conversion", command_plan},
     {"convert", "Turn a raster of elevations into an archive", command_convert},
-    {"info", "Say what an archive or a raster holds", command_info},
+    {"info", "Describe an archive or a raster", command_info},
     {"verify", "Check an archive, and compare it with its source", command_verify},
     {"restore", "Turn an archive back into a raster", command_restore},
     {"export", "Write the surface as a raster of any grid, whole or cut into tiles", command_export},
     {"sample", "Print elevation and normal at places", command_sample},
     {"shade", "Draw a picture of the surface with its shadows", command_shade},
     {"view", "Fly over an archive in a window, or draw it without one", command_view},
-    {"formats", "List what can be read and written", command_formats},
+    {"formats", "List the formats that are read and written", command_formats},
     {"experiment", "Measure iso and ortho meshes against sine waves, as the paper does",
      [](const Arguments& arguments) -> int { become_program("isohf-experiment", arguments); }, true},
 };

@@ -14,6 +14,8 @@ void add_ground_options(CommandLine& line, GroundRequest& request) {
               "polar-stereographic, none, or chosen by extent (default: auto of degrees, none of maps); parameters may "
               "follow, as in utm:32N",
               [&](const std::string& text) { request.projection = ProjectionRequest::parse(text); });
+  line.words({"auto", "equirectangular", "local", "transverse-mercator", "utm", "lambert-conformal",
+              "polar-stereographic", "none"});
   line.flag("--wrap-x", "Join the East edge of an input all the way round to its West edge", request.wrap_x);
 }
 

@@ -45,7 +45,7 @@ void add_lattice_options(CommandLine& line, PlanRequest& request) {
   line.flag("--fit", "Stretch the tiles a little so that they end on the input's edge", request.fit);
   line.option(
       "--outside", "RULE",
-      "What tiles hold beyond the input: cover (the slope goes on for two lattice steps, then level), clamp (the edge "
+      "Fill tiles beyond the input: cover (the slope goes on for two lattice steps, then level), clamp (the edge "
       "value goes on) or void (default cover)",
       [&](const std::string& text) {
         constexpr Outside kRules[] = {Outside::kCover, Outside::kClamp, Outside::kVoid};

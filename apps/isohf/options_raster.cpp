@@ -22,13 +22,14 @@ void require_raster_arguments(const CommandLine& line, const std::string& output
 void add_size_options(CommandLine& line, const std::string& size_description, RasterOptions& options) {
   line.option("--size", "WxH", size_description,
               [&](const std::string& text) { options.size = parse_size(text, 1, kMostSide); });
-  line.option("--spacing", "D", "Samples D world units apart",
+  line.option("--spacing", "D", "Write samples D world units apart",
               [&](const std::string& text) { options.spacing = parse_positive_number(text); });
 }
 
 void add_method_option(CommandLine& line, const std::string& without, RasterOptions& options) {
   line.option("--method", "NAME", fmt::format("hex or barycentric (default {})", without),
               [&](const std::string& text) { options.method = restore_method_from_string(text); });
+  line.words({"hex", "barycentric"});
 }
 
 void add_clamp_option(CommandLine& line, const std::string& type, RasterOptions& options) {
