@@ -9,9 +9,9 @@ namespace isohf::cli {
 void add_ground_options(CommandLine& line, GroundRequest& request) {
   line.group("Ground");
   line.option("--projection", "KIND",
-              "How degrees become metres, and other maps truer ones: equirectangular, local, transverse-mercator, utm, "
-              "lambert-conformal, "
-              "polar-stereographic, none, or chosen by extent (default: auto of degrees, none of maps); parameters may "
+              "Project degrees to metres, and maps to truer ones: equirectangular, local, transverse-mercator, utm, "
+              "lambert-conformal, polar-stereographic, none, or chosen by extent (default: auto of degrees, none of "
+              "maps); parameters may "
               "follow, as in utm:32N",
               [&](const std::string& text) { request.projection = ProjectionRequest::parse(text); });
   line.words({"auto", "equirectangular", "local", "transverse-mercator", "utm", "lambert-conformal",

@@ -4,17 +4,20 @@
 #include <tbb/parallel_pipeline.h>
 
 #include <half.h>
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
-#include <map>
+#include <limits>
+#include <optional>
 #include <thread>
+#include <tuple>
 #include <vector>
 
+#include "command_line.h"
 #include "isohf/base/error.h"
+#include "option_values.h"
 #include "sink.h"
 #include "terrain.h"
 
@@ -23,7 +26,6 @@ namespace {
 
 struct Options {
   std::string output;
-  std::string size = "1024x1024";
   Raster raster;
   TerrainOptions land;
   int threads = 0;
@@ -64,63 +66,53 @@ void store_row(SampleType type, std::span<const float> heights, std::byte* out) 
   }
 }
 
-Options parse(int argc, char** argv) {
+std::optional<Options> parse(const cli::Arguments& arguments) {
   Options options;
-  CLI::App app{"Makes terrain: mountains with eroded valleys, plains and, on request, a coast and voids.",
-               "make_terrain"};
-  app.add_option("-o,--output", options.output, "File to write: .tif .exr .png .hgt .raw .r16 .r32")->required();
-  app.add_option("--size", options.size, "Columns x rows")->capture_default_str();
-  app.add_option("--seed", options.land.seed, "Another number, another land")->capture_default_str();
-  app.add_option("--spacing", options.land.spacing_m, "Distance between samples in metres")
-      ->check(CLI::Range(0.1, 10000.0))
-      ->capture_default_str();
-  app.add_option("--relief", options.land.relief_m, "Height of the mountains in metres")
-      ->check(CLI::Range(1.0, 20000.0))
-      ->capture_default_str();
-  app.add_option("--base", options.land.base_m, "Added to every height, in metres")
-      ->check(CLI::Range(-12000.0, 12000.0))
-      ->capture_default_str();
-  app.add_option("--feature", options.land.feature_m, "Distance between the main ridges in metres")
-      ->check(CLI::Range(1.0, 1e6))
-      ->capture_default_str();
-  app.add_option("--roughness", options.land.roughness_m, "Largest sensor error on one sample in metres")
-      ->check(CLI::Range(0.0, 100.0))
-      ->capture_default_str();
-  app.add_option("--voids", options.land.void_fraction, "Share of samples in void patches")
-      ->check(CLI::Range(0.0, 0.4))
-      ->capture_default_str();
-  app.add_flag("--coast", options.land.coast, "Let the lowlands go under a flat sea at the base");
-  const std::map<std::string, SampleType> types = {{"int16", SampleType::kInt16},
-                                                   {"uint16", SampleType::kUint16},
-                                                   {"float32", SampleType::kFloat32},
-                                                   {"half", SampleType::kFloat16}};
-  app.add_option("--type", options.raster.type, "Sample type: int16 uint16 float32 half")
-      ->transform(CLI::CheckedTransformer(types));
-  app.add_flag("!--striped", options.raster.tiled, "TIFF, EXR: strips or scan lines instead of tiles");
-  app.add_flag("!--uncompressed", options.raster.deflate, "TIFF, EXR: no compression");
-  app.add_option("--threads", options.threads, "Threads; 0: as many as there are cores")->check(CLI::Range(0, 1024));
-  app.add_flag("-q,--quiet", options.quiet, "Print nothing");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& e) {
-    std::exit(app.exit(e) == 0 ? 0 : 2);
-  }
-  return options;
-}
-
-void check(Options& options) {
   Raster& raster = options.raster;
-  char end = 0;
-  long long columns = 0;
-  long long rows = 0;
-  if (std::sscanf(options.size.c_str(), "%lldx%lld%c", &columns, &rows, &end) != 2 || columns < 1 || rows < 1 ||
-      columns > 2'000'000'000 || rows > 2'000'000'000) {
-    throw Error(ErrorCode::kInvalidArgument, "--size " + options.size + ": columns and rows wanted, like 16384x8192");
-  }
-  raster.columns = columns;
-  raster.rows = rows;
-  raster.spacing_m = options.land.spacing_m;
-  raster.voids = options.land.void_fraction > 0;
+  TerrainOptions& land = options.land;
+  raster.columns = raster.rows = 1024;
+  cli::CommandLine line("make_terrain",
+                        "Makes terrain: mountains with eroded valleys, plains and, on request, a coast and voids.");
+  const auto number = [&](const char* flag, const char* name, const char* description, double& value, double least,
+                          double most) {
+    line.option(flag, name, fmt::format("{} (default {})", description, value),
+                [&value, least, most](const auto& text) { value = cli::parse_number_in(text, least, most); });
+  };
+  line.positional("OUTPUT", "-o,--output", "File to write: .tif .exr .png .hgt .raw .r16 .r32", options.output);
+  line.option("--size", "WxH", "Columns and rows (default 1024x1024)", [&](const std::string& text) {
+    std::tie(raster.columns, raster.rows) = cli::parse_size(text, 1, 2'000'000'000);
+  });
+  line.option("--seed", "N", "Make another land for another number", [&](const std::string& text) {
+    land.seed =
+        static_cast<decltype(land.seed)>(cli::parse_whole_number(text, 0, std::numeric_limits<std::int64_t>::max()));
+  });
+  number("--spacing", "M", "Put samples M metres apart", land.spacing_m, 0.1, 10000.0);
+  number("--relief", "M", "Raise mountains M metres high", land.relief_m, 1.0, 20000.0);
+  number("--base", "M", "Add M metres to every height", land.base_m, -12000.0, 12000.0);
+  number("--feature", "M", "Put the main ridges M metres apart", land.feature_m, 1.0, 1e6);
+  number("--roughness", "M", "Largest sensor error of a sample in metres", land.roughness_m, 0.0, 100.0);
+  number("--voids", "SHARE", "Share of samples in void patches", land.void_fraction, 0.0, 0.4);
+  line.flag("--coast", "Let the lowlands go under a flat sea at the base", land.coast);
+  line.option("--type", "TYPE", "Sample type: int16, uint16, float32 or half", [&](const std::string& text) {
+    constexpr SampleType kTypes[] = {SampleType::kInt16, SampleType::kUint16, SampleType::kFloat32,
+                                     SampleType::kFloat16};
+    raster.type = kTypes[cli::parse_word(text, {"int16", "uint16", "float32", "half"})];
+  });
+  bool striped = false;
+  bool uncompressed = false;
+  line.flag("--striped", "TIFF, EXR: strips or scan lines instead of tiles", striped);
+  line.flag("--uncompressed", "TIFF, EXR: no compression", uncompressed);
+  line.option("-j,--threads", "N", "Threads (default 0: all cores)", [&](const std::string& text) {
+    options.threads = static_cast<int>(cli::parse_whole_number(text, 0, 1024));
+  });
+  line.flag("-q,--quiet", "Print nothing", options.quiet);
+  if (!line.parse(arguments)) return std::nullopt;
+  line.require("OUTPUT", options.output);
+  raster.tiled = !striped;
+  raster.deflate = !uncompressed;
+  raster.spacing_m = land.spacing_m;
+  raster.voids = land.void_fraction > 0;
+  return options;
 }
 
 void check_range(const Options& options, const Terrain& terrain) {
@@ -166,8 +158,7 @@ void write(const Options& options, const Terrain& terrain, Sink& sink) {
   sink.finish();
 }
 
-void run(Options options) {
-  check(options);
+void make(const Options& options) {
   const Terrain terrain(options.land);
   check_range(options, terrain);
   const std::string part = options.output + ".part";
@@ -187,19 +178,15 @@ void run(Options options) {
   }
 }
 
+int run(const cli::Arguments& arguments) {
+  const std::optional<Options> options = parse(arguments);
+  if (options) make(*options);
+  return cli::kExitDone;
+}
+
 }  // namespace
 }  // namespace isohf::terrain
 
 int main(int argc, char** argv) {
-  const auto options = isohf::terrain::parse(argc, argv);
-  try {
-    isohf::terrain::run(options);
-    return 0;
-  } catch (const isohf::Error& e) {
-    fmt::print(stderr, "make_terrain: {}\n", e.what());
-    return e.code() == isohf::ErrorCode::kInvalidArgument ? 2 : 1;
-  } catch (const std::exception& e) {
-    fmt::print(stderr, "make_terrain: {}\n", e.what());
-    return 1;
-  }
+  return isohf::cli::run_program("make_terrain", argc, argv, isohf::terrain::run);
 }

@@ -215,8 +215,20 @@ INSTANTIATE_TEST_SUITE_P(
         BadValue{"--memory", "M", "a size in bytes such as 400M"},
         BadValue{"--progress", "bar", "auto, plain, json or none"}));
 
-TEST(Usage, WrongFilterIsAnsweredWithTheRightOnes) {
-  expect_usage_error({"convert", "a.tif", "b.isohf", "--filter", "cubic"}, "catmull-rom");
+TEST(Usage, WrongWordsAreAnsweredWithTheNearest) {
+  const auto wrong = [](const char* option, const char* value, const char* message) {
+    expect_usage_error({"convert", "a.tif", "b.isohf", option, value}, message);
+  };
+  wrong("--filter", "cubic", "catmull-rom");
+  wrong("--filter", "catmul-rom", "; did you mean catmull-rom?");
+  wrong("--filter", "Bilinear", "; did you mean bilinear?");
+  wrong("--acquisition", "gausian:2", "; did you mean gaussian?");
+  wrong("--projection", "lambert", "; did you mean lambert-conformal?");
+  wrong("--outside", "vodi", "; did you mean void?");
+  expect_usage_error({"restore", "a.isohf", "b.tif", "--method", "bary"}, "; did you mean barycentric?");
+  expect_usage_error({"export", "a.isohf", "b.tif", "--type", "u61"}, "; did you mean u16?");
+  expect_usage_error({"view", "a.isohf", "--mode", "textures"}, "; did you mean texture?");
+  expect_usage_error({"info", "--tile-size", "3"}, "unknown option --tile-size; it belongs to export");
 }
 
 TEST(Usage, OptionsThatContradictEachOtherAreRefused) {
