@@ -20,29 +20,35 @@ std::string_view setting(const char* name) {
   return value == nullptr ? std::string_view() : std::string_view(value);
 }
 
-bool is_terminal(int file) {
+/// Whether a terminal is behind `file` that understands escape codes.
+bool takes_escapes(int file) {
   return ::isatty(file) != 0 && !setting("TERM").empty() && setting("TERM") != "dumb";
+}
+
+/// 0 where there is no terminal.
+std::size_t columns_of(int file) {
+  struct winsize size {};
+  if (::isatty(file) == 0) return 0;
+  return ::ioctl(file, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : kLeastWidth;
 }
 
 bool takes_colours(int file) {
   if (!setting("NO_COLOR").empty()) return false;
   const std::string_view force = setting("CLICOLOR_FORCE");
-  return (!force.empty() && force != "0") || is_terminal(file);
+  return (!force.empty() && force != "0") || takes_escapes(file);
 }
 
 }  // namespace
 
 std::size_t terminal_columns(int file) {
-  struct winsize size {};
-  if (!is_terminal(file)) return 0;
-  return ::ioctl(file, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : kLeastWidth;
+  return takes_escapes(file) ? columns_of(file) : 0;
 }
 
 std::size_t text_width() {
   const std::string_view columns = setting("COLUMNS");
   std::size_t width = 0;
   std::from_chars(columns.data(), columns.data() + columns.size(), width);
-  if (width == 0) width = terminal_columns(STDOUT_FILENO);
+  if (width == 0) width = columns_of(STDOUT_FILENO);
   return width == 0 ? kWidthWithoutTerminal : std::clamp(width, kLeastWidth, kMostWidth);
 }
 

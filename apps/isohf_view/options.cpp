@@ -33,10 +33,10 @@ places.
 Exit codes: 0 done, 1 failed, 2 wrong usage, 3 --verify found differences, 130 interrupted.
 
 Examples:
-  isohf-view dem.isohf
-  isohf-view dem.isohf --screenshot view.png --sun 110,20 --exaggeration 1.5
-  isohf-view dem.isohf --flight path.txt --frames 600 --csv frames.csv
-  isohf-view dem.isohf --verify)";
+  isohf view dem.isohf
+  isohf view dem.isohf --screenshot view.png --sun 110,20 --exaggeration 1.5
+  isohf view dem.isohf --flight path.txt --frames 600 --csv frames.csv
+  isohf view dem.isohf --verify)";
 
 [[noreturn]] void refuse(const std::string& text, const std::string& required) {
   throw Error(ErrorCode::kInvalidArgument, "found '" + text + "', must be " + required);

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cstdlib>
 #include <sstream>
 
 #include "support/run_program.h"
@@ -42,7 +43,7 @@ std::size_t longest_line(const std::string& text) {
 }
 
 TEST(Terminal, PipesGetNoEscapeCodesUnlessForced) {
-  for (const std::string& setting : {"TERM=xterm", "CLICOLOR_FORCE=0", "TERM=dumb"}) {
+  for (const std::string setting : {"TERM=xterm", "CLICOLOR_FORCE=0", "TERM=dumb"}) {
     EXPECT_THAT(run_with({setting}, {"convert", "--help"}).out, Not(HasSubstr(kEscape)));
     EXPECT_THAT(run_with({setting}, {"info", "none.tif"}).err, testing::StartsWith("isohf: none.tif"));
   }
