@@ -162,6 +162,35 @@ Accuracy measure_accuracy(const std::string& archive, HeightSource& source, std:
   return accuracy;
 }
 
+MeasuredError measured_error(const AccuracyReport& report) {
+  MeasuredError found;
+  found.info.compared = report.samples_compared;
+  found.info.lost = report.samples_lost;
+  found.info.rms = report.rms;
+  found.info.max = report.max;
+  for (const ErrorPeak& peak : report.peaks) found.worst.push_back({peak.column, peak.row, 1, 1});
+  return found;
+}
+
+std::string describe_accuracy(const AccuracyInfo& info, const std::string& unit) {
+  return fmt::format("rms {:.4g}{}, largest {:.4g}{} over {} input samples{}{}", info.rms, unit, info.max, unit,
+                     describe_count(info.compared),
+                     info.lost > 0 ? fmt::format("; {} beside voids have no surface", describe_count(info.lost)) : "",
+                     info.max_error ? fmt::format("; {}{} was allowed", *info.max_error, unit) : "");
+}
+
+ordered_json json_from_estimate(const std::optional<ErrorEstimate>& estimate) {
+  if (!estimate) return nullptr;
+  return {{"rms", estimate->rms}, {"largest_seen", estimate->largest}, {"samples", estimate->samples}};
+}
+
+std::string describe_estimate(const std::optional<ErrorEstimate>& estimate, const std::string& unit) {
+  if (!estimate)
+    return "error not estimated: memory is limited, or the input cannot be read here and there in little time";
+  return fmt::format("error of about {:.3g}{} (rms); the largest of {} samples looked at is {:.3g}{}: an estimate",
+                     estimate->rms, unit, describe_count(estimate->samples), estimate->largest, unit);
+}
+
 ordered_json json_from(const Accuracy& accuracy) {
   ordered_json json = json_from(accuracy.surface);
   json["vertices"] = json_from(accuracy.vertices);

@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "isohf/convert/surface_error.h"
 #include "isohf/verify/against_source.h"
 #include "isohf/verify/lattice_report.h"
 #include "isohf/verify/vertex_check.h"
@@ -26,6 +27,14 @@ struct Accuracy {
 [[nodiscard]] Accuracy measure_accuracy(const std::string& archive, HeightSource& source, std::int64_t random_points,
                                         bool with_ortho, const WorkOptions& work, const CommonOptions& common,
                                         const std::atomic<bool>& cancel);
+
+/// The same for the archive's metadata.
+[[nodiscard]] MeasuredError measured_error(const AccuracyReport& report);
+/// "rms 4.7, largest 61 over 1,442,401 samples".
+[[nodiscard]] std::string describe_accuracy(const AccuracyInfo& info, const std::string& unit);
+[[nodiscard]] nlohmann::ordered_json json_from_estimate(const std::optional<ErrorEstimate>& estimate);
+/// Says that it is an estimate.
+[[nodiscard]] std::string describe_estimate(const std::optional<ErrorEstimate>& estimate, const std::string& unit);
 
 /// Members as docs/cli.md has them.
 [[nodiscard]] nlohmann::ordered_json json_from(const Accuracy& accuracy);

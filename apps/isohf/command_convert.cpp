@@ -68,6 +68,7 @@ struct ConvertCommandOptions {
   bool dry_run = false;
   /// Measure the archive against the input; the file for the report, "-" for none beside the summary.
   std::optional<std::string> report;
+  ErrorFreedom freedom;  ///< of --max-error
 };
 
 bool is_archive_name(const std::string& name) {
@@ -176,6 +177,12 @@ std::optional<ConvertCommandOptions> parse(const Arguments& arguments) {
   if (options.convert.clamp_range && !options.convert.z_range) {
     throw Error(ErrorCode::kInvalidArgument, "convert: --clamp-range needs --z-range MIN:MAX");
   }
+  if (options.convert.max_error && options.dry_run) {
+    throw Error(ErrorCode::kInvalidArgument,
+                "convert: --dry-run cannot tell what --max-error will choose; leave one of the two out");
+  }
+  options.freedom.density = !line.given("--density") && !line.given("--spacing") && !line.given("--tiles");
+  options.freedom.filter = !line.given("--filter");
   if (sun_min_deg) {
     if (!options.convert.shadow_seeds || !options.convert.shadow_seeds->sun_deg.empty()) {
       throw Error(ErrorCode::kInvalidArgument, "convert: --sun-min needs --shadow-seeds without angles");
@@ -232,7 +239,8 @@ Measured measure(const ConvertSummary& summary) {
 }
 
 ordered_json json_from(const ConvertCommandOptions& options, const ConvertSummary& summary,
-                       const std::optional<VoidCounts>& voids) {
+                       const std::optional<VoidCounts>& voids, const std::optional<ErrorEstimate>& expected) {
+  const std::optional<AccuracyInfo> accuracy = accuracy_info(summary.metadata);
   const Measured measured = measure(summary);
   return {{"input", options.input},
           {"files", summary.metadata.source.mosaic ? summary.metadata.source.mosaic->files : 1},
@@ -252,6 +260,8 @@ ordered_json json_from(const ConvertCommandOptions& options, const ConvertSummar
           {"source_samples", summary.source_samples},
           {"source_voids", json_from_voids(voids)},
           {"lattice_samples", summary.lattice_samples},
+          {"expected_error", json_from_estimate(expected)},
+          {"accuracy", accuracy ? ordered_json::parse(format_accuracy_info(*accuracy)) : ordered_json(nullptr)},
           {"step", summary.step},
           {"worst_rounding", summary.worst_rounding},
           {"seconds", summary.seconds},
@@ -262,7 +272,7 @@ ordered_json json_from(const ConvertCommandOptions& options, const ConvertSummar
 }
 
 std::string text_from(const ConvertCommandOptions& options, const ConvertSummary& summary,
-                      const std::optional<VoidCounts>& voids) {
+                      const std::optional<VoidCounts>& voids, const std::optional<ErrorEstimate>& expected) {
   const Measured measured = measure(summary);
   const Metadata& metadata = summary.metadata;
   const TileShape& shape = metadata.grid.shape();
@@ -291,6 +301,11 @@ std::string text_from(const ConvertCommandOptions& options, const ConvertSummary
   } else {
     say("elevations", fmt::format("{}, step {:.9g}{}, worst rounding {:.4g}{}", to_string(metadata.quantisation.type),
                                   summary.step, unit, summary.worst_rounding, unit));
+  }
+  if (const auto accuracy = accuracy_info(metadata)) {
+    say("error", describe_accuracy(*accuracy, unit));
+  } else {
+    say("expected", describe_estimate(expected, unit));
   }
   if (summary.seed_bytes > 0) {
     const auto tile_bytes = static_cast<double>(summary.tile_bytes);
@@ -337,17 +352,33 @@ int run(ConvertCommandOptions options) {
   const Plan plan = make_plan(source->info(), options.convert.plan);
   if (common.verbose && !common.quiet) print_plan_notes(*source, plan, options.convert);
   const std::atomic<bool>& cancel = watch_interrupts();
+  std::optional<Accuracy> accuracy;
+  if (options.report || options.convert.max_error) {
+    options.convert.measure = [&](const std::string& archive) {
+      const WorkArena threads(options.work.threads);
+      if (options.report) {
+        accuracy = measure_accuracy(archive, *source, kRandomPoints, true, options.work, common, cancel);
+        return measured_error(accuracy->surface);
+      }
+      ProgressDisplay display(options.work.progress, common.quiet, common.verbose);
+      const ArchiveReader reader(archive);
+      return measured_error(compare_with_source(
+          reader, *source, 0, options.work.threads,
+          [&](std::int64_t done, std::int64_t total) { display.update("compare", "rows", done, total); }, cancel));
+    };
+  }
+  std::optional<ErrorEstimate> expected;
+  if (!options.convert.measure && !common.quiet) expected = estimate_error(*source, plan, options.convert);
   ConvertSummary summary = [&] {
     ProgressDisplay display(options.work.progress, common.quiet, common.verbose);
-    return convert(
-        *source, plan, options.output, options.convert,
-        [&](const ConvertProgress& at) {
-          using Pass = ConvertProgress::Pass;
-          const char* const pass =
-              at.pass == Pass::kRange ? "range" : (at.pass == Pass::kTiles ? "tiles" : "residuals");
-          display.update(pass, at.pass == Pass::kTiles ? "tiles" : "rows", at.done, at.total);
-        },
-        cancel);
+    const auto show = [&](const ConvertProgress& at) {
+      using Pass = ConvertProgress::Pass;
+      const char* const pass = at.pass == Pass::kRange ? "range" : (at.pass == Pass::kTiles ? "tiles" : "residuals");
+      display.update(pass, at.pass == Pass::kTiles ? "tiles" : "rows", at.done, at.total);
+    };
+    return options.convert.max_error
+               ? convert_within(*source, options.output, options.convert, options.freedom, show, cancel)
+               : convert(*source, plan, options.output, options.convert, show, cancel);
   }();
   if (!common.quiet) {
     for (const std::string& warning : summary.warnings) print_warning(warning);
@@ -357,22 +388,17 @@ int run(ConvertCommandOptions options) {
                                             summary.tiles_expected));
   }
   const std::optional<VoidCounts> voids = counts_of_voids(*source, summary.source_voids);
-  std::optional<Accuracy> accuracy;
-  if (options.report) {
-    const WorkArena threads(options.work.threads);
-    accuracy = measure_accuracy(options.output, *source, kRandomPoints, true, options.work, common, cancel);
-    if (*options.report != "-") {
-      write_output(*options.report, json_text(json_from(*accuracy)), options.convert.overwrite);
-    }
+  if (options.report && *options.report != "-") {
+    write_output(*options.report, json_text(json_from(*accuracy)), options.convert.overwrite);
   }
   StandardOutput out;
   if (common.json) {
-    ordered_json document = json_from(options, summary, voids);
-    if (accuracy) document["report"] = json_from(*accuracy);
+    ordered_json document = json_from(options, summary, voids, expected);
+    if (options.report) document["report"] = json_from(*accuracy);
     out.write(json_text(document));
   } else if (!common.quiet) {
-    out.write(text_from(options, summary, voids));
-    if (accuracy) out.write(text_from(*accuracy, options.input));
+    out.write(text_from(options, summary, voids, expected));
+    if (options.report) out.write(text_from(*accuracy, options.input));
   }
   out.finish();
   return kExitDone;

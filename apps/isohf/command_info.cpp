@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "accuracy_output.h"
 #include "command.h"
 #include "describe.h"
 #include "isohf/archive/reader.h"
@@ -252,6 +253,7 @@ std::string describe_archive(const ArchiveReader& archive) {
   say("size",
       fmt::format("elevations take {}, {:.3f} bits a stored sample: {:.2f} times smaller than raw 16-bit samples",
                   describe_bytes(derived.tile_bytes), derived.bits_per_sample, derived.ratio_to_u16));
+  if (const auto info = accuracy_info(metadata)) say("error", describe_accuracy(*info, unit));
   if (const auto info = texture_info(metadata)) {
     say("textures", fmt::format("{}; from {}, {} x {} pixels, placed by {}", describe_textures(*info, 0.0),
                                 info->photo_name, info->photo_width, info->photo_height, info->placed_by));

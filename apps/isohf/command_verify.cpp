@@ -147,7 +147,7 @@ std::string text_from(const Finding& finding) {
 }
 
 /// What the comparison found beside errors of size: ground that is missing or made up, away from borders of voids.
-void add_findings(const Accuracy& measured, VerifyReport& report) {
+void add_findings(const Accuracy& measured, const std::string& contradiction, VerifyReport& report) {
   const AccuracyReport& accuracy = measured.surface;
   const VertexReport& vertices = measured.vertices;
   const auto add = [&](int id, std::int64_t count, const std::string& what, std::optional<TileIndex> tile = {}) {
@@ -160,6 +160,10 @@ void add_findings(const Accuracy& measured, VerifyReport& report) {
                   "allowed, or in being void",
                   vertices.worst, vertices.bound),
       vertices.first_wrong);
+  if (!contradiction.empty()) {
+    report.findings.push_back({finding::kAccuracy, severity_of(finding::kAccuracy), {}, contradiction});
+    ++report.findings_total;
+  }
   add(finding::kSourceLost, accuracy.lost_inside, "elevations of the input lie where the archive has none");
   add(finding::kSourceInvented, accuracy.invented_inside, "voids of the input lie where the archive has elevations");
 }
@@ -219,7 +223,7 @@ int run(const VerifyCommandOptions& options) {
   const bool compares = !options.against.names.empty() && report.passed();
   if (compares) {
     accuracy = compare(options, cancel);
-    add_findings(*accuracy, report);
+    add_findings(*accuracy, contradiction(ArchiveReader(options.archive).metadata(), accuracy->surface), report);
   }
   const std::string too_far = accuracy ? why_too_far(options, accuracy->surface) : "";
   const bool passed = report.passed() && too_far.empty();

@@ -90,6 +90,10 @@ void add_quantisation_options(CommandLine& line, ConvertOptions& options) {
               "Store every vertex's elevation to within E: steps of twice that (as MAX_Z_ERROR of LERC)",
               [&](const std::string& text) { options.max_rounding = parse_positive_number(text); });
   line.exclusive({"--step", "--max-rounding"});
+  line.option("--max-error", "E",
+              "Hold the surface, as drawn, to within E of every input sample: chooses density, step and filter where "
+              "they are not given, measures all, and refuses what cannot be held",
+              [&](const std::string& text) { options.max_error = parse_positive_number(text); });
 }
 
 }  // namespace isohf::cli

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "accuracy_output.h"
 #include "describe.h"
 #include "json_output.h"
 #include "standard_output.h"
@@ -14,7 +15,8 @@ namespace {
 
 using nlohmann::ordered_json;
 
-ordered_json json_from_plan(const SourceInfo& info, const Plan& plan, const MemoryPlan& memory, CodeType code_type) {
+ordered_json json_from_plan(const SourceInfo& info, const Plan& plan, const MemoryPlan& memory, CodeType code_type,
+                            const std::optional<ErrorEstimate>& error) {
   const std::uint64_t raw =
       static_cast<std::uint64_t>(plan.lattice_samples) * static_cast<std::uint64_t>(raw_bytes(code_type));
   return {
@@ -43,13 +45,14 @@ ordered_json json_from_plan(const SourceInfo& info, const Plan& plan, const Memo
       {"code_type", to_string(code_type)},
       {"raw_bytes", raw},
       {"estimated_archive_bytes", plan.estimated_bytes},
+      {"expected_error", json_from_estimate(error)},
       {"estimated_memory_bytes", memory.bytes},
       {"least_memory_bytes", memory.least_bytes},
       {"scratch_bytes", memory.scratch_bytes}};
 }
 
 std::string text_from_plan(const SourceInfo& info, const Plan& plan, const MemoryPlan& memory,
-                           const ConvertOptions& options) {
+                           const ConvertOptions& options, const std::optional<ErrorEstimate>& error) {
   const CodeType code_type = options.code_type;
   const GroundRequest& ground = options.plan.ground;
   const TileGrid& grid = plan.grid;
@@ -83,6 +86,7 @@ std::string text_from_plan(const SourceInfo& info, const Plan& plan, const Memor
       static_cast<std::uint64_t>(plan.lattice_samples) * static_cast<std::uint64_t>(raw_bytes(code_type));
   say("archive", fmt::format("about {} ({} samples, {} as raw {})", describe_bytes(plan.estimated_bytes),
                              describe_count(plan.lattice_samples), describe_bytes(raw), to_string(code_type)));
+  say("expected", describe_estimate(error, info.vertical_unit.empty() ? "" : " " + info.vertical_unit));
   say("memory", fmt::format("about {} while converting{}; --memory can be as small as {}", describe_bytes(memory.bytes),
                             memory.scratch_bytes == 0
                                 ? ""
@@ -93,7 +97,7 @@ std::string text_from_plan(const SourceInfo& info, const Plan& plan, const Memor
 
 }  // namespace
 
-void print_plan(const HeightSource& source, const ConvertOptions& options, const CommonOptions& common) {
+void print_plan(HeightSource& source, const ConvertOptions& options, const CommonOptions& common) {
   const SourceInfo& info = source.info();
   const Plan plan = make_plan(info, options.plan);
   const MemoryPlan memory = plan_memory(source, plan, options);
@@ -104,17 +108,19 @@ void print_plan(const HeightSource& source, const ConvertOptions& options, const
       print_warning(warning);
     }
   }
+  const std::optional<ErrorEstimate> error = estimate_error(source, plan, options);
   StandardOutput out;
   if (common.json) {
-    out.write(json_text(json_from_plan(info, plan, memory, options.code_type)));
+    out.write(json_text(json_from_plan(info, plan, memory, options.code_type, error)));
   } else if (!common.quiet) {
-    out.write(text_from_plan(info, plan, memory, options));
+    out.write(text_from_plan(info, plan, memory, options, error));
   }
   out.finish();
 }
 
-void print_plan_notes(const HeightSource& source, const Plan& plan, const ConvertOptions& options) {
-  std::istringstream lines(text_from_plan(source.info(), plan, plan_memory(source, plan, options), options));
+void print_plan_notes(HeightSource& source, const Plan& plan, const ConvertOptions& options) {
+  std::istringstream lines(text_from_plan(source.info(), plan, plan_memory(source, plan, options), options,
+                                          estimate_error(source, plan, options)));
   for (std::string line; std::getline(lines, line);) print_note("isohf: " + line);
 }
 

@@ -54,6 +54,8 @@ struct ArchiveWriter::State {
   std::optional<Journal> journal;
   std::uint64_t journalled = 0;  ///< bytes of the part file that the journal's file vouches for
   std::uint64_t synced = 0;
+  std::string content_hash;       ///< once complete
+  std::uint64_t members_end = 0;  ///< likewise: where index and directory begin
   bool finished = false;
   bool keep = false;
 
@@ -329,15 +331,32 @@ TileCodes ArchiveWriter::read_tile(TileIndex tile, const Quantisation& quantisat
   return decode_tile(state.grid.shape(), quantisation.type, payload);
 }
 
-std::uint64_t ArchiveWriter::finish(Metadata metadata) {
+const std::string& ArchiveWriter::part() const {
+  return state_->part.part_path();
+}
+
+void ArchiveWriter::complete(Metadata metadata) {
   State& state = *state_;
   ISOHF_ASSERT(state.contents.next_tile() == state.grid.tile_count() && !state.finished);
+  state.named([&] {
+    state.part.flush();
+    if (!state.content_hash.empty()) state.part.truncate(state.members_end);
+  });
+  if (state.content_hash.empty()) {
+    state.content_hash = state.contents.finish_hash(metadata);
+    state.members_end = state.part.position();
+  }
   metadata.tiles_stored = state.contents.tiles_stored();
-  metadata.content_sha256 = state.contents.finish_hash(metadata);
+  metadata.content_sha256 = state.content_hash;
   ZipMember member = state.metadata_member();
-  state.named([&] { state.part.flush(); });
   state.write_metadata(format_metadata(metadata), member);
   state.write_index_and_directory(member);
+  state.named([&] { state.part.flush(); });
+}
+
+std::uint64_t ArchiveWriter::finish(Metadata metadata) {
+  State& state = *state_;
+  complete(std::move(metadata));
   const std::uint64_t size = state.part.position();
   state.named([&] { state.part.commit(); });
   state.finished = true;

@@ -75,6 +75,11 @@ class ArchiveWriter {
   /// that a resumed job found. Any number of threads at once, but none beside the other functions.
   [[nodiscard]] TileCodes read_tile(TileIndex tile, const Quantisation& quantisation) const;
 
+  /// Makes the part file a whole archive with these metadata, which may be read as part() until the next call: so
+  /// that finish() can say in the metadata what was found by reading it. Then only complete() and finish() may follow.
+  void complete(Metadata metadata);
+  [[nodiscard]] const std::string& part() const;
+
   /// Completes the archive: metadata (tiles_stored and content_sha256 are filled in here), index, directory; flush and
   /// rename. All tiles must have been added. Returns the archive's size in bytes. Throws Error{kInvalidArgument} where
   /// the metadata do not fit WriterOptions::metadata_bytes; Error{kIo} where somebody else made `path` meanwhile (then

@@ -95,6 +95,7 @@ void WrittenContents::for_each_directory_chunk(
 }
 
 std::span<const std::byte> WrittenContents::finish_index(const ZipMember& metadata) {
+  index_.resize(static_cast<std::size_t>(next_) * kIndexRecordBytes);  // without the footer of a call before
   IndexFooter footer;
   footer.record_count = static_cast<std::uint64_t>(grid_.tile_count());
   footer.stored_count = static_cast<std::uint64_t>(stored_);

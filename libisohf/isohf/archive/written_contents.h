@@ -34,7 +34,7 @@ class WrittenContents {
 
   /// The content hash as text; call once.
   [[nodiscard]] std::string finish_hash(const Metadata& metadata) { return content_.finish(metadata); }
-  /// The member index.bin; `metadata` is the entry that the directory begins with. Call once, when all is added.
+  /// The member index.bin; `metadata` is the entry that the directory begins with. When all is added.
   [[nodiscard]] std::span<const std::byte> finish_index(const ZipMember& metadata);
   /// Appends the directory, whose last entry is that of index.bin, and the end records.
   void append_directory(const ZipMember& metadata, const ZipMember& index, OutputFile& part) const;

@@ -115,14 +115,21 @@ ElevationRange measure_surface(const Conversion& job, const ElevationRange& limi
   return all.min <= all.max ? all : ElevationRange{};
 }
 
-QuantisationRequest request_of(const ConvertOptions& options) {
-  return {options.code_type, options.step, options.max_rounding};
+QuantisationRequest request_of(const SourceInfo& info, const ConvertOptions& options) {
+  QuantisationRequest request{options.code_type, options.step, options.max_rounding};
+  // Of the error that is allowed an eighth is left to the rounding, which then takes few bytes.
+  if (options.max_error) request.wish = *options.max_error / 4.0;
+  // Samples that are vertices lose nothing by the step that is usual.
+  if (options.max_error && options.plan.through_samples && !is_floating(info.sample_type)) {
+    request.wish = std::max(*request.wish, std::abs(info.z_scale) / 2.0);
+  }
+  return request;
 }
 
 /// By the range of the data.
 void choose_codes_by_data(Conversion& job, ConvertSummary& summary, const ProgressCallback& progress) {
   const SourceInfo& info = job.source.info();
-  const QuantisationRequest request = request_of(job.options);
+  const QuantisationRequest request = request_of(job.source.info(), job.options);
   const SourceAxes axes = make_axes(job.plan.grid, job.geometry());
   EdgeRange edge(info, axes.x.continued_samples(), axes.z.continued_samples());
   const SourceSurvey survey = survey_source(job, edge, progress);
@@ -160,7 +167,7 @@ void choose_codes(Conversion& job, ConvertSummary& summary, const ProgressCallba
   if (job.options.z_range) {
     const ElevationRange range{job.options.z_range->first, job.options.z_range->second};
     job.datum = choose_datum(job.source.info(), range);
-    job.quantisation = quantisation_of_range(request_of(job.options), range, job.source.info());
+    job.quantisation = quantisation_of_range(request_of(job.source.info(), job.options), range, job.source.info());
     job.limits = {range.min, range.max};
     return;
   }

@@ -272,8 +272,21 @@ ConvertSummary convert(HeightSource& source, const Plan& plan, const std::string
                                               summary.tiles_expected));
     }
     summary.tile_bytes = writer.tile_bytes();
-    summary.archive_bytes = writer.finish(summary.metadata);
+    if (options.measure) {
+      writer.complete(summary.metadata);
+      summary.measured = options.measure(writer.part());
+      AccuracyInfo& found = summary.measured->info;
+      found.max_error = options.max_error;
+      found.rounding =
+          options.code_type == CodeType::kF32 ? all.worst_rounding : 0.5 * summary.metadata.quantisation.scale;
+      summary.is_finished = !options.max_error || found.max <= *options.max_error;
+      if (summary.is_finished) {
+        summary.metadata.extensions.emplace_back(kAccuracyName, format_accuracy_info(found));
+      }
+    }
+    summary.archive_bytes = summary.is_finished ? writer.finish(summary.metadata) : writer.bytes_written();
   } catch (const Error& error) {
+    if (options.is_retry) throw;
     // What is done stays for a resume when the user or the system ended it.
     if (error.code() == ErrorCode::kCancelled) writer.keep_part();
     if (error.code() != ErrorCode::kIo || !writer.keep_part()) throw;

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "isohf/archive/accuracy_info.h"
 #include "isohf/archive/texture_info.h"
 #include "isohf/archive/tile_codec.h"
 #include "isohf/convert/plan.h"
@@ -38,6 +39,12 @@ struct SourceNote {
   std::string fingerprint;             ///< what --resume compares beside the file's own size and time
 };
 
+/// What was found by reading an archive that is complete but for its name.
+struct MeasuredError {
+  AccuracyInfo info;
+  std::vector<Window> worst;  ///< single samples where the surface errs most, worst first
+};
+
 /// What a conversion does, beyond its input and output.
 struct ConvertOptions {
   PlanRequest plan;
@@ -64,7 +71,13 @@ struct ConvertOptions {
   bool resume = false;
   int level = kDefaultLevel;  ///< kMinLevel to kMaxLevel: the higher, the fewer bytes and the slower
   bool lossless = false;      ///< write residuals beside the tiles, so that the source's samples come back bit for bit
-  std::string producer;       ///< "isohf 0.1.0"
+  /// Measures the part file once it is a whole archive, before it gets its name; the metadata then say what was found.
+  std::function<MeasuredError(const std::string& archive)> measure;
+  /// The largest error that the surface may have at the source's samples; needs measure. convert() gives an archive no
+  /// name that exceeds it; convert_within() looks for one that does not. Chooses the step where none is asked for.
+  std::optional<double> max_error;
+  bool is_retry = false;  ///< an interrupt leaves no part file behind, which --resume could not use
+  std::string producer;   ///< "isohf 0.1.0"
   SourceNote source_note;
 };
 
@@ -98,6 +111,8 @@ struct ConvertSummary {
   std::optional<TextureInfo> texture;  ///< as in the metadata
   double pixels_per_texel =
       0.0;  ///< photo pixels under the side of a texel; above 1 where --texture-size is in the way
+  std::optional<MeasuredError> measured;  ///< by ConvertOptions::measure
+  bool is_finished = true;                ///< false: the surface errs by more than max_error, nothing was left
   double seconds = 0.0;
   std::vector<std::string> warnings;  ///< one line each
 };

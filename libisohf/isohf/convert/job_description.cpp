@@ -91,6 +91,7 @@ std::string job_fingerprint(const SourceInfo& info, const Plan& plan, const Conv
   std::string job = heights_fingerprint(info, plan, options);
   if (!options.source_note.fingerprint.empty()) job += " | " + options.source_note.fingerprint;
   if (const std::string& datum = info.georeference.system.vertical_datum; !datum.empty()) job += " | above " + datum;
+  if (options.max_error) job += fmt::format(" | max error {}", *options.max_error);
   if (plan.frame.projection) {
     const ProjectionRecord& on = *plan.frame.projection;
     job += fmt::format(" | on {} {} {} {} {} {} {} at {} {}{}", to_string(on.spec.kind),

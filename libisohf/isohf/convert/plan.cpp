@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "isohf/base/assert.h"
 #include "isohf/base/error.h"
 
 namespace isohf {
@@ -88,8 +89,26 @@ TileShape shape_for_small_source(const SourceFrame& frame, const PlanRequest& re
   return best.value_or(TileShape::nearest(kDefaultColumns, kDefaultRows, most_levels));
 }
 
+/// Square tiles of whole samples, each with two rows of triangles for a row of them: the size that wastes least.
+TileShape shape_through_samples(const SourceFrame& frame, int levels) {
+  const WorldBounds bounds = frame.bounds();
+  std::optional<TileShape> best;
+  double best_cost = 0.0;
+  for (int cells = 1 << (levels - 1); cells <= std::max(128, 1 << (levels - 1)); cells *= 2) {
+    const TileShape shape = TileShape::make(cells + 4, 2 * cells + 3, levels);
+    const double cost = std::ceil(bounds.x1 / frame.spacing_x / cells) *
+                        std::ceil(bounds.z1 / frame.spacing_z / cells) *
+                        (static_cast<double>(shape.stored_vertex_count()) + kTileOverhead);
+    if (best && cost > best_cost) continue;
+    best = shape;
+    best_cost = cost;
+  }
+  return *best;
+}
+
 TileShape choose_shape(const SourceFrame& frame, const PlanRequest& request) {
   const int levels = request.levels.value_or(kDefaultLevels);
+  if (request.through_samples && !request.shape && !request.budget) return shape_through_samples(frame, levels);
   if (request.shape) return TileShape::make(request.shape->first, request.shape->second, levels);
   if (request.budget) {
     const std::vector<TileShape> found = candidate_shapes(request, 1);
@@ -148,6 +167,11 @@ Plan make_plan(const SourceInfo& info, const PlanRequest& request) {
   const TileShape shape = choose_shape(frame, request);
   double extent_x = extent_for(shape, frame, request);
   double extent_z = extent_x;
+  if (request.through_samples) {
+    ISOHF_ASSERT(!frame.warp && !frame.wraps_x && !request.fit && !request.tiles);
+    extent_x = shape.cell_columns() * frame.spacing_x;
+    extent_z = shape.cell_rows() * frame.spacing_z / 2.0;
+  }
   std::int64_t columns = request.tiles ? request.tiles->first : 0;
   std::int64_t rows = request.tiles ? request.tiles->second : 0;
   if (frame.wraps_x) {

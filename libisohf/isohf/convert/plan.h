@@ -22,6 +22,9 @@ struct PlanRequest {
   std::optional<double> density;             ///< lattice samples for one source sample, > 0; nullopt: 1
   std::optional<double> spacing;             ///< lattice column step, world units, > 0
   std::optional<std::pair<std::int64_t, std::int64_t>> tiles;  ///< tile columns, rows
+  /// Instead: a column for each of the source's and two rows for each, so that every sample is a vertex: twice as many
+  /// vertices as samples. Not for sources that are projected or joined.
+  bool through_samples = false;
   bool fit = false;  ///< stretch the extents a little so that tiles end on the source's edge
   Outside outside = Outside::kCover;
   GroundRequest ground;

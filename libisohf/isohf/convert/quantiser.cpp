@@ -34,9 +34,13 @@ std::optional<double> wanted_step(const QuantisationRequest& request, const Sour
     }
     return step;
   }
-  if (!step && !is_floating(info.sample_type) && request.type == CodeType::kU16) {
-    return std::abs(info.z_scale) / kStepsPerSourceStep;
+  const bool is_whole = !is_floating(info.sample_type);
+  if (!step && request.wish) {
+    // Whole elevations stay whole: the source's own step times a power of two.
+    return is_whole ? std::abs(info.z_scale) * std::exp2(std::floor(std::log2(*request.wish / std::abs(info.z_scale))))
+                    : *request.wish;
   }
+  if (!step && is_whole && request.type == CodeType::kU16) return std::abs(info.z_scale) / kStepsPerSourceStep;
   return std::nullopt;
 }
 

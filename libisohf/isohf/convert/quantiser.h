@@ -14,6 +14,7 @@ struct QuantisationRequest {
   CodeType type = CodeType::kU16;
   std::optional<double> step;  ///< elevation of one code; 0: the finest that the type holds; nullopt: chosen
   std::optional<double> max_rounding = {};  ///< instead: steps of at most twice that
+  std::optional<double> wish = {};          ///< where neither is given: a step of about that, or as fine as can be
 };
 
 /// One scale and offset for the whole dataset.

@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "isohf/archive/accuracy_info.h"
 #include "isohf/base/assert.h"
 #include "isohf/base/error.h"
 #include "isohf/lattice/barycentric.h"
@@ -28,6 +29,7 @@ namespace {
 struct Sums {
   AccuracyReport counts;
   ErrorSums errors;
+  std::int64_t worst_column = 0;
   std::int64_t visited = 0;
 };
 
@@ -43,6 +45,22 @@ struct Place {
 constexpr std::int64_t kBlock = 32;
 /// Samples around one that are searched for voids, at most: next to a pole a triangle reaches over any number.
 constexpr std::int64_t kMostReach = 64;
+constexpr std::size_t kMostPeaks = 256;
+/// Object coordinates this near to a vertex's are the vertex's: places are rounded, and next to a void it matters.
+constexpr double kOnVertex = 1e-7;
+
+double snapped(double object) {
+  const double whole = std::round(object);
+  return std::abs(object - whole) < kOnVertex ? whole : object;
+}
+
+/// Leaves the largest.
+void prune(std::vector<ErrorPeak>& peaks) {
+  std::sort(peaks.begin(), peaks.end(), [](const ErrorPeak& a, const ErrorPeak& b) {
+    return a.error != b.error ? a.error > b.error : a.row < b.row;
+  });
+  peaks.resize(std::min(peaks.size(), kMostPeaks));
+}
 
 /// A row of tiles, decoded.
 struct TileRowSurface {
@@ -104,6 +122,7 @@ class Comparison {
     report.psnr_db = psnr_db(span_, report.rms);
     ErrorHistogram histogram;
     for (const ErrorHistogram& part : histograms_) histogram.add(part);
+    prune(report.peaks);
     report.p99 = std::min(histogram.percentile(0.99), report.max);
     return report;
   }
@@ -167,6 +186,7 @@ class Comparison {
     // A source row on the edge of two tile rows may be rounded to either; their vertices on it are the same.
     if (at.tile.row > surface.tile_row) at.point.z = grid_.shape().cell_rows();
     if (at.tile.row < surface.tile_row) at.point.z = 0.0;
+    at.point = {snapped(at.point.x), snapped(at.point.z)};
     const std::vector<double>& elevations = surface.elevations[static_cast<std::size_t>(at.tile.column)];
     const View2D<const double> view(elevations.data(), grid_.shape().columns(), grid_.shape().rows());
     return interpolate(barycentric(grid_.shape(), at.point), view);
@@ -186,7 +206,12 @@ class Comparison {
         compare_row(surface, band, row, sums[static_cast<std::size_t>(row - first)], histograms_.local());
       });
     }
-    for (const Sums& row : sums) {
+    for (std::size_t i = 0; i < sums.size(); ++i) {
+      const Sums& row = sums[i];
+      if (row.errors.max > 0.0) {
+        report.peaks.push_back({row.errors.max, row.worst_column, first + static_cast<std::int64_t>(i)});
+        if (report.peaks.size() > 64 * kMostPeaks) prune(report.peaks);
+      }
       visited_ += row.visited;
       errors.add(row.errors);
       report.samples_void += row.counts.samples_void;
@@ -216,6 +241,7 @@ class Comparison {
       return;
     }
     const double error = std::abs(stored - (double{sample} + datum_));
+    if (error > sums.errors.max) sums.worst_column = column;
     sums.errors.add(error, world);
     histogram.add(error);
   }
@@ -365,6 +391,25 @@ AccuracyReport compare_with_source(const ArchiveReader& archive, HeightSource& s
   oneapi::tbb::task_arena arena(threads > 0 ? threads : oneapi::tbb::task_arena::automatic);
   arena.execute([&] { report = Comparison(archive, source, random_points).run(progress, cancel); });
   return report;
+}
+
+std::string contradiction(const Metadata& metadata, const AccuracyReport& found) {
+  const std::optional<AccuracyInfo> stated = accuracy_info(metadata);
+  if (!stated) return {};
+  // The reference of the heights' floats may be another one.
+  const Statistics& statistics = metadata.statistics;
+  const double largest = std::max(std::abs(statistics.min.value_or(0.0)), std::abs(statistics.max.value_or(0.0)));
+  const double tolerance = 1e-6 * largest + 1e-9;
+  if (stated->compared == found.samples_compared && stated->lost == found.samples_lost &&
+      std::abs(stated->max - found.max) <= tolerance && std::abs(stated->rms - found.rms) <= tolerance) {
+    return {};
+  }
+  return fmt::format(
+      "the metadata state an error of rms {:.6g}, at most {:.6g}, over {} samples, {} lost; found are rms {:.6g}, at "
+      "most "
+      "{:.6g}, {} samples, {} lost",
+      stated->rms, stated->max, stated->compared, stated->lost, found.rms, found.max, found.samples_compared,
+      found.samples_lost);
 }
 
 }  // namespace isohf

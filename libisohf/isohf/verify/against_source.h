@@ -3,12 +3,21 @@
 #include <atomic>
 #include <cstdint>
 #include <functional>
+#include <string>
+#include <vector>
 
 #include "isohf/archive/reader.h"
 #include "isohf/lattice/tile_grid.h"
 #include "isohf/surface/height_source.h"
 
 namespace isohf {
+
+/// The largest error of a row of the source.
+struct ErrorPeak {
+  double error = 0.0;
+  std::int64_t column = 0;  ///< of the sample
+  std::int64_t row = 0;
+};
 
 /// How far an archive's surface (barycentric, as the renderer draws it) lies from the source it was made from.
 struct AccuracyReport {
@@ -27,6 +36,7 @@ struct AccuracyReport {
   std::int64_t random_points = 0;  ///< random places compared with bilinear interpolation of the source
   double random_rms = 0.0;
   double random_max = 0.0;
+  std::vector<ErrorPeak> peaks;  ///< the largest of all rows, 256 at most
 };
 
 /// Compares at every source sample and at `random_points` random places (fixed seed). Streams both sides: memory is
@@ -36,5 +46,8 @@ struct AccuracyReport {
                                                  std::int64_t random_points, int threads,
                                                  const std::function<void(std::int64_t, std::int64_t)>& progress,
                                                  const std::atomic<bool>& cancel);
+
+/// What contradicts the error that the archive's metadata state; empty where they state none, or just that.
+[[nodiscard]] std::string contradiction(const Metadata& metadata, const AccuracyReport& found);
 
 }  // namespace isohf

@@ -21,7 +21,8 @@ const std::vector<FindingKind>& finding_catalogue() {
       {finding::kStatistics, Severity::kError, "the metadata's statistics differ from the elevations"},
       {finding::kContentHash, Severity::kError, "the content hash differs from the elevations"},
       {finding::kTileCount, Severity::kError, "the number of stored tiles differs from the metadata"},
-      {finding::kElevationRange, Severity::kError, "a code lies beyond the last one"},
+      {finding::kElevationRange, Severity::kError,
+       "a code lies beyond the last one, or an elevation beyond the range that the metadata allow"},
       {finding::kMemberUnreadable, Severity::kError, "a member beside the tiles cannot be read, or its CRC is wrong"},
       {finding::kStructure, Severity::kError, "the ZIP structure breaks the profile of docs/archive_format.md"},
       {finding::kSourceLost, Severity::kError,
@@ -33,6 +34,8 @@ const std::vector<FindingKind>& finding_catalogue() {
        "a texture is missing, cannot be decoded, or has another size than the metadata says"},
       {finding::kVertex, Severity::kError,
        "a stored vertex is further from the source, resampled as the metadata say, than half a step"},
+      {finding::kAccuracy, Severity::kError,
+       "the error that the metadata state cannot be, or is not what comparing with the source gives"},
       {finding::kTileNotDeflate, Severity::kError, "zlib does not inflate a tile that a laxer decoder reads"},
   };
   return kinds;

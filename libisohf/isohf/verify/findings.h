@@ -27,6 +27,7 @@ inline constexpr int kLossless = 18;
 inline constexpr int kTileNotDeflate = 20;
 inline constexpr int kTexture = 21;
 inline constexpr int kVertex = 22;
+inline constexpr int kAccuracy = 25;
 }  // namespace finding
 
 /// Severity of a catalogue id.

@@ -12,6 +12,7 @@
 #include <memory>
 #include <utility>
 
+#include "isohf/archive/accuracy_info.h"
 #include "isohf/archive/content_hash.h"
 #include "isohf/archive/lane_decoder.h"
 #include "isohf/base/error.h"
@@ -316,6 +317,11 @@ class Verification {
 
   void check_totals() {
     const Metadata& metadata = archive_.metadata();
+    try {
+      (void)accuracy_info(metadata);
+    } catch (const Error& error) {
+      add(make(finding::kAccuracy, {}, error.what()));
+    }
     if (stored_ != metadata.tiles_stored) {
       add(make(finding::kTileCount, {},
                fmt::format("{} tiles are stored, the metadata says {}", stored_, metadata.tiles_stored)));
@@ -333,6 +339,11 @@ class Verification {
       differ("vertices", static_cast<double>(vertices_), static_cast<double>(said.vertices));
     if (voids_ != said.voids) differ("voids", static_cast<double>(voids_), static_cast<double>(said.voids));
     if (voids_ == vertices_) return;
+    if (metadata.z_range && !(min_ >= metadata.z_range->first && max_ <= metadata.z_range->second)) {
+      add(make(finding::kElevationRange, {},
+               fmt::format("elevations run from {} to {}, the metadata allow {} to {}", min_, max_,
+                           metadata.z_range->first, metadata.z_range->second)));
+    }
     const double span = std::max({std::abs(min_), std::abs(max_), 1e-300});
     const auto check = [&](const char* what, double found, const std::optional<double>& stated, double tolerance) {
       if (!stated || !(std::abs(found - *stated) <= tolerance * span)) differ(what, found, stated.value_or(0.0));
