@@ -545,6 +545,15 @@ std::string CommandLine::first_given(const std::vector<std::string>& groups) con
   return {};
 }
 
+std::vector<std::pair<std::string, std::string>> CommandLine::texts_in(const std::vector<std::string>& groups) const {
+  std::vector<std::pair<std::string, std::string>> texts;
+  for (const Option& option : state_->options) {
+    if (std::find(groups.begin(), groups.end(), option.group) != groups.end() && option.is_set())
+      texts.emplace_back(option.name(), option.found.back().values.front());
+  }
+  return texts;
+}
+
 void CommandLine::require(const std::string& name, const std::vector<std::string>& values) const {
   require(name, values.empty() ? std::string() : "given");
 }

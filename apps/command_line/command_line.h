@@ -4,6 +4,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "program.h"
@@ -77,6 +78,9 @@ class CommandLine {
   [[nodiscard]] std::string first_given(const std::vector<std::string>& groups) const;
   /// Throws Error{kInvalidArgument}: the options do not go together.
   [[noreturn]] void fail(const std::string& why) const;
+  /// The options of these groups that parse() met, on the command line or in the --config file, and their text; "true"
+  /// for a flag.
+  [[nodiscard]] std::vector<std::pair<std::string, std::string>> texts_in(const std::vector<std::string>& groups) const;
   /// Throws Error{kInvalidArgument} for a positional that is empty after parsing.
   void require(const std::string& name, const std::string& value) const;
   void require(const std::string& name, const std::vector<std::string>& values) const;

@@ -9,7 +9,6 @@
 #include <filesystem>
 #include <new>
 
-#include "isohf/base/error.h"
 #include "isohf/base/file.h"
 #include "standard_output.h"
 
@@ -21,13 +20,13 @@ std::string& name_of_program() {
   return name;
 }
 
+}  // namespace
+
 int exit_code_for(ErrorCode code) {
   if (code == ErrorCode::kInvalidArgument) return kExitUsage;
   if (code == ErrorCode::kCancelled) return kExitInterrupted;
   return kExitFailed;
 }
-
-}  // namespace
 
 const std::string& program_name() {
   return name_of_program();

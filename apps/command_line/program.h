@@ -3,6 +3,8 @@
 #include <string>
 #include <vector>
 
+#include "isohf/base/error.h"
+
 namespace isohf::cli {
 
 /// What follows the program's or the command's name on the command line.
@@ -16,6 +18,9 @@ enum ExitCode : int {
   kExitDifferences = 3,  ///< verify found something, restore not what --lossless kept
   kExitInterrupted = 130,
 };
+
+/// What a program ends with after an error of that code.
+[[nodiscard]] int exit_code_for(ErrorCode code);
 
 /// What main() is: runs `body`, and turns what it throws into one line on standard error and an exit code. `name` is
 /// how messages and help call the program.

@@ -14,14 +14,6 @@ namespace {
 
 constexpr std::size_t kBufferBytes = 1 << 16;
 
-/// Line breaks and control characters become blanks: an error is one line.
-std::string one_line(std::string text) {
-  for (char& c : text) {
-    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = ' ';
-  }
-  return text;
-}
-
 /// Writes a line in one call, so that lines of two processes do not mix; what cannot be told is not told.
 void write_line_to_stderr(std::string line) {
   line += '\n';
@@ -57,15 +49,30 @@ void StandardOutput::flush() {
   pending_.clear();
 }
 
+std::string printable(std::string text) {
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const auto at = [&](std::size_t k) { return k < text.size() ? static_cast<unsigned char>(text[k]) : 0U; };
+    const bool is_c0 = at(i) < 0x20 || at(i) == 0x7f;
+    // In UTF-8: U+0080 to U+009F, and what turns the direction of writing or breaks a line.
+    const bool is_c1 = at(i) == 0xc2 && at(i + 1) >= 0x80 && at(i + 1) < 0xa0;
+    const bool is_format = at(i) == 0xe2 && ((at(i + 1) == 0x80 && at(i + 2) >= 0xa8 && at(i + 2) <= 0xae) ||
+                                             (at(i + 1) == 0x81 && at(i + 2) >= 0xa6 && at(i + 2) <= 0xa9));
+    if (is_c0) text[i] = ' ';
+    if (is_c1) text.replace(i, 2, " ");
+    if (is_format) text.replace(i, 3, " ");
+  }
+  return text;
+}
+
 void print_warning(const std::string& text) {
   write_line_to_stderr(program_name() + ": " + styled("warning:", Style::kWarning, STDERR_FILENO) + " " +
-                       one_line(text));
+                       printable(text));
 }
 void print_error(const std::string& text) {
-  write_line_to_stderr(styled(program_name() + ":", Style::kError, STDERR_FILENO) + " " + one_line(text));
+  write_line_to_stderr(styled(program_name() + ":", Style::kError, STDERR_FILENO) + " " + printable(text));
 }
 void print_note(const std::string& text) {
-  write_line_to_stderr(one_line(text));
+  write_line_to_stderr(printable(text));
 }
 
 }  // namespace isohf::cli

@@ -21,6 +21,10 @@ class StandardOutput {
   std::string pending_;
 };
 
+/// Text that may come from a file, as one line without anything that a terminal obeys: control characters, those of
+/// Unicode as well, become blanks.
+[[nodiscard]] std::string printable(std::string text);
+
 /// Thrown where standard output's reader has gone; main() ends quietly.
 struct OutputClosed {};
 

@@ -193,6 +193,7 @@ std::optional<ConvertCommandOptions> parse(const Arguments& arguments) {
     throw Error(ErrorCode::kInvalidArgument,
                 "convert: --lossless keeps the input's own samples, --geoid changes them; give one of the two");
   }
+  options.inputs.as_given = recorded_options(line);
   check_texture_options(options.texture);
   if (!line.given("--tmpdir")) options.convert.scratch_folder = folder_of(options.output);
   options.convert.threads = options.work.threads;

@@ -7,10 +7,12 @@
 #include <cstring>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <utility>
 
 #include "accuracy_output.h"
 #include "command.h"
 #include "describe.h"
+#include "input_files.h"
 #include "isohf/archive/reader.h"
 #include "isohf/archive/texture_info.h"
 #include "isohf/base/error.h"
@@ -34,6 +36,7 @@ constexpr const char* kFooter =
 
 Examples:
   isohf info dem.isohf
+  isohf info *.tif *.isohf --json     one JSON object a line
   isohf info dem.tif --stats          what is understood of a raster, its range and its voids
   isohf info dem.isohf --tiles        one line a tile: column row bytes minimum maximum voids
   isohf info dem.isohf --json         the metadata and what follows from it)";
@@ -41,7 +44,8 @@ Examples:
 struct InfoOptions {
   CommonOptions common;
   WorkOptions work;
-  std::string input;
+  std::vector<std::string> inputs;
+  bool recursive = false;
   bool tiles = false;
   OpenOptions open;
   bool stats = false;
@@ -50,9 +54,13 @@ struct InfoOptions {
 
 std::optional<InfoOptions> parse(const Arguments& arguments) {
   InfoOptions options;
-  CommandLine line("info", "Describes an archive or a raster.");
+  CommandLine line("info", "Describes archives and rasters.");
   line.group("Arguments");
-  line.positional("INPUT", "-i,--input", "Archive or raster to describe", options.input);
+  line.positionals("INPUT...",
+                   "Archives and rasters to describe, one after the other: files, folders, \"patterns*\" and @lists",
+                   options.inputs);
+  line.repeated("-i,--input", "INPUT", "An input; may be given again", options.inputs);
+  line.flag("--recursive", "Look into the folders of a folder as well", options.recursive);
   line.flag("--tiles", "List an archive's tiles", options.tiles);
   line.flag("--stats", "Read all samples of a raster: range, mean, voids", options.stats);
   add_source_options(line, options.open);
@@ -60,7 +68,7 @@ std::optional<InfoOptions> parse(const Arguments& arguments) {
   add_common_options(line, options.common);
   line.footer(kFooter);
   if (!line.parse(arguments)) return std::nullopt;
-  line.require("INPUT", options.input);
+  line.require("INPUT", options.inputs);
   options.for_rasters = line.given("--stats") ? "--stats" : line.first_given({"Input"});
   return options;
 }
@@ -125,7 +133,7 @@ ordered_json json_from_tiles(const ArchiveReader& archive) {
   return tiles;
 }
 
-void print_json(const ArchiveReader& archive, bool tiles) {
+void print_json(const ArchiveReader& archive, bool tiles, bool is_one_of_many) {
   const Derived derived = derive(archive);
   ordered_json members = ordered_json::array();
   for (const MemberEntry& member : archive.members()) {
@@ -151,7 +159,7 @@ void print_json(const ArchiveReader& archive, bool tiles) {
   add_source_place(source_place(archive.metadata()), document);
   if (tiles) document["tiles"] = json_from_tiles(archive);
   StandardOutput out;
-  out.write(json_text(document));
+  out.write(is_one_of_many ? json_line(document) : json_text(document));
   out.finish();
 }
 
@@ -208,7 +216,9 @@ std::string describe_archive(const ArchiveReader& archive) {
   const std::string unit = metadata.vertical_unit == "unknown" ? "" : " " + metadata.vertical_unit;
   const Derived derived = derive(archive);
   std::string text;
-  const auto say = [&](const char* what, const std::string& value) { text += fmt::format("{:<12} {}\n", what, value); };
+  const auto say = [&](const char* what, const std::string& value) {
+    text += fmt::format("{:<12} {}\n", what, printable(value));
+  };
 
   say("archive",
       fmt::format("{}: {}, written by {}", archive.path(), describe_bytes(archive.size_bytes()), metadata.producer));
@@ -289,24 +299,24 @@ void print_tiles(const ArchiveReader& archive, StandardOutput& out) {
   }
 }
 
-int run(const InfoOptions& options) {
-  if (!is_archive(options.input, options.open)) {
+int describe_one(const InfoOptions& options, const std::string& input, bool is_one_of_many) {
+  if (!is_archive(input, options.open)) {
     if (options.tiles) {
-      throw Error(ErrorCode::kInvalidArgument, "info: --tiles is for archives, " + options.input + " is none");
+      throw Error(ErrorCode::kInvalidArgument, "info: --tiles is for archives, " + input + " is none");
     }
-    print_raster_info(options.input, options.open, options.stats, options.work, options.common);
+    print_raster_info(input, options.open, options.stats, options.work, options.common, is_one_of_many);
     return kExitDone;
   }
   if (!options.for_rasters.empty()) {
     throw Error(ErrorCode::kInvalidArgument,
-                "info: " + options.for_rasters + " is for rasters, " + options.input + " is an archive");
+                "info: " + options.for_rasters + " is for rasters, " + input + " is an archive");
   }
-  const ArchiveReader archive = open_archive(options.input);
+  const ArchiveReader archive = open_archive(input);
   if (!options.common.quiet) {
     for (const std::string& warning : archive.warnings()) print_warning(warning);
   }
   if (options.common.json) {
-    print_json(archive, options.tiles);
+    print_json(archive, options.tiles, is_one_of_many);
     return kExitDone;
   }
   StandardOutput out;
@@ -319,6 +329,20 @@ int run(const InfoOptions& options) {
   }
   out.finish();
   return kExitDone;
+}
+
+int run(const InfoOptions& options) {
+  const std::vector<std::string> files = list_files(options.inputs, options.recursive, false);
+  const bool in_blocks = files.size() > 1 && !options.common.json && !options.common.quiet;
+  bool is_first = true;
+  return for_each_file("info", files, options.common, [&](const std::string& file) {
+    if (in_blocks && !std::exchange(is_first, false)) {
+      StandardOutput out;
+      out.write("\n");
+      out.finish();
+    }
+    return describe_one(options, file, files.size() > 1);
+  });
 }
 
 }  // namespace

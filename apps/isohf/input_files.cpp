@@ -8,12 +8,17 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <map>
+#include <nlohmann/json.hpp>
 #include <set>
 
 #include "formats/hgt_source.h"
 #include "formats/letter_case.h"
 #include "formats/registry.h"
 #include "isohf/base/error.h"
+#include "json_output.h"
+#include "program.h"
+#include "standard_output.h"
 
 namespace isohf::cli {
 namespace {
@@ -35,10 +40,15 @@ const std::set<std::string>& raster_extensions() {
   return known;
 }
 
+/// What of a folder counts.
+enum class Wanted { kRasters, kArchives, kBoth };
+
 /// By its name; of a .zip by the names inside.
-bool has_raster_name(const fs::path& path) {
+bool has_wanted_name(const fs::path& path, Wanted wanted) {
   std::string name = lower_case(path.filename().string());
   if (name.starts_with(".")) return false;
+  const bool is_archive = name.size() > 6 && name.ends_with(".isohf");
+  if (is_archive || wanted == Wanted::kArchives) return is_archive && wanted != Wanted::kRasters;
   if (name.ends_with(".zip") && is_zip_of_hgt(path.string())) return true;
   if (name.ends_with(".gz")) name.resize(name.size() - 3);
   return std::any_of(raster_extensions().begin(), raster_extensions().end(), [&](const std::string& extension) {
@@ -57,13 +67,13 @@ bool is_label_of_another(const fs::path& path) {
 }
 
 template <typename Iterator>
-std::vector<std::string> rasters_in(const std::string& folder) {
+std::vector<std::string> files_in(const std::string& folder, Wanted wanted) {
   std::vector<std::string> found;
   std::error_code error;
   Iterator entry(folder, error);
   for (; !error && entry != Iterator(); entry.increment(error)) {
     std::error_code gone;
-    if (entry->is_regular_file(gone) && has_raster_name(entry->path()) && !is_label_of_another(entry->path())) {
+    if (entry->is_regular_file(gone) && has_wanted_name(entry->path(), wanted) && !is_label_of_another(entry->path())) {
       found.push_back(entry->path().string());
     }
   }
@@ -72,12 +82,14 @@ std::vector<std::string> rasters_in(const std::string& folder) {
   return found;
 }
 
-std::vector<std::string> files_of_folder(const std::string& folder, bool recursive) {
-  std::vector<std::string> found =
-      recursive ? rasters_in<fs::recursive_directory_iterator>(folder) : rasters_in<fs::directory_iterator>(folder);
+std::vector<std::string> files_of_folder(const std::string& folder, bool recursive, Wanted wanted) {
+  std::vector<std::string> found = recursive ? files_in<fs::recursive_directory_iterator>(folder, wanted)
+                                             : files_in<fs::directory_iterator>(folder, wanted);
   if (found.empty()) {
-    refuse(folder, fmt::format("holds no raster that isohf reads ({}){}", fmt::join(raster_extensions(), ", "),
-                               recursive ? "" : "; --recursive looks into its folders too"));
+    const std::string rasters = fmt::format("raster that isohf reads ({})", fmt::join(raster_extensions(), ", "));
+    refuse(folder, fmt::format("holds no {}{}{}", wanted == Wanted::kRasters ? "" : "archive (.isohf)",
+                               wanted == Wanted::kBoth ? " and no " : "", wanted == Wanted::kArchives ? "" : rasters) +
+                       (recursive ? "" : "; --recursive looks into its folders too"));
   }
   return found;
 }
@@ -100,16 +112,16 @@ std::vector<std::string> files_of_pattern(const std::string& pattern) {
   return found;
 }
 
-std::vector<std::string> files_of(const std::string& input, bool recursive) {
+std::vector<std::string> files_of(const std::string& input, bool recursive, Wanted wanted) {
   std::error_code error;
   const fs::file_status status = fs::status(input, error);
-  if (fs::is_directory(status)) return files_of_folder(input, recursive);
+  if (fs::is_directory(status)) return files_of_folder(input, recursive, wanted);
   if (fs::exists(status)) return {input};
   if (input.find_first_of("*?[") != std::string::npos) return files_of_pattern(input);
   refuse(input, error && error != std::errc::no_such_file_or_directory ? error.message() : "no such file");
 }
 
-std::vector<std::string> files_of_list(const std::string& list, bool recursive) {
+std::vector<std::string> files_of_list(const std::string& list, bool recursive, Wanted wanted) {
   std::error_code error;
   if (fs::is_directory(list, error)) refuse(list, "is a folder; @ is for a list of inputs, leave it out");
   std::ifstream file(list, std::ios::binary);
@@ -124,7 +136,7 @@ std::vector<std::string> files_of_list(const std::string& list, bool recursive) 
     if (line.empty() || line.front() == '#') continue;
     try {
       // An absolute path stays what it is.
-      std::vector<std::string> files = files_of((folder / line).string(), recursive);
+      std::vector<std::string> files = files_of((folder / line).string(), recursive, wanted);
       std::move(files.begin(), files.end(), std::back_inserter(found));
     } catch (const Error& problem) {
       throw problem.within(fmt::format("{}: line {}", list, number));
@@ -141,10 +153,61 @@ std::vector<std::string> expand_inputs(const std::vector<std::string>& inputs, b
   std::vector<std::string> found;
   for (const std::string& input : inputs) {
     const bool is_list = input.size() > 1 && input.front() == '@';
-    std::vector<std::string> files = is_list ? files_of_list(input.substr(1), recursive) : files_of(input, recursive);
+    std::vector<std::string> files = is_list ? files_of_list(input.substr(1), recursive, Wanted::kRasters)
+                                             : files_of(input, recursive, Wanted::kRasters);
     std::move(files.begin(), files.end(), std::back_inserter(found));
   }
   return found;
+}
+
+std::vector<std::string> list_files(const std::vector<std::string>& inputs, bool recursive, bool only_archives) {
+  const Wanted wanted = only_archives ? Wanted::kArchives : Wanted::kBoth;
+  std::vector<std::string> found;
+  for (const std::string& input : inputs) {
+    std::error_code error;
+    const fs::file_status status = fs::status(input, error);
+    std::vector<std::string> files = {input};
+    if (input.size() > 1 && input.front() == '@') {
+      files = files_of_list(input.substr(1), recursive, wanted);
+    } else if (fs::is_directory(status) ||
+               (status.type() == fs::file_type::not_found && input.find_first_of("*?[") != std::string::npos)) {
+      files = files_of(input, recursive, wanted);
+    }
+    std::move(files.begin(), files.end(), std::back_inserter(found));
+  }
+  return found;
+}
+
+int for_each_file(const std::string& command, const std::vector<std::string>& files, const CommonOptions& common,
+                  const std::function<int(const std::string& file)>& work) {
+  if (files.size() == 1) return work(files.front());
+  std::map<int, std::size_t> counts;
+  for (const std::string& file : files) {
+    int code = kExitDone;
+    try {
+      code = work(file);
+    } catch (const Error& error) {
+      if (error.code() == ErrorCode::kCancelled) throw;
+      code = exit_code_for(error.code());
+      print_error(error.what());
+      if (common.json) {
+        StandardOutput out;
+        out.write(json_line({{"file", file}, {"error", {{"exit_code", code}, {"message", error.what()}}}}));
+        out.finish();
+      }
+    }
+    ++counts[code];
+  }
+  if (!common.quiet) {
+    const std::size_t differ = counts[kExitDifferences];
+    print_note(fmt::format("{} {}: {} files: {} done, {}{} failed", program_name(), command, files.size(),
+                           counts[kExitDone], differ > 0 ? fmt::format("{} with differences, ", differ) : "",
+                           counts[kExitFailed] + counts[kExitUsage]));
+  }
+  for (const int code : {kExitUsage, kExitFailed, kExitDifferences}) {
+    if (counts[code] > 0) return code;
+  }
+  return kExitDone;
 }
 
 }  // namespace isohf::cli

@@ -1,7 +1,10 @@
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
+
+#include "options_common.h"
 
 namespace isohf::cli {
 
@@ -14,5 +17,16 @@ namespace isohf::cli {
 ///     passed over. A file whose name starts with @ is named ./@NAME.
 /// Throws Error{kIo} for what is not there, matches nothing or holds nothing.
 [[nodiscard]] std::vector<std::string> expand_inputs(const std::vector<std::string>& inputs, bool recursive);
+
+/// The files that a command goes through one after the other, each on its own: as above, but archives (.isohf) of a
+/// folder as well, or nothing else with `only_archives`, and what names a file is taken as it is, there or not.
+[[nodiscard]] std::vector<std::string> list_files(const std::vector<std::string>& inputs, bool recursive,
+                                                  bool only_archives);
+
+/// Goes through files one after the other: `work` returns an exit code or throws Error, which is said and does not keep
+/// the others from their turn; with `json` it is an object on a line as well. Of several files a line on standard error
+/// sums up. Returns the worst exit code: wrong usage before failure before differences. A single file's Error goes on.
+[[nodiscard]] int for_each_file(const std::string& command, const std::vector<std::string>& files,
+                                const CommonOptions& common, const std::function<int(const std::string& file)>& work);
 
 }  // namespace isohf::cli

@@ -24,8 +24,8 @@ namespace {
 constexpr Command kCommands[] = {
     {"plan", "List tile shapes, or preview a conversion", command_plan},
     {"convert", "Turn a raster of elevations into an archive", command_convert},
-    {"info", "Describe an archive or a raster", command_info},
-    {"verify", "Check an archive, and compare it with its source", command_verify},
+    {"info", "Describe archives and rasters", command_info},
+    {"verify", "Check archives, and compare one with its source", command_verify},
     {"restore", "Turn an archive back into a raster", command_restore},
     {"export", "Write the surface as a raster of any grid, whole or cut into tiles", command_export},
     {"sample", "Print elevation and normal at places", command_sample},

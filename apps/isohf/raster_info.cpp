@@ -122,7 +122,9 @@ std::string text_from(const RasterInfo& raster) {
   const SourceInfo& info = raster.source;
   const Georeference& place = info.georeference;
   std::string text;
-  const auto say = [&](const char* what, const std::string& value) { text += fmt::format("{:<12} {}\n", what, value); };
+  const auto say = [&](const char* what, const std::string& value) {
+    text += fmt::format("{:<12} {}\n", what, printable(value));
+  };
   say("raster", fmt::format("{}: {}, read by {}", info.path, info.format, raster.library));
   say("size", fmt::format("{} x {} {}{}, stored in blocks of {} x {}", info.width, info.height,
                           to_string(info.sample_type), info.channel.empty() ? "" : ", channel " + info.channel,
@@ -242,7 +244,7 @@ bool is_archive(const std::string& path, const OpenOptions& options) {
 }
 
 void print_raster_info(const std::string& path, const OpenOptions& options, bool with_statistics,
-                       const WorkOptions& work, const CommonOptions& common) {
+                       const WorkOptions& work, const CommonOptions& common, bool is_one_of_many) {
   const std::unique_ptr<HeightSource> source = open_input(path, options);
   RasterInfo raster;
   raster.source = source->info();
@@ -265,7 +267,8 @@ void print_raster_info(const std::string& path, const OpenOptions& options, bool
   }
   StandardOutput out;
   if (common.json) {
-    out.write(json_text(json_from(raster, warnings)));
+    const ordered_json document = json_from(raster, warnings);
+    out.write(is_one_of_many ? json_line(document) : json_text(document));
   } else if (!common.quiet) {
     out.write(text_from(raster));
   }

@@ -11,8 +11,8 @@ namespace isohf::cli {
 /// reader of rasters knows; or a file named .isohf that none knows. Throws Error{kIo, kCorrupt} as open_source.
 [[nodiscard]] bool is_archive(const std::string& path, const OpenOptions& options);
 
-/// Prints what is understood of a raster; `with_statistics` reads all of it.
+/// Prints what is understood of a raster; `with_statistics` reads all of it. JSON of one of many takes a line.
 void print_raster_info(const std::string& path, const OpenOptions& options, bool with_statistics,
-                       const WorkOptions& work, const CommonOptions& common);
+                       const WorkOptions& work, const CommonOptions& common, bool is_one_of_many);
 
 }  // namespace isohf::cli

@@ -89,12 +89,36 @@ void add_mosaic_options(CommandLine& line, SourceInputs& inputs) {
       });
   line.flag("--require-complete", "Fail where tiles are missing or ground lies in no input, and name it",
             inputs.require_complete);
-  line.flag("--recursive", "Look for rasters in the folders of a folder as well", inputs.recursive);
+  line.flag("--recursive", "Look into the folders of a folder as well", inputs.recursive);
+}
+
+RecordedOptions recorded_options(const CommandLine& line) {
+  RecordedOptions recorded;
+  for (auto& [name, text] : line.texts_in({"Input", "Several inputs"})) {
+    // Neither what files are found by nor what the archive calls them: the same samples, the same bytes.
+    const bool says_how = name != "--require-complete" && name != "--source-name" && name != "--recursive";
+    if (says_how) recorded.emplace_back(name.substr(2), text);
+  }
+  for (auto& [name, text] : line.texts_in({"Ground"})) {
+    if (name == "--geoid") recorded.emplace_back("geoid", file_name(text));
+  }
+  return recorded;
+}
+
+Arguments arguments_from(const RecordedOptions& recorded, const CommandLine& line) {
+  Arguments arguments;
+  for (const auto& [name, text] : recorded) {
+    const bool names_channel = name == "channel" || name == "encoding";
+    const bool given = names_channel ? line.given("--channel") || line.given("--encoding") : line.given("--" + name);
+    if (!given) arguments.push_back(fmt::format("--{}={}", name, text));
+  }
+  return arguments;
 }
 
 OpenedInputs open_inputs(std::vector<std::string> files, const SourceInputs& inputs, const OpenOptions& options,
                          int threads) {
   OpenedInputs opened;
+  opened.note.options = inputs.as_given;
   if (files.size() == 1) {
     opened.source = with_voids_treated(open_source(files.front(), options), options.voids);
     opened.files = std::move(files);

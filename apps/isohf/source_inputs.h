@@ -3,6 +3,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "command_line.h"
@@ -13,6 +14,9 @@
 
 namespace isohf::cli {
 
+/// Options that say how an input is read, by name, without dashes, with their text: as an archive records them.
+using RecordedOptions = std::vector<std::pair<std::string, std::string>>;
+
 /// The inputs of a command that form one source, and how they are joined.
 struct SourceInputs {
   std::vector<std::string> names;  ///< files, folders, patterns and @lists, as on the command line
@@ -20,11 +24,18 @@ struct SourceInputs {
   bool overlap_given = false;
   bool require_complete = false;
   bool recursive = false;
-  std::optional<BoundingBox> box;  ///< of the whole, only this part
+  std::optional<BoundingBox> box;           ///< of the whole, only this part
+  std::optional<RecordedOptions> as_given;  ///< for the archive's metadata
 };
 
 /// --bbox, and the group "Several inputs": --overlap, --require-complete, --recursive.
 void add_mosaic_options(CommandLine& line, SourceInputs& inputs);
+
+/// After parsing: the options of the groups "Input" and "Several inputs" that say how samples are read, and of a geoid
+/// the file's name, not its folder.
+[[nodiscard]] RecordedOptions recorded_options(const CommandLine& line);
+/// The arguments that the recorded options make, of those that `line` was not given.
+[[nodiscard]] Arguments arguments_from(const RecordedOptions& recorded, const CommandLine& line);
 
 /// Inputs, opened as one source.
 struct OpenedInputs {

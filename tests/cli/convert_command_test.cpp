@@ -151,7 +151,7 @@ TEST_F(ConvertCommand, LevelsStoreTheSameElevationsInFewerBytes) {
 TEST_F(ConvertCommand, MaxRoundingBoundsEveryVertex) {
   convert("a.isohf", {"--quiet", "--max-rounding", "0.125", "--filter", "bspline3"});
   const json report =
-      json::parse(run_isohf({"verify", folder / "a.isohf", "--against", folder / "a.tif", "--no-ortho", "--json"}).out);
+      json::parse(run_isohf({"verify", folder / "a.isohf", "--against", folder / "a.tif", "--json"}).out);
   const json& vertices = report.at("against").at("vertices");
   EXPECT_GT(vertices.at("checked").get<int>(), 10000);
   EXPECT_EQ(vertices.at("wrong"), 0);
@@ -172,7 +172,7 @@ TEST_F(ConvertCommand, ReportIsWhatVerifyFindsAndLeavesTheElevationsAsTheyAre) {
   EXPECT_EQ(made.at("metadata").at("content_sha256"), plain.at("metadata").at("content_sha256"));
   const json report = json::parse(read_file(folder / "r.json"));
   const json verified =
-      json::parse(run_isohf({"verify", folder / "a.isohf", "--against", folder / "a.tif", "--json"}).out);
+      json::parse(run_isohf({"verify", folder / "a.isohf", "--against", folder / "a.tif", "--ortho", "--json"}).out);
   EXPECT_EQ(report, verified.at("against"));
 
   // Without a file it stands alone, whatever follows; the output is no report.

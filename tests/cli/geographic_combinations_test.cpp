@@ -137,8 +137,8 @@ class GeographicCombinations : public testing::Test {
     ASSERT_EQ(pieces.exit_code, 0) << pieces.err;
     EXPECT_TRUE(read_file(folder / "whole.isohf") == read_file(folder / "a.isohf"));
     for (const std::string& input : {folder / "whole.flt", folder / "pieces"}) {
-      const RunResult verified = run_with({"verify", folder / "a.isohf", "--against", input, "--no-ortho", "--json"},
-                                          at.source_options(folder));
+      const RunResult verified =
+          run_with({"verify", folder / "a.isohf", "--against", input, "--json"}, at.source_options(folder));
       ASSERT_EQ(verified.exit_code, 0) << verified.out << verified.err;
       const json against = json::parse(verified.out).at("against");
       EXPECT_EQ(against.at("vertices").at("wrong"), 0);

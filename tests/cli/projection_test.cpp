@@ -76,8 +76,7 @@ TEST_F(ProjectionCommand, EveryKindPassesEveryCheckAndHasItsPlacesInDegrees) {
         "utm:32N", "lambert-conformal", "lambert-conformal:44,48,8", "polar-stereographic:45"}) {
     SCOPED_TRACE(kind);
     converts({"--projection", kind, "--filter", "catmull-rom", "--step", "0.02"});
-    const RunResult verified =
-        isohf({"verify", folder / "a.isohf", "--against", folder / "wide.flt", "--no-ortho", "--json"});
+    const RunResult verified = isohf({"verify", folder / "a.isohf", "--against", folder / "wide.flt", "--json"});
     ASSERT_EQ(verified.exit_code, 0) << verified.out << verified.err;
     const json against = json::parse(verified.out).at("against");
     EXPECT_EQ(against.at("samples"), 240 * 160);
@@ -253,7 +252,7 @@ TEST_F(ProjectionCommand, APolarCapIsWholeToThePole) {
   const RunResult result = isohf({"convert", folder / "cap.flt", folder / "a.isohf", "--step", "0.05"});
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.out, HasSubstr("polar-stereographic"));
-  const RunResult verified = isohf({"verify", folder / "a.isohf", "--against", folder / "cap.flt", "--no-ortho"});
+  const RunResult verified = isohf({"verify", folder / "a.isohf", "--against", folder / "cap.flt"});
   EXPECT_EQ(verified.exit_code, 0) << verified.out;
   for (const char* longitude : {"-180", "-179.8", "-90", "0", "45", "179.9"}) {
     const RunResult sampled = isohf({"sample", folder / "a.isohf", "--at-lonlat", longitude, "75.25"});
@@ -281,7 +280,7 @@ TEST_F(ProjectionCommand, ARepeatedColumnIsLeftOutOfAJoinedGlobe) {
   EXPECT_EQ(metadata("g.isohf").at("content_sha256"), metadata("h.isohf").at("content_sha256"));
   EXPECT_EQ(metadata("g.isohf").at("wraps_x"), true);
   for (const char* input : {"globe.flt", "again.flt"}) {
-    const RunResult verified = isohf({"verify", folder / "h.isohf", "--against", folder / input, "--no-ortho"});
+    const RunResult verified = isohf({"verify", folder / "h.isohf", "--against", folder / input});
     EXPECT_EQ(verified.exit_code, 0) << verified.out << verified.err;
   }
 }
@@ -293,9 +292,11 @@ TEST_F(ProjectionCommand, AGeoidMovesElevationsAndTheirDatum) {
   EXPECT_EQ(info.at("source").at("vertical_datum").at("name"), "the ellipsoid, by egm96-test");
   EXPECT_NEAR(std::stod(isohf({"sample", folder / "a.isohf", "--at-lonlat", "7.5", "45.5"}).out),
               land(7.5, 45.5) + 47.0, 1.0);
-  EXPECT_EQ(isohf({"verify", folder / "a.isohf", "--against", folder / "wide.flt", "--no-ortho"}).exit_code, 3);
-  const RunResult moved = isohf({"verify", folder / "a.isohf", "--against", folder / "wide.flt", "--no-ortho",
-                                 "--geoid", folder / "egm96-test.pgm"});
+  write_geoid(folder / "other.pgm", 72, 37, [](double, double) { return 52.0; });
+  EXPECT_EQ(isohf({"verify", folder / "a.isohf", "--against", folder / "wide.flt", "--geoid", folder / "other.pgm"})
+                .exit_code,
+            3);
+  const RunResult moved = isohf({"verify", folder / "a.isohf", "--against", folder / "wide.flt"});
   EXPECT_EQ(moved.exit_code, 0) << moved.out;
 }
 

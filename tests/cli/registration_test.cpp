@@ -122,8 +122,8 @@ class RegistrationOf : public testing::Test {
   }
 
   void expect_verified(const std::string& path, const std::vector<std::string>& options) const {
-    std::vector<std::string> arguments = {"verify",     folder / "a.isohf", "--against",   path,
-                                          "--no-ortho", "--json",           "--max-error", "0.0001"};
+    std::vector<std::string> arguments = {"verify", folder / "a.isohf", "--against", path,
+                                          "--json", "--max-error",      "0.0001"};
     arguments.insert(arguments.end(), options.begin(), options.end());
     const RunResult result = run_isohf(arguments);
     ASSERT_EQ(result.exit_code, 0) << result.out << result.err;

@@ -101,7 +101,7 @@ TEST_F(RestoreCommand, MoreThreadsThanCoresAreNoWordOnStandardError) {
   for (const std::vector<std::string>& command :
        std::vector<std::vector<std::string>>{{"restore", folder / "a.isohf", folder / "back.tif"},
                                              {"export", folder / "a.isohf", folder / "back.tif", "--overwrite"},
-                                             {"verify", folder / "a.isohf", "--against", kCoast, "--no-ortho"},
+                                             {"verify", folder / "a.isohf", "--against", kCoast},
                                              {"shade", folder / "a.isohf", "-o", folder / "back.png"},
                                              {"convert", kCoast, folder / "b.isohf", "--report"}}) {
     std::vector<std::string> arguments = command;

@@ -119,8 +119,7 @@ TEST_F(RestoreLike, ErrsAtTheSourcesSamplesByWhatVerifyMeasures) {
   for (const std::string& kind : kWarpedKinds) {
     SCOPED_TRACE(kind);
     convert("wide.flt", kind);
-    const RunResult verified =
-        run_isohf({"verify", folder / "a.isohf", "--against", folder / "wide.flt", "--no-ortho", "--json"});
+    const RunResult verified = run_isohf({"verify", folder / "a.isohf", "--against", folder / "wide.flt", "--json"});
     ASSERT_EQ(verified.exit_code, 0) << verified.err;
     const json against = json::parse(verified.out).at("against");
     const Raster back = like("wide.flt");

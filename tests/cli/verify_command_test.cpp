@@ -78,8 +78,7 @@ TEST_F(VerifyCommand, FindsAVertexThatTheSourceDoesNotGive) {
   write_int16_tiff(folder / "b.tif", 150, 120, [](std::int64_t c, std::int64_t r) {
     return static_cast<std::int16_t>(height(c, r) + (c == 75 && r == 60 ? 3 : 0));
   });
-  const RunResult result =
-      run_isohf({"verify", folder / "a.isohf", "--against", folder / "b.tif", "--no-ortho", "--json"});
+  const RunResult result = run_isohf({"verify", folder / "a.isohf", "--against", folder / "b.tif", "--json"});
   EXPECT_EQ(result.exit_code, 3);
   const json report = json::parse(result.out);
   ASSERT_EQ(report.at("checks").at("findings").size(), 1U) << result.out;
@@ -102,7 +101,7 @@ TEST_F(VerifyCommand, ComparesWithAnOrthoMeshOfAsManyVertices) {
     EXPECT_EQ(result.err, "");
     return result.out;
   };
-  const json against = json::parse(with({"--json"})).at("against");
+  const json against = json::parse(with({"--ortho", "--json"})).at("against");
   EXPECT_EQ(against.at("iso").at("triangles"), against.at("ortho").at("triangles"));
   for (const char* key : {"vertices", "triangles", "tile_bytes", "plain_bytes"}) {
     EXPECT_GT(against.at("iso").at(key).get<int>(), 0) << key;
@@ -117,11 +116,20 @@ TEST_F(VerifyCommand, ComparesWithAnOrthoMeshOfAsManyVertices) {
   }
   const double rms = against.at("rms").get<double>();
   EXPECT_NEAR(against.at("ortho_at_equal_rms").at("rms").get<double>(), rms, 0.02 * rms);
-  EXPECT_THAT(with({}), testing::AllOf(HasSubstr("\northo  "), HasSubstr("\nequal rms ")));
+  EXPECT_THAT(with({"--ortho"}), testing::AllOf(HasSubstr("\northo  "), HasSubstr("\nequal rms ")));
+  EXPECT_EQ(run_isohf({"verify", folder / "a.isohf", "--ortho"}).exit_code, 2);  // needs --against
+}
 
-  EXPECT_FALSE(json::parse(with({"--json", "--no-ortho"})).at("against").contains("ortho"));
-  EXPECT_THAT(with({"--no-ortho"}), testing::Not(HasSubstr("ortho")));
-  EXPECT_EQ(run_isohf({"verify", folder / "a.isohf", "--no-ortho"}).exit_code, 2);  // needs --against
+TEST_F(VerifyCommand, LeavesOrthoMeshesOutUnlessAskedForThem) {
+  for (const std::vector<std::string>& more : {std::vector<std::string>{}, {"--no-ortho"}}) {
+    std::vector<std::string> arguments = {"verify", folder / "a.isohf", "--against", folder / "a.tif"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    EXPECT_THAT(run_isohf(arguments).out, testing::Not(HasSubstr("ortho")));
+    arguments.emplace_back("--json");
+    const json against = json::parse(run_isohf(arguments).out).at("against");
+    EXPECT_TRUE(against.contains("rms"));
+    for (const char* key : {"iso", "ortho", "ortho_at_equal_rms"}) EXPECT_FALSE(against.contains(key)) << key;
+  }
 }
 
 TEST_F(VerifyCommand, AnotherSourceIsNoSource) {

@@ -58,7 +58,7 @@ TEST_F(VoidOptions, NodataTakesSeveralValues) {
   EXPECT_EQ(summary.at("source_voids").at("found"), kHole + kSpike);
   EXPECT_EQ(summary.at("metadata").at("source").at("voids").at("values"), json::array({-32768.0, 9999.0}));
   // Verify takes them from the archive.
-  const RunResult verified = run_isohf({"verify", folder / "a.isohf", "--against", folder / "a.tif", "--no-ortho"});
+  const RunResult verified = run_isohf({"verify", folder / "a.isohf", "--against", folder / "a.tif"});
   EXPECT_EQ(verified.exit_code, 0) << verified.out;
   EXPECT_EQ(verified.err, "");
 }
@@ -71,7 +71,7 @@ TEST_F(VoidOptions, ValidRangeMakesVoidsAndCountsThem) {
   EXPECT_EQ(summary.at("metadata").at("source").at("voids").at("valid_range"), json::array({100.0, 5000.0}));
   EXPECT_GT(summary.at("metadata").at("statistics").at("min"), 150.0);
   EXPECT_LT(summary.at("metadata").at("statistics").at("max"), 600.0);
-  EXPECT_EQ(run_isohf({"verify", folder / "a.isohf", "--against", folder / "a.tif", "--no-ortho"}).exit_code, 0);
+  EXPECT_EQ(run_isohf({"verify", folder / "a.isohf", "--against", folder / "a.tif"}).exit_code, 0);
 }
 
 TEST_F(VoidOptions, FillLeavesNoHoleAndVerifyRepeatsIt) {
@@ -84,8 +84,7 @@ TEST_F(VoidOptions, FillLeavesNoHoleAndVerifyRepeatsIt) {
   EXPECT_EQ(summary.at("metadata").at("source").at("voids").at("fill_distance"), 100);
   EXPECT_EQ(summary.at("metadata").at("statistics").at("voids"), 0);
   EXPECT_GE(summary.at("metadata").at("statistics").at("min"), 150.0);
-  const RunResult verified =
-      run_isohf({"verify", folder / "a.isohf", "--against", folder / "a.tif", "--no-ortho", "--json"});
+  const RunResult verified = run_isohf({"verify", folder / "a.isohf", "--against", folder / "a.tif", "--json"});
   EXPECT_EQ(verified.exit_code, 0) << verified.out;
   EXPECT_EQ(json::parse(verified.out).at("against").at("samples_void"), 0);
 }

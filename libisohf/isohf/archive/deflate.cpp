@@ -8,6 +8,7 @@
 #include <memory>
 
 #include "isohf/archive/literal_inflater.h"
+#include "isohf/base/bytes.h"
 #include "isohf/base/error.h"
 
 namespace isohf {
@@ -46,6 +47,10 @@ void inflate_exactly(std::span<const std::byte> deflated, std::span<std::byte> o
 }
 
 bool zlib_inflates_to(std::span<const std::byte> deflated, std::span<const std::byte> expected) {
+  const auto bit = [&](std::uint64_t at) { return std::to_integer<unsigned>(deflated[at / 8]) >> (at % 8) & 1U; };
+  const auto is_zero_to_next_byte = [&](std::uint64_t at) {
+    return at % 8 == 0 || std::to_integer<unsigned>(deflated[at / 8]) >> (at % 8) == 0;
+  };
   std::vector<std::byte> out(expected.size() + 1);  // one to spare, so that a longer stream shows
   z_stream stream{};
   if (inflateInit2(&stream, -MAX_WBITS) != Z_OK) throw Error(ErrorCode::kOutOfMemory, "no memory for zlib");
@@ -54,15 +59,34 @@ bool zlib_inflates_to(std::span<const std::byte> deflated, std::span<const std::
   stream.avail_in = static_cast<uInt>(deflated.size());
   stream.next_out = reinterpret_cast<Bytef*>(out.data());
   stream.avail_out = static_cast<uInt>(out.size());
-  const int result = inflate(&stream, Z_FINISH);
-  const bool whole = result == Z_STREAM_END && stream.avail_in == 0 && stream.total_out == expected.size();
+  // Block by block, each from its three bits of header on.
+  constexpr int kAtBlockEnd = 128;
+  constexpr int kWasLast = 64;
+  std::uint64_t begin = 0;
+  bool is_whole = false;
+  while (begin + 3 <= 8 * deflated.size()) {
+    if (bit(begin + 1) == 0 && bit(begin + 2) == 0 && !is_zero_to_next_byte(begin + 3)) break;
+    if (inflate(&stream, Z_BLOCK) != Z_OK || (stream.data_type & kAtBlockEnd) == 0) break;
+    begin = 8 * (deflated.size() - stream.avail_in) - static_cast<std::uint64_t>(stream.data_type & 7);
+    if ((stream.data_type & kWasLast) == 0) continue;
+    is_whole = stream.avail_in == 0 && is_zero_to_next_byte(begin);
+    break;
+  }
+  const bool is_same = is_whole && out.size() - stream.avail_out == expected.size() &&
+                       std::equal(expected.begin(), expected.end(), out.begin());
   inflateEnd(&stream);
-  return whole && std::equal(expected.begin(), expected.end(), out.begin());
+  return is_same;
 }
 
 std::uint32_t crc32(std::span<const std::byte> bytes, std::uint32_t seed) {
   if (bytes.empty()) return seed;  // libdeflate takes a null pointer for a wish to start anew
   return libdeflate_crc32(seed, bytes.data(), bytes.size());
+}
+
+std::uint32_t crc32_of_crc32(std::uint32_t crc, std::uint32_t seed) {
+  std::vector<std::byte> bytes;
+  ByteWriter(bytes).write(crc);
+  return crc32(bytes, seed);
 }
 
 }  // namespace isohf

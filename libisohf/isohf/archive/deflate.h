@@ -16,11 +16,14 @@ namespace isohf {
 /// Thread-safe.
 void inflate_exactly(std::span<const std::byte> deflated, std::span<std::byte> out);
 
-/// Inflates with zlib, the reference that every archive must satisfy: true where it makes exactly `expected`.
-/// libdeflate is laxer about code tables that zlib calls invalid.
+/// Inflates with zlib, the reference that every archive must satisfy: true where it makes exactly `expected`, and bits
+/// that no inflater reads, before stored bytes and behind the last block, are 0. libdeflate is laxer about code tables
+/// that zlib calls invalid.
 [[nodiscard]] bool zlib_inflates_to(std::span<const std::byte> deflated, std::span<const std::byte> expected);
 
 /// CRC-32 as ZIP has it; `seed` continues an earlier one.
 [[nodiscard]] std::uint32_t crc32(std::span<const std::byte> bytes, std::uint32_t seed = 0);
+/// The same of a checksum's four bytes, little-endian: of many checksums in turn one for all.
+[[nodiscard]] std::uint32_t crc32_of_crc32(std::uint32_t crc, std::uint32_t seed);
 
 }  // namespace isohf

@@ -147,6 +147,24 @@ void check_profile(std::span<const std::byte> file, const ZipEnd& end, const Com
   }
 }
 
+std::uint32_t data_crc32(const MappedFile& file, const ZipEnd& end) {
+  std::uint32_t all = 0;
+  std::vector<std::byte> data;
+  for_each_entry(file.bytes(), end, [&](const ZipEntry& entry) {
+    if (entry.name == kMetadataName || entry.name == kIndexName) return;
+    std::uint64_t at = checked_data_offset(file.bytes(), entry);
+    std::uint32_t crc = 0;
+    for (std::uint64_t left = entry.compressed_bytes; left > 0; left -= data.size()) {
+      data.resize(std::min<std::uint64_t>(left, std::uint64_t{1} << 20U));
+      file.read(at, data);
+      crc = crc32(data, crc);
+      at += data.size();
+    }
+    all = crc32_of_crc32(crc, all);
+  });
+  return all;
+}
+
 std::vector<std::byte> member_from(const MappedFile& file, const ZipEntry& entry, std::uint64_t data_offset) {
   std::vector<std::byte> data(entry.compressed_bytes);
   file.read(data_offset, data);

@@ -41,6 +41,10 @@ using Complain = std::function<void(const std::string&)>;
 /// writer makes it, members back to back from byte 0 on, metadata first, index last and right before the directory.
 void check_profile(std::span<const std::byte> file, const ZipEnd& end, const Complain& complain);
 
+/// CRC-32 over the CRC-32s of all members' data as they stand in the file, in the directory's order, but those of the
+/// metadata and the index. Throws as reading does.
+[[nodiscard]] std::uint32_t data_crc32(const MappedFile& file, const ZipEnd& end);
+
 /// A member whose data stand at `data_offset`, inflated where they are deflated, the CRC checked. Not through the map:
 /// a file that was cut after it was opened is an error, not the end of the process. Throws Error{kCorrupt,
 /// kUnsupported, kIo}.

@@ -96,6 +96,8 @@ struct SourceRecord {
   std::optional<MapGround> ground;     ///< under a source on a map that was understood
   /// Its reference system, where who reads the archive has understood it; never stored.
   std::shared_ptr<const ReferenceMap> map;
+  /// How it was read: options of `isohf convert` by name, without dashes, with their text; nullopt: not recorded.
+  std::optional<std::vector<std::pair<std::string, std::string>>> options;
 };
 
 /// The map on which world space lies, metres, where it is another one than the source's.

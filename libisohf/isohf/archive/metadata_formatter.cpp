@@ -75,6 +75,10 @@ Json source_to_json(const SourceRecord& source) {
                       {"names_sha256", source.mosaic->names_sha256},
                       {"overlap", source.mosaic->overlap}};
   }
+  if (source.options) {
+    json["options"] = Json::object();
+    for (const auto& [name, text] : *source.options) json["options"][name] = text;
+  }
   return json;
 }
 

@@ -9,6 +9,10 @@ namespace isohf {
 inline constexpr int kFormatVersion = 1;
 inline constexpr const char* kFormatName = "isohf";
 
+/// The extension that holds data_crc32() of an archive's members (docs/archive_format.md), as a string of hexadecimal
+/// digits.
+inline constexpr const char* kDataCrcName = "data_crc32";
+
 /// Whether a top-level member of that name belongs to the format; any other is an extension.
 [[nodiscard]] bool is_format_member(const std::string& name);
 

@@ -135,6 +135,18 @@ MapGround ground_from_json(const ObjectReader& json) {
   return ground;
 }
 
+/// Archives of the first builds have none.
+void options_from_json(const ObjectReader& json, SourceRecord& source) {
+  if (!json.has("options")) return;
+  const Json& options = json.required("options");
+  if (!options.is_object()) refuse_metadata(json.path("options"), "is no object");
+  source.options.emplace();
+  for (const auto& [name, value] : options.items()) {
+    if (!value.is_string()) refuse_metadata(json.path("options"), "holds something that is no string");
+    source.options->emplace_back(name, value.get<std::string>());
+  }
+}
+
 SourceRecord source_from_json(const ObjectReader& json) {
   SourceRecord source;
   source.name = json.text("name");
@@ -172,6 +184,7 @@ SourceRecord source_from_json(const ObjectReader& json) {
   const ObjectReader datum = json.object("vertical_datum");
   source.vertical_datum = datum.optional_text("name");
   source.vertical_epsg = datum.optional_code("epsg");
+  options_from_json(json, source);
   if (json.has("mosaic")) source.mosaic = mosaic_from_json(json.object("mosaic"));
   return source;
 }
@@ -273,6 +286,65 @@ std::string checked_hash(const ObjectReader& root) {
   return hash;
 }
 
+/// Holds every number that arithmetic is done with against the range in which that arithmetic works, and the place of
+/// the source against the tiles that were made of it.
+void check_ranges(const Metadata& metadata) {
+  const auto require = [](bool holds, const char* where, double found, const std::string& wanted) {
+    if (!holds) refuse_metadata(where, fmt::format("is {}, must {}", found, wanted));
+  };
+  const Quantisation& codes = metadata.quantisation;
+  require(std::isfinite(codes.offset + codes.scale * 65535.0), "samples.scale", codes.scale,
+          "not lead beyond all numbers");
+  const SourceRecord& source = metadata.source;
+  constexpr std::int64_t kMostSamples = std::int64_t{1} << 32U;
+  require(source.width <= kMostSamples, "source.width", static_cast<double>(source.width), "be at most 2^32");
+  require(source.height <= kMostSamples, "source.height", static_cast<double>(source.height), "be at most 2^32");
+  require(source.z_scale != 0.0, "source.z_scale", source.z_scale, "not be 0");
+  const auto check_axis = [&](const char* spacing_name, const char* first_name, double spacing, double first,
+                              std::int64_t samples, double step, double world) {
+    require(spacing >= 1e-9 * step && spacing <= 1e12 * step, spacing_name, spacing,
+            fmt::format("lie within 1e-9 and 1e12 lattice steps of {}", step));
+    const double last = first + spacing * static_cast<double>(std::max<std::int64_t>(samples - 1, 0));
+    require(std::abs(first) <= 1000.0 * world && std::abs(last) <= 1000.0 * world, first_name, first,
+            fmt::format("leave all samples near the world of {}", world));
+  };
+  const TileGrid& grid = metadata.grid;
+  check_axis("source.spacing.x", "source.first_sample.x", source.spacing_x, source.first_sample_x, source.width,
+             grid.sigma_x(), grid.world_width());
+  check_axis("source.spacing.z", "source.first_sample.z", source.spacing_z, source.first_sample_z, source.height,
+             grid.sigma_z(), grid.world_height());
+  const auto check_extent = [&](const char* where, double low, double high, double world) {
+    const double slack = 1e-6 * world;
+    require(low >= -slack && low <= high, where, low, "lie in the world, West and North first");
+    require(high <= world + slack, where, high, fmt::format("be at most {}, where the tiles end", world));
+  };
+  check_extent("valid.x0, .x1", metadata.valid.x0, metadata.valid.x1, grid.world_width());
+  check_extent("valid.z0, .z1", metadata.valid.z0, metadata.valid.z1, grid.world_height());
+  if (!metadata.projection) return;
+  const ProjectionSpec& spec = metadata.projection->spec;
+  const MapPoint& origin = metadata.projection->origin;
+  const auto within = [&](const char* where, double value, double most) {
+    require(std::abs(value) <= most, where, value, fmt::format("lie in {} to {}", -most, most));
+  };
+  within("projection.semi_major_axis_m", spec.ellipsoid.semi_major_axis_m, 1e12);
+  within("projection.longitude_0", spec.longitude_0, 1e4);
+  within("projection.latitude_0", spec.latitude_0, 90.0);
+  within("projection.parallel_1", spec.parallel_1, 90.0);
+  within("projection.parallel_2", spec.parallel_2, 90.0);
+  require(spec.scale_0 > 0.0 && spec.scale_0 <= 1e3, "projection.scale_0", spec.scale_0, "lie above 0, to 1000");
+  within("projection.false_easting", spec.false_easting, 1e15);
+  within("projection.false_northing", spec.false_northing, 1e15);
+  within("projection.origin.easting", origin.easting, 1e15);
+  within("projection.origin.northing", origin.northing, 1e15);
+  if (source.crs_unit != "degree") return;
+  within("source.crs.origin_x", source.origin_x.value_or(0.0), 1e4);
+  within("source.crs.origin_y", source.origin_y.value_or(0.0), 1e4);
+  require(source.crs_spacing_x >= 1e-12 && source.crs_spacing_x <= 360.0, "source.crs.spacing_x", source.crs_spacing_x,
+          "lie in 1e-12 to 360 degrees, which the projection needs");
+  require(source.crs_spacing_y >= 1e-12 && source.crs_spacing_y <= 360.0, "source.crs.spacing_y", source.crs_spacing_y,
+          "lie in 1e-12 to 360 degrees, which the projection needs");
+}
+
 }  // namespace
 
 Metadata parse_metadata(const std::string& text) {
@@ -307,6 +379,7 @@ Metadata parse_metadata(const std::string& text) {
   }
   metadata.content_sha256 = checked_hash(root);
   metadata.producer = root.text("producer");
+  check_ranges(metadata);
   for (const auto& [name, value] : json.items()) {
     if (!is_format_member(name)) metadata.extensions.emplace_back(name, value.dump());
   }

@@ -235,6 +235,11 @@ bool ArchiveReader::zlib_reads(TileIndex tile) const {
   return zlib_inflates_to(state_->read(entry.offset_bytes, entry.compressed_bytes), state_->payload(entry, tile));
 }
 
+bool ArchiveReader::zlib_reads(const MemberEntry& member, std::span<const std::byte> bytes) const {
+  if (!member.deflated || reads_by_directory()) return true;
+  return zlib_inflates_to(state_->read(member.offset_bytes, member.compressed_bytes), bytes);
+}
+
 std::vector<double> ArchiveReader::read_elevations(TileIndex tile) const {
   const TileCodes codes = read_tile(tile);
   if (codes.type == CodeType::kF32) return {codes.heights.begin(), codes.heights.end()};

@@ -11,6 +11,12 @@
 #include "isohf/base/error.h"
 
 namespace isohf {
+namespace {
+
+/// A grid of so many tiles may be stated where there is no index, and some for each tile that is there.
+constexpr std::uint64_t kMostTilesOnTrust = std::uint64_t{1} << 16U;
+
+}  // namespace
 
 TileTable::TileTable(const MappedFile& file, const ZipEnd& end, const Metadata& metadata)
     : file_(file), end_(end), metadata_(metadata) {
@@ -34,6 +40,7 @@ bool TileTable::use_index() {
   const auto directory = file_.bytes().subspan(end_.directory_offset, footer->directory_bytes);
   if (crc32(directory) != footer->directory_crc32) return false;
   data_end_ = start;
+  stored_count_ = footer->stored_count;
   return true;
 }
 
@@ -67,7 +74,13 @@ void TileTable::take_ranges_from_index(const Directory& directory) {
   const auto member = std::find_if(directory.members.begin(), directory.members.end(),
                                    [](const Directory::Member& m) { return m.entry.name == kIndexName; });
   const auto tiles = static_cast<std::uint64_t>(metadata_.grid.tile_count());
-  if (member == directory.members.end() || member->entry.bytes != tiles * kIndexRecordBytes + kIndexFooterBytes) return;
+  if (member == directory.members.end() || member->entry.bytes != tiles * kIndexRecordBytes + kIndexFooterBytes) {
+    // Without an index as large, the metadata's word alone stands for the grid: going through it must have an end.
+    if (tiles <= kMostTilesOnTrust + kMostTilesOnTrust / 16 * listed_.size()) return;
+    throw Error(ErrorCode::kCorrupt,
+                fmt::format("metadata: tiles: {}x{} are stated, {} are there, and no index of as many",
+                            metadata_.grid.tile_columns(), metadata_.grid.tile_rows(), listed_.size()));
+  }
   std::vector<std::byte> old;
   try {
     old = member_from(file_, member->entry, member->data_offset);
@@ -133,10 +146,12 @@ bool TileTable::is_deflated(TileIndex tile) const {
 
 void TileTable::check_against(const Directory& directory, const Complain& complain) const {
   auto tile = directory.tiles.begin();
+  std::uint64_t stored = 0;
   for (std::int64_t flat = 0; flat < metadata_.grid.tile_count(); ++flat) {
     const TileIndex index = metadata_.grid.tile_at(flat);
     const TileEntry entry = record(flat);
     const bool is_listed = tile != directory.tiles.end() && tile->flat == flat;
+    stored += entry.stored ? 1 : 0;
     if (entry.stored != is_listed) {
       complain(fmt::format(
           "tile ({},{}): {}", index.column, index.row,
@@ -148,6 +163,10 @@ void TileTable::check_against(const Directory& directory, const Complain& compla
                            tile->data_offset));
     }
     while (tile != directory.tiles.end() && tile->flat == flat) ++tile;
+  }
+  if (stored != stored_count_) {
+    complain(fmt::format("member \"{}\": its footer counts {} stored tiles, its records {}", kIndexName, stored_count_,
+                         stored));
   }
 }
 

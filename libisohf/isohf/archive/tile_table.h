@@ -45,8 +45,9 @@ class TileTable {
   ZipEnd end_;
   const Metadata& metadata_;
   bool by_directory_ = false;
-  std::vector<Listed> listed_;  ///< with `by_directory_`: its tiles, by flat index
-  std::uint64_t data_end_ = 0;  ///< tiles lie before it; without `by_directory_` the index begins there
+  std::vector<Listed> listed_;      ///< with `by_directory_`: its tiles, by flat index
+  std::uint64_t stored_count_ = 0;  ///< without `by_directory_`: as the index's footer has it
+  std::uint64_t data_end_ = 0;      ///< tiles lie before it; without `by_directory_` the index begins there
 };
 
 }  // namespace isohf

@@ -9,6 +9,7 @@
 #include "isohf/archive/content_hash.h"
 #include "isohf/archive/deflate.h"
 #include "isohf/archive/journal.h"
+#include "isohf/archive/metadata_json.h"
 #include "isohf/archive/written_contents.h"
 #include "isohf/archive/zip_layout.h"
 #include "isohf/base/assert.h"
@@ -348,6 +349,8 @@ void ArchiveWriter::complete(Metadata metadata) {
   }
   metadata.tiles_stored = state.contents.tiles_stored();
   metadata.content_sha256 = state.content_hash;
+  std::erase_if(metadata.extensions, [](const auto& extension) { return extension.first == kDataCrcName; });
+  metadata.extensions.emplace_back(kDataCrcName, fmt::format("\"{:08x}\"", state.contents.data_crc32()));
   ZipMember member = state.metadata_member();
   state.write_metadata(format_metadata(metadata), member);
   state.write_index_and_directory(member);

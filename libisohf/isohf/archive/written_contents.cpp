@@ -10,6 +10,7 @@
 namespace isohf {
 
 void WrittenContents::add(const JournalRecord& record) {
+  if (record.kind != JournalRecord::Kind::kEmptyTile) data_crc32_ = crc32_of_crc32(record.data_crc32, data_crc32_);
   if (record.kind == JournalRecord::Kind::kMember) {
     members_.push_back({next_, record.member});
     names_.insert(record.member.name);

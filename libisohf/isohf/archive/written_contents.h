@@ -32,6 +32,8 @@ class WrittenContents {
   /// What is known of a tile that was added.
   [[nodiscard]] TileEntry tile_entry(std::int64_t flat) const;
 
+  /// CRC-32 over the CRC-32s of all members' data as they stand in the file, in file order.
+  [[nodiscard]] std::uint32_t data_crc32() const { return data_crc32_; }
   /// The content hash as text; call once.
   [[nodiscard]] std::string finish_hash(const Metadata& metadata) { return content_.finish(metadata); }
   /// The member index.bin; `metadata` is the entry that the directory begins with. When all is added.
@@ -60,6 +62,7 @@ class WrittenContents {
   std::int64_t next_ = 0;
   std::int64_t stored_ = 0;
   std::uint64_t tile_bytes_ = 0;
+  std::uint32_t data_crc32_ = 0;
 };
 
 }  // namespace isohf

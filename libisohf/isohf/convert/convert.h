@@ -36,7 +36,8 @@ struct TextureRequest {
 struct SourceNote {
   std::string name;                    ///< instead of the file's; empty: the file's
   std::optional<MosaicRecord> mosaic;  ///< nullopt: a single file, or not to be said
-  std::string fingerprint;             ///< what --resume compares beside the file's own size and time
+  std::optional<std::vector<std::pair<std::string, std::string>>> options;  ///< as SourceRecord has them
+  std::string fingerprint;  ///< what --resume compares beside the file's own size and time
 };
 
 /// What was found by reading an archive that is complete but for its name.

@@ -15,6 +15,7 @@ SourceRecord record_of(const SourceInfo& info, const SourceFrame& frame, const S
   SourceRecord record;
   record.name = note.name.empty() ? std::filesystem::path(info.path).filename().string() : note.name;
   record.mosaic = note.mosaic;
+  record.options = note.options;
   record.format = info.format;
   record.width = info.width;
   record.height = info.height;

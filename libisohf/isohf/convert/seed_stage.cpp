@@ -1,11 +1,6 @@
 #include "isohf/convert/seed_stage.h"
 
 #include <fmt/format.h>
-#include <oneapi/tbb/parallel_for.h>
-#include <oneapi/tbb/parallel_invoke.h>
-#include <oneapi/tbb/task_arena.h>
-
-#include <limits>
 #include <utility>
 
 #include "isohf/base/assert.h"
@@ -17,6 +12,15 @@ namespace {
 /// Bytes kept of one visible row of a tile: about four casters of its own and three that enter, either way, and as much
 /// again while a row of tiles is finished (measured).
 constexpr std::uint64_t kBytesPerRow = 2 * (2 * 7 * sizeof(ShadowCaster) + 32);
+
+ShadowSeedInfo info_of(const ShadowSeedRequest& request, double elevation_units_per_world_unit) {
+  ShadowSeedInfo info;
+  info.kind = request.sun_deg.empty() ? ShadowSeedInfo::Kind::kHulls : ShadowSeedInfo::Kind::kAngles;
+  info.sun_min_deg = request.sun_deg.empty() ? request.sun_min_deg : request.sun_deg.front();
+  info.sun_deg = request.sun_deg;
+  info.elevation_units_per_world_unit = elevation_units_per_world_unit;
+  return info;
+}
 
 }  // namespace
 
@@ -52,29 +56,7 @@ std::uint64_t seed_stage_memory_bytes(const TileGrid& grid) {
 
 SeedStage::SeedStage(const TileGrid& grid, const Quantisation& quantisation, const ShadowSeedRequest& request,
                      double elevation_units_per_world_unit)
-    : grid_(grid), quantisation_(quantisation) {
-  info_.kind = request.sun_deg.empty() ? ShadowSeedInfo::Kind::kHulls : ShadowSeedInfo::Kind::kAngles;
-  info_.sun_min_deg = request.sun_deg.empty() ? request.sun_min_deg : request.sun_deg.front();
-  info_.sun_deg = request.sun_deg;
-  info_.elevation_units_per_world_unit = elevation_units_per_world_unit;
-  fall_min_ = info_.fall_per_half_step(grid, quantisation, info_.sun_min_deg);
-  for (const double degrees : info_.sun_deg) falls_.push_back(info_.fall_per_half_step(grid, quantisation, degrees));
-  // No code is below 0; how low floats go is only known at the end.
-  lowest_ = quantisation.type == CodeType::kF32 ? -std::numeric_limits<double>::infinity() : 0.0;
-}
-
-SeedStage::Tile SeedStage::prepare(const TileCodes& codes) const {
-  const TileShape& shape = grid_.shape();
-  Tile tile;
-  if (codes.type == CodeType::kF32) {
-    tile.casters = tile_casters(shape, {codes.heights.data(), shape.columns(), shape.rows()}, fall_min_);
-  } else {
-    tile.casters = tile_casters(shape, {codes.codes.data(), shape.columns(), shape.rows()},
-                                static_cast<std::uint16_t>(quantisation_.void_code()), fall_min_);
-  }
-  tile.edges = tile_edges(shape, codes);
-  return tile;
-}
+    : grid_(grid), info_(info_of(request, elevation_units_per_world_unit)), row_(grid, quantisation, info_) {}
 
 std::int64_t SeedStage::first_tile_needed(const TileGrid& grid, std::int64_t next_tile) {
   return next_tile == 0 ? 0 : (next_tile - 1) / grid.tile_columns() * grid.tile_columns();
@@ -86,51 +68,9 @@ void SeedStage::add(TileIndex index, Tile tile, ArchiveWriter& writer) {
   if (static_cast<std::int64_t>(tiles_.size()) == grid_.tile_columns()) finish_row(index.row, writer);
 }
 
-std::vector<double> SeedStage::heights_at_angles(const CasterRows& rows) const {
-  std::vector<double> heights;
-  for (const double fall : falls_) {
-    for (int row = 1; row <= visible_rows(grid_.shape()); ++row) {
-      heights.push_back(shadow_height_from(rows.row(row), fall));
-    }
-  }
-  return heights;
-}
-
-EncodedSeeds SeedStage::encode(const TileEdges& edges, const HullSeeds& seeds) const {
-  if (info_.kind == ShadowSeedInfo::Kind::kHulls) {
-    return seeds.empty() ? EncodedSeeds{} : encode_seeds(grid_, edges, seeds);
-  }
-  const AngleSeeds heights{heights_at_angles(seeds.eastward), heights_at_angles(seeds.westward)};
-  return heights.empty() ? EncodedSeeds{} : encode_seeds(grid_, edges, heights, falls_.size());
-}
-
 void SeedStage::finish_row(std::int64_t row, ArchiveWriter& writer) {
-  const TileShape& shape = grid_.shape();
-  const std::size_t n = tiles_.size();
-  std::vector<HullSeeds> seeds(n);
-  std::vector<EncodedSeeds> encoded(n);
-  // Isolated: a thread that waits here must not take a tile of the pipeline in hand and come back late.
-  oneapi::tbb::this_task_arena::isolate([&] {
-    oneapi::tbb::parallel_invoke(
-        [&] {
-          CasterRows handed = no_casters(shape);
-          for (std::size_t i = 0; i < n; ++i) {
-            CasterRows next = pass_on_casters(shape, handed, tiles_[i].casters.eastward, fall_min_, lowest_);
-            seeds[i].eastward = std::exchange(handed, std::move(next));
-          }
-        },
-        [&] {
-          CasterRows handed = no_casters(shape);
-          for (std::size_t i = n; i-- > 0;) {
-            CasterRows next = pass_on_casters(shape, handed, tiles_[i].casters.westward, fall_min_, lowest_);
-            seeds[i].westward = std::exchange(handed, std::move(next));
-          }
-        });
-    oneapi::tbb::parallel_for(std::size_t{0}, n, [&](std::size_t i) {
-      if (!tiles_[i].is_empty) encoded[i] = encode(tiles_[i].edges, seeds[i]);
-    });
-  });
-  for (std::size_t i = 0; i < n; ++i) {
+  const std::vector<EncodedSeeds> encoded = row_.encode(tiles_);
+  for (std::size_t i = 0; i < encoded.size(); ++i) {
     if (encoded[i].payload_bytes == 0) continue;
     writer.add_deflated_member(seed_name({static_cast<std::int64_t>(i), row}), encoded[i].deflated,
                                encoded[i].payload_bytes, encoded[i].payload_crc32);

@@ -3,10 +3,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "isohf/archive/shadow_seeds.h"
 #include "isohf/archive/writer.h"
 #include "isohf/convert/convert.h"
-#include "isohf/surface/shadow_hull.h"
+#include "isohf/convert/seed_row.h"
 
 namespace isohf {
 
@@ -25,14 +24,9 @@ class SeedStage {
   SeedStage(const TileGrid& grid, const Quantisation& quantisation, const ShadowSeedRequest& request,
             double elevation_units_per_world_unit);
 
-  /// What one tile brings along.
-  struct Tile {
-    TileCasters casters;
-    TileEdges edges;
-    bool is_empty = false;  ///< not stored, has no seeds
-  };
+  using Tile = SeedRow::Tile;
   /// Any tile, on any thread.
-  [[nodiscard]] Tile prepare(const TileCodes& codes) const;
+  [[nodiscard]] Tile prepare(const TileCodes& codes) const { return row_.prepare(codes); }
 
   /// The tile with which a writer that goes on at `next_tile` must begin: whose seeds are not yet written.
   [[nodiscard]] static std::int64_t first_tile_needed(const TileGrid& grid, std::int64_t next_tile);
@@ -45,17 +39,12 @@ class SeedStage {
   [[nodiscard]] ShadowSeedInfo info(const ArchiveWriter& writer) const;
 
  private:
-  [[nodiscard]] EncodedSeeds encode(const TileEdges& edges, const HullSeeds& seeds) const;
-  [[nodiscard]] std::vector<double> heights_at_angles(const CasterRows& rows) const;
   void finish_row(std::int64_t row, ArchiveWriter& writer);
 
   TileGrid grid_;
-  Quantisation quantisation_;
   ShadowSeedInfo info_;
-  double fall_min_;
-  double lowest_;
-  std::vector<double> falls_;  ///< kAngles
-  std::vector<Tile> tiles_;    ///< of the current row of tiles, so far
+  SeedRow row_;
+  std::vector<Tile> tiles_;  ///< of the current row of tiles, so far
 };
 
 }  // namespace isohf

@@ -42,6 +42,24 @@ void check(const LosslessRecord& record, const Metadata& metadata) {
   if (!fits) throw Error(ErrorCode::kCorrupt, "metadata: lossless does not fit the source's record");
 }
 
+/// A residual member holds every sample of its rows in as many bytes as the sample has: what the record claims is held
+/// against that before anything is made as large.
+const LosslessRecord& held_against_members(const ArchiveReader& archive, const LosslessRecord& record) {
+  const std::string name = residual_name(0);
+  const auto& members = archive.members();
+  const auto first =
+      std::find_if(members.begin(), members.end(), [&](const MemberEntry& member) { return member.name == name; });
+  const auto samples = static_cast<std::uint64_t>(record.width) *
+                       static_cast<std::uint64_t>(std::min(record.rows_per_member, record.height));
+  if (first != members.end() && first->bytes / size_bytes(record.mapping.type) < samples) {
+    throw Error(ErrorCode::kCorrupt, fmt::format("{}: member \"{}\" has {} bytes, too few for {} samples",
+                                                 archive.path(), name, first->bytes, samples));
+  }
+  if (first == members.end())
+    throw Error(ErrorCode::kCorrupt, fmt::format("{}: member \"{}\" is missing", archive.path(), name));
+  return record;
+}
+
 PlaceMesh read_places(const ArchiveReader& archive, const LosslessRecord& record) {
   const auto bytes = archive.read_member(kPlacesName);
   const std::string where = fmt::format("{}: member \"{}\"", archive.path(), kPlacesName);
@@ -89,8 +107,8 @@ std::optional<LosslessRecord> lossless_record(const Metadata& metadata) {
     record.rows_per_member = json.at("rows_per_member").get<std::int64_t>();
     record.residual_bytes = json.at("residual_bytes").get<std::uint64_t>();
     record.sha256 = json.at("sha256").get<std::string>();
-  } catch (const nlohmann::json::exception& error) {
-    throw Error(ErrorCode::kCorrupt, fmt::format("metadata: lossless: {}", error.what()));
+  } catch (const nlohmann::json::exception&) {
+    throw Error(ErrorCode::kCorrupt, "metadata: lossless: a member is missing, or is of another type than it must be");
   } catch (const Error& error) {
     throw Error(ErrorCode::kCorrupt, fmt::format("metadata: lossless: {}", error.what()));
   }
@@ -143,7 +161,7 @@ void SamplePredictor::read(std::int64_t first, std::int64_t rows, std::span<doub
 
 LosslessReader::LosslessReader(const ArchiveReader& archive, const LosslessRecord& record)
     : archive_(archive),
-      record_(record),
+      record_(held_against_members(archive, record)),
       surface_(
           archive.grid(), archive.metadata().wraps_x, archive.metadata().quantisation,
           [&archive](TileIndex tile) { return archive.read_tile(tile); }, source_grid(archive.metadata().source),

@@ -30,6 +30,25 @@ std::vector<double> columns_of(const SampleGrid& samples) {
   return columns;
 }
 
+/// Far from the surface places are no longer counted in lattice steps.
+SampleGrid checked(const SampleGrid& samples, const TileGrid& grid) {
+  if (samples.width < 1 || samples.height < 1 || !(samples.spacing_x > 0.0) || !(samples.spacing_z > 0.0)) {
+    throw Error(ErrorCode::kInvalidArgument,
+                fmt::format("a grid of {}x{} samples {} x {} apart, must have at least one and positive spacing",
+                            samples.width, samples.height, samples.spacing_x, samples.spacing_z));
+  }
+  const auto check_axis = [](double first, double spacing, std::int64_t count, double world) {
+    const double last = first + spacing * static_cast<double>(count - 1);
+    if (std::abs(first) <= 1000.0 * world && std::abs(last) <= 1000.0 * world) return;
+    throw Error(ErrorCode::kInvalidArgument, fmt::format("{} samples {} apart reach from {} to {}, far beyond the "
+                                                         "surface, which ends at {}; use a smaller spacing",
+                                                         count, spacing, first, last, world));
+  };
+  check_axis(samples.first_x, samples.spacing_x, samples.width, grid.world_width());
+  check_axis(samples.first_z, samples.spacing_z, samples.height, grid.world_height());
+  return samples;
+}
+
 bool is_inside(double place, double spacing, double end) {
   return place >= -kEndTolerance * spacing && place <= end + kEndTolerance * spacing;
 }
@@ -69,14 +88,9 @@ SurfaceRows::SurfaceRows(const TileGrid& grid, bool wraps_x, const Quantisation&
     : grid_(grid),
       quantisation_(quantisation),
       read_tile_(std::move(read_tile)),
-      samples_(samples),
+      samples_(checked(samples, grid)),
       method_(method),
       hex_(grid, method == RestoreMethod::kHex ? columns_of(samples) : std::vector<double>{}, wraps_x) {
-  if (samples.width < 1 || samples.height < 1 || !(samples.spacing_x > 0.0) || !(samples.spacing_z > 0.0)) {
-    throw Error(ErrorCode::kInvalidArgument,
-                fmt::format("a grid of {}x{} samples {} x {} apart, must have at least one and positive spacing",
-                            samples.width, samples.height, samples.spacing_x, samples.spacing_z));
-  }
   for (const double x : columns_of(samples)) {
     const TilePoint at = grid_.locate({x, 0.0});
     columns_.push_back({is_inside(x, samples.spacing_x, grid.world_width()), at.tile.column, at.point.x});

@@ -27,6 +27,8 @@ inline constexpr int kLossless = 18;
 inline constexpr int kTileNotDeflate = 20;
 inline constexpr int kTexture = 21;
 inline constexpr int kVertex = 22;
+inline constexpr int kShadowSeeds = 23;
+inline constexpr int kMetadata = 24;
 inline constexpr int kAccuracy = 25;
 }  // namespace finding
 

@@ -19,6 +19,8 @@
 #include "isohf/restore/lossless.h"
 #include "isohf/surface/normals.h"
 #include "isohf/verify/findings.h"
+#include "isohf/verify/metadata_check.h"
+#include "isohf/verify/seed_check.h"
 #include "isohf/verify/shared_vertices.h"
 #include "isohf/verify/texture_check.h"
 
@@ -31,7 +33,8 @@ constexpr int kKeptPerTileAndKind = 1;
 /// What decoding one tile gave.
 struct TileState {
   bool readable = false;
-  bool stored = false;
+  TileEntry entry;
+  // Of stored tiles:
   TileCodes codes;
   std::vector<float> heights;  ///< [C*R] vertical units, NaN where void
   std::vector<std::byte> digest;
@@ -49,17 +52,25 @@ using TileRow = std::vector<TileState>;
 class Verification {
  public:
   Verification(const ArchiveReader& archive, const VerifyOptions& options)
-      : archive_(archive), options_(options), grid_(archive.grid()), shape_(grid_.shape()) {
+      : archive_(archive),
+        options_(options),
+        grid_(archive.grid()),
+        shape_(grid_.shape()),
+        void_heights_(static_cast<std::size_t>(shape_.stored_vertex_count()), std::numeric_limits<float>::quiet_NaN()),
+        void_digest_(tile_content_digest(void_tile(shape_, archive.metadata().quantisation))) {
     for (std::size_t i = 0; i < shared_.size(); ++i) shared_[i] = shared_vertices(shape_, kComparedNeighbours[i]);
   }
 
   VerifyReport run() {
     check_structure();
-    check_members();
+    const bool has_members = check_members();
+    for (std::string& problem : contradictions_in(archive_)) add(make(finding::kMetadata, {}, std::move(problem)));
+    start_seeds();
     TileRow above;
     for (std::int64_t row = 0; row < grid_.tile_rows(); ++row) {
       TileRow current = read_row(row);
       compare_row(row, current, above);
+      check_seeds(row, current);
       collect(current);
       above = std::move(current);
       if (options_.progress && !options_.progress((row + 1) * grid_.tile_columns(), grid_.tile_count())) {
@@ -67,8 +78,17 @@ class Verification {
       }
     }
     check_totals();
+    if (seeds_) add_seed_problems(seeds_->check_record());
     check_lossless();
-    for (std::string& problem : check_textures(archive_)) add(make(finding::kTexture, {}, std::move(problem)));
+    if (has_members) {
+      for (std::string& problem : check_textures(archive_)) add(make(finding::kTexture, {}, std::move(problem)));
+    }
+    // Where all else is well: members may hold the same in other bytes.
+    if (report_.findings_total == 0) {
+      if (std::string problem = why_other_data(archive_); !problem.empty()) {
+        add(make(finding::kStructure, {}, std::move(problem)));
+      }
+    }
     return std::move(report_);
   }
 
@@ -95,14 +115,49 @@ class Verification {
     for (const std::string& problem : archive_.check_structure()) add(make(finding::kStructure, {}, problem));
   }
 
-  void check_members() {
+  /// False where the list of members itself is damaged.
+  bool check_members() {
+    try {
+      (void)archive_.members();
+    } catch (const Error& error) {
+      add(make(finding::kStructure, {}, error.what()));
+      return false;
+    }
     for (const MemberEntry& member : archive_.members()) {
       try {
-        (void)archive_.read_member(member);
+        if (!archive_.zlib_reads(member, archive_.read_member(member))) {
+          add(make(finding::kTileNotDeflate, {},
+                   fmt::format("member \"{}\" at byte {}: zlib does not inflate it, or its idle bits are not 0",
+                               member.name, member.offset_bytes)));
+        }
       } catch (const Error& error) {
         add(make(finding::kMemberUnreadable, {}, error.what()));
       }
     }
+    return true;
+  }
+
+  void start_seeds() {
+    try {
+      if (const auto info = shadow_seed_info(archive_.metadata())) seeds_.emplace(archive_, *info);
+    } catch (const Error& error) {
+      add(make(finding::kShadowSeeds, {}, error.what()));
+    }
+  }
+
+  /// Seeds follow from the whole row: where a tile of it cannot be read, that is said already.
+  void check_seeds(std::int64_t row, const TileRow& tiles) {
+    if (!seeds_) return;
+    std::vector<const TileCodes*> codes;
+    for (const TileState& tile : tiles) {
+      if (!tile.readable) return;
+      codes.push_back(tile.entry.stored ? &tile.codes : nullptr);
+    }
+    add_seed_problems(seeds_->check_row(row, codes));
+  }
+
+  void add_seed_problems(std::vector<SeedCheck::Problem> problems) {
+    for (auto& [tile, text] : problems) add(make(finding::kShadowSeeds, tile, std::move(text)));
   }
 
   TileRow read_row(std::int64_t row) {
@@ -111,29 +166,52 @@ class Verification {
     oneapi::tbb::parallel_for(std::size_t{0}, groups, [&](std::size_t group) {
       const std::size_t first = group * kDecoderLanes;
       const std::size_t count = std::min(kDecoderLanes, tiles.size() - first);
-      std::array<TileIndex, kDecoderLanes> indices{};
-      for (std::size_t i = 0; i < count; ++i) indices[i] = {static_cast<std::int64_t>(first + i), row};
+      std::vector<TileIndex> indices;
+      for (std::size_t i = first; i < first + count; ++i) {
+        const TileIndex index{static_cast<std::int64_t>(i), row};
+        if (find_entry(index, tiles[i])) indices.push_back(index);
+      }
       std::vector<TileCodes> codes;
       try {
-        codes = archive_.read_tiles(std::span(indices).first(count));
+        codes = archive_.read_tiles(indices);
       } catch (const Error&) {
         codes.clear();  // one by one, to tell which
       }
-      for (std::size_t i = 0; i < count; ++i) {
-        read_tile(indices[i], codes.empty() ? nullptr : &codes[i], tiles[first + i]);
+      for (std::size_t i = 0; i < indices.size(); ++i) {
+        read_tile(indices[i], codes.empty() ? nullptr : &codes[i], tiles[static_cast<std::size_t>(indices[i].column)]);
       }
     });
     return tiles;
   }
 
+  /// False where there is nothing to decode. A tile that is not stored takes neither time nor memory: only stored ones
+  /// are bounded by the file's size.
+  bool find_entry(TileIndex index, TileState& tile) const {
+    try {
+      tile.entry = archive_.tile_entry(index);
+    } catch (const Error& error) {
+      tile.findings.push_back(make(finding::kTileUndecodable, index, error.what()));
+      return false;
+    }
+    if (tile.entry.stored) return true;
+    tile.readable = true;
+    tile.digest = void_digest_;
+    tile.vertices = tile.voids = shape_.visible_vertex_count();
+    return false;
+  }
+
+  [[nodiscard]] const std::vector<float>& heights_of(const TileState& tile) const {
+    return tile.entry.stored ? tile.heights : void_heights_;
+  }
+
   /// codes: the tile as read already, or nullptr.
   void read_tile(TileIndex index, TileCodes* codes, TileState& tile) const {
-    const TileEntry entry = archive_.tile_entry(index);
-    tile.stored = entry.stored;
+    const TileEntry& entry = tile.entry;
     try {
       tile.codes = codes != nullptr ? std::move(*codes) : archive_.read_tile(index);
       if (!archive_.zlib_reads(index)) {
-        tile.findings.push_back(make(finding::kTileNotDeflate, index, "zlib does not inflate it to the same payload"));
+        tile.findings.push_back(make(finding::kTileNotDeflate, index,
+                                     "zlib does not inflate it to the same payload, or its idle bits are not 0"));
       }
     } catch (const Error& error) {
       tile.findings.push_back(make(finding::kTileUndecodable, index, error.what()));
@@ -184,12 +262,7 @@ class Verification {
       low = std::min(low, value);
       high = std::max(high, value);
     }
-    if (any != entry.stored) {
-      tile.findings.push_back(make(
-          finding::kTileEmpty, index,
-          any ? "holds elevations, but the index says that it is not stored" : "is stored, but holds no elevation"));
-    }
-    if (!entry.stored) return;
+    if (!any) tile.findings.push_back(make(finding::kTileEmpty, index, "is stored, but holds no elevation"));
     const auto number = [&](std::uint32_t code) {
       return q.type == CodeType::kF32 ? double{std::bit_cast<float>(code)} : static_cast<double>(code);
     };
@@ -252,6 +325,8 @@ class Verification {
   std::int64_t compare(TileIndex index, TileState& tile, const TileState& other, std::size_t neighbour,
                        bool tile_is_there) const {
     if (!tile.readable || !other.readable) return 0;
+    const auto shared_count = static_cast<std::int64_t>(shared_[neighbour].size());
+    if (!tile.entry.stored && !other.entry.stored) return shared_count;
     const TileIndex step = kComparedNeighbours[neighbour];
     const TileIndex other_index = tile_is_there ? TileIndex{index.column - step.column, index.row - step.row}
                                                 : TileIndex{index.column + step.column, index.row + step.row};
@@ -263,13 +338,13 @@ class Verification {
                                                  vertex.row, what, other_index.column, other_index.row)));
       }
     };
-    const View2D<const float> here_heights(tile.heights.data(), shape_.columns(), shape_.rows());
-    const View2D<const float> there_heights(other.heights.data(), shape_.columns(), shape_.rows());
+    const View2D<const float> here_heights(heights_of(tile).data(), shape_.columns(), shape_.rows());
+    const View2D<const float> there_heights(heights_of(other).data(), shape_.columns(), shape_.rows());
     for (const SharedVertex& shared : shared_[neighbour]) {
       const GridVertex mine = tile_is_there ? shared.there : shared.here;
       const GridVertex theirs = tile_is_there ? shared.here : shared.there;
-      const float a = tile.heights[at(mine)];
-      const float b = other.heights[at(theirs)];
+      const float a = here_heights(mine.column, mine.row);
+      const float b = there_heights(theirs.column, theirs.row);
       if (std::bit_cast<std::uint32_t>(a) != std::bit_cast<std::uint32_t>(b) && !(std::isnan(a) && std::isnan(b))) {
         report(shared.visible ? finding::kSharedVertex : finding::kPadding, shared.visible ? 0 : 1, mine,
                fmt::format("is {} here, other ({})", a, b));
@@ -279,7 +354,7 @@ class Verification {
         report(finding::kNormal, 2, mine, "has another normal");
       }
     }
-    return static_cast<std::int64_t>(shared_[neighbour].size());
+    return shared_count;
   }
 
   void collect(TileRow& row) {
@@ -287,7 +362,7 @@ class Verification {
       ++report_.tiles_checked;
       for (Finding& found : tile.findings) add(std::move(found));
       tile.findings.clear();
-      stored_ += tile.stored ? 1 : 0;
+      stored_ += tile.entry.stored ? 1 : 0;
       all_readable_ = all_readable_ && tile.readable;
       vertices_ += tile.vertices;
       voids_ += tile.voids;
@@ -357,9 +432,12 @@ class Verification {
   const VerifyOptions& options_;
   const TileGrid& grid_;
   TileShape shape_;
+  std::vector<float> void_heights_;
+  std::vector<std::byte> void_digest_;
   std::array<std::vector<SharedVertex>, std::size(kComparedNeighbours)> shared_;
   VerifyReport report_;
   ContentHash hash_;
+  std::optional<SeedCheck> seeds_;
   std::int64_t stored_ = 0;
   std::int64_t vertices_ = 0;
   std::int64_t voids_ = 0;

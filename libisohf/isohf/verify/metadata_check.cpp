@@ -1,0 +1,217 @@
+#include "isohf/verify/metadata_check.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "isohf/archive/directory.h"
+#include "isohf/archive/metadata_json.h"
+#include "isohf/base/error.h"
+#include "isohf/base/file.h"
+#include "isohf/projection/projection.h"
+#include "isohf/restore/archive_geometry.h"
+#include "isohf/restore/lossless.h"
+#include "isohf/surface/acquisition.h"
+
+namespace isohf {
+namespace {
+
+using Json = nlohmann::json;
+
+/// What follows from other members is written with all its digits; other programs may add in another order.
+constexpr double kSameTo = 1e-9;
+
+class Contradictions {
+ public:
+  explicit Contradictions(const ArchiveReader& archive)
+      : archive_(archive), metadata_(archive.metadata()), json_(Json::parse(archive.metadata_json())) {}
+
+  std::vector<std::string> run() {
+    check_lattice();
+    check_names();
+    check_place();
+    check_statistics();
+    check_mosaic();
+    check_residuals();
+    return std::move(found_);
+  }
+
+ private:
+  void add(const std::string& where, const std::string& what) { found_.push_back("metadata: " + where + ": " + what); }
+
+  /// A number that follows from others, by its path.
+  void check_number(const char* path, double expected, double scale) {
+    const Json* at = &json_;
+    for (std::string rest = path; !rest.empty();) {
+      const std::string key = rest.substr(0, rest.find('.'));
+      rest.erase(0, key.size() + 1);
+      at = at->is_object() && at->contains(key) ? &at->at(key) : nullptr;
+      if (at == nullptr) return add(path, fmt::format("is missing, must be {}", expected));
+    }
+    if (!at->is_number()) return add(path, fmt::format("is no number, must be {}", expected));
+    if (!(std::abs(at->get<double>() - expected) <= kSameTo * scale)) {
+      add(path, fmt::format("is {}, must be {}", at->get<double>(), expected));
+    }
+  }
+
+  void check_one_of(const char* where, const std::string& name, std::initializer_list<const char*> known) {
+    if (std::find(known.begin(), known.end(), name) != known.end()) return;
+    add(where, fmt::format("is \"{}\", must be one of {}", name, fmt::join(known, ", ")));
+  }
+
+  /// check throws Error where the name is not known.
+  template <typename Check>
+  void check_name(const char* where, Check check) {
+    try {
+      check();
+    } catch (const Error& error) {
+      add(where, error.what());
+    }
+  }
+
+  void check_lattice() {
+    const TileGrid& grid = metadata_.grid;
+    check_number("lattice.origin.x", 0.0, grid.sigma_x());
+    check_number("lattice.origin.z", 0.0, grid.sigma_z());
+    check_number("lattice.column_step", 2.0 * grid.sigma_x(), grid.sigma_x());
+    check_number("lattice.row_step", grid.sigma_z(), grid.sigma_z());
+    check_number("lattice.odd_row_shift", grid.sigma_x(), grid.sigma_x());
+    const Quantisation& codes = metadata_.quantisation;
+    const Json expected = codes.type == CodeType::kF32 ? Json("nan") : Json(codes.void_code());
+    if (const auto found = json_.at("samples").value("void", Json()); found != expected) {
+      add("samples.void", fmt::format("is {}, must be {}", found.dump(), expected.dump()));
+    }
+  }
+
+  void check_names() {
+    const SourceRecord& source = metadata_.source;
+    check_one_of("units.horizontal", metadata_.horizontal_unit, {"metre", "unknown"});
+    if (metadata_.vertical_unit.empty()) add("units.vertical", "is empty");
+    check_one_of("outside", metadata_.outside, {"cover", "clamp", "void"});
+    check_name("filter", [&] { (void)filter_from_string(metadata_.filter); });
+    // The taps of "fir:FILE" are the maker's.
+    if (!metadata_.acquisition.starts_with("fir:"))
+      check_name("acquisition", [&] { (void)acquisition_from_string(metadata_.acquisition); });
+    check_one_of("source.registration", source.registration, {"area", "point"});
+    check_name("source.sample_type", [&] { (void)sample_type_from_string(source.sample_type); });
+    check_one_of("source.crs.unit", source.crs_unit, {"metre", "degree", "unknown", ""});
+  }
+
+  /// Where the samples lie, and what of the world they cover, follow from each other.
+  void check_place() {
+    const SourceRecord& source = metadata_.source;
+    const TileGrid& grid = metadata_.grid;
+    if (source.width < 2 || source.height < 2) return;  // a surface that was made of no raster
+    if (metadata_.projection && metadata_.horizontal_unit != "metre") add("units.horizontal", "is not metre, on a map");
+    if (is_warped(metadata_)) {
+      if (source.crs_unit != "degree") return;  // of another map, which only PROJ understands
+      if (!source.origin_x || !source.origin_y) return add("source.crs", "has no origin, which the projection needs");
+      check_name("source.crs", [&] {
+        const WorldPoint first = ExactWarp(*archive_geometry(metadata_).warp).world_from_source({0.0, 0.0});
+        check_projected("source.first_sample.x", source.first_sample_x, first.x, source.spacing_x);
+        check_projected("source.first_sample.z", source.first_sample_z, first.z, source.spacing_z);
+      });
+      return;
+    }
+    const bool area = source.registration == "area";
+    check_number("source.first_sample.x", area ? source.spacing_x / 2.0 : 0.0, source.spacing_x);
+    check_number("source.first_sample.z", area ? source.spacing_z / 2.0 : 0.0, source.spacing_z);
+    const auto length = [](std::int64_t samples, bool whole, double spacing, double world) {
+      return std::min(static_cast<double>(whole ? samples : samples - 1) * spacing, world);
+    };
+    check_number("valid.x0", 0.0, grid.world_width());
+    check_number("valid.z0", 0.0, grid.world_height());
+    check_number("valid.x1", length(source.width, area || metadata_.wraps_x, source.spacing_x, grid.world_width()),
+                 grid.world_width());
+    check_number("valid.z1", length(source.height, area, source.spacing_z, grid.world_height()), grid.world_height());
+    if (metadata_.projection && source.crs_unit == "degree" && source.origin_x && source.origin_y)
+      check_scaled_degrees();
+  }
+
+  /// To a hundredth of `spacing` what the projection makes of the source's degrees.
+  void check_projected(const char* where, double stated, double found, double spacing) {
+    if (std::abs(stated - found) <= 0.01 * spacing) return;
+    add(where, fmt::format("is {}, the projection makes {} of the source's degrees", stated, found));
+  }
+
+  /// Equirectangular: degrees times their lengths.
+  void check_scaled_degrees() {
+    const SourceRecord& source = metadata_.source;
+    const ProjectionSpec& spec = metadata_.projection->spec;
+    const DegreeLengths degree = degree_lengths(spec.ellipsoid, spec.latitude_0);
+    const double spacing_x = source.crs_spacing_x * degree.along_parallel;
+    const double spacing_z = source.crs_spacing_y * degree.along_meridian;
+    check_projected("source.spacing.x", source.spacing_x, spacing_x, 1e-4 * spacing_x);
+    check_projected("source.spacing.z", source.spacing_z, spacing_z, 1e-4 * spacing_z);
+    // The map place of world (0, 0).
+    const MapPoint& origin = metadata_.projection->origin;
+    const double turn = 360.0 * degree.along_parallel;
+    const double easting = (*source.origin_x - spec.longitude_0) * degree.along_parallel - source.first_sample_x;
+    check_projected("projection.origin.easting", origin.easting,
+                    origin.easting + std::remainder(easting - origin.easting, turn), spacing_x);
+    check_projected("projection.origin.northing", origin.northing,
+                    (*source.origin_y - spec.latitude_0) * degree.along_meridian + source.first_sample_z, spacing_z);
+  }
+
+  void check_statistics() {
+    const Statistics& said = metadata_.statistics;
+    if (said.voids > said.vertices) add("statistics.voids", "are more than the vertices");
+    if (said.worst_rounding < 0.0) add("statistics.worst_rounding", "is below 0");
+  }
+
+  void check_mosaic() {
+    if (!metadata_.source.mosaic) return;
+    const MosaicRecord& mosaic = *metadata_.source.mosaic;
+    check_one_of("source.mosaic.overlap", mosaic.overlap, {"last", "first"});
+    if (mosaic.files < static_cast<std::int64_t>(mosaic.first_names.size()))
+      add("source.mosaic.files", "are fewer than the names");
+  }
+
+  void check_residuals() {
+    try {
+      const auto record = lossless_record(metadata_);
+      if (!record) return;
+      const SourceRecord& source = metadata_.source;
+      if (to_string(record->mapping.type) != source.sample_type)
+        add("lossless.sample_type",
+            fmt::format("is {}, the source's is {}", to_string(record->mapping.type), source.sample_type));
+      if (record->mapping.z_scale != source.z_scale || record->mapping.z_offset != source.z_offset)
+        add("lossless.z_scale, .z_offset", "are not the source's");
+      std::uint64_t bytes = 0;
+      for (const MemberEntry& member : archive_.members()) {
+        if (member.name.starts_with("residual/") && member.name != kPlacesName) bytes += member.compressed_bytes;
+      }
+      if (bytes != record->residual_bytes && !archive_.reads_by_directory())
+        add("lossless.residual_bytes", fmt::format("is {}, the members have {}", record->residual_bytes, bytes));
+    } catch (const Error&) {
+      // Restoring the samples tells of it.
+    }
+  }
+
+  const ArchiveReader& archive_;
+  const Metadata& metadata_;
+  Json json_;
+  std::vector<std::string> found_;
+};
+
+}  // namespace
+
+std::string why_other_data(const ArchiveReader& archive) {
+  if (archive.reads_by_directory()) return {};
+  for (const auto& [name, stated] : archive.metadata().extensions) {
+    if (name != kDataCrcName) continue;
+    const MappedFile file(archive.path());
+    const std::string found = fmt::format("\"{:08x}\"", data_crc32(file, find_zip_end(file.bytes())));
+    if (found != stated) return fmt::format("the members' data have the CRC-32 {}, the metadata say {}", found, stated);
+  }
+  return {};
+}
+
+std::vector<std::string> contradictions_in(const ArchiveReader& archive) {
+  return Contradictions(archive).run();
+}
+
+}  // namespace isohf

@@ -1,0 +1,128 @@
+#include "support/altered_archive.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstring>
+#include <span>
+#include <stdexcept>
+
+#include "isohf/archive/deflate.h"
+#include "isohf/archive/tile_index.h"
+#include "isohf/archive/zip_layout.h"
+#include "support/temporary_folder.h"
+
+namespace isohf::test {
+namespace {
+
+std::vector<std::byte> bytes_of(const std::string& text) {
+  const auto bytes = std::as_bytes(std::span(text));
+  return {bytes.begin(), bytes.end()};
+}
+
+template <typename T>
+void put(std::vector<std::byte>& out, std::size_t at, T value) {
+  std::memcpy(out.data() + at, &value, sizeof value);
+}
+
+}  // namespace
+
+AlteredArchive::AlteredArchive(const std::string& path) {
+  const std::string text = read_file(path);
+  const auto file = std::as_bytes(std::span(text));
+  for_each_entry(file, find_zip_end(file), [&](const ZipEntry& entry) {
+    const auto data = file.subspan(checked_data_offset(file, entry), entry.compressed_bytes);
+    if (entry.name == kMetadataName) {
+      metadata = nlohmann::json::parse(std::string(reinterpret_cast<const char*>(data.data()), data.size()));
+      tile_columns_ = metadata.at("tiles").at("columns").get<std::int64_t>();
+    } else if (entry.name == kIndexName) {
+      records_.assign(data.begin(), data.end() - kIndexFooterBytes);
+    } else {
+      members_.push_back(
+          {std::string(entry.name), entry.method == 8, entry.crc32, entry.bytes, {data.begin(), data.end()}});
+    }
+  });
+}
+
+std::vector<std::string> AlteredArchive::names() const {
+  std::vector<std::string> names;
+  for (const Member& member : members_) names.push_back(member.name);
+  return names;
+}
+
+const AlteredArchive::Member& AlteredArchive::member(const std::string& name) const {
+  const auto found = std::find_if(members_.begin(), members_.end(), [&](const Member& m) { return m.name == name; });
+  if (found == members_.end()) throw std::runtime_error("no member " + name);
+  return *found;
+}
+
+std::vector<std::byte> AlteredArchive::bytes(const std::string& name) const {
+  const Member& of = member(name);
+  if (!of.deflated) return of.data;
+  std::vector<std::byte> bytes(of.bytes);
+  inflate_exactly(of.data, bytes);
+  return bytes;
+}
+
+void AlteredArchive::set(const std::string& name, const std::vector<std::byte>& bytes) {
+  auto& of = const_cast<Member&>(member(name));
+  of = {name, of.deflated, crc32(bytes), bytes.size(), of.deflated ? deflate_bytes(bytes) : bytes};
+}
+
+void AlteredArchive::rename(const std::string& name, const std::string& to) {
+  const_cast<Member&>(member(name)).name = to;
+}
+
+void AlteredArchive::remove(const std::string& name) {
+  std::erase_if(members_, [&](const Member& m) { return m.name == name; });
+}
+
+std::uint64_t AlteredArchive::compressed_bytes(const std::string& start) const {
+  std::uint64_t bytes = 0;
+  for (const Member& member : members_) bytes += member.name.starts_with(start) ? member.data.size() : 0;
+  return bytes;
+}
+
+void AlteredArchive::write(const std::string& path) const {
+  std::vector<std::byte> file;
+  std::vector<std::byte> directory;
+  const auto append = [&](const Member& member) {
+    const ZipMember entry{member.name,  member.deflated ? ZipMethod::kDeflated : ZipMethod::kStored,
+                          member.crc32, member.data.size(),
+                          member.bytes, file.size()};
+    append_local_header(entry, file);
+    const std::uint64_t at = file.size();
+    file.insert(file.end(), member.data.begin(), member.data.end());
+    append_directory_entry(entry, directory);
+    return at;
+  };
+  nlohmann::json stated = metadata;
+  std::uint32_t data_crc = 0;
+  for (const Member& member : members_) data_crc = crc32_of_crc32(crc32(member.data), data_crc);
+  if (stated.contains("data_crc32")) stated["data_crc32"] = fmt::format("{:08x}", data_crc);
+  const std::vector<std::byte> json = bytes_of(stated.dump(1) + "\n");
+  append({kMetadataName, false, crc32(json), json.size(), json});
+  std::vector<std::byte> index = records_;
+  std::uint64_t stored = 0;
+  for (const Member& member : members_) {
+    const std::uint64_t at = append(member);
+    const auto tile = tile_from_name(member.name);
+    if (!tile) continue;
+    ++stored;
+    const auto record = static_cast<std::size_t>(tile->row * tile_columns_ + tile->column) * kIndexRecordBytes;
+    put(index, record, at);
+    put(index, record + 8, static_cast<std::uint32_t>(member.data.size()));
+    put(index, record + 12, static_cast<std::uint32_t>(member.bytes));
+    put(index, record + 16, member.crc32);
+  }
+  append_index_footer({index.size() / kIndexRecordBytes, stored_count.value_or(stored), members_.size() + 1,
+                       directory.size(), crc32(directory), crc32(index)},
+                      index);
+  append({kIndexName, false, crc32(index), index.size(), index});
+  const std::uint64_t directory_offset = file.size();
+  file.insert(file.end(), directory.begin(), directory.end());
+  append_end_records(members_.size() + 2, directory_offset, directory.size(), file);
+  write_file(path, file);
+}
+
+}  // namespace isohf::test
