@@ -362,7 +362,8 @@ int run(ConvertCommandOptions options) {
         return measured_error(accuracy->surface);
       }
       ProgressDisplay display(options.work.progress, common.quiet, common.verbose);
-      const ArchiveReader reader(archive);
+      ArchiveReader reader(archive);
+      reader.set_source_map(options.convert.plan.ground.source_map);
       return measured_error(compare_with_source(
           reader, *source, 0, options.work.threads,
           [&](std::int64_t done, std::int64_t total) { display.update("compare", "rows", done, total); }, cancel));
