@@ -232,6 +232,9 @@ std::size_t CommandLine::State::place_named(const Arguments& arguments, std::siz
   if (option == nullptr) refuse_unknown(name);
   if (equals == std::string::npos) return place_values(*option, arguments, at + 1);
   const std::string value = argument.substr(equals + 1);
+  if (option->values == 2 && value.find(',') != std::string::npos) {
+    return place_values(*option, {value}, 0) + at;
+  }
   if (option->values == 0 && value != "true" && value != "false") {
     refuse_usage(fmt::format("{} is a flag and takes no value, found '{}'", name, value));
   }
@@ -270,7 +273,10 @@ std::size_t CommandLine::State::place_values(Option& option, const Arguments& ar
   } else {
     for (; values.size() < option.values; ++next) {
       if (is_there(next)) {
-        values.push_back(arguments[next]);
+        // "1,2" and "1, 2" are two values as well.
+        const std::size_t comma = option.values == 2 && values.empty() ? arguments[next].find(',') : std::string::npos;
+        values.push_back(arguments[next].substr(0, comma));
+        if (comma < arguments[next].size() - 1) values.push_back(arguments[next].substr(comma + 1));
       } else if (option.values == 1) {
         refuse_usage(fmt::format("{} lacks its value", option.name()));
       } else {

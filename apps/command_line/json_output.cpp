@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
+#include <numbers>
 
 namespace isohf::cli {
 
@@ -31,8 +32,8 @@ ordered_json json_from(const TileGrid& grid) {
   return {{"tile_columns", grid.tile_columns()}, {"tile_rows", grid.tile_rows()},
           {"tiles", grid.tile_count()},          {"extent_x", grid.extent_x()},
           {"extent_z", grid.extent_z()},         {"column_spacing", 2.0 * grid.sigma_x()},
-          {"row_spacing", grid.sigma_z()},       {"world_width", grid.world_width()},
-          {"world_height", grid.world_height()}};
+          {"row_spacing", grid.sigma_z()},       {"aspect", std::numbers::sqrt3 * grid.sigma_x() / grid.sigma_z()},
+          {"world_width", grid.world_width()},   {"world_height", grid.world_height()}};
 }
 
 ordered_json json_from(const WorldBounds& bounds) {

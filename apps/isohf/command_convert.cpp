@@ -31,6 +31,7 @@
 #include "output_kinds.h"
 #include "plan_report.h"
 #include "source_inputs.h"
+#include "source_size.h"
 #include "standard_output.h"
 #include "void_counts_output.h"
 #include "work_arena.h"
@@ -65,6 +66,7 @@ struct ConvertCommandOptions {
   TextureOptions texture;
   ConvertOptions convert;
   GeoidRequest geoid;
+  bool spacing_in_metres = false;
   bool dry_run = false;
   /// Measure the archive against the input; the file for the report, "-" for none beside the summary.
   std::optional<std::string> report;
@@ -114,7 +116,7 @@ std::optional<ConvertCommandOptions> parse(const Arguments& arguments) {
   add_mosaic_options(line, options.inputs);
   line.option("--source-name", "NAME",
               "Record NAME as the source, instead of the input's file name or a mosaic's files", options.source_name);
-  add_lattice_options(line, options.convert.plan);
+  add_lattice_options(line, options.convert.plan, options.spacing_in_metres);
   add_ground_options(line, options.convert.plan.ground);
   add_geoid_option(line, options.geoid);
   add_shape_options(line, options.convert.plan);
@@ -206,9 +208,6 @@ std::optional<ConvertCommandOptions> parse(const Arguments& arguments) {
 }
 
 struct Measured {
-  std::uint64_t raw_bytes = 0;      ///< the lattice as raw 16-bit samples
-  double ratio = 0.0;               ///< of it to the tiles
-  double bits_per_sample = 0.0;     ///< of the tiles, over all lattice samples
   double samples_per_second = 0.0;  ///< of the source
   std::uint64_t peak_memory_bytes = 0;
 };
@@ -226,12 +225,6 @@ std::uint64_t peak_memory_bytes() {
 
 Measured measure(const ConvertSummary& summary) {
   Measured measured;
-  measured.raw_bytes = 2 * summary.lattice_samples;
-  const auto bytes = static_cast<double>(summary.tile_bytes);
-  if (summary.tile_bytes > 0) measured.ratio = static_cast<double>(measured.raw_bytes) / bytes;
-  if (summary.lattice_samples > 0) {
-    measured.bits_per_sample = 8.0 * bytes / static_cast<double>(summary.lattice_samples);
-  }
   if (summary.seconds > 0.0) {
     measured.samples_per_second = static_cast<double>(summary.source_samples) / summary.seconds;
   }
@@ -243,6 +236,7 @@ ordered_json json_from(const ConvertCommandOptions& options, const ConvertSummar
                        const std::optional<VoidCounts>& voids, const std::optional<ErrorEstimate>& expected) {
   const std::optional<AccuracyInfo> accuracy = accuracy_info(summary.metadata);
   const Measured measured = measure(summary);
+  const SizeBesideSource size(summary.metadata.source, summary.tile_bytes);
   return {{"input", options.input},
           {"files", summary.metadata.source.mosaic ? summary.metadata.source.mosaic->files : 1},
           {"output", options.output},
@@ -255,10 +249,10 @@ ordered_json json_from(const ConvertCommandOptions& options, const ConvertSummar
           {"residual_bytes", summary.residual_bytes},
           {"texture_bytes", summary.texture_bytes},
           {"photo_pixels_per_texel", summary.pixels_per_texel},
-          {"raw_16_bit_bytes", measured.raw_bytes},
-          {"ratio_to_raw_16_bit", measured.ratio},
-          {"bits_per_sample", measured.bits_per_sample},
-          {"source_samples", summary.source_samples},
+          {"source_samples", size.source_samples},
+          {"source_bytes", size.source_bytes},
+          {"bits_per_source_sample", size.bits_per_source_sample},
+          {"ratio_to_source", size.ratio_to_source},
           {"source_voids", json_from_voids(voids)},
           {"lattice_samples", summary.lattice_samples},
           {"expected_error", json_from_estimate(expected)},
@@ -290,11 +284,10 @@ std::string text_from(const ConvertCommandOptions& options, const ConvertSummary
     say("map scale", "not known: " + why);
   }
   if (metadata.projection) say("projection", describe_projection(*metadata.projection));
-  say("size", fmt::format("elevations take {}, {:.3f} bits a sample: {:.2f} times smaller than raw 16-bit samples",
-                          describe_bytes(summary.tile_bytes), measured.bits_per_sample, measured.ratio));
+  say("size", describe_size(metadata.source, summary.tile_bytes));
   if (summary.residual_bytes > 0) {
     say("residuals",
-        fmt::format("{}, {:.3f} bits an input sample", describe_bytes(summary.residual_bytes),
+        fmt::format("{}, {:.3f} bits a source sample", describe_bytes(summary.residual_bytes),
                     8.0 * static_cast<double>(summary.residual_bytes) / static_cast<double>(summary.source_samples)));
   }
   if (metadata.quantisation.type == CodeType::kF32) {
@@ -346,6 +339,7 @@ int run(ConvertCommandOptions options) {
     options.convert.source_note.mosaic.reset();
   }
   const std::unique_ptr<PhotoSource> photo = open_texture(options.texture, options.convert.texture);
+  check_spacing_unit(source->info(), options.convert.plan, options.spacing_in_metres);
   if (options.dry_run) {
     print_plan(*source, options.convert, common);
     return kExitDone;
@@ -362,8 +356,7 @@ int run(ConvertCommandOptions options) {
         return measured_error(accuracy->surface);
       }
       ProgressDisplay display(options.work.progress, common.quiet, common.verbose);
-      ArchiveReader reader(archive);
-      reader.set_source_map(options.convert.plan.ground.source_map);
+      const ArchiveReader reader(archive);
       return measured_error(compare_with_source(
           reader, *source, 0, options.work.threads,
           [&](std::int64_t done, std::int64_t total) { display.update("compare", "rows", done, total); }, cancel));

@@ -161,7 +161,7 @@ ExportGrid asked_grid(const ExportOptions& options, const Metadata& metadata) {
   const bool area = samples_are_areas(metadata);
   ExportGrid grid;
   if (options.raster.size || options.raster.spacing) {
-    grid.samples = grid_over(ground, area, options.raster.size, options.raster.spacing);
+    grid.samples = grid_over(ground, area, options.raster.size, spacing_in_world(options.raster, metadata));
   } else {
     grid.samples = natural_grid(metadata);
     if (options.bbox) grid.samples = part_of_source_grid(grid.samples, ground);

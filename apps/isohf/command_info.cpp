@@ -15,6 +15,7 @@
 #include "input_files.h"
 #include "isohf/archive/reader.h"
 #include "isohf/archive/texture_info.h"
+#include "isohf/archive/tile_statistics.h"
 #include "isohf/base/error.h"
 #include "isohf/restore/lossless.h"
 #include "json_output.h"
@@ -24,6 +25,7 @@
 #include "options_texture.h"
 #include "raster_info.h"
 #include "source_place.h"
+#include "source_size.h"
 #include "standard_output.h"
 
 namespace isohf::cli {
@@ -87,29 +89,15 @@ double elevation_of(const Quantisation& quantisation, std::uint32_t code) {
 struct Derived {
   std::uint64_t tile_bytes = 0;    ///< compressed, all tiles
   std::uint64_t member_bytes = 0;  ///< compressed, everything else
-  std::int64_t samples = 0;        ///< C*R for every tile
-  double bits_per_sample = 0.0;    ///< of the tiles that are stored
-  double ratio_to_u16 = 0.0;       ///< raw 16-bit samples of all tiles / tile_bytes
 };
 
 Derived derive(const ArchiveReader& archive) {
   const TileGrid& grid = archive.grid();
   Derived derived;
-  std::int64_t stored = 0;
   for (std::int64_t i = 0; i < grid.tile_count(); ++i) {
-    const TileEntry entry = archive.tile_entry(grid.tile_at(i));
-    stored += entry.stored ? 1 : 0;
-    derived.tile_bytes += entry.compressed_bytes;
+    derived.tile_bytes += archive.tile_entry(grid.tile_at(i)).compressed_bytes;
   }
   for (const MemberEntry& member : archive.members()) derived.member_bytes += member.compressed_bytes;
-  const std::int64_t per_tile = grid.shape().stored_vertex_count();
-  derived.samples = per_tile * grid.tile_count();
-  if (stored > 0) {
-    derived.bits_per_sample = 8.0 * static_cast<double>(derived.tile_bytes) / static_cast<double>(per_tile * stored);
-  }
-  if (derived.tile_bytes > 0) {
-    derived.ratio_to_u16 = 2.0 * static_cast<double>(derived.samples) / static_cast<double>(derived.tile_bytes);
-  }
   return derived;
 }
 
@@ -135,6 +123,7 @@ ordered_json json_from_tiles(const ArchiveReader& archive) {
 
 void print_json(const ArchiveReader& archive, bool tiles, bool is_one_of_many) {
   const Derived derived = derive(archive);
+  const SizeBesideSource size(archive.metadata().source, derived.tile_bytes);
   ordered_json members = ordered_json::array();
   for (const MemberEntry& member : archive.members()) {
     members.push_back({{"name", member.name},
@@ -143,19 +132,22 @@ void print_json(const ArchiveReader& archive, bool tiles, bool is_one_of_many) {
                        {"bytes", member.bytes},
                        {"deflated", member.deflated}});
   }
-  ordered_json document = {{"archive", archive.path()},
-                           {"bytes", archive.size_bytes()},
-                           {"metadata", ordered_json::parse(archive.metadata_json())},
-                           {"shape", json_from(archive.grid().shape())},
-                           {"grid", json_from(archive.grid())},
-                           {"lossless", lossless_record(archive.metadata()).has_value()},
-                           {"tile_bytes", derived.tile_bytes},
-                           {"lattice_samples", derived.samples},
-                           {"bits_per_sample", derived.bits_per_sample},
-                           {"ratio_to_raw_16_bit", derived.ratio_to_u16},
-                           {"reads_by_directory", archive.reads_by_directory()},
-                           {"warnings", archive.warnings()},
-                           {"members", members}};
+  ordered_json document = {
+      {"archive", archive.path()},
+      {"bytes", archive.size_bytes()},
+      {"metadata", ordered_json::parse(archive.metadata_json())},
+      {"shape", json_from(archive.grid().shape())},
+      {"grid", json_from(archive.grid())},
+      {"lossless", lossless_record(archive.metadata()).has_value()},
+      {"tile_bytes", derived.tile_bytes},
+      {"lattice_samples", archive.grid().shape().stored_vertex_count() * archive.grid().tile_count()},
+      {"source_samples", size.source_samples},
+      {"source_bytes", size.source_bytes},
+      {"bits_per_source_sample", size.bits_per_source_sample},
+      {"ratio_to_source", size.ratio_to_source},
+      {"reads_by_directory", archive.reads_by_directory()},
+      {"warnings", archive.warnings()},
+      {"members", members}};
   add_source_place(source_place(archive.metadata()), document);
   if (tiles) document["tiles"] = json_from_tiles(archive);
   StandardOutput out;
@@ -226,7 +218,7 @@ std::string describe_archive(const ArchiveReader& archive) {
                            describe_count(grid.tile_count()), describe_count(metadata.tiles_stored),
                            describe_count(grid.tile_count() - metadata.tiles_stored)));
   say("tile shape", fmt::format("{}x{} (C x R), {} levels, aspect {:.5f}, {} triangles", shape.columns(), shape.rows(),
-                                shape.levels(), shape.aspect(), describe_count(shape.triangle_count())));
+                                shape.levels(), triangle_aspect(grid), describe_count(shape.triangle_count())));
   say("tile extent",
       fmt::format("{} by {}", describe_length(grid.extent_x(), metres), describe_length(grid.extent_z(), metres)));
   say("lattice", fmt::format("columns {} apart, rows {}", describe_length(2.0 * grid.sigma_x(), metres),
@@ -251,7 +243,8 @@ std::string describe_archive(const ArchiveReader& archive) {
   }
   say("vertices",
       fmt::format(
-          "{} visible, {} void{}", describe_count(statistics.vertices), describe_count(statistics.voids),
+          "{} {}, {} void{}", describe_count(statistics.vertices),
+          counts_source_ground(metadata) ? "on the source's ground" : "visible", describe_count(statistics.voids),
           statistics.clamped > 0 ? fmt::format(", {} moved into the range", describe_count(statistics.clamped)) : ""));
   say("source", fmt::format("{}: {}, {} x {} {}{}, registered as {}", source.name, source.format, source.width,
                             source.height, source.sample_type,
@@ -260,9 +253,7 @@ std::string describe_archive(const ArchiveReader& archive) {
   say("reference", describe_crs(source));
   if (const auto place = source_place(metadata)) text += text_from(*place);
   say("filter", fmt::format("{}, acquisition {}", metadata.filter, metadata.acquisition));
-  say("size",
-      fmt::format("elevations take {}, {:.3f} bits a stored sample: {:.2f} times smaller than raw 16-bit samples",
-                  describe_bytes(derived.tile_bytes), derived.bits_per_sample, derived.ratio_to_u16));
+  say("size", describe_size(source, derived.tile_bytes));
   if (const auto info = accuracy_info(metadata)) say("error", describe_accuracy(*info, unit));
   if (const auto info = texture_info(metadata)) {
     say("textures", fmt::format("{}; from {}, {} x {} pixels, placed by {}", describe_textures(*info, 0.0),

@@ -45,6 +45,7 @@ struct PlanOptions {
   CodeType code_type = CodeType::kU16;
   int limit = 10;
   bool table1 = false;
+  bool spacing_in_metres = false;
 };
 
 std::optional<PlanOptions> parse(const Arguments& arguments) {
@@ -64,7 +65,7 @@ std::optional<PlanOptions> parse(const Arguments& arguments) {
   line.option("--limit", "N", "List at most N candidates (default 10)",
               [&](const std::string& text) { options.limit = static_cast<int>(parse_whole_number(text, 1, 1000000)); });
   line.flag("--table1", "List the shapes of the paper's Table 1", options.table1);
-  add_lattice_options(line, options.request);
+  add_lattice_options(line, options.request, options.spacing_in_metres);
   add_ground_options(line, options.request.ground);
   add_geoid_option(line, options.geoid);
   add_source_options(line, options.open);
@@ -192,6 +193,7 @@ int run(const PlanOptions& options) {
     convert.plan = options.request;
     understand_ground(source->info(), convert.plan.ground);
     convert.code_type = options.code_type;
+    check_spacing_unit(source->info(), options.request, options.spacing_in_metres);
     print_plan(*source, convert, options.common);
   }
   return kExitDone;

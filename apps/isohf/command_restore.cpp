@@ -104,7 +104,8 @@ OutputGrid asked_grid(const RestoreOptions& options, const Metadata& metadata) {
     return grid;
   }
   if (!raster.size && !raster.spacing) return OutputGrid(natural_grid(metadata));
-  return OutputGrid(grid_over(metadata.valid, samples_are_areas(metadata), raster.size, raster.spacing));
+  return OutputGrid(
+      grid_over(metadata.valid, samples_are_areas(metadata), raster.size, spacing_in_world(raster, metadata)));
 }
 
 /// Rows of another map than the archive's are read on the triangles.

@@ -1,25 +1,29 @@
 /// isohf sample: elevation and normal at places of an archive's surface.
 
 #include <fmt/format.h>
+#include <oneapi/tbb/parallel_for.h>
 
 #include <cmath>
+#include <cstring>
+#include <functional>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <optional>
 
 #include "archive_places.h"
 #include "command.h"
 #include "isohf/archive/reader.h"
+#include "isohf/base/bytes.h"
 #include "isohf/base/error.h"
-#include "isohf/lattice/barycentric.h"
 #include "isohf/restore/archive_geometry.h"
-#include "isohf/surface/normals.h"
+#include "isohf/restore/point_sampler.h"
 #include "json_output.h"
 #include "line_reader.h"
 #include "open_archive.h"
 #include "option_values.h"
 #include "options_common.h"
 #include "standard_output.h"
-#include "tile_cache.h"
+#include "work_arena.h"
 
 namespace isohf::cli {
 namespace {
@@ -35,6 +39,10 @@ start with # are passed over. For each place one line is printed:
 
 The elevation is that of the triangle there, as it is drawn; the normal (x, y up, z) is the vertex normals'
 blend over it, of length 1. A place without elevation gives 'void', one beyond the tiles 'outside'.
+
+With --binary places are pairs of little-endian float64, and each answer is 32 bytes, little-endian: float64
+elevation, float32 nx ny nz, uint32 state (0 surface, 1 void, 2 outside), int32 tile_column tile_row. Elevation is
+NaN and the normal 0 unless the state is 0; the tile is -1 -1 where it is 2.
 
 Examples:
   isohf sample dem.isohf --at 1200.5 340
@@ -52,6 +60,8 @@ struct SampleOptions {
   bool reads_source = false;   ///< standard input holds coordinates of the source
   bool with_degrees = false;   ///< answers hold them
   bool with_source = false;
+  bool binary = false;
+  int threads = 0;
   std::uint64_t memory_bytes = std::uint64_t{256} << 20;
 };
 
@@ -77,8 +87,14 @@ std::optional<SampleOptions> parse(const Arguments& arguments) {
   line.flag("--with-lonlat", "Add longitude and latitude to each line", options.with_degrees);
   line.flag("--with-crs", "Add the input's own coordinates to each line", options.with_source);
   line.exclusive({"--at", "--at-lonlat", "--at-crs", "--lonlat", "--crs"});
+  line.flag("--binary", "Read and write binary records instead of lines; see below", options.binary);
+  line.option("-j,--threads", "N", "Threads, 1 to 1024 (default: all cores); the result does not depend on it",
+              [&](const std::string& text) { options.threads = static_cast<int>(parse_whole_number(text, 1, 1024)); });
   add_memory_option(line, "Decoded tiles to keep (default 256M)", options.memory_bytes);
   add_common_options(line, options.common);
+  line.exclusive({"--json", "--binary"});
+  line.exclusive({"--with-lonlat", "--binary"});
+  line.exclusive({"--with-crs", "--binary"});
   line.footer(kFooter);
   if (!line.parse(arguments)) return std::nullopt;
   line.require("ARCHIVE", options.archive);
@@ -104,41 +120,6 @@ bool read_place(std::string_view text, WorldPoint& place) {
   return text.empty() && std::isfinite(place.x) && std::isfinite(place.z);
 }
 
-struct Sample {
-  bool inside = false;
-  TileIndex tile{};
-  double elevation = 0.0;  ///< NaN where void
-  double normal[3] = {0.0, 1.0, 0.0};
-};
-
-Sample sample_at(const TileGrid& grid, TileCache& cache, WorldPoint place) {
-  Sample sample;
-  sample.inside = grid.contains(place);
-  if (!sample.inside) return sample;
-  const TilePoint at = grid.locate(place);
-  sample.tile = at.tile;
-  const CachedTile& tile = cache.tile(at.tile);
-  const Barycentric where = barycentric(grid.shape(), at.point);
-  const std::int64_t columns = grid.shape().columns();
-  const std::int64_t rows = grid.shape().rows();
-  sample.elevation = interpolate(where, View2D<const double>(tile.elevations.data(), columns, rows));
-  if (std::isnan(sample.elevation)) return sample;
-  double sum[3] = {0.0, 0.0, 0.0};
-  for (std::size_t i = 0; i < 3; ++i) {
-    if (where.weights[i] <= 0.0) continue;
-    const Normal normal =
-        vertex_normal(grid, View2D<const float>(tile.relative.data(), columns, rows), where.vertices[i]);
-    sum[0] += where.weights[i] * static_cast<double>(normal.x);
-    sum[1] += where.weights[i] * static_cast<double>(normal.y);
-    sum[2] += where.weights[i] * static_cast<double>(normal.z);
-  }
-  // The blend is never 0: every normal points upwards.
-  const double length = std::sqrt(sum[0] * sum[0] + sum[1] * sum[1] + sum[2] * sum[2]);
-  // Adding 0 turns -0, which would print as such, into 0.
-  for (std::size_t i = 0; i < 3; ++i) sample.normal[i] = sum[i] / length + 0.0;
-  return sample;
-}
-
 /// What answers say of their places.
 struct PlaceOutput {
   const GeoPlaces* geo = nullptr;  ///< nullptr: no longitudes and latitudes
@@ -158,14 +139,14 @@ std::string columns_from(const PlaceOutput& output, WorldPoint place) {
   return text + '\n';
 }
 
-std::string text_from(const Sample& sample) {
-  if (!sample.inside) return "outside";
-  if (std::isnan(sample.elevation)) return "void";
+std::string text_from(const SurfaceSample& sample) {
+  if (sample.state == SurfaceSample::State::kOutside) return "outside";
+  if (sample.state == SurfaceSample::State::kVoid) return "void";
   return fmt::format("{:.9g} {:.7f} {:.7f} {:.7f} {} {}", sample.elevation, sample.normal[0], sample.normal[1],
                      sample.normal[2], sample.tile.column, sample.tile.row);
 }
 
-std::string json_from(const Sample& sample, WorldPoint place, const PlaceOutput& output) {
+std::string json_from(const SurfaceSample& sample, WorldPoint place, const PlaceOutput& output) {
   // A place that the map does not show has no world coordinates.
   const auto number = [](double value) { return std::isnan(value) ? ordered_json(nullptr) : ordered_json(value); };
   ordered_json json = {{"x", number(place.x)}, {"z", number(place.z)}};
@@ -180,18 +161,99 @@ std::string json_from(const Sample& sample, WorldPoint place, const PlaceOutput&
     const GeoPoint at = output.geo->geo_from_world(place);
     json["lonlat"] = pair("longitude", at.longitude, "latitude", at.latitude);
   }
-  if (!sample.inside) {
-    json["state"] = "outside";
-  } else {
-    const bool is_void = std::isnan(sample.elevation);
-    json["state"] = is_void ? "void" : "surface";
+  constexpr const char* kStates[] = {"surface", "void", "outside"};
+  json["state"] = kStates[static_cast<std::size_t>(sample.state)];
+  if (sample.state != SurfaceSample::State::kOutside) {
     json["tile"] = {{"column", sample.tile.column}, {"row", sample.tile.row}};
-    if (!is_void) {
-      json["elevation"] = sample.elevation;
-      json["normal"] = {sample.normal[0], sample.normal[1], sample.normal[2]};
-    }
+  }
+  if (sample.state == SurfaceSample::State::kSurface) {
+    json["elevation"] = sample.elevation;
+    json["normal"] = sample.normal;
   }
   return json_line(json);
+}
+
+std::string record_from(const SurfaceSample& sample) {
+  std::vector<std::byte> bytes;
+  ByteWriter writer(bytes);
+  const bool is_surface = sample.state == SurfaceSample::State::kSurface;
+  writer.write(is_surface ? sample.elevation : std::numeric_limits<double>::quiet_NaN());
+  for (const double part : sample.normal) writer.write(is_surface ? static_cast<float>(part) : 0.0F);
+  writer.write(static_cast<std::uint32_t>(sample.state));
+  writer.write(static_cast<std::int32_t>(sample.tile.column));
+  writer.write(static_cast<std::int32_t>(sample.tile.row));
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+/// Collects places and answers them together, in their order.
+class Answers {
+ public:
+  Answers(const ArchiveReader& archive, const SampleOptions& options, const PlaceOutput& output)
+      : options_(options), output_(output), sampler_(archive, options.memory_bytes) {}
+
+  void add(WorldPoint place) {
+    places_.push_back(place);
+    if (places_.size() == kMostPlaces) answer();
+  }
+
+  /// Answers what there is, and hands it to the operating system.
+  void flush() {
+    answer();
+    out_.flush();
+  }
+
+ private:
+  static constexpr std::size_t kMostPlaces = std::size_t{1} << 18U;
+  static constexpr std::size_t kPlacesOfText = 4096;
+
+  void answer() {
+    std::vector<SurfaceSample> samples(places_.size());
+    sampler_.sample(places_, samples);
+    std::vector<std::string> texts((samples.size() + kPlacesOfText - 1) / kPlacesOfText);
+    oneapi::tbb::parallel_for(std::size_t{0}, texts.size(), [&](std::size_t part) {
+      const std::size_t end = std::min((part + 1) * kPlacesOfText, samples.size());
+      for (std::size_t i = part * kPlacesOfText; i < end; ++i) {
+        texts[part] += options_.binary        ? record_from(samples[i])
+                       : options_.common.json ? json_from(samples[i], places_[i], output_)
+                                              : text_from(samples[i]) + columns_from(output_, places_[i]);
+      }
+    });
+    for (const std::string& text : texts) out_.write(text);
+    places_.clear();
+  }
+
+  const SampleOptions& options_;
+  const PlaceOutput& output_;
+  PointSampler sampler_;
+  StandardOutput out_;
+  std::vector<WorldPoint> places_;
+};
+
+/// Every place on standard input: x and z, or longitude and latitude.
+void read_places(bool binary, Answers& answers, const std::function<WorldPoint(WorldPoint)>& in_world) {
+  LineReader reader;
+  const auto flush = [&] { answers.flush(); };
+  WorldPoint place{};
+  while (binary) {
+    const std::string_view record = reader.next_record(2 * sizeof(double), flush);
+    if (record.empty()) return;
+    std::memcpy(&place.x, record.data(), sizeof(double));
+    std::memcpy(&place.z, record.data() + sizeof(double), sizeof(double));
+    if (!std::isfinite(place.x) || !std::isfinite(place.z)) {
+      throw Error(ErrorCode::kCorrupt, fmt::format("standard input, record {}: found {} {}, must be two finite numbers",
+                                                   reader.line_number(), place.x, place.z));
+    }
+    answers.add(in_world(place));
+  }
+  while (const std::optional<std::string> line = reader.next(flush)) {
+    const std::size_t first = line->find_first_not_of(" \t");
+    if (first == std::string::npos || (*line)[first] == '#') continue;
+    if (!read_place(*line, place)) {
+      throw Error(ErrorCode::kCorrupt, fmt::format("standard input, line {}: found '{}', must be 'x z', two numbers",
+                                                   reader.line_number(), line->substr(0, 80)));
+    }
+    answers.add(in_world(place));
+  }
 }
 
 /// The archive's places; its source's map is understood where that is `needed` for them, or `welcome`.
@@ -219,8 +281,6 @@ int run(const SampleOptions& options) {
   if (!options.common.quiet) {
     for (const std::string& warning : archive.warnings()) print_warning(warning);
   }
-  TileCache cache(archive, options.memory_bytes);
-  StandardOutput out;
   const bool takes_geo = options.reads_degrees || !options.geo_places.empty();
   const bool takes_source = options.reads_source || !options.source_places.empty();
   const GeoPlaces places =
@@ -228,32 +288,25 @@ int run(const SampleOptions& options) {
   PlaceOutput output;
   if (options.with_degrees || (options.common.json && places.knows_geo())) output.geo = &places;
   if (options.with_source || (options.common.json && places.knows_source())) output.source = &places;
-  const auto answer = [&](WorldPoint place) {
-    const Sample sample = sample_at(archive.grid(), cache, place);
-    out.write(options.common.json ? json_from(sample, place, output) : text_from(sample) + columns_from(output, place));
-  };
-  for (const WorldPoint place : options.places) answer(place);
-  for (const GeoPoint place : options.geo_places) answer(places.world_from_geo(place));
-  for (const MapPoint place : options.source_places) answer(places.world_from_source(place));
-  if (options.places.empty() && options.geo_places.empty() && options.source_places.empty()) {
-    LineReader reader;
-    while (const std::optional<std::string> line = reader.next([&] { out.flush(); })) {
-      const std::size_t first = line->find_first_not_of(" \t");
-      if (first == std::string::npos || (*line)[first] == '#') continue;
-      WorldPoint place{};
-      if (!read_place(*line, place)) {
-        out.flush();
-        throw Error(ErrorCode::kCorrupt, fmt::format("standard input, line {}: found '{}', must be 'x z', two numbers",
-                                                     reader.line_number(), line->substr(0, 80)));
-      }
-      if (takes_geo) {
-        answer(places.world_from_geo({place.x, place.z}));
-      } else {
-        answer(takes_source ? places.world_from_source({place.x, place.z}) : place);
+  WorkArena threads(options.threads);
+  threads.execute([&] {
+    Answers answers(archive, options, output);
+    for (const WorldPoint place : options.places) answers.add(place);
+    for (const GeoPoint place : options.geo_places) answers.add(places.world_from_geo(place));
+    for (const MapPoint place : options.source_places) answers.add(places.world_from_source(place));
+    if (options.places.empty() && options.geo_places.empty() && options.source_places.empty()) {
+      try {
+        read_places(options.binary, answers, [&](WorldPoint place) {
+          if (takes_geo) return places.world_from_geo({place.x, place.z});
+          return takes_source ? places.world_from_source({place.x, place.z}) : place;
+        });
+      } catch (const Error&) {
+        answers.flush();  // what came before a bad place is answered
+        throw;
       }
     }
-  }
-  out.finish();
+    answers.flush();
+  });
   return kExitDone;
 }
 

@@ -3,6 +3,7 @@
 #include <limits>
 
 #include "isohf/base/error.h"
+#include "length_value.h"
 #include "option_values.h"
 
 namespace isohf::cli {
@@ -32,13 +33,27 @@ void add_shape_options(CommandLine& line, PlanRequest& request) {
   line.exclusive({"--shape", "--triangles", "--vertices"});
 }
 
-void add_lattice_options(CommandLine& line, PlanRequest& request) {
+void check_spacing_unit(const SourceInfo& info, const PlanRequest& request, bool spacing_in_metres) {
+  if (!spacing_in_metres || make_source_frame(info, request.ground).in_metres) return;
+  throw Error(ErrorCode::kInvalidArgument,
+              info.path +
+                  ": --spacing has a unit, but the input's coordinates are in none that is known; give a plain "
+                  "number, or --sample-spacing in metres");
+}
+
+void add_lattice_options(CommandLine& line, PlanRequest& request, bool& spacing_in_metres) {
   line.group("Lattice");
-  line.option("--density", "RATIO", "Lattice samples for one input sample; 0.866 is the isotropic optimum (default 1)",
-              [&](const std::string& text) { request.density = parse_positive_number(text); });
+  line.option("--density", "RATIO",
+              "Lattice samples for one input sample, as in 0.5 or 1/2; 0.866 is the isotropic optimum (default 1)",
+              [&](const std::string& text) { request.density = parse_ratio(text); });
   line.option("--spacing", "LENGTH",
-              "Distance of neighbouring lattice columns, metres where the input's units are known",
-              [&](const std::string& text) { request.spacing = parse_positive_number(text); });
+              "Distance of neighbouring lattice columns: world units (metres where the input's are known), or with a "
+              "unit as in 30m, 0.5km, 100ft",
+              [&](const std::string& text) {
+                const LengthValue length = parse_length(text);
+                request.spacing = length.value;
+                spacing_in_metres = length.in_metres;
+              });
   line.option("--tiles", "NxM", "Number of tile columns by tile rows",
               [&](const std::string& text) { request.tiles = parse_size(text, 1, kMaxTilesPerAxis); });
   line.exclusive({"--density", "--spacing", "--tiles"});

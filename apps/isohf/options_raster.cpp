@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "isohf/base/error.h"
 #include "option_values.h"
 
 namespace isohf::cli {
@@ -22,8 +23,19 @@ void require_raster_arguments(const CommandLine& line, const std::string& output
 void add_size_options(CommandLine& line, const std::string& size_description, RasterOptions& options) {
   line.option("--size", "WxH", size_description,
               [&](const std::string& text) { options.size = parse_size(text, 1, kMostSide); });
-  line.option("--spacing", "D", "Write samples D world units apart",
-              [&](const std::string& text) { options.spacing = parse_positive_number(text); });
+  line.option("--spacing", "LENGTH", "Write samples so far apart: world units, or with a unit as in 30m, 0.5km, 100ft",
+              [&](const std::string& text) { options.spacing = parse_length(text); });
+}
+
+std::optional<double> spacing_in_world(const RasterOptions& options, const Metadata& metadata) {
+  if (!options.spacing) return std::nullopt;
+  if (options.spacing->in_metres && metadata.horizontal_unit != "metre") {
+    throw Error(ErrorCode::kInvalidArgument,
+                options.archive +
+                    ": --spacing has a unit, but the archive's world units are not known; give a plain "
+                    "number of these");
+  }
+  return options.spacing->value;
 }
 
 void add_method_option(CommandLine& line, const std::string& without, RasterOptions& options) {

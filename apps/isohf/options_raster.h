@@ -5,6 +5,7 @@
 
 #include "command_line.h"
 #include "isohf/restore/surface_rows.h"
+#include "length_value.h"
 #include "output_grid.h"
 
 namespace isohf::cli {
@@ -15,7 +16,7 @@ struct RasterOptions {
   std::string output;
   bool overwrite = false;
   std::optional<GridSize> size;
-  std::optional<double> spacing;  ///< world units
+  std::optional<LengthValue> spacing;
   std::optional<RestoreMethod> method;
   bool clamp_range = false;
 };
@@ -30,6 +31,9 @@ void require_raster_arguments(const CommandLine& line, const std::string& output
 
 /// --size, --spacing. `size_description` is what --help says of the first.
 void add_size_options(CommandLine& line, const std::string& size_description, RasterOptions& options);
+/// The spacing asked for in the archive's world units. Throws Error{kInvalidArgument} for metres where these are
+/// unknown.
+[[nodiscard]] std::optional<double> spacing_in_world(const RasterOptions& options, const Metadata& metadata);
 /// --method. `without` is what --help says of the default.
 void add_method_option(CommandLine& line, const std::string& without, RasterOptions& options);
 /// --clamp-range. `type` is whose range it is.

@@ -5,6 +5,7 @@
 #include "formats/raw_source.h"
 #include "isohf/base/error.h"
 #include "isohf/surface/filled_source.h"
+#include "length_value.h"
 #include "option_values.h"
 
 namespace isohf::cli {
@@ -64,8 +65,9 @@ void add_source_options(CommandLine& line, OpenOptions& options) {
               "Read bare samples: columns, rows, and u8, i8, or u16, i16, u32, i32, f32, f64 with le or be, as in "
               "200x200:u16le",
               [&](const std::string& text) { options.raw = raw_layout_from_string(text); });
-  line.option("--sample-spacing", "METRES", "Set the distance of neighbouring samples, instead of the file's",
-              [&](const std::string& text) { options.spacing = parse_positive_number(text); });
+  line.option("--sample-spacing", "METRES",
+              "Set the distance of neighbouring samples, instead of the file's: metres, or with a unit as in 100ft",
+              [&](const std::string& text) { options.spacing = parse_length(text).value; });
 }
 
 std::unique_ptr<HeightSource> open_input(const std::string& path, const OpenOptions& options) {

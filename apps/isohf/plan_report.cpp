@@ -7,7 +7,9 @@
 
 #include "accuracy_output.h"
 #include "describe.h"
+#include "isohf/convert/plan_warnings.h"
 #include "json_output.h"
+#include "source_size.h"
 #include "standard_output.h"
 
 namespace isohf::cli {
@@ -16,7 +18,7 @@ namespace {
 using nlohmann::ordered_json;
 
 ordered_json json_from_plan(const SourceInfo& info, const Plan& plan, const MemoryPlan& memory, CodeType code_type,
-                            const std::optional<ErrorEstimate>& error) {
+                            const std::optional<ErrorEstimate>& error, const std::vector<std::string>& warnings) {
   const std::uint64_t raw =
       static_cast<std::uint64_t>(plan.lattice_samples) * static_cast<std::uint64_t>(raw_bytes(code_type));
   return {
@@ -48,7 +50,8 @@ ordered_json json_from_plan(const SourceInfo& info, const Plan& plan, const Memo
       {"expected_error", json_from_estimate(error)},
       {"estimated_memory_bytes", memory.bytes},
       {"least_memory_bytes", memory.least_bytes},
-      {"scratch_bytes", memory.scratch_bytes}};
+      {"scratch_bytes", memory.scratch_bytes},
+      {"warnings", warnings}};
 }
 
 std::string text_from_plan(const SourceInfo& info, const Plan& plan, const MemoryPlan& memory,
@@ -66,8 +69,8 @@ std::string text_from_plan(const SourceInfo& info, const Plan& plan, const Memor
   say("samples", fmt::format("{} apart in x, {} in z, registered as {}", describe_length(plan.frame.spacing_x, metres),
                              describe_length(plan.frame.spacing_z, metres), to_string(plan.frame.registration)));
   say("tile shape", fmt::format("{}x{} (C x R), {} levels, aspect {:.5f}, {} triangles, {} samples", shape.columns(),
-                                shape.rows(), shape.levels(), shape.aspect(), describe_count(shape.triangle_count()),
-                                describe_count(shape.stored_vertex_count())));
+                                shape.rows(), shape.levels(), triangle_aspect(grid),
+                                describe_count(shape.triangle_count()), describe_count(shape.stored_vertex_count())));
   say("tile grid", fmt::format("{} x {} = {} tiles of {} by {}", grid.tile_columns(), grid.tile_rows(),
                                describe_count(grid.tile_count()), describe_length(grid.extent_x(), metres),
                                describe_length(grid.extent_z(), metres)));
@@ -103,7 +106,9 @@ void print_plan(HeightSource& source, const ConvertOptions& options, const Commo
   const MemoryPlan memory = plan_memory(source, plan, options);
   check_memory(memory, options);
   if (!common.quiet) {
-    for (const std::string& warning : info.warnings) print_warning(warning);
+    for (const auto* list : {&info.warnings, &warnings}) {
+      for (const std::string& warning : *list) print_warning(warning);
+    }
     if (const std::string warning = scale_warning(info, plan.frame, options.plan.ground.projection); !warning.empty()) {
       print_warning(warning);
     }
@@ -111,7 +116,7 @@ void print_plan(HeightSource& source, const ConvertOptions& options, const Commo
   const std::optional<ErrorEstimate> error = estimate_error(source, plan, options);
   StandardOutput out;
   if (common.json) {
-    out.write(json_text(json_from_plan(info, plan, memory, options.code_type, error)));
+    out.write(json_text(json_from_plan(info, plan, memory, options.code_type, error, warnings)));
   } else if (!common.quiet) {
     out.write(text_from_plan(info, plan, memory, options, error));
   }

@@ -31,9 +31,16 @@ class ArchiveSource final : public TileSource {
     scale_ = {stored.offset * world_per_elevation_, stored.scale * world_per_elevation_};
     if (stored.type == CodeType::kF32) {
       // Floats on the GPU would be four bytes a vertex: round them to 65535 steps over the dataset's range.
-      const double low = metadata.statistics.min.value_or(0.0) * world_per_elevation_;
-      const double high = metadata.statistics.max.value_or(0.0) * world_per_elevation_;
-      scale_ = {low, high > low ? (high - low) / (kVoidCode - 1) : 1.0};
+      // The statistics' leaves out what lies beyond the source.
+      double low = std::numeric_limits<double>::infinity();
+      double high = -low;
+      for (std::int64_t i = 0; i < grid().tile_count(); ++i) {
+        const TileBounds tile = bounds(grid().tile_at(i));
+        if (!tile.stored) continue;
+        low = std::min(low, tile.low);
+        high = std::max(high, tile.high);
+      }
+      scale_ = {std::isfinite(low) ? low : 0.0, high > low ? (high - low) / (kVoidCode - 1) : 1.0};
     }
     if (shadow_seed_info(metadata)) seeds_.emplace(reader_);
     if (texture_info(metadata)) textures_.emplace(reader_);

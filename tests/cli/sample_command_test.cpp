@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <random>
@@ -118,6 +119,99 @@ TEST_F(SampleCommand, BadLineIsNamedAfterTheAnswersBeforeIt) {
               std::string("isohf: standard input, line 3: found '") + bad + "', must be 'x z', two numbers\n");
     EXPECT_EQ(std::count(result.out.begin(), result.out.end(), '\n'), 1);
   }
+}
+
+TEST_F(SampleCommand, PlacesTakeACommaAsWellAsABlank) {
+  const RunResult apart = run_isohf({"sample", folder / "plane.isohf", "--at", "1000", "900", "--at", "-5", "7"});
+  ASSERT_EQ(apart.exit_code, 0) << apart.err;
+  for (const std::vector<std::string>& places :
+       std::vector<std::vector<std::string>>{{"--at", "1000,900", "--at", "-5,7"},
+                                             {"--at=1000,900", "--at", "-5,", "7"},
+                                             {"--at", "1000", "900", "--at=-5,7"}}) {
+    std::vector<std::string> arguments = {"sample"};
+    arguments.insert(arguments.end(), places.begin(), places.end());
+    arguments.push_back(folder / "plane.isohf");
+    const RunResult result = run_isohf(arguments);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_EQ(result.out, apart.out);
+  }
+  EXPECT_EQ(run_isohf({"sample", folder / "plane.isohf", "--at", "1,2,3"}).exit_code, 2);
+}
+
+TEST_F(SampleCommand, BinaryRecordsHoldWhatTheLinesSay) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> x_of(-100.0, 2300.0);
+  std::uniform_real_distribution<double> z_of(-100.0, 1700.0);
+  RunOptions lines;
+  RunOptions records;
+  for (int i = 0; i < 5000; ++i) {
+    const double place[2] = {x_of(random), z_of(random)};
+    records.input.append(reinterpret_cast<const char*>(place), sizeof place);
+    std::ostringstream line;
+    line.precision(17);
+    line << place[0] << " " << place[1] << "\n";
+    lines.input += line.str();
+  }
+  const RunResult text = run_isohf({"sample", folder / "plane.isohf"}, lines);
+  const RunResult binary = run_isohf({"sample", folder / "plane.isohf", "--binary", "-j", "3"}, records);
+  ASSERT_EQ(binary.exit_code, 0) << binary.err;
+  ASSERT_EQ(binary.out.size(), 5000U * 32U);
+  std::istringstream stream(text.out);
+  const char* record = binary.out.data();
+  for (std::string line; std::getline(stream, line); record += 32) {
+    double elevation = 0.0;
+    float normal[3] = {};
+    std::uint32_t state = 9;
+    std::int32_t tile[2] = {};
+    std::memcpy(&elevation, record, 8);
+    std::memcpy(normal, record + 8, 12);
+    std::memcpy(&state, record + 20, 4);
+    std::memcpy(tile, record + 24, 8);
+    if (state == 0) {
+      std::istringstream words(line);
+      double wanted[4] = {};
+      int wanted_tile[2] = {};
+      ASSERT_TRUE(words >> wanted[0] >> wanted[1] >> wanted[2] >> wanted[3] >> wanted_tile[0] >> wanted_tile[1])
+          << line;
+      EXPECT_NEAR(elevation, wanted[0], 1e-5);
+      for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(double{normal[i]}, wanted[i + 1], 1e-6);
+      EXPECT_EQ(tile[0], wanted_tile[0]);
+      EXPECT_EQ(tile[1], wanted_tile[1]);
+      continue;
+    }
+    EXPECT_EQ(line, state == 1 ? "void" : "outside");
+    EXPECT_TRUE(std::isnan(elevation));
+    EXPECT_EQ(normal[1], 0.0F);
+    EXPECT_EQ(tile[0] < 0, state == 2);
+  }
+}
+
+TEST_F(SampleCommand, ABadRecordIsNamedAfterTheAnswersBeforeIt) {
+  const double places[4] = {1000.0, 1000.0, std::numeric_limits<double>::quiet_NaN(), 0.0};
+  RunOptions input;
+  input.input.assign(reinterpret_cast<const char*>(places), sizeof places);
+  const RunResult not_a_number = run_isohf({"sample", folder / "plane.isohf", "--binary"}, input);
+  EXPECT_EQ(not_a_number.exit_code, 1);
+  EXPECT_EQ(not_a_number.err, "isohf: standard input, record 2: found nan 0, must be two finite numbers\n");
+  EXPECT_EQ(not_a_number.out.size(), 32U);
+  input.input.resize(20);
+  const RunResult cut = run_isohf({"sample", folder / "plane.isohf", "--binary"}, input);
+  EXPECT_EQ(cut.exit_code, 1);
+  EXPECT_EQ(cut.err, "isohf: standard input, record 2: ends after 4 bytes, must have 16\n");
+  EXPECT_EQ(cut.out.size(), 32U);
+}
+
+TEST_F(SampleCommand, ALineIsAnsweredBeforeTheNextIsSent) {
+  // A shell that sends the second line only once it has read the first answer: would wait for ever if that came late.
+  const std::string script = "coproc isohf sample " + (folder / "plane.isohf") +
+                             "; echo '1000 1000' >&${COPROC[1]}; read -t 20 -u ${COPROC[0]} first || exit 9; "
+                             "echo '1000,900' >&${COPROC[1]}; read -t 20 -u ${COPROC[0]} second || exit 9; "
+                             "echo \"$first\"; echo \"$second\"";
+  const std::string path = isohf_path();
+  const RunResult result =
+      run_program({"/bin/bash", "-c", "PATH=" + path.substr(0, path.rfind('/')) + ":$PATH; " + script});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(result.out, run_isohf({"sample", folder / "plane.isohf", "--at", "1000,1000", "--at", "1000,900"}).out);
 }
 
 TEST_F(SampleCommand, AnswersComeBeforeMoreIsAskedFor) {

@@ -105,7 +105,7 @@ TEST(Plan, TilesAreTakenAtTheirWord) {
 TEST(Plan, SmallSourcesGetTilesThatFitThem) {
   for (const int size : {2, 3, 42, 100, 200, 256, 348, 513, 1000, 1201}) {
     const Plan plan = make_plan(raster(size, size), {});
-    EXPECT_LE(std::abs(plan.grid.shape().aspect() - 1.0), 0.16) << size;
+    EXPECT_NEAR(plan.grid.sigma_x() * std::sqrt(3.0) / plan.grid.sigma_z(), 1.0, 0.16) << size;
     // Padding and the last tiles' overhang cost less than 60 % of the samples, once there are enough to speak of.
     if (size >= 42) {
       EXPECT_LT(static_cast<double>(plan.lattice_samples), 1.6 * size * size) << size;

@@ -11,18 +11,19 @@
 #include <memory>
 #include <optional>
 
+#include "isohf/archive/tile_statistics.h"
 #include "isohf/archive/writer.h"
 #include "isohf/base/assert.h"
 #include "isohf/base/error.h"
 #include "isohf/convert/conversion.h"
 #include "isohf/convert/job_description.h"
 #include "isohf/convert/memory_plan.h"
+#include "isohf/convert/plan_warnings.h"
 #include "isohf/convert/quantiser.h"
 #include "isohf/convert/residual_stage.h"
 #include "isohf/convert/seed_stage.h"
 #include "isohf/convert/texture_stage.h"
 #include "isohf/convert/tile_source.h"
-#include "isohf/convert/tile_statistics.h"
 
 namespace isohf {
 namespace {
@@ -84,7 +85,8 @@ Outliers find_outliers(const TileShape& shape, const CodeLimits& limits, double 
                           job.limits.lowest, job.limits.highest, outliers.vertices - 1));
 }
 
-void make_tile(const Conversion& job, const TileSource& source, const Stages& stages, bool is_new, TileJob& tile) {
+void make_tile(const Conversion& job, const TileSource& source, const CountedVertices& counted, const Stages& stages,
+               bool is_new, TileJob& tile) {
   const TileShape& shape = job.plan.grid.shape();
   std::vector<float> heights(static_cast<std::size_t>(shape.stored_vertex_count()));
   source.cut(tile.index, *tile.part, heights);
@@ -96,7 +98,7 @@ void make_tile(const Conversion& job, const TileSource& source, const Stages& st
   }
   EncodedTile& encoded = tile.encoded;
   encoded = encode_tile(shape, codes, job.options.level);
-  encoded.statistics = tile_statistics(shape, codes, job.quantisation);
+  encoded.statistics = tile_statistics(counted, tile.index, codes, job.quantisation);
   encoded.statistics.clamped = tile.outliers.visible;
   encoded.statistics.worst_rounding = counts.worst_rounding;
   if (stages.seeds != nullptr) tile.seeds = stages.seeds->prepare(codes);
@@ -109,6 +111,7 @@ void make_tile(const Conversion& job, const TileSource& source, const Stages& st
 void write_tiles(const Conversion& job, ArchiveWriter& writer, const Stages& stages, const ProgressCallback& callback) {
   const TileGrid& grid = job.plan.grid;
   TileSource source(job, {job.limits.lowest - job.datum, job.limits.highest - job.datum});
+  const CountedVertices counted(describe_job(job.source.info(), job.plan, job.options, job.quantisation));
   ProgressMeter meter(callback, ConvertProgress::Pass::kTiles, grid.tile_count());
   const std::int64_t first_new = writer.next_tile();
   std::int64_t next = stages.seeds != nullptr ? SeedStage::first_tile_needed(grid, first_new) : first_new;
@@ -138,7 +141,7 @@ void write_tiles(const Conversion& job, ArchiveWriter& writer, const Stages& sta
     return tile;
   };
   const auto encode = [&](TileJob* tile) {
-    make_tile(job, source, stages, grid.flat_index(tile->index) >= first_new, *tile);
+    make_tile(job, source, counted, stages, grid.flat_index(tile->index) >= first_new, *tile);
     tile->part.reset();
     return tile;
   };
@@ -212,6 +215,7 @@ ConvertSummary convert(HeightSource& source, const Plan& plan, const std::string
   if (const std::string warning = scale_warning(info, plan.frame, options.plan.ground.projection); !warning.empty()) {
     summary.warnings.push_back(warning);
   }
+  for (std::string& warning : plan_warnings(info, plan, options.plan)) summary.warnings.push_back(std::move(warning));
   if (textures)
     summary.warnings.insert(summary.warnings.end(), textures->warnings().begin(), textures->warnings().end());
   Conversion job{source, options, plan, memory, kernel, std::move(prefilter), cancel};

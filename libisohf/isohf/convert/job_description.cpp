@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "isohf/archive/tile_statistics.h"
+
 namespace isohf {
 namespace {
 
@@ -69,7 +71,7 @@ std::string heights_fingerprint(const SourceInfo& info, const Plan& plan, const 
   return fmt::format(
       "{} | {} {} bytes {}.{:09} {}x{} {} channel '{}' scale {} {} void {} | shape {}x{}/{} tiles {}x{} extent {} {} "
       "first {} {} "
-      "spacing {} {} {} | {} range {} step {} clamp {} | {} {} | level {} | seeds {}",
+      "spacing {} {} {} | {} range {} step {} clamp {} | {} {} | level {} | statistics of the source | seeds {}",
       options.producer, std::filesystem::path(info.path).filename().string(), ignored ? 0 : size,
       known ? status.st_mtim.tv_sec : 0, known ? status.st_mtim.tv_nsec : 0, info.width, info.height,
       to_string(info.sample_type), info.channel, info.z_scale, info.z_offset, describe_voids(info), shape.columns(),
@@ -135,6 +137,7 @@ Metadata describe_job(const SourceInfo& info, const Plan& plan, const ConvertOpt
   metadata.acquisition = options.acquisition;
   metadata.level = options.level;
   metadata.source = record_of(info, plan.frame, options.source_note);
+  metadata.extensions.emplace_back(kStatisticsOfName, kStatisticsOfSource);
   metadata.producer = options.producer;
   return metadata;
 }

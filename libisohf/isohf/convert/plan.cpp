@@ -8,6 +8,7 @@
 
 #include "isohf/base/assert.h"
 #include "isohf/base/error.h"
+#include "isohf/convert/plan_warnings.h"
 
 namespace isohf {
 namespace {
@@ -26,6 +27,21 @@ constexpr double kManyTiles = 12.0;
 constexpr double kWorstAspect = 0.02;
 /// What one tile costs beyond its samples (header, index, directory, a draw call), in samples.
 constexpr double kTileOverhead = 4000.0;
+/// What a level given up must save.
+constexpr double kLevelWorth = 1.1;
+
+/// Where tiles are to end on the source's edge (docs/decisions/0025): the densities and the aspects of triangles that
+/// may come out, and how much larger than the usual one a tile may be, on a side.
+constexpr double kLeastDensity = 0.97;
+constexpr double kMostDensity = 1.05;
+constexpr double kWorstFittedAspect = 0.03;
+/// How far a tile may be from square: textures are square, and lie on it without visible distortion.
+constexpr double kWorstTileAspect = 0.125;
+constexpr double kLargestSide = 1.5;
+
+/// Densities that nobody means unless they ask for them.
+constexpr double kThinDensity = 0.5;
+constexpr double kThickDensity = 2.0;
 
 [[noreturn]] void refuse(const std::string& why) {
   throw Error(ErrorCode::kInvalidArgument, why);
@@ -58,6 +74,114 @@ double extent_for(const TileShape& shape, const SourceFrame& frame, const PlanRe
   return extent_for_density(shape, frame, request.density.value_or(1.0));
 }
 
+/// Shape and grid of the tiles.
+struct Lattice {
+  TileShape shape;
+  std::int64_t columns;
+  std::int64_t rows;
+  double extent_x;
+  double extent_z;
+};
+
+/// Times larger or smaller, less 1.
+double off(double ratio) {
+  return std::max(ratio, 1.0 / ratio) - 1.0;
+}
+
+/// The least extent of which so many reach the source's edge.
+double extent_reaching(double length, std::int64_t tiles) {
+  const auto count = static_cast<double>(tiles);
+  double extent = length / count;
+  while (extent * count < length) extent = std::nextafter(extent, kMaxExtent);
+  return extent;
+}
+
+/// Steps of one tile along one axis, and how many such tiles there are.
+struct AxisTiles {
+  int cells;
+  std::int64_t tiles;
+  double ratio;  ///< of all steps to those wanted
+};
+
+/// Tiles that divide an axis into about `wanted` steps: `tiles` of them, or as many as are not much larger than
+/// `usual_cells`.
+std::vector<AxisTiles> axis_tiles(double wanted, int unit, int most_cells, int usual_cells,
+                                  const std::optional<std::int64_t>& tiles) {
+  std::vector<AxisTiles> found;
+  const auto add = [&](double cells, double count) {
+    if (cells < unit || cells > most_cells || count < 1.0 || count > static_cast<double>(kMaxTilesPerAxis)) return;
+    found.push_back({static_cast<int>(cells), static_cast<std::int64_t>(count), cells * count / wanted});
+  };
+  if (tiles) {
+    const double units = std::floor(wanted / static_cast<double>(*tiles) / unit);
+    add(std::max(units, 1.0) * unit, static_cast<double>(*tiles));
+    add((units + 1.0) * unit, static_cast<double>(*tiles));
+    return found;
+  }
+  for (int cells = unit; cells <= std::min(most_cells, static_cast<int>(kLargestSide * usual_cells)); cells += unit) {
+    const double count = std::floor(wanted / cells);
+    for (const double candidate : {count, count + 1.0}) {
+      if (off(candidate * cells / wanted) < 2.0 * kWorstFittedAspect) add(cells, candidate);
+    }
+  }
+  return found;
+}
+
+/// A lattice that ends on the source's edges, of tiles that are only nearly square so that triangles are equilateral.
+/// With a number of tiles given, the one whose density lies nearest 1; else nullopt where none is near enough.
+std::optional<Lattice> fitted_lattice(const SourceFrame& frame, const PlanRequest& request) {
+  const WorldBounds bounds = frame.bounds();
+  // Equilateral triangles, one vertex for a sample.
+  const double step = std::sqrt(frame.spacing_x * frame.spacing_z / kSin60);
+  double wanted_columns = bounds.x1 / step;
+  double wanted_rows = bounds.z1 / (step * kSin60);
+  std::optional<std::int64_t> tile_columns;
+  std::optional<std::int64_t> tile_rows;
+  if (request.tiles) {
+    tile_columns = request.tiles->first;
+    tile_rows = request.tiles->second;
+    // Tiles can only be so large: fewer vertices then, in both directions.
+    const double held = std::min({1.0, (kMaxTileColumns - 4) * static_cast<double>(*tile_columns) / wanted_columns,
+                                  (kMaxTileRows - 3) * static_cast<double>(*tile_rows) / wanted_rows});
+    wanted_columns *= held;
+    wanted_rows *= held;
+  }
+  const int most_levels = request.levels.value_or(kDefaultLevels);
+  const int fewest_levels = request.levels.value_or(1);
+  std::optional<Lattice> best;
+  double best_cost = 0.0;
+  double level_cost = 1.0;
+  for (int levels = most_levels; levels >= fewest_levels; --levels, level_cost *= request.tiles ? 1.05 : 1.15) {
+    const int unit = 1 << (levels - 1);
+    const std::vector<AxisTiles> all_columns =
+        axis_tiles(wanted_columns, unit, kMaxTileColumns - 4, kDefaultColumns - 4, tile_columns);
+    const std::vector<AxisTiles> all_rows =
+        axis_tiles(wanted_rows, 2 * unit, kMaxTileRows - 3, kDefaultRows - 3, tile_rows);
+    for (const AxisTiles& columns : all_columns) {
+      for (const AxisTiles& rows : all_rows) {
+        const double density = columns.ratio * rows.ratio;
+        const double aspect = columns.ratio / rows.ratio;
+        double cost = level_cost * (1.0 + off(density)) * (1.0 + off(aspect));
+        if (!request.tiles) {
+          if (density < kLeastDensity || density > kMostDensity || off(aspect) > kWorstFittedAspect) continue;
+          const double cells = static_cast<double>(columns.cells) * rows.cells;
+          const double stored = (columns.cells + 4.0) * (rows.cells + 3.0) + kTileOverhead;
+          const double side = std::sqrt(cells / ((kDefaultColumns - 4.0) * (kDefaultRows - 3.0)));
+          const double square = columns.cells / (rows.cells * kSin60);
+          if (off(square) > kWorstTileAspect) continue;
+          cost = level_cost * stored / cells * (1.0 + 0.5 * off(density)) * (1.0 + 0.5 * off(aspect)) *
+                 (1.0 + 0.2 * off(side)) * (1.0 + 0.05 * off(square));
+        }
+        if (best && cost >= best_cost) continue;
+        best = Lattice{TileShape::make(columns.cells + 4, rows.cells + 3, levels), columns.tiles, rows.tiles,
+                       extent_reaching(bounds.x1, columns.tiles), extent_reaching(bounds.z1, rows.tiles)};
+        best_cost = cost;
+      }
+    }
+  }
+  return best;
+}
+
 /// Stored samples of the whole dataset with this shape, tile overhead included.
 double cost_of(const TileShape& shape, const SourceFrame& frame, const PlanRequest& request) {
   const double extent = extent_for(shape, frame, request);
@@ -79,7 +203,7 @@ TileShape shape_for_small_source(const SourceFrame& frame, const PlanRequest& re
       const TileShape shape = TileShape::make(cells + 4, rows, levels);
       if (std::abs(shape.aspect() - 1.0) > kWorstAspect) continue;
       // Every level given up must save a tenth.
-      const double cost = cost_of(shape, frame, request) * std::pow(1.1, most_levels - levels);
+      const double cost = cost_of(shape, frame, request) * std::pow(kLevelWorth, most_levels - levels);
       if (!best || cost < best_cost) {
         best = shape;
         best_cost = cost;
@@ -127,6 +251,54 @@ TileShape choose_shape(const SourceFrame& frame, const PlanRequest& request) {
   return shape_for_small_source(frame, request);
 }
 
+/// Square tiles of the density, spacing or number asked for, which may reach beyond the source's edge.
+Lattice square_lattice(const SourceFrame& frame, const PlanRequest& request) {
+  const WorldBounds bounds = frame.bounds();
+  const TileShape shape = choose_shape(frame, request);
+  double extent_x = extent_for(shape, frame, request);
+  double extent_z = extent_x;
+  if (request.through_samples) {
+    ISOHF_ASSERT(!frame.warp && !frame.wraps_x && !request.fit && !request.tiles);
+    extent_x = shape.cell_columns() * frame.spacing_x;
+    extent_z = shape.cell_rows() * frame.spacing_z / 2.0;
+  }
+  std::int64_t columns = request.tiles ? request.tiles->first : 0;
+  std::int64_t rows = request.tiles ? request.tiles->second : 0;
+  if (frame.wraps_x) {
+    // A whole number of tiles goes round.
+    if (!request.tiles) columns = tiles_to_cover(std::max(bounds.x1 - extent_x / 2.0, 0.0), extent_x);
+    extent_x = bounds.x1 / static_cast<double>(columns);
+    if (!request.tiles)
+      rows = tiles_to_cover(request.fit ? std::max(bounds.z1 - extent_x / 2.0, 0.0) : bounds.z1, extent_x);
+    extent_z = request.fit ? bounds.z1 / static_cast<double>(rows) : std::max(extent_x, request.tiles ? extent_z : 0.0);
+  } else if (request.fit) {
+    if (!request.tiles) {
+      columns = tiles_to_cover(std::max(bounds.x1 - extent_x / 2.0, 0.0), extent_x);  // the nearest whole number
+      rows = tiles_to_cover(std::max(bounds.z1 - extent_z / 2.0, 0.0), extent_z);
+    }
+    extent_x = bounds.x1 / static_cast<double>(columns);
+    extent_z = bounds.z1 / static_cast<double>(rows);
+  } else if (!request.tiles) {
+    columns = tiles_to_cover(bounds.x1, extent_x);
+    rows = tiles_to_cover(bounds.z1, extent_z);
+  }
+  return {shape, columns, rows, extent_x, extent_z};
+}
+
+/// Fewer or more vertices than anybody asked for, and what would mend it.
+std::string density_warning(const SourceInfo& info, const Plan& plan, const PlanRequest& request) {
+  const char* const remedy = request.tiles && request.shape    ? "leave out --shape or --tiles"
+                             : request.tiles && request.budget ? "leave out the budget of a tile or --tiles"
+                             : request.tiles                   ? "ask for other --tiles"
+                             : request.fit                     ? "leave out --fit, or ask for smaller tiles"
+                                                               : "ask for smaller tiles";
+  const char* const unit = plan.frame.in_metres ? " m" : "";
+  return fmt::format(
+      "{}: the lattice has {:.3g} vertices for one of the input's samples, with columns {:.4g}{} apart "
+      "where the input's are {:.4g}{}; {}",
+      info.path, plan.density, 2.0 * plan.grid.sigma_x(), unit, plan.frame.spacing_x, unit, remedy);
+}
+
 void check(const PlanRequest& request) {
   if ((request.density ? 1 : 0) + (request.spacing ? 1 : 0) + (request.tiles ? 1 : 0) > 1) {
     refuse("more than one of --density, --spacing and --tiles is given; give one");
@@ -163,45 +335,34 @@ Plan make_plan(const SourceInfo& info, const PlanRequest& request) {
     refuse(fmt::format("{}: {}x{} samples, a surface needs at least 2x2", info.path, info.width, info.height));
   }
   const SourceFrame frame = make_source_frame(info, request.ground);
-  const WorldBounds bounds = frame.bounds();
-  const TileShape shape = choose_shape(frame, request);
-  double extent_x = extent_for(shape, frame, request);
-  double extent_z = extent_x;
-  if (request.through_samples) {
-    ISOHF_ASSERT(!frame.warp && !frame.wraps_x && !request.fit && !request.tiles);
-    extent_x = shape.cell_columns() * frame.spacing_x;
-    extent_z = shape.cell_rows() * frame.spacing_z / 2.0;
+  if (request.spacing && request.spacing_in_metres && !frame.in_metres) {
+    refuse(
+        fmt::format("{}: --spacing has a unit, but the input's coordinates are in none that is known; give a plain "
+                    "number, or --sample-spacing in metres",
+                    info.path));
   }
-  std::int64_t columns = request.tiles ? request.tiles->first : 0;
-  std::int64_t rows = request.tiles ? request.tiles->second : 0;
-  if (frame.wraps_x) {
-    // A whole number of tiles goes round.
-    if (!request.tiles) columns = tiles_to_cover(std::max(bounds.x1 - extent_x / 2.0, 0.0), extent_x);
-    extent_x = bounds.x1 / static_cast<double>(columns);
-    if (!request.tiles)
-      rows = tiles_to_cover(request.fit ? std::max(bounds.z1 - extent_x / 2.0, 0.0) : bounds.z1, extent_x);
-    extent_z = request.fit ? bounds.z1 / static_cast<double>(rows) : std::max(extent_x, request.tiles ? extent_z : 0.0);
-  } else if (request.fit) {
-    if (!request.tiles) {
-      columns = tiles_to_cover(std::max(bounds.x1 - extent_x / 2.0, 0.0), extent_x);  // the nearest whole number
-      rows = tiles_to_cover(std::max(bounds.z1 - extent_z / 2.0, 0.0), extent_z);
-    }
-    extent_x = bounds.x1 / static_cast<double>(columns);
-    extent_z = bounds.z1 / static_cast<double>(rows);
-  } else if (!request.tiles) {
-    columns = tiles_to_cover(bounds.x1, extent_x);
-    rows = tiles_to_cover(bounds.z1, extent_z);
-  }
-  Plan plan{frame, TileGrid::make(shape, columns, rows, extent_x, extent_z)};
-  plan.outside = request.outside;
-  plan.density = static_cast<double>(shape.cell_columns()) * shape.cell_rows() * frame.spacing_x * frame.spacing_z /
-                 (extent_x * extent_z);
+  const bool may_fit =
+      !request.shape && !request.budget && !request.density && !request.spacing && !request.through_samples;
+  std::optional<Lattice> lattice = may_fit ? fitted_lattice(frame, request) : std::nullopt;
+  if (!lattice) lattice = square_lattice(frame, request);
+  Plan plan{
+      .frame = frame,
+      .grid = TileGrid::make(lattice->shape, lattice->columns, lattice->rows, lattice->extent_x, lattice->extent_z),
+      .outside = request.outside};
+  const TileShape& shape = plan.grid.shape();
+  plan.density = frame.spacing_x * frame.spacing_z / (2.0 * plan.grid.sigma_x() * plan.grid.sigma_z());
   plan.band_rows = band_rows(plan);
   plan.lattice_samples = shape.stored_vertex_count() * plan.grid.tile_count();
   constexpr double kTypicalBits = 5.0;
   plan.estimated_bytes = static_cast<std::uint64_t>(static_cast<double>(plan.lattice_samples) * kTypicalBits / 8.0 +
                                                     150.0 * static_cast<double>(plan.grid.tile_count()) + 20e3);
   return plan;
+}
+
+std::vector<std::string> plan_warnings(const SourceInfo& info, const Plan& plan, const PlanRequest& request) {
+  const bool is_odd = plan.density < kThinDensity || plan.density > kThickDensity;
+  if (request.density || request.spacing || !is_odd) return {};
+  return {density_warning(info, plan, request)};
 }
 
 std::vector<TileShape> candidate_shapes(const PlanRequest& request, int limit) {

@@ -15,6 +15,7 @@
 #include "isohf/archive/accuracy_info.h"
 #include "isohf/archive/content_hash.h"
 #include "isohf/archive/lane_decoder.h"
+#include "isohf/archive/tile_statistics.h"
 #include "isohf/base/error.h"
 #include "isohf/restore/lossless.h"
 #include "isohf/surface/normals.h"
@@ -39,12 +40,7 @@ struct TileState {
   std::vector<float> heights;  ///< [C*R] vertical units, NaN where void
   std::vector<std::byte> digest;
   std::vector<Finding> findings;
-  // Over the visible vertices:
-  std::int64_t vertices = 0;
-  std::int64_t voids = 0;
-  double sum = 0.0;
-  double min = std::numeric_limits<double>::infinity();
-  double max = -std::numeric_limits<double>::infinity();
+  TileStatistics statistics;
 };
 
 using TileRow = std::vector<TileState>;
@@ -57,7 +53,8 @@ class Verification {
         grid_(archive.grid()),
         shape_(grid_.shape()),
         void_heights_(static_cast<std::size_t>(shape_.stored_vertex_count()), std::numeric_limits<float>::quiet_NaN()),
-        void_digest_(tile_content_digest(void_tile(shape_, archive.metadata().quantisation))) {
+        void_digest_(tile_content_digest(void_tile(shape_, archive.metadata().quantisation))),
+        counted_(archive.metadata()) {
     for (std::size_t i = 0; i < shared_.size(); ++i) shared_[i] = shared_vertices(shape_, kComparedNeighbours[i]);
   }
 
@@ -221,7 +218,7 @@ class Verification {
     tile.digest = tile_content_digest(tile.codes);
     fill_heights(index, tile);
     check_entry(index, entry, tile);
-    count_visible(tile);
+    tile.statistics = tile_statistics(counted_, index, tile.codes, archive_.metadata().quantisation);
   }
 
   void fill_heights(TileIndex index, TileState& tile) const {
@@ -274,26 +271,6 @@ class Verification {
     if (voids != entry.has_voids) {
       tile.findings.push_back(make(finding::kTileVoidFlag, index,
                                    voids ? "has voids, the index says none" : "has no voids, the index says some"));
-    }
-  }
-
-  void count_visible(TileState& tile) const {
-    for (int r = 1; r <= shape_.rows() - 2; ++r) {
-      const int last = shape_.columns() - (r % 2 == 0 ? 2 : 3);
-      for (int c = 1; c <= last; ++c) {
-        ++tile.vertices;
-        const std::size_t i = at({c, r});
-        if (std::isnan(tile.heights[i])) {
-          ++tile.voids;
-          continue;
-        }
-        const Quantisation& q = archive_.metadata().quantisation;
-        const double elevation =
-            q.type == CodeType::kF32 ? double{tile.heights[i]} : q.offset + q.scale * tile.codes.codes[i];
-        tile.sum += elevation;
-        tile.min = std::min(tile.min, elevation);
-        tile.max = std::max(tile.max, elevation);
-      }
     }
   }
 
@@ -364,11 +341,11 @@ class Verification {
       tile.findings.clear();
       stored_ += tile.entry.stored ? 1 : 0;
       all_readable_ = all_readable_ && tile.readable;
-      vertices_ += tile.vertices;
-      voids_ += tile.voids;
-      sum_ += tile.sum;
-      min_ = std::min(min_, tile.min);
-      max_ = std::max(max_, tile.max);
+      all_.vertices += tile.statistics.vertices;
+      all_.voids += tile.statistics.voids;
+      all_.sum += tile.statistics.sum;
+      all_.min = std::min(all_.min, tile.statistics.min);
+      all_.max = std::max(all_.max, tile.statistics.max);
       if (tile.readable) hash_.add_tile(tile.digest);
     }
   }
@@ -410,22 +387,24 @@ class Verification {
     const auto differ = [&](const char* what, double found, double stated) {
       add(make(finding::kStatistics, {}, fmt::format("{} is {}, the metadata says {}", what, found, stated)));
     };
-    if (vertices_ != said.vertices)
-      differ("vertices", static_cast<double>(vertices_), static_cast<double>(said.vertices));
-    if (voids_ != said.voids) differ("voids", static_cast<double>(voids_), static_cast<double>(said.voids));
-    if (voids_ == vertices_) return;
-    if (metadata.z_range && !(min_ >= metadata.z_range->first && max_ <= metadata.z_range->second)) {
+    const auto count = [&](const char* what, std::int64_t found, std::int64_t stated) {
+      if (found != stated) differ(what, static_cast<double>(found), static_cast<double>(stated));
+    };
+    count("vertices", all_.vertices, said.vertices);
+    count("voids", all_.voids, said.voids);
+    if (all_.voids == all_.vertices) return;
+    if (metadata.z_range && !(all_.min >= metadata.z_range->first && all_.max <= metadata.z_range->second)) {
       add(make(finding::kElevationRange, {},
-               fmt::format("elevations run from {} to {}, the metadata allow {} to {}", min_, max_,
+               fmt::format("elevations run from {} to {}, the metadata allow {} to {}", all_.min, all_.max,
                            metadata.z_range->first, metadata.z_range->second)));
     }
-    const double span = std::max({std::abs(min_), std::abs(max_), 1e-300});
+    const double span = std::max({std::abs(all_.min), std::abs(all_.max), 1e-300});
     const auto check = [&](const char* what, double found, const std::optional<double>& stated, double tolerance) {
       if (!stated || !(std::abs(found - *stated) <= tolerance * span)) differ(what, found, stated.value_or(0.0));
     };
-    check("minimum", min_, said.min, 1e-12);
-    check("maximum", max_, said.max, 1e-12);
-    check("mean", sum_ / static_cast<double>(vertices_ - voids_), said.mean, 1e-9);  // sums in another order
+    check("minimum", all_.min, said.min, 1e-12);
+    check("maximum", all_.max, said.max, 1e-12);
+    check("mean", total_statistics(all_).mean.value_or(0.0), said.mean, 1e-9);  // sums in another order
   }
 
   const ArchiveReader& archive_;
@@ -434,16 +413,13 @@ class Verification {
   TileShape shape_;
   std::vector<float> void_heights_;
   std::vector<std::byte> void_digest_;
+  CountedVertices counted_;
   std::array<std::vector<SharedVertex>, std::size(kComparedNeighbours)> shared_;
   VerifyReport report_;
   ContentHash hash_;
   std::optional<SeedCheck> seeds_;
   std::int64_t stored_ = 0;
-  std::int64_t vertices_ = 0;
-  std::int64_t voids_ = 0;
-  double sum_ = 0.0;
-  double min_ = std::numeric_limits<double>::infinity();
-  double max_ = -std::numeric_limits<double>::infinity();
+  TileStatistics all_;
   bool all_readable_ = true;
 };
 

@@ -1,0 +1,20 @@
+#pragma once
+
+#include <string>
+
+namespace isohf::cli {
+
+/// A length on the ground as it was typed.
+struct LengthValue {
+  double value = 0.0;      ///< > 0
+  bool in_metres = false;  ///< a unit was given, and `value` is metres; else it is whatever the world's units are
+};
+
+/// "30", "30m", "0.5 km", "100ft", "us-ft", ...: a number greater than 0 and, if wanted, a unit of length. Throws
+/// Error{kInvalidArgument} "found ..., must be ...".
+[[nodiscard]] LengthValue parse_length(const std::string& text);
+
+/// A positive number, or a fraction of two as in 1/2. Throws likewise.
+[[nodiscard]] double parse_ratio(const std::string& text);
+
+}  // namespace isohf::cli

@@ -1,0 +1,45 @@
+#pragma once
+
+#include "isohf/archive/tile_codec.h"
+
+namespace isohf {
+
+/// The metadata member that says what statistics count, an extension: its one value is JSON text.
+inline constexpr const char* kStatisticsOfName = "statistics_of";
+inline constexpr const char* kStatisticsOfSource = "\"source ground\"";
+
+/// Whether statistics are of the source's ground. Throws Error{kCorrupt} for another value of the member.
+[[nodiscard]] bool counts_source_ground(const Metadata& metadata);
+
+/// Which of a tile's vertices statistics count: those on the source's ground, Metadata::valid, where a vertex that
+/// tiles share counts in the North-West one of them. In archives without the member above every tile's visible vertices
+/// count.
+class CountedVertices {
+ public:
+  /// metadata  grid, valid, wraps_x and the member above are looked at. Throws as counts_source_ground().
+  explicit CountedVertices(const Metadata& metadata);
+
+  /// Columns of a tile's row; none where last < first.
+  struct Columns {
+    int first;
+    int last;
+  };
+  [[nodiscard]] Columns of_row(TileIndex tile, int row) const;
+  [[nodiscard]] const TileShape& shape() const { return grid_.shape(); }
+
+ private:
+  TileGrid grid_;
+  bool all_;
+  bool wraps_x_;
+  std::int64_t last_x_;  ///< on the lattice, of the source's ground
+  std::int64_t last_z_;
+};
+
+/// Counts, sum and range of one tile's vertices that count; clamped and worst_rounding are left 0.
+[[nodiscard]] TileStatistics tile_statistics(const CountedVertices& counted, TileIndex index, const TileCodes& tile,
+                                             const Quantisation& quantisation);
+
+/// All tiles' statistics as the metadata has them.
+[[nodiscard]] Statistics total_statistics(const TileStatistics& all);
+
+}  // namespace isohf

@@ -1,0 +1,129 @@
+#include "isohf/restore/point_sampler.h"
+
+#include <gtest/gtest.h>
+#include <oneapi/tbb/task_arena.h>
+
+#include <atomic>
+#include <cmath>
+#include <random>
+#include <vector>
+
+#include "isohf/base/view.h"
+#include "isohf/convert/convert.h"
+#include "isohf/lattice/barycentric.h"
+#include "isohf/surface/normals.h"
+#include "support/memory_source.h"
+#include "support/temporary_folder.h"
+
+namespace isohf {
+namespace {
+
+using State = SurfaceSample::State;
+
+/// Hills with a hole, 300 x 200 samples in tiles of 20 x 19.
+class PointSamplerTest : public testing::TestWithParam<CodeType> {
+ protected:
+  PointSamplerTest() {
+    test::MemorySource<float> source(SampleType::kFloat32, 300, 200, [](std::int64_t c, std::int64_t r) {
+      if (c > 90 && c < 140 && r > 60 && r < 90) return std::nan("");
+      return 500.0 + 40.0 * std::sin(static_cast<double>(c) * 0.3) * std::cos(static_cast<double>(r) * 0.2);
+    });
+    ConvertOptions options;
+    options.code_type = GetParam();
+    options.plan.shape = {20, 19};
+    options.plan.levels = 1;
+    const std::atomic<bool> cancel = false;
+    (void)convert(source, folder / "a.isohf", options, {}, cancel);
+  }
+
+  static std::vector<WorldPoint> places() {
+    std::mt19937 random(11);
+    std::uniform_real_distribution<double> x_of(-10.0, 320.0);
+    std::uniform_real_distribution<double> z_of(-10.0, 220.0);
+    std::vector<WorldPoint> all = {{0.0, 0.0}, {std::nan(""), 5.0}, {5.0, HUGE_VAL}, {299.0, 199.0}};
+    for (int i = 0; i < 3000; ++i) all.push_back({x_of(random), z_of(random)});
+    return all;
+  }
+
+  test::TemporaryFolder folder;
+};
+
+/// One place from the whole tile's elevations: the definition.
+SurfaceSample one(const ArchiveReader& archive, WorldPoint place) {
+  SurfaceSample sample;
+  const TileGrid& grid = archive.grid();
+  if (!grid.contains(place)) return sample;
+  const TilePoint at = grid.locate(place);
+  sample.tile = at.tile;
+  const std::vector<double> elevations = archive.read_elevations(at.tile);
+  const Barycentric where = barycentric(grid.shape(), at.point);
+  sample.elevation =
+      interpolate(where, View2D<const double>(elevations.data(), grid.shape().columns(), grid.shape().rows()));
+  sample.state = std::isnan(sample.elevation) ? State::kVoid : State::kSurface;
+  if (sample.state == State::kVoid) return sample;
+  std::vector<float> relative;
+  double datum = std::nan("");
+  for (const double elevation : elevations) {
+    if (std::isnan(datum)) datum = elevation;
+  }
+  for (const double elevation : elevations) relative.push_back(static_cast<float>(elevation - datum));
+  const View2D<const float> heights(relative.data(), grid.shape().columns(), grid.shape().rows());
+  double sum[3] = {};
+  for (std::size_t i = 0; i < 3; ++i) {
+    if (where.weights[i] <= 0.0) continue;
+    const Normal normal = vertex_normal(grid, heights, where.vertices[i]);
+    sum[0] += where.weights[i] * double{normal.x};
+    sum[1] += where.weights[i] * double{normal.y};
+    sum[2] += where.weights[i] * double{normal.z};
+  }
+  const double length = std::sqrt(sum[0] * sum[0] + sum[1] * sum[1] + sum[2] * sum[2]);
+  for (std::size_t i = 0; i < 3; ++i) sample.normal[i] = sum[i] / length + 0.0;
+  return sample;
+}
+
+void expect_same(const SurfaceSample& found, const SurfaceSample& wanted) {
+  ASSERT_EQ(found.state, wanted.state);
+  EXPECT_EQ(found.tile, wanted.tile);
+  if (wanted.state != State::kSurface) return;
+  EXPECT_EQ(found.elevation, wanted.elevation);
+  EXPECT_EQ(found.normal, wanted.normal);
+}
+
+TEST_P(PointSamplerTest, FindsWhatTheWholeTileHasAtAnyPlaceInAnyOrder) {
+  const ArchiveReader archive(folder / "a.isohf");
+  const std::vector<WorldPoint> all = places();
+  std::vector<SurfaceSample> found(all.size());
+  PointSampler(archive, 1U << 20U).sample(all, found);
+  int states[3] = {};
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    SCOPED_TRACE(testing::Message() << all[i].x << " " << all[i].z);
+    expect_same(found[i], one(archive, all[i]));
+    ++states[static_cast<int>(found[i].state)];
+  }
+  for (const int count : states) EXPECT_GT(count, 10) << "surface, void and outside are all there";
+}
+
+TEST_P(PointSamplerTest, AnswersDependNeitherOnBatchesNorOnMemoryNorOnThreads) {
+  const ArchiveReader archive(folder / "a.isohf");
+  const std::vector<WorldPoint> all = places();
+  std::vector<SurfaceSample> together(all.size());
+  PointSampler(archive, 1U << 20U).sample(all, together);
+  for (const int threads : {1, 2, 7}) {
+    oneapi::tbb::task_arena arena(threads);
+    arena.execute([&] {
+      PointSampler sampler(archive, 1);  // keeps one tile
+      for (std::size_t first = 0, size = 1; first < all.size(); first += size, size = size * 3 + 1) {
+        const std::size_t count = std::min(size, all.size() - first);
+        std::vector<SurfaceSample> found(count);
+        sampler.sample(std::span(all).subspan(first, count), found);
+        for (std::size_t i = 0; i < count; ++i) expect_same(found[i], together[first + i]);
+      }
+    });
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Types, PointSamplerTest, testing::Values(CodeType::kU16, CodeType::kU8, CodeType::kF32),
+                         [](const auto& tested) { return to_string(tested.param); });
+
+}  // namespace
+}  // namespace isohf
