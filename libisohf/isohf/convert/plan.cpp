@@ -335,12 +335,6 @@ Plan make_plan(const SourceInfo& info, const PlanRequest& request) {
     refuse(fmt::format("{}: {}x{} samples, a surface needs at least 2x2", info.path, info.width, info.height));
   }
   const SourceFrame frame = make_source_frame(info, request.ground);
-  if (request.spacing && request.spacing_in_metres && !frame.in_metres) {
-    refuse(
-        fmt::format("{}: --spacing has a unit, but the input's coordinates are in none that is known; give a plain "
-                    "number, or --sample-spacing in metres",
-                    info.path));
-  }
   const bool may_fit =
       !request.shape && !request.budget && !request.density && !request.spacing && !request.through_samples;
   std::optional<Lattice> lattice = may_fit ? fitted_lattice(frame, request) : std::nullopt;

@@ -193,7 +193,11 @@ class Verification {
     if (tile.entry.stored) return true;
     tile.readable = true;
     tile.digest = void_digest_;
-    tile.vertices = tile.voids = shape_.visible_vertex_count();
+    for (int row = 1; row <= shape_.rows() - 2; ++row) {
+      const CountedVertices::Columns columns = counted_.of_row(index, row);
+      tile.statistics.vertices += std::max(0, columns.last - columns.first + 1);
+    }
+    tile.statistics.voids = tile.statistics.vertices;
     return false;
   }
 
