@@ -253,7 +253,7 @@ class AsciiGridSource final : public HeightSource {
                       marker_, marker_));
     }
     if (end_of_last_ == file_.size_bytes()) {
-      info_.warnings.emplace_back("the file ends within its last line: its last number may be cut off");
+      info_.warnings.push_back(loss("the file ends within its last line: its last number may be cut off"));
     }
   }
 

@@ -204,7 +204,8 @@ class DtedSource final : public HeightSource {
       system.semi_major_axis_m = 6378135.0;
       system.inverse_flattening = 298.26;
     } else {
-      info_.warnings.push_back("the horizontal datum in DSI is neither WGS84 nor WGS72; its ellipsoid is not known");
+      info_.warnings.push_back(
+          loss("the horizontal datum in DSI is neither WGS84 nor WGS72; its ellipsoid is not known"));
     }
     const std::string_view vertical = field(kUhlBytes + 141, 3);
     if (vertical == "E96") {

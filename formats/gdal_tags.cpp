@@ -53,7 +53,7 @@ void read_gdal_item(const std::string& role, const std::string& text, SourceInfo
   }
   const std::optional<double> value = number_from(text);
   if (!value || !std::isfinite(*value) || (role == "scale" && *value == 0.0)) {
-    info.warnings.push_back(fmt::format("GDAL gives the {} \"{}\", which is ignored", role, text));
+    info.warnings.push_back(loss(fmt::format("GDAL gives the {} \"{}\", which is ignored", role, text)));
     return;
   }
   (role == "scale" ? info.z_scale : info.z_offset) = *value;
@@ -67,8 +67,8 @@ void read_gdal_nodata(const std::string& text, SourceInfo& info) {
   if (stored) {
     info.void_values.push_back(*stored);
   } else {
-    info.warnings.push_back(fmt::format("GDAL_NODATA is \"{}\", which no {} sample can hold; it is ignored", shown,
-                                        to_string(info.sample_type)));
+    info.warnings.push_back(loss(fmt::format("GDAL_NODATA is \"{}\", which no {} sample can hold; it is ignored", shown,
+                                             to_string(info.sample_type))));
   }
 }
 

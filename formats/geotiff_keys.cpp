@@ -163,7 +163,7 @@ AxisAligned map_from_transformation(const std::vector<double>& m) {
   return {m[3], m[7], m[0], m[5], true};
 }
 
-std::optional<AxisAligned> map_from_tags(const GeoTags& tags, std::vector<std::string>& warnings) {
+std::optional<AxisAligned> map_from_tags(const GeoTags& tags, std::vector<Warning>& warnings) {
   const auto& scale = tags.pixel_scale;
   const auto& tie = tags.tiepoints;
   if (scale.size() >= 2) {
@@ -175,15 +175,15 @@ std::optional<AxisAligned> map_from_tags(const GeoTags& tags, std::vector<std::s
       map.y0 = tie[4] - tie[1] * map.dy;
       map.has_origin = true;
     } else {
-      warnings.push_back("the georeference has a pixel scale but no tie point: the position is unknown");
+      warnings.push_back(loss("the georeference has a pixel scale but no tie point: the position is unknown"));
     }
     return map;
   }
   if (!tags.transformation.empty()) return map_from_transformation(tags.transformation);
   if (!tie.empty()) {
     warnings.push_back(
-        "the georeference has tie points only (ground control points), which are not used: spacing and "
-        "position are unknown");
+        loss("the georeference has tie points only (ground control points), which are not used: spacing and "
+             "position are unknown"));
   }
   return std::nullopt;
 }
@@ -312,7 +312,7 @@ void read_horizontal_unit(Keys& keys, bool projected, GeoTiffPlace& place, doubl
       geo.metres_per_unit = unit->metres;
     } else {
       geo.unit = HorizontalUnit::kUnknown;
-      place.warnings.push_back(fmt::format("linear unit {} is not known: the spacing has no unit", code.value_or(0)));
+      place.warnings.push_back(loss(fmt::format("linear unit {} is not known: the spacing has no unit", *code)));
     }
     return;
   }
@@ -325,7 +325,8 @@ void read_horizontal_unit(Keys& keys, bool projected, GeoTiffPlace& place, doubl
     degrees = *radians * 180.0 / std::numbers::pi;
   } else {
     geo.unit = HorizontalUnit::kUnknown;
-    place.warnings.push_back(fmt::format("angular unit {} is not known: the spacing has no unit", code.value_or(0)));
+    place.warnings.push_back(
+        loss(fmt::format("angular unit {} is not known: the spacing has no unit", code.value_or(0))));
   }
 }
 
@@ -359,7 +360,7 @@ void read_vertical(Keys& keys, GeoTiffPlace& place) {
       place.vertical_unit = unit->name;
       place.metres_per_vertical_unit = unit->metres;
     } else {
-      place.warnings.push_back(fmt::format("vertical unit {} is not known", *code));
+      place.warnings.push_back(loss(fmt::format("vertical unit {} is not known", *code)));
     }
   }
 }
@@ -422,7 +423,7 @@ GeoTiffPlace place_from_geotiff(const GeoTags& tags, std::int64_t rows) {
     }
   }
   if (keys.malformed() > 0) {
-    place.warnings.push_back(fmt::format("{} GeoTIFF keys are malformed and are ignored", keys.malformed()));
+    place.warnings.push_back(loss(fmt::format("{} GeoTIFF keys are malformed and are ignored", keys.malformed())));
   }
   return place;
 }

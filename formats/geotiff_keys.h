@@ -29,7 +29,7 @@ struct GeoTiffPlace {
   bool rows_from_south = false;  ///< the stored rows run from South to North and must be turned
   std::string vertical_unit;
   double metres_per_vertical_unit = 1.0;
-  std::vector<std::string> warnings;
+  std::vector<Warning> warnings;
 };
 
 /// Interprets `tags` of a raster of `rows` stored rows. The tie point of a PixelIsArea raster names a pixel's corner,

@@ -142,8 +142,8 @@ void GridHeader::read_place(SourceInfo& info) const {
   const auto x = first_centre("x", place.spacing_x, info.width);
   const auto y = first_centre("y", place.spacing_y, info.height);
   if (x.has_value() != y.has_value() || (x && !spaced)) {
-    info.warnings.push_back(fmt::format("the header gives {}: the position is unknown",
-                                        x && y ? "an origin without a spacing" : "the origin of one axis alone"));
+    info.warnings.push_back(loss(fmt::format("the header gives {}: the position is unknown",
+                                             x && y ? "an origin without a spacing" : "the origin of one axis alone")));
     return;
   }
   if (!x) return;

@@ -260,7 +260,8 @@ class HeaderGridSource final : public HeightSource {
   [[noreturn]] void refuse_length(std::uint64_t bytes, const std::string& wanted) const {
     throw Error(ErrorCode::kCorrupt,
                 fmt::format("{}: the file has {} bytes, {} x {} samples of {} bytes as {} says take {}", info_.path,
-                            bytes, info_.width, info_.height, size_bytes(info_.sample_type), header_path_, wanted));
+                            bytes, info_.width, info_.height, size_bytes(info_.sample_type), header_path_, wanted),
+                {info_.path, fmt::format("{} bytes", bytes), wanted + " bytes", ""});
   }
 
   std::string header_path_;

@@ -135,7 +135,8 @@ class HgtSource final : public HeightSource {
       geo.origin_x = corner->longitude;
       geo.origin_y = corner->latitude + 1;
     } else {
-      info_.warnings.push_back("the name does not say where the tile lies (N44E006.hgt does); its position is unknown");
+      info_.warnings.push_back(
+          loss("the name does not say where the tile lies (N44E006.hgt does); its position is unknown"));
     }
     if (size->rows != 1201 && size->rows != 3601) {
       info_.warnings.push_back(

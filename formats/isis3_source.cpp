@@ -191,12 +191,12 @@ class Isis3Source final : public HeightSource {
     if (geo.system.body.empty()) geo.system.body = target;
     geo.system.name = fmt::format("{} {}", map.text("PROJECTIONNAME").value_or("unknown projection"), target);
     if (map.number("ROTATION").value_or(0.0) != 0.0) {
-      info_.warnings.push_back("the map is rotated; its place is left out");
+      info_.warnings.push_back(loss("the map is rotated; its place is left out"));
       return;
     }
     const std::optional<double> resolution = metres(map, "PIXELRESOLUTION");
     if (!resolution || !(*resolution > 0.0)) {
-      info_.warnings.push_back("the group Mapping gives no PixelResolution in metres; the place is left out");
+      info_.warnings.push_back(loss("the group Mapping gives no PixelResolution in metres; the place is left out"));
       return;
     }
     geo.unit = HorizontalUnit::kMetre;
@@ -205,7 +205,8 @@ class Isis3Source final : public HeightSource {
     const std::optional<double> x = metres(map, "UPPERLEFTCORNERX");
     const std::optional<double> y = metres(map, "UPPERLEFTCORNERY");
     if (!x || !y) {
-      info_.warnings.push_back("the group Mapping gives no UpperLeftCornerX and Y in metres; the origin is unknown");
+      info_.warnings.push_back(
+          loss("the group Mapping gives no UpperLeftCornerX and Y in metres; the origin is unknown"));
       return;
     }
     geo.has_origin = true;

@@ -161,15 +161,17 @@ class Survey {
   /// Hands the members over; warnings of files come first in the plan's.
   std::vector<PlacedMember> finish() {
     SourceInfo& info = plan_->info;
-    std::size_t shown = 0;
-    for (const Warning& warning : warnings_) {
-      if (++shown > kMostWarnings) break;
-      info.warnings.push_back(
-          warning.files == 1 ? fmt::format("{}: {}", warning.path, warning.text)
-                             : fmt::format("{} and {} more files: {}", warning.path, warning.files - 1, warning.text));
+    Warning::Kind untold = Warning::Kind::kNote;
+    for (const FileWarning& warning : warnings_) {
+      if (info.warnings.size() == kMostWarnings) {
+        untold = std::max(untold, warning.text.kind);
+        continue;
+      }
+      const std::string others = warning.files == 1 ? "" : fmt::format(" and {} more files", warning.files - 1);
+      info.warnings.push_back(warning.text.reworded(fmt::format("{}{}: {}", warning.path, others, warning.text)));
     }
-    if (warnings_.size() > kMostWarnings) {
-      info.warnings.push_back(fmt::format("and {} more warnings of other kinds", warnings_.size() - kMostWarnings));
+    if (const std::size_t told = info.warnings.size(); told < warnings_.size()) {
+      info.warnings.push_back({fmt::format("and {} more warnings of other kinds", warnings_.size() - told), untold});
     }
     if (silent_ > 0 && states_system(info.georeference.system)) {
       info.warnings.push_back(fmt::format(
@@ -179,8 +181,8 @@ class Survey {
   }
 
  private:
-  struct Warning {
-    std::string text;
+  struct FileWarning {
+    Warning text;
     std::string path;
     std::int64_t files = 0;
   };
@@ -228,17 +230,17 @@ class Survey {
     return registration == Registration::kPoint ? "points" : "areas";
   }
 
-  void count_warnings(const std::string& path, const std::vector<std::string>& texts) {
-    for (const std::string& text : texts) {
+  void count_warnings(const std::string& path, const std::vector<Warning>& texts) {
+    for (const Warning& text : texts) {
       // Readers that name their file in a warning would make each one its own.
       const std::string prefix = path + ": ";
-      const std::string bare = text.starts_with(prefix) ? text.substr(prefix.size()) : text;
+      const std::string bare = text.substr(text.starts_with(prefix) ? prefix.size() : 0);
       const auto found = std::find_if(warnings_.begin(), warnings_.end(),
-                                      [&](const Warning& warning) { return warning.text == bare; });
+                                      [&](const FileWarning& warning) { return warning.text == bare; });
       if (found != warnings_.end()) {
         ++found->files;
       } else if (warnings_.size() < 100 * kMostWarnings) {
-        warnings_.push_back({bare, path, 1});
+        warnings_.push_back({text.reworded(bare), path, 1});
       }
     }
   }
@@ -246,7 +248,7 @@ class Survey {
   MosaicPlan* plan_;
   std::string first_;
   std::vector<PlacedMember> placed_;
-  std::vector<Warning> warnings_;
+  std::vector<FileWarning> warnings_;
   std::int64_t silent_ = 0;
 };
 

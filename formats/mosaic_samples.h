@@ -25,8 +25,8 @@ struct SampleKind {
 /// The samples of a mosaic: a kind that holds those of all its members, and the raw sample where there is no member.
 struct MosaicSamples {
   SampleKind kind;
-  std::vector<std::byte> gap;      ///< one raw sample that is void; without meaning where the mosaic has no gaps
-  std::vector<std::string> notes;  ///< what was changed for it to hold all, one line each
+  std::vector<std::byte> gap;  ///< one raw sample that is void; without meaning where the mosaic has no gaps
+  std::vector<Warning> notes;  ///< what was changed for it to hold all, one line each
 };
 
 /// Chooses the samples of a mosaic.

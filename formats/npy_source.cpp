@@ -256,7 +256,7 @@ class NpySource final : public HeightSource {
                   fmt::format("{}: ends early: {} bytes, an array of {} x {} {} needs {:.0f}", info_.path,
                               file_.size_bytes(), info_.width, info_.height, to_string(info_.sample_type), wanted));
     }
-    if (there > wanted) info_.warnings.push_back(fmt::format("{:.0f} bytes follow the array", there - wanted));
+    if (there > wanted) info_.warnings.push_back(loss(fmt::format("{:.0f} bytes follow the array", there - wanted)));
   }
 
   /// Fortran order: the samples of a column follow each other.

@@ -65,8 +65,8 @@ void override_spacing(SourceInfo& info, double spacing_m) {
   } else {
     if (place.unit == HorizontalUnit::kDegree) {
       info.warnings.push_back(
-          fmt::format("a spacing of {} m replaces {} x {} degrees: the origin in degrees is dropped", spacing_m,
-                      place.spacing_x, place.spacing_y));
+          loss(fmt::format("a spacing of {} m replaces {} x {} degrees: the origin in degrees is dropped", spacing_m,
+                           place.spacing_x, place.spacing_y)));
     }
     place.has_origin = false;
     place.origin_x = place.origin_y = 0.0;

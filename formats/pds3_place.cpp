@@ -51,11 +51,11 @@ class Placer {
     read_ellipsoid();
     const double rotation = map_.number("MAP_PROJECTION_ROTATION").value_or(0.0);
     if (rotation != 0.0) {
-      warn(fmt::format("the map is rotated by {} degrees; its place is left out", rotation));
+      warn(loss(fmt::format("the map is rotated by {} degrees; its place is left out", rotation)));
       return;
     }
     if (!read_scale()) {
-      warn("the label gives no MAP_RESOLUTION in pixels per degree and no MAP_SCALE; the place is left out");
+      warn(loss("the label gives no MAP_RESOLUTION in pixels per degree and no MAP_SCALE; the place is left out"));
       return;
     }
     if (degrees_) {
@@ -79,7 +79,7 @@ class Placer {
   }
 
  private:
-  void warn(std::string text) { place_.warnings.push_back(std::move(text)); }
+  void warn(Warning text) { place_.warnings.push_back(std::move(text)); }
 
   void read_ellipsoid() {
     const std::optional<double> a = metres(map_, "A_AXIS_RADIUS");
@@ -177,7 +177,7 @@ class Placer {
 
   void place_by_bounds() {
     if (!west_ || !north_ || !south_ || !east_) {
-      warn("the label gives neither projection offsets nor bounds; the origin is unknown");
+      warn(loss("the label gives neither projection offsets nor bounds; the origin is unknown"));
       return;
     }
     const auto spans = [&](std::int64_t columns, std::int64_t rows) {
@@ -191,10 +191,10 @@ class Placer {
     } else if (spans(columns_ - 1, rows_ - 1)) {
       geo_.registration = Registration::kPoint;
     } else {
-      warn(fmt::format(
+      warn(loss(fmt::format(
           "the label's bounds do not span {} x {} samples and it gives no projection offsets; the origin is "
           "unknown",
-          columns_, rows_));
+          columns_, rows_)));
       return;
     }
     geo_.has_origin = true;

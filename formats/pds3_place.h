@@ -12,7 +12,7 @@ namespace isohf {
 /// What a PDS3 label says of a raster's place.
 struct Pds3Place {
   Georeference georeference;
-  std::vector<std::string> warnings;
+  std::vector<Warning> warnings;
 };
 
 /// Interprets TARGET_NAME and IMAGE_MAP_PROJECTION of a label (PDS Standards Reference 3.8, appendix B).

@@ -222,8 +222,8 @@ class Pds3Source final : public HeightSource {
     }
     const std::optional<double> stored = void_value_as_stored(info_.sample_type, *number);
     if (!stored) {
-      info_.warnings.push_back(fmt::format("{} is {}, which no {} sample can hold; it is left aside", key, value.text,
-                                           to_string(info_.sample_type)));
+      info_.warnings.push_back(loss(fmt::format("{} is {}, which no {} sample can hold; it is left aside", key,
+                                                value.text, to_string(info_.sample_type))));
     } else if (std::find(info_.void_values.begin(), info_.void_values.end(), *stored) == info_.void_values.end()) {
       info_.void_values.push_back(*stored);
     }

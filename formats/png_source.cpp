@@ -155,7 +155,7 @@ class PngSource final : public HeightSource {
         description.require("png", info_);
         return description.describe(info_);
       }
-      info_.warnings.emplace_back("the .json beside it names no format, as one of isohf's would: it is left aside");
+      info_.warnings.push_back(loss("the .json beside it names no format, as one of isohf's would: it is left aside"));
     }
     read_place_beside(info_, packing_ ? 0 : static_cast<int>(channel_) + 1);
   }

@@ -106,7 +106,8 @@ class RawSource final : public HeightSource {
     if (bytes != file_.size_bytes()) {
       throw Error(ErrorCode::kCorrupt,
                   fmt::format("{}: the file has {} bytes, {} x {} samples of {} bytes take {}", path,
-                              file_.size_bytes(), layout.width, layout.height, size_bytes(layout.type), bytes));
+                              file_.size_bytes(), layout.width, layout.height, size_bytes(layout.type), bytes),
+                  {path, fmt::format("{} bytes", file_.size_bytes()), fmt::format("{} bytes", bytes), ""});
     }
     if (description != nullptr) description->describe(info_);
     if (is_floating(layout.type)) {

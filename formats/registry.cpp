@@ -165,7 +165,9 @@ std::string library_of(const Format& format) {
   return format.library != nullptr ? format.library() : "isohf";
 }
 
-std::unique_ptr<HeightSource> open_source(const std::string& path, const OpenOptions& options) {
+namespace {
+
+std::unique_ptr<HeightSource> open_by_head(const std::string& path, const OpenOptions& options) {
   const Head head = read_head(path);
   if (options.raw) return open_raw(path, options);
   const Reader* reader = reader_of(path, std::span(head.bytes).first(head.size));
@@ -179,6 +181,16 @@ std::unique_ptr<HeightSource> open_source(const std::string& path, const OpenOpt
     throw Error(ErrorCode::kInvalidArgument, path + ": has no parts; --part is for OpenEXR files of several");
   }
   return reader->open(path, options);
+}
+
+}  // namespace
+
+std::unique_ptr<HeightSource> open_source(const std::string& path, const OpenOptions& options) {
+  try {
+    return open_by_head(path, options);
+  } catch (const Error& error) {
+    throw error.at(path);  // which every reader's message names
+  }
 }
 
 }  // namespace isohf

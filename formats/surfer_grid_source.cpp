@@ -145,7 +145,7 @@ class SurferGridSource final : public HeightSource {
     set_layout(header.size(), SampleType::kFloat32);
     const std::uint64_t end = layout_.offset_bytes + layout_.row_bytes * static_cast<std::uint64_t>(info_.height);
     if (end < file_.size_bytes()) {
-      info_.warnings.push_back(fmt::format("{} bytes follow the grid", file_.size_bytes() - end));
+      info_.warnings.push_back(loss(fmt::format("{} bytes follow the grid", file_.size_bytes() - end)));
     }
   }
 
@@ -252,7 +252,7 @@ class SurferGridSource final : public HeightSource {
       }
     }
     const bool cut = words_->offset_of(word) + word.size() == file_.size_bytes();
-    if (cut) info_.warnings.emplace_back("the file ends within its last line: its last number may be cut off");
+    if (cut) info_.warnings.push_back(loss("the file ends within its last line: its last number may be cut off"));
     if (words_->next(word)) {
       corrupt(fmt::format("\"{}\" at byte {} comes after the {} x {} nodes that the header says", printable(word),
                           words_->offset_of(word), info_.width, info_.height));

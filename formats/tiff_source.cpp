@@ -244,7 +244,8 @@ class TiffSource final : public HeightSource {
     if (directories.has_more_pages)
       info_.warnings.emplace_back("there are several images in the file; the first is read");
     if (directories.has_broken)
-      info_.warnings.emplace_back("a directory behind the image is damaged; a transparency mask there is not applied");
+      info_.warnings.push_back(
+          loss("a directory behind the image is damaged; a transparency mask there is not applied"));
     mask_ = directories.mask;
     place(tags);
     read_gdal_metadata(tags.gdal_metadata, channel_, info_);
@@ -305,9 +306,9 @@ class TiffSource final : public HeightSource {
       blocks_->set_fill(std::span(fill).first(size_bytes(info_.sample_type)));
       reads_as = "void";
     }
-    info_.warnings.push_back(fmt::format("{} of {} {} are not stored in the file; they read as {}",
-                                         blocks_->missing_blocks(), blocks_->block_count(),
-                                         layout_.tiled ? "tiles" : "strips", reads_as));
+    info_.warnings.push_back(
+        loss(fmt::format("{} of {} {} are not stored in the file; they read as {}", blocks_->missing_blocks(),
+                         blocks_->block_count(), layout_.tiled ? "tiles" : "strips", reads_as)));
   }
 
   RawFile file_;

@@ -100,7 +100,7 @@ void UsgsDemHeader::read_system(SourceInfo& info) const {
     system.semi_major_axis_m = known->semi_major_axis_m;
     system.inverse_flattening = known->inverse_flattening;
   } else {
-    info.warnings.emplace_back("the header names no horizontal datum that isohf knows (old files mean NAD27)");
+    info.warnings.push_back(loss("the header names no horizontal datum that isohf knows (old files mean NAD27)"));
   }
   const std::string name = known != nullptr ? known->name : "unknown datum";
   system.name = name;

@@ -213,7 +213,7 @@ void read_prj_beside(SourceInfo& info) {
   const std::string text = prj_beside(info.path);
   if (!text.empty() && (read_wkt(text, info.georeference) || read_old_prj(text, info.georeference))) return;
   if (!text.empty()) {
-    info.warnings.emplace_back("the .prj beside the file is not the WKT of a map's reference system; it is ignored");
+    info.warnings.push_back(loss("the .prj beside the file is not the WKT of a map's reference system; it is ignored"));
   }
   const Georeference& place = info.georeference;
   if (place.has_origin && place.spacing_x < kFinestAsMetres && place.spacing_y < kFinestAsMetres &&

@@ -477,8 +477,12 @@ void CommandLine::repeated_pair(const std::string& flags, const std::string& val
               {.value_name = value_name, .description = description, .values = 2, .repeats = true, .take = take_two});
 }
 
-void CommandLine::flag(const std::string& flags, const std::string& description, bool& value) {
-  const auto take = [&value](const Values& values) { value = values.front() == "true"; };
+void CommandLine::flag(const std::string& flags, const std::string& description, bool& value,
+                       std::function<void()> given) {
+  const auto take = [&value, given = std::move(given)](const Values& values) {
+    value = values.front() == "true";
+    if (value && given) given();
+  };
   state_->add(flags, {.description = description, .values = 0, .take = take});
 }
 
@@ -570,7 +574,8 @@ void CommandLine::require(const std::string& name, const std::string& value) con
 }
 
 void CommandLine::fail(const std::string& why) const {
-  refuse((state_->is_program() ? "" : state_->command + ": ") + why);
+  if (state_->is_program()) refuse(why);
+  throw Error(ErrorCode::kInvalidArgument, {state_->command, why, "", ""});
 }
 
 std::vector<DeclaredOption> options_of(const Command& command) {

@@ -62,7 +62,9 @@ class CommandLine {
                      std::function<void(const std::string&, const std::string&)> take);
   /// Words that the option declared last may begin with, to suggest the nearest where its value is refused.
   void words(const std::vector<std::string>& words);
-  void flag(const std::string& flags, const std::string& description, bool& value);
+  /// `given` is called where the flag is set, also by the --config file.
+  void flag(const std::string& flags, const std::string& description, bool& value,
+            std::function<void()> given = nullptr);
   /// At most one of these long options may be given.
   void exclusive(const std::vector<std::string>& options);
   /// What --help ends with: examples and notes.

@@ -13,7 +13,7 @@ namespace isohf::cli {
 namespace {
 
 [[noreturn]] void refuse(const std::string& text, const std::string& required) {
-  throw Error(ErrorCode::kInvalidArgument, fmt::format("found '{}', must be {}", text, required));
+  throw Error(ErrorCode::kInvalidArgument, ErrorParts{"", "'" + text + "'", required, ""});
 }
 
 }  // namespace
@@ -84,8 +84,7 @@ std::vector<double> parse_numbers(const std::string& text) {
     const std::size_t end = std::min(text.find(',', start), text.size());
     double value = 0.0;
     if (!read_number(std::string_view(text).substr(start, end - start), value)) {
-      throw Error(ErrorCode::kInvalidArgument,
-                  fmt::format("found '{}', must be numbers separated by commas, as in 5,15,30", text));
+      refuse(text, "numbers separated by commas, as in 5,15,30");
     }
     numbers.push_back(value);
     start = end + 1;

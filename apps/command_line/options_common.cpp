@@ -1,6 +1,7 @@
 #include "options_common.h"
 
 #include "option_values.h"
+#include "standard_output.h"
 
 namespace isohf::cli {
 namespace {
@@ -11,8 +12,12 @@ constexpr int kMaxThreads = 1024;
 
 void add_common_options(CommandLine& line, CommonOptions& options) {
   line.group("Common");
-  line.flag("--json", "Print one JSON document on standard output instead of text", options.json);
-  line.flag("-q,--quiet", "Print nothing but errors", options.quiet);
+  line.flag("--json", "Print one JSON document on standard output instead of text, of an error as well", options.json,
+            [] { telling().json = true; });
+  line.flag("-q,--quiet", "Print nothing but errors, and warnings of lost data", options.quiet,
+            [] { telling().quiet = true; });
+  line.flag("--strict", "Take warnings as errors: where one arises, nothing is written", options.strict,
+            [] { telling().strict = true; });
   line.flag("-v,--verbose", "Say more, on standard error", options.verbose);
 }
 
@@ -26,6 +31,7 @@ void add_work_options(CommandLine& line, WorkOptions& options) {
               "none. On standard error (default auto)",
               [&](const std::string& text) {
                 options.progress = static_cast<ProgressMode>(parse_word(text, {"auto", "plain", "json", "none"}));
+                telling().json_notes = options.progress == ProgressMode::kJson;
               });
 }
 

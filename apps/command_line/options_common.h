@@ -12,9 +12,10 @@ struct CommonOptions {
   bool json = false;
   bool quiet = false;
   bool verbose = false;
+  bool strict = false;
 };
 
-/// --json, -q, -v. (--help and --config are CommandLine's own.)
+/// --json, -q, --strict, -v. (--help and --config are CommandLine's own.)
 void add_common_options(CommandLine& line, CommonOptions& options);
 
 /// Options of commands that take a while.

@@ -20,6 +20,15 @@ std::string& name_of_program() {
   return name;
 }
 
+/// How errors are told of where the options are not parsed yet, or cannot be.
+void prepare_telling(const Arguments& arguments) {
+  for (std::size_t i = 0; i < arguments.size() && arguments[i] != "--"; ++i) {
+    if (arguments[i] == "--json") telling().json = true;
+    if (arguments[i] == "--progress=json") telling().json_notes = true;
+    if (arguments[i] == "--progress" && i + 1 < arguments.size()) telling().json_notes = arguments[i + 1] == "json";
+  }
+}
+
 }  // namespace
 
 int exit_code_for(ErrorCode code) {
@@ -44,19 +53,18 @@ int run_program(const char* name, int argc, char** argv, int (*body)(const Argum
   // A closed pipe or a file over its size limit is an error that write() reports, not a reason to die.
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGXFSZ, SIG_IGN);
+  const Arguments arguments(argv + (argc > 0 ? 1 : 0), argv + argc);
+  prepare_telling(arguments);
   try {
-    return body(Arguments(argv + (argc > 0 ? 1 : 0), argv + argc));
+    return body(arguments);
   } catch (const OutputClosed&) {
     return kExitFailed;
   } catch (const Error& error) {
-    print_error(error.what());
-    return exit_code_for(error.code());
+    return print_error(error, exit_code_for(error.code()));
   } catch (const std::bad_alloc&) {
-    print_error("out of memory");
-    return kExitFailed;
+    return print_error(Error(ErrorCode::kOutOfMemory, "out of memory"), kExitFailed);
   } catch (const std::exception& error) {
-    print_error(std::string("internal error: ") + error.what());
-    return kExitFailed;
+    return print_internal_error(error.what());
   }
 }
 

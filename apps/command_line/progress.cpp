@@ -36,7 +36,12 @@ ProgressDisplay::ProgressDisplay(ProgressMode mode, bool quiet, bool verbose) : 
 }
 
 ProgressDisplay::~ProgressDisplay() {
+  clear();
+}
+
+void ProgressDisplay::clear() {
   if (bar_is_shown_) write_to_terminal("\r\x1b[K");
+  bar_is_shown_ = false;
 }
 
 void ProgressDisplay::update(const std::string& what, const std::string& unit, std::int64_t done, std::int64_t total) {
@@ -57,7 +62,7 @@ void ProgressDisplay::update(const std::string& what, const std::string& unit, s
   const double left = rate > 0.0 ? static_cast<double>(total - done) / rate : 0.0;
   const double part = total > 0 ? std::clamp(static_cast<double>(done) / static_cast<double>(total), 0.0, 1.0) : 1.0;
   if (style_ == Style::kJson) {
-    print_note(
+    print_progress(
         fmt::format(R"({{"progress":"{}","unit":"{}","done":{},"total":{},"seconds":{:.3f},"seconds_left":{:.3f}}})",
                     what, unit, done, total, seconds, left));
     return;
@@ -66,7 +71,7 @@ void ProgressDisplay::update(const std::string& what, const std::string& unit, s
   if (rate > 0.0) text += fmt::format("  {:.4g} {}/s", rate, unit);
   if (rate > 0.0 && !is_last) text += fmt::format("  {} left", describe_seconds(left));
   if (style_ == Style::kLines) {
-    print_note(program_name() + ": " + text);
+    print_note(text);
     return;
   }
   // A line that is wider than the terminal cannot be overwritten. The bar gives way before the figures do.

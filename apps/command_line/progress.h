@@ -21,6 +21,8 @@ class ProgressDisplay {
 
   /// `what` names the pass ("tiles"); a new name starts a new clock. `unit` is what is counted.
   void update(const std::string& what, const std::string& unit, std::int64_t done, std::int64_t total);
+  /// Erases the bar, for a line that is printed now.
+  void clear();
 
  private:
   using Clock = std::chrono::steady_clock;

@@ -2,15 +2,18 @@
 
 #include <unistd.h>
 
+#include <array>
 #include <cerrno>
 #include <cstring>
+#include <nlohmann/json.hpp>
 
-#include "isohf/base/error.h"
 #include "program.h"
 #include "terminal.h"
 
 namespace isohf::cli {
 namespace {
+
+using nlohmann::ordered_json;
 
 constexpr std::size_t kBufferBytes = 1 << 16;
 
@@ -26,6 +29,33 @@ void write_line_to_stderr(std::string line) {
     data += written;
     left -= static_cast<std::size_t>(written);
   }
+}
+
+/// On one line; bytes that are no UTF-8 are replaced.
+std::string line_of(const ordered_json& object) {
+  return object.dump(-1, ' ', false, ordered_json::error_handler_t::replace);
+}
+
+/// A line for people, `head` of them styled, or the JSON object that says the same.
+void tell(const std::string& head, Style style, const std::string& text, const ordered_json& object) {
+  if (telling().json_notes) return write_line_to_stderr(line_of(object));
+  const std::string name = program_name() + ":";
+  write_line_to_stderr((style == Style::kWarning ? name + " " + styled(head, style, STDERR_FILENO)
+                                                 : styled(name, style, STDERR_FILENO) + head) +
+                       " " + printable(text));
+}
+
+int report(const std::string& text, const ordered_json& object, int exit_code) {
+  tell("", Style::kError, text, object);
+  if (!telling().json) return exit_code;
+  try {
+    StandardOutput out;
+    out.write(line_of(object) + "\n");
+    out.finish();
+  } catch (const OutputClosed&) {
+  } catch (const Error&) {  // it has been told on standard error, or is what is being told
+  }
+  return exit_code;
 }
 
 }  // namespace
@@ -64,15 +94,61 @@ std::string printable(std::string text) {
   return text;
 }
 
-void print_warning(const std::string& text) {
-  write_line_to_stderr(program_name() + ": " + styled("warning:", Style::kWarning, STDERR_FILENO) + " " +
-                       printable(text));
+Telling& telling() {
+  static Telling how;
+  return how;
 }
-void print_error(const std::string& text) {
-  write_line_to_stderr(styled(program_name() + ":", Style::kError, STDERR_FILENO) + " " + printable(text));
+
+void print_warnings(const std::vector<Warning>& warnings) {
+  if (telling().strict && !warnings.empty()) throw error_from(warnings);
+  for (const Warning& warning : warnings) {
+    const bool is_loss = warning.kind == Warning::Kind::kLoss;
+    if (telling().quiet && !is_loss) continue;
+    tell("warning:", Style::kWarning, warning,
+         {{"warning", {{"kind", is_loss ? "loss" : "note"}, {"message", std::string(warning)}}}});
+  }
 }
+
+void print_warning(const Warning& warning) {
+  print_warnings({warning});
+}
+
+ordered_json json_from(const Error& error, int exit_code) {
+  // In the order of ErrorCode.
+  static constexpr std::array kCodes = {"invalid-argument", "io",        "unsupported", "corrupt",
+                                        "out-of-memory",    "cancelled", "warning"};
+  ordered_json json = {
+      {"code", kCodes.at(static_cast<std::size_t>(error.code()))}, {"exit_code", exit_code}, {"message", error.what()}};
+  const ErrorParts parts = error.parts();
+  const auto add = [&](const char* name, const std::string& text) {
+    if (!text.empty()) json[name] = text;
+  };
+  add("where", parts.where);
+  add("found", parts.found);
+  add("required", parts.required);
+  add("remedy", parts.remedy);
+  return json;
+}
+
+void print_error_line(const Error& error) {
+  tell("", Style::kError, error.what(), {{"error", json_from(error, exit_code_for(error.code()))}});
+}
+
+int print_error(const Error& error, int exit_code) {
+  return report(error.what(), {{"error", json_from(error, exit_code)}}, exit_code);
+}
+
+int print_internal_error(const std::string& what) {
+  return report("internal error: " + what,
+                {{"error", {{"code", "internal"}, {"exit_code", +kExitFailed}, {"message", what}}}}, kExitFailed);
+}
+
 void print_note(const std::string& text) {
-  write_line_to_stderr(printable(text));
+  write_line_to_stderr(telling().json_notes ? line_of({{"note", text}}) : program_name() + ": " + printable(text));
+}
+
+void print_progress(const std::string& line) {
+  write_line_to_stderr(printable(line));
 }
 
 }  // namespace isohf::cli

@@ -1,7 +1,12 @@
 #pragma once
 
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <string_view>
+#include <vector>
+
+#include "isohf/base/error.h"
+#include "isohf/base/warning.h"
 
 namespace isohf::cli {
 
@@ -28,11 +33,30 @@ class StandardOutput {
 /// Thrown where standard output's reader has gone; main() ends quietly.
 struct OutputClosed {};
 
-/// One line on standard error: "PROGRAM: warning: ...".
-void print_warning(const std::string& text);
+/// How this run tells of warnings and errors; one for the process, as its streams are. The options set it.
+struct Telling {
+  bool json = false;        ///< --json: an error is a document on standard output as well
+  bool json_notes = false;  ///< --progress json: every line on standard error is a JSON object
+  bool quiet = false;       ///< -q: of warnings only those of kind kLoss
+  bool strict = false;      ///< --strict: a warning is an error
+};
+[[nodiscard]] Telling& telling();
+
+/// One line on standard error for each: "PROGRAM: warning: ...". Throws Error{kWarning} where strict.
+void print_warnings(const std::vector<Warning>& warnings);
+void print_warning(const Warning& warning);
 /// One line on standard error: "PROGRAM: ...".
-void print_error(const std::string& text);
-/// One line on standard error as it stands.
+void print_error_line(const Error& error);
+/// The same, and with --json {"error": ...} on standard output. Returns `exit_code`.
+int print_error(const Error& error, int exit_code);
+/// The same for what is a fault of the program's own.
+int print_internal_error(const std::string& what);
+/// The member `error` of such a document: code, exit_code, message, and of where, found, required and remedy what is
+/// known.
+[[nodiscard]] nlohmann::ordered_json json_from(const Error& error, int exit_code);
+/// One line on standard error: "PROGRAM: ...".
 void print_note(const std::string& text);
+/// One line on standard error as it stands.
+void print_progress(const std::string& line);
 
 }  // namespace isohf::cli

@@ -4,12 +4,15 @@
 #include <sys/resource.h>
 
 #include <cstdlib>
+#include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <set>
 
 #include "accuracy_output.h"
 #include "command.h"
+#include "convert_each.h"
 #include "describe.h"
 #include "formats/letter_case.h"
 #include "input_files.h"
@@ -19,6 +22,8 @@
 #include "isohf/base/file.h"
 #include "isohf/base/output_file.h"
 #include "isohf/convert/convert.h"
+#include "isohf/convert/job_description.h"
+#include "isohf/convert/memory_plan.h"
 #include "isohf/surface/acquisition.h"
 #include "isohf/surface/kernels.h"
 #include "json_output.h"
@@ -53,7 +58,8 @@ Examples:
   isohf convert tiles/ -o land.isohf --require-complete
   isohf convert heights.exr h.isohf --channel R --z-scale 1200 --sample-spacing 2
   isohf plan dem.tif                  the same options without writing: see what comes out
-  for f in *.hgt; do isohf convert "$f" "${f%.hgt}.isohf" -q || break; done)";
+  isohf convert --each tiles/ --recursive --out-dir archives --keep-going    one archive of each
+  isohf convert --each tiles/ --recursive --out-dir archives --resume        goes on after an interrupt)";
 
 struct ConvertCommandOptions {
   CommonOptions common;
@@ -68,6 +74,7 @@ struct ConvertCommandOptions {
   GeoidRequest geoid;
   bool spacing_in_metres = false;
   bool dry_run = false;
+  EachOptions each;
   /// Measure the archive against the input; the file for the report, "-" for none beside the summary.
   std::optional<std::string> report;
   ErrorFreedom freedom;  ///< of --max-error
@@ -95,6 +102,21 @@ void take_output(std::vector<std::string> names, ConvertCommandOptions& options)
   inputs.insert(inputs.end(), names.begin(), names.end());
 }
 
+/// What belongs to --each alone, and what has no meaning for many archives.
+void check_each_options(const CommandLine& line, const ConvertCommandOptions& options) {
+  const auto refuse = [](const std::string& why) {
+    throw Error(ErrorCode::kInvalidArgument, {"convert", why, "", ""});
+  };
+  for (const char* option : {"--out-dir", "--skip-existing", "--keep-going"}) {
+    if (!options.each.each && line.given(option)) refuse(std::string(option) + " needs --each");
+  }
+  if (!options.each.each) return;
+  if (options.each.folder.empty()) refuse("--each needs --out-dir DIR, where the archives go");
+  for (const char* option : {"--output", "--dry-run", "--source-name", "--report", "--overlap", "--require-complete"}) {
+    if (line.given(option)) refuse(fmt::format("{} is for one archive, --each makes many; leave one out", option));
+  }
+}
+
 std::optional<ConvertCommandOptions> parse(const Arguments& arguments) {
   ConvertCommandOptions options;
   std::optional<double> sun_min_deg;
@@ -112,6 +134,7 @@ std::optional<ConvertCommandOptions> parse(const Arguments& arguments) {
   line.flag("--resume", "Continue OUTPUT.part of an interrupted run, after checking what is there",
             options.convert.resume);
   line.flag("--dry-run", "Print the plan and write nothing, as isohf plan INPUT does", options.dry_run);
+  add_each_options(line, options.each);
   add_source_options(line, options.open);
   add_mosaic_options(line, options.inputs);
   line.option("--source-name", "NAME",
@@ -173,9 +196,14 @@ std::optional<ConvertCommandOptions> parse(const Arguments& arguments) {
   add_common_options(line, options.common);
   line.footer(kFooter);
   if (!line.parse(arguments)) return std::nullopt;
-  take_output(std::move(names), options);
+  check_each_options(line, options);
+  if (options.each.each) {
+    options.inputs.names.insert(options.inputs.names.end(), names.begin(), names.end());
+  } else {
+    take_output(std::move(names), options);
+  }
   line.require("INPUT", options.inputs.names);
-  if (!options.dry_run) line.require("OUTPUT", options.output);
+  if (!options.dry_run && !options.each.each) line.require("OUTPUT", options.output);
   if (options.convert.clamp_range && !options.convert.z_range) {
     throw Error(ErrorCode::kInvalidArgument, "convert: --clamp-range needs --z-range MIN:MAX");
   }
@@ -197,12 +225,15 @@ std::optional<ConvertCommandOptions> parse(const Arguments& arguments) {
   }
   options.inputs.as_given = recorded_options(line);
   check_texture_options(options.texture);
-  if (!line.given("--tmpdir")) options.convert.scratch_folder = folder_of(options.output);
+  if (!line.given("--tmpdir")) {
+    options.convert.scratch_folder = options.each.each ? options.each.folder : folder_of(options.output);
+  }
   options.convert.threads = options.work.threads;
   if (options.convert.memory_bytes != 0) {
     // What is packed shares the memory with what is read from it, and with the tiles.
     options.open.unpacked_bytes = std::min(options.open.unpacked_bytes, options.convert.memory_bytes / 3);
   }
+  options.convert.strict = options.common.strict;
   options.convert.producer = "isohf " ISOHF_VERSION;
   return options;
 }
@@ -240,6 +271,7 @@ ordered_json json_from(const ConvertCommandOptions& options, const ConvertSummar
   return {{"input", options.input},
           {"files", summary.metadata.source.mosaic ? summary.metadata.source.mosaic->files : 1},
           {"output", options.output},
+          {"status", "converted"},
           {"tiles_expected", summary.tiles_expected},
           {"tiles_written", summary.tiles_written},
           {"tiles_void", summary.tiles_void},
@@ -317,72 +349,218 @@ std::string text_from(const ConvertCommandOptions& options, const ConvertSummary
   return text;
 }
 
-int run(ConvertCommandOptions options) {
-  const CommonOptions& common = options.common;
-  // What the output is can be told before anything is looked for.
-  if (!options.dry_run) check_archive_output(options.inputs.names, options.output, options.convert.overwrite);
-  std::vector<std::string> files = expand_inputs(options.inputs.names, options.inputs.recursive);
-  if (!options.dry_run) {
-    check_archive_output(files, options.output, options.convert.overwrite);
-    if (options.report && *options.report != "-") {
-      check_report_output(files, *options.report, options.convert.overwrite);
-    }
-  }
+/// A source, and what is read beside it.
+struct Prepared {
+  std::vector<std::string> files;
+  std::unique_ptr<HeightSource> source;
+  std::unique_ptr<PhotoSource> photo;
+};
+
+Prepared prepare(ConvertCommandOptions& options, std::vector<std::string> files) {
   OpenedInputs opened = open_inputs(std::move(files), options.inputs, options.open, options.work.threads);
-  const std::unique_ptr<HeightSource> source =
-      laid_out(std::move(opened.source), options.geoid, options.convert.plan.ground);
-  understand_ground(source->info(), options.convert.plan.ground);
-  options.input = source->info().path;
+  Prepared prepared{std::move(opened.files),
+                    laid_out(std::move(opened.source), options.geoid, options.convert.plan.ground), nullptr};
+  understand_ground(prepared.source->info(), options.convert.plan.ground);
+  options.input = prepared.source->info().path;
   options.convert.source_note = opened.note;
   if (!options.source_name.empty()) {
     options.convert.source_note.name = options.source_name;
     options.convert.source_note.mosaic.reset();
   }
-  const std::unique_ptr<PhotoSource> photo = open_texture(options.texture, options.convert.texture);
-  check_spacing_unit(source->info(), options.convert.plan, options.spacing_in_metres);
+  prepared.photo = open_texture(options.texture, options.convert.texture);
+  check_spacing_unit(prepared.source->info(), options.convert.plan, options.spacing_in_metres);
+  return prepared;
+}
+
+/// Whether OUTPUT is what --resume would come to. Throws Error{kInvalidArgument} where it is another archive, unless it
+/// may be replaced.
+bool is_complete(const ConvertCommandOptions& options, const Prepared& prepared, const Plan& plan) {
+  std::error_code none;
+  if (!options.convert.resume || !std::filesystem::exists(options.output, none)) return false;
+  std::string difference;
+  const auto written = std::filesystem::last_write_time(options.output, none);
+  for (const std::string& file : prepared.files) {
+    if (std::filesystem::last_write_time(file, none) > written) difference = file + " was changed after it was written";
+  }
+  try {
+    if (difference.empty()) {
+      difference = difference_from_job(ArchiveReader(options.output).metadata_json(), prepared.source->info(), plan,
+                                       options.convert);
+      if (!difference.empty()) difference = "was made otherwise: " + difference;
+    }
+  } catch (const Error& error) {
+    difference = std::string("is no complete archive: ") + error.what();
+  }
+  if (difference.empty()) return true;
+  if (options.convert.overwrite) return false;
+  throw Error(ErrorCode::kInvalidArgument, {options.output, difference, "", "--overwrite makes it anew"});
+}
+
+ordered_json json_of_complete(const std::string& input, const std::string& output, const char* status) {
+  return {
+      {"input", input}, {"output", output}, {"status", status}, {"archive_bytes", std::filesystem::file_size(output)}};
+}
+
+/// The files of --each, their archives where they may be written.
+std::vector<EachFile> checked_files(const ConvertCommandOptions& options) {
+  std::vector<EachFile> files = files_of_each(options.inputs.names, options.inputs.recursive, options.each.folder);
+  std::error_code none;
+  std::set<std::filesystem::path> inputs;
+  for (const EachFile& file : files) inputs.insert(std::filesystem::weakly_canonical(file.input, none));
+  std::string existing;
+  std::size_t count = 0;
+  for (const EachFile& file : files) {
+    if (!std::filesystem::exists(std::filesystem::symlink_status(file.output, none))) continue;
+    if (inputs.contains(std::filesystem::weakly_canonical(file.output, none))) {
+      throw Error(ErrorCode::kInvalidArgument,
+                  {file.output, "the output is one of the inputs", "", "choose another folder"});
+    }
+    if (count++ == 0) existing = file.output;
+  }
+  if (count > 0 && !options.convert.overwrite && !options.convert.resume && !options.each.skip_existing) {
+    throw Error(ErrorCode::kInvalidArgument,
+                {existing, count == 1 ? "exists" : fmt::format("exists, and {} more archives do", count - 1), "",
+                 "--skip-existing leaves them as they are, --resume checks them, --overwrite replaces them"});
+  }
+  return files;
+}
+
+/// One of --each; nullopt where the share is too small for it.
+std::optional<EachResult> convert_one(ConvertCommandOptions options, const EachFile& file, const EachShare& share,
+                                      const std::atomic<bool>& cancel) {
+  /// What one thread does in a fraction of a second.
+  constexpr std::int64_t kSmallSamples = std::int64_t{1} << 24U;
+  options.output = file.output;
+  options.work.threads = options.convert.threads = share.threads;
+  options.convert.memory_bytes = share.memory_bytes;
+  if (share.memory_bytes != 0) {
+    options.open.unpacked_bytes = std::min(options.open.unpacked_bytes, share.memory_bytes / 3);
+  }
+  const std::filesystem::path output(file.output);
+  std::error_code none;
+  if (options.each.skip_existing && std::filesystem::exists(output, none)) {
+    try {
+      const ArchiveReader complete(file.output);
+      return EachResult{
+          EachResult::State::kSkipped, json_line(json_of_complete(file.input, file.output, "skipped")), {}};
+    } catch (const Error& error) {
+      if (!options.convert.overwrite) {
+        throw Error(error.code(), {file.output, std::string("is no complete archive: ") + error.what(), "",
+                                   "--overwrite replaces it"});
+      }
+    }
+  }
+  std::filesystem::create_directories(output.parent_path(), none);  // what fails is said next
+  check_archive_output({file.input}, file.output, options.convert.overwrite || options.convert.resume);
+  const Prepared prepared = prepare(options, {file.input});
+  const SourceInfo& info = prepared.source->info();
+  const Plan plan = make_plan(info, options.convert.plan);
+  if (is_complete(options, prepared, plan)) {
+    return EachResult{
+        EachResult::State::kComplete, json_line(json_of_complete(file.input, file.output, "complete")), {}};
+  }
+  if (!share.alone) {
+    if (info.width > kSmallSamples / info.height) return std::nullopt;
+    const MemoryPlan memory = plan_memory(*prepared.source, plan, options.convert);
+    if (share.memory_bytes != 0 && memory.bytes > share.memory_bytes) return std::nullopt;
+  }
+  if (options.convert.max_error) {
+    options.convert.measure = [&](const std::string& archive) {
+      const WorkArena threads(share.threads);
+      const ArchiveReader reader(archive);
+      return measured_error(compare_with_source(
+          reader, *prepared.source, 0, share.threads, [](std::int64_t, std::int64_t) {}, cancel));
+    };
+  }
+  const auto show = [](const ConvertProgress&) {};
+  ConvertSummary summary =
+      options.convert.max_error
+          ? convert_within(*prepared.source, file.output, options.convert, options.freedom, show, cancel)
+          : convert(*prepared.source, plan, file.output, options.convert, show, cancel);
+  const ordered_json document =
+      json_from(options, summary, counts_of_voids(*prepared.source, summary.source_voids), std::nullopt);
+  return EachResult{EachResult::State::kConverted, json_line(document), std::move(summary.warnings)};
+}
+
+int run_each(const ConvertCommandOptions& options) {
+  const std::vector<EachFile> files = checked_files(options);
+  const std::atomic<bool>& cancel = watch_interrupts();
+  return convert_each(
+      files, options.each, options.work, options.common, options.convert.memory_bytes,
+      [&](const EachFile& file, const EachShare& share) { return convert_one(options, file, share, cancel); }, cancel);
+}
+
+int run(ConvertCommandOptions options) {
+  const CommonOptions& common = options.common;
+  const bool may_exist = options.convert.overwrite || options.convert.resume;
+  // What the output is can be told before anything is looked for.
+  if (!options.dry_run) check_archive_output(options.inputs.names, options.output, may_exist);
+  std::vector<std::string> files = expand_inputs(options.inputs.names, options.inputs.recursive);
+  if (!options.dry_run) {
+    check_archive_output(files, options.output, may_exist);
+    if (options.report && *options.report != "-") {
+      check_report_output(files, *options.report, options.convert.overwrite);
+    }
+  }
+  const Prepared prepared = prepare(options, std::move(files));
+  HeightSource& source = *prepared.source;
   if (options.dry_run) {
-    print_plan(*source, options.convert, common);
+    print_plan(source, options.convert, common);
     return kExitDone;
   }
-  const Plan plan = make_plan(source->info(), options.convert.plan);
-  if (common.verbose && !common.quiet) print_plan_notes(*source, plan, options.convert);
+  const Plan plan = make_plan(source.info(), options.convert.plan);
+  if (is_complete(options, prepared, plan)) {
+    StandardOutput out;
+    if (common.json) out.write(json_text(json_of_complete(options.input, options.output, "complete")));
+    if (!common.json && !common.quiet) {
+      out.write(fmt::format("{}: complete already, made of this input with these options\n", options.output));
+    }
+    out.finish();
+    return kExitDone;
+  }
+  if (common.verbose && !common.quiet) print_plan_notes(source, plan, options.convert);
   const std::atomic<bool>& cancel = watch_interrupts();
   std::optional<Accuracy> accuracy;
   if (options.report || options.convert.max_error) {
     options.convert.measure = [&](const std::string& archive) {
       const WorkArena threads(options.work.threads);
       if (options.report) {
-        accuracy = measure_accuracy(archive, *source, kRandomPoints, true, options.work, common, cancel);
+        accuracy = measure_accuracy(archive, source, kRandomPoints, true, options.work, common, cancel);
         return measured_error(accuracy->surface);
       }
       ProgressDisplay display(options.work.progress, common.quiet, common.verbose);
       const ArchiveReader reader(archive);
       return measured_error(compare_with_source(
-          reader, *source, 0, options.work.threads,
+          reader, source, 0, options.work.threads,
           [&](std::int64_t done, std::int64_t total) { display.update("compare", "rows", done, total); }, cancel));
     };
   }
   std::optional<ErrorEstimate> expected;
-  if (!options.convert.measure && !common.quiet) expected = estimate_error(*source, plan, options.convert);
-  ConvertSummary summary = [&] {
+  if (!options.convert.measure && !common.quiet) expected = estimate_error(source, plan, options.convert);
+  const ConvertSummary summary = [&] {
     ProgressDisplay display(options.work.progress, common.quiet, common.verbose);
     const auto show = [&](const ConvertProgress& at) {
       using Pass = ConvertProgress::Pass;
       const char* const pass = at.pass == Pass::kRange ? "range" : (at.pass == Pass::kTiles ? "tiles" : "residuals");
       display.update(pass, at.pass == Pass::kTiles ? "tiles" : "rows", at.done, at.total);
     };
-    return options.convert.max_error
-               ? convert_within(*source, options.output, options.convert, options.freedom, show, cancel)
-               : convert(*source, plan, options.output, options.convert, show, cancel);
+    try {
+      return options.convert.max_error
+                 ? convert_within(source, options.output, options.convert, options.freedom, show, cancel)
+                 : convert(source, plan, options.output, options.convert, show, cancel);
+    } catch (const Error& error) {
+      if (error.code() != ErrorCode::kCancelled) throw;
+      throw Error(ErrorCode::kCancelled,
+                  {options.output, "interrupted", "",
+                   "the same command with --resume goes on with what is in " + options.output + ".part"});
+    }
   }();
-  if (!common.quiet) {
-    for (const std::string& warning : summary.warnings) print_warning(warning);
-  }
+  print_warnings(summary.warnings);
   if (summary.tiles_written != summary.tiles_expected) {
     throw Error(ErrorCode::kIo, fmt::format("{}: {} tiles written, {} expected", options.output, summary.tiles_written,
                                             summary.tiles_expected));
   }
-  const std::optional<VoidCounts> voids = counts_of_voids(*source, summary.source_voids);
+  const std::optional<VoidCounts> voids = counts_of_voids(source, summary.source_voids);
   if (options.report && *options.report != "-") {
     write_output(*options.report, json_text(json_from(*accuracy)), options.convert.overwrite);
   }
@@ -403,7 +581,8 @@ int run(ConvertCommandOptions options) {
 
 int command_convert(const Arguments& arguments) {
   std::optional<ConvertCommandOptions> options = parse(arguments);
-  return options ? run(std::move(*options)) : static_cast<int>(kExitDone);
+  if (!options) return kExitDone;
+  return options->each.each ? run_each(*options) : run(std::move(*options));
 }
 
 }  // namespace isohf::cli

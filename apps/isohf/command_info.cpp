@@ -303,9 +303,7 @@ int describe_one(const InfoOptions& options, const std::string& input, bool is_o
                 "info: " + options.for_rasters + " is for rasters, " + input + " is an archive");
   }
   const ArchiveReader archive = open_archive(input);
-  if (!options.common.quiet) {
-    for (const std::string& warning : archive.warnings()) print_warning(warning);
-  }
+  print_warnings(archive.warnings());
   if (options.common.json) {
     print_json(archive, options.tiles, is_one_of_many);
     return kExitDone;

@@ -256,8 +256,7 @@ int run(const RestoreOptions& options) {
     arena.execute([&] { restored = Restorer(options, archive, grid, cancel).run(record); });
   } catch (const Error& error) {
     if (!record || error.code() != ErrorCode::kCorrupt) throw;
-    print_error(error.what());
-    return kExitDifferences;
+    return print_error(error, kExitDifferences);
   }
   const std::string how = restored.is_source ? "source" : to_string(method_of(options, grid));
   StandardOutput out;

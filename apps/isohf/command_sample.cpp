@@ -278,9 +278,7 @@ GeoPlaces places_of(ArchiveReader& archive, bool needs_geo, bool needs_source, b
 
 int run(const SampleOptions& options) {
   ArchiveReader archive = open_archive(options.archive);
-  if (!options.common.quiet) {
-    for (const std::string& warning : archive.warnings()) print_warning(warning);
-  }
+  print_warnings(archive.warnings());
   const bool takes_geo = options.reads_degrees || !options.geo_places.empty();
   const bool takes_source = options.reads_source || !options.source_places.empty();
   const GeoPlaces places =

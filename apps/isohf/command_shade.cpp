@@ -179,9 +179,7 @@ int run(ShadeOptions options) {
   const CommonOptions& common = options.common;
   check_raster_output({options.archive}, options.output, options.overwrite);
   const ArchiveReader archive = open_archive(options.archive);
-  if (!common.quiet) {
-    for (const std::string& warning : archive.warnings()) print_warning(warning);
-  }
+  print_warnings(archive.warnings());
   ShadeRequest& request = options.request;
   choose_size(archive, options.size, request);
   request.elevation_units_per_world_unit = elevation_units_per_world_unit(archive.metadata());

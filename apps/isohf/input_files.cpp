@@ -26,7 +26,7 @@ namespace {
 namespace fs = std::filesystem;
 
 [[noreturn]] void refuse(const std::string& input, const std::string& why) {
-  throw Error(ErrorCode::kIo, input + ": " + why);
+  throw Error(ErrorCode::kIo, {input, why, "", ""});
 }
 
 /// Extensions of native formats; headers beside the files that they describe are not rasters of their own.
@@ -149,6 +149,22 @@ std::vector<std::string> files_of_list(const std::string& list, bool recursive, 
 
 }  // namespace
 
+bool has_raster_name(const std::string& path) {
+  return has_wanted_name(path, Wanted::kRasters);
+}
+
+std::vector<InputFile> expand_input_files(const std::vector<std::string>& inputs, bool recursive) {
+  std::vector<InputFile> found;
+  for (const std::string& input : inputs) {
+    std::error_code none;
+    const bool is_folder = fs::is_directory(input, none);
+    for (const std::string& path : expand_inputs({input}, recursive)) {
+      found.push_back({path, is_folder ? fs::path(path).lexically_relative(input).parent_path().string() : ""});
+    }
+  }
+  return found;
+}
+
 std::vector<std::string> expand_inputs(const std::vector<std::string>& inputs, bool recursive) {
   std::vector<std::string> found;
   for (const std::string& input : inputs) {
@@ -189,10 +205,10 @@ int for_each_file(const std::string& command, const std::vector<std::string>& fi
     } catch (const Error& error) {
       if (error.code() == ErrorCode::kCancelled) throw;
       code = exit_code_for(error.code());
-      print_error(error.what());
+      print_error_line(error);
       if (common.json) {
         StandardOutput out;
-        out.write(json_line({{"file", file}, {"error", {{"exit_code", code}, {"message", error.what()}}}}));
+        out.write(json_line({{"file", file}, {"error", json_from(error, code)}}));
         out.finish();
       }
     }
@@ -200,8 +216,8 @@ int for_each_file(const std::string& command, const std::vector<std::string>& fi
   }
   if (!common.quiet) {
     const std::size_t differ = counts[kExitDifferences];
-    print_note(fmt::format("{} {}: {} files: {} done, {}{} failed", program_name(), command, files.size(),
-                           counts[kExitDone], differ > 0 ? fmt::format("{} with differences, ", differ) : "",
+    print_note(fmt::format("{}: {} files: {} done, {}{} failed", command, files.size(), counts[kExitDone],
+                           differ > 0 ? fmt::format("{} with differences, ", differ) : "",
                            counts[kExitFailed] + counts[kExitUsage]));
   }
   for (const int code : {kExitUsage, kExitFailed, kExitDifferences}) {

@@ -18,6 +18,16 @@ namespace isohf::cli {
 /// Throws Error{kIo} for what is not there, matches nothing or holds nothing.
 [[nodiscard]] std::vector<std::string> expand_inputs(const std::vector<std::string>& inputs, bool recursive);
 
+/// A file, and where it was found below a folder that was named: "N44" of tiles/N44/N44E006.hgt for tiles/.
+struct InputFile {
+  std::string path;
+  std::string below;
+};
+[[nodiscard]] std::vector<InputFile> expand_input_files(const std::vector<std::string>& inputs, bool recursive);
+
+/// Whether a file of this name would be taken from a folder.
+[[nodiscard]] bool has_raster_name(const std::string& path);
+
 /// The files that a command goes through one after the other, each on its own: as above, but archives (.isohf) of a
 /// folder as well, or nothing else with `only_archives`, and what names a file is taken as it is, there or not.
 [[nodiscard]] std::vector<std::string> list_files(const std::vector<std::string>& inputs, bool recursive,

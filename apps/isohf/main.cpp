@@ -67,7 +67,8 @@ void print_usage() {
   page.row("-h, --help", "Print the arguments, options, defaults and examples of a command");
   page.row("-V, --version", "Print the version");
   page.row("    --json", "Print one JSON document on standard output instead of text");
-  page.row("-q, --quiet", "Print nothing but errors");
+  page.row("-q, --quiet", "Print nothing but errors, and warnings of lost data");
+  page.row("    --strict", "Take warnings as errors");
   page.row("-v, --verbose", "Say more on standard error");
   page.row("    --config FILE", "Read options from a TOML file");
   page.text(kNotes);

@@ -105,14 +105,11 @@ void print_plan(HeightSource& source, const ConvertOptions& options, const Commo
   const Plan plan = make_plan(info, options.plan);
   const MemoryPlan memory = plan_memory(source, plan, options);
   check_memory(memory, options);
-  if (!common.quiet) {
-    for (const auto* list : {&info.warnings, &warnings}) {
-      for (const std::string& warning : *list) print_warning(warning);
-    }
-    if (const std::string warning = scale_warning(info, plan.frame, options.plan.ground.projection); !warning.empty()) {
-      print_warning(warning);
-    }
+  std::vector<Warning> all = info.warnings;
+  if (const std::string scale = scale_warning(info, plan.frame, options.plan.ground.projection); !scale.empty()) {
+    all.push_back(scale);
   }
+  print_warnings(all);
   const std::optional<ErrorEstimate> error = estimate_error(source, plan, options);
   StandardOutput out;
   if (common.json) {
@@ -126,7 +123,7 @@ void print_plan(HeightSource& source, const ConvertOptions& options, const Commo
 void print_plan_notes(HeightSource& source, const Plan& plan, const ConvertOptions& options) {
   std::istringstream lines(text_from_plan(source.info(), plan, plan_memory(source, plan, options), options,
                                           estimate_error(source, plan, options)));
-  for (std::string line; std::getline(lines, line);) print_note("isohf: " + line);
+  for (std::string line; std::getline(lines, line);) print_note(line);
 }
 
 }  // namespace isohf::cli

@@ -189,7 +189,7 @@ ordered_json json_from(const SourceSurvey& survey) {
           {"undeclared_voids", undeclared}};
 }
 
-ordered_json json_from(const RasterInfo& raster, const std::vector<std::string>& warnings) {
+ordered_json json_from(const RasterInfo& raster, const std::vector<Warning>& warnings) {
   const SourceInfo& info = raster.source;
   const Georeference& place = info.georeference;
   const ReferenceSystem& system = place.system;
@@ -256,15 +256,15 @@ void print_raster_info(const std::string& path, const OpenOptions& options, bool
       options.registration ? "option" : (place.registration != Registration::kUnknown ? "file" : "default");
   raster.place =
       source_place(place, raster.source.width, raster.source.height, raster.registration == Registration::kArea);
-  std::vector<std::string> warnings = raster.source.warnings;
+  std::vector<Warning> warnings = raster.source.warnings;
   if (with_statistics) {
     raster.survey = survey(*source, work, common);
     raster.voids = counts_of_voids(*source, raster.survey->scan().voids);
     if (const std::string warning = raster.survey->warning(); !warning.empty()) warnings.push_back(warning);
   }
-  if (!common.quiet) {
-    for (const std::string& warning : warnings) print_warning(path + ": " + warning);
-  }
+  std::vector<Warning> named;
+  for (const Warning& warning : warnings) named.push_back(warning.reworded(path + ": " + warning));
+  print_warnings(named);
   StandardOutput out;
   if (common.json) {
     const ordered_json document = json_from(raster, warnings);

@@ -200,8 +200,8 @@ void set_mapping(RasterSpec& spec, const SampleMapping& mapping, std::optional<d
 
 void warn_of_lost_scale(const std::string& output, const SampleMapping& mapping) {
   if ((mapping.z_scale == 1.0 && mapping.z_offset == 0.0) || has_scale(raster_kind(output))) return;
-  print_warning(fmt::format("{}: has no place for what its raw numbers mean: elevation = raw * {} + {}", output,
-                            mapping.z_scale, mapping.z_offset));
+  print_warning(loss(fmt::format("{}: has no place for what its raw numbers mean: elevation = raw * {} + {}", output,
+                                 mapping.z_scale, mapping.z_offset)));
 }
 
 }  // namespace isohf::cli

@@ -243,7 +243,7 @@ void run_window(const TileSource& source, const Options& options) {
       controls.wants_picture = false;
       const std::string name = next_picture_name();
       save_picture(session.view, name);
-      if (!options.common.quiet) cli::print_note("isohf-view: wrote " + name);
+      if (!options.common.quiet) cli::print_note("wrote " + name);
     }
     glfwSwapBuffers(window.get());
     if (is_last) break;

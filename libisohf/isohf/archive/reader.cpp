@@ -53,7 +53,7 @@ struct ArchiveReader::State {
   ZipEnd end;
   std::string json;
   std::optional<Metadata> metadata;
-  std::vector<std::string> warnings;
+  std::vector<Warning> warnings;
   std::optional<TileTable> tiles;
   mutable std::once_flag members_read;
   mutable std::vector<MemberEntry> members;
@@ -112,7 +112,8 @@ std::vector<std::byte> ArchiveReader::State::payload(const TileEntry& entry, Til
     bytes.assign(data.begin(), data.end());
   }
   if (const std::uint32_t found = crc32(bytes); found != entry.payload_crc32) {
-    throw Error(ErrorCode::kCorrupt, fmt::format("its CRC-32 is {:08x}, {:08x} is stated", found, entry.payload_crc32));
+    throw Error(ErrorCode::kCorrupt, fmt::format("its CRC-32 is {:08x}, {:08x} is stated", found, entry.payload_crc32),
+                {"", fmt::format("CRC-32 {:08x}", found), fmt::format("{:08x}", entry.payload_crc32), ""});
   }
   return bytes;
 }
@@ -157,7 +158,7 @@ const std::string& ArchiveReader::metadata_json() const {
 bool ArchiveReader::reads_by_directory() const {
   return state_->tiles->by_directory();
 }
-const std::vector<std::string>& ArchiveReader::warnings() const {
+const std::vector<Warning>& ArchiveReader::warnings() const {
   return state_->warnings;
 }
 
@@ -278,7 +279,7 @@ std::vector<std::byte> ArchiveReader::read_member(const MemberEntry& member) con
 
 std::vector<std::string> ArchiveReader::check_structure() const {
   const State& state = *state_;
-  std::vector<std::string> found = state.warnings;
+  std::vector<std::string> found(state.warnings.begin(), state.warnings.end());
   const auto complain = [&](const std::string& what) { found.push_back(what); };
   try {
     state.mapped.check_size();

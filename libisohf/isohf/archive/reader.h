@@ -9,6 +9,7 @@
 
 #include "isohf/archive/metadata.h"
 #include "isohf/archive/tile_codec.h"
+#include "isohf/base/warning.h"
 
 namespace isohf {
 
@@ -57,7 +58,7 @@ class ArchiveReader {
   /// True where the index disagreed with the ZIP directory and tiles are found by the directory instead.
   [[nodiscard]] bool reads_by_directory() const;
   /// What opening found odd, one line each, for the user.
-  [[nodiscard]] const std::vector<std::string>& warnings() const;
+  [[nodiscard]] const std::vector<Warning>& warnings() const;
 
   /// Holds the whole ZIP structure against the profile of docs/archive_format.md: every directory entry, local header
   /// and name, order, gaps and overlaps, index against directory. One line for each thing wrong; empty where all is

@@ -45,7 +45,7 @@ bool is_large(const ZipMember& member) {
 }
 
 [[noreturn]] void refuse(std::uint64_t offset, const std::string& why) {
-  throw Error(ErrorCode::kCorrupt, fmt::format("at byte {}: {}", offset, why));
+  throw Error(ErrorCode::kCorrupt, {fmt::format("at byte {}", offset), why, "", ""});
 }
 
 std::string_view text_of(std::span<const std::byte> bytes) {

@@ -1,8 +1,10 @@
 #pragma once
 
+#include <memory>
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <utility>
 
 namespace isohf {
 
@@ -14,20 +16,53 @@ enum class ErrorCode {
   kCorrupt,          ///< the bytes contradict themselves or their format
   kOutOfMemory,      ///< an allocation failed or would exceed the stated bound
   kCancelled,        ///< the caller asked to stop
+  kWarning,          ///< a warning, where the caller asked for none
+};
+
+/// An error in parts, for programs that read it; empty where not known. A setting goes by its name ("filter"), not by
+/// the option of some program.
+struct ErrorParts {
+  std::string where;     ///< file, member, byte, or setting, from the outside in
+  std::string found;     ///< 'found 7, must be even' has 7 here
+  std::string required;  ///< and 'even' here
+  std::string remedy;    ///< what to do
+
+  /// "where: found 7, must be even; remedy"; "where: found; remedy" where nothing is required.
+  [[nodiscard]] std::string text() const {
+    std::string all = where.empty() ? std::string() : where + ": ";
+    all += required.empty() ? found : "found " + found + ", must be " + required;
+    return remedy.empty() ? all : all + "; " + remedy;
+  }
 };
 
 /// The one exception type that isohf throws. A message says where, what was found, what was required, and the remedy.
 class Error : public std::runtime_error {
  public:
   Error(ErrorCode code, const std::string& message) : std::runtime_error(message), code_(code) {}
+  Error(ErrorCode code, const ErrorParts& parts) : Error(code, parts.text(), parts) {}
+  /// For messages that are no plain sequence of their parts.
+  Error(ErrorCode code, const std::string& message, ErrorParts parts)
+      : std::runtime_error(message), code_(code), parts_(std::make_shared<ErrorParts>(std::move(parts))) {}
 
   [[nodiscard]] ErrorCode code() const noexcept { return code_; }
+  [[nodiscard]] ErrorParts parts() const { return parts_ ? *parts_ : ErrorParts{}; }
 
   /// The same error seen from one level further out: "where: message".
-  [[nodiscard]] Error within(std::string_view where) const { return {code_, std::string(where) + ": " + what()}; }
+  [[nodiscard]] Error within(std::string_view where) const {
+    ErrorParts parts = this->parts();
+    parts.where = std::string(where) + (parts.where.empty() ? "" : ": " + parts.where);
+    return {code_, std::string(where) + ": " + what(), std::move(parts)};
+  }
+  /// The same error and message where the message says `where` already, or that goes without saying.
+  [[nodiscard]] Error at(std::string_view where) const {
+    ErrorParts parts = this->parts();
+    if (parts.where.empty()) parts.where = where;
+    return {code_, what(), std::move(parts)};
+  }
 
  private:
   ErrorCode code_;
+  std::shared_ptr<const ErrorParts> parts_;  ///< shared: exceptions are copied, which must not throw
 };
 
 }  // namespace isohf

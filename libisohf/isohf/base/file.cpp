@@ -23,7 +23,7 @@ std::string reason(int error_number) {
 }
 
 [[noreturn]] void fail(const std::string& path, const std::string& deed, int error_number) {
-  throw Error(ErrorCode::kIo, fmt::format("{}{}{}: {}", path, path.empty() ? "" : ": ", deed, reason(error_number)));
+  throw Error(ErrorCode::kIo, {path, deed + ": " + reason(error_number), "", ""});
 }
 
 }  // namespace
@@ -176,9 +176,11 @@ void MappedFile::read(std::uint64_t offset_bytes, std::span<std::byte> out) cons
 
 void MappedFile::check_size() const {
   if (const std::uint64_t now = file_.size_bytes(); now < size_) {
-    throw Error(ErrorCode::kIo, fmt::format("has {} bytes, had {} when it was opened: another program cut it; no "
-                                            "file may be changed while it is read",
-                                            now, size_));
+    throw Error(ErrorCode::kIo,
+                fmt::format("has {} bytes, had {} when it was opened: another program cut it; no "
+                            "file may be changed while it is read",
+                            now, size_),
+                {"", fmt::format("{} bytes", now), fmt::format("{} bytes", size_), ""});
   }
 }
 

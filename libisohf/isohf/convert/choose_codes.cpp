@@ -73,7 +73,7 @@ SourceSurvey survey_source(const Conversion& job, EdgeRange& edge, const Progres
 }
 
 /// Elevations 0 to 1 in floats or scaled integers are most often a fraction of something.
-void warn_of_unit_range(const SourceInfo& info, const ElevationRange& range, std::vector<std::string>& warnings) {
+void warn_of_unit_range(const SourceInfo& info, const ElevationRange& range, std::vector<Warning>& warnings) {
   if (!is_floating(info.sample_type) || info.z_scale != 1.0 || info.z_offset != 0.0) return;
   if (range.min >= -0.1 && range.max <= 1.1 && range.max > range.min) {
     warnings.push_back(

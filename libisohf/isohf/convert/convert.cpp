@@ -163,6 +163,10 @@ void write_tiles(const Conversion& job, ArchiveWriter& writer, const Stages& sta
                                                   make_filter<TileJob*, void>(filter_mode::serial_in_order, write));
 }
 
+void refuse_warnings(const ConvertSummary& summary, const ConvertOptions& options) {
+  if (options.strict && !summary.warnings.empty()) throw error_from(summary.warnings);
+}
+
 void check_range(const std::pair<double, double>& range) {
   if (!(std::isfinite(range.first) && std::isfinite(range.second) && range.first < range.second)) {
     throw Error(ErrorCode::kInvalidArgument,
@@ -207,9 +211,6 @@ ConvertSummary convert(HeightSource& source, const Plan& plan, const std::string
                     "one of the two out",
                     info.path));
   }
-  ArchiveWriter writer(output, plan.grid,
-                       {options.overwrite, options.resume, job_fingerprint(info, plan, options),
-                        metadata_room(describe_job(info, plan, options, {}))});
   ConvertSummary summary(plan.grid);
   summary.warnings = info.warnings;
   if (const std::string warning = scale_warning(info, plan.frame, options.plan.ground.projection); !warning.empty()) {
@@ -218,6 +219,10 @@ ConvertSummary convert(HeightSource& source, const Plan& plan, const std::string
   for (std::string& warning : plan_warnings(info, plan, options.plan)) summary.warnings.push_back(std::move(warning));
   if (textures)
     summary.warnings.insert(summary.warnings.end(), textures->warnings().begin(), textures->warnings().end());
+  refuse_warnings(summary, options);
+  ArchiveWriter writer(output, plan.grid,
+                       {options.overwrite, options.resume, job_fingerprint(info, plan, options),
+                        metadata_room(describe_job(info, plan, options, {}))});
   Conversion job{source, options, plan, memory, kernel, std::move(prefilter), cancel};
   std::optional<SeedStage> seeds;
   std::optional<LosslessRecord> lossless;
@@ -225,6 +230,7 @@ ConvertSummary convert(HeightSource& source, const Plan& plan, const std::string
     oneapi::tbb::task_arena arena(threads);
     arena.execute([&] {
       choose_codes(job, summary, progress);
+      refuse_warnings(summary, options);
       if (options.shadow_seeds) {
         // Lengths of both kinds are compared as metres where both are known to be.
         const bool known = plan.frame.in_metres && !info.vertical_unit.empty();
@@ -251,6 +257,13 @@ ConvertSummary convert(HeightSource& source, const Plan& plan, const std::string
                   fmt::format("{}: elevations are rounded by up to {:.3g} as {}, more than --max-rounding {}; use that "
                               "much, or another --type",
                               info.path, all.worst_rounding, to_string(options.code_type), *options.max_rounding));
+    }
+    if (all.clamped > 0) {
+      summary.warnings.push_back(
+          loss(fmt::format("{}: {} of {} lattice vertices lay outside {} to {} and were moved to "
+                           "its ends",
+                           info.path, all.clamped, all.vertices, job.limits.lowest, job.limits.highest)));
+      refuse_warnings(summary, options);
     }
     summary.metadata = describe_job(info, plan, options, job.quantisation);
     summary.metadata.statistics = total_statistics(all);

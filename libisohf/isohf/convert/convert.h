@@ -70,6 +70,7 @@ struct ConvertOptions {
   std::string scratch_folder = ".";  ///< where rows go that memory has no room for, in a file without a name
   bool overwrite = false;
   bool resume = false;
+  bool strict = false;        ///< a warning is an Error{kWarning}, and nothing is written
   int level = kDefaultLevel;  ///< kMinLevel to kMaxLevel: the higher, the fewer bytes and the slower
   bool lossless = false;      ///< write residuals beside the tiles, so that the source's samples come back bit for bit
   /// Measures the part file once it is a whole archive, before it gets its name; the metadata then say what was found.
@@ -115,7 +116,7 @@ struct ConvertSummary {
   std::optional<MeasuredError> measured;  ///< by ConvertOptions::measure
   bool is_finished = true;                ///< false: the surface errs by more than max_error, nothing was left
   double seconds = 0.0;
-  std::vector<std::string> warnings;  ///< one line each
+  std::vector<Warning> warnings;
 };
 
 /// source -> tiles -> archive. Two passes over the source at most (the first only finds the range; lossless takes one

@@ -6,6 +6,10 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <nlohmann/json.hpp>
+#include <span>
+
+#include "isohf/archive/content_hash.h"
 
 #include "isohf/archive/tile_statistics.h"
 
@@ -62,17 +66,16 @@ std::string describe_voids(const SourceInfo& info) {
                      info.fill_distance);
 }
 
-std::string heights_fingerprint(const SourceInfo& info, const Plan& plan, const ConvertOptions& options) {
-  std::error_code ignored;
-  const auto size = std::filesystem::file_size(info.path, ignored);
+std::string heights_fingerprint(const SourceInfo& info, const Plan& plan, const ConvertOptions& options,
+                                bool of_files) {
   struct stat status {};
-  const bool known = ::stat(info.path.c_str(), &status) == 0;
+  const bool known = of_files && ::stat(info.path.c_str(), &status) == 0;
   const TileShape& shape = plan.grid.shape();
   return fmt::format(
       "{} | {} {} bytes {}.{:09} {}x{} {} channel '{}' scale {} {} void {} | shape {}x{}/{} tiles {}x{} extent {} {} "
       "first {} {} "
       "spacing {} {} {} | {} range {} step {} clamp {} | {} {} | level {} | statistics of the source | seeds {}",
-      options.producer, std::filesystem::path(info.path).filename().string(), ignored ? 0 : size,
+      of_files ? options.producer : "", std::filesystem::path(info.path).filename().string(), status.st_size,
       known ? status.st_mtim.tv_sec : 0, known ? status.st_mtim.tv_nsec : 0, info.width, info.height,
       to_string(info.sample_type), info.channel, info.z_scale, info.z_offset, describe_voids(info), shape.columns(),
       shape.rows(), shape.levels(), plan.grid.tile_columns(), plan.grid.tile_rows(), plan.grid.extent_x(),
@@ -88,11 +91,10 @@ std::string heights_fingerprint(const SourceInfo& info, const Plan& plan, const 
           : "none");
 }
 
-}  // namespace
-
-std::string job_fingerprint(const SourceInfo& info, const Plan& plan, const ConvertOptions& options) {
-  std::string job = heights_fingerprint(info, plan, options);
-  if (!options.source_note.fingerprint.empty()) job += " | " + options.source_note.fingerprint;
+/// of_files: with sizes and times of the files, and the program's version.
+std::string fingerprint(const SourceInfo& info, const Plan& plan, const ConvertOptions& options, bool of_files) {
+  std::string job = heights_fingerprint(info, plan, options, of_files);
+  if (of_files && !options.source_note.fingerprint.empty()) job += " | " + options.source_note.fingerprint;
   if (const std::string& datum = info.georeference.system.vertical_datum; !datum.empty()) job += " | above " + datum;
   if (options.max_error) job += fmt::format(" | max error {}", *options.max_error);
   if (plan.frame.projection) {
@@ -106,7 +108,7 @@ std::string job_fingerprint(const SourceInfo& info, const Plan& plan, const Conv
     const TextureRequest& texture = *options.texture;
     const PhotoInfo& photo = texture.photo->info();
     struct stat status {};
-    const bool known = ::stat(photo.path.c_str(), &status) == 0;
+    const bool known = of_files && ::stat(photo.path.c_str(), &status) == 0;
     job += fmt::format(" | texture {} {} bytes {}.{:09} {}x{}x{} {} {} {}",
                        std::filesystem::path(photo.path).filename().string(), known ? status.st_size : 0,
                        known ? status.st_mtim.tv_sec : 0, known ? status.st_mtim.tv_nsec : 0, photo.width, photo.height,
@@ -119,6 +121,13 @@ std::string job_fingerprint(const SourceInfo& info, const Plan& plan, const Conv
   }
   return job;
 }
+
+}  // namespace
+
+std::string job_fingerprint(const SourceInfo& info, const Plan& plan, const ConvertOptions& options) {
+  return fingerprint(info, plan, options, true);
+}
+
 Metadata describe_job(const SourceInfo& info, const Plan& plan, const ConvertOptions& options,
                       const Quantisation& quantisation) {
   Metadata metadata(plan.grid);
@@ -139,7 +148,39 @@ Metadata describe_job(const SourceInfo& info, const Plan& plan, const ConvertOpt
   metadata.source = record_of(info, plan.frame, options.source_note);
   metadata.extensions.emplace_back(kStatisticsOfName, kStatisticsOfSource);
   metadata.producer = options.producer;
+  const std::string job = fingerprint(info, plan, options, false) + (options.lossless ? " | lossless" : "");
+  const std::vector<std::byte> digest = sha256(std::as_bytes(std::span<const char>(job)));
+  metadata.extensions.emplace_back(kJobName, '"' + hex(digest) + '"');
   return metadata;
+}
+
+std::string difference_from_job(const std::string& metadata_json, const SourceInfo& info, const Plan& plan,
+                                const ConvertOptions& options) {
+  const auto made = nlohmann::json::parse(metadata_json);
+  const auto asked = nlohmann::json::parse(format_metadata(describe_job(info, plan, options, {})));
+  if (made.contains(kJobName) && made.at(kJobName) == asked.at(kJobName)) return {};
+  // Members that are known before the work, by themselves and then by their own members.
+  std::string found;
+  const auto compare = [&](const std::string& name, const nlohmann::json& theirs, const nlohmann::json& ours) {
+    if (theirs == ours) return;
+    found += fmt::format("{}{} {}, not {}", found.empty() ? "" : ", ", name, theirs.dump(), ours.dump());
+  };
+  for (const char* name : {"tile_shape", "tiles", "extent", "valid", "outside", "projection", "wraps_x", "filter",
+                           "acquisition", "edges", "level", "source"}) {
+    const nlohmann::json theirs = made.value(name, nlohmann::json());
+    const nlohmann::json ours = asked.value(name, nlohmann::json());
+    if (!theirs.is_object() || !ours.is_object()) {
+      compare(name, theirs, ours);
+      continue;
+    }
+    for (const auto& [member, value] : ours.items()) {
+      if (member != "stored")
+        compare(fmt::format("{}.{}", name, member), theirs.value(member, nlohmann::json()), value);
+    }
+  }
+  const std::string type = to_string(options.code_type);
+  compare("samples.type", made.at("samples").at("type"), type);
+  return found.empty() ? "other elevation codes, shadow seeds, textures or residuals" : found;
 }
 
 }  // namespace isohf

@@ -237,7 +237,9 @@ void check_memory(const MemoryPlan& memory, const ConvertOptions& options) {
       ErrorCode::kOutOfMemory,
       fmt::format("--memory allows {} MB, this conversion needs at least {} MB; allow that much, or use smaller "
                   "tiles (--shape, --triangles) or fewer --threads than {}",
-                  options.memory_bytes / kMega, least, threads_of(options)));
+                  options.memory_bytes / kMega, least, threads_of(options)),
+      {"memory", fmt::format("{} MB", options.memory_bytes / kMega), fmt::format("at least {} MB", least),
+       "allow that much, or use smaller tiles or fewer threads"});
 }
 
 }  // namespace isohf

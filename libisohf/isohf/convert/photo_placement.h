@@ -16,7 +16,7 @@ struct PhotoPlacement {
   WorldBounds bounds;  ///< outer edges of its pixels; a rectangle around what it shows of the source, where projected
   std::optional<WarpPlace> warp;  ///< where rows of the photo are no rows of the world
   bool by_georeference = false;
-  std::vector<std::string> warnings;
+  std::vector<Warning> warnings;
 };
 
 /// Both georeferenced: as they say. Else the photo covers exactly what the source covers: its pixel edges lie on the

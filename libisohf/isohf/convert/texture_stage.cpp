@@ -150,7 +150,7 @@ TextureStage TextureStage::make(const Plan& plan, const SourceInfo& source, cons
   stage.warnings_ = photo.info().warnings;
   stage.warnings_.insert(stage.warnings_.end(), placement.warnings.begin(), placement.warnings.end());
   if (info.channels == 3 && photo.info().channels == 4) {
-    stage.warnings_.push_back(fmt::format("{}: JPEG has no alpha, the photo's is dropped", photo.info().path));
+    stage.warnings_.push_back(loss(fmt::format("{}: JPEG has no alpha, the photo's is dropped", photo.info().path)));
   }
   const std::int64_t rows = rows_below_tiles(photo.info(), placement, stage.cutter_, plan.grid);
   const std::uint64_t cache = cache_bytes(photo.info(), rows, threads);

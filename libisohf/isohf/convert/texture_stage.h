@@ -24,7 +24,7 @@ class TextureStage {
 
   /// Peak memory, bytes; an estimate.
   [[nodiscard]] std::uint64_t memory_bytes() const { return memory_bytes_; }
-  [[nodiscard]] const std::vector<std::string>& warnings() const { return warnings_; }
+  [[nodiscard]] const std::vector<Warning>& warnings() const { return warnings_; }
   /// Photo pixels under the side of a texel, the larger of both directions.
   [[nodiscard]] double pixels_per_texel() const { return pixels_per_texel_; }
 
@@ -48,7 +48,7 @@ class TextureStage {
   TextureInfo info_;
   TextureCutter cutter_;
   double pixels_per_texel_;
-  std::vector<std::string> warnings_;
+  std::vector<Warning> warnings_;
   std::uint64_t memory_bytes_ = 0;
 };
 

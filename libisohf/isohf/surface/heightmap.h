@@ -8,6 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include "isohf/base/warning.h"
+
 namespace isohf {
 
 /// How a raster stores one elevation.
@@ -95,7 +97,7 @@ struct SourceInfo {
   /// whole multiples of these costs no sample twice.
   std::int64_t block_width = 0;
   std::int64_t block_height = 1;
-  std::vector<std::string> warnings;  ///< one line each, for the user; e.g. "values look like 0...1"
+  std::vector<Warning> warnings;  ///< for the user; e.g. "values look like 0...1"
 };
 
 /// Half-precision bits to float, exact.

@@ -22,7 +22,7 @@ struct PhotoInfo {
   bool random_access = false;
   std::uint64_t pixel_bytes = 3;             ///< of one pixel in the reader's cache
   std::optional<Georeference> georeference;  ///< has_origin is true; the origin is the middle of pixel (0, 0)
-  std::vector<std::string> warnings;         ///< one line each, for the user
+  std::vector<Warning> warnings;             ///< for the user
 };
 
 /// A picture of the ground that is read in windows and may be larger than memory. Any number of threads at once.

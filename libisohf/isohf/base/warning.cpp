@@ -1,0 +1,13 @@
+#include "isohf/base/warning.h"
+
+#include "isohf/base/error.h"
+
+namespace isohf {
+
+Error error_from(const std::vector<Warning>& warnings) {
+  std::string all;
+  for (const Warning& warning : warnings) all += (all.empty() ? "" : "; ") + warning;
+  return {ErrorCode::kWarning, "a warning counts as an error: " + all, {"", all, "no warning", ""}};
+}
+
+}  // namespace isohf
