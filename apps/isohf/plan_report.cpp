@@ -106,6 +106,8 @@ void print_plan(HeightSource& source, const ConvertOptions& options, const Commo
   const MemoryPlan memory = plan_memory(source, plan, options);
   check_memory(memory, options);
   std::vector<Warning> all = info.warnings;
+  const std::vector<std::string> warnings = plan_warnings(info, plan, options.plan);
+  for (const std::string& warning : warnings) all.push_back(warning);
   if (const std::string scale = scale_warning(info, plan.frame, options.plan.ground.projection); !scale.empty()) {
     all.push_back(scale);
   }

@@ -136,7 +136,7 @@ TEST(CroppedSource, HasTheSamplesOfItsPartOfFileAndMosaic) {
     const std::unique_ptr<HeightSource> cropped = crop(std::move(source), box);
     ASSERT_EQ(cropped->info().width, 40);
     ASSERT_EQ(cropped->info().height, 33);
-    EXPECT_EQ(cropped->info().warnings, std::vector<std::string>());
+    EXPECT_EQ(cropped->info().warnings, std::vector<Warning>());
     EXPECT_DOUBLE_EQ(cropped->info().georeference.origin_x, x + 15.0);
     EXPECT_DOUBLE_EQ(cropped->info().georeference.origin_y, y - 15.0);
     EXPECT_TRUE(read_whole(*cropped) == raster.part(part));

@@ -125,7 +125,7 @@ TEST_F(Dted, CarriesItsDatums) {
   EXPECT_EQ(source->info().georeference.system.vertical_epsg, 5773);
   put(old, 80 + 144, "XXXXX");
   // One about the datum, one about the name: this cell's posts are 15 seconds apart.
-  const std::vector<std::string> warnings = open_dted(write(old), {})->info().warnings;
+  const std::vector<Warning> warnings = open_dted(write(old), {})->info().warnings;
   ASSERT_EQ(warnings.size(), 2U);
   EXPECT_EQ(warnings[0], "the horizontal datum in DSI is neither WGS84 nor WGS72; its ellipsoid is not known");
   EXPECT_TRUE(warnings[1].starts_with("its name says DTED level 0, whose posts are 30 seconds apart")) << warnings[1];

@@ -69,7 +69,7 @@ TEST(MosaicSource, PiecesGiveTheWholeBitForBitInEveryType) {
       EXPECT_EQ(info.georeference.registration, registration);
       EXPECT_EQ(info.georeference.system.epsg, 32632);
       EXPECT_EQ(info.format, original.format);
-      EXPECT_EQ(info.warnings, std::vector<std::string>());
+      EXPECT_EQ(info.warnings, std::vector<Warning>());
       EXPECT_EQ(mosaic->plan().holes.samples, 0);
       EXPECT_TRUE(read_whole(*mosaic) == raster.samples);
     }
