@@ -38,7 +38,7 @@ TEST(Metadata, ComesBackAsItWas) {
   EXPECT_EQ(back.grid.tile_columns(), 5);
   EXPECT_EQ(back.quantisation.offset, -12.5);
   EXPECT_EQ(back.quantisation.scale, 0.1);
-  EXPECT_EQ(back.valid.x1, 1.0 / 3.0);
+  EXPECT_EQ(back.valid.x1, metadata.valid.x1);
   EXPECT_EQ(back.source.name, metadata.source.name);
   EXPECT_EQ(back.source.origin_x, 6.000123456789);
   EXPECT_EQ(back.source.origin_y, std::nullopt);

@@ -99,11 +99,13 @@ Metadata make_metadata(const TileGrid& grid, CodeType type) {
   metadata.quantisation = {type, type == CodeType::kF32 ? 0.0 : -12.5, type == CodeType::kF32 ? 1.0 : 0.1};
   metadata.horizontal_unit = "metre";
   metadata.vertical_unit = "metre";
-  metadata.valid = {0.0, 0.5, 1.0 / 3.0, 99.0};
+  metadata.valid = {0.0, grid.world_height() / 5.0, grid.world_width() / 3.0, grid.world_height()};
   metadata.source.name = "hügel \"1\".tif";
   metadata.source.format = "GeoTIFF";
   metadata.source.width = 1201;
   metadata.source.height = 1200;
+  metadata.source.spacing_x = grid.world_width() / 1200.0;
+  metadata.source.spacing_z = grid.world_height() / 1200.0;
   metadata.source.sample_type = "int16";
   metadata.source.registration = "point";
   metadata.source.origin_x = 6.000123456789;
