@@ -124,6 +124,12 @@ RasterSink::RasterSink(std::string path, const RasterSpec& spec, std::unique_ptr
 
 RasterSink::~RasterSink() = default;
 
+std::vector<std::string> RasterSink::files() const {
+  std::vector<std::string> all = {path_};
+  for (const Sidecar& sidecar : sidecars_of(path_, spec_)) all.push_back(sidecar.path);
+  return all;
+}
+
 void RasterSink::write_rows(std::span<const std::byte> rows) {
   const std::size_t one_row = row_bytes(spec_);
   const auto count = static_cast<std::int64_t>(rows.size() / one_row);

@@ -51,6 +51,8 @@ class RasterSink {
   ~RasterSink();
 
   [[nodiscard]] const RasterSpec& spec() const { return spec_; }
+  /// The raster, and the files that stand beside it.
+  [[nodiscard]] std::vector<std::string> files() const;
 
   /// Appends whole rows: [k * width * channels] samples in host byte order, the channels of a pixel together.
   /// Throws Error naming the path: kIo (disk full, ...), kInvalidArgument (part of a row; more rows than declared).

@@ -30,7 +30,7 @@ std::size_t most_open_rasters() {
 FileStamp FileStamp::of(const std::string& path) {
   struct stat status {};
   if (::stat(path.c_str(), &status) != 0) {
-    throw Error(ErrorCode::kIo, path + ": " + (errno == ENOENT ? "no such file" : std::strerror(errno)));
+    throw Error(ErrorCode::kIo, {path, errno == ENOENT ? "no such file" : std::strerror(errno), "", ""});
   }
   return {static_cast<std::uint64_t>(status.st_size), status.st_mtim.tv_sec, status.st_mtim.tv_nsec};
 }

@@ -48,6 +48,8 @@ class ProjSystem final : public UnderstoodSystem {
   [[nodiscard]] const Description& description() const override { return description_; }
   [[nodiscard]] double metres_per_unit() const override { return metres_per_unit_; }
   [[nodiscard]] const Ellipsoid& ellipsoid() const override { return description_.ellipsoid; }
+  /// libproj, SQLite and what they read of proj.db.
+  [[nodiscard]] std::uint64_t memory_bytes() const override { return 14'000'000; }
 
   [[nodiscard]] GeoPoint geo_from_map(MapPoint place) const override {
     double at[2] = {place.easting * scale_, place.northing * scale_};
@@ -73,6 +75,11 @@ class ProjSystem final : public UnderstoodSystem {
 std::shared_ptr<const UnderstoodSystem> understand_system(const std::string& text,
                                                           std::optional<double> metres_per_unit) {
   return std::make_shared<ProjSystem>(text, metres_per_unit);
+}
+
+std::shared_ptr<const ReferenceMap> understand_map(const std::string& text, std::optional<double> metres_per_unit) {
+  if (auto utm = utm_map(text, metres_per_unit)) return utm;
+  return understand_system(text, metres_per_unit);
 }
 
 std::string system_text(const ReferenceSystem& system) {

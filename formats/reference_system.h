@@ -33,6 +33,10 @@ class UnderstoodSystem : public ReferenceMap {
 [[nodiscard]] std::shared_ptr<const UnderstoodSystem> understand_system(
     const std::string& text, std::optional<double> metres_per_unit = std::nullopt);
 
+/// The same where coordinates and places are all that is wanted: PROJ is left alone where utm_map() knows the system.
+[[nodiscard]] std::shared_ptr<const ReferenceMap> understand_map(const std::string& text,
+                                                                 std::optional<double> metres_per_unit);
+
 /// What names the system to PROJ: "EPSG:n", or the WKT; empty where a file has neither.
 [[nodiscard]] std::string system_text(const ReferenceSystem& system);
 

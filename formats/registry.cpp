@@ -86,7 +86,7 @@ struct Head {
 
 /// The file's first bytes; refuses whatever is not a readable regular file with something in it.
 Head read_head(const std::string& path) {
-  const auto refuse = [&](ErrorCode code, const std::string& why) { throw Error(code, path + ": " + why); };
+  const auto refuse = [&](ErrorCode code, const std::string& why) { throw Error(code, {path, why, "", ""}); };
   struct stat status {};
   if (::stat(path.c_str(), &status) != 0) {
     refuse(ErrorCode::kIo, errno == ENOENT ? "no such file" : std::strerror(errno));

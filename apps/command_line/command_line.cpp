@@ -385,8 +385,8 @@ void CommandLine::State::take() {
         if (option.take) option.take(occurrence.values);
       } catch (const Error& error) {
         const std::string word = occurrence.values.front().substr(0, occurrence.values.front().find(':'));
-        throw Error(error.code(),
-                    fmt::format("{}: {}{}", occurrence.where, error.what(), did_you_mean(word, option.words)));
+        const Error placed = error.within(occurrence.where);
+        throw Error(placed.code(), placed.what() + did_you_mean(word, option.words), placed.parts());
       }
     }
   }

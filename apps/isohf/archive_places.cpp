@@ -176,7 +176,7 @@ void understand_source(ArchiveReader& archive) {
   const std::string text = system_text(horizontal_system(source));
   if (text.empty()) refuse(archive.path() + ": names no reference system: it cannot be told where its metres lie");
   try {
-    archive.set_source_map(understand_system(text, source.metres_per_unit));
+    archive.set_source_map(understand_map(text, source.metres_per_unit));
   } catch (const Error& error) {
     throw Error(error.code(), archive.path() + ": " + error.what());
   }

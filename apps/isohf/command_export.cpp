@@ -234,14 +234,15 @@ class Exporter {
             row, store_rows(store, mapping.type, options_.raster.output, grid_.samples.width, row, elevations, counts));
       });
     }
-    tiles.keep();
     files = tiles.files();
+    written = tiles.keep();
   }
 
   SampleMapping mapping;
   SampleCounts counts;
   bool has_voids = false;
   std::int64_t files = 0;
+  std::vector<std::string> written;  ///< those beside them as well
 
  private:
   SampleMapping choose_mapping() {
@@ -305,6 +306,7 @@ int run(const ExportOptions& options) {
                            {"height", grid.cut.rows},
                            {"overlap", grid.cut.overlap}}},
                          {"files", exporter.files},
+                         {"files_written", exporter.written},
                          {"sample_type", to_string(mapping.type)},
                          {"z_scale", mapping.z_scale},
                          {"z_offset", mapping.z_offset},

@@ -126,7 +126,8 @@ ordered_json json_from(const OutputGrid& grid) {
 
 struct Restored {
   SampleCounts counts;
-  bool is_source = false;  ///< the source's own samples, hash checked
+  bool is_source = false;          ///< the source's own samples, hash checked
+  std::vector<std::string> files;  ///< written
 };
 
 class Restorer {
@@ -184,7 +185,7 @@ class Restorer {
                                                    options_.raster.archive, found, record.sha256));
     }
     sink->finish();
-    return {{}, true};
+    return {{}, true, sink->files()};
   }
 
   /// The same numbers in another type; refuses what would not be the same.
@@ -227,6 +228,7 @@ class Restorer {
           store_rows(store, mapping.type, options_.raster.output, grid_.world.width, row, elevations, restored.counts));
     });
     sink->finish();
+    restored.files = sink->files();
     return restored;
   }
 
@@ -264,6 +266,7 @@ int run(const RestoreOptions& options) {
     const ordered_json places = json_from(grid);
     out.write(json_text({{"archive", options.raster.archive},
                          {"output", options.raster.output},
+                         {"files_written", restored.files},
                          {"method", how},
                          {"width", grid.world.width},
                          {"height", grid.world.height},

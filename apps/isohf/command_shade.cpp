@@ -212,6 +212,7 @@ int run(ShadeOptions options) {
   if (common.json) {
     out.write(json_text({{"archive", options.archive},
                          {"output", options.output},
+                         {"files_written", sink->files()},
                          {"width", request.width},
                          {"height", request.height},
                          {"tiles", archive.grid().tile_count()},

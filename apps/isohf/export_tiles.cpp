@@ -8,8 +8,6 @@
 #include <filesystem>
 #include <utility>
 
-#include "formats/raster_sidecars.h"
-
 namespace isohf::cli {
 namespace {
 
@@ -95,11 +93,9 @@ void ExportTiles::write_part(TileRow& tiles, std::int64_t first, std::span<const
     tiles.sinks[at]->write_rows(part);
   });
   if (end < top + cut_.rows) return;
-  for (std::size_t at = 0; at < tiles.sinks.size(); ++at) {
-    const std::string file = name(first_column_ + static_cast<std::int64_t>(at), tiles.row);
-    tiles.sinks[at]->finish();
-    written_.push_back(file);
-    for (const Sidecar& sidecar : sidecars_of(file, tiles.sinks[at]->spec())) written_.push_back(sidecar.path);
+  for (const auto& sink : tiles.sinks) {
+    sink->finish();
+    for (std::string& file : sink->files()) written_.push_back(std::move(file));
   }
 }
 

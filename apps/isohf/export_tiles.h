@@ -6,6 +6,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "formats/raster_sink.h"
@@ -35,8 +36,8 @@ class ExportTiles {
   void begin_group(std::int64_t group, SpecOf spec_of);
   /// Whole rows of the raster from `row` on. Throws Error as RasterSink does.
   void write(std::int64_t row, std::span<const std::byte> rows);
-  /// All is written: the files stay.
-  void keep() { written_.clear(); }
+  /// All is written: the files stay, which are returned.
+  std::vector<std::string> keep() { return std::exchange(written_, {}); }
 
  private:
   struct TileRow {

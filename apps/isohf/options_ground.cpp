@@ -24,7 +24,7 @@ void understand_ground(const SourceInfo& info, GroundRequest& request) {
   const std::string text = system_text(place.system);
   if (place.unit != HorizontalUnit::kMetre || !place.has_origin || text.empty()) return;
   try {
-    request.source_map = understand_system(text, place.metres_per_unit);
+    request.source_map = understand_map(text, place.metres_per_unit);
   } catch (const Error& error) {
     request.why_no_map = error.what();
   }

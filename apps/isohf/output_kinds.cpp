@@ -13,8 +13,8 @@
 namespace isohf::cli {
 namespace {
 
-[[noreturn]] void refuse(const std::string& output, const std::string& why) {
-  throw Error(ErrorCode::kInvalidArgument, output + ": exists and is " + why);
+[[noreturn]] void refuse(const std::string& output, const std::string& kind, const std::string& remedy) {
+  throw Error(ErrorCode::kInvalidArgument, {output, "exists and is " + kind, "", remedy});
 }
 
 /// What a file is that somebody was about to lose.
@@ -33,7 +33,7 @@ std::string kind_of(const std::string& path) {
 void check_archive_output(const std::vector<std::string>& inputs, const std::string& output, bool overwrite) {
   const std::string place = check_output_place(inputs, output);
   if (!head_of_file(place, 1).empty() && !is_archive_file(place)) {
-    refuse(output, kind_of(place) + "; an archive replaces only archives, choose another name");
+    refuse(output, kind_of(place), "an archive replaces only archives, choose another name");
   }
   check_output_file(inputs, output, overwrite);
 }
@@ -54,7 +54,7 @@ void check_report_output(const std::vector<std::string>& inputs, const std::stri
   const auto* begin = reinterpret_cast<const char*>(head.data());
   const auto json = nlohmann::json::parse(begin, begin + head.size(), nullptr, false);
   if (!head.empty() && !(json.is_object() && json.contains("rms"))) {
-    refuse(output, "no report of isohf, which alone is replaced by one; choose another name");
+    refuse(output, "no report of isohf, which alone is replaced by one", "choose another name");
   }
   check_output_file(inputs, output, overwrite);
 }

@@ -46,7 +46,7 @@ std::optional<SourcePlace> source_place(const Georeference& place, std::int64_t 
     found.ground = stored;
   } else if (place.unit == HorizontalUnit::kMetre && !text.empty()) {
     try {
-      found.ground = ground_under(*understand_system(text, place.metres_per_unit), found.bounds);
+      found.ground = ground_under(*understand_map(text, place.metres_per_unit), found.bounds);
       if (!found.ground) found.why_no_ground = "the reference system shows no place there";
     } catch (const Error& error) {
       found.why_no_ground = error.what();

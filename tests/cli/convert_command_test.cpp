@@ -117,9 +117,9 @@ TEST_F(ConvertCommand, EveryOptionChangesWhatItSays) {
     convert(name, more);
     return json::parse(run_isohf({"info", folder / name, "--json"}).out);
   };
-  const json tiles = metadata("tiles.isohf", {"--tiles", "3x2", "--shape", "28x35", "--levels", "2"});
-  EXPECT_EQ(tiles.at("grid").at("tile_columns"), 3);
-  EXPECT_EQ(tiles.at("grid").at("tile_rows"), 2);
+  const json tiles = metadata("tiles.isohf", {"--tiles", "8x6", "--shape", "28x35", "--levels", "2"});
+  EXPECT_EQ(tiles.at("grid").at("tile_columns"), 8);
+  EXPECT_EQ(tiles.at("grid").at("tile_rows"), 6);
   EXPECT_EQ(tiles.at("shape").at("columns"), 28);
   EXPECT_EQ(tiles.at("shape").at("levels"), 2);
   const json spaced = metadata("spaced.isohf", {"--sample-spacing", "30", "--spacing", "45", "--registration", "area"});

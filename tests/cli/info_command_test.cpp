@@ -36,7 +36,7 @@ TEST_F(InfoCommand, SaysWhatTheArchiveHolds) {
   EXPECT_EQ(result.exit_code, 0);
   EXPECT_EQ(result.err, "");
   for (const char* part : {"28x35 (C x R), 2 levels", "a.tif", "200 x 100 float32", "limited-cubic", "wholly void",
-                           "bits a stored sample", "sha256 "}) {
+                           "bits a source sample", "sha256 "}) {
     EXPECT_THAT(result.out, HasSubstr(part));
   }
 }

@@ -22,6 +22,13 @@ namespace fs = std::filesystem;
 const std::string kData = ISOHF_SOURCE_DIR "/testdata/";
 const std::string kSchemas = ISOHF_SOURCE_DIR "/docs/schema/";
 
+/// small_grid() with its South-West corner and its spacing elsewhere.
+std::string grid_at(double x, double y, double spacing) {
+  const std::string rows = small_grid();
+  return "ncols 40\nnrows 40\nxllcorner " + std::to_string(x) + "\nyllcorner " + std::to_string(y) + "\ncellsize " +
+         std::to_string(spacing) + rows.substr(rows.find('\n', rows.find("cellsize")));
+}
+
 /// Collects documents as files SCHEMA.NUMBER.json for the validator.
 class Documents {
  public:
@@ -76,6 +83,13 @@ TEST(JsonSchema, HoldsForEveryCommandsSuccessAndFailure) {
   const std::string a = folder / "a.isohf";
   const std::string b = folder / "b.isohf";
   write_text(folder / "odd.asc", small_grid(0, "-9999"));
+  const std::string d = folder / "d.isohf";
+  const std::string degrees = folder / "degrees.asc";
+  write_text(degrees, grid_at(7.0, 46.0, 0.001));
+  const std::string west = folder / "west.asc";
+  const std::string east = folder / "east.asc";
+  write_text(west, grid_at(0.0, 0.0, 30.0));
+  write_text(east, grid_at(1200.0, 0.0, 30.0));
   write_text(folder / "bad.asc", "ncols 2\nnrows 2\ncellsize 1\n1 2 three 4\n");
   write_text(folder / "bad.isohf", "no archive");
 
@@ -83,10 +97,12 @@ TEST(JsonSchema, HoldsForEveryCommandsSuccessAndFailure) {
   documents.run(0, "convert", {"convert", voids, b, "--fill", "--z-range", "0:1000", "--clamp-range"});
   documents.run(0, "convert", {"convert", peaks, folder / "c.isohf", "--type", "f32"});
   documents.run(0, "convert", {"convert", coast, a, "--shadow-seeds", "--lossless", "--resume"});
-  documents.run(0, "plan", {"convert", coast, folder / "d.isohf", "--dry-run"});
-  documents.run(1, "error", {"convert", folder / "none.tif", folder / "d.isohf"});
+  documents.run(0, "convert", {"convert", degrees, d, "--max-error", "20"});
+  documents.run(0, "convert", {"convert", west, east, folder / "joined.isohf", "--texture", peaks});
+  documents.run(0, "plan", {"convert", coast, folder / "none.isohf", "--dry-run", "--memory", "200M"});
+  documents.run(1, "error", {"convert", folder / "none.tif", folder / "none.isohf"});
   documents.run(2, "error", {"convert", coast, a, "--progress", "json"});
-  documents.run(1, "error", {"convert", folder / "odd.asc", folder / "d.isohf", "--strict", "--progress", "json"});
+  documents.run(1, "error", {"convert", folder / "odd.asc", folder / "none.isohf", "--strict", "--progress", "json"});
   documents.run(1, "convert-each-line",
                 {"convert", "--each", coast, folder / "bad.asc", voids, "--out-dir", folder / "each", "--keep-going",
                  "--progress", "json"});
@@ -97,8 +113,9 @@ TEST(JsonSchema, HoldsForEveryCommandsSuccessAndFailure) {
   documents.run(0, "plan", {"plan"});
   documents.run(0, "plan", {"plan", "--table1"});
   documents.run(0, "plan", {"plan", "--shape", "212x243"});
-  documents.run(0, "plan", {"plan", coast, "--progress", "none"});
-  documents.run(0, "plan", {"plan", folder / "odd.asc", "--memory", "200M"});
+  documents.run(0, "plan", {"plan", coast});
+  documents.run(0, "plan", {"plan", folder / "odd.asc"});
+  documents.run(0, "plan", {"plan", degrees});
   documents.run(2, "error", {"plan", "--shape", "5"});
 
   documents.run(0, "info", {"info", a, "--tiles"});
@@ -106,16 +123,29 @@ TEST(JsonSchema, HoldsForEveryCommandsSuccessAndFailure) {
   documents.run(0, "info", {"info", coast, "--stats", "--progress", "json"});
   documents.run(0, "info", {"info", peaks});
   documents.run(0, "info", {"info", folder / "odd.asc", "--stats"});
+  documents.run(0, "info", {"info", d});
+  documents.run(0, "info", {"info", folder / "joined.isohf"});
+  documents.run(0, "info", {"info", degrees});
+  documents.run(0, "info-line", {"info", a, peaks, degrees});
+  documents.run(1, "info-line", {"info", a, folder / "bad.isohf", folder / "none.tif"});
+  for (const char* old : {"codes", "floats", "globe", "lossless", "projected", "textured"}) {
+    documents.run(0, "info", {"info", kData + "archives/v1/" + old + ".isohf"});
+  }
+  documents.run(2, "info-line", {"info", a, b, "--level", "3"});
   documents.run(1, "error", {"info", folder / "bad.isohf"});
 
   documents.run(0, "verify", {"verify", a});
   documents.run(0, "verify", {"verify", a, "--against", coast, "--progress", "json"});
   documents.run(3, "verify", {"verify", a, "--against", coast, "--max-error", "0.1"});
+  documents.run(3, "verify", {"verify", folder / "bad.isohf"});
+  documents.run(0, "verify-line", {"verify", a, b});
+  documents.run(1, "verify-line", {"verify", a, folder / "bad.isohf", folder / "none.isohf"});
   documents.run(0, "verify", {"verify", "--list-checks"});
   documents.run(1, "error", {"verify", folder / "none.isohf"});
 
   documents.run(0, "restore", {"restore", a, folder / "a.tif"});
   documents.run(0, "restore", {"restore", b, folder / "b.npy", "--size", "50x50", "--progress", "json"});
+  documents.run(0, "restore", {"restore", d, folder / "d.tif", "--like", degrees});
   documents.run(2, "error", {"restore", a, folder / "a.tif"});
   documents.run(0, "export", {"export", a, folder / "t.r16", "--tiles", "2x2", "--progress", "json"});
   documents.run(0, "export", {"export", a, folder / "t.asc", "--size", "30x20"});
@@ -124,10 +154,13 @@ TEST(JsonSchema, HoldsForEveryCommandsSuccessAndFailure) {
   RunOptions places;
   places.input = "100 100\n-5 2\n";
   documents.run(0, "sample-line", {"sample", b}, places);
+  documents.run(0, "sample-line", {"sample", d}, places);
   places.input = "100 100\nnowhere\n";
   documents.run(1, "sample-line", {"sample", a}, places);
   documents.run(0, "shade", {"shade", a, "-o", folder / "s.png", "--progress", "json"});
   documents.run(2, "error", {"shade", a});
+  documents.run(0, "experiment", {"experiment", "--quick", "--triangles", "1000", "-o", folder / "figures"});
+  documents.run(2, "error", {"experiment", "--triangles", "5"});
   documents.run(0, "formats", {"formats"});
   documents.run(2, "error", {"formats", "all"});
   documents.run(2, "error", {"frmats"});
@@ -144,8 +177,8 @@ TEST(JsonSchema, HoldsForEveryCommandsSuccessAndFailure) {
     EXPECT_TRUE(documents.succeeded().contains(command)) << command;
     EXPECT_TRUE(documents.failed().contains(command)) << command;
   }
-  const RunResult valid =
-      run_program({"python3", ISOHF_SOURCE_DIR "/tests/cli/validate_documents.py", kSchemas, collected});
+  const RunResult valid = run_program(
+      {"/usr/bin/env", "python3", ISOHF_SOURCE_DIR "/tests/cli/validate_documents.py", kSchemas, collected});
   EXPECT_EQ(valid.exit_code, 0) << valid.out << valid.err;
 }
 
@@ -156,7 +189,8 @@ TEST(JsonSchema, RejectsAMemberThatNoSchemaKnows) {
   const TemporaryFolder folder;
   const auto validate = [&](const std::string& error) {
     write_text(folder / "error.0.json", R"({"error":{"code":"io","message":"m")" + error + "}}");
-    return run_program({"python3", ISOHF_SOURCE_DIR "/tests/cli/validate_documents.py", kSchemas, folder.path()});
+    return run_program(
+        {"/usr/bin/env", "python3", ISOHF_SOURCE_DIR "/tests/cli/validate_documents.py", kSchemas, folder.path()});
   };
   EXPECT_EQ(validate(R"(,"exit_code":1)").exit_code, 0);
   EXPECT_EQ(validate("").exit_code, 1);

@@ -219,10 +219,11 @@ TEST_F(RestoreLike, TakesRastersOfTheArchivesOwnMap) {
     convert("wide.flt", kind);
     for (const std::string extension : {".tif", ".png", ".flt", ".r32"}) {
       SCOPED_TRACE(kind + extension);
+      // So many that no column lies on vertices, where the last bit of its place decides whether a void is near.
       const std::string map = "map" + std::to_string(kind.size()) + extension.substr(1) + extension;
-      ASSERT_EQ(run(map, {"--size", "120x90", "--overwrite", "-q"}).exit_code, 0);
+      ASSERT_EQ(run(map, {"--size", "128x64", "--overwrite", "-q"}).exit_code, 0);
       const Raster back = like(map, "like.exr");
-      ASSERT_EQ(run("direct.exr", {"--size", "120x90", "--overwrite", "-q"}).exit_code, 0);
+      ASSERT_EQ(run("direct.exr", {"--size", "128x64", "--overwrite", "-q"}).exit_code, 0);
       const Raster direct = read_raster(folder / "direct.exr");
       ASSERT_EQ(back.heights.size(), direct.heights.size());
       for (std::size_t i = 0; i < back.heights.size(); ++i) {

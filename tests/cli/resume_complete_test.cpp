@@ -71,7 +71,7 @@ TEST_F(ResumeComplete, NoticesAnInputThatChanged) {
 TEST_F(ResumeComplete, NoticesAFileThatIsNoArchive) {
   write_text(output_, "mine");
   before_ = "mine";
-  expect_refused({"--filter", "nearest"}, "is no complete archive");
+  expect_refused({"--filter", "nearest"}, "exists and is no isohf archive; an archive replaces only archives");
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <sstream>
 
 #include "small_grid.h"
@@ -70,6 +71,12 @@ TEST(JsonError, NamesTheFileThatIsMissingExistsOrIsUnknown) {
   EXPECT_EQ(missing.at("where"), folder / "none.tif");
   EXPECT_EQ(missing.at("found"), "no such file");
   write_text(rasters.out, "mine");
+  const json other = error_of({"convert", rasters.plain, rasters.out, "--json"}, 2);
+  EXPECT_EQ(other.at("where"), rasters.out);
+  EXPECT_EQ(other.at("found"), "exists and is no isohf archive");
+  EXPECT_THAT(other.at("remedy").get<std::string>(), HasSubstr("choose another name"));
+  std::filesystem::remove(rasters.out);
+  ASSERT_EQ(run_isohf({"convert", rasters.plain, rasters.out}).exit_code, 0);
   const json exists = error_of({"convert", rasters.plain, rasters.out, "--json"}, 2);
   EXPECT_EQ(exists.at("where"), rasters.out);
   EXPECT_EQ(exists.at("found"), "exists");
@@ -111,6 +118,51 @@ TEST(JsonError, NamesTheByteOfADamagedArchive) {
   EXPECT_EQ(error.at("code"), "corrupt");
   EXPECT_THAT(error.at("where").get<std::string>(), HasSubstr(rasters.out + ": "));
   EXPECT_THAT(error.at("where").get<std::string>(), HasSubstr("at byte "));
+}
+
+TEST(JsonError, OfAFileAmongManyIsThatOfTheFileAlone) {
+  const TemporaryFolder folder;
+  const Rasters rasters(folder);
+  ASSERT_EQ(run_isohf({"convert", rasters.plain, rasters.out}).exit_code, 0);
+  for (const char* command : {"info", "verify"}) {
+    SCOPED_TRACE(command);
+    const std::string missing = folder / "none.isohf";
+    const json alone = error_of({command, missing, "--json"}, 1);
+    EXPECT_EQ(alone.at("where"), missing);
+    const RunResult many = run_isohf({command, rasters.out, missing, "--json"});
+    EXPECT_EQ(many.exit_code, 1);
+    std::istringstream lines(many.out);
+    std::string line;
+    std::getline(lines, line);
+    EXPECT_FALSE(json::parse(line).contains("error"));
+    std::getline(lines, line);
+    EXPECT_EQ(json::parse(line), (json{{"file", missing}, {"error", alone}}));
+  }
+}
+
+TEST(JsonFiles, AreAllThatRestoreExportAndShadeWrote) {
+  const TemporaryFolder folder;
+  const Rasters rasters(folder);
+  ASSERT_EQ(run_isohf({"convert", rasters.plain, rasters.out}).exit_code, 0);
+  int run = 0;
+  const auto expect_all = [&](std::vector<std::string> arguments, const std::string& name, std::size_t count) {
+    SCOPED_TRACE(testing::PrintToString(arguments) + name);
+    const std::string to = folder / ("to" + std::to_string(run++));
+    std::filesystem::create_directory(to);
+    arguments.insert(arguments.begin() + 1, {rasters.out, "-o", to + "/" + name, "--json"});
+    const RunResult result = run_isohf(arguments);
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    std::set<std::string> there;
+    for (const auto& entry : std::filesystem::directory_iterator(to)) there.insert(entry.path().string());
+    const std::vector<std::string> told = json::parse(result.out).at("files_written");
+    EXPECT_EQ(told.size(), count);
+    EXPECT_EQ(std::set<std::string>(told.begin(), told.end()), there);
+  };
+  expect_all({"restore"}, "a.tif", 1);
+  expect_all({"restore", "--size", "20x20"}, "a.flt", 2);
+  expect_all({"export"}, "a.r16", 2);
+  expect_all({"export", "--tiles", "2x2"}, "a.r16", 8);
+  expect_all({"shade"}, "a.png", 1);
 }
 
 TEST(Strict, AWarningIsAnErrorAndNothingIsWritten) {

@@ -1,5 +1,6 @@
 """validate_documents.py SCHEMAS DOCUMENTS: checks DOCUMENTS/NAME.NUMBER.json against SCHEMAS/NAME.json.
 
+Members of an archive's metadata that are not listed are allowed, but none of ours: here they are faults as well.
 Prints a line for each fault, and exits with 1 where there is one.
 """
 
@@ -9,7 +10,18 @@ import sys
 
 import jsonschema
 
+
+def close(schema):
+    """Allows no member that is not listed."""
+    if isinstance(schema, dict):
+        if "properties" in schema:
+            schema.setdefault("additionalProperties", False)
+        for part in schema.values():
+            close(part)
+
+
 schemas = {path.stem: json.loads(path.read_text()) for path in pathlib.Path(sys.argv[1]).glob("*.json")}
+close(schemas["metadata"])
 store = {schema["$id"]: schema for schema in schemas.values()}
 faults = 0
 for path in sorted(pathlib.Path(sys.argv[2]).glob("*.json")):

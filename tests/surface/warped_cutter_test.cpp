@@ -41,8 +41,8 @@ struct Fixture {
     geometry.height = height;
     geometry.registration = Registration::kArea;
     geometry.wraps_x = goes_round;
-    geometry.warp = WarpPlace{
-        spec, {bounds.west, bounds.north}, {first.longitude, first.latitude}, dx, dz, width, height};
+    geometry.warp =
+        WarpPlace{spec, {bounds.west, bounds.north}, {first.longitude, first.latitude}, dx, dz, width, height};
     const double extent = std::max(bounds.east - bounds.west, bounds.north - bounds.south) / 3.0;
     grid = TileGrid::make(TileShape::make(36, 35, 2), 3, 3, extent, extent);
     for (std::int64_t r = 0; r < height; ++r) {

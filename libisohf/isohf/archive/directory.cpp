@@ -178,8 +178,10 @@ std::vector<std::byte> member_from(const MappedFile& file, const ZipEntry& entry
   } else if (entry.method == static_cast<std::uint16_t>(ZipMethod::kDeflated)) {
     // Deflate makes at most 1032 bytes of one: a larger claim is not worth the memory.
     if (entry.bytes / 1032 > entry.compressed_bytes) {
-      throw Error(ErrorCode::kCorrupt, fmt::format("{}: states {} bytes, which {} cannot inflate to", describe(entry),
-                                                   entry.bytes, entry.compressed_bytes));
+      throw Error(
+          ErrorCode::kCorrupt,
+          {describe(entry),
+           fmt::format("states {} bytes, which {} cannot inflate to", entry.bytes, entry.compressed_bytes), "", ""});
     }
     bytes.resize(entry.bytes);
     try {
@@ -189,11 +191,11 @@ std::vector<std::byte> member_from(const MappedFile& file, const ZipEntry& entry
     }
   } else {
     throw Error(ErrorCode::kUnsupported,
-                fmt::format("{}: compression method {}, only 0 and 8 are read", describe(entry), entry.method));
+                {describe(entry), fmt::format("compression method {}, only 0 and 8 are read", entry.method), "", ""});
   }
   if (const std::uint32_t found = crc32(bytes); found != entry.crc32) {
     throw Error(ErrorCode::kCorrupt,
-                fmt::format("{}: its CRC-32 is {:08x}, {:08x} is stated", describe(entry), found, entry.crc32));
+                {describe(entry), fmt::format("its CRC-32 is {:08x}, {:08x} is stated", found, entry.crc32), "", ""});
   }
   return bytes;
 }

@@ -117,11 +117,17 @@ class Estimate {
     memory.tile_columns_at_once = fits;
   }
 
+  [[nodiscard]] std::uint64_t map_bytes() const {
+    const auto& map = options_.plan.ground.source_map;
+    return map ? map->memory_bytes() : 0;
+  }
+
   [[nodiscard]] std::uint64_t total(const MemoryPlan& memory) const {
     const auto vertices = static_cast<double>(plan_.grid.shape().stored_vertex_count());
     const double program = kProgramBytes + threads_ * kThreadBytes + threads_ * vertices * kBytesPerVertex +
                            kBytesPerTile * static_cast<double>(plan_.grid.tile_count()) +
-                           static_cast<double>(source_.buffer_bytes(memory.source_buffer_bytes));
+                           static_cast<double>(source_.buffer_bytes(memory.source_buffer_bytes)) +
+                           static_cast<double>(map_bytes());
     const double seeds = options_.shadow_seeds ? static_cast<double>(seed_stage_memory_bytes(plan_.grid)) : 0.0;
     const double tiles = tiles_pass(memory) + seeds + static_cast<double>(texture_bytes_);
     double peak = std::max(scan_pass(memory), tiles);

@@ -1,6 +1,9 @@
 #pragma once
 
+#include <cstdint>
+#include <memory>
 #include <optional>
+#include <string>
 
 #include "isohf/projection/projection_spec.h"
 
@@ -21,7 +24,14 @@ class ReferenceMap {
   [[nodiscard]] virtual MapPoint map_from_geo(GeoPoint place) const = 0;
   [[nodiscard]] virtual double metres_per_unit() const = 0;
   [[nodiscard]] virtual const Ellipsoid& ellipsoid() const = 0;
+  /// What holds it in memory, libraries that were loaded for it included.
+  [[nodiscard]] virtual std::uint64_t memory_bytes() const { return 0; }
 };
+
+/// "EPSG:32601" to "EPSG:32760": the UTM zones of WGS 84, the commonest maps of elevations, by GeographicLib. nullptr
+/// for any other text.
+[[nodiscard]] std::shared_ptr<const ReferenceMap> utm_map(const std::string& text,
+                                                          std::optional<double> metres_per_unit);
 
 /// The rectangle of a map that a raster covers, in the map's units.
 struct MapBounds {

@@ -11,6 +11,7 @@
 #include "isohf/archive/metadata_json.h"
 #include "isohf/base/error.h"
 #include "isohf/base/file.h"
+#include "isohf/projection/projected_extent.h"
 #include "isohf/projection/projection.h"
 #include "isohf/restore/archive_geometry.h"
 #include "isohf/restore/lossless.h"
@@ -106,15 +107,13 @@ class Contradictions {
     const TileGrid& grid = metadata_.grid;
     if (source.width < 2 || source.height < 2) return;  // a surface that was made of no raster
     if (metadata_.projection && metadata_.horizontal_unit != "metre") add("units.horizontal", "is not metre, on a map");
+    check_number("valid.x0", 0.0, grid.world_width());
+    check_number("valid.z0", 0.0, grid.world_height());
+    if (metadata_.projection && source.crs_unit == "degree") check_ellipsoid();
     if (is_warped(metadata_)) {
       if (source.crs_unit != "degree") return;  // of another map, which only PROJ understands
       if (!source.origin_x || !source.origin_y) return add("source.crs", "has no origin, which the projection needs");
-      check_name("source.crs", [&] {
-        const WorldPoint first = ExactWarp(*archive_geometry(metadata_).warp).world_from_source({0.0, 0.0});
-        check_projected("source.first_sample.x", source.first_sample_x, first.x, source.spacing_x);
-        check_projected("source.first_sample.z", source.first_sample_z, first.z, source.spacing_z);
-      });
-      return;
+      return check_name("source.crs", [&] { check_warped_degrees(); });
     }
     const bool area = source.registration == "area";
     check_number("source.first_sample.x", area ? source.spacing_x / 2.0 : 0.0, source.spacing_x);
@@ -122,13 +121,56 @@ class Contradictions {
     const auto length = [](std::int64_t samples, bool whole, double spacing, double world) {
       return std::min(static_cast<double>(whole ? samples : samples - 1) * spacing, world);
     };
-    check_number("valid.x0", 0.0, grid.world_width());
-    check_number("valid.z0", 0.0, grid.world_height());
     check_number("valid.x1", length(source.width, area || metadata_.wraps_x, source.spacing_x, grid.world_width()),
                  grid.world_width());
     check_number("valid.z1", length(source.height, area, source.spacing_z, grid.world_height()), grid.world_height());
     if (metadata_.projection && source.crs_unit == "degree" && source.origin_x && source.origin_y)
       check_scaled_degrees();
+  }
+
+  /// The map is of the source's body.
+  void check_ellipsoid() {
+    const SourceRecord& source = metadata_.source;
+    const Ellipsoid& found = metadata_.projection->spec.ellipsoid;
+    Ellipsoid expected;
+    if (source.semi_major_axis_m) expected = {*source.semi_major_axis_m, source.inverse_flattening.value_or(0.0)};
+    const auto differ = [](double a, double b) { return !(std::abs(a - b) <= kSameTo * std::abs(b)); };
+    if (differ(found.semi_major_axis_m, expected.semi_major_axis_m) ||
+        differ(found.inverse_flattening, expected.inverse_flattening)) {
+      add("projection",
+          fmt::format("is of an ellipsoid of {} m, 1/{}; the source's is of {} m, 1/{}", found.semi_major_axis_m,
+                      found.inverse_flattening, expected.semi_major_axis_m, expected.inverse_flattening));
+    }
+  }
+
+  /// Degrees on a map: the first sample's place, the spacings in the middle of the ground, and the ground's rectangle.
+  void check_warped_degrees() {
+    const SourceRecord& source = metadata_.source;
+    const ProjectionRecord& map = *metadata_.projection;
+    const WorldPoint first = ExactWarp(*archive_geometry(metadata_).warp).world_from_source({0.0, 0.0});
+    const double half = source.registration == "area" ? 0.5 : 0.0;
+    const auto past_first = [&](std::int64_t samples) { return static_cast<double>(samples - 1) + half; };
+    GeoExtent ground;
+    ground.west = *source.origin_x - half * source.crs_spacing_x;
+    ground.east = *source.origin_x + past_first(source.width) * source.crs_spacing_x;
+    ground.north = std::min(*source.origin_y + half * source.crs_spacing_y, 90.0);
+    ground.south = std::max(*source.origin_y - past_first(source.height) * source.crs_spacing_y, -90.0);
+    const DegreeLengths degree = degree_lengths(map.spec.ellipsoid, ground.middle().latitude);
+    const double spacing_x = source.crs_spacing_x * degree.along_parallel;
+    const double spacing_z = source.crs_spacing_y * degree.along_meridian;
+    check_projected("source.first_sample.x", source.first_sample_x, first.x, spacing_x);
+    check_projected("source.first_sample.z", source.first_sample_z, first.z, spacing_z);
+    check_projected("source.spacing.x", source.spacing_x, spacing_x, 1e-4 * spacing_x);
+    check_projected("source.spacing.z", source.spacing_z, spacing_z, 1e-4 * spacing_z);
+    // Rounded up, and found by walking along the ground's sides.
+    const MapBounds bounds = projected_bounds(Projection(map.spec), ground);
+    const auto check_end = [&](const char* where, double stated, double length, double world, double spacing) {
+      check_projected(where, stated, std::min(length, world), 100.0 * std::max(spacing, 1e-4 * length));
+    };
+    check_end("valid.x1", metadata_.valid.x1, bounds.east - map.origin.easting, metadata_.grid.world_width(),
+              spacing_x);
+    check_end("valid.z1", metadata_.valid.z1, map.origin.northing - bounds.south, metadata_.grid.world_height(),
+              spacing_z);
   }
 
   /// To a hundredth of `spacing` what the projection makes of the source's degrees.
