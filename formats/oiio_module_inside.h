@@ -1,13 +1,9 @@
 #pragma once
 
-#include <algorithm>
 #include <cstdint>
-#include <cstdio>
-#include <cstring>
-#include <exception>
-#include <new>
 #include <string>
 
+#include "formats/module_inside.h"
 #include "formats/oiio_module.h"
 #include "isohf/base/error.h"
 
@@ -15,31 +11,10 @@
 
 namespace isohf {
 
-template <std::size_t kSize>
-void put_text(char (&out)[kSize], const std::string& text) {
-  std::snprintf(out, kSize, "%s", text.c_str());
-  std::replace(out, out + std::strlen(out), '\n', ' ');
-}
-
-/// Runs `action` and turns what it throws into a result code and a message.
+/// `action` on the far side of the C boundary.
 template <typename Action>
 int guarded(IsohfOiioMessage* message, Action action) {
-  const auto report = [&](ErrorCode code, const char* text) {
-    put_text(message->text, text);
-    return static_cast<int>(code) + 1;
-  };
-  try {
-    action();
-    return 0;
-  } catch (const Error& error) {
-    return report(error.code(), error.what());
-  } catch (const std::bad_alloc&) {
-    return report(ErrorCode::kOutOfMemory, "OpenImageIO ran out of memory");
-  } catch (const std::exception& error) {
-    return report(ErrorCode::kCorrupt, error.what());
-  } catch (...) {
-    return report(ErrorCode::kCorrupt, "OpenImageIO failed without saying why");
-  }
+  return guarded(message, "OpenImageIO", ErrorCode::kCorrupt, action);
 }
 
 /// OpenImageIO hands out pictures: where it would deliver other numbers than the file holds, the file is refused.

@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "formats/module_inside.h"
 #include "isohf/base/error.h"
 
 // The module is a library of its own: it shares headers with isohf, no code.
@@ -38,12 +39,6 @@ struct Worker {
   Context context;
   Object operation;
 };
-
-template <std::size_t kSize>
-void put_text(char (&out)[kSize], const char* text) {
-  std::snprintf(out, kSize, "%s", text != nullptr ? text : "");
-  std::replace(out, out + std::strlen(out), '\n', ' ');
-}
 
 Context make_context() {
   Context context(proj_context_create());
@@ -145,9 +140,9 @@ void describe(IsohfProjSystem& system, IsohfProjInfo& info) {
   const PJ* const part = system.horizontal.get();
   info.is_projected = proj_get_type(part) == PJ_TYPE_PROJECTED_CRS ? 1 : 0;
   info.is_compound = proj_get_type(system.system.get()) == PJ_TYPE_COMPOUND_CRS ? 1 : 0;
-  put_text(info.name, proj_get_name(part));
-  put_text(info.authority, proj_get_id_auth_name(part, 0));
-  put_text(info.code, proj_get_id_code(part, 0));
+  isohf::put_text(info.name, proj_get_name(part));
+  isohf::put_text(info.authority, proj_get_id_auth_name(part, 0));
+  isohf::put_text(info.code, proj_get_id_code(part, 0));
   const double unit = unit_of(context, part);
   info.metres_per_unit = info.is_projected != 0 ? unit : unit * kDegreesPerRadian;
 
@@ -156,7 +151,7 @@ void describe(IsohfProjSystem& system, IsohfProjInfo& info) {
   if (!geographic || !ellipsoid) refuse("names no ellipsoid");
   Object datum(proj_crs_get_datum(context, geographic.get()));
   if (!datum) datum.reset(proj_crs_get_datum_ensemble(context, geographic.get()));
-  put_text(info.datum, datum ? proj_get_name(datum.get()) : proj_get_name(geographic.get()));
+  isohf::put_text(info.datum, datum ? proj_get_name(datum.get()) : proj_get_name(geographic.get()));
   double minor = 0.0;
   int is_minor_computed = 0;
   proj_ellipsoid_get_parameters(context, ellipsoid.get(), &info.semi_major_axis_m, &minor, &is_minor_computed,
@@ -196,27 +191,8 @@ void open(const std::string& text, IsohfProjSystem& system, IsohfProjInfo& info)
   describe(system, info);
 }
 
-/// Runs `action` and turns what it throws into a result code and a message.
-template <typename Action>
-int guarded(IsohfProjMessage* message, Action action) {
-  const auto report = [&](ErrorCode code, const char* text) {
-    put_text(message->text, text);
-    return static_cast<int>(code) + 1;
-  };
-  try {
-    action();
-    return 0;
-  } catch (const Error& error) {
-    return report(error.code(), error.what());
-  } catch (const std::bad_alloc&) {
-    return report(ErrorCode::kOutOfMemory, "PROJ ran out of memory");
-  } catch (...) {
-    return report(ErrorCode::kUnsupported, "PROJ failed without saying why");
-  }
-}
-
 int module_open(const char* text, IsohfProjSystem** system, IsohfProjInfo* info, IsohfProjMessage* message) {
-  return guarded(message, [&] {
+  return isohf::guarded(message, "PROJ", ErrorCode::kUnsupported, [&] {
     auto made = std::make_unique<IsohfProjSystem>();
     open(text, *made, *info);
     *system = made.release();
