@@ -7,7 +7,7 @@
 #include <new>
 #include <string>
 
-#include "isohf/base/error.h"
+#include "isohf/error.h"
 
 /// What crosses a module's C boundary, seen from inside the modules isohf_oiio.so and isohf_proj.so.
 

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "formats/registry.h"
+#include "isohf/raster.h"
 
 namespace isohf {
 namespace {

@@ -2,7 +2,8 @@
 
 #include <cstdint>
 
-#include "isohf/base/error.h"
+#include "isohf/error.h"
+#include "isohf/raster.h"
 
 namespace isohf {
 

@@ -9,8 +9,9 @@
 #include <string>
 #include <type_traits>
 
-#include "isohf/base/error.h"
-#include "isohf/surface/sample_types.h"
+#include "isohf/error.h"
+#include "isohf/raster.h"
+#include "isohf/surface/source/sample_types.h"
 
 namespace isohf {
 namespace {

@@ -3,8 +3,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "formats/registry.h"
-#include "isohf/surface/heightmap.h"
+#include "isohf/raster.h"
 
 namespace isohf {
 

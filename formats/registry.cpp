@@ -11,24 +11,25 @@
 #include <cstring>
 #include <span>
 
-#include "formats/ascii_grid_source.h"
-#include "formats/dted_source.h"
-#include "formats/exr_source.h"
-#include "formats/header_grid_source.h"
-#include "formats/hgt_source.h"
-#include "formats/isis3_source.h"
-#include "formats/letter_case.h"
+#include "formats/binary_grids/dted_source.h"
+#include "formats/binary_grids/header_grid_source.h"
+#include "formats/binary_grids/hgt_source.h"
+#include "formats/binary_grids/npy_source.h"
+#include "formats/binary_grids/raw_source.h"
+#include "formats/exr/exr_source.h"
+#include "formats/files/letter_case.h"
+#include "formats/files/raw_file.h"
 #include "formats/libraries.h"
-#include "formats/npy_source.h"
-#include "formats/oiio_source.h"
-#include "formats/pds3_source.h"
-#include "formats/png_source.h"
-#include "formats/raw_file.h"
-#include "formats/raw_source.h"
-#include "formats/surfer_grid_source.h"
-#include "formats/tiff_source.h"
-#include "formats/usgs_dem_source.h"
-#include "isohf/base/error.h"
+#include "formats/oiio/oiio_source.h"
+#include "formats/planetary/isis3_source.h"
+#include "formats/planetary/pds3_source.h"
+#include "formats/png/png_source.h"
+#include "formats/text_grids/ascii_grid_source.h"
+#include "formats/text_grids/surfer_grid_source.h"
+#include "formats/text_grids/usgs_dem_source.h"
+#include "formats/tiff/tiff_source.h"
+#include "isohf/error.h"
+#include "isohf/raster.h"
 
 namespace isohf {
 namespace {
@@ -185,7 +186,7 @@ std::unique_ptr<HeightSource> open_by_head(const std::string& path, const OpenOp
 
 }  // namespace
 
-std::unique_ptr<HeightSource> open_source(const std::string& path, const OpenOptions& options) {
+std::unique_ptr<HeightSource> open_raster(const std::string& path, const OpenOptions& options) {
   try {
     return open_by_head(path, options);
   } catch (const Error& error) {

@@ -10,7 +10,7 @@
 #include <new>
 
 #include "isohf/base/file.h"
-#include "standard_output.h"
+#include "output/standard_output.h"
 
 namespace isohf::cli {
 namespace {

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "isohf/base/error.h"
+#include "isohf/error.h"
 
 namespace isohf::cli {
 

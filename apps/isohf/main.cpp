@@ -10,13 +10,14 @@
 #include <string_view>
 #include <vector>
 
-#include "command.h"
-#include "command_line.h"
+#include "commands/command.h"
 #include "formats/registry.h"
-#include "help_page.h"
-#include "isohf/base/error.h"
 #include "isohf/base/simd.h"
-#include "nearest_word.h"
+#include "isohf/error.h"
+#include "isohf/raster.h"
+#include "options/command_line.h"
+#include "options/help_page.h"
+#include "options/nearest_word.h"
 
 namespace isohf::cli {
 namespace {

@@ -2,9 +2,9 @@
 
 #include <fmt/format.h>
 
-#include "formats/foreign_file.h"
+#include "formats/files/foreign_file.h"
 #include "formats/registry.h"
-#include "isohf/base/error.h"
+#include "isohf/error.h"
 
 namespace isohf::cli {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "isohf/archive/reader.h"
+#include "isohf/archive.h"
 
 namespace isohf::cli {
 

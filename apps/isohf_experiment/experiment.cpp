@@ -13,7 +13,7 @@
 #include <utility>
 
 #include "height_fit.h"
-#include "isohf/base/error.h"
+#include "isohf/error.h"
 #include "reconstruction_error.h"
 #include "sine_wave.h"
 #include "test_mesh.h"

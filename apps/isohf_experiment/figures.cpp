@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "svg_chart.h"
+#include "output/svg_chart.h"
 
 namespace isohf::experiment {
 namespace {

@@ -3,7 +3,7 @@
 #include <string>
 
 #include "experiment.h"
-#include "isohf/lattice/tile_shape.h"
+#include "isohf/lattice.h"
 
 /// The paper's figures from an experiment, as the text of CSV and SVG files. CSV: a heading line, then commas; numbers
 /// in the shortest form that reads back to the same value.

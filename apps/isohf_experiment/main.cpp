@@ -11,12 +11,12 @@
 #include "experiment.h"
 #include "figures.h"
 #include "interrupt.h"
-#include "isohf/base/error.h"
 #include "isohf/base/output_file.h"
-#include "option_values.h"
-#include "options_common.h"
+#include "isohf/error.h"
+#include "options/option_values.h"
+#include "options/options_common.h"
+#include "output/standard_output.h"
 #include "program.h"
-#include "standard_output.h"
 
 namespace isohf::cli {
 namespace {

@@ -7,10 +7,9 @@
 #include <numbers>
 #include <utility>
 
-#include "isohf/base/error.h"
+#include "isohf/error.h"
+#include "isohf/lattice.h"
 #include "isohf/lattice/strip.h"
-#include "isohf/lattice/tile_mapping.h"
-#include "isohf/lattice/tile_shape.h"
 
 namespace isohf::experiment {
 namespace {

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "tile_source.h"
+#include "paging/tile_source.h"
 #include "view_state.h"
 
 namespace isohf::view {

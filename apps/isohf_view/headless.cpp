@@ -5,20 +5,20 @@
 
 #include <nlohmann/json.hpp>
 
-#include "flight.h"
-#include "headless_context.h"
+#include "gl/headless_context.h"
+#include "gl/offscreen.h"
+#include "gl/png_file.h"
 #include "interrupt.h"
-#include "isohf/base/error.h"
-#include "offscreen.h"
-#include "output_file.h"
-#include "png_file.h"
-#include "print_result.h"
+#include "isohf/error.h"
+#include "measure/flight.h"
+#include "measure/transition_sweep.h"
+#include "output/output_file.h"
+#include "output/standard_output.h"
 #include "program.h"
 #include "session.h"
-#include "standard_output.h"
 #include "text_file.h"
-#include "transition_sweep.h"
-#include "verify_view.h"
+#include "verify/print_result.h"
+#include "verify/verify_view.h"
 
 namespace isohf::view {
 namespace {

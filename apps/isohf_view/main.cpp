@@ -2,8 +2,8 @@
 
 #include "headless.h"
 #include "options.h"
+#include "paging/tile_source.h"
 #include "program.h"
-#include "tile_source.h"
 #include "window.h"
 
 namespace {

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <vector>
 
-#include "isohf/base/error.h"
-#include "option_values.h"
+#include "isohf/error.h"
+#include "options/option_values.h"
 
 namespace isohf::view {
 namespace {

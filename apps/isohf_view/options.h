@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "options_common.h"
+#include "options/options_common.h"
 #include "view_state.h"
 
 namespace isohf::view {

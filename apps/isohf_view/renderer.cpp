@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "shaders.h"
+#include "gl/shaders.h"
 
 namespace isohf::view {
 namespace {

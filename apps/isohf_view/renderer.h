@@ -6,10 +6,10 @@
 #include <tuple>
 #include <vector>
 
+#include "gl/terrain_program.h"
+#include "gl/tile_buffers.h"
 #include "isohf/lattice/lod.h"
-#include "terrain_program.h"
-#include "tile_buffers.h"
-#include "tile_source.h"
+#include "paging/tile_source.h"
 #include "view_state.h"
 
 namespace isohf::view {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <thread>
 
-#include "isohf/base/error.h"
+#include "isohf/error.h"
 
 namespace isohf::view {
 namespace {

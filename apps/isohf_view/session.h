@@ -4,12 +4,12 @@
 #include <vector>
 
 #include "camera.h"
+#include "gl/overlay.h"
 #include "options.h"
-#include "overlay.h"
+#include "paging/texture_box.h"
+#include "paging/tile_box.h"
 #include "renderer.h"
 #include "shadow_sun.h"
-#include "texture_box.h"
-#include "tile_box.h"
 
 namespace isohf::view {
 

@@ -5,7 +5,7 @@
 #include <cstring>
 #include <string>
 
-#include "isohf/base/error.h"
+#include "isohf/error.h"
 
 namespace isohf::view {
 

@@ -2,7 +2,7 @@
 
 #include <optional>
 
-#include "vec.h"
+#include "gl/vec.h"
 
 namespace isohf::view {
 

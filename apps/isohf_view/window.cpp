@@ -14,11 +14,11 @@
 #include <string>
 #include <vector>
 
-#include "isohf/base/error.h"
-#include "offscreen.h"
-#include "png_file.h"
+#include "gl/offscreen.h"
+#include "gl/png_file.h"
+#include "isohf/error.h"
+#include "output/standard_output.h"
 #include "session.h"
-#include "standard_output.h"
 
 namespace isohf::view {
 namespace {

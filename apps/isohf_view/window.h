@@ -1,7 +1,7 @@
 #pragma once
 
 #include "options.h"
-#include "tile_source.h"
+#include "paging/tile_source.h"
 
 namespace isohf::view {
 

@@ -15,9 +15,9 @@
 #include <tuple>
 #include <vector>
 
-#include "command_line.h"
-#include "isohf/base/error.h"
-#include "option_values.h"
+#include "isohf/error.h"
+#include "options/command_line.h"
+#include "options/option_values.h"
 #include "sink.h"
 #include "terrain.h"
 

@@ -8,7 +8,7 @@
 #include <filesystem>
 #include <utility>
 
-#include "isohf/base/error.h"
+#include "isohf/error.h"
 
 namespace isohf::terrain {
 namespace {

@@ -7,7 +7,7 @@
 
 #include <optional>
 
-#include "isohf/base/error.h"
+#include "isohf/error.h"
 #include "sink.h"
 
 namespace isohf::terrain {

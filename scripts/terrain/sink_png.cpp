@@ -5,7 +5,7 @@
 #include <cstring>
 #include <utility>
 
-#include "isohf/base/error.h"
+#include "isohf/error.h"
 #include "sink.h"
 
 namespace isohf::terrain {

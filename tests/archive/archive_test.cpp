@@ -4,10 +4,12 @@
 #include <filesystem>
 
 #include "archive/tiles.h"
-#include "isohf/archive/deflate.h"
-#include "isohf/archive/reader.h"
+#include "isohf/archive.h"
+#include "isohf/archive/codec/tile_codec.h"
+#include "isohf/archive/codec/tile_codes.h"
+#include "isohf/archive/deflate/deflate.h"
 #include "isohf/archive/writer.h"
-#include "isohf/base/error.h"
+#include "isohf/error.h"
 #include "support/temporary_folder.h"
 
 namespace isohf {

@@ -1,10 +1,10 @@
-#include "isohf/archive/deflate.h"
+#include "isohf/archive/deflate/deflate.h"
 
 #include <gtest/gtest.h>
 
 #include <random>
 
-#include "isohf/base/error.h"
+#include "isohf/error.h"
 
 namespace isohf {
 namespace {

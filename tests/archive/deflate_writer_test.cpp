@@ -1,11 +1,11 @@
-#include "isohf/archive/deflate_writer.h"
+#include "isohf/archive/deflate/deflate_writer.h"
 
 #include <gtest/gtest.h>
 
 #include <random>
 
 #include "archive/zlib_inflate.h"
-#include "isohf/archive/deflate.h"
+#include "isohf/archive/deflate/deflate.h"
 
 namespace isohf {
 namespace {

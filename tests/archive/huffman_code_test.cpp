@@ -1,4 +1,4 @@
-#include "isohf/archive/huffman_code.h"
+#include "isohf/archive/deflate/huffman_code.h"
 
 #include <gtest/gtest.h>
 

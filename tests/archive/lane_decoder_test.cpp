@@ -1,4 +1,5 @@
-#include "isohf/archive/lane_decoder.h"
+#include "isohf/archive/codec/simd/lane_decoder.h"
+#include "isohf/archive/codec/tile_codec.h"
 
 #include <gtest/gtest.h>
 
@@ -11,9 +12,10 @@
 #include <random>
 
 #include "archive/tiles.h"
-#include "isohf/archive/deflate.h"
-#include "isohf/archive/predictors.h"
-#include "isohf/base/error.h"
+#include "isohf/archive/codec/predict/predictors.h"
+#include "isohf/archive/codec/tile_codes.h"
+#include "isohf/archive/deflate/deflate.h"
+#include "isohf/error.h"
 
 namespace isohf {
 namespace {

@@ -1,4 +1,5 @@
-#include "isohf/archive/literal_inflater.h"
+#include "isohf/archive/deflate/literal_inflater.h"
+#include "isohf/archive/codec/tile_codec.h"
 
 #include <gtest/gtest.h>
 #include <libdeflate.h>
@@ -9,8 +10,9 @@
 #include <random>
 
 #include "archive/tiles.h"
-#include "isohf/archive/deflate.h"
-#include "isohf/archive/deflate_writer.h"
+#include "isohf/archive/codec/tile_codes.h"
+#include "isohf/archive/deflate/deflate.h"
+#include "isohf/archive/deflate/deflate_writer.h"
 
 namespace isohf {
 namespace {

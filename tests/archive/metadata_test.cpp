@@ -1,4 +1,4 @@
-#include "isohf/archive/metadata.h"
+#include "isohf/metadata.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "archive/tiles.h"
-#include "isohf/base/error.h"
+#include "isohf/error.h"
 
 namespace isohf {
 namespace {

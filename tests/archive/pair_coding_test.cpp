@@ -1,4 +1,4 @@
-#include "isohf/archive/pair_coding.h"
+#include "isohf/archive/codec/residuals/pair_coding.h"
 
 #include <gtest/gtest.h>
 
@@ -6,9 +6,9 @@
 #include <random>
 
 #include "archive/tiles.h"
-#include "isohf/archive/deflate.h"
-#include "isohf/archive/tile_codec.h"
-#include "isohf/archive/tile_payload.h"
+#include "isohf/archive/codec/tile_codec.h"
+#include "isohf/archive/codec/tile_payload.h"
+#include "isohf/archive/deflate/deflate.h"
 
 namespace isohf {
 namespace {

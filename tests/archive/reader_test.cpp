@@ -1,4 +1,4 @@
-#include "isohf/archive/reader.h"
+#include "isohf/archive.h"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -15,9 +15,9 @@
 #include <thread>
 
 #include "archive/tiles.h"
-#include "isohf/archive/deflate.h"
-#include "isohf/archive/zip_layout.h"
-#include "isohf/base/error.h"
+#include "isohf/archive/container/zip_layout.h"
+#include "isohf/archive/deflate/deflate.h"
+#include "isohf/error.h"
 #include "support/temporary_folder.h"
 
 namespace isohf {

@@ -1,4 +1,4 @@
-#include "isohf/archive/residual_expander.h"
+#include "isohf/archive/codec/simd/residual_expander.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <random>
 #include <vector>
 
-#include "isohf/archive/residual_symbols.h"
+#include "isohf/archive/codec/residuals/residual_symbols.h"
 #include "isohf/base/simd.h"
 
 namespace isohf {

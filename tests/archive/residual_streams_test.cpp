@@ -1,4 +1,4 @@
-#include "isohf/archive/residual_streams.h"
+#include "isohf/archive/codec/residuals/residual_streams.h"
 
 #include <gtest/gtest.h>
 
@@ -8,9 +8,9 @@
 #include <random>
 #include <vector>
 
-#include "isohf/archive/coding_effort.h"
-#include "isohf/archive/residual_expander.h"
-#include "isohf/archive/tile_codec.h"
+#include "isohf/archive/codec/coding_effort.h"
+#include "isohf/archive/codec/simd/residual_expander.h"
+#include "isohf/archive/codec/tile_codes.h"
 #include "isohf/base/simd.h"
 
 namespace isohf {

@@ -1,4 +1,4 @@
-#include "isohf/archive/shadow_seeds.h"
+#include "isohf/archive/shadow_seeds/shadow_seeds.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,9 +7,9 @@
 #include <functional>
 #include <random>
 
-#include "isohf/archive/deflate.h"
-#include "isohf/archive/zip_layout.h"
-#include "isohf/base/error.h"
+#include "isohf/archive/container/zip_layout.h"
+#include "isohf/archive/deflate/deflate.h"
+#include "isohf/error.h"
 
 namespace isohf {
 namespace {

@@ -1,6 +1,7 @@
 /// Kernels of vectorised.h and their plain twins: the same bits.
 
 #include "isohf/base/simd.h"
+#include "isohf/archive/codec/tile_codec.h"
 
 #include <gtest/gtest.h>
 
@@ -10,9 +11,10 @@
 #include <random>
 
 #include "archive/tiles.h"
-#include "isohf/archive/deflate.h"
-#include "isohf/archive/lane_decoder.h"
-#include "isohf/archive/quantise.h"
+#include "isohf/archive/codec/quantise.h"
+#include "isohf/archive/codec/simd/lane_decoder.h"
+#include "isohf/archive/codec/tile_codes.h"
+#include "isohf/archive/deflate/deflate.h"
 
 namespace isohf {
 namespace {

@@ -5,9 +5,9 @@
 #include <cstdlib>
 #include <string>
 
-#include "isohf/archive/picture_codec.h"
-#include "isohf/archive/texture_info.h"
-#include "isohf/base/error.h"
+#include "isohf/archive/textures/picture_codec.h"
+#include "isohf/archive/textures/texture_info.h"
+#include "isohf/error.h"
 #include "support/memory_photo.h"
 
 namespace isohf {

@@ -1,4 +1,4 @@
-#include "isohf/archive/tile_codec.h"
+#include "isohf/archive/codec/tile_codec.h"
 
 #include <gtest/gtest.h>
 
@@ -8,10 +8,10 @@
 
 #include "archive/tiles.h"
 #include "archive/zlib_inflate.h"
-#include "isohf/archive/content_hash.h"
-#include "isohf/archive/deflate.h"
-#include "isohf/archive/tile_payload.h"
-#include "isohf/base/error.h"
+#include "isohf/archive/codec/tile_payload.h"
+#include "isohf/archive/container/content_hash.h"
+#include "isohf/archive/deflate/deflate.h"
+#include "isohf/error.h"
 
 namespace isohf {
 namespace {

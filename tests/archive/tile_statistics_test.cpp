@@ -1,4 +1,5 @@
 #include "isohf/archive/tile_statistics.h"
+#include "isohf/archive/codec/tile_codes.h"
 
 #include <gtest/gtest.h>
 

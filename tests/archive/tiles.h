@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "isohf/archive/metadata.h"
-#include "isohf/archive/tile_codec.h"
+#include "isohf/archive/codec/tile_codes.h"
+#include "isohf/metadata.h"
 
 /// Tiles and archives to test with.
 

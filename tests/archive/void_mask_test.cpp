@@ -1,8 +1,8 @@
-#include "isohf/archive/void_mask.h"
+#include "isohf/archive/codec/void_mask.h"
 
 #include <gtest/gtest.h>
 
-#include "isohf/base/error.h"
+#include "isohf/error.h"
 
 namespace isohf {
 namespace {

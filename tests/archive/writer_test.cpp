@@ -1,4 +1,5 @@
 #include "isohf/archive/writer.h"
+#include "isohf/archive/codec/tile_codec.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,8 +10,9 @@
 #include <csignal>
 
 #include "archive/tiles.h"
-#include "isohf/archive/reader.h"
-#include "isohf/base/error.h"
+#include "isohf/archive.h"
+#include "isohf/archive/codec/tile_codes.h"
+#include "isohf/error.h"
 #include "support/temporary_folder.h"
 
 namespace isohf {

@@ -1,15 +1,17 @@
-#include "isohf/archive/zip_layout.h"
+#include "isohf/archive/container/zip_layout.h"
+#include "isohf/archive/codec/tile_codec.h"
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 
 #include "archive/tiles.h"
-#include "isohf/archive/content_hash.h"
-#include "isohf/archive/deflate.h"
-#include "isohf/archive/reader.h"
+#include "isohf/archive.h"
+#include "isohf/archive/codec/tile_codes.h"
+#include "isohf/archive/container/content_hash.h"
+#include "isohf/archive/deflate/deflate.h"
 #include "isohf/archive/tile_index.h"
-#include "isohf/base/error.h"
+#include "isohf/error.h"
 #include "support/temporary_folder.h"
 
 namespace isohf {

@@ -12,7 +12,7 @@
 #include <cerrno>
 #include <filesystem>
 
-#include "isohf/base/error.h"
+#include "isohf/error.h"
 #include "support/temporary_folder.h"
 
 namespace {

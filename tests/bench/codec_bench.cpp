@@ -14,11 +14,11 @@
 #include <string>
 #include <vector>
 
-#include "isohf/archive/deflate.h"
-#include "isohf/archive/lane_decoder.h"
-#include "isohf/archive/tile_codec.h"
-#include "isohf/base/error.h"
-#include "isohf/lattice/tile_mapping.h"
+#include "isohf/archive/codec/simd/lane_decoder.h"
+#include "isohf/archive/codec/tile_codec.h"
+#include "isohf/archive/deflate/deflate.h"
+#include "isohf/error.h"
+#include "isohf/lattice.h"
 
 namespace {
 

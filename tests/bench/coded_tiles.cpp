@@ -2,16 +2,18 @@
 
 #include <cmath>
 
-#include "isohf/archive/activities.h"
-#include "isohf/archive/coding_effort.h"
-#include "isohf/archive/context_model.h"
-#include "isohf/archive/deflate.h"
-#include "isohf/archive/hex_predictor.h"
-#include "isohf/archive/predictor_fit.h"
-#include "isohf/archive/quantise.h"
-#include "isohf/archive/residual_fold.h"
-#include "isohf/archive/residual_streams.h"
-#include "isohf/archive/residual_symbols.h"
+#include "isohf/archive/codec/coding_effort.h"
+#include "isohf/archive/codec/predict/activities.h"
+#include "isohf/archive/codec/predict/hex_predictor.h"
+#include "isohf/archive/codec/predict/predictor_fit.h"
+#include "isohf/archive/codec/predict/residual_fold.h"
+#include "isohf/archive/codec/quantise.h"
+#include "isohf/archive/codec/residuals/context_model.h"
+#include "isohf/archive/codec/residuals/residual_streams.h"
+#include "isohf/archive/codec/residuals/residual_symbols.h"
+#include "isohf/archive/codec/tile_codec.h"
+#include "isohf/archive/codec/tile_codes.h"
+#include "isohf/archive/deflate/deflate.h"
 
 namespace isohf::bench {
 

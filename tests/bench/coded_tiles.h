@@ -5,9 +5,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "isohf/archive/lane_decoder.h"
-#include "isohf/archive/residual_streams.h"
-#include "isohf/archive/tile_codec.h"
+#include "isohf/archive/codec/residuals/residual_streams.h"
+#include "isohf/archive/codec/simd/lane_decoder.h"
+#include "isohf/archive/codec/tile_codes.h"
 
 /// What the kernels of the tile codec are measured on.
 namespace isohf::bench {

@@ -6,11 +6,12 @@
 #include <vector>
 
 #include "bench/coded_tiles.h"
-#include "isohf/archive/deflate.h"
-#include "isohf/archive/lane_decoder.h"
-#include "isohf/archive/pair_coding.h"
-#include "isohf/archive/residual_expander.h"
-#include "isohf/archive/residual_symbols.h"
+#include "isohf/archive/codec/residuals/pair_coding.h"
+#include "isohf/archive/codec/residuals/residual_symbols.h"
+#include "isohf/archive/codec/simd/lane_decoder.h"
+#include "isohf/archive/codec/simd/residual_expander.h"
+#include "isohf/archive/codec/tile_codec.h"
+#include "isohf/archive/deflate/deflate.h"
 
 namespace isohf::bench {
 namespace {

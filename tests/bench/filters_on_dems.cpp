@@ -10,7 +10,8 @@
 #include <vector>
 
 #include "formats/registry.h"
-#include "isohf/surface/height_source.h"
+#include "isohf/raster.h"
+#include "isohf/surface/source/sample_types.h"
 #include "support/trigonometric_field.h"
 
 namespace {
@@ -38,7 +39,7 @@ struct Raster {
 };
 
 Raster load(const std::string& path) {
-  const auto source = isohf::open_source(path, {});
+  const auto source = isohf::open_raster(path, {});
   const isohf::SourceInfo& info = source->info();
   Raster raster{std::min(info.width, kLargest), std::min(info.height, kLargest), {}};
   const auto count = static_cast<std::size_t>(raster.columns * raster.rows);

@@ -24,9 +24,10 @@
 #include <vector>
 
 #include "formats/registry.h"
-#include "isohf/base/error.h"
 #include "isohf/base/file.h"
-#include "isohf/surface/source_rows.h"
+#include "isohf/error.h"
+#include "isohf/raster.h"
+#include "isohf/surface/source/source_rows.h"
 
 namespace {
 
@@ -105,7 +106,7 @@ void run(const std::string& raster, const std::string& payload_file, double arch
   const isohf::MappedFile file(payload_file);
   const std::vector<std::span<const std::byte>> payloads = payloads_in(file.bytes());
   const int nearest = nearest_level(payloads, archive_bytes);
-  const double read_seconds = read_all(*isohf::open_source(raster, {}));
+  const double read_seconds = read_all(*isohf::open_raster(raster, {}));
   std::set<int> levels = {1, 3, 6, 9, 12};
   levels.insert(nearest);
   std::string deflated;

@@ -7,8 +7,8 @@
 #include <fstream>
 #include <vector>
 
-#include "isohf/archive/reader.h"
-#include "isohf/base/error.h"
+#include "isohf/archive.h"
+#include "isohf/error.h"
 
 namespace {
 

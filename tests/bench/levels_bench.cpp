@@ -11,10 +11,12 @@
 #include <string>
 #include <vector>
 
-#include "isohf/archive/deflate.h"
-#include "isohf/archive/lane_decoder.h"
-#include "isohf/archive/reader.h"
-#include "isohf/base/error.h"
+#include "isohf/archive.h"
+#include "isohf/archive/codec/simd/lane_decoder.h"
+#include "isohf/archive/codec/tile_codec.h"
+#include "isohf/archive/codec/tile_codes.h"
+#include "isohf/archive/deflate/deflate.h"
+#include "isohf/error.h"
 
 namespace {
 

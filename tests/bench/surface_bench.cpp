@@ -12,17 +12,18 @@
 #include <string>
 #include <vector>
 
-#include "isohf/archive/content_hash.h"
-#include "isohf/archive/deflate.h"
-#include "isohf/archive/quantise.h"
-#include "isohf/archive/tile_codec.h"
-#include "isohf/surface/height_source.h"
-#include "isohf/surface/kernels.h"
-#include "isohf/surface/normals.h"
-#include "isohf/surface/prefilter.h"
-#include "isohf/surface/shadow_hull.h"
-#include "isohf/surface/source_scan.h"
-#include "isohf/surface/tile_cutter.h"
+#include "isohf/archive/codec/quantise.h"
+#include "isohf/archive/codec/tile_codec.h"
+#include "isohf/archive/container/content_hash.h"
+#include "isohf/archive/deflate/deflate.h"
+#include "isohf/raster.h"
+#include "isohf/surface/resample/kernels.h"
+#include "isohf/surface/resample/prefilter.h"
+#include "isohf/surface/resample/tile_cutter.h"
+#include "isohf/surface/shade/normals.h"
+#include "isohf/surface/shade/shadow_hull.h"
+#include "isohf/surface/source/sample_types.h"
+#include "isohf/surface/source/source_scan.h"
 
 namespace {
 

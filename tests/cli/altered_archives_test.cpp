@@ -11,9 +11,8 @@
 #include <string>
 #include <vector>
 
-#include "isohf/base/error.h"
-#include "isohf/verify/findings.h"
-#include "isohf/verify/verify.h"
+#include "isohf/error.h"
+#include "isohf/verify.h"
 #include "support/altered_archive.h"
 #include "support/run_program.h"
 #include "support/sanitizers.h"

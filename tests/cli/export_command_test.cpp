@@ -9,6 +9,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "isohf/raster.h"
 #include "support/raster.h"
 #include "support/run_program.h"
 #include "support/temporary_folder.h"

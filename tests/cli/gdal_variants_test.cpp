@@ -9,6 +9,8 @@
 #include <nlohmann/json.hpp>
 
 #include "formats/registry.h"
+#include "isohf/raster.h"
+#include "isohf/surface/source/sample_types.h"
 #include "support/gdal_answers.h"
 #include "support/run_program.h"
 #include "support/temporary_folder.h"
@@ -115,7 +117,7 @@ TEST_F(GdalVariants, TransparentSamplesAreVoids) {
   // The sea, at 0, becomes transparent.
   translate(folder_ / "whole.tif", "sea.tif", {"-a_nodata", "0"});
   const auto elevations = [](const std::string& path) {
-    const std::unique_ptr<HeightSource> source = open_source(path, {});
+    const std::unique_ptr<HeightSource> source = open_raster(path, {});
     const SourceInfo& info = source->info();
     const auto count = static_cast<std::size_t>(info.width * info.height);
     std::vector<std::byte> raw(count * size_bytes(info.sample_type));

@@ -14,8 +14,9 @@
 #include <span>
 
 #include "formats/registry.h"
-#include "isohf/archive/reader.h"
+#include "isohf/archive.h"
 #include "isohf/projection/projection.h"
+#include "isohf/raster.h"
 #include "support/degree_grid.h"
 #include "support/raster.h"
 #include "support/run_program.h"
@@ -302,7 +303,7 @@ TEST_F(GeographicCombinations, LosslessKeepsTheFilesOwnSamplesBehindBoxAndFill) 
   ASSERT_EQ(made.exit_code, 0) << made.err;
   const RunResult restored = run_isohf({"restore", folder / "a.isohf", folder / "a.tif"});
   ASSERT_EQ(restored.exit_code, 0) << restored.err;
-  const auto raster = open_source(folder / "a.tif", {});
+  const auto raster = open_raster(folder / "a.tif", {});
   ASSERT_EQ(raster->info().width, 72) << "without the repeated column";
   ASSERT_EQ(raster->info().height, 22);
   EXPECT_DOUBLE_EQ(raster->info().georeference.origin_x, -177.5);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "formats/registry.h"
+#include "isohf/raster.h"
 #include "support/run_program.h"
 #include "support/samples.h"
 #include "support/temporary_folder.h"
@@ -30,7 +31,7 @@ const std::map<std::string, std::string> kContents = {
 };
 
 std::vector<std::byte> samples_of(const std::string& path) {
-  return read_whole(*open_source(path, {}));
+  return read_whole(*open_raster(path, {}));
 }
 
 TEST(KeptArchives, AreAllKnown) {
@@ -70,7 +71,7 @@ TEST(KeptArchives, GiveTheSamplesOfTheirSourceBack) {
   EXPECT_TRUE(samples_of(folder / "voids.tif") == samples_of(ISOHF_SOURCE_DIR "/testdata/voids_200x150_int16.tif"));
   const RunResult projected = run_isohf({"restore", kFolder + "projected.isohf", folder / "map.tif"});
   ASSERT_EQ(projected.exit_code, 0) << projected.err;
-  const auto source = open_source(folder / "map.tif", {});
+  const auto source = open_raster(folder / "map.tif", {});
   ASSERT_EQ(source->info().sample_type, SampleType::kInt32);
   std::int32_t sample = 0;
   source->read_window({5, 5, 1, 1}, std::as_writable_bytes(std::span(&sample, 1)));

@@ -8,9 +8,10 @@
 #include <filesystem>
 #include <iostream>
 
-#include "formats/raw_source.h"
+#include "formats/binary_grids/raw_source.h"
 #include "formats/registry.h"
-#include "isohf/base/error.h"
+#include "isohf/error.h"
+#include "isohf/raster.h"
 #include "support/raster.h"
 #include "support/real_files.h"
 #include "support/run_program.h"
@@ -67,7 +68,7 @@ void expect_same(const Raster& found, const Raster& expected) {
 /// The format of the source, so far as isohf writes it; no PNG of elevations that were packed into its colours.
 std::string restored_name(const fs::path& file) {
   const std::string extension = lower_extension(file);
-  if (extension == ".png" && size_bytes(open_source(file, options_for(file))->info().sample_type) > 2)
+  if (extension == ".png" && size_bytes(open_raster(file, options_for(file))->info().sample_type) > 2)
     return "back.tif";
   for (const char* own : {".tif", ".exr", ".png", ".hgt"}) {
     if (extension == own) return std::string("back") + own;
@@ -108,7 +109,7 @@ TEST_P(LosslessRealData, ComesBackBitForBit) {
     if (!is_in(GetParam(), file) || (kSanitized && fs::file_size(file) > (std::uintmax_t{1} << 20U))) continue;
     SCOPED_TRACE(file);
     try {
-      const auto source = open_source(file, options_for(file));
+      const auto source = open_raster(file, options_for(file));
       // One row is no surface: ldem_4_cropped.img.
       if (std::min(source->info().width, source->info().height) < 2) {
         not_read.push_back(file.filename());

@@ -13,10 +13,11 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "formats/raster_sink.h"
-#include "formats/reference_system.h"
+#include "formats/georeference/reference_system.h"
 #include "formats/registry.h"
+#include "formats/write/raster_sink.h"
 #include "isohf/projection/projection.h"
+#include "isohf/raster.h"
 #include "support/real_files.h"
 #include "support/run_program.h"
 #include "support/temporary_folder.h"
@@ -165,8 +166,8 @@ TEST_F(MapCommand, EveryKindPassesEveryCheck) {
 TEST_F(MapCommand, ProjectedSamplesComeBackBitForBit) {
   ASSERT_EQ(convert("web.tif", "a.isohf", {"--projection", "auto", "--lossless"}).exit_code, 0);
   ASSERT_EQ(run_isohf({"restore", folder / "a.isohf", folder / "back.tif"}).exit_code, 0);
-  const auto back = open_source(folder / "back.tif", {});
-  const auto first = open_source(folder / "web.tif", {});
+  const auto back = open_raster(folder / "back.tif", {});
+  const auto first = open_raster(folder / "web.tif", {});
   std::vector<std::byte> a(static_cast<std::size_t>(kSize * kSize) * 4);
   std::vector<std::byte> b(a.size());
   first->read_window({0, 0, kSize, kSize}, a);

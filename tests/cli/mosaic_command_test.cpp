@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "formats/mosaic_pieces.h"
+#include "isohf/raster.h"
 #include "support/plain_tiff.h"
 #include "support/real_files.h"
 #include "support/run_program.h"
@@ -137,7 +138,7 @@ TEST_F(MosaicCommand, RestoringALosslessMosaicGivesTheWholeRaster) {
   convert(write_pieces(raster, folder / "", ragged_cut(190, 140, 6, 12)), {"--lossless"});
   const RunResult result = run_isohf({"restore", folder / "out.isohf", folder / "back.tif"});
   ASSERT_EQ(result.exit_code, 0) << result.err;
-  const auto back = open_source(folder / "back.tif", {});
+  const auto back = open_raster(folder / "back.tif", {});
   ASSERT_EQ(back->info().width, 190);
   EXPECT_EQ(back->info().georeference.origin_x, raster.spec.georeference->origin_x);
   std::vector<std::byte> samples(raster.samples.size());
@@ -345,7 +346,7 @@ TEST_F(MosaicCommand, ResumeRefusesOtherMembers) {
 TEST_F(MosaicCommand, ARealRasterInPiecesHasNoSeam) {
   const std::string path = real_data() / "srtm_bigtujunga30m_utm11.tif";
   if (!std::filesystem::exists(path)) GTEST_SKIP() << kNoRealFiles;
-  const auto source = open_source(path, {});
+  const auto source = open_raster(path, {});
   const SourceInfo& info = source->info();
   CutRaster raster;
   raster.spec = placed_spec(info.width, info.height, info.sample_type, info.georeference.registration);
@@ -365,13 +366,13 @@ TEST_F(MosaicCommand, RealDegreeTilesJoin) {
   const std::string data = real_data().string() + "/";
   if (!std::filesystem::exists(data + "N44E006.hgt")) GTEST_SKIP() << kNoRealFiles;
   convert({data + "N44E007.hgt", data + "N44E006.hgt"}, {"--lossless"});
-  const auto west = open_source(data + "N44E006.hgt", {});
-  const auto east = open_source(data + "N44E007.hgt", {});
+  const auto west = open_raster(data + "N44E006.hgt", {});
+  const auto east = open_raster(data + "N44E007.hgt", {});
   const std::int64_t side = west->info().width;
   EXPECT_EQ(metadata().at("source").at("width"), 2 * side - 1);
   EXPECT_EQ(metadata().at("source").at("crs").at("origin_x"), 6.0);
   ASSERT_EQ(run_isohf({"restore", folder / "out.isohf", folder / "back.tif", "-q"}).exit_code, 0);
-  const auto back = open_source(folder / "back.tif", {});
+  const auto back = open_raster(folder / "back.tif", {});
   const auto rows = static_cast<std::size_t>(side * side * 2);
   std::vector<std::byte> expected(rows);
   std::vector<std::byte> found(rows);

@@ -13,6 +13,7 @@
 #include <sstream>
 
 #include "formats/registry.h"
+#include "isohf/raster.h"
 #include "support/degree_grid.h"
 #include "support/real_files.h"
 #include "support/run_program.h"
@@ -113,13 +114,13 @@ TEST_F(ProjectionCommand, RestoreGivesARasterOfTheMap) {
   converts({"--projection", "utm:32N"});
   const RunResult restored = isohf({"restore", folder / "a.isohf", folder / "a.tif"});
   ASSERT_EQ(restored.exit_code, 0) << restored.err;
-  const auto utm = open_source(folder / "a.tif", {});
+  const auto utm = open_raster(folder / "a.tif", {});
   EXPECT_EQ(utm->info().georeference.unit, HorizontalUnit::kMetre);
   EXPECT_EQ(utm->info().georeference.registration, Registration::kArea);
   converts({"--projection", "lambert-conformal:44,48,8"});
   const RunResult mapped = isohf({"restore", folder / "a.isohf", folder / "b.tif"});
   ASSERT_EQ(mapped.exit_code, 0) << mapped.err;
-  const auto cone = open_source(folder / "b.tif", {});
+  const auto cone = open_raster(folder / "b.tif", {});
   EXPECT_EQ(cone->info().georeference.unit, HorizontalUnit::kMetre);
   EXPECT_THAT(cone->info().georeference.system.name, HasSubstr("lambert-conformal around longitude 8"));
   // A raster of the map is a source like any other: it lies where the archive does.
@@ -183,7 +184,7 @@ TEST_F(ProjectionCommand, LosslessGivesTheInputBackThroughEveryKind) {
     EXPECT_THAT(restored.out, HasSubstr("240 x 160 samples, the source's own samples"));
     EXPECT_TRUE(read_file(folder / "back.flt") == input);
     // In degrees, where they were.
-    const auto back = open_source(folder / "back.flt", {});
+    const auto back = open_raster(folder / "back.flt", {});
     EXPECT_EQ(back->info().georeference.unit, HorizontalUnit::kDegree);
     EXPECT_NEAR(back->info().georeference.origin_x, 2.025, 1e-9);
     EXPECT_NEAR(back->info().georeference.origin_y, 49.975, 1e-9);
@@ -191,7 +192,7 @@ TEST_F(ProjectionCommand, LosslessGivesTheInputBackThroughEveryKind) {
     // What else is asked for is a raster of the map.
     ASSERT_EQ(isohf({"restore", folder / "a.isohf", folder / "map.tif", "--overwrite", "--method", "hex"}).exit_code,
               0);
-    EXPECT_EQ(open_source(folder / "map.tif", {})->info().georeference.unit, HorizontalUnit::kMetre);
+    EXPECT_EQ(open_raster(folder / "map.tif", {})->info().georeference.unit, HorizontalUnit::kMetre);
   }
 }
 
@@ -217,8 +218,8 @@ TEST_F(ProjectionCommand, ShadowsPicturesAndReportsOfAMapAreMade) {
   ASSERT_EQ(isohf({"export", folder / "a.isohf", folder / "b.tif", "--size", "300x200"}).exit_code, 0);
   OpenOptions green;
   green.channel = "1";
-  const Georeference drawn = open_source(folder / "a.tif", green)->info().georeference;
-  const Georeference exported = open_source(folder / "b.tif", {})->info().georeference;
+  const Georeference drawn = open_raster(folder / "a.tif", green)->info().georeference;
+  const Georeference exported = open_raster(folder / "b.tif", {})->info().georeference;
   EXPECT_NEAR(drawn.origin_x, exported.origin_x, 1e-6);
   EXPECT_NEAR(drawn.origin_y, exported.origin_y, 1e-6);
   EXPECT_NEAR(drawn.spacing_x, exported.spacing_x, 1e-9);
@@ -304,7 +305,7 @@ TEST(MarsMegdr, LandsAtItsRadiusAndLongitude) {
   const std::string label = real_data() / "megt90n000cb.lbl";
   if (!fs::exists(label)) GTEST_SKIP() << kNoRealFiles;
   const TemporaryFolder folder;
-  const auto source = open_source(label, {});
+  const auto source = open_raster(label, {});
   const Georeference& place = source->info().georeference;
   for (const std::vector<std::string>& more :
        {std::vector<std::string>{}, std::vector<std::string>{"--wrap-x", "--filter", "bspline3"}}) {

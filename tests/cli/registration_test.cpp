@@ -9,7 +9,7 @@
 #include <random>
 #include <sstream>
 
-#include "formats/raster_sink.h"
+#include "formats/write/raster_sink.h"
 #include "support/place_at.h"
 #include "support/raster.h"
 #include "support/run_program.h"

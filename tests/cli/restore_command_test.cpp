@@ -11,8 +11,8 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "formats/raster_sink.h"
-#include "isohf/archive/reader.h"
+#include "formats/write/raster_sink.h"
+#include "isohf/archive.h"
 #include "support/plain_tiff.h"
 #include "support/raster.h"
 #include "support/run_program.h"

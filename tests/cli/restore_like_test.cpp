@@ -12,8 +12,10 @@
 #include <string>
 #include <vector>
 
-#include "formats/raster_sink.h"
 #include "formats/registry.h"
+#include "formats/write/raster_sink.h"
+#include "isohf/raster.h"
+#include "isohf/surface/source/sample_types.h"
 #include "support/degree_grid.h"
 #include "support/run_program.h"
 #include "support/samples.h"
@@ -42,7 +44,7 @@ struct Raster {
 };
 
 Raster read_raster(const std::string& path) {
-  const auto source = open_source(path, {});
+  const auto source = open_raster(path, {});
   Raster raster{source->info(), {}};
   raster.heights.resize(static_cast<std::size_t>(raster.info.width * raster.info.height));
   heights_from_samples(raster.info, 0.0, read_whole(*source), raster.heights);

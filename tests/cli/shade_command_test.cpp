@@ -6,7 +6,8 @@
 #include <nlohmann/json.hpp>
 
 #include "formats/registry.h"
-#include "isohf/archive/reader.h"
+#include "isohf/archive.h"
+#include "isohf/raster.h"
 #include "support/place_at.h"
 #include "support/plain_tiff.h"
 #include "support/raster.h"
@@ -38,7 +39,7 @@ struct Channel {
 Channel read_channel(const std::string& path, const std::string& channel) {
   OpenOptions options;
   options.channel = channel;
-  const auto source = open_source(path, options);
+  const auto source = open_raster(path, options);
   return {source->info().width, source->info().height, source->info().georeference, read_whole(*source)};
 }
 

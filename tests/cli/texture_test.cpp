@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "formats/registry.h"
+#include "isohf/raster.h"
 #include "support/memory_photo.h"
 #include "support/plain_tiff.h"
 #include "support/run_program.h"
@@ -110,7 +111,7 @@ TEST_F(TextureOption, ShadeShowsThePhoto) {
     OpenOptions channel;
     const auto row_of = [&](const char* name) {
       channel.channel = name;
-      const auto source = open_source(folder / "s.tif", channel);
+      const auto source = open_raster(folder / "s.tif", channel);
       std::vector<std::byte> row(static_cast<std::size_t>(source->info().width));
       source->read_window({0, source->info().height / 2, source->info().width, 1}, row);
       return row;

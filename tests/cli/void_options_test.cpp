@@ -9,7 +9,7 @@
 #include <span>
 #include <vector>
 
-#include "formats/raster_sink.h"
+#include "formats/write/raster_sink.h"
 #include "support/place_at.h"
 #include "support/plain_tiff.h"
 #include "support/raster.h"

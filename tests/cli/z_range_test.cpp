@@ -5,8 +5,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "isohf/archive/reader.h"
-#include "isohf/lattice/tile_mapping.h"
+#include "isohf/archive.h"
+#include "isohf/lattice.h"
 #include "support/plain_tiff.h"
 #include "support/run_program.h"
 #include "support/temporary_folder.h"

@@ -8,12 +8,12 @@
 #include <random>
 #include <string>
 
-#include "isohf/archive/reader.h"
-#include "isohf/base/error.h"
+#include "isohf/archive.h"
+#include "isohf/error.h"
 #include "isohf/lattice/barycentric.h"
-#include "isohf/surface/kernels.h"
-#include "isohf/verify/against_source.h"
-#include "isohf/verify/verify.h"
+#include "isohf/surface/resample/kernels.h"
+#include "isohf/verify.h"
+#include "isohf/verify/accuracy/against_source.h"
 #include "support/memory_source.h"
 #include "support/temporary_folder.h"
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "isohf/convert/plan_warnings.h"
+#include "isohf/convert/frame/plan.h"
 
 namespace isohf {
 namespace {

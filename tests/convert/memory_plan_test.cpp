@@ -5,8 +5,8 @@
 
 #include <cmath>
 
-#include "isohf/base/error.h"
 #include "isohf/convert/convert.h"
+#include "isohf/error.h"
 #include "support/memory_source.h"
 #include "support/sanitizers.h"
 #include "support/temporary_folder.h"

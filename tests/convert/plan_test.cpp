@@ -1,10 +1,10 @@
-#include "isohf/convert/plan.h"
+#include "isohf/convert/frame/plan.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "isohf/base/error.h"
+#include "isohf/error.h"
 
 namespace isohf {
 namespace {

@@ -8,13 +8,13 @@
 #include <cmath>
 #include <filesystem>
 
-#include "isohf/archive/reader.h"
-#include "isohf/base/error.h"
+#include "isohf/archive.h"
 #include "isohf/convert/convert.h"
+#include "isohf/error.h"
 #include "isohf/projection/projection.h"
 #include "isohf/restore/archive_geometry.h"
-#include "isohf/verify/against_source.h"
-#include "isohf/verify/verify.h"
+#include "isohf/verify.h"
+#include "isohf/verify/accuracy/against_source.h"
 #include "isohf/verify/vertex_check.h"
 #include "support/memory_source.h"
 #include "support/place_at.h"

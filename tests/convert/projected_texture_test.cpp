@@ -5,12 +5,12 @@
 
 #include <cmath>
 
-#include "isohf/archive/reader.h"
-#include "isohf/archive/texture_reader.h"
-#include "isohf/base/error.h"
+#include "isohf/archive.h"
+#include "isohf/archive/textures/texture_reader.h"
 #include "isohf/convert/convert.h"
+#include "isohf/error.h"
 #include "isohf/projection/projection.h"
-#include "isohf/verify/verify.h"
+#include "isohf/verify.h"
 #include "support/memory_photo.h"
 #include "support/memory_source.h"
 #include "support/place_at.h"

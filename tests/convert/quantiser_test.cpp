@@ -1,4 +1,4 @@
-#include "isohf/convert/quantiser.h"
+#include "isohf/convert/stages/quantiser.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <random>
 #include <vector>
 
-#include "isohf/base/error.h"
+#include "isohf/error.h"
 
 namespace isohf {
 namespace {

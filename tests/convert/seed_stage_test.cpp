@@ -1,4 +1,4 @@
-#include "isohf/convert/seed_stage.h"
+#include "isohf/convert/stages/seed_stage.h"
 
 #include <gtest/gtest.h>
 
@@ -6,12 +6,12 @@
 #include <filesystem>
 #include <limits>
 
-#include "isohf/archive/reader.h"
-#include "isohf/archive/shadow_seed_reader.h"
-#include "isohf/base/error.h"
+#include "isohf/archive.h"
+#include "isohf/archive/shadow_seeds/shadow_seed_reader.h"
 #include "isohf/convert/convert.h"
-#include "isohf/surface/shadow.h"
-#include "isohf/verify/verify.h"
+#include "isohf/error.h"
+#include "isohf/surface/shade/shadow.h"
+#include "isohf/verify.h"
 #include "support/memory_source.h"
 #include "support/run_program.h"
 #include "support/temporary_folder.h"

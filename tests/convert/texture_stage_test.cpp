@@ -1,4 +1,4 @@
-#include "isohf/convert/texture_stage.h"
+#include "isohf/convert/stages/texture_stage.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,12 +7,12 @@
 #include <functional>
 #include <limits>
 
-#include "isohf/archive/reader.h"
-#include "isohf/archive/texture_reader.h"
-#include "isohf/base/error.h"
+#include "isohf/archive.h"
+#include "isohf/archive/textures/texture_reader.h"
 #include "isohf/convert/convert.h"
-#include "isohf/convert/photo_placement.h"
-#include "isohf/verify/verify.h"
+#include "isohf/convert/frame/photo_placement.h"
+#include "isohf/error.h"
+#include "isohf/verify.h"
 #include "support/memory_photo.h"
 #include "support/memory_source.h"
 #include "support/place_at.h"

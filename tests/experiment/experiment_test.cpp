@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "figures.h"
-#include "isohf/base/error.h"
+#include "isohf/error.h"
 #include "support/run_program.h"
 #include "support/temporary_folder.h"
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "isohf/base/error.h"
+#include "isohf/error.h"
 #include "reconstruction_error.h"
 
 namespace isohf::experiment {

@@ -1,4 +1,4 @@
-#include "svg_chart.h"
+#include "output/svg_chart.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

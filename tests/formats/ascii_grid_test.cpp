@@ -5,10 +5,11 @@
 #include <cmath>
 #include <random>
 
-#include "formats/ascii_grid_source.h"
 #include "formats/raster_reference.h"
 #include "formats/reader_failure.h"
-#include "isohf/base/error.h"
+#include "formats/text_grids/ascii_grid_source.h"
+#include "isohf/error.h"
+#include "isohf/raster.h"
 #include "support/every_window.h"
 #include "support/real_files.h"
 #include "support/samples.h"
@@ -27,7 +28,7 @@ constexpr const char* kNumbers = "1 2 3\n4 5 -9999\n";
 class AsciiGrid : public ::testing::Test {
  protected:
   [[nodiscard]] std::unique_ptr<HeightSource> open(const std::string& text, const OpenOptions& options = {}) const {
-    return open_source(write(text), options);
+    return open_raster(write(text), options);
   }
 
   [[nodiscard]] Error refusal(const std::string& text) const {
@@ -49,7 +50,7 @@ TEST_F(AsciiGrid, DeliversRealFilesAsTheReferenceDoes) {
   if (files.empty()) GTEST_SKIP() << kNoRealFiles;
   for (const auto& file : files) {
     SCOPED_TRACE(file.string());
-    const auto source = open_source(file.string(), {});
+    const auto source = open_raster(file.string(), {});
     expect_as_reference(*source, reference_of(file));
     EXPECT_EQ(source->info().format, "ESRI ASCII grid");
   }

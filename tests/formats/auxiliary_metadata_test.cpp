@@ -1,10 +1,10 @@
-#include "formats/auxiliary_metadata.h"
+#include "formats/georeference/auxiliary_metadata.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "formats/reader_failure.h"
-#include "isohf/base/error.h"
+#include "isohf/error.h"
 #include "support/temporary_folder.h"
 
 namespace isohf::test {

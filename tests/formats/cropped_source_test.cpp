@@ -1,4 +1,4 @@
-#include "formats/cropped_source.h"
+#include "formats/decorate/cropped_source.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,9 +7,10 @@
 #include <cstring>
 
 #include "formats/mosaic_pieces.h"
-#include "formats/raster_sink.h"
 #include "formats/registry.h"
-#include "isohf/base/error.h"
+#include "formats/write/raster_sink.h"
+#include "isohf/error.h"
+#include "isohf/raster.h"
 #include "support/place_at.h"
 #include "support/samples.h"
 #include "support/temporary_folder.h"
@@ -81,7 +82,7 @@ TEST(CroppedSource, ABoxAcrossTheSeamOfAGlobeIsJoined) {
     sink->write_rows(samples);
     sink->finish();
     const auto joined = [&](const std::string& box) {
-      return crop(open_source(folder / "globe.tif", {}), bounding_box_from_string(box));
+      return crop(open_raster(folder / "globe.tif", {}), bounding_box_from_string(box));
     };
     const auto source = joined("-60,-30,60,40");
     const SourceInfo& info = source->info();
@@ -129,7 +130,7 @@ TEST(CroppedSource, HasTheSamplesOfItsPartOfFileAndMosaic) {
   const double y = 5200015.0 - 21 * 30.0;
   const BoundingBox box{x, y - 33 * 30.0, x + 40 * 30.0, y};
   for (const bool joined : {false, true}) {
-    std::unique_ptr<HeightSource> source = open_source(folder / "whole.tif", {});
+    std::unique_ptr<HeightSource> source = open_raster(folder / "whole.tif", {});
     if (joined)
       source =
           std::make_unique<MosaicSource>("mosaic", plan_mosaic(pieces, {}, box), OpenOptions{}, OverlapRule::kLast);
@@ -146,7 +147,7 @@ TEST(CroppedSource, HasTheSamplesOfItsPartOfFileAndMosaic) {
     }
   }
   const BoundingBox beyond{x, y - 33 * 30.0, x + 4000 * 30.0, y};
-  const auto cut = crop(open_source(folder / "whole.tif", {}), beyond);
+  const auto cut = crop(open_raster(folder / "whole.tif", {}), beyond);
   EXPECT_EQ(cut->info().width, 67);
   EXPECT_THAT(cut->info().warnings, ::testing::ElementsAre(HasSubstr("67 x 33 samples")));
 }

@@ -5,10 +5,11 @@
 #include <algorithm>
 #include <random>
 
-#include "formats/dted_source.h"
+#include "formats/binary_grids/dted_source.h"
 #include "formats/raster_reference.h"
 #include "formats/reader_failure.h"
-#include "isohf/base/error.h"
+#include "isohf/error.h"
+#include "isohf/raster.h"
 #include "support/every_window.h"
 #include "support/real_files.h"
 #include "support/samples.h"
@@ -85,7 +86,7 @@ TEST_F(Dted, DeliversRealCellsAsTheReferenceDoes) {
   if (files.empty()) GTEST_SKIP() << test::kNoRealFiles;
   for (const auto& file : files) {
     SCOPED_TRACE(file.string());
-    const auto source = open_source(file.string(), {});
+    const auto source = open_raster(file.string(), {});
     test::expect_as_reference(*source, test::reference_of(file));
     EXPECT_EQ(source->info().format, "DTED");
     EXPECT_EQ(source->info().vertical_unit, "metre");
@@ -95,7 +96,7 @@ TEST_F(Dted, DeliversRealCellsAsTheReferenceDoes) {
 }
 
 TEST_F(Dted, TurnsColumnsIntoRowsFromTheNorth) {
-  const auto source = open_source(write(cell()), {});
+  const auto source = open_raster(write(cell()), {});
   const SourceInfo& info = source->info();
   EXPECT_EQ(info.georeference.registration, Registration::kPoint);
   EXPECT_DOUBLE_EQ(info.georeference.spacing_x, 30.0 / 3600.0);

@@ -11,11 +11,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "formats/exr_source.h"
+#include "formats/exr/exr_source.h"
 #include "formats/raster_reference.h"
 #include "formats/reader_failure.h"
 #include "formats/registry.h"
-#include "isohf/base/error.h"
+#include "isohf/error.h"
+#include "isohf/raster.h"
 #include "support/real_files.h"
 #include "support/samples.h"
 #include "support/temporary_folder.h"
@@ -222,9 +223,9 @@ TEST(ExrSource, IsPlacedByAWorldFile) {
   const TemporaryFolder folder;
   const std::string path = folder / "a.exr";
   std::filesystem::copy_file(std::string(ISOHF_SOURCE_DIR) + "/testdata/ridges_161x161_float.exr", path);
-  EXPECT_FALSE(open_source(path, {})->info().georeference.has_origin);
+  EXPECT_FALSE(open_raster(path, {})->info().georeference.has_origin);
   write_file(folder / "a.erw", "0.5\n0\n0\n-0.25\n10.25\n50\n");
-  const Georeference place = open_source(path, {})->info().georeference;
+  const Georeference place = open_raster(path, {})->info().georeference;
   EXPECT_TRUE(place.has_origin);
   EXPECT_EQ(place.origin_x, 10.25);
   EXPECT_EQ(place.origin_y, 50.0);
@@ -351,7 +352,7 @@ TEST(ExrSource, ReadsPartsOfAMultiPartFile) {
     OpenOptions of_part;
     of_part.part = part;
     of_part.channel = channel;
-    const auto source = open_source(path, of_part);
+    const auto source = open_raster(path, of_part);
     EXPECT_EQ(read_whole(*source), Samples(pictures[number]).plane(plane)) << part;
     EXPECT_EQ(source->info().channel, name);
   };
@@ -365,7 +366,7 @@ TEST(ExrSource, ReadsPartsOfAMultiPartFile) {
   wrong.part = "3";
   EXPECT_THAT(error_of([&] { (void)open_exr(path, wrong); }).what(), HasSubstr("in parts 0...2"));
   write_file(folder / "a.asc", "ncols 1\nnrows 1\n1\n");
-  EXPECT_THAT(error_of([&] { (void)open_source(folder / "a.asc", wrong); }).what(), HasSubstr("--part is for OpenEXR"));
+  EXPECT_THAT(error_of([&] { (void)open_raster(folder / "a.asc", wrong); }).what(), HasSubstr("--part is for OpenEXR"));
 }
 
 TEST(ExrSource, RefusesSubsampledChannelsOnly) {
@@ -479,7 +480,7 @@ TEST(ExrSource, AgreesWithReferenceReadersOnRealFiles) {
   if (files.empty()) GTEST_SKIP() << kNoRealFiles;
   for (const auto& file : files) {
     SCOPED_TRACE(file);
-    const auto source = open_source(file, {});
+    const auto source = open_raster(file, {});
     expect_as_reference(*source, reference_of(file));
     EXPECT_EQ(source->info().georeference.registration, Registration::kUnknown);
   }

@@ -1,4 +1,4 @@
-#include "formats/geotiff_keys.h"
+#include "formats/tiff/geotiff_keys.h"
 
 #include <gtest/gtest.h>
 
@@ -6,8 +6,8 @@
 #include <numbers>
 #include <random>
 
-#include "formats/units.h"
-#include "isohf/base/error.h"
+#include "formats/georeference/units.h"
+#include "isohf/error.h"
 
 namespace isohf {
 namespace {

@@ -4,11 +4,12 @@
 #include <filesystem>
 #include <random>
 
+#include "formats/files/raw_file.h"
 #include "formats/gzipped.h"
-#include "formats/raw_file.h"
 #include "formats/reader_failure.h"
 #include "formats/registry.h"
 #include "formats/zip_archive.h"
+#include "isohf/raster.h"
 #include "support/samples.h"
 #include "support/temporary_folder.h"
 
@@ -51,16 +52,16 @@ class PackedTile : public ::testing::Test {
 };
 
 TEST_F(PackedTile, IsHeldOnlyWhereThatIsAllowedAndThenCounted) {
-  EXPECT_EQ(open_source(plain_, {})->buffer_bytes(UINT64_MAX), 0U);
+  EXPECT_EQ(open_raster(plain_, {})->buffer_bytes(UINT64_MAX), 0U);
   for (const char* packing : {".gz", ".zip"}) {
     SCOPED_TRACE(packing);
-    EXPECT_EQ(open_source(plain_ + packing, {})->buffer_bytes(UINT64_MAX), kTileBytes);
-    EXPECT_EQ(open_source(plain_ + packing, holding(kTileBytes))->buffer_bytes(UINT64_MAX), kTileBytes);
+    EXPECT_EQ(open_raster(plain_ + packing, {})->buffer_bytes(UINT64_MAX), kTileBytes);
+    EXPECT_EQ(open_raster(plain_ + packing, holding(kTileBytes))->buffer_bytes(UINT64_MAX), kTileBytes);
     // Places of the decoder instead, one each MiB, and what it works with.
-    const auto streamed = open_source(plain_ + packing, holding(kTileBytes - 1))->buffer_bytes(UINT64_MAX);
+    const auto streamed = open_raster(plain_ + packing, holding(kTileBytes - 1))->buffer_bytes(UINT64_MAX);
     EXPECT_GT(streamed, kMiB / 4);
     EXPECT_LT(streamed, kMiB);
-    const auto held = open_source(plain_ + packing, {});
+    const auto held = open_raster(plain_ + packing, {});
     EXPECT_EQ(held->buffer_bytes(kTileBytes), kTileBytes);
     EXPECT_EQ(held->buffer_bytes(4 * kMiB), kTileBytes);
     EXPECT_EQ(held->buffer_bytes(kMiB), streamed);
@@ -72,13 +73,13 @@ TEST_F(PackedTile, IsHeldOnlyWhereThatIsAllowedAndThenCounted) {
 }
 
 TEST_F(PackedTile, HasTheSameSamplesHeldAndNotInAnyOrder) {
-  const auto plain = open_source(plain_, {});
+  const auto plain = open_raster(plain_, {});
   const auto all = read_whole(*plain);
   for (const char* packing : {".gz", ".zip"}) {
     SCOPED_TRACE(packing);
-    const auto held = open_source(plain_ + packing, {});
-    const auto streamed = open_source(plain_ + packing, holding(0));
-    const auto dropped = open_source(plain_ + packing, {});
+    const auto held = open_raster(plain_ + packing, {});
+    const auto streamed = open_raster(plain_ + packing, holding(0));
+    const auto dropped = open_raster(plain_ + packing, {});
     (void)read_window(*dropped, {0, 700, kSide, 1});
     dropped->limit_buffers(1);
     std::mt19937 random(9);
@@ -99,7 +100,7 @@ TEST_F(PackedTile, HasTheSameSamplesHeldAndNotInAnyOrder) {
 }
 
 TEST_F(PackedTile, SaysWhenItWasChangedWhileItWasRead) {
-  const auto source = open_source(plain_ + ".gz", {});
+  const auto source = open_raster(plain_ + ".gz", {});
   source->limit_buffers(1);
   std::filesystem::resize_file(plain_ + ".gz", 1000);
   const Error error = error_of([&] { (void)read_window(*source, {0, 1100, kSide, 1}); });
@@ -113,8 +114,8 @@ TEST(Gzip, ReadsATileOfSeveralMegabytesInAnyOrder) {
   const std::string contents = terrain(std::size_t{1201} * 1201 * 2);
   write_file(plain_path, contents);
   write_file(plain_path + ".gz", gzipped(contents));
-  const auto plain = open_source(plain_path, {});
-  const auto packed = open_source(plain_path + ".gz", {});
+  const auto plain = open_raster(plain_path, {});
+  const auto packed = open_raster(plain_path + ".gz", {});
   EXPECT_EQ(packed->info().format, "SRTM HGT");
   EXPECT_EQ(packed->info().georeference.origin_y, 45.0);
   EXPECT_EQ(packed->info().warnings.size(), 0U);
@@ -133,7 +134,7 @@ TEST(Gzip, HoldsTextGridsWithTheirPrj) {
   const TemporaryFolder folder;
   write_file(folder / "a.asc.gz", gzipped("ncols 2\nnrows 2\nxllcorner 5\nyllcorner 6\ncellsize 1\n1 2\n3 4\n"));
   write_file(folder / "a.prj", R"(PROJCS["Here",GEOGCS["G",DATUM["D",SPHEROID["S",6378137,298]]],UNIT["metre",1]])");
-  const auto source = open_source(folder / "a.asc.gz", {});
+  const auto source = open_raster(folder / "a.asc.gz", {});
   EXPECT_EQ(source->info().format, "ESRI ASCII grid");
   EXPECT_EQ(source->info().georeference.system.name, "Here");
   const auto all = read_whole(*source);
@@ -198,9 +199,9 @@ TEST(Gzip, RefusesEveryTruncationAndEveryFlippedByteInTheSameWordsHeldAndNot) {
     write_file(path, bytes);
     OpenOptions options;
     options.raw = RawLayout{20, 20, SampleType::kUint16, false};
-    const std::string held = failure_of(path, &code, [&] { read_corner(*open_source(path, options)); });
+    const std::string held = failure_of(path, &code, [&] { read_corner(*open_raster(path, options)); });
     options.unpacked_bytes = 0;
-    EXPECT_EQ(failure_of(path, &code, [&] { read_corner(*open_source(path, options)); }), held);
+    EXPECT_EQ(failure_of(path, &code, [&] { read_corner(*open_raster(path, options)); }), held);
     return held;
   };
   EXPECT_EQ(failure(whole), "");
@@ -222,14 +223,14 @@ TEST(Gzip, SaysWhichFormatsItDoesNotReadInside) {
   const TemporaryFolder folder;
   const auto says = [&](const std::string& name, const std::string& contents) {
     write_file(folder / name, gzipped(contents));
-    return std::string(error_of([&] { (void)open_source(folder / name, {}); }).what());
+    return std::string(error_of([&] { (void)open_raster(folder / name, {}); }).what());
   };
   EXPECT_THAT(says("a.tif.gz", std::string("II*\0\x08\0\0\0", 8) + std::string(90, ' ')),
               HasSubstr("is TIFF in gzip, which isohf does not read; gunzip it first"));
   EXPECT_THAT(says("a.txt.gz", "nothing that is known"), HasSubstr("is something unknown in gzip"));
   // A browser may have unpacked it already: the content decides.
   write_file(folder / "b.asc.gz", "ncols 2\nnrows 1\n1 2\n");
-  EXPECT_EQ(open_source(folder / "b.asc.gz", {})->info().width, 2);
+  EXPECT_EQ(open_raster(folder / "b.asc.gz", {})->info().width, 2);
 }
 
 }  // namespace

@@ -4,10 +4,11 @@
 
 #include <random>
 
-#include "formats/header_grid_source.h"
+#include "formats/binary_grids/header_grid_source.h"
 #include "formats/raster_reference.h"
 #include "formats/reader_failure.h"
-#include "isohf/base/error.h"
+#include "isohf/error.h"
+#include "isohf/raster.h"
 #include "support/every_window.h"
 #include "support/real_files.h"
 #include "support/samples.h"
@@ -30,7 +31,7 @@ class HeaderGrid : public ::testing::Test {
                                                    const std::string& name = "grid.bil") const {
     write("grid.hdr", header);
     write(name, data);
-    return open_source(folder_ / name, {});
+    return open_raster(folder_ / name, {});
   }
 
   [[nodiscard]] std::string refusal(const std::string& header, const std::string& data,
@@ -54,14 +55,14 @@ TEST_F(HeaderGrid, DeliversRealFilesAsTheReferenceDoes) {
   if (files.empty()) GTEST_SKIP() << kNoRealFiles;
   for (const auto& file : files) {
     SCOPED_TRACE(file.string());
-    const auto source = open_source(file.string(), {});
+    const auto source = open_raster(file.string(), {});
     expect_as_reference(*source, reference_of(file));
     const bool has_prj = std::filesystem::exists(std::filesystem::path(file).replace_extension(".prj"));
     EXPECT_EQ(source->info().warnings.size(), has_prj ? 0U : 1U);  // degrees that nothing declares
     EXPECT_EQ(source->info().georeference.system.wkt.empty(), !has_prj);
     EXPECT_EQ(source->info().georeference.unit, has_prj ? HorizontalUnit::kMetre : HorizontalUnit::kUnknown);
     // The header stands for the grid as well.
-    const auto by_header = open_source(std::filesystem::path(file).replace_extension(".hdr").string(), {});
+    const auto by_header = open_raster(std::filesystem::path(file).replace_extension(".hdr").string(), {});
     EXPECT_EQ(read_whole(*by_header), read_whole(*source));
   }
 }
@@ -75,7 +76,7 @@ TEST_F(HeaderGrid, ReadsGtopo30) {
         "YDIM          0.00833333333333\n");
   write("W180N90.DEM", std::string("\xD8\xF1\x00\x01\x00\x02\x01\x00\xFF\xFF\x22\x78", 12));
   for (const char* name : {"W180N90.DEM", "W180N90.HDR"}) {
-    const auto source = open_source(folder_ / name, {});
+    const auto source = open_raster(folder_ / name, {});
     const SourceInfo& info = source->info();
     ASSERT_EQ(info.sample_type, SampleType::kInt16);
     EXPECT_EQ(info.void_values, std::vector<double>{-9999.0});
@@ -177,19 +178,19 @@ TEST_F(HeaderGrid, SaysWhatItTakesForGranted) {
 TEST_F(HeaderGrid, MissesTheOtherFileByName) {
   write("lonely.flt", bytes(12));
   write("lonely.bil", bytes(12));
-  EXPECT_THAT(error_of([&] { (void)open_source(folder_ / "lonely.flt", {}); }).what(),
+  EXPECT_THAT(error_of([&] { (void)open_raster(folder_ / "lonely.flt", {}); }).what(),
               HasSubstr("lonely.hdr is not there"));
   write("lonely.hdr", kSixteenBits);
-  EXPECT_THAT(error_of([&] { (void)open_source(folder_ / "lonely.hdr", {}); }).what(), HasSubstr("name the one"));
+  EXPECT_THAT(error_of([&] { (void)open_raster(folder_ / "lonely.hdr", {}); }).what(), HasSubstr("name the one"));
   std::filesystem::remove(folder_ / "lonely.flt");
-  EXPECT_EQ(open_source(folder_ / "lonely.hdr", {})->info().width, 3);
+  EXPECT_EQ(open_raster(folder_ / "lonely.hdr", {})->info().width, 3);
   std::filesystem::remove(folder_ / "lonely.bil");
-  EXPECT_THAT(error_of([&] { (void)open_source(folder_ / "lonely.hdr", {}); }).what(),
+  EXPECT_THAT(error_of([&] { (void)open_raster(folder_ / "lonely.hdr", {}); }).what(),
               HasSubstr("whose data is not beside"));
   write("twofold.bil", bytes(12));
   write("twofold.bil.hdr", std::string("BYTEORDER I\n") + kSixteenBits);
-  EXPECT_EQ(open_source(folder_ / "twofold.bil", {})->info().width, 3);
-  EXPECT_EQ(open_source(folder_ / "twofold.bil.hdr", {})->info().width, 3);
+  EXPECT_EQ(open_raster(folder_ / "twofold.bil", {})->info().width, 3);
+  EXPECT_EQ(open_raster(folder_ / "twofold.bil.hdr", {})->info().width, 3);
 }
 
 TEST_F(HeaderGrid, RefusesWhatItDoesNotRead) {

@@ -1,4 +1,4 @@
-#include "formats/hgt_source.h"
+#include "formats/binary_grids/hgt_source.h"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,8 @@
 
 #include "formats/raster_reference.h"
 #include "formats/zip_archive.h"
-#include "isohf/base/error.h"
+#include "isohf/error.h"
+#include "isohf/raster.h"
 #include "support/every_window.h"
 #include "support/real_files.h"
 #include "support/samples.h"
@@ -209,7 +210,7 @@ TEST_F(HgtSource, NeverCrashesOnADamagedArchive) {
 TEST_F(HgtSource, IsFoundInAnArchiveOfAnotherName) {
   const std::string path = write("NASADEM_HGT_n44e006.zip", zipped("n44e006.hgt", tile(7, 7), true));
   EXPECT_TRUE(is_zip_of_hgt(path));
-  const auto source = open_source(path, {});
+  const auto source = open_raster(path, {});
   EXPECT_EQ(source->info().format, "SRTM HGT");
   EXPECT_EQ(source->info().georeference.origin_y, 45.0);
   EXPECT_FALSE(is_zip_of_hgt(write("other.zip", zipped("readme.txt", tile(3, 3), true))));

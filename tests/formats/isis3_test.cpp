@@ -6,10 +6,11 @@
 #include <bit>
 #include <random>
 
-#include "formats/isis3_source.h"
+#include "formats/planetary/isis3_source.h"
 #include "formats/raster_reference.h"
 #include "formats/reader_failure.h"
-#include "isohf/base/error.h"
+#include "isohf/error.h"
+#include "isohf/raster.h"
 #include "support/every_window.h"
 #include "support/real_files.h"
 #include "support/samples.h"
@@ -94,7 +95,7 @@ TEST_F(Isis3, DeliversRealCubesAsTheReferenceDoes) {
   if (files.empty()) GTEST_SKIP() << test::kNoRealFiles;
   for (const auto& file : files) {
     SCOPED_TRACE(file.string());
-    const auto source = open_source(file.string(), {});
+    const auto source = open_raster(file.string(), {});
     const auto ref = test::reference_of(file);
     test::expect_as_reference(*source, ref);
     const SourceInfo& info = source->info();
@@ -118,7 +119,7 @@ TEST_F(Isis3, WindowsEqualTheWholeInEveryLayout) {
         OpenOptions options;
         options.channel = std::to_string(band);
         const auto source =
-            open_source(write(label(layout, 2, pixels) + tiles(tile_columns, tile_rows, 2, big_endian)), options);
+            open_raster(write(label(layout, 2, pixels) + tiles(tile_columns, tile_rows, 2, big_endian)), options);
         test::expect_every_window(*source, test::stored<std::int16_t>(5, 4, [&](std::int64_t c, std::int64_t r) {
           return height_at(band, static_cast<int>(c), static_cast<int>(r));
         }));
@@ -134,19 +135,19 @@ TEST_F(Isis3, FollowsADetachedLabelToItsCore) {
   test::write_file(folder_ / "data.CUB", std::string(kLabelBytes, 'x') + tiles(3, 2, 1, false));
   const std::string path = folder_ / "outside.lbl";
   test::write_file(path, text);
-  const auto expected = open_source(folder_ / "whole.cub", {});
-  const auto source = open_source(path, {});
+  const auto expected = open_raster(folder_ / "whole.cub", {});
+  const auto source = open_raster(path, {});
   EXPECT_EQ(test::read_whole(*source), test::read_whole(*expected));
   EXPECT_EQ(source->info().georeference.origin_x, expected->info().georeference.origin_x);
   std::filesystem::remove(folder_ / "data.CUB");
   ErrorCode code = ErrorCode::kCancelled;
-  EXPECT_THAT(test::failure_of(path, &code, [&] { (void)open_source(path, {}); }),
+  EXPECT_THAT(test::failure_of(path, &code, [&] { (void)open_raster(path, {}); }),
               HasSubstr("^Core names DATA.cub, which must be a file beside the label"));
   EXPECT_EQ(code, ErrorCode::kIo);
 }
 
 TEST_F(Isis3, PlacesPixelsAndScalesThem) {
-  const auto source = open_source(write(label(kTiles, 1, kWord) + tiles(3, 2, 1, false)), {});
+  const auto source = open_raster(write(label(kTiles, 1, kWord) + tiles(3, 2, 1, false)), {});
   const SourceInfo& info = source->info();
   EXPECT_EQ(info.georeference.registration, Registration::kArea);
   EXPECT_EQ(info.georeference.origin_x, -95.0);
@@ -156,7 +157,7 @@ TEST_F(Isis3, PlacesPixelsAndScalesThem) {
   EXPECT_EQ(info.georeference.system.inverse_flattening, 0.0);
   EXPECT_EQ(info.z_scale, 0.5);
   EXPECT_EQ(info.z_offset, 1737400.0);
-  const auto bare = open_source(write(label(kTiles, 1, kWord, "") + tiles(3, 2, 1, false)), {});
+  const auto bare = open_raster(write(label(kTiles, 1, kWord, "") + tiles(3, 2, 1, false)), {});
   EXPECT_FALSE(bare->info().georeference.has_origin);
   EXPECT_TRUE(bare->info().warnings.empty());
 }
@@ -181,7 +182,7 @@ TEST_F(Isis3, TakesSpecialPixelsForVoids) {
   for (const Kind& kind : kinds) {
     SCOPED_TRACE(kind.name);
     const auto source =
-        open_source(write(label(kTiles, 1, fmt::format("Type = {}", kind.name)) + std::string(2000, '\1')), {});
+        open_raster(write(label(kTiles, 1, fmt::format("Type = {}", kind.name)) + std::string(2000, '\1')), {});
     EXPECT_EQ(source->info().sample_type, kind.type);
     for (const double value : kind.special) EXPECT_TRUE(test::is_void(source->info(), value)) << value;
     for (const double value : kind.plain) EXPECT_FALSE(test::is_void(source->info(), value)) << value;

@@ -2,8 +2,9 @@
 
 #include <gtest/gtest.h>
 
-#include "formats/raster_sink.h"
 #include "formats/registry.h"
+#include "formats/write/raster_sink.h"
+#include "isohf/raster.h"
 #include "support/raster.h"
 #include "support/samples.h"
 #include "support/temporary_folder.h"
@@ -31,7 +32,7 @@ TEST(LimitedBuffers, DeliverTheSameSamplesInAnyOrder) {
   for (const auto& [name, type] : {std::pair{"a.exr", SampleType::kFloat16}, {"a.png", SampleType::kUint16}}) {
     SCOPED_TRACE(name);
     const auto samples = write_counting(folder / name, type);
-    const auto source = open_source(folder / name, {});
+    const auto source = open_raster(folder / name, {});
     const std::uint64_t all = source->buffer_bytes(UINT64_MAX);
     EXPECT_GE(all, samples.size());
     for (const std::uint64_t limit : {std::uint64_t{1} << 30U, std::uint64_t{100000}, std::uint64_t{1}}) {
@@ -49,13 +50,13 @@ TEST(LimitedBuffers, DeliverTheSameSamplesInAnyOrder) {
 TEST(LimitedBuffers, AreCountedByTheRow) {
   const TemporaryFolder folder;
   (void)write_counting(folder / "a.png", SampleType::kUint16);
-  const auto png = open_source(folder / "a.png", {});
+  const auto png = open_raster(folder / "a.png", {});
   // A kept row at least, one that is decoded and one of libpng's.
   EXPECT_EQ(png->buffer_bytes(1), 3 * kRowBytes);
   EXPECT_EQ(png->buffer_bytes(10 * kRowBytes), 12 * kRowBytes);
   EXPECT_EQ(png->buffer_bytes(UINT64_MAX), (kHeight + 2) * kRowBytes);
   (void)write_counting(folder / "a.exr", SampleType::kFloat16);
-  const auto exr = open_source(folder / "a.exr", {});
+  const auto exr = open_raster(folder / "a.exr", {});
   // Bands are whole chunks of 16 rows; what OpenEXR holds besides does not depend on them.
   const std::uint64_t library = exr->buffer_bytes(1) - 16 * kRowBytes;
   EXPECT_GE(library, 16 * kRowBytes);

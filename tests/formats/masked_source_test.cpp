@@ -1,4 +1,4 @@
-#include "formats/masked_source.h"
+#include "formats/decorate/masked_source.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,9 +8,10 @@
 #include <span>
 #include <vector>
 
+#include "formats/tiff/tiff_source.h"
 #include "formats/tiff_bytes.h"
-#include "formats/tiff_source.h"
-#include "isohf/base/error.h"
+#include "isohf/error.h"
+#include "isohf/surface/source/sample_types.h"
 #include "support/memory_source.h"
 #include "support/temporary_folder.h"
 

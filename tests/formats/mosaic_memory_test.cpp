@@ -5,7 +5,8 @@
 #include <random>
 
 #include "formats/gzipped.h"
-#include "formats/mosaic_source.h"
+#include "formats/mosaic/mosaic_source.h"
+#include "isohf/raster.h"
 #include "support/samples.h"
 #include "support/temporary_folder.h"
 

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "formats/mosaic_source.h"
-#include "isohf/surface/height_source.h"
+#include "formats/mosaic/mosaic_source.h"
+#include "isohf/raster.h"
 #include "support/place_at.h"
 #include "support/raster.h"
 

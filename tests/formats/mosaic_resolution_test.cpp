@@ -5,8 +5,8 @@
 
 #include <cmath>
 
+#include "formats/mosaic/mosaic_samples.h"
 #include "formats/mosaic_pieces.h"
-#include "formats/mosaic_samples.h"
 #include "support/samples.h"
 #include "support/temporary_folder.h"
 

@@ -1,4 +1,4 @@
-#include "formats/mosaic_source.h"
+#include "formats/mosaic/mosaic_source.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,7 +8,8 @@
 #include <filesystem>
 
 #include "formats/mosaic_pieces.h"
-#include "isohf/base/error.h"
+#include "isohf/error.h"
+#include "isohf/raster.h"
 #include "support/samples.h"
 #include "support/temporary_folder.h"
 
@@ -59,7 +60,7 @@ TEST(MosaicSource, PiecesGiveTheWholeBitForBitInEveryType) {
       std::reverse(paths.begin(), paths.end());
       const auto mosaic = open_mosaic(paths);
       const SourceInfo& info = mosaic->info();
-      const SourceInfo original = open_source(folder / "whole.tif", {})->info();
+      const SourceInfo original = open_raster(folder / "whole.tif", {})->info();
       EXPECT_EQ(info.width, 97);
       EXPECT_EQ(info.height, 61);
       EXPECT_EQ(info.sample_type, type);

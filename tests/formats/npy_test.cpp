@@ -5,11 +5,12 @@
 #include <algorithm>
 #include <random>
 
-#include "formats/npy_source.h"
+#include "formats/binary_grids/npy_source.h"
 #include "formats/raster_reference.h"
 #include "formats/reader_failure.h"
 #include "formats/zip_archive.h"
-#include "isohf/base/error.h"
+#include "isohf/error.h"
+#include "isohf/raster.h"
 #include "support/real_files.h"
 #include "support/samples.h"
 #include "support/temporary_folder.h"
@@ -52,7 +53,7 @@ class Npy : public testing::Test {
   std::string failure(const std::string& bytes, ErrorCode* code = nullptr, const std::string& name = "a.npy") const {
     const std::string path = write(bytes, name);
     return test::failure_of(path, code, [&] {
-      const auto source = open_source(path, {});
+      const auto source = open_raster(path, {});
       test::read_corner(*source);
     });
   }
@@ -63,7 +64,7 @@ class Npy : public testing::Test {
 TEST_F(Npy, DeliversARealArray) {
   const auto file = test::real_data() / "derived" / "gale.npy";
   if (!std::filesystem::exists(file)) GTEST_SKIP() << test::kNoRealFiles;
-  const auto source = open_source(file.string(), {});
+  const auto source = open_raster(file.string(), {});
   const auto ref = test::reference_of(file);
   EXPECT_EQ(source->info().width, ref.at("width").get<int>());
   EXPECT_EQ(source->info().height, ref.at("height").get<int>());
@@ -90,7 +91,7 @@ TEST_F(Npy, ReadsEveryTypeOrderAndVersion) {
       for (const int version : {1, 2, 3}) {
         SCOPED_TRACE(fmt::format("{}{} {}", order, name, version));
         const std::string data = counting(size, order == '>');
-        const auto source = open_source(write(array(order + std::string(name), "(2, 3)", data, version)), {});
+        const auto source = open_raster(write(array(order + std::string(name), "(2, 3)", data, version)), {});
         ASSERT_EQ(source->info().sample_type, type);
         ASSERT_EQ(source->info().width, 3);
         const auto raw = test::read_whole(*source);
@@ -108,7 +109,7 @@ TEST_F(Npy, ReadsWholeNumbersOf64BitsAsFloatsThatHoldThem) {
   for (const char* type : {"<i8", ">i8", "<u8", ">u8"}) {
     for (const char* order : {"False", "True"}) {
       SCOPED_TRACE(fmt::format("{} {}", type, order));
-      const auto source = open_source(write(array(type, "(2, 3)", counting(8, type[0] == '>'), 1, order)), {});
+      const auto source = open_raster(write(array(type, "(2, 3)", counting(8, type[0] == '>'), 1, order)), {});
       ASSERT_EQ(source->info().sample_type, SampleType::kFloat64);
       std::vector<std::byte> last(16);
       source->read_window({2, 0, 1, 2}, last);
@@ -118,12 +119,12 @@ TEST_F(Npy, ReadsWholeNumbersOf64BitsAsFloatsThatHoldThem) {
   }
   const auto number = [&](const char* type, const std::string& bytes) { return array(type, "(1, 1)", bytes); };
   const std::string lowest("\0\0\0\0\0\0\0\x80", 8);
-  EXPECT_EQ(test::value_at(SampleType::kFloat64, test::read_whole(*open_source(write(number("<i8", lowest)), {})), 0),
+  EXPECT_EQ(test::value_at(SampleType::kFloat64, test::read_whole(*open_raster(write(number("<i8", lowest)), {})), 0),
             -0x1p63);
-  EXPECT_EQ(test::value_at(SampleType::kFloat64, test::read_whole(*open_source(write(number("<u8", lowest)), {})), 0),
+  EXPECT_EQ(test::value_at(SampleType::kFloat64, test::read_whole(*open_raster(write(number("<u8", lowest)), {})), 0),
             0x1p63);
   const std::string ones(8, '\xff');
-  EXPECT_EQ(test::value_at(SampleType::kFloat64, test::read_whole(*open_source(write(number("<i8", ones)), {})), 0),
+  EXPECT_EQ(test::value_at(SampleType::kFloat64, test::read_whole(*open_raster(write(number("<i8", ones)), {})), 0),
             -1);
   EXPECT_THAT(
       failure(number("<u8", ones)),
@@ -136,7 +137,7 @@ TEST_F(Npy, ReadsWholeNumbersOf64BitsAsFloatsThatHoldThem) {
 TEST_F(Npy, DimensionsOfOneAreNone) {
   const std::string data = counting(2, false);
   for (const char* shape : {"(1, 2, 3)", "(2, 1, 3)", "(2, 3, 1)", "(1, 2, 3, 1)"}) {
-    const auto source = open_source(write(array("<i2", shape, data)), {});
+    const auto source = open_raster(write(array("<i2", shape, data)), {});
     EXPECT_EQ(source->info().width, 3) << shape;
     EXPECT_EQ(source->info().height, 2) << shape;
   }
@@ -156,7 +157,7 @@ TEST_F(Npy, SaysWhatItDoesNotRead) {
 TEST_F(Npy, ReadsFortranOrder) {
   for (const bool big_endian : {false, true}) {
     const std::string type = big_endian ? ">i2" : "<i2";
-    const auto source = open_source(write(array(type, "(2, 3)", counting(2, big_endian), 1, "True")), {});
+    const auto source = open_raster(write(array(type, "(2, 3)", counting(2, big_endian), 1, "True")), {});
     const auto raw = test::read_whole(*source);
     const std::vector<double> wanted = {1, 3, 5, 2, 4, 6};
     for (std::size_t i = 0; i < 6; ++i) EXPECT_EQ(test::value_at(SampleType::kInt16, raw, i), wanted[i]);
@@ -178,13 +179,13 @@ TEST_F(Npy, PicksAnArrayOfAnArchive) {
                                         entry("high.npy", array(">i4", "(3, 2)", counting(4, true)))},
                                        kind % 2 == 1, kind >= 2);
     const std::string path = write({reinterpret_cast<const char*>(zip.data()), zip.size()}, "a.npz");
-    const auto first = open_source(path, {});
+    const auto first = open_raster(path, {});
     EXPECT_EQ(first->info().width, 3);
     EXPECT_EQ(first->info().channel, "low");
     EXPECT_THAT(first->info().warnings, ::testing::ElementsAre(HasSubstr("array low is read, of dx, low, high")));
     OpenOptions options;
     options.channel = "high";
-    const auto high = open_source(path, options);
+    const auto high = open_raster(path, options);
     EXPECT_EQ(high->info().width, 2);
     EXPECT_TRUE(high->info().warnings.empty());
     const auto raw = test::read_whole(*high);
@@ -193,7 +194,7 @@ TEST_F(Npy, PicksAnArrayOfAnArchive) {
     const auto says = [&](const char* channel) {
       options.channel = channel;
       ErrorCode code = ErrorCode::kCancelled;
-      return test::failure_of(path, &code, [&] { (void)open_source(path, options); });
+      return test::failure_of(path, &code, [&] { (void)open_raster(path, options); });
     };
     EXPECT_THAT(says("nothing"), HasSubstr("there is no array \"nothing\"; there are dx, low, high"));
     EXPECT_THAT(says("dx"), HasSubstr("must have 2 dimensions (array dx)"));
@@ -209,7 +210,7 @@ TEST_F(Npy, PicksAnArrayOfAnArchive) {
 TEST_F(Npy, DeliversARealArchive) {
   const auto file = test::real_data() / "jacksboro_fault_dem.npz";
   if (!std::filesystem::exists(file)) GTEST_SKIP() << test::kNoRealFiles;
-  const auto source = open_source(file.string(), {});
+  const auto source = open_raster(file.string(), {});
   const auto ref = test::reference_of(file);
   EXPECT_EQ(source->info().channel, "elevation");
   EXPECT_TRUE(source->info().warnings.empty());

@@ -3,7 +3,8 @@
 
 #include "formats/reader_failure.h"
 #include "formats/registry.h"
-#include "isohf/base/error.h"
+#include "isohf/error.h"
+#include "isohf/raster.h"
 #include "support/samples.h"
 #include "support/temporary_folder.h"
 
@@ -50,7 +51,7 @@ class OiioModule : public ::testing::Test {
 };
 
 TEST_F(OiioModule, ReadsWhatNoNativeReaderKnows) {
-  const auto source = open_source(write_graymap(), {});
+  const auto source = open_raster(write_graymap(), {});
   const SourceInfo& info = source->info();
   EXPECT_EQ(info.format, "pnm");
   ASSERT_EQ(info.width, kWidth);
@@ -71,7 +72,7 @@ TEST_F(OiioModule, ReadsWhatNoNativeReaderKnows) {
 }
 
 TEST_F(OiioModule, KeepsNoMoreThanItIsAskedTo) {
-  const auto source = open_source(write_graymap(), {});
+  const auto source = open_raster(write_graymap(), {});
   EXPECT_EQ(source->buffer_bytes(1), 2U * kWidth);
   EXPECT_EQ(source->buffer_bytes(9 * kWidth), 4U * 2 * kWidth);
   EXPECT_EQ(source->buffer_bytes(UINT64_MAX), 2U * kWidth * kHeight);
@@ -82,21 +83,21 @@ TEST_F(OiioModule, KeepsNoMoreThanItIsAskedTo) {
 
 TEST_F(OiioModule, ReadsTheChannelAskedFor) {
   const std::string path = write_pixmap();
-  const auto first = open_source(path, {});
+  const auto first = open_raster(path, {});
   EXPECT_EQ(first->info().channel, "R");
   ASSERT_EQ(first->info().warnings.size(), 1U);
   EXPECT_EQ(first->info().warnings[0], "channel R is read, of 3");
   for (const char* name : {"G", "1"}) {
     OpenOptions options;
     options.channel = name;
-    const auto source = open_source(path, options);
+    const auto source = open_raster(path, options);
     const auto samples = read_whole(*source);
     ASSERT_EQ(samples.size(), 8U);
     for (std::size_t at = 0; at < samples.size(); ++at) EXPECT_EQ(static_cast<std::size_t>(samples[at]), at * 3 + 1);
   }
   OpenOptions options;
   options.channel = "Z";
-  const Error error = error_of([&] { (void)open_source(path, options); });
+  const Error error = error_of([&] { (void)open_raster(path, options); });
   EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
   EXPECT_EQ(error.what(), path + ": has no channel \"Z\"; it has R, G, B (or 0...2)");
 }
@@ -105,7 +106,7 @@ TEST_F(OiioModule, RefusesFilesWhoseNumbersItWouldNotGet) {
   const auto refuses = [&](const std::string& name, const std::string& bytes, const char* why) {
     const std::string path = folder_ / name;
     write_file(path, bytes);
-    const Error error = error_of([&] { (void)open_source(path, {}); });
+    const Error error = error_of([&] { (void)open_raster(path, {}); });
     EXPECT_EQ(error.code(), ErrorCode::kUnsupported);
     EXPECT_EQ(std::string(error.what()).rfind(path + ": " + why, 0), 0U) << error.what();
   };
@@ -131,11 +132,11 @@ TEST_F(OiioModule, AppliesTheOpenOptions) {
   OpenOptions options;
   options.z_scale = 0.5;
   options.void_values = {7.0};
-  const auto source = open_source(write_graymap(), options);
+  const auto source = open_raster(write_graymap(), options);
   EXPECT_EQ(source->info().z_scale, 0.5);
   EXPECT_EQ(source->info().void_values, std::vector<double>{7.0});
   options.z_scale = 0.0;
-  EXPECT_EQ(error_of([&] { (void)open_source(write_graymap(), options); }).code(), ErrorCode::kInvalidArgument);
+  EXPECT_EQ(error_of([&] { (void)open_raster(write_graymap(), options); }).code(), ErrorCode::kInvalidArgument);
 }
 
 TEST_F(OiioModule, ReportsTruncationAndForeignFilesInOneLine) {
@@ -144,13 +145,13 @@ TEST_F(OiioModule, ReportsTruncationAndForeignFilesInOneLine) {
   const std::string cut = folder_ / "cut.pgm";
   for (std::size_t length = 1; length < bytes.size(); length += 13) {
     write_file(cut, bytes.substr(0, length));
-    const Error error = error_of([&] { (void)read_whole(*open_source(cut, {})); });
+    const Error error = error_of([&] { (void)read_whole(*open_raster(cut, {})); });
     EXPECT_THAT(error.what(), HasSubstr(cut));
     EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos) << error.what();
   }
   const std::string text = folder_ / "notes.txt";
   write_file(text, "this is no raster");
-  const Error error = error_of([&] { (void)open_source(text, {}); });
+  const Error error = error_of([&] { (void)open_raster(text, {}); });
   EXPECT_EQ(error.code(), ErrorCode::kUnsupported);
   EXPECT_THAT(error.what(), HasSubstr("unknown format: this is text; isohf formats lists what is read"));
   EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos) << error.what();

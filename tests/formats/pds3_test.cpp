@@ -5,10 +5,11 @@
 #include <bit>
 #include <random>
 
-#include "formats/pds3_source.h"
+#include "formats/planetary/pds3_source.h"
 #include "formats/raster_reference.h"
 #include "formats/reader_failure.h"
-#include "isohf/base/error.h"
+#include "isohf/error.h"
+#include "isohf/raster.h"
 #include "support/every_window.h"
 #include "support/real_files.h"
 #include "support/samples.h"
@@ -77,7 +78,7 @@ TEST_F(Pds3, PlacesTheRealMarsByLabelOrData) {
   const auto lbl = test::real_data() / "megt90n000cb.lbl";
   if (!std::filesystem::exists(lbl)) GTEST_SKIP() << test::kNoRealFiles;
   for (const char* name : {"megt90n000cb.lbl", "megt90n000cb.img"}) {
-    const auto source = open_source((test::real_data() / name).string(), {});
+    const auto source = open_raster((test::real_data() / name).string(), {});
     // GDAL reads this label's 1-based offsets as 0-based, one pixel off; the reference has the label's bounds besides.
     auto ref = test::reference_of("megt90n000cb.img");
     ref["geotransform"] = ref.at("geotransform_from_label_bounds_deg");
@@ -98,7 +99,7 @@ TEST_F(Pds3, PlacesTheRealMarsByLabelOrData) {
 TEST_F(Pds3, ReadsTheRealAttachedLabel) {
   const auto file = test::real_data() / "derived" / "mola_crop_attached.img";
   if (!std::filesystem::exists(file)) GTEST_SKIP() << test::kNoRealFiles;
-  const auto source = open_source(file.string(), {});
+  const auto source = open_raster(file.string(), {});
   auto ref = test::reference_of(file);
   // The label has no map: neither place nor spacing.
   EXPECT_FALSE(source->info().georeference.has_origin);
@@ -116,7 +117,7 @@ TEST_F(Pds3, ReadsTheRealAttachedLabel) {
 TEST_F(Pds3, ReadsTheRealMoonBehindItsLabelNotInside) {
   const auto file = test::real_data() / "ldem_4_cropped.img";
   if (!std::filesystem::exists(file)) GTEST_SKIP() << test::kNoRealFiles;
-  const auto source = open_source(file.string(), {});
+  const auto source = open_raster(file.string(), {});
   const SourceInfo& info = source->info();
   EXPECT_EQ(info.width, 1440);
   EXPECT_EQ(info.height, 1);
@@ -161,7 +162,7 @@ TEST_F(Pds3, ReadsEverySampleType) {
     SCOPED_TRACE(kind.name + std::to_string(kind.bits));
     std::string image = replaced(kImage, "MSB_INTEGER", kind.name);
     image = replaced(image, "SAMPLE_BITS = 16", "SAMPLE_BITS = " + std::to_string(kind.bits));
-    const auto source = open_source(write("t.img", attached(image) + samples(12, kind.bits / 8, kind.big_endian)), {});
+    const auto source = open_raster(write("t.img", attached(image) + samples(12, kind.bits / 8, kind.big_endian)), {});
     EXPECT_EQ(source->info().sample_type, kind.type);
     const auto raw = test::read_whole(*source);
     for (std::size_t i = 0; i < 12; ++i) EXPECT_EQ(test::value_at(kind.type, raw, i), 100.0 + static_cast<double>(i));
@@ -174,7 +175,7 @@ TEST_F(Pds3, ReadsEverySampleType) {
       const auto bits = std::bit_cast<std::uint32_t>(value);
       for (int b = 0; b < 4; ++b) data.push_back(static_cast<char>(bits >> (8 * (big_endian ? 3 - b : b))));
     }
-    const auto source = open_source(write("f.img", attached(image) + data + std::string(36, '\0')), {});
+    const auto source = open_raster(write("f.img", attached(image) + data + std::string(36, '\0')), {});
     const auto raw = test::read_whole(*source);
     ASSERT_EQ(source->info().sample_type, SampleType::kFloat32);
     EXPECT_EQ(test::value_at(SampleType::kFloat32, raw, 0), 1.5);
@@ -231,7 +232,7 @@ TEST_F(Pds3, WindowsEqualTheWholeInEveryLayout) {
       for (int band = 0; band < 2; ++band) {
         OpenOptions options;
         options.channel = std::to_string(band);
-        const auto source = open_source(write("b.img", attached(image) + data), options);
+        const auto source = open_raster(write("b.img", attached(image) + data), options);
         test::expect_every_window(*source, test::stored<std::int16_t>(4, 3, [&](std::int64_t c, std::int64_t r) {
           return value(band, static_cast<int>(r), static_cast<int>(c));
         }));
@@ -244,7 +245,7 @@ TEST_F(Pds3, FollowsEveryPointer) {
   const std::string data = samples(12, 2, true);
   const std::string label = replaced(attached(), "RECORD_BYTES = 512\r\n", "RECORD_BYTES = 8\r\n");
   const auto first = [&](const std::string& path) {
-    return test::value_at(SampleType::kInt16, test::read_whole(*open_source(path, {})), 0);
+    return test::value_at(SampleType::kInt16, test::read_whole(*open_raster(path, {})), 0);
   };
   EXPECT_EQ(first(write("p.img", replaced(label, "^IMAGE = 3", "^IMAGE = 129") + data)), 100);
   EXPECT_EQ(first(write("p.img", replaced(label, "^IMAGE = 3", "^IMAGE = 1036 <BYTES>") + data + data)), 101);
@@ -261,10 +262,10 @@ TEST_F(Pds3, FollowsEveryPointer) {
 TEST_F(Pds3, TellsTheDataFileOfALabelFromOthers) {
   write("x.lbl", replaced(attached(), "^IMAGE = 3", "^IMAGE = \"X.IMG\""));
   const std::string data = write("x.img", samples(12, 2, true));
-  EXPECT_EQ(open_source(data, {})->info().format, "PDS3");
+  EXPECT_EQ(open_raster(data, {})->info().format, "PDS3");
   write("y.lbl", replaced(attached(), "^IMAGE = 3", "^IMAGE = \"X.IMG\""));
   const std::string other = write("y.img", samples(12, 2, true));
-  EXPECT_THROW((void)open_source(other, {}), Error);
+  EXPECT_THROW((void)open_raster(other, {}), Error);
   EXPECT_FALSE(has_pds3_label(write("z.img", "no label")));
 }
 
@@ -277,7 +278,7 @@ TEST_F(Pds3, PlacesByWhicheverMeaningTheBoundsConfirm) {
       "MAP_PROJECTION_TYPE = SIMPLE_CYLINDRICAL\r\nMAP_RESOLUTION = 2 <PIX/DEG>\r\n"
       "CENTER_LATITUDE = 0\r\nCENTER_LONGITUDE = 180\r\nA_AXIS_RADIUS = 3396000 <M>\r\n";
   const auto place = [&](const std::string& fields) {
-    const auto source = open_source(write("m.img", attached(kImage, map(scale + fields)) + samples(12, 2, true)), {});
+    const auto source = open_raster(write("m.img", attached(kImage, map(scale + fields)) + samples(12, 2, true)), {});
     return source->info();
   };
   const auto expect = [](const SourceInfo& info, double x, double y, std::size_t warnings) {
@@ -312,7 +313,7 @@ TEST_F(Pds3, PlacesByWhicheverMeaningTheBoundsConfirm) {
 TEST_F(Pds3, PlacesTheGlobeInEitherLongitudes) {
   const std::string image = replaced(replaced(kImage, "LINES = 3", "LINES = 2"), "MSB_INTEGER", "LSB_INTEGER");
   const auto west_edge = [&](const std::string& direction, double centre, double west) {
-    const auto source = open_source(
+    const auto source = open_raster(
         write("g.img",
               attached(image, map("MAP_PROJECTION_TYPE = \"EQUIRECTANGULAR\"\r\nMAP_RESOLUTION = 0.0111111111111"
                                   "1111 <PIXEL/DEGREE>\r\nPOSITIVE_LONGITUDE_DIRECTION = " +
@@ -334,7 +335,7 @@ TEST_F(Pds3, PlacesTheGlobeInEitherLongitudes) {
 }
 
 TEST_F(Pds3, CarriesOtherProjectionsInMetres) {
-  const auto source = open_source(
+  const auto source = open_raster(
       write("s.img",
             attached(kImage, map("MAP_PROJECTION_TYPE = \"POLAR STEREOGRAPHIC\"\r\nMAP_SCALE = 0.24 <KM/PIXEL>\r\n"
                                  "A_AXIS_RADIUS = 3396.19 <KM>\r\nC_AXIS_RADIUS = 3376.2 <KM>\r\n"
@@ -353,7 +354,7 @@ TEST_F(Pds3, CarriesOtherProjectionsInMetres) {
 
 TEST_F(Pds3, ScalesAndMarksVoids) {
   const auto source =
-      open_source(write("v.img", attached(replaced(kImage, " LINES",
+      open_raster(write("v.img", attached(replaced(kImage, " LINES",
                                                    " SCALING_FACTOR = 0.5\r\n OFFSET = 1.7374E6 /* radius */\r\n"
                                                    " UNIT = KM\r\n NULL = -32768\r\n"
                                                    " MISSING_CONSTANT = (-32767, 70000)\r\n LINES")) +

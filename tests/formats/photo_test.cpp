@@ -1,4 +1,4 @@
-#include "formats/photo.h"
+#include "formats/oiio/photo.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -6,11 +6,12 @@
 #include <cmath>
 #include <fstream>
 
-#include "formats/photo_place.h"
+#include "formats/oiio/photo_place.h"
 #include "formats/reader_failure.h"
 #include "formats/registry.h"
 #include "formats/tiff_bytes.h"
-#include "isohf/base/error.h"
+#include "isohf/error.h"
+#include "isohf/raster.h"
 #include "support/memory_photo.h"
 #include "support/temporary_folder.h"
 

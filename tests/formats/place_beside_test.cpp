@@ -1,4 +1,4 @@
-#include "formats/place_beside.h"
+#include "formats/georeference/place_beside.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,7 +7,8 @@
 
 #include "formats/reader_failure.h"
 #include "formats/registry.h"
-#include "isohf/base/error.h"
+#include "isohf/error.h"
+#include "isohf/raster.h"
 #include "support/temporary_folder.h"
 
 namespace isohf::test {
@@ -42,7 +43,7 @@ TEST_F(PlaceBeside, WorldFileAndPrjPlaceAPicture) {
   for (const auto& [picture, world] : {std::pair("a.png", "a.pgw"), {"a.pgm", "a.pmw"}}) {
     SCOPED_TRACE(picture);
     beside(world, "0.5\n0\n0\n-0.25\n10.25\n50\n");
-    const Georeference place = open_source(folder_ / picture, {})->info().georeference;
+    const Georeference place = open_raster(folder_ / picture, {})->info().georeference;
     EXPECT_TRUE(place.has_origin);
     EXPECT_EQ(place.spacing_x, 0.5);
     EXPECT_EQ(place.spacing_y, 0.25);
@@ -56,7 +57,7 @@ TEST_F(PlaceBeside, WorldFileAndPrjPlaceAPicture) {
 
 TEST_F(PlaceBeside, PictureWithoutAWorldFileHasNoPlace) {
   beside("a.prj", kDegrees);
-  const Georeference place = open_source(graymap("a.pgm"), {})->info().georeference;
+  const Georeference place = open_raster(graymap("a.pgm"), {})->info().georeference;
   EXPECT_FALSE(place.has_origin);
   EXPECT_EQ(place.unit, HorizontalUnit::kUnknown);
 }
@@ -64,7 +65,7 @@ TEST_F(PlaceBeside, PictureWithoutAWorldFileHasNoPlace) {
 TEST_F(PlaceBeside, RefusesPicturesWithNorthAtTheBottom) {
   beside("a.wld", "0.5\n0\n0\n0.25\n10.25\n50\n");
   const std::string path = graymap("a.pgm");
-  const Error error = error_of([&] { (void)open_source(path, {}); });
+  const Error error = error_of([&] { (void)open_raster(path, {}); });
   EXPECT_EQ(error.code(), ErrorCode::kUnsupported);
   EXPECT_EQ(error.what(), folder_ / "a.wld" + ": dy is positive; rows must run from North to South");
 }
@@ -72,12 +73,12 @@ TEST_F(PlaceBeside, RefusesPicturesWithNorthAtTheBottom) {
 TEST_F(PlaceBeside, SaysWhichWorldFileIsNone) {
   beside("a.wld", "half a metre");
   const std::string path = graymap("a.pgm");
-  EXPECT_THAT(error_of([&] { (void)open_source(path, {}); }).what(), HasSubstr("a.wld: is not a world file"));
+  EXPECT_THAT(error_of([&] { (void)open_raster(path, {}); }).what(), HasSubstr("a.wld: is not a world file"));
 }
 
 TEST_F(PlaceBeside, WarnsOfDegreesThatNothingNames) {
   beside("a.wld", "0.001\n0\n0\n-0.001\n10.25\n50\n");
-  const auto source = open_source(graymap("a.pgm"), {});
+  const auto source = open_raster(graymap("a.pgm"), {});
   ASSERT_EQ(source->info().warnings.size(), 1U);
   EXPECT_THAT(source->info().warnings[0], HasSubstr("look like degrees"));
 }

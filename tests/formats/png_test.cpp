@@ -6,11 +6,12 @@
 #include <algorithm>
 #include <cstdio>
 
-#include "formats/png_source.h"
+#include "formats/png/png_source.h"
 #include "formats/raster_reference.h"
 #include "formats/reader_failure.h"
 #include "formats/registry.h"
-#include "isohf/base/error.h"
+#include "isohf/error.h"
+#include "isohf/raster.h"
 #include "support/real_files.h"
 #include "support/samples.h"
 #include "support/temporary_folder.h"
@@ -193,7 +194,7 @@ TEST(PngSource, UnpacksElevationsAsTheReferenceDoes) {
     const auto expected = reference_of(path);
     OpenOptions options;
     options.channel = encoding;
-    const auto source = open_source(path, options);
+    const auto source = open_raster(path, options);
     const SourceInfo& info = source->info();
     EXPECT_EQ(info.channel, encoding);
     EXPECT_EQ(info.vertical_unit, "metre");
@@ -215,14 +216,14 @@ TEST(PngSource, UnpacksElevationsAsTheReferenceDoes) {
       EXPECT_DOUBLE_EQ(elevations[at], pixel.at("value").get<double>());
     }
     // The bytes leave no doubt: the same without being told, and a warning says so.
-    const auto untold = open_source(path, {});
+    const auto untold = open_raster(path, {});
     EXPECT_EQ(untold->info().channel, encoding);
     ASSERT_EQ(untold->info().warnings.size(), 1U);
     EXPECT_THAT(untold->info().warnings[0], HasSubstr(fmt::format("decoded as with --encoding {}", encoding)));
     EXPECT_EQ(read_whole(*untold), all);
     OpenOptions by_name;
     by_name.channel = "R";
-    const auto red = open_source(path, by_name);
+    const auto red = open_raster(path, by_name);
     EXPECT_EQ(red->info().sample_type, SampleType::kUint8);
     EXPECT_TRUE(red->info().warnings.empty());
   }
@@ -237,7 +238,7 @@ TEST(PngSource, TakesTransparentPixelsOfPackedElevationsAsVoid) {
   write_picture(path, picture);
   OpenOptions options;
   options.channel = "mapbox";
-  const auto source = open_source(path, options);
+  const auto source = open_raster(path, options);
   EXPECT_EQ(source->info().void_values, std::vector<double>{-1.0});
   const std::vector<double> values = values_of(*source);
   int voids = 0;
@@ -265,7 +266,7 @@ TEST(PngSource, UnpacksNothingButColoursOfEightBits) {
     write_picture(path, picture);
     OpenOptions options;
     options.channel = encoding;
-    const Error error = error_of([&] { (void)open_source(path, options); });
+    const Error error = error_of([&] { (void)open_raster(path, options); });
     EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
     EXPECT_THAT(error.what(), HasSubstr(fmt::format("encoding {} packs an elevation", encoding)));
   }
@@ -420,7 +421,7 @@ TEST(PngSource, AgreesWithReferenceReadersOnRealFiles) {
   if (files.empty()) GTEST_SKIP() << kNoRealFiles;
   for (const auto& file : files) {
     SCOPED_TRACE(file);
-    const auto source = open_source(file, {});
+    const auto source = open_raster(file, {});
     const auto ref = reference_of(file);
     if (ref.at("dtype") == "UInt16") {
       expect_as_reference(*source, ref);

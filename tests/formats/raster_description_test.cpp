@@ -1,5 +1,5 @@
 /// The .json beside a PNG, read again; raster_sink_test.cpp and raw_source_test.cpp have that of raw samples.
-#include "formats/raster_description.h"
+#include "formats/georeference/raster_description.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,10 +8,12 @@
 #include <fstream>
 #include <iterator>
 
-#include "formats/raster_sink.h"
 #include "formats/reader_failure.h"
 #include "formats/registry.h"
-#include "isohf/base/error.h"
+#include "formats/write/raster_sink.h"
+#include "isohf/error.h"
+#include "isohf/raster.h"
+#include "isohf/surface/source/sample_types.h"
 #include "support/place_at.h"
 #include "support/raster.h"
 #include "support/samples.h"
@@ -55,7 +57,7 @@ TEST(RasterDescription, GivesAPngPlaceAndMeaning) {
   const TemporaryFolder folder;
   const std::string path = folder / "a.png";
   write_picture(path);
-  const auto source = open_source(path, {});
+  const auto source = open_raster(path, {});
   const SourceInfo& info = source->info();
   const Georeference& place = info.georeference;
   const Georeference wanted = *picture_spec().georeference;
@@ -85,7 +87,7 @@ TEST(RasterDescription, IsOverruledByTheUser) {
   options.z_offset = 0.0;
   options.void_values = {100.0};
   options.registration = Registration::kArea;
-  const auto source = open_source(path, options);
+  const auto source = open_raster(path, options);
   EXPECT_EQ(source->info().georeference.registration, Registration::kArea);
   EXPECT_EQ(source->info().georeference.origin_x, -7.1);
   const std::vector<float> found = elevations_of(*source);
@@ -99,7 +101,7 @@ TEST(RasterDescription, OfAnotherProgramIsLeftAsideWithAWarning) {
   write_picture(path);
   std::filesystem::remove(path + ".json");
   write_file(path + ".json", R"({"z_scale": 9, "tiles": []})");
-  const auto source = open_source(path, {});
+  const auto source = open_raster(path, {});
   EXPECT_EQ(source->info().z_scale, 1.0);
   ASSERT_EQ(source->info().warnings.size(), 1U);
   EXPECT_THAT(source->info().warnings.front(), HasSubstr("names no format"));
@@ -114,7 +116,7 @@ TEST(RasterDescription, IsRefusedWhereItIsDamaged) {
   const auto error_with = [&](const std::string& text) {
     std::filesystem::remove(path + ".json");
     write_file(path + ".json", text);
-    const Error error = error_of([&] { (void)open_source(path, {}); });
+    const Error error = error_of([&] { (void)open_raster(path, {}); });
     const std::string what = error.what();
     EXPECT_EQ(error.code(), ErrorCode::kCorrupt);
     EXPECT_EQ(what.find('\n'), std::string::npos) << what;

@@ -1,4 +1,4 @@
-#include "formats/raster_sink.h"
+#include "formats/write/raster_sink.h"
 
 #include <fcntl.h>
 #include <gmock/gmock.h>
@@ -14,7 +14,8 @@
 
 #include "formats/reader_failure.h"
 #include "formats/registry.h"
-#include "isohf/base/error.h"
+#include "isohf/error.h"
+#include "isohf/raster.h"
 #include "support/place_at.h"
 #include "support/raster.h"
 #include "support/real_files.h"
@@ -95,7 +96,7 @@ TEST(RasterSink, RoundTripsEverySampleTypeAndChannel) {
           for (int channel = 0; channel < channels; ++channel) {
             OpenOptions options;
             if (channels > 1) options.channel = std::string(1, "RGBA"[channel]);
-            const auto source = open_source(path, options);
+            const auto source = open_raster(path, options);
             ASSERT_EQ(source->info().sample_type, type);
             ASSERT_EQ(source->info().width, spec.width);
             ASSERT_EQ(source->info().height, spec.height);
@@ -116,7 +117,7 @@ TEST(RasterSink, RoundTripsManyStripsAndLongRows) {
       const auto samples = noise(spec);
       const std::string path = folder / (std::to_string(width) + extension);
       write(path, spec, samples, 33);
-      EXPECT_EQ(read_whole(*open_source(path, {})), samples);
+      EXPECT_EQ(read_whole(*open_raster(path, {})), samples);
     }
   }
 }
@@ -178,7 +179,7 @@ TEST(RasterSink, GridsAndPlainSamplesReadBackWithPlaceAndVoids) {
         }
         const std::string path = folder / (std::to_string(++round) + extension);
         write(path, spec, samples, 3);
-        const auto source = open_source(path, {});
+        const auto source = open_raster(path, {});
         const SourceInfo& info = source->info();
         ASSERT_EQ(info.width, 5);
         ASSERT_EQ(info.height, 4);
@@ -246,7 +247,7 @@ TEST(RasterSink, RefusesADescriptionThatIsWrong) {
   const auto says = [&](const std::string& json) {
     write_file(path, "12345678");
     write_file(path + ".json", json);
-    const Error error = error_of([&] { (void)open_source(path, {}); });
+    const Error error = error_of([&] { (void)open_raster(path, {}); });
     EXPECT_EQ(error.code(), ErrorCode::kCorrupt);
     return std::string(error.what());
   };
@@ -280,7 +281,7 @@ TEST(RasterSink, WritesHgtTilesOfTheSizesThatExist) {
   const std::string path = folder / "N44E006.hgt";
   write(path, spec, samples, 100);
   EXPECT_EQ(std::filesystem::file_size(path), 1201U * 1201U * 2U);
-  EXPECT_EQ(read_whole(*open_source(path, {})), samples);
+  EXPECT_EQ(read_whole(*open_raster(path, {})), samples);
   for (const auto& bad : {spec_of(1200, 1201, SampleType::kInt16), spec_of(1201, 1201, SampleType::kUint16),
                           spec_of(1201, 1201, SampleType::kInt16, 3)}) {
     EXPECT_EQ(error_of([&] { (void)create_raster(folder / "N44E007.hgt", bad); }).code(), ErrorCode::kInvalidArgument);
@@ -306,7 +307,7 @@ TEST(RasterSink, KeepsVoidScaleAndUnitInTiff) {
     spec.metres_per_vertical_unit = 0.3048;
     spec.overwrite = true;
     write_raster(path, spec, noise(spec));
-    const auto source = open_source(path, {});
+    const auto source = open_raster(path, {});
     EXPECT_EQ(source->info().void_values, std::vector<double>{value});
     EXPECT_EQ(source->info().z_scale, 0.1);
     EXPECT_EQ(source->info().z_offset, -11000.0);
@@ -340,7 +341,7 @@ TEST(RasterSink, KeepsTheGeoreferenceOfRealFilesInTiff) {
   const TemporaryFolder folder;
   for (const auto& file : files) {
     SCOPED_TRACE(file);
-    const SourceInfo original = open_source(file, {})->info();
+    const SourceInfo original = open_raster(file, {})->info();
     RasterSpec spec = spec_of(6, 4, original.sample_type);
     spec.georeference = original.georeference;
     spec.vertical_unit = original.vertical_unit;
@@ -348,7 +349,7 @@ TEST(RasterSink, KeepsTheGeoreferenceOfRealFilesInTiff) {
     spec.overwrite = true;
     const std::string path = folder / "copy.tif";
     write_raster(path, spec, noise(spec));
-    const auto source = open_source(path, {});
+    const auto source = open_raster(path, {});
     expect_same_place(original.georeference, source->info().georeference);
     EXPECT_EQ(original.vertical_unit, source->info().vertical_unit);
   }
@@ -360,7 +361,7 @@ TEST(RasterSink, KeepsTransparentGrayInPng) {
   RasterSpec spec = spec_of(5, 4, SampleType::kUint16);
   spec.void_value = 65535.0;
   write(path, spec, noise(spec), 4);
-  EXPECT_EQ(open_source(path, {})->info().void_values, std::vector<double>{65535.0});
+  EXPECT_EQ(open_raster(path, {})->info().void_values, std::vector<double>{65535.0});
   spec.void_value = -1.0;
   EXPECT_EQ(error_of([&] { (void)create_raster(folder / "no.png", spec); }).code(), ErrorCode::kInvalidArgument);
 }
@@ -396,12 +397,12 @@ TEST(RasterSink, ReplacesAFileOnlyWhenTold) {
   EXPECT_EQ(error.what(), path + ": exists; --overwrite replaces it");
   spec.overwrite = true;
   { const auto abandoned = create_raster(path, spec); }
-  EXPECT_EQ(open_source(path, {})->info().width, 4);
+  EXPECT_EQ(open_raster(path, {})->info().width, 4);
   spec.width = 5;
   const auto sink = create_raster(path, spec);
   sink->write_rows(noise(spec));
   sink->finish();
-  EXPECT_EQ(open_source(path, {})->info().width, 5);
+  EXPECT_EQ(open_raster(path, {})->info().width, 5);
 }
 
 TEST(RasterSink, RefusesWhatItCannotWriteAndLeavesNothing) {
@@ -453,7 +454,7 @@ TEST(RasterSink, ReplacesOnlyItsOwnKind) {
     sink->write_rows(noise(spec));
     sink->finish();
   }
-  EXPECT_EQ(open_source(folder / "b.tif", {})->info().width, 6);
+  EXPECT_EQ(open_raster(folder / "b.tif", {})->info().width, 6);
 }
 
 /// Renames that still happen before the program dies; negative: it does not.

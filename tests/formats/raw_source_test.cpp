@@ -1,4 +1,4 @@
-#include "formats/raw_source.h"
+#include "formats/binary_grids/raw_source.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,7 +7,8 @@
 
 #include "formats/raster_reference.h"
 #include "formats/reader_failure.h"
-#include "isohf/base/error.h"
+#include "isohf/error.h"
+#include "isohf/raster.h"
 #include "support/every_window.h"
 #include "support/real_files.h"
 #include "support/samples.h"
@@ -40,10 +41,10 @@ TEST(RawSource, DeliversRealFilesAsTheReferenceDoes) {
     const auto expected = reference_of(file);
     const std::string size = std::to_string(expected.at("width").get<int>());
     // The square that the refusal suggests is the file's.
-    const Error error = error_of([&] { (void)open_source(file.string(), {}); });
+    const Error error = error_of([&] { (void)open_raster(file.string(), {}); });
     EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
     EXPECT_THAT(error.what(), HasSubstr("--raw " + size + "x" + size + ":u16le"));
-    const auto source = open_source(file.string(), raw(size + "x" + size + ":u16le"));
+    const auto source = open_raster(file.string(), raw(size + "x" + size + ":u16le"));
     expect_as_reference(*source, expected);
     EXPECT_EQ(source->info().georeference.registration, Registration::kUnknown);
     EXPECT_FALSE(source->info().georeference.has_origin);
@@ -91,7 +92,7 @@ TEST(RawSource, ReadsEveryTypeInBothByteOrders) {
                        wanted.begin() + static_cast<std::ptrdiff_t>(i + size));
         }
       }
-      const auto source = open_source(path, raw(std::string("5x3:") + name + (size == 1 ? "" : order)));
+      const auto source = open_raster(path, raw(std::string("5x3:") + name + (size == 1 ? "" : order)));
       EXPECT_EQ(source->info().sample_type, type);
       SCOPED_TRACE(name + order);
       expect_every_window(*source, std::as_bytes(std::span(wanted)));
@@ -104,10 +105,10 @@ TEST(RawSource, WantsExactlyTheBytesOfItsLayout) {
   for (std::size_t bytes = 1; bytes < 30; ++bytes) {
     const std::string path = write(folder, "terrain.r16", bytes);
     if (bytes == 24) {
-      EXPECT_EQ(open_source(path, raw("4x3:u16le"))->info().height, 3);
+      EXPECT_EQ(open_raster(path, raw("4x3:u16le"))->info().height, 3);
       continue;
     }
-    const Error error = error_of([&] { (void)open_source(path, raw("4x3:u16le")); });
+    const Error error = error_of([&] { (void)open_raster(path, raw("4x3:u16le")); });
     EXPECT_EQ(error.code(), ErrorCode::kCorrupt);
     EXPECT_EQ(error.what(),
               path + ": the file has " + std::to_string(bytes) + " bytes, 4 x 3 samples of 2 bytes take 24");
@@ -117,7 +118,7 @@ TEST(RawSource, WantsExactlyTheBytesOfItsLayout) {
 TEST(RawSource, AsksForALayoutByName) {
   const TemporaryFolder folder;
   const auto what = [&](const std::string& name, std::size_t bytes) {
-    const Error error = error_of([&] { (void)open_source(write(folder, name, bytes), {}); });
+    const Error error = error_of([&] { (void)open_raster(write(folder, name, bytes), {}); });
     EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
     return std::string(error.what());
   };
@@ -133,17 +134,17 @@ TEST(RawSource, AsksForALayoutByName) {
 TEST(RawSource, GoesBeforeNameAndContent) {
   const TemporaryFolder folder;
   write_file(folder / "a.png", "\x89PNG\r\n\x1A\n");
-  EXPECT_EQ(open_source(folder / "a.png", raw("2x2:u16be"))->info().format, "raw samples");
+  EXPECT_EQ(open_raster(folder / "a.png", raw("2x2:u16be"))->info().format, "raw samples");
   OpenOptions channel = raw("2x2:u16be");
   channel.channel = "1";
-  EXPECT_EQ(error_of([&] { (void)open_source(folder / "a.png", channel); }).code(), ErrorCode::kInvalidArgument);
+  EXPECT_EQ(error_of([&] { (void)open_raster(folder / "a.png", channel); }).code(), ErrorCode::kInvalidArgument);
 }
 
 TEST(RawSource, TakesFloatsBeyondAnyHeightAsVoid) {
   const TemporaryFolder folder;
   const std::array<float, 4> samples = {1.0F, -3.4e38F, NAN, 8848.0F};
   write_file(folder / "a.f32", std::as_bytes(std::span(samples)));
-  const auto source = open_source(folder / "a.f32", raw("4x1:f32le"));
+  const auto source = open_raster(folder / "a.f32", raw("4x1:f32le"));
   const auto read = read_whole(*source);
   for (std::size_t i = 0; i < 4; ++i) {
     EXPECT_EQ(is_void(source->info(), value_at(SampleType::kFloat32, read, i)), i == 1 || i == 2);

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "formats/registry.h"
+#include "isohf/raster.h"
 
 namespace isohf::test {
 

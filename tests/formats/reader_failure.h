@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <string>
 
-#include "isohf/base/error.h"
+#include "isohf/error.h"
 #include "support/samples.h"
 
 namespace isohf::test {

@@ -1,4 +1,4 @@
-#include "formats/reference_system.h"
+#include "formats/georeference/reference_system.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,10 +9,11 @@
 #include <thread>
 #include <vector>
 
-#include "formats/geotiff_keys.h"
 #include "formats/reader_failure.h"
 #include "formats/registry.h"
-#include "isohf/base/error.h"
+#include "formats/tiff/geotiff_keys.h"
+#include "isohf/error.h"
+#include "isohf/raster.h"
 
 namespace isohf::test {
 namespace {

@@ -9,9 +9,10 @@
 #include <set>
 #include <string>
 
-#include "formats/raster_sink.h"
 #include "formats/reader_failure.h"
-#include "isohf/base/error.h"
+#include "formats/write/raster_sink.h"
+#include "isohf/error.h"
+#include "isohf/raster.h"
 #include "support/real_files.h"
 #include "support/samples.h"
 #include "support/temporary_folder.h"
@@ -23,7 +24,7 @@ using ::testing::HasSubstr;
 using ::testing::MatchesRegex;
 
 Error refusal(const std::string& path) {
-  return error_of([&] { (void)open_source(path, {}); });
+  return error_of([&] { (void)open_raster(path, {}); });
 }
 
 TEST(OpenSource, NamesWhatIsWrongWithAPath) {
@@ -96,11 +97,11 @@ TEST(OpenSource, GoesByContentNotByName) {
                                      {"earth_0_0_0.png", "PNG"},
                                      {"float_nan.tif", "GeoTIFF"},
                                      {"N44E006.hgt", "SRTM HGT"}}) {
-    EXPECT_EQ(open_source(real_data() / name, {})->info().format, format);
+    EXPECT_EQ(open_raster(real_data() / name, {})->info().format, format);
     const bool has_signature = std::string(format) != "SRTM HGT";
     const std::string renamed = folder / (has_signature ? "N44E006.hgt" : "UPPER_N44E006.HGT");
     std::filesystem::copy_file(real_data() / name, renamed, std::filesystem::copy_options::overwrite_existing);
-    EXPECT_EQ(open_source(renamed, {})->info().format, format);
+    EXPECT_EQ(open_raster(renamed, {})->info().format, format);
   }
 }
 
@@ -108,7 +109,7 @@ TEST(OpenSource, GoesByContentNotByName) {
 TEST(OpenSource, LoadsNoOtherImageLibraryForNativeFormats) {
   if (real_files().empty()) GTEST_SKIP() << kNoRealFiles;
   for (const char* name : {"t3d_peak1.exr", "earth_0_0_0.png", "mt_fuji_90m.tif", "N44E006.hgt"}) {
-    const auto source = open_source(real_data() / name, {});
+    const auto source = open_raster(real_data() / name, {});
     (void)read_window(*source, {0, 0, source->info().width, 2});
   }
   std::ifstream maps("/proc/self/maps");

@@ -12,8 +12,9 @@
 #include "formats/open_options.h"
 #include "formats/raster_reference.h"
 #include "formats/registry.h"
-#include "isohf/convert/plan.h"
-#include "isohf/surface/source_survey.h"
+#include "isohf/convert/frame/plan.h"
+#include "isohf/raster.h"
+#include "isohf/surface/source/source_survey.h"
 #include "support/real_files.h"
 #include "support/samples.h"
 
@@ -119,7 +120,7 @@ TEST(SharedData, EveryFileIsReadAsItsReferenceSays) {
     const std::filesystem::path file = file_of(name);
     ASSERT_FALSE(file.empty()) << "no such file";
     const nlohmann::json ref = reference_of(file);
-    const auto source = open_source(file.string(), options_for(name, ref));
+    const auto source = open_raster(file.string(), options_for(name, ref));
     const SourceInfo& info = source->info();
     EXPECT_EQ(info.width, ref.at("width").get<std::int64_t>());
     const std::int64_t more_rows = name == kOneRowMore ? 1 : 0;
@@ -137,7 +138,7 @@ TEST(SharedData, EveryFileIsReadAsItsReferenceSays) {
 TEST(SharedData, LabelTextIsNoElevation) {
   const auto file = real_data() / "ldem_4_cropped.img";
   if (!std::filesystem::exists(file)) GTEST_SKIP() << kNoRealFiles;
-  const auto source = open_source(file.string(), {});
+  const auto source = open_raster(file.string(), {});
   SourceSurvey survey(source->info(), false);
   survey.add(read_whole(*source));
   // The Moon's North pole lies within a kilometre of the mean radius; the text would be 10 km above it.

@@ -1,4 +1,4 @@
-#include "formats/surfer_grid_source.h"
+#include "formats/text_grids/surfer_grid_source.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,6 +8,7 @@
 
 #include "formats/gzipped.h"
 #include "formats/reader_failure.h"
+#include "isohf/raster.h"
 #include "support/samples.h"
 #include "support/temporary_folder.h"
 
@@ -50,11 +51,11 @@ class SurferGrid : public ::testing::Test {
  protected:
   [[nodiscard]] std::unique_ptr<HeightSource> open(const std::string& bytes, const std::string& name = "a.grd") const {
     write_file(folder_ / name, bytes);
-    return open_source(folder_ / name, {});
+    return open_raster(folder_ / name, {});
   }
   [[nodiscard]] std::string failure(const std::string& bytes, ErrorCode* code = nullptr) const {
     write_file(folder_ / "a.grd", bytes);
-    return failure_of(folder_ / "a.grd", code, [&] { read_corner(*open_source(folder_ / "a.grd", {})); });
+    return failure_of(folder_ / "a.grd", code, [&] { read_corner(*open_raster(folder_ / "a.grd", {})); });
   }
 
   const TemporaryFolder folder_;
@@ -97,7 +98,7 @@ TEST_F(SurferGrid, WindowsEqualTheWhole) {
   for (const double value : {0.0, 6.0, 0.0, 4.0, 0.0, 34.0}) binary += little(value);
   const std::string text = "DSAA 7 5\n0 6\n0 4\n0 34\n" + numbers + "\n";
   write_file(folder_ / "c.grd.gz", gzipped(text));
-  for (const auto& source : {open(text), open(binary + floats, "b.grd"), open_source(folder_ / "c.grd.gz", {})}) {
+  for (const auto& source : {open(text), open(binary + floats, "b.grd"), open_raster(folder_ / "c.grd.gz", {})}) {
     for (std::int64_t row = 4; row >= 0; --row) {
       for (std::int64_t column = 0; column < 7; ++column) {
         for (std::int64_t columns = 1; columns <= 7 - column; ++columns) {

@@ -5,9 +5,9 @@
 #include <sys/resource.h>
 #include <zlib.h>
 
+#include "formats/tiff/tiff_source.h"
 #include "formats/tiff_bytes.h"
-#include "formats/tiff_source.h"
-#include "isohf/base/error.h"
+#include "isohf/error.h"
 #include "support/temporary_folder.h"
 
 namespace isohf {

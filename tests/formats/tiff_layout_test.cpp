@@ -8,8 +8,9 @@
 #include <set>
 #include <tuple>
 
-#include "formats/tiff_source.h"
-#include "isohf/base/error.h"
+#include "formats/tiff/tiff_source.h"
+#include "isohf/error.h"
+#include "isohf/raster.h"
 #include "support/temporary_folder.h"
 
 namespace isohf {

@@ -1,4 +1,4 @@
-#include "formats/tiff_source.h"
+#include "formats/tiff/tiff_source.h"
 
 #include <gtest/gtest.h>
 #include <zlib.h>
@@ -6,7 +6,9 @@
 #include <cmath>
 
 #include "formats/tiff_bytes.h"
-#include "isohf/base/error.h"
+#include "isohf/error.h"
+#include "isohf/raster.h"
+#include "isohf/surface/source/sample_types.h"
 #include "support/samples.h"
 #include "support/temporary_folder.h"
 

@@ -1,4 +1,4 @@
-#include "formats/usgs_dem_source.h"
+#include "formats/text_grids/usgs_dem_source.h"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -9,6 +9,7 @@
 
 #include "formats/raster_reference.h"
 #include "formats/reader_failure.h"
+#include "isohf/raster.h"
 #include "support/real_files.h"
 #include "support/samples.h"
 #include "support/temporary_folder.h"
@@ -132,7 +133,7 @@ class UsgsDem : public testing::Test {
 TEST_F(UsgsDem, DeliversTheRealFileAsTheReferenceDoes) {
   const auto file = test::real_data() / "derived" / "besseggen_utm.dem";
   if (!std::filesystem::exists(file)) GTEST_SKIP() << test::kNoRealFiles;
-  const auto source = open_source(file.string(), {});
+  const auto source = open_raster(file.string(), {});
   const auto ref = test::reference_of(file);
   const SourceInfo& info = source->info();
   // The profiles begin at y = 6818005 and have 200 posts. GDAL moves the grid to multiples of its spacing, half a post
@@ -168,7 +169,7 @@ TEST_F(UsgsDem, TurnsProfilesOfDifferentLengthsIntoRows) {
   for (const std::string& bytes :
        {records, as_lines(records, "\n", true), as_lines(records, "\r\n", true), as_lines(records, "\n", false),
         as_lines(records, "\r\n", false), records.substr(0, records.find_last_not_of(' ') + 1)}) {
-    const auto source = open_source(write(bytes), {});
+    const auto source = open_raster(write(bytes), {});
     const SourceInfo& info = source->info();
     EXPECT_EQ(info.format, "USGS DEM");
     ASSERT_EQ(info.width, 3);
@@ -188,7 +189,7 @@ TEST_F(UsgsDem, WindowsEqualTheWholeAcrossRecords) {
   const Dem dem = long_dem(4, 700);
   const std::string records = header(dem) + body(dem);
   for (const std::string& bytes : {records, as_lines(records, "\n", false)}) {
-    const auto source = open_source(write(bytes), {});
+    const auto source = open_raster(write(bytes), {});
     ASSERT_EQ(source->info().height, 700);
     const auto whole = test::read_whole(*source);
     for (int r = 0; r < 700; ++r) {
@@ -223,7 +224,7 @@ TEST_F(UsgsDem, ReadsSecondsFeetAndTenthsAboveALocalDatum) {
   dem.vertical_datum = 1;
   for (std::size_t i = 0; i < 3; ++i) dem.profiles[i].x = -108.0 * 3600.0 + 3.0 * static_cast<double>(i);
   for (std::size_t i = 0; i < 3; ++i) dem.profiles[i].y = 37.0 * 3600.0 + (i == 0 ? 3.0 : 0.0);
-  const auto source = open_source(write(header(dem) + body(dem)), {});
+  const auto source = open_raster(write(header(dem) + body(dem)), {});
   const SourceInfo& info = source->info();
   EXPECT_EQ(info.georeference.unit, HorizontalUnit::kDegree);
   EXPECT_EQ(info.georeference.origin_x, -108.0);

@@ -1,4 +1,4 @@
-#include "formats/windowed_source.h"
+#include "formats/decorate/windowed_source.h"
 
 #include <gtest/gtest.h>
 
@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "formats/closed_source.h"
-#include "isohf/surface/filled_source.h"
-#include "isohf/surface/geoid_source.h"
+#include "formats/decorate/closed_source.h"
+#include "isohf/surface/decorate/filled_source.h"
+#include "isohf/surface/decorate/geoid_source.h"
 #include "support/memory_source.h"
 #include "support/place_at.h"
 #include "support/small_geoid.h"

@@ -9,9 +9,9 @@
 #include <cstdlib>
 #include <string>
 
-#include "isohf/archive/reader.h"
-#include "isohf/archive/texture_reader.h"
-#include "isohf/base/error.h"
+#include "isohf/archive.h"
+#include "isohf/archive/textures/texture_reader.h"
+#include "isohf/error.h"
 
 namespace {
 

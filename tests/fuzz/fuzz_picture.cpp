@@ -5,8 +5,8 @@
 #include <cstdlib>
 #include <span>
 
-#include "isohf/archive/picture_codec.h"
-#include "isohf/base/error.h"
+#include "isohf/archive/textures/picture_codec.h"
+#include "isohf/error.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   constexpr int kMost = 64;

@@ -15,8 +15,8 @@
 #include <vector>
 
 #include "formats/reader_cases.h"
-#include "isohf/base/error.h"
-#include "isohf/surface/height_source.h"
+#include "isohf/error.h"
+#include "isohf/raster.h"
 #include "support/temporary_folder.h"
 
 namespace isohf::test {

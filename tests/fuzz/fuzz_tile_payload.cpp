@@ -6,10 +6,10 @@
 #include <cstdlib>
 #include <span>
 
-#include "isohf/archive/content_hash.h"
-#include "isohf/archive/lane_decoder.h"
-#include "isohf/archive/tile_codec.h"
-#include "isohf/base/error.h"
+#include "isohf/archive/codec/simd/lane_decoder.h"
+#include "isohf/archive/codec/tile_codec.h"
+#include "isohf/archive/container/content_hash.h"
+#include "isohf/error.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using isohf::CodeType;

@@ -5,10 +5,9 @@
 #include <limits>
 #include <numbers>
 
-#include "isohf/base/error.h"
+#include "isohf/error.h"
+#include "isohf/lattice.h"
 #include "isohf/lattice/strip.h"
-#include "isohf/lattice/tile_grid.h"
-#include "isohf/lattice/tile_shape.h"
 #include "lattice/mesh_check.h"
 
 /// Errata of the paper that concern the tile's shape; the others stand beside what they concern (docs/paper.md).

@@ -7,8 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "isohf/lattice/tile_mapping.h"
-#include "isohf/lattice/tile_shape.h"
+#include "isohf/lattice.h"
 
 /// Exact checks on index meshes of one tile, in integers.
 

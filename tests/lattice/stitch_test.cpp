@@ -4,8 +4,8 @@
 
 #include <map>
 
+#include "isohf/lattice.h"
 #include "isohf/lattice/strip.h"
-#include "isohf/lattice/tile_grid.h"
 #include "lattice/mesh_check.h"
 #include "support/sanitizers.h"
 

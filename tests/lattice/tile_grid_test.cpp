@@ -1,4 +1,4 @@
-#include "isohf/lattice/tile_grid.h"
+#include "isohf/lattice.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <map>
 #include <random>
 
-#include "isohf/base/error.h"
+#include "isohf/error.h"
 #include "lattice/mesh_check.h"
 
 namespace isohf {

@@ -1,4 +1,4 @@
-#include "isohf/lattice/tile_mapping.h"
+#include "isohf/lattice.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,6 @@
 #include <random>
 #include <set>
 
-#include "isohf/lattice/tile_grid.h"
 #include "lattice/mesh_check.h"
 
 namespace isohf {

@@ -1,4 +1,4 @@
-#include "isohf/lattice/tile_shape.h"
+#include "isohf/lattice.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,7 +8,7 @@
 #include <numbers>
 #include <tuple>
 
-#include "isohf/base/error.h"
+#include "isohf/error.h"
 #include "lattice/mesh_check.h"
 
 namespace isohf {

@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "isohf/base/error.h"
+#include "isohf/error.h"
 
 namespace isohf {
 namespace {

@@ -1,9 +1,9 @@
-#include "isohf/projection/projection_spec.h"
+#include "isohf/projection.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "isohf/base/error.h"
+#include "isohf/error.h"
 #include "isohf/projection/projection_wkt.h"
 
 namespace isohf {

@@ -8,7 +8,7 @@
 #include <cmath>
 #include <random>
 
-#include "isohf/base/error.h"
+#include "isohf/error.h"
 #include "isohf/projection/choose_projection.h"
 
 namespace isohf {

@@ -8,10 +8,10 @@
 #include <cstring>
 #include <vector>
 
-#include "isohf/archive/reader.h"
-#include "isohf/base/error.h"
+#include "isohf/archive.h"
 #include "isohf/base/view.h"
 #include "isohf/convert/convert.h"
+#include "isohf/error.h"
 #include "isohf/lattice/barycentric.h"
 #include "support/memory_source.h"
 #include "support/temporary_folder.h"

@@ -8,7 +8,7 @@
 #include <numeric>
 
 #include "isohf/restore/surface_rows.h"
-#include "isohf/surface/kernels.h"
+#include "isohf/surface/resample/kernels.h"
 
 namespace isohf {
 namespace {

@@ -7,9 +7,9 @@
 #include <filesystem>
 #include <limits>
 
-#include "isohf/archive/content_hash.h"
+#include "isohf/archive/container/content_hash.h"
 #include "isohf/convert/convert.h"
-#include "isohf/verify/verify.h"
+#include "isohf/verify.h"
 #include "support/memory_source.h"
 #include "support/temporary_folder.h"
 

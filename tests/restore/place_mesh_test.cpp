@@ -6,7 +6,7 @@
 #include <limits>
 #include <vector>
 
-#include "isohf/base/error.h"
+#include "isohf/error.h"
 #include "isohf/restore/lossless.h"
 #include "isohf/restore/scattered_surface.h"
 

@@ -11,7 +11,7 @@
 #include "isohf/base/view.h"
 #include "isohf/convert/convert.h"
 #include "isohf/lattice/barycentric.h"
-#include "isohf/surface/normals.h"
+#include "isohf/surface/shade/normals.h"
 #include "support/memory_source.h"
 #include "support/temporary_folder.h"
 

@@ -7,7 +7,8 @@
 #include <limits>
 #include <random>
 
-#include "isohf/base/error.h"
+#include "isohf/error.h"
+#include "isohf/surface/source/sample_types.h"
 
 namespace isohf {
 namespace {

@@ -7,9 +7,9 @@
 #include <span>
 #include <stdexcept>
 
-#include "isohf/archive/deflate.h"
+#include "isohf/archive/container/zip_layout.h"
+#include "isohf/archive/deflate/deflate.h"
 #include "isohf/archive/tile_index.h"
-#include "isohf/archive/zip_layout.h"
 #include "support/temporary_folder.h"
 
 namespace isohf::test {

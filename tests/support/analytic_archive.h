@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "isohf/lattice/tile_grid.h"
+#include "isohf/lattice.h"
 
 namespace isohf::test {
 

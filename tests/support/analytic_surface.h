@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "isohf/lattice/tile_grid.h"
+#include "isohf/lattice.h"
 
 namespace isohf::test {
 

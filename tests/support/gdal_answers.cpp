@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "formats/registry.h"
+#include "isohf/raster.h"
 #include "support/samples.h"
 
 namespace isohf::test {
@@ -43,7 +44,7 @@ void expect_same_place(const json& ours, const json& gdal) {
 }
 
 void expect_same_samples(const std::string& file, bool turned) {
-  const auto source = open_source(file, {});
+  const auto source = open_raster(file, {});
   const SourceInfo& info = source->info();
   std::mt19937 random(11);
   std::string places;

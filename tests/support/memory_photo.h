@@ -5,7 +5,7 @@
 #include <functional>
 #include <vector>
 
-#include "isohf/surface/photo_source.h"
+#include "isohf/surface/photo/photo_source.h"
 
 namespace isohf::test {
 

@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "isohf/surface/height_source.h"
+#include "isohf/raster.h"
 
 namespace isohf::test {
 

@@ -2,7 +2,7 @@
 
 #include <optional>
 
-#include "isohf/surface/heightmap.h"
+#include "isohf/raster.h"
 
 namespace isohf::test {
 

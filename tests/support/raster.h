@@ -5,8 +5,10 @@
 #include <string>
 #include <vector>
 
-#include "formats/raster_sink.h"
 #include "formats/registry.h"
+#include "formats/write/raster_sink.h"
+#include "isohf/raster.h"
+#include "isohf/surface/source/sample_types.h"
 #include "support/samples.h"
 
 /// Raster files, written and read whole.
@@ -23,7 +25,7 @@ struct Raster {
 };
 
 inline Raster read_raster(const std::string& path, const OpenOptions& options = {}) {
-  const auto source = open_source(path, options);
+  const auto source = open_raster(path, options);
   Raster raster{source->info(), read_whole(*source), {}};
   raster.elevations.resize(static_cast<std::size_t>(raster.info.width * raster.info.height));
   heights_from_samples(raster.info, 0.0, raster.raw, raster.elevations);

@@ -3,7 +3,7 @@
 #include <atomic>
 #include <stdexcept>
 
-#include "isohf/archive/reader.h"
+#include "isohf/archive.h"
 #include "isohf/convert/convert.h"
 #include "support/memory_source.h"
 #include "support/temporary_folder.h"

@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
-#include "isohf/surface/height_source.h"
-#include "isohf/surface/sample_types.h"
+#include "isohf/raster.h"
+#include "isohf/surface/source/sample_types.h"
 
 namespace isohf::test {
 

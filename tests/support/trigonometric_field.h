@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "isohf/base/view.h"
-#include "isohf/surface/kernels.h"
-#include "isohf/surface/prefilter.h"
+#include "isohf/surface/resample/kernels.h"
+#include "isohf/surface/resample/prefilter.h"
 
 namespace isohf {
 

@@ -1,4 +1,4 @@
-#include "isohf/surface/acquisition.h"
+#include "isohf/surface/resample/acquisition.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -6,7 +6,7 @@
 #include <cmath>
 #include <functional>
 
-#include "isohf/base/error.h"
+#include "isohf/error.h"
 #include "support/temporary_folder.h"
 
 namespace isohf {

@@ -1,4 +1,4 @@
-#include "isohf/surface/band_reader.h"
+#include "isohf/surface/source/band_reader.h"
 
 #include <gtest/gtest.h>
 

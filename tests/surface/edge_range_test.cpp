@@ -1,10 +1,10 @@
-#include "isohf/surface/edge_range.h"
+#include "isohf/surface/source/edge_range.h"
 
 #include <gtest/gtest.h>
 
 #include <random>
 
-#include "isohf/surface/source_rows.h"
+#include "isohf/surface/source/source_rows.h"
 #include "support/memory_source.h"
 
 namespace isohf {

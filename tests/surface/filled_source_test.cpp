@@ -1,4 +1,4 @@
-#include "isohf/surface/filled_source.h"
+#include "isohf/surface/decorate/filled_source.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -10,7 +10,7 @@
 #include <limits>
 #include <random>
 
-#include "isohf/base/error.h"
+#include "isohf/error.h"
 #include "support/memory_source.h"
 
 namespace isohf::test {

@@ -1,4 +1,4 @@
-#include "isohf/surface/geoid_source.h"
+#include "isohf/surface/decorate/geoid_source.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,7 +8,7 @@
 #include <cstring>
 #include <filesystem>
 
-#include "isohf/base/error.h"
+#include "isohf/error.h"
 #include "support/memory_source.h"
 #include "support/place_at.h"
 #include "support/small_geoid.h"

@@ -9,8 +9,9 @@
 #include <random>
 #include <vector>
 
-#include "isohf/surface/height_source.h"
-#include "isohf/surface/sample_access.h"
+#include "isohf/raster.h"
+#include "isohf/surface/source/sample_access.h"
+#include "isohf/surface/source/sample_types.h"
 
 namespace isohf {
 namespace {

@@ -1,4 +1,4 @@
-#include "isohf/surface/kernels.h"
+#include "isohf/surface/resample/kernels.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <limits>
 #include <vector>
 
-#include "isohf/base/error.h"
+#include "isohf/error.h"
 
 namespace isohf {
 namespace {

@@ -1,4 +1,4 @@
-#include "isohf/surface/normals.h"
+#include "isohf/surface/shade/normals.h"
 
 #include <gtest/gtest.h>
 

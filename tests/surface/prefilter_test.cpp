@@ -1,4 +1,4 @@
-#include "isohf/surface/prefilter.h"
+#include "isohf/surface/resample/prefilter.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -10,7 +10,7 @@
 #include <numbers>
 #include <random>
 
-#include "isohf/base/error.h"
+#include "isohf/error.h"
 #include "support/trigonometric_field.h"
 
 namespace isohf {

@@ -1,10 +1,10 @@
-#include "isohf/surface/projected_photo.h"
+#include "isohf/surface/photo/projected_photo.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "isohf/surface/srgb.h"
+#include "isohf/surface/photo/srgb.h"
 #include "support/memory_photo.h"
 
 namespace isohf {

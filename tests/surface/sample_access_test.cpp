@@ -1,4 +1,4 @@
-#include "isohf/surface/sample_access.h"
+#include "isohf/surface/source/sample_access.h"
 
 #include <gtest/gtest.h>
 

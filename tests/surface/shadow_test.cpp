@@ -1,4 +1,4 @@
-#include "isohf/surface/shadow.h"
+#include "isohf/surface/shade/shadow.h"
 
 #include <gtest/gtest.h>
 

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "isohf/base/view.h"
-#include "isohf/lattice/tile_grid.h"
-#include "isohf/surface/shadow.h"
+#include "isohf/lattice.h"
+#include "isohf/surface/shade/shadow.h"
 
 /// A row of tiles with made-up codes, and its shadows by the definition: every vertex against every vertex before it.
 

@@ -1,8 +1,8 @@
-#include "isohf/surface/source_axis.h"
+#include "isohf/surface/source/source_axis.h"
 
 #include <gtest/gtest.h>
 
-#include "isohf/base/error.h"
+#include "isohf/error.h"
 
 namespace isohf {
 namespace {

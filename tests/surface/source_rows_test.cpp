@@ -1,4 +1,4 @@
-#include "isohf/surface/source_rows.h"
+#include "isohf/surface/source/source_rows.h"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 #include <numeric>
 #include <set>
 
-#include "isohf/base/error.h"
+#include "isohf/error.h"
 
 namespace isohf {
 namespace {

@@ -1,4 +1,4 @@
-#include "isohf/surface/source_warp.h"
+#include "isohf/surface/resample/source_warp.h"
 
 #include <gtest/gtest.h>
 

@@ -1,11 +1,11 @@
-#include "isohf/surface/texture_cutter.h"
+#include "isohf/surface/photo/texture_cutter.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <random>
 
-#include "isohf/surface/srgb.h"
+#include "isohf/surface/photo/srgb.h"
 #include "support/memory_photo.h"
 
 namespace isohf {

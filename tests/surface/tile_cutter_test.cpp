@@ -1,4 +1,4 @@
-#include "isohf/surface/tile_cutter.h"
+#include "isohf/surface/resample/tile_cutter.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "isohf/surface/warped_cutter.h"
+#include "isohf/surface/resample/warped_cutter.h"
 
 #include <gtest/gtest.h>
 
@@ -12,7 +12,7 @@
 
 #include "isohf/projection/choose_projection.h"
 #include "isohf/projection/projected_extent.h"
-#include "isohf/surface/source_geometry.h"
+#include "isohf/surface/source/source_geometry.h"
 
 namespace isohf {
 namespace {

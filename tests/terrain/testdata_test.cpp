@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "formats/registry.h"
+#include "isohf/raster.h"
 #include "support/samples.h"
 #include "support/temporary_folder.h"
 
@@ -16,7 +17,7 @@ namespace {
 namespace fs = std::filesystem;
 
 std::vector<std::byte> samples_of(const std::string& path) {
-  return test::read_whole(*open_source(path, {}));
+  return test::read_whole(*open_raster(path, {}));
 }
 
 std::set<std::string> rasters_in(const fs::path& folder) {

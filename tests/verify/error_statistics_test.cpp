@@ -1,4 +1,4 @@
-#include "isohf/verify/error_statistics.h"
+#include "isohf/verify/accuracy/error_statistics.h"
 
 #include <gtest/gtest.h>
 

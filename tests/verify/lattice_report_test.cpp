@@ -1,11 +1,11 @@
-#include "isohf/verify/lattice_report.h"
+#include "isohf/verify/accuracy/lattice_report.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "isohf/convert/convert.h"
-#include "isohf/verify/against_source.h"
+#include "isohf/verify/accuracy/against_source.h"
 #include "support/memory_source.h"
 #include "support/temporary_folder.h"
 #include "support/trigonometric_field.h"

@@ -1,4 +1,4 @@
-#include "isohf/verify/ortho_twin.h"
+#include "isohf/verify/accuracy/ortho_twin.h"
 
 #include <gtest/gtest.h>
 #include <oneapi/tbb/task_arena.h>
@@ -10,10 +10,10 @@
 #include <string>
 #include <vector>
 
-#include "isohf/archive/quantise.h"
-#include "isohf/surface/acquisition.h"
-#include "isohf/surface/prefilter.h"
-#include "isohf/surface/source_axis.h"
+#include "isohf/archive/codec/quantise.h"
+#include "isohf/surface/resample/acquisition.h"
+#include "isohf/surface/resample/prefilter.h"
+#include "isohf/surface/source/source_axis.h"
 #include "support/memory_source.h"
 #include "support/trigonometric_field.h"
 

@@ -1,10 +1,10 @@
-#include "isohf/verify/plain_coding.h"
+#include "isohf/verify/accuracy/plain_coding.h"
 
 #include <gtest/gtest.h>
 
 #include <vector>
 
-#include "isohf/archive/deflate.h"
+#include "isohf/archive/deflate/deflate.h"
 
 namespace isohf {
 namespace {

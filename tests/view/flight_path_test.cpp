@@ -1,8 +1,8 @@
-#include "flight_path.h"
+#include "measure/flight_path.h"
 
 #include <gtest/gtest.h>
 
-#include "isohf/base/error.h"
+#include "isohf/error.h"
 #include "support/temporary_folder.h"
 
 namespace isohf::view {

@@ -5,8 +5,8 @@
 #include <memory>
 #include <string>
 
-#include "headless_context.h"
-#include "isohf/base/error.h"
+#include "gl/headless_context.h"
+#include "isohf/error.h"
 
 namespace isohf::test {
 

@@ -11,9 +11,9 @@
 #include <utility>
 #include <vector>
 
-#include "isohf/surface/shadow.h"
+#include "isohf/surface/shade/shadow.h"
+#include "paging/tile_source.h"
 #include "support/analytic_surface.h"
-#include "tile_source.h"
 
 namespace isohf::test {
 

@@ -3,13 +3,13 @@
 #include <cstdlib>
 
 #include "camera.h"
+#include "gl/offscreen.h"
+#include "gl/png_file.h"
 #include "gl_test.h"
+#include "measure/transition_sweep.h"
 #include "memory_tiles.h"
-#include "offscreen.h"
-#include "png_file.h"
+#include "paging/tile_box.h"
 #include "session.h"
-#include "tile_box.h"
-#include "transition_sweep.h"
 
 namespace isohf::view {
 namespace {

@@ -1,4 +1,4 @@
-#include "texture_box.h"
+#include "paging/texture_box.h"
 
 #include <gmock/gmock.h>
 
@@ -8,10 +8,10 @@
 #include <thread>
 
 #include "camera.h"
+#include "gl/offscreen.h"
 #include "gl_test.h"
-#include "isohf/surface/texture_cutter.h"
+#include "isohf/surface/photo/texture_cutter.h"
 #include "memory_tiles.h"
-#include "offscreen.h"
 #include "session.h"
 #include "support/memory_photo.h"
 

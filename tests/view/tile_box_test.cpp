@@ -1,4 +1,4 @@
-#include "tile_box.h"
+#include "paging/tile_box.h"
 
 #include <atomic>
 #include <chrono>

@@ -1,4 +1,4 @@
-#include "verify_view.h"
+#include "verify/verify_view.h"
 
 #include <gmock/gmock.h>
 

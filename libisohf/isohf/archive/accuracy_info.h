@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "isohf/archive/metadata.h"
+#include "isohf/metadata.h"
 
 namespace isohf {
 

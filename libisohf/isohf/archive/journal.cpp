@@ -2,9 +2,10 @@
 
 #include <algorithm>
 
-#include "isohf/archive/deflate.h"
+#include "isohf/archive/codec/tile_codes.h"
+#include "isohf/archive/deflate/deflate.h"
 #include "isohf/base/bytes.h"
-#include "isohf/base/error.h"
+#include "isohf/error.h"
 
 namespace isohf {
 namespace {

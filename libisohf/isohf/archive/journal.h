@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "isohf/archive/tile_codec.h"
-#include "isohf/archive/zip_layout.h"
+#include "isohf/archive/codec/tile_codes.h"
+#include "isohf/archive/container/zip_layout.h"
 #include "isohf/base/file.h"
 
 namespace isohf {

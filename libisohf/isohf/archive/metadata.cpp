@@ -1,10 +1,10 @@
-#include "isohf/archive/metadata.h"
+#include "isohf/metadata.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 
-#include "isohf/base/error.h"
+#include "isohf/error.h"
 
 namespace isohf {
 

@@ -3,9 +3,9 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "isohf/archive/metadata.h"
 #include "isohf/archive/metadata_json.h"
-#include "isohf/base/error.h"
+#include "isohf/error.h"
+#include "isohf/metadata.h"
 
 namespace isohf {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <set>
 
-#include "isohf/base/error.h"
+#include "isohf/error.h"
 
 namespace isohf {
 

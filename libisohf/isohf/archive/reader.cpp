@@ -1,4 +1,5 @@
-#include "isohf/archive/reader.h"
+#include "isohf/archive.h"
+#include "isohf/archive/codec/tile_codec.h"
 
 #include <fmt/format.h>
 
@@ -7,13 +8,14 @@
 #include <limits>
 #include <mutex>
 
-#include "isohf/archive/deflate.h"
-#include "isohf/archive/directory.h"
-#include "isohf/archive/lane_decoder.h"
+#include "isohf/archive/codec/simd/lane_decoder.h"
+#include "isohf/archive/codec/tile_codes.h"
+#include "isohf/archive/container/directory.h"
+#include "isohf/archive/container/zip_layout.h"
+#include "isohf/archive/deflate/deflate.h"
 #include "isohf/archive/tile_table.h"
-#include "isohf/archive/zip_layout.h"
-#include "isohf/base/error.h"
 #include "isohf/base/file.h"
+#include "isohf/error.h"
 
 namespace isohf {
 namespace {

@@ -1,6 +1,6 @@
 #include "isohf/archive/tile_index.h"
 
-#include "isohf/archive/deflate.h"
+#include "isohf/archive/deflate/deflate.h"
 #include "isohf/base/bytes.h"
 
 namespace isohf {

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "isohf/archive/reader.h"
+#include "isohf/archive.h"
 
 /// The member index.bin: one record for each tile of the grid, by flat index, and a footer that is the last thing
 /// before the ZIP directory (docs/archive_format.md, "Index").

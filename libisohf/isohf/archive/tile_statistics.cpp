@@ -7,9 +7,10 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "isohf/archive/quantise.h"
-#include "isohf/base/error.h"
+#include "isohf/archive/codec/quantise.h"
+#include "isohf/archive/codec/tile_codes.h"
 #include "isohf/base/vectorised.h"
+#include "isohf/error.h"
 
 namespace isohf {
 namespace {

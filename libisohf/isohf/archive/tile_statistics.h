@@ -1,6 +1,6 @@
 #pragma once
 
-#include "isohf/archive/tile_codec.h"
+#include "isohf/archive/codec/tile_codes.h"
 
 namespace isohf {
 

@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <array>
 
-#include "isohf/archive/deflate.h"
+#include "isohf/archive/codec/tile_payload.h"
+#include "isohf/archive/deflate/deflate.h"
 #include "isohf/archive/tile_index.h"
-#include "isohf/archive/tile_payload.h"
-#include "isohf/base/error.h"
+#include "isohf/error.h"
 
 namespace isohf {
 namespace {

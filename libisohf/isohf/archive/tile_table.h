@@ -3,11 +3,11 @@
 #include <cstdint>
 #include <vector>
 
-#include "isohf/archive/directory.h"
-#include "isohf/archive/metadata.h"
-#include "isohf/archive/reader.h"
-#include "isohf/archive/zip_layout.h"
+#include "isohf/archive.h"
+#include "isohf/archive/container/directory.h"
+#include "isohf/archive/container/zip_layout.h"
 #include "isohf/base/file.h"
+#include "isohf/metadata.h"
 
 namespace isohf {
 

@@ -1,4 +1,5 @@
 #include "isohf/archive/writer.h"
+#include "isohf/archive/codec/tile_codec.h"
 
 #include <fmt/format.h>
 
@@ -6,16 +7,17 @@
 #include <optional>
 #include <vector>
 
-#include "isohf/archive/content_hash.h"
-#include "isohf/archive/deflate.h"
+#include "isohf/archive/codec/tile_codes.h"
+#include "isohf/archive/container/content_hash.h"
+#include "isohf/archive/container/zip_layout.h"
+#include "isohf/archive/deflate/deflate.h"
 #include "isohf/archive/journal.h"
 #include "isohf/archive/metadata_json.h"
 #include "isohf/archive/written_contents.h"
-#include "isohf/archive/zip_layout.h"
 #include "isohf/base/assert.h"
 #include "isohf/base/bytes.h"
-#include "isohf/base/error.h"
 #include "isohf/base/output_file.h"
+#include "isohf/error.h"
 
 namespace isohf {
 namespace {
@@ -251,7 +253,7 @@ TileStatistics ArchiveWriter::statistics() const {
   return state_->contents.statistics();
 }
 
-ArchiveWriter::MemberTotals ArchiveWriter::members_in(const std::string& folder) const {
+MemberTotals ArchiveWriter::members_in(const std::string& folder) const {
   return state_->contents.members_in(folder);
 }
 

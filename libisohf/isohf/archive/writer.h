@@ -6,8 +6,8 @@
 #include <span>
 #include <string>
 
-#include "isohf/archive/metadata.h"
-#include "isohf/archive/tile_codec.h"
+#include "isohf/archive/codec/tile_codes.h"
+#include "isohf/metadata.h"
 
 namespace isohf {
 
@@ -52,10 +52,6 @@ class ArchiveWriter {
   [[nodiscard]] TileStatistics statistics() const;
 
   /// How many members other than tiles there are so far under a folder ("seeds/"), and their compressed bytes.
-  struct MemberTotals {
-    std::int64_t members = 0;
-    std::uint64_t bytes = 0;
-  };
   [[nodiscard]] MemberTotals members_in(const std::string& folder) const;
 
   /// Appends the tile with flat index next_tile(). An empty tile takes no bytes.

@@ -2,9 +2,10 @@
 
 #include <algorithm>
 
-#include "isohf/archive/deflate.h"
+#include "isohf/archive/codec/tile_codes.h"
+#include "isohf/archive/container/zip_layout.h"
+#include "isohf/archive/deflate/deflate.h"
 #include "isohf/archive/tile_index.h"
-#include "isohf/archive/zip_layout.h"
 #include "isohf/base/assert.h"
 
 namespace isohf {
@@ -45,8 +46,8 @@ void WrittenContents::add_up(const TileStatistics& tile) {
   statistics_.worst_rounding = std::max(statistics_.worst_rounding, tile.worst_rounding);
 }
 
-ArchiveWriter::MemberTotals WrittenContents::members_in(const std::string& folder) const {
-  ArchiveWriter::MemberTotals totals;
+MemberTotals WrittenContents::members_in(const std::string& folder) const {
+  MemberTotals totals;
   for (const Placed& placed : members_) {
     if (!placed.member.name.starts_with(folder)) continue;
     ++totals.members;

@@ -6,10 +6,10 @@
 #include <unordered_set>
 #include <vector>
 
-#include "isohf/archive/content_hash.h"
+#include "isohf/archive.h"
+#include "isohf/archive/codec/tile_codes.h"
+#include "isohf/archive/container/content_hash.h"
 #include "isohf/archive/journal.h"
-#include "isohf/archive/reader.h"
-#include "isohf/archive/writer.h"
 #include "isohf/base/output_file.h"
 
 namespace isohf {
@@ -28,7 +28,7 @@ class WrittenContents {
   [[nodiscard]] std::uint64_t tile_bytes() const { return tile_bytes_; }
   [[nodiscard]] const TileStatistics& statistics() const { return statistics_; }
   [[nodiscard]] bool has_member(const std::string& name) const { return names_.count(name) != 0; }
-  [[nodiscard]] ArchiveWriter::MemberTotals members_in(const std::string& folder) const;
+  [[nodiscard]] MemberTotals members_in(const std::string& folder) const;
   /// What is known of a tile that was added.
   [[nodiscard]] TileEntry tile_entry(std::int64_t flat) const;
 

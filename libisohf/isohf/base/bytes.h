@@ -9,7 +9,7 @@
 #include <type_traits>
 #include <vector>
 
-#include "isohf/base/error.h"
+#include "isohf/error.h"
 
 namespace isohf {
 

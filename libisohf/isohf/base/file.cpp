@@ -13,7 +13,7 @@
 #include <system_error>
 #include <utility>
 
-#include "isohf/base/error.h"
+#include "isohf/error.h"
 
 namespace isohf {
 namespace {

@@ -9,7 +9,7 @@
 #include <filesystem>
 #include <system_error>
 
-#include "isohf/base/error.h"
+#include "isohf/error.h"
 
 namespace isohf {
 namespace {

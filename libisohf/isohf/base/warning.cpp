@@ -1,6 +1,4 @@
-#include "isohf/base/warning.h"
-
-#include "isohf/base/error.h"
+#include "isohf/error.h"
 
 namespace isohf {
 

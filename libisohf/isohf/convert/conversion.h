@@ -7,12 +7,12 @@
 #include <string>
 #include <vector>
 
-#include "isohf/archive/quantise.h"
+#include "isohf/archive/codec/quantise.h"
 #include "isohf/convert/convert.h"
 #include "isohf/convert/memory_plan.h"
-#include "isohf/surface/kernels.h"
-#include "isohf/surface/prefilter.h"
-#include "isohf/surface/source_geometry.h"
+#include "isohf/surface/resample/kernels.h"
+#include "isohf/surface/resample/prefilter.h"
+#include "isohf/surface/source/source_geometry.h"
 
 namespace isohf {
 

@@ -1,4 +1,5 @@
 #include "isohf/convert/convert.h"
+#include "isohf/archive/codec/tile_codec.h"
 
 #include <fmt/format.h>
 #include <oneapi/tbb/global_control.h>
@@ -11,19 +12,20 @@
 #include <memory>
 #include <optional>
 
+#include "isohf/archive/codec/tile_codes.h"
 #include "isohf/archive/tile_statistics.h"
 #include "isohf/archive/writer.h"
 #include "isohf/base/assert.h"
-#include "isohf/base/error.h"
 #include "isohf/convert/conversion.h"
+#include "isohf/convert/frame/plan.h"
 #include "isohf/convert/job_description.h"
 #include "isohf/convert/memory_plan.h"
-#include "isohf/convert/plan_warnings.h"
-#include "isohf/convert/quantiser.h"
-#include "isohf/convert/residual_stage.h"
-#include "isohf/convert/seed_stage.h"
-#include "isohf/convert/texture_stage.h"
-#include "isohf/convert/tile_source.h"
+#include "isohf/convert/stages/quantiser.h"
+#include "isohf/convert/stages/residual_stage.h"
+#include "isohf/convert/stages/seed_stage.h"
+#include "isohf/convert/stages/texture_stage.h"
+#include "isohf/convert/stages/tile_source.h"
+#include "isohf/error.h"
 
 namespace isohf {
 namespace {

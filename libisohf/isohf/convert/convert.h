@@ -9,12 +9,12 @@
 #include <vector>
 
 #include "isohf/archive/accuracy_info.h"
-#include "isohf/archive/texture_info.h"
-#include "isohf/archive/tile_codec.h"
-#include "isohf/convert/plan.h"
-#include "isohf/surface/height_source.h"
-#include "isohf/surface/kernels.h"
-#include "isohf/surface/photo_source.h"
+#include "isohf/archive/codec/tile_codes.h"
+#include "isohf/archive/textures/texture_info.h"
+#include "isohf/convert/frame/plan.h"
+#include "isohf/raster.h"
+#include "isohf/surface/photo/photo_source.h"
+#include "isohf/surface/resample/kernels.h"
 
 namespace isohf {
 

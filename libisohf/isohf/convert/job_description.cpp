@@ -9,7 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <span>
 
-#include "isohf/archive/content_hash.h"
+#include "isohf/archive/container/content_hash.h"
 
 #include "isohf/archive/tile_statistics.h"
 

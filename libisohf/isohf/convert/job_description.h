@@ -2,8 +2,8 @@
 
 #include <string>
 
-#include "isohf/archive/metadata.h"
 #include "isohf/convert/convert.h"
+#include "isohf/metadata.h"
 
 namespace isohf {
 

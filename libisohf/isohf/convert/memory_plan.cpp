@@ -8,13 +8,13 @@
 #include <array>
 #include <cmath>
 
-#include "isohf/base/error.h"
-#include "isohf/convert/residual_stage.h"
-#include "isohf/convert/seed_stage.h"
-#include "isohf/convert/texture_stage.h"
-#include "isohf/surface/band_reader.h"
-#include "isohf/surface/kernels.h"
-#include "isohf/surface/prefilter.h"
+#include "isohf/convert/stages/residual_stage.h"
+#include "isohf/convert/stages/seed_stage.h"
+#include "isohf/convert/stages/texture_stage.h"
+#include "isohf/error.h"
+#include "isohf/surface/resample/kernels.h"
+#include "isohf/surface/resample/prefilter.h"
+#include "isohf/surface/source/band_reader.h"
 
 namespace isohf {
 namespace {

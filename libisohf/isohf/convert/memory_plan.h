@@ -4,9 +4,9 @@
 #include <cstdint>
 
 #include "isohf/convert/convert.h"
-#include "isohf/convert/plan.h"
-#include "isohf/surface/height_source.h"
-#include "isohf/surface/source_rows.h"
+#include "isohf/convert/frame/plan.h"
+#include "isohf/raster.h"
+#include "isohf/surface/source/source_rows.h"
 
 namespace isohf {
 

@@ -9,11 +9,12 @@
 #include <memory>
 #include <numbers>
 
-#include "isohf/base/error.h"
 #include "isohf/convert/conversion.h"
 #include "isohf/convert/memory_plan.h"
+#include "isohf/error.h"
 #include "isohf/lattice/barycentric.h"
-#include "isohf/surface/source_scan.h"
+#include "isohf/surface/source/sample_types.h"
+#include "isohf/surface/source/source_scan.h"
 
 namespace isohf {
 namespace {

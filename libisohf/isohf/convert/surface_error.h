@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "isohf/convert/convert.h"
-#include "isohf/convert/plan.h"
-#include "isohf/surface/height_source.h"
+#include "isohf/convert/frame/plan.h"
+#include "isohf/raster.h"
 
 namespace isohf {
 

@@ -4,9 +4,7 @@
 #include <cstddef>
 
 #include "isohf/base/view.h"
-#include "isohf/lattice/tile_grid.h"
-#include "isohf/lattice/tile_mapping.h"
-#include "isohf/lattice/tile_shape.h"
+#include "isohf/lattice.h"
 
 /// Which triangle holds a point, and its weights there (paper section 3.10, Table 2, Eq. 9, errata E11, E12).
 ///

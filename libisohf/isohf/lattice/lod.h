@@ -1,6 +1,6 @@
 #pragma once
 
-#include "isohf/lattice/tile_grid.h"
+#include "isohf/lattice.h"
 
 /// Choosing a level of detail and fading between two (paper sections 3.8-3.9, Eqs. 7-8, erratum E18).
 

@@ -5,8 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "isohf/lattice/tile_mapping.h"
-#include "isohf/lattice/tile_shape.h"
+#include "isohf/lattice.h"
 
 /// The paths along which light casts shadows: rows of visible vertices, followed eastwards or westwards (paper section
 /// 3.13). Pure geometry and plain data; casting is in surface/shadow.h.

@@ -1,6 +1,6 @@
 #include "isohf/lattice/stitch.h"
 
-#include "isohf/lattice/tile_mapping.h"
+#include "isohf/lattice.h"
 
 namespace isohf {
 namespace {

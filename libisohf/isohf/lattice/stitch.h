@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "isohf/lattice/tile_shape.h"
+#include "isohf/lattice.h"
 
 /// The triangle list that joins a coarse strip to the full-detail border (paper section 3.5, Eqs. 5-6, appendix), so
 /// that tiles of any two levels meet without T-junctions.

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "isohf/lattice/tile_shape.h"
+#include "isohf/lattice.h"
 
 /// The triangle strip that draws a tile's body at one level of detail (paper sections 3.3-3.4, Eqs. 3-4, appendix).
 ///

@@ -1,11 +1,11 @@
-#include "isohf/lattice/tile_grid.h"
+#include "isohf/lattice.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "isohf/base/error.h"
+#include "isohf/error.h"
 
 namespace isohf {
 

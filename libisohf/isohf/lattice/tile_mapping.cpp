@@ -1,4 +1,4 @@
-#include "isohf/lattice/tile_mapping.h"
+#include "isohf/lattice.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "isohf/lattice/tile_shape.h"
+#include "isohf/lattice.h"
 
 #include <fmt/format.h>
 
@@ -7,7 +7,7 @@
 #include <numbers>
 #include <tuple>
 
-#include "isohf/base/error.h"
+#include "isohf/error.h"
 
 namespace isohf {
 namespace {

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <optional>
 
-#include "isohf/base/error.h"
+#include "isohf/error.h"
 
 namespace isohf {
 namespace {

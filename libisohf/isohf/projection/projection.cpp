@@ -13,7 +13,7 @@
 #include <numbers>
 #include <type_traits>
 
-#include "isohf/base/error.h"
+#include "isohf/error.h"
 
 namespace isohf {
 namespace {

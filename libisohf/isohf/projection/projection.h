@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "isohf/projection/projection_spec.h"
+#include "isohf/projection.h"
 
 namespace isohf {
 

@@ -1,11 +1,11 @@
-#include "isohf/projection/projection_spec.h"
+#include "isohf/projection.h"
 
 #include <fmt/format.h>
 
 #include <charconv>
 #include <cmath>
 
-#include "isohf/base/error.h"
+#include "isohf/error.h"
 
 namespace isohf {
 namespace {

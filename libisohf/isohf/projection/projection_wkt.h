@@ -3,7 +3,7 @@
 #include <optional>
 #include <string>
 
-#include "isohf/projection/projection_spec.h"
+#include "isohf/projection.h"
 
 namespace isohf {
 

@@ -5,28 +5,9 @@
 #include <optional>
 #include <string>
 
-#include "isohf/projection/projection_spec.h"
+#include "isohf/projection.h"
 
 namespace isohf {
-
-/// A horizontal reference system that is understood: its coordinates <-> places on the body. Longitudes and latitudes
-/// are those of the system's own datum, counted from Greenwich. Immutable and thread-safe.
-class ReferenceMap {
- public:
-  ReferenceMap() = default;
-  ReferenceMap(const ReferenceMap&) = delete;
-  ReferenceMap& operator=(const ReferenceMap&) = delete;
-  virtual ~ReferenceMap() = default;
-
-  /// longitude in [-180, 180]. NaN where the map shows no place. Coordinates are in units of metres_per_unit().
-  [[nodiscard]] virtual GeoPoint geo_from_map(MapPoint place) const = 0;
-  /// NaN where the map has no place for it.
-  [[nodiscard]] virtual MapPoint map_from_geo(GeoPoint place) const = 0;
-  [[nodiscard]] virtual double metres_per_unit() const = 0;
-  [[nodiscard]] virtual const Ellipsoid& ellipsoid() const = 0;
-  /// What holds it in memory, libraries that were loaded for it included.
-  [[nodiscard]] virtual std::uint64_t memory_bytes() const { return 0; }
-};
 
 /// "EPSG:32601" to "EPSG:32760": the UTM zones of WGS 84, the commonest maps of elevations, by GeographicLib. nullptr
 /// for any other text.
@@ -62,19 +43,6 @@ struct PlaceScale {
 /// NaN in every member where the map shows no place, or ends.
 [[nodiscard]] PlaceScale scale_at(const ReferenceMap& map, MapPoint place);
 
-/// What lies under a rectangle of a map.
-struct MapGround {
-  GeoPoint centre;          ///< under the rectangle's
-  GeoExtent extent;         ///< the least one that holds the ground; all longitudes where a pole is inside
-  double mean_scale = 1.0;  ///< of places evenly spread over the map: of lengths, over all directions
-  double least_scale = 1.0;
-  double most_scale = 1.0;
-  double worst_error = 0.0;  ///< the largest deviation of a scale from 1
-  GeoPoint worst_place;
-
-  /// Beyond this lengths of the map are no lengths of the ground (docs/decisions/0029).
-  static constexpr double kTrueEnough = 0.02;
-};
 /// Looks at 33 x 33 places, the sides included, and rounds to 1e-8 degrees and scales to 1e-7. Places that the map does
 /// not show are passed over; nullopt where it shows none of them.
 [[nodiscard]] std::optional<MapGround> ground_under(const ReferenceMap& map, const MapBounds& bounds);

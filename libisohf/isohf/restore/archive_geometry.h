@@ -1,7 +1,7 @@
 #pragma once
 
-#include "isohf/archive/metadata.h"
-#include "isohf/surface/source_geometry.h"
+#include "isohf/metadata.h"
+#include "isohf/surface/source/source_geometry.h"
 
 namespace isohf {
 

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "isohf/base/assert.h"
-#include "isohf/base/error.h"
+#include "isohf/error.h"
 
 namespace isohf {
 

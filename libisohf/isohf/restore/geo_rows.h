@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <span>
 
-#include "isohf/archive/metadata.h"
+#include "isohf/metadata.h"
 #include "isohf/restore/archive_geometry.h"
 #include "isohf/restore/scattered_surface.h"
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "isohf/surface/kernels.h"
+#include "isohf/surface/resample/kernels.h"
 
 namespace isohf {
 namespace {

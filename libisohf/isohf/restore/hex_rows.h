@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "isohf/lattice/tile_grid.h"
+#include "isohf/lattice.h"
 
 /// The separable way back from the lattice (docs/decisions/0012): along each lattice row a quintic B-spline gives
 /// heights at the columns that are wanted; all rows then stand in line, and a second quintic B-spline goes down the

@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "isohf/base/bytes.h"
-#include "isohf/base/error.h"
+#include "isohf/error.h"
 
 namespace isohf {
 namespace {

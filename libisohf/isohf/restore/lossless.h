@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "isohf/archive/reader.h"
+#include "isohf/archive.h"
 #include "isohf/restore/place_mesh.h"
 #include "isohf/restore/residual_codec.h"
 #include "isohf/restore/scattered_surface.h"

@@ -11,11 +11,11 @@
 #include <utility>
 #include <vector>
 
-#include "isohf/archive/lane_decoder.h"
-#include "isohf/archive/quantise.h"
+#include "isohf/archive/codec/quantise.h"
+#include "isohf/archive/codec/simd/lane_decoder.h"
 #include "isohf/base/assert.h"
 #include "isohf/lattice/barycentric.h"
-#include "isohf/surface/normals.h"
+#include "isohf/surface/shade/normals.h"
 
 namespace isohf {
 namespace {

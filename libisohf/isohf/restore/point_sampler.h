@@ -8,7 +8,7 @@
 #include <span>
 #include <unordered_map>
 
-#include "isohf/archive/reader.h"
+#include "isohf/archive.h"
 
 namespace isohf {
 

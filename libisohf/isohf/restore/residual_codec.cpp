@@ -10,7 +10,7 @@
 
 #include "isohf/base/assert.h"
 #include "isohf/base/bytes.h"
-#include "isohf/surface/sample_types.h"
+#include "isohf/surface/source/sample_types.h"
 
 namespace isohf {
 namespace {

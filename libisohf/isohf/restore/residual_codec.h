@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "isohf/surface/heightmap.h"
+#include "isohf/raster.h"
 
 /// Source samples as what is left after predicting them from the archive's surface (docs/archive_format.md, residuals).
 ///

@@ -10,9 +10,9 @@
 #include <utility>
 
 #include "isohf/base/assert.h"
-#include "isohf/base/error.h"
+#include "isohf/error.h"
 #include "isohf/lattice/barycentric.h"
-#include "isohf/surface/kernels.h"
+#include "isohf/surface/resample/kernels.h"
 
 namespace isohf {
 namespace {

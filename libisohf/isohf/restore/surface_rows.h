@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "isohf/archive/metadata.h"
-#include "isohf/archive/tile_codec.h"
-#include "isohf/lattice/tile_grid.h"
+#include "isohf/archive/codec/tile_codes.h"
+#include "isohf/lattice.h"
+#include "isohf/metadata.h"
 #include "isohf/restore/hex_rows.h"
 
 namespace isohf {

@@ -1,4 +1,4 @@
-#include "isohf/verify/findings.h"
+#include "isohf/verify.h"
 
 #include <fmt/format.h>
 

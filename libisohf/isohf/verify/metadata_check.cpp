@@ -7,15 +7,15 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "isohf/archive/directory.h"
+#include "isohf/archive/container/directory.h"
 #include "isohf/archive/metadata_json.h"
-#include "isohf/base/error.h"
 #include "isohf/base/file.h"
+#include "isohf/error.h"
 #include "isohf/projection/projected_extent.h"
 #include "isohf/projection/projection.h"
 #include "isohf/restore/archive_geometry.h"
 #include "isohf/restore/lossless.h"
-#include "isohf/surface/acquisition.h"
+#include "isohf/surface/resample/acquisition.h"
 
 namespace isohf {
 namespace {

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "isohf/archive/reader.h"
+#include "isohf/archive.h"
 
 namespace isohf {
 

@@ -5,8 +5,8 @@
 
 #include <algorithm>
 
-#include "isohf/archive/deflate.h"
-#include "isohf/base/error.h"
+#include "isohf/archive/deflate/deflate.h"
+#include "isohf/error.h"
 
 namespace isohf {
 

@@ -7,8 +7,8 @@
 #include <utility>
 #include <vector>
 
-#include "isohf/archive/reader.h"
-#include "isohf/convert/seed_row.h"
+#include "isohf/archive.h"
+#include "isohf/convert/stages/seed_row.h"
 
 namespace isohf {
 

@@ -6,8 +6,8 @@
 #include <array>
 #include <optional>
 
-#include "isohf/archive/texture_reader.h"
-#include "isohf/base/error.h"
+#include "isohf/archive/textures/texture_reader.h"
+#include "isohf/error.h"
 
 namespace isohf {
 namespace {

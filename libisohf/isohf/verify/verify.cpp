@@ -1,4 +1,4 @@
-#include "isohf/verify/verify.h"
+#include "isohf/verify.h"
 
 #include <fmt/format.h>
 #include <oneapi/tbb/parallel_for.h>
@@ -13,13 +13,13 @@
 #include <utility>
 
 #include "isohf/archive/accuracy_info.h"
-#include "isohf/archive/content_hash.h"
-#include "isohf/archive/lane_decoder.h"
+#include "isohf/archive/codec/simd/lane_decoder.h"
+#include "isohf/archive/codec/tile_codes.h"
+#include "isohf/archive/container/content_hash.h"
 #include "isohf/archive/tile_statistics.h"
-#include "isohf/base/error.h"
+#include "isohf/error.h"
 #include "isohf/restore/lossless.h"
-#include "isohf/surface/normals.h"
-#include "isohf/verify/findings.h"
+#include "isohf/surface/shade/normals.h"
 #include "isohf/verify/metadata_check.h"
 #include "isohf/verify/seed_check.h"
 #include "isohf/verify/shared_vertices.h"

@@ -9,11 +9,11 @@
 #include <limits>
 #include <vector>
 
-#include "isohf/archive/quantise.h"
-#include "isohf/base/error.h"
+#include "isohf/archive/codec/quantise.h"
+#include "isohf/error.h"
 #include "isohf/restore/archive_geometry.h"
-#include "isohf/surface/band_reader.h"
-#include "isohf/surface/source_scan.h"
+#include "isohf/surface/source/band_reader.h"
+#include "isohf/surface/source/source_scan.h"
 
 namespace isohf {
 namespace {

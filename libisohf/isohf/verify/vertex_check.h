@@ -5,8 +5,8 @@
 #include <functional>
 #include <optional>
 
-#include "isohf/archive/reader.h"
-#include "isohf/surface/height_source.h"
+#include "isohf/archive.h"
+#include "isohf/raster.h"
 
 namespace isohf {
 

@@ -1,8 +1,8 @@
 #include <cstdio>
 
-#include "isohf/archive/reader.h"
-#include "isohf/base/error.h"
-#include "isohf/lattice/tile_shape.h"
+#include "isohf/archive.h"
+#include "isohf/error.h"
+#include "isohf/lattice.h"
 
 /// Exit code 0 when pure geometry links, and the reader with all that it is built on.
 int main() {

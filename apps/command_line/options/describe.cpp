@@ -1,0 +1,76 @@
+#include "options/describe.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "isohf/projection/projection_wkt.h"
+
+namespace isohf::cli {
+
+std::string describe_bytes(std::uint64_t bytes) {
+  if (bytes < 1000) return fmt::format("{} bytes", bytes);
+  constexpr const char* kUnits[] = {"kB", "MB", "GB", "TB", "PB", "EB"};
+  double value = static_cast<double>(bytes) / 1000.0;
+  std::size_t unit = 0;
+  while (value >= 999.5 && unit + 1 < std::size(kUnits)) {
+    value /= 1000.0;
+    ++unit;
+  }
+  return fmt::format("{:.3g} {}", value, kUnits[unit]);
+}
+
+std::string describe_count(std::int64_t count) {
+  const std::string digits = std::to_string(count);
+  std::string out;
+  for (std::size_t i = 0; i < digits.size(); ++i) {
+    const bool starts_group = i > 0 && digits[i - 1] != '-' && (digits.size() - i) % 3 == 0;
+    if (starts_group) out += ' ';
+    out += digits[i];
+  }
+  return out;
+}
+
+std::string describe_seconds(double seconds) {
+  if (seconds < 60.0) return fmt::format("{:.{}f} s", seconds, seconds < 10.0 ? 2 : 0);
+  const auto whole = static_cast<std::int64_t>(std::llround(std::fmin(seconds, 1e12)));
+  if (whole < 3600) return fmt::format("{} min {:02} s", whole / 60, whole % 60);
+  return fmt::format("{} h {:02} min", whole / 3600, whole / 60 % 60);
+}
+
+std::string describe_length(double length, bool metres) {
+  if (!metres) return fmt::format("{:.6g} units", length);
+  if (std::fabs(length) >= 1e4) return fmt::format("{:.6g} km", length / 1000.0);
+  return fmt::format("{:.6g} m", length);
+}
+
+std::string describe_projection(const ProjectionRecord& record) {
+  const double worst = 100.0 * record.worst_scale_error;
+  const std::string error =
+      worst < 1000.0 ? fmt::format("lengths err by up to {:.3g} %", worst) : std::string("lengths err by any amount");
+  const double longitude = std::remainder(record.worst_place.longitude, 360.0);
+  return fmt::format("{}; {} (at longitude {:.6g}, latitude {:.6g}); {}", describe_projection(record.spec), error,
+                     longitude, record.worst_place.latitude, record.why);
+}
+
+std::string describe_map_scale(const MapGround& ground) {
+  return fmt::format(
+      "lengths on the input's map are {:.5g} times those on the ground, {:.5g} to {:.5g}; off by {:.3g} % at longitude "
+      "{:.6g}, latitude {:.6g}",
+      ground.mean_scale, ground.least_scale, ground.most_scale, 100.0 * ground.worst_error,
+      ground.worst_place.longitude, ground.worst_place.latitude);
+}
+
+int raw_bytes(CodeType type) {
+  switch (type) {
+    case CodeType::kU8:
+      return 1;
+    case CodeType::kU16:
+      return 2;
+    case CodeType::kF32:
+      return 4;
+  }
+  return 0;
+}
+
+}  // namespace isohf::cli

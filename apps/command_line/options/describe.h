@@ -1,0 +1,27 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "isohf/convert/frame/plan.h"
+
+namespace isohf::cli {
+
+/// Numbers as people read them; JSON output uses none of these.
+
+[[nodiscard]] std::string describe_bytes(std::uint64_t bytes);  ///< "12.3 MB", powers of 1000
+[[nodiscard]] std::string describe_count(std::int64_t count);   ///< "2 472 768"
+[[nodiscard]] std::string describe_seconds(double seconds);     ///< "0.31 s", "4 min 05 s"
+/// A horizontal length with its unit: metres, kilometres, or "units" where `metres` is false.
+[[nodiscard]] std::string describe_length(double length, bool metres);
+
+/// The projection, how far lengths err and where, and why it was taken.
+[[nodiscard]] std::string describe_projection(const ProjectionRecord& record);
+
+/// Lengths on a source's own map for those on the ground.
+[[nodiscard]] std::string describe_map_scale(const MapGround& ground);
+
+/// Bytes of one stored elevation before coding.
+[[nodiscard]] int raw_bytes(CodeType type);
+
+}  // namespace isohf::cli

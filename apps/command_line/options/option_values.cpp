@@ -1,0 +1,122 @@
+#include "options/option_values.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+
+#include "isohf/error.h"
+#include "options/nearest_word.h"
+
+namespace isohf::cli {
+namespace {
+
+[[noreturn]] void refuse(const std::string& text, const std::string& required) {
+  throw Error(ErrorCode::kInvalidArgument, ErrorParts{"", "'" + text + "'", required, ""});
+}
+
+}  // namespace
+
+bool read_number(std::string_view text, double& value) {
+  if (!text.empty() && text.front() == '+') text.remove_prefix(1);
+  if (text.empty() || text.front() == '+') return false;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  return error == std::errc{} && end == text.data() + text.size();
+}
+
+double parse_number(const std::string& text) {
+  double value = 0.0;
+  if (!read_number(text, value) || !std::isfinite(value)) refuse(text, "a finite number");
+  return value;
+}
+
+double parse_positive_number(const std::string& text) {
+  double value = 0.0;
+  if (!read_number(text, value) || !std::isfinite(value) || value <= 0.0) refuse(text, "a number greater than 0");
+  return value;
+}
+
+double parse_number_in(const std::string& text, double least, double most) {
+  double value = 0.0;
+  if (!read_number(text, value) || !(value >= least && value <= most)) {
+    refuse(text, fmt::format("a number from {} to {}", least, most));
+  }
+  return value;
+}
+
+std::int64_t parse_whole_number(const std::string& text, std::int64_t least, std::int64_t most) {
+  std::int64_t value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc{} || end != text.data() + text.size() || value < least || value > most) {
+    refuse(text, fmt::format("a whole number from {} to {}", least, most));
+  }
+  return value;
+}
+
+std::pair<std::int64_t, std::int64_t> parse_size(const std::string& text, std::int64_t least, std::int64_t most) {
+  const std::size_t cross = text.find_first_of("xX");
+  const std::string required = fmt::format("COLUMNSxROWS, two whole numbers from {} to {}", least, most);
+  if (cross == std::string::npos) refuse(text, required);
+  try {
+    return {parse_whole_number(text.substr(0, cross), least, most),
+            parse_whole_number(text.substr(cross + 1), least, most)};
+  } catch (const Error&) {
+    refuse(text, required);
+  }
+}
+
+std::pair<double, double> parse_range(const std::string& text) {
+  const std::size_t colon = text.find_first_of(":,");
+  double low = 0.0;
+  double high = 0.0;
+  if (colon == std::string::npos || !read_number(std::string_view(text).substr(0, colon), low) ||
+      !read_number(std::string_view(text).substr(colon + 1), high) || !std::isfinite(low) || !std::isfinite(high)) {
+    refuse(text, "MIN:MAX, two finite numbers");
+  }
+  if (!(low < high)) refuse(text, "MIN:MAX with MIN less than MAX");
+  return {low, high};
+}
+
+std::vector<double> parse_numbers(const std::string& text) {
+  std::vector<double> numbers;
+  for (std::size_t start = 0; start <= text.size();) {
+    const std::size_t end = std::min(text.find(',', start), text.size());
+    double value = 0.0;
+    if (!read_number(std::string_view(text).substr(start, end - start), value)) {
+      refuse(text, "numbers separated by commas, as in 5,15,30");
+    }
+    numbers.push_back(value);
+    start = end + 1;
+  }
+  return numbers;
+}
+
+std::uint64_t parse_bytes(const std::string& text) {
+  const std::string required = "a size in bytes such as 400M, 1.5GiB or 2GB";
+  const std::size_t digits = std::min(text.find_first_not_of("0123456789."), text.size());
+  double value = 0.0;
+  if (digits == 0 || !read_number(std::string_view(text).substr(0, digits), value)) refuse(text, required);
+  std::string unit = text.substr(digits);
+  double factor = 1.0;
+  if (!unit.empty() && unit != "B") {
+    const std::size_t power = std::string_view("KMGT").find(static_cast<char>(std::toupper(unit[0])));
+    const std::string rest = unit.substr(1);
+    if (power == std::string::npos || !(rest.empty() || rest == "iB" || rest == "B")) refuse(text, required);
+    factor = std::pow(rest == "B" ? 1000.0 : 1024.0, static_cast<double>(power) + 1.0);
+  }
+  const double bytes = std::floor(value * factor);
+  if (!(bytes >= 1.0) || bytes > 9e18) refuse(text, required);
+  return static_cast<std::uint64_t>(bytes);
+}
+
+std::size_t parse_word(const std::string& text, const std::vector<std::string>& words) {
+  std::string list;
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    if (words[i] == text) return i;
+    list += (i == 0 ? "" : i + 1 == words.size() ? " or " : ", ") + words[i];
+  }
+  refuse(text, list + did_you_mean(text, words));
+}
+
+}  // namespace isohf::cli

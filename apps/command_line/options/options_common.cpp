@@ -1,0 +1,43 @@
+#include "options/options_common.h"
+
+#include "options/option_values.h"
+#include "output/standard_output.h"
+
+namespace isohf::cli {
+namespace {
+
+constexpr int kMaxThreads = 1024;
+
+}  // namespace
+
+void add_common_options(CommandLine& line, CommonOptions& options) {
+  line.group("Common");
+  line.flag("--json", "Print one JSON document on standard output instead of text, of an error as well", options.json,
+            [] { telling().json = true; });
+  line.flag("-q,--quiet", "Print nothing but errors, and warnings of lost data", options.quiet,
+            [] { telling().quiet = true; });
+  line.flag("--strict", "Take warnings as errors: where one arises, nothing is written", options.strict,
+            [] { telling().strict = true; });
+  line.flag("-v,--verbose", "Say more, on standard error", options.verbose);
+}
+
+void add_work_options(CommandLine& line, WorkOptions& options) {
+  line.group("Work");
+  line.option(
+      "-j,--threads", "N", "Threads, 1 to 1024 (default: all cores); the result does not depend on it",
+      [&](const std::string& text) { options.threads = static_cast<int>(parse_whole_number(text, 1, kMaxThreads)); });
+  line.option("--progress", "MODE",
+              "auto: a bar on a terminal, plain lines with -v, else nothing; plain: lines; json: one object a line; "
+              "none. On standard error (default auto)",
+              [&](const std::string& text) {
+                options.progress = static_cast<ProgressMode>(parse_word(text, {"auto", "plain", "json", "none"}));
+                telling().json_notes = options.progress == ProgressMode::kJson;
+              });
+}
+
+void add_memory_option(CommandLine& line, const std::string& description, std::uint64_t& bytes) {
+  line.option("--memory", "SIZE", description + "; as in 400M or 1.5GiB",
+              [&](const std::string& text) { bytes = parse_bytes(text); });
+}
+
+}  // namespace isohf::cli

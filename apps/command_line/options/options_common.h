@@ -1,0 +1,33 @@
+#pragma once
+
+#include <cstdint>
+
+#include "options/command_line.h"
+#include "output/progress.h"
+
+namespace isohf::cli {
+
+/// Options that every command knows.
+struct CommonOptions {
+  bool json = false;
+  bool quiet = false;
+  bool verbose = false;
+  bool strict = false;
+};
+
+/// --json, -q, --strict, -v. (--help and --config are CommandLine's own.)
+void add_common_options(CommandLine& line, CommonOptions& options);
+
+/// Options of commands that take a while.
+struct WorkOptions {
+  int threads = 0;  ///< 0: all cores
+  ProgressMode progress = ProgressMode::kAuto;
+};
+
+/// -j, --progress.
+void add_work_options(CommandLine& line, WorkOptions& options);
+
+/// --memory SIZE: bytes, 0 where not given.
+void add_memory_option(CommandLine& line, const std::string& description, std::uint64_t& bytes);
+
+}  // namespace isohf::cli

@@ -1,0 +1,154 @@
+#include "output/standard_output.h"
+
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <nlohmann/json.hpp>
+
+#include "output/terminal.h"
+#include "program.h"
+
+namespace isohf::cli {
+namespace {
+
+using nlohmann::ordered_json;
+
+constexpr std::size_t kBufferBytes = 1 << 16;
+
+/// Writes a line in one call, so that lines of two processes do not mix; what cannot be told is not told.
+void write_line_to_stderr(std::string line) {
+  line += '\n';
+  const char* data = line.data();
+  std::size_t left = line.size();
+  while (left > 0) {
+    const ssize_t written = ::write(STDERR_FILENO, data, left);
+    if (written < 0 && errno == EINTR) continue;
+    if (written <= 0) return;
+    data += written;
+    left -= static_cast<std::size_t>(written);
+  }
+}
+
+/// On one line; bytes that are no UTF-8 are replaced.
+std::string line_of(const ordered_json& object) {
+  return object.dump(-1, ' ', false, ordered_json::error_handler_t::replace);
+}
+
+/// A line for people, `head` of them styled, or the JSON object that says the same.
+void tell(const std::string& head, Style style, const std::string& text, const ordered_json& object) {
+  if (telling().json_notes) return write_line_to_stderr(line_of(object));
+  const std::string name = program_name() + ":";
+  write_line_to_stderr((style == Style::kWarning ? name + " " + styled(head, style, STDERR_FILENO)
+                                                 : styled(name, style, STDERR_FILENO) + head) +
+                       " " + printable(text));
+}
+
+int report(const std::string& text, const ordered_json& object, int exit_code) {
+  tell("", Style::kError, text, object);
+  if (!telling().json) return exit_code;
+  try {
+    StandardOutput out;
+    out.write(line_of(object) + "\n");
+    out.finish();
+  } catch (const OutputClosed&) {
+  } catch (const Error&) {  // it has been told on standard error, or is what is being told
+  }
+  return exit_code;
+}
+
+}  // namespace
+
+void StandardOutput::write(std::string_view text) {
+  pending_ += text;
+  if (pending_.size() >= kBufferBytes) flush();
+}
+
+void StandardOutput::flush() {
+  std::size_t from = 0;
+  while (from < pending_.size()) {
+    const ssize_t written = ::write(STDOUT_FILENO, pending_.data() + from, pending_.size() - from);
+    if (written < 0) {
+      if (errno == EINTR) continue;
+      if (errno == EPIPE) throw OutputClosed{};
+      throw Error(ErrorCode::kIo, std::string("standard output: ") + std::strerror(errno));
+    }
+    from += static_cast<std::size_t>(written);
+  }
+  pending_.clear();
+}
+
+std::string printable(std::string text) {
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const auto at = [&](std::size_t k) { return k < text.size() ? static_cast<unsigned char>(text[k]) : 0U; };
+    const bool is_c0 = at(i) < 0x20 || at(i) == 0x7f;
+    // In UTF-8: U+0080 to U+009F, and what turns the direction of writing or breaks a line.
+    const bool is_c1 = at(i) == 0xc2 && at(i + 1) >= 0x80 && at(i + 1) < 0xa0;
+    const bool is_format = at(i) == 0xe2 && ((at(i + 1) == 0x80 && at(i + 2) >= 0xa8 && at(i + 2) <= 0xae) ||
+                                             (at(i + 1) == 0x81 && at(i + 2) >= 0xa6 && at(i + 2) <= 0xa9));
+    if (is_c0) text[i] = ' ';
+    if (is_c1) text.replace(i, 2, " ");
+    if (is_format) text.replace(i, 3, " ");
+  }
+  return text;
+}
+
+Telling& telling() {
+  static Telling how;
+  return how;
+}
+
+void print_warnings(const std::vector<Warning>& warnings) {
+  if (telling().strict && !warnings.empty()) throw error_from(warnings);
+  for (const Warning& warning : warnings) {
+    const bool is_loss = warning.kind == Warning::Kind::kLoss;
+    if (telling().quiet && !is_loss) continue;
+    tell("warning:", Style::kWarning, warning,
+         {{"warning", {{"kind", is_loss ? "loss" : "note"}, {"message", std::string(warning)}}}});
+  }
+}
+
+void print_warning(const Warning& warning) {
+  print_warnings({warning});
+}
+
+ordered_json json_from(const Error& error, int exit_code) {
+  // In the order of ErrorCode.
+  static constexpr std::array kCodes = {"invalid-argument", "io",        "unsupported", "corrupt",
+                                        "out-of-memory",    "cancelled", "warning"};
+  ordered_json json = {
+      {"code", kCodes.at(static_cast<std::size_t>(error.code()))}, {"exit_code", exit_code}, {"message", error.what()}};
+  const ErrorParts parts = error.parts();
+  const auto add = [&](const char* name, const std::string& text) {
+    if (!text.empty()) json[name] = text;
+  };
+  add("where", parts.where);
+  add("found", parts.found);
+  add("required", parts.required);
+  add("remedy", parts.remedy);
+  return json;
+}
+
+void print_error_line(const Error& error) {
+  tell("", Style::kError, error.what(), {{"error", json_from(error, exit_code_for(error.code()))}});
+}
+
+int print_error(const Error& error, int exit_code) {
+  return report(error.what(), {{"error", json_from(error, exit_code)}}, exit_code);
+}
+
+int print_internal_error(const std::string& what) {
+  return report("internal error: " + what,
+                {{"error", {{"code", "internal"}, {"exit_code", +kExitFailed}, {"message", what}}}}, kExitFailed);
+}
+
+void print_note(const std::string& text) {
+  write_line_to_stderr(telling().json_notes ? line_of({{"note", text}}) : program_name() + ": " + printable(text));
+}
+
+void print_progress(const std::string& line) {
+  write_line_to_stderr(printable(line));
+}
+
+}  // namespace isohf::cli

@@ -1,0 +1,61 @@
+#include "output/terminal.h"
+
+#include <fmt/format.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cstdlib>
+
+namespace isohf::cli {
+namespace {
+
+constexpr std::size_t kLeastWidth = 80;
+constexpr std::size_t kMostWidth = 120;
+constexpr std::size_t kWidthWithoutTerminal = 100;
+
+std::string_view setting(const char* name) {
+  const char* value = std::getenv(name);
+  return value == nullptr ? std::string_view() : std::string_view(value);
+}
+
+/// Whether a terminal is behind `file` that understands escape codes.
+bool takes_escapes(int file) {
+  return ::isatty(file) != 0 && !setting("TERM").empty() && setting("TERM") != "dumb";
+}
+
+/// 0 where there is no terminal.
+std::size_t columns_of(int file) {
+  struct winsize size {};
+  if (::isatty(file) == 0) return 0;
+  return ::ioctl(file, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : kLeastWidth;
+}
+
+bool takes_colours(int file) {
+  if (!setting("NO_COLOR").empty()) return false;
+  const std::string_view force = setting("CLICOLOR_FORCE");
+  return (!force.empty() && force != "0") || takes_escapes(file);
+}
+
+}  // namespace
+
+std::size_t terminal_columns(int file) {
+  return takes_escapes(file) ? columns_of(file) : 0;
+}
+
+std::size_t text_width() {
+  const std::string_view columns = setting("COLUMNS");
+  std::size_t width = 0;
+  std::from_chars(columns.data(), columns.data() + columns.size(), width);
+  if (width == 0) width = columns_of(STDOUT_FILENO);
+  return width == 0 ? kWidthWithoutTerminal : std::clamp(width, kLeastWidth, kMostWidth);
+}
+
+std::string styled(std::string_view text, Style style, int file) {
+  if (!takes_colours(file)) return std::string(text);
+  const char* code = style == Style::kHeading ? "1" : style == Style::kError ? "1;31" : "1;33";
+  return fmt::format("\x1b[{}m{}\x1b[0m", code, text);
+}
+
+}  // namespace isohf::cli

@@ -1,0 +1,590 @@
+/// isohf convert: a raster of elevations becomes an archive.
+
+#include <fmt/format.h>
+#include <sys/resource.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <set>
+
+#include "commands/command.h"
+#include "commands/convert_each.h"
+#include "formats/files/letter_case.h"
+#include "interrupt.h"
+#include "isohf/archive.h"
+#include "isohf/archive/codec/tile_codes.h"
+#include "isohf/base/file.h"
+#include "isohf/base/output_file.h"
+#include "isohf/convert/convert.h"
+#include "isohf/convert/job_description.h"
+#include "isohf/convert/memory_plan.h"
+#include "isohf/error.h"
+#include "isohf/raster.h"
+#include "isohf/surface/resample/acquisition.h"
+#include "isohf/surface/resample/kernels.h"
+#include "options/describe.h"
+#include "options/input_files.h"
+#include "options/option_values.h"
+#include "options/options_common.h"
+#include "options/options_ground.h"
+#include "options/options_lattice.h"
+#include "options/options_source.h"
+#include "options/options_texture.h"
+#include "options/source_inputs.h"
+#include "options/source_size.h"
+#include "output/accuracy_output.h"
+#include "output/json_output.h"
+#include "output/output_kinds.h"
+#include "output/plan_report.h"
+#include "output/standard_output.h"
+#include "output/void_counts_output.h"
+#include "work_arena.h"
+
+namespace isohf::cli {
+namespace {
+
+using nlohmann::ordered_json;
+
+constexpr const char* kFooter =
+    R"(The archive is written as OUTPUT.part and renamed when it is complete; an interrupted run leaves the
+part for --resume and nothing under the final name. The bytes do not depend on --threads.
+
+Examples:
+  isohf convert dem.tif dem.isohf
+  isohf convert dem.tif -o dem.isohf --density 0.866 --outside void --overwrite
+  isohf convert dem.tif dem.isohf --texture orthophoto.tif
+  isohf convert N4*E00*.hgt alps.isohf               many inputs form one surface
+  isohf convert tiles/ -o land.isohf --require-complete
+  isohf convert heights.exr h.isohf --channel R --z-scale 1200 --sample-spacing 2
+  isohf plan dem.tif                  the same options without writing: see what comes out
+  isohf convert --each tiles/ --recursive --out-dir archives --keep-going    one archive of each
+  isohf convert --each tiles/ --recursive --out-dir archives --resume        goes on after an interrupt)";
+
+struct ConvertCommandOptions {
+  CommonOptions common;
+  WorkOptions work;
+  SourceInputs inputs;
+  std::string input;  ///< what messages and reports call them: the file, or "mosaic of 12 files"
+  std::string output;
+  std::string source_name;
+  OpenOptions open;
+  TextureOptions texture;
+  ConvertOptions convert;
+  GeoidRequest geoid;
+  bool spacing_in_metres = false;
+  bool dry_run = false;
+  EachOptions each;
+  /// Measure the archive against the input; the file for the report, "-" for none beside the summary.
+  std::optional<std::string> report;
+  ErrorFreedom freedom;  ///< of --max-error
+};
+
+bool is_archive_name(const std::string& name) {
+  return lower_case(name).ends_with(".isohf");
+}
+
+/// The last name is the output where -o names none and it is called .isohf. Any other name is an input: a forgotten
+/// output must not cost the last of them.
+void take_output(std::vector<std::string> names, ConvertCommandOptions& options) {
+  std::vector<std::string>& inputs = options.inputs.names;
+  if (options.output.empty() && !names.empty() && inputs.size() + names.size() > 1) {
+    if (is_archive_name(names.back())) {
+      options.output = names.back();
+      names.pop_back();
+    } else if (!options.dry_run) {
+      throw Error(ErrorCode::kInvalidArgument,
+                  fmt::format("convert: no OUTPUT given: {0} is not called .isohf and counts as an input; name the "
+                              "archive NAME.isohf, or give -o {0} if that is meant",
+                              names.back()));
+    }
+  }
+  inputs.insert(inputs.end(), names.begin(), names.end());
+}
+
+/// What belongs to --each alone, and what has no meaning for many archives.
+void check_each_options(const CommandLine& line, const ConvertCommandOptions& options) {
+  const auto refuse = [](const std::string& why) {
+    throw Error(ErrorCode::kInvalidArgument, {"convert", why, "", ""});
+  };
+  for (const char* option : {"--out-dir", "--skip-existing", "--keep-going"}) {
+    if (!options.each.each && line.given(option)) refuse(std::string(option) + " needs --each");
+  }
+  if (!options.each.each) return;
+  if (options.each.folder.empty()) refuse("--each needs --out-dir DIR, where the archives go");
+  for (const char* option : {"--output", "--dry-run", "--source-name", "--report", "--overlap", "--require-complete"}) {
+    if (line.given(option)) refuse(fmt::format("{} is for one archive, --each makes many; leave one out", option));
+  }
+}
+
+std::optional<ConvertCommandOptions> parse(const Arguments& arguments) {
+  ConvertCommandOptions options;
+  std::optional<double> sun_min_deg;
+  std::vector<std::string> names;
+  CommandLine line("convert", "Turns rasters of elevations into an archive of isometric heightfield tiles.");
+  line.group("Arguments");
+  line.positionals("INPUT... OUTPUT",
+                   "Rasters of elevations: files, folders, \"patterns*\" and @lists, which form one source; then the "
+                   "archive to write, NAME.isohf",
+                   names);
+  line.repeated("-i,--input", "INPUT", "An input, before those without a name; may be given again",
+                options.inputs.names);
+  line.option("-o,--output", "OUTPUT", "The archive to write; then all others are inputs", options.output);
+  line.flag("--overwrite", "Replace OUTPUT where it exists", options.convert.overwrite);
+  line.flag("--resume", "Continue OUTPUT.part of an interrupted run, after checking what is there",
+            options.convert.resume);
+  line.flag("--dry-run", "Print the plan and write nothing, as isohf plan INPUT does", options.dry_run);
+  add_each_options(line, options.each);
+  add_source_options(line, options.open);
+  add_mosaic_options(line, options.inputs);
+  line.option("--source-name", "NAME",
+              "Record NAME as the source, instead of the input's file name or a mosaic's files", options.source_name);
+  add_lattice_options(line, options.convert.plan, options.spacing_in_metres);
+  add_ground_options(line, options.convert.plan.ground);
+  add_geoid_option(line, options.geoid);
+  add_shape_options(line, options.convert.plan);
+  add_quantisation_options(line, options.convert);
+  line.group("Reconstruction");
+  line.option(
+      "--filter", "NAME",
+      "nearest, bilinear, limited-cubic, catmull-rom, bspline2, bspline3, bspline5, lanczos3 or lanczos6 (default " +
+          options.convert.filter + ")",
+      [&](const std::string& text) { options.convert.filter = to_string(filter_from_string(text)); });
+  line.words({"nearest", "bilinear", "limited-cubic", "catmull-rom", "bspline2", "bspline3", "bspline5", "lanczos3",
+              "lanczos6"});
+  line.option("--acquisition", "NAME",
+              "Account for how samples were taken: point, box, tent, gaussian:SIGMA or fir:FILE (default " +
+                  options.convert.acquisition + ")",
+              [&](const std::string& text) {
+                (void)acquisition_from_string(text.starts_with("fir:") ? "point" : text);
+                options.convert.acquisition = text;
+              });
+  line.words({"point", "box", "tent", "gaussian", "fir"});
+  line.group("Size and speed");
+  line.option("--level", "N",
+              fmt::format("Effort to make the archive small, {} to {} (default {}); the elevations are the same",
+                          kMinLevel, kMaxLevel, kDefaultLevel),
+              [&](const std::string& text) {
+                options.convert.level = static_cast<int>(parse_whole_number(text, kMinLevel, kMaxLevel));
+              });
+  line.group("Shadows");
+  line.option_or_numbers(
+      "--shadow-seeds", "[DEG,...]", "all",
+      "Store the shadows that tiles cast over their neighbours, so that none needs another: for every sun elevation "
+      "from --sun-min on, or for the given ones, as in 5,15,30",
+      [&](const std::string& text) {
+        options.convert.shadow_seeds.emplace();
+        if (text != "all") options.convert.shadow_seeds->sun_deg = parse_numbers(text);
+      });
+  line.option("--sun-min", "DEG", "Lowest sun elevation for --shadow-seeds (default 2); a lower one takes more room",
+              [&](const std::string& text) { sun_min_deg = parse_number(text); });
+  add_texture_options(line, options.texture);
+  line.group("Residuals");
+  line.flag("--lossless", "Keep residuals as well, so that restore gives INPUT's samples bit for bit",
+            options.convert.lossless);
+  line.group("Report");
+  line.option_or_value(
+      "--report", "[FILE.json|-]", "-", [](const std::string& text) { return text == "-" || text.ends_with(".json"); },
+      "Measure the archive against INPUT afterwards, and ortho meshes beside it; print it with the summary, and write "
+      "it to FILE.json as well",
+      [&](const std::string& text) { options.report = text; });
+  add_work_options(line, options.work);
+  add_memory_option(line, "Stay within SIZE of memory, to a tenth (default: as is fastest)",
+                    options.convert.memory_bytes);
+  line.option("--tmpdir", "FOLDER", "Put the scratch file that --memory may need there (default: OUTPUT's folder)",
+              options.convert.scratch_folder);
+  add_common_options(line, options.common);
+  line.footer(kFooter);
+  if (!line.parse(arguments)) return std::nullopt;
+  check_each_options(line, options);
+  if (options.each.each) {
+    options.inputs.names.insert(options.inputs.names.end(), names.begin(), names.end());
+  } else {
+    take_output(std::move(names), options);
+  }
+  line.require("INPUT", options.inputs.names);
+  if (!options.dry_run && !options.each.each) line.require("OUTPUT", options.output);
+  if (options.convert.clamp_range && !options.convert.z_range) {
+    throw Error(ErrorCode::kInvalidArgument, "convert: --clamp-range needs --z-range MIN:MAX");
+  }
+  if (options.convert.max_error && options.dry_run) {
+    throw Error(ErrorCode::kInvalidArgument,
+                "convert: --dry-run cannot tell what --max-error will choose; leave one of the two out");
+  }
+  options.freedom.density = !line.given("--density") && !line.given("--spacing") && !line.given("--tiles");
+  options.freedom.filter = !line.given("--filter");
+  if (sun_min_deg) {
+    if (!options.convert.shadow_seeds || !options.convert.shadow_seeds->sun_deg.empty()) {
+      throw Error(ErrorCode::kInvalidArgument, "convert: --sun-min needs --shadow-seeds without angles");
+    }
+    options.convert.shadow_seeds->sun_min_deg = *sun_min_deg;
+  }
+  if (options.convert.lossless && !options.geoid.path.empty()) {
+    throw Error(ErrorCode::kInvalidArgument,
+                "convert: --lossless keeps the input's own samples, --geoid changes them; give one of the two");
+  }
+  options.inputs.as_given = recorded_options(line);
+  check_texture_options(options.texture);
+  if (!line.given("--tmpdir")) {
+    options.convert.scratch_folder = options.each.each ? options.each.folder : folder_of(options.output);
+  }
+  options.convert.threads = options.work.threads;
+  if (options.convert.memory_bytes != 0) {
+    // What is packed shares the memory with what is read from it, and with the tiles.
+    options.open.unpacked_bytes = std::min(options.open.unpacked_bytes, options.convert.memory_bytes / 3);
+  }
+  options.convert.strict = options.common.strict;
+  options.convert.producer = "isohf " ISOHF_VERSION;
+  return options;
+}
+
+struct Measured {
+  double samples_per_second = 0.0;  ///< of the source
+  std::uint64_t peak_memory_bytes = 0;
+};
+
+/// The largest resident set so far. getrusage() would also count the program that started this one.
+std::uint64_t peak_memory_bytes() {
+  std::ifstream status("/proc/self/status");
+  for (std::string line; std::getline(status, line);) {
+    if (line.rfind("VmHWM:", 0) == 0) return std::strtoull(line.c_str() + 6, nullptr, 10) * 1024;
+  }
+  struct rusage usage {};
+  ::getrusage(RUSAGE_SELF, &usage);
+  return static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;
+}
+
+Measured measure(const ConvertSummary& summary) {
+  Measured measured;
+  if (summary.seconds > 0.0) {
+    measured.samples_per_second = static_cast<double>(summary.source_samples) / summary.seconds;
+  }
+  measured.peak_memory_bytes = peak_memory_bytes();
+  return measured;
+}
+
+ordered_json json_from(const ConvertCommandOptions& options, const ConvertSummary& summary,
+                       const std::optional<VoidCounts>& voids, const std::optional<ErrorEstimate>& expected) {
+  const std::optional<AccuracyInfo> accuracy = accuracy_info(summary.metadata);
+  const Measured measured = measure(summary);
+  const SizeBesideSource size(summary.metadata.source, summary.tile_bytes);
+  return {{"input", options.input},
+          {"files", summary.metadata.source.mosaic ? summary.metadata.source.mosaic->files : 1},
+          {"output", options.output},
+          {"status", "converted"},
+          {"tiles_expected", summary.tiles_expected},
+          {"tiles_written", summary.tiles_written},
+          {"tiles_void", summary.tiles_void},
+          {"archive_bytes", summary.archive_bytes},
+          {"tile_bytes", summary.tile_bytes},
+          {"shadow_seed_bytes", summary.seed_bytes},
+          {"residual_bytes", summary.residual_bytes},
+          {"texture_bytes", summary.texture_bytes},
+          {"photo_pixels_per_texel", summary.pixels_per_texel},
+          {"source_samples", size.source_samples},
+          {"source_bytes", size.source_bytes},
+          {"bits_per_source_sample", size.bits_per_source_sample},
+          {"ratio_to_source", size.ratio_to_source},
+          {"source_voids", json_from_voids(voids)},
+          {"lattice_samples", summary.lattice_samples},
+          {"expected_error", json_from_estimate(expected)},
+          {"accuracy", accuracy ? ordered_json::parse(format_accuracy_info(*accuracy)) : ordered_json(nullptr)},
+          {"step", summary.step},
+          {"worst_rounding", summary.worst_rounding},
+          {"seconds", summary.seconds},
+          {"source_samples_per_second", measured.samples_per_second},
+          {"peak_memory_bytes", measured.peak_memory_bytes},
+          {"warnings", summary.warnings},
+          {"metadata", ordered_json::parse(ArchiveReader(options.output).metadata_json())}};
+}
+
+std::string text_from(const ConvertCommandOptions& options, const ConvertSummary& summary,
+                      const std::optional<VoidCounts>& voids, const std::optional<ErrorEstimate>& expected) {
+  const Measured measured = measure(summary);
+  const Metadata& metadata = summary.metadata;
+  const TileShape& shape = metadata.grid.shape();
+  const std::string unit = metadata.vertical_unit == "unknown" ? "" : " " + metadata.vertical_unit;
+  std::string text;
+  const auto say = [&](const char* what, const std::string& value) { text += fmt::format("{:<12} {}\n", what, value); };
+  say("archive", fmt::format("{}: {}", options.output, describe_bytes(summary.archive_bytes)));
+  say("tiles", fmt::format("{} of {} written, {} of them wholly void; {} x {} tiles of {}x{}",
+                           describe_count(summary.tiles_written), describe_count(summary.tiles_expected),
+                           describe_count(summary.tiles_void), metadata.grid.tile_columns(), metadata.grid.tile_rows(),
+                           shape.columns(), shape.rows()));
+  if (metadata.source.ground) say("map scale", describe_map_scale(*metadata.source.ground));
+  if (const std::string& why = options.convert.plan.ground.why_no_map; !why.empty()) {
+    say("map scale", "not known: " + why);
+  }
+  if (metadata.projection) say("projection", describe_projection(*metadata.projection));
+  say("size", describe_size(metadata.source, summary.tile_bytes));
+  if (summary.residual_bytes > 0) {
+    say("residuals",
+        fmt::format("{}, {:.3f} bits a source sample", describe_bytes(summary.residual_bytes),
+                    8.0 * static_cast<double>(summary.residual_bytes) / static_cast<double>(summary.source_samples)));
+  }
+  if (metadata.quantisation.type == CodeType::kF32) {
+    say("elevations", fmt::format("f32, worst rounding {:.4g}{}", summary.worst_rounding, unit));
+  } else {
+    say("elevations", fmt::format("{}, step {:.9g}{}, worst rounding {:.4g}{}", to_string(metadata.quantisation.type),
+                                  summary.step, unit, summary.worst_rounding, unit));
+  }
+  if (const auto accuracy = accuracy_info(metadata)) {
+    say("error", describe_accuracy(*accuracy, unit));
+  } else {
+    say("expected", describe_estimate(expected, unit));
+  }
+  if (summary.seed_bytes > 0) {
+    const auto tile_bytes = static_cast<double>(summary.tile_bytes);
+    say("shadows", fmt::format("seeds of {}, {:.1f} % of the tiles'", describe_bytes(summary.seed_bytes),
+                               100.0 * static_cast<double>(summary.seed_bytes) / tile_bytes));
+  }
+  if (summary.texture) say("textures", describe_textures(*summary.texture, summary.pixels_per_texel));
+  if (voids && voids->found > 0) say("voids", text_from_voids(*voids));
+  if (metadata.statistics.clamped > 0) {
+    say("clamped", fmt::format("{} vertices moved into the range", describe_count(metadata.statistics.clamped)));
+  }
+  say("time", fmt::format("{}, {:.3g} million input samples a second", describe_seconds(summary.seconds),
+                          measured.samples_per_second / 1e6));
+  say("memory", fmt::format("{} at most", describe_bytes(measured.peak_memory_bytes)));
+  return text;
+}
+
+/// A source, and what is read beside it.
+struct Prepared {
+  std::vector<std::string> files;
+  std::unique_ptr<HeightSource> source;
+  std::unique_ptr<PhotoSource> photo;
+};
+
+Prepared prepare(ConvertCommandOptions& options, std::vector<std::string> files) {
+  OpenedInputs opened = open_inputs(std::move(files), options.inputs, options.open, options.work.threads);
+  Prepared prepared{std::move(opened.files),
+                    laid_out(std::move(opened.source), options.geoid, options.convert.plan.ground), nullptr};
+  understand_ground(prepared.source->info(), options.convert.plan.ground);
+  options.input = prepared.source->info().path;
+  options.convert.source_note = opened.note;
+  if (!options.source_name.empty()) {
+    options.convert.source_note.name = options.source_name;
+    options.convert.source_note.mosaic.reset();
+  }
+  prepared.photo = open_texture(options.texture, options.convert.texture);
+  check_spacing_unit(prepared.source->info(), options.convert.plan, options.spacing_in_metres);
+  return prepared;
+}
+
+/// Whether OUTPUT is what --resume would come to. Throws Error{kInvalidArgument} where it is another archive, unless it
+/// may be replaced.
+bool is_complete(const ConvertCommandOptions& options, const Prepared& prepared, const Plan& plan) {
+  std::error_code none;
+  if (!options.convert.resume || !std::filesystem::exists(options.output, none)) return false;
+  std::string difference;
+  const auto written = std::filesystem::last_write_time(options.output, none);
+  for (const std::string& file : prepared.files) {
+    if (std::filesystem::last_write_time(file, none) > written) difference = file + " was changed after it was written";
+  }
+  try {
+    if (difference.empty()) {
+      difference = difference_from_job(ArchiveReader(options.output).metadata_json(), prepared.source->info(), plan,
+                                       options.convert);
+      if (!difference.empty()) difference = "was made otherwise: " + difference;
+    }
+  } catch (const Error& error) {
+    difference = std::string("is no complete archive: ") + error.what();
+  }
+  if (difference.empty()) return true;
+  if (options.convert.overwrite) return false;
+  throw Error(ErrorCode::kInvalidArgument, {options.output, difference, "", "--overwrite makes it anew"});
+}
+
+ordered_json json_of_complete(const std::string& input, const std::string& output, const char* status) {
+  return {
+      {"input", input}, {"output", output}, {"status", status}, {"archive_bytes", std::filesystem::file_size(output)}};
+}
+
+/// The files of --each, their archives where they may be written.
+std::vector<EachFile> checked_files(const ConvertCommandOptions& options) {
+  std::vector<EachFile> files = files_of_each(options.inputs.names, options.inputs.recursive, options.each.folder);
+  std::error_code none;
+  std::set<std::filesystem::path> inputs;
+  for (const EachFile& file : files) inputs.insert(std::filesystem::weakly_canonical(file.input, none));
+  std::string existing;
+  std::size_t count = 0;
+  for (const EachFile& file : files) {
+    if (!std::filesystem::exists(std::filesystem::symlink_status(file.output, none))) continue;
+    if (inputs.contains(std::filesystem::weakly_canonical(file.output, none))) {
+      throw Error(ErrorCode::kInvalidArgument,
+                  {file.output, "the output is one of the inputs", "", "choose another folder"});
+    }
+    if (count++ == 0) existing = file.output;
+  }
+  if (count > 0 && !options.convert.overwrite && !options.convert.resume && !options.each.skip_existing) {
+    throw Error(ErrorCode::kInvalidArgument,
+                {existing, count == 1 ? "exists" : fmt::format("exists, and {} more archives do", count - 1), "",
+                 "--skip-existing leaves them as they are, --resume checks them, --overwrite replaces them"});
+  }
+  return files;
+}
+
+/// One of --each; nullopt where the share is too small for it.
+std::optional<EachResult> convert_one(ConvertCommandOptions options, const EachFile& file, const EachShare& share,
+                                      const std::atomic<bool>& cancel) {
+  /// What one thread does in a fraction of a second.
+  constexpr std::int64_t kSmallSamples = std::int64_t{1} << 24U;
+  options.output = file.output;
+  options.work.threads = options.convert.threads = share.threads;
+  options.convert.memory_bytes = share.memory_bytes;
+  if (share.memory_bytes != 0) {
+    options.open.unpacked_bytes = std::min(options.open.unpacked_bytes, share.memory_bytes / 3);
+  }
+  const std::filesystem::path output(file.output);
+  std::error_code none;
+  if (options.each.skip_existing && std::filesystem::exists(output, none)) {
+    try {
+      const ArchiveReader complete(file.output);
+      return EachResult{
+          EachResult::State::kSkipped, json_line(json_of_complete(file.input, file.output, "skipped")), {}};
+    } catch (const Error& error) {
+      if (!options.convert.overwrite) {
+        throw Error(error.code(), {file.output, std::string("is no complete archive: ") + error.what(), "",
+                                   "--overwrite replaces it"});
+      }
+    }
+  }
+  std::filesystem::create_directories(output.parent_path(), none);  // what fails is said next
+  check_archive_output({file.input}, file.output, options.convert.overwrite || options.convert.resume);
+  const Prepared prepared = prepare(options, {file.input});
+  const SourceInfo& info = prepared.source->info();
+  const Plan plan = make_plan(info, options.convert.plan);
+  if (is_complete(options, prepared, plan)) {
+    return EachResult{
+        EachResult::State::kComplete, json_line(json_of_complete(file.input, file.output, "complete")), {}};
+  }
+  if (!share.alone) {
+    if (info.width > kSmallSamples / info.height) return std::nullopt;
+    const MemoryPlan memory = plan_memory(*prepared.source, plan, options.convert);
+    if (share.memory_bytes != 0 && memory.bytes > share.memory_bytes) return std::nullopt;
+  }
+  if (options.convert.max_error) {
+    options.convert.measure = [&](const std::string& archive) {
+      const WorkArena threads(share.threads);
+      const ArchiveReader reader(archive);
+      return measured_error(compare_with_source(
+          reader, *prepared.source, 0, share.threads, [](std::int64_t, std::int64_t) {}, cancel));
+    };
+  }
+  const auto show = [](const ConvertProgress&) {};
+  ConvertSummary summary =
+      options.convert.max_error
+          ? convert_within(*prepared.source, file.output, options.convert, options.freedom, show, cancel)
+          : convert(*prepared.source, plan, file.output, options.convert, show, cancel);
+  const ordered_json document =
+      json_from(options, summary, counts_of_voids(*prepared.source, summary.source_voids), std::nullopt);
+  return EachResult{EachResult::State::kConverted, json_line(document), std::move(summary.warnings)};
+}
+
+int run_each(const ConvertCommandOptions& options) {
+  const std::vector<EachFile> files = checked_files(options);
+  const std::atomic<bool>& cancel = watch_interrupts();
+  return convert_each(
+      files, options.each, options.work, options.common, options.convert.memory_bytes,
+      [&](const EachFile& file, const EachShare& share) { return convert_one(options, file, share, cancel); }, cancel);
+}
+
+int run(ConvertCommandOptions options) {
+  const CommonOptions& common = options.common;
+  const bool may_exist = options.convert.overwrite || options.convert.resume;
+  // What the output is can be told before anything is looked for.
+  if (!options.dry_run) check_archive_output(options.inputs.names, options.output, may_exist);
+  std::vector<std::string> files = expand_inputs(options.inputs.names, options.inputs.recursive);
+  if (!options.dry_run) {
+    check_archive_output(files, options.output, may_exist);
+    if (options.report && *options.report != "-") {
+      check_report_output(files, *options.report, options.convert.overwrite);
+    }
+  }
+  const Prepared prepared = prepare(options, std::move(files));
+  HeightSource& source = *prepared.source;
+  if (options.dry_run) {
+    print_plan(source, options.convert, common);
+    return kExitDone;
+  }
+  const Plan plan = make_plan(source.info(), options.convert.plan);
+  if (is_complete(options, prepared, plan)) {
+    StandardOutput out;
+    if (common.json) out.write(json_text(json_of_complete(options.input, options.output, "complete")));
+    if (!common.json && !common.quiet) {
+      out.write(fmt::format("{}: complete already, made of this input with these options\n", options.output));
+    }
+    out.finish();
+    return kExitDone;
+  }
+  if (common.verbose && !common.quiet) print_plan_notes(source, plan, options.convert);
+  const std::atomic<bool>& cancel = watch_interrupts();
+  std::optional<Accuracy> accuracy;
+  if (options.report || options.convert.max_error) {
+    options.convert.measure = [&](const std::string& archive) {
+      const WorkArena threads(options.work.threads);
+      if (options.report) {
+        accuracy = measure_accuracy(archive, source, kRandomPoints, true, options.work, common, cancel);
+        return measured_error(accuracy->surface);
+      }
+      ProgressDisplay display(options.work.progress, common.quiet, common.verbose);
+      const ArchiveReader reader(archive);
+      return measured_error(compare_with_source(
+          reader, source, 0, options.work.threads,
+          [&](std::int64_t done, std::int64_t total) { display.update("compare", "rows", done, total); }, cancel));
+    };
+  }
+  std::optional<ErrorEstimate> expected;
+  if (!options.convert.measure && !common.quiet) expected = estimate_error(source, plan, options.convert);
+  const ConvertSummary summary = [&] {
+    ProgressDisplay display(options.work.progress, common.quiet, common.verbose);
+    const auto show = [&](const ConvertProgress& at) {
+      using Pass = ConvertProgress::Pass;
+      const char* const pass = at.pass == Pass::kRange ? "range" : (at.pass == Pass::kTiles ? "tiles" : "residuals");
+      display.update(pass, at.pass == Pass::kTiles ? "tiles" : "rows", at.done, at.total);
+    };
+    try {
+      return options.convert.max_error
+                 ? convert_within(source, options.output, options.convert, options.freedom, show, cancel)
+                 : convert(source, plan, options.output, options.convert, show, cancel);
+    } catch (const Error& error) {
+      if (error.code() != ErrorCode::kCancelled) throw;
+      throw Error(ErrorCode::kCancelled,
+                  {options.output, "interrupted", "",
+                   "the same command with --resume goes on with what is in " + options.output + ".part"});
+    }
+  }();
+  print_warnings(summary.warnings);
+  if (summary.tiles_written != summary.tiles_expected) {
+    throw Error(ErrorCode::kIo, fmt::format("{}: {} tiles written, {} expected", options.output, summary.tiles_written,
+                                            summary.tiles_expected));
+  }
+  const std::optional<VoidCounts> voids = counts_of_voids(source, summary.source_voids);
+  if (options.report && *options.report != "-") {
+    write_output(*options.report, json_text(json_from(*accuracy)), options.convert.overwrite);
+  }
+  StandardOutput out;
+  if (common.json) {
+    ordered_json document = json_from(options, summary, voids, expected);
+    if (options.report) document["report"] = json_from(*accuracy);
+    out.write(json_text(document));
+  } else if (!common.quiet) {
+    out.write(text_from(options, summary, voids, expected));
+    if (options.report) out.write(text_from(*accuracy, options.input));
+  }
+  out.finish();
+  return kExitDone;
+}
+
+}  // namespace
+
+int command_convert(const Arguments& arguments) {
+  std::optional<ConvertCommandOptions> options = parse(arguments);
+  if (!options) return kExitDone;
+  return options->each.each ? run_each(*options) : run(std::move(*options));
+}
+
+}  // namespace isohf::cli

@@ -1,0 +1,342 @@
+/// isohf export: the surface of an archive as an ortho raster of any grid, whole or cut into tiles.
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "commands/command.h"
+#include "commands/export_tiles.h"
+#include "interrupt.h"
+#include "isohf/error.h"
+#include "isohf/restore/archive_geometry.h"
+#include "open_archive.h"
+#include "options/describe.h"
+#include "options/option_values.h"
+#include "options/options_common.h"
+#include "options/options_raster.h"
+#include "output/archive_places.h"
+#include "output/json_output.h"
+#include "output/output_kinds.h"
+#include "output/standard_output.h"
+#include "raster/output_grid.h"
+#include "raster/restored_raster.h"
+#include "raster/restored_samples.h"
+#include "raster/surface_scan.h"
+#include "work_arena.h"
+
+namespace isohf::cli {
+namespace {
+
+using nlohmann::ordered_json;
+
+constexpr const char* kFooter =
+    R"(Without options the samples lie where the source's lay. The format follows from OUTPUT's extension; .tif,
+.exr, .flt, .asc, .r32 and .npy take elevations as float32, .hgt as int16, .png, .r16 and .raw as uint16
+over the range of elevations that there is, with scale and offset in OUTPUT.json. Many tiles share one scale.
+With --tile-size or --tiles OUTPUT is cut: NAME_x0_y0.r16 is the North-West tile, x counts East, y South.
+Where the size is left open it becomes the nearest one that makes whole tiles.
+
+Examples:
+  isohf export dem.isohf dem.tif --spacing 30
+  isohf export dem.isohf alps.png --size 4097x4097
+  isohf export dem.isohf part.tif --bbox 6.5,45,7,45.5
+  isohf export dem.isohf unreal.r16 --tile-size 1009 --overlap 1
+  isohf export dem.isohf unity.raw --tiles 4x4 --tile-size 513 --overlap 1)";
+
+struct ExportOptions {
+  CommonOptions common;
+  WorkOptions work;
+  RasterOptions raster;
+  std::optional<BoundingBox> bbox;
+  std::optional<SampleType> type;
+  std::optional<std::pair<double, double>> z_range;
+  std::optional<double> z_scale;
+  std::optional<double> z_offset;
+  std::optional<GridSize> tiles;
+  std::optional<GridSize> tile_size;
+  std::int64_t overlap = 0;
+
+  [[nodiscard]] RestoreMethod method() const { return raster.method.value_or(RestoreMethod::kHex); }
+};
+
+/// "1009" is a square.
+GridSize parse_side_or_size(const std::string& text) {
+  if (text.find_first_of("xX") != std::string::npos) return parse_size(text, 1, kMostSide);
+  const std::int64_t side = parse_whole_number(text, 1, kMostSide);
+  return {side, side};
+}
+
+SampleType parse_type(const std::string& text) {
+  constexpr std::array<SampleType, 7> kTypes = {SampleType::kUint8,  SampleType::kUint16,  SampleType::kInt16,
+                                                SampleType::kInt32,  SampleType::kFloat16, SampleType::kFloat32,
+                                                SampleType::kFloat64};
+  return kTypes[parse_word(text, {"u8", "u16", "i16", "i32", "f16", "f32", "f64"})];
+}
+
+std::optional<ExportOptions> parse(const Arguments& arguments) {
+  ExportOptions options;
+  CommandLine line("export", "Writes the surface of an archive as a raster of elevations.");
+  add_raster_arguments(line, "OUTPUT", options.raster);
+  line.group("Grid");
+  add_size_options(line, "Write so many samples over the ground (default: the source's samples)", options.raster);
+  line.option("--bbox", "W,S,E,N",
+              "Only this part of the ground, in the source's coordinates; across the 180th meridian W is above E",
+              [&](const std::string& text) { options.bbox = bounding_box_from_string(text); });
+  add_method_option(line, "hex", options.raster);
+  line.group("Tiles");
+  line.option("--tile-size", "N|WxH", "Cut into tiles of so many samples, each into a file of its own",
+              [&](const std::string& text) { options.tile_size = parse_side_or_size(text); });
+  line.option("--tiles", "NxM", "Cut into so many tiles across and down",
+              [&](const std::string& text) { options.tiles = parse_size(text, 1, 65536); });
+  line.option("--overlap", "K", "Samples that neighbouring tiles share (default 0; 1 for shared edges)",
+              [&](const std::string& text) { options.overlap = parse_whole_number(text, 0, 65536); });
+  line.group("Samples");
+  line.option("--type", "TYPE", "u8, u16, i16, i32, f16, f32 or f64 (default: by the format)",
+              [&](const std::string& text) { options.type = parse_type(text); });
+  line.option("--z-range", "MIN:MAX",
+              "Elevations of the lowest and highest sample of an integer type (default of u8 and "
+              "u16: those that there are, which takes another pass)",
+              [&](const std::string& text) { options.z_range = parse_range(text); });
+  line.option("--z-scale", "FACTOR", "elevation = sample * FACTOR + z-offset (default 1)",
+              [&](const std::string& text) { options.z_scale = parse_positive_number(text); });
+  line.option("--z-offset", "NUMBER", "See --z-scale (default 0)",
+              [&](const std::string& text) { options.z_offset = parse_number(text); });
+  add_clamp_option(line, "the type", options.raster);
+  add_work_options(line, options.work);
+  add_common_options(line, options.common);
+  line.footer(kFooter);
+  line.exclusive({"--z-range", "--z-scale"});
+  line.exclusive({"--z-range", "--z-offset"});
+  if (!line.parse(arguments)) return std::nullopt;
+  require_raster_arguments(line, "OUTPUT", options.raster);
+  if (options.overlap > 0 && !options.tiles && !options.tile_size) {
+    throw Error(ErrorCode::kInvalidArgument, "export: --overlap needs --tiles or --tile-size");
+  }
+  return options;
+}
+
+/// The samples of the source's grid that lie in a part of the world.
+SampleGrid part_of_source_grid(const SampleGrid& source, const WorldBounds& ground) {
+  constexpr double kOnTheEdge = 1e-6;  // of a spacing; edges are computed by products
+  const auto first = [](double from, double start, double spacing) {
+    return static_cast<std::int64_t>(std::ceil((from - start) / spacing - kOnTheEdge));
+  };
+  const auto last = [](double to, double start, double spacing) {
+    return static_cast<std::int64_t>(std::floor((to - start) / spacing + kOnTheEdge));
+  };
+  const std::int64_t c0 = first(ground.x0, source.first_x, source.spacing_x);
+  const std::int64_t r0 = first(ground.z0, source.first_z, source.spacing_z);
+  SampleGrid part = source;
+  part.width = last(ground.x1, source.first_x, source.spacing_x) - c0 + 1;
+  part.height = last(ground.z1, source.first_z, source.spacing_z) - r0 + 1;
+  part.first_x = source.first_x + static_cast<double>(c0) * source.spacing_x;
+  part.first_z = source.first_z + static_cast<double>(r0) * source.spacing_z;
+  if (part.width < 1 || part.height < 1) {
+    throw Error(ErrorCode::kInvalidArgument, "--bbox holds no sample of the source's grid; --size or --spacing would");
+  }
+  return part;
+}
+
+struct ExportGrid {
+  SampleGrid samples;
+  TileCut cut;
+};
+
+ExportGrid asked_grid(const ExportOptions& options, const Metadata& metadata) {
+  WorldBounds ground = metadata.valid;
+  if (options.bbox) {
+    ground = world_bounds(metadata, *options.bbox);
+    const TileGrid& tiles = metadata.grid;
+    if (!(ground.x0 < tiles.world_width() && ground.x1 > 0.0 && ground.z0 < tiles.world_height() && ground.z1 > 0.0)) {
+      throw Error(ErrorCode::kInvalidArgument,
+                  options.raster.archive + ": --bbox lies outside of what the archive covers");
+    }
+  }
+  const bool area = samples_are_areas(metadata);
+  ExportGrid grid;
+  if (options.raster.size || options.raster.spacing) {
+    grid.samples = grid_over(ground, area, options.raster.size, spacing_in_world(options.raster, metadata));
+  } else {
+    grid.samples = natural_grid(metadata);
+    if (options.bbox) grid.samples = part_of_source_grid(grid.samples, ground);
+  }
+  GridSize size{grid.samples.width, grid.samples.height};
+  grid.cut = cut_into_tiles(size, !options.raster.size && !options.raster.spacing, options.tiles, options.tile_size,
+                            options.overlap);
+  if (size != GridSize{grid.samples.width, grid.samples.height}) {
+    grid.samples = grid_over(ground, area, size, std::nullopt);
+  }
+  return grid;
+}
+
+SampleType default_type(const std::string& output) {
+  switch (raster_kind(output)) {
+    case RasterKind::kHgt:
+      return SampleType::kInt16;
+    case RasterKind::kPng:
+    case RasterKind::kRaw16:
+      return SampleType::kUint16;
+    default:
+      return SampleType::kFloat32;
+  }
+}
+
+/// The scale that spreads elevations over a type's numbers, one of them kept for voids where there are any.
+SampleMapping spread(SampleType type, std::pair<double, double> elevations, bool has_voids) {
+  auto [low, high] = sample_range(type);
+  const std::optional<double> void_value = has_voids ? usual_void(type) : std::nullopt;
+  if (void_value == low) low += 1.0;
+  if (void_value == high) high -= 1.0;
+  const double scale =
+      elevations.second > elevations.first ? (elevations.second - elevations.first) / (high - low) : 1.0;
+  return {type, scale, elevations.first - low * scale};
+}
+
+class Exporter {
+ public:
+  Exporter(const ExportOptions& options, const ArchiveReader& archive, const ExportGrid& grid,
+           const std::atomic<bool>& cancel)
+      : options_(options),
+        archive_(archive),
+        grid_(grid),
+        display_(options.work.progress, options.common.quiet, options.common.verbose),
+        scan_(archive, OutputGrid(grid.samples), options.method(), display_, cancel) {}
+
+  void run() {
+    has_voids = needs_void(archive_.metadata(), OutputGrid(grid_.samples), options_.raster.output);
+    mapping = choose_mapping();
+    if (!options_.common.quiet) warn_of_lost_scale(options_.raster.output, mapping);
+    const auto void_value = has_voids ? usual_void(mapping.type) : std::nullopt;
+    const SampleStore store(mapping, void_value, options_.raster.clamp_range);
+    ExportTiles tiles(options_.raster.output, grid_.cut, grid_.samples.width);
+    const auto spec_of = [&](std::int64_t column, std::int64_t row) {
+      SampleGrid part = grid_.samples;
+      part.width = grid_.cut.columns;
+      part.height = grid_.cut.rows;
+      part.first_x += static_cast<double>(column * (grid_.cut.columns - grid_.cut.overlap)) * part.spacing_x;
+      part.first_z += static_cast<double>(row * (grid_.cut.rows - grid_.cut.overlap)) * part.spacing_z;
+      RasterSpec spec = restored_raster(archive_.metadata(), OutputGrid(part), mapping.type);
+      set_mapping(spec, mapping, void_value);
+      spec.overwrite = options_.raster.overwrite;
+      return spec;
+    };
+    for (std::int64_t group = 0; group < tiles.groups(); ++group) {
+      tiles.begin_group(group, spec_of);
+      counts = {};
+      scan_.run("export", [&](std::int64_t row, std::span<const double> elevations) {
+        tiles.write(
+            row, store_rows(store, mapping.type, options_.raster.output, grid_.samples.width, row, elevations, counts));
+      });
+    }
+    files = tiles.files();
+    written = tiles.keep();
+  }
+
+  SampleMapping mapping;
+  SampleCounts counts;
+  bool has_voids = false;
+  std::int64_t files = 0;
+  std::vector<std::string> written;  ///< those beside them as well
+
+ private:
+  SampleMapping choose_mapping() {
+    const SampleType type = options_.type.value_or(default_type(options_.raster.output));
+    if (options_.z_scale || options_.z_offset) {
+      return {type, options_.z_scale.value_or(1.0), options_.z_offset.value_or(0.0)};
+    }
+    if (is_floating(type)) {
+      if (options_.z_range)
+        throw Error(ErrorCode::kInvalidArgument, "export: --z-range is for integer types; floats hold elevations");
+      return {type, 1.0, 0.0};
+    }
+    if (options_.z_range) return spread(type, *options_.z_range, has_voids);
+    if (type != SampleType::kUint8 && type != SampleType::kUint16) return {type, 1.0, 0.0};
+    double low = std::numeric_limits<double>::infinity();
+    double high = -low;
+    bool voids = false;
+    scan_.run("range", [&](std::int64_t, std::span<const double> elevations) {
+      for (const double z : elevations) {
+        voids = voids || std::isnan(z);
+        low = z < low ? z : low;
+        high = z > high ? z : high;
+      }
+    });
+    has_voids = voids;
+    return low <= high ? spread(type, {low, high}, has_voids) : SampleMapping{type, 1.0, 0.0};
+  }
+
+  const ExportOptions& options_;
+  const ArchiveReader& archive_;
+  ExportGrid grid_;
+  ProgressDisplay display_;
+  SurfaceScan scan_;
+};
+
+int run(const ExportOptions& options) {
+  ArchiveReader archive = open_archive(options.raster.archive);
+  if (options.bbox && is_warped(archive.metadata())) understand_source(archive);
+  const ExportGrid grid = asked_grid(options, archive.metadata());
+  for (const std::string& file : ExportTiles(options.raster.output, grid.cut, grid.samples.width).names()) {
+    check_raster_output({options.raster.archive}, file, options.raster.overwrite);
+  }
+  Exporter exporter(options, archive, grid, watch_interrupts());
+  WorkArena arena(options.work.threads);
+  arena.execute([&] { exporter.run(); });
+  const SampleGrid& samples = grid.samples;
+  const SampleMapping& mapping = exporter.mapping;
+  StandardOutput out;
+  if (options.common.json) {
+    out.write(json_text({{"archive", options.raster.archive},
+                         {"output", options.raster.output},
+                         {"method", to_string(options.method())},
+                         {"width", samples.width},
+                         {"height", samples.height},
+                         {"first_sample", {{"x", samples.first_x}, {"z", samples.first_z}}},
+                         {"spacing", {{"x", samples.spacing_x}, {"z", samples.spacing_z}}},
+                         {"tiles",
+                          {{"across", grid.cut.across},
+                           {"down", grid.cut.down},
+                           {"width", grid.cut.columns},
+                           {"height", grid.cut.rows},
+                           {"overlap", grid.cut.overlap}}},
+                         {"files", exporter.files},
+                         {"files_written", exporter.written},
+                         {"sample_type", to_string(mapping.type)},
+                         {"z_scale", mapping.z_scale},
+                         {"z_offset", mapping.z_offset},
+                         {"voids", exporter.counts.voids},
+                         {"clamped", exporter.counts.clamped}}));
+  } else if (!options.common.quiet) {
+    std::string what = fmt::format("{} x {} samples of {}, {:.6g} x {:.6g} apart", samples.width, samples.height,
+                                   to_string(mapping.type), samples.spacing_x, samples.spacing_z);
+    if (exporter.files > 1) {
+      what +=
+          fmt::format(", in {} x {} files of {} x {}", grid.cut.across, grid.cut.down, grid.cut.columns, grid.cut.rows);
+    }
+    if (mapping.z_scale != 1.0 || mapping.z_offset != 0.0) {
+      what += fmt::format("; elevation = sample * {} + {}", mapping.z_scale, mapping.z_offset);
+    }
+    if (exporter.counts.voids > 0) what += fmt::format(", {} voids", describe_count(exporter.counts.voids));
+    if (exporter.counts.clamped > 0) {
+      what += fmt::format(", {} moved into the range", describe_count(exporter.counts.clamped));
+    }
+    out.write(fmt::format("{}: {}\n", options.raster.output, what));
+  }
+  out.finish();
+  return kExitDone;
+}
+
+}  // namespace
+
+int command_export(const Arguments& arguments) {
+  const std::optional<ExportOptions> options = parse(arguments);
+  return options ? run(*options) : static_cast<int>(kExitDone);
+}
+
+}  // namespace isohf::cli

@@ -1,0 +1,210 @@
+/// isohf plan: tile shapes, or what convert would make of an input.
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "commands/command.h"
+#include "isohf/error.h"
+#include "isohf/raster.h"
+#include "options/describe.h"
+#include "options/input_files.h"
+#include "options/option_values.h"
+#include "options/options_common.h"
+#include "options/options_ground.h"
+#include "options/options_lattice.h"
+#include "options/options_source.h"
+#include "options/source_inputs.h"
+#include "output/json_output.h"
+#include "output/plan_report.h"
+#include "output/standard_output.h"
+
+namespace isohf::cli {
+namespace {
+
+using nlohmann::ordered_json;
+
+constexpr const char* kFooter =
+    R"(Without INPUT the candidates for a tile are listed, best true aspect first: (R-3)sin60/(C-4), 1 is
+equilateral. With INPUT nothing is written; sizes are estimates.
+
+Examples:
+  isohf plan --levels 4 --triangles 10000
+  isohf plan --shape 212x243
+  isohf plan dem.tif --density 0.866
+  isohf plan tiles/                   what many rasters make together
+  isohf plan --table1                 the paper's Table 1 with true aspects)";
+
+struct PlanOptions {
+  CommonOptions common;
+  SourceInputs inputs;
+  OpenOptions open;
+
+  PlanRequest request;
+  GeoidRequest geoid;
+  CodeType code_type = CodeType::kU16;
+  int limit = 10;
+  bool table1 = false;
+  bool spacing_in_metres = false;
+};
+
+std::optional<PlanOptions> parse(const Arguments& arguments) {
+  PlanOptions options;
+  CommandLine line("plan", "Lists tile shapes, or previews a conversion.");
+  line.group("Arguments");
+  std::vector<std::string> names;
+  line.positionals("[INPUT...]",
+                   "Rasters of elevations: files, folders, \"patterns*\" and @lists, which form one source (default: "
+                   "none, list shapes)",
+                   names);
+  line.repeated("-i,--input", "INPUT", "An input, before those without a name; may be given again",
+                options.inputs.names);
+  add_shape_options(line, options.request);
+  line.group("Candidates");
+  add_code_type_option(line, options.code_type);
+  line.option("--limit", "N", "List at most N candidates (default 10)",
+              [&](const std::string& text) { options.limit = static_cast<int>(parse_whole_number(text, 1, 1000000)); });
+  line.flag("--table1", "List the shapes of the paper's Table 1", options.table1);
+  add_lattice_options(line, options.request, options.spacing_in_metres);
+  add_ground_options(line, options.request.ground);
+  add_geoid_option(line, options.geoid);
+  add_source_options(line, options.open);
+  add_mosaic_options(line, options.inputs);
+  add_common_options(line, options.common);
+  line.footer(kFooter);
+  if (!line.parse(arguments)) return std::nullopt;
+  options.inputs.names.insert(options.inputs.names.end(), names.begin(), names.end());
+  const auto refuse = [](const std::string& why) { throw Error(ErrorCode::kInvalidArgument, "plan: " + why); };
+  if (options.inputs.names.empty()) {
+    const std::string option = line.first_given({"Lattice", "Ground", "Input", "Several inputs"});
+    if (!option.empty()) refuse(option + " needs an INPUT");
+  } else if (line.given("--limit")) {
+    refuse("--limit is for lists of candidates, without an INPUT");
+  }
+  if (options.table1) {
+    if (!options.inputs.names.empty()) refuse("--table1 takes no INPUT");
+    const std::string option = line.given("--limit") ? "--limit" : line.first_given({"Tile shape"});
+    if (!option.empty()) refuse("--table1 takes no " + option);
+  }
+  return options;
+}
+
+std::int64_t stitch_indices_of_all_levels(const TileShape& shape) {
+  std::int64_t count = 0;
+  for (int level = 0; level < shape.levels(); ++level) count += shape.stitch_index_count(level);
+  return count;
+}
+
+std::int64_t strip_indices_of_all_levels(const TileShape& shape) {
+  std::int64_t count = 0;
+  for (int level = 0; level < shape.levels(); ++level) count += shape.strip_index_count(level);
+  return count;
+}
+
+constexpr const char* kTableHeading =
+    "     C      R  levels   aspect  (printed)   triangles     samples        bytes     strip    stitch";
+
+std::string table_row(const TileShape& shape, CodeType type) {
+  return fmt::format("{:>6} {:>6} {:>7} {:>8.5f} {:>10.3f} {:>11} {:>11} {:>12} {:>9} {:>9}", shape.columns(),
+                     shape.rows(), shape.levels(), shape.aspect(), shape.printed_aspect(), shape.triangle_count(),
+                     shape.stored_vertex_count(), shape.stored_vertex_count() * raw_bytes(type),
+                     strip_indices_of_all_levels(shape), stitch_indices_of_all_levels(shape));
+}
+
+constexpr const char* kTableNotes =
+    "\naspect   true aspect of the drawn triangles, (R-3)sin60/(C-4); printed: the paper's R sin60/C\n"
+    "samples  stored elevations of a tile, C*R; bytes: of these before compression\n"
+    "strip    indices of the strips of all levels; stitch: of the stitches\n";
+
+ordered_json json_with_bytes(const TileShape& shape, CodeType type) {
+  ordered_json json = json_from(shape);
+  json["raw_bytes"] = shape.stored_vertex_count() * raw_bytes(type);
+  return json;
+}
+
+void list_table1(const PlanOptions& options) {
+  StandardOutput out;
+  ordered_json rows = ordered_json::array();
+  std::string text = std::string("Table 1 of the paper\n") + kTableHeading + "\n";
+  for (const Table1Row& row : table1()) {
+    const std::string why = TileShape::why_invalid(row.columns, row.rows, row.levels);
+    if (why.empty()) {
+      const TileShape shape = TileShape::make(row.columns, row.rows, row.levels);
+      text += table_row(shape, options.code_type) + "\n";
+      rows.push_back(json_with_bytes(shape, options.code_type));
+      rows.back()["valid"] = true;
+    } else {
+      const TileShape near = TileShape::nearest(row.columns, row.rows, row.levels);
+      text += fmt::format("{:>6} {:>6} {:>7} {:>8} {:>10.3f}  invalid: {}; the nearest valid shape is {}x{}\n",
+                          row.columns, row.rows, row.levels, "-", row.printed_aspect, why, near.columns(), near.rows());
+      rows.push_back({{"columns", row.columns},
+                      {"rows", row.rows},
+                      {"levels", row.levels},
+                      {"printed_aspect", row.printed_aspect},
+                      {"valid", false},
+                      {"why", why},
+                      {"nearest", json_with_bytes(near, options.code_type)}});
+    }
+  }
+  out.write(options.common.json ? json_text({{"table1", rows}}) : text + kTableNotes);
+  out.finish();
+}
+
+std::vector<TileShape> shapes_for(const PlanOptions& options) {
+  constexpr int kDefaultLevels = 4;
+  const PlanRequest& request = options.request;
+  const int levels = request.levels.value_or(kDefaultLevels);
+  if (request.shape) return {TileShape::make(request.shape->first, request.shape->second, levels)};
+  std::vector<TileShape> shapes = candidate_shapes(request, options.limit);
+  if (shapes.empty()) {
+    throw Error(ErrorCode::kInvalidArgument,
+                fmt::format("plan: no tile shape of {} levels lies near {}; ask for more of them or for fewer --levels",
+                            levels, request.budget ? request.budget->count : 0));
+  }
+  return shapes;
+}
+
+void list_candidates(const PlanOptions& options) {
+  const std::vector<TileShape> shapes = shapes_for(options);
+  StandardOutput out;
+  if (options.common.json) {
+    ordered_json list = ordered_json::array();
+    for (const TileShape& shape : shapes) list.push_back(json_with_bytes(shape, options.code_type));
+    out.write(json_text({{"code_type", to_string(options.code_type)}, {"candidates", list}}));
+  } else {
+    std::string text = std::string(kTableHeading) + "\n";
+    for (const TileShape& shape : shapes) text += table_row(shape, options.code_type) + "\n";
+    out.write(text + kTableNotes);
+  }
+  out.finish();
+}
+
+int run(const PlanOptions& options) {
+  if (options.table1) {
+    list_table1(options);
+  } else if (options.inputs.names.empty()) {
+    list_candidates(options);
+  } else {
+    const std::unique_ptr<HeightSource> source = laid_out(
+        open_inputs(expand_inputs(options.inputs.names, options.inputs.recursive), options.inputs, options.open, 0)
+            .source,
+        options.geoid, options.request.ground);
+    ConvertOptions convert;
+    convert.plan = options.request;
+    understand_ground(source->info(), convert.plan.ground);
+    convert.code_type = options.code_type;
+    check_spacing_unit(source->info(), options.request, options.spacing_in_metres);
+    print_plan(*source, convert, options.common);
+  }
+  return kExitDone;
+}
+
+}  // namespace
+
+int command_plan(const Arguments& arguments) {
+  const std::optional<PlanOptions> options = parse(arguments);
+  return options ? run(*options) : static_cast<int>(kExitDone);
+}
+
+}  // namespace isohf::cli

@@ -1,0 +1,318 @@
+/// isohf sample: elevation and normal at places of an archive's surface.
+
+#include <fmt/format.h>
+#include <oneapi/tbb/parallel_for.h>
+
+#include <cmath>
+#include <cstring>
+#include <functional>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "commands/command.h"
+#include "commands/line_reader.h"
+#include "isohf/archive.h"
+#include "isohf/base/bytes.h"
+#include "isohf/error.h"
+#include "isohf/restore/archive_geometry.h"
+#include "isohf/restore/point_sampler.h"
+#include "open_archive.h"
+#include "options/option_values.h"
+#include "options/options_common.h"
+#include "output/archive_places.h"
+#include "output/json_output.h"
+#include "output/standard_output.h"
+#include "work_arena.h"
+
+namespace isohf::cli {
+namespace {
+
+using nlohmann::ordered_json;
+
+constexpr const char* kFooter =
+    R"(Places are world units from the surface's North-West corner, x eastwards, z southwards: metres where the
+source's units are known. Standard input holds one place a line, "x z" or "x,z"; empty lines and lines that
+start with # are passed over. For each place one line is printed:
+
+  elevation nx ny nz tile_column tile_row
+
+The elevation is that of the triangle there, as it is drawn; the normal (x, y up, z) is the vertex normals'
+blend over it, of length 1. A place without elevation gives 'void', one beyond the tiles 'outside'.
+
+With --binary places are pairs of little-endian float64, and each answer is 32 bytes, little-endian: float64
+elevation, float32 nx ny nz, uint32 state (0 surface, 1 void, 2 outside), int32 tile_column tile_row. Elevation is
+NaN and the normal 0 unless the state is 0; the tile is -1 -1 where it is 2.
+
+Examples:
+  isohf sample dem.isohf --at 1200.5 340
+  isohf sample dem.isohf --at-lonlat 6.865 45.833
+  isohf sample dem.isohf --at-crs 334000 5077500 --with-lonlat      in metres of the input's own map
+  isohf sample dem.isohf < places.txt > elevations.txt)";
+
+struct SampleOptions {
+  CommonOptions common;
+  std::string archive;
+  std::vector<WorldPoint> places;
+  std::vector<GeoPoint> geo_places;
+  std::vector<MapPoint> source_places;
+  bool reads_degrees = false;  ///< standard input holds longitudes and latitudes
+  bool reads_source = false;   ///< standard input holds coordinates of the source
+  bool with_degrees = false;   ///< answers hold them
+  bool with_source = false;
+  bool binary = false;
+  int threads = 0;
+  std::uint64_t memory_bytes = std::uint64_t{256} << 20;
+};
+
+std::optional<SampleOptions> parse(const Arguments& arguments) {
+  SampleOptions options;
+  CommandLine line("sample", "Prints elevation and normal at places read from standard input.");
+  line.group("Arguments");
+  line.positional("ARCHIVE", "-i,--input", "Archive to sample", options.archive);
+  line.repeated_pair("--at", "X Z", "A place, instead of standard input; may be given again",
+                     [&](const std::string& x, const std::string& z) {
+                       options.places.push_back({parse_number(x), parse_number(z)});
+                     });
+  line.repeated_pair("--at-lonlat", "LON LAT", "A place in degrees of the input's own datum; may be given again",
+                     [&](const std::string& longitude, const std::string& latitude) {
+                       options.geo_places.push_back({parse_number(longitude), parse_number(latitude)});
+                     });
+  line.repeated_pair("--at-crs", "E N", "A place in the input's own coordinates; may be given again",
+                     [&](const std::string& easting, const std::string& northing) {
+                       options.source_places.push_back({parse_number(easting), parse_number(northing)});
+                     });
+  line.flag("--lonlat", "Places on standard input are longitude and latitude, degrees", options.reads_degrees);
+  line.flag("--crs", "Places on standard input are in the input's own coordinates", options.reads_source);
+  line.flag("--with-lonlat", "Add longitude and latitude to each line", options.with_degrees);
+  line.flag("--with-crs", "Add the input's own coordinates to each line", options.with_source);
+  line.exclusive({"--at", "--at-lonlat", "--at-crs", "--lonlat", "--crs"});
+  line.flag("--binary", "Read and write binary records instead of lines; see below", options.binary);
+  line.option("-j,--threads", "N", "Threads, 1 to 1024 (default: all cores); the result does not depend on it",
+              [&](const std::string& text) { options.threads = static_cast<int>(parse_whole_number(text, 1, 1024)); });
+  add_memory_option(line, "Decoded tiles to keep (default 256M)", options.memory_bytes);
+  add_common_options(line, options.common);
+  line.exclusive({"--json", "--binary"});
+  line.exclusive({"--with-lonlat", "--binary"});
+  line.exclusive({"--with-crs", "--binary"});
+  line.footer(kFooter);
+  if (!line.parse(arguments)) return std::nullopt;
+  line.require("ARCHIVE", options.archive);
+  return options;
+}
+
+/// Reads "x z" or "x,z"; false where the text is neither.
+bool read_place(std::string_view text, WorldPoint& place) {
+  constexpr std::string_view kBlanks = " \t";
+  const auto next_word = [&]() -> std::string_view {
+    const std::size_t first = std::min(text.find_first_not_of(kBlanks), text.size());
+    const std::size_t last = std::min(text.find_first_of(" \t,", first), text.size());
+    const std::string_view word = text.substr(first, last - first);
+    text.remove_prefix(last);
+    return word;
+  };
+  const auto skip_blanks = [&] { text.remove_prefix(std::min(text.find_first_not_of(kBlanks), text.size())); };
+  if (!read_number(next_word(), place.x)) return false;
+  skip_blanks();
+  if (!text.empty() && text.front() == ',') text.remove_prefix(1);
+  if (!read_number(next_word(), place.z)) return false;
+  skip_blanks();
+  return text.empty() && std::isfinite(place.x) && std::isfinite(place.z);
+}
+
+/// What answers say of their places.
+struct PlaceOutput {
+  const GeoPlaces* geo = nullptr;  ///< nullptr: no longitudes and latitudes
+  const GeoPlaces* source = nullptr;
+};
+
+std::string columns_from(const PlaceOutput& output, WorldPoint place) {
+  std::string text;
+  if (output.source != nullptr) {
+    const MapPoint at = output.source->source_from_world(place);
+    text += fmt::format(" {:.12g} {:.12g}", at.easting, at.northing);
+  }
+  if (output.geo != nullptr) {
+    const GeoPoint at = output.geo->geo_from_world(place);
+    text += fmt::format(" {:.12g} {:.12g}", at.longitude, at.latitude);
+  }
+  return text + '\n';
+}
+
+std::string text_from(const SurfaceSample& sample) {
+  if (sample.state == SurfaceSample::State::kOutside) return "outside";
+  if (sample.state == SurfaceSample::State::kVoid) return "void";
+  return fmt::format("{:.9g} {:.7f} {:.7f} {:.7f} {} {}", sample.elevation, sample.normal[0], sample.normal[1],
+                     sample.normal[2], sample.tile.column, sample.tile.row);
+}
+
+std::string json_from(const SurfaceSample& sample, WorldPoint place, const PlaceOutput& output) {
+  // A place that the map does not show has no world coordinates.
+  const auto number = [](double value) { return std::isnan(value) ? ordered_json(nullptr) : ordered_json(value); };
+  ordered_json json = {{"x", number(place.x)}, {"z", number(place.z)}};
+  const auto pair = [&](const char* first, double a, const char* second, double b) {
+    return ordered_json{{first, number(a)}, {second, number(b)}};
+  };
+  if (output.source != nullptr) {
+    const MapPoint at = output.source->source_from_world(place);
+    json["crs"] = pair("x", at.easting, "y", at.northing);
+  }
+  if (output.geo != nullptr) {
+    const GeoPoint at = output.geo->geo_from_world(place);
+    json["lonlat"] = pair("longitude", at.longitude, "latitude", at.latitude);
+  }
+  constexpr const char* kStates[] = {"surface", "void", "outside"};
+  json["state"] = kStates[static_cast<std::size_t>(sample.state)];
+  if (sample.state != SurfaceSample::State::kOutside) {
+    json["tile"] = {{"column", sample.tile.column}, {"row", sample.tile.row}};
+  }
+  if (sample.state == SurfaceSample::State::kSurface) {
+    json["elevation"] = sample.elevation;
+    json["normal"] = sample.normal;
+  }
+  return json_line(json);
+}
+
+std::string record_from(const SurfaceSample& sample) {
+  std::vector<std::byte> bytes;
+  ByteWriter writer(bytes);
+  const bool is_surface = sample.state == SurfaceSample::State::kSurface;
+  writer.write(is_surface ? sample.elevation : std::numeric_limits<double>::quiet_NaN());
+  for (const double part : sample.normal) writer.write(is_surface ? static_cast<float>(part) : 0.0F);
+  writer.write(static_cast<std::uint32_t>(sample.state));
+  writer.write(static_cast<std::int32_t>(sample.tile.column));
+  writer.write(static_cast<std::int32_t>(sample.tile.row));
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+/// Collects places and answers them together, in their order.
+class Answers {
+ public:
+  Answers(const ArchiveReader& archive, const SampleOptions& options, const PlaceOutput& output)
+      : options_(options), output_(output), sampler_(archive, options.memory_bytes) {}
+
+  void add(WorldPoint place) {
+    places_.push_back(place);
+    if (places_.size() == kMostPlaces) answer();
+  }
+
+  /// Answers what there is, and hands it to the operating system.
+  void flush() {
+    answer();
+    out_.flush();
+  }
+
+ private:
+  static constexpr std::size_t kMostPlaces = std::size_t{1} << 18U;
+  static constexpr std::size_t kPlacesOfText = 4096;
+
+  void answer() {
+    std::vector<SurfaceSample> samples(places_.size());
+    sampler_.sample(places_, samples);
+    std::vector<std::string> texts((samples.size() + kPlacesOfText - 1) / kPlacesOfText);
+    oneapi::tbb::parallel_for(std::size_t{0}, texts.size(), [&](std::size_t part) {
+      const std::size_t end = std::min((part + 1) * kPlacesOfText, samples.size());
+      for (std::size_t i = part * kPlacesOfText; i < end; ++i) {
+        texts[part] += options_.binary        ? record_from(samples[i])
+                       : options_.common.json ? json_from(samples[i], places_[i], output_)
+                                              : text_from(samples[i]) + columns_from(output_, places_[i]);
+      }
+    });
+    for (const std::string& text : texts) out_.write(text);
+    places_.clear();
+  }
+
+  const SampleOptions& options_;
+  const PlaceOutput& output_;
+  PointSampler sampler_;
+  StandardOutput out_;
+  std::vector<WorldPoint> places_;
+};
+
+/// Every place on standard input: x and z, or longitude and latitude.
+void read_places(bool binary, Answers& answers, const std::function<WorldPoint(WorldPoint)>& in_world) {
+  LineReader reader;
+  const auto flush = [&] { answers.flush(); };
+  WorldPoint place{};
+  while (binary) {
+    const std::string_view record = reader.next_record(2 * sizeof(double), flush);
+    if (record.empty()) return;
+    std::memcpy(&place.x, record.data(), sizeof(double));
+    std::memcpy(&place.z, record.data() + sizeof(double), sizeof(double));
+    if (!std::isfinite(place.x) || !std::isfinite(place.z)) {
+      throw Error(ErrorCode::kCorrupt, fmt::format("standard input, record {}: found {} {}, must be two finite numbers",
+                                                   reader.line_number(), place.x, place.z));
+    }
+    answers.add(in_world(place));
+  }
+  while (const std::optional<std::string> line = reader.next(flush)) {
+    const std::size_t first = line->find_first_not_of(" \t");
+    if (first == std::string::npos || (*line)[first] == '#') continue;
+    if (!read_place(*line, place)) {
+      throw Error(ErrorCode::kCorrupt, fmt::format("standard input, line {}: found '{}', must be 'x z', two numbers",
+                                                   reader.line_number(), line->substr(0, 80)));
+    }
+    answers.add(in_world(place));
+  }
+}
+
+/// The archive's places; its source's map is understood where that is `needed` for them, or `welcome`.
+GeoPlaces places_of(ArchiveReader& archive, bool needs_geo, bool needs_source, bool is_welcome) {
+  const auto lacks = [](const GeoPlaces& places, bool geo, bool source) {
+    return (geo && !places.knows_geo()) || (source && !places.knows_source());
+  };
+  const GeoPlaces first(archive.metadata());
+  const bool is_needed = lacks(first, needs_geo, needs_source);
+  if (!is_needed && !(is_welcome && lacks(first, true, true))) return first;
+  try {
+    understand_source(archive);
+  } catch (const Error&) {
+    if (is_needed) throw;
+  }
+  GeoPlaces places(archive.metadata());
+  if (!lacks(places, needs_geo, needs_source)) return places;
+  throw Error(ErrorCode::kInvalidArgument, archive.path() + ": its source has no place in " +
+                                               (needs_geo ? "degrees" : "coordinates") +
+                                               "; give places in world units, --at X Z");
+}
+
+int run(const SampleOptions& options) {
+  ArchiveReader archive = open_archive(options.archive);
+  print_warnings(archive.warnings());
+  const bool takes_geo = options.reads_degrees || !options.geo_places.empty();
+  const bool takes_source = options.reads_source || !options.source_places.empty();
+  const GeoPlaces places =
+      places_of(archive, takes_geo || options.with_degrees, takes_source || options.with_source, options.common.json);
+  PlaceOutput output;
+  if (options.with_degrees || (options.common.json && places.knows_geo())) output.geo = &places;
+  if (options.with_source || (options.common.json && places.knows_source())) output.source = &places;
+  WorkArena threads(options.threads);
+  threads.execute([&] {
+    Answers answers(archive, options, output);
+    for (const WorldPoint place : options.places) answers.add(place);
+    for (const GeoPoint place : options.geo_places) answers.add(places.world_from_geo(place));
+    for (const MapPoint place : options.source_places) answers.add(places.world_from_source(place));
+    if (options.places.empty() && options.geo_places.empty() && options.source_places.empty()) {
+      try {
+        read_places(options.binary, answers, [&](WorldPoint place) {
+          if (takes_geo) return places.world_from_geo({place.x, place.z});
+          return takes_source ? places.world_from_source({place.x, place.z}) : place;
+        });
+      } catch (const Error&) {
+        answers.flush();  // what came before a bad place is answered
+        throw;
+      }
+    }
+    answers.flush();
+  });
+  return kExitDone;
+}
+
+}  // namespace
+
+int command_sample(const Arguments& arguments) {
+  const std::optional<SampleOptions> options = parse(arguments);
+  return options ? run(*options) : static_cast<int>(kExitDone);
+}
+
+}  // namespace isohf::cli

@@ -1,0 +1,237 @@
+/// isohf shade: a picture of an archive's surface, with the shadows that it casts.
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "commands/command.h"
+#include "formats/georeference/units.h"
+#include "formats/write/raster_sink.h"
+#include "interrupt.h"
+#include "isohf/error.h"
+#include "isohf/restore/archive_geometry.h"
+#include "open_archive.h"
+#include "options/describe.h"
+#include "options/option_values.h"
+#include "options/options_common.h"
+#include "output/json_output.h"
+#include "output/output_kinds.h"
+#include "output/standard_output.h"
+#include "raster/restored_raster.h"
+#include "shade/shade_picture.h"
+#include "work_arena.h"
+
+namespace isohf::cli {
+namespace {
+
+using nlohmann::ordered_json;
+
+constexpr std::int64_t kMaxPixels = 1 << 20;  ///< of a side
+constexpr std::int64_t kDefaultPixels = 2048;
+/// Eq. 16's k where the relief is that of mountains; in flatter lands this share of the elevation range.
+constexpr double kDefaultSoftness = 2.0;
+constexpr double kDefaultSoftnessShare = 0.005;
+
+constexpr const char* kFooter =
+    R"(The picture covers what the input covered, North at the top; where there is no elevation it is transparent.
+Shadows are those of a sun due West or due East. Shadow seeds in the archive (convert --shadow-seeds) are used
+where they hold for the sun asked for; the picture is the same without them.
+Memory is bounded whatever the archive's and the picture's size: a few dozen tiles and about 64 MB.
+
+Examples:
+  isohf shade dem.isohf -o dem.png --hillshade
+  isohf shade dem.isohf -o evening.png --hillshade --sun-elevation 5 --azimuth W --size 4096x2300
+  isohf shade dem.isohf -o map.png --hillshade --texture
+  isohf shade dem.isohf -o shadows.tif --palette gray --sun-elevation 8)";
+
+struct ShadeOptions {
+  CommonOptions common;
+  WorkOptions work;
+  std::string archive;
+  std::string output;
+  bool overwrite = false;
+  bool no_shadow = false;
+  std::optional<std::pair<std::int64_t, std::int64_t>> size;
+  std::optional<double> softness;
+  ShadeRequest request;
+};
+
+double parse_sun(const std::string& text) {
+  const double degrees = parse_number(text);
+  if (!(degrees >= 0.01 && degrees < 90.0)) {
+    throw Error(ErrorCode::kInvalidArgument, "found '" + text + "', must be degrees from 0.01 to below 90");
+  }
+  return degrees;
+}
+
+std::optional<ShadeOptions> parse(const Arguments& arguments) {
+  ShadeOptions options;
+  ShadeRequest& request = options.request;
+  CommandLine line("shade", "Draws a picture of an archive's surface with the shadows that it casts.");
+  line.group("Arguments");
+  line.positional("ARCHIVE", "-i,--input", "Archive to draw", options.archive);
+  line.positional("OUTPUT", "-o,--output", "Picture to write, .png or .tif", options.output);
+  line.flag("--overwrite", "Replace OUTPUT where it exists", options.overwrite);
+  line.group("Light");
+  line.option("--sun-elevation", "DEG", "Height of the sun above the horizon, 0.01 to below 90 (default 15)",
+              [&](const std::string& text) { request.sun_elevation_deg = parse_sun(text); });
+  line.option("--azimuth", "E|W", "Put the sun in the East or the West (default W)", [&](const std::string& text) {
+    request.travel = parse_word(text, {"E", "W"}) == 0 ? LightTravel::kWestward : LightTravel::kEastward;
+  });
+  line.flag("--hillshade", "Shade slopes by how they face the sun", request.hillshade);
+  line.flag("--no-shadow", "Leave out the shadows that land casts on land beyond it", options.no_shadow);
+  line.option("--shadow-softness", "K",
+              "The sun's apparent size at the caster's distance, vertical units (default 2, or 0.5 % of the elevation "
+              "range where that is less)",
+              [&](const std::string& text) { options.softness = parse_positive_number(text); });
+  line.group("Picture");
+  line.option("--size", "WxH", "Pixels (default: one for each lattice step, at most 2048 a side)",
+              [&](const std::string& text) { options.size = parse_size(text, 1, kMaxPixels); });
+  line.option("--exaggeration", "F", "Draw heights F times as high (default 1)",
+              [&](const std::string& text) { request.exaggeration = parse_positive_number(text); });
+  line.flag("--texture", "Show the archive's textures; where there is none, the palette's colours", request.texture);
+  line.option("--palette", "NAME", "Colours of the ground: elevation or gray (default elevation)",
+              [&](const std::string& text) {
+                request.palette = static_cast<PaletteName>(parse_word(text, {"elevation", "gray"}));
+              });
+  add_work_options(line, options.work);
+  add_common_options(line, options.common);
+  line.footer(kFooter);
+  if (!line.parse(arguments)) return std::nullopt;
+  line.require("ARCHIVE", options.archive);
+  line.require("OUTPUT", options.output);
+  if (options.no_shadow && options.softness) {
+    throw Error(ErrorCode::kInvalidArgument, "shade: --shadow-softness and --no-shadow exclude each other");
+  }
+  request.shadows = !options.no_shadow;
+  return options;
+}
+
+void choose_size(const ArchiveReader& archive, const std::optional<std::pair<std::int64_t, std::int64_t>>& size,
+                 ShadeRequest& request) {
+  if (size) {
+    request.width = size->first;
+    request.height = size->second;
+    return;
+  }
+  const WorldBounds& bounds = archive.metadata().valid;
+  const double longest = std::max(bounds.x1 - bounds.x0, bounds.z1 - bounds.z0);
+  const double pixel = std::max(2.0 * archive.grid().sigma_x(), longest / static_cast<double>(kDefaultPixels));
+  const auto pixels = [pixel](double length) {
+    return std::clamp<std::int64_t>(static_cast<std::int64_t>(std::lround(length / pixel)), 1, kDefaultPixels);
+  };
+  request.width = pixels(bounds.x1 - bounds.x0);
+  request.height = pixels(bounds.z1 - bounds.z0);
+}
+
+/// 1 where either unit is not known.
+double elevation_units_per_world_unit(const Metadata& metadata) {
+  if (metadata.horizontal_unit != "metre") return 1.0;
+  const auto unit = linear_unit(metadata.vertical_unit);
+  return unit ? 1.0 / unit->metres : 1.0;
+}
+
+double default_softness(const Metadata& metadata) {
+  const Statistics& statistics = metadata.statistics;
+  const double range = statistics.min && statistics.max ? *statistics.max - *statistics.min : 0.0;
+  return range > 0.0 ? std::min(kDefaultSoftness, kDefaultSoftnessShare * range) : kDefaultSoftness;
+}
+
+/// Where the picture lies, for GeoTIFF; nullopt where the source did not say.
+std::optional<Georeference> georeference_of(const Metadata& metadata, const ShadeRequest& request) {
+  const SourceRecord& source = metadata.source;
+  if (is_warped(metadata)) {
+    SampleGrid grid{request.width, request.height};
+    grid.spacing_x = (metadata.valid.x1 - metadata.valid.x0) / static_cast<double>(request.width);
+    grid.spacing_z = (metadata.valid.z1 - metadata.valid.z0) / static_cast<double>(request.height);
+    grid.first_x = metadata.valid.x0 + grid.spacing_x / 2.0;
+    grid.first_z = metadata.valid.z0 + grid.spacing_z / 2.0;
+    return map_georeference(metadata, grid);
+  }
+  if (!source.origin_x || !source.origin_y || !(source.crs_spacing_x > 0.0) || !(source.crs_spacing_y > 0.0)) {
+    return std::nullopt;
+  }
+  const double pixel_x = (metadata.valid.x1 - metadata.valid.x0) / static_cast<double>(request.width);
+  const double pixel_z = (metadata.valid.z1 - metadata.valid.z0) / static_cast<double>(request.height);
+  const double units_x = source.crs_spacing_x / source.spacing_x;
+  const double units_z = source.crs_spacing_y / source.spacing_z;
+  Georeference place;
+  place.registration = Registration::kArea;
+  place.unit = source.crs_unit == "metre"    ? HorizontalUnit::kMetre
+               : source.crs_unit == "degree" ? HorizontalUnit::kDegree
+                                             : HorizontalUnit::kUnknown;
+  place.metres_per_unit = source.metres_per_unit;
+  place.spacing_x = pixel_x * units_x;
+  place.spacing_y = pixel_z * units_z;
+  place.has_origin = true;
+  place.origin_x = *source.origin_x + (metadata.valid.x0 + pixel_x / 2.0 - source.first_sample_x) * units_x;
+  place.origin_y = *source.origin_y - (metadata.valid.z0 + pixel_z / 2.0 - source.first_sample_z) * units_z;
+  place.system = horizontal_system(source);
+  return place;
+}
+
+int run(ShadeOptions options) {
+  const auto start = std::chrono::steady_clock::now();
+  const CommonOptions& common = options.common;
+  check_raster_output({options.archive}, options.output, options.overwrite);
+  const ArchiveReader archive = open_archive(options.archive);
+  print_warnings(archive.warnings());
+  ShadeRequest& request = options.request;
+  choose_size(archive, options.size, request);
+  request.elevation_units_per_world_unit = elevation_units_per_world_unit(archive.metadata());
+  request.softness = options.softness.value_or(default_softness(archive.metadata()));
+
+  RasterSpec spec;
+  spec.width = request.width;
+  spec.height = request.height;
+  spec.sample_type = SampleType::kUint8;
+  spec.channels = static_cast<int>(kShadeChannels);
+  spec.georeference = georeference_of(archive.metadata(), request);
+  if (is_warped(archive.metadata()) && !spec.georeference->system.epsg) {
+    spec.projection = archive.metadata().projection->spec;
+  }
+  spec.overwrite = options.overwrite;
+  const auto sink = create_raster(options.output, spec);
+
+  const std::atomic<bool>& cancel = watch_interrupts();
+  WorkArena arena(options.work.threads);
+  const ShadeReport report = arena.execute([&] {
+    ProgressDisplay display(options.work.progress, common.quiet, common.verbose);
+    return render_shade(
+        archive, request, [&](std::span<const std::uint8_t> rows) { sink->write_rows(std::as_bytes(rows)); },
+        [&](std::int64_t done, std::int64_t total) { display.update("shade", "tiles", done, total); }, cancel);
+  });
+  sink->finish();
+
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  StandardOutput out;
+  if (common.json) {
+    out.write(json_text({{"archive", options.archive},
+                         {"output", options.output},
+                         {"files_written", sink->files()},
+                         {"width", request.width},
+                         {"height", request.height},
+                         {"tiles", archive.grid().tile_count()},
+                         {"used_shadow_seeds", report.used_seeds},
+                         {"seconds", seconds}}));
+  } else if (!common.quiet) {
+    out.write(fmt::format("picture      {}: {} x {} pixels of {} tiles in {}{}\n", options.output, request.width,
+                          request.height, describe_count(archive.grid().tile_count()), describe_seconds(seconds),
+                          report.used_seeds ? ", with the archive's shadow seeds" : ""));
+  }
+  out.finish();
+  return kExitDone;
+}
+
+}  // namespace
+
+int command_shade(const Arguments& arguments) {
+  std::optional<ShadeOptions> options = parse(arguments);
+  return options ? run(std::move(*options)) : static_cast<int>(kExitDone);
+}
+
+}  // namespace isohf::cli

@@ -1,0 +1,343 @@
+/// isohf verify: is an archive whole, and how far is it from what it was made from?
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <cmath>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "commands/command.h"
+#include "interrupt.h"
+#include "isohf/error.h"
+#include "isohf/raster.h"
+#include "isohf/verify.h"
+#include "open_archive.h"
+#include "options/describe.h"
+#include "options/input_files.h"
+#include "options/option_values.h"
+#include "options/options_common.h"
+#include "options/options_ground.h"
+#include "options/options_source.h"
+#include "options/source_inputs.h"
+#include "output/accuracy_output.h"
+#include "output/json_output.h"
+#include "output/standard_output.h"
+#include "work_arena.h"
+
+namespace isohf::cli {
+namespace {
+
+using nlohmann::ordered_json;
+
+constexpr const char* kFooter =
+    R"(Each finding is one line: its number, its severity, where, what. Exit code 0: nothing above a note was found;
+3: something was, or the surface is further from INPUT than allowed; 1: the check itself failed.
+Options of the input default to what the archive says it was made with.
+
+Examples:
+  isohf verify dem.isohf
+  isohf verify archives/ --recursive --json       one JSON object a line
+  isohf verify dem.isohf --against dem.tif --max-error 5
+  isohf verify --list-checks)";
+
+struct VerifyCommandOptions {
+  CommonOptions common;
+  WorkOptions work;
+  std::vector<std::string> archives;
+  std::string archive;  ///< the one in hand
+  SourceInputs against;
+  OpenOptions open;
+  GeoidRequest geoid;
+  bool geoid_is_recorded = false;  ///< its path is a name without a folder
+  std::int64_t random_points = kRandomPoints;
+  std::optional<double> max_error;
+  std::optional<double> max_rms;
+  bool ortho = false;
+  bool list_checks = false;
+};
+
+/// `recorded`: how the archive's input was read; it counts where `arguments` say nothing.
+std::optional<VerifyCommandOptions> parse(const Arguments& arguments, const RecordedOptions& recorded = {}) {
+  VerifyCommandOptions options;
+  CommandLine line("verify", "Checks archives, and compares one with what it was made from.");
+  line.group("Arguments");
+  line.positionals("ARCHIVE...",
+                   "Archives to check, one after the other: files, folders of .isohf, \"patterns*\" and @lists",
+                   options.archives);
+  line.repeated("-i,--input", "ARCHIVE", "An archive; may be given again", options.archives);
+  line.flag("--list-checks", "Print what is checked, one finding kind a line, and exit", options.list_checks);
+  line.group("Comparison");
+  line.repeated(
+      "--against", "INPUT",
+      "Measure the surface against the raster it was made from; a folder, \"pattern*\" or @list, or again and "
+      "again, for a mosaic",
+      options.against.names);
+  line.option("--random", "N", "Random places to compare beside the input's samples (default 100000)",
+              [&](const std::string& text) { options.random_points = parse_whole_number(text, 0, 1000000000); });
+  line.flag("--ortho",
+            "Measure ortho meshes of as many vertices, and of as small an error, as well; takes five times as long",
+            options.ortho);
+  bool without_ortho = false;
+  line.flag("--no-ortho", "The default; kept for scripts of before there was --ortho", without_ortho);
+  line.exclusive({"--ortho", "--no-ortho"});
+  const auto limit = [](std::optional<double>& value) {
+    return [&value](const std::string& text) {
+      double found = 0.0;
+      if (!read_number(text, found) || !(found >= 0.0)) {
+        throw Error(ErrorCode::kInvalidArgument, "found '" + text + "', must be a number of at least 0");
+      }
+      value = found;
+    };
+  };
+  line.option("--max-error", "E", "Exit 3 where an input sample is missed by more than E (default: any error passes)",
+              limit(options.max_error));
+  line.option("--max-rms", "E", "Exit 3 where the root mean square error is above E (default: any passes)",
+              limit(options.max_rms));
+  add_source_options(line, options.open);
+  add_mosaic_options(line, options.against);
+  line.group("Ground");
+  add_geoid_option(line, options.geoid);
+  add_work_options(line, options.work);
+  add_common_options(line, options.common);
+  line.footer(kFooter);
+  if (!line.parse(arguments)) return std::nullopt;
+  if (!recorded.empty()) {
+    Arguments all = arguments_from(recorded, line);
+    all.insert(all.end(), arguments.begin(), arguments.end());
+    std::optional<VerifyCommandOptions> parsed = parse(all);
+    parsed->geoid_is_recorded = !line.given("--geoid");
+    return parsed;
+  }
+  if (options.list_checks) return options;
+  line.require("ARCHIVE", options.archives);
+  if (options.against.names.empty()) {
+    std::string option = line.first_given({"Comparison", "Ground", "Input", "Several inputs"});
+    if (option == "--recursive") option = line.first_given({"Ground"});  // archives are looked for in folders, too
+    if (!option.empty()) throw Error(ErrorCode::kInvalidArgument, "verify: " + option + " needs --against INPUT");
+  }
+  return options;
+}
+
+const char* to_word(Severity severity) {
+  switch (severity) {
+    case Severity::kNote:
+      return "note";
+    case Severity::kWarning:
+      return "warning";
+    case Severity::kError:
+      return "error";
+  }
+  return "?";
+}
+
+void list_checks(bool json) {
+  StandardOutput out;
+  ordered_json list = ordered_json::array();
+  for (const FindingKind& kind : finding_catalogue()) {
+    if (json) {
+      list.push_back({{"id", finding_name(kind.id)}, {"severity", to_word(kind.severity)}, {"meaning", kind.meaning}});
+    } else {
+      out.write(fmt::format("{} {:<7} {}\n", finding_name(kind.id), to_word(kind.severity), kind.meaning));
+    }
+  }
+  if (json) out.write(json_text({{"checks", list}}));
+  out.finish();
+}
+
+ordered_json json_from(const VerifyReport& report) {
+  ordered_json findings = ordered_json::array();
+  for (const Finding& finding : report.findings) {
+    ordered_json json = {{"id", finding_name(finding.id)}, {"severity", to_word(finding.severity)}};
+    json["tile"] = finding.tile ? ordered_json{{"column", finding.tile->column}, {"row", finding.tile->row}}
+                                : ordered_json(nullptr);
+    json["text"] = finding.text;
+    findings.push_back(std::move(json));
+  }
+  return {{"passed", report.passed()},
+          {"tiles_checked", report.tiles_checked},
+          {"shared_vertices_checked", report.shared_vertices_checked},
+          {"findings_total", report.findings_total},
+          {"findings", findings}};
+}
+
+std::string text_from(const Finding& finding) {
+  std::string text = finding_name(finding.id) + " " + to_word(finding.severity);
+  if (finding.tile) text += fmt::format(" tile ({},{})", finding.tile->column, finding.tile->row);
+  return text + ": " + printable(finding.text) + "\n";
+}
+
+/// What the comparison found beside errors of size: ground that is missing or made up, away from borders of voids.
+void add_findings(const Accuracy& measured, const std::string& contradiction, VerifyReport& report) {
+  const AccuracyReport& accuracy = measured.surface;
+  const VertexReport& vertices = measured.vertices;
+  const auto add = [&](int id, std::int64_t count, const std::string& what, std::optional<TileIndex> tile = {}) {
+    if (count == 0) return;
+    report.findings.push_back({id, severity_of(id), tile, fmt::format("{} {}", describe_count(count), what)});
+    ++report.findings_total;
+  };
+  add(finding::kVertex, vertices.wrong,
+      fmt::format("vertices, from this tile on, differ from the input resampled, by up to {:.6g} where {:.6g} is "
+                  "allowed, or in being void",
+                  vertices.worst, vertices.bound),
+      vertices.first_wrong);
+  if (!contradiction.empty()) {
+    report.findings.push_back({finding::kAccuracy, severity_of(finding::kAccuracy), {}, contradiction});
+    ++report.findings_total;
+  }
+  add(finding::kSourceLost, accuracy.lost_inside, "elevations of the input lie where the archive has none");
+  add(finding::kSourceInvented, accuracy.invented_inside, "voids of the input lie where the archive has elevations");
+}
+
+VerifyReport check(const VerifyCommandOptions& options, const std::atomic<bool>& cancel) {
+  ProgressDisplay display(options.work.progress, options.common.quiet, options.common.verbose);
+  VerifyOptions verify;
+  verify.threads = options.work.threads;
+  verify.progress = [&](std::int64_t done, std::int64_t total) {
+    display.update("verify", "tiles", done, total);
+    return !cancel.load();
+  };
+  return verify_archive(options.archive, verify);
+}
+
+/// The geoid of an archive's record, beside the inputs or in the working folder.
+void find_geoid(const std::string& archive, const std::vector<std::string>& files, GeoidRequest& geoid) {
+  const std::string name = geoid.path;
+  for (const std::string& path : {(std::filesystem::path(files.front()).parent_path() / name).string(), name}) {
+    std::error_code ignored;
+    geoid.path = path;
+    if (std::filesystem::exists(path, ignored)) return;
+  }
+  throw Error(ErrorCode::kInvalidArgument,
+              fmt::format("{}: was made with --geoid {}, which lies neither beside the input nor in this folder; give "
+                          "--geoid FILE",
+                          archive, name));
+}
+
+/// Archives of before `source.options` say how their input was read by what it was read as.
+void take_record(const SourceRecord& record, OpenOptions& open) {
+  if (open.channel.empty()) open.channel = record.channel;
+  if (open.void_values.empty() && !record.mosaic) open.void_values = record.void_values;
+  if (!open.z_scale) open.z_scale = record.z_scale;
+  if (!open.z_offset) open.z_offset = record.z_offset;
+}
+
+bool is_as_recorded(const SourceInfo& info, const SourceRecord& record) {
+  const auto same = [](double a, double b) { return a == b || (std::isnan(a) && std::isnan(b)); };
+  return info.channel == record.channel && to_string(info.sample_type) == record.sample_type &&
+         info.z_scale == record.z_scale && info.z_offset == record.z_offset &&
+         std::equal(info.void_values.begin(), info.void_values.end(), record.void_values.begin(),
+                    record.void_values.end(), same);
+}
+
+/// The archive's input, read as it was read then.
+std::unique_ptr<HeightSource> open_as_recorded(VerifyCommandOptions options, const Metadata& metadata) {
+  const SourceRecord& record = metadata.source;
+  const std::vector<std::string> files = expand_inputs(options.against.names, options.against.recursive);
+  if (options.geoid_is_recorded && !options.geoid.path.empty()) find_geoid(options.archive, files, options.geoid);
+  OpenOptions& open = options.open;
+  if (!open.registration)
+    open.registration = record.registration == "area" ? Registration::kArea : Registration::kPoint;
+  if (!record.options) {
+    if (!open.voids.valid_range) open.voids.valid_range = record.valid_range;
+    if (open.voids.distance() == 0 && record.fill_distance > 0) open.voids.fill_distance = record.fill_distance;
+    if (!options.against.overlap_given && record.mosaic && record.mosaic->overlap == "first")
+      options.against.overlap = OverlapRule::kFirst;
+  }
+  GroundRequest ground;
+  ground.wrap_x = metadata.wraps_x;
+  const auto opened = [&] {
+    return laid_out(std::move(open_inputs(files, options.against, open, options.work.threads).source), options.geoid,
+                    ground);
+  };
+  std::unique_ptr<HeightSource> source = opened();
+  if (record.options || is_as_recorded(source->info(), record)) return source;
+  take_record(record, open);
+  return opened();
+}
+
+Accuracy compare(const VerifyCommandOptions& options, const Metadata& metadata, const std::atomic<bool>& cancel) {
+  const std::unique_ptr<HeightSource> source = open_as_recorded(options, metadata);
+  return measure_accuracy(options.archive, *source, options.random_points, options.ortho, options.work, options.common,
+                          cancel);
+}
+
+/// What of the measured error is more than was allowed; empty where nothing is.
+std::string why_too_far(const VerifyCommandOptions& options, const AccuracyReport& accuracy) {
+  if (options.max_error && accuracy.max > *options.max_error) {
+    return fmt::format("the largest error is {:.6g}, at most {:.6g} is allowed", accuracy.max, *options.max_error);
+  }
+  if (options.max_rms && accuracy.rms > *options.max_rms) {
+    return fmt::format("the rms error is {:.6g}, at most {:.6g} is allowed", accuracy.rms, *options.max_rms);
+  }
+  return {};
+}
+
+int check_one(VerifyCommandOptions options, const Arguments& arguments, bool is_one_of_many) {
+  const std::atomic<bool>& cancel = watch_interrupts();
+  const WorkArena threads(options.work.threads);
+  VerifyReport report = check(options, cancel);
+  std::optional<Accuracy> accuracy;
+  // An archive that is not whole has no surface to measure.
+  const bool compares = !options.against.names.empty() && report.passed();
+  if (compares) {
+    const Metadata metadata = open_archive(options.archive).metadata();
+    if (metadata.source.options) {
+      const std::string archive = options.archive;
+      options = *parse(arguments, *metadata.source.options);
+      options.archive = archive;
+    }
+    accuracy = compare(options, metadata, cancel);
+    add_findings(*accuracy, contradiction(metadata, accuracy->surface), report);
+  }
+  const std::string too_far = accuracy ? why_too_far(options, accuracy->surface) : "";
+  const bool passed = report.passed() && too_far.empty();
+
+  StandardOutput out;
+  if (options.common.json) {
+    ordered_json document = {{"archive", options.archive}, {"passed", passed}, {"checks", json_from(report)}};
+    if (accuracy) document["against"] = json_from(*accuracy);
+    if (!too_far.empty()) document["difference"] = too_far;
+    out.write(is_one_of_many ? json_line(document) : json_text(document));
+  } else if (!options.common.quiet) {
+    for (const Finding& finding : report.findings) out.write(text_from(finding));
+    const std::int64_t not_listed = report.findings_total - static_cast<std::int64_t>(report.findings.size());
+    if (not_listed > 0) out.write(fmt::format("and {} more\n", describe_count(not_listed)));
+    if (accuracy) out.write(text_from(*accuracy, fmt::format("{}", fmt::join(options.against.names, " "))));
+    if (!options.against.names.empty() && !compares)
+      out.write("not compared with the input: the archive is not whole\n");
+    if (!too_far.empty()) out.write("difference: " + too_far + "\n");
+    out.write(fmt::format("{}: {}: {} tiles and {} shared vertices checked, {} findings\n", printable(options.archive),
+                          passed ? "passed" : "FAILED", describe_count(report.tiles_checked),
+                          describe_count(report.shared_vertices_checked), describe_count(report.findings_total)));
+  }
+  out.finish();
+  return passed ? kExitDone : kExitDifferences;
+}
+
+int run(const VerifyCommandOptions& options, const Arguments& arguments) {
+  if (options.list_checks) {
+    list_checks(options.common.json);
+    return kExitDone;
+  }
+  const std::vector<std::string> files = list_files(options.archives, options.against.recursive, true);
+  if (files.size() > 1 && !options.against.names.empty()) {
+    throw Error(ErrorCode::kInvalidArgument,
+                fmt::format("verify: --against compares one archive with its input, {} are given", files.size()));
+  }
+  return for_each_file("verify", files, options.common, [&](const std::string& file) {
+    VerifyCommandOptions one = options;
+    one.archive = file;
+    return check_one(std::move(one), arguments, files.size() > 1);
+  });
+}
+
+}  // namespace
+
+int command_verify(const Arguments& arguments) {
+  const std::optional<VerifyCommandOptions> options = parse(arguments);
+  return options ? run(*options, arguments) : static_cast<int>(kExitDone);
+}
+
+}  // namespace isohf::cli

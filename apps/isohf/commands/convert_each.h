@@ -1,0 +1,60 @@
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "isohf/error.h"
+#include "options/options_common.h"
+
+namespace isohf::cli {
+
+/// One of many conversions, and where its archive goes.
+struct EachFile {
+  std::string input;
+  std::string output;
+};
+
+/// What convert --each is asked for beyond the conversions themselves.
+struct EachOptions {
+  std::string folder;          ///< --out-dir; empty: a single archive
+  bool each = false;           ///< --each
+  bool skip_existing = false;  ///< a complete archive is left as it is
+  bool keep_going = false;     ///< a file that fails does not stop the others
+};
+
+void add_each_options(CommandLine& line, EachOptions& options);
+
+/// Inputs, as expand_inputs takes them, and the archive of each: FOLDER/NAME.isohf, in the folders that --recursive
+/// found it in. Throws Error{kInvalidArgument} where two would be one.
+[[nodiscard]] std::vector<EachFile> files_of_each(const std::vector<std::string>& inputs, bool recursive,
+                                                  const std::string& folder);
+
+/// What a conversion may use.
+struct EachShare {
+  int threads = 0;
+  std::uint64_t memory_bytes = 0;  ///< 0: as is fastest
+  bool alone = false;              ///< no other runs beside it
+};
+
+/// What became of a file.
+struct EachResult {
+  enum class State { kConverted, kComplete, kSkipped };
+  State state = State::kConverted;
+  std::string document;  ///< JSON members on one line
+  std::vector<Warning> warnings;
+};
+
+/// Converts one file within the share; nullopt where it is too large for a share that is not all there is.
+using ConvertOneFile = std::function<std::optional<EachResult>(const EachFile& file, const EachShare& share)>;
+
+/// Runs the conversions: small files side by side, one thread each, and large ones alone on all threads; together they
+/// stay within memory_bytes (0: none is set). Tells of every file in the order of the inputs, and of all at the end.
+/// Returns the exit code. Throws Error{kCancelled}.
+int convert_each(const std::vector<EachFile>& files, const EachOptions& options, const WorkOptions& work,
+                 const CommonOptions& common, std::uint64_t memory_bytes, const ConvertOneFile& convert_one,
+                 const std::atomic<bool>& cancel);
+
+}  // namespace isohf::cli

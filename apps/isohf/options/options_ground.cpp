@@ -1,0 +1,56 @@
+#include "options/options_ground.h"
+
+#include "formats/decorate/closed_source.h"
+#include "formats/georeference/reference_system.h"
+#include "isohf/error.h"
+
+namespace isohf::cli {
+
+void add_ground_options(CommandLine& line, GroundRequest& request) {
+  line.group("Ground");
+  line.option("--projection", "KIND",
+              "Project degrees to metres, and maps to truer ones: equirectangular, local, transverse-mercator, utm, "
+              "lambert-conformal, polar-stereographic, none, or chosen by extent (default: auto of degrees, none of "
+              "maps); parameters may "
+              "follow, as in utm:32N",
+              [&](const std::string& text) { request.projection = ProjectionRequest::parse(text); });
+  line.words({"auto", "equirectangular", "local", "transverse-mercator", "utm", "lambert-conformal",
+              "polar-stereographic", "none"});
+  line.flag("--wrap-x", "Join the East edge of an input all the way round to its West edge", request.wrap_x);
+}
+
+void understand_ground(const SourceInfo& info, GroundRequest& request) {
+  const Georeference& place = info.georeference;
+  const std::string text = system_text(place.system);
+  if (place.unit != HorizontalUnit::kMetre || !place.has_origin || text.empty()) return;
+  try {
+    request.source_map = understand_map(text, place.metres_per_unit);
+  } catch (const Error& error) {
+    request.why_no_map = error.what();
+  }
+}
+
+void add_geoid_option(CommandLine& line, GeoidRequest& request) {
+  line.option("--geoid", "FILE.pgm[:WAY]",
+              "Move elevations by a geoid of GeographicLib's: to-ellipsoidal, from heights above it (default), or "
+              "to-orthometric",
+              [&](const std::string& text) { request = GeoidRequest::parse(text); });
+}
+
+std::unique_ptr<HeightSource> with_geoid(std::unique_ptr<HeightSource> source, const GeoidRequest& request) {
+  if (request.path.empty()) return source;
+  return std::make_unique<GeoidSource>(std::move(source), request);
+}
+
+std::unique_ptr<HeightSource> laid_out(std::unique_ptr<HeightSource> source, const GeoidRequest& geoid,
+                                       const GroundRequest& ground) {
+  if (ground.wrap_x) source = without_repeated_column(std::move(source));
+  return with_geoid(std::move(source), geoid);
+}
+
+std::unique_ptr<HeightSource> without_repeated_column(std::unique_ptr<HeightSource> source) {
+  if (closure_of(source->info()) != Closure::kRepeated) return source;
+  return std::make_unique<ClosedSource>(std::move(source));
+}
+
+}  // namespace isohf::cli

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <memory>
+
+#include "isohf/convert/frame/source_frame.h"
+#include "isohf/surface/decorate/geoid_source.h"
+#include "options/command_line.h"
+
+namespace isohf::cli {
+
+/// How a source in degrees is laid out on the ground plane: --projection, --wrap-x.
+void add_ground_options(CommandLine& line, GroundRequest& request);
+
+/// Has a source on a map of its own understood, for its scales and for --projection; where that cannot be,
+/// request.why_no_map says why.
+void understand_ground(const SourceInfo& info, GroundRequest& request);
+
+/// --geoid FILE.pgm[:to-ellipsoidal|to-orthometric].
+void add_geoid_option(CommandLine& line, GeoidRequest& request);
+
+/// The source with its elevations moved, where that was asked for.
+[[nodiscard]] std::unique_ptr<HeightSource> with_geoid(std::unique_ptr<HeightSource> source,
+                                                       const GeoidRequest& request);
+
+/// The source as the options above have it laid out: moved by the geoid, closed where it is joined.
+[[nodiscard]] std::unique_ptr<HeightSource> laid_out(std::unique_ptr<HeightSource> source, const GeoidRequest& geoid,
+                                                     const GroundRequest& ground);
+
+/// The source without a last column that repeats the first one, as --wrap-x needs it; any other as it is.
+[[nodiscard]] std::unique_ptr<HeightSource> without_repeated_column(std::unique_ptr<HeightSource> source);
+
+}  // namespace isohf::cli

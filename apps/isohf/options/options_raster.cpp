@@ -1,0 +1,52 @@
+#include "options/options_raster.h"
+
+#include <fmt/format.h>
+
+#include "isohf/error.h"
+#include "options/option_values.h"
+
+namespace isohf::cli {
+
+void add_raster_arguments(CommandLine& line, const std::string& output_name, RasterOptions& options) {
+  line.group("Arguments");
+  line.positional("ARCHIVE", "-i,--input", "Archive to read", options.archive);
+  line.positional(output_name, "-o,--output",
+                  "Raster to write: NAME.tif, .exr, .png, .hgt, .asc, .flt, .r16, .raw, .r32 or .npy", options.output);
+  line.flag("--overwrite", fmt::format("Replace {} where it exists", output_name), options.overwrite);
+}
+
+void require_raster_arguments(const CommandLine& line, const std::string& output_name, const RasterOptions& options) {
+  line.require("ARCHIVE", options.archive);
+  line.require(output_name, options.output);
+}
+
+void add_size_options(CommandLine& line, const std::string& size_description, RasterOptions& options) {
+  line.option("--size", "WxH", size_description,
+              [&](const std::string& text) { options.size = parse_size(text, 1, kMostSide); });
+  line.option("--spacing", "LENGTH", "Write samples so far apart: world units, or with a unit as in 30m, 0.5km, 100ft",
+              [&](const std::string& text) { options.spacing = parse_length(text); });
+}
+
+std::optional<double> spacing_in_world(const RasterOptions& options, const Metadata& metadata) {
+  if (!options.spacing) return std::nullopt;
+  if (options.spacing->in_metres && metadata.horizontal_unit != "metre") {
+    throw Error(ErrorCode::kInvalidArgument,
+                options.archive +
+                    ": --spacing has a unit, but the archive's world units are not known; give a plain "
+                    "number of these");
+  }
+  return options.spacing->value;
+}
+
+void add_method_option(CommandLine& line, const std::string& without, RasterOptions& options) {
+  line.option("--method", "NAME", fmt::format("hex or barycentric (default {})", without),
+              [&](const std::string& text) { options.method = restore_method_from_string(text); });
+  line.words({"hex", "barycentric"});
+}
+
+void add_clamp_option(CommandLine& line, const std::string& type, RasterOptions& options) {
+  line.flag("--clamp-range", fmt::format("Move samples that {} does not hold to its ends, instead of refusing", type),
+            options.clamp_range);
+}
+
+}  // namespace isohf::cli

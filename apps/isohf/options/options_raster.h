@@ -1,0 +1,42 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "isohf/restore/surface_rows.h"
+#include "options/command_line.h"
+#include "options/length_value.h"
+#include "raster/output_grid.h"
+
+namespace isohf::cli {
+
+/// What commands that write the surface of an archive as a raster are told alike.
+struct RasterOptions {
+  std::string archive;
+  std::string output;
+  bool overwrite = false;
+  std::optional<GridSize> size;
+  std::optional<LengthValue> spacing;
+  std::optional<RestoreMethod> method;
+  bool clamp_range = false;
+};
+
+/// Samples on a side, at most.
+inline constexpr std::int64_t kMostSide = std::int64_t{1} << 31U;
+
+/// The group "Arguments": ARCHIVE, the output by the name that the command has for it, --overwrite.
+void add_raster_arguments(CommandLine& line, const std::string& output_name, RasterOptions& options);
+/// Throws Error{kInvalidArgument} where one of the two is not given.
+void require_raster_arguments(const CommandLine& line, const std::string& output_name, const RasterOptions& options);
+
+/// --size, --spacing. `size_description` is what --help says of the first.
+void add_size_options(CommandLine& line, const std::string& size_description, RasterOptions& options);
+/// The spacing asked for in the archive's world units. Throws Error{kInvalidArgument} for metres where these are
+/// unknown.
+[[nodiscard]] std::optional<double> spacing_in_world(const RasterOptions& options, const Metadata& metadata);
+/// --method. `without` is what --help says of the default.
+void add_method_option(CommandLine& line, const std::string& without, RasterOptions& options);
+/// --clamp-range. `type` is whose range it is.
+void add_clamp_option(CommandLine& line, const std::string& type, RasterOptions& options);
+
+}  // namespace isohf::cli

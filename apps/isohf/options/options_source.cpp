@@ -1,0 +1,78 @@
+#include "options/options_source.h"
+
+#include <cmath>
+
+#include "formats/binary_grids/raw_source.h"
+#include "isohf/error.h"
+#include "isohf/raster.h"
+#include "isohf/surface/decorate/filled_source.h"
+#include "options/length_value.h"
+#include "options/option_values.h"
+
+namespace isohf::cli {
+
+void add_source_options(CommandLine& line, OpenOptions& options) {
+  line.group("Input");
+  line.option(
+      "--channel", "NAME|N",
+      "Read this channel alone, by name or number from 0, without masks and opacity (default: the only or first "
+      "fitting one, with them)",
+      options.channel);
+  line.option("--part", "NAME|N", "Read this part of an OpenEXR file of several, by name or number from 0",
+              options.part);
+  line.option(
+      "--encoding", "NAME",
+      "Decode elevations packed into the colours of an 8-bit PNG: terrarium, mapbox or rgba-float (default: decode, "
+      "with a warning, where the bytes leave no doubt)",
+      [&](const std::string& text) {
+        (void)parse_word(text, {"terrarium", "mapbox", "rgba-float"});
+        options.channel = text;  // one more channel of the picture, as which archives record it
+      });
+  line.exclusive({"--channel", "--encoding"});
+  line.option(
+      "--registration", "KIND",
+      "Place samples: area (middle of a pixel), point (on posts) or auto (default: as the file says, else areas "
+      "with and posts without a georeference)",
+      [&](const std::string& text) {
+        const std::size_t word = parse_word(text, {"area", "point", "auto"});
+        options.registration.reset();
+        if (word == 0) options.registration = Registration::kArea;
+        if (word == 1) options.registration = Registration::kPoint;
+      });
+  line.option("--nodata", "VALUE,...", "Treat these raw values as voids, instead of the file's; NaN always is one",
+              [&](const std::string& text) {
+                try {
+                  options.void_values = parse_numbers(text);
+                } catch (const Error&) {
+                  throw Error(ErrorCode::kInvalidArgument,
+                              "found '" + text + "', must be a number or nan, or several with commas between them");
+                }
+              });
+  line.option("--valid-range", "LO:HI", "Treat elevations outside as voids (default: all are valid)",
+              [&](const std::string& text) { options.voids.valid_range = parse_range(text); });
+  line.flag("--fill", "Fill voids smoothly, up to --fill-distance from the nearest elevation", options.voids.fill);
+  line.option(
+      "--fill-distance", "D", "Fill voids as far as D samples, 1 to 4096 (default 100); implies --fill",
+      [&](const std::string& text) { options.voids.fill_distance = parse_whole_number(text, 1, kMaxFillDistance); });
+  line.option("--z-scale", "FACTOR", "Multiply raw values by FACTOR, then add --z-offset (default: the file's, else 1)",
+              [&](const std::string& text) {
+                const double scale = parse_number(text);
+                if (scale == 0.0) throw Error(ErrorCode::kInvalidArgument, "found '" + text + "', must not be 0");
+                options.z_scale = scale;
+              });
+  line.option("--z-offset", "NUMBER", "Add NUMBER to scaled values (default: the file's, else 0)",
+              [&](const std::string& text) { options.z_offset = parse_number(text); });
+  line.option("--raw", "WxH:TYPE",
+              "Read bare samples: columns, rows, and u8, i8, or u16, i16, u32, i32, f32, f64 with le or be, as in "
+              "200x200:u16le",
+              [&](const std::string& text) { options.raw = raw_layout_from_string(text); });
+  line.option("--sample-spacing", "METRES",
+              "Set the distance of neighbouring samples, instead of the file's: metres, or with a unit as in 100ft",
+              [&](const std::string& text) { options.spacing = parse_length(text).value; });
+}
+
+std::unique_ptr<HeightSource> open_input(const std::string& path, const OpenOptions& options) {
+  return with_voids_treated(open_raster(path, options), options.voids);
+}
+
+}  // namespace isohf::cli

@@ -1,0 +1,73 @@
+#include "options/options_texture.h"
+
+#include <fmt/format.h>
+
+#include <bit>
+
+#include "formats/oiio/photo.h"
+#include "isohf/error.h"
+#include "isohf/surface/photo/texture_cutter.h"
+#include "options/describe.h"
+#include "options/option_values.h"
+
+namespace isohf::cli {
+
+void add_texture_options(CommandLine& line, TextureOptions& options) {
+  const auto take = [&options](const char* name) {
+    if (options.first_given.empty()) options.first_given = name;
+  };
+  line.group("Textures");
+  line.option(
+      "--texture", "PHOTO",
+      "Cut a texture for every tile out of this picture, which lies as its georeference says, or covers exactly "
+      "the input's ground; any format that OpenImageIO reads, larger than memory if need be",
+      options.photo);
+  line.option(
+      "--texture-format", "KIND", "png or jpeg (default jpeg, png where the photo has alpha)",
+      [&options, take](const std::string& text) {
+        options.request.format = parse_word(text, {"png", "jpeg"}) == 0 ? TextureFormat::kPng : TextureFormat::kJpeg;
+        take("--texture-format");
+      });
+  line.option(
+      "--texture-size", "N",
+      "Texels on a side at most, a power of two from 64 to 4096 (default 1024); fewer where the photo has no more",
+      [&options, take](const std::string& text) {
+        const std::int64_t size = parse_whole_number(text, kMinTextureSize, kMaxTextureSize);
+        if (!std::has_single_bit(static_cast<std::uint64_t>(size))) {
+          throw Error(ErrorCode::kInvalidArgument, fmt::format("found '{}', must be a power of two", text));
+        }
+        options.request.max_size = static_cast<int>(size);
+        take("--texture-size");
+      });
+  line.option("--texture-quality", "N", "Quality of JPEG textures, 1 to 100 (default 90)",
+              [&options, take](const std::string& text) {
+                options.request.jpeg_quality = static_cast<int>(parse_whole_number(text, 1, 100));
+                take("--texture-quality");
+              });
+}
+
+void check_texture_options(const TextureOptions& options) {
+  if (options.photo.empty() && !options.first_given.empty()) {
+    throw Error(ErrorCode::kInvalidArgument, fmt::format("convert: {} needs --texture PHOTO", options.first_given));
+  }
+}
+
+std::unique_ptr<PhotoSource> open_texture(const TextureOptions& options, std::optional<TextureRequest>& request) {
+  if (options.photo.empty()) return nullptr;
+  std::unique_ptr<PhotoSource> photo = open_photo(options.photo);
+  request = options.request;
+  request->photo = photo.get();
+  return photo;
+}
+
+std::string describe_textures(const TextureInfo& info, double pixels_per_texel) {
+  std::string text =
+      fmt::format("{0} x {0} texels a tile, {1} levels, {2}{3}, {4}: {5} members, {6}", info.size, info.levels,
+                  to_string(info.format), info.format == TextureFormat::kJpeg ? fmt::format(" {}", info.quality) : "",
+                  info.channels == 1 ? "grey" : (info.channels == 3 ? "RGB" : "RGBA"), describe_count(info.members),
+                  describe_bytes(info.bytes));
+  if (pixels_per_texel > 0.0) text += fmt::format("; {:.3g} photo pixels a texel", pixels_per_texel);
+  return text;
+}
+
+}  // namespace isohf::cli

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "isohf/convert/convert.h"
+#include "isohf/surface/photo/photo_source.h"
+#include "options/command_line.h"
+
+namespace isohf::cli {
+
+/// --texture and what belongs to it.
+struct TextureOptions {
+  std::string photo;  ///< empty: no textures
+  TextureRequest request;
+  std::string first_given;  ///< of the others, for the message where --texture is missing
+};
+
+void add_texture_options(CommandLine& line, TextureOptions& options);
+/// Throws Error{kInvalidArgument} where there is no photo for the other options.
+void check_texture_options(const TextureOptions& options);
+
+/// Opens the photo and fills `request`, which points to it; nullptr where none was asked for.
+[[nodiscard]] std::unique_ptr<PhotoSource> open_texture(const TextureOptions& options,
+                                                        std::optional<TextureRequest>& request);
+
+/// "1024 x 1024 texels a tile, 8 levels, jpeg 90: 1040 members, 12.3 MB; 0.87 photo pixels a texel". 0 pixels: left
+/// out.
+[[nodiscard]] std::string describe_textures(const TextureInfo& info, double pixels_per_texel);
+
+}  // namespace isohf::cli

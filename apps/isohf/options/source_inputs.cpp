@@ -1,0 +1,146 @@
+#include "options/source_inputs.h"
+
+#include <fmt/format.h>
+#include <oneapi/tbb/task_arena.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <span>
+
+#include "isohf/archive/container/content_hash.h"
+#include "isohf/error.h"
+#include "isohf/raster.h"
+#include "isohf/surface/decorate/filled_source.h"
+#include "options/option_values.h"
+
+namespace isohf::cli {
+namespace {
+
+constexpr std::size_t kFilesNamed = 8;
+
+std::string sha256_of(const std::string& text) {
+  Sha256 hash;
+  hash.add(std::as_bytes(std::span(text)));
+  return hex(hash.finish());
+}
+
+std::string file_name(const std::string& path) {
+  return std::filesystem::path(path).filename().string();
+}
+
+const char* to_string(OverlapRule rule) {
+  return rule == OverlapRule::kLast ? "last" : "first";
+}
+
+/// The record does not depend on the order in which the files were named: finest first, by their places.
+MosaicRecord record_of(const MosaicPlan& plan, OverlapRule rule) {
+  MosaicRecord record;
+  record.overlap = to_string(rule);
+  std::string names;
+  for (auto layer = plan.layers.rbegin(); layer != plan.layers.rend(); ++layer) {
+    for (const MosaicMember& member : layer->members) {
+      ++record.files;
+      const std::string name = file_name(member.path);
+      names += name + "\n";
+      if (record.first_names.size() < kFilesNamed) record.first_names.push_back(name);
+    }
+  }
+  record.names_sha256 = sha256_of(names);
+  return record;
+}
+
+/// Two mosaics with the same fingerprint are made of the same files, named in the same order.
+std::string fingerprint_of(const MosaicPlan& plan, OverlapRule rule) {
+  std::vector<const MosaicMember*> members;
+  for (const MosaicLayer& layer : plan.layers) {
+    for (const MosaicMember& member : layer.members) members.push_back(&member);
+  }
+  std::sort(members.begin(), members.end(),
+            [](const MosaicMember* a, const MosaicMember* b) { return a->order < b->order; });
+  std::string text;
+  for (const MosaicMember* member : members) {
+    text += fmt::format("{} {} bytes {}.{:09} at {} {}\n", file_name(member->path), member->size_bytes,
+                        member->changed_s, member->changed_ns, member->column, member->row);
+  }
+  return fmt::format("mosaic {} {} files {}", to_string(rule), members.size(), sha256_of(text));
+}
+
+void take_box(const SourceInputs& inputs, OpenedInputs& opened) {
+  if (!inputs.box) return;
+  const BoundingBox& box = *inputs.box;
+  opened.source = crop(std::move(opened.source), box);
+  if (!opened.note.fingerprint.empty()) opened.note.fingerprint += " ";
+  opened.note.fingerprint += fmt::format("bbox {} {} {} {}", box.west, box.south, box.east, box.north);
+}
+
+}  // namespace
+
+void add_mosaic_options(CommandLine& line, SourceInputs& inputs) {
+  line.option("--bbox", "W,S,E,N",
+              "Only the part between these coordinates of the input's reference system, whole samples",
+              [&](const std::string& text) { inputs.box = bounding_box_from_string(text); });
+  line.group("Several inputs");
+  line.option(
+      "--overlap", "RULE",
+      "Where inputs of one resolution overlap, the last (default) or the first named shows; finer ones always lie "
+      "over coarser ones, and voids show what lies below",
+      [&](const std::string& text) {
+        inputs.overlap = parse_word(text, {"last", "first"}) == 0 ? OverlapRule::kLast : OverlapRule::kFirst;
+        inputs.overlap_given = true;
+      });
+  line.flag("--require-complete", "Fail where tiles are missing or ground lies in no input, and name it",
+            inputs.require_complete);
+  line.flag("--recursive", "Look into the folders of a folder as well", inputs.recursive);
+}
+
+RecordedOptions recorded_options(const CommandLine& line) {
+  RecordedOptions recorded;
+  for (auto& [name, text] : line.texts_in({"Input", "Several inputs"})) {
+    // Neither what files are found by nor what the archive calls them: the same samples, the same bytes.
+    const bool says_how = name != "--require-complete" && name != "--source-name" && name != "--recursive";
+    if (says_how) recorded.emplace_back(name.substr(2), text);
+  }
+  for (auto& [name, text] : line.texts_in({"Ground"})) {
+    if (name == "--geoid") recorded.emplace_back("geoid", file_name(text));
+  }
+  return recorded;
+}
+
+Arguments arguments_from(const RecordedOptions& recorded, const CommandLine& line) {
+  Arguments arguments;
+  for (const auto& [name, text] : recorded) {
+    const bool names_channel = name == "channel" || name == "encoding";
+    const bool given = names_channel ? line.given("--channel") || line.given("--encoding") : line.given("--" + name);
+    if (!given) arguments.push_back(fmt::format("--{}={}", name, text));
+  }
+  return arguments;
+}
+
+OpenedInputs open_inputs(std::vector<std::string> files, const SourceInputs& inputs, const OpenOptions& options,
+                         int threads) {
+  OpenedInputs opened;
+  opened.note.options = inputs.as_given;
+  if (files.size() == 1) {
+    opened.source = with_voids_treated(open_raster(files.front(), options), options.voids);
+    opened.files = std::move(files);
+    take_box(inputs, opened);
+    return opened;
+  }
+  const std::string name = fmt::format("mosaic of {} files", files.size());
+  oneapi::tbb::task_arena arena(threads > 0 ? threads : oneapi::tbb::task_arena::automatic);
+  MosaicPlan plan = arena.execute([&] { return plan_mosaic(files, options, inputs.box); });
+  if (inputs.require_complete && plan.holes.samples > 0) {
+    throw Error(ErrorCode::kIo, name + ": --require-complete: " + plan.holes.describe(MosaicHoles::kMostNamed));
+  }
+  opened.note.name = name;
+  opened.note.mosaic = record_of(plan, inputs.overlap);
+  opened.note.fingerprint = fingerprint_of(plan, inputs.overlap);
+  // Voids are filled across the files' borders.
+  opened.source =
+      with_voids_treated(std::make_unique<MosaicSource>(name, std::move(plan), options, inputs.overlap), options.voids);
+  opened.files = std::move(files);
+  take_box(inputs, opened);
+  return opened;
+}
+
+}  // namespace isohf::cli

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "formats/decorate/cropped_source.h"
+#include "formats/mosaic/mosaic_source.h"
+#include "formats/registry.h"
+#include "isohf/convert/convert.h"
+#include "isohf/raster.h"
+#include "options/command_line.h"
+
+namespace isohf::cli {
+
+/// Options that say how an input is read, by name, without dashes, with their text: as an archive records them.
+using RecordedOptions = std::vector<std::pair<std::string, std::string>>;
+
+/// The inputs of a command that form one source, and how they are joined.
+struct SourceInputs {
+  std::vector<std::string> names;  ///< files, folders, patterns and @lists, as on the command line
+  OverlapRule overlap = OverlapRule::kLast;
+  bool overlap_given = false;
+  bool require_complete = false;
+  bool recursive = false;
+  std::optional<BoundingBox> box;           ///< of the whole, only this part
+  std::optional<RecordedOptions> as_given;  ///< for the archive's metadata
+};
+
+/// --bbox, and the group "Several inputs": --overlap, --require-complete, --recursive.
+void add_mosaic_options(CommandLine& line, SourceInputs& inputs);
+
+/// After parsing: the options of the groups "Input" and "Several inputs" that say how samples are read, and of a geoid
+/// the file's name, not its folder.
+[[nodiscard]] RecordedOptions recorded_options(const CommandLine& line);
+/// The arguments that the recorded options make, of those that `line` was not given.
+[[nodiscard]] Arguments arguments_from(const RecordedOptions& recorded, const CommandLine& line);
+
+/// Inputs, opened as one source.
+struct OpenedInputs {
+  std::vector<std::string> files;
+  std::unique_ptr<HeightSource> source;
+  SourceNote note;  ///< for the archive's metadata and --resume; says nothing of a single file
+};
+
+/// Opens what `files`, as expand_inputs gives them, are together: the file itself where it is one, else their mosaic.
+/// With --require-complete ground without a file is an Error{kIo}. threads: 0 for all cores.
+[[nodiscard]] OpenedInputs open_inputs(std::vector<std::string> files, const SourceInputs& inputs,
+                                       const OpenOptions& options, int threads);
+
+}  // namespace isohf::cli

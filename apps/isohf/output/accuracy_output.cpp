@@ -1,0 +1,207 @@
+#include "output/accuracy_output.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "isohf/archive.h"
+#include "isohf/restore/archive_geometry.h"
+#include "options/describe.h"
+#include "output/archive_places.h"
+#include "output/progress.h"
+
+namespace isohf::cli {
+namespace {
+
+using nlohmann::ordered_json;
+
+const char* to_word(Diagonal diagonal) {
+  return diagonal == Diagonal::kFalling ? "nw-se" : "sw-ne";
+}
+
+double ratio(double a, double b) {
+  return b > 0.0 ? a / b : 0.0;
+}
+
+ordered_json json_from(const OrthoErrors& ortho) {
+  return {{"spacing", ortho.spacing},
+          {"vertices", ortho.vertices},
+          {"triangles", 2 * ortho.vertices},
+          {"samples_compared", ortho.compared},
+          {"diagonal", to_word(ortho.diagonal)},
+          {"rms", ortho.rms},
+          {"rms_other_diagonal", ortho.rms_of_other},
+          {"max", ortho.max},
+          {"p99", ortho.p99},
+          {"psnr_db", ortho.psnr_db},
+          {"clamped", ortho.clamped},
+          {"plain_bytes", ortho.plain_bytes}};
+}
+
+void add_lattice(const LatticeReport& lattice, ordered_json& json) {
+  json["iso"] = {{"vertices", lattice.vertices},
+                 {"triangles", lattice.triangles},
+                 {"tile_bytes", lattice.tile_bytes},
+                 {"plain_bytes", lattice.plain_bytes}};
+  json["ortho"] = json_from(lattice.twin);
+  json["ortho_at_equal_rms"] = lattice.equal ? json_from(*lattice.equal) : ordered_json(nullptr);
+}
+
+std::string line(const char* what, const std::string& value) {
+  return fmt::format("{:<12} {}\n", what, value);
+}
+
+/// "12.3 % less" or "more".
+std::string difference(double share) {
+  return fmt::format("{:.1f} % {}", 100.0 * std::abs(share - 1.0), share <= 1.0 ? "less" : "more");
+}
+
+std::string text_from(const LatticeReport& lattice, double iso_rms) {
+  const OrthoErrors& twin = lattice.twin;
+  std::string text = line("iso", fmt::format("{} triangles, {} vertices; {} of tiles, {} coded plainly",
+                                             describe_count(lattice.triangles), describe_count(lattice.vertices),
+                                             describe_bytes(lattice.tile_bytes), describe_bytes(lattice.plain_bytes)));
+  text +=
+      line("ortho", fmt::format("as many: squares of {:.6g} cut {}: rms {:.6g}, 99 % within {:.6g}, largest {:.6g}, "
+                                "PSNR {:.1f} dB; {} coded plainly",
+                                twin.spacing, twin.diagonal == Diagonal::kFalling ? "NW-SE" : "SW-NE", twin.rms,
+                                twin.p99, twin.max, twin.psnr_db, describe_bytes(twin.plain_bytes)));
+  if (twin.rms > 0.0) {
+    text += line("", fmt::format("iso errs by {} than ortho (rms)", difference(iso_rms / twin.rms)));
+  }
+  if (lattice.equal) {
+    const OrthoErrors& equal = *lattice.equal;
+    const auto plain_bytes = static_cast<double>(equal.plain_bytes);
+    text += line("equal rms",
+                 fmt::format("ortho takes {} triangles, {:.3f} times iso's (squares of {:.6g}, rms {:.6g}); {} coded "
+                             "plainly, {:.3f} times iso's",
+                             describe_count(2 * equal.vertices),
+                             ratio(static_cast<double>(equal.vertices), static_cast<double>(lattice.vertices)),
+                             equal.spacing, equal.rms, describe_bytes(equal.plain_bytes),
+                             ratio(plain_bytes, static_cast<double>(lattice.plain_bytes))));
+  } else if (iso_rms > 0.0 && twin.rms > 0.0) {
+    text += line("equal rms", "not met by ortho with a quarter to four times the triangles");
+  }
+  return text;
+}
+
+std::string text_from(const VertexReport& report) {
+  return line("vertices", fmt::format("{} resampled once more: largest difference {:.6g}, at most {:.6g} is rounding{}",
+                                      describe_count(report.vertices), report.worst, report.bound,
+                                      report.clamped > 0 ? fmt::format("; {} clamped", describe_count(report.clamped))
+                                                         : std::string()));
+}
+
+ordered_json json_from(const VertexReport& report) {
+  return {{"checked", report.vertices}, {"voids", report.voids}, {"clamped", report.clamped},
+          {"wrong", report.wrong},      {"bound", report.bound}, {"worst", report.worst}};
+}
+
+std::string text_from(const AccuracyReport& report, const std::string& input) {
+  std::string text = line("against", fmt::format("{}: {} of {} samples compared, {} void in the input", input,
+                                                 describe_count(report.samples_compared),
+                                                 describe_count(report.samples), describe_count(report.samples_void)));
+  if (report.samples_lost + report.samples_invented > 0) {
+    text += line("voids", fmt::format("{} samples lie in voids of the surface, {} voids lie on it; {} and {} of them "
+                                      "away from borders of voids",
+                                      describe_count(report.samples_lost), describe_count(report.samples_invented),
+                                      describe_count(report.lost_inside), describe_count(report.invented_inside)));
+  }
+  text +=
+      line("error", fmt::format("rms {:.6g}, 99 % within {:.6g}, largest {:.6g} at x {:.9g} z {:.9g}, PSNR {:.1f} dB",
+                                report.rms, report.p99, report.max, report.worst.x, report.worst.z, report.psnr_db));
+  if (report.random_points > 0) {
+    text += line("between", fmt::format("rms {:.6g}, largest {:.6g} at {} random places", report.random_rms,
+                                        report.random_max, describe_count(report.random_points)));
+  }
+  return text;
+}
+
+ordered_json json_from(const AccuracyReport& report) {
+  return {{"samples", report.samples},
+          {"samples_void", report.samples_void},
+          {"samples_compared", report.samples_compared},
+          {"samples_lost", report.samples_lost},
+          {"lost_inside", report.lost_inside},
+          {"samples_invented", report.samples_invented},
+          {"invented_inside", report.invented_inside},
+          {"rms", report.rms},
+          {"max", report.max},
+          {"p99", report.p99},
+          {"psnr_db", report.psnr_db},
+          {"worst", {{"x", report.worst.x}, {"z", report.worst.z}}},
+          {"random_points", report.random_points},
+          {"random_rms", report.random_rms},
+          {"random_max", report.random_max}};
+}
+
+}  // namespace
+
+Accuracy measure_accuracy(const std::string& archive, HeightSource& source, std::int64_t random_points, bool with_ortho,
+                          const WorkOptions& work, const CommonOptions& common, const std::atomic<bool>& cancel) {
+  ArchiveReader reader(archive);
+  if (is_warped(reader.metadata())) understand_source(reader);
+  ProgressDisplay display(work.progress, common.quiet, common.verbose);
+  Accuracy accuracy;
+  accuracy.vertices = check_vertices(
+      reader, source, work.threads,
+      [&](std::int64_t done, std::int64_t total) { display.update("resample", "rows", done, total); }, cancel);
+  accuracy.surface = compare_with_source(
+      reader, source, random_points, work.threads,
+      [&](std::int64_t done, std::int64_t total) { display.update("compare", "rows", done, total); }, cancel);
+  // An ortho mesh of the map would have to be resampled through the projection as well.
+  if (with_ortho && !is_warped(reader.metadata())) {
+    accuracy.lattice = compare_lattices(
+        reader, source, accuracy.surface.rms, work.threads,
+        [&](int pass, std::int64_t done, std::int64_t total) {
+          display.update(fmt::format("ortho {}", pass), "rows", done, total);
+        },
+        cancel);
+  }
+  return accuracy;
+}
+
+MeasuredError measured_error(const AccuracyReport& report) {
+  MeasuredError found;
+  found.info.compared = report.samples_compared;
+  found.info.lost = report.samples_lost;
+  found.info.rms = report.rms;
+  found.info.max = report.max;
+  for (const ErrorPeak& peak : report.peaks) found.worst.push_back({peak.column, peak.row, 1, 1});
+  return found;
+}
+
+std::string describe_accuracy(const AccuracyInfo& info, const std::string& unit) {
+  return fmt::format("rms {:.4g}{}, largest {:.4g}{} over {} input samples{}{}", info.rms, unit, info.max, unit,
+                     describe_count(info.compared),
+                     info.lost > 0 ? fmt::format("; {} beside voids have no surface", describe_count(info.lost)) : "",
+                     info.max_error ? fmt::format("; {}{} was allowed", *info.max_error, unit) : "");
+}
+
+ordered_json json_from_estimate(const std::optional<ErrorEstimate>& estimate) {
+  if (!estimate) return nullptr;
+  return {{"rms", estimate->rms}, {"largest_seen", estimate->largest}, {"samples", estimate->samples}};
+}
+
+std::string describe_estimate(const std::optional<ErrorEstimate>& estimate, const std::string& unit) {
+  if (!estimate)
+    return "error not estimated: memory is limited, or the input cannot be read here and there in little time";
+  return fmt::format("error of about {:.3g}{} (rms); the largest of {} samples looked at is {:.3g}{}: an estimate",
+                     estimate->rms, unit, describe_count(estimate->samples), estimate->largest, unit);
+}
+
+ordered_json json_from(const Accuracy& accuracy) {
+  ordered_json json = json_from(accuracy.surface);
+  json["vertices"] = json_from(accuracy.vertices);
+  if (accuracy.lattice) add_lattice(*accuracy.lattice, json);
+  return json;
+}
+
+std::string text_from(const Accuracy& accuracy, const std::string& input) {
+  std::string text = text_from(accuracy.surface, input) + text_from(accuracy.vertices);
+  if (accuracy.lattice) text += text_from(*accuracy.lattice, accuracy.surface.rms);
+  return text;
+}
+
+}  // namespace isohf::cli

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <atomic>
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <string>
+
+#include "isohf/convert/surface_error.h"
+#include "isohf/verify/accuracy/against_source.h"
+#include "isohf/verify/accuracy/lattice_report.h"
+#include "isohf/verify/vertex_check.h"
+#include "options/options_common.h"
+
+namespace isohf::cli {
+
+/// Random places to compare beside the samples where nothing else is asked for.
+inline constexpr std::int64_t kRandomPoints = 100000;
+
+/// What convert --report and verify --against measure and print.
+struct Accuracy {
+  VertexReport vertices;
+  AccuracyReport surface;
+  std::optional<LatticeReport> lattice;  ///< nullopt where it was not asked for
+};
+
+/// Opens the archive; the source is the one that it was made from.
+[[nodiscard]] Accuracy measure_accuracy(const std::string& archive, HeightSource& source, std::int64_t random_points,
+                                        bool with_ortho, const WorkOptions& work, const CommonOptions& common,
+                                        const std::atomic<bool>& cancel);
+
+/// The same for the archive's metadata.
+[[nodiscard]] MeasuredError measured_error(const AccuracyReport& report);
+/// "rms 4.7, largest 61 over 1,442,401 samples".
+[[nodiscard]] std::string describe_accuracy(const AccuracyInfo& info, const std::string& unit);
+[[nodiscard]] nlohmann::ordered_json json_from_estimate(const std::optional<ErrorEstimate>& estimate);
+/// Says that it is an estimate.
+[[nodiscard]] std::string describe_estimate(const std::optional<ErrorEstimate>& estimate, const std::string& unit);
+
+/// Members as docs/cli.md has them.
+[[nodiscard]] nlohmann::ordered_json json_from(const Accuracy& accuracy);
+/// A few lines; `input` is the source's name.
+[[nodiscard]] std::string text_from(const Accuracy& accuracy, const std::string& input);
+
+}  // namespace isohf::cli

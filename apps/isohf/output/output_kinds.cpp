@@ -1,0 +1,62 @@
+#include "output/output_kinds.h"
+
+#include <nlohmann/json.hpp>
+
+#include "formats/registry.h"
+#include "formats/write/raster_sidecars.h"
+#include "formats/write/raster_sink.h"
+#include "isohf/archive/writer.h"
+#include "isohf/base/output_file.h"
+#include "isohf/error.h"
+#include "output/output_file.h"
+
+namespace isohf::cli {
+namespace {
+
+[[noreturn]] void refuse(const std::string& output, const std::string& kind, const std::string& remedy) {
+  throw Error(ErrorCode::kInvalidArgument, {output, "exists and is " + kind, "", remedy});
+}
+
+/// What a file is that somebody was about to lose.
+std::string kind_of(const std::string& path) {
+  const Format* found = nullptr;
+  try {
+    found = native_format_of(path, {});
+  } catch (const Error&) {
+    // What cannot be looked into is told to be nothing of ours.
+  }
+  return found != nullptr ? std::string("a raster (") + found->name + ")" : "no isohf archive";
+}
+
+}  // namespace
+
+void check_archive_output(const std::vector<std::string>& inputs, const std::string& output, bool overwrite) {
+  const std::string place = check_output_place(inputs, output);
+  if (!head_of_file(place, 1).empty() && !is_archive_file(place)) {
+    refuse(output, kind_of(place), "an archive replaces only archives, choose another name");
+  }
+  check_output_file(inputs, output, overwrite);
+}
+
+void check_raster_output(const std::vector<std::string>& inputs, const std::string& output, bool overwrite) {
+  std::vector<std::string> also_written;
+  for (const std::string& sidecar : sidecar_paths(output)) {
+    also_written.push_back(sidecar);
+    also_written.push_back(sidecar + ".part");
+  }
+  static_cast<void>(check_output_place(inputs, output, std::move(also_written)));
+  check_raster_target(output, overwrite);
+}
+
+void check_report_output(const std::vector<std::string>& inputs, const std::string& output, bool overwrite) {
+  constexpr std::size_t kMostBytes = std::size_t{1} << 20U;
+  const std::vector<std::byte> head = head_of_file(check_output_place(inputs, output), kMostBytes);
+  const auto* begin = reinterpret_cast<const char*>(head.data());
+  const auto json = nlohmann::json::parse(begin, begin + head.size(), nullptr, false);
+  if (!head.empty() && !(json.is_object() && json.contains("rms"))) {
+    refuse(output, "no report of isohf, which alone is replaced by one", "choose another name");
+  }
+  check_output_file(inputs, output, overwrite);
+}
+
+}  // namespace isohf::cli

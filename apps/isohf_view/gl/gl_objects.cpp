@@ -1,0 +1,89 @@
+#include "gl/gl_objects.h"
+
+#include <fmt/format.h>
+
+#include "isohf/error.h"
+
+namespace isohf::view {
+namespace {
+
+std::string shader_log(GLuint shader) {
+  GLint size = 0;
+  glGetShaderiv(shader, GL_INFO_LOG_LENGTH, &size);
+  std::string log(static_cast<std::size_t>(size > 0 ? size : 0), '\0');
+  if (size > 0) glGetShaderInfoLog(shader, size, nullptr, log.data());
+  return log;
+}
+
+void attach(GLuint program, const std::string& name, GLenum stage, const std::string& source) {
+  const GLuint shader = glCreateShader(stage);
+  const char* text = source.c_str();
+  glShaderSource(shader, 1, &text, nullptr);
+  glCompileShader(shader);
+  GLint done = GL_FALSE;
+  glGetShaderiv(shader, GL_COMPILE_STATUS, &done);
+  const std::string log = done == GL_TRUE ? std::string() : shader_log(shader);
+  glAttachShader(program, shader);
+  glDeleteShader(shader);  // lives on with the program
+  if (done != GL_TRUE) {
+    throw Error(ErrorCode::kUnsupported, fmt::format("the GL driver refused the {} {} shader: {}", name,
+                                                     stage == GL_VERTEX_SHADER ? "vertex" : "fragment", log));
+  }
+}
+
+}  // namespace
+
+Program::Program(const std::string& name, const std::string& vertex_source, const std::string& fragment_source,
+                 const std::vector<std::string>& feedback) {
+  const GLuint program = name_.get();
+  attach(program, name, GL_VERTEX_SHADER, vertex_source);
+  attach(program, name, GL_FRAGMENT_SHADER, fragment_source);
+  if (!feedback.empty()) {
+    std::vector<const char*> outputs;
+    for (const std::string& output : feedback) outputs.push_back(output.c_str());
+    glTransformFeedbackVaryings(program, static_cast<GLsizei>(outputs.size()), outputs.data(), GL_INTERLEAVED_ATTRIBS);
+  }
+  glLinkProgram(program);
+  GLint done = GL_FALSE;
+  glGetProgramiv(program, GL_LINK_STATUS, &done);
+  if (done != GL_TRUE) {
+    GLint size = 0;
+    glGetProgramiv(program, GL_INFO_LOG_LENGTH, &size);
+    std::string log(static_cast<std::size_t>(size > 0 ? size : 0), '\0');
+    if (size > 0) glGetProgramInfoLog(program, size, nullptr, log.data());
+    throw Error(ErrorCode::kUnsupported, fmt::format("the GL driver could not link the {} shaders: {}", name, log));
+  }
+}
+
+GLint Program::uniform(const char* uniform_name) const {
+  auto found = places_.find(uniform_name);
+  if (found == places_.end()) {
+    found = places_.emplace(uniform_name, glGetUniformLocation(name_.get(), uniform_name)).first;
+  }
+  return found->second;
+}
+
+void require_gl() {
+  const int version = epoxy_gl_version();
+  if (version >= 33 && epoxy_is_desktop_gl()) return;
+  throw Error(ErrorCode::kUnsupported,
+              fmt::format("OpenGL 3.3 is required, this machine offers {}.{}", version / 10, version % 10));
+}
+
+std::string gl_description() {
+  const auto* renderer = reinterpret_cast<const char*>(glGetString(GL_RENDERER));
+  const int version = epoxy_gl_version();
+  return fmt::format("{}, OpenGL {}.{}", renderer == nullptr ? "unknown renderer" : renderer, version / 10,
+                     version % 10);
+}
+
+void check_gl(const char* doing) {
+  const GLenum error = glGetError();
+  if (error == GL_NO_ERROR) return;
+  if (error == GL_OUT_OF_MEMORY) {
+    throw Error(ErrorCode::kOutOfMemory, fmt::format("{}: the GL driver is out of memory", doing));
+  }
+  throw Error(ErrorCode::kUnsupported, fmt::format("{}: GL error 0x{:04x}", doing, error));
+}
+
+}  // namespace isohf::view

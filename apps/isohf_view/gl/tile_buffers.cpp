@@ -1,0 +1,166 @@
+#include "gl/tile_buffers.h"
+
+#include <algorithm>
+
+#include "isohf/base/assert.h"
+#include "isohf/lattice.h"
+
+namespace isohf::view {
+namespace {
+
+std::vector<std::int16_t> object_places(const TileShape& shape) {
+  std::vector<std::int16_t> places;
+  places.reserve(static_cast<std::size_t>(2 * shape.stored_vertex_count()));
+  for (int row = 0; row < shape.rows(); ++row) {
+    for (int column = 0; column < shape.columns(); ++column) {
+      const ObjectVertex place = object_from_grid(shape, GridVertex{column, row});
+      places.push_back(static_cast<std::int16_t>(place.x));
+      places.push_back(static_cast<std::int16_t>(place.z));
+    }
+  }
+  return places;
+}
+
+template <typename T>
+GLsizeiptr upload_static(GLenum target, const std::vector<T>& values) {
+  const auto size = static_cast<GLsizeiptr>(values.size() * sizeof(T));
+  glBufferData(target, size, values.data(), GL_STATIC_DRAW);
+  return size;
+}
+
+constexpr GLuint kShadowAttribute = 4;
+
+const void* offset_pointer(std::size_t bytes) {
+  return reinterpret_cast<const void*>(bytes);
+}
+
+}  // namespace
+
+SharedGeometry::SharedGeometry(const TileShape& shape, const IndexArrays& arrays) : shape_(shape) {
+  const bool fits_16_bits = shape.stored_vertex_count() <= 65536;
+  index_type_ = fits_16_bits ? GL_UNSIGNED_SHORT : GL_UNSIGNED_INT;
+  const std::size_t index_bytes = fits_16_bits ? 2 : 4;
+
+  std::vector<std::uint32_t> all;
+  for (const auto& strip : arrays.strips) {
+    strip_offsets_bytes_.push_back(all.size() * index_bytes);
+    strip_counts_.push_back(static_cast<GLsizei>(strip.size()));
+    all.insert(all.end(), strip.begin(), strip.end());
+  }
+  stitch_offset_bytes_ = all.size() * index_bytes;
+  for (const std::size_t count : arrays.stitch_counts) stitch_counts_.push_back(static_cast<GLsizei>(count));
+  all.insert(all.end(), arrays.stitch.begin(), arrays.stitch.end());
+
+  glBindVertexArray(0);
+  glBindBuffer(GL_ARRAY_BUFFER, xz_.get());
+  bytes_ += static_cast<std::uint64_t>(upload_static(GL_ARRAY_BUFFER, object_places(shape)));
+  // The element array belongs to a vertex array's state: fill the buffer through another target.
+  glBindBuffer(GL_COPY_WRITE_BUFFER, indices_.get());
+  if (fits_16_bits) {
+    bytes_ += static_cast<std::uint64_t>(
+        upload_static(GL_COPY_WRITE_BUFFER, std::vector<std::uint16_t>(all.begin(), all.end())));
+  } else {
+    bytes_ += static_cast<std::uint64_t>(upload_static(GL_COPY_WRITE_BUFFER, all));
+  }
+  check_gl("uploading the shared vertex and index arrays");
+}
+
+void SharedGeometry::draw_strip(int level) const {
+  const auto i = static_cast<std::size_t>(level);
+  glDrawElements(GL_TRIANGLE_STRIP, strip_counts_[i], index_type_, offset_pointer(strip_offsets_bytes_[i]));
+}
+
+void SharedGeometry::draw_stitch(int level) const {
+  glDrawElements(GL_TRIANGLES, stitch_counts_[static_cast<std::size_t>(level)], index_type_,
+                 offset_pointer(stitch_offset_bytes_));
+}
+
+std::vector<std::uint32_t> SharedGeometry::read(std::size_t offset_bytes, GLsizei count) const {
+  const auto size = static_cast<std::size_t>(count);
+  const auto offset = static_cast<GLintptr>(offset_bytes);
+  glBindBuffer(GL_COPY_READ_BUFFER, indices_.get());
+  if (index_type_ == GL_UNSIGNED_INT) {
+    std::vector<std::uint32_t> indices(size);
+    glGetBufferSubData(GL_COPY_READ_BUFFER, offset, static_cast<GLsizeiptr>(size * 4), indices.data());
+    return indices;
+  }
+  std::vector<std::uint16_t> indices(size);
+  glGetBufferSubData(GL_COPY_READ_BUFFER, offset, static_cast<GLsizeiptr>(size * 2), indices.data());
+  return {indices.begin(), indices.end()};
+}
+
+std::vector<std::uint32_t> SharedGeometry::read_strip(int level) const {
+  const auto i = static_cast<std::size_t>(level);
+  return read(strip_offsets_bytes_[i], strip_counts_[i]);
+}
+
+std::vector<std::uint32_t> SharedGeometry::read_stitch(int level) const {
+  return read(stitch_offset_bytes_, stitch_counts_[static_cast<std::size_t>(level)]);
+}
+
+TileSlot::TileSlot(const SharedGeometry& shared)
+    : vertices_(static_cast<std::size_t>(shared.shape().stored_vertex_count())),
+      rim_(static_cast<std::size_t>(shared.shape().columns()) + 2) {
+  constexpr GLsizei kStep = sizeof(std::uint16_t);
+  glBindVertexArray(array_.get());
+  glBindBuffer(GL_ARRAY_BUFFER, shared.xz());
+  glVertexAttribIPointer(0, 2, GL_SHORT, 0, nullptr);
+  glBindBuffer(GL_ARRAY_BUFFER, codes_.get());
+  const std::vector<std::uint16_t> nothing(vertices_ + 2 * rim_, 0);
+  glBufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(nothing.size() * kStep), nothing.data(), GL_DYNAMIC_DRAW);
+  const std::size_t row = rim_ - 2;
+  glVertexAttribIPointer(1, 3, GL_UNSIGNED_SHORT, kStep, offset_pointer((rim_ - 1) * kStep));
+  glVertexAttribIPointer(2, 4, GL_UNSIGNED_SHORT, kStep, offset_pointer((rim_ - row - 1) * kStep));
+  glVertexAttribIPointer(3, 4, GL_UNSIGNED_SHORT, kStep, offset_pointer((rim_ + row - 1) * kStep));
+  for (GLuint attribute = 0; attribute < 4; ++attribute) glEnableVertexAttribArray(attribute);
+  glVertexAttribI4ui(kShadowAttribute, 0, 0, 0, 0);
+  glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, shared.indices());
+  glBindVertexArray(0);
+  check_gl("making a tile's elevation buffer");
+}
+
+void TileSlot::upload(std::span<const std::uint16_t> codes) {
+  ISOHF_ASSERT(codes.size() == vertices_);
+  glBindBuffer(GL_ARRAY_BUFFER, codes_.get());
+  glBufferSubData(GL_ARRAY_BUFFER, static_cast<GLintptr>(rim_ * sizeof(std::uint16_t)),
+                  static_cast<GLsizeiptr>(codes.size_bytes()), codes.data());
+}
+
+void TileSlot::upload_shadow(std::span<const std::uint16_t> shadow) {
+  glBindVertexArray(array_.get());
+  if (shadow.empty()) {
+    glDisableVertexAttribArray(kShadowAttribute);
+    shadow_.reset();
+    glBindVertexArray(0);
+    return;
+  }
+  ISOHF_ASSERT(shadow.size() == vertices_);
+  if (!shadow_) shadow_.emplace();
+  glBindBuffer(GL_ARRAY_BUFFER, shadow_->get());
+  glBufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(shadow.size_bytes()), shadow.data(), GL_DYNAMIC_DRAW);
+  glVertexAttribIPointer(kShadowAttribute, 1, GL_UNSIGNED_SHORT, 0, nullptr);
+  glEnableVertexAttribArray(kShadowAttribute);
+  glBindVertexArray(0);
+}
+
+std::vector<std::uint16_t> TileSlot::read_back() const {
+  std::vector<std::uint16_t> codes(vertices_);
+  glBindBuffer(GL_ARRAY_BUFFER, codes_.get());
+  glGetBufferSubData(GL_ARRAY_BUFFER, static_cast<GLintptr>(rim_ * sizeof(std::uint16_t)),
+                     static_cast<GLsizeiptr>(codes.size() * sizeof(std::uint16_t)), codes.data());
+  return codes;
+}
+
+std::vector<std::uint16_t> TileSlot::read_back_shadow() const {
+  if (!shadow_) return {};
+  std::vector<std::uint16_t> shadow(vertices_);
+  glBindBuffer(GL_ARRAY_BUFFER, shadow_->get());
+  glGetBufferSubData(GL_ARRAY_BUFFER, 0, static_cast<GLsizeiptr>(shadow.size() * sizeof(std::uint16_t)), shadow.data());
+  return shadow;
+}
+
+void TileSlot::bind() const {
+  glBindVertexArray(array_.get());
+}
+
+}  // namespace isohf::view

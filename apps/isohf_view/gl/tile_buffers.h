@@ -1,0 +1,84 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include "gl/gl_objects.h"
+#include "gl/index_arrays.h"
+#include "isohf/lattice.h"
+
+namespace isohf::view {
+
+/// What all tiles of one shape share on the GPU (paper section 3.2): the object-space (x, z) of every stored vertex as
+/// GL_SHORT pairs, and the index arrays of all levels in one buffer, 16 bits an index where they fit.
+class SharedGeometry {
+ public:
+  SharedGeometry(const TileShape& shape, const IndexArrays& arrays);
+
+  [[nodiscard]] const TileShape& shape() const { return shape_; }
+  [[nodiscard]] GLuint xz() const { return xz_.get(); }
+  [[nodiscard]] GLuint indices() const { return indices_.get(); }
+  [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
+
+  /// One draw call each, with the tile's vertex array bound.
+  void draw_strip(int level) const;
+  void draw_stitch(int level) const;
+  /// The arrays as the GPU holds them, for verifying.
+  [[nodiscard]] std::vector<std::uint32_t> read_strip(int level) const;
+  [[nodiscard]] std::vector<std::uint32_t> read_stitch(int level) const;
+  [[nodiscard]] bool has_stitch(int level) const { return stitch_counts_[static_cast<std::size_t>(level)] > 0; }
+
+ private:
+  [[nodiscard]] std::vector<std::uint32_t> read(std::size_t offset_bytes, GLsizei count) const;
+
+  TileShape shape_;
+  Buffer xz_;
+  Buffer indices_;
+  GLenum index_type_;
+  std::vector<GLsizei> strip_counts_;
+  std::vector<std::size_t> strip_offsets_bytes_;
+  std::vector<GLsizei> stitch_counts_;
+  std::size_t stitch_offset_bytes_ = 0;
+  std::uint64_t bytes_ = 0;
+};
+
+/// One tile on the GPU: two bytes a vertex. The one buffer is bound as three overlapping attributes, so that the vertex
+/// shader finds the neighbours that a normal needs: v-1..v+1, v-C-1..v-C+2 and v+C-1..v+C+2. A row and two vertices of
+/// nothing lie before and behind the codes. Shadow heights take two more bytes a vertex. A slot is reused for tile
+/// after tile.
+class TileSlot {
+ public:
+  explicit TileSlot(const SharedGeometry& shared);
+
+  /// codes [C x R]
+  void upload(std::span<const std::uint16_t> codes);
+  /// Shadow heights in codes of the same scale, [C x R]; two more bytes a vertex from the first call on. An empty span
+  /// takes the shadow away.
+  void upload_shadow(std::span<const std::uint16_t> shadow);
+
+  /// The codes as the GPU holds them, for tests.
+  [[nodiscard]] std::vector<std::uint16_t> read_back() const;
+  /// Empty where it has no shadow.
+  [[nodiscard]] std::vector<std::uint16_t> read_back_shadow() const;
+
+  /// Binds the vertex array.
+  void bind() const;
+
+  /// What a tile takes, and what drivers keep of it besides: Mesa 3 KB for its vertex array and buffers.
+  [[nodiscard]] static std::uint64_t bytes(const TileShape& shape, bool shadow = false) {
+    constexpr std::uint64_t kDriverBytes = 4096;
+    const std::int64_t codes = shape.stored_vertex_count() + 2 * (shape.columns() + 2);
+    return static_cast<std::uint64_t>(codes + (shadow ? shape.stored_vertex_count() : 0)) * sizeof(std::uint16_t) +
+           kDriverBytes;
+  }
+
+ private:
+  std::size_t vertices_;
+  std::size_t rim_;  ///< unused vertices before and behind the codes
+  Buffer codes_;
+  std::optional<Buffer> shadow_;
+  VertexArray array_;
+};
+
+}  // namespace isohf::view

@@ -1,0 +1,126 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "gl/tile_buffers.h"
+#include "paging/tile_loader.h"
+#include "paging/tile_source.h"
+
+namespace isohf::view {
+
+/// Bounds that a TileBox keeps.
+struct TileBoxLimits {
+  std::uint64_t memory_bytes = std::uint64_t{512} << 20;          ///< tiles on the GPU and on their way there
+  std::uint64_t upload_bytes_per_frame = std::uint64_t{4} << 20;  ///< at least one tile a frame goes up all the same
+  int workers = 2;
+};
+
+/// Tile columns and rows first..last, inclusive; empty where last < first.
+struct TileRange {
+  std::int64_t first_column = 0;
+  std::int64_t last_column = -1;
+  std::int64_t first_row = 0;
+  std::int64_t last_row = -1;
+
+  [[nodiscard]] bool contains(TileIndex tile) const {
+    return tile.column >= first_column && tile.column <= last_column && tile.row >= first_row && tile.row <= last_row;
+  }
+  friend bool operator==(const TileRange&, const TileRange&) = default;
+};
+
+/// What one update did, and where things stand.
+struct TileBoxFigures {
+  int uploads = 0;  ///< in this frame
+  std::uint64_t upload_bytes = 0;
+  std::int64_t resident_tiles = 0;
+  std::int64_t missing_tiles = 0;    ///< in the box and stored, but not resident yet
+  std::uint64_t resident_bytes = 0;  ///< GPU and CPU bytes of tiles: never above memory_bytes
+  std::int64_t shadows_to_come = 0;  ///< resident tiles whose shadow is not yet of the sun wanted
+  int shadow_uploads = 0;            ///< in this frame, of tiles that were there already
+  double update_ms = 0.0;            ///< that the last update took
+  double radius = 0.0;               ///< world units: what was asked for, or less where memory would not do
+};
+
+/// The tiles around the camera, kept resident by sliding a box over the heightfield (paper section 3.12).
+///
+/// Tile (c, r) lives in cell (c mod box columns, r mod box rows), so that rows and columns that leave the box hand
+/// their cells, and GPU buffers, to those that enter on the other side. Workers decode; update() uploads what they have
+/// finished, within the frame's budget, and never waits for them. When the sun moves they compute all resident tiles'
+/// shadows anew, the longest outdated first; until then the old ones stay. A TileBox lives on the GL thread.
+class TileBox {
+ public:
+  /// Throws Error{kInvalidArgument} where memory_bytes does not hold four tiles.
+  TileBox(const TileSource& source, const SharedGeometry& shared, const TileBoxLimits& limits);
+
+  /// The sun that shadows are wanted for, one that the source's seeds hold for; nullopt: none are. From the next update
+  /// on.
+  void set_sun(const std::optional<RowSun>& sun);
+
+  /// Moves the box to the bounding square of a circle round `centre`, world units; once a frame.
+  void update(WorldPoint centre, double radius);
+
+  /// Updates until the box is complete: for pictures, not for frames.
+  void finish(WorldPoint centre, double radius);
+
+  /// `radius`, or the most that memory holds the tiles of.
+  [[nodiscard]] double fitting_radius(double radius) const;
+
+  [[nodiscard]] const TileSlot* resident(TileIndex tile) const;
+  [[nodiscard]] const TileRange& range() const { return range_; }
+  [[nodiscard]] const TileBoxFigures& figures() const { return figures_; }
+  /// The first tile that could not be read, as a message.
+  [[nodiscard]] const std::optional<std::string>& error() const { return error_; }
+  [[nodiscard]] const TileSource& source() const { return source_; }
+
+ private:
+  enum class State { kUnused, kMissing, kRequested, kResident, kVoid, kBroken };
+  struct Cell {
+    TileIndex tile{-1, -1};
+    State state = State::kUnused;
+    std::unique_ptr<TileSlot> slot;
+    std::uint64_t sun_number = 0;  ///< of the sun that its shadow is of; 0: it has none
+    bool shadow_requested = false;
+    bool shadow_broken = false;
+  };
+
+  [[nodiscard]] std::size_t cell_of(TileIndex tile) const;
+  [[nodiscard]] std::pair<std::int64_t, std::int64_t> tiles_across(double radius) const;
+  void resize(WorldPoint centre, double radius);
+  void enter(Cell& cell, TileIndex tile);
+  void place(LoadedTile& loaded);
+  void upload();
+  void place_shadow(Cell& cell, const LoadedTile& loaded);
+  [[nodiscard]] bool is_outdated(const Cell& cell) const {
+    return sun_ && cell.state == State::kResident && cell.sun_number != sun_number_ && !cell.shadow_broken;
+  }
+  void request(WorldPoint centre);
+  void request_shadows(WorldPoint centre, std::size_t most);
+  [[nodiscard]] double distance_squared(const Cell& cell, WorldPoint centre) const;
+  void count();
+
+  const TileSource& source_;
+  const SharedGeometry& shared_;
+  TileBoxLimits limits_;
+  std::uint64_t slot_bytes_;
+  std::uint64_t on_the_way_bytes_;  ///< of one tile
+  std::size_t in_flight_limit_;
+  std::int64_t max_slots_;
+  std::int64_t box_columns_ = 0;
+  std::int64_t box_rows_ = 0;
+  TileRange range_;
+  std::vector<Cell> cells_;
+  std::vector<std::unique_ptr<TileSlot>> spare_;
+  std::vector<LoadedTile> waiting_;  ///< decoded, for a later frame's budget
+  std::optional<RowSun> sun_;
+  std::uint64_t sun_number_ = 0;  ///< counts suns
+  TileBoxFigures figures_;
+  std::optional<std::string> error_;
+  TileLoader loader_;  // last: its threads stop first
+};
+
+}  // namespace isohf::view

@@ -1,0 +1,81 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "isohf/archive/shadow_seeds/shadow_seeds.h"
+#include "isohf/archive/textures/texture_info.h"
+#include "isohf/lattice.h"
+#include "isohf/metadata.h"
+#include "isohf/picture.h"
+
+namespace isohf::view {
+
+/// The code that means "void" on the GPU, whatever the archive's own is.
+inline constexpr std::uint16_t kVoidCode = 65535;
+
+/// How the viewer's 16-bit codes become heights: height = offset + scale * code, world units. Where the unit of
+/// elevations is known and another than that of the ground (feet over metres), it has been converted.
+struct ViewScale {
+  double offset = 0.0;
+  double scale = 1.0;
+};
+
+/// What is known of a tile before it is read.
+struct TileBounds {
+  bool stored = false;  ///< false: wholly void
+  bool has_voids = false;
+  double low = 0.0;  ///< world units
+  double high = 0.0;
+};
+
+/// A sun in the plane of the rows, over true heights: what shadows are computed for.
+struct RowSun {
+  LightTravel travel = LightTravel::kEastward;
+  double elevation_deg = 15.0;  ///< above 0, below 90
+  friend bool operator==(const RowSun&, const RowSun&) = default;
+};
+
+/// Where tiles come from. All functions may be called from any number of threads at once.
+class TileSource {
+ public:
+  TileSource() = default;
+  TileSource(const TileSource&) = delete;
+  TileSource& operator=(const TileSource&) = delete;
+  virtual ~TileSource() = default;
+
+  [[nodiscard]] virtual const TileGrid& grid() const = 0;
+  [[nodiscard]] virtual ViewScale scale() const = 0;
+  /// False where the ground's unit is not known, so that heights may have any proportion to it.
+  [[nodiscard]] virtual bool is_to_scale() const { return true; }
+  /// The part of the world that the source covers; what lies beyond is made up.
+  [[nodiscard]] virtual WorldBounds covered() const { return {0.0, 0.0, grid().world_width(), grid().world_height()}; }
+  [[nodiscard]] virtual TileBounds bounds(TileIndex tile) const = 0;
+  /// codes [C x R] out, 0..65534, or kVoidCode. Throws Error naming the tile.
+  virtual void read(TileIndex tile, std::span<std::uint16_t> codes) const = 0;
+  /// True where codes are rounded from finer heights, from which shadows are computed.
+  [[nodiscard]] virtual bool rounds() const { return false; }
+  /// The record of the shadow seeds; nullptr where the source has none.
+  [[nodiscard]] virtual const ShadowSeedInfo* shadow_seeds() const { return nullptr; }
+  /// Reads a tile with its shadow heights, from no other tile. sun must be one that the seeds hold for.
+  /// shadow [C x R] out: in codes like heights, rounded, at visible vertices; 0 at others. Throws Error naming the
+  /// tile.
+  virtual void read_lit(TileIndex tile, const RowSun& sun, std::span<std::uint16_t> codes,
+                        std::span<std::uint16_t> shadow) const;
+  /// The record of the textures; nullptr where the source has none.
+  [[nodiscard]] virtual const TextureInfo* textures() const { return nullptr; }
+  [[nodiscard]] virtual bool has_texture(TileIndex) const { return false; }
+  /// A level of a tile's texture as RGBA with straight alpha. Throws Error naming the tile.
+  [[nodiscard]] virtual Picture read_texture(TileIndex tile, int level) const;
+};
+
+/// Opens an archive for viewing. 16- and 8-bit codes are taken as they are; float elevations are rounded to 65535
+/// steps between the dataset's smallest and largest elevation. Throws what ArchiveReader throws.
+[[nodiscard]] std::unique_ptr<TileSource> open_archive(const std::string& path);
+
+/// Lowest and highest elevation of the tiles together; {0, 0} where all is void.
+[[nodiscard]] TileBounds whole_bounds(const TileSource& source);
+
+}  // namespace isohf::view

@@ -1,0 +1,128 @@
+#include "verify/tile_probe.h"
+
+#include <algorithm>
+
+#include "gl/shaders.h"
+#include "renderer.h"
+
+namespace isohf::view {
+namespace {
+
+int largest(const std::vector<PixelWindow>& windows, int PixelWindow::*side) {
+  int size = 1;
+  for (const PixelWindow& window : windows) size = std::max(size, window.*side);
+  return size;
+}
+
+}  // namespace
+
+TileProbe::TileProbe(const TileGrid& grid, const SharedGeometry& shared, double code_height)
+    : grid_(grid),
+      shared_(shared),
+      solid_("probe", false, probe_fragment_shader(false)),
+      voids_("probe", true, probe_fragment_shader(true)),
+      solid_shadow_("shadow probe", false, shadow_probe_fragment_shader(false)),
+      voids_shadow_("shadow probe", true, shadow_probe_fragment_shader(true)),
+      solid_feedback_("capture", false, probe_fragment_shader(false), {"gl_Position", "v_facing", "v_place"}),
+      voids_feedback_("capture", true, probe_fragment_shader(true), {"gl_Position", "v_facing", "v_place"}),
+      target_(largest(MeshOracle(grid.shape()).windows(), &PixelWindow::width),
+              largest(MeshOracle(grid.shape()).windows(), &PixelWindow::height), GL_RGBA32F) {
+  frame_.code_height = code_height;
+  frame_.code_slope = code_height;
+}
+
+void TileProbe::begin(const TerrainProgram& program, const PixelWindow& window) {
+  // Straight down, North up: clip x and y from x and -z, nearer where higher.
+  Mat4 clip;
+  clip.at(0, 0) = 2.0 * kPixelsPerX / (grid_.sigma_x() * target_.width());
+  clip.at(0, 3) = -2.0 * window.x0 / target_.width() - 1.0;
+  clip.at(1, 2) = -2.0 * kPixelsPerZ / (grid_.sigma_z() * target_.height());
+  clip.at(1, 3) = 2.0 * (window.z0 + window.height) / target_.height() - 1.0;
+  clip.at(2, 1) = -1.8 / (65535.0 * frame_.code_height);
+  clip.at(2, 3) = 0.9;
+  clip.at(3, 3) = 1.0;
+  frame_.clip_from_eye = clip;
+  target_.bind();
+  glViewport(0, 0, target_.width(), target_.height());
+  glClearColor(0.0F, 0.0F, 0.0F, 0.0F);
+  glDepthMask(GL_TRUE);
+  glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
+  glFrontFace(GL_CCW);
+  glCullFace(GL_BACK);
+  program.begin(grid_, frame_);
+  program.set_tile(grid_, frame_, {0, 0});
+  glUniform1f(program.uniform("alpha"), 1.0F);
+}
+
+void TileProbe::draw_mesh(const TileSlot& slot, int level, bool cull) {
+  slot.bind();
+  if (cull) {
+    glEnable(GL_CULL_FACE);
+  } else {
+    glDisable(GL_CULL_FACE);
+  }
+  shared_.draw_strip(level);
+  glDisable(GL_CULL_FACE);
+  if (shared_.has_stitch(level)) shared_.draw_stitch(level);
+}
+
+void TileProbe::draw_level(const TileSlot& slot, bool voids, int level, const PixelWindow& window, bool cull,
+                           std::vector<float>& out) {
+  begin(voids ? voids_ : solid_, window);
+  add_up(slot, level, cull, out);
+}
+
+void TileProbe::draw_shadow(const TileSlot& slot, bool voids, int level, const PixelWindow& window, double softness,
+                            std::vector<float>& out) {
+  const TerrainProgram& program = voids ? voids_shadow_ : solid_shadow_;
+  begin(program, window);
+  glUniform1f(program.uniform("shadow_gain"), static_cast<float>(2.0 / softness));
+  add_up(slot, level, true, out);
+}
+
+void TileProbe::add_up(const TileSlot& slot, int level, bool cull, std::vector<float>& out) {
+  glDisable(GL_DEPTH_TEST);
+  glEnable(GL_BLEND);
+  glBlendFunc(GL_ONE, GL_ONE);
+  draw_mesh(slot, level, cull);
+  glDisable(GL_BLEND);
+  target_.read_rgba32f(out);
+}
+
+void TileProbe::draw_blend(const TileSlot& slot, bool voids, const LodBlend& blend, const PixelWindow& window,
+                           std::vector<float>& out) {
+  begin(voids ? voids_ : solid_, window);
+  begin_opaque_pass();
+  draw_mesh(slot, blend.first, true);
+  if (blend.alpha > 0.0 && blend.second != blend.first) {
+    begin_fading_pass();
+    order_fading(blend);
+    glUniform1f((voids ? voids_ : solid_).uniform("alpha"), static_cast<float>(blend.alpha));
+    draw_mesh(slot, blend.second, true);
+    end_fading_pass();
+  }
+  target_.read_rgba32f(out);
+}
+
+void TileProbe::capture(const TileSlot& slot, bool voids, std::vector<ProbedVertex>& out) {
+  out.resize(static_cast<std::size_t>(grid_.shape().stored_vertex_count()));
+  const auto bytes = static_cast<GLsizeiptr>(out.size() * sizeof(ProbedVertex));
+  glBindBuffer(GL_TRANSFORM_FEEDBACK_BUFFER, captured_.get());
+  glBufferData(GL_TRANSFORM_FEEDBACK_BUFFER, bytes, nullptr, GL_STREAM_READ);
+  glBindBufferBase(GL_TRANSFORM_FEEDBACK_BUFFER, 0, captured_.get());
+  const TerrainProgram& program = voids ? voids_feedback_ : solid_feedback_;
+  frame_.clip_from_eye = Mat4::identity();  // clip positions are then the vertices' places
+  program.begin(grid_, frame_);
+  program.set_tile(grid_, frame_, {0, 0});
+  slot.bind();
+  glEnable(GL_RASTERIZER_DISCARD);
+  glBeginTransformFeedback(GL_POINTS);
+  glDrawArrays(GL_POINTS, 0, static_cast<GLsizei>(out.size()));
+  glEndTransformFeedback();
+  glDisable(GL_RASTERIZER_DISCARD);
+  glGetBufferSubData(GL_TRANSFORM_FEEDBACK_BUFFER, 0, bytes, out.data());
+  glBindBufferBase(GL_TRANSFORM_FEEDBACK_BUFFER, 0, 0);
+  check_gl("capturing vertices");
+}
+
+}  // namespace isohf::view

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "gl/offscreen.h"
+#include "gl/terrain_program.h"
+#include "gl/tile_buffers.h"
+#include "isohf/lattice/lod.h"
+#include "verify/mesh_oracle.h"
+
+namespace isohf::view {
+
+/// What the vertex shader made of one vertex, captured by transform feedback.
+struct ProbedVertex {
+  float x, y, z, w;  ///< from the tile's North-West corner and code 0, world units; w = 1
+  float nx, ny, nz, distance;
+  float object_x, object_z, code, shadow;
+};
+
+/// Draws a tile from straight above with the terrain's vertex shader into floats: (code, normal x, normal z, count).
+class TileProbe {
+ public:
+  TileProbe(const TileGrid& grid, const SharedGeometry& shared, double code_height);
+
+  /// Strip and stitch of one level, added up: `cull` leaves back faces out. Rows from the South.
+  void draw_level(const TileSlot& slot, bool voids, int level, const PixelWindow& window, bool cull,
+                  std::vector<float>& out);
+  /// The two-stage transition, by the same passes as pictures.
+  void draw_blend(const TileSlot& slot, bool voids, const LodBlend& blend, const PixelWindow& window,
+                  std::vector<float>& out);
+  /// What the fragment shader makes of the shadow, strip and stitch of one level added up: (share of the sun, shadow
+  /// height above the ground in codes, 0, count). softness is k of Eq. 16 in codes.
+  void draw_shadow(const TileSlot& slot, bool voids, int level, const PixelWindow& window, double softness,
+                   std::vector<float>& out);
+  /// All stored vertices; padding gets no sensible normal.
+  void capture(const TileSlot& slot, bool voids, std::vector<ProbedVertex>& out);
+  [[nodiscard]] int width() const { return target_.width(); }  ///< pixels of a row of the pictures
+
+ private:
+  void begin(const TerrainProgram& program, const PixelWindow& window);
+  void add_up(const TileSlot& slot, int level, bool cull, std::vector<float>& out);
+  void draw_mesh(const TileSlot& slot, int level, bool cull);
+
+  const TileGrid& grid_;
+  const SharedGeometry& shared_;
+  TerrainFrame frame_;
+  TerrainProgram solid_;
+  TerrainProgram voids_;
+  TerrainProgram solid_shadow_;
+  TerrainProgram voids_shadow_;
+  TerrainProgram solid_feedback_;
+  TerrainProgram voids_feedback_;
+  Offscreen target_;
+  Buffer captured_;
+};
+
+}  // namespace isohf::view

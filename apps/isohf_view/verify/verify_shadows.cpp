@@ -1,0 +1,174 @@
+#include "verify/verify_shadows.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "isohf/error.h"
+#include "isohf/surface/shade/shadow.h"
+#include "verify/verify_places.h"
+
+namespace isohf::view {
+namespace {
+
+/// k of Eq. 16 for the pictures looked at, codes: wide enough for many pixels to lie in half shadow.
+constexpr double kSoftness = 64.0;
+constexpr std::size_t kMostSuns = 4;
+
+/// Suns that the seeds hold for: the lowest first.
+std::vector<double> suns_of(const ShadowSeedInfo& seeds) {
+  std::vector<double> suns;
+  if (seeds.kind == ShadowSeedInfo::Kind::kHulls) {
+    suns.push_back(seeds.sun_min_deg);
+    for (const double sun : {5.0, 14.0, 35.0}) {
+      if (sun > seeds.sun_min_deg) suns.push_back(sun);
+    }
+    return suns;
+  }
+  const std::size_t count = std::min(kMostSuns, seeds.sun_deg.size());
+  for (std::size_t i = 0; i < count; ++i) {
+    suns.push_back(seeds.sun_deg[count == 1 ? 0 : i * (seeds.sun_deg.size() - 1) / (count - 1)]);
+  }
+  return suns;
+}
+
+std::string sun_name(const RowSun& sun) {
+  return fmt::format("sun in the {} at {:g} degrees", sun.travel == LightTravel::kEastward ? "West" : "East",
+                     sun.elevation_deg);
+}
+
+}  // namespace
+
+ShadowVerifier::ShadowVerifier(const TileSource& source, const SharedGeometry& shared, MeshOracle& oracle,
+                               TileProbe& probe, const VerifyOptions& options, VerifyReport& report)
+    : source_(source),
+      oracle_(oracle),
+      probe_(probe),
+      options_(options),
+      report_(report),
+      slot_(shared),
+      codes_(static_cast<std::size_t>(source.grid().shape().stored_vertex_count())),
+      heights_(codes_.size()),
+      carried_(codes_.size()),
+      seeded_(codes_.size()) {
+  // Shadow heights are rounded to a code. Seeds of angles have been so before, and heights that are floats are rounded
+  // here but not where the shadows come from: half a code each. Besides, the float rounding of 65535.
+  const bool twice = source.rounds() || source.shadow_seeds()->kind == ShadowSeedInfo::Kind::kAngles;
+  tolerance_ = (twice ? 1.0 : 0.5) + 0.01;
+}
+
+bool ShadowVerifier::voids(TileIndex tile) const {
+  const TileBounds bounds = source_.bounds(tile);
+  return bounds.has_voids || !bounds.stored;
+}
+
+void ShadowVerifier::verify() {
+  const TileGrid& grid = source_.grid();
+  report_.suns_deg = suns_of(*source_.shadow_seeds());
+  for (std::int64_t row = 0; row < grid.tile_rows(); ++row) {
+    for (const LightTravel travel : {LightTravel::kEastward, LightTravel::kWestward}) verify_row(row, travel);
+    if (options_.progress) options_.progress((row + 1) * grid.tile_columns(), grid.tile_count());
+  }
+}
+
+void ShadowVerifier::verify_row(std::int64_t row, LightTravel travel) {
+  const TileGrid& grid = source_.grid();
+  const std::vector<double> dark(static_cast<std::size_t>(visible_rows(grid.shape())), kNoShadow);
+  std::vector<std::vector<double>> entering(report_.suns_deg.size(), dark);
+  for (std::int64_t i = 0; i < grid.tile_columns(); ++i) {
+    const TileIndex tile{travel == LightTravel::kEastward ? i : grid.tile_columns() - 1 - i, row};
+    try {
+      source_.read(tile, codes_);
+    } catch (const Error&) {
+      return;  // the tile's own check has said so, and nothing can be carried past it
+    }
+    std::transform(codes_.begin(), codes_.end(), heights_.begin(), [](std::uint16_t code) {
+      return code == kVoidCode ? std::numeric_limits<float>::quiet_NaN() : static_cast<float>(code);
+    });
+    slot_.upload(codes_);
+    for (std::size_t k = 0; k < entering.size(); ++k) {
+      verify_tile(tile, {travel, report_.suns_deg[k]}, k, entering[k]);
+    }
+  }
+}
+
+void ShadowVerifier::verify_tile(TileIndex tile, const RowSun& sun, std::size_t sun_number,
+                                 std::vector<double>& entering) {
+  const TileGrid& grid = source_.grid();
+  const TileShape& shape = grid.shape();
+  const double fall = std::tan(sun.elevation_deg * std::numbers::pi / 180.0) / source_.scale().scale;
+  tile_shadow(grid, View2D<const float>(heights_.data(), shape.columns(), shape.rows()), {sun.travel, fall}, entering,
+              View2D<float>(carried_.data(), shape.columns(), shape.rows()), entering);
+  try {
+    std::vector<std::uint16_t> codes(codes_.size());
+    source_.read_lit(tile, sun, codes, seeded_);
+  } catch (const Error& error) {
+    report_.add({Check::kShadow, tile, 0.0, error.what(), 0.0, 1});
+    return;
+  }
+  slot_.upload_shadow(seeded_);
+  probe_.capture(slot_, voids(tile), captured_);
+  check_vertices(tile, sun);
+  // Each tile at one level a sun, all levels in turn.
+  const auto turn = static_cast<std::size_t>(tile.column + tile.row) + sun_number;
+  const int level = static_cast<int>(turn % static_cast<std::size_t>(shape.levels()));
+  for (const PixelWindow& window : oracle_.windows()) check_share(tile, sun, level, window);
+}
+
+void ShadowVerifier::check_vertices(TileIndex tile, const RowSun& sun) {
+  const TileShape& shape = source_.grid().shape();
+  Worst worst;
+  for (int row = 1; row < shape.rows() - 1; ++row) {
+    for (int column = 1; column <= last_visible_column(shape, row); ++column) {
+      const auto i = static_cast<std::size_t>(row * shape.columns() + column);
+      if (codes_[i] == kVoidCode) continue;
+      ++report_.shadow_vertices;
+      const double got = captured_[i].code + captured_[i].shadow;
+      const double want = carried_[i];
+      const double off = std::abs(got - want);
+      report_.worst_shadow = std::max(report_.worst_shadow, off);
+      if (off <= tolerance_) continue;
+      worst.add(off, [&] {
+        return fmt::format("{}, {}: shadow height {} codes, carried along the row {:.2f}, ground {}",
+                           vertex_name({column, row}), sun_name(sun), got, want, codes_[i]);
+      });
+    }
+  }
+  if (worst.any()) report_.add(worst.finding(Check::kShadow, tile, 0.0));
+}
+
+// The vertices' shadow heights have been looked at: from them the library's barycentric S and Eq. 16.
+void ShadowVerifier::check_share(TileIndex tile, const RowSun& sun, int level, const PixelWindow& window) {
+  const TileShape& shape = source_.grid().shape();
+  probe_.draw_shadow(slot_, voids(tile), level, window, kSoftness, pixels_);
+  ++report_.pictures;
+  const std::span<const PixelSample> samples = oracle_.samples(level, window);
+  const double reach = window.x0 + window.z0 + window.width + window.height;
+  Worst worst;
+  for (int j = 0; j < window.height; ++j) {
+    for (int i = 0; i < window.width; ++i) {
+      const PixelSample& sample = samples[static_cast<std::size_t>(j * window.width + i)];
+      const SampledCode ground = sample_code(sample, codes_);
+      const float* got = pixels_.data() + 4 * static_cast<std::size_t>((window.height - 1 - j) * probe_.width() + i);
+      if (!ground.valid || got[3] != 1.0F) continue;  // coverage is another check's
+      ++report_.pixels;
+      const SampledCode shadow = sample_code(sample, seeded_);
+      const double want = sun_share_on_surface(ground.code, shadow.code, kSoftness);
+      const double off = std::abs(got[0] - want);
+      report_.worst_share = std::max(report_.worst_share, off);
+      const double codes = kCodeTolerance + (ground.spread + shadow.spread) * reach * kPerPixel;
+      if (off <= 2.0 * codes / kSoftness) continue;
+      worst.add(off, [&] {
+        return fmt::format("{}, {}: share {:.4f} of the sun, library {:.4f} (ground {:.3f}, shadow {:.3f})",
+                           pixel_name(shape, window, i, j, sample), sun_name(sun), got[0], want, ground.code,
+                           shadow.code);
+      });
+    }
+  }
+  if (worst.any()) report_.add(worst.finding(Check::kSunShare, tile, level));
+}
+
+}  // namespace isohf::view

@@ -1,0 +1,176 @@
+#include "formats/binary_grids/hgt_source.h"
+
+#include <fmt/core.h>
+
+#include <cmath>
+#include <cstring>
+#include <optional>
+#include <vector>
+
+#include "formats/binary_grids/hgt_name.h"
+#include "formats/files/letter_case.h"
+#include "formats/files/raw_file.h"
+#include "formats/files/zipped_file.h"
+#include "formats/open_options.h"
+#include "isohf/base/assert.h"
+#include "isohf/error.h"
+#include "isohf/raster.h"
+
+namespace isohf {
+namespace {
+
+constexpr std::int64_t kSampleBytes = 2;
+
+std::string file_name(const std::string& path) {
+  const std::size_t slash = path.find_last_of('/');
+  return slash == std::string::npos ? path : path.substr(slash + 1);
+}
+
+struct Size {
+  std::int64_t columns = 0;
+  std::int64_t rows = 0;
+};
+
+std::optional<Size> size_of_tile(std::uint64_t bytes) {
+  if (bytes % kSampleBytes != 0) return std::nullopt;
+  const auto samples = static_cast<std::int64_t>(bytes / kSampleBytes);
+  // Beyond 50 degrees of latitude some producers halve the columns.
+  if (samples == std::int64_t{1801} * 3601) return Size{1801, 3601};
+  const auto side = static_cast<std::int64_t>(std::llround(std::sqrt(static_cast<double>(samples))));
+  if (side < 2 || side * side != samples) return std::nullopt;
+  return Size{side, side};
+}
+
+class HgtSource final : public HeightSource {
+ public:
+  HgtSource(const std::string& path, const OpenOptions& options) {
+    info_.path = path;
+    std::string name = path;
+    if (lower_case(path).ends_with(".zip")) {
+      name = open_member(options.unpacked_bytes);
+    } else {
+      file_.emplace(path, options.unpacked_bytes);
+    }
+    describe(name, file_->size_bytes(), options);
+    apply_open_options(info_, options);
+  }
+
+  [[nodiscard]] const SourceInfo& info() const override { return info_; }
+
+  void read_window(const Window& window, std::span<std::byte> samples) override {
+    ISOHF_ASSERT(window.column >= 0 && window.row >= 0 && window.columns >= 0 && window.rows >= 0);
+    ISOHF_ASSERT(window.column + window.columns <= info_.width && window.row + window.rows <= info_.height);
+    ISOHF_ASSERT(samples.size() == static_cast<std::size_t>(window.columns * window.rows * kSampleBytes));
+    // Whole rows lie together in the file as in the window.
+    const bool whole = window.columns == info_.width;
+    const std::int64_t runs = whole ? 1 : window.rows;
+    const std::size_t run_bytes = whole ? samples.size() : static_cast<std::size_t>(window.columns * kSampleBytes);
+    for (std::int64_t i = 0; i < runs; ++i) {
+      const auto offset = static_cast<std::uint64_t>(((window.row + i) * info_.width + window.column) * kSampleBytes);
+      file_->read(offset, samples.subspan(static_cast<std::size_t>(i) * run_bytes, run_bytes));
+    }
+    swap_byte_order(samples, kSampleBytes);
+  }
+
+  void limit_buffers(std::uint64_t bytes) override { file_->limit_buffers(bytes); }
+  [[nodiscard]] std::uint64_t buffer_bytes(std::uint64_t limit) const override { return file_->buffer_bytes(limit); }
+
+ private:
+  /// Opens the tile of a zip archive; returns the name that says where it lies.
+  std::string open_member(std::uint64_t unpacked_bytes) {
+    std::vector<ZippedFile> tiles;
+    for (ZippedFile& member : zipped_files(RawFile(info_.path))) {
+      if (lower_case(member.name).ends_with(".hgt")) tiles.push_back(std::move(member));
+    }
+    if (tiles.size() != 1) {
+      throw Error(
+          ErrorCode::kUnsupported,
+          fmt::format("{}: {} .hgt files are in the archive, must be 1; unpack it, a folder of them is one input",
+                      info_.path, tiles.size()));
+    }
+    file_.emplace(info_.path, tiles.front(), unpacked_bytes);
+    const std::optional<HgtCorner> inside = hgt_corner_of(tiles.front().name);
+    const std::optional<HgtCorner> outside = hgt_corner_of(info_.path);
+    if (inside && outside && (inside->latitude != outside->latitude || inside->longitude != outside->longitude)) {
+      info_.warnings.push_back(fmt::format("the archive is called {} and holds {}; the latter says where the tile lies",
+                                           file_name(info_.path), file_name(tiles.front().name)));
+    }
+    return inside ? tiles.front().name : info_.path;
+  }
+
+  void describe(const std::string& name, std::uint64_t bytes, const OpenOptions& options) {
+    const std::optional<Size> size = size_of_tile(bytes);
+    if (!size) {
+      throw Error(
+          ErrorCode::kCorrupt,
+          fmt::format("{}: the tile has {} bytes; an HGT tile has 2884802 (1201 x 1201), 25934402 (3601 x 3601), "
+                      "12970802 (1801 x 3601) or another square of 2 byte samples",
+                      info_.path, bytes));
+    }
+    if (!options.channel.empty() && options.channel != "0") {
+      throw Error(ErrorCode::kInvalidArgument,
+                  fmt::format("{}: there is no channel \"{}\"; there is 0 alone", info_.path, options.channel));
+    }
+    info_.format = "SRTM HGT";
+    info_.width = size->columns;
+    info_.height = size->rows;
+    info_.sample_type = SampleType::kInt16;
+    info_.void_values = {-32768.0};
+    info_.vertical_unit = "metre";
+    info_.block_width = info_.width;
+    info_.block_height = 1;
+    Georeference& geo = info_.georeference;
+    geo.registration = Registration::kPoint;
+    geo.unit = HorizontalUnit::kDegree;
+    geo.spacing_x = 1.0 / static_cast<double>(size->columns - 1);
+    geo.spacing_y = 1.0 / static_cast<double>(size->rows - 1);
+    geo.system.name = "WGS 84";
+    geo.system.epsg = 4326;
+    geo.system.body = "Earth";
+    geo.system.semi_major_axis_m = 6378137.0;
+    geo.system.inverse_flattening = 298.257223563;
+    geo.system.vertical_epsg = 5773;
+    geo.system.vertical_datum = "EGM96";
+    if (const std::optional<HgtCorner> corner = hgt_corner_of(name)) {
+      geo.has_origin = true;
+      geo.origin_x = corner->longitude;
+      geo.origin_y = corner->latitude + 1;
+    } else {
+      info_.warnings.push_back(
+          loss("the name does not say where the tile lies (N44E006.hgt does); its position is unknown"));
+    }
+    if (size->rows != 1201 && size->rows != 3601) {
+      info_.warnings.push_back(
+          fmt::format("{} x {} is not the size of an SRTM tile (1201 or 3601 squared); it is read as "
+                      "one degree",
+                      size->columns, size->rows));
+    }
+  }
+
+  std::optional<RawFile> file_;
+  SourceInfo info_;
+};
+
+}  // namespace
+
+bool is_hgt_name(const std::string& path) {
+  const std::string name = lower_case(without_gzip(path));
+  return name.ends_with(".hgt") || name.ends_with(".hgt.zip");
+}
+
+bool is_zip_of_hgt(const std::string& path) {
+  if (!lower_case(path).ends_with(".zip")) return false;
+  try {
+    const std::vector<ZippedFile> members = zipped_files(RawFile(path));
+    return std::any_of(members.begin(), members.end(),
+                       [](const ZippedFile& member) { return lower_case(member.name).ends_with(".hgt"); });
+  } catch (const Error&) {
+    return false;  // is something else, or too damaged to say
+  }
+}
+
+std::unique_ptr<HeightSource> open_hgt(const std::string& path, const OpenOptions& options) {
+  return std::make_unique<HgtSource>(path, options);
+}
+
+}  // namespace isohf

@@ -1,0 +1,367 @@
+#include "formats/binary_grids/npy_source.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cctype>
+#include <charconv>
+#include <cstring>
+#include <limits>
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include "formats/binary_grids/plain_samples.h"
+#include "formats/files/raw_file.h"
+#include "formats/files/zipped_file.h"
+#include "formats/open_options.h"
+#include "formats/text_grids/text_tokens.h"
+#include "isohf/base/assert.h"
+#include "isohf/error.h"
+#include "isohf/raster.h"
+
+namespace isohf {
+namespace {
+
+constexpr std::string_view kMagic = "\x93NUMPY";
+constexpr std::size_t kLongestList = 200;  // of names in a message
+constexpr std::size_t kMostHeaderBytes = std::size_t{1} << 20U;
+constexpr std::int64_t kRowsAtOnce = 256;
+constexpr std::int64_t kMostSide = std::int64_t{1} << 31;
+
+struct Header {
+  std::string descr;
+  bool fortran_order = false;
+  std::vector<std::int64_t> shape;
+};
+
+/// The header's Python dictionary: three keys, each once.
+class HeaderParser {
+ public:
+  HeaderParser(const std::string& path, std::string_view text) : path_(path), text_(text) {}
+
+  Header parse() {
+    Header header;
+    unsigned seen = 0;
+    take('{');
+    while (peek() != '}') {
+      const std::string key = quoted();
+      take(':');
+      if (key == "descr") {
+        if (peek() == '[')
+          throw Error(ErrorCode::kUnsupported, path_ + ": the array's elements are records, must be numbers");
+        header.descr = quoted();
+        seen |= 1U;
+      } else if (key == "fortran_order") {
+        header.fortran_order = truth();
+        seen |= 2U;
+      } else if (key == "shape") {
+        header.shape = numbers();
+        seen |= 4U;
+      } else {
+        fail(fmt::format("has an unknown key {}", key));
+      }
+      if (peek() != '}') take(',');
+    }
+    if (seen != 7U) fail("must say descr, fortran_order and shape");
+    return header;
+  }
+
+ private:
+  [[noreturn]] void fail(const std::string& what) const {
+    throw Error(ErrorCode::kCorrupt, fmt::format("{}: the array's header {}", path_, what));
+  }
+
+  char peek() {
+    while (at_ < text_.size() && std::isspace(static_cast<unsigned char>(text_[at_])) != 0) ++at_;
+    if (at_ >= text_.size()) fail("ends early");
+    return text_[at_];
+  }
+
+  void take(char wanted) {
+    if (peek() != wanted) fail(fmt::format("has no {} at its character {}", wanted, at_));
+    ++at_;
+  }
+
+  std::string quoted() {
+    const char quote = peek();
+    if (quote != '\'' && quote != '"') fail(fmt::format("has no text at its character {}", at_));
+    const std::size_t end = text_.find(quote, at_ + 1);
+    if (end == std::string_view::npos) fail("has a text without an end");
+    std::string result(text_.substr(at_ + 1, end - at_ - 1));
+    at_ = end + 1;
+    if (!std::all_of(result.begin(), result.end(), [](char c) { return c >= ' ' && c < 127; })) {
+      fail("has a text that is not ASCII");
+    }
+    return result;
+  }
+
+  bool truth() {
+    peek();
+    for (const std::string_view word : {std::string_view("True"), std::string_view("False")}) {
+      if (text_.substr(at_, word.size()) != word) continue;
+      at_ += word.size();
+      return word == "True";
+    }
+    fail("says neither True nor False of fortran_order");
+  }
+
+  std::vector<std::int64_t> numbers() {
+    std::vector<std::int64_t> result;
+    take('(');
+    while (peek() != ')') {
+      std::int64_t number = 0;
+      const char* const end = text_.data() + text_.size();
+      const auto [at, error] = std::from_chars(text_.data() + at_, end, number);
+      if (error != std::errc{} || number < 0) fail(fmt::format("has no length at its character {}", at_));
+      at_ = static_cast<std::size_t>(at - text_.data());
+      result.push_back(number);
+      if (peek() != ')') take(',');
+    }
+    ++at_;
+    return result;
+  }
+
+  std::string path_;
+  std::string_view text_;
+  std::size_t at_ = 0;
+};
+
+/// Whole numbers of 64 bits are delivered as float64, NumPy's integers by default among them.
+enum class Wide { kNo, kSigned, kUnsigned };
+
+std::optional<SampleType> sample_type(std::string_view kind) {
+  constexpr std::array<std::pair<std::string_view, SampleType>, 11> kTypes = {{{"u1", SampleType::kUint8},
+                                                                               {"i1", SampleType::kInt8},
+                                                                               {"u2", SampleType::kUint16},
+                                                                               {"i2", SampleType::kInt16},
+                                                                               {"u4", SampleType::kUint32},
+                                                                               {"i4", SampleType::kInt32},
+                                                                               {"u8", SampleType::kFloat64},
+                                                                               {"i8", SampleType::kFloat64},
+                                                                               {"f2", SampleType::kFloat16},
+                                                                               {"f4", SampleType::kFloat32},
+                                                                               {"f8", SampleType::kFloat64}}};
+  const auto* const found = std::find_if(kTypes.begin(), kTypes.end(), [&](const auto& t) { return t.first == kind; });
+  return found == kTypes.end() ? std::nullopt : std::optional(found->second);
+}
+
+/// A whole number as the float64 that it is; false where it is none.
+template <typename Whole>
+bool widen(std::byte* at, Whole& number) {
+  std::memcpy(&number, at, sizeof number);
+  const auto value = static_cast<double>(number);
+  // 2^63 and 2^64 are not in the types' ranges, but what their largest numbers round to.
+  constexpr double kEnd = std::numeric_limits<Whole>::is_signed ? 0x1p63 : 0x1p64;
+  if (value >= kEnd || static_cast<Whole>(value) != number) return false;
+  std::memcpy(at, &value, sizeof value);
+  return true;
+}
+
+class NpySource final : public HeightSource {
+ public:
+  NpySource(const std::string& path, const OpenOptions& options) : file_(path, options.unpacked_bytes) {
+    info_.path = path;
+    info_.format = "NumPy";
+    read_header();
+    (void)choose_band(info_, options, 1);
+    apply_open_options(info_, options);
+  }
+  /// One array of an .npz.
+  NpySource(const std::string& path, const ZippedFile& member, const OpenOptions& options)
+      : file_(path, member, options.unpacked_bytes) {
+    info_.path = path;
+    info_.format = "NumPy";
+    read_header();
+  }
+
+  [[nodiscard]] SourceInfo& info() { return info_; }
+
+  [[nodiscard]] const SourceInfo& info() const override { return info_; }
+
+  void read_window(const Window& window, std::span<std::byte> samples) override {
+    if (fortran_order_) {
+      read_by_columns(window, samples);
+    } else {
+      read_plain_samples(file_, info_, layout_, window, samples);
+    }
+    if (wide_ == Wide::kSigned) widen_all<std::int64_t>(window, samples);
+    if (wide_ == Wide::kUnsigned) widen_all<std::uint64_t>(window, samples);
+  }
+
+  void limit_buffers(std::uint64_t bytes) override { file_.limit_buffers(bytes); }
+  [[nodiscard]] std::uint64_t buffer_bytes(std::uint64_t limit) const override { return file_.buffer_bytes(limit); }
+
+ private:
+  void read_header() {
+    std::array<unsigned char, 12> start = {};
+    file_.read(0, std::as_writable_bytes(std::span(start).first(10)));
+    const unsigned version = start[6];
+    if (version < 1 || version > 3) {
+      throw Error(ErrorCode::kUnsupported, fmt::format("{}: NumPy format {}, must be 1 to 3", info_.path, version));
+    }
+    if (version > 1) file_.read(10, std::as_writable_bytes(std::span(start).subspan(10)));
+    std::size_t length = start[8] | static_cast<std::size_t>(start[9]) << 8U;
+    if (version > 1) length |= static_cast<std::size_t>(start[10]) << 16U | static_cast<std::size_t>(start[11]) << 24U;
+    if (length > kMostHeaderBytes) {
+      throw Error(ErrorCode::kCorrupt, fmt::format("{}: the array's header has {} bytes, must be at most {}",
+                                                   info_.path, length, kMostHeaderBytes));
+    }
+    const std::size_t text_at = version > 1 ? 12 : 10;
+    std::string text(length, '\0');
+    file_.read(text_at, std::as_writable_bytes(std::span(text)));
+    layout_.offset_bytes = text_at + length;
+    describe(HeaderParser(info_.path, text).parse());
+  }
+
+  void describe(const Header& header) {
+    const auto unsupported = [&](const std::string& what) {
+      throw Error(ErrorCode::kUnsupported, fmt::format("{}: {}", info_.path, what));
+    };
+    const char order = header.descr.empty() ? '?' : header.descr.front();
+    const std::optional<SampleType> type = sample_type(std::string_view(header.descr).substr(order == '?' ? 0 : 1));
+    if (!type || std::string_view("<>=|").find(order) == std::string_view::npos ||
+        (order == '|' && size_bytes(*type) > 1)) {
+      unsupported(fmt::format("the array's type is '{}'; integers of 8 to 64 bits and floats of 16 to 64 are read",
+                              header.descr));
+    }
+    std::vector<std::int64_t> shape = header.shape;
+    while (shape.size() > 2 && std::find(shape.begin(), shape.end(), 1) != shape.end()) {
+      shape.erase(std::find(shape.begin(), shape.end(), 1));  // (1, rows, columns) is a raster as well
+    }
+    if (shape.size() != 2) {
+      unsupported(fmt::format("the array's shape is ({}), must have 2 dimensions", fmt::join(header.shape, ", ")));
+    }
+    fortran_order_ = header.fortran_order && shape[0] > 1 && shape[1] > 1;
+    if (header.descr.ends_with("i8")) wide_ = Wide::kSigned;
+    if (header.descr.ends_with("u8")) wide_ = Wide::kUnsigned;
+    info_.height = shape[0];
+    info_.width = shape[1];
+    if (info_.width < 1 || info_.height < 1 || info_.width > kMostSide || info_.height > kMostSide) {
+      throw Error(ErrorCode::kCorrupt, fmt::format("{}: the array's shape is ({}), must be from 1 to {}", info_.path,
+                                                   fmt::join(header.shape, ", "), kMostSide));
+    }
+    info_.sample_type = type.value_or(SampleType::kFloat32);
+    info_.block_width = info_.width;
+    info_.block_height = fortran_order_ ? std::min(info_.height, kRowsAtOnce) : 1;
+    layout_.big_endian = order == '>';
+    layout_.row_bytes = static_cast<std::uint64_t>(info_.width) * size_bytes(info_.sample_type);
+    // At most 2^31 rows of 2^34 bytes would overflow; no file is that large.
+    const double wanted = static_cast<double>(layout_.offset_bytes) +
+                          static_cast<double>(layout_.row_bytes) * static_cast<double>(info_.height);
+    const auto there = static_cast<double>(file_.size_bytes());
+    if (there < wanted) {
+      throw Error(ErrorCode::kCorrupt,
+                  fmt::format("{}: ends early: {} bytes, an array of {} x {} {} needs {:.0f}", info_.path,
+                              file_.size_bytes(), info_.width, info_.height, to_string(info_.sample_type), wanted));
+    }
+    if (there > wanted) info_.warnings.push_back(loss(fmt::format("{:.0f} bytes follow the array", there - wanted)));
+  }
+
+  /// Fortran order: the samples of a column follow each other.
+  void read_by_columns(const Window& window, std::span<std::byte> samples) {
+    const std::size_t size = size_bytes(info_.sample_type);
+    ISOHF_ASSERT(window.column >= 0 && window.row >= 0 && window.columns >= 0 && window.rows >= 0);
+    ISOHF_ASSERT(window.column + window.columns <= info_.width && window.row + window.rows <= info_.height);
+    ISOHF_ASSERT(samples.size() == static_cast<std::size_t>(window.columns * window.rows) * size);
+    column_.resize(static_cast<std::size_t>(window.rows) * size);
+    const std::size_t row_bytes = static_cast<std::size_t>(window.columns) * size;
+    for (std::int64_t c = 0; c < window.columns; ++c) {
+      const auto first = static_cast<std::uint64_t>((window.column + c) * info_.height + window.row);
+      file_.read(layout_.offset_bytes + first * size, column_);
+      std::byte* out = samples.data() + static_cast<std::size_t>(c) * size;
+      for (std::size_t at = 0; at < column_.size(); at += size, out += row_bytes) {
+        std::memcpy(out, column_.data() + at, size);
+      }
+    }
+    if (layout_.big_endian != (std::endian::native == std::endian::big)) swap_byte_order(samples, size);
+  }
+
+  template <typename Whole>
+  void widen_all(const Window& window, std::span<std::byte> samples) const {
+    for (std::size_t at = 0; at < samples.size(); at += sizeof(Whole)) {
+      Whole number{};
+      if (widen(samples.data() + at, number)) continue;
+      const auto index = static_cast<std::int64_t>(at / sizeof(Whole));
+      throw Error(
+          ErrorCode::kUnsupported,
+          fmt::format("{}: sample ({}, {}) is {}, which float64 does not hold; store the array as float64", info_.path,
+                      window.column + index % window.columns, window.row + index / window.columns, number));
+    }
+  }
+
+  RawFile file_;
+  PlainLayout layout_;
+  bool fortran_order_ = false;
+  Wide wide_ = Wide::kNo;
+  std::vector<std::byte> column_;
+  SourceInfo info_;
+};
+
+/// "elevation.npy" is the array elevation.
+std::string array_name(const ZippedFile& member) {
+  return member.name.ends_with(".npy") ? member.name.substr(0, member.name.size() - 4) : member.name;
+}
+
+/// An array that is a raster; nullptr where its shape or type make it none and nobody asked for it by name.
+std::unique_ptr<NpySource> open_array(const std::string& path, const ZippedFile& member, bool wanted,
+                                      const OpenOptions& options) {
+  try {
+    return std::make_unique<NpySource>(path, member, options);
+  } catch (const Error& error) {
+    if (!wanted && error.code() == ErrorCode::kUnsupported) return nullptr;
+    throw Error(error.code(), fmt::format("{} (array {})", error.what(), array_name(member)));
+  }
+}
+
+}  // namespace
+
+bool looks_like_npy(std::span<const std::byte> head) {
+  return head.size() >= kMagic.size() && std::equal(kMagic.begin(), kMagic.end(), head.begin(),
+                                                    [](char c, std::byte b) { return static_cast<std::byte>(c) == b; });
+}
+
+std::unique_ptr<HeightSource> open_npy(const std::string& path, const OpenOptions& options) {
+  return std::make_unique<NpySource>(path, options);
+}
+
+std::unique_ptr<HeightSource> open_npz(const std::string& path, const OpenOptions& options) {
+  const std::vector<ZippedFile> members = zipped_files(RawFile(path));
+  std::unique_ptr<NpySource> chosen;
+  std::string name;
+  std::string names;
+  std::size_t rasters = 0;
+  for (const ZippedFile& member : members) {
+    const std::string array = array_name(member);
+    const bool wanted = options.channel == array;
+    if (wanted || options.channel.empty()) {
+      std::unique_ptr<NpySource> source = open_array(path, member, wanted, options);
+      rasters += source ? 1 : 0;
+      if (source && !chosen) {
+        chosen = std::move(source);
+        name = array;
+      }
+    }
+    if (names.size() < kLongestList) names += (names.empty() ? "" : ", ") + printable(array);
+  }
+  if (!chosen && !options.channel.empty()) {
+    throw Error(ErrorCode::kInvalidArgument,
+                fmt::format("{}: there is no array \"{}\"; there are {}", path, options.channel, names));
+  }
+  if (!chosen) {
+    throw Error(
+        ErrorCode::kUnsupported,
+        fmt::format("{}: no array of the archive ({}) has two dimensions and a type that is read", path, names));
+  }
+  if (rasters > 1) {
+    chosen->info().warnings.push_back(
+        fmt::format("array {} is read, of {}; --channel NAME takes another", name, names));
+  }
+  chosen->info().channel = members.size() > 1 ? name : std::string();
+  apply_open_options(chosen->info(), options);
+  return chosen;
+}
+
+}  // namespace isohf

@@ -1,0 +1,167 @@
+#include "formats/binary_grids/raw_source.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+
+#include "formats/binary_grids/plain_samples.h"
+#include "formats/files/letter_case.h"
+#include "formats/files/raw_file.h"
+#include "formats/georeference/raster_description.h"
+#include "formats/open_options.h"
+#include "isohf/error.h"
+#include "isohf/raster.h"
+
+namespace isohf {
+namespace {
+
+/// Beyond it floats without a declared void value mean voids.
+constexpr double kBeyondAnyHeight = 1e38;
+
+struct TypeName {
+  std::string_view name;
+  SampleType type;
+};
+
+constexpr std::array<TypeName, 8> kTypes = {{
+    {"u8", SampleType::kUint8},
+    {"i8", SampleType::kInt8},
+    {"u16", SampleType::kUint16},
+    {"i16", SampleType::kInt16},
+    {"u32", SampleType::kUint32},
+    {"i32", SampleType::kInt32},
+    {"f32", SampleType::kFloat32},
+    {"f64", SampleType::kFloat64},
+}};
+
+[[noreturn]] void refuse_layout(std::string_view text) {
+  throw Error(ErrorCode::kInvalidArgument,
+              fmt::format("found '{}', must be WxH:TYPE as in 200x200:u16le: columns, rows, and u8, i8, or u16, i16, "
+                          "u32, i32, f32, f64 with le or be for the byte order",
+                          text));
+}
+
+/// Takes a whole number of at least 1 off the front of `text`.
+bool take_count(std::string_view& text, std::int64_t& count) {
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), count);
+  if (error != std::errc{} || count < 1) return false;
+  text.remove_prefix(static_cast<std::size_t>(end - text.data()));
+  return true;
+}
+
+bool take(std::string_view& text, std::string_view front) {
+  if (text.substr(0, front.size()) != front) return false;
+  text.remove_prefix(front.size());
+  return true;
+}
+
+/// "200x200:u16le" where `bytes` are the samples of a square, else an empty text.
+std::string square(std::uint64_t bytes, std::string_view type, std::size_t sample_bytes) {
+  if (bytes % sample_bytes != 0) return {};
+  const std::uint64_t samples = bytes / sample_bytes;
+  const auto side = static_cast<std::uint64_t>(std::llround(std::sqrt(static_cast<double>(samples))));
+  return side * side == samples ? fmt::format("{}x{}:{}", side, side, type) : std::string();
+}
+
+[[noreturn]] void refuse_without_layout(const std::string& path) {
+  const std::uint64_t bytes = RawFile(path).size_bytes();
+  const std::string ending = lower_case(path.substr(std::min(path.find_last_of('.') + 1, path.size())));
+  std::string example;
+  if (ending == "r8") {
+    example = square(bytes, "u8", 1);
+  } else if (ending == "r32" || ending == "f32") {
+    example = square(bytes, "f32le", 4);
+  } else if (ending == "f64") {
+    example = square(bytes, "f64le", 8);
+  } else {
+    example = square(bytes, "u16le", 2);
+    if (example.empty() && ending == "raw") example = square(bytes, "u8", 1);
+  }
+  const std::string hint =
+      example.empty() ? "as in --raw 200x300:u16le" : fmt::format("its {} bytes would be --raw {}", bytes, example);
+  throw Error(ErrorCode::kInvalidArgument,
+              fmt::format("{}: raw samples have no header; --raw WxH:TYPE must say what they are ({})", path, hint));
+}
+
+class RawSource final : public HeightSource {
+ public:
+  RawSource(const std::string& path, const RawLayout& layout, const RasterDescription* description,
+            const OpenOptions& options)
+      : file_(path, options.unpacked_bytes) {
+    info_.path = path;
+    info_.format = "raw samples";
+    if (!options.channel.empty() && options.channel != "0") {
+      throw Error(ErrorCode::kInvalidArgument,
+                  fmt::format("{}: there is no channel \"{}\"; there is 0 alone", path, options.channel));
+    }
+    info_.width = layout.width;
+    info_.height = layout.height;
+    info_.sample_type = layout.type;
+    info_.block_width = layout.width;
+    layout_.row_bytes = static_cast<std::uint64_t>(layout.width) * size_bytes(layout.type);
+    layout_.big_endian = layout.big_endian;
+    const std::uint64_t bytes = layout_.row_bytes * static_cast<std::uint64_t>(layout.height);
+    if (bytes != file_.size_bytes()) {
+      throw Error(ErrorCode::kCorrupt,
+                  fmt::format("{}: the file has {} bytes, {} x {} samples of {} bytes take {}", path,
+                              file_.size_bytes(), layout.width, layout.height, size_bytes(layout.type), bytes),
+                  {path, fmt::format("{} bytes", file_.size_bytes()), fmt::format("{} bytes", bytes), ""});
+    }
+    if (description != nullptr) description->describe(info_);
+    if (is_floating(layout.type)) {
+      info_.valid_min = -kBeyondAnyHeight;
+      info_.valid_max = kBeyondAnyHeight;
+    }
+    apply_open_options(info_, options);
+  }
+
+  [[nodiscard]] const SourceInfo& info() const override { return info_; }
+
+  void read_window(const Window& window, std::span<std::byte> samples) override {
+    read_plain_samples(file_, info_, layout_, window, samples);
+  }
+
+  void limit_buffers(std::uint64_t bytes) override { file_.limit_buffers(bytes); }
+  [[nodiscard]] std::uint64_t buffer_bytes(std::uint64_t limit) const override { return file_.buffer_bytes(limit); }
+
+ private:
+  RawFile file_;
+  SourceInfo info_;
+  PlainLayout layout_;
+};
+
+}  // namespace
+
+RawLayout raw_layout_from_string(std::string_view text) {
+  RawLayout layout;
+  std::string_view rest = text;
+  if (!take_count(rest, layout.width) || (!take(rest, "x") && !take(rest, "X")) || !take_count(rest, layout.height) ||
+      !take(rest, ":")) {
+    refuse_layout(text);
+  }
+  // f64 samples of this many are 2^62 bytes; no file has more.
+  if (layout.width > (std::int64_t{1} << 59U) / layout.height) refuse_layout(text);
+  for (const TypeName& row : kTypes) {
+    if (!take(rest, row.name)) continue;
+    layout.type = row.type;
+    if (size_bytes(row.type) == 1 && rest.empty()) return layout;
+    if (rest == "le" || rest == "be") {
+      layout.big_endian = rest == "be";
+      return layout;
+    }
+    break;
+  }
+  refuse_layout(text);
+}
+
+std::unique_ptr<HeightSource> open_raw(const std::string& path, const OpenOptions& options) {
+  if (options.raw) return std::make_unique<RawSource>(path, *options.raw, nullptr, options);
+  if (!has_raster_description(path)) refuse_without_layout(path);
+  const RasterDescription description(path);
+  return std::make_unique<RawSource>(path, description.layout(), &description, options);
+}
+
+}  // namespace isohf

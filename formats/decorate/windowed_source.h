@@ -1,0 +1,37 @@
+#pragma once
+
+#include <memory>
+
+#include "isohf/raster.h"
+
+namespace isohf {
+
+/// A window of another source, as a source of its own: placed where that window lies.
+class WindowedSource : public HeightSource {
+ public:
+  /// window  inside the source; 1x1 samples at least
+  WindowedSource(std::unique_ptr<HeightSource> source, const Window& window);
+  ~WindowedSource() override;
+
+  [[nodiscard]] const SourceInfo& info() const override { return info_; }
+  void read_window(const Window& window, std::span<std::byte> samples) override;
+  void limit_buffers(std::uint64_t bytes) override;
+  [[nodiscard]] std::uint64_t buffer_bytes(std::uint64_t limit) const override;
+  /// The same window of what the other source is made of.
+  [[nodiscard]] HeightSource& as_stored() override { return stored_ ? *stored_ : *this; }
+
+ protected:
+  [[nodiscard]] SourceInfo& mutable_info() { return info_; }
+
+ private:
+  WindowedSource(HeightSource& source, const Window& window);
+
+  std::unique_ptr<HeightSource> own_;  ///< source_, where this is its only user
+  HeightSource& source_;
+  Window window_;
+  SourceInfo info_;
+  bool keeps_blocks_;                       ///< windows that begin where blocks do, still do
+  std::unique_ptr<WindowedSource> stored_;  ///< null: source_ is as stored
+};
+
+}  // namespace isohf

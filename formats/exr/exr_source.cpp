@@ -1,0 +1,402 @@
+#include "formats/exr/exr_source.h"
+
+#include <OpenEXR/Iex.h>
+#include <OpenEXR/ImfChannelList.h>
+#include <OpenEXR/ImfFrameBuffer.h>
+#include <OpenEXR/ImfHeader.h>
+#include <OpenEXR/ImfInputPart.h>
+#include <OpenEXR/ImfMultiPartInputFile.h>
+#include <OpenEXR/ImfPartType.h>
+#include <OpenEXR/ImfTileDescription.h>
+#include <OpenEXR/ImfTiledInputPart.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cstring>
+#include <new>
+#include <optional>
+#include <set>
+#include <string>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "formats/exr/exr_threads.h"
+#include "formats/files/letter_case.h"
+#include "formats/georeference/place_beside.h"
+#include "formats/open_options.h"
+#include "formats/text_grids/text_tokens.h"
+#include "isohf/base/assert.h"
+#include "isohf/error.h"
+#include "isohf/raster.h"
+
+namespace isohf {
+namespace {
+
+/// Words for elevations, anywhere in the name of a channel or its layer, in any case.
+constexpr std::array kHeightWords = {"height", "elevation", "altitude", "dem"};
+/// Then channels called so, in any case; those of layers of normals and the like are something else.
+constexpr std::array kPreferredChannels = {"y", "z", "depth", "r"};
+constexpr std::array kOtherLayers = {"n", "normal", "normals", "uv", "st", "motion", "velocity", "tangent"};
+/// The order in which OpenImageIO, and so oiiotool, lists the channels of a layer; others follow by name.
+constexpr std::array kListedFirst = {"r",     "red", "g",  "green", "b",  "blue", "y",  "real", "imag",  "a",
+                                     "alpha", "ar",  "ra", "ag",    "ga", "ab",   "ba", "z",    "depth", "zback"};
+
+/// Rows are decoded in runs of at most about this size, so that several chunks are decoded at a time.
+constexpr std::int64_t kBandBytes = std::int64_t{8} << 20U;
+
+struct Channel {
+  int part = 0;
+  std::string part_name;  ///< empty in a file of one part
+  std::string name;
+  Imf::PixelType type = Imf::HALF;
+  bool subsampled = false;
+  bool deep = false;
+};
+
+std::string full_name(const Channel& channel) {
+  return channel.part_name.empty() ? channel.name : channel.part_name + "." + channel.name;
+}
+
+/// For messages.
+std::string shown_name(const Channel& channel) {
+  return one_line(full_name(channel));
+}
+
+/// What stands between the dots of a name, in lower case.
+std::vector<std::string> components_of(const std::string& name) {
+  std::vector<std::string> components(1);
+  for (const char c : lower_case(name)) {
+    if (c == '.') {
+      components.emplace_back();
+    } else {
+      components.back() += c;
+    }
+  }
+  return components;
+}
+
+template <std::size_t count>
+std::size_t place_in(const std::array<const char*, count>& list, const std::string& word) {
+  return static_cast<std::size_t>(std::find(list.begin(), list.end(), word) - list.begin());
+}
+
+/// By layer, then as kListedFirst says, then by name. A layer of X, Y and Z is a vector, in that order.
+void sort_as_listed(std::vector<Channel>& channels) {
+  const auto layer_of = [](const Channel& channel) {
+    const std::size_t dot = channel.name.rfind('.');
+    return dot == std::string::npos ? std::string() : channel.name.substr(0, dot);
+  };
+  const auto last_of = [](const Channel& channel) { return components_of(channel.name).back(); };
+  std::set<std::pair<std::string, std::string>> there;
+  for (const Channel& channel : channels) there.emplace(layer_of(channel), last_of(channel));
+  const auto key = [&](const Channel& channel) {
+    const std::string layer = layer_of(channel);
+    const bool is_vector = there.contains({layer, "x"}) && there.contains({layer, "y"}) && there.contains({layer, "z"});
+    return std::tuple(layer, is_vector ? kListedFirst.size() : place_in(kListedFirst, last_of(channel)), channel.name);
+  };
+  std::ranges::stable_sort(channels, {}, key);
+}
+
+bool is_deep(const Imf::Header& header) {
+  return header.hasType() && Imf::isDeepData(header.type());
+}
+
+std::vector<Channel> channels_of(const Imf::MultiPartInputFile& file) {
+  std::vector<Channel> channels;
+  for (int part = 0; part < file.parts(); ++part) {
+    const Imf::Header& header = file.header(part);
+    std::vector<Channel> of_part;
+    for (auto at = header.channels().begin(); at != header.channels().end(); ++at) {
+      Channel channel;
+      channel.part = part;
+      if (file.parts() > 1) channel.part_name = header.hasName() ? header.name() : std::to_string(part);
+      channel.name = at.name();
+      channel.type = at.channel().type;
+      channel.subsampled = at.channel().xSampling != 1 || at.channel().ySampling != 1;
+      channel.deep = is_deep(header);
+      of_part.push_back(channel);
+    }
+    if (of_part.empty()) continue;
+    sort_as_listed(of_part);
+    channels.insert(channels.end(), of_part.begin(), of_part.end());
+  }
+  return channels;
+}
+
+std::string list_of(const std::vector<Channel>& channels) {
+  std::string list;
+  for (const Channel& channel : channels) list += (list.empty() ? "" : ", ") + shown_name(channel);
+  return list;
+}
+
+/// Drops the channels of all parts but one, given by its name or number.
+void keep_part(std::vector<Channel>& channels, const std::string& wanted) {
+  const int parts = channels.back().part + 1;
+  int part = -1;
+  for (const Channel& channel : channels) {
+    if (part < 0 && channel.part_name == wanted) part = channel.part;
+  }
+  const char* const end = wanted.data() + wanted.size();
+  int number = 0;
+  const auto [at, error] = std::from_chars(wanted.data(), end, number);
+  if (part < 0 && error == std::errc() && at == end && number >= 0 && number < parts) part = number;
+  if (part < 0) {
+    throw Error(ErrorCode::kInvalidArgument, fmt::format("has no part \"{}\"; its channels are {}, in parts 0...{}",
+                                                         wanted, list_of(channels), parts - 1));
+  }
+  std::erase_if(channels, [part](const Channel& channel) { return channel.part != part; });
+}
+
+Channel named_channel(const std::vector<Channel>& channels, const std::string& wanted) {
+  for (const Channel& channel : channels) {
+    if (channel.name == wanted) return channel;
+  }
+  for (const Channel& channel : channels) {
+    if (full_name(channel) == wanted) return channel;
+  }
+  std::size_t index = 0;
+  const char* end = wanted.data() + wanted.size();
+  const auto parsed = std::from_chars(wanted.data(), end, index);
+  if (parsed.ec == std::errc() && parsed.ptr == end && index < channels.size()) return channels[index];
+  throw Error(ErrorCode::kInvalidArgument, fmt::format("has no channel \"{}\"; it has {} (or 0...{})", wanted,
+                                                       list_of(channels), channels.size() - 1));
+}
+
+/// The channel that most likely holds elevations, in the first part that is not deep.
+Channel default_channel(const std::vector<Channel>& channels) {
+  std::vector<Channel> candidates;
+  for (const Channel& channel : channels) {
+    if (!channel.deep && (candidates.empty() || candidates.front().part == channel.part)) candidates.push_back(channel);
+  }
+  if (candidates.empty()) return channels.front();
+  // "height", then "height.Y" or "terrain.height", then "Y", then "beauty.Y", then what is left.
+  const auto rank = [](const Channel& channel) {
+    const std::vector<std::string> components = components_of(channel.name);
+    const bool whole = components.size() == 1;
+    std::size_t words = kHeightWords.size();
+    for (const std::string& component : components) words = std::min(words, place_in(kHeightWords, component));
+    if (words < kHeightWords.size()) return words + (whole ? 0 : kHeightWords.size());
+    const bool is_other = !whole && place_in(kOtherLayers, components.front()) < kOtherLayers.size();
+    return 2 * kHeightWords.size() + (whole ? 0 : kPreferredChannels.size() + 1) +
+           (is_other ? kPreferredChannels.size() : place_in(kPreferredChannels, components.back()));
+  };
+  return *std::ranges::min_element(candidates, {}, rank);
+}
+
+SampleType sample_type_of(Imf::PixelType type) {
+  switch (type) {
+    case Imf::UINT:
+      return SampleType::kUint32;
+    case Imf::HALF:
+      return SampleType::kFloat16;
+    case Imf::FLOAT:
+      return SampleType::kFloat32;
+    default:
+      throw Error(ErrorCode::kCorrupt, fmt::format("OpenEXR pixel type {} is unknown", static_cast<int>(type)));
+  }
+}
+
+std::int64_t scan_lines_per_chunk(Imf::Compression compression) {
+  switch (compression) {
+    case Imf::ZIP_COMPRESSION:
+    case Imf::PXR24_COMPRESSION:
+      return 16;
+    case Imf::PIZ_COMPRESSION:
+    case Imf::B44_COMPRESSION:
+    case Imf::B44A_COMPRESSION:
+    case Imf::DWAA_COMPRESSION:
+      return 32;
+    case Imf::DWAB_COMPRESSION:
+      return 256;
+    default:
+      return 1;
+  }
+}
+
+/// Runs `action`, turning whatever the OpenEXR library throws into Error with `where` in front.
+template <typename Action>
+auto translated(const std::string& where, Action action) -> decltype(action()) {
+  try {
+    return action();
+  } catch (const Error& error) {
+    throw error.within(where);
+  } catch (const std::bad_alloc&) {
+    throw Error(ErrorCode::kOutOfMemory, where + ": OpenEXR ran out of memory");
+  } catch (const std::exception& error) {
+    throw Error(ErrorCode::kCorrupt, where + ": OpenEXR: " + one_line(error.what()));
+  }
+}
+
+class ExrSource final : public HeightSource {
+ public:
+  ExrSource(const std::string& path, const OpenOptions& options)
+      : file_(path.c_str(), Imf::globalThreadCount(), false) {
+    std::vector<Channel> channels = channels_of(file_);
+    if (channels.empty()) throw Error(ErrorCode::kCorrupt, "OpenEXR file has no channels");
+    if (!options.part.empty()) keep_part(channels, options.part);
+    channel_ = options.channel.empty() ? default_channel(channels) : named_channel(channels, options.channel);
+    if (channel_.deep) {
+      throw Error(
+          ErrorCode::kUnsupported,
+          fmt::format("OpenEXR channel {} is deep, several samples per pixel; flatten it", shown_name(channel_)));
+    }
+    if (channel_.subsampled) {
+      throw Error(ErrorCode::kUnsupported, fmt::format("OpenEXR channel {} is subsampled; the file has {}",
+                                                       shown_name(channel_), list_of(channels)));
+    }
+    if (!file_.partComplete(channel_.part)) {
+      throw Error(ErrorCode::kCorrupt, "OpenEXR file is incomplete: its table of chunks has gaps");
+    }
+    describe(path, channels, options.channel.empty());
+    open_part();
+    read_place_beside(info_, channels.size() == 1 ? 1 : 0);
+    apply_open_options(info_, options);
+  }
+
+  [[nodiscard]] const SourceInfo& info() const override { return info_; }
+
+  void read_window(const Window& window, std::span<std::byte> samples) override {
+    ISOHF_ASSERT(window.column >= 0 && window.row >= 0 && window.columns >= 0 && window.rows >= 0 &&
+                 window.column + window.columns <= info_.width && window.row + window.rows <= info_.height);
+    const std::size_t row_bytes = static_cast<std::size_t>(window.columns) * sample_bytes_;
+    ISOHF_ASSERT(samples.size() == row_bytes * static_cast<std::size_t>(window.rows));
+    if (samples.empty()) return;
+    std::byte* out = samples.data();
+    for (std::int64_t row = window.row; row < window.row + window.rows; ++row, out += row_bytes) {
+      if (!band_holds(row, window)) load_band(row, window);
+      const std::int64_t at = (row - band_.row) * band_.columns + window.column - band_.column;
+      std::memcpy(out, samples_.data() + static_cast<std::size_t>(at) * sample_bytes_, row_bytes);
+    }
+  }
+
+  void limit_buffers(std::uint64_t bytes) override {
+    band_bytes_ = static_cast<std::int64_t>(std::min<std::uint64_t>(bytes, kBandBytes));
+    band_ = {};
+    samples_ = {};
+  }
+  /// Of the band, and of OpenEXR's chunks with all their channels: two for each of its threads, and about as much again
+  /// as stored and once more while they are decoded.
+  [[nodiscard]] std::uint64_t buffer_bytes(std::uint64_t limit) const override {
+    const auto bytes = static_cast<std::int64_t>(std::min<std::uint64_t>(limit, kBandBytes));
+    const std::int64_t rows = std::min(band_rows(info_.width, bytes), info_.height);
+    std::int64_t pixel_bytes = 0;
+    const Imf::ChannelList& channels = file_.header(channel_.part).channels();
+    for (auto at = channels.begin(); at != channels.end(); ++at) {
+      pixel_bytes += static_cast<std::int64_t>(size_bytes(sample_type_of(at.channel().type)));
+    }
+    const std::int64_t chunks = std::max(2 * Imf::globalThreadCount(), 1);
+    const std::int64_t chunk_bytes = 3 * info_.block_width * info_.block_height * pixel_bytes;
+    return static_cast<std::uint64_t>(rows * info_.width * static_cast<std::int64_t>(sample_bytes_) +
+                                      chunks * chunk_bytes);
+  }
+
+ private:
+  /// Rows of whole chunks of so many columns that `bytes` have room for.
+  [[nodiscard]] std::int64_t band_rows(std::int64_t columns, std::int64_t bytes) const {
+    const std::int64_t affordable = bytes / (columns * static_cast<std::int64_t>(sample_bytes_));
+    return std::max(affordable / info_.block_height * info_.block_height, info_.block_height);
+  }
+
+  void describe(const std::string& path, const std::vector<Channel>& channels, bool chosen_here) {
+    const Imf::Header& header = file_.header(channel_.part);
+    const Imath::Box2i& data = header.dataWindow();
+    const Imath::Box2i& display = header.displayWindow();
+    info_.path = path;
+    info_.format = "OpenEXR";
+    info_.width = std::int64_t{data.max.x} - data.min.x + 1;
+    info_.height = std::int64_t{data.max.y} - data.min.y + 1;
+    info_.sample_type = sample_type_of(channel_.type);
+    info_.channel = channels.size() > 1 || !channel_.part_name.empty() ? full_name(channel_) : std::string();
+    sample_bytes_ = size_bytes(info_.sample_type);
+    if (chosen_here && channels.size() > 1) {
+      info_.warnings.push_back(fmt::format("channel {} is read, of {} ({}); --channel chooses another",
+                                           shown_name(channel_), channels.size(), list_of(channels)));
+    }
+    if (data != display) {
+      info_.warnings.push_back(fmt::format(
+          "the data window ({}, {}) - ({}, {}) is read; the display window ({}, {}) - "
+          "({}, {}) differs",
+          data.min.x, data.min.y, data.max.x, data.max.y, display.min.x, display.min.y, display.max.x, display.max.y));
+    }
+  }
+
+  void open_part() {
+    const Imf::Header& header = file_.header(channel_.part);
+    origin_ = header.dataWindow().min;
+    if (header.hasType() ? Imf::isTiled(header.type()) : header.hasTileDescription()) {
+      tiles_.emplace(file_, channel_.part);
+      info_.block_width = std::min<std::int64_t>(tiles_->tileXSize(), info_.width);
+      info_.block_height = std::min<std::int64_t>(tiles_->tileYSize(), info_.height);
+    } else {
+      scan_lines_.emplace(file_, channel_.part);
+      info_.block_width = info_.width;
+      info_.block_height = std::min(scan_lines_per_chunk(header.compression()), info_.height);
+    }
+  }
+
+  [[nodiscard]] bool band_holds(std::int64_t row, const Window& window) const {
+    return row >= band_.row && row < band_.row + band_.rows && window.column >= band_.column &&
+           window.column + window.columns <= band_.column + band_.columns;
+  }
+
+  /// Decodes whole chunks around the part of `window` that begins at `row`: all of its rows if they are few.
+  void load_band(std::int64_t row, const Window& window) {
+    const auto down = [](std::int64_t value, std::int64_t step) { return value / step * step; };
+    const auto up = [](std::int64_t value, std::int64_t step, std::int64_t end) {
+      return std::min((value + step - 1) / step * step, end);
+    };
+    Window band;
+    band.column = down(window.column, info_.block_width);
+    band.columns = up(window.column + window.columns, info_.block_width, info_.width) - band.column;
+    band.row = down(row, info_.block_height);
+    const std::int64_t wanted = up(window.row + window.rows, info_.block_height, info_.height) - band.row;
+    band.rows = std::min({wanted, band_rows(band.columns, band_bytes_), info_.height - band.row});
+    band_ = {};  // what is there is overwritten, even if decoding fails half-way
+    translated(fmt::format("{}: rows {} to {}", info_.path, band.row, band.row + band.rows - 1), [&] { decode(band); });
+    band_ = band;
+  }
+
+  void decode(const Window& band) {
+    samples_.resize(static_cast<std::size_t>(band.columns * band.rows) * sample_bytes_);
+    const Imath::V2i first(origin_.x + static_cast<int>(band.column), origin_.y + static_cast<int>(band.row));
+    Imf::FrameBuffer frame;
+    frame.insert(channel_.name,
+                 Imf::Slice::Make(channel_.type, samples_.data(), first, band.columns, band.rows, sample_bytes_,
+                                  sample_bytes_ * static_cast<std::size_t>(band.columns)));
+    if (tiles_) {
+      tiles_->setFrameBuffer(frame);
+      const auto tile = [](std::int64_t at, std::int64_t size) { return static_cast<int>(at / size); };
+      tiles_->readTiles(tile(band.column, info_.block_width), tile(band.column + band.columns - 1, info_.block_width),
+                        tile(band.row, info_.block_height), tile(band.row + band.rows - 1, info_.block_height));
+    } else {
+      scan_lines_->setFrameBuffer(frame);
+      scan_lines_->readPixels(first.y, first.y + static_cast<int>(band.rows) - 1);
+    }
+  }
+
+  Imf::MultiPartInputFile file_;
+  std::optional<Imf::InputPart> scan_lines_;
+  std::optional<Imf::TiledInputPart> tiles_;
+  Channel channel_;
+  Imath::V2i origin_;
+  SourceInfo info_;
+  std::size_t sample_bytes_ = 0;
+  std::int64_t band_bytes_ = kBandBytes;
+  Window band_;                     ///< what samples_ holds
+  std::vector<std::byte> samples_;  ///< decoded chunks of the channel
+};
+
+}  // namespace
+
+std::unique_ptr<HeightSource> open_exr(const std::string& path, const OpenOptions& options) {
+  return translated(path, [&]() -> std::unique_ptr<HeightSource> {
+    check_exr_headers(path);
+    start_exr_threads();
+    return std::make_unique<ExrSource>(path, options);
+  });
+}
+
+}  // namespace isohf

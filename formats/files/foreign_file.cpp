@@ -1,0 +1,85 @@
+#include "formats/files/foreign_file.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <fstream>
+#include <string_view>
+
+namespace isohf {
+namespace {
+
+using namespace std::string_view_literals;
+
+constexpr const char* kGdal = "gdal_translate {} OUT.tif makes a GeoTIFF of it";
+constexpr const char* kUnpack = "unpack it first";
+
+struct Signature {
+  std::string_view bytes;
+  const char* is;
+  const char* help = "";
+  std::size_t at = 0;
+};
+
+constexpr Signature kSignatures[] = {
+    {"isohf.json"sv, "an isohf archive", "isohf restore {} OUT.tif makes a raster of it", 30},
+    {"PK\x03\x04"sv, "a ZIP file", "unzip it first"},
+    {"\x1f\x8b"sv, "a gzip file", "gunzip it first"},
+    {"BZh"sv, "a bzip2 file", kUnpack},
+    {"\xfd"
+     "7zXZ"sv,
+     "an xz file", kUnpack},
+    {"\x28\xb5\x2f\xfd"sv, "a Zstandard file", kUnpack},
+    {"7z\xbc\xaf"sv, "a 7-Zip file", kUnpack},
+    {"Rar!"sv, "a RAR file", kUnpack},
+    {"ustar"sv, "a tar file", "tar xf {} unpacks it", 257},
+    {"%PDF"sv, "a PDF document"},
+    {"LASF"sv, "a LAS point cloud", "PDAL grids it: pdal translate {} OUT.tif --writers.gdal.resolution=1"},
+    {"ply\n"sv, "a PLY mesh"},
+    {"glTF"sv, "a glTF model"},
+    {"\x89HDF"sv, "an HDF5 or NetCDF file", kGdal},
+    {"CDF\x01"sv, "a NetCDF file", kGdal},
+    {"CDF\x02"sv, "a NetCDF file", kGdal},
+    {"\x0e\x03\x13\x01"sv, "an HDF4 file", kGdal},
+    {"GRIB"sv, "a GRIB file", kGdal},
+    {"EHFA_HEADER_TAG"sv, "an ERDAS Imagine raster", kGdal},
+    {"NITF"sv, "a NITF raster", kGdal},
+    {"msid"sv, "a MrSID picture", kGdal},
+    {"<VRTDataset"sv, "a GDAL virtual raster", kGdal},
+    {"SQLite format 3"sv, "an SQLite database, as a GeoPackage is one", kGdal},
+    {"\x00\x00\x27\x0a"sv, "a shapefile, which holds points or outlines", "gdal_grid makes a raster of points"},
+    {"\xff\xd8\xff"sv, "a JPEG picture"},
+    {"GIF8"sv, "a GIF picture"},
+    {"RIFF"sv, "a RIFF file: a WebP picture, sound or film"},
+    {"\x7f"
+     "ELF"sv,
+     "a program"},
+    {"<?xml"sv, "XML text"},
+    {"{"sv, "JSON text"},
+};
+
+bool is_text(std::string_view head) {
+  return !head.empty() && std::all_of(head.begin(), head.end(), [](char c) {
+    const auto byte = static_cast<unsigned char>(c);
+    return byte >= 0x20 ? byte != 0x7f : byte == '\n' || byte == '\r' || byte == '\t' || byte == '\f';
+  });
+}
+
+}  // namespace
+
+ForeignFile foreign_file(const std::string& path) {
+  constexpr std::size_t kHeadBytes = 512;
+  std::string head(kHeadBytes, '\0');
+  std::ifstream file(path, std::ios::binary);
+  file.read(head.data(), static_cast<std::streamsize>(head.size()));
+  head.resize(static_cast<std::size_t>(file.gcount()));
+  for (const Signature& signature : kSignatures) {
+    if (head.size() < signature.at || !std::string_view(head).substr(signature.at).starts_with(signature.bytes))
+      continue;
+    return {signature.is, fmt::format(fmt::runtime(signature.help), path)};
+  }
+  if (is_text(head)) return {"text", ""};
+  return {};
+}
+
+}  // namespace isohf

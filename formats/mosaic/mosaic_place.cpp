@@ -1,0 +1,249 @@
+#include "formats/mosaic/mosaic_place.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numeric>
+#include <utility>
+
+#include "isohf/error.h"
+
+namespace isohf {
+namespace {
+
+/// Spacings that differ by less, relatively, are one resolution.
+constexpr double kSameResolution = 1e-3;
+/// Rounding that moves samples by more than this is worth a word.
+constexpr double kWorthAWord = 1e-3;
+/// Sides of more samples would overflow byte counts; far beyond what memory bounds.
+constexpr double kMostSamples = 1e9;
+/// Edges of coarser members that fall on samples are computed and may miss them by a little.
+constexpr double kOnSample = 1e-6;
+
+using Spacing = std::pair<double, double>;
+
+struct Resolution {
+  Spacing spacing;  ///< the commonest of its members'
+  std::vector<PlacedMember> members;
+};
+
+bool is_same_resolution(const Spacing& a, const Spacing& b) {
+  return std::abs(a.first / b.first - 1.0) <= kSameResolution && std::abs(a.second / b.second - 1.0) <= kSameResolution;
+}
+
+/// By resolution, finest columns first; independent of the members' order.
+std::vector<Resolution> by_resolution(std::vector<PlacedMember> members) {
+  std::map<Spacing, std::int64_t> counts;
+  for (const PlacedMember& placed : members) ++counts[{placed.spacing_x, placed.spacing_y}];
+  std::vector<Resolution> found;
+  std::vector<std::int64_t> commonest;
+  std::map<Spacing, std::size_t> where;
+  for (const auto& [spacing, count] : counts) {
+    std::size_t i = 0;
+    while (i < found.size() && !is_same_resolution(found[i].spacing, spacing)) ++i;
+    if (i == found.size()) {
+      found.push_back({spacing, {}});
+      commonest.push_back(0);
+    }
+    if (count > commonest[i]) {
+      commonest[i] = count;
+      found[i].spacing = spacing;
+    }
+    where[spacing] = i;
+  }
+  for (PlacedMember& placed : members) {
+    found[where[{placed.spacing_x, placed.spacing_y}]].members.push_back(std::move(placed));
+  }
+  return found;
+}
+
+/// A member's first sample on one axis of its layer's grid, and how far it or its last one lies off.
+struct Snapped {
+  std::int64_t first = 0;
+  double off = 0.0;
+};
+
+Snapped snap(double distance, double spacing, double own_spacing, std::int64_t samples) {
+  const double place = distance / spacing;
+  const double first = std::round(place);
+  const auto steps = static_cast<double>(samples - 1);
+  const double last_off = (distance + steps * own_spacing) / spacing - (first + steps);
+  const double off = place - first;
+  return {static_cast<std::int64_t>(first), std::abs(last_off) > std::abs(off) ? last_off : off};
+}
+
+[[noreturn]] void refuse_misaligned(const std::string& path, const char* axis, double off) {
+  throw Error(
+      ErrorCode::kInvalidArgument,
+      fmt::format("{}: lies {:.3g} of a sample off the grid of the other files of its resolution in {}, at most "
+                  "{} is taken as rounding; resample it to their grid (gdalwarp -tap) or leave it out",
+                  path, std::abs(off), axis, kSnapTolerance));
+}
+
+MosaicLayer lay_out(Resolution resolution, double& worst) {
+  MosaicLayer layer;
+  std::tie(layer.spacing_x, layer.spacing_y) = resolution.spacing;
+  const std::vector<PlacedMember>& placed = resolution.members;
+  const auto west = [](const PlacedMember& a, const PlacedMember& b) { return a.origin_x < b.origin_x; };
+  const auto south = [](const PlacedMember& a, const PlacedMember& b) { return a.origin_y < b.origin_y; };
+  layer.origin_x = std::min_element(placed.begin(), placed.end(), west)->origin_x;
+  layer.origin_y = std::max_element(placed.begin(), placed.end(), south)->origin_y;
+  for (PlacedMember& each : resolution.members) {
+    MosaicMember& member = each.member;
+    const double x = each.origin_x - layer.origin_x;
+    const double y = layer.origin_y - each.origin_y;
+    if (!(x / layer.spacing_x < kMostSamples && y / layer.spacing_y < kMostSamples)) {
+      throw Error(ErrorCode::kInvalidArgument,
+                  fmt::format("{}: lies more than {:.0e} samples from other files of the mosaic; is its georeference "
+                              "right? leave it out otherwise",
+                              member.path, kMostSamples));
+    }
+    const Snapped column = snap(x, layer.spacing_x, each.spacing_x, member.width);
+    const Snapped row = snap(y, layer.spacing_y, each.spacing_y, member.height);
+    if (std::abs(column.off) > kSnapTolerance) refuse_misaligned(member.path, "x", column.off);
+    if (std::abs(row.off) > kSnapTolerance) refuse_misaligned(member.path, "y", row.off);
+    worst = std::max({worst, std::abs(column.off), std::abs(row.off)});
+    member.column = column.first;
+    member.row = row.first;
+    layer.width = std::max(layer.width, member.column + member.width);
+    layer.height = std::max(layer.height, member.row + member.height);
+    layer.tallest = std::max(layer.tallest, member.height);
+    layer.members.push_back(std::move(member));
+  }
+  std::sort(layer.members.begin(), layer.members.end(), [](const MosaicMember& a, const MosaicMember& b) {
+    return std::tie(a.row, a.column, a.order) < std::tie(b.row, b.column, b.order);
+  });
+  return layer;
+}
+
+/// First and last whole numbers in [low, high].
+std::pair<std::int64_t, std::int64_t> whole_numbers(double low, double high) {
+  return {static_cast<std::int64_t>(std::ceil(low - kOnSample)),
+          static_cast<std::int64_t>(std::floor(high + kOnSample))};
+}
+
+/// Of a coarser layer's samples first...last, those of the finer axis that lie in their reach.
+std::pair<std::int64_t, std::int64_t> covered(double offset, double ratio, std::int64_t first, std::int64_t last,
+                                              double reach) {
+  return whole_numbers(offset + (static_cast<double>(first) - reach) * ratio,
+                       offset + (static_cast<double>(last) + reach) * ratio);
+}
+
+struct Extent {
+  std::int64_t first = 0;
+  std::int64_t last = 0;
+
+  void include(std::pair<std::int64_t, std::int64_t> range) {
+    first = std::min(first, range.first);
+    last = std::max(last, range.second);
+  }
+};
+
+}  // namespace
+
+void join_antimeridian(std::vector<PlacedMember>& members) {
+  constexpr double kTurn = 360.0;
+  const auto end_of = [](const PlacedMember& placed) {
+    return placed.origin_x + static_cast<double>(placed.member.width) * placed.spacing_x;
+  };
+  std::vector<std::size_t> order(members.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  const auto sort_by_west = [&] {
+    std::sort(order.begin(), order.end(),
+              [&](std::size_t a, std::size_t b) { return members[a].origin_x < members[b].origin_x; });
+  };
+  const auto east = [&] {
+    double most = end_of(members.front());
+    for (const PlacedMember& placed : members) most = std::max(most, end_of(placed));
+    return most;
+  };
+  sort_by_west();
+  // Some files count longitudes from 0 to 360, others from -180 to 180.
+  if (east() - members[order.front()].origin_x > kTurn + 2.0 * members.front().spacing_x) {
+    for (PlacedMember& placed : members) placed.origin_x -= kTurn * std::floor((placed.origin_x + 180.0) / kTurn);
+    sort_by_west();
+  }
+  double reach = end_of(members[order.front()]);
+  for (const std::size_t i : order) {
+    const double start = members[i].origin_x;
+    if (start - reach > kTurn / 2.0) {
+      for (PlacedMember& placed : members) {
+        if (placed.origin_x < start) placed.origin_x += kTurn;
+      }
+      return;
+    }
+    reach = std::max(reach, end_of(members[i]));
+  }
+}
+
+void place_members(std::vector<PlacedMember> members, MosaicPlan& plan) {
+  double worst = 0.0;
+  for (Resolution& resolution : by_resolution(std::move(members))) {
+    plan.layers.push_back(lay_out(std::move(resolution), worst));
+  }
+  if (worst > kWorthAWord) {
+    plan.info.warnings.push_back(fmt::format(
+        "places of files are rounded: they lie up to {:.2g} of a sample off their common grid and are put on it",
+        worst));
+  }
+  // Coarsest first; of two of one area, the one with the wider columns.
+  std::sort(plan.layers.begin(), plan.layers.end(), [](const MosaicLayer& a, const MosaicLayer& b) {
+    const double area_a = a.spacing_x * a.spacing_y;
+    const double area_b = b.spacing_x * b.spacing_y;
+    return area_a != area_b ? area_a > area_b : a.spacing_x > b.spacing_x;
+  });
+  const auto finer_x = [](const MosaicLayer& a, const MosaicLayer& b) { return a.spacing_x < b.spacing_x; };
+  const auto finer_y = [](const MosaicLayer& a, const MosaicLayer& b) { return a.spacing_y < b.spacing_y; };
+  // The last of equally fine layers: the finest in the other direction as well, the one that is on the grid.
+  const auto x_from = std::min_element(plan.layers.rbegin(), plan.layers.rend(), finer_x);
+  const auto y_from = std::min_element(plan.layers.rbegin(), plan.layers.rend(), finer_y);
+  Georeference& place = plan.info.georeference;
+  place.spacing_x = x_from->spacing_x;
+  place.spacing_y = y_from->spacing_y;
+  place.origin_x = x_from->origin_x;
+  place.origin_y = y_from->origin_y;
+  const double reach = place.registration == Registration::kArea ? 0.5 : 0.0;
+  Extent columns{0, x_from->width - 1};
+  Extent rows{0, y_from->height - 1};
+  for (const MosaicLayer& layer : plan.layers) {
+    if (plan.is_on_grid(layer)) continue;
+    columns.include(covered((layer.origin_x - place.origin_x) / place.spacing_x, layer.spacing_x / place.spacing_x, 0,
+                            layer.width - 1, reach));
+    rows.include(covered((place.origin_y - layer.origin_y) / place.spacing_y, layer.spacing_y / place.spacing_y, 0,
+                         layer.height - 1, reach));
+  }
+  plan.info.width = columns.last - columns.first + 1;
+  plan.info.height = rows.last - rows.first + 1;
+  // Not touched where the finest members reach as far as any: the whole has the very origin of its pieces then.
+  if (columns.first != 0) place.origin_x += static_cast<double>(columns.first) * place.spacing_x;
+  if (rows.first != 0) place.origin_y -= static_cast<double>(rows.first) * place.spacing_y;
+  for (MosaicLayer& layer : plan.layers) {
+    if (!plan.is_on_grid(layer)) continue;
+    for (MosaicMember& member : layer.members) {
+      member.column -= columns.first;
+      member.row -= rows.first;
+    }
+    layer.origin_x = place.origin_x;
+    layer.origin_y = place.origin_y;
+    layer.width = plan.info.width;
+    layer.height = plan.info.height;
+  }
+}
+
+SampleRectangle ground_of(const MosaicPlan& plan, const MosaicLayer& layer, const MosaicMember& member, double reach) {
+  if (plan.is_on_grid(layer)) return {member.column, member.row, member.width, member.height};
+  const Georeference& place = plan.info.georeference;
+  auto [west, east] = covered((layer.origin_x - place.origin_x) / place.spacing_x, layer.spacing_x / place.spacing_x,
+                              member.column, member.column + member.width - 1, reach);
+  auto [north, south] = covered((place.origin_y - layer.origin_y) / place.spacing_y, layer.spacing_y / place.spacing_y,
+                                member.row, member.row + member.height - 1, reach);
+  west = std::max<std::int64_t>(west, 0);
+  north = std::max<std::int64_t>(north, 0);
+  east = std::min(east, plan.info.width - 1);
+  south = std::min(south, plan.info.height - 1);
+  return {west, north, std::max<std::int64_t>(east - west + 1, 0), std::max<std::int64_t>(south - north + 1, 0)};
+}
+
+}  // namespace isohf

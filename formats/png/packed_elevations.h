@@ -1,0 +1,55 @@
+#pragma once
+
+#include <bitset>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "isohf/raster.h"
+
+namespace isohf {
+
+/// How the 8-bit channels of a picture hold one elevation together.
+enum class Packing {
+  kTerrarium,  ///< R * 256 + G + B / 256 - 32768 metres (Mapzen)
+  kMapbox,     ///< (R * 65536 + G * 256 + B) * 0.1 - 10000 metres (Mapbox terrain-RGB)
+  kRgbaFloat,  ///< R, G, B, A are the bytes of a big-endian IEEE float (MMGIS)
+};
+
+[[nodiscard]] std::string to_string(Packing packing);  ///< "terrarium", "mapbox", "rgba-float"
+/// The inverse of to_string; nullopt for any other text.
+[[nodiscard]] std::optional<Packing> packing_from_string(const std::string& text);
+
+/// Sample type, scale, offset, unit, void value and channel of a picture with that packing. The codes of the first two
+/// are int32, exact; where there is an alpha channel, a wholly transparent pixel is void (-1).
+void describe_packing(Packing packing, bool has_alpha, SourceInfo& info);
+
+/// Pixels of `channels` bytes each, 3 or 4, into samples of the type that describe_packing names.
+void unpack_elevations(Packing packing, std::size_t channels, std::span<const std::byte> pixels,
+                       std::span<std::byte> samples);
+
+/// Whether rows of a picture look packed. In codes the next higher byte goes on where one overflows, which colours do
+/// not do; floats have exponents of heights, and an alpha channel that is noise.
+class PackingEvidence {
+ public:
+  explicit PackingEvidence(std::size_t channels) : channels_(channels) {}
+  void add(std::span<const std::byte> row);
+  /// nullopt where nothing speaks for it, as in land so flat that no byte overflows.
+  [[nodiscard]] std::optional<Packing> packing() const;
+  /// Whether red, green and blue were equal everywhere.
+  [[nodiscard]] bool is_grey() const { return differing_ == 0; }
+
+ private:
+  std::size_t channels_;
+  double of_codes_ = 0.0;     ///< sum of the steps from pixel to pixel, of whole codes
+  double of_channels_ = 0.0;  ///< and of the channels by themselves, weighted as in the code
+  std::int64_t red_ = 0;
+  std::int64_t pixels_ = 0;
+  std::int64_t differing_ = 0;  ///< pixels that have a colour
+  std::int64_t heights_ = 0;    ///< pixels that are floats of a height's size
+  std::bitset<256> alphas_;     ///< that occur
+};
+
+}  // namespace isohf

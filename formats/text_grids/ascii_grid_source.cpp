@@ -1,0 +1,362 @@
+#include "formats/text_grids/ascii_grid_source.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <vector>
+
+#include "formats/binary_grids/grid_header.h"
+#include "formats/binary_grids/header_grid_source.h"
+#include "formats/files/letter_case.h"
+#include "formats/files/raw_file.h"
+#include "formats/georeference/wkt.h"
+#include "formats/open_options.h"
+#include "formats/text_grids/grass_header.h"
+#include "formats/text_grids/row_places.h"
+#include "formats/text_grids/text_tokens.h"
+#include "isohf/base/assert.h"
+#include "isohf/error.h"
+#include "isohf/raster.h"
+
+namespace isohf {
+namespace {
+
+const std::vector<std::string_view>& known_words() {
+  static const std::vector<std::string_view> words = {
+      "ncols", "ncol",      "nrows",       "nrow",   "xllcorner", "yllcorner", "xllcenter", "xllcentre", "yllcenter",
+      "dx",    "yllcentre", "nodatavalue", "nodata", "cellsize",  "dy",        "xcellsize", "ycellsize"};
+  return words;
+}
+
+/// The first word of a text, a byte order mark passed over; empty where it does not end within `text`.
+std::string_view first_word(std::string_view text) {
+  if (text.substr(0, 3) == "\xEF\xBB\xBF") text.remove_prefix(3);
+  constexpr std::string_view kBlanks = " \t\r\n\f\v";
+  text.remove_prefix(std::min(text.find_first_not_of(kBlanks), text.size()));
+  const std::size_t end = text.find_first_of(kBlanks);
+  return end == std::string_view::npos ? std::string_view() : text.substr(0, end);
+}
+
+/// What a word among the numbers is, found without computing its value.
+struct Shape {
+  bool number = false;
+  bool whole = false;      ///< no exponent, and nothing but zeros behind the decimal sign
+  char decimal = 0;        ///< '.', ',' or none
+  std::size_t digits = 0;  ///< before the decimal sign
+};
+
+bool is_digit(char c) {
+  return c >= '0' && c <= '9';
+}
+
+Shape shape_of(std::string_view word) {
+  const char* at = word.data();
+  const char* const end = at + word.size();
+  if (at != end && (*at == '-' || *at == '+')) ++at;
+  const char* const first = at;
+  while (at != end && is_digit(*at)) ++at;
+  Shape shape;
+  shape.digits = static_cast<std::size_t>(at - first);
+  shape.whole = shape.digits > 0;
+  std::size_t fraction = 0;
+  if (at != end && (*at == '.' || *at == ',')) {
+    shape.decimal = *at++;
+    for (; at != end && is_digit(*at); ++at, ++fraction) shape.whole = shape.whole && *at == '0';
+    if (shape.decimal == ',' && fraction == 0) return {};  // "1, 2, 3": a list
+  }
+  if (shape.digits + fraction > 0 && at != end && (*at == 'e' || *at == 'E')) {
+    shape.whole = false;
+    ++at;
+    if (at != end && (*at == '-' || *at == '+')) ++at;
+    const char* const exponent = at;
+    while (at != end && is_digit(*at)) ++at;
+    double value = 0.0;
+    shape.number = at == end && at != exponent && read_decimal(word, value);
+    return shape;
+  }
+  shape.number = at == end && shape.digits + fraction > 0;
+  if (shape.number && shape.digits > 300) {
+    double value = 0.0;
+    shape.number = read_decimal(word, value);
+  }
+  if (!shape.number) {
+    double special = 0.0;
+    shape = {};
+    shape.number = read_decimal(word, special) && !std::isfinite(special);
+  }
+  return shape;
+}
+
+/// The value of a word whose shape is whole; false beyond 32 bits.
+bool read_whole(std::string_view word, std::int32_t& value) {
+  const bool negative = word.front() == '-';
+  std::int64_t sum = 0;
+  std::size_t i = negative || word.front() == '+' ? 1 : 0;
+  if (i == word.size() || !is_digit(word[i])) return false;
+  for (; i < word.size() && is_digit(word[i]); ++i) {
+    sum = sum * 10 + (word[i] - '0');
+    if (sum > std::int64_t{1} << 31U) return false;
+  }
+  if (negative) sum = -sum;
+  if (sum > std::numeric_limits<std::int32_t>::max()) return false;
+  value = static_cast<std::int32_t>(sum);
+  return true;
+}
+
+class AsciiGridSource final : public HeightSource {
+ public:
+  AsciiGridSource(const std::string& path, const OpenOptions& options)
+      : file_(path, options.unpacked_bytes), words_(file_), grass_(path) {
+    info_.path = path;
+    info_.format = "ESRI ASCII grid";
+    if (!options.channel.empty() && options.channel != "0") {
+      throw Error(ErrorCode::kInvalidArgument,
+                  fmt::format("{}: there is no channel \"{}\"; there is 0 alone", path, options.channel));
+    }
+    GridHeader header(path);
+    std::string_view word;
+    const bool any = read_header(header, word);
+    if (is_grass_) {
+      info_.format = "GRASS ASCII grid";
+      grass_.read(info_);
+      marked_ = true;
+    } else {
+      header.require_only(known_words());
+      header.read_size(info_);
+      header.read_place(info_);
+      marked_ = header.has("nodatavalue") || header.has("nodata") || !options.void_values.empty();
+    }
+    require_room();
+    scan(word, any);
+    if (is_grass_) {
+      const auto stored = void_value_as_stored(info_.sample_type, grass_.null_value());
+      if (grass_.has_null() && stored && !std::isnan(*stored)) info_.void_values = {*stored};
+    } else {
+      header.read_void(info_);
+    }
+    read_prj_beside(info_);
+    info_.block_width = info_.width;
+    apply_open_options(info_, options);
+  }
+
+  [[nodiscard]] const SourceInfo& info() const override { return info_; }
+
+  void read_window(const Window& window, std::span<std::byte> samples) override {
+    const std::size_t size = size_bytes(info_.sample_type);
+    ISOHF_ASSERT(window.column >= 0 && window.row >= 0 && window.columns >= 0 && window.rows >= 0);
+    ISOHF_ASSERT(window.column + window.columns <= info_.width && window.row + window.rows <= info_.height);
+    ISOHF_ASSERT(samples.size() == static_cast<std::size_t>(window.columns * window.rows) * size);
+    if (samples.empty()) return;
+    const std::size_t row_bytes = static_cast<std::size_t>(window.columns) * size;
+    for (std::int64_t i = 0; i < window.rows; ++i) {
+      go_to(window.row + i, window.column);
+      const auto row = samples.subspan(static_cast<std::size_t>(i) * row_bytes, row_bytes);
+      if (info_.sample_type == SampleType::kInt32) {
+        read_run<std::int32_t>(row, read_whole);
+      } else if (is_grass_) {
+        read_run<double>(row, [this](std::string_view word, double& value) {
+          value = std::numeric_limits<double>::quiet_NaN();
+          return word == grass_.null_word() || read_decimal(word, value);
+        });
+      } else {
+        read_run<double>(row, read_decimal);
+      }
+    }
+  }
+
+  void limit_buffers(std::uint64_t bytes) override { file_.limit_buffers(bytes); }
+  [[nodiscard]] std::uint64_t buffer_bytes(std::uint64_t limit) const override { return file_.buffer_bytes(limit); }
+
+ private:
+  [[noreturn]] void refuse(ErrorCode code, const std::string& what) const {
+    throw Error(code, fmt::format("{}: line {}: {}", info_.path, words_.line(), what));
+  }
+
+  /// Leaves the first word of the numbers in `word`; false where there is none.
+  bool read_header(GridHeader& header, std::string_view& word) {
+    std::array<char, 3> mark{};
+    if (file_.read_some(0, std::as_writable_bytes(std::span(mark))) == 3 &&
+        std::string_view(mark.data(), 3) == "\xEF\xBB\xBF") {
+      words_.seek(3);
+    }
+    while (words_.next(word)) {
+      if (GrassHeader::is_name(word)) {
+        read_grass_line(word);
+        continue;
+      }
+      double special = 0.0;
+      if (std::isalpha(static_cast<unsigned char>(word.front())) == 0 || read_decimal(word, special)) return true;
+      const std::string name(word);
+      const std::uint64_t line = words_.line();
+      if (!words_.next(word)) refuse(ErrorCode::kCorrupt, fmt::format("{} has no value", printable(name)));
+      if (is_grass_) {
+        refuse(ErrorCode::kUnsupported,
+               fmt::format("\"{} {}\" is no line of a GRASS ASCII header", printable(name), printable(word)));
+      }
+      header.add(name, word, line);
+      is_esri_ = true;
+    }
+    return false;
+  }
+
+  /// "name: value" or "name:value".
+  void read_grass_line(std::string_view word) {
+    if (is_esri_) refuse(ErrorCode::kCorrupt, fmt::format("\"{}\" follows lines of an ESRI header", printable(word)));
+    is_grass_ = true;
+    const std::size_t colon = word.find(':');
+    const std::string name(word.substr(0, colon));
+    const std::uint64_t line = words_.line();
+    word.remove_prefix(colon + 1);
+    if (word.empty() && !words_.next(word)) refuse(ErrorCode::kCorrupt, name + ": has no value");
+    grass_.add(name, word, line);
+  }
+
+  /// A number takes a byte and another one keeps it apart from the next.
+  void require_room() const {
+    const auto most = static_cast<std::int64_t>((file_.size_bytes() + 1) / 2);
+    if (info_.width > most || info_.height > most / info_.width) {
+      throw Error(ErrorCode::kCorrupt,
+                  fmt::format("{}: the header says {} x {} numbers; the file's {} bytes hold {} at most", info_.path,
+                              info_.width, info_.height, file_.size_bytes(), most));
+    }
+  }
+
+  /// Checks every number, learns the sample type and notes where rows begin.
+  void scan(std::string_view word, bool any) {
+    bool whole = true;
+    for (std::int64_t row = 0; row < info_.height; ++row) {
+      for (std::int64_t column = 0; column < info_.width; ++column) {
+        if (!any) refuse_short(row, column);
+        if (column == 0) places_.note(row, words_.offset_of(word));
+        whole = check(word) && whole;
+        end_of_last_ = words_.offset_of(word) + word.size();
+        any = words_.next(word);
+      }
+    }
+    if (any) {
+      refuse(ErrorCode::kCorrupt, fmt::format("\"{}\" comes after the {} x {} numbers that the header says",
+                                              printable(word), info_.width, info_.height));
+    }
+    info_.sample_type = whole ? SampleType::kInt32 : SampleType::kFloat64;
+    if (decimal_ == ',') {
+      info_.warnings.emplace_back("the numbers have decimal commas: 1,5 is read as one and a half");
+    }
+    if (!marked_ && !marker_.empty()) {
+      info_.warnings.push_back(
+          fmt::format("the header names no void value, but {} occurs; if it means a void, give "
+                      "--nodata {}",
+                      marker_, marker_));
+    }
+    if (end_of_last_ == file_.size_bytes()) {
+      info_.warnings.push_back(loss("the file ends within its last line: its last number may be cut off"));
+    }
+  }
+
+  [[noreturn]] void refuse_short(std::int64_t row, std::int64_t column) const {
+    refuse(ErrorCode::kCorrupt, fmt::format("the file ends after {} of {} x {} numbers", row * info_.width + column,
+                                            info_.width, info_.height));
+  }
+
+  /// Whether a number can be an int32 sample.
+  bool check(std::string_view word) {
+    if (is_grass_ && word == grass_.null_word() && std::isnan(grass_.null_value())) return false;
+    const Shape shape = shape_of(word);
+    if (!shape.number) refuse_word(word);
+    if (is_grass_ && grass_.is_whole() && !shape.whole) {
+      refuse(ErrorCode::kCorrupt, fmt::format("\"{}\" is no whole number, as type: int says", printable(word)));
+    }
+    if (shape.decimal != 0 && shape.decimal != decimal_) {
+      if (decimal_ != 0) {
+        refuse(ErrorCode::kCorrupt, fmt::format("\"{}\" has a decimal {}, numbers before it have the other sign; they "
+                                                "must all have the same",
+                                                printable(word), shape.decimal == ',' ? "comma" : "point"));
+      }
+      decimal_ = shape.decimal;
+    }
+    if (!marked_ && word.size() > 4 && word.front() == '-' && marker_.empty()) note_marker(word, shape);
+    std::int32_t value = 0;
+    return shape.whole && (shape.digits <= 9 || read_whole(word, value));
+  }
+
+  [[noreturn]] void refuse_word(std::string_view word) const {
+    const char* why = std::count(word.begin(), word.end(), ',') > 1 || word.back() == ','
+                          ? "; numbers must have blanks between them, not commas"
+                          : "";
+    refuse(ErrorCode::kCorrupt, fmt::format("\"{}\" is not a number{}", printable(word), why));
+  }
+
+  /// Remembers the value that means a void by custom.
+  void note_marker(std::string_view word, const Shape& shape) {
+    if ((word[1] != '9' && word[1] != '3') || shape.digits > 5) return;
+    double value = 0.0;
+    if (read_decimal(word, value) && (value == -9999.0 || value == -32768.0))
+      marker_ = value < -9999.0 ? "-32768" : "-9999";
+  }
+
+  /// Makes the number at (row, column) the next one to be read.
+  void go_to(std::int64_t row, std::int64_t column) {
+    const std::int64_t wanted = row * info_.width + column;
+    const RowPlaces::Place place = places_.before(row);
+    const std::int64_t noted = place.row * info_.width;
+    if (next_ < noted || next_ > wanted) {
+      words_.seek(place.offset_bytes);
+      next_ = noted;
+    }
+    std::string_view word;
+    for (; next_ < wanted; ++next_) {
+      if (!words_.next(word)) refuse_changed();
+    }
+  }
+
+  template <typename T, typename Read>
+  void read_run(std::span<std::byte> samples, Read read) {
+    std::string_view word;
+    for (std::size_t at = 0; at < samples.size(); at += sizeof(T)) {
+      T value{};
+      if (!words_.next(word) || !read(word, value)) refuse_changed();
+      std::memcpy(samples.data() + at, &value, sizeof(T));
+    }
+    next_ += static_cast<std::int64_t>(samples.size() / sizeof(T));
+  }
+
+  [[noreturn]] void refuse_changed() {
+    next_ = std::numeric_limits<std::int64_t>::max();
+    throw Error(ErrorCode::kCorrupt, info_.path + ": the file has changed since it was opened");
+  }
+
+  RawFile file_;
+  TextTokens words_;
+  GrassHeader grass_;
+  bool is_grass_ = false;
+  bool is_esri_ = false;
+  SourceInfo info_;
+  RowPlaces places_;
+  std::int64_t next_ = std::numeric_limits<std::int64_t>::max();  // number that words_ reads next, counted by rows
+  std::uint64_t end_of_last_ = 0;
+  char decimal_ = 0;
+  bool marked_ = false;  // a void value is named
+  std::string marker_;   // void by custom, seen in the file
+};
+
+}  // namespace
+
+bool looks_like_ascii_grid(std::span<const std::byte> head) {
+  const std::string_view word = first_word({reinterpret_cast<const char*>(head.data()), head.size()});
+  if (GrassHeader::is_name(word)) return true;
+  const std::string name = GridHeader::plain_name(word);
+  return std::find(known_words().begin(), known_words().end(), name) != known_words().end();
+}
+
+std::unique_ptr<HeightSource> open_ascii_grid(const std::string& path, const OpenOptions& options) {
+  // The header of a binary grid begins with the same words.
+  if (lower_case(path).ends_with(".hdr")) return open_header_grid(path, options);
+  return std::make_unique<AsciiGridSource>(path, options);
+}
+
+}  // namespace isohf

@@ -1,0 +1,320 @@
+#include "formats/text_grids/surfer_grid_source.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include "formats/binary_grids/plain_samples.h"
+#include "formats/binary_grids/turned_rows.h"
+#include "formats/files/raw_file.h"
+#include "formats/georeference/wkt.h"
+#include "formats/open_options.h"
+#include "formats/text_grids/row_places.h"
+#include "formats/text_grids/text_tokens.h"
+#include "isohf/base/assert.h"
+#include "isohf/base/bytes.h"
+#include "isohf/error.h"
+#include "isohf/raster.h"
+
+namespace isohf {
+namespace {
+
+constexpr std::size_t kMagicBytes = 4;
+constexpr std::string_view kText = "DSAA";
+constexpr std::string_view kSurfer6 = "DSBB";
+constexpr std::string_view kSurfer7 = "DSRB";
+constexpr std::string_view kGridSection = "GRID";
+constexpr std::string_view kDataSection = "DATA";
+/// Blanked nodes have this value or a greater one: just below 1.70141e38, which texts write in fewer digits.
+constexpr double kBlank = 1.7014e38;
+constexpr std::size_t kSurfer6HeaderBytes = 56;
+constexpr std::size_t kGridSectionBytes = 72;
+/// More lie before no grid's data.
+constexpr int kMostSections = 64;
+constexpr double kMostSide = 2147483647.0;
+
+class SurferGridSource final : public HeightSource {
+ public:
+  SurferGridSource(const std::string& path, const OpenOptions& options) : file_(path, options.unpacked_bytes) {
+    info_.path = path;
+    (void)choose_band(info_, options, 1);
+    std::array<char, kMagicBytes> magic{};
+    file_.read(0, std::as_writable_bytes(std::span(magic)));
+    const std::string_view kind(magic.data(), magic.size());
+    info_.valid_max = kBlank;
+    if (kind == kText) {
+      read_text_header();
+    } else if (kind == kSurfer6) {
+      read_surfer6();
+    } else if (kind == kSurfer7) {
+      read_surfer7();
+    } else {
+      corrupt("does not begin as a Surfer grid does (DSAA, DSBB or DSRB)");
+    }
+    read_prj_beside(info_);
+    info_.block_width = info_.width;
+    info_.block_height = 1;
+    apply_open_options(info_, options);
+  }
+
+  [[nodiscard]] const SourceInfo& info() const override { return info_; }
+
+  void read_window(const Window& window, std::span<std::byte> samples) override {
+    const Window stored = turned(window, info_.height);
+    if (words_) {
+      read_text(stored, samples);
+    } else {
+      read_plain_samples(file_, info_, layout_, stored, samples);
+    }
+    turn_rows(samples, static_cast<std::size_t>(window.columns) * size_bytes(info_.sample_type));
+  }
+
+  void limit_buffers(std::uint64_t bytes) override { file_.limit_buffers(bytes); }
+  [[nodiscard]] std::uint64_t buffer_bytes(std::uint64_t limit) const override { return file_.buffer_bytes(limit); }
+
+ private:
+  [[noreturn]] void corrupt(const std::string& what) const {
+    throw Error(ErrorCode::kCorrupt, fmt::format("{}: {}", info_.path, what));
+  }
+
+  void set_size(double columns, double rows) {
+    const auto fits = [](double n) { return n >= 2.0 && n <= kMostSide && n == std::floor(n); };
+    if (!fits(columns) || !fits(rows)) {
+      corrupt(fmt::format("the header says {} x {} nodes, must be whole numbers from 2 to {:.0f}", columns, rows,
+                          kMostSide));
+    }
+    info_.width = static_cast<std::int64_t>(columns);
+    info_.height = static_cast<std::int64_t>(rows);
+  }
+
+  /// By the south-western node and the distances between nodes.
+  void set_place(double west, double south, double spacing_x, double spacing_y) {
+    Georeference& place = info_.georeference;
+    place.registration = Registration::kPoint;
+    place.has_origin = true;
+    place.spacing_x = spacing_x;
+    place.spacing_y = spacing_y;
+    place.origin_x = west;
+    place.origin_y = south + static_cast<double>(info_.height - 1) * spacing_y;
+    if (!std::isfinite(west) || !std::isfinite(place.origin_y) || !(spacing_x > 0.0) || !std::isfinite(spacing_x) ||
+        !(spacing_y > 0.0)) {
+      corrupt(
+          fmt::format("the header puts the first node at ({}, {}) and the next ones {} and {} from it, must be "
+                      "finite numbers, the distances positive",
+                      west, south, spacing_x, spacing_y));
+    }
+  }
+
+  void set_place_by_corners(double west, double east, double south, double north) {
+    set_place(west, south, (east - west) / static_cast<double>(info_.width - 1),
+              (north - south) / static_cast<double>(info_.height - 1));
+    info_.georeference.origin_y = north;
+  }
+
+  void set_layout(std::uint64_t offset_bytes, SampleType type) {
+    info_.sample_type = type;
+    layout_.offset_bytes = offset_bytes;
+    layout_.row_bytes = static_cast<std::uint64_t>(info_.width) * size_bytes(type);
+    const std::uint64_t room = file_.size_bytes() - offset_bytes;
+    if (layout_.row_bytes > room / static_cast<std::uint64_t>(info_.height)) {
+      corrupt(fmt::format("ends early: {} x {} nodes of {} bytes begin at byte {}, the file has {} bytes", info_.width,
+                          info_.height, size_bytes(type), offset_bytes, file_.size_bytes()));
+    }
+  }
+
+  void read_surfer6() {
+    info_.format = "Surfer 6 grid";
+    std::array<std::byte, kSurfer6HeaderBytes> header{};
+    file_.read(0, header);
+    ByteReader in(header);
+    (void)in.read_bytes(kMagicBytes);
+    const double columns = in.read<std::int16_t>();
+    const double rows = in.read<std::int16_t>();
+    set_size(columns, rows);
+    const auto west = in.read<double>();
+    const auto east = in.read<double>();
+    const auto south = in.read<double>();
+    const auto north = in.read<double>();
+    set_place_by_corners(west, east, south, north);
+    set_layout(header.size(), SampleType::kFloat32);
+    const std::uint64_t end = layout_.offset_bytes + layout_.row_bytes * static_cast<std::uint64_t>(info_.height);
+    if (end < file_.size_bytes()) {
+      info_.warnings.push_back(loss(fmt::format("{} bytes follow the grid", file_.size_bytes() - end)));
+    }
+  }
+
+  /// Sections, each with its name and size.
+  void read_surfer7() {
+    info_.format = "Surfer 7 grid";
+    std::uint64_t at = 0;
+    bool has_grid = false;
+    for (int i = 0; i < kMostSections; ++i) {
+      std::array<std::byte, 8> head{};
+      file_.read(at, head);
+      const std::string_view name(reinterpret_cast<const char*>(head.data()), kMagicBytes);
+      const auto size = ByteReader(std::span<const std::byte>(head).subspan(kMagicBytes)).read<std::int32_t>();
+      at += head.size();
+      if (name == kDataSection) {
+        if (!has_grid) corrupt("its data come before the section that says what they are");
+        return set_layout(at, SampleType::kFloat64);
+      }
+      if (size < 0) corrupt(fmt::format("section {} at byte {} has a size of {} bytes", printable(name), at - 8, size));
+      if (name == kGridSection) {
+        if (static_cast<std::size_t>(size) < kGridSectionBytes) {
+          corrupt(fmt::format("the grid section has {} bytes, must have {}", size, kGridSectionBytes));
+        }
+        read_grid_section(at);
+        has_grid = true;
+      }
+      at += static_cast<std::uint64_t>(size);
+    }
+    corrupt(fmt::format("has {} sections without data among them", kMostSections));
+  }
+
+  void read_grid_section(std::uint64_t at) {
+    std::array<std::byte, kGridSectionBytes> section{};
+    file_.read(at, section);
+    ByteReader in(section);
+    const double rows = in.read<std::int32_t>();
+    const double columns = in.read<std::int32_t>();
+    set_size(columns, rows);
+    const auto west = in.read<double>();
+    const auto south = in.read<double>();
+    const auto spacing_x = in.read<double>();
+    const auto spacing_y = in.read<double>();
+    set_place(west, south, spacing_x, spacing_y);
+    (void)in.read_bytes(16);  // the range of the elevations
+    const auto angle = in.read<double>();
+    if (angle != 0.0) {
+      throw Error(ErrorCode::kUnsupported,
+                  fmt::format("{}: the grid is turned by {}; only grids along the axes are read", info_.path, angle));
+    }
+    const auto blank = in.read<double>();
+    if (std::isfinite(blank) && blank < kBlank) info_.void_values = {blank};
+  }
+
+  double next_number(const char* what) {
+    std::string_view word;
+    double value = 0.0;
+    if (!words_->next(word)) corrupt(fmt::format("line {}: ends before {}", words_->line(), what));
+    if (!read_decimal(word, value)) refuse_word(word);
+    return value;
+  }
+
+  [[noreturn]] void refuse_word(std::string_view word) const {
+    corrupt(fmt::format("\"{}\" at byte {} is not a number", printable(word), words_->offset_of(word)));
+  }
+
+  void read_text_header() {
+    info_.format = "Surfer text grid";
+    info_.sample_type = SampleType::kFloat64;
+    words_.emplace(file_);
+    std::string_view word;
+    (void)words_->next(word);
+    if (word != kText) corrupt(fmt::format("begins with \"{}\", must begin with DSAA", printable(word)));
+    const double columns = next_number("the number of columns");
+    const double rows = next_number("the number of rows");
+    set_size(columns, rows);
+    const double west = next_number("the range of x");
+    const double east = next_number("the range of x");
+    const double south = next_number("the range of y");
+    const double north = next_number("the range of y");
+    set_place_by_corners(west, east, south, north);
+    (void)next_number("the range of z");
+    (void)next_number("the range of z");
+    // A number takes a byte and another one keeps it apart from the next.
+    const auto most = static_cast<std::int64_t>((file_.size_bytes() + 1) / 2);
+    if (info_.height > most / info_.width) {
+      corrupt(fmt::format("the header says {} x {} nodes; the file's {} bytes hold {} at most", info_.width,
+                          info_.height, file_.size_bytes(), most));
+    }
+    scan();
+  }
+
+  /// Checks every number and notes where rows begin.
+  void scan() {
+    std::string_view word;
+    double value = 0.0;
+    for (std::int64_t row = 0; row < info_.height; ++row) {
+      for (std::int64_t column = 0; column < info_.width; ++column) {
+        if (!words_->next(word)) {
+          corrupt(fmt::format("the file ends after {} of {} x {} nodes", row * info_.width + column, info_.width,
+                              info_.height));
+        }
+        if (column == 0) places_.note(row, words_->offset_of(word));
+        if (!read_decimal(word, value)) refuse_word(word);
+      }
+    }
+    const bool cut = words_->offset_of(word) + word.size() == file_.size_bytes();
+    if (cut) info_.warnings.push_back(loss("the file ends within its last line: its last number may be cut off"));
+    if (words_->next(word)) {
+      corrupt(fmt::format("\"{}\" at byte {} comes after the {} x {} nodes that the header says", printable(word),
+                          words_->offset_of(word), info_.width, info_.height));
+    }
+  }
+
+  /// `stored`: rows counted from the South.
+  void read_text(const Window& stored, std::span<std::byte> samples) {
+    ISOHF_ASSERT(stored.column >= 0 && stored.row >= 0 && stored.columns >= 0 && stored.rows >= 0);
+    ISOHF_ASSERT(stored.column + stored.columns <= info_.width && stored.row + stored.rows <= info_.height);
+    ISOHF_ASSERT(samples.size() == static_cast<std::size_t>(stored.columns * stored.rows) * sizeof(double));
+    std::byte* out = samples.data();
+    std::string_view word;
+    for (std::int64_t row = stored.row; row < stored.row + stored.rows; ++row) {
+      go_to(row, stored.column);
+      for (std::int64_t i = 0; i < stored.columns; ++i, out += sizeof(double)) {
+        double value = 0.0;
+        if (!words_->next(word) || !read_decimal(word, value)) refuse_changed();
+        std::memcpy(out, &value, sizeof(value));
+      }
+      next_ += stored.columns;
+    }
+  }
+
+  /// Makes the number at (row, column), row 0 in the South, the next one to be read.
+  void go_to(std::int64_t row, std::int64_t column) {
+    const std::int64_t wanted = row * info_.width + column;
+    const RowPlaces::Place place = places_.before(row);
+    const std::int64_t noted = place.row * info_.width;
+    if (next_ < noted || next_ > wanted) {
+      words_->seek(place.offset_bytes);
+      next_ = noted;
+    }
+    std::string_view word;
+    for (; next_ < wanted; ++next_) {
+      if (!words_->next(word)) refuse_changed();
+    }
+  }
+
+  [[noreturn]] void refuse_changed() {
+    next_ = std::numeric_limits<std::int64_t>::max();
+    corrupt("the file has changed since it was opened");
+  }
+
+  RawFile file_;
+  PlainLayout layout_;               // of binary grids; rows from the South
+  std::optional<TextTokens> words_;  // of text
+  RowPlaces places_;
+  std::int64_t next_ = std::numeric_limits<std::int64_t>::max();  // number that words_ reads next, counted by rows
+  SourceInfo info_;
+};
+
+}  // namespace
+
+bool looks_like_surfer_grid(std::span<const std::byte> head) {
+  const std::string_view text(reinterpret_cast<const char*>(head.data()), std::min(head.size(), kMagicBytes));
+  return text == kText || text == kSurfer6 || text == kSurfer7;
+}
+
+std::unique_ptr<HeightSource> open_surfer_grid(const std::string& path, const OpenOptions& options) {
+  return std::make_unique<SurferGridSource>(path, options);
+}
+
+}  // namespace isohf

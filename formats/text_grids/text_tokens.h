@@ -1,0 +1,75 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "formats/files/raw_file.h"
+
+namespace isohf {
+
+/// Reads the words of a text file one after the other, whatever blanks and line ends lie between them; holds 256 KiB.
+class TextTokens {
+ public:
+  /// `file` must outlive this.
+  explicit TextTokens(const RawFile& file);
+
+  /// Goes to a place in the file that is not inside a word; lines count from 1 there.
+  void seek(std::uint64_t offset_bytes);
+
+  /// The next word, valid until the next call; false at the end of the file.
+  /// Throws Error: kIo; kCorrupt for a word of more than kLongestWord bytes.
+  bool next(std::string_view& word) {
+    for (;;) {
+      while (is_blank(*at_)) line_ += *at_++ == '\n' ? 1U : 0U;
+      const char* begin = at_;
+      while (!is_blank(*at_) && *at_ != '\0') ++at_;
+      if (at_ != end_ && *at_ != '\0') {
+        word = {begin, static_cast<std::size_t>(at_ - begin)};
+        return true;
+      }
+      if (at_ != end_) {  // a zero byte in the file is part of a word
+        if (finish_odd_word(begin, word)) return true;
+      } else if (!fill(begin)) {
+        word = {at_, static_cast<std::size_t>(end_ - at_)};
+        at_ = end_;
+        return !word.empty();
+      }
+    }
+  }
+
+  /// Of the last word.
+  [[nodiscard]] std::uint64_t line() const { return line_; }
+  [[nodiscard]] std::uint64_t offset_of(std::string_view word) const {
+    return base_ + static_cast<std::uint64_t>(word.data() - buffer_.data());
+  }
+
+  static constexpr std::size_t kLongestWord = 1024;
+
+ private:
+  static bool is_blank(char c) { return c == ' ' || (c >= '\t' && c <= '\r'); }
+  bool finish_odd_word(const char* begin, std::string_view& word);
+  /// Reads on, keeping what begins at `keep`, which at_ then points to; false where the file has no more.
+  bool fill(const char* keep);
+
+  const RawFile& file_;
+  std::vector<char> buffer_;  // ends in a zero byte beyond end_
+  const char* at_ = nullptr;
+  const char* end_ = nullptr;
+  std::uint64_t base_ = 0;  // place of the buffer in the file
+  std::uint64_t line_ = 1;
+};
+
+/// The number that a word of a grid's text says, with a decimal point or one decimal comma, or one of the spellings of
+/// NaN and infinity that programs print; false for any other word and for numbers beyond the range of a double.
+[[nodiscard]] bool read_decimal(std::string_view word, double& value);
+
+/// A word fit for a message: at most 40 bytes, only printable ones.
+[[nodiscard]] std::string printable(std::string_view word);
+
+/// A text found in a file, fit for one line: blanks for control characters.
+[[nodiscard]] std::string one_line(std::string text);
+
+}  // namespace isohf

@@ -1,0 +1,88 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "formats/files/raw_file.h"
+#include "formats/tiff/geotiff_keys.h"
+#include "formats/tiff/tiff_layout.h"
+
+namespace isohf {
+
+/// Tags beside the layout.
+struct TiffTags {
+  GeoTags geo;
+  std::string gdal_nodata;
+  std::string gdal_metadata;
+  std::vector<std::string> warnings;
+};
+
+/// Where a block lies in the file; 0 bytes: not stored (sparse file).
+struct TiffBlockSpan {
+  std::uint64_t offset_bytes = 0;
+  std::uint64_t size_bytes = 0;
+};
+
+/// The directories (images) of a file.
+struct TiffDirectories {
+  std::uint32_t main = 0;             ///< the first that is neither a reduced image nor a mask
+  std::optional<std::uint32_t> mask;  ///< the main image's transparency mask, which follows it
+  bool has_more_pages = false;        ///< another is a full-size image
+  bool has_broken = false;            ///< one behind the last that was read is broken
+};
+
+struct TiffMainImage;
+
+/// One libtiff handle on a directory; not thread-safe. Nothing of libtiff shows outside its source file.
+class TiffHandle {
+ public:
+  /// `mapped`: compressed bytes are mapped instead of read, for strips too large to buffer.
+  TiffHandle(const RawFile& file, std::uint32_t directory, bool mapped);
+  TiffHandle(const TiffHandle&) = delete;
+  TiffHandle& operator=(const TiffHandle&) = delete;
+  ~TiffHandle();
+
+  /// Decodes block `index` into host byte order; `bytes` is exactly its decoded size. Throws Error{kCorrupt, kIo}.
+  void decode_block(std::uint64_t index, bool tiled, std::span<std::byte> bytes);
+
+  /// Decodes one row of a stripped image. Rows of one strip must be asked for in order, from its first.
+  void decode_row(std::int64_t row, std::int64_t plane, std::span<std::byte> bytes);
+
+  /// Gives mapped pages that were read back to the system.
+  void forget_mapped();
+
+  /// Throws Error{kCorrupt} where the table of blocks has no such entry.
+  [[nodiscard]] TiffBlockSpan block_span(std::uint64_t index);
+
+  [[nodiscard]] TiffLayout read_layout();
+  [[nodiscard]] TiffTags read_tags();
+
+  /// Room that the user of the handle may use while he holds it.
+  std::vector<std::byte> scratch;
+
+ private:
+  friend TiffMainImage open_main_image(const RawFile& file);
+  struct Impl;
+  explicit TiffHandle(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+/// What a file holds, and a handle on its main image.
+struct TiffMainImage {
+  TiffDirectories directories;
+  std::unique_ptr<TiffHandle> handle;
+};
+
+/// A handle on another directory of the file, as its main image. Throws Error{kCorrupt} where it cannot be read.
+[[nodiscard]] TiffMainImage open_image(const RawFile& file, std::uint32_t directory);
+
+/// Opens the file once where it holds one image: of ten thousand small files in a mosaic, opening is most of the work.
+/// Throws Error{kCorrupt} where not even the first directory can be read.
+[[nodiscard]] TiffMainImage open_main_image(const RawFile& file);
+
+}  // namespace isohf

@@ -1,0 +1,343 @@
+#include "formats/tiff/tiff_source.h"
+
+#include <fmt/core.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <charconv>
+#include <cstring>
+#include <filesystem>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "formats/binary_grids/turned_rows.h"
+#include "formats/decorate/masked_source.h"
+#include "formats/files/letter_case.h"
+#include "formats/files/raw_file.h"
+#include "formats/georeference/auxiliary_metadata.h"
+#include "formats/georeference/place_beside.h"
+#include "formats/georeference/units.h"
+#include "formats/georeference/wkt.h"
+#include "formats/open_options.h"
+#include "formats/tiff/gdal_tags.h"
+#include "formats/tiff/geotiff_keys.h"
+#include "formats/tiff/tiff_blocks.h"
+#include "formats/tiff/tiff_file.h"
+#include "formats/tiff/tiff_mask.h"
+#include "isohf/base/assert.h"
+#include "isohf/error.h"
+#include "isohf/raster.h"
+
+namespace isohf {
+namespace {
+
+// TIFF 6.0 and its supplements: PhotometricInterpretation, SampleFormat, Orientation.
+constexpr int kMinIsWhite = 0;
+constexpr int kMinIsBlack = 1;
+constexpr int kRgb = 2;
+constexpr int kYCbCr = 6;
+constexpr int kJpeg = 7;
+constexpr int kSigned = 2;
+constexpr int kFloating = 3;
+constexpr int kComplexInteger = 5;
+constexpr int kComplexFloating = 6;
+constexpr int kTopLeft = 1;
+constexpr int kBottomLeft = 4;
+
+/// Floats beyond this are voids that a file forgot to declare (-3.4e38, 1.7e308, 1e31), in any unit.
+constexpr double kBeyondAnyHeight = 1e30;
+
+SampleType sample_type_of(const TiffLayout& layout) {
+  switch (layout.sample_format) {
+    case kFloating:
+      if (layout.bits_per_sample == 16) return SampleType::kFloat16;
+      if (layout.bits_per_sample == 32) return SampleType::kFloat32;
+      if (layout.bits_per_sample == 64) return SampleType::kFloat64;
+      break;
+    case kSigned:
+      if (layout.bits_per_sample == 8) return SampleType::kInt8;
+      if (layout.bits_per_sample == 16) return SampleType::kInt16;
+      if (layout.bits_per_sample == 32) return SampleType::kInt32;
+      break;
+    case kComplexInteger:
+    case kComplexFloating:
+      break;
+    default:
+      if (layout.bits_per_sample == 8) return SampleType::kUint8;
+      if (layout.bits_per_sample == 16) return SampleType::kUint16;
+      if (layout.bits_per_sample == 32) return SampleType::kUint32;
+  }
+  constexpr std::array<const char*, 7> kFormats = {
+      "undefined", "unsigned integer", "signed integer",        "floating-point",
+      "undefined", "complex integer",  "complex floating-point"};
+  const char* format = layout.sample_format < kFormats.size() ? kFormats[layout.sample_format] : "undefined";
+  throw Error(
+      ErrorCode::kUnsupported,
+      fmt::format("the samples are {} bit {}; isohf reads 8, 16 and 32 bit integers and 16, 32 and 64 bit floats",
+                  layout.bits_per_sample, format));
+}
+
+void require_heights(const TiffLayout& layout) {
+  const int photometric = layout.photometric;
+  const bool picture = photometric == kRgb || (photometric == kYCbCr && layout.compression == kJpeg);
+  if (photometric == kMinIsWhite || photometric == kMinIsBlack || picture) return;
+  constexpr std::array<const char*, 11> kNames = {"",
+                                                  "",
+                                                  "",
+                                                  "a colour palette",
+                                                  "a transparency mask",
+                                                  "CMYK colour",
+                                                  "YCbCr colour",
+                                                  "",
+                                                  "CIE L*a*b* colour",
+                                                  "ICC L*a*b* colour",
+                                                  "ITU L*a*b* colour"};
+  const auto index = static_cast<std::size_t>(photometric);
+  const std::string what = index < kNames.size() && kNames[index][0] != '\0'
+                               ? std::string(kNames[index])
+                               : fmt::format("photometric interpretation {}", photometric);
+  throw Error(ErrorCode::kUnsupported, fmt::format("the image has {}; isohf reads grey and RGB images", what));
+}
+
+/// Whether a pixel has two samples, an elevation and its opacity.
+bool has_grey_and_opacity(const TiffLayout& layout) {
+  const bool is_grey = layout.photometric == kMinIsWhite || layout.photometric == kMinIsBlack;
+  return is_grey && layout.samples_per_pixel == 2 && layout.alpha_sample == 1;
+}
+
+/// "R", "G", "B" or "Y" and "A"; empty where a sample has no name.
+std::vector<std::string> channel_names(const TiffLayout& layout) {
+  std::vector<std::string> names(layout.samples_per_pixel);
+  if (layout.photometric == kMinIsWhite || layout.photometric == kMinIsBlack) {
+    names[0] = std::string(1, 'Y');
+  } else {
+    for (std::size_t i = 0; i < std::min<std::size_t>(names.size(), 3); ++i) names[i] = std::string(1, "RGB"[i]);
+  }
+  if (layout.alpha_sample > 0 && static_cast<std::size_t>(layout.alpha_sample) < names.size()) {
+    names[static_cast<std::size_t>(layout.alpha_sample)] = std::string(1, 'A');
+  }
+  return names;
+}
+
+int choose_channel(const TiffLayout& layout, const std::string& wanted, SourceInfo& info) {
+  const std::vector<std::string> names = channel_names(layout);
+  const auto label = [&](std::size_t i) { return names[i].empty() ? std::to_string(i) : names[i]; };
+  std::size_t chosen = 0;
+  if (!wanted.empty()) {
+    chosen = static_cast<std::size_t>(std::find(names.begin(), names.end(), upper_case(wanted)) - names.begin());
+    if (chosen == names.size()) {
+      const auto [end, failure] = std::from_chars(wanted.data(), wanted.data() + wanted.size(), chosen);
+      if (failure != std::errc() || end != wanted.data() + wanted.size()) chosen = names.size();
+    }
+    if (chosen >= names.size()) {
+      std::vector<std::string> there;
+      for (std::size_t i = 0; i < names.size(); ++i) {
+        there.push_back(names[i].empty() ? std::to_string(i) : fmt::format("{} ({})", i, names[i]));
+      }
+      throw Error(ErrorCode::kInvalidArgument,
+                  fmt::format("there is no channel \"{}\"; there are {}", wanted, fmt::join(there, ", ")));
+    }
+  }
+  const bool colour = layout.photometric == kRgb || layout.photometric == kYCbCr;
+  if (names.size() > 1) info.channel = label(chosen);
+  if (wanted.empty() && colour && layout.bits_per_sample == 8) {
+    info.warnings.push_back(
+        fmt::format("this is an 8 bit colour picture; its channel {} is read as elevation", label(0)));
+  } else if (wanted.empty() && names.size() > 1 && !has_grey_and_opacity(layout)) {
+    info.warnings.push_back(fmt::format("there are {} channels; channel {} is read", names.size(), label(0)));
+  }
+  return static_cast<int>(chosen);
+}
+
+std::array<std::byte, 8> bytes_of_value(SampleType type, double value) {
+  std::array<std::byte, 8> bytes = {};
+  const auto store = [&](auto typed) { std::memcpy(bytes.data(), &typed, sizeof(typed)); };
+  switch (type) {
+    case SampleType::kUint8:
+      store(static_cast<std::uint8_t>(value));
+      break;
+    case SampleType::kInt8:
+      store(static_cast<std::int8_t>(value));
+      break;
+    case SampleType::kUint16:
+      store(static_cast<std::uint16_t>(value));
+      break;
+    case SampleType::kInt16:
+      store(static_cast<std::int16_t>(value));
+      break;
+    case SampleType::kUint32:
+      store(static_cast<std::uint32_t>(value));
+      break;
+    case SampleType::kInt32:
+      store(static_cast<std::int32_t>(value));
+      break;
+    // Any void is as good as another here; a half NaN spares the conversion.
+    case SampleType::kFloat16:
+      store(std::uint16_t{0x7E00});
+      break;
+    case SampleType::kFloat32:
+      store(static_cast<float>(value));
+      break;
+    case SampleType::kFloat64:
+      store(value);
+      break;
+  }
+  return bytes;
+}
+
+class TiffSource final : public HeightSource {
+ public:
+  TiffSource(const std::string& path, const OpenOptions& options) : file_(path) {
+    info_.path = path;
+    TiffMainImage image = open_main_image(file_);
+    const TiffTags tags = image.handle->read_tags();
+    layout_ = image.handle->read_layout();
+    try {
+      describe(image.directories, tags, options);
+    } catch (const Error& error) {
+      throw error.within(path);
+    }
+    apply_open_options(info_, options);
+    blocks_.emplace(file_, layout_, std::move(image), channel_);
+    describe_missing_blocks();
+  }
+
+  [[nodiscard]] const SourceInfo& info() const override { return info_; }
+
+  /// What tells which samples are transparent; null where nothing does.
+  [[nodiscard]] std::unique_ptr<HeightSource> open_opacity() const {
+    if (mask_) return open_tiff_mask(info_.path, *mask_, turned_);
+    const std::string beside = info_.path + ".msk";  // as GDAL writes them
+    std::error_code error;
+    if (std::filesystem::is_regular_file(beside, error)) return open_tiff_mask(beside, 0, turned_);
+    if (!has_grey_and_opacity(layout_) || channel_ != 0) return nullptr;
+    OpenOptions options;
+    options.channel = "A";
+    return std::make_unique<TiffSource>(info_.path, options);
+  }
+
+  void read_window(const Window& window, std::span<std::byte> samples) override {
+    if (!turned_) return blocks_->read(window, samples);
+    blocks_->read(turned(window, info_.height), samples);
+    turn_rows(samples, static_cast<std::size_t>(window.columns) * size_bytes(info_.sample_type));
+  }
+
+  // From the South the windows of a caller do not begin where blocks do.
+  void limit_buffers(std::uint64_t bytes) override {
+    if (!turned_) blocks_->limit_cache(bytes);
+  }
+  [[nodiscard]] std::uint64_t buffer_bytes(std::uint64_t limit) const override {
+    return blocks_->cache_bytes(turned_ ? UINT64_MAX : limit);
+  }
+
+ private:
+  void describe(const TiffDirectories& directories, const TiffTags& tags, const OpenOptions& options) {
+    require_heights(layout_);
+    info_.format = std::string(tags.geo.empty() ? "TIFF" : "GeoTIFF");
+    info_.width = layout_.width;
+    info_.height = layout_.height;
+    info_.sample_type = sample_type_of(layout_);
+    for (const std::string& warning : tags.warnings) info_.warnings.push_back("libtiff: " + warning);
+    channel_ = choose_channel(layout_, options.channel, info_);
+    if (directories.has_more_pages)
+      info_.warnings.emplace_back("there are several images in the file; the first is read");
+    if (directories.has_broken)
+      info_.warnings.push_back(
+          loss("a directory behind the image is damaged; a transparency mask there is not applied"));
+    mask_ = directories.mask;
+    place(tags);
+    read_gdal_metadata(tags.gdal_metadata, channel_, info_);
+    read_gdal_nodata(tags.gdal_nodata, info_);
+    read_files_beside();
+    check_orientation();
+    if (is_floating(info_.sample_type) && info_.void_values.empty()) {
+      info_.valid_min = -kBeyondAnyHeight;
+      info_.valid_max = kBeyondAnyHeight;
+    }
+  }
+
+  void place(const TiffTags& tags) {
+    GeoTiffPlace place = place_from_geotiff(tags.geo, layout_.height);
+    info_.georeference = place.georeference;
+    info_.vertical_unit = place.vertical_unit;
+    info_.metres_per_vertical_unit = place.metres_per_vertical_unit;
+    info_.warnings.insert(info_.warnings.end(), place.warnings.begin(), place.warnings.end());
+    turned_ = place.rows_from_south;
+    is_placed_ = place.placed;
+  }
+
+  /// What the tags leave open may stand in other files.
+  void read_files_beside() {
+    read_auxiliary_metadata(info_, channel_ + 1);
+    if (!is_placed_ && !info_.georeference.has_origin) place_by_world_file();
+    if (!has_reference_system(info_.georeference)) read_prj_beside(info_);
+  }
+
+  void check_orientation() {
+    if (layout_.orientation == kTopLeft) return;
+    if (info_.georeference.has_origin) {
+      info_.warnings.push_back(fmt::format(
+          "the orientation tag ({}) is ignored: the georeference says which way the rows run", layout_.orientation));
+    } else if (layout_.orientation == kBottomLeft) {
+      turned_ = !turned_;
+    } else {
+      throw Error(
+          ErrorCode::kUnsupported,
+          fmt::format("the orientation is {}; isohf reads 1 (top-left) and 4 (bottom-left)", layout_.orientation));
+    }
+  }
+
+  void place_by_world_file() {
+    const std::optional<WorldFile> world = world_file_beside(info_.path);
+    if (!world) return;
+    turned_ = world->rows_from_south();
+    place_by(*world, layout_.height, info_.georeference);
+  }
+
+  void describe_missing_blocks() {
+    info_.block_width = layout_.block_width;
+    info_.block_height = blocks_->unit_rows();
+    if (blocks_->missing_blocks() == 0) return;
+    const char* reads_as = "0";
+    if (!info_.void_values.empty()) {
+      const auto fill = bytes_of_value(info_.sample_type, info_.void_values.front());
+      blocks_->set_fill(std::span(fill).first(size_bytes(info_.sample_type)));
+      reads_as = "void";
+    }
+    info_.warnings.push_back(
+        loss(fmt::format("{} of {} {} are not stored in the file; they read as {}", blocks_->missing_blocks(),
+                         blocks_->block_count(), layout_.tiled ? "tiles" : "strips", reads_as)));
+  }
+
+  RawFile file_;
+  TiffLayout layout_;
+  SourceInfo info_;
+  int channel_ = 0;
+  std::optional<std::uint32_t> mask_;
+  bool is_placed_ = false;  // by its tags, if without an origin
+  bool turned_ = false;     // the stored rows run from South to North
+  std::optional<TiffBlocks> blocks_;
+};
+
+}  // namespace
+
+bool looks_like_tiff(std::span<const std::byte> head) {
+  if (head.size() < 4) return false;
+  const auto is = [&](std::array<int, 4> magic) {
+    return std::equal(magic.begin(), magic.end(), head.begin(),
+                      [](int wanted, std::byte found) { return static_cast<std::byte>(wanted) == found; });
+  };
+  return is({'I', 'I', 42, 0}) || is({'M', 'M', 0, 42}) || is({'I', 'I', 43, 0}) || is({'M', 'M', 0, 43});
+}
+
+std::unique_ptr<HeightSource> open_tiff(const std::string& path, const OpenOptions& options) {
+  auto source = std::make_unique<TiffSource>(path, options);
+  std::unique_ptr<HeightSource> opacity = options.channel.empty() ? source->open_opacity() : nullptr;
+  if (!opacity) return source;
+  return mask_transparent(std::move(source), std::move(opacity));
+}
+
+}  // namespace isohf

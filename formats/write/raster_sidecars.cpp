@@ -1,0 +1,164 @@
+#include "formats/write/raster_sidecars.h"
+
+#include <fmt/format.h>
+
+#include <cctype>
+#include <cmath>
+#include <filesystem>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "formats/files/letter_case.h"
+#include "isohf/base/output_file.h"
+#include "isohf/error.h"
+
+namespace isohf {
+namespace {
+
+std::string extension_of(const std::string& path) {
+  return lower_case(std::filesystem::path(path).extension().string());
+}
+
+/// Size, place and void value in the words that GridFloat and ASCII grids share. Cells are areas: the corner of the
+/// South-West cell lies half a spacing off its sample.
+std::string grid_words(const RasterSpec& spec) {
+  std::string words = fmt::format("ncols {}\nnrows {}\n", spec.width, spec.height);
+  const Georeference place = spec.georeference.value_or(Georeference{});
+  const double south = place.origin_y - static_cast<double>(spec.height - 1) * place.spacing_y;
+  const double x = place.has_origin ? place.origin_x - place.spacing_x / 2.0 : 0.0;
+  const double y = place.has_origin ? south - place.spacing_y / 2.0 : 0.0;
+  words += fmt::format("xllcorner {}\nyllcorner {}\n", x, y);
+  words += place.spacing_x == place.spacing_y ? fmt::format("cellsize {}\n", place.spacing_x)
+                                              : fmt::format("dx {}\ndy {}\n", place.spacing_x, place.spacing_y);
+  return words + fmt::format("NODATA_value {}\n", grid_void(spec));
+}
+
+/// GridFloat knows one cell size; EHdr's words, which its readers take as well, know two.
+std::string grid_float_header(const RasterSpec& spec) {
+  const Georeference place = spec.georeference.value_or(Georeference{});
+  if (place.spacing_x == place.spacing_y) return grid_words(spec) + "byteorder LSBFIRST\n";
+  return fmt::format(
+      "NROWS {}\nNCOLS {}\nNBANDS 1\nNBITS 32\nPIXELTYPE FLOAT\nBYTEORDER LSBFIRST\nLAYOUT BIL\nULXMAP {}\n"
+      "ULYMAP {}\nXDIM {}\nYDIM {}\nNODATA {}\n",
+      spec.height, spec.width, place.has_origin ? place.origin_x : place.spacing_x / 2.0,
+      place.has_origin ? place.origin_y : (static_cast<double>(spec.height) - 0.5) * place.spacing_y, place.spacing_x,
+      place.spacing_y, grid_void(spec));
+}
+
+/// ESRI's WKT of the reference system: as found, or made for WGS 84 in degrees and its UTM zones; else empty.
+std::string prj_text(const RasterSpec& spec) {
+  if (!spec.georeference) return {};
+  const ReferenceSystem& system = spec.georeference->system;
+  if (!system.wkt.empty()) return system.wkt;
+  const std::string wgs84 = R"(GEOGCS["GCS_WGS_1984",DATUM["D_WGS_1984",SPHEROID["WGS_1984",6378137.0,298.257223563]],)"
+                            R"(PRIMEM["Greenwich",0.0],UNIT["Degree",0.0174532925199433]])";
+  const int epsg = system.epsg.value_or(0);
+  if (epsg == 4326) return wgs84;
+  const bool north = epsg > 32600 && epsg <= 32660;
+  const bool south = epsg > 32700 && epsg <= 32760;
+  if (!north && !south) return {};
+  const int zone = epsg % 100;
+  return fmt::format(
+      R"(PROJCS["WGS_1984_UTM_Zone_{}{}",{},PROJECTION["Transverse_Mercator"],PARAMETER["False_Easting",500000.0],)"
+      R"(PARAMETER["False_Northing",{}],PARAMETER["Central_Meridian",{}],PARAMETER["Scale_Factor",0.9996],)"
+      R"(PARAMETER["Latitude_Of_Origin",0.0],UNIT["Meter",1.0]])",
+      zone, north ? 'N' : 'S', wgs84, north ? "0.0" : "10000000.0", 6 * zone - 183);
+}
+
+std::string json_text(const std::string& extension, const RasterSpec& spec) {
+  nlohmann::ordered_json json = {{"format", extension == ".png" ? "png" : "raw samples"},
+                                 {"width", spec.width},
+                                 {"height", spec.height},
+                                 {"sample_type", to_string(spec.sample_type)}};
+  if (extension != ".png") json["byte_order"] = "little";
+  json["row_order"] = "north to south";
+  json["z_scale"] = spec.z_scale;
+  json["z_offset"] = spec.z_offset;
+  json["vertical_unit"] = spec.vertical_unit.empty() ? "unknown" : spec.vertical_unit;
+  json["void_value"] = spec.void_value ? nlohmann::ordered_json(*spec.void_value) : nlohmann::ordered_json(nullptr);
+  if (spec.georeference) {
+    const Georeference& place = *spec.georeference;
+    const bool degrees = place.unit == HorizontalUnit::kDegree;
+    const bool metres = place.unit == HorizontalUnit::kMetre;
+    json["registration"] = to_string(place.registration);
+    json["spacing_x"] = place.spacing_x;
+    json["spacing_y"] = place.spacing_y;
+    json["horizontal_unit"] = degrees ? "degree" : metres ? "metre" : "unknown";
+    if (metres && place.metres_per_unit != 1.0) json["metres_per_unit"] = place.metres_per_unit;
+    if (place.has_origin) {
+      json["origin_x"] = place.origin_x;
+      json["origin_y"] = place.origin_y;
+    }
+    if (!place.system.name.empty()) json["crs_name"] = place.system.name;
+    if (place.system.epsg) json["crs_epsg"] = *place.system.epsg;
+    if (!place.system.body.empty()) json["body"] = place.system.body;
+  }
+  // What is no UTF-8 in a name found in a file must not keep it from being written.
+  return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace
+
+double grid_void(const RasterSpec& spec) {
+  if (spec.void_value && !std::isnan(*spec.void_value)) return *spec.void_value;
+  switch (spec.sample_type) {
+    case SampleType::kFloat16:
+    case SampleType::kFloat32:
+    case SampleType::kFloat64:
+      return static_cast<double>(std::numeric_limits<float>::lowest());
+    default:
+      return -2147483648.0;  // integers without a void value have none; the word is required all the same
+  }
+}
+
+std::string ascii_grid_header(const RasterSpec& spec) {
+  return grid_words(spec);
+}
+
+std::vector<std::string> sidecar_paths(const std::string& path) {
+  const std::string extension = extension_of(path);
+  const auto beside = [&](const char* other) { return std::filesystem::path(path).replace_extension(other).string(); };
+  if (extension == ".flt") return {beside(".hdr"), beside(".prj")};
+  if (extension == ".asc") return {beside(".prj")};
+  const bool described = extension == ".r16" || extension == ".r32" || extension == ".raw" || extension == ".png";
+  return described ? std::vector<std::string>{path + ".json"} : std::vector<std::string>{};
+}
+
+void check_sidecar_target(const std::string& path) {
+  constexpr std::size_t kMostBytes = std::size_t{1} << 16U;
+  const std::vector<std::byte> bytes = head_of_file(path, kMostBytes);
+  if (bytes.empty()) return;
+  const std::string text = lower_case({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+  const std::string extension = extension_of(path);
+  bool is_kind = false;
+  if (extension == ".json") {
+    const auto json = nlohmann::json::parse(text, nullptr, false);
+    is_kind = json.is_object() && json.contains("width") && json.contains("sample_type");
+  } else if (extension == ".hdr") {
+    is_kind = text.find("ncols") != std::string::npos && text.find("nrows") != std::string::npos;
+  } else {
+    const std::size_t end = text.find_first_not_of("abcdefghijklmnopqrstuvwxyz_");
+    is_kind = end > 0 && end != std::string::npos && (text[end] == '[' || text.starts_with("projection"));
+  }
+  if (is_kind) return;
+  throw Error(
+      ErrorCode::kInvalidArgument,
+      fmt::format("exists and is no {} of a raster, which alone is replaced; remove it first, or choose another "
+                  "name for the raster",
+                  extension));
+}
+
+std::vector<Sidecar> sidecars_of(const std::string& path, const RasterSpec& spec) {
+  const std::string extension = extension_of(path);
+  const auto beside = [&](const char* other) { return std::filesystem::path(path).replace_extension(other).string(); };
+  std::vector<Sidecar> list;
+  if (extension == ".flt") list.push_back({beside(".hdr"), grid_float_header(spec)});
+  if (extension == ".flt" || extension == ".asc") {
+    if (std::string text = prj_text(spec); !text.empty()) list.push_back({beside(".prj"), text + "\n"});
+  }
+  const bool raw = extension == ".r16" || extension == ".r32" || extension == ".raw";
+  if (raw || (extension == ".png" && spec.describe)) list.push_back({path + ".json", json_text(extension, spec)});
+  return list;
+}
+
+}  // namespace isohf

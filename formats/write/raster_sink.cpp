@@ -1,0 +1,219 @@
+#include "formats/write/raster_sink.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <limits>
+#include <span>
+
+#include "formats/files/letter_case.h"
+#include "formats/libraries.h"
+#include "formats/write/raster_encoder.h"
+#include "formats/write/raster_sidecars.h"
+#include "isohf/base/output_file.h"
+#include "isohf/error.h"
+
+namespace isohf {
+namespace {
+
+struct Writer {
+  Format format;
+  std::unique_ptr<RasterEncoder> (*encode)(OutputFile& out, const RasterSpec& spec);
+  bool has_signature;  ///< by which its files are known; others begin in any way
+};
+
+const std::vector<Writer>& writers() {
+  static const std::vector<Writer> table = {
+      {{"GeoTIFF", {".tif", ".tiff"}, tiff_library, "samples of any type"}, encode_tiff, true},
+      {{"OpenEXR", {".exr"}, exr_library, "float16, float32, uint32"}, encode_exr, true},
+      {{"PNG", {".png"}, png_library, "uint8, uint16"}, encode_png, true},
+      {{"SRTM HGT", {".hgt"}, nullptr, "int16; 1201x1201, 3601x3601 or 1801x3601"}, encode_hgt, false},
+      {{"ESRI ASCII grid", {".asc"}, nullptr, "samples of any type"}, encode_asc, true},
+      {{"GridFloat", {".flt"}, nullptr, "float32; with .hdr"}, encode_flt, false},
+      {{"raw 16 bit", {".r16", ".raw"}, nullptr, "uint16; with .json"}, encode_r16, false},
+      {{"raw 32 bit", {".r32"}, nullptr, "float32; with .json"}, encode_r32, false},
+      {{"NumPy", {".npy"}, nullptr, "samples of any type"}, encode_npy, true},
+  };
+  return table;
+}
+
+std::string lower_extension(const std::string& path) {
+  const std::size_t dot = path.rfind('.');
+  if (dot == std::string::npos || path.find('/', dot) != std::string::npos) return {};
+  return lower_case(path.substr(dot));
+}
+
+const Writer& writer_for(const std::string& path) {
+  const std::string extension = lower_extension(path);
+  for (const Writer& writer : writers()) {
+    for (const char* known : writer.format.extensions) {
+      if (extension == known) return writer;
+    }
+  }
+  throw Error(ErrorCode::kInvalidArgument, fmt::format("no writer for the extension \"{}\"; there are {}", extension,
+                                                       fmt::join(writable_extensions(), " ")));
+}
+
+void check(const RasterSpec& spec) {
+  constexpr std::int64_t kMaxSide = std::numeric_limits<std::int32_t>::max();
+  if (spec.width < 1 || spec.height < 1 || spec.width > kMaxSide || spec.height > kMaxSide) {
+    throw Error(ErrorCode::kInvalidArgument, fmt::format("a raster of {} x {} samples, must be 1...{} on each side",
+                                                         spec.width, spec.height, kMaxSide));
+  }
+  if (spec.channels != 1 && spec.channels != 3 && spec.channels != 4) {
+    throw Error(ErrorCode::kInvalidArgument, fmt::format("{} channels, must be 1, 3 or 4", spec.channels));
+  }
+}
+
+/// What a file is that is to be replaced; empty where it is of the writer's kind, or empty.
+std::string other_kind(const std::string& path, const Writer& writer) {
+  constexpr std::size_t kHeadBytes = 256;
+  const std::vector<std::byte> head = head_of_file(path, kHeadBytes);
+  if (head.empty()) return {};
+  const std::string start(reinterpret_cast<const char*>(head.data()), std::min<std::size_t>(head.size(), 4));
+  if (start == "PK\x03\x04") return "a ZIP archive, as .isohf files are";
+  const Format* const found = format_of_head(head);
+  if (found == nullptr) return writer.has_signature ? fmt::format("no {}", writer.format.name) : "";
+  const bool same = std::ranges::any_of(found->extensions, [&](std::string_view extension) {
+    return std::ranges::count(writer.format.extensions, extension) > 0;
+  });
+  return same ? "" : fmt::format("of the kind {}", found->name);
+}
+
+/// Throws, without the path, what OutputFile will throw, and where another kind of file stands there.
+void check_target(const std::string& path, const Writer& writer, bool overwrite) {
+  const std::string kind = other_kind(output_place(path, true), writer);
+  if (kind.empty()) return static_cast<void>(output_place(path, overwrite));
+  throw Error(ErrorCode::kInvalidArgument,
+              fmt::format("exists and is {}; a {} replaces only a file of its own kind, remove it first or choose "
+                          "another name",
+                          kind, writer.format.name));
+}
+
+/// Whether the file is there already, as it would be written: rasters of one name may share a .prj.
+bool holds(const Sidecar& sidecar) {
+  const std::vector<std::byte> found = head_of_file(sidecar.path, sidecar.text.size() + 1);
+  return std::ranges::equal(found, std::as_bytes(std::span(sidecar.text)));
+}
+
+std::vector<std::unique_ptr<OutputFile>> begin_sidecars(const std::string& path, const RasterSpec& spec) {
+  std::vector<std::unique_ptr<OutputFile>> files;
+  for (const Sidecar& sidecar : sidecars_of(path, spec)) {
+    if (holds(sidecar)) continue;
+    try {
+      check_sidecar_target(sidecar.path);
+      files.push_back(std::make_unique<OutputFile>(sidecar.path, OutputFile::Options{spec.overwrite}));
+      files.back()->append(sidecar.text);
+      files.back()->flush();
+    } catch (const Error& error) {
+      throw error.within(sidecar.path);
+    }
+  }
+  return files;
+}
+
+}  // namespace
+
+RasterSink::RasterSink(std::string path, const RasterSpec& spec, std::unique_ptr<OutputFile> file,
+                       std::vector<std::unique_ptr<OutputFile>> sidecars, std::unique_ptr<RasterEncoder> encoder)
+    : path_(std::move(path)),
+      spec_(spec),
+      file_(std::move(file)),
+      sidecars_(std::move(sidecars)),
+      encoder_(std::move(encoder)) {}
+
+RasterSink::~RasterSink() = default;
+
+std::vector<std::string> RasterSink::files() const {
+  std::vector<std::string> all = {path_};
+  for (const Sidecar& sidecar : sidecars_of(path_, spec_)) all.push_back(sidecar.path);
+  return all;
+}
+
+void RasterSink::write_rows(std::span<const std::byte> rows) {
+  const std::size_t one_row = row_bytes(spec_);
+  const auto count = static_cast<std::int64_t>(rows.size() / one_row);
+  if (rows.size() % one_row != 0 || count > spec_.height - rows_written_) {
+    throw Error(ErrorCode::kInvalidArgument,
+                fmt::format("{}: {} bytes after row {} of {}, must be whole rows of {} bytes", path_, rows.size(),
+                            rows_written_, spec_.height, one_row));
+  }
+  if (count == 0) return;
+  try {
+    encoder_->write(rows, count);
+  } catch (const Error& error) {
+    throw error.within(path_);
+  }
+  rows_written_ += count;
+}
+
+void RasterSink::finish() {
+  if (rows_written_ != spec_.height || !encoder_) {
+    throw Error(ErrorCode::kInvalidArgument,
+                fmt::format("{}: finished after {} of {} rows", path_, rows_written_, spec_.height));
+  }
+  try {
+    encoder_->close();
+    encoder_.reset();
+    // All is on the disk before anything gets its name, and what the raster's name stands for is complete when it
+    // appears. Whoever ends the program in between finds no raster, never old samples with a new description.
+    file_->sync();
+    for (const auto& sidecar : sidecars_) sidecar->sync();
+    if (!sidecars_.empty()) file_->remove_replaced();
+    for (const auto& sidecar : sidecars_) {
+      try {
+        sidecar->commit();
+      } catch (const Error& error) {
+        throw error.within(sidecar->path());
+      }
+    }
+    file_->commit();
+  } catch (const Error& error) {
+    throw error.within(path_);
+  }
+}
+
+std::unique_ptr<RasterSink> create_raster(const std::string& path, const RasterSpec& spec) {
+  try {
+    const Writer& writer = writer_for(path);
+    check(spec);
+    check_target(path, writer, spec.overwrite);
+    auto file = std::make_unique<OutputFile>(path, OutputFile::Options{spec.overwrite});
+    auto sidecars = begin_sidecars(path, spec);
+    auto encoder = writer.encode(*file, spec);
+    return std::make_unique<RasterSink>(path, spec, std::move(file), std::move(sidecars), std::move(encoder));
+  } catch (const Error& error) {
+    throw error.within(path);
+  }
+}
+
+void check_raster_target(const std::string& path, bool overwrite) {
+  try {
+    if (path == "-") static_cast<void>(output_place(path, overwrite));  // says so before the extension is looked at
+    check_target(path, writer_for(path), overwrite);
+  } catch (const Error& error) {
+    throw error.within(path);
+  }
+}
+
+const std::vector<std::string>& writable_extensions() {
+  static const std::vector<std::string> extensions = [] {
+    std::vector<std::string> list;
+    for (const Format& format : writable_formats()) {
+      list.insert(list.end(), format.extensions.begin(), format.extensions.end());
+    }
+    return list;
+  }();
+  return extensions;
+}
+
+const std::vector<Format>& writable_formats() {
+  static const std::vector<Format> formats = [] {
+    std::vector<Format> list;
+    for (const Writer& writer : writers()) list.push_back(writer.format);
+    return list;
+  }();
+  return formats;
+}
+
+}  // namespace isohf

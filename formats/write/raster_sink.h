@@ -1,0 +1,93 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "formats/registry.h"
+#include "isohf/projection.h"
+#include "isohf/raster.h"
+
+namespace isohf {
+
+/// What a new raster is. Georeference, scale, offset and unit go into TIFF and the .json beside raw samples and PNG;
+/// grids have a place for the georeference, the other formats for nothing.
+struct RasterSpec {
+  std::int64_t width = 0;   ///< columns, >= 1
+  std::int64_t height = 0;  ///< rows, >= 1
+  SampleType sample_type = SampleType::kFloat32;
+  int channels = 1;                  ///< 1 gray (Y), 3 RGB, 4 RGBA
+  std::optional<double> void_value;  ///< raw value that means "no elevation"
+  std::optional<Georeference> georeference;
+  std::optional<ProjectionSpec> projection;  ///< the map that the georeference is on, where no EPSG code names it
+  double z_scale = 1.0;                      ///< elevation = raw * z_scale + z_offset, in vertical units
+  double z_offset = 0.0;
+  std::string vertical_unit;  ///< "metre", ...; empty where unknown
+  double metres_per_vertical_unit = 1.0;
+  bool describe = false;   ///< of PNG: write NAME.png.json beside it, which says what the numbers mean
+  bool overwrite = false;  ///< replace a file of that name
+};
+
+class OutputFile;
+class RasterEncoder;
+
+/// A raster file that is written from its first row to its last.
+///
+/// Everything goes to NAME.part (output_file.h), which finish() flushes to the disk and renames; a sink that is
+/// destroyed before leaves nothing behind. The files beside it (raster_sidecars.h) get their names first, when all are
+/// on the disk; samples and a description that do not belong together never stand beside each other. One thread calls.
+/// Memory: a few megabytes, a few rows where these are longer, and 256 rows for TIFF, of 64 MiB at most. TIFF strips
+/// are compressed on the caller's oneTBB arena; the bytes do not depend on the number of threads.
+class RasterSink {
+ public:
+  RasterSink(std::string path, const RasterSpec& spec, std::unique_ptr<OutputFile> file,
+             std::vector<std::unique_ptr<OutputFile>> sidecars, std::unique_ptr<RasterEncoder> encoder);
+  RasterSink(const RasterSink&) = delete;
+  RasterSink& operator=(const RasterSink&) = delete;
+  ~RasterSink();
+
+  [[nodiscard]] const RasterSpec& spec() const { return spec_; }
+  /// The raster, and the files that stand beside it.
+  [[nodiscard]] std::vector<std::string> files() const;
+
+  /// Appends whole rows: [k * width * channels] samples in host byte order, the channels of a pixel together.
+  /// Throws Error naming the path: kIo (disk full, ...), kInvalidArgument (part of a row; more rows than declared).
+  void write_rows(std::span<const std::byte> rows);
+
+  /// Completes the file and gives it its name. All rows must have been written. Throws Error{kIo, kInvalidArgument}.
+  void finish();
+
+ private:
+  std::string path_;
+  RasterSpec spec_;
+  std::unique_ptr<OutputFile> file_;  ///< outlives the encoder, which writes to it
+  std::vector<std::unique_ptr<OutputFile>> sidecars_;
+  std::unique_ptr<RasterEncoder> encoder_;
+  std::int64_t rows_written_ = 0;
+};
+
+/// Begins a raster whose format follows from the extension of `path`, in any case:
+///   .tif .tiff  TIFF 6.0: tiles of 256 x 256, or strips; deflate with predictor, BigTIFF above 4 GB, GeoTIFF keys,
+///   GDAL_NODATA; any type .exr        OpenEXR scan lines, ZIP; float16, float32, uint32 .png        uint8, uint16; a
+///   gray void value becomes the transparent one .hgt        one int16 channel of 1201 x 1201, 3601 x 3601 or 1801 x
+///   3601 samples; void is -32768 .asc        one channel of any type, in decimal; NaN becomes the lowest float .flt
+///   one float32 channel, with its .hdr; NaN becomes the lowest float .r16 .raw   one uint16 channel, little-endian,
+///   nothing else; .r32 the same of float32; with NAME.r16.json .npy        NumPy, any type
+/// Throws Error naming the path: kInvalidArgument (no such extension; sizes, or samples that the format cannot hold;
+/// the file exists and overwrite is not set, or is of another kind), kIo.
+[[nodiscard]] std::unique_ptr<RasterSink> create_raster(const std::string& path, const RasterSpec& spec);
+
+/// Refuses a name that create_raster would refuse, before any work: Error naming the path.
+void check_raster_target(const std::string& path, bool overwrite);
+
+/// The extensions that create_raster knows: ".tif", ...
+[[nodiscard]] const std::vector<std::string>& writable_extensions();
+
+/// The formats behind them; a note says what samples one holds.
+[[nodiscard]] const std::vector<Format>& writable_formats();
+
+}  // namespace isohf

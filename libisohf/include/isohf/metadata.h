@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "isohf/lattice.h"
+#include "isohf/projection.h"
+
+namespace isohf {
+
+/// Metadata of more bytes than this are refused.
+inline constexpr std::uint32_t kMaxMetadataBytes = 64U << 20U;
+
+/// How a tile stores one elevation: a 16- or 8-bit code, or a 32-bit float.
+enum class CodeType { kU16, kU8, kF32 };
+
+[[nodiscard]] std::string to_string(CodeType type);                     ///< "u16", "u8", "f32"
+[[nodiscard]] CodeType code_type_from_string(const std::string& text);  ///< throws Error{kInvalidArgument}
+
+/// One scale and offset for the whole dataset: elevation = offset + scale * code. Codes run from 0 to max_code(); the
+/// next one means void. For kF32 the float is the elevation itself, offset 0, scale 1, NaN is void.
+struct Quantisation {
+  CodeType type = CodeType::kU16;
+  double offset = 0.0;  ///< elevation of code 0, vertical units (metres where known)
+  double scale = 1.0;   ///< elevation step of one code, > 0
+
+  [[nodiscard]] std::uint32_t max_code() const { return type == CodeType::kU8 ? 254U : 65534U; }
+  [[nodiscard]] std::uint32_t void_code() const { return type == CodeType::kU8 ? 255U : 65535U; }
+};
+
+/// A rectangle of world space.
+struct WorldBounds {
+  double x0 = 0.0;
+  double z0 = 0.0;
+  double x1 = 0.0;
+  double z1 = 0.0;
+};
+
+/// Elevation statistics over the stored lattice vertices, each shared vertex counted once a tile that shows it.
+struct Statistics {
+  std::optional<double> min;  ///< vertical units; absent where every vertex is void
+  std::optional<double> max;
+  std::optional<double> mean;
+  std::int64_t vertices = 0;    ///< visible vertices of all tiles
+  std::int64_t voids = 0;       ///< of these, void
+  std::int64_t clamped = 0;     ///< elevations outside --z-range that were moved to its end
+  double worst_rounding = 0.0;  ///< largest |stored - computed| elevation, vertical units
+};
+
+/// What a source of several files was joined from.
+struct MosaicRecord {
+  std::int64_t files = 0;
+  std::vector<std::string> first_names;  ///< without folders, some of them
+  std::string names_sha256;              ///< over all names, a line feed after each
+  std::string overlap;                   ///< which showed where several overlapped: "last" or "first" named
+};
+
+/// What the surface was made from, as found in the source.
+struct SourceRecord {
+  std::string name;  ///< file name without its folder
+  std::string format;
+  std::int64_t width = 0;
+  std::int64_t height = 0;
+  std::string sample_type;
+  std::string channel;
+  double z_scale = 1;  ///< elevation = raw sample * z_scale + z_offset, in vertical units
+  double z_offset = 0;
+  std::vector<double> void_values;                       ///< raw values that meant "no elevation"
+  std::optional<std::pair<double, double>> valid_range;  ///< elevations outside were void, by the user's choice
+  std::int64_t fill_distance = 0;  ///< voids up to so many samples from an elevation were filled; 0: none
+  std::string registration;        ///< "area", "point": as used
+  double first_sample_x = 0;       ///< world place of sample (0, 0)
+  double first_sample_z = 0;
+  double spacing_x = 1;  ///< world units between neighbouring columns and rows
+  double spacing_z = 1;
+  std::optional<double> origin_x;  ///< CRS coordinates of sample (0, 0), as found
+  std::optional<double> origin_y;
+  double crs_spacing_x = 0;  ///< CRS units between neighbouring columns and rows, as found; 0 where unknown
+  double crs_spacing_y = 0;
+  std::string crs_unit;          ///< "metre", "degree", "unknown"
+  double metres_per_unit = 1.0;  ///< of a linear unit: "metre" is feet as well
+  std::string crs_name;
+  std::optional<int> crs_epsg;
+  std::string crs_wkt;
+  std::string body;
+  std::optional<double> semi_major_axis_m;
+  std::optional<double> inverse_flattening;
+  std::string vertical_datum;
+  std::optional<int> vertical_epsg;
+  std::optional<MosaicRecord> mosaic;  ///< nullopt: a single file
+  std::optional<MapGround> ground;     ///< under a source on a map that was understood
+  /// Its reference system, where who reads the archive has understood it; never stored.
+  std::shared_ptr<const ReferenceMap> map;
+  /// How it was read: options of `isohf convert` by name, without dashes, with their text; nullopt: not recorded.
+  std::optional<std::vector<std::pair<std::string, std::string>>> options;
+};
+
+/// The map on which world space lies, metres, where it is another one than the source's.
+struct ProjectionRecord {
+  ProjectionSpec spec;
+  MapPoint origin;                 ///< map place of world (0, 0); x goes East from there, z South
+  double worst_scale_error = 0.0;  ///< over the source's ground: 0.01 for 1 %; may be infinite
+  GeoPoint worst_place;            ///< where that is
+  std::string why;                 ///< why this one
+};
+
+/// Everything about an archive but its elevations; its first member, as JSON (docs/archive_format.md).
+struct Metadata {
+  explicit Metadata(const TileGrid& tile_grid) : grid(tile_grid) {}
+
+  TileGrid grid;
+  Quantisation quantisation;
+  /// Elevations that nothing stored lies beyond, by the user's choice: offset and a whole number of steps more.
+  std::optional<std::pair<double, double>> z_range;
+  std::string horizontal_unit = "unknown";  ///< world units: "metre" or "unknown"
+  std::string vertical_unit = "unknown";    ///< "metre", "foot", ... or "unknown"
+  WorldBounds valid;  ///< the part of the world that the source covers; a rectangle around it where it was projected
+  std::optional<ProjectionRecord> projection;  ///< absent where world space is the source's own plane
+  bool wraps_x = false;                        ///< the East edge of the last tiles is the West edge of the first
+  std::string outside = "cover";               ///< what lies beyond: "cover", "clamp" or "void"
+  std::string filter = "bilinear";
+  std::string edges = "mirror";  ///< how samples went on beyond the source's ends: "mirror", "odd"
+  std::string acquisition = "point";
+  std::optional<int> level;  ///< that the tiles were coded at; tells readers nothing
+  SourceRecord source;
+  Statistics statistics;
+  std::vector<std::string> textures;
+  std::int64_t tiles_stored = 0;  ///< tiles that hold at least one elevation; the others are wholly void and absent
+  std::string content_sha256;     ///< see docs/archive_format.md; independent of threads, level and codec
+  std::string producer;           ///< "isohf 0.1.0"
+  /// Further top-level JSON members that a later section adds (shadow seeds, residuals, accuracy), as JSON text by
+  /// name.
+  std::vector<std::pair<std::string, std::string>> extensions;
+};
+
+/// The metadata as JSON text (UTF-8, no trailing newline), and back. parse_metadata throws Error{kCorrupt} naming the
+/// member at fault, and Error{kUnsupported} for a format version that this build does not know.
+[[nodiscard]] std::string format_metadata(const Metadata& metadata);
+/// The projection alone, as metadata have it: JSON text.
+[[nodiscard]] std::string format_projection(const ProjectionRecord& record);
+/// The ground under a source on a map alone, in the same way.
+[[nodiscard]] std::string format_ground(const MapGround& ground);
+/// Room to set aside for these metadata (WriterOptions::metadata_bytes) while statistics, hash and extensions are yet
+/// to come: 16384 bytes, or as much more as a long WKT takes.
+[[nodiscard]] std::uint32_t metadata_room(const Metadata& draft);
+[[nodiscard]] Metadata parse_metadata(const std::string& json);
+
+}  // namespace isohf

@@ -1,0 +1,123 @@
+#include "isohf/archive/codec/quantise.h"
+
+#include <bit>
+#include <cmath>
+
+#include "isohf/base/vectorised.h"
+
+namespace isohf {
+namespace {
+
+/// code = height * inverse + shift, rounded, held within 0..last; what became of it is added up.
+struct CodeLine {
+  double inverse = 1.0;
+  double shift = 0.0;
+  double last = 0.0;
+  std::int32_t void_code = 0;
+  double worst = 0.0;  ///< largest rounding, in codes
+  std::int64_t below = 0;
+  std::int64_t above = 0;
+};
+
+ISOHF_VECTORISED(void, round_to_codes,
+                 (const float* __restrict heights, std::size_t count, CodeLine& line, std::uint16_t* __restrict codes),
+                 (heights, count, line, codes)) {
+  const double inverse = line.inverse;
+  const double shift = line.shift;
+  const double last = line.last;
+  const std::int32_t void_code = line.void_code;
+  std::int64_t worst = 0;
+  std::int64_t below = 0;
+  std::int64_t above = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const double exact = double{heights[i]} * inverse + shift;  // NaN compares false below
+    const bool is_void = exact != exact;
+    const double raised = exact < 0.0 || is_void ? 0.0 : exact;
+    const double inside = raised > last ? last : raised;
+    const auto code = static_cast<std::int32_t>(inside + 0.5);
+    below += exact < -0.5 ? 1 : 0;
+    above += exact >= last + 0.5 ? 1 : 0;
+    // Doubles that are not negative are ordered like their bits, and a maximum of integers vectorises.
+    const auto off = std::bit_cast<std::int64_t>(std::abs(inside - static_cast<double>(code)));
+    worst = off > worst ? off : worst;
+    codes[i] = static_cast<std::uint16_t>(is_void ? void_code : code);
+  }
+  line.worst = std::bit_cast<double>(worst);
+  line.below = below;
+  line.above = above;
+}
+
+/// Heights by `datum` higher; the largest rounding, voids left aside. Floats that are not negative are ordered like
+/// their bits, and a maximum of integers vectorises.
+ISOHF_VECTORISED(float, raise_heights,
+                 (const float* __restrict heights, std::size_t count, double datum, float* __restrict raised),
+                 (heights, count, datum, raised)) {
+  std::int32_t worst = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const double exact = double{heights[i]} + datum;
+    const auto rounded = static_cast<float>(exact);
+    const auto off = static_cast<float>(std::abs(double{rounded} - exact));
+    const std::int32_t bits = off == off ? std::bit_cast<std::int32_t>(off) : 0;
+    worst = bits > worst ? bits : worst;
+    raised[i] = rounded;
+  }
+  return std::bit_cast<float>(worst);
+}
+
+/// The float that is nearest to `limit` on the side of `inner`, or `limit` itself.
+float float_within(double limit, float inner) {
+  const auto nearest = static_cast<float>(limit);
+  const bool beyond = inner > 0.0F ? double{nearest} < limit : double{nearest} > limit;
+  return beyond ? std::nextafter(nearest, inner) : nearest;
+}
+
+}  // namespace
+
+QuantiserCounts quantise(const Quantisation& quantisation, double datum, std::span<const float> heights,
+                         TileCodes& tile) {
+  return quantise(quantisation, code_limits(quantisation), datum, heights, tile);
+}
+
+QuantiserCounts quantise(const Quantisation& quantisation, const CodeLimits& limits, double datum,
+                         std::span<const float> heights, TileCodes& tile) {
+  QuantiserCounts counts;
+  tile.type = quantisation.type;
+  const std::size_t n = heights.size();
+  if (quantisation.type == CodeType::kF32) {
+    tile.codes.clear();
+    tile.heights.resize(n);
+    counts.worst_rounding = double{raise_heights(heights.data(), n, datum, tile.heights.data())};
+    if (std::isinf(limits.lowest) && std::isinf(limits.highest)) return counts;
+    const float lowest = float_within(limits.lowest, HUGE_VALF);
+    const float highest = float_within(limits.highest, -HUGE_VALF);
+    for (float& height : tile.heights) height = height < lowest ? lowest : (height > highest ? highest : height);
+    return counts;
+  }
+  tile.heights.clear();
+  tile.codes.resize(n);
+  CodeLine line;
+  line.inverse = 1.0 / quantisation.scale;
+  line.shift = (datum - quantisation.offset) * line.inverse;
+  line.last = static_cast<double>(quantisation.max_code());
+  if (limits.highest < code_limits(quantisation).highest) {
+    line.last = std::round((limits.highest - quantisation.offset) / quantisation.scale);
+  }
+  line.void_code = static_cast<std::int32_t>(quantisation.void_code());
+  round_to_codes(heights.data(), n, line, tile.codes.data());
+  counts.below = line.below;
+  counts.above = line.above;
+  counts.worst_rounding = line.worst * quantisation.scale;
+  return counts;
+}
+
+CodeLimits code_limits(const Quantisation& quantisation) {
+  if (quantisation.type == CodeType::kF32) return {-HUGE_VAL, HUGE_VAL};
+  return {quantisation.offset, elevation_from_code(quantisation, quantisation.max_code())};
+}
+
+CodeLimits code_limits(const Metadata& metadata) {
+  if (metadata.z_range) return {metadata.z_range->first, metadata.z_range->second};
+  return code_limits(metadata.quantisation);
+}
+
+}  // namespace isohf

@@ -1,0 +1,231 @@
+#include "isohf/archive/codec/residuals/residual_streams.h"
+
+#include <bit>
+#include <cstring>
+
+#include "isohf/archive/codec/predict/activities.h"
+#include "isohf/archive/codec/residuals/context_model.h"
+#include "isohf/archive/codec/residuals/pair_coding.h"
+#include "isohf/archive/codec/residuals/residual_symbols.h"
+#include "isohf/base/vectorised.h"
+
+namespace isohf {
+namespace {
+
+/// Symbols of residuals below 2^24: a float's exponent and upper three bits of mantissa are octave and eighth.
+ISOHF_VECTORISED(void, find_small_symbols,
+                 (const std::uint16_t* __restrict folded, std::size_t count, std::uint8_t* __restrict symbols),
+                 (folded, count, symbols)) {
+  constexpr std::int32_t kFirst = (127 + 4) * 8 - static_cast<std::int32_t>(kFirstSplitSymbol);
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto residual = static_cast<std::int32_t>(folded[i]);
+    const std::int32_t split = (std::bit_cast<std::int32_t>(static_cast<float>(residual)) >> 20) - kFirst;
+    symbols[i] = static_cast<std::uint8_t>(residual < static_cast<std::int32_t>(kFirstSplitSymbol) ? residual : split);
+  }
+}
+void find_symbols(const std::uint16_t* folded, std::size_t count, std::uint8_t* symbols) {
+  find_small_symbols(folded, count, symbols);
+}
+
+/// Half a residual of 32 bits as a float, of the same octave less one and the same eighth: half, so that it has a sign
+/// to spare; and with the bit eight below the highest one cleared, so that no carry of rounding gets past it.
+constexpr std::uint32_t bits_of_half(std::uint32_t folded) {
+  const std::uint32_t kept = folded & ~(folded >> 8U);
+  return std::bit_cast<std::uint32_t>(static_cast<float>(static_cast<std::int32_t>(kept >> 1U)));
+}
+
+ISOHF_VECTORISED(void, find_large_symbols,
+                 (const std::uint32_t* __restrict folded, std::size_t count, std::uint8_t* __restrict symbols),
+                 (folded, count, symbols)) {
+  constexpr std::uint32_t kFirst = (127 + 3) * 8 - kFirstSplitSymbol;
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::uint32_t split = (bits_of_half(folded[i]) >> 20U) - kFirst;
+    symbols[i] = static_cast<std::uint8_t>(folded[i] < kFirstSplitSymbol ? folded[i] : split);
+  }
+}
+void find_symbols(const std::uint32_t* folded, std::size_t count, std::uint8_t* symbols) {
+  find_large_symbols(folded, count, symbols);
+}
+
+/// Bits one after the other, the lowest of a byte first.
+class BitPacker {
+ public:
+  /// `most_bytes` is the most that will come.
+  explicit BitPacker(std::size_t most_bytes) : room_(most_bytes + 8), to_(room_.data()) {}
+
+  void put(std::uint32_t bits, unsigned count) {
+    bits_ |= std::uint64_t{bits} << bit_count_;
+    bit_count_ += count;
+    if (bit_count_ < 32) return;
+    std::memcpy(to_, &bits_, 4);
+    to_ += 4;
+    bits_ >>= 32U;
+    bit_count_ -= 32;
+  }
+  /// As many as 56 bits; where all are put so.
+  void put_many(std::uint64_t bits, unsigned count) {
+    bits_ |= bits << bit_count_;
+    std::memcpy(to_, &bits_, 8);
+    bit_count_ += count;
+    to_ += bit_count_ / 8;
+    bits_ >>= bit_count_ / 8 * 8;
+    bit_count_ %= 8;
+  }
+  [[nodiscard]] std::vector<std::byte> finish() {
+    std::memcpy(to_, &bits_, 8);
+    return {room_.data(), to_ + (bit_count_ + 7) / 8};
+  }
+
+ private:
+  Scratch<std::byte> room_;
+  std::byte* to_;
+  std::uint64_t bits_ = 0;
+  unsigned bit_count_ = 0;
+};
+
+/// The extra bits of two neighbouring residuals of codes, together no more than 24, and how many these are.
+ISOHF_VECTORISED(void, join_extra_bits,
+                 (const std::uint16_t* __restrict folded, std::size_t pairs, std::uint32_t* __restrict bits,
+                  std::uint32_t* __restrict counts),
+                 (folded, pairs, bits, counts)) {
+  constexpr std::int32_t kFirstOctave = 127 + 4;
+  for (std::size_t i = 0; i < pairs; ++i) {
+    const auto extra = [&](std::uint32_t value, std::uint32_t& count) {
+      const std::int32_t exponent =
+          std::bit_cast<std::int32_t>(static_cast<float>(static_cast<std::int32_t>(value))) >> 23;
+      const std::int32_t octave = exponent - kFirstOctave + 1;
+      count = static_cast<std::uint32_t>(octave < 0 ? 0 : octave);
+      return value & ((1U << count) - 1);
+    };
+    std::uint32_t first_count = 0;
+    std::uint32_t second_count = 0;
+    const std::uint32_t first = extra(folded[2 * i], first_count);
+    const std::uint32_t second = extra(folded[2 * i + 1], second_count);
+    bits[i] = first | second << first_count;
+    counts[i] = first_count + second_count;
+  }
+}
+
+/// The extra bits of residuals of floats, and how many these are.
+ISOHF_VECTORISED(void, find_extra_bits,
+                 (const std::uint32_t* __restrict folded, std::size_t count, std::uint32_t* __restrict bits,
+                  std::uint32_t* __restrict counts),
+                 (folded, count, bits, counts)) {
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::int32_t octave = static_cast<std::int32_t>(bits_of_half(folded[i]) >> 23U) - 129;
+    counts[i] = static_cast<std::uint32_t>(octave < 0 ? 0 : octave);
+    bits[i] = folded[i] & ((1U << counts[i]) - 1);
+  }
+}
+
+/// The bits of the residuals that their symbols leave out.
+std::vector<std::byte> pack_extra_bits(const std::uint16_t* folded, std::size_t count) {
+  BitPacker packer(count * 2);
+  const std::size_t pairs = count / 2;
+  Scratch<std::uint32_t> bits(pairs);
+  Scratch<std::uint32_t> counts(pairs);
+  join_extra_bits(folded, pairs, bits.data(), counts.data());
+  for (std::size_t i = 0; i < pairs; ++i) packer.put(bits.data()[i], counts.data()[i]);
+  if (count % 2 != 0) {
+    const unsigned last = extra_bits_of_symbol(symbol_of(folded[count - 1]));
+    packer.put(folded[count - 1] & ((1U << last) - 1), last);
+  }
+  return packer.finish();
+}
+std::vector<std::byte> pack_extra_bits(const std::uint32_t* folded, std::size_t count) {
+  BitPacker packer(count * 4);
+  Scratch<std::uint32_t> bits(count);
+  Scratch<std::uint32_t> counts(count);
+  find_extra_bits(folded, count, bits.data(), counts.data());
+  std::size_t i = 0;
+  for (; i + 2 <= count; i += 2) {
+    const std::uint64_t second = bits.data()[i + 1];
+    packer.put_many(bits.data()[i] | second << counts.data()[i], counts.data()[i] + counts.data()[i + 1]);
+  }
+  if (i < count) packer.put_many(bits.data()[i], counts.data()[i]);
+  return packer.finish();
+}
+
+}  // namespace
+
+template <typename Folded>
+std::vector<std::uint32_t> sort_by_context(const Residuals<Folded>& residuals,
+                                           std::span<const std::uint16_t> thresholds,
+                                           std::span<const std::uint32_t> histogram, Folded* sorted) {
+  const auto table = context_table(thresholds);
+  std::vector<std::uint32_t> counts(thresholds.size() + 1);
+  for (std::size_t level = 0; level < histogram.size(); ++level) counts[table[level]] += histogram[level];
+  std::array<Folded*, kMaxContexts> to{};
+  std::array<Folded*, kMaxContexts> to_end{};
+  for (std::size_t i = 0; i < counts.size(); ++i) {
+    to[i] = sorted;
+    sorted += counts[i];
+    to_end[i] = sorted;
+  }
+  const Folded* const folded = residuals.folded.data();
+  const std::uint16_t* const activities = residuals.activities.data();
+  const std::size_t count = residuals.count;
+  for (std::size_t i = 0; i < count / 2; ++i) {
+    const std::size_t from_end = count - 1 - i;
+    *to[table[activities[i]]]++ = folded[i];
+    *--to_end[table[activities[from_end]]] = folded[from_end];
+  }
+  if (count % 2 != 0) *to[table[activities[count / 2]]] = folded[count / 2];
+  return counts;
+}
+
+template <typename Folded>
+std::uint8_t choose_activity_shift(const Residuals<Folded>& residuals) {
+  std::uint64_t sum = 0;
+  for (std::size_t i = 0; i < residuals.count; ++i) sum += residuals.folded.data()[i];
+  std::size_t count = residuals.count;
+  for (const std::uint8_t is_void : residuals.is_void) count -= is_void;
+  const std::uint64_t mean = count == 0 ? 0 : sum / count;
+  unsigned shift = 0;
+  while ((mean >> shift) > kMagnitudeLimit / 10) ++shift;
+  return static_cast<std::uint8_t>(shift);
+}
+
+template <typename Folded>
+Streams make_streams(const Residuals<Folded>& residuals, const CodingEffort& effort, PayloadHeader& header) {
+  const std::size_t count = residuals.count;
+  Streams streams;
+  streams.single = std::make_unique_for_overwrite<std::uint8_t[]>(count);
+  std::uint8_t* const symbols = streams.single.get();
+  find_symbols(residuals.folded.data(), count, symbols);
+  const std::span<const std::uint16_t> activities(residuals.activities.data(), count);
+  const std::vector<std::uint32_t> histogram = count_activities(activities);
+  header.thresholds = choose_thresholds({symbols, count}, activities, histogram, effort.context_thinning);
+  Scratch<Folded> sorted(count);
+  header.symbol_counts = sort_by_context(residuals, header.thresholds, histogram, sorted.data());
+  find_symbols(sorted.data(), count, symbols);
+  streams.extra = pack_extra_bits(sorted.data(), count);
+  auto from = std::as_bytes(std::span<const std::uint8_t>(symbols, count));
+  streams.paired.reserve(header.symbol_counts.size());
+  for (std::size_t i = 0; i < header.symbol_counts.size(); ++i) {
+    streams.symbols.push_back(from.first(header.symbol_counts[i]));
+    from = from.subspan(header.symbol_counts[i]);
+    if (!effort.has_pairs || !pairs_pay(streams.symbols.back())) continue;
+    std::vector<std::byte> pairs = pair_symbols(streams.symbols.back());
+    if (pairs.size() > streams.symbols.back().size()) continue;  // max_payload_bytes holds for either
+    streams.paired.push_back(std::move(pairs));
+    streams.symbols.back() = streams.paired.back();
+    header.paired = static_cast<std::uint16_t>(header.paired | 1U << i);
+  }
+  return streams;
+}
+
+template std::vector<std::uint32_t> sort_by_context(const Residuals<std::uint16_t>& residuals,
+                                                    std::span<const std::uint16_t> thresholds,
+                                                    std::span<const std::uint32_t> histogram, std::uint16_t* sorted);
+template std::vector<std::uint32_t> sort_by_context(const Residuals<std::uint32_t>& residuals,
+                                                    std::span<const std::uint16_t> thresholds,
+                                                    std::span<const std::uint32_t> histogram, std::uint32_t* sorted);
+template std::uint8_t choose_activity_shift(const Residuals<std::uint16_t>& residuals);
+template std::uint8_t choose_activity_shift(const Residuals<std::uint32_t>& residuals);
+template Streams make_streams(const Residuals<std::uint16_t>& residuals, const CodingEffort& effort,
+                              PayloadHeader& header);
+template Streams make_streams(const Residuals<std::uint32_t>& residuals, const CodingEffort& effort,
+                              PayloadHeader& header);
+
+}  // namespace isohf

@@ -1,0 +1,64 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "isohf/archive/codec/coding_effort.h"
+#include "isohf/archive/codec/tile_payload.h"
+#include "isohf/base/scratch.h"
+
+/// A tile's residuals, from the order in which they are coded to the streams in which they are stored.
+
+namespace isohf {
+
+/// Folded: 16 bits for codes, 32 for floats.
+template <typename Folded>
+struct Residuals {
+  Scratch<Folded> folded;  ///< in coding order
+  Scratch<std::uint16_t> activities;
+  std::vector<std::uint8_t> is_void;  ///< empty where no sample is void
+  std::size_t count = 0;
+
+  Residuals(std::size_t samples, bool has_voids)
+      : folded(samples), activities(samples), is_void(has_voids ? samples : 0), count(samples) {}
+
+  void drop_voids() {
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+      folded.data()[kept] = folded.data()[i];
+      activities.data()[kept] = activities.data()[i];
+      kept += is_void[i] == 0 ? 1 : 0;
+    }
+    count = kept;
+  }
+};
+
+/// The streams as they are stored: symbols by context, paired where that pays, and the extra bits.
+struct Streams {
+  std::vector<std::span<const std::byte>> symbols;  ///< of `single` or `paired`
+  std::unique_ptr<std::uint8_t[]> single;
+  std::vector<std::vector<std::byte>> paired;
+  std::vector<std::byte> extra;
+};
+
+/// The shift that brings residuals to a mean below 2^4.
+template <typename Folded>
+[[nodiscard]] std::uint8_t choose_activity_shift(const Residuals<Folded>& residuals);
+
+/// Puts the residuals context by context into `sorted`, each context's in order, and returns how many there are of
+/// each; `histogram` is count_activities of them. The last half is sorted from its end, beside the first: one alone
+/// would wait for its own pointers.
+template <typename Folded>
+[[nodiscard]] std::vector<std::uint32_t> sort_by_context(const Residuals<Folded>& residuals,
+                                                         std::span<const std::uint16_t> thresholds,
+                                                         std::span<const std::uint32_t> histogram, Folded* sorted);
+
+/// Cuts the residuals into contexts, as many as pay; completes the header's thresholds, counts and pairs.
+template <typename Folded>
+[[nodiscard]] Streams make_streams(const Residuals<Folded>& residuals, const CodingEffort& effort,
+                                   PayloadHeader& header);
+
+}  // namespace isohf

@@ -1,0 +1,292 @@
+#include "isohf/archive/codec/simd/lane_floats.h"
+
+#include <algorithm>
+
+#include "isohf/archive/codec/predict/sample_lattice.h"
+#include "isohf/archive/codec/residuals/residual_symbols.h"
+#include "isohf/base/unaligned.h"
+#include "isohf/base/vectorised.h"
+#if defined(ISOHF_HAS_WIDE)
+#include <immintrin.h>
+#endif
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC diagnostic ignored "-Wpsabi"  // kernels are inlined: their vectors cross no boundary
+#endif
+
+namespace isohf {
+namespace {
+
+constexpr std::size_t kLanes = kDecoderLanes;
+constexpr std::ptrdiff_t kStep = LaneRing::kStep;
+
+using Ints = std::int32_t __attribute__((vector_size(4 * kLanes)));
+using Words = std::uint32_t __attribute__((vector_size(4 * kLanes)));
+
+/// Where the sample of each weight stands from the predicted one (Neighbours::of_weight), NE's last.
+struct Term {
+  LaneRow row;
+  int place;
+};
+constexpr std::size_t kWest = 0;
+constexpr std::size_t kFarWest = 2;
+constexpr std::array<Term, kWeightCount + 1> kTerms = {{
+    {LaneRow::kOwn, -1},    {LaneRow::kNorth, -1},   {LaneRow::kOwn, -2},    {LaneRow::kNorth, 1},
+    {LaneRow::kNorth, -2},  {LaneRow::kFar, 0},      {LaneRow::kFar, 1},     {LaneRow::kFar, -1},
+    {LaneRow::kFar, 2},     {LaneRow::kFar, -2},     {LaneRow::kFarther, 0}, {LaneRow::kFarther, -1},
+    {LaneRow::kFarther, 1}, {LaneRow::kFarther, -2}, {LaneRow::kNorth, 2},   {LaneRow::kNorth, -3},
+    {LaneRow::kFar, 3},     {LaneRow::kFar, -3},     {LaneRow::kNorth, 0},
+}};
+
+using Rows = LaneRows<std::uint32_t>;
+
+/// Sums are those of samples and weights and half a sample, 2^11: bits from the twelfth on are the prediction, and the
+/// eleventh is set where it was not rounded up. At (low << 12) + 2^11 they reach the range, at (high << 12) + 2^11 they
+/// leave it.
+constexpr std::int64_t kHalf = std::int64_t{1} << (kWeightBits - 1);
+
+constexpr bool is_summed_above(std::size_t term, bool is_near) {
+  return term != kWest && term != kFarWest && !(is_near && term >= kNearWeightCount && term < kWeightCount);
+}
+
+/// A place lane by lane: what the other kernel does for all at once.
+template <bool kIsNear, bool kWithVoids>
+[[gnu::always_inline]] inline void restore_place_plainly(const Rows& rows, const FloatStretch& weights, int place,
+                                                         LaneRange& range) {
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    const std::ptrdiff_t at = place * kStep + static_cast<std::ptrdiff_t>(lane);
+    std::int32_t& own = rows.own[at];
+    if (kWithVoids && rows.is_void[at] != 0) {
+      own = static_cast<std::int32_t>((std::int64_t{rows.own[at - kStep]} + rows.north[at]) >> 1);
+    } else {
+      std::int64_t sum = kHalf + std::int64_t{weights[kWest].all[lane]} * rows.own[at - kStep] +
+                         std::int64_t{weights[kFarWest].all[lane]} * rows.own[at - 2 * kStep];
+      for (std::size_t term = 0; term < kTerms.size(); ++term) {
+        if (!is_summed_above(term, kIsNear)) continue;
+        sum += std::int64_t{weights[term].all[lane]} * rows.above(kTerms[term].row)[at + kTerms[term].place * kStep];
+      }
+      const std::uint32_t residual = unzigzag(rows.folded[at]);
+      const std::int64_t low = range.low[lane];
+      const std::int64_t high = range.high[lane];
+      auto restored = static_cast<std::uint32_t>(sum >> kWeightBits);
+      restored = (sum & kHalf) != 0 ? restored - residual : restored + residual;
+      if (sum < low * (2 * kHalf) + kHalf) restored = static_cast<std::uint32_t>(low) - residual;
+      if (sum >= high * (2 * kHalf) + kHalf) restored = static_cast<std::uint32_t>(high) + residual;
+      own = static_cast<std::int32_t>(restored);
+    }
+    range.least_seen[lane] = std::min(range.least_seen[lane], own);
+    range.most_seen[lane] = std::max(range.most_seen[lane], own);
+  }
+}
+
+#if defined(ISOHF_HAS_WIDE)
+using Longs = std::int64_t __attribute__((vector_size(4 * kLanes)));
+using LongWords = std::uint64_t __attribute__((vector_size(4 * kLanes)));
+
+/// Even lanes are worked on as they stand, in the low halves of 64 bits; odd ones are brought there.
+[[gnu::always_inline]] inline Ints odd_lanes(Ints values) {
+  return __builtin_shufflevector(values, values, 1, 1, 3, 3, 5, 5, 7, 7);
+}
+template <bool kIsWide>  // for the target of the function that it is inlined into
+[[gnu::always_inline]] inline Longs multiply(Ints samples, const PerLane<std::int32_t>& weights) {
+  return (Longs)__builtin_ia32_pmuldq256(samples, unaligned<Ints>(weights.data()).value);
+}
+/// One of two, by the signs of 64 bits.
+template <bool kIsWide>
+[[gnu::always_inline]] inline Longs choose_by_sign(Longs signs, Longs where_set, Longs otherwise) {
+  using Doubles = double __attribute__((vector_size(4 * kLanes)));
+  return (Longs)__builtin_ia32_blendvpd256((Doubles)otherwise, (Doubles)where_set, (Doubles)signs);
+}
+
+/// What becomes of half of the lanes' sums: samples, in the low halves. All that can be is made ready before the sum is
+/// known, which each place waits for.
+struct Outcomes {
+  Longs residual;
+  Longs minus_residual;
+  Longs below;  ///< the sample where the sum lies below the range, and above
+  Longs above;
+};
+template <bool kIsWide>
+[[gnu::always_inline]] inline Longs restore_half(Longs sum, Longs least, Longs most, const Outcomes& outcomes) {
+  const Longs step = choose_by_sign<kIsWide>((Longs)((LongWords)sum << (64 - kWeightBits)), outcomes.minus_residual,
+                                             outcomes.residual);
+  const Longs inside = (Longs)((LongWords)sum >> kWeightBits) + step;
+  const Longs lowered = choose_by_sign<kIsWide>(sum - most, inside, outcomes.above);
+  return choose_by_sign<kIsWide>(sum - least, outcomes.below, lowered);
+}
+
+template <bool kIsWide, bool kIsNear, bool kWithVoids>
+[[gnu::always_inline]] inline void restore_places_widely(const Rows& rows, const FloatStretch& weights, int begin,
+                                                         int end, LaneRange& range) {
+  using Bytes = std::int8_t __attribute__((vector_size(kLanes)));
+  const auto bound_of = [](Ints value) { return (Longs)((LongWords)value << 32U) >> (32 - kWeightBits); };
+  const Ints low = unaligned<Ints>(range.low.data()).value;
+  const Ints high = unaligned<Ints>(range.high.data()).value;
+  const Longs even_least = bound_of(low) + kHalf;
+  const Longs odd_least = bound_of(odd_lanes(low)) + kHalf;
+  const Longs even_most = bound_of(high) + kHalf;
+  const Longs odd_most = bound_of(odd_lanes(high)) + kHalf;
+  Ints least_seen = unaligned<Ints>(range.least_seen.data()).value;
+  Ints most_seen = unaligned<Ints>(range.most_seen.data()).value;
+  Ints even_west = unaligned<Ints>(rows.own + (begin - 1) * kStep).value;
+  Ints odd_west = odd_lanes(even_west);
+  Ints even_far_west = unaligned<Ints>(rows.own + (begin - 2) * kStep).value;
+  Ints odd_far_west = odd_lanes(even_far_west);
+  for (int place = begin; place < end; ++place) {
+    const std::ptrdiff_t at = place * kStep;
+    Longs even = multiply<kIsWide>(even_far_west, weights[kFarWest].all) + kHalf;
+    Longs odd = multiply<kIsWide>(odd_far_west, weights[kFarWest].of_odd) + kHalf;
+#pragma GCC unroll 19
+    for (std::size_t term = 0; term < kTerms.size(); ++term) {
+      if (!is_summed_above(term, kIsNear)) continue;
+      const Ints samples = unaligned<Ints>(rows.above(kTerms[term].row) + at + kTerms[term].place * kStep).value;
+      even += multiply<kIsWide>(samples, weights[term].all);
+      odd += multiply<kIsWide>(odd_lanes(samples), weights[term].of_odd);
+    }
+    const Words folded = unaligned<Words>(rows.folded + at).value;
+    const Ints residual = (Ints)((folded >> 1U) ^ -(folded & 1U));
+    const Ints below = low - residual;
+    const Ints above = high + residual;
+    const Outcomes of_even = {(Longs)residual, (Longs)-residual, (Longs)below, (Longs)above};
+    const Outcomes of_odd = {(Longs)odd_lanes(residual), (Longs)odd_lanes(-residual), (Longs)odd_lanes(below),
+                             (Longs)odd_lanes(above)};
+    even += multiply<kIsWide>(even_west, weights[kWest].all);
+    odd += multiply<kIsWide>(odd_west, weights[kWest].of_odd);
+    const Longs even_own = restore_half<kIsWide>(even, even_least, even_most, of_even);
+    const Longs odd_own = restore_half<kIsWide>(odd, odd_least, odd_most, of_odd);
+    Ints own = __builtin_shufflevector((Ints)even_own, (Ints)((LongWords)odd_own << 32U), 0, 9, 2, 11, 4, 13, 6, 15);
+    even_far_west = even_west;
+    odd_far_west = odd_west;
+    even_west = (Ints)even_own;
+    odd_west = (Ints)odd_own;
+    if constexpr (kWithVoids) {
+      const Ints west = unaligned<Ints>(rows.own + at - kStep).value;
+      const Ints north = unaligned<Ints>(rows.north + at).value;
+      const Ints is_void = __builtin_convertvector(unaligned<Bytes>(rows.is_void + at).value, Ints);
+      own = is_void != 0 ? (west & north) + ((west ^ north) >> 1) : own;  // the mean, without a carry
+      even_west = own;
+      odd_west = odd_lanes(own);
+    }
+    least_seen = own < least_seen ? own : least_seen;
+    most_seen = own > most_seen ? own : most_seen;
+    unaligned<Ints>(rows.own + at).value = own;
+  }
+  unaligned<Ints>(range.least_seen.data()).value = least_seen;
+  unaligned<Ints>(range.most_seen.data()).value = most_seen;
+}
+#endif
+
+template <bool kIsWide, bool kIsNear, bool kWithVoids>
+[[gnu::always_inline]] inline void restore_places(const Rows& rows, const FloatStretch& weights, int begin, int end,
+                                                  LaneRange& range) {
+#if defined(ISOHF_HAS_WIDE)
+  if constexpr (kIsWide) return restore_places_widely<kIsWide, kIsNear, kWithVoids>(rows, weights, begin, end, range);
+#endif
+  for (int place = begin; place < end; ++place) {
+    restore_place_plainly<kIsNear, kWithVoids>(rows, weights, place, range);
+  }
+}
+
+ISOHF_TWO_WAYS(void, restore_near,
+               (const Rows& rows, const FloatStretch& weights, int begin, int end, LaneRange& range),
+               (rows, weights, begin, end, range)) {
+  restore_places<kIsWide, true, false>(rows, weights, begin, end, range);
+}
+ISOHF_TWO_WAYS(void, restore_widely,
+               (const Rows& rows, const FloatStretch& weights, int begin, int end, LaneRange& range),
+               (rows, weights, begin, end, range)) {
+  restore_places<kIsWide, false, false>(rows, weights, begin, end, range);
+}
+ISOHF_TWO_WAYS(void, restore_with_voids,
+               (const Rows& rows, const FloatStretch& weights, int begin, int end, LaneRange& range),
+               (rows, weights, begin, end, range)) {
+  restore_places<kIsWide, false, true>(rows, weights, begin, end, range);
+}
+
+/// The floats of eight places from `first` on, lane by lane: a transposed square.
+ISOHF_VECTORISED(void, turn_square,
+                 (const std::int32_t* samples, const PerLane<std::int32_t>& dropped, const PerLane<float*>& heights,
+                  int first),
+                 (samples, dropped, heights, first)) {
+  using Pairs = std::uint64_t __attribute__((vector_size(4 * kLanes)));
+  const Words shift = unaligned<Words>(dropped.data()).value;
+  Words floats[kLanes];
+  for (std::size_t i = 0; i < kLanes; ++i) {  // float_from_ordered
+    const Ints ordered = unaligned<Ints>(samples + i * kLanes).value;
+    floats[i] = ((Words)(ordered ^ (ordered >> 31)) << shift) | ((Words)ordered & 0x80000000U);
+  }
+  Pairs pairs[kLanes];  // of places, the first two lanes of each half and then the last two
+  for (std::size_t i = 0; i < kLanes; i += 2) {
+    pairs[i] = (Pairs)__builtin_shufflevector(floats[i], floats[i + 1], 0, 8, 1, 9, 4, 12, 5, 13);
+    pairs[i + 1] = (Pairs)__builtin_shufflevector(floats[i], floats[i + 1], 2, 10, 3, 11, 6, 14, 7, 15);
+  }
+  for (std::size_t i = 0; i < 2; ++i) {
+    const Pairs west[2] = {__builtin_shufflevector(pairs[i], pairs[i + 2], 0, 4, 2, 6),
+                           __builtin_shufflevector(pairs[i], pairs[i + 2], 1, 5, 3, 7)};
+    const Pairs east[2] = {__builtin_shufflevector(pairs[i + 4], pairs[i + 6], 0, 4, 2, 6),
+                           __builtin_shufflevector(pairs[i + 4], pairs[i + 6], 1, 5, 3, 7)};
+    for (std::size_t k = 0; k < 2; ++k) {
+      const std::size_t lane = 2 * i + k;
+      unaligned<Pairs>(heights[lane] + first).value = __builtin_shufflevector(west[k], east[k], 0, 1, 4, 5);
+      unaligned<Pairs>(heights[lane + 4] + first).value = __builtin_shufflevector(west[k], east[k], 2, 3, 6, 7);
+    }
+  }
+}
+
+/// A sample of all lanes, in each of `count` places.
+void repeat_sample(const std::int32_t* from, std::int32_t* out, int count) {
+  PerLane<std::int32_t> sample{};
+  std::copy_n(from, kLanes, sample.begin());
+  for (int i = 0; i < count; ++i) std::copy(sample.begin(), sample.end(), out + i * kStep);
+}
+
+}  // namespace
+
+LaneFloats::LaneFloats(const TileShape& shape) : columns_(shape.columns()), ring_(columns_), stretches_(columns_) {}
+
+void LaneFloats::open(const PayloadHeader& header) {
+  const std::size_t lane = stretches_.lanes();
+  stretches_.open(header);
+  ring_.fill(lane, header.base);
+  range_.low[lane] = header.low;
+  range_.high[lane] = header.high;
+  dropped_[lane] = header.dropped_bits;
+}
+
+void LaneFloats::restore_row(int r, const LaneResiduals<std::uint32_t>& residuals) {
+  const int first = Lattice<std::int64_t>::first(r);
+  const int last = r % 2 == 0 ? columns_ - 2 : columns_ - 1;
+  const Rows rows = ring_.around(r, residuals);
+  repeat_sample(rows.north + first * kStep, rows.own + (first - 2) * kStep, 2);
+  stretches_.take_row(r, [](FloatStretch& weights, std::size_t lane, const PredictorWeights& of_lane, int anchor) {
+    for (std::size_t term = 0; term < kTerms.size(); ++term) {
+      weights[term].all[lane] = term < kWeightCount ? of_lane[term] : anchor;
+      if (lane % 2 != 0) weights[term].of_odd[lane - 1] = weights[term].all[lane];
+    }
+  });
+  range_.least_seen = range_.low;
+  range_.most_seen = range_.high;
+  stretches_.for_each(first, last, [&](const FloatStretch& weights, int begin, int end) {
+    if (residuals.has_voids()) {
+      restore_with_voids(rows, weights, begin, end, range_);
+    } else if (stretches_.is_wide()) {
+      restore_widely(rows, weights, begin, end, range_);
+    } else {
+      restore_near(rows, weights, begin, end, range_);
+    }
+  });
+  repeat_sample(rows.own + first * kStep, rows.own - kLaneMargin * kStep, first + kLaneMargin);
+  repeat_sample(rows.own + last * kStep, rows.own + (last + 1) * kStep, columns_ + kLaneMargin - last - 1);
+}
+
+void LaneFloats::write_row(int r, const PerLane<float*>& heights) const {
+  const auto step = static_cast<int>(kLanes);
+  const int last = r % 2 == 0 ? columns_ - 2 : columns_ - 1;
+  int place = Lattice<std::int64_t>::first(r);
+  for (; place + step <= last + 1; place += step) turn_square(ring_.row(r) + place * kStep, dropped_, heights, place);
+  for (; place <= last; ++place) {
+    for (std::size_t lane = 0; lane < stretches_.lanes(); ++lane)
+      heights[lane][place] = stored(sample(r, place, lane), lane);
+  }
+}
+
+}  // namespace isohf

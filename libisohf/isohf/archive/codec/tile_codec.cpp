@@ -1,0 +1,334 @@
+#include "isohf/archive/codec/tile_codec.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+
+#include "isohf/archive/codec/coding_effort.h"
+#include "isohf/archive/codec/ordered_float.h"
+#include "isohf/archive/codec/predict/activities.h"
+#include "isohf/archive/codec/predict/hex_predictor.h"
+#include "isohf/archive/codec/predict/predictor_fit.h"
+#include "isohf/archive/codec/predict/residual_fold.h"
+#include "isohf/archive/codec/residuals/residual_streams.h"
+#include "isohf/archive/codec/residuals/residual_symbols.h"
+#include "isohf/archive/codec/tile_payload.h"
+#include "isohf/archive/codec/void_mask.h"
+#include "isohf/archive/container/content_hash.h"
+#include "isohf/archive/deflate/deflate.h"
+#include "isohf/archive/deflate/deflate_writer.h"
+#include "isohf/base/assert.h"
+#include "isohf/base/scratch.h"
+#include "isohf/base/vectorised.h"
+
+namespace isohf {
+namespace {
+
+/// The void mask, as 0 and 1; empty where nothing is void.
+struct Voids {
+  std::vector<std::uint8_t> is_void;
+  std::int64_t count = 0;
+};
+
+template <typename Sample, typename IsVoid>
+Voids find_voids(std::span<const Sample> samples, std::int64_t count, const IsVoid& is_void) {
+  Voids voids;
+  voids.count = count;
+  if (voids.count == 0) return voids;
+  voids.is_void.resize(samples.size());
+  std::transform(samples.begin(), samples.end(), voids.is_void.begin(),
+                 [&](Sample sample) { return static_cast<std::uint8_t>(is_void(sample) ? 1 : 0); });
+  return voids;
+}
+
+/// Puts the samples of a tile into lattice order, voids filled. `sample_at(i)` is the sample with storage index i.
+template <typename Wide, typename SampleAt>
+void load(Lattice<Wide>& lattice, const Voids& voids, Wide base, const SampleAt& sample_at) {
+  const int columns = lattice.columns();
+  lattice.fill_rows_above(base);
+  for (int r = 0; r < lattice.rows(); ++r) {
+    Wide* const own = lattice.row(r);
+    const auto row_start = static_cast<std::size_t>(r) * static_cast<std::size_t>(columns);
+    const auto index = [&](int column) { return row_start + static_cast<std::size_t>(column); };
+    const int first = Lattice<Wide>::first(r);
+    const int last = lattice.last(r);
+    for (int place = first; place <= last; ++place) own[place] = sample_at(index(place));
+    if (r % 2 == 0) {
+      own[first] = sample_at(index(0));
+      own[last] = sample_at(index(columns - 1));
+      for (int side = 0; side < 2; ++side) lattice.slid(r, side) = sample_at(index(column_of_slid(columns, side)));
+    }
+    if (!voids.is_void.empty()) {
+      lattice.open_row(r);
+      const Wide* const north = lattice.row(r - 1) + r % 2;
+      for (int place = first; place <= last; ++place) {
+        if (voids.is_void[index(column_of_place(columns, r, place))] != 0) own[place] = void_fill(own, north, place);
+      }
+    }
+    lattice.close_row(r);
+  }
+}
+
+std::uint16_t fold(std::int32_t difference) {
+  return static_cast<std::uint16_t>(zigzag(static_cast<std::int16_t>(difference)));
+}
+std::uint32_t fold(std::int64_t difference) {
+  return zigzag(static_cast<std::int32_t>(difference));
+}
+
+ISOHF_VECTORISED(void, find_code_magnitudes,
+                 (const std::uint16_t* folded, int count, unsigned shift, std::uint8_t* __restrict out),
+                 (folded, count, shift, out)) {
+  for (int i = 0; i < count; ++i) out[i] = magnitude(folded[i], shift);
+}
+ISOHF_VECTORISED(void, find_float_magnitudes,
+                 (const std::uint32_t* folded, int count, unsigned shift, std::uint8_t* __restrict out),
+                 (folded, count, shift, out)) {
+  for (int i = 0; i < count; ++i) out[i] = magnitude(folded[i], shift);
+}
+void find_magnitudes(const std::uint16_t* folded, int count, unsigned shift, std::uint8_t* out) {
+  find_code_magnitudes(folded, count, shift, out);
+}
+void find_magnitudes(const std::uint32_t* folded, int count, unsigned shift, std::uint8_t* out) {
+  find_float_magnitudes(folded, count, shift, out);
+}
+
+/// The columns of a tile's samples in coding order, row by row; a row has as many samples as columns.
+template <typename Use>
+void for_coding_order(int columns, int r, const Use& use) {
+  const int first = r % 2 == 0 ? 1 : 0;
+  const int last = r % 2 == 0 ? columns - 2 : columns - 1;
+  std::size_t i = 0;
+  for (int place = first; place <= last; ++place) use(i++, column_of_place(columns, r, place));
+  for (int side = 0; r % 2 == 0 && side < 2; ++side) use(i++, column_of_slid(columns, side));
+}
+
+/// Folded residuals of all samples in coding order; 0 where void. `is_void` comes in coding order as well.
+template <typename Wide, typename Folded>
+void find_residuals(Lattice<Wide>& lattice, const Voids& voids, const PayloadHeader& header, Residuals<Folded>& out) {
+  const int columns = lattice.columns();
+  std::vector<Wide> halves(static_cast<std::size_t>(columns));
+  for (int r = 0; r < lattice.rows(); ++r) {
+    const int first = Lattice<Wide>::first(r);
+    const int count = lattice.last(r) + 1 - first;
+    const auto row_start = static_cast<std::size_t>(r) * static_cast<std::size_t>(columns);
+    Folded* const folded = out.folded.data() + row_start;
+    lattice.open_row(r);
+    predict_row<Wide>(lattice, r, header.predictors, header.low, header.high, halves);
+    fold_row(lattice.row(r) + first, halves.data() + first, count, folded);
+    for (int side = 0; r % 2 == 0 && side < 2; ++side) {
+      folded[count + side] = fold(lattice.slid_prediction(r, side) - lattice.slid(r, side));
+    }
+    lattice.close_row(r);
+    if (voids.is_void.empty()) continue;
+    for_coding_order(columns, r, [&](std::size_t i, int column) {
+      const bool is_void = voids.is_void[row_start + static_cast<std::size_t>(column)] != 0;
+      out.is_void[row_start + i] = is_void ? 1 : 0;
+      if (is_void) folded[i] = 0;
+    });
+  }
+}
+
+/// Activities in coding order, by the magnitudes that `shift` makes of the residuals.
+template <typename Folded>
+void find_all_activities(int columns, int rows, unsigned shift, Residuals<Folded>& residuals) {
+  MagnitudeRows magnitudes(columns);
+  std::vector<std::uint16_t> activities(static_cast<std::size_t>(columns));
+  for (int r = 0; r < rows; ++r) {
+    const int first = r % 2 == 0 ? 1 : 0;
+    const int last = r % 2 == 0 ? columns - 2 : columns - 1;
+    const auto row_start = static_cast<std::size_t>(r) * static_cast<std::size_t>(columns);
+    std::uint16_t* const out = residuals.activities.data() + row_start;
+    find_activities(magnitudes.above() + r % 2, magnitudes.far_above(), first, last, out - first);
+    std::uint8_t* const current = magnitudes.current();
+    find_magnitudes(residuals.folded.data() + row_start, last + 1 - first, shift, current + first);
+    if (r % 2 == 0) {
+      out[columns - 2] = activity_of_slid(current[1], current[2]);
+      out[columns - 1] = activity_of_slid(current[columns - 3], current[columns - 2]);
+    }
+    magnitudes.close_row(first, last);
+  }
+}
+
+/// Completes payload and Deflate stream; a block for each part.
+void assemble(PayloadHeader& header, std::span<const std::byte> mask, const Streams& streams, EncodedTile& tile) {
+  header.mask_bytes = static_cast<std::uint32_t>(mask.size());
+  header.extra_bytes = static_cast<std::uint32_t>(streams.extra.size());
+  std::vector<std::byte> bytes;
+  write_payload_header(header, bytes);
+  DeflateWriter writer(tile.deflated);
+  const auto add = [&](std::span<const std::byte> part) {
+    writer.add(part);
+    tile.payload_crc32 = crc32(part, tile.payload_crc32);
+    tile.payload_bytes += static_cast<std::uint32_t>(part.size());
+  };
+  add(bytes);
+  add(mask);
+  add(std::as_bytes(std::span(header.predictors.map)));
+  for (const auto& symbols : streams.symbols) add(symbols);
+  add(streams.extra);
+  writer.finish();
+}
+
+template <typename Wide, typename Folded, typename SampleAt>
+void encode_samples(const TileShape& shape, PayloadHeader header, const Voids& voids, const SampleAt& sample_at,
+                    const CodingEffort& effort, EncodedTile& tile) {
+  std::vector<std::byte> mask;
+  if (!voids.is_void.empty()) mask = pack_void_mask(voids.is_void);
+  header.has_voids = !mask.empty();
+  header.is_constant = header.low == header.high;
+  Streams streams;
+  if (!header.is_constant) {
+    Lattice<Wide> lattice(shape);
+    load<Wide>(lattice, voids, header.base, sample_at);
+    header.predictors = fit_predictors<Wide>(lattice, header.low, header.high, effort.fit);
+    Residuals<Folded> residuals(static_cast<std::size_t>(shape.stored_vertex_count()), !voids.is_void.empty());
+    find_residuals<Wide, Folded>(lattice, voids, header, residuals);
+    header.activity_shift = choose_activity_shift(residuals);
+    find_all_activities(shape.columns(), shape.rows(), header.activity_shift, residuals);
+    if (header.has_voids) residuals.drop_voids();
+    streams = make_streams(residuals, effort, header);
+  }
+  assemble(header, mask, streams, tile);
+}
+
+/// Smallest and largest code, and how many are void; `low` is the void code where all are.
+struct CodeRange {
+  std::int32_t low = 0xffff;
+  std::int32_t high = 0;
+  std::int32_t voids = 0;
+};
+
+ISOHF_VECTORISED(CodeRange, range_of_codes, (const std::uint16_t* codes, std::size_t count, std::int32_t void_code),
+                 (codes, count, void_code)) {
+  std::int32_t low = 0xffff;
+  std::int32_t high = 0;
+  std::int32_t voids = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::int32_t code = codes[i];
+    const std::int32_t valid = code == void_code ? 0 : code;
+    low = code < low ? code : low;
+    high = valid > high ? valid : high;
+    voids += code == void_code ? 1 : 0;
+  }
+  return {low, high, voids};
+}
+
+EncodedTile encode_codes(const TileShape& shape, const TileCodes& tile, const CodingEffort& effort) {
+  const std::span<const std::uint16_t> codes = tile.codes;
+  const Quantisation quantisation{tile.type, 0.0, 1.0};
+  const auto void_code = static_cast<std::uint16_t>(quantisation.void_code());
+  EncodedTile encoded;
+  encoded.content_digest = tile_content_digest(tile);
+  const auto is_void = [&](std::uint16_t code) { return code == void_code; };
+  const CodeRange range = range_of_codes(codes.data(), codes.size(), void_code);
+  const Voids voids = find_voids(codes, range.voids, is_void);
+  encoded.has_voids = voids.count != 0;
+  encoded.is_empty = voids.count == shape.stored_vertex_count();
+  if (encoded.is_empty) return encoded;
+
+  PayloadHeader header;
+  header.type = tile.type;
+  header.base = *std::find_if_not(codes.begin(), codes.end(), is_void);
+  header.low = range.low;
+  header.high = range.high;
+  ISOHF_ASSERT(header.high <= static_cast<std::int32_t>(quantisation.max_code()));
+  encoded.code_min = static_cast<std::uint32_t>(header.low);
+  encoded.code_max = static_cast<std::uint32_t>(header.high);
+  encode_samples<std::int32_t, std::uint16_t>(
+      shape, header, voids, [&](std::size_t i) { return std::int32_t{codes[i]}; }, effort, encoded);
+  return encoded;
+}
+
+/// How many floats are void, and the bits, but their signs, that any other has.
+struct FloatBits {
+  std::int32_t used = 0;
+  std::int32_t voids = 0;
+};
+ISOHF_VECTORISED(FloatBits, bits_of_floats, (const float* heights, std::size_t count), (heights, count)) {
+  std::int32_t used = 0;
+  std::int32_t voids = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::int32_t magnitude = std::bit_cast<std::int32_t>(heights[i]) & 0x7fffffff;
+    const bool is_void = magnitude > 0x7f800000;
+    used |= is_void ? 0 : magnitude;
+    voids += is_void ? 1 : 0;
+  }
+  return {used, voids};
+}
+
+/// ordered_from_float of all, and the least and the most of those that are no voids.
+ISOHF_VECTORISED(CodeRange, order_floats,
+                 (const float* heights, std::size_t count, unsigned dropped, std::int32_t* __restrict ordered),
+                 (heights, count, dropped, ordered)) {
+  std::int32_t low = std::numeric_limits<std::int32_t>::max();
+  std::int32_t high = std::numeric_limits<std::int32_t>::min();
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::int32_t bits = std::bit_cast<std::int32_t>(heights[i]);
+    const std::int32_t magnitude = bits & 0x7fffffff;
+    const bool is_void = magnitude > 0x7f800000;
+    const std::int32_t value = (magnitude >> dropped) ^ (bits >> 31);
+    ordered[i] = value;
+    const std::int32_t least = is_void ? low : value;
+    const std::int32_t most = is_void ? high : value;
+    low = least < low ? least : low;
+    high = most > high ? most : high;
+  }
+  return {low, high, 0};
+}
+
+EncodedTile encode_floats(const TileShape& shape, const TileCodes& tile, const CodingEffort& effort) {
+  const std::span<const float> heights = tile.heights;
+  const FloatBits bits = bits_of_floats(heights.data(), heights.size());
+  EncodedTile encoded;
+  encoded.content_digest = tile_content_digest(tile);
+  const auto is_void = [](float height) { return std::isnan(height); };
+  const Voids voids = find_voids(heights, bits.voids, is_void);
+  encoded.has_voids = voids.count != 0;
+  encoded.is_empty = voids.count == shape.stored_vertex_count();
+  if (encoded.is_empty) return encoded;
+
+  PayloadHeader header;
+  header.type = CodeType::kF32;
+  header.dropped_bits =
+      bits.used == 0 ? 0 : static_cast<std::uint8_t>(std::countr_zero(static_cast<std::uint32_t>(bits.used)));
+  Scratch<std::int32_t> ordered(heights.size());
+  const CodeRange range = order_floats(heights.data(), heights.size(), header.dropped_bits, ordered.data());
+  header.base = ordered_from_float(*std::find_if_not(heights.begin(), heights.end(), is_void), header.dropped_bits);
+  header.low = range.low;
+  header.high = range.high;
+  encoded.code_min = std::bit_cast<std::uint32_t>(float_from_ordered(header.low, header.dropped_bits));
+  encoded.code_max = std::bit_cast<std::uint32_t>(float_from_ordered(header.high, header.dropped_bits));
+  encode_samples<std::int64_t, std::uint32_t>(
+      shape, header, voids, [&](std::size_t i) { return std::int64_t{ordered.data()[i]}; }, effort, encoded);
+  return encoded;
+}
+
+}  // namespace
+
+TileCodes void_tile(const TileShape& shape, const Quantisation& quantisation) {
+  TileCodes tile;
+  tile.type = quantisation.type;
+  const auto samples = static_cast<std::size_t>(shape.stored_vertex_count());
+  if (tile.type == CodeType::kF32) {
+    tile.heights.assign(samples, std::numeric_limits<float>::quiet_NaN());
+  } else {
+    tile.codes.assign(samples, static_cast<std::uint16_t>(quantisation.void_code()));
+  }
+  return tile;
+}
+
+EncodedTile encode_tile(const TileShape& shape, const TileCodes& tile, int level) {
+  const auto samples = static_cast<std::size_t>(shape.stored_vertex_count());
+  const bool is_float = tile.type == CodeType::kF32;
+  ISOHF_ASSERT(tile.codes.size() == (is_float ? 0 : samples) && tile.heights.size() == (is_float ? samples : 0));
+  try {
+    const CodingEffort effort = coding_effort(level);
+    return is_float ? encode_floats(shape, tile, effort) : encode_codes(shape, tile, effort);
+  } catch (const std::bad_alloc&) {
+    throw Error(ErrorCode::kOutOfMemory, "no memory to code a tile of " + std::to_string(samples) + " samples");
+  }
+}
+
+}  // namespace isohf

@@ -1,0 +1,203 @@
+#include "isohf/archive/codec/tile_payload.h"
+
+#include <fmt/format.h>
+
+#include <bit>
+#include <cstdlib>
+
+#include "isohf/archive/codec/ordered_float.h"
+#include "isohf/archive/codec/predict/activities.h"
+#include "isohf/archive/codec/residuals/pair_coding.h"
+#include "isohf/error.h"
+
+namespace isohf {
+namespace {
+
+enum : std::uint8_t { kHasVoids = 1, kIsConstant = 2 };
+
+std::uint8_t byte_of(CodeType type) {
+  switch (type) {
+    case CodeType::kU16:
+      return 0;
+    case CodeType::kU8:
+      return 1;
+    case CodeType::kF32:
+      return 2;
+  }
+  return 0;
+}
+
+[[noreturn]] void refuse(const std::string& why) {
+  throw Error(ErrorCode::kCorrupt, "tile header: " + why);
+}
+
+void check_range(const PayloadHeader& header) {
+  std::int64_t least = 0;
+  std::int64_t most = header.type == CodeType::kU8 ? 254 : 65534;
+  if (header.type == CodeType::kF32) {
+    most = ordered_from_float(std::bit_cast<float>(0x7f800000U), header.dropped_bits);  // infinity, both signs
+    least = -most - 1;
+  }
+  if (header.low < least || header.high > most || header.low > header.high) {
+    refuse(fmt::format("its range {}..{} is none within {}..{}", header.low, header.high, least, most));
+  }
+  if (header.is_constant != (header.low == header.high)) refuse("its range contradicts its flag for equal samples");
+}
+
+void check_predictor(const PayloadHeader& header) {
+  if (header.base < header.low || header.base > header.high) {
+    refuse(fmt::format("its base {} lies outside its range {}..{}", header.base, header.low, header.high));
+  }
+  for (const PredictorWeights& weights : header.predictors.weights) {
+    int sum = 0;
+    for (const std::int16_t weight : weights) sum += std::abs(int{weight});
+    if (sum >= kWeightSumLimit) refuse(fmt::format("its weights add up to {}, must be below {}", sum, kWeightSumLimit));
+  }
+  if (header.activity_shift > 31)
+    refuse(fmt::format("its activity shift is {}, must lie in 0..31", header.activity_shift));
+  for (std::size_t i = 0; i < header.thresholds.size(); ++i) {
+    const unsigned before = i == 0 ? 0 : header.thresholds[i - 1];
+    if (header.thresholds[i] <= before || header.thresholds[i] >= kActivityLimit) {
+      refuse(
+          fmt::format("its threshold {} is {}, must ascend within 1..{}", i, header.thresholds[i], kActivityLimit - 1));
+    }
+  }
+}
+
+}  // namespace
+
+std::uint64_t max_payload_bytes(const TileShape& shape, CodeType type) {
+  const auto samples = static_cast<std::uint64_t>(shape.stored_vertex_count());
+  // One symbol each, a byte and a half where pairs are written apart, and its extra bits, at most 12 or 28; a run of
+  // the mask takes a byte for each sample or fewer.
+  const std::uint64_t extra_bits = type == CodeType::kF32 ? 28 : 12;
+  const std::uint64_t header = kPredictedHeaderBytes + 2 * kWeightCount * kMaxPredictors + 6 * kMaxContexts;
+  return header + block_count(shape) + samples + (samples * extra_bits + 7) / 8 + samples + 8;
+}
+
+std::size_t block_count(const TileShape& shape) {
+  return static_cast<std::size_t>(Predictors::blocks_across(shape.columns())) *
+         static_cast<std::size_t>(Predictors::blocks_across(shape.rows()));
+}
+
+void write_payload_header(const PayloadHeader& header, std::vector<std::byte>& out) {
+  ByteWriter writer(out);
+  writer.write(kCodecVersion);
+  writer.write(byte_of(header.type));
+  writer.write(static_cast<std::uint8_t>((header.has_voids ? kHasVoids : 0) | (header.is_constant ? kIsConstant : 0)));
+  writer.write(header.dropped_bits);
+  writer.write(header.low);
+  writer.write(header.high);
+  writer.write(header.mask_bytes);
+  if (header.is_constant) return;
+  writer.write(header.base);
+  writer.write(header.extra_bytes);
+  writer.write(header.activity_shift);
+  writer.write(static_cast<std::uint8_t>(header.symbol_counts.size()));
+  writer.write(header.paired);
+  const std::size_t weight_count = header.predictors.is_wide ? kWeightCount : kNearWeightCount;
+  writer.write(static_cast<std::uint8_t>(header.predictors.weights.size()));
+  writer.write(static_cast<std::uint8_t>(weight_count));
+  for (const PredictorWeights& weights : header.predictors.weights) {
+    for (std::size_t i = 0; i < weight_count; ++i) writer.write(weights[i]);
+  }
+  for (const std::uint16_t threshold : header.thresholds) writer.write(threshold);
+  for (const std::uint32_t count : header.symbol_counts) writer.write(count);
+}
+
+PayloadHeader read_payload_header(const TileShape& shape, CodeType type, ByteReader& reader) {
+  const auto version = reader.read<std::uint8_t>();
+  if (version != kCodecVersion) {
+    if (version == 0) refuse("its codec version is 0");
+    throw Error(ErrorCode::kUnsupported,
+                fmt::format("tile codec version {}; this build reads version {}", version, kCodecVersion));
+  }
+  PayloadHeader header;
+  header.type = type;
+  if (const auto found = reader.read<std::uint8_t>(); found != byte_of(type)) {
+    refuse(fmt::format("its sample type is {}, the archive's is {} ({})", found, byte_of(type), to_string(type)));
+  }
+  const auto flags = reader.read<std::uint8_t>();
+  if ((flags & ~(kHasVoids | kIsConstant)) != 0) refuse(fmt::format("reserved flags are set: {:#04x}", flags));
+  header.has_voids = (flags & kHasVoids) != 0;
+  header.is_constant = (flags & kIsConstant) != 0;
+  header.dropped_bits = reader.read<std::uint8_t>();
+  if (header.dropped_bits > (type == CodeType::kF32 ? 30 : 0)) {
+    refuse(fmt::format("{} low bits are left out, too many for {}", header.dropped_bits, to_string(type)));
+  }
+  header.low = reader.read<std::int32_t>();
+  header.high = reader.read<std::int32_t>();
+  header.mask_bytes = reader.read<std::uint32_t>();
+  check_range(header);
+  if (header.has_voids != (header.mask_bytes != 0)) refuse("its void mask contradicts its flag for voids");
+  const auto samples = static_cast<std::uint64_t>(shape.stored_vertex_count());
+  if (header.mask_bytes > samples + 8) refuse(fmt::format("its void mask of {} bytes is too long", header.mask_bytes));
+  if (header.is_constant) return header;
+
+  header.base = reader.read<std::int32_t>();
+  header.extra_bytes = reader.read<std::uint32_t>();
+  header.activity_shift = reader.read<std::uint8_t>();
+  const std::size_t contexts = reader.read<std::uint8_t>();
+  if (contexts < 1 || contexts > kMaxContexts)
+    refuse(fmt::format("it has {} contexts, must have 1..{}", contexts, kMaxContexts));
+  header.paired = reader.read<std::uint16_t>();
+  if ((std::uint32_t{header.paired} >> contexts) != 0) {
+    refuse(fmt::format("it has pairs in context {}, the last is {}", std::bit_width(header.paired) - 1, contexts - 1));
+  }
+  const std::size_t predictors = reader.read<std::uint8_t>();
+  if (predictors < 1 || predictors > kMaxPredictors) {
+    refuse(fmt::format("it has {} predictors, must have 1..{}", predictors, kMaxPredictors));
+  }
+  const std::size_t weight_count = reader.read<std::uint8_t>();
+  if (weight_count != kNearWeightCount && weight_count != kWeightCount) {
+    refuse(fmt::format("its predictors have {} weights, must have {} or {}", weight_count, kNearWeightCount,
+                       kWeightCount));
+  }
+  header.predictors.is_wide = weight_count == kWeightCount;
+  header.predictors.weights.assign(predictors, {});
+  for (PredictorWeights& weights : header.predictors.weights) {
+    for (std::size_t i = 0; i < weight_count; ++i) weights[i] = reader.read<std::int16_t>();
+  }
+  for (std::size_t i = 1; i < contexts; ++i) header.thresholds.push_back(reader.read<std::uint16_t>());
+  std::uint64_t symbols = 0;
+  for (std::size_t i = 0; i < contexts; ++i) {
+    header.symbol_counts.push_back(reader.read<std::uint32_t>());
+    symbols += header.symbol_counts.back();
+  }
+  check_predictor(header);
+  if (symbols > samples) refuse(fmt::format("it has {} symbols, more than the tile's {} samples", symbols, samples));
+  return header;
+}
+
+void read_block_map(const TileShape& shape, ByteReader& reader, Predictors& predictors) {
+  const std::size_t count = predictors.weights.size();
+  if (count == 1) return;
+  const auto bytes = reader.read_bytes(block_count(shape));
+  predictors.block_columns = Predictors::blocks_across(shape.columns());
+  predictors.map.clear();
+  for (const std::byte byte : bytes) {
+    const auto index = std::to_integer<std::uint8_t>(byte);
+    if (index >= count) refuse(fmt::format("its map names predictor {}, the last is {}", index, count - 1));
+    predictors.map.push_back(index);
+  }
+}
+
+SymbolStreams::SymbolStreams(const PayloadHeader& header, ByteReader& reader) {
+  const auto is_paired = [&](std::size_t context) { return ((header.paired >> context) & 1U) != 0; };
+  std::size_t unpaired = 0;
+  for (std::size_t i = 0; i < header.symbol_counts.size(); ++i) unpaired += is_paired(i) ? header.symbol_counts[i] : 0;
+  unpaired_ = std::make_unique_for_overwrite<std::byte[]>(unpaired);
+  std::byte* to = unpaired_.get();
+  for (std::size_t i = 0; i < header.symbol_counts.size(); ++i) {
+    const std::size_t count = header.symbol_counts[i];
+    if (is_paired(i)) {
+      unpair_symbols(reader, {to, count});
+      streams_[i] = {to, count};
+      to += count;
+    } else {
+      streams_[i] = reader.read_bytes(count);
+    }
+  }
+}
+
+}  // namespace isohf

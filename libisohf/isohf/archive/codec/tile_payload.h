@@ -1,0 +1,70 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "isohf/archive/codec/predict/predictors.h"
+#include "isohf/archive/codec/tile_codes.h"
+#include "isohf/base/bytes.h"
+
+/// What stands in a tile's payload: its header, the map of its predictors, the symbols of its contexts
+/// (docs/archive_format.md, "Tile payload").
+
+namespace isohf {
+
+inline constexpr std::uint8_t kCodecVersion = 1;
+inline constexpr std::size_t kMaxContexts = 16;
+inline constexpr std::size_t kFixedHeaderBytes = 16;      ///< of every payload
+inline constexpr std::size_t kPredictedHeaderBytes = 30;  ///< of one whose samples are not all equal, without weights
+                                                          ///< and contexts
+
+/// The largest payload that a tile of this shape and type can have.
+[[nodiscard]] std::uint64_t max_payload_bytes(const TileShape& shape, CodeType type);
+
+struct PayloadHeader {
+  CodeType type = CodeType::kU16;
+  bool has_voids = false;
+  bool is_constant = false;
+  std::int32_t low = 0;  ///< smallest and largest sample that is not void
+  std::int32_t high = 0;
+  std::int32_t base = 0;  ///< stands for all samples above and West of the first
+  std::uint32_t mask_bytes = 0;
+  std::uint32_t extra_bytes = 0;
+  std::uint8_t activity_shift = 0;
+  std::uint8_t dropped_bits = 0;  ///< kF32: low bits of the float that are zero everywhere
+  Predictors predictors;
+  std::vector<std::uint16_t> thresholds;     ///< one fewer than contexts, ascending
+  std::vector<std::uint32_t> symbol_counts;  ///< one for each context
+  std::uint16_t paired = 0;                  ///< bit k: context k's symbols are stored in pairs (pair_coding.h)
+};
+
+/// Appends the header: 16 bytes, and where the samples differ the rest of it. Mask and map come behind it.
+void write_payload_header(const PayloadHeader& header, std::vector<std::byte>& out);
+
+/// Blocks that the map of a tile of this shape has.
+[[nodiscard]] std::size_t block_count(const TileShape& shape);
+
+/// Reads a header, void mask and map of predictors left out, and checks all that it says against itself and the shape.
+/// Throws Error{kCorrupt, kUnsupported}.
+[[nodiscard]] PayloadHeader read_payload_header(const TileShape& shape, CodeType type, ByteReader& reader);
+
+/// Reads the map, which follows the mask where there are several predictors. Throws Error{kCorrupt}.
+void read_block_map(const TileShape& shape, ByteReader& reader, Predictors& predictors);
+
+/// The symbols of all contexts, unpaired.
+class SymbolStreams {
+ public:
+  /// Reads what the header says that there is. Throws Error{kCorrupt}. The reader's bytes must outlive the streams.
+  SymbolStreams(const PayloadHeader& header, ByteReader& reader);
+
+  [[nodiscard]] std::span<const std::byte> operator[](std::size_t context) const { return streams_[context]; }
+
+ private:
+  std::array<std::span<const std::byte>, kMaxContexts> streams_{};
+  std::unique_ptr<std::byte[]> unpaired_;
+};
+
+}  // namespace isohf

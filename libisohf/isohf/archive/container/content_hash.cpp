@@ -1,0 +1,109 @@
+#include "isohf/archive/container/content_hash.h"
+
+#include <nettle/sha2.h>
+
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+
+#include "isohf/base/bytes.h"
+
+namespace isohf {
+namespace {
+
+void update(sha256_ctx& context, std::span<const std::byte> bytes) {
+  sha256_update(&context, bytes.size(), reinterpret_cast<const std::uint8_t*>(bytes.data()));
+}
+
+std::vector<std::byte> digest_of(sha256_ctx& context) {
+  std::vector<std::byte> digest(SHA256_DIGEST_SIZE);
+  sha256_digest(&context, digest.size(), reinterpret_cast<std::uint8_t*>(digest.data()));
+  return digest;
+}
+
+}  // namespace
+
+std::vector<std::byte> sha256(std::span<const std::byte> bytes) {
+  sha256_ctx context;
+  sha256_init(&context);
+  update(context, bytes);
+  return digest_of(context);
+}
+
+struct Sha256::State {
+  sha256_ctx context;
+};
+
+Sha256::Sha256() : state_(std::make_unique<State>()) {
+  sha256_init(&state_->context);
+}
+Sha256::~Sha256() = default;
+
+void Sha256::add(std::span<const std::byte> bytes) {
+  update(state_->context, bytes);
+}
+
+std::vector<std::byte> Sha256::finish() {
+  return digest_of(state_->context);
+}
+
+std::string hex(std::span<const std::byte> digest) {
+  constexpr char kDigits[] = "0123456789abcdef";
+  std::string text;
+  for (const std::byte byte : digest) {
+    text += kDigits[std::to_integer<unsigned>(byte) >> 4U];
+    text += kDigits[std::to_integer<unsigned>(byte) & 15U];
+  }
+  return text;
+}
+
+std::vector<std::byte> tile_content_digest(const TileCodes& tile) {
+  if (tile.type == CodeType::kU16) return sha256(std::as_bytes(std::span(tile.codes)));
+  std::vector<std::byte> bytes;
+  if (tile.type == CodeType::kU8) {
+    bytes.reserve(tile.codes.size());
+    for (const std::uint16_t code : tile.codes) bytes.push_back(static_cast<std::byte>(code & 0xFFU));
+    return sha256(bytes);
+  }
+  bytes.resize(tile.heights.size() * sizeof(float));
+  for (std::size_t i = 0; i < tile.heights.size(); ++i) {
+    const float height = tile.heights[i];
+    const std::uint32_t bits = std::isnan(height) ? 0x7FC00000U : std::bit_cast<std::uint32_t>(height);
+    std::memcpy(bytes.data() + i * sizeof(bits), &bits, sizeof(bits));
+  }
+  return sha256(bytes);
+}
+
+struct ContentHash::State {
+  sha256_ctx context;
+};
+
+ContentHash::ContentHash() : state_(std::make_unique<State>()) {
+  sha256_init(&state_->context);
+}
+ContentHash::~ContentHash() = default;
+
+void ContentHash::add_tile(std::span<const std::byte> digest) {
+  update(state_->context, digest);
+}
+
+std::string ContentHash::finish(const Metadata& metadata) {
+  std::vector<std::byte> bytes;
+  ByteWriter out(bytes);
+  const TileGrid& grid = metadata.grid;
+  out.write(static_cast<std::uint32_t>(grid.shape().columns()));
+  out.write(static_cast<std::uint32_t>(grid.shape().rows()));
+  out.write(static_cast<std::uint32_t>(grid.shape().levels()));
+  out.write(static_cast<std::uint64_t>(grid.tile_columns()));
+  out.write(static_cast<std::uint64_t>(grid.tile_rows()));
+  out.write(grid.extent_x());
+  out.write(grid.extent_z());
+  out.write(static_cast<std::uint8_t>(metadata.quantisation.type));
+  out.write(metadata.quantisation.offset);
+  out.write(metadata.quantisation.scale);
+  update(state_->context, bytes);
+  return hex(digest_of(state_->context));
+}
+
+}  // namespace isohf

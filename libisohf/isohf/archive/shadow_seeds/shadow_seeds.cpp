@@ -1,0 +1,346 @@
+#include "isohf/archive/shadow_seeds/shadow_seeds.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "isohf/archive/codec/ordered_float.h"
+#include "isohf/archive/codec/residuals/residual_symbols.h"
+#include "isohf/archive/container/zip_layout.h"
+#include "isohf/archive/shadow_seeds/seed_streams.h"
+#include "isohf/base/assert.h"
+#include "isohf/base/bytes.h"
+#include "isohf/error.h"
+
+namespace isohf {
+namespace {
+
+constexpr double kNone = -std::numeric_limits<double>::infinity();
+constexpr std::uint8_t kSeedsVersion = 1;
+constexpr std::size_t kHeaderBytes = 8;
+
+/// The streams of a hull payload.
+enum Stream : std::size_t {
+  kCounts,        ///< casters of a row, against the row above
+  kPlaces,        ///< ordinals, against the predicted caster's or the one before
+  kNearHeights,   ///< height against the predicted caster's, where its place was at most one vertex off,
+  kOtherHeights,  ///< or a few,
+  kFreeHeights,   ///< else against the caster before, nearer to the edge
+  kHullStreams
+};
+
+/// A caster of the row above stands for the next one of this row until this row has one at most this many vertices
+/// nearer to the edge than predicted.
+constexpr std::int64_t kPassed = -2;
+
+/// Heights as whole numbers that keep their order: codes, or a float's place among all floats.
+std::int32_t whole_from_height(CodeType type, double height) {
+  if (type == CodeType::kF32) return ordered_from_float(static_cast<float>(height), 0);
+  return static_cast<std::int32_t>(height);
+}
+
+double height_from_whole(CodeType type, std::int32_t whole) {
+  if (type == CodeType::kF32) return static_cast<double>(float_from_ordered(whole, 0));
+  return whole;
+}
+
+/// What heights at a row's edge are coded on: the tile's own vertex there; where it is void what is below all others.
+
+std::int32_t edge_of(const TileEdges& edges, int row, LightTravel travel) {
+  const double height = (travel == LightTravel::kEastward ? edges.west : edges.east)[static_cast<std::size_t>(row - 1)];
+  if (!std::isnan(height)) return whole_from_height(edges.type, height);
+  return edges.type == CodeType::kF32 ? ordered_from_float(-std::numeric_limits<float>::infinity(), 0) : -1;
+}
+
+/// Differences wrap around, so that the two ends of the floats fit as well.
+std::uint32_t minus(std::int32_t a, std::int32_t b) {
+  return static_cast<std::uint32_t>(a) - static_cast<std::uint32_t>(b);
+}
+std::int32_t plus(std::int32_t a, std::uint32_t difference) {
+  return static_cast<std::int32_t>(static_cast<std::uint32_t>(a) + difference);
+}
+
+/// The ordinal in a row of the vertex nearest to a distance that a neighbouring row has, the farther one of two.
+std::int64_t nearest_ordinal(const TileShape& shape, int row, std::int64_t distance) {
+  const std::int64_t across = half_steps_across(shape);
+  if (row % 2 != 0) return (distance + 1) / 2;
+  return distance / across * (shape.cell_columns() + 1) + (distance % across + 1) / 2;
+}
+
+/// Goes through a row's casters beside those of the row above and says what each is predicted from. Encoder and decoder
+/// take the same steps.
+class CasterPrediction {
+ public:
+  CasterPrediction(const TileShape& shape, CodeType type, int row, std::int32_t edge,
+                   std::span<const ShadowCaster> above)
+      : shape_(shape), type_(type), row_(row), above_(above), whole_(edge) {
+    skip_passed();
+  }
+
+  [[nodiscard]] bool has_above() const { return next_ < above_.size(); }
+  /// Base of the next caster's ordinal: that of the caster above, else the first that is possible.
+  [[nodiscard]] std::int64_t place() const { return has_above() ? above_place() : place_ + 1; }
+  /// The stream that its height stands in, and the height that it is coded on.
+  [[nodiscard]] Stream height_stream(std::int64_t place) const {
+    if (!has_above()) return kFreeHeights;
+    const std::int64_t off = std::abs(place - above_place());
+    return off <= 1 ? kNearHeights : off <= 6 ? kOtherHeights : kFreeHeights;
+  }
+  [[nodiscard]] std::int32_t whole(Stream stream) const {
+    return stream == kFreeHeights ? whole_ : whole_from_height(type_, above_[next_].height);
+  }
+  [[nodiscard]] std::int64_t previous_place() const { return place_; }
+
+  void take(std::int64_t place, std::int32_t whole) {
+    if (has_above() && place - above_place() >= kPassed) ++next_;
+    place_ = place;
+    whole_ = whole;
+    skip_passed();
+  }
+
+ private:
+  [[nodiscard]] std::int64_t above_place() const { return nearest_ordinal(shape_, row_, above_[next_].distance); }
+  void skip_passed() {
+    while (has_above() && above_place() <= place_) ++next_;
+  }
+
+  const TileShape& shape_;
+  CodeType type_;
+  int row_;
+  std::span<const ShadowCaster> above_;
+  std::size_t next_ = 0;
+  std::int64_t place_ = 0;
+  std::int32_t whole_;
+};
+
+std::span<const ShadowCaster> row_above(const CasterRows& rows, int row) {
+  return row == 1 ? std::span<const ShadowCaster>() : rows.row(row - 1);
+}
+
+void encode_direction(const TileGrid& grid, const TileEdges& edges, LightTravel travel, const CasterRows& rows,
+                      SymbolWriter& writer) {
+  const TileShape& shape = grid.shape();
+  for (int row = 1; row <= visible_rows(shape); ++row) {
+    const auto above = row_above(rows, row);
+    const auto casters = rows.row(row);
+    writer.put(kCounts, zigzag(static_cast<std::int32_t>(casters.size()) - static_cast<std::int32_t>(above.size())));
+    CasterPrediction prediction(shape, edges.type, row, edge_of(edges, row, travel), above);
+    for (const ShadowCaster& caster : casters) {
+      const std::int64_t place = ordinal_from_distance(shape, row, caster.distance);
+      ISOHF_ASSERT(place > prediction.previous_place());
+      const std::int32_t whole = whole_from_height(edges.type, caster.height);
+      const Stream stream = prediction.height_stream(place);
+      writer.put(kPlaces, zigzag(static_cast<std::int32_t>(place - prediction.place())));
+      const std::uint32_t off = minus(whole, prediction.whole(stream));
+      writer.put(stream, stream == kFreeHeights ? off : zigzag(static_cast<std::int32_t>(off)));
+      prediction.take(place, whole);
+    }
+  }
+}
+
+[[noreturn]] void refuse(const std::string& why) {
+  throw Error(ErrorCode::kCorrupt, why);
+}
+
+void check_height(CodeType type, std::int32_t whole, int row) {
+  const double height = height_from_whole(type, whole);
+  const double highest = type == CodeType::kU8    ? 254
+                         : type == CodeType::kU16 ? 65534
+                                                  : double{std::numeric_limits<float>::max()};
+  const double lowest = type == CodeType::kF32 ? -highest : 0.0;
+  if (!(height >= lowest && height <= highest)) refuse(fmt::format("row {}: a caster's height is no elevation", row));
+}
+
+/// `most` vertices lie before the edge.
+CasterRows decode_direction(const TileGrid& grid, const TileEdges& edges, LightTravel travel, std::int64_t most,
+                            SymbolReader& reader) {
+  const TileShape& shape = grid.shape();
+  CasterRows rows;
+  rows.starts.push_back(0);
+  for (int row = 1; row <= visible_rows(shape); ++row) {
+    // A copy: the list grows while the row is read.
+    const auto before = row_above(rows, row);
+    const std::vector<ShadowCaster> above(before.begin(), before.end());
+    const auto count =
+        static_cast<std::int64_t>(above.size()) + static_cast<std::int32_t>(unzigzag(reader.get(kCounts)));
+    if (count < 0 || static_cast<std::uint64_t>(count) > reader.left(kPlaces)) {
+      refuse(fmt::format("row {}: states {} casters, {} are left", row, count, reader.left(kPlaces)));
+    }
+    CasterPrediction prediction(shape, edges.type, row, edge_of(edges, row, travel), above);
+    for (std::int64_t i = 0; i < count; ++i) {
+      const std::int64_t place = prediction.place() + static_cast<std::int32_t>(unzigzag(reader.get(kPlaces)));
+      if (place <= prediction.previous_place() || place > most) {
+        refuse(fmt::format("row {}: a caster is vertex {} from the edge, must lie from {} to {}", row, place,
+                           prediction.previous_place() + 1, most));
+      }
+      const Stream stream = prediction.height_stream(place);
+      const std::uint32_t folded = reader.get(stream);
+      const std::int32_t whole = plus(prediction.whole(stream), stream == kFreeHeights ? folded : unzigzag(folded));
+      check_height(edges.type, whole, row);
+      rows.casters.push_back({distance_from_ordinal(shape, row, place), height_from_whole(edges.type, whole)});
+      prediction.take(place, whole);
+    }
+    rows.starts.push_back(static_cast<std::uint32_t>(rows.casters.size()));
+  }
+  return rows;
+}
+
+/// Writes the header that both kinds share.
+std::vector<std::byte> start_payload(const TileShape& shape, CodeType type, ShadowSeedInfo::Kind kind,
+                                     std::size_t angles) {
+  std::vector<std::byte> payload;
+  ByteWriter writer(payload);
+  writer.write(kSeedsVersion);
+  writer.write(static_cast<std::uint8_t>(kind == ShadowSeedInfo::Kind::kHulls ? 0 : 1));
+  writer.write(static_cast<std::uint8_t>(type));
+  writer.write(std::uint8_t{0});
+  writer.write(static_cast<std::uint16_t>(visible_rows(shape)));
+  writer.write(static_cast<std::uint16_t>(angles));
+  ISOHF_ASSERT(payload.size() == kHeaderBytes);
+  return payload;
+}
+
+void read_header(const TileShape& shape, CodeType type, ShadowSeedInfo::Kind kind, std::size_t angles,
+                 ByteReader& reader) {
+  const auto version = reader.read<std::uint8_t>();
+  if (version != kSeedsVersion) {
+    throw Error(ErrorCode::kUnsupported, fmt::format("version {} of seeds, {} is read", version, kSeedsVersion));
+  }
+  const auto expect = [&](const char* what, std::uint64_t found, std::uint64_t wanted) {
+    if (found != wanted) refuse(fmt::format("{} is {}, must be {}", what, found, wanted));
+  };
+  expect("the kind", reader.read<std::uint8_t>(), kind == ShadowSeedInfo::Kind::kHulls ? 0 : 1);
+  expect("the code type", reader.read<std::uint8_t>(), static_cast<std::uint64_t>(type));
+  expect("the reserved byte", reader.read<std::uint8_t>(), 0);
+  expect("the number of rows", reader.read<std::uint16_t>(), static_cast<std::uint64_t>(visible_rows(shape)));
+  expect("the number of angles", reader.read<std::uint16_t>(), angles);
+}
+
+/// S of an angle as a whole number above the edge's, 0 where it is no higher.
+std::uint32_t rise_above(CodeType type, std::int32_t edge, double height) {
+  if (height == kNone) return 0;
+  const double rounded = type == CodeType::kF32 ? height : std::clamp(std::round(height), -1.0, 65534.0);
+  const std::int32_t whole = whole_from_height(type, rounded);
+  return whole > edge ? minus(whole, edge) : 0;
+}
+
+template <typename Visit>
+void for_each_angle_row(const TileShape& shape, std::size_t angles, Visit visit) {
+  for (const LightTravel travel : {LightTravel::kEastward, LightTravel::kWestward}) {
+    for (std::size_t angle = 0; angle < angles; ++angle) {
+      for (int row = 1; row <= visible_rows(shape); ++row) visit(travel, angle, row);
+    }
+  }
+}
+
+}  // namespace
+
+TileEdges tile_edges(const TileShape& shape, const TileCodes& tile) {
+  TileEdges edges;
+  edges.type = tile.type;
+  const auto void_code = tile.type == CodeType::kU8 ? 255 : 65535;
+  for (int row = 1; row <= visible_rows(shape); ++row) {
+    for (const int column : {1, last_visible_column(shape, row)}) {
+      const auto at =
+          static_cast<std::size_t>(row) * static_cast<std::size_t>(shape.columns()) + static_cast<std::size_t>(column);
+      double height = NAN;
+      if (tile.type == CodeType::kF32) {
+        if (std::isfinite(tile.heights[at])) height = static_cast<double>(tile.heights[at]);
+      } else if (tile.codes[at] != void_code) {
+        height = tile.codes[at];
+      }
+      (column == 1 ? edges.west : edges.east).push_back(height);
+    }
+  }
+  return edges;
+}
+
+bool AngleSeeds::empty() const {
+  const auto none = [](double height) { return height == kNone; };
+  return std::all_of(eastward.begin(), eastward.end(), none) && std::all_of(westward.begin(), westward.end(), none);
+}
+
+bool has_room_for_seeds(const TileGrid& grid) {
+  return grid.tile_columns() < (std::int64_t{1} << 31) / (grid.shape().cell_columns() + 1);
+}
+
+EncodedSeeds encode_seeds(const TileGrid& grid, const TileEdges& edges, const HullSeeds& seeds) {
+  ISOHF_ASSERT(has_room_for_seeds(grid));
+  SymbolWriter writer(kHullStreams);
+  encode_direction(grid, edges, LightTravel::kEastward, seeds.eastward, writer);
+  encode_direction(grid, edges, LightTravel::kWestward, seeds.westward, writer);
+  return writer.finish(start_payload(grid.shape(), edges.type, ShadowSeedInfo::Kind::kHulls, 0));
+}
+
+EncodedSeeds encode_seeds(const TileGrid& grid, const TileEdges& edges, const AngleSeeds& seeds, std::size_t angles) {
+  const TileShape& shape = grid.shape();
+  SymbolWriter writer(1);
+  std::uint32_t before = 0;
+  for_each_angle_row(shape, angles, [&](LightTravel travel, std::size_t angle, int row) {
+    const auto& heights = travel == LightTravel::kEastward ? seeds.eastward : seeds.westward;
+    const double height =
+        heights[angle * static_cast<std::size_t>(visible_rows(shape)) + static_cast<std::size_t>(row - 1)];
+    const std::uint32_t rise = rise_above(edges.type, edge_of(edges, row, travel), height);
+    writer.put(0, zigzag(static_cast<std::int32_t>(rise - before)));
+    before = rise;
+  });
+  return writer.finish(start_payload(shape, edges.type, ShadowSeedInfo::Kind::kAngles, angles));
+}
+
+HullSeeds decode_hull_seeds(const TileGrid& grid, TileIndex index, const TileEdges& edges,
+                            std::span<const std::byte> payload) {
+  ByteReader bytes(payload);
+  read_header(grid.shape(), edges.type, ShadowSeedInfo::Kind::kHulls, 0, bytes);
+  SymbolReader reader(bytes, kHullStreams);
+  // Even rows have a vertex more for each tile; a limit that holds for both keeps casters inside the heightfield.
+  const std::int64_t steps = grid.shape().cell_columns() + 1;
+  HullSeeds seeds;
+  seeds.eastward = decode_direction(grid, edges, LightTravel::kEastward, index.column * steps, reader);
+  seeds.westward =
+      decode_direction(grid, edges, LightTravel::kWestward, (grid.tile_columns() - 1 - index.column) * steps, reader);
+  reader.finish();
+  return seeds;
+}
+
+AngleSeeds decode_angle_seeds(const TileGrid& grid, const TileEdges& edges, std::size_t angles,
+                              std::span<const std::byte> payload) {
+  const TileShape& shape = grid.shape();
+  ByteReader bytes(payload);
+  read_header(shape, edges.type, ShadowSeedInfo::Kind::kAngles, angles, bytes);
+  SymbolReader reader(bytes, 1);
+  AngleSeeds seeds;
+  std::uint32_t rise = 0;
+  for_each_angle_row(shape, angles, [&](LightTravel travel, std::size_t, int row) {
+    rise += unzigzag(reader.get(0));
+    const std::int32_t edge = edge_of(edges, row, travel);
+    double height = kNone;
+    if (rise != 0) {
+      const std::int32_t whole = plus(edge, rise);
+      if (whole <= edge) refuse(fmt::format("row {}: a shadow's height is no elevation", row));
+      check_height(edges.type, whole, row);
+      height = height_from_whole(edges.type, whole);
+    }
+    (travel == LightTravel::kEastward ? seeds.eastward : seeds.westward).push_back(height);
+  });
+  reader.finish();
+  return seeds;
+}
+
+std::string seed_name(TileIndex tile) {
+  return fmt::format("seeds/{}/{}.seed", tile.row, tile.column);
+}
+
+std::optional<TileIndex> tile_from_seed_name(std::string_view name) {
+  constexpr std::string_view kFolder = "seeds/";
+  constexpr std::string_view kEnding = ".seed";
+  if (name.size() < kFolder.size() + kEnding.size() || !name.starts_with(kFolder) || !name.ends_with(kEnding)) {
+    return std::nullopt;
+  }
+  const auto middle = name.substr(kFolder.size(), name.size() - kFolder.size() - kEnding.size());
+  return tile_from_name(fmt::format("tiles/{}.tile", middle));
+}
+
+}  // namespace isohf

@@ -1,0 +1,178 @@
+#include <fmt/format.h>
+#include <oneapi/tbb/blocked_range.h>
+#include <oneapi/tbb/parallel_for.h>
+#include <oneapi/tbb/parallel_invoke.h>
+#include <oneapi/tbb/parallel_reduce.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "isohf/convert/conversion.h"
+#include "isohf/convert/stages/elevation_range.h"
+#include "isohf/convert/stages/quantiser.h"
+#include "isohf/convert/stages/tile_source.h"
+#include "isohf/error.h"
+#include "isohf/surface/source/edge_range.h"
+#include "isohf/surface/source/source_survey.h"
+
+namespace isohf {
+namespace {
+
+/// What is in a window, by all threads.
+SourceSurvey survey_window(const SourceInfo& info, std::span<const std::byte> raw) {
+  constexpr std::size_t kGrain = std::size_t{1} << 18U;
+  const std::size_t bytes = size_bytes(info.sample_type);
+  return oneapi::tbb::parallel_reduce(
+      oneapi::tbb::blocked_range<std::size_t>(0, raw.size() / bytes, kGrain), SourceSurvey(info, false),
+      [&](const auto& part, SourceSurvey found) {
+        found.add(raw.subspan(part.begin() * bytes, part.size() * bytes));
+        return found;
+      },
+      [](SourceSurvey found, const SourceSurvey& other) {
+        found.add(other);
+        return found;
+      });
+}
+
+/// First pass: range and counts of the whole source. While one window is looked at the next one is read.
+SourceSurvey survey_source(const Conversion& job, EdgeRange& edge, const ProgressCallback& callback) {
+  HeightSource& source = job.source;
+  const SourceInfo& info = source.info();
+  const ReadStep& step = job.memory.scan_step;
+  ProgressMeter meter(callback, ConvertProgress::Pass::kRange, info.height);
+  SourceSurvey survey(info, false);
+  std::vector<std::byte> now;
+  std::vector<std::byte> next;
+  std::vector<Window> windows = step.windows(info, 0);
+  const auto read = [&](const Window& window, std::vector<std::byte>& raw) {
+    raw.resize(static_cast<std::size_t>(window.columns * window.rows) * size_bytes(info.sample_type));
+    source.read_window(window, raw);
+  };
+  read(windows.front(), now);
+  for (std::size_t i = 0; i < windows.size();) {
+    throw_if_cancelled(job.cancel);
+    const Window window = windows[i++];
+    if (i == windows.size() && window.row + window.rows < info.height) {
+      windows = step.windows(info, window.row + window.rows);
+      i = 0;
+    }
+    const auto look = [&] {
+      survey.add(survey_window(info, now));
+      edge.add_window(window, now);
+    };
+    if (i < windows.size()) {
+      oneapi::tbb::parallel_invoke(look, [&] { read(windows[i], next); });
+    } else {
+      look();
+    }
+    now.swap(next);
+    meter.report(window.row + (i == 0 || i == windows.size() ? window.rows : 0), 0);
+  }
+  return survey;
+}
+
+/// Elevations 0 to 1 in floats or scaled integers are most often a fraction of something.
+void warn_of_unit_range(const SourceInfo& info, const ElevationRange& range, std::vector<Warning>& warnings) {
+  if (!is_floating(info.sample_type) || info.z_scale != 1.0 || info.z_offset != 0.0) return;
+  if (range.min >= -0.1 && range.max <= 1.1 && range.max > range.min) {
+    warnings.push_back(
+        fmt::format("{}: elevations run from {:.4g} to {:.4g}, which looks like a fraction of a height, not "
+                    "metres; give --z-scale and --z-offset",
+                    info.path, range.min, range.max));
+  }
+}
+
+/// The range of the surface itself, for kernels that leave the range of their samples: cuts every tile, keeps none.
+ElevationRange measure_surface(const Conversion& job, const ElevationRange& limits, const ProgressCallback& callback) {
+  const TileGrid& grid = job.plan.grid;
+  TileSource tiles(job, {limits.min - job.datum, limits.max - job.datum});
+  ProgressMeter meter(callback, ConvertProgress::Pass::kRange, grid.tile_rows());
+  std::vector<ElevationRange> ranges(static_cast<std::size_t>(grid.tile_columns()), {HUGE_VAL, -HUGE_VAL});
+  std::int64_t next = 0;
+  while (next < grid.tile_count()) {
+    throw_if_cancelled(job.cancel);
+    const std::int64_t first = next;
+    const std::shared_ptr<const TileSource::Part> part = tiles.read(grid.tile_at(first));
+    while (next < grid.tile_count() && part->holds(grid.tile_at(next))) ++next;
+    oneapi::tbb::parallel_for(first, next, [&](std::int64_t flat) {
+      const TileIndex tile = grid.tile_at(flat);
+      std::vector<float> heights(static_cast<std::size_t>(grid.shape().stored_vertex_count()));
+      tiles.cut(tile, *part, heights);
+      ElevationRange& range = ranges[static_cast<std::size_t>(tile.column)];
+      for (const float height : heights) {
+        const double elevation = double{height} + job.datum;  // NaN compares false
+        range.min = elevation < range.min ? elevation : range.min;
+        range.max = elevation > range.max ? elevation : range.max;
+      }
+    });
+    meter.report(next / grid.tile_columns(), 0);
+  }
+  ElevationRange all{HUGE_VAL, -HUGE_VAL};
+  for (const ElevationRange& range : ranges) {
+    all = {std::min(all.min, range.min), std::max(all.max, range.max)};
+  }
+  return all.min <= all.max ? all : ElevationRange{};
+}
+
+QuantisationRequest request_of(const SourceInfo& info, const ConvertOptions& options) {
+  QuantisationRequest request{options.code_type, options.step, options.max_rounding};
+  // Of the error that is allowed an eighth is left to the rounding, which then takes few bytes.
+  if (options.max_error) request.wish = *options.max_error / 4.0;
+  // Samples that are vertices lose nothing by the step that is usual.
+  if (options.max_error && options.plan.through_samples && !is_floating(info.sample_type)) {
+    request.wish = std::max(*request.wish, std::abs(info.z_scale) / 2.0);
+  }
+  return request;
+}
+
+/// By the range of the data.
+void choose_codes_by_data(Conversion& job, ConvertSummary& summary, const ProgressCallback& progress) {
+  const SourceInfo& info = job.source.info();
+  const QuantisationRequest request = request_of(job.source.info(), job.options);
+  const SourceAxes axes = make_axes(job.plan.grid, job.geometry());
+  EdgeRange edge(info, axes.x.continued_samples(), axes.z.continued_samples());
+  const SourceSurvey survey = survey_source(job, edge, progress);
+  SourceScan found = survey.scan();
+  if (found.valid == 0) {
+    throw Error(ErrorCode::kInvalidArgument,
+                fmt::format("{}: all {} samples are void or not finite, there is no elevation to convert", info.path,
+                            found.voids));
+  }
+  summary.source_voids = found.voids;
+  warn_of_unit_range(info, found.range, summary.warnings);
+  if (const std::string warning = survey.warning(); !warning.empty()) {
+    summary.warnings.push_back(info.path + ": " + warning);
+  }
+  job.datum = choose_datum(info, found.range);
+  if (job.plan.outside == Outside::kCover) found.range = edge.widen(found.range);
+  job.quantisation = choose_quantisation(request, found.range, info);
+  const double over = overshoot(job.kernel, job.prefilter);
+  if (over == 0.0 || job.options.code_type == CodeType::kF32) return;
+  // The surface may leave the samples' range. Where the codes reach far enough for the worst case at the same step,
+  // nothing needs to be measured; next to voids and on a raster between whose ends little lies there is no such bound.
+  const bool is_large = std::min(info.width, info.height) > 2 * (job.prefilter.halo() + job.kernel.taps());
+  const bool has_step = request.max_rounding || (request.step ? *request.step != 0.0 : !is_floating(info.sample_type));
+  const ElevationRange reach = widened(found.range, over);
+  if (found.voids == 0 && is_large && has_step && has_codes_for(job.quantisation, reach)) {
+    job.quantisation = choose_quantisation({request.type, job.quantisation.scale}, reach, info);
+    return;
+  }
+  job.quantisation = choose_quantisation(request, measure_surface(job, found.range, progress), info);
+}
+
+}  // namespace
+
+void choose_codes(Conversion& job, ConvertSummary& summary, const ProgressCallback& progress) {
+  if (job.options.z_range) {
+    const ElevationRange range{job.options.z_range->first, job.options.z_range->second};
+    job.datum = choose_datum(job.source.info(), range);
+    job.quantisation = quantisation_of_range(request_of(job.source.info(), job.options), range, job.source.info());
+    job.limits = {range.min, range.max};
+    return;
+  }
+  choose_codes_by_data(job, summary, progress);
+  job.limits = code_limits(job.quantisation);
+}
+
+}  // namespace isohf

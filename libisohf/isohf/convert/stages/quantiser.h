@@ -1,0 +1,38 @@
+#pragma once
+
+#include <optional>
+
+#include "isohf/archive/codec/quantise.h"
+#include "isohf/metadata.h"
+#include "isohf/raster.h"
+#include "isohf/surface/source/source_scan.h"
+
+namespace isohf {
+
+/// How codes are to be chosen.
+struct QuantisationRequest {
+  CodeType type = CodeType::kU16;
+  std::optional<double> step;  ///< elevation of one code; 0: the finest that the type holds; nullopt: chosen
+  std::optional<double> max_rounding = {};  ///< instead: steps of at most twice that
+  std::optional<double> wish = {};          ///< where neither is given: a step of about that, or as fine as can be
+};
+
+/// One scale and offset for the whole dataset.
+///
+/// The chosen step is half of the source's own for integer samples, doubled until the range fits, and the finest
+/// that fits for floats. The offset is a multiple of the step, so that whole elevations stay whole.
+/// Throws Error{kInvalidArgument} where a step that was asked for needs more codes than the type has, naming the
+/// smallest one that fits.
+[[nodiscard]] Quantisation choose_quantisation(const QuantisationRequest& request, const ElevationRange& range,
+                                               const SourceInfo& info);
+
+/// The same where the first code is to be range.min and another one range.max, so that nothing stored lies beyond and
+/// everything between them is stored to within half a step. A step that was asked for must divide the range, or it is
+/// refused with those that do; one that is chosen, or given by max_rounding, becomes so much finer that it does.
+[[nodiscard]] Quantisation quantisation_of_range(const QuantisationRequest& request, const ElevationRange& range,
+                                                 const SourceInfo& info);
+
+/// True where steps of this scale reach over the whole range with the codes that the type has.
+[[nodiscard]] bool has_codes_for(const Quantisation& quantisation, const ElevationRange& range);
+
+}  // namespace isohf

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "isohf/archive/writer.h"
+#include "isohf/convert/convert.h"
+#include "isohf/surface/photo/projected_photo.h"
+#include "isohf/surface/photo/texture_cutter.h"
+
+namespace isohf {
+
+/// Textures in the pass that makes the tiles. A tile's texture depends on the photo alone; its members stand before the
+/// tile, so that a conversion that is resumed goes on at the next tile.
+class TextureStage {
+ public:
+  /// Decides place, size and format, and how much the photo may keep for `tiles_at_once`. Reads no pixel.
+  /// Throws Error{kInvalidArgument} naming the option or the photo at fault.
+  static TextureStage make(const Plan& plan, const SourceInfo& source, const TextureRequest& request, int threads,
+                           int tiles_at_once);
+
+  /// Peak memory, bytes; an estimate.
+  [[nodiscard]] std::uint64_t memory_bytes() const { return memory_bytes_; }
+  [[nodiscard]] const std::vector<Warning>& warnings() const { return warnings_; }
+  /// Photo pixels under the side of a texel, the larger of both directions.
+  [[nodiscard]] double pixels_per_texel() const { return pixels_per_texel_; }
+
+  /// The members of a tile, the coarsest level first; none where the photo does not show it. Any thread.
+  using Encoded = std::vector<std::vector<std::byte>>;
+  [[nodiscard]] Encoded encode(TileIndex tile) const;
+
+  /// Hands a tile's members to the writer, before the tile itself.
+  void add(TileIndex tile, const Encoded& encoded, ArchiveWriter& writer) const;
+
+  /// The metadata's record, once all tiles are in.
+  [[nodiscard]] TextureInfo info(const ArchiveWriter& writer) const;
+
+ private:
+  struct Layout;
+  TextureStage(PhotoSource& photo, TextureInfo info, Layout layout);
+  [[nodiscard]] bool shows(TileIndex tile) const;
+
+  std::unique_ptr<ProjectedPhoto> projected_;  ///< of the user's photo; nullptr where its rows are the world's
+  PhotoSource& photo_;                         ///< that one, or the user's
+  TextureInfo info_;
+  TextureCutter cutter_;
+  double pixels_per_texel_;
+  std::vector<Warning> warnings_;
+  std::uint64_t memory_bytes_ = 0;
+};
+
+}  // namespace isohf

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "isohf/raster.h"
+
+namespace isohf {
+
+/// Whole rows of a source, wherever they lie in memory.
+struct VoidRows {
+  std::int64_t first = 0;             ///< the source's row that entry 0 holds
+  std::vector<const std::byte*> raw;  ///< [rows] each width samples of the source's type
+  std::vector<const char*> voids;     ///< [rows] 1 where a sample is void; nullptr for a row without voids
+};
+
+/// Fills voids from what lies around them; filled_source.h says how and what can be relied on.
+class VoidFiller {
+ public:
+  /// distance: samples, >= 1
+  VoidFiller(const SourceInfo& info, std::int64_t distance);
+
+  /// Fills the voids of the source's rows first to end - 1.
+  /// rows    those rows and reach() more on either side, as far as the source has them
+  /// samples [(end - first) * width samples] those rows as the source has them; filled in place
+  /// Returns how many were filled in each row. Works on the calling thread's task arena.
+  std::vector<std::int64_t> fill(const VoidRows& rows, std::int64_t first, std::int64_t end,
+                                 std::span<std::byte> samples) const;
+
+  [[nodiscard]] std::int64_t reach() const;
+  /// How far the smoothing looks, beyond the distance.
+  [[nodiscard]] static std::int64_t smoothing_reach();
+  /// Rows that are worth filling at once.
+  static constexpr std::int64_t kRowsAtOnce = 64;
+
+ private:
+  struct Box;
+
+  [[nodiscard]] std::vector<Box> boxes(const VoidRows& rows, std::int64_t first, std::int64_t end) const;
+  void look_for_ground(const VoidRows& rows, Box& box) const;
+  void cast_rays(const VoidRows& rows, Box& box) const;
+  void cast_row(const VoidRows& rows, Box& box, std::int64_t row) const;
+  void smooth(Box& box) const;
+  [[nodiscard]] double storable(double raw) const;
+
+  SourceInfo info_;
+  std::int64_t distance_;
+};
+
+}  // namespace isohf

@@ -1,0 +1,233 @@
+#include "isohf/surface/resample/acquisition.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <fstream>
+#include <functional>
+#include <numbers>
+#include <optional>
+#include <string_view>
+
+#include "isohf/error.h"
+
+namespace isohf {
+namespace {
+
+constexpr double kLargestSigma = 100.0;
+constexpr std::size_t kMostTaps = 255;
+constexpr std::size_t kMostBytes = 65536;  ///< of a FIR file
+/// A normal density holds less than 3e-19 beyond so many standard deviations.
+constexpr double kGaussianReach = 9.0;
+
+[[noreturn]] void refuse(const std::string& message) {
+  throw Error(ErrorCode::kInvalidArgument, message);
+}
+
+std::optional<double> number_from(std::string_view text) {
+  double value = 0.0;
+  const auto [end, status] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (status != std::errc{} || end != text.data() + text.size() || !std::isfinite(value)) return std::nullopt;
+  return value;
+}
+
+constexpr int kNodes = 16;
+
+/// Nodes and weights on [-1, 1], by Newton's method on the Legendre polynomial of degree 16.
+struct GaussLegendre {
+  std::array<double, kNodes> node;
+  std::array<double, kNodes> weight;
+
+  GaussLegendre() : node{}, weight{} {
+    for (int i = 0; i < kNodes; ++i) {
+      double x = std::cos(std::numbers::pi * (i + 0.75) / (kNodes + 0.5));
+      double slope = 1.0;
+      for (int step = 0; step < 8; ++step) {  // converges in 4
+        double previous = 1.0;
+        double current = x;
+        for (int n = 2; n <= kNodes; ++n) {
+          const double next = ((2 * n - 1) * x * current - (n - 1) * previous) / n;
+          previous = current;
+          current = next;
+        }
+        slope = kNodes * (x * current - previous) / (x * x - 1.0);
+        x -= current / slope;
+      }
+      node[static_cast<std::size_t>(i)] = x;
+      weight[static_cast<std::size_t>(i)] = 2.0 / ((1.0 - x * x) * slope * slope);
+    }
+  }
+};
+
+/// Integral of f from begin to end, cut at all halves of integers (the kernels' knots) and so that no piece is longer
+/// than `longest`; 0 where end <= begin.
+double integral(double begin, double end, double longest, const std::function<double(double)>& f) {
+  static const GaussLegendre rule;
+  double sum = 0.0;
+  for (double half = std::floor(2.0 * begin); half < 2.0 * end; half += 1.0) {
+    const double from = std::max(begin, 0.5 * half);
+    const double to = std::min(end, 0.5 * (half + 1.0));
+    if (to <= from) continue;
+    const int pieces = static_cast<int>(std::ceil((to - from) / longest));
+    const double radius = 0.5 * (to - from) / pieces;
+    for (int piece = 0; piece < pieces; ++piece) {
+      const double middle = from + (2 * piece + 1) * radius;
+      for (std::size_t i = 0; i < kNodes; ++i) sum += radius * rule.weight[i] * f(middle + radius * rule.node[i]);
+    }
+  }
+  return sum;
+}
+
+double response_at(const Kernel& kernel, const Acquisition& acquisition, int k) {
+  switch (acquisition.kind) {
+    case Acquisition::Kind::kPoint:
+      return kernel.value(k);
+    case Acquisition::Kind::kBox:
+      return integral(-0.5, 0.5, 0.5, [&](double x) { return kernel.value(k - x); });
+    case Acquisition::Kind::kTent:
+      return integral(-1.0, 1.0, 0.5, [&](double x) { return (1.0 - std::abs(x)) * kernel.value(k - x); });
+    case Acquisition::Kind::kGaussian: {
+      const double sigma = acquisition.sigma;
+      const double reach = kGaussianReach * sigma;
+      const double scale = 1.0 / (sigma * std::sqrt(2.0 * std::numbers::pi));
+      return integral(
+          std::max(-reach, k - kernel.support()), std::min(reach, k + kernel.support()), sigma,
+          [&](double x) { return scale * std::exp(-0.5 * (x / sigma) * (x / sigma)) * kernel.value(k - x); });
+    }
+    case Acquisition::Kind::kFir: {
+      const int middle = static_cast<int>(acquisition.taps.size() / 2);
+      double sum = 0.0;
+      for (int j = -middle; j <= middle; ++j) {
+        sum += acquisition.taps[static_cast<std::size_t>(j + middle)] * kernel.value(k - j);
+      }
+      return sum;
+    }
+  }
+  return 0.0;
+}
+
+double reach_of(const Acquisition& acquisition) {
+  switch (acquisition.kind) {
+    case Acquisition::Kind::kPoint:
+      return 0.0;
+    case Acquisition::Kind::kBox:
+      return 0.5;
+    case Acquisition::Kind::kTent:
+      return 1.0;
+    case Acquisition::Kind::kGaussian:
+      return kGaussianReach * acquisition.sigma;
+    case Acquisition::Kind::kFir:
+      return static_cast<double>(acquisition.taps.size() / 2);
+  }
+  return 0.0;
+}
+
+}  // namespace
+
+Acquisition acquisition_from_string(const std::string& text) {
+  Acquisition result;
+  if (text == "point") return result;
+  if (text == "box" || text == "tent") {
+    result.kind = text == "box" ? Acquisition::Kind::kBox : Acquisition::Kind::kTent;
+    return result;
+  }
+  const std::string_view view = text;
+  if (view.starts_with("gaussian:")) {
+    const std::optional<double> sigma = number_from(view.substr(9));
+    if (!sigma || !(*sigma > 0.0) || *sigma > kLargestSigma) {
+      refuse(fmt::format("acquisition is \"{}\": sigma must be a number above 0 and at most {} source samples", text,
+                         kLargestSigma));
+    }
+    result.kind = Acquisition::Kind::kGaussian;
+    result.sigma = *sigma;
+    return result;
+  }
+  if (view.starts_with("fir:")) {
+    const std::string path = text.substr(4);
+    std::ifstream file(path, std::ios::binary);
+    std::string contents(kMostBytes + 1, ' ');
+    file.read(contents.data(), static_cast<std::streamsize>(contents.size()));
+    if (!file.eof()) {  // neither opened, or not readable, or longer
+      if (file)
+        refuse(fmt::format("{}: taps of an acquisition filter must not be more than {} bytes", path, kMostBytes));
+      throw Error(ErrorCode::kIo, path + ": cannot read the taps of the acquisition filter");
+    }
+    contents.resize(static_cast<std::size_t>(file.gcount()));
+    return fir_from_text(contents, path);
+  }
+  refuse(fmt::format("acquisition is \"{}\", must be point, box, tent, gaussian:SIGMA or fir:FILE", text));
+}
+
+std::string to_string(const Acquisition& acquisition) {
+  switch (acquisition.kind) {
+    case Acquisition::Kind::kPoint:
+      return "point";
+    case Acquisition::Kind::kBox:
+      return "box";
+    case Acquisition::Kind::kTent:
+      return "tent";
+    case Acquisition::Kind::kGaussian:
+      return fmt::format("gaussian:{}", acquisition.sigma);
+    case Acquisition::Kind::kFir:
+      return "fir:" + acquisition.path;
+  }
+  return {};
+}
+
+Acquisition fir_from_text(const std::string& text, const std::string& path) {
+  Acquisition result;
+  result.kind = Acquisition::Kind::kFir;
+  result.path = path;
+  constexpr std::string_view kSpace = " \t\r\n\f\v";
+  const std::string_view view = text;
+  std::size_t at = 0;
+  while ((at = view.find_first_not_of(kSpace, at)) != std::string_view::npos) {
+    if (view[at] == '#') {
+      at = std::min(view.find('\n', at), view.size());
+      continue;
+    }
+    const std::size_t end = std::min(view.find_first_of(" \t\r\n\f\v#", at), view.size());
+    const std::string_view word = view.substr(at, end - at);
+    const std::optional<double> tap = number_from(word);
+    if (!tap) refuse(fmt::format("{}: byte {}: \"{}\" is not a finite number", path, at, word.substr(0, 40)));
+    if (result.taps.size() == kMostTaps) refuse(fmt::format("{}: more than {} taps", path, kMostTaps));
+    result.taps.push_back(*tap);
+    at = end;
+  }
+  const std::size_t count = result.taps.size();
+  if (count % 2 == 0) refuse(fmt::format("{}: {} taps, must be an odd number", path, count));
+  double sum = 0.0;
+  double size = 0.0;
+  for (const double tap : result.taps) {
+    sum += tap;
+    size += std::abs(tap);
+  }
+  // Decimal fractions of a sum leave 1e-16 or so of each tap.
+  if (std::abs(sum) <= 1e-12 * size || !std::isfinite(size)) {
+    refuse(fmt::format("{}: the taps sum to {}, so that level ground would read as nothing", path, sum));
+  }
+  for (std::size_t i = 0; i < count / 2; ++i) {
+    const double left = result.taps[i];
+    const double right = result.taps[count - 1 - i];
+    if (std::abs(left - right) > 1e-9 * size) {
+      refuse(fmt::format("{}: taps {} and {} are {} and {}; the filter must be symmetric", path, i + 1, count - i, left,
+                         right));
+    }
+    result.taps[i] = result.taps[count - 1 - i] = 0.5 * (left + right);
+  }
+  for (double& tap : result.taps) tap /= sum;
+  return result;
+}
+
+std::vector<double> sampled_response(const Kernel& kernel, const Acquisition& acquisition) {
+  const int last = static_cast<int>(std::ceil(kernel.support() + reach_of(acquisition)));
+  std::vector<double> response;
+  for (int k = 0; k <= last; ++k) response.push_back(response_at(kernel, acquisition, k));
+  while (response.size() > 1 && std::abs(response.back()) < 1e-17) response.pop_back();
+  return response;
+}
+
+}  // namespace isohf

@@ -1,0 +1,217 @@
+#include "isohf/surface/resample/kernels.h"
+
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "isohf/error.h"
+
+namespace isohf {
+namespace {
+
+struct FilterEntry {
+  Filter filter;
+  const char* name;
+  int taps;
+};
+
+constexpr std::array<FilterEntry, 9> kFilters = {{
+    {Filter::kNearest, "nearest", 1},
+    {Filter::kBilinear, "bilinear", 2},
+    {Filter::kLimitedCubic, "limited-cubic", 4},
+    {Filter::kCatmullRom, "catmull-rom", 4},
+    {Filter::kBspline2, "bspline2", 3},
+    {Filter::kBspline3, "bspline3", 4},
+    {Filter::kBspline5, "bspline5", 6},
+    {Filter::kLanczos3, "lanczos3", 6},
+    {Filter::kLanczos6, "lanczos6", 12},
+}};
+
+using Weights = std::array<double, kMaxTaps>;
+
+// All take t, how far the position lies past its base tap: floor(u) for even tap counts, t in [0, 1); the nearest
+// sample for odd ones, t in [-1/2, 1/2).
+
+void catmull_rom_weights(double t, Weights& w) {
+  const double s = 1.0 - t;
+  w[0] = -0.5 * t * s * s;
+  w[1] = 1.0 + t * t * (1.5 * t - 2.5);
+  w[2] = 1.0 + s * s * (1.5 * s - 2.5);
+  w[3] = -0.5 * s * t * t;
+}
+
+/// A straight line and 4/3 of what Catmull-Rom adds to it: as much at the middle as the cubic spline of all samples
+/// would, to 0.02, by four of them. Exact on planes; 4/3 by measurement (docs/decisions/0027).
+void limited_cubic_weights(double t, Weights& w) {
+  const double s = 1.0 - t;
+  const double before = 2.0 / 3.0 * t * s * s;
+  const double after = 2.0 / 3.0 * s * t * t;
+  w[0] = -before;
+  w[1] = s + 2.0 * before - after;
+  w[2] = t + 2.0 * after - before;
+  w[3] = -after;
+}
+
+void bspline2_weights(double t, Weights& w) {
+  w[0] = 0.5 * (0.5 - t) * (0.5 - t);
+  w[1] = 0.75 - t * t;
+  w[2] = 0.5 * (0.5 + t) * (0.5 + t);
+}
+
+void bspline3_weights(double t, Weights& w) {
+  const double s = 1.0 - t;
+  w[0] = s * s * s / 6.0;
+  w[1] = 2.0 / 3.0 - 0.5 * t * t * (1.0 + s);
+  w[2] = 2.0 / 3.0 - 0.5 * s * s * (1.0 + t);
+  w[3] = t * t * t / 6.0;
+}
+
+/// The quintic B-spline on its three pieces, 0 <= x <= 1, 2 and 3.
+double bspline5_inner(double x) {
+  const double x2 = x * x;
+  return 11.0 / 20.0 + x2 * (-0.5 + x2 * (0.25 - x / 12.0));
+}
+double bspline5_middle(double x) {
+  return 17.0 / 40.0 + x * (5.0 / 8.0 + x * (-7.0 / 4.0 + x * (5.0 / 4.0 + x * (-3.0 / 8.0 + x / 24.0))));
+}
+double bspline5_outer(double x) {
+  const double y = 3.0 - x;
+  const double y2 = y * y;
+  return y2 * y2 * y / 120.0;
+}
+
+void bspline5_weights(double t, Weights& w) {
+  const double s = 1.0 - t;
+  w[0] = bspline5_outer(2.0 + t);
+  w[1] = bspline5_middle(1.0 + t);
+  w[2] = bspline5_inner(t);
+  w[3] = bspline5_inner(s);
+  w[4] = bspline5_middle(1.0 + s);
+  w[5] = bspline5_outer(2.0 + s);
+}
+
+/// sinc(x) sinc(x / lobes) at the 2 lobes taps around the position, divided by their sum: a bare Lanczos kernel ripples
+/// by up to 1 % on level ground.
+void lanczos_weights(int lobes, double t, Weights& w) {
+  if (t == 0.0) {
+    w[static_cast<std::size_t>(lobes - 1)] = 1.0;
+    return;
+  }
+  const double sine = std::sin(std::numbers::pi * t);  // sin(pi x) at x = t - k is this with alternating sign
+  double sum = 0.0;
+  for (int i = 0; i < 2 * lobes; ++i) {
+    const int k = i - lobes + 1;  // tap's distance from the base tap
+    const double x = t - k;
+    const double sinc = ((k & 1) != 0 ? -sine : sine) / x;
+    const double window = std::sin(std::numbers::pi * x / lobes) / x;
+    w[static_cast<std::size_t>(i)] = sinc * window;  // times lobes / pi^2, which the division below takes out
+    sum += w[static_cast<std::size_t>(i)];
+  }
+  for (int i = 0; i < 2 * lobes; ++i) w[static_cast<std::size_t>(i)] /= sum;
+}
+
+/// Weights in double and the first tap.
+std::int64_t weights_at(Filter filter, int taps, double u, Weights& w) {
+  double base = std::floor(u);
+  double t = u - base;
+  if ((taps & 1) != 0 ? t >= 0.5 : t == 1.0) {  // 1 where u is so little below an integer that u - base rounds
+    base += 1.0;
+    t -= 1.0;
+  }
+  switch (filter) {
+    case Filter::kNearest:
+      w[0] = 1.0;
+      break;
+    case Filter::kBilinear:
+      w[0] = 1.0 - t;
+      w[1] = t;
+      break;
+    case Filter::kLimitedCubic:
+      limited_cubic_weights(t, w);
+      break;
+    case Filter::kCatmullRom:
+      catmull_rom_weights(t, w);
+      break;
+    case Filter::kBspline2:
+      bspline2_weights(t, w);
+      break;
+    case Filter::kBspline3:
+      bspline3_weights(t, w);
+      break;
+    case Filter::kBspline5:
+      bspline5_weights(t, w);
+      break;
+    case Filter::kLanczos3:
+      lanczos_weights(3, t, w);
+      break;
+    case Filter::kLanczos6:
+      lanczos_weights(6, t, w);
+      break;
+  }
+  return static_cast<std::int64_t>(base) - (taps - 1) / 2;
+}
+
+}  // namespace
+
+std::string to_string(Filter filter) {
+  for (const FilterEntry& entry : kFilters) {
+    if (entry.filter == filter) return entry.name;
+  }
+  return {};
+}
+
+Filter filter_from_string(const std::string& text) {
+  std::string names;
+  for (const FilterEntry& entry : kFilters) {
+    if (text == entry.name) return entry.filter;
+    names += (names.empty() ? "" : ", ") + std::string(entry.name);
+  }
+  throw Error(ErrorCode::kInvalidArgument, "filter is \"" + text + "\", must be one of " + names);
+}
+
+std::string to_string(Edges edges) {
+  return edges == Edges::kOdd ? "odd" : "mirror";
+}
+
+Edges edges_from_string(const std::string& text) {
+  if (text == "odd") return Edges::kOdd;
+  if (text == "mirror") return Edges::kMirror;
+  throw Error(ErrorCode::kInvalidArgument, "edges is \"" + text + "\", must be odd or mirror");
+}
+
+Kernel Kernel::make(Filter filter, Edges edges) {
+  int taps = 0;
+  for (const FilterEntry& entry : kFilters) {
+    if (entry.filter == filter) taps = entry.taps;
+  }
+  return {filter, taps, edges};
+}
+
+bool Kernel::interpolates() const {
+  return filter_ != Filter::kBspline2 && filter_ != Filter::kBspline3 && filter_ != Filter::kBspline5;
+}
+
+TapWeights Kernel::at(double u) const {
+  Weights exact{};
+  TapWeights result{};
+  result.first = weights_at(filter_, taps_, u, exact);
+  for (std::size_t i = 0; i < static_cast<std::size_t>(taps_); ++i) result.weights[i] = static_cast<float>(exact[i]);
+  return result;
+}
+
+double Kernel::value(double x) const {
+  Weights exact{};
+  const std::int64_t first = weights_at(filter_, taps_, x, exact);  // the position x, seen from a sample at 0
+  return first <= 0 && -first < taps_ ? exact[static_cast<std::size_t>(-first)] : 0.0;
+}
+
+std::int64_t mirror_index(std::int64_t k, std::int64_t count) {
+  if (k >= 0 && k < count) return k;
+  if (count == 1) return 0;
+  const std::int64_t period = 2 * (count - 1);
+  k %= period;
+  if (k < 0) k += period;
+  return k < count ? k : period - k;
+}
+
+}  // namespace isohf

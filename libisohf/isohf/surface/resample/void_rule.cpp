@@ -1,0 +1,115 @@
+#include "isohf/surface/resample/void_rule.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+
+namespace isohf {
+
+float VoidRule::at(double u, double v, const TapWeights& columns, const TapWeights& rows) const {
+  if (all_nearest_void(u, v)) return std::numeric_limits<float>::quiet_NaN();
+  Taps taps;
+  double valid_weight = 0.0;
+  bool whole = true;
+  const auto weight = [&](std::size_t j, std::size_t i) { return double{columns.weights[i]} * rows.weights[j]; };
+  const auto count = static_cast<std::size_t>(kernel_.taps());
+  for (std::size_t j = 0; j < count; ++j) {
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::int64_t column = columns.first + static_cast<std::int64_t>(i);
+      const std::int64_t row = rows.first + static_cast<std::int64_t>(j);
+      taps[j][i] = coefficient(column, row);
+      whole = whole && !std::isnan(taps[j][i]);
+      if (!is_void(column, row)) valid_weight += weight(j, i);
+    }
+  }
+  if (valid_weight < 0.5) return std::numeric_limits<float>::quiet_NaN();
+  if (!whole && kernel_.edges() == Edges::kOdd) complete(taps);
+  double sum = 0.0;
+  double missing_weight = 0.0;
+  double weight_sum = 0.0;
+  for (std::size_t j = 0; j < count; ++j) {
+    for (std::size_t i = 0; i < count; ++i) {
+      if (std::isnan(taps[j][i])) {
+        missing_weight += std::abs(weight(j, i));
+        continue;
+      }
+      sum += weight(j, i) * taps[j][i];
+      weight_sum += weight(j, i);
+    }
+  }
+  const auto height = static_cast<float>(missing_weight == 0.0 ? sum : sum / weight_sum);
+  if (!kernel_.is_limited()) return height;
+  float least = std::numeric_limits<float>::infinity();
+  float most = -least;
+  for (const std::int64_t row : {rows.first + 1, rows.first + 2}) {
+    for (const std::int64_t column : {columns.first + 1, columns.first + 2}) {
+      if (is_void(column, row)) continue;
+      const float corner = at_index(column, row);
+      least = std::min(least, corner);
+      most = std::max(most, corner);
+    }
+  }
+  return held_within(height, least, most);
+}
+
+/// Missing taps go on along each row whose middle two are there, then along each column: by distance from the middle,
+/// so that what a tap is mirrored from is there before it.
+void VoidRule::complete(Taps& taps) const {
+  const auto count = static_cast<std::size_t>(kernel_.taps());
+  if (count % 2 != 0 || count < 4) return;
+  const std::size_t middle = count / 2 - 1;
+  const auto go_on = [&](auto tap) {
+    if (std::isnan(tap(middle)) || std::isnan(tap(middle + 1))) return;
+    std::size_t before = middle;
+    std::size_t after = middle + 1;
+    for (std::size_t distance = 1; distance <= middle; ++distance) {
+      const std::size_t left = middle - distance;
+      const std::size_t right = middle + 1 + distance;
+      if (std::isnan(tap(left))) {
+        tap(left) = 2.0 * tap(before) - tap(2 * before - left);
+      } else if (before == left + 1) {
+        before = left;
+      }
+      if (std::isnan(tap(right))) {
+        tap(right) = 2.0 * tap(after) - tap(2 * after - right);
+      } else if (after == right - 1) {
+        after = right;
+      }
+    }
+  };
+  for (std::size_t j = 0; j < count; ++j) go_on([&](std::size_t i) -> double& { return taps[j][i]; });
+  for (std::size_t i = 0; i < count; ++i) go_on([&](std::size_t j) -> double& { return taps[j][i]; });
+}
+
+double VoidRule::coefficient(std::int64_t column, std::int64_t row) const {
+  double sum = 0.0;
+  axis_z_.stand_ins(row, kernel_.edges(), [&](std::int64_t r, int row_weight) {
+    axis_x_.stand_ins(column, kernel_.edges(), [&](std::int64_t c, int column_weight) {
+      sum += row_weight * column_weight * double{band_.heights(c - band_.first_column, r - band_.first_row)};
+    });
+  });
+  return sum;
+}
+
+float VoidRule::at_index(std::int64_t column, std::int64_t row) const {
+  return band_.heights(axis_x_.index(column) - band_.first_column, axis_z_.index(row) - band_.first_row);
+}
+
+bool VoidRule::is_void(std::int64_t column, std::int64_t row) const {
+  if (band_.voids.data() == nullptr) return std::isnan(at_index(column, row));
+  return band_.voids(axis_x_.index(column) - band_.first_column, axis_z_.index(row) - band_.first_row) != 0;
+}
+
+/// Rows that the kernel itself does not read may lie outside the band; the nearest kernel has but one.
+bool VoidRule::all_nearest_void(double u, double v) const {
+  if (kernel_.taps() == 1) return false;
+  for (const double row : {std::floor(v), std::ceil(v)}) {
+    for (const double column : {std::floor(u), std::ceil(u)}) {
+      if (!is_void(static_cast<std::int64_t>(column), static_cast<std::int64_t>(row))) return false;
+    }
+  }
+  return true;
+}
+
+}  // namespace isohf

@@ -1,0 +1,122 @@
+#include "isohf/surface/source/edge_range.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "isohf/base/assert.h"
+#include "isohf/surface/source/sample_types.h"
+
+namespace isohf {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+/// Codes are for the source, not for what lies beyond: an eighth of its range is given at either end.
+constexpr double kMostWidening = 0.125;
+
+void include(ElevationRange& range, float height) {
+  if (std::isnan(height)) return;
+  range.min = std::min(range.min, double{height});
+  range.max = std::max(range.max, double{height});
+}
+
+}  // namespace
+
+EdgeRange::EdgeRange(const SourceInfo& info, std::int64_t depth_columns, std::int64_t depth_rows)
+    : info_(info),
+      depth_columns_(static_cast<std::size_t>(std::min(depth_columns + 2, info.width))),
+      depth_rows_(static_cast<std::size_t>(std::min(depth_rows + 2, info.height))),
+      bound_{kInfinity, -kInfinity} {}
+
+EdgeRange::Profile EdgeRange::profile_of(std::span<const float> from_edge) {
+  Profile profile{{kInfinity, -kInfinity}, {kInfinity, -kInfinity}};
+  include(profile.edge, from_edge.front());
+  for (const float height : from_edge) include(profile.inside, height);
+  return profile;
+}
+
+void EdgeRange::add_between(const Profile& a, const Profile& b, ElevationRange& bound) {
+  const double edge_max = std::max(a.edge.max, b.edge.max);
+  const double edge_min = std::min(a.edge.min, b.edge.min);
+  const double inside_max = std::max(a.inside.max, b.inside.max);
+  const double inside_min = std::min(a.inside.min, b.inside.min);
+  if (edge_min > edge_max) return;  // void
+  bound.max = std::max(bound.max, 2.0 * edge_max - inside_min);
+  bound.min = std::min(bound.min, 2.0 * edge_min - inside_max);
+}
+
+void EdgeRange::add_side(std::span<const std::byte> samples, bool east) {
+  side_.resize(depth_columns_);
+  heights_from_samples(info_, 0.0, samples, side_);
+  if (east) std::reverse(side_.begin(), side_.end());
+  const Profile profile = profile_of(side_);
+  std::optional<Profile>& before = last_profile_[east ? 1 : 0];
+  add_between(profile, before.value_or(profile), bound_);
+  before = profile;
+}
+
+void EdgeRange::add_window(const Window& window, std::span<const std::byte> raw) {
+  const std::size_t bytes = size_bytes(info_.sample_type);
+  const auto columns = static_cast<std::size_t>(window.columns);
+  const auto width = static_cast<std::size_t>(info_.width);
+  ISOHF_ASSERT(raw.size() == static_cast<std::size_t>(window.rows) * columns * bytes);
+  for (std::int64_t i = 0; i < window.rows; ++i) {
+    const auto row = raw.subspan(static_cast<std::size_t>(i) * columns * bytes, columns * bytes);
+    // Only the ends of most rows are converted.
+    if (window.column == 0) add_side(row.first(depth_columns_ * bytes), false);
+    if (window.column + window.columns == info_.width) add_side(row.last(depth_columns_ * bytes), true);
+    const auto from_north = static_cast<std::size_t>(window.row + i);
+    const auto from_south = static_cast<std::size_t>(info_.height - 1 - window.row - i);
+    const auto keep = [&](std::vector<float>& rows, std::size_t from_edge) {
+      if (from_edge >= depth_rows_) return;
+      rows.resize(depth_rows_ * width);
+      heights_from_samples(
+          info_, 0.0, row,
+          std::span(rows).subspan(from_edge * width + static_cast<std::size_t>(window.column), columns));
+    };
+    keep(north_, from_north);
+    keep(south_, from_south);
+  }
+}
+
+std::uint64_t EdgeRange::memory_bytes() const {
+  return 2 * sizeof(float) * depth_rows_ * static_cast<std::uint64_t>(info_.width);
+}
+
+void EdgeRange::add_edge_rows(const std::vector<float>& rows, ElevationRange& bound) const {
+  const auto width = static_cast<std::size_t>(info_.width);
+  std::vector<float> column(depth_rows_);
+  Profile before{};
+  for (std::size_t c = 0; c < width; ++c) {
+    for (std::size_t r = 0; r < depth_rows_; ++r) column[r] = rows[r * width + c];
+    const Profile profile = profile_of(column);
+    add_between(profile, c == 0 ? profile : before, bound);
+    before = profile;
+  }
+  // Corners are continued along both axes: 2(2a - b) - (2c - d) of four values in the corner's block.
+  for (const bool east : {false, true}) {
+    ElevationRange block{kInfinity, -kInfinity};
+    for (std::size_t r = 0; r < depth_rows_; ++r) {
+      for (std::size_t i = 0; i < depth_columns_; ++i) include(block, rows[r * width + (east ? width - 1 - i : i)]);
+    }
+    if (block.min > block.max) continue;
+    bound.max = std::max(bound.max, 5.0 * block.max - 4.0 * block.min);
+    bound.min = std::min(bound.min, 5.0 * block.min - 4.0 * block.max);
+  }
+}
+
+ElevationRange EdgeRange::widen(const ElevationRange& range) const {
+  ElevationRange bound = bound_;
+  if (!north_.empty()) add_edge_rows(north_, bound);
+  if (!south_.empty()) add_edge_rows(south_, bound);
+  // Heights were rounded to single precision.
+  const double slack = 1e-6 * std::max(std::abs(range.min), std::abs(range.max));
+  const double most = (range.max - range.min) * kMostWidening;
+  ElevationRange wide = range;
+  if (bound.max > range.max) wide.max = std::min(bound.max + slack, range.max + most);
+  if (bound.min < range.min) wide.min = std::max(bound.min - slack, range.min - most);
+  return wide;
+}
+
+}  // namespace isohf

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "isohf/raster.h"
+#include "isohf/surface/source/source_scan.h"
+
+namespace isohf {
+
+/// Bounds the elevations that a surface continued beyond its source's edge can take (Outside::kCover), from the samples
+/// along that edge. Fed with all of the source; keeps `depth_rows` + 2 rows at either end.
+///
+/// A continued elevation is 2 F(edge) - F(inside), with both values between samples of at most `depth` from the edge;
+/// the bound takes the largest of the two edge samples beside it and the smallest of those inside, and the other way
+/// round.
+class EdgeRange {
+ public:
+  EdgeRange(const SourceInfo& info, std::int64_t depth_columns, std::int64_t depth_rows);
+
+  /// raw [window.rows * window.columns samples]. Windows that touch the West or the East edge come from North to South
+  /// and hold all columns that count there: ReadStep's do. The others come in any order.
+  void add_window(const Window& window, std::span<const std::byte> raw);
+
+  /// Memory, bytes.
+  [[nodiscard]] std::uint64_t memory_bytes() const;
+
+  /// After all windows: `range` widened to hold every continued elevation, but by no more than an eighth at either end;
+  /// steeper edges are held at the end of the codes (TileCutter's limits).
+  [[nodiscard]] ElevationRange widen(const ElevationRange& range) const;
+
+ private:
+  /// Smallest and largest height at the edge and within the depth from it, at one place along it.
+  struct Profile {
+    ElevationRange edge;
+    ElevationRange inside;
+  };
+  static Profile profile_of(std::span<const float> from_edge);
+  static void add_between(const Profile& a, const Profile& b, ElevationRange& bound);
+  void add_side(std::span<const std::byte> samples, bool east);
+  void add_edge_rows(const std::vector<float>& rows, ElevationRange& bound) const;
+
+  const SourceInfo& info_;
+  std::size_t depth_columns_;
+  std::size_t depth_rows_;
+  std::vector<float> north_;                            ///< [depth_rows][width], from the edge
+  std::vector<float> south_;                            ///< the same, from the South edge
+  std::vector<float> side_;                             ///< scratch, from the edge
+  std::array<std::optional<Profile>, 2> last_profile_;  ///< West and East, of the row before
+  ElevationRange bound_;
+};
+
+}  // namespace isohf

@@ -1,0 +1,85 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "isohf/raster.h"
+#include "isohf/surface/resample/kernels.h"
+
+namespace isohf {
+
+/// What surrounds the source: tiles reach past its last sample unless they were fitted to it.
+enum class Outside {
+  kCover,  ///< the surface goes on with its slope for two lattice steps, then level: planes hold up to the source's
+           ///< edge
+  kClamp,  ///< the edge value goes on
+  kVoid,   ///< no elevation
+};
+
+[[nodiscard]] std::string to_string(Outside outside);                ///< "cover", "clamp", "void"
+[[nodiscard]] Outside outside_from_string(const std::string& text);  ///< throws Error{kInvalidArgument}
+
+/// Lattice steps for which Outside::kCover continues slopes: the triangles that straddle the source's edge need one,
+/// and the normals of their vertices another.
+inline constexpr double kContinuedSteps = 2.0;
+
+/// One axis of the source: which of its samples a world coordinate falls on or between.
+///
+///   area    |-- 0 --|-- 1 --|  ...  |- n-1 -|      first_world is the place of sample 0, the middle of its pixel
+///   point       0-------1---  ...  ---n-1          the source ends at its first and last posts
+class SourceAxis {
+ public:
+  /// Where a world coordinate reads the source. Beyond the first or last sample by d, a continued surface has the
+  /// elevation 2 F(edge) - F(position), with the position mirrored: as far inside as the coordinate lies outside.
+  struct Place {
+    double position;    ///< in samples, within [0, n-1]; in [0, n) on an axis that wraps
+    double edge = 0.0;  ///< 0 or n-1, where continued
+    bool continued = false;
+    bool has_elevation = true;  ///< false where Outside leaves none
+  };
+
+  /// samples >= 1; first_world, spacing_world and continued_world in world units, spacing > 0; continued_world is how
+  /// far Outside::kCover continues slopes.
+  SourceAxis(std::int64_t samples, double first_world, double spacing_world, Registration registration, Outside outside,
+             double continued_world);
+
+  /// An axis that goes all the way round: the sample behind the last one is the first.
+  [[nodiscard]] static SourceAxis wrapping(std::int64_t samples, double first_world, double spacing_world);
+  /// An axis whose world coordinates are positions, in samples, of a source that was projected. Where the slope has
+  /// gone on for `continued` samples, Outside::kCover ends: such a source fills no rectangle of the world, and a level
+  /// plain all around it would be made up.
+  [[nodiscard]] static SourceAxis of_positions(std::int64_t samples, Registration registration, Outside outside,
+                                               double continued);
+
+  [[nodiscard]] std::int64_t samples() const { return samples_; }
+  [[nodiscard]] bool wraps() const { return wraps_; }
+  /// The sample that stands in for sample k, any k: mirrored at the ends (mirror_index), or counted round.
+  [[nodiscard]] std::int64_t index(std::int64_t k) const {
+    if (k >= 0 && k < samples_) return k;
+    return wraps_ ? ((k % samples_) + samples_) % samples_ : mirror_index(k, samples_);
+  }
+  /// The same with weights, for heights (continue_row).
+  template <typename Use>
+  void stand_ins(std::int64_t k, Edges edges, Use use) const {
+    if (wraps_ || (k >= 0 && k < samples_)) return use(index(k), 1);
+    continue_row(k, samples_, edges, use);
+  }
+  /// Whole samples inside the edge that a continued place may read.
+  [[nodiscard]] std::int64_t continued_samples() const;
+
+  /// Pure function of the coordinate. Half a pixel around an area-registered source is covered ground: clamped where
+  /// Outside::kClamp asks for it, else continued.
+  [[nodiscard]] Place place(double world) const;
+
+ private:
+  std::int64_t samples_;
+  double first_world_;
+  double spacing_world_;
+  double reach_;  ///< how far the covered ground goes beyond the first and last samples, in samples
+  Outside outside_;
+  double continued_;  ///< in samples
+  bool wraps_ = false;
+  bool ends_ = false;  ///< nothing lies beyond the continuation
+};
+
+}  // namespace isohf

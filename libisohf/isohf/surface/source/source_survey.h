@@ -1,0 +1,62 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "isohf/surface/source/source_scan.h"
+
+namespace isohf {
+
+/// A raw value that looks like a mark for voids that the source does not declare.
+struct UndeclaredVoid {
+  double value = 0.0;
+  std::int64_t count = 0;    ///< samples that hold it
+  bool many_values = false;  ///< `value` is but the outermost of several
+};
+
+/// What one pass over a whole source finds, whatever parts it comes in: range and counts, the mean where it is wanted,
+/// and voids that are not declared.
+///
+/// A value counts as an undeclared void where it is one that files mark voids with (-32768, -32767, 32767, 65535,
+/// -9999, 9999, -99999, 99999, -999999, 999999; or anything from 1e30 on, on either side) and lies further from all
+/// other elevations than these lie from each other. Ordinary sources pay nothing for that: samples are looked at again
+/// only in parts whose smallest or largest is such a value.
+class SourceSurvey {
+ public:
+  /// with_mean: takes as long as the rest again.
+  SourceSurvey(const SourceInfo& info, bool with_mean);
+
+  /// Samples of the source's type; every sample of the source once, in any order that suits.
+  void add(std::span<const std::byte> raw);
+  /// What another survey of the same source found in other parts.
+  void add(const SourceSurvey& other);
+
+  /// Range in elevations.
+  [[nodiscard]] SourceScan scan() const;
+  /// Of all valid elevations; nullopt where there are none or it was not wanted.
+  [[nodiscard]] std::optional<double> mean() const;
+  [[nodiscard]] std::vector<UndeclaredVoid> undeclared_voids() const;
+  /// One line on them for the user, without the path; empty where there are none.
+  [[nodiscard]] std::string warning() const;
+
+ private:
+  void look_for_voids(std::span<const std::byte> raw, SourceScan part);
+
+  SourceInfo info_;  ///< of raw samples: scale 1, offset 0
+  double z_scale_ = 1.0;
+  double z_offset_ = 0.0;
+  bool with_mean_ = false;
+  double sum_ = 0.0;
+  SourceScan all_;     ///< raw
+  SourceScan others_;  ///< raw, without the suspects
+  std::map<double, std::int64_t> suspects_;
+  SourceScan huge_negative_;
+  SourceScan huge_positive_;
+};
+
+}  // namespace isohf

@@ -1,0 +1,415 @@
+#include "isohf/verify/accuracy/against_source.h"
+
+#include <fmt/format.h>
+#include <oneapi/tbb/enumerable_thread_specific.h>
+#include <oneapi/tbb/parallel_for.h>
+#include <oneapi/tbb/task_arena.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <random>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "isohf/archive/accuracy_info.h"
+#include "isohf/base/assert.h"
+#include "isohf/error.h"
+#include "isohf/lattice/barycentric.h"
+#include "isohf/restore/archive_geometry.h"
+#include "isohf/surface/source/band_reader.h"
+#include "isohf/surface/source/source_scan.h"
+#include "isohf/verify/accuracy/error_statistics.h"
+
+namespace isohf {
+namespace {
+
+/// What one run of samples adds up to; sums are formed run by run in a fixed order.
+struct Sums {
+  AccuracyReport counts;
+  ErrorSums errors;
+  std::int64_t worst_column = 0;
+  std::int64_t visited = 0;
+};
+
+/// A random place in source columns and rows.
+struct Place {
+  double u;
+  double v;
+  WorldPoint world;
+  std::int64_t tile_row;
+};
+
+/// Source samples that are looked at together: either side of a square.
+constexpr std::int64_t kBlock = 32;
+/// Samples around one that are searched for voids, at most: next to a pole a triangle reaches over any number.
+constexpr std::int64_t kMostReach = 64;
+constexpr std::size_t kMostPeaks = 256;
+/// Object coordinates this near to a vertex's are the vertex's: places are rounded, and next to a void it matters.
+constexpr double kOnVertex = 1e-7;
+
+double snapped(double object) {
+  const double whole = std::round(object);
+  return std::abs(object - whole) < kOnVertex ? whole : object;
+}
+
+/// Leaves the largest.
+void prune(std::vector<ErrorPeak>& peaks) {
+  std::sort(peaks.begin(), peaks.end(), [](const ErrorPeak& a, const ErrorPeak& b) {
+    return a.error != b.error ? a.error > b.error : a.row < b.row;
+  });
+  peaks.resize(std::min(peaks.size(), kMostPeaks));
+}
+
+/// A row of tiles, decoded.
+struct TileRowSurface {
+  std::int64_t tile_row = 0;
+  std::vector<std::vector<double>> elevations;
+};
+
+class Comparison {
+ public:
+  Comparison(const ArchiveReader& archive, HeightSource& source, std::int64_t random_points)
+      : archive_(archive),
+        grid_(archive.grid()),
+        record_(archive.metadata().source),
+        source_(source),
+        info_(source.info()) {
+    if (info_.width != record_.width || info_.height != record_.height) {
+      throw Error(ErrorCode::kInvalidArgument,
+                  fmt::format("{}: {}x{} samples, {} was made from {}x{}", info_.path, info_.width, info_.height,
+                              archive.path(), record_.width, record_.height));
+    }
+    const Statistics& statistics = archive.metadata().statistics;
+    const ElevationRange range{statistics.min.value_or(0.0), statistics.max.value_or(0.0)};
+    datum_ = choose_datum(info_, range);
+    span_ = range.max - range.min;
+    const double reach = std::max(grid_.sigma_x() * 2.0 / record_.spacing_x, grid_.sigma_z() / record_.spacing_z);
+    reach_ = static_cast<std::int64_t>(std::ceil(reach)) + 1;
+    if (is_warped(archive.metadata())) warp_.emplace(*archive_geometry(archive.metadata()).warp);
+    draw_points(random_points);
+  }
+
+  AccuracyReport run(const std::function<void(std::int64_t, std::int64_t)>& progress, const std::atomic<bool>& cancel) {
+    const Prefilter samples_as_they_are = Prefilter::make(Filter::kBilinear, {});
+    BandReader reader(source_, datum_, samples_as_they_are);
+    AccuracyReport report;
+    ErrorSums errors;
+    double random_squares = 0.0;
+    std::int64_t first_row = 0;
+    if (warp_) run_warped(reader, report, errors, random_squares, progress, cancel);
+    for (std::int64_t tile_row = 0; !warp_ && tile_row < grid_.tile_rows() && first_row < info_.height; ++tile_row) {
+      if (cancel.load(std::memory_order_relaxed)) throw Error(ErrorCode::kCancelled, "interrupted");
+      const std::int64_t end_row = rows_until(tile_row);
+      if (end_row > first_row) {
+        const auto band =
+            reader.read({std::max<std::int64_t>(first_row - reach_, 0), std::min(end_row + reach_, info_.height) - 1});
+        const TileRowSurface surface = decode(tile_row);
+        compare_rows(surface, *band, first_row, end_row, report, errors);
+        compare_points(surface, *band, first_row, end_row, report, random_squares);
+        first_row = end_row;
+      }
+      if (progress) progress(tile_row + 1, grid_.tile_rows());
+    }
+    report.samples = info_.width * info_.height;
+    report.samples_compared = errors.count;
+    report.rms = errors.rms();
+    report.max = errors.max;
+    report.worst = errors.worst;
+    if (report.random_points > 0)
+      report.random_rms = std::sqrt(random_squares / static_cast<double>(report.random_points));
+    report.psnr_db = psnr_db(span_, report.rms);
+    ErrorHistogram histogram;
+    for (const ErrorHistogram& part : histograms_) histogram.add(part);
+    prune(report.peaks);
+    report.p99 = std::min(histogram.percentile(0.99), report.max);
+    return report;
+  }
+
+ private:
+  [[nodiscard]] double world_x(double column) const { return record_.first_sample_x + column * record_.spacing_x; }
+  [[nodiscard]] double world_z(double row) const { return record_.first_sample_z + row * record_.spacing_z; }
+
+  /// The tile row under a world place; the nearest one for places beside the tiles.
+  [[nodiscard]] std::int64_t tile_row_at(WorldPoint world) const {
+    const double row = std::floor(world.z / grid_.extent_z());
+    return static_cast<std::int64_t>(std::clamp(row, 0.0, static_cast<double>(grid_.tile_rows() - 1)));
+  }
+
+  /// The source was projected: each sample has a place of its own, and is compared with the tile row that it lies on.
+  void run_warped(BandReader& reader, AccuracyReport& report, ErrorSums& errors, double& random_squares,
+                  const std::function<void(std::int64_t, std::int64_t)>& progress, const std::atomic<bool>& cancel) {
+    const std::vector<SourceWarp::RowBounds> all = SourceWarp(grid_, warp_->place(), 0.0).reading_bounds();
+    visited_ = 0;
+    for (std::int64_t tile_row = 0; tile_row < grid_.tile_rows(); ++tile_row) {
+      if (cancel.load(std::memory_order_relaxed)) throw Error(ErrorCode::kCancelled, "interrupted");
+      const SourceWarp::RowBounds& bounds = all[static_cast<std::size_t>(tile_row)];
+      const auto last = static_cast<double>(info_.height - 1);
+      if (bounds.most >= 0.0 && bounds.least <= last) {
+        const auto first_row = static_cast<std::int64_t>(std::max(std::floor(bounds.least), 0.0));
+        const auto end_row = static_cast<std::int64_t>(std::min(std::ceil(bounds.most), last)) + 1;
+        const auto band = reader.read(
+            {std::max<std::int64_t>(first_row - kMostReach, 0), std::min(end_row + kMostReach, info_.height) - 1});
+        const TileRowSurface surface = decode(tile_row);
+        compare_rows(surface, *band, first_row, end_row, report, errors);
+        for (; next_point_ < points_.size() && points_[next_point_].tile_row <= tile_row; ++next_point_) {
+          compare_point(surface, *band, points_[next_point_], report, random_squares);
+        }
+      }
+      if (progress) progress(tile_row + 1, grid_.tile_rows());
+    }
+    // Every sample lies on one tile row.
+    ISOHF_ASSERT(visited_ == info_.width * info_.height);
+  }
+
+  /// One past the last source row that lies North of the tile row's South edge; all that are left, for the last row.
+  [[nodiscard]] std::int64_t rows_until(std::int64_t tile_row) const {
+    if (tile_row + 1 == grid_.tile_rows()) return info_.height;
+    const double edge = static_cast<double>(tile_row + 1) * grid_.extent_z();
+    const double rows = std::ceil((edge - record_.first_sample_z) / record_.spacing_z);
+    return std::clamp<std::int64_t>(static_cast<std::int64_t>(rows), 0, info_.height);
+  }
+
+  TileRowSurface decode(std::int64_t tile_row) const {
+    TileRowSurface surface;
+    surface.tile_row = tile_row;
+    surface.elevations.resize(static_cast<std::size_t>(grid_.tile_columns()));
+    oneapi::tbb::parallel_for(std::size_t{0}, surface.elevations.size(), [&](std::size_t column) {
+      surface.elevations[column] = archive_.read_elevations({static_cast<std::int64_t>(column), tile_row});
+    });
+    return surface;
+  }
+
+  [[nodiscard]] double elevation_at(const TileRowSurface& surface, WorldPoint world) const {
+    TilePoint at = grid_.locate(world);
+    // A source row on the edge of two tile rows may be rounded to either; their vertices on it are the same.
+    if (at.tile.row > surface.tile_row) at.point.z = grid_.shape().cell_rows();
+    if (at.tile.row < surface.tile_row) at.point.z = 0.0;
+    at.point = {snapped(at.point.x), snapped(at.point.z)};
+    const std::vector<double>& elevations = surface.elevations[static_cast<std::size_t>(at.tile.column)];
+    const View2D<const double> view(elevations.data(), grid_.shape().columns(), grid_.shape().rows());
+    return interpolate(barycentric(grid_.shape(), at.point), view);
+  }
+
+  void compare_rows(const TileRowSurface& surface, const Band& band, std::int64_t first, std::int64_t end,
+                    AccuracyReport& report, ErrorSums& errors) {
+    std::vector<Sums> sums(static_cast<std::size_t>(end - first));
+    if (warp_) {
+      oneapi::tbb::parallel_for(first / kBlock, (end + kBlock - 1) / kBlock, [&](std::int64_t block) {
+        const std::int64_t from = std::max(first, block * kBlock);
+        const std::int64_t to = std::min(end, (block + 1) * kBlock);
+        compare_warped_rows(surface, band, from, to, std::span(sums).subspan(static_cast<std::size_t>(from - first)));
+      });
+    } else {
+      oneapi::tbb::parallel_for(first, end, [&](std::int64_t row) {
+        compare_row(surface, band, row, sums[static_cast<std::size_t>(row - first)], histograms_.local());
+      });
+    }
+    for (std::size_t i = 0; i < sums.size(); ++i) {
+      const Sums& row = sums[i];
+      if (row.errors.max > 0.0) {
+        report.peaks.push_back({row.errors.max, row.worst_column, first + static_cast<std::int64_t>(i)});
+        if (report.peaks.size() > 64 * kMostPeaks) prune(report.peaks);
+      }
+      visited_ += row.visited;
+      errors.add(row.errors);
+      report.samples_void += row.counts.samples_void;
+      report.samples_lost += row.counts.samples_lost;
+      report.lost_inside += row.counts.lost_inside;
+      report.samples_invented += row.counts.samples_invented;
+      report.invented_inside += row.counts.invented_inside;
+    }
+  }
+
+  void compare_row(const TileRowSurface& surface, const Band& band, std::int64_t row, Sums& sums,
+                   ErrorHistogram& histogram) const {
+    for (std::int64_t column = 0; column < info_.width; ++column) {
+      const WorldPoint world{world_x(static_cast<double>(column)), world_z(static_cast<double>(row))};
+      compare_sample(surface, band, column, row, world, sums, histogram);
+    }
+  }
+
+  void compare_sample(const TileRowSurface& surface, const Band& band, std::int64_t column, std::int64_t row,
+                      WorldPoint world, Sums& sums, ErrorHistogram& histogram) const {
+    const float sample = band.view().heights(column, row - band.rows.first);
+    const double stored = elevation_at(surface, world);
+    const bool is_void = std::isnan(sample);
+    sums.counts.samples_void += is_void ? 1 : 0;
+    if (is_void || std::isnan(stored)) {
+      if (is_void != std::isnan(stored)) count_mismatch(band, column, row, is_void, sums.counts);
+      return;
+    }
+    const double error = std::abs(stored - (double{sample} + datum_));
+    if (error > sums.errors.max) sums.worst_column = column;
+    sums.errors.add(error, world);
+    histogram.add(error);
+  }
+
+  /// Those samples of rows [first, end), a block's rows at most, that lie on the surface's tile row.
+  void compare_warped_rows(const TileRowSurface& surface, const Band& band, std::int64_t first, std::int64_t end,
+                           std::span<Sums> sums) {
+    ErrorHistogram& histogram = histograms_.local();
+    for (std::int64_t column = 0; column < info_.width; column += kBlock) {
+      const std::int64_t end_column = std::min(column + kBlock, info_.width);
+      if (!may_meet(surface.tile_row, column, end_column, first, end)) continue;
+      for (std::int64_t row = first; row < end; ++row) {
+        Sums& of_row = sums[static_cast<std::size_t>(row - first)];
+        for (std::int64_t c = column; c < end_column; ++c) {
+          const WorldPoint world = warp_->world_from_source({static_cast<double>(c), static_cast<double>(row)});
+          if (tile_row_at(world) != surface.tile_row) continue;
+          ++of_row.visited;
+          compare_sample(surface, band, c, row, world, of_row, histogram);
+        }
+      }
+    }
+  }
+
+  /// False where a block of samples surely lies on other tile rows: its place is known at nine of them, and bends
+  /// between these by less than half as much as it changes over the block.
+  [[nodiscard]] bool may_meet(std::int64_t tile_row, std::int64_t column, std::int64_t end_column, std::int64_t row,
+                              std::int64_t end_row) const {
+    double least = HUGE_VAL;
+    double most = -HUGE_VAL;
+    for (const double t : {0.0, 0.5, 1.0}) {
+      for (const double s : {0.0, 0.5, 1.0}) {
+        const double u = static_cast<double>(column) + s * static_cast<double>(end_column - 1 - column);
+        const double v = static_cast<double>(row) + t * static_cast<double>(end_row - 1 - row);
+        const double z = warp_->world_from_source({u, v}).z;
+        least = std::min(least, z);
+        most = std::max(most, z);
+      }
+    }
+    const double margin = 0.5 * (most - least) + grid_.sigma_z();
+    return tile_row_at({0.0, least - margin}) <= tile_row && tile_row_at({0.0, most + margin}) >= tile_row;
+  }
+
+  /// Samples that a triangle may reach over from this one.
+  [[nodiscard]] std::int64_t reach_at(std::int64_t column, std::int64_t row) const {
+    if (!warp_) return reach_;
+    const SourcePosition here{static_cast<double>(column), static_cast<double>(row)};
+    const WorldPoint world = warp_->world_from_source(here);
+    double most = 0.0;
+    for (const double side : {-1.0, 1.0}) {
+      for (const auto& [x, z] :
+           {std::pair{2.0 * side * grid_.sigma_x(), 0.0}, std::pair{0.0, side * grid_.sigma_z()}}) {
+        const SourcePosition there = warp_->source_from_world({world.x + x, world.z + z});
+        most = std::max({most, std::abs(std::remainder(there.u - here.u, warp_->place().columns_round())),
+                         std::abs(there.v - here.v)});
+      }
+    }
+    return std::min(static_cast<std::int64_t>(std::ceil(1.5 * most)) + 1, kMostReach);
+  }
+
+  /// A sample that has an elevation on one side only. Around voids that is as it should be: a triangle with a void
+  /// vertex is no surface. It is a fault where the neighbourhood within a triangle's reach is all of one kind.
+  void count_mismatch(const Band& band, std::int64_t column, std::int64_t row, bool void_in_source,
+                      AccuracyReport& counts) const {
+    ++(void_in_source ? counts.samples_invented : counts.samples_lost);
+    const bool edge_is_void = archive_.metadata().outside == "void";
+    const std::int64_t reach = reach_at(column, row);
+    for (std::int64_t r = row - reach; r <= row + reach; ++r) {
+      for (std::int64_t c = column - reach; c <= column + reach; ++c) {
+        const bool inside = c >= 0 && r >= band.rows.first && c < info_.width && r <= band.rows.last;
+        if (!inside && !edge_is_void) continue;
+        const bool is_void = !inside || std::isnan(band.view().heights(c, r - band.rows.first));
+        if (is_void != void_in_source) return;
+      }
+    }
+    ++(void_in_source ? counts.invented_inside : counts.lost_inside);
+  }
+
+  /// Fixed seed, sorted from North to South.
+  void draw_points(std::int64_t count) {
+    std::mt19937_64 random(20040808);
+    const auto uniform = [&](double end) { return static_cast<double>(random() >> 11U) * 0x1p-53 * end; };
+    points_.reserve(static_cast<std::size_t>(count));
+    for (std::int64_t i = 0; i < count; ++i) {
+      const double u = uniform(static_cast<double>(info_.width - 1));
+      const double v = uniform(static_cast<double>(info_.height - 1));
+      const WorldPoint world = warp_ ? warp_->world_from_source({u, v}) : WorldPoint{world_x(u), world_z(v)};
+      points_.push_back({u, v, world, warp_ ? tile_row_at(world) : 0});
+    }
+    std::sort(points_.begin(), points_.end(), [](const Place& a, const Place& b) {
+      return a.tile_row != b.tile_row ? a.tile_row < b.tile_row : a.v < b.v;
+    });
+  }
+
+  /// Points whose place lies in this tile row: their source row is in [first - 1, end).
+  void compare_points(const TileRowSurface& surface, const Band& band, std::int64_t first, std::int64_t end,
+                      AccuracyReport& report, double& squares) {
+    const bool last = end == info_.height;
+    for (; next_point_ < points_.size(); ++next_point_) {
+      const Place& place = points_[next_point_];
+      if (!last && place.v > static_cast<double>(end - 1)) break;
+      if (first > 0 && place.v < static_cast<double>(first)) continue;  // between the last row and the edge
+      compare_point(surface, band, place, report, squares);
+    }
+  }
+
+  void compare_point(const TileRowSurface& surface, const Band& band, const Place& place, AccuracyReport& report,
+                     double& squares) const {
+    const auto i = static_cast<std::int64_t>(place.u);
+    const auto j = static_cast<std::int64_t>(place.v);
+    const View2D<const float> heights = band.view().heights;
+    const auto h = [&](std::int64_t c, std::int64_t r) {
+      return double{heights(std::min(c, info_.width - 1), std::min(r, info_.height - 1) - band.rows.first)};
+    };
+    const double u = place.u - static_cast<double>(i);
+    const double v = place.v - static_cast<double>(j);
+    const double expected =
+        (1 - v) * ((1 - u) * h(i, j) + u * h(i + 1, j)) + v * ((1 - u) * h(i, j + 1) + u * h(i + 1, j + 1));
+    const double stored = elevation_at(surface, place.world);
+    if (std::isnan(expected) || std::isnan(stored)) return;
+    const double error = std::abs(stored - expected - datum_);
+    ++report.random_points;
+    squares += error * error;
+    report.random_max = std::max(report.random_max, error);
+  }
+
+  const ArchiveReader& archive_;
+  const TileGrid& grid_;
+  const SourceRecord& record_;
+  HeightSource& source_;
+  const SourceInfo& info_;
+  double datum_ = 0.0;
+  double span_ = 0.0;
+  std::int64_t reach_ = 2;
+  std::optional<ExactWarp> warp_;  ///< where the source was projected
+  std::int64_t visited_ = 0;
+  std::vector<Place> points_;  ///< from North to South
+  std::size_t next_point_ = 0;
+  oneapi::tbb::enumerable_thread_specific<ErrorHistogram> histograms_;
+};
+
+}  // namespace
+
+AccuracyReport compare_with_source(const ArchiveReader& archive, HeightSource& source, std::int64_t random_points,
+                                   int threads, const std::function<void(std::int64_t, std::int64_t)>& progress,
+                                   const std::atomic<bool>& cancel) {
+  AccuracyReport report;
+  oneapi::tbb::task_arena arena(threads > 0 ? threads : oneapi::tbb::task_arena::automatic);
+  arena.execute([&] { report = Comparison(archive, source, random_points).run(progress, cancel); });
+  return report;
+}
+
+std::string contradiction(const Metadata& metadata, const AccuracyReport& found) {
+  const std::optional<AccuracyInfo> stated = accuracy_info(metadata);
+  if (!stated) return {};
+  // The reference of the heights' floats may be another one.
+  const Statistics& statistics = metadata.statistics;
+  const double largest = std::max(std::abs(statistics.min.value_or(0.0)), std::abs(statistics.max.value_or(0.0)));
+  const double tolerance = 1e-6 * largest + 1e-9;
+  if (stated->compared == found.samples_compared && stated->lost == found.samples_lost &&
+      std::abs(stated->max - found.max) <= tolerance && std::abs(stated->rms - found.rms) <= tolerance) {
+    return {};
+  }
+  return fmt::format(
+      "the metadata state an error of rms {:.6g}, at most {:.6g}, over {} samples, {} lost; found are rms {:.6g}, at "
+      "most "
+      "{:.6g}, {} samples, {} lost",
+      stated->rms, stated->max, stated->compared, stated->lost, found.rms, found.max, found.samples_compared,
+      found.samples_lost);
+}
+
+}  // namespace isohf
