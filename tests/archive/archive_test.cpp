@@ -5,8 +5,8 @@
 
 #include "archive/tiles.h"
 #include "isohf/archive.h"
-#include "isohf/archive/codec/tile_codec.h"
 #include "isohf/archive/codec/tile_codes.h"
+#include "isohf/archive/codec/tile_encoder.h"
 #include "isohf/archive/deflate/deflate.h"
 #include "isohf/archive/writer.h"
 #include "isohf/error.h"

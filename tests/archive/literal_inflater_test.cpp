@@ -1,5 +1,5 @@
 #include "isohf/archive/deflate/literal_inflater.h"
-#include "isohf/archive/codec/tile_codec.h"
+#include "isohf/archive/codec/tile_encoder.h"
 
 #include <gtest/gtest.h>
 #include <libdeflate.h>

@@ -86,20 +86,20 @@ def decode(payload, columns, rows, kind):
     assert at + extra_bytes == len(payload)
     modulus = 1 << (32 if kind == 2 else 16)
 
-    def unfolded(symbol):
+    def unzigzagged(symbol):
         if symbol < 16:
             return symbol
         bits = (symbol - 16) // 8 + 1
         return ((8 + (symbol & 7)) << bits) + extra.take(bits)
 
-    streams = [iter([unfolded(symbol) for symbol in found]) for found in symbols]
+    streams = [iter([unzigzagged(symbol) for symbol in found]) for found in symbols]
     assert (extra.at + 7) // 8 == extra_bytes
 
-    def residual(activity):
-        return next(streams[sum(threshold <= activity for threshold in thresholds)])
+    def residual(energy):
+        return next(streams[sum(threshold <= energy for threshold in thresholds)])
 
-    def restore(halves, folded):
-        difference = folded // 2 if folded % 2 == 0 else -(folded + 1) // 2
+    def restore(halves, zigzagged):
+        difference = zigzagged // 2 if zigzagged % 2 == 0 else -(zigzagged + 1) // 2
         prediction = (halves + 1) >> 1
         value = (prediction + difference if halves % 2 else prediction - difference) % modulus
         if kind == 2 and value >= modulus // 2:
@@ -133,11 +133,11 @@ def decode(payload, columns, rows, kind):
                           farther[p + s - 2], near[p + s + 2], near[p + s - 3], far[p + 3], far[p - 3]]
             total = sum(a * (b - ne) for a, b in zip(w, neighbours))
             halves = min(max((4096 * ne + total) >> 11, 2 * low), 2 * high - 1)
-            folded = residual(4 * (n[p + s] + n[p + s - 1] + f[p]) + 3 * n[p + s + 1]
+            zigzagged = residual(4 * (n[p + s] + n[p + s - 1] + f[p]) + 3 * n[p + s + 1]
                               + 2 * (n[p + s + 2] + n[p + s - 2] + f[p + 1] + f[p - 1])
                               + n[p + s - 3] + f[p + 2] + f[p - 2])
-            v[p] = restore(halves, folded)
-            g[p] = min(folded >> shift, 157)
+            v[p] = restore(halves, zigzagged)
+            g[p] = min(zigzagged >> shift, 157)
             out[r * columns + column[p]] = v[p]
         for c, p in (() if s else ((1, 1), (columns - 2, columns - 3))):
             if not mask[r * columns + c]:

@@ -6,7 +6,8 @@
 #include <random>
 
 #include "archive/tiles.h"
-#include "isohf/archive/codec/tile_codec.h"
+#include "isohf/archive/codec/tile_decoder.h"
+#include "isohf/archive/codec/tile_encoder.h"
 #include "isohf/archive/codec/tile_payload.h"
 #include "isohf/archive/deflate/deflate.h"
 

@@ -16,7 +16,7 @@ struct Streams {
   std::vector<std::byte> symbols;
   std::vector<std::byte> extra;  ///< with the slack behind it
   std::size_t extra_bytes = 0;
-  std::vector<std::uint16_t> folded;
+  std::vector<std::uint16_t> zigzagged;
   std::uint64_t bits = 0;
 
   [[nodiscard]] std::uint64_t expand(std::uint64_t position, std::uint16_t* to) const {
@@ -31,12 +31,12 @@ Streams make_streams(std::size_t count, std::uint32_t range, std::uint64_t posit
   streams.extra.resize(count * 2 + kExpanderSlack + 16);
   streams.bits = position;
   for (std::size_t i = 0; i < count; ++i) {
-    const auto folded = static_cast<std::uint16_t>((random() & 0xffffU) >> (random() % (range + 1)));
-    const unsigned symbol = symbol_of(folded);
-    streams.folded.push_back(folded);
+    const auto zigzagged = static_cast<std::uint16_t>((random() & 0xffffU) >> (random() % (range + 1)));
+    const unsigned symbol = symbol_of(zigzagged);
+    streams.zigzagged.push_back(zigzagged);
     streams.symbols.push_back(static_cast<std::byte>(symbol));
     for (unsigned bit = 0; bit < extra_bits_of_symbol(symbol); ++bit, ++streams.bits) {
-      streams.extra[streams.bits / 8] |= static_cast<std::byte>((folded >> bit & 1U) << streams.bits % 8);
+      streams.extra[streams.bits / 8] |= static_cast<std::byte>((zigzagged >> bit & 1U) << streams.bits % 8);
     }
   }
   streams.extra_bytes = static_cast<std::size_t>((streams.bits + 7) / 8);
@@ -54,9 +54,9 @@ TEST_P(ResidualExpander, PutsExtraBitsToSymbols) {
     for (std::size_t count = 0; count < 70; ++count) {
       for (const std::uint64_t position : {std::uint64_t{0}, std::uint64_t{5}, std::uint64_t{8}}) {
         const Streams streams = make_streams(count, range, position, static_cast<std::uint32_t>(count));
-        std::vector<std::uint16_t> folded(count);
-        ASSERT_EQ(streams.expand(position, folded.data()), streams.bits) << range << ", " << count;
-        ASSERT_EQ(folded, streams.folded);
+        std::vector<std::uint16_t> zigzagged(count);
+        ASSERT_EQ(streams.expand(position, zigzagged.data()), streams.bits) << range << ", " << count;
+        ASSERT_EQ(zigzagged, streams.zigzagged);
       }
     }
   }
@@ -64,11 +64,11 @@ TEST_P(ResidualExpander, PutsExtraBitsToSymbols) {
 
 TEST_P(ResidualExpander, ReadsEveryResidual) {
   Streams streams;
-  std::vector<std::uint16_t> folded(65536);
+  std::vector<std::uint16_t> zigzagged(65536);
   for (std::uint32_t first = 0; first < 65536; first += 65536 / 64) {
     streams = make_streams(1000, 0, 0, first);
-    ASSERT_EQ(streams.expand(0, folded.data()), streams.bits);
-    ASSERT_TRUE(std::equal(streams.folded.begin(), streams.folded.end(), folded.begin()));
+    ASSERT_EQ(streams.expand(0, zigzagged.data()), streams.bits);
+    ASSERT_TRUE(std::equal(streams.zigzagged.begin(), streams.zigzagged.end(), zigzagged.begin()));
   }
 }
 
@@ -77,8 +77,8 @@ TEST_P(ResidualExpander, RefusesSymbolsThatDoNotExist) {
     for (std::size_t at = 0; at < 40; ++at) {
       Streams streams = make_streams(40, 16, 0, 1);
       streams.symbols[at] = static_cast<std::byte>(symbol);
-      std::vector<std::uint16_t> folded(40);
-      EXPECT_EQ(streams.expand(0, folded.data()), kNotExpanded) << symbol << " at " << at;
+      std::vector<std::uint16_t> zigzagged(40);
+      EXPECT_EQ(streams.expand(0, zigzagged.data()), kNotExpanded) << symbol << " at " << at;
     }
   }
 }
@@ -86,21 +86,21 @@ TEST_P(ResidualExpander, RefusesSymbolsThatDoNotExist) {
 TEST_P(ResidualExpander, RefusesTooFewExtraBits) {
   for (const std::size_t count : {std::size_t{1}, std::size_t{16}, std::size_t{47}, std::size_t{200}}) {
     Streams streams = make_streams(count, 0, 0, 9);
-    std::vector<std::uint16_t> folded(count);
+    std::vector<std::uint16_t> zigzagged(count);
     while (streams.extra_bytes-- > 0) {
       // The slack alone behind what is left, so that the sanitizers see a read too far.
       streams.extra.assign(streams.extra.begin(),
                            streams.extra.begin() + static_cast<std::ptrdiff_t>(streams.extra_bytes + kExpanderSlack));
-      ASSERT_EQ(streams.expand(0, folded.data()), kNotExpanded) << streams.extra_bytes;
+      ASSERT_EQ(streams.expand(0, zigzagged.data()), kNotExpanded) << streams.extra_bytes;
       if (streams.extra_bytes == 0) break;
     }
   }
 }
 
-/// Symbols and extra bits of these folded residuals of floats, and the slack.
+/// Symbols and extra bits of these zigzagged residuals of floats, and the slack.
 struct FloatStreams {
-  explicit FloatStreams(std::vector<std::uint32_t> residuals) : folded(std::move(residuals)) {
-    for (const std::uint32_t value : folded) {
+  explicit FloatStreams(std::vector<std::uint32_t> residuals) : zigzagged(std::move(residuals)) {
+    for (const std::uint32_t value : zigzagged) {
       const unsigned symbol = symbol_of(value);
       symbols.push_back(static_cast<std::byte>(symbol));
       for (unsigned bit = 0; bit < extra_bits_of_symbol(symbol); ++bit, ++bits) {
@@ -112,10 +112,10 @@ struct FloatStreams {
     extra.resize(extra_bytes + kExpanderSlack);
   }
   [[nodiscard]] std::uint64_t expand(std::vector<std::uint32_t>& out) const {
-    out.resize(folded.size());
+    out.resize(zigzagged.size());
     return expand_residuals(symbols, std::span(extra).first(extra_bytes), 0, out.data());
   }
-  std::vector<std::uint32_t> folded;
+  std::vector<std::uint32_t> zigzagged;
   std::vector<std::byte> symbols;
   std::vector<std::byte> extra;
   std::size_t extra_bytes = 0;
@@ -139,7 +139,7 @@ TEST(FloatResidualExpander, ReadsResidualsOfFloats) {
     const FloatStreams streams(residuals_of_all_octaves(count));
     std::vector<std::uint32_t> out;
     ASSERT_EQ(streams.expand(out), streams.bits);
-    EXPECT_EQ(out, streams.folded);
+    EXPECT_EQ(out, streams.zigzagged);
   }
 }
 

@@ -8,21 +8,21 @@
 #include <random>
 #include <vector>
 
-#include "isohf/archive/codec/coding_effort.h"
 #include "isohf/archive/codec/simd/residual_expander.h"
 #include "isohf/archive/codec/tile_codes.h"
+#include "isohf/archive/codec/tile_encoder.h"
 #include "isohf/base/simd.h"
 
 namespace isohf {
 namespace {
 
 /// Whatever has few bits besides its highest: ends of octaves and of their eighths, and their neighbours.
-template <typename Folded>
-std::vector<Folded> residuals_at_all_ends() {
-  constexpr auto kMost = std::uint64_t{std::numeric_limits<Folded>::max()};
-  std::vector<Folded> residuals;
+template <typename Zigzagged>
+std::vector<Zigzagged> residuals_at_all_ends() {
+  constexpr auto kMost = std::uint64_t{std::numeric_limits<Zigzagged>::max()};
+  std::vector<Zigzagged> residuals;
   const auto add = [&](std::uint64_t value) {
-    if (value <= kMost) residuals.push_back(static_cast<Folded>(value));
+    if (value <= kMost) residuals.push_back(static_cast<Zigzagged>(value));
   };
   for (unsigned octave = 3; octave <= 32; ++octave) {
     for (std::uint64_t eighth = 8; eighth < 16; ++eighth) {
@@ -38,19 +38,19 @@ std::vector<Folded> residuals_at_all_ends() {
   return residuals;
 }
 
-template <typename Folded>
-void expect_read_again(const std::vector<Folded>& values) {
-  Residuals<Folded> residuals(values.size(), false);
-  std::copy(values.begin(), values.end(), residuals.folded.data());
-  std::fill_n(residuals.activities.data(), values.size(), std::uint16_t{0});  // so all are of one context
+template <typename Zigzagged>
+void expect_read_again(const std::vector<Zigzagged>& values) {
+  Residuals<Zigzagged> residuals(values.size(), false);
+  std::copy(values.begin(), values.end(), residuals.zigzagged.data());
+  std::fill_n(residuals.energies.data(), values.size(), std::uint16_t{0});  // so all are of one context
   CodingEffort effort = coding_effort(kDefaultLevel);
-  effort.has_pairs = false;
+  effort.streams.has_pairs = false;
   PayloadHeader header;
-  Streams streams = make_streams(residuals, effort, header);
+  Streams streams = make_streams(residuals, effort.streams, header);
   ASSERT_EQ(streams.symbols.size(), 1U);
   const std::size_t extra_bytes = streams.extra.size();
   streams.extra.resize(extra_bytes + kExpanderSlack);
-  std::vector<Folded> back(values.size());
+  std::vector<Zigzagged> back(values.size());
   const std::uint64_t bits =
       expand_residuals(streams.symbols[0], std::span(streams.extra).first(extra_bytes), 0, back.data());
   EXPECT_EQ((bits + 7) / 8, extra_bytes);

@@ -1,7 +1,8 @@
 /// Kernels of vectorised.h and their plain twins: the same bits.
 
 #include "isohf/base/simd.h"
-#include "isohf/archive/codec/tile_codec.h"
+#include "isohf/archive/codec/tile_decoder.h"
+#include "isohf/archive/codec/tile_encoder.h"
 
 #include <gtest/gtest.h>
 
@@ -12,7 +13,7 @@
 
 #include "archive/tiles.h"
 #include "isohf/archive/codec/quantise.h"
-#include "isohf/archive/codec/simd/lane_decoder.h"
+#include "isohf/archive/codec/simd/batch_decoder.h"
 #include "isohf/archive/codec/tile_codes.h"
 #include "isohf/archive/deflate/deflate.h"
 
@@ -58,11 +59,11 @@ TEST_F(Simd, DecodesTilesToTheSameSamples) {
       if (encoded.is_empty) continue;
       std::vector<std::byte> payload(encoded.payload_bytes);
       inflate_exactly(encoded.deflated, payload);
-      const std::vector<std::span<const std::byte>> payloads(kDecoderLanes, payload);
+      const std::vector<std::span<const std::byte>> payloads(kBatchLanes, payload);
       const auto decode = [&] {
-        std::vector<TileCodes> tiles(kDecoderLanes);
-        std::array<bool, kDecoderLanes> decoded{};
-        decode_lanes(shape, type, payloads, tiles, decoded);
+        std::vector<TileCodes> tiles(kBatchLanes);
+        std::array<bool, kBatchLanes> decoded{};
+        decode_batch(shape, type, payloads, tiles, decoded);
         tiles.push_back(decode_tile(shape, type, payload));
         return tiles;
       };

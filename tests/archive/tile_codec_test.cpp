@@ -1,4 +1,5 @@
-#include "isohf/archive/codec/tile_codec.h"
+#include "isohf/archive/codec/tile_decoder.h"
+#include "isohf/archive/codec/tile_encoder.h"
 
 #include <gtest/gtest.h>
 
@@ -193,7 +194,7 @@ TEST(TileCodec, RefusesEveryWrongHeaderField) {
   expect_error(shape, type, with(12, {1}), ErrorCode::kCorrupt);                   // mask bytes
   expect_error(shape, type, with(16, {0, 0, 1, 0}), ErrorCode::kCorrupt);          // base
   expect_error(shape, type, with(20, {255, 255, 255, 255}), ErrorCode::kCorrupt);  // extra bytes
-  expect_error(shape, type, with(24, {32}), ErrorCode::kCorrupt);                  // activity shift
+  expect_error(shape, type, with(24, {32}), ErrorCode::kCorrupt);                  // energy shift
   expect_error(shape, type, with(25, {0}), ErrorCode::kCorrupt);                   // contexts
   expect_error(shape, type, with(25, {17}), ErrorCode::kCorrupt);
   expect_error(shape, type, with(26, {0, 128}), ErrorCode::kCorrupt);  // pairs in a context that is not

@@ -6,7 +6,7 @@
 #include <cstring>
 #include <limits>
 
-#include "isohf/archive/codec/tile_codec.h"
+#include "isohf/archive/codec/tile_encoder.h"
 #include "isohf/archive/writer.h"
 
 namespace isohf::test {

@@ -1,5 +1,5 @@
 #include "isohf/archive/writer.h"
-#include "isohf/archive/codec/tile_codec.h"
+#include "isohf/archive/codec/tile_encoder.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 #include "isohf/archive/container/zip_layout.h"
-#include "isohf/archive/codec/tile_codec.h"
+#include "isohf/archive/codec/tile_encoder.h"
 
 #include <fcntl.h>
 #include <gtest/gtest.h>

@@ -14,8 +14,9 @@
 #include <string>
 #include <vector>
 
-#include "isohf/archive/codec/simd/lane_decoder.h"
-#include "isohf/archive/codec/tile_codec.h"
+#include "isohf/archive/codec/simd/batch_decoder.h"
+#include "isohf/archive/codec/tile_decoder.h"
+#include "isohf/archive/codec/tile_encoder.h"
 #include "isohf/archive/deflate/deflate.h"
 #include "isohf/error.h"
 #include "isohf/lattice.h"
@@ -176,13 +177,13 @@ int run(int argc, char** argv) {
     time_decoding(plain_seconds, [&](std::size_t i) { return decode_tile_slowly(shape, tiles[i].type, payloads[i]); });
     time_decoding(decode_seconds, [&](std::size_t i) { return decode_tile(shape, tiles[i].type, payloads[i]); });
     const double from = now();
-    for (std::size_t i = 0; i < tiles.size(); i += isohf::kDecoderLanes) {
-      const std::size_t count = std::min(isohf::kDecoderLanes, tiles.size() - i);
-      std::array<isohf::TileCodes, isohf::kDecoderLanes> decoded;
-      std::array<bool, isohf::kDecoderLanes> is_decoded{};
-      std::array<std::span<const std::byte>, isohf::kDecoderLanes> group;
+    for (std::size_t i = 0; i < tiles.size(); i += isohf::kBatchLanes) {
+      const std::size_t count = std::min(isohf::kBatchLanes, tiles.size() - i);
+      std::array<isohf::TileCodes, isohf::kBatchLanes> decoded;
+      std::array<bool, isohf::kBatchLanes> is_decoded{};
+      std::array<std::span<const std::byte>, isohf::kBatchLanes> group;
       for (std::size_t k = 0; k < count; ++k) group[k] = payloads[i + k];
-      decode_lanes(shape, tiles[i].type, std::span(group).first(count), std::span(decoded).first(count),
+      decode_batch(shape, tiles[i].type, std::span(group).first(count), std::span(decoded).first(count),
                    std::span(is_decoded).first(count));
       for (std::size_t k = 0; k < count; ++k) same &= !is_decoded[k] || are_same(decoded[k], tiles[i + k]);
     }

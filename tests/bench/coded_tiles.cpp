@@ -2,17 +2,15 @@
 
 #include <cmath>
 
-#include "isohf/archive/codec/coding_effort.h"
-#include "isohf/archive/codec/predict/activities.h"
+#include "isohf/archive/codec/predict/context_energy.h"
 #include "isohf/archive/codec/predict/hex_predictor.h"
 #include "isohf/archive/codec/predict/predictor_fit.h"
-#include "isohf/archive/codec/predict/residual_fold.h"
 #include "isohf/archive/codec/quantise.h"
 #include "isohf/archive/codec/residuals/context_model.h"
 #include "isohf/archive/codec/residuals/residual_streams.h"
 #include "isohf/archive/codec/residuals/residual_symbols.h"
-#include "isohf/archive/codec/tile_codec.h"
 #include "isohf/archive/codec/tile_codes.h"
+#include "isohf/archive/codec/tile_encoder.h"
 #include "isohf/archive/deflate/deflate.h"
 
 namespace isohf::bench {
@@ -66,20 +64,20 @@ Inside::Inside() : lattice(kShape), residuals(samples(), false), sorted(samples(
   for (int r = 0; r < kShape.rows(); ++r) {
     const std::size_t at = static_cast<std::size_t>(r) * columns;
     predict_row<std::int32_t>(lattice, r, predictors, 0, 65534, halves);
-    fold_row(lattice.row(r), halves.data(), kShape.columns(), residuals.folded.data() + at);
-    for (std::size_t c = 0; c < columns; ++c) magnitudes[0][c + 3] = magnitude(residuals.folded.data()[at + c], 0);
-    find_activities(magnitudes[1].data() + 3, magnitudes[2].data() + 3, 0, kShape.columns() - 1,
-                    residuals.activities.data() + at);
+    zigzag_row(lattice.row(r), halves.data(), kShape.columns(), residuals.zigzagged.data() + at);
+    for (std::size_t c = 0; c < columns; ++c) magnitudes[0][c + 3] = magnitude(residuals.zigzagged.data()[at + c], 0);
+    find_energies(magnitudes[1].data() + 3, magnitudes[2].data() + 3, 0, kShape.columns() - 1,
+                  residuals.energies.data() + at);
     std::swap(magnitudes[2], magnitudes[1]);
     std::swap(magnitudes[1], magnitudes[0]);
   }
   for (std::size_t i = 0; i < samples(); ++i) {
-    symbols.push_back(static_cast<std::uint8_t>(symbol_of(residuals.folded.data()[i])));
+    symbols.push_back(static_cast<std::uint8_t>(symbol_of(residuals.zigzagged.data()[i])));
   }
-  histogram = count_activities({residuals.activities.data(), samples()});
-  thresholds = choose_thresholds(symbols, {residuals.activities.data(), samples()}, histogram,
-                                 coding_effort(kDefaultLevel).context_thinning);
-  streams = make_streams(residuals, coding_effort(kDefaultLevel), header);
+  histogram = count_energies({residuals.energies.data(), samples()});
+  thresholds = choose_thresholds(symbols, {residuals.energies.data(), samples()}, histogram,
+                                 coding_effort(kDefaultLevel).streams.context_thinning);
+  streams = make_streams(residuals, coding_effort(kDefaultLevel).streams, header);
   const auto counts = sort_by_context(residuals, thresholds, histogram, sorted.data());
   least.assign(counts[0], std::byte{0});
   for (std::size_t i = 0; i < counts[0]; ++i) least[i] = static_cast<std::byte>(symbol_of(sorted.data()[i]));

@@ -5,15 +5,16 @@
 #include <cstdint>
 #include <vector>
 
+#include "isohf/archive/codec/predict/sample_lattice.h"
 #include "isohf/archive/codec/residuals/residual_streams.h"
-#include "isohf/archive/codec/simd/lane_decoder.h"
+#include "isohf/archive/codec/simd/batch_decoder.h"
 #include "isohf/archive/codec/tile_codes.h"
 
 /// What the kernels of the tile codec are measured on.
 namespace isohf::bench {
 
 inline const TileShape kShape = TileShape::make(212, 243, 4);
-inline constexpr std::size_t kTiles = kDecoderLanes;
+inline constexpr std::size_t kTiles = kBatchLanes;
 
 /// Hills with valleys and noise that grows with their slope: contexts differ, as on real terrain.
 [[nodiscard]] std::vector<float> terrain(std::size_t tile);

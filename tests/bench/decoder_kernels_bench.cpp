@@ -8,9 +8,10 @@
 #include "bench/coded_tiles.h"
 #include "isohf/archive/codec/residuals/pair_coding.h"
 #include "isohf/archive/codec/residuals/residual_symbols.h"
-#include "isohf/archive/codec/simd/lane_decoder.h"
+#include "isohf/archive/codec/simd/batch_decoder.h"
 #include "isohf/archive/codec/simd/residual_expander.h"
-#include "isohf/archive/codec/tile_codec.h"
+#include "isohf/archive/codec/tile_decoder.h"
+#include "isohf/archive/codec/tile_encoder.h"
 #include "isohf/archive/deflate/deflate.h"
 
 namespace isohf::bench {
@@ -49,9 +50,9 @@ void expand(benchmark::State& state) {
   std::vector<std::byte> extra = inside().streams.extra;
   const std::size_t extra_bytes = extra.size();
   extra.resize(extra_bytes + kExpanderSlack);
-  Scratch<std::uint16_t> folded(Inside::samples());
+  Scratch<std::uint16_t> zigzagged(Inside::samples());
   for (auto _ : state) {
-    if (expand_residuals(symbols, std::span(extra).first(extra_bytes), 0, folded.data()) == kNotExpanded) {
+    if (expand_residuals(symbols, std::span(extra).first(extra_bytes), 0, zigzagged.data()) == kNotExpanded) {
       state.SkipWithError("the extra bits do not fit the symbols");
     }
     benchmark::ClobberMemory();
@@ -68,7 +69,7 @@ void decode_side_by_side(benchmark::State& state) {
   for (auto _ : state) {
     std::vector<TileCodes> tiles(count);
     std::array<bool, kTiles> is_decoded{};
-    decode_lanes(kShape, of.type, payloads, tiles, std::span(is_decoded).first(count));
+    decode_batch(kShape, of.type, payloads, tiles, std::span(is_decoded).first(count));
     if (!is_decoded[0]) state.SkipWithError("is not decoded in lanes");
     benchmark::DoNotOptimize(tiles.data());
   }
@@ -96,7 +97,7 @@ void decode_all(benchmark::State& state) {
     const std::vector<std::span<const std::byte>> spans(payloads.begin(), payloads.end());
     std::vector<TileCodes> tiles(kTiles);
     std::array<bool, kTiles> is_decoded{};
-    decode_lanes(kShape, of.type, spans, tiles, is_decoded);
+    decode_batch(kShape, of.type, spans, tiles, is_decoded);
     for (std::size_t i = 0; i < kTiles; ++i) {
       if (!is_decoded[i]) tiles[i] = decode_tile(kShape, of.type, payloads[i]);
     }

@@ -11,17 +11,15 @@
 #include <vector>
 
 #include "bench/coded_tiles.h"
-#include "isohf/archive/codec/coding_effort.h"
-#include "isohf/archive/codec/predict/activities.h"
+#include "isohf/archive/codec/predict/context_energy.h"
 #include "isohf/archive/codec/predict/hex_predictor.h"
 #include "isohf/archive/codec/predict/predictor_fit.h"
-#include "isohf/archive/codec/predict/residual_fold.h"
 #include "isohf/archive/codec/quantise.h"
 #include "isohf/archive/codec/residuals/context_model.h"
 #include "isohf/archive/codec/residuals/pair_coding.h"
 #include "isohf/archive/codec/residuals/residual_streams.h"
-#include "isohf/archive/codec/tile_codec.h"
 #include "isohf/archive/codec/tile_codes.h"
+#include "isohf/archive/codec/tile_encoder.h"
 #include "isohf/archive/container/content_hash.h"
 #include "isohf/archive/deflate/deflate.h"
 #include "isohf/archive/deflate/deflate_writer.h"
@@ -123,41 +121,42 @@ void predict(benchmark::State& state) {
 }
 BENCHMARK(predict);
 
-void fold(benchmark::State& state) {
+void zigzag_residuals(benchmark::State& state) {
   std::vector<std::int32_t> halves(static_cast<std::size_t>(kShape.columns()), 1801);
-  std::vector<std::uint16_t> folded(halves.size());
+  std::vector<std::uint16_t> zigzagged(halves.size());
   for (auto _ : state) {
     for (int r = 0; r < kShape.rows(); ++r) {
-      fold_row(inside().lattice.row(r), halves.data(), kShape.columns(), folded.data());
-      benchmark::DoNotOptimize(folded.data());
+      zigzag_row(inside().lattice.row(r), halves.data(), kShape.columns(), zigzagged.data());
+      benchmark::DoNotOptimize(zigzagged.data());
     }
     benchmark::ClobberMemory();
   }
   set_samples(state, Inside::samples());
 }
-BENCHMARK(fold);
+BENCHMARK(zigzag_residuals)->Name("zigzag");
 
-void activities(benchmark::State& state) {
+void energies(benchmark::State& state) {
   const auto columns = static_cast<std::size_t>(kShape.columns());
   std::vector<std::uint8_t> magnitudes(columns + 8, 7);
   std::vector<std::uint16_t> out(columns);
   for (auto _ : state) {
     for (int r = 0; r < kShape.rows(); ++r) {
-      find_activities(magnitudes.data() + 3, magnitudes.data() + 3, 0, kShape.columns() - 1, out.data());
+      find_energies(magnitudes.data() + 3, magnitudes.data() + 3, 0, kShape.columns() - 1, out.data());
       benchmark::DoNotOptimize(out.data());
     }
     benchmark::ClobberMemory();
   }
   set_samples(state, Inside::samples());
 }
-BENCHMARK(activities);
+BENCHMARK(energies)->Name("context energies");
 
 void contexts(benchmark::State& state) {
-  const std::span<const std::uint16_t> of(inside().residuals.activities.data(), Inside::samples());
+  const std::span<const std::uint16_t> of(inside().residuals.energies.data(), Inside::samples());
   for (auto _ : state) {
-    const std::vector<std::uint32_t> histogram = count_activities(of);
+    const std::vector<std::uint32_t> histogram = count_energies(of);
     benchmark::DoNotOptimize(
-        choose_thresholds(inside().symbols, of, histogram, coding_effort(kDefaultLevel).context_thinning).data());
+        choose_thresholds(inside().symbols, of, histogram, coding_effort(kDefaultLevel).streams.context_thinning)
+            .data());
   }
   set_samples(state, Inside::samples());
 }
@@ -177,7 +176,8 @@ BENCHMARK(sort_residuals)->Name("sort into streams");
 void streams(benchmark::State& state) {
   for (auto _ : state) {
     PayloadHeader header;
-    benchmark::DoNotOptimize(make_streams(inside().residuals, coding_effort(kDefaultLevel), header).extra.data());
+    benchmark::DoNotOptimize(
+        make_streams(inside().residuals, coding_effort(kDefaultLevel).streams, header).extra.data());
   }
   set_samples(state, Inside::samples());
 }

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "isohf/archive/codec/quantise.h"
-#include "isohf/archive/codec/tile_codec.h"
+#include "isohf/archive/codec/tile_encoder.h"
 #include "isohf/archive/container/content_hash.h"
 #include "isohf/archive/deflate/deflate.h"
 #include "isohf/raster.h"

@@ -6,8 +6,9 @@
 #include <cstdlib>
 #include <span>
 
-#include "isohf/archive/codec/simd/lane_decoder.h"
-#include "isohf/archive/codec/tile_codec.h"
+#include "isohf/archive/codec/simd/batch_decoder.h"
+#include "isohf/archive/codec/tile_decoder.h"
+#include "isohf/archive/codec/tile_encoder.h"
 #include "isohf/archive/container/content_hash.h"
 #include "isohf/error.h"
 
@@ -25,7 +26,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::array<std::span<const std::byte>, 2> twice = {payload, payload};
   std::array<isohf::TileCodes, 2> lanes;
   std::array<bool, 2> is_decoded{};
-  decode_lanes(shape, type, twice, lanes, is_decoded);
+  decode_batch(shape, type, twice, lanes, is_decoded);
   if (is_decoded[0] != is_decoded[1]) std::abort();
   try {
     const isohf::TileCodes tile = decode_tile(shape, type, payload);

@@ -1,7 +1,7 @@
 #include "support/analytic_archive.h"
 
-#include "isohf/archive/codec/tile_codec.h"
 #include "isohf/archive/codec/tile_codes.h"
+#include "isohf/archive/codec/tile_encoder.h"
 #include "isohf/archive/writer.h"
 #include "support/analytic_surface.h"
 

@@ -1,5 +1,6 @@
 #include "isohf/archive.h"
-#include "isohf/archive/codec/tile_codec.h"
+#include "isohf/archive/codec/tile_decoder.h"
+#include "isohf/archive/codec/tile_encoder.h"
 
 #include <fmt/format.h>
 
@@ -8,7 +9,7 @@
 #include <limits>
 #include <mutex>
 
-#include "isohf/archive/codec/simd/lane_decoder.h"
+#include "isohf/archive/codec/simd/batch_decoder.h"
 #include "isohf/archive/codec/tile_codes.h"
 #include "isohf/archive/container/directory.h"
 #include "isohf/archive/container/zip_layout.h"
@@ -199,11 +200,11 @@ TileCodes ArchiveReader::read_tile(TileIndex tile) const {
 
 std::vector<TileCodes> ArchiveReader::read_tiles(std::span<const TileIndex> tiles) const {
   std::vector<TileCodes> codes(tiles.size());
-  for (std::size_t begin = 0; begin < tiles.size(); begin += kDecoderLanes) {
-    const std::size_t count = std::min(kDecoderLanes, tiles.size() - begin);
-    std::array<std::vector<std::byte>, kDecoderLanes> payloads;
-    std::array<std::span<const std::byte>, kDecoderLanes> spans;
-    std::array<std::size_t, kDecoderLanes> place{};
+  for (std::size_t begin = 0; begin < tiles.size(); begin += kBatchLanes) {
+    const std::size_t count = std::min(kBatchLanes, tiles.size() - begin);
+    std::array<std::vector<std::byte>, kBatchLanes> payloads;
+    std::array<std::span<const std::byte>, kBatchLanes> spans;
+    std::array<std::size_t, kBatchLanes> place{};
     std::size_t lanes = 0;
     for (std::size_t i = begin; i < begin + count; ++i) {
       const TileEntry entry = tile_entry(tiles[i]);
@@ -220,9 +221,9 @@ std::vector<TileCodes> ArchiveReader::read_tiles(std::span<const TileIndex> tile
       spans[lanes] = payloads[lanes];
       place[lanes++] = i;
     }
-    std::array<TileCodes, kDecoderLanes> decoded;
-    std::array<bool, kDecoderLanes> is_decoded{};
-    decode_lanes(grid().shape(), metadata().quantisation.type, std::span(spans).first(lanes),
+    std::array<TileCodes, kBatchLanes> decoded;
+    std::array<bool, kBatchLanes> is_decoded{};
+    decode_batch(grid().shape(), metadata().quantisation.type, std::span(spans).first(lanes),
                  std::span(decoded).first(lanes), std::span(is_decoded).first(lanes));
     for (std::size_t lane = 0; lane < lanes; ++lane) {
       const std::size_t i = place[lane];

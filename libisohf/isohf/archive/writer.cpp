@@ -1,5 +1,6 @@
 #include "isohf/archive/writer.h"
-#include "isohf/archive/codec/tile_codec.h"
+#include "isohf/archive/codec/tile_decoder.h"
+#include "isohf/archive/codec/tile_encoder.h"
 
 #include <fmt/format.h>
 

@@ -1,5 +1,5 @@
 #include "isohf/convert/convert.h"
-#include "isohf/archive/codec/tile_codec.h"
+#include "isohf/archive/codec/tile_encoder.h"
 
 #include <fmt/format.h>
 #include <oneapi/tbb/global_control.h>

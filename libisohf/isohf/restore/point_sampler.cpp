@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "isohf/archive/codec/quantise.h"
-#include "isohf/archive/codec/simd/lane_decoder.h"
+#include "isohf/archive/codec/simd/batch_decoder.h"
 #include "isohf/base/assert.h"
 #include "isohf/lattice/barycentric.h"
 #include "isohf/surface/shade/normals.h"
@@ -106,7 +106,7 @@ PointSampler::PointSampler(const ArchiveReader& archive, std::uint64_t memory_by
   const auto threads = static_cast<std::uint64_t>(oneapi::tbb::this_task_arena::max_concurrency());
   capacity_ = static_cast<std::size_t>(std::max<std::uint64_t>(1, memory_bytes / tile_bytes));
   // Large tiles in all lanes of all threads would take more than is to be kept.
-  tiles_together_ = std::clamp<std::size_t>(capacity_ / threads, 1, kDecoderLanes);
+  tiles_together_ = std::clamp<std::size_t>(capacity_ / threads, 1, kBatchLanes);
 }
 
 PointSampler::Codes PointSampler::kept(std::int64_t tile) {

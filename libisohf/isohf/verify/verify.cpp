@@ -13,7 +13,7 @@
 #include <utility>
 
 #include "isohf/archive/accuracy_info.h"
-#include "isohf/archive/codec/simd/lane_decoder.h"
+#include "isohf/archive/codec/simd/batch_decoder.h"
 #include "isohf/archive/codec/tile_codes.h"
 #include "isohf/archive/container/content_hash.h"
 #include "isohf/archive/tile_statistics.h"
@@ -159,10 +159,10 @@ class Verification {
 
   TileRow read_row(std::int64_t row) {
     TileRow tiles(static_cast<std::size_t>(grid_.tile_columns()));
-    const std::size_t groups = (tiles.size() + kDecoderLanes - 1) / kDecoderLanes;
+    const std::size_t groups = (tiles.size() + kBatchLanes - 1) / kBatchLanes;
     oneapi::tbb::parallel_for(std::size_t{0}, groups, [&](std::size_t group) {
-      const std::size_t first = group * kDecoderLanes;
-      const std::size_t count = std::min(kDecoderLanes, tiles.size() - first);
+      const std::size_t first = group * kBatchLanes;
+      const std::size_t count = std::min(kBatchLanes, tiles.size() - first);
       std::vector<TileIndex> indices;
       for (std::size_t i = first; i < first + count; ++i) {
         const TileIndex index{static_cast<std::int64_t>(i), row};

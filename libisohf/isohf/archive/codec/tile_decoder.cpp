@@ -1,14 +1,15 @@
+#include "isohf/archive/codec/tile_decoder.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <limits>
 
 #include "isohf/archive/codec/ordered_float.h"
-#include "isohf/archive/codec/predict/activities.h"
+#include "isohf/archive/codec/predict/context_energy.h"
 #include "isohf/archive/codec/predict/hex_predictor.h"
 #include "isohf/archive/codec/residuals/residual_symbols.h"
-#include "isohf/archive/codec/simd/lane_decoder.h"
-#include "isohf/archive/codec/tile_codec.h"
+#include "isohf/archive/codec/simd/batch_decoder.h"
 #include "isohf/archive/codec/tile_payload.h"
 #include "isohf/archive/codec/void_mask.h"
 
@@ -59,7 +60,7 @@ class BitReader {
   unsigned bit_count_ = 0;
 };
 
-/// The folded residuals of all contexts: symbols and extra bits put together.
+/// The zigzagged residuals of all contexts: symbols and extra bits put together.
 class ResidualReader {
  public:
   ResidualReader(const PayloadHeader& header, ByteReader& reader) : table_(context_table(header.thresholds)) {
@@ -67,24 +68,24 @@ class ResidualReader {
     BitReader extra(reader.read_bytes(header.extra_bytes));
     const unsigned limit = symbol_limit(residual_bits(header.type));
     for (std::size_t i = 0; i < header.symbol_counts.size(); ++i) {
-      next_[i] = folded_.size();
+      next_[i] = zigzagged_.size();
       for (const std::byte byte : symbols[i]) {
         const auto symbol = std::to_integer<unsigned>(byte);
         if (symbol >= limit) refuse(fmt::format("symbol {} does not exist, the last is {}", symbol, limit - 1));
         const unsigned bits = extra_bits_of_symbol(symbol);
-        folded_.push_back(folded_from(symbol, bits == 0 ? 0 : extra.take(bits)));
+        zigzagged_.push_back(zigzagged_from(symbol, bits == 0 ? 0 : extra.take(bits)));
       }
-      end_[i] = folded_.size();
+      end_[i] = zigzagged_.size();
     }
     if (extra.ran_out()) refuse("it holds too few extra bits");
     if (!extra.is_used_up()) refuse("it holds more extra bits than its symbols ask for");
   }
 
-  /// The folded residual of a place with that activity.
-  std::uint32_t take(std::uint16_t activity) {
-    const std::size_t context = table_[activity];
+  /// The zigzagged residual of a place with that energy.
+  std::uint32_t take(std::uint16_t energy) {
+    const std::size_t context = table_[energy];
     if (next_[context] == end_[context]) refuse(fmt::format("context {} holds too few symbols", context));
-    return folded_[next_[context]++];
+    return zigzagged_[next_[context]++];
   }
 
   void check_used_up(std::size_t contexts) const {
@@ -94,20 +95,20 @@ class ResidualReader {
   }
 
  private:
-  std::array<std::uint8_t, kActivityLimit> table_;
-  std::vector<std::uint32_t> folded_;
+  std::array<std::uint8_t, kEnergyLimit> table_;
+  std::vector<std::uint32_t> zigzagged_;
   std::array<std::size_t, kMaxContexts> next_{};
   std::array<std::size_t, kMaxContexts> end_{};
 };
 
 /// The sample that halves predict, plus or less the residual as it is turned, modulo 2^16 or 2^32.
-std::int32_t restore(std::int32_t halves, std::uint32_t folded) {
-  const std::uint32_t residual = unzigzag(folded);
+std::int32_t restore(std::int32_t halves, std::uint32_t zigzagged) {
+  const std::uint32_t residual = unzigzag(zigzagged);
   const auto prediction = static_cast<std::uint32_t>(prediction_of_halves(halves));
   return static_cast<std::int32_t>(((halves & 1) != 0 ? prediction + residual : prediction - residual) & 0xffffU);
 }
-std::int64_t restore(std::int64_t halves, std::uint32_t folded) {
-  const std::uint32_t residual = unzigzag(folded);
+std::int64_t restore(std::int64_t halves, std::uint32_t zigzagged) {
+  const std::uint32_t residual = unzigzag(zigzagged);
   const auto prediction = static_cast<std::uint32_t>(prediction_of_halves(halves));
   return static_cast<std::int32_t>((halves & 1) != 0 ? prediction + residual : prediction - residual);
 }
@@ -132,7 +133,7 @@ class TileDecoder {
         lattice_(shape),
         parts_(static_cast<std::size_t>(shape.columns())),
         magnitudes_(shape.columns()),
-        activities_(parts_.size()) {
+        energies_(parts_.size()) {
     lattice_.fill_rows_above(header.base);
   }
 
@@ -171,7 +172,7 @@ class TileDecoder {
     const int first = Lattice<Wide>::first(r);
     const int last = lattice_.last(r);
     predict_row_from_above(lattice_, r, header_.predictors, parts_);
-    find_activities(magnitudes_.above() + r % 2, magnitudes_.far_above(), first, last, activities_.data());
+    find_energies(magnitudes_.above() + r % 2, magnitudes_.far_above(), first, last, energies_.data());
     const Wide least = 2 * Wide{header_.low};
     const Wide most = 2 * Wide{header_.high} - 1;
     Wide* const own = lattice_.row(r);
@@ -187,8 +188,8 @@ class TileDecoder {
           continue;
         }
         const auto at = static_cast<std::size_t>(place);
-        const std::uint32_t residual = residuals_.take(activities_[at]);
-        magnitudes[place] = magnitude(residual, header_.activity_shift);
+        const std::uint32_t residual = residuals_.take(energies_[at]);
+        magnitudes[place] = magnitude(residual, header_.energy_shift);
         const Wide halves = complete(parts_[at], weight_w, own[place - 1], weight_ww, own[place - 2]);
         own[place] = restore(std::min(std::max(halves, least), most), residual);
         in_range &= own[place] >= header_.low && own[place] <= header_.high;
@@ -201,7 +202,7 @@ class TileDecoder {
     const int at = side == 0 ? 1 : lattice_.columns() - 3;
     const std::uint8_t* const magnitudes = magnitudes_.current();
     const Wide sample = restore(2 * lattice_.slid_prediction(r, side),
-                                residuals_.take(activity_of_slid(magnitudes[at], magnitudes[at + 1])));
+                                residuals_.take(context_energy_of_slid(magnitudes[at], magnitudes[at + 1])));
     if (sample < header_.low || sample > header_.high) {
       refuse(fmt::format("row {} leaves the range {}..{} that the header states", r, header_.low, header_.high));
     }
@@ -214,7 +215,7 @@ class TileDecoder {
   Lattice<Wide> lattice_;
   std::vector<Wide> parts_;
   MagnitudeRows magnitudes_;
-  std::vector<std::uint16_t> activities_;
+  std::vector<std::uint16_t> energies_;
 };
 
 /// Reads all samples but the voids, which `put` never sees.
@@ -275,7 +276,7 @@ TileCodes decode_tile(const TileShape& shape, CodeType type, std::span<const std
   if (type == CodeType::kF32) return decode_tile_slowly(shape, type, payload);  // one lane of eight would take longer
   TileCodes tile;
   bool is_decoded = false;
-  decode_lanes(shape, type, {&payload, 1}, {&tile, 1}, {&is_decoded, 1});
+  decode_batch(shape, type, {&payload, 1}, {&tile, 1}, {&is_decoded, 1});
   return is_decoded ? tile : decode_tile_slowly(shape, type, payload);
 }
 

@@ -6,7 +6,7 @@
 #include <cstdlib>
 
 #include "isohf/archive/codec/ordered_float.h"
-#include "isohf/archive/codec/predict/activities.h"
+#include "isohf/archive/codec/predict/context_energy.h"
 #include "isohf/archive/codec/residuals/pair_coding.h"
 #include "isohf/error.h"
 
@@ -53,13 +53,12 @@ void check_predictor(const PayloadHeader& header) {
     for (const std::int16_t weight : weights) sum += std::abs(int{weight});
     if (sum >= kWeightSumLimit) refuse(fmt::format("its weights add up to {}, must be below {}", sum, kWeightSumLimit));
   }
-  if (header.activity_shift > 31)
-    refuse(fmt::format("its activity shift is {}, must lie in 0..31", header.activity_shift));
+  if (header.energy_shift > 31) refuse(fmt::format("its energy shift is {}, must lie in 0..31", header.energy_shift));
   for (std::size_t i = 0; i < header.thresholds.size(); ++i) {
     const unsigned before = i == 0 ? 0 : header.thresholds[i - 1];
-    if (header.thresholds[i] <= before || header.thresholds[i] >= kActivityLimit) {
+    if (header.thresholds[i] <= before || header.thresholds[i] >= kEnergyLimit) {
       refuse(
-          fmt::format("its threshold {} is {}, must ascend within 1..{}", i, header.thresholds[i], kActivityLimit - 1));
+          fmt::format("its threshold {} is {}, must ascend within 1..{}", i, header.thresholds[i], kEnergyLimit - 1));
     }
   }
 }
@@ -92,7 +91,7 @@ void write_payload_header(const PayloadHeader& header, std::vector<std::byte>& o
   if (header.is_constant) return;
   writer.write(header.base);
   writer.write(header.extra_bytes);
-  writer.write(header.activity_shift);
+  writer.write(header.energy_shift);
   writer.write(static_cast<std::uint8_t>(header.symbol_counts.size()));
   writer.write(header.paired);
   const std::size_t weight_count = header.predictors.is_wide ? kWeightCount : kNearWeightCount;
@@ -136,7 +135,7 @@ PayloadHeader read_payload_header(const TileShape& shape, CodeType type, ByteRea
 
   header.base = reader.read<std::int32_t>();
   header.extra_bytes = reader.read<std::uint32_t>();
-  header.activity_shift = reader.read<std::uint8_t>();
+  header.energy_shift = reader.read<std::uint8_t>();
   const std::size_t contexts = reader.read<std::uint8_t>();
   if (contexts < 1 || contexts > kMaxContexts)
     refuse(fmt::format("it has {} contexts, must have 1..{}", contexts, kMaxContexts));

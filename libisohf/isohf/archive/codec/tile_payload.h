@@ -33,7 +33,7 @@ struct PayloadHeader {
   std::int32_t base = 0;  ///< stands for all samples above and West of the first
   std::uint32_t mask_bytes = 0;
   std::uint32_t extra_bytes = 0;
-  std::uint8_t activity_shift = 0;
+  std::uint8_t energy_shift = 0;
   std::uint8_t dropped_bits = 0;  ///< kF32: low bits of the float that are zero everywhere
   Predictors predictors;
   std::vector<std::uint16_t> thresholds;     ///< one fewer than contexts, ascending

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cstring>
 
-#include "isohf/archive/deflate/byte_counts.h"
 #include "isohf/archive/deflate/huffman_code.h"
 
 namespace isohf {

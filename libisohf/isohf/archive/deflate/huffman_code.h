@@ -9,6 +9,11 @@
 
 namespace isohf {
 
+using ByteCounts = std::array<std::uint32_t, 256>;
+
+/// How often each byte occurs.
+[[nodiscard]] ByteCounts count_bytes(std::span<const std::byte> bytes);
+
 /// Shortest prefix code with no code longer than `limit` bits (nearly shortest where the limit bites); lengths are 0
 /// for symbols of frequency 0. A single symbol gets length 1.
 void build_code_lengths(std::span<const std::uint32_t> frequencies, unsigned limit, std::span<std::uint8_t> lengths);

@@ -66,7 +66,7 @@ std::uint32_t SymbolReader::get(std::size_t stream) {
   const auto extra = static_cast<std::uint32_t>(bits_ & ((std::uint64_t{1} << count) - 1));
   bits_ >>= count;
   bit_count_ -= count;
-  return folded_from(symbol, extra);
+  return zigzagged_from(symbol, extra);
 }
 
 void SymbolReader::finish() const {

@@ -6,7 +6,7 @@ import statistics
 
 from sections.sizes import DEMS
 
-DEFAULT = 5  # kDefaultLevel of tile_codec.h
+DEFAULT = 5  # kDefaultLevel of tile_codes.h
 SMOKE = False  # the levels above 9 take long, and nothing here depends on the input's size
 
 

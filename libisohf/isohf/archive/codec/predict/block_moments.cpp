@@ -4,7 +4,7 @@
 #include <bit>
 #include <cmath>
 
-#include "isohf/archive/codec/predict/neighbours.h"
+#include "isohf/archive/codec/predict/hex_predictor.h"
 #include "isohf/base/unaligned.h"
 #include "isohf/base/vectorised.h"
 

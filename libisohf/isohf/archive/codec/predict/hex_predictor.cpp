@@ -1,6 +1,6 @@
 #include "isohf/archive/codec/predict/hex_predictor.h"
 
-#include "isohf/archive/codec/predict/neighbours.h"
+#include "isohf/archive/codec/residuals/residual_symbols.h"
 #include "isohf/base/unaligned.h"
 #include "isohf/base/vectorised.h"
 #if defined(ISOHF_HAS_WIDE)
@@ -181,6 +181,21 @@ ISOHF_TWO_WAYS(void, sum_floats_widely_above,
   sum_above<kIsWide, kWeightCount>(at, weights, begin, end, out);
 }
 
+ISOHF_VECTORISED(void, zigzag_codes,
+                 (const std::int32_t* own, const std::int32_t* halves, int count, std::uint16_t* __restrict out),
+                 (own, halves, count, out)) {
+  for (int i = 0; i < count; ++i) {
+    const auto difference = static_cast<std::int16_t>(oriented_difference(own[i], halves[i]));
+    out[i] = static_cast<std::uint16_t>(zigzag(difference));
+  }
+}
+
+ISOHF_VECTORISED(void, zigzag_floats,
+                 (const std::int64_t* own, const std::int64_t* halves, int count, std::uint32_t* __restrict out),
+                 (own, halves, count, out)) {
+  for (int i = 0; i < count; ++i) out[i] = zigzag(static_cast<std::int32_t>(oriented_difference(own[i], halves[i])));
+}
+
 }  // namespace
 
 template <>
@@ -227,6 +242,13 @@ void predict_row_from_above(const Lattice<std::int64_t>& lattice, int r, const P
       sum_floats_above(at, weights, begin, end, parts.data());
     }
   });
+}
+
+void zigzag_row(const std::int32_t* own, const std::int32_t* halves, int count, std::uint16_t* out) {
+  zigzag_codes(own, halves, count, out);
+}
+void zigzag_row(const std::int64_t* own, const std::int64_t* halves, int count, std::uint32_t* out) {
+  zigzag_floats(own, halves, count, out);
 }
 
 }  // namespace isohf

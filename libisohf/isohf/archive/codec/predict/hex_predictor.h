@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 
@@ -16,6 +18,33 @@
 
 namespace isohf {
 
+/// Where the neighbours of a row's samples stand in memory. own[c-1] is W, north[c] NE, far[c] NN and farther[c] the one North-East of NE's NN.
+template <typename Wide>
+struct Neighbours {
+  const Wide* own;
+  const Wide* north;
+  const Wide* far;
+  const Wide* farther;
+  int first;
+  int last;
+
+  Neighbours(const Lattice<Wide>& lattice, int r)
+      : own(lattice.row(r)),
+        north(lattice.row(r - 1) + r % 2),
+        far(lattice.row(r - 2)),
+        farther(lattice.row(r - 3) + r % 2),
+        first(Lattice<Wide>::first(r)),
+        last(lattice.last(r)) {}
+
+  /// The samples that weight i belongs to, indexed by place.
+  [[nodiscard]] const Wide* of_weight(std::size_t i) const {
+    const std::array<const Wide*, kWeightCount> all = {
+        own - 1, north - 1, own - 2,     north + 1,   north - 2,   far,       far + 1,   far - 1, far + 2,
+        far - 2, farther,   farther - 1, farther + 1, farther - 2, north + 2, north - 3, far + 3, far - 3};
+    return all[i];
+  }
+};
+
 /// Predictions for all lattice places of row r, in halves of a sample: 2 * prediction, less 1 where it was rounded up.
 /// Limited to the samples' range [low, high]. `halves` is indexed by place. The row must be open.
 template <typename Wide>
@@ -29,7 +58,7 @@ void predict_row_from_above(const Lattice<std::int64_t>& lattice, int r, const P
 void predict_row_from_above(const Lattice<std::int32_t>& lattice, int r, const Predictors& predictors,
                             std::span<std::int32_t> parts);
 
-/// The sample that halves predict, and the difference from it that is folded: a sample below it comes first where it
+/// The sample that halves predict, and the difference from it that is zigzagged: a sample below it comes first where it
 /// was rounded up, one above it otherwise.
 template <typename Wide>
 [[nodiscard]] inline Wide prediction_of_halves(Wide halves) {
@@ -40,5 +69,10 @@ template <typename Wide>
   const Wide difference = prediction_of_halves(halves) - sample;
   return (halves & 1) != 0 ? -difference : difference;
 }
+
+/// Zigzag residuals of `count` samples, from predictions in halves. own, halves, out [count]; `out` is neither of the
+/// others.
+void zigzag_row(const std::int32_t* own, const std::int32_t* halves, int count, std::uint16_t* out);
+void zigzag_row(const std::int64_t* own, const std::int64_t* halves, int count, std::uint32_t* out);
 
 }  // namespace isohf

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include "isohf/archive/codec/predict/activities.h"
-#include "isohf/archive/codec/predict/code_cost.h"
+#include "isohf/archive/codec/predict/context_energy.h"
+#include "isohf/archive/codec/residuals/code_cost.h"
 #include "isohf/archive/codec/tile_payload.h"
 
 namespace isohf {
@@ -14,9 +14,9 @@ constexpr std::uint64_t kTableBits = 150;      // of a context beside its code l
 constexpr std::size_t kSymbolsToThin = 16384;  // below, all take part
 constexpr std::uint64_t kBitsPerSymbol = 3;    // of a code length in a block header
 
-/// The symbols of one range of activities and what coding them takes.
+/// The symbols of one range of energies and what coding them takes.
 struct Group {
-  unsigned end;  ///< first activity that is not in it
+  unsigned end;  ///< first energy that is not in it
   std::array<std::uint32_t, kSymbols> counts{};
 
   [[nodiscard]] std::uint64_t bits_with(const Group& other) const {
@@ -37,29 +37,29 @@ struct Group {
 
 }  // namespace
 
-std::vector<std::uint32_t> count_activities(std::span<const std::uint16_t> activities) {
-  // Two tables: one alone would wait for its own counts where activities repeat.
-  std::vector<std::uint32_t> histogram(kActivityLimit);
-  std::vector<std::uint32_t> odd(kActivityLimit);
+std::vector<std::uint32_t> count_energies(std::span<const std::uint16_t> energies) {
+  // Two tables: one alone would wait for its own counts where energies repeat.
+  std::vector<std::uint32_t> histogram(kEnergyLimit);
+  std::vector<std::uint32_t> odd(kEnergyLimit);
   std::size_t i = 0;
-  for (; i + 2 <= activities.size(); i += 2) {
-    ++histogram[activities[i]];
-    ++odd[activities[i + 1]];
+  for (; i + 2 <= energies.size(); i += 2) {
+    ++histogram[energies[i]];
+    ++odd[energies[i + 1]];
   }
-  if (i < activities.size()) ++odd[activities[i]];
-  for (std::size_t activity = 0; activity < histogram.size(); ++activity) histogram[activity] += odd[activity];
+  if (i < energies.size()) ++odd[energies[i]];
+  for (std::size_t energy = 0; energy < histogram.size(); ++energy) histogram[energy] += odd[energy];
   return histogram;
 }
 
 std::vector<std::uint16_t> choose_thresholds(std::span<const std::uint8_t> symbols,
-                                             std::span<const std::uint16_t> activities,
+                                             std::span<const std::uint16_t> energies,
                                              std::span<const std::uint32_t> histogram, std::size_t thinning) {
   // Start from ranges of about equal count...
   std::vector<Group> groups;
-  std::vector<std::uint8_t> group_of(kActivityLimit);
+  std::vector<std::uint8_t> group_of(kEnergyLimit);
   const std::uint64_t share = symbols.size() / kMaxContexts + 1;
   std::uint64_t in_group = 0;
-  for (unsigned at = 0; at < kActivityLimit; ++at) {
+  for (unsigned at = 0; at < kEnergyLimit; ++at) {
     group_of[at] = static_cast<std::uint8_t>(groups.size());
     in_group += histogram[at];
     if (in_group >= share && groups.size() + 1 < kMaxContexts) {
@@ -67,10 +67,10 @@ std::vector<std::uint16_t> choose_thresholds(std::span<const std::uint8_t> symbo
       in_group = 0;
     }
   }
-  groups.push_back({kActivityLimit, {}});
+  groups.push_back({kEnergyLimit, {}});
   const std::size_t step = symbols.size() >= kSymbolsToThin ? thinning : 1;
   for (std::size_t i = 0; i < symbols.size(); i += step) {
-    groups[group_of[activities[i]]].counts[symbols[i]] += static_cast<std::uint32_t>(step);
+    groups[group_of[energies[i]]].counts[symbols[i]] += static_cast<std::uint32_t>(step);
   }
 
   // ... and join the two neighbours whose joining saves most, while any does.

@@ -4,8 +4,7 @@
 
 #include <algorithm>
 
-#include "isohf/archive/codec/predict/code_cost.h"
-#include "isohf/archive/deflate/byte_counts.h"
+#include "isohf/archive/codec/residuals/code_cost.h"
 #include "isohf/archive/deflate/huffman_code.h"
 #include "isohf/error.h"
 

@@ -3,7 +3,7 @@
 #include <bit>
 #include <cstring>
 
-#include "isohf/archive/codec/predict/activities.h"
+#include "isohf/archive/codec/predict/context_energy.h"
 #include "isohf/archive/codec/residuals/context_model.h"
 #include "isohf/archive/codec/residuals/pair_coding.h"
 #include "isohf/archive/codec/residuals/residual_symbols.h"
@@ -14,37 +14,37 @@ namespace {
 
 /// Symbols of residuals below 2^24: a float's exponent and upper three bits of mantissa are octave and eighth.
 ISOHF_VECTORISED(void, find_small_symbols,
-                 (const std::uint16_t* __restrict folded, std::size_t count, std::uint8_t* __restrict symbols),
-                 (folded, count, symbols)) {
+                 (const std::uint16_t* __restrict zigzagged, std::size_t count, std::uint8_t* __restrict symbols),
+                 (zigzagged, count, symbols)) {
   constexpr std::int32_t kFirst = (127 + 4) * 8 - static_cast<std::int32_t>(kFirstSplitSymbol);
   for (std::size_t i = 0; i < count; ++i) {
-    const auto residual = static_cast<std::int32_t>(folded[i]);
+    const auto residual = static_cast<std::int32_t>(zigzagged[i]);
     const std::int32_t split = (std::bit_cast<std::int32_t>(static_cast<float>(residual)) >> 20) - kFirst;
     symbols[i] = static_cast<std::uint8_t>(residual < static_cast<std::int32_t>(kFirstSplitSymbol) ? residual : split);
   }
 }
-void find_symbols(const std::uint16_t* folded, std::size_t count, std::uint8_t* symbols) {
-  find_small_symbols(folded, count, symbols);
+void find_symbols(const std::uint16_t* zigzagged, std::size_t count, std::uint8_t* symbols) {
+  find_small_symbols(zigzagged, count, symbols);
 }
 
 /// Half a residual of 32 bits as a float, of the same octave less one and the same eighth: half, so that it has a sign
 /// to spare; and with the bit eight below the highest one cleared, so that no carry of rounding gets past it.
-constexpr std::uint32_t bits_of_half(std::uint32_t folded) {
-  const std::uint32_t kept = folded & ~(folded >> 8U);
+constexpr std::uint32_t bits_of_half(std::uint32_t zigzagged) {
+  const std::uint32_t kept = zigzagged & ~(zigzagged >> 8U);
   return std::bit_cast<std::uint32_t>(static_cast<float>(static_cast<std::int32_t>(kept >> 1U)));
 }
 
 ISOHF_VECTORISED(void, find_large_symbols,
-                 (const std::uint32_t* __restrict folded, std::size_t count, std::uint8_t* __restrict symbols),
-                 (folded, count, symbols)) {
+                 (const std::uint32_t* __restrict zigzagged, std::size_t count, std::uint8_t* __restrict symbols),
+                 (zigzagged, count, symbols)) {
   constexpr std::uint32_t kFirst = (127 + 3) * 8 - kFirstSplitSymbol;
   for (std::size_t i = 0; i < count; ++i) {
-    const std::uint32_t split = (bits_of_half(folded[i]) >> 20U) - kFirst;
-    symbols[i] = static_cast<std::uint8_t>(folded[i] < kFirstSplitSymbol ? folded[i] : split);
+    const std::uint32_t split = (bits_of_half(zigzagged[i]) >> 20U) - kFirst;
+    symbols[i] = static_cast<std::uint8_t>(zigzagged[i] < kFirstSplitSymbol ? zigzagged[i] : split);
   }
 }
-void find_symbols(const std::uint32_t* folded, std::size_t count, std::uint8_t* symbols) {
-  find_large_symbols(folded, count, symbols);
+void find_symbols(const std::uint32_t* zigzagged, std::size_t count, std::uint8_t* symbols) {
+  find_large_symbols(zigzagged, count, symbols);
 }
 
 /// Bits one after the other, the lowest of a byte first.
@@ -85,9 +85,9 @@ class BitPacker {
 
 /// The extra bits of two neighbouring residuals of codes, together no more than 24, and how many these are.
 ISOHF_VECTORISED(void, join_extra_bits,
-                 (const std::uint16_t* __restrict folded, std::size_t pairs, std::uint32_t* __restrict bits,
+                 (const std::uint16_t* __restrict zigzagged, std::size_t pairs, std::uint32_t* __restrict bits,
                   std::uint32_t* __restrict counts),
-                 (folded, pairs, bits, counts)) {
+                 (zigzagged, pairs, bits, counts)) {
   constexpr std::int32_t kFirstOctave = 127 + 4;
   for (std::size_t i = 0; i < pairs; ++i) {
     const auto extra = [&](std::uint32_t value, std::uint32_t& count) {
@@ -99,8 +99,8 @@ ISOHF_VECTORISED(void, join_extra_bits,
     };
     std::uint32_t first_count = 0;
     std::uint32_t second_count = 0;
-    const std::uint32_t first = extra(folded[2 * i], first_count);
-    const std::uint32_t second = extra(folded[2 * i + 1], second_count);
+    const std::uint32_t first = extra(zigzagged[2 * i], first_count);
+    const std::uint32_t second = extra(zigzagged[2 * i + 1], second_count);
     bits[i] = first | second << first_count;
     counts[i] = first_count + second_count;
   }
@@ -108,35 +108,35 @@ ISOHF_VECTORISED(void, join_extra_bits,
 
 /// The extra bits of residuals of floats, and how many these are.
 ISOHF_VECTORISED(void, find_extra_bits,
-                 (const std::uint32_t* __restrict folded, std::size_t count, std::uint32_t* __restrict bits,
+                 (const std::uint32_t* __restrict zigzagged, std::size_t count, std::uint32_t* __restrict bits,
                   std::uint32_t* __restrict counts),
-                 (folded, count, bits, counts)) {
+                 (zigzagged, count, bits, counts)) {
   for (std::size_t i = 0; i < count; ++i) {
-    const std::int32_t octave = static_cast<std::int32_t>(bits_of_half(folded[i]) >> 23U) - 129;
+    const std::int32_t octave = static_cast<std::int32_t>(bits_of_half(zigzagged[i]) >> 23U) - 129;
     counts[i] = static_cast<std::uint32_t>(octave < 0 ? 0 : octave);
-    bits[i] = folded[i] & ((1U << counts[i]) - 1);
+    bits[i] = zigzagged[i] & ((1U << counts[i]) - 1);
   }
 }
 
 /// The bits of the residuals that their symbols leave out.
-std::vector<std::byte> pack_extra_bits(const std::uint16_t* folded, std::size_t count) {
+std::vector<std::byte> pack_extra_bits(const std::uint16_t* zigzagged, std::size_t count) {
   BitPacker packer(count * 2);
   const std::size_t pairs = count / 2;
   Scratch<std::uint32_t> bits(pairs);
   Scratch<std::uint32_t> counts(pairs);
-  join_extra_bits(folded, pairs, bits.data(), counts.data());
+  join_extra_bits(zigzagged, pairs, bits.data(), counts.data());
   for (std::size_t i = 0; i < pairs; ++i) packer.put(bits.data()[i], counts.data()[i]);
   if (count % 2 != 0) {
-    const unsigned last = extra_bits_of_symbol(symbol_of(folded[count - 1]));
-    packer.put(folded[count - 1] & ((1U << last) - 1), last);
+    const unsigned last = extra_bits_of_symbol(symbol_of(zigzagged[count - 1]));
+    packer.put(zigzagged[count - 1] & ((1U << last) - 1), last);
   }
   return packer.finish();
 }
-std::vector<std::byte> pack_extra_bits(const std::uint32_t* folded, std::size_t count) {
+std::vector<std::byte> pack_extra_bits(const std::uint32_t* zigzagged, std::size_t count) {
   BitPacker packer(count * 4);
   Scratch<std::uint32_t> bits(count);
   Scratch<std::uint32_t> counts(count);
-  find_extra_bits(folded, count, bits.data(), counts.data());
+  find_extra_bits(zigzagged, count, bits.data(), counts.data());
   std::size_t i = 0;
   for (; i + 2 <= count; i += 2) {
     const std::uint64_t second = bits.data()[i + 1];
@@ -148,36 +148,36 @@ std::vector<std::byte> pack_extra_bits(const std::uint32_t* folded, std::size_t 
 
 }  // namespace
 
-template <typename Folded>
-std::vector<std::uint32_t> sort_by_context(const Residuals<Folded>& residuals,
+template <typename Zigzagged>
+std::vector<std::uint32_t> sort_by_context(const Residuals<Zigzagged>& residuals,
                                            std::span<const std::uint16_t> thresholds,
-                                           std::span<const std::uint32_t> histogram, Folded* sorted) {
+                                           std::span<const std::uint32_t> histogram, Zigzagged* sorted) {
   const auto table = context_table(thresholds);
   std::vector<std::uint32_t> counts(thresholds.size() + 1);
   for (std::size_t level = 0; level < histogram.size(); ++level) counts[table[level]] += histogram[level];
-  std::array<Folded*, kMaxContexts> to{};
-  std::array<Folded*, kMaxContexts> to_end{};
+  std::array<Zigzagged*, kMaxContexts> to{};
+  std::array<Zigzagged*, kMaxContexts> to_end{};
   for (std::size_t i = 0; i < counts.size(); ++i) {
     to[i] = sorted;
     sorted += counts[i];
     to_end[i] = sorted;
   }
-  const Folded* const folded = residuals.folded.data();
-  const std::uint16_t* const activities = residuals.activities.data();
+  const Zigzagged* const zigzagged = residuals.zigzagged.data();
+  const std::uint16_t* const energies = residuals.energies.data();
   const std::size_t count = residuals.count;
   for (std::size_t i = 0; i < count / 2; ++i) {
     const std::size_t from_end = count - 1 - i;
-    *to[table[activities[i]]]++ = folded[i];
-    *--to_end[table[activities[from_end]]] = folded[from_end];
+    *to[table[energies[i]]]++ = zigzagged[i];
+    *--to_end[table[energies[from_end]]] = zigzagged[from_end];
   }
-  if (count % 2 != 0) *to[table[activities[count / 2]]] = folded[count / 2];
+  if (count % 2 != 0) *to[table[energies[count / 2]]] = zigzagged[count / 2];
   return counts;
 }
 
-template <typename Folded>
-std::uint8_t choose_activity_shift(const Residuals<Folded>& residuals) {
+template <typename Zigzagged>
+std::uint8_t choose_energy_shift(const Residuals<Zigzagged>& residuals) {
   std::uint64_t sum = 0;
-  for (std::size_t i = 0; i < residuals.count; ++i) sum += residuals.folded.data()[i];
+  for (std::size_t i = 0; i < residuals.count; ++i) sum += residuals.zigzagged.data()[i];
   std::size_t count = residuals.count;
   for (const std::uint8_t is_void : residuals.is_void) count -= is_void;
   const std::uint64_t mean = count == 0 ? 0 : sum / count;
@@ -186,17 +186,17 @@ std::uint8_t choose_activity_shift(const Residuals<Folded>& residuals) {
   return static_cast<std::uint8_t>(shift);
 }
 
-template <typename Folded>
-Streams make_streams(const Residuals<Folded>& residuals, const CodingEffort& effort, PayloadHeader& header) {
+template <typename Zigzagged>
+Streams make_streams(const Residuals<Zigzagged>& residuals, const StreamEffort& effort, PayloadHeader& header) {
   const std::size_t count = residuals.count;
   Streams streams;
   streams.single = std::make_unique_for_overwrite<std::uint8_t[]>(count);
   std::uint8_t* const symbols = streams.single.get();
-  find_symbols(residuals.folded.data(), count, symbols);
-  const std::span<const std::uint16_t> activities(residuals.activities.data(), count);
-  const std::vector<std::uint32_t> histogram = count_activities(activities);
-  header.thresholds = choose_thresholds({symbols, count}, activities, histogram, effort.context_thinning);
-  Scratch<Folded> sorted(count);
+  find_symbols(residuals.zigzagged.data(), count, symbols);
+  const std::span<const std::uint16_t> energies(residuals.energies.data(), count);
+  const std::vector<std::uint32_t> histogram = count_energies(energies);
+  header.thresholds = choose_thresholds({symbols, count}, energies, histogram, effort.context_thinning);
+  Scratch<Zigzagged> sorted(count);
   header.symbol_counts = sort_by_context(residuals, header.thresholds, histogram, sorted.data());
   find_symbols(sorted.data(), count, symbols);
   streams.extra = pack_extra_bits(sorted.data(), count);
@@ -221,11 +221,11 @@ template std::vector<std::uint32_t> sort_by_context(const Residuals<std::uint16_
 template std::vector<std::uint32_t> sort_by_context(const Residuals<std::uint32_t>& residuals,
                                                     std::span<const std::uint16_t> thresholds,
                                                     std::span<const std::uint32_t> histogram, std::uint32_t* sorted);
-template std::uint8_t choose_activity_shift(const Residuals<std::uint16_t>& residuals);
-template std::uint8_t choose_activity_shift(const Residuals<std::uint32_t>& residuals);
-template Streams make_streams(const Residuals<std::uint16_t>& residuals, const CodingEffort& effort,
+template std::uint8_t choose_energy_shift(const Residuals<std::uint16_t>& residuals);
+template std::uint8_t choose_energy_shift(const Residuals<std::uint32_t>& residuals);
+template Streams make_streams(const Residuals<std::uint16_t>& residuals, const StreamEffort& effort,
                               PayloadHeader& header);
-template Streams make_streams(const Residuals<std::uint32_t>& residuals, const CodingEffort& effort,
+template Streams make_streams(const Residuals<std::uint32_t>& residuals, const StreamEffort& effort,
                               PayloadHeader& header);
 
 }  // namespace isohf

@@ -6,7 +6,6 @@
 #include <span>
 #include <vector>
 
-#include "isohf/archive/codec/coding_effort.h"
 #include "isohf/archive/codec/tile_payload.h"
 #include "isohf/base/scratch.h"
 
@@ -14,26 +13,32 @@
 
 namespace isohf {
 
-/// Folded: 16 bits for codes, 32 for floats.
-template <typename Folded>
+/// Zigzagged: 16 bits for codes, 32 for floats.
+template <typename Zigzagged>
 struct Residuals {
-  Scratch<Folded> folded;  ///< in coding order
-  Scratch<std::uint16_t> activities;
+  Scratch<Zigzagged> zigzagged;  ///< in coding order
+  Scratch<std::uint16_t> energies;
   std::vector<std::uint8_t> is_void;  ///< empty where no sample is void
   std::size_t count = 0;
 
   Residuals(std::size_t samples, bool has_voids)
-      : folded(samples), activities(samples), is_void(has_voids ? samples : 0), count(samples) {}
+      : zigzagged(samples), energies(samples), is_void(has_voids ? samples : 0), count(samples) {}
 
   void drop_voids() {
     std::size_t kept = 0;
     for (std::size_t i = 0; i < count; ++i) {
-      folded.data()[kept] = folded.data()[i];
-      activities.data()[kept] = activities.data()[i];
+      zigzagged.data()[kept] = zigzagged.data()[i];
+      energies.data()[kept] = energies.data()[i];
       kept += is_void[i] == 0 ? 1 : 0;
     }
     count = kept;
   }
+};
+
+/// How much work the streams are worth.
+struct StreamEffort {
+  std::size_t context_thinning = 3;  ///< one residual in so many decides on the contexts of a large tile; odd
+  bool has_pairs = true;             ///< symbols may be paired
 };
 
 /// The streams as they are stored: symbols by context, paired where that pays, and the extra bits.
@@ -45,20 +50,20 @@ struct Streams {
 };
 
 /// The shift that brings residuals to a mean below 2^4.
-template <typename Folded>
-[[nodiscard]] std::uint8_t choose_activity_shift(const Residuals<Folded>& residuals);
+template <typename Zigzagged>
+[[nodiscard]] std::uint8_t choose_energy_shift(const Residuals<Zigzagged>& residuals);
 
 /// Puts the residuals context by context into `sorted`, each context's in order, and returns how many there are of
-/// each; `histogram` is count_activities of them. The last half is sorted from its end, beside the first: one alone
+/// each; `histogram` is count_energies of them. The last half is sorted from its end, beside the first: one alone
 /// would wait for its own pointers.
-template <typename Folded>
-[[nodiscard]] std::vector<std::uint32_t> sort_by_context(const Residuals<Folded>& residuals,
+template <typename Zigzagged>
+[[nodiscard]] std::vector<std::uint32_t> sort_by_context(const Residuals<Zigzagged>& residuals,
                                                          std::span<const std::uint16_t> thresholds,
-                                                         std::span<const std::uint32_t> histogram, Folded* sorted);
+                                                         std::span<const std::uint32_t> histogram, Zigzagged* sorted);
 
 /// Cuts the residuals into contexts, as many as pay; completes the header's thresholds, counts and pairs.
-template <typename Folded>
-[[nodiscard]] Streams make_streams(const Residuals<Folded>& residuals, const CodingEffort& effort,
+template <typename Zigzagged>
+[[nodiscard]] Streams make_streams(const Residuals<Zigzagged>& residuals, const StreamEffort& effort,
                                    PayloadHeader& header);
 
 }  // namespace isohf

@@ -5,7 +5,7 @@
 
 #include "isohf/metadata.h"
 
-/// Residuals as they are stored: folded, then a symbol and some bits more (docs/archive_format.md, "Tile payload").
+/// Residuals as they are stored: zigzagged, then a symbol and some bits more (docs/archive_format.md, "Tile payload").
 
 namespace isohf {
 
@@ -13,22 +13,22 @@ namespace isohf {
 [[nodiscard]] inline std::uint32_t zigzag(std::int32_t residual) {
   return (static_cast<std::uint32_t>(residual) << 1U) ^ static_cast<std::uint32_t>(residual >> 31);
 }
-[[nodiscard]] inline std::uint32_t unzigzag(std::uint32_t folded) {
-  return (folded >> 1U) ^ (0U - (folded & 1U));
+[[nodiscard]] inline std::uint32_t unzigzag(std::uint32_t zigzagged) {
+  return (zigzagged >> 1U) ^ (0U - (zigzagged & 1U));
 }
 
-/// A folded residual as a symbol and some bits more: itself below 16; above, eight symbols for every octave.
+/// A zigzagged residual as a symbol and some bits more: itself below 16; above, eight symbols for every octave.
 inline constexpr std::uint32_t kFirstSplitSymbol = 16;
 
 [[nodiscard]] constexpr unsigned extra_bits_of_symbol(unsigned symbol) {
   return symbol < kFirstSplitSymbol ? 0U : (symbol - kFirstSplitSymbol) / 8 + 1;
 }
-[[nodiscard]] constexpr unsigned symbol_of(std::uint32_t folded) {
-  if (folded < kFirstSplitSymbol) return folded;
-  const auto octave = static_cast<unsigned>(std::bit_width(folded)) - 1;  // 4..31
-  return kFirstSplitSymbol + (octave - 4) * 8 + ((folded >> (octave - 3)) & 7U);
+[[nodiscard]] constexpr unsigned symbol_of(std::uint32_t zigzagged) {
+  if (zigzagged < kFirstSplitSymbol) return zigzagged;
+  const auto octave = static_cast<unsigned>(std::bit_width(zigzagged)) - 1;  // 4..31
+  return kFirstSplitSymbol + (octave - 4) * 8 + ((zigzagged >> (octave - 3)) & 7U);
 }
-[[nodiscard]] constexpr std::uint32_t folded_from(unsigned symbol, std::uint32_t extra) {
+[[nodiscard]] constexpr std::uint32_t zigzagged_from(unsigned symbol, std::uint32_t extra) {
   if (symbol < kFirstSplitSymbol) return symbol;
   const unsigned bits = extra_bits_of_symbol(symbol);
   return ((8U + (symbol & 7U)) << bits) + extra;

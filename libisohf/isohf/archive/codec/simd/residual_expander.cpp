@@ -21,14 +21,14 @@ static_assert(7 + kGroup * extra_bits_of_symbol(kSymbols - 1) <= 64);
 constexpr std::array<std::uint32_t, 256> make_symbol_table() {
   std::array<std::uint32_t, 256> table{};
   for (unsigned symbol = 0; symbol < 256; ++symbol) {
-    table[symbol] = symbol < kSymbols ? folded_from(symbol, 0) | extra_bits_of_symbol(symbol) << 16U : kNoSuchSymbol;
+    table[symbol] = symbol < kSymbols ? zigzagged_from(symbol, 0) | extra_bits_of_symbol(symbol) << 16U : kNoSuchSymbol;
   }
   return table;
 }
 constexpr auto kSymbolTable = make_symbol_table();
 
 std::uint64_t expand_plainly(const std::byte* symbols, std::size_t count, const std::byte* extra,
-                             std::uint64_t position, std::uint64_t end, std::uint16_t* __restrict folded) {
+                             std::uint64_t position, std::uint64_t end, std::uint16_t* __restrict zigzagged) {
   std::uint32_t seen = 0;
   for (std::size_t i = 0; i < count; ++i) {
     if (position > end) return kNotExpanded;
@@ -38,7 +38,7 @@ std::uint64_t expand_plainly(const std::byte* symbols, std::size_t count, const 
     const std::uint32_t entry = kSymbolTable[std::to_integer<std::size_t>(symbols[i])];
     const unsigned taken = (entry >> 16U) & 0xffU;
     seen |= entry;
-    folded[i] = static_cast<std::uint16_t>(entry + (bits & ((std::uint64_t{1} << taken) - 1)));
+    zigzagged[i] = static_cast<std::uint16_t>(entry + (bits & ((std::uint64_t{1} << taken) - 1)));
     position += taken;
   }
   return position > end || (seen & kNoSuchSymbol) != 0 ? kNotExpanded : position;
@@ -50,7 +50,7 @@ std::uint64_t expand_plainly(const std::byte* symbols, std::size_t count, const 
 /// Sixteen symbols at a time: octaves and mantissas by bytes, then the extra bits of four symbols put to them by one
 /// deposit. The last symbols, fewer than sixteen, are left to the plain loop.
 std::uint64_t expand_widely(const std::byte* symbols, std::size_t count, const std::byte* extra, std::uint64_t position,
-                            std::uint64_t end, std::uint16_t* __restrict folded) {
+                            std::uint64_t end, std::uint16_t* __restrict zigzagged) {
   const __m128i low_powers = _mm_setr_epi8(1, 2, 4, 8, 16, 32, 64, -128, 0, 0, 0, 0, 0, 0, 0, 0);
   const __m128i high_powers = _mm_setr_epi8(0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 4, 8, 16, 32, 64, -128);
   const __m128i eight = _mm_set1_epi8(8);
@@ -66,7 +66,7 @@ std::uint64_t expand_widely(const std::byte* symbols, std::size_t count, const s
   std::size_t i = 0;
   for (; i + 16 <= count; i += 16) {
     const __m128i symbol = _mm_loadu_si128(static_cast<const __m128i*>(static_cast<const void*>(symbols + i)));
-    auto* const to = static_cast<__m128i*>(static_cast<void*>(folded + i));
+    auto* const to = static_cast<__m128i*>(static_cast<void*>(zigzagged + i));
     if (_mm_testz_si128(symbol, _mm_set1_epi8(-16)) != 0) {  // residuals themselves
       _mm_storeu_si128(to, _mm_unpacklo_epi8(symbol, zero));
       _mm_storeu_si128(to + 1, _mm_unpackhi_epi8(symbol, zero));
@@ -87,12 +87,12 @@ std::uint64_t expand_widely(const std::byte* symbols, std::size_t count, const s
       put_four(static_cast<std::uint64_t>(_mm_extract_epi64(least, 1)),
                static_cast<std::uint64_t>(_mm_extract_epi64(mask, 1)), eight_to + kGroup);
     };
-    put_eight(_mm_unpacklo_epi8(low, high), _mm_unpacklo_epi8(mantissa, zero), folded + i);
-    put_eight(_mm_unpackhi_epi8(low, high), _mm_unpackhi_epi8(mantissa, zero), folded + i + 2 * kGroup);
+    put_eight(_mm_unpacklo_epi8(low, high), _mm_unpacklo_epi8(mantissa, zero), zigzagged + i);
+    put_eight(_mm_unpackhi_epi8(low, high), _mm_unpackhi_epi8(mantissa, zero), zigzagged + i + 2 * kGroup);
   }
   const __m128i last = _mm_set1_epi8(static_cast<char>(kSymbols - 1));
   if (_mm_movemask_epi8(_mm_cmpeq_epi8(_mm_max_epu8(most, last), last)) != 0xffff) return kNotExpanded;
-  return expand_plainly(symbols + i, count - i, extra, position, end, folded + i);
+  return expand_plainly(symbols + i, count - i, extra, position, end, zigzagged + i);
 }
 #pragma GCC pop_options
 #endif
@@ -106,7 +106,7 @@ constexpr unsigned kFloatSymbols = symbol_limit(32);
 constexpr std::array<FloatSymbol, 256> make_float_symbols() {
   std::array<FloatSymbol, 256> table{};
   for (unsigned symbol = 0; symbol < kFloatSymbols; ++symbol) {
-    table[symbol] = {folded_from(symbol, 0), extra_bits_of_symbol(symbol)};
+    table[symbol] = {zigzagged_from(symbol, 0), extra_bits_of_symbol(symbol)};
   }
   return table;
 }
@@ -115,14 +115,14 @@ static_assert(7 + 2 * extra_bits_of_symbol(kFloatSymbols - 1) <= 64);  // two sy
 
 ISOHF_VECTORISED(std::uint64_t, expand_floats,
                  (const std::byte* symbols, std::size_t count, const std::byte* extra, std::uint64_t position,
-                  std::uint64_t end, std::uint32_t* __restrict folded),
-                 (symbols, count, extra, position, end, folded)) {
+                  std::uint64_t end, std::uint32_t* __restrict zigzagged),
+                 (symbols, count, extra, position, end, zigzagged)) {
   unsigned most = 0;
   const auto put = [&](std::size_t i, std::uint64_t bits) {
     const auto symbol = std::to_integer<unsigned>(symbols[i]);
     const FloatSymbol& entry = kFloatSymbolTable[symbol];
     most = symbol > most ? symbol : most;
-    folded[i] = entry.least + static_cast<std::uint32_t>(bits & ((std::uint64_t{1} << entry.extra_bits) - 1));
+    zigzagged[i] = entry.least + static_cast<std::uint32_t>(bits & ((std::uint64_t{1} << entry.extra_bits) - 1));
     return entry.extra_bits;
   };
   std::size_t i = 0;
@@ -147,19 +147,20 @@ ISOHF_VECTORISED(std::uint64_t, expand_floats,
 }  // namespace
 
 std::uint64_t expand_residuals(std::span<const std::byte> symbols, std::span<const std::byte> extra,
-                               std::uint64_t position, std::uint16_t* folded) {
+                               std::uint64_t position, std::uint16_t* zigzagged) {
   const std::uint64_t end = 8 * std::uint64_t{extra.size()};
 #if defined(ISOHF_HAS_WIDE)
   if (detail::simd_is_on.load(std::memory_order_relaxed)) {
-    return expand_widely(symbols.data(), symbols.size(), extra.data(), position, end, folded);
+    return expand_widely(symbols.data(), symbols.size(), extra.data(), position, end, zigzagged);
   }
 #endif
-  return expand_plainly(symbols.data(), symbols.size(), extra.data(), position, end, folded);
+  return expand_plainly(symbols.data(), symbols.size(), extra.data(), position, end, zigzagged);
 }
 
 std::uint64_t expand_residuals(std::span<const std::byte> symbols, std::span<const std::byte> extra,
-                               std::uint64_t position, std::uint32_t* folded) {
-  return expand_floats(symbols.data(), symbols.size(), extra.data(), position, 8 * std::uint64_t{extra.size()}, folded);
+                               std::uint64_t position, std::uint32_t* zigzagged) {
+  return expand_floats(symbols.data(), symbols.size(), extra.data(), position, 8 * std::uint64_t{extra.size()},
+                       zigzagged);
 }
 
 }  // namespace isohf

@@ -1,5 +1,6 @@
-#include "isohf/archive/codec/simd/lane_decoder.h"
-#include "isohf/archive/codec/tile_codec.h"
+#include "isohf/archive/codec/simd/batch_decoder.h"
+#include "isohf/archive/codec/tile_decoder.h"
+#include "isohf/archive/codec/tile_encoder.h"
 
 #include <gtest/gtest.h>
 
@@ -42,27 +43,27 @@ std::optional<TileCodes> decode_plainly(const TileShape& shape, CodeType type, s
 }
 
 struct Decoded {
-  std::array<TileCodes, kDecoderLanes> tiles;
-  std::array<bool, kDecoderLanes> decoded{};
+  std::array<TileCodes, kBatchLanes> tiles;
+  std::array<bool, kBatchLanes> decoded{};
 };
 
 Decoded decode(const TileShape& shape, CodeType type, const std::vector<std::vector<std::byte>>& payloads) {
-  std::array<std::span<const std::byte>, kDecoderLanes> spans;
+  std::array<std::span<const std::byte>, kBatchLanes> spans;
   std::copy(payloads.begin(), payloads.end(), spans.begin());
   Decoded out;
-  decode_lanes(shape, type, std::span(spans).first(payloads.size()), std::span(out.tiles).first(payloads.size()),
+  decode_batch(shape, type, std::span(spans).first(payloads.size()), std::span(out.tiles).first(payloads.size()),
                std::span(out.decoded).first(payloads.size()));
   return out;
 }
 
-TEST(LaneDecoder, GivesWhatThePlainDecoderGivesForAnyNumberOfLanes) {
+TEST(BatchDecoder, GivesWhatThePlainDecoderGivesForAnyNumberOfLanes) {
   const Kind kinds[] = {Kind::kPlane,     Kind::kTerrain,    Kind::kNoise,    Kind::kExtremes,
                         Kind::kTwoLevels, Kind::kVoidIsland, Kind::kVoidNoise};
   std::uint32_t seed = 1;
   for (const TileShape& shape : {TileShape::make(5, 5, 1), TileShape::make(6, 5, 1), TileShape::make(24, 29, 1),
                                  TileShape::make(52, 67, 4), TileShape::make(300, 9, 1)}) {
     for (const CodeType type : {CodeType::kU16, CodeType::kU8, CodeType::kF32}) {
-      for (const std::size_t count : {std::size_t{1}, std::size_t{2}, std::size_t{3}, std::size_t{5}, kDecoderLanes}) {
+      for (const std::size_t count : {std::size_t{1}, std::size_t{2}, std::size_t{3}, std::size_t{5}, kBatchLanes}) {
         for (const Kind first : kinds) {
           std::vector<std::vector<std::byte>> payloads;
           for (std::size_t i = 0; i < count; ++i) {
@@ -82,7 +83,7 @@ TEST(LaneDecoder, GivesWhatThePlainDecoderGivesForAnyNumberOfLanes) {
   }
 }
 
-TEST(LaneDecoder, GivesWhatThePlainDecoderGivesForPredictorsOfEveryKind) {
+TEST(BatchDecoder, GivesWhatThePlainDecoderGivesForPredictorsOfEveryKind) {
   const TileShape shape = TileShape::make(68, 67, 1);
   for (const CodeType type : {CodeType::kU16, CodeType::kU8, CodeType::kF32}) {
     const TileCodes tile = test::make_halves(shape, type);
@@ -102,20 +103,20 @@ TEST(LaneDecoder, GivesWhatThePlainDecoderGivesForPredictorsOfEveryKind) {
   }
 }
 
-TEST(LaneDecoder, LeavesEqualSamplesToThePlainDecoder) {
+TEST(BatchDecoder, LeavesEqualSamplesToThePlainDecoder) {
   const TileShape shape = TileShape::make(24, 29, 1);
   for (const CodeType type : {CodeType::kU16, CodeType::kU8, CodeType::kF32}) {
     const Decoded fast =
         decode(shape, type,
                {payload_of(shape, type, Kind::kVoidIsland, 1), payload_of(shape, type, Kind::kTerrain, 2),
                 payload_of(shape, type, Kind::kConstant, 3)});
-    EXPECT_EQ(fast.decoded, (std::array<bool, kDecoderLanes>{true, true, false}));
+    EXPECT_EQ(fast.decoded, (std::array<bool, kBatchLanes>{true, true, false}));
     EXPECT_TRUE(test::same_samples(fast.tiles[0], test::make_tile(shape, type, Kind::kVoidIsland, 1)));
     EXPECT_TRUE(test::same_samples(fast.tiles[1], test::make_tile(shape, type, Kind::kTerrain, 2)));
   }
 }
 
-TEST(LaneDecoder, RefusesWhatThePlainDecoderRefusesWithoutHarmToOtherLanes) {
+TEST(BatchDecoder, RefusesWhatThePlainDecoderRefusesWithoutHarmToOtherLanes) {
   const TileShape shape = TileShape::make(12, 11, 3);
   for (const CodeType type : {CodeType::kU16, CodeType::kU8, CodeType::kF32}) {
     const std::vector<std::byte> good = payload_of(shape, type, Kind::kTerrain, 1);
@@ -137,7 +138,7 @@ TEST(LaneDecoder, RefusesWhatThePlainDecoderRefusesWithoutHarmToOtherLanes) {
   }
 }
 
-TEST(LaneDecoder, RefusesEveryTruncation) {
+TEST(BatchDecoder, RefusesEveryTruncation) {
   const TileShape shape = TileShape::make(12, 11, 3);
   for (const CodeType type : {CodeType::kU16, CodeType::kF32}) {
     std::vector<std::byte> payload = payload_of(shape, type, Kind::kNoise, 3);
@@ -148,7 +149,7 @@ TEST(LaneDecoder, RefusesEveryTruncation) {
   }
 }
 
-TEST(LaneDecoder, SurvivesNoiseBehindAValidHeader) {
+TEST(BatchDecoder, SurvivesNoiseBehindAValidHeader) {
   const TileShape shape = TileShape::make(24, 29, 1);
   for (const CodeType type : {CodeType::kU16, CodeType::kF32}) {
     std::mt19937 random(1);
@@ -185,16 +186,15 @@ std::vector<std::byte> payload_of_greatest_sums(const TileShape& shape, std::mt1
   return payload;
 }
 
-TEST(LaneDecoder, AddsUpTheGreatestSumsOfFloatsExactly) {
+TEST(BatchDecoder, AddsUpTheGreatestSumsOfFloatsExactly) {
   const TileShape shape = TileShape::make(5, 5, 1);  // few samples: the first that is restored out of range ends it
   std::mt19937 random(5);
   int decoded = 0;
   for (int round = 0; round < 100; ++round) {
     std::vector<std::vector<std::byte>> payloads;
-    for (std::size_t lane = 0; lane < kDecoderLanes; ++lane)
-      payloads.push_back(payload_of_greatest_sums(shape, random));
+    for (std::size_t lane = 0; lane < kBatchLanes; ++lane) payloads.push_back(payload_of_greatest_sums(shape, random));
     const Decoded fast = decode(shape, CodeType::kF32, payloads);
-    for (std::size_t lane = 0; lane < kDecoderLanes; ++lane) {
+    for (std::size_t lane = 0; lane < kBatchLanes; ++lane) {
       const auto plain = decode_plainly(shape, CodeType::kF32, payloads[lane]);
       ASSERT_EQ(fast.decoded[lane], plain.has_value());
       if (!plain) continue;

@@ -1,44 +1,66 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
 
-#include "isohf/archive/codec/simd/lane_residuals.h"
 #include "isohf/archive/codec/tile_payload.h"
 
 /// What tiles that are decoded side by side are predicted from: rows of all lanes' samples, and weights.
 
 namespace isohf {
 
+/// Tiles that are decoded side by side, one in each lane of the machine's registers: a tile's samples wait for the one
+/// before, the samples of other tiles do not.
+inline constexpr std::size_t kBatchLanes = 8;
+
+/// A value for each lane.
+template <typename T>
+using PerLane = std::array<T, kBatchLanes>;
+
+inline constexpr int kBatchMargin = 3;
+
+/// The range of each lane's samples, and the least and the most that a row had.
+struct BatchRange {
+  PerLane<std::int32_t> low{};
+  PerLane<std::int32_t> high{};
+  PerLane<std::int32_t> least_seen{};
+  PerLane<std::int32_t> most_seen{};
+
+  [[nodiscard]] bool is_kept(std::size_t lane) const {
+    return least_seen[lane] >= low[lane] && most_seen[lane] <= high[lane];
+  }
+};
+
 /// The rows that a sample is predicted from: its own and the three North of it.
-enum class LaneRow : std::uint8_t { kOwn, kNorth, kFar, kFarther };
+enum class BatchRow : std::uint8_t { kOwn, kNorth, kFar, kFarther };
 
 /// Those rows, lane by lane at each place, and what a row is restored with. On odd rows' North and farther rows a place
 /// is that of the neighbour North-East.
-template <typename Folded>
-struct LaneRows {
+template <typename Zigzagged>
+struct BatchRows {
   std::int32_t* own;
   const std::int32_t* north;
   const std::int32_t* far;
   const std::int32_t* farther;
-  const Folded* folded;
+  const Zigzagged* zigzagged;
   const std::uint8_t* is_void;  ///< by place and lane; told where a lane has voids in the row
 
   /// Of a row above the sample's own.
-  [[nodiscard]] const std::int32_t* above(LaneRow row) const {
-    return row == LaneRow::kNorth ? north : row == LaneRow::kFar ? far : farther;
+  [[nodiscard]] const std::int32_t* above(BatchRow row) const {
+    return row == BatchRow::kNorth ? north : row == BatchRow::kFar ? far : farther;
   }
 };
 
-/// The last four rows of all lanes, by place and lane, with kLaneMargin places more West and East.
-class LaneRing {
+/// The last four rows of all lanes, by place and lane, with kBatchMargin places more West and East.
+class BatchRing {
  public:
-  static constexpr std::ptrdiff_t kStep = kDecoderLanes;
+  static constexpr std::ptrdiff_t kStep = kBatchLanes;
 
-  explicit LaneRing(int columns)
-      : stride_(kStep * (columns + 2 * kLaneMargin)), values_(4 * static_cast<std::size_t>(stride_)) {}
+  explicit BatchRing(int columns)
+      : stride_(kStep * (columns + 2 * kBatchMargin)), values_(4 * static_cast<std::size_t>(stride_)) {}
 
   /// Place 0 of row r, which is among the last four; row -1 and those North of it are as fill() left them.
   [[nodiscard]] std::int32_t* row(int r) { return values_.data() + offset(r); }
@@ -46,17 +68,17 @@ class LaneRing {
 
   /// One lane's value at every place.
   void fill(std::size_t lane, std::int32_t value) {
-    for (std::size_t i = lane; i < values_.size(); i += kDecoderLanes) values_[i] = value;
+    for (std::size_t i = lane; i < values_.size(); i += kBatchLanes) values_[i] = value;
   }
 
-  template <typename Folded>
-  [[nodiscard]] LaneRows<Folded> around(int r, const LaneResiduals<Folded>& residuals) {
+  template <typename Zigzagged>
+  [[nodiscard]] BatchRows<Zigzagged> around(int r, const Zigzagged* zigzagged, const std::uint8_t* is_void) {
     const std::ptrdiff_t east = r % 2 * kStep;
-    return {row(r), row(r - 1) + east, row(r - 2), row(r - 3) + east, residuals.folded(), residuals.is_void()};
+    return {row(r), row(r - 1) + east, row(r - 2), row(r - 3) + east, zigzagged, is_void};
   }
 
  private:
-  [[nodiscard]] std::ptrdiff_t offset(int r) const { return (r & 3) * stride_ + kStep * kLaneMargin; }
+  [[nodiscard]] std::ptrdiff_t offset(int r) const { return (r & 3) * stride_ + kStep * kBatchMargin; }
 
   std::ptrdiff_t stride_;
   std::vector<std::int32_t> values_;
@@ -65,9 +87,9 @@ class LaneRing {
 /// The weights of all lanes along a row: one stretch of places where no lane has a map of blocks, one a block where
 /// some have.
 template <typename Weights>
-class LaneStretches {
+class BatchStretches {
  public:
-  explicit LaneStretches(int columns) : columns_(columns) {}
+  explicit BatchStretches(int columns) : columns_(columns) {}
 
   /// Lanes are opened in order. The header must outlive this.
   void open(const PayloadHeader& header) {

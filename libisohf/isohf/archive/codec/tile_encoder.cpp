@@ -1,16 +1,14 @@
-#include "isohf/archive/codec/tile_codec.h"
+#include "isohf/archive/codec/tile_encoder.h"
 
 #include <algorithm>
 #include <bit>
 #include <cmath>
 #include <limits>
 
-#include "isohf/archive/codec/coding_effort.h"
 #include "isohf/archive/codec/ordered_float.h"
-#include "isohf/archive/codec/predict/activities.h"
+#include "isohf/archive/codec/predict/context_energy.h"
 #include "isohf/archive/codec/predict/hex_predictor.h"
 #include "isohf/archive/codec/predict/predictor_fit.h"
-#include "isohf/archive/codec/predict/residual_fold.h"
 #include "isohf/archive/codec/residuals/residual_streams.h"
 #include "isohf/archive/codec/residuals/residual_symbols.h"
 #include "isohf/archive/codec/tile_payload.h"
@@ -24,6 +22,22 @@
 
 namespace isohf {
 namespace {
+
+//                          passes thinning predictors rounds thinning moves wide
+constexpr std::array<CodingEffort, kMaxLevel> kEfforts = {{
+    {.fit = {0, 1, 1, 0, 1, 0, false}, .streams = {15, false}},
+    {.fit = {1, 15, 1, 0, 1, 0, false}, .streams = {15, true}},
+    {.fit = {2, 9, 1, 0, 1, 0, false}, .streams = {3, true}},
+    {.fit = {1, 25, 2, 1, 15, 1, false}, .streams = {9, true}},
+    {.fit = {1, 15, 2, 1, 9, 1, false}, .streams = {7, true}},
+    {.fit = {1, 7, 2, 1, 5, 2, false}, .streams = {5, true}},
+    {.fit = {2, 5, 2, 1, 3, 3, false}, .streams = {3, true}},
+    {.fit = {2, 5, 2, 1, 3, 3, true}, .streams = {3, true}},
+    {.fit = {2, 5, 2, 2, 3, 3, true}, .streams = {3, true}},
+    {.fit = {2, 3, 2, 2, 1, 4, true}, .streams = {1, true}},
+    {.fit = {2, 3, 2, 4, 1, 4, true}, .streams = {1, true}},
+    {.fit = {2, 1, 2, 8, 1, 6, true}, .streams = {1, true}},
+}};
 
 /// The void mask, as 0 and 1; empty where nothing is void.
 struct Voids {
@@ -70,28 +84,28 @@ void load(Lattice<Wide>& lattice, const Voids& voids, Wide base, const SampleAt&
   }
 }
 
-std::uint16_t fold(std::int32_t difference) {
+std::uint16_t zigzag_difference(std::int32_t difference) {
   return static_cast<std::uint16_t>(zigzag(static_cast<std::int16_t>(difference)));
 }
-std::uint32_t fold(std::int64_t difference) {
+std::uint32_t zigzag_difference(std::int64_t difference) {
   return zigzag(static_cast<std::int32_t>(difference));
 }
 
 ISOHF_VECTORISED(void, find_code_magnitudes,
-                 (const std::uint16_t* folded, int count, unsigned shift, std::uint8_t* __restrict out),
-                 (folded, count, shift, out)) {
-  for (int i = 0; i < count; ++i) out[i] = magnitude(folded[i], shift);
+                 (const std::uint16_t* zigzagged, int count, unsigned shift, std::uint8_t* __restrict out),
+                 (zigzagged, count, shift, out)) {
+  for (int i = 0; i < count; ++i) out[i] = magnitude(zigzagged[i], shift);
 }
 ISOHF_VECTORISED(void, find_float_magnitudes,
-                 (const std::uint32_t* folded, int count, unsigned shift, std::uint8_t* __restrict out),
-                 (folded, count, shift, out)) {
-  for (int i = 0; i < count; ++i) out[i] = magnitude(folded[i], shift);
+                 (const std::uint32_t* zigzagged, int count, unsigned shift, std::uint8_t* __restrict out),
+                 (zigzagged, count, shift, out)) {
+  for (int i = 0; i < count; ++i) out[i] = magnitude(zigzagged[i], shift);
 }
-void find_magnitudes(const std::uint16_t* folded, int count, unsigned shift, std::uint8_t* out) {
-  find_code_magnitudes(folded, count, shift, out);
+void find_magnitudes(const std::uint16_t* zigzagged, int count, unsigned shift, std::uint8_t* out) {
+  find_code_magnitudes(zigzagged, count, shift, out);
 }
-void find_magnitudes(const std::uint32_t* folded, int count, unsigned shift, std::uint8_t* out) {
-  find_float_magnitudes(folded, count, shift, out);
+void find_magnitudes(const std::uint32_t* zigzagged, int count, unsigned shift, std::uint8_t* out) {
+  find_float_magnitudes(zigzagged, count, shift, out);
 }
 
 /// The columns of a tile's samples in coding order, row by row; a row has as many samples as columns.
@@ -104,48 +118,49 @@ void for_coding_order(int columns, int r, const Use& use) {
   for (int side = 0; r % 2 == 0 && side < 2; ++side) use(i++, column_of_slid(columns, side));
 }
 
-/// Folded residuals of all samples in coding order; 0 where void. `is_void` comes in coding order as well.
-template <typename Wide, typename Folded>
-void find_residuals(Lattice<Wide>& lattice, const Voids& voids, const PayloadHeader& header, Residuals<Folded>& out) {
+/// Zigzagged residuals of all samples in coding order; 0 where void. `is_void` comes in coding order as well.
+template <typename Wide, typename Zigzagged>
+void find_residuals(Lattice<Wide>& lattice, const Voids& voids, const PayloadHeader& header,
+                    Residuals<Zigzagged>& out) {
   const int columns = lattice.columns();
   std::vector<Wide> halves(static_cast<std::size_t>(columns));
   for (int r = 0; r < lattice.rows(); ++r) {
     const int first = Lattice<Wide>::first(r);
     const int count = lattice.last(r) + 1 - first;
     const auto row_start = static_cast<std::size_t>(r) * static_cast<std::size_t>(columns);
-    Folded* const folded = out.folded.data() + row_start;
+    Zigzagged* const zigzagged = out.zigzagged.data() + row_start;
     lattice.open_row(r);
     predict_row<Wide>(lattice, r, header.predictors, header.low, header.high, halves);
-    fold_row(lattice.row(r) + first, halves.data() + first, count, folded);
+    zigzag_row(lattice.row(r) + first, halves.data() + first, count, zigzagged);
     for (int side = 0; r % 2 == 0 && side < 2; ++side) {
-      folded[count + side] = fold(lattice.slid_prediction(r, side) - lattice.slid(r, side));
+      zigzagged[count + side] = zigzag_difference(lattice.slid_prediction(r, side) - lattice.slid(r, side));
     }
     lattice.close_row(r);
     if (voids.is_void.empty()) continue;
     for_coding_order(columns, r, [&](std::size_t i, int column) {
       const bool is_void = voids.is_void[row_start + static_cast<std::size_t>(column)] != 0;
       out.is_void[row_start + i] = is_void ? 1 : 0;
-      if (is_void) folded[i] = 0;
+      if (is_void) zigzagged[i] = 0;
     });
   }
 }
 
-/// Activities in coding order, by the magnitudes that `shift` makes of the residuals.
-template <typename Folded>
-void find_all_activities(int columns, int rows, unsigned shift, Residuals<Folded>& residuals) {
+/// Energies in coding order, by the magnitudes that `shift` makes of the residuals.
+template <typename Zigzagged>
+void find_all_energies(int columns, int rows, unsigned shift, Residuals<Zigzagged>& residuals) {
   MagnitudeRows magnitudes(columns);
-  std::vector<std::uint16_t> activities(static_cast<std::size_t>(columns));
+  std::vector<std::uint16_t> energies(static_cast<std::size_t>(columns));
   for (int r = 0; r < rows; ++r) {
     const int first = r % 2 == 0 ? 1 : 0;
     const int last = r % 2 == 0 ? columns - 2 : columns - 1;
     const auto row_start = static_cast<std::size_t>(r) * static_cast<std::size_t>(columns);
-    std::uint16_t* const out = residuals.activities.data() + row_start;
-    find_activities(magnitudes.above() + r % 2, magnitudes.far_above(), first, last, out - first);
+    std::uint16_t* const out = residuals.energies.data() + row_start;
+    find_energies(magnitudes.above() + r % 2, magnitudes.far_above(), first, last, out - first);
     std::uint8_t* const current = magnitudes.current();
-    find_magnitudes(residuals.folded.data() + row_start, last + 1 - first, shift, current + first);
+    find_magnitudes(residuals.zigzagged.data() + row_start, last + 1 - first, shift, current + first);
     if (r % 2 == 0) {
-      out[columns - 2] = activity_of_slid(current[1], current[2]);
-      out[columns - 1] = activity_of_slid(current[columns - 3], current[columns - 2]);
+      out[columns - 2] = context_energy_of_slid(current[1], current[2]);
+      out[columns - 1] = context_energy_of_slid(current[columns - 3], current[columns - 2]);
     }
     magnitudes.close_row(first, last);
   }
@@ -171,7 +186,7 @@ void assemble(PayloadHeader& header, std::span<const std::byte> mask, const Stre
   writer.finish();
 }
 
-template <typename Wide, typename Folded, typename SampleAt>
+template <typename Wide, typename Zigzagged, typename SampleAt>
 void encode_samples(const TileShape& shape, PayloadHeader header, const Voids& voids, const SampleAt& sample_at,
                     const CodingEffort& effort, EncodedTile& tile) {
   std::vector<std::byte> mask;
@@ -183,12 +198,12 @@ void encode_samples(const TileShape& shape, PayloadHeader header, const Voids& v
     Lattice<Wide> lattice(shape);
     load<Wide>(lattice, voids, header.base, sample_at);
     header.predictors = fit_predictors<Wide>(lattice, header.low, header.high, effort.fit);
-    Residuals<Folded> residuals(static_cast<std::size_t>(shape.stored_vertex_count()), !voids.is_void.empty());
-    find_residuals<Wide, Folded>(lattice, voids, header, residuals);
-    header.activity_shift = choose_activity_shift(residuals);
-    find_all_activities(shape.columns(), shape.rows(), header.activity_shift, residuals);
+    Residuals<Zigzagged> residuals(static_cast<std::size_t>(shape.stored_vertex_count()), !voids.is_void.empty());
+    find_residuals<Wide, Zigzagged>(lattice, voids, header, residuals);
+    header.energy_shift = choose_energy_shift(residuals);
+    find_all_energies(shape.columns(), shape.rows(), header.energy_shift, residuals);
     if (header.has_voids) residuals.drop_voids();
-    streams = make_streams(residuals, effort, header);
+    streams = make_streams(residuals, effort.streams, header);
   }
   assemble(header, mask, streams, tile);
 }
@@ -306,6 +321,14 @@ EncodedTile encode_floats(const TileShape& shape, const TileCodes& tile, const C
 }
 
 }  // namespace
+
+CodingEffort coding_effort(int level) {
+  if (level < kMinLevel || level > kMaxLevel) {
+    throw Error(ErrorCode::kInvalidArgument, "level " + std::to_string(level) + ", must be " +
+                                                 std::to_string(kMinLevel) + " to " + std::to_string(kMaxLevel));
+  }
+  return kEfforts[static_cast<std::size_t>(level - kMinLevel)];
+}
 
 TileCodes void_tile(const TileShape& shape, const Quantisation& quantisation) {
   TileCodes tile;

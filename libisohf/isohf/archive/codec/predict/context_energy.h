@@ -17,33 +17,33 @@ namespace isohf {
 ///     1 . 2 . 4 . 2 . 1      row r-2
 ///   1 . 2 . 4 . 4 . 3 . 2    row r-1
 ///              (x)
-inline constexpr unsigned kActivityLimit = 4096;  ///< activities are below this
-inline constexpr unsigned kActivityWeight = 26;   ///< sum of the weights
-inline constexpr std::uint32_t kMagnitudeLimit = (kActivityLimit - 1) / kActivityWeight;
+inline constexpr unsigned kEnergyLimit = 4096;  ///< energies are below this
+inline constexpr unsigned kEnergyWeight = 26;   ///< sum of the weights
+inline constexpr std::uint32_t kMagnitudeLimit = (kEnergyLimit - 1) / kEnergyWeight;
 
-/// What a folded residual counts in activities.
-[[nodiscard]] inline std::uint8_t magnitude(std::uint32_t folded, unsigned shift) {
-  const std::uint32_t shifted = folded >> shift;
+/// What a zigzagged residual counts in energies.
+[[nodiscard]] inline std::uint8_t magnitude(std::uint32_t zigzagged, unsigned shift) {
+  const std::uint32_t shifted = zigzagged >> shift;
   return static_cast<std::uint8_t>(shifted < kMagnitudeLimit ? shifted : kMagnitudeLimit);
 }
 /// `north` as in prediction, so that north[place] is NE's; far[place] is NN's.
-[[nodiscard]] inline std::uint16_t activity_of(const std::uint8_t* north, const std::uint8_t* far, int place) {
+[[nodiscard]] inline std::uint16_t context_energy(const std::uint8_t* north, const std::uint8_t* far, int place) {
   const std::uint8_t* const n = north + place;
   const std::uint8_t* const f = far + place;
   return static_cast<std::uint16_t>(4 * (n[0] + n[-1] + f[0]) + 3 * n[1] + 2 * (n[2] + n[-2] + f[1] + f[-1]) + n[-3] +
                                     f[2] + f[-2]);
 }
 /// The same for a slid vertex, from the two lattice places beside it.
-[[nodiscard]] inline std::uint16_t activity_of_slid(std::uint8_t west, std::uint8_t east) {
-  return static_cast<std::uint16_t>(kActivityWeight / 2 * (unsigned{west} + east));
+[[nodiscard]] inline std::uint16_t context_energy_of_slid(std::uint8_t west, std::uint8_t east) {
+  return static_cast<std::uint16_t>(kEnergyWeight / 2 * (unsigned{west} + east));
 }
 
-/// Activities of places first to last of a row.
-void find_activities(const std::uint8_t* north, const std::uint8_t* far, int first, int last,
-                     std::uint16_t* __restrict activities);
+/// Energies of places first to last of a row.
+void find_energies(const std::uint8_t* north, const std::uint8_t* far, int first, int last,
+                   std::uint16_t* __restrict energies);
 
-/// The context of every activity: how many thresholds it reaches.
-[[nodiscard]] std::array<std::uint8_t, kActivityLimit> context_table(std::span<const std::uint16_t> thresholds);
+/// The context of every energy: how many thresholds it reaches.
+[[nodiscard]] std::array<std::uint8_t, kEnergyLimit> context_table(std::span<const std::uint16_t> thresholds);
 
 /// Magnitudes of the row that is worked on and the two above it, with margins of three places.
 class MagnitudeRows {

@@ -1,4 +1,4 @@
-#include "isohf/archive/codec/simd/lane_floats.h"
+#include "isohf/archive/codec/simd/batch_floats.h"
 
 #include <algorithm>
 
@@ -16,28 +16,28 @@
 namespace isohf {
 namespace {
 
-constexpr std::size_t kLanes = kDecoderLanes;
-constexpr std::ptrdiff_t kStep = LaneRing::kStep;
+constexpr std::size_t kLanes = kBatchLanes;
+constexpr std::ptrdiff_t kStep = BatchRing::kStep;
 
 using Ints = std::int32_t __attribute__((vector_size(4 * kLanes)));
 using Words = std::uint32_t __attribute__((vector_size(4 * kLanes)));
 
 /// Where the sample of each weight stands from the predicted one (Neighbours::of_weight), NE's last.
 struct Term {
-  LaneRow row;
+  BatchRow row;
   int place;
 };
 constexpr std::size_t kWest = 0;
 constexpr std::size_t kFarWest = 2;
 constexpr std::array<Term, kWeightCount + 1> kTerms = {{
-    {LaneRow::kOwn, -1},    {LaneRow::kNorth, -1},   {LaneRow::kOwn, -2},    {LaneRow::kNorth, 1},
-    {LaneRow::kNorth, -2},  {LaneRow::kFar, 0},      {LaneRow::kFar, 1},     {LaneRow::kFar, -1},
-    {LaneRow::kFar, 2},     {LaneRow::kFar, -2},     {LaneRow::kFarther, 0}, {LaneRow::kFarther, -1},
-    {LaneRow::kFarther, 1}, {LaneRow::kFarther, -2}, {LaneRow::kNorth, 2},   {LaneRow::kNorth, -3},
-    {LaneRow::kFar, 3},     {LaneRow::kFar, -3},     {LaneRow::kNorth, 0},
+    {BatchRow::kOwn, -1},    {BatchRow::kNorth, -1},   {BatchRow::kOwn, -2},    {BatchRow::kNorth, 1},
+    {BatchRow::kNorth, -2},  {BatchRow::kFar, 0},      {BatchRow::kFar, 1},     {BatchRow::kFar, -1},
+    {BatchRow::kFar, 2},     {BatchRow::kFar, -2},     {BatchRow::kFarther, 0}, {BatchRow::kFarther, -1},
+    {BatchRow::kFarther, 1}, {BatchRow::kFarther, -2}, {BatchRow::kNorth, 2},   {BatchRow::kNorth, -3},
+    {BatchRow::kFar, 3},     {BatchRow::kFar, -3},     {BatchRow::kNorth, 0},
 }};
 
-using Rows = LaneRows<std::uint32_t>;
+using Rows = BatchRows<std::uint32_t>;
 
 /// Sums are those of samples and weights and half a sample, 2^11: bits from the twelfth on are the prediction, and the
 /// eleventh is set where it was not rounded up. At (low << 12) + 2^11 they reach the range, at (high << 12) + 2^11 they
@@ -51,7 +51,7 @@ constexpr bool is_summed_above(std::size_t term, bool is_near) {
 /// A place lane by lane: what the other kernel does for all at once.
 template <bool kIsNear, bool kWithVoids>
 [[gnu::always_inline]] inline void restore_place_plainly(const Rows& rows, const FloatStretch& weights, int place,
-                                                         LaneRange& range) {
+                                                         BatchRange& range) {
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
     const std::ptrdiff_t at = place * kStep + static_cast<std::ptrdiff_t>(lane);
     std::int32_t& own = rows.own[at];
@@ -64,7 +64,7 @@ template <bool kIsNear, bool kWithVoids>
         if (!is_summed_above(term, kIsNear)) continue;
         sum += std::int64_t{weights[term].all[lane]} * rows.above(kTerms[term].row)[at + kTerms[term].place * kStep];
       }
-      const std::uint32_t residual = unzigzag(rows.folded[at]);
+      const std::uint32_t residual = unzigzag(rows.zigzagged[at]);
       const std::int64_t low = range.low[lane];
       const std::int64_t high = range.high[lane];
       auto restored = static_cast<std::uint32_t>(sum >> kWeightBits);
@@ -116,7 +116,7 @@ template <bool kIsWide>
 
 template <bool kIsWide, bool kIsNear, bool kWithVoids>
 [[gnu::always_inline]] inline void restore_places_widely(const Rows& rows, const FloatStretch& weights, int begin,
-                                                         int end, LaneRange& range) {
+                                                         int end, BatchRange& range) {
   using Bytes = std::int8_t __attribute__((vector_size(kLanes)));
   const auto bound_of = [](Ints value) { return (Longs)((LongWords)value << 32U) >> (32 - kWeightBits); };
   const Ints low = unaligned<Ints>(range.low.data()).value;
@@ -142,8 +142,8 @@ template <bool kIsWide, bool kIsNear, bool kWithVoids>
       even += multiply<kIsWide>(samples, weights[term].all);
       odd += multiply<kIsWide>(odd_lanes(samples), weights[term].of_odd);
     }
-    const Words folded = unaligned<Words>(rows.folded + at).value;
-    const Ints residual = (Ints)((folded >> 1U) ^ -(folded & 1U));
+    const Words zigzagged = unaligned<Words>(rows.zigzagged + at).value;
+    const Ints residual = (Ints)((zigzagged >> 1U) ^ -(zigzagged & 1U));
     const Ints below = low - residual;
     const Ints above = high + residual;
     const Outcomes of_even = {(Longs)residual, (Longs)-residual, (Longs)below, (Longs)above};
@@ -177,7 +177,7 @@ template <bool kIsWide, bool kIsNear, bool kWithVoids>
 
 template <bool kIsWide, bool kIsNear, bool kWithVoids>
 [[gnu::always_inline]] inline void restore_places(const Rows& rows, const FloatStretch& weights, int begin, int end,
-                                                  LaneRange& range) {
+                                                  BatchRange& range) {
 #if defined(ISOHF_HAS_WIDE)
   if constexpr (kIsWide) return restore_places_widely<kIsWide, kIsNear, kWithVoids>(rows, weights, begin, end, range);
 #endif
@@ -187,17 +187,17 @@ template <bool kIsWide, bool kIsNear, bool kWithVoids>
 }
 
 ISOHF_TWO_WAYS(void, restore_near,
-               (const Rows& rows, const FloatStretch& weights, int begin, int end, LaneRange& range),
+               (const Rows& rows, const FloatStretch& weights, int begin, int end, BatchRange& range),
                (rows, weights, begin, end, range)) {
   restore_places<kIsWide, true, false>(rows, weights, begin, end, range);
 }
 ISOHF_TWO_WAYS(void, restore_widely,
-               (const Rows& rows, const FloatStretch& weights, int begin, int end, LaneRange& range),
+               (const Rows& rows, const FloatStretch& weights, int begin, int end, BatchRange& range),
                (rows, weights, begin, end, range)) {
   restore_places<kIsWide, false, false>(rows, weights, begin, end, range);
 }
 ISOHF_TWO_WAYS(void, restore_with_voids,
-               (const Rows& rows, const FloatStretch& weights, int begin, int end, LaneRange& range),
+               (const Rows& rows, const FloatStretch& weights, int begin, int end, BatchRange& range),
                (rows, weights, begin, end, range)) {
   restore_places<kIsWide, false, true>(rows, weights, begin, end, range);
 }
@@ -241,9 +241,9 @@ void repeat_sample(const std::int32_t* from, std::int32_t* out, int count) {
 
 }  // namespace
 
-LaneFloats::LaneFloats(const TileShape& shape) : columns_(shape.columns()), ring_(columns_), stretches_(columns_) {}
+BatchFloats::BatchFloats(const TileShape& shape) : columns_(shape.columns()), ring_(columns_), stretches_(columns_) {}
 
-void LaneFloats::open(const PayloadHeader& header) {
+void BatchFloats::open(const PayloadHeader& header) {
   const std::size_t lane = stretches_.lanes();
   stretches_.open(header);
   ring_.fill(lane, header.base);
@@ -252,10 +252,10 @@ void LaneFloats::open(const PayloadHeader& header) {
   dropped_[lane] = header.dropped_bits;
 }
 
-void LaneFloats::restore_row(int r, const LaneResiduals<std::uint32_t>& residuals) {
+void BatchFloats::restore_row(int r, const BatchResiduals<std::uint32_t>& residuals) {
   const int first = Lattice<std::int64_t>::first(r);
   const int last = r % 2 == 0 ? columns_ - 2 : columns_ - 1;
-  const Rows rows = ring_.around(r, residuals);
+  const Rows rows = ring_.around(r, residuals.zigzagged(), residuals.is_void());
   repeat_sample(rows.north + first * kStep, rows.own + (first - 2) * kStep, 2);
   stretches_.take_row(r, [](FloatStretch& weights, std::size_t lane, const PredictorWeights& of_lane, int anchor) {
     for (std::size_t term = 0; term < kTerms.size(); ++term) {
@@ -274,11 +274,11 @@ void LaneFloats::restore_row(int r, const LaneResiduals<std::uint32_t>& residual
       restore_near(rows, weights, begin, end, range_);
     }
   });
-  repeat_sample(rows.own + first * kStep, rows.own - kLaneMargin * kStep, first + kLaneMargin);
-  repeat_sample(rows.own + last * kStep, rows.own + (last + 1) * kStep, columns_ + kLaneMargin - last - 1);
+  repeat_sample(rows.own + first * kStep, rows.own - kBatchMargin * kStep, first + kBatchMargin);
+  repeat_sample(rows.own + last * kStep, rows.own + (last + 1) * kStep, columns_ + kBatchMargin - last - 1);
 }
 
-void LaneFloats::write_row(int r, const PerLane<float*>& heights) const {
+void BatchFloats::write_row(int r, const PerLane<float*>& heights) const {
   const auto step = static_cast<int>(kLanes);
   const int last = r % 2 == 0 ? columns_ - 2 : columns_ - 1;
   int place = Lattice<std::int64_t>::first(r);

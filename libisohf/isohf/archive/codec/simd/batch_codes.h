@@ -4,30 +4,29 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "isohf/archive/codec/simd/lane_range.h"
-#include "isohf/archive/codec/simd/lane_residuals.h"
-#include "isohf/archive/codec/simd/lane_rows.h"
+#include "isohf/archive/codec/simd/batch_residuals.h"
+#include "isohf/archive/codec/simd/batch_rows.h"
 #include "isohf/archive/codec/tile_payload.h"
 
 namespace isohf {
 
 /// What a stretch of places is predicted with: a pair of weights of each lane, one pair of neighbours after the other.
-inline constexpr std::size_t kLaneTermPairs = 11;
-using StretchWeights = std::array<PerLane<std::int32_t>, kLaneTermPairs>;
+inline constexpr std::size_t kTermPairCount = 11;
+using StretchWeights = std::array<PerLane<std::int32_t>, kTermPairCount>;
 
 /// The samples of tiles that are decoded side by side, on their way from residuals to codes, row by row.
-class LaneSamples {
+class BatchCodes {
  public:
-  using Folded = std::uint16_t;
+  using Zigzagged = std::uint16_t;
   using Stored = std::uint16_t;
 
-  explicit LaneSamples(const TileShape& shape);
+  explicit BatchCodes(const TileShape& shape);
 
   /// Lanes are opened in order. The header must outlive this.
   void open(const PayloadHeader& header);
 
   /// Restores row r from the residuals taken last.
-  void restore_row(int r, const LaneResiduals<std::uint16_t>& residuals);
+  void restore_row(int r, const BatchResiduals<std::uint16_t>& residuals);
 
   /// Whether no sample of that row has left its lane's range.
   [[nodiscard]] bool is_in_range(std::size_t lane) const { return range_.is_kept(lane); }
@@ -46,9 +45,9 @@ class LaneSamples {
 
  private:
   int columns_;
-  LaneRange range_;  ///< shifted (lane_samples.cpp)
-  LaneRing ring_;    ///< pairs of samples
-  LaneStretches<StretchWeights> stretches_;
+  BatchRange range_;  ///< shifted (batch_codes.cpp)
+  BatchRing ring_;    ///< pairs of samples
+  BatchStretches<StretchWeights> stretches_;
 };
 
 }  // namespace isohf

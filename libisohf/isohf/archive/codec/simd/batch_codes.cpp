@@ -1,4 +1,4 @@
-#include "isohf/archive/codec/simd/lane_samples.h"
+#include "isohf/archive/codec/simd/batch_codes.h"
 
 #include <algorithm>
 
@@ -15,8 +15,8 @@
 namespace isohf {
 namespace {
 
-constexpr std::size_t kLanes = kDecoderLanes;
-constexpr std::ptrdiff_t kStep = LaneRing::kStep;
+constexpr std::size_t kLanes = kBatchLanes;
+constexpr std::ptrdiff_t kStep = BatchRing::kStep;
 
 /// A sample less 2^15, so that it fits 16 bits with a sign. Weights add up to 2^12, hence the sum of weighted samples
 /// is that of the shifted ones and 2^27.
@@ -33,27 +33,27 @@ constexpr int kAnchor = static_cast<int>(kWeightCount);  // NE's weight
 /// A pair of terms: the place of its western sample from the predicted one, on which row, and the weights of both; a
 /// negative one for none.
 struct TermPair {
-  LaneRow row;
+  BatchRow row;
   int place;
   int west;
   int east;
 };
 constexpr std::size_t kNearPairs = 8;
-constexpr std::array<TermPair, kLaneTermPairs> kTermPairs = {{
-    {LaneRow::kOwn, -2, 2, 0},
-    {LaneRow::kNorth, -1, 1, kAnchor},
-    {LaneRow::kNorth, 1, 3, 14},
-    {LaneRow::kNorth, -3, 15, 4},
-    {LaneRow::kFar, -1, 7, 5},
-    {LaneRow::kFar, 1, 6, 8},
-    {LaneRow::kFar, -3, 17, 9},
-    {LaneRow::kFarther, -1, 11, 10},
-    {LaneRow::kFar, 3, 16, -1},
-    {LaneRow::kFarther, 1, 12, -1},
-    {LaneRow::kFarther, -2, 13, -1},
+constexpr std::array<TermPair, kTermPairCount> kTermPairs = {{
+    {BatchRow::kOwn, -2, 2, 0},
+    {BatchRow::kNorth, -1, 1, kAnchor},
+    {BatchRow::kNorth, 1, 3, 14},
+    {BatchRow::kNorth, -3, 15, 4},
+    {BatchRow::kFar, -1, 7, 5},
+    {BatchRow::kFar, 1, 6, 8},
+    {BatchRow::kFar, -3, 17, 9},
+    {BatchRow::kFarther, -1, 11, 10},
+    {BatchRow::kFar, 3, 16, -1},
+    {BatchRow::kFarther, 1, 12, -1},
+    {BatchRow::kFarther, -2, 13, -1},
 }};
 
-using Rows = LaneRows<std::uint16_t>;
+using Rows = BatchRows<std::uint16_t>;
 using Ints = std::int32_t __attribute__((vector_size(4 * kLanes)));
 using Words = std::uint32_t __attribute__((vector_size(4 * kLanes)));
 using Shorts = std::uint16_t __attribute__((vector_size(2 * kLanes)));
@@ -94,7 +94,7 @@ template <bool kIsWide>
 /// sample's own.
 template <bool kIsWide, std::size_t kPairs, bool kWithVoids>
 [[gnu::always_inline]] inline void restore_places(const Rows& rows, const StretchWeights& weights, int begin, int end,
-                                                  LaneRange& range) {
+                                                  BatchRange& range) {
   using Bytes = std::int8_t __attribute__((vector_size(kLanes)));
   const Ints low = unaligned<Ints>(range.low.data()).value;
   const Ints high = unaligned<Ints>(range.high.data()).value;
@@ -110,8 +110,8 @@ template <bool kIsWide, std::size_t kPairs, bool kWithVoids>
       const TermPair term = kTermPairs[pair];
       above += weigh<kIsWide>(rows.above(term.row) + at + term.place * kStep, weights[pair].data());
     }
-    const Words folded = __builtin_convertvector(unaligned<Shorts>(rows.folded + at).value, Words);
-    const Ints residual = (Ints)((folded >> 1U) ^ -(folded & 1U));
+    const Words zigzagged = __builtin_convertvector(unaligned<Shorts>(rows.zigzagged + at).value, Words);
+    const Ints residual = (Ints)((zigzagged >> 1U) ^ -(zigzagged & 1U));
     const Words sum = above + weigh<kIsWide>(reinterpret_cast<const std::int32_t*>(&west_pair), weights[0].data());
     // Shifted samples are predicted as samples are: 2^27 more in the sum are 2^16 more in the halves, an even number.
     Ints halves = (Ints)sum >> (kWeightBits - 1);
@@ -135,17 +135,17 @@ template <bool kIsWide, std::size_t kPairs, bool kWithVoids>
 }
 
 ISOHF_TWO_WAYS(void, restore_near,
-               (const Rows& rows, const StretchWeights& weights, int begin, int end, LaneRange& range),
+               (const Rows& rows, const StretchWeights& weights, int begin, int end, BatchRange& range),
                (rows, weights, begin, end, range)) {
   restore_places<kIsWide, kNearPairs, false>(rows, weights, begin, end, range);
 }
 ISOHF_TWO_WAYS(void, restore_widely,
-               (const Rows& rows, const StretchWeights& weights, int begin, int end, LaneRange& range),
+               (const Rows& rows, const StretchWeights& weights, int begin, int end, BatchRange& range),
                (rows, weights, begin, end, range)) {
   restore_places<kIsWide, kTermPairs.size(), false>(rows, weights, begin, end, range);
 }
 ISOHF_TWO_WAYS(void, restore_with_voids,
-               (const Rows& rows, const StretchWeights& weights, int begin, int end, LaneRange& range),
+               (const Rows& rows, const StretchWeights& weights, int begin, int end, BatchRange& range),
                (rows, weights, begin, end, range)) {
   restore_places<kIsWide, kTermPairs.size(), true>(rows, weights, begin, end, range);
 }
@@ -190,9 +190,9 @@ std::int32_t code_of(std::int32_t pair) {
 
 }  // namespace
 
-LaneSamples::LaneSamples(const TileShape& shape) : columns_(shape.columns()), ring_(columns_), stretches_(columns_) {}
+BatchCodes::BatchCodes(const TileShape& shape) : columns_(shape.columns()), ring_(columns_), stretches_(columns_) {}
 
-void LaneSamples::open(const PayloadHeader& header) {
+void BatchCodes::open(const PayloadHeader& header) {
   const std::size_t lane = stretches_.lanes();
   stretches_.open(header);
   const std::int32_t base = header.base - kSampleShift;
@@ -201,10 +201,10 @@ void LaneSamples::open(const PayloadHeader& header) {
   range_.high[lane] = header.high - kSampleShift;
 }
 
-void LaneSamples::restore_row(int r, const LaneResiduals<std::uint16_t>& residuals) {
+void BatchCodes::restore_row(int r, const BatchResiduals<std::uint16_t>& residuals) {
   const int first = Lattice<std::int32_t>::first(r);
   const int last = r % 2 == 0 ? columns_ - 2 : columns_ - 1;
-  const Rows rows = ring_.around(r, residuals);
+  const Rows rows = ring_.around(r, residuals.zigzagged(), residuals.is_void());
   repeat_sample(rows.north + first * kStep, false, rows.own + (first - 2) * kStep, 1);
   stretches_.take_row(r, [](StretchWeights& weights, std::size_t lane, const PredictorWeights& of_lane, int anchor) {
     const auto weight_of = [&](int i) -> std::int32_t {
@@ -225,15 +225,15 @@ void LaneSamples::restore_row(int r, const LaneResiduals<std::uint16_t>& residua
       restore_near(rows, weights, begin, end, range_);
     }
   });
-  repeat_sample(rows.own + first * kStep, false, rows.own - kLaneMargin * kStep, first + kLaneMargin);
-  repeat_sample(rows.own + (last - 1) * kStep, true, rows.own + last * kStep, columns_ + kLaneMargin - last);
+  repeat_sample(rows.own + first * kStep, false, rows.own - kBatchMargin * kStep, first + kBatchMargin);
+  repeat_sample(rows.own + (last - 1) * kStep, true, rows.own + last * kStep, columns_ + kBatchMargin - last);
 }
 
-std::int32_t LaneSamples::sample(int r, int place, std::size_t lane) const {
+std::int32_t BatchCodes::sample(int r, int place, std::size_t lane) const {
   return code_of(ring_.row(r)[place * kStep + static_cast<std::ptrdiff_t>(lane)]);
 }
 
-void LaneSamples::write_row(int r, const PerLane<std::uint16_t*>& codes) const {
+void BatchCodes::write_row(int r, const PerLane<std::uint16_t*>& codes) const {
   const std::int32_t* const samples = ring_.row(r);
   const auto step = static_cast<int>(kLanes);
   const int last = r % 2 == 0 ? columns_ - 2 : columns_ - 1;

@@ -1,4 +1,4 @@
-#include "isohf/archive/codec/simd/lane_decoder.h"
+#include "isohf/archive/codec/simd/batch_decoder.h"
 
 #include <algorithm>
 #include <limits>
@@ -8,9 +8,9 @@
 
 #include "isohf/archive/codec/predict/sample_lattice.h"
 #include "isohf/archive/codec/residuals/residual_symbols.h"
-#include "isohf/archive/codec/simd/lane_floats.h"
-#include "isohf/archive/codec/simd/lane_residuals.h"
-#include "isohf/archive/codec/simd/lane_samples.h"
+#include "isohf/archive/codec/simd/batch_codes.h"
+#include "isohf/archive/codec/simd/batch_floats.h"
+#include "isohf/archive/codec/simd/batch_residuals.h"
 #include "isohf/archive/codec/tile_payload.h"
 #include "isohf/base/assert.h"
 #include "isohf/error.h"
@@ -36,14 +36,14 @@ Stored void_of(CodeType type) {
   }
 }
 
-/// Tiles on their way: payloads, residuals, samples (LaneSamples or LaneFloats), what is stored.
+/// Tiles on their way: payloads, residuals, samples (BatchCodes or BatchFloats), what is stored.
 template <typename Samples>
-class LaneDecoder {
-  using Folded = typename Samples::Folded;
+class BatchDecoder {
+  using Zigzagged = typename Samples::Zigzagged;
   using Stored = typename Samples::Stored;
 
  public:
-  LaneDecoder(const TileShape& shape, CodeType type)
+  BatchDecoder(const TileShape& shape, CodeType type)
       : shape_(shape),
         type_(type),
         void_(void_of<Stored>(type)),
@@ -53,7 +53,7 @@ class LaneDecoder {
 
   /// False where the payload is not for this decoder, or broken.
   bool open(std::span<const std::byte> bytes, TileCodes& tile) {
-    auto payload = std::make_unique<LanePayload<Folded>>();
+    auto payload = std::make_unique<BatchPayload<Zigzagged>>();
     try {
       if (!payload->open(shape_, type_, bytes)) return false;
     } catch (const Error&) {
@@ -125,10 +125,10 @@ class LaneDecoder {
   const TileShape& shape_;
   CodeType type_;
   Stored void_;
-  std::vector<std::unique_ptr<LanePayload<Folded>>> payloads_;
+  std::vector<std::unique_ptr<BatchPayload<Zigzagged>>> payloads_;
   std::vector<Stored*> stored_;
   std::vector<bool> is_good_;
-  LaneResiduals<Folded> residuals_;
+  BatchResiduals<Zigzagged> residuals_;
   Samples samples_;
   std::vector<Stored> spare_row_;  ///< of lanes without a tile
 };
@@ -136,7 +136,7 @@ class LaneDecoder {
 template <typename Samples>
 void decode_side_by_side(const TileShape& shape, CodeType type, std::span<const std::span<const std::byte>> payloads,
                          std::span<TileCodes> tiles, std::span<bool> decoded) {
-  LaneDecoder<Samples> decoder(shape, type);
+  BatchDecoder<Samples> decoder(shape, type);
   std::vector<std::size_t> opened;
   for (std::size_t i = 0; i < payloads.size(); ++i) {
     tiles[i] = {};
@@ -149,14 +149,14 @@ void decode_side_by_side(const TileShape& shape, CodeType type, std::span<const 
 
 }  // namespace
 
-void decode_lanes(const TileShape& shape, CodeType type, std::span<const std::span<const std::byte>> payloads,
+void decode_batch(const TileShape& shape, CodeType type, std::span<const std::span<const std::byte>> payloads,
                   std::span<TileCodes> tiles, std::span<bool> decoded) {
-  ISOHF_ASSERT(payloads.size() <= kDecoderLanes && tiles.size() == payloads.size());
+  ISOHF_ASSERT(payloads.size() <= kBatchLanes && tiles.size() == payloads.size());
   std::fill(decoded.begin(), decoded.end(), false);
   if (type == CodeType::kF32) {
-    decode_side_by_side<LaneFloats>(shape, type, payloads, tiles, decoded);
+    decode_side_by_side<BatchFloats>(shape, type, payloads, tiles, decoded);
   } else {
-    decode_side_by_side<LaneSamples>(shape, type, payloads, tiles, decoded);
+    decode_side_by_side<BatchCodes>(shape, type, payloads, tiles, decoded);
   }
 }
 

@@ -7,26 +7,20 @@
 #include <span>
 #include <vector>
 
-#include "isohf/archive/codec/simd/lane_decoder.h"
+#include "isohf/archive/codec/simd/batch_rows.h"
 #include "isohf/archive/codec/tile_payload.h"
 
 /// The residuals of tiles that are decoded side by side: taken from the streams of their contexts, row by row.
 
 namespace isohf {
 
-/// A value for each lane.
-template <typename T>
-using PerLane = std::array<T, kDecoderLanes>;
-
-inline constexpr int kLaneMargin = 3;
-
-/// One tile's payload, its residuals put together. Folded: uint16 for codes, uint32 for floats.
-template <typename Folded>
-struct LanePayload {
+/// One tile's payload, its residuals put together. Zigzagged: uint16 for codes, uint32 for floats.
+template <typename Zigzagged>
+struct BatchPayload {
   PayloadHeader header;
-  std::vector<std::uint8_t> is_void;                     ///< in row order; empty where nothing is void
-  std::unique_ptr<Folded[]> folded;                      ///< context by context, and a row's worth of zeros
-  std::array<const Folded*, kMaxContexts + 1> starts{};  ///< of the contexts; all past the last one end there
+  std::vector<std::uint8_t> is_void;                        ///< in row order; empty where nothing is void
+  std::unique_ptr<Zigzagged[]> zigzagged;                   ///< context by context, and a row's worth of zeros
+  std::array<const Zigzagged*, kMaxContexts + 1> starts{};  ///< of the contexts; all past the last one end there
 
   /// False where the payload is not for this decoder. Throws Error where it is broken.
   [[nodiscard]] bool open(const TileShape& shape, CodeType type, std::span<const std::byte> payload);
@@ -39,19 +33,19 @@ struct LanePayload {
 };
 
 /// Residuals of all lanes, side by side at each place.
-template <typename Folded>
-class LaneResiduals {
+template <typename Zigzagged>
+class BatchResiduals {
  public:
-  explicit LaneResiduals(int columns);
+  explicit BatchResiduals(int columns);
 
   /// Lanes are opened in order. The payload must outlive this.
-  void open(const LanePayload<Folded>& payload);
+  void open(const BatchPayload<Zigzagged>& payload);
 
   /// Takes the residuals of row r. A lane that a context has run out of is no longer good.
   void take_row(int r);
 
   /// By place and lane: the row's residuals; and which are void, where has_voids() says that some are.
-  [[nodiscard]] const Folded* folded() const { return folded_.data(); }
+  [[nodiscard]] const Zigzagged* zigzagged() const { return zigzagged_.data(); }
   [[nodiscard]] const std::uint8_t* is_void() const { return is_void_.data(); }
   [[nodiscard]] bool has_voids() const { return has_voids_; }
   [[nodiscard]] const std::uint8_t* void_row(std::size_t lane) const { return void_rows_[lane]; }
@@ -62,7 +56,7 @@ class LaneResiduals {
   [[nodiscard]] bool is_good(std::size_t lane) const { return is_good_[lane]; }
 
  private:
-  using Streams = std::array<const Folded*, kMaxContexts>;
+  using Streams = std::array<const Zigzagged*, kMaxContexts>;
 
   void take_places(int first, int last);
   void take_around_voids(std::size_t lane, int r, int first, int last);
@@ -73,17 +67,17 @@ class LaneResiduals {
 
   int columns_;
   std::size_t count_ = 0;
-  PerLane<const LanePayload<Folded>*> payloads_{};
-  std::vector<std::uint8_t> tables_;  ///< kActivityLimit of each lane
+  PerLane<const BatchPayload<Zigzagged>*> payloads_{};
+  std::vector<std::uint8_t> tables_;  ///< kEnergyLimit of each lane
   PerLane<Streams> next_{};
   PerLane<std::int32_t> shifts_{};
   PerLane<bool> is_good_{};
   PerLane<const std::uint8_t*> void_rows_{};
-  std::array<PerLane<Folded>, 2> slid_{};
+  std::array<PerLane<Zigzagged>, 2> slid_{};
   std::array<std::vector<std::uint8_t>, 3> magnitudes_;  ///< of the row, and of the two above it
-  std::vector<std::uint16_t> activities_;
-  std::vector<Folded> folded_;
-  std::vector<Folded> nothing_;  ///< what lanes without a tile take
+  std::vector<std::uint16_t> energies_;
+  std::vector<Zigzagged> zigzagged_;
+  std::vector<Zigzagged> nothing_;  ///< what lanes without a tile take
   std::vector<std::uint8_t> is_void_;
   bool has_voids_ = false;
 };

@@ -1,8 +1,8 @@
-#include "isohf/archive/codec/simd/lane_residuals.h"
+#include "isohf/archive/codec/simd/batch_residuals.h"
 
 #include <algorithm>
 
-#include "isohf/archive/codec/predict/activities.h"
+#include "isohf/archive/codec/predict/context_energy.h"
 #include "isohf/archive/codec/predict/sample_lattice.h"
 #include "isohf/archive/codec/simd/residual_expander.h"
 #include "isohf/archive/codec/void_mask.h"
@@ -12,47 +12,47 @@
 namespace isohf {
 namespace {
 
-constexpr std::ptrdiff_t kStep = kDecoderLanes;
+constexpr std::ptrdiff_t kStep = kBatchLanes;
 /// Between two lanes' tables: not a power of two, or what they all use most would fall into the same sets of the cache.
-constexpr std::size_t kTableStride = kActivityLimit + 576;
+constexpr std::size_t kTableStride = kEnergyLimit + 576;
 
-ISOHF_VECTORISED(void, find_lane_activities,
+ISOHF_VECTORISED(void, find_lane_energies,
                  (const std::uint8_t* north, const std::uint8_t* far, std::ptrdiff_t begin, std::ptrdiff_t end,
-                  std::uint16_t* __restrict activities),
-                 (north, far, begin, end, activities)) {
+                  std::uint16_t* __restrict energies),
+                 (north, far, begin, end, energies)) {
   for (std::ptrdiff_t i = begin; i < end; ++i) {
     const std::uint8_t* const n = north + i;
     const std::uint8_t* const f = far + i;
-    activities[i] = static_cast<std::uint16_t>(4 * (n[0] + n[-kStep] + f[0]) + 3 * n[kStep] +
-                                               2 * (n[2 * kStep] + n[-2 * kStep] + f[kStep] + f[-kStep]) +
-                                               n[-3 * kStep] + f[2 * kStep] + f[-2 * kStep]);
+    energies[i] = static_cast<std::uint16_t>(4 * (n[0] + n[-kStep] + f[0]) + 3 * n[kStep] +
+                                             2 * (n[2 * kStep] + n[-2 * kStep] + f[kStep] + f[-kStep]) + n[-3 * kStep] +
+                                             f[2 * kStep] + f[-2 * kStep]);
   }
 }
 
-/// Each lane's residuals, shifted as its activities want them.
+/// Each lane's residuals, shifted as its energies want them.
 ISOHF_VECTORISED(void, shift_lanes,
-                 (const std::uint16_t* folded, std::ptrdiff_t begin, std::ptrdiff_t end,
+                 (const std::uint16_t* zigzagged, std::ptrdiff_t begin, std::ptrdiff_t end,
                   const PerLane<std::int32_t>& shifts, std::uint16_t* __restrict shifted),
-                 (folded, begin, end, shifts, shifted)) {
-  using Ints = std::int32_t __attribute__((vector_size(4 * kDecoderLanes)));
-  using Shorts = std::uint16_t __attribute__((vector_size(2 * kDecoderLanes)));
+                 (zigzagged, begin, end, shifts, shifted)) {
+  using Ints = std::int32_t __attribute__((vector_size(4 * kBatchLanes)));
+  using Shorts = std::uint16_t __attribute__((vector_size(2 * kBatchLanes)));
   const Ints shift = unaligned<Ints>(shifts.data()).value;
   for (std::ptrdiff_t at = begin; at < end; at += kStep) {
-    const Ints wide = __builtin_convertvector(unaligned<Shorts>(folded + at).value, Ints) >> shift;
+    const Ints wide = __builtin_convertvector(unaligned<Shorts>(zigzagged + at).value, Ints) >> shift;
     unaligned<Shorts>(shifted + at).value = __builtin_convertvector(wide, Shorts);
   }
 }
 
 /// Those of floats, as far as they fit 16 bits.
 ISOHF_VECTORISED(void, shift_float_lanes,
-                 (const std::uint32_t* folded, std::ptrdiff_t begin, std::ptrdiff_t end,
+                 (const std::uint32_t* zigzagged, std::ptrdiff_t begin, std::ptrdiff_t end,
                   const PerLane<std::int32_t>& shifts, std::uint16_t* __restrict shifted),
-                 (folded, begin, end, shifts, shifted)) {
-  using Words = std::uint32_t __attribute__((vector_size(4 * kDecoderLanes)));
-  using Shorts = std::uint16_t __attribute__((vector_size(2 * kDecoderLanes)));
+                 (zigzagged, begin, end, shifts, shifted)) {
+  using Words = std::uint32_t __attribute__((vector_size(4 * kBatchLanes)));
+  using Shorts = std::uint16_t __attribute__((vector_size(2 * kBatchLanes)));
   const Words shift = unaligned<Words>(shifts.data()).value;
   for (std::ptrdiff_t at = begin; at < end; at += kStep) {
-    const Words wide = unaligned<Words>(folded + at).value >> shift;
+    const Words wide = unaligned<Words>(zigzagged + at).value >> shift;
     unaligned<Shorts>(shifted + at).value = __builtin_convertvector(wide < 0xffffU ? wide : Words{} + 0xffffU, Shorts);
   }
 }
@@ -67,23 +67,23 @@ ISOHF_VECTORISED(void, limit_magnitudes,
 }
 
 /// One residual for each of kCount lanes at each place. Lanes in turn: one alone would wait for its own pointers.
-template <std::size_t kCount, typename Folded>
-void take_lanes(const std::uint16_t* activities, const std::uint8_t* tables,
-                std::array<const Folded*, kMaxContexts>* next, int first, int last, Folded* folded) {
+template <std::size_t kCount, typename Zigzagged>
+void take_lanes(const std::uint16_t* energies, const std::uint8_t* tables,
+                std::array<const Zigzagged*, kMaxContexts>* next, int first, int last, Zigzagged* zigzagged) {
   for (std::ptrdiff_t at = first * kStep; at <= last * kStep; at += kStep) {
 #pragma GCC unroll 8
     for (std::size_t lane = 0; lane < kCount; ++lane) {
       const auto i = at + static_cast<std::ptrdiff_t>(lane);
-      const std::size_t context = tables[lane * kTableStride + activities[i]];
-      folded[i] = *next[lane][context]++;
+      const std::size_t context = tables[lane * kTableStride + energies[i]];
+      zigzagged[i] = *next[lane][context]++;
     }
   }
 }
 
 }  // namespace
 
-template <typename Folded>
-bool LanePayload<Folded>::open(const TileShape& shape, CodeType type, std::span<const std::byte> payload) {
+template <typename Zigzagged>
+bool BatchPayload<Zigzagged>::open(const TileShape& shape, CodeType type, std::span<const std::byte> payload) {
   if (payload.size() > max_payload_bytes(shape, type)) return false;
   ByteReader reader(payload);
   header = read_payload_header(shape, type, reader);
@@ -107,16 +107,16 @@ bool LanePayload<Folded>::open(const TileShape& shape, CodeType type, std::span<
   return count == samples - voids && expand(shape.columns(), symbols, extra, count);
 }
 
-template <typename Folded>
-bool LanePayload<Folded>::expand(int columns, std::span<const std::span<const std::byte>> symbols,
-                                 std::span<const std::byte> extra, std::size_t count) {
+template <typename Zigzagged>
+bool BatchPayload<Zigzagged>::expand(int columns, std::span<const std::span<const std::byte>> symbols,
+                                     std::span<const std::byte> extra, std::size_t count) {
   std::vector<std::byte> padded(extra.size() + kExpanderSlack);
   std::copy(extra.begin(), extra.end(), padded.begin());
   // A row may run past a context's last residual, and past the last of all; that is told when it is done.
   const auto spare = static_cast<std::size_t>(columns) + 2;
-  folded = std::make_unique_for_overwrite<Folded[]>(count + spare);
-  std::fill_n(folded.get() + count, spare, Folded{0});
-  Folded* to = folded.get();
+  zigzagged = std::make_unique_for_overwrite<Zigzagged[]>(count + spare);
+  std::fill_n(zigzagged.get() + count, spare, Zigzagged{0});
+  Zigzagged* to = zigzagged.get();
   std::uint64_t position = 0;
   for (std::size_t i = 0; i < symbols.size(); ++i) {
     position = expand_residuals(symbols[i], std::span(padded).first(extra.size()), position, to);
@@ -129,78 +129,78 @@ bool LanePayload<Folded>::expand(int columns, std::span<const std::span<const st
   return position % 8 == 0 || (std::to_integer<unsigned>(extra[position / 8]) >> (position % 8)) == 0;
 }
 
-template <typename Folded>
-const std::uint8_t* LanePayload<Folded>::void_row(int columns, int r) const {
+template <typename Zigzagged>
+const std::uint8_t* BatchPayload<Zigzagged>::void_row(int columns, int r) const {
   if (is_void.empty()) return nullptr;
   const std::uint8_t* const row = is_void.data() + static_cast<std::ptrdiff_t>(r) * columns;
   return std::find(row, row + columns, std::uint8_t{1}) == row + columns ? nullptr : row;
 }
 
-template <typename Folded>
-LaneResiduals<Folded>::LaneResiduals(int columns)
+template <typename Zigzagged>
+BatchResiduals<Zigzagged>::BatchResiduals(int columns)
     : columns_(columns),
-      tables_(kDecoderLanes * kTableStride),
-      activities_(kDecoderLanes * static_cast<std::size_t>(columns)),
-      folded_(activities_.size()),
+      tables_(kBatchLanes * kTableStride),
+      energies_(kBatchLanes * static_cast<std::size_t>(columns)),
+      zigzagged_(energies_.size()),
       nothing_(static_cast<std::size_t>(columns) + 2),
-      is_void_(activities_.size()) {
-  for (auto& row : magnitudes_) row.resize(kDecoderLanes * (static_cast<std::size_t>(columns) + 2 * kLaneMargin));
+      is_void_(energies_.size()) {
+  for (auto& row : magnitudes_) row.resize(kBatchLanes * (static_cast<std::size_t>(columns) + 2 * kBatchMargin));
 }
 
-template <typename Folded>
-void LaneResiduals<Folded>::open(const LanePayload<Folded>& payload) {
+template <typename Zigzagged>
+void BatchResiduals<Zigzagged>::open(const BatchPayload<Zigzagged>& payload) {
   const auto table = context_table(payload.header.thresholds);
   std::copy(table.begin(), table.end(), tables_.begin() + static_cast<std::ptrdiff_t>(count_ * kTableStride));
   std::copy_n(payload.starts.begin(), kMaxContexts, next_[count_].begin());
-  shifts_[count_] = payload.header.activity_shift;
+  shifts_[count_] = payload.header.energy_shift;
   payloads_[count_] = &payload;
   is_good_[count_] = true;
   ++count_;
 }
 
-template <typename Folded>
-std::uint8_t* LaneResiduals<Folded>::magnitudes(std::size_t back) {
-  return magnitudes_[back].data() + kLaneMargin * kStep;
+template <typename Zigzagged>
+std::uint8_t* BatchResiduals<Zigzagged>::magnitudes(std::size_t back) {
+  return magnitudes_[back].data() + kBatchMargin * kStep;
 }
 
-template <typename Folded>
-void LaneResiduals<Folded>::take_places(int first, int last) {
+template <typename Zigzagged>
+void BatchResiduals<Zigzagged>::take_places(int first, int last) {
   const auto take = [&](auto lanes) {
-    take_lanes<lanes.value>(activities_.data(), tables_.data(), next_.data(), first, last, folded_.data());
+    take_lanes<lanes.value>(energies_.data(), tables_.data(), next_.data(), first, last, zigzagged_.data());
   };
   if (count_ == 1) return take(std::integral_constant<std::size_t, 1>());
   if (count_ == 2) return take(std::integral_constant<std::size_t, 2>());
   if (count_ <= 4) return take(std::integral_constant<std::size_t, 4>());
-  take(std::integral_constant<std::size_t, kDecoderLanes>());
+  take(std::integral_constant<std::size_t, kBatchLanes>());
 }
 
-template <typename Folded>
-void LaneResiduals<Folded>::take_around_voids(std::size_t lane, int r, int first, int last) {
+template <typename Zigzagged>
+void BatchResiduals<Zigzagged>::take_around_voids(std::size_t lane, int r, int first, int last) {
   for (int place = first; place <= last; ++place) {
-    const std::size_t i = static_cast<std::size_t>(place) * kDecoderLanes + lane;
+    const std::size_t i = static_cast<std::size_t>(place) * kBatchLanes + lane;
     const bool is_void = void_rows_[lane] != nullptr && void_rows_[lane][column_of_place(columns_, r, place)] != 0;
     is_void_[i] = is_void ? 1 : 0;
-    folded_[i] = is_void ? Folded{0} : *next_[lane][tables_[lane * kTableStride + activities_[i]]]++;
+    zigzagged_[i] = is_void ? Zigzagged{0} : *next_[lane][tables_[lane * kTableStride + energies_[i]]]++;
   }
 }
 
-template <typename Folded>
-void LaneResiduals<Folded>::take_slid(std::size_t lane) {
+template <typename Zigzagged>
+void BatchResiduals<Zigzagged>::take_slid(std::size_t lane) {
   const std::uint8_t* const row = magnitudes(0) + lane;
   for (int side = 0; side < 2; ++side) {
     if (void_rows_[lane] != nullptr && void_rows_[lane][column_of_slid(columns_, side)] != 0) continue;
     const std::ptrdiff_t at = (side == 0 ? 1 : columns_ - 3) * kStep;
-    const std::uint16_t activity = activity_of_slid(row[at], row[at + kStep]);
-    slid_[static_cast<std::size_t>(side)][lane] = *next_[lane][tables_[lane * kTableStride + activity]]++;
+    const std::uint16_t energy = context_energy_of_slid(row[at], row[at + kStep]);
+    slid_[static_cast<std::size_t>(side)][lane] = *next_[lane][tables_[lane * kTableStride + energy]]++;
   }
 }
 
-template <typename Folded>
-void LaneResiduals<Folded>::take_row(int r) {
+template <typename Zigzagged>
+void BatchResiduals<Zigzagged>::take_row(int r) {
   const int first = r % 2 == 0 ? 1 : 0;
   const int last = r % 2 == 0 ? columns_ - 2 : columns_ - 1;
   has_voids_ = false;
-  for (std::size_t lane = 0; lane < kDecoderLanes; ++lane) {
+  for (std::size_t lane = 0; lane < kBatchLanes; ++lane) {
     if (!is_good_[lane]) {  // takes what it likes, but not past the end
       next_[lane].fill(nothing_.data());
       void_rows_[lane] = nullptr;
@@ -209,10 +209,9 @@ void LaneResiduals<Folded>::take_row(int r) {
       has_voids_ |= void_rows_[lane] != nullptr;
     }
   }
-  find_lane_activities(magnitudes(1) + r % 2 * kStep, magnitudes(2), first * kStep, (last + 1) * kStep,
-                       activities_.data());
+  find_lane_energies(magnitudes(1) + r % 2 * kStep, magnitudes(2), first * kStep, (last + 1) * kStep, energies_.data());
   if (has_voids_) {
-    for (std::size_t lane = 0; lane < kDecoderLanes; ++lane) take_around_voids(lane, r, first, last);
+    for (std::size_t lane = 0; lane < kBatchLanes; ++lane) take_around_voids(lane, r, first, last);
   } else {
     take_places(first, last);
   }
@@ -227,33 +226,33 @@ void LaneResiduals<Folded>::take_row(int r) {
   close_row(first, last);
 }
 
-template <typename Folded>
-void LaneResiduals<Folded>::find_magnitudes(std::ptrdiff_t begin, std::ptrdiff_t end) {
-  const std::uint16_t* shifted = activities_.data();
-  if constexpr (sizeof(Folded) == 4) {
-    shift_float_lanes(folded_.data(), begin, end, shifts_, activities_.data());
+template <typename Zigzagged>
+void BatchResiduals<Zigzagged>::find_magnitudes(std::ptrdiff_t begin, std::ptrdiff_t end) {
+  const std::uint16_t* shifted = energies_.data();
+  if constexpr (sizeof(Zigzagged) == 4) {
+    shift_float_lanes(zigzagged_.data(), begin, end, shifts_, energies_.data());
   } else {
     const bool has_shifts = std::any_of(shifts_.begin(), shifts_.end(), [](std::int32_t shift) { return shift != 0; });
-    if (has_shifts) shift_lanes(folded_.data(), begin, end, shifts_, activities_.data());
-    if (!has_shifts) shifted = folded_.data();
+    if (has_shifts) shift_lanes(zigzagged_.data(), begin, end, shifts_, energies_.data());
+    if (!has_shifts) shifted = zigzagged_.data();
   }
   limit_magnitudes(shifted, begin, end, magnitudes(0));
 }
 
-template <typename Folded>
-void LaneResiduals<Folded>::close_row(int first, int last) {
+template <typename Zigzagged>
+void BatchResiduals<Zigzagged>::close_row(int first, int last) {
   std::uint8_t* const row = magnitudes(0);
-  for (int place = -kLaneMargin; place < first; ++place) std::copy_n(row + first * kStep, kStep, row + place * kStep);
-  for (int place = last + 1; place < columns_ + kLaneMargin; ++place) {
+  for (int place = -kBatchMargin; place < first; ++place) std::copy_n(row + first * kStep, kStep, row + place * kStep);
+  for (int place = last + 1; place < columns_ + kBatchMargin; ++place) {
     std::copy_n(row + last * kStep, kStep, row + place * kStep);
   }
   magnitudes_[2].swap(magnitudes_[1]);
   magnitudes_[1].swap(magnitudes_[0]);
 }
 
-template struct LanePayload<std::uint16_t>;
-template struct LanePayload<std::uint32_t>;
-template class LaneResiduals<std::uint16_t>;
-template class LaneResiduals<std::uint32_t>;
+template struct BatchPayload<std::uint16_t>;
+template struct BatchPayload<std::uint32_t>;
+template class BatchResiduals<std::uint16_t>;
+template class BatchResiduals<std::uint32_t>;
 
 }  // namespace isohf

@@ -5,9 +5,8 @@
 #include <cstdint>
 
 #include "isohf/archive/codec/ordered_float.h"
-#include "isohf/archive/codec/simd/lane_range.h"
-#include "isohf/archive/codec/simd/lane_residuals.h"
-#include "isohf/archive/codec/simd/lane_rows.h"
+#include "isohf/archive/codec/simd/batch_residuals.h"
+#include "isohf/archive/codec/simd/batch_rows.h"
 #include "isohf/archive/codec/tile_payload.h"
 
 namespace isohf {
@@ -22,26 +21,26 @@ struct FloatWeights {
 using FloatStretch = std::array<FloatWeights, kWeightCount + 1>;
 
 /// The samples of tiles of floats that are decoded side by side, on their way from residuals to floats, row by row:
-/// what LaneSamples is for codes.
-class LaneFloats {
+/// what BatchCodes is for codes.
+class BatchFloats {
  public:
-  using Folded = std::uint32_t;
+  using Zigzagged = std::uint32_t;
   using Stored = float;
 
-  explicit LaneFloats(const TileShape& shape);
+  explicit BatchFloats(const TileShape& shape);
 
   /// Lanes are opened in order. The header must outlive this.
   void open(const PayloadHeader& header);
 
   /// Restores row r from the residuals taken last.
-  void restore_row(int r, const LaneResiduals<std::uint32_t>& residuals);
+  void restore_row(int r, const BatchResiduals<std::uint32_t>& residuals);
 
   /// Whether no sample of that row has left its lane's range.
   [[nodiscard]] bool is_in_range(std::size_t lane) const { return range_.is_kept(lane); }
 
   /// A lane's sample at a place of row r, which is among the last three.
   [[nodiscard]] std::int32_t sample(int r, int place, std::size_t lane) const {
-    return ring_.row(r)[place * LaneRing::kStep + static_cast<std::ptrdiff_t>(lane)];
+    return ring_.row(r)[place * BatchRing::kStep + static_cast<std::ptrdiff_t>(lane)];
   }
   /// A sum as samples have it, and a sample as it is stored.
   [[nodiscard]] static std::int32_t wrapped(std::uint32_t sum) { return static_cast<std::int32_t>(sum); }
@@ -55,10 +54,10 @@ class LaneFloats {
 
  private:
   int columns_;
-  LaneRange range_;
+  BatchRange range_;
   PerLane<std::int32_t> dropped_{};
-  LaneRing ring_;
-  LaneStretches<FloatStretch> stretches_;
+  BatchRing ring_;
+  BatchStretches<FloatStretch> stretches_;
 };
 
 }  // namespace isohf
