@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <limits>
+#include <nlohmann/json.hpp>
 #include <utility>
 
 #include "archive/tiles.h"
@@ -209,10 +210,23 @@ TEST(Metadata, OldArchivesHaveNoProjectionAndDoNotJoin) {
 
 TEST(Metadata, OldArchivesMirroredTheirSourcesAtTheEdges) {
   Metadata metadata = full();
-  metadata.edges = "odd";
+  metadata.edges = Edges::kOdd;
   const std::string json = format_metadata(metadata);
-  EXPECT_EQ(parse_metadata(json).edges, "odd");
-  EXPECT_EQ(parse_metadata(replaced(json, "\n \"edges\": \"odd\",", "")).edges, "mirror");
+  EXPECT_EQ(parse_metadata(json).edges, Edges::kOdd);
+  EXPECT_EQ(parse_metadata(replaced(json, "\n \"edges\": \"odd\",", "")).edges, Edges::kMirror);
+}
+
+TEST(Metadata, NamesThatThisBuildDoesNotKnowAreNoValues) {
+  std::string json = format_metadata(full());
+  const Metadata whole = parse_metadata(json);
+  EXPECT_TRUE(whole.filter && whole.acquisition && whole.outside && whole.edges);
+  EXPECT_NE(whole.source.registration, Registration::kUnknown);
+  auto altered = nlohmann::json::parse(json);
+  for (const char* name : {"filter", "acquisition", "outside", "edges"}) altered[name] = "nonsense";
+  altered["source"]["registration"] = "nonsense";
+  const Metadata metadata = parse_metadata(altered.dump());
+  EXPECT_FALSE(metadata.filter || metadata.acquisition || metadata.outside || metadata.edges);
+  EXPECT_EQ(metadata.source.registration, Registration::kUnknown);
 }
 
 TEST(Metadata, RefusesProjectionsThatMakeNoMap) {

@@ -108,7 +108,7 @@ Metadata make_metadata(const TileGrid& grid, CodeType type) {
   metadata.source.spacing_x = grid.world_width() / 1200.0;
   metadata.source.spacing_z = grid.world_height() / 1200.0;
   metadata.source.sample_type = "int16";
-  metadata.source.registration = "point";
+  metadata.source.registration = Registration::kPoint;
   metadata.source.origin_x = 6.000123456789;
   metadata.source.crs_epsg = 32611;
   metadata.source.crs_wkt = "PROJCS[\"...\"]";

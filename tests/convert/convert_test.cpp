@@ -30,7 +30,7 @@ class Convert : public testing::Test {
     ConvertOptions options;
     options.plan.shape = {20, 19};
     options.plan.levels = 4;
-    options.filter = to_string(filter);
+    options.filter = filter;
     options.producer = "isohf test";
     return options;
   }
@@ -187,7 +187,7 @@ TEST_F(Convert, EveryFilterStaysInsideItsCodes) {
                              "lanczos3", "lanczos6"}) {
     for (const double step : {0.0, 0.125}) {
       ConvertOptions options = small_tiles();
-      options.filter = filter;
+      options.filter = filter_from_string(filter);
       options.step = step;
       options.overwrite = true;
       const ConvertSummary summary = run(source, path("checker.isohf"), options);

@@ -37,7 +37,7 @@ class Described : public HeightSource {
 MemoryPlan plan_for(const Described& source, std::uint64_t limit, const std::string& filter = "bilinear") {
   ConvertOptions options;
   options.memory_bytes = limit;
-  options.filter = filter;
+  options.filter = filter_from_string(filter);
   options.threads = 2;
   return plan_memory(source, make_plan(source.info(), options.plan), options);
 }
@@ -102,7 +102,7 @@ TEST(MemoryPlan, TheArchiveDoesNotDependOnTheLimit) {
       ConvertOptions options;
       options.plan.shape = {20, 19};
       options.plan.levels = 4;
-      options.filter = filter;
+      options.filter = filter_from_string(filter);
       options.lossless = std::string(filter) == "bspline3";
       options.threads = 2;
       options.overwrite = true;

@@ -63,7 +63,7 @@ ConvertOptions options_for(const std::string& projection) {
   options.plan.levels = 2;
   options.plan.ground.projection = ProjectionRequest::parse(projection);
   options.step = 0.02;
-  options.filter = "catmull-rom";
+  options.filter = filter_from_string("catmull-rom");
   options.producer = "isohf test";
   return options;
 }
@@ -184,7 +184,7 @@ TEST(ProjectedArchive, BytesDoNotDependOnThreads) {
   std::string hash;
   for (const int threads : {1, 2, 5}) {
     ConvertOptions options = options_for("lambert-conformal");
-    options.filter = "bspline3";
+    options.filter = filter_from_string("bspline3");
     options.threads = threads;
     options.overwrite = true;
     (void)run(source, folder / "a.isohf", options);
@@ -207,7 +207,7 @@ TEST(ProjectedArchive, PassesEveryCheckAgainstItsSource) {
       Source& source = *owner;
       for (int i = 0; i < 40; ++i) source.at(37 + i % 8, 60 + i / 8) = std::numeric_limits<float>::quiet_NaN();
       ConvertOptions options = options_for(kind);
-      options.filter = filter;
+      options.filter = filter_from_string(filter);
       options.overwrite = true;
       (void)run(source, folder / "a.isohf", options);
       EXPECT_TRUE(verify_archive(folder / "a.isohf", {}).passed());
@@ -256,7 +256,7 @@ TEST(JoinedGlobe, TilesAcrossTheJoinShareTheirVertices) {
       source.mutable_info().georeference = test::place_at(registration, HorizontalUnit::kDegree, -180.0, 90.0, 1.0);
       ConvertOptions options = options_for("auto");
       options.plan.ground.wrap_x = true;
-      options.filter = filter;
+      options.filter = filter_from_string(filter);
       options.overwrite = true;
       (void)run(source, folder / "a.isohf", options);
       const ArchiveReader archive(folder / "a.isohf");

@@ -57,7 +57,7 @@ TEST(Lossless, ReturnsIntegersForEveryFilterDensityAndCodeType) {
   for (const char* filter : {"nearest", "bilinear", "bspline5", "lanczos6"}) {
     for (const double density : {0.2, 1.0, 1.4}) {
       ConvertOptions options;
-      options.filter = filter;
+      options.filter = filter_from_string(filter);
       options.plan.density = density;
       convert_to(source, folder / "a.isohf", options);
       expect_exact(source, folder / "a.isohf", filter + std::to_string(density));

@@ -22,7 +22,7 @@ void write_analytic_archive(const std::string& path, const TileGrid& grid, const
   metadata.source.width = 1;
   metadata.source.height = 1;
   metadata.source.sample_type = "uint16";
-  metadata.source.registration = "point";
+  metadata.source.registration = Registration::kPoint;
   metadata.producer = "isohf test";
   for (std::int64_t flat = 0; flat < grid.tile_count(); ++flat) {
     TileCodes tile;

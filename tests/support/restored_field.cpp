@@ -17,7 +17,7 @@ double psnr_of_restoring(Filter filter, const TrigonometricField& field, int mar
   MemorySource<float> source(SampleType::kFloat32, n, n,
                              [&](std::int64_t c, std::int64_t r) { return static_cast<double>(sample_at(c, r)); });
   ConvertOptions options;
-  options.filter = to_string(filter);
+  options.filter = filter;
   options.code_type = CodeType::kF32;
   options.plan.shape = {30, 33};
   options.plan.levels = 1;

@@ -65,28 +65,28 @@ TEST(Acquisition, FirIsReadFromItsFile) {
   const test::TemporaryFolder folder;
   const std::string path = folder / "taps.txt";
   test::write_file(path, "1 2 1\n");
-  const Acquisition fir = acquisition_from_string("fir:" + path);
+  const Acquisition fir = with_taps(acquisition_from_string("fir:" + path));
   EXPECT_EQ(fir.taps, (std::vector<double>{0.25, 0.5, 0.25}));
   EXPECT_EQ(to_string(fir), "fir:" + path);
   std::filesystem::remove(path);
   try {
-    (void)acquisition_from_string("fir:" + path);
+    (void)with_taps(acquisition_from_string("fir:" + path));
     FAIL() << "a missing file was read";
   } catch (const Error& error) {
     EXPECT_EQ(error.code(), ErrorCode::kIo);
     EXPECT_THAT(error.what(), HasSubstr(path));
   }
-  EXPECT_THROW((void)acquisition_from_string("fir:"), Error);
-  EXPECT_THROW((void)acquisition_from_string("fir:" + folder.path()), Error);
+  EXPECT_THROW((void)with_taps(acquisition_from_string("fir:")), Error);
+  EXPECT_THROW((void)with_taps(acquisition_from_string("fir:" + folder.path())), Error);
 }
 
 TEST(Acquisition, FirFilesOfMoreThan64KibibytesAreRefused) {
   const test::TemporaryFolder folder;
   const std::string path = folder / "long.txt";
   test::write_file(path, "1" + std::string(65536, ' '));
-  EXPECT_THAT(refusal([&] { (void)acquisition_from_string("fir:" + path); }), HasSubstr("65536 bytes"));
+  EXPECT_THAT(refusal([&] { (void)with_taps(acquisition_from_string("fir:" + path)); }), HasSubstr("65536 bytes"));
   test::write_file(path, "1" + std::string(65535, ' '));
-  EXPECT_EQ(acquisition_from_string("fir:" + path).taps.size(), 1U);
+  EXPECT_EQ(with_taps(acquisition_from_string("fir:" + path)).taps.size(), 1U);
 }
 
 TEST(Acquisition, FirTextTakesCommentsAndAnySpace) {

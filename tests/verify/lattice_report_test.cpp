@@ -59,7 +59,7 @@ test::MemorySource<float> long_waves() {
 TEST_F(LatticeReports, LongWavesGiveTheClosedFormsFactor) {
   test::MemorySource<float> source = long_waves();
   ConvertOptions how = options(1.0 / 9.0);
-  how.filter = "bspline5";  // so that what is measured is the meshes, not the reconstruction
+  how.filter = filter_from_string("bspline5");  // so that what is measured is the meshes, not the reconstruction
   const Both both = compare(source, how);
   const OrthoErrors& twin = both.lattice.twin;
   const double both_diagonals = std::sqrt((twin.rms * twin.rms + twin.rms_of_other * twin.rms_of_other) / 2.0);
@@ -80,7 +80,7 @@ TEST_F(LatticeReports, NoiseIsMissedAlikeByBoth) {
     return state >> 22U;  // 0 to 1023
   });
   ConvertOptions how = options(1.0 / 16.0);
-  how.filter = "nearest";  // the others would smooth it
+  how.filter = filter_from_string("nearest");  // the others would smooth it
   how.code_type = CodeType::kU16;
   const Both both = compare(source, how);
   EXPECT_NEAR(both.surface.rms / both.lattice.twin.rms, 1.0, 0.01);  // 26250 vertices: 1/sqrt(26250) = 0.6 %

@@ -55,12 +55,12 @@ Metadata describe(const Job& job, std::int64_t width, std::int64_t height) {
   Metadata metadata(TileGrid::make(TileShape::make(24, 27, 2), tiles(width, job.spacing_x),
                                    tiles(height, job.spacing_z), extent, extent));
   metadata.quantisation = job.quantisation;
-  metadata.outside = to_string(job.outside);
-  metadata.filter = to_string(job.filter);
-  metadata.acquisition = job.acquisition;
+  metadata.outside = job.outside;
+  metadata.filter = job.filter;
+  metadata.acquisition = acquisition_from_string(job.acquisition);
   metadata.source.width = width;
   metadata.source.height = height;
-  metadata.source.registration = to_string(job.registration);
+  metadata.source.registration = job.registration;
   metadata.source.spacing_x = job.spacing_x;
   metadata.source.spacing_z = job.spacing_z;
   if (job.registration == Registration::kArea) {
@@ -93,8 +93,8 @@ struct BruteForce {
       for (std::int64_t c = 0; c < record.width; ++c) samples.push_back(source.at(c, r));
     }
     std::vector<float> coefficients = samples;
-    const Kernel kernel = Kernel::make(filter_from_string(metadata.filter), edges_from_string(metadata.edges));
-    Prefilter::make(kernel.filter(), acquisition_from_string(metadata.acquisition), kernel.edges())
+    const Kernel kernel = Kernel::make(*metadata.filter, *metadata.edges);
+    Prefilter::make(kernel.filter(), *metadata.acquisition, kernel.edges())
         .filter({coefficients.data(), record.width, record.height});
     const View2D<const float> sample_view(samples.data(), record.width, record.height);
     const View2D<const float> view(coefficients.data(), record.width, record.height);

@@ -23,8 +23,7 @@
 #include "isohf/convert/memory_plan.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
-#include "isohf/surface/resample/acquisition.h"
-#include "isohf/surface/resample/kernels.h"
+#include "isohf/resampling.h"
 #include "options/describe.h"
 #include "options/input_files.h"
 #include "options/option_values.h"
@@ -150,17 +149,14 @@ std::optional<ConvertCommandOptions> parse(const Arguments& arguments) {
   line.option(
       "--filter", "NAME",
       "nearest, bilinear, limited-cubic, catmull-rom, bspline2, bspline3, bspline5, lanczos3 or lanczos6 (default " +
-          options.convert.filter + ")",
-      [&](const std::string& text) { options.convert.filter = to_string(filter_from_string(text)); });
+          to_string(options.convert.filter) + ")",
+      [&](const std::string& text) { options.convert.filter = filter_from_string(text); });
   line.words({"nearest", "bilinear", "limited-cubic", "catmull-rom", "bspline2", "bspline3", "bspline5", "lanczos3",
               "lanczos6"});
   line.option("--acquisition", "NAME",
               "Account for how samples were taken: point, box, tent, gaussian:SIGMA or fir:FILE (default " +
-                  options.convert.acquisition + ")",
-              [&](const std::string& text) {
-                (void)acquisition_from_string(text.starts_with("fir:") ? "point" : text);
-                options.convert.acquisition = text;
-              });
+                  to_string(options.convert.acquisition) + ")",
+              [&](const std::string& text) { options.convert.acquisition = acquisition_from_string(text); });
   line.words({"point", "box", "tent", "gaussian", "fir"});
   line.group("Size and speed");
   line.option("--level", "N",

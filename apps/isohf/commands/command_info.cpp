@@ -227,7 +227,7 @@ std::string describe_archive(const ArchiveReader& archive) {
   say("covers", fmt::format("{} by {}", describe_length(grid.world_width(), metres),
                             describe_length(grid.world_height(), metres)));
   say("source in", fmt::format("x {:.6g}..{:.6g}, z {:.6g}..{:.6g}; beyond it: {}", metadata.valid.x0,
-                               metadata.valid.x1, metadata.valid.z0, metadata.valid.z1, metadata.outside));
+                               metadata.valid.x1, metadata.valid.z0, metadata.valid.z1, name_of(metadata.outside)));
   if (metadata.projection) say("projection", describe_projection(*metadata.projection));
   if (metadata.wraps_x) say("joins", "the East edge is the West edge");
   if (codes.type == CodeType::kF32) {
@@ -247,13 +247,14 @@ std::string describe_archive(const ArchiveReader& archive) {
           "{} {}, {} void{}", describe_count(statistics.vertices),
           counts_source_ground(metadata) ? "on the source's ground" : "visible", describe_count(statistics.voids),
           statistics.clamped > 0 ? fmt::format(", {} moved into the range", describe_count(statistics.clamped)) : ""));
-  say("source", fmt::format("{}: {}, {} x {} {}{}, registered as {}", source.name, source.format, source.width,
-                            source.height, source.sample_type,
-                            source.channel.empty() ? "" : ", channel " + source.channel, source.registration));
+  say("source",
+      fmt::format("{}: {}, {} x {} {}{}, registered as {}", source.name, source.format, source.width, source.height,
+                  source.sample_type, source.channel.empty() ? "" : ", channel " + source.channel,
+                  to_string(source.registration)));
   if (source.mosaic) say("joined from", describe_mosaic(*source.mosaic));
   say("reference", describe_crs(source));
   if (const auto place = source_place(metadata)) text += text_from(*place);
-  say("filter", fmt::format("{}, acquisition {}", metadata.filter, metadata.acquisition));
+  say("filter", fmt::format("{}, acquisition {}", name_of(metadata.filter), name_of(metadata.acquisition)));
   say("size", describe_size(source, derived.tile_bytes));
   if (const auto info = accuracy_info(metadata)) say("error", describe_accuracy(*info, unit));
   if (const auto info = texture_info(metadata)) {

@@ -237,8 +237,7 @@ std::unique_ptr<HeightSource> open_as_recorded(VerifyCommandOptions options, con
   const std::vector<std::string> files = expand_inputs(options.against.names, options.against.recursive);
   if (options.geoid_is_recorded && !options.geoid.path.empty()) find_geoid(options.archive, files, options.geoid);
   OpenOptions& open = options.open;
-  if (!open.registration)
-    open.registration = record.registration == "area" ? Registration::kArea : Registration::kPoint;
+  if (!open.registration) open.registration = record.registration;
   if (!record.options) {
     if (!open.voids.valid_range) open.voids.valid_range = record.valid_range;
     if (open.voids.distance() == 0 && record.fill_distance > 0) open.voids.fill_distance = record.fill_distance;

@@ -66,7 +66,7 @@ std::optional<SourcePlace> source_place(const Metadata& metadata) {
   place.origin_x = source.origin_x.value_or(0.0);
   place.origin_y = source.origin_y.value_or(0.0);
   place.system = horizontal_system(source);
-  return source_place(place, source.width, source.height, source.registration == "area", source.ground);
+  return source_place(place, source.width, source.height, source.registration == Registration::kArea, source.ground);
 }
 
 std::string text_from(const SourcePlace& place) {

@@ -52,7 +52,8 @@ BoundingBox turned(const BoundingBox& box, const Metadata& metadata, const Bound
     return BoundingBox{box.west + turns * kTurn, box.south, box.east + turns * kTurn, box.north};
   };
   // Less than this holds no sample: half of an area, or but the rounding of a post's coordinate.
-  const double least = metadata.source.crs_spacing_x * (metadata.source.registration == "area" ? 0.5 : 1e-6);
+  const double least =
+      metadata.source.crs_spacing_x * (metadata.source.registration == Registration::kArea ? 0.5 : 1e-6);
   const double first = std::ceil((west + least - box.east) / kTurn);
   const double last = std::floor((east - least - box.west) / kTurn);
   if (first > last) return by(std::round((west + east - box.west - box.east) / (2.0 * kTurn)));

@@ -83,8 +83,8 @@ bool may_have_voids(const Metadata& metadata, const SampleGrid& grid) {
   const TileGrid& tiles = metadata.grid;
   const double last_x = grid.first_x + static_cast<double>(grid.width - 1) * grid.spacing_x;
   const double last_z = grid.first_z + static_cast<double>(grid.height - 1) * grid.spacing_z;
-  return is_warped(metadata) || metadata.statistics.voids > 0 || metadata.outside == "void" || grid.first_x < 0.0 ||
-         grid.first_z < 0.0 || last_x > tiles.world_width() || last_z > tiles.world_height();
+  return is_warped(metadata) || metadata.statistics.voids > 0 || metadata.outside == Outside::kVoid ||
+         grid.first_x < 0.0 || grid.first_z < 0.0 || last_x > tiles.world_width() || last_z > tiles.world_height();
 }
 
 TileCut cut_into_tiles(GridSize& size, bool free, const std::optional<GridSize>& count,

@@ -38,7 +38,7 @@ RasterSpec raster_in_source_system(const Metadata& metadata, const SampleGrid& g
   const SourceRecord& source = metadata.source;
   RasterSpec spec = plain_raster(metadata, grid, type);
   Georeference place;
-  place.registration = source.registration == "area" ? Registration::kArea : Registration::kPoint;
+  place.registration = source.registration == Registration::kArea ? Registration::kArea : Registration::kPoint;
   place.unit = horizontal_unit(source);
   place.metres_per_unit = source.metres_per_unit;
   // World units to the source's own.
@@ -156,7 +156,7 @@ Georeference map_georeference(const Metadata& metadata, const SampleGrid& grid) 
 }
 
 bool samples_are_areas(const Metadata& metadata) {
-  return is_warped(metadata) || metadata.source.registration == "area";
+  return is_warped(metadata) || metadata.source.registration == Registration::kArea;
 }
 
 SampleGrid natural_grid(const Metadata& metadata) {

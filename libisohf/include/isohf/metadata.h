@@ -10,6 +10,8 @@
 
 #include "isohf/lattice.h"
 #include "isohf/projection.h"
+#include "isohf/raster.h"
+#include "isohf/resampling.h"
 
 namespace isohf {
 
@@ -73,8 +75,8 @@ struct SourceRecord {
   std::vector<double> void_values;                       ///< raw values that meant "no elevation"
   std::optional<std::pair<double, double>> valid_range;  ///< elevations outside were void, by the user's choice
   std::int64_t fill_distance = 0;  ///< voids up to so many samples from an elevation were filled; 0: none
-  std::string registration;        ///< "area", "point": as used
-  double first_sample_x = 0;       ///< world place of sample (0, 0)
+  Registration registration = Registration::kUnknown;  ///< as used; unknown: a name that this build does not know
+  double first_sample_x = 0;                           ///< world place of sample (0, 0)
   double first_sample_z = 0;
   double spacing_x = 1;  ///< world units between neighbouring columns and rows
   double spacing_z = 1;
@@ -122,10 +124,11 @@ struct Metadata {
   WorldBounds valid;  ///< the part of the world that the source covers; a rectangle around it where it was projected
   std::optional<ProjectionRecord> projection;  ///< absent where world space is the source's own plane
   bool wraps_x = false;                        ///< the East edge of the last tiles is the West edge of the first
-  std::string outside = "cover";               ///< what lies beyond: "cover", "clamp" or "void"
-  std::string filter = "bilinear";
-  std::string edges = "mirror";  ///< how samples went on beyond the source's ends: "mirror", "odd"
-  std::string acquisition = "point";
+  // nullopt: a name that this build does not know; the surface can be read all the same.
+  std::optional<Outside> outside = Outside::kCover;
+  std::optional<Filter> filter = Filter::kBilinear;
+  std::optional<Edges> edges = Edges::kMirror;  ///< how samples went on beyond the source's ends
+  std::optional<Acquisition> acquisition = Acquisition{};
   std::optional<int> level;  ///< that the tiles were coded at; tells readers nothing
   SourceRecord source;
   Statistics statistics;
@@ -137,6 +140,12 @@ struct Metadata {
   /// name.
   std::vector<std::pair<std::string, std::string>> extensions;
 };
+
+/// The name of what metadata say; "unknown" where this build does not know it.
+template <typename T>
+[[nodiscard]] std::string name_of(const std::optional<T>& value) {
+  return value ? to_string(*value) : "unknown";
+}
 
 /// The metadata as JSON text (UTF-8, no trailing newline), and back. parse_metadata throws Error{kCorrupt} naming the
 /// member at fault, and Error{kUnsupported} for a format version that this build does not know.

@@ -56,7 +56,7 @@ Json source_to_json(const SourceRecord& source) {
   json["z_scale"] = source.z_scale;
   json["z_offset"] = source.z_offset;
   json["voids"] = voids_to_json(source);
-  json["registration"] = source.registration;
+  json["registration"] = to_string(source.registration);
   json["first_sample"] = {{"x", source.first_sample_x}, {"z", source.first_sample_z}};
   json["spacing"] = {{"x", source.spacing_x}, {"z", source.spacing_z}};
   json["crs"] = {{"name", text_or_null(source.crs_name)}, {"epsg", or_null(source.crs_epsg)},
@@ -145,12 +145,12 @@ std::string format_metadata(const Metadata& metadata) {
   json["units"] = {{"horizontal", metadata.horizontal_unit}, {"vertical", metadata.vertical_unit}};
   const WorldBounds& valid = metadata.valid;
   json["valid"] = {{"x0", valid.x0}, {"z0", valid.z0}, {"x1", valid.x1}, {"z1", valid.z1}};
-  json["outside"] = metadata.outside;
+  json["outside"] = name_of(metadata.outside);
   json["projection"] = projection_to_json(metadata.projection);
   json["wraps_x"] = metadata.wraps_x;
-  json["filter"] = metadata.filter;
-  json["edges"] = metadata.edges;
-  json["acquisition"] = metadata.acquisition;
+  json["filter"] = name_of(metadata.filter);
+  json["edges"] = name_of(metadata.edges);
+  json["acquisition"] = name_of(metadata.acquisition);
   if (metadata.level) json["level"] = *metadata.level;
   json["source"] = source_to_json(metadata.source);
   json["statistics"] = statistics_to_json(metadata.statistics);

@@ -158,7 +158,9 @@ SourceRecord source_from_json(const ObjectReader& json) {
   source.z_scale = json.optional_number("z_scale").value_or(1.0);
   source.z_offset = json.optional_number("z_offset").value_or(0.0);
   voids_from_json(json, source);
-  source.registration = json.text("registration");
+  const std::string registration = json.text("registration");
+  if (registration == "area") source.registration = Registration::kArea;
+  if (registration == "point") source.registration = Registration::kPoint;
   source.first_sample_x = json.object("first_sample").number("x");
   source.first_sample_z = json.object("first_sample").number("z");
   source.spacing_x = json.object("spacing").number("x");
@@ -345,6 +347,16 @@ void check_ranges(const Metadata& metadata) {
           "lie in 1e-12 to 360 degrees, which the projection needs");
 }
 
+/// What a name stands for; nullopt where this build does not know it.
+template <typename T>
+std::optional<T> named(T (*from_string)(const std::string&), const std::string& name) {
+  try {
+    return from_string(name);
+  } catch (const Error&) {
+    return std::nullopt;
+  }
+}
+
 }  // namespace
 
 Metadata parse_metadata(const std::string& text) {
@@ -362,12 +374,12 @@ Metadata parse_metadata(const std::string& text) {
   metadata.vertical_unit = root.object("units").text("vertical");
   const ObjectReader valid = root.object("valid");
   metadata.valid = {valid.number("x0"), valid.number("z0"), valid.number("x1"), valid.number("z1")};
-  metadata.outside = root.text("outside");
+  metadata.outside = named(outside_from_string, root.text("outside"));
   metadata.projection = projection_from_json(root);
   metadata.wraps_x = root.optional_flag("wraps_x");
-  metadata.filter = root.text("filter");
-  if (root.has("edges")) metadata.edges = root.text("edges");
-  metadata.acquisition = root.text("acquisition");
+  metadata.filter = named(filter_from_string, root.text("filter"));
+  if (root.has("edges")) metadata.edges = named(edges_from_string, root.text("edges"));
+  metadata.acquisition = named(acquisition_from_string, root.text("acquisition"));
   if (root.has("level")) metadata.level = static_cast<int>(root.integer("level", 1, 12));
   metadata.source = source_from_json(root.object("source"));
   metadata.statistics = statistics_from_json(root.object("statistics"));

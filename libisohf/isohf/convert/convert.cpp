@@ -198,8 +198,8 @@ ConvertSummary convert(HeightSource& source, const Plan& plan, const std::string
       options.texture
           ? std::optional(TextureStage::make(plan, info, *options.texture, threads, textured_tiles_in_flight(options)))
           : std::nullopt;
-  const Kernel kernel = Kernel::make(filter_from_string(options.filter));
-  Prefilter prefilter = Prefilter::make(kernel.filter(), acquisition_from_string(options.acquisition));
+  const Kernel kernel = Kernel::make(options.filter);
+  Prefilter prefilter = Prefilter::make(kernel.filter(), options.acquisition);
   const MemoryPlan memory = plan_memory(source, plan, options, textures ? textures->memory_bytes() : 0);
   check_memory(memory, options);
   source.limit_buffers(memory.source_buffer_bytes);

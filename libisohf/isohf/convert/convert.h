@@ -13,8 +13,8 @@
 #include "isohf/archive/textures/texture_info.h"
 #include "isohf/convert/frame/plan.h"
 #include "isohf/raster.h"
+#include "isohf/resampling.h"
 #include "isohf/surface/photo/photo_source.h"
-#include "isohf/surface/resample/kernels.h"
 
 namespace isohf {
 
@@ -59,8 +59,8 @@ struct ConvertOptions {
   std::optional<double> max_rounding;
   /// What to do with elevations outside z_range: false refuses, true moves them to its end and counts them.
   bool clamp_range = false;
-  std::string filter = to_string(kDefaultFilter);
-  std::string acquisition = "point";
+  Filter filter = kDefaultFilter;
+  Acquisition acquisition;
   std::optional<ShadowSeedRequest> shadow_seeds;  ///< nullopt: none
   std::optional<TextureRequest> texture;          ///< nullopt: none
   int threads = 0;                                ///< 0: all cores

@@ -32,7 +32,7 @@ SourceRecord record_of(const SourceInfo& info, const SourceFrame& frame, const S
   record.void_values = info.void_values;
   record.valid_range = info.valid_range;
   record.fill_distance = info.fill_distance;
-  record.registration = to_string(frame.registration);
+  record.registration = frame.registration;
   record.first_sample_x = frame.first_sample_x;
   record.first_sample_z = frame.first_sample_z;
   record.spacing_x = frame.spacing_x;
@@ -88,7 +88,7 @@ std::string heights_fingerprint(const SourceInfo& info, const Plan& plan, const 
       options.max_rounding ? fmt::format("rounding {}", *options.max_rounding)
       : options.step       ? fmt::format("{}", *options.step)
                            : "auto",
-      options.clamp_range, options.filter, options.acquisition, options.level,
+      options.clamp_range, to_string(options.filter), to_string(options.acquisition), options.level,
       options.shadow_seeds
           ? fmt::format("{} [{}]", options.shadow_seeds->sun_min_deg, fmt::join(options.shadow_seeds->sun_deg, " "))
           : "none");
@@ -141,11 +141,11 @@ Metadata describe_job(const SourceInfo& info, const Plan& plan, const ConvertOpt
   metadata.valid = plan.frame.bounds();
   metadata.valid.x1 = std::min(metadata.valid.x1, plan.grid.world_width());
   metadata.valid.z1 = std::min(metadata.valid.z1, plan.grid.world_height());
-  metadata.outside = to_string(plan.outside);
+  metadata.outside = plan.outside;
   metadata.projection = plan.frame.projection;
   metadata.wraps_x = plan.frame.wraps_x;
   metadata.filter = options.filter;
-  metadata.edges = to_string(Edges::kOdd);
+  metadata.edges = Edges::kOdd;
   metadata.acquisition = options.acquisition;
   metadata.level = options.level;
   metadata.source = record_of(info, plan.frame, options.source_note);

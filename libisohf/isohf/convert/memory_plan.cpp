@@ -64,7 +64,7 @@ class Estimate {
         threads_(threads_of(options)) {
     const TileGrid& grid = plan.grid;
     // Source rows and columns of a tile with its padding and the taps around it.
-    const int taps = Kernel::make(filter_from_string(options.filter)).taps();
+    const int taps = Kernel::make(options.filter).taps();
     tile_rows_ = std::min(rounded(plan.band_rows) + taps + 2, info_.height);
     tile_columns_ =
         std::min(rounded(grid.shape().columns() * 2.0 * grid.sigma_x() / plan.frame.spacing_x) + taps + 2, info_.width);
@@ -204,8 +204,7 @@ int textured_tiles_in_flight(const ConvertOptions& options) {
 
 MemoryPlan plan_memory(const HeightSource& source, const Plan& plan, const ConvertOptions& options,
                        std::uint64_t texture_bytes) {
-  const Prefilter prefilter =
-      Prefilter::make(filter_from_string(options.filter), acquisition_from_string(options.acquisition));
+  const Prefilter prefilter = Prefilter::make(options.filter, options.acquisition);
   const Estimate estimate(source, plan, options, prefilter, texture_bytes, options.memory_bytes);
   const Estimate least(source, plan, options, prefilter, texture_bytes, 1);
   const std::uint64_t least_bytes =

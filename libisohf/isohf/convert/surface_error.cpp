@@ -55,9 +55,8 @@ struct Reconstruction {
   Kernel kernel;
   Prefilter prefilter;
 
-  static Reconstruction make(const std::string& filter, const std::string& acquisition) {
-    const Kernel kernel = Kernel::make(filter_from_string(filter));
-    return {kernel, Prefilter::make(kernel.filter(), acquisition_from_string(acquisition))};
+  static Reconstruction make(Filter filter, const Acquisition& acquisition) {
+    return {Kernel::make(filter), Prefilter::make(filter, acquisition)};
   }
 };
 
@@ -257,12 +256,6 @@ double expected_step(const SourceInfo& info, const ConvertOptions& options) {
   return is_floating(info.sample_type) || options.code_type != CodeType::kU16 ? 0.0 : std::abs(info.z_scale) / 2.0;
 }
 
-struct Choice {
-  Plan plan;
-  std::string filter;
-  std::size_t at = 0;  ///< among the plans
-};
-
 /// Plans in the order of their cost.
 std::vector<Plan> plans_for(const SourceInfo& info, const ConvertOptions& options, const ErrorFreedom& freedom) {
   std::vector<Plan> plans;
@@ -319,8 +312,8 @@ ConvertSummary convert_within(HeightSource& source, const std::string& output, c
   const SourceInfo& info = source.info();
   const double most = *options.max_error;
   const std::vector<Plan> plans = plans_for(info, options, freedom);
-  std::vector<std::string> filters = {options.filter};
-  if (freedom.filter && options.filter != "bspline3") filters.emplace_back("bspline3");
+  std::vector<Filter> filters = {options.filter};
+  if (freedom.filter && options.filter != Filter::kBspline3) filters.push_back(Filter::kBspline3);
   const double step = expected_step(info, options);
   Windows windows(source, options);
   oneapi::tbb::task_arena threads(threads_of(options));
@@ -329,7 +322,7 @@ ConvertSummary convert_within(HeightSource& source, const std::string& output, c
   });
 
   // The first plan, from this one on, that holds on the windows.
-  const auto search = [&](std::size_t from, const std::string& filter) {
+  const auto search = [&](std::size_t from, Filter filter) {
     const Reconstruction by = Reconstruction::make(filter, options.acquisition);
     std::size_t at = from;
     threads.execute([&] {
@@ -347,7 +340,7 @@ ConvertSummary convert_within(HeightSource& source, const std::string& output, c
   for (int attempt = 0; attempt < kAttempts; ++attempt) {
     std::size_t chosen = search(next, filters.front());
     ConvertOptions now = options;
-    for (const std::string& filter : filters) {
+    for (const Filter filter : filters) {
       const std::size_t other = filter == options.filter ? chosen : search(next, filter);
       if (plans[other].density > kWorthAnotherFilter * plans[chosen].density) continue;
       chosen = other;

@@ -17,12 +17,12 @@ SourceGeometry geometry_of(const Metadata& metadata) {
   SourceGeometry geometry;
   geometry.width = source.width;
   geometry.height = source.height;
-  geometry.registration = source.registration == "area" ? Registration::kArea : Registration::kPoint;
+  geometry.registration = source.registration == Registration::kArea ? Registration::kArea : Registration::kPoint;
   geometry.first_sample_x = source.first_sample_x;
   geometry.first_sample_z = source.first_sample_z;
   geometry.spacing_x = source.spacing_x;
   geometry.spacing_z = source.spacing_z;
-  geometry.outside = outside_from_string(metadata.outside);
+  geometry.outside = known(metadata.outside, "outside");
   geometry.wraps_x = metadata.wraps_x;
   if (!is_warped(metadata)) return geometry;
   if (!has_place(source)) {

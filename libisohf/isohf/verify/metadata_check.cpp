@@ -15,7 +15,6 @@
 #include "isohf/projection/projection.h"
 #include "isohf/restore/archive_geometry.h"
 #include "isohf/restore/lossless.h"
-#include "isohf/surface/resample/acquisition.h"
 
 namespace isohf {
 namespace {
@@ -91,12 +90,11 @@ class Contradictions {
     const SourceRecord& source = metadata_.source;
     check_one_of("units.horizontal", metadata_.horizontal_unit, {"metre", "unknown"});
     if (metadata_.vertical_unit.empty()) add("units.vertical", "is empty");
-    check_one_of("outside", metadata_.outside, {"cover", "clamp", "void"});
-    check_name("filter", [&] { (void)filter_from_string(metadata_.filter); });
-    // The taps of "fir:FILE" are the maker's.
-    if (!metadata_.acquisition.starts_with("fir:"))
-      check_name("acquisition", [&] { (void)acquisition_from_string(metadata_.acquisition); });
-    check_one_of("source.registration", source.registration, {"area", "point"});
+    const auto text = [](const Json& object, const char* member) { return object.at(member).get<std::string>(); };
+    check_one_of("outside", text(json_, "outside"), {"cover", "clamp", "void"});
+    check_name("filter", [&] { (void)filter_from_string(text(json_, "filter")); });
+    check_name("acquisition", [&] { (void)acquisition_from_string(text(json_, "acquisition")); });
+    check_one_of("source.registration", text(json_.at("source"), "registration"), {"area", "point"});
     check_name("source.sample_type", [&] { (void)sample_type_from_string(source.sample_type); });
     check_one_of("source.crs.unit", source.crs_unit, {"metre", "degree", "unknown", ""});
   }
@@ -115,7 +113,7 @@ class Contradictions {
       if (!source.origin_x || !source.origin_y) return add("source.crs", "has no origin, which the projection needs");
       return check_name("source.crs", [&] { check_warped_degrees(); });
     }
-    const bool area = source.registration == "area";
+    const bool area = source.registration == Registration::kArea;
     check_number("source.first_sample.x", area ? source.spacing_x / 2.0 : 0.0, source.spacing_x);
     check_number("source.first_sample.z", area ? source.spacing_z / 2.0 : 0.0, source.spacing_z);
     const auto length = [](std::int64_t samples, bool whole, double spacing, double world) {
@@ -148,7 +146,7 @@ class Contradictions {
     const SourceRecord& source = metadata_.source;
     const ProjectionRecord& map = *metadata_.projection;
     const WorldPoint first = ExactWarp(*archive_geometry(metadata_).warp).world_from_source({0.0, 0.0});
-    const double half = source.registration == "area" ? 0.5 : 0.0;
+    const double half = source.registration == Registration::kArea ? 0.5 : 0.0;
     const auto past_first = [&](std::int64_t samples) { return static_cast<double>(samples - 1) + half; };
     GeoExtent ground;
     ground.west = *source.origin_x - half * source.crs_spacing_x;

@@ -25,8 +25,8 @@ class VertexCheck {
         metadata_(archive.metadata()),
         grid_(archive.grid()),
         source_(source),
-        kernel_(Kernel::make(filter_from_string(metadata_.filter), edges_from_string(metadata_.edges))),
-        prefilter_(Prefilter::make(kernel_.filter(), acquisition_from_string(metadata_.acquisition), kernel_.edges())),
+        kernel_(Kernel::make(known(metadata_.filter, "filter"), known(metadata_.edges, "edges"))),
+        prefilter_(Prefilter::make(kernel_.filter(), known(metadata_.acquisition, "acquisition"), kernel_.edges())),
         limits_(code_limits(metadata_)) {
     const SourceInfo& info = source.info();
     if (info.width != metadata_.source.width || info.height != metadata_.source.height) {

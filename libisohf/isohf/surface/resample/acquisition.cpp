@@ -146,17 +146,9 @@ Acquisition acquisition_from_string(const std::string& text) {
     return result;
   }
   if (view.starts_with("fir:")) {
-    const std::string path = text.substr(4);
-    std::ifstream file(path, std::ios::binary);
-    std::string contents(kMostBytes + 1, ' ');
-    file.read(contents.data(), static_cast<std::streamsize>(contents.size()));
-    if (!file.eof()) {  // neither opened, or not readable, or longer
-      if (file)
-        refuse(fmt::format("{}: taps of an acquisition filter must not be more than {} bytes", path, kMostBytes));
-      throw Error(ErrorCode::kIo, path + ": cannot read the taps of the acquisition filter");
-    }
-    contents.resize(static_cast<std::size_t>(file.gcount()));
-    return fir_from_text(contents, path);
+    result.kind = Acquisition::Kind::kFir;
+    result.path = text.substr(4);
+    return result;
   }
   refuse(fmt::format("acquisition is \"{}\", must be point, box, tent, gaussian:SIGMA or fir:FILE", text));
 }
@@ -175,6 +167,20 @@ std::string to_string(const Acquisition& acquisition) {
       return "fir:" + acquisition.path;
   }
   return {};
+}
+
+Acquisition with_taps(const Acquisition& acquisition) {
+  if (acquisition.kind != Acquisition::Kind::kFir || !acquisition.taps.empty()) return acquisition;
+  const std::string& path = acquisition.path;
+  std::ifstream file(path, std::ios::binary);
+  std::string contents(kMostBytes + 1, ' ');
+  file.read(contents.data(), static_cast<std::streamsize>(contents.size()));
+  if (!file.eof()) {  // neither opened, or not readable, or longer
+    if (file) refuse(fmt::format("{}: taps of an acquisition filter must not be more than {} bytes", path, kMostBytes));
+    throw Error(ErrorCode::kIo, path + ": cannot read the taps of the acquisition filter");
+  }
+  contents.resize(static_cast<std::size_t>(file.gcount()));
+  return fir_from_text(contents, path);
 }
 
 Acquisition fir_from_text(const std::string& text, const std::string& path) {

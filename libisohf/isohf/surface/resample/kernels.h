@@ -2,39 +2,10 @@
 
 #include <array>
 #include <cstdint>
-#include <string>
+
+#include "isohf/resampling.h"
 
 namespace isohf {
-
-/// Reconstruction kernels: how a height between samples follows from the samples around it.
-enum class Filter {
-  kNearest,
-  kBilinear,
-  kLimitedCubic,
-  kCatmullRom,
-  kBspline2,
-  kBspline3,
-  kBspline5,
-  kLanczos3,
-  kLanczos6
-};
-
-/// "nearest", "bilinear", "limited-cubic", "catmull-rom", "bspline2", "bspline3", "bspline5", "lanczos3", "lanczos6".
-[[nodiscard]] std::string to_string(Filter filter);
-/// The inverse of to_string; throws Error{kInvalidArgument} naming all of them for any other text.
-[[nodiscard]] Filter filter_from_string(const std::string& text);
-
-/// What `convert` uses where nobody says otherwise (docs/decisions/0027).
-inline constexpr Filter kDefaultFilter = Filter::kLimitedCubic;
-
-/// How a row of samples goes on beyond its ends, and into voids, for taps that reach there.
-enum class Edges {
-  kMirror,  ///< s[-k] = s[k]: bends a slope; archives that do not name a rule
-  kOdd,     ///< s[-k] = 2 s[0] - s[k], mirrored at the last sample as a point: planes stay planes
-};
-
-[[nodiscard]] std::string to_string(Edges edges);                ///< "mirror", "odd"
-[[nodiscard]] Edges edges_from_string(const std::string& text);  ///< throws Error{kInvalidArgument}
 
 inline constexpr int kMaxTaps = 12;
 

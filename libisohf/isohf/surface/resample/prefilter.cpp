@@ -225,7 +225,7 @@ Prefilter::Prefilter(std::vector<double> taps, int border, double worst_gain, Ed
 
 Prefilter Prefilter::make(Filter filter, const Acquisition& acquisition, Edges edges) {
   const Kernel kernel = Kernel::make(filter);
-  const std::vector<double> response = sampled_response(kernel, acquisition);
+  const std::vector<double> response = sampled_response(kernel, with_taps(acquisition));
   const std::vector<double> at_points = sampled_response(kernel, Acquisition{});
   std::vector<double> cosines(kCircle);
   for (std::size_t j = 0; j < kCircle; ++j) {

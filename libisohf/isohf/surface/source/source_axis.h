@@ -1,23 +1,11 @@
 #pragma once
 
 #include <cstdint>
-#include <string>
 
 #include "isohf/raster.h"
 #include "isohf/surface/resample/kernels.h"
 
 namespace isohf {
-
-/// What surrounds the source: tiles reach past its last sample unless they were fitted to it.
-enum class Outside {
-  kCover,  ///< the surface goes on with its slope for two lattice steps, then level: planes hold up to the source's
-           ///< edge
-  kClamp,  ///< the edge value goes on
-  kVoid,   ///< no elevation
-};
-
-[[nodiscard]] std::string to_string(Outside outside);                ///< "cover", "clamp", "void"
-[[nodiscard]] Outside outside_from_string(const std::string& text);  ///< throws Error{kInvalidArgument}
 
 /// Lattice steps for which Outside::kCover continues slopes: the triangles that straddle the source's edge need one,
 /// and the normals of their vertices another.

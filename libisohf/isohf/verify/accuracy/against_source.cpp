@@ -306,7 +306,7 @@ class Comparison {
   void count_mismatch(const Band& band, std::int64_t column, std::int64_t row, bool void_in_source,
                       AccuracyReport& counts) const {
     ++(void_in_source ? counts.samples_invented : counts.samples_lost);
-    const bool edge_is_void = archive_.metadata().outside == "void";
+    const bool edge_is_void = archive_.metadata().outside == Outside::kVoid;
     const std::int64_t reach = reach_at(column, row);
     for (std::int64_t r = row - reach; r <= row + reach; ++r) {
       for (std::int64_t c = column - reach; c <= column + reach; ++c) {

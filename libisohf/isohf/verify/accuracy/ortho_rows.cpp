@@ -8,6 +8,7 @@
 
 #include "isohf/archive/codec/quantise.h"
 #include "isohf/base/assert.h"
+#include "isohf/restore/archive_geometry.h"
 #include "isohf/verify/accuracy/plain_coding.h"
 
 namespace isohf {
@@ -47,8 +48,8 @@ void append(const TileCodes& row, std::size_t first, std::size_t count, TileCode
 
 OrthoGround OrthoGround::make(const Metadata& surface, const Kernel& kernel, double datum, double spacing) {
   const SourceRecord& source = surface.source;
-  const Registration registration = source.registration == "area" ? Registration::kArea : Registration::kPoint;
-  const Outside outside = outside_from_string(surface.outside);
+  const Registration registration = source.registration;
+  const Outside outside = known(surface.outside, "outside");
   const double continued = kContinuedSteps * spacing;
   const SourceAxis x(source.width, source.first_sample_x, source.spacing_x, registration, outside, continued);
   const SourceAxis z(source.height, source.first_sample_z, source.spacing_z, registration, outside, continued);

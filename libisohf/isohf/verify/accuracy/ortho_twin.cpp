@@ -12,7 +12,8 @@
 #include <vector>
 
 #include "isohf/error.h"
-#include "isohf/surface/resample/acquisition.h"
+#include "isohf/restore/archive_geometry.h"
+#include "isohf/surface/resample/prefilter.h"
 #include "isohf/surface/source/band_reader.h"
 #include "isohf/verify/accuracy/error_statistics.h"
 #include "isohf/verify/accuracy/ortho_rows.h"
@@ -66,8 +67,8 @@ class OrthoComparison {
         spacing_(spacing),
         range_{surface.statistics.min.value_or(0.0), surface.statistics.max.value_or(0.0)},
         datum_(choose_datum(info_, range_)),
-        kernel_(Kernel::make(filter_from_string(surface.filter), edges_from_string(surface.edges))),
-        prefilter_(Prefilter::make(kernel_.filter(), acquisition_from_string(surface.acquisition), kernel_.edges())),
+        kernel_(Kernel::make(known(surface.filter, "filter"), known(surface.edges, "edges"))),
+        prefilter_(Prefilter::make(kernel_.filter(), known(surface.acquisition, "acquisition"), kernel_.edges())),
         ground_(OrthoGround::make(surface, kernel_, datum_, spacing)),
         in_full_(in_full) {
     for (const OrthoPhase& phase : kOrthoPhases) {

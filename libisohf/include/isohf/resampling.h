@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace isohf {
+
+/// Reconstruction kernels: how a height between samples follows from the samples around it.
+enum class Filter {
+  kNearest,
+  kBilinear,
+  kLimitedCubic,
+  kCatmullRom,
+  kBspline2,
+  kBspline3,
+  kBspline5,
+  kLanczos3,
+  kLanczos6
+};
+
+/// "nearest", "bilinear", "limited-cubic", "catmull-rom", "bspline2", "bspline3", "bspline5", "lanczos3", "lanczos6".
+[[nodiscard]] std::string to_string(Filter filter);
+/// The inverse of to_string; throws Error{kInvalidArgument} naming all of them for any other text.
+[[nodiscard]] Filter filter_from_string(const std::string& text);
+
+/// What convert() uses by default (docs/decisions/0027).
+inline constexpr Filter kDefaultFilter = Filter::kLimitedCubic;
+
+/// How a row of samples goes on beyond its ends, and into voids, for taps that reach there.
+enum class Edges {
+  kMirror,  ///< s[-k] = s[k]: bends a slope; archives that do not name a rule
+  kOdd,     ///< s[-k] = 2 s[0] - s[k], mirrored at the last sample as a point: planes stay planes
+};
+
+[[nodiscard]] std::string to_string(Edges edges);                ///< "mirror", "odd"
+[[nodiscard]] Edges edges_from_string(const std::string& text);  ///< throws Error{kInvalidArgument}
+
+/// What surrounds the source: tiles reach past its last sample unless they were fitted to it.
+enum class Outside {
+  kCover,  ///< the slope goes on for two lattice steps, then level: planes hold up to the source's edge
+  kClamp,  ///< the edge value goes on
+  kVoid,   ///< no elevation
+};
+
+[[nodiscard]] std::string to_string(Outside outside);                ///< "cover", "clamp", "void"
+[[nodiscard]] Outside outside_from_string(const std::string& text);  ///< throws Error{kInvalidArgument}
+
+/// What the sensor or producer did to the terrain before it sampled it: the filter phi of which every source sample is
+/// one reading, sample(k) = integral of phi(x) height(k - x) dx, along columns and rows alike. Distances are in source
+/// samples. phi is even and integrates to 1.
+struct Acquisition {
+  enum class Kind {
+    kPoint,     ///< the height at the sample's position
+    kBox,       ///< the mean over the sample's own area
+    kTent,      ///< the mean weighted by a tent two samples wide
+    kGaussian,  ///< the mean weighted by a normal density of standard deviation `sigma`
+    kFir,       ///< a weighted mean of point readings, one sample apart
+  };
+  Kind kind = Kind::kPoint;
+  double sigma = 0.0;        ///< kGaussian: above 0, at most 100
+  std::vector<double> taps;  ///< kFir: odd count, symmetric, sum 1; the middle one belongs to the sample's own position
+  std::string path;          ///< kFir: the file of the taps, which is read where `taps` is empty
+};
+
+/// "point", "box", "tent", "gaussian:SIGMA" or "fir:FILE", whose file is not looked at. Throws Error{kInvalidArgument}
+/// for any other text.
+[[nodiscard]] Acquisition acquisition_from_string(const std::string& text);
+/// The inverse; the shortest SIGMA that reads back as the same number.
+[[nodiscard]] std::string to_string(const Acquisition& acquisition);
+
+}  // namespace isohf
