@@ -75,12 +75,8 @@ Camera overview_camera(const TileSource& source, const ViewState& view) {
     double top = -1e300;
     double bottom = 1e300;
     for (int corner = 0; corner < 8; ++corner) {
-      const Vec3 at = Vec3{(corner & 1) != 0 ? covered.x1 : covered.x0, (corner & 2) != 0 ? high : low,
-                           (corner & 4) != 0 ? covered.z1 : covered.z0} -
-                      middle;
-      const auto along = [&](int row) {
-        return camera.at(row, 0) * at.x + camera.at(row, 1) * at.y + camera.at(row, 2) * at.z;
-      };
+      const Vec3 at = box_corner({covered.x0, low, covered.z0}, {covered.x1, high, covered.z1}, corner) - middle;
+      const auto along = [&](int row) { return camera.along(row, at); };
       const double aside = std::max(std::abs(along(0)) / half_x, std::abs(along(1) - lift) / half_y) / 0.9;
       nearest = std::max(nearest, aside + along(2));
       if (round == 0) continue;
@@ -99,12 +95,11 @@ Camera overview_camera(const TileSource& source, const ViewState& view) {
 }
 
 double farthest_corner(const TileGrid& grid, const TileBounds& whole, Vec3 eye, double exaggeration) {
+  const Vec3 low{0.0, whole.low * exaggeration, 0.0};
+  const Vec3 high{grid.world_width(), whole.high * exaggeration, grid.world_height()};
   double farthest = 0.0;
   for (int corner = 0; corner < 8; ++corner) {
-    const Vec3 place{(corner & 1) != 0 ? grid.world_width() : 0.0,
-                     ((corner & 2) != 0 ? whole.high : whole.low) * exaggeration,
-                     (corner & 4) != 0 ? grid.world_height() : 0.0};
-    farthest = std::max(farthest, length(place - eye));
+    farthest = std::max(farthest, length(box_corner(low, high, corner) - eye));
   }
   return farthest;
 }

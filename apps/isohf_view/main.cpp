@@ -1,26 +1,158 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include <memory>
+#include <nlohmann/json.hpp>
 
-#include "headless.h"
-#include "options.h"
-#include "paging/tile_source.h"
+#include "actions.h"
+#include "formats/write/raster_sink.h"
+#include "gl/offscreen.h"
+#include "interrupt.h"
+#include "isohf/error.h"
+#include "output/json_output.h"
+#include "output/output_file.h"
+#include "output/standard_output.h"
 #include "program.h"
-#include "window.h"
+#include "session.h"
+#include "verify/verify_view.h"
 
+namespace isohf::view {
 namespace {
 
-int run(const isohf::cli::Arguments& arguments) {
-  using namespace isohf::view;
+using nlohmann::ordered_json;
+
+/// A call that throws once the program was interrupted.
+std::function<void()> interrupt_check() {
+  return [&interrupted = cli::watch_interrupts()] {
+    if (interrupted) throw Error(ErrorCode::kCancelled, "interrupted");
+  };
+}
+
+int take_screenshot(const TileSource& source, const Options& options) {
+  Session session(source, options);
+  const Offscreen target(options.view.width, options.view.height, GL_RGBA8);
+  session.complete_frame();
+  if (session.is_cut() && !options.common.quiet) {
+    cli::print_warning(
+        fmt::format("--memory {}M holds the tiles within {:.0f} world units of the eye; what lies beyond is left out",
+                    options.memory_mib, session.box().figures().radius));
+  }
+  write_picture(options.screenshot, target.width(), target.height());
+  print_result(options.common, "", [&] {
+    return ordered_json{{"archive", options.archive},
+                        {"screenshot", options.screenshot},
+                        {"width", target.width()},
+                        {"height", target.height()},
+                        {"cut", session.is_cut()}};
+  });
+  return cli::kExitDone;
+}
+
+std::string text_from(const ViewReport& report, const std::string& archive) {
+  std::string text = fmt::format(
+      "{} tiles, {} pictures, {} pixels, {} vertices, {} shared vertices, {} pixels across seams\n"
+      "worst height {:.4f} codes, worst normal {:.2e}\n",
+      report.tiles, grouped(report.pictures), grouped(report.pixels), grouped(report.vertices),
+      grouped(report.shared_vertices), grouped(report.seam_pixels), report.worst_height, report.worst_normal);
+  if (report.suns_deg.empty()) {
+    text += "shadows: the archive has no shadow seeds\n";
+  } else {
+    text += fmt::format(
+        "shadows: suns of {:g} degrees, East and West, {} vertices, worst {:.4f} codes, share of the sun {:.2e}\n",
+        fmt::join(report.suns_deg, ", "), grouped(report.shadow_vertices), report.worst_shadow, report.worst_share);
+  }
+  if (report.passed()) return text + archive + ": archive, index arrays and shaders agree\n";
+  for (const ViewFinding& found : report.findings) {
+    text += fmt::format("{} {}: tile ({},{}), level {:g}: {}; worst {:g}, {} place{}\n", finding_name(found.id),
+                        check_name(found.id), found.tile.column, found.tile.row, found.level, found.where,
+                        found.deviation, found.count, found.count == 1 ? "" : "s");
+  }
+  const auto shown = static_cast<std::int64_t>(report.findings.size());
+  if (report.failures > shown) text += fmt::format("and {} more\n", report.failures - shown);
+  return text;
+}
+
+ordered_json json_from(const ViewReport& report, const std::string& archive) {
+  ordered_json findings = ordered_json::array();
+  for (const ViewFinding& found : report.findings) {
+    findings.push_back({{"id", finding_name(found.id)},
+                        {"check", check_name(found.id)},
+                        {"column", found.tile.column},
+                        {"row", found.tile.row},
+                        {"level", found.level},
+                        {"where", found.where},
+                        {"worst", found.deviation},
+                        {"places", found.count}});
+  }
+  return {{"archive", archive},
+          {"passed", report.passed()},
+          {"tiles", report.tiles},
+          {"pictures", report.pictures},
+          {"pixels", report.pixels},
+          {"vertices", report.vertices},
+          {"shared_vertices", report.shared_vertices},
+          {"seam_pixels", report.seam_pixels},
+          {"worst_height_codes", report.worst_height},
+          {"worst_normal", report.worst_normal},
+          {"suns_deg", report.suns_deg},
+          {"shadow_vertices", report.shadow_vertices},
+          {"worst_shadow_codes", report.worst_shadow},
+          {"worst_share_of_sun", report.worst_share},
+          {"failures", report.failures},
+          {"findings", findings}};
+}
+
+int verify(const TileSource& source, const Options& options) {
+  ViewChecks wanted;
+  wanted.progress = [check = interrupt_check()](std::int64_t, std::int64_t) { check(); };
+  const ViewReport report = verify_view(source, make_index_arrays(source.grid().shape()), wanted);
+  print_result(options.common, text_from(report, options.archive), [&] { return json_from(report, options.archive); });
+  return report.passed() ? cli::kExitDone : cli::kExitDifferences;
+}
+
+int run(const cli::Arguments& arguments) {
   const std::optional<Options> options = parse_options(arguments);
-  if (!options) return isohf::cli::kExitDone;
-  check_outputs(*options);
+  if (!options) return cli::kExitDone;
+  for (const std::string& output : {options->screenshot, options->csv, options->plot}) {
+    if (!output.empty()) cli::check_output_file({options->archive}, output, options->overwrite);
+  }
+  if (!options->screenshot.empty()) check_raster_target(options->screenshot, options->overwrite);
   const std::unique_ptr<TileSource> source = open_archive(options->archive);
-  if (options->action != Options::Action::kWindow) return run_headless(*source, *options);
-  run_window(*source, *options);
-  return isohf::cli::kExitDone;
+  if (options->action == Options::Action::kWindow) {
+    run_window(*source, *options);
+    return cli::kExitDone;
+  }
+  const HeadlessContext context;
+  require_gl();
+  switch (options->action) {
+    case Options::Action::kScreenshot:
+      return take_screenshot(*source, *options);
+    case Options::Action::kVerify:
+      return verify(*source, *options);
+    case Options::Action::kFlight:
+      fly(*source, *options, interrupt_check());
+      return cli::kExitDone;
+    default:
+      sweep(*source, *options);
+      return cli::kExitDone;
+  }
 }
 
 }  // namespace
 
+void print_result(const cli::CommonOptions& common, const std::string& text,
+                  const std::function<ordered_json()>& json) {
+  cli::StandardOutput out;
+  if (common.json) {
+    out.write(cli::json_text(json()));
+  } else if (!common.quiet) {
+    out.write(text);
+  }
+  out.finish();
+}
+
+}  // namespace isohf::view
+
 int main(int argc, char** argv) {
-  return isohf::cli::run_program("isohf-view", argc, argv, run);
+  return isohf::cli::run_program("isohf-view", argc, argv, isohf::view::run);
 }

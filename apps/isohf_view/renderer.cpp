@@ -4,10 +4,35 @@
 #include <array>
 #include <cmath>
 
-#include "gl/shaders.h"
-
 namespace isohf::view {
 namespace {
+
+constexpr const char* kSkyVertex = R"glsl(#version 330 core
+out vec2 v_ndc;
+void main() {
+  v_ndc = vec2(float((gl_VertexID & 1) * 4 - 1), float((gl_VertexID & 2) * 2 - 1));
+  gl_Position = vec4(v_ndc, 1.0, 1.0);
+}
+)glsl";
+
+constexpr const char* kSkyFragment = R"glsl(#version 330 core
+in vec2 v_ndc;
+out vec4 colour;
+uniform mat3 world_from_camera;
+uniform vec2 half_view;         // tangents of half the fields of view
+uniform vec3 sun;
+uniform vec3 horizon;
+uniform vec3 zenith;
+void main() {
+  vec3 ray = normalize(world_from_camera * vec3(v_ndc * half_view, -1.0));
+  vec3 sky = mix(horizon, zenith, 1.0 - exp(-2.2 * max(ray.y, 0.0)));
+  if (sun.y > -0.1) {
+    float near_sun = max(dot(ray, sun), 0.0);
+    sky += vec3(1.0, 0.75, 0.45) * (0.25 * pow(near_sun, 24.0) + 0.6 * smoothstep(0.99993, 0.99997, near_sun));
+  }
+  colour = vec4(pow(sky, vec3(1.0 / 1.6)), 1.0);
+}
+)glsl";
 
 constexpr Vec3 kHorizon{0.62, 0.70, 0.78};
 constexpr Vec3 kZenith{0.16, 0.30, 0.55};
@@ -27,30 +52,17 @@ Vec3 by_day(Vec3 colour, Vec3 sun) {
   return std::clamp(sun.y * 5.0 + 0.35, 0.06, 1.0) * colour;
 }
 
-/// Corners' outcome against the clip volume: true where all eight lie beyond one plane.
-bool outside_view(const Mat4& clip, Vec3 low, Vec3 high) {
+/// True where all corners of the box lie beyond one and the same plane of the clip volume.
+bool outside_view(const Mat4& clip, const TileVolume& box) {
   std::array<int, 5> beyond{};
   for (int corner = 0; corner < 8; ++corner) {
-    const double x = (corner & 1) != 0 ? high.x : low.x;
-    const double y = (corner & 2) != 0 ? high.y : low.y;
-    const double z = (corner & 4) != 0 ? high.z : low.z;
-    std::array<double, 4> c{};
-    for (int row = 0; row < 4; ++row) {
-      c[static_cast<std::size_t>(row)] =
-          clip.at(row, 0) * x + clip.at(row, 1) * y + clip.at(row, 2) * z + clip.at(row, 3);
-    }
-    beyond[0] += c[0] < -c[3] ? 1 : 0;
-    beyond[1] += c[0] > c[3] ? 1 : 0;
-    beyond[2] += c[1] < -c[3] ? 1 : 0;
-    beyond[3] += c[1] > c[3] ? 1 : 0;
-    beyond[4] += c[2] > c[3] ? 1 : 0;
+    const Vec3 at = box_corner(box.low, box.high, corner);
+    const auto along = [&](int row) { return clip.along(row, at) + clip.at(row, 3); };
+    const double w = along(3);
+    const std::array<bool, 5> is_beyond{along(0) < -w, along(0) > w, along(1) < -w, along(1) > w, along(2) > w};
+    for (std::size_t plane = 0; plane < 5; ++plane) beyond[plane] += is_beyond[plane] ? 1 : 0;
   }
-  return std::any_of(beyond.begin(), beyond.end(), [](int count) { return count == 8; });
-}
-
-/// From the eye, at the origin, to a box.
-double box_distance(Vec3 low, Vec3 high) {
-  return length({std::clamp(0.0, low.x, high.x), std::clamp(0.0, low.y, high.y), std::clamp(0.0, low.z, high.z)});
+  return std::find(beyond.begin(), beyond.end(), 8) != beyond.end();
 }
 
 void set_cutting(bool on) {
@@ -67,10 +79,6 @@ bool reaches_beyond(const TileGrid& grid, TileIndex tile, const WorldBounds& cov
   const WorldPoint west_north = grid.world_from_object(tile, {0.0, 0.0});
   return west_north.x < covered.x0 || west_north.z < covered.z0 || west_north.x + grid.extent_x() > covered.x1 ||
          west_north.z + grid.extent_z() > covered.z1;
-}
-
-double focal_px(const ViewState& view) {
-  return view.height / (2.0 * std::tan(view.fov_y_rad / 2.0));
 }
 
 }  // namespace
@@ -128,8 +136,8 @@ Renderer::Renderer(const TileSource& source, const SharedGeometry& shared)
     : source_(source),
       shared_(shared),
       whole_(whole_bounds(source)),
-      flat_{{"wire", false, flat_fragment_shader(false)}, {"wire", true, flat_fragment_shader(true)}},
-      sky_("sky", sky_vertex_shader(), sky_fragment_shader()) {
+      flat_("wire", flat_fragment_shader),
+      sky_("sky", kSkyVertex, kSkyFragment) {
   const std::array<std::uint8_t, 4> nothing{};
   glBindTexture(GL_TEXTURE_2D, no_texture_.get());
   glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, 1, 1, 0, GL_RGBA, GL_UNSIGNED_BYTE, nothing.data());
@@ -159,7 +167,7 @@ double Renderer::level_of(const ViewState& view, TileIndex tile, const TileBound
                       0.5 * (bounds.low + bounds.high) * view.exaggeration,
                       (static_cast<double>(tile.row) + 0.5) * grid.extent_z()};
     const double distance = length(centre - view.eye);
-    level = fractional_level(projected_area_px(triangle_area(grid, 1.0), focal_px(view), distance), levels,
+    level = fractional_level(projected_area_px(triangle_area(grid, 1.0), view.focal_px(), distance), levels,
                              view.triangle_px);
   }
   return view.plain_switching ? std::round(level) : level;
@@ -175,11 +183,8 @@ std::vector<Renderer::Item> Renderer::visible_items(const ViewState& view, const
       const TileIndex tile{column, row};
       const TileBounds bounds = source_.bounds(tile);
       if (!bounds.stored) continue;
-      const Vec3 low = Vec3{static_cast<double>(column) * grid.extent_x(), bounds.low * view.exaggeration,
-                            static_cast<double>(row) * grid.extent_z()} -
-                       view.eye;
-      const Vec3 high = low + Vec3{grid.extent_x(), (bounds.high - bounds.low) * view.exaggeration, grid.extent_z()};
-      if (outside_view(frame.clip_from_eye, low, high)) continue;
+      const TileVolume box = tile_volume(grid, tile, bounds, view);
+      if (outside_view(frame.clip_from_eye, box)) continue;
       const TileSlot* slot = resident(tile);
       if (slot == nullptr) {
         ++figures.absent_tiles;
@@ -192,8 +197,8 @@ std::vector<Renderer::Item> Renderer::visible_items(const ViewState& view, const
         if (textures_) texture = textures_(tile);
         if (texture == 0) texture = no_texture_.get();
       }
-      items.push_back({tile, slot, is_cut, is_cut || bounds.has_voids, length(0.5 * (low + high)),
-                       box_distance(low, high), blend, texture});
+      items.push_back({tile, slot, is_cut, is_cut || bounds.has_voids, length(0.5 * (box.low + box.high)),
+                       box.distance(), blend, texture});
     }
   }
   std::sort(items.begin(), items.end(), [](const Item& a, const Item& b) { return a.distance < b.distance; });
@@ -302,7 +307,7 @@ void Renderer::draw_wires(const ViewState& view, const TerrainFrame& frame, cons
       if (item.is_rim != rim) continue;
       // Lines vanish where a triangle's side falls below eight pixels.
       const double side = 2.0 * source_.grid().sigma_x() * (1 << item.blend.first);
-      glUniform1f(program.uniform("fade_distance"), static_cast<float>(side * focal_px(view) / 8.0));
+      glUniform1f(program.uniform("fade_distance"), static_cast<float>(side * view.focal_px() / 8.0));
       draw_mesh(program, frame, item, item.blend.first, figures);
     }
   }

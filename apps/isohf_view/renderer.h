@@ -69,11 +69,6 @@ class Renderer {
   [[nodiscard]] static bool fades(const Item& item) {
     return item.blend.alpha > 0.5 / 255.0 && item.blend.second != item.blend.first;
   }
-  struct Variants {
-    TerrainProgram inner;
-    TerrainProgram rim;
-    [[nodiscard]] const TerrainProgram& of(bool is_rim) const { return is_rim ? rim : inner; }
-  };
 
   [[nodiscard]] std::vector<Item> visible_items(const ViewState& view, const TerrainFrame& frame,
                                                 const std::array<std::int64_t, 4>& range, const ResidentTile& resident,
@@ -96,7 +91,7 @@ class Renderer {
   TileBounds whole_;
   std::map<std::tuple<ColourMode, bool, bool>, TerrainProgram> shading_;  ///< by mode, borders, rim
   std::vector<DrawnMesh> drawn_;
-  Variants flat_;
+  TerrainPrograms flat_;
   Program sky_;
   TileTexture textures_;
   Texture no_texture_;  ///< one texel without alpha

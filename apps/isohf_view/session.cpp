@@ -40,35 +40,19 @@ double default_exaggeration(const TileSource& source, const TileBounds& whole) {
   return source.is_to_scale() || range < 0.5 * side ? 1.0 : 0.25 * side / range;
 }
 
-const std::vector<std::string>& help_lines() {
-  static const std::vector<std::string> kLines{"W A S D, arrows  move          drag left   turn",
-                                               "Q E              down, up      drag right  move sideways",
-                                               "Shift, Ctrl      fast, slow    wheel       nearer, farther",
-                                               "C  fly or orbit                R  back to the start",
-                                               "J L  sun round   I K  sun up and down   U  shadows",
-                                               "+ -  vertical exaggeration     [ ]  far distance",
-                                               "M  colours       X  wires      B  tile borders",
-                                               "T  fade or switch levels       Z  haze   V  beyond the source",
-                                               "P  picture       F  figures    H  this help     Esc  end"};
-  return kLines;
-}
+const std::vector<std::string> kHelpLines{"W A S D, arrows  move          drag left   turn",
+                                          "Q E              down, up      drag right  move sideways",
+                                          "Shift, Ctrl      fast, slow    wheel       nearer, farther",
+                                          "C  fly or orbit                R  back to the start",
+                                          "J L  sun round   I K  sun up and down   U  shadows",
+                                          "+ -  vertical exaggeration     [ ]  far distance",
+                                          "M  colours       X  wires      B  tile borders",
+                                          "T  fade or switch levels       Z  haze   V  beyond the source",
+                                          "P  picture       F  figures    H  this help     Esc  end"};
 
 const char* mode_name(ColourMode mode) {
-  switch (mode) {
-    case ColourMode::kElevation:
-      return "elevation";
-    case ColourMode::kPlain:
-      return "plain";
-    case ColourMode::kLevels:
-      return "levels of detail";
-    case ColourMode::kStrips:
-      return "strip order";
-    case ColourMode::kTexture:
-      return "texture";
-    case ColourMode::kNormals:
-      return "normals";
-  }
-  return "";
+  constexpr const char* kNames[] = {"elevation", "plain", "levels of detail", "strip order", "texture", "normals"};
+  return kNames[static_cast<std::size_t>(mode)];
 }
 
 }  // namespace
@@ -186,14 +170,8 @@ void Session::complete_frame() {
 }
 
 std::string Session::shadow_line() const {
-  switch (shadow_sun_.state) {
-    case ShadowSun::State::kNoSeeds:
-      return "no shadows: the archive has no shadow seeds";
-    case ShadowSun::State::kNone:
-      return "no shadows: no sun along the rows";
-    default:
-      break;
-  }
+  if (shadow_sun_.state == ShadowSun::State::kNoSeeds) return "no shadows: the archive has no shadow seeds";
+  if (shadow_sun_.state == ShadowSun::State::kNone) return "no shadows: no sun along the rows";
   if (!shadows) return "shadows off";
   std::string line =
       fmt::format("shadows from the {}, {:.1f} deg", shadow_sun_.sun.travel == LightTravel::kEastward ? "West" : "East",
@@ -229,7 +207,7 @@ void Session::draw_overlay(double frames_per_second, bool figures, bool help) co
     if (box_.error()) lines.push_back(box_.error()->substr(0, 100));
     overlay_.draw(lines, view.width, view.height, size);
   }
-  if (help) overlay_.draw(help_lines(), view.width, view.height, size, true);
+  if (help) overlay_.draw(kHelpLines, view.width, view.height, size, true);
 }
 
 }  // namespace isohf::view

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <optional>
 
 #include "gl/vec.h"
@@ -30,6 +31,9 @@ struct ViewState {
   bool plain_switching = false;       ///< rounds the level instead of fading: for comparison
   int width = 1280;                   ///< pixels
   int height = 720;
+
+  /// Pixels of one world unit at distance 1.
+  [[nodiscard]] double focal_px() const { return height / (2.0 * std::tan(fov_y_rad / 2.0)); }
 };
 
 /// Unit vector towards a sun at `azimuth_deg`, clockwise from North, `elevation_deg` above the horizon.

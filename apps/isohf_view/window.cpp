@@ -1,5 +1,3 @@
-#include "window.h"
-
 #include <epoxy/gl.h>
 // After epoxy, which replaces GL's own header.
 #include <GLFW/glfw3.h>
@@ -14,8 +12,8 @@
 #include <string>
 #include <vector>
 
+#include "actions.h"
 #include "gl/offscreen.h"
-#include "gl/png_file.h"
 #include "isohf/error.h"
 #include "output/standard_output.h"
 #include "session.h"
@@ -116,63 +114,49 @@ class Controls {
 
   void press(int key) {
     ViewState& view = session_.view;
+    const auto toggle = [](bool& what) { what = !what; };
     switch (key) {
       case GLFW_KEY_ESCAPE:
-        glfwSetWindowShouldClose(window_, GLFW_TRUE);
-        break;
+        return glfwSetWindowShouldClose(window_, GLFW_TRUE);
       case GLFW_KEY_C:
-        session_.camera.switch_kind();
-        break;
+        return session_.camera.switch_kind();
       case GLFW_KEY_R:
         session_.camera = start_;
-        break;
+        return;
       case GLFW_KEY_M:
-        next_mode();
-        break;
+        return next_mode();
       case GLFW_KEY_X:
-        view.wireframe = !view.wireframe;
-        break;
+        return toggle(view.wireframe);
       case GLFW_KEY_B:
-        view.borders = !view.borders;
-        break;
+        return toggle(view.borders);
       case GLFW_KEY_T:
-        view.plain_switching = !view.plain_switching;
-        break;
+        return toggle(view.plain_switching);
       case GLFW_KEY_U:
-        session_.shadows = !session_.shadows;
-        break;
+        return toggle(session_.shadows);
       case GLFW_KEY_V:
-        view.beyond = !view.beyond;
-        break;
+        return toggle(view.beyond);
       case GLFW_KEY_Z:
-        view.haze = !view.haze;
-        break;
+        return toggle(view.haze);
       case GLFW_KEY_H:
       case GLFW_KEY_F1:
-        show_help = !show_help;
-        break;
+        return toggle(show_help);
       case GLFW_KEY_F:
-        show_figures = !show_figures;
-        break;
+        return toggle(show_figures);
       case GLFW_KEY_P:
         wants_picture = true;
-        break;
+        return;
       case GLFW_KEY_EQUAL:
       case GLFW_KEY_KP_ADD:
-        exaggerate(1.1);
-        break;
+        return exaggerate(1.1);
       case GLFW_KEY_MINUS:
       case GLFW_KEY_KP_SUBTRACT:
-        exaggerate(1.0 / 1.1);
-        break;
+        return exaggerate(1.0 / 1.1);
       case GLFW_KEY_LEFT_BRACKET:
-        session_.scale_far(1.0 / 1.15);
-        break;
+        return session_.scale_far(1.0 / 1.15);
       case GLFW_KEY_RIGHT_BRACKET:
-        session_.scale_far(1.15);
-        break;
+        return session_.scale_far(1.15);
       default:
-        break;
+        return;
     }
   }
 
@@ -207,11 +191,6 @@ std::string next_picture_name() {
   }
 }
 
-void save_picture(const ViewState& view, const std::string& path) {
-  const auto pixels = read_pixels(view.width, view.height);
-  write_png(path, view.width, view.height, pixels);
-}
-
 }  // namespace
 
 void run_window(const TileSource& source, const Options& options) {
@@ -238,11 +217,12 @@ void run_window(const TileSource& source, const Options& options) {
     session.frame();
     session.draw_overlay(1.0 / smooth_s, controls.show_figures, controls.show_help);
     const bool is_last = options.frames > 0 && frame >= options.frames;
-    if (is_last && !options.screenshot.empty()) save_picture(session.view, options.screenshot);
+    if (is_last && !options.screenshot.empty())
+      write_picture(options.screenshot, session.view.width, session.view.height);
     if (controls.wants_picture) {
       controls.wants_picture = false;
       const std::string name = next_picture_name();
-      save_picture(session.view, name);
+      write_picture(name, session.view.width, session.view.height);
       if (!options.common.quiet) cli::print_note("wrote " + name);
     }
     glfwSwapBuffers(window.get());

@@ -5,7 +5,7 @@
 #include <memory>
 #include <string>
 
-#include "gl/headless_context.h"
+#include "gl/offscreen.h"
 #include "isohf/error.h"
 
 namespace isohf::test {

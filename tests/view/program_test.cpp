@@ -189,6 +189,11 @@ TEST_F(ViewProgramTest, ReplacesFilesOnlyWhenTold) {
   EXPECT_EQ(refused.exit_code, 2);
   EXPECT_EQ(text("kept.png"), "mine");
   EXPECT_NE(refused.err.find("kept.png: exists"), std::string::npos) << refused.err;
+  // As isohf export: what is not a picture stays even then.
+  EXPECT_EQ(run(shot + " --overwrite").exit_code, 2);
+  EXPECT_EQ(text("kept.png"), "mine");
+  EXPECT_EQ(std::remove(path("kept.png").c_str()), 0);
+  EXPECT_EQ(run(shot).exit_code, 0);
   EXPECT_EQ(run(shot + " --overwrite").exit_code, 0);
   EXPECT_TRUE(is_png("kept.png"));
 }

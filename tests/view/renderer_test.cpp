@@ -4,7 +4,6 @@
 
 #include "camera.h"
 #include "gl/offscreen.h"
-#include "gl/png_file.h"
 #include "gl_test.h"
 #include "measure/transition_sweep.h"
 #include "memory_tiles.h"
@@ -47,7 +46,7 @@ TEST_F(RendererTest, DrawsEveryVisibleTileWithAtMostTwoCallsAPass) {
   }
   const auto pixels = target.read_rgba8();
   if (const char* folder = std::getenv("ISOHF_TEST_PICTURES")) {
-    write_png(std::string(folder) + "/renderer.png", view.width, view.height, pixels);
+    write_picture(std::string(folder) + "/renderer.png", view.width, view.height);
   }
   std::size_t green = 0;  // the lowland colours: the terrain is there
   for (std::size_t i = 0; i < pixels.size(); i += 4) green += pixels[i + 1] > pixels[i + 2] ? 1 : 0;

@@ -14,18 +14,18 @@ TileGrid tiny_grid() {
   return TileGrid::make(TileShape::make(20, 27, 3), 3, 2, 480.0, 496.0);
 }
 
-std::string text_of(const VerifyReport& report) {
+std::string text_of(const ViewReport& report) {
   std::string text;
-  for (const Finding& finding : report.findings) {
-    text += to_string(finding.check) + ", tile (" + std::to_string(finding.tile.column) + "," +
+  for (const ViewFinding& finding : report.findings) {
+    text += check_name(finding.id) + ", tile (" + std::to_string(finding.tile.column) + "," +
             std::to_string(finding.tile.row) + "), level " + std::to_string(finding.level) + ": " + finding.where +
             " [" + std::to_string(finding.count) + "]\n";
   }
   return text;
 }
 
-VerifyOptions quick(bool seams) {
-  VerifyOptions options;
+ViewChecks quick(bool seams) {
+  ViewChecks options;
   options.fractions.clear();
   options.seams = seams;
   return options;
@@ -35,7 +35,7 @@ class VerifyViewTest : public test::GlTest {};
 
 TEST_F(VerifyViewTest, PassesOnSoundTiles) {
   const MemoryTiles source(tiny_grid());
-  const VerifyReport report = verify_view(source, make_index_arrays(source.grid().shape()));
+  const ViewReport report = verify_view(source, make_index_arrays(source.grid().shape()));
   EXPECT_TRUE(report.passed()) << text_of(report);
   EXPECT_EQ(report.tiles, 6);
   EXPECT_GT(report.seam_pixels, 100000);
@@ -55,25 +55,25 @@ TEST_F(VerifyViewTest, PassesWhereTilesHaveVoids) {
       }
     }
   });
-  const VerifyReport report = verify_view(source, make_index_arrays(grid.shape()));
+  const ViewReport report = verify_view(source, make_index_arrays(grid.shape()));
   EXPECT_TRUE(report.passed()) << text_of(report);
 }
 
 TEST_F(VerifyViewTest, PassesOnOddShapes) {
   for (const auto& [columns, rows, levels] : {std::array{5, 5, 1}, std::array{6, 5, 1}, std::array{12, 11, 3}}) {
     const MemoryTiles source(TileGrid::make(TileShape::make(columns, rows, levels), 2, 2, 10.0, 10.0));
-    const VerifyReport report = verify_view(source, make_index_arrays(source.grid().shape()));
+    const ViewReport report = verify_view(source, make_index_arrays(source.grid().shape()));
     EXPECT_TRUE(report.passed()) << columns << "x" << rows << "\n" << text_of(report);
   }
 }
 
 /// Every finding names the level at fault, and one of them is of the check that a person would look for.
-void expect_found(const IndexArrays& arrays, Check check, int level, const std::string& what, bool seams = false) {
+void expect_found(const IndexArrays& arrays, int id, int level, const std::string& what, bool seams = false) {
   const MemoryTiles source(tiny_grid());
-  const VerifyReport report = verify_view(source, arrays, quick(seams));
+  const ViewReport report = verify_view(source, arrays, quick(seams));
   EXPECT_FALSE(report.passed()) << what;
-  const bool named = std::any_of(report.findings.begin(), report.findings.end(), [&](const Finding& finding) {
-    return finding.check == check && finding.level == level;
+  const bool named = std::any_of(report.findings.begin(), report.findings.end(), [&](const ViewFinding& finding) {
+    return finding.id == id && finding.level == level;
   });
   EXPECT_TRUE(named) << what << "\n" << text_of(report);
 }
@@ -90,29 +90,29 @@ TEST_F(VerifyViewTest, FindsBrokenStrips) {
       for (const int off : {-1, 1}) {
         broken = sound;
         broken.strips[l][i] += static_cast<std::uint32_t>(off);
-        expect_found(broken, Check::kMesh, level, "index " + std::to_string(i) + " is off by one");
+        expect_found(broken, finding::kDrawnMesh, level, "index " + std::to_string(i) + " is off by one");
       }
     }
     broken = sound;
     broken.strips[l][middle + 5] += 1;
-    expect_found(broken, Check::kHeight, level, "an index is one too large");
+    expect_found(broken, finding::kDrawnHeight, level, "an index is one too large");
     broken = sound;
     broken.strips[l].resize(broken.strips[l].size() - 1);
-    expect_found(broken, Check::kCoverage, level, "the last triangle is missing");
+    expect_found(broken, finding::kDrawnCoverage, level, "the last triangle is missing");
     broken = sound;
     broken.strips[l].insert(broken.strips[l].begin(), broken.strips[l].front());
-    expect_found(broken, Check::kWinding, level, "all triangles face down");
+    expect_found(broken, finding::kDrawnWinding, level, "all triangles face down");
     broken = sound;
     for (std::uint32_t& index : broken.strips[l]) index += static_cast<std::uint32_t>(tiny_grid().shape().columns());
     for (std::uint32_t& index : broken.strips[l]) index = std::min<std::uint32_t>(index, 20 * 27 - 1);
-    expect_found(broken, Check::kCoverage, level, "all indices are one row too far South");
+    expect_found(broken, finding::kDrawnCoverage, level, "all indices are one row too far South");
   }
 }
 
 TEST_F(VerifyViewTest, FindsSwappedStripsOfTwoLevels) {
   IndexArrays broken = make_index_arrays(tiny_grid().shape());
   std::swap(broken.strips[1], broken.strips[2]);
-  expect_found(broken, Check::kHeight, 1, "level 1 draws the mesh of level 2");
+  expect_found(broken, finding::kDrawnHeight, 1, "level 1 draws the mesh of level 2");
 }
 
 TEST_F(VerifyViewTest, FindsBrokenStitches) {
@@ -121,14 +121,14 @@ TEST_F(VerifyViewTest, FindsBrokenStitches) {
     IndexArrays broken = sound;
     broken.stitch[3 * triangle + 1] = broken.stitch[3 * triangle];
     const int level = 3 * triangle < sound.stitch_counts[1] ? 1 : 2;
-    expect_found(broken, Check::kMesh, level, "stitch triangle " + std::to_string(triangle) + " is missing");
+    expect_found(broken, finding::kDrawnMesh, level, "stitch triangle " + std::to_string(triangle) + " is missing");
     broken = sound;
     std::swap(broken.stitch[3 * triangle + 1], broken.stitch[3 * triangle]);
-    expect_found(broken, Check::kMesh, level, "stitch triangle " + std::to_string(triangle) + " faces away");
+    expect_found(broken, finding::kDrawnMesh, level, "stitch triangle " + std::to_string(triangle) + " faces away");
   }
   IndexArrays broken = sound;
   broken.stitch[4] += 1;
-  expect_found(broken, Check::kMesh, 1, "a stitch triangle leaves the edge");
+  expect_found(broken, finding::kDrawnMesh, 1, "a stitch triangle leaves the edge");
 }
 
 TEST_F(VerifyViewTest, SeesCracksInPictures) {
@@ -136,23 +136,27 @@ TEST_F(VerifyViewTest, SeesCracksInPictures) {
   for (std::size_t level = 1; level < 3; ++level) {
     IndexArrays broken = sound;
     broken.stitch_counts[level] = 0;
-    expect_found(broken, Check::kCrack, static_cast<int>(level), "a level has no stitch", true);
+    expect_found(broken, finding::kDrawnCrack, static_cast<int>(level), "a level has no stitch", true);
   }
   IndexArrays broken = sound;
   broken.strips[0].resize(broken.strips[0].size() - 3);
-  expect_found(broken, Check::kCrack, 0, "the last triangles are missing", true);
+  expect_found(broken, finding::kDrawnCrack, 0, "the last triangles are missing", true);
 }
 
-void expect_tile_found(const MemoryTiles::Alter& alter, Check check, const std::string& what) {
+void expect_tile_found(const MemoryTiles::Alter& alter, int id, const std::string& what) {
   const TileIndex bad{1, 1};
   const MemoryTiles source(tiny_grid(), [&](TileIndex tile, std::vector<std::uint16_t>& codes) {
     if (tile == bad) alter(tile, codes);
   });
-  const VerifyReport report = verify_view(source, make_index_arrays(source.grid().shape()), quick(false));
-  EXPECT_FALSE(report.passed()) << what;
+  const ViewReport report = verify_view(source, make_index_arrays(source.grid().shape()), quick(false));
+  EXPECT_TRUE(std::any_of(report.findings.begin(), report.findings.end(),
+                          [&](const ViewFinding& finding) { return finding.id == id; }))
+      << what << "\n"
+      << text_of(report);
   // A tile is found at fault when it meets its neighbours: by itself, or by the next one in order.
-  for (const Finding& finding : report.findings) {
-    EXPECT_EQ(finding.check, check) << what;
+  for (const ViewFinding& finding : report.findings) {
+    // Where only padding differs, another tile may see no more of it than the normals.
+    EXPECT_THAT(finding.id, testing::AnyOf(id, finding::kNormal)) << what;
     EXPECT_TRUE(finding.tile == bad || finding.where.find("tile (1,1)") != std::string::npos) << text_of(report);
   }
 }
@@ -161,12 +165,12 @@ TEST_F(VerifyViewTest, FindsTilesThatAreOffByOne) {
   const int columns = tiny_grid().shape().columns();
   expect_tile_found(
       [](TileIndex, std::vector<std::uint16_t>& codes) { std::rotate(codes.begin(), codes.begin() + 1, codes.end()); },
-      Check::kShared, "one column further West");
+      finding::kSharedVertex, "one column further West");
   expect_tile_found(
       [&](TileIndex, std::vector<std::uint16_t>& codes) {
         std::rotate(codes.begin(), codes.begin() + columns, codes.end());
       },
-      Check::kShared, "one row further North");
+      finding::kSharedVertex, "one row further North");
 }
 
 TEST_F(VerifyViewTest, FindsShiftedPadding) {
@@ -176,7 +180,7 @@ TEST_F(VerifyViewTest, FindsShiftedPadding) {
       [&](TileIndex, std::vector<std::uint16_t>& codes) {
         for (int row = 0; row < rows; ++row) codes[static_cast<std::size_t>(row * columns)] += 40;
       },
-      Check::kShared, "the West padding column is off");
+      finding::kSharedVertex, "the West padding column is off");
   expect_tile_found(
       [&](TileIndex, std::vector<std::uint16_t>& codes) {
         // As the paper prints Eq. 1: the padding of even rows one step further out (errata E5).
@@ -185,12 +189,12 @@ TEST_F(VerifyViewTest, FindsShiftedPadding) {
           codes[at] = codes[at] > 30000 ? codes[at] - 7 : codes[at] + 7;
         }
       },
-      Check::kShared, "the West padding of even rows is sampled one step further out");
+      finding::kSharedVertex, "the West padding of even rows is sampled one step further out");
   expect_tile_found(
       [&](TileIndex, std::vector<std::uint16_t>& codes) {
         std::rotate(codes.begin(), codes.begin() + 1, codes.begin() + columns);
       },
-      Check::kShared, "the North padding row is one column off");
+      finding::kSharedVertex, "the North padding row is one column off");
 }
 
 ShadowSeedInfo low_suns() {
@@ -202,7 +206,7 @@ ShadowSeedInfo low_suns() {
 TEST_F(VerifyViewTest, PassesOnSoundShadows) {
   MemoryTiles source(tiny_grid());
   source.set_seeds(low_suns());
-  const VerifyReport report = verify_view(source, make_index_arrays(source.grid().shape()), quick(false));
+  const ViewReport report = verify_view(source, make_index_arrays(source.grid().shape()), quick(false));
   EXPECT_TRUE(report.passed()) << text_of(report);
   EXPECT_EQ(report.suns_deg.size(), 4U);
   EXPECT_EQ(report.shadow_vertices, 4 * 2 * 6 * source.grid().shape().visible_vertex_count());
@@ -223,7 +227,7 @@ TEST_F(VerifyViewTest, PassesOnShadowsAcrossVoids) {
     }
   });
   source.set_seeds(low_suns());
-  const VerifyReport report = verify_view(source, make_index_arrays(grid.shape()), quick(false));
+  const ViewReport report = verify_view(source, make_index_arrays(grid.shape()), quick(false));
   EXPECT_TRUE(report.passed()) << text_of(report);
 }
 
@@ -233,10 +237,10 @@ void expect_seeds_found(const std::function<void(std::vector<double>&)>& spoil, 
   source.set_seeds(low_suns(), [&](TileIndex tile, LightTravel travel, std::vector<double>& entering) {
     if (tile == TileIndex{1, 1} && travel == LightTravel::kWestward) spoil(entering);
   });
-  const VerifyReport report = verify_view(source, make_index_arrays(source.grid().shape()), quick(false));
+  const ViewReport report = verify_view(source, make_index_arrays(source.grid().shape()), quick(false));
   EXPECT_FALSE(report.passed()) << what;
-  for (const Finding& finding : report.findings) {
-    EXPECT_EQ(finding.check, Check::kShadow) << what;
+  for (const ViewFinding& finding : report.findings) {
+    EXPECT_EQ(finding.id, finding::kDrawnShadow) << what;
     EXPECT_EQ(finding.tile, (TileIndex{1, 1})) << what;
     EXPECT_NE(finding.where.find("vertex (c "), std::string::npos) << what;
     EXPECT_NE(finding.where.find("sun in the East at "), std::string::npos) << what;
@@ -262,10 +266,10 @@ TEST_F(VerifyViewTest, NamesTilesWhoseSeedsCannotBeRead) {
   source.set_seeds(low_suns(), [](TileIndex tile, LightTravel, std::vector<double>&) {
     if (tile == TileIndex{2, 0}) throw Error(ErrorCode::kCorrupt, "member \"seeds/0/2.seed\" is broken");
   });
-  const VerifyReport report = verify_view(source, make_index_arrays(source.grid().shape()), quick(false));
+  const ViewReport report = verify_view(source, make_index_arrays(source.grid().shape()), quick(false));
   EXPECT_FALSE(report.passed());
-  for (const Finding& finding : report.findings) {
-    EXPECT_EQ(finding.check, Check::kShadow);
+  for (const ViewFinding& finding : report.findings) {
+    EXPECT_EQ(finding.id, finding::kDrawnShadow);
     EXPECT_EQ(finding.tile, (TileIndex{2, 0}));
     EXPECT_NE(finding.where.find("seeds/0/2.seed"), std::string::npos);
   }
@@ -275,7 +279,7 @@ TEST_F(VerifyViewTest, FindsOneWrongElevationOnAnEdge) {
   const int columns = tiny_grid().shape().columns();
   expect_tile_found(
       [&](TileIndex, std::vector<std::uint16_t>& codes) { codes[static_cast<std::size_t>(9 * columns + 1)] += 1; },
-      Check::kShared, "one code differs by one");
+      finding::kSharedVertex, "one code differs by one");
 }
 
 }  // namespace

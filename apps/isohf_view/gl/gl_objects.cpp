@@ -2,16 +2,20 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "isohf/error.h"
 
 namespace isohf::view {
 namespace {
 
-std::string shader_log(GLuint shader) {
+/// What the driver says of a shader or a program.
+template <typename Get, typename GetLog>
+std::string log_of(GLuint name, const Get& get, const GetLog& get_log) {
   GLint size = 0;
-  glGetShaderiv(shader, GL_INFO_LOG_LENGTH, &size);
-  std::string log(static_cast<std::size_t>(size > 0 ? size : 0), '\0');
-  if (size > 0) glGetShaderInfoLog(shader, size, nullptr, log.data());
+  get(name, GL_INFO_LOG_LENGTH, &size);
+  std::string log(static_cast<std::size_t>(std::max(size, 0)), '\0');
+  if (size > 0) get_log(name, size, nullptr, log.data());
   return log;
 }
 
@@ -22,7 +26,7 @@ void attach(GLuint program, const std::string& name, GLenum stage, const std::st
   glCompileShader(shader);
   GLint done = GL_FALSE;
   glGetShaderiv(shader, GL_COMPILE_STATUS, &done);
-  const std::string log = done == GL_TRUE ? std::string() : shader_log(shader);
+  const std::string log = done == GL_TRUE ? std::string() : log_of(shader, glGetShaderiv, glGetShaderInfoLog);
   glAttachShader(program, shader);
   glDeleteShader(shader);  // lives on with the program
   if (done != GL_TRUE) {
@@ -35,7 +39,7 @@ void attach(GLuint program, const std::string& name, GLenum stage, const std::st
 
 Program::Program(const std::string& name, const std::string& vertex_source, const std::string& fragment_source,
                  const std::vector<std::string>& feedback) {
-  const GLuint program = name_.get();
+  const GLuint program = name_.value;
   attach(program, name, GL_VERTEX_SHADER, vertex_source);
   attach(program, name, GL_FRAGMENT_SHADER, fragment_source);
   if (!feedback.empty()) {
@@ -47,18 +51,15 @@ Program::Program(const std::string& name, const std::string& vertex_source, cons
   GLint done = GL_FALSE;
   glGetProgramiv(program, GL_LINK_STATUS, &done);
   if (done != GL_TRUE) {
-    GLint size = 0;
-    glGetProgramiv(program, GL_INFO_LOG_LENGTH, &size);
-    std::string log(static_cast<std::size_t>(size > 0 ? size : 0), '\0');
-    if (size > 0) glGetProgramInfoLog(program, size, nullptr, log.data());
-    throw Error(ErrorCode::kUnsupported, fmt::format("the GL driver could not link the {} shaders: {}", name, log));
+    throw Error(ErrorCode::kUnsupported, fmt::format("the GL driver could not link the {} shaders: {}", name,
+                                                     log_of(program, glGetProgramiv, glGetProgramInfoLog)));
   }
 }
 
 GLint Program::uniform(const char* uniform_name) const {
   auto found = places_.find(uniform_name);
   if (found == places_.end()) {
-    found = places_.emplace(uniform_name, glGetUniformLocation(name_.get(), uniform_name)).first;
+    found = places_.emplace(uniform_name, glGetUniformLocation(name_.value, uniform_name)).first;
   }
   return found->second;
 }
@@ -68,13 +69,6 @@ void require_gl() {
   if (version >= 33 && epoxy_is_desktop_gl()) return;
   throw Error(ErrorCode::kUnsupported,
               fmt::format("OpenGL 3.3 is required, this machine offers {}.{}", version / 10, version % 10));
-}
-
-std::string gl_description() {
-  const auto* renderer = reinterpret_cast<const char*>(glGetString(GL_RENDERER));
-  const int version = epoxy_gl_version();
-  return fmt::format("{}, OpenGL {}.{}", renderer == nullptr ? "unknown renderer" : renderer, version / 10,
-                     version % 10);
 }
 
 void check_gl(const char* doing) {

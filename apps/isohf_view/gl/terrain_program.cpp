@@ -1,12 +1,265 @@
 #include "gl/terrain_program.h"
 
-#include "gl/shaders.h"
-
 namespace isohf::view {
+namespace {
+
+std::string header(bool rim) {
+  return rim ? "#version 330 core\n#define RIM\n" : "#version 330 core\n";
+}
+
+// Positions: a vertex's place in the whole heightfield is an integer (LatticeVertex). Only its distance from an anchor
+// near the eye becomes a float, by the same operations for every tile, so that two tiles put a shared vertex in exactly
+// one place and no crack can open between them.
+//
+// Normals: paper Eqs. 10-11 with errata E5-E10, for the four kinds of fan of isohf/surface/normals.h. Differences of
+// codes are exact in integers, so both tiles of an edge also get the same normal, bit for bit. The neighbours are the
+// same buffer again, bound as overlapping attributes that begin a row earlier and later (v is the vertex):
+//
+//   north   v-C-1  v-C  v-C+1  v-C+2       even row: NW = x, NE = y; on the West edge N = y, on the East edge N = x
+//   here      v-1   v    v+1               odd row:  NW = y, NE = z; on the West edge NW = x, N = y, NE = z,
+//   south   v+C-1  v+C  v+C+1  v+C+2                                 on the East edge NW = y, N = z, NE = w
+constexpr const char* kTerrainVertex = R"glsl(
+layout(location = 0) in ivec2 object_xz;
+layout(location = 1) in uvec3 here;
+layout(location = 2) in uvec4 north;
+layout(location = 3) in uvec4 south;
+layout(location = 4) in uint shadow_code;
+
+uniform ivec2 last_xz;          // 2(C-4), R-3: the East and South edges
+uniform ivec2 tile_lattice;     // the tile's North-West corner, lattice steps from the anchor
+uniform vec2 sigma;             // world units of one object-space step in x and z
+uniform vec3 anchor;            // the anchor's place, seen from the eye; y: elevation of code 0
+uniform float code_height;      // world units of one code, exaggeration included
+uniform float code_slope;       // the same for normals
+uniform mat4 clip_from_eye;
+// Two slots of four: a software rasteriser pays for each slot and triangle.
+out vec4 v_facing;              // unit normal, distance from the eye
+out vec4 v_place;               // object space x and z, elevation code, codes that the shadow lies above
+#ifdef RIM
+uniform vec4 covered;           // West, North, East, South of what is shown, seen from the eye
+out gl_PerVertex {
+  vec4 gl_Position;
+  float gl_ClipDistance[4];     // only looked at where the renderer asks for it
+};
+out float v_void;
+#endif
+
+vec3 vertex_normal() {
+  bool odd = (object_xz.y & 1) == 0;  // the grid row is z + 1
+  bool west = object_xz.x == 0;
+  bool east = object_xz.x == last_xz.x;
+  ivec4 n = ivec4(north);
+  ivec4 s = ivec4(south);
+  ivec4 fall = n - s;
+  int across = 2 * (int(here.x) - int(here.z));
+  int rise_x;
+  int rise_z;
+  int steps_x = 12;
+  int steps_z;
+  if (odd) {
+    ivec2 nws = west ? ivec2(n.x, s.x) : ivec2(n.y, s.y);
+    ivec2 nes = east ? ivec2(n.w, s.w) : ivec2(n.z, s.z);
+    rise_x = across + (nws.y - nes.y) + (nws.x - nes.x);
+    rise_z = fall.y + fall.z + (west ? fall.x : 0) + (east ? fall.w : 0);
+    steps_z = west || east ? 6 : 4;
+  } else {
+    // Beside an edge the slid vertex is half as far away as an ordinary neighbour; on it, one side is the edge's own.
+    bool edge = west || east;
+    int west_share = west ? 0 : object_xz.x == 1 ? 2 : 3;
+    int east_share = east ? 0 : object_xz.x == last_xz.x - 1 ? 2 : 3;
+    rise_x = across + (edge ? 0 : (s.x - s.y) + (n.x - n.y));
+    rise_z = west_share * fall.x + east_share * fall.y;
+    steps_z = 2 * (west_share + east_share);
+    steps_x = edge ? 4 : steps_z;
+  }
+#ifdef RIM
+  uint worst = max(max(here.x, here.y), here.z);
+  uvec4 either = max(north, south);
+  if (odd) {
+    worst = max(worst, max(either.y, either.z));
+    worst = max(worst, max(west ? either.x : 0u, east ? either.w : 0u));
+  } else {
+    worst = max(worst, max(west ? 0u : either.x, east ? 0u : either.y));
+  }
+  if (worst == 65535u) return vec3(0.0, 1.0, 0.0);
+#endif
+  return normalize(vec3(float(rise_x) * code_slope / (float(steps_x) * sigma.x), 1.0,
+                        float(rise_z) * code_slope / (float(steps_z) * sigma.y)));
+}
+
+void main() {
+  ivec2 lattice = tile_lattice + object_xz;
+  float height = float(here.y) * code_height;
+  vec3 eye = anchor + vec3(float(lattice.x) * sigma.x, height, float(lattice.y) * sigma.y);
+  v_facing = vec4(vertex_normal(), length(eye));
+  v_place = vec4(vec2(object_xz), float(here.y), max(float(shadow_code) - float(here.y), 0.0));
+  gl_Position = clip_from_eye * vec4(eye, 1.0);
+#ifdef RIM
+  v_void = here.y == 65535u ? 1.0 : 0.0;
+  gl_ClipDistance[0] = eye.x - covered.x;
+  gl_ClipDistance[1] = eye.z - covered.y;
+  gl_ClipDistance[2] = covered.z - eye.x;
+  gl_ClipDistance[3] = covered.w - eye.z;
+#endif
+}
+)glsl";
+
+constexpr const char* kDiscardVoid = R"glsl(
+#ifdef RIM
+in float v_void;
+#define DISCARD_VOID if (v_void > 0.0) discard
+#else
+#define DISCARD_VOID
+#endif
+)glsl";
+
+// Eq. 16 on the surface itself (isohf/surface/shadow.h): all of the sun where the ground is its own shadow height, none
+// where that lies k/2 above. Interpolated along the triangles, as heights are.
+constexpr const char* kSunShare = R"glsl(
+uniform float shadow_gain;      // 2/k, per code; 0: no shadows
+float sun_share() { return clamp(1.0 - v_place.w * shadow_gain, 0.0, 1.0); }
+)glsl";
+
+// MODE as in view_state.h: 0 elevation colours, 1 plain, 2 levels of detail, 3 strip order, 4 texture, 5 normals. Each
+// mode is a program of its own, and what does not change from pixel to pixel comes as a uniform: a software rasteriser
+// takes every branch and repeats every sum in every pixel.
+constexpr const char* kTerrainFragment = R"glsl(
+in vec4 v_facing;
+in vec4 v_place;
+out vec4 colour;
+
+uniform int level;              // of the mesh in hand
+uniform bool is_stitch;
+uniform vec3 level_colour;
+uniform float alpha;
+uniform vec2 object_size;       // 2(C-4), R-3
+uniform vec2 ramp;              // code at the ramp's foot, 1/codes of its height
+uniform vec3 sun;               // towards the sun
+uniform vec3 sun_light;         // on ground that faces it
+uniform vec3 sky_light;         // on level ground
+uniform vec2 haze;              // distance where it begins, 1/distance to where it is complete; y = 0: none
+uniform vec3 horizon;
+uniform sampler2D tile_texture; // colours as coded, multiplied by alpha
+uniform vec3 texture_place;     // texture coordinates = object space * xy + z
+float sun_share();
+
+#if MODE == 0 || MODE == 4
+vec3 hypsometric(float t) {
+  float at = 7.0 * t;
+  return vec3(0.17, 0.36, 0.30) + vec3(0.13, 0.12, -0.03) * clamp(at, 0.0, 1.0) +
+         vec3(0.23, 0.12, 0.07) * clamp(at - 1.0, 0.0, 1.0) + vec3(0.21, 0.09, 0.11) * clamp(at - 2.0, 0.0, 1.0) +
+         vec3(-0.07, -0.16, -0.09) * clamp(at - 3.0, 0.0, 1.0) + vec3(-0.13, -0.11, -0.02) * clamp(at - 4.0, 0.0, 1.0) +
+         vec3(0.12, 0.21, 0.27) * clamp(at - 5.0, 0.0, 1.0) + vec3(0.29, 0.33, 0.37) * clamp(at - 6.0, 0.0, 1.0);
+}
+#endif
+
+#if MODE == 3
+// The paper's Fig. 6: even rows of triangles red, drawn from East to West, odd rows blue, from West to East; the
+// colour deepens along the way and every second triangle is lighter.
+vec3 strip_colour() {
+  if (is_stitch) return vec3(0.95, 0.85, 0.25);
+  float row = floor(v_place.y / exp2(float(level)));
+  bool red = mod(row, 2.0) < 0.5;
+  float way = clamp(v_place.x / object_size.x, 0.0, 1.0);
+  if (red) way = 1.0 - way;
+  vec3 base = red ? mix(vec3(1.0, 0.75, 0.65), vec3(0.75, 0.10, 0.10), way)
+                  : mix(vec3(0.70, 0.82, 1.0), vec3(0.10, 0.20, 0.75), way);
+  return (gl_PrimitiveID & 1) == 0 ? base : mix(base, vec3(1.0), 0.18);
+}
+#endif
+
+vec3 base_colour() {
+#if MODE == 0
+  return hypsometric((v_place.z - ramp.x) * ramp.y);
+#elif MODE == 2
+  return level_colour;
+#elif MODE == 3
+  return strip_colour();
+#elif MODE == 4
+  // Under full light a photo shows its own colours: the power of 1/1.6 below is undone. Where there is no photo the
+  // texture has no alpha.
+  vec4 photo = texture(tile_texture, v_place.xy * texture_place.xy + texture_place.z);
+  vec3 own = pow(min(photo.rgb / max(photo.a, 0.004), 1.0), vec3(1.6));
+  return mix(hypsometric((v_place.z - ramp.x) * ramp.y), own, photo.a);
+#else
+  return vec3(0.80, 0.79, 0.76);
+#endif
+}
+
+void main() {
+  DISCARD_VOID;
+  vec3 normal = normalize(v_facing.xyz);
+#if MODE == 5
+  vec3 shown = normal * 0.5 + 0.5;
+#else
+  vec3 base = base_colour();
+#ifdef BORDERS
+  vec2 inside = min(v_place.xy, object_size - v_place.xy);
+  vec2 width = max(fwidth(v_place.xy), vec2(1e-6));
+  float edge = min(inside.x / width.x, inside.y / width.y);
+  base = mix(vec3(0.05, 0.05, 0.08), base, clamp(edge - 0.5, 0.25, 1.0));
+#endif
+  float direct = max(dot(normal, sun), 0.0) * sun_share();
+  vec3 shown = base * (sky_light * (0.5 + 0.5 * normal.y) + sun_light * direct);
+#endif
+  float far = clamp((v_facing.w - haze.x) * haze.y, 0.0, 1.0);
+  shown = mix(shown, horizon, far * far * (3.0 - 2.0 * far));
+  colour = vec4(sqrt(shown * sqrt(sqrt(shown))), alpha);  // to the power of 1/1.6
+}
+)glsl";
+
+constexpr const char* kProbeFragment = R"glsl(
+in vec4 v_facing;
+in vec4 v_place;
+out vec4 probe;
+uniform float alpha;
+void main() {
+  DISCARD_VOID;
+  probe = vec4(v_place.z, v_facing.x, v_facing.z, alpha);
+}
+)glsl";
+
+constexpr const char* kShadowProbeFragment = R"glsl(
+in vec4 v_place;
+out vec4 probe;
+float sun_share();
+void main() {
+  DISCARD_VOID;
+  probe = vec4(sun_share(), v_place.w, 0.0, 1.0);
+}
+)glsl";
+
+constexpr const char* kFlatFragment = R"glsl(
+in vec4 v_facing;
+out vec4 colour;
+uniform vec4 flat_colour;
+uniform float fade_distance;    // where lines begin to vanish; gone at three times as far; 0: never
+void main() {
+  DISCARD_VOID;
+  colour = flat_colour;
+  if (fade_distance > 0.0) colour.a *= clamp(1.5 - 0.5 * v_facing.w / fade_distance, 0.0, 1.0);
+}
+)glsl";
+
+}  // namespace
+
+std::string terrain_fragment_shader(bool rim, ColourMode mode, bool borders) {
+  return header(rim) + "#define MODE " + std::to_string(static_cast<int>(mode)) + "\n" +
+         (borders ? "#define BORDERS\n" : "") + kDiscardVoid + kTerrainFragment + kSunShare;
+}
+std::string probe_fragment_shader(bool rim) {
+  return header(rim) + kDiscardVoid + kProbeFragment;
+}
+std::string shadow_probe_fragment_shader(bool rim) {
+  return header(rim) + kDiscardVoid + kShadowProbeFragment + kSunShare;
+}
+std::string flat_fragment_shader(bool rim) {
+  return header(rim) + kDiscardVoid + kFlatFragment;
+}
 
 TerrainProgram::TerrainProgram(const std::string& name, bool rim, const std::string& fragment_source,
                                const std::vector<std::string>& feedback)
-    : program_(name, terrain_vertex_shader(rim), fragment_source, feedback) {}
+    : program_(name, header(rim) + kTerrainVertex, fragment_source, feedback) {}
 
 void TerrainProgram::begin(const TileGrid& grid, const TerrainFrame& frame) const {
   program_.use();

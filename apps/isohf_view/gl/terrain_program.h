@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <string>
 #include <vector>
 
@@ -8,8 +7,20 @@
 #include "gl/vec.h"
 #include "isohf/lattice.h"
 #include "isohf/metadata.h"
+#include "view_state.h"
 
 namespace isohf::view {
+
+/// Fragment shaders for the terrain. `rim` is the variant for tiles with voids, or that reach beyond what the source
+/// covers: it discards voids and has clip distances.
+/// Light, colours, haze, and tile borders where wanted. A program for each mode.
+[[nodiscard]] std::string terrain_fragment_shader(bool rim, ColourMode mode, bool borders);
+/// (elevation code, normal x, normal z, 1): what verifying reads back.
+[[nodiscard]] std::string probe_fragment_shader(bool rim);
+/// (share of the sun, shadow height above the ground in codes, 0, 1): what verifying reads back of shadows.
+[[nodiscard]] std::string shadow_probe_fragment_shader(bool rim);
+/// One flat colour: wireframes.
+[[nodiscard]] std::string flat_fragment_shader(bool rim);
 
 /// The uniforms of the terrain's vertex shader that hold for a whole frame.
 struct TerrainFrame {
@@ -22,7 +33,9 @@ struct TerrainFrame {
   WorldBounds covered{-1e30, -1e30, 1e30, 1e30};
 };
 
-/// A program with the terrain's vertex shader and one fragment shader or another.
+/// A program with the terrain's vertex shader, which every picture and every check draws through, and one fragment
+/// shader or another. Vertex attributes: 0 the shared object-space (x, z); 1, 2, 3 the tile's elevation codes around the
+/// vertex; 4 the tile's shadow heights in codes (constant 0 without them).
 class TerrainProgram {
  public:
   TerrainProgram(const std::string& name, bool rim, const std::string& fragment_source,
@@ -33,11 +46,21 @@ class TerrainProgram {
   /// Before the tile's draw calls.
   void set_tile(const TileGrid& grid, const TerrainFrame& frame, TileIndex tile) const;
 
-  [[nodiscard]] const Program& program() const { return program_; }
   [[nodiscard]] GLint uniform(const char* name) const { return program_.uniform(name); }
 
  private:
   Program program_;
+};
+
+/// Both variants of a program.
+struct TerrainPrograms {
+  TerrainPrograms(const std::string& name, std::string (*fragment)(bool rim),
+                  const std::vector<std::string>& feedback = {})
+      : inner(name, false, fragment(false), feedback), rim(name, true, fragment(true), feedback) {}
+  [[nodiscard]] const TerrainProgram& of(bool is_rim) const { return is_rim ? rim : inner; }
+
+  TerrainProgram inner;
+  TerrainProgram rim;
 };
 
 }  // namespace isohf::view

@@ -1,9 +1,8 @@
 #include "gl/tile_buffers.h"
 
-#include <algorithm>
-
 #include "isohf/base/assert.h"
-#include "isohf/lattice.h"
+#include "isohf/lattice/stitch.h"
+#include "isohf/lattice/strip.h"
 
 namespace isohf::view {
 namespace {
@@ -22,10 +21,8 @@ std::vector<std::int16_t> object_places(const TileShape& shape) {
 }
 
 template <typename T>
-GLsizeiptr upload_static(GLenum target, const std::vector<T>& values) {
-  const auto size = static_cast<GLsizeiptr>(values.size() * sizeof(T));
-  glBufferData(target, size, values.data(), GL_STATIC_DRAW);
-  return size;
+void upload_static(GLenum target, const std::vector<T>& values) {
+  glBufferData(target, static_cast<GLsizeiptr>(values.size() * sizeof(T)), values.data(), GL_STATIC_DRAW);
 }
 
 constexpr GLuint kShadowAttribute = 4;
@@ -35,6 +32,16 @@ const void* offset_pointer(std::size_t bytes) {
 }
 
 }  // namespace
+
+IndexArrays make_index_arrays(const TileShape& shape) {
+  IndexArrays arrays;
+  for (int level = 0; level < shape.levels(); ++level) {
+    arrays.strips.push_back(strip_indices(shape, level));
+    arrays.stitch_counts.push_back(static_cast<std::size_t>(shape.stitch_index_count(level)));
+  }
+  arrays.stitch = stitch_indices(shape);
+  return arrays;
+}
 
 SharedGeometry::SharedGeometry(const TileShape& shape, const IndexArrays& arrays) : shape_(shape) {
   const bool fits_16_bits = shape.stored_vertex_count() <= 65536;
@@ -53,14 +60,13 @@ SharedGeometry::SharedGeometry(const TileShape& shape, const IndexArrays& arrays
 
   glBindVertexArray(0);
   glBindBuffer(GL_ARRAY_BUFFER, xz_.get());
-  bytes_ += static_cast<std::uint64_t>(upload_static(GL_ARRAY_BUFFER, object_places(shape)));
+  upload_static(GL_ARRAY_BUFFER, object_places(shape));
   // The element array belongs to a vertex array's state: fill the buffer through another target.
   glBindBuffer(GL_COPY_WRITE_BUFFER, indices_.get());
   if (fits_16_bits) {
-    bytes_ += static_cast<std::uint64_t>(
-        upload_static(GL_COPY_WRITE_BUFFER, std::vector<std::uint16_t>(all.begin(), all.end())));
+    upload_static(GL_COPY_WRITE_BUFFER, std::vector<std::uint16_t>(all.begin(), all.end()));
   } else {
-    bytes_ += static_cast<std::uint64_t>(upload_static(GL_COPY_WRITE_BUFFER, all));
+    upload_static(GL_COPY_WRITE_BUFFER, all);
   }
   check_gl("uploading the shared vertex and index arrays");
 }
@@ -76,17 +82,15 @@ void SharedGeometry::draw_stitch(int level) const {
 }
 
 std::vector<std::uint32_t> SharedGeometry::read(std::size_t offset_bytes, GLsizei count) const {
-  const auto size = static_cast<std::size_t>(count);
-  const auto offset = static_cast<GLintptr>(offset_bytes);
   glBindBuffer(GL_COPY_READ_BUFFER, indices_.get());
-  if (index_type_ == GL_UNSIGNED_INT) {
-    std::vector<std::uint32_t> indices(size);
-    glGetBufferSubData(GL_COPY_READ_BUFFER, offset, static_cast<GLsizeiptr>(size * 4), indices.data());
-    return indices;
-  }
-  std::vector<std::uint16_t> indices(size);
-  glGetBufferSubData(GL_COPY_READ_BUFFER, offset, static_cast<GLsizeiptr>(size * 2), indices.data());
-  return {indices.begin(), indices.end()};
+  const auto read_as = [&](auto indices) -> std::vector<std::uint32_t> {
+    glGetBufferSubData(GL_COPY_READ_BUFFER, static_cast<GLintptr>(offset_bytes),
+                       static_cast<GLsizeiptr>(indices.size() * sizeof(indices[0])), indices.data());
+    return {indices.begin(), indices.end()};
+  };
+  const auto size = static_cast<std::size_t>(count);
+  return index_type_ == GL_UNSIGNED_INT ? read_as(std::vector<std::uint32_t>(size))
+                                        : read_as(std::vector<std::uint16_t>(size));
 }
 
 std::vector<std::uint32_t> SharedGeometry::read_strip(int level) const {
@@ -141,26 +145,6 @@ void TileSlot::upload_shadow(std::span<const std::uint16_t> shadow) {
   glVertexAttribIPointer(kShadowAttribute, 1, GL_UNSIGNED_SHORT, 0, nullptr);
   glEnableVertexAttribArray(kShadowAttribute);
   glBindVertexArray(0);
-}
-
-std::vector<std::uint16_t> TileSlot::read_back() const {
-  std::vector<std::uint16_t> codes(vertices_);
-  glBindBuffer(GL_ARRAY_BUFFER, codes_.get());
-  glGetBufferSubData(GL_ARRAY_BUFFER, static_cast<GLintptr>(rim_ * sizeof(std::uint16_t)),
-                     static_cast<GLsizeiptr>(codes.size() * sizeof(std::uint16_t)), codes.data());
-  return codes;
-}
-
-std::vector<std::uint16_t> TileSlot::read_back_shadow() const {
-  if (!shadow_) return {};
-  std::vector<std::uint16_t> shadow(vertices_);
-  glBindBuffer(GL_ARRAY_BUFFER, shadow_->get());
-  glGetBufferSubData(GL_ARRAY_BUFFER, 0, static_cast<GLsizeiptr>(shadow.size() * sizeof(std::uint16_t)), shadow.data());
-  return shadow;
-}
-
-void TileSlot::bind() const {
-  glBindVertexArray(array_.get());
 }
 
 }  // namespace isohf::view

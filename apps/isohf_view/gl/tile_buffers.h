@@ -3,12 +3,21 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "gl/gl_objects.h"
-#include "gl/index_arrays.h"
 #include "isohf/lattice.h"
 
 namespace isohf::view {
+
+/// The index arrays that all tiles of one shape share, as the library makes them. Verifying takes altered ones too.
+struct IndexArrays {
+  std::vector<std::vector<std::uint32_t>> strips;  ///< by level
+  std::vector<std::uint32_t> stitch;               ///< level λ draws the first stitch_counts[λ]
+  std::vector<std::size_t> stitch_counts;          ///< by level
+};
+
+[[nodiscard]] IndexArrays make_index_arrays(const TileShape& shape);
 
 /// What all tiles of one shape share on the GPU (paper section 3.2): the object-space (x, z) of every stored vertex as
 /// GL_SHORT pairs, and the index arrays of all levels in one buffer, 16 bits an index where they fit.
@@ -19,7 +28,6 @@ class SharedGeometry {
   [[nodiscard]] const TileShape& shape() const { return shape_; }
   [[nodiscard]] GLuint xz() const { return xz_.get(); }
   [[nodiscard]] GLuint indices() const { return indices_.get(); }
-  [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
 
   /// One draw call each, with the tile's vertex array bound.
   void draw_strip(int level) const;
@@ -40,7 +48,6 @@ class SharedGeometry {
   std::vector<std::size_t> strip_offsets_bytes_;
   std::vector<GLsizei> stitch_counts_;
   std::size_t stitch_offset_bytes_ = 0;
-  std::uint64_t bytes_ = 0;
 };
 
 /// One tile on the GPU: two bytes a vertex. The one buffer is bound as three overlapping attributes, so that the vertex
@@ -57,13 +64,8 @@ class TileSlot {
   /// takes the shadow away.
   void upload_shadow(std::span<const std::uint16_t> shadow);
 
-  /// The codes as the GPU holds them, for tests.
-  [[nodiscard]] std::vector<std::uint16_t> read_back() const;
-  /// Empty where it has no shadow.
-  [[nodiscard]] std::vector<std::uint16_t> read_back_shadow() const;
-
   /// Binds the vertex array.
-  void bind() const;
+  void bind() const { glBindVertexArray(array_.get()); }
 
   /// What a tile takes, and what drivers keep of it besides: Mesa 3 KB for its vertex array and buffers.
   [[nodiscard]] static std::uint64_t bytes(const TileShape& shape, bool shadow = false) {

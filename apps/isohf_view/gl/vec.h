@@ -33,6 +33,11 @@ inline Vec3 normalised(Vec3 a) {
   return size > 0.0 ? (1.0 / size) * a : a;
 }
 
+/// Corner 0...7 of the box between `low` and `high`: bits 0, 1, 2 choose x, y, z.
+inline Vec3 box_corner(Vec3 low, Vec3 high, int corner) {
+  return {(corner & 1) != 0 ? high.x : low.x, (corner & 2) != 0 ? high.y : low.y, (corner & 4) != 0 ? high.z : low.z};
+}
+
 /// Column-major 4x4 matrix, as GL takes it.
 struct Mat4 {
   std::array<double, 16> m{};
@@ -45,6 +50,8 @@ struct Mat4 {
     for (int i = 0; i < 4; ++i) out.at(i, i) = 1.0;
     return out;
   }
+  /// A row of the matrix times a vector, without the fourth column.
+  [[nodiscard]] double along(int row, Vec3 v) const { return at(row, 0) * v.x + at(row, 1) * v.y + at(row, 2) * v.z; }
   [[nodiscard]] std::array<float, 16> floats() const {
     std::array<float, 16> out{};
     for (std::size_t i = 0; i < 16; ++i) out[i] = static_cast<float>(m[i]);
@@ -86,9 +93,10 @@ inline Mat4 look_along(Vec3 forward) {
   Mat4 out = Mat4::identity();
   const std::array<Vec3, 3> rows{right, up, -1.0 * ahead};
   for (int row = 0; row < 3; ++row) {
-    out.at(row, 0) = rows[static_cast<std::size_t>(row)].x;
-    out.at(row, 1) = rows[static_cast<std::size_t>(row)].y;
-    out.at(row, 2) = rows[static_cast<std::size_t>(row)].z;
+    const Vec3 axis = rows[static_cast<std::size_t>(row)];
+    out.at(row, 0) = axis.x;
+    out.at(row, 1) = axis.y;
+    out.at(row, 2) = axis.z;
   }
   return out;
 }

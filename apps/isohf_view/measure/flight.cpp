@@ -1,28 +1,73 @@
-#include "measure/flight.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <fstream>
 #include <nlohmann/json.hpp>
 #include <numeric>
 #include <optional>
+#include <sstream>
 
+#include "actions.h"
 #include "gl/offscreen.h"
+#include "isohf/base/output_file.h"
 #include "isohf/error.h"
 #include "measure/flight_path.h"
-#include "measure/process_memory.h"
 #include "measure/static_mesh.h"
 #include "output/svg_chart.h"
 #include "session.h"
-#include "text_file.h"
-#include "verify/print_result.h"
 
 namespace isohf::view {
 namespace {
 
 using nlohmann::ordered_json;
+
+/// What the operating system says of this process, bytes; zeros where it says nothing.
+struct ProcessMemory {
+  std::uint64_t anonymous = 0;  ///< resident and its own: not to be had from a file again
+  std::uint64_t peak = 0;       ///< most that was ever resident, pages of mapped files included
+};
+
+ProcessMemory process_memory() {
+  ProcessMemory memory;
+  std::ifstream status("/proc/self/status");
+  for (std::string line; std::getline(status, line);) {
+    std::istringstream fields(line);
+    std::string name;
+    std::uint64_t kib = 0;
+    if (!(fields >> name >> kib)) continue;
+    if (name == "RssAnon:") memory.anonymous = kib << 10U;
+    if (name == "VmHWM:") memory.peak = kib << 10U;
+  }
+  return memory;
+}
+
+/// A file of lines that is written as the flight goes on, where it is asked for. Errors name it.
+class Lines {
+ public:
+  explicit Lines(const std::string& path) {
+    if (!path.empty()) file_.emplace(path, OutputFile::Options{.overwrite = true});
+  }
+  void add(const std::string& line) {
+    named([&] { file_->append(line + "\n"); });
+  }
+  void finish() {
+    named([&] { file_->commit(); });
+  }
+
+ private:
+  template <typename Write>
+  void named(const Write& write) {
+    if (!file_) return;
+    try {
+      write();
+    } catch (const Error& error) {
+      throw error.within(file_->path());
+    }
+  }
+  std::optional<OutputFile> file_;
+};
 
 double milliseconds_since(std::chrono::steady_clock::time_point begin) {
   return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
@@ -195,9 +240,8 @@ ordered_json json_from(const MeshSpeed& sum) {
 void fly(const TileSource& source, const Options& options, const std::function<void()>& poll) {
   const FlightPath path = FlightPath::read(options.flight);
   const int frames = options.frames > 0 ? options.frames : 300;
-  TextFile csv(options.csv);
-  TextFile plot(options.plot);
-  csv.line(
+  Lines csv(options.csv);
+  csv.add(
       "frame,time_s,frame_ms,update_ms,triangles,draw_calls,passes,visible_tiles,absent_tiles,resident_tiles,"
       "missing_tiles,uploads,shadow_uploads,shadows_to_come,upload_bytes,resident_bytes,radius,texture_upload_bytes,"
       "texture_bytes,"
@@ -228,11 +272,11 @@ void fly(const TileSource& source, const Options& options, const std::function<v
     const TextureBoxFigures textures =
         session.textures() != nullptr ? session.textures()->figures() : TextureBoxFigures{};
     const double update_ms = box.update_ms + textures.update_ms;
-    csv.line(fmt::format("{},{:.4f},{:.3f},{:.3f},{},{},{},{},{},{},{},{},{},{},{},{},{:.1f},{},{},{}", frame, time_s,
-                         ms, update_ms, figures.triangles, figures.draw_calls, figures.passes, figures.visible_tiles,
-                         figures.absent_tiles, box.resident_tiles, box.missing_tiles, box.uploads, box.shadow_uploads,
-                         box.shadows_to_come, box.upload_bytes, box.resident_bytes, box.radius, textures.upload_bytes,
-                         textures.resident_bytes, textures.to_come));
+    csv.add(fmt::format("{},{:.4f},{:.3f},{:.3f},{},{},{},{},{},{},{},{},{},{},{},{},{:.1f},{},{},{}", frame, time_s,
+                        ms, update_ms, figures.triangles, figures.draw_calls, figures.passes, figures.visible_tiles,
+                        figures.absent_tiles, box.resident_tiles, box.missing_tiles, box.uploads, box.shadow_uploads,
+                        box.shadows_to_come, box.upload_bytes, box.resident_bytes, box.radius, textures.upload_bytes,
+                        textures.resident_bytes, textures.to_come));
     totals.frame_ms.push_back(ms);
     totals.time_s.push_back(time_s);
     totals.update_ms.push_back(update_ms);
@@ -247,10 +291,12 @@ void fly(const TileSource& source, const Options& options, const std::function<v
       throw Error(ErrorCode::kCorrupt, *session.textures()->error());
     }
   }
-  csv.close();
-  plot.line(plot_of(totals, fmt::format("Flight over {} tiles, {} x {} pixels", source.grid().tile_count(),
-                                        options.view.width, options.view.height)));
-  plot.close();
+  csv.finish();
+  if (!options.plot.empty()) {
+    const std::string title = fmt::format("Flight over {} tiles, {} x {} pixels", source.grid().tile_count(),
+                                          options.view.width, options.view.height);
+    write_output(options.plot, plot_of(totals, title) + "\n", true);
+  }
   std::optional<MeshSpeed> baseline;
   if (options.baseline) baseline = baseline_of(session, stand, path);
   print_result(options.common, text_from(totals, options) + (baseline ? text_from(*baseline) : ""), [&] {

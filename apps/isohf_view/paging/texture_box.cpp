@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <exception>
 #include <thread>
 
 #include "isohf/error.h"
@@ -31,6 +32,30 @@ float best_anisotropy() {
   return std::min(most, kMostAnisotropy);
 }
 
+/// So that texels without colour lend none to their neighbours when the GPU filters.
+void multiply_by_alpha(Picture& picture) {
+  for (std::size_t i = 0; i < picture.samples.size(); i += 4) {
+    const unsigned alpha = picture.samples[i + 3];
+    for (std::size_t c = 0; alpha != 255 && c < 3; ++c) {
+      picture.samples[i + c] = static_cast<std::uint8_t>((picture.samples[i + c] * alpha + 127) / 255);
+    }
+  }
+}
+
+TextureChain load_chain(const TileSource& source, const TextureRequest& request) {
+  TextureChain chain{request, {}, {}};
+  try {
+    for (int level = request.finest; level < source.textures()->levels; ++level) {
+      chain.levels.push_back(source.read_texture(request.tile, level));
+      multiply_by_alpha(chain.levels.back());
+    }
+  } catch (const std::exception& error) {
+    chain.error = error.what();
+    chain.levels.clear();
+  }
+  return chain;
+}
+
 }  // namespace
 
 TextureBox::TextureBox(const TileSource& source, std::uint64_t memory_bytes, int workers)
@@ -41,7 +66,7 @@ TextureBox::TextureBox(const TileSource& source, std::uint64_t memory_bytes, int
       anisotropy_(best_anisotropy()),
       resident_limit_(memory_bytes / 4 * 3),
       on_the_way_limit_(memory_bytes / 4),
-      loader_(source, workers) {
+      loader_([&source](const TextureRequest& request) { return load_chain(source, request); }, workers) {
   while (finest_ < levels_ - 1 &&
          (kOnTheWay * bytes_from(finest_) > on_the_way_limit_ || 2 * bytes_from(finest_) > resident_limit_)) {
     ++finest_;
@@ -87,21 +112,15 @@ void TextureBox::enter(const TileRange& range) {
 void TextureBox::decide(const ViewState& view) {
   const TileGrid& grid = source_.grid();
   const double texel = std::max(grid.extent_x(), grid.extent_z()) / (source_.textures()->size - 1);
-  const double focal = view.height / (2.0 * std::tan(view.fov_y_rad / 2.0));
   for (auto& [flat, entry] : entries_) {
-    const TileBounds bounds = source_.bounds(entry.tile);
-    const Vec3 low = Vec3{static_cast<double>(entry.tile.column) * grid.extent_x(), bounds.low * view.exaggeration,
-                          static_cast<double>(entry.tile.row) * grid.extent_z()} -
-                     view.eye;
-    const Vec3 high = low + Vec3{grid.extent_x(), (bounds.high - bounds.low) * view.exaggeration, grid.extent_z()};
-    entry.distance =
-        length({std::clamp(0.0, low.x, high.x), std::clamp(0.0, low.y, high.y), std::clamp(0.0, low.z, high.z)});
+    entry.distance = tile_volume(grid, entry.tile, source_.bounds(entry.tile), view).distance();
   }
   const std::uint64_t room = resident_limit_ - bytes_from(finest_);
   for (double coarser = 0.0;; coarser += 0.25) {
     std::uint64_t sum = 0;
     for (auto& [flat, entry] : entries_) {
-      const double pixels = std::max(entry.distance / focal / texel, 1e-9);  // texels of level 0 under a pixel
+      const double pixels =
+          std::max(entry.distance / view.focal_px() / texel, 1e-9);  // texels of level 0 under a pixel
       entry.wanted = static_cast<int>(std::clamp(std::floor(std::log2(pixels) + coarser), static_cast<double>(finest_),
                                                  static_cast<double>(levels_ - 1)));
       sum += bytes_from(entry.wanted);
@@ -150,8 +169,8 @@ bool TextureBox::upload_rows(Upload& work, std::uint64_t budget) {
 }
 
 void TextureBox::take(Upload& done) {
-  const auto found = entries_.find(source_.grid().flat_index(done.chain.tile));
-  on_the_way_bytes_ -= bytes_from(done.chain.finest);
+  const auto found = entries_.find(source_.grid().flat_index(done.chain.request.tile));
+  on_the_way_bytes_ -= bytes_from(done.chain.request.finest);
   Entry& entry = found->second;  // requested entries stay
   entry.requested = false;
   if (done.chain.levels.empty()) {
@@ -161,7 +180,7 @@ void TextureBox::take(Upload& done) {
   }
   if (entry.texture) resident_bytes_ -= bytes_from(entry.finest);
   entry.texture = std::move(done.texture);
-  entry.finest = done.chain.finest;
+  entry.finest = done.chain.request.finest;
   resident_bytes_ += bytes_from(entry.finest);
 }
 
@@ -194,7 +213,7 @@ bool TextureBox::request(Entry& entry, int finest) {
   if (!fits(finest)) return false;
   entry.requested = true;
   on_the_way_bytes_ += bytes_from(finest);
-  loader_.request(entry.tile, finest);
+  loader_.request({entry.tile, finest});
   return true;
 }
 
@@ -215,9 +234,7 @@ bool TextureBox::evict_one() {
 }
 
 void TextureBox::request() {
-  std::vector<Entry*> bare;
-  std::vector<Entry*> coarse;
-  std::vector<Entry*> spare;
+  std::vector<Entry*> bare, coarse, spare;
   for (auto& [flat, entry] : entries_) {
     if (entry.requested || entry.broken) continue;
     if (entry.wanted == levels_) {
@@ -231,9 +248,7 @@ void TextureBox::request() {
       spare.push_back(&entry);
     }
   }
-  std::sort(bare.begin(), bare.end(), nearer);
-  std::sort(coarse.begin(), coarse.end(), nearer);
-  std::sort(spare.begin(), spare.end(), nearer);
+  for (std::vector<Entry*>* list : {&bare, &coarse, &spare}) std::sort(list->begin(), list->end(), nearer);
   // Where nothing is on its way that would make room, it is taken from those that have too much.
   const auto request_or_evict = [this](Entry& entry, int finest) {
     return request(entry, finest) || (on_the_way_bytes_ == 0 && evict_one());
@@ -283,11 +298,6 @@ void TextureBox::finish(const TileRange& range, const ViewState& view) {
 GLuint TextureBox::texture(TileIndex tile) const {
   const auto found = entries_.find(source_.grid().flat_index(tile));
   return found != entries_.end() && found->second.texture ? found->second.texture->get() : 0;
-}
-
-int TextureBox::resident_level(TileIndex tile) const {
-  const auto found = entries_.find(source_.grid().flat_index(tile));
-  return found != entries_.end() && found->second.texture ? found->second.finest : levels_;
 }
 
 }  // namespace isohf::view

@@ -8,12 +8,25 @@
 #include <vector>
 
 #include "gl/gl_objects.h"
-#include "paging/texture_loader.h"
+#include "paging/background_loader.h"
 #include "paging/tile_box.h"
 #include "paging/tile_source.h"
 #include "view_state.h"
 
 namespace isohf::view {
+
+/// A tile's texture from the mip level `finest` on.
+struct TextureRequest {
+  TileIndex tile{};
+  int finest = 0;
+};
+
+/// The same as a worker has decoded it.
+struct TextureChain {
+  TextureRequest request;
+  std::vector<Picture> levels;  ///< RGBA, colours multiplied by alpha; empty where reading failed
+  std::string error;
+};
 
 /// What one update did, and where things stand.
 struct TextureBoxFigures {
@@ -41,8 +54,6 @@ class TextureBox {
 
   /// The GL texture of a tile; 0 where there is none (yet).
   [[nodiscard]] GLuint texture(TileIndex tile) const;
-  /// The level that it begins with; the number of levels where there is none.
-  [[nodiscard]] int resident_level(TileIndex tile) const;
   [[nodiscard]] const TextureBoxFigures& figures() const { return figures_; }
   /// The first texture that could not be read, as a message.
   [[nodiscard]] const std::optional<std::string>& error() const { return error_; }
@@ -95,7 +106,7 @@ class TextureBox {
   std::optional<Upload> upload_;
   TextureBoxFigures figures_;
   std::optional<std::string> error_;
-  TextureLoader loader_;  // last: its threads stop first
+  BackgroundLoader<TextureRequest, TextureChain> loader_;  // last: its threads stop first
 };
 
 }  // namespace isohf::view

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <exception>
+#include <thread>
 #include <tuple>
 
 #include "isohf/error.h"
@@ -17,8 +19,30 @@ namespace {
 constexpr std::uint64_t kCpuCopies = 4;
 constexpr std::uint64_t kCpuCopiesLit = 9;
 
-std::int64_t wrap(std::int64_t value, std::int64_t size) {
-  return value % size;
+LoadedTile load_tile(const TileSource& source, const TileRequest& request) {
+  LoadedTile loaded;
+  loaded.request = request;
+  const auto vertices = static_cast<std::size_t>(source.grid().shape().stored_vertex_count());
+  const auto attempt = [&](auto&& read) {
+    try {
+      loaded.codes.resize(vertices);
+      read();
+      return true;
+    } catch (const std::exception& error) {
+      if (loaded.error.empty()) loaded.error = error.what();
+      loaded.codes.clear();
+      loaded.shadow.clear();
+      return false;
+    }
+  };
+  const bool lit = request.sun && attempt([&] {
+                     loaded.shadow.resize(vertices);
+                     source.read_lit(request.tile, *request.sun, loaded.codes, loaded.shadow);
+                   });
+  // Broken seeds take nothing but the shadow away.
+  if (!lit && request.codes) attempt([&] { source.read(request.tile, loaded.codes); });
+  if (!request.codes) loaded.codes = {};
+  return loaded;
 }
 
 }  // namespace
@@ -30,7 +54,7 @@ TileBox::TileBox(const TileSource& source, const SharedGeometry& shared, const T
       slot_bytes_(TileSlot::bytes(shared.shape(), source.shadow_seeds() != nullptr)),
       on_the_way_bytes_(TileSlot::bytes(shared.shape()) *
                         (source.shadow_seeds() == nullptr ? kCpuCopies : kCpuCopiesLit)),
-      loader_(source, limits.workers) {
+      loader_([&source](const TileRequest& request) { return load_tile(source, request); }, limits.workers) {
   const std::uint64_t per_frame = limits.upload_bytes_per_frame / slot_bytes_ + 1;
   // A quarter of the memory at most is for tiles on their way.
   in_flight_limit_ = static_cast<std::size_t>(
@@ -53,7 +77,7 @@ void TileBox::set_sun(const std::optional<RowSun>& sun) {
 }
 
 std::size_t TileBox::cell_of(TileIndex tile) const {
-  return static_cast<std::size_t>(wrap(tile.column, box_columns_) + wrap(tile.row, box_rows_) * box_columns_);
+  return static_cast<std::size_t>(tile.column % box_columns_ + tile.row % box_rows_ * box_columns_);
 }
 
 std::pair<std::int64_t, std::int64_t> TileBox::tiles_across(double radius) const {
@@ -98,9 +122,8 @@ void TileBox::resize(WorldPoint centre, double radius) {
     }
   }
   const auto first = [](double place, double r, double extent, std::int64_t count, std::int64_t all) {
-    const double at = std::floor((place - r) / extent);
-    const double low = std::clamp(at, 0.0, static_cast<double>(all - count));
-    return static_cast<std::int64_t>(low);
+    return static_cast<std::int64_t>(
+        std::clamp(std::floor((place - r) / extent), 0.0, static_cast<double>(all - count)));
   };
   range_.first_column = first(centre.x, kept, grid.extent_x(), columns, grid.tile_columns());
   range_.first_row = first(centre.z, kept, grid.extent_z(), rows, grid.tile_rows());
@@ -136,13 +159,11 @@ void TileBox::update(WorldPoint centre, double radius) {
 }
 
 void TileBox::upload() {
-  std::size_t done = 0;
-  for (; done < waiting_.size(); ++done) {
-    const std::uint64_t next = waiting_[done].bytes();
-    if (figures_.upload_bytes > 0 && figures_.upload_bytes + next > limits_.upload_bytes_per_frame) break;
-    place(waiting_[done]);
+  for (; !waiting_.empty(); waiting_.pop_front()) {
+    const std::uint64_t next = waiting_.front().bytes();
+    if (figures_.upload_bytes > 0 && figures_.upload_bytes + next > limits_.upload_bytes_per_frame) return;
+    place(waiting_.front());
   }
-  waiting_.erase(waiting_.begin(), waiting_.begin() + static_cast<std::ptrdiff_t>(done));
 }
 
 void TileBox::place(LoadedTile& loaded) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <memory>
 #include <optional>
 #include <string>
@@ -8,10 +9,28 @@
 #include <vector>
 
 #include "gl/tile_buffers.h"
-#include "paging/tile_loader.h"
+#include "paging/background_loader.h"
 #include "paging/tile_source.h"
 
 namespace isohf::view {
+
+/// What a worker is to do: read a tile, compute its shadow heights, or both.
+struct TileRequest {
+  TileIndex tile{};
+  bool codes = true;             ///< false: only its shadow is wanted
+  std::optional<RowSun> sun;     ///< for shadow heights; nullopt: none
+  std::uint64_t sun_number = 0;  ///< handed back
+};
+
+/// A tile that a worker has decoded, or what went wrong.
+struct LoadedTile {
+  TileRequest request;
+  std::vector<std::uint16_t> codes;   ///< empty where reading failed, or where they were not wanted
+  std::vector<std::uint16_t> shadow;  ///< empty where there is none, or no seeds could be read
+  std::string error;
+
+  [[nodiscard]] std::uint64_t bytes() const { return (codes.size() + shadow.size()) * sizeof(std::uint16_t); }
+};
 
 /// Bounds that a TileBox keeps.
 struct TileBoxLimits {
@@ -115,12 +134,12 @@ class TileBox {
   TileRange range_;
   std::vector<Cell> cells_;
   std::vector<std::unique_ptr<TileSlot>> spare_;
-  std::vector<LoadedTile> waiting_;  ///< decoded, for a later frame's budget
+  std::deque<LoadedTile> waiting_;  ///< decoded, for a later frame's budget
   std::optional<RowSun> sun_;
   std::uint64_t sun_number_ = 0;  ///< counts suns
   TileBoxFigures figures_;
   std::optional<std::string> error_;
-  TileLoader loader_;  // last: its threads stop first
+  BackgroundLoader<TileRequest, LoadedTile> loader_;  // last: its threads stop first
 };
 
 }  // namespace isohf::view

@@ -1,11 +1,131 @@
 #include "paging/tile_source.h"
 
 #include <algorithm>
+#include <bit>
+#include <cmath>
 #include <limits>
+#include <optional>
 
+#include "formats/georeference/units.h"
+#include "isohf/archive.h"
+#include "isohf/archive/shadow_seeds/shadow_seed_reader.h"
+#include "isohf/archive/textures/texture_reader.h"
+#include "isohf/base/assert.h"
 #include "isohf/error.h"
+#include "isohf/surface/shade/shadow.h"
 
 namespace isohf::view {
+namespace {
+
+/// World units of one elevation unit; 1 where either is not known.
+double world_per_elevation(const Metadata& metadata) {
+  if (metadata.horizontal_unit != "metre") return 1.0;
+  const auto unit = linear_unit(metadata.vertical_unit);
+  return unit ? unit->metres : 1.0;
+}
+
+class ArchiveSource final : public TileSource {
+ public:
+  explicit ArchiveSource(const std::string& path)
+      : reader_(path), world_per_elevation_(world_per_elevation(reader_.metadata())) {
+    const Metadata& metadata = reader_.metadata();
+    const Quantisation& stored = metadata.quantisation;
+    scale_ = {stored.offset * world_per_elevation_, stored.scale * world_per_elevation_};
+    if (stored.type == CodeType::kF32) {
+      // Floats on the GPU would be four bytes a vertex: round them to 65535 steps over the dataset's range.
+      // The statistics' leaves out what lies beyond the source.
+      const TileBounds whole = whole_bounds(*this);
+      scale_ = {whole.low, whole.high > whole.low ? (whole.high - whole.low) / (kVoidCode - 1) : 1.0};
+    }
+    if (shadow_seed_info(metadata)) seeds_.emplace(reader_);
+    if (texture_info(metadata)) textures_.emplace(reader_);
+  }
+
+  [[nodiscard]] const TileGrid& grid() const override { return reader_.grid(); }
+  [[nodiscard]] ViewScale scale() const override { return scale_; }
+
+  [[nodiscard]] bool is_to_scale() const override { return reader_.metadata().horizontal_unit == "metre"; }
+  [[nodiscard]] bool rounds() const override { return is_float(); }
+  [[nodiscard]] WorldBounds covered() const override { return reader_.metadata().valid; }
+
+  [[nodiscard]] TileBounds bounds(TileIndex tile) const override {
+    const TileEntry entry = reader_.tile_entry(tile);
+    if (!entry.stored) return {};
+    if (is_float()) {
+      return {true, entry.has_voids, std::bit_cast<float>(entry.code_min) * world_per_elevation_,
+              std::bit_cast<float>(entry.code_max) * world_per_elevation_};
+    }
+    return {true, entry.has_voids, scale_.offset + scale_.scale * entry.code_min,
+            scale_.offset + scale_.scale * entry.code_max};
+  }
+
+  void read(TileIndex tile, std::span<std::uint16_t> codes) const override { convert(reader_.read_tile(tile), codes); }
+
+  [[nodiscard]] const ShadowSeedInfo* shadow_seeds() const override { return seeds_ ? &seeds_->info() : nullptr; }
+
+  [[nodiscard]] const TextureInfo* textures() const override { return textures_ ? &textures_->info() : nullptr; }
+  [[nodiscard]] bool has_texture(TileIndex tile) const override { return textures_ && textures_->has(tile); }
+  [[nodiscard]] Picture read_texture(TileIndex tile, int level) const override {
+    return textures_->read_rgba(tile, level);
+  }
+
+  void read_lit(TileIndex tile, const RowSun& sun, std::span<std::uint16_t> codes,
+                std::span<std::uint16_t> shadow) const override {
+    const TileCodes stored = reader_.read_tile(tile);
+    convert(stored, codes);
+    // Shadow heights are found in the viewer's codes, unrounded: single precision holds these to 1/256 of a code.
+    std::vector<double> entering = seeds_->entering(tile, stored, sun.travel, sun.elevation_deg);
+    for (double& height : entering) height = exact_code_of(height);
+    std::vector<float> heights(codes.size());
+    if (is_float()) {
+      std::transform(stored.heights.begin(), stored.heights.end(), heights.begin(),
+                     [this](float height) { return static_cast<float>(exact_code_of(height)); });
+    } else {
+      std::transform(codes.begin(), codes.end(), heights.begin(), [](std::uint16_t code) {
+        return code == kVoidCode ? std::numeric_limits<float>::quiet_NaN() : static_cast<float>(code);
+      });
+    }
+    const Quantisation unit{CodeType::kF32, 0.0, scale_.scale / world_per_elevation_};  // elevation units of a code
+    const double fall = seeds_->info().fall_per_half_step(grid(), unit, sun.elevation_deg) / grid().sigma_x();
+    const TileShape& shape = grid().shape();
+    std::vector<float> lit(codes.size());
+    tile_shadow(grid(), View2D<const float>(heights.data(), shape.columns(), shape.rows()), {sun.travel, fall},
+                entering, View2D<float>(lit.data(), shape.columns(), shape.rows()), {});
+    std::transform(lit.begin(), lit.end(), shadow.begin(),
+                   [](float height) { return std::isfinite(height) ? rounded(height) : std::uint16_t{0}; });
+  }
+
+ private:
+  [[nodiscard]] bool is_float() const { return reader_.metadata().quantisation.type == CodeType::kF32; }
+  [[nodiscard]] static std::uint16_t rounded(double code) {
+    return static_cast<std::uint16_t>(std::clamp(std::round(code), 0.0, kVoidCode - 1.0));
+  }
+  [[nodiscard]] double exact_code_of(double elevation) const {
+    return (elevation * world_per_elevation_ - scale_.offset) / scale_.scale;
+  }
+  [[nodiscard]] std::uint16_t code_of(float elevation) const { return rounded(exact_code_of(elevation)); }
+
+  void convert(const TileCodes& stored, std::span<std::uint16_t> codes) const {
+    if (stored.type == CodeType::kF32) {
+      ISOHF_ASSERT(stored.heights.size() == codes.size());
+      std::transform(stored.heights.begin(), stored.heights.end(), codes.begin(),
+                     [this](float height) { return std::isnan(height) ? kVoidCode : code_of(height); });
+      return;
+    }
+    ISOHF_ASSERT(stored.codes.size() == codes.size());
+    const std::uint32_t void_code = reader_.metadata().quantisation.void_code();
+    std::transform(stored.codes.begin(), stored.codes.end(), codes.begin(),
+                   [=](std::uint16_t code) { return code == void_code ? kVoidCode : code; });
+  }
+
+  ArchiveReader reader_;
+  double world_per_elevation_;
+  ViewScale scale_;
+  std::optional<ShadowSeedReader> seeds_;
+  std::optional<TextureReader> textures_;
+};
+
+}  // namespace
 
 void TileSource::read_lit(TileIndex, const RowSun&, std::span<std::uint16_t>, std::span<std::uint16_t>) const {
   throw Error(ErrorCode::kUnsupported, "this source has no shadow seeds");
@@ -13,6 +133,13 @@ void TileSource::read_lit(TileIndex, const RowSun&, std::span<std::uint16_t>, st
 
 Picture TileSource::read_texture(TileIndex, int) const {
   throw Error(ErrorCode::kUnsupported, "this source has no textures");
+}
+
+TileVolume tile_volume(const TileGrid& grid, TileIndex tile, const TileBounds& bounds, const ViewState& view) {
+  const Vec3 low = Vec3{static_cast<double>(tile.column) * grid.extent_x(), bounds.low * view.exaggeration,
+                        static_cast<double>(tile.row) * grid.extent_z()} -
+                   view.eye;
+  return {low, low + Vec3{grid.extent_x(), (bounds.high - bounds.low) * view.exaggeration, grid.extent_z()}};
 }
 
 TileBounds whole_bounds(const TileSource& source) {
@@ -28,6 +155,10 @@ TileBounds whole_bounds(const TileSource& source) {
   }
   if (!whole.stored) return {};
   return whole;
+}
+
+std::unique_ptr<TileSource> open_archive(const std::string& path) {
+  return std::make_unique<ArchiveSource>(path);
 }
 
 }  // namespace isohf::view

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -10,6 +11,7 @@
 #include "isohf/lattice.h"
 #include "isohf/metadata.h"
 #include "isohf/picture.h"
+#include "view_state.h"
 
 namespace isohf::view {
 
@@ -74,6 +76,18 @@ class TileSource {
 /// Opens an archive for viewing. 16- and 8-bit codes are taken as they are; float elevations are rounded to 65535
 /// steps between the dataset's smallest and largest elevation. Throws what ArchiveReader throws.
 [[nodiscard]] std::unique_ptr<TileSource> open_archive(const std::string& path);
+
+/// The box around a tile, from the eye.
+struct TileVolume {
+  Vec3 low;
+  Vec3 high;
+  /// From the eye to the nearest point of the box.
+  [[nodiscard]] double distance() const {
+    return length({std::clamp(0.0, low.x, high.x), std::clamp(0.0, low.y, high.y), std::clamp(0.0, low.z, high.z)});
+  }
+};
+[[nodiscard]] TileVolume tile_volume(const TileGrid& grid, TileIndex tile, const TileBounds& bounds,
+                                     const ViewState& view);
 
 /// Lowest and highest elevation of the tiles together; {0, 0} where all is void.
 [[nodiscard]] TileBounds whole_bounds(const TileSource& source);

@@ -25,6 +25,17 @@ struct PixelWindow {
   auto operator<=>(const PixelWindow&) const = default;
 };
 
+/// Calls visit(i, j, k, at) for column i and row j of a window: k counts its pixels row by row, `at` is the place of the
+/// pixel's four floats in a picture `picture_width` wide whose rows begin in the South.
+template <typename Visit>
+void for_each_pixel(const PixelWindow& window, int picture_width, const Visit& visit) {
+  std::size_t k = 0;
+  for (int j = 0; j < window.height; ++j) {
+    const auto first = static_cast<std::size_t>(window.height - 1 - j) * static_cast<std::size_t>(picture_width);
+    for (int i = 0; i < window.width; ++i, ++k) visit(i, j, k, 4 * (first + static_cast<std::size_t>(i)));
+  }
+}
+
 /// A pixel centre on the mesh of a level: three stored vertices, c + r*C, and their weights.
 struct PixelSample {
   std::array<std::uint32_t, 3> vertices;

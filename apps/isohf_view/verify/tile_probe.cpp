@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include "gl/shaders.h"
 #include "renderer.h"
 
 namespace isohf::view {
@@ -19,12 +18,9 @@ int largest(const std::vector<PixelWindow>& windows, int PixelWindow::*side) {
 TileProbe::TileProbe(const TileGrid& grid, const SharedGeometry& shared, double code_height)
     : grid_(grid),
       shared_(shared),
-      solid_("probe", false, probe_fragment_shader(false)),
-      voids_("probe", true, probe_fragment_shader(true)),
-      solid_shadow_("shadow probe", false, shadow_probe_fragment_shader(false)),
-      voids_shadow_("shadow probe", true, shadow_probe_fragment_shader(true)),
-      solid_feedback_("capture", false, probe_fragment_shader(false), {"gl_Position", "v_facing", "v_place"}),
-      voids_feedback_("capture", true, probe_fragment_shader(true), {"gl_Position", "v_facing", "v_place"}),
+      height_("probe", probe_fragment_shader),
+      shadow_("shadow probe", shadow_probe_fragment_shader),
+      feedback_("capture", probe_fragment_shader, {"gl_Position", "v_facing", "v_place"}),
       target_(largest(MeshOracle(grid.shape()).windows(), &PixelWindow::width),
               largest(MeshOracle(grid.shape()).windows(), &PixelWindow::height), GL_RGBA32F) {
   frame_.code_height = code_height;
@@ -68,13 +64,13 @@ void TileProbe::draw_mesh(const TileSlot& slot, int level, bool cull) {
 
 void TileProbe::draw_level(const TileSlot& slot, bool voids, int level, const PixelWindow& window, bool cull,
                            std::vector<float>& out) {
-  begin(voids ? voids_ : solid_, window);
+  begin(height_.of(voids), window);
   add_up(slot, level, cull, out);
 }
 
 void TileProbe::draw_shadow(const TileSlot& slot, bool voids, int level, const PixelWindow& window, double softness,
                             std::vector<float>& out) {
-  const TerrainProgram& program = voids ? voids_shadow_ : solid_shadow_;
+  const TerrainProgram& program = shadow_.of(voids);
   begin(program, window);
   glUniform1f(program.uniform("shadow_gain"), static_cast<float>(2.0 / softness));
   add_up(slot, level, true, out);
@@ -91,13 +87,13 @@ void TileProbe::add_up(const TileSlot& slot, int level, bool cull, std::vector<f
 
 void TileProbe::draw_blend(const TileSlot& slot, bool voids, const LodBlend& blend, const PixelWindow& window,
                            std::vector<float>& out) {
-  begin(voids ? voids_ : solid_, window);
+  begin(height_.of(voids), window);
   begin_opaque_pass();
   draw_mesh(slot, blend.first, true);
   if (blend.alpha > 0.0 && blend.second != blend.first) {
     begin_fading_pass();
     order_fading(blend);
-    glUniform1f((voids ? voids_ : solid_).uniform("alpha"), static_cast<float>(blend.alpha));
+    glUniform1f(height_.of(voids).uniform("alpha"), static_cast<float>(blend.alpha));
     draw_mesh(slot, blend.second, true);
     end_fading_pass();
   }
@@ -110,7 +106,7 @@ void TileProbe::capture(const TileSlot& slot, bool voids, std::vector<ProbedVert
   glBindBuffer(GL_TRANSFORM_FEEDBACK_BUFFER, captured_.get());
   glBufferData(GL_TRANSFORM_FEEDBACK_BUFFER, bytes, nullptr, GL_STREAM_READ);
   glBindBufferBase(GL_TRANSFORM_FEEDBACK_BUFFER, 0, captured_.get());
-  const TerrainProgram& program = voids ? voids_feedback_ : solid_feedback_;
+  const TerrainProgram& program = feedback_.of(voids);
   frame_.clip_from_eye = Mat4::identity();  // clip positions are then the vertices' places
   program.begin(grid_, frame_);
   program.set_tile(grid_, frame_, {0, 0});

@@ -45,12 +45,9 @@ class TileProbe {
   const TileGrid& grid_;
   const SharedGeometry& shared_;
   TerrainFrame frame_;
-  TerrainProgram solid_;
-  TerrainProgram voids_;
-  TerrainProgram solid_shadow_;
-  TerrainProgram voids_shadow_;
-  TerrainProgram solid_feedback_;
-  TerrainProgram voids_feedback_;
+  TerrainPrograms height_;
+  TerrainPrograms shadow_;
+  TerrainPrograms feedback_;
   Offscreen target_;
   Buffer captured_;
 };

@@ -1,14 +1,13 @@
-#include "verify/verify_seams.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 
-#include "gl/shaders.h"
 #include "isohf/error.h"
 #include "isohf/lattice/barycentric.h"
+#include "verify/verify_view.h"
 
 namespace isohf::view {
 namespace {
@@ -24,15 +23,56 @@ std::vector<std::int64_t> block_firsts(std::int64_t tiles) {
   return firsts;
 }
 
-}  // namespace
+class SeamVerifier {
+ public:
+  explicit SeamVerifier(const CheckContext& context);
+  /// All blocks.
+  void verify();
 
-SeamVerifier::SeamVerifier(const TileSource& source, const SharedGeometry& shared, VerifyReport& report)
-    : source_(source), shared_(shared), report_(report), program_("seam", false, flat_fragment_shader(false)) {
-  const TileBounds whole = whole_bounds(source);
-  const ViewScale scale = source.scale();
+ private:
+  struct Block {
+    TileIndex first{};
+    int columns = 0;
+    int rows = 0;
+    std::vector<std::vector<std::uint16_t>> codes;  ///< voids filled: a hole is no crack
+  };
+  struct Slant {
+    bool along_x = true;
+    double px_per_code = 0.0;  ///< k, with its sign
+  };
+
+  bool load(Block& block);
+  void verify_block(const Block& block, std::int64_t number);
+  void slanted(const Block& block, int even_level, int odd_level, const Slant& slant);
+  void from_above(const Block& block, int even_level, int odd_level);
+  /// Background is black.
+  [[nodiscard]] std::vector<std::uint8_t> draw(const Block& block, const TerrainFrame& frame, int even_level,
+                                               int odd_level, int width, int height);
+  [[nodiscard]] double code_at(const Block& block, double x, double z) const;  ///< block's object space
+  [[nodiscard]] double rough_step(const Block& block) const;
+  [[nodiscard]] ViewFinding describe(const Block& block, const Slant& slant, int even_level, int odd_level,
+                                     double along_px, double across) const;
+
+  const TileSource& source_;
+  const SharedGeometry& shared_;
+  ViewReport& report_;
+  TerrainProgram program_;
+  std::vector<TileSlot> slots_;
+  std::uint16_t fill_;
+  double middle_;
+  std::optional<Offscreen> target_;
+};
+
+SeamVerifier::SeamVerifier(const CheckContext& context)
+    : source_(context.source),
+      shared_(context.shared),
+      report_(context.report),
+      program_("seam", false, flat_fragment_shader(false)) {
+  const TileBounds whole = whole_bounds(source_);
+  const ViewScale scale = source_.scale();
   fill_ = static_cast<std::uint16_t>(std::clamp((whole.low - scale.offset) / scale.scale, 0.0, 65534.0));
   middle_ = (0.5 * (whole.low + whole.high) - scale.offset) / scale.scale;
-  for (int i = 0; i < kBlockTiles * kBlockTiles; ++i) slots_.emplace_back(shared);
+  for (int i = 0; i < kBlockTiles * kBlockTiles; ++i) slots_.emplace_back(shared_);
 }
 
 bool SeamVerifier::load(Block& block) {
@@ -110,10 +150,14 @@ double SeamVerifier::code_at(const Block& block, double x, double z) const {
                      View2D<const std::uint16_t>(codes.data(), shape.columns(), shape.rows()));
 }
 
-void SeamVerifier::draw(const Block& block, const TerrainFrame& frame, int even_level, int odd_level,
-                        const Offscreen& target) {
-  target.bind();
-  glViewport(0, 0, target.width(), target.height());
+std::vector<std::uint8_t> SeamVerifier::draw(const Block& block, const TerrainFrame& frame, int even_level,
+                                             int odd_level, int width, int height) {
+  if (!target_ || target_->width() != width || target_->height() != height) {
+    target_.reset();
+    target_.emplace(width, height, GL_RGBA8);
+  }
+  target_->bind();
+  glViewport(0, 0, width, height);
   glClearColor(0.0F, 0.0F, 0.0F, 0.0F);
   glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
   glDisable(GL_DEPTH_TEST);
@@ -134,6 +178,7 @@ void SeamVerifier::draw(const Block& block, const TerrainFrame& frame, int even_
     }
   }
   ++report_.pictures;
+  return target_->read_rgba8();
 }
 
 void SeamVerifier::slanted(const Block& block, int even_level, int odd_level, const Slant& slant) {
@@ -149,10 +194,6 @@ void SeamVerifier::slanted(const Block& block, int even_level, int odd_level, co
   const int across_count = std::max(1, static_cast<int>(across_size * across_px));
   const int picture_width = slant.along_x ? along_count : across_count;
   const int picture_height = slant.along_x ? across_count : along_count;
-  if (!target_ || target_->width() != picture_width || target_->height() != picture_height) {
-    target_.reset();
-    target_ = std::make_unique<Offscreen>(picture_width, picture_height, GL_RGBA8);
-  }
 
   TerrainFrame frame;
   frame.anchor_tile = block.first;
@@ -176,11 +217,10 @@ void SeamVerifier::slanted(const Block& block, int even_level, int odd_level, co
   }
   clip.at(3, 3) = 1.0;
   frame.clip_from_eye = clip;
-  draw(block, frame, even_level, odd_level, *target_);
-  const std::vector<std::uint8_t> pixels = target_->read_rgba8();
+  const std::vector<std::uint8_t> pixels = draw(block, frame, even_level, odd_level, picture_width, picture_height);
 
   std::int64_t bare = 0;
-  Finding worst{};
+  ViewFinding worst{};
   for (int line = 0; line < across_count; ++line) {
     const double across = (line + 0.5) / across_px;
     const auto end = [&](double along) {
@@ -206,8 +246,8 @@ void SeamVerifier::slanted(const Block& block, int even_level, int odd_level, co
 }
 
 /// The place of the full-detail surface that would have been drawn at a bare pixel.
-Finding SeamVerifier::describe(const Block& block, const Slant& slant, int even_level, int odd_level, double along,
-                               double across) const {
+ViewFinding SeamVerifier::describe(const Block& block, const Slant& slant, int even_level, int odd_level, double along,
+                                   double across) const {
   const TileShape& shape = source_.grid().shape();
   const double width = 2.0 * shape.cell_columns();
   const double height = shape.cell_rows();
@@ -229,7 +269,7 @@ Finding SeamVerifier::describe(const Block& block, const Slant& slant, int even_
   const int row = std::clamp(static_cast<int>(z / height), 0, block.rows - 1);
   const TileIndex tile{block.first.column + column, block.first.row + row};
   const int level = (row + column) % 2 == 0 ? even_level : odd_level;
-  return {Check::kCrack,
+  return {finding::kDrawnCrack,
           tile,
           static_cast<double>(level),
           fmt::format("background shows near object space ({:.1f}, {:.1f}), slanted along {}, neighbours at level {}",
@@ -253,12 +293,7 @@ void SeamVerifier::from_above(const Block& block, int even_level, int odd_level)
   frame.anchor = {-0.5 * grid.extent_x() * block.columns, -0.45 * size, -0.5 * grid.extent_z() * block.rows};
   const Vec3 forward{0.0, -std::sin(80.0 * radians), -std::cos(80.0 * radians)};
   frame.clip_from_eye = perspective(70.0 * radians, 1.0, 0.05 * size, 2.0 * size) * look_along(forward);
-  if (!target_ || target_->width() != kSize_px || target_->height() != kSize_px) {
-    target_.reset();
-    target_ = std::make_unique<Offscreen>(kSize_px, kSize_px, GL_RGBA8);
-  }
-  draw(block, frame, even_level, odd_level, *target_);
-  const std::vector<std::uint8_t> pixels = target_->read_rgba8();
+  const std::vector<std::uint8_t> pixels = draw(block, frame, even_level, odd_level, kSize_px, kSize_px);
   std::int64_t bare = 0;
   std::size_t first = 0;
   for (std::size_t i = 0; i < pixels.size(); i += 4) {
@@ -266,7 +301,7 @@ void SeamVerifier::from_above(const Block& block, int even_level, int odd_level)
   }
   report_.seam_pixels += kSize_px * kSize_px;
   if (bare == 0) return;
-  report_.add({Check::kCrack,
+  report_.add({finding::kDrawnCrack,
                {block.first.column + block.columns / 2, block.first.row + block.rows / 2},
                static_cast<double>(even_level),
                fmt::format("background shows through the block of {} x {} tiles from tile ({},{}), seen from above, at "
@@ -275,6 +310,12 @@ void SeamVerifier::from_above(const Block& block, int even_level, int odd_level)
                            first / kSize_px, kSize_px, even_level, odd_level),
                static_cast<double>(bare),
                bare});
+}
+
+}  // namespace
+
+void verify_seams(const CheckContext& context) {
+  SeamVerifier(context).verify();
 }
 
 }  // namespace isohf::view

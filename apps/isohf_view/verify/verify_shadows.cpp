@@ -1,15 +1,12 @@
-#include "verify/verify_shadows.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
 
 #include "isohf/error.h"
 #include "isohf/surface/shade/shadow.h"
-#include "verify/verify_places.h"
+#include "verify/verify_view.h"
 
 namespace isohf::view {
 namespace {
@@ -40,29 +37,44 @@ std::string sun_name(const RowSun& sun) {
                      sun.elevation_deg);
 }
 
-}  // namespace
+class ShadowVerifier {
+ public:
+  explicit ShadowVerifier(const CheckContext& context);
+  void verify();
 
-ShadowVerifier::ShadowVerifier(const TileSource& source, const SharedGeometry& shared, MeshOracle& oracle,
-                               TileProbe& probe, const VerifyOptions& options, VerifyReport& report)
-    : source_(source),
-      oracle_(oracle),
-      probe_(probe),
-      options_(options),
-      report_(report),
-      slot_(shared),
-      codes_(static_cast<std::size_t>(source.grid().shape().stored_vertex_count())),
-      heights_(codes_.size()),
+ private:
+  void verify_row(std::int64_t row, LightTravel travel);
+  void verify_tile(TileIndex tile, const RowSun& sun, std::size_t sun_number, std::vector<double>& entering);
+  void check_vertices(TileIndex tile, const RowSun& sun);
+  void check_share(TileIndex tile, const RowSun& sun, int level, const PixelWindow& window);
+
+  const CheckContext& context_;
+  const TileSource& source_;
+  TileProbe& probe_;
+  ViewReport& report_;
+  TileSlot slot_;
+  double tolerance_;  ///< codes
+  std::vector<std::uint16_t> codes_;
+  std::vector<float> heights_;         ///< the same, NaN where void
+  std::vector<float> carried_;         ///< shadow heights by the library
+  std::vector<std::uint16_t> seeded_;  ///< by the tile's own seeds
+  std::vector<ProbedVertex> captured_;
+  std::vector<float> pixels_;
+};
+
+ShadowVerifier::ShadowVerifier(const CheckContext& context)
+    : context_(context),
+      source_(context.source),
+      probe_(context.probe),
+      report_(context.report),
+      slot_(context.shared),
+      codes_(static_cast<std::size_t>(source_.grid().shape().stored_vertex_count())),
       carried_(codes_.size()),
       seeded_(codes_.size()) {
   // Shadow heights are rounded to a code. Seeds of angles have been so before, and heights that are floats are rounded
   // here but not where the shadows come from: half a code each. Besides, the float rounding of 65535.
-  const bool twice = source.rounds() || source.shadow_seeds()->kind == ShadowSeedInfo::Kind::kAngles;
+  const bool twice = source_.rounds() || source_.shadow_seeds()->kind == ShadowSeedInfo::Kind::kAngles;
   tolerance_ = (twice ? 1.0 : 0.5) + 0.01;
-}
-
-bool ShadowVerifier::voids(TileIndex tile) const {
-  const TileBounds bounds = source_.bounds(tile);
-  return bounds.has_voids || !bounds.stored;
 }
 
 void ShadowVerifier::verify() {
@@ -70,7 +82,7 @@ void ShadowVerifier::verify() {
   report_.suns_deg = suns_of(*source_.shadow_seeds());
   for (std::int64_t row = 0; row < grid.tile_rows(); ++row) {
     for (const LightTravel travel : {LightTravel::kEastward, LightTravel::kWestward}) verify_row(row, travel);
-    if (options_.progress) options_.progress((row + 1) * grid.tile_columns(), grid.tile_count());
+    if (context_.options.progress) context_.options.progress((row + 1) * grid.tile_columns(), grid.tile_count());
   }
 }
 
@@ -85,9 +97,7 @@ void ShadowVerifier::verify_row(std::int64_t row, LightTravel travel) {
     } catch (const Error&) {
       return;  // the tile's own check has said so, and nothing can be carried past it
     }
-    std::transform(codes_.begin(), codes_.end(), heights_.begin(), [](std::uint16_t code) {
-      return code == kVoidCode ? std::numeric_limits<float>::quiet_NaN() : static_cast<float>(code);
-    });
+    heights_ = heights_from(codes_);
     slot_.upload(codes_);
     for (std::size_t k = 0; k < entering.size(); ++k) {
       verify_tile(tile, {travel, report_.suns_deg[k]}, k, entering[k]);
@@ -106,16 +116,16 @@ void ShadowVerifier::verify_tile(TileIndex tile, const RowSun& sun, std::size_t 
     std::vector<std::uint16_t> codes(codes_.size());
     source_.read_lit(tile, sun, codes, seeded_);
   } catch (const Error& error) {
-    report_.add({Check::kShadow, tile, 0.0, error.what(), 0.0, 1});
+    report_.add({finding::kDrawnShadow, tile, 0.0, error.what(), 0.0, 1});
     return;
   }
   slot_.upload_shadow(seeded_);
-  probe_.capture(slot_, voids(tile), captured_);
+  probe_.capture(slot_, context_.has_voids(tile), captured_);
   check_vertices(tile, sun);
   // Each tile at one level a sun, all levels in turn.
   const auto turn = static_cast<std::size_t>(tile.column + tile.row) + sun_number;
   const int level = static_cast<int>(turn % static_cast<std::size_t>(shape.levels()));
-  for (const PixelWindow& window : oracle_.windows()) check_share(tile, sun, level, window);
+  for (const PixelWindow& window : context_.oracle.windows()) check_share(tile, sun, level, window);
 }
 
 void ShadowVerifier::check_vertices(TileIndex tile, const RowSun& sun) {
@@ -137,38 +147,41 @@ void ShadowVerifier::check_vertices(TileIndex tile, const RowSun& sun) {
       });
     }
   }
-  if (worst.any()) report_.add(worst.finding(Check::kShadow, tile, 0.0));
+  worst.report(report_, finding::kDrawnShadow, tile, 0.0);
 }
 
 // The vertices' shadow heights have been looked at: from them the library's barycentric S and Eq. 16.
 void ShadowVerifier::check_share(TileIndex tile, const RowSun& sun, int level, const PixelWindow& window) {
   const TileShape& shape = source_.grid().shape();
-  probe_.draw_shadow(slot_, voids(tile), level, window, kSoftness, pixels_);
+  probe_.draw_shadow(slot_, context_.has_voids(tile), level, window, kSoftness, pixels_);
   ++report_.pictures;
-  const std::span<const PixelSample> samples = oracle_.samples(level, window);
+  const std::span<const PixelSample> samples = context_.oracle.samples(level, window);
   const double reach = window.x0 + window.z0 + window.width + window.height;
   Worst worst;
-  for (int j = 0; j < window.height; ++j) {
-    for (int i = 0; i < window.width; ++i) {
-      const PixelSample& sample = samples[static_cast<std::size_t>(j * window.width + i)];
-      const SampledCode ground = sample_code(sample, codes_);
-      const float* got = pixels_.data() + 4 * static_cast<std::size_t>((window.height - 1 - j) * probe_.width() + i);
-      if (!ground.valid || got[3] != 1.0F) continue;  // coverage is another check's
-      ++report_.pixels;
-      const SampledCode shadow = sample_code(sample, seeded_);
-      const double want = sun_share_on_surface(ground.code, shadow.code, kSoftness);
-      const double off = std::abs(got[0] - want);
-      report_.worst_share = std::max(report_.worst_share, off);
-      const double codes = kCodeTolerance + (ground.spread + shadow.spread) * reach * kPerPixel;
-      if (off <= 2.0 * codes / kSoftness) continue;
-      worst.add(off, [&] {
-        return fmt::format("{}, {}: share {:.4f} of the sun, library {:.4f} (ground {:.3f}, shadow {:.3f})",
-                           pixel_name(shape, window, i, j, sample), sun_name(sun), got[0], want, ground.code,
-                           shadow.code);
-      });
-    }
-  }
-  if (worst.any()) report_.add(worst.finding(Check::kSunShare, tile, level));
+  for_each_pixel(window, probe_.width(), [&](int i, int j, std::size_t k, std::size_t at) {
+    const SampledCode ground = sample_code(samples[k], codes_);
+    const float* got = pixels_.data() + at;
+    if (!ground.valid || got[3] != 1.0F) return;  // coverage is another check's
+    ++report_.pixels;
+    const SampledCode shadow = sample_code(samples[k], seeded_);
+    const double want = sun_share_on_surface(ground.code, shadow.code, kSoftness);
+    const double off = std::abs(got[0] - want);
+    report_.worst_share = std::max(report_.worst_share, off);
+    const double codes = kCodeTolerance + (ground.spread + shadow.spread) * reach * kPerPixel;
+    if (off <= 2.0 * codes / kSoftness) return;
+    worst.add(off, [&] {
+      return fmt::format("{}, {}: share {:.4f} of the sun, library {:.4f} (ground {:.3f}, shadow {:.3f})",
+                         pixel_name(shape, window, i, j, samples[k]), sun_name(sun), got[0], want, ground.code,
+                         shadow.code);
+    });
+  });
+  worst.report(report_, finding::kDrawnSunShare, tile, level);
+}
+
+}  // namespace
+
+void verify_shadows(const CheckContext& context) {
+  ShadowVerifier(context).verify();
 }
 
 }  // namespace isohf::view

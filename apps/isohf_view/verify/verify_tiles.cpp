@@ -1,13 +1,13 @@
-#include "verify/verify_tiles.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
+#include <unordered_map>
 
 #include "isohf/error.h"
 #include "isohf/lattice/lod.h"
-#include "verify/verify_places.h"
+#include "isohf/surface/shade/normals.h"
+#include "verify/verify_view.h"
 
 namespace isohf::view {
 namespace {
@@ -18,51 +18,71 @@ std::uint64_t lattice_key(LatticeVertex vertex) {
   return static_cast<std::uint64_t>(vertex.x) * 0x1000000000U + (static_cast<std::uint64_t>(vertex.z) & 0xFFFFFFFFFU);
 }
 
-}  // namespace
+class TileVerifier {
+ public:
+  explicit TileVerifier(const CheckContext& context)
+      : context_(context),
+        source_(context.source),
+        report_(context.report),
+        probe_(context.probe),
+        slot_(context.shared),
+        codes_(static_cast<std::size_t>(source_.grid().shape().stored_vertex_count())),
+        normals_(codes_.size()) {}
 
-TileVerifier::TileVerifier(const TileSource& source, const SharedGeometry& shared, MeshOracle& oracle, TileProbe& probe,
-                           const VerifyOptions& options, VerifyReport& report)
-    : source_(source),
-      options_(options),
-      report_(report),
-      oracle_(oracle),
-      probe_(probe),
-      slot_(shared),
-      codes_(static_cast<std::size_t>(source.grid().shape().stored_vertex_count())),
-      normals_(codes_.size()) {}
+  /// Tiles in flat-index order.
+  void verify(TileIndex tile);
 
-void TileVerifier::compute_normals() {
-  const TileShape& shape = source_.grid().shape();
-  std::vector<float> heights(codes_.size());
-  std::transform(codes_.begin(), codes_.end(), heights.begin(), [this](std::uint16_t code) {
-    return code == kVoidCode ? std::numeric_limits<float>::quiet_NaN()
-                             : static_cast<float>(source_.scale().scale * code);
-  });
-  tile_normals(source_.grid(), View2D<const float>(heights.data(), shape.columns(), shape.rows()),
-               View2D<Normal>(normals_.data(), shape.columns(), shape.rows()));
-}
+ private:
+  /// What some tile said of a vertex that others store too.
+  struct SharedVertex {
+    std::uint16_t code = 0;
+    bool has_normal = false;
+    float nx = 0.0F, ny = 0.0F, nz = 0.0F;
+    TileIndex tile{};
+  };
+
+  void check_vertices(TileIndex tile);
+  void check_shared(TileIndex tile);
+  void check_level(TileIndex tile, int level, const PixelWindow& window);
+  void check_transition(TileIndex tile, double level, const PixelWindow& window);
+  void diagnose_coverage(int level, const PixelWindow& window, ViewFinding found);
+
+  const CheckContext& context_;
+  const TileSource& source_;
+  ViewReport& report_;
+  TileProbe& probe_;
+  TileSlot slot_;
+  bool voids_ = false;  ///< of the tile in hand
+  std::vector<std::uint16_t> codes_;
+  std::vector<Normal> normals_;
+  std::vector<ProbedVertex> captured_;
+  std::vector<float> pixels_;
+  std::unordered_map<std::uint64_t, SharedVertex> seen_;  ///< of the last two tile rows' rims
+  std::int64_t seen_row_ = 0;
+};
 
 void TileVerifier::verify(TileIndex tile) {
   ++report_.tiles;
-  const TileBounds bounds = source_.bounds(tile);
   try {
     source_.read(tile, codes_);
   } catch (const Error& error) {
-    report_.add({Check::kReadable, tile, 0.0, error.what(), 0.0, 1});
+    report_.add({finding::kTileUndecodable, tile, 0.0, error.what(), 0.0, 1});
     return;
   }
   slot_.upload(codes_);
-  compute_normals();
-  const bool voids = bounds.has_voids || !bounds.stored;
-  probe_.capture(slot_, voids, captured_);
+  const TileShape& shape = source_.grid().shape();
+  const std::vector<float> heights = heights_from(codes_, source_.scale().scale);
+  tile_normals(source_.grid(), View2D<const float>(heights.data(), shape.columns(), shape.rows()),
+               View2D<Normal>(normals_.data(), shape.columns(), shape.rows()));
+  voids_ = context_.has_voids(tile);
+  probe_.capture(slot_, voids_, captured_);
   check_vertices(tile);
   check_shared(tile);
-  const int levels = source_.grid().shape().levels();
-  for (const PixelWindow& window : oracle_.windows()) {
-    for (int level = 0; level < levels; ++level) {
-      check_level(tile, voids, level, window);
-      if (level + 1 == levels) continue;
-      for (const double fraction : options_.fractions) check_transition(tile, voids, level + fraction, window);
+  for (const PixelWindow& window : context_.oracle.windows()) {
+    for (int level = 0; level < shape.levels(); ++level) {
+      check_level(tile, level, window);
+      if (level + 1 == shape.levels()) continue;
+      for (const double fraction : context_.options.fractions) check_transition(tile, level + fraction, window);
     }
   }
 }
@@ -101,7 +121,7 @@ void TileVerifier::check_vertices(TileIndex tile) {
       }
     }
   }
-  if (worst.any()) report_.add(worst.finding(Check::kVertex, tile, 0.0));
+  worst.report(report_, finding::kDrawnVertex, tile, 0.0);
 }
 
 // Every stored vertex near the rim lies in a neighbour's array as well, padding included: the codes must be the same
@@ -113,7 +133,8 @@ void TileVerifier::check_shared(TileIndex tile) {
     seen_row_ = tile.row;
     std::erase_if(seen_, [&](const auto& entry) { return entry.second.tile.row < tile.row - 1; });
   }
-  Worst worst;
+  Worst codes;
+  Worst normals;
   for (int row = 0; row < shape.rows(); ++row) {
     const bool rim_row = row < 3 || row >= shape.rows() - 3;
     for (int column = 0; column < shape.columns(); ++column) {
@@ -132,13 +153,13 @@ void TileVerifier::check_shared(TileIndex tile) {
       SharedVertex& there = found->second;
       ++report_.shared_vertices;
       if (there.code != here.code) {
-        worst.add(std::abs(there.code - here.code), [&] {
+        codes.add(std::abs(there.code - here.code), [&] {
           return fmt::format("{}: code {}, tile ({},{}) stores {} at the same place", vertex_name(vertex), here.code,
                              there.tile.column, there.tile.row, there.code);
         });
       } else if (there.has_normal && here.has_normal &&
                  (there.nx != here.nx || there.ny != here.ny || there.nz != here.nz)) {
-        worst.add(std::max(std::abs(there.nx - here.nx), std::abs(there.nz - here.nz)), [&] {
+        normals.add(std::max(std::abs(there.nx - here.nx), std::abs(there.nz - here.nz)), [&] {
           return fmt::format("{}: normal ({}, {}, {}), in tile ({},{}) ({}, {}, {})", vertex_name(vertex), here.nx,
                              here.ny, here.nz, there.tile.column, there.tile.row, there.nx, there.ny, there.nz);
         });
@@ -146,116 +167,116 @@ void TileVerifier::check_shared(TileIndex tile) {
       if (!there.has_normal && here.has_normal) there = here;
     }
   }
-  if (worst.any()) report_.add(worst.finding(Check::kShared, tile, 0.0));
+  codes.report(report_, finding::kSharedVertex, tile, 0.0);
+  if (!codes.any()) normals.report(report_, finding::kNormal, tile, 0.0);  // else these follow from the codes
 }
 
-void TileVerifier::check_level(TileIndex tile, bool voids, int level, const PixelWindow& window) {
+void TileVerifier::check_level(TileIndex tile, int level, const PixelWindow& window) {
   const TileShape& shape = source_.grid().shape();
-  const std::span<const PixelSample> samples = oracle_.samples(level, window);
-  probe_.draw_level(slot_, voids, level, window, true, pixels_);
+  const std::span<const PixelSample> samples = context_.oracle.samples(level, window);
+  probe_.draw_level(slot_, voids_, level, window, true, pixels_);
   ++report_.pictures;
   Worst coverage;
   Worst height;
   Worst normal;
-  const int target_width = probe_.width();
-  for (int j = 0; j < window.height; ++j) {
-    for (int i = 0; i < window.width; ++i) {
-      const PixelSample& sample = samples[static_cast<std::size_t>(j * window.width + i)];
-      const std::size_t at = 4 * static_cast<std::size_t>((window.height - 1 - j) * target_width + i);
-      const SampledCode want = sample_code(sample, codes_);
-      const float* got = pixels_.data() + at;
-      ++report_.pixels;
-      const float required = want.valid ? 1.0F : 0.0F;
-      if (got[3] != required) {
-        coverage.add(std::abs(got[3] - required), [&] {
-          return fmt::format("{}: drawn {} times, required {}", pixel_name(shape, window, i, j, sample), got[3],
-                             required);
-        });
-        continue;
-      }
-      if (!want.valid) continue;
-      const double reach = window.x0 + window.z0 + window.width + window.height;
-      const double off = std::abs(got[0] - want.code);
-      report_.worst_height = std::max(report_.worst_height, off);
-      if (off > kCodeTolerance + want.spread * reach * kPerPixel) {
-        height.add(off, [&] {
-          return fmt::format("{}: code {:.3f}, library {:.3f}", pixel_name(shape, window, i, j, sample), got[0],
-                             want.code);
-        });
-      }
-      double nx = 0.0;
-      double nz = 0.0;
-      for (std::size_t k = 0; k < 3; ++k) {
-        nx += static_cast<double>(sample.weights[k]) * normals_[sample.vertices[k]].x;
-        nz += static_cast<double>(sample.weights[k]) * normals_[sample.vertices[k]].z;
-      }
-      const double turn = std::max(std::abs(got[1] - nx), std::abs(got[2] - nz));
-      report_.worst_normal = std::max(report_.worst_normal, turn);
-      if (turn > kNormalTolerance + 2.0 * reach * kPerPixel) {
-        normal.add(turn, [&] {
-          return fmt::format("{}: normal x, z ({:.5f}, {:.5f}), library ({:.5f}, {:.5f})",
-                             pixel_name(shape, window, i, j, sample), got[1], got[2], nx, nz);
-        });
-      }
+  const double reach = window.x0 + window.z0 + window.width + window.height;
+  for_each_pixel(window, probe_.width(), [&](int i, int j, std::size_t k, std::size_t at) {
+    const PixelSample& sample = samples[k];
+    const SampledCode want = sample_code(sample, codes_);
+    const float* got = pixels_.data() + at;
+    ++report_.pixels;
+    const float required = want.valid ? 1.0F : 0.0F;
+    if (got[3] != required) {
+      coverage.add(std::abs(got[3] - required), [&] {
+        return fmt::format("{}: drawn {} times, required {}", pixel_name(shape, window, i, j, sample), got[3],
+                           required);
+      });
+      return;
     }
-  }
-  if (coverage.any()) diagnose_coverage(voids, level, window, coverage.finding(Check::kCoverage, tile, level));
-  if (height.any()) report_.add(height.finding(Check::kHeight, tile, level));
-  if (normal.any()) report_.add(normal.finding(Check::kNormal, tile, level));
+    if (!want.valid) return;
+    const double off = std::abs(got[0] - want.code);
+    report_.worst_height = std::max(report_.worst_height, off);
+    if (off > kCodeTolerance + want.spread * reach * kPerPixel) {
+      height.add(off, [&] {
+        return fmt::format("{}: code {:.3f}, library {:.3f}", pixel_name(shape, window, i, j, sample), got[0],
+                           want.code);
+      });
+    }
+    double nx = 0.0;
+    double nz = 0.0;
+    for (std::size_t corner = 0; corner < 3; ++corner) {
+      const Normal& there = normals_[sample.vertices[corner]];
+      nx += static_cast<double>(sample.weights[corner]) * there.x;
+      nz += static_cast<double>(sample.weights[corner]) * there.z;
+    }
+    const double turn = std::max(std::abs(got[1] - nx), std::abs(got[2] - nz));
+    report_.worst_normal = std::max(report_.worst_normal, turn);
+    if (turn > kNormalTolerance + 2.0 * reach * kPerPixel) {
+      normal.add(turn, [&] {
+        return fmt::format("{}: normal x, z ({:.5f}, {:.5f}), library ({:.5f}, {:.5f})",
+                           pixel_name(shape, window, i, j, sample), got[1], got[2], nx, nz);
+      });
+    }
+  });
+  if (coverage.any()) diagnose_coverage(level, window, coverage.worst(finding::kDrawnCoverage, tile, level));
+  height.report(report_, finding::kDrawnHeight, tile, level);
+  normal.report(report_, finding::kDrawnNormal, tile, level);
 }
 
 /// A tile that is whole once back faces are drawn too has triangles that wind the wrong way.
-void TileVerifier::diagnose_coverage(bool voids, int level, const PixelWindow& window, const Finding& finding) {
-  const std::span<const PixelSample> samples = oracle_.samples(level, window);
-  probe_.draw_level(slot_, voids, level, window, false, pixels_);
+void TileVerifier::diagnose_coverage(int level, const PixelWindow& window, ViewFinding found) {
+  const std::span<const PixelSample> samples = context_.oracle.samples(level, window);
+  probe_.draw_level(slot_, voids_, level, window, false, pixels_);
   bool whole = true;
-  for (int j = 0; j < window.height && whole; ++j) {
-    for (int i = 0; i < window.width && whole; ++i) {
-      const SampledCode want = sample_code(samples[static_cast<std::size_t>(j * window.width + i)], codes_);
-      const std::size_t at = 4 * static_cast<std::size_t>((window.height - 1 - j) * probe_.width() + i);
-      whole = pixels_[at + 3] == (want.valid ? 1.0F : 0.0F);
-    }
-  }
-  Finding shown = finding;
+  for_each_pixel(window, probe_.width(), [&](int, int, std::size_t k, std::size_t at) {
+    whole = whole && pixels_[at + 3] == (sample_code(samples[k], codes_).valid ? 1.0F : 0.0F);
+  });
   if (whole) {
-    shown.check = Check::kWinding;
-    shown.where += " (whole once back faces are drawn: the triangle faces down)";
+    found.id = finding::kDrawnWinding;
+    found.where += " (whole once back faces are drawn: the triangle faces down)";
   }
-  report_.add(shown);
+  report_.add(std::move(found));
 }
 
 // Seen from above the first mesh covers all; the second, fading in with alpha, shows where it lies higher.
-void TileVerifier::check_transition(TileIndex tile, bool voids, double level, const PixelWindow& window) {
+void TileVerifier::check_transition(TileIndex tile, double level, const PixelWindow& window) {
   const TileShape& shape = source_.grid().shape();
   const LodBlend blend = lod_blend(level, shape.levels());
-  const std::span<const PixelSample> first_kept = oracle_.samples(blend.first, window);
+  const std::span<const PixelSample> first_kept = context_.oracle.samples(blend.first, window);
   const std::vector<PixelSample> first(first_kept.begin(), first_kept.end());
-  const std::span<const PixelSample> second = oracle_.samples(blend.second, window);
-  probe_.draw_blend(slot_, voids, blend, window, pixels_);
+  const std::span<const PixelSample> second = context_.oracle.samples(blend.second, window);
+  probe_.draw_blend(slot_, voids_, blend, window, pixels_);
   ++report_.pictures;
   Worst worst;
   const double reach = window.x0 + window.z0 + window.width + window.height;
-  for (int j = 0; j < window.height; ++j) {
-    for (int i = 0; i < window.width; ++i) {
-      const auto k = static_cast<std::size_t>(j * window.width + i);
-      const SampledCode under = sample_code(first[k], codes_);
-      const SampledCode over = sample_code(second[k], codes_);
-      if (!under.valid || !over.valid) continue;
-      ++report_.pixels;
-      const double want = under.code + blend.alpha * std::max(over.code - under.code, 0.0);
-      const double got = pixels_[4 * static_cast<std::size_t>((window.height - 1 - j) * probe_.width() + i)];
-      const double off = std::abs(got - want);
-      report_.worst_height = std::max(report_.worst_height, off);
-      if (off > 2.0 * kCodeTolerance + (under.spread + over.spread) * reach * kPerPixel) {
-        worst.add(off, [&] {
-          return fmt::format("{}: code {:.3f}, required {:.3f} (levels {} at {:.3f} and {} at {:.3f}, alpha {:.2f})",
-                             pixel_name(shape, window, i, j, first[k]), got, want, blend.first, under.code,
-                             blend.second, over.code, blend.alpha);
-        });
-      }
-    }
+  for_each_pixel(window, probe_.width(), [&](int i, int j, std::size_t k, std::size_t at) {
+    const SampledCode under = sample_code(first[k], codes_);
+    const SampledCode over = sample_code(second[k], codes_);
+    if (!under.valid || !over.valid) return;
+    ++report_.pixels;
+    const double want = under.code + blend.alpha * std::max(over.code - under.code, 0.0);
+    const double got = pixels_[at];
+    const double off = std::abs(got - want);
+    report_.worst_height = std::max(report_.worst_height, off);
+    if (off <= 2.0 * kCodeTolerance + (under.spread + over.spread) * reach * kPerPixel) return;
+    worst.add(off, [&] {
+      return fmt::format("{}: code {:.3f}, required {:.3f} (levels {} at {:.3f} and {} at {:.3f}, alpha {:.2f})",
+                         pixel_name(shape, window, i, j, first[k]), got, want, blend.first, under.code, blend.second,
+                         over.code, blend.alpha);
+    });
+  });
+  worst.report(report_, finding::kDrawnTransition, tile, level);
+}
+
+}  // namespace
+
+void verify_tiles(const CheckContext& context) {
+  const TileGrid& grid = context.source.grid();
+  TileVerifier verifier(context);
+  for (std::int64_t flat = 0; flat < grid.tile_count(); ++flat) {
+    verifier.verify(grid.tile_at(flat));
+    if (context.options.progress) context.options.progress(flat + 1, grid.tile_count());
   }
-  if (worst.any()) report_.add(worst.finding(Check::kTransition, tile, level));
 }
 
 }  // namespace isohf::view

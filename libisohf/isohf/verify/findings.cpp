@@ -42,6 +42,22 @@ const std::vector<FindingKind>& finding_catalogue() {
        "a member of the metadata contradicts another one, or names nothing known"},
       {finding::kAccuracy, Severity::kError,
        "the error that the metadata state cannot be, or is not what comparing with the source gives"},
+      {finding::kDrawnVertex, Severity::kError,
+       "a vertex is drawn in another place, or with another elevation or normal, than the library computes"},
+      {finding::kDrawnCoverage, Severity::kError,
+       "a point of a tile is not drawn, or drawn more than once, or something outside the tile is drawn"},
+      {finding::kDrawnWinding, Severity::kError, "a triangle faces down"},
+      {finding::kDrawnHeight, Severity::kError, "inside a triangle the drawn elevation is not the interpolated one"},
+      {finding::kDrawnNormal, Severity::kError, "inside a triangle the drawn normal is not the interpolated one"},
+      {finding::kDrawnTransition, Severity::kError,
+       "while one level of detail fades into the next, the drawn elevation is not the one that both levels give"},
+      {finding::kDrawnCrack, Severity::kError, "background shows between neighbouring tiles"},
+      {finding::kDrawnMesh, Severity::kError,
+       "triangles of the index arrays do not join side to side, or do not meet the full-detail border"},
+      {finding::kDrawnShadow, Severity::kError,
+       "a vertex's drawn shadow height is not the one that is carried along the row of tiles"},
+      {finding::kDrawnSunShare, Severity::kError,
+       "inside a triangle the drawn share of the sun is not that of the interpolated shadow height"},
   };
   return kinds;
 }
