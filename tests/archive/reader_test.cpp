@@ -15,7 +15,7 @@
 #include <thread>
 
 #include "archive/tiles.h"
-#include "isohf/archive/container/zip_layout.h"
+#include "isohf/archive/container/archive_directory.h"
 #include "isohf/archive/deflate/deflate.h"
 #include "isohf/error.h"
 #include "support/temporary_folder.h"
@@ -36,14 +36,11 @@ struct Parts {
   std::vector<Part> parts;
 
   explicit Parts(const std::vector<std::byte>& file) {
-    const std::span<const std::byte> bytes(file);
-    for_each_entry(bytes, find_zip_end(bytes), [&](const ZipEntry& entry) {
-      const auto data = bytes.subspan(checked_data_offset(bytes, entry), entry.compressed_bytes);
-      parts.push_back({{std::string(entry.name), static_cast<ZipMethod>(entry.method), entry.crc32,
-                        entry.compressed_bytes, entry.bytes, entry.header_offset},
-                       {data.begin(), data.end()},
-                       ""});
-    });
+    const auto source = memory_source(file);
+    for (ZipEntries entries(*source, find_archive_end(*source)); const auto entry = entries.next();) {
+      const auto data = std::span(file).subspan(checked_data_offset(*source, *entry), entry->compressed_bytes);
+      parts.push_back({*entry, {data.begin(), data.end()}, ""});
+    }
   }
 
   [[nodiscard]] Part& find(const std::string& name) {

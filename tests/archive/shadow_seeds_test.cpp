@@ -7,7 +7,7 @@
 #include <functional>
 #include <random>
 
-#include "isohf/archive/container/zip_layout.h"
+#include "isohf/archive/container/archive_directory.h"
 #include "isohf/archive/deflate/deflate.h"
 #include "isohf/error.h"
 

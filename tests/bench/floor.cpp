@@ -24,7 +24,7 @@
 #include <vector>
 
 #include "formats/registry.h"
-#include "isohf/base/file.h"
+#include "isohf/base/source_bytes.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
 #include "isohf/surface/source/source_rows.h"
@@ -103,7 +103,8 @@ int nearest_level(std::span<const std::span<const std::byte>> payloads, double a
 }
 
 void run(const std::string& raster, const std::string& payload_file, double archive_bytes) {
-  const isohf::MappedFile file(payload_file);
+  const auto source = isohf::open_file_source(payload_file);
+  const isohf::SourceBytes file(*source, 0, source->size_bytes());
   const std::vector<std::span<const std::byte>> payloads = payloads_in(file.bytes());
   const int nearest = nearest_level(payloads, archive_bytes);
   const double read_seconds = read_all(*isohf::open_raster(raster, {}));

@@ -7,7 +7,7 @@
 #include <span>
 #include <stdexcept>
 
-#include "isohf/archive/container/zip_layout.h"
+#include "isohf/archive/container/archive_directory.h"
 #include "isohf/archive/deflate/deflate.h"
 #include "isohf/archive/tile_index.h"
 #include "support/temporary_folder.h"
@@ -28,20 +28,20 @@ void put(std::vector<std::byte>& out, std::size_t at, T value) {
 }  // namespace
 
 AlteredArchive::AlteredArchive(const std::string& path) {
-  const std::string text = read_file(path);
-  const auto file = std::as_bytes(std::span(text));
-  for_each_entry(file, find_zip_end(file), [&](const ZipEntry& entry) {
-    const auto data = file.subspan(checked_data_offset(file, entry), entry.compressed_bytes);
-    if (entry.name == kMetadataName) {
+  const std::vector<std::byte> file = read_bytes(path);
+  const auto source = memory_source(file);
+  for (ZipEntries entries(*source, find_archive_end(*source)); const auto entry = entries.next();) {
+    const auto data = std::span(file).subspan(checked_data_offset(*source, *entry), entry->compressed_bytes);
+    if (entry->name == kMetadataName) {
       metadata = nlohmann::json::parse(std::string(reinterpret_cast<const char*>(data.data()), data.size()));
       tile_columns_ = metadata.at("tiles").at("columns").get<std::int64_t>();
-    } else if (entry.name == kIndexName) {
+    } else if (entry->name == kIndexName) {
       records_.assign(data.begin(), data.end() - kIndexFooterBytes);
     } else {
       members_.push_back(
-          {std::string(entry.name), entry.method == 8, entry.crc32, entry.bytes, {data.begin(), data.end()}});
+          {entry->name, entry->method == ZipMethod::kDeflated, entry->crc32, entry->bytes, {data.begin(), data.end()}});
     }
-  });
+  }
 }
 
 std::vector<std::string> AlteredArchive::names() const {

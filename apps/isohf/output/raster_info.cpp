@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "interrupt.h"
-#include "isohf/archive/container/zip_layout.h"
+#include "isohf/archive/container/archive_directory.h"
 #include "isohf/base/file.h"
 #include "isohf/convert/frame/plan.h"
 #include "isohf/error.h"

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "isohf/byte_source.h"
 #include "isohf/error.h"
 #include "isohf/metadata.h"
 
@@ -46,19 +47,24 @@ struct MemberEntry {
   bool deflated = false;
 };
 
-/// Opens an archive by memory map and decodes tiles in any order, from any number of threads at once.
-///
-/// Opening reads the tail, the index and the metadata, no tile. Nothing in the file is trusted.
+/// Decodes the tiles of an archive in any order, from any number of threads at once. Nothing in the file is trusted.
 class ArchiveReader {
  public:
-  /// Throws Error{kIo} where the file cannot be opened, Error{kCorrupt} or Error{kUnsupported} naming member and byte
-  /// offset where it is no archive that this build can read.
+  /// Opens a file. Opening reads its tail, the index and the metadata, no tile; what is read later is read from the
+  /// file: nothing grows with it. Throws Error{kIo} where the file cannot be opened, Error{kCorrupt} or
+  /// Error{kUnsupported} naming member and byte offset where it is no archive that this build can read.
   explicit ArchiveReader(const std::string& path);
+
+  /// The same from anything that reads a range of bytes; `name` is what messages call it. Opening reads both ends, two
+  /// ranges; of an archive of more than some 600 tiles also index and directory, in pieces of 1 MiB. The index is kept,
+  /// 32 bytes a tile, so that a tile then costs one range.
+  ArchiveReader(std::shared_ptr<const ByteSource> source, const std::string& name);
   ~ArchiveReader();
   ArchiveReader(const ArchiveReader&) = delete;
   ArchiveReader& operator=(const ArchiveReader&) = delete;
 
-  [[nodiscard]] const std::string& path() const;
+  [[nodiscard]] const std::string& path() const;  ///< or name
+  [[nodiscard]] const ByteSource& source() const;
   [[nodiscard]] std::uint64_t size_bytes() const;
   [[nodiscard]] const Metadata& metadata() const;
   [[nodiscard]] const TileGrid& grid() const { return metadata().grid; }

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "isohf/archive/codec/tile_codes.h"
-#include "isohf/archive/container/zip_layout.h"
 #include "isohf/base/file.h"
+#include "isohf/base/zip.h"
 
 namespace isohf {
 

@@ -1,6 +1,4 @@
 #include "isohf/archive.h"
-#include "isohf/archive/codec/tile_decoder.h"
-#include "isohf/archive/codec/tile_encoder.h"
 
 #include <fmt/format.h>
 
@@ -8,33 +6,64 @@
 #include <array>
 #include <limits>
 #include <mutex>
+#include <utility>
 
 #include "isohf/archive/codec/simd/batch_decoder.h"
 #include "isohf/archive/codec/tile_codes.h"
-#include "isohf/archive/container/directory.h"
-#include "isohf/archive/container/zip_layout.h"
+#include "isohf/archive/codec/tile_decoder.h"
+#include "isohf/archive/container/archive_directory.h"
 #include "isohf/archive/deflate/deflate.h"
-#include "isohf/archive/tile_table.h"
-#include "isohf/base/file.h"
+#include "isohf/archive/tile_locator.h"
+#include "isohf/base/source_bytes.h"
 #include "isohf/error.h"
 
 namespace isohf {
 namespace {
 
-/// The first entry of that name; nullopt where there is none.
-std::optional<ZipEntry> find_entry(std::span<const std::byte> file, const ZipEnd& end, std::string_view name) {
-  std::optional<ZipEntry> found;
-  for_each_entry(file, end, [&](const ZipEntry& entry) {
-    if (!found && entry.name == name) found = entry;
-  });
-  return found;
-}
+/// A source of which the two ends are fetched first, each at once: that is where all lies that opening reads.
+class EndsFirst final : public ByteSource {
+ public:
+  explicit EndsFirst(const ByteSource& source) : source_(source), tail_offset_(source.size_bytes()) {
+    if (!source.view(0, 1).empty()) return;
+    tail_offset_ -= std::min(tail_offset_, kTailBytes);
+    tail_ = SourceBytes(source, tail_offset_, source.size_bytes() - tail_offset_);
+    head_ = SourceBytes(source, 0, std::min(tail_offset_, kHeadBytes));
+  }
+
+  /// From here on everything is read from the source.
+  void forget_ends() { head_ = tail_ = {}; }
+
+  [[nodiscard]] std::uint64_t size_bytes() const override { return source_.size_bytes(); }
+  [[nodiscard]] std::size_t read(std::uint64_t offset_bytes, std::span<std::byte> out) const override {
+    for (const auto& [bytes, begin] :
+         {std::pair(head_.bytes(), std::uint64_t{0}), std::pair(tail_.bytes(), tail_offset_)}) {
+      if (offset_bytes < begin || offset_bytes - begin >= bytes.size()) continue;
+      const auto found = bytes.subspan(offset_bytes - begin);
+      if (found.size() < out.size()) continue;
+      std::copy_n(found.begin(), out.size(), out.begin());
+      return out.size();
+    }
+    return source_.read(offset_bytes, out);
+  }
+  [[nodiscard]] std::span<const std::byte> view(std::uint64_t offset_bytes, std::size_t size_bytes) const override {
+    return source_.view(offset_bytes, size_bytes);
+  }
+
+ private:
+  static constexpr std::uint64_t kHeadBytes = std::uint64_t{32} << 10U;         // the metadata of nearly every archive
+  static constexpr std::uint64_t kTailBytes = (std::uint64_t{64} << 10U) + 22;  // an end record and its comment
+
+  const ByteSource& source_;
+  std::uint64_t tail_offset_;
+  SourceBytes head_;
+  SourceBytes tail_;
+};
 
 /// The metadata's entry: the first of the directory in every archive of ours, searched for in others.
-ZipEntry metadata_entry(std::span<const std::byte> file, const ZipEnd& end) {
-  std::optional<ZipEntry> entry;
-  if (end.entries > 0) entry = first_entry(file, end);
-  if (!entry || entry->name != kMetadataName) entry = find_entry(file, end, kMetadataName);
+ZipEntry metadata_entry(const ByteSource& file, const ZipEnd& end) {
+  ZipEntries entries(file, end);
+  auto entry = entries.next();
+  while (entry && entry->name != kMetadataName) entry = entries.next();
   if (!entry) {
     throw Error(ErrorCode::kCorrupt,
                 fmt::format("is a ZIP file, but no isohf archive: it has no member \"{}\"", kMetadataName));
@@ -49,35 +78,35 @@ ZipEntry metadata_entry(std::span<const std::byte> file, const ZipEnd& end) {
 }  // namespace
 
 struct ArchiveReader::State {
-  explicit State(const std::string& path) : mapped(path), file(mapped.bytes()) {}
+  State(std::shared_ptr<const ByteSource> bytes, const std::string& its_name, bool keeps_index);
 
-  MappedFile mapped;
-  std::span<const std::byte> file;
+  std::shared_ptr<const ByteSource> source;
+  EndsFirst file;
+  std::string name;
   ZipEnd end;
   std::string json;
   std::optional<Metadata> metadata;
   std::vector<Warning> warnings;
-  std::optional<TileTable> tiles;
+  std::optional<TileLocator> tiles;
   mutable std::once_flag members_read;
   mutable std::vector<MemberEntry> members;
 
-  void open();
-  [[nodiscard]] std::vector<std::byte> read(std::uint64_t offset_bytes, std::uint64_t size_bytes) const;
+  void open(bool keeps_index);
   [[nodiscard]] std::vector<std::byte> payload(const TileEntry& entry, TileIndex tile) const;
   void read_members() const;
 };
 
-/// Not through the map: a file that was cut after it was opened is an error, not the end of the process.
-std::vector<std::byte> ArchiveReader::State::read(std::uint64_t offset_bytes, std::uint64_t size_bytes) const {
-  std::vector<std::byte> bytes(size_bytes);
-  mapped.read(offset_bytes, bytes);
-  return bytes;
+ArchiveReader::State::State(std::shared_ptr<const ByteSource> bytes, const std::string& its_name, bool keeps_index) try
+    : source(std::move(bytes)), file(*source), name(its_name) {
+  open(keeps_index);
+} catch (const Error& error) {
+  throw error.within(its_name);
 }
 
-void ArchiveReader::State::open() {
-  end = find_zip_end(file);
+void ArchiveReader::State::open(bool keeps_index) {
+  end = find_archive_end(file);
   const ZipEntry entry = metadata_entry(file, end);
-  const std::vector<std::byte> bytes = member_from(mapped, entry, checked_data_offset(file, entry));
+  const std::vector<std::byte> bytes = member_from(file, entry, checked_data_offset(file, entry));
   json.assign(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   try {
     metadata.emplace(parse_metadata(json));
@@ -85,10 +114,11 @@ void ArchiveReader::State::open() {
     throw error.within(fmt::format("at byte {}", entry.header_offset));
   }
   json.erase(json.find_last_not_of(" \n") + 1);
-  tiles.emplace(mapped, end, *metadata);
+  tiles.emplace(file, end, *metadata, keeps_index);
   if (tiles->by_directory()) {
     warnings.emplace_back("index and ZIP directory do not agree, as after repacking; tiles are found by the directory");
   }
+  file.forget_ends();
 }
 
 std::vector<std::byte> ArchiveReader::State::payload(const TileEntry& entry, TileIndex tile) const {
@@ -99,12 +129,12 @@ std::vector<std::byte> ArchiveReader::State::payload(const TileEntry& entry, Til
         header);
   }
   const std::uint64_t before = std::min<std::uint64_t>(header.size(), entry.offset_bytes);
-  const std::vector<std::byte> stored = read(entry.offset_bytes - before, before + entry.compressed_bytes);
+  const SourceBytes stored(file, entry.offset_bytes - before, before + entry.compressed_bytes);
   // The local header must say what the index says, or the offset is not a tile's.
-  if (before < header.size() || !std::equal(header.begin(), header.end(), stored.begin())) {
+  if (before < header.size() || !std::equal(header.begin(), header.end(), stored.bytes().begin())) {
     throw Error(ErrorCode::kCorrupt, "its local header does not say what the index says");
   }
-  const auto data = std::span(stored).subspan(before);
+  const auto data = stored.bytes().subspan(before);
   std::vector<std::byte> bytes;
   if (tiles->is_deflated(tile)) {
     bytes.resize(entry.payload_bytes);
@@ -122,32 +152,32 @@ std::vector<std::byte> ArchiveReader::State::payload(const TileEntry& entry, Til
 }
 
 void ArchiveReader::State::read_members() const {
-  mapped.check_size();
-  const Directory directory =
+  const ArchiveDirectory directory =
       read_directory(file, end, std::nullopt, [](const std::string& what) { throw Error(ErrorCode::kCorrupt, what); });
   std::vector<MemberEntry> found;
-  for (const Directory::Member& member : directory.members) {
-    found.push_back({std::string(member.entry.name), member.data_offset, member.entry.compressed_bytes,
-                     member.entry.bytes, member.entry.crc32, member.entry.method == 8});
+  for (const auto& [entry, data_offset] : directory.members) {
+    found.push_back({entry.name, data_offset, entry.compressed_bytes, entry.bytes, entry.crc32,
+                     entry.method == ZipMethod::kDeflated});
   }
   members = std::move(found);
 }
 
-ArchiveReader::ArchiveReader(const std::string& path) : state_(std::make_unique<State>(path)) {
-  try {
-    state_->open();
-  } catch (const Error& error) {
-    throw error.within(path);
-  }
-}
+ArchiveReader::ArchiveReader(const std::string& path)
+    : state_(std::make_unique<State>(open_file_source(path), path, false)) {}
+
+ArchiveReader::ArchiveReader(std::shared_ptr<const ByteSource> source, const std::string& name)
+    : state_(std::make_unique<State>(std::move(source), name, true)) {}
 
 ArchiveReader::~ArchiveReader() = default;
 
 const std::string& ArchiveReader::path() const {
-  return state_->mapped.path();
+  return state_->name;
+}
+const ByteSource& ArchiveReader::source() const {
+  return *state_->source;
 }
 std::uint64_t ArchiveReader::size_bytes() const {
-  return state_->file.size();
+  return source().size_bytes();
 }
 const Metadata& ArchiveReader::metadata() const {
   return *state_->metadata;
@@ -236,12 +266,13 @@ std::vector<TileCodes> ArchiveReader::read_tiles(std::span<const TileIndex> tile
 bool ArchiveReader::zlib_reads(TileIndex tile) const {
   const TileEntry entry = tile_entry(tile);
   if (!entry.stored || reads_by_directory()) return true;  // zipped again by another program: not our stream
-  return zlib_inflates_to(state_->read(entry.offset_bytes, entry.compressed_bytes), state_->payload(entry, tile));
+  return zlib_inflates_to(SourceBytes(source(), entry.offset_bytes, entry.compressed_bytes).bytes(),
+                          state_->payload(entry, tile));
 }
 
 bool ArchiveReader::zlib_reads(const MemberEntry& member, std::span<const std::byte> bytes) const {
   if (!member.deflated || reads_by_directory()) return true;
-  return zlib_inflates_to(state_->read(member.offset_bytes, member.compressed_bytes), bytes);
+  return zlib_inflates_to(SourceBytes(source(), member.offset_bytes, member.compressed_bytes).bytes(), bytes);
 }
 
 std::vector<double> ArchiveReader::read_elevations(TileIndex tile) const {
@@ -268,13 +299,13 @@ std::optional<std::vector<std::byte>> ArchiveReader::read_member(const std::stri
 std::vector<std::byte> ArchiveReader::read_member(const MemberEntry& member) const {
   ZipEntry entry;
   entry.name = member.name;
-  entry.method = member.deflated ? 8 : 0;
+  entry.method = member.deflated ? ZipMethod::kDeflated : ZipMethod::kStored;
   entry.crc32 = member.crc32;
   entry.compressed_bytes = member.compressed_bytes;
   entry.bytes = member.bytes;
   entry.header_offset = member.offset_bytes;
   try {
-    return member_from(state_->mapped, entry, member.offset_bytes);
+    return member_from(source(), entry, member.offset_bytes);
   } catch (const Error& error) {
     throw error.within(path());
   }
@@ -285,14 +316,13 @@ std::vector<std::string> ArchiveReader::check_structure() const {
   std::vector<std::string> found(state.warnings.begin(), state.warnings.end());
   const auto complain = [&](const std::string& what) { found.push_back(what); };
   try {
-    state.mapped.check_size();
-    const Directory directory = read_directory(state.file, state.end, grid(), complain);
+    const ArchiveDirectory directory = read_directory(state.file, state.end, grid(), complain);
     if (!state.tiles->by_directory()) {
       state.tiles->check_against(directory, complain);
       check_profile(state.file, state.end, complain);
     }
-    for (const Directory::Member& member : directory.members) {
-      static_cast<void>(member_from(state.mapped, member.entry, member.data_offset));
+    for (const auto& [entry, data_offset] : directory.members) {
+      static_cast<void>(member_from(state.file, entry, data_offset));
     }
   } catch (const Error& error) {
     complain(error.what());

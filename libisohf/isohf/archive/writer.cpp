@@ -8,13 +8,13 @@
 #include <optional>
 #include <vector>
 
+#include "isohf/archive/archive_index_builder.h"
 #include "isohf/archive/codec/tile_codes.h"
+#include "isohf/archive/container/archive_directory.h"
 #include "isohf/archive/container/content_hash.h"
-#include "isohf/archive/container/zip_layout.h"
 #include "isohf/archive/deflate/deflate.h"
 #include "isohf/archive/journal.h"
 #include "isohf/archive/metadata_json.h"
-#include "isohf/archive/written_contents.h"
 #include "isohf/base/assert.h"
 #include "isohf/base/bytes.h"
 #include "isohf/base/output_file.h"
@@ -52,7 +52,7 @@ struct ArchiveWriter::State {
   std::string path;
   TileGrid grid;
   WriterOptions options;
-  WrittenContents contents;
+  ArchiveIndexBuilder contents;
   OutputFile part;  ///< behind all that may not fit in memory
   std::string journal_path;
   std::optional<Journal> journal;

@@ -3,7 +3,6 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/file.h>
-#include <sys/mman.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -154,34 +153,6 @@ void File::start_writeback(std::uint64_t offset_bytes, std::uint64_t size_bytes)
 
 void File::close() {
   if (descriptor_ >= 0 && ::close(std::exchange(descriptor_, -1)) != 0) fail(name_, "cannot close", errno);
-}
-
-MappedFile::MappedFile(const std::string& path) : file_(path, File::Mode::kRead) {
-  size_ = file_.size_bytes();
-  if (size_ == 0) return;
-  void* mapped = ::mmap(nullptr, size_, PROT_READ, MAP_SHARED, file_.descriptor(), 0);
-  if (mapped == MAP_FAILED) fail(path, "cannot map", errno);
-  data_ = static_cast<const std::byte*>(mapped);
-}
-
-MappedFile::~MappedFile() {
-  if (data_ != nullptr) ::munmap(const_cast<std::byte*>(data_), size_);
-}
-
-void MappedFile::read(std::uint64_t offset_bytes, std::span<std::byte> out) const {
-  if (file_.read_at(offset_bytes, out) == out.size()) return;
-  check_size();
-  throw Error(ErrorCode::kIo, fmt::format("ends before byte {}", offset_bytes + out.size()));
-}
-
-void MappedFile::check_size() const {
-  if (const std::uint64_t now = file_.size_bytes(); now < size_) {
-    throw Error(ErrorCode::kIo,
-                fmt::format("has {} bytes, had {} when it was opened: another program cut it; no "
-                            "file may be changed while it is read",
-                            now, size_),
-                {"", fmt::format("{} bytes", now), fmt::format("{} bytes", size_), ""});
-  }
 }
 
 bool rename_file(const std::string& from, const std::string& to, bool overwrite) {

@@ -53,32 +53,6 @@ class File {
   int descriptor_ = -1;
 };
 
-/// A whole file, mapped for reading.
-///
-/// The system kills a process that looks at mapped bytes which another one has cut off the file meanwhile. So read()
-/// fetches what is needed long after opening, and check_size() goes before every walk over bytes().
-class MappedFile {
- public:
-  /// Throws Error{kIo} where the file cannot be opened or mapped. An empty file maps to an empty span.
-  explicit MappedFile(const std::string& path);
-  ~MappedFile();
-  MappedFile(const MappedFile&) = delete;
-  MappedFile& operator=(const MappedFile&) = delete;
-
-  [[nodiscard]] std::span<const std::byte> bytes() const { return {data_, size_}; }
-  [[nodiscard]] const std::string& path() const { return file_.path(); }
-
-  /// Copies bytes out of the file, not the map. Throws Error{kIo} without the path where the file has become shorter.
-  void read(std::uint64_t offset_bytes, std::span<std::byte> out) const;
-  /// Throws Error{kIo} without the path where the file has become shorter than it was when it was opened.
-  void check_size() const;
-
- private:
-  File file_;
-  const std::byte* data_ = nullptr;
-  std::size_t size_ = 0;
-};
-
 /// Moves `from` to `to` in one step. Without `overwrite` an existing `to` is left alone and false is returned.
 /// Throws Error{kIo} for anything else that goes wrong.
 [[nodiscard]] bool rename_file(const std::string& from, const std::string& to, bool overwrite);

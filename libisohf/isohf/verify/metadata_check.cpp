@@ -7,9 +7,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "isohf/archive/container/directory.h"
+#include "isohf/archive/container/archive_directory.h"
 #include "isohf/archive/metadata_json.h"
-#include "isohf/base/file.h"
 #include "isohf/error.h"
 #include "isohf/projection/projected_extent.h"
 #include "isohf/projection/projection.h"
@@ -243,8 +242,7 @@ std::string why_other_data(const ArchiveReader& archive) {
   if (archive.reads_by_directory()) return {};
   for (const auto& [name, stated] : archive.metadata().extensions) {
     if (name != kDataCrcName) continue;
-    const MappedFile file(archive.path());
-    const std::string found = fmt::format("\"{:08x}\"", data_crc32(file, find_zip_end(file.bytes())));
+    const std::string found = fmt::format("\"{:08x}\"", data_crc32(archive.source()));
     if (found != stated) return fmt::format("the members' data have the CRC-32 {}, the metadata say {}", found, stated);
   }
   return {};

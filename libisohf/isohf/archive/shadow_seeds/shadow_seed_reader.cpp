@@ -7,7 +7,7 @@
 #include <cmath>
 #include <limits>
 
-#include "isohf/archive/container/zip_layout.h"
+#include "isohf/archive/container/archive_directory.h"
 #include "isohf/error.h"
 
 namespace isohf {

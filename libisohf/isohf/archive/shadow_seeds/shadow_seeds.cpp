@@ -9,7 +9,7 @@
 
 #include "isohf/archive/codec/ordered_float.h"
 #include "isohf/archive/codec/residuals/residual_symbols.h"
-#include "isohf/archive/container/zip_layout.h"
+#include "isohf/archive/container/archive_directory.h"
 #include "isohf/archive/shadow_seeds/seed_streams.h"
 #include "isohf/base/assert.h"
 #include "isohf/base/bytes.h"

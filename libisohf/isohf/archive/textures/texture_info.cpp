@@ -6,7 +6,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "isohf/archive/container/zip_layout.h"
+#include "isohf/archive/container/archive_directory.h"
 #include "isohf/error.h"
 
 namespace isohf {

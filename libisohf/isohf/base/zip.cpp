@@ -1,11 +1,13 @@
-#include "isohf/archive/container/zip_layout.h"
+#include "isohf/base/zip.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
+#include <span>
+#include <string_view>
 
 #include "isohf/base/bytes.h"
+#include "isohf/base/source_bytes.h"
 #include "isohf/error.h"
 
 namespace isohf {
@@ -17,6 +19,7 @@ constexpr std::uint32_t kEndSignature = 0x06054b50;
 constexpr std::uint32_t kEnd64Signature = 0x06064b50;
 constexpr std::uint32_t kLocator64Signature = 0x07064b50;
 constexpr std::size_t kLocalBytes = 30;
+constexpr std::size_t kEntryBytes = 46;
 constexpr std::size_t kEndBytes = 22;
 constexpr std::size_t kLocator64Bytes = 20;
 constexpr std::uint64_t kEnd64Bytes = 56;
@@ -67,41 +70,6 @@ void append_text(ByteWriter& writer, const std::string& text) {
 }
 
 }  // namespace
-
-std::string tile_name(TileIndex tile) {
-  return fmt::format("tiles/{}/{}.tile", tile.row, tile.column);
-}
-
-std::optional<TileIndex> tile_from_name(std::string_view name) {
-  constexpr std::string_view kFolder = "tiles/";
-  if (name.substr(0, kFolder.size()) != kFolder) return std::nullopt;
-  TileIndex tile{};
-  const char* const end = name.data() + name.size();
-  const auto row = std::from_chars(name.data() + kFolder.size(), end, tile.row);
-  if (row.ec != std::errc{} || row.ptr == end || *row.ptr != '/') return std::nullopt;
-  const auto column = std::from_chars(row.ptr + 1, end, tile.column);
-  if (column.ec != std::errc{} || tile.row < 0 || tile.column < 0) return std::nullopt;
-  if (tile_name(tile) != name) return std::nullopt;  // leading zeros, another ending
-  return tile;
-}
-
-std::string why_bad_name(std::string_view name) {
-  if (name.empty()) return "it is empty";
-  if (name.size() > 65535) return "it is longer than 65535 bytes";
-  if (name.front() == '/') return "it is absolute";
-  if (name.back() == '/') return "it is a folder's";
-  for (const char c : name) {
-    if (c == '\\' || c == ':') return fmt::format("it holds '{}'", c);
-    if (static_cast<unsigned char>(c) < 32 || c == 127) return "it holds a control character";
-  }
-  for (std::size_t start = 0; start <= name.size();) {
-    const std::size_t end = std::min(name.find('/', start), name.size());
-    const std::string_view part = name.substr(start, end - start);
-    if (part.empty() || part == "." || part == "..") return fmt::format("it holds the part \"{}\"", part);
-    start = end + 1;
-  }
-  return {};
-}
 
 std::uint64_t local_header_bytes(const ZipMember& member) {
   return kLocalBytes + member.name.size() + (is_large(member) ? 20 : 0);
@@ -183,32 +151,33 @@ void append_end_records(std::uint64_t entries, std::uint64_t directory_offset, s
 
 namespace {
 
-/// Offset of the end record: the last one whose comment ends with the file.
-std::uint64_t find_end_record(std::span<const std::byte> file) {
-  if (file.size() >= kEndBytes) {
-    const std::uint64_t latest = file.size() - kEndBytes;
-    const std::uint64_t earliest = latest > 0xffff ? latest - 0xffff : 0;
-    for (std::uint64_t at = latest + 1; at-- > earliest;) {
-      ByteReader reader(file.subspan(at), at);
-      if (reader.read<std::uint32_t>() != kEndSignature) continue;
-      static_cast<void>(reader.read_bytes(16));
-      if (reader.read<std::uint16_t>() == latest - at) return at;
-    }
+/// Offset of the end record in the file's tail: the last one whose comment ends with the file, or else the last one.
+std::optional<std::size_t> find_end_record(std::span<const std::byte> tail) {
+  std::optional<std::size_t> last;
+  for (std::size_t at = tail.size() < kEndBytes ? 0 : tail.size() - kEndBytes + 1; at-- > 0;) {
+    ByteReader reader(tail.subspan(at));
+    if (reader.read<std::uint32_t>() != kEndSignature) continue;
+    static_cast<void>(reader.read_bytes(16));
+    if (reader.read<std::uint16_t>() == reader.remaining()) return at;
+    if (!last) last = at;
   }
-  throw Error(ErrorCode::kCorrupt,
-              fmt::format("is no isohf archive, or is cut off: no ZIP end record in its {} bytes", file.size()));
+  return last;
 }
 
-/// Completes `end` from the ZIP64 end record that a locator at `locator_offset` names.
-void read_end64(std::span<const std::byte> file, std::uint64_t locator_offset, ZipEnd& end) {
-  ByteReader locator(file.subspan(locator_offset), locator_offset);
+/// Completes `end` from the ZIP64 end record, where a locator stands right before the other one.
+void read_end64(const ByteSource& file, ZipEnd& end) {
+  if (end.records_offset < kLocator64Bytes) return;
+  const std::uint64_t locator_offset = end.records_offset - kLocator64Bytes;
+  const SourceBytes locator_bytes(file, locator_offset, kLocator64Bytes);
+  ByteReader locator(locator_bytes.bytes());
   if (locator.read<std::uint32_t>() != kLocator64Signature) return;
   static_cast<void>(locator.read<std::uint32_t>());
   const auto at = locator.read<std::uint64_t>();
   if (at > locator_offset || locator_offset - at < kEnd64Bytes) {
     refuse(locator_offset, fmt::format("the ZIP64 locator names byte {} for the end record", at));
   }
-  ByteReader reader(file.subspan(at), at);
+  const SourceBytes bytes(file, at, kEnd64Bytes);
+  ByteReader reader(bytes.bytes());
   if (reader.read<std::uint32_t>() != kEnd64Signature) refuse(at, "no ZIP64 end record, where the locator says so");
   const auto size = reader.read<std::uint64_t>();
   if (size != locator_offset - at - 12) refuse(at, fmt::format("the ZIP64 end record states {} bytes", size));
@@ -224,10 +193,14 @@ void read_end64(std::span<const std::byte> file, std::uint64_t locator_offset, Z
 
 }  // namespace
 
-ZipEnd find_zip_end(std::span<const std::byte> file) {
-  const std::uint64_t at = find_end_record(file);
-  ByteReader reader(file.subspan(at), at);
-  static_cast<void>(reader.read<std::uint32_t>());
+std::optional<ZipEnd> find_zip_end(const ByteSource& file) {
+  const std::uint64_t tail_bytes = std::min<std::uint64_t>(file.size_bytes(), kEndBytes + 0xffff);
+  const std::uint64_t tail_offset = file.size_bytes() - tail_bytes;
+  const SourceBytes tail(file, tail_offset, tail_bytes);
+  const auto found = find_end_record(tail.bytes());
+  if (!found) return std::nullopt;
+  const std::uint64_t at = tail_offset + *found;
+  ByteReader reader(tail.bytes().subspan(*found + 4));
   const auto disks = reader.read<std::uint32_t>();
   ZipEnd end;
   end.entries = reader.read<std::uint16_t>();
@@ -235,9 +208,10 @@ ZipEnd find_zip_end(std::span<const std::byte> file) {
   end.directory_bytes = reader.read<std::uint32_t>();
   end.directory_offset = reader.read<std::uint32_t>();
   end.records_offset = at;
+  end.end_offset = at + kEndBytes + reader.read<std::uint16_t>();
   if (disks != 0 || entries != end.entries) refuse(at, "the archive is split over several files");
-  if (at >= kLocator64Bytes) read_end64(file, at - kLocator64Bytes, end);
-  if (end.directory_offset > end.records_offset || end.directory_bytes != end.records_offset - end.directory_offset) {
+  read_end64(file, end);
+  if (end.directory_offset > end.records_offset || end.directory_bytes > end.records_offset - end.directory_offset) {
     refuse(at, fmt::format("the end record places {} bytes of directory at byte {}, where it ends at byte {}",
                            end.directory_bytes, end.directory_offset, end.records_offset));
   }
@@ -247,17 +221,24 @@ ZipEnd find_zip_end(std::span<const std::byte> file) {
 namespace {
 
 /// Replaces the sizes that say "see the ZIP64 field".
-void read_zip64_field(ByteReader& extra, ZipEntry& entry) {
+void read_zip64_field(std::span<const std::byte> fields, std::uint64_t at, ZipMember& member) {
+  ByteReader extra(fields, at);
   while (extra.remaining() >= 4) {
     const auto tag = extra.read<std::uint16_t>();
     const auto field = extra.read_bytes(extra.read<std::uint16_t>());
     if (tag != kZip64Tag) continue;
-    ByteReader reader(field, entry.entry_offset);
-    for (std::uint64_t* value : {&entry.bytes, &entry.compressed_bytes, &entry.header_offset}) {
+    ByteReader reader(field, at);
+    for (std::uint64_t* value : {&member.bytes, &member.compressed_bytes, &member.header_offset}) {
       if (*value == kIn64) *value = reader.read<std::uint64_t>();
     }
     return;
   }
+}
+
+/// Bytes of an entry, by its lengths of name, extra fields and comment; its first ones must be there.
+std::size_t entry_bytes(std::span<const std::byte> entry) {
+  ByteReader lengths(entry.subspan(28));
+  return kEntryBytes + lengths.read<std::uint16_t>() + lengths.read<std::uint16_t>() + lengths.read<std::uint16_t>();
 }
 
 ZipEntry read_entry(ByteReader& reader, std::uint64_t at) {
@@ -265,8 +246,8 @@ ZipEntry read_entry(ByteReader& reader, std::uint64_t at) {
   entry.entry_offset = at;
   if (reader.read<std::uint32_t>() != kEntrySignature) refuse(at, "no directory entry, where one must stand");
   static_cast<void>(reader.read<std::uint32_t>());
-  entry.flags = reader.read<std::uint16_t>();
-  entry.method = reader.read<std::uint16_t>();
+  entry.is_encrypted = (reader.read<std::uint16_t>() & kFlagEncrypted) != 0;
+  entry.method = static_cast<ZipMethod>(reader.read<std::uint16_t>());
   static_cast<void>(reader.read<std::uint32_t>());
   entry.crc32 = reader.read<std::uint32_t>();
   entry.compressed_bytes = reader.read<std::uint32_t>();
@@ -277,68 +258,70 @@ ZipEntry read_entry(ByteReader& reader, std::uint64_t at) {
   static_cast<void>(reader.read_bytes(8));
   entry.header_offset = reader.read<std::uint32_t>();
   entry.name = text_of(reader.read_bytes(name_bytes));
-  ByteReader extra(reader.read_bytes(extra_bytes), at);
-  read_zip64_field(extra, entry);
+  read_zip64_field(reader.read_bytes(extra_bytes), at, entry);
   static_cast<void>(reader.read_bytes(comment_bytes));
   return entry;
 }
 
 }  // namespace
 
-void for_each_entry(std::span<const std::byte> file, const ZipEnd& end,
-                    const std::function<void(const ZipEntry&)>& at) {
-  ByteReader reader(file.subspan(end.directory_offset, end.directory_bytes), end.directory_offset);
-  std::uint64_t entries = 0;
-  for (; reader.remaining() != 0; ++entries) at(read_entry(reader, end.directory_offset + reader.position()));
-  if (entries != end.entries) {
-    refuse(end.directory_offset,
-           fmt::format("the directory holds {} entries, its end record says {}", entries, end.entries));
+std::optional<ZipEntry> ZipEntries::next() {
+  constexpr std::uint64_t kFirstPieceBytes = 4096;                // what is looked for is mostly the first
+  constexpr std::uint64_t kPieceBytes = std::uint64_t{1} << 18U;  // no entry is longer
+  if (position_ == end_.directory_bytes) {
+    if (entries_ == end_.entries) return std::nullopt;
+    refuse(end_.directory_offset,
+           fmt::format("the directory holds {} entries, its end record says {}", entries_, end_.entries));
   }
+  const auto rest = [&] { return std::span<const std::byte>(piece_).subspan(position_ - piece_offset_); };
+  while ((rest().size() < kEntryBytes || rest().size() < entry_bytes(rest())) &&
+         piece_offset_ + piece_.size() < end_.directory_bytes) {
+    const std::uint64_t most = piece_.empty() ? kFirstPieceBytes : kPieceBytes;
+    piece_.resize(std::min(most, end_.directory_bytes - position_));
+    piece_offset_ = position_;
+    read_exactly(file_, end_.directory_offset + position_, piece_);
+  }
+  const std::uint64_t at = end_.directory_offset + position_;
+  ByteReader reader(rest(), at);
+  const ZipEntry entry = read_entry(reader, at);
+  position_ += reader.position();
+  ++entries_;
+  return entry;
 }
 
-ZipEntry first_entry(std::span<const std::byte> file, const ZipEnd& end) {
-  ByteReader reader(file.subspan(end.directory_offset, end.directory_bytes), end.directory_offset);
-  return read_entry(reader, end.directory_offset);
-}
-
-std::uint64_t checked_data_offset(std::span<const std::byte> file, const ZipEntry& entry) {
+ZipLocal read_local_header(const ByteSource& file, const ZipEntry& entry) {
+  constexpr std::uint64_t kExtraBytes = 64;  // most that extra fields mostly take
   const std::uint64_t at = entry.header_offset;
   const auto fail = [&](const std::string& why) { refuse(at, fmt::format("member \"{}\": {}", entry.name, why)); };
-  if (at > file.size() || file.size() - at < kLocalBytes) fail("its local header lies outside the file");
-  ByteReader reader(file.subspan(at), at);
+  if (at > file.size_bytes() || file.size_bytes() - at < kLocalBytes) fail("its local header lies outside the file");
+  const std::uint64_t left = file.size_bytes() - at;
+  SourceBytes bytes(file, at, std::min(left, kLocalBytes + entry.name.size() + kExtraBytes));
+  ByteReader lengths(bytes.bytes().subspan(26));
+  const std::uint64_t header_bytes = kLocalBytes + lengths.read<std::uint16_t>() + lengths.read<std::uint16_t>();
+  if (header_bytes > bytes.bytes().size()) bytes = SourceBytes(file, at, std::min(left, header_bytes));
+  ByteReader reader(bytes.bytes(), at);
+  ZipLocal local;
   if (reader.read<std::uint32_t>() != kLocalSignature) fail("no local header, where the directory says so");
   static_cast<void>(reader.read<std::uint16_t>());
   const auto flags = reader.read<std::uint16_t>();
-  const auto method = reader.read<std::uint16_t>();
-  static_cast<void>(reader.read<std::uint32_t>());
-  if (((flags | entry.flags) & kFlagEncrypted) != 0) {
+  local.sizes_follow = (flags & kFlagSizesFollow) != 0;
+  if (entry.is_encrypted || (flags & kFlagEncrypted) != 0) {
     throw Error(ErrorCode::kUnsupported, fmt::format("member \"{}\" at byte {} is encrypted", entry.name, at));
   }
-  if (method != entry.method)
-    fail(fmt::format("its local header says method {}, the directory {}", method, entry.method));
-  ZipEntry local = entry;
-  local.crc32 = reader.read<std::uint32_t>();
-  local.compressed_bytes = reader.read<std::uint32_t>();
-  local.bytes = reader.read<std::uint32_t>();
+  local.member.method = static_cast<ZipMethod>(reader.read<std::uint16_t>());
+  static_cast<void>(reader.read<std::uint32_t>());
+  local.member.crc32 = reader.read<std::uint32_t>();
+  local.member.compressed_bytes = reader.read<std::uint32_t>();
+  local.member.bytes = reader.read<std::uint32_t>();
   const std::size_t name_bytes = reader.read<std::uint16_t>();
   const std::size_t extra_bytes = reader.read<std::uint16_t>();
-  if (text_of(reader.read_bytes(name_bytes)) != entry.name)
-    fail("its local header has another name than the directory");
-  local.header_offset = 0;
-  ByteReader extra(reader.read_bytes(extra_bytes), at);
-  read_zip64_field(extra, local);
-  // Archivers that write a stream leave the local sizes out; isohf never does.
-  if ((flags & kFlagSizesFollow) == 0 &&
-      (local.crc32 != entry.crc32 || local.compressed_bytes != entry.compressed_bytes || local.bytes != entry.bytes)) {
-    fail(fmt::format("its local header states {} of {} bytes and CRC {:08x}, the directory {} of {} and {:08x}",
-                     local.compressed_bytes, local.bytes, local.crc32, entry.compressed_bytes, entry.bytes,
-                     entry.crc32));
-  }
-  const std::uint64_t data = at + reader.position();
-  if (entry.compressed_bytes > file.size() - data) {
+  local.member.name = text_of(reader.read_bytes(name_bytes));
+  read_zip64_field(reader.read_bytes(extra_bytes), at, local.member);
+  local.data_offset = at + header_bytes;
+  if (entry.compressed_bytes > file.size_bytes() - local.data_offset) {
     fail(fmt::format("its {} bytes of data reach past the end of the file", entry.compressed_bytes));
   }
-  return data;
+  return local;
 }
 
 }  // namespace isohf

@@ -1,5 +1,4 @@
-#include "isohf/archive/container/zip_layout.h"
-#include "isohf/archive/codec/tile_encoder.h"
+#include "isohf/base/zip.h"
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
@@ -8,7 +7,8 @@
 #include "archive/tiles.h"
 #include "isohf/archive.h"
 #include "isohf/archive/codec/tile_codes.h"
-#include "isohf/archive/container/content_hash.h"
+#include "isohf/archive/codec/tile_encoder.h"
+#include "isohf/archive/container/archive_directory.h"
 #include "isohf/archive/deflate/deflate.h"
 #include "isohf/archive/tile_index.h"
 #include "isohf/error.h"
@@ -17,7 +17,7 @@
 namespace isohf {
 namespace {
 
-TEST(ZipLayout, NamesTilesAndReadsTheirNamesBack) {
+TEST(Zip, NamesTilesAndReadsTheirNamesBack) {
   EXPECT_EQ(tile_name({7, 12}), "tiles/12/7.tile");
   for (const TileIndex tile : {TileIndex{0, 0}, TileIndex{10, 0}, TileIndex{16777215, 16777215}}) {
     EXPECT_EQ(tile_from_name(tile_name(tile)), tile);
@@ -32,11 +32,12 @@ TEST(ZipLayout, NamesTilesAndReadsTheirNamesBack) {
 /// Entries of a directory that stands alone in a file.
 std::vector<ZipEntry> entries_of(const std::vector<std::byte>& file) {
   std::vector<ZipEntry> entries;
-  for_each_entry(file, find_zip_end(file), [&](const ZipEntry& entry) { entries.push_back(entry); });
+  const auto source = memory_source(file);
+  for (ZipEntries all(*source, find_archive_end(*source)); const auto entry = all.next();) entries.push_back(*entry);
   return entries;
 }
 
-TEST(ZipLayout, KeepsSizesAndOffsetsBeyond32Bits) {
+TEST(Zip, KeepsSizesAndOffsetsBeyond32Bits) {
   const std::uint64_t values[] = {0, 1, 0xfffffffeU, 0xffffffffU, 0x100000000U, 0x123456789abcU};
   std::vector<ZipMember> members;
   for (const std::uint64_t bytes : values) {
@@ -57,14 +58,14 @@ TEST(ZipLayout, KeepsSizesAndOffsetsBeyond32Bits) {
   }
 }
 
-TEST(ZipLayout, CountsMoreEntriesThan16Bits) {
+TEST(Zip, CountsMoreEntriesThan16Bits) {
   std::vector<std::byte> file;
   for (int i = 0; i < 70000; ++i) append_directory_entry({"x", ZipMethod::kStored, 0, 0, 0, 0}, file);
   append_end_records(70000, 0, file.size(), file);
   EXPECT_EQ(entries_of(file).size(), 70000U);
 }
 
-TEST(ZipLayout, StatesTheSizeOfALocalHeader) {
+TEST(Zip, StatesTheSizeOfALocalHeader) {
   for (const std::uint64_t bytes : {std::uint64_t{5}, std::uint64_t{0xffffffffU}}) {
     const ZipMember member{"some/name", ZipMethod::kStored, 1, bytes, bytes, 0};
     std::vector<std::byte> header;
@@ -73,7 +74,7 @@ TEST(ZipLayout, StatesTheSizeOfALocalHeader) {
   }
 }
 
-TEST(ZipLayout, RefusesEveryTruncationOfADirectory) {
+TEST(Zip, RefusesEveryTruncationOfADirectory) {
   std::vector<std::byte> file;
   for (int i = 0; i < 3; ++i) append_directory_entry({"name", ZipMethod::kStored, 0, 1, 1, 0x1ffffffffU}, file);
   append_end_records(3, 0, file.size(), file);
@@ -92,7 +93,7 @@ void write_at(const std::string& path, std::uint64_t offset, const std::vector<s
   ::close(descriptor);
 }
 
-TEST(ZipLayout, ReachesTilesBeyondFourGibibytes) {
+TEST(Zip, ReachesTilesBeyondFourGibibytes) {
   // metadata, five GiB of a hole as a member, one tile, the index.
   const test::TemporaryFolder folder;
   const std::string path = folder / "large.isohf";

@@ -1,4 +1,4 @@
-#include "isohf/archive/tile_table.h"
+#include "isohf/archive/tile_locator.h"
 
 #include <fmt/format.h>
 
@@ -18,42 +18,43 @@ constexpr std::uint64_t kMostTilesOnTrust = std::uint64_t{1} << 16U;
 
 }  // namespace
 
-TileTable::TileTable(const MappedFile& file, const ZipEnd& end, const Metadata& metadata)
+TileLocator::TileLocator(const ByteSource& file, const ZipEnd& end, const Metadata& metadata, bool keeps_index)
     : file_(file), end_(end), metadata_(metadata) {
-  if (!use_index()) use_directory();
+  if (!use_index(keeps_index)) use_directory();
 }
 
 /// Takes the index where it and the directory agree.
-bool TileTable::use_index() {
+bool TileLocator::use_index(bool keeps_index) {
   const auto tiles = static_cast<std::uint64_t>(metadata_.grid.tile_count());
-  const std::uint64_t bytes = tiles * kIndexRecordBytes + kIndexFooterBytes;
-  if (end_.directory_offset < bytes) return false;
-  const std::uint64_t start = end_.directory_offset - bytes;
-  const auto footer =
-      parse_index_footer(file_.bytes().subspan(end_.directory_offset - kIndexFooterBytes, kIndexFooterBytes));
+  const std::uint64_t records_bytes = tiles * kIndexRecordBytes;
+  if (end_.directory_offset < records_bytes + kIndexFooterBytes) return false;
+  const std::uint64_t footer_offset = end_.directory_offset - kIndexFooterBytes;
+  const auto footer = parse_index_footer(SourceBytes(file_, footer_offset, kIndexFooterBytes).bytes());
   if (!footer || footer->record_count != tiles || footer->directory_bytes >= end_.directory_bytes ||
       footer->directory_entries + 1 != end_.entries) {
     return false;
   }
-  const auto found = file_.bytes().subspan(start, tiles * kIndexRecordBytes);
-  if (crc32(found) != footer->records_crc32) return false;
-  const auto directory = file_.bytes().subspan(end_.directory_offset, footer->directory_bytes);
-  if (crc32(directory) != footer->directory_crc32) return false;
-  data_end_ = start;
+  data_end_ = footer_offset - records_bytes;
+  SourceBytes kept;
+  if (keeps_index) kept = SourceBytes(file_, data_end_, records_bytes);
+  if ((keeps_index ? crc32(kept.bytes()) : crc32_in(file_, data_end_, records_bytes)) != footer->records_crc32)
+    return false;
+  if (crc32_in(file_, end_.directory_offset, footer->directory_bytes) != footer->directory_crc32) return false;
+  index_ = std::move(kept);
   stored_count_ = footer->stored_count;
   return true;
 }
 
-void TileTable::use_directory() {
+void TileLocator::use_directory() {
   by_directory_ = true;
   data_end_ = end_.directory_offset;
-  const Directory directory = read_directory(file_.bytes(), end_, metadata_.grid,
-                                             [](const std::string& what) { throw Error(ErrorCode::kCorrupt, what); });
+  const ArchiveDirectory directory = read_directory(
+      file_, end_, metadata_.grid, [](const std::string& what) { throw Error(ErrorCode::kCorrupt, what); });
   const bool is_float = metadata_.quantisation.type == CodeType::kF32;
-  for (const Directory::Tile& tile : directory.tiles) {
-    if (tile.entry.method != 0 && tile.entry.method != 8) {
+  for (const ArchiveDirectory::Tile& tile : directory.tiles) {
+    if (tile.entry.method != ZipMethod::kStored && tile.entry.method != ZipMethod::kDeflated) {
       throw Error(ErrorCode::kUnsupported, fmt::format("{}: compression method {}, only 0 and 8 are read",
-                                                       describe(tile.entry), tile.entry.method));
+                                                       describe(tile.entry), static_cast<int>(tile.entry.method)));
     }
     TileEntry entry;
     entry.stored = true;
@@ -64,15 +65,15 @@ void TileTable::use_directory() {
     entry.has_voids = true;  // what is not known without decoding: the widest range
     entry.code_min = is_float ? 0xff800000U : 0U;
     entry.code_max = is_float ? 0x7f800000U : metadata_.quantisation.max_code();
-    listed_.push_back({tile.flat, entry, tile.entry.method == 8});
+    listed_.push_back({tile.flat, entry, tile.entry.method == ZipMethod::kDeflated});
   }
   take_ranges_from_index(directory);
 }
 
 /// A repacked archive still has its old index as a member: what it says of tiles that are the same is true.
-void TileTable::take_ranges_from_index(const Directory& directory) {
+void TileLocator::take_ranges_from_index(const ArchiveDirectory& directory) {
   const auto member = std::find_if(directory.members.begin(), directory.members.end(),
-                                   [](const Directory::Member& m) { return m.entry.name == kIndexName; });
+                                   [](const ArchiveDirectory::Member& m) { return m.entry.name == kIndexName; });
   const auto tiles = static_cast<std::uint64_t>(metadata_.grid.tile_count());
   if (member == directory.members.end() || member->entry.bytes != tiles * kIndexRecordBytes + kIndexFooterBytes) {
     // Without an index as large, the metadata's word alone stands for the grid: going through it must have an end.
@@ -100,20 +101,25 @@ void TileTable::take_ranges_from_index(const Directory& directory) {
   }
 }
 
-const TileTable::Listed* TileTable::find_listed(std::int64_t flat) const {
+const TileLocator::Listed* TileLocator::find_listed(std::int64_t flat) const {
   const auto found = std::lower_bound(listed_.begin(), listed_.end(), flat,
                                       [](const Listed& tile, std::int64_t wanted) { return tile.flat < wanted; });
   return found != listed_.end() && found->flat == flat ? &*found : nullptr;
 }
 
-TileEntry TileTable::record(std::int64_t flat) const {
+TileEntry TileLocator::record(std::int64_t flat) const {
   if (by_directory_) {
     const Listed* const tile = find_listed(flat);
     return tile == nullptr ? TileEntry{} : tile->entry;
   }
   const std::uint64_t at = static_cast<std::uint64_t>(flat) * kIndexRecordBytes;
   std::array<std::byte, kIndexRecordBytes> bytes{};
-  file_.read(data_end_ + at, bytes);
+  const auto kept = index_.bytes();
+  if (kept.empty()) {
+    read_exactly(file_, data_end_ + at, bytes);
+  } else {
+    std::copy_n(kept.begin() + static_cast<std::ptrdiff_t>(at), bytes.size(), bytes.begin());
+  }
   const auto entry = parse_index_record(bytes);
   if (!entry) {
     throw Error(ErrorCode::kCorrupt,
@@ -123,7 +129,7 @@ TileEntry TileTable::record(std::int64_t flat) const {
   return *entry;
 }
 
-TileEntry TileTable::checked_record(TileIndex tile) const {
+TileEntry TileLocator::checked_record(TileIndex tile) const {
   const TileEntry entry = record(metadata_.grid.flat_index(tile));
   if (!entry.stored) return entry;
   const auto refuse = [&](const std::string& why) {
@@ -140,11 +146,11 @@ TileEntry TileTable::checked_record(TileIndex tile) const {
   return entry;
 }
 
-bool TileTable::is_deflated(TileIndex tile) const {
+bool TileLocator::is_deflated(TileIndex tile) const {
   return !by_directory_ || find_listed(metadata_.grid.flat_index(tile))->deflated;
 }
 
-void TileTable::check_against(const Directory& directory, const Complain& complain) const {
+void TileLocator::check_against(const ArchiveDirectory& directory, const Complain& complain) const {
   auto tile = directory.tiles.begin();
   std::uint64_t stored = 0;
   for (std::int64_t flat = 0; flat < metadata_.grid.tile_count(); ++flat) {

@@ -16,9 +16,9 @@ namespace isohf {
 
 /// What an archive that is being written holds so far, and what follows from it: index, directory, content hash.
 /// Memory: 32 bytes a tile.
-class WrittenContents {
+class ArchiveIndexBuilder {
  public:
-  explicit WrittenContents(const TileGrid& grid) : grid_(grid) {}
+  explicit ArchiveIndexBuilder(const TileGrid& grid) : grid_(grid) {}
 
   /// Takes a step of writing: the tile with flat index next_tile(), or a member that stands before it.
   void add(const JournalRecord& record);

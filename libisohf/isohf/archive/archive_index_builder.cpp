@@ -1,16 +1,16 @@
-#include "isohf/archive/written_contents.h"
+#include "isohf/archive/archive_index_builder.h"
 
 #include <algorithm>
 
 #include "isohf/archive/codec/tile_codes.h"
-#include "isohf/archive/container/zip_layout.h"
+#include "isohf/archive/container/archive_directory.h"
 #include "isohf/archive/deflate/deflate.h"
 #include "isohf/archive/tile_index.h"
 #include "isohf/base/assert.h"
 
 namespace isohf {
 
-void WrittenContents::add(const JournalRecord& record) {
+void ArchiveIndexBuilder::add(const JournalRecord& record) {
   if (record.kind != JournalRecord::Kind::kEmptyTile) data_crc32_ = crc32_of_crc32(record.data_crc32, data_crc32_);
   if (record.kind == JournalRecord::Kind::kMember) {
     members_.push_back({next_, record.member});
@@ -36,7 +36,7 @@ void WrittenContents::add(const JournalRecord& record) {
   ++next_;
 }
 
-void WrittenContents::add_up(const TileStatistics& tile) {
+void ArchiveIndexBuilder::add_up(const TileStatistics& tile) {
   statistics_.vertices += tile.vertices;
   statistics_.voids += tile.voids;
   statistics_.clamped += tile.clamped;
@@ -46,7 +46,7 @@ void WrittenContents::add_up(const TileStatistics& tile) {
   statistics_.worst_rounding = std::max(statistics_.worst_rounding, tile.worst_rounding);
 }
 
-MemberTotals WrittenContents::members_in(const std::string& folder) const {
+MemberTotals ArchiveIndexBuilder::members_in(const std::string& folder) const {
   MemberTotals totals;
   for (const Placed& placed : members_) {
     if (!placed.member.name.starts_with(folder)) continue;
@@ -56,14 +56,14 @@ MemberTotals WrittenContents::members_in(const std::string& folder) const {
   return totals;
 }
 
-TileEntry WrittenContents::tile_entry(std::int64_t flat) const {
+TileEntry ArchiveIndexBuilder::tile_entry(std::int64_t flat) const {
   const auto at = static_cast<std::size_t>(flat) * kIndexRecordBytes;
   const auto entry = parse_index_record(std::span(index_).subspan(at, kIndexRecordBytes));
   ISOHF_ASSERT(entry.has_value());
   return *entry;
 }
 
-ZipMember WrittenContents::tile_member(std::int64_t flat) const {
+ZipMember ArchiveIndexBuilder::tile_member(std::int64_t flat) const {
   const TileEntry entry = tile_entry(flat);
   ZipMember member{tile_name(grid_.tile_at(flat)), ZipMethod::kDeflated, entry.payload_crc32,
                    entry.compressed_bytes,         entry.payload_bytes,  entry.offset_bytes};
@@ -72,7 +72,7 @@ ZipMember WrittenContents::tile_member(std::int64_t flat) const {
 }
 
 /// Hands the directory's entries over in file order, a few at a time, with their number; index.bin's is not among them.
-void WrittenContents::for_each_directory_chunk(
+void ArchiveIndexBuilder::for_each_directory_chunk(
     const ZipMember& metadata, const std::function<void(std::span<const std::byte>, std::uint64_t)>& at) const {
   constexpr std::size_t kChunkBytes = std::size_t{1} << 16U;
   std::vector<std::byte> chunk;
@@ -96,7 +96,7 @@ void WrittenContents::for_each_directory_chunk(
   at(chunk, entries);
 }
 
-std::span<const std::byte> WrittenContents::finish_index(const ZipMember& metadata) {
+std::span<const std::byte> ArchiveIndexBuilder::finish_index(const ZipMember& metadata) {
   index_.resize(static_cast<std::size_t>(next_) * kIndexRecordBytes);  // without the footer of a call before
   IndexFooter footer;
   footer.record_count = static_cast<std::uint64_t>(grid_.tile_count());
@@ -111,7 +111,7 @@ std::span<const std::byte> WrittenContents::finish_index(const ZipMember& metada
   return index_;
 }
 
-void WrittenContents::append_directory(const ZipMember& metadata, const ZipMember& index, OutputFile& part) const {
+void ArchiveIndexBuilder::append_directory(const ZipMember& metadata, const ZipMember& index, OutputFile& part) const {
   const std::uint64_t offset = part.position();
   std::uint64_t entries = 1;
   for_each_directory_chunk(metadata, [&](std::span<const std::byte> chunk, std::uint64_t in_chunk) {

@@ -1,0 +1,279 @@
+#include "isohf/archive/container/archive_directory.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <utility>
+
+#include "isohf/archive/deflate/deflate.h"
+#include "isohf/base/source_bytes.h"
+#include "isohf/error.h"
+
+namespace isohf {
+namespace {
+
+constexpr std::string_view kTileFolder = "tiles/";
+
+/// An entry and where its bytes lie in the file, local header included.
+struct Placed {
+  ZipEntry entry;
+  std::uint64_t data_offset;
+  bool is_folder;
+
+  [[nodiscard]] std::uint64_t begin() const { return entry.header_offset; }
+  [[nodiscard]] std::uint64_t end() const { return data_offset + entry.compressed_bytes; }
+};
+
+/// Complains where two members share bytes or reach into the directory at byte `limit`.
+void check_overlaps(const std::vector<Placed>& all, std::uint64_t limit, const Complain& complain) {
+  std::vector<const Placed*> sorted;
+  for (const Placed& placed : all) sorted.push_back(&placed);
+  std::sort(sorted.begin(), sorted.end(), [](const Placed* a, const Placed* b) {
+    return a->begin() != b->begin() ? a->begin() < b->begin() : a->end() < b->end();
+  });
+  const Placed* before = nullptr;
+  for (const Placed* const placed : sorted) {
+    if (placed->end() > limit)
+      complain(fmt::format("{} reaches into the directory at byte {}", describe(placed->entry), limit));
+    if (before != nullptr && before->end() > placed->begin()) {
+      complain(fmt::format("{} overlaps \"{}\", which ends at byte {}", describe(placed->entry), before->entry.name,
+                           before->end()));
+    }
+    before = placed;
+  }
+}
+
+void check_duplicates(const std::vector<Placed>& all, const Complain& complain) {
+  std::vector<const ZipEntry*> sorted;
+  for (const Placed& placed : all) sorted.push_back(&placed.entry);
+  std::stable_sort(sorted.begin(), sorted.end(), [](const auto* a, const auto* b) { return a->name < b->name; });
+  for (std::size_t i = 1; i < sorted.size(); ++i) {
+    if (sorted[i]->name != sorted[i - 1]->name) continue;
+    complain(fmt::format("member \"{}\" is there twice, at bytes {} and {}", sorted[i]->name,
+                         sorted[i - 1]->header_offset, sorted[i]->header_offset));
+  }
+}
+
+/// Why a tile's entry cannot be a tile, one clause; empty where it can.
+std::string why_bad_tile(const ZipEntry& entry, const TileGrid& grid) {
+  const auto tile = tile_from_name(entry.name);
+  if (!tile) return "has no tile's name, tiles/ROW/COLUMN.tile";
+  if (!grid.contains(*tile)) {
+    return fmt::format("lies outside the grid of {}x{} tiles", grid.tile_columns(), grid.tile_rows());
+  }
+  if (entry.bytes == 0) return "is empty";
+  if (entry.bytes > 0xffffffffU || entry.compressed_bytes > 0xffffffffU) return "is larger than any tile";
+  return {};
+}
+
+}  // namespace
+
+std::string tile_name(TileIndex tile) {
+  return fmt::format("tiles/{}/{}.tile", tile.row, tile.column);
+}
+
+std::optional<TileIndex> tile_from_name(std::string_view name) {
+  constexpr std::string_view kFolder = "tiles/";
+  if (name.substr(0, kFolder.size()) != kFolder) return std::nullopt;
+  TileIndex tile{};
+  const char* const end = name.data() + name.size();
+  const auto row = std::from_chars(name.data() + kFolder.size(), end, tile.row);
+  if (row.ec != std::errc{} || row.ptr == end || *row.ptr != '/') return std::nullopt;
+  const auto column = std::from_chars(row.ptr + 1, end, tile.column);
+  if (column.ec != std::errc{} || tile.row < 0 || tile.column < 0) return std::nullopt;
+  if (tile_name(tile) != name) return std::nullopt;  // leading zeros, another ending
+  return tile;
+}
+
+std::string why_bad_name(std::string_view name) {
+  if (name.empty()) return "it is empty";
+  if (name.size() > 65535) return "it is longer than 65535 bytes";
+  if (name.front() == '/') return "it is absolute";
+  if (name.back() == '/') return "it is a folder's";
+  for (const char c : name) {
+    if (c == '\\' || c == ':') return fmt::format("it holds '{}'", c);
+    if (static_cast<unsigned char>(c) < 32 || c == 127) return "it holds a control character";
+  }
+  for (std::size_t start = 0; start <= name.size();) {
+    const std::size_t end = std::min(name.find('/', start), name.size());
+    const std::string_view part = name.substr(start, end - start);
+    if (part.empty() || part == "." || part == "..") return fmt::format("it holds the part \"{}\"", part);
+    start = end + 1;
+  }
+  return {};
+}
+
+std::string describe(const ZipEntry& entry) {
+  return fmt::format("member \"{}\" at byte {}", entry.name, entry.header_offset);
+}
+
+ZipEnd find_archive_end(const ByteSource& file) {
+  const auto end = find_zip_end(file);
+  if (!end || end->end_offset != file.size_bytes()) {
+    throw Error(
+        ErrorCode::kCorrupt,
+        fmt::format("is no isohf archive, or is cut off: no ZIP end record in its {} bytes", file.size_bytes()));
+  }
+  if (end->directory_offset + end->directory_bytes != end->records_offset) {
+    throw Error(ErrorCode::kCorrupt,
+                fmt::format("at byte {}: {} bytes of directory at byte {} do not end where the end records begin",
+                            end->records_offset, end->directory_bytes, end->directory_offset));
+  }
+  return *end;
+}
+
+std::uint64_t checked_data_offset(const ByteSource& file, const ZipEntry& entry) {
+  const auto fail = [&](const std::string& why) {
+    throw Error(ErrorCode::kCorrupt, {fmt::format("at byte {}", entry.header_offset),
+                                      fmt::format("member \"{}\": {}", entry.name, why), "", ""});
+  };
+  const auto [local, sizes_follow, data_offset] = read_local_header(file, entry);
+  if (local.method != entry.method) {
+    fail(fmt::format("its local header says method {}, the directory {}", static_cast<int>(local.method),
+                     static_cast<int>(entry.method)));
+  }
+  if (local.name != entry.name) fail("its local header has another name than the directory");
+  // Archivers that write a stream leave the local sizes out; isohf never does.
+  if (!sizes_follow &&
+      (local.crc32 != entry.crc32 || local.compressed_bytes != entry.compressed_bytes || local.bytes != entry.bytes)) {
+    fail(fmt::format("its local header states {} of {} bytes and CRC {:08x}, the directory {} of {} and {:08x}",
+                     local.compressed_bytes, local.bytes, local.crc32, entry.compressed_bytes, entry.bytes,
+                     entry.crc32));
+  }
+  return data_offset;
+}
+
+ArchiveDirectory read_directory(const ByteSource& file, const ZipEnd& end, const std::optional<TileGrid>& grid,
+                                const Complain& complain) {
+  std::vector<Placed> all;
+  for (ZipEntries entries(file, end); auto entry = entries.next();) {
+    if (!grid && entry->name.starts_with(kTileFolder)) continue;
+    // Archivers put in entries for folders; they hold nothing.
+    const bool is_folder = entry->name.size() > 1 && entry->name.back() == '/' && entry->bytes == 0;
+    const std::string_view name = std::string_view(entry->name).substr(0, entry->name.size() - (is_folder ? 1 : 0));
+    if (const std::string why = why_bad_name(name); !why.empty()) {
+      complain(fmt::format("{}: its name is not allowed: {}", describe(*entry), why));
+      continue;
+    }
+    try {
+      const std::uint64_t data_offset = checked_data_offset(file, *entry);
+      all.push_back({std::move(*entry), data_offset, is_folder});
+    } catch (const Error& error) {
+      if (error.code() == ErrorCode::kIo) throw;
+      complain(error.what());
+    }
+  }
+  check_overlaps(all, end.directory_offset, complain);
+  check_duplicates(all, complain);
+  ArchiveDirectory directory;
+  for (Placed& placed : all) {
+    if (placed.is_folder) continue;
+    if (!placed.entry.name.starts_with(kTileFolder)) {
+      directory.members.push_back({std::move(placed.entry), placed.data_offset});
+    } else if (const std::string why = why_bad_tile(placed.entry, *grid); !why.empty()) {
+      complain(fmt::format("{}: {}", describe(placed.entry), why));
+    } else {
+      const std::int64_t flat = grid->flat_index(*tile_from_name(placed.entry.name));
+      directory.tiles.push_back({flat, std::move(placed.entry), placed.data_offset});
+    }
+  }
+  std::sort(directory.tiles.begin(), directory.tiles.end(),
+            [](const auto& a, const auto& b) { return a.flat < b.flat; });
+  std::sort(directory.members.begin(), directory.members.end(),
+            [](const auto& a, const auto& b) { return a.data_offset < b.data_offset; });
+  return directory;
+}
+
+void check_profile(const ByteSource& file, const ZipEnd& end, const Complain& complain) {
+  std::vector<std::byte> ours;
+  const auto stands_at = [&](std::uint64_t offset) {
+    if (offset > file.size_bytes() || ours.size() > file.size_bytes() - offset) return false;
+    const SourceBytes theirs(file, offset, ours.size());
+    return std::equal(ours.begin(), ours.end(), theirs.bytes().begin());
+  };
+  std::uint64_t offset = 0;
+  std::uint64_t entries = 0;
+  for (ZipEntries all(file, end); const auto entry = all.next(); ++entries) {
+    ours.clear();
+    append_directory_entry(*entry, ours);
+    if (!stands_at(entry->entry_offset)) {
+      complain(fmt::format("{}: its directory entry at byte {} is not as the profile has it", describe(*entry),
+                           entry->entry_offset));
+    }
+    if (entry->header_offset != offset)
+      complain(fmt::format("{}: the member before it ends at byte {}", describe(*entry), offset));
+    if (entries == 0 && entry->name != kMetadataName)
+      complain(fmt::format("{}: is first, where the metadata belong", describe(*entry)));
+    if (entries + 1 == end.entries && entry->name != kIndexName)
+      complain(fmt::format("{}: is last, where the index belongs", describe(*entry)));
+    ours.clear();
+    append_local_header(*entry, ours);
+    if (!stands_at(entry->header_offset))
+      complain(fmt::format("{}: its local header is not as the profile has it", describe(*entry)));
+    offset = entry->header_offset + ours.size() + entry->compressed_bytes;
+  }
+  ours.clear();
+  append_end_records(end.entries, end.directory_offset, end.directory_bytes, ours);
+  if (ours.size() != file.size_bytes() - end.records_offset || !stands_at(end.records_offset))
+    complain(fmt::format("the end records at byte {} are not as the profile has them", end.records_offset));
+  if (offset != end.directory_offset) {
+    complain(
+        fmt::format("the directory begins at byte {}, the last member ends at byte {}", end.directory_offset, offset));
+  }
+}
+
+std::uint32_t crc32_in(const ByteSource& file, std::uint64_t offset_bytes, std::uint64_t size_bytes) {
+  constexpr std::uint64_t kPieceBytes = std::uint64_t{1} << 20U;
+  std::uint32_t crc = 0;
+  for (std::uint64_t done = 0; done < size_bytes; done += kPieceBytes) {
+    crc = crc32(SourceBytes(file, offset_bytes + done, std::min(kPieceBytes, size_bytes - done)).bytes(), crc);
+  }
+  return crc;
+}
+
+std::uint32_t data_crc32(const ByteSource& file) {
+  std::uint32_t all = 0;
+  for (ZipEntries entries(file, find_archive_end(file)); const auto entry = entries.next();) {
+    if (entry->name == kMetadataName || entry->name == kIndexName) continue;
+    all = crc32_of_crc32(crc32_in(file, checked_data_offset(file, *entry), entry->compressed_bytes), all);
+  }
+  return all;
+}
+
+std::vector<std::byte> member_from(const ByteSource& file, const ZipEntry& entry, std::uint64_t data_offset) {
+  SourceBytes data(file, data_offset, entry.compressed_bytes);
+  std::vector<std::byte> bytes;
+  if (entry.method == ZipMethod::kStored) {
+    if (entry.bytes != entry.compressed_bytes) {
+      throw Error(ErrorCode::kCorrupt, fmt::format("{}: is stored, but states {} bytes of {}", describe(entry),
+                                                   entry.compressed_bytes, entry.bytes));
+    }
+    bytes = std::move(data).take();
+  } else if (entry.method == ZipMethod::kDeflated) {
+    // Deflate makes at most 1032 bytes of one: a larger claim is not worth the memory.
+    if (entry.bytes / 1032 > entry.compressed_bytes) {
+      throw Error(
+          ErrorCode::kCorrupt,
+          {describe(entry),
+           fmt::format("states {} bytes, which {} cannot inflate to", entry.bytes, entry.compressed_bytes), "", ""});
+    }
+    bytes.resize(entry.bytes);
+    try {
+      inflate_exactly(data.bytes(), bytes);
+    } catch (const Error& error) {
+      throw error.within(describe(entry));
+    }
+  } else {
+    throw Error(ErrorCode::kUnsupported,
+                {describe(entry),
+                 fmt::format("compression method {}, only 0 and 8 are read", static_cast<int>(entry.method)), "", ""});
+  }
+  if (const std::uint32_t found = crc32(bytes); found != entry.crc32) {
+    throw Error(ErrorCode::kCorrupt,
+                {describe(entry), fmt::format("its CRC-32 is {:08x}, {:08x} is stated", found, entry.crc32), "", ""});
+  }
+  return bytes;
+}
+
+}  // namespace isohf
