@@ -33,4 +33,13 @@ struct Format {
 /// "libtiff 4.5.0", or "isohf".
 [[nodiscard]] std::string library_of(const Format& format);
 
+/// What the OpenImageIO module brings.
+struct OiioFormats {
+  std::string library;                  ///< "OpenImageIO 2.4.7"
+  std::vector<std::string> extensions;  ///< ".bmp", ...: of all formats that it reads
+};
+
+/// Loads the module. Throws Error{kUnsupported} where there is none.
+[[nodiscard]] OiioFormats oiio_formats();
+
 }  // namespace isohf

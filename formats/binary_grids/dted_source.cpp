@@ -1,4 +1,4 @@
-#include "formats/binary_grids/dted_source.h"
+#include "formats/readers.h"
 
 #include <fmt/format.h>
 

@@ -7,8 +7,9 @@
 #include <charconv>
 #include <cmath>
 
+#include "formats/files/text.h"
+#include "formats/files/text_tokens.h"
 #include "formats/open_options.h"
-#include "formats/text_grids/text_tokens.h"
 #include "isohf/error.h"
 
 namespace isohf {

@@ -1,4 +1,4 @@
-#include "formats/binary_grids/header_grid_source.h"
+#include "formats/readers.h"
 
 #include <fmt/core.h>
 
@@ -12,12 +12,10 @@
 
 #include "formats/binary_grids/grid_header.h"
 #include "formats/binary_grids/plain_samples.h"
-#include "formats/files/letter_case.h"
 #include "formats/files/raw_file.h"
-#include "formats/georeference/place_beside.h"
-#include "formats/georeference/wkt.h"
+#include "formats/files/text.h"
+#include "formats/georeference/files_beside.h"
 #include "formats/open_options.h"
-#include "formats/text_grids/text_tokens.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
 

@@ -1,4 +1,4 @@
-#include "formats/binary_grids/npy_source.h"
+#include "formats/readers.h"
 
 #include <fmt/format.h>
 
@@ -15,9 +15,8 @@
 
 #include "formats/binary_grids/plain_samples.h"
 #include "formats/files/raw_file.h"
-#include "formats/files/zipped_file.h"
+#include "formats/files/text.h"
 #include "formats/open_options.h"
-#include "formats/text_grids/text_tokens.h"
 #include "isohf/base/assert.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"

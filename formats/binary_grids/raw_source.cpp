@@ -1,4 +1,4 @@
-#include "formats/binary_grids/raw_source.h"
+#include "formats/readers.h"
 
 #include <fmt/core.h>
 
@@ -8,8 +8,8 @@
 #include <cmath>
 
 #include "formats/binary_grids/plain_samples.h"
-#include "formats/files/letter_case.h"
 #include "formats/files/raw_file.h"
+#include "formats/files/text.h"
 #include "formats/georeference/raster_description.h"
 #include "formats/open_options.h"
 #include "isohf/error.h"

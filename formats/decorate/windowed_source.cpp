@@ -1,5 +1,7 @@
 #include "formats/decorate/windowed_source.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cstdint>
 #include <utility>
@@ -12,6 +14,10 @@ namespace {
 /// `block`: samples along one axis; 0 or 1 where there are no blocks.
 bool begins_a_block(std::int64_t at, std::int64_t block) {
   return at == 0 || block <= 1 || at % block == 0;
+}
+
+Window all_but_the_last_column(const SourceInfo& info) {
+  return {0, 0, info.width - 1, info.height};
 }
 
 }  // namespace
@@ -54,6 +60,15 @@ void WindowedSource::limit_buffers(std::uint64_t bytes) {
 
 std::uint64_t WindowedSource::buffer_bytes(std::uint64_t limit) const {
   return source_.buffer_bytes(keeps_blocks_ ? limit : UINT64_MAX);
+}
+
+ClosedSource::ClosedSource(std::unique_ptr<HeightSource> source)
+    : ClosedSource(all_but_the_last_column(source->info()), std::move(source)) {}
+
+ClosedSource::ClosedSource(const Window& window, std::unique_ptr<HeightSource>&& source)
+    : WindowedSource(std::move(source), window) {
+  mutable_info().warnings.push_back(
+      fmt::format("{}: column {} is the first one again, 360 degrees on, and is left out", info().path, info().width));
 }
 
 }  // namespace isohf

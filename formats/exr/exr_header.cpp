@@ -9,14 +9,15 @@
 #include <optional>
 #include <vector>
 
-#include "formats/text_grids/text_tokens.h"
+#include "formats/files/text.h"
 #include "isohf/base/bytes.h"
+#include "formats/readers.h"
 #include "isohf/error.h"
 
 namespace isohf {
 namespace {
 
-constexpr std::array<unsigned char, kExrMagicBytes> kMagic = {0x76, 0x2F, 0x31, 0x01};
+constexpr std::array<unsigned char, 4> kMagic = {0x76, 0x2F, 0x31, 0x01};
 constexpr std::uint32_t kVersionMask = 0xFF;
 constexpr std::uint32_t kTiledFlag = 0x200;
 constexpr std::uint32_t kMultiPartFlag = 0x1000;
@@ -243,7 +244,7 @@ bool looks_like_exr(std::span<const std::byte> head) {
 
 void check_exr_headers(const std::string& path) {
   HeaderWalk walk(path);
-  walk.skip(kExrMagicBytes);
+  walk.skip(kMagic.size());
   const std::uint32_t version = walk.take_u32();
   if ((version & kVersionMask) != 2) {
     throw Error(ErrorCode::kUnsupported, fmt::format("OpenEXR version {} is not 2", version & kVersionMask));

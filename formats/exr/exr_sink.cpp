@@ -9,8 +9,8 @@
 #include <exception>
 #include <optional>
 
-#include "formats/exr/exr_threads.h"
-#include "formats/write/raster_encoder.h"
+#include "formats/exr/exr_header.h"
+#include "formats/write/encoders.h"
 #include "isohf/error.h"
 
 namespace isohf {

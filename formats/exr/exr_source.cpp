@@ -1,4 +1,4 @@
-#include "formats/exr/exr_source.h"
+#include "formats/readers.h"
 
 #include <OpenEXR/Iex.h>
 #include <OpenEXR/ImfChannelList.h>
@@ -7,27 +7,30 @@
 #include <OpenEXR/ImfInputPart.h>
 #include <OpenEXR/ImfMultiPartInputFile.h>
 #include <OpenEXR/ImfPartType.h>
+#include <OpenEXR/ImfThreading.h>
 #include <OpenEXR/ImfTileDescription.h>
 #include <OpenEXR/ImfTiledInputPart.h>
+#include <OpenEXR/OpenEXRConfig.h>
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
 #include <charconv>
 #include <cstring>
+#include <mutex>
 #include <new>
 #include <optional>
 #include <set>
 #include <string>
+#include <thread>
 #include <tuple>
 #include <utility>
 #include <vector>
 
-#include "formats/exr/exr_threads.h"
-#include "formats/files/letter_case.h"
-#include "formats/georeference/place_beside.h"
+#include "formats/exr/exr_header.h"
+#include "formats/files/text.h"
+#include "formats/georeference/files_beside.h"
 #include "formats/open_options.h"
-#include "formats/text_grids/text_tokens.h"
 #include "isohf/base/assert.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
@@ -397,6 +400,17 @@ std::unique_ptr<HeightSource> open_exr(const std::string& path, const OpenOption
     start_exr_threads();
     return std::make_unique<ExrSource>(path, options);
   });
+}
+
+void start_exr_threads() {
+  static std::once_flag once;
+  std::call_once(once, [] {
+    Imf::setGlobalThreadCount(static_cast<int>(std::clamp(std::thread::hardware_concurrency(), 1U, 4U)));
+  });
+}
+
+std::string exr_library() {
+  return "OpenEXR " OPENEXR_VERSION_STRING;
 }
 
 }  // namespace isohf

@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "formats/files/inflated_bytes.h"
-#include "formats/files/unpacked_bytes.h"
 
 namespace isohf {
 
@@ -85,5 +84,23 @@ class RawFile {
 
 /// Turns the byte order of every sample of `sample_bytes` (1, 2, 4 or 8) in place.
 void swap_byte_order(std::span<std::byte> samples, std::size_t sample_bytes);
+
+/// One file of a zip archive (PKWARE APPNOTE 6.3, Zip64 included).
+struct ZippedFile {
+  std::string name;
+  std::uint16_t method = 0;  ///< 0 stored, 8 deflated
+  bool encrypted = false;
+  std::uint32_t crc32 = 0;
+  std::uint64_t stored_bytes = 0;
+  std::uint64_t size_bytes = 0;
+  std::uint64_t header_offset_bytes = 0;
+};
+
+/// The directory of the archive. Throws Error{kCorrupt, kIo} naming the file.
+[[nodiscard]] std::vector<ZippedFile> zipped_files(const RawFile& file);
+
+/// Where the stored bytes of `member` begin in the file. Throws Error: kUnsupported for encrypted members and for
+/// methods other than stored and deflated; kCorrupt.
+[[nodiscard]] std::uint64_t zipped_file_begin(const RawFile& file, const ZippedFile& member);
 
 }  // namespace isohf

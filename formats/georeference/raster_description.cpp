@@ -8,9 +8,9 @@
 #include <span>
 
 #include "formats/files/raw_file.h"
+#include "formats/files/text.h"
 #include "formats/georeference/units.h"
 #include "formats/open_options.h"
-#include "formats/text_grids/text_tokens.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
 

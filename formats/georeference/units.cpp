@@ -4,7 +4,7 @@
 #include <array>
 #include <cctype>
 
-#include "formats/files/letter_case.h"
+#include "formats/files/text.h"
 
 namespace isohf {
 namespace {

@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "formats/georeference/units.h"
-#include "formats/georeference/world_file.h"
 
 namespace isohf {
 namespace {
@@ -19,8 +18,6 @@ constexpr int kDeepest = 32;
 constexpr double kRadiansPerDegree = 0.017453292519943295;
 // Files give 12 to 17 digits of it.
 constexpr double kDegreeTolerance = 1e-10;
-/// Grids of so many metres and less within 360 m of (0, 0) are rarer than those in degrees: it is 36" of arc.
-constexpr double kFinestAsMetres = 0.01;
 
 /// KEYWORD["text", number, KEYWORD[...], ...]
 struct Node {
@@ -209,19 +206,8 @@ bool read_old_prj(std::string_view text, Georeference& place) {
 
 }  // namespace
 
-void read_prj_beside(SourceInfo& info) {
-  const std::string text = prj_beside(info.path);
-  if (!text.empty() && (read_wkt(text, info.georeference) || read_old_prj(text, info.georeference))) return;
-  if (!text.empty()) {
-    info.warnings.push_back(loss("the .prj beside the file is not the WKT of a map's reference system; it is ignored"));
-  }
-  const Georeference& place = info.georeference;
-  if (place.has_origin && place.spacing_x < kFinestAsMetres && place.spacing_y < kFinestAsMetres &&
-      std::abs(place.origin_x) <= 360.0 && std::abs(place.origin_y) <= 90.0) {
-    info.warnings.emplace_back(
-        "the coordinates look like degrees, but no .prj beside the file says so; with one, or with --sample-spacing, "
-        "distances would be in metres");
-  }
+bool read_prj(std::string_view text, Georeference& place) {
+  return read_wkt(text, place) || read_old_prj(text, place);
 }
 
 }  // namespace isohf

@@ -11,8 +11,7 @@ namespace isohf {
 /// text is not the WKT of a projected or geographic system.
 [[nodiscard]] bool read_wkt(std::string_view text, Georeference& place);
 
-/// Reads the .prj beside info.path, where there is one, with read_wkt; a text that is no WKT becomes a
-/// warning, and so do coordinates that look like degrees without one.
-void read_prj_beside(SourceInfo& info);
+/// The same of a .prj, which may be older than WKT ("Projection GEOGRAPHIC").
+[[nodiscard]] bool read_prj(std::string_view text, Georeference& place);
 
 }  // namespace isohf

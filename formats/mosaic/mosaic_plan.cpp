@@ -12,7 +12,7 @@
 #include <optional>
 #include <utility>
 
-#include "formats/mosaic/mosaic_place.h"
+#include "formats/mosaic/mosaic_layout.h"
 #include "formats/mosaic/reader_pool.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
@@ -149,9 +149,7 @@ class Survey {
     member.width = info.width;
     member.height = info.height;
     member.order = static_cast<std::int64_t>(placed_.size());
-    member.size_bytes = stamp.size_bytes;
-    member.changed_s = stamp.changed_s;
-    member.changed_ns = stamp.changed_ns;
+    member.stamp = stamp;
     const SampleKind kind = SampleKind::of(info);
     const auto found = std::find(plan_->kinds.begin(), plan_->kinds.end(), kind);
     member.kind = static_cast<std::size_t>(found - plan_->kinds.begin());

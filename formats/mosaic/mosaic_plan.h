@@ -1,76 +1,14 @@
 #pragma once
 
-#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "formats/decorate/cropped_source.h"
-#include "formats/mosaic/mosaic_samples.h"
+#include "formats/mosaic/mosaic_layout.h"
 #include "isohf/raster.h"
 
 namespace isohf {
-
-/// Members' samples may lie this far from the mosaic's grid, in samples: the rounding of origins and spacings that are
-/// written in few digits. They count as lying on it.
-inline constexpr double kSnapTolerance = 0.05;
-
-/// One file of a mosaic: what is kept of it while it is closed.
-struct MosaicMember {
-  std::string path;
-  std::int64_t width = 0;
-  std::int64_t height = 0;
-  std::int64_t column = 0;  ///< of its first sample in its layer's grid, >= 0
-  std::int64_t row = 0;
-  std::size_t kind = 0;          ///< MosaicPlan::kinds
-  std::int64_t order = 0;        ///< its place among the paths
-  std::uint64_t size_bytes = 0;  ///< of the file, and when it was changed last, as it was opened first
-  std::int64_t changed_s = 0;
-  std::int64_t changed_ns = 0;
-};
-
-/// Members of one resolution on one grid.
-struct MosaicLayer {
-  double spacing_x = 1.0;  ///< units of the mosaic's coordinates
-  double spacing_y = 1.0;
-  double origin_x = 0.0;  ///< of sample (0, 0)
-  double origin_y = 0.0;
-  std::int64_t width = 0;
-  std::int64_t height = 0;
-  std::vector<MosaicMember> members;  ///< by row, then column, then order
-  std::int64_t tallest = 0;           ///< height of the highest member
-};
-
-/// Ground of a mosaic that no member covers.
-struct MosaicHoles {
-  std::int64_t samples = 0;          ///< of the mosaic, without a member of any resolution
-  std::int64_t tiles = 0;            ///< places of the members' regular grid; 0 where they form none
-  std::int64_t tiles_missing = 0;    ///< of these, without a member and not covered by others
-  std::vector<std::string> missing;  ///< where, at most kMostNamed: "N45E006", or "x 500000...510000, y 0...10000"
-  static constexpr std::size_t kMostNamed = 20;
-
-  /// One line: how much is missing and where, `named` places at most; empty where nothing is.
-  [[nodiscard]] std::string describe(std::size_t named) const;
-};
-
-/// Many rasters as one: where each lies, and what samples the whole has.
-struct MosaicPlan {
-  SourceInfo info;  ///< of the whole; path and block_height are left to the source
-  std::vector<SampleKind> kinds;
-  MosaicSamples samples;
-  /// From the coarsest to the finest, and that is the order in which they are laid over each other. A layer that has
-  /// the mosaic's spacing is on its grid; others are interpolated.
-  std::vector<MosaicLayer> layers;
-  Window region;                   ///< the samples that matter: all, or those of a box
-  MosaicHoles holes;               ///< in the region
-  std::int64_t block_height = 1;   ///< the members' largest
-  std::uint64_t reader_bytes = 0;  ///< that a member's reader keeps at most
-  int readers_at_once = 1;         ///< as many threads read, each a member of its own
-
-  [[nodiscard]] bool is_on_grid(const MosaicLayer& layer) const {
-    return layer.spacing_x == info.georeference.spacing_x && layer.spacing_y == info.georeference.spacing_y;
-  }
-};
 
 /// Opens every file once, in parallel, and places it by its georeference. Its grid is the finest among the members';
 /// coordinates, registration, reference system and units must agree. Members on both sides of the 180th meridian are

@@ -2,11 +2,8 @@
 
 #include <fmt/format.h>
 #include <sys/resource.h>
-#include <sys/stat.h>
 
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
 #include <utility>
 
 #include "isohf/error.h"
@@ -26,14 +23,6 @@ std::size_t most_open_rasters() {
   if (::getrlimit(RLIMIT_NOFILE, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY) return kMostOpen;
   const auto allowed = static_cast<std::size_t>(limit.rlim_cur);
   return std::clamp<std::size_t>(allowed > kFilesForOthers ? allowed - kFilesForOthers : 1, 1, kMostOpen);
-}
-
-FileStamp FileStamp::of(const std::string& path) {
-  struct stat status {};
-  if (::stat(path.c_str(), &status) != 0) {
-    throw Error(ErrorCode::kIo, {path, errno == ENOENT ? "no such file" : std::strerror(errno), "", ""});
-  }
-  return {static_cast<std::uint64_t>(status.st_size), status.st_mtim.tv_sec, status.st_mtim.tv_nsec};
 }
 
 ReaderPool::ReaderPool(OpenOptions options) : options_(std::move(options)), most_open_(most_open_rasters()) {}
@@ -74,7 +63,7 @@ std::unique_ptr<HeightSource> ReaderPool::take(std::int64_t key, const MosaicMem
   }
   closed.clear();
   try {
-    if (!(FileStamp::of(member.path) == FileStamp{member.size_bytes, member.changed_s, member.changed_ns})) {
+    if (FileStamp::of(member.path) != member.stamp) {
       throw Error(ErrorCode::kIo, member.path + ": was changed while the mosaic was being read; begin again");
     }
     std::unique_ptr<HeightSource> reader = open_raster(member.path, options_);

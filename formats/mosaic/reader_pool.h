@@ -7,23 +7,13 @@
 #include <mutex>
 #include <unordered_map>
 
-#include "formats/mosaic/mosaic_plan.h"
+#include "formats/mosaic/mosaic_layout.h"
 #include "isohf/raster.h"
 
 namespace isohf {
 
 /// How many rasters may be open at once: 64, or fewer where the system allows the process few open files.
 [[nodiscard]] std::size_t most_open_rasters();
-
-/// Size of a file and when it was changed last. Throws Error{kIo} naming the path.
-struct FileStamp {
-  std::uint64_t size_bytes = 0;
-  std::int64_t changed_s = 0;
-  std::int64_t changed_ns = 0;
-
-  [[nodiscard]] static FileStamp of(const std::string& path);
-  friend bool operator==(const FileStamp&, const FileStamp&) = default;
-};
 
 /// Opens a mosaic's members when they are read, and keeps the last used ones open within bounds of files and memory.
 /// Any number of threads, each with a member of its own.

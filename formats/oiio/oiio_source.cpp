@@ -1,4 +1,5 @@
-#include "formats/oiio/oiio_source.h"
+#include "formats/readers.h"
+#include "formats/registry.h"
 
 #include <fmt/format.h>
 
@@ -6,8 +7,7 @@
 #include <sstream>
 
 #include "formats/files/foreign_file.h"
-#include "formats/georeference/place_beside.h"
-#include "formats/libraries.h"
+#include "formats/georeference/files_beside.h"
 #include "formats/oiio/oiio_loader.h"
 #include "formats/open_options.h"
 #include "isohf/base/assert.h"

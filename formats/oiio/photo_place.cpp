@@ -3,10 +3,10 @@
 #include <array>
 
 #include "formats/files/raw_file.h"
-#include "formats/georeference/place_beside.h"
+#include "formats/georeference/files_beside.h"
+#include "formats/readers.h"
 #include "formats/tiff/geotiff_keys.h"
 #include "formats/tiff/tiff_file.h"
-#include "formats/tiff/tiff_source.h"
 #include "isohf/error.h"
 
 namespace isohf {

@@ -1,4 +1,4 @@
-#include "formats/planetary/isis3_source.h"
+#include "formats/readers.h"
 
 #include <fmt/format.h>
 
@@ -11,8 +11,8 @@
 #include <string_view>
 #include <vector>
 
-#include "formats/files/file_beside.h"
 #include "formats/files/raw_file.h"
+#include "formats/georeference/files_beside.h"
 #include "formats/georeference/units.h"
 #include "formats/open_options.h"
 #include "formats/planetary/label_text.h"

@@ -6,7 +6,7 @@
 #include <csetjmp>
 #include <cstring>
 
-#include "formats/libraries.h"
+#include "formats/readers.h"
 
 // libpng leaves a failed call by longjmp: a function that calls setjmp holds nothing but trivial objects.
 

@@ -8,7 +8,7 @@
 #include <exception>
 #include <utility>
 
-#include "formats/write/raster_encoder.h"
+#include "formats/write/encoders.h"
 #include "isohf/error.h"
 
 namespace isohf {

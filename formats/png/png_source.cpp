@@ -1,4 +1,4 @@
-#include "formats/png/png_source.h"
+#include "formats/readers.h"
 
 #include <fmt/format.h>
 
@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "formats/decorate/masked_source.h"
-#include "formats/georeference/place_beside.h"
+#include "formats/georeference/files_beside.h"
 #include "formats/georeference/raster_description.h"
 #include "formats/open_options.h"
 #include "formats/png/packed_elevations.h"

@@ -1,4 +1,4 @@
-#include "formats/text_grids/surfer_grid_source.h"
+#include "formats/readers.h"
 
 #include <fmt/format.h>
 
@@ -12,12 +12,11 @@
 #include <vector>
 
 #include "formats/binary_grids/plain_samples.h"
-#include "formats/binary_grids/turned_rows.h"
 #include "formats/files/raw_file.h"
-#include "formats/georeference/wkt.h"
+#include "formats/files/text.h"
+#include "formats/files/text_tokens.h"
+#include "formats/georeference/files_beside.h"
 #include "formats/open_options.h"
-#include "formats/text_grids/row_places.h"
-#include "formats/text_grids/text_tokens.h"
 #include "isohf/base/assert.h"
 #include "isohf/base/bytes.h"
 #include "isohf/error.h"

@@ -3,23 +3,53 @@
 #include <fmt/core.h>
 #include <sys/mman.h>
 #include <sys/stat.h>
+#include <tiff.h>
 #include <tiffio.h>
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cstdarg>
+#include <cstddef>
+#include <cstdint>
 #include <cstdio>
 #include <exception>
 #include <optional>
+#include <span>
 #include <utility>
 
-#include "formats/libraries.h"
-#include "formats/text_grids/text_tokens.h"
-#include "formats/tiff/tiff_directory.h"
+#include "formats/files/raw_file.h"
+#include "formats/files/text.h"
+#include "formats/readers.h"
 #include "isohf/error.h"
 
 namespace isohf {
 namespace {
+
+/// Where a directory of a TIFF file lies, and how its numbers are written.
+struct TiffDirectoryPlace {
+  std::uint64_t offset_bytes = 0;
+  bool big_tiff = false;  ///< numbers of 64 bits
+  bool swapped = false;   ///< in big-endian order
+};
+
+/// The count of tag `wanted` in the directory as it stands in the file; nullopt where it is absent. libtiff pads short
+/// tables with zeros, which would pass for blocks that a sparse file leaves out. Throws Error{kIo, kCorrupt}.
+std::optional<std::uint64_t> tiff_stored_count(const RawFile& file, const TiffDirectoryPlace& place,
+                                               std::uint16_t wanted) {
+  const auto number = [&](std::uint64_t offset, std::size_t bytes) {
+    std::array<std::byte, 8> stored = {};
+    file.read(offset, std::span(stored).first(bytes));
+    if (place.swapped) std::reverse(stored.begin(), stored.begin() + static_cast<std::ptrdiff_t>(bytes));
+    return std::bit_cast<std::uint64_t>(stored);  // little-endian, which base/bytes.h asserts
+  };
+  const std::uint64_t entries = number(place.offset_bytes, place.big_tiff ? 8 : 2);
+  for (std::uint64_t i = 0; i < entries; ++i) {
+    const std::uint64_t entry = place.offset_bytes + (place.big_tiff ? 8 + 20 * i : 2 + 12 * i);
+    if (number(entry, 2) == wanted) return number(entry + 4, place.big_tiff ? 8 : 4);
+  }
+  return std::nullopt;
+}
 
 /// No buffer that libtiff asks for is larger; blocks are checked against smaller bounds before.
 constexpr tmsize_t kLargestAllocation = tmsize_t{1} << 30;
@@ -407,6 +437,39 @@ std::string tiff_library() {
   const std::string text = TIFFGetVersion();
   const std::size_t number = std::min(text.find_first_of("0123456789"), text.size());
   return "libtiff " + text.substr(number, text.find('\n') - number);
+}
+
+std::int64_t TiffLayout::stored_rows(std::int64_t down) const {
+  return tiled ? block_height : std::min(block_height, height - down * block_height);
+}
+
+std::string tiff_compression_name(std::uint16_t compression) {
+  constexpr std::array<std::pair<std::uint16_t, const char*>, 20> kNames = {{
+      {COMPRESSION_NONE, "none"},
+      {COMPRESSION_CCITTRLE, "CCITT RLE"},
+      {COMPRESSION_CCITTFAX3, "CCITT fax 3"},
+      {COMPRESSION_CCITTFAX4, "CCITT fax 4"},
+      {COMPRESSION_LZW, "LZW"},
+      {COMPRESSION_OJPEG, "old JPEG"},
+      {COMPRESSION_JPEG, "JPEG"},
+      {COMPRESSION_PACKBITS, "PackBits"},
+      {COMPRESSION_PIXARLOG, "PixarLog"},
+      {COMPRESSION_DEFLATE, "DEFLATE"},
+      {COMPRESSION_ADOBE_DEFLATE, "DEFLATE"},
+      {COMPRESSION_JBIG, "JBIG"},
+      {COMPRESSION_SGILOG, "SGILog"},
+      {COMPRESSION_JP2000, "JPEG 2000"},
+      {COMPRESSION_LERC, "LERC"},
+      {COMPRESSION_LZMA, "LZMA"},
+      {COMPRESSION_ZSTD, "ZSTD"},
+      {COMPRESSION_WEBP, "WebP"},
+      {COMPRESSION_JXL, "JPEG XL"},
+      {COMPRESSION_THUNDERSCAN, "ThunderScan"},
+  }};
+  for (const auto& [code, name] : kNames) {
+    if (code == compression) return name;
+  }
+  return std::to_string(compression);
 }
 
 }  // namespace isohf

@@ -1,4 +1,4 @@
-#include "formats/write/raster_sidecars.h"
+#include "formats/write/encoders.h"
 
 #include <fmt/format.h>
 
@@ -8,7 +8,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "formats/files/letter_case.h"
+#include "formats/files/text.h"
 #include "isohf/base/output_file.h"
 #include "isohf/error.h"
 

@@ -6,10 +6,9 @@
 #include <limits>
 #include <span>
 
-#include "formats/files/letter_case.h"
-#include "formats/libraries.h"
-#include "formats/write/raster_encoder.h"
-#include "formats/write/raster_sidecars.h"
+#include "formats/files/text.h"
+#include "formats/readers.h"
+#include "formats/write/encoders.h"
 #include "isohf/base/output_file.h"
 #include "isohf/error.h"
 

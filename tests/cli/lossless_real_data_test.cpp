@@ -8,7 +8,7 @@
 #include <filesystem>
 #include <iostream>
 
-#include "formats/binary_grids/raw_source.h"
+#include "formats/readers.h"
 #include "formats/registry.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"

@@ -7,7 +7,7 @@
 
 #include "formats/raster_reference.h"
 #include "formats/reader_failure.h"
-#include "formats/text_grids/ascii_grid_source.h"
+#include "formats/readers.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
 #include "support/every_window.h"

@@ -1,4 +1,4 @@
-#include "formats/georeference/auxiliary_metadata.h"
+#include "formats/georeference/files_beside.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

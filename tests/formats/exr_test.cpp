@@ -11,9 +11,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "formats/exr/exr_source.h"
 #include "formats/raster_reference.h"
 #include "formats/reader_failure.h"
+#include "formats/readers.h"
 #include "formats/registry.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"

@@ -4,9 +4,9 @@
 
 #include <random>
 
-#include "formats/binary_grids/header_grid_source.h"
 #include "formats/raster_reference.h"
 #include "formats/reader_failure.h"
+#include "formats/readers.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
 #include "support/every_window.h"

@@ -1,4 +1,4 @@
-#include "formats/binary_grids/hgt_source.h"
+#include "formats/readers.h"
 
 #include <gtest/gtest.h>
 
@@ -74,14 +74,6 @@ TEST_F(HgtSource, DeliversRealFilesAsTheReferenceDoes) {
     EXPECT_EQ(source->info().georeference.system.vertical_datum, "EGM96");
     EXPECT_EQ(source->info().vertical_unit, "metre");
   }
-}
-
-TEST_F(HgtSource, RecognisesItsNames) {
-  EXPECT_TRUE(is_hgt_name("a/N44E006.hgt"));
-  EXPECT_TRUE(is_hgt_name("N44E006.HGT"));
-  EXPECT_TRUE(is_hgt_name("N44E006.SRTMGL1.hgt.zip"));
-  EXPECT_FALSE(is_hgt_name("N44E006.zip"));
-  EXPECT_FALSE(is_hgt_name("hgt"));
 }
 
 TEST_F(HgtSource, TakesTheCornerFromTheName) {

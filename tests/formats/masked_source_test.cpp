@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "formats/tiff/tiff_source.h"
+#include "formats/readers.h"
 #include "formats/tiff_bytes.h"
 #include "isohf/error.h"
 #include "isohf/surface/source/sample_types.h"

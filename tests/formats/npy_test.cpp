@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <random>
 
-#include "formats/binary_grids/npy_source.h"
 #include "formats/raster_reference.h"
 #include "formats/reader_failure.h"
+#include "formats/readers.h"
 #include "formats/zip_archive.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"

@@ -5,9 +5,9 @@
 #include <bit>
 #include <random>
 
-#include "formats/planetary/pds3_source.h"
 #include "formats/raster_reference.h"
 #include "formats/reader_failure.h"
+#include "formats/readers.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
 #include "support/every_window.h"

@@ -1,4 +1,4 @@
-#include "formats/georeference/place_beside.h"
+#include "formats/georeference/files_beside.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <cstdio>
 
-#include "formats/png/png_source.h"
 #include "formats/raster_reference.h"
 #include "formats/reader_failure.h"
+#include "formats/readers.h"
 #include "formats/registry.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"

@@ -1,4 +1,4 @@
-#include "formats/binary_grids/raw_source.h"
+#include "formats/readers.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

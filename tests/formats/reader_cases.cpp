@@ -4,19 +4,7 @@
 
 #include <cstring>
 
-#include "formats/binary_grids/dted_source.h"
-#include "formats/binary_grids/header_grid_source.h"
-#include "formats/binary_grids/hgt_source.h"
-#include "formats/binary_grids/npy_source.h"
-#include "formats/binary_grids/raw_source.h"
-#include "formats/exr/exr_source.h"
-#include "formats/planetary/isis3_source.h"
-#include "formats/planetary/pds3_source.h"
-#include "formats/png/png_source.h"
-#include "formats/text_grids/ascii_grid_source.h"
-#include "formats/text_grids/surfer_grid_source.h"
-#include "formats/text_grids/usgs_dem_source.h"
-#include "formats/tiff/tiff_source.h"
+#include "formats/readers.h"
 #include "formats/tiff_bytes.h"
 #include "formats/write/raster_sink.h"
 #include "formats/zip_archive.h"

@@ -1,4 +1,4 @@
-#include "formats/text_grids/surfer_grid_source.h"
+#include "formats/readers.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

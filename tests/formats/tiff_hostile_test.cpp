@@ -5,7 +5,7 @@
 #include <sys/resource.h>
 #include <zlib.h>
 
-#include "formats/tiff/tiff_source.h"
+#include "formats/readers.h"
 #include "formats/tiff_bytes.h"
 #include "isohf/error.h"
 #include "support/temporary_folder.h"

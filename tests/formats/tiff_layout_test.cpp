@@ -8,7 +8,7 @@
 #include <set>
 #include <tuple>
 
-#include "formats/tiff/tiff_source.h"
+#include "formats/readers.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
 #include "support/temporary_folder.h"

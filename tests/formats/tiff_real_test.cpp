@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
 #include "formats/raster_reference.h"
-#include "formats/tiff/tiff_source.h"
+#include "formats/readers.h"
 #include "support/real_files.h"
 
 namespace isohf {

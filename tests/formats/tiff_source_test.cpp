@@ -1,4 +1,4 @@
-#include "formats/tiff/tiff_source.h"
+#include "formats/readers.h"
 
 #include <gtest/gtest.h>
 #include <zlib.h>

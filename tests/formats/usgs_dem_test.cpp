@@ -1,4 +1,4 @@
-#include "formats/text_grids/usgs_dem_source.h"
+#include "formats/readers.h"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>

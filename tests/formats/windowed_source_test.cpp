@@ -8,7 +8,6 @@
 #include <string>
 #include <vector>
 
-#include "formats/decorate/closed_source.h"
 #include "isohf/surface/decorate/filled_source.h"
 #include "isohf/surface/decorate/geoid_source.h"
 #include "support/memory_source.h"

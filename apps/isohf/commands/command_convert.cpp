@@ -12,7 +12,7 @@
 
 #include "commands/command.h"
 #include "commands/convert_each.h"
-#include "formats/files/letter_case.h"
+#include "formats/files/text.h"
 #include "interrupt.h"
 #include "isohf/archive.h"
 #include "isohf/archive/codec/tile_codes.h"

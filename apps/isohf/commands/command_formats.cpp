@@ -7,7 +7,7 @@
 #include <optional>
 
 #include "commands/command.h"
-#include "formats/libraries.h"
+#include "formats/readers.h"
 #include "formats/registry.h"
 #include "formats/write/raster_sink.h"
 #include "isohf/error.h"

@@ -13,7 +13,7 @@
 #include <thread>
 #include <variant>
 
-#include "formats/files/letter_case.h"
+#include "formats/files/text.h"
 #include "options/describe.h"
 #include "options/input_files.h"
 #include "output/json_output.h"

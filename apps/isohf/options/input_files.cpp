@@ -12,8 +12,8 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "formats/binary_grids/hgt_source.h"
-#include "formats/files/letter_case.h"
+#include "formats/files/text.h"
+#include "formats/readers.h"
 #include "formats/registry.h"
 #include "isohf/error.h"
 #include "output/json_output.h"

@@ -1,6 +1,6 @@
 #include "options/options_ground.h"
 
-#include "formats/decorate/closed_source.h"
+#include "formats/decorate/windowed_source.h"
 #include "formats/georeference/reference_system.h"
 #include "isohf/error.h"
 

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "formats/binary_grids/raw_source.h"
+#include "formats/readers.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
 #include "isohf/surface/decorate/filled_source.h"

@@ -59,8 +59,8 @@ std::string fingerprint_of(const MosaicPlan& plan, OverlapRule rule) {
             [](const MosaicMember* a, const MosaicMember* b) { return a->order < b->order; });
   std::string text;
   for (const MosaicMember* member : members) {
-    text += fmt::format("{} {} bytes {}.{:09} at {} {}\n", file_name(member->path), member->size_bytes,
-                        member->changed_s, member->changed_ns, member->column, member->row);
+    text += fmt::format("{} {} bytes {}.{:09} at {} {}\n", file_name(member->path), member->stamp.size_bytes,
+                        member->stamp.changed_s, member->stamp.changed_ns, member->column, member->row);
   }
   return fmt::format("mosaic {} {} files {}", to_string(rule), members.size(), sha256_of(text));
 }

@@ -3,7 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "formats/registry.h"
-#include "formats/write/raster_sidecars.h"
+#include "formats/write/encoders.h"
 #include "formats/write/raster_sink.h"
 #include "isohf/archive/writer.h"
 #include "isohf/base/output_file.h"

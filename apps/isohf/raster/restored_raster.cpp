@@ -7,7 +7,7 @@
 #include <cmath>
 #include <filesystem>
 
-#include "formats/files/letter_case.h"
+#include "formats/files/text.h"
 #include "isohf/projection/projection_wkt.h"
 #include "isohf/restore/archive_geometry.h"
 #include "output/standard_output.h"

@@ -18,4 +18,20 @@ namespace isohf {
   return result;
 }
 
+/// A word fit for a message: at most 40 bytes, only printable ones.
+[[nodiscard]] inline std::string printable(std::string_view word) {
+  std::string text(word.substr(0, 40));
+  for (char& c : text) c = c >= ' ' && c <= '~' ? c : '?';
+  return word.size() > 40 ? text + "..." : text;
+}
+
+/// A text found in a file, fit for one line: blanks for control characters.
+[[nodiscard]] inline std::string one_line(std::string text) {
+  for (char& c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (byte < 0x20 || byte == 0x7F) c = ' ';
+  }
+  return text;
+}
+
 }  // namespace isohf

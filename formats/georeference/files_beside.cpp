@@ -1,21 +1,26 @@
-#include "formats/georeference/auxiliary_metadata.h"
+#include "formats/georeference/files_beside.h"
 
 #include <expat.h>
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <array>
+#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <locale>
 #include <map>
 #include <memory>
 #include <optional>
+#include <sstream>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "formats/georeference/place_beside.h"
+#include "formats/files/raw_file.h"
+#include "formats/files/text.h"
 #include "formats/georeference/wkt.h"
 #include "formats/tiff/gdal_tags.h"
 #include "isohf/error.h"
@@ -23,9 +28,43 @@
 namespace isohf {
 namespace {
 
-constexpr std::size_t kChunk = 65536;
-/// No reference system is longer; histograms and tables are, and are not kept.
+/// Grids of so many metres and less within 360 m of (0, 0) are rarer than those in degrees: it is 36" of arc.
+constexpr double kFinestAsMetres = 0.01;
+
+/// Of a .prj or world file, and of a reference system in an .aux.xml, whose histograms and tables are not kept.
 constexpr std::size_t kLongestText = 65536;
+
+std::optional<std::string> text_of(const std::filesystem::path& path) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error)) return std::nullopt;
+  std::ifstream in(path, std::ios::binary);
+  std::string text(kLongestText, '\0');
+  in.read(text.data(), static_cast<std::streamsize>(text.size()));
+  text.resize(static_cast<std::size_t>(in.gcount()));
+  return text;
+}
+
+std::vector<std::string> spellings(const std::vector<std::string>& extensions) {
+  std::vector<std::string> all;
+  for (const std::string& extension : extensions) {
+    std::string upper = extension;
+    std::transform(upper.begin(), upper.end(), upper.begin(),
+                   [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
+    all.push_back(extension);
+    all.push_back(upper);
+  }
+  return all;
+}
+
+/// .jgw and .jpgw for .jpg: the first and last letter and a w, or all of them.
+std::vector<std::string> world_extensions(const std::string& raster_path) {
+  const std::string own = lower_case(std::filesystem::path(raster_path).extension().string());
+  if (own == ".flt") return {".flw", ".ftw", ".fltw", ".wld"};
+  if (own.size() < 3 || own == ".tif" || own == ".tiff") return {".tfw", ".tifw", ".wld"};
+  return {fmt::format(".{}{}w", own[1], own.back()), own + "w", ".wld"};
+}
+
+constexpr std::size_t kChunk = 65536;
 
 /// The texts of interest, by their place in the document: "SRS", "GeoTransform", "AREA_OR_POINT", and "1/NoDataValue"
 /// and so on for a band.
@@ -134,6 +173,54 @@ void place_by_transform(const std::string& path, const std::string& text, Georef
 
 }  // namespace
 
+std::optional<WorldFile> world_file_beside(const std::string& raster_path) {
+  for (const std::string& extension : spellings(world_extensions(raster_path))) {
+    const std::filesystem::path path = std::filesystem::path(raster_path).replace_extension(extension);
+    const std::optional<std::string> text = text_of(path);
+    if (!text) continue;
+    std::istringstream in(*text);
+    in.imbue(std::locale::classic());
+    double rotation_y = 0.0;
+    double rotation_x = 0.0;
+    WorldFile world;
+    world.path = path.string();
+    if (!(in >> world.dx >> rotation_y >> rotation_x >> world.dy >> world.x0 >> world.y0)) {
+      throw Error(ErrorCode::kCorrupt, world.path + ": is not a world file, which has six numbers");
+    }
+    if (rotation_x != 0.0 || rotation_y != 0.0 || !(world.dx > 0.0) || world.dy == 0.0) {
+      throw Error(
+          ErrorCode::kUnsupported,
+          fmt::format("{}: dx {}, rotations {} and {}, dy {}: isohf reads rasters whose columns run from West to "
+                      "East, without rotation",
+                      world.path, world.dx, rotation_y, rotation_x, world.dy));
+    }
+    return world;
+  }
+  return std::nullopt;
+}
+
+std::string prj_beside(const std::string& raster_path) {
+  for (const std::string& extension : spellings({".prj"})) {
+    if (auto text = text_of(std::filesystem::path(without_gzip(raster_path)).replace_extension(extension))) {
+      while (!text->empty() && std::isspace(static_cast<unsigned char>(text->back())) != 0) text->pop_back();
+      return *text;
+    }
+  }
+  return {};
+}
+
+std::string file_beside(const std::string& beside, const std::string& name) {
+  const std::filesystem::path folder = std::filesystem::path(beside).parent_path();
+  std::error_code ignored;
+  if (std::filesystem::is_regular_file(folder / name, ignored)) return (folder / name).string();
+  std::string found;
+  for (const auto& entry : std::filesystem::directory_iterator(folder.empty() ? "." : folder, ignored)) {
+    const std::string candidate = entry.path().filename().string();
+    if (lower_case(candidate) == lower_case(name) && (found.empty() || candidate < found)) found = candidate;
+  }
+  return found.empty() ? found : (folder / found).string();
+}
+
 void read_auxiliary_metadata(SourceInfo& info, int band) {
   const std::string path = info.path + ".aux.xml";
   std::error_code error;
@@ -165,6 +252,47 @@ void read_auxiliary_metadata(SourceInfo& info, int band) {
   const bool scaled = info.z_scale != 1.0 || info.z_offset != 0.0;
   item("scale", "Scale", scaled);
   item("offset", "Offset", scaled);
+}
+
+void read_prj_beside(SourceInfo& info) {
+  const std::string text = prj_beside(info.path);
+  if (!text.empty() && read_prj(text, info.georeference)) return;
+  if (!text.empty()) {
+    info.warnings.push_back(loss("the .prj beside the file is not the WKT of a map's reference system; it is ignored"));
+  }
+  const Georeference& place = info.georeference;
+  if (place.has_origin && place.spacing_x < kFinestAsMetres && place.spacing_y < kFinestAsMetres &&
+      std::abs(place.origin_x) <= 360.0 && std::abs(place.origin_y) <= 90.0) {
+    info.warnings.emplace_back(
+        "the coordinates look like degrees, but no .prj beside the file says so; with one, or with --sample-spacing, "
+        "distances would be in metres");
+  }
+}
+
+void place_by(const WorldFile& world, std::int64_t rows, Georeference& place) {
+  place.spacing_x = world.dx;
+  place.spacing_y = std::abs(world.dy);
+  place.has_origin = true;
+  place.origin_x = world.x0;
+  place.origin_y = world.y0 + (world.rows_from_south() ? static_cast<double>(rows - 1) * world.dy : 0.0);
+}
+
+bool has_reference_system(const Georeference& place) {
+  return place.unit != HorizontalUnit::kUnknown || place.system.epsg || !place.system.wkt.empty();
+}
+
+void read_place_beside(SourceInfo& info, int band) {
+  read_auxiliary_metadata(info, band);
+  Georeference& place = info.georeference;
+  if (!place.has_origin) {
+    const std::optional<WorldFile> world = world_file_beside(info.path);
+    if (!world) return;
+    if (world->rows_from_south()) {
+      throw Error(ErrorCode::kUnsupported, world->path + ": dy is positive; rows must run from North to South");
+    }
+    place_by(*world, info.height, place);
+  }
+  if (!has_reference_system(place)) read_prj_beside(info);
 }
 
 }  // namespace isohf

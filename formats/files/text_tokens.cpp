@@ -1,4 +1,4 @@
-#include "formats/text_grids/text_tokens.h"
+#include "formats/files/text_tokens.h"
 
 #include <fmt/core.h>
 
@@ -8,7 +8,7 @@
 #include <cstring>
 #include <limits>
 
-#include "formats/files/letter_case.h"
+#include "formats/files/text.h"
 #include "isohf/error.h"
 
 namespace isohf {
@@ -109,20 +109,6 @@ bool read_decimal(std::string_view word, double& value) {
     }
   }
   return read_special(word, value);
-}
-
-std::string one_line(std::string text) {
-  for (char& c : text) {
-    const auto byte = static_cast<unsigned char>(c);
-    if (byte < 0x20 || byte == 0x7F) c = ' ';
-  }
-  return text;
-}
-
-std::string printable(std::string_view word) {
-  std::string text(word.substr(0, 40));
-  for (char& c : text) c = c >= ' ' && c <= '~' ? c : '?';
-  return word.size() > 40 ? text + "..." : text;
 }
 
 }  // namespace isohf

@@ -1,23 +1,55 @@
-#include "formats/binary_grids/hgt_source.h"
-
 #include <fmt/core.h>
+#include <fmt/format.h>
 
+#include <cctype>
 #include <cmath>
 #include <cstring>
 #include <optional>
+#include <string>
 #include <vector>
 
-#include "formats/binary_grids/hgt_name.h"
-#include "formats/files/letter_case.h"
 #include "formats/files/raw_file.h"
-#include "formats/files/zipped_file.h"
+#include "formats/files/text.h"
 #include "formats/open_options.h"
+#include "formats/readers.h"
+#include "formats/write/encoders.h"
 #include "isohf/base/assert.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
 
 namespace isohf {
 namespace {
+
+/// The South-West post of an SRTM tile, whole degrees.
+struct HgtCorner {
+  int longitude = 0;  ///< -180...180
+  int latitude = 0;   ///< -90...90
+};
+
+/// What the name of an SRTM tile says: hemisphere and two digits, hemisphere and three digits, in any case, at its
+/// beginning: "N44E006.hgt", "s35e145.SRTMGL1.hgt.zip". Nothing where it begins in another way. Folders may precede it.
+std::optional<HgtCorner> hgt_corner_of(const std::string& path) {
+  const std::string name = path.substr(path.find_last_of('/') + 1);
+  if (name.size() < 7) return std::nullopt;
+  const auto hemisphere = [&](std::size_t at) {
+    return static_cast<char>(std::tolower(static_cast<unsigned char>(name[at])));
+  };
+  const auto digits = [&](std::size_t begin, std::size_t count) {
+    int value = 0;
+    for (std::size_t i = begin; i < begin + count; ++i) {
+      if (std::isdigit(static_cast<unsigned char>(name[i])) == 0) return -1;
+      value = value * 10 + (name[i] - '0');
+    }
+    return value;
+  };
+  const char north_south = hemisphere(0);
+  const char east_west = hemisphere(3);
+  if ((north_south != 'n' && north_south != 's') || (east_west != 'e' && east_west != 'w')) return std::nullopt;
+  const int latitude = digits(1, 2);
+  const int longitude = digits(4, 3);
+  if (latitude < 0 || latitude > 90 || longitude < 0 || longitude > 180) return std::nullopt;
+  return HgtCorner{east_west == 'w' ? -longitude : longitude, north_south == 's' ? -latitude : latitude};
+}
 
 constexpr std::int64_t kSampleBytes = 2;
 
@@ -151,12 +183,55 @@ class HgtSource final : public HeightSource {
   SourceInfo info_;
 };
 
-}  // namespace
+constexpr double kVoid = -32768.0;
 
-bool is_hgt_name(const std::string& path) {
-  const std::string name = lower_case(without_gzip(path));
-  return name.ends_with(".hgt") || name.ends_with(".hgt.zip");
+/// Big-endian int16, nothing else.
+class HgtEncoder final : public RasterEncoder {
+ public:
+  explicit HgtEncoder(OutputFile& out) : out_(out) {}
+
+  void write(std::span<const std::byte> rows, std::int64_t /*count*/) override {
+    swapped_.assign(rows.begin(), rows.end());
+    swap_byte_order(swapped_, sizeof(std::int16_t));
+    out_.append(swapped_);
+  }
+  void close() override {}
+
+ private:
+  OutputFile& out_;
+  std::vector<std::byte> swapped_;
+};
+
+bool is_tile_size(std::int64_t width, std::int64_t height) {
+  return (height == 3601 && (width == 3601 || width == 1801)) || (height == 1201 && width == 1201);
 }
+
+/// Nothing in the file says where it lies but its name, which readers believe: it must be true.
+void check_place(const std::string& path, const RasterSpec& spec) {
+  const std::optional<HgtCorner> named = hgt_corner_of(path);
+  if (!named || !spec.georeference || !spec.georeference->has_origin) return;
+  const Georeference& place = *spec.georeference;
+  const double west_off = std::remainder(place.origin_x - named->longitude, 360.0);
+  const double north_off = place.origin_y - (named->latitude + 1);
+  const double column = 1.0 / static_cast<double>(spec.width - 1);
+  const double row = 1.0 / static_cast<double>(spec.height - 1);
+  // A thousandth of a sample, anywhere in the tile.
+  const bool is_there = place.unit == HorizontalUnit::kDegree && std::abs(west_off) < column / 1000.0 &&
+                        std::abs(north_off) < row / 1000.0 &&
+                        std::abs(place.spacing_x - column) < column * column / 1000.0 &&
+                        std::abs(place.spacing_y - row) < row * row / 1000.0;
+  if (is_there) return;
+  throw Error(
+      ErrorCode::kInvalidArgument,
+      fmt::format("the name of an HGT tile says where it lies, here {} to {} East and {} to {} North in degrees; "
+                  "these samples lie at {} to {} and {} to {}{}; give the file the name of its place",
+                  named->longitude, named->longitude + 1, named->latitude, named->latitude + 1, place.origin_x,
+                  place.origin_x + place.spacing_x * static_cast<double>(spec.width - 1),
+                  place.origin_y - place.spacing_y * static_cast<double>(spec.height - 1), place.origin_y,
+                  place.unit == HorizontalUnit::kDegree ? "" : ", not in degrees"));
+}
+
+}  // namespace
 
 bool is_zip_of_hgt(const std::string& path) {
   if (!lower_case(path).ends_with(".zip")) return false;
@@ -171,6 +246,23 @@ bool is_zip_of_hgt(const std::string& path) {
 
 std::unique_ptr<HeightSource> open_hgt(const std::string& path, const OpenOptions& options) {
   return std::make_unique<HgtSource>(path, options);
+}
+
+std::unique_ptr<RasterEncoder> encode_hgt(OutputFile& out, const RasterSpec& spec) {
+  if (spec.sample_type != SampleType::kInt16 || spec.channels != 1) {
+    throw Error(ErrorCode::kInvalidArgument, fmt::format("HGT stores one channel of int16, not {} of {}", spec.channels,
+                                                         to_string(spec.sample_type)));
+  }
+  if (!is_tile_size(spec.width, spec.height)) {
+    throw Error(ErrorCode::kInvalidArgument,
+                fmt::format("an HGT tile has 1201 x 1201, 3601 x 3601 or 1801 x 3601 samples, not {} x {}", spec.width,
+                            spec.height));
+  }
+  if (spec.void_value && *spec.void_value != kVoid) {
+    throw Error(ErrorCode::kInvalidArgument, fmt::format("HGT's void value is -32768, not {}", *spec.void_value));
+  }
+  check_place(out.path(), spec);
+  return std::make_unique<HgtEncoder>(out);
 }
 
 }  // namespace isohf

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "isohf/raster.h"
+
+namespace isohf {
+
+/// The six numbers of an ESRI world file: x = x0 + dx * column, y = y0 + dy * row at the samples' centres.
+struct WorldFile {
+  std::string path;
+  double dx = 0.0;
+  double dy = 0.0;
+  double x0 = 0.0;
+  double y0 = 0.0;
+
+  [[nodiscard]] bool rows_from_south() const { return dy > 0.0; }
+};
+
+/// Looks beside raster.tif for raster.tfw, raster.tifw, those of other formats (.jgw, .pgw, ...) and raster.wld (any of
+/// them in upper case); nullopt where none is. Throws Error: kCorrupt where one is but is not six numbers, kUnsupported
+/// where it rotates the raster.
+[[nodiscard]] std::optional<WorldFile> world_file_beside(const std::string& raster_path);
+
+/// The text of raster.prj (or .PRJ) beside raster.tif; empty where none is. At most 64 KiB.
+[[nodiscard]] std::string prj_beside(const std::string& raster_path);
+
+/// The path of the file called `name`, in any case, in the folder of the file `beside`: labels were written for file
+/// systems without case. Empty where there is none.
+[[nodiscard]] std::string file_beside(const std::string& beside, const std::string& name);
+
+/// Reads the .prj beside info.path, where there is one, with read_wkt; a text that is no WKT becomes a
+/// warning, and so do coordinates that look like degrees without one.
+void read_prj_beside(SourceInfo& info);
+
+/// Reads NAME.EXT.aux.xml, in which GDAL keeps what a raster's format has no room for ("Persistent Auxiliary
+/// Metadata"): where the raster lies, its reference system, and a void value, unit, scale and offset for each band.
+/// `band` counts from 1; with 0 none of the latter is taken. Takes what `info` does not know yet, and leaves what it
+/// knows; statistics and all else are passed over. No such file: nothing happens. Throws Error naming the file:
+/// kCorrupt where it is not XML or its numbers are none, kUnsupported where it turns the raster or puts South on top.
+void read_auxiliary_metadata(SourceInfo& info, int band);
+
+/// Spacing and origin of a raster of `rows` rows; the origin is the northernmost row's, whichever the file has first.
+void place_by(const WorldFile& world, std::int64_t rows, Georeference& place);
+
+/// Whether the file has said what its coordinates are.
+[[nodiscard]] bool has_reference_system(const Georeference& place);
+
+/// For pictures, which have nothing to say of their place: GDAL's .aux.xml beside, or else the world file, and the
+/// .prj. `band` as read_auxiliary_metadata has it. Throws Error: kUnsupported where the world file has the southernmost
+/// row first, and as world_file_beside and read_auxiliary_metadata do.
+void read_place_beside(SourceInfo& info, int band);
+
+}  // namespace isohf

@@ -1,0 +1,115 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "formats/mosaic/mosaic_samples.h"
+#include "isohf/raster.h"
+
+namespace isohf {
+
+/// Size of a file and when it was changed last. Throws Error{kIo} naming the path.
+struct FileStamp {
+  std::uint64_t size_bytes = 0;
+  std::int64_t changed_s = 0;
+  std::int64_t changed_ns = 0;
+
+  [[nodiscard]] static FileStamp of(const std::string& path);
+  friend bool operator==(const FileStamp&, const FileStamp&) = default;
+};
+
+/// Members' samples may lie this far from the mosaic's grid, in samples: the rounding of origins and spacings that are
+/// written in few digits. They count as lying on it.
+inline constexpr double kSnapTolerance = 0.05;
+
+/// One file of a mosaic: what is kept of it while it is closed.
+struct MosaicMember {
+  std::string path;
+  std::int64_t width = 0;
+  std::int64_t height = 0;
+  std::int64_t column = 0;  ///< of its first sample in its layer's grid, >= 0
+  std::int64_t row = 0;
+  std::size_t kind = 0;    ///< MosaicPlan::kinds
+  std::int64_t order = 0;  ///< its place among the paths
+  FileStamp stamp;         ///< of the file when it was opened first
+};
+
+/// Members of one resolution on one grid.
+struct MosaicLayer {
+  double spacing_x = 1.0;  ///< units of the mosaic's coordinates
+  double spacing_y = 1.0;
+  double origin_x = 0.0;  ///< of sample (0, 0)
+  double origin_y = 0.0;
+  std::int64_t width = 0;
+  std::int64_t height = 0;
+  std::vector<MosaicMember> members;  ///< by row, then column, then order
+  std::int64_t tallest = 0;           ///< height of the highest member
+};
+
+/// Ground of a mosaic that no member covers.
+struct MosaicHoles {
+  std::int64_t samples = 0;          ///< of the mosaic, without a member of any resolution
+  std::int64_t tiles = 0;            ///< places of the members' regular grid; 0 where they form none
+  std::int64_t tiles_missing = 0;    ///< of these, without a member and not covered by others
+  std::vector<std::string> missing;  ///< where, at most kMostNamed: "N45E006", or "x 500000...510000, y 0...10000"
+  static constexpr std::size_t kMostNamed = 20;
+
+  /// One line: how much is missing and where, `named` places at most; empty where nothing is.
+  [[nodiscard]] std::string describe(std::size_t named) const;
+};
+
+/// Many rasters as one: where each lies, and what samples the whole has.
+struct MosaicPlan {
+  SourceInfo info;  ///< of the whole; path and block_height are left to the source
+  std::vector<SampleKind> kinds;
+  MosaicSamples samples;
+  /// From the coarsest to the finest, and that is the order in which they are laid over each other. A layer that has
+  /// the mosaic's spacing is on its grid; others are interpolated.
+  std::vector<MosaicLayer> layers;
+  Window region;                   ///< the samples that matter: all, or those of a box
+  MosaicHoles holes;               ///< in the region
+  std::int64_t block_height = 1;   ///< the members' largest
+  std::uint64_t reader_bytes = 0;  ///< that a member's reader keeps at most
+  int readers_at_once = 1;         ///< as many threads read, each a member of its own
+
+  [[nodiscard]] bool is_on_grid(const MosaicLayer& layer) const {
+    return layer.spacing_x == info.georeference.spacing_x && layer.spacing_y == info.georeference.spacing_y;
+  }
+};
+
+/// A member and where its own file puts it.
+struct PlacedMember {
+  MosaicMember member;
+  double origin_x = 0.0;  ///< coordinates of its sample (0, 0)
+  double origin_y = 0.0;
+  double spacing_x = 1.0;
+  double spacing_y = 1.0;
+};
+
+/// A rectangle of the mosaic's samples.
+struct SampleRectangle {
+  std::int64_t column = 0;
+  std::int64_t row = 0;
+  std::int64_t columns = 0;
+  std::int64_t rows = 0;
+};
+
+/// Moves members by whole turns so that those on both sides of the 180th meridian lie side by side: where more than
+/// half a turn lies empty between them, all West of the gap go East of the others. Nothing else moves.
+void join_antimeridian(std::vector<PlacedMember>& members);
+
+/// Puts members on grids: fills plan.layers and size, spacing and origin of plan.info, whose georeference says unit and
+/// registration. plan.info.warnings gains a line where rounding was taken away that is worth a word.
+/// Throws Error{kInvalidArgument} naming a member that lies off the grid of its resolution.
+void place_members(std::vector<PlacedMember> members, MosaicPlan& plan);
+
+/// The samples of the mosaic that a member of `layer` stands for; `reach`: how far its outermost samples do, in samples
+/// of the layer's own, 0 or 0.5.
+[[nodiscard]] SampleRectangle ground_of(const MosaicPlan& plan, const MosaicLayer& layer, const MosaicMember& member,
+                                        double reach);
+
+/// What lies in no member.
+[[nodiscard]] MosaicHoles find_holes(const MosaicPlan& plan);
+
+}  // namespace isohf
