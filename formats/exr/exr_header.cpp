@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "formats/files/text.h"
-#include "isohf/base/bytes.h"
 #include "formats/readers.h"
+#include "isohf/base/bytes.h"
 #include "isohf/error.h"
 
 namespace isohf {
