@@ -19,11 +19,11 @@
 #include "isohf/raster.h"
 #include "isohf/surface/resample/kernels.h"
 #include "isohf/surface/resample/prefilter.h"
-#include "isohf/surface/resample/tile_cutter.h"
+#include "isohf/surface/resample/tile_resampler.h"
 #include "isohf/surface/shade/normals.h"
 #include "isohf/surface/shade/shadow_hull.h"
 #include "isohf/surface/source/sample_types.h"
-#include "isohf/surface/source/source_scan.h"
+#include "isohf/surface/source/source_statistics.h"
 
 namespace {
 
@@ -66,8 +66,8 @@ struct Stages {
   [[nodiscard]] SourceAxis axis() const {
     return {kColumns, kSpacing / 2.0, kSpacing, Registration::kArea, Outside::kCover, 60.0};
   }
-  [[nodiscard]] TileCutter cutter(Filter filter) const {
-    return {grid, axis(), axis(), Kernel::make(filter), {-1e9, 1e9}};
+  [[nodiscard]] std::unique_ptr<TileResampler> cutter(Filter filter) const {
+    return make_grid_resampler(grid, {axis(), axis()}, Kernel::make(filter), {-1e9, 1e9});
   }
 
   SourceInfo info;
@@ -168,10 +168,10 @@ BENCHMARK(prefilter_columns)->DenseRange(3, 5);
 
 /// Row sampler and all: bytes of the heights that come out.
 void cut_tile(benchmark::State& state) {
-  const TileCutter cutter = stages().cutter(kFilters[state.range(0)]);
+  const auto cutter = stages().cutter(kFilters[state.range(0)]);
   std::vector<float> out(stages().tile.size());
   for (auto _ : state) {
-    cutter.cut({0, 0}, stages().band(), out);
+    cutter->cut({0, 0}, stages().band(), out);
     benchmark::DoNotOptimize(out.data());
     benchmark::ClobberMemory();
   }

@@ -14,7 +14,7 @@
 #include "formats/registry.h"
 #include "isohf/convert/frame/plan.h"
 #include "isohf/raster.h"
-#include "isohf/surface/source/source_survey.h"
+#include "isohf/surface/source/source_statistics.h"
 #include "support/real_files.h"
 #include "support/samples.h"
 

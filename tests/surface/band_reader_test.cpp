@@ -121,12 +121,12 @@ TEST(BandReader, TilesCutFromItsBandsFollowTheRuleForVoids) {
       prefilter.filter({coefficients.data(), 61, 61});
       BandReader reader(source, 0.0, prefilter);
       const SourceAxis axis(61, 0.0, 10.0, Registration::kPoint, Outside::kClamp, 0.0);
-      const TileCutter cutter(grid, axis, axis, kernel, {-1e9, 1e9});
+      const auto cutter = make_grid_resampler(grid, {axis, axis}, kernel, {-1e9, 1e9});
       std::vector<float> heights(12 * 11);
       for (std::int64_t tile = 0; tile < grid.tile_count(); ++tile) {
         const TileIndex index = grid.tile_at(tile);
-        const auto band = reader.read(cutter.rows_needed(index.row));
-        cutter.cut(index, band->view(), heights);
+        const auto band = reader.read(cutter->rows_needed(index.row));
+        cutter->cut(index, band->view(), heights);
         for (int r = 0; r < 11; ++r) {
           for (int c = 0; c < 12; ++c) {
             const WorldPoint world = grid.world_from_lattice(grid.lattice_vertex(index, {c, r}));

@@ -16,7 +16,7 @@
 #include "isohf/error.h"
 #include "isohf/raster.h"
 #include "isohf/surface/source/source_rows.h"
-#include "isohf/surface/source/source_survey.h"
+#include "isohf/surface/source/source_statistics.h"
 #include "options/describe.h"
 #include "options/options_source.h"
 #include "options/source_place.h"

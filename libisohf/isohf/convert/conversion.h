@@ -12,7 +12,7 @@
 #include "isohf/convert/memory_plan.h"
 #include "isohf/surface/resample/kernels.h"
 #include "isohf/surface/resample/prefilter.h"
-#include "isohf/surface/source/source_geometry.h"
+#include "isohf/surface/resample/tile_resampler.h"
 
 namespace isohf {
 
@@ -61,8 +61,8 @@ struct Conversion {
 
   [[nodiscard]] SourceGeometry geometry() const { return plan.frame.geometry(plan.outside); }
   /// Elevations beyond the source's edge are held within a range.
-  [[nodiscard]] std::unique_ptr<VertexCutter> cutter(const ElevationRange& held_within) const {
-    return make_cutter(plan.grid, geometry(), kernel, held_within);
+  [[nodiscard]] std::unique_ptr<TileResampler> cutter(const ElevationRange& held_within) const {
+    return make_tile_resampler(plan.grid, geometry(), kernel, held_within);
   }
 };
 

@@ -14,7 +14,7 @@
 #include "isohf/error.h"
 #include "isohf/lattice/barycentric.h"
 #include "isohf/surface/source/sample_types.h"
-#include "isohf/surface/source/source_scan.h"
+#include "isohf/surface/source/source_statistics.h"
 
 namespace isohf {
 namespace {
@@ -190,7 +190,7 @@ Sums Windows::errors_in(HeldWindow& window, const Plan& plan, const Reconstructi
     columns = {static_cast<std::int64_t>(*least) - kMaxTaps, static_cast<std::int64_t>(*most) + kMaxTaps};
     columns = {std::max<std::int64_t>(columns.first, 0), std::min(columns.last, info_.width - 1)};
   }
-  const auto cutter = make_cutter(tile, geometry, by.kernel, {-HUGE_VAL, HUGE_VAL});
+  const auto cutter = make_tile_resampler(tile, geometry, by.kernel, {-HUGE_VAL, HUGE_VAL});
   if (!geometry.warp) columns = cutter->columns_needed(0);
   const RowRange rows = cutter->rows_needed(0);
   const bool is_held = columns.first >= held.column && columns.last < held.column + held.columns &&

@@ -13,7 +13,7 @@
 #include "isohf/error.h"
 #include "isohf/restore/archive_geometry.h"
 #include "isohf/surface/source/band_reader.h"
-#include "isohf/surface/source/source_scan.h"
+#include "isohf/surface/source/source_statistics.h"
 
 namespace isohf {
 namespace {
@@ -47,8 +47,8 @@ class VertexCheck {
   }
 
   VertexReport run(const std::function<void(std::int64_t, std::int64_t)>& progress, const std::atomic<bool>& cancel) {
-    const auto cutter =
-        make_cutter(grid_, archive_geometry(metadata_), kernel_, {limits_.lowest - datum_, limits_.highest - datum_});
+    const auto cutter = make_tile_resampler(grid_, archive_geometry(metadata_), kernel_,
+                                            {limits_.lowest - datum_, limits_.highest - datum_});
     BandReader reader(source_, datum_, prefilter_, archive_geometry(metadata_).wraps_x);
     std::vector<VertexReport> tiles(static_cast<std::size_t>(grid_.tile_columns()));
     for (std::int64_t row = 0; row < grid_.tile_rows(); ++row) {
@@ -64,7 +64,7 @@ class VertexCheck {
   }
 
  private:
-  [[nodiscard]] VertexReport check_tile(const VertexCutter& cutter, const Band& band, TileIndex tile) const {
+  [[nodiscard]] VertexReport check_tile(const TileResampler& cutter, const Band& band, TileIndex tile) const {
     std::vector<float> heights(static_cast<std::size_t>(grid_.shape().stored_vertex_count()));
     cutter.cut(tile, band.view(), heights);
     const std::vector<double> stored = archive_.read_elevations(tile);

@@ -7,7 +7,7 @@
 
 #include "isohf/metadata.h"
 #include "isohf/projection/choose_projection.h"
-#include "isohf/surface/source/source_geometry.h"
+#include "isohf/surface/resample/tile_resampler.h"
 
 namespace isohf {
 

@@ -14,7 +14,7 @@
 #include "isohf/convert/stages/tile_source.h"
 #include "isohf/error.h"
 #include "isohf/surface/source/edge_range.h"
-#include "isohf/surface/source/source_survey.h"
+#include "isohf/surface/source/source_statistics.h"
 
 namespace isohf {
 namespace {

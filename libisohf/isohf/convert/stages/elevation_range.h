@@ -2,7 +2,7 @@
 
 #include "isohf/surface/resample/kernels.h"
 #include "isohf/surface/resample/prefilter.h"
-#include "isohf/surface/source/source_scan.h"
+#include "isohf/surface/source/source_statistics.h"
 
 namespace isohf {
 

@@ -5,7 +5,7 @@
 #include "isohf/archive/codec/quantise.h"
 #include "isohf/metadata.h"
 #include "isohf/raster.h"
-#include "isohf/surface/source/source_scan.h"
+#include "isohf/surface/source/source_statistics.h"
 
 namespace isohf {
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "isohf/convert/conversion.h"
-#include "isohf/surface/resample/vertex_cutter.h"
+#include "isohf/surface/resample/tile_resampler.h"
 #include "isohf/surface/source/band_reader.h"
 #include "isohf/surface/source/source_rows.h"
 
@@ -17,7 +17,7 @@ namespace isohf {
 /// one, bands of as many tiles as memory allows are filtered first.
 class TileSource {
  public:
-  /// `limits` as TileCutter's. The conversion outlives it.
+  /// `limits` as TileResampler's. The conversion outlives it.
   TileSource(const Conversion& job, const ElevationRange& limits);
   ~TileSource();
 
@@ -38,14 +38,14 @@ class TileSource {
   /// MemoryPlan::tiles_in_flight have entered after.
   [[nodiscard]] std::shared_ptr<const Part> read(TileIndex tile);
 
-  /// heights [C x R] out, as TileCutter::cut. Any thread.
+  /// heights [C x R] out, as TileResampler::cut. Any thread.
   void cut(TileIndex tile, const Part& part, std::span<float> heights) const;
 
  private:
   struct Windows;
 
   const Conversion& job_;
-  std::unique_ptr<VertexCutter> cutter_;
+  std::unique_ptr<TileResampler> cutter_;
   bool cuts_windows_;  ///< tiles have their own pieces of the source
   bool reads_whole_rows_;
   std::vector<RowRange> columns_needed_;  ///< by tile column

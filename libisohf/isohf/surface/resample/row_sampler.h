@@ -8,7 +8,7 @@
 #include "isohf/surface/resample/kernels.h"
 #include "isohf/surface/source/source_axis.h"
 #include "isohf/surface/source/source_band.h"
-#include "isohf/surface/source/source_scan.h"
+#include "isohf/surface/source/source_statistics.h"
 
 namespace isohf {
 

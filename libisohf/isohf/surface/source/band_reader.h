@@ -7,7 +7,7 @@
 
 #include "isohf/raster.h"
 #include "isohf/surface/resample/prefilter.h"
-#include "isohf/surface/resample/tile_cutter.h"
+#include "isohf/surface/resample/tile_resampler.h"
 #include "isohf/surface/source/sample_types.h"
 #include "isohf/surface/source/source_rows.h"
 

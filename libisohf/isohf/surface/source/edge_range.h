@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "isohf/raster.h"
-#include "isohf/surface/source/source_scan.h"
+#include "isohf/surface/source/source_statistics.h"
 
 namespace isohf {
 
@@ -30,7 +30,7 @@ class EdgeRange {
   [[nodiscard]] std::uint64_t memory_bytes() const;
 
   /// After all windows: `range` widened to hold every continued elevation, but by no more than an eighth at either end;
-  /// steeper edges are held at the end of the codes (TileCutter's limits).
+  /// steeper edges are held at the end of the codes (TileResampler's limits).
   [[nodiscard]] ElevationRange widen(const ElevationRange& range) const;
 
  private:

@@ -1,4 +1,4 @@
-#include "isohf/surface/resample/tile_cutter.h"
+#include "isohf/surface/resample/tile_resampler.h"
 
 #include <gtest/gtest.h>
 
@@ -38,17 +38,17 @@ struct Fixture {
   [[nodiscard]] SourceAxis axis(std::int64_t samples, Outside outside) const {
     return {samples, first(), spacing, registration, outside, 25.0};
   }
-  [[nodiscard]] TileCutter cutter(const TileGrid& grid, Filter filter, Outside outside) const {
-    return {grid, axis(width, outside), axis(height, outside), Kernel::make(filter), {-1e9, 1e9}};
+  [[nodiscard]] std::unique_ptr<TileResampler> cutter(const TileGrid& grid, Filter filter, Outside outside) const {
+    return make_grid_resampler(grid, {axis(width, outside), axis(height, outside)}, Kernel::make(filter), {-1e9, 1e9});
   }
   /// Cuts with a band of just the rows that the cutter asks for.
   [[nodiscard]] std::vector<float> cut(const TileGrid& grid, TileIndex tile, Filter filter = Filter::kBilinear,
                                        Outside outside = Outside::kClamp) const {
-    const TileCutter cutter_ = cutter(grid, filter, outside);
-    const RowRange rows = cutter_.rows_needed(tile.row);
+    const auto cutter_ = cutter(grid, filter, outside);
+    const RowRange rows = cutter_->rows_needed(tile.row);
     const SourceBand band{{heights.data() + rows.first * width, width, rows.last - rows.first + 1}, rows.first};
     std::vector<float> out(static_cast<std::size_t>(grid.shape().stored_vertex_count()));
-    cutter_.cut(tile, band, out);
+    cutter_->cut(tile, band, out);
     return out;
   }
 };
@@ -65,7 +65,7 @@ float bumps(double x, double z) {
 constexpr Filter kSlopes[] = {Filter::kBilinear, Filter::kLimitedCubic, Filter::kCatmullRom,
                               Filter::kBspline2, Filter::kBspline3,     Filter::kBspline5};
 
-TEST(TileCutter, ReproducesAPlaneToTheVeryEdgeOfTheSourceAndAsFarAsItGoesOn) {
+TEST(GridResampler, ReproducesAPlaneToTheVeryEdgeOfTheSourceAndAsFarAsItGoesOn) {
   const auto plane = [](double x, double z) { return static_cast<float>(3.0 + 0.25 * x - 0.5 * z); };
   for (const Registration registration : {Registration::kArea, Registration::kPoint}) {
     const Fixture source(43, 44, registration, plane);
@@ -124,7 +124,7 @@ void for_each_vertex_inside(const Fixture& source, Filter filter, Look look) {
   }
 }
 
-TEST(TileCutter, LimitedCubicStaysWithinTheSamplesAroundEachVertex) {
+TEST(GridResampler, LimitedCubicStaysWithinTheSamplesAroundEachVertex) {
   std::mt19937 random(3);
   for (const double void_share : {0.0, 0.1, 0.4}) {
     Fixture source(42, 41, Registration::kPoint, bumps);
@@ -149,7 +149,7 @@ TEST(TileCutter, LimitedCubicStaysWithinTheSamplesAroundEachVertex) {
   }
 }
 
-TEST(TileCutter, LimitedCubicKeepsWaterFlatAtTheFootOfCliffs) {
+TEST(GridResampler, LimitedCubicKeepsWaterFlatAtTheFootOfCliffs) {
   std::mt19937 random(5);
   const auto is_land = [](double x, double z) { return x + 0.7 * z + 25.0 * std::sin(0.07 * z) > 330.0; };
   const Fixture source(42, 41, Registration::kPoint, [&](double x, double z) {
@@ -169,7 +169,7 @@ TEST(TileCutter, LimitedCubicKeepsWaterFlatAtTheFootOfCliffs) {
   EXPECT_GT(not_flat[Filter::kCatmullRom], 20) << "no cliff's foot is there to ring";
 }
 
-TEST(TileCutter, PlanesAreExactNextToVoidsBetweenFourSamples) {
+TEST(GridResampler, PlanesAreExactNextToVoidsBetweenFourSamples) {
   const auto plane = [](double x, double z) { return static_cast<float>(3.0 + 0.25 * x - 0.5 * z); };
   std::mt19937 random(9);
   for (const int voids : {20, 300}) {
@@ -214,7 +214,7 @@ TEST(Errata, E06SlidVerticesAreSampledWhereTheyLie) {
   }
 }
 
-TEST(TileCutter, SharedVerticesAndPaddingHaveTheSameBitsInEveryTile) {
+TEST(GridResampler, SharedVerticesAndPaddingHaveTheSameBitsInEveryTile) {
   std::mt19937 random(7);
   Fixture source(50, 45, Registration::kArea, bumps);
   // Voids near tile edges must not make a difference either.
@@ -243,7 +243,7 @@ TEST(TileCutter, SharedVerticesAndPaddingHaveTheSameBitsInEveryTile) {
   }
 }
 
-TEST(TileCutter, VoidsNeverLeakIntoElevations) {
+TEST(GridResampler, VoidsNeverLeakIntoElevations) {
   Fixture source(40, 40, Registration::kPoint, [](double, double) { return 100.0F; });
   for (std::int64_t row = 10; row < 20; ++row) {
     for (std::int64_t column = 12; column < 25; ++column)
@@ -275,14 +275,14 @@ TEST(TileCutter, VoidsNeverLeakIntoElevations) {
   }
 }
 
-TEST(TileCutter, ReadsOnlyTheRowsThatItAskedFor) {
+TEST(GridResampler, ReadsOnlyTheRowsThatItAskedFor) {
   const Fixture source(30, 200, Registration::kArea, bumps);
   const TileGrid grid = TileGrid::make(TileShape::make(12, 11, 2), 3, 25, 82.0, 82.0);
   for (const Filter filter : kFilters) {
-    const TileCutter cutter = source.cutter(grid, filter, Outside::kCover);
+    const auto cutter = source.cutter(grid, filter, Outside::kCover);
     std::int64_t last_first = 0;
     for (std::int64_t row = 0; row < 25; ++row) {
-      const RowRange rows = cutter.rows_needed(row);
+      const RowRange rows = cutter->rows_needed(row);
       EXPECT_GE(rows.first, 0);
       EXPECT_LT(rows.last, 200);
       EXPECT_LE(rows.last - rows.first, 30) << "a band, not the whole";
@@ -296,7 +296,7 @@ TEST(TileCutter, ReadsOnlyTheRowsThatItAskedFor) {
   }
 }
 
-TEST(TileCutter, OutsideFollowsTheRule) {
+TEST(GridResampler, OutsideFollowsTheRule) {
   const Fixture source(20, 20, Registration::kPoint, [](double x, double z) { return static_cast<float>(x + z); });
   const TileGrid grid = TileGrid::make(TileShape::make(12, 11, 2), 1, 1, 380.0, 380.0);  // twice the source
   const int c = 8;

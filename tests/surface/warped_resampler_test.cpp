@@ -1,4 +1,4 @@
-#include "isohf/surface/resample/warped_cutter.h"
+#include "isohf/surface/resample/tile_resampler.h"
 
 #include <gtest/gtest.h>
 
@@ -12,7 +12,6 @@
 
 #include "isohf/projection/choose_projection.h"
 #include "isohf/projection/projected_extent.h"
-#include "isohf/surface/source/source_geometry.h"
 
 namespace isohf {
 namespace {
@@ -57,7 +56,7 @@ struct Fixture {
   [[nodiscard]] std::vector<float> cut(TileIndex tile, Filter filter, Outside outside) const {
     SourceGeometry with = geometry;
     with.outside = outside;
-    const auto cutter = make_cutter(grid, with, Kernel::make(filter), {-1e9, 1e9});
+    const auto cutter = make_tile_resampler(grid, with, Kernel::make(filter), {-1e9, 1e9});
     const RowRange rows = cutter->rows_needed(tile.row);
     const std::vector<float> band(heights.begin() + rows.first * with.width,
                                   heights.begin() + (rows.last + 1) * with.width);
@@ -94,7 +93,7 @@ double slope(double longitude, double latitude) {
   return 20.0 * longitude - 35.0 * latitude;
 }
 
-TEST(WarpedCutter, ReproducesAPlaneOfTheSourceAtEveryVertexToItsVeryEdge) {
+TEST(WarpedResampler, ReproducesAPlaneOfTheSourceAtEveryVertexToItsVeryEdge) {
   for (const char* request : {"lambert-conformal", "transverse-mercator", "local"}) {
     const Fixture source(request, {5.0, 40.0, 12.0, 46.0}, 140, 120, slope);
     for (const Filter filter : {Filter::kBilinear, Filter::kLimitedCubic, Filter::kCatmullRom, Filter::kBspline3}) {
@@ -110,7 +109,7 @@ TEST(WarpedCutter, ReproducesAPlaneOfTheSourceAtEveryVertexToItsVeryEdge) {
   }
 }
 
-TEST(WarpedCutter, GoesRoundTheSeamAndOverThePole) {
+TEST(WarpedResampler, GoesRoundTheSeamAndOverThePole) {
   const auto waves = [](double longitude, double latitude) {
     constexpr double kDegree = M_PI / 180.0;
     const double radius = (90.0 - latitude);
@@ -135,7 +134,7 @@ TEST(WarpedCutter, GoesRoundTheSeamAndOverThePole) {
   EXPECT_GT(near_seam, 100);
 }
 
-TEST(WarpedCutter, SharedVerticesHaveTheSameBitsInEveryTile) {
+TEST(WarpedResampler, SharedVerticesHaveTheSameBitsInEveryTile) {
   std::mt19937 random(7);
   Fixture source("lambert-conformal", {5.0, 40.0, 12.0, 46.0}, 140, 120,
                  [](double x, double y) { return 50.0 * std::sin(x * 3.0) + 30.0 * std::cos(y * 5.0 + x); });
@@ -152,7 +151,7 @@ TEST(WarpedCutter, SharedVerticesHaveTheSameBitsInEveryTile) {
   }
 }
 
-TEST(WarpedCutter, BeyondTheSourceFollowsTheRule) {
+TEST(WarpedResampler, BeyondTheSourceFollowsTheRule) {
   const Fixture source("lambert-conformal", {5.0, 40.0, 12.0, 46.0}, 140, 120, slope);
   const auto beyond = [&](SourcePosition at) {
     const auto over = [](double place, std::int64_t samples) {
@@ -194,7 +193,7 @@ TEST(WarpedCutter, BeyondTheSourceFollowsTheRule) {
   EXPECT_GT(ended, 10);
 }
 
-TEST(WarpedCutter, VoidsNeverLeakIntoElevations) {
+TEST(WarpedResampler, VoidsNeverLeakIntoElevations) {
   Fixture source("transverse-mercator", {5.0, 40.0, 12.0, 46.0}, 140, 120, [](double, double) { return 100.0; });
   std::mt19937 random(11);
   for (int i = 0; i < 2000; ++i) source.heights[random() % source.heights.size()] = kVoid;

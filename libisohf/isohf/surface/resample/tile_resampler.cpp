@@ -1,0 +1,331 @@
+#include "isohf/surface/resample/tile_resampler.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "isohf/base/assert.h"
+#include "isohf/surface/resample/row_sampler.h"
+#include "isohf/surface/resample/void_rule.h"
+
+namespace isohf {
+namespace {
+
+/// Beyond this many samples no slope goes on: next to a pole a lattice step crosses any number of columns.
+constexpr double kMostContinued = 256.0;
+
+/// Samples that kContinuedSteps lattice steps cross at most, along u and v, anywhere on the source's border.
+SourcePosition continued_samples(const TileGrid& grid, const WarpPlace& place) {
+  const ExactWarp warp(place);
+  constexpr int kPlaces = 64;
+  const auto last_u = static_cast<double>(place.width - 1);
+  const auto last_v = static_cast<double>(place.height - 1);
+  const double steps[2][2] = {{2.0 * grid.sigma_x(), 0.0}, {0.0, grid.sigma_z()}};
+  SourcePosition most;
+  const auto look_at = [&](double u, double v) {
+    const WorldPoint world = warp.world_from_source({u, v});
+    for (const auto& step : steps) {
+      const SourcePosition there = warp.source_from_world({world.x + step[0], world.z + step[1]});
+      const double across = std::remainder(there.u - u, place.columns_round());
+      most.u = std::max(most.u, std::abs(across));  // a NaN is passed over
+      most.v = std::max(most.v, std::abs(there.v - v));
+    }
+  };
+  for (int i = 0; i <= kPlaces; ++i) {
+    const double share = static_cast<double>(i) / kPlaces;
+    look_at(share * last_u, 0.0);
+    look_at(share * last_u, last_v);
+    look_at(0.0, share * last_v);
+    look_at(last_u, share * last_v);
+  }
+  // Upwards to a sixteenth: last bits of the projection must not decide what is void.
+  const auto rounded = [](double samples) {
+    return std::min(std::ceil(kContinuedSteps * samples * 16.0 + 0.01) / 16.0, kMostContinued);
+  };
+  return {rounded(most.u), rounded(most.v)};
+}
+
+/// Taps of all columns of a tile's rows of one parity.
+ColumnTaps taps_of_tile(const TileGrid& grid, const SourceAxis& axis, const Kernel& kernel, TileIndex tile,
+                        int parity) {
+  std::vector<double> world_x(static_cast<std::size_t>(grid.shape().columns()));
+  const std::int64_t round = grid.tile_columns() * 2 * grid.shape().cell_columns();
+  for (std::size_t c = 0; c < world_x.size(); ++c) {
+    LatticeVertex vertex = grid.lattice_vertex(tile, {static_cast<int>(c), parity});
+    // The same vertex has the same bits on both sides of the join.
+    if (axis.wraps()) vertex.x = ((vertex.x % round) + round) % round;
+    world_x[c] = grid.world_from_lattice(vertex).x;
+  }
+  return make_column_taps(axis, kernel, world_x);
+}
+
+class GridResampler final : public TileResampler {
+ public:
+  GridResampler(const TileGrid& grid, const SourceAxis& axis_x, const SourceAxis& axis_z, const Kernel& kernel,
+                const ElevationRange& limits);
+
+  [[nodiscard]] RowRange rows_needed(std::int64_t tile_row) const override;
+  [[nodiscard]] RowRange columns_needed(std::int64_t tile_column) const override;
+  /// O(C*R*taps); no allocation proportional to anything but the tile.
+  void cut(TileIndex tile, const SourceBand& band, std::span<float> heights) const override;
+
+ private:
+  TileGrid grid_;
+  SourceAxis axis_x_;
+  Kernel kernel_;
+  RowSampler sampler_;
+};
+
+GridResampler::GridResampler(const TileGrid& grid, const SourceAxis& axis_x, const SourceAxis& axis_z,
+                             const Kernel& kernel, const ElevationRange& limits)
+    : grid_(grid), axis_x_(axis_x), kernel_(kernel), sampler_(axis_x, axis_z, kernel, limits) {}
+
+RowRange GridResampler::rows_needed(std::int64_t tile_row) const {
+  RowRange range = RowSampler::no_rows();
+  for (int r = 0; r < grid_.shape().rows(); ++r) {
+    sampler_.add_rows_needed(grid_.world_from_lattice(grid_.lattice_vertex({0, tile_row}, {0, r})).z, range);
+  }
+  return range;
+}
+
+RowRange GridResampler::columns_needed(std::int64_t tile_column) const {
+  RowRange range = RowSampler::no_rows();
+  for (const int parity : {0, 1}) {
+    add_columns_needed(axis_x_, taps_of_tile(grid_, axis_x_, kernel_, {tile_column, 0}, parity), range);
+  }
+  return range;
+}
+
+void GridResampler::cut(TileIndex tile, const SourceBand& band, std::span<float> heights) const {
+  const auto columns = static_cast<std::size_t>(grid_.shape().columns());
+  ISOHF_ASSERT(heights.size() == static_cast<std::size_t>(grid_.shape().stored_vertex_count()));
+  const std::array<ColumnTaps, 2> taps = {taps_of_tile(grid_, axis_x_, kernel_, tile, 0),
+                                          taps_of_tile(grid_, axis_x_, kernel_, tile, 1)};
+  RowSampler::Scratch scratch;
+  for (int r = 0; r < grid_.shape().rows(); ++r) {
+    const double world_z = grid_.world_from_lattice(grid_.lattice_vertex(tile, {0, r})).z;
+    sampler_.sample(band, world_z, taps[static_cast<std::size_t>(r & 1)], scratch,
+                    heights.subspan(static_cast<std::size_t>(r) * columns, columns));
+  }
+}
+
+constexpr float kVoid = std::numeric_limits<float>::quiet_NaN();
+
+double reach_of(const SourceAxis& x, const SourceAxis& z, Outside outside) {
+  if (outside == Outside::kClamp) return HUGE_VAL;  // the edge goes on for ever
+  return static_cast<double>(std::max(x.continued_samples(), z.continued_samples())) + 1.0;
+}
+
+/// Sum over taps x taps coefficients, the first of which is `from`.
+template <int kTaps>
+float blend(const float* from, std::int64_t stride, const TapWeights& columns, const TapWeights& rows) {
+  float sum = 0.0F;
+  for (int j = 0; j < kTaps; ++j) {
+    const float* line = from + j * stride;
+    float along = columns.weights[0] * line[0];
+    for (int i = 1; i < kTaps; ++i) along += columns.weights[static_cast<std::size_t>(i)] * line[i];
+    sum += rows.weights[static_cast<std::size_t>(j)] * along;
+  }
+  return sum;
+}
+
+float blend(int taps, const float* from, std::int64_t stride, const TapWeights& columns, const TapWeights& rows) {
+  switch (taps) {
+    case 1:
+      return *from;
+    case 2:
+      return blend<2>(from, stride, columns, rows);
+    case 3:
+      return blend<3>(from, stride, columns, rows);
+    case 4:
+      return blend<4>(from, stride, columns, rows);
+    case 6:
+      return blend<6>(from, stride, columns, rows);
+    default:
+      ISOHF_ASSERT(taps == 12);
+      return blend<12>(from, stride, columns, rows);
+  }
+}
+
+/// Rule 5 of kernels.h: `from` as in blend, of four taps.
+float held_within_cell(float height, const float* from, std::int64_t stride) {
+  const float* above = from + stride + 1;
+  const float* below = above + stride;
+  const auto [least, most] = std::minmax({above[0], above[1], below[0], below[1]});
+  return held_within(height, least, most);
+}
+
+bool any_void(const char* from, std::int64_t stride, int taps) {
+  char any = 0;
+  for (int j = 0; j < taps; ++j) {
+    for (int i = 0; i < taps; ++i) any = static_cast<char>(any | from[j * stride + i]);
+  }
+  return any != 0;
+}
+
+class WarpedResampler final : public TileResampler {
+ public:
+  /// The axes are those of positions (SourceAxis::of_positions, or one that wraps with spacing 1 for x). `limits` as in
+  /// GridResampler.
+  WarpedResampler(const TileGrid& grid, const WarpPlace& place, const SourceAxis& axis_x, const SourceAxis& axis_z,
+                  Outside outside, const Kernel& kernel, const ElevationRange& limits);
+
+  [[nodiscard]] RowRange rows_needed(std::int64_t tile_row) const override;
+  /// All: a column of tiles is no column of the source.
+  [[nodiscard]] RowRange columns_needed(std::int64_t) const override { return {0, axis_x_.samples() - 1}; }
+  /// O(C*R*taps^2).
+  void cut(TileIndex tile, const SourceBand& band, std::span<float> heights) const override;
+
+ private:
+  void sample_row(const SourceBand& band, const double* u, const double* v, float* heights) const;
+  /// Any position: continued, held, void or not.
+  [[nodiscard]] float sample(const SourceBand& band, double u, double v) const;
+  [[nodiscard]] float sample_inside(const SourceBand& band, double u, double v) const;
+
+  TileGrid grid_;
+  SourceAxis axis_x_;
+  SourceAxis axis_z_;
+  Kernel kernel_;
+  SourceWarp warp_;
+  std::vector<SourceWarp::RowBounds> bounds_;  ///< by tile row
+  float lowest_;
+  float highest_;
+};
+
+WarpedResampler::WarpedResampler(const TileGrid& grid, const WarpPlace& place, const SourceAxis& axis_x,
+                                 const SourceAxis& axis_z, Outside outside, const Kernel& kernel,
+                                 const ElevationRange& limits)
+    : grid_(grid),
+      axis_x_(axis_x),
+      axis_z_(axis_z),
+      kernel_(kernel),
+      warp_(grid, place, reach_of(axis_x, axis_z, outside)),
+      bounds_(warp_.reading_bounds()),
+      lowest_(static_cast<float>(limits.min)),
+      highest_(static_cast<float>(limits.max)) {}
+
+RowRange WarpedResampler::rows_needed(std::int64_t tile_row) const {
+  const SourceWarp::RowBounds& bounds = bounds_[static_cast<std::size_t>(tile_row)];
+  const std::int64_t count = axis_z_.samples();
+  RowRange range = RowRange::none();
+  const auto add = [&](double v) {
+    const std::int64_t first = kernel_.at(v).first;
+    for (std::int64_t row = first; row < first + kernel_.taps(); ++row) {
+      range.first = std::min(range.first, axis_z_.index(row));
+      range.last = std::max(range.last, axis_z_.index(row));
+    }
+  };
+  const auto last = static_cast<double>(count - 1);
+  add(std::clamp(bounds.least, 0.0, last));
+  add(std::clamp(bounds.most, 0.0, last));
+  // What is continued reads the edge and as far inside as it lies outside.
+  const auto inside = static_cast<double>(axis_z_.continued_samples());
+  if (bounds.least < 0.0) add(std::min(inside, last));
+  if (bounds.most > last) add(std::max(last - inside, 0.0));
+  return range;
+}
+
+float WarpedResampler::sample_inside(const SourceBand& band, double u, double v) const {
+  return VoidRule(band, axis_x_, axis_z_, kernel_).at(u, v, kernel_.at(u), kernel_.at(v));
+}
+
+float WarpedResampler::sample(const SourceBand& band, double u, double v) const {
+  if (std::isnan(u) || std::isnan(v)) return kVoid;
+  if (!axis_x_.wraps()) {
+    // Beyond half a turn from the middle the other side is nearer.
+    const double middle = static_cast<double>(axis_x_.samples() - 1) / 2.0;
+    u = middle + std::remainder(u - middle, warp_.exact().place().columns_round());
+  }
+  const SourceAxis::Place x = axis_x_.place(u);
+  const SourceAxis::Place z = axis_z_.place(v);
+  if (!x.has_elevation || !z.has_elevation) return kVoid;
+  const auto along_row = [&](double row) {
+    const float height = sample_inside(band, x.position, row);
+    return x.continued ? continue_slope(sample_inside(band, x.edge, row), height) : height;
+  };
+  float height = along_row(z.position);
+  if (z.continued) height = continue_slope(along_row(z.edge), height);
+  if (x.continued || z.continued) height = held_within(height, lowest_, highest_);
+  return height;
+}
+
+void WarpedResampler::sample_row(const SourceBand& band, const double* u, const double* v, float* heights) const {
+  const int taps = kernel_.taps();
+  const auto last_u = static_cast<double>(axis_x_.samples() - 1);
+  const auto last_v = static_cast<double>(axis_z_.samples() - 1);
+  const std::int64_t end_column = axis_x_.samples() - taps;
+  const std::int64_t first_row = band.first_row;
+  const std::int64_t end_row = band.first_row + band.heights.rows() - taps;
+  const std::int64_t stride = band.heights.stride();
+  for (int c = 0; c < grid_.shape().columns(); ++c) {
+    heights[c] = kVoid;
+    if (u[c] >= 0.0 && u[c] <= last_u && v[c] >= 0.0 && v[c] <= last_v) {
+      const TapWeights columns = kernel_.at(u[c]);
+      const TapWeights rows = kernel_.at(v[c]);
+      // Away from the source's ends: no tap is another one's mirror image.
+      if (columns.first >= 0 && columns.first <= end_column && rows.first >= 0 &&
+          rows.first + taps <= axis_z_.samples()) {
+        ISOHF_ASSERT(rows.first >= first_row && rows.first <= end_row);
+        const std::int64_t at = (rows.first - first_row) * stride + columns.first - band.first_column;
+        const bool near_void = band.voids.data() != nullptr && any_void(band.voids.data() + at, stride, taps);
+        const float* from = band.heights.data() + at;
+        heights[c] = near_void ? kVoid : blend(taps, from, stride, columns, rows);
+        if (std::isnan(heights[c])) {
+          heights[c] = VoidRule(band, axis_x_, axis_z_, kernel_).at(u[c], v[c], columns, rows);
+        } else if (kernel_.is_limited()) {
+          heights[c] = held_within_cell(heights[c], from, stride);
+        }
+        continue;
+      }
+    }
+    heights[c] = sample(band, u[c], v[c]);
+  }
+}
+
+void WarpedResampler::cut(TileIndex tile, const SourceBand& band, std::span<float> heights) const {
+  const auto columns = static_cast<std::size_t>(grid_.shape().columns());
+  ISOHF_ASSERT(heights.size() == static_cast<std::size_t>(grid_.shape().stored_vertex_count()));
+  std::vector<double> u(heights.size());
+  std::vector<double> v(heights.size());
+  warp_.positions(tile, u, v);
+  for (std::size_t at = 0; at < heights.size(); at += columns) {
+    sample_row(band, u.data() + at, v.data() + at, heights.data() + at);
+  }
+}
+
+}  // namespace
+
+SourceAxes make_axes(const TileGrid& grid, const SourceGeometry& geometry) {
+  if (geometry.warp) {
+    const SourcePosition continued = continued_samples(grid, *geometry.warp);
+    const auto along = [&](std::int64_t samples, double steps) {
+      return SourceAxis::of_positions(samples, geometry.registration, geometry.outside, steps);
+    };
+    return {geometry.wraps_x ? SourceAxis::wrapping(geometry.width, 0.0, 1.0) : along(geometry.width, continued.u),
+            along(geometry.height, continued.v)};
+  }
+  const SourceAxis z(geometry.height, geometry.first_sample_z, geometry.spacing_z, geometry.registration,
+                     geometry.outside, kContinuedSteps * grid.sigma_z());
+  if (geometry.wraps_x) {
+    return {SourceAxis::wrapping(geometry.width, geometry.first_sample_x, geometry.spacing_x), z};
+  }
+  return {SourceAxis(geometry.width, geometry.first_sample_x, geometry.spacing_x, geometry.registration,
+                     geometry.outside, kContinuedSteps * 2.0 * grid.sigma_x()),
+          z};
+}
+
+std::unique_ptr<TileResampler> make_grid_resampler(const TileGrid& grid, const SourceAxes& axes, const Kernel& kernel,
+                                                   const ElevationRange& limits) {
+  return std::make_unique<GridResampler>(grid, axes.x, axes.z, kernel, limits);
+}
+
+std::unique_ptr<TileResampler> make_tile_resampler(const TileGrid& grid, const SourceGeometry& geometry,
+                                                   const Kernel& kernel, const ElevationRange& limits) {
+  const SourceAxes axes = make_axes(grid, geometry);
+  if (!geometry.warp) return make_grid_resampler(grid, axes, kernel, limits);
+  return std::make_unique<WarpedResampler>(grid, *geometry.warp, axes.x, axes.z, geometry.outside, kernel, limits);
+}
+
+}  // namespace isohf

@@ -1,0 +1,71 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+
+#include "isohf/lattice.h"
+#include "isohf/surface/resample/kernels.h"
+#include "isohf/surface/resample/source_warp.h"
+#include "isohf/surface/source/source_axis.h"
+#include "isohf/surface/source/source_band.h"
+#include "isohf/surface/source/source_statistics.h"
+
+namespace isohf {
+
+/// Resamples the source at every stored vertex of a tile: visible ones, slid ones where they lie (errata E6), padding.
+///
+/// An elevation is a pure function of the vertex's place in the whole heightfield, so tiles that share a vertex hold
+/// the same bits of it. Thread-safe.
+class TileResampler {
+ public:
+  virtual ~TileResampler() = default;
+
+  /// The source rows that a row of tiles reads; at least one.
+  [[nodiscard]] virtual RowRange rows_needed(std::int64_t tile_row) const = 0;
+
+  /// The source columns that a column of tiles reads; at least one.
+  [[nodiscard]] virtual RowRange columns_needed(std::int64_t tile_column) const = 0;
+
+  /// Cuts one tile. `band` holds at least rows_needed(tile.row) and columns_needed(tile.column).
+  /// heights [C x R] out, relative to the band's datum; NaN where void: outside the source, or where less than half of
+  /// the kernel's weight, or none of the nearest samples, is valid.
+  virtual void cut(TileIndex tile, const SourceBand& band, std::span<float> heights) const = 0;
+
+ protected:
+  TileResampler() = default;
+  TileResampler(const TileResampler&) = default;
+  TileResampler& operator=(const TileResampler&) = default;
+};
+
+/// Where a source's samples lie in the world: all that resampling it needs beside the samples.
+struct SourceGeometry {
+  std::int64_t width = 0;
+  std::int64_t height = 0;
+  Registration registration = Registration::kPoint;
+  double first_sample_x = 0.0;  ///< world place of sample (0, 0)
+  double first_sample_z = 0.0;
+  double spacing_x = 1.0;  ///< world units between columns and rows
+  double spacing_z = 1.0;
+  Outside outside = Outside::kCover;
+  bool wraps_x = false;           ///< the East edge is the West edge
+  std::optional<WarpPlace> warp;  ///< where the source was projected; first sample and spacings then say nothing
+};
+
+/// The source's axes as the cutter of this grid reads them: in world units, or in positions where it was projected.
+struct SourceAxes {
+  SourceAxis x;
+  SourceAxis z;
+};
+[[nodiscard]] SourceAxes make_axes(const TileGrid& grid, const SourceGeometry& geometry);
+
+/// The resampler for a source of that geometry. `limits`, relative to the band's datum, hold the continuation beyond the
+/// source's edge only; elevations of the source itself are never touched.
+[[nodiscard]] std::unique_ptr<TileResampler> make_tile_resampler(const TileGrid& grid, const SourceGeometry& geometry,
+                                                                 const Kernel& kernel, const ElevationRange& limits);
+/// The same where the source's rows are rows of the world, by its axes.
+[[nodiscard]] std::unique_ptr<TileResampler> make_grid_resampler(const TileGrid& grid, const SourceAxes& axes,
+                                                                 const Kernel& kernel, const ElevationRange& limits);
+
+}  // namespace isohf
