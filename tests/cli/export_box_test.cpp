@@ -105,7 +105,7 @@ TEST_F(ExportBox, RefusesGroundAtBothEndsOfAGlobe) {
     convert("globe.flt", more);
     EXPECT_THAT(
         refused("170,-10,-175,10"),
-        HasSubstr("--bbox 170,-10,-175,10 lies at the East end and at the West end of the archive's ground, -180 "
+        HasSubstr("--bbox 170,-10,-175,10: lies at the East end and at the West end of the archive's ground, -180 "
                   "to 180, which is no rectangle of it; give 170 to 180 and -180 to -175 one after the other"));
     EXPECT_EQ(exported("170,-10,180,10").info.width, 20);
     EXPECT_EQ(exported("-180,-10,-175,10").info.width, 10);

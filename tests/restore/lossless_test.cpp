@@ -34,7 +34,7 @@ void expect_exact(HeightSource& source, const std::string& path, const std::stri
   const auto record = lossless_record(archive.metadata());
   ASSERT_TRUE(record.has_value()) << what;
   std::vector<std::byte> back;
-  for (LosslessReader reader(archive, *record); !reader.at_end();) {
+  for (SourceRowReader reader(archive); !reader.at_end();) {
     const std::vector<std::byte> part = reader.read_next();
     back.insert(back.end(), part.begin(), part.end());
   }
@@ -86,6 +86,16 @@ TEST(Lossless, ReturnsFloatsWithTheirNansAndZeros) {
   source.mutable_info().z_offset = -17.0;
   convert_to(source, folder / "a.isohf", {});
   expect_exact(source, folder / "a.isohf", "float32");
+}
+
+TEST(SourceRowReader, RefusesAnArchiveWithoutResiduals) {
+  const test::TemporaryFolder folder;
+  test::MemorySource<float> source(SampleType::kFloat32, 70, 60, hill);
+  ConvertOptions options;
+  const std::atomic<bool> cancel = false;
+  (void)convert(source, folder / "a.isohf", options, {}, cancel);
+  const ArchiveReader archive(folder / "a.isohf");
+  EXPECT_THROW(SourceRowReader{archive}, Error);
 }
 
 TEST(Lossless, BytesDoNotDependOnThreads) {

@@ -5,6 +5,7 @@
 
 #include <atomic>
 #include <cmath>
+#include <limits>
 #include <random>
 #include <vector>
 
@@ -17,8 +18,6 @@
 
 namespace isohf {
 namespace {
-
-using State = SurfaceSample::State;
 
 /// Hills with a hole, 300 x 200 samples in tiles of 20 x 19.
 class PointSamplerTest : public testing::TestWithParam<CodeType> {
@@ -59,8 +58,8 @@ SurfaceSample one(const ArchiveReader& archive, WorldPoint place) {
   const Barycentric where = barycentric(grid.shape(), at.point);
   sample.elevation =
       interpolate(where, View2D<const double>(elevations.data(), grid.shape().columns(), grid.shape().rows()));
-  sample.state = std::isnan(sample.elevation) ? State::kVoid : State::kSurface;
-  if (sample.state == State::kVoid) return sample;
+  sample.state = std::isnan(sample.elevation) ? SurfaceState::kNodata : SurfaceState::kSurface;
+  if (sample.state == SurfaceState::kNodata) return sample;
   std::vector<float> relative;
   double datum = std::nan("");
   for (const double elevation : elevations) {
@@ -84,20 +83,60 @@ SurfaceSample one(const ArchiveReader& archive, WorldPoint place) {
 void expect_same(const SurfaceSample& found, const SurfaceSample& wanted) {
   ASSERT_EQ(found.state, wanted.state);
   EXPECT_EQ(found.tile, wanted.tile);
-  if (wanted.state != State::kSurface) return;
+  if (wanted.state != SurfaceState::kSurface) return;
   EXPECT_EQ(found.elevation, wanted.elevation);
   EXPECT_EQ(found.normal, wanted.normal);
+}
+
+TEST(PointSampler, FindsElevationsAtAnyPointInAnyOrder) {
+  const TileGrid grid = TileGrid::make(TileShape::make(20, 19, 4), 3, 2, 16.0, 16.0 * std::sqrt(0.75));
+  const auto plane = [](double x, double z) { return 3.0 * x - 2.0 * z + 100.0; };
+  const auto read_one = [&](TileIndex tile) {
+    TileCodes codes;
+    codes.type = CodeType::kF32;
+    for (int r = 0; r < grid.shape().rows(); ++r) {
+      for (int c = 0; c < grid.shape().columns(); ++c) {
+        const WorldPoint at = grid.world_from_lattice(grid.lattice_vertex(tile, {c, r}));
+        codes.heights.push_back(static_cast<float>(plane(at.x, at.z)));
+      }
+    }
+    return codes;
+  };
+  const ReadTiles read = [&](std::span<const TileIndex> tiles) {
+    std::vector<TileCodes> all;
+    for (const TileIndex tile : tiles) all.push_back(read_one(tile));
+    return all;
+  };
+  PointSampler surface(grid, {CodeType::kF32, 0.0, 1.0}, read, 5000);  // two tiles and a half
+  std::vector<WorldPoint> places;
+  for (int i = 0; i < 500; ++i) places.push_back({std::fmod(i * 17.31, 47.9), std::fmod(i * 5.77, 27.6)});
+  places.push_back({-0.1, 3.0});
+  places.push_back({std::numeric_limits<double>::quiet_NaN(), 3.0});
+  for (int pass = 0; pass < 2; ++pass) {
+    std::vector<double> found(places.size());
+    surface.sample(places, std::span(found));
+    for (std::size_t i = 0; i < 500; ++i) EXPECT_NEAR(found[i], plane(places[i].x, places[i].z), 1e-4) << i;
+    EXPECT_TRUE(std::isnan(found[500]) && std::isnan(found[501]));
+  }
 }
 
 TEST_P(PointSamplerTest, FindsWhatTheWholeTileHasAtAnyPlaceInAnyOrder) {
   const ArchiveReader archive(folder / "a.isohf");
   const std::vector<WorldPoint> all = places();
   std::vector<SurfaceSample> found(all.size());
-  PointSampler(archive, 1U << 20U).sample(all, found);
+  std::vector<double> elevations(all.size());
+  Surface surface(archive, 1U << 20U);
+  surface.sample(all, std::span(found));
+  surface.sample(all, std::span(elevations));
   int states[3] = {};
   for (std::size_t i = 0; i < all.size(); ++i) {
     SCOPED_TRACE(testing::Message() << all[i].x << " " << all[i].z);
     expect_same(found[i], one(archive, all[i]));
+    if (i % 100 == 0) expect_same(surface.at(all[i]), found[i]);
+    EXPECT_EQ(std::isnan(elevations[i]), found[i].state != SurfaceState::kSurface);
+    if (found[i].state == SurfaceState::kSurface) {
+      EXPECT_EQ(elevations[i], found[i].elevation);
+    }
     ++states[static_cast<int>(found[i].state)];
   }
   for (const int count : states) EXPECT_GT(count, 10) << "surface, void and outside are all there";
@@ -107,15 +146,15 @@ TEST_P(PointSamplerTest, AnswersDependNeitherOnBatchesNorOnMemoryNorOnThreads) {
   const ArchiveReader archive(folder / "a.isohf");
   const std::vector<WorldPoint> all = places();
   std::vector<SurfaceSample> together(all.size());
-  PointSampler(archive, 1U << 20U).sample(all, together);
+  Surface(archive, 1U << 20U).sample(all, std::span(together));
   for (const int threads : {1, 2, 7}) {
     oneapi::tbb::task_arena arena(threads);
     arena.execute([&] {
-      PointSampler sampler(archive, 1);  // keeps one tile
+      Surface surface(archive, 1);  // keeps one tile
       for (std::size_t first = 0, size = 1; first < all.size(); first += size, size = size * 3 + 1) {
         const std::size_t count = std::min(size, all.size() - first);
         std::vector<SurfaceSample> found(count);
-        sampler.sample(std::span(all).subspan(first, count), found);
+        surface.sample(std::span(all).subspan(first, count), std::span(found));
         for (std::size_t i = 0; i < count; ++i) expect_same(found[i], together[first + i]);
       }
     });

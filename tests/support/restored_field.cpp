@@ -28,10 +28,7 @@ double psnr_of_restoring(Filter filter, const TrigonometricField& field, int mar
   (void)convert(source, folder / "field.isohf", options, {}, cancel);
 
   const ArchiveReader archive(folder / "field.isohf");
-  const Metadata& metadata = archive.metadata();
-  SurfaceRows surface(
-      archive.grid(), metadata.wraps_x, metadata.quantisation, [&](TileIndex tile) { return archive.read_tile(tile); },
-      source_grid(metadata.source), method);
+  RowReader surface(archive, source_grid(archive.metadata().source), method);
   std::vector<double> restored(samples.size());
   surface.read(0, n, restored);
   double squares = 0.0;

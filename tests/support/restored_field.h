@@ -1,6 +1,6 @@
 #pragma once
 
-#include "isohf/restore/surface_rows.h"
+#include "isohf/surface.h"
 #include "support/trigonometric_field.h"
 
 namespace isohf::test {

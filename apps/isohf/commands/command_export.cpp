@@ -12,22 +12,20 @@
 
 #include "commands/command.h"
 #include "commands/export_tiles.h"
+#include "formats/decorate/cropped_source.h"
 #include "interrupt.h"
 #include "isohf/error.h"
-#include "isohf/restore/archive_geometry.h"
+#include "isohf/restore/sample_grids.h"
+#include "isohf/surface.h"
 #include "open_archive.h"
 #include "options/describe.h"
 #include "options/option_values.h"
 #include "options/options_common.h"
 #include "options/options_raster.h"
-#include "output/archive_places.h"
 #include "output/json_output.h"
 #include "output/output_kinds.h"
 #include "output/standard_output.h"
-#include "raster/output_grid.h"
 #include "raster/restored_raster.h"
-#include "raster/restored_samples.h"
-#include "raster/surface_scan.h"
 #include "work_arena.h"
 
 namespace isohf::cli {
@@ -121,28 +119,6 @@ std::optional<ExportOptions> parse(const Arguments& arguments) {
   return options;
 }
 
-/// The samples of the source's grid that lie in a part of the world.
-SampleGrid part_of_source_grid(const SampleGrid& source, const WorldBounds& ground) {
-  constexpr double kOnTheEdge = 1e-6;  // of a spacing; edges are computed by products
-  const auto first = [](double from, double start, double spacing) {
-    return static_cast<std::int64_t>(std::ceil((from - start) / spacing - kOnTheEdge));
-  };
-  const auto last = [](double to, double start, double spacing) {
-    return static_cast<std::int64_t>(std::floor((to - start) / spacing + kOnTheEdge));
-  };
-  const std::int64_t c0 = first(ground.x0, source.first_x, source.spacing_x);
-  const std::int64_t r0 = first(ground.z0, source.first_z, source.spacing_z);
-  SampleGrid part = source;
-  part.width = last(ground.x1, source.first_x, source.spacing_x) - c0 + 1;
-  part.height = last(ground.z1, source.first_z, source.spacing_z) - r0 + 1;
-  part.first_x = source.first_x + static_cast<double>(c0) * source.spacing_x;
-  part.first_z = source.first_z + static_cast<double>(r0) * source.spacing_z;
-  if (part.width < 1 || part.height < 1) {
-    throw Error(ErrorCode::kInvalidArgument, "--bbox holds no sample of the source's grid; --size or --spacing would");
-  }
-  return part;
-}
-
 struct ExportGrid {
   SampleGrid samples;
   TileCut cut;
@@ -151,7 +127,12 @@ struct ExportGrid {
 ExportGrid asked_grid(const ExportOptions& options, const Metadata& metadata) {
   WorldBounds ground = metadata.valid;
   if (options.bbox) {
-    ground = world_bounds(metadata, *options.bbox);
+    const BoundingBox& box = *options.bbox;
+    try {
+      ground = world_bounds(metadata, {box.west, box.south, box.east, box.north});
+    } catch (const Error& error) {
+      throw error.within(fmt::format("--bbox {},{},{},{}", box.west, box.south, box.east, box.north));
+    }
     const TileGrid& tiles = metadata.grid;
     if (!(ground.x0 < tiles.world_width() && ground.x1 > 0.0 && ground.z0 < tiles.world_height() && ground.z1 > 0.0)) {
       throw Error(ErrorCode::kInvalidArgument,
@@ -164,7 +145,14 @@ ExportGrid asked_grid(const ExportOptions& options, const Metadata& metadata) {
     grid.samples = grid_over(ground, area, options.raster.size, spacing_in_world(options.raster, metadata));
   } else {
     grid.samples = natural_grid(metadata);
-    if (options.bbox) grid.samples = part_of_source_grid(grid.samples, ground);
+    if (options.bbox) {
+      const std::optional<SampleGrid> part = part_of(grid.samples, ground);
+      if (!part) {
+        throw Error(ErrorCode::kInvalidArgument,
+                    "--bbox holds no sample of the source's grid; --size or --spacing would");
+      }
+      grid.samples = *part;
+    }
   }
   GridSize size{grid.samples.width, grid.samples.height};
   grid.cut = cut_into_tiles(size, !options.raster.size && !options.raster.spacing, options.tiles, options.tile_size,
@@ -187,32 +175,19 @@ SampleType default_type(const std::string& output) {
   }
 }
 
-/// The scale that spreads elevations over a type's numbers, one of them kept for voids where there are any.
-SampleMapping spread(SampleType type, std::pair<double, double> elevations, bool has_voids) {
-  auto [low, high] = sample_range(type);
-  const std::optional<double> void_value = has_voids ? usual_void(type) : std::nullopt;
-  if (void_value == low) low += 1.0;
-  if (void_value == high) high -= 1.0;
-  const double scale =
-      elevations.second > elevations.first ? (elevations.second - elevations.first) / (high - low) : 1.0;
-  return {type, scale, elevations.first - low * scale};
-}
-
 class Exporter {
  public:
-  Exporter(const ExportOptions& options, const ArchiveReader& archive, const ExportGrid& grid,
-           const std::atomic<bool>& cancel)
+  Exporter(const ExportOptions& options, const ArchiveReader& archive, const ExportGrid& grid)
       : options_(options),
         archive_(archive),
         grid_(grid),
-        display_(options.work.progress, options.common.quiet, options.common.verbose),
-        scan_(archive, OutputGrid(grid.samples), options.method(), display_, cancel) {}
+        display_(options.work.progress, options.common.quiet, options.common.verbose) {}
 
   void run() {
-    has_voids = needs_void(archive_.metadata(), OutputGrid(grid_.samples), options_.raster.output);
+    has_voids = needs_void(archive_.metadata(), grid_.samples, options_.raster.output);
     mapping = choose_mapping();
     if (!options_.common.quiet) warn_of_lost_scale(options_.raster.output, mapping);
-    const auto void_value = has_voids ? usual_void(mapping.type) : std::nullopt;
+    const auto void_value = has_voids ? usual_nodata(mapping.type) : std::nullopt;
     const SampleStore store(mapping, void_value, options_.raster.clamp_range);
     ExportTiles tiles(options_.raster.output, grid_.cut, grid_.samples.width);
     const auto spec_of = [&](std::int64_t column, std::int64_t row) {
@@ -221,15 +196,14 @@ class Exporter {
       part.height = grid_.cut.rows;
       part.first_x += static_cast<double>(column * (grid_.cut.columns - grid_.cut.overlap)) * part.spacing_x;
       part.first_z += static_cast<double>(row * (grid_.cut.rows - grid_.cut.overlap)) * part.spacing_z;
-      RasterSpec spec = restored_raster(archive_.metadata(), OutputGrid(part), mapping.type);
-      set_mapping(spec, mapping, void_value);
+      RasterSpec spec = raster_spec(archive_.metadata(), part, mapping, void_value);
       spec.overwrite = options_.raster.overwrite;
       return spec;
     };
     for (std::int64_t group = 0; group < tiles.groups(); ++group) {
       tiles.begin_group(group, spec_of);
       counts = {};
-      scan_.run("export", [&](std::int64_t row, std::span<const double> elevations) {
+      scan("export", [&](std::int64_t row, std::span<const double> elevations) {
         tiles.write(
             row, store_rows(store, mapping.type, options_.raster.output, grid_.samples.width, row, elevations, counts));
       });
@@ -239,12 +213,19 @@ class Exporter {
   }
 
   SampleMapping mapping;
-  SampleCounts counts;
+  SampleStore::Result counts;
   bool has_voids = false;
   std::int64_t files = 0;
   std::vector<std::string> written;  ///< those beside them as well
 
  private:
+  void scan(const char* stage, const RowReader::Take& take) {
+    RowReader(archive_, grid_.samples, options_.method()).read_all(take, [&](std::int64_t rows) {
+      display_.update(stage, "rows", rows, grid_.samples.height);
+      if (cancel_.load()) throw Error(ErrorCode::kCancelled, "interrupted");
+    });
+  }
+
   SampleMapping choose_mapping() {
     const SampleType type = options_.type.value_or(default_type(options_.raster.output));
     if (options_.z_scale || options_.z_offset) {
@@ -260,7 +241,7 @@ class Exporter {
     double low = std::numeric_limits<double>::infinity();
     double high = -low;
     bool voids = false;
-    scan_.run("range", [&](std::int64_t, std::span<const double> elevations) {
+    scan("range", [&](std::int64_t, std::span<const double> elevations) {
       for (const double z : elevations) {
         voids = voids || std::isnan(z);
         low = z < low ? z : low;
@@ -274,8 +255,8 @@ class Exporter {
   const ExportOptions& options_;
   const ArchiveReader& archive_;
   ExportGrid grid_;
+  const std::atomic<bool>& cancel_ = watch_interrupts();
   ProgressDisplay display_;
-  SurfaceScan scan_;
 };
 
 int run(const ExportOptions& options) {
@@ -285,7 +266,7 @@ int run(const ExportOptions& options) {
   for (const std::string& file : ExportTiles(options.raster.output, grid.cut, grid.samples.width).names()) {
     check_raster_output({options.raster.archive}, file, options.raster.overwrite);
   }
-  Exporter exporter(options, archive, grid, watch_interrupts());
+  Exporter exporter(options, archive, grid);
   WorkArena arena(options.work.threads);
   arena.execute([&] { exporter.run(); });
   const SampleGrid& samples = grid.samples;
@@ -310,7 +291,7 @@ int run(const ExportOptions& options) {
                          {"sample_type", to_string(mapping.type)},
                          {"z_scale", mapping.z_scale},
                          {"z_offset", mapping.z_offset},
-                         {"voids", exporter.counts.voids},
+                         {"voids", exporter.counts.nodata},
                          {"clamped", exporter.counts.clamped}}));
   } else if (!options.common.quiet) {
     std::string what = fmt::format("{} x {} samples of {}, {:.6g} x {:.6g} apart", samples.width, samples.height,
@@ -322,7 +303,7 @@ int run(const ExportOptions& options) {
     if (mapping.z_scale != 1.0 || mapping.z_offset != 0.0) {
       what += fmt::format("; elevation = sample * {} + {}", mapping.z_scale, mapping.z_offset);
     }
-    if (exporter.counts.voids > 0) what += fmt::format(", {} voids", describe_count(exporter.counts.voids));
+    if (exporter.counts.nodata > 0) what += fmt::format(", {} voids", describe_count(exporter.counts.nodata));
     if (exporter.counts.clamped > 0) {
       what += fmt::format(", {} moved into the range", describe_count(exporter.counts.clamped));
     }

@@ -15,7 +15,7 @@
 #include "isohf/archive/tile_statistics.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
-#include "isohf/restore/lossless.h"
+#include "isohf/surface.h"
 #include "open_archive.h"
 #include "options/describe.h"
 #include "options/input_files.h"

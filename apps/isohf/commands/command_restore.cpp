@@ -11,11 +11,12 @@
 #include "commands/command.h"
 #include "formats/registry.h"
 #include "interrupt.h"
-#include "isohf/archive/container/content_hash.h"
+#include "isohf/convert/frame/source_frame.h"
 #include "isohf/error.h"
 #include "isohf/projection/projection_wkt.h"
-#include "isohf/restore/archive_geometry.h"
-#include "isohf/restore/lossless.h"
+#include "isohf/restore/residual_codec.h"
+#include "isohf/restore/sample_grids.h"
+#include "isohf/surface.h"
 #include "open_archive.h"
 #include "options/describe.h"
 #include "options/input_files.h"
@@ -23,14 +24,10 @@
 #include "options/options_common.h"
 #include "options/options_raster.h"
 #include "options/source_inputs.h"
-#include "output/archive_places.h"
 #include "output/json_output.h"
 #include "output/output_kinds.h"
 #include "output/standard_output.h"
-#include "raster/output_grid.h"
 #include "raster/restored_raster.h"
-#include "raster/restored_samples.h"
-#include "raster/surface_scan.h"
 #include "work_arena.h"
 
 namespace isohf::cli {
@@ -85,76 +82,77 @@ std::optional<RestoreOptions> parse(const Arguments& arguments) {
   return options;
 }
 
-OutputGrid asked_grid(const RestoreOptions& options, const Metadata& metadata) {
-  const RasterOptions& raster = options.raster;
-  if (!options.like.empty()) {
-    const OpenedInputs like = open_inputs(expand_inputs({options.like}, false), {}, {}, options.work.threads);
-    std::vector<std::string> warnings;
-    OutputGrid grid = grid_like(metadata, like.source->info(), warnings);
-    for (const std::string& warning : warnings) {
-      if (!options.common.quiet) print_warning(warning);
-    }
-    if (grid.degrees && raster.method == RestoreMethod::kHex) {
-      throw Error(
-          ErrorCode::kInvalidArgument,
-          fmt::format("{}: its rows are no rows of the archive, whose input was projected ({}), and --method hex "
-                      "goes along rows; leave it out, or give --method barycentric",
-                      options.like, describe_projection(metadata.projection->spec)));
-    }
-    return grid;
+/// Of the raster in --like.
+SampleGrid grid_of_other(const RestoreOptions& options, const Metadata& metadata) {
+  const OpenedInputs like = open_inputs(expand_inputs({options.like}, false), {}, {}, options.work.threads);
+  const SourceInfo& other = like.source->info();
+  std::vector<std::string> warnings;
+  std::optional<SampleGrid> grid = grid_like(metadata, other, warnings);
+  for (const std::string& warning : warnings) {
+    if (!options.common.quiet) print_warning(warning);
   }
-  if (!raster.size && !raster.spacing) return OutputGrid(natural_grid(metadata));
-  return OutputGrid(
-      grid_over(metadata.valid, samples_are_areas(metadata), raster.size, spacing_in_world(raster, metadata)));
+  if (!grid) {
+    const SourceFrame frame = make_source_frame(other);
+    grid = {frame.width,
+            frame.height,
+            metadata.valid.x0 + frame.first_sample_x,
+            metadata.valid.z0 + frame.first_sample_z,
+            frame.spacing_x,
+            frame.spacing_z};
+  }
+  if (grid->in_degrees && options.raster.method == RestoreMethod::kHex) {
+    throw Error(ErrorCode::kInvalidArgument,
+                fmt::format("{}: its rows are no rows of the archive, whose input was projected ({}), and --method hex "
+                            "goes along rows; leave it out, or give --method barycentric",
+                            options.like, describe_projection(metadata.projection->spec)));
+  }
+  return *grid;
+}
+
+SampleGrid asked_grid(const RestoreOptions& options, const Metadata& metadata) {
+  const RasterOptions& raster = options.raster;
+  if (!options.like.empty()) return grid_of_other(options, metadata);
+  if (!raster.size && !raster.spacing) return natural_grid(metadata);
+  return grid_over(metadata.valid, samples_are_areas(metadata), raster.size, spacing_in_world(raster, metadata));
 }
 
 /// Rows of another map than the archive's are read on the triangles.
-RestoreMethod method_of(const RestoreOptions& options, const OutputGrid& grid) {
-  return grid.degrees ? RestoreMethod::kBarycentric : options.raster.method.value_or(RestoreMethod::kHex);
-}
-
-/// Where the first sample lies and how far the others, for JSON.
-ordered_json json_from(const OutputGrid& grid) {
-  if (grid.degrees) {
-    const GeoGrid& on = *grid.degrees;
-    return {{"first_sample", {{"longitude", on.first_sample.longitude}, {"latitude", on.first_sample.latitude}}},
-            {"spacing", {{"longitude", on.degrees_x}, {"latitude", on.degrees_y}}}};
-  }
-  return {{"first_sample", {{"x", grid.world.first_x}, {"z", grid.world.first_z}}},
-          {"spacing", {{"x", grid.world.spacing_x}, {"z", grid.world.spacing_z}}}};
+RestoreMethod method_of(const RestoreOptions& options, const SampleGrid& grid) {
+  return grid.in_degrees ? RestoreMethod::kBarycentric : options.raster.method.value_or(RestoreMethod::kHex);
 }
 
 struct Restored {
-  SampleCounts counts;
+  SampleStore::Result counts;
   bool is_source = false;          ///< the source's own samples, hash checked
   std::vector<std::string> files;  ///< written
 };
 
 class Restorer {
  public:
-  Restorer(const RestoreOptions& options, const ArchiveReader& archive, const OutputGrid& grid,
-           const std::atomic<bool>& cancel)
+  Restorer(const RestoreOptions& options, const ArchiveReader& archive, const SampleGrid& grid)
       : options_(options),
         archive_(archive),
         grid_(grid),
-        cancel_(cancel),
         display_(options.work.progress, options.common.quiet, options.common.verbose) {}
 
-  Restored run(const std::optional<LosslessRecord>& record) { return record ? run_lossless(*record) : run_surface(); }
+  Restored run(bool is_lossless) { return is_lossless ? run_lossless() : run_surface(); }
 
  private:
-  [[nodiscard]] std::unique_ptr<RasterSink> open(const SampleMapping& mapping, std::optional<double> void_value,
-                                                 bool is_source) const {
-    RasterSpec spec = is_source ? source_raster(archive_.metadata(), mapping.type)
-                                : restored_raster(archive_.metadata(), grid_, mapping.type);
-    set_mapping(spec, mapping, void_value);
+  [[nodiscard]] std::unique_ptr<RasterSink> open(RasterSpec spec, const SampleMapping& mapping) const {
     spec.overwrite = options_.raster.overwrite;
     std::unique_ptr<RasterSink> sink = create_raster(options_.raster.output, spec);
     if (!options_.common.quiet) warn_of_lost_scale(options_.raster.output, mapping);
     return sink;
   }
 
-  Restored run_lossless(const LosslessRecord& record) {
+  void report(std::int64_t rows) {
+    display_.update("restore", "rows", rows, grid_.height);
+    if (cancel_.load()) throw Error(ErrorCode::kCancelled, "interrupted");
+  }
+
+  Restored run_lossless() {
+    SourceRowReader reader(archive_);
+    const LosslessRecord& record = reader.record();
     const SampleMapping kept = record.mapping;
     SampleMapping written = kept;
     written.type = restored_type(options_.raster.output, kept.type);
@@ -169,47 +167,27 @@ class Restorer {
                   fmt::format("{}: {} does not hold the void value {}; write .tif", options_.raster.output,
                               to_string(written.type), *void_value));
     }
-    const std::unique_ptr<RasterSink> sink = open(written, void_value, true);
-    LosslessReader reader(archive_, record);
-    Sha256 hash;
+    const auto sink = open(source_raster_spec(archive_.metadata(), written, void_value), written);
     std::int64_t row = 0;
     while (!reader.at_end()) {
       const std::vector<std::byte> raw = reader.read_next();
-      hash.add(raw);
-      sink->write_rows(as_kept ? raw : in_type(raw, record, written.type, row, voids_to_nan));
-      row += static_cast<std::int64_t>(raw.size() / size_bytes(kept.type)) / record.width;
-      report_rows(display_, "restore", row, grid_.world.height, cancel_);
-    }
-    if (const std::string found = hex(hash.finish()); found != record.sha256) {
-      throw Error(ErrorCode::kCorrupt, fmt::format("{}: the restored samples have the SHA-256 {}, the source's is {}",
-                                                   options_.raster.archive, found, record.sha256));
+      const std::size_t count = raw.size() / size_bytes(kept.type);
+      if (as_kept) {
+        sink->write_rows(raw);
+      } else {
+        std::vector<std::byte> out(count * size_bytes(written.type));
+        if (const auto refused = convert_exactly(kept.type, raw, record.void_values, voids_to_nan, written.type, out)) {
+          const auto sample = static_cast<std::int64_t>(*refused);
+          refuse_sample(options_.raster.output, written.type, sample % grid_.width, row + sample / grid_.width,
+                        load_sample(kept.type, raw.data() + *refused * size_bytes(kept.type)), "write .tif");
+        }
+        sink->write_rows(out);
+      }
+      row += static_cast<std::int64_t>(count) / record.width;
+      report(row);
     }
     sink->finish();
     return {{}, true, sink->files()};
-  }
-
-  /// The same numbers in another type; refuses what would not be the same.
-  [[nodiscard]] std::vector<std::byte> in_type(std::span<const std::byte> raw, const LosslessRecord& record,
-                                               SampleType to, std::int64_t first_row, bool voids_to_nan) const {
-    const SampleType from = record.mapping.type;
-    const std::vector<double>& voids = record.void_values;
-    const SampleStore store({to, 1.0, 0.0}, std::nullopt, false);
-    const std::size_t count = raw.size() / size_bytes(from);
-    std::vector<std::byte> out(count * size_bytes(to));
-    for (std::size_t i = 0; i < count; ++i) {
-      const double value = load_sample(from, raw.data() + i * size_bytes(from));
-      std::byte* const at = out.data() + i * size_bytes(to);
-      const bool is_void = !std::isfinite(value) || std::find(voids.begin(), voids.end(), value) != voids.end();
-      const SampleStore::Outcome outcome = store.store(is_void && voids_to_nan ? std::nan("") : value, at);
-      const bool same = outcome == SampleStore::Outcome::kVoid ||
-                        (outcome == SampleStore::Outcome::kStored && load_sample(to, at) == value);
-      const auto place = static_cast<std::int64_t>(i);
-      if (!same) {
-        refuse_sample(options_.raster.output, to, place % grid_.world.width, first_row + place / grid_.world.width,
-                      value, "write .tif");
-      }
-    }
-    return out;
   }
 
   Restored run_surface() {
@@ -218,15 +196,17 @@ class Restorer {
         restored_type(options_.raster.output, sample_type_from_string(metadata.source.sample_type)),
         metadata.source.z_scale, metadata.source.z_offset};
     const bool has_voids = needs_void(metadata, grid_, options_.raster.output);
-    const auto void_value = has_voids ? usual_void(mapping.type) : std::nullopt;
+    const auto void_value = has_voids ? usual_nodata(mapping.type) : std::nullopt;
     const SampleStore store(mapping, void_value, options_.raster.clamp_range);
-    const std::unique_ptr<RasterSink> sink = open(mapping, void_value, false);
-    const SurfaceScan scan(archive_, grid_, method_of(options_, grid_), display_, cancel_);
+    const auto sink = open(raster_spec(metadata, grid_, mapping, void_value), mapping);
     Restored restored;
-    scan.run("restore", [&](std::int64_t row, std::span<const double> elevations) {
-      sink->write_rows(
-          store_rows(store, mapping.type, options_.raster.output, grid_.world.width, row, elevations, restored.counts));
-    });
+    RowReader(archive_, grid_, method_of(options_, grid_))
+        .read_all(
+            [&](std::int64_t row, std::span<const double> elevations) {
+              sink->write_rows(store_rows(store, mapping.type, options_.raster.output, grid_.width, row, elevations,
+                                          restored.counts));
+            },
+            [&](std::int64_t rows) { report(rows); });
     sink->finish();
     restored.files = sink->files();
     return restored;
@@ -234,10 +214,20 @@ class Restorer {
 
   const RestoreOptions& options_;
   const ArchiveReader& archive_;
-  OutputGrid grid_;
-  const std::atomic<bool>& cancel_;
+  SampleGrid grid_;
+  const std::atomic<bool>& cancel_ = watch_interrupts();
   ProgressDisplay display_;
 };
+
+/// First sample and spacing, for JSON.
+void add_grid(const SampleGrid& grid, ordered_json& json) {
+  const char* const x = grid.in_degrees ? "longitude" : "x";
+  const char* const z = grid.in_degrees ? "latitude" : "z";
+  json["width"] = grid.width;
+  json["height"] = grid.height;
+  json["first_sample"] = {{x, grid.first_x}, {z, grid.first_z}};
+  json["spacing"] = {{x, grid.spacing_x}, {z, grid.spacing_z}};
+}
 
 int run(const RestoreOptions& options) {
   std::vector<std::string> inputs = {options.raster.archive};
@@ -249,39 +239,34 @@ int run(const RestoreOptions& options) {
   const ArchiveReader archive = open_archive(options.raster.archive);
   const bool wants_source =
       options.like.empty() && !options.raster.size && !options.raster.spacing && !options.raster.method;
-  const std::optional<LosslessRecord> record = wants_source ? lossless_record(archive.metadata()) : std::nullopt;
-  const OutputGrid grid =
-      record ? OutputGrid(source_grid(archive.metadata().source)) : asked_grid(options, archive.metadata());
-  const std::atomic<bool>& cancel = watch_interrupts();
+  const bool is_lossless = wants_source && lossless_record(archive.metadata());
+  const SampleGrid grid =
+      is_lossless ? source_grid(archive.metadata().source) : asked_grid(options, archive.metadata());
   Restored restored;
   try {
-    arena.execute([&] { restored = Restorer(options, archive, grid, cancel).run(record); });
+    arena.execute([&] { restored = Restorer(options, archive, grid).run(is_lossless); });
   } catch (const Error& error) {
-    if (!record || error.code() != ErrorCode::kCorrupt) throw;
+    if (!is_lossless || error.code() != ErrorCode::kCorrupt) throw;
     return print_error(error, kExitDifferences);
   }
   const std::string how = restored.is_source ? "source" : to_string(method_of(options, grid));
   StandardOutput out;
   if (options.common.json) {
-    const ordered_json places = json_from(grid);
-    out.write(json_text({{"archive", options.raster.archive},
+    ordered_json json = {{"archive", options.raster.archive},
                          {"output", options.raster.output},
                          {"files_written", restored.files},
-                         {"method", how},
-                         {"width", grid.world.width},
-                         {"height", grid.world.height},
-                         {"first_sample", places.at("first_sample")},
-                         {"spacing", places.at("spacing")},
-                         {"source_samples", restored.is_source},
-                         {"voids", restored.is_source ? ordered_json(nullptr) : ordered_json(restored.counts.voids)},
-                         {"clamped", restored.counts.clamped}}));
+                         {"method", how}};
+    add_grid(grid, json);
+    json["source_samples"] = restored.is_source;
+    json["voids"] = restored.is_source ? ordered_json(nullptr) : ordered_json(restored.counts.nodata);
+    json["clamped"] = restored.counts.clamped;
+    out.write(json_text(json));
   } else if (!options.common.quiet) {
     std::string what = "the source's own samples, SHA-256 as stated";
-    if (!restored.is_source) what = fmt::format("method {}, {} voids", how, describe_count(restored.counts.voids));
+    if (!restored.is_source) what = fmt::format("method {}, {} voids", how, describe_count(restored.counts.nodata));
     if (restored.counts.clamped > 0)
       what += fmt::format(", {} moved into the range", describe_count(restored.counts.clamped));
-    out.write(
-        fmt::format("{}: {} x {} samples, {}\n", options.raster.output, grid.world.width, grid.world.height, what));
+    out.write(fmt::format("{}: {} x {} samples, {}\n", options.raster.output, grid.width, grid.height, what));
   }
   out.finish();
   return kExitDone;

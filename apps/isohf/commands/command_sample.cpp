@@ -15,12 +15,10 @@
 #include "isohf/archive.h"
 #include "isohf/base/bytes.h"
 #include "isohf/error.h"
-#include "isohf/restore/archive_geometry.h"
-#include "isohf/restore/point_sampler.h"
+#include "isohf/surface.h"
 #include "open_archive.h"
 #include "options/option_values.h"
 #include "options/options_common.h"
-#include "output/archive_places.h"
 #include "output/json_output.h"
 #include "output/standard_output.h"
 #include "work_arena.h"
@@ -122,8 +120,8 @@ bool read_place(std::string_view text, WorldPoint& place) {
 
 /// What answers say of their places.
 struct PlaceOutput {
-  const GeoPlaces* geo = nullptr;  ///< nullptr: no longitudes and latitudes
-  const GeoPlaces* source = nullptr;
+  const WorldGeoreference* geo = nullptr;  ///< nullptr: no longitudes and latitudes
+  const WorldGeoreference* source = nullptr;
 };
 
 std::string columns_from(const PlaceOutput& output, WorldPoint place) {
@@ -140,8 +138,8 @@ std::string columns_from(const PlaceOutput& output, WorldPoint place) {
 }
 
 std::string text_from(const SurfaceSample& sample) {
-  if (sample.state == SurfaceSample::State::kOutside) return "outside";
-  if (sample.state == SurfaceSample::State::kVoid) return "void";
+  if (sample.state == SurfaceState::kOutside) return "outside";
+  if (sample.state == SurfaceState::kNodata) return "void";
   return fmt::format("{:.9g} {:.7f} {:.7f} {:.7f} {} {}", sample.elevation, sample.normal[0], sample.normal[1],
                      sample.normal[2], sample.tile.column, sample.tile.row);
 }
@@ -163,10 +161,10 @@ std::string json_from(const SurfaceSample& sample, WorldPoint place, const Place
   }
   constexpr const char* kStates[] = {"surface", "void", "outside"};
   json["state"] = kStates[static_cast<std::size_t>(sample.state)];
-  if (sample.state != SurfaceSample::State::kOutside) {
+  if (sample.state != SurfaceState::kOutside) {
     json["tile"] = {{"column", sample.tile.column}, {"row", sample.tile.row}};
   }
-  if (sample.state == SurfaceSample::State::kSurface) {
+  if (sample.state == SurfaceState::kSurface) {
     json["elevation"] = sample.elevation;
     json["normal"] = sample.normal;
   }
@@ -176,7 +174,7 @@ std::string json_from(const SurfaceSample& sample, WorldPoint place, const Place
 std::string record_from(const SurfaceSample& sample) {
   std::vector<std::byte> bytes;
   ByteWriter writer(bytes);
-  const bool is_surface = sample.state == SurfaceSample::State::kSurface;
+  const bool is_surface = sample.state == SurfaceState::kSurface;
   writer.write(is_surface ? sample.elevation : std::numeric_limits<double>::quiet_NaN());
   for (const double part : sample.normal) writer.write(is_surface ? static_cast<float>(part) : 0.0F);
   writer.write(static_cast<std::uint32_t>(sample.state));
@@ -189,7 +187,7 @@ std::string record_from(const SurfaceSample& sample) {
 class Answers {
  public:
   Answers(const ArchiveReader& archive, const SampleOptions& options, const PlaceOutput& output)
-      : options_(options), output_(output), sampler_(archive, options.memory_bytes) {}
+      : options_(options), output_(output), surface_(archive, options.memory_bytes) {}
 
   void add(WorldPoint place) {
     places_.push_back(place);
@@ -208,7 +206,7 @@ class Answers {
 
   void answer() {
     std::vector<SurfaceSample> samples(places_.size());
-    sampler_.sample(places_, samples);
+    surface_.sample(places_, std::span(samples));
     std::vector<std::string> texts((samples.size() + kPlacesOfText - 1) / kPlacesOfText);
     oneapi::tbb::parallel_for(std::size_t{0}, texts.size(), [&](std::size_t part) {
       const std::size_t end = std::min((part + 1) * kPlacesOfText, samples.size());
@@ -224,7 +222,7 @@ class Answers {
 
   const SampleOptions& options_;
   const PlaceOutput& output_;
-  PointSampler sampler_;
+  Surface surface_;
   StandardOutput out_;
   std::vector<WorldPoint> places_;
 };
@@ -257,11 +255,11 @@ void read_places(bool binary, Answers& answers, const std::function<WorldPoint(W
 }
 
 /// The archive's places; its source's map is understood where that is `needed` for them, or `welcome`.
-GeoPlaces places_of(ArchiveReader& archive, bool needs_geo, bool needs_source, bool is_welcome) {
-  const auto lacks = [](const GeoPlaces& places, bool geo, bool source) {
-    return (geo && !places.knows_geo()) || (source && !places.knows_source());
+WorldGeoreference places_of(ArchiveReader& archive, bool needs_geo, bool needs_source, bool is_welcome) {
+  const auto lacks = [](const WorldGeoreference& places, bool geo, bool source) {
+    return (geo && !places.has_geo()) || (source && !places.has_source());
   };
-  const GeoPlaces first(archive.metadata());
+  const WorldGeoreference first(archive.metadata());
   const bool is_needed = lacks(first, needs_geo, needs_source);
   if (!is_needed && !(is_welcome && lacks(first, true, true))) return first;
   try {
@@ -269,7 +267,7 @@ GeoPlaces places_of(ArchiveReader& archive, bool needs_geo, bool needs_source, b
   } catch (const Error&) {
     if (is_needed) throw;
   }
-  GeoPlaces places(archive.metadata());
+  WorldGeoreference places(archive.metadata());
   if (!lacks(places, needs_geo, needs_source)) return places;
   throw Error(ErrorCode::kInvalidArgument, archive.path() + ": its source has no place in " +
                                                (needs_geo ? "degrees" : "coordinates") +
@@ -281,11 +279,11 @@ int run(const SampleOptions& options) {
   print_warnings(archive.warnings());
   const bool takes_geo = options.reads_degrees || !options.geo_places.empty();
   const bool takes_source = options.reads_source || !options.source_places.empty();
-  const GeoPlaces places =
+  const WorldGeoreference places =
       places_of(archive, takes_geo || options.with_degrees, takes_source || options.with_source, options.common.json);
   PlaceOutput output;
-  if (options.with_degrees || (options.common.json && places.knows_geo())) output.geo = &places;
-  if (options.with_source || (options.common.json && places.knows_source())) output.source = &places;
+  if (options.with_degrees || (options.common.json && places.has_geo())) output.geo = &places;
+  if (options.with_source || (options.common.json && places.has_source())) output.source = &places;
   WorkArena threads(options.threads);
   threads.execute([&] {
     Answers answers(archive, options, output);

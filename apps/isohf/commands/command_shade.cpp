@@ -13,7 +13,7 @@
 #include "formats/write/raster_sink.h"
 #include "interrupt.h"
 #include "isohf/error.h"
-#include "isohf/restore/archive_geometry.h"
+#include "isohf/surface.h"
 #include "open_archive.h"
 #include "options/describe.h"
 #include "options/option_values.h"
@@ -21,7 +21,6 @@
 #include "output/json_output.h"
 #include "output/output_kinds.h"
 #include "output/standard_output.h"
-#include "raster/restored_raster.h"
 #include "shade/shade_picture.h"
 #include "work_arena.h"
 
@@ -144,34 +143,16 @@ double default_softness(const Metadata& metadata) {
 /// Where the picture lies, for GeoTIFF; nullopt where the source did not say.
 std::optional<Georeference> georeference_of(const Metadata& metadata, const ShadeRequest& request) {
   const SourceRecord& source = metadata.source;
-  if (is_warped(metadata)) {
-    SampleGrid grid{request.width, request.height};
-    grid.spacing_x = (metadata.valid.x1 - metadata.valid.x0) / static_cast<double>(request.width);
-    grid.spacing_z = (metadata.valid.z1 - metadata.valid.z0) / static_cast<double>(request.height);
-    grid.first_x = metadata.valid.x0 + grid.spacing_x / 2.0;
-    grid.first_z = metadata.valid.z0 + grid.spacing_z / 2.0;
-    return map_georeference(metadata, grid);
-  }
   if (!source.origin_x || !source.origin_y || !(source.crs_spacing_x > 0.0) || !(source.crs_spacing_y > 0.0)) {
     return std::nullopt;
   }
-  const double pixel_x = (metadata.valid.x1 - metadata.valid.x0) / static_cast<double>(request.width);
-  const double pixel_z = (metadata.valid.z1 - metadata.valid.z0) / static_cast<double>(request.height);
-  const double units_x = source.crs_spacing_x / source.spacing_x;
-  const double units_z = source.crs_spacing_y / source.spacing_z;
-  Georeference place;
-  place.registration = Registration::kArea;
-  place.unit = source.crs_unit == "metre"    ? HorizontalUnit::kMetre
-               : source.crs_unit == "degree" ? HorizontalUnit::kDegree
-                                             : HorizontalUnit::kUnknown;
-  place.metres_per_unit = source.metres_per_unit;
-  place.spacing_x = pixel_x * units_x;
-  place.spacing_y = pixel_z * units_z;
-  place.has_origin = true;
-  place.origin_x = *source.origin_x + (metadata.valid.x0 + pixel_x / 2.0 - source.first_sample_x) * units_x;
-  place.origin_y = *source.origin_y - (metadata.valid.z0 + pixel_z / 2.0 - source.first_sample_z) * units_z;
-  place.system = horizontal_system(source);
-  return place;
+  auto found =
+      grid_georeference(metadata, grid_over(metadata.valid, true, GridSize{request.width, request.height}, {}));
+  found->registration = Registration::kArea;
+  if (is_warped(metadata)) return found;
+  found->system.vertical_datum.clear();
+  found->system.vertical_epsg.reset();
+  return found;
 }
 
 int run(ShadeOptions options) {

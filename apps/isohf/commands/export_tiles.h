@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "formats/write/raster_sink.h"
-#include "raster/output_grid.h"
+#include "isohf/restore/sample_grids.h"
 
 namespace isohf::cli {
 

@@ -3,10 +3,9 @@
 #include <optional>
 #include <string>
 
-#include "isohf/restore/surface_rows.h"
+#include "isohf/surface.h"
 #include "options/command_line.h"
 #include "options/length_value.h"
-#include "raster/output_grid.h"
 
 namespace isohf::cli {
 

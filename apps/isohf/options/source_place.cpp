@@ -7,8 +7,8 @@
 
 #include "formats/georeference/reference_system.h"
 #include "isohf/error.h"
+#include "isohf/surface.h"
 #include "options/describe.h"
-#include "raster/restored_raster.h"
 
 namespace isohf::cli {
 namespace {
@@ -57,15 +57,8 @@ std::optional<SourcePlace> source_place(const Georeference& place, std::int64_t 
 
 std::optional<SourcePlace> source_place(const Metadata& metadata) {
   const SourceRecord& source = metadata.source;
-  Georeference place;
-  place.unit = horizontal_unit(source);
-  place.metres_per_unit = source.metres_per_unit;
-  place.spacing_x = source.crs_spacing_x;
-  place.spacing_y = source.crs_spacing_y;
-  place.has_origin = source.origin_x && source.origin_y && source.crs_spacing_x > 0.0 && source.crs_spacing_y > 0.0;
-  place.origin_x = source.origin_x.value_or(0.0);
-  place.origin_y = source.origin_y.value_or(0.0);
-  place.system = horizontal_system(source);
+  Georeference place = source_georeference(source);
+  place.has_origin = place.has_origin && source.crs_spacing_x > 0.0 && source.crs_spacing_y > 0.0;
   return source_place(place, source.width, source.height, source.registration == Registration::kArea, source.ground);
 }
 

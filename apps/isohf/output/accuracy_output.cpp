@@ -6,9 +6,8 @@
 #include <nlohmann/json.hpp>
 
 #include "isohf/archive.h"
-#include "isohf/restore/archive_geometry.h"
+#include "isohf/surface.h"
 #include "options/describe.h"
-#include "output/archive_places.h"
 #include "output/progress.h"
 
 namespace isohf::cli {

@@ -1,13 +1,13 @@
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "formats/write/raster_sink.h"
-#include "isohf/archive.h"
-#include "isohf/restore/residual_codec.h"
-#include "isohf/restore/surface_rows.h"
-#include "raster/output_grid.h"
+#include "isohf/restore/sample_store.h"
+#include "isohf/surface.h"
 
 namespace isohf::cli {
 
@@ -15,41 +15,32 @@ namespace isohf::cli {
 enum class RasterKind { kTiff, kExr, kPng, kHgt, kAsc, kFlt, kRaw16, kRaw32, kNpy, kOther };
 [[nodiscard]] RasterKind raster_kind(const std::string& path);
 
-/// Whether the file, or the one beside it, says what scale and offset are.
-[[nodiscard]] bool has_scale(RasterKind kind);
-
 /// The sample type of a raster restored to `path`: the source's own where the format holds it, else the nearest that
 /// it holds (float32 in EXR and GridFloat, int16 in HGT, uint16 in PNG and .r16).
 [[nodiscard]] SampleType restored_type(const std::string& path, SampleType source_type);
 
-/// What a raster of that grid is: size, place and reference system as the source's, so far as they are known.
-[[nodiscard]] RasterSpec restored_raster(const Metadata& metadata, const OutputGrid& grid, SampleType type);
-
+/// What a raster of that grid is: size, georeference and unit, so far as they are known, and what its raw numbers mean.
+/// A void value that is NaN goes without saying.
+[[nodiscard]] RasterSpec raster_spec(const Metadata& metadata, const SampleGrid& grid, const SampleMapping& mapping,
+                                     std::optional<double> void_value);
 /// The source's own raster, in its own reference system also where it was projected.
-[[nodiscard]] RasterSpec source_raster(const Metadata& metadata, SampleType type);
-
-/// Where a grid of the world lies on the map that the archive's source was projected to (is_warped), its samples areas.
-[[nodiscard]] Georeference map_georeference(const Metadata& metadata, const SampleGrid& grid);
-
-/// The grid of the archive's source; where that was projected, square areas as large as its own over the rectangle
-/// around its ground.
-[[nodiscard]] SampleGrid natural_grid(const Metadata& metadata);
-
-/// True where samples of rasters of the archive stand for areas: as the source's, or on a map.
-[[nodiscard]] bool samples_are_areas(const Metadata& metadata);
-
-[[nodiscard]] HorizontalUnit horizontal_unit(const SourceRecord& source);
-
-/// The source's body and horizontal reference system, as recorded.
-[[nodiscard]] ReferenceSystem horizontal_system(const SourceRecord& source);
+[[nodiscard]] RasterSpec source_raster_spec(const Metadata& metadata, const SampleMapping& mapping,
+                                            std::optional<double> void_value);
 
 /// Whether a raster of the grid in `output` needs a value for voids.
-[[nodiscard]] bool needs_void(const Metadata& metadata, const OutputGrid& grid, const std::string& output);
-
-/// Puts into the spec what its raw numbers mean. A void value that is NaN goes without saying.
-void set_mapping(RasterSpec& spec, const SampleMapping& mapping, std::optional<double> void_value);
+[[nodiscard]] bool needs_void(const Metadata& metadata, const SampleGrid& grid, const std::string& output);
 
 /// A warning where scale or offset say something and the format of `output` has no place for them.
 void warn_of_lost_scale(const std::string& output, const SampleMapping& mapping);
+
+/// Throws Error{kInvalidArgument} for a sample that a raster's type does not hold, naming column, row and remedy.
+[[noreturn]] void refuse_sample(const std::string& output, SampleType type, std::int64_t column, std::int64_t row,
+                                double value, const char* remedy);
+
+/// Rows of elevations, NaN where void, into raw samples; the first row's number and the width are for messages. Adds to
+/// `counts`. Throws Error{kInvalidArgument} as refuse_sample.
+[[nodiscard]] std::vector<std::byte> store_rows(const SampleStore& store, SampleType type, const std::string& output,
+                                                std::int64_t width, std::int64_t first_row,
+                                                std::span<const double> elevations, SampleStore::Result& counts);
 
 }  // namespace isohf::cli

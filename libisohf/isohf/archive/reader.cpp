@@ -8,6 +8,7 @@
 #include <mutex>
 #include <utility>
 
+#include "isohf/archive/codec/quantise.h"
 #include "isohf/archive/codec/simd/batch_decoder.h"
 #include "isohf/archive/codec/tile_codes.h"
 #include "isohf/archive/codec/tile_decoder.h"
@@ -276,16 +277,7 @@ bool ArchiveReader::zlib_reads(const MemberEntry& member, std::span<const std::b
 }
 
 std::vector<double> ArchiveReader::read_elevations(TileIndex tile) const {
-  const TileCodes codes = read_tile(tile);
-  if (codes.type == CodeType::kF32) return {codes.heights.begin(), codes.heights.end()};
-  const Quantisation& quantisation = metadata().quantisation;
-  const std::uint32_t void_code = quantisation.void_code();
-  std::vector<double> heights(codes.codes.size());
-  std::transform(codes.codes.begin(), codes.codes.end(), heights.begin(), [&](std::uint16_t code) {
-    return code == void_code ? std::numeric_limits<double>::quiet_NaN()
-                             : quantisation.offset + quantisation.scale * code;
-  });
-  return heights;
+  return elevations_of(read_tile(tile), metadata().quantisation);
 }
 
 std::optional<std::vector<std::byte>> ArchiveReader::read_member(const std::string& name) const {

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "isohf/archive/container/content_hash.h"
 #include "isohf/base/bytes.h"
 #include "isohf/error.h"
 
@@ -17,7 +18,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 /// The prediction of a source that was projected.
-constexpr const char* kAtPlaces = "places";
+constexpr const char* kAtPositions = "places";
 
 /// JSON has no numbers that are not finite.
 Json json_from(double value) {
@@ -44,28 +45,27 @@ void check(const LosslessRecord& record, const Metadata& metadata) {
 
 /// A residual member holds every sample of its rows in as many bytes as the sample has: what the record claims is held
 /// against that before anything is made as large.
-const LosslessRecord& held_against_members(const ArchiveReader& archive, const LosslessRecord& record) {
+void check_members(const ArchiveReader& archive, const LosslessRecord& record) {
   const std::string name = residual_name(0);
   const auto& members = archive.members();
   const auto first =
       std::find_if(members.begin(), members.end(), [&](const MemberEntry& member) { return member.name == name; });
   const auto samples = static_cast<std::uint64_t>(record.width) *
                        static_cast<std::uint64_t>(std::min(record.rows_per_member, record.height));
-  if (first != members.end() && first->bytes / size_bytes(record.mapping.type) < samples) {
+  if (first == members.end())
+    throw Error(ErrorCode::kCorrupt, fmt::format("{}: member \"{}\" is missing", archive.path(), name));
+  if (first->bytes / size_bytes(record.mapping.type) < samples) {
     throw Error(ErrorCode::kCorrupt, fmt::format("{}: member \"{}\" has {} bytes, too few for {} samples",
                                                  archive.path(), name, first->bytes, samples));
   }
-  if (first == members.end())
-    throw Error(ErrorCode::kCorrupt, fmt::format("{}: member \"{}\" is missing", archive.path(), name));
-  return record;
 }
 
-PlaceMesh read_places(const ArchiveReader& archive, const LosslessRecord& record) {
-  const auto bytes = archive.read_member(kPlacesName);
-  const std::string where = fmt::format("{}: member \"{}\"", archive.path(), kPlacesName);
+PositionMesh read_positions(const ArchiveReader& archive, const LosslessRecord& record) {
+  const auto bytes = archive.read_member(kPositionsName);
+  const std::string where = fmt::format("{}: member \"{}\"", archive.path(), kPositionsName);
   if (!bytes) throw Error(ErrorCode::kCorrupt, where + " is missing");
   try {
-    return places_from_bytes(record.width, record.height, *bytes);
+    return positions_from_bytes(record.width, record.height, *bytes);
   } catch (const Error& error) {
     throw error.within(where);
   }
@@ -82,7 +82,7 @@ std::string format_lossless(const LosslessRecord& record) {
                      {"z_scale", record.mapping.z_scale},
                      {"z_offset", record.mapping.z_offset},
                      {"void_values", voids},
-                     {"prediction", record.at_places ? kAtPlaces : to_string(record.method)},
+                     {"prediction", record.at_positions ? kAtPositions : to_string(record.method)},
                      {"rows_per_member", record.rows_per_member},
                      {"residual_bytes", record.residual_bytes},
                      {"sha256", record.sha256}};
@@ -102,8 +102,8 @@ std::optional<LosslessRecord> lossless_record(const Metadata& metadata) {
     record.height = json.at("height").get<std::int64_t>();
     for (const Json& value : json.at("void_values")) record.void_values.push_back(number_from(value));
     const auto prediction = json.at("prediction").get<std::string>();
-    record.at_places = prediction == kAtPlaces;
-    record.method = record.at_places ? RestoreMethod::kBarycentric : restore_method_from_string(prediction);
+    record.at_positions = prediction == kAtPositions;
+    record.method = record.at_positions ? RestoreMethod::kBarycentric : restore_method_from_string(prediction);
     record.rows_per_member = json.at("rows_per_member").get<std::int64_t>();
     record.residual_bytes = json.at("residual_bytes").get<std::uint64_t>();
     record.sha256 = json.at("sha256").get<std::string>();
@@ -120,15 +120,15 @@ std::string residual_name(std::int64_t first_row) {
   return fmt::format("residual/{:08}", first_row);
 }
 
-std::vector<std::byte> bytes_of(const PlaceMesh& places) {
+std::vector<std::byte> bytes_of(const PositionMesh& positions) {
   std::vector<std::byte> bytes;
   ByteWriter writer(bytes);
-  for (const double value : places.values()) writer.write(value);
+  for (const double value : positions.values()) writer.write(value);
   return bytes;
 }
 
-PlaceMesh places_from_bytes(std::int64_t width, std::int64_t height, std::span<const std::byte> bytes) {
-  const std::size_t count = PlaceMesh::value_count(width, height);
+PositionMesh positions_from_bytes(std::int64_t width, std::int64_t height, std::span<const std::byte> bytes) {
+  const std::size_t count = PositionMesh::value_count(width, height);
   if (bytes.size() != count * sizeof(double)) {
     throw Error(ErrorCode::kCorrupt, fmt::format("has {} bytes, must have {}", bytes.size(), count * sizeof(double)));
   }
@@ -139,13 +139,13 @@ PlaceMesh places_from_bytes(std::int64_t width, std::int64_t height, std::span<c
 }
 
 SamplePredictor::SamplePredictor(const TileGrid& grid, bool wraps_x, const Quantisation& quantisation,
-                                 SurfaceRows::ReadTile read_tile, const SampleGrid& samples, RestoreMethod method,
-                                 std::optional<PlaceMesh> places)
-    : samples_(samples), places_(std::move(places)) {
-  if (places_) {
-    scattered_ = std::make_unique<ScatteredSurface>(grid, quantisation, std::move(read_tile));
+                                 ReadTiles read_tiles, const SampleGrid& samples, RestoreMethod method,
+                                 std::optional<PositionMesh> positions)
+    : samples_(samples), positions_(std::move(positions)) {
+  if (positions_) {
+    points_.emplace(grid, quantisation, std::move(read_tiles), kTileBytes / 2);  // as much again is in hand
   } else {
-    rows_ = std::make_unique<SurfaceRows>(grid, wraps_x, quantisation, std::move(read_tile), samples, method);
+    rows_.emplace(grid, wraps_x, quantisation, std::move(read_tiles), samples, method);
   }
 }
 
@@ -154,35 +154,70 @@ void SamplePredictor::read(std::int64_t first, std::int64_t rows, std::span<doub
   std::vector<WorldPoint> at(predicted.size());
   const auto width = static_cast<std::size_t>(samples_.width);
   oneapi::tbb::parallel_for(std::int64_t{0}, rows, [&](std::int64_t row) {
-    places_->row(first + row, std::span(at).subspan(static_cast<std::size_t>(row) * width, width));
+    positions_->row(first + row, std::span(at).subspan(static_cast<std::size_t>(row) * width, width));
   });
-  scattered_->read(at, predicted);
+  points_->sample(at, predicted);
 }
 
-LosslessReader::LosslessReader(const ArchiveReader& archive, const LosslessRecord& record)
-    : archive_(archive),
-      record_(held_against_members(archive, record)),
-      surface_(
-          archive.grid(), archive.metadata().wraps_x, archive.metadata().quantisation,
-          [&archive](TileIndex tile) { return archive.read_tile(tile); }, source_grid(archive.metadata().source),
-          record.method, record.at_places ? std::optional(read_places(archive, record)) : std::nullopt) {}
+struct SourceRowReader::State {
+  State(const ArchiveReader& its_archive, LosslessRecord its_record)
+      : archive(its_archive),
+        record(std::move(its_record)),
+        surface(archive.grid(), archive.metadata().wraps_x, archive.metadata().quantisation, tiles_of(archive),
+                source_grid(archive.metadata().source), record.method,
+                record.at_positions ? std::optional(read_positions(archive, record)) : std::nullopt) {}
 
-std::vector<std::byte> LosslessReader::read_next() {
-  const std::int64_t rows = std::min(record_.rows_per_member, record_.height - next_row_);
-  const std::string name = residual_name(next_row_);
-  const auto payload = archive_.read_member(name);
+  const ArchiveReader& archive;
+  LosslessRecord record;
+  SamplePredictor surface;
+  std::int64_t next_row = 0;
+  Sha256 hash;
+};
+
+SourceRowReader::SourceRowReader(const ArchiveReader& archive) {
+  std::optional<LosslessRecord> record = lossless_record(archive.metadata());
+  if (!record) {
+    throw Error(ErrorCode::kInvalidArgument,
+                archive.path() + ": keeps no residuals, so that the source's own samples cannot be had from it");
+  }
+  check_members(archive, *record);
+  state_ = std::make_unique<State>(archive, std::move(*record));
+}
+
+SourceRowReader::~SourceRowReader() = default;
+
+const LosslessRecord& SourceRowReader::record() const {
+  return state_->record;
+}
+
+bool SourceRowReader::at_end() const {
+  return state_->next_row == state_->record.height;
+}
+
+std::vector<std::byte> SourceRowReader::read_next() {
+  State& state = *state_;
+  const LosslessRecord& record = state.record;
+  const std::int64_t rows = std::min(record.rows_per_member, record.height - state.next_row);
+  const std::string name = residual_name(state.next_row);
+  const auto payload = state.archive.read_member(name);
   if (!payload) {
-    throw Error(ErrorCode::kCorrupt, fmt::format("{}: member \"{}\" is missing", archive_.path(), name));
+    throw Error(ErrorCode::kCorrupt, fmt::format("{}: member \"{}\" is missing", state.archive.path(), name));
   }
-  std::vector<double> predicted(static_cast<std::size_t>(rows * record_.width));
-  surface_.read(next_row_, rows, predicted);
-  std::vector<std::byte> raw(predicted.size() * size_bytes(record_.mapping.type));
+  std::vector<double> predicted(static_cast<std::size_t>(rows * record.width));
+  state.surface.read(state.next_row, rows, predicted);
+  std::vector<std::byte> raw(predicted.size() * size_bytes(record.mapping.type));
   try {
-    decode_residuals(record_.mapping, record_.width, *payload, predicted, raw);
+    decode_residuals(record.mapping, record.width, *payload, predicted, raw);
   } catch (const Error& error) {
-    throw error.within(fmt::format("{}: member \"{}\"", archive_.path(), name));
+    throw error.within(fmt::format("{}: member \"{}\"", state.archive.path(), name));
   }
-  next_row_ += rows;
+  state.hash.add(raw);
+  state.next_row += rows;
+  if (!at_end()) return raw;
+  if (const std::string found = hex(state.hash.finish()); found != record.sha256) {
+    throw Error(ErrorCode::kCorrupt, fmt::format("{}: the restored samples have the SHA-256 {}, the source's is {}",
+                                                 state.archive.path(), found, record.sha256));
+  }
   return raw;
 }
 

@@ -20,33 +20,36 @@
 namespace isohf {
 namespace {
 
-/// A place by the tile that holds it; ordered so, and within a tile as they came.
-using PlaceOfTile = std::pair<std::int64_t, std::size_t>;
+/// Points that follow each other on one tile; ordered by tile, and within one as they came.
+struct Run {
+  std::int64_t tile;
+  std::size_t first;
+  std::size_t end;
+
+  friend bool operator<(const Run& a, const Run& b) { return a.tile != b.tile ? a.tile < b.tile : a.first < b.first; }
+};
 
 /// One tile's surface, from its codes.
 class TileSurface {
  public:
-  /// scratch  C*R heights, whatever they are
+  /// scratch  nothing, or C*R heights of any value
   TileSurface(const TileGrid& grid, const Quantisation& quantisation, const TileCodes& codes,
               std::vector<float>& scratch)
-      : grid_(grid), quantisation_(quantisation), codes_(codes), scratch_(scratch) {
-    const auto count = static_cast<std::size_t>(grid.shape().stored_vertex_count());
-    for (std::size_t i = 0; i < count; ++i) {
-      const double elevation = elevation_at(i);
-      if (std::isnan(elevation)) continue;
-      datum_ = elevation;
-      break;
+      : grid_(grid), quantisation_(quantisation), codes_(codes), scratch_(scratch) {}
+
+  [[nodiscard]] double elevation(const Barycentric& where) const {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < 3; ++i) {
+      if (where.weights[i] > 0.0) sum += where.weights[i] * elevation_at(at(where.vertices[i]));
     }
+    return sum;
   }
 
   void sample(ObjectPoint point, SurfaceSample& sample) {
     const Barycentric where = barycentric(grid_.shape(), point);
-    sample.elevation = 0.0;
-    for (std::size_t i = 0; i < 3; ++i) {
-      if (where.weights[i] > 0.0) sample.elevation += where.weights[i] * elevation_at(at(where.vertices[i]));
-    }
-    sample.state = std::isnan(sample.elevation) ? SurfaceSample::State::kVoid : SurfaceSample::State::kSurface;
-    if (sample.state == SurfaceSample::State::kVoid) return;
+    sample.elevation = elevation(where);
+    sample.state = std::isnan(sample.elevation) ? SurfaceState::kNodata : SurfaceState::kSurface;
+    if (sample.state == SurfaceState::kNodata) return;
     fill_around(where);
     const View2D<const float> heights(scratch_.data(), grid_.shape().columns(), grid_.shape().rows());
     std::array<double, 3> sum{};
@@ -68,11 +71,12 @@ class TileSurface {
            static_cast<std::size_t>(vertex.column);
   }
 
-  [[nodiscard]] double elevation_at(std::size_t i) const {
-    if (codes_.type == CodeType::kF32) return double{codes_.heights[i]};
-    const std::uint32_t code = codes_.codes[i];
-    return code == quantisation_.void_code() ? std::numeric_limits<double>::quiet_NaN()
-                                             : elevation_from_code(quantisation_, code);
+  [[nodiscard]] double elevation_at(std::size_t i) const { return elevation_of_vertex(codes_, quantisation_, i); }
+
+  /// The tile's first elevation.
+  [[nodiscard]] double datum() {
+    for (std::size_t i = 0; std::isnan(datum_); ++i) datum_ = elevation_at(i);
+    return datum_;
   }
 
   /// Heights above the datum of all vertices that the normals of a triangle's vertices depend on: single precision is
@@ -86,7 +90,7 @@ class TileSurface {
     for (int row = first_row; row <= last_row; ++row) {
       for (int column = first_column; column <= last_column; ++column) {
         const std::size_t vertex = at({column, row});
-        scratch_[vertex] = static_cast<float>(elevation_at(vertex) - datum_);
+        scratch_[vertex] = static_cast<float>(elevation_at(vertex) - datum());
       }
     }
   }
@@ -95,14 +99,20 @@ class TileSurface {
   const Quantisation& quantisation_;
   const TileCodes& codes_;
   std::vector<float>& scratch_;
-  double datum_ = 0.0;
+  double datum_ = std::numeric_limits<double>::quiet_NaN();
 };
 
 }  // namespace
 
-PointSampler::PointSampler(const ArchiveReader& archive, std::uint64_t memory_bytes) : archive_(archive) {
-  const std::uint64_t bytes = archive.metadata().quantisation.type == CodeType::kF32 ? 4 : 2;
-  const std::uint64_t tile_bytes = static_cast<std::uint64_t>(archive.grid().shape().stored_vertex_count()) * bytes;
+ReadTiles tiles_of(const ArchiveReader& archive) {
+  return [&archive](std::span<const TileIndex> tiles) { return archive.read_tiles(tiles); };
+}
+
+PointSampler::PointSampler(const TileGrid& grid, const Quantisation& quantisation, ReadTiles read_tiles,
+                           std::uint64_t memory_bytes)
+    : grid_(grid), quantisation_(quantisation), read_tiles_(std::move(read_tiles)) {
+  const std::uint64_t bytes = quantisation.type == CodeType::kF32 ? 4 : 2;
+  const std::uint64_t tile_bytes = static_cast<std::uint64_t>(grid.shape().stored_vertex_count()) * bytes;
   const auto threads = static_cast<std::uint64_t>(oneapi::tbb::this_task_arena::max_concurrency());
   capacity_ = static_cast<std::size_t>(std::max<std::uint64_t>(1, memory_bytes / tile_bytes));
   // Large tiles in all lanes of all threads would take more than is to be kept.
@@ -127,26 +137,24 @@ void PointSampler::keep(std::int64_t tile, const Codes& codes) {
   by_tile_[tile] = used_.begin();
 }
 
-void PointSampler::sample(std::span<const WorldPoint> places, std::span<SurfaceSample> samples) {
-  ISOHF_ASSERT(places.size() == samples.size());
-  const TileGrid& grid = archive_.grid();
-  std::vector<PlaceOfTile> order;
-  order.reserve(places.size());
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    samples[i] = {};
-    if (!grid.contains(places[i])) continue;
-    samples[i].tile = grid.locate(places[i]).tile;
-    order.emplace_back(grid.flat_index(samples[i].tile), i);
+/// Calls sample(codes, points of a tile) for each tile, `points` as runs of their numbers.
+template <typename Sample>
+void PointSampler::visit(std::span<const WorldPoint> points, const Sample& sample) {
+  std::vector<Run> runs;
+  std::int64_t last = -1;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const std::int64_t tile = grid_.contains(points[i]) ? grid_.flat_index(grid_.locate(points[i]).tile) : -1;
+    if (tile >= 0 && tile != last) runs.push_back({tile, i, i});
+    if (tile >= 0) runs.back().end = i + 1;
+    last = tile;
   }
-  oneapi::tbb::parallel_sort(order.begin(), order.end());
-  std::vector<std::span<const PlaceOfTile>> tiles;  // the places of each
-  for (std::size_t first = 0, i = 1; first < order.size(); ++i) {
-    if (i < order.size() && order[i].first == order[first].first) continue;
-    tiles.emplace_back(order.data() + first, i - first);
+  oneapi::tbb::parallel_sort(runs.begin(), runs.end());
+  std::vector<std::span<const Run>> tiles;  // the runs of each
+  for (std::size_t first = 0, i = 1; first < runs.size(); ++i) {
+    if (i < runs.size() && runs[i].tile == runs[first].tile) continue;
+    tiles.emplace_back(runs.data() + first, i - first);
     first = i;
   }
-  oneapi::tbb::enumerable_thread_specific<std::vector<float>> scratches(
-      [&] { return std::vector<float>(static_cast<std::size_t>(grid.shape().stored_vertex_count())); });
   const std::size_t groups = (tiles.size() + tiles_together_ - 1) / tiles_together_;
   oneapi::tbb::parallel_for(std::size_t{0}, groups, [&](std::size_t group) {
     const std::size_t first = group * tiles_together_;
@@ -154,18 +162,46 @@ void PointSampler::sample(std::span<const WorldPoint> places, std::span<SurfaceS
     std::vector<Codes> codes;
     std::vector<TileIndex> missing;
     for (const auto& tile : of_group) {
-      codes.push_back(kept(tile.front().first));
-      if (!codes.back()) missing.push_back(grid.tile_at(tile.front().first));
+      codes.push_back(kept(tile.front().tile));
+      if (!codes.back()) missing.push_back(grid_.tile_at(tile.front().tile));
     }
-    std::vector<TileCodes> read = missing.empty() ? std::vector<TileCodes>{} : archive_.read_tiles(missing);
+    std::vector<TileCodes> read = missing.empty() ? std::vector<TileCodes>{} : read_tiles_(missing);
     for (std::size_t i = 0, next = 0; i < codes.size(); ++i) {
       if (codes[i]) continue;
       codes[i] = std::make_shared<const TileCodes>(std::move(read[next++]));
-      keep(of_group[i].front().first, codes[i]);
+      keep(of_group[i].front().tile, codes[i]);
     }
-    for (std::size_t i = 0; i < codes.size(); ++i) {
-      TileSurface surface(grid, archive_.metadata().quantisation, *codes[i], scratches.local());
-      for (const auto& [tile, place] : of_group[i]) surface.sample(grid.locate(places[place]).point, samples[place]);
+    for (std::size_t i = 0; i < codes.size(); ++i) sample(*codes[i], of_group[i]);
+  });
+}
+
+void PointSampler::sample(std::span<const WorldPoint> points, std::span<SurfaceSample> samples) {
+  ISOHF_ASSERT(points.size() == samples.size());
+  std::fill(samples.begin(), samples.end(), SurfaceSample{});
+  oneapi::tbb::enumerable_thread_specific<std::vector<float>> scratches(
+      [&] { return std::vector<float>(static_cast<std::size_t>(grid_.shape().stored_vertex_count())); });
+  visit(points, [&](const TileCodes& codes, std::span<const Run> runs) {
+    TileSurface surface(grid_, quantisation_, codes, scratches.local());
+    for (const Run& run : runs) {
+      for (std::size_t i = run.first; i < run.end; ++i) {
+        const TilePoint at = grid_.locate(points[i]);
+        samples[i].tile = at.tile;
+        surface.sample(at.point, samples[i]);
+      }
+    }
+  });
+}
+
+void PointSampler::sample(std::span<const WorldPoint> points, std::span<double> elevations) {
+  ISOHF_ASSERT(points.size() == elevations.size());
+  std::fill(elevations.begin(), elevations.end(), std::numeric_limits<double>::quiet_NaN());
+  visit(points, [&](const TileCodes& codes, std::span<const Run> runs) {
+    std::vector<float> no_scratch;
+    const TileSurface surface(grid_, quantisation_, codes, no_scratch);
+    for (const Run& run : runs) {
+      for (std::size_t i = run.first; i < run.end; ++i) {
+        elevations[i] = surface.elevation(barycentric(grid_.shape(), grid_.locate(points[i]).point));
+      }
     }
   });
 }

@@ -1,38 +1,33 @@
 #pragma once
 
-#include <array>
-#include <cstdint>
+#include <functional>
 #include <list>
 #include <memory>
 #include <mutex>
 #include <span>
 #include <unordered_map>
+#include <vector>
 
-#include "isohf/archive.h"
+#include "isohf/surface.h"
 
 namespace isohf {
 
-/// What the surface has at a place.
-struct SurfaceSample {
-  enum class State : std::uint8_t { kSurface, kVoid, kOutside };
-  State state = State::kOutside;
-  TileIndex tile{-1, -1};                          ///< where the place lies; (-1, -1) outside
-  double elevation = 0.0;                          ///< of the triangle there, as it is drawn; kSurface alone
-  std::array<double, 3> normal = {0.0, 1.0, 0.0};  ///< vertex normals' blend over it, of length 1; likewise
-};
+/// Decodes several tiles, void ones too; called from many threads at once.
+using ReadTiles = std::function<std::vector<TileCodes>(std::span<const TileIndex>)>;
+[[nodiscard]] ReadTiles tiles_of(const ArchiveReader& archive);
 
-/// The surface of an archive at any number of places in any order.
+/// What Surface does, for tiles that come from anywhere.
 ///
-/// The places of a call are sorted by tile: each tile that it meets is decoded once, several at a time on all threads
-/// of the caller's oneTBB arena. The codes of tiles used last are kept. What is found depends on neither.
+/// The points of a call are sorted by tile, runs on one tile together: each tile is decoded once.
 class PointSampler {
  public:
-  /// Keeps at most `memory_bytes` of decoded tiles. The archive outlives it.
-  PointSampler(const ArchiveReader& archive, std::uint64_t memory_bytes);
+  /// Keeps at most `memory_bytes` of decoded tiles, and has as much again in hand during a call; one tile in each
+  /// thread at least.
+  PointSampler(const TileGrid& grid, const Quantisation& quantisation, ReadTiles read_tiles,
+               std::uint64_t memory_bytes);
 
-  /// samples [n] out, of places [n]; a place that is NaN lies outside. Throws as ArchiveReader::read_tiles does. One
-  /// call at a time.
-  void sample(std::span<const WorldPoint> places, std::span<SurfaceSample> samples);
+  void sample(std::span<const WorldPoint> points, std::span<SurfaceSample> samples);
+  void sample(std::span<const WorldPoint> points, std::span<double> elevations);
 
  private:
   using Codes = std::shared_ptr<const TileCodes>;
@@ -41,10 +36,14 @@ class PointSampler {
     Codes codes;
   };
 
+  template <typename Sample>
+  void visit(std::span<const WorldPoint> points, const Sample& sample);
   [[nodiscard]] Codes kept(std::int64_t tile);
   void keep(std::int64_t tile, const Codes& codes);
 
-  const ArchiveReader& archive_;
+  TileGrid grid_;
+  Quantisation quantisation_;
+  ReadTiles read_tiles_;
   std::size_t capacity_;        ///< tiles to keep
   std::size_t tiles_together_;  ///< decoded at once by one thread
   std::mutex mutex_;            ///< of what follows

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "isohf/raster.h"
+#include "isohf/surface.h"
 
 /// Source samples as what is left after predicting them from the archive's surface (docs/archive_format.md, residuals).
 ///
@@ -15,13 +15,6 @@
 /// where the surface has none, are kept as they are.
 
 namespace isohf {
-
-/// How raw samples and elevations go together: elevation = raw * z_scale + z_offset.
-struct SampleMapping {
-  SampleType type = SampleType::kFloat32;
-  double z_scale = 1.0;
-  double z_offset = 0.0;
-};
 
 /// The raw sample nearest to an elevation, as `size_bytes(type)` bytes at `raw`; ties upwards. False, and nothing
 /// written, where the type does not reach that far. `elevation` is not NaN.

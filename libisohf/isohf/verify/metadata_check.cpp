@@ -14,6 +14,7 @@
 #include "isohf/projection/projection.h"
 #include "isohf/restore/archive_geometry.h"
 #include "isohf/restore/lossless.h"
+#include "isohf/surface.h"
 
 namespace isohf {
 namespace {
@@ -221,7 +222,7 @@ class Contradictions {
         add("lossless.z_scale, .z_offset", "are not the source's");
       std::uint64_t bytes = 0;
       for (const MemberEntry& member : archive_.members()) {
-        if (member.name.starts_with("residual/") && member.name != kPlacesName) bytes += member.compressed_bytes;
+        if (member.name.starts_with("residual/") && member.name != kPositionsName) bytes += member.compressed_bytes;
       }
       if (bytes != record->residual_bytes && !archive_.reads_by_directory())
         add("lossless.residual_bytes", fmt::format("is {}, the members have {}", record->residual_bytes, bytes));

@@ -120,4 +120,11 @@ CodeLimits code_limits(const Metadata& metadata) {
   return code_limits(metadata.quantisation);
 }
 
+std::vector<double> elevations_of(const TileCodes& tile, const Quantisation& quantisation) {
+  if (tile.type == CodeType::kF32) return {tile.heights.begin(), tile.heights.end()};
+  std::vector<double> elevations(tile.codes.size());
+  for (std::size_t i = 0; i < elevations.size(); ++i) elevations[i] = elevation_of_vertex(tile, quantisation, i);
+  return elevations;
+}
+
 }  // namespace isohf

@@ -1,7 +1,10 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <span>
+#include <vector>
 
 #include "isohf/archive/codec/tile_codes.h"
 #include "isohf/metadata.h"
@@ -37,5 +40,16 @@ QuantiserCounts quantise(const Quantisation& quantisation, double datum, std::sp
 [[nodiscard]] inline double elevation_from_code(const Quantisation& quantisation, std::uint32_t code) {
   return quantisation.offset + quantisation.scale * code;
 }
+
+/// The elevation of a tile's i-th vertex, NaN where void.
+[[nodiscard]] inline double elevation_of_vertex(const TileCodes& tile, const Quantisation& quantisation,
+                                                std::size_t i) {
+  if (tile.type == CodeType::kF32) return static_cast<double>(tile.heights[i]);
+  return tile.codes[i] == quantisation.void_code() ? std::numeric_limits<double>::quiet_NaN()
+                                                   : elevation_from_code(quantisation, tile.codes[i]);
+}
+
+/// All C*R elevations of a tile, NaN where void.
+[[nodiscard]] std::vector<double> elevations_of(const TileCodes& tile, const Quantisation& quantisation);
 
 }  // namespace isohf

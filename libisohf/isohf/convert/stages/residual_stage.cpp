@@ -63,11 +63,11 @@ std::uint64_t residual_stage_memory_bytes(const SourceInfo& info, const Plan& pl
   const double bands = members * rows * width * (2.0 * sample + 8.0);
   const double encoding = threads * rows * width * (5.0 + 5.0 * sample);
   if (plan.frame.warp) {
-    // A place for each sample of a member, tiles that are kept, and one in each thread.
+    // A position for each sample of a member, tiles that are kept, and one in each thread.
     const double tile_bytes = 8.0 * static_cast<double>(shape.stored_vertex_count());
-    const double mesh = 16.0 * static_cast<double>(PlaceMesh::value_count(info.width, info.height));
+    const double mesh = 16.0 * static_cast<double>(PositionMesh::value_count(info.width, info.height));
     return static_cast<std::uint64_t>(bands + encoding + rows * width * 16.0 + mesh + threads * 2.0 * tile_bytes +
-                                      static_cast<double>(ScatteredSurface::kKeptBytes));
+                                      static_cast<double>(SamplePredictor::kTileBytes));
   }
   const double tile_rows = std::ceil(rows * plan.frame.spacing_z / plan.grid.extent_z()) + 1.0;
   const double tiles = tile_rows * static_cast<double>(plan.grid.tile_columns()) * 8.0 *
@@ -87,19 +87,24 @@ LosslessRecord write_residuals(HeightSource& source, const SourceFrame& frame, c
   record.void_values = info.void_values;
   record.rows_per_member = rows_per_member(info);
   writer.flush_tiles();
-  std::optional<PlaceMesh> places;
+  std::optional<PositionMesh> positions;
   if (frame.warp) {
     const ExactWarp warp(*frame.warp);
-    places.emplace(info.width, info.height, [&](double column, double row) {
+    positions.emplace(info.width, info.height, [&](double column, double row) {
       return warp.world_from_source({column, row});
     });
-    record.at_places = true;
-    writer.add_member(kPlacesName, bytes_of(*places), true);
+    record.at_positions = true;
+    writer.add_member(kPositionsName, bytes_of(*positions), true);
   }
+  const ReadTiles read_tiles = [&](std::span<const TileIndex> tiles) {
+    std::vector<TileCodes> codes;
+    for (const TileIndex tile : tiles) codes.push_back(writer.read_tile(tile, quantisation));
+    return codes;
+  };
   SamplePredictor surface(
-      grid, frame.wraps_x, quantisation, [&](TileIndex tile) { return writer.read_tile(tile, quantisation); },
+      grid, frame.wraps_x, quantisation, read_tiles,
       {frame.width, frame.height, frame.first_sample_x, frame.first_sample_z, frame.spacing_x, frame.spacing_z},
-      record.method, std::move(places));
+      record.method, std::move(positions));
   Sha256 hash;
   for (std::int64_t row = 0; row < info.height;) {
     std::vector<ResidualBand> bands;

@@ -18,6 +18,7 @@
 #include "isohf/error.h"
 #include "isohf/lattice/barycentric.h"
 #include "isohf/restore/archive_geometry.h"
+#include "isohf/surface.h"
 #include "isohf/surface/source/band_reader.h"
 #include "isohf/surface/source/source_statistics.h"
 #include "isohf/verify/accuracy/error_statistics.h"

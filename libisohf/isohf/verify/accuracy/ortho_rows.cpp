@@ -21,18 +21,6 @@ ElevationRange code_range(const Metadata& surface, double datum) {
   return {limits.lowest - datum, limits.highest - datum};
 }
 
-void elevations_from_codes(const Quantisation& quantisation, const TileCodes& codes, std::vector<double>& out) {
-  out.resize(codes.codes.size() + codes.heights.size());
-  if (quantisation.type == CodeType::kF32) {
-    std::copy(codes.heights.begin(), codes.heights.end(), out.begin());
-    return;
-  }
-  const std::uint32_t void_code = quantisation.void_code();
-  std::transform(codes.codes.begin(), codes.codes.end(), out.begin(), [&](std::uint16_t code) {
-    return code == void_code ? std::numeric_limits<double>::quiet_NaN() : elevation_from_code(quantisation, code);
-  });
-}
-
 /// Appends columns [first, first + count) of a row.
 void append(const TileCodes& row, std::size_t first, std::size_t count, TileCodes& tile) {
   const auto at = static_cast<std::ptrdiff_t>(first);
@@ -101,7 +89,7 @@ void OrthoRows::fill(std::int64_t index, const SourceBand& band, RowSampler::Scr
   const Quantisation& quantisation = ground_.surface.quantisation;
   const QuantiserCounts counts = quantise(quantisation, code_limits(ground_.surface), ground_.datum, heights, codes);
   clamped_[static_cast<std::size_t>(index)] = counts.below + counts.above;
-  elevations_from_codes(quantisation, codes, kept_[static_cast<std::size_t>(row - first_row_)]);
+  kept_[static_cast<std::size_t>(row - first_row_)] = elevations_of(codes, quantisation);
   if (is_coded_) codes_[codes_.size() - static_cast<std::size_t>(opened() - index)] = std::move(codes);
 }
 

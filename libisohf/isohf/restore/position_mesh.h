@@ -17,13 +17,13 @@ namespace isohf {
 ///
 ///     node 0 ------ node 1 ------ ... ------ node n     n = max(3, ceil((samples - 1) / step)), evenly spaced from the
 ///     sample 0                               the last   first sample to the last, along either axis
-class PlaceMesh {
+class PositionMesh {
  public:
   /// `at` gives the place of any position between samples; NaN where there is none: all samples of the cells around
   /// then have none.
-  PlaceMesh(std::int64_t columns, std::int64_t rows, const std::function<WorldPoint(double column, double row)>& at);
+  PositionMesh(std::int64_t columns, std::int64_t rows, const std::function<WorldPoint(double column, double row)>& at);
   /// values [value_count()]  as values() gave them
-  PlaceMesh(std::int64_t columns, std::int64_t rows, std::vector<double> values);
+  PositionMesh(std::int64_t columns, std::int64_t rows, std::vector<double> values);
 
   [[nodiscard]] static std::int64_t step(std::int64_t columns, std::int64_t rows);
   [[nodiscard]] static std::size_t value_count(std::int64_t columns, std::int64_t rows);

@@ -1,7 +1,8 @@
-#include "isohf/restore/surface_rows.h"
+#include "isohf/restore/grid_sampler.h"
 
 #include <fmt/format.h>
 #include <oneapi/tbb/parallel_for.h>
+#include <oneapi/tbb/task_arena.h>
 
 #include <algorithm>
 #include <atomic>
@@ -9,6 +10,8 @@
 #include <limits>
 #include <utility>
 
+#include "isohf/archive/codec/quantise.h"
+#include "isohf/archive/codec/simd/batch_decoder.h"
 #include "isohf/base/assert.h"
 #include "isohf/error.h"
 #include "isohf/lattice/barycentric.h"
@@ -30,13 +33,9 @@ std::vector<double> columns_of(const SampleGrid& samples) {
   return columns;
 }
 
-/// Far from the surface places are no longer counted in lattice steps.
+/// Far from the surface positions are no longer counted in lattice steps.
 SampleGrid checked(const SampleGrid& samples, const TileGrid& grid) {
-  if (samples.width < 1 || samples.height < 1 || !(samples.spacing_x > 0.0) || !(samples.spacing_z > 0.0)) {
-    throw Error(ErrorCode::kInvalidArgument,
-                fmt::format("a grid of {}x{} samples {} x {} apart, must have at least one and positive spacing",
-                            samples.width, samples.height, samples.spacing_x, samples.spacing_z));
-  }
+  require_samples(samples);
   const auto check_axis = [](double first, double spacing, std::int64_t count, double world) {
     const double last = first + spacing * static_cast<double>(count - 1);
     if (std::abs(first) <= 1000.0 * world && std::abs(last) <= 1000.0 * world) return;
@@ -55,66 +54,57 @@ bool is_inside(double place, double spacing, double end) {
 
 }  // namespace
 
-std::string to_string(RestoreMethod method) {
-  return method == RestoreMethod::kHex ? "hex" : "barycentric";
-}
-
-RestoreMethod restore_method_from_string(const std::string& text) {
-  if (text == "barycentric") return RestoreMethod::kBarycentric;
-  if (text == "hex") return RestoreMethod::kHex;
-  throw Error(ErrorCode::kInvalidArgument, fmt::format("found '{}', must be barycentric or hex", text));
-}
-
-SampleGrid source_grid(const SourceRecord& source) {
-  return {source.width,          source.height,    source.first_sample_x,
-          source.first_sample_z, source.spacing_x, source.spacing_z};
-}
-
-std::vector<double> elevations_of(const TileCodes& tile, const Quantisation& quantisation) {
-  std::vector<double> elevations;
-  if (tile.type == CodeType::kF32) {
-    elevations.assign(tile.heights.begin(), tile.heights.end());
-    return elevations;
+void require_samples(const SampleGrid& grid) {
+  if (grid.width < 1 || grid.height < 1 || !(grid.spacing_x > 0.0) || !(grid.spacing_z > 0.0)) {
+    throw Error(ErrorCode::kInvalidArgument,
+                fmt::format("a grid of {}x{} samples {} x {} apart, must have at least one and positive spacing",
+                            grid.width, grid.height, grid.spacing_x, grid.spacing_z));
   }
-  elevations.reserve(tile.codes.size());
-  for (const std::uint32_t code : tile.codes) {
-    elevations.push_back(code == quantisation.void_code() ? kVoid : quantisation.offset + quantisation.scale * code);
-  }
-  return elevations;
 }
 
-SurfaceRows::SurfaceRows(const TileGrid& grid, bool wraps_x, const Quantisation& quantisation, ReadTile read_tile,
+GridSampler::GridSampler(const TileGrid& grid, bool wraps_x, const Quantisation& quantisation, ReadTiles read_tiles,
                          const SampleGrid& samples, RestoreMethod method)
     : grid_(grid),
       quantisation_(quantisation),
-      read_tile_(std::move(read_tile)),
+      read_tiles_(std::move(read_tiles)),
       samples_(checked(samples, grid)),
       method_(method),
-      hex_(grid, method == RestoreMethod::kHex ? columns_of(samples) : std::vector<double>{}, wraps_x) {
+      spline_(grid, method == RestoreMethod::kHex ? columns_of(samples) : std::vector<double>{}, wraps_x) {
   for (const double x : columns_of(samples)) {
     const TilePoint at = grid_.locate({x, 0.0});
     columns_.push_back({is_inside(x, samples.spacing_x, grid.world_width()), at.tile.column, at.point.x});
   }
 }
 
-const SurfaceRows::TileRow& SurfaceRows::tile_row(std::int64_t row) {
+const GridSampler::TileRow& GridSampler::tile_row(std::int64_t row) {
   for (const TileRow& kept : tile_rows_) {
     if (kept.row == row) return kept;
   }
   TileRow made{row, false, {}};
   made.elevations.resize(static_cast<std::size_t>(grid_.tile_columns()));
   std::atomic<bool> any = false;
-  oneapi::tbb::parallel_for(std::size_t{0}, made.elevations.size(), [&](std::size_t column) {
-    std::vector<double>& elevations = made.elevations[column];
-    elevations = elevations_of(read_tile_({static_cast<std::int64_t>(column), row}), quantisation_);
-    if (std::any_of(elevations.begin(), elevations.end(), [](double h) { return std::isnan(h); })) any = true;
+  const auto threads = static_cast<std::size_t>(oneapi::tbb::this_task_arena::max_concurrency());
+  const std::size_t together = std::clamp<std::size_t>(made.elevations.size() / threads, 1, kBatchLanes);
+  const std::size_t groups = (made.elevations.size() + together - 1) / together;
+  oneapi::tbb::parallel_for(std::size_t{0}, groups, [&](std::size_t group) {
+    const std::size_t first = group * together;
+    std::vector<TileIndex> tiles;
+    for (std::size_t column = first; column < std::min(first + together, made.elevations.size()); ++column) {
+      tiles.push_back({static_cast<std::int64_t>(column), row});
+    }
+    const std::vector<TileCodes> codes = read_tiles_(tiles);
+    for (std::size_t i = 0; i < codes.size(); ++i) {
+      std::vector<double>& elevations = made.elevations[first + i];
+      elevations = elevations_of(codes[i], quantisation_);
+      if (std::any_of(elevations.begin(), elevations.end(), [](double h) { return std::isnan(h); })) any = true;
+    }
   });
   made.has_voids = any;
   tile_rows_.push_back(std::move(made));
   return tile_rows_.back();
 }
 
-const SurfaceRows::TileRow& SurfaceRows::kept_tile_row(std::int64_t row) const {
+const GridSampler::TileRow& GridSampler::kept_tile_row(std::int64_t row) const {
   const auto found =
       std::find_if(tile_rows_.begin(), tile_rows_.end(), [&](const TileRow& kept) { return kept.row == row; });
   ISOHF_ASSERT(found != tile_rows_.end());
@@ -122,7 +112,7 @@ const SurfaceRows::TileRow& SurfaceRows::kept_tile_row(std::int64_t row) const {
 }
 
 /// Drops the lattice rows before `first` and makes those up to `last`.
-void SurfaceRows::keep_lattice_rows(std::int64_t first, std::int64_t last) {
+void GridSampler::keep_lattice_rows(std::int64_t first, std::int64_t last) {
   while (!lattice_rows_.empty() && first_lattice_row_ < first) {
     lattice_rows_.pop_front();
     ++first_lattice_row_;
@@ -131,33 +121,33 @@ void SurfaceRows::keep_lattice_rows(std::int64_t first, std::int64_t last) {
   for (;;) {
     const std::int64_t next = first_lattice_row_ + static_cast<std::int64_t>(lattice_rows_.size());
     if (next > last) return;
-    const TileRow& tiles = tile_row(hex_.tile_row_of(next));
+    const TileRow& tiles = tile_row(spline_.tile_row_of(next));
     std::int64_t end = next;
-    while (end <= last && hex_.tile_row_of(end) == tiles.row) ++end;
+    while (end <= last && spline_.tile_row_of(end) == tiles.row) ++end;
     const std::size_t have = lattice_rows_.size();
     lattice_rows_.resize(have + static_cast<std::size_t>(end - next));
     oneapi::tbb::parallel_for(next, end, [&](std::int64_t row) {
       LatticeRow& made = lattice_rows_[have + static_cast<std::size_t>(row - next)];
       made.heights.resize(columns_.size());
       made.near_void.resize(columns_.size());
-      made.any_near_void = hex_.straighten(row, tiles.elevations, made.heights, made.near_void);
+      made.any_near_void = spline_.straighten(row, tiles.elevations, made.heights, made.near_void);
     });
   }
 }
 
-void SurfaceRows::read(std::int64_t first, std::int64_t rows, std::span<double> elevations) {
+void GridSampler::read(std::int64_t first, std::int64_t rows, std::span<double> elevations) {
   ISOHF_ASSERT(elevations.size() == static_cast<std::size_t>(rows * samples_.width));
   const auto tile_row_at = [&](std::int64_t row) { return grid_.locate({0.0, world_z(row)}).tile.row; };
   for (std::int64_t row = first; row < first + rows; ++row) (void)tile_row(tile_row_at(row));
   if (method_ == RestoreMethod::kHex) {
-    std::int64_t low = hex_.rows() - 1;
+    std::int64_t low = spline_.rows() - 1;
     std::int64_t high = 0;
     for (const std::int64_t row : {first, first + rows - 1}) {
       const double z = std::clamp(world_z(row), 0.0, grid_.world_height());
-      const std::int64_t start = quintic_weights(hex_.row_at(z)).first - QuinticResponse::kHalo;
+      const std::int64_t start = quintic_weights(spline_.row_at(z)).first - QuinticResponse::kHalo;
       for (std::int64_t k = start; k < start + QuinticResponse::kTaps; ++k) {
-        low = std::min(low, mirror_index(k, hex_.rows()));
-        high = std::max(high, mirror_index(k, hex_.rows()));
+        low = std::min(low, mirror_index(k, spline_.rows()));
+        high = std::max(high, mirror_index(k, spline_.rows()));
       }
     }
     keep_lattice_rows(low, high);
@@ -170,7 +160,7 @@ void SurfaceRows::read(std::int64_t first, std::int64_t rows, std::span<double> 
   std::erase_if(tile_rows_, [next](const TileRow& kept) { return kept.row < next; });
 }
 
-void SurfaceRows::read_on_triangles(const TilePoint& at, std::span<double> out) const {
+void GridSampler::read_on_triangles(const TilePoint& at, std::span<double> out) const {
   const TileRow& tiles = kept_tile_row(at.tile.row);
   const TileShape& shape = grid_.shape();
   for (std::size_t c = 0; c < columns_.size(); ++c) {
@@ -181,7 +171,7 @@ void SurfaceRows::read_on_triangles(const TilePoint& at, std::span<double> out) 
   }
 }
 
-void SurfaceRows::read_row(std::int64_t row, std::span<double> out) const {
+void GridSampler::read_row(std::int64_t row, std::span<double> out) const {
   const double z = world_z(row);
   if (!is_inside(z, samples_.spacing_z, grid_.world_height())) {
     std::fill(out.begin(), out.end(), kVoid);
@@ -189,10 +179,10 @@ void SurfaceRows::read_row(std::int64_t row, std::span<double> out) const {
   }
   const TilePoint at = grid_.locate({0.0, z});
   if (method_ == RestoreMethod::kBarycentric) return read_on_triangles(at, out);
-  const QuinticResponse response = quintic_response(hex_.row_at(std::clamp(z, 0.0, grid_.world_height())));
+  const QuinticResponse response = quintic_response(spline_.row_at(std::clamp(z, 0.0, grid_.world_height())));
   bool beside_voids = kept_tile_row(at.tile.row).has_voids;
   for (std::int64_t t = 0; t < QuinticResponse::kTaps; ++t) {
-    const std::int64_t k = mirror_index(response.first + t, hex_.rows());
+    const std::int64_t k = mirror_index(response.first + t, spline_.rows());
     beside_voids = beside_voids || lattice_rows_[static_cast<std::size_t>(k - first_lattice_row_)].any_near_void;
   }
   if (beside_voids) read_on_triangles(at, out);
@@ -200,10 +190,10 @@ void SurfaceRows::read_row(std::int64_t row, std::span<double> out) const {
 }
 
 /// Replaces the elevations of a row by the spline's; those that are void, or have voids around, stay.
-void SurfaceRows::blend_lattice_rows(const QuinticResponse& response, bool beside_voids, std::span<double> out) const {
+void GridSampler::blend_lattice_rows(const QuinticResponse& response, bool beside_voids, std::span<double> out) const {
   std::array<const LatticeRow*, QuinticResponse::kTaps> rows{};
   for (std::size_t t = 0; t < rows.size(); ++t) {
-    const std::int64_t k = mirror_index(response.first + static_cast<std::int64_t>(t), hex_.rows());
+    const std::int64_t k = mirror_index(response.first + static_cast<std::int64_t>(t), spline_.rows());
     rows[t] = &lattice_rows_[static_cast<std::size_t>(k - first_lattice_row_)];
   }
   std::vector<double> sums(out.size(), 0.0);

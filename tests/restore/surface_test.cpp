@@ -1,4 +1,4 @@
-#include "isohf/restore/geo_rows.h"
+#include "isohf/surface.h"
 
 #include <gtest/gtest.h>
 #include <oneapi/tbb/task_arena.h>
@@ -20,7 +20,7 @@ namespace isohf {
 namespace {
 
 /// Hills over 5 to 9 East and 44 to 47 North, on a map.
-class GeoRowsTest : public testing::Test {
+class SurfaceInDegrees : public testing::Test {
  protected:
   void convert_to(ProjectionKind kind, bool placed = true) {
     test::MemorySource<float> source(SampleType::kFloat32, 80, 60, [](std::int64_t c, std::int64_t r) {
@@ -45,13 +45,12 @@ class GeoRowsTest : public testing::Test {
   }
 
   /// Reads the grid in calls of so many rows on so many threads.
-  static std::vector<double> read(const ArchiveReader& archive, const GeoGrid& grid, std::int64_t rows_at_once,
+  static std::vector<double> read(const ArchiveReader& archive, const SampleGrid& grid, std::int64_t rows_at_once,
                                   int threads) {
     std::vector<double> elevations(static_cast<std::size_t>(grid.width * grid.height));
     oneapi::tbb::task_arena arena(threads);
     arena.execute([&] {
-      GeoRows rows(
-          archive.metadata(), [&](TileIndex tile) { return archive.read_tile(tile); }, grid);
+      RowReader rows(archive, grid);
       for (std::int64_t row = 0; row < grid.height; row += rows_at_once) {
         const std::int64_t count = std::min(rows_at_once, grid.height - row);
         rows.read(
@@ -66,46 +65,48 @@ class GeoRowsTest : public testing::Test {
   test::TemporaryFolder folder;
 };
 
-TEST_F(GeoRowsTest, FindsWhatTheTriangleAtEveryPlaceHas) {
+TEST_F(SurfaceInDegrees, FindsWhatTheTriangleAtEveryPlaceHas) {
   for (const ProjectionKind kind : {ProjectionKind::kLocal, ProjectionKind::kTransverseMercator, ProjectionKind::kUtm,
                                     ProjectionKind::kLambertConformal}) {
     SCOPED_TRACE(to_string(kind));
     convert_to(kind);
     const ArchiveReader archive(folder / "a.isohf");
     const TileGrid& tiles = archive.grid();
-    const GeoPlaces places(archive.metadata());
+    Surface surface(archive);
     // Larger than the ground on all sides.
-    const GeoGrid grid{67, 59, {4.71, 47.23}, 0.0731, 0.0617};
+    const SampleGrid grid{67, 59, 4.71, 47.23, 0.0731, 0.0617, true};
     const std::vector<double> found = read(archive, grid, 7, 2);
-    int surface = 0;
+    int found_there = 0;
     for (std::int64_t row = 0; row < grid.height; ++row) {
       for (std::int64_t column = 0; column < grid.width; ++column) {
-        const WorldPoint world = places.world_from_geo(
-            {4.71 + static_cast<double>(column) * 0.0731, 47.23 - static_cast<double>(row) * 0.0617});
+        const GeoPoint geo{4.71 + static_cast<double>(column) * 0.0731, 47.23 - static_cast<double>(row) * 0.0617};
+        const WorldPoint world = surface.georeference().world_from_geo(geo);
         double expected = std::nan("");
         if (tiles.contains(world)) {
           const TilePoint at = tiles.locate(world);
-          const std::vector<double> heights =
-              elevations_of(archive.read_tile(at.tile), archive.metadata().quantisation);
+          const std::vector<double> heights = archive.read_elevations(at.tile);
           expected = interpolate(barycentric(tiles.shape(), at.point),
                                  View2D<const double>(heights.data(), tiles.shape().columns(), tiles.shape().rows()));
         }
         const double here = found[static_cast<std::size_t>(row * grid.width + column)];
         ASSERT_EQ(std::isnan(here), std::isnan(expected)) << column << " " << row;
         if (std::isnan(expected)) continue;
-        ++surface;
+        ++found_there;
         ASSERT_EQ(here, expected) << column << " " << row;
+        if (column % 20 == 0) {
+          ASSERT_EQ(surface.at(geo).elevation, expected);
+        }
       }
     }
-    EXPECT_GT(surface, 2000);
-    EXPECT_LT(surface, 67 * 59);
+    EXPECT_GT(found_there, 2000);
+    EXPECT_LT(found_there, 67 * 59);
   }
 }
 
-TEST_F(GeoRowsTest, BitsDoNotDependOnThreadsOrOnHowRowsAreCut) {
+TEST_F(SurfaceInDegrees, BitsDoNotDependOnThreadsOrOnHowRowsAreCut) {
   convert_to(ProjectionKind::kLambertConformal);
   const ArchiveReader archive(folder / "a.isohf");
-  const GeoGrid grid{131, 97, {4.9, 47.1}, 0.033, 0.035};
+  const SampleGrid grid{131, 97, 4.9, 47.1, 0.033, 0.035, true};
   const std::vector<double> whole = read(archive, grid, 97, 1);
   for (const std::int64_t rows : {1, 5, 96}) {
     const std::vector<double> cut = read(archive, grid, rows, 4);
@@ -113,20 +114,63 @@ TEST_F(GeoRowsTest, BitsDoNotDependOnThreadsOrOnHowRowsAreCut) {
   }
 }
 
-TEST_F(GeoRowsTest, RefusesGridsWithoutSamplesAndArchivesWithoutAPlace) {
+TEST_F(SurfaceInDegrees, RefusesGridsWithoutSamplesAndArchivesWithoutAnOrigin) {
   convert_to(ProjectionKind::kUtm);
   {
     const ArchiveReader archive(folder / "a.isohf");
-    const auto read_tile = [&](TileIndex tile) { return archive.read_tile(tile); };
-    EXPECT_THROW(GeoRows(archive.metadata(), read_tile, {0, 5, {5.0, 46.0}, 0.1, 0.1}), Error);
-    EXPECT_THROW(GeoRows(archive.metadata(), read_tile, {5, 5, {5.0, 46.0}, 0.1, 0.0}), Error);
-    EXPECT_THROW(GeoRows(archive.metadata(), read_tile, {5, 5, {5.0, 46.0}, std::nan(""), 0.1}), Error);
+    EXPECT_THROW(RowReader(archive, {0, 5, 5.0, 46.0, 0.1, 0.1, true}), Error);
+    EXPECT_THROW(RowReader(archive, {5, 5, 5.0, 46.0, 0.1, 0.0, true}), Error);
+    EXPECT_THROW(RowReader(archive, {5, 5, 5.0, 46.0, std::nan(""), 0.1, true}), Error);
+    EXPECT_THROW(RowReader(archive, {5, 5, 1e9, 0.0, 1.0, 1.0}), Error) << "far beyond the surface";
   }
   convert_to(ProjectionKind::kEquirectangular, false);
   const ArchiveReader archive(folder / "a.isohf");
-  EXPECT_THROW(GeoRows(archive.metadata(), [&](TileIndex tile) { return archive.read_tile(tile); },
-                       {5, 5, {5.0, 46.0}, 0.1, 0.1}),
-               Error);
+  EXPECT_THROW(RowReader(archive, {5, 5, 5.0, 46.0, 0.1, 0.1, true}), Error);
+  EXPECT_THROW((void)Surface(archive).at(GeoPoint{7.0, 46.0}), Error);
+  EXPECT_THROW((void)Surface(archive).at(MapPoint{7.0, 46.0}), Error);
+}
+
+TEST_F(SurfaceInDegrees, FindsTheSameByDegreesAndByTheSourcesCoordinates) {
+  convert_to(ProjectionKind::kLambertConformal);
+  const ArchiveReader archive(folder / "a.isohf");
+  Surface surface(archive);
+  const SurfaceSample by_geo = surface.at(GeoPoint{7.3, 45.1});
+  ASSERT_EQ(by_geo.state, SurfaceState::kSurface);
+  EXPECT_EQ(surface.at(MapPoint{7.3, 45.1}).elevation, by_geo.elevation) << "the source is in degrees";
+  EXPECT_EQ(surface.at(MapPoint{7.3 + 360.0, 45.1}).tile, by_geo.tile);
+  const WorldPoint world = surface.georeference().world_from_geo({7.3, 45.1});
+  EXPECT_EQ(surface.at(world).elevation, by_geo.elevation);
+  const GeoPoint back = surface.georeference().geo_from_world(world);
+  EXPECT_NEAR(back.longitude, 7.3, 1e-9);
+  EXPECT_NEAR(back.latitude, 45.1, 1e-9);
+}
+
+TEST_F(SurfaceInDegrees, RowsOfAWorldGridAreTheTriangles) {
+  convert_to(ProjectionKind::kUtm);
+  const ArchiveReader archive(folder / "a.isohf");
+  Surface surface(archive);
+  const SampleGrid grid = grid_over(archive.metadata().valid, true, GridSize{40, 30}, {});
+  RowReader rows(archive, grid, RestoreMethod::kBarycentric);
+  std::int64_t rows_seen = 0;
+  rows.read_all(
+      [&](std::int64_t first, std::span<const double> elevations) {
+        for (std::size_t i = 0; i < elevations.size(); ++i) {
+          const auto column = static_cast<double>(i % 40);
+          const auto row = static_cast<double>(first + static_cast<std::int64_t>(i) / 40);
+          const SurfaceSample here =
+              surface.at(WorldPoint{grid.first_x + column * grid.spacing_x, grid.first_z + row * grid.spacing_z});
+          ASSERT_EQ(std::isnan(elevations[i]), here.state != SurfaceState::kSurface);
+          if (here.state == SurfaceState::kSurface) {
+            ASSERT_NEAR(elevations[i], here.elevation, 1e-9);
+          }
+        }
+      },
+      [&](std::int64_t done) { rows_seen = done; });
+  EXPECT_EQ(rows_seen, 30);
+  const std::optional<Georeference> where = grid_georeference(archive.metadata(), grid);
+  ASSERT_TRUE(where.has_value());
+  EXPECT_EQ(where->unit, HorizontalUnit::kMetre);
+  EXPECT_EQ(where->system.epsg, std::nullopt) << "UTM of an unnamed system in degrees has no code";
 }
 
 }  // namespace

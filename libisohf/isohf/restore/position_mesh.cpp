@@ -1,4 +1,4 @@
-#include "isohf/restore/place_mesh.h"
+#include "isohf/restore/position_mesh.h"
 
 #include <algorithm>
 #include <array>
@@ -36,20 +36,20 @@ CubicTaps taps_at(std::int64_t sample, std::int64_t samples, std::int64_t cells)
 
 }  // namespace
 
-std::int64_t PlaceMesh::step(std::int64_t columns, std::int64_t rows) {
+std::int64_t PositionMesh::step(std::int64_t columns, std::int64_t rows) {
   std::int64_t step = kStep;
   while (cells_of(columns, step) > kMostCells / cells_of(rows, step)) step *= 2;
   return step;
 }
 
-std::size_t PlaceMesh::value_count(std::int64_t columns, std::int64_t rows) {
+std::size_t PositionMesh::value_count(std::int64_t columns, std::int64_t rows) {
   const std::int64_t between = step(columns, rows);
   return 2 * static_cast<std::size_t>(cells_of(columns, between) + 1) *
          static_cast<std::size_t>(cells_of(rows, between) + 1);
 }
 
-PlaceMesh::PlaceMesh(std::int64_t columns, std::int64_t rows,
-                     const std::function<WorldPoint(double column, double row)>& at)
+PositionMesh::PositionMesh(std::int64_t columns, std::int64_t rows,
+                           const std::function<WorldPoint(double column, double row)>& at)
     : columns_(columns), rows_(rows), step_(step(columns, rows)) {
   const std::int64_t across = cells_of(columns, step_);
   const std::int64_t down = cells_of(rows, step_);
@@ -66,12 +66,12 @@ PlaceMesh::PlaceMesh(std::int64_t columns, std::int64_t rows,
   }
 }
 
-PlaceMesh::PlaceMesh(std::int64_t columns, std::int64_t rows, std::vector<double> values)
+PositionMesh::PositionMesh(std::int64_t columns, std::int64_t rows, std::vector<double> values)
     : columns_(columns), rows_(rows), step_(step(columns, rows)), values_(std::move(values)) {
   ISOHF_ASSERT(values_.size() == value_count(columns, rows));
 }
 
-void PlaceMesh::row(std::int64_t row, std::span<WorldPoint> out) const {
+void PositionMesh::row(std::int64_t row, std::span<WorldPoint> out) const {
   ISOHF_ASSERT(out.size() == static_cast<std::size_t>(columns_));
   const auto nodes = static_cast<std::size_t>(cells_of(columns_, step_) + 1);
   const CubicTaps down = taps_at(row, rows_, cells_of(rows_, step_));

@@ -1,4 +1,4 @@
-#include "isohf/restore/hex_rows.h"
+#include "isohf/restore/grid_sampler.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,6 @@
 #include <cstring>
 #include <numeric>
 
-#include "isohf/restore/surface_rows.h"
 #include "isohf/surface/resample/kernels.h"
 
 namespace isohf {
@@ -51,9 +50,9 @@ TEST(QuinticSpline, ResponseIsTheFilterAndTheSplineInOne) {
 
 /// Tiles of heights that are a function of the place, sampled at every stored vertex.
 template <typename Height>
-SurfaceRows surface_of(const TileGrid& grid, const SampleGrid& samples, RestoreMethod method, Height height,
+GridSampler surface_of(const TileGrid& grid, const SampleGrid& samples, RestoreMethod method, Height height,
                        bool wraps_x = false) {
-  const auto read = [grid, height](TileIndex tile) {
+  const auto read_one = [grid, height](TileIndex tile) {
     TileCodes codes;
     codes.type = CodeType::kF32;
     for (int r = 0; r < grid.shape().rows(); ++r) {
@@ -64,6 +63,11 @@ SurfaceRows surface_of(const TileGrid& grid, const SampleGrid& samples, RestoreM
     }
     return codes;
   };
+  const ReadTiles read = [read_one](std::span<const TileIndex> tiles) {
+    std::vector<TileCodes> all;
+    for (const TileIndex tile : tiles) all.push_back(read_one(tile));
+    return all;
+  };
   return {grid, wraps_x, {CodeType::kF32, 0.0, 1.0}, read, samples, method};
 }
 
@@ -71,12 +75,12 @@ TileGrid three_by_two() {
   return TileGrid::make(TileShape::make(20, 19, 4), 3, 2, 16.0, 16.0 * std::sqrt(0.75));
 }
 
-TEST(SurfaceRows, HoldsPlanesWhereverTilesMeet) {
+TEST(GridSampler, HoldsPlanesWhereverTilesMeet) {
   const TileGrid grid = three_by_two();
   const SampleGrid samples{90, 50, 0.0, 0.0, grid.world_width() / 89, grid.world_height() / 49};
   for (const RestoreMethod method : {RestoreMethod::kBarycentric, RestoreMethod::kHex}) {
     auto plane = [](double x, double z) { return 3.0 * x - 2.0 * z + 100.0; };
-    SurfaceRows rows = surface_of(grid, samples, method, plane);
+    GridSampler rows = surface_of(grid, samples, method, plane);
     std::vector<double> all(90 * 50);
     rows.read(0, 50, all);
     for (std::int64_t r = 8; r < 42; ++r) {  // the spline's mirrored ends bend a plane
@@ -90,7 +94,7 @@ TEST(SurfaceRows, HoldsPlanesWhereverTilesMeet) {
   }
 }
 
-TEST(SurfaceRows, GoRoundWhereTheWorldDoes) {
+TEST(GridSampler, GoRoundWhereTheWorldDoes) {
   const TileGrid grid = three_by_two();
   const double round = grid.world_width();
   // The same waves, once with the seam in the middle.
@@ -98,7 +102,7 @@ TEST(SurfaceRows, GoRoundWhereTheWorldDoes) {
   const auto shifted = [&](double x, double z) { return waves(x + grid.extent_x(), z); };
   const SampleGrid samples{96, 20, 0.25, 3.0, round / 96.0, 1.0};
   const auto all = [&](const auto& height, bool wraps_x) {
-    SurfaceRows rows = surface_of(grid, samples, RestoreMethod::kHex, height, wraps_x);
+    GridSampler rows = surface_of(grid, samples, RestoreMethod::kHex, height, wraps_x);
     std::vector<double> heights(96 * 20);
     rows.read(0, 20, heights);
     return heights;
@@ -117,7 +121,7 @@ TEST(SurfaceRows, GoRoundWhereTheWorldDoes) {
   EXPECT_GT(bent, 1.0) << "mirrored ends are no seam: the test would not see one";
 }
 
-TEST(SurfaceRows, GivesTheSameBitsHoweverItIsCut) {
+TEST(GridSampler, GivesTheSameBitsHoweverItIsCut) {
   const TileGrid grid = three_by_two();
   const SampleGrid samples{61, 40, 0.3, 0.2, 0.7, 0.6};
   const auto hills = [](double x, double z) {
@@ -127,7 +131,7 @@ TEST(SurfaceRows, GivesTheSameBitsHoweverItIsCut) {
     std::vector<double> whole(61 * 40);
     surface_of(grid, samples, method, hills).read(0, 40, whole);
     for (const std::int64_t step : {1, 3, 17}) {
-      SurfaceRows rows = surface_of(grid, samples, method, hills);
+      GridSampler rows = surface_of(grid, samples, method, hills);
       for (std::int64_t row = 0; row < 40; row += step) {
         const std::int64_t count = std::min<std::int64_t>(step, 40 - row);
         std::vector<double> part(static_cast<std::size_t>(61 * count));
@@ -138,7 +142,7 @@ TEST(SurfaceRows, GivesTheSameBitsHoweverItIsCut) {
   }
 }
 
-TEST(SurfaceRows, BothMethodsAreVoidAtTheSamePlacesAndNoVoidLeaks) {
+TEST(GridSampler, BothMethodsAreVoidAtTheSamePlacesAndNoVoidLeaks) {
   const TileGrid grid = three_by_two();
   const SampleGrid samples{61, 36, 0.3, 0.2, 0.7, 0.6};
   const auto level = [](double x, double z) { return std::hypot(x - 20.0, z - 13.0) < 5.0 ? std::nan("") : 1000.0; };

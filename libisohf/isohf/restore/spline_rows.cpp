@@ -1,4 +1,4 @@
-#include "isohf/restore/hex_rows.h"
+#include "isohf/restore/spline_rows.h"
 
 #include <algorithm>
 #include <cmath>
@@ -123,7 +123,8 @@ void quintic_prefilter(std::span<double> line) {
   for (double& value : line) value *= 120.0;
 }
 
-HexRows::HexRows(const TileGrid& grid, std::vector<double> columns_x, bool wraps_x) : grid_(grid), wraps_x_(wraps_x) {
+SplineRows::SplineRows(const TileGrid& grid, std::vector<double> columns_x, bool wraps_x)
+    : grid_(grid), wraps_x_(wraps_x) {
   // Even k are odd z, with vertices at object-space x = -1, 1, ...; odd k have them at -2, 0, ...
   for (const double x : columns_x) {
     const double half_steps = x / grid.sigma_x();
@@ -136,12 +137,12 @@ HexRows::HexRows(const TileGrid& grid, std::vector<double> columns_x, bool wraps
   }
 }
 
-std::int64_t HexRows::tile_row_of(std::int64_t row) const {
+std::int64_t SplineRows::tile_row_of(std::int64_t row) const {
   return std::clamp<std::int64_t>((row - 1) / grid_.shape().cell_rows(), 0, grid_.tile_rows() - 1);
 }
 
 /// The vertices of a lattice row, padding included; of a row that goes round, kRound more on either side instead.
-std::vector<double> HexRows::line_of(std::int64_t row, const std::vector<std::vector<double>>& tiles) const {
+std::vector<double> SplineRows::line_of(std::int64_t row, const std::vector<std::vector<double>>& tiles) const {
   const std::int64_t columns = grid_.shape().columns();
   const std::int64_t cells = grid_.shape().cell_columns();
   const std::int64_t r = row - tile_row_of(row) * grid_.shape().cell_rows();
@@ -167,8 +168,8 @@ std::vector<double> HexRows::line_of(std::int64_t row, const std::vector<std::ve
   return round;
 }
 
-bool HexRows::straighten(std::int64_t row, const std::vector<std::vector<double>>& tiles, std::span<double> heights,
-                         std::span<char> near_void) const {
+bool SplineRows::straighten(std::int64_t row, const std::vector<std::vector<double>>& tiles, std::span<double> heights,
+                            std::span<char> near_void) const {
   const bool shifted = is_shifted(row - tile_row_of(row) * grid_.shape().cell_rows());
   std::vector<double> line = line_of(row, tiles);
   std::vector<char> voids;

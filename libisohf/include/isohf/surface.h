@@ -1,0 +1,219 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "isohf/archive.h"
+#include "isohf/projection.h"
+#include "isohf/raster.h"
+
+/// What an archive's surface holds: elevation and normal at any point, rows of any grid, and the source's own samples.
+///
+///     const isohf::ArchiveReader archive("dem.isohf");
+///     isohf::Surface surface(archive);
+///     const isohf::SurfaceSample sample = surface.at(isohf::WorldPoint{1200.5, 340.0});
+///     if (sample.state == isohf::SurfaceState::kSurface) use(sample.elevation, sample.normal);
+
+namespace isohf {
+
+/// Where the world of an archive lies: world points <-> longitude and latitude, and <-> coordinates of the archive's
+/// source. Of a source in degrees these two are the same. Immutable, cheap to copy, thread-safe.
+///
+/// Longitudes and latitudes are degrees on the source's own datum. Of a source on a map they are known once the map is
+/// understood: understand_source().
+class WorldGeoreference {
+ public:
+  /// Throws Error{kCorrupt} where the metadata name a projection without the source's origin.
+  explicit WorldGeoreference(const Metadata& metadata);
+
+  [[nodiscard]] bool has_geo() const;     ///< world <-> longitude and latitude
+  [[nodiscard]] bool has_source() const;  ///< world <-> coordinates of the source
+
+  /// Longitudes are taken modulo 360, nearest to the source's middle. NaN where the map has no position for it.
+  /// The four need has_geo() or has_source().
+  [[nodiscard]] WorldPoint world_from_geo(GeoPoint point) const;
+  /// longitude in [-180, 180]. NaN where the map shows no ground.
+  [[nodiscard]] GeoPoint geo_from_world(WorldPoint point) const;
+  [[nodiscard]] WorldPoint world_from_source(MapPoint point) const;
+  [[nodiscard]] MapPoint source_from_world(WorldPoint point) const;
+
+ private:
+  struct State;
+  std::shared_ptr<const State> state_;
+};
+
+/// Has the reference system understood that the archive's source lies on, where that is a map of its own: longitudes
+/// and latitudes are known from then on. Loads PROJ unless the map is a UTM zone.
+/// Throws Error, naming the archive, where it names no system, or one that is not understood.
+void understand_source(ArchiveReader& archive);
+
+/// Whether the surface has an elevation at a point.
+enum class SurfaceState : std::uint8_t { kSurface, kNodata, kOutside };
+
+/// The surface at one point.
+struct SurfaceSample {
+  SurfaceState state = SurfaceState::kOutside;
+  TileIndex tile{-1, -1};                          ///< under the point; (-1, -1) outside
+  double elevation = 0.0;                          ///< of the triangle there, as it is drawn; kSurface alone
+  std::array<double, 3> normal = {0.0, 1.0, 0.0};  ///< x East, y up, z South, of length 1: vertex normals, blended
+};
+
+/// The surface of an archive at any number of points in any order.
+///
+/// Each tile under the points of a call is decoded once, several at a time on all threads of the caller's oneTBB arena.
+/// Tiles used last are kept. What is found depends on neither.
+class Surface {
+ public:
+  /// Keeps at most `memory_bytes` of decoded tiles, one at least. The archive must outlive it.
+  explicit Surface(const ArchiveReader& archive, std::uint64_t memory_bytes = std::uint64_t{256} << 20U);
+  ~Surface();
+  Surface(const Surface&) = delete;
+  Surface& operator=(const Surface&) = delete;
+
+  /// A point that is NaN lies outside. Throws as ArchiveReader::read_tiles does. One call at a time.
+  [[nodiscard]] SurfaceSample at(WorldPoint point);
+  /// Throws Error{kInvalidArgument} where the archive's longitudes and latitudes are not known.
+  [[nodiscard]] SurfaceSample at(GeoPoint point);
+  /// In coordinates of the source. Throws Error{kInvalidArgument} where these are not known.
+  [[nodiscard]] SurfaceSample at(MapPoint point);
+
+  /// points [n]   samples [n] out
+  void sample(std::span<const WorldPoint> points, std::span<SurfaceSample> samples);
+  /// Elevations alone, which is quicker: elevations [n] out, vertical units, NaN where there is none.
+  void sample(std::span<const WorldPoint> points, std::span<double> elevations);
+
+  [[nodiscard]] const WorldGeoreference& georeference() const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+/// How an elevation between lattice vertices is found.
+enum class RestoreMethod {
+  kBarycentric,  ///< on the triangles, as the renderer draws them
+  kHex,          ///< by quintic B-splines along the rows and then down the columns; on the triangles beside nodata
+};
+
+[[nodiscard]] std::string to_string(RestoreMethod method);                        ///< "barycentric", "hex"
+[[nodiscard]] RestoreMethod restore_method_from_string(const std::string& text);  ///< throws Error{kInvalidArgument}
+
+/// The samples of a raster on the ground: evenly spaced columns from West to East and rows from North to South, in world
+/// units or in degrees.
+struct SampleGrid {
+  std::int64_t width = 0;   ///< columns, >= 1
+  std::int64_t height = 0;  ///< rows, >= 1
+  double first_x = 0.0;     ///< of sample (0, 0): world x, or longitude
+  double first_z = 0.0;     ///< world z, or latitude
+  double spacing_x = 1.0;   ///< between columns, > 0
+  double spacing_z = 1.0;   ///< between rows, > 0: southwards, also in degrees
+  bool in_degrees = false;
+  Registration registration = Registration::kArea;  ///< in degrees; in world units it is samples_are_areas()
+};
+
+/// Columns and rows.
+using GridSize = std::pair<std::int64_t, std::int64_t>;
+
+/// The grid of an archive's source in the world; not of one that was projected, whose rows are no rows there.
+[[nodiscard]] SampleGrid source_grid(const SourceRecord& source);
+/// The same; of a source that was projected square areas as large as its own, over the rectangle around its ground.
+[[nodiscard]] SampleGrid natural_grid(const Metadata& metadata);
+/// Samples over a part of the world: in the middle of areas, or on posts from its first edge to its last.
+/// size  so many; nullopt: as many as `spacing` gives, which is also their distance where both are given. One of the
+/// two is needed.
+[[nodiscard]] SampleGrid grid_over(const WorldBounds& ground, bool areas, const std::optional<GridSize>& size,
+                                   const std::optional<double>& spacing);
+/// True where samples of rasters made of the archive stand for areas: as the source's do, or on a map.
+[[nodiscard]] bool samples_are_areas(const Metadata& metadata);
+/// True where the surface may have no elevation at a sample of the grid.
+[[nodiscard]] bool may_have_nodata(const Metadata& metadata, const SampleGrid& grid);
+
+/// True where the archive's source was projected, so that its rows are no rows of the world.
+[[nodiscard]] bool is_warped(const Metadata& metadata);
+/// Where the source's samples lie, as its file said.
+[[nodiscard]] Georeference source_georeference(const SourceRecord& source);
+/// Where a grid lies: in the source's reference system, in its degrees, or on the map that it was projected to. nullopt
+/// where nothing is known.
+[[nodiscard]] std::optional<Georeference> grid_georeference(const Metadata& metadata, const SampleGrid& grid);
+
+/// The surface of an archive at the samples of a grid, from the first row to the last.
+///
+/// Memory grows with the width, not with the height. Works on the caller's oneTBB arena; the bits depend on archive and
+/// grid alone.
+class RowReader {
+ public:
+  /// A grid in degrees is read on the triangles, each sample at its own longitude and latitude. The archive must outlive
+  /// the reader. Throws Error{kInvalidArgument} for a grid without samples or far beyond the surface, and for one in
+  /// degrees where the archive's are not known.
+  RowReader(const ArchiveReader& archive, const SampleGrid& grid, RestoreMethod method = RestoreMethod::kHex);
+  ~RowReader();
+  RowReader(const RowReader&) = delete;
+  RowReader& operator=(const RowReader&) = delete;
+
+  /// Rows `first` to `first + rows - 1`; calls come in increasing order.
+  /// elevations [rows * width] out, vertical units; NaN where the surface has none.
+  void read(std::int64_t first, std::int64_t rows, std::span<double> elevations);
+
+  /// Some whole rows from `first_row` on.
+  using Take = std::function<void(std::int64_t first_row, std::span<const double> elevations)>;
+  /// All rows, about a million samples at a time. `progress` is told the rows done, and may throw.
+  void read_all(const Take& take, const std::function<void(std::int64_t rows_done)>& progress = {});
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+/// How raw samples and elevations go together: elevation = raw * z_scale + z_offset.
+struct SampleMapping {
+  SampleType type = SampleType::kFloat32;
+  double z_scale = 1.0;
+  double z_offset = 0.0;
+};
+
+/// What an archive made without loss says of its source's samples.
+struct LosslessRecord {
+  SampleMapping mapping;
+  std::int64_t width = 0;
+  std::int64_t height = 0;
+  RestoreMethod method = RestoreMethod::kHex;  ///< how samples are predicted
+  bool at_positions = false;                   ///< by triangles at stored positions instead
+  std::int64_t rows_per_member = 0;
+  std::vector<double> void_values;   ///< as SourceInfo has them
+  std::uint64_t residual_bytes = 0;  ///< of all residual members, compressed
+  std::string sha256;                ///< over all raw samples, little-endian, row by row
+};
+
+/// nullopt where the archive keeps no residuals. Throws Error{kCorrupt}.
+[[nodiscard]] std::optional<LosslessRecord> lossless_record(const Metadata& metadata);
+
+/// The source's own samples out of an archive made without loss, bit for bit, from the first row to the last.
+class SourceRowReader {
+ public:
+  /// Throws Error{kInvalidArgument} where the archive keeps no residuals; kCorrupt. The archive must outlive it.
+  explicit SourceRowReader(const ArchiveReader& archive);
+  ~SourceRowReader();
+  SourceRowReader(const SourceRowReader&) = delete;
+  SourceRowReader& operator=(const SourceRowReader&) = delete;
+
+  [[nodiscard]] const LosslessRecord& record() const;
+  [[nodiscard]] bool at_end() const;
+  /// Some further rows, in the source's sample type. Throws Error{kCorrupt} naming the member, and at the last row where
+  /// all of them don't have the SHA-256 that the metadata state.
+  [[nodiscard]] std::vector<std::byte> read_next();
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace isohf

@@ -1,0 +1,442 @@
+#include "isohf/restore/sample_grids.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include "isohf/error.h"
+#include "isohf/projection/projected_extent.h"
+#include "isohf/projection/projection_wkt.h"
+
+namespace isohf {
+namespace {
+
+constexpr double kTurn = 360.0;
+
+/// Where a grid of the world lies on the map that the source was projected to, its samples areas.
+Georeference map_georeference(const Metadata& metadata, const SampleGrid& grid) {
+  const SourceRecord& source = metadata.source;
+  const ProjectionRecord& on = *metadata.projection;
+  Georeference place;
+  place.registration = Registration::kArea;
+  place.unit = HorizontalUnit::kMetre;
+  place.spacing_x = grid.spacing_x;
+  place.spacing_y = grid.spacing_z;
+  place.has_origin = true;
+  place.origin_x = on.origin.easting + grid.first_x;
+  place.origin_y = on.origin.northing - grid.first_z;
+  // A map's own code and name are none of degrees.
+  const bool in_degrees = source_georeference(source).unit == HorizontalUnit::kDegree;
+  place.system.epsg = projection_epsg(on.spec, in_degrees ? source.crs_epsg : std::nullopt);
+  place.system.name = describe_projection(on.spec);
+  if (!place.system.epsg) place.system.wkt = projection_wkt(on.spec, in_degrees ? source.crs_name : "");
+  place.system.body = source.body;
+  place.system.semi_major_axis_m = on.spec.ellipsoid.semi_major_axis_m;
+  place.system.inverse_flattening = on.spec.ellipsoid.inverse_flattening;
+  place.system.vertical_datum = source.vertical_datum;
+  place.system.vertical_epsg = source.vertical_epsg;
+  return place;
+}
+
+[[noreturn]] void refuse(const std::string& why) {
+  throw Error(ErrorCode::kInvalidArgument, why);
+}
+
+/// World x of coordinates of the source, where rows of the world are its rows.
+class SourceColumns {
+ public:
+  explicit SourceColumns(const SourceRecord& source)
+      : first_(source.first_sample_x), origin_(*source.origin_x), scale_(source.spacing_x / source.crs_spacing_x) {}
+
+  [[nodiscard]] double world(double coordinate) const { return first_ + (coordinate - origin_) * scale_; }
+  [[nodiscard]] double coordinate(double world) const { return origin_ + (world - first_) / scale_; }
+
+ private:
+  double first_;
+  double origin_;
+  double scale_;
+};
+
+/// The box by as many whole turns East that it lies on the archive's ground.
+MapBounds turned(const MapBounds& box, const Metadata& metadata) {
+  const SourceColumns columns(metadata.source);
+  const double west = columns.coordinate(metadata.valid.x0);
+  const double east = columns.coordinate(metadata.valid.x1);
+  const auto by = [&](double turns) {
+    return MapBounds{box.west + turns * kTurn, box.south, box.east + turns * kTurn, box.north};
+  };
+  // Less than this holds no sample: half of an area, or but the rounding of a post's coordinate.
+  const double least =
+      metadata.source.crs_spacing_x * (metadata.source.registration == Registration::kArea ? 0.5 : 1e-6);
+  const double first = std::ceil((west + least - box.east) / kTurn);
+  const double last = std::floor((east - least - box.west) / kTurn);
+  if (first > last) return by(std::round((west + east - box.west - box.east) / (2.0 * kTurn)));
+  if (first == last) return by(first);
+  for (double turns = first; turns <= last; turns += 1.0) {
+    const MapBounds there = by(turns);
+    if (there.west <= west + least && there.east >= east - least) return there;
+  }
+  const MapBounds there = by(first);
+  const MapBounds again = by(first + 1.0);
+  refuse(
+      fmt::format("lies at the East end and at the West end of the archive's ground, {:.10g} to {:.10g}, which is "
+                  "no rectangle of it; give {:.10g} to {:.10g} and {:.10g} to {:.10g} one after the other",
+                  west, east, again.west, east, west, there.east));
+}
+
+std::string describe_unit(HorizontalUnit unit) {
+  return unit == HorizontalUnit::kDegree ? "degrees" : unit == HorizontalUnit::kMetre ? "metres" : "an unknown unit";
+}
+
+std::string describe_system(const ReferenceSystem& system) {
+  if (system.epsg) return fmt::format("EPSG:{}", *system.epsg);
+  return system.name.empty() ? "no named reference system" : "\"" + system.name + "\"";
+}
+
+/// Refuses coordinates that are known to mean another ground than the source's.
+void check_same_system(const Metadata& metadata, const SourceInfo& other) {
+  const SourceRecord& source = metadata.source;
+  const Georeference& theirs = other.georeference;
+  const HorizontalUnit unit = source_georeference(source).unit;
+  const bool units_known = unit != HorizontalUnit::kUnknown && theirs.unit != HorizontalUnit::kUnknown;
+  if (units_known && unit != theirs.unit) {
+    refuse(
+        fmt::format("{}: is in {}, the archive's source in {}; bring it to the source's reference system, {} "
+                    "(gdalwarp)",
+                    other.path, describe_unit(theirs.unit), describe_unit(unit),
+                    describe_system(source_georeference(source).system)));
+  }
+  if (!source.body.empty() && !theirs.system.body.empty() && source.body != theirs.system.body) {
+    refuse(fmt::format("{}: is of {}, the archive of {}", other.path, theirs.system.body, source.body));
+  }
+  // Datums of the ellipsoids of WGS 84 and GRS 80 lie within metres of each other, those of others a hundred apart.
+  constexpr double kSameEllipsoid = 1e-5;
+  const auto& their_axis = theirs.system.semi_major_axis_m;
+  const std::optional<double> ours =
+      metadata.projection ? metadata.projection->spec.ellipsoid.semi_major_axis_m : source.semi_major_axis_m;
+  const bool same_ellipsoid = !their_axis || !ours || std::abs(*their_axis - *ours) <= kSameEllipsoid * *ours;
+  bool same = same_ellipsoid;
+  if (unit == HorizontalUnit::kMetre && units_known) {
+    const double metres = source.spacing_x / source.crs_spacing_x;
+    same = same && std::abs(theirs.metres_per_unit - metres) <= 1e-9 * metres &&
+           (!source.crs_epsg || !theirs.system.epsg || source.crs_epsg == theirs.system.epsg);
+  }
+  if (same) return;
+  refuse(fmt::format("{}: is in {}, the archive's source in {}; bring it to that (gdalwarp)", other.path,
+                     describe_system(theirs.system), describe_system(source_georeference(source).system)));
+}
+
+/// Whether a reference system is that which rasters of the archive's map are written in.
+bool is_own_map(const Metadata& metadata, const SourceInfo& other) {
+  const Georeference own = map_georeference(metadata, natural_grid(metadata));
+  const Georeference& theirs = other.georeference;
+  if (theirs.unit != HorizontalUnit::kMetre || theirs.metres_per_unit != 1.0) return false;
+  if (own.system.epsg || theirs.system.epsg) return own.system.epsg == theirs.system.epsg;
+  if (!theirs.system.wkt.empty()) return own.system.wkt == theirs.system.wkt;
+  if (own.system.name != theirs.system.name) return false;
+  // The name has no body in it.
+  if (theirs.system.semi_major_axis_m) return own.system.semi_major_axis_m == theirs.system.semi_major_axis_m;
+  return !theirs.system.body.empty() && own.system.body == theirs.system.body;
+}
+
+/// The grid of a raster beside an archive whose rows are no rows of its source.
+SampleGrid grid_through_map(const Metadata& metadata, const SourceInfo& other) {
+  const ProjectionRecord& on = *metadata.projection;
+  const Georeference& theirs = other.georeference;
+  if (theirs.has_origin && is_own_map(metadata, other)) {
+    return {
+        other.width,      other.height,    theirs.origin_x - on.origin.easting, on.origin.northing - theirs.origin_y,
+        theirs.spacing_x, theirs.spacing_y};
+  }
+  const std::string map = describe_projection(on.spec);
+  if (source_georeference(metadata.source).unit != HorizontalUnit::kDegree) {
+    refuse(
+        fmt::format("{}: the archive's input was laid on another map; only a raster on that ({}) has a place there; "
+                    "bring it there (gdalwarp)",
+                    other.path, map));
+  }
+  if (!theirs.has_origin || theirs.unit != HorizontalUnit::kDegree) {
+    refuse(fmt::format(
+        "{}: {}; the archive's input was in degrees and was projected, so that only a raster in degrees "
+        "or on that map ({}) has a place there; bring it to degrees (gdalwarp)",
+        other.path,
+        theirs.has_origin ? fmt::format("is in {} of {}", describe_unit(theirs.unit), describe_system(theirs.system))
+                          : std::string("does not say where it lies"),
+        map));
+  }
+  check_same_system(metadata, other);
+  SampleGrid grid{other.width,      other.height, theirs.origin_x, theirs.origin_y, theirs.spacing_x,
+                  theirs.spacing_y, true};
+  if (theirs.registration != Registration::kUnknown) grid.registration = theirs.registration;
+  return grid;
+}
+
+/// Whether a raster and the archive's source share ground where the coordinates of both are of one kind.
+bool share_ground(const SourceRecord& source, const SourceInfo& other) {
+  const Georeference& theirs = other.georeference;
+  const auto overlap = [](double a0, double a1, double b0, double b1) { return a0 <= b1 && b0 <= a1; };
+  const double east = *source.origin_x + static_cast<double>(source.width) * source.crs_spacing_x;
+  const double south = *source.origin_y - static_cast<double>(source.height) * source.crs_spacing_y;
+  return overlap(*source.origin_x, east, theirs.origin_x,
+                 theirs.origin_x + static_cast<double>(other.width) * theirs.spacing_x) &&
+         overlap(south, *source.origin_y, theirs.origin_y - static_cast<double>(other.height) * theirs.spacing_y,
+                 theirs.origin_y);
+}
+
+/// One axis of the cut: how many tiles, and of how many samples.
+struct AxisCut {
+  std::int64_t tiles = 1;
+  std::int64_t samples = 0;
+};
+
+AxisCut cut_axis(std::int64_t& size, bool free, std::optional<std::int64_t> tiles, std::optional<std::int64_t> samples,
+                 std::int64_t overlap, const char* axis) {
+  const auto own = [&](std::int64_t of_tile) {
+    if (of_tile <= overlap || of_tile < 2 * overlap) {
+      throw Error(
+          ErrorCode::kInvalidArgument,
+          fmt::format("tiles of {} {} with an overlap of {}: a tile must have at least twice the overlap, and one "
+                      "sample of its own",
+                      of_tile, axis, overlap));
+    }
+    return of_tile - overlap;
+  };
+  if (samples) {
+    const std::int64_t step = own(*samples);
+    const auto near = std::max<std::int64_t>((size - overlap + step / 2) / step, 1);
+    const std::int64_t count = tiles.value_or(near);
+    const std::int64_t whole = count * step + overlap;
+    if (free) size = whole;
+    if (size != whole) {
+      throw Error(ErrorCode::kInvalidArgument,
+                  fmt::format("{} {} do not make {} whole tiles of {} that share {}; {} do", size, axis, count,
+                              *samples, overlap, whole));
+    }
+    return {count, *samples};
+  }
+  const std::int64_t count = tiles.value_or(1);
+  const std::int64_t all = size - overlap;
+  if (all < count || (all % count != 0 && !free)) {
+    const std::int64_t step = std::max<std::int64_t>((all + count / 2) / count, overlap + 1);
+    throw Error(ErrorCode::kInvalidArgument, fmt::format("{} {} do not make {} equal tiles that share {}; {} do", size,
+                                                         axis, count, overlap, count * step + overlap));
+  }
+  const std::int64_t of_tile = (all + count / 2) / count + overlap;
+  (void)own(of_tile);
+  if (free) size = (of_tile - overlap) * count + overlap;
+  return {count, of_tile};
+}
+
+}  // namespace
+
+SampleGrid source_grid(const SourceRecord& source) {
+  return {source.width,          source.height,    source.first_sample_x,
+          source.first_sample_z, source.spacing_x, source.spacing_z};
+}
+
+SampleGrid natural_grid(const Metadata& metadata) {
+  if (!is_warped(metadata)) return source_grid(metadata.source);
+  const WorldBounds& ground = metadata.valid;
+  SampleGrid grid;
+  // One area for one of the source's, in the middle of its ground.
+  grid.spacing_x = grid.spacing_z = std::sqrt(metadata.source.spacing_x * metadata.source.spacing_z);
+  grid.width = std::max(std::llround((ground.x1 - ground.x0) / grid.spacing_x), 1LL);
+  grid.height = std::max(std::llround((ground.z1 - ground.z0) / grid.spacing_z), 1LL);
+  grid.first_x = ground.x0 + grid.spacing_x / 2.0;
+  grid.first_z = ground.z0 + grid.spacing_z / 2.0;
+  return grid;
+}
+
+SampleGrid grid_over(const WorldBounds& ground, bool areas, const std::optional<GridSize>& size,
+                     const std::optional<double>& spacing) {
+  const double width = ground.x1 - ground.x0;
+  const double height = ground.z1 - ground.z0;
+  const auto count = [&](double length) {
+    const double steps = std::floor(length / *spacing * (1.0 + 1e-12));
+    return std::max<std::int64_t>(static_cast<std::int64_t>(steps) + (areas ? 0 : 1), 1);
+  };
+  const auto step = [&](double length, std::int64_t samples) {
+    const std::int64_t steps = areas ? samples : samples - 1;
+    return spacing ? *spacing : (steps > 0 ? length / static_cast<double>(steps) : length);
+  };
+  SampleGrid grid;
+  grid.width = size ? size->first : count(width);
+  grid.height = size ? size->second : count(height);
+  grid.spacing_x = step(width, grid.width);
+  grid.spacing_z = step(height, grid.height);
+  grid.first_x = ground.x0 + (areas ? grid.spacing_x / 2.0 : 0.0);
+  grid.first_z = ground.z0 + (areas ? grid.spacing_z / 2.0 : 0.0);
+  return grid;
+}
+
+bool samples_are_areas(const Metadata& metadata) {
+  return is_warped(metadata) || metadata.source.registration == Registration::kArea;
+}
+
+bool may_have_nodata(const Metadata& metadata, const SampleGrid& grid) {
+  if (grid.in_degrees) return true;
+  const TileGrid& tiles = metadata.grid;
+  const double last_x = grid.first_x + static_cast<double>(grid.width - 1) * grid.spacing_x;
+  const double last_z = grid.first_z + static_cast<double>(grid.height - 1) * grid.spacing_z;
+  return is_warped(metadata) || metadata.statistics.voids > 0 || metadata.outside == Outside::kVoid ||
+         grid.first_x < 0.0 || grid.first_z < 0.0 || last_x > tiles.world_width() || last_z > tiles.world_height();
+}
+
+Georeference source_georeference(const SourceRecord& source) {
+  Georeference own;
+  own.registration = source.registration == Registration::kArea ? Registration::kArea : Registration::kPoint;
+  own.unit = source.crs_unit == "metre"    ? HorizontalUnit::kMetre
+             : source.crs_unit == "degree" ? HorizontalUnit::kDegree
+                                           : HorizontalUnit::kUnknown;
+  own.metres_per_unit = source.metres_per_unit;
+  own.spacing_x = source.crs_spacing_x > 0.0 ? source.crs_spacing_x : source.spacing_x;
+  own.spacing_y = source.crs_spacing_y > 0.0 ? source.crs_spacing_y : source.spacing_z;
+  own.has_origin = source.origin_x.has_value() && source.origin_y.has_value();
+  own.origin_x = source.origin_x.value_or(0.0);
+  own.origin_y = source.origin_y.value_or(0.0);
+  own.system.name = source.crs_name;
+  own.system.epsg = source.crs_epsg;
+  own.system.wkt = source.crs_wkt;
+  own.system.body = source.body;
+  own.system.semi_major_axis_m = source.semi_major_axis_m;
+  own.system.inverse_flattening = source.inverse_flattening;
+  own.system.vertical_datum = source.vertical_datum;
+  own.system.vertical_epsg = source.vertical_epsg;
+  return own;
+}
+
+std::optional<Georeference> grid_georeference(const Metadata& metadata, const SampleGrid& grid) {
+  const SourceRecord& source = metadata.source;
+  Georeference found = source_georeference(source);
+  if (grid.in_degrees) {
+    found.registration = grid.registration;
+    found.unit = HorizontalUnit::kDegree;
+    found.metres_per_unit = 1.0;
+    found.has_origin = true;
+    found.origin_x = grid.first_x;
+    found.origin_y = grid.first_z;
+    found.spacing_x = grid.spacing_x;
+    found.spacing_y = grid.spacing_z;
+    return found;
+  }
+  if (is_warped(metadata)) return map_georeference(metadata, grid);
+  // World units to the source's own.
+  const double per_x = source.crs_spacing_x > 0.0 ? source.crs_spacing_x / source.spacing_x : 1.0;
+  const double per_z = source.crs_spacing_y > 0.0 ? source.crs_spacing_y / source.spacing_z : 1.0;
+  if (grid.spacing_x != source.spacing_x || grid.spacing_z != source.spacing_z) {
+    found.spacing_x = grid.spacing_x * per_x;
+    found.spacing_y = grid.spacing_z * per_z;
+  }
+  if (found.has_origin) {
+    found.origin_x += (grid.first_x - source.first_sample_x) * per_x;
+    found.origin_y -= (grid.first_z - source.first_sample_z) * per_z;
+  }
+  // Without an origin a point of unit spacing is what a raster that says nothing is taken for.
+  const bool has_spacing = found.spacing_x != 1.0 || found.spacing_y != 1.0;
+  if (!found.has_origin && !has_spacing && found.registration != Registration::kArea) return std::nullopt;
+  return found;
+}
+
+std::optional<SampleGrid> part_of(const SampleGrid& grid, const WorldBounds& ground) {
+  constexpr double kOnTheEdge = 1e-6;  // of a spacing; edges are computed by products
+  const auto first = [](double from, double start, double spacing) {
+    return static_cast<std::int64_t>(std::ceil((from - start) / spacing - kOnTheEdge));
+  };
+  const auto last = [](double to, double start, double spacing) {
+    return static_cast<std::int64_t>(std::floor((to - start) / spacing + kOnTheEdge));
+  };
+  const std::int64_t c0 = first(ground.x0, grid.first_x, grid.spacing_x);
+  const std::int64_t r0 = first(ground.z0, grid.first_z, grid.spacing_z);
+  SampleGrid part = grid;
+  part.width = last(ground.x1, grid.first_x, grid.spacing_x) - c0 + 1;
+  part.height = last(ground.z1, grid.first_z, grid.spacing_z) - r0 + 1;
+  part.first_x = grid.first_x + static_cast<double>(c0) * grid.spacing_x;
+  part.first_z = grid.first_z + static_cast<double>(r0) * grid.spacing_z;
+  if (part.width < 1 || part.height < 1) return std::nullopt;
+  return part;
+}
+
+WorldBounds world_bounds(const Metadata& metadata, const MapBounds& asked) {
+  const SourceRecord& source = metadata.source;
+  if (!source.origin_x || !source.origin_y || !(source.crs_spacing_x > 0.0) || !(source.crs_spacing_y > 0.0)) {
+    refuse("the archive does not say where its source lay; coordinates mean nothing");
+  }
+  const bool degrees = source_georeference(source).unit == HorizontalUnit::kDegree;
+  MapBounds box = asked;
+  if (degrees && box.east <= box.west) box.east += kTurn;
+  if (!(box.west < box.east)) refuse("West must be less than East");
+  if (is_warped(metadata)) {
+    const ProjectionRecord& on = *metadata.projection;
+    const Projection world(on.spec);
+    const MapBounds map = degrees ? projected_bounds(world, GeoExtent{box.west, box.south, box.east, box.north})
+                                  : projected_bounds(world, *source.map, box);
+    if (!std::isfinite(map.west)) refuse("the archive's map has no place for a part of that");
+    return {map.west - on.origin.easting, on.origin.northing - map.north, map.east - on.origin.easting,
+            on.origin.northing - map.south};
+  }
+  if (degrees) box = turned(box, metadata);
+  const SourceColumns columns(source);
+  const double to_z = source.spacing_z / source.crs_spacing_y;
+  WorldBounds bounds;
+  bounds.x0 = columns.world(box.west);
+  bounds.x1 = columns.world(box.east);
+  bounds.z0 = source.first_sample_z + (*source.origin_y - box.north) * to_z;
+  bounds.z1 = source.first_sample_z + (*source.origin_y - box.south) * to_z;
+  return bounds;
+}
+
+std::optional<SampleGrid> grid_like(const Metadata& metadata, const SourceInfo& other,
+                                    std::vector<std::string>& warnings) {
+  if (is_warped(metadata)) return grid_through_map(metadata, other);
+  const SourceRecord& source = metadata.source;
+  const Georeference& theirs = other.georeference;
+  const HorizontalUnit unit = source_georeference(source).unit;
+  const bool placed = source.origin_x && source.origin_y && theirs.has_origin && source.crs_spacing_x > 0.0 &&
+                      source.crs_spacing_y > 0.0;
+  if (placed) check_same_system(metadata, other);
+  const bool same_unit = unit == theirs.unit || (placed && share_ground(source, other));
+  if (placed && unit != theirs.unit) {
+    warnings.push_back(fmt::format(
+        "{}: does not say what its coordinates count (a .prj would); {}", other.path,
+        same_unit ? "they are taken for those of the archive's reference system, on whose ground they lie"
+                  : "on the archive's ground they do not lie, so its grid begins in the North-West corner there"));
+  }
+  if (!placed && source.origin_x) {
+    warnings.push_back(fmt::format(
+        "{}: does not say where it lies; its grid begins in the North-West corner of the archive", other.path));
+  }
+  if (!placed || !same_unit) return std::nullopt;
+  const double to_x = source.spacing_x / source.crs_spacing_x;
+  const double to_z = source.spacing_z / source.crs_spacing_y;
+  double east = theirs.origin_x - *source.origin_x;
+  if (unit == HorizontalUnit::kDegree) {
+    // As many turns on as bring the middles nearest to each other.
+    const double apart = east + 0.5 * (static_cast<double>(other.width - 1) * theirs.spacing_x -
+                                       static_cast<double>(source.width - 1) * source.crs_spacing_x);
+    east -= kTurn * std::round(apart / kTurn);
+  }
+  return SampleGrid{other.width,
+                    other.height,
+                    source.first_sample_x + east * to_x,
+                    source.first_sample_z + (*source.origin_y - theirs.origin_y) * to_z,
+                    theirs.spacing_x * to_x,
+                    theirs.spacing_y * to_z};
+}
+
+TileCut cut_into_tiles(GridSize& size, bool free, const std::optional<GridSize>& count,
+                       const std::optional<GridSize>& tile_size, std::int64_t overlap) {
+  const auto first = [](const std::optional<GridSize>& pair) {
+    return pair ? std::optional(pair->first) : std::nullopt;
+  };
+  const auto second = [](const std::optional<GridSize>& pair) {
+    return pair ? std::optional(pair->second) : std::nullopt;
+  };
+  const AxisCut x = cut_axis(size.first, free, first(count), first(tile_size), overlap, "columns");
+  const AxisCut z = cut_axis(size.second, free, second(count), second(tile_size), overlap, "rows");
+  return {x.tiles, z.tiles, x.samples, z.samples, overlap, count || tile_size};
+}
+
+}  // namespace isohf

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "isohf/projection/reference_map.h"
+#include "isohf/surface.h"
+
+namespace isohf {
+
+/// The samples of a grid in world units that lie in a part of the world; nullopt where none does.
+[[nodiscard]] std::optional<SampleGrid> part_of(const SampleGrid& grid, const WorldBounds& ground);
+
+/// The part of the world in a box of the source's coordinates. Longitudes are compared modulo 360 degrees; West above
+/// East crosses the 180th meridian.
+/// Throws Error{kInvalidArgument} where the archive does not know where its source lay, where West is not less than
+/// East in a source that is not in degrees, and where the ground lies at both ends of the archive, so that it is no
+/// rectangle there.
+[[nodiscard]] WorldBounds world_bounds(const Metadata& metadata, const MapBounds& box);
+
+/// The grid of another raster of elevations, in the archive's world or, where the archive's input was projected, in
+/// degrees. By the origins of both, also where one has no unit that is known and their grounds meet; never through a
+/// projection, where it has to be in degrees or on the archive's own map. nullopt where nothing ties the two, and it is
+/// to begin in the North-West corner. A warning says what was taken for granted.
+/// Throws Error{kInvalidArgument} where the two are known to be in different units, reference systems or bodies.
+[[nodiscard]] std::optional<SampleGrid> grid_like(const Metadata& metadata, const SourceInfo& other,
+                                                  std::vector<std::string>& warnings);
+
+/// A raster that is cut into tiles, each as large as the others and sharing `overlap` samples with its neighbours.
+struct TileCut {
+  std::int64_t across = 1;
+  std::int64_t down = 1;
+  std::int64_t columns = 0;  ///< of a tile
+  std::int64_t rows = 0;
+  std::int64_t overlap = 0;
+  bool asked = false;  ///< every file is named by its column and row then, even a single one
+};
+
+/// How a raster of `size` samples is cut. Where `free` is set the user gave no size: that of the nearest number of whole
+/// tiles is taken, into `size`. Throws Error{kInvalidArgument} naming the nearest sizes where tiles do not come out
+/// whole, and where overlap leaves a tile nothing of its own.
+/// count      tiles across and down; nullopt: as many as fit
+/// tile_size  samples of a tile; nullopt: the size divided
+[[nodiscard]] TileCut cut_into_tiles(GridSize& size, bool free, const std::optional<GridSize>& count,
+                                     const std::optional<GridSize>& tile_size, std::int64_t overlap);
+
+}  // namespace isohf

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "isohf/surface.h"
+
+namespace isohf {
+
+/// The lowest and highest raw number of a type.
+[[nodiscard]] std::pair<double, double> sample_range(SampleType type);
+
+/// The raw value that stands for nodata in samples of a type; nullopt for floats, which have NaN.
+[[nodiscard]] std::optional<double> usual_nodata(SampleType type);
+
+/// The mapping that spreads elevations over all numbers of an integer type, one of them kept for nodata where there is
+/// any.
+[[nodiscard]] SampleMapping spread(SampleType type, std::pair<double, double> elevations, bool has_nodata);
+
+/// Elevations into raw samples of a raster's type.
+class SampleStore {
+ public:
+  enum class Outcome : std::uint8_t { kStored, kNodata, kClamped, kRefused };
+
+  /// nodata  raw value kept for nodata, at an end of an integer type's range; nullopt: floats take NaN, and an integer
+  ///         type uses its whole range and holds no nodata
+  /// clamp   move what the type does not hold to the end of its range
+  SampleStore(const SampleMapping& mapping, std::optional<double> nodata, bool clamp);
+
+  /// Writes size_bytes(type) bytes at `raw`, none where it refuses. NaN is nodata.
+  Outcome store(double elevation, std::byte* raw) const;
+  /// Whether a raw number is one of the type, exactly.
+  [[nodiscard]] bool holds(double raw) const;
+
+  struct Result {
+    std::int64_t nodata = 0;
+    std::int64_t clamped = 0;
+    std::optional<std::size_t> refused;  ///< the first that the type does not hold
+  };
+  /// raw [n samples] out, of elevations [n]. Works on the caller's oneTBB arena.
+  Result store(std::span<const double> elevations, std::span<std::byte> raw) const;
+
+ private:
+  SampleMapping mapping_;
+  std::optional<double> nodata_;
+  bool clamp_;
+  double low_;  ///< smallest and largest raw number that is an elevation
+  double high_;
+};
+
+/// Raw samples in another type, number for number; those that are `nodata`, or not finite, as NaN where nodata_to_nan.
+/// raw [n samples of `from`]   out [n samples of `to`]. Returns the first that `to` does not hold.
+[[nodiscard]] std::optional<std::size_t> convert_exactly(SampleType from, std::span<const std::byte> raw,
+                                                         const std::vector<double>& nodata, bool nodata_to_nan,
+                                                         SampleType to, std::span<std::byte> out);
+
+}  // namespace isohf

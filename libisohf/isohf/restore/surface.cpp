@@ -1,0 +1,137 @@
+#include "isohf/surface.h"
+
+#include <fmt/format.h>
+#include <oneapi/tbb/blocked_range.h>
+#include <oneapi/tbb/parallel_for.h>
+
+#include <algorithm>
+
+#include "isohf/base/assert.h"
+#include "isohf/error.h"
+#include "isohf/restore/grid_sampler.h"
+#include "isohf/restore/point_sampler.h"
+
+namespace isohf {
+namespace {
+
+/// Samples that are handed over at once, about.
+constexpr std::int64_t kSamplesAtOnce = std::int64_t{1} << 20U;
+/// What tiles under a grid in degrees take.
+constexpr std::uint64_t kTileBytes = std::uint64_t{16} << 20U;
+
+[[noreturn]] void refuse(const char* what) {
+  throw Error(ErrorCode::kInvalidArgument,
+              fmt::format("the archive's source has no position in {}; use world coordinates", what));
+}
+
+}  // namespace
+
+struct Surface::State {
+  PointSampler sampler;
+  WorldGeoreference georeference;
+};
+
+Surface::Surface(const ArchiveReader& archive, std::uint64_t memory_bytes)
+    : state_(new State{{archive.grid(), archive.metadata().quantisation, tiles_of(archive), memory_bytes},
+                       WorldGeoreference(archive.metadata())}) {}
+
+Surface::~Surface() = default;
+
+SurfaceSample Surface::at(WorldPoint point) {
+  SurfaceSample sample;
+  state_->sampler.sample({&point, 1}, std::span(&sample, 1));
+  return sample;
+}
+
+SurfaceSample Surface::at(GeoPoint point) {
+  if (!state_->georeference.has_geo()) refuse("degrees");
+  return at(state_->georeference.world_from_geo(point));
+}
+
+SurfaceSample Surface::at(MapPoint point) {
+  if (!state_->georeference.has_source()) refuse("coordinates");
+  return at(state_->georeference.world_from_source(point));
+}
+
+void Surface::sample(std::span<const WorldPoint> points, std::span<SurfaceSample> samples) {
+  state_->sampler.sample(points, samples);
+}
+
+void Surface::sample(std::span<const WorldPoint> points, std::span<double> elevations) {
+  state_->sampler.sample(points, elevations);
+}
+
+const WorldGeoreference& Surface::georeference() const {
+  return state_->georeference;
+}
+
+std::string to_string(RestoreMethod method) {
+  return method == RestoreMethod::kHex ? "hex" : "barycentric";
+}
+
+RestoreMethod restore_method_from_string(const std::string& text) {
+  if (text == "barycentric") return RestoreMethod::kBarycentric;
+  if (text == "hex") return RestoreMethod::kHex;
+  throw Error(ErrorCode::kInvalidArgument, fmt::format("found '{}', must be barycentric or hex", text));
+}
+
+struct RowReader::State {
+  State(const ArchiveReader& archive, const SampleGrid& its_grid, RestoreMethod method) : grid(its_grid) {
+    const Metadata& metadata = archive.metadata();
+    if (!grid.in_degrees) {
+      rows.emplace(metadata.grid, metadata.wraps_x, metadata.quantisation, tiles_of(archive), grid, method);
+      return;
+    }
+    require_samples(grid);
+    georeference.emplace(metadata);
+    if (!georeference->has_geo()) refuse("degrees");
+    points.emplace(metadata.grid, metadata.quantisation, tiles_of(archive), kTileBytes);
+  }
+
+  void read_degrees(std::int64_t first, std::int64_t count, std::span<double> elevations) {
+    ISOHF_ASSERT(elevations.size() == static_cast<std::size_t>(count * grid.width));
+    std::vector<WorldPoint> at(elevations.size());
+    oneapi::tbb::parallel_for(oneapi::tbb::blocked_range<std::size_t>(0, at.size(), 1024), [&](const auto& part) {
+      for (std::size_t i = part.begin(); i < part.end(); ++i) {
+        const auto sample = static_cast<std::int64_t>(i);
+        const auto column = static_cast<double>(sample % grid.width);
+        const auto row = static_cast<double>(first + sample / grid.width);
+        at[i] =
+            georeference->world_from_geo({grid.first_x + column * grid.spacing_x, grid.first_z - row * grid.spacing_z});
+      }
+    });
+    points->sample(at, elevations);
+  }
+
+  SampleGrid grid;
+  std::optional<GridSampler> rows;  ///< of a grid in world units
+  std::optional<WorldGeoreference> georeference;
+  std::optional<PointSampler> points;
+};
+
+RowReader::RowReader(const ArchiveReader& archive, const SampleGrid& grid, RestoreMethod method)
+    : state_(std::make_unique<State>(archive, grid, method)) {}
+
+RowReader::~RowReader() = default;
+
+void RowReader::read(std::int64_t first, std::int64_t rows, std::span<double> elevations) {
+  if (state_->rows) {
+    state_->rows->read(first, rows, elevations);
+  } else {
+    state_->read_degrees(first, rows, elevations);
+  }
+}
+
+void RowReader::read_all(const Take& take, const std::function<void(std::int64_t rows_done)>& progress) {
+  const SampleGrid& grid = state_->grid;
+  const std::int64_t rows_at_once = std::max<std::int64_t>(kSamplesAtOnce / grid.width, 1);
+  for (std::int64_t row = 0; row < grid.height; row += rows_at_once) {
+    const std::int64_t rows = std::min(rows_at_once, grid.height - row);
+    std::vector<double> elevations(static_cast<std::size_t>(rows * grid.width));
+    read(row, rows, elevations);
+    take(row, elevations);
+    if (progress) progress(row + rows);
+  }
+}
+
+}  // namespace isohf
