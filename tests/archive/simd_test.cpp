@@ -1,4 +1,4 @@
-/// Kernels of vectorised.h and their plain twins: the same bits.
+/// Kernels of base/simd.h compiled for AVX2 and for the base set: the same bits.
 
 #include "isohf/base/simd.h"
 #include "isohf/archive/codec/tile_decoder.h"

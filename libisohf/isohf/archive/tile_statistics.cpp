@@ -9,7 +9,7 @@
 
 #include "isohf/archive/codec/quantise.h"
 #include "isohf/archive/codec/tile_codes.h"
-#include "isohf/base/vectorised.h"
+#include "isohf/base/simd.h"
 #include "isohf/error.h"
 
 namespace isohf {
@@ -23,8 +23,7 @@ struct CodeSum {
   std::int32_t high = 0;
 };
 
-ISOHF_VECTORISED(CodeSum, sum_codes, (const std::uint16_t* codes, int count, std::int32_t void_code),
-                 (codes, count, void_code)) {
+ISOHF_KERNEL CodeSum sum_codes(const std::uint16_t* codes, int count, std::int32_t void_code) {
   std::uint32_t sum = 0;
   std::int32_t voids = 0;
   std::int32_t low = 0xffff;
@@ -100,7 +99,8 @@ TileStatistics tile_statistics(const CountedVertices& counted, TileIndex index, 
       }
       continue;
     }
-    const CodeSum found = sum_codes(tile.codes.data() + at, count, static_cast<std::int32_t>(quantisation.void_code()));
+    const CodeSum found =
+        vectorised<sum_codes>(tile.codes.data() + at, count, static_cast<std::int32_t>(quantisation.void_code()));
     statistics.vertices += count;
     statistics.voids += found.voids;
     if (found.voids == count) continue;

@@ -3,7 +3,7 @@
 #include <bit>
 #include <cmath>
 
-#include "isohf/base/vectorised.h"
+#include "isohf/base/simd.h"
 
 namespace isohf {
 namespace {
@@ -19,9 +19,8 @@ struct CodeLine {
   std::int64_t above = 0;
 };
 
-ISOHF_VECTORISED(void, round_to_codes,
-                 (const float* __restrict heights, std::size_t count, CodeLine& line, std::uint16_t* __restrict codes),
-                 (heights, count, line, codes)) {
+ISOHF_KERNEL void round_to_codes(const float* __restrict heights, std::size_t count, CodeLine& line,
+                                 std::uint16_t* __restrict codes) {
   const double inverse = line.inverse;
   const double shift = line.shift;
   const double last = line.last;
@@ -49,9 +48,8 @@ ISOHF_VECTORISED(void, round_to_codes,
 
 /// Heights by `datum` higher; the largest rounding, voids left aside. Floats that are not negative are ordered like
 /// their bits, and a maximum of integers vectorises.
-ISOHF_VECTORISED(float, raise_heights,
-                 (const float* __restrict heights, std::size_t count, double datum, float* __restrict raised),
-                 (heights, count, datum, raised)) {
+ISOHF_KERNEL float raise_heights(const float* __restrict heights, std::size_t count, double datum,
+                                 float* __restrict raised) {
   std::int32_t worst = 0;
   for (std::size_t i = 0; i < count; ++i) {
     const double exact = double{heights[i]} + datum;
@@ -86,7 +84,7 @@ QuantiserCounts quantise(const Quantisation& quantisation, const CodeLimits& lim
   if (quantisation.type == CodeType::kF32) {
     tile.codes.clear();
     tile.heights.resize(n);
-    counts.worst_rounding = double{raise_heights(heights.data(), n, datum, tile.heights.data())};
+    counts.worst_rounding = double{vectorised<raise_heights>(heights.data(), n, datum, tile.heights.data())};
     if (std::isinf(limits.lowest) && std::isinf(limits.highest)) return counts;
     const float lowest = float_within(limits.lowest, HUGE_VALF);
     const float highest = float_within(limits.highest, -HUGE_VALF);
@@ -103,7 +101,7 @@ QuantiserCounts quantise(const Quantisation& quantisation, const CodeLimits& lim
     line.last = std::round((limits.highest - quantisation.offset) / quantisation.scale);
   }
   line.void_code = static_cast<std::int32_t>(quantisation.void_code());
-  round_to_codes(heights.data(), n, line, tile.codes.data());
+  vectorised<round_to_codes>(heights.data(), n, line, tile.codes.data());
   counts.below = line.below;
   counts.above = line.above;
   counts.worst_rounding = line.worst * quantisation.scale;

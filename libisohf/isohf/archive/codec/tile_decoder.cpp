@@ -171,7 +171,7 @@ class TileDecoder {
   bool decode_row(int r, const std::uint8_t* void_row) {
     const int first = Lattice<Wide>::first(r);
     const int last = lattice_.last(r);
-    predict_row_from_above(lattice_, r, header_.predictors, parts_);
+    predict_row_from_above<Wide>(lattice_, r, header_.predictors, parts_);
     find_energies(magnitudes_.above() + r % 2, magnitudes_.far_above(), first, last, energies_.data());
     const Wide least = 2 * Wide{header_.low};
     const Wide most = 2 * Wide{header_.high} - 1;

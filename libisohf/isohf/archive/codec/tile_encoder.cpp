@@ -18,7 +18,7 @@
 #include "isohf/archive/deflate/deflate_writer.h"
 #include "isohf/base/assert.h"
 #include "isohf/base/scratch.h"
-#include "isohf/base/vectorised.h"
+#include "isohf/base/simd.h"
 
 namespace isohf {
 namespace {
@@ -91,21 +91,9 @@ std::uint32_t zigzag_difference(std::int64_t difference) {
   return zigzag(static_cast<std::int32_t>(difference));
 }
 
-ISOHF_VECTORISED(void, find_code_magnitudes,
-                 (const std::uint16_t* zigzagged, int count, unsigned shift, std::uint8_t* __restrict out),
-                 (zigzagged, count, shift, out)) {
+template <typename Zigzagged>
+ISOHF_KERNEL void find_magnitudes(const Zigzagged* zigzagged, int count, unsigned shift, std::uint8_t* __restrict out) {
   for (int i = 0; i < count; ++i) out[i] = magnitude(zigzagged[i], shift);
-}
-ISOHF_VECTORISED(void, find_float_magnitudes,
-                 (const std::uint32_t* zigzagged, int count, unsigned shift, std::uint8_t* __restrict out),
-                 (zigzagged, count, shift, out)) {
-  for (int i = 0; i < count; ++i) out[i] = magnitude(zigzagged[i], shift);
-}
-void find_magnitudes(const std::uint16_t* zigzagged, int count, unsigned shift, std::uint8_t* out) {
-  find_code_magnitudes(zigzagged, count, shift, out);
-}
-void find_magnitudes(const std::uint32_t* zigzagged, int count, unsigned shift, std::uint8_t* out) {
-  find_float_magnitudes(zigzagged, count, shift, out);
 }
 
 /// The columns of a tile's samples in coding order, row by row; a row has as many samples as columns.
@@ -157,7 +145,8 @@ void find_all_energies(int columns, int rows, unsigned shift, Residuals<Zigzagge
     std::uint16_t* const out = residuals.energies.data() + row_start;
     find_energies(magnitudes.above() + r % 2, magnitudes.far_above(), first, last, out - first);
     std::uint8_t* const current = magnitudes.current();
-    find_magnitudes(residuals.zigzagged.data() + row_start, last + 1 - first, shift, current + first);
+    vectorised<find_magnitudes<Zigzagged>>(residuals.zigzagged.data() + row_start, last + 1 - first, shift,
+                                           current + first);
     if (r % 2 == 0) {
       out[columns - 2] = context_energy_of_slid(current[1], current[2]);
       out[columns - 1] = context_energy_of_slid(current[columns - 3], current[columns - 2]);
@@ -215,8 +204,7 @@ struct CodeRange {
   std::int32_t voids = 0;
 };
 
-ISOHF_VECTORISED(CodeRange, range_of_codes, (const std::uint16_t* codes, std::size_t count, std::int32_t void_code),
-                 (codes, count, void_code)) {
+ISOHF_KERNEL CodeRange range_of_codes(const std::uint16_t* codes, std::size_t count, std::int32_t void_code) {
   std::int32_t low = 0xffff;
   std::int32_t high = 0;
   std::int32_t voids = 0;
@@ -237,7 +225,7 @@ EncodedTile encode_codes(const TileShape& shape, const TileCodes& tile, const Co
   EncodedTile encoded;
   encoded.content_digest = tile_content_digest(tile);
   const auto is_void = [&](std::uint16_t code) { return code == void_code; };
-  const CodeRange range = range_of_codes(codes.data(), codes.size(), void_code);
+  const CodeRange range = vectorised<range_of_codes>(codes.data(), codes.size(), void_code);
   const Voids voids = find_voids(codes, range.voids, is_void);
   encoded.has_voids = voids.count != 0;
   encoded.is_empty = voids.count == shape.stored_vertex_count();
@@ -261,7 +249,7 @@ struct FloatBits {
   std::int32_t used = 0;
   std::int32_t voids = 0;
 };
-ISOHF_VECTORISED(FloatBits, bits_of_floats, (const float* heights, std::size_t count), (heights, count)) {
+ISOHF_KERNEL FloatBits bits_of_floats(const float* heights, std::size_t count) {
   std::int32_t used = 0;
   std::int32_t voids = 0;
   for (std::size_t i = 0; i < count; ++i) {
@@ -274,9 +262,8 @@ ISOHF_VECTORISED(FloatBits, bits_of_floats, (const float* heights, std::size_t c
 }
 
 /// ordered_from_float of all, and the least and the most of those that are no voids.
-ISOHF_VECTORISED(CodeRange, order_floats,
-                 (const float* heights, std::size_t count, unsigned dropped, std::int32_t* __restrict ordered),
-                 (heights, count, dropped, ordered)) {
+ISOHF_KERNEL CodeRange order_floats(const float* heights, std::size_t count, unsigned dropped,
+                                    std::int32_t* __restrict ordered) {
   std::int32_t low = std::numeric_limits<std::int32_t>::max();
   std::int32_t high = std::numeric_limits<std::int32_t>::min();
   for (std::size_t i = 0; i < count; ++i) {
@@ -295,7 +282,7 @@ ISOHF_VECTORISED(CodeRange, order_floats,
 
 EncodedTile encode_floats(const TileShape& shape, const TileCodes& tile, const CodingEffort& effort) {
   const std::span<const float> heights = tile.heights;
-  const FloatBits bits = bits_of_floats(heights.data(), heights.size());
+  const FloatBits bits = vectorised<bits_of_floats>(heights.data(), heights.size());
   EncodedTile encoded;
   encoded.content_digest = tile_content_digest(tile);
   const auto is_void = [](float height) { return std::isnan(height); };
@@ -309,7 +296,7 @@ EncodedTile encode_floats(const TileShape& shape, const TileCodes& tile, const C
   header.dropped_bits =
       bits.used == 0 ? 0 : static_cast<std::uint8_t>(std::countr_zero(static_cast<std::uint32_t>(bits.used)));
   Scratch<std::int32_t> ordered(heights.size());
-  const CodeRange range = order_floats(heights.data(), heights.size(), header.dropped_bits, ordered.data());
+  const CodeRange range = vectorised<order_floats>(heights.data(), heights.size(), header.dropped_bits, ordered.data());
   header.base = ordered_from_float(*std::find_if_not(heights.begin(), heights.end(), is_void), header.dropped_bits);
   header.low = range.low;
   header.high = range.high;

@@ -6,7 +6,7 @@
 #include <cstring>
 #include <utility>
 
-#include "isohf/base/vectorised.h"
+#include "isohf/base/simd.h"
 
 namespace isohf {
 namespace {
@@ -151,8 +151,7 @@ struct Progress {
 };
 
 /// Literals while whole words can be read and written; returns at the first symbol that is none, or near an end.
-ISOHF_VECTORISED(void, copy_literals, (const Entry* table, std::uint64_t mask, Progress& progress),
-                 (table, mask, progress)) {
+ISOHF_KERNEL void copy_literals(const Entry* table, std::uint64_t mask, Progress& progress) {
   constexpr int kLookUps = 56 / kTableBits;
   const std::byte* in = progress.in;
   std::byte* out = progress.out;
@@ -301,7 +300,7 @@ class LiteralInflater {
   /// Literals and runs up to the end of the block. A match's distance is one code, `distance_bits` zeros.
   bool inflate_symbols(unsigned distance_bits) {
     for (;;) {
-      copy_literals(code_.table(), (std::uint64_t{1} << kTableBits) - 1, at_);
+      vectorised<copy_literals>(code_.table(), (std::uint64_t{1} << kTableBits) - 1, at_);
       refill();
       Entry entry = code_.look_up(at_.bits);
       if (((entry >> 8U) & 0x1ffU) == kLongCode && literals_of(entry) == 0) {

@@ -13,16 +13,8 @@
 #include <utility>
 
 #include "isohf/base/assert.h"
-#include "isohf/base/unaligned.h"
+#include "isohf/base/simd.h"
 #include "isohf/error.h"
-
-// The one hot loop is compiled for wider vectors as well and chosen when the program starts. Each lane does the same
-// operations in the same order, and products are never fused with sums, so all choices give the same bits.
-#if defined(__x86_64__) && defined(__ELF__) && !defined(__SANITIZE_ADDRESS__)
-#define ISOHF_VECTOR_CLONES __attribute__((target_clones("avx512f", "avx2", "default")))
-#else
-#define ISOHF_VECTOR_CLONES
-#endif
 
 namespace isohf {
 namespace {
@@ -44,36 +36,31 @@ double spectrum_at(const std::vector<double>& even, std::size_t j, const std::ve
   return even[0] + 2.0 * sum;
 }
 
-/// Eight neighbouring samples in one vector, or in as many as the machine needs; loads need no alignment. Left to
-/// itself the compiler would vectorise over k.
-using Pack = double __attribute__((vector_size(64)));
-constexpr std::int64_t kPack = 8;
-static_assert(kBlock == 4 * kPack);
+using FourDoubles = double __attribute__((vector_size(32)));
+using EightDoubles = double __attribute__((vector_size(64)));
 
 /// out[b * out_step + i] = p[0] x[i'] + sum over k of p[k] (x[i' - k * step] + x[i' + k * step]), i' = b * kBlock + i.
-ISOHF_VECTOR_CLONES
-void convolve(const double* x, std::int64_t step, const double* p, std::int64_t halo, std::int64_t blocks, float* out,
-              std::int64_t out_step) {
-  const auto at = [](const double* place) -> const Unaligned<Pack>& { return unaligned<Pack>(place); };
+/// A Pack is a vector of neighbouring samples: left to itself the compiler would vectorise over k.
+template <typename Pack>
+ISOHF_KERNEL void convolve(const double* x, std::int64_t step, const double* p, std::int64_t halo, std::int64_t blocks,
+                           float* __restrict out, std::int64_t out_step) {
+  constexpr std::size_t kPack = sizeof(Pack) / sizeof(double);
+  constexpr std::size_t kSums = kBlock / kPack;
   for (std::int64_t b = 0; b < blocks; ++b) {
-    const double* centre = x + b * kBlock;
-    // Four sums side by side: each addition waits for the one before it.
-    Pack sum0 = p[0] * at(centre).value;
-    Pack sum1 = p[0] * at(centre + kPack).value;
-    Pack sum2 = p[0] * at(centre + 2 * kPack).value;
-    Pack sum3 = p[0] * at(centre + 3 * kPack).value;
+    const double* const centre = x + b * kBlock;
+    Pack sums[kSums];  // side by side: each addition waits for the one before it
+    for (std::size_t i = 0; i < kSums; ++i) sums[i] = p[0] * unaligned<Pack>(centre + i * kPack).value;
     for (std::int64_t k = 1; k <= halo; ++k) {
-      const double* before = centre - k * step;
-      const double* after = centre + k * step;
-      sum0 += p[k] * (at(before).value + at(after).value);
-      sum1 += p[k] * (at(before + kPack).value + at(after + kPack).value);
-      sum2 += p[k] * (at(before + 2 * kPack).value + at(after + 2 * kPack).value);
-      sum3 += p[k] * (at(before + 3 * kPack).value + at(after + 3 * kPack).value);
+      const double* const before = centre - k * step;
+      const double* const after = centre + k * step;
+      for (std::size_t i = 0; i < kSums; ++i) {
+        sums[i] += p[k] * (unaligned<Pack>(before + i * kPack).value + unaligned<Pack>(after + i * kPack).value);
+      }
     }
-    float* target = out + b * out_step;
-    for (const Pack& sum : {sum0, sum1, sum2, sum3}) {
-      for (std::int64_t i = 0; i < kPack; ++i) target[i] = static_cast<float>(sum[i]);
-      target += kPack;
+    float* const target = out + b * out_step;
+    for (std::size_t i = 0; i < kSums; ++i) {
+      const Pack sum = sums[i];
+      for (std::size_t k = 0; k < kPack; ++k) target[i * kPack + k] = static_cast<float>(sum[k]);
     }
   }
 }
@@ -171,7 +158,8 @@ class LineFilter {
     for (std::int64_t k = count; k < count + pad(); ++k) go_on(run, count, k);
     const std::int64_t blocks = round_up(to - from, kBlock) / kBlock;
     coefficients_.resize(static_cast<std::size_t>(blocks * kBlock));
-    convolve(run + from, 1, taps_.data(), reach_, blocks, coefficients_.data(), kBlock);
+    vectorised<convolve<FourDoubles>, convolve<FourDoubles>, convolve<EightDoubles>>(
+        run + from, 1, taps_.data(), reach_, blocks, coefficients_.data(), kBlock);
     for (std::int64_t k = 0; k < to - from; ++k) out[k] = coefficients_[static_cast<std::size_t>(k)];
   }
 
@@ -318,8 +306,9 @@ void Prefilter::filter_columns(View2D<const float> band, std::int64_t first, Vie
       const std::int64_t columns = std::min(kStripColumns, band.columns() - column);
       load_strip(band, column, columns, first - reach, first + rows + reach, edges_, strip);
       // Columns do not touch each other: those with voids come out wrong here and are done again, run by run.
-      convolve(strip.samples.data() + reach * kStripColumns, kStripColumns, taps_.data(), reach,
-               rows * kStripColumns / kBlock, strip.coefficients.data(), kBlock);
+      vectorised<convolve<FourDoubles>, convolve<FourDoubles>, convolve<EightDoubles>>(
+          strip.samples.data() + reach * kStripColumns, kStripColumns, taps_.data(), reach,
+          rows * kStripColumns / kBlock, strip.coefficients.data(), kBlock);
       for (std::int64_t i = 0; i < columns; ++i) {
         if (strip.has_void[static_cast<std::size_t>(i)] == 0) continue;
         const Line<float> coefficients{strip.coefficients.data() + i, kStripColumns};

@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "isohf/base/assert.h"
-#include "isohf/base/vectorised.h"
+#include "isohf/base/simd.h"
 #include "isohf/surface/resample/void_rule.h"
 
 namespace isohf {
@@ -14,21 +14,16 @@ namespace {
 
 constexpr float kVoid = std::numeric_limits<float>::quiet_NaN();
 
-ISOHF_VECTORISED(void, weigh, (const float* __restrict in, float weight, std::int64_t count, float* __restrict out),
-                 (in, weight, count, out)) {
+ISOHF_KERNEL void weigh(const float* __restrict in, float weight, std::int64_t count, float* __restrict out) {
   for (std::int64_t k = 0; k < count; ++k) out[k] = weight * in[k];
 }
-ISOHF_VECTORISED(void, add_weighted,
-                 (const float* __restrict in, float weight, std::int64_t count, float* __restrict out),
-                 (in, weight, count, out)) {
+ISOHF_KERNEL void add_weighted(const float* __restrict in, float weight, std::int64_t count, float* __restrict out) {
   for (std::int64_t k = 0; k < count; ++k) out[k] += weight * in[k];
 }
 
 /// The weights of four rows at once, as weigh() and add_weighted() would one after the other.
-ISOHF_VECTORISED(void, weigh_four,
-                 (const std::array<const float*, 4>& in, const float* weights, std::int64_t count,
-                  float* __restrict out),
-                 (in, weights, count, out)) {
+ISOHF_KERNEL void weigh_four(const std::array<const float*, 4>& in, const float* weights, std::int64_t count,
+                             float* __restrict out) {
   const float* __restrict a = in[0];
   const float* __restrict b = in[1];
   const float* __restrict c = in[2];
@@ -51,7 +46,8 @@ void blend_rows(const SourceBand& band, const TapWeights& rows, const Kernel& ke
   const auto add_row = [&](std::int64_t row, float weight, bool is_inner_done) {
     const float* source = row_at(row);
     const float* in = source + (inner_first - band.first_column);
-    if (!is_inner_done) is_first ? weigh(in, weight, inner, out) : add_weighted(in, weight, inner, out);
+    if (!is_inner_done)
+      is_first ? vectorised<weigh>(in, weight, inner, out) : vectorised<add_weighted>(in, weight, inner, out);
     const auto beyond = [&](std::int64_t k) {
       float height = 0.0F;
       axis_x.stand_ins(columns.first + k, kernel.edges(), [&](std::int64_t column, int share) {
@@ -68,9 +64,8 @@ void blend_rows(const SourceBand& band, const TapWeights& rows, const Kernel& ke
   const bool at_once = is_inside && kernel.taps() == 4;
   if (at_once) {
     const std::int64_t left = inner_first - band.first_column;
-    weigh_four({row_at(rows.first) + left, row_at(rows.first + 1) + left, row_at(rows.first + 2) + left,
-                row_at(rows.first + 3) + left},
-               rows.weights.data(), inner, out);
+    const auto row = [&](int t) { return row_at(rows.first + t) + left; };
+    vectorised<weigh_four>(std::array{row(0), row(1), row(2), row(3)}, rows.weights.data(), inner, out);
   }
   for (int t = 0; t < kernel.taps(); ++t) {
     const float weight = rows.weights[static_cast<std::size_t>(t)];
@@ -79,17 +74,14 @@ void blend_rows(const SourceBand& band, const TapWeights& rows, const Kernel& ke
   }
 }
 
-ISOHF_VECTORISED(void, range_of_two,
-                 (const float* __restrict a, const float* __restrict b, std::int64_t count, float* __restrict least,
-                  float* __restrict most),
-                 (a, b, count, least, most)) {
+ISOHF_KERNEL void range_of_two(const float* __restrict a, const float* __restrict b, std::int64_t count,
+                               float* __restrict least, float* __restrict most) {
   for (std::int64_t k = 0; k < count; ++k) {
     least[k] = a[k] < b[k] ? a[k] : b[k];
     most[k] = a[k] < b[k] ? b[k] : a[k];
   }
 }
-ISOHF_VECTORISED(void, widen_to_next, (std::int64_t count, float* __restrict least, float* __restrict most),
-                 (count, least, most)) {
+ISOHF_KERNEL void widen_to_next(std::int64_t count, float* __restrict least, float* __restrict most) {
   for (std::int64_t k = 0; k + 1 < count; ++k) {
     least[k] = least[k + 1] < least[k] ? least[k + 1] : least[k];
     most[k] = most[k + 1] > most[k] ? most[k + 1] : most[k];
@@ -106,7 +98,7 @@ void cell_ranges(const SourceBand& band, const TapWeights& rows, const SourceAxi
   const float* below = band.heights.row(axis_z.index(rows.first + 2) - band.first_row);
   const auto add = [&](std::int64_t column, std::int64_t count, std::int64_t k) {
     const std::int64_t at = column - band.first_column;
-    range_of_two(above + at, below + at, count, least.data() + k, most.data() + k);
+    vectorised<range_of_two>(above + at, below + at, count, least.data() + k, most.data() + k);
   };
   const std::int64_t inner_first = std::clamp<std::int64_t>(columns.first, 0, axis_x.samples());
   const std::int64_t inner_last =
@@ -114,14 +106,12 @@ void cell_ranges(const SourceBand& band, const TapWeights& rows, const SourceAxi
   add(inner_first, inner_last - inner_first, inner_first - columns.first);
   for (std::int64_t k = 0; k < inner_first - columns.first; ++k) add(axis_x.index(columns.first + k), 1, k);
   for (std::int64_t k = inner_last - columns.first; k < columns.width; ++k) add(axis_x.index(columns.first + k), 1, k);
-  widen_to_next(columns.width, least.data(), most.data());
+  vectorised<widen_to_next>(columns.width, least.data(), most.data());
 }
 
 /// Rule 5 of kernels.h; a NaN stays.
-ISOHF_VECTORISED(void, hold_within_cells,
-                 (const ColumnTaps& columns, const float* __restrict least, const float* __restrict most,
-                  float* __restrict values),
-                 (columns, least, most, values)) {
+ISOHF_KERNEL void hold_within_cells(const ColumnTaps& columns, const float* __restrict least,
+                                    const float* __restrict most, float* __restrict values) {
   const std::int32_t* __restrict start = columns.start.data();
   for (std::size_t c = 0; c < columns.count; ++c) {
     values[c] = held_within(values[c], least[start[c] + 1], most[start[c] + 1]);
@@ -149,7 +139,7 @@ void find_voids(const SourceBand& band, const TapWeights& rows, int taps, const 
 }
 
 template <int kTaps>
-inline void gather_columns(const ColumnTaps& columns, const float* __restrict line, float* __restrict out) {
+ISOHF_KERNEL void gather_columns(const ColumnTaps& columns, const float* __restrict line, float* __restrict out) {
   const std::size_t count = columns.count;
   const std::int32_t* __restrict start = columns.start.data();
   const float* __restrict weights = columns.weights.data();
@@ -160,21 +150,8 @@ inline void gather_columns(const ColumnTaps& columns, const float* __restrict li
     out[c] = height;
   }
 }
-// Only free functions can be cloned for several machines, not templates.
-ISOHF_VECTORISED(void, gather_two, (const ColumnTaps& columns, const float* __restrict line, float* __restrict out),
-                 (columns, line, out)) {
-  gather_columns<2>(columns, line, out);
-}
-ISOHF_VECTORISED(void, gather_four, (const ColumnTaps& columns, const float* __restrict line, float* __restrict out),
-                 (columns, line, out)) {
-  gather_columns<4>(columns, line, out);
-}
-ISOHF_VECTORISED(void, gather_six, (const ColumnTaps& columns, const float* __restrict line, float* __restrict out),
-                 (columns, line, out)) {
-  gather_columns<6>(columns, line, out);
-}
 
-ISOHF_VECTORISED(bool, has_nan, (const float* values, std::size_t count), (values, count)) {
+ISOHF_KERNEL bool has_nan(const float* values, std::size_t count) {
   std::int32_t any = 0;
   for (std::size_t i = 0; i < count; ++i) any |= values[i] != values[i] ? 1 : 0;
   return any != 0;
@@ -183,17 +160,17 @@ ISOHF_VECTORISED(bool, has_nan, (const float* values, std::size_t count), (value
 void gather_columns(int taps, const ColumnTaps& columns, const float* line, float* out) {
   switch (taps) {
     case 1:
-      return gather_columns<1>(columns, line, out);
+      return vectorised<gather_columns<1>>(columns, line, out);
     case 2:
-      return gather_two(columns, line, out);
+      return vectorised<gather_columns<2>>(columns, line, out);
     case 3:
-      return gather_columns<3>(columns, line, out);
+      return vectorised<gather_columns<3>>(columns, line, out);
     case 4:
-      return gather_four(columns, line, out);
+      return vectorised<gather_columns<4>>(columns, line, out);
     case 6:
-      return gather_six(columns, line, out);
+      return vectorised<gather_columns<6>>(columns, line, out);
     case 12:
-      return gather_columns<12>(columns, line, out);
+      return vectorised<gather_columns<12>>(columns, line, out);
     default:
       ISOHF_ASSERT(false);
   }
@@ -290,9 +267,9 @@ void RowSampler::sample_at(const SourceBand& band, double v, const ColumnTaps& c
   gather_columns(kernel_.taps(), columns, scratch.line.data(), values.data());
   if (kernel_.is_limited()) {
     cell_ranges(band, rows, axis_x_, axis_z_, columns, scratch.least, scratch.most);
-    hold_within_cells(columns, scratch.least.data(), scratch.most.data(), values.data());
+    vectorised<hold_within_cells>(columns, scratch.least.data(), scratch.most.data(), values.data());
   }
-  if (band.voids.data() != nullptr || has_nan(values.data(), values.size()))
+  if (band.voids.data() != nullptr || vectorised<has_nan>(values.data(), values.size()))
     resample_near_voids(band, v, columns, rows, scratch, values);
   for (std::size_t i = 0; i < columns.continued.size(); ++i) {
     float& value = values[columns.continued[i]];

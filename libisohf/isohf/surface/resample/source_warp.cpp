@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "isohf/base/assert.h"
-#include "isohf/base/vectorised.h"
+#include "isohf/base/simd.h"
 
 namespace isohf {
 namespace {
@@ -81,10 +81,8 @@ class Bicubic {
   std::array<Cubic, 4> coefficients_;
 };
 
-ISOHF_VECTORISED(void, evaluate,
-                 (const double* __restrict s, std::int64_t count, const double* __restrict cubic,
-                  double* __restrict out),
-                 (s, count, cubic, out)) {
+ISOHF_KERNEL void evaluate(const double* __restrict s, std::int64_t count, const double* __restrict cubic,
+                           double* __restrict out) {
   const double c0 = cubic[0];
   const double c1 = cubic[1];
   const double c2 = cubic[2];
@@ -278,8 +276,8 @@ void SourceWarp::fill(const Block& block, const Target& target) const {
         for (std::size_t c = first; c < end; ++c) s[c - first] = block.s_of(target.columns_x[parity][c]);
         const double t = block.t_of(target.first_z + row);
         const auto count = static_cast<std::int64_t>(s.size());
-        evaluate(s.data(), count, u.at(t).data(), at_row(target.u, row) + first);
-        evaluate(s.data(), count, v.at(t).data(), at_row(target.v, row) + first);
+        vectorised<evaluate>(s.data(), count, u.at(t).data(), at_row(target.u, row) + first);
+        vectorised<evaluate>(s.data(), count, v.at(t).data(), at_row(target.v, row) + first);
       }
       return;
     }

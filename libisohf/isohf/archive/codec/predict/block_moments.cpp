@@ -5,8 +5,7 @@
 #include <cmath>
 
 #include "isohf/archive/codec/predict/hex_predictor.h"
-#include "isohf/base/unaligned.h"
-#include "isohf/base/vectorised.h"
+#include "isohf/base/simd.h"
 
 namespace isohf {
 namespace {
@@ -16,18 +15,18 @@ constexpr std::size_t kPairs = 4;
 
 /// Differences of samples as floats: exact as doubles, then rounded once. Floats' differences have 34 bits at most, and
 /// machines that turn no 64-bit integers into doubles add them to the lowest bits of 1.5 * 2^52.
-[[gnu::always_inline]] inline float as_float(std::int32_t difference) {
+ISOHF_KERNEL float as_float(std::int32_t difference) {
   return static_cast<float>(difference);
 }
-[[gnu::always_inline]] inline float as_float(std::int64_t difference) {
+ISOHF_KERNEL float as_float(std::int64_t difference) {
   constexpr double kBase = 6755399441055744.0;
   return static_cast<float>(std::bit_cast<double>(std::bit_cast<std::int64_t>(kBase) + difference) - kBase);
 }
 
 /// Neighbours of one row less NE, scaled: blocks of kBlockWidth places, `stride` apart.
 template <typename Wide>
-[[gnu::always_inline]] inline void scale_blocks(const Wide* samples, const Wide* anchor, const float* scale, int blocks,
-                                                std::ptrdiff_t stride, float* __restrict out) {
+ISOHF_KERNEL void scale_blocks(const Wide* samples, const Wide* anchor, const float* scale, int blocks,
+                               std::ptrdiff_t stride, float* __restrict out) {
   for (int block = 0; block < blocks; ++block) {
     float* const to = out + block * stride;
     const std::ptrdiff_t from = std::ptrdiff_t{block} * kBlockPlaces;
@@ -36,25 +35,11 @@ template <typename Wide>
     }
   }
 }
-ISOHF_VECTORISED(void, scale_code_blocks,
-                 (const std::int32_t* samples, const std::int32_t* anchor, const float* scale, int blocks,
-                  std::ptrdiff_t stride, float* __restrict out),
-                 (samples, anchor, scale, blocks, stride, out)) {
-  scale_blocks(samples, anchor, scale, blocks, stride, out);
-}
-ISOHF_VECTORISED(void, scale_float_blocks,
-                 (const std::int64_t* samples, const std::int64_t* anchor, const float* scale, int blocks,
-                  std::ptrdiff_t stride, float* __restrict out),
-                 (samples, anchor, scale, blocks, stride, out)) {
-  scale_blocks(samples, anchor, scale, blocks, stride, out);
-}
-
 /// Sums of products of all pairs of terms, `terms` arrays of `count` floats that lie `stride` apart; count is a
 /// multiple of 8. Eight sums a pair and then their tree: the same order on every machine. Pairs are worked on by fours:
 /// three more terms than there are must be readable, and three more sums are written than there are pairs.
-ISOHF_VECTORISED(void, multiply_pairs,
-                 (const float* values, std::size_t terms, std::size_t stride, std::size_t count, float* __restrict out),
-                 (values, terms, stride, count, out)) {
+ISOHF_KERNEL void multiply_pairs(const float* values, std::size_t terms, std::size_t stride, std::size_t count,
+                                 float* __restrict out) {
   using Eight = float __attribute__((vector_size(4 * kMomentLanes)));
   using Four = float __attribute__((vector_size(16)));
   for (std::size_t i = 0; i < terms; ++i) {
@@ -84,13 +69,11 @@ ISOHF_VECTORISED(void, multiply_pairs,
   }
 }
 
-ISOHF_VECTORISED(void, add_all, (const float* moments, std::size_t count, double* __restrict sum),
-                 (moments, count, sum)) {
+ISOHF_KERNEL void add_all(const float* moments, std::size_t count, double* __restrict sum) {
   for (std::size_t i = 0; i < count; ++i) sum[i] += double{moments[i]};
 }
 
-ISOHF_VECTORISED(double, weigh_all, (const float* moments, const double* products, std::size_t count),
-                 (moments, products, count)) {
+ISOHF_KERNEL double weigh_all(const float* moments, const double* products, std::size_t count) {
   using Doubles = double __attribute__((vector_size(32)));
   Doubles sum = {};
   for (std::size_t i = 0; i < count; i += 4) {
@@ -103,24 +86,12 @@ ISOHF_VECTORISED(double, weigh_all, (const float* moments, const double* product
 
 /// |error| in samples, from predictions in halves.
 template <typename Wide>
-[[gnu::always_inline]] inline void find_errors(const Wide* own, const Wide* halves, int first, int last,
-                                               float* __restrict errors) {
+ISOHF_KERNEL void find_errors(const Wide* own, const Wide* halves, int first, int last, float* __restrict errors) {
   for (int c = first; c <= last; ++c) errors[c] = 0.5F * as_float(2 * own[c] - halves[c]);
-}
-ISOHF_VECTORISED(void, find_code_errors,
-                 (const std::int32_t* own, const std::int32_t* halves, int first, int last, float* __restrict errors),
-                 (own, halves, first, last, errors)) {
-  find_errors(own, halves, first, last, errors);
-}
-ISOHF_VECTORISED(void, find_float_errors,
-                 (const std::int64_t* own, const std::int64_t* halves, int first, int last, float* __restrict errors),
-                 (own, halves, first, last, errors)) {
-  find_errors(own, halves, first, last, errors);
 }
 
 /// A sample's weight: the inverse of the error that it had, for a quarter, and its neighbours on the row.
-ISOHF_VECTORISED(void, weigh_by_errors, (const float* __restrict errors, int first, int last, float* __restrict scale),
-                 (errors, first, last, scale)) {
+ISOHF_KERNEL void weigh_by_errors(const float* __restrict errors, int first, int last, float* __restrict scale) {
   constexpr float kFloor = 0.25F;  // samples; smaller errors are rounding
   for (int c = first + 2; c < last; ++c) {
     const float around = std::abs(errors[c - 2]) + 2.0F * std::abs(errors[c - 1]) + std::abs(errors[c + 1]);
@@ -151,7 +122,7 @@ void BlockMoments<Wide>::measure(const Predictors& predictors, int start, int st
   take_bands(predictors, start, step, [&](int band, std::size_t count) {
     for (std::size_t block = 0; block < across; ++block) {
       float* const out = moments_.data() + moment_count(terms_) * (static_cast<std::size_t>(band) * across + block);
-      multiply_pairs(values_.data() + block * count, terms_, stride_, count, out);
+      vectorised<multiply_pairs>(values_.data() + block * count, terms_, stride_, count, out);
       std::fill(out + terms_ * (terms_ + 1) / 2, out + moment_count(terms_), 0.0F);
     }
   });
@@ -162,7 +133,8 @@ std::vector<double> BlockMoments<Wide>::measure_whole(const Predictors& predicto
   std::vector<double> sum(moment_count(terms_));
   std::vector<float> of_band(sum.size() + kPairs);
   take_bands(predictors, start, step, [&](int, std::size_t count) {
-    multiply_pairs(values_.data(), terms_, stride_, static_cast<std::size_t>(across_) * count, of_band.data());
+    vectorised<multiply_pairs>(values_.data(), terms_, stride_, static_cast<std::size_t>(across_) * count,
+                               of_band.data());
     add_moments(of_band.data(), terms_ * (terms_ + 1) / 2, sum.data());
   });
   return sum;
@@ -188,20 +160,11 @@ void BlockMoments<Wide>::take_row(int r, int slot, int slots, const Predictors& 
   predict_row<Wide>(lattice_, r, predictors, low_, high_, halves_);
   const std::ptrdiff_t stride = std::ptrdiff_t{slots} * kBlockPlaces;
   float* const out = values_.data() + std::ptrdiff_t{slot} * kBlockPlaces;
-  if constexpr (sizeof(Wide) == 4) {
-    find_code_errors(at.own, halves_.data(), at.first, at.last, errors_.data());
-  } else {
-    find_float_errors(at.own, halves_.data(), at.first, at.last, errors_.data());
-  }
+  vectorised<find_errors<Wide>>(at.own, halves_.data(), at.first, at.last, errors_.data());
   std::fill(scale_.begin(), scale_.end(), 0.0F);  // WW of the first two and the East of the last are not of the row
-  weigh_by_errors(errors_.data(), at.first, at.last, scale_.data());
+  vectorised<weigh_by_errors>(errors_.data(), at.first, at.last, scale_.data());
   for (std::size_t term = 0; term + 1 < terms_; ++term) {
-    float* const to = out + term * stride_;
-    if constexpr (sizeof(Wide) == 4) {
-      scale_code_blocks(at.of_weight(term), at.north, scale_.data(), across_, stride, to);
-    } else {
-      scale_float_blocks(at.of_weight(term), at.north, scale_.data(), across_, stride, to);
-    }
+    vectorised<scale_blocks<Wide>>(at.of_weight(term), at.north, scale_.data(), across_, stride, out + term * stride_);
   }
   float* const to = out + (terms_ - 1) * stride_;
   for (int block = 0; block < across_; ++block) {
@@ -216,11 +179,11 @@ template class BlockMoments<std::int32_t>;
 template class BlockMoments<std::int64_t>;
 
 void add_moments(const float* moments, std::size_t count, double* __restrict sum) {
-  add_all(moments, count, sum);
+  vectorised<add_all>(moments, count, sum);
 }
 
 double weigh_moments(const float* moments, const double* products, std::size_t count) {
-  return weigh_all(moments, products, count);
+  return vectorised<weigh_all>(moments, products, count);
 }
 
 }  // namespace isohf

@@ -1,14 +1,12 @@
 #include "isohf/archive/codec/predict/context_energy.h"
 
-#include "isohf/base/vectorised.h"
+#include "isohf/base/simd.h"
 
 namespace isohf {
 namespace {
 
-ISOHF_VECTORISED(void, sum_magnitudes,
-                 (const std::uint8_t* north, const std::uint8_t* far, int first, int last,
-                  std::uint16_t* __restrict energies),
-                 (north, far, first, last, energies)) {
+ISOHF_KERNEL void sum_magnitudes(const std::uint8_t* north, const std::uint8_t* far, int first, int last,
+                                 std::uint16_t* __restrict energies) {
   for (int place = first; place <= last; ++place) energies[place] = context_energy(north, far, place);
 }
 
@@ -16,7 +14,7 @@ ISOHF_VECTORISED(void, sum_magnitudes,
 
 void find_energies(const std::uint8_t* north, const std::uint8_t* far, int first, int last,
                    std::uint16_t* __restrict energies) {
-  sum_magnitudes(north, far, first, last, energies);
+  vectorised<sum_magnitudes>(north, far, first, last, energies);
 }
 
 std::array<std::uint8_t, kEnergyLimit> context_table(std::span<const std::uint16_t> thresholds) {

@@ -53,10 +53,8 @@ void predict_row(const Lattice<Wide>& lattice, int r, const Predictors& predicto
 
 /// The part of a prediction that the rows above decide, by place: halves = (part + wW*W + wWW*WW) >> (kWeightBits - 1),
 /// limited to 2*low ... 2*high-1.
-void predict_row_from_above(const Lattice<std::int64_t>& lattice, int r, const Predictors& predictors,
-                            std::span<std::int64_t> parts);
-void predict_row_from_above(const Lattice<std::int32_t>& lattice, int r, const Predictors& predictors,
-                            std::span<std::int32_t> parts);
+template <typename Wide>
+void predict_row_from_above(const Lattice<Wide>& lattice, int r, const Predictors& predictors, std::span<Wide> parts);
 
 /// The sample that halves predict, and the difference from it that is zigzagged: a sample below it comes first where it
 /// was rounded up, one above it otherwise.

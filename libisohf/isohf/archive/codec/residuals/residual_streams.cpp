@@ -2,49 +2,39 @@
 
 #include <bit>
 #include <cstring>
+#include <type_traits>
 
 #include "isohf/archive/codec/predict/context_energy.h"
 #include "isohf/archive/codec/residuals/context_model.h"
 #include "isohf/archive/codec/residuals/pair_coding.h"
 #include "isohf/archive/codec/residuals/residual_symbols.h"
-#include "isohf/base/vectorised.h"
+#include "isohf/base/simd.h"
 
 namespace isohf {
 namespace {
 
-/// Symbols of residuals below 2^24: a float's exponent and upper three bits of mantissa are octave and eighth.
-ISOHF_VECTORISED(void, find_small_symbols,
-                 (const std::uint16_t* __restrict zigzagged, std::size_t count, std::uint8_t* __restrict symbols),
-                 (zigzagged, count, symbols)) {
-  constexpr std::int32_t kFirst = (127 + 4) * 8 - static_cast<std::int32_t>(kFirstSplitSymbol);
-  for (std::size_t i = 0; i < count; ++i) {
-    const auto residual = static_cast<std::int32_t>(zigzagged[i]);
-    const std::int32_t split = (std::bit_cast<std::int32_t>(static_cast<float>(residual)) >> 20) - kFirst;
-    symbols[i] = static_cast<std::uint8_t>(residual < static_cast<std::int32_t>(kFirstSplitSymbol) ? residual : split);
-  }
+/// A residual as a float, whose exponent and upper three bits of mantissa are octave and eighth. One of 32 bits is halved,
+/// so that it has a sign to spare; and the bit eight below its highest one is cleared, so that no carry of rounding gets
+/// past that.
+constexpr std::uint32_t float_bits(std::uint16_t zigzagged) {
+  return std::bit_cast<std::uint32_t>(static_cast<float>(std::int32_t{zigzagged}));
 }
-void find_symbols(const std::uint16_t* zigzagged, std::size_t count, std::uint8_t* symbols) {
-  find_small_symbols(zigzagged, count, symbols);
-}
-
-/// Half a residual of 32 bits as a float, of the same octave less one and the same eighth: half, so that it has a sign
-/// to spare; and with the bit eight below the highest one cleared, so that no carry of rounding gets past it.
-constexpr std::uint32_t bits_of_half(std::uint32_t zigzagged) {
+constexpr std::uint32_t float_bits(std::uint32_t zigzagged) {
   const std::uint32_t kept = zigzagged & ~(zigzagged >> 8U);
   return std::bit_cast<std::uint32_t>(static_cast<float>(static_cast<std::int32_t>(kept >> 1U)));
 }
 
-ISOHF_VECTORISED(void, find_large_symbols,
-                 (const std::uint32_t* __restrict zigzagged, std::size_t count, std::uint8_t* __restrict symbols),
-                 (zigzagged, count, symbols)) {
-  constexpr std::uint32_t kFirst = (127 + 3) * 8 - kFirstSplitSymbol;
+template <typename Zigzagged>
+ISOHF_KERNEL void find_symbols(const Zigzagged* __restrict zigzagged, std::size_t count,
+                               std::uint8_t* __restrict symbols) {
+  constexpr bool kIsSmall = sizeof(Zigzagged) == 2;
+  using Value = std::conditional_t<kIsSmall, std::int32_t, std::uint32_t>;  // machines compare signed numbers faster
+  constexpr Value kFirst = (kIsSmall ? 127 + 4 : 127 + 3) * 8 - kFirstSplitSymbol;
   for (std::size_t i = 0; i < count; ++i) {
-    const std::uint32_t split = (bits_of_half(zigzagged[i]) >> 20U) - kFirst;
-    symbols[i] = static_cast<std::uint8_t>(zigzagged[i] < kFirstSplitSymbol ? zigzagged[i] : split);
+    const Value value = zigzagged[i];
+    const Value split = static_cast<Value>(float_bits(zigzagged[i]) >> 20U) - kFirst;
+    symbols[i] = static_cast<std::uint8_t>(value < Value{kFirstSplitSymbol} ? value : split);
   }
-}
-void find_symbols(const std::uint32_t* zigzagged, std::size_t count, std::uint8_t* symbols) {
-  find_large_symbols(zigzagged, count, symbols);
 }
 
 /// Bits one after the other, the lowest of a byte first.
@@ -84,10 +74,8 @@ class BitPacker {
 };
 
 /// The extra bits of two neighbouring residuals of codes, together no more than 24, and how many these are.
-ISOHF_VECTORISED(void, join_extra_bits,
-                 (const std::uint16_t* __restrict zigzagged, std::size_t pairs, std::uint32_t* __restrict bits,
-                  std::uint32_t* __restrict counts),
-                 (zigzagged, pairs, bits, counts)) {
+ISOHF_KERNEL void join_extra_bits(const std::uint16_t* __restrict zigzagged, std::size_t pairs,
+                                  std::uint32_t* __restrict bits, std::uint32_t* __restrict counts) {
   constexpr std::int32_t kFirstOctave = 127 + 4;
   for (std::size_t i = 0; i < pairs; ++i) {
     const auto extra = [&](std::uint32_t value, std::uint32_t& count) {
@@ -107,12 +95,10 @@ ISOHF_VECTORISED(void, join_extra_bits,
 }
 
 /// The extra bits of residuals of floats, and how many these are.
-ISOHF_VECTORISED(void, find_extra_bits,
-                 (const std::uint32_t* __restrict zigzagged, std::size_t count, std::uint32_t* __restrict bits,
-                  std::uint32_t* __restrict counts),
-                 (zigzagged, count, bits, counts)) {
+ISOHF_KERNEL void find_extra_bits(const std::uint32_t* __restrict zigzagged, std::size_t count,
+                                  std::uint32_t* __restrict bits, std::uint32_t* __restrict counts) {
   for (std::size_t i = 0; i < count; ++i) {
-    const std::int32_t octave = static_cast<std::int32_t>(bits_of_half(zigzagged[i]) >> 23U) - 129;
+    const std::int32_t octave = static_cast<std::int32_t>(float_bits(zigzagged[i]) >> 23U) - 129;
     counts[i] = static_cast<std::uint32_t>(octave < 0 ? 0 : octave);
     bits[i] = zigzagged[i] & ((1U << counts[i]) - 1);
   }
@@ -124,7 +110,7 @@ std::vector<std::byte> pack_extra_bits(const std::uint16_t* zigzagged, std::size
   const std::size_t pairs = count / 2;
   Scratch<std::uint32_t> bits(pairs);
   Scratch<std::uint32_t> counts(pairs);
-  join_extra_bits(zigzagged, pairs, bits.data(), counts.data());
+  vectorised<join_extra_bits>(zigzagged, pairs, bits.data(), counts.data());
   for (std::size_t i = 0; i < pairs; ++i) packer.put(bits.data()[i], counts.data()[i]);
   if (count % 2 != 0) {
     const unsigned last = extra_bits_of_symbol(symbol_of(zigzagged[count - 1]));
@@ -136,7 +122,7 @@ std::vector<std::byte> pack_extra_bits(const std::uint32_t* zigzagged, std::size
   BitPacker packer(count * 4);
   Scratch<std::uint32_t> bits(count);
   Scratch<std::uint32_t> counts(count);
-  find_extra_bits(zigzagged, count, bits.data(), counts.data());
+  vectorised<find_extra_bits>(zigzagged, count, bits.data(), counts.data());
   std::size_t i = 0;
   for (; i + 2 <= count; i += 2) {
     const std::uint64_t second = bits.data()[i + 1];
@@ -192,13 +178,13 @@ Streams make_streams(const Residuals<Zigzagged>& residuals, const StreamEffort& 
   Streams streams;
   streams.single = std::make_unique_for_overwrite<std::uint8_t[]>(count);
   std::uint8_t* const symbols = streams.single.get();
-  find_symbols(residuals.zigzagged.data(), count, symbols);
+  vectorised<find_symbols<Zigzagged>>(residuals.zigzagged.data(), count, symbols);
   const std::span<const std::uint16_t> energies(residuals.energies.data(), count);
   const std::vector<std::uint32_t> histogram = count_energies(energies);
   header.thresholds = choose_thresholds({symbols, count}, energies, histogram, effort.context_thinning);
   Scratch<Zigzagged> sorted(count);
   header.symbol_counts = sort_by_context(residuals, header.thresholds, histogram, sorted.data());
-  find_symbols(sorted.data(), count, symbols);
+  vectorised<find_symbols<Zigzagged>>(sorted.data(), count, symbols);
   streams.extra = pack_extra_bits(sorted.data(), count);
   auto from = std::as_bytes(std::span<const std::uint8_t>(symbols, count));
   streams.paired.reserve(header.symbol_counts.size());

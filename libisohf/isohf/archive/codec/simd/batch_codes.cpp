@@ -3,14 +3,7 @@
 #include <algorithm>
 
 #include "isohf/archive/codec/predict/sample_lattice.h"
-#include "isohf/base/unaligned.h"
-#include "isohf/base/vectorised.h"
-#if defined(ISOHF_HAS_WIDE)
-#include <immintrin.h>
-#endif
-#if defined(__GNUC__) && !defined(__clang__)
-#pragma GCC diagnostic ignored "-Wpsabi"  // kernels are inlined: their vectors cross no boundary
-#endif
+#include "isohf/archive/codec/simd/vector_operations.h"
 
 namespace isohf {
 namespace {
@@ -54,47 +47,14 @@ constexpr std::array<TermPair, kTermPairCount> kTermPairs = {{
 }};
 
 using Rows = BatchRows<std::uint16_t>;
-using Ints = std::int32_t __attribute__((vector_size(4 * kLanes)));
-using Words = std::uint32_t __attribute__((vector_size(4 * kLanes)));
 using Shorts = std::uint16_t __attribute__((vector_size(2 * kLanes)));
-
-/// Both samples of a pair times their weights, added up.
-template <bool kIsWide>
-[[gnu::always_inline]] inline Words weigh(const std::int32_t* samples, const std::int32_t* weights) {
-#if defined(ISOHF_HAS_WIDE)
-  if constexpr (kIsWide) {
-    using Halves = short __attribute__((vector_size(4 * kLanes)));
-    return (Words)__builtin_ia32_pmaddwd256(unaligned<Halves>(samples).value, unaligned<Halves>(weights).value);
-  }
-#endif
-  Words out;
-  for (std::size_t lane = 0; lane < kLanes; ++lane) {
-    const auto half = [](std::int32_t pair) { return std::int32_t{static_cast<std::int16_t>(pair)}; };
-    out[lane] = static_cast<std::uint32_t>(half(samples[lane]) * half(weights[lane])) +
-                static_cast<std::uint32_t>((samples[lane] >> 16) * (weights[lane] >> 16));
-  }
-  return out;
-}
-
-/// One of two, by the lowest bit of each lane.
-template <bool kIsWide>
-[[gnu::always_inline]] inline Ints choose_by_lowest(Ints bits, Ints where_set, Ints otherwise) {
-  const Ints signs = (Ints)((Words)bits << 31U);
-#if defined(ISOHF_HAS_WIDE)
-  if constexpr (kIsWide) {
-    using Floats = float __attribute__((vector_size(4 * kLanes)));
-    return (Ints)__builtin_ia32_blendvps256((Floats)otherwise, (Floats)where_set, (Floats)signs);
-  }
-#endif
-  return signs < 0 ? where_set : otherwise;
-}
 
 /// Predictions completed by residuals, from West to East. What each place waits for is kept short: it is all that a row
 /// takes. Sums modulo 2^32, as the plain decoder has them. Writes the pair West of each sample, and not the last
 /// sample's own.
 template <bool kIsWide, std::size_t kPairs, bool kWithVoids>
-[[gnu::always_inline]] inline void restore_places(const Rows& rows, const StretchWeights& weights, int begin, int end,
-                                                  BatchRange& range) {
+ISOHF_KERNEL void restore_places(const Rows& rows, const StretchWeights& weights, int begin, int end,
+                                 BatchRange& range) {
   using Bytes = std::int8_t __attribute__((vector_size(kLanes)));
   const Ints low = unaligned<Ints>(range.low.data()).value;
   const Ints high = unaligned<Ints>(range.high.data()).value;
@@ -102,22 +62,26 @@ template <bool kIsWide, std::size_t kPairs, bool kWithVoids>
   const Ints most = 2 * high - 1;
   Ints least_seen = unaligned<Ints>(range.least_seen.data()).value;
   Ints most_seen = unaligned<Ints>(range.most_seen.data()).value;
+  const Words west_weights = unaligned<Words>(weights[0].data()).value;
   Words west_pair = unaligned<Words>(rows.own + (begin - 2) * kStep).value;
   for (int place = begin; place < end; ++place) {
     const std::ptrdiff_t at = place * kStep;
     Words above = {};
     for (std::size_t pair = 1; pair < kPairs; ++pair) {
       const TermPair term = kTermPairs[pair];
-      above += weigh<kIsWide>(rows.above(term.row) + at + term.place * kStep, weights[pair].data());
+      above += multiply_pairs<kIsWide>(unaligned<Words>(rows.above(term.row) + at + term.place * kStep).value,
+                                       unaligned<Words>(weights[pair].data()).value);
     }
     const Words zigzagged = __builtin_convertvector(unaligned<Shorts>(rows.zigzagged + at).value, Words);
     const Ints residual = (Ints)((zigzagged >> 1U) ^ -(zigzagged & 1U));
-    const Words sum = above + weigh<kIsWide>(reinterpret_cast<const std::int32_t*>(&west_pair), weights[0].data());
+    const Words sum = above + multiply_pairs<kIsWide>(west_pair, west_weights);
     // Shifted samples are predicted as samples are: 2^27 more in the sum are 2^16 more in the halves, an even number.
     Ints halves = (Ints)sum >> (kWeightBits - 1);
     halves = halves < least ? least : halves;
     halves = halves > most ? most : halves;
-    Words high_half = (Words)(((halves + 1) >> 1) + choose_by_lowest<kIsWide>(halves, residual, -residual)) << 16U;
+    Words high_half =
+        (Words)(((halves + 1) >> 1) + choose_by_sign<kIsWide>((Ints)((Words)halves << 31U), residual, -residual))
+        << 16U;
     Ints own = (Ints)high_half >> 16;
     if constexpr (kWithVoids) {
       const Ints north = (Ints)(unaligned<Words>(rows.north + at).value << 16U) >> 16;
@@ -134,25 +98,8 @@ template <bool kIsWide, std::size_t kPairs, bool kWithVoids>
   unaligned<Ints>(range.most_seen.data()).value = most_seen;
 }
 
-ISOHF_TWO_WAYS(void, restore_near,
-               (const Rows& rows, const StretchWeights& weights, int begin, int end, BatchRange& range),
-               (rows, weights, begin, end, range)) {
-  restore_places<kIsWide, kNearPairs, false>(rows, weights, begin, end, range);
-}
-ISOHF_TWO_WAYS(void, restore_widely,
-               (const Rows& rows, const StretchWeights& weights, int begin, int end, BatchRange& range),
-               (rows, weights, begin, end, range)) {
-  restore_places<kIsWide, kTermPairs.size(), false>(rows, weights, begin, end, range);
-}
-ISOHF_TWO_WAYS(void, restore_with_voids,
-               (const Rows& rows, const StretchWeights& weights, int begin, int end, BatchRange& range),
-               (rows, weights, begin, end, range)) {
-  restore_places<kIsWide, kTermPairs.size(), true>(rows, weights, begin, end, range);
-}
-
 /// The samples of eight places from first on, lane by lane: the pairs of every other place, a transposed square.
-ISOHF_VECTORISED(void, turn_square, (const std::int32_t* samples, const PerLane<std::uint16_t*>& codes, int first),
-                 (samples, codes, first)) {
+ISOHF_KERNEL void turn_square(const std::int32_t* samples, const PerLane<std::uint16_t*>& codes, int first) {
   using Long = std::uint64_t __attribute__((vector_size(8 * kLanes / 2)));
   using Quad = std::uint32_t __attribute__((vector_size(16)));
   Words pairs[4];
@@ -217,13 +164,13 @@ void BatchCodes::restore_row(int r, const BatchResiduals<std::uint16_t>& residua
   range_.least_seen = range_.low;
   range_.most_seen = range_.high;
   stretches_.for_each(first, last, [&](const StretchWeights& weights, int begin, int end) {
-    if (residuals.has_voids()) {
-      restore_with_voids(rows, weights, begin, end, range_);
-    } else if (stretches_.is_wide()) {
-      restore_widely(rows, weights, begin, end, range_);
-    } else {
-      restore_near(rows, weights, begin, end, range_);
-    }
+    const auto restore = [&]<std::size_t kPairs, bool kWithVoids>() {
+      vectorised<restore_places<false, kPairs, kWithVoids>, restore_places<true, kPairs, kWithVoids>>(
+          rows, weights, begin, end, range_);
+    };
+    if (residuals.has_voids()) return restore.template operator()<kTermPairCount, true>();
+    if (stretches_.is_wide()) return restore.template operator()<kTermPairCount, false>();
+    restore.template operator()<kNearPairs, false>();
   });
   repeat_sample(rows.own + first * kStep, false, rows.own - kBatchMargin * kStep, first + kBatchMargin);
   repeat_sample(rows.own + (last - 1) * kStep, true, rows.own + last * kStep, columns_ + kBatchMargin - last);
@@ -238,7 +185,7 @@ void BatchCodes::write_row(int r, const PerLane<std::uint16_t*>& codes) const {
   const auto step = static_cast<int>(kLanes);
   const int last = r % 2 == 0 ? columns_ - 2 : columns_ - 1;
   int place = Lattice<std::int32_t>::first(r);
-  for (; place + step <= last + 1; place += step) turn_square(samples + place * kStep, codes, place);
+  for (; place + step <= last + 1; place += step) vectorised<turn_square>(samples + place * kStep, codes, place);
   for (; place <= last; ++place) {
     for (std::size_t lane = 0; lane < stretches_.lanes(); ++lane) {
       codes[lane][place] = static_cast<std::uint16_t>(sample(r, place, lane));

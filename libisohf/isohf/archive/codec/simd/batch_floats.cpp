@@ -4,23 +4,13 @@
 
 #include "isohf/archive/codec/predict/sample_lattice.h"
 #include "isohf/archive/codec/residuals/residual_symbols.h"
-#include "isohf/base/unaligned.h"
-#include "isohf/base/vectorised.h"
-#if defined(ISOHF_HAS_WIDE)
-#include <immintrin.h>
-#endif
-#if defined(__GNUC__) && !defined(__clang__)
-#pragma GCC diagnostic ignored "-Wpsabi"  // kernels are inlined: their vectors cross no boundary
-#endif
+#include "isohf/archive/codec/simd/vector_operations.h"
 
 namespace isohf {
 namespace {
 
 constexpr std::size_t kLanes = kBatchLanes;
 constexpr std::ptrdiff_t kStep = BatchRing::kStep;
-
-using Ints = std::int32_t __attribute__((vector_size(4 * kLanes)));
-using Words = std::uint32_t __attribute__((vector_size(4 * kLanes)));
 
 /// Where the sample of each weight stands from the predicted one (Neighbours::of_weight), NE's last.
 struct Term {
@@ -48,53 +38,13 @@ constexpr bool is_summed_above(std::size_t term, bool is_near) {
   return term != kWest && term != kFarWest && !(is_near && term >= kNearWeightCount && term < kWeightCount);
 }
 
-/// A place lane by lane: what the other kernel does for all at once.
-template <bool kIsNear, bool kWithVoids>
-[[gnu::always_inline]] inline void restore_place_plainly(const Rows& rows, const FloatStretch& weights, int place,
-                                                         BatchRange& range) {
-  for (std::size_t lane = 0; lane < kLanes; ++lane) {
-    const std::ptrdiff_t at = place * kStep + static_cast<std::ptrdiff_t>(lane);
-    std::int32_t& own = rows.own[at];
-    if (kWithVoids && rows.is_void[at] != 0) {
-      own = static_cast<std::int32_t>((std::int64_t{rows.own[at - kStep]} + rows.north[at]) >> 1);
-    } else {
-      std::int64_t sum = kHalf + std::int64_t{weights[kWest].all[lane]} * rows.own[at - kStep] +
-                         std::int64_t{weights[kFarWest].all[lane]} * rows.own[at - 2 * kStep];
-      for (std::size_t term = 0; term < kTerms.size(); ++term) {
-        if (!is_summed_above(term, kIsNear)) continue;
-        sum += std::int64_t{weights[term].all[lane]} * rows.above(kTerms[term].row)[at + kTerms[term].place * kStep];
-      }
-      const std::uint32_t residual = unzigzag(rows.zigzagged[at]);
-      const std::int64_t low = range.low[lane];
-      const std::int64_t high = range.high[lane];
-      auto restored = static_cast<std::uint32_t>(sum >> kWeightBits);
-      restored = (sum & kHalf) != 0 ? restored - residual : restored + residual;
-      if (sum < low * (2 * kHalf) + kHalf) restored = static_cast<std::uint32_t>(low) - residual;
-      if (sum >= high * (2 * kHalf) + kHalf) restored = static_cast<std::uint32_t>(high) + residual;
-      own = static_cast<std::int32_t>(restored);
-    }
-    range.least_seen[lane] = std::min(range.least_seen[lane], own);
-    range.most_seen[lane] = std::max(range.most_seen[lane], own);
-  }
-}
-
-#if defined(ISOHF_HAS_WIDE)
-using Longs = std::int64_t __attribute__((vector_size(4 * kLanes)));
-using LongWords = std::uint64_t __attribute__((vector_size(4 * kLanes)));
-
 /// Even lanes are worked on as they stand, in the low halves of 64 bits; odd ones are brought there.
-[[gnu::always_inline]] inline Ints odd_lanes(Ints values) {
+ISOHF_KERNEL Ints odd_lanes(Ints values) {
   return __builtin_shufflevector(values, values, 1, 1, 3, 3, 5, 5, 7, 7);
 }
-template <bool kIsWide>  // for the target of the function that it is inlined into
-[[gnu::always_inline]] inline Longs multiply(Ints samples, const PerLane<std::int32_t>& weights) {
-  return (Longs)__builtin_ia32_pmuldq256(samples, unaligned<Ints>(weights.data()).value);
-}
-/// One of two, by the signs of 64 bits.
 template <bool kIsWide>
-[[gnu::always_inline]] inline Longs choose_by_sign(Longs signs, Longs where_set, Longs otherwise) {
-  using Doubles = double __attribute__((vector_size(4 * kLanes)));
-  return (Longs)__builtin_ia32_blendvpd256((Doubles)otherwise, (Doubles)where_set, (Doubles)signs);
+ISOHF_KERNEL Longs multiply(Ints samples, const PerLane<std::int32_t>& weights) {
+  return multiply_low_halves<kIsWide>((Longs)samples, unaligned<Longs>(weights.data()).value);
 }
 
 /// What becomes of half of the lanes' sums: samples, in the low halves. All that can be is made ready before the sum is
@@ -106,17 +56,16 @@ struct Outcomes {
   Longs above;
 };
 template <bool kIsWide>
-[[gnu::always_inline]] inline Longs restore_half(Longs sum, Longs least, Longs most, const Outcomes& outcomes) {
+ISOHF_KERNEL Longs restore_half(Longs sum, Longs least, Longs most, const Outcomes& outcomes) {
   const Longs step = choose_by_sign<kIsWide>((Longs)((LongWords)sum << (64 - kWeightBits)), outcomes.minus_residual,
                                              outcomes.residual);
-  const Longs inside = (Longs)((LongWords)sum >> kWeightBits) + step;
+  const Longs inside = (Longs)(((LongWords)sum >> kWeightBits) + (LongWords)step);
   const Longs lowered = choose_by_sign<kIsWide>(sum - most, inside, outcomes.above);
   return choose_by_sign<kIsWide>(sum - least, outcomes.below, lowered);
 }
 
 template <bool kIsWide, bool kIsNear, bool kWithVoids>
-[[gnu::always_inline]] inline void restore_places_widely(const Rows& rows, const FloatStretch& weights, int begin,
-                                                         int end, BatchRange& range) {
+ISOHF_KERNEL void restore_places(const Rows& rows, const FloatStretch& weights, int begin, int end, BatchRange& range) {
   using Bytes = std::int8_t __attribute__((vector_size(kLanes)));
   const auto bound_of = [](Ints value) { return (Longs)((LongWords)value << 32U) >> (32 - kWeightBits); };
   const Ints low = unaligned<Ints>(range.low.data()).value;
@@ -143,16 +92,18 @@ template <bool kIsWide, bool kIsNear, bool kWithVoids>
       odd += multiply<kIsWide>(odd_lanes(samples), weights[term].of_odd);
     }
     const Words zigzagged = unaligned<Words>(rows.zigzagged + at).value;
-    const Ints residual = (Ints)((zigzagged >> 1U) ^ -(zigzagged & 1U));
-    const Ints below = low - residual;
-    const Ints above = high + residual;
-    const Outcomes of_even = {(Longs)residual, (Longs)-residual, (Longs)below, (Longs)above};
-    const Outcomes of_odd = {(Longs)odd_lanes(residual), (Longs)odd_lanes(-residual), (Longs)odd_lanes(below),
-                             (Longs)odd_lanes(above)};
+    const Words residual = (zigzagged >> 1U) ^ -(zigzagged & 1U);  // sums modulo 2^32
+    const auto of_even = [&](Words values) { return (Longs)values; };
+    const auto of_odd = [&](Words values) { return (Longs)odd_lanes((Ints)values); };
+    const auto outcomes_of = [&](const auto& half) {
+      return Outcomes{half(residual), half(-residual), half((Words)low - residual), half((Words)high + residual)};
+    };
+    const Outcomes even_outcomes = outcomes_of(of_even);
+    const Outcomes odd_outcomes = outcomes_of(of_odd);
     even += multiply<kIsWide>(even_west, weights[kWest].all);
     odd += multiply<kIsWide>(odd_west, weights[kWest].of_odd);
-    const Longs even_own = restore_half<kIsWide>(even, even_least, even_most, of_even);
-    const Longs odd_own = restore_half<kIsWide>(odd, odd_least, odd_most, of_odd);
+    const Longs even_own = restore_half<kIsWide>(even, even_least, even_most, even_outcomes);
+    const Longs odd_own = restore_half<kIsWide>(odd, odd_least, odd_most, odd_outcomes);
     Ints own = __builtin_shufflevector((Ints)even_own, (Ints)((LongWords)odd_own << 32U), 0, 9, 2, 11, 4, 13, 6, 15);
     even_far_west = even_west;
     odd_far_west = odd_west;
@@ -173,40 +124,9 @@ template <bool kIsWide, bool kIsNear, bool kWithVoids>
   unaligned<Ints>(range.least_seen.data()).value = least_seen;
   unaligned<Ints>(range.most_seen.data()).value = most_seen;
 }
-#endif
-
-template <bool kIsWide, bool kIsNear, bool kWithVoids>
-[[gnu::always_inline]] inline void restore_places(const Rows& rows, const FloatStretch& weights, int begin, int end,
-                                                  BatchRange& range) {
-#if defined(ISOHF_HAS_WIDE)
-  if constexpr (kIsWide) return restore_places_widely<kIsWide, kIsNear, kWithVoids>(rows, weights, begin, end, range);
-#endif
-  for (int place = begin; place < end; ++place) {
-    restore_place_plainly<kIsNear, kWithVoids>(rows, weights, place, range);
-  }
-}
-
-ISOHF_TWO_WAYS(void, restore_near,
-               (const Rows& rows, const FloatStretch& weights, int begin, int end, BatchRange& range),
-               (rows, weights, begin, end, range)) {
-  restore_places<kIsWide, true, false>(rows, weights, begin, end, range);
-}
-ISOHF_TWO_WAYS(void, restore_widely,
-               (const Rows& rows, const FloatStretch& weights, int begin, int end, BatchRange& range),
-               (rows, weights, begin, end, range)) {
-  restore_places<kIsWide, false, false>(rows, weights, begin, end, range);
-}
-ISOHF_TWO_WAYS(void, restore_with_voids,
-               (const Rows& rows, const FloatStretch& weights, int begin, int end, BatchRange& range),
-               (rows, weights, begin, end, range)) {
-  restore_places<kIsWide, false, true>(rows, weights, begin, end, range);
-}
-
 /// The floats of eight places from `first` on, lane by lane: a transposed square.
-ISOHF_VECTORISED(void, turn_square,
-                 (const std::int32_t* samples, const PerLane<std::int32_t>& dropped, const PerLane<float*>& heights,
-                  int first),
-                 (samples, dropped, heights, first)) {
+ISOHF_KERNEL void turn_square(const std::int32_t* samples, const PerLane<std::int32_t>& dropped,
+                              const PerLane<float*>& heights, int first) {
   using Pairs = std::uint64_t __attribute__((vector_size(4 * kLanes)));
   const Words shift = unaligned<Words>(dropped.data()).value;
   Words floats[kLanes];
@@ -266,13 +186,13 @@ void BatchFloats::restore_row(int r, const BatchResiduals<std::uint32_t>& residu
   range_.least_seen = range_.low;
   range_.most_seen = range_.high;
   stretches_.for_each(first, last, [&](const FloatStretch& weights, int begin, int end) {
-    if (residuals.has_voids()) {
-      restore_with_voids(rows, weights, begin, end, range_);
-    } else if (stretches_.is_wide()) {
-      restore_widely(rows, weights, begin, end, range_);
-    } else {
-      restore_near(rows, weights, begin, end, range_);
-    }
+    const auto restore = [&]<bool kIsNear, bool kWithVoids>() {
+      vectorised<restore_places<false, kIsNear, kWithVoids>, restore_places<true, kIsNear, kWithVoids>>(
+          rows, weights, begin, end, range_);
+    };
+    if (residuals.has_voids()) return restore.template operator()<false, true>();
+    if (stretches_.is_wide()) return restore.template operator()<false, false>();
+    restore.template operator()<true, false>();
   });
   repeat_sample(rows.own + first * kStep, rows.own - kBatchMargin * kStep, first + kBatchMargin);
   repeat_sample(rows.own + last * kStep, rows.own + (last + 1) * kStep, columns_ + kBatchMargin - last - 1);
@@ -282,7 +202,8 @@ void BatchFloats::write_row(int r, const PerLane<float*>& heights) const {
   const auto step = static_cast<int>(kLanes);
   const int last = r % 2 == 0 ? columns_ - 2 : columns_ - 1;
   int place = Lattice<std::int64_t>::first(r);
-  for (; place + step <= last + 1; place += step) turn_square(ring_.row(r) + place * kStep, dropped_, heights, place);
+  for (; place + step <= last + 1; place += step)
+    vectorised<turn_square>(ring_.row(r) + place * kStep, dropped_, heights, place);
   for (; place <= last; ++place) {
     for (std::size_t lane = 0; lane < stretches_.lanes(); ++lane)
       heights[lane][place] = stored(sample(r, place, lane), lane);

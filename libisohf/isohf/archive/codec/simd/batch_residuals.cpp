@@ -6,8 +6,7 @@
 #include "isohf/archive/codec/predict/sample_lattice.h"
 #include "isohf/archive/codec/simd/residual_expander.h"
 #include "isohf/archive/codec/void_mask.h"
-#include "isohf/base/unaligned.h"
-#include "isohf/base/vectorised.h"
+#include "isohf/base/simd.h"
 
 namespace isohf {
 namespace {
@@ -16,10 +15,8 @@ constexpr std::ptrdiff_t kStep = kBatchLanes;
 /// Between two lanes' tables: not a power of two, or what they all use most would fall into the same sets of the cache.
 constexpr std::size_t kTableStride = kEnergyLimit + 576;
 
-ISOHF_VECTORISED(void, find_lane_energies,
-                 (const std::uint8_t* north, const std::uint8_t* far, std::ptrdiff_t begin, std::ptrdiff_t end,
-                  std::uint16_t* __restrict energies),
-                 (north, far, begin, end, energies)) {
+ISOHF_KERNEL void find_lane_energies(const std::uint8_t* north, const std::uint8_t* far, std::ptrdiff_t begin,
+                                     std::ptrdiff_t end, std::uint16_t* __restrict energies) {
   for (std::ptrdiff_t i = begin; i < end; ++i) {
     const std::uint8_t* const n = north + i;
     const std::uint8_t* const f = far + i;
@@ -30,10 +27,8 @@ ISOHF_VECTORISED(void, find_lane_energies,
 }
 
 /// Each lane's residuals, shifted as its energies want them.
-ISOHF_VECTORISED(void, shift_lanes,
-                 (const std::uint16_t* zigzagged, std::ptrdiff_t begin, std::ptrdiff_t end,
-                  const PerLane<std::int32_t>& shifts, std::uint16_t* __restrict shifted),
-                 (zigzagged, begin, end, shifts, shifted)) {
+ISOHF_KERNEL void shift_lanes(const std::uint16_t* zigzagged, std::ptrdiff_t begin, std::ptrdiff_t end,
+                              const PerLane<std::int32_t>& shifts, std::uint16_t* __restrict shifted) {
   using Ints = std::int32_t __attribute__((vector_size(4 * kBatchLanes)));
   using Shorts = std::uint16_t __attribute__((vector_size(2 * kBatchLanes)));
   const Ints shift = unaligned<Ints>(shifts.data()).value;
@@ -44,10 +39,8 @@ ISOHF_VECTORISED(void, shift_lanes,
 }
 
 /// Those of floats, as far as they fit 16 bits.
-ISOHF_VECTORISED(void, shift_float_lanes,
-                 (const std::uint32_t* zigzagged, std::ptrdiff_t begin, std::ptrdiff_t end,
-                  const PerLane<std::int32_t>& shifts, std::uint16_t* __restrict shifted),
-                 (zigzagged, begin, end, shifts, shifted)) {
+ISOHF_KERNEL void shift_float_lanes(const std::uint32_t* zigzagged, std::ptrdiff_t begin, std::ptrdiff_t end,
+                                    const PerLane<std::int32_t>& shifts, std::uint16_t* __restrict shifted) {
   using Words = std::uint32_t __attribute__((vector_size(4 * kBatchLanes)));
   using Shorts = std::uint16_t __attribute__((vector_size(2 * kBatchLanes)));
   const Words shift = unaligned<Words>(shifts.data()).value;
@@ -57,10 +50,8 @@ ISOHF_VECTORISED(void, shift_float_lanes,
   }
 }
 
-ISOHF_VECTORISED(void, limit_magnitudes,
-                 (const std::uint16_t* __restrict shifted, std::ptrdiff_t begin, std::ptrdiff_t end,
-                  std::uint8_t* __restrict magnitudes),
-                 (shifted, begin, end, magnitudes)) {
+ISOHF_KERNEL void limit_magnitudes(const std::uint16_t* __restrict shifted, std::ptrdiff_t begin, std::ptrdiff_t end,
+                                   std::uint8_t* __restrict magnitudes) {
   for (std::ptrdiff_t i = begin; i < end; ++i) {
     magnitudes[i] = static_cast<std::uint8_t>(shifted[i] < kMagnitudeLimit ? shifted[i] : kMagnitudeLimit);
   }
@@ -209,7 +200,8 @@ void BatchResiduals<Zigzagged>::take_row(int r) {
       has_voids_ |= void_rows_[lane] != nullptr;
     }
   }
-  find_lane_energies(magnitudes(1) + r % 2 * kStep, magnitudes(2), first * kStep, (last + 1) * kStep, energies_.data());
+  vectorised<find_lane_energies>(magnitudes(1) + r % 2 * kStep, magnitudes(2), first * kStep, (last + 1) * kStep,
+                                 energies_.data());
   if (has_voids_) {
     for (std::size_t lane = 0; lane < kBatchLanes; ++lane) take_around_voids(lane, r, first, last);
   } else {
@@ -230,13 +222,13 @@ template <typename Zigzagged>
 void BatchResiduals<Zigzagged>::find_magnitudes(std::ptrdiff_t begin, std::ptrdiff_t end) {
   const std::uint16_t* shifted = energies_.data();
   if constexpr (sizeof(Zigzagged) == 4) {
-    shift_float_lanes(zigzagged_.data(), begin, end, shifts_, energies_.data());
+    vectorised<shift_float_lanes>(zigzagged_.data(), begin, end, shifts_, energies_.data());
   } else {
     const bool has_shifts = std::any_of(shifts_.begin(), shifts_.end(), [](std::int32_t shift) { return shift != 0; });
-    if (has_shifts) shift_lanes(zigzagged_.data(), begin, end, shifts_, energies_.data());
+    if (has_shifts) vectorised<shift_lanes>(zigzagged_.data(), begin, end, shifts_, energies_.data());
     if (!has_shifts) shifted = zigzagged_.data();
   }
-  limit_magnitudes(shifted, begin, end, magnitudes(0));
+  vectorised<limit_magnitudes>(shifted, begin, end, magnitudes(0));
 }
 
 template <typename Zigzagged>

@@ -4,8 +4,8 @@
 #include <cstring>
 
 #include "isohf/archive/codec/residuals/residual_symbols.h"
-#include "isohf/base/vectorised.h"
-#if defined(ISOHF_HAS_WIDE)
+#include "isohf/base/simd.h"
+#if defined(ISOHF_TARGET_WIDE)
 #include <immintrin.h>
 #endif
 
@@ -44,19 +44,18 @@ std::uint64_t expand_plainly(const std::byte* symbols, std::size_t count, const 
   return position > end || (seen & kNoSuchSymbol) != 0 ? kNotExpanded : position;
 }
 
-#if defined(ISOHF_HAS_WIDE)
-#pragma GCC push_options
-#pragma GCC target("arch=x86-64-v3")
+#if defined(ISOHF_TARGET_WIDE)
 /// Sixteen symbols at a time: octaves and mantissas by bytes, then the extra bits of four symbols put to them by one
 /// deposit. The last symbols, fewer than sixteen, are left to the plain loop.
-std::uint64_t expand_widely(const std::byte* symbols, std::size_t count, const std::byte* extra, std::uint64_t position,
-                            std::uint64_t end, std::uint16_t* __restrict zigzagged) {
+ISOHF_TARGET_WIDE std::uint64_t expand_widely(const std::byte* symbols, std::size_t count, const std::byte* extra,
+                                              std::uint64_t position, std::uint64_t end,
+                                              std::uint16_t* __restrict zigzagged) {
   const __m128i low_powers = _mm_setr_epi8(1, 2, 4, 8, 16, 32, 64, -128, 0, 0, 0, 0, 0, 0, 0, 0);
   const __m128i high_powers = _mm_setr_epi8(0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 4, 8, 16, 32, 64, -128);
   const __m128i eight = _mm_set1_epi8(8);
   const __m128i zero = _mm_setzero_si128();
   __m128i most = zero;
-  const auto put_four = [&](std::uint64_t least, std::uint64_t mask, std::uint16_t* to) {
+  const auto put_four = [&](std::uint64_t least, std::uint64_t mask, std::uint16_t* to) ISOHF_TARGET_WIDE {
     std::uint64_t bits;
     std::memcpy(&bits, extra + position / 8, sizeof(bits));
     const std::uint64_t four = least + _pdep_u64(bits >> (position % 8), mask);  // no bit of the least is in the mask
@@ -79,7 +78,7 @@ std::uint64_t expand_widely(const std::byte* symbols, std::size_t count, const s
     const __m128i low = _mm_shuffle_epi8(low_powers, octave);
     const __m128i high = _mm_shuffle_epi8(high_powers, octave);
     const __m128i mantissa = _mm_min_epu8(symbol, _mm_or_si128(_mm_and_si128(symbol, _mm_set1_epi8(7)), eight));
-    const auto put_eight = [&](__m128i power, __m128i mantissas, std::uint16_t* eight_to) {
+    const auto put_eight = [&](__m128i power, __m128i mantissas, std::uint16_t* eight_to) ISOHF_TARGET_WIDE {
       const __m128i least = _mm_mullo_epi16(mantissas, power);
       const __m128i mask = _mm_sub_epi16(power, _mm_set1_epi16(1));
       put_four(static_cast<std::uint64_t>(_mm_cvtsi128_si64(least)),
@@ -94,7 +93,6 @@ std::uint64_t expand_widely(const std::byte* symbols, std::size_t count, const s
   if (_mm_movemask_epi8(_mm_cmpeq_epi8(_mm_max_epu8(most, last), last)) != 0xffff) return kNotExpanded;
   return expand_plainly(symbols + i, count - i, extra, position, end, zigzagged + i);
 }
-#pragma GCC pop_options
 #endif
 
 /// The same for floats: the smallest residual alone may take 32 bits.
@@ -113,10 +111,9 @@ constexpr std::array<FloatSymbol, 256> make_float_symbols() {
 constexpr auto kFloatSymbolTable = make_float_symbols();
 static_assert(7 + 2 * extra_bits_of_symbol(kFloatSymbols - 1) <= 64);  // two symbols' extra bits with one read
 
-ISOHF_VECTORISED(std::uint64_t, expand_floats,
-                 (const std::byte* symbols, std::size_t count, const std::byte* extra, std::uint64_t position,
-                  std::uint64_t end, std::uint32_t* __restrict zigzagged),
-                 (symbols, count, extra, position, end, zigzagged)) {
+ISOHF_KERNEL std::uint64_t expand_floats(const std::byte* symbols, std::size_t count, const std::byte* extra,
+                                         std::uint64_t position, std::uint64_t end,
+                                         std::uint32_t* __restrict zigzagged) {
   unsigned most = 0;
   const auto put = [&](std::size_t i, std::uint64_t bits) {
     const auto symbol = std::to_integer<unsigned>(symbols[i]);
@@ -149,8 +146,8 @@ ISOHF_VECTORISED(std::uint64_t, expand_floats,
 std::uint64_t expand_residuals(std::span<const std::byte> symbols, std::span<const std::byte> extra,
                                std::uint64_t position, std::uint16_t* zigzagged) {
   const std::uint64_t end = 8 * std::uint64_t{extra.size()};
-#if defined(ISOHF_HAS_WIDE)
-  if (detail::simd_is_on.load(std::memory_order_relaxed)) {
+#if defined(ISOHF_TARGET_WIDE)
+  if (detail::simd_level.load(std::memory_order_relaxed) != detail::SimdLevel::kBase) {
     return expand_widely(symbols.data(), symbols.size(), extra.data(), position, end, zigzagged);
   }
 #endif
@@ -159,8 +156,8 @@ std::uint64_t expand_residuals(std::span<const std::byte> symbols, std::span<con
 
 std::uint64_t expand_residuals(std::span<const std::byte> symbols, std::span<const std::byte> extra,
                                std::uint64_t position, std::uint32_t* zigzagged) {
-  return expand_floats(symbols.data(), symbols.size(), extra.data(), position, 8 * std::uint64_t{extra.size()},
-                       zigzagged);
+  return vectorised<expand_floats>(symbols.data(), symbols.size(), extra.data(), position,
+                                   8 * std::uint64_t{extra.size()}, zigzagged);
 }
 
 }  // namespace isohf
