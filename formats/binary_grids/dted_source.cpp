@@ -10,9 +10,8 @@
 #include <string_view>
 #include <vector>
 
-#include "formats/files/raw_file.h"
+#include "formats/files/file_source.h"
 #include "formats/open_options.h"
-#include "isohf/base/assert.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
 
@@ -47,14 +46,10 @@ int elevation(std::byte high, std::byte low) {
   return (std::to_integer<int>(high) & 0x80) != 0 ? -magnitude : magnitude;
 }
 
-class DtedSource final : public HeightSource {
+class DtedSource final : public FileSource {
  public:
-  DtedSource(const std::string& path, const OpenOptions& options) : file_(path, options.unpacked_bytes) {
-    info_.path = path;
-    if (!options.channel.empty() && options.channel != "0") {
-      throw Error(ErrorCode::kInvalidArgument,
-                  fmt::format("{}: there is no channel \"{}\"; there is 0 alone", path, options.channel));
-    }
+  DtedSource(const std::string& path, const OpenOptions& options) : FileSource(path, "DTED", options) {
+    (void)choose_band(info_, options, 1);
     read_header();
     describe();
     check_size();
@@ -62,12 +57,8 @@ class DtedSource final : public HeightSource {
     apply_open_options(info_, options);
   }
 
-  [[nodiscard]] const SourceInfo& info() const override { return info_; }
-
   void read_window(const Window& window, std::span<std::byte> samples) override {
-    ISOHF_ASSERT(window.column >= 0 && window.row >= 0 && window.columns >= 0 && window.rows >= 0);
-    ISOHF_ASSERT(window.column + window.columns <= info_.width && window.row + window.rows <= info_.height);
-    ISOHF_ASSERT(static_cast<std::int64_t>(samples.size()) == window.columns * window.rows * 2);
+    ISOHF_ASSERT(is_window_of(info_, window, samples.size()));
     if (samples.empty()) return;
     for (std::int64_t c = 0; c < window.columns; ++c) {
       const std::span<const std::byte> posts = column(window.column + c, window.row, window.rows);
@@ -80,9 +71,6 @@ class DtedSource final : public HeightSource {
       }
     }
   }
-
-  void limit_buffers(std::uint64_t bytes) override { file_.limit_buffers(bytes); }
-  [[nodiscard]] std::uint64_t buffer_bytes(std::uint64_t limit) const override { return file_.buffer_bytes(limit); }
 
  private:
   [[noreturn]] void corrupt(std::string_view label, const std::string& what) const {
@@ -128,16 +116,16 @@ class DtedSource final : public HeightSource {
 
   void read_header() {
     std::array<std::byte, kTapeRecordBytes + 4> head = {};
-    const std::span<const std::byte> start(head.data(), file_.read_some(0, head));
+    const std::span<const std::byte> start(head.data(), file_->read_some(0, head));
     while (header_at_ < kTapeRecordBytes && !starts_with(start, header_at_, "UHL1")) header_at_ += kTapeRecordBytes;
     if (!starts_with(start, header_at_, "UHL1")) {
       throw Error(ErrorCode::kCorrupt, info_.path + ": has no user header label UHL1, must start with it");
     }
     header_.resize(kHeaderBytes);
-    if (file_.read_some(header_at_, std::as_writable_bytes(std::span(header_))) != kHeaderBytes) {
+    if (file_->read_some(header_at_, std::as_writable_bytes(std::span(header_))) != kHeaderBytes) {
       throw Error(ErrorCode::kCorrupt,
                   fmt::format("{}: ends early: {} bytes, the labels UHL, DSI and ACC alone have {}", info_.path,
-                              file_.size_bytes(), header_at_ + kHeaderBytes));
+                              file_->size_bytes(), header_at_ + kHeaderBytes));
     }
     if (field(kUhlBytes, 3) != "DSI") corrupt("DSI", fmt::format("is not at byte {}", header_at_ + kUhlBytes));
     if (field(kUhlBytes + kDsiBytes, 3) != "ACC") {
@@ -146,7 +134,6 @@ class DtedSource final : public HeightSource {
   }
 
   void describe() {
-    info_.format = "DTED";
     info_.width = required(47, 4, "number of columns", 1);
     info_.height = required(51, 4, "number of posts in a column", 1);
     const std::optional<int> rows = digits(kUhlBytes + 281, 4);
@@ -219,9 +206,9 @@ class DtedSource final : public HeightSource {
 
   void check_size() const {
     const auto wanted = header_at_ + kHeaderBytes + static_cast<std::uint64_t>(info_.width * record_bytes());
-    if (file_.size_bytes() < wanted) {
+    if (file_->size_bytes() < wanted) {
       throw Error(ErrorCode::kCorrupt, fmt::format("{}: ends early: {} bytes, {} columns of {} posts need {}",
-                                                   info_.path, file_.size_bytes(), info_.width, info_.height, wanted));
+                                                   info_.path, file_->size_bytes(), info_.width, info_.height, wanted));
     }
   }
 
@@ -235,9 +222,9 @@ class DtedSource final : public HeightSource {
     const std::span<std::byte> record(record_);
     const auto posts = record.subspan(static_cast<std::size_t>(begin), static_cast<std::size_t>(2 * rows));
     if (checked_[static_cast<std::size_t>(index)]) {
-      file_.read(at + static_cast<std::uint64_t>(begin), posts);
+      file_->read(at + static_cast<std::uint64_t>(begin), posts);
     } else {
-      file_.read(at, record);
+      file_->read(at, record);
       check_record(index, at, record);
       checked_[static_cast<std::size_t>(index)] = true;
     }
@@ -266,12 +253,10 @@ class DtedSource final : public HeightSource {
     }
   }
 
-  RawFile file_;
   std::size_t header_at_ = 0;
   std::string header_;  // UHL, DSI, ACC
   std::vector<bool> checked_;
   std::vector<std::byte> record_;
-  SourceInfo info_;
 };
 
 }  // namespace

@@ -12,7 +12,7 @@
 
 #include "formats/binary_grids/grid_header.h"
 #include "formats/binary_grids/plain_samples.h"
-#include "formats/files/raw_file.h"
+#include "formats/files/file_source.h"
 #include "formats/files/text.h"
 #include "formats/georeference/files_beside.h"
 #include "formats/open_options.h"
@@ -120,16 +120,13 @@ GridHeader read_header(const std::string& path) {
   return header;
 }
 
-class HeaderGridSource final : public HeightSource {
+class HeaderGridSource final : public PlainSource {
  public:
-  HeaderGridSource(const Pair& files, const OpenOptions& options) : header_path_(files.header), file_(files.data) {
-    info_.path = files.data;
-    if (!options.channel.empty() && options.channel != "0") {
-      throw Error(ErrorCode::kInvalidArgument,
-                  fmt::format("{}: there is no channel \"{}\"; there is 0 alone", info_.path, options.channel));
-    }
-    const bool grid_float = extension_of(files.data) == ".flt";
-    info_.format = grid_float ? "GridFloat" : "EHdr";
+  HeaderGridSource(const Pair& files, const OpenOptions& options)
+      : PlainSource(files.data, extension_of(files.data) == ".flt" ? "GridFloat" : "EHdr", options),
+        header_path_(files.header) {
+    (void)choose_band(info_, options, 1);
+    const bool grid_float = info_.format == "GridFloat";
     const GridHeader header = read_header(files.header);
     header.read_size(info_);
     require_one_band(header);
@@ -146,12 +143,6 @@ class HeaderGridSource final : public HeightSource {
     read_prj_beside(info_);
     info_.block_width = info_.width;
     apply_open_options(info_, options);
-  }
-
-  [[nodiscard]] const SourceInfo& info() const override { return info_; }
-
-  void read_window(const Window& window, std::span<std::byte> samples) override {
-    read_plain_samples(file_, info_, layout_, window, samples);
   }
 
  private:
@@ -235,7 +226,7 @@ class HeaderGridSource final : public HeightSource {
 
   /// The file must have the bytes that the header says, the last row's padding perhaps left out.
   void read_layout(const GridHeader& header) {
-    const std::uint64_t bytes = file_.size_bytes();
+    const std::uint64_t bytes = file_->size_bytes();
     const std::uint64_t size = size_bytes(info_.sample_type);
     const auto width = static_cast<std::uint64_t>(info_.width);
     const auto height = static_cast<std::uint64_t>(info_.height);
@@ -264,9 +255,6 @@ class HeaderGridSource final : public HeightSource {
   }
 
   std::string header_path_;
-  RawFile file_;
-  SourceInfo info_;
-  PlainLayout layout_;
 };
 
 }  // namespace

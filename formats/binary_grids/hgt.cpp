@@ -8,12 +8,11 @@
 #include <string>
 #include <vector>
 
-#include "formats/files/raw_file.h"
+#include "formats/binary_grids/plain_samples.h"
 #include "formats/files/text.h"
 #include "formats/open_options.h"
 #include "formats/readers.h"
 #include "formats/write/encoders.h"
-#include "isohf/base/assert.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
 
@@ -73,10 +72,9 @@ std::optional<Size> size_of_tile(std::uint64_t bytes) {
   return Size{side, side};
 }
 
-class HgtSource final : public HeightSource {
+class HgtSource final : public PlainSource {
  public:
-  HgtSource(const std::string& path, const OpenOptions& options) {
-    info_.path = path;
+  HgtSource(const std::string& path, const OpenOptions& options) : PlainSource(path, "SRTM HGT") {
     std::string name = path;
     if (lower_case(path).ends_with(".zip")) {
       name = open_member(options.unpacked_bytes);
@@ -87,31 +85,11 @@ class HgtSource final : public HeightSource {
     apply_open_options(info_, options);
   }
 
-  [[nodiscard]] const SourceInfo& info() const override { return info_; }
-
-  void read_window(const Window& window, std::span<std::byte> samples) override {
-    ISOHF_ASSERT(window.column >= 0 && window.row >= 0 && window.columns >= 0 && window.rows >= 0);
-    ISOHF_ASSERT(window.column + window.columns <= info_.width && window.row + window.rows <= info_.height);
-    ISOHF_ASSERT(samples.size() == static_cast<std::size_t>(window.columns * window.rows * kSampleBytes));
-    // Whole rows lie together in the file as in the window.
-    const bool whole = window.columns == info_.width;
-    const std::int64_t runs = whole ? 1 : window.rows;
-    const std::size_t run_bytes = whole ? samples.size() : static_cast<std::size_t>(window.columns * kSampleBytes);
-    for (std::int64_t i = 0; i < runs; ++i) {
-      const auto offset = static_cast<std::uint64_t>(((window.row + i) * info_.width + window.column) * kSampleBytes);
-      file_->read(offset, samples.subspan(static_cast<std::size_t>(i) * run_bytes, run_bytes));
-    }
-    swap_byte_order(samples, kSampleBytes);
-  }
-
-  void limit_buffers(std::uint64_t bytes) override { file_->limit_buffers(bytes); }
-  [[nodiscard]] std::uint64_t buffer_bytes(std::uint64_t limit) const override { return file_->buffer_bytes(limit); }
-
  private:
   /// Opens the tile of a zip archive; returns the name that says where it lies.
   std::string open_member(std::uint64_t unpacked_bytes) {
-    std::vector<ZippedFile> tiles;
-    for (ZippedFile& member : zipped_files(RawFile(info_.path))) {
+    std::vector<ZipEntry> tiles;
+    for (ZipEntry& member : zipped_files(RawFile(info_.path))) {
       if (lower_case(member.name).ends_with(".hgt")) tiles.push_back(std::move(member));
     }
     if (tiles.size() != 1) {
@@ -139,11 +117,7 @@ class HgtSource final : public HeightSource {
                       "12970802 (1801 x 3601) or another square of 2 byte samples",
                       info_.path, bytes));
     }
-    if (!options.channel.empty() && options.channel != "0") {
-      throw Error(ErrorCode::kInvalidArgument,
-                  fmt::format("{}: there is no channel \"{}\"; there is 0 alone", info_.path, options.channel));
-    }
-    info_.format = "SRTM HGT";
+    (void)choose_band(info_, options, 1);
     info_.width = size->columns;
     info_.height = size->rows;
     info_.sample_type = SampleType::kInt16;
@@ -151,6 +125,8 @@ class HgtSource final : public HeightSource {
     info_.vertical_unit = "metre";
     info_.block_width = info_.width;
     info_.block_height = 1;
+    layout_.row_bytes = static_cast<std::uint64_t>(info_.width * kSampleBytes);
+    layout_.big_endian = true;
     Georeference& geo = info_.georeference;
     geo.registration = Registration::kPoint;
     geo.unit = HorizontalUnit::kDegree;
@@ -178,9 +154,6 @@ class HgtSource final : public HeightSource {
                       size->columns, size->rows));
     }
   }
-
-  std::optional<RawFile> file_;
-  SourceInfo info_;
 };
 
 constexpr double kVoid = -32768.0;
@@ -236,9 +209,9 @@ void check_place(const std::string& path, const RasterSpec& spec) {
 bool is_zip_of_hgt(const std::string& path) {
   if (!lower_case(path).ends_with(".zip")) return false;
   try {
-    const std::vector<ZippedFile> members = zipped_files(RawFile(path));
+    const std::vector<ZipEntry> members = zipped_files(RawFile(path));
     return std::any_of(members.begin(), members.end(),
-                       [](const ZippedFile& member) { return lower_case(member.name).ends_with(".hgt"); });
+                       [](const ZipEntry& member) { return lower_case(member.name).ends_with(".hgt"); });
   } catch (const Error&) {
     return false;  // is something else, or too damaged to say
   }

@@ -14,10 +14,9 @@
 #include <vector>
 
 #include "formats/binary_grids/plain_samples.h"
-#include "formats/files/raw_file.h"
+#include "formats/files/file_source.h"
 #include "formats/files/text.h"
 #include "formats/open_options.h"
-#include "isohf/base/assert.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
 
@@ -159,49 +158,40 @@ bool widen(std::byte* at, Whole& number) {
   return true;
 }
 
-class NpySource final : public HeightSource {
+class NpySource final : public PlainSource {
  public:
-  NpySource(const std::string& path, const OpenOptions& options) : file_(path, options.unpacked_bytes) {
-    info_.path = path;
-    info_.format = "NumPy";
+  NpySource(const std::string& path, const OpenOptions& options) : PlainSource(path, "NumPy", options) {
     read_header();
     (void)choose_band(info_, options, 1);
     apply_open_options(info_, options);
   }
   /// One array of an .npz.
-  NpySource(const std::string& path, const ZippedFile& member, const OpenOptions& options)
-      : file_(path, member, options.unpacked_bytes) {
-    info_.path = path;
-    info_.format = "NumPy";
+  NpySource(const std::string& path, const ZipEntry& member, const OpenOptions& options) : PlainSource(path, "NumPy") {
+    file_.emplace(path, member, options.unpacked_bytes);
     read_header();
   }
 
-  [[nodiscard]] SourceInfo& info() { return info_; }
-
-  [[nodiscard]] const SourceInfo& info() const override { return info_; }
+  [[nodiscard]] SourceInfo& mutable_info() { return info_; }
 
   void read_window(const Window& window, std::span<std::byte> samples) override {
     if (fortran_order_) {
       read_by_columns(window, samples);
     } else {
-      read_plain_samples(file_, info_, layout_, window, samples);
+      PlainSource::read_window(window, samples);
     }
     if (wide_ == Wide::kSigned) widen_all<std::int64_t>(window, samples);
     if (wide_ == Wide::kUnsigned) widen_all<std::uint64_t>(window, samples);
   }
 
-  void limit_buffers(std::uint64_t bytes) override { file_.limit_buffers(bytes); }
-  [[nodiscard]] std::uint64_t buffer_bytes(std::uint64_t limit) const override { return file_.buffer_bytes(limit); }
-
  private:
   void read_header() {
     std::array<unsigned char, 12> start = {};
-    file_.read(0, std::as_writable_bytes(std::span(start).first(10)));
+    file_->read(0, std::as_writable_bytes(std::span(start).first(10)));
     const unsigned version = start[6];
     if (version < 1 || version > 3) {
       throw Error(ErrorCode::kUnsupported, fmt::format("{}: NumPy format {}, must be 1 to 3", info_.path, version));
     }
-    if (version > 1) file_.read(10, std::as_writable_bytes(std::span(start).subspan(10)));
+    if (version > 1) file_->read(10, std::as_writable_bytes(std::span(start).subspan(10)));
     std::size_t length = start[8] | static_cast<std::size_t>(start[9]) << 8U;
     if (version > 1) length |= static_cast<std::size_t>(start[10]) << 16U | static_cast<std::size_t>(start[11]) << 24U;
     if (length > kMostHeaderBytes) {
@@ -210,7 +200,7 @@ class NpySource final : public HeightSource {
     }
     const std::size_t text_at = version > 1 ? 12 : 10;
     std::string text(length, '\0');
-    file_.read(text_at, std::as_writable_bytes(std::span(text)));
+    file_->read(text_at, std::as_writable_bytes(std::span(text)));
     layout_.offset_bytes = text_at + length;
     describe(HeaderParser(info_.path, text).parse());
   }
@@ -250,11 +240,11 @@ class NpySource final : public HeightSource {
     // At most 2^31 rows of 2^34 bytes would overflow; no file is that large.
     const double wanted = static_cast<double>(layout_.offset_bytes) +
                           static_cast<double>(layout_.row_bytes) * static_cast<double>(info_.height);
-    const auto there = static_cast<double>(file_.size_bytes());
+    const auto there = static_cast<double>(file_->size_bytes());
     if (there < wanted) {
       throw Error(ErrorCode::kCorrupt,
                   fmt::format("{}: ends early: {} bytes, an array of {} x {} {} needs {:.0f}", info_.path,
-                              file_.size_bytes(), info_.width, info_.height, to_string(info_.sample_type), wanted));
+                              file_->size_bytes(), info_.width, info_.height, to_string(info_.sample_type), wanted));
     }
     if (there > wanted) info_.warnings.push_back(loss(fmt::format("{:.0f} bytes follow the array", there - wanted)));
   }
@@ -262,14 +252,12 @@ class NpySource final : public HeightSource {
   /// Fortran order: the samples of a column follow each other.
   void read_by_columns(const Window& window, std::span<std::byte> samples) {
     const std::size_t size = size_bytes(info_.sample_type);
-    ISOHF_ASSERT(window.column >= 0 && window.row >= 0 && window.columns >= 0 && window.rows >= 0);
-    ISOHF_ASSERT(window.column + window.columns <= info_.width && window.row + window.rows <= info_.height);
-    ISOHF_ASSERT(samples.size() == static_cast<std::size_t>(window.columns * window.rows) * size);
+    ISOHF_ASSERT(is_window_of(info_, window, samples.size()));
     column_.resize(static_cast<std::size_t>(window.rows) * size);
     const std::size_t row_bytes = static_cast<std::size_t>(window.columns) * size;
     for (std::int64_t c = 0; c < window.columns; ++c) {
       const auto first = static_cast<std::uint64_t>((window.column + c) * info_.height + window.row);
-      file_.read(layout_.offset_bytes + first * size, column_);
+      file_->read(layout_.offset_bytes + first * size, column_);
       std::byte* out = samples.data() + static_cast<std::size_t>(c) * size;
       for (std::size_t at = 0; at < column_.size(); at += size, out += row_bytes) {
         std::memcpy(out, column_.data() + at, size);
@@ -291,21 +279,18 @@ class NpySource final : public HeightSource {
     }
   }
 
-  RawFile file_;
-  PlainLayout layout_;
   bool fortran_order_ = false;
   Wide wide_ = Wide::kNo;
   std::vector<std::byte> column_;
-  SourceInfo info_;
 };
 
 /// "elevation.npy" is the array elevation.
-std::string array_name(const ZippedFile& member) {
+std::string array_name(const ZipEntry& member) {
   return member.name.ends_with(".npy") ? member.name.substr(0, member.name.size() - 4) : member.name;
 }
 
 /// An array that is a raster; nullptr where its shape or type make it none and nobody asked for it by name.
-std::unique_ptr<NpySource> open_array(const std::string& path, const ZippedFile& member, bool wanted,
+std::unique_ptr<NpySource> open_array(const std::string& path, const ZipEntry& member, bool wanted,
                                       const OpenOptions& options) {
   try {
     return std::make_unique<NpySource>(path, member, options);
@@ -327,12 +312,12 @@ std::unique_ptr<HeightSource> open_npy(const std::string& path, const OpenOption
 }
 
 std::unique_ptr<HeightSource> open_npz(const std::string& path, const OpenOptions& options) {
-  const std::vector<ZippedFile> members = zipped_files(RawFile(path));
+  const std::vector<ZipEntry> members = zipped_files(RawFile(path));
   std::unique_ptr<NpySource> chosen;
   std::string name;
   std::string names;
   std::size_t rasters = 0;
-  for (const ZippedFile& member : members) {
+  for (const ZipEntry& member : members) {
     const std::string array = array_name(member);
     const bool wanted = options.channel == array;
     if (wanted || options.channel.empty()) {
@@ -355,11 +340,11 @@ std::unique_ptr<HeightSource> open_npz(const std::string& path, const OpenOption
         fmt::format("{}: no array of the archive ({}) has two dimensions and a type that is read", path, names));
   }
   if (rasters > 1) {
-    chosen->info().warnings.push_back(
+    chosen->mutable_info().warnings.push_back(
         fmt::format("array {} is read, of {}; --channel NAME takes another", name, names));
   }
-  chosen->info().channel = members.size() > 1 ? name : std::string();
-  apply_open_options(chosen->info(), options);
+  chosen->mutable_info().channel = members.size() > 1 ? name : std::string();
+  apply_open_options(chosen->mutable_info(), options);
   return chosen;
 }
 

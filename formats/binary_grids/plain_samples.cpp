@@ -2,16 +2,12 @@
 
 #include <bit>
 
-#include "isohf/base/assert.h"
-
 namespace isohf {
 
 void read_plain_samples(const RawFile& file, const SourceInfo& info, const PlainLayout& layout, const Window& window,
                         std::span<std::byte> samples) {
   const std::size_t size = size_bytes(info.sample_type);
-  ISOHF_ASSERT(window.column >= 0 && window.row >= 0 && window.columns >= 0 && window.rows >= 0);
-  ISOHF_ASSERT(window.column + window.columns <= info.width && window.row + window.rows <= info.height);
-  ISOHF_ASSERT(samples.size() == static_cast<std::size_t>(window.columns * window.rows) * size);
+  ISOHF_ASSERT(is_window_of(info, window, samples.size()));
   const std::size_t run_bytes = static_cast<std::size_t>(window.columns) * size;
   const std::uint64_t first = layout.offset_bytes + static_cast<std::uint64_t>(window.row) * layout.row_bytes +
                               static_cast<std::uint64_t>(window.column) * size;

@@ -5,10 +5,8 @@
 #include <cstdint>
 #include <span>
 
-#include "formats/files/raw_file.h"
+#include "formats/files/file_source.h"
 #include "isohf/raster.h"
-
-/// Rasters that are stored from South to North, which are delivered from North to South.
 
 namespace isohf {
 
@@ -22,6 +20,21 @@ struct PlainLayout {
 /// Reads `window` of the raster that `info` and `layout` describe, in host byte order. Throws Error{kIo, kCorrupt}.
 void read_plain_samples(const RawFile& file, const SourceInfo& info, const PlainLayout& layout, const Window& window,
                         std::span<std::byte> samples);
+
+/// A raster of nothing but such samples, behind a header perhaps.
+class PlainSource : public FileSource {
+ public:
+  void read_window(const Window& window, std::span<std::byte> samples) override {
+    read_plain_samples(*file_, info_, layout_, window, samples);
+  }
+
+ protected:
+  using FileSource::FileSource;
+
+  PlainLayout layout_;
+};
+
+// Rasters that are stored from South to North, which are delivered from North to South.
 
 /// The rows of `window` as they are stored, of a raster of `height` rows.
 [[nodiscard]] inline Window turned(const Window& window, std::int64_t height) {

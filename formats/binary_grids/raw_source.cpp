@@ -8,7 +8,7 @@
 #include <cmath>
 
 #include "formats/binary_grids/plain_samples.h"
-#include "formats/files/raw_file.h"
+#include "formats/files/file_source.h"
 #include "formats/files/text.h"
 #include "formats/georeference/raster_description.h"
 #include "formats/open_options.h"
@@ -86,17 +86,12 @@ std::string square(std::uint64_t bytes, std::string_view type, std::size_t sampl
               fmt::format("{}: raw samples have no header; --raw WxH:TYPE must say what they are ({})", path, hint));
 }
 
-class RawSource final : public HeightSource {
+class RawSource final : public PlainSource {
  public:
   RawSource(const std::string& path, const RawLayout& layout, const RasterDescription* description,
             const OpenOptions& options)
-      : file_(path, options.unpacked_bytes) {
-    info_.path = path;
-    info_.format = "raw samples";
-    if (!options.channel.empty() && options.channel != "0") {
-      throw Error(ErrorCode::kInvalidArgument,
-                  fmt::format("{}: there is no channel \"{}\"; there is 0 alone", path, options.channel));
-    }
+      : PlainSource(path, "raw samples", options) {
+    (void)choose_band(info_, options, 1);
     info_.width = layout.width;
     info_.height = layout.height;
     info_.sample_type = layout.type;
@@ -104,11 +99,11 @@ class RawSource final : public HeightSource {
     layout_.row_bytes = static_cast<std::uint64_t>(layout.width) * size_bytes(layout.type);
     layout_.big_endian = layout.big_endian;
     const std::uint64_t bytes = layout_.row_bytes * static_cast<std::uint64_t>(layout.height);
-    if (bytes != file_.size_bytes()) {
+    if (bytes != file_->size_bytes()) {
       throw Error(ErrorCode::kCorrupt,
                   fmt::format("{}: the file has {} bytes, {} x {} samples of {} bytes take {}", path,
-                              file_.size_bytes(), layout.width, layout.height, size_bytes(layout.type), bytes),
-                  {path, fmt::format("{} bytes", file_.size_bytes()), fmt::format("{} bytes", bytes), ""});
+                              file_->size_bytes(), layout.width, layout.height, size_bytes(layout.type), bytes),
+                  {path, fmt::format("{} bytes", file_->size_bytes()), fmt::format("{} bytes", bytes), ""});
     }
     if (description != nullptr) description->describe(info_);
     if (is_floating(layout.type)) {
@@ -117,20 +112,6 @@ class RawSource final : public HeightSource {
     }
     apply_open_options(info_, options);
   }
-
-  [[nodiscard]] const SourceInfo& info() const override { return info_; }
-
-  void read_window(const Window& window, std::span<std::byte> samples) override {
-    read_plain_samples(file_, info_, layout_, window, samples);
-  }
-
-  void limit_buffers(std::uint64_t bytes) override { file_.limit_buffers(bytes); }
-  [[nodiscard]] std::uint64_t buffer_bytes(std::uint64_t limit) const override { return file_.buffer_bytes(limit); }
-
- private:
-  RawFile file_;
-  SourceInfo info_;
-  PlainLayout layout_;
 };
 
 }  // namespace

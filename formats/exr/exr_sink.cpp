@@ -62,7 +62,7 @@ Imf::PixelType pixel_type(SampleType type) {
 
 Imf::Header header_of(const RasterSpec& spec) {
   Imf::Header header(static_cast<int>(spec.width), static_cast<int>(spec.height));
-  header.compression() = Imf::ZIP_COMPRESSION;
+  header.compression() = spec.compress ? Imf::ZIP_COMPRESSION : Imf::NO_COMPRESSION;
   return header;
 }
 

@@ -28,10 +28,10 @@
 #include <vector>
 
 #include "formats/exr/exr_header.h"
+#include "formats/files/file_source.h"
 #include "formats/files/text.h"
 #include "formats/georeference/files_beside.h"
 #include "formats/open_options.h"
-#include "isohf/base/assert.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
 
@@ -262,10 +262,8 @@ class ExrSource final : public HeightSource {
   [[nodiscard]] const SourceInfo& info() const override { return info_; }
 
   void read_window(const Window& window, std::span<std::byte> samples) override {
-    ISOHF_ASSERT(window.column >= 0 && window.row >= 0 && window.columns >= 0 && window.rows >= 0 &&
-                 window.column + window.columns <= info_.width && window.row + window.rows <= info_.height);
+    ISOHF_ASSERT(is_window_of(info_, window, samples.size()));
     const std::size_t row_bytes = static_cast<std::size_t>(window.columns) * sample_bytes_;
-    ISOHF_ASSERT(samples.size() == row_bytes * static_cast<std::size_t>(window.rows));
     if (samples.empty()) return;
     std::byte* out = samples.data();
     for (std::int64_t row = window.row; row < window.row + window.rows; ++row, out += row_bytes) {

@@ -10,10 +10,9 @@
 #include <vector>
 
 #include "formats/files/inflated_bytes.h"
+#include "isohf/base/zip.h"
 
 namespace isohf {
-
-struct ZippedFile;
 
 /// Whether the name ends in .gz, in any case.
 [[nodiscard]] bool is_gzip_name(const std::string& path);
@@ -35,7 +34,7 @@ class RawFile {
   explicit RawFile(const std::string& path, std::uint64_t held_bytes = kMostHeldBytes);
   /// The contents of one member of a zip archive: stored or deflated, checked against size and CRC.
   /// Throws also Error{kUnsupported}: encrypted, or packed by another method.
-  RawFile(const std::string& path, const ZippedFile& member, std::uint64_t held_bytes = kMostHeldBytes);
+  RawFile(const std::string& path, const ZipEntry& member, std::uint64_t held_bytes = kMostHeldBytes);
   RawFile(const RawFile&) = delete;
   RawFile& operator=(const RawFile&) = delete;
   ~RawFile();
@@ -70,7 +69,7 @@ class RawFile {
   [[nodiscard]] std::vector<std::byte> stored_bytes() const;
   [[nodiscard]] InflatedBytes::ReadStored packed_reader() const;
   void unpack_gzip(std::uint64_t held_bytes);
-  void unpack_member(const ZippedFile& member, std::uint64_t held_bytes);
+  void unpack_member(const ZipEntry& member, std::uint64_t held_bytes);
 
   std::string path_;
   int descriptor_ = -1;
@@ -85,22 +84,11 @@ class RawFile {
 /// Turns the byte order of every sample of `sample_bytes` (1, 2, 4 or 8) in place.
 void swap_byte_order(std::span<std::byte> samples, std::size_t sample_bytes);
 
-/// One file of a zip archive (PKWARE APPNOTE 6.3, Zip64 included).
-struct ZippedFile {
-  std::string name;
-  std::uint16_t method = 0;  ///< 0 stored, 8 deflated
-  bool encrypted = false;
-  std::uint32_t crc32 = 0;
-  std::uint64_t stored_bytes = 0;
-  std::uint64_t size_bytes = 0;
-  std::uint64_t header_offset_bytes = 0;
-};
-
-/// The directory of the archive. Throws Error{kCorrupt, kIo} naming the file.
-[[nodiscard]] std::vector<ZippedFile> zipped_files(const RawFile& file);
+/// The directory of a zip archive, names fit for one line. Throws Error{kCorrupt, kIo} naming the file.
+[[nodiscard]] std::vector<ZipEntry> zipped_files(const RawFile& file);
 
 /// Where the stored bytes of `member` begin in the file. Throws Error: kUnsupported for encrypted members and for
 /// methods other than stored and deflated; kCorrupt.
-[[nodiscard]] std::uint64_t zipped_file_begin(const RawFile& file, const ZippedFile& member);
+[[nodiscard]] std::uint64_t zipped_file_begin(const RawFile& file, const ZipEntry& member);
 
 }  // namespace isohf

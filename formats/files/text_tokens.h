@@ -2,11 +2,15 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
+#include <limits>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "formats/files/raw_file.h"
+#include "isohf/raster.h"
 
 namespace isohf {
 
@@ -66,13 +70,12 @@ class TextTokens {
 /// NaN and infinity that programs print; false for any other word and for numbers beyond the range of a double.
 [[nodiscard]] bool read_decimal(std::string_view word, double& value);
 
-/// Where rows of a text begin: of every row, or of every second, fourth, ... once there are many (512 KiB at most).
-class RowPlaces {
+/// The rows of numbers in a text: where each begins, or every second, fourth, ... once there are many (512 KiB at
+/// most), and reading on from there.
+class TextRows {
  public:
-  struct Place {
-    std::int64_t row = 0;
-    std::uint64_t offset_bytes = 0;
-  };
+  /// `words` must outlive this. columns  numbers of a row
+  TextRows(TextTokens& words, std::int64_t columns) : words_(&words), columns_(columns) {}
 
   /// Takes rows in their order, from 0.
   void note(std::int64_t row, std::uint64_t offset_bytes) {
@@ -86,17 +89,42 @@ class RowPlaces {
     offsets_.push_back(offset_bytes);
   }
 
-  /// The nearest one that is known at or before `row`, which has been passed.
-  [[nodiscard]] Place before(std::int64_t row) const {
-    const std::int64_t place = row / stride_;
-    return {place * stride_, offsets_[static_cast<std::size_t>(place)]};
+  /// Reads `window`, whose rows have been noted, into samples of T by `read_number(word, T&)`. Goes on where it stopped
+  /// last where that is nearer than a noted row. False where the text is no longer what it was.
+  template <typename T, typename Read>
+  [[nodiscard]] bool read(const Window& window, std::span<std::byte> samples, Read read_number) {
+    std::byte* out = samples.data();
+    std::string_view word;
+    for (std::int64_t row = window.row; row < window.row + window.rows; ++row) {
+      const std::int64_t wanted = row * columns_ + window.column;
+      const std::int64_t noted = row / stride_ * stride_ * columns_;
+      if (next_ < noted || next_ > wanted) {
+        words_->seek(offsets_[static_cast<std::size_t>(row / stride_)]);
+        next_ = noted;
+      }
+      for (const std::int64_t end = wanted + window.columns; next_ < end; ++next_) {
+        T value{};
+        if (!words_->next(word) || (next_ >= wanted && !read_number(word, value))) {
+          next_ = kNowhere;
+          return false;
+        }
+        if (next_ < wanted) continue;
+        std::memcpy(out, &value, sizeof(T));
+        out += sizeof(T);
+      }
+    }
+    return true;
   }
 
  private:
   static constexpr std::size_t kMost = 65536;
+  static constexpr std::int64_t kNowhere = std::numeric_limits<std::int64_t>::max();
 
+  TextTokens* words_;
+  std::int64_t columns_;
   std::vector<std::uint64_t> offsets_;
   std::int64_t stride_ = 1;
+  std::int64_t next_ = kNowhere;  ///< the number that words_ reads next, counted by rows
 };
 
 }  // namespace isohf

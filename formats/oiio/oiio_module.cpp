@@ -1,13 +1,18 @@
-#include "formats/oiio/oiio_module_inside.h"
+#include "formats/oiio/oiio_module.h"
 
 #include <OpenImageIO/imageio.h>
 
 #include <algorithm>
+#include <array>
+#include <cctype>
 #include <cstring>
+#include <fstream>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "formats/module_inside.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
 
@@ -17,6 +22,7 @@ struct IsohfOiioRaster {
   OIIO::ImageSpec spec;
   OIIO::TypeDesc type;
   int channel = 0;
+  int channels = 1;  ///< that are delivered, from `channel` on
   std::int64_t band_bytes = 0;
   std::vector<unsigned char> band;  ///< rows read around a window that does not end where the file's blocks do
 };
@@ -25,9 +31,91 @@ namespace {
 
 using isohf::Error;
 using isohf::ErrorCode;
-using isohf::guarded;
 using isohf::put_text;
 using isohf::SampleType;
+
+/// `action` on the far side of the C boundary.
+template <typename Action>
+int guarded(IsohfOiioMessage* message, Action action) {
+  return isohf::guarded(message, "OpenImageIO", ErrorCode::kCorrupt, action);
+}
+
+/// A header or a string of boxes ends within it, or the file is none that isohf judges.
+constexpr std::size_t kHeaderBytes = std::size_t{1} << 20U;
+
+std::vector<unsigned char> head_of(const std::string& path) {
+  std::ifstream in(path, std::ios::binary);
+  std::vector<unsigned char> head(kHeaderBytes);
+  in.read(reinterpret_cast<char*>(head.data()), static_cast<std::streamsize>(head.size()));
+  head.resize(static_cast<std::size_t>(in.gcount()));
+  return head;
+}
+
+/// The largest value of a portable any-map (P1 to P6), which stands behind width and height; 0 where there is none.
+long largest_value(const std::vector<unsigned char>& head) {
+  std::array<long, 3> numbers{};
+  std::size_t at = 2;
+  for (long& number : numbers) {
+    while (at < head.size() && (std::isspace(head[at]) != 0 || head[at] == '#')) {
+      if (head[at] == '#') {
+        while (at < head.size() && head[at] != '\n') ++at;
+      } else {
+        ++at;
+      }
+    }
+    for (; at < head.size() && std::isdigit(head[at]) != 0 && number < 1000000; ++at) {
+      number = 10 * number + (head[at] - '0');
+    }
+  }
+  return numbers[2];
+}
+
+/// Whether the first component of a JPEG 2000 codestream is signed: ISO 15444-1, A.5.1, the marker SIZ behind SOC. The
+/// codestream stands in the box jp2c (I.5.4) or alone; nullopt where it was not found.
+std::optional<bool> first_component_is_signed(const std::vector<unsigned char>& head) {
+  constexpr std::array<unsigned char, 4> kStart = {0xFF, 0x4F, 0xFF, 0x51};  // SOC, SIZ
+  constexpr std::ptrdiff_t kPrecision = 42;                                  // Ssiz of the first component, from SOC
+  const auto start = std::search(head.begin(), head.end(), kStart.begin(), kStart.end());
+  if (head.end() - start <= kPrecision) return std::nullopt;
+  return (start[kPrecision] & 0x80U) != 0;
+}
+
+[[noreturn]] void refuse(const std::string& what) {
+  throw Error(ErrorCode::kUnsupported, what + "; store the raster as TIFF or PNG (gdal_translate does)");
+}
+
+/// Whether the file says where it lies in a way that OpenImageIO does not hand on: JPEG 2000 with the box of GeoJP2.
+bool states_a_place(const std::string& format, const std::string& path) {
+  if (format != "jpeg2000") return false;
+  constexpr std::array<unsigned char, 16> kGeoJp2 = {0xB1, 0x4B, 0xF8, 0xBD, 0x08, 0x3D, 0x4B, 0x43,
+                                                     0xA5, 0xAE, 0x8C, 0xD7, 0xD5, 0xA6, 0xCE, 0x03};
+  const std::vector<unsigned char> head = head_of(path);
+  return std::search(head.begin(), head.end(), kGeoJp2.begin(), kGeoJp2.end()) != head.end();
+}
+
+/// OpenImageIO hands out pictures: where it would deliver other numbers than the file holds, the file is refused.
+/// `bits` are those of a sample as delivered, `stored_bits` those in the file.
+void require_stored_numbers(const std::string& format, int bits, int stored_bits, bool is_floating,
+                            const std::string& path) {
+  if (format == "fits") refuse("OpenImageIO displaces the rows of FITS images");
+  if (format != "pnm" && stored_bits != bits) {
+    refuse("the samples have " + std::to_string(stored_bits) + " bits, and OpenImageIO spreads them over " +
+           std::to_string(bits));
+  }
+  if (format == "jpeg2000") {
+    const std::optional<bool> is_signed = first_component_is_signed(head_of(path));
+    if (!is_signed) refuse("there is no codestream in its first MiB, so that nothing says whether samples are signed");
+    if (*is_signed) refuse("the samples are signed, which OpenImageIO reads as if they were not");
+  }
+  if (format == "pnm" && !is_floating) {
+    const long largest = largest_value(head_of(path));
+    const long range = bits == 8 ? 255 : 65535;
+    if (largest != range) {
+      refuse("the largest value is stated as " + std::to_string(largest) +
+             ", and OpenImageIO spreads the samples over 0 to " + std::to_string(range));
+    }
+  }
+}
 
 /// Windows narrower than the raster, or in tiles, are cut out of bands of about this size.
 constexpr std::int64_t kBandBytes = std::int64_t{8} << 20U;
@@ -102,11 +190,17 @@ bool open_raster(IsohfOiioRaster& raster, const char* path, const std::string& c
   const OIIO::ImageSpec& spec = raster.spec;
   check(spec);
   const auto bits = static_cast<int>(8 * spec.format.size());
-  isohf::require_stored_numbers(raster.input->format_name(), bits, spec.get_int_attribute("oiio:BitsPerSample", bits),
-                                spec.format.is_floating_point(), path);
+  require_stored_numbers(raster.input->format_name(), bits, spec.get_int_attribute("oiio:BitsPerSample", bits),
+                         spec.format.is_floating_point(), path);
   raster.band_bytes = kBandBytes;
-  raster.channel = channel_index(spec, channel);
-  raster.type = spec.channelformat(raster.channel);
+  const bool all = channel == ISOHF_OIIO_ALL_CHANNELS;
+  raster.channel = all ? 0 : channel_index(spec, channel);
+  raster.channels = all ? spec.nchannels : 1;
+  raster.type = all ? spec.format : spec.channelformat(raster.channel);
+  const std::string space = spec.get_string_attribute("oiio:ColorSpace");
+  info.channels = raster.channels;
+  info.alpha = spec.alpha_channel;
+  info.is_linear = !space.empty() && (space[0] == 'l' || space[0] == 'L') ? 1 : 0;
   info.width = spec.width;
   info.height = spec.height;
   info.block_width = spec.tile_width > 0 ? std::min(spec.tile_width, spec.width) : spec.width;
@@ -114,10 +208,10 @@ bool open_raster(IsohfOiioRaster& raster, const char* path, const std::string& c
   info.sample_type = static_cast<int32_t>(sample_type_of(raster.type));
   put_text(info.format, raster.input->format_name());
   std::string warning;
-  if (isohf::states_a_place(raster.input->format_name(), path)) {
+  if (states_a_place(raster.input->format_name(), path)) {
     warning = "the place that it states itself (GeoJP2) is not read; a world file beside it would be";
   }
-  if (spec.nchannels > 1) put_text(info.channel, spec.channel_name(raster.channel));
+  if (spec.nchannels > 1 && !all) put_text(info.channel, spec.channel_name(raster.channel));
   if (spec.nchannels > 1 && channel.empty()) {
     warning += (warning.empty() ? "channel " : "; channel ") + std::string(spec.channel_name(0)) + " is read, of " +
                std::to_string(spec.nchannels);
@@ -131,20 +225,25 @@ void read_rows(IsohfOiioRaster& raster, int begin, int end, void* out) {
   const OIIO::ImageSpec& spec = raster.spec;
   const int from = spec.y + begin;
   const int to = spec.y + end;
-  const bool done =
-      spec.tile_width > 0
-          ? raster.input->read_tiles(0, 0, spec.x, spec.x + spec.width, from, to, spec.z, spec.z + 1, raster.channel,
-                                     raster.channel + 1, raster.type, out)
-          : raster.input->read_scanlines(0, 0, from, to, spec.z, raster.channel, raster.channel + 1, raster.type, out);
+  const bool done = spec.tile_width > 0
+                        ? raster.input->read_tiles(0, 0, spec.x, spec.x + spec.width, from, to, spec.z, spec.z + 1,
+                                                   raster.channel, raster.channel + raster.channels, raster.type, out)
+                        : raster.input->read_scanlines(0, 0, from, to, spec.z, raster.channel,
+                                                       raster.channel + raster.channels, raster.type, out);
   if (done) return;
   throw Error(ErrorCode::kCorrupt,
               "rows " + std::to_string(begin) + " to " + std::to_string(end - 1) + ": " + raster.input->geterror());
 }
 
+/// Of all channels that are delivered.
+std::size_t pixel_bytes(const IsohfOiioRaster& raster) {
+  return raster.type.size() * static_cast<std::size_t>(raster.channels);
+}
+
 /// Rows of blocks that a band has room for, at least one.
 std::int64_t band_rows(const IsohfOiioRaster& raster, std::int64_t bytes) {
   const std::int64_t step = raster.spec.tile_width > 0 ? raster.spec.tile_height : 1;
-  const std::int64_t row_bytes = std::int64_t{raster.spec.width} * static_cast<std::int64_t>(raster.type.size());
+  const std::int64_t row_bytes = std::int64_t{raster.spec.width} * static_cast<std::int64_t>(pixel_bytes(raster));
   return std::max(bytes / row_bytes / step * step, step);
 }
 
@@ -152,7 +251,7 @@ void read_window(IsohfOiioRaster& raster, int column, int row, int columns, int 
   const OIIO::ImageSpec& spec = raster.spec;
   const bool tiled = spec.tile_width > 0;
   if (!tiled && columns == spec.width) return read_rows(raster, row, row + rows, out);
-  const std::size_t size = raster.type.size();
+  const std::size_t size = pixel_bytes(raster);
   const std::size_t row_bytes = static_cast<std::size_t>(spec.width) * size;
   const std::size_t out_bytes = static_cast<std::size_t>(columns) * size;
   const std::int64_t step = tiled ? spec.tile_height : 1;
@@ -188,7 +287,7 @@ int module_open(const char* path, const char* channel, IsohfOiioRaster** raster,
 int module_read(IsohfOiioRaster* raster, int64_t column, int64_t row, int64_t columns, int64_t rows, void* samples,
                 size_t bytes, IsohfOiioMessage* message) {
   return guarded(message, [&] {
-    if (static_cast<size_t>(columns * rows) * raster->type.size() != bytes) {
+    if (static_cast<size_t>(columns * rows) * pixel_bytes(*raster) != bytes) {
       throw Error(ErrorCode::kInvalidArgument, "the window and its buffer differ in size");
     }
     read_window(*raster, static_cast<int>(column), static_cast<int>(row), static_cast<int>(columns),
@@ -204,7 +303,7 @@ void module_bound(IsohfOiioRaster* raster, int64_t bytes) {
 int64_t module_buffer_bytes(const IsohfOiioRaster* raster, int64_t bytes) {
   const OIIO::ImageSpec& spec = raster->spec;
   return std::min<std::int64_t>(band_rows(*raster, std::min(kBandBytes, bytes)), spec.height) * spec.width *
-         static_cast<std::int64_t>(raster->type.size());
+         static_cast<std::int64_t>(pixel_bytes(*raster));
 }
 
 void module_close(IsohfOiioRaster* raster) {
@@ -248,9 +347,7 @@ const char* module_extensions() {
 }  // namespace
 
 extern "C" __attribute__((visibility("default"))) const IsohfOiioModule* isohf_oiio_module() {
-  static const IsohfOiioModule module = {ISOHF_OIIO_ABI,         module_open,           module_read,
-                                         module_bound,           module_buffer_bytes,   module_close,
-                                         isohf_oiio_open_photo,  isohf_oiio_read_photo, isohf_oiio_bound_photo,
-                                         isohf_oiio_close_photo, module_library,        module_extensions};
+  static const IsohfOiioModule module = {ISOHF_OIIO_ABI,      module_open,  module_read,    module_bound,
+                                         module_buffer_bytes, module_close, module_library, module_extensions};
   return &module;
 }

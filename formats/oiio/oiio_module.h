@@ -13,9 +13,12 @@
 extern "C" {
 
 /// Raised whenever anything below changes; the loader refuses any other.
-#define ISOHF_OIIO_ABI 5
+#define ISOHF_OIIO_ABI 6
 
 #define ISOHF_OIIO_UNKNOWN (-1)
+
+/// As a channel: all of them, interleaved, as the type that holds each.
+#define ISOHF_OIIO_ALL_CHANNELS "*"
 
 typedef struct IsohfOiioRaster IsohfOiioRaster;
 
@@ -25,24 +28,13 @@ typedef struct IsohfOiioInfo {
   int64_t block_width;
   int64_t block_height;
   int32_t sample_type;  ///< a SampleType
+  int32_t channels;     ///< that are delivered
+  int32_t alpha;        ///< which channel of the file is opacity; -1: none
+  int32_t is_linear;    ///< the numbers are light, not coded as sRGB
   char format[32];      ///< "fits", "bmp", ...
   char channel[64];     ///< empty where there is but one
   char warning[256];    ///< empty: none
 } IsohfOiioInfo;
-
-/// A picture of the ground, read as 8-bit sRGB through a cache of bounded size.
-typedef struct IsohfOiioPhoto IsohfOiioPhoto;
-
-typedef struct IsohfOiioPhotoInfo {
-  int64_t width;
-  int64_t height;
-  int64_t block_height;   ///< rows that are decoded together
-  int64_t pixel_bytes;    ///< of one pixel in the cache
-  int32_t channels;       ///< as delivered: 1 grey, 3 RGB, 4 RGBA with straight alpha
-  int32_t random_access;  ///< 0: a block needs those before it
-  char format[32];
-  char warning[256];  ///< empty: none
-} IsohfOiioPhotoInfo;
 
 typedef struct IsohfOiioMessage {
   char text[512];
@@ -60,16 +52,6 @@ typedef void (*IsohfOiioBound)(IsohfOiioRaster* raster, int64_t bytes);
 typedef int64_t (*IsohfOiioBufferBytes)(const IsohfOiioRaster* raster, int64_t bytes);
 typedef void (*IsohfOiioClose)(IsohfOiioRaster* raster);
 
-/// Opens a photo and fills `info`. Photos are read by any number of threads at once.
-typedef int (*IsohfOiioOpenPhoto)(const char* path, IsohfOiioPhoto** photo, IsohfOiioPhotoInfo* info,
-                                  IsohfOiioMessage* message);
-/// Reads a window as 8-bit samples, channels interleaved; `bytes` is the size of `samples`.
-typedef int (*IsohfOiioReadPhoto)(IsohfOiioPhoto* photo, int64_t column, int64_t row, int64_t columns, int64_t rows,
-                                  uint8_t* samples, size_t bytes, IsohfOiioMessage* message);
-/// Bounds the cache.
-typedef void (*IsohfOiioBoundPhoto)(IsohfOiioPhoto* photo, int64_t bytes);
-typedef void (*IsohfOiioClosePhoto)(IsohfOiioPhoto* photo);
-
 /// "OpenImageIO 2.4.7", and the extensions of all formats that it reads: "bmp fits ...". Both stay valid.
 typedef const char* (*IsohfOiioText)(void);
 
@@ -80,10 +62,6 @@ typedef struct IsohfOiioModule {
   IsohfOiioBound bound;
   IsohfOiioBufferBytes buffer_bytes;
   IsohfOiioClose close;
-  IsohfOiioOpenPhoto open_photo;
-  IsohfOiioReadPhoto read_photo;
-  IsohfOiioBoundPhoto bound_photo;
-  IsohfOiioClosePhoto close_photo;
   IsohfOiioText library;
   IsohfOiioText extensions;
 } IsohfOiioModule;

@@ -6,11 +6,11 @@
 #include <algorithm>
 #include <sstream>
 
+#include "formats/files/file_source.h"
 #include "formats/files/foreign_file.h"
 #include "formats/georeference/files_beside.h"
 #include "formats/oiio/oiio_loader.h"
 #include "formats/open_options.h"
-#include "isohf/base/assert.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
 
@@ -56,10 +56,7 @@ class OiioSource final : public HeightSource {
   [[nodiscard]] const SourceInfo& info() const override { return info_; }
 
   void read_window(const Window& window, std::span<std::byte> samples) override {
-    ISOHF_ASSERT(window.column >= 0 && window.row >= 0 && window.columns >= 0 && window.rows >= 0 &&
-                 window.column + window.columns <= info_.width && window.row + window.rows <= info_.height);
-    ISOHF_ASSERT(samples.size() ==
-                 static_cast<std::size_t>(window.columns * window.rows) * size_bytes(info_.sample_type));
+    ISOHF_ASSERT(is_window_of(info_, window, samples.size()));
     if (samples.empty()) return;
     IsohfOiioMessage message{};
     const int result = module_.read(raster_, window.column, window.row, window.columns, window.rows, samples.data(),

@@ -11,12 +11,11 @@
 #include <string_view>
 #include <vector>
 
-#include "formats/files/raw_file.h"
+#include "formats/files/file_source.h"
 #include "formats/georeference/files_beside.h"
 #include "formats/georeference/units.h"
 #include "formats/open_options.h"
 #include "formats/planetary/label_text.h"
-#include "isohf/base/assert.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
 
@@ -56,11 +55,9 @@ std::optional<double> metres(const LabelFields& fields, const char* key) {
   return number && length ? std::optional(*number * length->metres) : std::nullopt;
 }
 
-class Isis3Source final : public HeightSource {
+class Isis3Source final : public FileSource {
  public:
-  Isis3Source(const std::string& path, const OpenOptions& options) {
-    info_.path = path;
-    info_.format = "ISIS3 cube";
+  Isis3Source(const std::string& path, const OpenOptions& options) : FileSource(path, "ISIS3 cube") {
     const LabelText label = read_label(path, options.unpacked_bytes);
     const LabelBlock& cube = inner(label.root, "ISISCUBE");
     read_core(inner(cube, "CORE"), label.end_bytes, options.unpacked_bytes);
@@ -69,12 +66,8 @@ class Isis3Source final : public HeightSource {
     apply_open_options(info_, options);
   }
 
-  [[nodiscard]] const SourceInfo& info() const override { return info_; }
-
   void read_window(const Window& window, std::span<std::byte> samples) override {
-    ISOHF_ASSERT(window.column >= 0 && window.row >= 0 && window.columns >= 0 && window.rows >= 0);
-    ISOHF_ASSERT(window.column + window.columns <= info_.width && window.row + window.rows <= info_.height);
-    ISOHF_ASSERT(static_cast<std::int64_t>(samples.size()) == window.columns * window.rows * size_);
+    ISOHF_ASSERT(is_window_of(info_, window, samples.size()));
     for (std::int64_t row = window.row; row < window.row + window.rows;) {
       const std::int64_t rows = std::min(window.row + window.rows, (row / tile_rows_ + 1) * tile_rows_) - row;
       for (std::int64_t column = window.column; column < window.column + window.columns;) {
@@ -87,9 +80,6 @@ class Isis3Source final : public HeightSource {
     }
     if (big_endian_) swap_byte_order(samples, static_cast<std::size_t>(size_));
   }
-
-  void limit_buffers(std::uint64_t bytes) override { file_->limit_buffers(bytes); }
-  [[nodiscard]] std::uint64_t buffer_bytes(std::uint64_t limit) const override { return file_->buffer_bytes(limit); }
 
  private:
   [[nodiscard]] const LabelBlock& inner(const LabelBlock& block, const char* name) const {
@@ -246,7 +236,6 @@ class Isis3Source final : public HeightSource {
     }
   }
 
-  std::optional<RawFile> file_;
   std::uint64_t first_bytes_ = 0;  // of the band's first sample
   std::uint64_t band_bytes_ = 0;
   std::int64_t bands_ = 1;
@@ -256,7 +245,6 @@ class Isis3Source final : public HeightSource {
   std::int64_t tile_rows_ = 0;
   std::int64_t tiles_across_ = 0;
   std::vector<std::byte> piece_;
-  SourceInfo info_;
 };
 
 }  // namespace

@@ -17,13 +17,12 @@
 #include <tuple>
 #include <vector>
 
-#include "formats/files/raw_file.h"
+#include "formats/files/file_source.h"
 #include "formats/files/text.h"
 #include "formats/georeference/files_beside.h"
 #include "formats/georeference/units.h"
 #include "formats/open_options.h"
 #include "formats/planetary/label_text.h"
-#include "isohf/base/assert.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
 
@@ -405,15 +404,13 @@ float float_from_vax(std::uint32_t stored) {
   return static_cast<float>(negative ? -magnitude : magnitude);
 }
 
-class Pds3Source final : public HeightSource {
+class Pds3Source final : public FileSource {
  public:
-  Pds3Source(const std::string& path, const OpenOptions& options) : label_path_(path) {
+  Pds3Source(const std::string& path, const OpenOptions& options) : FileSource(path, "PDS3"), label_path_(path) {
     if (has_pds3_label(path)) label_path_ = file_beside(path, std::filesystem::path(path).stem().string() + ".lbl");
     const LabelText label = read_label(label_path_, options.unpacked_bytes);
     const LabelBlock& image = only_image(label.root);
     const LabelFields fields(label_path_, image);
-    info_.path = path;
-    info_.format = "PDS3";
     layout_ = pds3_layout(fields);
     find_data(label);
     if (label_path_ != path && !same_file(path, data_path_)) {
@@ -428,13 +425,9 @@ class Pds3Source final : public HeightSource {
     apply_open_options(info_, options);
   }
 
-  [[nodiscard]] const SourceInfo& info() const override { return info_; }
-
   void read_window(const Window& window, std::span<std::byte> samples) override {
-    ISOHF_ASSERT(window.column >= 0 && window.row >= 0 && window.columns >= 0 && window.rows >= 0);
-    ISOHF_ASSERT(window.column + window.columns <= info_.width && window.row + window.rows <= info_.height);
+    ISOHF_ASSERT(is_window_of(info_, window, samples.size()));
     const auto size = static_cast<std::int64_t>(size_bytes(info_.sample_type));
-    ISOHF_ASSERT(static_cast<std::int64_t>(samples.size()) == window.columns * window.rows * size);
     if (samples.empty()) return;
     const bool together = layout_.sample_stride_bytes == size;
     if (together && window.columns == info_.width && layout_.line_stride_bytes == window.columns * size) {
@@ -460,9 +453,6 @@ class Pds3Source final : public HeightSource {
       std::memcpy(samples.data() + at, &value, sizeof(value));
     }
   }
-
-  void limit_buffers(std::uint64_t bytes) override { file_->limit_buffers(bytes); }
-  [[nodiscard]] std::uint64_t buffer_bytes(std::uint64_t limit) const override { return file_->buffer_bytes(limit); }
 
  private:
   [[nodiscard]] const LabelBlock& only_image(const LabelBlock& root) const {
@@ -620,9 +610,7 @@ class Pds3Source final : public HeightSource {
   std::string data_path_;
   std::uint64_t image_bytes_ = 0;  // where ^IMAGE points
   int pointer_line_ = 0;
-  std::optional<RawFile> file_;
   std::vector<std::byte> piece_;
-  SourceInfo info_;
 };
 
 }  // namespace

@@ -84,10 +84,20 @@ bool PngDecoder::read_header(PngHeader& header, int& color_type) {
   return true;
 }
 
-bool PngDecoder::start(PngHeader& header) {
+bool PngDecoder::start(PngHeader& header, For use) {
+  if (!update(header, use)) return false;
+  header.channels = channels_of(png_get_color_type(png_, info_));
+  return true;
+}
+
+bool PngDecoder::update(PngHeader& header, For use) {
   if (setjmp(png_jmpbuf(png_)) != 0) return false;  // NOLINT(cert-err52-cpp)
-  if (header.bit_depth < 8) png_set_packing(png_);  // a byte each, values as stored
-  if (header.bit_depth == 16) png_set_swap(png_);   // PNG is big-endian, we are not
+  if (use == For::kPicture) {
+    png_set_expand(png_);
+  } else if (header.bit_depth < 8) {
+    png_set_packing(png_);  // a byte each, values as stored
+  }
+  if (header.bit_depth == 16) png_set_swap(png_);  // PNG is big-endian, we are not
   if (header.interlaced) (void)png_set_interlace_handling(png_);
   png_read_update_info(png_, info_);
   header.row_bytes = png_get_rowbytes(png_, info_);

@@ -38,8 +38,11 @@ class PngDecoder {
 
   /// Opens the file, from its beginning, and reads what stands before the first row.
   [[nodiscard]] bool open(const std::string& path, PngHeader& header);
+  /// Numbers come as stored; of pictures, palettes and transparent colours are expanded into channels, and grey of
+  /// fewer bits to 8.
+  enum class For { kNumbers, kPicture };
   /// Allocates for rows of the header's size, in host byte order and a byte at least for every number.
-  [[nodiscard]] bool start(PngHeader& header);
+  [[nodiscard]] bool start(PngHeader& header, For use = For::kNumbers);
   /// Decodes the next row, or all of an interlaced picture at once.
   [[nodiscard]] bool read_row(std::span<std::byte> row);
   [[nodiscard]] bool read_picture(std::span<std::byte> picture, const PngHeader& header);
@@ -54,6 +57,7 @@ class PngDecoder {
 
   bool fail(const char* text);
   [[nodiscard]] bool read_header(PngHeader& header, int& color_type);
+  [[nodiscard]] bool update(PngHeader& header, For use);
   [[nodiscard]] bool read_rows(unsigned char** rows);
   void close();
 

@@ -12,12 +12,12 @@
 #include <vector>
 
 #include "formats/decorate/masked_source.h"
+#include "formats/files/file_source.h"
 #include "formats/georeference/files_beside.h"
 #include "formats/georeference/raster_description.h"
 #include "formats/open_options.h"
 #include "formats/png/packed_elevations.h"
 #include "formats/png/png_decoder.h"
-#include "isohf/base/assert.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
 
@@ -59,10 +59,8 @@ class PngSource final : public HeightSource {
   [[nodiscard]] bool is_beside_opacity() const { return channels_ == 2 && channel_ == 0; }
 
   void read_window(const Window& window, std::span<std::byte> samples) override {
-    ISOHF_ASSERT(window.column >= 0 && window.row >= 0 && window.columns >= 0 && window.rows >= 0 &&
-                 window.column + window.columns <= info_.width && window.row + window.rows <= info_.height);
+    ISOHF_ASSERT(is_window_of(info_, window, samples.size()));
     const std::size_t out_bytes = static_cast<std::size_t>(window.columns) * sample_bytes_;
-    ISOHF_ASSERT(samples.size() == out_bytes * static_cast<std::size_t>(window.rows));
     if (samples.empty()) return;
     const auto first = static_cast<std::size_t>(window.row);
     const std::size_t end = first + static_cast<std::size_t>(window.rows);

@@ -15,12 +15,11 @@
 #include <vector>
 
 #include "formats/binary_grids/grid_header.h"
-#include "formats/files/raw_file.h"
+#include "formats/files/file_source.h"
 #include "formats/files/text.h"
 #include "formats/files/text_tokens.h"
 #include "formats/georeference/files_beside.h"
 #include "formats/open_options.h"
-#include "isohf/base/assert.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
 
@@ -267,16 +266,11 @@ bool read_whole(std::string_view word, std::int32_t& value) {
   return true;
 }
 
-class AsciiGridSource final : public HeightSource {
+class AsciiGridSource final : public FileSource {
  public:
   AsciiGridSource(const std::string& path, const OpenOptions& options)
-      : file_(path, options.unpacked_bytes), words_(file_), grass_(path) {
-    info_.path = path;
-    info_.format = "ESRI ASCII grid";
-    if (!options.channel.empty() && options.channel != "0") {
-      throw Error(ErrorCode::kInvalidArgument,
-                  fmt::format("{}: there is no channel \"{}\"; there is 0 alone", path, options.channel));
-    }
+      : FileSource(path, "ESRI ASCII grid", options), words_(*file_), grass_(path) {
+    (void)choose_band(info_, options, 1);
     GridHeader header(path);
     std::string_view word;
     const bool any = read_header(header, word);
@@ -303,33 +297,17 @@ class AsciiGridSource final : public HeightSource {
     apply_open_options(info_, options);
   }
 
-  [[nodiscard]] const SourceInfo& info() const override { return info_; }
-
   void read_window(const Window& window, std::span<std::byte> samples) override {
-    const std::size_t size = size_bytes(info_.sample_type);
-    ISOHF_ASSERT(window.column >= 0 && window.row >= 0 && window.columns >= 0 && window.rows >= 0);
-    ISOHF_ASSERT(window.column + window.columns <= info_.width && window.row + window.rows <= info_.height);
-    ISOHF_ASSERT(samples.size() == static_cast<std::size_t>(window.columns * window.rows) * size);
-    if (samples.empty()) return;
-    const std::size_t row_bytes = static_cast<std::size_t>(window.columns) * size;
-    for (std::int64_t i = 0; i < window.rows; ++i) {
-      go_to(window.row + i, window.column);
-      const auto row = samples.subspan(static_cast<std::size_t>(i) * row_bytes, row_bytes);
-      if (info_.sample_type == SampleType::kInt32) {
-        read_run<std::int32_t>(row, read_whole);
-      } else if (is_grass_) {
-        read_run<double>(row, [this](std::string_view word, double& value) {
-          value = std::numeric_limits<double>::quiet_NaN();
-          return word == grass_.null_word() || read_decimal(word, value);
-        });
-      } else {
-        read_run<double>(row, read_decimal);
-      }
-    }
+    ISOHF_ASSERT(is_window_of(info_, window, samples.size()));
+    const auto read_grass = [this](std::string_view word, double& value) {
+      value = std::numeric_limits<double>::quiet_NaN();
+      return word == grass_.null_word() || read_decimal(word, value);
+    };
+    const bool done = info_.sample_type == SampleType::kInt32 ? rows_->read<std::int32_t>(window, samples, read_whole)
+                      : is_grass_                             ? rows_->read<double>(window, samples, read_grass)
+                                                              : rows_->read<double>(window, samples, read_decimal);
+    if (!done) fail(ErrorCode::kCorrupt, "the file has changed since it was opened");
   }
-
-  void limit_buffers(std::uint64_t bytes) override { file_.limit_buffers(bytes); }
-  [[nodiscard]] std::uint64_t buffer_bytes(std::uint64_t limit) const override { return file_.buffer_bytes(limit); }
 
  private:
   [[noreturn]] void refuse(ErrorCode code, const std::string& what) const {
@@ -339,7 +317,7 @@ class AsciiGridSource final : public HeightSource {
   /// Leaves the first word of the numbers in `word`; false where there is none.
   bool read_header(GridHeader& header, std::string_view& word) {
     std::array<char, 3> mark{};
-    if (file_.read_some(0, std::as_writable_bytes(std::span(mark))) == 3 &&
+    if (file_->read_some(0, std::as_writable_bytes(std::span(mark))) == 3 &&
         std::string_view(mark.data(), 3) == "\xEF\xBB\xBF") {
       words_.seek(3);
     }
@@ -377,21 +355,22 @@ class AsciiGridSource final : public HeightSource {
 
   /// A number takes a byte and another one keeps it apart from the next.
   void require_room() const {
-    const auto most = static_cast<std::int64_t>((file_.size_bytes() + 1) / 2);
+    const auto most = static_cast<std::int64_t>((file_->size_bytes() + 1) / 2);
     if (info_.width > most || info_.height > most / info_.width) {
       throw Error(ErrorCode::kCorrupt,
                   fmt::format("{}: the header says {} x {} numbers; the file's {} bytes hold {} at most", info_.path,
-                              info_.width, info_.height, file_.size_bytes(), most));
+                              info_.width, info_.height, file_->size_bytes(), most));
     }
   }
 
   /// Checks every number, learns the sample type and notes where rows begin.
   void scan(std::string_view word, bool any) {
+    rows_.emplace(words_, info_.width);
     bool whole = true;
     for (std::int64_t row = 0; row < info_.height; ++row) {
       for (std::int64_t column = 0; column < info_.width; ++column) {
         if (!any) refuse_short(row, column);
-        if (column == 0) places_.note(row, words_.offset_of(word));
+        if (column == 0) rows_->note(row, words_.offset_of(word));
         whole = check(word) && whole;
         end_of_last_ = words_.offset_of(word) + word.size();
         any = words_.next(word);
@@ -411,7 +390,7 @@ class AsciiGridSource final : public HeightSource {
                       "--nodata {}",
                       marker_, marker_));
     }
-    if (end_of_last_ == file_.size_bytes()) {
+    if (end_of_last_ == file_->size_bytes()) {
       info_.warnings.push_back(loss("the file ends within its last line: its last number may be cut off"));
     }
   }
@@ -457,45 +436,11 @@ class AsciiGridSource final : public HeightSource {
       marker_ = value < -9999.0 ? "-32768" : "-9999";
   }
 
-  /// Makes the number at (row, column) the next one to be read.
-  void go_to(std::int64_t row, std::int64_t column) {
-    const std::int64_t wanted = row * info_.width + column;
-    const RowPlaces::Place place = places_.before(row);
-    const std::int64_t noted = place.row * info_.width;
-    if (next_ < noted || next_ > wanted) {
-      words_.seek(place.offset_bytes);
-      next_ = noted;
-    }
-    std::string_view word;
-    for (; next_ < wanted; ++next_) {
-      if (!words_.next(word)) refuse_changed();
-    }
-  }
-
-  template <typename T, typename Read>
-  void read_run(std::span<std::byte> samples, Read read) {
-    std::string_view word;
-    for (std::size_t at = 0; at < samples.size(); at += sizeof(T)) {
-      T value{};
-      if (!words_.next(word) || !read(word, value)) refuse_changed();
-      std::memcpy(samples.data() + at, &value, sizeof(T));
-    }
-    next_ += static_cast<std::int64_t>(samples.size() / sizeof(T));
-  }
-
-  [[noreturn]] void refuse_changed() {
-    next_ = std::numeric_limits<std::int64_t>::max();
-    throw Error(ErrorCode::kCorrupt, info_.path + ": the file has changed since it was opened");
-  }
-
-  RawFile file_;
   TextTokens words_;
   GrassHeader grass_;
   bool is_grass_ = false;
   bool is_esri_ = false;
-  SourceInfo info_;
-  RowPlaces places_;
-  std::int64_t next_ = std::numeric_limits<std::int64_t>::max();  // number that words_ reads next, counted by rows
+  std::optional<TextRows> rows_;
   std::uint64_t end_of_last_ = 0;
   char decimal_ = 0;
   bool marked_ = false;  // a void value is named

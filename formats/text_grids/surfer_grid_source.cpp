@@ -12,12 +12,10 @@
 #include <vector>
 
 #include "formats/binary_grids/plain_samples.h"
-#include "formats/files/raw_file.h"
 #include "formats/files/text.h"
 #include "formats/files/text_tokens.h"
 #include "formats/georeference/files_beside.h"
 #include "formats/open_options.h"
-#include "isohf/base/assert.h"
 #include "isohf/base/bytes.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
@@ -39,13 +37,12 @@ constexpr std::size_t kGridSectionBytes = 72;
 constexpr int kMostSections = 64;
 constexpr double kMostSide = 2147483647.0;
 
-class SurferGridSource final : public HeightSource {
+class SurferGridSource final : public PlainSource {
  public:
-  SurferGridSource(const std::string& path, const OpenOptions& options) : file_(path, options.unpacked_bytes) {
-    info_.path = path;
+  SurferGridSource(const std::string& path, const OpenOptions& options) : PlainSource(path, "", options) {
     (void)choose_band(info_, options, 1);
     std::array<char, kMagicBytes> magic{};
-    file_.read(0, std::as_writable_bytes(std::span(magic)));
+    file_->read(0, std::as_writable_bytes(std::span(magic)));
     const std::string_view kind(magic.data(), magic.size());
     info_.valid_max = kBlank;
     if (kind == kText) {
@@ -63,25 +60,19 @@ class SurferGridSource final : public HeightSource {
     apply_open_options(info_, options);
   }
 
-  [[nodiscard]] const SourceInfo& info() const override { return info_; }
-
   void read_window(const Window& window, std::span<std::byte> samples) override {
     const Window stored = turned(window, info_.height);
-    if (words_) {
-      read_text(stored, samples);
-    } else {
-      read_plain_samples(file_, info_, layout_, stored, samples);
+    ISOHF_ASSERT(is_window_of(info_, stored, samples.size()));
+    if (!words_) {
+      PlainSource::read_window(stored, samples);
+    } else if (!rows_->read<double>(stored, samples, read_decimal)) {
+      corrupt("the file has changed since it was opened");
     }
     turn_rows(samples, static_cast<std::size_t>(window.columns) * size_bytes(info_.sample_type));
   }
 
-  void limit_buffers(std::uint64_t bytes) override { file_.limit_buffers(bytes); }
-  [[nodiscard]] std::uint64_t buffer_bytes(std::uint64_t limit) const override { return file_.buffer_bytes(limit); }
-
  private:
-  [[noreturn]] void corrupt(const std::string& what) const {
-    throw Error(ErrorCode::kCorrupt, fmt::format("{}: {}", info_.path, what));
-  }
+  [[noreturn]] void corrupt(const std::string& what) const { fail(ErrorCode::kCorrupt, what); }
 
   void set_size(double columns, double rows) {
     const auto fits = [](double n) { return n >= 2.0 && n <= kMostSide && n == std::floor(n); };
@@ -121,17 +112,17 @@ class SurferGridSource final : public HeightSource {
     info_.sample_type = type;
     layout_.offset_bytes = offset_bytes;
     layout_.row_bytes = static_cast<std::uint64_t>(info_.width) * size_bytes(type);
-    const std::uint64_t room = file_.size_bytes() - offset_bytes;
+    const std::uint64_t room = file_->size_bytes() - offset_bytes;
     if (layout_.row_bytes > room / static_cast<std::uint64_t>(info_.height)) {
       corrupt(fmt::format("ends early: {} x {} nodes of {} bytes begin at byte {}, the file has {} bytes", info_.width,
-                          info_.height, size_bytes(type), offset_bytes, file_.size_bytes()));
+                          info_.height, size_bytes(type), offset_bytes, file_->size_bytes()));
     }
   }
 
   void read_surfer6() {
     info_.format = "Surfer 6 grid";
     std::array<std::byte, kSurfer6HeaderBytes> header{};
-    file_.read(0, header);
+    file_->read(0, header);
     ByteReader in(header);
     (void)in.read_bytes(kMagicBytes);
     const double columns = in.read<std::int16_t>();
@@ -144,8 +135,8 @@ class SurferGridSource final : public HeightSource {
     set_place_by_corners(west, east, south, north);
     set_layout(header.size(), SampleType::kFloat32);
     const std::uint64_t end = layout_.offset_bytes + layout_.row_bytes * static_cast<std::uint64_t>(info_.height);
-    if (end < file_.size_bytes()) {
-      info_.warnings.push_back(loss(fmt::format("{} bytes follow the grid", file_.size_bytes() - end)));
+    if (end < file_->size_bytes()) {
+      info_.warnings.push_back(loss(fmt::format("{} bytes follow the grid", file_->size_bytes() - end)));
     }
   }
 
@@ -156,7 +147,7 @@ class SurferGridSource final : public HeightSource {
     bool has_grid = false;
     for (int i = 0; i < kMostSections; ++i) {
       std::array<std::byte, 8> head{};
-      file_.read(at, head);
+      file_->read(at, head);
       const std::string_view name(reinterpret_cast<const char*>(head.data()), kMagicBytes);
       const auto size = ByteReader(std::span<const std::byte>(head).subspan(kMagicBytes)).read<std::int32_t>();
       at += head.size();
@@ -179,7 +170,7 @@ class SurferGridSource final : public HeightSource {
 
   void read_grid_section(std::uint64_t at) {
     std::array<std::byte, kGridSectionBytes> section{};
-    file_.read(at, section);
+    file_->read(at, section);
     ByteReader in(section);
     const double rows = in.read<std::int32_t>();
     const double columns = in.read<std::int32_t>();
@@ -214,7 +205,7 @@ class SurferGridSource final : public HeightSource {
   void read_text_header() {
     info_.format = "Surfer text grid";
     info_.sample_type = SampleType::kFloat64;
-    words_.emplace(file_);
+    words_.emplace(*file_);
     std::string_view word;
     (void)words_->next(word);
     if (word != kText) corrupt(fmt::format("begins with \"{}\", must begin with DSAA", printable(word)));
@@ -229,16 +220,17 @@ class SurferGridSource final : public HeightSource {
     (void)next_number("the range of z");
     (void)next_number("the range of z");
     // A number takes a byte and another one keeps it apart from the next.
-    const auto most = static_cast<std::int64_t>((file_.size_bytes() + 1) / 2);
+    const auto most = static_cast<std::int64_t>((file_->size_bytes() + 1) / 2);
     if (info_.height > most / info_.width) {
       corrupt(fmt::format("the header says {} x {} nodes; the file's {} bytes hold {} at most", info_.width,
-                          info_.height, file_.size_bytes(), most));
+                          info_.height, file_->size_bytes(), most));
     }
     scan();
   }
 
   /// Checks every number and notes where rows begin.
   void scan() {
+    rows_.emplace(*words_, info_.width);
     std::string_view word;
     double value = 0.0;
     for (std::int64_t row = 0; row < info_.height; ++row) {
@@ -247,11 +239,11 @@ class SurferGridSource final : public HeightSource {
           corrupt(fmt::format("the file ends after {} of {} x {} nodes", row * info_.width + column, info_.width,
                               info_.height));
         }
-        if (column == 0) places_.note(row, words_->offset_of(word));
+        if (column == 0) rows_->note(row, words_->offset_of(word));
         if (!read_decimal(word, value)) refuse_word(word);
       }
     }
-    const bool cut = words_->offset_of(word) + word.size() == file_.size_bytes();
+    const bool cut = words_->offset_of(word) + word.size() == file_->size_bytes();
     if (cut) info_.warnings.push_back(loss("the file ends within its last line: its last number may be cut off"));
     if (words_->next(word)) {
       corrupt(fmt::format("\"{}\" at byte {} comes after the {} x {} nodes that the header says", printable(word),
@@ -259,50 +251,8 @@ class SurferGridSource final : public HeightSource {
     }
   }
 
-  /// `stored`: rows counted from the South.
-  void read_text(const Window& stored, std::span<std::byte> samples) {
-    ISOHF_ASSERT(stored.column >= 0 && stored.row >= 0 && stored.columns >= 0 && stored.rows >= 0);
-    ISOHF_ASSERT(stored.column + stored.columns <= info_.width && stored.row + stored.rows <= info_.height);
-    ISOHF_ASSERT(samples.size() == static_cast<std::size_t>(stored.columns * stored.rows) * sizeof(double));
-    std::byte* out = samples.data();
-    std::string_view word;
-    for (std::int64_t row = stored.row; row < stored.row + stored.rows; ++row) {
-      go_to(row, stored.column);
-      for (std::int64_t i = 0; i < stored.columns; ++i, out += sizeof(double)) {
-        double value = 0.0;
-        if (!words_->next(word) || !read_decimal(word, value)) refuse_changed();
-        std::memcpy(out, &value, sizeof(value));
-      }
-      next_ += stored.columns;
-    }
-  }
-
-  /// Makes the number at (row, column), row 0 in the South, the next one to be read.
-  void go_to(std::int64_t row, std::int64_t column) {
-    const std::int64_t wanted = row * info_.width + column;
-    const RowPlaces::Place place = places_.before(row);
-    const std::int64_t noted = place.row * info_.width;
-    if (next_ < noted || next_ > wanted) {
-      words_->seek(place.offset_bytes);
-      next_ = noted;
-    }
-    std::string_view word;
-    for (; next_ < wanted; ++next_) {
-      if (!words_->next(word)) refuse_changed();
-    }
-  }
-
-  [[noreturn]] void refuse_changed() {
-    next_ = std::numeric_limits<std::int64_t>::max();
-    corrupt("the file has changed since it was opened");
-  }
-
-  RawFile file_;
-  PlainLayout layout_;               // of binary grids; rows from the South
   std::optional<TextTokens> words_;  // of text
-  RowPlaces places_;
-  std::int64_t next_ = std::numeric_limits<std::int64_t>::max();  // number that words_ reads next, counted by rows
-  SourceInfo info_;
+  std::optional<TextRows> rows_;     // from the South
 };
 
 }  // namespace

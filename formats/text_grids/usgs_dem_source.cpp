@@ -17,11 +17,10 @@
 #include <utility>
 #include <vector>
 
-#include "formats/files/raw_file.h"
+#include "formats/files/file_source.h"
 #include "formats/files/text.h"
 #include "formats/files/text_tokens.h"
 #include "formats/open_options.h"
-#include "isohf/base/assert.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
 
@@ -239,11 +238,9 @@ struct Profile {
   double y = 0.0;
 };
 
-class UsgsDemSource final : public HeightSource {
+class UsgsDemSource final : public FileSource {
  public:
-  UsgsDemSource(const std::string& path, const OpenOptions& options) : file_(path, options.unpacked_bytes) {
-    info_.path = path;
-    info_.format = "USGS DEM";
+  UsgsDemSource(const std::string& path, const OpenOptions& options) : FileSource(path, "USGS DEM", options) {
     (void)choose_band(info_, options, 1);
     find_record_ends();
     std::uint64_t at = 0;
@@ -257,22 +254,14 @@ class UsgsDemSource final : public HeightSource {
     apply_open_options(info_, options);
   }
 
-  [[nodiscard]] const SourceInfo& info() const override { return info_; }
-
   void read_window(const Window& window, std::span<std::byte> samples) override {
-    ISOHF_ASSERT(window.column >= 0 && window.row >= 0 && window.columns >= 0 && window.rows >= 0);
-    ISOHF_ASSERT(window.column + window.columns <= info_.width && window.row + window.rows <= info_.height);
-    ISOHF_ASSERT(samples.size() ==
-                 static_cast<std::size_t>(window.columns * window.rows) * size_bytes(info_.sample_type));
+    ISOHF_ASSERT(is_window_of(info_, window, samples.size()));
     if (info_.sample_type == SampleType::kInt16) {
       read_columns<std::int16_t>(window, samples);
     } else {
       read_columns<std::int32_t>(window, samples);
     }
   }
-
-  void limit_buffers(std::uint64_t bytes) override { file_.limit_buffers(bytes); }
-  [[nodiscard]] std::uint64_t buffer_bytes(std::uint64_t limit) const override { return file_.buffer_bytes(limit); }
 
  private:
   [[noreturn]] void corrupt(const std::string& where, const std::string& what) const {
@@ -282,7 +271,7 @@ class UsgsDemSource final : public HeightSource {
   /// Records are 1024 bytes, or lines of at most so many.
   void find_record_ends() {
     std::array<char, 2 * kRecordBytes + 8> start{};
-    const std::size_t got = file_.read_some(0, std::as_writable_bytes(std::span(start)));
+    const std::size_t got = file_->read_some(0, std::as_writable_bytes(std::span(start)));
     const std::string_view text(start.data(), got);
     const std::size_t end = text.find('\n');
     if (end == std::string_view::npos || end > kRecordBytes + 1) return;
@@ -292,7 +281,7 @@ class UsgsDemSource final : public HeightSource {
   /// The record at `at`, without its line end; moves `at` to the next. Empty at the end of the file.
   [[nodiscard]] std::string record(std::uint64_t& at) const {
     std::string text(kRecordBytes + (lines_ ? 2 : 0), '\0');
-    text.resize(file_.read_some(at, std::as_writable_bytes(std::span(text))));
+    text.resize(file_->read_some(at, std::as_writable_bytes(std::span(text))));
     if (!lines_) {
       at += text.size();
       return text;
@@ -309,10 +298,10 @@ class UsgsDemSource final : public HeightSource {
 
   void read_profiles(std::uint64_t at) {
     // A profile has one record at least; a line has its end at least.
-    const std::uint64_t room = file_.size_bytes() / (lines_ ? kProfileHeadBytes : kRecordBytes);
+    const std::uint64_t room = file_->size_bytes() / (lines_ ? kProfileHeadBytes : kRecordBytes);
     if (static_cast<std::uint64_t>(info_.width) > room) {
       corrupt("the type A record",
-              fmt::format("says {} profiles, for which {} bytes have no room", info_.width, file_.size_bytes()));
+              fmt::format("says {} profiles, for which {} bytes have no room", info_.width, file_->size_bytes()));
     }
     profiles_.reserve(static_cast<std::size_t>(info_.width));
     std::optional<double> datum;
@@ -356,9 +345,9 @@ class UsgsDemSource final : public HeightSource {
     // The last record may lack its blanks.
     const Profile& last = profiles_.back();
     const std::uint64_t least = last.end_bytes - kRecordBytes + byte_of(last.posts - 1) + kPostBytes;
-    if (!lines_ && file_.size_bytes() < least) {
+    if (!lines_ && file_->size_bytes() < least) {
       corrupt(fmt::format("profile {}", info_.width),
-              fmt::format("the file ends early: it has {} bytes, must have {}", file_.size_bytes(), least));
+              fmt::format("the file ends early: it has {} bytes, must have {}", file_->size_bytes(), least));
     }
   }
 
@@ -444,7 +433,7 @@ class UsgsDemSource final : public HeightSource {
                                    ? profile.end_bytes - at
                                    : static_cast<std::uint64_t>(record_of(end - 1) - first_record_ + 1) * kRecordBytes;
     text_.resize(static_cast<std::size_t>(most));
-    text_.resize(file_.read_some(at, std::as_writable_bytes(std::span(text_))));
+    text_.resize(file_->read_some(at, std::as_writable_bytes(std::span(text_))));
     records_.clear();
     const std::string_view all = text_;
     for (std::size_t i = 0; i < all.size();) {
@@ -456,13 +445,11 @@ class UsgsDemSource final : public HeightSource {
     records_.resize(std::max(records_.size(), static_cast<std::size_t>(record_of(end - 1) - first_record_ + 1)));
   }
 
-  RawFile file_;
   bool lines_ = false;
   std::vector<Profile> profiles_;
   std::string text_;  // of the records below
   std::vector<std::string_view> records_;
   std::int64_t first_record_ = 0;
-  SourceInfo info_;
 };
 
 }  // namespace

@@ -399,6 +399,19 @@ TiffTags TiffHandle::read_tags() {
   return tags;
 }
 
+std::vector<std::array<std::uint8_t, 3>> TiffHandle::read_palette() {
+  std::array<std::uint16_t*, 3> channels = {};
+  if (TIFFGetField(impl_->tif, TIFFTAG_COLORMAP, &channels[0], &channels[1], &channels[2]) != 1) {
+    impl_->fail("the palette is missing");
+  }
+  std::vector<std::array<std::uint8_t, 3>> colours(std::size_t{1}
+                                                   << impl_->field<std::uint16_t>(TIFFTAG_BITSPERSAMPLE, 1));
+  for (std::size_t i = 0; i < colours.size(); ++i) {
+    for (std::size_t c = 0; c < 3; ++c) colours[i][c] = static_cast<std::uint8_t>(channels[c][i] / 257);
+  }
+  return colours;
+}
+
 TiffMainImage open_image(const RawFile& file, std::uint32_t directory) {
   TiffMainImage image;
   image.directories.main = directory;

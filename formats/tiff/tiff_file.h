@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -96,6 +97,8 @@ class TiffHandle {
 
   [[nodiscard]] TiffLayout read_layout();
   [[nodiscard]] TiffTags read_tags();
+  /// Red, green and blue of every value that a sample of the image can have. Throws Error{kCorrupt} without a palette.
+  [[nodiscard]] std::vector<std::array<std::uint8_t, 3>> read_palette();
 
   /// Room that the user of the handle may use while he holds it.
   std::vector<std::byte> scratch;

@@ -30,6 +30,7 @@ struct TiffStripLayout {
   SampleType sample_type = SampleType::kFloat32;
   std::size_t samples_per_row = 0;  ///< of all channels
   std::size_t channels = 1;         ///< interleaved
+  bool compress = true;
 };
 
 constexpr int kLevel = 6;
@@ -81,6 +82,7 @@ void predict(const TiffStripLayout& layout, std::span<std::byte> rows) {
 /// The compression is a zlib stream. `rows` is overwritten. The same rows always give the same bytes.
 /// Throws Error{kOutOfMemory}.
 std::vector<std::byte> compress_tiff_strip(const TiffStripLayout& layout, std::span<std::byte> rows) {
+  if (!layout.compress) return {rows.begin(), rows.end()};
   predict(layout, rows);
   const std::unique_ptr<libdeflate_compressor, decltype(&libdeflate_free_compressor)> compressor(
       libdeflate_alloc_compressor(kLevel), libdeflate_free_compressor);
@@ -263,8 +265,9 @@ class TiffEncoder final : public RasterEncoder {
     set(TIFFTAG_SAMPLEFORMAT, floating ? SAMPLEFORMAT_IEEEFP : is_signed ? SAMPLEFORMAT_INT : SAMPLEFORMAT_UINT);
     set(TIFFTAG_PHOTOMETRIC, spec.channels == 1 ? PHOTOMETRIC_MINISBLACK : PHOTOMETRIC_RGB);
     set(TIFFTAG_PLANARCONFIG, PLANARCONFIG_CONTIG);
-    set(TIFFTAG_COMPRESSION, COMPRESSION_ADOBE_DEFLATE);
-    set(TIFFTAG_PREDICTOR, floating ? PREDICTOR_FLOATINGPOINT : PREDICTOR_HORIZONTAL);
+    layout_.compress = spec.compress;
+    set(TIFFTAG_COMPRESSION, spec.compress ? COMPRESSION_ADOBE_DEFLATE : COMPRESSION_NONE);
+    if (spec.compress) set(TIFFTAG_PREDICTOR, floating ? PREDICTOR_FLOATINGPOINT : PREDICTOR_HORIZONTAL);
     if (spec.channels == 4) {
       const std::uint16_t opacity = EXTRASAMPLE_UNASSALPHA;
       set(TIFFTAG_EXTRASAMPLES, 1, &opacity);

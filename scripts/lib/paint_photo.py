@@ -1,51 +1,32 @@
 #!/usr/bin/env python3
 """Paints what a satellite might see of a terrain: sea, beaches, fields, woods, rock and snow, by height and slope.
 
-    isohf restore dem.isohf heights.png --clamp-range && scripts/lib/paint_photo.py heights.png photo.ppm [PIXELS_PER_SAMPLE]
+    isohf restore dem.isohf heights.r16 --clamp-range && scripts/lib/paint_photo.py heights.r16 photo.png [PIXELS_PER_SAMPLE]
 
-HEIGHTS is a 16-bit grey PNG; heights count relative to its range, the lowest value is the sea. The picture of
-docs/viewer.md was made with it. Nothing is shaded: the viewer has lights of its own. Only Python's own library is used.
+HEIGHTS.r16 has the .json beside it that isohf writes; heights count relative to its range, the lowest value is the sea.
+The picture of docs/viewer.md was made with it. Nothing is shaded: the viewer has lights of its own. Only Python's own
+library is used.
 """
+import array
+import json
 import struct
 import sys
 import zlib
 
 
-def read_png(path):
-    data = open(path, "rb").read()
-    at, packed, header = 8, b"", None
-    while at < len(data):
-        size, kind = struct.unpack(">I4s", data[at : at + 8])
-        body = data[at + 8 : at + 8 + size]
-        if kind == b"IHDR":
-            header = struct.unpack(">IIBBBBB", body)
-        if kind == b"IDAT":
-            packed += body
-        at += 12 + size
-    width, height, depth, colour, _, _, interlace = header
-    if (depth, colour, interlace) != (16, 0, 0):
-        sys.exit(f"{path}: no 16-bit grey PNG")
-    raw, stride, above, rows = zlib.decompress(packed), width * 2, bytes(width * 2), []
-    for r in range(height):
-        kind = raw[r * (stride + 1)]
-        line = bytearray(raw[r * (stride + 1) + 1 : (r + 1) * (stride + 1)])
-        for i in range(stride):
-            left = line[i - 2] if i > 1 else 0
-            corner = above[i - 2] if i > 1 else 0
-            up = above[i]
-            if kind == 1:
-                line[i] = (line[i] + left) & 255
-            elif kind == 2:
-                line[i] = (line[i] + up) & 255
-            elif kind == 3:
-                line[i] = (line[i] + (left + up) // 2) & 255
-            elif kind == 4:
-                p = left + up - corner
-                a, b, c = abs(p - left), abs(p - up), abs(p - corner)
-                line[i] = (line[i] + (left if a <= b and a <= c else up if b <= c else corner)) & 255
-        above = bytes(line)
-        rows.append(list(struct.unpack(f">{width}H", above)))
-    return rows
+def read_heights(path):
+    with open(path + ".json", encoding="utf-8") as text:
+        width = json.load(text)["width"]
+    samples = array.array("H")
+    with open(path, "rb") as raw:
+        samples.frombytes(raw.read())
+    if sys.byteorder == "big":
+        samples.byteswap()
+    return [samples[at : at + width].tolist() for at in range(0, len(samples), width)]
+
+
+def png_chunk(kind, body):
+    return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
 
 
 def hashed(x, y, seed):
@@ -102,7 +83,8 @@ def paint(rows, scale, out):
     low, high = min(map(min, rows)), max(map(max, rows))
     width, height = len(rows[0]) * scale, len(rows) * scale
     broad, fine, patch = Noise(40 * scale, 5, 1), Noise(5 * scale, 4, 20), Noise(9 * scale, 2, 40)
-    out.write(b"P6\n%d %d\n255\n" % (width, height))
+    packer = zlib.compressobj()
+    packed = b""
 
     def heights(y):
         v = min(max((y + 0.5) / scale - 0.5, 0.0), len(rows) - 1.001)
@@ -131,12 +113,14 @@ def paint(rows, scale, out):
                 colour = ground(h, slope, b[x], f[x], FIELDS[int(hashed(i, j, 7) * 5.99)])
             grain = 0.82 + 0.36 * f[x]
             pixels += bytes(min(255, max(0, int(c * grain))) for c in colour)
-        out.write(pixels)
+        packed += packer.compress(b"\0" + pixels)  # filter 0: none
         here, below = below, heights(min(y + 2, height - 1))
+    out.write(b"\x89PNG\r\n\x1a\n" + png_chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)))
+    out.write(png_chunk(b"IDAT", packed + packer.flush()) + png_chunk(b"IEND", b""))
 
 
 if __name__ == "__main__":
     if len(sys.argv) not in (3, 4):
         sys.exit(__doc__)
     with open(sys.argv[2], "wb") as result:
-        paint(read_png(sys.argv[1]), int(sys.argv[3]) if len(sys.argv) == 4 else 4, result)
+        paint(read_heights(sys.argv[1]), int(sys.argv[3]) if len(sys.argv) == 4 else 4, result)

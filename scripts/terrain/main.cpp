@@ -15,18 +15,23 @@
 #include <tuple>
 #include <vector>
 
+#include "formats/write/raster_sink.h"
 #include "isohf/error.h"
 #include "options/command_line.h"
 #include "options/option_values.h"
-#include "sink.h"
 #include "terrain.h"
 
 namespace isohf::terrain {
 namespace {
 
+/// Samples that mean "no height here"; the float types use NaN.
+constexpr std::int16_t kVoidInt16 = -32768;
+constexpr std::uint16_t kVoidUint16 = 65535;
+constexpr std::int64_t kBandRows = 256;
+
 struct Options {
   std::string output;
-  Raster raster;
+  RasterSpec raster;
   TerrainOptions land;
   int threads = 0;
   bool quiet = false;
@@ -57,20 +62,40 @@ void store_row(SampleType type, std::span<const float> heights, std::byte* out) 
         return std::isnan(h) ? kVoidUint16 : static_cast<std::uint16_t>(std::lround(std::max(h, 0.0F)));
       });
       break;
-    case SampleType::kFloat32:
-      convert_row<float>(heights, out, [](float h) { return h; });
-      break;
     case SampleType::kFloat16:
       convert_row<half>(heights, out, [](float h) { return half(h); });
       break;
+    default:
+      convert_row<float>(heights, out, [](float h) { return h; });
   }
+}
+
+/// Cells in UTM zone 33 North, far from the zone's edges; a place that an HGT file could not say.
+void describe_ground(Options& options) {
+  RasterSpec& raster = options.raster;
+  const SampleType type = raster.sample_type;
+  if (options.land.void_fraction > 0) {
+    raster.void_value = type == SampleType::kInt16    ? kVoidInt16
+                        : type == SampleType::kUint16 ? kVoidUint16
+                                                      : std::numeric_limits<double>::quiet_NaN();
+  }
+  if (options.output.ends_with(".hgt")) return;
+  Georeference& place = raster.georeference.emplace();
+  place.registration = Registration::kArea;
+  place.unit = HorizontalUnit::kMetre;
+  place.spacing_x = place.spacing_y = options.land.spacing_m;
+  place.has_origin = true;
+  place.origin_x = 300000 + place.spacing_x / 2;
+  place.origin_y = 5300000 - place.spacing_y / 2;
+  place.system.epsg = 32633;
 }
 
 std::optional<Options> parse(const cli::Arguments& arguments) {
   Options options;
-  Raster& raster = options.raster;
+  RasterSpec& raster = options.raster;
   TerrainOptions& land = options.land;
-  raster.columns = raster.rows = 1024;
+  raster.width = raster.height = 1024;
+  raster.sample_type = SampleType::kInt16;
   cli::CommandLine line("make_terrain",
                         "Makes terrain: mountains with eroded valleys, plains and, on request, a coast and voids.");
   const auto number = [&](const char* flag, const char* name, const char* description, double& value, double least,
@@ -78,9 +103,9 @@ std::optional<Options> parse(const cli::Arguments& arguments) {
     line.option(flag, name, fmt::format("{} (default {})", description, value),
                 [&value, least, most](const auto& text) { value = cli::parse_number_in(text, least, most); });
   };
-  line.positional("OUTPUT", "-o,--output", "File to write: .tif .exr .png .hgt .raw .r16 .r32", options.output);
+  line.positional("OUTPUT", "-o,--output", "File to write: .tif .exr .png .hgt .npy .raw .r16 .r32", options.output);
   line.option("--size", "WxH", "Columns and rows (default 1024x1024)", [&](const std::string& text) {
-    std::tie(raster.columns, raster.rows) = cli::parse_size(text, 1, 2'000'000'000);
+    std::tie(raster.width, raster.height) = cli::parse_size(text, 1, 2'000'000'000);
   });
   line.option("--seed", "N", "Make another land for another number", [&](const std::string& text) {
     land.seed =
@@ -96,11 +121,9 @@ std::optional<Options> parse(const cli::Arguments& arguments) {
   line.option("--type", "TYPE", "Sample type: int16, uint16, float32 or half", [&](const std::string& text) {
     constexpr SampleType kTypes[] = {SampleType::kInt16, SampleType::kUint16, SampleType::kFloat32,
                                      SampleType::kFloat16};
-    raster.type = kTypes[cli::parse_word(text, {"int16", "uint16", "float32", "half"})];
+    raster.sample_type = kTypes[cli::parse_word(text, {"int16", "uint16", "float32", "half"})];
   });
-  bool striped = false;
   bool uncompressed = false;
-  line.flag("--striped", "TIFF, EXR: strips or scan lines instead of tiles", striped);
   line.flag("--uncompressed", "TIFF, EXR: no compression", uncompressed);
   line.option("-j,--threads", "N", "Threads (default 0: all cores)", [&](const std::string& text) {
     options.threads = static_cast<int>(cli::parse_whole_number(text, 0, 1024));
@@ -108,16 +131,15 @@ std::optional<Options> parse(const cli::Arguments& arguments) {
   line.flag("-q,--quiet", "Print nothing", options.quiet);
   if (!line.parse(arguments)) return std::nullopt;
   line.require("OUTPUT", options.output);
-  raster.tiled = !striped;
-  raster.deflate = !uncompressed;
-  raster.spacing_m = land.spacing_m;
-  raster.voids = land.void_fraction > 0;
+  raster.compress = !uncompressed;
+  raster.overwrite = true;
+  describe_ground(options);
   return options;
 }
 
 void check_range(const Options& options, const Terrain& terrain) {
   const auto [low, high] = terrain.bounds();
-  const SampleType type = options.raster.type;
+  const SampleType type = options.raster.sample_type;
   const double most = type == SampleType::kInt16 ? 32767 : type == SampleType::kUint16 ? 65534 : 65504;
   // Lowlands of uint16 rasters end at 0, like a sea without the flag.
   const double least = type == SampleType::kInt16 ? -32767 : type == SampleType::kUint16 ? -1e9 : -65504;
@@ -128,29 +150,29 @@ void check_range(const Options& options, const Terrain& terrain) {
   }
 }
 
-void write(const Options& options, const Terrain& terrain, Sink& sink) {
-  const Raster& raster = options.raster;
+void write(const Options& options, const Terrain& terrain, RasterSink& sink) {
+  const RasterSpec& raster = options.raster;
   const int threads =
       options.threads > 0 ? options.threads : static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
-  const auto row_bytes = static_cast<std::size_t>(raster.columns) * size_bytes(raster.type);
+  const auto row_bytes = static_cast<std::size_t>(raster.width) * size_bytes(raster.sample_type);
   std::int64_t next = 0;
   auto cut = [&](tbb::flow_control& flow) {
-    Band band{next, std::min(Sink::kBandRows, raster.rows - next), {}};
+    Band band{next, std::min(kBandRows, raster.height - next), {}};
     if (band.rows <= 0) flow.stop();
     next += band.rows;
     return band;
   };
   auto fill = [&](Band band) {
     band.samples.resize(static_cast<std::size_t>(band.rows) * row_bytes);
-    std::vector<float> heights(static_cast<std::size_t>(raster.columns));
+    std::vector<float> heights(static_cast<std::size_t>(raster.width));
     for (std::int64_t r = 0; r < band.rows; ++r) {
       terrain.row(0, band.row + r, heights);
-      store_row(raster.type, heights, band.samples.data() + static_cast<std::size_t>(r) * row_bytes);
+      store_row(raster.sample_type, heights, band.samples.data() + static_cast<std::size_t>(r) * row_bytes);
     }
     return band;
   };
-  auto store = [&](Band band) { sink.write_band(band.samples); };
+  auto store = [&](Band band) { sink.write_rows(band.samples); };
   tbb::parallel_pipeline(static_cast<std::size_t>(threads) + 1,
                          tbb::make_filter<void, Band>(tbb::filter_mode::serial_in_order, cut) &
                              tbb::make_filter<Band, Band>(tbb::filter_mode::parallel, fill) &
@@ -161,19 +183,10 @@ void write(const Options& options, const Terrain& terrain, Sink& sink) {
 void make(const Options& options) {
   const Terrain terrain(options.land);
   check_range(options, terrain);
-  const std::string part = options.output + ".part";
-  try {
-    auto sink = make_sink(options.output, part, options.raster);
-    write(options, terrain, *sink);
-    sink.reset();
-    std::filesystem::rename(part, options.output);
-  } catch (...) {
-    std::error_code ignored;
-    std::filesystem::remove(part, ignored);
-    throw;
-  }
+  const auto sink = create_raster(options.output, options.raster);
+  write(options, terrain, *sink);
   if (!options.quiet) {
-    fmt::print("{}: {} x {} samples, {} bytes\n", options.output, options.raster.columns, options.raster.rows,
+    fmt::print("{}: {} x {} samples, {} bytes\n", options.output, options.raster.width, options.raster.height,
                std::filesystem::file_size(options.output));
   }
 }

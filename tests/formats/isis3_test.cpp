@@ -189,16 +189,6 @@ TEST_F(Isis3, TakesSpecialPixelsForVoids) {
   }
 }
 
-TEST_F(Isis3, RefusesEveryTruncation) {
-  const std::string whole = label(kTiles, 1, kWord) + tiles(3, 2, 1, false);
-  EXPECT_EQ(failure(whole), "");
-  for (std::size_t length = 0; length < whole.size(); ++length) {
-    ErrorCode code = ErrorCode::kCancelled;
-    EXPECT_NE(failure(whole.substr(0, length), &code), "") << length;
-    EXPECT_EQ(code, ErrorCode::kCorrupt) << length;
-  }
-}
-
 TEST_F(Isis3, SurvivesDamagedLabels) {
   const std::string whole = label(kTiles, 1, kWord) + tiles(3, 2, 1, false);
   const std::size_t end = whole.find("End\n") + 4;

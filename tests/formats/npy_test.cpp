@@ -151,7 +151,7 @@ TEST_F(Npy, SaysWhatItDoesNotRead) {
   EXPECT_THAT(failure(array("<i2", "(2, 3, 2)", data)), HasSubstr("must have 2 dimensions"));
   EXPECT_THAT(failure(array("<i2", "(2, 0)", data)), HasSubstr("must be from 1"));
   EXPECT_THAT(failure(array("<i2", "(2, 3)", data, 4)), HasSubstr("NumPy format 4"));
-  EXPECT_THAT(failure("PK\x03\x04 anything", nullptr, "a.npz"), HasSubstr("is too short for a zip archive"));
+  EXPECT_THAT(failure("PK\x03\x04 anything", nullptr, "a.npz"), HasSubstr("no zip archive"));
 }
 
 TEST_F(Npy, ReadsFortranOrder) {
@@ -223,16 +223,6 @@ TEST_F(Npy, DeliversARealArchive) {
       const auto at = static_cast<std::size_t>(pixel.at("row").get<int>() * 403 + pixel.at("col").get<int>());
       EXPECT_EQ(test::value_at(SampleType::kInt16, raw, at), pixel.at("raw").get<double>());
     }
-  }
-}
-
-TEST_F(Npy, RefusesEveryTruncation) {
-  const std::string whole = array("<i2", "(2, 3)", counting(2, false));
-  EXPECT_EQ(failure(whole), "");
-  for (std::size_t length = 6; length < whole.size(); ++length) {
-    ErrorCode code = ErrorCode::kCancelled;
-    EXPECT_NE(failure(whole.substr(0, length), &code), "") << length;
-    EXPECT_EQ(code, ErrorCode::kCorrupt) << length;
   }
 }
 

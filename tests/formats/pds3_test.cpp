@@ -368,16 +368,6 @@ TEST_F(Pds3, ScalesAndMarksVoids) {
   EXPECT_EQ(info.warnings.size(), 1U);
 }
 
-TEST_F(Pds3, RefusesEveryTruncation) {
-  const std::string whole = attached() + samples(12, 2, true);
-  EXPECT_EQ(failure(whole), "");
-  for (std::size_t length = 0; length < whole.size(); ++length) {
-    ErrorCode code = ErrorCode::kCancelled;
-    EXPECT_NE(failure(whole.substr(0, length), &code), "") << length;
-    EXPECT_EQ(code, ErrorCode::kCorrupt) << length;
-  }
-}
-
 TEST_F(Pds3, SurvivesDamagedLabels) {
   const std::string whole = attached(kImage, map("MAP_PROJECTION_TYPE = EQUIRECTANGULAR\r\nMAP_RESOLUTION = 2\r\n"
                                                  "CENTER_LONGITUDE = 0\r\nLINE_PROJECTION_OFFSET = 4.5\r\n"

@@ -1,4 +1,4 @@
-#include "formats/oiio/photo.h"
+#include "formats/photo/photo.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -6,7 +6,6 @@
 #include <cmath>
 #include <fstream>
 
-#include "formats/oiio/photo_place.h"
 #include "formats/reader_failure.h"
 #include "formats/registry.h"
 #include "formats/tiff_bytes.h"
@@ -143,10 +142,10 @@ TEST_F(Photo, ReadsGeoTiffTags) {
 TEST_F(Photo, ReadsWorldFilesOfItsOwnExtension) {
   const std::string path = write_pixmap("map.ppm", 8, 4, 3);
   write("map.jgw", "1\n0\n0\n-1\n0\n0\n");
-  EXPECT_FALSE(photo_georeference(path, 4));
+  EXPECT_FALSE(open_photo(path)->info().georeference);
   write("map.pmw", "0.5\n0\n0\n-0.25\n100\n200\n");
   write("map.prj", "LOCAL_CS[\"here\"]\n");
-  const auto place = photo_georeference(path, 4);
+  const auto place = open_photo(path)->info().georeference;
   ASSERT_TRUE(place);
   EXPECT_EQ(place->origin_x, 100.0);
   EXPECT_EQ(place->origin_y, 200.0);

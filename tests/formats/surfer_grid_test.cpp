@@ -114,16 +114,6 @@ TEST_F(SurferGrid, WindowsEqualTheWhole) {
   }
 }
 
-TEST_F(SurferGrid, RefusesEveryTruncation) {
-  for (const std::string& whole : {text_grid(), surfer6(), surfer7()}) {
-    for (std::size_t length = 4; length + 2 < whole.size(); ++length) {
-      ErrorCode code = ErrorCode::kCancelled;
-      EXPECT_NE(failure(whole.substr(0, length), &code), "") << length;
-      EXPECT_EQ(code, ErrorCode::kCorrupt) << length;
-    }
-  }
-}
-
 TEST_F(SurferGrid, SaysWhatIsWrong) {
   EXPECT_THAT(failure(text_grid("1 2 3\n4 x 6\n")), HasSubstr("\"x\" at byte 39 is not a number"));
   EXPECT_THAT(failure(text_grid("1 2 3\n4 5 6\n7\n")), HasSubstr("\"7\" at byte 43 comes after the 3 x 2 nodes"));

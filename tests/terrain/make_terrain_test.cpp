@@ -29,14 +29,20 @@ class MakeTerrain : public testing::Test {
 
   std::string bytes(const std::string& name) const { return test::read_file(folder_ / name); }
 
+  /// Of a NumPy file, without its header.
+  std::string samples_of(const std::string& name) const {
+    const std::string all = bytes(name);
+    return all.substr(10 + static_cast<unsigned char>(all[8]));
+  }
+
   const test::TemporaryFolder folder_;
 };
 
 TEST_F(MakeTerrain, GivesTheSameBytesForAnyNumberOfThreads) {
   const std::string size = test::kSanitized ? "100x1300" : "600x1300";
-  for (const std::string name : {"a.tif", "a.exr", "a.raw"}) {
+  for (const std::string name : {"a.tif", "a.exr", "a.npy"}) {
     const std::string options =
-        "--size " + size + " --voids 0.05 --type " + std::string(name == "a.raw" ? "int16" : "float32") + " -o ";
+        "--size " + size + " --voids 0.05 --type " + std::string(name == "a.npy" ? "int16" : "float32") + " -o ";
     ASSERT_EQ(run(options + name + " --threads 1"), 0) << bytes("stderr");
     const std::string one = bytes(name);
     for (const int threads : {2, 3, 8}) {
@@ -46,10 +52,10 @@ TEST_F(MakeTerrain, GivesTheSameBytesForAnyNumberOfThreads) {
   }
 }
 
-TEST_F(MakeTerrain, RawFilesHoldTheRoundedHeightsRowByRow) {
-  ASSERT_EQ(run("--size 130x300 --seed 9 -o a.raw"), 0) << bytes("stderr");
+TEST_F(MakeTerrain, FilesHoldTheRoundedHeightsRowByRow) {
+  ASSERT_EQ(run("--size 130x300 --seed 9 -o a.npy"), 0) << bytes("stderr");
   EXPECT_EQ(bytes("stderr"), "");
-  const std::string raw = bytes("a.raw");
+  const std::string raw = samples_of("a.npy");
   ASSERT_EQ(raw.size(), 130U * 300U * 2U);
   TerrainOptions options;
   options.seed = 9;
@@ -67,19 +73,18 @@ TEST_F(MakeTerrain, RawFilesHoldTheRoundedHeightsRowByRow) {
 
 TEST_F(MakeTerrain, HgtIsBigEndianWithTheSrtmVoid) {
   ASSERT_EQ(run("--size 1201x1201 --voids 0.2 -o N10E010.hgt"), 0) << bytes("stderr");
-  ASSERT_EQ(run("--size 1201x1201 --voids 0.2 -o same.raw"), 0);
+  ASSERT_EQ(run("--size 1201x1201 --voids 0.2 -o same.npy"), 0);
   std::string hgt = bytes("N10E010.hgt");
   for (std::size_t i = 0; i + 1 < hgt.size(); i += 2) std::swap(hgt[i], hgt[i + 1]);
-  EXPECT_TRUE(hgt == bytes("same.raw"));
+  EXPECT_TRUE(hgt == samples_of("same.npy"));
   EXPECT_NE(hgt.find(std::string("\x00\x80", 2)), std::string::npos);
 }
 
 TEST_F(MakeTerrain, RefusesWhatAFormatCannotHoldAndLeavesNoFile) {
   const char* refused[] = {
       "--size 8x8 -o a.png",
-      "--size 8x8 --type uint16 --voids 0.1 -o a.png",
       "--size 8x8 -o a.exr",
-      "--size 8x8 --type half -o a.tif",
+      "--size 8x8 -o a.raw",
       "--size 8x8 -o a.hgt",
       "--size 8x8 -o a.xyz",
       "--size 8x8 -o a",
@@ -100,8 +105,8 @@ TEST_F(MakeTerrain, RefusesWhatAFormatCannotHoldAndLeavesNoFile) {
 }
 
 TEST_F(MakeTerrain, SaysWhenTheFolderIsMissing) {
-  EXPECT_EQ(run("--size 8x8 -o missing/a.raw"), 1);
-  EXPECT_NE(bytes("stderr").find("missing/a.raw"), std::string::npos);
+  EXPECT_EQ(run("--size 8x8 -o missing/a.npy"), 1);
+  EXPECT_NE(bytes("stderr").find("missing/a.npy"), std::string::npos);
 }
 
 }  // namespace

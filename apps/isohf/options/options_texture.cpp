@@ -4,7 +4,7 @@
 
 #include <bit>
 
-#include "formats/oiio/photo.h"
+#include "formats/photo/photo.h"
 #include "isohf/error.h"
 #include "isohf/surface/photo/texture_cutter.h"
 #include "options/describe.h"

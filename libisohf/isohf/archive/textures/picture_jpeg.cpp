@@ -1,14 +1,9 @@
 #include <fmt/format.h>
 
-#include <array>
-#include <csetjmp>
-#include <cstdio>
 #include <cstdlib>
 #include <memory>
 
-// Needs <cstdio> before it.
-#include <jpeglib.h>
-
+#include "isohf/archive/textures/jpeg_errors.h"
 #include "isohf/archive/textures/picture_codec.h"
 #include "isohf/base/assert.h"
 #include "isohf/error.h"
@@ -16,29 +11,8 @@
 namespace isohf {
 namespace {
 
-/// libjpeg's error handler: notes the message and jumps. Warnings, where libjpeg would go on with pixels that it made
-/// up, are errors as well.
-struct ErrorHandler {
-  jpeg_error_mgr base{};  // first: libjpeg hands out a pointer to it
-  std::jmp_buf jump{};
-  std::array<char, JMSG_LENGTH_MAX> text{};
-
-  ErrorHandler() {
-    jpeg_std_error(&base);
-    base.error_exit = fail;
-    base.emit_message = [](j_common_ptr jpeg, int level) {
-      if (level < 0) fail(jpeg);
-    };
-  }
-  static void fail(j_common_ptr jpeg) {
-    auto* const self = reinterpret_cast<ErrorHandler*>(jpeg->err);
-    self->base.format_message(jpeg, self->text.data());
-    std::longjmp(self->jump, 1);  // NOLINT(cert-err52-cpp): libjpeg's way to return errors
-  }
-};
-
 /// The functions that call libjpeg hold nothing that a jump could leak.
-bool compress(jpeg_compress_struct& jpeg, ErrorHandler& errors, const Picture& picture, int quality,
+bool compress(jpeg_compress_struct& jpeg, JpegErrors& errors, const Picture& picture, int quality,
               unsigned char** bytes, unsigned long* size) {  // NOLINT(google-runtime-int): libjpeg's type
   if (setjmp(errors.jump) != 0) return false;                // NOLINT(cert-err52-cpp)
   jpeg_create_compress(&jpeg);
@@ -62,7 +36,7 @@ bool compress(jpeg_compress_struct& jpeg, ErrorHandler& errors, const Picture& p
   return true;
 }
 
-bool start_reading(jpeg_decompress_struct& jpeg, ErrorHandler& errors, std::span<const std::byte> bytes) {
+bool start_reading(jpeg_decompress_struct& jpeg, JpegErrors& errors, std::span<const std::byte> bytes) {
   if (setjmp(errors.jump) != 0) return false;  // NOLINT(cert-err52-cpp)
   jpeg_create_decompress(&jpeg);
   jpeg_mem_src(&jpeg, reinterpret_cast<const unsigned char*>(bytes.data()),
@@ -71,7 +45,7 @@ bool start_reading(jpeg_decompress_struct& jpeg, ErrorHandler& errors, std::span
   return true;
 }
 
-bool read_rows(jpeg_decompress_struct& jpeg, ErrorHandler& errors, Picture& picture) {
+bool read_rows(jpeg_decompress_struct& jpeg, JpegErrors& errors, Picture& picture) {
   if (setjmp(errors.jump) != 0) return false;  // NOLINT(cert-err52-cpp)
   jpeg.dct_method = JDCT_ISLOW;
   jpeg.out_color_space = picture.channels == 1 ? JCS_GRAYSCALE : JCS_RGB;
@@ -88,7 +62,7 @@ bool read_rows(jpeg_decompress_struct& jpeg, ErrorHandler& errors, Picture& pict
 
 std::vector<std::byte> encode_jpeg(const Picture& picture, int quality) {
   ISOHF_ASSERT((picture.channels == 1 || picture.channels == 3) && quality >= 1 && quality <= 100);
-  ErrorHandler errors;
+  JpegErrors errors;
   jpeg_compress_struct jpeg{};
   jpeg.err = &errors.base;
   unsigned char* bytes = nullptr;
@@ -102,7 +76,7 @@ std::vector<std::byte> encode_jpeg(const Picture& picture, int quality) {
 }
 
 Picture decode_jpeg(std::span<const std::byte> bytes, int most) {
-  ErrorHandler errors;
+  JpegErrors errors;
   jpeg_decompress_struct jpeg{};
   jpeg.err = &errors.base;
   const std::unique_ptr<jpeg_decompress_struct, decltype(&jpeg_destroy_decompress)> owner(&jpeg,

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "isohf/surface/photo/photo_source.h"
+
+namespace isohf {
+
+/// Opens a picture of the ground: PNG, JPEG and TIFF natively, other formats through OpenImageIO (oiio_module.h). Grey,
+/// RGB or RGBA of 8 or 16 bits or floats, and palettes of 8 bits, are delivered as 8-bit sRGB. Light (OpenEXR, PFM) is
+/// coded as sRGB, any other numbers are taken to be so. Four channels of which the fourth is no alpha lose it, with a
+/// warning. The georeference is that of GeoTIFF tags, else of a world file and a .prj beside the picture.
+/// Memory: what set_cache_bytes allows, one row of blocks at least; interlaced PNG and progressive JPEG are decoded
+/// whole by their libraries.
+/// Throws Error naming the path: kIo (missing), kUnsupported (no module, unknown format, 2 or more than 4 channels, a
+/// rotated or South-up georeference), kCorrupt.
+[[nodiscard]] std::unique_ptr<PhotoSource> open_photo(const std::string& path);
+
+/// A picture's decoder behind the photo's cache, for one thread at a time. Errors carry no path.
+class PhotoRows {
+ public:
+  PhotoRows() = default;
+  PhotoRows(const PhotoRows&) = delete;
+  PhotoRows& operator=(const PhotoRows&) = delete;
+  virtual ~PhotoRows() = default;
+
+  /// Rows [row, row + rows) as 8-bit sRGB. Where rows are decoded in order, going back begins again at the first.
+  virtual void read(std::int64_t row, std::int64_t rows, std::span<std::uint8_t> samples) = 0;
+};
+
+/// Each fills `info` but for path, and block_height and random_access where rows are decoded one by one in order.
+[[nodiscard]] std::unique_ptr<PhotoRows> open_png_rows(PhotoInfo& info);
+[[nodiscard]] std::unique_ptr<PhotoRows> open_jpeg_rows(PhotoInfo& info);
+[[nodiscard]] std::unique_ptr<PhotoRows> open_tiff_rows(PhotoInfo& info);
+[[nodiscard]] std::unique_ptr<PhotoRows> open_oiio_rows(PhotoInfo& info);
+
+/// The channels delivered of a picture that has `stored`, of which number `alpha` is opacity (-1: none is): as many, or
+/// 3 of 4 with a warning. Throws Error{kUnsupported}.
+[[nodiscard]] int photo_channels(int stored, int alpha, PhotoInfo& info);
+/// Warns where a picture's orientation tag (TIFF 6.0) asks for turning it.
+void note_orientation(int orientation, PhotoInfo& info);
+/// Samples of uint8, uint16, float16 or float32 as 8 bits, rounded; `is_light`: floats are light, but for a fourth
+/// channel. Keeps the first `kept` channels of pixels of `stored`.
+void photo_samples(SampleType type, std::span<const std::byte> raw, int stored, int kept, bool is_light,
+                   std::span<std::uint8_t> samples);
+
+}  // namespace isohf

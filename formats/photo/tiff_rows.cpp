@@ -1,0 +1,140 @@
+#include <fmt/format.h>
+#include <tiff.h>
+
+#include <algorithm>
+#include <array>
+#include <memory>
+#include <vector>
+
+#include "formats/files/raw_file.h"
+#include "formats/photo/photo.h"
+#include "formats/tiff/geotiff_keys.h"
+#include "formats/tiff/tiff_blocks.h"
+#include "formats/tiff/tiff_file.h"
+#include "isohf/error.h"
+
+namespace isohf {
+namespace {
+
+[[noreturn]] void refuse(const std::string& what) {
+  throw Error(ErrorCode::kUnsupported,
+              what +
+                  "; photos have 8 or 16 bits or floats, grey, RGB or of a palette: gdal_translate -ot Byte makes "
+                  "such of others");
+}
+
+SampleType sample_type_of(const TiffLayout& layout) {
+  const bool is_unsigned = layout.sample_format == SAMPLEFORMAT_UINT || layout.sample_format == SAMPLEFORMAT_VOID;
+  const int bits = layout.bits_per_sample;
+  if (is_unsigned && bits == 8) return SampleType::kUint8;
+  if (is_unsigned && bits == 16) return SampleType::kUint16;
+  if (layout.sample_format == SAMPLEFORMAT_IEEEFP && bits == 16) return SampleType::kFloat16;
+  if (layout.sample_format == SAMPLEFORMAT_IEEEFP && bits == 32) return SampleType::kFloat32;
+  refuse(fmt::format("has {} samples of {} bits",
+                     is_unsigned                                   ? "unsigned"
+                     : layout.sample_format == SAMPLEFORMAT_IEEEFP ? "floating"
+                                                                   : "signed or complex",
+                     bits));
+}
+
+/// Interleaved samples of a pixel as columns of their own, so that one reader delivers all.
+TiffLayout spread(TiffLayout layout) {
+  layout.width *= layout.interleaved();
+  layout.block_width *= layout.interleaved();
+  if (!layout.separate) layout.samples_per_pixel = 1;
+  return layout;
+}
+
+class TiffRows final : public PhotoRows {
+ public:
+  explicit TiffRows(PhotoInfo& info) : file_(info.path) {
+    TiffMainImage image = open_main_image(file_);
+    const TiffLayout layout = image.handle->read_layout();
+    describe(*image.handle, layout, info);
+    const std::uint32_t directory = image.directories.main;
+    const int planes = layout.separate ? kept_ : 1;
+    for (int plane = 0; plane < planes; ++plane) {
+      if (plane > 0) image = open_image(file_, directory);
+      planes_.push_back(std::make_unique<TiffBlocks>(file_, spread(layout), std::move(image), plane));
+    }
+    info.random_access = layout.tiled || layout.block_height < layout.height;
+    const std::int64_t unit = planes_.front()->unit_rows();
+    info.block_height = std::min(std::max<std::int64_t>(info.block_height / unit, 1) * unit, layout.height);
+    for (const auto& blocks : planes_) blocks->limit_cache(0);  // whole rows of blocks are read
+    width_ = layout.width;
+  }
+
+  void read(std::int64_t row, std::int64_t rows, std::span<std::uint8_t> samples) override {
+    if (planes_.size() == 1 && palette_.empty()) {
+      read_plane(0, row, rows, stored_, kept_, samples);
+    } else {
+      plane_.resize(static_cast<std::size_t>(width_ * rows));
+      for (std::size_t channel = 0; channel < planes_.size(); ++channel) {
+        read_plane(channel, row, rows, 1, 1, plane_);
+        for (std::size_t i = 0; i < plane_.size() && palette_.empty(); ++i) {
+          samples[i * planes_.size() + channel] = plane_[i];
+        }
+      }
+      for (std::size_t i = 0; i < plane_.size() && !palette_.empty(); ++i) {
+        std::copy_n(palette_[plane_[i]].begin(), 3, samples.begin() + static_cast<std::ptrdiff_t>(3 * i));
+      }
+    }
+    if (!inverted_) return;
+    for (std::uint8_t& sample : samples) sample = static_cast<std::uint8_t>(255 - sample);
+  }
+
+ private:
+  void describe(TiffHandle& handle, const TiffLayout& layout, PhotoInfo& info) {
+    info.format = "tiff";
+    info.width = layout.width;
+    info.height = layout.height;
+    stored_ = layout.samples_per_pixel;
+    inverted_ = layout.photometric == PHOTOMETRIC_MINISWHITE;
+    if (layout.photometric == PHOTOMETRIC_PALETTE) {
+      if (stored_ != 1 || layout.bits_per_sample != 8) {
+        refuse(fmt::format("has a palette for {} samples of {} bits", stored_, layout.bits_per_sample));
+      }
+      palette_ = handle.read_palette();
+    }
+    const bool is_read = inverted_ || !palette_.empty() || layout.photometric == PHOTOMETRIC_MINISBLACK ||
+                         layout.photometric == PHOTOMETRIC_RGB ||
+                         (layout.photometric == PHOTOMETRIC_YCBCR && layout.compression == COMPRESSION_JPEG);
+    kept_ = photo_channels(stored_, layout.alpha_sample, info);
+    if (!is_read) refuse(fmt::format("has colours of TIFF's photometric interpretation {}", layout.photometric));
+    type_ = sample_type_of(layout);
+    info.channels = palette_.empty() ? kept_ : 3;
+    note_orientation(layout.orientation, info);
+    const GeoTiffPlace place = place_from_geotiff(handle.read_tags().geo, layout.height);
+    if (!place.placed || !place.georeference.has_origin) return;
+    if (place.rows_from_south) {
+      throw Error(ErrorCode::kUnsupported, "its rows run from South to North; turn it first");
+    }
+    info.georeference = place.georeference;
+  }
+
+  void read_plane(std::size_t plane, std::int64_t row, std::int64_t rows, int stored, int kept,
+                  std::span<std::uint8_t> samples) {
+    raw_.resize(static_cast<std::size_t>(width_ * stored * rows) * size_bytes(type_));
+    planes_[plane]->read({0, row, width_ * stored, rows}, raw_);
+    photo_samples(type_, raw_, stored, kept, false, samples);
+  }
+
+  RawFile file_;
+  std::vector<std::unique_ptr<TiffBlocks>> planes_;
+  std::int64_t width_ = 0;
+  int stored_ = 0;  ///< samples of a pixel
+  int kept_ = 0;
+  bool inverted_ = false;  ///< 0 is white
+  SampleType type_ = SampleType::kUint8;
+  std::vector<std::array<std::uint8_t, 3>> palette_;
+  std::vector<std::byte> raw_;
+  std::vector<std::uint8_t> plane_;  ///< one channel, or places in the palette
+};
+
+}  // namespace
+
+std::unique_ptr<PhotoRows> open_tiff_rows(PhotoInfo& info) {
+  return std::make_unique<TiffRows>(info);
+}
+
+}  // namespace isohf
