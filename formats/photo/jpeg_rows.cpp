@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "formats/photo/photo.h"
-#include "isohf/archive/textures/jpeg_errors.h"
+#include "isohf/base/jpeg_errors.h"
 #include "isohf/error.h"
 
 namespace isohf {

@@ -3,9 +3,9 @@
 #include <cstdlib>
 #include <memory>
 
-#include "isohf/archive/textures/jpeg_errors.h"
 #include "isohf/archive/textures/picture_codec.h"
 #include "isohf/base/assert.h"
+#include "isohf/base/jpeg_errors.h"
 #include "isohf/error.h"
 
 namespace isohf {
