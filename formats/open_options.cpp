@@ -9,36 +9,12 @@
 #include <string>
 #include <type_traits>
 
+#include "isohf/base/sample.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
-#include "isohf/surface/source/sample_types.h"
 
 namespace isohf {
 namespace {
-
-template <typename T>
-std::optional<double> integer_as_stored(double value) {
-  const auto lowest = static_cast<double>(std::numeric_limits<T>::min());
-  const auto highest = static_cast<double>(std::numeric_limits<T>::max());
-  if (!(value >= lowest && value <= highest) || std::trunc(value) != value) return std::nullopt;
-  return value;
-}
-
-/// Rounds to a binary format of `digits` significant bits whose largest finite value is `highest` and whose smallest
-/// step is 2^`lowest_exponent`. Decimal texts of the largest value round up past it (GDAL writes 3.40282346638529e+38),
-/// up to half a step; those mean the largest value.
-std::optional<double> float_as_stored(double value, int digits, double highest, int lowest_exponent) {
-  if (!std::isfinite(value)) return value;
-  int exponent = 0;
-  std::frexp(value, &exponent);  // |value| < 2^exponent
-  const int step = std::max(exponent - digits, lowest_exponent);
-  const double rounded = std::ldexp(std::nearbyint(std::ldexp(value, -step)), step);
-  if (std::abs(rounded) <= highest) return rounded;
-  int top = 0;
-  std::frexp(highest, &top);
-  if (std::abs(value) <= highest + std::ldexp(0.5, top - digits)) return std::copysign(highest, value);
-  return std::nullopt;
-}
 
 void require_finite(const std::optional<double>& value, const SourceInfo& info, const char* what) {
   if (value && !std::isfinite(*value)) {
@@ -80,19 +56,13 @@ void override_spacing(SourceInfo& info, double spacing_m) {
 }  // namespace
 
 std::optional<double> void_value_as_stored(SampleType type, double value) {
-  return with_stored_type(type, [value](auto stored) -> std::optional<double> {
-    using T = decltype(stored);
-    if constexpr (std::is_same_v<T, StoredHalf>) {
-      return float_as_stored(value, 11, 65504.0, -24);
-    } else if constexpr (std::is_same_v<T, float>) {
-      return float_as_stored(value, std::numeric_limits<float>::digits,
-                             static_cast<double>(std::numeric_limits<float>::max()), -149);
-    } else if constexpr (std::is_same_v<T, double>) {
-      return value;
-    } else {
-      return integer_as_stored<T>(value);
-    }
-  });
+  if (!std::isfinite(value)) return is_floating(type) ? std::optional(value) : std::nullopt;
+  const double nearest = nearest_sample(type, value);
+  if (!is_floating(type)) return nearest == value ? std::optional(value) : std::nullopt;
+  // Decimal texts of the largest value round up past it (GDAL writes 3.40282346638529e+38), up to half a step.
+  const double most = sample_range(type).second;
+  if (std::abs(value) > most + (most - previous_sample(type, most)) / 2.0) return std::nullopt;
+  return nearest;
 }
 
 void apply_open_options(SourceInfo& info, const OpenOptions& options) {

@@ -12,7 +12,7 @@
 
 #include "formats/open_options.h"
 #include "isohf/base/assert.h"
-#include "isohf/surface/source/sample_types.h"
+#include "isohf/base/sample.h"
 
 namespace isohf {
 namespace {
@@ -20,7 +20,7 @@ namespace {
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// A stored sample as a number.
+/// A stored sample as a number, for loops over one type.
 template <typename T>
 double load(const std::byte* at) {
   return static_cast<double>(number_of(stored_at<T>(at)));
@@ -42,15 +42,9 @@ struct Limits {
 
 /// Of an integer type; both are 0 for floating ones.
 Limits limits_of(SampleType type) {
-  return with_stored_type(type, [](auto sample) -> Limits {
-    using T = decltype(sample);
-    if constexpr (std::is_integral_v<T>) {
-      return {static_cast<double>(std::numeric_limits<T>::lowest()),
-              static_cast<double>(std::numeric_limits<T>::max())};
-    } else {
-      return {};
-    }
-  });
+  if (is_floating(type)) return {};
+  const auto [lowest, highest] = sample_range(type);
+  return {lowest, highest};
 }
 
 /// Whether some sample of this kind could be an elevation of that raw number.
@@ -125,21 +119,7 @@ std::optional<double> common_void(const std::vector<SampleKind>& kinds, SampleTy
 
 std::vector<std::byte> sample_of(SampleType type, double number) {
   std::vector<std::byte> bytes(size_bytes(type));
-  with_stored_type(type, [&](auto zero) {
-    using T = decltype(zero);
-    if constexpr (std::is_same_v<T, StoredHalf>) {
-      std::uint16_t bits = 0x7E00;  // a NaN
-      for (std::uint32_t candidate = 0; std::isfinite(number) && candidate < 0x10000; ++candidate) {
-        if (static_cast<double>(float_from_half(static_cast<std::uint16_t>(candidate))) == number) {
-          bits = static_cast<std::uint16_t>(candidate);
-        }
-      }
-      std::memcpy(bytes.data(), &bits, sizeof(bits));
-    } else {
-      const T value = static_cast<T>(number);
-      std::memcpy(bytes.data(), &value, sizeof(value));
-    }
-  });
+  store_sample(type)(number, bytes.data());
   return bytes;
 }
 
@@ -317,14 +297,8 @@ void numbers_from_samples(const SampleKind& kind, std::span<const std::byte> raw
 
 void samples_from_numbers(SampleType type, std::span<const double> numbers, std::span<std::byte> raw) {
   ISOHF_ASSERT(type == SampleType::kFloat32 || type == SampleType::kFloat64);
-  if (type == SampleType::kFloat64) {
-    std::memcpy(raw.data(), numbers.data(), raw.size());
-    return;
-  }
-  for (std::size_t i = 0; i < numbers.size(); ++i) {
-    const auto value = static_cast<float>(numbers[i]);
-    std::memcpy(raw.data() + i * sizeof(float), &value, sizeof(value));
-  }
+  const StoreSample store = store_sample(type);
+  for (std::size_t i = 0; i < numbers.size(); ++i) store(numbers[i], raw.data() + i * size_bytes(type));
 }
 
 }  // namespace isohf

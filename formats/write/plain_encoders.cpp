@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "formats/write/encoders.h"
+#include "isohf/base/sample.h"
 #include "isohf/error.h"
-#include "isohf/surface/source/sample_types.h"
 
 namespace isohf {
 namespace {

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "formats/registry.h"
+#include "isohf/base/sample.h"
 #include "isohf/raster.h"
-#include "isohf/surface/source/sample_types.h"
 #include "support/trigonometric_field.h"
 
 namespace {

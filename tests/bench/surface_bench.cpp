@@ -16,13 +16,13 @@
 #include "isohf/archive/codec/tile_encoder.h"
 #include "isohf/archive/container/content_hash.h"
 #include "isohf/archive/deflate/deflate.h"
+#include "isohf/base/sample.h"
 #include "isohf/raster.h"
 #include "isohf/surface/resample/kernels.h"
 #include "isohf/surface/resample/prefilter.h"
 #include "isohf/surface/resample/tile_resampler.h"
 #include "isohf/surface/shade/normals.h"
 #include "isohf/surface/shade/shadow_hull.h"
-#include "isohf/surface/source/sample_types.h"
 #include "isohf/surface/source/source_statistics.h"
 
 namespace {

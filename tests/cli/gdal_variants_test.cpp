@@ -9,8 +9,8 @@
 #include <nlohmann/json.hpp>
 
 #include "formats/registry.h"
+#include "isohf/base/sample.h"
 #include "isohf/raster.h"
-#include "isohf/surface/source/sample_types.h"
 #include "support/gdal_answers.h"
 #include "support/run_program.h"
 #include "support/temporary_folder.h"

@@ -14,8 +14,8 @@
 
 #include "formats/registry.h"
 #include "formats/write/raster_sink.h"
+#include "isohf/base/sample.h"
 #include "isohf/raster.h"
-#include "isohf/surface/source/sample_types.h"
 #include "support/degree_grid.h"
 #include "support/run_program.h"
 #include "support/samples.h"

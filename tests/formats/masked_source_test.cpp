@@ -10,8 +10,8 @@
 
 #include "formats/readers.h"
 #include "formats/tiff_bytes.h"
+#include "isohf/base/sample.h"
 #include "isohf/error.h"
-#include "isohf/surface/source/sample_types.h"
 #include "support/memory_source.h"
 #include "support/temporary_folder.h"
 

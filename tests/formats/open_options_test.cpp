@@ -5,9 +5,9 @@
 #include <cmath>
 #include <limits>
 
+#include "isohf/base/sample.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
-#include "isohf/surface/source/sample_types.h"
 
 namespace isohf {
 namespace {

@@ -6,9 +6,9 @@
 #include <cmath>
 
 #include "formats/tiff_bytes.h"
+#include "isohf/base/sample.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
-#include "isohf/surface/source/sample_types.h"
 #include "support/samples.h"
 #include "support/temporary_folder.h"
 

@@ -145,6 +145,21 @@ TEST_F(SurfaceInDegrees, FindsTheSameByDegreesAndByTheSourcesCoordinates) {
   EXPECT_NEAR(back.latitude, 45.1, 1e-9);
 }
 
+TEST_F(SurfaceInDegrees, RowsStopWhereTheJobIsCancelled) {
+  convert_to(ProjectionKind::kUtm);
+  const ArchiveReader archive(folder / "a.isohf");
+  const std::atomic<bool> cancel = true;
+  Job job;
+  job.cancel = &cancel;
+  RowReader rows(archive, natural_grid(archive.metadata()));
+  try {
+    rows.read_all([](std::int64_t, std::span<const double>) {}, job);
+    ADD_FAILURE() << "went on";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::kCancelled);
+  }
+}
+
 TEST_F(SurfaceInDegrees, RowsOfAWorldGridAreTheTriangles) {
   convert_to(ProjectionKind::kUtm);
   const ArchiveReader archive(folder / "a.isohf");
@@ -152,6 +167,9 @@ TEST_F(SurfaceInDegrees, RowsOfAWorldGridAreTheTriangles) {
   const SampleGrid grid = grid_over(archive.metadata().valid, true, GridSize{40, 30}, {});
   RowReader rows(archive, grid, RestoreMethod::kBarycentric);
   std::int64_t rows_seen = 0;
+  Job job;
+  job.threads = 2;
+  job.progress = [&](const Progress& at) { rows_seen = at.done; };
   rows.read_all(
       [&](std::int64_t first, std::span<const double> elevations) {
         for (std::size_t i = 0; i < elevations.size(); ++i) {
@@ -165,7 +183,7 @@ TEST_F(SurfaceInDegrees, RowsOfAWorldGridAreTheTriangles) {
           }
         }
       },
-      [&](std::int64_t done) { rows_seen = done; });
+      job);
   EXPECT_EQ(rows_seen, 30);
   const std::optional<Georeference> where = grid_georeference(archive.metadata(), grid);
   ASSERT_TRUE(where.has_value());

@@ -7,8 +7,8 @@
 
 #include "formats/registry.h"
 #include "formats/write/raster_sink.h"
+#include "isohf/base/sample.h"
 #include "isohf/raster.h"
-#include "isohf/surface/source/sample_types.h"
 #include "support/samples.h"
 
 /// Raster files, written and read whole.

@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
+#include "isohf/base/sample.h"
 #include "isohf/raster.h"
-#include "isohf/surface/source/sample_types.h"
 
 namespace isohf::test {
 

@@ -220,10 +220,11 @@ class Exporter {
 
  private:
   void scan(const char* stage, const RowReader::Take& take) {
-    RowReader(archive_, grid_.samples, options_.method()).read_all(take, [&](std::int64_t rows) {
-      display_.update(stage, "rows", rows, grid_.samples.height);
-      if (cancel_.load()) throw Error(ErrorCode::kCancelled, "interrupted");
-    });
+    Job job;
+    job.threads = options_.work.threads;
+    job.cancel = &watch_interrupts();
+    job.progress = [&](const Progress& at) { display_.update(stage, at.unit, at.done, at.total); };
+    RowReader(archive_, grid_.samples, options_.method()).read_all(take, job);
   }
 
   SampleMapping choose_mapping() {
@@ -255,7 +256,6 @@ class Exporter {
   const ExportOptions& options_;
   const ArchiveReader& archive_;
   ExportGrid grid_;
-  const std::atomic<bool>& cancel_ = watch_interrupts();
   ProgressDisplay display_;
 };
 

@@ -11,10 +11,10 @@
 #include "commands/command.h"
 #include "formats/registry.h"
 #include "interrupt.h"
+#include "isohf/base/sample.h"
 #include "isohf/convert/frame/source_frame.h"
 #include "isohf/error.h"
 #include "isohf/projection/projection_wkt.h"
-#include "isohf/restore/residual_codec.h"
 #include "isohf/restore/sample_grids.h"
 #include "isohf/surface.h"
 #include "open_archive.h"
@@ -133,7 +133,11 @@ class Restorer {
       : options_(options),
         archive_(archive),
         grid_(grid),
-        display_(options.work.progress, options.common.quiet, options.common.verbose) {}
+        display_(options.work.progress, options.common.quiet, options.common.verbose) {
+    job_.threads = options.work.threads;
+    job_.cancel = &watch_interrupts();
+    job_.progress = [this](const Progress& at) { display_.update("restore", at.unit, at.done, at.total); };
+  }
 
   Restored run(bool is_lossless) { return is_lossless ? run_lossless() : run_surface(); }
 
@@ -143,11 +147,6 @@ class Restorer {
     std::unique_ptr<RasterSink> sink = create_raster(options_.raster.output, spec);
     if (!options_.common.quiet) warn_of_lost_scale(options_.raster.output, mapping);
     return sink;
-  }
-
-  void report(std::int64_t rows) {
-    display_.update("restore", "rows", rows, grid_.height);
-    if (cancel_.load()) throw Error(ErrorCode::kCancelled, "interrupted");
   }
 
   Restored run_lossless() {
@@ -179,12 +178,13 @@ class Restorer {
         if (const auto refused = convert_exactly(kept.type, raw, record.void_values, voids_to_nan, written.type, out)) {
           const auto sample = static_cast<std::int64_t>(*refused);
           refuse_sample(options_.raster.output, written.type, sample % grid_.width, row + sample / grid_.width,
-                        load_sample(kept.type, raw.data() + *refused * size_bytes(kept.type)), "write .tif");
+                        load_sample(kept.type)(raw.data() + *refused * size_bytes(kept.type)), "write .tif");
         }
         sink->write_rows(out);
       }
       row += static_cast<std::int64_t>(count) / record.width;
-      report(row);
+      job_.report({"restore", "rows", row, grid_.height});
+      job_.throw_if_cancelled();
     }
     sink->finish();
     return {{}, true, sink->files()};
@@ -206,7 +206,7 @@ class Restorer {
               sink->write_rows(store_rows(store, mapping.type, options_.raster.output, grid_.width, row, elevations,
                                           restored.counts));
             },
-            [&](std::int64_t rows) { report(rows); });
+            job_);
     sink->finish();
     restored.files = sink->files();
     return restored;
@@ -215,8 +215,8 @@ class Restorer {
   const RestoreOptions& options_;
   const ArchiveReader& archive_;
   SampleGrid grid_;
-  const std::atomic<bool>& cancel_ = watch_interrupts();
   ProgressDisplay display_;
+  Job job_;
 };
 
 /// First sample and spacing, for JSON.

@@ -13,7 +13,7 @@
 #include "formats/write/raster_sink.h"
 #include "interrupt.h"
 #include "isohf/error.h"
-#include "isohf/surface.h"
+#include "isohf/shade.h"
 #include "open_archive.h"
 #include "options/describe.h"
 #include "options/option_values.h"
@@ -21,8 +21,6 @@
 #include "output/json_output.h"
 #include "output/output_kinds.h"
 #include "output/standard_output.h"
-#include "shade/shade_picture.h"
-#include "work_arena.h"
 
 namespace isohf::cli {
 namespace {
@@ -30,11 +28,6 @@ namespace {
 using nlohmann::ordered_json;
 
 constexpr std::int64_t kMaxPixels = 1 << 20;  ///< of a side
-constexpr std::int64_t kDefaultPixels = 2048;
-/// Eq. 16's k where the relief is that of mountains; in flatter lands this share of the elevation range.
-constexpr double kDefaultSoftness = 2.0;
-constexpr double kDefaultSoftnessShare = 0.005;
-
 constexpr const char* kFooter =
     R"(The picture covers what the input covered, North at the top; where there is no elevation it is transparent.
 Shadows are those of a sun due West or due East. Shadow seeds in the archive (convert --shadow-seeds) are used
@@ -47,16 +40,14 @@ Examples:
   isohf shade dem.isohf -o map.png --hillshade --texture
   isohf shade dem.isohf -o shadows.tif --palette gray --sun-elevation 8)";
 
-struct ShadeOptions {
+struct ShadeCommand {
   CommonOptions common;
   WorkOptions work;
   std::string archive;
   std::string output;
   bool overwrite = false;
   bool no_shadow = false;
-  std::optional<std::pair<std::int64_t, std::int64_t>> size;
-  std::optional<double> softness;
-  ShadeRequest request;
+  ShadeOptions picture;
 };
 
 double parse_sun(const std::string& text) {
@@ -67,9 +58,9 @@ double parse_sun(const std::string& text) {
   return degrees;
 }
 
-std::optional<ShadeOptions> parse(const Arguments& arguments) {
-  ShadeOptions options;
-  ShadeRequest& request = options.request;
+std::optional<ShadeCommand> parse(const Arguments& arguments) {
+  ShadeCommand options;
+  ShadeOptions& request = options.picture;
   CommandLine line("shade", "Draws a picture of an archive's surface with the shadows that it casts.");
   line.group("Arguments");
   line.positional("ARCHIVE", "-i,--input", "Archive to draw", options.archive);
@@ -79,52 +70,36 @@ std::optional<ShadeOptions> parse(const Arguments& arguments) {
   line.option("--sun-elevation", "DEG", "Height of the sun above the horizon, 0.01 to below 90 (default 15)",
               [&](const std::string& text) { request.sun_elevation_deg = parse_sun(text); });
   line.option("--azimuth", "E|W", "Put the sun in the East or the West (default W)", [&](const std::string& text) {
-    request.travel = parse_word(text, {"E", "W"}) == 0 ? LightTravel::kWestward : LightTravel::kEastward;
+    request.sun = parse_word(text, {"E", "W"}) == 0 ? SunSide::kEast : SunSide::kWest;
   });
   line.flag("--hillshade", "Shade slopes by how they face the sun", request.hillshade);
   line.flag("--no-shadow", "Leave out the shadows that land casts on land beyond it", options.no_shadow);
   line.option("--shadow-softness", "K",
               "The sun's apparent size at the caster's distance, vertical units (default 2, or 0.5 % of the elevation "
               "range where that is less)",
-              [&](const std::string& text) { options.softness = parse_positive_number(text); });
+              [&](const std::string& text) { request.softness = parse_positive_number(text); });
   line.group("Picture");
   line.option("--size", "WxH", "Pixels (default: one for each lattice step, at most 2048 a side)",
-              [&](const std::string& text) { options.size = parse_size(text, 1, kMaxPixels); });
+              [&](const std::string& text) { request.size = parse_size(text, 1, kMaxPixels); });
   line.option("--exaggeration", "F", "Draw heights F times as high (default 1)",
               [&](const std::string& text) { request.exaggeration = parse_positive_number(text); });
   line.flag("--texture", "Show the archive's textures; where there is none, the palette's colours", request.texture);
-  line.option("--palette", "NAME", "Colours of the ground: elevation or gray (default elevation)",
-              [&](const std::string& text) {
-                request.palette = static_cast<PaletteName>(parse_word(text, {"elevation", "gray"}));
-              });
+  line.option(
+      "--palette", "NAME", "Colours of the ground: elevation or gray (default elevation)",
+      [&](const std::string& text) {
+        request.palette = parse_word(text, {"elevation", "gray"}) == 0 ? ShadePalette::kElevation : ShadePalette::kGray;
+      });
   add_work_options(line, options.work);
   add_common_options(line, options.common);
   line.footer(kFooter);
   if (!line.parse(arguments)) return std::nullopt;
   line.require("ARCHIVE", options.archive);
   line.require("OUTPUT", options.output);
-  if (options.no_shadow && options.softness) {
+  if (options.no_shadow && request.softness) {
     throw Error(ErrorCode::kInvalidArgument, "shade: --shadow-softness and --no-shadow exclude each other");
   }
   request.shadows = !options.no_shadow;
   return options;
-}
-
-void choose_size(const ArchiveReader& archive, const std::optional<std::pair<std::int64_t, std::int64_t>>& size,
-                 ShadeRequest& request) {
-  if (size) {
-    request.width = size->first;
-    request.height = size->second;
-    return;
-  }
-  const WorldBounds& bounds = archive.metadata().valid;
-  const double longest = std::max(bounds.x1 - bounds.x0, bounds.z1 - bounds.z0);
-  const double pixel = std::max(2.0 * archive.grid().sigma_x(), longest / static_cast<double>(kDefaultPixels));
-  const auto pixels = [pixel](double length) {
-    return std::clamp<std::int64_t>(static_cast<std::int64_t>(std::lround(length / pixel)), 1, kDefaultPixels);
-  };
-  request.width = pixels(bounds.x1 - bounds.x0);
-  request.height = pixels(bounds.z1 - bounds.z0);
 }
 
 /// 1 where either unit is not known.
@@ -134,20 +109,13 @@ double elevation_units_per_world_unit(const Metadata& metadata) {
   return unit ? 1.0 / unit->metres : 1.0;
 }
 
-double default_softness(const Metadata& metadata) {
-  const Statistics& statistics = metadata.statistics;
-  const double range = statistics.min && statistics.max ? *statistics.max - *statistics.min : 0.0;
-  return range > 0.0 ? std::min(kDefaultSoftness, kDefaultSoftnessShare * range) : kDefaultSoftness;
-}
-
 /// Where the picture lies, for GeoTIFF; nullopt where the source did not say.
-std::optional<Georeference> georeference_of(const Metadata& metadata, const ShadeRequest& request) {
+std::optional<Georeference> georeference_of(const Metadata& metadata, const GridSize& size) {
   const SourceRecord& source = metadata.source;
   if (!source.origin_x || !source.origin_y || !(source.crs_spacing_x > 0.0) || !(source.crs_spacing_y > 0.0)) {
     return std::nullopt;
   }
-  auto found =
-      grid_georeference(metadata, grid_over(metadata.valid, true, GridSize{request.width, request.height}, {}));
+  auto found = grid_georeference(metadata, grid_over(metadata.valid, true, size, {}));
   found->registration = Registration::kArea;
   if (is_warped(metadata)) return found;
   found->system.vertical_datum.clear();
@@ -155,37 +123,36 @@ std::optional<Georeference> georeference_of(const Metadata& metadata, const Shad
   return found;
 }
 
-int run(ShadeOptions options) {
+int run(ShadeCommand options) {
   const auto start = std::chrono::steady_clock::now();
   const CommonOptions& common = options.common;
   check_raster_output({options.archive}, options.output, options.overwrite);
   const ArchiveReader archive = open_archive(options.archive);
   print_warnings(archive.warnings());
-  ShadeRequest& request = options.request;
-  choose_size(archive, options.size, request);
+  ShadeOptions& request = options.picture;
+  const GridSize size = request.size.value_or(shade_size(archive));
   request.elevation_units_per_world_unit = elevation_units_per_world_unit(archive.metadata());
-  request.softness = options.softness.value_or(default_softness(archive.metadata()));
 
   RasterSpec spec;
-  spec.width = request.width;
-  spec.height = request.height;
+  spec.width = size.first;
+  spec.height = size.second;
   spec.sample_type = SampleType::kUint8;
   spec.channels = static_cast<int>(kShadeChannels);
-  spec.georeference = georeference_of(archive.metadata(), request);
+  spec.georeference = georeference_of(archive.metadata(), size);
   if (is_warped(archive.metadata()) && !spec.georeference->system.epsg) {
     spec.projection = archive.metadata().projection->spec;
   }
   spec.overwrite = options.overwrite;
   const auto sink = create_raster(options.output, spec);
 
-  const std::atomic<bool>& cancel = watch_interrupts();
-  WorkArena arena(options.work.threads);
-  const ShadeReport report = arena.execute([&] {
-    ProgressDisplay display(options.work.progress, common.quiet, common.verbose);
-    return render_shade(
-        archive, request, [&](std::span<const std::uint8_t> rows) { sink->write_rows(std::as_bytes(rows)); },
-        [&](std::int64_t done, std::int64_t total) { display.update("shade", "tiles", done, total); }, cancel);
-  });
+  ProgressDisplay display(options.work.progress, common.quiet, common.verbose);
+  Job job;
+  job.threads = options.work.threads;
+  job.cancel = &watch_interrupts();
+  job.progress = [&](const Progress& at) { display.update(at.stage, at.unit, at.done, at.total); };
+  const ShadeReport report = shade_rows(
+      archive, request, [&](std::span<const std::uint8_t> rows) { sink->write_rows(std::as_bytes(rows)); }, job);
+  display.clear();
   sink->finish();
 
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -194,14 +161,14 @@ int run(ShadeOptions options) {
     out.write(json_text({{"archive", options.archive},
                          {"output", options.output},
                          {"files_written", sink->files()},
-                         {"width", request.width},
-                         {"height", request.height},
+                         {"width", size.first},
+                         {"height", size.second},
                          {"tiles", archive.grid().tile_count()},
                          {"used_shadow_seeds", report.used_seeds},
                          {"seconds", seconds}}));
   } else if (!common.quiet) {
-    out.write(fmt::format("picture      {}: {} x {} pixels of {} tiles in {}{}\n", options.output, request.width,
-                          request.height, describe_count(archive.grid().tile_count()), describe_seconds(seconds),
+    out.write(fmt::format("picture      {}: {} x {} pixels of {} tiles in {}{}\n", options.output, size.first,
+                          size.second, describe_count(archive.grid().tile_count()), describe_seconds(seconds),
                           report.used_seeds ? ", with the archive's shadow seeds" : ""));
   }
   out.finish();
@@ -211,7 +178,7 @@ int run(ShadeOptions options) {
 }  // namespace
 
 int command_shade(const Arguments& arguments) {
-  std::optional<ShadeOptions> options = parse(arguments);
+  std::optional<ShadeCommand> options = parse(arguments);
   return options ? run(std::move(*options)) : static_cast<int>(kExitDone);
 }
 

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "isohf/archive.h"
+#include "isohf/job.h"
 #include "isohf/projection.h"
 #include "isohf/raster.h"
 
@@ -165,8 +166,8 @@ class RowReader {
 
   /// Some whole rows from `first_row` on.
   using Take = std::function<void(std::int64_t first_row, std::span<const double> elevations)>;
-  /// All rows, about a million samples at a time. `progress` is told the rows done, and may throw.
-  void read_all(const Take& take, const std::function<void(std::int64_t rows_done)>& progress = {});
+  /// All rows, about a million samples at a time. Throws Error{kCancelled}.
+  void read_all(const Take& take, const Job& job = {});
 
  private:
   struct State;

@@ -9,11 +9,11 @@
 #include <memory>
 #include <numbers>
 
+#include "isohf/base/sample.h"
 #include "isohf/convert/conversion.h"
 #include "isohf/convert/memory_plan.h"
 #include "isohf/error.h"
 #include "isohf/lattice/barycentric.h"
-#include "isohf/surface/source/sample_types.h"
 #include "isohf/surface/source/source_statistics.h"
 
 namespace isohf {

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 #include <oneapi/tbb/parallel_for.h>
-#include <oneapi/tbb/task_arena.h>
 
 #include <algorithm>
 #include <atomic>
@@ -11,7 +10,6 @@
 #include <utility>
 
 #include "isohf/archive/codec/quantise.h"
-#include "isohf/archive/codec/simd/batch_decoder.h"
 #include "isohf/base/assert.h"
 #include "isohf/error.h"
 #include "isohf/lattice/barycentric.h"
@@ -83,21 +81,12 @@ const GridSampler::TileRow& GridSampler::tile_row(std::int64_t row) {
   TileRow made{row, false, {}};
   made.elevations.resize(static_cast<std::size_t>(grid_.tile_columns()));
   std::atomic<bool> any = false;
-  const auto threads = static_cast<std::size_t>(oneapi::tbb::this_task_arena::max_concurrency());
-  const std::size_t together = std::clamp<std::size_t>(made.elevations.size() / threads, 1, kBatchLanes);
-  const std::size_t groups = (made.elevations.size() + together - 1) / together;
-  oneapi::tbb::parallel_for(std::size_t{0}, groups, [&](std::size_t group) {
-    const std::size_t first = group * together;
-    std::vector<TileIndex> tiles;
-    for (std::size_t column = first; column < std::min(first + together, made.elevations.size()); ++column) {
-      tiles.push_back({static_cast<std::int64_t>(column), row});
-    }
-    const std::vector<TileCodes> codes = read_tiles_(tiles);
-    for (std::size_t i = 0; i < codes.size(); ++i) {
-      std::vector<double>& elevations = made.elevations[first + i];
-      elevations = elevations_of(codes[i], quantisation_);
-      if (std::any_of(elevations.begin(), elevations.end(), [](double h) { return std::isnan(h); })) any = true;
-    }
+  std::vector<TileIndex> tiles;
+  for (std::int64_t column = 0; column < grid_.tile_columns(); ++column) tiles.push_back({column, row});
+  for_each_tile(read_tiles_, tiles, [&](std::size_t i, const TileCodes& codes) {
+    std::vector<double>& elevations = made.elevations[i];
+    elevations = elevations_of(codes, quantisation_);
+    if (std::any_of(elevations.begin(), elevations.end(), [](double h) { return std::isnan(h); })) any = true;
   });
   made.has_voids = any;
   tile_rows_.push_back(std::move(made));

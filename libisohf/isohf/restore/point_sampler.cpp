@@ -108,6 +108,18 @@ ReadTiles tiles_of(const ArchiveReader& archive) {
   return [&archive](std::span<const TileIndex> tiles) { return archive.read_tiles(tiles); };
 }
 
+void for_each_tile(const ReadTiles& read_tiles, std::span<const TileIndex> tiles,
+                   const std::function<void(std::size_t, const TileCodes&)>& use) {
+  const auto threads = static_cast<std::size_t>(oneapi::tbb::this_task_arena::max_concurrency());
+  const std::size_t together = std::clamp<std::size_t>(tiles.size() / threads, 1, kBatchLanes);
+  const std::size_t groups = (tiles.size() + together - 1) / together;
+  oneapi::tbb::parallel_for(std::size_t{0}, groups, [&](std::size_t group) {
+    const std::size_t first = group * together;
+    const std::vector<TileCodes> codes = read_tiles(tiles.subspan(first, std::min(together, tiles.size() - first)));
+    for (std::size_t i = 0; i < codes.size(); ++i) use(first + i, codes[i]);
+  });
+}
+
 PointSampler::PointSampler(const TileGrid& grid, const Quantisation& quantisation, ReadTiles read_tiles,
                            std::uint64_t memory_bytes)
     : grid_(grid), quantisation_(quantisation), read_tiles_(std::move(read_tiles)) {

@@ -16,6 +16,11 @@ namespace isohf {
 using ReadTiles = std::function<std::vector<TileCodes>(std::span<const TileIndex>)>;
 [[nodiscard]] ReadTiles tiles_of(const ArchiveReader& archive);
 
+/// Decodes tiles on all threads of the caller's oneTBB arena, several together in each where there are enough, and
+/// hands them to use(number in `tiles`, codes) on the thread that decoded them.
+void for_each_tile(const ReadTiles& read_tiles, std::span<const TileIndex> tiles,
+                   const std::function<void(std::size_t, const TileCodes&)>& use);
+
 /// What Surface does, for tiles that come from anywhere.
 ///
 /// The points of a call are sorted by tile, runs on one tile together: each tile is decoded once.

@@ -10,7 +10,7 @@
 
 #include "isohf/base/assert.h"
 #include "isohf/base/bytes.h"
-#include "isohf/surface/source/sample_types.h"
+#include "isohf/base/sample.h"
 
 namespace isohf {
 namespace {
@@ -26,8 +26,9 @@ std::size_t context_of(unsigned west_bits, unsigned north_bits) {
   return context;
 }
 
-/// Nearest half-precision value, ties away from zero; the maximum where the number is larger.
-std::uint16_t half_from_double(double value) {
+/// Nearest half-precision value, ties away from zero; the maximum where the number is larger. The format says so
+/// (docs/archive_format.md); everything else rounds ties to even (base/sample.h).
+std::uint16_t predicted_half(double value) {
   const std::uint16_t sign = std::signbit(value) ? 0x8000U : 0U;
   const double size = std::abs(value);
   if (size >= 65504.0) return static_cast<std::uint16_t>(sign | 0x7BFFU);
@@ -55,10 +56,6 @@ struct Integer {
   using Bits = std::make_unsigned_t<T>;
   static Bits key(Bits bits) { return bits; }
   static Bits bits(Bits key) { return key; }
-  static bool reaches(double raw) {
-    return raw >= static_cast<double>(std::numeric_limits<T>::min()) - 0.5 &&
-           raw < static_cast<double>(std::numeric_limits<T>::max()) + 0.5;
-  }
   static Bits nearest(double raw) {
     const double rounded = std::clamp(std::floor(raw + 0.5), static_cast<double>(std::numeric_limits<T>::min()),
                                       static_cast<double>(std::numeric_limits<T>::max()));
@@ -70,8 +67,7 @@ struct Half {
   using Bits = std::uint16_t;
   static Bits key(Bits bits) { return ordered(bits); }
   static Bits bits(Bits key) { return unordered(key); }
-  static bool reaches(double raw) { return std::abs(raw) < 65520.0; }
-  static Bits nearest(double raw) { return half_from_double(raw); }
+  static Bits nearest(double raw) { return predicted_half(raw); }
 };
 
 template <typename T, typename B>
@@ -79,7 +75,6 @@ struct Floating {
   using Bits = B;
   static Bits key(Bits bits) { return ordered(bits); }
   static Bits bits(Bits key) { return unordered(key); }
-  static bool reaches(double raw) { return std::isfinite(static_cast<T>(raw)); }
   static Bits nearest(double raw) {
     constexpr auto kMost = static_cast<double>(std::numeric_limits<T>::max());
     return std::bit_cast<Bits>(static_cast<T>(std::clamp(raw, -kMost, kMost)));
@@ -245,22 +240,6 @@ void decode(const SampleMapping& mapping, std::int64_t width, std::span<const st
 }
 
 }  // namespace
-
-bool store_sample(const SampleMapping& mapping, double elevation, std::byte* raw) {
-  return with_type(mapping.type, [&](auto type) {
-    using Type = decltype(type);
-    const double sample = (elevation - mapping.z_offset) / mapping.z_scale;
-    if (!Type::reaches(sample)) return false;
-    const typename Type::Bits bits = Type::nearest(sample);
-    std::memcpy(raw, &bits, sizeof(bits));
-    return true;
-  });
-}
-
-double load_sample(SampleType type, const std::byte* raw) {
-  return with_stored_type(
-      type, [raw](auto stored) { return static_cast<double>(number_of(stored_at<decltype(stored)>(raw))); });
-}
 
 ResidualPayload encode_residuals(const SampleMapping& mapping, std::int64_t width, std::span<const std::byte> raw,
                                  std::span<const char> is_void, std::span<const double> predicted) {

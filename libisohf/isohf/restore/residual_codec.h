@@ -16,13 +16,6 @@
 
 namespace isohf {
 
-/// The raw sample nearest to an elevation, as `size_bytes(type)` bytes at `raw`; ties upwards. False, and nothing
-/// written, where the type does not reach that far. `elevation` is not NaN.
-bool store_sample(const SampleMapping& mapping, double elevation, std::byte* raw);
-
-/// The number that a raw sample is; exact.
-[[nodiscard]] double load_sample(SampleType type, const std::byte* raw);
-
 /// A member's bytes and where its parts end, so that each can have a Huffman table of its own.
 struct ResidualPayload {
   std::vector<std::byte> bytes;

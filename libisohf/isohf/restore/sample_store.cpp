@@ -4,43 +4,13 @@
 #include <oneapi/tbb/parallel_for.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstring>
-#include <limits>
 #include <tuple>
-#include <type_traits>
 
 #include "isohf/base/assert.h"
-#include "isohf/restore/residual_codec.h"
-#include "isohf/surface/source/sample_types.h"
+#include "isohf/base/sample.h"
 
 namespace isohf {
-namespace {
-
-void store_nan(SampleType type, std::byte* raw) {
-  with_stored_type(type, [raw](auto stored) {
-    using T = decltype(stored);
-    if constexpr (std::is_same_v<T, StoredHalf>) stored.bits = 0x7E00;
-    if constexpr (std::is_floating_point_v<T>) stored = std::numeric_limits<T>::quiet_NaN();
-    std::memcpy(raw, &stored, sizeof stored);
-  });
-}
-
-}  // namespace
-
-std::pair<double, double> sample_range(SampleType type) {
-  return with_stored_type(type, [](auto stored) -> std::pair<double, double> {
-    using T = decltype(stored);
-    if constexpr (std::is_same_v<T, StoredHalf>) {
-      return {-65504.0, 65504.0};  // (2 - 2^-10) * 2^15
-    } else {
-      return {static_cast<double>(std::numeric_limits<T>::lowest()),
-              static_cast<double>(std::numeric_limits<T>::max())};
-    }
-  });
-}
-
 std::optional<double> usual_nodata(SampleType type) {
   if (is_floating(type)) return std::nullopt;
   const auto [low, high] = sample_range(type);
@@ -65,32 +35,25 @@ SampleStore::SampleStore(const SampleMapping& mapping, std::optional<double> nod
 }
 
 SampleStore::Outcome SampleStore::store(double elevation, std::byte* raw) const {
-  const SampleMapping plain{mapping_.type, 1.0, 0.0};
+  const StoreSample put = store_sample(mapping_.type);
   if (std::isnan(elevation)) {
-    if (nodata_) {
-      store_sample(plain, *nodata_, raw);
-      return Outcome::kNodata;
-    }
-    if (!is_floating(mapping_.type)) return Outcome::kRefused;
-    store_nan(mapping_.type, raw);
+    if (!nodata_ && !is_floating(mapping_.type)) return Outcome::kRefused;
+    put(nodata_.value_or(elevation), raw);
     return Outcome::kNodata;
   }
-  std::array<std::byte, sizeof(double)> bytes{};
-  const bool held = store_sample(mapping_, elevation, bytes.data());
-  const double stored = held ? load_sample(mapping_.type, bytes.data()) : 0.0;
-  if (held && stored >= low_ && stored <= high_) {
-    std::copy_n(bytes.begin(), size_bytes(mapping_.type), raw);
+  const double sample = (elevation - mapping_.z_offset) / mapping_.z_scale;
+  const std::optional<double> held = rounded_sample(mapping_.type, sample);
+  if (held && *held >= low_ && *held <= high_) {
+    put(*held, raw);
     return Outcome::kStored;
   }
   if (!clamp_) return Outcome::kRefused;
-  const double sample = (elevation - mapping_.z_offset) / mapping_.z_scale;
-  store_sample(plain, sample < low_ + (high_ - low_) / 2.0 ? low_ : high_, raw);
+  put(sample < low_ + (high_ - low_) / 2.0 ? low_ : high_, raw);
   return Outcome::kClamped;
 }
 
 bool SampleStore::holds(double raw) const {
-  std::array<std::byte, sizeof(double)> bytes{};
-  return store_sample({mapping_.type, 1.0, 0.0}, raw, bytes.data()) && load_sample(mapping_.type, bytes.data()) == raw;
+  return rounded_sample(mapping_.type, raw) == raw;
 }
 
 SampleStore::Result SampleStore::store(std::span<const double> elevations, std::span<std::byte> raw) const {
@@ -116,13 +79,15 @@ std::optional<std::size_t> convert_exactly(SampleType from, std::span<const std:
   const SampleStore store({to, 1.0, 0.0}, std::nullopt, false);
   const std::size_t count = raw.size() / size_bytes(from);
   ISOHF_ASSERT(out.size() == count * size_bytes(to));
+  const LoadSample load = load_sample(from);
+  const LoadSample load_again = load_sample(to);
   for (std::size_t i = 0; i < count; ++i) {
-    const double value = load_sample(from, raw.data() + i * size_bytes(from));
+    const double value = load(raw.data() + i * size_bytes(from));
     std::byte* const at = out.data() + i * size_bytes(to);
     const bool is_nodata = !std::isfinite(value) || std::find(nodata.begin(), nodata.end(), value) != nodata.end();
     const SampleStore::Outcome outcome = store.store(is_nodata && nodata_to_nan ? std::nan("") : value, at);
     const bool same = outcome == SampleStore::Outcome::kNodata ||
-                      (outcome == SampleStore::Outcome::kStored && load_sample(to, at) == value);
+                      (outcome == SampleStore::Outcome::kStored && load_again(at) == value);
     if (!same) return i;
   }
   return std::nullopt;

@@ -11,9 +11,6 @@
 
 namespace isohf {
 
-/// The lowest and highest raw number of a type.
-[[nodiscard]] std::pair<double, double> sample_range(SampleType type);
-
 /// The raw value that stands for nodata in samples of a type; nullopt for floats, which have NaN.
 [[nodiscard]] std::optional<double> usual_nodata(SampleType type);
 

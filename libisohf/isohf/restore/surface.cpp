@@ -6,6 +6,7 @@
 
 #include <algorithm>
 
+#include "isohf/base/arena.h"
 #include "isohf/base/assert.h"
 #include "isohf/error.h"
 #include "isohf/restore/grid_sampler.h"
@@ -122,16 +123,19 @@ void RowReader::read(std::int64_t first, std::int64_t rows, std::span<double> el
   }
 }
 
-void RowReader::read_all(const Take& take, const std::function<void(std::int64_t rows_done)>& progress) {
+void RowReader::read_all(const Take& take, const Job& job) {
   const SampleGrid& grid = state_->grid;
   const std::int64_t rows_at_once = std::max<std::int64_t>(kSamplesAtOnce / grid.width, 1);
-  for (std::int64_t row = 0; row < grid.height; row += rows_at_once) {
-    const std::int64_t rows = std::min(rows_at_once, grid.height - row);
-    std::vector<double> elevations(static_cast<std::size_t>(rows * grid.width));
-    read(row, rows, elevations);
-    take(row, elevations);
-    if (progress) progress(row + rows);
-  }
+  Arena(job).execute([&] {
+    for (std::int64_t row = 0; row < grid.height; row += rows_at_once) {
+      const std::int64_t rows = std::min(rows_at_once, grid.height - row);
+      std::vector<double> elevations(static_cast<std::size_t>(rows * grid.width));
+      read(row, rows, elevations);
+      take(row, elevations);
+      job.report({"rows", "rows", row + rows, grid.height});
+      job.throw_if_cancelled();
+    }
+  });
 }
 
 }  // namespace isohf

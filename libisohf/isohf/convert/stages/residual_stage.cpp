@@ -9,8 +9,8 @@
 #include "isohf/archive/container/content_hash.h"
 #include "isohf/archive/deflate/deflate.h"
 #include "isohf/archive/deflate/deflate_writer.h"
+#include "isohf/base/sample.h"
 #include "isohf/error.h"
-#include "isohf/surface/source/sample_types.h"
 
 namespace isohf {
 namespace {

@@ -1,5 +1,5 @@
 #include "isohf/convert/stages/tile_source.h"
-#include "isohf/surface/source/sample_types.h"
+#include "isohf/base/sample.h"
 
 #include <oneapi/tbb/enumerable_thread_specific.h>
 

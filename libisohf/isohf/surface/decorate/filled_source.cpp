@@ -9,8 +9,8 @@
 #include <numeric>
 
 #include "isohf/base/assert.h"
+#include "isohf/base/sample.h"
 #include "isohf/error.h"
-#include "isohf/surface/source/sample_types.h"
 
 namespace isohf {
 namespace {

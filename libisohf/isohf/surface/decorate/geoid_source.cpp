@@ -9,8 +9,8 @@
 #include <filesystem>
 #include <limits>
 
+#include "isohf/base/sample.h"
 #include "isohf/error.h"
-#include "isohf/surface/source/sample_types.h"
 #include "isohf/surface/source/source_rows.h"
 
 namespace isohf {

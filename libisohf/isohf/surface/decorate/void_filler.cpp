@@ -10,7 +10,7 @@
 #include <limits>
 #include <numeric>
 
-#include "isohf/surface/source/sample_access.h"
+#include "isohf/base/sample.h"
 
 namespace isohf {
 namespace {

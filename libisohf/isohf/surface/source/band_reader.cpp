@@ -9,7 +9,7 @@
 #include <mutex>
 
 #include "isohf/base/assert.h"
-#include "isohf/surface/source/sample_types.h"
+#include "isohf/base/sample.h"
 
 namespace isohf {
 namespace {

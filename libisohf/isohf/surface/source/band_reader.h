@@ -5,10 +5,10 @@
 #include <memory>
 #include <vector>
 
+#include "isohf/base/sample.h"
 #include "isohf/raster.h"
 #include "isohf/surface/resample/prefilter.h"
 #include "isohf/surface/resample/tile_resampler.h"
-#include "isohf/surface/source/sample_types.h"
 #include "isohf/surface/source/source_rows.h"
 
 namespace isohf {

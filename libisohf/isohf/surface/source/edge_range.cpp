@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "isohf/base/assert.h"
-#include "isohf/surface/source/sample_types.h"
+#include "isohf/base/sample.h"
 
 namespace isohf {
 namespace {

@@ -8,7 +8,7 @@
 #include <limits>
 #include <type_traits>
 
-#include "isohf/surface/source/sample_types.h"
+#include "isohf/base/sample.h"
 
 namespace isohf {
 namespace {

@@ -4,22 +4,20 @@
 #include <cstdint>
 #include <vector>
 
+#include "isohf/shade.h"
 #include "isohf/surface/shade/normals.h"
-#include "isohf/surface/shade/shadow.h"
 
-namespace isohf::cli {
+namespace isohf {
 
 /// Linear light, red, green, blue; 1 is white.
 using Light = std::array<float, 3>;
-
-enum class PaletteName { kElevation, kGray };
 
 /// Colours of the ground by elevation.
 class Palette {
  public:
   /// The colours run from `low` to `high`, elevation units; at least one of any two elevations apart where they are
   /// equal.
-  Palette(PaletteName name, double low, double high);
+  Palette(ShadePalette name, double low, double high);
   [[nodiscard]] const Light& at(double elevation) const;
 
  private:
@@ -31,7 +29,7 @@ class Palette {
 /// Sun and sky over a landscape: how much light falls on a piece of ground, and what a picture shows of it.
 class Illumination {
  public:
-  Illumination(LightTravel travel, double sun_elevation_deg, bool hillshade);
+  Illumination(SunSide side, double sun_elevation_deg, bool hillshade);
 
   /// Light that falls on ground with that normal where `sun_share` of the sun is seen.
   [[nodiscard]] Light on(const Normal& normal, double sun_share) const;
@@ -48,4 +46,4 @@ class Illumination {
 /// then sRGB.
 [[nodiscard]] std::uint8_t value_from_light(float light);
 
-}  // namespace isohf::cli
+}  // namespace isohf

@@ -1,10 +1,10 @@
-#include "shade/shade_light.h"
+#include "isohf/restore/shade/light.h"
 
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
-namespace isohf::cli {
+namespace isohf {
 namespace {
 
 constexpr int kColours = 1024;
@@ -40,11 +40,11 @@ Light blend(const Stop (&stops)[N], float at) {
 
 }  // namespace
 
-Palette::Palette(PaletteName name, double low, double high)
+Palette::Palette(ShadePalette name, double low, double high)
     : low_(low), per_unit_(high > low ? (kColours - 1) / (high - low) : 0.0) {
   for (int i = 0; i < kColours; ++i) {
     const float at = static_cast<float>(i) / (kColours - 1);
-    colours_.push_back(name == PaletteName::kElevation ? blend(kElevationStops, at) : blend(kGrayStops, at));
+    colours_.push_back(name == ShadePalette::kElevation ? blend(kElevationStops, at) : blend(kGrayStops, at));
   }
 }
 
@@ -53,9 +53,9 @@ const Light& Palette::at(double elevation) const {
   return colours_[static_cast<std::size_t>(place)];
 }
 
-Illumination::Illumination(LightTravel travel, double sun_elevation_deg, bool hillshade) : hillshade_(hillshade) {
+Illumination::Illumination(SunSide side, double sun_elevation_deg, bool hillshade) : hillshade_(hillshade) {
   const double angle = sun_elevation_deg * std::numbers::pi / 180.0;
-  sun_x_ = static_cast<float>(travel == LightTravel::kEastward ? -std::cos(angle) : std::cos(angle));
+  sun_x_ = static_cast<float>(side == SunSide::kWest ? -std::cos(angle) : std::cos(angle));
   sun_y_ = static_cast<float>(std::sin(angle));
   // A real sun near the horizon leaves flat ground dark. The exposure follows it, though not all the way, so that a
   // morning stays a morning: flat ground gets sin^0.35 of what a high sun gives it.
@@ -94,4 +94,4 @@ std::uint8_t value_from_light(float light) {
   return static_cast<std::uint8_t>(std::clamp(value * 255.0F + 0.5F, 0.0F, 255.0F));
 }
 
-}  // namespace isohf::cli
+}  // namespace isohf

@@ -9,9 +9,8 @@
 #include <random>
 #include <vector>
 
+#include "isohf/base/sample.h"
 #include "isohf/raster.h"
-#include "isohf/surface/source/sample_access.h"
-#include "isohf/surface/source/sample_types.h"
 
 namespace isohf {
 namespace {

@@ -1,0 +1,112 @@
+#include "isohf/shade.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cmath>
+#include <vector>
+
+#include "isohf/convert/convert.h"
+#include "isohf/error.h"
+#include "support/memory_source.h"
+#include "support/temporary_folder.h"
+
+namespace isohf {
+namespace {
+
+/// Level ground with a wall from North to South at column 60 and a hole North-East of it.
+class ShadeTest : public testing::Test {
+ protected:
+  ShadeTest() {
+    test::MemorySource<float> source(SampleType::kFloat32, 120, 90, [](std::int64_t c, std::int64_t r) {
+      if (c > 90 && c < 100 && r > 10 && r < 20) return std::nan("");
+      return c >= 58 && c < 62 ? 30.0 : 0.0;
+    });
+    ConvertOptions options;
+    options.plan.shape = {20, 19};
+    options.plan.levels = 1;
+    (void)convert(source, folder / "a.isohf", options);
+  }
+
+  static int brightness(const Picture& picture, int column, int row) {
+    const std::uint8_t* const pixel = picture.pixel(column, row);
+    return pixel[0] + pixel[1] + pixel[2];
+  }
+
+  test::TemporaryFolder folder;
+};
+
+TEST_F(ShadeTest, CastsTheShadowAwayFromTheSun) {
+  const ArchiveReader archive(folder / "a.isohf");
+  ShadeOptions options;
+  options.size = GridSize{120, 90};
+  options.sun_elevation_deg = 45.0;  // the shadow is as long as the wall is high
+  const Picture west = shade(archive, options);
+  EXPECT_LT(brightness(west, 75, 50), brightness(west, 45, 50)) << "the sun stands in the West";
+  EXPECT_EQ(brightness(west, 110, 50), brightness(west, 20, 50)) << "beyond the shadow";
+  options.sun = SunSide::kEast;
+  const Picture east = shade(archive, options);
+  EXPECT_GT(brightness(east, 75, 50), brightness(east, 45, 50));
+  options.shadows = false;
+  const Picture none = shade(archive, options);
+  EXPECT_EQ(brightness(none, 75, 50), brightness(none, 45, 50));
+}
+
+TEST_F(ShadeTest, LeavesNodataTransparent) {
+  const ArchiveReader archive(folder / "a.isohf");
+  ShadeOptions options;
+  options.size = GridSize{120, 90};
+  const Picture picture = shade(archive, options);
+  EXPECT_EQ(picture.pixel(95, 15)[3], 0);
+  EXPECT_EQ(picture.pixel(20, 15)[3], 255);
+}
+
+TEST_F(ShadeTest, PixelsDoNotDependOnThreadsOrOnWhetherRowsAreTaken) {
+  const ArchiveReader archive(folder / "a.isohf");
+  ShadeOptions options;
+  options.hillshade = true;
+  Job job;
+  job.threads = 1;
+  const Picture one = shade(archive, options, job);
+  job.threads = 3;
+  std::int64_t tiles = 0;
+  job.progress = [&](const Progress& at) { tiles = at.done; };
+  std::vector<std::uint8_t> rows;
+  const ShadeReport report = shade_rows(
+      archive, options, [&](std::span<const std::uint8_t> some) { rows.insert(rows.end(), some.begin(), some.end()); },
+      job);
+  EXPECT_EQ(report.size, shade_size(archive));
+  EXPECT_EQ(one.width, report.size.first);
+  EXPECT_EQ(one.samples, rows);
+  EXPECT_EQ(tiles, archive.grid().tile_count());
+}
+
+TEST_F(ShadeTest, RefusesWhatIsOutOfRangeAndStopsWhereCancelled) {
+  const ArchiveReader archive(folder / "a.isohf");
+  const auto code_of = [&](const ShadeOptions& options, const Job& job = {}) {
+    try {
+      (void)shade(archive, options, job);
+    } catch (const Error& error) {
+      return error.code();
+    }
+    return ErrorCode::kWarning;  // none
+  };
+  const auto with = [](auto change) {
+    ShadeOptions options;
+    change(options);
+    return options;
+  };
+  EXPECT_EQ(code_of(with([](ShadeOptions& o) { o.size = GridSize{0, 5}; })), ErrorCode::kInvalidArgument);
+  EXPECT_EQ(code_of(with([](ShadeOptions& o) { o.sun_elevation_deg = 90.0; })), ErrorCode::kInvalidArgument);
+  EXPECT_EQ(code_of(with([](ShadeOptions& o) { o.sun_elevation_deg = std::nan(""); })), ErrorCode::kInvalidArgument);
+  EXPECT_EQ(code_of(with([](ShadeOptions& o) { o.exaggeration = 0.0; })), ErrorCode::kInvalidArgument);
+  EXPECT_EQ(code_of(with([](ShadeOptions& o) { o.softness = -1.0; })), ErrorCode::kInvalidArgument);
+  EXPECT_EQ(code_of(with([](ShadeOptions& o) { o.texture = true; })), ErrorCode::kInvalidArgument) << "has none";
+  const std::atomic<bool> cancel = true;
+  Job job;
+  job.cancel = &cancel;
+  EXPECT_EQ(code_of({}, job), ErrorCode::kCancelled);
+}
+
+}  // namespace
+}  // namespace isohf
