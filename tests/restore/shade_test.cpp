@@ -25,7 +25,8 @@ class ShadeTest : public testing::Test {
     ConvertOptions options;
     options.plan.shape = {20, 19};
     options.plan.levels = 1;
-    (void)convert(source, folder / "a.isohf", options);
+    const std::atomic<bool> cancel = false;
+    (void)convert(source, folder / "a.isohf", options, {}, cancel);
   }
 
   static int brightness(const Picture& picture, int column, int row) {

@@ -138,16 +138,17 @@ TEST(TileShadow, LeavesOutWhatIsNotAskedFor) {
   EXPECT_EQ(leaving, leaving_alone);
 }
 
-TEST(ShadowAlongRow, FollowsEqs17And18) {
-  const std::vector<double> heights = {10, 4, NAN, 9, 1};
-  const std::vector<double> step = {1, 2, 1, 4};
-  std::vector<double> shadow(5);
-  shadow_along_row(heights, step, 1.0, kNoShadow, shadow);
-  EXPECT_EQ(shadow, (std::vector<double>{10, 9, 7, 9, 5}));
-  shadow_along_row({}, {}, 1.0, 0.0, {});
+/// Eqs. 17-18 (errata E14, E15) as printed, vertex by vertex. elevations [n]  step [n-1]  entering  at the first vertex
+std::vector<double> shadow_along_row(const std::vector<double>& elevations, const std::vector<double>& step, double fall,
+                                     double entering) {
+  std::vector<double> shadow;
+  for (std::size_t i = 0; i < elevations.size(); ++i) {
+    shadow.push_back(std::max(elevations[i], i == 0 ? entering : shadow.back() - step[i - 1] * fall));
+  }
+  return shadow;
 }
 
-TEST(ShadowAlongRow, AgreesWithTileShadow) {
+TEST(TileShadow, FollowsEqs17And18AlongEveryRow) {
   const ShadowWorld world(TileShape::make(21, 39, 1), 1, 20.0, Terrain::kRidges, 11);
   const double sigma = world.grid.sigma_x();
   const auto shadow = sweep(world, {LightTravel::kEastward, 300.0});
@@ -158,7 +159,7 @@ TEST(ShadowAlongRow, AgreesWithTileShadow) {
       heights.push_back(world.code(0, c, row));
       if (c > 1) step.push_back((object_x(21, c, row) - object_x(21, c - 1, row)) * sigma);
     }
-    shadow_along_row(heights, step, 300.0, kNoShadow, heights);
+    heights = shadow_along_row(heights, step, 300.0, kNoShadow);
     for (std::size_t i = 0; i < heights.size(); ++i) {
       // float rounding of numbers up to 65534
       ASSERT_NEAR(heights[i], double{shadow[0][static_cast<std::size_t>(row * 21) + i + 1]}, 0.01);
@@ -178,12 +179,8 @@ TEST(SunShare, RunsFromDarkToFullOverTheSunsSize) {
 // As printed a tile's first vertex has S = 0: in the shadow where the land lies below 0, and never under the mountain
 // next door.
 TEST(Errata, E14FirstVertexTakesWhatItsNeighbourHandsOver) {
-  std::vector<double> shadow(2);
-  shadow_along_row(std::vector<double>{-50, -60}, std::vector<double>{1}, 1.0, kNoShadow, shadow);
-  EXPECT_EQ(shadow[0], -50);
-  shadow_along_row(std::vector<double>{-50, -60}, std::vector<double>{1}, 1.0, 25, shadow);
-  EXPECT_EQ(shadow[0], 25);
-  EXPECT_EQ(shadow[1], 24);
+  EXPECT_EQ(shadow_along_row({-50, -60}, {1}, 1.0, kNoShadow).front(), -50);
+  EXPECT_EQ(shadow_along_row({-50, -60}, {1}, 1.0, 25), (std::vector<double>{25, 24}));
 
   // Two tiles: a wall in the first darkens the first vertex of the second.
   const TileShape shape = TileShape::make(5, 5, 1);

@@ -4,13 +4,14 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <cstring>
+#include <bit>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <utility>
 
 #include "commands/command.h"
 #include "isohf/archive.h"
+#include "isohf/archive/codec/quantise.h"
 #include "isohf/archive/textures/texture_info.h"
 #include "isohf/archive/tile_statistics.h"
 #include "isohf/error.h"
@@ -78,13 +79,8 @@ std::optional<InfoOptions> parse(const Arguments& arguments) {
 
 /// The elevation that the index's code stands for.
 double elevation_of(const Quantisation& quantisation, std::uint32_t code) {
-  if (quantisation.type == CodeType::kF32) {
-    float value = 0.0F;
-    static_assert(sizeof value == sizeof code);
-    std::memcpy(&value, &code, sizeof value);
-    return static_cast<double>(value);
-  }
-  return quantisation.offset + quantisation.scale * static_cast<double>(code);
+  if (quantisation.type == CodeType::kF32) return static_cast<double>(std::bit_cast<float>(code));
+  return elevation_from_code(quantisation, code);
 }
 
 struct Derived {

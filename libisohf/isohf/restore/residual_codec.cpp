@@ -39,65 +39,45 @@ std::uint16_t predicted_half(double value) {
   return static_cast<std::uint16_t>(sign | bits);
 }
 
-template <typename Bits>
-Bits ordered(Bits bits) {
-  constexpr Bits kSign = static_cast<Bits>(Bits{1} << (sizeof(Bits) * 8 - 1));
-  return (bits & kSign) != 0 ? static_cast<Bits>(~bits) : static_cast<Bits>(bits | kSign);
-}
-template <typename Bits>
-Bits unordered(Bits key) {
-  constexpr Bits kSign = static_cast<Bits>(Bits{1} << (sizeof(Bits) * 8 - 1));
-  return (key & kSign) != 0 ? static_cast<Bits>(key & ~kSign) : static_cast<Bits>(~key);
-}
-
-/// An integer sample type: bits are their own key, differences wrap.
 template <typename T>
-struct Integer {
-  using Bits = std::make_unsigned_t<T>;
-  static Bits key(Bits bits) { return bits; }
-  static Bits bits(Bits key) { return key; }
+struct BitsOf : std::make_unsigned<T> {};
+template <>
+struct BitsOf<StoredHalf> : std::type_identity<std::uint16_t> {};
+template <>
+struct BitsOf<float> : std::type_identity<std::uint32_t> {};
+template <>
+struct BitsOf<double> : std::type_identity<std::uint64_t> {};
+
+/// The bits of a sample type as unsigned keys whose differences wrap: of integers the bits themselves, of floats in the
+/// order of their values.
+template <typename T>
+struct Coding {
+  using Bits = typename BitsOf<T>::type;
+  static constexpr Bits kSign = static_cast<Bits>(Bits{1} << (sizeof(Bits) * 8 - 1));
+
+  static Bits key(Bits bits) {
+    if constexpr (std::is_integral_v<T>) return bits;
+    return (bits & kSign) != 0 ? static_cast<Bits>(~bits) : static_cast<Bits>(bits | kSign);
+  }
+  static Bits bits(Bits key) {
+    if constexpr (std::is_integral_v<T>) return key;
+    return (key & kSign) != 0 ? static_cast<Bits>(key & ~kSign) : static_cast<Bits>(~key);
+  }
   static Bits nearest(double raw) {
-    const double rounded = std::clamp(std::floor(raw + 0.5), static_cast<double>(std::numeric_limits<T>::min()),
-                                      static_cast<double>(std::numeric_limits<T>::max()));
-    return static_cast<Bits>(static_cast<T>(rounded));
+    if constexpr (std::is_same_v<T, StoredHalf>) {
+      return predicted_half(raw);
+    } else {
+      constexpr auto kLeast = static_cast<double>(std::numeric_limits<T>::lowest());
+      constexpr auto kMost = static_cast<double>(std::numeric_limits<T>::max());
+      const double whole = std::is_integral_v<T> ? std::floor(raw + 0.5) : raw;
+      return std::bit_cast<Bits>(static_cast<T>(std::clamp(whole, kLeast, kMost)));
+    }
   }
 };
-
-struct Half {
-  using Bits = std::uint16_t;
-  static Bits key(Bits bits) { return ordered(bits); }
-  static Bits bits(Bits key) { return unordered(key); }
-  static Bits nearest(double raw) { return predicted_half(raw); }
-};
-
-template <typename T, typename B>
-struct Floating {
-  using Bits = B;
-  static Bits key(Bits bits) { return ordered(bits); }
-  static Bits bits(Bits key) { return unordered(key); }
-  static Bits nearest(double raw) {
-    constexpr auto kMost = static_cast<double>(std::numeric_limits<T>::max());
-    return std::bit_cast<Bits>(static_cast<T>(std::clamp(raw, -kMost, kMost)));
-  }
-};
-
-template <typename T>
-Integer<T> coding_of(T /*stored*/) {
-  return {};
-}
-Half coding_of(StoredHalf /*stored*/) {
-  return {};
-}
-Floating<float, std::uint32_t> coding_of(float /*stored*/) {
-  return {};
-}
-Floating<double, std::uint64_t> coding_of(double /*stored*/) {
-  return {};
-}
 
 template <typename Action>
 auto with_type(SampleType type, Action action) {
-  return with_stored_type(type, [&](auto stored) { return action(coding_of(stored)); });
+  return with_stored_type(type, [&](auto stored) { return action(Coding<decltype(stored)>{}); });
 }
 
 /// Residual 0, -1, 1, -2, ... as 0, 1, 2, 3, ...

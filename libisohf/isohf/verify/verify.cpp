@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "isohf/archive/accuracy_info.h"
+#include "isohf/archive/codec/quantise.h"
 #include "isohf/archive/codec/simd/batch_decoder.h"
 #include "isohf/archive/codec/tile_codes.h"
 #include "isohf/archive/container/content_hash.h"
@@ -234,10 +235,8 @@ class Verification {
     tile.heights.resize(tile.codes.codes.size());
     std::int64_t beyond = 0;
     for (std::size_t i = 0; i < tile.heights.size(); ++i) {
-      const std::uint32_t code = tile.codes.codes[i];
-      tile.heights[i] = code == q.void_code() ? std::numeric_limits<float>::quiet_NaN()
-                                              : static_cast<float>(q.offset + q.scale * code);
-      beyond += code > q.void_code() ? 1 : 0;
+      tile.heights[i] = static_cast<float>(elevation_of_vertex(tile.codes, q, i));
+      beyond += tile.codes.codes[i] > q.void_code() ? 1 : 0;
     }
     if (beyond > 0) {
       tile.findings.push_back(make(finding::kElevationRange, index,

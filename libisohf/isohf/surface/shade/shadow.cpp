@@ -101,16 +101,6 @@ class RowPass {
 
 }  // namespace
 
-void shadow_along_row(std::span<const double> elevations, std::span<const double> step, double fall, double entering,
-                      std::span<double> shadow) {
-  double height = entering;
-  for (std::size_t i = 0; i < elevations.size(); ++i) {
-    if (i > 0) height -= step[i - 1] * fall;
-    height = higher(elevations[i], height);
-    shadow[i] = height;
-  }
-}
-
 void tile_shadow(const TileGrid& grid, View2D<const float> elevations, const ShadowLight& light,
                  std::span<const double> entering, View2D<float> shadow, std::span<double> leaving) {
   const TileShape& shape = grid.shape();

@@ -17,15 +17,6 @@ namespace isohf {
 /// S where nothing casts a shadow yet: before the first vertex that has an elevation.
 inline constexpr double kNoShadow = -std::numeric_limits<double>::infinity();
 
-/// Shadow height along one row of vertices, light travelling in row order (paper Eqs. 17-18, errata E14, E15).
-/// elevations [n]  metres; NaN is void: it casts nothing and the shadow passes over it
-/// step [n-1]      metres between neighbours          fall  tan(sun elevation), > 0
-/// entering        shadow height handed over by the previous tile at the first vertex, metres, or kNoShadow
-/// shadow [n]      out, metres; may be the same array as elevations
-/// O(n), no allocation, cannot fail. Rounding errors add up along the row; tile_shadow's do not.
-void shadow_along_row(std::span<const double> elevations, std::span<const double> step, double fall, double entering,
-                      std::span<double> shadow);
-
 /// A sun in the plane of the rows.
 struct ShadowLight {
   LightTravel travel = LightTravel::kEastward;
