@@ -16,9 +16,9 @@
 #include "formats/georeference/files_beside.h"
 #include "formats/readers.h"
 #include "isohf/base/assert.h"
+#include "isohf/base/sample.h"
 #include "isohf/error.h"
 #include "isohf/surface/photo/srgb.h"
-#include "isohf/surface/source/sample_types.h"
 
 namespace isohf {
 namespace {

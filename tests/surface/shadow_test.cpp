@@ -139,8 +139,8 @@ TEST(TileShadow, LeavesOutWhatIsNotAskedFor) {
 }
 
 /// Eqs. 17-18 (errata E14, E15) as printed, vertex by vertex. elevations [n]  step [n-1]  entering  at the first vertex
-std::vector<double> shadow_along_row(const std::vector<double>& elevations, const std::vector<double>& step, double fall,
-                                     double entering) {
+std::vector<double> shadow_along_row(const std::vector<double>& elevations, const std::vector<double>& step,
+                                     double fall, double entering) {
   std::vector<double> shadow;
   for (std::size_t i = 0; i < elevations.size(); ++i) {
     shadow.push_back(std::max(elevations[i], i == 0 ? entering : shadow.back() - step[i - 1] * fall));
