@@ -1,4 +1,4 @@
-#include "isohf/archive/codec/void_mask.h"
+#include "isohf/archive/codec/tile_payload.h"
 
 #include <gtest/gtest.h>
 

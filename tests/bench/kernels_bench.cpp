@@ -15,7 +15,6 @@
 #include "isohf/archive/codec/predict/hex_predictor.h"
 #include "isohf/archive/codec/predict/predictor_fit.h"
 #include "isohf/archive/codec/quantise.h"
-#include "isohf/archive/codec/residuals/context_model.h"
 #include "isohf/archive/codec/residuals/pair_coding.h"
 #include "isohf/archive/codec/residuals/residual_streams.h"
 #include "isohf/archive/codec/tile_codes.h"

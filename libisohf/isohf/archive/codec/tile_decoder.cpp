@@ -5,13 +5,11 @@
 #include <algorithm>
 #include <limits>
 
-#include "isohf/archive/codec/ordered_float.h"
 #include "isohf/archive/codec/predict/context_energy.h"
 #include "isohf/archive/codec/predict/hex_predictor.h"
 #include "isohf/archive/codec/residuals/residual_symbols.h"
 #include "isohf/archive/codec/simd/batch_decoder.h"
 #include "isohf/archive/codec/tile_payload.h"
-#include "isohf/archive/codec/void_mask.h"
 
 namespace isohf {
 namespace {
@@ -20,44 +18,34 @@ namespace {
   throw Error(ErrorCode::kCorrupt, "tile payload: " + why);
 }
 
-/// Bits from a span, the lowest of a byte first; reads zeros past the end and remembers it.
+/// Bits from a span, the lowest of a byte first; zeros past its end.
 class BitReader {
  public:
-  explicit BitReader(std::span<const std::byte> bytes) : bytes_(bytes) {}
-
-  std::uint32_t take(unsigned count) {
-    if (bit_count_ < 32) refill();
-    const auto value = static_cast<std::uint32_t>(bits_ & ((std::uint64_t{1} << count) - 1));
-    bits_ >>= count;
-    bit_count_ -= count;
-    return value;
+  explicit BitReader(std::span<const std::byte> bytes) : bytes_(bytes.begin(), bytes.end()), end_(8 * bytes.size()) {
+    bytes_.resize(bytes.size() + sizeof(std::uint64_t));
   }
 
-  [[nodiscard]] bool ran_out() const { return used_bits() > 8 * std::uint64_t{bytes_.size()}; }
+  /// Up to 32 bits.
+  std::uint32_t take(unsigned count) {
+    const std::uint64_t bits = rest();
+    position_ += count;
+    return static_cast<std::uint32_t>(bits & ((std::uint64_t{1} << count) - 1));
+  }
+
+  [[nodiscard]] bool ran_out() const { return position_ > end_; }
   /// True where all bytes were used and the bits left over in the last one are zero.
-  [[nodiscard]] bool is_used_up() const { return (used_bits() + 7) / 8 == bytes_.size() && bits_ == 0; }
+  [[nodiscard]] bool is_used_up() const { return end_ - position_ < 8 && rest() == 0; }
 
  private:
-  [[nodiscard]] std::uint64_t used_bits() const { return 8 * std::uint64_t{position_} - bit_count_; }
-
-  void refill() {
-    if (position_ + 4 <= bytes_.size()) {
-      std::uint32_t word;
-      std::memcpy(&word, bytes_.data() + position_, 4);
-      bits_ |= std::uint64_t{word} << bit_count_;
-    } else {
-      for (std::size_t i = 0; position_ + i < bytes_.size(); ++i) {
-        bits_ |= std::uint64_t{std::to_integer<unsigned>(bytes_[position_ + i])} << (bit_count_ + 8 * i);
-      }
-    }
-    position_ += 4;
-    bit_count_ += 32;
+  [[nodiscard]] std::uint64_t rest() const {
+    std::uint64_t bits = 0;
+    if (position_ < end_) std::memcpy(&bits, bytes_.data() + position_ / 8, sizeof(bits));
+    return bits >> position_ % 8;
   }
 
-  std::span<const std::byte> bytes_;
-  std::size_t position_ = 0;  ///< past the end where zeros were made up
-  std::uint64_t bits_ = 0;
-  unsigned bit_count_ = 0;
+  std::vector<std::byte> bytes_;
+  std::uint64_t end_;
+  std::uint64_t position_ = 0;
 };
 
 /// The zigzagged residuals of all contexts: symbols and extra bits put together.

@@ -5,14 +5,12 @@
 #include <cmath>
 #include <limits>
 
-#include "isohf/archive/codec/ordered_float.h"
 #include "isohf/archive/codec/predict/context_energy.h"
 #include "isohf/archive/codec/predict/hex_predictor.h"
 #include "isohf/archive/codec/predict/predictor_fit.h"
 #include "isohf/archive/codec/residuals/residual_streams.h"
 #include "isohf/archive/codec/residuals/residual_symbols.h"
 #include "isohf/archive/codec/tile_payload.h"
-#include "isohf/archive/codec/void_mask.h"
 #include "isohf/archive/container/content_hash.h"
 #include "isohf/archive/deflate/deflate.h"
 #include "isohf/archive/deflate/deflate_writer.h"

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <bit>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -66,5 +67,26 @@ class SymbolStreams {
   std::array<std::span<const std::byte>, kMaxContexts> streams_{};
   std::unique_ptr<std::byte[]> unpaired_;
 };
+
+/// A float's place among all floats that have `dropped` zero low bits: order-preserving, -0.0 just below +0.0.
+[[nodiscard]] inline std::int32_t ordered_from_float(float value, unsigned dropped) {
+  const auto bits = std::bit_cast<std::uint32_t>(value);
+  const auto magnitude = static_cast<std::int32_t>((bits & 0x7fffffffU) >> dropped);
+  return bits >> 31U != 0 ? -magnitude - 1 : magnitude;
+}
+
+[[nodiscard]] inline float float_from_ordered(std::int32_t ordered, unsigned dropped) {
+  const bool negative = ordered < 0;
+  const std::uint32_t magnitude = static_cast<std::uint32_t>(negative ? -(ordered + 1) : ordered) << dropped;
+  return std::bit_cast<float>(magnitude | (negative ? 0x80000000U : 0U));
+}
+
+/// The void mask of a tile as run lengths: samples that are known, samples that are void, and so on in turn, in storage
+/// order; each length as a LEB128 number. Only the first may be 0; they add up to the number of samples. `is_void` holds 0
+/// or 1 for each sample.
+[[nodiscard]] std::vector<std::byte> pack_void_mask(std::span<const std::uint8_t> is_void);
+
+/// Throws Error{kCorrupt} where the runs do not add up to `samples` or are not as pack_void_mask makes them.
+[[nodiscard]] std::vector<std::uint8_t> unpack_void_mask(std::span<const std::byte> packed, std::size_t samples);
 
 }  // namespace isohf

@@ -11,8 +11,6 @@ namespace {
 constexpr unsigned kEndOfBlock = 256;
 constexpr std::size_t kBlockBytes = std::size_t{1} << 17;
 constexpr std::size_t kMaxRun = 258;  // the longest match of Deflate
-constexpr std::array<std::uint8_t, 19> kLengthOrder = {16, 17, 18, 0, 8,  7, 9,  6, 10, 5,
-                                                       11, 4,  12, 3, 13, 2, 14, 1, 15};
 
 /// Deflate's match lengths: symbol, number of extra bits and their value, for lengths 3..258 (RFC 1951, 3.2.5).
 struct MatchCode {

@@ -9,6 +9,10 @@
 
 namespace isohf {
 
+/// The order in which a dynamic block sends the lengths of the code for code lengths (RFC 1951, 3.2.7).
+inline constexpr std::array<std::uint8_t, 19> kLengthOrder = {16, 17, 18, 0, 8,  7, 9,  6, 10, 5,
+                                                              11, 4,  12, 3, 13, 2, 14, 1, 15};
+
 using ByteCounts = std::array<std::uint32_t, 256>;
 
 /// How often each byte occurs.

@@ -6,6 +6,7 @@
 #include <cstring>
 #include <utility>
 
+#include "isohf/archive/deflate/huffman_code.h"
 #include "isohf/base/simd.h"
 
 namespace isohf {
@@ -15,8 +16,6 @@ constexpr unsigned kEndOfBlock = 256;
 constexpr unsigned kLastSymbol = 285;
 constexpr unsigned kMaxLength = 15;
 constexpr unsigned kTableBits = 11;
-constexpr std::array<std::uint8_t, 19> kLengthOrder = {16, 17, 18, 0, 8,  7, 9,  6, 10, 5,
-                                                       11, 4,  12, 3, 13, 2, 14, 1, 15};
 
 /// What the next bits say: bits 0-5 how many of them, bits 6-7 how many literals these are (0: a symbol that is none),
 /// bits 8-15 and 16-23 the literals, or from bit 8 on the symbol; kLongCode where the code is longer than the table's.

@@ -7,8 +7,8 @@
 #include <cmath>
 #include <limits>
 
-#include "isohf/archive/codec/ordered_float.h"
 #include "isohf/archive/codec/residuals/residual_symbols.h"
+#include "isohf/archive/codec/tile_payload.h"
 #include "isohf/archive/container/archive_directory.h"
 #include "isohf/archive/shadow_seeds/seed_streams.h"
 #include "isohf/base/assert.h"

@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cstring>
-#include <mutex>
 
 #include "isohf/base/assert.h"
 #include "isohf/base/sample.h"
@@ -37,36 +36,15 @@ void resize(std::vector<T>& values, std::size_t samples, std::size_t columns) {
 
 }  // namespace
 
-/// Takes bands back on whatever thread drops them last.
-class BandReader::Pool {
- public:
-  [[nodiscard]] std::unique_ptr<Band> take() {
-    const std::lock_guard lock(mutex_);
-    if (bands_.empty()) return std::make_unique<Band>();
-    std::unique_ptr<Band> band = std::move(bands_.back());
-    bands_.pop_back();
-    return band;
-  }
-  void give_back(std::unique_ptr<Band> band) {
-    const std::lock_guard lock(mutex_);
-    bands_.push_back(std::move(band));
-  }
-
- private:
-  std::mutex mutex_;
-  std::vector<std::unique_ptr<Band>> bands_;
-};
-
 BandReader::BandReader(HeightSource& source, double datum, const Prefilter& prefilter, bool wraps)
     : own_rows_(std::make_unique<SourceRows>(source, ReadStep::make(source.info(), kReadBytes))),
       rows_(*own_rows_),
       datum_(datum),
       prefilter_(prefilter),
-      wraps_(wraps),
-      pool_(std::make_shared<Pool>()) {}
+      wraps_(wraps) {}
 
 BandReader::BandReader(SourceRows& rows, double datum, const Prefilter& prefilter, bool wraps)
-    : rows_(rows), datum_(datum), prefilter_(prefilter), wraps_(wraps), pool_(std::make_shared<Pool>()) {}
+    : rows_(rows), datum_(datum), prefilter_(prefilter), wraps_(wraps) {}
 
 std::uint64_t BandReader::memory_bytes(const Prefilter& prefilter, std::int64_t bands, std::int64_t rows,
                                        std::int64_t columns, const SourceInfo& info) {
@@ -80,8 +58,7 @@ std::uint64_t BandReader::memory_bytes(const Prefilter& prefilter, std::int64_t 
 }
 
 std::shared_ptr<Band> BandReader::make_band(const RowRange& rows, const RowRange& columns) const {
-  std::shared_ptr<Band> band(pool_->take().release(),
-                             [pool = pool_](Band* dropped) { pool->give_back(std::unique_ptr<Band>(dropped)); });
+  std::shared_ptr<Band> band = recycled_.take([] { return std::make_unique<Band>(); });
   band->columns = static_cast<std::int64_t>(count_of(columns));
   band->first_column = columns.first;
   band->rows = rows;

@@ -53,9 +53,6 @@ class BandReader {
                                                   std::int64_t columns, const SourceInfo& info);
 
  private:
-  /// Memory of bands that nobody reads any more, for the next ones: fresh memory would be cleared page by page.
-  class Pool;
-
   [[nodiscard]] std::shared_ptr<Band> make_band(const RowRange& rows, const RowRange& columns) const;
   /// Makes band_'s heights those of `rows` and `columns`, prefiltered along rows; with voids.
   void move_heights_to(const RowRange& rows, const RowRange& columns);
@@ -66,7 +63,7 @@ class BandReader {
   double datum_;
   const Prefilter& prefilter_;
   bool wraps_;
-  std::shared_ptr<Pool> pool_;
+  Recycled<Band> recycled_;
   Band filtered_;                     ///< heights prefiltered along rows alone, halo included
   std::shared_ptr<const Band> last_;  ///< where the prefilter is the identity
 };

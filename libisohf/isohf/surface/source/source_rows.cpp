@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <cstring>
-#include <mutex>
-#include <utility>
 
 #include "isohf/base/assert.h"
 #include "isohf/error.h"
@@ -57,28 +55,6 @@ struct SourceRows::Slab {
   std::unique_ptr<std::byte[]> raw;
 };
 
-/// Takes memory back on whatever thread drops it last: fresh memory would be cleared page by page.
-class SourceRows::Pool {
- public:
-  explicit Pool(std::size_t bytes) : bytes_(bytes) {}
-  [[nodiscard]] std::unique_ptr<std::byte[]> take() {
-    const std::lock_guard lock(mutex_);
-    if (idle_.empty()) return std::make_unique_for_overwrite<std::byte[]>(bytes_);
-    std::unique_ptr<std::byte[]> memory = std::move(idle_.back());
-    idle_.pop_back();
-    return memory;
-  }
-  void give_back(std::unique_ptr<std::byte[]> memory) {
-    const std::lock_guard lock(mutex_);
-    idle_.push_back(std::move(memory));
-  }
-
- private:
-  std::size_t bytes_;
-  std::mutex mutex_;
-  std::vector<std::unique_ptr<std::byte[]>> idle_;
-};
-
 class SourceRows::SlabRows final : public RawRows {
  public:
   SlabRows(std::vector<std::shared_ptr<const Slab>> slabs, std::int64_t slab_rows, const SourceInfo& info)
@@ -128,10 +104,7 @@ class SourceRows::ScratchRows final : public RawRows {
   std::size_t sample_bytes_;
 };
 
-SourceRows::SourceRows(HeightSource& source, const ReadStep& step)
-    : source_(source),
-      step_(step),
-      pool_(std::make_shared<Pool>(static_cast<std::size_t>(step.rows) * row_bytes_of(source.info()))) {}
+SourceRows::SourceRows(HeightSource& source, const ReadStep& step) : source_(source), step_(step) {}
 
 SourceRows::SourceRows(HeightSource& source, const ReadStep& step, const std::string& folder, std::int64_t kept_rows)
     : source_(source), step_(step), kept_rows_(std::min(kept_rows, source.info().height)) {
@@ -156,7 +129,12 @@ void SourceRows::read_slab() {
   const SourceInfo& info = source_.info();
   const std::size_t row_bytes = row_bytes_of(info);
   const std::vector<Window> windows = step_.windows(info, next_);
-  auto slab = std::make_unique<Slab>(Slab{next_, windows.front().rows, pool_->take()});
+  const std::shared_ptr<Slab> slab = recycled_.take([&] {
+    const std::size_t most = static_cast<std::size_t>(step_.rows) * row_bytes;
+    return std::make_unique<Slab>(Slab{0, 0, std::make_unique_for_overwrite<std::byte[]>(most)});
+  });
+  slab->first = next_;
+  slab->rows = windows.front().rows;
   for (const Window& window : windows) {
     const std::size_t bytes = static_cast<std::size_t>(window.columns) * size_bytes(info.sample_type);
     const auto rows = static_cast<std::size_t>(window.rows);
@@ -170,10 +148,7 @@ void SourceRows::read_slab() {
     for (std::size_t r = 0; r < rows; ++r) std::memcpy(to + r * row_bytes, raw_.data() + r * bytes, bytes);
   }
   next_ += slab->rows;
-  slabs_.emplace_back(slab.release(), [pool = pool_](Slab* dropped) {
-    const std::unique_ptr<Slab> done(dropped);
-    pool->give_back(std::move(done->raw));
-  });
+  slabs_.push_back(slab);
 }
 
 void SourceRows::read_to_scratch() {

@@ -5,8 +5,10 @@
 #include <deque>
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "isohf/base/file.h"
@@ -27,6 +29,33 @@ struct ReadStep {
   [[nodiscard]] std::uint64_t most_bytes(const SourceInfo& info) const;
   /// The windows that make up the rows from `first` on, which is a multiple of `rows`.
   [[nodiscard]] std::vector<Window> windows(const SourceInfo& info, std::int64_t first) const;
+};
+
+/// Memory that others gave back, on whatever thread dropped it last: fresh memory would be cleared page by page.
+template <typename T>
+class Recycled {
+ public:
+  /// One that was dropped, or what make() makes (std::unique_ptr<T>).
+  template <typename Make>
+  [[nodiscard]] std::shared_ptr<T> take(const Make& make) const {
+    std::unique_ptr<T> value;
+    if (const std::lock_guard lock(idle_->mutex); !idle_->values.empty()) {
+      value = std::move(idle_->values.back());
+      idle_->values.pop_back();
+    }
+    if (!value) value = make();
+    return {value.release(), [idle = idle_](T* dropped) {
+              const std::lock_guard lock(idle->mutex);
+              idle->values.emplace_back(dropped);
+            }};
+  }
+
+ private:
+  struct Idle {
+    std::mutex mutex;
+    std::vector<std::unique_ptr<T>> values;
+  };
+  std::shared_ptr<Idle> idle_ = std::make_shared<Idle>();
 };
 
 /// Raw samples of consecutive rows of a source, unchanging. Any number of threads at once.
@@ -61,7 +90,6 @@ class SourceRows {
 
  private:
   struct Slab;
-  class Pool;
   class SlabRows;
   class ScratchRows;
 
@@ -70,7 +98,7 @@ class SourceRows {
 
   HeightSource& source_;
   ReadStep step_;
-  std::shared_ptr<Pool> pool_;
+  Recycled<Slab> recycled_;
   std::deque<std::shared_ptr<const Slab>> slabs_;
   std::shared_ptr<File> scratch_;
   std::int64_t kept_rows_ = 0;

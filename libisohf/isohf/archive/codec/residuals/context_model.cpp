@@ -1,4 +1,4 @@
-#include "isohf/archive/codec/residuals/context_model.h"
+#include "isohf/archive/codec/residuals/residual_streams.h"
 
 #include <algorithm>
 

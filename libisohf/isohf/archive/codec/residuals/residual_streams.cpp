@@ -5,7 +5,6 @@
 #include <type_traits>
 
 #include "isohf/archive/codec/predict/context_energy.h"
-#include "isohf/archive/codec/residuals/context_model.h"
 #include "isohf/archive/codec/residuals/pair_coding.h"
 #include "isohf/archive/codec/residuals/residual_symbols.h"
 #include "isohf/base/simd.h"

@@ -4,7 +4,6 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "isohf/archive/codec/ordered_float.h"
 #include "isohf/archive/codec/simd/batch_residuals.h"
 #include "isohf/archive/codec/simd/batch_rows.h"
 #include "isohf/archive/codec/tile_payload.h"

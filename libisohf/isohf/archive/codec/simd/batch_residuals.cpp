@@ -5,7 +5,7 @@
 #include "isohf/archive/codec/predict/context_energy.h"
 #include "isohf/archive/codec/predict/sample_lattice.h"
 #include "isohf/archive/codec/simd/residual_expander.h"
-#include "isohf/archive/codec/void_mask.h"
+#include "isohf/archive/codec/tile_payload.h"
 #include "isohf/base/simd.h"
 
 namespace isohf {
