@@ -10,15 +10,9 @@
 #include <new>
 
 #include "isohf/base/file.h"
-#include "output/standard_output.h"
 
 namespace isohf::cli {
 namespace {
-
-std::string& name_of_program() {
-  static std::string name = "isohf";
-  return name;
-}
 
 /// How errors are told of where the options are not parsed yet, or cannot be.
 void prepare_telling(const Arguments& arguments) {
@@ -31,16 +25,6 @@ void prepare_telling(const Arguments& arguments) {
 
 }  // namespace
 
-int exit_code_for(ErrorCode code) {
-  if (code == ErrorCode::kInvalidArgument) return kExitUsage;
-  if (code == ErrorCode::kCancelled) return kExitInterrupted;
-  return kExitFailed;
-}
-
-const std::string& program_name() {
-  return name_of_program();
-}
-
 void print_version() {
   StandardOutput out;
   out.write(program_name() + " " ISOHF_VERSION "\n");
@@ -49,7 +33,7 @@ void print_version() {
 
 int run_program(const char* name, int argc, char** argv, int (*body)(const Arguments& arguments)) {
   occupy_standard_descriptors();
-  name_of_program() = name;
+  program_name() = name;
   // A closed pipe or a file over its size limit is an error that write() reports, not a reason to die.
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGXFSZ, SIG_IGN);

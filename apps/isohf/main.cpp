@@ -17,7 +17,7 @@
 #include "isohf/raster.h"
 #include "options/command_line.h"
 #include "options/help_page.h"
-#include "options/nearest_word.h"
+#include "options/option_values.h"
 
 namespace isohf::cli {
 namespace {

@@ -9,6 +9,7 @@
 #include "gl/offscreen.h"
 #include "interrupt.h"
 #include "isohf/error.h"
+#include "options/describe.h"
 #include "output/json_output.h"
 #include "output/output_file.h"
 #include "output/standard_output.h"
@@ -52,14 +53,16 @@ std::string text_from(const ViewReport& report, const std::string& archive) {
   std::string text = fmt::format(
       "{} tiles, {} pictures, {} pixels, {} vertices, {} shared vertices, {} pixels across seams\n"
       "worst height {:.4f} codes, worst normal {:.2e}\n",
-      report.tiles, grouped(report.pictures), grouped(report.pixels), grouped(report.vertices),
-      grouped(report.shared_vertices), grouped(report.seam_pixels), report.worst_height, report.worst_normal);
+      report.tiles, cli::describe_count(report.pictures), cli::describe_count(report.pixels),
+      cli::describe_count(report.vertices), cli::describe_count(report.shared_vertices),
+      cli::describe_count(report.seam_pixels), report.worst_height, report.worst_normal);
   if (report.suns_deg.empty()) {
     text += "shadows: the archive has no shadow seeds\n";
   } else {
     text += fmt::format(
         "shadows: suns of {:g} degrees, East and West, {} vertices, worst {:.4f} codes, share of the sun {:.2e}\n",
-        fmt::join(report.suns_deg, ", "), grouped(report.shadow_vertices), report.worst_shadow, report.worst_share);
+        fmt::join(report.suns_deg, ", "), cli::describe_count(report.shadow_vertices), report.worst_shadow,
+        report.worst_share);
   }
   if (report.passed()) return text + archive + ": archive, index arrays and shaders agree\n";
   for (const ViewFinding& found : report.findings) {

@@ -173,21 +173,19 @@ double Renderer::level_of(const ViewState& view, TileIndex tile, const TileBound
   return view.plain_switching ? std::round(level) : level;
 }
 
-std::vector<Renderer::Item> Renderer::visible_items(const ViewState& view, const TerrainFrame& frame,
-                                                    const std::array<std::int64_t, 4>& range,
-                                                    const ResidentTile& resident, FrameFigures& figures) const {
+void Renderer::find_visible(Frame& frame, const TileRange& range, const ResidentTile& resident) const {
+  const ViewState& view = frame.view;
   const TileGrid& grid = source_.grid();
-  std::vector<Item> items;
-  for (std::int64_t row = range[2]; row <= range[3]; ++row) {
-    for (std::int64_t column = range[0]; column <= range[1]; ++column) {
+  for (std::int64_t row = range.first_row; row <= range.last_row; ++row) {
+    for (std::int64_t column = range.first_column; column <= range.last_column; ++column) {
       const TileIndex tile{column, row};
       const TileBounds bounds = source_.bounds(tile);
       if (!bounds.stored) continue;
       const TileVolume box = tile_volume(grid, tile, bounds, view);
-      if (outside_view(frame.clip_from_eye, box)) continue;
+      if (outside_view(frame.terrain.clip_from_eye, box)) continue;
       const TileSlot* slot = resident(tile);
       if (slot == nullptr) {
-        ++figures.absent_tiles;
+        ++frame.figures.absent_tiles;
         continue;
       }
       const bool is_cut = !view.beyond && reaches_beyond(grid, tile, source_.covered());
@@ -197,17 +195,18 @@ std::vector<Renderer::Item> Renderer::visible_items(const ViewState& view, const
         if (textures_) texture = textures_(tile);
         if (texture == 0) texture = no_texture_.get();
       }
-      items.push_back({tile, slot, is_cut, is_cut || bounds.has_voids, length(0.5 * (box.low + box.high)),
-                       box.distance(), blend, texture});
+      frame.items.push_back({tile, slot, is_cut, is_cut || bounds.has_voids, length(0.5 * (box.low + box.high)),
+                             box.distance(), blend, texture});
     }
   }
-  std::sort(items.begin(), items.end(), [](const Item& a, const Item& b) { return a.distance < b.distance; });
-  figures.visible_tiles = static_cast<std::int64_t>(items.size());
-  return items;
+  std::sort(frame.items.begin(), frame.items.end(),
+            [](const Item& a, const Item& b) { return a.distance < b.distance; });
+  frame.figures.visible_tiles = static_cast<std::int64_t>(frame.items.size());
 }
 
-void Renderer::begin_shading(const TerrainProgram& program, const ViewState& view, const TerrainFrame& frame) const {
-  program.begin(source_.grid(), frame);
+void Renderer::begin_shading(const Frame& frame, const TerrainProgram& program) const {
+  const ViewState& view = frame.view;
+  program.begin(source_.grid(), frame.terrain);
   const Vec3 sun = normalised(view.sun);
   const ViewScale scale = source_.scale();
   const double codes = std::max(whole_.high - whole_.low, 1e-9) / scale.scale;
@@ -234,10 +233,9 @@ void Renderer::begin_shading(const TerrainProgram& program, const ViewState& vie
   glUniform2f(program.uniform("haze"), static_cast<float>(haze_begin), static_cast<float>(haze_rise));
 }
 
-void Renderer::draw_mesh(const TerrainProgram& program, const TerrainFrame& frame, const Item& item, int level,
-                         FrameFigures& figures) const {
+void Renderer::draw_mesh(Frame& frame, const TerrainProgram& program, const Item& item, int level) const {
   const TileShape& shape = source_.grid().shape();
-  program.set_tile(source_.grid(), frame, item.tile);
+  program.set_tile(source_.grid(), frame.terrain, item.tile);
   glUniform1i(program.uniform("level"), level);
   glUniform1i(program.uniform("is_stitch"), 0);
   set_vec3(program.uniform("level_colour"), level_colour(level));
@@ -246,54 +244,51 @@ void Renderer::draw_mesh(const TerrainProgram& program, const TerrainFrame& fram
   if (item.is_cut) set_cutting(true);
   glEnable(GL_CULL_FACE);
   shared_.draw_strip(level);
-  figures.triangles += shape.strip_triangle_count(level);
-  ++figures.draw_calls;
+  frame.figures.triangles += shape.strip_triangle_count(level);
+  ++frame.figures.draw_calls;
   if (shared_.has_stitch(level)) {
     // Stitch triangles stand upright and are seen from either side.
     glUniform1i(program.uniform("is_stitch"), 1);
     set_vec3(program.uniform("level_colour"), 0.8 * level_colour(level));
     glDisable(GL_CULL_FACE);
     shared_.draw_stitch(level);
-    figures.triangles += shape.stitch_triangle_count(level);
-    ++figures.draw_calls;
+    frame.figures.triangles += shape.stitch_triangle_count(level);
+    ++frame.figures.draw_calls;
   }
   if (item.is_cut) set_cutting(false);
 }
 
-void Renderer::draw_opaque(const ViewState& view, const TerrainFrame& frame, const std::vector<Item>& items,
-                           FrameFigures& figures) {
+void Renderer::draw_opaque(Frame& frame) {
   begin_opaque_pass();
   for (const bool rim : {false, true}) {
-    const TerrainProgram& program = shading(view, rim);
-    begin_shading(program, view, frame);
+    const TerrainProgram& program = shading(frame.view, rim);
+    begin_shading(frame, program);
     glUniform1f(program.uniform("alpha"), 1.0F);
-    for (const Item& item : items) {
+    for (const Item& item : frame.items) {
       if (item.is_rim != rim) continue;
-      draw_mesh(program, frame, item, item.blend.first, figures);
+      draw_mesh(frame, program, item, item.blend.first);
       drawn_.push_back({item.tile, item.blend.first});
     }
   }
 }
 
-void Renderer::draw_fading(const ViewState& view, const TerrainFrame& frame, const std::vector<Item>& items,
-                           FrameFigures& figures) {
-  begin_fading_pass(!view.wireframe);  // wires are those of the first mesh, and shown through the second
+void Renderer::draw_fading(Frame& frame) {
+  begin_fading_pass(!frame.view.wireframe);  // wires are those of the first mesh, and shown through the second
   for (const bool rim : {false, true}) {
-    const TerrainProgram& program = shading(view, rim);
-    begin_shading(program, view, frame);
-    for (auto item = items.rbegin(); item != items.rend(); ++item) {
+    const TerrainProgram& program = shading(frame.view, rim);
+    begin_shading(frame, program);
+    for (auto item = frame.items.rbegin(); item != frame.items.rend(); ++item) {
       if (item->is_rim != rim || !fades(*item)) continue;
       order_fading(item->blend);
       glUniform1f(program.uniform("alpha"), static_cast<float>(item->blend.alpha));
-      draw_mesh(program, frame, *item, item->blend.second, figures);
+      draw_mesh(frame, program, *item, item->blend.second);
       drawn_.push_back({item->tile, item->blend.second});
     }
   }
   end_fading_pass();
 }
 
-void Renderer::draw_wires(const ViewState& view, const TerrainFrame& frame, const std::vector<Item>& items,
-                          FrameFigures& figures) const {
+void Renderer::draw_wires(Frame& frame) const {
   glPolygonMode(GL_FRONT_AND_BACK, GL_LINE);
   glEnable(GL_POLYGON_OFFSET_LINE);
   glPolygonOffset(-1.0F, -2.0F);
@@ -301,14 +296,14 @@ void Renderer::draw_wires(const ViewState& view, const TerrainFrame& frame, cons
   glBlendFunc(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA);
   for (const bool rim : {false, true}) {
     const TerrainProgram& program = flat_.of(rim);
-    program.begin(source_.grid(), frame);
+    program.begin(source_.grid(), frame.terrain);
     glUniform4f(program.uniform("flat_colour"), 0.05F, 0.06F, 0.09F, 0.7F);
-    for (const Item& item : items) {
+    for (const Item& item : frame.items) {
       if (item.is_rim != rim) continue;
       // Lines vanish where a triangle's side falls below eight pixels.
       const double side = 2.0 * source_.grid().sigma_x() * (1 << item.blend.first);
-      glUniform1f(program.uniform("fade_distance"), static_cast<float>(side * view.focal_px() / 8.0));
-      draw_mesh(program, frame, item, item.blend.first, figures);
+      glUniform1f(program.uniform("fade_distance"), static_cast<float>(side * frame.view.focal_px() / 8.0));
+      draw_mesh(frame, program, item, item.blend.first);
     }
   }
   glDisable(GL_BLEND);
@@ -341,20 +336,17 @@ void Renderer::draw_sky(const ViewState& view) const {
   glDepthFunc(GL_LESS);
 }
 
-FrameFigures Renderer::draw(const ViewState& view, std::int64_t first_column, std::int64_t last_column,
-                            std::int64_t first_row, std::int64_t last_row, const ResidentTile& resident) {
-  FrameFigures figures;
+FrameFigures Renderer::draw(const ViewState& view, const TileRange& range, const ResidentTile& resident) {
   drawn_.clear();
-  TerrainFrame frame = terrain_frame(source_, view);
-  const std::vector<Item> items =
-      visible_items(view, frame, {first_column, last_column, first_row, last_row}, resident, figures);
+  Frame frame{view, terrain_frame(source_, view), {}, {}};
+  find_visible(frame, range, resident);
   // Depth is fine only near the eye: begin it where the ground begins, or two meshes of one hill cannot be told apart.
   double nearest = view.far_distance;
-  for (const Item& item : items) nearest = std::min(nearest, item.nearest);
+  for (const Item& item : frame.items) nearest = std::min(nearest, item.nearest);
   // In the corners of the view depth is the least part of distance.
   const double half_y = std::tan(view.fov_y_rad / 2.0);
   const double half_x = half_y * view.width / view.height;
-  frame = terrain_frame(source_, view, 0.95 * nearest / std::sqrt(1.0 + half_x * half_x + half_y * half_y));
+  frame.terrain = terrain_frame(source_, view, 0.95 * nearest / std::sqrt(1.0 + half_x * half_x + half_y * half_y));
   glViewport(0, 0, view.width, view.height);
   glEnable(GL_DEPTH_TEST);
   glDepthFunc(GL_LESS);
@@ -363,19 +355,19 @@ FrameFigures Renderer::draw(const ViewState& view, std::int64_t first_column, st
   glCullFace(GL_BACK);
   glClear(GL_DEPTH_BUFFER_BIT);
   glActiveTexture(GL_TEXTURE0);
-  draw_opaque(view, frame, items, figures);
+  draw_opaque(frame);
   draw_sky(view);
-  figures.passes = 1;
-  if (std::any_of(items.begin(), items.end(), fades)) {
-    draw_fading(view, frame, items, figures);
-    ++figures.passes;
+  frame.figures.passes = 1;
+  if (std::any_of(frame.items.begin(), frame.items.end(), fades)) {
+    draw_fading(frame);
+    ++frame.figures.passes;
   }
   if (view.wireframe) {
-    draw_wires(view, frame, items, figures);
-    ++figures.passes;
+    draw_wires(frame);
+    ++frame.figures.passes;
   }
   glBindVertexArray(0);
-  return figures;
+  return frame.figures;
 }
 
 }  // namespace isohf::view

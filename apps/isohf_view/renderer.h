@@ -44,9 +44,8 @@ class Renderer {
   /// Where ColourMode::kTexture finds its textures.
   void set_textures(TileTexture textures) { textures_ = std::move(textures); }
 
-  /// Draws tiles first..last of both axes, as far as resident, into the bound framebuffer.
-  FrameFigures draw(const ViewState& view, std::int64_t first_column, std::int64_t last_column, std::int64_t first_row,
-                    std::int64_t last_row, const ResidentTile& resident);
+  /// Draws the tiles of a range, as far as resident, into the bound framebuffer.
+  FrameFigures draw(const ViewState& view, const TileRange& range, const ResidentTile& resident);
 
   /// What the last frame drew in its opaque and its fading pass, in order.
   [[nodiscard]] const std::vector<DrawnMesh>& drawn() const { return drawn_; }
@@ -70,21 +69,23 @@ class Renderer {
     return item.blend.alpha > 0.5 / 255.0 && item.blend.second != item.blend.first;
   }
 
-  [[nodiscard]] std::vector<Item> visible_items(const ViewState& view, const TerrainFrame& frame,
-                                                const std::array<std::int64_t, 4>& range, const ResidentTile& resident,
-                                                FrameFigures& figures) const;
+  /// What the passes over one frame's tiles share.
+  struct Frame {
+    const ViewState& view;
+    TerrainFrame terrain;
+    std::vector<Item> items;  ///< nearest first
+    FrameFigures figures;
+  };
+
+  void find_visible(Frame& frame, const TileRange& range, const ResidentTile& resident) const;
   /// Made when first wanted.
   [[nodiscard]] const TerrainProgram& shading(const ViewState& view, bool is_rim);
   void draw_sky(const ViewState& view) const;
-  void draw_opaque(const ViewState& view, const TerrainFrame& frame, const std::vector<Item>& items,
-                   FrameFigures& figures);
-  void draw_fading(const ViewState& view, const TerrainFrame& frame, const std::vector<Item>& items,
-                   FrameFigures& figures);
-  void draw_wires(const ViewState& view, const TerrainFrame& frame, const std::vector<Item>& items,
-                  FrameFigures& figures) const;
-  void draw_mesh(const TerrainProgram& program, const TerrainFrame& frame, const Item& item, int level,
-                 FrameFigures& figures) const;
-  void begin_shading(const TerrainProgram& program, const ViewState& view, const TerrainFrame& frame) const;
+  void draw_opaque(Frame& frame);
+  void draw_fading(Frame& frame);
+  void draw_wires(Frame& frame) const;
+  void draw_mesh(Frame& frame, const TerrainProgram& program, const Item& item, int level) const;
+  void begin_shading(const Frame& frame, const TerrainProgram& program) const;
 
   const TileSource& source_;
   const SharedGeometry& shared_;

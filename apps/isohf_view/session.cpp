@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "isohf/error.h"
+#include "options/describe.h"
 
 namespace isohf::view {
 namespace {
@@ -56,16 +57,6 @@ const char* mode_name(ColourMode mode) {
 }
 
 }  // namespace
-
-std::string grouped(std::int64_t number) {
-  const std::string digits = std::to_string(number);
-  std::string out;
-  for (std::size_t i = 0; i < digits.size(); ++i) {
-    if (i > 0 && digits[i - 1] != '-' && (digits.size() - i) % 3 == 0) out += ' ';
-    out += digits[i];
-  }
-  return out;
-}
 
 Session::Session(const TileSource& source, const Options& options)
     : view(options.view),
@@ -143,9 +134,7 @@ void Session::draw() {
   const double reach = box_.figures().radius;
   cut_ = reach < reach_wanted_;
   if (cut_) view.far_distance = reach;
-  const TileRange& range = box_.range();
-  figures_ = renderer_.draw(view, range.first_column, range.last_column, range.first_row, range.last_row,
-                            [this](TileIndex tile) { return box_.resident(tile); });
+  figures_ = renderer_.draw(view, box_.range(), [this](TileIndex tile) { return box_.resident(tile); });
 }
 
 void Session::frame() {
@@ -186,8 +175,8 @@ void Session::draw_overlay(double frames_per_second, bool figures, bool help) co
   if (figures) {
     const TileBoxFigures& box = box_.figures();
     std::vector<std::string> lines{
-        fmt::format("{:5.1f} fps   {} triangles   {} draw calls", frames_per_second, grouped(figures_.triangles),
-                    figures_.draw_calls),
+        fmt::format("{:5.1f} fps   {} triangles   {} draw calls", frames_per_second,
+                    cli::describe_count(figures_.triangles), figures_.draw_calls),
         fmt::format("{} tiles drawn, {} resident, {} to come, {:.1f} MiB", figures_.visible_tiles, box.resident_tiles,
                     box.missing_tiles, static_cast<double>(box.resident_bytes) / (1 << 20)),
         fmt::format("x {:.0f}  y {:.0f}  z {:.0f}   {}   {}", camera.eye.x, camera.eye.y / view.exaggeration,

@@ -68,7 +68,4 @@ class Session {
   bool cut_ = false;           ///< memory shortens the far distance
 };
 
-/// "12 345 678"
-[[nodiscard]] std::string grouped(std::int64_t number);
-
 }  // namespace isohf::view

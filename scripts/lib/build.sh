@@ -1,5 +1,11 @@
 # Sourced, with $root set to the top of the tree. Configuring and building, the same way for every script.
 
+# isohf_usage FIRST LAST: the lines of the calling script's head that say how it is called.
+isohf_usage() { sed -n "$1,$2s/^# \{0,1\}//p" "$0"; }
+
+# isohf_value ARGUMENT...: ends with code 2 where an option, the first, has no value behind it.
+isohf_value() { (($# > 1)) || { echo "${0##*/}: $1 lacks its value" >&2; exit 2; }; }
+
 # isohf_jobs: compilations side by side: one for each core, but no more than memory allows (about 1.5 GB for one).
 isohf_jobs() {
   local cores memory_gb

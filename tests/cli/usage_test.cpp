@@ -139,22 +139,6 @@ TEST(Usage, BashCompletesEveryCommandOptionAndWord) {
   EXPECT_EQ(completions_of(" convert --fit interpol", 3), "\n");
 }
 
-TEST(Usage, ScriptsEndWithCode2OnWrongOptions) {
-  for (const char* script : {"check", "setup", "flight", "accuracy_table"}) {
-    const std::string path = std::string(ISOHF_SOURCE_DIR "/scripts/") + script;
-    EXPECT_EQ(run_program({"/bin/bash", path, "--bogus"}).exit_code, 2) << script;
-    EXPECT_EQ(run_program({"/bin/bash", path, "--help"}).exit_code, 0) << script;
-  }
-}
-
-TEST(Usage, FailureToWriteStandardOutputIsReported) {
-  RunOptions full;
-  full.output_path = "/dev/full";
-  const RunResult result = run_isohf({"plan"}, full);
-  EXPECT_EQ(result.exit_code, 1);
-  EXPECT_EQ(result.err, "isohf: standard output: No space left on device\n");
-}
-
 TEST(Usage, ReaderThatLeavesIsNoMessage) {
   RunOptions closed;
   closed.close_output = true;

@@ -33,11 +33,9 @@ TEST_F(RendererTest, DrawsEveryVisibleTileWithAtMostTwoCallsAPass) {
   view.far_distance = 1.2 * farthest_corner(source.grid(), whole_bounds(source), view.eye, 1.0);
   box.finish({view.eye.x, view.eye.z}, view.far_distance);
   Offscreen target(view.width, view.height, GL_RGBA8);
-  const TileRange& range = box.range();
   for (const double level : {0.0, 0.3, 1.0, 1.7, 3.0}) {
     view.fixed_level = level;
-    const FrameFigures figures = renderer.draw(view, range.first_column, range.last_column, range.first_row,
-                                               range.last_row, [&](TileIndex tile) { return box.resident(tile); });
+    const FrameFigures figures = renderer.draw(view, box.range(), [&](TileIndex tile) { return box.resident(tile); });
     EXPECT_EQ(figures.visible_tiles, 12);
     EXPECT_EQ(figures.absent_tiles, 0);
     EXPECT_LE(figures.draw_calls, 2 * figures.visible_tiles * figures.passes);

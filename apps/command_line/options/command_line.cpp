@@ -11,7 +11,7 @@
 #include "isohf/error.h"
 #include "options/config_file.h"
 #include "options/help_page.h"
-#include "options/nearest_word.h"
+#include "options/option_values.h"
 #include "output/standard_output.h"
 
 namespace isohf::cli {

@@ -8,7 +8,6 @@
 #include <nlohmann/json.hpp>
 
 #include "output/terminal.h"
-#include "program.h"
 
 namespace isohf::cli {
 namespace {
@@ -94,6 +93,17 @@ std::string printable(std::string text) {
   return text;
 }
 
+int exit_code_for(ErrorCode code) {
+  if (code == ErrorCode::kInvalidArgument) return kExitUsage;
+  if (code == ErrorCode::kCancelled) return kExitInterrupted;
+  return kExitFailed;
+}
+
+std::string& program_name() {
+  static std::string name = "isohf";
+  return name;
+}
+
 Telling& telling() {
   static Telling how;
   return how;
@@ -105,7 +115,7 @@ void print_warnings(const std::vector<Warning>& warnings) {
     const bool is_loss = warning.kind == Warning::Kind::kLoss;
     if (telling().quiet && !is_loss) continue;
     tell("warning:", Style::kWarning, warning,
-         {{"warning", {{"kind", is_loss ? "loss" : "note"}, {"message", std::string(warning)}}}});
+         {{"warning", {{"kind", is_loss ? "loss" : "note"}, {"message", warning.c_str()}}}});
   }
 }
 

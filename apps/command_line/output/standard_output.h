@@ -9,6 +9,21 @@
 
 namespace isohf::cli {
 
+/// How the programs end (docs/cli.md).
+enum ExitCode : int {
+  kExitDone = 0,
+  kExitFailed = 1,
+  kExitUsage = 2,
+  kExitDifferences = 3,  ///< verify found something, restore not what --lossless kept
+  kExitInterrupted = 130,
+};
+
+/// What a program ends with after an error of that code.
+[[nodiscard]] int exit_code_for(ErrorCode code);
+
+/// How messages and help call the program; run_program() sets it.
+[[nodiscard]] std::string& program_name();
+
 /// Buffered writing to standard output, every failure noticed.
 ///
 /// A reader that has gone away (a closed pipe) is no error worth a message: it ends the program with exit code 1 and

@@ -74,7 +74,8 @@ class Drawing {
   void legend(const std::vector<Curve>& curves, double x, double y) {
     for (std::size_t i = 0; i < curves.size(); ++i) {
       const double left = x + (i % 2 == 0 ? 0.0 : 280.0);
-      const double base = y + 19.0 * static_cast<double>(i / 2);
+      const std::size_t line = i / 2;
+      const double base = y + 19.0 * static_cast<double>(line);
       curve(curves[i], {left, left + 30}, {base - 4, base - 4}, false);
       text(left + 38, base, curves[i].label, "start");
     }

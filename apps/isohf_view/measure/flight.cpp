@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <ctime>
 #include <fstream>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <numeric>
 #include <optional>
@@ -14,7 +16,7 @@
 #include "isohf/base/output_file.h"
 #include "isohf/error.h"
 #include "measure/flight_path.h"
-#include "measure/static_mesh.h"
+#include "options/describe.h"
 #include "output/svg_chart.h"
 #include "session.h"
 
@@ -123,22 +125,18 @@ std::string text_from(const FlightTotals& totals, const Options& options) {
   const FlightSummary summary = summary_of(totals);
   const auto frames = static_cast<std::int64_t>(summary.frames);
   return fmt::format(
-             "frames: {}, ms: mean {:.2f}, median {:.2f}, 99 % {:.2f}, worst {:.2f}\n"
-             "triangles: {} a frame, {:.2f} million a second\n",
-             frames, summary.mean_ms, summary.median_ms, summary.percentile_99_ms, summary.worst_ms,
-             grouped(totals.triangles / frames), summary.triangles_per_second / 1e6) +
-         fmt::format(
-             "tile memory: at most {:.1f} MiB, bound {} MiB; uploaded {:.1f} MiB\n"
-             "update(), all that a frame does for paging: ms: mean {:.3f}, worst {:.3f}\n",
-             mib(totals.most_bytes), options.memory_mib, mib(totals.upload_bytes), summary.update_mean_ms,
-             summary.update_worst_ms) +
-         fmt::format(
-             "process: {:.1f} MiB of its own before the first tile, {:.1f} MiB at most; peak with mapped files {:.1f} "
-             "MiB\n"
-             "frames with more than 2 draw calls a visible tile and pass: {}\n"
-             "tiles in view that were not there yet, a frame: {:.2f}\n",
-             mib(totals.anonymous_before), mib(totals.most_anonymous), mib(process_memory().peak),
-             totals.over_two_calls, static_cast<double>(totals.absent) / static_cast<double>(frames));
+      "frames: {}, ms: mean {:.2f}, median {:.2f}, 99 % {:.2f}, worst {:.2f}\n"
+      "triangles: {} a frame, {:.2f} million a second\n"
+      "tile memory: at most {:.1f} MiB, bound {} MiB; uploaded {:.1f} MiB\n"
+      "update(), all that a frame does for paging: ms: mean {:.3f}, worst {:.3f}\n"
+      "process: {:.1f} MiB of its own before the first tile, {:.1f} MiB at most; peak with mapped files {:.1f} MiB\n"
+      "frames with more than 2 draw calls a visible tile and pass: {}\n"
+      "tiles in view that were not there yet, a frame: {:.2f}\n",
+      frames, summary.mean_ms, summary.median_ms, summary.percentile_99_ms, summary.worst_ms,
+      cli::describe_count(totals.triangles / frames), summary.triangles_per_second / 1e6, mib(totals.most_bytes),
+      options.memory_mib, mib(totals.upload_bytes), summary.update_mean_ms, summary.update_worst_ms,
+      mib(totals.anonymous_before), mib(totals.most_anonymous), mib(process_memory().peak), totals.over_two_calls,
+      static_cast<double>(totals.absent) / static_cast<double>(frames));
 }
 
 ordered_json json_from(const FlightTotals& totals, const Options& options) {
@@ -193,6 +191,126 @@ std::string plot_of(const FlightTotals& totals, const std::string& title) {
   return chart::line_chart(drawing, chart::Scale::kLogarithmic);
 }
 
+/// The same picture's triangles, drawn twice.
+struct MeshSpeed {
+  std::int64_t triangles = 0;  ///< a frame
+  struct Time {
+    double wall_ms = 0.0;
+    double processor_ms = 0.0;  ///< of all threads: hardly depends on what else the machine does
+  };
+  Time ours;   ///< a whole frame of the session, nothing left to load
+  Time plain;  ///< the same meshes from float positions, in one plain colour, without sky or fading
+};
+
+constexpr int kRuns = 5;
+
+constexpr const char* kVertex = R"glsl(#version 330 core
+layout(location = 0) in vec3 place;
+uniform mat4 clip_from_eye;
+void main() { gl_Position = clip_from_eye * vec4(place, 1.0); }
+)glsl";
+
+constexpr const char* kFragment = R"glsl(#version 330 core
+out vec4 colour;
+void main() { colour = vec4(0.6, 0.6, 0.6, 1.0); }
+)glsl";
+
+/// One tile's positions, seen from the eye.
+class StaticTile {
+ public:
+  StaticTile(const Session& session, TileIndex tile) {
+    const TileGrid& grid = session.source().grid();
+    const TileShape& shape = grid.shape();
+    const ViewScale scale = session.source().scale();
+    std::vector<std::uint16_t> codes(static_cast<std::size_t>(shape.stored_vertex_count()));
+    session.source().read(tile, codes);
+    std::vector<float> places;
+    places.reserve(3 * codes.size());
+    for (int row = 0; row < shape.rows(); ++row) {
+      for (int column = 0; column < shape.columns(); ++column) {
+        const ObjectVertex at = object_from_grid(shape, GridVertex{column, row});
+        const std::uint16_t code = codes[static_cast<std::size_t>(row * shape.columns() + column)];
+        const WorldPoint world = grid.world_from_object(tile, {static_cast<double>(at.x), static_cast<double>(at.z)});
+        const double y = (scale.offset + scale.scale * code) * session.view.exaggeration;
+        places.push_back(static_cast<float>(world.x - session.view.eye.x));
+        places.push_back(static_cast<float>(y - session.view.eye.y));
+        places.push_back(static_cast<float>(world.z - session.view.eye.z));
+      }
+    }
+    glBindVertexArray(array_.get());
+    glBindBuffer(GL_ARRAY_BUFFER, places_.get());
+    glBufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(places.size() * sizeof(float)), places.data(),
+                 GL_STATIC_DRAW);
+    glVertexAttribPointer(0, 3, GL_FLOAT, GL_FALSE, 0, nullptr);
+    glEnableVertexAttribArray(0);
+    glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, session.shared().indices());
+    glBindVertexArray(0);
+  }
+  void bind() const { glBindVertexArray(array_.get()); }
+
+ private:
+  VertexArray array_;
+  Buffer places_;
+};
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+template <typename Draw>
+MeshSpeed::Time median_time(const Draw& draw) {
+  std::vector<double> wall_ms;
+  std::vector<double> processor_ms;
+  for (int run = 0; run < kRuns; ++run) {
+    const auto begin = std::chrono::steady_clock::now();
+    const std::clock_t begin_clock = std::clock();
+    draw();
+    glFinish();
+    processor_ms.push_back(1e3 * static_cast<double>(std::clock() - begin_clock) / CLOCKS_PER_SEC);
+    wall_ms.push_back(milliseconds_since(begin));
+  }
+  return {median(wall_ms), median(processor_ms)};
+}
+
+/// What a plain static mesh costs the same driver: every mesh that the session's frame draws, strip by strip and at the
+/// same places, but with its vertices' positions laid out beforehand, and no light. Loads all tiles in reach first.
+/// Medians of a few frames.
+MeshSpeed measure_static_mesh(Session& session) {
+  const Offscreen target(session.view.width, session.view.height, GL_RGBA8);
+  target.bind();
+  session.complete_frame();
+  MeshSpeed speed;
+  speed.triangles = session.figures().triangles;
+  speed.ours = median_time([&] { session.frame(); });
+
+  const std::vector<DrawnMesh> meshes = session.renderer().drawn();
+  std::map<std::int64_t, StaticTile> tiles;
+  for (const DrawnMesh& mesh : meshes) {
+    tiles.try_emplace(session.source().grid().flat_index(mesh.tile), session, mesh.tile);
+  }
+  const Program program("static mesh", kVertex, kFragment);
+  const TerrainFrame frame = terrain_frame(session.source(), session.view);
+  const SharedGeometry& shared = session.shared();
+  speed.plain = median_time([&] {
+    glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
+    begin_opaque_pass();
+    program.use();
+    glUniformMatrix4fv(program.uniform("clip_from_eye"), 1, GL_FALSE, frame.clip_from_eye.floats().data());
+    for (const DrawnMesh& mesh : meshes) {
+      tiles.at(session.source().grid().flat_index(mesh.tile)).bind();
+      glEnable(GL_CULL_FACE);
+      shared.draw_strip(mesh.level);
+      if (!shared.has_stitch(mesh.level)) continue;
+      glDisable(GL_CULL_FACE);
+      shared.draw_stitch(mesh.level);
+    }
+  });
+  glBindVertexArray(0);
+  return speed;
+}
+
 /// The rasteriser's limit, the sum over a few places along the flight.
 constexpr int kBaselinePlaces = 5;
 
@@ -214,7 +332,7 @@ MeshSpeed baseline_of(Session& session, const std::function<void(double)>& stand
 
 std::string text_from(const MeshSpeed& sum) {
   std::string text = fmt::format("standing at {} places: {} triangles a frame\n", kBaselinePlaces,
-                                 grouped(sum.triangles / kBaselinePlaces));
+                                 cli::describe_count(sum.triangles / kBaselinePlaces));
   const auto add = [&](const char* name, const MeshSpeed::Time& time) {
     text += fmt::format("  {} {:.2f} ms, {:.2f} million triangles a second; processor {:.2f} ms\n", name,
                         time.wall_ms / kBaselinePlaces, static_cast<double>(sum.triangles) / time.wall_ms / 1e3,

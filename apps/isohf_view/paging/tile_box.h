@@ -39,19 +39,6 @@ struct TileBoxLimits {
   int workers = 2;
 };
 
-/// Tile columns and rows first..last, inclusive; empty where last < first.
-struct TileRange {
-  std::int64_t first_column = 0;
-  std::int64_t last_column = -1;
-  std::int64_t first_row = 0;
-  std::int64_t last_row = -1;
-
-  [[nodiscard]] bool contains(TileIndex tile) const {
-    return tile.column >= first_column && tile.column <= last_column && tile.row >= first_row && tile.row <= last_row;
-  }
-  friend bool operator==(const TileRange&, const TileRange&) = default;
-};
-
 /// What one update did, and where things stand.
 struct TileBoxFigures {
   int uploads = 0;  ///< in this frame

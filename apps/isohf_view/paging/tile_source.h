@@ -77,6 +77,19 @@ class TileSource {
 /// steps between the dataset's smallest and largest elevation. Throws what ArchiveReader throws.
 [[nodiscard]] std::unique_ptr<TileSource> open_archive(const std::string& path);
 
+/// Tile columns and rows first..last, inclusive; empty where last < first.
+struct TileRange {
+  std::int64_t first_column = 0;
+  std::int64_t last_column = -1;
+  std::int64_t first_row = 0;
+  std::int64_t last_row = -1;
+
+  [[nodiscard]] bool contains(TileIndex tile) const {
+    return tile.column >= first_column && tile.column <= last_column && tile.row >= first_row && tile.row <= last_row;
+  }
+  friend bool operator==(const TileRange&, const TileRange&) = default;
+};
+
 /// The box around a tile, from the eye.
 struct TileVolume {
   Vec3 low;

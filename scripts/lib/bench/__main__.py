@@ -15,20 +15,20 @@ from harness import Bench
 FIRST = ["convert", "peers", "floor", "filters", "sizes", "large", "memory"]
 
 
-def find_sections():
-    """Modules by name: FIRST, then the others by the alphabet."""
+def section_names():
+    """FIRST, then the others by the alphabet."""
     names = [path.stem for path in (pathlib.Path(__file__).parent / "sections").glob("*.py")]
-    names.sort(key=lambda name: (FIRST.index(name) if name in FIRST else len(FIRST), name))
-    return {name: importlib.import_module(f"sections.{name}") for name in names}
+    return sorted(names, key=lambda name: (FIRST.index(name) if name in FIRST else len(FIRST), name))
 
 
-def main():
-    sections = find_sections()
-    if sys.argv[1:] == ["--list"]:
-        for name, module in sections.items():
-            print(f"    {name + ':':<10} {module.__doc__.strip().splitlines()[0]}")
-        return
-    root = pathlib.Path(sys.argv[1])
+def find_sections():
+    """Modules by name."""
+    return {name: importlib.import_module(f"sections.{name}") for name in section_names()}
+
+
+def parse(arguments):
+    """What is wanted; ends with code 2 on a wrong option. Imports nothing that a bare system lacks."""
+    root = pathlib.Path(arguments[0])
     parser = argparse.ArgumentParser(prog="scripts/bench")
     parser.add_argument("root")
     parser.add_argument("sections", nargs="*", metavar="SECTION")
@@ -39,18 +39,32 @@ def main():
     parser.add_argument("--json", action="store_true")
     parser.add_argument("--data", default=str(root / "../shared/data"))
     parser.add_argument("--input")
-    options = parser.parse_args()
+    options = parser.parse_args(arguments)
     for section in options.sections:
-        if section not in sections:
-            parser.error(f"{section}: no section; there are {', '.join(sections)}")
-    chosen = options.sections or ["convert"]
+        if section not in section_names():
+            parser.error(f"{section}: no section; there are {', '.join(section_names())}")
     if options.smoke:
         options.small, options.rounds = True, 1
-        chosen = options.sections or [name for name in sections if getattr(sections[name], "SMOKE", True)]
     if options.rounds is None:
         options.rounds = 2 if options.small else 5
     if options.rounds < 1:
         parser.error("--rounds: at least 1")
+    return options
+
+
+def main():
+    if sys.argv[1] == "--parse":
+        parse(sys.argv[2:])
+        return
+    sections = find_sections()
+    if sys.argv[1] == "--list":
+        for name, module in sections.items():
+            print(f"    {name + ':':<10} {module.__doc__.strip().splitlines()[0]}")
+        return
+    options = parse(sys.argv[1:])
+    chosen = options.sections or ["convert"]
+    if options.smoke and not options.sections:
+        chosen = [name for name in sections if getattr(sections[name], "SMOKE", True)]
     bench = Bench(options)
     if options.write:
         bench.has_places(chosen)

@@ -1,0 +1,27 @@
+#!/usr/bin/env bash
+# Every script ends with code 2 on a wrong option, before it installs or builds anything, and with 0 on --help.
+#   script_options_test.sh SOURCE_DIR
+cd "$1" || exit 1
+failed=0
+expect() {  # expect CODE SCRIPT ARGUMENT...
+  local code=$1 found
+  shift
+  timeout 20 "$@" >/dev/null 2>&1
+  found=$?
+  ((found == code)) || { echo "$*: ended with $found, must be $code"; failed=1; }
+}
+for script in accuracy_table bench check flight fuzz make_testdata quickstart setup test; do
+  expect 0 "scripts/$script" --help
+  [[ $script == test ]] || expect 2 "scripts/$script" --nonsense
+done
+expect 2 scripts/accuracy_table --data
+expect 2 scripts/accuracy_table --quick
+expect 2 scripts/bench nonsense
+expect 2 scripts/bench --rounds 0
+expect 2 scripts/check --fix --nonsense
+expect 2 scripts/flight --frames
+expect 2 scripts/flight --frames none
+expect 2 scripts/fuzz archive soon
+expect 2 scripts/setup --all --nonsense
+expect 2 scripts/test --golden nonsense
+exit $failed
