@@ -214,7 +214,7 @@ void Renderer::begin_shading(const Frame& frame, const TerrainProgram& program) 
               static_cast<float>(1.0 / codes));
   set_vec3(program.uniform("sun"), sun);
   if (const TextureInfo* textures = source_.textures()) {
-    // Texel centres lie on the tile's edges (docs/archive_format.md, section 12).
+    // Texel centres lie on the tile's edges (docs/archive_format.md, "Textures").
     const TileShape& shape = source_.grid().shape();
     const double size = textures->size;
     const double whole = (size - 1.0) / size;

@@ -9,7 +9,12 @@
 #include <utility>
 
 #include "archive/tiles.h"
+#include "isohf/archive/metadata/accuracy_info.h"
+#include "isohf/archive/metadata/json_members.h"
+#include "isohf/archive/shadow_seeds/shadow_seeds.h"
+#include "isohf/archive/textures/texture_info.h"
 #include "isohf/error.h"
+#include "support/temporary_folder.h"
 
 namespace isohf {
 namespace {
@@ -241,6 +246,68 @@ TEST(Metadata, RefusesProjectionsThatMakeNoMap) {
         std::pair{"\"utm_zone\": null", "\"utm_zone\": 61"}, std::pair{"\"wraps_x\": true", "\"wraps_x\": 1"}}) {
     EXPECT_THROW((void)parse_metadata(replaced(json, from, to)), Error) << to;
   }
+}
+
+using Json = nlohmann::json;
+
+Json schema_file(const std::string& name) {
+  return Json::parse(test::read_file(ISOHF_SOURCE_DIR "/docs/schema/" + name));
+}
+
+/// References put in place; whether other members are allowed is for the programs' documents to say.
+Json resolved(const Json& schema, const Json& common) {
+  if (schema.is_object() && schema.contains("$ref")) {
+    const auto reference = schema["$ref"].get<std::string>();
+    return resolved(common.at(Json::json_pointer(reference.substr(reference.find('#') + 1))), common);
+  }
+  if (!schema.is_structured()) return schema;
+  Json result = schema;
+  if (schema.is_object() && schema.value("additionalProperties", Json()) == false) result.erase("additionalProperties");
+  for (auto& part : result) part = resolved(part, common);
+  return result;
+}
+
+template <typename T>
+Json extension_schema(void (*members)(JsonMembers&, T&)) {
+  T value;
+  return Json::parse(schema_of_members([&](JsonMembers& json) { members(json, value); }));
+}
+
+TEST(Metadata, AreDescribedByTheSchemaOfTheirTable) {
+  Json made = Json::parse(metadata_schema());
+  made["properties"]["statistics"]["type"] = {"object", "null"};  // what a plan prints has none yet
+  made["properties"]["accuracy"] = extension_schema(accuracy_members);
+  made["properties"]["tile_textures"] = extension_schema(texture_members);
+  made["properties"]["shadow_seeds"] = extension_schema(shadow_seed_members);
+  const Json file = resolved(schema_file("metadata.json"), schema_file("common.json"));
+  EXPECT_TRUE(file.at("required") == made["required"]) << made["required"].dump();
+  for (const auto& [name, schema] : made["properties"].items()) {
+    Json found = file.at("properties").value(name, Json());
+    if (name == "projection")
+      found = {{"type", {"object", "null"}},
+               {"properties", found["anyOf"][0]["properties"]},
+               {"required", found["anyOf"][0]["required"]}};
+    EXPECT_TRUE(found == schema) << name << " is " << found.dump() << ", must be " << schema.dump();
+  }
+}
+
+/// Names of members that the page does not have in code type, alone or behind a dot.
+std::vector<std::string> names_off_the_page(const Json& schema, const std::string& page) {
+  std::vector<std::string> missing;
+  for (const auto& [name, member] : schema.value("properties", Json::object()).items()) {
+    const bool is_there =
+        page.find("." + name + "`") != std::string::npos || page.find("`" + name + "`") != std::string::npos;
+    if (!is_there && !member.contains("properties")) missing.push_back(name);
+    const auto inner = names_off_the_page(member, page);
+    missing.insert(missing.end(), inner.begin(), inner.end());
+  }
+  return missing;
+}
+
+TEST(Metadata, HaveEveryMemberOnThePageOfTheFormat) {
+  const std::string page = test::read_file(ISOHF_SOURCE_DIR "/docs/archive_format.md");
+  EXPECT_THAT(names_off_the_page(resolved(schema_file("metadata.json"), schema_file("common.json")), page),
+              testing::IsEmpty());
 }
 
 }  // namespace

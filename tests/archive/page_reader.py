@@ -191,4 +191,5 @@ def main(path):
     assert everything.hexdigest() == metadata["content_sha256"], "another content hash"
 
 
-main(sys.argv[1])
+if __name__ == "__main__":
+    main(sys.argv[1])

@@ -218,13 +218,19 @@ TEST(ShadowSeeds, NamesAreExact) {
   }
 }
 
+ShadowSeedInfo parsed(const std::string& json) {
+  Metadata metadata(TileGrid::make(TileShape::make(5, 5, 1), 1, 1, 1.0, 1.0));
+  metadata.extensions = {{kShadowSeedsName, json}};
+  return *shadow_seed_info(metadata);
+}
+
 TEST(ShadowSeedInfo, ComesBackFromJson) {
   ShadowSeedInfo info;
   info.sun_min_deg = 1.5;
   info.elevation_units_per_world_unit = 3.28;
   info.members = 5;
   info.bytes = 700;
-  const ShadowSeedInfo hulls = parse_shadow_seed_info(format_shadow_seed_info(info));
+  const ShadowSeedInfo hulls = parsed(format_shadow_seed_info(info));
   EXPECT_EQ(hulls.kind, ShadowSeedInfo::Kind::kHulls);
   EXPECT_EQ(hulls.sun_min_deg, 1.5);
   EXPECT_EQ(hulls.elevation_units_per_world_unit, 3.28);
@@ -232,12 +238,12 @@ TEST(ShadowSeedInfo, ComesBackFromJson) {
   EXPECT_EQ(hulls.bytes, 700U);
   info.kind = ShadowSeedInfo::Kind::kAngles;
   info.sun_deg = {5, 15, 30};
-  EXPECT_EQ(parse_shadow_seed_info(format_shadow_seed_info(info)).sun_deg, info.sun_deg);
+  EXPECT_EQ(parsed(format_shadow_seed_info(info)).sun_deg, info.sun_deg);
 }
 
 TEST(ShadowSeedInfo, RefusesWhatItIsNot) {
   const std::string rest = R"(,"elevation_units_per_world_unit":1,"members":1,"bytes":1})";
-  EXPECT_NO_THROW((void)parse_shadow_seed_info(R"({"kind":"hulls","sun_min_deg":2)" + rest));
+  EXPECT_NO_THROW((void)parsed(R"({"kind":"hulls","sun_min_deg":2)" + rest));
   for (const std::string& text : std::vector<std::string>{
            "", "[]", "{}", R"({"kind":"lines","sun_min_deg":2)" + rest, R"({"kind":"hulls")" + rest,
            R"({"kind":"hulls","sun_min_deg":0)" + rest, R"({"kind":"hulls","sun_min_deg":90)" + rest,
@@ -246,7 +252,7 @@ TEST(ShadowSeedInfo, RefusesWhatItIsNot) {
            R"({"kind":"angles","sun_deg":[5,"x"])" + rest, R"({"kind":"hulls","sun_min_deg":2})",
            R"({"kind":"hulls","sun_min_deg":2,"elevation_units_per_world_unit":0,"members":1,"bytes":1})",
            R"({"kind":"hulls","sun_min_deg":2,"elevation_units_per_world_unit":1,"members":-1,"bytes":1})"}) {
-    EXPECT_THROW((void)parse_shadow_seed_info(text), Error) << text;
+    EXPECT_THROW((void)parsed(text), Error) << text;
   }
 }
 

@@ -120,12 +120,18 @@ TextureInfo sample_info() {
   return info;
 }
 
+TextureInfo parsed(const std::string& json) {
+  Metadata metadata(TileGrid::make(TileShape::make(5, 5, 1), 1, 1, 1.0, 1.0));
+  metadata.extensions = {{kTileTexturesName, json}};
+  return *texture_info(metadata);
+}
+
 TEST(TextureInfo, ComesBackFromItsJson) {
   for (const TextureFormat format : {TextureFormat::kJpeg, TextureFormat::kPng}) {
     TextureInfo info = sample_info();
     info.format = format;
     info.channels = format == TextureFormat::kPng ? 4 : 3;
-    const TextureInfo back = parse_texture_info(format_texture_info(info));
+    const TextureInfo back = parsed(format_texture_info(info));
     EXPECT_EQ(format_texture_info(back), format_texture_info(info));
     EXPECT_EQ(back.bytes, info.bytes);
     EXPECT_EQ(back.photo_name, info.photo_name);
@@ -150,13 +156,13 @@ TEST(TextureInfo, RefusesEveryMissingOrWrongMember) {
     std::string bad = good;
     ASSERT_NE(bad.find(from), std::string::npos) << from;
     bad.replace(bad.find(from), std::string(from).size(), to);
-    EXPECT_EQ(code_of([&] { (void)parse_texture_info(bad); }), ErrorCode::kCorrupt) << bad;
+    EXPECT_EQ(code_of([&] { (void)parsed(bad); }), ErrorCode::kCorrupt) << bad;
   }
   std::string other = good;
   other.replace(other.find("jpeg"), 4, "webp");
-  EXPECT_EQ(code_of([&] { (void)parse_texture_info(other); }), ErrorCode::kUnsupported);
+  EXPECT_EQ(code_of([&] { (void)parsed(other); }), ErrorCode::kUnsupported);
   for (const char* text : {"", "[]", "3", "{"}) {
-    EXPECT_EQ(code_of([&] { (void)parse_texture_info(text); }), ErrorCode::kCorrupt);
+    EXPECT_EQ(code_of([&] { (void)parsed(text); }), ErrorCode::kCorrupt);
   }
 }
 

@@ -14,7 +14,6 @@
 #include "isohf/archive/container/content_hash.h"
 #include "isohf/archive/deflate/deflate.h"
 #include "isohf/archive/journal.h"
-#include "isohf/archive/metadata_json.h"
 #include "isohf/base/assert.h"
 #include "isohf/base/bytes.h"
 #include "isohf/base/output_file.h"

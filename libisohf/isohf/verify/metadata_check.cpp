@@ -8,7 +8,6 @@
 #include <nlohmann/json.hpp>
 
 #include "isohf/archive/container/archive_directory.h"
-#include "isohf/archive/metadata_json.h"
 #include "isohf/error.h"
 #include "isohf/projection/projected_extent.h"
 #include "isohf/projection/projection.h"

@@ -12,11 +12,11 @@
 #include <memory>
 #include <utility>
 
-#include "isohf/archive/accuracy_info.h"
 #include "isohf/archive/codec/quantise.h"
 #include "isohf/archive/codec/simd/batch_decoder.h"
 #include "isohf/archive/codec/tile_codes.h"
 #include "isohf/archive/container/content_hash.h"
+#include "isohf/archive/metadata/accuracy_info.h"
 #include "isohf/archive/tile_statistics.h"
 #include "isohf/error.h"
 #include "isohf/surface.h"

@@ -70,6 +70,8 @@ void check_profile(const ByteSource& file, const ZipEnd& end, const Complain& co
 /// CRC-32 over the CRC-32s of all members' data as they stand in the file, in the directory's order, but those of the
 /// metadata and the index. Throws as reading does.
 [[nodiscard]] std::uint32_t data_crc32(const ByteSource& file);
+/// The metadata's extension that holds it, as a string of hexadecimal digits.
+inline constexpr const char* kDataCrcName = "data_crc32";
 
 /// "member "a/b" at byte 4711".
 [[nodiscard]] std::string describe(const ZipEntry& entry);

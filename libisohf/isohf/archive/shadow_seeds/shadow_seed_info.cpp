@@ -4,33 +4,16 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "isohf/archive/metadata/json_members.h"
 #include "isohf/archive/shadow_seeds/shadow_seeds.h"
 #include "isohf/error.h"
 
 namespace isohf {
 namespace {
 
-using Json = nlohmann::ordered_json;
-
-[[noreturn]] void refuse(const std::string& member, const std::string& why) {
-  throw Error(ErrorCode::kCorrupt, fmt::format("shadow_seeds.{}: {}", member, why));
-}
-
-double number(const Json& json, const char* member) {
-  if (!json.contains(member) || !json[member].is_number()) refuse(member, "is no number");
-  return json[member].get<double>();
-}
-
-std::uint64_t count(const Json& json, const char* member) {
-  if (!json.contains(member) || !json[member].is_number_unsigned()) refuse(member, "is no whole number");
-  return json[member].get<std::uint64_t>();
-}
-
-double checked_sun(const char* member, double degrees) {
-  if (!(degrees >= kMinSunDeg && degrees < 90.0)) {
-    refuse(member, fmt::format("is {}, must be an elevation from {} to below 90", degrees, kMinSunDeg));
-  }
-  return degrees;
+void check_sun(const JsonMembers& json, const char* key, double degrees) {
+  if (!(degrees >= kMinSunDeg && degrees < 90.0))
+    json.refuse(key, fmt::format("is {}, must be an elevation from {} to below 90", degrees, kMinSunDeg));
 }
 
 }  // namespace
@@ -41,58 +24,43 @@ double ShadowSeedInfo::fall_per_half_step(const TileGrid& grid, const Quantisati
   return rise * grid.sigma_x() * elevation_units_per_world_unit / quantisation.scale;
 }
 
-std::string format_shadow_seed_info(const ShadowSeedInfo& info) {
-  Json json;
-  if (info.kind == ShadowSeedInfo::Kind::kHulls) {
-    json["kind"] = "hulls";
-    json["sun_min_deg"] = info.sun_min_deg;
+void shadow_seed_members(JsonMembers& json, ShadowSeedInfo& info) {
+  constexpr JsonRule kAbsent{.presence = JsonRule::kAbsent};
+  std::string kind = info.kind == ShadowSeedInfo::Kind::kHulls ? "hulls" : "angles";
+  json("kind", kind);
+  if (kind != "hulls" && kind != "angles")
+    throw Error(ErrorCode::kUnsupported, fmt::format("shadow_seeds.kind: is \"{}\", hulls and angles are read", kind));
+  const bool is_hulls = kind == "hulls";
+  info.kind = is_hulls ? ShadowSeedInfo::Kind::kHulls : ShadowSeedInfo::Kind::kAngles;
+  std::optional<double> lowest = is_hulls ? std::optional(info.sun_min_deg) : std::nullopt;
+  std::optional<std::vector<double>> angles = is_hulls ? std::nullopt : std::optional(info.sun_deg);
+  json("sun_min_deg", lowest, kAbsent);
+  json("sun_deg", angles, kAbsent);
+  if (is_hulls) {
+    if (!lowest) json.refuse("sun_min_deg", "is missing");
+    info.sun_min_deg = *lowest;
+    check_sun(json, "sun_min_deg", info.sun_min_deg);
   } else {
-    json["kind"] = "angles";
-    json["sun_deg"] = info.sun_deg;
-  }
-  json["directions"] = {"east", "west"};
-  json["elevation_units_per_world_unit"] = info.elevation_units_per_world_unit;
-  json["members"] = info.members;
-  json["bytes"] = info.bytes;
-  return json.dump();
-}
-
-ShadowSeedInfo parse_shadow_seed_info(const std::string& text) {
-  const Json json = Json::parse(text, nullptr, false);
-  if (!json.is_object()) throw Error(ErrorCode::kCorrupt, "shadow_seeds: is no object");
-  ShadowSeedInfo info;
-  const std::string kind = json.contains("kind") && json["kind"].is_string() ? json["kind"].get<std::string>() : "";
-  if (kind == "hulls") {
-    info.sun_min_deg = checked_sun("sun_min_deg", number(json, "sun_min_deg"));
-  } else if (kind == "angles") {
-    info.kind = ShadowSeedInfo::Kind::kAngles;
-    if (!json.contains("sun_deg") || !json["sun_deg"].is_array()) refuse("sun_deg", "is no array");
-    for (const Json& angle : json["sun_deg"]) {
-      if (!angle.is_number()) refuse("sun_deg", "holds something that is no number");
-      info.sun_deg.push_back(checked_sun("sun_deg", angle.get<double>()));
-      const std::size_t n = info.sun_deg.size();
-      if (n > 1 && info.sun_deg[n - 2] >= info.sun_deg[n - 1]) refuse("sun_deg", "is not in ascending order");
+    info.sun_deg = angles.value_or(std::vector<double>{});
+    for (std::size_t n = 0; n < info.sun_deg.size(); ++n) {
+      check_sun(json, "sun_deg", info.sun_deg[n]);
+      if (n > 0 && info.sun_deg[n - 1] >= info.sun_deg[n]) json.refuse("sun_deg", "is not in ascending order");
     }
     if (info.sun_deg.empty() || info.sun_deg.size() > kMaxSeedAngles) {
-      refuse("sun_deg", fmt::format("has {} angles, must have 1 to {}", info.sun_deg.size(), kMaxSeedAngles));
+      json.refuse("sun_deg", fmt::format("has {} angles, must have 1 to {}", info.sun_deg.size(), kMaxSeedAngles));
     }
-  } else {
-    throw Error(ErrorCode::kUnsupported, fmt::format("shadow_seeds.kind: is \"{}\", hulls and angles are read", kind));
   }
-  info.elevation_units_per_world_unit = number(json, "elevation_units_per_world_unit");
-  if (!(info.elevation_units_per_world_unit > 0.0 && std::isfinite(info.elevation_units_per_world_unit))) {
-    refuse("elevation_units_per_world_unit", "must be above 0");
-  }
-  info.members = static_cast<std::int64_t>(count(json, "members"));
-  info.bytes = count(json, "bytes");
-  return info;
+  json.derived("directions", {"east", "west"}, {{"type", "array"}, {"items", {{"type", "string"}}}});
+  json("elevation_units_per_world_unit", info.elevation_units_per_world_unit, {.least = 0.0, .above_least = true});
+  json.all("members", info.members, "bytes", info.bytes);
+}
+
+std::string format_shadow_seed_info(const ShadowSeedInfo& info) {
+  return write_extension(info, shadow_seed_members);
 }
 
 std::optional<ShadowSeedInfo> shadow_seed_info(const Metadata& metadata) {
-  for (const auto& [name, text] : metadata.extensions) {
-    if (name == kShadowSeedsName) return parse_shadow_seed_info(text);
-  }
-  return std::nullopt;
+  return read_extension(metadata, kShadowSeedsName, shadow_seed_members);
 }
 
 }  // namespace isohf

@@ -38,10 +38,13 @@ inline constexpr const char* kShadowSeedsName = "shadow_seeds";  ///< of the met
 inline constexpr std::size_t kMaxSeedAngles = 64;
 inline constexpr double kMinSunDeg = 0.01;  ///< sun elevations lie from here to below 90 degrees
 
-/// To and from the extension's JSON. Throws Error{kCorrupt} naming the member at fault, kUnsupported for other kinds.
+class JsonMembers;
+void shadow_seed_members(JsonMembers& json, ShadowSeedInfo& info);
+
+/// The extension's JSON.
 [[nodiscard]] std::string format_shadow_seed_info(const ShadowSeedInfo& info);
-[[nodiscard]] ShadowSeedInfo parse_shadow_seed_info(const std::string& json);
-/// The record of an archive's metadata; nullopt where it has no seeds.
+/// The record of an archive's metadata; nullopt where it has no seeds. Throws Error{kCorrupt} naming the member at
+/// fault, kUnsupported for other kinds.
 [[nodiscard]] std::optional<ShadowSeedInfo> shadow_seed_info(const Metadata& metadata);
 
 /// "seeds/ROW/COLUMN.seed", as tiles are named.

@@ -38,10 +38,13 @@ struct TextureInfo {
 inline constexpr const char* kTileTexturesName = "tile_textures";  ///< of the metadata's extension
 inline constexpr const char* kTextureFolder = "textures/";
 
-/// To and from the extension's JSON. Throws Error{kCorrupt} naming the member at fault, kUnsupported for other formats.
+class JsonMembers;
+void texture_members(JsonMembers& json, TextureInfo& info);
+
+/// The extension's JSON.
 [[nodiscard]] std::string format_texture_info(const TextureInfo& info);
-[[nodiscard]] TextureInfo parse_texture_info(const std::string& json);
-/// The record of an archive's metadata; nullopt where it has no textures.
+/// The record of an archive's metadata; nullopt where it has no textures. Throws Error{kCorrupt} naming the member at
+/// fault, kUnsupported for other formats.
 [[nodiscard]] std::optional<TextureInfo> texture_info(const Metadata& metadata);
 /// What the metadata's `textures` holds: the pattern of names.
 [[nodiscard]] std::string texture_name_pattern(TextureFormat format);

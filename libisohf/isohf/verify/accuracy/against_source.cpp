@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include "isohf/archive/accuracy_info.h"
+#include "isohf/archive/metadata/accuracy_info.h"
 #include "isohf/base/assert.h"
 #include "isohf/error.h"
 #include "isohf/lattice/barycentric.h"

@@ -3,7 +3,6 @@
 #include <cstdint>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "isohf/metadata.h"
 
@@ -21,6 +20,9 @@ struct AccuracyInfo {
 };
 
 inline constexpr const char* kAccuracyName = "accuracy";  ///< of the metadata's extension
+
+class JsonMembers;
+void accuracy_members(JsonMembers& json, AccuracyInfo& info);
 
 /// The extension's JSON.
 [[nodiscard]] std::string format_accuracy_info(const AccuracyInfo& info);

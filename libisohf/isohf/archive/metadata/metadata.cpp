@@ -1,0 +1,335 @@
+#include "isohf/metadata.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "isohf/archive/metadata/json_members.h"
+#include "isohf/error.h"
+
+namespace isohf {
+namespace {
+
+using Json = JsonMembers::Json;
+
+constexpr int kFormatVersion = 1;
+constexpr const char* kFormatName = "isohf";
+constexpr JsonRule kNull{.presence = JsonRule::kNull};
+constexpr JsonRule kAbsent{.presence = JsonRule::kAbsent};
+constexpr JsonRule kDefaulted{.presence = JsonRule::kDefaulted};
+
+JsonRule within(double most) {
+  return {.least = -most, .most = most};
+}
+
+// --- what metadata consist of, in the order in which it is written ---
+
+void version_members(JsonMembers& json) {
+  std::string format = kFormatName;
+  json("format", format);
+  if (format != kFormatName) json.refuse("format", fmt::format("is \"{}\", must be \"{}\"", format, kFormatName));
+  std::int64_t version = kFormatVersion;
+  json("version", version, {.least = 1});
+  if (version != kFormatVersion) {
+    throw Error(ErrorCode::kUnsupported,
+                fmt::format("metadata: format version {}; this build reads version {}", version, kFormatVersion));
+  }
+}
+
+void grid_members(JsonMembers& json, TileGrid& grid, std::int64_t& tiles_stored) {
+  int columns = grid.shape().columns();
+  int rows = grid.shape().rows();
+  int levels = grid.shape().levels();
+  json.object("tile_shape", [&](JsonMembers& shape) {
+    shape("columns", columns, {.most = kMaxTileColumns});
+    shape("rows", rows, {.most = kMaxTileRows});
+    shape("levels", levels, {.most = 99});
+  });
+  if (const std::string why = TileShape::why_invalid(columns, rows, levels); !why.empty())
+    json.refuse("tile_shape", why);
+  std::int64_t tile_columns = grid.tile_columns();
+  std::int64_t tile_rows = grid.tile_rows();
+  json.object("tiles", "columns", tile_columns, "rows", tile_rows, "stored", tiles_stored);
+  double extent_x = grid.extent_x();
+  double extent_z = grid.extent_z();
+  json.object("extent", "x", extent_x, "z", extent_z);
+  if (!json.reads()) return;
+  try {
+    grid = TileGrid::make(TileShape::make(columns, rows, levels), tile_columns, tile_rows, extent_x, extent_z);
+  } catch (const Error& error) {
+    throw Error(ErrorCode::kCorrupt, fmt::format("metadata: {}", error.what()));
+  }
+  if (tiles_stored > grid.tile_count())
+    json.refuse("tiles.stored", fmt::format("is {}, must lie in 0..{}", tiles_stored, grid.tile_count()));
+}
+
+/// Follows from shape and extent; written down for people.
+void lattice_members(JsonMembers& json, const TileGrid& grid) {
+  const Json number = {{"type", "number"}};
+  json.object("lattice", [&](JsonMembers& lattice) {
+    lattice.object("origin", [&](JsonMembers& origin) {
+      origin.derived("x", 0.0, number);
+      origin.derived("z", 0.0, number);
+    });
+    lattice.derived("column_step", 2.0 * grid.sigma_x(), number);
+    lattice.derived("row_step", grid.sigma_z(), number);
+    lattice.derived("odd_row_shift", grid.sigma_x(), number);
+  });
+}
+
+void sample_members(JsonMembers& json, Metadata& metadata) {
+  Quantisation& codes = metadata.quantisation;
+  json.name("type", codes.type, code_type_from_string);
+  json("offset", codes.offset);
+  json("scale", codes.scale, {.least = 0.0, .above_least = true});
+  const bool is_float = codes.type == CodeType::kF32;
+  json.derived("void", is_float ? Json("nan") : Json(codes.void_code()), {{"type", {"string", "integer"}}});
+  json("range", metadata.z_range, kAbsent);
+  if (is_float && (codes.offset != 0.0 || codes.scale != 1.0))
+    refuse_metadata("samples", "offset and scale of f32 must be 0 and 1");
+  if (metadata.z_range && !(metadata.z_range->first <= metadata.z_range->second))
+    json.refuse("range", "is not the smaller number first");
+}
+
+void projection_members(JsonMembers& json, ProjectionRecord& record) {
+  ProjectionSpec& spec = record.spec;
+  json.name("kind", spec.kind, projection_kind_from_string);
+  if (json.reads() && spec.kind == ProjectionKind::kNone) json.refuse("kind", "is none; the member must then be null");
+  json("semi_major_axis_m", spec.ellipsoid.semi_major_axis_m, {.least = 0.0, .most = 1e12, .above_least = true});
+  double& inverse = spec.ellipsoid.inverse_flattening;
+  json("inverse_flattening", inverse);
+  if (inverse != 0.0 && !(inverse > 1.0)) json.refuse("inverse_flattening", "must be 0 or above 1");
+  json("longitude_0", spec.longitude_0, within(1e4));
+  json("latitude_0", spec.latitude_0, within(90.0));
+  json("parallel_1", spec.parallel_1, within(90.0));
+  json("parallel_2", spec.parallel_2, within(90.0));
+  json("scale_0", spec.scale_0, {.least = 0.0, .most = 1e3, .above_least = true});
+  json("false_easting", spec.false_easting, within(1e15));
+  json("false_northing", spec.false_northing, within(1e15));
+  std::optional<int> zone = spec.utm_zone == 0 ? std::nullopt : std::optional(spec.utm_zone);
+  json("utm_zone", zone, {.presence = JsonRule::kNull, .least = -60, .most = 60});
+  spec.utm_zone = zone.value_or(0);
+  json.object("origin", [&](JsonMembers& origin) {
+    origin("easting", record.origin.easting, within(1e15));
+    origin("northing", record.origin.northing, within(1e15));
+  });
+  double& error = record.worst_scale_error;
+  std::optional<double> finite = std::isfinite(error) ? std::optional(error) : std::nullopt;
+  json.object("worst_scale_error", "error", finite, "longitude", record.worst_place.longitude, "latitude",
+              record.worst_place.latitude);
+  error = finite.value_or(std::numeric_limits<double>::infinity());
+  json("why", record.why, kDefaulted);
+}
+
+void ground_members(JsonMembers& json, MapGround& ground) {
+  GeoExtent& extent = ground.extent;
+  json.object("centre", "longitude", ground.centre.longitude, "latitude", ground.centre.latitude);
+  json.object("bounds", "west", extent.west, "south", extent.south, "east", extent.east, "north", extent.north);
+  json.object("map_scale", "mean", ground.mean_scale, "least", ground.least_scale, "most", ground.most_scale,
+              "worst_error", ground.worst_error, "longitude", ground.worst_place.longitude, "latitude",
+              ground.worst_place.latitude);
+}
+
+void mosaic_members(JsonMembers& json, MosaicRecord& mosaic) {
+  json.all("files", mosaic.files, "names", mosaic.first_names, "names_sha256", mosaic.names_sha256, "overlap",
+           mosaic.overlap);
+}
+
+void source_members(JsonMembers& json, SourceRecord& source) {
+  constexpr JsonRule kSamples{.most = 4294967296.0};
+  json("name", source.name);
+  json("format", source.format);
+  json("width", source.width, kSamples);
+  json("height", source.height, kSamples);
+  json("sample_type", source.sample_type);
+  json("channel", source.channel, kNull);
+  json("z_scale", source.z_scale, kDefaulted);
+  json("z_offset", source.z_offset, kDefaulted);
+  json.object(
+      "voids",
+      [&](JsonMembers& voids) {
+        voids("values", source.void_values);
+        voids("valid_range", source.valid_range, kNull);
+        voids("fill_distance", source.fill_distance, {.most = std::numeric_limits<std::int32_t>::max()});
+      },
+      kDefaulted);
+  std::string registration = to_string(source.registration);
+  json("registration", registration);
+  source.registration = registration == "area"    ? Registration::kArea
+                        : registration == "point" ? Registration::kPoint
+                                                  : Registration::kUnknown;
+  json.object("first_sample", "x", source.first_sample_x, "z", source.first_sample_z);
+  json.object("spacing", "x", source.spacing_x, "z", source.spacing_z);
+  std::optional<double> metres_per_unit;
+  if (!json.reads() && source.metres_per_unit != 1.0) metres_per_unit = source.metres_per_unit;
+  json.object("crs", [&](JsonMembers& crs) {
+    crs("name", source.crs_name, kNull);
+    crs("epsg", source.crs_epsg, kNull);
+    crs("wkt", source.crs_wkt, kNull);
+    crs("unit", source.crs_unit, kNull);
+    crs.all("origin_x", source.origin_x, "origin_y", source.origin_y);
+    crs.all("spacing_x", source.crs_spacing_x, "spacing_y", source.crs_spacing_y);
+    crs("metres_per_unit", metres_per_unit, kAbsent);
+  });
+  json.object("ground", source.ground, ground_members, kAbsent);
+  // Archives of the first builds tell the unit by the spacings alone.
+  const bool is_plain = !source.ground && source.crs_unit == "metre" && source.crs_spacing_x > 0.0;
+  if (json.reads())
+    source.metres_per_unit = metres_per_unit.value_or(is_plain ? source.spacing_x / source.crs_spacing_x : 1.0);
+  json.object("body", [&](JsonMembers& body) {
+    body("name", source.body, kNull);
+    body.all("semi_major_axis_m", source.semi_major_axis_m, "inverse_flattening", source.inverse_flattening);
+  });
+  json.object("vertical_datum", [&](JsonMembers& datum) {
+    datum("name", source.vertical_datum, kNull);
+    datum("epsg", source.vertical_epsg, kNull);
+  });
+  json.object("mosaic", source.mosaic, mosaic_members, kAbsent);
+  json("options", source.options, kAbsent);
+}
+
+void metadata_members(JsonMembers& json, Metadata& metadata) {
+  version_members(json);
+  json("producer", metadata.producer);
+  grid_members(json, metadata.grid, metadata.tiles_stored);
+  if (!json.reads()) lattice_members(json, metadata.grid);
+  json.object("samples", [&](JsonMembers& samples) { sample_members(samples, metadata); });
+  json.object("units", "horizontal", metadata.horizontal_unit, "vertical", metadata.vertical_unit);
+  WorldBounds& valid = metadata.valid;
+  json.object("valid", "x0", valid.x0, "z0", valid.z0, "x1", valid.x1, "z1", valid.z1);
+  json.name("outside", metadata.outside, outside_from_string);
+  json.object("projection", metadata.projection, projection_members, kNull);
+  json("wraps_x", metadata.wraps_x, kDefaulted);
+  json.name("filter", metadata.filter, filter_from_string);
+  json.name("edges", metadata.edges, edges_from_string, kDefaulted);
+  json.name("acquisition", metadata.acquisition, acquisition_from_string);
+  json("level", metadata.level, {.presence = JsonRule::kAbsent, .least = 1, .most = 12});
+  json.object("source", [&](JsonMembers& source) { source_members(source, metadata.source); });
+  Statistics& counted = metadata.statistics;
+  json.object("statistics", "min", counted.min, "max", counted.max, "mean", counted.mean, "vertices", counted.vertices,
+              "voids", counted.voids, "clamped", counted.clamped, "worst_rounding", counted.worst_rounding);
+  json("textures", metadata.textures);
+  json("content_sha256", metadata.content_sha256);
+}
+
+/// Whether a top-level member of that name belongs to the format; any other is an extension.
+bool is_format_member(const std::string& name) {
+  static const Json schema = Json::parse(metadata_schema());
+  return schema["properties"].contains(name);
+}
+
+Metadata empty_metadata() {
+  return Metadata(TileGrid::make(TileShape::make(5, 5, 1), 1, 1, 1.0, 1.0));
+}
+
+// --- what members must be beside each other ---
+
+void require(bool holds, const std::string& where, double found, const std::string& wanted) {
+  if (!holds) refuse_metadata(where, fmt::format("is {}, must {}", found, wanted));
+}
+
+/// One axis of the source and of the ground that it covers, "x" or "z", against the lattice that was made of it.
+void check_axis(const std::string& axis, double spacing, double first, std::int64_t samples, double valid_begin,
+                double valid_end, double step, double world) {
+  require(spacing >= 1e-9 * step && spacing <= 1e12 * step, "source.spacing." + axis, spacing,
+          fmt::format("lie within 1e-9 and 1e12 lattice steps of {}", step));
+  const double last = first + spacing * static_cast<double>(std::max<std::int64_t>(samples - 1, 0));
+  require(std::abs(first) <= 1000.0 * world && std::abs(last) <= 1000.0 * world, "source.first_sample." + axis, first,
+          fmt::format("leave all samples near the world of {}", world));
+  const double slack = 1e-6 * world;
+  require(valid_begin >= -slack && valid_begin <= valid_end, "valid." + axis + "0", valid_begin,
+          "lie in the world, West and North first");
+  require(valid_end <= world + slack, "valid." + axis + "1", valid_end,
+          fmt::format("be at most {}, where the tiles end", world));
+}
+
+void check(const Metadata& metadata) {
+  const std::string& hash = metadata.content_sha256;
+  if (hash.size() != 64 || hash.find_first_not_of("0123456789abcdef") != std::string::npos)
+    refuse_metadata("content_sha256", "is no 64 lower-case hexadecimal digits");
+  const Quantisation& codes = metadata.quantisation;
+  require(std::isfinite(codes.offset + codes.scale * 65535.0), "samples.scale", codes.scale,
+          "not lead beyond all numbers");
+  const SourceRecord& source = metadata.source;
+  require(source.z_scale != 0.0, "source.z_scale", source.z_scale, "not be 0");
+  const TileGrid& grid = metadata.grid;
+  const WorldBounds& valid = metadata.valid;
+  check_axis("x", source.spacing_x, source.first_sample_x, source.width, valid.x0, valid.x1, grid.sigma_x(),
+             grid.world_width());
+  check_axis("z", source.spacing_z, source.first_sample_z, source.height, valid.z0, valid.z1, grid.sigma_z(),
+             grid.world_height());
+  if (!metadata.projection || source.crs_unit != "degree") return;
+  for (const double origin : {source.origin_x.value_or(0.0), source.origin_y.value_or(0.0)})
+    require(std::abs(origin) <= 1e4, "source.crs.origin", origin, "lie in -10000 to 10000");
+  for (const double spacing : {source.crs_spacing_x, source.crs_spacing_y}) {
+    require(spacing >= 1e-12 && spacing <= 360.0, "source.crs.spacing", spacing,
+            "lie in 1e-12 to 360 degrees, which the projection needs");
+  }
+}
+
+}  // namespace
+
+std::string to_string(CodeType type) {
+  return type == CodeType::kU16 ? "u16" : type == CodeType::kU8 ? "u8" : "f32";
+}
+
+CodeType code_type_from_string(const std::string& text) {
+  for (const CodeType type : {CodeType::kU16, CodeType::kU8, CodeType::kF32}) {
+    if (text == to_string(type)) return type;
+  }
+  throw Error(ErrorCode::kInvalidArgument, fmt::format("sample type is \"{}\", must be u16, u8 or f32", text));
+}
+
+std::string format_metadata(const Metadata& metadata) {
+  return write_members(
+      [&](JsonMembers& json) {
+        Metadata copy = metadata;
+        metadata_members(json, copy);
+        for (const auto& [name, text] : metadata.extensions) {
+          if (is_format_member(name)) {
+            throw Error(ErrorCode::kInvalidArgument,
+                        fmt::format("metadata: extension \"{}\" has a name of the format", name));
+          }
+          json.derived(name.c_str(), parse_json(text), {});
+        }
+      },
+      1);
+}
+
+Metadata parse_metadata(const std::string& text) {
+  Metadata metadata = empty_metadata();
+  Json json = parse_json(text);
+  if (!json.is_object()) refuse_metadata("", "is no object");
+  JsonMembers members(JsonMembers::Pass::kRead, json, "");
+  metadata_members(members, metadata);
+  check(metadata);
+  for (const auto& [name, value] : json.items()) {
+    if (!is_format_member(name)) metadata.extensions.emplace_back(name, value.dump());
+  }
+  return metadata;
+}
+
+std::string metadata_schema() {
+  Metadata metadata = empty_metadata();
+  return schema_of_members([&](JsonMembers& json) { metadata_members(json, metadata); });
+}
+
+std::string format_projection(const ProjectionRecord& record) {
+  return write_extension(record, projection_members);
+}
+
+std::string format_ground(const MapGround& ground) {
+  return write_extension(ground, ground_members);
+}
+
+std::uint32_t metadata_room(const Metadata& draft) {
+  constexpr std::size_t kLeast = 16384;
+  constexpr std::size_t kStillToCome = 8192;
+  const std::size_t wanted = (format_metadata(draft).size() + kStillToCome + 4095) / 4096 * 4096;
+  return static_cast<std::uint32_t>(std::clamp<std::size_t>(wanted, kLeast, kMaxMetadataBytes));
+}
+
+}  // namespace isohf
