@@ -294,7 +294,8 @@ TEST(Metadata, AreDescribedByTheSchemaOfTheirTable) {
 /// Names of members that the page does not have in code type, alone or behind a dot.
 std::vector<std::string> names_off_the_page(const Json& schema, const std::string& page) {
   std::vector<std::string> missing;
-  for (const auto& [name, member] : schema.value("properties", Json::object()).items()) {
+  const Json properties = schema.value("properties", Json::object());
+  for (const auto& [name, member] : properties.items()) {
     const bool is_there =
         page.find("." + name + "`") != std::string::npos || page.find("`" + name + "`") != std::string::npos;
     if (!is_there && !member.contains("properties")) missing.push_back(name);

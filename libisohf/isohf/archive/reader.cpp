@@ -25,7 +25,7 @@ namespace {
 class EndsFirst final : public ByteSource {
  public:
   explicit EndsFirst(const ByteSource& source) : source_(source), tail_offset_(source.size_bytes()) {
-    if (!source.view(0, 1).empty()) return;
+    if (tail_offset_ == 0 || !source.view(0, 1).empty()) return;
     tail_offset_ -= std::min(tail_offset_, kTailBytes);
     tail_ = SourceBytes(source, tail_offset_, source.size_bytes() - tail_offset_);
     head_ = SourceBytes(source, 0, std::min(tail_offset_, kHeadBytes));

@@ -10,26 +10,6 @@
 #include "isohf/base/bytes.h"
 
 namespace isohf {
-namespace {
-
-void update(sha256_ctx& context, std::span<const std::byte> bytes) {
-  sha256_update(&context, bytes.size(), reinterpret_cast<const std::uint8_t*>(bytes.data()));
-}
-
-std::vector<std::byte> digest_of(sha256_ctx& context) {
-  std::vector<std::byte> digest(SHA256_DIGEST_SIZE);
-  sha256_digest(&context, digest.size(), reinterpret_cast<std::uint8_t*>(digest.data()));
-  return digest;
-}
-
-}  // namespace
-
-std::vector<std::byte> sha256(std::span<const std::byte> bytes) {
-  sha256_ctx context;
-  sha256_init(&context);
-  update(context, bytes);
-  return digest_of(context);
-}
 
 struct Sha256::State {
   sha256_ctx context;
@@ -41,11 +21,19 @@ Sha256::Sha256() : state_(std::make_unique<State>()) {
 Sha256::~Sha256() = default;
 
 void Sha256::add(std::span<const std::byte> bytes) {
-  update(state_->context, bytes);
+  sha256_update(&state_->context, bytes.size(), reinterpret_cast<const std::uint8_t*>(bytes.data()));
 }
 
 std::vector<std::byte> Sha256::finish() {
-  return digest_of(state_->context);
+  std::vector<std::byte> digest(SHA256_DIGEST_SIZE);
+  sha256_digest(&state_->context, digest.size(), reinterpret_cast<std::uint8_t*>(digest.data()));
+  return digest;
+}
+
+std::vector<std::byte> sha256(std::span<const std::byte> bytes) {
+  Sha256 hash;
+  hash.add(bytes);
+  return hash.finish();
 }
 
 std::string hex(std::span<const std::byte> digest) {
@@ -75,19 +63,6 @@ std::vector<std::byte> tile_content_digest(const TileCodes& tile) {
   return sha256(bytes);
 }
 
-struct ContentHash::State {
-  sha256_ctx context;
-};
-
-ContentHash::ContentHash() : state_(std::make_unique<State>()) {
-  sha256_init(&state_->context);
-}
-ContentHash::~ContentHash() = default;
-
-void ContentHash::add_tile(std::span<const std::byte> digest) {
-  update(state_->context, digest);
-}
-
 std::string ContentHash::finish(const Metadata& metadata) {
   std::vector<std::byte> bytes;
   ByteWriter out(bytes);
@@ -102,8 +77,8 @@ std::string ContentHash::finish(const Metadata& metadata) {
   out.write(static_cast<std::uint8_t>(metadata.quantisation.type));
   out.write(metadata.quantisation.offset);
   out.write(metadata.quantisation.scale);
-  update(state_->context, bytes);
-  return hex(digest_of(state_->context));
+  hash_.add(bytes);
+  return hex(hash_.finish());
 }
 
 }  // namespace isohf

@@ -41,19 +41,13 @@ class Sha256 {
 /// rows, f64 extent x, f64 extent z, u8 code type (0 u16, 1 u8, 2 f32), f64 offset, f64 scale.
 class ContentHash {
  public:
-  ContentHash();
-  ~ContentHash();
-  ContentHash(const ContentHash&) = delete;
-  ContentHash& operator=(const ContentHash&) = delete;
-
   /// Adds the next tile in flat order; wholly void tiles count like any other.
-  void add_tile(std::span<const std::byte> digest);
+  void add_tile(std::span<const std::byte> digest) { hash_.add(digest); }
   /// The hash as text; uses grid and quantisation of the metadata. Call once.
   [[nodiscard]] std::string finish(const Metadata& metadata);
 
  private:
-  struct State;
-  std::unique_ptr<State> state_;
+  Sha256 hash_;
 };
 
 }  // namespace isohf

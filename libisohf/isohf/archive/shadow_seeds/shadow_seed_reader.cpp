@@ -83,48 +83,32 @@ std::vector<double> ShadowSeedReader::entering(TileIndex index, const TileCodes&
                                 : fmt::format("{} degrees", fmt::join(info_.sun_deg, ", ")),
                             sun_elevation_deg));
   }
-  std::vector<double> heights = info_.kind == ShadowSeedInfo::Kind::kHulls
-                                    ? entering_by_hulls(index, tile, travel, sun_elevation_deg)
-                                    : entering_by_angle(index, tile, travel, sun_elevation_deg);
+  const TileGrid& grid = archive_.grid();
   const Quantisation& quantisation = archive_.metadata().quantisation;
+  const auto rows = static_cast<std::size_t>(visible_rows(grid.shape()));
+  std::vector<double> heights(rows, kNone);
+  if (info_.kind == ShadowSeedInfo::Kind::kHulls) {
+    const double fall = info_.fall_per_half_step(grid, quantisation, sun_elevation_deg);
+    const HullSeeds seeds = hulls(index, tile);
+    const CasterRows& casters = travel == LightTravel::kEastward ? seeds.eastward : seeds.westward;
+    for (std::size_t row = 0; row < rows; ++row) {
+      for (const ShadowCaster& caster : casters.row(static_cast<int>(row) + 1))
+        heights[row] = std::max(heights[row], caster.height - static_cast<double>(caster.distance) * fall);
+    }
+  } else if (const std::vector<std::byte> bytes = payload(index); !bytes.empty()) {
+    const auto angle = std::find_if(info_.sun_deg.begin(), info_.sun_deg.end(),
+                                    [&](double known) { return std::abs(known - sun_elevation_deg) <= kSameAngleDeg; });
+    try {
+      const AngleSeeds seeds = decode_angle_seeds(grid, tile_edges(grid.shape(), tile), info_.sun_deg.size(), bytes);
+      const auto& all = travel == LightTravel::kEastward ? seeds.eastward : seeds.westward;
+      std::copy_n(all.begin() + (angle - info_.sun_deg.begin()) * static_cast<std::ptrdiff_t>(rows), rows,
+                  heights.begin());
+    } catch (const Error& error) {
+      throw error.within(fmt::format("{}: member \"{}\"", archive_.path(), seed_name(index)));
+    }
+  }
   for (double& height : heights) height = quantisation.offset + quantisation.scale * height;
   return heights;
-}
-
-std::vector<double> ShadowSeedReader::entering_by_hulls(TileIndex index, const TileCodes& tile, LightTravel travel,
-                                                        double sun_elevation_deg) const {
-  const TileGrid& grid = archive_.grid();
-  const double fall = info_.fall_per_half_step(grid, archive_.metadata().quantisation, sun_elevation_deg);
-  const HullSeeds seeds = hulls(index, tile);
-  const CasterRows& rows = travel == LightTravel::kEastward ? seeds.eastward : seeds.westward;
-  std::vector<double> heights;
-  for (int row = 1; row <= visible_rows(grid.shape()); ++row) {
-    double height = kNone;
-    for (const ShadowCaster& caster : rows.row(row)) {
-      height = std::max(height, caster.height - static_cast<double>(caster.distance) * fall);
-    }
-    heights.push_back(height);
-  }
-  return heights;
-}
-
-std::vector<double> ShadowSeedReader::entering_by_angle(TileIndex index, const TileCodes& tile, LightTravel travel,
-                                                        double sun_elevation_deg) const {
-  const auto rows = static_cast<std::size_t>(visible_rows(archive_.grid().shape()));
-  const std::vector<std::byte> bytes = payload(index);
-  if (bytes.empty()) return std::vector<double>(rows, kNone);
-  const auto nearest = std::min_element(info_.sun_deg.begin(), info_.sun_deg.end(), [&](double a, double b) {
-    return std::abs(a - sun_elevation_deg) < std::abs(b - sun_elevation_deg);
-  });
-  try {
-    const AngleSeeds seeds =
-        decode_angle_seeds(archive_.grid(), tile_edges(archive_.grid().shape(), tile), info_.sun_deg.size(), bytes);
-    const auto& heights = travel == LightTravel::kEastward ? seeds.eastward : seeds.westward;
-    const auto first = heights.begin() + (nearest - info_.sun_deg.begin()) * static_cast<std::ptrdiff_t>(rows);
-    return {first, first + static_cast<std::ptrdiff_t>(rows)};
-  } catch (const Error& error) {
-    throw error.within(fmt::format("{}: member \"{}\"", archive_.path(), seed_name(index)));
-  }
 }
 
 }  // namespace isohf

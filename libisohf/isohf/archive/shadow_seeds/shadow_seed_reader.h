@@ -32,10 +32,6 @@ class ShadowSeedReader {
 
  private:
   [[nodiscard]] std::vector<std::byte> payload(TileIndex index) const;
-  [[nodiscard]] std::vector<double> entering_by_hulls(TileIndex index, const TileCodes& tile, LightTravel travel,
-                                                      double sun_elevation_deg) const;
-  [[nodiscard]] std::vector<double> entering_by_angle(TileIndex index, const TileCodes& tile, LightTravel travel,
-                                                      double sun_elevation_deg) const;
 
   const ArchiveReader& archive_;
   ShadowSeedInfo info_;
