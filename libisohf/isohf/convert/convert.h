@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include "isohf/archive/metadata/accuracy_info.h"
 #include "isohf/archive/codec/tile_codes.h"
+#include "isohf/archive/metadata/accuracy_info.h"
 #include "isohf/archive/textures/texture_info.h"
 #include "isohf/convert/frame/plan.h"
 #include "isohf/raster.h"

@@ -77,7 +77,7 @@ ShadeTexture::Tile ShadeTexture::read(TileIndex tile) const {
 ShadeTexture::Colour ShadeTexture::Tile::at(double s, double t) const {
   Colour colour;
   if (picture_.samples.empty()) return colour;
-  // docs/archive_format.md, section 12: one texture coordinate for all levels.
+  // docs/archive_format.md, "Textures": one texture coordinate for all levels.
   const auto place = [this](double along) {
     const double u = (0.5 + (finest_size_ - 1) * along) / finest_size_;
     return std::clamp(u * picture_.width - 0.5, 0.0, picture_.width - 1.0);
