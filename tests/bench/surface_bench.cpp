@@ -58,7 +58,7 @@ struct Stages {
     info.height = kRows;
     info.sample_type = SampleType::kInt16;
     heights_from_samples(info, 0.0, raw, heights);
-    cutter(Filter::kBilinear).cut({0, 0}, band(), tile);
+    cutter(Filter::kBilinear)->cut({0, 0}, band(), tile);
     quantise(quantisation, 0.0, tile, codes);
   }
 

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <limits>
 
 #include "isohf/archive/codec/predict/context_energy.h"
 #include "isohf/archive/codec/predict/hex_predictor.h"
@@ -231,16 +230,12 @@ TileCodes decode_checked(const TileShape& shape, CodeType type, std::span<const 
   std::vector<std::uint8_t> is_void;
   if (header.has_voids) is_void = unpack_void_mask(reader.read_bytes(header.mask_bytes), samples);
   if (!header.is_constant) read_block_map(shape, reader, header.predictors);
-  TileCodes tile;
-  tile.type = type;
+  TileCodes tile = void_tile(shape, {type, 0.0, 1.0});
   if (type == CodeType::kF32) {
-    tile.heights.assign(samples, std::numeric_limits<float>::quiet_NaN());
     decode_samples<std::int64_t>(shape, header, is_void, reader, [&](std::size_t i, std::int64_t ordered) {
       tile.heights[i] = float_from_ordered(static_cast<std::int32_t>(ordered), header.dropped_bits);
     });
   } else {
-    const Quantisation quantisation{type, 0.0, 1.0};
-    tile.codes.assign(samples, static_cast<std::uint16_t>(quantisation.void_code()));
     decode_samples<std::int32_t>(shape, header, is_void, reader, [&](std::size_t i, std::int32_t code) {
       tile.codes[i] = static_cast<std::uint16_t>(code);
     });

@@ -38,25 +38,17 @@ constexpr std::array<CodingEffort, kMaxLevel> kEfforts = {{
 }};
 
 /// The void mask, as 0 and 1; empty where nothing is void.
-struct Voids {
-  std::vector<std::uint8_t> is_void;
-  std::int64_t count = 0;
-};
-
 template <typename Sample, typename IsVoid>
-Voids find_voids(std::span<const Sample> samples, std::int64_t count, const IsVoid& is_void) {
-  Voids voids;
-  voids.count = count;
-  if (voids.count == 0) return voids;
-  voids.is_void.resize(samples.size());
-  std::transform(samples.begin(), samples.end(), voids.is_void.begin(),
+std::vector<std::uint8_t> find_voids(std::span<const Sample> samples, std::int64_t count, const IsVoid& is_void) {
+  std::vector<std::uint8_t> voids(count == 0 ? 0 : samples.size());
+  std::transform(samples.begin(), samples.begin() + static_cast<std::ptrdiff_t>(voids.size()), voids.begin(),
                  [&](Sample sample) { return static_cast<std::uint8_t>(is_void(sample) ? 1 : 0); });
   return voids;
 }
 
 /// Puts the samples of a tile into lattice order, voids filled. `sample_at(i)` is the sample with storage index i.
 template <typename Wide, typename SampleAt>
-void load(Lattice<Wide>& lattice, const Voids& voids, Wide base, const SampleAt& sample_at) {
+void load(Lattice<Wide>& lattice, std::span<const std::uint8_t> voids, Wide base, const SampleAt& sample_at) {
   const int columns = lattice.columns();
   lattice.fill_rows_above(base);
   for (int r = 0; r < lattice.rows(); ++r) {
@@ -71,11 +63,11 @@ void load(Lattice<Wide>& lattice, const Voids& voids, Wide base, const SampleAt&
       own[last] = sample_at(index(columns - 1));
       for (int side = 0; side < 2; ++side) lattice.slid(r, side) = sample_at(index(column_of_slid(columns, side)));
     }
-    if (!voids.is_void.empty()) {
+    if (!voids.empty()) {
       lattice.open_row(r);
       const Wide* const north = lattice.row(r - 1) + r % 2;
       for (int place = first; place <= last; ++place) {
-        if (voids.is_void[index(column_of_place(columns, r, place))] != 0) own[place] = void_fill(own, north, place);
+        if (voids[index(column_of_place(columns, r, place))] != 0) own[place] = void_fill(own, north, place);
       }
     }
     lattice.close_row(r);
@@ -106,7 +98,7 @@ void for_coding_order(int columns, int r, const Use& use) {
 
 /// Zigzagged residuals of all samples in coding order; 0 where void. `is_void` comes in coding order as well.
 template <typename Wide, typename Zigzagged>
-void find_residuals(Lattice<Wide>& lattice, const Voids& voids, const PayloadHeader& header,
+void find_residuals(Lattice<Wide>& lattice, std::span<const std::uint8_t> voids, const PayloadHeader& header,
                     Residuals<Zigzagged>& out) {
   const int columns = lattice.columns();
   std::vector<Wide> halves(static_cast<std::size_t>(columns));
@@ -122,9 +114,9 @@ void find_residuals(Lattice<Wide>& lattice, const Voids& voids, const PayloadHea
       zigzagged[count + side] = zigzag_difference(lattice.slid_prediction(r, side) - lattice.slid(r, side));
     }
     lattice.close_row(r);
-    if (voids.is_void.empty()) continue;
+    if (voids.empty()) continue;
     for_coding_order(columns, r, [&](std::size_t i, int column) {
-      const bool is_void = voids.is_void[row_start + static_cast<std::size_t>(column)] != 0;
+      const bool is_void = voids[row_start + static_cast<std::size_t>(column)] != 0;
       out.is_void[row_start + i] = is_void ? 1 : 0;
       if (is_void) zigzagged[i] = 0;
     });
@@ -174,10 +166,10 @@ void assemble(PayloadHeader& header, std::span<const std::byte> mask, const Stre
 }
 
 template <typename Wide, typename Zigzagged, typename SampleAt>
-void encode_samples(const TileShape& shape, PayloadHeader header, const Voids& voids, const SampleAt& sample_at,
-                    const CodingEffort& effort, EncodedTile& tile) {
+void encode_samples(const TileShape& shape, PayloadHeader header, std::span<const std::uint8_t> voids,
+                    const SampleAt& sample_at, const CodingEffort& effort, EncodedTile& tile) {
   std::vector<std::byte> mask;
-  if (!voids.is_void.empty()) mask = pack_void_mask(voids.is_void);
+  if (!voids.empty()) mask = pack_void_mask(voids);
   header.has_voids = !mask.empty();
   header.is_constant = header.low == header.high;
   Streams streams;
@@ -185,7 +177,7 @@ void encode_samples(const TileShape& shape, PayloadHeader header, const Voids& v
     Lattice<Wide> lattice(shape);
     load<Wide>(lattice, voids, header.base, sample_at);
     header.predictors = fit_predictors<Wide>(lattice, header.low, header.high, effort.fit);
-    Residuals<Zigzagged> residuals(static_cast<std::size_t>(shape.stored_vertex_count()), !voids.is_void.empty());
+    Residuals<Zigzagged> residuals(static_cast<std::size_t>(shape.stored_vertex_count()), !voids.empty());
     find_residuals<Wide, Zigzagged>(lattice, voids, header, residuals);
     header.energy_shift = choose_energy_shift(residuals);
     find_all_energies(shape.columns(), shape.rows(), header.energy_shift, residuals);
@@ -224,9 +216,8 @@ EncodedTile encode_codes(const TileShape& shape, const TileCodes& tile, const Co
   encoded.content_digest = tile_content_digest(tile);
   const auto is_void = [&](std::uint16_t code) { return code == void_code; };
   const CodeRange range = vectorised<range_of_codes>(codes.data(), codes.size(), void_code);
-  const Voids voids = find_voids(codes, range.voids, is_void);
-  encoded.has_voids = voids.count != 0;
-  encoded.is_empty = voids.count == shape.stored_vertex_count();
+  encoded.has_voids = range.voids != 0;
+  encoded.is_empty = range.voids == shape.stored_vertex_count();
   if (encoded.is_empty) return encoded;
 
   PayloadHeader header;
@@ -238,7 +229,8 @@ EncodedTile encode_codes(const TileShape& shape, const TileCodes& tile, const Co
   encoded.code_min = static_cast<std::uint32_t>(header.low);
   encoded.code_max = static_cast<std::uint32_t>(header.high);
   encode_samples<std::int32_t, std::uint16_t>(
-      shape, header, voids, [&](std::size_t i) { return std::int32_t{codes[i]}; }, effort, encoded);
+      shape, header, find_voids(codes, range.voids, is_void), [&](std::size_t i) { return std::int32_t{codes[i]}; },
+      effort, encoded);
   return encoded;
 }
 
@@ -284,9 +276,8 @@ EncodedTile encode_floats(const TileShape& shape, const TileCodes& tile, const C
   EncodedTile encoded;
   encoded.content_digest = tile_content_digest(tile);
   const auto is_void = [](float height) { return std::isnan(height); };
-  const Voids voids = find_voids(heights, bits.voids, is_void);
-  encoded.has_voids = voids.count != 0;
-  encoded.is_empty = voids.count == shape.stored_vertex_count();
+  encoded.has_voids = bits.voids != 0;
+  encoded.is_empty = bits.voids == shape.stored_vertex_count();
   if (encoded.is_empty) return encoded;
 
   PayloadHeader header;
@@ -301,7 +292,8 @@ EncodedTile encode_floats(const TileShape& shape, const TileCodes& tile, const C
   encoded.code_min = std::bit_cast<std::uint32_t>(float_from_ordered(header.low, header.dropped_bits));
   encoded.code_max = std::bit_cast<std::uint32_t>(float_from_ordered(header.high, header.dropped_bits));
   encode_samples<std::int64_t, std::uint32_t>(
-      shape, header, voids, [&](std::size_t i) { return std::int64_t{ordered.data()[i]}; }, effort, encoded);
+      shape, header, find_voids(heights, bits.voids, is_void),
+      [&](std::size_t i) { return std::int64_t{ordered.data()[i]}; }, effort, encoded);
   return encoded;
 }
 
