@@ -188,7 +188,7 @@ void TextureBox::upload(std::uint64_t budget) {
   for (;;) {
     if (!upload_) {
       if (waiting_.empty()) break;
-      upload_.emplace().chain = std::move(waiting_.front());
+      upload_ = Upload{std::move(waiting_.front()), {}, 0, 0};
       waiting_.pop_front();
     }
     if (!upload_->chain.levels.empty() && !upload_rows(*upload_, budget)) break;
