@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <string>
 #include <type_traits>
@@ -63,6 +64,13 @@ std::optional<double> void_value_as_stored(SampleType type, double value) {
   const double most = sample_range(type).second;
   if (std::abs(value) > most + (most - previous_sample(type, most)) / 2.0) return std::nullopt;
   return nearest;
+}
+
+std::vector<std::byte> stored_sample(SampleType type, double value) {
+  std::vector<std::byte> bytes(size_bytes(type));
+  const bool is_beyond = type == SampleType::kFloat16 && std::isinf(value);
+  store_sample(type)(is_beyond ? std::numeric_limits<double>::quiet_NaN() : value, bytes.data());
+  return bytes;
 }
 
 void apply_open_options(SourceInfo& info, const OpenOptions& options) {

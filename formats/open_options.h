@@ -1,7 +1,9 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <vector>
 
 #include "isohf/raster.h"
 
@@ -10,6 +12,9 @@ namespace isohf {
 /// The value that a sample of `type` holds when a file or a user writes `value` in decimal: rounded to the type's
 /// precision, so that "-3.4e38" finds the float32 voids; nullopt where no sample of that type can hold it.
 [[nodiscard]] std::optional<double> void_value_as_stored(SampleType type, double value);
+
+/// The bytes of a sample of `type` that holds `value`, which it can (void_value_as_stored); infinities are NaN in halves.
+[[nodiscard]] std::vector<std::byte> stored_sample(SampleType type, double value);
 
 /// Lets what the user says override what the file says; every reader calls it last, on a complete `info`.
 ///

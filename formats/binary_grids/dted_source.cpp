@@ -11,6 +11,8 @@
 #include <vector>
 
 #include "formats/files/file_source.h"
+#include "formats/files/text.h"
+#include "formats/georeference/units.h"
 #include "formats/open_options.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
@@ -29,12 +31,6 @@ constexpr std::int64_t kRowsAtOnce = 256;
 constexpr int kVoid = -32767;
 /// Far below any ground; two's complement, which some programs write instead, lands there.
 constexpr int kLowestElevation = -16000;
-
-bool starts_with(std::span<const std::byte> bytes, std::size_t at, std::string_view text) {
-  return bytes.size() >= at + text.size() &&
-         std::equal(text.begin(), text.end(), bytes.begin() + static_cast<std::ptrdiff_t>(at),
-                    [](char c, std::byte b) { return static_cast<std::byte>(c) == b; });
-}
 
 unsigned at_u8(std::span<const std::byte> bytes, std::size_t i) {
   return std::to_integer<unsigned>(bytes[i]);
@@ -117,8 +113,9 @@ class DtedSource final : public FileSource {
   void read_header() {
     std::array<std::byte, kTapeRecordBytes + 4> head = {};
     const std::span<const std::byte> start(head.data(), file_->read_some(0, head));
-    while (header_at_ < kTapeRecordBytes && !starts_with(start, header_at_, "UHL1")) header_at_ += kTapeRecordBytes;
-    if (!starts_with(start, header_at_, "UHL1")) {
+    while (header_at_ < kTapeRecordBytes && text_of(start).substr(std::min(header_at_, start.size()), 4) != "UHL1")
+      header_at_ += kTapeRecordBytes;
+    if (text_of(start).substr(std::min(header_at_, start.size()), 4) != "UHL1") {
       throw Error(ErrorCode::kCorrupt, info_.path + ": has no user header label UHL1, must start with it");
     }
     header_.resize(kHeaderBytes);
@@ -182,10 +179,7 @@ class DtedSource final : public FileSource {
     system.body = "Earth";
     const std::string_view horizontal = field(kUhlBytes + 144, 5);
     if (horizontal == "WGS84") {
-      system.name = "WGS 84";
-      system.epsg = 4326;
-      system.semi_major_axis_m = 6378137.0;
-      system.inverse_flattening = 298.257223563;
+      system = wgs84_system();
     } else if (horizontal == "WGS72") {
       system.name = "WGS 72";
       system.epsg = 4322;
@@ -262,7 +256,8 @@ class DtedSource final : public FileSource {
 }  // namespace
 
 bool looks_like_dted(std::span<const std::byte> head) {
-  return starts_with(head, 0, "UHL1") || starts_with(head, kTapeRecordBytes, "UHL1");
+  return text_of(head).starts_with("UHL1") ||
+         text_of(head).substr(std::min(kTapeRecordBytes, head.size())).starts_with("UHL1");
 }
 
 std::unique_ptr<HeightSource> open_dted(const std::string& path, const OpenOptions& options) {

@@ -260,7 +260,7 @@ class HeaderGridSource final : public PlainSource {
 }  // namespace
 
 bool looks_like_grid_header(std::span<const std::byte> head) {
-  std::string_view text(reinterpret_cast<const char*>(head.data()), head.size());
+  std::string_view text = text_of(head);
   text.remove_prefix(std::min(text.find_first_not_of(" \t\r\n"), text.size()));
   const std::string_view line = text.substr(0, text.find('\n'));
   const std::string name = GridHeader::plain_name(two_words(line)[0]);

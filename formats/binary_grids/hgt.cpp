@@ -10,6 +10,7 @@
 
 #include "formats/binary_grids/plain_samples.h"
 #include "formats/files/text.h"
+#include "formats/georeference/units.h"
 #include "formats/open_options.h"
 #include "formats/readers.h"
 #include "formats/write/encoders.h"
@@ -132,11 +133,7 @@ class HgtSource final : public PlainSource {
     geo.unit = HorizontalUnit::kDegree;
     geo.spacing_x = 1.0 / static_cast<double>(size->columns - 1);
     geo.spacing_y = 1.0 / static_cast<double>(size->rows - 1);
-    geo.system.name = "WGS 84";
-    geo.system.epsg = 4326;
-    geo.system.body = "Earth";
-    geo.system.semi_major_axis_m = 6378137.0;
-    geo.system.inverse_flattening = 298.257223563;
+    geo.system = wgs84_system();
     geo.system.vertical_epsg = 5773;
     geo.system.vertical_datum = "EGM96";
     if (const std::optional<HgtCorner> corner = hgt_corner_of(name)) {

@@ -303,8 +303,7 @@ std::unique_ptr<NpySource> open_array(const std::string& path, const ZipEntry& m
 }  // namespace
 
 bool looks_like_npy(std::span<const std::byte> head) {
-  return head.size() >= kMagic.size() && std::equal(kMagic.begin(), kMagic.end(), head.begin(),
-                                                    [](char c, std::byte b) { return static_cast<std::byte>(c) == b; });
+  return text_of(head).starts_with(kMagic);
 }
 
 std::unique_ptr<HeightSource> open_npy(const std::string& path, const OpenOptions& options) {

@@ -165,27 +165,6 @@ std::optional<PartHeader> take_header(HeaderWalk& walk) {
   throw Error(ErrorCode::kUnsupported, fmt::format("OpenEXR header has more than {} attributes", kMaxAttributes));
 }
 
-std::uint64_t scan_lines_per_chunk(std::uint8_t compression) {
-  switch (compression) {
-    case 0:  // none
-    case 1:  // RLE
-    case 2:  // ZIPS
-      return 1;
-    case 3:  // ZIP
-    case 5:  // PXR24
-      return 16;
-    case 4:  // PIZ
-    case 6:  // B44
-    case 7:  // B44A
-    case 8:  // DWAA
-      return 32;
-    case 9:  // DWAB
-      return 256;
-    default:
-      throw Error(ErrorCode::kUnsupported, fmt::format("OpenEXR compression {} is unknown", compression));
-  }
-}
-
 std::uint64_t divided_up(std::uint64_t value, std::uint64_t by) {
   return (value + by - 1) / by;
 }
@@ -203,7 +182,7 @@ void check_part(const PartHeader& part, bool tiled_file, std::uint64_t file_size
   const bool deep = part.type.rfind("deep", 0) == 0;
   const bool tiled = part.type.empty() ? tiled_file : part.type == "tiledimage" || part.type == "deeptile";
   std::uint64_t chunk_width = static_cast<std::uint64_t>(width);
-  std::uint64_t chunk_height = deep ? 1 : scan_lines_per_chunk(part.compression);
+  std::uint64_t chunk_height = deep ? 1 : static_cast<std::uint64_t>(scan_lines_per_chunk(part.compression));
   if (tiled) {
     if (!part.has_tiles || part.tile_width == 0 || part.tile_height == 0) {
       throw Error(ErrorCode::kCorrupt, "OpenEXR tiled part has no tile size");
@@ -237,6 +216,27 @@ void check_part(const PartHeader& part, bool tiled_file, std::uint64_t file_size
 }
 
 }  // namespace
+
+std::int64_t scan_lines_per_chunk(std::uint8_t compression) {
+  switch (compression) {
+    case 0:  // none
+    case 1:  // RLE
+    case 2:  // ZIPS
+      return 1;
+    case 3:  // ZIP
+    case 5:  // PXR24
+      return 16;
+    case 4:  // PIZ
+    case 6:  // B44
+    case 7:  // B44A
+    case 8:  // DWAA
+      return 32;
+    case 9:  // DWAB
+      return 256;
+    default:
+      throw Error(ErrorCode::kUnsupported, fmt::format("OpenEXR compression {} is unknown", compression));
+  }
+}
 
 bool looks_like_exr(std::span<const std::byte> head) {
   return head.size() >= kMagic.size() && std::memcmp(head.data(), kMagic.data(), kMagic.size()) == 0;

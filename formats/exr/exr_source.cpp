@@ -202,23 +202,6 @@ SampleType sample_type_of(Imf::PixelType type) {
   }
 }
 
-std::int64_t scan_lines_per_chunk(Imf::Compression compression) {
-  switch (compression) {
-    case Imf::ZIP_COMPRESSION:
-    case Imf::PXR24_COMPRESSION:
-      return 16;
-    case Imf::PIZ_COMPRESSION:
-    case Imf::B44_COMPRESSION:
-    case Imf::B44A_COMPRESSION:
-    case Imf::DWAA_COMPRESSION:
-      return 32;
-    case Imf::DWAB_COMPRESSION:
-      return 256;
-    default:
-      return 1;
-  }
-}
-
 /// Runs `action`, turning whatever the OpenEXR library throws into Error with `where` in front.
 template <typename Action>
 auto translated(const std::string& where, Action action) -> decltype(action()) {
@@ -334,7 +317,8 @@ class ExrSource final : public HeightSource {
     } else {
       scan_lines_.emplace(file_, channel_.part);
       info_.block_width = info_.width;
-      info_.block_height = std::min(scan_lines_per_chunk(header.compression()), info_.height);
+      info_.block_height =
+          std::min(scan_lines_per_chunk(static_cast<std::uint8_t>(header.compression())), info_.height);
     }
   }
 

@@ -47,11 +47,8 @@ std::optional<std::string> text_of(const std::filesystem::path& path) {
 std::vector<std::string> spellings(const std::vector<std::string>& extensions) {
   std::vector<std::string> all;
   for (const std::string& extension : extensions) {
-    std::string upper = extension;
-    std::transform(upper.begin(), upper.end(), upper.begin(),
-                   [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
     all.push_back(extension);
-    all.push_back(upper);
+    all.push_back(upper_case(extension));
   }
   return all;
 }

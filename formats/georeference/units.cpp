@@ -92,6 +92,16 @@ std::optional<LinearUnit> linear_unit(std::string_view name) {
   return std::nullopt;
 }
 
+ReferenceSystem wgs84_system() {
+  ReferenceSystem system;
+  system.name = "WGS 84";
+  system.epsg = 4326;
+  system.body = "Earth";
+  system.semi_major_axis_m = 6378137.0;
+  system.inverse_flattening = 298.257223563;
+  return system;
+}
+
 std::string body_of(std::string_view name, std::optional<double> semi_major_axis_m) {
   const std::string text = lower_case(name);
   for (const BodyRow& body : kBodies) {

@@ -4,6 +4,8 @@
 #include <string>
 #include <string_view>
 
+#include "isohf/raster.h"
+
 namespace isohf {
 
 /// A unit of length.
@@ -18,6 +20,9 @@ struct LinearUnit {
 /// By the name or abbreviation that files use, in any case: "m", "Meters", "ft", "ftUS", ...; nullopt for any other
 /// text.
 [[nodiscard]] std::optional<LinearUnit> linear_unit(std::string_view name);
+
+/// WGS 84 in degrees, on the Earth.
+[[nodiscard]] ReferenceSystem wgs84_system();
 
 /// The planet or moon that a reference system's name (or, failing that, its semi-major axis) belongs to; else empty.
 /// Axes: reports of the IAU working group on cartographic coordinates; anything from 6.35e6 m to 6.38e6 m is the Earth.

@@ -195,12 +195,7 @@ bool read_old_prj(std::string_view text, Georeference& place) {
   if (words.rfind("PROJECTION GEOGRAPHIC", 0) != 0 || !says("UNITS DD")) return false;
   place.unit = HorizontalUnit::kDegree;
   if (!says("DATUM WGS84")) return true;
-  ReferenceSystem& system = place.system;
-  system.name = "WGS 84";
-  system.epsg = 4326;
-  system.body = "Earth";
-  system.semi_major_axis_m = 6378137.0;
-  system.inverse_flattening = 298.257223563;
+  place.system = wgs84_system();
   return true;
 }
 

@@ -1,4 +1,4 @@
-#include "formats/mosaic/mosaic_plan.h"
+#include "formats/mosaic/mosaic_layout.h"
 
 #include <fmt/format.h>
 #include <oneapi/tbb/parallel_for.h>
@@ -12,7 +12,6 @@
 #include <optional>
 #include <utility>
 
-#include "formats/mosaic/mosaic_layout.h"
 #include "formats/mosaic/reader_pool.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"

@@ -117,12 +117,6 @@ std::optional<double> common_void(const std::vector<SampleKind>& kinds, SampleTy
   return std::nullopt;
 }
 
-std::vector<std::byte> sample_of(SampleType type, double number) {
-  std::vector<std::byte> bytes(size_bytes(type));
-  store_sample(type)(number, bytes.data());
-  return bytes;
-}
-
 /// The raw number to fill gaps with in a kind that stays as it is; nullopt where it has no void.
 std::optional<double> gap_of(const SampleKind& kind) {
   for (const double value : kind.void_values) {
@@ -144,7 +138,7 @@ MosaicSamples widened(const SampleKind& kind) {
   samples.kind = plain_kind(wider(kind.type), kind);
   const bool floating = is_floating(samples.kind.type);
   if (!floating) samples.kind.void_values = {limits_of(samples.kind.type).lowest};
-  samples.gap = sample_of(samples.kind.type, floating ? kNaN : samples.kind.void_values.front());
+  samples.gap = stored_sample(samples.kind.type, floating ? kNaN : samples.kind.void_values.front());
   samples.notes.push_back(fmt::format("{} has no number to spare for voids in all files; samples become {}",
                                       to_string(kind.type), to_string(samples.kind.type)));
   return samples;
@@ -186,7 +180,7 @@ MosaicSamples choose_mosaic_samples(const std::vector<SampleKind>& kinds, bool g
   MosaicSamples samples;
   if (!all([&](const SampleKind& kind) { return kind.z_scale == first.z_scale && kind.z_offset == first.z_offset; })) {
     samples.kind = plain_kind(SampleType::kFloat64, {});
-    samples.gap = sample_of(samples.kind.type, kNaN);
+    samples.gap = stored_sample(samples.kind.type, kNaN);
     samples.notes.emplace_back("the files differ in scale or offset; samples become elevations, float64");
     return samples;
   }
@@ -194,19 +188,19 @@ MosaicSamples choose_mosaic_samples(const std::vector<SampleKind>& kinds, bool g
     const std::optional<double> gap = gap_of(first);
     if (!gap && gaps) return widened(first);
     samples.kind = first;
-    samples.gap = sample_of(first.type, gap.value_or(0.0));
+    samples.gap = stored_sample(first.type, gap.value_or(0.0));
     return samples;
   }
   samples.kind = plain_kind(common_type(kinds, interpolated), first);
   if (is_floating(samples.kind.type)) {
-    samples.gap = sample_of(samples.kind.type, kNaN);
+    samples.gap = stored_sample(samples.kind.type, kNaN);
   } else {
     const bool has_voids =
         gaps || !all([](const SampleKind& kind) { return kind.void_values.empty() && !is_bounded(kind); });
     const std::optional<double> value = common_void(kinds, samples.kind.type);
     if (has_voids && !value) return widened(samples.kind);
     if (has_voids) samples.kind.void_values = {*value};
-    samples.gap = sample_of(samples.kind.type, has_voids ? *value : 0.0);
+    samples.gap = stored_sample(samples.kind.type, has_voids ? *value : 0.0);
   }
   if (!all([&](const SampleKind& kind) { return kind.type == samples.kind.type; })) {
     samples.notes.push_back(fmt::format(

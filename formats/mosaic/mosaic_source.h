@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "formats/mosaic/mosaic_plan.h"
+#include "formats/mosaic/mosaic_layout.h"
 #include "formats/mosaic/reader_pool.h"
 #include "isohf/raster.h"
 

@@ -616,7 +616,7 @@ class Pds3Source final : public FileSource {
 }  // namespace
 
 bool looks_like_pds3(std::span<const std::byte> head) {
-  std::string_view text(reinterpret_cast<const char*>(head.data()), head.size());
+  std::string_view text = text_of(head);
   const auto skip_blank = [&] {
     while (!text.empty() && std::isspace(static_cast<unsigned char>(text.front())) != 0) text.remove_prefix(1);
   };

@@ -450,7 +450,7 @@ class AsciiGridSource final : public FileSource {
 }  // namespace
 
 bool looks_like_ascii_grid(std::span<const std::byte> head) {
-  const std::string_view word = first_word({reinterpret_cast<const char*>(head.data()), head.size()});
+  const std::string_view word = first_word(text_of(head));
   if (GrassHeader::is_name(word)) return true;
   const std::string name = GridHeader::plain_name(word);
   return std::find(known_words().begin(), known_words().end(), name) != known_words().end();

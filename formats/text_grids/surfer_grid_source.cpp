@@ -148,7 +148,7 @@ class SurferGridSource final : public PlainSource {
     for (int i = 0; i < kMostSections; ++i) {
       std::array<std::byte, 8> head{};
       file_->read(at, head);
-      const std::string_view name(reinterpret_cast<const char*>(head.data()), kMagicBytes);
+      const std::string_view name = text_of(head).substr(0, kMagicBytes);
       const auto size = ByteReader(std::span<const std::byte>(head).subspan(kMagicBytes)).read<std::int32_t>();
       at += head.size();
       if (name == kDataSection) {
@@ -258,7 +258,7 @@ class SurferGridSource final : public PlainSource {
 }  // namespace
 
 bool looks_like_surfer_grid(std::span<const std::byte> head) {
-  const std::string_view text(reinterpret_cast<const char*>(head.data()), std::min(head.size(), kMagicBytes));
+  const std::string_view text = text_of(head).substr(0, kMagicBytes);
   return text == kText || text == kSurfer6 || text == kSurfer7;
 }
 

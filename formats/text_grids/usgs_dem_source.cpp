@@ -455,7 +455,7 @@ class UsgsDemSource final : public FileSource {
 }  // namespace
 
 bool looks_like_usgs_dem(std::span<const std::byte> head) {
-  const std::string_view text(reinterpret_cast<const char*>(head.data()), head.size());
+  const std::string_view text = text_of(head);
   if (text.size() < 168) return false;
   const auto code = [&](std::size_t at, std::int64_t low, std::int64_t high) {
     const auto value = whole_number(text.substr(at, 6));

@@ -127,9 +127,10 @@ constexpr int kMinIsBlack = 1;
 constexpr int kRgb = 2;
 constexpr int kYCbCr = 6;
 constexpr int kJpeg = 7;
+constexpr int kUnsigned = 1;
 constexpr int kSigned = 2;
 constexpr int kFloating = 3;
-constexpr int kComplexInteger = 5;
+constexpr int kUndefined = 4;
 constexpr int kComplexFloating = 6;
 constexpr int kTopLeft = 1;
 constexpr int kBottomLeft = 4;
@@ -138,24 +139,25 @@ constexpr int kBottomLeft = 4;
 constexpr double kBeyondAnyHeight = 1e30;
 
 SampleType sample_type_of(const TiffLayout& layout) {
-  switch (layout.sample_format) {
-    case kFloating:
-      if (layout.bits_per_sample == 16) return SampleType::kFloat16;
-      if (layout.bits_per_sample == 32) return SampleType::kFloat32;
-      if (layout.bits_per_sample == 64) return SampleType::kFloat64;
-      break;
-    case kSigned:
-      if (layout.bits_per_sample == 8) return SampleType::kInt8;
-      if (layout.bits_per_sample == 16) return SampleType::kInt16;
-      if (layout.bits_per_sample == 32) return SampleType::kInt32;
-      break;
-    case kComplexInteger:
-    case kComplexFloating:
-      break;
-    default:
-      if (layout.bits_per_sample == 8) return SampleType::kUint8;
-      if (layout.bits_per_sample == 16) return SampleType::kUint16;
-      if (layout.bits_per_sample == 32) return SampleType::kUint32;
+  struct Row {
+    int format;
+    int bits;
+    SampleType type;
+  };
+  constexpr std::array<Row, 9> kTypes = {{{kUnsigned, 8, SampleType::kUint8},
+                                          {kUnsigned, 16, SampleType::kUint16},
+                                          {kUnsigned, 32, SampleType::kUint32},
+                                          {kSigned, 8, SampleType::kInt8},
+                                          {kSigned, 16, SampleType::kInt16},
+                                          {kSigned, 32, SampleType::kInt32},
+                                          {kFloating, 16, SampleType::kFloat16},
+                                          {kFloating, 32, SampleType::kFloat32},
+                                          {kFloating, 64, SampleType::kFloat64}}};
+  // Any other number means what no number does.
+  const bool is_known = layout.sample_format >= kUnsigned && layout.sample_format <= kComplexFloating;
+  const int stored_as = is_known && layout.sample_format != kUndefined ? layout.sample_format : kUnsigned;
+  for (const Row& row : kTypes) {
+    if (row.format == stored_as && row.bits == layout.bits_per_sample) return row.type;
   }
   constexpr std::array<const char*, 7> kFormats = {
       "undefined", "unsigned integer", "signed integer",        "floating-point",
@@ -237,42 +239,6 @@ int choose_channel(const TiffLayout& layout, const std::string& wanted, SourceIn
     info.warnings.push_back(fmt::format("there are {} channels; channel {} is read", names.size(), label(0)));
   }
   return static_cast<int>(chosen);
-}
-
-std::array<std::byte, 8> bytes_of_value(SampleType type, double value) {
-  std::array<std::byte, 8> bytes = {};
-  const auto store = [&](auto typed) { std::memcpy(bytes.data(), &typed, sizeof(typed)); };
-  switch (type) {
-    case SampleType::kUint8:
-      store(static_cast<std::uint8_t>(value));
-      break;
-    case SampleType::kInt8:
-      store(static_cast<std::int8_t>(value));
-      break;
-    case SampleType::kUint16:
-      store(static_cast<std::uint16_t>(value));
-      break;
-    case SampleType::kInt16:
-      store(static_cast<std::int16_t>(value));
-      break;
-    case SampleType::kUint32:
-      store(static_cast<std::uint32_t>(value));
-      break;
-    case SampleType::kInt32:
-      store(static_cast<std::int32_t>(value));
-      break;
-    // Any void is as good as another here; a half NaN spares the conversion.
-    case SampleType::kFloat16:
-      store(std::uint16_t{0x7E00});
-      break;
-    case SampleType::kFloat32:
-      store(static_cast<float>(value));
-      break;
-    case SampleType::kFloat64:
-      store(value);
-      break;
-  }
-  return bytes;
 }
 
 class TiffSource final : public HeightSource {
@@ -390,8 +356,7 @@ class TiffSource final : public HeightSource {
     if (blocks_->missing_blocks() == 0) return;
     const char* reads_as = "0";
     if (!info_.void_values.empty()) {
-      const auto fill = bytes_of_value(info_.sample_type, info_.void_values.front());
-      blocks_->set_fill(std::span(fill).first(size_bytes(info_.sample_type)));
+      blocks_->set_fill(stored_sample(info_.sample_type, info_.void_values.front()));
       reads_as = "void";
     }
     info_.warnings.push_back(

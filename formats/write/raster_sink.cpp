@@ -69,8 +69,7 @@ std::string other_kind(const std::string& path, const Writer& writer) {
   constexpr std::size_t kHeadBytes = 256;
   const std::vector<std::byte> head = head_of_file(path, kHeadBytes);
   if (head.empty()) return {};
-  const std::string start(reinterpret_cast<const char*>(head.data()), std::min<std::size_t>(head.size(), 4));
-  if (start == "PK\x03\x04") return "a ZIP archive, as .isohf files are";
+  if (text_of(head).starts_with("PK\x03\x04")) return "a ZIP archive, as .isohf files are";
   const Format* const found = format_of_head(head);
   if (found == nullptr) return writer.has_signature ? fmt::format("no {}", writer.format.name) : "";
   const bool same = std::ranges::any_of(found->extensions, [&](std::string_view extension) {
