@@ -224,10 +224,12 @@ void check_profile(const ByteSource& file, const ZipEnd& end, const Complain& co
 }
 
 std::uint32_t crc32_in(const ByteSource& file, std::uint64_t offset_bytes, std::uint64_t size_bytes) {
-  constexpr std::uint64_t kPieceBytes = std::uint64_t{1} << 20U;
+  std::vector<std::byte> piece(std::min(size_bytes, std::uint64_t{1} << 20U));
   std::uint32_t crc = 0;
-  for (std::uint64_t done = 0; done < size_bytes; done += kPieceBytes) {
-    crc = crc32(SourceBytes(file, offset_bytes + done, std::min(kPieceBytes, size_bytes - done)).bytes(), crc);
+  for (std::uint64_t done = 0; done < size_bytes; done += piece.size()) {
+    piece.resize(std::min<std::uint64_t>(piece.size(), size_bytes - done));
+    read_exactly(file, offset_bytes + done, piece);
+    crc = crc32(piece, crc);
   }
   return crc;
 }

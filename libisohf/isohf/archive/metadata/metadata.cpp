@@ -215,14 +215,20 @@ void metadata_members(JsonMembers& json, Metadata& metadata) {
   json("content_sha256", metadata.content_sha256);
 }
 
-/// Whether a top-level member of that name belongs to the format; any other is an extension.
-bool is_format_member(const std::string& name) {
-  static const Json schema = Json::parse(metadata_schema());
-  return schema["properties"].contains(name);
-}
-
 Metadata empty_metadata() {
   return Metadata(TileGrid::make(TileShape::make(5, 5, 1), 1, 1, 1.0, 1.0));
+}
+
+/// Whether a top-level member of that name belongs to the format; any other is an extension.
+bool is_format_member(const std::string& name) {
+  static const Json schema = [] {
+    Json made = {{"properties", Json::object()}, {"required", Json::array()}};
+    JsonMembers json(JsonMembers::Pass::kSchema, made, "");
+    Metadata metadata = empty_metadata();
+    metadata_members(json, metadata);
+    return made;
+  }();
+  return schema["properties"].contains(name);
 }
 
 // --- what members must be beside each other ---
