@@ -1,4 +1,4 @@
-#include "shadow_sun.h"
+#include "session.h"
 
 #include <gtest/gtest.h>
 
