@@ -11,6 +11,7 @@
 
 #include "isohf/base/view.h"
 #include "isohf/convert/convert.h"
+#include "isohf/error.h"
 #include "isohf/lattice/barycentric.h"
 #include "isohf/surface/shade/normals.h"
 #include "support/memory_source.h"
@@ -46,6 +47,12 @@ class PointSamplerTest : public testing::TestWithParam<CodeType> {
 
   test::TemporaryFolder folder;
 };
+
+Job with_memory(std::uint64_t bytes) {
+  Job job;
+  job.memory_bytes = bytes;
+  return job;
+}
 
 /// One place from the whole tile's elevations: the definition.
 SurfaceSample one(const ArchiveReader& archive, WorldPoint place) {
@@ -125,7 +132,7 @@ TEST_P(PointSamplerTest, FindsWhatTheWholeTileHasAtAnyPlaceInAnyOrder) {
   const std::vector<WorldPoint> all = places();
   std::vector<SurfaceSample> found(all.size());
   std::vector<double> elevations(all.size());
-  Surface surface(archive, 1U << 20U);
+  Surface surface(archive, with_memory(1U << 20U));
   surface.sample(all, std::span(found));
   surface.sample(all, std::span(elevations));
   int states[3] = {};
@@ -146,11 +153,11 @@ TEST_P(PointSamplerTest, AnswersDependNeitherOnBatchesNorOnMemoryNorOnThreads) {
   const ArchiveReader archive(folder / "a.isohf");
   const std::vector<WorldPoint> all = places();
   std::vector<SurfaceSample> together(all.size());
-  Surface(archive, 1U << 20U).sample(all, std::span(together));
+  Surface(archive, with_memory(1U << 20U)).sample(all, std::span(together));
   for (const int threads : {1, 2, 7}) {
     oneapi::tbb::task_arena arena(threads);
     arena.execute([&] {
-      Surface surface(archive, 1);  // keeps one tile
+      Surface surface(archive, with_memory(1));  // keeps one tile
       for (std::size_t first = 0, size = 1; first < all.size(); first += size, size = size * 3 + 1) {
         const std::size_t count = std::min(size, all.size() - first);
         std::vector<SurfaceSample> found(count);
@@ -159,6 +166,25 @@ TEST_P(PointSamplerTest, AnswersDependNeitherOnBatchesNorOnMemoryNorOnThreads) {
       }
     });
   }
+}
+
+TEST_P(PointSamplerTest, WorksOnTheJobsThreadsUntilItIsCancelled) {
+  const ArchiveReader archive(folder / "a.isohf");
+  const std::vector<WorldPoint> all = places();
+  std::vector<double> here(all.size());
+  Surface(archive).sample(all, std::span(here));
+  std::atomic<bool> cancel = false;
+  Job job;
+  job.threads = 3;
+  job.cancel = &cancel;
+  Surface surface(archive, job);
+  std::vector<double> there(all.size());
+  surface.sample(all, std::span(there));
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    ASSERT_TRUE(here[i] == there[i] || (std::isnan(here[i]) && std::isnan(there[i])));
+  }
+  cancel = true;
+  EXPECT_THROW(surface.sample(all, std::span(there)), Error);
 }
 
 INSTANTIATE_TEST_SUITE_P(Types, PointSamplerTest, testing::Values(CodeType::kU16, CodeType::kU8, CodeType::kF32),

@@ -150,7 +150,7 @@ class Restorer {
   }
 
   Restored run_lossless() {
-    SourceRowReader reader(archive_);
+    SourceRowReader reader(archive_, job_);
     const LosslessRecord& record = reader.record();
     const SampleMapping kept = record.mapping;
     SampleMapping written = kept;
@@ -183,8 +183,6 @@ class Restorer {
         sink->write_rows(out);
       }
       row += static_cast<std::int64_t>(count) / record.width;
-      job_.report({"restore", "rows", row, grid_.height});
-      job_.throw_if_cancelled();
     }
     sink->finish();
     return {{}, true, sink->files()};

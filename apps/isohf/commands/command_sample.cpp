@@ -183,11 +183,17 @@ std::string record_from(const SurfaceSample& sample) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
+Job job_of(const SampleOptions& options) {
+  Job job;
+  job.memory_bytes = options.memory_bytes;
+  return job;  // its threads are those of the arena around it, which answers are written on as well
+}
+
 /// Collects places and answers them together, in their order.
 class Answers {
  public:
   Answers(const ArchiveReader& archive, const SampleOptions& options, const PlaceOutput& output)
-      : options_(options), output_(output), surface_(archive, options.memory_bytes) {}
+      : options_(options), output_(output), surface_(archive, job_of(options)) {}
 
   void add(WorldPoint place) {
     places_.push_back(place);

@@ -70,12 +70,13 @@ struct SurfaceSample {
 
 /// The surface of an archive at any number of points in any order.
 ///
-/// Each tile under the points of a call is decoded once, several at a time on all threads of the caller's oneTBB arena.
-/// Tiles used last are kept. What is found depends on neither.
+/// Each tile under the points of a call is decoded once, several at a time on all threads. Tiles used last are kept. What
+/// is found depends on neither.
 class Surface {
  public:
-  /// Keeps at most `memory_bytes` of decoded tiles, one at least. The archive must outlive it.
-  explicit Surface(const ArchiveReader& archive, std::uint64_t memory_bytes = std::uint64_t{256} << 20U);
+  /// Keeps at most job.memory_bytes of decoded tiles (0: 256 MiB), one at least; works on job.threads (0: those of the
+  /// caller's oneTBB arena), looks at job.cancel before each call. The archive must outlive it.
+  explicit Surface(const ArchiveReader& archive, const Job& job = {});
   ~Surface();
   Surface(const Surface&) = delete;
   Surface& operator=(const Surface&) = delete;
@@ -148,8 +149,7 @@ using GridSize = std::pair<std::int64_t, std::int64_t>;
 
 /// The surface of an archive at the samples of a grid, from the first row to the last.
 ///
-/// Memory grows with the width, not with the height. Works on the caller's oneTBB arena; the bits depend on archive and
-/// grid alone.
+/// Memory grows with the width, not with the height. The bits depend on archive and grid alone.
 class RowReader {
  public:
   /// A grid in degrees is read on the triangles, each sample at its own longitude and latitude. The archive must outlive
@@ -160,7 +160,7 @@ class RowReader {
   RowReader(const RowReader&) = delete;
   RowReader& operator=(const RowReader&) = delete;
 
-  /// Rows `first` to `first + rows - 1`; calls come in increasing order.
+  /// Rows `first` to `first + rows - 1`, on the caller's oneTBB arena; calls come in increasing order.
   /// elevations [rows * width] out, vertical units; NaN where the surface has none.
   void read(std::int64_t first, std::int64_t rows, std::span<double> elevations);
 
@@ -201,15 +201,15 @@ struct LosslessRecord {
 class SourceRowReader {
  public:
   /// Throws Error{kInvalidArgument} where the archive keeps no residuals; kCorrupt. The archive must outlive it.
-  explicit SourceRowReader(const ArchiveReader& archive);
+  explicit SourceRowReader(const ArchiveReader& archive, Job job = {});
   ~SourceRowReader();
   SourceRowReader(const SourceRowReader&) = delete;
   SourceRowReader& operator=(const SourceRowReader&) = delete;
 
   [[nodiscard]] const LosslessRecord& record() const;
   [[nodiscard]] bool at_end() const;
-  /// Some further rows, in the source's sample type. Throws Error{kCorrupt} naming the member, and at the last row where
-  /// all of them don't have the SHA-256 that the metadata state.
+  /// Some further rows, in the source's sample type; tells the job. Throws Error{kCorrupt} naming the member, and at the
+  /// last row where all of them don't have the SHA-256 that the metadata state; kCancelled.
   [[nodiscard]] std::vector<std::byte> read_next();
 
  private:

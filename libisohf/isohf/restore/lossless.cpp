@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "isohf/archive/container/content_hash.h"
+#include "isohf/base/arena.h"
 #include "isohf/base/bytes.h"
 #include "isohf/error.h"
 
@@ -160,28 +161,30 @@ void SamplePredictor::read(std::int64_t first, std::int64_t rows, std::span<doub
 }
 
 struct SourceRowReader::State {
-  State(const ArchiveReader& its_archive, LosslessRecord its_record)
+  State(const ArchiveReader& its_archive, LosslessRecord its_record, Job its_job)
       : archive(its_archive),
         record(std::move(its_record)),
+        job(std::move(its_job)),
         surface(archive.grid(), archive.metadata().wraps_x, archive.metadata().quantisation, tiles_of(archive),
                 source_grid(archive.metadata().source), record.method,
                 record.at_positions ? std::optional(read_positions(archive, record)) : std::nullopt) {}
 
   const ArchiveReader& archive;
   LosslessRecord record;
+  Job job;
   SamplePredictor surface;
   std::int64_t next_row = 0;
   Sha256 hash;
 };
 
-SourceRowReader::SourceRowReader(const ArchiveReader& archive) {
+SourceRowReader::SourceRowReader(const ArchiveReader& archive, Job job) {
   std::optional<LosslessRecord> record = lossless_record(archive.metadata());
   if (!record) {
     throw Error(ErrorCode::kInvalidArgument,
                 archive.path() + ": keeps no residuals, so that the source's own samples cannot be had from it");
   }
   check_members(archive, *record);
-  state_ = std::make_unique<State>(archive, std::move(*record));
+  state_ = std::make_unique<State>(archive, std::move(*record), std::move(job));
 }
 
 SourceRowReader::~SourceRowReader() = default;
@@ -197,6 +200,7 @@ bool SourceRowReader::at_end() const {
 std::vector<std::byte> SourceRowReader::read_next() {
   State& state = *state_;
   const LosslessRecord& record = state.record;
+  state.job.throw_if_cancelled();
   const std::int64_t rows = std::min(record.rows_per_member, record.height - state.next_row);
   const std::string name = residual_name(state.next_row);
   const auto payload = state.archive.read_member(name);
@@ -204,7 +208,7 @@ std::vector<std::byte> SourceRowReader::read_next() {
     throw Error(ErrorCode::kCorrupt, fmt::format("{}: member \"{}\" is missing", state.archive.path(), name));
   }
   std::vector<double> predicted(static_cast<std::size_t>(rows * record.width));
-  state.surface.read(state.next_row, rows, predicted);
+  Arena(state.job).execute([&] { state.surface.read(state.next_row, rows, predicted); });
   std::vector<std::byte> raw(predicted.size() * size_bytes(record.mapping.type));
   try {
     decode_residuals(record.mapping, record.width, *payload, predicted, raw);
@@ -213,6 +217,7 @@ std::vector<std::byte> SourceRowReader::read_next() {
   }
   state.hash.add(raw);
   state.next_row += rows;
+  state.job.report({"rows", "rows", state.next_row, record.height});
   if (!at_end()) return raw;
   if (const std::string found = hex(state.hash.finish()); found != record.sha256) {
     throw Error(ErrorCode::kCorrupt, fmt::format("{}: the restored samples have the SHA-256 {}, the source's is {}",

@@ -17,6 +17,8 @@ namespace {
 
 /// Samples that are handed over at once, about.
 constexpr std::int64_t kSamplesAtOnce = std::int64_t{1} << 20U;
+/// What a Surface keeps of decoded tiles.
+constexpr std::uint64_t kDefaultMemory = std::uint64_t{256} << 20U;
 /// What tiles under a grid in degrees take.
 constexpr std::uint64_t kTileBytes = std::uint64_t{16} << 20U;
 
@@ -28,19 +30,34 @@ constexpr std::uint64_t kTileBytes = std::uint64_t{16} << 20U;
 }  // namespace
 
 struct Surface::State {
+  State(const ArchiveReader& archive, const Job& its_job)
+      : job(its_job),
+        sampler(archive.grid(), archive.metadata().quantisation, tiles_of(archive),
+                job.memory_bytes > 0 ? job.memory_bytes : kDefaultMemory),
+        georeference(archive.metadata()) {
+    if (job.threads > 0) arena.emplace(job);
+  }
+
+  template <typename Found>
+  void sample(std::span<const WorldPoint> points, std::span<Found> found) {
+    job.throw_if_cancelled();
+    if (!arena) return sampler.sample(points, found);
+    arena->execute([&] { sampler.sample(points, found); });
+  }
+
+  Job job;
+  std::optional<Arena> arena;
   PointSampler sampler;
   WorldGeoreference georeference;
 };
 
-Surface::Surface(const ArchiveReader& archive, std::uint64_t memory_bytes)
-    : state_(new State{{archive.grid(), archive.metadata().quantisation, tiles_of(archive), memory_bytes},
-                       WorldGeoreference(archive.metadata())}) {}
+Surface::Surface(const ArchiveReader& archive, const Job& job) : state_(std::make_unique<State>(archive, job)) {}
 
 Surface::~Surface() = default;
 
 SurfaceSample Surface::at(WorldPoint point) {
   SurfaceSample sample;
-  state_->sampler.sample({&point, 1}, std::span(&sample, 1));
+  state_->sample({&point, 1}, std::span(&sample, 1));
   return sample;
 }
 
@@ -55,11 +72,11 @@ SurfaceSample Surface::at(MapPoint point) {
 }
 
 void Surface::sample(std::span<const WorldPoint> points, std::span<SurfaceSample> samples) {
-  state_->sampler.sample(points, samples);
+  state_->sample(points, samples);
 }
 
 void Surface::sample(std::span<const WorldPoint> points, std::span<double> elevations) {
-  state_->sampler.sample(points, elevations);
+  state_->sample(points, elevations);
 }
 
 const WorldGeoreference& Surface::georeference() const {
