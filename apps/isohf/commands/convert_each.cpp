@@ -119,10 +119,10 @@ class Batch {
                               {"not_done", files_.size() - begun},
                               {"seconds", seconds}}}}));
     } else if (!common_.quiet) {
-      std::string text =
-          fmt::format("{} files: {} converted", describe_count(files_.size()), describe_count(converted_));
+      const auto number = [](std::size_t count) { return describe_count(static_cast<std::int64_t>(count)); };
+      std::string text = fmt::format("{} files: {} converted", number(files_.size()), number(converted_));
       const auto add = [&](std::size_t count, const char* what) {
-        if (count > 0) text += fmt::format(", {} {}", describe_count(count), what);
+        if (count > 0) text += fmt::format(", {} {}", number(count), what);
       };
       add(complete_, "complete before");
       add(skipped_, "skipped");
