@@ -2,8 +2,8 @@
 # CMake (find_package(isohf)) and pkg-config need to find it.
 include(CMakePackageConfigHelpers)
 
-install(TARGETS isohf EXPORT isohf ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT development)
-install(DIRECTORY libisohf/include/isohf libisohf/isohf DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT development
+install(TARGETS isohf isohf_formats EXPORT isohf ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT development)
+install(DIRECTORY libisohf/include/isohf DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT development
         FILES_MATCHING PATTERN "*.h")
 install(TARGETS isohf_cli isohf_experiment RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT programs)
 if(TARGET isohf_view)
@@ -13,8 +13,9 @@ endif()
 
 set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/isohf)
 install(EXPORT isohf FILE isohfTargets.cmake NAMESPACE isohf:: DESTINATION ${package_dir} COMPONENT development)
+set(module_dir lib/isohf)
 configure_package_config_file(cmake/isohfConfig.cmake.in ${PROJECT_BINARY_DIR}/isohfConfig.cmake
-                              INSTALL_DESTINATION ${package_dir} NO_SET_AND_CHECK_MACRO)
+                              INSTALL_DESTINATION ${package_dir} PATH_VARS module_dir NO_SET_AND_CHECK_MACRO)
 # Before 1.0 every minor version may change the interface.
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/isohfConfigVersion.cmake COMPATIBILITY SameMinorVersion)
 install(FILES ${PROJECT_BINARY_DIR}/isohfConfig.cmake ${PROJECT_BINARY_DIR}/isohfConfigVersion.cmake

@@ -32,17 +32,17 @@ struct Reader {
 
 const std::vector<Reader>& readers() {
   static const std::vector<Reader> table = {
-      {{"OpenEXR", {".exr"}, exr_library, "takes --channel and --part"}, looks_like_exr, open_exr},
-      {{"TIFF", {".tif", ".tiff"}, tiff_library, "takes --channel"}, looks_like_tiff, open_tiff},
-      {{"PNG", {".png"}, png_library, "takes --channel and --encoding"}, looks_like_png, open_png},
+      {{"OpenEXR", {".exr"}, exr_library, "takes `channel` and `part`"}, looks_like_exr, open_exr},
+      {{"TIFF", {".tif", ".tiff"}, tiff_library, "takes `channel`"}, looks_like_tiff, open_tiff},
+      {{"PNG", {".png"}, png_library, "takes `channel` and `encoding`"}, looks_like_png, open_png},
       {{"ESRI ASCII grid, GRASS ASCII", {".asc"}}, looks_like_ascii_grid, open_ascii_grid, nullptr, true},
       {{"GridFloat or EHdr header", {".hdr"}}, looks_like_grid_header, open_header_grid},
       {{"GridFloat", {".flt"}}, nullptr, open_header_grid},
       {{"EHdr", {".bil", ".bip", ".bsq"}}, nullptr, open_header_grid},
-      {{"PDS3", {".img", ".lbl"}, nullptr, "takes --channel"}, looks_like_pds3, open_pds3, has_pds3_label, true},
-      {{"ISIS3 cube", {".cub", ".lbl"}, nullptr, "takes --channel"}, looks_like_isis3, open_isis3, nullptr, true},
+      {{"PDS3", {".img", ".lbl"}, nullptr, "takes `channel`"}, looks_like_pds3, open_pds3, has_pds3_label, true},
+      {{"ISIS3 cube", {".cub", ".lbl"}, nullptr, "takes `channel`"}, looks_like_isis3, open_isis3, nullptr, true},
       {{"NumPy", {".npy"}}, looks_like_npy, open_npy, nullptr, true},
-      {{"NumPy archive", {".npz"}, nullptr, "takes --channel"}, nullptr, open_npz},
+      {{"NumPy archive", {".npz"}, nullptr, "takes `channel`"}, nullptr, open_npz},
       {{"USGS DEM", {".dem"}}, looks_like_usgs_dem, open_usgs_dem, nullptr, true},
       {{"GTOPO30", {".dem"}}, nullptr, open_header_grid},
       {{"DTED", {".dt0", ".dt1", ".dt2"}}, looks_like_dted, open_dted, nullptr, true},
@@ -51,7 +51,7 @@ const std::vector<Reader>& readers() {
       {{"raw samples",
         {".r8", ".r16", ".r32", ".f32", ".f64", ".raw"},
         nullptr,
-        "needs --raw, or isohf's .json beside"},
+        "needs `raw`, or isohf's .json beside"},
        nullptr,
        open_raw,
        nullptr,
@@ -165,7 +165,7 @@ std::unique_ptr<HeightSource> open_by_head(const std::string& path, const OpenOp
   }
   if (reader == nullptr) return open_with_oiio(path, options);
   if (!options.part.empty() && reader->open != open_exr) {
-    throw Error(ErrorCode::kInvalidArgument, path + ": has no parts; --part is for OpenEXR files of several");
+    throw Error(ErrorCode::kInvalidArgument, path + ": has no parts; `part` is for OpenEXR files of several");
   }
   return reader->open(path, options);
 }

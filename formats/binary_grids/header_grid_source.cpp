@@ -87,7 +87,7 @@ Pair pair_of(const std::string& path) {
     if (is_file(replaced)) return {path, replaced.string()};
     if (is_file(path + extension)) return {path, path + extension};
   }
-  throw Error(ErrorCode::kIo, fmt::format("{}: its header {} is not there; it must be beside it, or --raw WxH:TYPE say "
+  throw Error(ErrorCode::kIo, fmt::format("{}: its header {} is not there; it must be beside it, or `raw` WxH:TYPE say "
                                           "what the samples are",
                                           path, std::filesystem::path(path).replace_extension(".hdr").string()));
 }

@@ -340,7 +340,7 @@ std::unique_ptr<HeightSource> open_npz(const std::string& path, const OpenOption
   }
   if (rasters > 1) {
     chosen->mutable_info().warnings.push_back(
-        fmt::format("array {} is read, of {}; --channel NAME takes another", name, names));
+        fmt::format("array {} is read, of {}; `channel` NAME takes another", name, names));
   }
   chosen->mutable_info().channel = members.size() > 1 ? name : std::string();
   apply_open_options(chosen->mutable_info(), options);

@@ -81,9 +81,9 @@ std::string square(std::uint64_t bytes, std::string_view type, std::size_t sampl
     if (example.empty() && ending == "raw") example = square(bytes, "u8", 1);
   }
   const std::string hint =
-      example.empty() ? "as in --raw 200x300:u16le" : fmt::format("its {} bytes would be --raw {}", bytes, example);
+      example.empty() ? "as in `raw` 200x300:u16le" : fmt::format("its {} bytes would be `raw` {}", bytes, example);
   throw Error(ErrorCode::kInvalidArgument,
-              fmt::format("{}: raw samples have no header; --raw WxH:TYPE must say what they are ({})", path, hint));
+              fmt::format("{}: raw samples have no header; `raw` WxH:TYPE must say what they are ({})", path, hint));
 }
 
 class RawSource final : public PlainSource {

@@ -49,7 +49,7 @@ struct Part {
 };
 
 std::string text_of(const BoundingBox& box) {
-  return fmt::format("--bbox {},{},{},{}", box.west, box.south, box.east, box.north);
+  return fmt::format("`bbox` {},{},{},{}", box.west, box.south, box.east, box.north);
 }
 
 /// Where the columns of a box lie: at both ends of a raster of a whole turn they are one piece.
@@ -58,7 +58,7 @@ void find_columns(const BoundingBox& box, const SourceInfo& info, double reach, 
   const bool degrees = place.unit == HorizontalUnit::kDegree;
   double east = box.east;
   if (degrees && east <= box.west) east += kTurn;
-  if (!(box.west < east)) refuse(fmt::format("--bbox: West is {}, which must be less than East, {}", box.west, east));
+  if (!(box.west < east)) refuse(fmt::format("`bbox`: West is {}, which must be less than East, {}", box.west, east));
   const auto at = [&](double turn) {
     return stretch((box.west + turn - place.origin_x) / place.spacing_x,
                    (east + turn - place.origin_x) / place.spacing_x, info.width, reach);
@@ -100,7 +100,7 @@ void find_columns(const BoundingBox& box, const SourceInfo& info, double reach, 
 
 Part part_in(const BoundingBox& box, const SourceInfo& info) {
   const Georeference& place = info.georeference;
-  if (!place.has_origin) refuse(info.path + ": does not say where it lies, which --bbox needs");
+  if (!place.has_origin) refuse(info.path + ": does not say where it lies, which `bbox` needs");
   const double reach = place.registration == Registration::kPoint ? 0.0 : 0.5;
   const Stretch rows = stretch((place.origin_y - box.north) / place.spacing_y,
                                (place.origin_y - box.south) / place.spacing_y, info.height, reach);
@@ -127,7 +127,7 @@ class CroppedSource final : public WindowedSource {
       : WindowedSource(std::move(source), part.window) {
     if (!part.cut) return;
     mutable_info().warnings.push_back(
-        fmt::format("--bbox reaches beyond {}; what lies in both is taken, {} x {} samples", info().path, info().width,
+        fmt::format("`bbox` reaches beyond {}; what lies in both is taken, {} x {} samples", info().path, info().width,
                     info().height));
   }
 };

@@ -35,7 +35,7 @@ class MaskedSource final : public HeightSource {
     if (samples_.kind.type != stored_.type) {
       info_.warnings.push_back(
           fmt::format("{} has no number to spare for transparent samples, which are voids; samples "
-                      "become {} (--nodata V gives them one, --channel 0 reads the image without them)",
+                      "become {} (`void_values` V gives them one, `channel` 0 reads the image without them)",
                       to_string(stored_.type), to_string(samples_.kind.type)));
     }
     info_.sample_type = samples_.kind.type;

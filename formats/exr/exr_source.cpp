@@ -296,7 +296,7 @@ class ExrSource final : public HeightSource {
     info_.channel = channels.size() > 1 || !channel_.part_name.empty() ? full_name(channel_) : std::string();
     sample_bytes_ = size_bytes(info_.sample_type);
     if (chosen_here && channels.size() > 1) {
-      info_.warnings.push_back(fmt::format("channel {} is read, of {} ({}); --channel chooses another",
+      info_.warnings.push_back(fmt::format("channel {} is read, of {} ({}); `channel` chooses another",
                                            shown_name(channel_), channels.size(), list_of(channels)));
     }
     if (data != display) {

@@ -34,7 +34,7 @@ constexpr Signature kSignatures[] = {
     {"Rar!"sv, "a RAR file", kUnpack},
     {"ustar"sv, "a tar file", "tar xf {} unpacks it", 257},
     {"%PDF"sv, "a PDF document"},
-    {"LASF"sv, "a LAS point cloud", "PDAL grids it: pdal translate {} OUT.tif --writers.gdal.resolution=1"},
+    {"LASF"sv, "a LAS point cloud", "PDAL grids it: pdal translate {} OUT.tif --writers.gdal.resolution=1"},  // NOLINT
     {"ply\n"sv, "a PLY mesh"},
     {"glTF"sv, "a glTF model"},
     {"\x89HDF"sv, "an HDF5 or NetCDF file", kGdal},

@@ -261,7 +261,7 @@ void read_prj_beside(SourceInfo& info) {
   if (place.has_origin && place.spacing_x < kFinestAsMetres && place.spacing_y < kFinestAsMetres &&
       std::abs(place.origin_x) <= 360.0 && std::abs(place.origin_y) <= 90.0) {
     info.warnings.emplace_back(
-        "the coordinates look like degrees, but no .prj beside the file says so; with one, or with --sample-spacing, "
+        "the coordinates look like degrees, but no .prj beside the file says so; with one, or with `sample_spacing`, "
         "distances would be in metres");
   }
 }

@@ -6,6 +6,7 @@
 
 #include "formats/georeference/proj_module.h"
 #include "formats/module_loader.h"
+#include "isohf/convert.h"
 #include "isohf/error.h"
 
 namespace isohf {
@@ -84,6 +85,17 @@ std::shared_ptr<const ReferenceMap> understand_map(const std::string& text, std:
 
 std::string system_text(const ReferenceSystem& system) {
   return system.epsg ? fmt::format("EPSG:{}", *system.epsg) : system.wkt;
+}
+
+void understand_ground(const SourceInfo& info, GroundRequest& request) {
+  const Georeference& place = info.georeference;
+  const std::string text = system_text(place.system);
+  if (place.unit != HorizontalUnit::kMetre || !place.has_origin || text.empty()) return;
+  try {
+    request.source_map = understand_map(text, place.metres_per_unit);
+  } catch (const Error& error) {
+    request.why_no_map = error.what();
+  }
 }
 
 }  // namespace isohf

@@ -205,7 +205,7 @@ class Survey {
                                unit_name(place), first_, unit_name(ours)));
     }
     if (place.registration != ours.registration) {
-      refuse(path, fmt::format("its samples stand for {}, those of {} for {}; --registration says what holds for all",
+      refuse(path, fmt::format("its samples stand for {}, those of {} for {}; `registration` says what holds for all",
                                words(place.registration), first_, words(ours.registration)));
     }
     Agreement agreement;

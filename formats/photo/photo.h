@@ -3,21 +3,10 @@
 #include <cstdint>
 #include <memory>
 #include <span>
-#include <string>
 
-#include "isohf/surface/photo/photo_source.h"
+#include "isohf/picture.h"
 
 namespace isohf {
-
-/// Opens a picture of the ground: PNG, JPEG and TIFF natively, other formats through OpenImageIO (oiio_module.h). Grey,
-/// RGB or RGBA of 8 or 16 bits or floats, and palettes of 8 bits, are delivered as 8-bit sRGB. Light (OpenEXR, PFM) is
-/// coded as sRGB, any other numbers are taken to be so. Four channels of which the fourth is no alpha lose it, with a
-/// warning. The georeference is that of GeoTIFF tags, else of a world file and a .prj beside the picture.
-/// Memory: what set_cache_bytes allows, one row of blocks at least; interlaced PNG and progressive JPEG are decoded
-/// whole by their libraries.
-/// Throws Error naming the path: kIo (missing), kUnsupported (no module, unknown format, 2 or more than 4 channels, a
-/// rotated or South-up georeference), kCorrupt.
-[[nodiscard]] std::unique_ptr<PhotoSource> open_photo(const std::string& path);
 
 /// A picture's decoder behind the photo's cache, for one thread at a time. Errors carry no path.
 class PhotoRows {

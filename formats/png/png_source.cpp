@@ -139,7 +139,7 @@ class PngSource final : public HeightSource {
       throw Error(ErrorCode::kInvalidArgument,
                   fmt::format("{}: has no channel \"{}\"; it has {} (or 0...{}){}", info_.path, wanted,
                               fmt::join(channels, ", "), channels_ - 1,
-                              channels_ > 2 ? ", and with --encoding terrarium, mapbox or rgba-float" : ""));
+                              channels_ > 2 ? ", and with `encoding` terrarium, mapbox or rgba-float" : ""));
     }
     if (channels_ == 1) return;
     info_.channel = channels[channel_];
@@ -187,8 +187,8 @@ class PngSource final : public HeightSource {
       if (const std::optional<Packing> packing = evidence.packing()) {
         unpack(*packing);
         info_.warnings.push_back(
-            fmt::format("its colours are packed elevations, as their bytes show: decoded as with --encoding {0}; give "
-                        "--encoding {0} to say so, or --channel R for one channel alone",
+            fmt::format("its colours are packed elevations, as their bytes show: decoded as with `encoding` {0}; give "
+                        "`encoding` {0} to say so, or `channel` R for one channel alone",
                         to_string(*packing)));
         return;
       }
@@ -199,8 +199,8 @@ class PngSource final : public HeightSource {
     }
     throw Error(
         ErrorCode::kInvalidArgument,
-        fmt::format("{}: is a colour picture with channels {}; say which one holds elevations (--channel R), or "
-                    "how they are packed into all (--encoding terrarium, mapbox or rgba-float)",
+        fmt::format("{}: is a colour picture with channels {}; say which one holds elevations (`channel` R), or "
+                    "how they are packed into all (`encoding` terrarium, mapbox or rgba-float)",
                     info_.path, fmt::join(header_.channels, ", ")));
   }
 

@@ -385,10 +385,10 @@ class AsciiGridSource final : public FileSource {
       info_.warnings.emplace_back("the numbers have decimal commas: 1,5 is read as one and a half");
     }
     if (!marked_ && !marker_.empty()) {
-      info_.warnings.push_back(
-          fmt::format("the header names no void value, but {} occurs; if it means a void, give "
-                      "--nodata {}",
-                      marker_, marker_));
+      info_.warnings.emplace_back(
+          fmt::format("the header names no void value, but {} occurs; if it means a void, give `void_values` {}",
+                      marker_, marker_),
+          Warning::Kind::kUndeclaredNodata);
     }
     if (end_of_last_ == file_->size_bytes()) {
       info_.warnings.push_back(loss("the file ends within its last line: its last number may be cut off"));

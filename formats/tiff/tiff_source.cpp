@@ -56,7 +56,7 @@ class TiffMask final : public HeightSource {
       throw Error(
           ErrorCode::kUnsupported,
           fmt::format(
-              "{}: the transparency mask has {} samples of {} bits a pixel, must have one of 1 or 8; --channel 0 "
+              "{}: the transparency mask has {} samples of {} bits a pixel, must have one of 1 or 8; `channel` 0 "
               "reads the image without it",
               path, layout.samples_per_pixel, layout.bits_per_sample));
     }

@@ -127,7 +127,7 @@ TEST(ArchiveWriter, ReplacesWhereItMay) {
   }
   EXPECT_THAT(folder.names(), ElementsAre("a"));
   EXPECT_EQ(ArchiveReader(folder / "a").metadata().tiles_stored, 18);
-  EXPECT_EQ(code_of([&] { ArchiveWriter(folder / "a", grid, {}); }, "exists; --overwrite"),
+  EXPECT_EQ(code_of([&] { ArchiveWriter(folder / "a", grid, {}); }, "exists; `overwrite`"),
             ErrorCode::kInvalidArgument);
   for (const char* other : {"text", "PK\x03\x04 a ZIP archive of something else, longer than a header"}) {
     test::write_file(folder / "b", other);

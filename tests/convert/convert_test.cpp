@@ -1,4 +1,4 @@
-#include "isohf/convert/convert.h"
+#include "isohf/convert.h"
 
 #include <gtest/gtest.h>
 
@@ -13,7 +13,6 @@
 #include "isohf/lattice/barycentric.h"
 #include "isohf/surface/resample/kernels.h"
 #include "isohf/verify.h"
-#include "isohf/verify/accuracy/against_source.h"
 #include "support/memory_source.h"
 #include "support/temporary_folder.h"
 
@@ -35,9 +34,9 @@ class Convert : public testing::Test {
     return options;
   }
 
-  static ConvertSummary run(HeightSource& source, const std::string& output, const ConvertOptions& options) {
-    const std::atomic<bool> cancel = false;
-    return convert(source, output, options, {}, cancel);
+  static ConvertSummary run(HeightSource& source, const std::string& output, const ConvertOptions& options,
+                            const Job& job = {}) {
+    return convert(source, output, options, job);
   }
 
   const test::TemporaryFolder folder_;
@@ -103,8 +102,7 @@ TEST_F(Convert, AQuadraticComesBackWithinTheBilinearBound) {
   });
   const ConvertSummary summary = run(source, path("bowl.isohf"), small_tiles());
   const ArchiveReader archive(path("bowl.isohf"));
-  const std::atomic<bool> cancel = false;
-  const AccuracyReport report = compare_with_source(archive, source, 5000, 0, {}, cancel);
+  const AccuracyReport report = compare_with_source(archive, source, {}, 5000);
   EXPECT_EQ(report.samples_compared, 100 * 100);
   // Linear interpolation of a parabola of second derivative k errs by at most k/8 times the square of the longest side:
   // once bilinearly from the source (both axes), once over the triangles (sides up to 1.08 spacings).
@@ -120,9 +118,8 @@ TEST_F(Convert, TheBytesAreTheSameForAnyNumberOfThreads) {
     std::string first;
     for (const int threads : {1, 2, 3, 7}) {
       ConvertOptions options = small_tiles(filter);
-      options.threads = threads;
       options.overwrite = true;
-      (void)run(source, path("t.isohf"), options);
+      (void)run(source, path("t.isohf"), options, {.threads = threads});
       const std::string bytes = test::read_file(path("t.isohf"));
       if (first.empty()) first = bytes;
       EXPECT_TRUE(bytes == first) << threads << " threads, " << to_string(filter);
@@ -152,8 +149,7 @@ TEST_F(Convert, VoidsStayVoidAndAreCounted) {
     const VerifyReport report = verify_archive(path("voids.isohf"), {});
     for (const Finding& finding : report.findings) ADD_FAILURE() << finding_name(finding.id) << " " << finding.text;
     const ArchiveReader archive(path("voids.isohf"));
-    const std::atomic<bool> cancel = false;
-    const AccuracyReport accuracy = compare_with_source(archive, source, 0, 0, {}, cancel);
+    const AccuracyReport accuracy = compare_with_source(archive, source);
     EXPECT_EQ(accuracy.samples_void, 30 * 30);
     EXPECT_EQ(accuracy.lost_inside, 0);
     EXPECT_EQ(accuracy.invented_inside, 0);
@@ -169,11 +165,10 @@ TEST_F(Convert, AHoleOnOneSideAloneIsCountedAsAFault) {
   }
   (void)run(whole, path("whole.isohf"), small_tiles());
   (void)run(holed, path("holed.isohf"), small_tiles());
-  const std::atomic<bool> cancel = false;
-  const AccuracyReport invented = compare_with_source(ArchiveReader(path("whole.isohf")), holed, 0, 0, {}, cancel);
+  const AccuracyReport invented = compare_with_source(ArchiveReader(path("whole.isohf")), holed);
   EXPECT_GT(invented.invented_inside, 400);  // of 30 x 30, but for a few samples at each side
   EXPECT_EQ(invented.lost_inside, 0);
-  const AccuracyReport lost = compare_with_source(ArchiveReader(path("holed.isohf")), whole, 0, 0, {}, cancel);
+  const AccuracyReport lost = compare_with_source(ArchiveReader(path("holed.isohf")), whole);
   EXPECT_GT(lost.lost_inside, 400);
   EXPECT_EQ(lost.invented_inside, 0);
 }
@@ -221,13 +216,11 @@ TEST_F(Convert, ACancelledJobIsResumedToTheSameBytes) {
   const ConvertOptions options = small_tiles();
   (void)run(source, path("whole.isohf"), options);
   std::atomic<bool> cancel = false;
+  Job job;
+  job.cancel = &cancel;
+  job.progress = [&](const Progress& at) { cancel = cancel || at.stage == "tiles"; };
   try {
-    (void)convert(
-        source, path("parts.isohf"), options,
-        [&](const ConvertProgress& progress) {
-          if (progress.pass == ConvertProgress::Pass::kTiles) cancel = true;
-        },
-        cancel);
+    (void)convert(source, path("parts.isohf"), options, job);
     FAIL() << "was not cancelled";
   } catch (const Error& error) {
     EXPECT_EQ(error.code(), ErrorCode::kCancelled);
@@ -244,7 +237,7 @@ TEST_F(Convert, ValuesThatLookLikeFractionsAreWarnedOf) {
                                    [](std::int64_t c, std::int64_t) { return static_cast<double>(c) / 29.0; });
   const ConvertSummary summary = run(source, path("unit.isohf"), small_tiles());
   ASSERT_EQ(summary.warnings.size(), 1U);
-  EXPECT_NE(summary.warnings[0].find("--z-scale"), std::string::npos);
+  EXPECT_NE(summary.warnings[0].find("`z_scale`"), std::string::npos);
 }
 
 TEST_F(Convert, RadiiOfAWholeMoonKeepTheirDecimals) {
@@ -253,8 +246,7 @@ TEST_F(Convert, RadiiOfAWholeMoonKeepTheirDecimals) {
   });
   const ConvertSummary summary = run(source, path("moon.isohf"), small_tiles());
   const ArchiveReader archive(path("moon.isohf"));
-  const std::atomic<bool> cancel = false;
-  EXPECT_LE(compare_with_source(archive, source, 0, 0, {}, cancel).max, summary.step + 1e-7);
+  EXPECT_LE(compare_with_source(archive, source).max, summary.step + 1e-7);
 }
 
 }  // namespace

@@ -62,7 +62,7 @@ TEST(FittedLattice, TilesThatCannotBeSoLargeKeepTheirAspectAndAreWarnedOf) {
   EXPECT_NEAR(aspect(plan), 1.0, 0.01);
   EXPECT_LT(plan.density, 0.5);
   EXPECT_THAT(warnings_of(posts(60000, 60000), tiles(1, 1)),
-              testing::ElementsAre(testing::HasSubstr("ask for other --tiles")));
+              testing::ElementsAre(testing::HasSubstr("ask for other `tiles`")));
 }
 
 TEST(FittedLattice, AShapeAndTilesThatThinOutTheSourceAreWarnedOfWithTheFigure) {
@@ -73,7 +73,7 @@ TEST(FittedLattice, AShapeAndTilesThatThinOutTheSourceAreWarnedOfWithTheFigure) 
   const std::vector<std::string> warnings = warnings_of(posts(1201, 1201), request);
   ASSERT_EQ(warnings.size(), 1U);
   EXPECT_THAT(warnings[0], testing::HasSubstr("0.00853 vertices for one of the input's samples"));
-  EXPECT_THAT(warnings[0], testing::HasSubstr("leave out --shape or --tiles"));
+  EXPECT_THAT(warnings[0], testing::HasSubstr("leave out `shape` or `tiles`"));
   request.shape.reset();
   request.budget = ShapeBudget{ShapeBudget::Kind::kTriangles, 1000000};
   EXPECT_THAT(warnings_of(posts(201, 201), request), testing::SizeIs(1)) << "far more than there are samples";

@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "isohf/convert/convert.h"
+#include "isohf/convert.h"
 #include "isohf/error.h"
 #include "support/memory_source.h"
 #include "support/sanitizers.h"
@@ -36,10 +36,8 @@ class Described : public HeightSource {
 
 MemoryPlan plan_for(const Described& source, std::uint64_t limit, const std::string& filter = "bilinear") {
   ConvertOptions options;
-  options.memory_bytes = limit;
   options.filter = filter_from_string(filter);
-  options.threads = 2;
-  return plan_memory(source, make_plan(source.info(), options.plan), options);
+  return plan_memory(source, make_plan(source.info(), options.plan), options, {.threads = 2, .memory_bytes = limit});
 }
 
 TEST(MemoryPlan, StaysWithinEveryLimitThatIsNotRefused) {
@@ -104,19 +102,18 @@ TEST(MemoryPlan, TheArchiveDoesNotDependOnTheLimit) {
       options.plan.levels = 4;
       options.filter = filter_from_string(filter);
       options.lossless = std::string(filter) == "bspline3";
-      options.threads = 2;
+      Job job{.threads = 2};
       options.overwrite = true;
       options.scratch_folder = folder.path();
       options.shadow_seeds.emplace();
-      const std::atomic<bool> cancel = false;
-      (void)convert(source, folder / "any.isohf", options, {}, cancel);
+      (void)convert(source, folder / "any.isohf", options, job);
       const std::string expected = test::read_file(folder / "any.isohf");
       const Plan plan = make_plan(source.info(), options.plan);
-      const MemoryPlan free = plan_memory(source, plan, options);
+      const MemoryPlan free = plan_memory(source, plan, options, job);
       for (const std::uint64_t limit : {free.least_bytes, (free.least_bytes + free.bytes) / 2, 2 * free.bytes}) {
-        options.memory_bytes = limit;
-        in_scratch += plan_memory(source, plan, options).scratch_bytes > 0 ? 1 : 0;
-        (void)convert(source, folder / "bound.isohf", options, {}, cancel);
+        job.memory_bytes = limit;
+        in_scratch += plan_memory(source, plan, options, job).scratch_bytes > 0 ? 1 : 0;
+        (void)convert(source, folder / "bound.isohf", options, job);
         EXPECT_EQ(test::read_file(folder / "bound.isohf"), expected) << filter << " in " << limit << " bytes";
       }
       EXPECT_EQ(folder.names(), (std::vector<std::string>{"any.isohf", "bound.isohf"}));
@@ -134,20 +131,19 @@ TEST(MemoryPlan, AScratchFileHoldsAllRowsOfTilesInFlightOfANarrowRaster) {
   ConvertOptions options;
   options.plan.shape = {68, 75};
   options.plan.levels = 2;
-  options.threads = 4;
+  Job job{.threads = 4};
   options.overwrite = true;
   options.scratch_folder = folder.path();
   const Plan plan = make_plan(source.info(), options.plan);
   ASSERT_EQ(plan.grid.tile_columns(), 1);
-  const std::atomic<bool> cancel = false;
-  (void)convert(source, folder / "any.isohf", options, {}, cancel);
-  options.memory_bytes = plan_memory(source, plan, options).least_bytes;
-  const MemoryPlan least = plan_memory(source, plan, options);
+  (void)convert(source, folder / "any.isohf", options, job);
+  job.memory_bytes = plan_memory(source, plan, options, job).least_bytes;
+  const MemoryPlan least = plan_memory(source, plan, options, job);
   ASSERT_GT(least.scratch_rows, 0);
   ASSERT_LT(least.scratch_rows, 6000);
   // Each tile in flight needs its own rows, all at once.
   EXPECT_GE(least.scratch_rows, static_cast<std::int64_t>(least.tiles_in_flight) * 70);
-  (void)convert(source, folder / "bound.isohf", options, {}, cancel);
+  (void)convert(source, folder / "bound.isohf", options, job);
   EXPECT_EQ(test::read_file(folder / "bound.isohf"), test::read_file(folder / "any.isohf"));
 }
 
@@ -155,15 +151,12 @@ TEST(MemoryPlan, ALimitThatIsTooSmallIsAnsweredWithTheSmallest) {
   const test::TemporaryFolder folder;
   test::MemorySource<std::int16_t> source(SampleType::kInt16, 90, 75,
                                           [](auto c, auto) { return static_cast<double>(c); });
-  ConvertOptions options;
-  options.memory_bytes = 1000000;
-  const std::atomic<bool> cancel = false;
   try {
-    (void)convert(source, folder / "a.isohf", options, {}, cancel);
+    (void)convert(source, folder / "a.isohf", {}, {.memory_bytes = 1000000});
     FAIL();
   } catch (const Error& error) {
     EXPECT_EQ(error.code(), ErrorCode::kOutOfMemory);
-    EXPECT_THAT(error.what(), HasSubstr("--memory allows 1 MB, this conversion needs at least "));
+    EXPECT_THAT(error.what(), HasSubstr("`memory_bytes` allows 1 MB, this conversion needs at least "));
   }
   EXPECT_TRUE(folder.names().empty());
 }

@@ -9,13 +9,11 @@
 #include <filesystem>
 
 #include "isohf/archive.h"
-#include "isohf/convert/convert.h"
+#include "isohf/convert.h"
 #include "isohf/error.h"
 #include "isohf/projection/projection.h"
 #include "isohf/restore/archive_geometry.h"
 #include "isohf/verify.h"
-#include "isohf/verify/accuracy/against_source.h"
-#include "isohf/verify/vertex_check.h"
 #include "support/memory_source.h"
 #include "support/place_at.h"
 #include "support/temporary_folder.h"
@@ -68,9 +66,9 @@ ConvertOptions options_for(const std::string& projection) {
   return options;
 }
 
-ConvertSummary run(HeightSource& source, const std::string& output, const ConvertOptions& options) {
-  const std::atomic<bool> cancel = false;
-  return convert(source, output, options, {}, cancel);
+ConvertSummary run(HeightSource& source, const std::string& output, const ConvertOptions& options,
+                   const Job& job = {}) {
+  return convert(source, output, options, job);
 }
 
 const Ground kGrounds[] = {{"Earth", {}, {-3.0, 42.0, 5.0, 50.0}},
@@ -185,9 +183,8 @@ TEST(ProjectedArchive, BytesDoNotDependOnThreads) {
   for (const int threads : {1, 2, 5}) {
     ConvertOptions options = options_for("lambert-conformal");
     options.filter = filter_from_string("bspline3");
-    options.threads = threads;
     options.overwrite = true;
-    (void)run(source, folder / "a.isohf", options);
+    (void)run(source, folder / "a.isohf", options, {.threads = threads});
     const std::string found = ArchiveReader(folder / "a.isohf").metadata().content_sha256;
     EXPECT_EQ(hash.empty() ? found : hash, found);
     hash = found;
@@ -196,7 +193,6 @@ TEST(ProjectedArchive, BytesDoNotDependOnThreads) {
 
 TEST(ProjectedArchive, PassesEveryCheckAgainstItsSource) {
   const test::TemporaryFolder folder;
-  const std::atomic<bool> cancel = false;
   const Ground cap{"Earth", {}, {-180.0, 60.0, 180.0, 90.0}};
   const Ground across{"Earth", {}, {178.0, 60.0, 185.0, 66.0}};
   for (const auto& [kind, ground] : {std::pair{"local", kGrounds[0]}, std::pair{"lambert-conformal", kGrounds[1]},
@@ -212,10 +208,10 @@ TEST(ProjectedArchive, PassesEveryCheckAgainstItsSource) {
       (void)run(source, folder / "a.isohf", options);
       EXPECT_TRUE(verify_archive(folder / "a.isohf", {}).passed());
       const ArchiveReader archive(folder / "a.isohf");
-      const VertexReport vertices = check_vertices(archive, source, 0, {}, cancel);
+      const VertexReport vertices = check_vertices(archive, source);
       EXPECT_EQ(vertices.wrong, 0);
       EXPECT_GT(vertices.vertices, 10000);
-      const AccuracyReport accuracy = compare_with_source(archive, source, 2000, 0, {}, cancel);
+      const AccuracyReport accuracy = compare_with_source(archive, source, {}, 2000);
       EXPECT_EQ(accuracy.samples, 240 * 150);
       EXPECT_EQ(accuracy.samples_void, 40);
       EXPECT_EQ(accuracy.lost_inside, 0);
@@ -294,8 +290,7 @@ TEST(JoinedGlobe, TilesAcrossTheJoinShareTheirVertices) {
       }
       EXPECT_GE(shared, grid.tile_rows() * shape.rows() * 3);
       EXPECT_TRUE(verify_archive(folder / "a.isohf", {}).passed());
-      const std::atomic<bool> cancel = false;
-      EXPECT_EQ(check_vertices(archive, source, 0, {}, cancel).wrong, 0);
+      EXPECT_EQ(check_vertices(archive, source).wrong, 0);
     }
   }
 }
@@ -311,7 +306,7 @@ TEST(JoinedGlobe, AnInputThatDoesNotGoRoundIsRefused) {
     ADD_FAILURE() << "was taken";
   } catch (const Error& error) {
     EXPECT_STREQ(error.what(),
-                 "memory: --wrap-x needs columns all the way round, 360 degrees; this input's 200 columns 0.04 apart "
+                 "memory: `wrap_x` needs columns all the way round, 360 degrees; this input's 200 columns 0.04 apart "
                  "make 8");
   }
 }

@@ -7,7 +7,7 @@
 
 #include "isohf/archive.h"
 #include "isohf/archive/textures/texture_reader.h"
-#include "isohf/convert/convert.h"
+#include "isohf/convert.h"
 #include "isohf/error.h"
 #include "isohf/projection/projection.h"
 #include "isohf/verify.h"
@@ -81,9 +81,9 @@ ConvertOptions options_for(const std::string& projection, PhotoSource& photo) {
   return options;
 }
 
-ConvertSummary run(HeightSource& source, const std::string& output, const ConvertOptions& options) {
-  const std::atomic<bool> cancel = false;
-  return convert(source, output, options, {}, cancel);
+ConvertSummary run(HeightSource& source, const std::string& output, const ConvertOptions& options,
+                   const Job& job = {}) {
+  return convert(source, output, options, job);
 }
 
 /// Largest difference, in steps of colour, of the texels of level 0 whose places lie inside `ground`; counts them.
@@ -152,7 +152,7 @@ TEST(ProjectedTexture, ShowsEveryPlaceInItsColour) {
     const auto source = source_over(with.source);
     const auto photo = photo_over(with.photo, with.channels);
     const ConvertSummary summary = run(*source, folder / "a.isohf", options_for(with.projection, *photo));
-    EXPECT_EQ(summary.texture->placed_by, "georeference");
+    EXPECT_EQ(texture_info(summary.metadata)->placed_by, "georeference");
     const ArchiveReader archive(folder / "a.isohf");
     // A photo's pixel beside its border, where that goes on.
     GeoExtent inside = with.source.extent;
@@ -193,7 +193,7 @@ TEST(ProjectedTexture, CoversTheSourceWithoutAGeoreference) {
   const auto photo = photo_over(kFrancePhoto);
   photo->mutable_info().georeference.reset();
   const ConvertSummary summary = run(*source, folder / "a.isohf", options_for("local", *photo));
-  EXPECT_EQ(summary.texture->placed_by, "source");
+  EXPECT_EQ(texture_info(summary.metadata)->placed_by, "source");
   std::int64_t compared = 0;
   EXPECT_LT(worst_colour(ArchiveReader(folder / "a.isohf"), {-2.9, 42.1, 4.9, 49.9}, compared), 1.35);
   EXPECT_GT(compared, 10000);
@@ -215,7 +215,7 @@ TEST(ProjectedTexture, GivesTilesBesideThePhotoNone) {
   EXPECT_LT(worst_colour(archive, {-0.98, 44.02, 0.98, 45.98}, compared), 1.35);
   EXPECT_GT(compared, 500);
   // The rectangle around it: 2 degrees of latitude, 222 km and the parallels' bend.
-  const WorldBounds& shown = summary.texture->placement;
+  const WorldBounds shown = texture_info(summary.metadata)->placement;
   EXPECT_NEAR(shown.z1 - shown.z0, 223000.0, 2000.0);
   EXPECT_NEAR(shown.x1 - shown.x0, 160000.0, 2000.0);
 }
@@ -249,8 +249,7 @@ TEST(ProjectedTexture, BytesDoNotDependOnThreads) {
   for (const int threads : {1, 2, 5}) {
     ConvertOptions options = options_for("lambert-conformal", photo);
     options.texture->format = TextureFormat::kJpeg;
-    options.threads = threads;
-    (void)run(*source, folder / "a.isohf", options);
+    (void)run(*source, folder / "a.isohf", options, {.threads = threads});
     const std::string found = test::read_file(folder / "a.isohf");
     if (first.empty()) first = found;
     EXPECT_EQ(found, first);

@@ -8,7 +8,7 @@
 
 #include "isohf/archive.h"
 #include "isohf/archive/shadow_seeds/shadow_seed_reader.h"
-#include "isohf/convert/convert.h"
+#include "isohf/convert.h"
 #include "isohf/error.h"
 #include "isohf/surface/shade/shadow.h"
 #include "isohf/verify.h"
@@ -53,9 +53,9 @@ ConvertOptions options_with(const ShadowSeedRequest& request, CodeType type = Co
   return options;
 }
 
-ConvertSummary run(HeightSource& source, const std::string& output, const ConvertOptions& options) {
-  const std::atomic<bool> cancel = false;
-  return convert(source, output, options, {}, cancel);
+ConvertSummary run(HeightSource& source, const std::string& output, const ConvertOptions& options,
+                   const Job& job = {}) {
+  return convert(source, output, options, job);
 }
 
 /// S at the edge where light enters each tile of a row of tiles, carried through all of it.
@@ -171,8 +171,7 @@ TEST(SeedStage, BytesDoNotDependOnThreads) {
   std::string first;
   for (const int threads : {1, 2, 5}) {
     ConvertOptions options = options_with({2.0, {}});
-    options.threads = threads;
-    (void)run(source, folder / "a.isohf", options);
+    (void)run(source, folder / "a.isohf", options, {.threads = threads});
     const std::string bytes = test::read_file(folder / "a.isohf");
     if (first.empty()) first = bytes;
     ASSERT_TRUE(bytes == first) << threads;
@@ -188,12 +187,10 @@ TEST(SeedStage, AResumeFromAnyTileGivesTheSameBytes) {
   // Interrupted before the last row of tiles; by one thread, which is never so far behind the reading that it has
   // written next to nothing.
   source.fail_from_row = 59;
-  options.threads = 1;
-  EXPECT_THROW((void)run(source, folder / "a.isohf", options), Error);
+  EXPECT_THROW((void)run(source, folder / "a.isohf", options, {.threads = 1}), Error);
   source.fail_from_row = std::numeric_limits<std::int64_t>::max();
   const std::string part = test::read_file(folder / "a.isohf.part");
   const std::string journal = test::read_file(folder / "a.isohf.part.journal");
-  options.threads = 0;
   options.resume = true;
   ASSERT_GT(journal.size(), 4000U);
   for (std::size_t kept = 0; kept <= journal.size(); kept += 1013) {

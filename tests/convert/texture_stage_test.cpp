@@ -9,7 +9,7 @@
 
 #include "isohf/archive.h"
 #include "isohf/archive/textures/texture_reader.h"
-#include "isohf/convert/convert.h"
+#include "isohf/convert.h"
 #include "isohf/convert/frame/photo_placement.h"
 #include "isohf/error.h"
 #include "isohf/verify.h"
@@ -47,9 +47,9 @@ ConvertOptions options_for(MemoryPhoto& photo, TextureFormat format = TextureFor
   return options;
 }
 
-ConvertSummary run(HeightSource& source, const std::string& output, const ConvertOptions& options) {
-  const std::atomic<bool> cancel = false;
-  return convert(source, output, options, {}, cancel);
+ConvertSummary run(HeightSource& source, const std::string& output, const ConvertOptions& options,
+                   const Job& job = {}) {
+  return convert(source, output, options, job);
 }
 
 std::string message_of(const std::function<void()>& action) {
@@ -148,7 +148,7 @@ TEST(TextureStage, StoresWhatTheCutterCutsForEveryTileWithGround) {
   Hills source;
   MemoryPhoto photo(500, 400, 3, noise);
   const ConvertSummary summary = run(source, folder / "a.isohf", options_for(photo));
-  ASSERT_TRUE(summary.texture);
+  ASSERT_TRUE(texture_info(summary.metadata));
   EXPECT_GT(summary.tiles_void, 0);
   const ArchiveReader archive(folder / "a.isohf");
   EXPECT_EQ(archive.metadata().textures, std::vector<std::string>{"textures/ROW/COLUMN/SIZE.png"});
@@ -207,12 +207,12 @@ TEST(TextureStage, RefusesOptionsOutOfRange) {
   for (const int size : {0, -64, 32, 65, 100, 8192}) {
     ConvertOptions options = options_for(photo);
     options.texture->max_size = size;
-    EXPECT_THAT(message_of([&] { (void)run(source, folder / "a.isohf", options); }), HasSubstr("--texture-size"));
+    EXPECT_THAT(message_of([&] { (void)run(source, folder / "a.isohf", options); }), HasSubstr("`max_size`"));
   }
   for (const int quality : {0, 101}) {
     ConvertOptions options = options_for(photo);
     options.texture->jpeg_quality = quality;
-    EXPECT_THAT(message_of([&] { (void)run(source, folder / "a.isohf", options); }), HasSubstr("--texture-quality"));
+    EXPECT_THAT(message_of([&] { (void)run(source, folder / "a.isohf", options); }), HasSubstr("`jpeg_quality`"));
   }
   EXPECT_TRUE(folder.names().empty());
 }
@@ -225,12 +225,12 @@ TEST(TextureStage, PicksTheFormatByAlpha) {
     ConvertOptions options = options_for(photo);
     options.texture->format.reset();
     const ConvertSummary summary = run(source, folder / "a.isohf", options);
-    EXPECT_EQ(summary.texture->format, channels == 4 ? TextureFormat::kPng : TextureFormat::kJpeg);
-    EXPECT_EQ(summary.texture->channels, channels);
+    EXPECT_EQ(texture_info(summary.metadata)->format, channels == 4 ? TextureFormat::kPng : TextureFormat::kJpeg);
+    EXPECT_EQ(texture_info(summary.metadata)->channels, channels);
     EXPECT_TRUE(verify_archive(folder / "a.isohf", {}).passed());
     options.texture->format = TextureFormat::kJpeg;
     const ConvertSummary jpeg = run(source, folder / "a.isohf", options);
-    EXPECT_EQ(jpeg.texture->channels, std::min(channels, 3));
+    EXPECT_EQ(texture_info(jpeg.metadata)->channels, std::min(channels, 3));
     EXPECT_EQ(jpeg.warnings.size(), channels == 4 ? 1U : 0U);
     EXPECT_TRUE(verify_archive(folder / "a.isohf", {}).passed());
   }
@@ -243,10 +243,9 @@ TEST(TextureStage, GivesTheSameBytesForAnyNumberOfThreads) {
   std::string first;
   for (const int threads : {1, 2, 5}) {
     ConvertOptions options = options_for(photo, TextureFormat::kJpeg);
-    options.threads = threads;
     options.shadow_seeds.emplace();
     options.lossless = true;
-    (void)run(source, folder / "a.isohf", options);
+    (void)run(source, folder / "a.isohf", options, {.threads = threads});
     const std::string bytes = read_file(folder / "a.isohf");
     if (first.empty()) first = bytes;
     EXPECT_EQ(bytes, first);
@@ -277,20 +276,20 @@ TEST(TextureStage, ResumesToTheSameBytesWhereverItWasCut) {
   for (const bool with_seeds : {false, true}) {
     ConvertOptions options = options_for(photo);
     if (with_seeds) options.shadow_seeds.emplace();
-    options.threads = 2;
-    (void)run(source, folder / "whole.isohf", options);
+    const Job job{.threads = 2};
+    (void)run(source, folder / "whole.isohf", options, job);
     const std::string whole = read_file(folder / "whole.isohf");
     photo.pixels_read = 0;
-    (void)run(source, folder / "whole.isohf", options);
+    (void)run(source, folder / "whole.isohf", options, job);
     const std::int64_t all = photo.pixels_read;
     for (const double share : {0.0, 0.1, 0.35, 0.6, 0.9, 0.99}) {
       FailingPhoto failing(photo, static_cast<std::int64_t>(share * static_cast<double>(all)));
       options.texture->photo = &failing;
       options.resume = false;
-      EXPECT_THROW((void)run(source, folder / "cut.isohf", options), Error);
+      EXPECT_THROW((void)run(source, folder / "cut.isohf", options, job), Error);
       options.texture->photo = &photo;
       options.resume = true;
-      (void)run(source, folder / "cut.isohf", options);
+      (void)run(source, folder / "cut.isohf", options, job);
       EXPECT_EQ(read_file(folder / "cut.isohf"), whole) << share;
     }
   }
@@ -315,10 +314,10 @@ TEST(TextureStage, CountsAgainstTheMemoryAllowed) {
   Hills source;
   MemoryPhoto photo(300, 220, 3, noise);
   ConvertOptions options = options_for(photo);
-  options.memory_bytes = 110000000;  // the photo's reader alone takes more
-  EXPECT_THROW((void)run(source, folder / "a.isohf", options), Error);
+  const Job job{.memory_bytes = 110000000};  // the photo's reader alone takes more
+  EXPECT_THROW((void)run(source, folder / "a.isohf", options, job), Error);
   options.texture.reset();
-  EXPECT_NO_THROW((void)run(source, folder / "a.isohf", options));
+  EXPECT_NO_THROW((void)run(source, folder / "a.isohf", options, job));
 }
 
 /// Findings of kTexture after the file's bytes were changed.

@@ -154,9 +154,9 @@ TEST_F(AsciiGrid, WarnsOfAVoidValueThatTheHeaderDoesNotName) {
   const auto warnings = [&](const std::string& text, const OpenOptions& options = {}) {
     return open(text, options)->info().warnings;
   };
-  EXPECT_THAT(warnings("ncols 2\nnrows 1\n1 -9999\n"), ElementsAre(HasSubstr("--nodata -9999")));
-  EXPECT_THAT(warnings("ncols 2\nnrows 1\n-9.999e+03 1\n"), ElementsAre(HasSubstr("--nodata -9999")));
-  EXPECT_THAT(warnings("ncols 2\nnrows 1\n-32768.0 1\n"), ElementsAre(HasSubstr("--nodata -32768")));
+  EXPECT_THAT(warnings("ncols 2\nnrows 1\n1 -9999\n"), ElementsAre(HasSubstr("`void_values` -9999")));
+  EXPECT_THAT(warnings("ncols 2\nnrows 1\n-9.999e+03 1\n"), ElementsAre(HasSubstr("`void_values` -9999")));
+  EXPECT_THAT(warnings("ncols 2\nnrows 1\n-32768.0 1\n"), ElementsAre(HasSubstr("`void_values` -32768")));
   EXPECT_THAT(warnings("ncols 2\nnrows 1\n-999 1\n"), IsEmpty());
   OpenOptions options;
   options.void_values = {-9999.0};

@@ -109,7 +109,7 @@ TEST(CroppedSource, ABoxAcrossTheSeamOfAGlobeIsJoined) {
 
 TEST(CroppedSource, BoxesOutsideOrWrongAreRefused) {
   const SourceInfo posts = placed(Registration::kPoint, 100.0, 200.0, 10.0, 11, false);
-  EXPECT_THAT(window_in("300,130,340,180", posts), HasSubstr("a.tif: fewer than 2x2 samples lie in --bbox"));
+  EXPECT_THAT(window_in("300,130,340,180", posts), HasSubstr("a.tif: fewer than 2x2 samples lie in `bbox`"));
   EXPECT_THAT(window_in("300,130,340,180", posts), HasSubstr("its own ground is 100,100,200,200"));
   EXPECT_THAT(window_in("140,130,110,180", posts), HasSubstr("must be less than East"));
   for (const char* text : {"", "1,2,3", "1,2,3,4,5", "1,2,3,x", "1,4,3,2", "1,2,1,4", "1,2,nan,4", "1 2 3 4"}) {

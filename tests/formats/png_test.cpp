@@ -160,8 +160,8 @@ TEST(PngSource, WantsToKnowWhatTheColoursOfAPictureAre) {
     const Error error = error_of([&] { (void)open_png(path, {}); });
     EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
     EXPECT_THAT(error.what(), HasSubstr("is a colour picture with channels R, G, B"));
-    EXPECT_THAT(error.what(), HasSubstr("--channel R"));
-    EXPECT_THAT(error.what(), HasSubstr("--encoding terrarium"));
+    EXPECT_THAT(error.what(), HasSubstr("`channel` R"));
+    EXPECT_THAT(error.what(), HasSubstr("`encoding` terrarium"));
     OpenOptions options;
     options.channel = "R";
     EXPECT_TRUE(open_png(path, options)->info().warnings.empty());
@@ -219,7 +219,7 @@ TEST(PngSource, UnpacksElevationsAsTheReferenceDoes) {
     const auto untold = open_raster(path, {});
     EXPECT_EQ(untold->info().channel, encoding);
     ASSERT_EQ(untold->info().warnings.size(), 1U);
-    EXPECT_THAT(untold->info().warnings[0], HasSubstr(fmt::format("decoded as with --encoding {}", encoding)));
+    EXPECT_THAT(untold->info().warnings[0], HasSubstr(fmt::format("decoded as with `encoding` {}", encoding)));
     EXPECT_EQ(read_whole(*untold), all);
     OpenOptions by_name;
     by_name.channel = "R";

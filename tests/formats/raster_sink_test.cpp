@@ -225,7 +225,7 @@ TEST(RasterSink, WritesSidecarsWithTheRasterOrNotAtAll) {
   write(folder / "a.asc", spec, noise(spec), 4);  // the .prj is there already, and the same
   write_file(folder / "b.hdr", "ncols 3\nnrows 2\n");
   const Error error = error_of([&] { (void)create_raster(folder / "b.flt", spec); });
-  EXPECT_EQ(error.what(), folder / "b.flt: " + (folder / "b.hdr: exists; --overwrite replaces it"));
+  EXPECT_EQ(error.what(), folder / "b.flt: " + (folder / "b.hdr: exists; `overwrite` replaces it"));
   EXPECT_EQ(read_file(folder / "b.hdr"), "ncols 3\nnrows 2\n");
   RasterSpec picture = placed(6, 4, SampleType::kUint16, 10.0);
   write(folder / "c.png", picture, noise(picture), 4);
@@ -394,7 +394,7 @@ TEST(RasterSink, ReplacesAFileOnlyWhenTold) {
   write(path, spec, noise(spec), 4);
   const Error error = error_of([&] { (void)create_raster(path, spec); });
   EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
-  EXPECT_EQ(error.what(), path + ": exists; --overwrite replaces it");
+  EXPECT_EQ(error.what(), path + ": exists; `overwrite` replaces it");
   spec.overwrite = true;
   { const auto abandoned = create_raster(path, spec); }
   EXPECT_EQ(open_raster(path, {})->info().width, 4);

@@ -43,7 +43,7 @@ TEST(RawSource, DeliversRealFilesAsTheReferenceDoes) {
     // The square that the refusal suggests is the file's.
     const Error error = error_of([&] { (void)open_raster(file.string(), {}); });
     EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
-    EXPECT_THAT(error.what(), HasSubstr("--raw " + size + "x" + size + ":u16le"));
+    EXPECT_THAT(error.what(), HasSubstr("`raw` " + size + "x" + size + ":u16le"));
     const auto source = open_raster(file.string(), raw(size + "x" + size + ":u16le"));
     expect_as_reference(*source, expected);
     EXPECT_EQ(source->info().georeference.registration, Registration::kUnknown);
@@ -122,12 +122,12 @@ TEST(RawSource, AsksForALayoutByName) {
     EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
     return std::string(error.what());
   };
-  EXPECT_THAT(what("a.r8", 9), HasSubstr("--raw 3x3:u8)"));
-  EXPECT_THAT(what("a.R16", 18), HasSubstr("--raw 3x3:u16le)"));
-  EXPECT_THAT(what("a.f32", 36), HasSubstr("--raw 3x3:f32le)"));
-  EXPECT_THAT(what("a.raw", 18), HasSubstr("--raw 3x3:u16le)"));
-  EXPECT_THAT(what("a.raw", 9), HasSubstr("--raw 3x3:u8)"));
-  EXPECT_THAT(what("a.r16", 20), HasSubstr("as in --raw 200x300:u16le"));
+  EXPECT_THAT(what("a.r8", 9), HasSubstr("`raw` 3x3:u8)"));
+  EXPECT_THAT(what("a.R16", 18), HasSubstr("`raw` 3x3:u16le)"));
+  EXPECT_THAT(what("a.f32", 36), HasSubstr("`raw` 3x3:f32le)"));
+  EXPECT_THAT(what("a.raw", 18), HasSubstr("`raw` 3x3:u16le)"));
+  EXPECT_THAT(what("a.raw", 9), HasSubstr("`raw` 3x3:u8)"));
+  EXPECT_THAT(what("a.r16", 20), HasSubstr("as in `raw` 200x300:u16le"));
   EXPECT_THAT(what("a.r16", 20), Not(HasSubstr("\n")));
 }
 

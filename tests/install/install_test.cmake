@@ -1,5 +1,6 @@
-# cmake -DBINARY_DIR=... -DSOURCE_DIR=... -DWORK_DIR=... -DLIBDIR=... -DCXX=... -P install_test.cmake
-# Installs into a folder of its own, then builds and runs another project on it, by CMake and by pkg-config.
+# cmake -DBINARY_DIR=... -DSOURCE_DIR=... -DWORK_DIR=... -DLIBDIR=... -DCXX=... -DEXAMPLES_DIR=... -DRASTER=...
+#       -P install_test.cmake
+# Installs into a folder of its own, then builds and runs the examples on it, by CMake and by pkg-config.
 function(run)
   execute_process(COMMAND ${ARGV} RESULT_VARIABLE result OUTPUT_VARIABLE output ERROR_VARIABLE output)
   if(NOT result EQUAL 0)
@@ -12,16 +13,26 @@ file(REMOVE_RECURSE ${WORK_DIR})
 set(prefix ${WORK_DIR}/prefix)
 run(${CMAKE_COMMAND} --install ${BINARY_DIR} --prefix ${prefix})
 
-run(${CMAKE_COMMAND} -S ${SOURCE_DIR}/consumer -B ${WORK_DIR}/build -DCMAKE_PREFIX_PATH=${prefix}
-    -DCMAKE_CXX_COMPILER=${CXX})
+# Private headers stay at home.
+file(GLOB folders LIST_DIRECTORIES true ${prefix}/include/* ${prefix}/include/isohf/*)
+foreach(path IN LISTS folders)
+  if(IS_DIRECTORY ${path} AND NOT path STREQUAL ${prefix}/include/isohf)
+    message(FATAL_ERROR "${path} is installed")
+  endif()
+endforeach()
+
+# As someone else's project, who has but the package.
+file(COPY ${EXAMPLES_DIR} DESTINATION ${WORK_DIR})
+run(${CMAKE_COMMAND} -S ${WORK_DIR}/examples -B ${WORK_DIR}/build -DCMAKE_PREFIX_PATH=${prefix}
+    -DCMAKE_CXX_COMPILER=${CXX} -DISOHF_EXAMPLE_RASTER=${RASTER})
 run(${CMAKE_COMMAND} --build ${WORK_DIR}/build)
-run(${WORK_DIR}/build/consumer)
+run(${CMAKE_CTEST_COMMAND} --test-dir ${WORK_DIR}/build --output-on-failure)
 
 set(ENV{PKG_CONFIG_PATH} ${prefix}/${LIBDIR}/pkgconfig)
 execute_process(COMMAND pkg-config --define-variable=prefix=${prefix} --cflags --libs isohf OUTPUT_VARIABLE flags
                 COMMAND_ERROR_IS_FATAL ANY OUTPUT_STRIP_TRAILING_WHITESPACE)
 separate_arguments(flags UNIX_COMMAND "${flags}")
-run(${CXX} ${SOURCE_DIR}/consumer/main.cpp -o ${WORK_DIR}/by_pkg_config ${flags})
-run(${WORK_DIR}/by_pkg_config)
+run(${CXX} ${EXAMPLES_DIR}/convert.cpp -o ${WORK_DIR}/by_pkg_config ${flags})
+run(${WORK_DIR}/by_pkg_config ${RASTER} ${WORK_DIR}/by_pkg_config.isohf)
 
 file(REMOVE_RECURSE ${WORK_DIR})

@@ -68,27 +68,27 @@ TEST(ChooseProjection, AutoKeepsGlobesEquirectangular) {
 
 TEST(ChooseProjection, AutoKeepsRowsWhereTheyAreNeeded) {
   ProjectionProblem problem = problem_of({-5.0, 42.0, 9.0, 51.0});
-  problem.keeps_rows = "--lossless";
+  problem.wraps_x = true;
   const ProjectionChoice choice = choose_projection({}, problem);
   EXPECT_EQ(choice.spec.kind, ProjectionKind::kEquirectangular);
-  EXPECT_THAT(choice.why, HasSubstr("--lossless"));
+  EXPECT_THAT(choice.why, HasSubstr("--wrap-x"));
   EXPECT_THAT(refusal_of("lambert-conformal", problem),
-              HasSubstr("dem.tif: --projection lambert-conformal: --lossless needs the input's rows to stay rows; "
-                        "--projection equirectangular works"));
+              HasSubstr("dem.tif: `projection` lambert-conformal: `wrap_x` needs the input's rows to stay rows; "
+                        "`projection` equirectangular works"));
 }
 
 TEST(ChooseProjection, GroundsThatDoNotSuitAreRefusedWithWhatWorks) {
   const GeoExtent cap{-180.0, 60.0, 180.0, 90.0};
   const GeoExtent globe{-180.0, -90.0, 180.0, 90.0};
   EXPECT_THAT(refusal_of("lambert-conformal", problem_of(cap, true)),
-              HasSubstr("reaches latitude 90, a cone shows up to 89; --projection polar-stereographic works"));
+              HasSubstr("reaches latitude 90, a cone shows up to 89; `projection` polar-stereographic works"));
   EXPECT_THAT(refusal_of("transverse-mercator", problem_of(globe, true)),
               HasSubstr("180 degrees from the central meridian, at most 80"));
   EXPECT_THAT(refusal_of("utm", problem_of({0.0, 80.0, 6.0, 85.0})), HasSubstr("from latitude -80 to 84"));
   EXPECT_THAT(refusal_of("polar-stereographic", problem_of({0.0, -10.0, 90.0, 80.0})), HasSubstr("beyond the equator"));
   EXPECT_THAT(refusal_of("local", problem_of(globe, true)), HasSubstr("a quarter of the way round"));
   EXPECT_THAT(refusal_of("equirectangular", problem_of({0.0, 89.9, 10.0, 90.0})),
-              HasSubstr("--projection transverse-mercator works"));
+              HasSubstr("`projection` transverse-mercator works"));
   EXPECT_THAT(refusal_of("transverse-mercator:-70", problem_of({0.0, 0.0, 5.0, 5.0})), HasSubstr("would err by"));
   ProjectionProblem mars = problem_of({10.0, 10.0, 11.0, 11.0});
   mars.body = "Mars";

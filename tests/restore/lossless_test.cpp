@@ -8,7 +8,7 @@
 #include <limits>
 
 #include "isohf/archive/container/content_hash.h"
-#include "isohf/convert/convert.h"
+#include "isohf/convert.h"
 #include "isohf/verify.h"
 #include "support/memory_source.h"
 #include "support/temporary_folder.h"
@@ -16,14 +16,13 @@
 namespace isohf {
 namespace {
 
-ConvertSummary convert_to(HeightSource& source, const std::string& path, ConvertOptions options) {
+ConvertSummary convert_to(HeightSource& source, const std::string& path, ConvertOptions options, const Job& job = {}) {
   options.plan.shape = {20, 19};
   options.plan.levels = 4;
   options.lossless = true;
   options.overwrite = true;
   options.producer = "isohf test";
-  const std::atomic<bool> cancel = false;
-  return convert(source, path, options, {}, cancel);
+  return convert(source, path, options, job);
 }
 
 void expect_exact(HeightSource& source, const std::string& path, const std::string& what) {
@@ -91,9 +90,7 @@ TEST(Lossless, ReturnsFloatsWithTheirNansAndZeros) {
 TEST(SourceRowReader, RefusesAnArchiveWithoutResiduals) {
   const test::TemporaryFolder folder;
   test::MemorySource<float> source(SampleType::kFloat32, 70, 60, hill);
-  ConvertOptions options;
-  const std::atomic<bool> cancel = false;
-  (void)convert(source, folder / "a.isohf", options, {}, cancel);
+  (void)convert(source, folder / "a.isohf");
   const ArchiveReader archive(folder / "a.isohf");
   EXPECT_THROW(SourceRowReader{archive}, Error);
 }
@@ -102,11 +99,8 @@ TEST(Lossless, BytesDoNotDependOnThreads) {
   const test::TemporaryFolder folder;
   test::MemorySource<std::int16_t> source(SampleType::kInt16, 90, 75,
                                           [](std::int64_t c, std::int64_t r) { return std::round(hill(c, r)); });
-  ConvertOptions options;
-  options.threads = 1;
-  convert_to(source, folder / "one.isohf", options);
-  options.threads = 4;
-  convert_to(source, folder / "four.isohf", options);
+  convert_to(source, folder / "one.isohf", {}, {.threads = 1});
+  convert_to(source, folder / "four.isohf", {}, {.threads = 4});
   const ArchiveReader one(folder / "one.isohf");
   const ArchiveReader four(folder / "four.isohf");
   EXPECT_EQ(one.metadata_json(), four.metadata_json());

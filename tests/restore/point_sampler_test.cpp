@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "isohf/base/view.h"
-#include "isohf/convert/convert.h"
+#include "isohf/convert.h"
 #include "isohf/error.h"
 #include "isohf/lattice/barycentric.h"
 #include "isohf/surface/shade/normals.h"
@@ -32,8 +32,7 @@ class PointSamplerTest : public testing::TestWithParam<CodeType> {
     options.code_type = GetParam();
     options.plan.shape = {20, 19};
     options.plan.levels = 1;
-    const std::atomic<bool> cancel = false;
-    (void)convert(source, folder / "a.isohf", options, {}, cancel);
+    (void)convert(source, folder / "a.isohf", options);
   }
 
   static std::vector<WorldPoint> places() {

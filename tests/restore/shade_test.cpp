@@ -6,7 +6,7 @@
 #include <cmath>
 #include <vector>
 
-#include "isohf/convert/convert.h"
+#include "isohf/convert.h"
 #include "isohf/error.h"
 #include "support/memory_source.h"
 #include "support/temporary_folder.h"
@@ -25,8 +25,7 @@ class ShadeTest : public testing::Test {
     ConvertOptions options;
     options.plan.shape = {20, 19};
     options.plan.levels = 1;
-    const std::atomic<bool> cancel = false;
-    (void)convert(source, folder / "a.isohf", options, {}, cancel);
+    (void)convert(source, folder / "a.isohf", options);
   }
 
   static int brightness(const Picture& picture, int column, int row) {

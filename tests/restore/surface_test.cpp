@@ -10,7 +10,7 @@
 
 #include "isohf/archive.h"
 #include "isohf/base/view.h"
-#include "isohf/convert/convert.h"
+#include "isohf/convert.h"
 #include "isohf/error.h"
 #include "isohf/lattice/barycentric.h"
 #include "support/memory_source.h"
@@ -40,8 +40,7 @@ class SurfaceInDegrees : public testing::Test {
     options.plan.levels = 1;
     options.plan.ground.projection = {false, kind, {}, 0};
     options.overwrite = true;
-    const std::atomic<bool> cancel = false;
-    (void)convert(source, folder / "a.isohf", options, {}, cancel);
+    (void)convert(source, folder / "a.isohf", options);
   }
 
   /// Reads the grid in calls of so many rows on so many threads.

@@ -5,7 +5,7 @@
 #include <functional>
 #include <vector>
 
-#include "isohf/surface/photo/photo_source.h"
+#include "isohf/picture.h"
 
 namespace isohf::test {
 

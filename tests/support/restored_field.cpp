@@ -4,7 +4,7 @@
 #include <stdexcept>
 
 #include "isohf/archive.h"
-#include "isohf/convert/convert.h"
+#include "isohf/convert.h"
 #include "support/memory_source.h"
 #include "support/temporary_folder.h"
 
@@ -24,8 +24,7 @@ double psnr_of_restoring(Filter filter, const TrigonometricField& field, int mar
   options.plan.spacing = 1.0;
   options.plan.outside = Outside::kCover;
   const TemporaryFolder folder;
-  const std::atomic<bool> cancel = false;
-  (void)convert(source, folder / "field.isohf", options, {}, cancel);
+  (void)convert(source, folder / "field.isohf", options);
 
   const ArchiveReader archive(folder / "field.isohf");
   RowReader surface(archive, source_grid(archive.metadata().source), method);

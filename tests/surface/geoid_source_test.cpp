@@ -132,7 +132,7 @@ TEST(GeoidSource, WhatItCannotUseIsRefusedInOneLine) {
     EXPECT_THAT(refusal_of([&] { open("cut.pgm"); }), HasSubstr("cut.pgm: is no geoid")) << length;
   }
   EXPECT_THAT(refusal_of([&] { open("a.pgm", [](SourceInfo& i) { i.georeference.unit = HorizontalUnit::kMetre; }); }),
-              HasSubstr("--geoid needs an input in degrees"));
+              HasSubstr("`geoid` needs an input in degrees"));
   EXPECT_THAT(refusal_of([&] { open("a.pgm", [](SourceInfo& i) { i.georeference.system.body = "Mars"; }); }),
               HasSubstr("holds for the Earth, the input shows Mars"));
 }

@@ -4,8 +4,8 @@
 
 #include <cmath>
 
-#include "isohf/convert/convert.h"
-#include "isohf/verify/accuracy/against_source.h"
+#include "isohf/convert.h"
+#include "isohf/verify.h"
 #include "support/memory_source.h"
 #include "support/temporary_folder.h"
 #include "support/trigonometric_field.h"
@@ -30,12 +30,11 @@ class LatticeReports : public testing::Test {
     LatticeReport lattice;
   };
   Both compare(HeightSource& source, const ConvertOptions& how, int threads = 0) const {
-    const std::atomic<bool> cancel = false;
-    (void)convert(source, path_, how, {}, cancel);
+    (void)convert(source, path_, how);
     const ArchiveReader archive(path_);
     Both both;
-    both.surface = compare_with_source(archive, source, 0, threads, {}, cancel);
-    both.lattice = compare_lattices(archive, source, both.surface.rms, threads, {}, cancel);
+    both.surface = compare_with_source(archive, source, {.threads = threads});
+    both.lattice = compare_lattices(archive, source, both.surface.rms, {.threads = threads});
     return both;
   }
 

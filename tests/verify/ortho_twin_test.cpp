@@ -73,8 +73,7 @@ Metadata describe(const Job& job, std::int64_t width, std::int64_t height) {
 }
 
 OrthoErrors measure(const Metadata& metadata, HeightSource& source, double spacing, bool in_full = true) {
-  const std::atomic<bool> cancel = false;
-  return measure_ortho_twin(metadata, source, spacing, in_full, {}, cancel);
+  return measure_ortho_twin(metadata, source, spacing, in_full, "ortho 1", {});
 }
 
 /// The same figures, straight from their definition: the whole raster at once, vertex by vertex, in double.

@@ -1,5 +1,6 @@
 #include "options/options_common.h"
 
+#include "interrupt.h"
 #include "options/option_values.h"
 #include "output/standard_output.h"
 
@@ -38,6 +39,15 @@ void add_work_options(CommandLine& line, WorkOptions& options) {
 void add_memory_option(CommandLine& line, const std::string& description, std::uint64_t& bytes) {
   line.option("--memory", "SIZE", description + "; as in 400M or 1.5GiB",
               [&](const std::string& text) { bytes = parse_bytes(text); });
+}
+
+Job job_from(const WorkOptions& options, ProgressDisplay& display) {
+  Job job;
+  job.threads = options.threads;
+  job.memory_bytes = options.memory_bytes;
+  job.progress = [&display](const Progress& at) { display.update(at.stage, at.unit, at.done, at.total); };
+  job.cancel = &watch_interrupts();
+  return job;
 }
 
 }  // namespace isohf::cli

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 
+#include "isohf/job.h"
 #include "options/command_line.h"
 #include "output/progress.h"
 
@@ -20,7 +21,8 @@ void add_common_options(CommandLine& line, CommonOptions& options);
 
 /// Options of commands that take a while.
 struct WorkOptions {
-  int threads = 0;  ///< 0: all cores
+  int threads = 0;                 ///< 0: all cores
+  std::uint64_t memory_bytes = 0;  ///< 0: no bound
   ProgressMode progress = ProgressMode::kAuto;
 };
 
@@ -29,5 +31,8 @@ void add_work_options(CommandLine& line, WorkOptions& options);
 
 /// --memory SIZE: bytes, 0 where not given.
 void add_memory_option(CommandLine& line, const std::string& description, std::uint64_t& bytes);
+
+/// A job with these threads and this memory, which `display` shows and an interrupt cancels.
+[[nodiscard]] Job job_from(const WorkOptions& options, ProgressDisplay& display);
 
 }  // namespace isohf::cli

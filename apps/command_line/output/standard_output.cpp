@@ -6,6 +6,7 @@
 #include <cerrno>
 #include <cstring>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "output/terminal.h"
 
@@ -16,9 +17,65 @@ using nlohmann::ordered_json;
 
 constexpr std::size_t kBufferBytes = 1 << 16;
 
+/// Settings as the library's messages name them, and the options that set them.
+constexpr std::pair<std::string_view, std::string_view> kSpellings[] = {
+    {"bbox", "--bbox"},
+    {"budget", "--triangles"},
+    {"channel", "--channel"},
+    {"clamp_range", "--clamp-range"},
+    {"code_type", "--type"},
+    {"density", "--density"},
+    {"encoding", "--encoding"},
+    {"fill", "--fill"},
+    {"fit", "--fit"},
+    {"geoid", "--geoid"},
+    {"jpeg_quality", "--texture-quality"},
+    {"levels", "--levels"},
+    {"lossless", "--lossless"},
+    {"max_error", "--max-error"},
+    {"max_rounding", "--max-rounding"},
+    {"max_size", "--texture-size"},
+    {"memory_bytes", "--memory"},
+    {"overwrite", "--overwrite"},
+    {"part", "--part"},
+    {"projection", "--projection"},
+    {"raw", "--raw"},
+    {"registration", "--registration"},
+    {"resume", "--resume"},
+    {"sample_spacing", "--sample-spacing"},
+    {"shadow_seeds", "--shadow-seeds"},
+    {"shape", "--shape"},
+    {"spacing", "--spacing"},
+    {"step", "--step"},
+    {"sun_min_deg", "--sun-min"},
+    {"texture", "--texture"},
+    {"threads", "--threads"},
+    {"tiles", "--tiles"},
+    {"void_values", "--nodata"},
+    {"wrap_x", "--wrap-x"},
+    {"z_offset", "--z-offset"},
+    {"z_range", "--z-range"},
+    {"z_scale", "--z-scale"},
+};
+
+/// The text with settings between backticks as options.
+std::string spelled(std::string text) {
+  for (std::size_t open = 0; (open = text.find('`', open)) != std::string::npos; ++open) {
+    const std::size_t close = text.find('`', open + 1);
+    if (close == std::string::npos) break;
+    const std::string_view name = std::string_view(text).substr(open + 1, close - open - 1);
+    for (const auto& [setting, option] : kSpellings) {
+      if (name != setting) continue;
+      text.replace(open, close - open + 1, option);
+      break;
+    }
+  }
+  return text;
+}
+
 /// Writes a line in one call, so that lines of two processes do not mix; what cannot be told is not told.
-void write_line_to_stderr(std::string line) {
-  line += '\n';
+void write_line_to_stderr(const std::string& text) {
+  const std::string line = spelled(text) + '\n';
   const char* data = line.data();
   std::size_t left = line.size();
   while (left > 0) {
@@ -60,7 +117,12 @@ int report(const std::string& text, const ordered_json& object, int exit_code) {
 }  // namespace
 
 void StandardOutput::write(std::string_view text) {
-  pending_ += text;
+  // Documents quote what the library said; rows of numbers pass as they are.
+  if (text.find('`') == std::string_view::npos) {
+    pending_ += text;
+  } else {
+    pending_ += spelled(std::string(text));
+  }
   if (pending_.size() >= kBufferBytes) flush();
 }
 

@@ -15,10 +15,11 @@
 #include "formats/files/text.h"
 #include "interrupt.h"
 #include "isohf/archive.h"
-#include "isohf/archive/codec/tile_codes.h"
+#include "isohf/archive/metadata/accuracy_info.h"
 #include "isohf/base/file.h"
 #include "isohf/base/output_file.h"
-#include "isohf/convert/convert.h"
+#include "isohf/convert.h"
+#include "isohf/convert/frame/plan.h"
 #include "isohf/convert/job_description.h"
 #include "isohf/convert/memory_plan.h"
 #include "isohf/error.h"
@@ -40,7 +41,6 @@
 #include "output/plan_report.h"
 #include "output/standard_output.h"
 #include "output/void_counts_output.h"
-#include "work_arena.h"
 
 namespace isohf::cli {
 namespace {
@@ -78,7 +78,6 @@ struct ConvertCommandOptions {
   EachOptions each;
   /// Measure the archive against the input; the file for the report, "-" for none beside the summary.
   std::optional<std::string> report;
-  ErrorFreedom freedom;  ///< of --max-error
 };
 
 bool is_archive_name(const std::string& name) {
@@ -118,6 +117,12 @@ void check_each_options(const CommandLine& line, const ConvertCommandOptions& op
   }
 }
 
+/// What is packed shares the memory with what is read from it, and with the tiles.
+void share_memory(ConvertCommandOptions& options) {
+  if (options.work.memory_bytes == 0) return;
+  options.open.unpacked_bytes = std::min(options.open.unpacked_bytes, options.work.memory_bytes / 3);
+}
+
 std::optional<ConvertCommandOptions> parse(const Arguments& arguments) {
   ConvertCommandOptions options;
   std::optional<double> sun_min_deg;
@@ -149,7 +154,7 @@ std::optional<ConvertCommandOptions> parse(const Arguments& arguments) {
   line.option(
       "--filter", "NAME",
       "nearest, bilinear, limited-cubic, catmull-rom, bspline2, bspline3, bspline5, lanczos3 or lanczos6 (default " +
-          to_string(options.convert.filter) + ")",
+          to_string(kDefaultFilter) + ")",
       [&](const std::string& text) { options.convert.filter = filter_from_string(text); });
   line.words({"nearest", "bilinear", "limited-cubic", "catmull-rom", "bspline2", "bspline3", "bspline5", "lanczos3",
               "lanczos6"});
@@ -187,8 +192,7 @@ std::optional<ConvertCommandOptions> parse(const Arguments& arguments) {
       "it to FILE.json as well",
       [&](const std::string& text) { options.report = text; });
   add_work_options(line, options.work);
-  add_memory_option(line, "Stay within SIZE of memory, to a tenth (default: as is fastest)",
-                    options.convert.memory_bytes);
+  add_memory_option(line, "Stay within SIZE of memory, to a tenth (default: as is fastest)", options.work.memory_bytes);
   line.option("--tmpdir", "FOLDER", "Put the scratch file that --memory may need there (default: OUTPUT's folder)",
               options.convert.scratch_folder);
   add_common_options(line, options.common);
@@ -209,8 +213,6 @@ std::optional<ConvertCommandOptions> parse(const Arguments& arguments) {
     throw Error(ErrorCode::kInvalidArgument,
                 "convert: --dry-run cannot tell what --max-error will choose; leave one of the two out");
   }
-  options.freedom.density = !line.given("--density") && !line.given("--spacing") && !line.given("--tiles");
-  options.freedom.filter = !line.given("--filter");
   if (sun_min_deg) {
     if (!options.convert.shadow_seeds || !options.convert.shadow_seeds->sun_deg.empty()) {
       throw Error(ErrorCode::kInvalidArgument, "convert: --sun-min needs --shadow-seeds without angles");
@@ -226,13 +228,8 @@ std::optional<ConvertCommandOptions> parse(const Arguments& arguments) {
   if (!line.given("--tmpdir")) {
     options.convert.scratch_folder = options.each.each ? options.each.folder : folder_of(options.output);
   }
-  options.convert.threads = options.work.threads;
-  if (options.convert.memory_bytes != 0) {
-    // What is packed shares the memory with what is read from it, and with the tiles.
-    options.open.unpacked_bytes = std::min(options.open.unpacked_bytes, options.convert.memory_bytes / 3);
-  }
+  share_memory(options);
   options.convert.strict = options.common.strict;
-  options.convert.producer = "isohf " ISOHF_VERSION;
   return options;
 }
 
@@ -336,7 +333,7 @@ std::string text_from(const ConvertCommandOptions& options, const ConvertSummary
     say("shadows", fmt::format("seeds of {}, {:.1f} % of the tiles'", describe_bytes(summary.seed_bytes),
                                100.0 * static_cast<double>(summary.seed_bytes) / tile_bytes));
   }
-  if (summary.texture) say("textures", describe_textures(*summary.texture, summary.pixels_per_texel));
+  if (const auto info = texture_info(metadata)) say("textures", describe_textures(*info, summary.pixels_per_texel));
   if (voids && voids->found > 0) say("voids", text_from_voids(*voids));
   if (metadata.statistics.clamped > 0) {
     say("clamped", fmt::format("{} vertices moved into the range", describe_count(metadata.statistics.clamped)));
@@ -372,7 +369,7 @@ Prepared prepare(ConvertCommandOptions& options, std::vector<std::string> files)
 
 /// Whether OUTPUT is what --resume would come to. Throws Error{kInvalidArgument} where it is another archive, unless it
 /// may be replaced.
-bool is_complete(const ConvertCommandOptions& options, const Prepared& prepared, const Plan& plan) {
+bool is_complete(const ConvertCommandOptions& options, const Prepared& prepared) {
   std::error_code none;
   if (!options.convert.resume || !std::filesystem::exists(options.output, none)) return false;
   std::string difference;
@@ -382,8 +379,9 @@ bool is_complete(const ConvertCommandOptions& options, const Prepared& prepared,
   }
   try {
     if (difference.empty()) {
-      difference = difference_from_job(ArchiveReader(options.output).metadata_json(), prepared.source->info(), plan,
-                                       options.convert);
+      const SourceInfo& info = prepared.source->info();
+      difference = difference_from_job(ArchiveReader(options.output).metadata_json(), info,
+                                       make_plan(info, options.convert.plan), options.convert);
       if (!difference.empty()) difference = "was made otherwise: " + difference;
     }
   } catch (const Error& error) {
@@ -424,16 +422,13 @@ std::vector<EachFile> checked_files(const ConvertCommandOptions& options) {
 }
 
 /// One of --each; nullopt where the share is too small for it.
-std::optional<EachResult> convert_one(ConvertCommandOptions options, const EachFile& file, const EachShare& share,
-                                      const std::atomic<bool>& cancel) {
+std::optional<EachResult> convert_one(ConvertCommandOptions options, const EachFile& file, const EachShare& share) {
   /// What one thread does in a fraction of a second.
   constexpr std::int64_t kSmallSamples = std::int64_t{1} << 24U;
   options.output = file.output;
-  options.work.threads = options.convert.threads = share.threads;
-  options.convert.memory_bytes = share.memory_bytes;
-  if (share.memory_bytes != 0) {
-    options.open.unpacked_bytes = std::min(options.open.unpacked_bytes, share.memory_bytes / 3);
-  }
+  options.work.threads = share.threads;
+  options.work.memory_bytes = share.memory_bytes;
+  share_memory(options);
   const std::filesystem::path output(file.output);
   std::error_code none;
   if (options.each.skip_existing && std::filesystem::exists(output, none)) {
@@ -452,40 +447,31 @@ std::optional<EachResult> convert_one(ConvertCommandOptions options, const EachF
   check_archive_output({file.input}, file.output, options.convert.overwrite || options.convert.resume);
   const Prepared prepared = prepare(options, {file.input});
   const SourceInfo& info = prepared.source->info();
-  const Plan plan = make_plan(info, options.convert.plan);
-  if (is_complete(options, prepared, plan)) {
+  if (is_complete(options, prepared)) {
     return EachResult{
         EachResult::State::kComplete, json_line(json_of_complete(file.input, file.output, "complete")), {}};
   }
+  Job job;
+  job.threads = share.threads;
+  job.memory_bytes = share.memory_bytes;
+  job.cancel = &watch_interrupts();
   if (!share.alone) {
     if (info.width > kSmallSamples / info.height) return std::nullopt;
-    const MemoryPlan memory = plan_memory(*prepared.source, plan, options.convert);
+    const Plan plan = make_plan(info, options.convert.plan);
+    const MemoryPlan memory = plan_memory(*prepared.source, plan, options.convert, job);
     if (share.memory_bytes != 0 && memory.bytes > share.memory_bytes) return std::nullopt;
   }
-  if (options.convert.max_error) {
-    options.convert.measure = [&](const std::string& archive) {
-      const WorkArena threads(share.threads);
-      const ArchiveReader reader(archive);
-      return measured_error(compare_with_source(
-          reader, *prepared.source, 0, share.threads, [](std::int64_t, std::int64_t) {}, cancel));
-    };
-  }
-  const auto show = [](const ConvertProgress&) {};
-  ConvertSummary summary =
-      options.convert.max_error
-          ? convert_within(*prepared.source, file.output, options.convert, options.freedom, show, cancel)
-          : convert(*prepared.source, plan, file.output, options.convert, show, cancel);
+  ConvertSummary summary = convert(*prepared.source, file.output, options.convert, job);
   const ordered_json document =
       json_from(options, summary, counts_of_voids(*prepared.source, summary.source_voids), std::nullopt);
   return EachResult{EachResult::State::kConverted, json_line(document), std::move(summary.warnings)};
 }
 
 int run_each(const ConvertCommandOptions& options) {
-  const std::vector<EachFile> files = checked_files(options);
-  const std::atomic<bool>& cancel = watch_interrupts();
   return convert_each(
-      files, options.each, options.work, options.common, options.convert.memory_bytes,
-      [&](const EachFile& file, const EachShare& share) { return convert_one(options, file, share, cancel); }, cancel);
+      checked_files(options), options.each, options.work, options.common,
+      [&](const EachFile& file, const EachShare& share) { return convert_one(options, file, share); },
+      watch_interrupts());
 }
 
 int run(ConvertCommandOptions options) {
@@ -502,12 +488,13 @@ int run(ConvertCommandOptions options) {
   }
   const Prepared prepared = prepare(options, std::move(files));
   HeightSource& source = *prepared.source;
+  std::optional<ProgressDisplay> display(std::in_place, options.work.progress, common.quiet, common.verbose);
+  const Job job = job_from(options.work, *display);
   if (options.dry_run) {
-    print_plan(source, options.convert, common);
+    print_plan(source, options.convert, job, common);
     return kExitDone;
   }
-  const Plan plan = make_plan(source.info(), options.convert.plan);
-  if (is_complete(options, prepared, plan)) {
+  if (is_complete(options, prepared)) {
     StandardOutput out;
     if (common.json) out.write(json_text(json_of_complete(options.input, options.output, "complete")));
     if (!common.json && !common.quiet) {
@@ -516,36 +503,21 @@ int run(ConvertCommandOptions options) {
     out.finish();
     return kExitDone;
   }
-  if (common.verbose && !common.quiet) print_plan_notes(source, plan, options.convert);
-  const std::atomic<bool>& cancel = watch_interrupts();
+  const bool is_measured = options.report || options.convert.max_error;
+  std::optional<ErrorEstimate> expected;
+  if (!common.quiet && (common.verbose || !is_measured)) expected = estimate_error(source, options.convert, job);
+  if (common.verbose && !common.quiet) print_plan_notes(source, options.convert, job, expected);
+  if (is_measured) expected.reset();
   std::optional<Accuracy> accuracy;
-  if (options.report || options.convert.max_error) {
+  if (options.report) {
     options.convert.measure = [&](const std::string& archive) {
-      const WorkArena threads(options.work.threads);
-      if (options.report) {
-        accuracy = measure_accuracy(archive, source, kRandomPoints, true, options.work, common, cancel);
-        return measured_error(accuracy->surface);
-      }
-      ProgressDisplay display(options.work.progress, common.quiet, common.verbose);
-      const ArchiveReader reader(archive);
-      return measured_error(compare_with_source(
-          reader, source, 0, options.work.threads,
-          [&](std::int64_t done, std::int64_t total) { display.update("compare", "rows", done, total); }, cancel));
+      accuracy = measure_accuracy(archive, source, kRandomPoints, true, job);
+      return accuracy->surface;
     };
   }
-  std::optional<ErrorEstimate> expected;
-  if (!options.convert.measure && !common.quiet) expected = estimate_error(source, plan, options.convert);
   const ConvertSummary summary = [&] {
-    ProgressDisplay display(options.work.progress, common.quiet, common.verbose);
-    const auto show = [&](const ConvertProgress& at) {
-      using Pass = ConvertProgress::Pass;
-      const char* const pass = at.pass == Pass::kRange ? "range" : (at.pass == Pass::kTiles ? "tiles" : "residuals");
-      display.update(pass, at.pass == Pass::kTiles ? "tiles" : "rows", at.done, at.total);
-    };
     try {
-      return options.convert.max_error
-                 ? convert_within(source, options.output, options.convert, options.freedom, show, cancel)
-                 : convert(source, plan, options.output, options.convert, show, cancel);
+      return convert(source, options.output, options.convert, job);
     } catch (const Error& error) {
       if (error.code() != ErrorCode::kCancelled) throw;
       throw Error(ErrorCode::kCancelled,
@@ -553,11 +525,8 @@ int run(ConvertCommandOptions options) {
                    "the same command with --resume goes on with what is in " + options.output + ".part"});
     }
   }();
+  display.reset();
   print_warnings(summary.warnings);
-  if (summary.tiles_written != summary.tiles_expected) {
-    throw Error(ErrorCode::kIo, fmt::format("{}: {} tiles written, {} expected", options.output, summary.tiles_written,
-                                            summary.tiles_expected));
-  }
   const std::optional<VoidCounts> voids = counts_of_voids(source, summary.source_voids);
   if (options.report && *options.report != "-") {
     write_output(*options.report, json_text(json_from(*accuracy)), options.convert.overwrite);

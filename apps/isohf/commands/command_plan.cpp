@@ -195,7 +195,7 @@ int run(const PlanOptions& options) {
     understand_ground(source->info(), convert.plan.ground);
     convert.code_type = options.code_type;
     check_spacing_unit(source->info(), options.request, options.spacing_in_metres);
-    print_plan(*source, convert, options.common);
+    print_plan(*source, convert, {}, options.common);
   }
   return kExitDone;
 }

@@ -9,7 +9,6 @@
 #include <optional>
 
 #include "commands/command.h"
-#include "interrupt.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
 #include "isohf/verify.h"
@@ -24,7 +23,6 @@
 #include "output/accuracy_output.h"
 #include "output/json_output.h"
 #include "output/standard_output.h"
-#include "work_arena.h"
 
 namespace isohf::cli {
 namespace {
@@ -190,17 +188,6 @@ void add_findings(const Accuracy& measured, const std::string& contradiction, Ve
   add(finding::kSourceInvented, accuracy.invented_inside, "voids of the input lie where the archive has elevations");
 }
 
-VerifyReport check(const VerifyCommandOptions& options, const std::atomic<bool>& cancel) {
-  ProgressDisplay display(options.work.progress, options.common.quiet, options.common.verbose);
-  VerifyOptions verify;
-  verify.threads = options.work.threads;
-  verify.progress = [&](std::int64_t done, std::int64_t total) {
-    display.update("verify", "tiles", done, total);
-    return !cancel.load();
-  };
-  return verify_archive(options.archive, verify);
-}
-
 /// The geoid of an archive's record, beside the inputs or in the working folder.
 void find_geoid(const std::string& archive, const std::vector<std::string>& files, GeoidRequest& geoid) {
   const std::string name = geoid.path;
@@ -256,12 +243,6 @@ std::unique_ptr<HeightSource> open_as_recorded(VerifyCommandOptions options, con
   return opened();
 }
 
-Accuracy compare(const VerifyCommandOptions& options, const Metadata& metadata, const std::atomic<bool>& cancel) {
-  const std::unique_ptr<HeightSource> source = open_as_recorded(options, metadata);
-  return measure_accuracy(options.archive, *source, options.random_points, options.ortho, options.work, options.common,
-                          cancel);
-}
-
 /// What of the measured error is more than was allowed; empty where nothing is.
 std::string why_too_far(const VerifyCommandOptions& options, const AccuracyReport& accuracy) {
   if (options.max_error && accuracy.max > *options.max_error) {
@@ -274,9 +255,10 @@ std::string why_too_far(const VerifyCommandOptions& options, const AccuracyRepor
 }
 
 int check_one(VerifyCommandOptions options, const Arguments& arguments, bool is_one_of_many) {
-  const std::atomic<bool>& cancel = watch_interrupts();
-  const WorkArena threads(options.work.threads);
-  VerifyReport report = check(options, cancel);
+  std::optional<ProgressDisplay> display(std::in_place, options.work.progress, options.common.quiet,
+                                         options.common.verbose);
+  const Job job = job_from(options.work, *display);
+  VerifyReport report = verify_archive(options.archive, job);
   std::optional<Accuracy> accuracy;
   // An archive that is not whole has no surface to measure.
   const bool compares = !options.against.names.empty() && report.passed();
@@ -287,9 +269,11 @@ int check_one(VerifyCommandOptions options, const Arguments& arguments, bool is_
       options = *parse(arguments, *metadata.source.options);
       options.archive = archive;
     }
-    accuracy = compare(options, metadata, cancel);
+    const std::unique_ptr<HeightSource> source = open_as_recorded(options, metadata);
+    accuracy = measure_accuracy(options.archive, *source, options.random_points, options.ortho, job);
     add_findings(*accuracy, contradiction(metadata, accuracy->surface), report);
   }
+  display.reset();
   const std::string too_far = accuracy ? why_too_far(options, accuracy->surface) : "";
   const bool passed = report.passed() && too_far.empty();
 

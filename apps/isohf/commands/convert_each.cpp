@@ -215,8 +215,8 @@ std::vector<EachFile> files_of_each(const std::vector<std::string>& inputs, bool
 }
 
 int convert_each(const std::vector<EachFile>& files, const EachOptions& options, const WorkOptions& work,
-                 const CommonOptions& common, std::uint64_t memory_bytes, const ConvertOneFile& convert_one,
-                 const std::atomic<bool>& cancel) {
+                 const CommonOptions& common, const ConvertOneFile& convert_one, const std::atomic<bool>& cancel) {
+  const std::uint64_t memory_bytes = work.memory_bytes;
   const auto threads = work.threads > 0 ? static_cast<std::size_t>(work.threads)
                                         : std::max<std::size_t>(1, std::thread::hardware_concurrency());
   std::size_t workers = std::min(threads, files.size());

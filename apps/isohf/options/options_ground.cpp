@@ -1,8 +1,7 @@
 #include "options/options_ground.h"
 
 #include "formats/decorate/windowed_source.h"
-#include "formats/georeference/reference_system.h"
-#include "isohf/error.h"
+#include "isohf/convert/frame/source_frame.h"
 
 namespace isohf::cli {
 
@@ -17,17 +16,6 @@ void add_ground_options(CommandLine& line, GroundRequest& request) {
   line.words({"auto", "equirectangular", "local", "transverse-mercator", "utm", "lambert-conformal",
               "polar-stereographic", "none"});
   line.flag("--wrap-x", "Join the East edge of an input all the way round to its West edge", request.wrap_x);
-}
-
-void understand_ground(const SourceInfo& info, GroundRequest& request) {
-  const Georeference& place = info.georeference;
-  const std::string text = system_text(place.system);
-  if (place.unit != HorizontalUnit::kMetre || !place.has_origin || text.empty()) return;
-  try {
-    request.source_map = understand_map(text, place.metres_per_unit);
-  } catch (const Error& error) {
-    request.why_no_map = error.what();
-  }
 }
 
 void add_geoid_option(CommandLine& line, GeoidRequest& request) {

@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "isohf/convert/frame/source_frame.h"
+#include "isohf/convert.h"
 #include "isohf/surface/decorate/geoid_source.h"
 #include "options/command_line.h"
 
@@ -10,10 +10,6 @@ namespace isohf::cli {
 
 /// How a source in degrees is laid out on the ground plane: --projection, --wrap-x.
 void add_ground_options(CommandLine& line, GroundRequest& request);
-
-/// Has a source on a map of its own understood, for its scales and for --projection; where that cannot be,
-/// request.why_no_map says why.
-void understand_ground(const SourceInfo& info, GroundRequest& request);
 
 /// --geoid FILE.pgm[:to-ellipsoidal|to-orthometric].
 void add_geoid_option(CommandLine& line, GeoidRequest& request);

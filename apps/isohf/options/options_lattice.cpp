@@ -2,6 +2,7 @@
 
 #include <limits>
 
+#include "isohf/convert/frame/source_frame.h"
 #include "isohf/error.h"
 #include "options/length_value.h"
 #include "options/option_values.h"

@@ -2,8 +2,7 @@
 
 #include <cstdint>
 
-#include "isohf/convert/convert.h"
-#include "isohf/convert/frame/plan.h"
+#include "isohf/convert.h"
 #include "options/command_line.h"
 
 namespace isohf::cli {

@@ -4,8 +4,8 @@
 
 #include <bit>
 
-#include "formats/photo/photo.h"
 #include "isohf/error.h"
+#include "isohf/picture.h"
 #include "isohf/surface/photo/texture_cutter.h"
 #include "options/describe.h"
 #include "options/option_values.h"

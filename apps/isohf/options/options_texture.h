@@ -4,8 +4,8 @@
 #include <optional>
 #include <string>
 
-#include "isohf/convert/convert.h"
-#include "isohf/surface/photo/photo_source.h"
+#include "isohf/archive/textures/texture_info.h"
+#include "isohf/convert.h"
 #include "options/command_line.h"
 
 namespace isohf::cli {

@@ -9,7 +9,7 @@
 #include "formats/decorate/cropped_source.h"
 #include "formats/mosaic/mosaic_source.h"
 #include "formats/registry.h"
-#include "isohf/convert/convert.h"
+#include "isohf/convert.h"
 #include "isohf/raster.h"
 #include "options/command_line.h"
 

@@ -8,7 +8,6 @@
 #include "isohf/archive.h"
 #include "isohf/surface.h"
 #include "options/describe.h"
-#include "output/progress.h"
 
 namespace isohf::cli {
 namespace {
@@ -138,37 +137,14 @@ ordered_json json_from(const AccuracyReport& report) {
 }  // namespace
 
 Accuracy measure_accuracy(const std::string& archive, HeightSource& source, std::int64_t random_points, bool with_ortho,
-                          const WorkOptions& work, const CommonOptions& common, const std::atomic<bool>& cancel) {
+                          const Job& job) {
   ArchiveReader reader(archive);
-  if (is_warped(reader.metadata())) understand_source(reader);
-  ProgressDisplay display(work.progress, common.quiet, common.verbose);
-  Accuracy accuracy;
-  accuracy.vertices = check_vertices(
-      reader, source, work.threads,
-      [&](std::int64_t done, std::int64_t total) { display.update("resample", "rows", done, total); }, cancel);
-  accuracy.surface = compare_with_source(
-      reader, source, random_points, work.threads,
-      [&](std::int64_t done, std::int64_t total) { display.update("compare", "rows", done, total); }, cancel);
+  const bool on_another_map = is_warped(reader.metadata());
+  if (on_another_map) understand_source(reader);
+  Accuracy accuracy{check_vertices(reader, source, job), compare_with_source(reader, source, job, random_points), {}};
   // An ortho mesh of the map would have to be resampled through the projection as well.
-  if (with_ortho && !is_warped(reader.metadata())) {
-    accuracy.lattice = compare_lattices(
-        reader, source, accuracy.surface.rms, work.threads,
-        [&](int pass, std::int64_t done, std::int64_t total) {
-          display.update(fmt::format("ortho {}", pass), "rows", done, total);
-        },
-        cancel);
-  }
+  if (with_ortho && !on_another_map) accuracy.lattice = compare_lattices(reader, source, accuracy.surface.rms, job);
   return accuracy;
-}
-
-MeasuredError measured_error(const AccuracyReport& report) {
-  MeasuredError found;
-  found.info.compared = report.samples_compared;
-  found.info.lost = report.samples_lost;
-  found.info.rms = report.rms;
-  found.info.max = report.max;
-  for (const ErrorPeak& peak : report.peaks) found.worst.push_back({peak.column, peak.row, 1, 1});
-  return found;
 }
 
 std::string describe_accuracy(const AccuracyInfo& info, const std::string& unit) {

@@ -1,15 +1,12 @@
 #pragma once
 
-#include <atomic>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 
-#include "isohf/convert/surface_error.h"
-#include "isohf/verify/accuracy/against_source.h"
+#include "isohf/convert.h"
+#include "isohf/verify.h"
 #include "isohf/verify/accuracy/lattice_report.h"
-#include "isohf/verify/vertex_check.h"
-#include "options/options_common.h"
 
 namespace isohf::cli {
 
@@ -25,11 +22,8 @@ struct Accuracy {
 
 /// Opens the archive; the source is the one that it was made from.
 [[nodiscard]] Accuracy measure_accuracy(const std::string& archive, HeightSource& source, std::int64_t random_points,
-                                        bool with_ortho, const WorkOptions& work, const CommonOptions& common,
-                                        const std::atomic<bool>& cancel);
+                                        bool with_ortho, const Job& job);
 
-/// The same for the archive's metadata.
-[[nodiscard]] MeasuredError measured_error(const AccuracyReport& report);
 /// "rms 4.7, largest 61 over 1,442,401 samples".
 [[nodiscard]] std::string describe_accuracy(const AccuracyInfo& info, const std::string& unit);
 [[nodiscard]] nlohmann::ordered_json json_from_estimate(const std::optional<ErrorEstimate>& estimate);

@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "isohf/convert/frame/plan.h"
+#include "isohf/convert/memory_plan.h"
 #include "options/describe.h"
 #include "options/source_size.h"
 #include "output/accuracy_output.h"
@@ -100,11 +101,11 @@ std::string text_from_plan(const SourceInfo& info, const Plan& plan, const Memor
 
 }  // namespace
 
-void print_plan(HeightSource& source, const ConvertOptions& options, const CommonOptions& common) {
+void print_plan(HeightSource& source, const ConvertOptions& options, const Job& job, const CommonOptions& common) {
   const SourceInfo& info = source.info();
   const Plan plan = make_plan(info, options.plan);
-  const MemoryPlan memory = plan_memory(source, plan, options);
-  check_memory(memory, options);
+  const MemoryPlan memory = plan_memory(source, plan, options, job);
+  check_memory(memory, job);
   std::vector<Warning> all = info.warnings;
   const std::vector<std::string> warnings = plan_warnings(info, plan, options.plan);
   for (const std::string& warning : warnings) all.push_back(warning);
@@ -112,7 +113,7 @@ void print_plan(HeightSource& source, const ConvertOptions& options, const Commo
     all.push_back(scale);
   }
   print_warnings(all);
-  const std::optional<ErrorEstimate> error = estimate_error(source, plan, options);
+  const std::optional<ErrorEstimate> error = estimate_error(source, options, job);
   StandardOutput out;
   if (common.json) {
     out.write(json_text(json_from_plan(info, plan, memory, options.code_type, error, warnings)));
@@ -122,9 +123,11 @@ void print_plan(HeightSource& source, const ConvertOptions& options, const Commo
   out.finish();
 }
 
-void print_plan_notes(HeightSource& source, const Plan& plan, const ConvertOptions& options) {
-  std::istringstream lines(text_from_plan(source.info(), plan, plan_memory(source, plan, options), options,
-                                          estimate_error(source, plan, options)));
+void print_plan_notes(HeightSource& source, const ConvertOptions& options, const Job& job,
+                      const std::optional<ErrorEstimate>& error) {
+  const Plan plan = make_plan(source.info(), options.plan);
+  std::istringstream lines(
+      text_from_plan(source.info(), plan, plan_memory(source, plan, options, job), options, error));
   for (std::string line; std::getline(lines, line);) print_note(line);
 }
 

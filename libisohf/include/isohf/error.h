@@ -38,6 +38,8 @@ struct ErrorParts {
 };
 
 /// The one exception type that isohf throws. A message says where, what was found, what was required, and the remedy.
+/// Messages and warnings name a setting by its member in the options, between backticks, as in "`overwrite` replaces it":
+/// how a user sets it is known to the program alone.
 class Error : public std::runtime_error {
  public:
   Error(ErrorCode code, const std::string& message) : std::runtime_error(message), code_(code) {}
@@ -70,8 +72,9 @@ class Error : public std::runtime_error {
 /// One line for the user about a result that was made nevertheless, and what kind of news it is.
 struct Warning : std::string {
   enum class Kind {
-    kNote,  ///< how something was understood, or what looks odd
-    kLoss,  ///< samples, their meaning or their place were lost: clamped, made void, cut off, dropped
+    kNote,              ///< how something was understood, or what looks odd
+    kLoss,              ///< samples, their meaning or their position were lost: clamped, made void, cut off, dropped
+    kUndeclaredNodata,  ///< a note that samples hold what looks like nodata
   };
 
   Warning(std::string text, Kind its_kind = Kind::kNote) : std::string(std::move(text)), kind(its_kind) {}

@@ -23,7 +23,7 @@ struct Job {
   int threads = 0;                 ///< 0: one a core
   std::uint64_t memory_bytes = 0;  ///< peak of the resident set, held to within a tenth; 0: no bound
   /// Called by one thread at a time, after every tile or band of rows; not to be waited in.
-  std::function<void(const Progress&)> progress;
+  std::function<void(const Progress&)> progress = {};
   const std::atomic<bool>* cancel = nullptr;  ///< once true, Error{kCancelled} within a fraction of a second
 
   void report(const Progress& at) const {

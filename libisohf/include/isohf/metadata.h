@@ -24,6 +24,11 @@ enum class CodeType { kU16, kU8, kF32 };
 [[nodiscard]] std::string to_string(CodeType type);                     ///< "u16", "u8", "f32"
 [[nodiscard]] CodeType code_type_from_string(const std::string& text);  ///< throws Error{kInvalidArgument}
 
+/// How hard the encoder tries: the higher, the fewer bytes and the slower. Readers need not know.
+inline constexpr int kMinLevel = 1;
+inline constexpr int kMaxLevel = 12;
+inline constexpr int kDefaultLevel = 5;
+
 /// One scale and offset for the whole dataset: elevation = offset + scale * code. Codes run from 0 to max_code(); the
 /// next one means void. For kF32 the float is the elevation itself, offset 0, scale 1, NaN is void.
 struct Quantisation {
@@ -50,7 +55,7 @@ struct Statistics {
   std::optional<double> mean;
   std::int64_t vertices = 0;    ///< visible vertices of all tiles
   std::int64_t voids = 0;       ///< of these, void
-  std::int64_t clamped = 0;     ///< elevations outside --z-range that were moved to its end
+  std::int64_t clamped = 0;     ///< elevations outside the range asked for that were moved to its end
   double worst_rounding = 0.0;  ///< largest |stored - computed| elevation, vertical units
 };
 
@@ -158,5 +163,20 @@ template <typename T>
 /// to come: 16384 bytes, or as much more as a long WKT takes.
 [[nodiscard]] std::uint32_t metadata_room(const Metadata& draft);
 [[nodiscard]] Metadata parse_metadata(const std::string& json);
+
+/// How far an archive's surface, as it is drawn, lies from the samples of its source: the metadata's member "accuracy",
+/// which is there where the writer measured it.
+struct AccuracyInfo {
+  std::int64_t compared = 0;  ///< samples with elevations on both sides
+  std::int64_t lost = 0;      ///< elevations of the source in voids of the surface: beside voids
+  double rms = 0.0;           ///< vertical units
+  double max = 0.0;
+  std::optional<double> max_error;  ///< that was asked for; max is at most that
+  double rounding = 0.0;            ///< the bound on a stored vertex's: half a step; of f32 the largest there was
+};
+
+/// The record of an archive's metadata; nullopt where it was not measured. Throws Error{kCorrupt} naming the member at
+/// fault, and where the figures contradict each other or the source's size.
+[[nodiscard]] std::optional<AccuracyInfo> accuracy_info(const Metadata& metadata);
 
 }  // namespace isohf

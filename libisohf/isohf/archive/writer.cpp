@@ -129,7 +129,7 @@ void ArchiveWriter::State::resume() {
   if (!opened.matches) {
     throw Error(
         ErrorCode::kInvalidArgument,
-        fmt::format("{} belongs to another input or other options; start over without --resume", part.part_path()));
+        fmt::format("{} belongs to another input or other options; start over without `resume`", part.part_path()));
   }
   const std::uint64_t head = local_header_bytes(metadata_member()) + options.metadata_bytes;
   if (opened.records.empty() || part.size_on_disk() < head) {

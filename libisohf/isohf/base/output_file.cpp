@@ -83,7 +83,7 @@ std::string output_place(const std::string& path, bool overwrite) {
   if (::stat(place.c_str(), &status) != 0) throw Error(ErrorCode::kIo, "cannot be looked at: " + reason(errno));
   if (S_ISDIR(status.st_mode)) refuse("is a folder, the output must be a file name");
   if (!S_ISREG(status.st_mode)) refuse("is no regular file, the output must be one");
-  if (!overwrite) throw Error(ErrorCode::kInvalidArgument, {"", "exists", "", "--overwrite replaces it"});
+  if (!overwrite) throw Error(ErrorCode::kInvalidArgument, {"", "exists", "", "`overwrite` replaces it"});
   check_folder(folder_of(place));
   return place;
 }

@@ -61,6 +61,10 @@ SourceRecord record_of(const SourceInfo& info, const SourceFrame& frame, const S
   return record;
 }
 
+std::string producer_of(const ConvertOptions& options) {
+  return options.producer.empty() ? "isohf " ISOHF_VERSION : options.producer;
+}
+
 std::string describe_voids(const SourceInfo& info) {
   return fmt::format("[{}] {}:{} fill {}", fmt::join(info.void_values, " "), info.valid_min, info.valid_max,
                      info.fill_distance);
@@ -75,7 +79,7 @@ std::string heights_fingerprint(const SourceInfo& info, const Plan& plan, const 
       "{} | {} {} bytes {}.{:09} {}x{} {} channel '{}' scale {} {} void {} | shape {}x{}/{} tiles {}x{} extent {} {} "
       "first {} {} "
       "spacing {} {} {} | {} range {} step {} clamp {} | {} {} | level {} | statistics of the source | seeds {}",
-      of_files ? options.producer : "",
+      of_files ? producer_of(options) : "",
       // The archive itself knows its source by the name that it states.
       of_files || options.source_note.name.empty() ? std::filesystem::path(info.path).filename().string()
                                                    : options.source_note.name,
@@ -88,7 +92,8 @@ std::string heights_fingerprint(const SourceInfo& info, const Plan& plan, const 
       options.max_rounding ? fmt::format("rounding {}", *options.max_rounding)
       : options.step       ? fmt::format("{}", *options.step)
                            : "auto",
-      options.clamp_range, to_string(options.filter), to_string(options.acquisition), options.level,
+      options.clamp_range, to_string(options.filter.value_or(kDefaultFilter)), to_string(options.acquisition),
+      options.level,
       options.shadow_seeds
           ? fmt::format("{} [{}]", options.shadow_seeds->sun_min_deg, fmt::join(options.shadow_seeds->sun_deg, " "))
           : "none");
@@ -144,13 +149,13 @@ Metadata describe_job(const SourceInfo& info, const Plan& plan, const ConvertOpt
   metadata.outside = plan.outside;
   metadata.projection = plan.frame.projection;
   metadata.wraps_x = plan.frame.wraps_x;
-  metadata.filter = options.filter;
+  metadata.filter = options.filter.value_or(kDefaultFilter);
   metadata.edges = Edges::kOdd;
   metadata.acquisition = options.acquisition;
   metadata.level = options.level;
   metadata.source = record_of(info, plan.frame, options.source_note);
   metadata.extensions.emplace_back(kStatisticsOfName, kStatisticsOfSource);
-  metadata.producer = options.producer;
+  metadata.producer = producer_of(options);
   const std::string job = fingerprint(info, plan, options, false) + (options.lossless ? " | lossless" : "");
   const std::vector<std::byte> digest = sha256(std::as_bytes(std::span<const char>(job)));
   metadata.extensions.emplace_back(kJobName, '"' + hex(digest) + '"');

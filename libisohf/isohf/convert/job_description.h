@@ -2,7 +2,8 @@
 
 #include <string>
 
-#include "isohf/convert/convert.h"
+#include "isohf/convert.h"
+#include "isohf/convert/frame/plan.h"
 #include "isohf/metadata.h"
 
 namespace isohf {

@@ -2,12 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <oneapi/tbb/task_arena.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 
+#include "isohf/base/arena.h"
 #include "isohf/convert/stages/residual_stage.h"
 #include "isohf/convert/stages/seed_stage.h"
 #include "isohf/convert/stages/texture_stage.h"
@@ -52,8 +51,8 @@ constexpr int kTexturedTilesPerThread = 2;
 class Estimate {
  public:
   /// limit: 0 where there is none.
-  Estimate(const HeightSource& source, const Plan& plan, const ConvertOptions& options, const Prefilter& prefilter,
-           std::uint64_t texture_bytes, std::uint64_t limit)
+  Estimate(const HeightSource& source, const Plan& plan, const ConvertOptions& options, const Job& job,
+           const Prefilter& prefilter, std::uint64_t texture_bytes, std::uint64_t limit)
       : source_(source),
         info_(source.info()),
         plan_(plan),
@@ -61,10 +60,10 @@ class Estimate {
         texture_bytes_(texture_bytes),
         limit_(limit),
         prefilter_(prefilter),
-        threads_(threads_of(options)) {
+        threads_(threads_of(job)) {
     const TileGrid& grid = plan.grid;
     // Source rows and columns of a tile with its padding and the taps around it.
-    const int taps = Kernel::make(options.filter).taps();
+    const int taps = Kernel::make(options.filter.value_or(kDefaultFilter)).taps();
     tile_rows_ = std::min(rounded(plan.band_rows) + taps + 2, info_.height);
     tile_columns_ =
         std::min(rounded(grid.shape().columns() * 2.0 * grid.sigma_x() / plan.frame.spacing_x) + taps + 2, info_.width);
@@ -194,27 +193,23 @@ class Estimate {
 
 }  // namespace
 
-int threads_of(const ConvertOptions& options) {
-  return options.threads > 0 ? options.threads : oneapi::tbb::this_task_arena::max_concurrency();
+int textured_tiles_in_flight(const Job& job) {
+  return threads_of(job) * kTexturedTilesPerThread;
 }
 
-int textured_tiles_in_flight(const ConvertOptions& options) {
-  return threads_of(options) * kTexturedTilesPerThread;
-}
-
-MemoryPlan plan_memory(const HeightSource& source, const Plan& plan, const ConvertOptions& options,
+MemoryPlan plan_memory(const HeightSource& source, const Plan& plan, const ConvertOptions& options, const Job& job,
                        std::uint64_t texture_bytes) {
-  const Prefilter prefilter = Prefilter::make(options.filter, options.acquisition);
-  const Estimate estimate(source, plan, options, prefilter, texture_bytes, options.memory_bytes);
-  const Estimate least(source, plan, options, prefilter, texture_bytes, 1);
+  const Prefilter prefilter = Prefilter::make(options.filter.value_or(kDefaultFilter), options.acquisition);
+  const Estimate estimate(source, plan, options, job, prefilter, texture_bytes, job.memory_bytes);
+  const Estimate least(source, plan, options, job, prefilter, texture_bytes, 1);
   const std::uint64_t least_bytes =
       std::min(least.with(kRations.back(), false).bytes, least.with(kRations.back(), true).bytes);
   const auto choose = [&]() -> MemoryPlan {
-    if (options.memory_bytes == 0) return estimate.with(kRations[kUnlimitedRation], false);
+    if (job.memory_bytes == 0) return estimate.with(kRations[kUnlimitedRation], false);
     for (const bool in_scratch : {false, true}) {
       for (const Ration& ration : kRations) {
         const MemoryPlan memory = estimate.with(ration, in_scratch);
-        if (memory.bytes <= options.memory_bytes) return memory;
+        if (memory.bytes <= job.memory_bytes) return memory;
       }
     }
     return estimate.with(kRations.back(), true);
@@ -224,26 +219,26 @@ MemoryPlan plan_memory(const HeightSource& source, const Plan& plan, const Conve
   return memory;
 }
 
-MemoryPlan plan_memory(const HeightSource& source, const Plan& plan, const ConvertOptions& options) {
+MemoryPlan plan_memory(const HeightSource& source, const Plan& plan, const ConvertOptions& options, const Job& job) {
   std::uint64_t texture_bytes = 0;
   if (options.texture) {
-    texture_bytes = TextureStage::make(plan, source.info(), *options.texture, threads_of(options),
-                                       textured_tiles_in_flight(options))
-                        .memory_bytes();
+    texture_bytes =
+        TextureStage::make(plan, source.info(), *options.texture, threads_of(job), textured_tiles_in_flight(job))
+            .memory_bytes();
   }
-  return plan_memory(source, plan, options, texture_bytes);
+  return plan_memory(source, plan, options, job, texture_bytes);
 }
 
-void check_memory(const MemoryPlan& memory, const ConvertOptions& options) {
-  if (options.memory_bytes == 0 || memory.bytes <= options.memory_bytes) return;
+void check_memory(const MemoryPlan& memory, const Job& job) {
+  if (job.memory_bytes == 0 || memory.bytes <= job.memory_bytes) return;
   constexpr std::uint64_t kMega = 1000000;
   const std::uint64_t least = (memory.least_bytes + kMega - 1) / kMega;
   throw Error(
       ErrorCode::kOutOfMemory,
-      fmt::format("--memory allows {} MB, this conversion needs at least {} MB; allow that much, or use smaller "
-                  "tiles (--shape, --triangles) or fewer --threads than {}",
-                  options.memory_bytes / kMega, least, threads_of(options)),
-      {"memory", fmt::format("{} MB", options.memory_bytes / kMega), fmt::format("at least {} MB", least),
+      fmt::format("`memory_bytes` allows {} MB, this conversion needs at least {} MB; allow that much, or use smaller "
+                  "tiles (`shape`, `budget`) or fewer `threads` than {}",
+                  job.memory_bytes / kMega, least, threads_of(job)),
+      {"memory", fmt::format("{} MB", job.memory_bytes / kMega), fmt::format("at least {} MB", least),
        "allow that much, or use smaller tiles or fewer threads"});
 }
 

@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "isohf/convert/convert.h"
+#include "isohf/convert.h"
 #include "isohf/convert/frame/plan.h"
 #include "isohf/raster.h"
 #include "isohf/surface/source/source_rows.h"
@@ -26,22 +26,21 @@ struct MemoryPlan {
   std::uint64_t source_buffer_bytes = 0;  ///< what the source may keep of decoded blocks
 };
 
-/// The one estimate that `plan`, `--dry-run`, `--memory` and convert() itself go by. Takes the fastest way that stays
-/// within options.memory_bytes (0: the fastest), or the most frugal one where none does: bytes > memory_bytes then.
+/// The one estimate that plans, bounds and convert() go by. Takes the fastest way that stays within job.memory_bytes, or
+/// the most frugal one where none does: bytes > memory_bytes then.
 /// texture_bytes: what a TextureStage takes, where there is one.
 [[nodiscard]] MemoryPlan plan_memory(const HeightSource& source, const Plan& plan, const ConvertOptions& options,
-                                     std::uint64_t texture_bytes);
+                                     const Job& job, std::uint64_t texture_bytes);
 
 /// The same, with the textures that the options ask for.
-[[nodiscard]] MemoryPlan plan_memory(const HeightSource& source, const Plan& plan, const ConvertOptions& options);
+[[nodiscard]] MemoryPlan plan_memory(const HeightSource& source, const Plan& plan, const ConvertOptions& options,
+                                     const Job& job);
 
-/// Throws Error{kOutOfMemory} where a plan takes more than options.memory_bytes allow: before a conversion, and where
-/// only its plan is asked for.
-void check_memory(const MemoryPlan& memory, const ConvertOptions& options);
+/// Throws Error{kOutOfMemory} where a plan takes more than job.memory_bytes allow: before a conversion, and where only
+/// its plan is asked for.
+void check_memory(const MemoryPlan& memory, const Job& job);
 
-/// Threads that a conversion works with.
-[[nodiscard]] int threads_of(const ConvertOptions& options);
 /// Tiles in flight where each brings a texture along.
-[[nodiscard]] int textured_tiles_in_flight(const ConvertOptions& options);
+[[nodiscard]] int textured_tiles_in_flight(const Job& job);
 
 }  // namespace isohf

@@ -71,7 +71,7 @@ class Choice {
  private:
   [[noreturn]] void refuse(const std::string& fault) const {
     throw Error(ErrorCode::kInvalidArgument,
-                fmt::format("{}: --projection {}: {}; --projection {} works", problem_.path, to_string(request_.kind),
+                fmt::format("{}: `projection` {}: {}; `projection` {} works", problem_.path, to_string(request_.kind),
                             fault, to_string(automatic().spec.kind)));
   }
 
@@ -139,8 +139,8 @@ class Choice {
 
   /// Why the ground does not suit the map; empty where it does.
   [[nodiscard]] std::string fault_of(const ProjectionSpec& spec) const {
-    if (spec.kind != Kind::kEquirectangular && !problem_.keeps_rows.empty()) {
-      return fmt::format("{} needs the input's rows to stay rows", problem_.keeps_rows);
+    if (spec.kind != Kind::kEquirectangular && problem_.wraps_x) {
+      return "`wrap_x` needs the input's rows to stay rows";
     }
     if (std::string fault = fault_of_ground(spec); !fault.empty()) return fault;
     if (spec.kind == Kind::kEquirectangular) return {};
@@ -233,8 +233,8 @@ class Choice {
     const ScaleError flat_error =
         has_flat ? worst_scale_error(Projection(flat), ground_) : ScaleError{HUGE_VAL, middle_};
     const auto flat_because = [&](const std::string& why) { return ProjectionChoice{flat, flat_error, why}; };
-    if (has_flat && !problem_.keeps_rows.empty()) {
-      return flat_because(fmt::format("{} needs the input's rows to stay rows", problem_.keeps_rows));
+    if (has_flat && problem_.wraps_x) {
+      return flat_because("--wrap-x needs the input's rows to stay rows");  // NOLINT: as archives have recorded it
     }
     if (has_flat && flat_error.worst <= kEquirectangularError) {
       return flat_because(fmt::format("lengths err by no more than {:g} %", 100.0 * kEquirectangularError));

@@ -16,10 +16,8 @@ struct ProjectionProblem {
   Ellipsoid ellipsoid;
   GeoExtent ground;         ///< latitudes within [-90, 90]
   bool goes_round = false;  ///< its East side is its West side
-  /// What needs the source's rows to stay rows, as in "--lossless": auto then takes no other kind than
-  /// equirectangular, and others are refused. Empty where nothing does.
-  std::string keeps_rows;
-  bool in_degrees = true;  ///< else on a map, whose rows are no parallels: equirectangular is no choice
+  bool wraps_x = false;     ///< its rows stay rows: auto takes no other kind than equirectangular, others are refused
+  bool in_degrees = true;   ///< else on a map, whose rows are no parallels: equirectangular is no choice
 };
 
 struct ProjectionChoice {

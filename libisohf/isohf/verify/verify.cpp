@@ -2,13 +2,13 @@
 
 #include <fmt/format.h>
 #include <oneapi/tbb/parallel_for.h>
-#include <oneapi/tbb/task_arena.h>
 
 #include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <memory>
 #include <utility>
 
@@ -18,16 +18,58 @@
 #include "isohf/archive/container/content_hash.h"
 #include "isohf/archive/metadata/accuracy_info.h"
 #include "isohf/archive/tile_statistics.h"
+#include "isohf/base/arena.h"
 #include "isohf/error.h"
 #include "isohf/surface.h"
 #include "isohf/surface/shade/normals.h"
 #include "isohf/verify/metadata_check.h"
 #include "isohf/verify/seed_check.h"
-#include "isohf/verify/shared_vertices.h"
 #include "isohf/verify/texture_check.h"
 
 namespace isohf {
 namespace {
+
+/// One lattice vertex as two neighbouring tiles store it, visible or padding.
+struct SharedVertex {
+  GridVertex here;
+  GridVertex there;
+  bool visible;  ///< in both tiles: on their common edge or corner; else padding of at least one of them
+};
+
+/// The neighbours that a tile is compared with; the other four compare themselves with it.
+constexpr TileIndex kComparedNeighbours[] = {{1, 0}, {0, 1}, {1, 1}, {-1, 1}};
+
+/// All vertices that a tile and its neighbour at `step` (one of kComparedNeighbours) both store, row by row.
+std::vector<SharedVertex> shared_vertices(const TileShape& shape, TileIndex step) {
+  // Only the stored vertices near the common edge can coincide; looked up by place, so that no index arithmetic of the
+  // mapping is repeated here.
+  const std::int64_t shift_x = step.column * 2 * shape.cell_columns();
+  const std::int64_t shift_z = step.row * shape.cell_rows();
+  std::map<std::pair<std::int64_t, std::int64_t>, GridVertex> there;
+  const auto near_edge = [](int index, int count) { return index <= 4 || index >= count - 5; };
+  const auto may_coincide = [&](GridVertex vertex) {
+    return (step.column == 0 || near_edge(vertex.column, shape.columns())) &&
+           (step.row == 0 || near_edge(vertex.row, shape.rows()));
+  };
+  for (int r = 0; r < shape.rows(); ++r) {
+    for (int c = 0; c < shape.columns(); ++c) {
+      if (!may_coincide({c, r})) continue;
+      const ObjectVertex object = object_from_grid(shape, GridVertex{c, r});
+      there[{object.z + shift_z, object.x + shift_x}] = {c, r};
+    }
+  }
+  std::vector<SharedVertex> shared;
+  for (int r = 0; r < shape.rows(); ++r) {
+    for (int c = 0; c < shape.columns(); ++c) {
+      if (!may_coincide({c, r})) continue;
+      const ObjectVertex object = object_from_grid(shape, GridVertex{c, r});
+      const auto at = there.find({object.z, object.x});
+      if (at == there.end()) continue;
+      shared.push_back({{c, r}, at->second, is_visible(shape, {c, r}) && is_visible(shape, at->second)});
+    }
+  }
+  return shared;
+}
 
 /// At most this many findings of one kind are kept for one tile: the first says where, the count says how many.
 constexpr int kKeptPerTileAndKind = 1;
@@ -48,9 +90,9 @@ using TileRow = std::vector<TileState>;
 
 class Verification {
  public:
-  Verification(const ArchiveReader& archive, const VerifyOptions& options)
+  Verification(const ArchiveReader& archive, std::size_t max_findings)
       : archive_(archive),
-        options_(options),
+        max_findings_(max_findings),
         grid_(archive.grid()),
         shape_(grid_.shape()),
         void_heights_(static_cast<std::size_t>(shape_.stored_vertex_count()), std::numeric_limits<float>::quiet_NaN()),
@@ -59,7 +101,7 @@ class Verification {
     for (std::size_t i = 0; i < shared_.size(); ++i) shared_[i] = shared_vertices(shape_, kComparedNeighbours[i]);
   }
 
-  VerifyReport run() {
+  VerifyReport run(const Job& job) {
     check_structure();
     const bool has_members = check_members();
     for (std::string& problem : contradictions_in(archive_)) add(make(finding::kMetadata, {}, std::move(problem)));
@@ -71,9 +113,8 @@ class Verification {
       check_seeds(row, current);
       collect(current);
       above = std::move(current);
-      if (options_.progress && !options_.progress((row + 1) * grid_.tile_columns(), grid_.tile_count())) {
-        throw Error(ErrorCode::kCancelled, "interrupted");
-      }
+      job.report({"verify", "tiles", (row + 1) * grid_.tile_columns(), grid_.tile_count()});
+      job.throw_if_cancelled();
     }
     check_totals();
     if (seeds_) add_seed_problems(seeds_->check_record());
@@ -102,7 +143,7 @@ class Verification {
 
   void add(Finding found) {
     ++report_.findings_total;
-    if (report_.findings.size() < options_.max_findings) report_.findings.push_back(std::move(found));
+    if (report_.findings.size() < max_findings_) report_.findings.push_back(std::move(found));
   }
 
   void check_structure() {
@@ -405,7 +446,7 @@ class Verification {
   }
 
   const ArchiveReader& archive_;
-  const VerifyOptions& options_;
+  std::size_t max_findings_;
   const TileGrid& grid_;
   TileShape shape_;
   std::vector<float> void_heights_;
@@ -422,7 +463,7 @@ class Verification {
 
 }  // namespace
 
-VerifyReport verify_archive(const std::string& path, const VerifyOptions& options) {
+VerifyReport verify_archive(const std::string& path, const Job& job, std::size_t max_findings) {
   std::unique_ptr<ArchiveReader> archive;
   try {
     archive = std::make_unique<ArchiveReader>(path);
@@ -434,8 +475,7 @@ VerifyReport verify_archive(const std::string& path, const VerifyOptions& option
     return report;
   }
   VerifyReport report;
-  oneapi::tbb::task_arena arena(options.threads > 0 ? options.threads : oneapi::tbb::task_arena::automatic);
-  arena.execute([&] { report = Verification(*archive, options).run(); });
+  Arena(job).execute([&] { report = Verification(*archive, max_findings).run(job); });
   return report;
 }
 

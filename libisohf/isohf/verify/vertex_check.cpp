@@ -1,8 +1,5 @@
-#include "isohf/verify/vertex_check.h"
-
 #include <fmt/format.h>
 #include <oneapi/tbb/parallel_for.h>
-#include <oneapi/tbb/task_arena.h>
 
 #include <algorithm>
 #include <cmath>
@@ -10,10 +7,12 @@
 #include <vector>
 
 #include "isohf/archive/codec/quantise.h"
+#include "isohf/base/arena.h"
 #include "isohf/error.h"
 #include "isohf/restore/archive_geometry.h"
 #include "isohf/surface/source/band_reader.h"
 #include "isohf/surface/source/source_statistics.h"
+#include "isohf/verify.h"
 
 namespace isohf {
 namespace {
@@ -46,19 +45,19 @@ class VertexCheck {
     can_clamp_ = metadata_.z_range || statistics.clamped > 0;
   }
 
-  VertexReport run(const std::function<void(std::int64_t, std::int64_t)>& progress, const std::atomic<bool>& cancel) {
+  VertexReport run(const Job& job) {
     const auto cutter = make_tile_resampler(grid_, archive_geometry(metadata_), kernel_,
                                             {limits_.lowest - datum_, limits_.highest - datum_});
     BandReader reader(source_, datum_, prefilter_, archive_geometry(metadata_).wraps_x);
     std::vector<VertexReport> tiles(static_cast<std::size_t>(grid_.tile_columns()));
     for (std::int64_t row = 0; row < grid_.tile_rows(); ++row) {
-      if (cancel.load(std::memory_order_relaxed)) throw Error(ErrorCode::kCancelled, "interrupted");
+      job.throw_if_cancelled();
       const auto band = reader.read(cutter->rows_needed(row));
       oneapi::tbb::parallel_for(std::int64_t{0}, grid_.tile_columns(), [&](std::int64_t column) {
         tiles[static_cast<std::size_t>(column)] = check_tile(*cutter, *band, {column, row});
       });
       for (const VertexReport& tile : tiles) add(tile);
-      if (progress) progress(row + 1, grid_.tile_rows());
+      job.report({"resample", "rows", row + 1, grid_.tile_rows()});
     }
     return report_;
   }
@@ -114,12 +113,9 @@ class VertexCheck {
 
 }  // namespace
 
-VertexReport check_vertices(const ArchiveReader& archive, HeightSource& source, int threads,
-                            const std::function<void(std::int64_t, std::int64_t)>& progress,
-                            const std::atomic<bool>& cancel) {
+VertexReport check_vertices(const ArchiveReader& archive, HeightSource& source, const Job& job) {
   VertexReport report;
-  oneapi::tbb::task_arena arena(threads > 0 ? threads : oneapi::tbb::task_arena::automatic);
-  arena.execute([&] { report = VertexCheck(archive, source).run(progress, cancel); });
+  Arena(job).execute([&] { report = VertexCheck(archive, source).run(job); });
   return report;
 }
 

@@ -42,9 +42,4 @@ struct MemberTotals {
   std::uint64_t bytes = 0;
 };
 
-/// How hard the encoder tries: the higher, the fewer bytes and the slower. Readers need not know.
-inline constexpr int kMinLevel = 1;
-inline constexpr int kMaxLevel = 12;
-inline constexpr int kDefaultLevel = 5;
-
 }  // namespace isohf

@@ -21,7 +21,7 @@ ShadowSeedInfo info_of(const ArchiveReader& archive) {
   const auto info = shadow_seed_info(archive.metadata());
   if (!info) {
     throw Error(ErrorCode::kInvalidArgument,
-                fmt::format("{}: has no shadow seeds; convert with --shadow-seeds", archive.path()));
+                fmt::format("{}: has no shadow seeds; convert with `shadow_seeds`", archive.path()));
   }
   return *info;
 }

@@ -6,15 +6,11 @@
 #include <string_view>
 
 #include "isohf/metadata.h"
+#include "isohf/picture.h"
 
 /// Textures as members of an archive (docs/archive_format.md, "Textures").
 
 namespace isohf {
-
-enum class TextureFormat { kPng, kJpeg };
-
-[[nodiscard]] std::string to_string(TextureFormat format);                        ///< "png", "jpeg"
-[[nodiscard]] TextureFormat texture_format_from_string(const std::string& text);  ///< throws Error{kInvalidArgument}
 
 /// The metadata's member "tile_textures".
 struct TextureInfo {

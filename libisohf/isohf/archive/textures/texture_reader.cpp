@@ -14,7 +14,7 @@ TextureInfo info_of(const ArchiveReader& archive) {
   const auto info = texture_info(archive.metadata());
   if (!info) {
     throw Error(ErrorCode::kInvalidArgument,
-                fmt::format("{}: has no textures; convert with --texture", archive.path()));
+                fmt::format("{}: has no textures; convert with `texture`", archive.path()));
   }
   return *info;
 }

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "isohf/convert/frame/plan.h"
-#include "isohf/surface/photo/photo_source.h"
+#include "isohf/picture.h"
 #include "isohf/surface/photo/texture_cutter.h"
 
 namespace isohf {

@@ -50,8 +50,8 @@ std::int64_t tiles_to_cover(double length, double extent) {
   const double tiles = std::ceil(length / extent - 1e-9);
   if (!(tiles <= static_cast<double>(kMaxTilesPerAxis))) {
     refuse(
-        fmt::format("the lattice needs {:.3g} tiles in one direction, at most {} are possible; use a larger --spacing "
-                    "or a smaller --density",
+        fmt::format("the lattice needs {:.3g} tiles in one direction, at most {} are possible; use a larger `spacing` "
+                    "or a smaller `density`",
                     tiles, kMaxTilesPerAxis));
   }
   return std::max<std::int64_t>(1, static_cast<std::int64_t>(tiles));
@@ -236,7 +236,7 @@ TileShape choose_shape(const SourceFrame& frame, const PlanRequest& request) {
   if (request.budget) {
     const std::vector<TileShape> found = candidate_shapes(request, 1);
     if (found.empty()) {
-      refuse(fmt::format("no tile shape of {} levels lies near the budget of {}; use fewer --levels or a larger budget",
+      refuse(fmt::format("no tile shape of {} levels lies near the budget of {}; use fewer `levels` or a larger budget",
                          levels, request.budget->count));
     }
     return found.front();
@@ -286,10 +286,10 @@ Lattice square_lattice(const SourceFrame& frame, const PlanRequest& request) {
 
 /// Fewer or more vertices than anybody asked for, and what would mend it.
 std::string density_warning(const SourceInfo& info, const Plan& plan, const PlanRequest& request) {
-  const char* const remedy = request.tiles && request.shape    ? "leave out --shape or --tiles"
-                             : request.tiles && request.budget ? "leave out the budget of a tile or --tiles"
-                             : request.tiles                   ? "ask for other --tiles"
-                             : request.fit                     ? "leave out --fit, or ask for smaller tiles"
+  const char* const remedy = request.tiles && request.shape    ? "leave out `shape` or `tiles`"
+                             : request.tiles && request.budget ? "leave out the budget of a tile or `tiles`"
+                             : request.tiles                   ? "ask for other `tiles`"
+                             : request.fit                     ? "leave out `fit`, or ask for smaller tiles"
                                                                : "ask for smaller tiles";
   const char* const unit = plan.frame.in_metres ? " m" : "";
   return fmt::format(
@@ -300,17 +300,17 @@ std::string density_warning(const SourceInfo& info, const Plan& plan, const Plan
 
 void check(const PlanRequest& request) {
   if ((request.density ? 1 : 0) + (request.spacing ? 1 : 0) + (request.tiles ? 1 : 0) > 1) {
-    refuse("more than one of --density, --spacing and --tiles is given; give one");
+    refuse("more than one of `density`, `spacing` and `tiles` is given; give one");
   }
   if (request.shape && request.budget) refuse("both a tile shape and a tile budget are given; give one");
   const auto check_positive = [](const std::optional<double>& value, const char* option) {
     if (value && !(std::isfinite(*value) && *value > 0.0))
       refuse(fmt::format("{} is {}, must be positive", option, *value));
   };
-  check_positive(request.density, "--density");
-  check_positive(request.spacing, "--spacing");
+  check_positive(request.density, "`density`");
+  check_positive(request.spacing, "`spacing`");
   if (request.tiles && (request.tiles->first < 1 || request.tiles->second < 1)) {
-    refuse(fmt::format("--tiles is {}x{}, must be at least 1x1", request.tiles->first, request.tiles->second));
+    refuse(fmt::format("`tiles` is {}x{}, must be at least 1x1", request.tiles->first, request.tiles->second));
   }
 }
 

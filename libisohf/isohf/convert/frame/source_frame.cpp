@@ -73,7 +73,7 @@ void place_by_warp(const SourceInfo& info, const MapBounds& bounds, std::shared_
   const Georeference& place = info.georeference;
   const ProjectionSpec& spec = frame.projection->spec;
   if (!std::isfinite(bounds.west)) {
-    refuse(fmt::format("{}: --projection {} has no place for a part of the input; give --projection auto", info.path,
+    refuse(fmt::format("{}: `projection` {} has no place for a part of the input; give `projection` auto", info.path,
                        to_string(spec.kind)));
   }
   const double grain = grain_of(std::min(frame.spacing_x, frame.spacing_z));
@@ -116,7 +116,7 @@ void place_on_map(const SourceInfo& info, const GroundRequest& request, SourceFr
   const bool is_asked = asked.is_given && (asked.is_auto || asked.kind != ProjectionKind::kNone);
   const bool is_placed = request.source_map && info.georeference.has_origin;
   const auto refuse_request = [&](const std::string& why) {
-    refuse(fmt::format("{}: --projection {} {}", info.path, asked.is_auto ? "auto" : to_string(asked.kind), why));
+    refuse(fmt::format("{}: `projection` {} {}", info.path, asked.is_auto ? "auto" : to_string(asked.kind), why));
   };
   if (!is_placed) {
     if (!is_asked || (asked.is_auto && request.why_no_map.empty())) return;
@@ -134,9 +134,8 @@ void place_on_map(const SourceInfo& info, const GroundRequest& request, SourceFr
   const MapGround& ground = *frame.ground;
   if (asked.is_auto && ground.worst_error <= MapGround::kTrueEnough) return;
   const bool goes_round = ground.extent.east - ground.extent.west > 359.0;
-  const ProjectionChoice choice =
-      choose_projection(asked, {info.path, info.georeference.system.body, map.ellipsoid(), ground.extent, goes_round,
-                                request.keeps_rows.empty() && request.wrap_x ? "--wrap-x" : request.keeps_rows, false});
+  const ProjectionChoice choice = choose_projection(asked, {info.path, info.georeference.system.body, map.ellipsoid(),
+                                                            ground.extent, goes_round, request.wrap_x, false});
   const Projection projection(choice.spec);
   const ScaleError error = worst_scale_error(projection, map, bounds);
   if (asked.is_auto && error.worst >= ground.worst_error) return;
@@ -162,15 +161,14 @@ void place_degrees(const SourceInfo& info, const GroundRequest& request, SourceF
   ProjectionRequest asked = request.projection;
   if (!place.has_origin) {
     if (!asked.is_auto && asked.kind != ProjectionKind::kEquirectangular && asked.kind != ProjectionKind::kNone) {
-      refuse(fmt::format("{}: --projection {} needs to know where the input lies; it has no georeference", info.path,
+      refuse(fmt::format("{}: `projection` {} needs to know where the input lies; it has no georeference", info.path,
                          to_string(asked.kind)));
     }
     if (asked.is_auto) asked = {false, ProjectionKind::kEquirectangular, {}, 0, asked.is_given};
   }
   const Closure closure = closure_of(info);
-  ProjectionProblem problem{info.path, place.system.body,         ellipsoid_of(place.system),
-                            ground,    closure != Closure::kOpen, request.keeps_rows};
-  if (request.wrap_x && problem.keeps_rows.empty()) problem.keeps_rows = "--wrap-x";
+  const ProjectionProblem problem{info.path, place.system.body,         ellipsoid_of(place.system),
+                                  ground,    closure != Closure::kOpen, request.wrap_x};
   const ProjectionChoice choice = choose_projection(asked, problem);
   if (choice.spec.kind == ProjectionKind::kNone) return;
   if (choice.spec.kind != ProjectionKind::kEquirectangular) check_latitudes(info);
@@ -250,7 +248,7 @@ SourceFrame make_source_frame(const SourceInfo& info, const GroundRequest& reque
   if (request.wrap_x) {
     if (closure_of(info) != Closure::kClosed) {
       refuse(
-          fmt::format("{}: --wrap-x needs columns all the way round, 360 degrees; this input's {} columns {:.9g} "
+          fmt::format("{}: `wrap_x` needs columns all the way round, 360 degrees; this input's {} columns {:.9g} "
                       "apart make {:.9g}",
                       info.path, info.width, place.spacing_x,
                       place.unit == HorizontalUnit::kDegree ? static_cast<double>(info.width) * place.spacing_x : 0.0));
@@ -278,10 +276,10 @@ std::string scale_warning(const SourceInfo& info, const SourceFrame& frame, cons
   const MapGround& ground = *frame.ground;
   const GeoExtent& extent = ground.extent;
   const bool has_pole = extent.north == 90.0 || extent.south == -90.0;
-  const char* const remedy = request.is_given ? "--projection none keeps it without a warning"
+  const char* const remedy = request.is_given ? "`projection` none keeps it without a warning"
                              : extent.east - extent.west > 180.0 && !has_pole
-                                 ? "a part of it (--bbox) can be laid on a truer map by --projection auto"
-                                 : "--projection auto lays the surface on a truer map, none keeps this one without a "
+                                 ? "a part of it (`bbox`) can be laid on a truer map by `projection` auto"
+                                 : "`projection` auto lays the surface on a truer map, none keeps this one without a "
                                    "warning";
   return fmt::format(
       "{}: lengths on its map are {:.4g} times those on the ground ({:.4g} to {:.4g}), and slopes, normals and shadows "
@@ -290,16 +288,10 @@ std::string scale_warning(const SourceInfo& info, const SourceFrame& frame, cons
 }
 
 SourceFrame make_source_frame(const SourceInfo& info) {
-  return make_source_frame(info, {{false,
-                                   info.georeference.unit == HorizontalUnit::kDegree ? ProjectionKind::kEquirectangular
-                                                                                     : ProjectionKind::kNone,
-                                   {},
-                                   0,
-                                   false},
-                                  false,
-                                  "",
-                                  nullptr,
-                                  ""});
+  GroundRequest request;
+  request.projection.is_auto = false;
+  if (info.georeference.unit == HorizontalUnit::kDegree) request.projection.kind = ProjectionKind::kEquirectangular;
+  return make_source_frame(info, request);
 }
 
 }  // namespace isohf

@@ -1,26 +1,15 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
 #include <optional>
 #include <string>
 
+#include "isohf/convert.h"
 #include "isohf/metadata.h"
 #include "isohf/projection/choose_projection.h"
 #include "isohf/surface/resample/tile_resampler.h"
 
 namespace isohf {
-
-/// How a source is laid out on the ground plane.
-struct GroundRequest {
-  /// Of degrees, auto by default; of a source on a map of its own only where the user gives one.
-  ProjectionRequest projection;
-  bool wrap_x = false;  ///< join the East edge to the West edge
-  /// What needs the source's rows to stay rows of the world, as in "--lossless"; empty where nothing does.
-  std::string keeps_rows;
-  std::shared_ptr<const ReferenceMap> source_map = nullptr;  ///< of a source on a map of its own, where understood
-  std::string why_no_map;                                    ///< in one line, where there is a system and no map
-};
 
 /// Where the source's samples lie in world space.
 struct SourceFrame {
@@ -54,7 +43,7 @@ struct SourceFrame {
 [[nodiscard]] SourceFrame make_source_frame(const SourceInfo& info);
 
 /// What a user must hear of the lengths of a source that keeps its own map: one line; empty where they are true to
-/// MapGround::kTrueEnough, or --projection none says that it is known.
+/// MapGround::kTrueEnough, or projection none says that it is known.
 [[nodiscard]] std::string scale_warning(const SourceInfo& info, const SourceFrame& frame,
                                         const ProjectionRequest& request);
 

@@ -9,8 +9,7 @@
 #include <utility>
 
 #include "isohf/convert/conversion.h"
-#include "isohf/convert/stages/elevation_range.h"
-#include "isohf/convert/stages/quantiser.h"
+#include "isohf/convert/stages/choose_quantisation.h"
 #include "isohf/convert/stages/tile_source.h"
 #include "isohf/error.h"
 #include "isohf/surface/source/edge_range.h"
@@ -36,11 +35,10 @@ SourceSurvey survey_window(const SourceInfo& info, std::span<const std::byte> ra
 }
 
 /// First pass: range and counts of the whole source. While one window is looked at the next one is read.
-SourceSurvey survey_source(const Conversion& job, EdgeRange& edge, const ProgressCallback& callback) {
-  HeightSource& source = job.source;
+SourceSurvey survey_source(const Conversion& conversion, EdgeRange& edge) {
+  HeightSource& source = conversion.source;
   const SourceInfo& info = source.info();
-  const ReadStep& step = job.memory.scan_step;
-  ProgressMeter meter(callback, ConvertProgress::Pass::kRange, info.height);
+  const ReadStep& step = conversion.memory.scan_step;
   SourceSurvey survey(info, false);
   std::vector<std::byte> now;
   std::vector<std::byte> next;
@@ -51,7 +49,7 @@ SourceSurvey survey_source(const Conversion& job, EdgeRange& edge, const Progres
   };
   read(windows.front(), now);
   for (std::size_t i = 0; i < windows.size();) {
-    throw_if_cancelled(job.cancel);
+    conversion.job.throw_if_cancelled();
     const Window window = windows[i++];
     if (i == windows.size() && window.row + window.rows < info.height) {
       windows = step.windows(info, window.row + window.rows);
@@ -67,7 +65,8 @@ SourceSurvey survey_source(const Conversion& job, EdgeRange& edge, const Progres
       look();
     }
     now.swap(next);
-    meter.report(window.row + (i == 0 || i == windows.size() ? window.rows : 0), 0);
+    const std::int64_t rows = window.row + (i == 0 || i == windows.size() ? window.rows : 0);
+    conversion.job.report({"range", "rows", rows, info.height});
   }
   return survey;
 }
@@ -78,20 +77,19 @@ void warn_of_unit_range(const SourceInfo& info, const ElevationRange& range, std
   if (range.min >= -0.1 && range.max <= 1.1 && range.max > range.min) {
     warnings.push_back(
         fmt::format("{}: elevations run from {:.4g} to {:.4g}, which looks like a fraction of a height, not "
-                    "metres; give --z-scale and --z-offset",
+                    "metres; give `z_scale` and `z_offset`",
                     info.path, range.min, range.max));
   }
 }
 
 /// The range of the surface itself, for kernels that leave the range of their samples: cuts every tile, keeps none.
-ElevationRange measure_surface(const Conversion& job, const ElevationRange& limits, const ProgressCallback& callback) {
-  const TileGrid& grid = job.plan.grid;
-  TileSource tiles(job, {limits.min - job.datum, limits.max - job.datum});
-  ProgressMeter meter(callback, ConvertProgress::Pass::kRange, grid.tile_rows());
+ElevationRange measure_surface(const Conversion& conversion, const ElevationRange& limits) {
+  const TileGrid& grid = conversion.plan.grid;
+  TileSource tiles(conversion, {limits.min - conversion.datum, limits.max - conversion.datum});
   std::vector<ElevationRange> ranges(static_cast<std::size_t>(grid.tile_columns()), {HUGE_VAL, -HUGE_VAL});
   std::int64_t next = 0;
   while (next < grid.tile_count()) {
-    throw_if_cancelled(job.cancel);
+    conversion.job.throw_if_cancelled();
     const std::int64_t first = next;
     const std::shared_ptr<const TileSource::Part> part = tiles.read(grid.tile_at(first));
     while (next < grid.tile_count() && part->holds(grid.tile_at(next))) ++next;
@@ -101,12 +99,12 @@ ElevationRange measure_surface(const Conversion& job, const ElevationRange& limi
       tiles.cut(tile, *part, heights);
       ElevationRange& range = ranges[static_cast<std::size_t>(tile.column)];
       for (const float height : heights) {
-        const double elevation = double{height} + job.datum;  // NaN compares false
+        const double elevation = double{height} + conversion.datum;  // NaN compares false
         range.min = elevation < range.min ? elevation : range.min;
         range.max = elevation > range.max ? elevation : range.max;
       }
     });
-    meter.report(next / grid.tile_columns(), 0);
+    conversion.job.report({"range", "rows", next / grid.tile_columns(), grid.tile_rows()});
   }
   ElevationRange all{HUGE_VAL, -HUGE_VAL};
   for (const ElevationRange& range : ranges) {
@@ -127,12 +125,12 @@ QuantisationRequest request_of(const SourceInfo& info, const ConvertOptions& opt
 }
 
 /// By the range of the data.
-void choose_codes_by_data(Conversion& job, ConvertSummary& summary, const ProgressCallback& progress) {
-  const SourceInfo& info = job.source.info();
-  const QuantisationRequest request = request_of(job.source.info(), job.options);
-  const SourceAxes axes = make_axes(job.plan.grid, job.geometry());
+void choose_codes_by_data(Conversion& conversion, ConvertSummary& summary) {
+  const SourceInfo& info = conversion.source.info();
+  const QuantisationRequest request = request_of(conversion.source.info(), conversion.options);
+  const SourceAxes axes = make_axes(conversion.plan.grid, conversion.geometry());
   EdgeRange edge(info, axes.x.continued_samples(), axes.z.continued_samples());
-  const SourceSurvey survey = survey_source(job, edge, progress);
+  const SourceSurvey survey = survey_source(conversion, edge);
   SourceScan found = survey.scan();
   if (found.valid == 0) {
     throw Error(ErrorCode::kInvalidArgument,
@@ -144,35 +142,37 @@ void choose_codes_by_data(Conversion& job, ConvertSummary& summary, const Progre
   if (const std::string warning = survey.warning(); !warning.empty()) {
     summary.warnings.push_back(info.path + ": " + warning);
   }
-  job.datum = choose_datum(info, found.range);
-  if (job.plan.outside == Outside::kCover) found.range = edge.widen(found.range);
-  job.quantisation = choose_quantisation(request, found.range, info);
-  const double over = overshoot(job.kernel, job.prefilter);
-  if (over == 0.0 || job.options.code_type == CodeType::kF32) return;
+  conversion.datum = choose_datum(info, found.range);
+  if (conversion.plan.outside == Outside::kCover) found.range = edge.widen(found.range);
+  conversion.quantisation = choose_quantisation(request, found.range, info);
+  const double over = overshoot(conversion.kernel, conversion.prefilter);
+  if (over == 0.0 || conversion.options.code_type == CodeType::kF32) return;
   // The surface may leave the samples' range. Where the codes reach far enough for the worst case at the same step,
   // nothing needs to be measured; next to voids and on a raster between whose ends little lies there is no such bound.
-  const bool is_large = std::min(info.width, info.height) > 2 * (job.prefilter.halo() + job.kernel.taps());
+  const bool is_large =
+      std::min(info.width, info.height) > 2 * (conversion.prefilter.halo() + conversion.kernel.taps());
   const bool has_step = request.max_rounding || (request.step ? *request.step != 0.0 : !is_floating(info.sample_type));
   const ElevationRange reach = widened(found.range, over);
-  if (found.voids == 0 && is_large && has_step && has_codes_for(job.quantisation, reach)) {
-    job.quantisation = choose_quantisation({request.type, job.quantisation.scale}, reach, info);
+  if (found.voids == 0 && is_large && has_step && has_codes_for(conversion.quantisation, reach)) {
+    conversion.quantisation = choose_quantisation({request.type, conversion.quantisation.scale}, reach, info);
     return;
   }
-  job.quantisation = choose_quantisation(request, measure_surface(job, found.range, progress), info);
+  conversion.quantisation = choose_quantisation(request, measure_surface(conversion, found.range), info);
 }
 
 }  // namespace
 
-void choose_codes(Conversion& job, ConvertSummary& summary, const ProgressCallback& progress) {
-  if (job.options.z_range) {
-    const ElevationRange range{job.options.z_range->first, job.options.z_range->second};
-    job.datum = choose_datum(job.source.info(), range);
-    job.quantisation = quantisation_of_range(request_of(job.source.info(), job.options), range, job.source.info());
-    job.limits = {range.min, range.max};
+void choose_codes(Conversion& conversion, ConvertSummary& summary) {
+  if (conversion.options.z_range) {
+    const ElevationRange range{conversion.options.z_range->first, conversion.options.z_range->second};
+    conversion.datum = choose_datum(conversion.source.info(), range);
+    conversion.quantisation = quantisation_of_range(request_of(conversion.source.info(), conversion.options), range,
+                                                    conversion.source.info());
+    conversion.limits = {range.min, range.max};
     return;
   }
-  choose_codes_by_data(job, summary, progress);
-  job.limits = code_limits(job.quantisation);
+  choose_codes_by_data(conversion, summary);
+  conversion.limits = code_limits(conversion.quantisation);
 }
 
 }  // namespace isohf

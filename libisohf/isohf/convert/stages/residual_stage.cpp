@@ -78,7 +78,7 @@ std::uint64_t residual_stage_memory_bytes(const SourceInfo& info, const Plan& pl
 
 LosslessRecord write_residuals(HeightSource& source, const SourceFrame& frame, const TileGrid& grid,
                                const Quantisation& quantisation, std::size_t members_at_once, ArchiveWriter& writer,
-                               const std::function<void(std::int64_t)>& progress, const std::atomic<bool>& cancel) {
+                               const Job& job) {
   const SourceInfo& info = source.info();
   LosslessRecord record;
   record.mapping = {info.sample_type, info.z_scale, info.z_offset};
@@ -109,7 +109,7 @@ LosslessRecord write_residuals(HeightSource& source, const SourceFrame& frame, c
   for (std::int64_t row = 0; row < info.height;) {
     std::vector<ResidualBand> bands;
     for (; row < info.height && bands.size() < members_at_once; row += record.rows_per_member) {
-      if (cancel.load(std::memory_order_relaxed)) throw Error(ErrorCode::kCancelled, "interrupted");
+      job.throw_if_cancelled();
       ResidualBand& band = bands.emplace_back();
       const std::int64_t rows = std::min(record.rows_per_member, info.height - row);
       band.first_row = row;
@@ -125,7 +125,7 @@ LosslessRecord write_residuals(HeightSource& source, const SourceFrame& frame, c
       writer.add_deflated_member(residual_name(band.first_row), band.deflated, band.payload_bytes, band.payload_crc32);
       record.residual_bytes += band.deflated.size();
     }
-    progress(std::min(row, info.height));
+    job.report({"residuals", "rows", std::min(row, info.height), info.height, writer.bytes_written()});
   }
   record.sha256 = hex(hash.finish());
   return record;

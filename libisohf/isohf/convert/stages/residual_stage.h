@@ -1,11 +1,10 @@
 #pragma once
 
-#include <atomic>
 #include <cstdint>
-#include <functional>
 
 #include "isohf/archive/writer.h"
 #include "isohf/convert/frame/plan.h"
+#include "isohf/job.h"
 #include "isohf/raster.h"
 #include "isohf/restore/lossless.h"
 
@@ -18,11 +17,9 @@ namespace isohf {
 /// Writes the residual members: reads all tiles back from the writer, predicts every source sample from them and keeps
 /// the difference. All tiles have been added, no member of that name. Reads the source once more from North to South;
 /// memory is bounded by two rows of tiles and a few bands of source rows. Works on the caller's oneTBB arena; the bytes
-/// depend neither on it nor on `members_at_once`. `progress` is told the source rows done; `cancel` is polled between
-/// bands.
+/// depend neither on it nor on `members_at_once`. Stage "residuals".
 [[nodiscard]] LosslessRecord write_residuals(HeightSource& source, const SourceFrame& frame, const TileGrid& grid,
                                              const Quantisation& quantisation, std::size_t members_at_once,
-                                             ArchiveWriter& writer, const std::function<void(std::int64_t)>& progress,
-                                             const std::atomic<bool>& cancel);
+                                             ArchiveWriter& writer, const Job& job);
 
 }  // namespace isohf

@@ -31,21 +31,21 @@ void check_seed_request(const ShadowSeedRequest& request, const TileGrid& grid) 
         ErrorCode::kInvalidArgument,
         fmt::format("{} is {} degrees, must be a sun elevation from {} to below 90", option, degrees, kMinSunDeg));
   };
-  check("--sun-min", request.sun_min_deg);
+  check("`sun_min_deg`", request.sun_min_deg);
   for (std::size_t i = 0; i < request.sun_deg.size(); ++i) {
-    check("--shadow-seeds", request.sun_deg[i]);
+    check("`shadow_seeds`", request.sun_deg[i]);
     if (i > 0 && request.sun_deg[i] <= request.sun_deg[i - 1]) {
-      throw Error(ErrorCode::kInvalidArgument, "--shadow-seeds: the sun elevations must ascend");
+      throw Error(ErrorCode::kInvalidArgument, "`shadow_seeds`: the sun elevations must ascend");
     }
   }
   if (request.sun_deg.size() > kMaxSeedAngles) {
-    throw Error(ErrorCode::kInvalidArgument, fmt::format("--shadow-seeds: {} sun elevations, at most {} are possible",
+    throw Error(ErrorCode::kInvalidArgument, fmt::format("`shadow_seeds`: {} sun elevations, at most {} are possible",
                                                          request.sun_deg.size(), kMaxSeedAngles));
   }
   if (!has_room_for_seeds(grid)) {
     throw Error(
         ErrorCode::kUnsupported,
-        "--shadow-seeds: rows of 2^31 lattice vertices and more have no room for seeds; use a larger --spacing");
+        "`shadow_seeds`: rows of 2^31 lattice vertices and more have no room for seeds; use a larger `spacing`");
   }
 }
 

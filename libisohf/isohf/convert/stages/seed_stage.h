@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "isohf/archive/writer.h"
-#include "isohf/convert/convert.h"
+#include "isohf/convert.h"
 #include "isohf/convert/stages/seed_row.h"
 
 namespace isohf {

@@ -24,12 +24,12 @@ constexpr double kRounding = 1e-6;
 void check(const TextureRequest& request, const PhotoInfo& photo) {
   const auto size = static_cast<unsigned>(std::max(request.max_size, 0));
   if (!std::has_single_bit(size) || request.max_size < kMinTextureSize || request.max_size > kMaxTextureSize) {
-    throw Error(ErrorCode::kInvalidArgument, fmt::format("--texture-size is {}, must be a power of two from {} to {}",
+    throw Error(ErrorCode::kInvalidArgument, fmt::format("`max_size` is {}, must be a power of two from {} to {}",
                                                          request.max_size, kMinTextureSize, kMaxTextureSize));
   }
   if (request.jpeg_quality < 1 || request.jpeg_quality > 100) {
     throw Error(ErrorCode::kInvalidArgument,
-                fmt::format("--texture-quality is {}, must be from 1 to 100", request.jpeg_quality));
+                fmt::format("`jpeg_quality` is {}, must be from 1 to 100", request.jpeg_quality));
   }
   if (photo.channels != 1 && photo.channels != 3 && photo.channels != 4) {
     throw Error(ErrorCode::kUnsupported,

@@ -6,8 +6,10 @@
 #include <string>
 #include <vector>
 
+#include "isohf/archive/textures/texture_info.h"
 #include "isohf/archive/writer.h"
-#include "isohf/convert/convert.h"
+#include "isohf/convert.h"
+#include "isohf/convert/frame/plan.h"
 #include "isohf/surface/photo/projected_photo.h"
 #include "isohf/surface/photo/texture_cutter.h"
 

@@ -18,7 +18,7 @@ namespace isohf {
 class TileSource {
  public:
   /// `limits` as TileResampler's. The conversion outlives it.
-  TileSource(const Conversion& job, const ElevationRange& limits);
+  TileSource(const Conversion& conversion, const ElevationRange& limits);
   ~TileSource();
 
   /// Tiles of one row that are cut from the same rows of the source.
@@ -44,7 +44,7 @@ class TileSource {
  private:
   struct Windows;
 
-  const Conversion& job_;
+  const Conversion& conversion_;
   std::unique_ptr<TileResampler> cutter_;
   bool cuts_windows_;  ///< tiles have their own pieces of the source
   bool reads_whole_rows_;

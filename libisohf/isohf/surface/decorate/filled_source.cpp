@@ -63,7 +63,7 @@ SourceInfo treated_info(const SourceInfo& info, const VoidTreatment& treatment) 
     treated.valid_max = std::min(info.valid_max, raw_high);
     // What a reader takes for undeclared voids is in the range or it is not; a survey says so where it still is.
     std::erase_if(treated.warnings,
-                  [](const std::string& warning) { return warning.find("--nodata") != warning.npos; });
+                  [](const Warning& warning) { return warning.kind == Warning::Kind::kUndeclaredNodata; });
   }
   treated.valid_range = treatment.valid_range;
   treated.fill_distance = treatment.distance();

@@ -152,12 +152,12 @@ GeoidSource::GeoidSource(std::unique_ptr<HeightSource> source, const GeoidReques
   const Georeference& place = info_.georeference;
   if (place.unit != HorizontalUnit::kDegree || !place.has_origin) {
     throw Error(ErrorCode::kInvalidArgument,
-                fmt::format("{}: --geoid needs an input in degrees with a place; shift this one before it is projected",
+                fmt::format("{}: `geoid` needs an input in degrees with a place; shift this one before it is projected",
                             info_.path));
   }
   if (!place.system.body.empty() && place.system.body != "Earth") {
     throw Error(ErrorCode::kInvalidArgument,
-                fmt::format("{}: --geoid holds for the Earth, the input shows {}", info_.path, place.system.body));
+                fmt::format("{}: `geoid` holds for the Earth, the input shows {}", info_.path, place.system.body));
   }
   model_ = std::make_unique<Model>(request.path);
   info_.sample_type = has_more_than_24_bits(info_.sample_type) ? SampleType::kFloat64 : SampleType::kFloat32;

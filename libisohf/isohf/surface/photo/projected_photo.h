@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "isohf/surface/photo/photo_source.h"
+#include "isohf/picture.h"
 #include "isohf/surface/photo/texture_cutter.h"
 #include "isohf/surface/resample/source_warp.h"
 

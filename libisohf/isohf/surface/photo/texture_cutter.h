@@ -6,7 +6,6 @@
 
 #include "isohf/lattice.h"
 #include "isohf/picture.h"
-#include "isohf/surface/photo/photo_source.h"
 
 namespace isohf {
 

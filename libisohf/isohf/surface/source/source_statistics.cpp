@@ -238,19 +238,19 @@ std::vector<UndeclaredVoid> SourceSurvey::undeclared_voids() const {
 
 std::string SourceSurvey::warning() const {
   // A reader that counts on its own (ASCII grids, where text is parsed anyway) has said it.
-  for (const std::string& warning : info_.warnings) {
-    if (warning.find("--nodata") != std::string::npos) return {};
+  for (const Warning& warning : info_.warnings) {
+    if (warning.kind == Warning::Kind::kUndeclaredNodata) return {};
   }
   std::string values;
-  std::string list;  // one value: --nodata takes no more
+  std::string list;  // the first one
   for (const UndeclaredVoid& found : undeclared_voids()) {
     values += fmt::format("{}{} samples hold {:.9g}{}", values.empty() ? "" : ", ", found.count, found.value,
                           found.many_values ? " or the like" : "");
     if (list.empty()) list = fmt::format("{:.9g}", found.value);
   }
   if (values.empty()) return {};
-  return fmt::format("{}, far from all others ({:.6g} to {:.6g}): if that means no elevation, give --{}", values,
-                     others_.range.min, others_.range.max, "nodata " + list);
+  return fmt::format("{}, far from all others ({:.6g} to {:.6g}): if that means no elevation, give `void_values` {}",
+                     values, others_.range.min, others_.range.max, list);
 }
 
 }  // namespace isohf

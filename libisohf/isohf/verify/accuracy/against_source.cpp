@@ -1,9 +1,6 @@
-#include "isohf/verify/accuracy/against_source.h"
-
 #include <fmt/format.h>
 #include <oneapi/tbb/enumerable_thread_specific.h>
 #include <oneapi/tbb/parallel_for.h>
-#include <oneapi/tbb/task_arena.h>
 
 #include <algorithm>
 #include <cmath>
@@ -14,6 +11,7 @@
 #include <vector>
 
 #include "isohf/archive/metadata/accuracy_info.h"
+#include "isohf/base/arena.h"
 #include "isohf/base/assert.h"
 #include "isohf/error.h"
 #include "isohf/lattice/barycentric.h"
@@ -21,6 +19,7 @@
 #include "isohf/surface.h"
 #include "isohf/surface/source/band_reader.h"
 #include "isohf/surface/source/source_statistics.h"
+#include "isohf/verify.h"
 #include "isohf/verify/accuracy/error_statistics.h"
 
 namespace isohf {
@@ -92,16 +91,16 @@ class Comparison {
     draw_points(random_points);
   }
 
-  AccuracyReport run(const std::function<void(std::int64_t, std::int64_t)>& progress, const std::atomic<bool>& cancel) {
+  AccuracyReport run(const Job& job) {
     const Prefilter samples_as_they_are = Prefilter::make(Filter::kBilinear, {});
     BandReader reader(source_, datum_, samples_as_they_are);
     AccuracyReport report;
     ErrorSums errors;
     double random_squares = 0.0;
     std::int64_t first_row = 0;
-    if (warp_) run_warped(reader, report, errors, random_squares, progress, cancel);
+    if (warp_) run_warped(reader, report, errors, random_squares, job);
     for (std::int64_t tile_row = 0; !warp_ && tile_row < grid_.tile_rows() && first_row < info_.height; ++tile_row) {
-      if (cancel.load(std::memory_order_relaxed)) throw Error(ErrorCode::kCancelled, "interrupted");
+      job.throw_if_cancelled();
       const std::int64_t end_row = rows_until(tile_row);
       if (end_row > first_row) {
         const auto band =
@@ -111,7 +110,7 @@ class Comparison {
         compare_points(surface, *band, first_row, end_row, report, random_squares);
         first_row = end_row;
       }
-      if (progress) progress(tile_row + 1, grid_.tile_rows());
+      job.report({"compare", "rows", tile_row + 1, grid_.tile_rows()});
     }
     report.samples = info_.width * info_.height;
     report.samples_compared = errors.count;
@@ -140,11 +139,11 @@ class Comparison {
 
   /// The source was projected: each sample has a place of its own, and is compared with the tile row that it lies on.
   void run_warped(BandReader& reader, AccuracyReport& report, ErrorSums& errors, double& random_squares,
-                  const std::function<void(std::int64_t, std::int64_t)>& progress, const std::atomic<bool>& cancel) {
+                  const Job& job) {
     const std::vector<SourceWarp::RowBounds> all = SourceWarp(grid_, warp_->place(), 0.0).reading_bounds();
     visited_ = 0;
     for (std::int64_t tile_row = 0; tile_row < grid_.tile_rows(); ++tile_row) {
-      if (cancel.load(std::memory_order_relaxed)) throw Error(ErrorCode::kCancelled, "interrupted");
+      job.throw_if_cancelled();
       const SourceWarp::RowBounds& bounds = all[static_cast<std::size_t>(tile_row)];
       const auto last = static_cast<double>(info_.height - 1);
       if (bounds.most >= 0.0 && bounds.least <= last) {
@@ -158,7 +157,7 @@ class Comparison {
           compare_point(surface, *band, points_[next_point_], report, random_squares);
         }
       }
-      if (progress) progress(tile_row + 1, grid_.tile_rows());
+      job.report({"compare", "rows", tile_row + 1, grid_.tile_rows()});
     }
     // Every sample lies on one tile row.
     ISOHF_ASSERT(visited_ == info_.width * info_.height);
@@ -385,12 +384,10 @@ class Comparison {
 
 }  // namespace
 
-AccuracyReport compare_with_source(const ArchiveReader& archive, HeightSource& source, std::int64_t random_points,
-                                   int threads, const std::function<void(std::int64_t, std::int64_t)>& progress,
-                                   const std::atomic<bool>& cancel) {
+AccuracyReport compare_with_source(const ArchiveReader& archive, HeightSource& source, const Job& job,
+                                   std::int64_t random_points) {
   AccuracyReport report;
-  oneapi::tbb::task_arena arena(threads > 0 ? threads : oneapi::tbb::task_arena::automatic);
-  arena.execute([&] { report = Comparison(archive, source, random_points).run(progress, cancel); });
+  Arena(job).execute([&] { report = Comparison(archive, source, random_points).run(job); });
   return report;
 }
 

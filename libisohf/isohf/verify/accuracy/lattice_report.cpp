@@ -1,13 +1,13 @@
 #include "isohf/verify/accuracy/lattice_report.h"
 
 #include <oneapi/tbb/parallel_for.h>
-#include <oneapi/tbb/task_arena.h>
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 #include <vector>
 
-#include "isohf/error.h"
+#include "isohf/base/arena.h"
 #include "isohf/verify/accuracy/plain_coding.h"
 
 namespace isohf {
@@ -31,13 +31,13 @@ std::uint64_t plain_bytes_of_tile(const TileShape& shape, const TileCodes& tile)
   return plainly_coded_bytes(visible, widths);
 }
 
-void measure_archive(const ArchiveReader& archive, LatticeReport& report, const std::atomic<bool>& cancel) {
+void measure_archive(const ArchiveReader& archive, LatticeReport& report, const Job& job) {
   const TileGrid& grid = archive.grid();
   report.triangles = grid.shape().triangle_count() * grid.tile_count();
   report.vertices = report.triangles / 2;
   std::vector<std::uint64_t> bytes(static_cast<std::size_t>(grid.tile_columns()));
   for (std::int64_t row = 0; row < grid.tile_rows(); ++row) {
-    if (cancel.load(std::memory_order_relaxed)) throw Error(ErrorCode::kCancelled, "interrupted");
+    job.throw_if_cancelled();
     oneapi::tbb::parallel_for(std::size_t{0}, bytes.size(), [&](std::size_t column) {
       const TileCodes tile = archive.read_tile({static_cast<std::int64_t>(column), row});
       bytes[column] = plain_bytes_of_tile(grid.shape(), tile);
@@ -105,15 +105,11 @@ double rounding_of(const Metadata& metadata) {
 }
 
 void compare(const ArchiveReader& archive, HeightSource& source, double iso_rms, LatticeReport& report,
-             const LatticeProgress& progress, const std::atomic<bool>& cancel) {
-  measure_archive(archive, report, cancel);
+             const Job& job) {
+  measure_archive(archive, report, job);
   int pass = 0;
   const auto measure = [&](double spacing, bool in_full) {
-    ++pass;
-    const auto tell = [&](std::int64_t done, std::int64_t total) {
-      if (progress) progress(pass, done, total);
-    };
-    return measure_ortho_twin(archive.metadata(), source, spacing, in_full, tell, cancel);
+    return measure_ortho_twin(archive.metadata(), source, spacing, in_full, "ortho " + std::to_string(++pass), job);
   };
   const double spacing = ortho_spacing(archive.grid());
   report.twin = measure(spacing, true);
@@ -132,11 +128,9 @@ void compare(const ArchiveReader& archive, HeightSource& source, double iso_rms,
 
 }  // namespace
 
-LatticeReport compare_lattices(const ArchiveReader& archive, HeightSource& source, double iso_rms, int threads,
-                               const LatticeProgress& progress, const std::atomic<bool>& cancel) {
+LatticeReport compare_lattices(const ArchiveReader& archive, HeightSource& source, double iso_rms, const Job& job) {
   LatticeReport report;
-  oneapi::tbb::task_arena arena(threads > 0 ? threads : oneapi::tbb::task_arena::automatic);
-  arena.execute([&] { compare(archive, source, iso_rms, report, progress, cancel); });
+  Arena(job).execute([&] { compare(archive, source, iso_rms, report, job); });
   return report;
 }
 

@@ -1,8 +1,6 @@
 #pragma once
 
-#include <atomic>
 #include <cstdint>
-#include <functional>
 #include <optional>
 
 #include "isohf/archive.h"
@@ -29,13 +27,9 @@ struct LatticeReport {
   std::optional<OrthoErrors> equal;
 };
 
-/// Progress of one pass: which, source rows done, of all.
-using LatticeProgress = std::function<void(int pass, std::int64_t done, std::int64_t total)>;
-
-/// `iso_rms` as compare_with_source found it. Deterministic; cost: most often three times measure_ortho_twin's.
-/// threads  0: all cores. Throws as measure_ortho_twin does.
+/// `iso_rms` as compare_with_source found it. Deterministic; cost: most often three times measure_ortho_twin's. Stages
+/// "ortho 1", "ortho 2", ... Throws as measure_ortho_twin does.
 [[nodiscard]] LatticeReport compare_lattices(const ArchiveReader& archive, HeightSource& source, double iso_rms,
-                                             int threads, const LatticeProgress& progress,
-                                             const std::atomic<bool>& cancel);
+                                             const Job& job);
 
 }  // namespace isohf

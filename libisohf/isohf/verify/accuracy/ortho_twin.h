@@ -1,9 +1,9 @@
 #pragma once
 
-#include <atomic>
 #include <cstdint>
-#include <functional>
+#include <string>
 
+#include "isohf/job.h"
 #include "isohf/metadata.h"
 #include "isohf/raster.h"
 
@@ -48,12 +48,10 @@ inline constexpr OrthoPhase kOrthoPhases[] = {{0.125, 0.375}, {0.375, 0.875}, {0
 /// acquisition, rule for its outside and quantisation, and compares its triangles with the source at every source
 /// sample as compare_with_source does. Streams: the source is read once from North to South, twice where the filter has
 /// a prefilter; memory is bounded by a few bands of rows. The same result for any number of threads.
-/// spacing  world units, > 0    in_full  also p99 and plain_bytes   progress  source rows done, of all
+/// spacing  world units, > 0    in_full  also p99 and plain_bytes   stage  that the job hears of, in source rows
 /// Works on the caller's oneTBB arena. Throws Error as the source does, Error{kInvalidArgument, kIo} where a FIR file
 /// of the acquisition is gone, Error{kCancelled}.
 [[nodiscard]] OrthoErrors measure_ortho_twin(const Metadata& surface, HeightSource& source, double spacing,
-                                             bool in_full,
-                                             const std::function<void(std::int64_t, std::int64_t)>& progress,
-                                             const std::atomic<bool>& cancel);
+                                             bool in_full, const std::string& stage, const Job& job);
 
 }  // namespace isohf

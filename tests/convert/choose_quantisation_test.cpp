@@ -1,4 +1,4 @@
-#include "isohf/convert/stages/quantiser.h"
+#include "isohf/convert/stages/choose_quantisation.h"
 
 #include <gtest/gtest.h>
 

@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "isohf/error.h"
+#include "isohf/job.h"
+#include "isohf/lattice.h"
+#include "isohf/metadata.h"
+#include "isohf/picture.h"
+#include "isohf/projection.h"
+#include "isohf/raster.h"
+#include "isohf/resampling.h"
+#include "isohf/verify.h"
+
+namespace isohf {
+
+/// How a source is laid out on the ground plane.
+struct GroundRequest {
+  /// Of degrees, auto by default; of a source on a map of its own only where the user gives one.
+  ProjectionRequest projection;
+  bool wrap_x = false;                                       ///< join the East edge to the West edge
+  std::shared_ptr<const ReferenceMap> source_map = nullptr;  ///< of a source on a map of its own, where understood
+  std::string why_no_map;                                    ///< in one line, where there is a system and no map
+};
+
+/// Looks up the map of a source that lies on one of its own, for the scales of its lengths and for other projections;
+/// request.why_no_map says why where that cannot be. Without it such a source keeps its map, unexamined.
+void understand_ground(const SourceInfo& info, GroundRequest& request);
+
+/// What is asked of the lattice and its tiles. At most one of density, spacing and tiles is given; at most one of shape
+/// and budget.
+struct PlanRequest {
+  std::optional<std::pair<int, int>> shape;  ///< C, R; nullopt: chosen
+  std::optional<int> levels;                 ///< Λ; nullopt: 4, or fewer for small sources
+  std::optional<ShapeBudget> budget;         ///< of one tile
+  std::optional<double> density;             ///< lattice samples for one source sample, > 0; nullopt: 1
+  std::optional<double> spacing;             ///< lattice column step, world units, > 0
+  std::optional<std::pair<std::int64_t, std::int64_t>> tiles;  ///< tile columns, rows
+  /// Instead: a column for each of the source's and two rows for each, so that every sample is a vertex: twice as many
+  /// vertices as samples. Not for sources that are projected or joined.
+  bool through_samples = false;
+  bool fit = false;  ///< stretch the extents a little so that tiles end on the source's edge
+  Outside outside = Outside::kCover;
+  GroundRequest ground;
+};
+
+/// Which shadow seeds an archive gets (docs/archive_format.md).
+struct ShadowSeedRequest {
+  double sun_min_deg = 2.0;     ///< hulls for every sun elevation from here on, degrees, 0.01 to below 90
+  std::vector<double> sun_deg;  ///< instead: shadow heights for these sun elevations, ascending
+};
+
+/// Which textures an archive gets (docs/decisions/0015).
+struct TextureRequest {
+  PhotoSource* photo = nullptr;         ///< must outlive the conversion
+  std::optional<TextureFormat> format;  ///< nullopt: JPEG, or PNG where the photo has alpha
+  int max_size = 1024;                  ///< texels on a side at most: a power of two, 64...4096
+  int jpeg_quality = 90;                ///< 1...100
+};
+
+/// What an archive says of its source beyond what the source itself says.
+struct SourceNote {
+  std::string name;                    ///< instead of the file's; empty: the file's
+  std::optional<MosaicRecord> mosaic;  ///< nullopt: a single file, or not to be said
+  std::optional<std::vector<std::pair<std::string, std::string>>> options;  ///< as SourceRecord has them
+  std::string fingerprint;  ///< what `resume` compares beside the file's own size and time
+};
+
+/// What a conversion does, beyond its input and output.
+struct ConvertOptions {
+  PlanRequest plan;
+  CodeType code_type = CodeType::kU16;
+  /// Nothing stored lies beyond; the lower end is the first code, the upper end another one. nullopt: taken from the
+  /// data in a first pass.
+  std::optional<std::pair<double, double>> z_range;
+  /// Elevation step of one code; nullopt: chosen (docs/decisions/0011). 0 asks for the finest that the code type holds.
+  std::optional<double> step;
+  /// Instead of a step: every vertex is stored to within that (LERC's MAX_Z_ERROR), or convert() refuses.
+  std::optional<double> max_rounding;
+  /// What to do with elevations outside z_range: false refuses, true moves them to its end and counts them.
+  bool clamp_range = false;
+  std::optional<Filter> filter;  ///< nullopt: kDefaultFilter, or with max_error what takes fewer vertices
+  Acquisition acquisition;
+  std::optional<ShadowSeedRequest> shadow_seeds;  ///< nullopt: none
+  std::optional<TextureRequest> texture;          ///< nullopt: none
+  std::string scratch_folder = ".";  ///< where rows go that memory has no room for, in a file without a name
+  bool overwrite = false;
+  bool resume = false;        ///< go on with what an interrupted run left in NAME.part
+  bool strict = false;        ///< a warning is an Error{kWarning}, and nothing is written
+  int level = kDefaultLevel;  ///< kMinLevel to kMaxLevel: the higher, the fewer bytes and the slower
+  bool lossless = false;      ///< write residuals beside the tiles, so that the source's samples come back bit for bit
+  /// Hold the surface, as drawn, to within that of every source sample that it has an elevation for. The smallest
+  /// density that does is looked for, unless `plan` gives one; the step is chosen where none is asked for. Archives are
+  /// made and measured up to eight times. Throws Error{kInvalidArgument} with the smallest error that was reached.
+  std::optional<double> max_error;
+  /// Measures the archive once it is whole but for its name; the metadata then state what was found. nullopt:
+  /// compare_with_source() where max_error is given, else nothing.
+  std::function<AccuracyReport(const std::string& archive)> measure;
+  std::string producer;  ///< for the record; empty: "isohf" and the library's version
+  SourceNote source_note;
+};
+
+/// What a conversion did.
+struct ConvertSummary {
+  explicit ConvertSummary(const TileGrid& grid) : metadata(grid) {}
+
+  Metadata metadata;
+  std::int64_t tiles_expected = 0;
+  std::int64_t tiles_written = 0;  ///< stored and void ones together: always tiles_expected on return
+  std::int64_t tiles_void = 0;
+  std::uint64_t archive_bytes = 0;
+  std::uint64_t residual_bytes = 0;  ///< of these, residuals; 0 where not lossless
+  std::uint64_t source_samples = 0;
+  std::optional<std::int64_t> source_voids;  ///< of these, void; nullopt where the first pass was spared (z_range)
+  std::uint64_t lattice_samples = 0;         ///< C*R for every tile
+  double step = 0.0;                         ///< elevation of one code
+  double worst_rounding = 0.0;
+  std::uint64_t tile_bytes = 0;  ///< of all tiles, compressed
+  std::uint64_t seed_bytes = 0;  ///< of shadow seeds, compressed
+  std::uint64_t texture_bytes = 0;
+  double pixels_per_texel = 0.0;  ///< photo pixels under the side of a texel; above 1 where max_size is in the way
+  double seconds = 0.0;
+  std::vector<Warning> warnings;
+};
+
+/// source -> tiles -> archive. Two passes over the source at most (the first only finds the range; lossless takes one
+/// more for the residuals), bounded memory, all cores; the same bytes for any job. Stages: "range", "tiles",
+/// "residuals", "compare".
+/// A conversion that is cancelled leaves NAME.part and its journal for `resume`, and nothing under the final name.
+/// Throws Error{kInvalidArgument} naming the setting at fault, kOutOfMemory where job.memory_bytes are too few, and as
+/// reading the source and writing do.
+ConvertSummary convert(HeightSource& source, const std::string& output, const ConvertOptions& options = {},
+                       const Job& job = {});
+
+/// How far a surface will lie from the source's samples, by some of them.
+struct ErrorEstimate {
+  double rms = 0.0;
+  double largest = 0.0;      ///< of those looked at: most often there are larger ones
+  std::int64_t samples = 0;  ///< that it stands on
+};
+
+/// The error that such a conversion will have, from up to 64 windows of 64 x 64 samples, at most a thirtieth of a large
+/// source: resampled and compared on the triangles as the archive will be. Deterministic. nullopt where the source
+/// would have to be unpacked as a whole or filled for it, where memory is limited, or where nothing but voids was met.
+[[nodiscard]] std::optional<ErrorEstimate> estimate_error(HeightSource& source, const ConvertOptions& options,
+                                                          const Job& job = {});
+
+}  // namespace isohf

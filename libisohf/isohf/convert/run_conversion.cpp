@@ -1,0 +1,335 @@
+#include "isohf/convert/run_conversion.h"
+
+#include "isohf/archive/codec/tile_encoder.h"
+
+#include <fmt/format.h>
+#include <oneapi/tbb/parallel_pipeline.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <optional>
+
+#include "isohf/archive/codec/tile_codes.h"
+#include "isohf/archive/metadata/accuracy_info.h"
+#include "isohf/archive/tile_statistics.h"
+#include "isohf/archive/writer.h"
+#include "isohf/base/arena.h"
+#include "isohf/base/assert.h"
+#include "isohf/convert/conversion.h"
+#include "isohf/convert/frame/plan.h"
+#include "isohf/convert/job_description.h"
+#include "isohf/convert/memory_plan.h"
+#include "isohf/convert/stages/choose_quantisation.h"
+#include "isohf/convert/stages/residual_stage.h"
+#include "isohf/convert/stages/seed_stage.h"
+#include "isohf/convert/stages/texture_stage.h"
+#include "isohf/convert/stages/tile_source.h"
+#include "isohf/error.h"
+
+namespace isohf {
+namespace {
+
+/// Elevations of one tile beyond the limits.
+struct Outliers {
+  std::int64_t vertices = 0;  ///< of all that are stored
+  std::int64_t visible = 0;   ///< of these, visible
+  GridVertex worst{};
+  double elevation = 0.0;  ///< of the worst
+};
+
+/// A tile on its way through the pipeline.
+struct TileJob {
+  TileIndex index{};
+  std::shared_ptr<const TileSource::Part> part;
+  EncodedTile encoded;
+  Outliers outliers;
+  SeedStage::Tile seeds;
+  TextureStage::Encoded texture;
+};
+
+/// What goes into an archive beside the tiles, made in the same pass; nullptr: not asked for.
+struct Stages {
+  SeedStage* seeds = nullptr;
+  const TextureStage* textures = nullptr;
+};
+
+Outliers find_outliers(const TileShape& shape, const CodeLimits& limits, double datum, std::span<const float> heights) {
+  Outliers found;
+  // Resampled level ground is level but for the rounding of floats.
+  const double largest = std::max(std::abs(limits.lowest), std::abs(limits.highest)) + std::abs(datum);
+  double worst = 4.0 * largest * double{std::numeric_limits<float>::epsilon()};
+  const double rounding = worst;
+  std::size_t i = 0;
+  for (int r = 0; r < shape.rows(); ++r) {
+    for (int c = 0; c < shape.columns(); ++c) {
+      const double elevation = double{heights[i++]} + datum;
+      const double beyond = std::max(limits.lowest - elevation, elevation - limits.highest);  // NaN compares false
+      if (!(beyond > rounding)) continue;
+      ++found.vertices;
+      found.visible += is_visible(shape, {c, r}) ? 1 : 0;
+      if (beyond <= worst) continue;
+      worst = beyond;
+      found.worst = {c, r};
+      found.elevation = elevation;
+    }
+  }
+  return found;
+}
+
+[[noreturn]] void refuse_outliers(const Conversion& conversion, TileIndex tile, const Outliers& outliers) {
+  const TileGrid& grid = conversion.plan.grid;
+  const WorldPoint place = grid.world_from_lattice(grid.lattice_vertex(tile, outliers.worst));
+  throw Error(ErrorCode::kInvalidArgument,
+              fmt::format("{}: elevation {:.9g} at x {:.9g} z {:.9g}, in tile ({},{}), lies outside `z_range` {}:{}, "
+                          "and {} more of the tile; widen the range, or give `clamp_range` to move them to its ends",
+                          conversion.source.info().path, outliers.elevation, place.x, place.z, tile.column, tile.row,
+                          conversion.limits.lowest, conversion.limits.highest, outliers.vertices - 1));
+}
+
+void make_tile(const Conversion& conversion, const TileSource& source, const CountedVertices& counted,
+               const Stages& stages, bool is_new, TileJob& tile) {
+  const TileShape& shape = conversion.plan.grid.shape();
+  std::vector<float> heights(static_cast<std::size_t>(shape.stored_vertex_count()));
+  source.cut(tile.index, *tile.part, heights);
+  TileCodes codes;
+  const QuantiserCounts counts = quantise(conversion.quantisation, conversion.limits, conversion.datum, heights, codes);
+  // Without a range from the user the codes reach over all that there is.
+  if (conversion.options.z_range || counts.below + counts.above > 0) {
+    tile.outliers = find_outliers(shape, conversion.limits, conversion.datum, heights);
+  }
+  EncodedTile& encoded = tile.encoded;
+  encoded = encode_tile(shape, codes, conversion.options.level);
+  encoded.statistics = tile_statistics(counted, tile.index, codes, conversion.quantisation);
+  encoded.statistics.clamped = tile.outliers.visible;
+  encoded.statistics.worst_rounding = counts.worst_rounding;
+  if (stages.seeds != nullptr) tile.seeds = stages.seeds->prepare(codes);
+  tile.seeds.is_empty = encoded.is_empty;
+  if (stages.textures != nullptr && is_new && !encoded.is_empty) tile.texture = stages.textures->encode(tile.index);
+}
+
+/// Second pass: read -> resample and encode -> write in order. The number of tiles in flight is fixed, and so is the
+/// number of parts of the source: one that is being cut and one that is being read.
+void write_tiles(const Conversion& conversion, ArchiveWriter& writer, const Stages& stages) {
+  const TileGrid& grid = conversion.plan.grid;
+  const CodeLimits& limits = conversion.limits;
+  TileSource source(conversion, {limits.lowest - conversion.datum, limits.highest - conversion.datum});
+  const CountedVertices counted(
+      describe_job(conversion.source.info(), conversion.plan, conversion.options, conversion.quantisation));
+  const std::int64_t first_new = writer.next_tile();
+  std::int64_t next = stages.seeds != nullptr ? SeedStage::first_tile_needed(grid, first_new) : first_new;
+  std::shared_ptr<const TileSource::Part> part;
+
+  // Tiles leave the pipeline in the order in which they enter it, so that a ring of as many as may be in flight always
+  // has the next one free. The pipeline itself only hands on pointers: it forgets to destroy what it holds when a stage
+  // throws.
+  std::vector<TileJob> ring(conversion.memory.tiles_in_flight);
+  std::size_t entered = 0;
+
+  const auto read = [&](oneapi::tbb::flow_control& control) -> TileJob* {
+    conversion.job.throw_if_cancelled();
+    if (next == grid.tile_count()) {
+      part.reset();
+      control.stop();
+      return nullptr;
+    }
+    TileJob* tile = &ring[entered++ % ring.size()];
+    *tile = {};
+    tile->index = grid.tile_at(next++);
+    if (!part || !part->holds(tile->index)) {
+      part.reset();
+      part = source.read(tile->index);
+    }
+    tile->part = part;
+    return tile;
+  };
+  const auto encode = [&](TileJob* tile) {
+    make_tile(conversion, source, counted, stages, grid.flat_index(tile->index) >= first_new, *tile);
+    tile->part.reset();
+    return tile;
+  };
+  std::int64_t written = next;
+  const auto write = [&](TileJob* tile) {
+    if (tile->outliers.vertices > 0 && !conversion.options.clamp_range)
+      refuse_outliers(conversion, tile->index, tile->outliers);
+    if (written >= first_new) {
+      if (stages.textures != nullptr) stages.textures->add(tile->index, tile->texture, writer);
+      writer.add_tile(tile->encoded);
+    }
+    if (stages.seeds != nullptr) stages.seeds->add(tile->index, std::move(tile->seeds), writer);
+    conversion.job.report({"tiles", "tiles", ++written, grid.tile_count(), writer.bytes_written()});
+  };
+
+  using oneapi::tbb::filter_mode;
+  using oneapi::tbb::make_filter;
+  oneapi::tbb::parallel_pipeline(ring.size(), make_filter<void, TileJob*>(filter_mode::serial_in_order, read) &
+                                                  make_filter<TileJob*, TileJob*>(filter_mode::parallel, encode) &
+                                                  make_filter<TileJob*, void>(filter_mode::serial_in_order, write));
+}
+
+void check_range(const std::pair<double, double>& range) {
+  if (!(std::isfinite(range.first) && std::isfinite(range.second) && range.first < range.second)) {
+    throw Error(ErrorCode::kInvalidArgument,
+                fmt::format("`z_range` is {}:{}, must be two numbers, the smaller first", range.first, range.second));
+  }
+}
+
+void refuse_warnings(const ConvertSummary& summary, const ConvertOptions& options) {
+  if (options.strict && !summary.warnings.empty()) throw error_from(summary.warnings);
+}
+
+/// What is odd before a sample is read.
+void warn_of_plan(const SourceInfo& info, const Plan& plan, const PlanRequest& request, const TextureStage* textures,
+                  std::vector<Warning>& warnings) {
+  warnings = info.warnings;
+  if (std::string text = scale_warning(info, plan.frame, request.ground.projection); !text.empty()) {
+    warnings.emplace_back(std::move(text));
+  }
+  for (std::string& text : plan_warnings(info, plan, request)) warnings.emplace_back(std::move(text));
+  if (textures != nullptr) warnings.insert(warnings.end(), textures->warnings().begin(), textures->warnings().end());
+}
+
+/// Holds what all tiles together came to against the options.
+void check_statistics(const Conversion& conversion, const TileStatistics& all, std::vector<Warning>& warnings) {
+  const std::string& path = conversion.source.info().path;
+  const ConvertOptions& options = conversion.options;
+  if (all.voids == all.vertices) {
+    throw Error(ErrorCode::kInvalidArgument,
+                fmt::format("{}: every one of the {} lattice vertices is void, nothing to write", path, all.vertices));
+  }
+  if (options.max_rounding && all.worst_rounding > *options.max_rounding * (1.0 + 1e-6)) {
+    throw Error(ErrorCode::kInvalidArgument,
+                fmt::format("{}: elevations are rounded by up to {:.3g} as {}, more than `max_rounding` {}; use that "
+                            "much, or another `code_type`",
+                            path, all.worst_rounding, to_string(options.code_type), *options.max_rounding));
+  }
+  if (all.clamped > 0) {
+    warnings.push_back(
+        loss(fmt::format("{}: {} of {} lattice vertices lay outside {} to {} and were moved to its ends", path,
+                         all.clamped, all.vertices, conversion.limits.lowest, conversion.limits.highest)));
+  }
+}
+
+/// The accuracy of the archive as it will be, by the surface that a reader of it finds.
+AccuracyReport measure(const std::string& archive, const Conversion& conversion) {
+  if (conversion.options.measure) return conversion.options.measure(archive);
+  ArchiveReader reader(archive);
+  reader.set_source_map(conversion.options.plan.ground.source_map);
+  return compare_with_source(reader, conversion.source, conversion.job);
+}
+
+AccuracyInfo info_of(const AccuracyReport& report, const ConvertOptions& options, const Quantisation& quantisation,
+                     double worst_rounding) {
+  return {report.samples_compared,
+          report.samples_lost,
+          report.rms,
+          report.max,
+          options.max_error,
+          options.code_type == CodeType::kF32 ? worst_rounding : 0.5 * quantisation.scale};
+}
+
+}  // namespace
+
+ConversionResult run_conversion(HeightSource& source, const Plan& plan, const std::string& output,
+                                const ConvertOptions& options, const Job& job, bool is_retry) {
+  const auto start = std::chrono::steady_clock::now();
+  const SourceInfo& info = source.info();
+  if (options.z_range) check_range(*options.z_range);
+  if (options.shadow_seeds) check_seed_request(*options.shadow_seeds, plan.grid);
+  std::optional<TextureStage> textures;
+  if (options.texture) {
+    textures.emplace(TextureStage::make(plan, info, *options.texture, threads_of(job), textured_tiles_in_flight(job)));
+  }
+  const Kernel kernel = Kernel::make(options.filter.value_or(kDefaultFilter));
+  Prefilter prefilter = Prefilter::make(kernel.filter(), options.acquisition);
+  const MemoryPlan memory = plan_memory(source, plan, options, job, textures ? textures->memory_bytes() : 0);
+  check_memory(memory, job);
+  source.limit_buffers(memory.source_buffer_bytes);
+  if (options.lossless && info.fill_distance > 0 && &source.as_stored() == &source) {
+    throw Error(ErrorCode::kInvalidArgument,
+                fmt::format("{}: `lossless` keeps the samples as they were before `fill`, which are out of reach; "
+                            "leave one of the two out",
+                            info.path));
+  }
+  ConversionResult result{ConvertSummary(plan.grid), {}};
+  ConvertSummary& summary = result.summary;
+  Metadata& metadata = summary.metadata;
+  warn_of_plan(info, plan, options.plan, textures ? &*textures : nullptr, summary.warnings);
+  refuse_warnings(summary, options);
+  ArchiveWriter writer(output, plan.grid,
+                       {options.overwrite, options.resume, job_fingerprint(info, plan, options),
+                        metadata_room(describe_job(info, plan, options, {}))});
+  Conversion conversion{source, options, plan, memory, kernel, std::move(prefilter), job};
+  std::optional<SeedStage> seeds;
+  std::optional<LosslessRecord> lossless;
+  try {
+    Arena(job).execute([&] {
+      choose_codes(conversion, summary);
+      refuse_warnings(summary, options);
+      if (options.shadow_seeds) {
+        // Lengths of both kinds are compared as metres where both are known to be.
+        const bool known = plan.frame.in_metres && !info.vertical_unit.empty();
+        seeds.emplace(plan.grid, conversion.quantisation, *options.shadow_seeds,
+                      known ? 1.0 / info.metres_per_vertical_unit : 1.0);
+      }
+      write_tiles(conversion, writer, {seeds ? &*seeds : nullptr, textures ? &*textures : nullptr});
+      if (options.lossless) {
+        lossless = write_residuals(source.as_stored(), plan.frame, plan.grid, conversion.quantisation,
+                                   memory.members_at_once, writer, job);
+      }
+    });
+
+    const TileStatistics all = writer.statistics();
+    check_statistics(conversion, all, summary.warnings);
+    refuse_warnings(summary, options);
+    metadata = describe_job(info, plan, options, conversion.quantisation);
+    metadata.statistics = total_statistics(all);
+    if (seeds) {
+      const ShadowSeedInfo record = seeds->info(writer);
+      summary.seed_bytes = record.bytes;
+      metadata.extensions.emplace_back(kShadowSeedsName, format_shadow_seed_info(record));
+    }
+    if (textures) {
+      const TextureInfo record = textures->info(writer);
+      summary.texture_bytes = record.bytes;
+      summary.pixels_per_texel = textures->pixels_per_texel();
+      metadata.textures = {texture_name_pattern(record.format)};
+      metadata.extensions.emplace_back(kTileTexturesName, format_texture_info(record));
+    }
+    if (lossless) {
+      summary.residual_bytes = lossless->residual_bytes;
+      metadata.extensions.emplace_back(kLosslessName, format_lossless(*lossless));
+    }
+    summary.tiles_expected = plan.grid.tile_count();
+    summary.tiles_written = writer.next_tile();
+    summary.tiles_void = summary.tiles_written - writer.tiles_stored();
+    ISOHF_ASSERT(summary.tiles_written == summary.tiles_expected);
+    summary.tile_bytes = writer.tile_bytes();
+    if (options.measure || options.max_error) {
+      writer.complete(metadata);
+      result.measured = measure(writer.part(), conversion);
+      const AccuracyInfo found = info_of(*result.measured, options, metadata.quantisation, all.worst_rounding);
+      result.is_finished = !options.max_error || found.max <= *options.max_error;
+      if (result.is_finished) metadata.extensions.emplace_back(kAccuracyName, format_accuracy_info(found));
+    }
+    summary.archive_bytes = result.is_finished ? writer.finish(metadata) : writer.bytes_written();
+  } catch (const Error& error) {
+    if (is_retry) throw;
+    // What is done stays for a resume when the user or the system ended it.
+    if (error.code() == ErrorCode::kCancelled) writer.keep_part();
+    if (error.code() != ErrorCode::kIo || !writer.keep_part()) throw;
+    throw Error(ErrorCode::kIo,
+                fmt::format("{}; {}.part keeps what is done, `resume` goes on from there", error.what(), output));
+  }
+  metadata.tiles_stored = writer.tiles_stored();
+  summary.source_samples = static_cast<std::uint64_t>(info.width) * static_cast<std::uint64_t>(info.height);
+  summary.lattice_samples = static_cast<std::uint64_t>(plan.lattice_samples);
+  summary.step = metadata.quantisation.type == CodeType::kF32 ? 0.0 : metadata.quantisation.scale;
+  summary.worst_rounding = metadata.statistics.worst_rounding;
+  summary.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return result;
+}
+
+}  // namespace isohf
