@@ -13,7 +13,7 @@ namespace {
 using testing::HasSubstr;
 
 ProjectionProblem problem_of(const GeoExtent& ground, bool goes_round = false) {
-  return {"dem.tif", "", {}, ground, goes_round, ""};
+  return {"dem.tif", "", {}, ground, goes_round, false};
 }
 
 ProjectionChoice choose(const std::string& request, const GeoExtent& ground, bool goes_round = false) {

@@ -48,7 +48,7 @@ void for_each_map(const Test& test) {
     for (const ProjectionKind kind : kMaps) {
       if (kind == ProjectionKind::kUtm && !(ground.ellipsoid == kEarth)) continue;
       const ProjectionChoice choice =
-          choose_projection(request_of(kind), {"dem.tif", "", ground.ellipsoid, ground.extent, false, ""});
+          choose_projection(request_of(kind), {"dem.tif", "", ground.ellipsoid, ground.extent, false, false});
       SCOPED_TRACE(to_string(kind) + " at longitude " + std::to_string(ground.extent.west) + ", latitude " +
                    std::to_string(ground.extent.south));
       test(ground, Projection(choice.spec), choice.error);
@@ -168,7 +168,7 @@ TEST(Projection, AgreesWithSnydersExamples) {
 TEST(Projection, UtmIsUtm) {
   for (const GeoExtent& extent : {GeoExtent{6.0, 44.0, 7.0, 45.0}, GeoExtent{145.0, -36.0, 146.0, -35.0}}) {
     const ProjectionChoice choice =
-        choose_projection(request_of(ProjectionKind::kUtm), {"dem.tif", "Earth", kEarth, extent, false, ""});
+        choose_projection(request_of(ProjectionKind::kUtm), {"dem.tif", "Earth", kEarth, extent, false, false});
     int zone = 0;
     bool is_north = false;
     double x = 0.0;
@@ -184,7 +184,7 @@ TEST(Projection, UtmIsUtm) {
 TEST(Projection, ALengthOfAnotherBodyIsThatBodys) {
   // A degree of the meridian of a sphere.
   const ProjectionChoice choice = choose_projection(request_of(ProjectionKind::kLocal),
-                                                    {"moon.img", "Moon", kMoon, {10.0, 0.0, 11.0, 1.0}, false, ""});
+                                                    {"moon.img", "Moon", kMoon, {10.0, 0.0, 11.0, 1.0}, false, false});
   const Projection map(choice.spec);
   EXPECT_NEAR(map.forward({10.5, 1.0}).northing - map.forward({10.5, 0.0}).northing, 1737400.0 * M_PI / 180.0, 1e-6);
 }

@@ -25,7 +25,7 @@ struct Scene {
 Scene make_scene(const std::string& request, const GeoExtent& ground, std::int64_t width, std::int64_t height,
                  bool goes_round = false, const Ellipsoid& ellipsoid = {}) {
   const ProjectionSpec spec =
-      choose_projection(ProjectionRequest::parse(request), {"dem.tif", "", ellipsoid, ground, goes_round, ""}).spec;
+      choose_projection(ProjectionRequest::parse(request), {"dem.tif", "", ellipsoid, ground, goes_round, false}).spec;
   const MapBounds bounds = projected_bounds(Projection(spec), ground);
   const double dx = (ground.east - ground.west) / static_cast<double>(width);
   const double dz = (ground.north - ground.south) / static_cast<double>(height);

@@ -31,7 +31,7 @@ struct Fixture {
           const std::function<double(double longitude, double latitude)>& height_at, bool goes_round = false)
       : grid(TileGrid::make(TileShape::make(36, 35, 2), 1, 1, 1.0, 1.0)) {
     const ProjectionSpec spec =
-        choose_projection(ProjectionRequest::parse(request), {"dem.tif", "", {}, ground, goes_round, ""}).spec;
+        choose_projection(ProjectionRequest::parse(request), {"dem.tif", "", {}, ground, goes_round, false}).spec;
     const MapBounds bounds = projected_bounds(Projection(spec), ground);
     const double dx = (ground.east - ground.west) / static_cast<double>(width);
     const double dz = (ground.north - ground.south) / static_cast<double>(height);
