@@ -276,7 +276,7 @@ std::vector<MosaicSource::Part> MosaicSource::parts_in(std::size_t layer, const 
     part.row = next->row;
     if (overlap(part.column, part.own.column, part.own.columns, next->width, window.column, window.columns) > 0 &&
         overlap(part.row, part.own.row, part.own.rows, next->height, window.row, window.rows) > 0) {
-      parts.push_back(std::move(part));
+      parts.push_back(part);
     }
   }
   std::sort(parts.begin(), parts.end(), [&](const Part& a, const Part& b) {

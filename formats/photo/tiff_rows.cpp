@@ -53,9 +53,9 @@ class TiffRows final : public PhotoRows {
     describe(*image.handle, layout, info);
     const std::uint32_t directory = image.directories.main;
     const int planes = layout.separate ? kept_ : 1;
-    for (int plane = 0; plane < planes; ++plane) {
-      if (plane > 0) image = open_image(file_, directory);
-      planes_.push_back(std::make_unique<TiffBlocks>(file_, spread(layout), std::move(image), plane));
+    planes_.push_back(std::make_unique<TiffBlocks>(file_, spread(layout), std::move(image), 0));
+    for (int plane = 1; plane < planes; ++plane) {
+      planes_.push_back(std::make_unique<TiffBlocks>(file_, spread(layout), open_image(file_, directory), plane));
     }
     info.random_access = layout.tiled || layout.block_height < layout.height;
     const std::int64_t unit = planes_.front()->unit_rows();

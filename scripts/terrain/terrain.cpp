@@ -224,7 +224,7 @@ Terrain::Terrain(const TerrainOptions& options) : options_(options) {
   for (std::size_t i = 0; i < bend_.size(); ++i) {
     bend_[i] = make_lattice((i % 2 == 0 ? 1.7 : 0.6) * feature, feature, turn++, ++seed);
   }
-  void_edge_ = make_lattice(kVoidCell / 4, feature, turn++, ++seed);
+  void_edge_ = make_lattice(kVoidCell / 4.0, feature, turn++, ++seed);
   for (std::size_t i = 0; i < ridges_.size(); ++i) {
     ridges_[i] = make_lattice(feature / static_cast<double>(1 << i), feature, turn++, ++seed);
   }

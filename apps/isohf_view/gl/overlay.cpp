@@ -114,9 +114,10 @@ void Overlay::draw(const std::vector<std::string>& lines, int view_width, int vi
     for (const char character : line) {
       const int glyph = character - kFirstGlyph;
       if (glyph > 0 && glyph < kGlyphCount) {
-        add_quad(corners, x, y, kGlyphWidth * scale, kGlyphHeight * scale,
-                 static_cast<float>(glyph % kColumns * kGlyphWidth),
-                 static_cast<float>(glyph / kColumns * kGlyphHeight), kGlyphWidth, kGlyphHeight);
+        const int column = glyph % kColumns;
+        const int row = glyph / kColumns;
+        add_quad(corners, x, y, kGlyphWidth * scale, kGlyphHeight * scale, static_cast<float>(column * kGlyphWidth),
+                 static_cast<float>(row * kGlyphHeight), kGlyphWidth, kGlyphHeight);
       }
       x += kAdvance * scale;
     }

@@ -123,7 +123,7 @@ void quintic_prefilter(std::span<double> line) {
   for (double& value : line) value *= 120.0;
 }
 
-SplineRows::SplineRows(const TileGrid& grid, std::vector<double> columns_x, bool wraps_x)
+SplineRows::SplineRows(const TileGrid& grid, const std::vector<double>& columns_x, bool wraps_x)
     : grid_(grid), wraps_x_(wraps_x) {
   // Even k are odd z, with vertices at object-space x = -1, 1, ...; odd k have them at -2, 0, ...
   for (const double x : columns_x) {

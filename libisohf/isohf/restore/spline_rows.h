@@ -37,7 +37,7 @@ class SplineRows {
  public:
   /// columns_x [n]  the world x of the columns that are wanted, increasing
   /// wraps_x        rows go all the way round: behind their East end they begin again
-  SplineRows(const TileGrid& grid, std::vector<double> columns_x, bool wraps_x);
+  SplineRows(const TileGrid& grid, const std::vector<double>& columns_x, bool wraps_x);
 
   [[nodiscard]] std::int64_t rows() const { return grid_.tile_rows() * grid_.shape().cell_rows() + 3; }
   [[nodiscard]] std::int64_t tile_row_of(std::int64_t row) const;

@@ -112,10 +112,10 @@ struct RowReader::State {
     oneapi::tbb::parallel_for(oneapi::tbb::blocked_range<std::size_t>(0, at.size(), 1024), [&](const auto& part) {
       for (std::size_t i = part.begin(); i < part.end(); ++i) {
         const auto sample = static_cast<std::int64_t>(i);
-        const auto column = static_cast<double>(sample % grid.width);
-        const auto row = static_cast<double>(first + sample / grid.width);
-        at[i] =
-            georeference->world_from_geo({grid.first_x + column * grid.spacing_x, grid.first_z - row * grid.spacing_z});
+        const std::int64_t column = sample % grid.width;
+        const std::int64_t row = first + sample / grid.width;
+        at[i] = georeference->world_from_geo({grid.first_x + static_cast<double>(column) * grid.spacing_x,
+                                              grid.first_z - static_cast<double>(row) * grid.spacing_z});
       }
     });
     points->sample(at, elevations);

@@ -195,8 +195,8 @@ class Verification {
     add_seed_problems(seeds_->check_row(row, codes));
   }
 
-  void add_seed_problems(std::vector<SeedCheck::Problem> problems) {
-    for (auto& [tile, text] : problems) add(make(finding::kShadowSeeds, tile, std::move(text)));
+  void add_seed_problems(const std::vector<SeedCheck::Problem>& problems) {
+    for (const auto& [tile, text] : problems) add(make(finding::kShadowSeeds, tile, text));
   }
 
   TileRow read_row(std::int64_t row) {

@@ -211,8 +211,10 @@ void ProjectedPhoto::fill(const Window& block, Places& places) const {
   };
   bool is_close = true;
   for (int i = 0; is_close && i < kProbes * kProbes; ++i) {
-    const double s = static_cast<double>(i % kProbes) / (kProbes - 1);
-    const double t = static_cast<double>(i / kProbes) / (kProbes - 1);
+    const int column = i % kProbes;
+    const int row = i / kProbes;
+    const double s = static_cast<double>(column) / (kProbes - 1);
+    const double t = static_cast<double>(row) / (kProbes - 1);
     const SourcePosition exact = at(column_at(s), row_at(t), near_u);
     const SourcePosition found = between(s, t);
     // False as well where either is NaN.

@@ -120,7 +120,7 @@ double reach_of(const Acquisition& acquisition) {
     case Acquisition::Kind::kGaussian:
       return kGaussianReach * acquisition.sigma;
     case Acquisition::Kind::kFir:
-      return static_cast<double>(acquisition.taps.size() / 2);
+      return (static_cast<double>(acquisition.taps.size()) - 1.0) / 2.0;  // their number is odd
   }
   return 0.0;
 }

@@ -248,7 +248,7 @@ Prefilter Prefilter::make(Filter filter, const Acquisition& acquisition, Edges e
   for (std::size_t k = 0; k <= kLongestHalo; ++k) {
     double sum = 0.5 * (inverse.front() + ((k & 1U) != 0 ? -inverse.back() : inverse.back()));
     for (std::size_t j = 1; j < kCircle / 2; ++j) sum += inverse[j] * cosines[(j * k) % kCircle];
-    taps.push_back(sum / (kCircle / 2));
+    taps.push_back(2.0 * sum / static_cast<double>(kCircle));
   }
   double tail = 0.0;
   while (taps.size() > 1 && tail + 2.0 * std::abs(taps.back()) < kTail) {
