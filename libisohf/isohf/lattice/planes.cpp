@@ -1,0 +1,141 @@
+#include "isohf/lattice/planes.h"
+
+#include <algorithm>
+#include <bit>
+
+#include "isohf/base/assert.h"
+#include "isohf/lattice/lod.h"
+
+namespace isohf {
+namespace {
+
+constexpr int kStrides[] = {8, 4};
+
+bool allows(const TileShape& shape, int stride) {
+  return shape.cell_columns() % stride == 0 && shape.cell_rows() / 2 % stride == 0;
+}
+
+std::int64_t tiles_above(std::int64_t tiles, int stride) {
+  return (tiles + stride - 1) / stride;
+}
+
+TileShape with_levels(const TileShape& shape, int levels) {
+  return levels <= shape.levels() ? shape : TileShape::make(shape.columns(), shape.rows(), levels);
+}
+
+}  // namespace
+
+int plane_stride(const TileShape& shape) {
+  for (const int stride : kStrides) {
+    if (allows(shape, stride)) return stride;
+  }
+  return 0;
+}
+
+int plane_count(const TileGrid& grid, int stride) {
+  int count = 0;
+  for (std::int64_t tiles = std::max(grid.tile_columns(), grid.tile_rows()); tiles > 1; ++count) {
+    tiles = tiles_above(tiles, stride);
+  }
+  return count;
+}
+
+std::vector<std::uint32_t> side_stitch_indices(const TileShape& shape, TileSide side, int stride) {
+  ISOHF_ASSERT(std::has_single_bit(static_cast<unsigned>(stride)) && allows(shape, stride));
+  const int south = shape.rows() - 2;
+  const auto east = [&](int row) { return shape.columns() - (row % 2 == 0 ? 2 : 3); };
+  const bool along_z = side == TileSide::kWest || side == TileSide::kEast;
+  const int end = along_z ? south : shape.columns() - 3;
+  const auto vertex = [&](int along) -> GridVertex {
+    switch (side) {
+      case TileSide::kWest:
+        return {1, along};
+      case TileSide::kEast:
+        return {east(along), along};
+      case TileSide::kNorth:
+        return {along, 1};
+      case TileSide::kSouth:
+        break;
+    }
+    return {along, south};
+  };
+  // The border runs down the West edge and on counter-clockwise seen from above.
+  const bool forwards = side == TileSide::kWest || side == TileSide::kSouth;
+  std::vector<std::uint32_t> list;
+  for (int step = 2; step <= stride; step *= 2) {
+    for (int along = 1; along < end; along += step) {
+      const int kept[] = {along, along + step};
+      for (const int at : {kept[forwards ? 0 : 1], kept[forwards ? 1 : 0], along + step / 2}) {
+        const GridVertex at_vertex = vertex(at);
+        list.push_back(static_cast<std::uint32_t>(at_vertex.column + at_vertex.row * shape.columns()));
+      }
+    }
+  }
+  return list;
+}
+
+Planes::Planes(const TileGrid& grid, int stride, int count, bool wraps_x)
+    : stride_(stride), wraps_x_(wraps_x), mesh_shape_(grid.shape()) {
+  grids_.push_back(grid);
+  if (count == 0) return;
+  ISOHF_ASSERT(stride >= 2 && std::has_single_bit(static_cast<unsigned>(stride)) && allows(grid.shape(), stride));
+  step_ = std::countr_zero(static_cast<unsigned>(stride));
+  mesh_shape_ = with_levels(grid.shape(), step_ + 1);
+  for (int plane = 1; plane <= count; ++plane) {
+    const TileGrid& below = grids_.back();
+    grids_.push_back(TileGrid::make(grid.shape(), tiles_above(below.tile_columns(), stride),
+                                    tiles_above(below.tile_rows(), stride), below.extent_x() * stride,
+                                    below.extent_z() * stride));
+  }
+}
+
+PlaneLevel Planes::at_level(int level) const {
+  const int plane = count() == 0 ? 0 : std::min(level / step_, count());
+  return {plane, level - plane * step_};
+}
+
+PlaneBlend Planes::blend(double level) const {
+  const LodBlend blend = lod_blend(level, levels());
+  return {at_level(blend.first), at_level(blend.second), blend.alpha};
+}
+
+int Planes::plane_for_spacing(double step_x, double step_z) const {
+  int plane = 0;
+  while (plane < count() && 2.0 * grid(plane + 1).sigma_x() <= step_x && grid(plane + 1).sigma_z() <= step_z) ++plane;
+  return plane;
+}
+
+std::int64_t Planes::x_below(int below, int plane, std::int64_t x) const {
+  const std::int64_t width = grid(below).tile_columns() * 2 * grid(below).shape().cell_columns();
+  x *= scale(plane - below);
+  if (wraps_x_ && grid(plane).tile_columns() * scale(plane) == grid(0).tile_columns()) {
+    if (x < 0) return x + width;
+    if (x > width) return x - width;
+  }
+  return std::clamp(x, std::int64_t{0}, width);
+}
+
+std::int64_t Planes::z_below(int below, int plane, std::int64_t z) const {
+  return std::clamp(z * scale(plane - below), std::int64_t{0},
+                    grid(below).tile_rows() * grid(below).shape().cell_rows());
+}
+
+TileVertex Planes::vertex_below(int plane, TileIndex tile, GridVertex vertex) const {
+  if (plane == 0) return {tile, vertex};
+  const LatticeVertex at = place(plane, grid(plane).lattice_vertex(tile, vertex));
+  const TileGrid& fine = grid(0);
+  const std::int64_t width = 2 * fine.shape().cell_columns();
+  const std::int64_t height = fine.shape().cell_rows();
+  const TileIndex holds{std::min(at.x / width, fine.tile_columns() - 1), std::min(at.z / height, fine.tile_rows() - 1)};
+  return {holds,
+          {static_cast<int>((at.x - holds.column * width) / 2 + 1), static_cast<int>(at.z - holds.row * height + 1)}};
+}
+
+TileRange Planes::below(int plane, TileIndex tile) const {
+  const TileGrid& fine = grid(plane - 1);
+  const TileIndex first{tile.column * stride_, tile.row * stride_};
+  return {first,
+          {std::min(first.column + stride_, fine.tile_columns()), std::min(first.row + stride_, fine.tile_rows())}};
+}
+
+}  // namespace isohf

@@ -1,0 +1,112 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "isohf/lattice.h"
+
+/// Coarse planes: the levels of detail (paper sections 3.4-3.8) carried on above a tile.
+///
+/// Plane 0 is the grid of tiles. A tile of plane p stands for S x S tiles of plane p-1 and so for F x F tiles, F = S^p.
+/// Its vertex at (X, Z), continued over the plane's tiles as a LatticeVertex is, is the vertex of plane 0 at
+/// (F·X, F·Z): F is even, so that is a visible vertex of an odd row, those that Eq. 1 slides included. What would lie
+/// beyond the last tiles of plane 0 is moved to their edge, place and elevation alike, so that every plane covers the
+/// same ground to its very edge.
+///
+/// One level of detail runs through all planes: level p·log2(S) + λ is level λ of plane p, and level 0 of plane p takes
+/// the place of level log2(S) of plane p-1. The two are the same mesh, but for the vertices that the finer one has on
+/// straight edges between tiles that the coarser one joins: there two halves make one triangle.
+
+namespace isohf {
+
+/// The four sides of a tile.
+enum class TileSide { kWest, kEast, kNorth, kSouth };
+
+/// S for tiles of a shape: 8, or else 4, where C-4 and (R-3)/2 are multiples of it; 0 where there are no planes.
+[[nodiscard]] int plane_stride(const TileShape& shape);
+/// Planes above the tiles until one tile is left; stride a power of two >= 2.
+[[nodiscard]] int plane_count(const TileGrid& grid, int stride);
+
+/// Indices c + r*C of the triangles that a tile draws on one side beside a tile of the next coarser plane, with
+/// whatever level's strip and whole stitch list: the stitch triangles of strides 2 to `stride` of that side, wound the
+/// other way, so that they leave the coarser tile's border. Finest first. C-4 and (R-3)/2 are multiples of `stride`.
+[[nodiscard]] std::vector<std::uint32_t> side_stitch_indices(const TileShape& shape, TileSide side, int stride);
+
+/// A level of one plane.
+struct PlaneLevel {
+  int plane;
+  int level;  ///< λ
+  friend bool operator==(const PlaneLevel&, const PlaneLevel&) = default;
+};
+
+/// What to draw at a fractional level, as LodBlend says.
+struct PlaneBlend {
+  PlaneLevel first;
+  PlaneLevel second;
+  double alpha;
+};
+
+/// A vertex of plane 0.
+struct TileVertex {
+  TileIndex tile;
+  GridVertex vertex;
+  friend bool operator==(const TileVertex&, const TileVertex&) = default;
+};
+
+/// Tiles of one plane, `end` past the last ones.
+struct TileRange {
+  TileIndex first;
+  TileIndex end;
+};
+
+/// All planes of a heightfield. Immutable.
+class Planes {
+ public:
+  /// `count` planes above the tiles of `grid`; 0: none, and stride is not looked at. Otherwise stride is a power of two
+  /// >= 2 of which C-4 and (R-3)/2 are multiples, and each tile of the last plane has less than 2^62 half steps.
+  Planes(const TileGrid& grid, int stride, int count, bool wraps_x);
+
+  [[nodiscard]] int stride() const { return stride_; }
+  [[nodiscard]] int count() const { return static_cast<int>(grids_.size()) - 1; }
+  /// Tiles of a plane, 0 <= plane <= count(); extents are those of F tiles, beyond the last tiles of plane 0 too.
+  [[nodiscard]] const TileGrid& grid(int plane) const { return grids_[static_cast<std::size_t>(plane)]; }
+  /// S^plane.
+  [[nodiscard]] std::int64_t scale(int plane) const { return std::int64_t{1} << (plane * step_); }
+  /// The tiles' shape with as many levels as planes take, log2(S)+1, or more: whose strips and stitch lists are drawn.
+  [[nodiscard]] const TileShape& mesh_shape() const { return mesh_shape_; }
+
+  /// Levels 0 to levels()-1 through all planes.
+  [[nodiscard]] int levels() const { return count() * step_ + grid(0).shape().levels(); }
+  [[nodiscard]] PlaneLevel at_level(int level) const;
+  /// lod_blend() through all planes. `level` as fractional_level(area_px, levels()) gives it.
+  [[nodiscard]] PlaneBlend blend(double level) const;
+  /// The coarsest plane whose vertices lie no further apart than so many world units along x and z; 0 where none.
+  [[nodiscard]] int plane_for_spacing(double step_x, double step_z) const;
+
+  /// Where a vertex of a plane lies, in the lattice of plane 0: what the mesh is drawn at.
+  [[nodiscard]] LatticeVertex place(int plane, LatticeVertex vertex) const { return place_in(0, plane, vertex); }
+  /// The vertex of plane 0 whose code the stored vertex of a plane's tile, padding included, has.
+  [[nodiscard]] TileVertex vertex_below(int plane, TileIndex tile, GridVertex vertex) const;
+
+  /// The tile of plane+1 above a tile, and the tiles of plane-1 below one.
+  [[nodiscard]] TileIndex above(TileIndex tile) const { return {tile.column / stride_, tile.row / stride_}; }
+  [[nodiscard]] TileRange below(int plane, TileIndex tile) const;
+
+  /// One coordinate of place(): where vertices of `plane` at x and z lie in a finer plane `below`, of which they are
+  /// vertices likewise.
+  [[nodiscard]] std::int64_t x_below(int below, int plane, std::int64_t x) const;
+  [[nodiscard]] std::int64_t z_below(int below, int plane, std::int64_t z) const;
+
+ private:
+  [[nodiscard]] LatticeVertex place_in(int below, int plane, LatticeVertex vertex) const {
+    return {x_below(below, plane, vertex.x), z_below(below, plane, vertex.z)};
+  }
+
+  int stride_;
+  int step_ = 0;  ///< log2(S)
+  bool wraps_x_;
+  TileShape mesh_shape_;
+  std::vector<TileGrid> grids_;
+};
+
+}  // namespace isohf
