@@ -96,6 +96,16 @@ TEST(Planes, EachVertexIsOneOfTheTilesBelow) {
   }
 }
 
+TEST(Planes, VerticesFarBeyondTheTilesAreVoid) {
+  const TileGrid grid = TileGrid::make(TileShape::make(12, 19, 4), 9, 9, 1.0, 1.0);  // 144 x 144
+  const Planes planes(grid, 8, 2, false);
+  EXPECT_FALSE(planes.is_beyond(1, {34, 26}));  // 8 steps of 2 and 1 behind 18
+  EXPECT_TRUE(planes.is_beyond(1, {35, 26}));
+  EXPECT_TRUE(planes.is_beyond(1, {34, 27}));
+  EXPECT_FALSE(planes.is_beyond(1, {-2, -1}));
+  EXPECT_FALSE(planes.is_beyond(0, {200, 200}));  // padding of tiles
+}
+
 TEST(Planes, PaddingOfAJoinedPlaneIsTheOtherEdges) {
   const TileGrid grid = TileGrid::make(TileShape::make(12, 19, 4), 64, 3, 1.0, 1.0);
   const Planes planes(grid, 8, 2, true);
@@ -132,6 +142,10 @@ std::set<PlaceTriangle> mesh_of(const Planes& planes, int plane, int level) {
           (b.second - a.second) * (c.first - a.first) - (b.first - a.first) * (c.second - a.second);
       EXPECT_GE(area, 0) << name_of(planes);
       if (area == 0) continue;
+      for (const std::uint32_t index : t) {
+        const LatticeVertex v = grid.lattice_vertex(grid.tile_at(i), vertex_of(shape, index));
+        EXPECT_FALSE(planes.is_beyond(plane, v)) << name_of(planes);
+      }
       EXPECT_TRUE(mesh.insert(turned(places)).second) << name_of(planes);
     }
   }

@@ -105,10 +105,24 @@ int Planes::plane_for_spacing(double step_x, double step_z) const {
   return plane;
 }
 
+bool Planes::is_joined(int plane) const {
+  return wraps_x_ && grid(plane).tile_columns() * scale(plane) == grid(0).tile_columns();
+}
+
+bool Planes::is_beyond(int plane, LatticeVertex vertex) const {
+  const TileShape& shape = grid(0).shape();
+  const std::int64_t reach = std::int64_t{1} << (mesh_shape_.levels() - 1);
+  const auto is_far = [&](std::int64_t at, std::int64_t cells, std::int64_t step) {
+    return (at - reach * step) * scale(plane) > cells;
+  };
+  return plane > 0 && ((!is_joined(plane) && is_far(vertex.x, grid(0).tile_columns() * 2 * shape.cell_columns(), 2)) ||
+                       is_far(vertex.z, grid(0).tile_rows() * shape.cell_rows(), 1));
+}
+
 std::int64_t Planes::x_below(int below, int plane, std::int64_t x) const {
   const std::int64_t width = grid(below).tile_columns() * 2 * grid(below).shape().cell_columns();
   x *= scale(plane - below);
-  if (wraps_x_ && grid(plane).tile_columns() * scale(plane) == grid(0).tile_columns()) {
+  if (is_joined(plane)) {
     if (x < 0) return x + width;
     if (x > width) return x - width;
   }

@@ -10,8 +10,9 @@
 /// Plane 0 is the grid of tiles. A tile of plane p stands for S x S tiles of plane p-1 and so for F x F tiles, F = S^p.
 /// Its vertex at (X, Z), continued over the plane's tiles as a LatticeVertex is, is the vertex of plane 0 at
 /// (F·X, F·Z): F is even, so that is a visible vertex of an odd row, those that Eq. 1 slides included. What would lie
-/// beyond the last tiles of plane 0 is moved to their edge, place and elevation alike, so that every plane covers the
-/// same ground to its very edge.
+/// beyond the tiles of plane 0 is moved to their edge, place and elevation alike, so that every plane covers the same
+/// ground to its very edge. What lies further beyond than the step of the coarsest level is part of no triangle that
+/// has an area, and void.
 ///
 /// One level of detail runs through all planes: level p·log2(S) + λ is level λ of plane p, and level 0 of plane p takes
 /// the place of level log2(S) of plane p-1. The two are the same mesh, but for the vertices that the finer one has on
@@ -85,7 +86,9 @@ class Planes {
 
   /// Where a vertex of a plane lies, in the lattice of plane 0: what the mesh is drawn at.
   [[nodiscard]] LatticeVertex place(int plane, LatticeVertex vertex) const { return place_in(0, plane, vertex); }
-  /// The vertex of plane 0 whose code the stored vertex of a plane's tile, padding included, has.
+  /// True where it is further beyond the tiles of plane 0 than has an elevation: a void.
+  [[nodiscard]] bool is_beyond(int plane, LatticeVertex vertex) const;
+  /// The vertex of plane 0 whose code the stored vertex of a plane's tile, padding included, has if it isn't beyond.
   [[nodiscard]] TileVertex vertex_below(int plane, TileIndex tile, GridVertex vertex) const;
 
   /// The tile of plane+1 above a tile, and the tiles of plane-1 below one.
@@ -98,6 +101,7 @@ class Planes {
   [[nodiscard]] std::int64_t z_below(int below, int plane, std::int64_t z) const;
 
  private:
+  [[nodiscard]] bool is_joined(int plane) const;
   [[nodiscard]] LatticeVertex place_in(int below, int plane, LatticeVertex vertex) const {
     return {x_below(below, plane, vertex.x), z_below(below, plane, vertex.z)};
   }
