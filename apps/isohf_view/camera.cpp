@@ -6,7 +6,17 @@
 namespace isohf::view {
 namespace {
 
-constexpr double kSteepest_rad = 1.553;  // 89 degrees: straight down has no heading
+constexpr double kSteepest_rad = 1.5707;  // straight down has no heading
+
+/// Turns a vector about an axis of length 1, counter-clockwise seen against the axis.
+Vec3 turned(Vec3 v, Vec3 axis, double angle_rad) {
+  const double c = std::cos(angle_rad);
+  return c * v + std::sin(angle_rad) * cross(axis, v) + (1.0 - c) * dot(axis, v) * axis;
+}
+
+double whole_turn(double angle_rad) {
+  return std::remainder(angle_rad, 2.0 * std::acos(-1.0));
+}
 
 }  // namespace
 
@@ -17,46 +27,42 @@ Vec3 Camera::forward() const {
 
 void Camera::look_at(Vec3 from, Vec3 target) {
   eye = from;
-  pivot = target;
   const Vec3 way = target - from;
-  distance = std::max(length(way), 1e-9);
+  const double distance = std::max(length(way), 1e-9);
   if (way.x != 0.0 || way.z != 0.0) heading_rad = std::atan2(way.x, -way.z);
   pitch_rad = std::clamp(std::asin(std::clamp(way.y / distance, -1.0, 1.0)), -kSteepest_rad, kSteepest_rad);
 }
 
 void Camera::turn(double heading_change_rad, double pitch_change_rad) {
-  heading_rad = std::remainder(heading_rad + heading_change_rad, 2.0 * std::acos(-1.0));
+  heading_rad = whole_turn(heading_rad + heading_change_rad);
   pitch_rad = std::clamp(pitch_rad + pitch_change_rad, -kSteepest_rad, kSteepest_rad);
-  if (kind == Kind::kOrbit) {
-    eye = pivot - distance * forward();
-  } else {
-    pivot = eye + distance * forward();
-  }
 }
 
-void Camera::move(double right, double up, double ahead) {
-  const Vec3 east{std::cos(heading_rad), 0.0, std::sin(heading_rad)};
-  const Vec3 front = kind == Kind::kFly ? forward() : Vec3{std::sin(heading_rad), 0.0, -std::cos(heading_rad)};
-  const Vec3 step = right * east + Vec3{0.0, up, 0.0} + ahead * front;
-  eye = eye + step;
-  pivot = pivot + step;
+void Camera::orbit(Vec3 about, double heading_change_rad, double pitch_change_rad) {
+  const double before = pitch_rad;
+  const Vec3 axis = right();
+  turn(0.0, pitch_change_rad);
+  const Vec3 tilted = turned(eye - about, axis, pitch_rad - before);
+  eye = about + turned(tilted, {0.0, -1.0, 0.0}, heading_change_rad);
+  turn(heading_change_rad, 0.0);
 }
 
-void Camera::zoom(double factor) {
-  if (kind == Kind::kOrbit) {
-    distance *= factor;
-    eye = pivot - distance * forward();
-  } else {
-    move(0.0, 0.0, distance * (1.0 - factor));
-  }
+Vec3 ray_through(const Camera& camera, const ViewState& view, double x, double y) {
+  const double half_y = std::tan(view.fov_y_rad / 2.0);
+  const double half_x = half_y * view.width / view.height;
+  const Vec3 up = cross(camera.right(), camera.forward());
+  return normalised(camera.forward() + x * half_x * camera.right() + y * half_y * up);
 }
 
-void Camera::switch_kind() {
-  kind = kind == Kind::kFly ? Kind::kOrbit : Kind::kFly;
-  pivot = eye + distance * forward();
+Camera between(const Camera& from, const Camera& to, double share) {
+  Camera out;
+  out.eye = from.eye + share * (to.eye - from.eye);
+  out.heading_rad = whole_turn(from.heading_rad + share * whole_turn(to.heading_rad - from.heading_rad));
+  out.pitch_rad = from.pitch_rad + share * (to.pitch_rad - from.pitch_rad);
+  return out;
 }
 
-Camera overview_camera(const TileSource& source, const ViewState& view) {
+Camera overview_camera(const TileSource& source, const ViewState& view, Vec3* target) {
   const TileBounds whole = whole_bounds(source);
   const WorldBounds covered = source.covered();
   const double low = whole.low * view.exaggeration;
@@ -89,6 +95,7 @@ Camera overview_camera(const TileSource& source, const ViewState& view) {
   }
   const Vec3 up{camera.at(1, 0), camera.at(1, 1), camera.at(1, 2)};
   const Vec3 pivot = middle + lift * up;
+  if (target != nullptr) *target = pivot;
   Camera out;
   out.look_at(pivot + distance * way, pivot);
   return out;

@@ -7,30 +7,32 @@ namespace isohf::view {
 
 /// Where a viewer stands and looks. Angles: heading clockwise from North, pitch up from the horizon.
 struct Camera {
-  enum class Kind { kFly, kOrbit };
-
-  Kind kind = Kind::kOrbit;
   Vec3 eye;
   double heading_rad = 0.0;
   double pitch_rad = 0.0;
-  Vec3 pivot;  ///< orbit: looked at, eye = pivot - distance * forward
-  double distance = 1.0;
 
   [[nodiscard]] Vec3 forward() const;
+  [[nodiscard]] Vec3 right() const { return {std::cos(heading_rad), 0.0, std::sin(heading_rad)}; }
 
-  /// Looks from `eye` at `target`, which becomes the pivot.
+  /// Looks from `from` at `target`.
   void look_at(Vec3 from, Vec3 target);
-  /// Mouse drag: turns the head (fly) or walks round the pivot (orbit).
+  /// Turns the head.
   void turn(double heading_change_rad, double pitch_change_rad);
-  /// Steps to the right, up and ahead, world units; the pivot goes along.
-  void move(double right, double up, double ahead);
-  /// Orbit: changes the distance from the pivot by a factor; fly: moves ahead.
-  void zoom(double factor);
-  void switch_kind();
+  /// Walks round a point, which stays where it is on the screen. Stops short of straight up and down.
+  void orbit(Vec3 about, double heading_change_rad, double pitch_change_rad);
+
+  friend bool operator==(const Camera&, const Camera&) = default;
 };
 
-/// A camera that sees all that the source covers from the South-East, as large as the view takes.
-[[nodiscard]] Camera overview_camera(const TileSource& source, const ViewState& view);
+/// Direction of the ray through a place on the screen: x and y from -1 to 1, eastwards and upwards of its middle.
+[[nodiscard]] Vec3 ray_through(const Camera& camera, const ViewState& view, double x, double y);
+
+/// Part of the way from one camera to another, 0...1, the short way round.
+[[nodiscard]] Camera between(const Camera& from, const Camera& to, double share);
+
+/// A camera that sees all that the source covers from the South-East, as large as the view takes; what it looks at goes
+/// to `target` where wanted.
+[[nodiscard]] Camera overview_camera(const TileSource& source, const ViewState& view, Vec3* target = nullptr);
 
 /// Distance from a point to the farthest corner of the heightfield, of which `whole` are the bounds.
 [[nodiscard]] double farthest_corner(const TileGrid& grid, const TileBounds& whole, Vec3 eye, double exaggeration);

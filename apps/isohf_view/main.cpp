@@ -22,6 +22,9 @@ namespace {
 
 using nlohmann::ordered_json;
 
+/// Samples a pixel of a picture, which may take its time.
+constexpr int kPictureSamples = 4;
+
 /// A call that throws once the program was interrupted.
 std::function<void()> interrupt_check() {
   return [&interrupted = cli::watch_interrupts()] {
@@ -31,14 +34,14 @@ std::function<void()> interrupt_check() {
 
 int take_screenshot(const TileSource& source, const Options& options) {
   Session session(source, options);
-  const Offscreen target(options.view.width, options.view.height, GL_RGBA8);
+  const Offscreen target(options.view.width, options.view.height, GL_RGBA8, options.samples.value_or(kPictureSamples));
   session.complete_frame();
   if (session.is_cut() && !options.common.quiet) {
     cli::print_warning(
         fmt::format("--memory {}M holds the tiles within {:.0f} world units of the eye; what lies beyond is left out",
                     options.memory_mib, session.box().figures().radius));
   }
-  write_picture(options.screenshot, target.width(), target.height());
+  target.write_picture(options.screenshot);
   print_result(options.common, "", [&] {
     return ordered_json{{"archive", options.archive},
                         {"screenshot", options.screenshot},

@@ -124,7 +124,7 @@ void add_picture(CommandLine& line, Options& options) {
               [&](const std::string& text) { options.position = parse_place(text); });
   line.option("--look-at", "X,Y,Z", "Look there",
               [&](const std::string& text) { options.look_at = parse_place(text); });
-  line.flag("--fly", "Begin with the fly camera rather than the orbit camera", options.fly);
+  line.flag("--fly", "Begin with the left button turning the head rather than dragging the ground", options.fly);
   line.option("--fov", "DEG", "Vertical field of view, 1 to 150 (default 50)", [&](const std::string& text) {
     options.view.fov_y_rad = cli::parse_number_in(text, 1.0, 150.0) * std::acos(-1.0) / 180.0;
   });
@@ -134,6 +134,12 @@ void add_picture(CommandLine& line, Options& options) {
               "Draw heights F times as high (default 1, or less where the ground's unit is not known and heights would "
               "tower over it)",
               [&](const std::string& text) { options.exaggeration = cli::parse_positive_number(text); });
+  line.option("--samples", "N",
+              "Draw pixels as means of 1, 2, 4 or 8 samples (default 4; 1 in a window that no GPU draws)",
+              [&](const std::string& text) {
+                constexpr int kSamples[] = {1, 2, 4, 8};
+                options.samples = kSamples[cli::parse_word(text, {"1", "2", "4", "8"})];
+              });
   line.option("--mode", "NAME",
               "Colour by elevation, plain, levels, strips, texture or normals (default: texture where the archive has "
               "textures, else elevation)",

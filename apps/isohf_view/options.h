@@ -35,6 +35,7 @@ struct Options {
   std::optional<bool> shadows;            ///< nullopt: where the archive has seeds
   std::optional<double> shadow_softness;  ///< k of Eq. 16, world units; nullopt: default_softness()
   std::optional<double> far_distance;
+  std::optional<int> samples;  ///< a pixel; nullopt: 4, but 1 in a window that software draws
   std::uint64_t memory_mib = 512;
   std::uint64_t upload_mib = 4;
   int threads = 0;  ///< workers that decode; 0: one less than the machine's cores

@@ -9,9 +9,10 @@ namespace {
 
 constexpr const char* kSkyVertex = R"glsl(#version 330 core
 out vec2 v_ndc;
+uniform float far_depth;
 void main() {
   v_ndc = vec2(float((gl_VertexID & 1) * 4 - 1), float((gl_VertexID & 2) * 2 - 1));
-  gl_Position = vec4(v_ndc, 1.0, 1.0);
+  gl_Position = vec4(v_ndc, far_depth, 1.0);
 }
 )glsl";
 
@@ -52,14 +53,25 @@ Vec3 by_day(Vec3 colour, Vec3 sun) {
   return std::clamp(sun.y * 5.0 + 0.35, 0.06, 1.0) * colour;
 }
 
+/// The least near distance, of the far distance.
+double least_near(DepthOrder order) {
+  return order == DepthOrder::kNearIsOne ? 1e-7 : 2e-4;
+}
+
+/// Units of polygon offset towards the eye.
+float offset_nearer(DepthOrder order, float units) {
+  return order == DepthOrder::kNearIsOne ? units : -units;
+}
+
 /// True where all corners of the box lie beyond one and the same plane of the clip volume.
-bool outside_view(const Mat4& clip, const TileVolume& box) {
+bool outside_view(const Mat4& clip, DepthOrder order, const TileVolume& box) {
   std::array<int, 5> beyond{};
   for (int corner = 0; corner < 8; ++corner) {
     const Vec3 at = box_corner(box.low, box.high, corner);
     const auto along = [&](int row) { return clip.along(row, at) + clip.at(row, 3); };
     const double w = along(3);
-    const std::array<bool, 5> is_beyond{along(0) < -w, along(0) > w, along(1) < -w, along(1) > w, along(2) > w};
+    const std::array<bool, 5> is_beyond{along(0) < -w, along(0) > w, along(1) < -w, along(1) > w,
+                                        order == DepthOrder::kNearIsOne ? along(2) < 0.0 : along(2) > w};
     for (std::size_t plane = 0; plane < 5; ++plane) beyond[plane] += is_beyond[plane] ? 1 : 0;
   }
   return std::find(beyond.begin(), beyond.end(), 8) != beyond.end();
@@ -83,13 +95,18 @@ bool reaches_beyond(const TileGrid& grid, TileIndex tile, const WorldBounds& cov
 
 }  // namespace
 
-TerrainFrame terrain_frame(const TileSource& source, const ViewState& view, double nearest) {
+DepthOrder best_depth_order() {
+  const bool can = epoxy_gl_version() >= 45 || epoxy_has_gl_extension("GL_ARB_clip_control");
+  return can ? DepthOrder::kNearIsOne : DepthOrder::kNearIsZero;
+}
+
+TerrainFrame terrain_frame(const TileSource& source, const ViewState& view, double nearest, DepthOrder order) {
   const TileGrid& grid = source.grid();
   const double aspect = static_cast<double>(view.width) / view.height;
   TerrainFrame frame;
-  const double near_distance = std::clamp(nearest, view.far_distance * kNearShare, 0.5 * view.far_distance);
-  frame.clip_from_eye =
-      perspective(view.fov_y_rad, aspect, near_distance, view.far_distance) * look_along(view.forward);
+  const double near_distance = std::clamp(nearest, view.far_distance * least_near(order), 0.5 * view.far_distance);
+  const auto projection = order == DepthOrder::kNearIsOne ? perspective_reversed : perspective;
+  frame.clip_from_eye = projection(view.fov_y_rad, aspect, near_distance, view.far_distance) * look_along(view.forward);
   frame.anchor_tile = grid.locate({view.eye.x, view.eye.z}).tile;
   frame.anchor = {static_cast<double>(frame.anchor_tile.column) * grid.extent_x() - view.eye.x,
                   source.scale().offset * view.exaggeration - view.eye.y,
@@ -101,9 +118,9 @@ TerrainFrame terrain_frame(const TileSource& source, const ViewState& view, doub
   return frame;
 }
 
-void begin_opaque_pass() {
+void begin_opaque_pass(DepthOrder order) {
   glEnable(GL_DEPTH_TEST);
-  glDepthFunc(GL_LESS);
+  glDepthFunc(order == DepthOrder::kNearIsOne ? GL_GREATER : GL_LESS);
   glDepthMask(GL_TRUE);
   glDisable(GL_BLEND);
 }
@@ -122,8 +139,8 @@ void begin_fading_pass(bool write_depth) {
 // in and then switching to the coarse mesh at β = ½ is only seamless if the coarse mesh counts as in front there in
 // both stages: nearer by eight depth steps while it fades in over the fine one, and the fine one farther by eight while
 // it fades out over the coarse one.
-void order_fading(const LodBlend& blend) {
-  glPolygonOffset(0.0F, blend.second > blend.first ? -8.0F : 8.0F);
+void order_fading(const LodBlend& blend, DepthOrder order) {
+  glPolygonOffset(0.0F, offset_nearer(order, blend.second > blend.first ? 8.0F : -8.0F));
 }
 
 void end_fading_pass() {
@@ -182,7 +199,7 @@ void Renderer::find_visible(Frame& frame, const TileRange& range, const Resident
       const TileBounds bounds = source_.bounds(tile);
       if (!bounds.stored) continue;
       const TileVolume box = tile_volume(grid, tile, bounds, view);
-      if (outside_view(frame.terrain.clip_from_eye, box)) continue;
+      if (outside_view(frame.terrain.clip_from_eye, order_, box)) continue;
       const TileSlot* slot = resident(tile);
       if (slot == nullptr) {
         ++frame.figures.absent_tiles;
@@ -259,7 +276,7 @@ void Renderer::draw_mesh(Frame& frame, const TerrainProgram& program, const Item
 }
 
 void Renderer::draw_opaque(Frame& frame) {
-  begin_opaque_pass();
+  begin_opaque_pass(order_);
   for (const bool rim : {false, true}) {
     const TerrainProgram& program = shading(frame.view, rim);
     begin_shading(frame, program);
@@ -279,7 +296,7 @@ void Renderer::draw_fading(Frame& frame) {
     begin_shading(frame, program);
     for (auto item = frame.items.rbegin(); item != frame.items.rend(); ++item) {
       if (item->is_rim != rim || !fades(*item)) continue;
-      order_fading(item->blend);
+      order_fading(item->blend, order_);
       glUniform1f(program.uniform("alpha"), static_cast<float>(item->blend.alpha));
       draw_mesh(frame, program, *item, item->blend.second);
       drawn_.push_back({item->tile, item->blend.second});
@@ -291,7 +308,7 @@ void Renderer::draw_fading(Frame& frame) {
 void Renderer::draw_wires(Frame& frame) const {
   glPolygonMode(GL_FRONT_AND_BACK, GL_LINE);
   glEnable(GL_POLYGON_OFFSET_LINE);
-  glPolygonOffset(-1.0F, -2.0F);
+  glPolygonOffset(offset_nearer(order_, 1.0F), offset_nearer(order_, 2.0F));
   glEnable(GL_BLEND);
   glBlendFunc(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA);
   for (const bool rim : {false, true}) {
@@ -328,17 +345,19 @@ void Renderer::draw_sky(const ViewState& view) const {
   set_vec3(sky_.uniform("horizon"), by_day(kHorizon, sun));
   set_vec3(sky_.uniform("zenith"), by_day(kZenith, sun));
   // At the far end of depth: only where no ground is.
-  glDepthFunc(GL_LEQUAL);
+  const bool reversed = order_ == DepthOrder::kNearIsOne;
+  glUniform1f(sky_.uniform("far_depth"), reversed ? 0.0F : 1.0F);
+  glDepthFunc(reversed ? GL_GEQUAL : GL_LEQUAL);
   glDepthMask(GL_FALSE);
   glBindVertexArray(nothing_.get());
   glDrawArrays(GL_TRIANGLES, 0, 3);
   glDepthMask(GL_TRUE);
-  glDepthFunc(GL_LESS);
+  glDepthFunc(reversed ? GL_GREATER : GL_LESS);
 }
 
 FrameFigures Renderer::draw(const ViewState& view, const TileRange& range, const ResidentTile& resident) {
   drawn_.clear();
-  Frame frame{view, terrain_frame(source_, view), {}, {}};
+  Frame frame{view, terrain_frame(source_, view, 0.0, order_), {}, {}};
   find_visible(frame, range, resident);
   // Depth is fine only near the eye: begin it where the ground begins, or two meshes of one hill cannot be told apart.
   double nearest = view.far_distance;
@@ -346,10 +365,12 @@ FrameFigures Renderer::draw(const ViewState& view, const TileRange& range, const
   // In the corners of the view depth is the least part of distance.
   const double half_y = std::tan(view.fov_y_rad / 2.0);
   const double half_x = half_y * view.width / view.height;
-  frame.terrain = terrain_frame(source_, view, 0.95 * nearest / std::sqrt(1.0 + half_x * half_x + half_y * half_y));
+  nearest *= 0.95 / std::sqrt(1.0 + half_x * half_x + half_y * half_y);
+  frame.terrain = terrain_frame(source_, view, nearest, order_);
+  const bool reversed = order_ == DepthOrder::kNearIsOne;
+  if (reversed) glClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
+  glClearDepth(reversed ? 0.0 : 1.0);
   glViewport(0, 0, view.width, view.height);
-  glEnable(GL_DEPTH_TEST);
-  glDepthFunc(GL_LESS);
   glDepthMask(GL_TRUE);
   glFrontFace(GL_CCW);
   glCullFace(GL_BACK);
@@ -367,6 +388,8 @@ FrameFigures Renderer::draw(const ViewState& view, const TileRange& range, const
     ++frame.figures.passes;
   }
   glBindVertexArray(0);
+  glClearDepth(1.0);
+  if (reversed) glClipControl(GL_LOWER_LEFT, GL_NEGATIVE_ONE_TO_ONE);
   return frame.figures;
 }
 

@@ -14,6 +14,13 @@
 
 namespace isohf::view {
 
+/// How depth runs: from 0 near to 1 far, as GL has it; or from 1 near to 0 far, which with floats is fine at any
+/// distance and lets the near plane stand at the eye.
+enum class DepthOrder { kNearIsZero, kNearIsOne };
+
+/// kNearIsOne where the driver can (GL_ARB_clip_control, OpenGL 4.5).
+[[nodiscard]] DepthOrder best_depth_order();
+
 /// What one frame drew.
 struct FrameFigures {
   std::int64_t visible_tiles = 0;  ///< in the view and resident
@@ -90,6 +97,7 @@ class Renderer {
   const TileSource& source_;
   const SharedGeometry& shared_;
   TileBounds whole_;
+  DepthOrder order_ = best_depth_order();
   std::map<std::tuple<ColourMode, bool, bool>, TerrainProgram> shading_;  ///< by mode, borders, rim
   std::vector<DrawnMesh> drawn_;
   TerrainPrograms flat_;
@@ -100,17 +108,15 @@ class Renderer {
 };
 
 /// The frame's uniforms for a view: positions are told from an anchor tile under the eye, in floats near the eye.
-/// nearest  distance from the eye within which nothing is drawn; kNearShare of the far distance where smaller.
-[[nodiscard]] TerrainFrame terrain_frame(const TileSource& source, const ViewState& view, double nearest = 0.0);
+/// nearest  distance from the eye within which nothing is drawn; a least share of the far distance where smaller.
+[[nodiscard]] TerrainFrame terrain_frame(const TileSource& source, const ViewState& view, double nearest = 0.0,
+                                         DepthOrder order = DepthOrder::kNearIsZero);
 
 /// The GL state of the opaque and of the fading pass; verifying draws with the same.
-void begin_opaque_pass();
+void begin_opaque_pass(DepthOrder order = DepthOrder::kNearIsZero);
 void begin_fading_pass(bool write_depth = true);
 /// Before a tile's second mesh is drawn in the fading pass.
-void order_fading(const LodBlend& blend);
+void order_fading(const LodBlend& blend, DepthOrder order = DepthOrder::kNearIsZero);
 void end_fading_pass();
-
-/// Nearest and farthest depth that a frame draws.
-inline constexpr double kNearShare = 2e-4;  ///< of the far distance
 
 }  // namespace isohf::view

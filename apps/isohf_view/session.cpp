@@ -42,14 +42,15 @@ double default_exaggeration(const TileSource& source, const TileBounds& whole) {
   return source.is_to_scale() || range < 0.5 * side ? 1.0 : 0.25 * side / range;
 }
 
-const std::vector<std::string> kHelpLines{"W A S D, arrows  move          drag left   turn",
-                                          "Q E              down, up      drag right  move sideways",
-                                          "Shift, Ctrl      fast, slow    wheel       nearer, farther",
-                                          "C  fly or orbit                R  back to the start",
+const std::vector<std::string> kHelpLines{"drag left   move the ground      wheel         nearer, farther",
+                                          "drag right  turn about it        double click  go there",
+                                          "W A S D, arrows  fly   Q E  down, up   Shift, Ctrl  fast, slow",
+                                          "C or Alt  left button looks round      Y  measure from here",
+                                          "Home  all   N  North up   T  from above   R  back to the start",
                                           "J L  sun round   I K  sun up and down   U  shadows",
                                           "+ -  vertical exaggeration     [ ]  far distance",
                                           "M  colours       X  wires      B  tile borders",
-                                          "T  fade or switch levels       Z  haze   V  beyond the source",
+                                          "G  fade or switch levels       Z  haze   V  beyond the source",
                                           "P  picture       F  figures    H  this help     Esc  end"};
 
 const char* mode_name(ColourMode mode) {
@@ -120,25 +121,26 @@ Session::Session(const TileSource& source, const Options& options)
   } else if (view.mode == ColourMode::kTexture) {
     throw Error(ErrorCode::kInvalidArgument, "--mode texture: this archive has no textures; convert with --texture");
   }
-  camera = first_camera();
+  Vec3 target;
+  camera = first_camera(target);
   const auto exaggerated = [this](Vec3 at) { return Vec3{at.x, at.y * view.exaggeration, at.z}; };
   if (options.position || options.look_at) {
     camera.look_at(options.position ? exaggerated(*options.position) : camera.eye,
-                   options.look_at ? exaggerated(*options.look_at) : camera.pivot);
+                   options.look_at ? exaggerated(*options.look_at) : target);
   }
-  if (options.fly) camera.kind = Camera::Kind::kFly;
 }
 
-Camera Session::first_camera() const {
-  Camera all = overview_camera(source_, view);
+Camera Session::first_camera(Vec3& target) const {
+  Camera all = overview_camera(source_, view, &target);
   // Where memory does not hold what that sees, stand nearer, over the middle.
   const double needed = farthest_corner(source_.grid(), whole_, all.eye, view.exaggeration);
   const double reach = box_.fitting_radius(needed);
   if (reach < needed) {
-    const Vec3 way = normalised(all.eye - all.pivot);
+    const Vec3 way = -1.0 * all.forward();
     const WorldBounds covered = source_.covered();
     const Vec3 middle{0.5 * (covered.x0 + covered.x1), 0.5 * (whole_.low + whole_.high) * view.exaggeration,
                       0.5 * (covered.z0 + covered.z1)};
+    target = middle;
     all.look_at(middle + 0.3 * reach * way, middle);
   }
   return all;
@@ -200,8 +202,14 @@ std::string Session::shadow_line() const {
   return to_come > 0 ? fmt::format("{}, {} to come", line, to_come) : line;
 }
 
-void Session::draw_overlay(double frames_per_second, bool figures, bool help) const {
-  const int size = std::max(1, view.height / 400);
+bool Session::is_settled() const {
+  const TileBoxFigures& box = box_.figures();
+  return box.missing_tiles == 0 && box.shadows_to_come == 0 && (!shows_textures() || textures_->figures().to_come == 0);
+}
+
+void Session::draw_overlay(double frames_per_second, bool figures, bool help,
+                           const std::vector<std::string>& reading) const {
+  const int size = std::max(1, view.height / 350);
   if (figures) {
     const TileBoxFigures& box = box_.figures();
     std::vector<std::string> lines{
@@ -209,8 +217,8 @@ void Session::draw_overlay(double frames_per_second, bool figures, bool help) co
                     cli::describe_count(figures_.triangles), figures_.draw_calls),
         fmt::format("{} tiles drawn, {} resident, {} to come, {:.1f} MiB", figures_.visible_tiles, box.resident_tiles,
                     box.missing_tiles, static_cast<double>(box.resident_bytes) / (1 << 20)),
-        fmt::format("x {:.0f}  y {:.0f}  z {:.0f}   {}   {}", camera.eye.x, camera.eye.y / view.exaggeration,
-                    camera.eye.z, camera.kind == Camera::Kind::kFly ? "fly" : "orbit", mode_name(view.mode)),
+        fmt::format("eye x {:.0f}  y {:.0f}  z {:.0f}   {}", camera.eye.x, camera.eye.y / view.exaggeration,
+                    camera.eye.z, mode_name(view.mode)),
         fmt::format("sun {:.0f}, {:.0f} deg   height x {:.2g}   {}", sun_azimuth_deg, sun_elevation_deg,
                     view.exaggeration, help ? "" : "H help"),
         shadow_line()};
@@ -224,6 +232,7 @@ void Session::draw_overlay(double frames_per_second, bool figures, bool help) co
       lines.push_back(fmt::format("far distance cut to {:.0f} by --memory", box.radius));
     }
     if (box_.error()) lines.push_back(box_.error()->substr(0, 100));
+    lines.insert(lines.end(), reading.begin(), reading.end());
     overlay_.draw(lines, view.width, view.height, size);
   }
   if (help) overlay_.draw(kHelpLines, view.width, view.height, size, true);

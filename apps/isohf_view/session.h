@@ -46,8 +46,8 @@ class Session {
   void complete_frame();
   /// Changes the far distance by a factor.
   void scale_far(double factor) { far_distance_ = view.far_distance * factor; }
-  /// Figures, and the keys where `help`, over the frame.
-  void draw_overlay(double frames_per_second, bool figures, bool help) const;
+  /// Figures, and the keys where `help`, over the frame; `reading` is of the place under the cursor.
+  void draw_overlay(double frames_per_second, bool figures, bool help, const std::vector<std::string>& reading) const;
 
   Camera camera;
   ViewState view;
@@ -55,6 +55,8 @@ class Session {
   double sun_elevation_deg;
   bool shadows;  ///< wanted; drawn where the source has seeds
 
+  /// True where the next frame would show the same: nothing is on its way.
+  [[nodiscard]] bool is_settled() const;
   /// True where memory ended the last frame before the far distance.
   [[nodiscard]] bool is_cut() const { return cut_; }
   [[nodiscard]] const FrameFigures& figures() const { return figures_; }
@@ -68,7 +70,7 @@ class Session {
  private:
   void prepare();
   void draw();
-  [[nodiscard]] Camera first_camera() const;
+  [[nodiscard]] Camera first_camera(Vec3& target) const;
   [[nodiscard]] bool shows_textures() const { return textures_ && view.mode == ColourMode::kTexture; }
   [[nodiscard]] std::string shadow_line() const;
 

@@ -9,6 +9,10 @@
 #include <cmath>
 #include <filesystem>
 #include <memory>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -17,9 +21,13 @@
 #include "isohf/error.h"
 #include "output/standard_output.h"
 #include "session.h"
+#include "steering.h"
 
 namespace isohf::view {
 namespace {
+
+/// How long an idle window sleeps at most: workers that have failed are then seen.
+constexpr double kIdle_s = 0.5;
 
 std::string glfw_error() {
   const char* text = nullptr;
@@ -58,48 +66,72 @@ class Window {
   GLFWwindow* window_ = nullptr;
 };
 
-/// Keys and mouse onto a session.
+/// Keys and mouse onto a session. All comes by callback, so that no click is lost between two slow frames.
 class Controls {
  public:
-  Controls(GLFWwindow* window, Session& session) : window_(window), session_(session), start_(session.camera) {
+  Controls(GLFWwindow* window, Session& session, bool look)
+      : window_(window),
+        session_(session),
+        ground_(session.source()),
+        steering_(session.source(), ground_, session.camera, session.view),
+        start_(session.camera),
+        looks_(look) {
     glfwSetWindowUserPointer(window, this);
     glfwSetKeyCallback(window, [](GLFWwindow* w, int key, int, int action, int) {
+      of(w).changed_ = true;
+      if (action == GLFW_PRESS) of(w).tapped_.insert(key);
       if (action != GLFW_RELEASE) of(w).press(key);
     });
-    glfwSetScrollCallback(
-        window, [](GLFWwindow* w, double, double steps) { of(w).session_.camera.zoom(std::pow(0.88, steps)); });
-    glfwGetCursorPos(window, &mouse_x_, &mouse_y_);
+    glfwSetMouseButtonCallback(
+        window, [](GLFWwindow* w, int button, int action, int mods) { of(w).click(button, action, mods); });
+    glfwSetCursorPosCallback(window, [](GLFWwindow* w, double x, double y) { of(w).move(x, y); });
+    glfwSetScrollCallback(window, [](GLFWwindow* w, double, double steps) {
+      of(w).changed_ = true;
+      of(w).steering_.wheel(steps, of(w).cursor_);
+    });
+    glfwSetFramebufferSizeCallback(window, [](GLFWwindow* w, int, int) { of(w).changed_ = true; });
+    glfwSetWindowRefreshCallback(window, [](GLFWwindow* w) { of(w).changed_ = true; });
+    glfwSetCursorEnterCallback(window, [](GLFWwindow* w, int inside) {
+      of(w).changed_ = true;
+      of(w).inside_ = inside == GLFW_TRUE;
+    });
   }
 
-  /// Held keys and drags, `seconds` since the last call.
-  void update(double seconds) {
-    Camera& camera = session_.camera;
-    double speed = 0.6 * camera.distance * seconds;
-    if (held(GLFW_KEY_LEFT_SHIFT) || held(GLFW_KEY_RIGHT_SHIFT)) speed *= 4.0;
-    if (held(GLFW_KEY_LEFT_CONTROL) || held(GLFW_KEY_RIGHT_CONTROL)) speed *= 0.2;
-    camera.move(speed * axis(GLFW_KEY_D, GLFW_KEY_RIGHT, GLFW_KEY_A, GLFW_KEY_LEFT),
-                speed * axis(GLFW_KEY_E, GLFW_KEY_PAGE_UP, GLFW_KEY_Q, GLFW_KEY_PAGE_DOWN),
-                speed * axis(GLFW_KEY_W, GLFW_KEY_UP, GLFW_KEY_S, GLFW_KEY_DOWN));
-    session_.sun_azimuth_deg += 40.0 * seconds * axis(GLFW_KEY_L, GLFW_KEY_L, GLFW_KEY_J, GLFW_KEY_J);
-    session_.sun_elevation_deg =
-        std::clamp(session_.sun_elevation_deg + 25.0 * seconds * axis(GLFW_KEY_I, GLFW_KEY_I, GLFW_KEY_K, GLFW_KEY_K),
-                   -10.0, 90.0);
-    double x = 0.0;
-    double y = 0.0;
-    glfwGetCursorPos(window_, &x, &y);
-    const double dx = (x - mouse_x_) / session_.view.height;
-    const double dy = (y - mouse_y_) / session_.view.height;
-    mouse_x_ = x;
-    mouse_y_ = y;
-    if (glfwGetMouseButton(window_, GLFW_MOUSE_BUTTON_LEFT) == GLFW_PRESS) {
-      // Flying turns the head towards the mouse; orbiting drags the ground along.
-      const double sense = camera.kind == Camera::Kind::kFly ? 1.0 : -1.0;
-      camera.turn(sense * 2.5 * dx, -sense * 2.5 * dy);
-    }
-    if (glfwGetMouseButton(window_, GLFW_MOUSE_BUTTON_RIGHT) == GLFW_PRESS) {
-      camera.move(-dx * camera.distance, 0.0, dy * camera.distance);
-    }
+  /// Held keys and what goes on by itself, `seconds` since the last call. True where the picture has changed since.
+  bool update(double seconds) {
+    bool moves = changed_ || steering_.is_flying();
+    changed_ = false;
+    const double hurry = held(GLFW_KEY_LEFT_SHIFT) || held(GLFW_KEY_RIGHT_SHIFT)       ? 4.0
+                         : held(GLFW_KEY_LEFT_CONTROL) || held(GLFW_KEY_RIGHT_CONTROL) ? 0.2
+                                                                                       : 1.0;
+    const Vec3 walk{axis(GLFW_KEY_D, GLFW_KEY_RIGHT, GLFW_KEY_A, GLFW_KEY_LEFT),
+                    axis(GLFW_KEY_E, GLFW_KEY_PAGE_UP, GLFW_KEY_Q, GLFW_KEY_PAGE_DOWN),
+                    axis(GLFW_KEY_W, GLFW_KEY_UP, GLFW_KEY_S, GLFW_KEY_DOWN)};
+    steering_.update(seconds, walk, hurry);
+    const double round = axis(GLFW_KEY_L, GLFW_KEY_L, GLFW_KEY_J, GLFW_KEY_J);
+    const double up = axis(GLFW_KEY_I, GLFW_KEY_I, GLFW_KEY_K, GLFW_KEY_K);
+    session_.sun_azimuth_deg += 40.0 * seconds * round;
+    session_.sun_elevation_deg = std::clamp(session_.sun_elevation_deg + 25.0 * seconds * up, -10.0, 90.0);
+    tapped_.clear();
+    return moves || !(walk == Vec3{}) || round != 0.0 || up != 0.0;
   }
+
+  /// What is under the cursor, and what lies between it and the place measured from; empty where there is nothing.
+  [[nodiscard]] std::vector<std::string> reading() {
+    std::vector<std::string> lines;
+    const auto there = inside_ ? steering_.pick(cursor_) : std::nullopt;
+    if (!there) return lines;
+    const double lift = session_.view.exaggeration;
+    lines = session_.source().describe_place({there->x, there->z}, there->y / lift);
+    if (measured_from_) {
+      const Vec3 way = *there - *measured_from_;
+      lines.push_back(fmt::format("{:.6g} away on the ground, {:+.6g} up", std::hypot(way.x, way.z), way.y / lift));
+    }
+    return lines;
+  }
+
+  /// As drawn, without exaggeration.
+  [[nodiscard]] double height_above_ground() { return steering_.height_above_ground() / session_.view.exaggeration; }
 
   bool show_figures = true;
   bool show_help = false;
@@ -107,9 +139,35 @@ class Controls {
 
  private:
   static Controls& of(GLFWwindow* window) { return *static_cast<Controls*>(glfwGetWindowUserPointer(window)); }
-  [[nodiscard]] bool held(int key) const { return glfwGetKey(window_, key) == GLFW_PRESS; }
+  [[nodiscard]] bool held(int key) const { return glfwGetKey(window_, key) == GLFW_PRESS || tapped_.count(key) != 0; }
   [[nodiscard]] double axis(int plus, int plus_too, int minus, int minus_too) const {
     return (held(plus) || held(plus_too) ? 1.0 : 0.0) - (held(minus) || held(minus_too) ? 1.0 : 0.0);
+  }
+
+  void move(double x, double y) {
+    // From the window's coordinates to pixels, which on some screens are finer.
+    int width = 1;
+    int height = 1;
+    glfwGetWindowSize(window_, &width, &height);
+    cursor_ = {x * session_.view.width / std::max(width, 1), y * session_.view.height / std::max(height, 1)};
+    steering_.move(cursor_);
+    inside_ = changed_ = true;
+  }
+
+  void click(int button, int action, int mods) {
+    changed_ = true;
+    if (action == GLFW_RELEASE) return steering_.release();
+    const double now = glfwGetTime();
+    const bool twice = button == GLFW_MOUSE_BUTTON_LEFT && now - last_click_s_ < kDoubleClick_s &&
+                       std::hypot(cursor_.x - last_click_.x, cursor_.y - last_click_.y) < 6.0;
+    last_click_s_ = button == GLFW_MOUSE_BUTTON_LEFT && !twice ? now : -1.0;
+    last_click_ = cursor_;
+    if (twice) return steering_.approach(cursor_);
+    const bool look = looks_ != ((mods & GLFW_MOD_ALT) != 0);
+    steering_.press(button != GLFW_MOUSE_BUTTON_LEFT ? Steering::Drag::kOrbit
+                    : look                           ? Steering::Drag::kLook
+                                                     : Steering::Drag::kPan,
+                    cursor_);
   }
 
   void press(int key) {
@@ -119,9 +177,17 @@ class Controls {
       case GLFW_KEY_ESCAPE:
         return glfwSetWindowShouldClose(window_, GLFW_TRUE);
       case GLFW_KEY_C:
-        return session_.camera.switch_kind();
+        return toggle(looks_);
       case GLFW_KEY_R:
-        session_.camera = start_;
+        return steering_.go_to(start_);
+      case GLFW_KEY_HOME:
+        return steering_.go_to(overview_camera(session_.source(), view));
+      case GLFW_KEY_N:
+        return steering_.face_north();
+      case GLFW_KEY_T:
+        return steering_.look_down();
+      case GLFW_KEY_Y:
+        measured_from_ = measured_from_ ? std::nullopt : steering_.pick(cursor_);
         return;
       case GLFW_KEY_M:
         return next_mode();
@@ -129,7 +195,7 @@ class Controls {
         return toggle(view.wireframe);
       case GLFW_KEY_B:
         return toggle(view.borders);
-      case GLFW_KEY_T:
+      case GLFW_KEY_G:
         return toggle(view.plain_switching);
       case GLFW_KEY_U:
         return toggle(session_.shadows);
@@ -168,19 +234,29 @@ class Controls {
     session_.view.mode = at == order.end() || at + 1 == order.end() ? order.front() : *(at + 1);
   }
 
-  /// The pivot stays on the same ground, the eye at the same height above it.
+  /// The eye stays at the same height above the ground under the middle of the picture.
   void exaggerate(double factor) {
+    const Vec3 middle = steering_.hold({0.5 * session_.view.width, 0.5 * session_.view.height});
     session_.view.exaggeration *= factor;
-    const double rise = session_.camera.pivot.y * (factor - 1.0);
-    session_.camera.pivot.y += rise;
-    session_.camera.eye.y += rise;
+    session_.camera.eye.y += middle.y * (factor - 1.0);
+    steering_.update(0.0, {}, 1.0);
   }
+
+  static constexpr double kDoubleClick_s = 0.35;
 
   GLFWwindow* window_;
   Session& session_;
+  Ground ground_;
+  Steering steering_;
   Camera start_;
-  double mouse_x_ = 0.0;
-  double mouse_y_ = 0.0;
+  bool looks_;  ///< the left button turns the head
+  PicturePoint cursor_;
+  bool inside_ = false;  ///< the cursor, the window
+  bool changed_ = true;
+  std::set<int> tapped_;  ///< keys pressed since the last frame
+  std::optional<Vec3> measured_from_;
+  double last_click_s_ = -1.0;
+  PicturePoint last_click_;
 };
 
 /// isohf-0001.png and so on, the first name that is free.
@@ -197,37 +273,64 @@ void run_window(const TileSource& source, const Options& options) {
   const Window window(options.view.width, options.view.height, "isohf-view - " + options.archive);
   require_gl();
   Session session(source, options);
-  Controls controls(window.get(), session);
+  Controls controls(window.get(), session, options.fly);
   controls.show_figures = options.overlay;
+  std::optional<Offscreen> target;
   using Clock = std::chrono::steady_clock;
   auto last = Clock::now();
   double smooth_s = 1.0 / 60.0;
+  std::int64_t drawn = 0;
   for (int frame = 1; glfwWindowShouldClose(window.get()) == GLFW_FALSE; ++frame) {
     glfwPollEvents();
     const auto now = Clock::now();
     const double seconds = std::chrono::duration<double>(now - last).count();
     last = now;
-    smooth_s += 0.1 * (seconds - smooth_s);
-    controls.update(std::min(seconds, 0.1));
-    glfwGetFramebufferSize(window.get(), &session.view.width, &session.view.height);
-    if (session.view.width < 1 || session.view.height < 1) {
-      glfwWaitEventsTimeout(0.1);  // iconified
+    const bool changed = controls.update(std::min(seconds, 0.1));
+    int width = 0;
+    int height = 0;
+    glfwGetFramebufferSize(window.get(), &width, &height);
+    const bool iconified = width < 1 || height < 1;
+    // Where nothing moves and nothing is to come the picture stays; an event wakes us.
+    if (iconified || (!changed && options.frames == 0 && session.is_settled())) {
+      glfwWaitEventsTimeout(kIdle_s);
+      last = Clock::now();
+      --frame;
       continue;
     }
+    smooth_s += 0.1 * (seconds - smooth_s);
+    session.view.width = width;
+    session.view.height = height;
+    if (!target || target->width() != width || target->height() != height) {
+      target.emplace(width, height, GL_RGBA8, options.samples.value_or(default_samples()));
+    }
+    target->bind();
     session.frame();
-    session.draw_overlay(1.0 / smooth_s, controls.show_figures, controls.show_help);
     const bool is_last = options.frames > 0 && frame >= options.frames;
-    if (is_last && !options.screenshot.empty())
-      write_picture(options.screenshot, session.view.width, session.view.height);
     if (controls.wants_picture) {
       controls.wants_picture = false;
       const std::string name = next_picture_name();
-      write_picture(name, session.view.width, session.view.height);
+      target->write_picture(name);
       if (!options.common.quiet) cli::print_note("wrote " + name);
     }
+    target->show();
+    session.draw_overlay(1.0 / smooth_s, controls.show_figures, controls.show_help, controls.reading());
+    if (is_last && !options.screenshot.empty()) write_picture(options.screenshot, width, height);
     glfwSwapBuffers(window.get());
+    ++drawn;
     if (is_last) break;
   }
+  if (!options.common.json) return;
+  print_result(options.common, "", [&] {
+    const Camera& camera = session.camera;
+    constexpr double kDegrees = 180.0 / std::numbers::pi;
+    return nlohmann::ordered_json{{"archive", options.archive},
+                                  {"eye", {camera.eye.x, camera.eye.y / session.view.exaggeration, camera.eye.z}},
+                                  {"heading_deg", camera.heading_rad * kDegrees},
+                                  {"pitch_deg", camera.pitch_rad * kDegrees},
+                                  {"height_above_ground", controls.height_above_ground()},
+                                  {"triangles", session.figures().triangles},
+                                  {"frames", drawn}};
+  });
 }
 
 }  // namespace isohf::view

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
+#include <nlohmann/json.hpp>
 
 #include "gl_test.h"
 #include "support/analytic_archive.h"
@@ -233,6 +234,38 @@ TEST_F(ViewProgramTest, IsStartedByIsohfView) {
   const Outcome refused = test::run_isohf({"view", path("good.isohf"), "--mode", "puce"});
   EXPECT_EQ(refused.exit_code, 2);
   EXPECT_EQ(refused.err.rfind("isohf: view: --mode: found 'puce'", 0), 0U) << refused.err;
+}
+
+/// What a hand does: 60 notches of the wheel at nine places, drags with every button, a flight, and then nothing.
+TEST_F(ViewProgramTest, IsSteeredByMouseAndKeys) {
+  if (std::system("command -v xvfb-run >/dev/null 2>&1 && command -v xdotool >/dev/null 2>&1") != 0) {
+    GTEST_SKIP() << "xvfb-run or xdotool is not installed";
+  }
+  test::write_file(path("hand.sh"), R"sh(
+    "$1" "$2" --json --window --size 320x240 >"$3" & viewer=$!
+    id=$(timeout 30 xdotool search --sync --onlyvisible --name isohf-view | head -1)
+    xdotool windowmove "$id" 0 0 windowfocus "$id" sleep 1
+    for x in 20 160 300; do
+      for y in 20 120 220; do
+        xdotool key Home sleep 0.6 mousemove $x $y click --repeat 60 --delay 5 4 sleep 0.3
+      done
+    done
+    for button in 1 2 3; do xdotool mousemove 160 120 mousedown $button mousemove 210 150 mousemove 120 90 mouseup $button; done
+    xdotool mousemove 160 130 click --repeat 2 --delay 60 1 sleep 0.6
+    xdotool keydown w keydown Shift_L sleep 1.5 keyup Shift_L keyup w key n sleep 0.6 key t sleep 0.6
+    kill -0 $viewer && sleep 3
+    xdotool key Escape
+    wait $viewer
+  )sh");
+  const Outcome outcome =
+      test::run_program({"/usr/bin/env", "xvfb-run", "-a", "-s", "-screen 0 400x300x24", "sh", path("hand.sh"),
+                         ISOHF_BIN_DIR "/isohf-view", path("good.isohf"), path("hand.json")});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const auto end = nlohmann::json::parse(text("hand.json"));
+  EXPECT_GT(end.at("height_above_ground").get<double>(), 0.0) << end;
+  EXPECT_GT(end.at("triangles").get<std::int64_t>(), 0) << end;
+  EXPECT_NEAR(end.at("heading_deg").get<double>(), 0.0, 0.01) << end;
+  EXPECT_LT(end.at("pitch_deg").get<double>(), -89.0) << end;
 }
 
 TEST_F(ViewProgramTest, OpensAWindow) {

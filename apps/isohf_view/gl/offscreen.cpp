@@ -74,7 +74,22 @@ HeadlessContext::HeadlessContext() : state_(std::make_unique<State>()) {
 
 HeadlessContext::~HeadlessContext() = default;
 
-Offscreen::Offscreen(int width, int height, GLenum colour_format) : width_(width), height_(height) {
+bool is_software_driver() {
+  const std::string renderer = reinterpret_cast<const char*>(glGetString(GL_RENDERER));
+  return renderer.find("llvmpipe") != std::string::npos || renderer.find("softpipe") != std::string::npos ||
+         renderer.find("swrast") != std::string::npos;
+}
+
+int default_samples() {
+  return is_software_driver() ? 1 : 4;
+}
+
+Offscreen::Offscreen(int width, int height, GLenum colour_format, int samples) : width_(width), height_(height) {
+  GLint most = 1;
+  glGetIntegerv(GL_MAX_SAMPLES, &most);
+  samples = std::min(samples, most);
+  const GLsizei stored = samples > 1 ? samples : 0;
+  if (samples > 1) resolved_ = std::make_unique<Offscreen>(width, height, colour_format);
   GLint largest = 0;
   glGetIntegerv(GL_MAX_RENDERBUFFER_SIZE, &largest);
   if (width > largest || height > largest) {
@@ -83,9 +98,9 @@ Offscreen::Offscreen(int width, int height, GLenum colour_format) : width_(width
                             largest));
   }
   glBindRenderbuffer(GL_RENDERBUFFER, colour_.get());
-  glRenderbufferStorage(GL_RENDERBUFFER, colour_format, width, height);
+  glRenderbufferStorageMultisample(GL_RENDERBUFFER, stored, colour_format, width, height);
   glBindRenderbuffer(GL_RENDERBUFFER, depth_.get());
-  glRenderbufferStorage(GL_RENDERBUFFER, GL_DEPTH_COMPONENT32F, width, height);
+  glRenderbufferStorageMultisample(GL_RENDERBUFFER, stored, GL_DEPTH_COMPONENT32F, width, height);
   bind();
   glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_RENDERBUFFER, colour_.get());
   glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_RENDERBUFFER, depth_.get());
@@ -99,13 +114,34 @@ void Offscreen::bind() const {
   glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_.get());
 }
 
-std::vector<std::uint8_t> Offscreen::read_rgba8() const {
+void Offscreen::show() const {
+  glBindFramebuffer(GL_READ_FRAMEBUFFER, framebuffer_.get());
+  glBindFramebuffer(GL_DRAW_FRAMEBUFFER, 0);
+  glBlitFramebuffer(0, 0, width_, height_, 0, 0, width_, height_, GL_COLOR_BUFFER_BIT, GL_NEAREST);
+  glBindFramebuffer(GL_FRAMEBUFFER, 0);
+  check_gl("showing a picture");
+}
+
+void Offscreen::bind_for_reading() const {
   bind();
+  if (resolved_ == nullptr) return;
+  glBindFramebuffer(GL_DRAW_FRAMEBUFFER, resolved_->framebuffer_.get());
+  glBlitFramebuffer(0, 0, width_, height_, 0, 0, width_, height_, GL_COLOR_BUFFER_BIT, GL_NEAREST);
+  resolved_->bind();
+}
+
+void Offscreen::write_picture(const std::string& path) const {
+  bind_for_reading();
+  view::write_picture(path, width_, height_);
+}
+
+std::vector<std::uint8_t> Offscreen::read_rgba8() const {
+  bind_for_reading();
   return read_pixels(width_, height_);
 }
 
 void Offscreen::read_rgba32f(std::vector<float>& out) const {
-  bind();
+  bind_for_reading();
   out.resize(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_) * 4);
   glReadPixels(0, 0, width_, height_, GL_RGBA, GL_FLOAT, out.data());
   check_gl("reading pixels");

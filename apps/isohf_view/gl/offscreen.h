@@ -24,13 +24,22 @@ class HeadlessContext {
   std::unique_ptr<State> state_;
 };
 
+/// Samples a pixel that pictures are drawn with unless the user says: 4, or 1 where software draws a window.
+[[nodiscard]] int default_samples();
+/// True where no GPU draws.
+[[nodiscard]] bool is_software_driver();
+
 /// A framebuffer of our own with a depth buffer, bound on construction.
 class Offscreen {
  public:
-  /// colour_format  GL_RGBA8, GL_RGBA32F, ...
-  Offscreen(int width, int height, GLenum colour_format);
+  /// colour_format  GL_RGBA8, GL_RGBA32F, ...      samples  of a pixel, >= 1; as many as the driver has at most
+  Offscreen(int width, int height, GLenum colour_format, int samples = 1);
 
   void bind() const;
+  /// Copies the picture to the window, whose framebuffer is then bound.
+  void show() const;
+  /// As view::write_picture.
+  void write_picture(const std::string& path) const;
   [[nodiscard]] int width() const { return width_; }
   [[nodiscard]] int height() const { return height_; }
 
@@ -40,11 +49,14 @@ class Offscreen {
   void read_rgba32f(std::vector<float>& out) const;
 
  private:
+  void bind_for_reading() const;
+
   int width_;
   int height_;
   Framebuffer framebuffer_;
   Renderbuffer colour_;
   Renderbuffer depth_;
+  std::unique_ptr<Offscreen> resolved_;  ///< where there is more than one sample: their means
 };
 
 /// The bound framebuffer's pixels, rows from the top, four channels a pixel.

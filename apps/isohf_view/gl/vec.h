@@ -83,6 +83,15 @@ inline Mat4 perspective(double fov_y_rad, double aspect, double near_distance, d
   return out;
 }
 
+/// The same for depth from 1 at the near to 0 at the far distance (glClipControl, GL_ZERO_TO_ONE), which floats hold as
+/// finely far away as near.
+inline Mat4 perspective_reversed(double fov_y_rad, double aspect, double near_distance, double far_distance) {
+  Mat4 out = perspective(fov_y_rad, aspect, near_distance, far_distance);
+  out.at(2, 2) = near_distance / (far_distance - near_distance);
+  out.at(2, 3) = far_distance * near_distance / (far_distance - near_distance);
+  return out;
+}
+
 /// Rotation from world to camera axes for a viewer who looks along `forward` with +y upwards on the screen.
 inline Mat4 look_along(Vec3 forward) {
   const Vec3 ahead = normalised(forward);

@@ -8,6 +8,7 @@
 #include <exception>
 #include <thread>
 
+#include "gl/offscreen.h"
 #include "isohf/error.h"
 
 namespace isohf::view {
@@ -22,11 +23,7 @@ constexpr float kMostAnisotropy = 8.0F;
 
 /// A software rasteriser would spend nearly all its time on it.
 float best_anisotropy() {
-  const std::string renderer = reinterpret_cast<const char*>(glGetString(GL_RENDERER));
-  const bool is_software = renderer.find("llvmpipe") != std::string::npos ||
-                           renderer.find("softpipe") != std::string::npos ||
-                           renderer.find("swrast") != std::string::npos;
-  if (is_software || !epoxy_has_gl_extension("GL_EXT_texture_filter_anisotropic")) return 1.0F;
+  if (is_software_driver() || !epoxy_has_gl_extension("GL_EXT_texture_filter_anisotropic")) return 1.0F;
   GLfloat most = 1.0F;
   glGetFloatv(GL_MAX_TEXTURE_MAX_ANISOTROPY_EXT, &most);
   return std::min(most, kMostAnisotropy);

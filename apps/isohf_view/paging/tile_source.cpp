@@ -1,5 +1,7 @@
 #include "paging/tile_source.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -12,6 +14,7 @@
 #include "isohf/archive/textures/texture_reader.h"
 #include "isohf/base/assert.h"
 #include "isohf/error.h"
+#include "isohf/surface.h"
 #include "isohf/surface/shade/shadow.h"
 
 namespace isohf::view {
@@ -36,6 +39,16 @@ class ArchiveSource final : public TileSource {
       // The statistics' leaves out what lies beyond the source.
       const TileBounds whole = whole_bounds(*this);
       scale_ = {whole.low, whole.high > whole.low ? (whole.high - whole.low) / (kVoidCode - 1) : 1.0};
+    }
+    try {
+      understand_source(reader_);
+    } catch (const Error&) {
+      // Its map is not understood: places have no longitude and latitude then.
+    }
+    try {
+      georeference_.emplace(metadata);
+    } catch (const Error&) {
+      // Nor coordinates.
     }
     if (shadow_seed_info(metadata)) seeds_.emplace(reader_);
     if (texture_info(metadata)) textures_.emplace(reader_);
@@ -62,6 +75,22 @@ class ArchiveSource final : public TileSource {
   void read(TileIndex tile, std::span<std::uint16_t> codes) const override { convert(reader_.read_tile(tile), codes); }
 
   [[nodiscard]] const ShadowSeedInfo* shadow_seeds() const override { return seeds_ ? &seeds_->info() : nullptr; }
+
+  [[nodiscard]] std::vector<std::string> describe_place(WorldPoint at, double height) const override {
+    std::vector<std::string> lines = TileSource::describe_place(at, height / world_per_elevation_);
+    const std::string& unit = reader_.metadata().vertical_unit;
+    if (unit != "unknown") lines.back() += " " + unit;
+    if (!georeference_) return lines;
+    if (georeference_->has_source() && reader_.metadata().source.crs_unit != "degree") {
+      const MapPoint place = georeference_->source_from_world(at);
+      lines.push_back(fmt::format("E {:.2f}  N {:.2f}", place.easting, place.northing));
+    }
+    if (georeference_->has_geo()) {
+      const GeoPoint place = georeference_->geo_from_world(at);
+      lines.push_back(fmt::format("lon {:.6f}  lat {:.6f}", place.longitude, place.latitude));
+    }
+    return lines;
+  }
 
   [[nodiscard]] const TextureInfo* textures() const override { return textures_ ? &textures_->info() : nullptr; }
   [[nodiscard]] bool has_texture(TileIndex tile) const override { return textures_ && textures_->has(tile); }
@@ -121,6 +150,7 @@ class ArchiveSource final : public TileSource {
   ArchiveReader reader_;
   double world_per_elevation_;
   ViewScale scale_;
+  std::optional<WorldGeoreference> georeference_;
   std::optional<ShadowSeedReader> seeds_;
   std::optional<TextureReader> textures_;
 };
@@ -129,6 +159,14 @@ class ArchiveSource final : public TileSource {
 
 void TileSource::read_lit(TileIndex, const RowSun&, std::span<std::uint16_t>, std::span<std::uint16_t>) const {
   throw Error(ErrorCode::kUnsupported, "this source has no shadow seeds");
+}
+
+std::vector<std::string> TileSource::describe_place(WorldPoint at, double height) const {
+  // As many decimals as codes have steps.
+  const int decimals = std::clamp(static_cast<int>(std::ceil(-std::log10(scale().scale))), 0, 6);
+  const double unit = std::pow(10.0, decimals);
+  return {fmt::format("x {:.7g}  z {:.7g}  elevation {:.{}f}", at.x, at.z, std::round(height * unit) / unit + 0.0,
+                      decimals)};
 }
 
 Picture TileSource::read_texture(TileIndex, int) const {

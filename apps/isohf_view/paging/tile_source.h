@@ -5,6 +5,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "isohf/archive/shadow_seeds/shadow_seeds.h"
 #include "isohf/archive/textures/texture_info.h"
@@ -66,6 +67,8 @@ class TileSource {
   /// tile.
   virtual void read_lit(TileIndex tile, const RowSun& sun, std::span<std::uint16_t> codes,
                         std::span<std::uint16_t> shadow) const;
+  /// What to tell a reader of a place on the surface and its height, world units: a line for each way to name it.
+  [[nodiscard]] virtual std::vector<std::string> describe_place(WorldPoint at, double height) const;
   /// The record of the textures; nullptr where the source has none.
   [[nodiscard]] virtual const TextureInfo* textures() const { return nullptr; }
   [[nodiscard]] virtual bool has_texture(TileIndex) const { return false; }

@@ -1,0 +1,199 @@
+#include "steering.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace isohf::view {
+namespace {
+
+constexpr double kWheelStep = 0.88;  ///< of the distance, a notch
+constexpr double kTurn_rad = 2.5;    ///< by a drag as long as the picture is high
+constexpr double kFlight_s = 0.45;   ///< that going somewhere takes
+constexpr double kFarthest = 12.0;   ///< from the middle of the data, in its diagonals
+constexpr double kLevelSine = 0.12;  ///< below that the ground is seen too flat to be dragged along its plane
+constexpr int kRowsSearched = 24;    ///< of the picture, below a cursor in the sky
+constexpr double kMostSteps = 64.0;  ///< of a frame of flight
+constexpr double kClearance_m = 1.5;
+constexpr double kClearanceSteps = 0.1;  ///< lattice steps, where the unit is not known
+
+double smooth(double share) {
+  return share * share * (3.0 - 2.0 * share);
+}
+
+}  // namespace
+
+Steering::Steering(const TileSource& source, Ground& ground, Camera& camera, const ViewState& view)
+    : source_(source), ground_(ground), camera_(camera), view_(view) {
+  const double step = 2.0 * source.grid().sigma_x();
+  clearance_ = source.is_to_scale() ? std::min(kClearance_m, 2.0 * step) : kClearanceSteps * step;
+}
+
+Vec3 Steering::ray(PicturePoint at) const {
+  return ray_through(camera_, view_, 2.0 * at.x / view_.width - 1.0, 1.0 - 2.0 * at.y / view_.height);
+}
+
+WorldBounds Steering::shown() const {
+  const TileGrid& grid = source_.grid();
+  return view_.beyond ? WorldBounds{0.0, 0.0, grid.world_width(), grid.world_height()} : source_.covered();
+}
+
+std::optional<Vec3> Steering::pick(PicturePoint at) {
+  return ground_.hit(camera_.eye, ray(at), view_.exaggeration, shown());
+}
+
+Vec3 Steering::hold(PicturePoint at) {
+  if (const auto there = pick(at)) return *there;
+  // A cursor in the sky, or beside the data: what is seen below it, then what is seen in the middle.
+  for (const double x : {at.x, 0.5 * view_.width}) {
+    for (int row = 1; row <= kRowsSearched; ++row) {
+      const double y = at.y + (view_.height - at.y) * row / kRowsSearched;
+      if (const auto there = pick({x, y})) return *there;
+    }
+  }
+  const WorldBounds covered = shown();
+  const TileBounds& whole = ground_.whole();
+  return {0.5 * (covered.x0 + covered.x1), 0.5 * (whole.low + whole.high) * view_.exaggeration,
+          0.5 * (covered.z0 + covered.z1)};
+}
+
+std::optional<double> Steering::ground_under_eye() {
+  const WorldPoint at{camera_.eye.x, camera_.eye.z};
+  const auto highest = ground_.highest(at);
+  if (!highest) return std::nullopt;
+  // High above the tile nothing needs decoding.
+  if (camera_.eye.y > *highest * view_.exaggeration + 4.0 * source_.grid().extent_x()) {
+    return *highest * view_.exaggeration;
+  }
+  const auto height = ground_.height(at, shown());
+  return height ? std::optional(*height * view_.exaggeration) : std::nullopt;
+}
+
+double Steering::height_above_ground() {
+  const double ground = ground_under_eye().value_or(ground_.whole().low * view_.exaggeration);
+  return std::max(camera_.eye.y - ground, clearance_);
+}
+
+void Steering::stay_above() {
+  if (const auto ground = ground_under_eye()) camera_.eye.y = std::max(camera_.eye.y, *ground + clearance_);
+}
+
+/// Keeps the eye where the data can still be seen.
+void Steering::stay_near(Vec3 before) {
+  const WorldBounds covered = source_.covered();
+  const TileBounds& whole = ground_.whole();
+  const Vec3 size{covered.x1 - covered.x0, (whole.high - whole.low) * view_.exaggeration, covered.z1 - covered.z0};
+  const Vec3 middle{0.5 * (covered.x0 + covered.x1), 0.5 * (whole.low + whole.high) * view_.exaggeration,
+                    0.5 * (covered.z0 + covered.z1)};
+  const double now = length(camera_.eye - middle);
+  if (now > kFarthest * length(size) && now > length(before - middle)) camera_.eye = before;
+}
+
+void Steering::press(Drag kind, PicturePoint at) {
+  flight_.reset();
+  const Vec3 ground = hold(at);
+  const Vec3 way = camera_.eye - ground;
+  drag_ = Held{kind, at, ground, camera_, way.y > kLevelSine * length(way)};
+}
+
+void Steering::move(PicturePoint at) {
+  if (!drag_) return;
+  const double dx = kTurn_rad * (at.x - drag_->last.x) / view_.height;
+  const double dy = kTurn_rad * (at.y - drag_->last.y) / view_.height;
+  drag_->last = at;
+  const Camera before = camera_;
+  switch (drag_->kind) {
+    case Drag::kPan:
+      pan(at);
+      break;
+    case Drag::kOrbit: {
+      camera_.orbit(drag_->ground, -dx, -dy);
+      const auto ground = ground_under_eye();
+      if (ground && camera_.eye.y < *ground + clearance_) {
+        camera_ = before;
+        camera_.orbit(drag_->ground, -dx, 0.0);
+      }
+      break;
+    }
+    case Drag::kLook:
+      camera_.turn(dx, -dy);
+      break;
+  }
+  stay_above();
+  stay_near(before.eye);
+}
+
+void Steering::pan(PicturePoint at) {
+  const Vec3 along = ray(at);
+  const Vec3 way = drag_->ground - drag_->start.eye;
+  if (drag_->level) {
+    // At the same height, from where the cursor sees the point.
+    if (along.y > -kLevelSine / 2.0) return;
+    camera_.eye = drag_->ground - way.y / along.y * along;
+  } else {
+    const Vec3 ahead = camera_.forward();
+    camera_.eye = drag_->ground - dot(way, ahead) / dot(along, ahead) * along;
+  }
+}
+
+void Steering::wheel(double steps, PicturePoint at) {
+  flight_.reset();
+  const Vec3 before = camera_.eye;
+  const Vec3 ground = hold(at);
+  const Vec3 way = camera_.eye - ground;
+  const double distance = length(way);
+  double factor = std::pow(kWheelStep, steps);
+  // Never nearer than the eye may stand.
+  if (steps > 0.0) factor = std::max(factor, std::min(1.0, 2.0 * clearance_ / std::max(distance, 1e-300)));
+  camera_.eye = ground + factor * way;
+  stay_above();
+  stay_near(before);
+}
+
+void Steering::approach(PicturePoint at) {
+  const auto ground = pick(at);
+  if (!ground) return;
+  Camera target = camera_;
+  const Vec3 way = camera_.eye - *ground;
+  target.eye = *ground + std::max(0.3, std::min(1.0, 2.0 * clearance_ / std::max(length(way), 1e-300))) * way;
+  go_to(target);
+}
+
+void Steering::face_north() {
+  Camera target = camera_;
+  target.orbit(hold({0.5 * view_.width, 0.5 * view_.height}), -camera_.heading_rad, 0.0);
+  go_to(target);
+}
+
+void Steering::look_down() {
+  Camera target = camera_;
+  target.orbit(hold({0.5 * view_.width, 0.5 * view_.height}), 0.0, -4.0);
+  go_to(target);
+}
+
+void Steering::go_to(const Camera& target) {
+  drag_.reset();
+  flight_ = Flight{camera_, target, 0.0};
+}
+
+void Steering::update(double seconds, Vec3 walk, double hurry) {
+  if (flight_) {
+    flight_->share = std::min(1.0, flight_->share + seconds / kFlight_s);
+    camera_ = between(flight_->from, flight_->to, smooth(flight_->share));
+    stay_above();
+    if (flight_->share >= 1.0) flight_.reset();
+  }
+  if (walk == Vec3{}) return;
+  flight_.reset();
+  // In steps that see each ridge on the way.
+  const double step = 2.0 * source_.grid().sigma_x();
+  const double steps = std::clamp(std::ceil(seconds * hurry * height_above_ground() / step), 1.0, kMostSteps);
+  for (int i = 0; i < static_cast<int>(steps); ++i) {
+    const Vec3 before = camera_.eye;
+    const double way = seconds / steps * hurry * height_above_ground();
+    camera_.eye = before + way * (walk.x * camera_.right() + Vec3{0.0, walk.y, 0.0} + walk.z * camera_.forward());
+    stay_above();
+    stay_near(before);
+  }
+}
+
+}  // namespace isohf::view

@@ -1,0 +1,266 @@
+#include "steering.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "isohf/lattice/barycentric.h"
+#include "memory_tiles.h"
+
+namespace isohf::test {
+namespace {
+
+using view::Camera;
+using view::Ground;
+using view::PicturePoint;
+using view::Steering;
+using view::Vec3;
+using view::ViewState;
+
+TileGrid grid() {
+  return TileGrid::make(TileShape::make(28, 27, 3), 5, 4, 600.0, 600.0);
+}
+
+WorldBounds all(const TileGrid& of) {
+  return {0.0, 0.0, of.world_width(), of.world_height()};
+}
+
+/// A scene, an eye over it, and a hand.
+struct Scene {
+  explicit Scene(const MemoryTiles::Alter& alter = {}) : tiles(grid(), alter), ground(tiles) {
+    state.exaggeration = 8.0;
+    camera = overview_camera(tiles, state);
+  }
+  MemoryTiles tiles;
+  Ground ground;
+  ViewState state;
+  Camera camera;
+  Steering hand{tiles, ground, camera, state};
+
+  /// How far the eye stands above the ground; infinite beside the data.
+  [[nodiscard]] double height() {
+    const auto below = ground.height({camera.eye.x, camera.eye.z}, all(tiles.grid()));
+    return below ? camera.eye.y - *below * state.exaggeration : std::numeric_limits<double>::infinity();
+  }
+  /// Where a point of the world lies in the picture.
+  [[nodiscard]] PicturePoint project(Vec3 at) const {
+    const Vec3 way = at - camera.eye;
+    const Vec3 up = cross(camera.right(), camera.forward());
+    const double depth = dot(way, camera.forward());
+    return {0.5 * state.width + state.focal_px() * dot(way, camera.right()) / depth,
+            0.5 * state.height - state.focal_px() * dot(way, up) / depth};
+  }
+};
+
+double barycentric_height(const MemoryTiles& tiles, WorldPoint at) {
+  const TilePoint place = tiles.grid().locate(at);
+  const TileShape& shape = tiles.grid().shape();
+  std::vector<std::uint16_t> codes(static_cast<std::size_t>(shape.stored_vertex_count()));
+  tiles.read(place.tile, codes);
+  std::vector<double> heights;
+  for (const std::uint16_t code : codes) {
+    heights.push_back(code == view::kVoidCode ? std::numeric_limits<double>::quiet_NaN()
+                                              : tiles.scale().offset + tiles.scale().scale * code);
+  }
+  return interpolate(barycentric(shape, place.point),
+                     View2D<const double>(heights.data(), shape.columns(), shape.rows()));
+}
+
+TEST(Ground, HeightsAreThoseOfTheTriangles) {
+  Scene scene;
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> x(0.0, grid().world_width());
+  std::uniform_real_distribution<double> z(0.0, grid().world_height());
+  for (int i = 0; i < 300; ++i) {
+    const WorldPoint at{x(random), z(random)};
+    const auto found = scene.ground.height(at, all(grid()));
+    ASSERT_TRUE(found);
+    EXPECT_NEAR(*found, barycentric_height(scene.tiles, at), 1e-9);
+  }
+}
+
+/// The first point by brute force: small steps, then halving.
+std::optional<double> first_meeting(const Scene& scene, Vec3 eye, Vec3 along, double step, double reach) {
+  const auto above = [&](double t) {
+    const Vec3 at = eye + t * along;
+    if (!grid().contains(WorldPoint{at.x, at.z})) return std::numeric_limits<double>::quiet_NaN();
+    return at.y - scene.state.exaggeration * barycentric_height(scene.tiles, {at.x, at.z});
+  };
+  for (double t = step; t < reach; t += step) {
+    double from = t - step;
+    double to = t;
+    if (!(above(from) * above(to) <= 0.0)) continue;
+    for (int i = 0; i < 60; ++i) {
+      const double middle = 0.5 * (from + to);
+      (above(from) * above(middle) <= 0.0 ? to : from) = middle;
+    }
+    return to;
+  }
+  return std::nullopt;
+}
+
+TEST(Ground, ARayMeetsTheSurfaceWhereItFirstCrossesIt) {
+  Scene scene;
+  std::mt19937 random(2);
+  std::uniform_real_distribution<double> share(0.0, 1.0);
+  int met = 0;
+  for (int i = 0; i < 60; ++i) {
+    const Vec3 eye{share(random) * grid().world_width(), 900.0 + 900.0 * share(random),
+                   share(random) * grid().world_height()};
+    const Vec3 along = normalised(Vec3{share(random) - 0.5, -0.9 * share(random), share(random) - 0.5});
+    const auto expected = first_meeting(scene, eye, along, 4.0, 5000.0);
+    const auto found = scene.ground.hit(eye, along, scene.state.exaggeration, all(grid()));
+    ASSERT_EQ(found.has_value(), expected.has_value()) << "ray " << i;
+    if (!found) continue;
+    ++met;
+    EXPECT_NEAR(length(*found - eye), *expected, 1e-6) << "ray " << i;
+  }
+  EXPECT_GT(met, 20);
+}
+
+TEST(Ground, ARayAlongARowASlantOrStraightDownMeetsTheSurface) {
+  Scene scene;
+  const double step = grid().sigma_x();
+  for (const Vec3 along : {Vec3{0.0, -1.0, 0.0}, Vec3{step, -4.0 * step, 0.0}, Vec3{0.0, -4.0 * step, step},
+                           Vec3{step, -4.0 * step, grid().sigma_z()}, Vec3{-step, -4.0 * step, grid().sigma_z()}}) {
+    const Vec3 eye{1200.0, 1500.0, 12.0 * grid().sigma_z()};
+    const auto found = scene.ground.hit(eye, along, scene.state.exaggeration, all(grid()));
+    ASSERT_TRUE(found) << along.x << " " << along.y << " " << along.z;
+    EXPECT_NEAR(found->y, scene.state.exaggeration * barycentric_height(scene.tiles, {found->x, found->z}), 1e-6);
+  }
+}
+
+TEST(Ground, ARayGoesThroughVoids) {
+  Scene scene(
+      [](TileIndex, std::vector<std::uint16_t>& codes) { std::fill(codes.begin(), codes.end(), view::kVoidCode); });
+  EXPECT_FALSE(scene.ground.hit({100.0, 1e4, 100.0}, {0.0, -1.0, 0.0}, 1.0, all(grid())));
+  EXPECT_FALSE(scene.ground.height({100.0, 100.0}, all(grid())));
+}
+
+TEST(Steering, SixtyNotchesEndAboveGroundWithGroundInView) {
+  for (const double x : {0.05, 0.5, 0.95}) {
+    for (const double y : {0.05, 0.5, 0.95}) {
+      Scene scene;
+      const PicturePoint at{x * scene.state.width, y * scene.state.height};
+      for (int notch = 0; notch < 60; ++notch) {
+        scene.hand.wheel(1.0, at);
+        ASSERT_GE(scene.height(), scene.hand.clearance() * 0.999) << x << " " << y << " notch " << notch;
+      }
+      bool sees_ground = false;
+      for (int column = 0; column < 9 && !sees_ground; ++column) {
+        for (int row = 0; row < 9 && !sees_ground; ++row) {
+          sees_ground =
+              scene.hand.pick({scene.state.width * (column + 0.5) / 9.0, scene.state.height * (row + 0.5) / 9.0})
+                  .has_value();
+        }
+      }
+      EXPECT_TRUE(sees_ground) << x << " " << y;
+    }
+  }
+}
+
+TEST(Steering, SixtyNotchesOutStayWithinSightOfTheData) {
+  Scene scene;
+  for (int notch = 0; notch < 60; ++notch) scene.hand.wheel(-1.0, {600.0, 400.0});
+  const PicturePoint middle = scene.project({0.5 * grid().world_width(), 0.0, 0.5 * grid().world_height()});
+  EXPECT_GT(middle.x, 0.0);
+  EXPECT_LT(middle.x, scene.state.width);
+  EXPECT_LT(scene.camera.eye.y, 20.0 * (grid().world_width() + grid().world_height()));
+}
+
+TEST(Steering, TheWheelKeepsWhatIsUnderTheCursorThere) {
+  Scene scene;
+  const PicturePoint at{520.0, 340.0};
+  const auto before = scene.hand.pick(at);
+  ASSERT_TRUE(before);
+  scene.hand.wheel(7.0, at);
+  const PicturePoint after = scene.project(*before);
+  EXPECT_NEAR(after.x, at.x, 1e-6);
+  EXPECT_NEAR(after.y, at.y, 1e-6);
+}
+
+TEST(Steering, ADragKeepsTheGroundUnderTheCursor) {
+  Scene scene;
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> step(-25.0, 25.0);
+  PicturePoint at{640.0, 420.0};
+  const auto held = scene.hand.pick(at);
+  ASSERT_TRUE(held);
+  scene.hand.press(Steering::Drag::kPan, at);
+  for (int i = 0; i < 40; ++i) {
+    at = {std::clamp(at.x + step(random), 300.0, 900.0), std::clamp(at.y + step(random), 250.0, 600.0)};
+    scene.hand.move(at);
+    const PicturePoint now = scene.project(*held);
+    ASSERT_NEAR(now.x, at.x, 0.01) << i;
+    ASSERT_NEAR(now.y, at.y, 0.01) << i;
+  }
+  scene.hand.release();
+  const Camera still = scene.camera;
+  scene.hand.move({10.0, 10.0});
+  EXPECT_EQ(scene.camera, still);
+}
+
+TEST(Steering, TurningKeepsTheGroundUnderTheCursorWhereItIs) {
+  Scene scene;
+  const PicturePoint at{700.0, 500.0};
+  const auto held = scene.hand.pick(at);
+  ASSERT_TRUE(held);
+  const double heading = scene.camera.heading_rad;
+  scene.hand.press(Steering::Drag::kOrbit, at);
+  scene.hand.move({at.x + 90.0, at.y + 40.0});
+  const PicturePoint now = scene.project(*held);
+  EXPECT_NEAR(now.x, at.x, 1e-6);
+  EXPECT_NEAR(now.y, at.y, 1e-6);
+  // The scene follows the hand: dragged to the right, the viewer walks to the left and turns to the left with it.
+  EXPECT_LT(std::remainder(scene.camera.heading_rad - heading, 6.283185307179586), 0.0);
+}
+
+TEST(Steering, HalfAMinuteOfFlightNeverEntersTheGround) {
+  Scene scene;
+  scene.camera.look_at({300.0, 1500.0, 2000.0}, {2500.0, -300.0, 300.0});
+  for (int frame = 0; frame < 30 * 60; ++frame) {
+    scene.hand.update(1.0 / 60.0, {0.0, 0.0, 1.0}, frame % 200 < 60 ? 4.0 : 1.0);
+    ASSERT_GE(scene.height(), scene.hand.clearance() * 0.999) << frame;
+  }
+}
+
+TEST(Steering, SpeedFollowsTheHeightAboveGround) {
+  const auto way_from = [](double height) {
+    Scene scene;
+    const double ground = 8.0 * *scene.ground.height({1500.0, 1200.0}, all(grid()));
+    scene.camera.look_at({1500.0, ground + height, 1200.0}, {2500.0, ground + height, 1200.0});
+    const Vec3 before = scene.camera.eye;
+    scene.hand.update(0.01, {1.0, 0.0, 0.0}, 1.0);
+    return length(scene.camera.eye - before);
+  };
+  EXPECT_NEAR(way_from(2000.0) / way_from(500.0), 4.0, 0.02);
+}
+
+TEST(Steering, NFacesNorthAndTLooksDownAboutTheMiddle) {
+  Scene scene;
+  const PicturePoint middle{0.5 * scene.state.width, 0.5 * scene.state.height};
+  const auto held = scene.hand.pick(middle);
+  ASSERT_TRUE(held);
+  scene.hand.face_north();
+  for (int i = 0; i < 100; ++i) scene.hand.update(0.02, {}, 1.0);
+  EXPECT_NEAR(scene.camera.heading_rad, 0.0, 1e-9);
+  EXPECT_NEAR(scene.project(*held).x, middle.x, 1e-6);
+  scene.hand.look_down();
+  for (int i = 0; i < 100; ++i) scene.hand.update(0.02, {}, 1.0);
+  EXPECT_LT(scene.camera.pitch_rad, -1.57);
+  EXPECT_NEAR(scene.project(*held).y, middle.y, 1e-6);
+  EXPECT_FALSE(scene.hand.is_flying());
+}
+
+TEST(Steering, GoingThereStopsShortOfTheGround) {
+  Scene scene;
+  for (int i = 0; i < 40; ++i) {
+    scene.hand.approach({640.0, 400.0});
+    for (int frame = 0; frame < 40; ++frame) scene.hand.update(0.02, {}, 1.0);
+    ASSERT_GE(scene.height(), scene.hand.clearance() * 0.999);
+  }
+}
+
+}  // namespace
+}  // namespace isohf::test
