@@ -181,13 +181,17 @@ struct SampleMapping {
   double z_offset = 0.0;
 };
 
+/// How an archive made without loss predicts its source's samples (docs/archive_format.md, section 7). The last three
+/// are those of archives from before the others.
+enum class SamplePrediction : std::uint8_t { kSpline, kTriangles, kHex, kBarycentric, kPlaces };
+
 /// What an archive made without loss says of its source's samples.
 struct LosslessRecord {
   SampleMapping mapping;
   std::int64_t width = 0;
   std::int64_t height = 0;
-  RestoreMethod method = RestoreMethod::kHex;  ///< how samples are predicted
-  bool at_positions = false;                   ///< by triangles at stored positions instead
+  SamplePrediction prediction = SamplePrediction::kSpline;
+  int fraction_bits = 0;  ///< of the integers that kSpline and kTriangles count with
   std::int64_t rows_per_member = 0;
   std::vector<double> void_values;   ///< as SourceInfo has them
   std::uint64_t residual_bytes = 0;  ///< of all residual members, compressed

@@ -31,8 +31,13 @@ std::vector<double> columns_of(const SampleGrid& samples) {
   return columns;
 }
 
-/// Far from the surface positions are no longer counted in lattice steps.
-SampleGrid checked(const SampleGrid& samples, const TileGrid& grid) {
+bool is_inside(double place, double spacing, double end) {
+  return place >= -kEndTolerance * spacing && place <= end + kEndTolerance * spacing;
+}
+
+}  // namespace
+
+const SampleGrid& require_samples_near(const SampleGrid& samples, const TileGrid& grid) {
   require_samples(samples);
   const auto check_axis = [](double first, double spacing, std::int64_t count, double world) {
     const double last = first + spacing * static_cast<double>(count - 1);
@@ -45,12 +50,6 @@ SampleGrid checked(const SampleGrid& samples, const TileGrid& grid) {
   check_axis(samples.first_z, samples.spacing_z, samples.height, grid.world_height());
   return samples;
 }
-
-bool is_inside(double place, double spacing, double end) {
-  return place >= -kEndTolerance * spacing && place <= end + kEndTolerance * spacing;
-}
-
-}  // namespace
 
 void require_samples(const SampleGrid& grid) {
   if (grid.width < 1 || grid.height < 1 || !(grid.spacing_x > 0.0) || !(grid.spacing_z > 0.0)) {
@@ -65,7 +64,7 @@ GridSampler::GridSampler(const TileGrid& grid, bool wraps_x, const Quantisation&
     : grid_(grid),
       quantisation_(quantisation),
       read_tiles_(std::move(read_tiles)),
-      samples_(checked(samples, grid)),
+      samples_(require_samples_near(samples, grid)),
       method_(method),
       spline_(grid, method == RestoreMethod::kHex ? columns_of(samples) : std::vector<double>{}, wraps_x) {
   for (const double x : columns_of(samples)) {

@@ -12,6 +12,8 @@ namespace isohf {
 
 /// Throws Error{kInvalidArgument} for a grid without samples or spacing.
 void require_samples(const SampleGrid& grid);
+/// Throws also where it lies far from the surface, where positions are no longer counted in lattice steps.
+const SampleGrid& require_samples_near(const SampleGrid& samples, const TileGrid& grid);
 
 /// The surface of an archive at the samples of a grid, row by row from North to South.
 ///

@@ -4,8 +4,10 @@
 #include <oneapi/tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <type_traits>
 #include <utility>
 
 #include "isohf/archive/container/content_hash.h"
@@ -18,8 +20,29 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// The prediction of a source that was projected.
-constexpr const char* kAtPositions = "places";
+constexpr std::array<std::pair<SamplePrediction, const char*>, 5> kPredictions = {
+    {{SamplePrediction::kSpline, "spline"},
+     {SamplePrediction::kTriangles, "triangles"},
+     {SamplePrediction::kHex, "hex"},
+     {SamplePrediction::kBarycentric, "barycentric"},
+     {SamplePrediction::kPlaces, "places"}}};
+
+const char* name_of(SamplePrediction prediction) {
+  return std::find_if(kPredictions.begin(), kPredictions.end(),
+                      [&](const auto& entry) { return entry.first == prediction; })
+      ->second;
+}
+
+SamplePrediction prediction_from(const std::string& name) {
+  for (const auto& [prediction, its_name] : kPredictions) {
+    if (name == its_name) return prediction;
+  }
+  throw Error(ErrorCode::kUnsupported, fmt::format("the prediction \"{}\" is not known to this build", name));
+}
+
+bool is_in_integers(SamplePrediction prediction) {
+  return prediction == SamplePrediction::kSpline || prediction == SamplePrediction::kTriangles;
+}
 
 /// JSON has no numbers that are not finite.
 Json json_from(double value) {
@@ -36,11 +59,13 @@ double number_from(const Json& json) {
 }
 
 void check(const LosslessRecord& record, const Metadata& metadata) {
-  const bool fits = record.width == metadata.source.width && record.height == metadata.source.height &&
-                    record.width >= 1 && record.height >= 1 && record.rows_per_member >= 1 &&
-                    record.rows_per_member <= (std::int64_t{1} << 26U) / record.width + 16 &&
-                    std::isfinite(record.mapping.z_offset) && std::isfinite(record.mapping.z_scale) &&
-                    record.mapping.z_scale != 0.0;
+  const bool fits =
+      record.width == metadata.source.width && record.height == metadata.source.height && record.width >= 1 &&
+      record.height >= 1 && record.rows_per_member >= 1 &&
+      record.rows_per_member <= (std::int64_t{1} << 26U) / record.width + 16 &&
+      std::isfinite(record.mapping.z_offset) && std::isfinite(record.mapping.z_scale) &&
+      record.mapping.z_scale != 0.0 &&
+      (!is_in_integers(record.prediction) || FixedHeights::are_valid(metadata.quantisation, record.fraction_bits));
   if (!fits) throw Error(ErrorCode::kCorrupt, "metadata: lossless does not fit the source's record");
 }
 
@@ -61,12 +86,16 @@ void check_members(const ArchiveReader& archive, const LosslessRecord& record) {
   }
 }
 
-PositionMesh read_positions(const ArchiveReader& archive, const LosslessRecord& record) {
-  const auto bytes = archive.read_member(kPositionsName);
-  const std::string where = fmt::format("{}: member \"{}\"", archive.path(), kPositionsName);
+template <typename Mesh>
+Mesh read_mesh(const SamplePredictor::ReadMember& read_member, const char* name, const LosslessRecord& record) {
+  const auto bytes = read_member(name);
+  const std::string where = fmt::format("member \"{}\"", name);
   if (!bytes) throw Error(ErrorCode::kCorrupt, where + " is missing");
   try {
-    return positions_from_bytes(record.width, record.height, *bytes);
+    if constexpr (std::is_same_v<Mesh, PlaceMesh>)
+      return PlaceMesh(record.width, record.height, *bytes);
+    else
+      return positions_from_bytes(record.width, record.height, *bytes);
   } catch (const Error& error) {
     throw error.within(where);
   }
@@ -77,16 +106,17 @@ PositionMesh read_positions(const ArchiveReader& archive, const LosslessRecord& 
 std::string format_lossless(const LosslessRecord& record) {
   Json voids = Json::array();
   for (const double value : record.void_values) voids.push_back(json_from(value));
-  const Json json = {{"sample_type", to_string(record.mapping.type)},
-                     {"width", record.width},
-                     {"height", record.height},
-                     {"z_scale", record.mapping.z_scale},
-                     {"z_offset", record.mapping.z_offset},
-                     {"void_values", voids},
-                     {"prediction", record.at_positions ? kAtPositions : to_string(record.method)},
-                     {"rows_per_member", record.rows_per_member},
-                     {"residual_bytes", record.residual_bytes},
-                     {"sha256", record.sha256}};
+  Json json = {{"sample_type", to_string(record.mapping.type)},
+               {"width", record.width},
+               {"height", record.height},
+               {"z_scale", record.mapping.z_scale},
+               {"z_offset", record.mapping.z_offset},
+               {"void_values", voids},
+               {"prediction", name_of(record.prediction)},
+               {"fraction_bits", record.fraction_bits},
+               {"rows_per_member", record.rows_per_member},
+               {"residual_bytes", record.residual_bytes},
+               {"sha256", record.sha256}};
   return json.dump();
 }
 
@@ -102,16 +132,15 @@ std::optional<LosslessRecord> lossless_record(const Metadata& metadata) {
     record.width = json.at("width").get<std::int64_t>();
     record.height = json.at("height").get<std::int64_t>();
     for (const Json& value : json.at("void_values")) record.void_values.push_back(number_from(value));
-    const auto prediction = json.at("prediction").get<std::string>();
-    record.at_positions = prediction == kAtPositions;
-    record.method = record.at_positions ? RestoreMethod::kBarycentric : restore_method_from_string(prediction);
+    record.prediction = prediction_from(json.at("prediction").get<std::string>());
+    if (is_in_integers(record.prediction)) record.fraction_bits = json.at("fraction_bits").get<int>();
     record.rows_per_member = json.at("rows_per_member").get<std::int64_t>();
     record.residual_bytes = json.at("residual_bytes").get<std::uint64_t>();
     record.sha256 = json.at("sha256").get<std::string>();
   } catch (const nlohmann::json::exception&) {
     throw Error(ErrorCode::kCorrupt, "metadata: lossless: a member is missing, or is of another type than it must be");
   } catch (const Error& error) {
-    throw Error(ErrorCode::kCorrupt, fmt::format("metadata: lossless: {}", error.what()));
+    throw error.within("metadata: lossless");
   }
   check(record, metadata);
   return record;
@@ -121,11 +150,8 @@ std::string residual_name(std::int64_t first_row) {
   return fmt::format("residual/{:08}", first_row);
 }
 
-std::vector<std::byte> bytes_of(const PositionMesh& positions) {
-  std::vector<std::byte> bytes;
-  ByteWriter writer(bytes);
-  for (const double value : positions.values()) writer.write(value);
-  return bytes;
+bool is_residual(const std::string& name) {
+  return name.starts_with("residual/") && name != kNodesName && name != kPositionsName;
 }
 
 PositionMesh positions_from_bytes(std::int64_t width, std::int64_t height, std::span<const std::byte> bytes) {
@@ -140,24 +166,43 @@ PositionMesh positions_from_bytes(std::int64_t width, std::int64_t height, std::
 }
 
 SamplePredictor::SamplePredictor(const TileGrid& grid, bool wraps_x, const Quantisation& quantisation,
-                                 ReadTiles read_tiles, const SampleGrid& samples, RestoreMethod method,
-                                 std::optional<PositionMesh> positions)
-    : samples_(samples), positions_(std::move(positions)) {
-  if (positions_) {
-    points_.emplace(grid, quantisation, std::move(read_tiles), kTileBytes / 2);  // as much again is in hand
-  } else {
-    rows_.emplace(grid, wraps_x, quantisation, std::move(read_tiles), samples, method);
+                                 ReadTiles read_tiles, const SampleGrid& samples, const LosslessRecord& record,
+                                 const ReadMember& read_member)
+    : width_(record.width), heights_(quantisation, record.fraction_bits) {
+  switch (record.prediction) {
+    case SamplePrediction::kSpline:
+      spline_.emplace(grid, wraps_x, heights_, std::move(read_tiles), samples);
+      return;
+    case SamplePrediction::kHex:
+    case SamplePrediction::kBarycentric:
+      rows_.emplace(grid, wraps_x, quantisation, std::move(read_tiles), samples,
+                    record.prediction == SamplePrediction::kHex ? RestoreMethod::kHex : RestoreMethod::kBarycentric);
+      return;
+    case SamplePrediction::kTriangles:
+      nodes_ = read_mesh<PlaceMesh>(read_member, kNodesName, record);
+      break;
+    case SamplePrediction::kPlaces:
+      positions_ = read_mesh<PositionMesh>(read_member, kPositionsName, record);
+      break;
   }
+  points_.emplace(grid, quantisation, std::move(read_tiles), kTileBytes / 2);  // as much again is in hand
+}
+
+template <typename Mesh, typename Place>
+std::vector<Place> SamplePredictor::places(const Mesh& mesh, std::int64_t first, std::int64_t rows) const {
+  std::vector<Place> found(static_cast<std::size_t>(rows * width_));
+  const auto width = static_cast<std::size_t>(width_);
+  oneapi::tbb::parallel_for(std::int64_t{0}, rows, [&](std::int64_t row) {
+    mesh.row(first + row, std::span(found).subspan(static_cast<std::size_t>(row) * width, width));
+  });
+  return found;
 }
 
 void SamplePredictor::read(std::int64_t first, std::int64_t rows, std::span<double> predicted) {
+  if (spline_) return spline_->read(first, rows, predicted);
   if (rows_) return rows_->read(first, rows, predicted);
-  std::vector<WorldPoint> at(predicted.size());
-  const auto width = static_cast<std::size_t>(samples_.width);
-  oneapi::tbb::parallel_for(std::int64_t{0}, rows, [&](std::int64_t row) {
-    positions_->row(first + row, std::span(at).subspan(static_cast<std::size_t>(row) * width, width));
-  });
-  points_->sample(at, predicted);
+  if (nodes_) return points_->sample(places<PlaceMesh, FixedPlace>(*nodes_, first, rows), heights_, predicted);
+  points_->sample(places<PositionMesh, WorldPoint>(*positions_, first, rows), predicted);
 }
 
 struct SourceRowReader::State {
@@ -166,8 +211,8 @@ struct SourceRowReader::State {
         record(std::move(its_record)),
         job(std::move(its_job)),
         surface(archive.grid(), archive.metadata().wraps_x, archive.metadata().quantisation, tiles_of(archive),
-                source_grid(archive.metadata().source), record.method,
-                record.at_positions ? std::optional(read_positions(archive, record)) : std::nullopt) {}
+                source_grid(archive.metadata().source), record,
+                [&](const char* name) { return archive.read_member(name); }) {}
 
   const ArchiveReader& archive;
   LosslessRecord record;

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <span>
 #include <string>
@@ -10,6 +11,9 @@
 #include "isohf/restore/grid_sampler.h"
 #include "isohf/restore/point_sampler.h"
 #include "isohf/restore/position_mesh.h"
+#include "isohf/restore/predict/fixed_point.h"
+#include "isohf/restore/predict/place_mesh.h"
+#include "isohf/restore/predict/spline_predictor.h"
 #include "isohf/restore/residual_codec.h"
 #include "isohf/surface.h"
 
@@ -23,31 +27,40 @@ inline constexpr const char* kLosslessName = "lossless";
 /// "residual/00000000": the member that starts with source row `first_row`.
 [[nodiscard]] std::string residual_name(std::int64_t first_row);
 
-/// Where the samples of a source that was projected lie: a PositionMesh's values, as doubles.
+/// Where the samples of a source that was projected lie: a PlaceMesh's bytes, or in old archives a PositionMesh's.
+inline constexpr const char* kNodesName = "residual/nodes";
 inline constexpr const char* kPositionsName = "residual/places";
-[[nodiscard]] std::vector<std::byte> bytes_of(const PositionMesh& positions);
-/// Throws Error{kCorrupt} where the bytes are no mesh of that size.
+/// Whether a member holds residuals.
+[[nodiscard]] bool is_residual(const std::string& name);
+/// A PositionMesh's values, as doubles. Throws Error{kCorrupt} where the bytes are no mesh of that size.
 [[nodiscard]] PositionMesh positions_from_bytes(std::int64_t width, std::int64_t height,
                                                 std::span<const std::byte> bytes);
 
 /// Predicts the samples of a source, row by row from North to South: on its own grid, or at positions of their own.
 class SamplePredictor {
  public:
-  /// What tiles under samples with positions of their own take at most, beside one tile a thread.
+  /// What tiles under samples with places of their own take at most, beside one tile a thread.
   static constexpr std::uint64_t kTileBytes = std::uint64_t{32} << 20U;
 
-  /// positions  nullopt where the source's rows are rows of the world
+  /// As the record says; reads the places' member by read_member(name), nullopt where there is none.
+  using ReadMember = std::function<std::optional<std::vector<std::byte>>(const char* name)>;
   SamplePredictor(const TileGrid& grid, bool wraps_x, const Quantisation& quantisation, ReadTiles read_tiles,
-                  const SampleGrid& samples, RestoreMethod method, std::optional<PositionMesh> positions);
+                  const SampleGrid& samples, const LosslessRecord& record, const ReadMember& read_member);
 
   /// As GridSampler::read.
   void read(std::int64_t first, std::int64_t rows, std::span<double> predicted);
 
  private:
-  SampleGrid samples_;
-  std::optional<PositionMesh> positions_;
+  template <typename Mesh, typename Place>
+  [[nodiscard]] std::vector<Place> places(const Mesh& mesh, std::int64_t first, std::int64_t rows) const;
+
+  std::int64_t width_;
+  FixedHeights heights_;
+  std::optional<SplinePredictor> spline_;
   std::optional<GridSampler> rows_;
   std::optional<PointSampler> points_;
+  std::optional<PlaceMesh> nodes_;
+  std::optional<PositionMesh> positions_;
 };
 
 }  // namespace isohf

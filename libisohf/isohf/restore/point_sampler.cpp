@@ -149,13 +149,14 @@ void PointSampler::keep(std::int64_t tile, const Codes& codes) {
   by_tile_[tile] = used_.begin();
 }
 
-/// Calls sample(codes, points of a tile) for each tile, `points` as runs of their numbers.
-template <typename Sample>
-void PointSampler::visit(std::span<const WorldPoint> points, const Sample& sample) {
+/// Calls sample(codes, points of a tile) for each tile, `points` as runs of their numbers. tile_of(i) is the flat index
+/// of the tile under a point, -1 where there is none.
+template <typename TileOf, typename Sample>
+void PointSampler::visit(std::size_t points, const TileOf& tile_of, const Sample& sample) {
   std::vector<Run> runs;
   std::int64_t last = -1;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const std::int64_t tile = grid_.contains(points[i]) ? grid_.flat_index(grid_.locate(points[i]).tile) : -1;
+  for (std::size_t i = 0; i < points; ++i) {
+    const std::int64_t tile = tile_of(i);
     if (tile >= 0 && tile != last) runs.push_back({tile, i, i});
     if (tile >= 0) runs.back().end = i + 1;
     last = tile;
@@ -187,12 +188,17 @@ void PointSampler::visit(std::span<const WorldPoint> points, const Sample& sampl
   });
 }
 
+std::int64_t PointSampler::tile_under(WorldPoint point) const {
+  return grid_.contains(point) ? grid_.flat_index(grid_.locate(point).tile) : -1;
+}
+
 void PointSampler::sample(std::span<const WorldPoint> points, std::span<SurfaceSample> samples) {
   ISOHF_ASSERT(points.size() == samples.size());
   std::fill(samples.begin(), samples.end(), SurfaceSample{});
   oneapi::tbb::enumerable_thread_specific<std::vector<float>> scratches(
       [&] { return std::vector<float>(static_cast<std::size_t>(grid_.shape().stored_vertex_count())); });
-  visit(points, [&](const TileCodes& codes, std::span<const Run> runs) {
+  const auto tile_of = [&](std::size_t i) { return tile_under(points[i]); };
+  visit(points.size(), tile_of, [&](const TileCodes& codes, std::span<const Run> runs) {
     TileSurface surface(grid_, quantisation_, codes, scratches.local());
     for (const Run& run : runs) {
       for (std::size_t i = run.first; i < run.end; ++i) {
@@ -207,12 +213,35 @@ void PointSampler::sample(std::span<const WorldPoint> points, std::span<SurfaceS
 void PointSampler::sample(std::span<const WorldPoint> points, std::span<double> elevations) {
   ISOHF_ASSERT(points.size() == elevations.size());
   std::fill(elevations.begin(), elevations.end(), std::numeric_limits<double>::quiet_NaN());
-  visit(points, [&](const TileCodes& codes, std::span<const Run> runs) {
+  const auto tile_of = [&](std::size_t i) { return tile_under(points[i]); };
+  visit(points.size(), tile_of, [&](const TileCodes& codes, std::span<const Run> runs) {
     std::vector<float> no_scratch;
     const TileSurface surface(grid_, quantisation_, codes, no_scratch);
     for (const Run& run : runs) {
       for (std::size_t i = run.first; i < run.end; ++i) {
         elevations[i] = surface.elevation(barycentric(grid_.shape(), grid_.locate(points[i]).point));
+      }
+    }
+  });
+}
+
+void PointSampler::sample(std::span<const FixedPlace> places, const FixedHeights& heights,
+                          std::span<double> elevations) {
+  ISOHF_ASSERT(places.size() == elevations.size());
+  std::fill(elevations.begin(), elevations.end(), std::numeric_limits<double>::quiet_NaN());
+  const TileShape& shape = grid_.shape();
+  FixedTilePlace under{};
+  const auto tile_of = [&](std::size_t i) {
+    return locate(grid_, places[i], under) ? grid_.flat_index(under.tile) : -1;
+  };
+  visit(places.size(), tile_of, [&](const TileCodes& codes, std::span<const Run> runs) {
+    FixedTilePlace at{};
+    for (const Run& run : runs) {
+      for (std::size_t i = run.first; i < run.end; ++i) {
+        (void)locate(grid_, places[i], at);
+        elevations[i] = heights.elevation(fixed_height(fixed_triangle(shape, at.place), [&](GridVertex vertex) {
+          return heights.at(codes, static_cast<std::size_t>(vertex.row * shape.columns() + vertex.column));
+        }));
       }
     }
   });

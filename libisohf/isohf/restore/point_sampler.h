@@ -8,6 +8,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include "isohf/restore/predict/fixed_point.h"
 #include "isohf/surface.h"
 
 namespace isohf {
@@ -33,6 +34,8 @@ class PointSampler {
 
   void sample(std::span<const WorldPoint> points, std::span<SurfaceSample> samples);
   void sample(std::span<const WorldPoint> points, std::span<double> elevations);
+  /// In integers, on the triangles.
+  void sample(std::span<const FixedPlace> places, const FixedHeights& heights, std::span<double> elevations);
 
  private:
   using Codes = std::shared_ptr<const TileCodes>;
@@ -41,8 +44,9 @@ class PointSampler {
     Codes codes;
   };
 
-  template <typename Sample>
-  void visit(std::span<const WorldPoint> points, const Sample& sample);
+  [[nodiscard]] std::int64_t tile_under(WorldPoint point) const;
+  template <typename TileOf, typename Sample>
+  void visit(std::size_t points, const TileOf& tile_of, const Sample& sample);
   [[nodiscard]] Codes kept(std::int64_t tile);
   void keep(std::int64_t tile, const Codes& codes);
 

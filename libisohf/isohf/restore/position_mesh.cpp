@@ -12,10 +12,6 @@ namespace {
 constexpr std::int64_t kStep = 32;
 constexpr std::int64_t kMostCells = std::int64_t{1} << 20;
 
-std::int64_t cells_of(std::int64_t samples, std::int64_t step) {
-  return std::max<std::int64_t>((samples - 1 + step - 1) / step, 3);
-}
-
 /// Four neighbouring nodes and the weights of the cubic through them.
 struct CubicTaps {
   std::int64_t first;
@@ -36,34 +32,19 @@ CubicTaps taps_at(std::int64_t sample, std::int64_t samples, std::int64_t cells)
 
 }  // namespace
 
+std::int64_t PositionMesh::cells(std::int64_t samples, std::int64_t step) {
+  return std::max<std::int64_t>((samples - 1 + step - 1) / step, 3);
+}
+
 std::int64_t PositionMesh::step(std::int64_t columns, std::int64_t rows) {
   std::int64_t step = kStep;
-  while (cells_of(columns, step) > kMostCells / cells_of(rows, step)) step *= 2;
+  while (cells(columns, step) > kMostCells / cells(rows, step)) step *= 2;
   return step;
 }
 
 std::size_t PositionMesh::value_count(std::int64_t columns, std::int64_t rows) {
   const std::int64_t between = step(columns, rows);
-  return 2 * static_cast<std::size_t>(cells_of(columns, between) + 1) *
-         static_cast<std::size_t>(cells_of(rows, between) + 1);
-}
-
-PositionMesh::PositionMesh(std::int64_t columns, std::int64_t rows,
-                           const std::function<WorldPoint(double column, double row)>& at)
-    : columns_(columns), rows_(rows), step_(step(columns, rows)) {
-  const std::int64_t across = cells_of(columns, step_);
-  const std::int64_t down = cells_of(rows, step_);
-  const auto position = [](std::int64_t node, std::int64_t cells, std::int64_t samples) {
-    return static_cast<double>(node) * static_cast<double>(samples - 1) / static_cast<double>(cells);
-  };
-  values_.reserve(value_count(columns, rows));
-  for (std::int64_t j = 0; j <= down; ++j) {
-    for (std::int64_t i = 0; i <= across; ++i) {
-      const WorldPoint place = at(position(i, across, columns), position(j, down, rows));
-      values_.push_back(place.x);
-      values_.push_back(place.z);
-    }
-  }
+  return 2 * static_cast<std::size_t>(cells(columns, between) + 1) * static_cast<std::size_t>(cells(rows, between) + 1);
 }
 
 PositionMesh::PositionMesh(std::int64_t columns, std::int64_t rows, std::vector<double> values)
@@ -73,8 +54,8 @@ PositionMesh::PositionMesh(std::int64_t columns, std::int64_t rows, std::vector<
 
 void PositionMesh::row(std::int64_t row, std::span<WorldPoint> out) const {
   ISOHF_ASSERT(out.size() == static_cast<std::size_t>(columns_));
-  const auto nodes = static_cast<std::size_t>(cells_of(columns_, step_) + 1);
-  const CubicTaps down = taps_at(row, rows_, cells_of(rows_, step_));
+  const auto nodes = static_cast<std::size_t>(cells(columns_, step_) + 1);
+  const CubicTaps down = taps_at(row, rows_, cells(rows_, step_));
   std::vector<WorldPoint> line(nodes);
   for (std::size_t i = 0; i < nodes; ++i) {
     for (std::size_t j = 0; j < 4; ++j) {
@@ -83,9 +64,9 @@ void PositionMesh::row(std::int64_t row, std::span<WorldPoint> out) const {
       line[i].z += down.weights[j] * node[1];
     }
   }
-  const std::int64_t cells = cells_of(columns_, step_);
+  const std::int64_t all = cells(columns_, step_);
   for (std::int64_t column = 0; column < columns_; ++column) {
-    const CubicTaps across = taps_at(column, columns_, cells);
+    const CubicTaps across = taps_at(column, columns_, all);
     WorldPoint place{0.0, 0.0};
     for (std::size_t i = 0; i < 4; ++i) {
       const WorldPoint& node = line[static_cast<std::size_t>(across.first) + i];

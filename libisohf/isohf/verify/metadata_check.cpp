@@ -221,7 +221,7 @@ class Contradictions {
         add("lossless.z_scale, .z_offset", "are not the source's");
       std::uint64_t bytes = 0;
       for (const MemberEntry& member : archive_.members()) {
-        if (member.name.starts_with("residual/") && member.name != kPositionsName) bytes += member.compressed_bytes;
+        if (is_residual(member.name)) bytes += member.compressed_bytes;
       }
       if (bytes != record->residual_bytes && !archive_.reads_by_directory())
         add("lossless.residual_bytes", fmt::format("is {}, the members have {}", record->residual_bytes, bytes));

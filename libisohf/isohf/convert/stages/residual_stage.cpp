@@ -72,8 +72,8 @@ std::uint64_t residual_stage_memory_bytes(const SourceInfo& info, const Plan& pl
   const double tile_rows = std::ceil(rows * plan.frame.spacing_z / plan.grid.extent_z()) + 1.0;
   const double tiles = tile_rows * static_cast<double>(plan.grid.tile_columns()) * 8.0 *
                        static_cast<double>(shape.stored_vertex_count());
-  const double lattice_rows = rows * plan.frame.spacing_z / plan.grid.sigma_z() + QuinticResponse::kTaps + 2.0;
-  return static_cast<std::uint64_t>(bands + encoding + tiles + lattice_rows * width * 9.0);
+  const double lattice_rows = rows * plan.frame.spacing_z / plan.grid.sigma_z() + 2.0 * SplinePredictor::kReach + 2.0;
+  return static_cast<std::uint64_t>(bands + encoding + tiles + lattice_rows * width * 17.0);
 }
 
 LosslessRecord write_residuals(HeightSource& source, const SourceFrame& frame, const TileGrid& grid,
@@ -87,14 +87,17 @@ LosslessRecord write_residuals(HeightSource& source, const SourceFrame& frame, c
   record.void_values = info.void_values;
   record.rows_per_member = rows_per_member(info);
   writer.flush_tiles();
-  std::optional<PositionMesh> positions;
+  const TileStatistics stored = writer.statistics();
+  record.fraction_bits = FixedHeights::bits_for(quantisation, std::max(std::abs(stored.min), std::abs(stored.max)));
+  std::vector<std::byte> nodes;
   if (frame.warp) {
     const ExactWarp warp(*frame.warp);
-    positions.emplace(info.width, info.height, [&](double column, double row) {
+    const PlaceMesh places(info.width, info.height, grid, [&](double column, double row) {
       return warp.world_from_source({column, row});
     });
-    record.at_positions = true;
-    writer.add_member(kPositionsName, bytes_of(*positions), true);
+    record.prediction = SamplePrediction::kTriangles;
+    nodes = places.bytes();
+    writer.add_member(kNodesName, nodes, true);
   }
   const ReadTiles read_tiles = [&](std::span<const TileIndex> tiles) {
     std::vector<TileCodes> codes;
@@ -103,8 +106,8 @@ LosslessRecord write_residuals(HeightSource& source, const SourceFrame& frame, c
   };
   SamplePredictor surface(
       grid, frame.wraps_x, quantisation, read_tiles,
-      {frame.width, frame.height, frame.first_sample_x, frame.first_sample_z, frame.spacing_x, frame.spacing_z},
-      record.method, std::move(positions));
+      {frame.width, frame.height, frame.first_sample_x, frame.first_sample_z, frame.spacing_x, frame.spacing_z}, record,
+      [&](const char*) { return nodes; });
   Sha256 hash;
   for (std::int64_t row = 0; row < info.height;) {
     std::vector<ResidualBand> bands;

@@ -1,0 +1,512 @@
+#!/usr/bin/env python3
+"""Reads an isohf archive by archive_format.md, with nothing but Python's standard library: checks every member and the content
+hash and, where it was made with --lossless, brings back the source's samples. usage: reader.py ARCHIVE [SAMPLES]: prints the
+hashes; SAMPLES: writes the source's samples there, little-endian, row by row."""
+
+import hashlib
+import json
+import math
+import struct
+import sys
+import zlib
+
+
+class Refused(Exception):
+    pass
+
+
+def require(holds, what):
+    if not holds:
+        raise Refused(what)
+
+
+# ---- Tile payload, section 5 ----------------------------------------------------------------------------------------
+
+FIXED = {0: [4096], 1: [4096, -4096], 2: [4750, -1050, -1180, 370, -1230, 350, -1230, -290, 50, 660]}
+
+
+def void_mask(data, samples):
+    mask, run, shift, of = [], 0, 0, 0
+    for byte in data:
+        run |= (byte & 127) << shift
+        shift += 7
+        require(run <= samples, "a run of the void mask is too long")
+        if byte < 128:
+            require((run > 0 or not mask) and (byte > 0 or shift == 7), "a run of the void mask is empty or too wide")
+            mask += [of] * run
+            run, shift, of = 0, 0, 1 - of
+    require(len(mask) == samples and shift == 0, "the void mask has another size")
+    return mask
+
+
+def symbols_of(payload, at, count, is_paired):
+    """The symbols of a context and where they end."""
+    require(not is_paired or count <= 2 * len(payload), "more symbols than bytes")
+    symbols = list(payload[at : at + count]) if not is_paired else []
+    while is_paired and len(symbols) < count:
+        require(at < len(payload) and payload[at] <= 225, "no pair of symbols")
+        pair = divmod(payload[at], 15) if payload[at] < 225 else payload[at + 1 : at + 3]
+        require(len(pair) == 2 and (payload[at] < 225 or max(pair) >= 15), "no pair of symbols")
+        symbols += pair
+        at += 1 if payload[at] < 225 else 3
+    require(len(symbols) >= count and (len(symbols) == count or symbols.pop() == 0), "symbols are missing or left over")
+    return symbols, at if is_paired else at + count
+
+
+def decode(payload, columns, rows, kind):
+    """The integers of a tile in row order, None where void, and the number of dropped bits."""
+    require(len(payload) >= 16, "a payload ends early")
+    version, found_kind, flags, dropped, low, high, mask_bytes = struct.unpack_from("<BBBBiiI", payload)
+    require(version == 1 and found_kind == kind and flags < 4 and dropped <= (30 if kind == 2 else 0), "a header's fields")
+    ends = (-(1 << 31), (1 << 31) - 1) if kind == 2 else (0, (65534, 254)[kind])
+    require(ends[0] <= low <= high <= ends[1] and (low == high) == (flags >> 1) and (mask_bytes > 0) == (flags & 1), "a range")
+    at = 16
+    if not flags & 2:
+        require(len(payload) >= 30, "a payload ends early")
+        base, extra_bytes, shift, contexts, paired, predictors, n = struct.unpack_from("<iIBBHBB", payload, 16)
+        require(low <= base <= high and shift < 32 and 1 <= contexts <= 16 and paired >> contexts == 0
+                and 1 <= predictors <= 8 and n in (12, 18), "a header's fields")
+        fields = "<%dh%dH%dI" % (n * predictors, contexts - 1, contexts)
+        require(len(payload) >= 30 + struct.calcsize(fields), "a payload ends early")
+        numbers = struct.unpack_from(fields, payload, 30)
+        weights = [numbers[n * p : n * p + n] for p in range(predictors)]
+        thresholds, counts = numbers[n * predictors : -contexts], numbers[-contexts:]
+        require(all(sum(map(abs, w)) < 28672 for w in weights), "weights that are too large")
+        require(all(a < b for a, b in zip((0,) + thresholds, thresholds + (4096,))), "thresholds out of order")
+        at = 30 + struct.calcsize(fields)
+    mask = void_mask(payload[at : at + mask_bytes], columns * rows) if flags & 1 else [0] * (columns * rows)
+    at += mask_bytes
+    if flags & 2:
+        require(at == len(payload), "bytes behind the payload's end")
+        return [None if void else low for void in mask], dropped
+    across = -(-columns // 16)
+    blocks = across * -(-rows // 16) if predictors > 1 else 0
+    block_map = payload[at : at + blocks]
+    require(len(block_map) == blocks and all(p < predictors for p in block_map), "the map of predictors")
+    at += blocks
+    symbols = []
+    for k, count in enumerate(counts):
+        found, at = symbols_of(payload, at, count, paired >> k & 1)
+        symbols.append(found)
+    require(at + extra_bytes == len(payload), "bytes behind the payload's end")
+    extra, taken = int.from_bytes(payload[at:], "little"), 0
+    streams = []
+    for found in symbols:
+        stream = []
+        for symbol in found:
+            require(symbol < (240 if kind == 2 else 112), "a symbol above the last")
+            x = (symbol - 16) // 8 + 1 if symbol >= 16 else 0
+            stream.append(symbol if symbol < 16 else ((8 + (symbol & 7)) << x) + (extra >> taken & (1 << x) - 1))
+            taken += x
+        streams.append(iter(stream))
+    require((taken + 7) // 8 == extra_bytes and extra >> taken == 0, "extra bits that run out or are left over")
+    modulus = 1 << (32 if kind == 2 else 16)
+
+    def residual(energy):
+        folded = next(streams[sum(threshold <= energy for threshold in thresholds)], None)
+        require(folded is not None, "a context runs out of symbols")
+        return folded
+
+    def restore(halves, folded):
+        difference = folded // 2 if folded % 2 == 0 else -(folded + 1) // 2
+        prediction = (halves + 1) >> 1
+        value = (prediction + difference if halves % 2 else prediction - difference) % modulus
+        value -= modulus if kind == 2 and value >= modulus // 2 else 0
+        require(low <= value <= high, "a sample outside low … high")
+        return value
+
+    # Dictionaries by place, margins included.
+    places = range(-3, columns + 3)
+    above = [dict.fromkeys(places, base) for _ in range(3)]  # rows r-1, r-2, r-3
+    rough = [dict.fromkeys(places, 0) for _ in range(2)]
+    out = [None] * (columns * rows)
+    for r in range(rows):
+        s = r % 2
+        first, last = (0, columns - 1) if s else (1, columns - 2)
+        column = {p: p for p in range(first, last + 1)}
+        if not s:
+            column[1], column[columns - 2] = 0, columns - 1
+        (near, far, farther), (n, f) = above, rough
+        v, g = dict.fromkeys((first - 1, first - 2), near[first + s]), {}
+        for p in range(first, last + 1):
+            ne = near[p + s]
+            if mask[r * columns + column[p]]:
+                v[p], g[p] = (v[p - 1] + ne) >> 1, 0
+                continue
+            w = FIXED.get(r) or weights[block_map[r // 16 * across + p // 16] if blocks else 0]
+            neighbours = [v[p - 1], near[p + s - 1], v[p - 2], near[p + s + 1], near[p + s - 2], far[p], far[p + 1],
+                          far[p - 1], far[p + 2], far[p - 2], farther[p + s], farther[p + s - 1], farther[p + s + 1],
+                          farther[p + s - 2], near[p + s + 2], near[p + s - 3], far[p + 3], far[p - 3]]
+            total = sum(a * (b - ne) for a, b in zip(w, neighbours))
+            halves = min(max((4096 * ne + total) >> 11, 2 * low), 2 * high - 1)
+            folded = residual(4 * (n[p + s] + n[p + s - 1] + f[p]) + 3 * n[p + s + 1]
+                              + 2 * (n[p + s + 2] + n[p + s - 2] + f[p + 1] + f[p - 1])
+                              + n[p + s - 3] + f[p + 2] + f[p - 2])
+            out[r * columns + column[p]] = v[p] = restore(halves, folded)
+            g[p] = min(folded >> shift, 157)
+        for c, p in (() if s else ((1, 1), (columns - 2, columns - 3))):
+            if not mask[r * columns + c]:
+                out[r * columns + c] = restore(2 * ((v[p] + v[p + 1]) >> 1), residual(13 * (g[p] + g[p + 1])))
+        for row in (v, g):
+            row.update({p: row[first] for p in places if p < first})
+            row.update({p: row[last] for p in places if p > last})
+        above, rough = [v] + above[:2], [g, rough[0]]
+    require(all(next(stream, None) is None for stream in streams), "a context keeps symbols")
+    return out, dropped
+
+
+# ---- Residuals, section 7 -------------------------------------------------------------------------------------------
+
+INVERSE = [46566, -21655, 9393, -4048, 1743, -750, 323, -139, 60, -26, 11, -5, 2]
+TYPES = {"uint8": "B", "int8": "b", "uint16": "H", "int16": "h", "uint32": "I", "int32": "i", "float16": "e",
+         "float32": "f", "float64": "d"}
+
+
+def nearest(a, b):
+    return (2 * a + b) // (2 * b)
+
+
+def spline_weights(n):
+    def u(m):
+        a, b, c = (512 - m) ** 5, (1024 - m) ** 5, (1536 - m) ** 5
+        return [nearest(total, 120 << 31) for total in (a, b - 6 * a, c - 6 * b + 15 * a)]
+
+    (w0, w1, _), (w5, w4, w3) = u(n), u(512 - n)
+    return [w0, w1, 16384 - w0 - w1 - w3 - w4 - w5, w3, w4, w5]
+
+
+def inverse(s, i):
+    return nearest(INVERSE[0] * s(i) + sum(INVERSE[j] * (s(i - j) + s(i + j)) for j in range(1, 13)), 16384)
+
+
+def mirrored(i, n):
+    i %= 2 * (n - 1)
+    return min(i, 2 * (n - 1) - i)
+
+
+def filled(line):
+    """A lattice row with its voids filled in; None where all are void."""
+    there = [i for i, q in enumerate(line) if q is not None]
+    if not there:
+        return None
+    line = [line[there[0]]] * there[0] + line[there[0] : there[-1] + 1] + [line[there[-1]]] * (len(line) - there[-1] - 1)
+    for a, b in zip(there, there[1:]):
+        for i in range(a + 1, b):
+            line[i] = line[a] + nearest((i - a) * (line[b] - line[a]), b - a)
+    return line
+
+
+class Surface:
+    """The vertices of all tiles as integers: tiles[flat index][c + r * C], None where void."""
+
+    def __init__(self, metadata, tiles):
+        self.columns, self.rows = metadata["tile_shape"]["columns"], metadata["tile_shape"]["rows"]
+        self.across, self.down = metadata["tiles"]["columns"], metadata["tiles"]["rows"]
+        self.width, self.height = 512 * (self.columns - 4) * self.across, 512 * (self.rows - 3) * self.down
+        self.wraps, self.tiles = metadata.get("wraps_x"), tiles
+
+    def triangle(self, x, z):
+        """P at a place, None where there is none."""
+        if not (0 <= x <= self.width and 0 <= z <= self.height):
+            return None
+        i, j = min(x // (512 * (self.columns - 4)), self.across - 1), min(z // (512 * (self.rows - 3)), self.down - 1)
+        x, z = x - 512 * (self.columns - 4) * i, z - 512 * (self.rows - 3) * j
+        top = min(z // 512, self.rows - 4) + 1
+        below = z - 512 * (top - 1)
+        even, odd, e = (top, top + 1, 512 - below) if top % 2 == 0 else (top + 1, top, below)
+        k = min(x // 512, self.columns - 5)
+        t = 2 * (x - 512 * k)
+        if e <= t <= 1024 - e:
+            read = [(1024 - e - t, k + 1, odd), (2 * e, k + 2, even), (t - e, k + 2, odd)]
+        else:
+            a, s = (k, t) if t < e else (k + 1, t - 1024)
+            west, east = (2 * (e - s), 2 * s) if a == 0 else (e - s, e + s)
+            west, east = (-2 * s, 2 * (e + s)) if a == self.columns - 4 else (west, east)
+            read = [(west, a + 1, even), (1024 - 2 * e, a + 1, odd), (east, a + 2, even)]
+        tile = self.tiles[j * self.across + i]
+        read = [(weight, tile[c + r * self.columns]) for weight, c, r in read if weight]
+        return None if any(q is None for _, q in read) else nearest(sum(weight * q for weight, q in read), 1024)
+
+    def lattice_row(self, k):
+        j = min(max((k - 1) // (self.rows - 3), 0), self.down - 1)
+        r, first = k - j * (self.rows - 3), 2 - k % 2
+        rows = [tile[r * self.columns :][: self.columns] for tile in self.tiles[j * self.across : (j + 1) * self.across]]
+        line = sum((row[first : first + self.columns - 4] for row in rows), [])
+        return line if self.wraps else rows[0][:1] + line + (rows[-1][-3:-1] if k % 2 else rows[-1][-1:])
+
+    def spline(self, xs, zs):
+        """P of each sample, row by row, None where there is none."""
+        count = (self.rows - 3) * self.down + 3
+        taps = [[((x + half) // 512, spline_weights((x + half) % 512)) for x in xs] for half in (256, 512)]
+        heights, near = [], []
+        for k in range(count):
+            line = self.lattice_row(k)
+            n = len(line)
+            place = (lambda i: (i - 1) % n) if self.wraps else (lambda i: mirrored(i, n))
+            near.append([any(line[place(i + t)] is None for t in range(-2, 4)) for i, _ in taps[k % 2]])
+            line = filled(line)
+            wanted = {place(i + t) for i, _ in taps[k % 2] for t in range(-2, 4)} if line else ()
+            s = (lambda i: line[(i % n)]) if self.wraps else (lambda i: line[mirrored(i, n)])
+            c = {i: inverse(s, i) for i in wanted}
+            heights.append(line and [nearest(sum(w[t] * c[place(i - 2 + t)] for t in range(6)), 16384)
+                                     for i, w in taps[k % 2]])
+        coefficients = {}
+        for z in zs:
+            rows = [mirrored(z // 512 - 1 + t, count) for t in range(6)]
+            weights = spline_weights(z % 512)
+            for k in rows if 0 <= z <= self.height else ():
+                if k in coefficients or heights[k] is None:
+                    continue
+                window = {0: heights[k]}
+                for j in range(1, 13):
+                    window[-j] = heights[mirrored(k - j, count)] or window[1 - j]
+                    window[j] = heights[mirrored(k + j, count)] or window[j - 1]
+                coefficients[k] = [inverse(lambda j: window[j][i], 0) for i in range(len(xs))]
+            for i, x in enumerate(xs):
+                if not (0 <= x <= self.width and 0 <= z <= self.height):
+                    yield None
+                elif any(near[k][i] for k in rows):
+                    yield self.triangle(x, z)
+                else:
+                    yield nearest(sum(w * coefficients[k][i] for w, k in zip(weights, rows)), 16384)
+
+
+def cells(samples, step):
+    return max(3, -(-(samples - 1) // step))
+
+
+def node_weights(i, samples, n):
+    d = max(samples - 1, 1)
+    cell, part = i * n // d, (i * n % d * 16384 + d // 2) // d
+    first = min(max(cell - 1, 0), n - 3)
+    a, a1, a2, a3 = ((cell - first - m) * 16384 + part for m in range(4))
+    v0, v2, v3 = nearest(-a1 * a2 * a3, 6 << 26), nearest(-a * a1 * a3, 2 << 26), nearest(a * a1 * a2, 6 << 26)
+    return first, (v0, 65536 - v0 - v2 - v3, v2, v3)
+
+
+def blend(taps, nodes):
+    first, weights = taps
+    g = nodes[first : first + 4]
+    if None in g:
+        return None
+    return tuple(g[1][axis] + nearest(sum(w * (node[axis] - g[1][axis]) for w, node in zip(weights, g)), 65536)
+                 for axis in (0, 1))
+
+
+def places(member, width, height):
+    """The place of each sample, row by row, None where there is none."""
+    step = 32
+    while cells(width, step) > (1 << 20) // cells(height, step):
+        step *= 2
+    across, down = cells(width, step), cells(height, step)
+    require(len(member) == 16 * (across + 1) * (down + 1), "residual/nodes has another size")
+    numbers, sums, nodes = iter(struct.iter_unpack("<qq", member)), [(0, 0)] * (across + 2), []
+    for _ in range(down + 1):
+        row, west, corner = [], (0, 0), (0, 0)
+        for i in range(across + 1):
+            d = next(numbers)
+            there = -(1 << 63) not in d
+            north = sums[i]
+            at = tuple((d[axis] if there else 0) + west[axis] + north[axis] - corner[axis] for axis in (0, 1))
+            require(max(map(abs, at)) < 1 << 40, "a node lies too far from the tiles")
+            row.append(at if there else None)
+            sums[i], west, corner = at, at, north
+        nodes.append(row)
+    for j in range(height):
+        taps = node_weights(j, height, down)
+        line = [blend(taps, [row[i] for row in nodes]) for i in range(across + 1)]
+        yield from (blend(node_weights(i, width, across), line) for i in range(width))
+
+
+def key_of_guess(raw, kind):
+    """The key of the sample that a prediction becomes; `kind` is the sample type's letter in struct."""
+    bits = 8 * struct.calcsize("<" + kind)
+    sign = 1 << bits - 1
+    if kind not in "efd":
+        low, high = (-sign, sign - 1) if kind.islower() else (0, 2 * sign - 1)
+        return math.floor(min(max(raw + 0.5, low), high)) % (2 * sign)
+    limit = {"e": 65504.0, "f": (2.0 - 2.0**-23) * 2.0**127, "d": sys.float_info.max}[kind]
+    raw = min(max(raw, -limit), limit)
+    if kind == "e":  # ties away from zero
+        step = 2.0 ** (max(math.frexp(raw)[1] - 1, -14) - 10)
+        raw = math.copysign(min(math.floor(abs(raw) / step + 0.5) * step, limit), raw)
+    code = int.from_bytes(struct.pack("<" + kind, raw), "little")
+    return code ^ (2 * sign - 1) if code & sign else code | sign
+
+
+def planes(member, at, count, size):
+    """Numbers whose lowest bytes come first, then the second ones, …"""
+    require(at + count * size <= len(member), "a stream ends early")
+    return iter([int.from_bytes(member[at + i : at + count * size : count], "little") for i in range(count)])
+
+
+def restored(member, predicted, record):
+    """The raw samples of a residual member as bytes; `predicted` are elevations, None where there is none."""
+    kind, width, count = TYPES[record["sample_type"]], record["width"], len(predicted)
+    size = struct.calcsize("<" + kind)
+    require(len(member) >= 33 and member[0] <= 1, "residuals of another kind")
+    counts = struct.unpack_from("<8I", member, 1)
+    require(sum(counts) <= count, "more residuals than samples")
+    mask = int.from_bytes(member[33 : 33 + (count + 7) // 8], "little") if member[0] else 0
+    at, streams = 33 + ((count + 7) // 8 if member[0] else 0), []
+    for n in (count - sum(counts),) + counts:
+        streams.append(planes(member, at, n, size))
+        at += n * size
+    require(at == len(member), "bytes behind the residuals")
+    modulus, sign, widths, out = 1 << 8 * size, 1 << 8 * size - 1, [0] * width, bytearray()
+    for i, elevation in enumerate(predicted):
+        if elevation is None or mask >> i & 1:
+            code = next(streams[0], None)
+            require(code is not None, "more kept samples than are there")
+        else:
+            bits, c = widths[max(i % width - 1, 0)] + widths[i % width], i % width
+            folded = next(streams[1 + sum(limit < bits for limit in (1, 3, 5, 7, 9, 12, 18))], None)
+            require(folded is not None, "a stream ends early")
+            widths[c] = folded.bit_length()
+            guess = key_of_guess((elevation - record["z_offset"]) / record["z_scale"], kind)
+            code = (guess + (folded // 2 if folded % 2 == 0 else -(folded + 1) // 2)) % modulus
+            code = code if kind not in "efd" else code ^ sign if code & sign else code ^ modulus - 1
+        out += code.to_bytes(size, "little")
+    require(all(next(stream, None) is None for stream in streams), "residuals or kept samples are left over")
+    return bytes(out)
+
+
+# ---- The archive, sections 1 to 4 and 6 -----------------------------------------------------------------------------
+
+KINDS = {"u16": (0, "H", 65535), "u8": (1, "B", 255), "f32": (2, "I", 0x7FC00000)}
+
+
+class Archive:
+    def __init__(self, path):
+        with open(path, "rb") as file:
+            self.data = file.read()
+        self.read_directory()
+        self.metadata = json.loads(self.member("isohf.json"))
+        require(self.metadata["format"] == "isohf" and self.metadata["version"] == 1, "another version of the metadata")
+        self.shape, self.grid = self.metadata["tile_shape"], self.metadata["tiles"]
+        self.kind, self.letter, self.void = KINDS[self.metadata["samples"]["type"]]
+
+    def unpack(self, layout, at):
+        require(0 <= at and at + struct.calcsize("<" + layout) <= len(self.data), "a record ends behind the file's end")
+        return struct.unpack_from("<" + layout, self.data, at)
+
+    def read_directory(self):
+        end64 = self.unpack("IQHHIIQQQQ", len(self.data) - 98)
+        require(end64[0] == 0x06064B50 and end64[9] + end64[8] == len(self.data) - 98, "the end records")
+        self.members, at, entries, end = {}, end64[9], end64[7], 0
+        for _ in range(entries):
+            magic, _, _, flags, method, _, crc, size, full, name_size, extra, _, _, _, _, offset = self.unpack("IHHHHIIIIHHHHHII", at)
+            require(magic == 0x02014B50 and flags in (0, 0x800) and method in (0, 8), "a directory entry")
+            name = self.data[at + 46 : at + 46 + name_size]
+            wide = list(self.unpack("%dQ" % (extra // 8), at + 46 + name_size + 4)) if extra else []
+            if full == 0xFFFFFFFF:
+                full, size = wide.pop(0), wide.pop(0)
+            offset = wide.pop(0) if offset == 0xFFFFFFFF else offset
+            require(offset >= end, "members overlap")
+            local = self.unpack("IHHHIIIIHH", offset)
+            start = offset + 30 + local[8] + local[9]
+            require(local[0] == 0x04034B50 and local[2:4] == (flags, method) and local[5] == crc
+                    and self.data[offset + 30 : offset + 30 + local[8]] == name, "a local header that is not the directory's")
+            require(local[9] or local[6:8] == (size, full), "a local header's sizes")
+            end = start + size
+            require(end <= end64[9] and name.decode() not in self.members, "a member reaches into the directory, or occurs twice")
+            self.members[name.decode()] = (method, start, size, full, crc)
+            at += 46 + name_size + extra
+        require(at == len(self.data) - 98, "the directory's entries do not fill it")
+
+    def member(self, name):
+        require(name in self.members, name + " is missing")
+        method, start, size, full, crc = self.members[name]
+        content = self.data[start : start + size]
+        if method == 8:
+            inflater = zlib.decompressobj(wbits=-15)
+            try:
+                content = inflater.decompress(content, full + 1)
+            except zlib.error as error:
+                raise Refused("%s: %s" % (name, error)) from error
+            require(inflater.eof and not inflater.unused_data, name + " does not use up its bytes")
+        require(len(content) == full and zlib.crc32(content) == crc, name + " has another size or CRC")
+        return content
+
+    def read_tiles(self):
+        """The integers of all tiles, None where void, and for f32 each tile's dropped bits."""
+        samples, self.tiles, self.dropped = self.shape["columns"] * self.shape["rows"], [], []
+        for i in range(self.grid["columns"] * self.grid["rows"]):
+            name, values, dropped = "tiles/%d/%d.tile" % divmod(i, self.grid["columns"]), [None] * samples, 0
+            if name in self.members:
+                values, dropped = decode(self.member(name), self.shape["columns"], self.shape["rows"], self.kind)
+            self.tiles.append(values)
+            self.dropped.append(dropped)
+        require(sum(name.startswith("tiles/") for name in self.members) == self.grid["stored"], "another number of tiles")
+
+    def codes(self, tile):
+        """A tile's codes; of f32 the bits."""
+        values, d = self.tiles[tile], self.dropped[tile]
+        if self.kind == 2:
+            values = [v if v is None else v << d if v >= 0 else (-v - 1) << d | 1 << 31 for v in values]
+        return [self.void if v is None else v for v in values]
+
+    def content_hash(self):
+        everything, samples = hashlib.sha256(), self.metadata["samples"]
+        for i in range(len(self.tiles)):
+            codes = self.codes(i)
+            everything.update(hashlib.sha256(struct.pack("<%d%s" % (len(codes), self.letter), *codes)).digest())
+        everything.update(struct.pack("<IIIQQddBdd", self.shape["columns"], self.shape["rows"], self.shape["levels"],
+                                      self.grid["columns"], self.grid["rows"], self.metadata["extent"]["x"],
+                                      self.metadata["extent"]["z"], self.kind, samples["offset"], samples["scale"]))
+        return everything.hexdigest()
+
+    def integers(self, bits):
+        """The tiles as section 7 counts them."""
+        for i, values in enumerate(self.tiles):
+            if self.kind < 2:
+                yield [v if v is None else v << bits for v in values]
+                continue
+            heights = struct.unpack("<%df" % len(values), struct.pack("<%dI" % len(values), *self.codes(i)))
+            ends = (-(2.0**30), 2.0**30)
+            held = (None if v is None else min(max(h * 2.0**bits + 0.5, ends[0]), ends[1]) for h, v in zip(heights, values))
+            yield [h if h is None else math.floor(h) for h in held]
+
+    def source_samples(self):
+        record, source = self.metadata["lossless"], self.metadata["source"]
+        width, height, bits = record["width"], record["height"], record.get("fraction_bits")
+        require(record["prediction"] in ("spline", "triangles"), "prediction %s: not supported" % record["prediction"])
+        surface = Surface(self.metadata, list(self.integers(bits)))
+        if record["prediction"] == "spline":
+            extent, first, step = self.metadata["extent"], source["first_sample"], source["spacing"]
+            unit_x, unit_z = extent["x"] / (2.0 * (self.shape["columns"] - 4)), extent["z"] / (self.shape["rows"] - 3)
+            xs = [math.floor((first["x"] + i * step["x"]) / unit_x * 256.0 + 0.5) for i in range(width)]
+            zs = [math.floor((first["z"] + j * step["z"]) / unit_z * 512.0 + 0.5) for j in range(height)]
+            numbers = surface.spline(xs, zs)
+        else:
+            at = places(self.member("residual/nodes"), width, height)
+            numbers = (None if place is None else surface.triangle(*place) for place in at)
+        offset, scale, unit = self.metadata["samples"]["offset"], self.metadata["samples"]["scale"], 2.0**-bits
+        predicted = [p if p is None else offset + scale * (p * unit) for p in numbers]
+        found, rows = b"", record["rows_per_member"]
+        for row in range(0, height, rows):
+            found += restored(self.member("residual/%08d" % row), predicted[row * width : (row + rows) * width], record)
+        require(hashlib.sha256(found).hexdigest() == record["sha256"], "the samples have another SHA-256")
+        return found
+
+
+def main(path, samples=None):
+    archive = Archive(path)
+    for name in archive.members:
+        archive.member(name)
+    archive.read_tiles()
+    require(archive.content_hash() == archive.metadata["content_sha256"], "another content hash")
+    print("content", archive.metadata["content_sha256"])
+    if "lossless" in archive.metadata:
+        found = archive.source_samples()
+        print("samples", archive.metadata["lossless"]["sha256"])
+        if samples:
+            with open(samples, "wb") as file:
+                file.write(found)
+
+
+if __name__ == "__main__":
+    try:
+        main(*sys.argv[1:])
+    except Refused as refusal:
+        sys.exit("%s: %s" % (sys.argv[1], refusal))

@@ -1,0 +1,350 @@
+#include "isohf/restore/predict/spline_predictor.h"
+
+#include <oneapi/tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "isohf/base/assert.h"
+#include "isohf/base/simd.h"
+#include "isohf/restore/grid_sampler.h"
+#include "isohf/surface/resample/kernels.h"
+
+namespace isohf {
+namespace {
+
+constexpr double kVoid = std::numeric_limits<double>::quiet_NaN();
+/// Samples -> coefficients of the quintic B-spline through them: weights of the neighbours 0, 1, ... on either side, in
+/// 16384ths that sum to 1.
+constexpr std::array<double, 13> kInverse = {46566, -21655, 9393, -4048, 1743, -750, 323, -139, 60, -26, 11, -5, 2};
+constexpr int kHalo = static_cast<int>(kInverse.size()) - 1;
+static_assert(kHalo + 3 == SplinePredictor::kReach);
+/// Vertices by which a row is continued at its ends: the taps of the spline, and the halo of each.
+constexpr std::int64_t kMargin = 2;
+constexpr std::int64_t kContinued = kMargin + kHalo;
+/// Columns that are blended at once, in the nearest cache.
+constexpr std::size_t kBlock = 512;
+
+/// Sums in 16384ths, rounded to whole numbers, halves upwards.
+ISOHF_KERNEL void round_sums(std::size_t count, double* __restrict sums) {
+  for (std::size_t i = 0; i < count; ++i) sums[i] = std::floor(sums[i] * 0x1p-14 + 0.5);
+}
+ISOHF_KERNEL void weigh(const double* __restrict in, double weight, std::size_t count, double* __restrict sums) {
+  for (std::size_t i = 0; i < count; ++i) sums[i] = weight * in[i];
+}
+ISOHF_KERNEL void add_weighted(const double* __restrict in, double weight, std::size_t count, double* __restrict sums) {
+  for (std::size_t i = 0; i < count; ++i) sums[i] += weight * in[i];
+}
+ISOHF_KERNEL void add_two(const double* __restrict a, const double* __restrict b, double weight, std::size_t count,
+                          double* __restrict sums) {
+  for (std::size_t i = 0; i < count; ++i) sums[i] += weight * (a[i] + b[i]);
+}
+
+/// out [count]  coefficients at middle, middle + 1, ...; neighbour(j) [count] are the values j places on
+template <typename Neighbour>
+void invert(std::size_t count, const Neighbour& neighbour, double* out) {
+  for (std::size_t from = 0; from < count; from += kBlock) {
+    const std::size_t block = std::min(kBlock, count - from);
+    double* const sums = out + from;
+    vectorised<weigh>(neighbour(0) + from, kInverse[0], block, sums);
+    for (int j = 1; j <= kHalo; ++j) {
+      vectorised<add_two>(neighbour(-j) + from, neighbour(j) + from, kInverse[static_cast<std::size_t>(j)], block,
+                          sums);
+    }
+    vectorised<round_sums>(block, sums);
+  }
+}
+
+ISOHF_KERNEL void gather(const std::int32_t* __restrict start, const double* __restrict weights,
+                         const double* __restrict line, std::size_t count, double* __restrict out) {
+  for (std::size_t c = 0; c < count; ++c) {
+    const double* const from = line + start[c];
+    double sum = weights[c] * from[0];
+    for (std::size_t t = 1; t < 6; ++t) sum += weights[t * count + c] * from[t];
+    out[c] = std::floor(sum * 0x1p-14 + 0.5);
+  }
+}
+
+/// Voids between two vertices on the straight line between them, rounded, halves upwards; those beyond the outermost
+/// as that. False where all are void.
+bool fill_voids(std::vector<double>& line) {
+  const auto count = static_cast<std::int64_t>(line.size());
+  std::int64_t before = -1;
+  for (std::int64_t i = 0; i <= count; ++i) {
+    if (i < count && std::isnan(line[static_cast<std::size_t>(i)])) continue;
+    if (i == count && before < 0) return false;
+    const double from = line[static_cast<std::size_t>(before < 0 ? i : before)];
+    const double to = line[static_cast<std::size_t>(i == count ? before : i)];
+    const auto rise = static_cast<std::int64_t>(to - from);
+    const std::int64_t steps = i - before;
+    for (std::int64_t k = before + 1; k < i; ++k) {
+      const std::int64_t share = floor_divide(2 * rise * (k - before) + steps, 2 * steps);
+      line[static_cast<std::size_t>(k)] = from + static_cast<double>(share);
+    }
+    before = i;
+  }
+  return true;
+}
+
+}  // namespace
+
+std::array<int, 6> fixed_quintic(std::int64_t n) {
+  const auto fifth = [](std::int64_t a) { return a * a * a * a * a; };
+  const auto halves = [&](std::int64_t m) {  // the three weights that lie further than m / 512, nearest last
+    const std::int64_t a = fifth(kPlaceParts - m);
+    const std::int64_t b = fifth(2 * kPlaceParts - m);
+    const std::int64_t c = fifth(3 * kPlaceParts - m);
+    return std::array{a, b - 6 * a, c - 6 * b + 15 * a};
+  };
+  const auto weight = [](std::int64_t sum) {
+    constexpr std::int64_t kUnit = std::int64_t{120} << 31U;  // 120 * 512^5 / 16384
+    return static_cast<int>((sum + kUnit / 2) / kUnit);
+  };
+  const auto west = halves(n);
+  const auto east = halves(kPlaceParts - n);
+  std::array<int, 6> weights = {weight(west[0]), weight(west[1]), 0, weight(east[2]), weight(east[1]), weight(east[0])};
+  weights[2] = 16384 - weights[0] - weights[1] - weights[3] - weights[4] - weights[5];
+  return weights;
+}
+
+SplinePredictor::SplinePredictor(const TileGrid& grid, bool wraps_x, const FixedHeights& heights, ReadTiles read_tiles,
+                                 const SampleGrid& samples)
+    : grid_(grid), wraps_x_(wraps_x), heights_(heights), read_tiles_(std::move(read_tiles)), samples_(samples) {
+  require_samples_near(samples, grid);
+  const auto width = static_cast<std::size_t>(samples.width);
+  const std::int64_t most = kPlaceParts * grid.shape().cell_columns() * grid.tile_columns();
+  for (Taps& taps : taps_) {
+    taps.start.resize(width);
+    taps.weights.resize(6 * width);
+  }
+  for (std::size_t c = 0; c < width; ++c) {
+    const double x = samples.first_x + static_cast<double>(c) * samples.spacing_x;
+    x_.push_back(static_cast<std::int64_t>(std::floor(x / grid.sigma_x() * 256.0 + 0.5)));
+    for (std::size_t parity = 0; parity < 2; ++parity) {
+      // Vertices of even lattice rows lie at object x = -1, 1, 3, ..., those of odd ones at -2, 0, 2, ...
+      const std::int64_t place = std::clamp<std::int64_t>(x_[c], 0, most) + (parity == 0 ? 256 : 512);
+      taps_[parity].start[c] = static_cast<std::int32_t>(place / kPlaceParts - 2 + kMargin);
+      const std::array<int, 6> weights = fixed_quintic(place % kPlaceParts);
+      for (std::size_t t = 0; t < 6; ++t) taps_[parity].weights[t * width + c] = weights[t];
+    }
+  }
+}
+
+std::int64_t SplinePredictor::lattice_rows() const {
+  return grid_.tile_rows() * grid_.shape().cell_rows() + 3;
+}
+
+std::int64_t SplinePredictor::tile_row_of(std::int64_t lattice_row) const {
+  return std::clamp<std::int64_t>((lattice_row - 1) / grid_.shape().cell_rows(), 0, grid_.tile_rows() - 1);
+}
+
+std::int64_t SplinePredictor::z_of(std::int64_t row) const {
+  const double z = samples_.first_z + static_cast<double>(row) * samples_.spacing_z;
+  return static_cast<std::int64_t>(std::floor(z / grid_.sigma_z() * 512.0 + 0.5));
+}
+
+const SplinePredictor::LatticeRow& SplinePredictor::at(std::int64_t lattice_row) const {
+  return lattice_rows_[static_cast<std::size_t>(mirror_index(lattice_row, lattice_rows()) - first_lattice_row_)];
+}
+
+const SplinePredictor::TileRow& SplinePredictor::tile_row(std::int64_t row) {
+  for (const TileRow& kept : tile_rows_) {
+    if (kept.row == row) return kept;
+  }
+  TileRow made{row, {}};
+  made.heights.resize(static_cast<std::size_t>(grid_.tile_columns()));
+  std::vector<TileIndex> tiles;
+  for (std::int64_t column = 0; column < grid_.tile_columns(); ++column) tiles.push_back({column, row});
+  for_each_tile(read_tiles_, tiles,
+                [&](std::size_t i, const TileCodes& codes) { made.heights[i] = heights_.of(codes); });
+  tile_rows_.push_back(std::move(made));
+  return tile_rows_.back();
+}
+
+/// The vertices of a lattice row on the lattice: those that slid to a tile's edge are left out. A row that goes round
+/// has each vertex once, from x = 1 or 0 on.
+std::vector<double> SplinePredictor::line_of(const TileRow& tiles, std::int64_t lattice_row) const {
+  const std::int64_t columns = grid_.shape().columns();
+  const std::int64_t cells = grid_.shape().cell_columns();
+  const std::int64_t r = lattice_row - tiles.row * grid_.shape().cell_rows();
+  const std::int64_t first = r % 2 == 0 ? 2 : 1;
+  std::vector<double> line;
+  line.reserve(static_cast<std::size_t>(cells * grid_.tile_columns() + 3));
+  const auto row_of = [&](std::size_t tile) { return tiles.heights[tile].data() + r * columns; };
+  if (!wraps_x_) line.push_back(row_of(0)[0]);
+  for (std::size_t t = 0; t < tiles.heights.size(); ++t) {
+    line.insert(line.end(), row_of(t) + first, row_of(t) + first + cells);
+  }
+  if (wraps_x_) return line;
+  const double* const last = row_of(tiles.heights.size() - 1);
+  if (first == 2) {
+    line.push_back(last[columns - 1]);
+  } else {
+    line.insert(line.end(), last + columns - 3, last + columns - 1);
+  }
+  return line;
+}
+
+void SplinePredictor::straighten(const TileRow& tiles, std::int64_t lattice_row, LatticeRow& made) const {
+  std::vector<double> line = line_of(tiles, lattice_row);
+  const auto count = static_cast<std::int64_t>(line.size());
+  std::vector<char> voids;
+  if (std::any_of(line.begin(), line.end(), [](double n) { return std::isnan(n); })) {
+    for (const double n : line) voids.push_back(std::isnan(n) ? 1 : 0);
+    made.is_void = !fill_voids(line);
+    if (made.is_void) return;
+  }
+  const auto continued = [&](std::int64_t k) {
+    return static_cast<std::size_t>(wraps_x_ ? ((k - 1) % count + count) % count : mirror_index(k, count));
+  };
+  std::vector<double> wide;
+  const std::int64_t end = count + (wraps_x_ ? 1 : 0);  // of the vertices from object x = -1 or -2 on
+  const std::int64_t taps_end = end + 2 * kMargin;
+  wide.reserve(static_cast<std::size_t>(end + 2 * kContinued));
+  for (std::int64_t k = -kContinued; k < 0; ++k) wide.push_back(line[continued(k)]);
+  if (wraps_x_) wide.push_back(line[continued(0)]);
+  wide.insert(wide.end(), line.begin(), line.end());
+  for (std::int64_t k = end; k < end + kContinued + 2; ++k) wide.push_back(line[continued(k)]);
+  std::vector<double> coefficients(static_cast<std::size_t>(taps_end) + 2);
+  invert(
+      coefficients.size(), [&](int j) { return wide.data() + kHalo + j; }, coefficients.data());
+  const Taps& taps = taps_[static_cast<std::size_t>(lattice_row % 2)];
+  made.heights.resize(taps.start.size());
+  vectorised<gather>(taps.start.data(), taps.weights.data(), coefficients.data(), taps.start.size(),
+                     made.heights.data());
+  if (voids.empty()) return;
+  made.near_void.resize(taps.start.size());
+  for (std::size_t c = 0; c < taps.start.size(); ++c) {
+    for (std::int64_t t = 0; t < 6; ++t) made.near_void[c] |= voids[continued(taps.start[c] - kMargin + t)];
+  }
+}
+
+/// Rows without an elevation are stood in for by the last one before them that has any, seen from this row.
+void SplinePredictor::make_coefficients(std::int64_t lattice_row) {
+  LatticeRow& made = lattice_rows_[static_cast<std::size_t>(lattice_row - first_lattice_row_)];
+  if (made.is_void || !made.coefficients.empty()) return;
+  std::array<const double*, 2 * kHalo + 1> rows{};
+  rows[kHalo] = made.heights.data();
+  for (std::size_t j = 1; j <= kHalo; ++j) {
+    const auto step = static_cast<std::int64_t>(j);
+    const LatticeRow& above = at(lattice_row - step);
+    const LatticeRow& below = at(lattice_row + step);
+    rows[kHalo - j] = above.is_void ? rows[kHalo - j + 1] : above.heights.data();
+    rows[kHalo + j] = below.is_void ? rows[kHalo + j - 1] : below.heights.data();
+  }
+  made.coefficients.resize(made.heights.size());
+  invert(
+      made.heights.size(), [&](int j) { return rows[static_cast<std::size_t>(kHalo + j)]; }, made.coefficients.data());
+}
+
+/// Drops the lattice rows before `first` and makes those up to `last`.
+void SplinePredictor::keep_lattice_rows(std::int64_t first, std::int64_t last) {
+  while (!lattice_rows_.empty() && first_lattice_row_ < first) {
+    lattice_rows_.pop_front();
+    ++first_lattice_row_;
+  }
+  if (lattice_rows_.empty()) first_lattice_row_ = first;
+  for (;;) {
+    const std::int64_t next = first_lattice_row_ + static_cast<std::int64_t>(lattice_rows_.size());
+    if (next > last) return;
+    const TileRow& tiles = tile_row(tile_row_of(next));
+    std::int64_t end = next;
+    while (end <= last && tile_row_of(end) == tiles.row) ++end;
+    const std::size_t have = lattice_rows_.size();
+    lattice_rows_.resize(have + static_cast<std::size_t>(end - next));
+    oneapi::tbb::parallel_for(next, end, [&](std::int64_t row) {
+      straighten(tiles, row, lattice_rows_[have + static_cast<std::size_t>(row - next)]);
+    });
+  }
+}
+
+void SplinePredictor::read(std::int64_t first, std::int64_t rows, std::span<double> elevations) {
+  ISOHF_ASSERT(elevations.size() == static_cast<std::size_t>(rows * samples_.width));
+  const std::int64_t count = lattice_rows();
+  const std::int64_t last_z = kPlaceParts * (count - 3);
+  const auto middle = [&](std::int64_t row) {
+    return std::clamp<std::int64_t>(z_of(row), 0, last_z) / kPlaceParts + 1;
+  };
+  const std::int64_t north = middle(first);
+  const std::int64_t south = middle(first + rows - 1);
+  // What is mirrored at an end lies less far inside.
+  const std::int64_t low = std::max<std::int64_t>(north - kReach + 1, 0);
+  const std::int64_t high = std::min(south + kReach, count - 1);
+  for (std::int64_t row = tile_row_of(north); row <= tile_row_of(south); ++row) (void)tile_row(row);
+  keep_lattice_rows(low, high);
+  std::vector<std::int64_t> wanted;
+  for (std::int64_t row = std::max<std::int64_t>(north - 2, 0); row <= std::min(south + 3, count - 1); ++row) {
+    wanted.push_back(row);
+  }
+  oneapi::tbb::parallel_for(std::size_t{0}, wanted.size(), [&](std::size_t i) { make_coefficients(wanted[i]); });
+  oneapi::tbb::parallel_for(std::int64_t{0}, rows, [&](std::int64_t i) {
+    read_row(first + i, elevations.subspan(static_cast<std::size_t>(i * samples_.width), x_.size()));
+  });
+  // What lies North of the next row's tiles is done with.
+  const std::int64_t next = tile_row_of(middle(first + rows));
+  std::erase_if(tile_rows_, [next](const TileRow& kept) { return kept.row < next; });
+}
+
+/// Fills in the samples of a row that are marked.
+void SplinePredictor::read_triangles(std::int64_t z, const std::vector<char>& here, std::span<double> out) const {
+  const TileShape& shape = grid_.shape();
+  const TileRow* tiles = nullptr;
+  for (std::size_t c = 0; c < out.size(); ++c) {
+    FixedTilePlace found{};
+    if (here[c] == 0 || !locate(grid_, {x_[c], z}, found)) continue;
+    if (tiles == nullptr) {
+      const auto kept = std::find_if(tile_rows_.begin(), tile_rows_.end(),
+                                     [&](const TileRow& row) { return row.row == found.tile.row; });
+      ISOHF_ASSERT(kept != tile_rows_.end());
+      tiles = &*kept;
+    }
+    const double* const heights = tiles->heights[static_cast<std::size_t>(found.tile.column)].data();
+    out[c] = heights_.elevation(fixed_height(fixed_triangle(shape, found.place), [&](GridVertex vertex) {
+      return heights[vertex.row * shape.columns() + vertex.column];
+    }));
+  }
+}
+
+void SplinePredictor::read_row(std::int64_t row, std::span<double> out) const {
+  const std::int64_t z = z_of(row);
+  const std::int64_t last_z = kPlaceParts * (lattice_rows() - 3);
+  const std::int64_t last_x = kPlaceParts * grid_.shape().cell_columns() * grid_.tile_columns();
+  if (z < 0 || z > last_z) {
+    std::fill(out.begin(), out.end(), kVoid);
+    return;
+  }
+  const std::int64_t middle = z / kPlaceParts + 1;
+  const std::array<int, 6> weights = fixed_quintic(z % kPlaceParts);
+  std::vector<char> near;
+  bool any_void_row = false;
+  for (std::int64_t t = 0; t < 6; ++t) {
+    const LatticeRow& read = at(middle - 2 + t);
+    any_void_row = any_void_row || read.is_void;
+    if (read.near_void.empty()) continue;
+    near.resize(out.size());
+    for (std::size_t c = 0; c < near.size(); ++c) near[c] |= read.near_void[c];
+  }
+  if (any_void_row) {
+    near.assign(out.size(), 1);
+  } else {
+    for (std::size_t from = 0; from < out.size(); from += kBlock) {
+      const std::size_t block = std::min(kBlock, out.size() - from);
+      double* const sums = out.data() + from;
+      for (std::int64_t t = 0; t < 6; ++t) {
+        const double* const read = at(middle - 2 + t).coefficients.data() + from;
+        const double weight = weights[static_cast<std::size_t>(t)];
+        t == 0 ? vectorised<weigh>(read, weight, block, sums) : vectorised<add_weighted>(read, weight, block, sums);
+      }
+      vectorised<round_sums>(block, sums);
+      for (std::size_t c = 0; c < block; ++c) sums[c] = heights_.elevation(sums[c]);
+    }
+  }
+  for (std::size_t c = 0; c < out.size(); ++c) {
+    if (x_[c] < 0 || x_[c] > last_x || (!near.empty() && near[c] != 0)) out[c] = kVoid;
+  }
+  if (!near.empty()) read_triangles(z, near, out);
+}
+
+}  // namespace isohf
