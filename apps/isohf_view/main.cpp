@@ -39,7 +39,7 @@ int take_screenshot(const TileSource& source, const Options& options) {
   if (session.is_cut() && !options.common.quiet) {
     cli::print_warning(
         fmt::format("--memory {}M holds the tiles within {:.0f} world units of the eye; what lies beyond is left out",
-                    options.memory_mib, session.box().figures().radius));
+                    options.memory_mib, session.boxes().figures().radius));
   }
   target.write_picture(options.screenshot);
   print_result(options.common, "", [&] {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 
 namespace isohf::view {
@@ -152,6 +153,7 @@ void end_fading_pass() {
 Renderer::Renderer(const TileSource& source, const SharedGeometry& shared)
     : source_(source),
       shared_(shared),
+      planes_(planes_of(source)),
       whole_(whole_bounds(source)),
       flat_("wire", flat_fragment_shader),
       sky_("sky", kSkyVertex, kSkyFragment) {
@@ -171,50 +173,51 @@ const TerrainProgram& Renderer::shading(const ViewState& view, bool is_rim) {
   return shading_.try_emplace(key, "terrain", is_rim, fragment).first->second;
 }
 
-double Renderer::level_of(const ViewState& view, TileIndex tile, const TileBounds& bounds) const {
-  const TileGrid& grid = source_.grid();
-  const int levels = grid.shape().levels();
+double Renderer::level_of(const ViewState& view, PlaneTile at) const {
+  const TileGrid& grid = planes_.grid(at.plane);
+  const int levels = planes_.levels();
   double level = 0.0;
   if (view.fixed_level) {
-    const bool second = view.other_level && (tile.column + tile.row) % 2 != 0;
+    const bool second = view.other_level && (at.tile.column + at.tile.row) % 2 != 0;
     level = std::clamp(second ? *view.other_level : *view.fixed_level, 0.0, static_cast<double>(levels - 1));
   } else {
     // Section 3.9, with the straight distance in place of camera-space depth: turning the head changes no mesh.
-    const Vec3 centre{(static_cast<double>(tile.column) + 0.5) * grid.extent_x(),
-                      0.5 * (bounds.low + bounds.high) * view.exaggeration,
-                      (static_cast<double>(tile.row) + 0.5) * grid.extent_z()};
-    const double distance = length(centre - view.eye);
-    level = fractional_level(projected_area_px(triangle_area(grid, 1.0), view.focal_px(), distance), levels,
+    const TileVolume box = tile_volume(grid, at.tile, source_.plane(at.plane).bounds(at.tile), view);
+    const double distance = at.plane == 0 ? length(0.5 * (box.low + box.high)) : box.distance();
+    level = fractional_level(projected_area_px(triangle_area(source_.grid(), 1.0), view.focal_px(), distance), levels,
                              view.triangle_px);
   }
   return view.plain_switching ? std::round(level) : level;
 }
 
-void Renderer::find_visible(Frame& frame, const TileRange& range, const ResidentTile& resident) const {
+void Renderer::find_visible(Frame& frame, const TileRange& top, const ResidentTile& resident) const {
   const ViewState& view = frame.view;
-  const TileGrid& grid = source_.grid();
-  for (std::int64_t row = range.first_row; row <= range.last_row; ++row) {
-    for (std::int64_t column = range.first_column; column <= range.last_column; ++column) {
-      const TileIndex tile{column, row};
-      const TileBounds bounds = source_.bounds(tile);
-      if (!bounds.stored) continue;
-      const TileVolume box = tile_volume(grid, tile, bounds, view);
-      if (outside_view(frame.terrain.clip_from_eye, order_, box)) continue;
-      const TileSlot* slot = resident(tile);
-      if (slot == nullptr) {
-        ++frame.figures.absent_tiles;
-        continue;
-      }
-      const bool is_cut = !view.beyond && reaches_beyond(grid, tile, source_.covered());
-      const LodBlend blend = lod_blend(level_of(view, tile, bounds), grid.shape().levels());
-      GLuint texture = 0;
-      if (view.mode == ColourMode::kTexture) {
-        if (textures_) texture = textures_(tile);
-        if (texture == 0) texture = no_texture_.get();
-      }
-      frame.items.push_back({tile, slot, is_cut, is_cut || bounds.has_voids, length(0.5 * (box.low + box.high)),
-                             box.distance(), blend, texture});
+  const int step = std::countr_zero(static_cast<unsigned>(planes_.scale(planes_.count() > 0 ? 1 : 0)));
+  const auto own_level = [&](PlaneTile at) { return level_of(view, at) - at.plane * step; };
+  const auto bounds_of = [&](PlaneTile at) { return source_.plane(at.plane).bounds(at.tile); };
+  const PlaneWishes wishes{[&](PlaneTile at) { return bounds_of(at).stored; },
+                           [&](PlaneTile at) { return own_level(at) < 0.0; },
+                           [&](PlaneTile at) { return resident(at) != nullptr; }};
+  for (const ChosenTile& chosen : choose_tiles(planes_, top, wishes)) {
+    const PlaneTile at = chosen.at;
+    const TileGrid& grid = planes_.grid(at.plane);
+    const TileBounds bounds = bounds_of(at);
+    const TileVolume box = tile_volume(grid, at.tile, bounds, view);
+    if (outside_view(frame.terrain.clip_from_eye, order_, box)) continue;
+    const TileSlot* slot = resident(at);
+    if (slot == nullptr) {
+      ++frame.figures.absent_tiles;
+      continue;
     }
+    const bool is_cut = !view.beyond && reaches_beyond(grid, at.tile, source_.covered());
+    const LodBlend blend = lod_blend(own_level(at), planes_.mesh_shape().levels());
+    GLuint texture = 0;
+    if (view.mode == ColourMode::kTexture) {
+      if (textures_ && at.plane == 0) texture = textures_(at.tile);
+      if (texture == 0) texture = no_texture_.get();
+    }
+    frame.items.push_back({at, chosen.coarser_sides, slot, is_cut, is_cut || bounds.has_voids,
+                           length(0.5 * (box.low + box.high)), box.distance(), blend, texture});
   }
   std::sort(frame.items.begin(), frame.items.end(),
             [](const Item& a, const Item& b) { return a.distance < b.distance; });
@@ -251,8 +254,8 @@ void Renderer::begin_shading(const Frame& frame, const TerrainProgram& program) 
 }
 
 void Renderer::draw_mesh(Frame& frame, const TerrainProgram& program, const Item& item, int level) const {
-  const TileShape& shape = source_.grid().shape();
-  program.set_tile(source_.grid(), frame.terrain, item.tile);
+  const TileShape& shape = planes_.mesh_shape();
+  program.set_tile(source_.grid(), frame.terrain, item.at.tile, planes_.scale(item.at.plane));
   glUniform1i(program.uniform("level"), level);
   glUniform1i(program.uniform("is_stitch"), 0);
   set_vec3(program.uniform("level_colour"), level_colour(level));
@@ -272,6 +275,15 @@ void Renderer::draw_mesh(Frame& frame, const TerrainProgram& program, const Item
     frame.figures.triangles += shape.stitch_triangle_count(level);
     ++frame.figures.draw_calls;
   }
+  if (item.coarser_sides != 0) {
+    glUniform1i(program.uniform("is_stitch"), 1);
+    glDisable(GL_CULL_FACE);
+    for (int side = 0; side < 4; ++side) {
+      if ((item.coarser_sides >> static_cast<unsigned>(side) & 1U) == 0) continue;
+      frame.figures.triangles += shared_.draw_side(side);
+      ++frame.figures.draw_calls;
+    }
+  }
   if (item.is_cut) set_cutting(false);
 }
 
@@ -284,7 +296,7 @@ void Renderer::draw_opaque(Frame& frame) {
     for (const Item& item : frame.items) {
       if (item.is_rim != rim) continue;
       draw_mesh(frame, program, item, item.blend.first);
-      drawn_.push_back({item.tile, item.blend.first});
+      drawn_.push_back({item.at, item.blend.first});
     }
   }
 }
@@ -299,7 +311,7 @@ void Renderer::draw_fading(Frame& frame) {
       order_fading(item->blend, order_);
       glUniform1f(program.uniform("alpha"), static_cast<float>(item->blend.alpha));
       draw_mesh(frame, program, *item, item->blend.second);
-      drawn_.push_back({item->tile, item->blend.second});
+      drawn_.push_back({item->at, item->blend.second});
     }
   }
   end_fading_pass();
@@ -318,7 +330,7 @@ void Renderer::draw_wires(Frame& frame) const {
     for (const Item& item : frame.items) {
       if (item.is_rim != rim) continue;
       // Lines vanish where a triangle's side falls below eight pixels.
-      const double side = 2.0 * source_.grid().sigma_x() * (1 << item.blend.first);
+      const double side = 2.0 * planes_.grid(item.at.plane).sigma_x() * (1 << item.blend.first);
       glUniform1f(program.uniform("fade_distance"), static_cast<float>(side * frame.view.focal_px() / 8.0));
       draw_mesh(frame, program, item, item.blend.first);
     }
@@ -355,10 +367,10 @@ void Renderer::draw_sky(const ViewState& view) const {
   glDepthFunc(reversed ? GL_GREATER : GL_LESS);
 }
 
-FrameFigures Renderer::draw(const ViewState& view, const TileRange& range, const ResidentTile& resident) {
+FrameFigures Renderer::draw(const ViewState& view, const TileRange& top, const ResidentTile& resident) {
   drawn_.clear();
   Frame frame{view, terrain_frame(source_, view, 0.0, order_), {}, {}};
-  find_visible(frame, range, resident);
+  find_visible(frame, top, resident);
   // Depth is fine only near the eye: begin it where the ground begins, or two meshes of one hill cannot be told apart.
   double nearest = view.far_distance;
   for (const Item& item : frame.items) nearest = std::min(nearest, item.nearest);

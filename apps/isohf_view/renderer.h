@@ -9,6 +9,7 @@
 #include "gl/terrain_program.h"
 #include "gl/tile_buffers.h"
 #include "isohf/lattice/lod.h"
+#include "paging/plane_choice.h"
 #include "paging/tile_source.h"
 #include "view_state.h"
 
@@ -30,15 +31,15 @@ struct FrameFigures {
   std::int64_t passes = 0;      ///< over the terrain: opaque, fading, wires
 };
 
-/// A mesh that a frame drew: strip and stitch of a tile at a whole level.
+/// A mesh that a frame drew: strip and stitch of a tile at a whole level of its plane.
 struct DrawnMesh {
-  TileIndex tile{};
+  PlaneTile at;
   int level = 0;
   friend bool operator==(const DrawnMesh&, const DrawnMesh&) = default;
 };
 
 /// Finds a tile's buffers; nullptr where the tile is not resident.
-using ResidentTile = std::function<const TileSlot*(TileIndex)>;
+using ResidentTile = std::function<const TileSlot*(PlaneTile)>;
 
 /// The GL texture of a tile; 0 where there is none.
 using TileTexture = std::function<GLuint(TileIndex)>;
@@ -51,18 +52,16 @@ class Renderer {
   /// Where ColourMode::kTexture finds its textures.
   void set_textures(TileTexture textures) { textures_ = std::move(textures); }
 
-  /// Draws the tiles of a range, as far as resident, into the bound framebuffer.
-  FrameFigures draw(const ViewState& view, const TileRange& range, const ResidentTile& resident);
+  /// Draws what the tiles of a range of the coarsest plane stand for, as far as resident, into the bound framebuffer.
+  FrameFigures draw(const ViewState& view, const TileRange& top, const ResidentTile& resident);
 
   /// What the last frame drew in its opaque and its fading pass, in order.
   [[nodiscard]] const std::vector<DrawnMesh>& drawn() const { return drawn_; }
 
-  /// Level of detail at which a tile is drawn, fractional.
-  [[nodiscard]] double level_of(const ViewState& view, TileIndex tile, const TileBounds& bounds) const;
-
  private:
   struct Item {
-    TileIndex tile;
+    PlaneTile at;
+    unsigned coarser_sides;
     const TileSlot* slot;
     bool is_cut;  ///< reaches beyond what the source covers
     bool is_rim;  ///< is cut, or has voids
@@ -84,7 +83,10 @@ class Renderer {
     FrameFigures figures;
   };
 
-  void find_visible(Frame& frame, const TileRange& range, const ResidentTile& resident) const;
+  /// Level of detail through all planes at which a tile is wanted, fractional, by what is nearest of it; of a tile of
+  /// plane 0 by its middle.
+  [[nodiscard]] double level_of(const ViewState& view, PlaneTile at) const;
+  void find_visible(Frame& frame, const TileRange& top, const ResidentTile& resident) const;
   /// Made when first wanted.
   [[nodiscard]] const TerrainProgram& shading(const ViewState& view, bool is_rim);
   void draw_sky(const ViewState& view) const;
@@ -96,6 +98,7 @@ class Renderer {
 
   const TileSource& source_;
   const SharedGeometry& shared_;
+  Planes planes_;
   TileBounds whole_;
   DepthOrder order_ = best_depth_order();
   std::map<std::tuple<ColourMode, bool, bool>, TerrainProgram> shading_;  ///< by mode, borders, rim

@@ -64,6 +64,11 @@ constexpr double kOverhead_deg = 89.5;
 /// Suns closer together than this are one to the eye; the sun itself is half a degree wide.
 constexpr double kSame_deg = 0.01;
 
+SharedGeometry shared_geometry(const TileSource& source) {
+  const Planes planes = planes_of(source);
+  return {planes.mesh_shape(), make_index_arrays(planes.mesh_shape(), planes.count() > 0 ? planes.stride() : 0)};
+}
+
 double nearest_of(const ShadowSeedInfo& seeds, double wanted_deg) {
   if (seeds.kind == ShadowSeedInfo::Kind::kHulls) return std::max(wanted_deg, seeds.sun_min_deg);
   return *std::min_element(seeds.sun_deg.begin(), seeds.sun_deg.end(),
@@ -97,12 +102,12 @@ Session::Session(const TileSource& source, const Options& options)
       source_(source),
       whole_(whole_bounds(source)),
       shadow_softness_(options.shadow_softness.value_or(default_softness(whole_))),
-      shared_(source.grid().shape(), make_index_arrays(source.grid().shape())),
+      shared_(shared_geometry(source)),
       renderer_(source, shared_),
-      box_(source, shared_, limits_from(source, options)),
+      boxes_(source, shared_, limits_from(source, options)),
       upload_bytes_(options.upload_mib << 20),
       far_distance_(options.far_distance) {
-  const int levels = source.grid().shape().levels();
+  const int levels = planes_of(source).levels();
   for (const std::optional<double>& level : {view.fixed_level, view.other_level}) {
     if (level && *level > levels - 1) {
       throw Error(ErrorCode::kInvalidArgument,
@@ -134,7 +139,7 @@ Camera Session::first_camera(Vec3& target) const {
   Camera all = overview_camera(source_, view, &target);
   // Where memory does not hold what that sees, stand nearer, over the middle.
   const double needed = farthest_corner(source_.grid(), whole_, all.eye, view.exaggeration);
-  const double reach = box_.fitting_radius(needed);
+  const double reach = boxes_.fitting_reach(needed);
   if (reach < needed) {
     const Vec3 way = -1.0 * all.forward();
     const WorldBounds covered = source_.covered();
@@ -158,33 +163,33 @@ void Session::prepare() {
   const bool casts = shadow_sun_.state == ShadowSun::State::kExact || shadow_sun_.state == ShadowSun::State::kNearest;
   view.shadow_softness.reset();
   if (shadows && casts) view.shadow_softness = shadow_softness_;
-  box_.set_sun(shadows && casts ? std::optional(shadow_sun_.sun) : std::nullopt);
+  boxes_.set_sun(shadows && casts ? std::optional(shadow_sun_.sun) : std::nullopt);
 }
 
 void Session::draw() {
   // Where memory has shortened the reach, haze hides its end.
-  const double reach = box_.figures().radius;
+  const double reach = boxes_.figures().radius;
   cut_ = reach < reach_wanted_;
   if (cut_) view.far_distance = reach;
-  figures_ = renderer_.draw(view, box_.range(), [this](TileIndex tile) { return box_.resident(tile); });
+  figures_ = renderer_.draw(view, boxes_.top(), [this](PlaneTile at) { return boxes_.resident(at); });
 }
 
 void Session::frame() {
   prepare();
-  box_.update({view.eye.x, view.eye.z}, reach_wanted_);
+  boxes_.update(view, reach_wanted_);
   if (shows_textures()) {
-    const std::uint64_t gone = box_.figures().upload_bytes;
-    textures_->update(box_.range(), view, upload_bytes_ > gone ? upload_bytes_ - gone : 0);
+    const std::uint64_t gone = boxes_.figures().upload_bytes;
+    textures_->update(boxes_.finest(), view, upload_bytes_ > gone ? upload_bytes_ - gone : 0);
   }
   draw();
 }
 
 void Session::complete_frame() {
   prepare();
-  box_.finish({view.eye.x, view.eye.z}, reach_wanted_);
-  if (box_.error()) throw Error(ErrorCode::kCorrupt, *box_.error());
+  boxes_.finish(view, reach_wanted_);
+  if (boxes_.error()) throw Error(ErrorCode::kCorrupt, *boxes_.error());
   if (shows_textures()) {
-    textures_->finish(box_.range(), view);
+    textures_->finish(boxes_.finest(), view);
     if (textures_->error()) throw Error(ErrorCode::kCorrupt, *textures_->error());
   }
   draw();
@@ -198,12 +203,12 @@ std::string Session::shadow_line() const {
       fmt::format("shadows from the {}, {:.1f} deg", shadow_sun_.sun.travel == LightTravel::kEastward ? "West" : "East",
                   shadow_sun_.seen_deg);
   if (shadow_sun_.state == ShadowSun::State::kNearest) line += ", the nearest that the seeds hold for";
-  const std::int64_t to_come = box_.figures().shadows_to_come;
+  const std::int64_t to_come = boxes_.figures().shadows_to_come;
   return to_come > 0 ? fmt::format("{}, {} to come", line, to_come) : line;
 }
 
 bool Session::is_settled() const {
-  const TileBoxFigures& box = box_.figures();
+  const TileBoxFigures& box = boxes_.figures();
   return box.missing_tiles == 0 && box.shadows_to_come == 0 && (!shows_textures() || textures_->figures().to_come == 0);
 }
 
@@ -211,7 +216,7 @@ void Session::draw_overlay(double frames_per_second, bool figures, bool help,
                            const std::vector<std::string>& reading) const {
   const int size = std::max(1, view.height / 350);
   if (figures) {
-    const TileBoxFigures& box = box_.figures();
+    const TileBoxFigures& box = boxes_.figures();
     std::vector<std::string> lines{
         fmt::format("{:5.1f} fps   {} triangles   {} draw calls", frames_per_second,
                     cli::describe_count(figures_.triangles), figures_.draw_calls),
@@ -231,7 +236,7 @@ void Session::draw_overlay(double frames_per_second, bool figures, bool help,
     if (cut_) {
       lines.push_back(fmt::format("far distance cut to {:.0f} by --memory", box.radius));
     }
-    if (box_.error()) lines.push_back(box_.error()->substr(0, 100));
+    if (boxes_.error()) lines.push_back(boxes_.error()->substr(0, 100));
     lines.insert(lines.end(), reading.begin(), reading.end());
     overlay_.draw(lines, view.width, view.height, size);
   }

@@ -6,8 +6,8 @@
 #include "camera.h"
 #include "gl/overlay.h"
 #include "options.h"
+#include "paging/plane_boxes.h"
 #include "paging/texture_box.h"
-#include "paging/tile_box.h"
 #include "renderer.h"
 
 namespace isohf::view {
@@ -60,7 +60,7 @@ class Session {
   /// True where memory ended the last frame before the far distance.
   [[nodiscard]] bool is_cut() const { return cut_; }
   [[nodiscard]] const FrameFigures& figures() const { return figures_; }
-  [[nodiscard]] const TileBox& box() const { return box_; }
+  [[nodiscard]] const PlaneBoxes& boxes() const { return boxes_; }
   /// nullptr where the source has no textures.
   [[nodiscard]] const TextureBox* textures() const { return textures_ ? &*textures_ : nullptr; }
   [[nodiscard]] const TileSource& source() const { return source_; }
@@ -80,7 +80,7 @@ class Session {
   ShadowSun shadow_sun_;
   SharedGeometry shared_;
   Renderer renderer_;
-  TileBox box_;
+  PlaneBoxes boxes_;
   std::optional<TextureBox> textures_;
   std::uint64_t upload_bytes_;  ///< a frame, tiles and textures together
   Overlay overlay_;

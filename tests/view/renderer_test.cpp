@@ -35,7 +35,7 @@ TEST_F(RendererTest, DrawsEveryVisibleTileWithAtMostTwoCallsAPass) {
   Offscreen target(view.width, view.height, GL_RGBA8);
   for (const double level : {0.0, 0.3, 1.0, 1.7, 3.0}) {
     view.fixed_level = level;
-    const FrameFigures figures = renderer.draw(view, box.range(), [&](TileIndex tile) { return box.resident(tile); });
+    const FrameFigures figures = renderer.draw(view, box.range(), [&](PlaneTile at) { return box.resident(at.tile); });
     EXPECT_EQ(figures.visible_tiles, 12);
     EXPECT_EQ(figures.absent_tiles, 0);
     EXPECT_LE(figures.draw_calls, 2 * figures.visible_tiles * figures.passes);

@@ -1,5 +1,7 @@
 #include "gl/terrain_program.h"
 
+#include <algorithm>
+
 namespace isohf::view {
 namespace {
 
@@ -27,6 +29,8 @@ layout(location = 4) in uint shadow_code;
 
 uniform ivec2 last_xz;          // 2(C-4), R-3: the East and South edges
 uniform ivec2 tile_lattice;     // the tile's North-West corner, lattice steps from the anchor
+uniform int stride;             // lattice steps of one of the tile's: of its plane
+uniform ivec4 world;            // the heightfield's first and last place, lattice steps from the anchor
 uniform vec2 sigma;             // world units of one object-space step in x and z
 uniform vec3 anchor;            // the anchor's place, seen from the eye; y: elevation of code 0
 uniform float code_height;      // world units of one code, exaggeration included
@@ -83,12 +87,13 @@ vec3 vertex_normal() {
   }
   if (worst == 65535u) return vec3(0.0, 1.0, 0.0);
 #endif
-  return normalize(vec3(float(rise_x) * code_slope / (float(steps_x) * sigma.x), 1.0,
-                        float(rise_z) * code_slope / (float(steps_z) * sigma.y)));
+  return normalize(vec3(float(rise_x) * code_slope / (float(steps_x * stride) * sigma.x), 1.0,
+                        float(rise_z) * code_slope / (float(steps_z * stride) * sigma.y)));
 }
 
 void main() {
-  ivec2 lattice = tile_lattice + object_xz;
+  // Tiles of coarse planes end with the heightfield.
+  ivec2 lattice = clamp(tile_lattice + object_xz * stride, world.xy, world.zw);
   float height = float(here.y) * code_height;
   vec3 eye = anchor + vec3(float(lattice.x) * sigma.x, height, float(lattice.y) * sigma.y);
   v_facing = vec4(vertex_normal(), length(eye));
@@ -279,10 +284,20 @@ void TerrainProgram::begin(const TileGrid& grid, const TerrainFrame& frame) cons
   glUniformMatrix4fv(uniform("clip_from_eye"), 1, GL_FALSE, frame.clip_from_eye.floats().data());
 }
 
-void TerrainProgram::set_tile(const TileGrid& grid, const TerrainFrame& frame, TileIndex tile) const {
-  const auto x = (tile.column - frame.anchor_tile.column) * 2 * grid.shape().cell_columns();
-  const auto z = (tile.row - frame.anchor_tile.row) * grid.shape().cell_rows();
-  glUniform2i(uniform("tile_lattice"), static_cast<GLint>(x), static_cast<GLint>(z));
+void TerrainProgram::set_tile(const TileGrid& grid, const TerrainFrame& frame, TileIndex tile,
+                              std::int64_t stride) const {
+  constexpr std::int64_t kFarthest = std::int64_t{1} << 30;
+  const auto x = [&](std::int64_t column) {
+    return static_cast<GLint>(
+        std::clamp((column - frame.anchor_tile.column) * 2 * grid.shape().cell_columns(), -kFarthest, kFarthest));
+  };
+  const auto z = [&](std::int64_t row) {
+    return static_cast<GLint>(
+        std::clamp((row - frame.anchor_tile.row) * grid.shape().cell_rows(), -kFarthest, kFarthest));
+  };
+  glUniform2i(uniform("tile_lattice"), x(tile.column * stride), z(tile.row * stride));
+  glUniform1i(uniform("stride"), static_cast<GLint>(stride));
+  glUniform4i(uniform("world"), x(0), z(0), x(grid.tile_columns()), z(grid.tile_rows()));
 }
 
 }  // namespace isohf::view

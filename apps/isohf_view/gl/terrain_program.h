@@ -43,8 +43,9 @@ class TerrainProgram {
 
   /// Makes the program current and sets the frame's uniforms.
   void begin(const TileGrid& grid, const TerrainFrame& frame) const;
-  /// Before the tile's draw calls.
-  void set_tile(const TileGrid& grid, const TerrainFrame& frame, TileIndex tile) const;
+  /// Before the tile's draw calls. `grid` is that of the finest plane, `stride` how many of its steps one of the tile's
+  /// plane takes.
+  void set_tile(const TileGrid& grid, const TerrainFrame& frame, TileIndex tile, std::int64_t stride = 1) const;
 
   [[nodiscard]] GLint uniform(const char* name) const { return program_.uniform(name); }
 

@@ -1,6 +1,7 @@
 #include "gl/tile_buffers.h"
 
 #include "isohf/base/assert.h"
+#include "isohf/lattice/planes.h"
 #include "isohf/lattice/stitch.h"
 #include "isohf/lattice/strip.h"
 
@@ -33,13 +34,17 @@ const void* offset_pointer(std::size_t bytes) {
 
 }  // namespace
 
-IndexArrays make_index_arrays(const TileShape& shape) {
+IndexArrays make_index_arrays(const TileShape& shape, int plane_stride) {
   IndexArrays arrays;
   for (int level = 0; level < shape.levels(); ++level) {
     arrays.strips.push_back(strip_indices(shape, level));
     arrays.stitch_counts.push_back(static_cast<std::size_t>(shape.stitch_index_count(level)));
   }
   arrays.stitch = stitch_indices(shape);
+  if (plane_stride == 0) return arrays;
+  for (const TileSide side : {TileSide::kWest, TileSide::kEast, TileSide::kNorth, TileSide::kSouth}) {
+    arrays.sides.push_back(side_stitch_indices(shape, side, plane_stride));
+  }
   return arrays;
 }
 
@@ -57,6 +62,11 @@ SharedGeometry::SharedGeometry(const TileShape& shape, const IndexArrays& arrays
   stitch_offset_bytes_ = all.size() * index_bytes;
   for (const std::size_t count : arrays.stitch_counts) stitch_counts_.push_back(static_cast<GLsizei>(count));
   all.insert(all.end(), arrays.stitch.begin(), arrays.stitch.end());
+  for (const auto& side : arrays.sides) {
+    side_offsets_bytes_.push_back(all.size() * index_bytes);
+    side_counts_.push_back(static_cast<GLsizei>(side.size()));
+    all.insert(all.end(), side.begin(), side.end());
+  }
 
   glBindVertexArray(0);
   glBindBuffer(GL_ARRAY_BUFFER, xz_.get());
@@ -79,6 +89,12 @@ void SharedGeometry::draw_strip(int level) const {
 void SharedGeometry::draw_stitch(int level) const {
   glDrawElements(GL_TRIANGLES, stitch_counts_[static_cast<std::size_t>(level)], index_type_,
                  offset_pointer(stitch_offset_bytes_));
+}
+
+std::int64_t SharedGeometry::draw_side(int side) const {
+  const auto i = static_cast<std::size_t>(side);
+  glDrawElements(GL_TRIANGLES, side_counts_[i], index_type_, offset_pointer(side_offsets_bytes_[i]));
+  return side_counts_[i] / 3;
 }
 
 std::vector<std::uint32_t> SharedGeometry::read(std::size_t offset_bytes, GLsizei count) const {

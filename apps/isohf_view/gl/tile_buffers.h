@@ -15,9 +15,11 @@ struct IndexArrays {
   std::vector<std::vector<std::uint32_t>> strips;  ///< by level
   std::vector<std::uint32_t> stitch;               ///< level λ draws the first stitch_counts[λ]
   std::vector<std::size_t> stitch_counts;          ///< by level
+  std::vector<std::vector<std::uint32_t>> sides;   ///< beside a coarser plane's tile, by TileSide; may be empty
 };
 
-[[nodiscard]] IndexArrays make_index_arrays(const TileShape& shape);
+/// plane_stride  between the planes; 0: there are none
+[[nodiscard]] IndexArrays make_index_arrays(const TileShape& shape, int plane_stride = 0);
 
 /// What all tiles of one shape share on the GPU (paper section 3.2): the object-space (x, z) of every stored vertex as
 /// GL_SHORT pairs, and the index arrays of all levels in one buffer, 16 bits an index where they fit.
@@ -32,6 +34,8 @@ class SharedGeometry {
   /// One draw call each, with the tile's vertex array bound.
   void draw_strip(int level) const;
   void draw_stitch(int level) const;
+  /// Returns the triangles drawn.
+  std::int64_t draw_side(int side) const;
   /// The arrays as the GPU holds them, for verifying.
   [[nodiscard]] std::vector<std::uint32_t> read_strip(int level) const;
   [[nodiscard]] std::vector<std::uint32_t> read_stitch(int level) const;
@@ -48,6 +52,8 @@ class SharedGeometry {
   std::vector<std::size_t> strip_offsets_bytes_;
   std::vector<GLsizei> stitch_counts_;
   std::size_t stitch_offset_bytes_ = 0;
+  std::vector<GLsizei> side_counts_;
+  std::vector<std::size_t> side_offsets_bytes_;
 };
 
 /// One tile on the GPU: two bytes a vertex. The one buffer is bound as three overlapping attributes, so that the vertex

@@ -218,12 +218,14 @@ void main() { colour = vec4(0.6, 0.6, 0.6, 1.0); }
 /// One tile's positions, seen from the eye.
 class StaticTile {
  public:
-  StaticTile(const Session& session, TileIndex tile) {
-    const TileGrid& grid = session.source().grid();
+  StaticTile(const Session& session, PlaneTile which) {
+    const TileSource& source = session.source().plane(which.plane);
+    const TileIndex tile = which.tile;
+    const TileGrid& grid = source.grid();
     const TileShape& shape = grid.shape();
-    const ViewScale scale = session.source().scale();
+    const ViewScale scale = source.scale();
     std::vector<std::uint16_t> codes(static_cast<std::size_t>(shape.stored_vertex_count()));
-    session.source().read(tile, codes);
+    source.read(tile, codes);
     std::vector<float> places;
     places.reserve(3 * codes.size());
     for (int row = 0; row < shape.rows(); ++row) {
@@ -286,9 +288,12 @@ MeshSpeed measure_static_mesh(Session& session) {
   speed.ours = median_time([&] { session.frame(); });
 
   const std::vector<DrawnMesh> meshes = session.renderer().drawn();
-  std::map<std::int64_t, StaticTile> tiles;
+  std::map<std::pair<int, std::int64_t>, StaticTile> tiles;
+  const auto key = [&](PlaneTile at) {
+    return std::pair(at.plane, session.source().plane(at.plane).grid().flat_index(at.tile));
+  };
   for (const DrawnMesh& mesh : meshes) {
-    tiles.try_emplace(session.source().grid().flat_index(mesh.tile), session, mesh.tile);
+    tiles.try_emplace(key(mesh.at), session, mesh.at);
   }
   const Program program("static mesh", kVertex, kFragment);
   const TerrainFrame frame = terrain_frame(session.source(), session.view);
@@ -299,7 +304,7 @@ MeshSpeed measure_static_mesh(Session& session) {
     program.use();
     glUniformMatrix4fv(program.uniform("clip_from_eye"), 1, GL_FALSE, frame.clip_from_eye.floats().data());
     for (const DrawnMesh& mesh : meshes) {
-      tiles.at(session.source().grid().flat_index(mesh.tile)).bind();
+      tiles.at(key(mesh.at)).bind();
       glEnable(GL_CULL_FACE);
       shared.draw_strip(mesh.level);
       if (!shared.has_stitch(mesh.level)) continue;
@@ -386,7 +391,7 @@ void fly(const TileSource& source, const Options& options, const std::function<v
     glFinish();
     const double ms = milliseconds_since(begin);
     const FrameFigures& figures = session.figures();
-    const TileBoxFigures& box = session.box().figures();
+    const TileBoxFigures& box = session.boxes().figures();
     const TextureBoxFigures textures =
         session.textures() != nullptr ? session.textures()->figures() : TextureBoxFigures{};
     const double update_ms = box.update_ms + textures.update_ms;
@@ -404,7 +409,7 @@ void fly(const TileSource& source, const Options& options, const std::function<v
     totals.most_bytes = std::max(totals.most_bytes, box.resident_bytes + textures.resident_bytes);
     totals.upload_bytes += box.upload_bytes + textures.upload_bytes;
     if (figures.draw_calls > 2 * figures.visible_tiles * figures.passes) ++totals.over_two_calls;
-    if (session.box().error()) throw Error(ErrorCode::kCorrupt, *session.box().error());
+    if (session.boxes().error()) throw Error(ErrorCode::kCorrupt, *session.boxes().error());
     if (session.textures() != nullptr && session.textures()->error()) {
       throw Error(ErrorCode::kCorrupt, *session.textures()->error());
     }

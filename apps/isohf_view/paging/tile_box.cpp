@@ -158,6 +158,25 @@ void TileBox::update(WorldPoint centre, double radius) {
   figures_.update_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
 }
 
+std::uint64_t TileBox::most_bytes_of_a_tile(const TileSource& source) {
+  const bool lit = source.shadow_seeds() != nullptr;
+  const TileShape& shape = source.grid().shape();
+  // A quarter of the memory is for tiles on their way.
+  return (TileSlot::bytes(shape, lit) + TileSlot::bytes(shape) * (lit ? kCpuCopiesLit : kCpuCopies)) * 4 / 3;
+}
+
+void TileBox::rest() {
+  figures_.uploads = 0;
+  figures_.upload_bytes = 0;
+  figures_.shadow_uploads = 0;
+  figures_.update_ms = 0.0;
+  loader_.collect(waiting_);
+  upload();
+  count();
+  figures_.missing_tiles = 0;
+  figures_.shadows_to_come = 0;
+}
+
 void TileBox::upload() {
   for (; !waiting_.empty(); waiting_.pop_front()) {
     const std::uint64_t next = waiting_.front().bytes();

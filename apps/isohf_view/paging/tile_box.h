@@ -67,6 +67,11 @@ class TileBox {
   /// on.
   void set_sun(const std::optional<RowSun>& sun);
 
+  /// What a tile takes at most, resident or on its way, with a share of what is decoded besides.
+  [[nodiscard]] static std::uint64_t most_bytes_of_a_tile(const TileSource& source);
+
+  /// Nothing is wanted in this frame: keeps what there is and asks for nothing.
+  void rest();
   /// Moves the box to the bounding square of a circle round `centre`, world units; once a frame.
   void update(WorldPoint centre, double radius);
 

@@ -180,7 +180,14 @@ TileVolume tile_volume(const TileGrid& grid, TileIndex tile, const TileBounds& b
   return {low, low + Vec3{grid.extent_x(), (bounds.high - bounds.low) * view.exaggeration, grid.extent_z()}};
 }
 
-TileBounds whole_bounds(const TileSource& source) {
+Planes planes_of(const TileSource& source) {
+  return source.planes() != nullptr ? *source.planes() : Planes(source.grid(), 0, 0, false);
+}
+
+TileBounds whole_bounds(const TileSource& source_of_tiles) {
+  // The coarsest plane knows of all that lies below.
+  const Planes* planes = source_of_tiles.planes();
+  const TileSource& source = planes == nullptr ? source_of_tiles : source_of_tiles.plane(planes->count());
   TileBounds whole{false, false, std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
   const TileGrid& grid = source.grid();
   for (std::int64_t flat = 0; flat < grid.tile_count(); ++flat) {

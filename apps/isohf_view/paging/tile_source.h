@@ -10,6 +10,7 @@
 #include "isohf/archive/shadow_seeds/shadow_seeds.h"
 #include "isohf/archive/textures/texture_info.h"
 #include "isohf/lattice.h"
+#include "isohf/lattice/planes.h"
 #include "isohf/metadata.h"
 #include "isohf/picture.h"
 #include "view_state.h"
@@ -58,6 +59,11 @@ class TileSource {
   [[nodiscard]] virtual TileBounds bounds(TileIndex tile) const = 0;
   /// codes [C x R] out, 0..65534, or kVoidCode. Throws Error naming the tile.
   virtual void read(TileIndex tile, std::span<std::uint16_t> codes) const = 0;
+  /// The coarse planes above the tiles; nullptr where there are none.
+  [[nodiscard]] virtual const Planes* planes() const { return nullptr; }
+  /// A plane as a source of its own, 0 <= plane <= planes()->count(): its grid, ranges of all that lies below, codes of
+  /// the same scale. It covers what this one does.
+  [[nodiscard]] virtual const TileSource& plane(int) const { return *this; }
   /// True where codes are rounded from finer heights, from which shadows are computed.
   [[nodiscard]] virtual bool rounds() const { return false; }
   /// The record of the shadow seeds; nullptr where the source has none.
@@ -104,6 +110,9 @@ struct TileVolume {
 };
 [[nodiscard]] TileVolume tile_volume(const TileGrid& grid, TileIndex tile, const TileBounds& bounds,
                                      const ViewState& view);
+
+/// Its planes, or its tiles alone.
+[[nodiscard]] Planes planes_of(const TileSource& source);
 
 /// Lowest and highest elevation of the tiles together; {0, 0} where all is void.
 [[nodiscard]] TileBounds whole_bounds(const TileSource& source);

@@ -1,0 +1,91 @@
+#include "paging/plane_boxes.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+
+#include "isohf/lattice/lod.h"
+
+namespace isohf::view {
+
+PlaneBoxes::PlaneBoxes(const TileSource& source, const SharedGeometry& shared, const TileBoxLimits& limits)
+    : source_(source), planes_(planes_of(source)), whole_(whole_bounds(source)) {
+  boxes_.resize(static_cast<std::size_t>(planes_.count()) + 1);
+  const std::uint64_t share = limits.memory_bytes / boxes_.size();
+  TileBoxLimits own = limits;
+  own.upload_bytes_per_frame = limits.upload_bytes_per_frame / boxes_.size();
+  std::uint64_t left = limits.memory_bytes;
+  for (int plane = planes_.count(); plane >= 0; --plane) {
+    // What a small plane doesn't take is the finest one's.
+    const auto tiles = static_cast<std::uint64_t>(planes_.grid(plane).tile_count());
+    const std::uint64_t all = (std::min<std::uint64_t>(tiles, share) + 16) * TileBox::most_bytes_of_a_tile(source);
+    own.memory_bytes = plane == 0 ? left : std::min(share, all);
+    left -= own.memory_bytes;
+    boxes_[static_cast<std::size_t>(plane)] = std::make_unique<TileBox>(source.plane(plane), shared, own);
+  }
+}
+
+std::optional<double> PlaneBoxes::radius(int plane, const ViewState& view, double reach) const {
+  if (plane == planes_.count()) return reach;
+  const int step = std::countr_zero(static_cast<unsigned>(planes_.scale(1)));
+  const double level = step * (plane + 1.0);
+  double distance = 0.0;  // nearer than that a tile of the next plane gives way
+  if (view.fixed_level) {
+    distance = std::min(*view.fixed_level, view.other_level.value_or(level)) < level ? reach : 0.0;
+  } else {
+    distance = view.focal_px() * std::exp2(level) * std::sqrt(triangle_area(source_.grid(), 1.0) / view.triangle_px);
+  }
+  const double above = std::max(0.0, view.eye.y - whole_.high * view.exaggeration);
+  if (!(distance > above)) return std::nullopt;
+  const TileGrid& coarser = planes_.grid(plane + 1);
+  const double around = std::sqrt(distance * distance - above * above);
+  return std::min(reach, around + std::hypot(coarser.extent_x(), coarser.extent_z()));
+}
+
+void PlaneBoxes::set_sun(const std::optional<RowSun>& sun) {
+  for (const auto& box : boxes_) box->set_sun(sun);
+}
+
+void PlaneBoxes::update(const ViewState& view, double reach) {
+  for (int plane = planes_.count(); plane >= 0; --plane) {
+    if (const auto wanted = radius(plane, view, reach)) {
+      boxes_[static_cast<std::size_t>(plane)]->update({view.eye.x, view.eye.z}, *wanted);
+    } else {
+      boxes_[static_cast<std::size_t>(plane)]->rest();
+    }
+  }
+  count();
+}
+
+void PlaneBoxes::finish(const ViewState& view, double reach) {
+  for (int plane = planes_.count(); plane >= 0; --plane) {
+    if (const auto wanted = radius(plane, view, reach)) {
+      boxes_[static_cast<std::size_t>(plane)]->finish({view.eye.x, view.eye.z}, *wanted);
+    }
+  }
+  count();
+}
+
+double PlaneBoxes::fitting_reach(double reach) const {
+  return planes_.count() > 0 ? reach : boxes_.front()->fitting_radius(reach);
+}
+
+void PlaneBoxes::count() {
+  figures_ = {};
+  for (const auto& box : boxes_) {
+    const TileBoxFigures& one = box->figures();
+    figures_.uploads += one.uploads;
+    figures_.upload_bytes += one.upload_bytes;
+    figures_.resident_tiles += one.resident_tiles;
+    figures_.missing_tiles += one.missing_tiles;
+    figures_.resident_bytes += one.resident_bytes;
+    figures_.shadows_to_come += one.shadows_to_come;
+    figures_.shadow_uploads += one.shadow_uploads;
+    figures_.update_ms += one.update_ms;
+    figures_.radius = one.radius;
+    if (!error_) error_ = box->error();
+  }
+}
+
+}  // namespace isohf::view
