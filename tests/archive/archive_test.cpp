@@ -36,7 +36,7 @@ TEST(Archive, BringsBackTilesMembersAndMetadata) {
     for (std::int64_t flat = 0; flat < grid.tile_count(); ++flat) {
       EXPECT_TRUE(test::same_samples(reader.read_tile(grid.tile_at(flat)), test::tile_of_archive(grid, type, flat)));
     }
-    ASSERT_EQ(reader.members().size(), 4U);
+    ASSERT_EQ(reader.members().size(), 5U);
     EXPECT_EQ(reader.read_member("shadow/seeds.bin"), std::vector<std::byte>(1000, std::byte{7}));
     EXPECT_EQ(reader.read_member("preview.png"), std::vector<std::byte>(33, std::byte{9}));
     EXPECT_EQ(reader.read_member("nothing"), std::nullopt);

@@ -23,6 +23,7 @@ Metadata full() {
   const TileGrid grid = TileGrid::make(TileShape::make(12, 11, 3), 5, 4, 1.0 / 3.0, 0.1);
   Metadata metadata = test::make_metadata(grid, CodeType::kU16);
   metadata.content_sha256 = std::string(64, 'a');
+  metadata.ground_sha256 = std::string(64, 'b');
   metadata.tiles_stored = 17;
   metadata.extensions = {{"shadow", R"({"sun":[0.1,2],"note":"ä"})"}, {"accuracy", "1.5"}};
   return metadata;
@@ -84,23 +85,65 @@ TEST(Metadata, RecordsHowVoidsWereTreated) {
 }
 
 TEST(Metadata, BeginsWithFormatAndVersion) {
-  EXPECT_THAT(format_metadata(full()), testing::StartsWith("{\n \"format\": \"isohf\",\n \"version\": 1,\n"));
+  EXPECT_THAT(format_metadata(full()), testing::StartsWith("{\n \"format\": \"isohf\",\n \"version\": 2,\n"));
 }
 
 TEST(Metadata, RefusesTheFutureByItsVersion) {
   try {
-    static_cast<void>(parse_metadata(replaced(format_metadata(full()), "\"version\": 1", "\"version\": 2")));
+    static_cast<void>(parse_metadata(replaced(format_metadata(full()), "\"version\": 2", "\"version\": 3")));
     FAIL();
   } catch (const Error& error) {
     EXPECT_EQ(error.code(), ErrorCode::kUnsupported);
   }
 }
 
+TEST(Metadata, RefusesWhatItDoesNotKnowAndTheArchiveRequires) {
+  const std::string json = format_metadata(full());
+  const auto with = [&](const std::string& list) {
+    return replaced(json, "\"version\": 2,", "\"version\": 2, \"requires\": " + list + ",");
+  };
+  EXPECT_NO_THROW(static_cast<void>(parse_metadata(with("[]"))));
+  try {
+    static_cast<void>(parse_metadata(with("[\"rotated lattice\"]")));
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::kUnsupported);
+    EXPECT_THAT(error.what(), testing::HasSubstr("rotated lattice"));
+  }
+}
+
+TEST(Metadata, HoldsPlanesAgainstShapeAndGrid) {
+  Metadata metadata = full();
+  metadata.planes = {4, 2};
+  const std::string json = format_metadata(metadata);
+  EXPECT_EQ(parse_metadata(json).planes, (PlaneInfo{4, 2}));
+  EXPECT_EQ(format_metadata(parse_metadata(json)), json);
+  for (const auto& [from, to] : {std::pair("\"stride\": 4", "\"stride\": 8"),
+                                 {"\"stride\": 4", "\"stride\": 3"},
+                                 {"\"count\": 2", "\"count\": 3"},
+                                 {"\"count\": 2", "\"count\": 0"}}) {
+    EXPECT_THROW(static_cast<void>(parse_metadata(replaced(json, from, to))), Error) << to;
+  }
+}
+
+TEST(Metadata, KeepsExtensionsWhereverTheyStand) {
+  std::string json = format_metadata(full());
+  json = replaced(json, "\"name\": \"hügel", "\"sensor/no\": {\"a\": [1]}, \"name\": \"hügel");
+  json = replaced(json, "\"void\":", "\"unit~\": \"m\", \"void\":");
+  const Metadata metadata = parse_metadata(json);
+  ASSERT_EQ(metadata.extensions.size(), 4U);
+  EXPECT_EQ(metadata.extensions[0].first, "/samples/unit~0");
+  EXPECT_EQ(metadata.extensions[1].first, "/source/sensor~1no");
+  const auto back = nlohmann::json::parse(format_metadata(metadata));
+  EXPECT_EQ(back["source"]["sensor/no"]["a"][0], 1);
+  EXPECT_EQ(back["samples"]["unit~"], "m");
+}
+
 TEST(Metadata, NamesWhatIsWrong) {
   const std::string json = format_metadata(full());
   const std::pair<std::pair<const char*, const char*>, const char*> cases[] = {
       {{"\"format\": \"isohf\"", "\"format\": \"other\""}, "format"},
-      {{"\"version\": 1", "\"version\": \"1\""}, "version"},
+      {{"\"version\": 2", "\"version\": \"2\""}, "version"},
       {{"\"rows\": 11", "\"rows\": 12"}, "tile_shape"},
       {{"\"rows\": 11", "\"rows\": 1e9"}, "tile_shape.rows"},
       {{"\"columns\": 12", "\"columns\": -12"}, "tile_shape.columns"},
@@ -115,6 +158,8 @@ TEST(Metadata, NamesWhatIsWrong) {
       {{"\"textures\"", "\"textures2\""}, "textures"},
       {{"\"x0\"", "\"y0\""}, "valid.x0"},
       {{"aaaa", "AAAA"}, "content_sha256"},
+      {{"bbbb", "BBBB"}, "ground_sha256"},
+      {{"\"ground_sha256\"", "\"ground\""}, "ground_sha256"},
       {{"\"epsg\": 32611", "\"epsg\": \"x\""}, "source.crs.epsg"},
       {{"{", "["}, ""},
   };
@@ -148,14 +193,6 @@ TEST(Metadata, IgnoresBracketsInStrings) {
   Metadata metadata = full();
   metadata.source.crs_wkt = std::string(500, '[') + "\\\"{";
   EXPECT_EQ(parse_metadata(format_metadata(metadata)).source.crs_wkt, metadata.source.crs_wkt);
-}
-
-TEST(Metadata, AsksForRoomThatALongWktTakes) {
-  Metadata metadata = full();
-  EXPECT_EQ(metadata_room(metadata), 16384U);
-  metadata.source.crs_wkt = std::string(50000, 'x');
-  EXPECT_GT(metadata_room(metadata), 55000U);
-  EXPECT_LT(metadata_room(metadata), 65536U);
 }
 
 TEST(Metadata, RefusesAnExtensionWithANameOfTheFormat) {

@@ -162,28 +162,68 @@ def main(path):
     with open(path, "rb") as file:
         data = file.read()
     end64 = struct.unpack("<IQHHIIQQQQ", data[-98:-42])
-    directory = end64[9]
-    crc, _, size, name = struct.unpack_from("<IIIH", data, 14)
-    assert data[30 : 30 + name] == b"isohf.json"
-    text = data[30 + name : 30 + name + size]
-    assert zlib.crc32(text) == crc
+    directory, behind = end64[9], end64[9] + end64[8]
+    assert data[30:63] == b"mimetypeapplication/vnd.isohf+zip"
+
+    def own_member(behind, name):
+        """One of the last two members, by its directory entry, which ends there."""
+        for extra in (0, 12, 20, 28):
+            at = behind - 46 - len(name) - extra
+            fields = struct.unpack_from("<I6H3I5H2I", data, at)
+            if fields[0] == 0x02014B50 and data[at + 46 : at + 46 + len(name)] == name and fields[11] == extra:
+                start = fields[16] + 30 + len(name)
+                content = data[start : start + fields[8]]
+                assert zlib.crc32(content) == fields[7]
+                return content, start, at
+        raise AssertionError(name)
+
+    text, _, at = own_member(behind, b"isohf.json")
+    index, index_at, _ = own_member(at, b"index.bin")
     metadata = json.loads(text)
+    assert metadata["version"] == 2 and not metadata.get("requires")
     shape, tiles, samples = metadata["tile_shape"], metadata["tiles"], metadata["samples"]
     kind, columns, rows = KINDS[samples["type"]], shape["columns"], shape["rows"]
     count = tiles["columns"] * tiles["rows"]
-    start = directory - 64 - 32 * count
-    assert data[directory - 64 : directory - 56] == b"ISOHFIDX"
+    magic, version, tables, size, stands, _, _, descriptions, crc = struct.unpack_from("<8sII4QII", index, len(index) - 64)
+    assert (magic, version, size, stands) == (b"ISOHFIDX", 2, len(index), index_at)
+    at = len(index) - 64 - descriptions
+    assert zlib.crc32(index[at : at + descriptions]) == crc
+    for _ in range(tables):
+        size, flags, across, down, of_table, _, root_at, root_crc, per_page = struct.unpack_from("<II5QII", index, at)
+        name_bytes = struct.unpack_from("<I", index, at + 68)[0]
+        if index[at + 80 : at + 80 + name_bytes] == b"tiles/{row}/{column}.tile":
+            break
+        at += size
+    assert (flags, across, down, of_table) == (1, tiles["columns"], tiles["rows"], tiles["stored"])
+    pages = -(-count // per_page)
+    assert zlib.crc32(index[root_at : root_at + 48 * pages]) == root_crc
+    records = {}
+    for page in range(pages):
+        page_at, digests_at, _, present, page_crc, digests_crc = struct.unpack_from("<QQQIII", index, root_at + 48 * page)
+        if not present:
+            continue
+        bits = -(-min(per_page, count - page * per_page) // 8)
+        content = index[page_at : page_at + bits + 32 * present]
+        digests = index[digests_at : digests_at + 32 * present]
+        assert zlib.crc32(content) == page_crc and zlib.crc32(digests) == digests_crc
+        there = [i for i in range(8 * bits) if content[i // 8] >> i % 8 & 1]
+        for rank, i in enumerate(there):
+            record = content[bits + 32 * rank : bits + 32 * rank + 32]
+            records[page * per_page + i] = record, digests[32 * rank : 32 * rank + 32]
     everything = hashlib.sha256()
     stored = 0
     for tile in range(count):
-        offset, compressed, inflated, crc, _, _, flags = struct.unpack_from("<QIIIIII", data, start + 32 * tile)
         values, dropped = [None] * (columns * rows), 0
-        if flags & 1:
+        if tile in records:
+            offset, compressed, inflated, crc, _, _, flags = struct.unpack("<QIIIIII", records[tile][0])
+            assert flags & 1
             payload = zlib.decompress(data[offset : offset + compressed], wbits=-15)
             assert len(payload) == inflated and zlib.crc32(payload) == crc
             values, dropped = decode(payload, columns, rows, kind)
             stored += 1
-        everything.update(hashlib.sha256(pack(values, dropped, kind)).digest())
+        digest = hashlib.sha256(pack(values, dropped, kind)).digest()
+        assert tile not in records or records[tile][1] == digest
+        everything.update(digest)
     everything.update(struct.pack("<IIIQQddBdd", columns, rows, shape["levels"], tiles["columns"], tiles["rows"],
                                   metadata["extent"]["x"], metadata["extent"]["z"], kind, samples["offset"],
                                   samples["scale"]))

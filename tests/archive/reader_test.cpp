@@ -134,16 +134,20 @@ std::string io_error_of(const std::function<void()>& deed) {
 }
 
 TEST_F(ArchiveReaderTest, SaysThatAnotherProgramCutTheOpenFile) {
-  ASSERT_GT(good_.size(), 2 * 4096U);  // so that whole pages of a map go with what is cut
+  // More than opening keeps of the file's end, and whole pages of a map go with what is cut.
+  const TileGrid grid = TileGrid::make(TileShape::make(5, 5, 1), 100, 80, 10.0, 10.0);
+  std::filesystem::remove(path());
+  test::make_archive(path(), grid, CodeType::kU16);
+  const std::vector<std::byte> large = test::read_bytes(path());
   const auto is_told = HasSubstr(": another program cut it");
-  for (const std::size_t left : {std::size_t{0}, std::size_t{100}, std::size_t{4096}, good_.size() - 4097}) {
+  for (const std::size_t left : {std::size_t{0}, std::size_t{100}, std::size_t{4096}, std::size_t{100000}}) {
     SCOPED_TRACE(left);
-    test::write_file(path(), good_);
+    test::write_file(path(), large);
     const ArchiveReader reader(path());
     const ArchiveReader knows_members(path());
     const MemberEntry member = knows_members.members().back();
     std::filesystem::resize_file(path(), left);
-    const TileIndex last = grid_.tile_at(grid_.tile_count() - 1);
+    const TileIndex last{0, 20};
     EXPECT_THAT(io_error_of([&] { (void)reader.read_tile(last); }), is_told);
     EXPECT_THAT(io_error_of([&] { (void)reader.read_tiles(std::array{last}); }), is_told);
     EXPECT_THAT(io_error_of([&] { (void)reader.members(); }), is_told);
@@ -205,7 +209,7 @@ TEST_F(ArchiveReaderTest, ReadsTilesThatAnArchiverStored) {
 TEST_F(ArchiveReaderTest, KnowsRangesOfARepackedArchiveFromItsOldIndex) {
   Parts parts(good_);
   const TileEntry before = ArchiveReader(path()).tile_entry({2, 0});
-  std::swap(parts.parts[3], parts.parts[5]);
+  std::rotate(parts.parts.begin(), parts.parts.end() - 2, parts.parts.end());
   EXPECT_EQ(read_all(parts.join()), "by directory");
   const TileEntry after = ArchiveReader(path()).tile_entry({2, 0});
   EXPECT_EQ(after.code_min, before.code_min);
@@ -254,7 +258,8 @@ TEST_F(ArchiveReaderTest, RefusesOverlappingMembers) {
   Parts parts(good_);
   const auto file =
       parts.join([](std::vector<Parts::Part>& all) { all[3].member.header_offset = all[2].member.header_offset; });
-  EXPECT_NE(read_all(file), "");
+  static_cast<void>(read_all(file));
+  EXPECT_FALSE(ArchiveReader(path()).check_structure().empty());
   // An honest second entry for the same bytes under another name overlaps as well.
   Parts twice(good_);
   Parts::Part copy = twice.find("preview.png");
@@ -265,7 +270,8 @@ TEST_F(ArchiveReaderTest, RefusesOverlappingMembers) {
                                 })->member.header_offset;
     all.push_back(copy);
   });
-  EXPECT_NE(read_all(overlapping), "");
+  static_cast<void>(read_all(overlapping));
+  EXPECT_FALSE(ArchiveReader(path()).check_structure().empty());
 }
 
 TEST_F(ArchiveReaderTest, RefusesLyingSizes) {
@@ -355,7 +361,7 @@ TEST_F(ArchiveReaderTest, ReadsFromManyThreadsAtOnce) {
       for (int round = 0; round < 50; ++round) {
         const std::int64_t flat = (t * 5 + round) % grid_.tile_count();
         if (reader.read_tile(grid_.tile_at(flat)) != tile(flat)) ++wrong;
-        if (reader.members().size() != 4) ++wrong;
+        if (reader.members().size() != 5) ++wrong;
       }
     });
   }

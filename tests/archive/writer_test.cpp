@@ -7,7 +7,10 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <array>
 #include <csignal>
+#include <tuple>
 
 #include "archive/tiles.h"
 #include "isohf/archive.h"
@@ -22,6 +25,10 @@ using test::TemporaryFolder;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
+WriterOptions plain() {
+  return {false, false, "", {4, 2}};
+}
+
 TileGrid small_grid() {
   return TileGrid::make(TileShape::make(12, 11, 3), 5, 4, 100.0, 100.0);
 }
@@ -34,18 +41,29 @@ EncodedTile tile_at(const TileGrid& grid, std::int64_t flat) {
   return tile;
 }
 
+constexpr PlaneInfo kPlanes{4, 2};
+
+/// The coarse tiles that follow a fine one: what they hold means nothing to the container.
+void add_plane_tiles(ArchiveWriter& writer, const TileGrid& grid, std::int64_t done) {
+  if (done == 12) writer.add_plane_tile(1, {0, 0}, tile_at(grid, 2), {3, 4000});
+  if (done == 18) writer.add_plane_tile(1, {1, 0}, tile_at(grid, 1), {1, 2});
+  if (done == 20) writer.add_plane_tile(2, {0, 0}, tile_at(grid, 0), {0, 5000});
+}
+
 /// Adds tiles up to `end`, a member before every third one.
 void add_tiles(ArchiveWriter& writer, const TileGrid& grid, std::int64_t end) {
   while (writer.next_tile() < end) {
     const std::int64_t flat = writer.next_tile();
     if (flat % 3 == 0)
       writer.add_member("extra/" + std::to_string(flat), std::vector<std::byte>(50, std::byte{3}), true);
+    add_plane_tiles(writer, grid, flat);
     writer.add_tile(tile_at(grid, flat));
   }
 }
 
 void complete(ArchiveWriter& writer, const TileGrid& grid) {
   add_tiles(writer, grid, grid.tile_count());
+  add_plane_tiles(writer, grid, grid.tile_count());
   EXPECT_EQ(writer.statistics().vertices, 210);
   EXPECT_EQ(writer.statistics().min, -19.0);
   EXPECT_EQ(writer.tiles_stored(), 18);
@@ -82,7 +100,7 @@ TEST(ArchiveWriter, LeavesNothingWhereItIsNotFinished) {
   const TemporaryFolder folder;
   const TileGrid grid = small_grid();
   {
-    ArchiveWriter writer(folder / "a", grid, {});
+    ArchiveWriter writer(folder / "a", grid, plain());
     add_tiles(writer, grid, 7);
     EXPECT_THAT(folder.names(), ElementsAre("a.part", "a.part.journal"));
   }
@@ -92,11 +110,11 @@ TEST(ArchiveWriter, LeavesNothingWhereItIsNotFinished) {
 TEST(ArchiveWriter, LetsOneProcessWriteATarget) {
   const TemporaryFolder folder;
   const TileGrid grid = small_grid();
-  ArchiveWriter writer(folder / "a", grid, {});
+  ArchiveWriter writer(folder / "a", grid, plain());
   for (const bool resume : {false, true}) {
     EXPECT_EQ(code_of(
                   [&] {
-                    ArchiveWriter(folder / "a", grid, {true, resume, ""});
+                    ArchiveWriter(folder / "a", grid, {true, resume, "", kPlanes});
                   },
                   "another process"),
               ErrorCode::kIo);
@@ -109,7 +127,7 @@ TEST(ArchiveWriter, KeepsWhatSomebodyElseMadeMeanwhile) {
   const TemporaryFolder folder;
   const TileGrid grid = small_grid();
   {
-    ArchiveWriter writer(folder / "a", grid, {});
+    ArchiveWriter writer(folder / "a", grid, plain());
     test::write_file(folder / "a", "x");
     EXPECT_EQ(code_of([&] { complete(writer, grid); }, "meanwhile"), ErrorCode::kIo);
   }
@@ -122,18 +140,18 @@ TEST(ArchiveWriter, ReplacesWhereItMay) {
   const TileGrid grid = small_grid();
   test::write_file(folder / "a", "");
   for (int time = 0; time < 2; ++time) {  // an empty file, then an archive
-    ArchiveWriter writer(folder / "a", grid, {true, false, ""});
+    ArchiveWriter writer(folder / "a", grid, {true, false, "", kPlanes});
     complete(writer, grid);
   }
   EXPECT_THAT(folder.names(), ElementsAre("a"));
   EXPECT_EQ(ArchiveReader(folder / "a").metadata().tiles_stored, 18);
-  EXPECT_EQ(code_of([&] { ArchiveWriter(folder / "a", grid, {}); }, "exists; `overwrite`"),
+  EXPECT_EQ(code_of([&] { ArchiveWriter(folder / "a", grid, plain()); }, "exists; `overwrite`"),
             ErrorCode::kInvalidArgument);
   for (const char* other : {"text", "PK\x03\x04 a ZIP archive of something else, longer than a header"}) {
     test::write_file(folder / "b", other);
     EXPECT_EQ(code_of(
                   [&] {
-                    ArchiveWriter(folder / "b", grid, {true, false, ""});
+                    ArchiveWriter(folder / "b", grid, {true, false, "", kPlanes});
                   },
                   "b: is no isohf archive"),
               ErrorCode::kInvalidArgument);
@@ -151,26 +169,16 @@ TEST(ArchiveWriter, RefusesMembersWithBadOrTakenNames) {
   }
 }
 
-TEST(ArchiveWriter, SaysWhereTheMetadataDoNotFit) {
-  const TemporaryFolder folder;
-  const TileGrid grid = small_grid();
-  ArchiveWriter writer(folder / "a", grid, {});
-  add_tiles(writer, grid, 20);
-  Metadata metadata = test::make_metadata(grid, CodeType::kU16);
-  metadata.source.crs_wkt = std::string(20000, 'x');
-  EXPECT_EQ(code_of([&] { static_cast<void>(writer.finish(metadata)); }, "16384"), ErrorCode::kInvalidArgument);
-}
-
 /// Archives that a run wrote whole, and one that stopped at `stop` tiles, was damaged, and went on.
 class Resume : public testing::Test {
  protected:
   Resume() : grid_(small_grid()) {
-    ArchiveWriter writer(folder_ / "whole", grid_, {false, false, "job"});
+    ArchiveWriter writer(folder_ / "whole", grid_, {false, false, "job", kPlanes});
     complete(writer, grid_);
     whole_ = test::read_bytes(folder_ / "whole");
   }
   void stop_at(std::int64_t tiles) {
-    ArchiveWriter writer(folder_ / "a", grid_, {true, false, "job"});
+    ArchiveWriter writer(folder_ / "a", grid_, {true, false, "job", kPlanes});
     add_tiles(writer, grid_, tiles);
     writer.keep_part();
   }
@@ -178,7 +186,7 @@ class Resume : public testing::Test {
   std::int64_t go_on() {
     std::int64_t first = 0;
     {
-      ArchiveWriter writer(folder_ / "a", grid_, {true, true, "job"});
+      ArchiveWriter writer(folder_ / "a", grid_, {true, true, "job", kPlanes});
       first = writer.next_tile();
       complete(writer, grid_);
     }
@@ -199,6 +207,34 @@ TEST_F(Resume, GivesTheSameBytesFromWhereverItStopped) {
     stop_at(tiles);
     EXPECT_EQ(go_on(), tiles);
   }
+}
+
+TEST_F(Resume, HasCoarsePlanesThatComeBackTileByTile) {
+  stop_at(13);
+  EXPECT_EQ(go_on(), 13);
+  const ArchiveReader archive(folder_ / "a");
+  EXPECT_FALSE(archive.reads_by_directory());
+  EXPECT_THAT(archive.check_structure(), ElementsAre());
+  EXPECT_EQ(archive.metadata().planes, kPlanes);
+  EXPECT_EQ(archive.metadata().plane_grid(1), TileGrid::make(grid_.shape(), 2, 1, 400.0, 400.0));
+  EXPECT_EQ(archive.metadata().plane_grid(2), TileGrid::make(grid_.shape(), 1, 1, 1600.0, 1600.0));
+  for (const auto& [plane, tile, flat] : {std::tuple(1, TileIndex{0, 0}, 2), {1, {1, 0}, 1}, {2, {0, 0}, 0}}) {
+    const TileCodes expected = test::tile_of_archive(grid_, CodeType::kU16, flat);
+    EXPECT_EQ(archive.read_tile(tile, plane), expected);
+    EXPECT_EQ(archive.read_tiles(std::array{tile}, plane).front(), expected);
+    const auto digest = archive.tile_digest(tile, plane);
+    ASSERT_TRUE(digest.has_value());
+    EXPECT_TRUE(std::ranges::equal(*digest, tile_at(grid_, flat).content_digest));
+    EXPECT_TRUE(archive.zlib_reads(tile, plane));
+  }
+  EXPECT_EQ(archive.tile_entry({0, 0}, 1).code_max, 4000U);
+  EXPECT_THROW(static_cast<void>(archive.read_tile({2, 0}, 1)), Error);
+  EXPECT_THROW(static_cast<void>(archive.read_tile({0, 0}, 3)), Error);
+  std::vector<std::pair<std::string, std::int64_t>> tables;
+  for (const MemberTable& table : archive.tables()) tables.emplace_back(table.name, table.stored);
+  EXPECT_THAT(tables, ElementsAre(testing::Pair("tiles/{row}/{column}.tile", 18),
+                                  testing::Pair("planes/1/{row}/{column}.tile", 2),
+                                  testing::Pair("planes/2/{row}/{column}.tile", 1)));
 }
 
 TEST_F(Resume, StartsOverWhereThereIsNothing) {
@@ -223,7 +259,7 @@ TEST_F(Resume, GoesBackToTheLastTileThatIsWhole) {
   stop_at(9);
   const std::vector<std::byte> part_bytes = test::read_bytes(part());
   const std::vector<std::byte> journal_bytes = test::read_bytes(journal());
-  for (std::size_t at = 16000; at < part_bytes.size(); at += 61) {
+  for (std::size_t at = 0; at < part_bytes.size(); at += 61) {
     for (const bool cut : {false, true}) {
       std::vector<std::byte> damaged = part_bytes;
       if (cut) {
@@ -243,7 +279,7 @@ TEST_F(Resume, RefusesThePartOfAnotherJob) {
   const std::vector<std::byte> before = test::read_bytes(part());
   EXPECT_EQ(code_of(
                 [&] {
-                  ArchiveWriter(folder_ / "a", grid_, {true, true, "other"});
+                  ArchiveWriter(folder_ / "a", grid_, {true, true, "other", kPlanes});
                 },
                 "other"),
             ErrorCode::kInvalidArgument);
@@ -254,7 +290,7 @@ TEST_F(Resume, RefusesThePartOfAnotherJob) {
 TEST_F(Resume, DropsAnOldPartWithoutBeingAsked) {
   stop_at(5);
   {
-    ArchiveWriter writer(folder_ / "a", grid_, {true, false, "job"});
+    ArchiveWriter writer(folder_ / "a", grid_, {true, false, "job", kPlanes});
     EXPECT_EQ(writer.next_tile(), 0);
     complete(writer, grid_);
   }
@@ -265,7 +301,7 @@ TEST_F(Resume, GoesOnAfterAKill) {
   const pid_t child = ::fork();
   ASSERT_GE(child, 0);
   if (child == 0) {
-    ArchiveWriter writer(folder_ / "a", grid_, {true, false, "job"});
+    ArchiveWriter writer(folder_ / "a", grid_, {true, false, "job", kPlanes});
     add_tiles(writer, grid_, 13);
     ::kill(::getpid(), SIGKILL);
   }
@@ -288,7 +324,7 @@ TEST(ArchiveWriter, SaysThatTheDiskIsFullAndLeavesNothing) {
     ::setrlimit(RLIMIT_FSIZE, &limit);
     int result = 1;
     try {
-      ArchiveWriter writer(folder / "a", grid, {});
+      ArchiveWriter writer(folder / "a", grid, plain());
       const EncodedTile tile =
           encode_tile(grid.shape(), test::make_tile(grid.shape(), CodeType::kU16, test::Kind::kNoise, 1));
       while (writer.next_tile() < grid.tile_count()) writer.add_tile(tile);

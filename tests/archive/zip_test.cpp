@@ -1,16 +1,15 @@
 #include "isohf/base/zip.h"
 
-#include <fcntl.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include "archive/tiles.h"
 #include "isohf/archive.h"
+#include "isohf/archive/archive_index_builder.h"
 #include "isohf/archive/codec/tile_codes.h"
 #include "isohf/archive/codec/tile_encoder.h"
 #include "isohf/archive/container/archive_directory.h"
 #include "isohf/archive/deflate/deflate.h"
-#include "isohf/archive/tile_index.h"
+#include "isohf/base/output_file.h"
 #include "isohf/error.h"
 #include "support/temporary_folder.h"
 
@@ -20,11 +19,13 @@ namespace {
 TEST(Zip, NamesTilesAndReadsTheirNamesBack) {
   EXPECT_EQ(tile_name({7, 12}), "tiles/12/7.tile");
   for (const TileIndex tile : {TileIndex{0, 0}, TileIndex{10, 0}, TileIndex{16777215, 16777215}}) {
-    EXPECT_EQ(tile_from_name(tile_name(tile)), tile);
+    EXPECT_EQ(tile_from_name(tile_name(tile)), (PlaneTile{0, tile}));
+    EXPECT_EQ(tile_from_name(tile_name(tile, 12)), (PlaneTile{12, tile}));
   }
   for (const char* name :
        {"", "tiles/", "tiles/1", "tiles/1/", "tiles/1/2", "tiles/01/2.tile", "tiles/1/02.tile", "tiles/+1/2.tile",
-        "tiles/1/2.tile ", "Tiles/1/2.tile", "tiles/1/-2.tile", "tiles//2.tile", "tiles/1/2/3.tile"}) {
+        "tiles/1/2.tile ", "Tiles/1/2.tile", "tiles/1/-2.tile", "tiles//2.tile", "tiles/1/2/3.tile",
+        "planes/0/1/2.tile", "planes/1/2.tile", "planes/01/1/2.tile", "planes/1/1/2", "planes/-1/1/2.tile"}) {
     EXPECT_EQ(tile_from_name(name), std::nullopt) << name;
   }
 }
@@ -84,61 +85,45 @@ TEST(Zip, RefusesEveryTruncationOfADirectory) {
   }
 }
 
-/// Writes bytes into a file at an offset and leaves a hole before it.
-void write_at(const std::string& path, std::uint64_t offset, const std::vector<std::byte>& bytes) {
-  const int descriptor = ::open(path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0644);
-  ASSERT_GE(descriptor, 0);
-  EXPECT_EQ(::pwrite(descriptor, bytes.data(), bytes.size(), static_cast<off_t>(offset)),
-            static_cast<ssize_t>(bytes.size()));
-  ::close(descriptor);
-}
-
 TEST(Zip, ReachesTilesBeyondFourGibibytes) {
-  // metadata, five GiB of a hole as a member, one tile, the index.
+  // Five GiB of a hole as a member, one tile, index, metadata.
   const test::TemporaryFolder folder;
   const std::string path = folder / "large.isohf";
   const TileGrid grid = TileGrid::make(TileShape::make(12, 11, 3), 1, 1, 1.0, 1.0);
   const TileCodes tile = test::make_tile(grid.shape(), CodeType::kU16, test::Kind::kTerrain, 1);
   const EncodedTile encoded = encode_tile(grid.shape(), tile);
   Metadata metadata = test::make_metadata(grid, CodeType::kU16);
-  metadata.content_sha256 = std::string(64, '0');
+  metadata.content_sha256 = metadata.ground_sha256 = std::string(64, '0');
   const std::string json = format_metadata(metadata);
   const auto text = std::as_bytes(std::span<const char>(json));
-
-  const ZipMember first{kMetadataName, ZipMethod::kStored, crc32(text), json.size(), json.size(), 0};
-  std::vector<std::byte> head;
-  append_local_header(first, head);
-  head.insert(head.end(), text.begin(), text.end());
   const std::uint64_t hole_bytes = std::uint64_t{5} << 30U;
-  const ZipMember hole{"hole", ZipMethod::kStored, 0, hole_bytes, hole_bytes, head.size()};
-  append_local_header(hole, head);
-  write_at(path, 0, head);
-
-  std::vector<std::byte> tail;
-  const std::uint64_t start = head.size() + hole_bytes;
-  const ZipMember member{tile_name({0, 0}),       ZipMethod::kDeflated,  encoded.payload_crc32,
-                         encoded.deflated.size(), encoded.payload_bytes, start};
-  append_local_header(member, tail);
-  TileEntry entry;
-  entry.stored = true;
-  entry.offset_bytes = start + tail.size();
-  entry.compressed_bytes = static_cast<std::uint32_t>(encoded.deflated.size());
-  entry.payload_bytes = encoded.payload_bytes;
-  entry.payload_crc32 = encoded.payload_crc32;
-  tail.insert(tail.end(), encoded.deflated.begin(), encoded.deflated.end());
-  std::vector<std::byte> directory;
-  for (const ZipMember& one : {first, hole, member}) append_directory_entry(one, directory);
-  std::vector<std::byte> index;
-  append_index_record(entry, index);
-  append_index_footer({1, 1, 3, directory.size(), crc32(directory), crc32(index)}, index);
-  const ZipMember last{kIndexName, ZipMethod::kStored, crc32(index), index.size(), index.size(), start + tail.size()};
-  append_local_header(last, tail);
-  tail.insert(tail.end(), index.begin(), index.end());
-  append_directory_entry(last, directory);
-  const std::uint64_t directory_offset = start + tail.size();
-  tail.insert(tail.end(), directory.begin(), directory.end());
-  append_end_records(4, directory_offset, directory.size(), tail);
-  write_at(path, start, tail);
+  {
+    OutputFile file(path, {});
+    ArchiveIndexBuilder contents(grid, {}, folder / ".");
+    std::vector<std::byte> header;
+    const auto append = [&](JournalRecord::Kind kind, const ZipMember& member, std::span<const std::byte> data) {
+      header.clear();
+      append_local_header(member, header);
+      file.append(header);
+      file.append(data);
+      JournalRecord record;
+      record.kind = kind;
+      record.member = member;
+      if (kind != JournalRecord::Kind::kEmptyTile) contents.add(record);
+    };
+    append(JournalRecord::Kind::kMember, {"hole", ZipMethod::kStored, 0, hole_bytes, hole_bytes, 0}, {});
+    file.flush();
+    file.truncate(file.position() + hole_bytes);
+    append(JournalRecord::Kind::kTile,
+           {tile_name({0, 0}), ZipMethod::kDeflated, encoded.payload_crc32, encoded.deflated.size(),
+            encoded.payload_bytes, file.position()},
+           encoded.deflated);
+    const ZipMember index = contents.append_index(file);
+    const ZipMember last{kMetadataName, ZipMethod::kStored, crc32(text), json.size(), json.size(), file.position()};
+    append(JournalRecord::Kind::kEmptyTile, last, text);
+    contents.append_directory(index, last, file);
+    file.commit();
+  }
 
   const ArchiveReader reader(path);
   EXPECT_FALSE(reader.reads_by_directory());

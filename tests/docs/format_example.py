@@ -56,22 +56,34 @@ def local_header(data, at):
 def describe(data):
     end64 = struct.unpack("<IQHHIIQQQQ", data[-98:-42])
     directory_bytes, directory = end64[8], end64[9]
-    text, header, json_at = local_header(data, 0)
-    json_end = json_at + header[7]
-    tile_text, tile_header, tile_at = local_header(data, json_end)
+    text, header, media_at = local_header(data, 0)
+    tile_start = media_at + header[7]
+    tile_text, tile_header, tile_at = local_header(data, tile_start)
     deflated = data[tile_at : tile_at + tile_header[7]]
     payload = zlib.decompress(deflated, wbits=-15)
     assert zlib.crc32(payload) == tile_header[6] and len(payload) == tile_header[8]
-    index_header_text, index_header, index = local_header(data, tile_at + len(deflated))
-    record_text, record, _ = table(data, index, [
+    _, index_header, index = local_header(data, tile_at + len(deflated))
+    record_text, record, root = table(data, index + 33, [
         ("Q", "offset of the tile's data"), ("I", "compressed size"), ("I", "payload size"), ("I", "CRC-32 of the payload"),
-        ("I", "smallest code"), ("I", "largest code"), ("I", "flags: stored")])
-    assert record[0] == tile_at
-    footer_text, footer, footer_end = table(data, index + 32, [
-        ("8s", "magic"), ("I", "version"), ("I", "size of a record"), ("Q", "records"), ("Q", "records of stored tiles"),
-        ("Q", "directory entries before that of index.bin"), ("Q", "their bytes"), ("I", "CRC-32 of these"),
-        ("I", "CRC-32 of all records"), ("I", "zero"), ("I", "CRC-32 of the 60 bytes before")])
-    assert footer_end == directory
+        ("I", "smallest code"), ("I", "largest code"), ("I", "flags: the record is there")])
+    assert record[0] == tile_at and data[index + 32] == 1
+    root_text, _, description = table(data, root, [
+        ("Q", "offset of the page in `index.bin`"), ("Q", "offset of its digests"), ("Q", "sum of the compressed sizes"),
+        ("I", "stored places"), ("I", "CRC-32 of the page"), ("I", "CRC-32 of its digests"), ("I", "smallest code"),
+        ("I", "largest code"), ("I", "flags")])
+    description_text, _, footer_at = table(data, description, [
+        ("I", "size of the description"), ("I", "flags: has digests"), ("Q", "columns"), ("Q", "rows"), ("Q", "stored places"),
+        ("Q", "sum of their compressed sizes"), ("Q", "offset of the root"), ("I", "CRC-32 of the root"),
+        ("I", "places of a page"), ("I", "smallest code"), ("I", "largest code"), ("I", "flags"), ("I", "length of the name"),
+        ("Q", "zero"), ("25s", "name")])
+    footer_text, footer, footer_end = table(data, footer_at, [
+        ("8s", "magic"), ("I", "version"), ("I", "tables"), ("Q", "size of `index.bin`"), ("Q", "offset of its data"),
+        ("Q", "members before it"), ("Q", "of these, in tables"), ("I", "size of all descriptions"),
+        ("I", "CRC-32 of all descriptions"), ("I", "zero"), ("I", "CRC-32 of the 60 bytes before")])
+    assert footer[3] == index_header[7] == footer_end - index
+    _, json_header, json_at = local_header(data, footer_end)
+    json_end = json_at + json_header[7]
+    assert json_end == directory
     fields = [("B", "version of the codec"), ("B", "sample type: u16"), ("B", "flags"), ("B", "dropped bits"),
               ("i", "low"), ("i", "high"), ("I", "size of the void mask"), ("i", "base"), ("I", "size of the extra bits"),
               ("B", "context energy shift a"), ("B", "contexts K"), ("H", "contexts in pairs"), ("B", "predictors P"),
@@ -95,12 +107,10 @@ Nine elevations, `tiny.asc`:
 make one tile of 5×5 samples with `isohf convert tiny.asc -o tiny.isohf {" ".join(ARGUMENTS)}`. The archive has {len(data)}
 bytes; `tests/docs/format_example.py` took it apart for this section, and a test holds the two against each other.
 
-**The metadata's local header**, at byte 0:
+**The media type's local header**, at byte 0, and its data at byte {media_at}, `{data[media_at:tile_start].decode()}`:
 
 {text}
-Its {header[7]} bytes of data end at byte {json_end} with blanks and a newline (0x0A).
-
-**The tile's local header**, where `isohf.json` ends:
+**The tile's local header**:
 
 {tile_text}
 **The tile's data**, {len(deflated)} bytes of raw Deflate:
@@ -117,12 +127,25 @@ and the extra bits, `{extra.hex(" ") or "none"}`. They say, row by row,
 With the metadata's `samples.offset` {offset} and `samples.scale` {scale} the vertex in the middle, code {codes[12]}, has the elevation
 {offset + scale * codes[12]:.4f}.
 
-**The index**, whose local header of {30 + len("index.bin")} bytes goes before it, is a record:
+**The index**, whose local header of {30 + len("index.bin")} bytes goes before it, begins with the tile's digest, the SHA-256 of its
+25 codes,
+
+{hex_lines(data[index:index + 32], index)}
+Its only page is the byte `01` at byte {index + 32}, place 0 is stored, and the record:
 
 {record_text}
-and the footer, which ends where the directory begins:
+Its root has one entry:
+
+{root_text}
+The description of its only table:
+
+{description_text}
+and the footer:
 
 {footer_text}
+**The metadata**, whose local header of {30 + len("isohf.json")} bytes goes before them, are the {json_header[7]} bytes of JSON up to byte {json_end},
+where the directory begins.
+
 **The directory**, {end64[6]} entries in {directory_bytes} bytes:
 
 {hex_lines(data[directory:directory + directory_bytes], directory)}

@@ -9,14 +9,14 @@
 
 namespace isohf::test {
 
-/// An archive taken apart, altered, and put together again with right checksums, index and directory: what only
+/// An archive taken apart, altered, and put together again with right checksums, index and directory, in its own version of the format: what only
 /// somebody who means it would make.
 class AlteredArchive {
  public:
   explicit AlteredArchive(const std::string& path);
 
   nlohmann::json metadata;
-  std::optional<std::uint64_t> stored_count;  ///< what the index's footer says, instead of the truth
+  std::optional<std::uint64_t> stored_count;  ///< what the index's footer says, instead of the truth; of version 1
 
   [[nodiscard]] std::vector<std::string> names() const;
   /// A member's bytes, inflated.
@@ -39,9 +39,14 @@ class AlteredArchive {
     std::vector<std::byte> data;  ///< as it stands in the file
   };
   [[nodiscard]] const Member& member(const std::string& name) const;
+  [[nodiscard]] bool is_first_version() const;
+  [[nodiscard]] nlohmann::json stated() const;
+  void write_now(const std::string& path) const;
+  void write_first_version(const std::string& path) const;
 
+  std::string original_;            ///< the archive that was taken apart; must still be there
   std::vector<Member> members_;     ///< without metadata and index
-  std::vector<std::byte> records_;  ///< of the index
+  std::vector<std::byte> records_;  ///< of the index of version 1
   std::int64_t tile_columns_ = 0;   ///< as it was
 };
 

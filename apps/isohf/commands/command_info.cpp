@@ -89,12 +89,11 @@ struct Derived {
 };
 
 Derived derive(const ArchiveReader& archive) {
-  const TileGrid& grid = archive.grid();
   Derived derived;
-  for (std::int64_t i = 0; i < grid.tile_count(); ++i) {
-    derived.tile_bytes += archive.tile_entry(grid.tile_at(i)).compressed_bytes;
-  }
-  for (const MemberEntry& member : archive.members()) derived.member_bytes += member.compressed_bytes;
+  derived.tile_bytes = archive.tables().front().compressed_bytes;
+  for (const MemberTable& table : archive.tables()) derived.member_bytes += table.compressed_bytes;
+  derived.member_bytes -= derived.tile_bytes;
+  for (const MemberEntry& member : archive.loose_members()) derived.member_bytes += member.compressed_bytes;
   return derived;
 }
 
@@ -122,12 +121,20 @@ void print_json(const ArchiveReader& archive, bool tiles, bool is_one_of_many) {
   const Derived derived = derive(archive);
   const SizeBesideSource size(archive.metadata().source, derived.tile_bytes);
   ordered_json members = ordered_json::array();
-  for (const MemberEntry& member : archive.members()) {
+  for (const MemberEntry& member : archive.loose_members()) {
     members.push_back({{"name", member.name},
                        {"offset_bytes", member.offset_bytes},
                        {"compressed_bytes", member.compressed_bytes},
                        {"bytes", member.bytes},
                        {"deflated", member.deflated}});
+  }
+  ordered_json tables = ordered_json::array();
+  for (const MemberTable& table : archive.tables()) {
+    tables.push_back({{"name", table.name},
+                      {"columns", table.columns},
+                      {"rows", table.rows},
+                      {"stored", table.stored},
+                      {"compressed_bytes", table.compressed_bytes}});
   }
   ordered_json document = {
       {"archive", archive.path()},
@@ -144,6 +151,7 @@ void print_json(const ArchiveReader& archive, bool tiles, bool is_one_of_many) {
       {"ratio_to_source", size.ratio_to_source},
       {"reads_by_directory", archive.reads_by_directory()},
       {"warnings", archive.warnings()},
+      {"tables", tables},
       {"members", members}};
   add_source_place(source_place(archive.metadata()), document);
   if (tiles) document["tiles"] = json_from_tiles(archive);
@@ -163,21 +171,25 @@ std::string describe_crs(const SourceRecord& source) {
 }
 
 /// Those of one folder together, with what they take of the archive.
-std::string describe_members(const std::vector<MemberEntry>& members) {
+std::string describe_members(const ArchiveReader& archive) {
   struct Group {
     std::string name;
     std::int64_t members = 0;
     std::uint64_t bytes = 0;
   };
   std::vector<Group> groups;
-  for (const MemberEntry& member : members) {
-    const std::string folder = member.name.substr(0, member.name.find('/') + 1);
-    const std::string& name = folder.empty() ? member.name : folder;
+  const auto add = [&](const std::string& path, std::int64_t members, std::uint64_t bytes) {
+    const std::string folder = path.substr(0, path.find('/') + 1);
+    const std::string& name = folder.empty() ? path : folder;
     auto group = std::find_if(groups.begin(), groups.end(), [&](const Group& g) { return g.name == name; });
     if (group == groups.end()) group = groups.insert(groups.end(), {name});
-    ++group->members;
-    group->bytes += member.compressed_bytes;
-  }
+    group->members += members;
+    group->bytes += bytes;
+  };
+  const std::vector<MemberTable>& tables = archive.tables();
+  for (auto table = tables.begin() + 1; table != tables.end(); ++table)
+    add(table->name, table->stored, table->compressed_bytes);
+  for (const MemberEntry& member : archive.loose_members()) add(member.name, 1, member.compressed_bytes);
   std::string text;
   for (const Group& group : groups) {
     text += fmt::format("{}{} ({}{})", text.empty() ? "" : ", ", group.name,
@@ -265,7 +277,7 @@ std::string describe_archive(const ArchiveReader& archive) {
   } else {
     say("lossless", "no: restore resamples the surface");
   }
-  const std::string members = describe_members(archive.members());
+  const std::string members = describe_members(archive);
   say("members", members + (members.empty() ? "" : " beside the tiles"));
   say("content", "sha256 " + metadata.content_sha256);
   return text;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -25,7 +26,7 @@ struct TileCodes {
   friend bool operator==(const TileCodes&, const TileCodes&) = default;
 };
 
-/// What the archive's index says of one tile.
+/// What the archive's index says of one tile. Of a coarse plane's tile the range is that of all that lies below it.
 struct TileEntry {
   bool stored = false;             ///< false: wholly void, takes no bytes
   std::uint64_t offset_bytes = 0;  ///< of the compressed data in the file
@@ -47,17 +48,29 @@ struct MemberEntry {
   bool deflated = false;
 };
 
+/// What the index says of all members of one kind: the tiles, those of a coarse plane, seeds, textures of one size, ...
+struct MemberTable {
+  std::string name;          ///< of its members: "tiles/{row}/{column}.tile", "residual/{row:8}"
+  std::int64_t columns = 0;  ///< the grid that they stand in
+  std::int64_t rows = 0;
+  std::int64_t stored = 0;             ///< members that are there
+  std::uint64_t compressed_bytes = 0;  ///< of these
+  std::uint32_t code_min = 0;          ///< over all tiles that are stored, as in TileEntry; 0 for other members
+  std::uint32_t code_max = 0;
+  bool has_voids = false;  ///< in one that is stored
+};
+
 /// Decodes the tiles of an archive in any order, from any number of threads at once. Nothing in the file is trusted.
 class ArchiveReader {
  public:
-  /// Opens a file. Opening reads its tail, the index and the metadata, no tile; what is read later is read from the
-  /// file: nothing grows with it. Throws Error{kIo} where the file cannot be opened, Error{kCorrupt} or
+  /// Opens a file. Opening reads its tail and the metadata, no tile and no index but where its pages are; what is read
+  /// later is read from the file: nothing grows with it. Throws Error{kIo} where the file cannot be opened, Error{kCorrupt} or
   /// Error{kUnsupported} naming member and byte offset where it is no archive that this build can read.
   explicit ArchiveReader(const std::string& path);
 
-  /// The same from anything that reads a range of bytes; `name` is what messages call it. Opening reads both ends, two
-  /// ranges; of an archive of more than some 600 tiles also index and directory, in pieces of 1 MiB. The index is kept,
-  /// 32 bytes a tile, so that a tile then costs one range.
+  /// The same from anything that reads a range of bytes; `name` is what messages call it. Opening reads the last 256
+  /// KiB, and as much again where a longer directory stands there; pages of the index are read when they are asked for,
+  /// and some MiB of them kept, so that a tile mostly costs one range. Of version 1 the whole index is read and kept.
   ArchiveReader(std::shared_ptr<const ByteSource> source, const std::string& name);
   ~ArchiveReader();
   ArchiveReader(const ArchiveReader&) = delete;
@@ -82,27 +95,41 @@ class ArchiveReader {
   /// well.
   [[nodiscard]] std::vector<std::string> check_structure() const;
 
-  [[nodiscard]] TileEntry tile_entry(TileIndex tile) const;
-  [[nodiscard]] const std::vector<MemberEntry>& members() const;  ///< all but the tiles, in file order
+  /// `plane` 0 are the tiles themselves; 1 to metadata().planes.count are the coarse planes, each with its grid,
+  /// metadata().plane_grid(plane). What is no tile of the plane's grid throws Error{kInvalidArgument}.
+  [[nodiscard]] TileEntry tile_entry(TileIndex tile, int plane = 0) const;
+  /// SHA-256 of the tile's elevations as the archive states it, without decoding any (docs/archive_format.md, "Content
+  /// hash"); nullopt where the archive states none: in version 1, and where it is read by the directory.
+  [[nodiscard]] std::optional<std::array<std::byte, 32>> tile_digest(TileIndex tile, int plane = 0) const;
+
+  /// What there is of each kind of members, the tiles first, without a look at any of them. Of version 1, and where the
+  /// archive is read by the directory, all of it is gone through once.
+  [[nodiscard]] const std::vector<MemberTable>& tables() const;
+  /// Members in none of tables(), in file order: the metadata, the index, and what was attached.
+  [[nodiscard]] const std::vector<MemberEntry>& loose_members() const;
+  /// All but the tiles, in file order: goes through the whole directory and, once read, keeps it.
+  [[nodiscard]] const std::vector<MemberEntry>& members() const;
+  /// A member that is no tile by its name, in a table or loose; nullopt where there is none.
+  [[nodiscard]] std::optional<MemberEntry> find_member(const std::string& name) const;
 
   /// True where zlib inflates the tile's member to the same payload; tiles that are not stored need nothing inflated.
   /// Throws Error{kCorrupt} like read_tile.
-  [[nodiscard]] bool zlib_reads(TileIndex tile) const;
+  [[nodiscard]] bool zlib_reads(TileIndex tile, int plane = 0) const;
   /// The same for any other member, whose bytes are known already; stored ones need nothing inflated.
   [[nodiscard]] bool zlib_reads(const MemberEntry& member, std::span<const std::byte> bytes) const;
 
   /// Decodes one tile; a tile that is not stored comes back wholly void. Throws Error{kCorrupt} naming tile and byte.
-  [[nodiscard]] TileCodes read_tile(TileIndex tile) const;
+  [[nodiscard]] TileCodes read_tile(TileIndex tile, int plane = 0) const;
 
   /// Several at once, which takes less time than one after the other. Throws for the first that cannot be read.
-  [[nodiscard]] std::vector<TileCodes> read_tiles(std::span<const TileIndex> tiles) const;
+  [[nodiscard]] std::vector<TileCodes> read_tiles(std::span<const TileIndex> tiles, int plane = 0) const;
 
   /// The same as elevations in vertical units, NaN where void. C*R doubles.
-  [[nodiscard]] std::vector<double> read_elevations(TileIndex tile) const;
+  [[nodiscard]] std::vector<double> read_elevations(TileIndex tile, int plane = 0) const;
 
   /// Inflates any other member; nullopt where there is none of that name.
   [[nodiscard]] std::optional<std::vector<std::byte>> read_member(const std::string& name) const;
-  /// The same for one of members(), without a search.
+  /// The same for one that is known already, without a search.
   [[nodiscard]] std::vector<std::byte> read_member(const MemberEntry& member) const;
 
  private:

@@ -116,11 +116,29 @@ struct ProjectionRecord {
   std::string why;                 ///< why this one
 };
 
-/// Everything about an archive but its elevations; its first member, as JSON (docs/archive_format.md).
+/// Coarse planes above the tiles, by which an archive is looked at from afar: a tile of plane p holds every
+/// stride^p-th elevation of as many tiles in each direction (docs/archive_format.md, "Planes").
+struct PlaneInfo {
+  int stride = 8;  ///< from each plane to the next
+  int count = 0;   ///< coarse planes; the tiles themselves are plane 0 and do not count
+
+  friend bool operator==(const PlaneInfo&, const PlaneInfo&) = default;
+};
+
+/// The versions of the format that this build reads; it writes the last.
+inline constexpr int kOldestFormatVersion = 1;
+inline constexpr int kFormatVersion = 2;
+
+/// Everything about an archive but its elevations; its member isohf.json (docs/archive_format.md).
 struct Metadata {
   explicit Metadata(const TileGrid& tile_grid) : grid(tile_grid) {}
 
+  /// The tiles of a plane: plane 0 is `grid`; those of a coarser one are fewer and wider. 0 <= plane <= planes.count.
+  [[nodiscard]] TileGrid plane_grid(int plane) const;
+
+  int version = kFormatVersion;  ///< as it was read
   TileGrid grid;
+  PlaneInfo planes;
   Quantisation quantisation;
   /// Elevations that nothing stored lies beyond, by the user's choice: offset and a whole number of steps more.
   std::optional<std::pair<double, double>> z_range;
@@ -140,9 +158,12 @@ struct Metadata {
   std::vector<std::string> textures;
   std::int64_t tiles_stored = 0;  ///< tiles that hold at least one elevation; the others are wholly void and absent
   std::string content_sha256;     ///< see docs/archive_format.md; independent of threads, level and codec
-  std::string producer;           ///< "isohf 0.1.0"
-  /// Further top-level JSON members that a later section adds (shadow seeds, residuals, accuracy), as JSON text by
-  /// name.
+  /// Over content_sha256 and what says where on which ground it lies: lattice, units, projection, reference systems.
+  /// Empty in version 1.
+  std::string ground_sha256;
+  std::string producer;  ///< "isohf 0.1.0"
+  /// JSON members that this build does not know or that a later section adds (shadow seeds, residuals, accuracy), as
+  /// JSON text by name; of one inside another object by its place, "/source/crs/datum".
   std::vector<std::pair<std::string, std::string>> extensions;
 };
 
@@ -152,16 +173,14 @@ template <typename T>
   return value ? to_string(*value) : "unknown";
 }
 
-/// The metadata as JSON text (UTF-8, no trailing newline), and back. parse_metadata throws Error{kCorrupt} naming the
-/// member at fault, and Error{kUnsupported} for a format version that this build does not know.
+/// The metadata as JSON text (UTF-8, no trailing newline), in the version of the format that is written now, and back.
+/// parse_metadata throws Error{kCorrupt} naming the member at fault, and Error{kUnsupported} for a format version that
+/// this build does not know or where the archive requires what it does not know.
 [[nodiscard]] std::string format_metadata(const Metadata& metadata);
 /// The projection alone, as metadata have it: JSON text.
 [[nodiscard]] std::string format_projection(const ProjectionRecord& record);
 /// The ground under a source on a map alone, in the same way.
 [[nodiscard]] std::string format_ground(const MapGround& ground);
-/// Room to set aside for these metadata (WriterOptions::metadata_bytes) while statistics, hash and extensions are yet
-/// to come: 16384 bytes, or as much more as a long WKT takes.
-[[nodiscard]] std::uint32_t metadata_room(const Metadata& draft);
 [[nodiscard]] Metadata parse_metadata(const std::string& json);
 
 /// How far an archive's surface, as it is drawn, lies from the samples of its source: the metadata's member "accuracy",

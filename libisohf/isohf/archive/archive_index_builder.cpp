@@ -5,35 +5,94 @@
 #include "isohf/archive/codec/tile_codes.h"
 #include "isohf/archive/container/archive_directory.h"
 #include "isohf/archive/deflate/deflate.h"
-#include "isohf/archive/tile_index.h"
 #include "isohf/base/assert.h"
 
 namespace isohf {
+namespace {
+
+constexpr std::uint64_t kPieceBytes = std::uint64_t{1} << 20U;
+constexpr std::uint64_t kMostInRecord = 0xffffffffU;
+
+/// Hands over what was spilled, in pieces.
+template <typename To>
+void copy(const SpillBuffer& from, const To& to) {
+  std::vector<std::byte> piece;
+  for (std::uint64_t at = 0; at < from.size_bytes(); at += piece.size()) {
+    piece.resize(std::min(kPieceBytes, from.size_bytes() - at));
+    from.read(at, piece);
+    to(piece);
+  }
+}
+
+TableRecord record_of(const ZipMember& member) {
+  TableRecord record;
+  TileEntry& entry = record.entry;
+  entry.stored = true;
+  entry.offset_bytes = member.header_offset + local_header_bytes(member);
+  entry.compressed_bytes = static_cast<std::uint32_t>(member.compressed_bytes);
+  entry.payload_bytes = static_cast<std::uint32_t>(member.bytes);
+  entry.payload_crc32 = member.crc32;
+  record.deflated = member.method == ZipMethod::kDeflated;
+  return record;
+}
+
+}  // namespace
+
+ArchiveIndexBuilder::ArchiveIndexBuilder(const TileGrid& grid, const PlaneInfo& planes, const std::string& folder)
+    : grid_(grid), folder_(folder), directory_(folder) {
+  Metadata metadata(grid);
+  metadata.planes = planes;
+  for (const TileGrid& plane : plane_grids(metadata)) {
+    const int number = static_cast<int>(tables_.size());
+    tables_.emplace_back(tile_table_name(number), plane.tile_columns(), plane.tile_rows(), true, folder);
+  }
+  tile_tables_ = tables_.size();
+}
 
 void ArchiveIndexBuilder::add(const JournalRecord& record) {
-  if (record.kind != JournalRecord::Kind::kEmptyTile) data_crc32_ = crc32_of_crc32(record.data_crc32, data_crc32_);
+  if (record.kind != JournalRecord::Kind::kEmptyTile) {
+    data_crc32_ = crc32_of_crc32(record.data_crc32, data_crc32_);
+    std::vector<std::byte> entry;
+    append_directory_entry(record.member, entry);
+    directory_.append(entry);
+    ++entries_;
+  }
   if (record.kind == JournalRecord::Kind::kMember) {
-    members_.push_back({next_, record.member});
-    names_.insert(record.member.name);
+    if (put_in_table(record.member)) return;
+    loose_.push_back(record.member);
+    loose_names_.insert(record.member.name);
     return;
   }
-  TileEntry entry;
-  entry.stored = record.kind == JournalRecord::Kind::kTile;
-  if (entry.stored) {
-    entry.offset_bytes = record.member.header_offset + local_header_bytes(record.member);
-    entry.compressed_bytes = static_cast<std::uint32_t>(record.member.compressed_bytes);
-    entry.payload_bytes = static_cast<std::uint32_t>(record.member.bytes);
-    entry.payload_crc32 = record.member.crc32;
-    entry.code_min = record.code_min;
-    entry.code_max = record.code_max;
-    entry.has_voids = record.has_voids;
-    ++stored_;
+  if (record.kind != JournalRecord::Kind::kEmptyTile) {
+    const PlaneTile tile = *tile_from_name(record.member.name);
+    TableRecord stored = record_of(record.member);
+    stored.entry.code_min = record.code_min;
+    stored.entry.code_max = record.code_max;
+    stored.entry.has_voids = record.has_voids;
+    tables_[static_cast<std::size_t>(tile.plane)].add(tile.tile.row, tile.tile.column, stored, record.digest);
   }
-  tile_bytes_ += entry.compressed_bytes;
-  append_index_record(entry, index_);
+  if (record.kind == JournalRecord::Kind::kPlaneTile) return;
   content_.add_tile(record.digest);
   add_up(record.statistics);
   ++next_;
+}
+
+/// False where the member is of no kind that has a table, or does not fit into it.
+bool ArchiveIndexBuilder::put_in_table(const ZipMember& member) {
+  const auto place = table_place(member.name);
+  if (!place || member.bytes > kMostInRecord || member.compressed_bytes > kMostInRecord) return false;
+  const auto is_it = [&](const TableWriter& known) { return known.members().name == place->table; };
+  auto table = std::find_if(tables_.begin(), tables_.end(), is_it);
+  if (table == tables_.end()) {
+    const bool by_tile = place->table.find("{column}") != std::string::npos;
+    TableWriter made(place->table, by_tile ? grid_.tile_columns() : 1, by_tile ? grid_.tile_rows() : 0, false, folder_);
+    if (!made.takes(place->row, place->column)) return false;
+    tables_.push_back(std::move(made));
+    table = tables_.end() - 1;
+  }
+  if (!table->takes(place->row, place->column)) return false;
+  table->add(place->row, place->column, record_of(member), {});
+  return true;
 }
 
 void ArchiveIndexBuilder::add_up(const TileStatistics& tile) {
@@ -46,81 +105,101 @@ void ArchiveIndexBuilder::add_up(const TileStatistics& tile) {
   statistics_.worst_rounding = std::max(statistics_.worst_rounding, tile.worst_rounding);
 }
 
+bool ArchiveIndexBuilder::has_member(const std::string& name) const {
+  if (loose_names_.count(name) != 0) return true;
+  const auto place = table_place(name);
+  return place && std::any_of(tables_.begin(), tables_.end(), [&](const TableWriter& table) {
+           return table.members().name == place->table && place->column < table.members().columns &&
+                  place->row < table.members().rows && table.find(place->row, place->column).has_value();
+         });
+}
+
+bool ArchiveIndexBuilder::takes(TileIndex tile, int plane) const {
+  return plane >= 1 && static_cast<std::size_t>(plane) < tile_tables_ && tile.row >= 0 && tile.column >= 0 &&
+         tables_[static_cast<std::size_t>(plane)].takes(tile.row, tile.column);
+}
+
 MemberTotals ArchiveIndexBuilder::members_in(const std::string& folder) const {
   MemberTotals totals;
-  for (const Placed& placed : members_) {
-    if (!placed.member.name.starts_with(folder)) continue;
+  for (const TableWriter& table : tables_) {
+    if (!table.members().name.starts_with(folder)) continue;
+    totals.members += table.members().stored;
+    totals.bytes += table.members().compressed_bytes;
+  }
+  for (const ZipMember& member : loose_) {
+    if (!member.name.starts_with(folder)) continue;
     ++totals.members;
-    totals.bytes += placed.member.compressed_bytes;
+    totals.bytes += member.compressed_bytes;
   }
   return totals;
 }
 
-TileEntry ArchiveIndexBuilder::tile_entry(std::int64_t flat) const {
-  const auto at = static_cast<std::size_t>(flat) * kIndexRecordBytes;
-  const auto entry = parse_index_record(std::span(index_).subspan(at, kIndexRecordBytes));
-  ISOHF_ASSERT(entry.has_value());
-  return *entry;
+TileEntry ArchiveIndexBuilder::tile_entry(TileIndex tile, int plane) const {
+  const auto record = tables_[static_cast<std::size_t>(plane)].find(tile.row, tile.column);
+  return record ? record->entry : TileEntry{};
 }
 
-ZipMember ArchiveIndexBuilder::tile_member(std::int64_t flat) const {
-  const TileEntry entry = tile_entry(flat);
-  ZipMember member{tile_name(grid_.tile_at(flat)), ZipMethod::kDeflated, entry.payload_crc32,
-                   entry.compressed_bytes,         entry.payload_bytes,  entry.offset_bytes};
-  if (entry.stored) member.header_offset -= local_header_bytes(member);
+ZipMember ArchiveIndexBuilder::append_index(OutputFile& part) {
+  // Digests first, then pages, roots and descriptions, the coarse planes' last: what is asked for first is near the end.
+  std::vector<TableWriter*> order;
+  for (TableWriter& table : tables_) order.push_back(&table);
+  std::rotate(order.begin() + 1, order.begin() + static_cast<std::ptrdiff_t>(tile_tables_), order.end());
+  std::uint64_t size = 0;
+  std::vector<std::uint64_t> digests_at;
+  std::vector<std::uint64_t> pages_at;
+  for (TableWriter* const table : order) {
+    table->finish();
+    digests_at.push_back(size);
+    size += table->digests().size_bytes();
+  }
+  for (TableWriter* const table : order) {
+    pages_at.push_back(size);
+    size += table->pages().size_bytes();
+  }
+  std::vector<std::byte> tail;
+  std::vector<std::byte> descriptions;
+  TablesFooter footer;
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    const std::vector<std::byte> root = order[i]->place(digests_at[i], pages_at[i], size + tail.size());
+    tail.insert(tail.end(), root.begin(), root.end());
+    append_description(order[i]->description(), descriptions);
+    footer.in_tables += static_cast<std::uint64_t>(order[i]->members().stored);
+  }
+  size += tail.size() + descriptions.size() + kTablesFooterBytes;
+  ZipMember member{kIndexName, ZipMethod::kStored, 0, size, size, part.position()};
+  footer.tables = static_cast<std::uint32_t>(order.size());
+  footer.index_bytes = size;
+  footer.data_offset = member.header_offset + local_header_bytes(member);
+  footer.members = entries_;
+  footer.descriptions_bytes = static_cast<std::uint32_t>(descriptions.size());
+  footer.descriptions_crc32 = crc32(descriptions);
+  tail.insert(tail.end(), descriptions.begin(), descriptions.end());
+  append_tables_footer(footer, tail);
+
+  std::vector<std::byte> header;
+  append_local_header(member, header);
+  part.append(header);
+  const auto put = [&](std::span<const std::byte> bytes) {
+    member.crc32 = crc32(bytes, member.crc32);
+    part.append(bytes);
+  };
+  for (const TableWriter* const table : order) copy(table->digests(), put);
+  for (const TableWriter* const table : order) copy(table->pages(), put);
+  put(tail);
+  ISOHF_ASSERT(part.position() == footer.data_offset + size);
+  header.clear();
+  append_local_header(member, header);
+  part.write_at(member.header_offset, header);
   return member;
 }
 
-/// Hands the directory's entries over in file order, a few at a time, with their number; index.bin's is not among them.
-void ArchiveIndexBuilder::for_each_directory_chunk(
-    const ZipMember& metadata, const std::function<void(std::span<const std::byte>, std::uint64_t)>& at) const {
-  constexpr std::size_t kChunkBytes = std::size_t{1} << 16U;
-  std::vector<std::byte> chunk;
-  std::uint64_t entries = 0;
-  const auto add = [&](const ZipMember& member) {
-    append_directory_entry(member, chunk);
-    ++entries;
-    if (chunk.size() < kChunkBytes) return;
-    at(chunk, entries);
-    chunk.clear();
-    entries = 0;
-  };
-  add(metadata);
-  std::size_t placed = 0;
-  for (std::int64_t flat = 0; flat <= grid_.tile_count(); ++flat) {
-    for (; placed < members_.size() && members_[placed].before_tile == flat; ++placed) add(members_[placed].member);
-    if (flat == grid_.tile_count()) break;
-    const ZipMember member = tile_member(flat);
-    if (member.bytes != 0) add(member);
-  }
-  at(chunk, entries);
-}
-
-std::span<const std::byte> ArchiveIndexBuilder::finish_index(const ZipMember& metadata) {
-  index_.resize(static_cast<std::size_t>(next_) * kIndexRecordBytes);  // without the footer of a call before
-  IndexFooter footer;
-  footer.record_count = static_cast<std::uint64_t>(grid_.tile_count());
-  footer.stored_count = static_cast<std::uint64_t>(stored_);
-  footer.records_crc32 = crc32(index_);
-  for_each_directory_chunk(metadata, [&](std::span<const std::byte> chunk, std::uint64_t entries) {
-    footer.directory_entries += entries;
-    footer.directory_bytes += chunk.size();
-    footer.directory_crc32 = crc32(chunk, footer.directory_crc32);
-  });
-  append_index_footer(footer, index_);
-  return index_;
-}
-
-void ArchiveIndexBuilder::append_directory(const ZipMember& metadata, const ZipMember& index, OutputFile& part) const {
+void ArchiveIndexBuilder::append_directory(const ZipMember& index, const ZipMember& metadata, OutputFile& part) const {
   const std::uint64_t offset = part.position();
-  std::uint64_t entries = 1;
-  for_each_directory_chunk(metadata, [&](std::span<const std::byte> chunk, std::uint64_t in_chunk) {
-    part.append(chunk);
-    entries += in_chunk;
-  });
+  copy(directory_, [&](std::span<const std::byte> piece) { part.append(piece); });
   std::vector<std::byte> tail;
   append_directory_entry(index, tail);
-  append_end_records(entries, offset, part.position() + tail.size() - offset, tail);
+  append_directory_entry(metadata, tail);
+  append_end_records(entries_ + 2, offset, part.position() + tail.size() - offset, tail);
   part.append(tail);
 }
 

@@ -10,7 +10,7 @@
 namespace isohf {
 namespace {
 
-constexpr std::uint64_t kMagic = 0x314c4e4a46485349;  // "ISHFJNL1"
+constexpr std::uint64_t kMagic = 0x324c4e4a46485349;  // "ISHFJNL2"
 constexpr std::size_t kHeaderBytes = 8 + 32 + 4;
 
 std::vector<std::byte> make_header(const Digest& job) {
@@ -74,7 +74,7 @@ JournalRecord read_record(std::span<const std::byte> bytes, std::size_t& positio
   const auto name = reader.read_bytes(name_bytes);
   record.member.name.assign(reinterpret_cast<const char*>(name.data()), name.size());
   const std::uint32_t found = crc32(bytes.subspan(position, reader.position()));
-  if (kind < 1 || kind > 3 || reader.read<std::uint32_t>() != found) throw Error(ErrorCode::kCorrupt, "journal record");
+  if (kind < 1 || kind > 4 || reader.read<std::uint32_t>() != found) throw Error(ErrorCode::kCorrupt, "journal record");
   position += reader.position();
   return record;
 }

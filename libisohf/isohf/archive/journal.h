@@ -1,29 +1,27 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "isohf/archive/codec/tile_codes.h"
+#include "isohf/archive/container/member_tables.h"
 #include "isohf/base/file.h"
 #include "isohf/base/zip.h"
 
 namespace isohf {
 
-using Digest = std::array<std::byte, 32>;  ///< SHA-256
-
 /// One step of writing an archive, as its journal keeps it for a resume.
 struct JournalRecord {
-  enum class Kind : std::uint32_t { kTile = 1, kEmptyTile = 2, kMember = 3 };
+  enum class Kind : std::uint32_t { kTile = 1, kEmptyTile = 2, kMember = 3, kPlaneTile = 4 };
   Kind kind = Kind::kTile;
   ZipMember member;              ///< what was written; unused for an empty tile
   std::uint32_t data_crc32 = 0;  ///< of the member's data as they stand in the file
   std::uint32_t code_min = 0;
   std::uint32_t code_max = 0;
   bool has_voids = false;
-  Digest digest{};            ///< of a tile's content
+  Digest digest{};            ///< of a tile's content, on a coarse plane too
   TileStatistics statistics;  ///< of a tile
 };
 

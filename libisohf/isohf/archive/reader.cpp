@@ -6,6 +6,8 @@
 #include <array>
 #include <limits>
 #include <mutex>
+#include <string_view>
+#include <unordered_map>
 #include <utility>
 
 #include "isohf/archive/codec/quantise.h"
@@ -21,59 +23,52 @@
 namespace isohf {
 namespace {
 
-/// A source of which the two ends are fetched first, each at once: that is where all lies that opening reads.
-class EndsFirst final : public ByteSource {
+/// A source of which the tail is fetched first, and what stands before a longer directory: all lies there that opening
+/// reads, and of an archive that is not large all of the index that is asked for later.
+class TailFirst final : public ByteSource {
  public:
-  explicit EndsFirst(const ByteSource& source) : source_(source), tail_offset_(source.size_bytes()) {
-    if (tail_offset_ == 0 || !source.view(0, 1).empty()) return;
-    tail_offset_ -= std::min(tail_offset_, kTailBytes);
-    tail_ = SourceBytes(source, tail_offset_, source.size_bytes() - tail_offset_);
-    head_ = SourceBytes(source, 0, std::min(tail_offset_, kHeadBytes));
+  explicit TailFirst(const ByteSource& source)
+      : source_(source), has_view_(source.size_bytes() == 0 || !source.view(0, 1).empty()) {
+    if (!has_view_) fetch(source.size_bytes());
   }
 
-  /// From here on everything is read from the source.
-  void forget_ends() { head_ = tail_ = {}; }
+  /// Fetches the bytes before `end_offset`, unless they are there.
+  void fetch(std::uint64_t end_offset) {
+    const std::uint64_t begin = end_offset - std::min(end_offset, kPieceBytes);
+    if (has_view_ || (!pieces_.empty() && begin >= pieces_.back().first)) return;
+    const std::uint64_t end = pieces_.empty() ? end_offset : std::min(end_offset, pieces_.back().first);
+    if (begin < end) pieces_.emplace_back(begin, SourceBytes(source_, begin, end - begin));
+  }
 
   [[nodiscard]] std::uint64_t size_bytes() const override { return source_.size_bytes(); }
   [[nodiscard]] std::size_t read(std::uint64_t offset_bytes, std::span<std::byte> out) const override {
-    for (const auto& [bytes, begin] :
-         {std::pair(head_.bytes(), std::uint64_t{0}), std::pair(tail_.bytes(), tail_offset_)}) {
-      if (offset_bytes < begin || offset_bytes - begin >= bytes.size()) continue;
-      const auto found = bytes.subspan(offset_bytes - begin);
-      if (found.size() < out.size()) continue;
-      std::copy_n(found.begin(), out.size(), out.begin());
-      return out.size();
+    std::size_t done = 0;
+    for (auto piece = pieces_.rbegin(); piece != pieces_.rend() && done < out.size(); ++piece) {
+      const std::uint64_t at = offset_bytes + done;
+      const auto bytes = piece->second.bytes();
+      if (at < piece->first || at - piece->first >= bytes.size()) continue;
+      const auto found = bytes.subspan(at - piece->first);
+      const std::size_t count = std::min(found.size(), out.size() - done);
+      std::copy_n(found.begin(), count, out.begin() + static_cast<std::ptrdiff_t>(done));
+      done += count;
     }
-    return source_.read(offset_bytes, out);
+    return done > 0 ? done : source_.read(offset_bytes, out);
   }
   [[nodiscard]] std::span<const std::byte> view(std::uint64_t offset_bytes, std::size_t size_bytes) const override {
     return source_.view(offset_bytes, size_bytes);
   }
 
  private:
-  static constexpr std::uint64_t kHeadBytes = std::uint64_t{32} << 10U;         // the metadata of nearly every archive
-  static constexpr std::uint64_t kTailBytes = (std::uint64_t{64} << 10U) + 22;  // an end record and its comment
+  static constexpr std::uint64_t kPieceBytes = std::uint64_t{256} << 10U;
 
   const ByteSource& source_;
-  std::uint64_t tail_offset_;
-  SourceBytes head_;
-  SourceBytes tail_;
+  bool has_view_;
+  std::vector<std::pair<std::uint64_t, SourceBytes>> pieces_;  ///< by offset, the last of the file first
 };
 
-/// The metadata's entry: the first of the directory in every archive of ours, searched for in others.
-ZipEntry metadata_entry(const ByteSource& file, const ZipEnd& end) {
-  ZipEntries entries(file, end);
-  auto entry = entries.next();
-  while (entry && entry->name != kMetadataName) entry = entries.next();
-  if (!entry) {
-    throw Error(ErrorCode::kCorrupt,
-                fmt::format("is a ZIP file, but no isohf archive: it has no member \"{}\"", kMetadataName));
-  }
-  if (entry->bytes > kMaxMetadataBytes) {
-    throw Error(ErrorCode::kCorrupt, fmt::format("{}: {} bytes, more than the {} that metadata may have",
-                                                 describe(*entry), entry->bytes, kMaxMetadataBytes));
-  }
-  return *entry;
+MemberEntry member_entry(const ZipEntry& entry, std::uint64_t data_offset) {
+  return {entry.name,  data_offset, entry.compressed_bytes,
+          entry.bytes, entry.crc32, entry.method == ZipMethod::kDeflated};
 }
 
 }  // namespace
@@ -82,19 +77,41 @@ struct ArchiveReader::State {
   State(std::shared_ptr<const ByteSource> bytes, const std::string& its_name, bool keeps_index);
 
   std::shared_ptr<const ByteSource> source;
-  EndsFirst file;
+  TailFirst file;
   std::string name;
   ZipEnd end;
+  OwnEntries own;
   std::string json;
   std::optional<Metadata> metadata;
   std::vector<Warning> warnings;
   std::optional<TileLocator> tiles;
   mutable std::once_flag members_read;
   mutable std::vector<MemberEntry> members;
+  mutable std::unordered_map<std::string_view, std::size_t> members_by_name;
+  mutable std::once_flag loose_read;
+  mutable std::vector<MemberEntry> loose;
+  mutable std::once_flag tables_read;
+  mutable std::vector<MemberTable> tables;
 
   void open(bool keeps_index);
-  [[nodiscard]] std::vector<std::byte> payload(const TileEntry& entry, TileIndex tile) const;
+  /// A member's data, its local header held against what is stated, in one range.
+  [[nodiscard]] SourceBytes checked_data(const ZipMember& member, std::uint64_t data_offset,
+                                         std::size_t& header_bytes) const;
+  [[nodiscard]] std::vector<std::byte> payload(const TileEntry& entry, TileIndex tile, int plane) const;
+  void require(TileIndex tile, int plane) const;
+  /// Errors of reading with the archive's name.
+  template <typename Action>
+  auto named(const Action& action) const {
+    try {
+      return action();
+    } catch (const Error& error) {
+      throw error.within(name);
+    }
+  }
   void read_members() const;
+  void read_loose() const;
+  void read_tables() const;
+  [[nodiscard]] std::optional<MemberEntry> find_in_tables(const std::string& wanted) const;
 };
 
 ArchiveReader::State::State(std::shared_ptr<const ByteSource> bytes, const std::string& its_name, bool keeps_index) try
@@ -106,7 +123,13 @@ ArchiveReader::State::State(std::shared_ptr<const ByteSource> bytes, const std::
 
 void ArchiveReader::State::open(bool keeps_index) {
   end = find_archive_end(file);
-  const ZipEntry entry = metadata_entry(file, end);
+  file.fetch(end.directory_offset);
+  own = find_own_entries(file, end);
+  const ZipEntry& entry = own.metadata;
+  if (entry.bytes > kMaxMetadataBytes) {
+    throw Error(ErrorCode::kCorrupt, fmt::format("{}: {} bytes, more than the {} that metadata may have",
+                                                 describe(entry), entry.bytes, kMaxMetadataBytes));
+  }
   const std::vector<std::byte> bytes = member_from(file, entry, checked_data_offset(file, entry));
   json.assign(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   try {
@@ -115,29 +138,33 @@ void ArchiveReader::State::open(bool keeps_index) {
     throw error.within(fmt::format("at byte {}", entry.header_offset));
   }
   json.erase(json.find_last_not_of(" \n") + 1);
-  tiles.emplace(file, end, *metadata, keeps_index);
+  tiles.emplace(file, end, own, *metadata, keeps_index);
   if (tiles->by_directory()) {
     warnings.emplace_back("index and ZIP directory do not agree, as after repacking; tiles are found by the directory");
   }
-  file.forget_ends();
 }
 
-std::vector<std::byte> ArchiveReader::State::payload(const TileEntry& entry, TileIndex tile) const {
+SourceBytes ArchiveReader::State::checked_data(const ZipMember& member, std::uint64_t data_offset,
+                                               std::size_t& header_bytes) const {
   std::vector<std::byte> header;
-  if (!tiles->by_directory()) {
-    append_local_header(
-        {tile_name(tile), ZipMethod::kDeflated, entry.payload_crc32, entry.compressed_bytes, entry.payload_bytes, 0},
-        header);
-  }
-  const std::uint64_t before = std::min<std::uint64_t>(header.size(), entry.offset_bytes);
-  const SourceBytes stored(file, entry.offset_bytes - before, before + entry.compressed_bytes);
-  // The local header must say what the index says, or the offset is not a tile's.
-  if (before < header.size() || !std::equal(header.begin(), header.end(), stored.bytes().begin())) {
+  if (!tiles->by_directory()) append_local_header(member, header);
+  header_bytes = static_cast<std::size_t>(std::min<std::uint64_t>(header.size(), data_offset));
+  SourceBytes stored(file, data_offset - header_bytes, header_bytes + member.compressed_bytes);
+  // The local header must say what the index says, or the offset is not the member's.
+  if (header_bytes < header.size() || !std::equal(header.begin(), header.end(), stored.bytes().begin())) {
     throw Error(ErrorCode::kCorrupt, "its local header does not say what the index says");
   }
-  const auto data = stored.bytes().subspan(before);
+  return stored;
+}
+
+std::vector<std::byte> ArchiveReader::State::payload(const TileEntry& entry, TileIndex tile, int plane) const {
+  std::size_t header_bytes = 0;
+  const SourceBytes stored = checked_data({tile_name(tile, plane), ZipMethod::kDeflated, entry.payload_crc32,
+                                           entry.compressed_bytes, entry.payload_bytes, 0},
+                                          entry.offset_bytes, header_bytes);
+  const auto data = stored.bytes().subspan(header_bytes);
   std::vector<std::byte> bytes;
-  if (tiles->is_deflated(tile)) {
+  if (tiles->is_deflated(tile, plane)) {
     bytes.resize(entry.payload_bytes);
     inflate_exactly(data, bytes);
   } else {
@@ -154,13 +181,70 @@ std::vector<std::byte> ArchiveReader::State::payload(const TileEntry& entry, Til
 
 void ArchiveReader::State::read_members() const {
   const ArchiveDirectory directory =
-      read_directory(file, end, std::nullopt, [](const std::string& what) { throw Error(ErrorCode::kCorrupt, what); });
+      read_directory(file, end, {}, [](const std::string& what) { throw Error(ErrorCode::kCorrupt, what); });
   std::vector<MemberEntry> found;
-  for (const auto& [entry, data_offset] : directory.members) {
-    found.push_back({entry.name, data_offset, entry.compressed_bytes, entry.bytes, entry.crc32,
-                     entry.method == ZipMethod::kDeflated});
-  }
+  for (const auto& [entry, data_offset] : directory.members) found.push_back(member_entry(entry, data_offset));
   members = std::move(found);
+  for (std::size_t i = 0; i < members.size(); ++i) members_by_name.emplace(members[i].name, i);
+}
+
+void ArchiveReader::State::read_loose() const {
+  std::vector<MemberEntry> found;
+  const PagedIndex* const paged = tiles->paged();
+  const std::uint64_t in_tables = paged != nullptr ? paged->footer().in_tables : 0;
+  if (paged != nullptr && own.are_last && end.entries == in_tables + 3) {
+    // What every archive has: media type, index, metadata.
+    ZipEntry first;
+    first.name = kMediaTypeName;
+    first.compressed_bytes = first.bytes = kMediaType.size();
+    first.crc32 = crc32(std::as_bytes(std::span(kMediaType)));
+    for (const ZipEntry& entry : {first, *own.index, own.metadata})
+      found.push_back(member_entry(entry, checked_data_offset(file, entry)));
+  } else {
+    for (ZipEntries entries(file, end); const auto entry = entries.next();) {
+      if (is_in_tile_folder(entry->name) || entry->name.ends_with('/')) continue;
+      if (paged == nullptr ? table_place(entry->name).has_value() : find_in_tables(entry->name).has_value()) continue;
+      found.push_back(member_entry(*entry, checked_data_offset(file, *entry)));
+    }
+    std::sort(found.begin(), found.end(), [](const auto& a, const auto& b) { return a.offset_bytes < b.offset_bytes; });
+  }
+  loose = std::move(found);
+}
+
+void ArchiveReader::State::read_tables() const {
+  std::vector<MemberTable> found;
+  if (const PagedIndex* const paged = tiles->paged()) {
+    for (const TableDescription& table : paged->tables()) found.push_back(table.members);
+    tables = std::move(found);
+    return;
+  }
+  found = tiles->tile_tables();
+  for (ZipEntries entries(file, end); const auto entry = entries.next();) {
+    const auto place = table_place(entry->name);
+    if (!place) continue;
+    auto table =
+        std::find_if(found.begin(), found.end(), [&](const auto& known) { return known.name == place->table; });
+    if (table == found.end()) table = found.insert(found.end(), {.name = place->table});
+    table->columns = std::max(table->columns, place->column + 1);
+    table->rows = std::max(table->rows, place->row + 1);
+    table->compressed_bytes += entry->compressed_bytes;
+    ++table->stored;
+  }
+  tables = std::move(found);
+}
+
+std::optional<MemberEntry> ArchiveReader::State::find_in_tables(const std::string& wanted) const {
+  const PagedIndex* const paged = tiles->paged();
+  const auto place = paged != nullptr ? table_place(wanted) : std::nullopt;
+  const auto table = place ? paged->find_table(place->table) : std::nullopt;
+  if (!table) return std::nullopt;
+  const MemberTable& members_of = paged->tables()[*table].members;
+  if (place->column >= members_of.columns || place->row >= members_of.rows) return std::nullopt;
+  const auto record = paged->record(*table, place->row, place->column);
+  if (!record) return std::nullopt;
+  const TileEntry& entry = record->entry;
+  return MemberEntry{
+      wanted, entry.offset_bytes, entry.compressed_bytes, entry.payload_bytes, entry.payload_crc32, record->deflated};
 }
 
 ArchiveReader::ArchiveReader(const std::string& path)
@@ -196,40 +280,70 @@ const std::vector<Warning>& ArchiveReader::warnings() const {
   return state_->warnings;
 }
 
-TileEntry ArchiveReader::tile_entry(TileIndex tile) const {
-  if (!grid().contains(tile)) {
+void ArchiveReader::State::require(TileIndex tile, int plane) const {
+  if (plane < 0 || plane > metadata->planes.count) {
+    throw Error(ErrorCode::kInvalidArgument,
+                fmt::format("{}: has {} coarse planes, plane {} is asked for", name, metadata->planes.count, plane));
+  }
+  const TileGrid& grid = tiles->grids()[static_cast<std::size_t>(plane)];
+  if (!grid.contains(tile)) {
     throw Error(ErrorCode::kInvalidArgument, fmt::format("tile ({},{}) lies outside the grid of {}x{}", tile.column,
-                                                         tile.row, grid().tile_columns(), grid().tile_rows()));
+                                                         tile.row, grid.tile_columns(), grid.tile_rows()));
   }
-  try {
-    return state_->tiles->checked_record(tile);
-  } catch (const Error& error) {
-    throw error.within(path());
+}
+
+TileEntry ArchiveReader::tile_entry(TileIndex tile, int plane) const {
+  state_->require(tile, plane);
+  return state_->named([&] { return state_->tiles->checked_record(tile, plane); });
+}
+
+std::optional<std::array<std::byte, 32>> ArchiveReader::tile_digest(TileIndex tile, int plane) const {
+  state_->require(tile, plane);
+  return state_->named([&] { return state_->tiles->digest(tile, plane); });
+}
+
+const std::vector<MemberTable>& ArchiveReader::tables() const {
+  state_->named([&] { std::call_once(state_->tables_read, [&] { state_->read_tables(); }); });
+  return state_->tables;
+}
+
+const std::vector<MemberEntry>& ArchiveReader::loose_members() const {
+  state_->named([&] { std::call_once(state_->loose_read, [&] { state_->read_loose(); }); });
+  return state_->loose;
+}
+
+std::optional<MemberEntry> ArchiveReader::find_member(const std::string& name) const {
+  if (auto found = state_->named([&] { return state_->find_in_tables(name); })) return found;
+  if (state_->tiles->paged() == nullptr) {  // all members are in the directory alone
+    const auto& all = members();
+    const auto found = state_->members_by_name.find(name);
+    return found == state_->members_by_name.end() ? std::nullopt : std::optional(all[found->second]);
   }
+  const auto& all = loose_members();
+  const auto found = std::find_if(all.begin(), all.end(), [&](const MemberEntry& m) { return m.name == name; });
+  return found == all.end() ? std::nullopt : std::optional(*found);
 }
 
 const std::vector<MemberEntry>& ArchiveReader::members() const {
-  try {
-    std::call_once(state_->members_read, [&] { state_->read_members(); });
-  } catch (const Error& error) {
-    throw error.within(path());
-  }
+  state_->named([&] { std::call_once(state_->members_read, [&] { state_->read_members(); }); });
   return state_->members;
 }
 
-TileCodes ArchiveReader::read_tile(TileIndex tile) const {
-  const TileEntry entry = tile_entry(tile);
+TileCodes ArchiveReader::read_tile(TileIndex tile, int plane) const {
+  const TileEntry entry = tile_entry(tile, plane);
   const CodeType type = metadata().quantisation.type;
   const TileShape& shape = grid().shape();
   if (!entry.stored) return void_tile(shape, metadata().quantisation);
   try {
-    return decode_tile(shape, type, state_->payload(entry, tile));
+    return decode_tile(shape, type, state_->payload(entry, tile, plane));
   } catch (const Error& error) {
-    throw error.within(fmt::format("{}: tile ({},{}) at byte {}", path(), tile.column, tile.row, entry.offset_bytes));
+    throw error.within(fmt::format("{}: {}tile ({},{}) at byte {}", path(),
+                                   plane == 0 ? "" : fmt::format("plane {}: ", plane), tile.column, tile.row,
+                                   entry.offset_bytes));
   }
 }
 
-std::vector<TileCodes> ArchiveReader::read_tiles(std::span<const TileIndex> tiles) const {
+std::vector<TileCodes> ArchiveReader::read_tiles(std::span<const TileIndex> tiles, int plane) const {
   std::vector<TileCodes> codes(tiles.size());
   for (std::size_t begin = 0; begin < tiles.size(); begin += kBatchLanes) {
     const std::size_t count = std::min(kBatchLanes, tiles.size() - begin);
@@ -238,15 +352,15 @@ std::vector<TileCodes> ArchiveReader::read_tiles(std::span<const TileIndex> tile
     std::array<std::size_t, kBatchLanes> place{};
     std::size_t lanes = 0;
     for (std::size_t i = begin; i < begin + count; ++i) {
-      const TileEntry entry = tile_entry(tiles[i]);
+      const TileEntry entry = tile_entry(tiles[i], plane);
       if (!entry.stored) {
         codes[i] = void_tile(grid().shape(), metadata().quantisation);
         continue;
       }
       try {
-        payloads[lanes] = state_->payload(entry, tiles[i]);
+        payloads[lanes] = state_->payload(entry, tiles[i], plane);
       } catch (const Error&) {
-        codes[i] = read_tile(tiles[i]);  // tells which tile and why
+        codes[i] = read_tile(tiles[i], plane);  // tells which tile and why
         continue;
       }
       spans[lanes] = payloads[lanes];
@@ -258,17 +372,17 @@ std::vector<TileCodes> ArchiveReader::read_tiles(std::span<const TileIndex> tile
                  std::span(decoded).first(lanes), std::span(is_decoded).first(lanes));
     for (std::size_t lane = 0; lane < lanes; ++lane) {
       const std::size_t i = place[lane];
-      codes[i] = is_decoded[lane] ? std::move(decoded[lane]) : read_tile(tiles[i]);
+      codes[i] = is_decoded[lane] ? std::move(decoded[lane]) : read_tile(tiles[i], plane);
     }
   }
   return codes;
 }
 
-bool ArchiveReader::zlib_reads(TileIndex tile) const {
-  const TileEntry entry = tile_entry(tile);
+bool ArchiveReader::zlib_reads(TileIndex tile, int plane) const {
+  const TileEntry entry = tile_entry(tile, plane);
   if (!entry.stored || reads_by_directory()) return true;  // zipped again by another program: not our stream
   return zlib_inflates_to(SourceBytes(source(), entry.offset_bytes, entry.compressed_bytes).bytes(),
-                          state_->payload(entry, tile));
+                          state_->payload(entry, tile, plane));
 }
 
 bool ArchiveReader::zlib_reads(const MemberEntry& member, std::span<const std::byte> bytes) const {
@@ -276,16 +390,13 @@ bool ArchiveReader::zlib_reads(const MemberEntry& member, std::span<const std::b
   return zlib_inflates_to(SourceBytes(source(), member.offset_bytes, member.compressed_bytes).bytes(), bytes);
 }
 
-std::vector<double> ArchiveReader::read_elevations(TileIndex tile) const {
-  return elevations_of(read_tile(tile), metadata().quantisation);
+std::vector<double> ArchiveReader::read_elevations(TileIndex tile, int plane) const {
+  return elevations_of(read_tile(tile, plane), metadata().quantisation);
 }
 
 std::optional<std::vector<std::byte>> ArchiveReader::read_member(const std::string& name) const {
-  const auto& all = members();
-  const auto found =
-      std::find_if(all.begin(), all.end(), [&](const MemberEntry& member) { return member.name == name; });
-  if (found == all.end()) return std::nullopt;
-  return read_member(*found);
+  const auto member = find_member(name);
+  return member ? std::optional(read_member(*member)) : std::nullopt;
 }
 
 std::vector<std::byte> ArchiveReader::read_member(const MemberEntry& member) const {
@@ -296,11 +407,14 @@ std::vector<std::byte> ArchiveReader::read_member(const MemberEntry& member) con
   entry.compressed_bytes = member.compressed_bytes;
   entry.bytes = member.bytes;
   entry.header_offset = member.offset_bytes;
-  try {
-    return member_from(source(), entry, member.offset_bytes);
-  } catch (const Error& error) {
-    throw error.within(path());
-  }
+  return state_->named([&] {
+    if (state_->tiles->paged() == nullptr || !state_->find_in_tables(member.name))
+      return member_from(state_->file, entry, member.offset_bytes);
+    // Found without the directory: the member's local header has not been looked at yet.
+    std::size_t header_bytes = 0;
+    const SourceBytes stored = state_->checked_data(entry, member.offset_bytes, header_bytes);
+    return member_from(stored.bytes().subspan(header_bytes), entry);
+  });
 }
 
 std::vector<std::string> ArchiveReader::check_structure() const {
@@ -308,10 +422,12 @@ std::vector<std::string> ArchiveReader::check_structure() const {
   std::vector<std::string> found(state.warnings.begin(), state.warnings.end());
   const auto complain = [&](const std::string& what) { found.push_back(what); };
   try {
-    const ArchiveDirectory directory = read_directory(state.file, state.end, grid(), complain);
+    const ArchiveDirectory directory = read_directory(state.file, state.end, state.tiles->grids(), complain);
     if (!state.tiles->by_directory()) {
       state.tiles->check_against(directory, complain);
-      check_profile(state.file, state.end, complain);
+      // An archive to which another tool attached something is held against the rules of ZIP alone.
+      if (state.own.are_last || metadata().version == 1)
+        check_profile(state.file, state.end, metadata().version, complain);
     }
     for (const auto& [entry, data_offset] : directory.members) {
       static_cast<void>(member_from(state.file, entry, data_offset));

@@ -13,21 +13,6 @@ constexpr std::uint32_t kHasVoids = 2;
 
 }  // namespace
 
-void append_index_record(const TileEntry& entry, std::vector<std::byte>& out) {
-  if (!entry.stored) {
-    out.resize(out.size() + kIndexRecordBytes);
-    return;
-  }
-  ByteWriter writer(out);
-  writer.write(entry.offset_bytes);
-  writer.write(entry.compressed_bytes);
-  writer.write(entry.payload_bytes);
-  writer.write(entry.payload_crc32);
-  writer.write(entry.code_min);
-  writer.write(entry.code_max);
-  writer.write(kStored | (entry.has_voids ? kHasVoids : 0));
-}
-
 std::optional<TileEntry> parse_index_record(std::span<const std::byte> record) {
   ByteReader reader(record);
   TileEntry entry;
@@ -46,22 +31,6 @@ std::optional<TileEntry> parse_index_record(std::span<const std::byte> record) {
     if (byte != std::byte{0}) return std::nullopt;
   }
   return TileEntry{};
-}
-
-void append_index_footer(const IndexFooter& footer, std::vector<std::byte>& out) {
-  const std::size_t start = out.size();
-  ByteWriter writer(out);
-  writer.write(kMagic);
-  writer.write(kVersion);
-  writer.write(static_cast<std::uint32_t>(kIndexRecordBytes));
-  writer.write(footer.record_count);
-  writer.write(footer.stored_count);
-  writer.write(footer.directory_entries);
-  writer.write(footer.directory_bytes);
-  writer.write(footer.directory_crc32);
-  writer.write(footer.records_crc32);
-  writer.write(std::uint32_t{0});
-  writer.write(crc32(std::span<const std::byte>(out).subspan(start)));
 }
 
 std::optional<IndexFooter> parse_index_footer(std::span<const std::byte> bytes) {

@@ -8,8 +8,8 @@
 
 #include "isohf/archive.h"
 
-/// The member index.bin: one record for each tile of the grid, by flat index, and a footer that is the last thing
-/// before the ZIP directory (docs/archive_format.md, "Index").
+/// The member index.bin of version 1: one record for each tile of the grid, by flat index, and a footer that is the last
+/// thing before the ZIP directory (docs/archive_format.md, "Version 1").
 
 namespace isohf {
 
@@ -25,9 +25,6 @@ struct IndexFooter {
   std::uint32_t directory_crc32 = 0;    ///< of these entries
   std::uint32_t records_crc32 = 0;
 };
-
-void append_index_record(const TileEntry& entry, std::vector<std::byte>& out);
-void append_index_footer(const IndexFooter& footer, std::vector<std::byte>& out);
 
 /// The record as it stands; reserved bits and the rules for absent tiles are checked: nullopt where they are broken.
 [[nodiscard]] std::optional<TileEntry> parse_index_record(std::span<const std::byte> record);

@@ -37,7 +37,8 @@ Digest job_digest(const TileGrid& grid, const WriterOptions& options) {
   writer.write(grid.tile_rows());
   writer.write(grid.extent_x());
   writer.write(grid.extent_z());
-  writer.write(options.metadata_bytes);
+  writer.write(options.planes.stride);
+  writer.write(options.planes.count);
   writer.write_bytes(std::as_bytes(std::span<const char>(options.job_fingerprint)));
   const std::vector<std::byte> hash = sha256(bytes);
   Digest digest{};
@@ -66,7 +67,7 @@ struct ArchiveWriter::State {
       : path(target),
         grid(tile_grid),
         options(writer_options),
-        contents(tile_grid),
+        contents(tile_grid, writer_options.planes, folder_of(target)),
         part(target, {options.overwrite, options.resume, kBufferBytes}),
         journal_path(part.part_path() + ".journal") {}
 
@@ -80,27 +81,32 @@ struct ArchiveWriter::State {
     }
   }
 
-  [[nodiscard]] ZipMember metadata_member() const {
-    return {kMetadataName, ZipMethod::kStored, 0, options.metadata_bytes, options.metadata_bytes, 0};
-  }
-
   void start_over();
   void resume();
   [[nodiscard]] bool is_intact(const JournalRecord& record, std::uint64_t expected_offset) const;
   void append(const ZipMember& member, std::span<const std::byte> data);
   void add_member(ZipMember member, std::span<const std::byte> data);
   void checkpoint();
-  void write_metadata(const std::string& json, ZipMember& member);
-  void write_index_and_directory(const ZipMember& metadata);
+  void add_tile_member(JournalRecord::Kind kind, PlaneTile tile, const EncodedTile& encoded,
+                       std::pair<std::uint32_t, std::uint32_t> range);
 };
+
+/// The first member, by which the file is known for what it is.
+JournalRecord media_type_record() {
+  const auto data = std::as_bytes(std::span(kMediaType));
+  JournalRecord record;
+  record.kind = JournalRecord::Kind::kMember;
+  record.member = {kMediaTypeName, ZipMethod::kStored, crc32(data), data.size(), data.size(), 0};
+  record.data_crc32 = record.member.crc32;
+  return record;
+}
 
 void ArchiveWriter::State::start_over() {
   part.truncate(0);
   journal = Journal::start(journal_path, job_digest(grid, options));
-  std::vector<std::byte> head;
-  append_local_header(metadata_member(), head);
-  head.resize(head.size() + options.metadata_bytes, std::byte{' '});
-  part.append(head);
+  const JournalRecord record = media_type_record();
+  append(record.member, std::as_bytes(std::span(kMediaType)));
+  contents.add(record);
 }
 
 /// True where the part file holds what the record says, at the offset that it must stand at.
@@ -131,11 +137,12 @@ void ArchiveWriter::State::resume() {
         ErrorCode::kInvalidArgument,
         fmt::format("{} belongs to another input or other options; start over without `resume`", part.part_path()));
   }
-  const std::uint64_t head = local_header_bytes(metadata_member()) + options.metadata_bytes;
-  if (opened.records.empty() || part.size_on_disk() < head) {
+  const JournalRecord media_type = media_type_record();
+  if (opened.records.empty() || !is_intact(media_type, 0)) {
     start_over();
     return;
   }
+  const std::uint64_t head = local_header_bytes(media_type.member) + media_type.member.compressed_bytes;
   // All records that are true, then back to the last tile: what stands behind it is written again.
   std::uint64_t good_end = head;
   std::uint64_t journal_end = opened.header_bytes;
@@ -147,11 +154,12 @@ void ArchiveWriter::State::resume() {
     if (record.kind != JournalRecord::Kind::kEmptyTile) {
       offset += local_header_bytes(record.member) + record.member.compressed_bytes;
     }
-    if (record.kind == JournalRecord::Kind::kMember) continue;
+    if (record.kind == JournalRecord::Kind::kMember || record.kind == JournalRecord::Kind::kPlaneTile) continue;
     good_end = offset;
     journal_end = opened.ends[i];
     kept = i + 1;
   }
+  contents.add(media_type);
   for (std::size_t i = 0; i < kept && contents.next_tile() < grid.tile_count(); ++i) contents.add(opened.records[i]);
   part.truncate(good_end);
   journal = std::move(opened.journal);
@@ -185,36 +193,16 @@ void ArchiveWriter::State::checkpoint() {
   journalled = part.position();
 }
 
-void ArchiveWriter::State::write_metadata(const std::string& json, ZipMember& member) {
-  if (json.size() + 1 > options.metadata_bytes) {
-    throw Error(ErrorCode::kInvalidArgument, fmt::format("{}: the metadata take {} bytes, room was made for {}", path,
-                                                         json.size() + 1, options.metadata_bytes));
-  }
-  std::string padded = json;
-  padded.resize(options.metadata_bytes, ' ');
-  padded.back() = '\n';
-  const auto data = std::as_bytes(std::span<const char>(padded));
-  member.crc32 = crc32(data);
-  std::vector<std::byte> head;
-  append_local_header(member, head);
-  head.insert(head.end(), data.begin(), data.end());
-  named([&] { part.write_at(0, head); });
-}
-
-void ArchiveWriter::State::write_index_and_directory(const ZipMember& metadata) {
-  const std::span<const std::byte> index = contents.finish_index(metadata);
-  const ZipMember member{kIndexName, ZipMethod::kStored, crc32(index), index.size(), index.size(), part.position()};
-  append(member, index);
-  named([&] { contents.append_directory(metadata, member, part); });
-}
-
 bool is_archive_file(const std::string& path) {
-  // Its first member: a local header of 30 bytes, then the name.
-  const std::string start = std::string("PK\x03\x04") + std::string(26, '?') + kMetadataName;
-  const std::vector<std::byte> head = head_of_file(path, start.size());
-  return head.size() == start.size() &&
-         std::equal(head.begin(), head.end(), start.begin(),
-                    [](std::byte is, char wanted) { return wanted == '?' || is == static_cast<std::byte>(wanted); });
+  // Its first member: a local header of 30 bytes, then the name and, where that is the media type's, its data.
+  const auto starts_with = [&](const std::string& name) {
+    const std::string start = std::string("PK\x03\x04") + std::string(26, '?') + name;
+    const std::vector<std::byte> head = head_of_file(path, start.size());
+    return head.size() == start.size() &&
+           std::equal(head.begin(), head.end(), start.begin(),
+                      [](std::byte is, char wanted) { return wanted == '?' || is == static_cast<std::byte>(wanted); });
+  };
+  return starts_with(kMediaTypeName + std::string(kMediaType)) || starts_with(kMetadataName);
 }
 
 ArchiveWriter::ArchiveWriter(const std::string& path, const TileGrid& grid, const WriterOptions& options) {
@@ -257,31 +245,38 @@ MemberTotals ArchiveWriter::members_in(const std::string& folder) const {
   return state_->contents.members_in(folder);
 }
 
-void ArchiveWriter::add_tile(const EncodedTile& tile) {
-  State& state = *state_;
-  const std::int64_t flat = state.contents.next_tile();
-  ISOHF_ASSERT(flat < state.grid.tile_count());
+void ArchiveWriter::State::add_tile_member(JournalRecord::Kind kind, PlaneTile tile, const EncodedTile& encoded,
+                                           std::pair<std::uint32_t, std::uint32_t> range) {
   JournalRecord record;
-  record.kind = tile.is_empty ? JournalRecord::Kind::kEmptyTile : JournalRecord::Kind::kTile;
-  ISOHF_ASSERT(tile.content_digest.size() == record.digest.size());
-  std::copy(tile.content_digest.begin(), tile.content_digest.end(), record.digest.begin());
-  record.statistics = tile.statistics;
-  if (!tile.is_empty) {
-    record.member = {tile_name(state.grid.tile_at(flat)),
-                     ZipMethod::kDeflated,
-                     tile.payload_crc32,
-                     tile.deflated.size(),
-                     tile.payload_bytes,
-                     state.part.position()};
-    record.data_crc32 = crc32(tile.deflated);
-    record.code_min = tile.code_min;
-    record.code_max = tile.code_max;
-    record.has_voids = tile.has_voids;
-    state.append(record.member, tile.deflated);
+  record.kind = kind;
+  ISOHF_ASSERT(encoded.content_digest.size() == record.digest.size());
+  std::copy(encoded.content_digest.begin(), encoded.content_digest.end(), record.digest.begin());
+  record.statistics = encoded.statistics;
+  if (kind != JournalRecord::Kind::kEmptyTile) {
+    record.member = {tile_name(tile.tile, tile.plane), ZipMethod::kDeflated,  encoded.payload_crc32,
+                     encoded.deflated.size(),          encoded.payload_bytes, part.position()};
+    record.data_crc32 = crc32(encoded.deflated);
+    record.code_min = range.first;
+    record.code_max = range.second;
+    record.has_voids = encoded.has_voids;
+    append(record.member, encoded.deflated);
   }
-  state.journal->add(record);
-  state.contents.add(record);
-  state.checkpoint();
+  journal->add(record);
+  contents.add(record);
+  checkpoint();
+}
+
+void ArchiveWriter::add_tile(const EncodedTile& tile) {
+  const std::int64_t flat = state_->contents.next_tile();
+  ISOHF_ASSERT(flat < state_->grid.tile_count());
+  state_->add_tile_member(tile.is_empty ? JournalRecord::Kind::kEmptyTile : JournalRecord::Kind::kTile,
+                          {0, state_->grid.tile_at(flat)}, tile, {tile.code_min, tile.code_max});
+}
+
+void ArchiveWriter::add_plane_tile(int plane, TileIndex tile, const EncodedTile& encoded,
+                                   std::pair<std::uint32_t, std::uint32_t> below) {
+  ISOHF_ASSERT(state_->contents.takes(tile, plane));
+  if (!encoded.is_empty) state_->add_tile_member(JournalRecord::Kind::kPlaneTile, {plane, tile}, encoded, below);
 }
 
 void ArchiveWriter::State::add_member(ZipMember member, std::span<const std::byte> data) {
@@ -290,7 +285,7 @@ void ArchiveWriter::State::add_member(ZipMember member, std::span<const std::byt
   };
   const std::string& name = member.name;
   if (const std::string why = why_bad_name(name); !why.empty()) refuse(why);
-  if (name == kMetadataName || name == kIndexName || name.rfind("tiles/", 0) == 0) refuse("the name is taken");
+  if (name == kMetadataName || name == kIndexName || is_in_tile_folder(name)) refuse("the name is taken");
   if (contents.has_member(name)) refuse("it is there already");
   JournalRecord record;
   record.kind = JournalRecord::Kind::kMember;
@@ -320,9 +315,9 @@ void ArchiveWriter::flush_tiles() {
   state_->named([&] { state_->part.flush(); });
 }
 
-TileCodes ArchiveWriter::read_tile(TileIndex tile, const Quantisation& quantisation) const {
+TileCodes ArchiveWriter::read_tile(TileIndex tile, const Quantisation& quantisation, int plane) const {
   const State& state = *state_;
-  const TileEntry entry = state.contents.tile_entry(state.grid.flat_index(tile));
+  const TileEntry entry = state.contents.tile_entry(tile, plane);
   if (!entry.stored) return void_tile(state.grid.shape(), quantisation);
   std::vector<std::byte> deflated(entry.compressed_bytes);
   std::vector<std::byte> payload(entry.payload_bytes);
@@ -349,14 +344,23 @@ void ArchiveWriter::complete(Metadata metadata) {
     state.content_hash = state.contents.finish_hash(metadata);
     state.members_end = state.part.position();
   }
+  metadata.version = kFormatVersion;
+  metadata.planes = state.options.planes;
   metadata.tiles_stored = state.contents.tiles_stored();
   metadata.content_sha256 = state.content_hash;
+  metadata.ground_sha256 = ground_hash(metadata);
   std::erase_if(metadata.extensions, [](const auto& extension) { return extension.first == kDataCrcName; });
   metadata.extensions.emplace_back(kDataCrcName, fmt::format("\"{:08x}\"", state.contents.data_crc32()));
-  ZipMember member = state.metadata_member();
-  state.write_metadata(format_metadata(metadata), member);
-  state.write_index_and_directory(member);
-  state.named([&] { state.part.flush(); });
+  const std::string json = format_metadata(metadata) + "\n";
+  const auto data = std::as_bytes(std::span<const char>(json));
+  state.named([&] {
+    const ZipMember index = state.contents.append_index(state.part);
+    const ZipMember member{kMetadataName, ZipMethod::kStored, crc32(data),
+                           data.size(),   data.size(),        state.part.position()};
+    state.append(member, data);
+    state.contents.append_directory(index, member, state.part);
+    state.part.flush();
+  });
 }
 
 std::uint64_t ArchiveWriter::finish(Metadata metadata) {

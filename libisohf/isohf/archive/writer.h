@@ -5,6 +5,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <utility>
 
 #include "isohf/archive/codec/tile_codes.h"
 #include "isohf/metadata.h"
@@ -17,11 +18,10 @@ struct WriterOptions {
   bool resume = false;     ///< continue NAME.part where its journal says so, after checking what is there
   /// Identifies the job for resuming: the same text means the same input and options. Stored in the journal.
   std::string job_fingerprint;
-  /// Room for the metadata at the head of the file, JSON and padding. The same for the same input and options.
-  std::uint32_t metadata_bytes = 16384;
+  PlaneInfo planes;  ///< coarse planes that add_plane_tile fills, up to as many
 };
 
-/// Whether a file begins as the archives that ArchiveWriter writes. No other file is ever replaced by one, but an empty
+/// Whether a file begins as an archive of any version of the format. No other file is ever replaced by one, but an empty
 /// one.
 [[nodiscard]] bool is_archive_file(const std::string& path);
 
@@ -30,7 +30,8 @@ struct WriterOptions {
 /// Everything goes to NAME.part (and its journal NAME.part.journal), which finish() flushes to the disk and renames;
 /// nothing ever stands half-written under the final name. Destroyed unfinished, the writer removes its part file,
 /// unless keep_part() was called. Not thread-safe. Every call throws Error{kIo} with path and reason (disk full, ...).
-/// Two processes cannot write the same archive at once: the second gets Error{kIo}. Memory: 32 bytes a tile.
+/// Two processes cannot write the same archive at once: the second gets Error{kIo}. Memory does not
+/// grow with the tiles but by a tenth of a byte for each.
 class ArchiveWriter {
  public:
   /// Opens NAME.part beside `path`, or beside what it links to. Throws Error{kInvalidArgument} where `path` exists
@@ -57,7 +58,13 @@ class ArchiveWriter {
   /// Appends the tile with flat index next_tile(). An empty tile takes no bytes.
   void add_tile(const EncodedTile& tile);
 
-  /// Appends any other member. `name` is relative, '/'-separated, without "..", not in tiles/. Stored or deflated as
+  /// Appends a tile of a coarse plane, 1 to WriterOptions::planes.count; those of one plane by ascending flat index. An
+  /// empty one takes no bytes. Like members between two tiles it belongs to the tile of plane 0 that follows.
+  ///   below  smallest and largest code of all that the tile stands for
+  void add_plane_tile(int plane, TileIndex tile, const EncodedTile& encoded,
+                      std::pair<std::uint32_t, std::uint32_t> below);
+
+  /// Appends any other member. `name` is relative, '/'-separated, without "..", not in tiles/ or planes/. Stored or deflated as
   /// `deflate` says. Members added between two tiles belong to the tile that follows: a resumed job adds them again
   /// where that tile had not been written.
   void add_member(const std::string& name, std::span<const std::byte> bytes, bool deflate);
@@ -69,16 +76,15 @@ class ArchiveWriter {
   void flush_tiles();
   /// Decodes a tile that was added before flush_tiles(), for members that are made from the tiles as stored; also those
   /// that a resumed job found. Any number of threads at once, but none beside the other functions.
-  [[nodiscard]] TileCodes read_tile(TileIndex tile, const Quantisation& quantisation) const;
+  [[nodiscard]] TileCodes read_tile(TileIndex tile, const Quantisation& quantisation, int plane = 0) const;
 
   /// Makes the part file a whole archive with these metadata, which may be read as part() until the next call: so
   /// that finish() can say in the metadata what was found by reading it. Then only complete() and finish() may follow.
   void complete(Metadata metadata);
   [[nodiscard]] const std::string& part() const;
 
-  /// Completes the archive: metadata (tiles_stored and content_sha256 are filled in here), index, directory; flush and
-  /// rename. All tiles must have been added. Returns the archive's size in bytes. Throws Error{kInvalidArgument} where
-  /// the metadata do not fit WriterOptions::metadata_bytes; Error{kIo} where somebody else made `path` meanwhile (then
+  /// Completes the archive: index, metadata (planes, tiles_stored and the hashes are filled in here), directory; flush
+  /// and rename. All tiles must have been added. Returns the archive's size in bytes. Throws Error{kIo} where somebody else made `path` meanwhile (then
   /// the finished part file stays).
   std::uint64_t finish(Metadata metadata);
 

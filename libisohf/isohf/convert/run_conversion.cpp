@@ -259,8 +259,7 @@ ConversionResult run_conversion(HeightSource& source, const Plan& plan, const st
   warn_of_plan(info, plan, options.plan, textures ? &*textures : nullptr, summary.warnings);
   refuse_warnings(summary, options);
   ArchiveWriter writer(output, plan.grid,
-                       {options.overwrite, options.resume, job_fingerprint(info, plan, options),
-                        metadata_room(describe_job(info, plan, options, {}))});
+                       {options.overwrite, options.resume, job_fingerprint(info, plan, options), {}});
   Conversion conversion{source, options, plan, memory, kernel, std::move(prefilter), job};
   std::optional<SeedStage> seeds;
   std::optional<LosslessRecord> lossless;

@@ -73,13 +73,10 @@ void check(const LosslessRecord& record, const Metadata& metadata) {
 /// against that before anything is made as large.
 void check_members(const ArchiveReader& archive, const LosslessRecord& record) {
   const std::string name = residual_name(0);
-  const auto& members = archive.members();
-  const auto first =
-      std::find_if(members.begin(), members.end(), [&](const MemberEntry& member) { return member.name == name; });
+  const auto first = archive.find_member(name);
   const auto samples = static_cast<std::uint64_t>(record.width) *
                        static_cast<std::uint64_t>(std::min(record.rows_per_member, record.height));
-  if (first == members.end())
-    throw Error(ErrorCode::kCorrupt, fmt::format("{}: member \"{}\" is missing", archive.path(), name));
+  if (!first) throw Error(ErrorCode::kCorrupt, fmt::format("{}: member \"{}\" is missing", archive.path(), name));
   if (first->bytes / size_bytes(record.mapping.type) < samples) {
     throw Error(ErrorCode::kCorrupt, fmt::format("{}: member \"{}\" has {} bytes, too few for {} samples",
                                                  archive.path(), name, first->bytes, samples));

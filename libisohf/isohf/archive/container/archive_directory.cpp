@@ -14,6 +14,7 @@ namespace isohf {
 namespace {
 
 constexpr std::string_view kTileFolder = "tiles/";
+constexpr std::string_view kPlaneFolder = "planes/";
 
 /// An entry and where its bytes lie in the file, local header included.
 struct Placed {
@@ -56,12 +57,14 @@ void check_duplicates(const std::vector<Placed>& all, const Complain& complain) 
 }
 
 /// Why a tile's entry cannot be a tile, one clause; empty where it can.
-std::string why_bad_tile(const ZipEntry& entry, const TileGrid& grid) {
+std::string why_bad_tile(const ZipEntry& entry, std::span<const TileGrid> grids) {
   const auto tile = tile_from_name(entry.name);
-  if (!tile) return "has no tile's name, tiles/ROW/COLUMN.tile";
-  if (!grid.contains(*tile)) {
+  if (!tile) return "has no tile's name, tiles/ROW/COLUMN.tile or planes/PLANE/ROW/COLUMN.tile";
+  const auto plane = static_cast<std::size_t>(tile->plane);
+  if (plane >= grids.size()) return fmt::format("is of plane {}, and there are {}", plane, grids.size());
+  const TileGrid& grid = grids[plane];
+  if (!grid.contains(tile->tile))
     return fmt::format("lies outside the grid of {}x{} tiles", grid.tile_columns(), grid.tile_rows());
-  }
   if (entry.bytes == 0) return "is empty";
   if (entry.bytes > 0xffffffffU || entry.compressed_bytes > 0xffffffffU) return "is larger than any tile";
   return {};
@@ -69,21 +72,44 @@ std::string why_bad_tile(const ZipEntry& entry, const TileGrid& grid) {
 
 }  // namespace
 
-std::string tile_name(TileIndex tile) {
-  return fmt::format("tiles/{}/{}.tile", tile.row, tile.column);
+std::string tile_name(TileIndex tile, int plane) {
+  return plane == 0 ? fmt::format("tiles/{}/{}.tile", tile.row, tile.column)
+                    : fmt::format("planes/{}/{}/{}.tile", plane, tile.row, tile.column);
 }
 
-std::optional<TileIndex> tile_from_name(std::string_view name) {
-  constexpr std::string_view kFolder = "tiles/";
-  if (name.substr(0, kFolder.size()) != kFolder) return std::nullopt;
-  TileIndex tile{};
+std::optional<PlaneTile> tile_from_name(std::string_view name) {
+  PlaneTile found;
+  const char* at = name.data();
   const char* const end = name.data() + name.size();
-  const auto row = std::from_chars(name.data() + kFolder.size(), end, tile.row);
-  if (row.ec != std::errc{} || row.ptr == end || *row.ptr != '/') return std::nullopt;
-  const auto column = std::from_chars(row.ptr + 1, end, tile.column);
-  if (column.ec != std::errc{} || tile.row < 0 || tile.column < 0) return std::nullopt;
-  if (tile_name(tile) != name) return std::nullopt;  // leading zeros, another ending
-  return tile;
+  const auto take = [&](auto& value) {
+    const auto [behind, error] = std::from_chars(at, end, value);
+    at = behind;
+    return error == std::errc{} && value >= 0;
+  };
+  if (name.starts_with(kTileFolder)) {
+    at += kTileFolder.size();
+  } else if (name.starts_with(kPlaneFolder)) {
+    at += kPlaneFolder.size();
+    if (!take(found.plane) || found.plane == 0 || at == end) return std::nullopt;
+    ++at;
+  } else {
+    return std::nullopt;
+  }
+  if (!take(found.tile.row) || at == end) return std::nullopt;
+  ++at;
+  if (!take(found.tile.column)) return std::nullopt;
+  if (tile_name(found.tile, found.plane) != name) return std::nullopt;  // leading zeros, another ending
+  return found;
+}
+
+bool is_in_tile_folder(std::string_view name) {
+  return name.starts_with(kTileFolder) || name.starts_with(kPlaneFolder);
+}
+
+std::vector<TileGrid> plane_grids(const Metadata& metadata) {
+  std::vector<TileGrid> grids;
+  for (int plane = 0; plane <= metadata.planes.count; ++plane) grids.push_back(metadata.plane_grid(plane));
+  return grids;
 }
 
 std::string why_bad_name(std::string_view name) {
@@ -144,11 +170,11 @@ std::uint64_t checked_data_offset(const ByteSource& file, const ZipEntry& entry)
   return data_offset;
 }
 
-ArchiveDirectory read_directory(const ByteSource& file, const ZipEnd& end, const std::optional<TileGrid>& grid,
+ArchiveDirectory read_directory(const ByteSource& file, const ZipEnd& end, std::span<const TileGrid> grids,
                                 const Complain& complain) {
   std::vector<Placed> all;
   for (ZipEntries entries(file, end); auto entry = entries.next();) {
-    if (!grid && entry->name.starts_with(kTileFolder)) continue;
+    if (grids.empty() && is_in_tile_folder(entry->name)) continue;
     // Archivers put in entries for folders; they hold nothing.
     const bool is_folder = entry->name.size() > 1 && entry->name.back() == '/' && entry->bytes == 0;
     const std::string_view name = std::string_view(entry->name).substr(0, entry->name.size() - (is_folder ? 1 : 0));
@@ -169,29 +195,78 @@ ArchiveDirectory read_directory(const ByteSource& file, const ZipEnd& end, const
   ArchiveDirectory directory;
   for (Placed& placed : all) {
     if (placed.is_folder) continue;
-    if (!placed.entry.name.starts_with(kTileFolder)) {
+    if (!is_in_tile_folder(placed.entry.name)) {
       directory.members.push_back({std::move(placed.entry), placed.data_offset});
-    } else if (const std::string why = why_bad_tile(placed.entry, *grid); !why.empty()) {
+    } else if (const std::string why = why_bad_tile(placed.entry, grids); !why.empty()) {
       complain(fmt::format("{}: {}", describe(placed.entry), why));
     } else {
-      const std::int64_t flat = grid->flat_index(*tile_from_name(placed.entry.name));
-      directory.tiles.push_back({flat, std::move(placed.entry), placed.data_offset});
+      const PlaneTile tile = *tile_from_name(placed.entry.name);
+      const std::int64_t flat = grids[static_cast<std::size_t>(tile.plane)].flat_index(tile.tile);
+      directory.tiles.push_back({tile.plane, flat, std::move(placed.entry), placed.data_offset});
     }
   }
   std::sort(directory.tiles.begin(), directory.tiles.end(),
-            [](const auto& a, const auto& b) { return a.flat < b.flat; });
+            [](const auto& a, const auto& b) { return a.plane != b.plane ? a.plane < b.plane : a.flat < b.flat; });
   std::sort(directory.members.begin(), directory.members.end(),
             [](const auto& a, const auto& b) { return a.data_offset < b.data_offset; });
   return directory;
 }
 
-void check_profile(const ByteSource& file, const ZipEnd& end, const Complain& complain) {
+OwnEntries find_own_entries(const ByteSource& file, const ZipEnd& end) {
+  OwnEntries found;
+  const auto entry_at_end = [&](std::uint64_t behind, std::string_view name) -> std::optional<ZipEntry> {
+    for (const std::uint64_t extra : {0, 12, 20, 28}) {
+      const std::uint64_t bytes = 46 + name.size() + extra;
+      if (bytes > behind) break;
+      const ZipEnd one{1, end.directory_offset + behind - bytes, bytes, 0, 0};
+      try {
+        ZipEntries entries(file, one);
+        if (auto entry = entries.next(); entry->name == name && !entries.next()) return entry;
+      } catch (const Error& error) {
+        if (error.code() != ErrorCode::kCorrupt) throw;
+      }
+    }
+    return std::nullopt;
+  };
+  if (auto metadata = entry_at_end(end.directory_bytes, kMetadataName)) {
+    found.index = entry_at_end(metadata->entry_offset - end.directory_offset, kIndexName);
+    found.metadata = *std::move(metadata);
+    found.are_last = found.index.has_value();
+    if (found.are_last) return found;
+  }
+  ZipEntries all(file, end);
+  auto entry = all.next();
+  bool has_metadata = entry && entry->name == kMetadataName;
+  if (has_metadata) {  // version 1: the metadata first, the index last
+    found.metadata = *entry;
+    found.index = entry_at_end(end.directory_bytes, kIndexName);
+    if (found.index) return found;
+  }
+  for (; entry; entry = all.next()) {
+    if (entry->name == kIndexName) found.index = *entry;
+    if (entry->name != kMetadataName || has_metadata) continue;
+    found.metadata = *entry;
+    has_metadata = true;
+  }
+  if (!has_metadata) {
+    throw Error(ErrorCode::kCorrupt,
+                fmt::format("is a ZIP file, but no isohf archive: it has no member \"{}\"", kMetadataName));
+  }
+  return found;
+}
+
+void check_profile(const ByteSource& file, const ZipEnd& end, int version, const Complain& complain) {
   std::vector<std::byte> ours;
   const auto stands_at = [&](std::uint64_t offset) {
     if (offset > file.size_bytes() || ours.size() > file.size_bytes() - offset) return false;
     const SourceBytes theirs(file, offset, ours.size());
     return std::equal(ours.begin(), ours.end(), theirs.bytes().begin());
   };
+  const std::uint32_t media_type_crc = crc32(std::as_bytes(std::span(kMediaType)));
+  using Places = std::vector<std::pair<std::uint64_t, std::string_view>>;
+  const Places places =
+      version == 1 ? Places{{0, kMetadataName}, {end.entries - 1, kIndexName}}
+                   : Places{{0, kMediaTypeName}, {end.entries - 2, kIndexName}, {end.entries - 1, kMetadataName}};
   std::uint64_t offset = 0;
   std::uint64_t entries = 0;
   for (ZipEntries all(file, end); const auto entry = all.next(); ++entries) {
@@ -203,10 +278,12 @@ void check_profile(const ByteSource& file, const ZipEnd& end, const Complain& co
     }
     if (entry->header_offset != offset)
       complain(fmt::format("{}: the member before it ends at byte {}", describe(*entry), offset));
-    if (entries == 0 && entry->name != kMetadataName)
-      complain(fmt::format("{}: is first, where the metadata belong", describe(*entry)));
-    if (entries + 1 == end.entries && entry->name != kIndexName)
-      complain(fmt::format("{}: is last, where the index belongs", describe(*entry)));
+    for (const auto& [place, name] : places) {
+      if (entries == place && entry->name != name)
+        complain(fmt::format("{}: stands where \"{}\" belongs", describe(*entry), name));
+    }
+    if (entry->name == kMediaTypeName && (entry->method != ZipMethod::kStored || entry->crc32 != media_type_crc))
+      complain(fmt::format("{}: must hold \"{}\", stored", describe(*entry), kMediaType));
     ours.clear();
     append_local_header(*entry, ours);
     if (!stands_at(entry->header_offset))
@@ -237,21 +314,25 @@ std::uint32_t crc32_in(const ByteSource& file, std::uint64_t offset_bytes, std::
 std::uint32_t data_crc32(const ByteSource& file) {
   std::uint32_t all = 0;
   for (ZipEntries entries(file, find_archive_end(file)); const auto entry = entries.next();) {
-    if (entry->name == kMetadataName || entry->name == kIndexName) continue;
+    if (entry->name == kIndexName) break;
+    if (entry->name == kMetadataName) continue;
     all = crc32_of_crc32(crc32_in(file, checked_data_offset(file, *entry), entry->compressed_bytes), all);
   }
   return all;
 }
 
 std::vector<std::byte> member_from(const ByteSource& file, const ZipEntry& entry, std::uint64_t data_offset) {
-  SourceBytes data(file, data_offset, entry.compressed_bytes);
+  return member_from(SourceBytes(file, data_offset, entry.compressed_bytes).bytes(), entry);
+}
+
+std::vector<std::byte> member_from(std::span<const std::byte> data, const ZipEntry& entry) {
   std::vector<std::byte> bytes;
   if (entry.method == ZipMethod::kStored) {
     if (entry.bytes != entry.compressed_bytes) {
       throw Error(ErrorCode::kCorrupt, fmt::format("{}: is stored, but states {} bytes of {}", describe(entry),
                                                    entry.compressed_bytes, entry.bytes));
     }
-    bytes = std::move(data).take();
+    bytes.assign(data.begin(), data.end());
   } else if (entry.method == ZipMethod::kDeflated) {
     // Deflate makes at most 1032 bytes of one: a larger claim is not worth the memory.
     if (entry.bytes / 1032 > entry.compressed_bytes) {
@@ -262,7 +343,7 @@ std::vector<std::byte> member_from(const ByteSource& file, const ZipEntry& entry
     }
     bytes.resize(entry.bytes);
     try {
-      inflate_exactly(data.bytes(), bytes);
+      inflate_exactly(data, bytes);
     } catch (const Error& error) {
       throw error.within(describe(entry));
     }

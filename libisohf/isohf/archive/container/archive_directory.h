@@ -2,6 +2,7 @@
 
 #include <functional>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -9,6 +10,7 @@
 #include "isohf/base/zip.h"
 #include "isohf/byte_source.h"
 #include "isohf/lattice.h"
+#include "isohf/metadata.h"
 
 /// An archive as a ZIP file: its members' names, and its directory held against the rules of docs/archive_format.md.
 
@@ -16,11 +18,24 @@ namespace isohf {
 
 inline constexpr const char* kMetadataName = "isohf.json";
 inline constexpr const char* kIndexName = "index.bin";
+/// The first member from version 2 on, stored, and what it holds.
+inline constexpr const char* kMediaTypeName = "mimetype";
+inline constexpr std::string_view kMediaType = "application/vnd.isohf+zip";
 
-/// "tiles/ROW/COLUMN.tile", decimal, without leading zeros.
-[[nodiscard]] std::string tile_name(TileIndex tile);
+/// A tile of a plane; plane 0 are the tiles themselves.
+struct PlaneTile {
+  int plane = 0;
+  TileIndex tile{};
+  friend bool operator==(const PlaneTile&, const PlaneTile&) = default;
+};
+/// "tiles/ROW/COLUMN.tile", and "planes/PLANE/ROW/COLUMN.tile" on a coarse plane; decimal, without leading zeros.
+[[nodiscard]] std::string tile_name(TileIndex tile, int plane = 0);
 /// The tile of such a name; nullopt where it is none in exactly that form.
-[[nodiscard]] std::optional<TileIndex> tile_from_name(std::string_view name);
+[[nodiscard]] std::optional<PlaneTile> tile_from_name(std::string_view name);
+/// Whether the name stands in the folder of the tiles or of the planes, where nothing else may.
+[[nodiscard]] bool is_in_tile_folder(std::string_view name);
+/// The metadata's grids by plane.
+[[nodiscard]] std::vector<TileGrid> plane_grids(const Metadata& metadata);
 
 /// Why a name may not stand in an archive, one clause; empty where it may.
 [[nodiscard]] std::string why_bad_name(std::string_view name);
@@ -28,6 +43,7 @@ inline constexpr const char* kIndexName = "index.bin";
 /// An archive's directory, read whole and checked: names, duplicates, local headers, overlaps.
 struct ArchiveDirectory {
   struct Tile {
+    int plane;
     std::int64_t flat;
     ZipEntry entry;
     std::uint64_t data_offset;
@@ -37,7 +53,7 @@ struct ArchiveDirectory {
     std::uint64_t data_offset;
   };
 
-  std::vector<Tile> tiles;      ///< by flat index
+  std::vector<Tile> tiles;      ///< by plane and flat index
   std::vector<Member> members;  ///< the others, in file order
 };
 
@@ -47,14 +63,24 @@ using Complain = std::function<void(const std::string&)>;
 /// The end record of an archive. Throws Error{kCorrupt} where there is none or it contradicts the file.
 [[nodiscard]] ZipEnd find_archive_end(const ByteSource& file);
 
-/// Reads and checks the directory of a file whose tiles belong to `grid`; with nullopt the members alone, and what is
-/// in tiles/ goes unread. What is wrong goes to `complain`; the entry at fault is left out.
+/// Reads and checks the directory of a file whose tiles belong to `grids`, by plane; with none the members alone, and
+/// tiles go unread. What is wrong goes to `complain`; the entry at fault is left out.
 [[nodiscard]] ArchiveDirectory read_directory(const ByteSource& file, const ZipEnd& end,
-                                              const std::optional<TileGrid>& grid, const Complain& complain);
+                                              std::span<const TileGrid> grids, const Complain& complain);
 
 /// Holds an archive of ours against the profile beyond what makes a ZIP file: the directory in file order and as the
-/// writer makes it, members back to back from byte 0 on, metadata first, index last and right before the directory.
-void check_profile(const ByteSource& file, const ZipEnd& end, const Complain& complain);
+/// writer of that version makes it, members back to back from byte 0 on; in version 1 the metadata first and the index
+/// last, in version 2 the media type first, index and metadata last.
+void check_profile(const ByteSource& file, const ZipEnd& end, int version, const Complain& complain);
+
+/// The entries of index and metadata, by which an archive is opened.
+struct OwnEntries {
+  std::optional<ZipEntry> index;
+  ZipEntry metadata;
+  bool are_last = false;  ///< as a writer of version 2 leaves them; else the directory was searched
+};
+/// Looks at the directory's end, or else goes through it. Throws Error{kCorrupt} where there are no metadata.
+[[nodiscard]] OwnEntries find_own_entries(const ByteSource& file, const ZipEnd& end);
 
 /// Offset of a member's data, its local header held against the directory. Throws Error{kCorrupt, kUnsupported}.
 [[nodiscard]] std::uint64_t checked_data_offset(const ByteSource& file, const ZipEntry& entry);
@@ -63,12 +89,14 @@ void check_profile(const ByteSource& file, const ZipEnd& end, const Complain& co
 /// kUnsupported, kIo}.
 [[nodiscard]] std::vector<std::byte> member_from(const ByteSource& file, const ZipEntry& entry,
                                                  std::uint64_t data_offset);
+/// The same of its data.
+[[nodiscard]] std::vector<std::byte> member_from(std::span<const std::byte> data, const ZipEntry& entry);
 
 /// CRC-32 of a range, read in pieces.
 [[nodiscard]] std::uint32_t crc32_in(const ByteSource& file, std::uint64_t offset_bytes, std::uint64_t size_bytes);
 
-/// CRC-32 over the CRC-32s of all members' data as they stand in the file, in the directory's order, but those of the
-/// metadata and the index. Throws as reading does.
+/// CRC-32 over the CRC-32s of the data of all members before the index as they stand in the file, in the directory's
+/// order, but those of the metadata. Throws as reading does.
 [[nodiscard]] std::uint32_t data_crc32(const ByteSource& file);
 /// The metadata's extension that holds it, as a string of hexadecimal digits.
 inline constexpr const char* kDataCrcName = "data_crc32";

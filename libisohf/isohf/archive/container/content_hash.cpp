@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <optional>
 
 #include "isohf/base/bytes.h"
 
@@ -79,6 +80,56 @@ std::string ContentHash::finish(const Metadata& metadata) {
   out.write(metadata.quantisation.scale);
   hash_.add(bytes);
   return hex(hash_.finish());
+}
+
+std::string ground_hash(const Metadata& metadata) {
+  std::vector<std::byte> bytes;
+  ByteWriter out(bytes);
+  const auto text = [&](const std::string& value) {
+    out.write(static_cast<std::uint32_t>(value.size()));
+    out.write_bytes(std::as_bytes(std::span<const char>(value)));
+  };
+  const auto number = [&](const std::optional<double>& value) {
+    out.write(static_cast<std::uint8_t>(value ? 1 : 0));
+    out.write(value.value_or(0.0));
+  };
+  const auto code = [&](const std::optional<int>& value) { out.write(std::int32_t{value.value_or(0)}); };
+  text(metadata.content_sha256);
+  text(metadata.horizontal_unit);
+  text(metadata.vertical_unit);
+  out.write(static_cast<std::uint8_t>(metadata.wraps_x ? 1 : 0));
+  out.write(static_cast<std::uint8_t>(metadata.projection ? 1 : 0));
+  const SourceRecord& source = metadata.source;
+  if (metadata.projection) {
+    const ProjectionSpec& spec = metadata.projection->spec;
+    text(to_string(spec.kind));
+    for (const double value :
+         {spec.ellipsoid.semi_major_axis_m, spec.ellipsoid.inverse_flattening, spec.longitude_0, spec.latitude_0,
+          spec.parallel_1, spec.parallel_2, spec.scale_0, spec.false_easting, spec.false_northing}) {
+      out.write(value);
+    }
+    out.write(std::int32_t{spec.utm_zone});
+    out.write(metadata.projection->origin.easting);
+    out.write(metadata.projection->origin.northing);
+  } else {
+    for (const double value : {source.first_sample_x, source.first_sample_z, source.spacing_x, source.spacing_z}) {
+      out.write(value);
+    }
+    number(source.origin_x);
+    number(source.origin_y);
+    out.write(source.crs_spacing_x);
+    out.write(source.crs_spacing_y);
+  }
+  text(source.crs_unit);
+  out.write(source.metres_per_unit);
+  code(source.crs_epsg);
+  text(source.crs_epsg ? "" : source.crs_wkt);
+  text(source.body);
+  number(source.semi_major_axis_m);
+  number(source.inverse_flattening);
+  text(source.vertical_datum);
+  code(source.vertical_epsg);
+  return hex(sha256(bytes));
 }
 
 }  // namespace isohf

@@ -35,6 +35,9 @@ class Sha256 {
 /// NaN written as 0x7FC00000; row by row, padding and voids included.
 [[nodiscard]] std::vector<std::byte> tile_content_digest(const TileCodes& tile);
 
+/// metadata.content_sha256 and what says where on which ground it lies, as text (docs/archive_format.md, "Ground hash").
+[[nodiscard]] std::string ground_hash(const Metadata& metadata);
+
 /// The hash of a whole dataset's elevations and of what places them; independent of threads, codec and compression.
 ///
 /// SHA-256 over, little-endian: the tile digests in flat order; then u32 C, u32 R, u32 Λ, u64 tile columns, u64 tile

@@ -180,10 +180,14 @@ void JsonMembers::object(const char* key, const Members& members, const JsonRule
   members(inner);
 }
 
-std::string write_members(const JsonMembers::Members& members, int indent) {
+std::string write_members(const JsonMembers::Members& members) {
   Json object = Json::object();
   JsonMembers json(JsonMembers::Pass::kWrite, object, "");
   members(json);
+  return text_of(object);
+}
+
+std::string text_of(const Json& object, int indent) {
   return object.dump(indent, ' ', false, Json::error_handler_t::replace);
 }
 

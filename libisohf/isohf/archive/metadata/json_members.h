@@ -146,8 +146,10 @@ class JsonMembers {
   std::string where_;
 };
 
-/// The members as JSON text. Text of unknown encoding (a WKT, a file name) does not make the whole unreadable.
-[[nodiscard]] std::string write_members(const JsonMembers::Members& members, int indent = -1);
+/// An object as JSON text. Text of unknown encoding (a WKT, a file name) does not make the whole unreadable.
+[[nodiscard]] std::string text_of(const nlohmann::ordered_json& object, int indent = -1);
+/// The same of members.
+[[nodiscard]] std::string write_members(const JsonMembers::Members& members);
 /// Their JSON Schema.
 [[nodiscard]] std::string schema_of_members(const JsonMembers::Members& members);
 /// The JSON Schema of the metadata without extensions, which docs/schema/metadata.json holds.

@@ -3,11 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <string_view>
 
 #include "isohf/archive/metadata/json_members.h"
+#include "isohf/base/assert.h"
 #include "isohf/error.h"
 
 namespace isohf {
@@ -15,7 +18,6 @@ namespace {
 
 using Json = JsonMembers::Json;
 
-constexpr int kFormatVersion = 1;
 constexpr const char* kFormatName = "isohf";
 constexpr JsonRule kNull{.presence = JsonRule::kNull};
 constexpr JsonRule kAbsent{.presence = JsonRule::kAbsent};
@@ -27,16 +29,51 @@ JsonRule within(double most) {
 
 // --- what metadata consist of, in the order in which it is written ---
 
-void version_members(JsonMembers& json) {
+/// What an archive may require of its readers and this build knows: nothing yet.
+constexpr std::array<std::string_view, 0> kKnownRequirements{};
+
+void version_members(JsonMembers& json, int& version) {
   std::string format = kFormatName;
   json("format", format);
   if (format != kFormatName) json.refuse("format", fmt::format("is \"{}\", must be \"{}\"", format, kFormatName));
-  std::int64_t version = kFormatVersion;
-  json("version", version, {.least = 1});
-  if (version != kFormatVersion) {
-    throw Error(ErrorCode::kUnsupported,
-                fmt::format("metadata: format version {}; this build reads version {}", version, kFormatVersion));
+  if (!json.reads()) version = kFormatVersion;
+  json("version", version, {.least = kOldestFormatVersion});
+  if (version > kFormatVersion) {
+    throw Error(ErrorCode::kUnsupported, fmt::format("metadata: format version {}; this build reads versions {} to {}",
+                                                     version, kOldestFormatVersion, kFormatVersion));
   }
+  std::optional<std::vector<std::string>> requirements;
+  json("requires", requirements, kAbsent);
+  for (const std::string& name : requirements.value_or(std::vector<std::string>{})) {
+    if (std::find(kKnownRequirements.begin(), kKnownRequirements.end(), name) != kKnownRequirements.end()) continue;
+    throw Error(
+        ErrorCode::kUnsupported,
+        fmt::format("metadata: the archive requires \"{}\" of its readers, which this build does not know", name));
+  }
+}
+
+void plane_members(JsonMembers& json, PlaneInfo& planes) {
+  json("stride", planes.stride, {.least = 2, .most = 1 << (kMaxTileLevels - 1)});
+  json("count", planes.count, {.least = 1, .most = 24});
+}
+
+/// The planes of a grid: until one tile is left at most, and no vertex of theirs between two of the tiles below.
+void check_planes(const JsonMembers& json, const TileGrid& grid, const PlaneInfo& planes) {
+  const TileShape& shape = grid.shape();
+  const auto refuse = [&](const char* member, const std::string& why) {
+    refuse_metadata(std::string("planes.") + member, why);
+  };
+  const int stride = planes.stride;
+  if ((stride & (stride - 1)) != 0 || shape.cell_columns() % stride != 0 || shape.cell_rows() / 2 % stride != 0) {
+    refuse("stride", fmt::format("is {}, must be a power of two that divides C-4 = {} and (R-3)/2 = {}", stride,
+                                 shape.cell_columns(), shape.cell_rows() / 2));
+  }
+  std::int64_t most = std::max(grid.tile_columns(), grid.tile_rows());
+  double extent = std::max(grid.extent_x(), grid.extent_z());
+  for (int plane = 1; plane <= planes.count; ++plane, most = (most + stride - 1) / stride, extent *= stride) {
+    if (most == 1) refuse("count", fmt::format("is {}, but plane {} has one tile", planes.count, plane - 1));
+  }
+  if (!(extent <= kMaxExtent)) json.refuse("extent", "is too wide for the planes' tiles");
 }
 
 void grid_members(JsonMembers& json, TileGrid& grid, std::int64_t& tiles_stored) {
@@ -192,9 +229,13 @@ void source_members(JsonMembers& json, SourceRecord& source) {
 }
 
 void metadata_members(JsonMembers& json, Metadata& metadata) {
-  version_members(json);
+  version_members(json, metadata.version);
   json("producer", metadata.producer);
   grid_members(json, metadata.grid, metadata.tiles_stored);
+  auto planes = metadata.planes.count > 0 ? std::optional(metadata.planes) : std::nullopt;
+  json.object("planes", planes, plane_members, kAbsent);
+  if (json.reads() && planes) check_planes(json, metadata.grid, *planes);
+  metadata.planes = planes.value_or(PlaneInfo{});
   if (!json.reads()) lattice_members(json, metadata.grid);
   json.object("samples", [&](JsonMembers& samples) { sample_members(samples, metadata); });
   json.object("units", "horizontal", metadata.horizontal_unit, "vertical", metadata.vertical_unit);
@@ -213,14 +254,15 @@ void metadata_members(JsonMembers& json, Metadata& metadata) {
               "voids", counted.voids, "clamped", counted.clamped, "worst_rounding", counted.worst_rounding);
   json("textures", metadata.textures);
   json("content_sha256", metadata.content_sha256);
+  json("ground_sha256", metadata.ground_sha256, kAbsent);
 }
 
 Metadata empty_metadata() {
   return Metadata(TileGrid::make(TileShape::make(5, 5, 1), 1, 1, 1.0, 1.0));
 }
 
-/// Whether a top-level member of that name belongs to the format; any other is an extension.
-bool is_format_member(const std::string& name) {
+/// The members that belong to the format, as a JSON Schema; all others are extensions.
+const Json& format_members() {
   static const Json schema = [] {
     Json made = {{"properties", Json::object()}, {"required", Json::array()}};
     JsonMembers json(JsonMembers::Pass::kSchema, made, "");
@@ -228,7 +270,46 @@ bool is_format_member(const std::string& name) {
     metadata_members(json, metadata);
     return made;
   }();
-  return schema["properties"].contains(name);
+  return schema;
+}
+
+/// A member's name as part of a JSON pointer (RFC 6901).
+std::string pointer_to(const std::string& where, const std::string& name) {
+  std::string part = where + "/";
+  for (const char c : name) part += c == '~' ? "~0" : c == '/' ? "~1" : std::string(1, c);
+  return part;
+}
+
+/// Takes what `schema` does not know of an object's members: those of the outermost by their names, others by their
+/// places.
+void take_extensions(const Json& object, const Json& schema, const std::string& where, Metadata& metadata) {
+  const Json& known = schema.at("properties");
+  for (const auto& [name, value] : object.items()) {
+    const auto found = known.find(name);
+    if (found == known.end()) {
+      const bool by_name = where.empty() && !name.starts_with("/");
+      if (by_name || !value.is_null())
+        metadata.extensions.emplace_back(by_name ? name : pointer_to(where, name), value.dump());
+    } else if (value.is_object() && found->contains("properties")) {
+      take_extensions(value, *found, pointer_to(where, name), metadata);
+    }
+  }
+}
+
+/// Puts an extension where it belongs; one whose object is no longer there goes with it.
+void put_extension(const std::string& name, const std::string& text, Json& object) {
+  if (!name.starts_with("/")) {
+    if (format_members()["properties"].contains(name)) {
+      throw Error(ErrorCode::kInvalidArgument,
+                  fmt::format("metadata: extension \"{}\" has a name of the format", name));
+    }
+    object[name] = parse_json(text);
+    return;
+  }
+  const Json::json_pointer place(name);
+  const Json::json_pointer parent = place.parent_pointer();
+  if (!object.contains(parent) || !object[parent].is_object() || object.contains(place)) return;
+  object[place] = parse_json(text);
 }
 
 // --- what members must be beside each other ---
@@ -252,10 +333,14 @@ void check_axis(const std::string& axis, double spacing, double first, std::int6
           fmt::format("be at most {}, where the tiles end", world));
 }
 
-void check(const Metadata& metadata) {
-  const std::string& hash = metadata.content_sha256;
+void check_hash(const char* name, const std::string& hash) {
   if (hash.size() != 64 || hash.find_first_not_of("0123456789abcdef") != std::string::npos)
-    refuse_metadata("content_sha256", "is no 64 lower-case hexadecimal digits");
+    refuse_metadata(name, "is no 64 lower-case hexadecimal digits");
+}
+
+void check(const Metadata& metadata) {
+  check_hash("content_sha256", metadata.content_sha256);
+  if (metadata.version >= 2) check_hash("ground_sha256", metadata.ground_sha256);
   const Quantisation& codes = metadata.quantisation;
   require(std::isfinite(codes.offset + codes.scale * 65535.0), "samples.scale", codes.scale,
           "not lead beyond all numbers");
@@ -290,19 +375,12 @@ CodeType code_type_from_string(const std::string& text) {
 }
 
 std::string format_metadata(const Metadata& metadata) {
-  return write_members(
-      [&](JsonMembers& json) {
-        Metadata copy = metadata;
-        metadata_members(json, copy);
-        for (const auto& [name, text] : metadata.extensions) {
-          if (is_format_member(name)) {
-            throw Error(ErrorCode::kInvalidArgument,
-                        fmt::format("metadata: extension \"{}\" has a name of the format", name));
-          }
-          json.derived(name.c_str(), parse_json(text), {});
-        }
-      },
-      1);
+  Json object = Json::object();
+  JsonMembers json(JsonMembers::Pass::kWrite, object, "");
+  Metadata copy = metadata;
+  metadata_members(json, copy);
+  for (const auto& [name, text] : metadata.extensions) put_extension(name, text, object);
+  return text_of(object, 1);
 }
 
 Metadata parse_metadata(const std::string& text) {
@@ -312,10 +390,20 @@ Metadata parse_metadata(const std::string& text) {
   JsonMembers members(JsonMembers::Pass::kRead, json, "");
   metadata_members(members, metadata);
   check(metadata);
-  for (const auto& [name, value] : json.items()) {
-    if (!is_format_member(name)) metadata.extensions.emplace_back(name, value.dump());
-  }
+  take_extensions(json, format_members(), "", metadata);
   return metadata;
+}
+
+TileGrid Metadata::plane_grid(int plane) const {
+  ISOHF_ASSERT(plane >= 0 && plane <= planes.count);
+  std::int64_t columns = grid.tile_columns();
+  std::int64_t rows = grid.tile_rows();
+  double stride = 1.0;
+  for (; plane > 0; --plane, stride *= planes.stride) {
+    columns = (columns + planes.stride - 1) / planes.stride;
+    rows = (rows + planes.stride - 1) / planes.stride;
+  }
+  return TileGrid::make(grid.shape(), columns, rows, grid.extent_x() * stride, grid.extent_z() * stride);
 }
 
 std::string metadata_schema() {
@@ -329,13 +417,6 @@ std::string format_projection(const ProjectionRecord& record) {
 
 std::string format_ground(const MapGround& ground) {
   return write_extension(ground, ground_members);
-}
-
-std::uint32_t metadata_room(const Metadata& draft) {
-  constexpr std::size_t kLeast = 16384;
-  constexpr std::size_t kStillToCome = 8192;
-  const std::size_t wanted = (format_metadata(draft).size() + kStillToCome + 4095) / 4096 * 4096;
-  return static_cast<std::uint32_t>(std::clamp<std::size_t>(wanted, kLeast, kMaxMetadataBytes));
 }
 
 }  // namespace isohf

@@ -28,16 +28,7 @@ ShadowSeedInfo info_of(const ArchiveReader& archive) {
 
 }  // namespace
 
-ShadowSeedReader::ShadowSeedReader(const ArchiveReader& archive)
-    : archive_(archive), info_(info_of(archive)), members_(static_cast<std::size_t>(archive.grid().tile_count()), -1) {
-  const auto& members = archive.members();
-  for (std::size_t i = 0; i < members.size(); ++i) {
-    const auto tile = tile_from_seed_name(members[i].name);
-    if (tile && archive.grid().contains(*tile)) {
-      members_[static_cast<std::size_t>(archive.grid().flat_index(*tile))] = static_cast<std::int64_t>(i);
-    }
-  }
-}
+ShadowSeedReader::ShadowSeedReader(const ArchiveReader& archive) : archive_(archive), info_(info_of(archive)) {}
 
 bool ShadowSeedReader::covers(double sun_elevation_deg) const {
   if (!(sun_elevation_deg > 0.0 && sun_elevation_deg < 90.0)) return false;
@@ -51,9 +42,7 @@ std::vector<std::byte> ShadowSeedReader::payload(TileIndex index) const {
     throw Error(ErrorCode::kInvalidArgument,
                 fmt::format("{}: tile ({},{}) lies outside the grid", archive_.path(), index.column, index.row));
   }
-  const std::int64_t member = members_[static_cast<std::size_t>(archive_.grid().flat_index(index))];
-  if (member < 0) return {};
-  return archive_.read_member(archive_.members()[static_cast<std::size_t>(member)]);
+  return archive_.read_member(seed_name(index)).value_or(std::vector<std::byte>{});
 }
 
 HullSeeds ShadowSeedReader::hulls(TileIndex index, const TileCodes& tile) const {

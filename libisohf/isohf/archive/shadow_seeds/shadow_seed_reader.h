@@ -35,7 +35,6 @@ class ShadowSeedReader {
 
   const ArchiveReader& archive_;
   ShadowSeedInfo info_;
-  std::vector<std::int64_t> members_;  ///< by flat tile index: place in archive.members(), -1 where none
 };
 
 }  // namespace isohf

@@ -452,7 +452,8 @@ std::optional<TileIndex> tile_from_seed_name(std::string_view name) {
     return std::nullopt;
   }
   const auto middle = name.substr(kFolder.size(), name.size() - kFolder.size() - kEnding.size());
-  return tile_from_name(fmt::format("tiles/{}.tile", middle));
+  const auto found = tile_from_name(fmt::format("tiles/{}.tile", middle));
+  return found ? std::optional(found->tile) : std::nullopt;
 }
 
 }  // namespace isohf

@@ -92,7 +92,7 @@ std::optional<TexturePlace> place_from_texture_name(const TextureInfo& info, std
     if (file != fmt::format("{}.{}", info.level_size(level), extension(info.format))) continue;
     const auto tile = tile_from_name(fmt::format("tiles/{}.tile", path.substr(0, slash)));
     if (!tile) return std::nullopt;
-    return TexturePlace{*tile, level};
+    return TexturePlace{tile->tile, level};
   }
   return std::nullopt;
 }

@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-
 #include "isohf/archive/textures/picture_codec.h"
 #include "isohf/error.h"
 
@@ -21,35 +19,20 @@ TextureInfo info_of(const ArchiveReader& archive) {
 
 }  // namespace
 
-TextureReader::TextureReader(const ArchiveReader& archive) : archive_(archive), info_(info_of(archive)) {
-  const auto& members = archive.members();
-  for (std::size_t i = 0; i < members.size(); ++i) {
-    const auto place = place_from_texture_name(info_, members[i].name);
-    if (place && archive.grid().contains(place->tile)) members_.emplace_back(slot(place->tile, place->level), i);
-  }
-  std::sort(members_.begin(), members_.end());
-}
+TextureReader::TextureReader(const ArchiveReader& archive) : archive_(archive), info_(info_of(archive)) {}
 
-std::uint64_t TextureReader::slot(TileIndex tile, int level) const {
-  return static_cast<std::uint64_t>(archive_.grid().flat_index(tile)) * static_cast<std::uint64_t>(info_.levels) +
-         static_cast<std::uint64_t>(level);
-}
-
-const MemberEntry* TextureReader::member(TileIndex tile, int level) const {
-  if (!archive_.grid().contains(tile) || level < 0 || level >= info_.levels) return nullptr;
-  const std::pair<std::uint64_t, std::uint64_t> wanted{slot(tile, level), 0};
-  const auto found = std::lower_bound(members_.begin(), members_.end(), wanted);
-  if (found == members_.end() || found->first != wanted.first) return nullptr;
-  return &archive_.members()[found->second];
+std::optional<MemberEntry> TextureReader::member(TileIndex tile, int level) const {
+  if (!archive_.grid().contains(tile) || level < 0 || level >= info_.levels) return std::nullopt;
+  return archive_.find_member(texture_name(info_, tile, level));
 }
 
 bool TextureReader::has(TileIndex tile, int level) const {
-  return member(tile, level) != nullptr;
+  return member(tile, level).has_value();
 }
 
 Picture TextureReader::read(TileIndex tile, int level) const {
-  const MemberEntry* const found = member(tile, level);
-  if (found == nullptr) {
+  const auto found = member(tile, level);
+  if (!found) {
     throw Error(ErrorCode::kInvalidArgument, fmt::format("{}: tile ({},{}) has no texture of level {}", archive_.path(),
                                                          tile.column, tile.row, level));
   }

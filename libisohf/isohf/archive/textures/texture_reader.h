@@ -30,14 +30,10 @@ class TextureReader {
   [[nodiscard]] Picture read_rgba(TileIndex tile, int level) const;
 
  private:
-  [[nodiscard]] std::uint64_t slot(TileIndex tile, int level) const;
-  /// nullptr where there is none.
-  [[nodiscard]] const MemberEntry* member(TileIndex tile, int level) const;
+  [[nodiscard]] std::optional<MemberEntry> member(TileIndex tile, int level) const;
 
   const ArchiveReader& archive_;
   TextureInfo info_;
-  /// Tile and level as one number, and the place in archive.members(), in ascending order.
-  std::vector<std::pair<std::uint64_t, std::uint64_t>> members_;
 };
 
 }  // namespace isohf
