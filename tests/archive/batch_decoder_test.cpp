@@ -30,7 +30,8 @@ std::vector<std::byte> payload_of(const EncodedTile& tile) {
 }
 
 std::vector<std::byte> payload_of(const TileShape& shape, CodeType type, Kind kind, std::uint32_t seed) {
-  return payload_of(encode_tile(shape, test::make_tile(shape, type, kind, seed)));
+  return payload_of(
+      encode_tile(shape, test::make_tile(shape, type, kind, seed), kDefaultLevel, PayloadVersion::kFirst));
 }
 
 /// What the plain decoder says: the tile, or nothing where it refuses.
@@ -89,7 +90,7 @@ TEST(BatchDecoder, GivesWhatThePlainDecoderGivesForPredictorsOfEveryKind) {
     const TileCodes tile = test::make_halves(shape, type);
     std::vector<std::vector<std::byte>> payloads;
     for (const int level : {kMinLevel, kDefaultLevel, kMaxLevel})
-      payloads.push_back(payload_of(encode_tile(shape, tile, level)));
+      payloads.push_back(payload_of(encode_tile(shape, tile, level, PayloadVersion::kFirst)));
     EXPECT_GT(std::to_integer<int>(payloads[1][28]), 1);
     payloads.push_back(payload_of(shape, type, Kind::kVoidNoise, 1));
     for (std::size_t begin = 0; begin < payloads.size(); ++begin) {  // with and without the others beside it

@@ -150,6 +150,175 @@ def decode(payload, columns, rows, kind):
     return out, dropped
 
 
+def first_table(of_class):
+    j = 1 if of_class >= 15 else (17 - of_class) // 2
+    weights = [(32768 >> min(31, s * j)) + 1 for s in range(16)]
+    return finish([w * 16380 // sum(weights) for w in weights])
+
+
+def finish(shares):
+    """Symbols 1 to 3 and 15 get one slot more, symbol 0 what is left."""
+    slots = [0] + [share + (s in (1, 2, 3, 15)) for s, share in enumerate(shares) if s]
+    slots[0] = 16384 - sum(slots)
+    return slots
+
+
+def mixed(counts, parent):
+    inverse = (2**31 - 2**19) // (sum(counts) + 8)
+    return finish([(c * inverse >> 17) + (p * (inverse >> 12) >> 16) for c, p in zip(counts, parent)])
+
+
+class Model:
+    """Slots of symbols by context: (class, quarter, pattern), without the pattern, or (class,) above class 15."""
+
+    def __init__(self):
+        self.slots, self.counts, self.waiting, self.bands = {}, {}, {}, 0
+
+    def table(self, context):
+        for key in (context, context[:2]):
+            if key in self.slots:
+                return self.slots[key]
+        return first_table(context[0])
+
+    def count(self, context, symbol):
+        for key in {context, context[:2]}:
+            self.waiting.setdefault(key, [0] * 16)[symbol] += 1
+
+    def end_band(self):
+        self.bands += 1
+        shift = max(0, self.bands.bit_length() - 3)
+        if self.bands >> shift << shift != self.bands:
+            return
+        for key in sorted(self.waiting, key=len):
+            self.counts[key] = [a + b for a, b in zip(self.counts.get(key, [0] * 16), self.waiting[key])]
+            parent = self.table(key[:2]) if len(key) == 3 else first_table(key[0])
+            self.slots[key] = mixed(self.counts[key], parent)
+        self.waiting = {}
+
+
+def decode_adaptive(payload, columns, rows, kind):
+    """The same of codec version 2."""
+    _, found_kind, flags, low, high, base = struct.unpack_from("<BBBHHH", payload)
+    assert found_kind == kind and flags < 16
+    at = 9
+
+    def number():
+        nonlocal at
+        value, shift = 0, 0
+        while True:
+            at += 1
+            value |= (payload[at - 1] & 127) << shift
+            shift += 7
+            if payload[at - 1] < 128:
+                return value
+
+    weights = FIXED[2]
+    if flags & 2:
+        n = 18 if flags & 4 else 12
+        weights = struct.unpack_from("<%dh" % n, payload, at)
+        at += 2 * n
+    mask = [0] * (columns * rows)
+    if flags & 1:
+        size = number()
+        mask = void_mask(payload[at : at + size], columns * rows)
+        at += size
+    states = list(struct.unpack_from("<%dI" % (8 if flags & 8 else 1), payload, at))
+    at += 4 * len(states)
+    size = number()
+    words = iter(struct.unpack_from("<%dH" % size, payload, at))
+    extra = Bits(payload[at + 2 * size :])
+    model = Model()
+    out = [None] * (columns * rows)
+
+    def take(i, eighths, energy, pattern):
+        """The sample that a prediction and the next symbol give, by the rules of row i of the band."""
+        code = (eighths + 4) >> 3
+        off = eighths - 8 * code
+        above, quarter = off >= 0, off if off >= 0 else -1 - off
+        if energy == 0:
+            k = 0
+        else:
+            octave = energy.bit_length() - 1
+            k = 1 + 2 * octave + (energy >> (octave - 1) & 1 if octave else 0)
+        context = (k, quarter, pattern if above else -pattern) if k <= 15 else (k,)
+        slots = model.table(context)
+        state = states[i % len(states)]
+        slot, symbol, start = state % 16384, 0, 0
+        while start + slots[symbol] <= slot:
+            start += slots[symbol]
+            symbol += 1
+        state = slots[symbol] * (state >> 14) + slot - start
+        if state < 65536:
+            state = state << 16 | next(words)
+        states[i % len(states)] = state
+        model.count(context, symbol)
+        if symbol < 15:
+            bits = max(0, (k - 15) // 2)
+            zigzagged = symbol << bits | extra.take(bits)
+        else:
+            bits = extra.take(5)
+            zigzagged = (1 << bits | extra.take(bits)) - 1
+        difference = zigzagged // 2 if zigzagged % 2 == 0 else -(zigzagged + 1) // 2
+        value = (code - difference if above else code + difference) % 65536
+        assert low <= value <= high
+        return value
+
+    def compared(a, b):
+        return (a > b) - (a < b)
+
+    places = range(-3, columns + 3)
+    V = {r: dict.fromkeys(places, base) for r in (-3, -2, -1)}
+    D = {r: dict.fromkeys(places, 0) for r in (-2, -1)}
+    for top in range(0, rows, 8):
+        band = range(top, min(top + 8, rows))
+        for t in range(columns + 25):
+            for r in band:
+                s = r % 2
+                p = t - (7 * (r - top) + 1) // 2
+                first, last = (0, columns - 1) if s else (1, columns - 2)
+                if not first <= p <= last:
+                    continue
+                if p == first:
+                    V[r] = {p - 2: V[r - 1][p + s], p - 1: V[r - 1][p + s]}
+                    D[r] = {p - 2: 0, p - 1: 0}
+                v, near, far, farther, d, n, f = V[r], V[r - 1], V[r - 2], V[r - 3], D[r], D[r - 1], D[r - 2]
+                column = {1: 0, columns - 2: columns - 1}.get(p, p) if not s else p
+                ne = near[p + s]
+                if mask[r * columns + column]:
+                    v[p], d[p] = (v[p - 1] + ne) >> 1, 0
+                else:
+                    w = FIXED.get(r) or weights
+                    neighbours = [v[p - 1], near[p + s - 1], v[p - 2], near[p + s + 1], near[p + s - 2], far[p],
+                                  far[p + 1], far[p - 1], far[p + 2], far[p - 2], farther[p + s], farther[p + s - 1],
+                                  farther[p + s + 1], farther[p + s - 2], near[p + s + 2], near[p + s - 3], far[p + 3],
+                                  far[p - 3]] if len(w) > 12 else [v[p - 1], near[p + s - 1], v[p - 2], near[p + s + 1],
+                                  near[p + s - 2], far[p], far[p + 1], far[p - 1], far[p + 2], far[p - 2],
+                                  farther[p + s], farther[p + s - 1]]
+                    total = 4096 * ne + sum(a * (b - ne) for a, b in zip(w, neighbours))
+                    eighths = min(max(total >> 9, 8 * low), 8 * high)
+                    energy = (4 * (n[p + s] + n[p + s - 1] + f[p]) + 3 * n[p + s + 1]
+                              + 2 * (n[p + s + 2] + n[p + s - 2] + f[p + 1] + f[p - 1])
+                              + n[p + s - 3] + f[p + 2] + f[p - 2] + 6 * d[p - 1] + 3 * d[p - 2])
+                    pattern = (27 * compared(v[p - 1], ne) + 9 * compared(near[p + s - 1], ne)
+                               + 3 * compared(near[p + s + 1], ne) + compared(near[p + s - 2], ne))
+                    v[p] = take(r - top, eighths, energy, pattern)
+                    d[p] = min(abs(8 * v[p] - eighths), 65535)
+                    out[r * columns + column] = v[p]
+                for row in (v, d):
+                    if p == first + 1:
+                        row.update({q: row[first] for q in places if q < first})
+                    if p == last:
+                        row.update({q: row[last] for q in places if q > last})
+        for r in band[::2]:
+            for c, p in (1, 1), (columns - 2, columns - 3):
+                if not mask[r * columns + c]:
+                    out[r * columns + c] = take(r - top, 4 * (V[r][p] + V[r][p + 1]), 17 * (D[r][p] + D[r][p + 1]), 0)
+        model.end_band()
+    assert next(words, None) is None and set(states) == {65536}
+    assert (extra.at + 7) // 8 == len(payload) - at - 2 * size
+    return out, 0
+
+
 def pack(values, dropped, kind):
     if kind < 2:
         void = (65535, 255)[kind]
@@ -219,7 +388,7 @@ def main(path):
             assert flags & 1
             payload = zlib.decompress(data[offset : offset + compressed], wbits=-15)
             assert len(payload) == inflated and zlib.crc32(payload) == crc
-            values, dropped = decode(payload, columns, rows, kind)
+            values, dropped = (decode if payload[0] == 1 else decode_adaptive)(payload, columns, rows, kind)
             stored += 1
         digest = hashlib.sha256(pack(values, dropped, kind)).digest()
         assert tile not in records or records[tile][1] == digest

@@ -180,7 +180,8 @@ TEST(TileCodec, RefusesEveryWrongHeaderField) {
   };
   const CodeType type = CodeType::kU16;
   expect_error(shape, type, with(0, {0}), ErrorCode::kCorrupt);  // version
-  expect_error(shape, type, with(0, {2}), ErrorCode::kUnsupported);
+  expect_error(shape, type, with(0, {2}), ErrorCode::kCorrupt);  // one of version 1, read as version 2
+  expect_error(shape, type, with(0, {3}), ErrorCode::kUnsupported);
   expect_error(shape, type, with(0, {255}), ErrorCode::kUnsupported);
   expect_error(shape, type, with(1, {1}), ErrorCode::kCorrupt);  // sample type
   expect_error(shape, type, with(1, {9}), ErrorCode::kCorrupt);

@@ -43,6 +43,13 @@ class Bench:
         return {"wall_s": wall, "cpu_s": float(user) + float(system), "peak_mb": float(peak) / 1024,
                 "out": result.stdout}
 
+    def run_plainly(self, *command):
+        """Standard output alone; several may run at once."""
+        result = subprocess.run([*map(str, command)], capture_output=True, text=True, check=False)
+        if result.returncode != 0:
+            self.fail(f"{' '.join(map(str, command))}: {result.stderr.strip()}")
+        return result.stdout
+
     def cores(self):
         return len(os.sched_getaffinity(0))
 
@@ -89,6 +96,9 @@ class Bench:
 
     def info(self, archive):
         return json.loads(self.run(self.isohf, "info", archive, "--json")["out"])
+
+    def info_plainly(self, archive):
+        return json.loads(self.run_plainly(self.isohf, "info", archive, "--json"))
 
     def add(self, section, header, rows, note):
         lines = ["| " + " | ".join(header) + " |", "|" + "---|" * len(header)]

@@ -4,10 +4,14 @@
 
 #include <algorithm>
 
+#include "isohf/archive/codec/adaptive/adaptive_decoder.h"
+#include "isohf/archive/codec/adaptive/adaptive_payload.h"
 #include "isohf/archive/codec/predict/context_energy.h"
 #include "isohf/archive/codec/predict/hex_predictor.h"
+#include "isohf/archive/codec/residuals/bits.h"
 #include "isohf/archive/codec/residuals/residual_symbols.h"
 #include "isohf/archive/codec/simd/batch_decoder.h"
+#include "isohf/archive/codec/simd/wavefront_decoder.h"
 #include "isohf/archive/codec/tile_payload.h"
 
 namespace isohf {
@@ -16,36 +20,6 @@ namespace {
 [[noreturn]] void refuse(const std::string& why) {
   throw Error(ErrorCode::kCorrupt, "tile payload: " + why);
 }
-
-/// Bits from a span, the lowest of a byte first; zeros past its end.
-class BitReader {
- public:
-  explicit BitReader(std::span<const std::byte> bytes) : bytes_(bytes.begin(), bytes.end()), end_(8 * bytes.size()) {
-    bytes_.resize(bytes.size() + sizeof(std::uint64_t));
-  }
-
-  /// Up to 32 bits.
-  std::uint32_t take(unsigned count) {
-    const std::uint64_t bits = rest();
-    position_ += count;
-    return static_cast<std::uint32_t>(bits & ((std::uint64_t{1} << count) - 1));
-  }
-
-  [[nodiscard]] bool ran_out() const { return position_ > end_; }
-  /// True where all bytes were used and the bits left over in the last one are zero.
-  [[nodiscard]] bool is_used_up() const { return end_ - position_ < 8 && rest() == 0; }
-
- private:
-  [[nodiscard]] std::uint64_t rest() const {
-    std::uint64_t bits = 0;
-    if (position_ < end_) std::memcpy(&bits, bytes_.data() + position_ / 8, sizeof(bits));
-    return bits >> position_ % 8;
-  }
-
-  std::vector<std::byte> bytes_;
-  std::uint64_t end_;
-  std::uint64_t position_ = 0;
-};
 
 /// The zigzagged residuals of all contexts: symbols and extra bits put together.
 class ResidualReader {
@@ -224,6 +198,7 @@ TileCodes decode_checked(const TileShape& shape, CodeType type, std::span<const 
   if (payload.size() > max_payload_bytes(shape, type)) {
     refuse(fmt::format("{} bytes, more than a tile of this shape can have", payload.size()));
   }
+  if (is_adaptive(payload)) return decode_adaptive(shape, type, payload);
   ByteReader reader(payload);
   PayloadHeader header = read_payload_header(shape, type, reader);
   const auto samples = static_cast<std::size_t>(shape.stored_vertex_count());
@@ -258,6 +233,12 @@ TileCodes decode_tile_slowly(const TileShape& shape, CodeType type, std::span<co
 TileCodes decode_tile(const TileShape& shape, CodeType type, std::span<const std::byte> payload) {
   if (type == CodeType::kF32) return decode_tile_slowly(shape, type, payload);  // one lane of eight would take longer
   TileCodes tile;
+  if (is_adaptive(payload) && payload.size() <= max_payload_bytes(shape, type)) {
+    tile.type = type;
+    tile.codes.resize(static_cast<std::size_t>(shape.stored_vertex_count()));
+    if (decode_wavefront(shape, read_adaptive_payload(shape, type, payload), tile)) return tile;
+    return decode_tile_slowly(shape, type, payload);
+  }
   bool is_decoded = false;
   decode_batch(shape, type, {&payload, 1}, {&tile, 1}, {&is_decoded, 1});
   return is_decoded ? tile : decode_tile_slowly(shape, type, payload);

@@ -4,7 +4,9 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <type_traits>
 
+#include "isohf/archive/codec/adaptive/adaptive_encoder.h"
 #include "isohf/archive/codec/predict/context_energy.h"
 #include "isohf/archive/codec/predict/hex_predictor.h"
 #include "isohf/archive/codec/predict/predictor_fit.h"
@@ -36,6 +38,25 @@ constexpr std::array<CodingEffort, kMaxLevel> kEfforts = {{
     {.fit = {2, 3, 2, 4, 1, 4, true}, .streams = {1, true}},
     {.fit = {2, 1, 2, 8, 1, 6, true}, .streams = {1, true}},
 }};
+
+/// What payloads of version 2 are worth: one predictor, as what is learnt does what several would. Each level tries what
+/// those below try.
+constexpr std::array<FitEffort, kMaxLevel> kAdaptiveEfforts = {{
+    {0, 1, 1, 0, 1, 0, false},
+    {1, 15, 1, 0, 1, 0, false},
+    {1, 9, 1, 0, 1, 0, false},
+    {2, 15, 1, 0, 1, 0, false},
+    {2, 9, 1, 0, 1, 0, false},
+    {2, 5, 1, 0, 1, 0, false},
+    {3, 3, 1, 0, 1, 0, false},
+    {2, 5, 1, 0, 1, 0, true},
+    {3, 3, 1, 0, 1, 0, true},
+    {4, 3, 1, 0, 1, 0, true},
+    {6, 1, 1, 0, 1, 0, true},
+    {8, 1, 1, 0, 1, 0, true},
+}};
+constexpr int kFirstTryingLevel = 6;        ///< from here on all efforts from this level to the one asked for are tried
+constexpr std::int64_t kFewSamples = 1024;  ///< below, there is little to learn from
 
 /// The void mask, as 0 and 1; empty where nothing is void.
 template <typename Sample, typename IsVoid>
@@ -165,9 +186,42 @@ void assemble(PayloadHeader& header, std::span<const std::byte> mask, const Stre
   writer.finish();
 }
 
+/// What encode_tile was asked for.
+struct Request {
+  int level;
+  PayloadVersion version;
+};
+
+/// A payload of version 2; false where it would be longer than a tile's may be.
+bool encode_adaptively(const TileShape& shape, const PayloadHeader& header, std::vector<std::uint8_t> voids,
+                       Lattice<std::int32_t>& lattice, int level, EncodedTile& tile) {
+  AdaptivePayload payload;
+  payload.type = header.type;
+  payload.low = header.low;
+  payload.high = header.high;
+  payload.base = header.base;
+  payload.is_void = std::move(voids);
+  std::vector<std::byte> best;
+  for (int tried = std::min(level, kFirstTryingLevel - 1); tried <= level; ++tried) {
+    const FitEffort& fit = kAdaptiveEfforts[static_cast<std::size_t>(tried - kMinLevel)];
+    payload.predictors = fit_predictors<std::int32_t>(lattice, header.low, header.high, fit);
+    payload.has_weights = payload.predictors.weights.front() != kThirdRowWeights;
+    std::vector<std::byte> bytes = encode_adaptive(lattice, payload);
+    if (best.empty() || bytes.size() < best.size()) best = std::move(bytes);
+  }
+  if (best.size() > max_payload_bytes(shape, header.type)) return false;
+  DeflateWriter writer(tile.deflated);
+  writer.add(best);
+  writer.finish();
+  tile.payload_crc32 = crc32(best);
+  tile.payload_bytes = static_cast<std::uint32_t>(best.size());
+  return true;
+}
+
 template <typename Wide, typename Zigzagged, typename SampleAt>
 void encode_samples(const TileShape& shape, PayloadHeader header, std::span<const std::uint8_t> voids,
-                    const SampleAt& sample_at, const CodingEffort& effort, EncodedTile& tile) {
+                    const SampleAt& sample_at, const Request& request, EncodedTile& tile) {
+  const CodingEffort effort = coding_effort(request.level);
   std::vector<std::byte> mask;
   if (!voids.empty()) mask = pack_void_mask(voids);
   header.has_voids = !mask.empty();
@@ -176,6 +230,13 @@ void encode_samples(const TileShape& shape, PayloadHeader header, std::span<cons
   if (!header.is_constant) {
     Lattice<Wide> lattice(shape);
     load<Wide>(lattice, voids, header.base, sample_at);
+    if constexpr (std::is_same_v<Wide, std::int32_t>) {
+      const bool is_wanted = request.version == PayloadVersion::kBest ? shape.stored_vertex_count() >= kFewSamples
+                                                                      : request.version == PayloadVersion::kAdaptive;
+      if (is_wanted && encode_adaptively(shape, header, {voids.begin(), voids.end()}, lattice, request.level, tile)) {
+        return;
+      }
+    }
     header.predictors = fit_predictors<Wide>(lattice, header.low, header.high, effort.fit);
     Residuals<Zigzagged> residuals(static_cast<std::size_t>(shape.stored_vertex_count()), !voids.empty());
     find_residuals<Wide, Zigzagged>(lattice, voids, header, residuals);
@@ -208,7 +269,7 @@ ISOHF_KERNEL CodeRange range_of_codes(const std::uint16_t* codes, std::size_t co
   return {low, high, voids};
 }
 
-EncodedTile encode_codes(const TileShape& shape, const TileCodes& tile, const CodingEffort& effort) {
+EncodedTile encode_codes(const TileShape& shape, const TileCodes& tile, const Request& request) {
   const std::span<const std::uint16_t> codes = tile.codes;
   const Quantisation quantisation{tile.type, 0.0, 1.0};
   const auto void_code = static_cast<std::uint16_t>(quantisation.void_code());
@@ -230,7 +291,7 @@ EncodedTile encode_codes(const TileShape& shape, const TileCodes& tile, const Co
   encoded.code_max = static_cast<std::uint32_t>(header.high);
   encode_samples<std::int32_t, std::uint16_t>(
       shape, header, find_voids(codes, range.voids, is_void), [&](std::size_t i) { return std::int32_t{codes[i]}; },
-      effort, encoded);
+      request, encoded);
   return encoded;
 }
 
@@ -270,7 +331,7 @@ ISOHF_KERNEL CodeRange order_floats(const float* heights, std::size_t count, uns
   return {low, high, 0};
 }
 
-EncodedTile encode_floats(const TileShape& shape, const TileCodes& tile, const CodingEffort& effort) {
+EncodedTile encode_floats(const TileShape& shape, const TileCodes& tile, const Request& request) {
   const std::span<const float> heights = tile.heights;
   const FloatBits bits = vectorised<bits_of_floats>(heights.data(), heights.size());
   EncodedTile encoded;
@@ -293,7 +354,7 @@ EncodedTile encode_floats(const TileShape& shape, const TileCodes& tile, const C
   encoded.code_max = std::bit_cast<std::uint32_t>(float_from_ordered(header.high, header.dropped_bits));
   encode_samples<std::int64_t, std::uint32_t>(
       shape, header, find_voids(heights, bits.voids, is_void),
-      [&](std::size_t i) { return std::int64_t{ordered.data()[i]}; }, effort, encoded);
+      [&](std::size_t i) { return std::int64_t{ordered.data()[i]}; }, request, encoded);
   return encoded;
 }
 
@@ -319,13 +380,14 @@ TileCodes void_tile(const TileShape& shape, const Quantisation& quantisation) {
   return tile;
 }
 
-EncodedTile encode_tile(const TileShape& shape, const TileCodes& tile, int level) {
+EncodedTile encode_tile(const TileShape& shape, const TileCodes& tile, int level, PayloadVersion version) {
   const auto samples = static_cast<std::size_t>(shape.stored_vertex_count());
   const bool is_float = tile.type == CodeType::kF32;
   ISOHF_ASSERT(tile.codes.size() == (is_float ? 0 : samples) && tile.heights.size() == (is_float ? samples : 0));
   try {
-    const CodingEffort effort = coding_effort(level);
-    return is_float ? encode_floats(shape, tile, effort) : encode_codes(shape, tile, effort);
+    static_cast<void>(coding_effort(level));
+    const Request request{level, version};
+    return is_float ? encode_floats(shape, tile, request) : encode_codes(shape, tile, request);
   } catch (const std::bad_alloc&) {
     throw Error(ErrorCode::kOutOfMemory, "no memory to code a tile of " + std::to_string(samples) + " samples");
   }

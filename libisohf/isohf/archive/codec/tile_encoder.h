@@ -15,9 +15,13 @@ struct CodingEffort {
 /// The effort of a level. Throws Error{kInvalidArgument} where it is not kMinLevel to kMaxLevel.
 [[nodiscard]] CodingEffort coding_effort(int level);
 
-/// Codes one tile: hexagonal prediction, residuals in context streams, Deflate. Deterministic; thread-safe.
-/// `tile` holds shape.stored_vertex_count() samples; `level` is kMinLevel to kMaxLevel. Never fails on data; throws
-/// Error{kOutOfMemory}, and Error{kInvalidArgument} for another level.
-[[nodiscard]] EncodedTile encode_tile(const TileShape& shape, const TileCodes& tile, int level = kDefaultLevel);
+/// The versions of payloads. Floats, samples that are all equal and tiles of few samples have version 1, others 2.
+enum class PayloadVersion : std::uint8_t { kBest, kFirst, kAdaptive };
+
+/// Codes one tile: hexagonal prediction, residuals in contexts, Deflate. Deterministic; thread-safe.
+/// `tile` holds shape.stored_vertex_count() samples; `level` is kMinLevel to kMaxLevel; `version` is for tests: kAdaptive
+/// also for few samples. Never fails on data; throws Error{kOutOfMemory}, and Error{kInvalidArgument} for another level.
+[[nodiscard]] EncodedTile encode_tile(const TileShape& shape, const TileCodes& tile, int level = kDefaultLevel,
+                                      PayloadVersion version = PayloadVersion::kBest);
 
 }  // namespace isohf

@@ -109,7 +109,7 @@ PayloadHeader read_payload_header(const TileShape& shape, CodeType type, ByteRea
   if (version != kCodecVersion) {
     if (version == 0) refuse("its codec version is 0");
     throw Error(ErrorCode::kUnsupported,
-                fmt::format("tile codec version {}; this build reads version {}", version, kCodecVersion));
+                fmt::format("tile codec version {}; this build reads versions 1 and 2", version));
   }
   PayloadHeader header;
   header.type = type;

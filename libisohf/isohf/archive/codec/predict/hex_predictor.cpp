@@ -25,26 +25,31 @@ struct WeightedRows {
   }
 };
 
+/// What is wanted of a sum: predict_row, predict_row_from_above, predict_row_in_eighths.
+enum class Wanted : std::uint8_t { kHalves, kAbove, kEighths };
+
 /// Whether a weight takes part in a sum: in that of the rows above all do but W's and WW's.
 constexpr bool takes_part(std::size_t weight, bool is_above) {
   return !is_above || (weight != 0 && weight != 2);
 }
 
-/// predict_row, or predict_row_from_above, for the first kTerms weights. `out` is none of the lattice's rows. Sums of
-/// codes are taken modulo 2^32, which they leave in part but not in whole.
-template <std::size_t kTerms, bool kIsAbove>
+/// What is wanted for the first kTerms weights. `out` is none of the lattice's rows. Sums of codes are taken modulo
+/// 2^32, which they leave in part but not in whole.
+template <std::size_t kTerms, Wanted kWanted>
 ISOHF_KERNEL void predict_codes(const Neighbours<std::int32_t>& at, const PredictorWeights& weights, int begin, int end,
                                 std::int32_t low, std::int32_t high, std::int32_t* __restrict out) {
   const WeightedRows<kTerms, std::int32_t, std::uint32_t> rows(at, weights);
-  const std::int32_t least = 2 * low;
-  const std::int32_t most = 2 * high - 1;
+  constexpr bool kIsAbove = kWanted == Wanted::kAbove;
+  constexpr bool kIsFine = kWanted == Wanted::kEighths;
+  const std::int32_t least = kIsFine ? 8 * low : 2 * low;
+  const std::int32_t most = kIsFine ? 8 * high : 2 * high - 1;
   for (int c = begin; c < end; ++c) {
     std::uint32_t sum = rows.anchor * static_cast<std::uint32_t>(at.north[c]);
     for (std::size_t i = 0; i < kTerms; ++i) {
       if (takes_part(i, kIsAbove)) sum += rows.w[i] * static_cast<std::uint32_t>(rows.from[i][c]);
     }
-    const std::int32_t halves = static_cast<std::int32_t>(sum) >> kHalvesBits;
-    const std::int32_t raised = halves < least ? least : halves;
+    const std::int32_t prediction = static_cast<std::int32_t>(sum) >> (kIsFine ? kWeightBits - 3 : kHalvesBits);
+    const std::int32_t raised = prediction < least ? least : prediction;
     out[c] = kIsAbove ? static_cast<std::int32_t>(sum) : raised > most ? most : raised;
   }
 }
@@ -79,14 +84,15 @@ ISOHF_KERNEL void predict_floats(const Neighbours<std::int64_t>& at, const Predi
   }
 }
 
-template <bool kIsAbove, typename Wide>
+template <Wanted kWanted, typename Wide>
 void predict(const Lattice<Wide>& lattice, int r, const Predictors& predictors, Wide low, Wide high, Wide* out) {
   const Neighbours at(lattice, r);
   predictors.for_stretches(r, at.first, at.last, [&](const PredictorWeights& weights, int begin, int end) {
     const auto predict_stretch = [&](auto terms) {
       if constexpr (std::is_same_v<Wide, std::int32_t>) {
-        vectorised<predict_codes<terms, kIsAbove>>(at, weights, begin, end, low, high, out);
+        vectorised<predict_codes<terms, kWanted>>(at, weights, begin, end, low, high, out);
       } else {
+        constexpr bool kIsAbove = kWanted == Wanted::kAbove;
         vectorised<predict_floats<false, terms, kIsAbove>, predict_floats<true, terms, kIsAbove>>(at, weights, begin,
                                                                                                   end, low, high, out);
       }
@@ -108,11 +114,15 @@ ISOHF_KERNEL void zigzag_samples(const Wide* own, const Wide* halves, int count,
 template <typename Wide>
 void predict_row(const Lattice<Wide>& lattice, int r, const Predictors& predictors, Wide low, Wide high,
                  std::span<Wide> halves) {
-  predict<false>(lattice, r, predictors, low, high, halves.data());
+  predict<Wanted::kHalves>(lattice, r, predictors, low, high, halves.data());
 }
 template <typename Wide>
 void predict_row_from_above(const Lattice<Wide>& lattice, int r, const Predictors& predictors, std::span<Wide> parts) {
-  predict<true>(lattice, r, predictors, Wide{0}, Wide{0}, parts.data());
+  predict<Wanted::kAbove>(lattice, r, predictors, Wide{0}, Wide{0}, parts.data());
+}
+void predict_row_in_eighths(const Lattice<std::int32_t>& lattice, int r, const Predictors& predictors, std::int32_t low,
+                            std::int32_t high, std::span<std::int32_t> eighths) {
+  predict<Wanted::kEighths>(lattice, r, predictors, low, high, eighths.data());
 }
 template void predict_row(const Lattice<std::int32_t>&, int, const Predictors&, std::int32_t, std::int32_t,
                           std::span<std::int32_t>);

@@ -37,11 +37,10 @@ struct Neighbours {
         last(lattice.last(r)) {}
 
   /// The samples that weight i belongs to, indexed by place.
-  [[nodiscard]] const Wide* of_weight(std::size_t i) const {
-    const std::array<const Wide*, kWeightCount> all = {
-        own - 1, north - 1, own - 2,     north + 1,   north - 2,   far,       far + 1,   far - 1, far + 2,
-        far - 2, farther,   farther - 1, farther + 1, farther - 2, north + 2, north - 3, far + 3, far - 3};
-    return all[i];
+  [[nodiscard]] const Wide* of_weight(std::size_t i) const { return of_all_weights()[i]; }
+  [[nodiscard]] std::array<const Wide*, kWeightCount> of_all_weights() const {
+    return {own - 1, north - 1, own - 2,     north + 1,   north - 2,   far,       far + 1,   far - 1, far + 2,
+            far - 2, farther,   farther - 1, farther + 1, farther - 2, north + 2, north - 3, far + 3, far - 3};
   }
 };
 
@@ -50,6 +49,10 @@ struct Neighbours {
 template <typename Wide>
 void predict_row(const Lattice<Wide>& lattice, int r, const Predictors& predictors, Wide low, Wide high,
                  std::span<Wide> halves);
+
+/// The same of codes in eighths of a code, rounded down, within 8*low ... 8*high.
+void predict_row_in_eighths(const Lattice<std::int32_t>& lattice, int r, const Predictors& predictors, std::int32_t low,
+                            std::int32_t high, std::span<std::int32_t> eighths);
 
 /// The part of a prediction that the rows above decide, by place: halves = (part + wW*W + wWW*WW) >> (kWeightBits - 1),
 /// limited to 2*low ... 2*high-1.

@@ -60,8 +60,16 @@ class Lattice {
   }
   /// What the rows below find in the margins of row r: its outermost samples again.
   void close_row(int r) {
+    close_west(r);
+    close_east(r);
+  }
+  /// Either side alone; the West once the row's first two samples are known.
+  void close_west(int r) {
     Wide* const samples = row(r);
     for (int place = -kMargin; place < first(r); ++place) samples[place] = samples[first(r)];
+  }
+  void close_east(int r) {
+    Wide* const samples = row(r);
     for (int place = last(r) + 1; place < columns_ + kMargin; ++place) samples[place] = samples[last(r)];
   }
   /// What a slid vertex is predicted as: the mean of its two neighbours on the row, rounded down.

@@ -1,10 +1,10 @@
 #include "isohf/archive/codec/residuals/residual_streams.h"
 
 #include <bit>
-#include <cstring>
 #include <type_traits>
 
 #include "isohf/archive/codec/predict/context_energy.h"
+#include "isohf/archive/codec/residuals/bits.h"
 #include "isohf/archive/codec/residuals/pair_coding.h"
 #include "isohf/archive/codec/residuals/residual_symbols.h"
 #include "isohf/base/simd.h"
@@ -35,42 +35,6 @@ ISOHF_KERNEL void find_symbols(const Zigzagged* __restrict zigzagged, std::size_
     symbols[i] = static_cast<std::uint8_t>(value < Value{kFirstSplitSymbol} ? value : split);
   }
 }
-
-/// Bits one after the other, the lowest of a byte first.
-class BitPacker {
- public:
-  /// `most_bytes` is the most that will come.
-  explicit BitPacker(std::size_t most_bytes) : room_(most_bytes + 8), to_(room_.data()) {}
-
-  void put(std::uint32_t bits, unsigned count) {
-    bits_ |= std::uint64_t{bits} << bit_count_;
-    bit_count_ += count;
-    if (bit_count_ < 32) return;
-    std::memcpy(to_, &bits_, 4);
-    to_ += 4;
-    bits_ >>= 32U;
-    bit_count_ -= 32;
-  }
-  /// As many as 56 bits; where all are put so.
-  void put_many(std::uint64_t bits, unsigned count) {
-    bits_ |= bits << bit_count_;
-    std::memcpy(to_, &bits_, 8);
-    bit_count_ += count;
-    to_ += bit_count_ / 8;
-    bits_ >>= bit_count_ / 8 * 8;
-    bit_count_ %= 8;
-  }
-  [[nodiscard]] std::vector<std::byte> finish() {
-    std::memcpy(to_, &bits_, 8);
-    return {room_.data(), to_ + (bit_count_ + 7) / 8};
-  }
-
- private:
-  Scratch<std::byte> room_;
-  std::byte* to_;
-  std::uint64_t bits_ = 0;
-  unsigned bit_count_ = 0;
-};
 
 /// The extra bits of two neighbouring residuals of codes, together no more than 24, and how many these are.
 ISOHF_KERNEL void join_extra_bits(const std::uint16_t* __restrict zigzagged, std::size_t pairs,

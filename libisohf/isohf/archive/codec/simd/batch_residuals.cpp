@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "isohf/archive/codec/adaptive/adaptive_payload.h"
 #include "isohf/archive/codec/predict/context_energy.h"
 #include "isohf/archive/codec/predict/sample_lattice.h"
 #include "isohf/archive/codec/simd/residual_expander.h"
@@ -75,7 +76,7 @@ void take_lanes(const std::uint16_t* energies, const std::uint8_t* tables,
 
 template <typename Zigzagged>
 bool BatchPayload<Zigzagged>::open(const TileShape& shape, CodeType type, std::span<const std::byte> payload) {
-  if (payload.size() > max_payload_bytes(shape, type)) return false;
+  if (payload.size() > max_payload_bytes(shape, type) || is_adaptive(payload)) return false;
   ByteReader reader(payload);
   header = read_payload_header(shape, type, reader);
   if (header.is_constant) return false;

@@ -1,0 +1,81 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <span>
+#include <vector>
+
+#include "isohf/base/scratch.h"
+
+/// Numbers of some bits each, the lowest bit of a byte first.
+
+namespace isohf {
+
+/// Bits from a span, the lowest of a byte first; zeros past its end.
+class BitReader {
+ public:
+  explicit BitReader(std::span<const std::byte> bytes) : bytes_(bytes.begin(), bytes.end()), end_(8 * bytes.size()) {
+    bytes_.resize(bytes.size() + sizeof(std::uint64_t));
+  }
+
+  /// Up to 32 bits.
+  std::uint32_t take(unsigned count) {
+    const std::uint64_t bits = rest();
+    position_ += count;
+    return static_cast<std::uint32_t>(bits & ((std::uint64_t{1} << count) - 1));
+  }
+
+  [[nodiscard]] bool ran_out() const { return position_ > end_; }
+  /// True where all bytes were used and the bits left over in the last one are zero.
+  [[nodiscard]] bool is_used_up() const { return end_ - position_ < 8 && rest() == 0; }
+
+ private:
+  [[nodiscard]] std::uint64_t rest() const {
+    std::uint64_t bits = 0;
+    if (position_ < end_) std::memcpy(&bits, bytes_.data() + position_ / 8, sizeof(bits));
+    return bits >> position_ % 8;
+  }
+
+  std::vector<std::byte> bytes_;
+  std::uint64_t end_;
+  std::uint64_t position_ = 0;
+};
+
+/// Bits one after the other, the lowest of a byte first.
+class BitPacker {
+ public:
+  /// `most_bytes` is the most that will come.
+  explicit BitPacker(std::size_t most_bytes) : room_(most_bytes + 8), to_(room_.data()) {}
+
+  void put(std::uint32_t bits, unsigned count) {
+    bits_ |= std::uint64_t{bits} << bit_count_;
+    bit_count_ += count;
+    if (bit_count_ < 32) return;
+    std::memcpy(to_, &bits_, 4);
+    to_ += 4;
+    bits_ >>= 32U;
+    bit_count_ -= 32;
+  }
+  /// As many as 56 bits; where all are put so.
+  void put_many(std::uint64_t bits, unsigned count) {
+    bits_ |= bits << bit_count_;
+    std::memcpy(to_, &bits_, 8);
+    bit_count_ += count;
+    to_ += bit_count_ / 8;
+    bits_ >>= bit_count_ / 8 * 8;
+    bit_count_ %= 8;
+  }
+  [[nodiscard]] std::vector<std::byte> finish() {
+    std::memcpy(to_, &bits_, 8);
+    return {room_.data(), to_ + (bit_count_ + 7) / 8};
+  }
+
+ private:
+  Scratch<std::byte> room_;
+  std::byte* to_;
+  std::uint64_t bits_ = 0;
+  unsigned bit_count_ = 0;
+};
+
+}  // namespace isohf

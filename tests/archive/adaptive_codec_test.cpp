@@ -1,0 +1,164 @@
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <optional>
+#include <random>
+
+#include "isohf/archive/codec/adaptive/adaptive_decoder.h"
+#include "isohf/archive/codec/adaptive/adaptive_payload.h"
+#include "isohf/archive/codec/adaptive/symbol_model.h"
+#include "isohf/archive/codec/tile_decoder.h"
+#include "isohf/archive/codec/tile_encoder.h"
+#include "isohf/archive/codec/tile_payload.h"
+#include "isohf/archive/deflate/deflate.h"
+#include "isohf/base/simd.h"
+#include "isohf/error.h"
+#include "tiles.h"
+
+namespace isohf {
+namespace {
+
+using test::Kind;
+
+std::vector<std::byte> adaptive_payload(const TileShape& shape, const TileCodes& tile, int level = kDefaultLevel) {
+  const EncodedTile encoded = encode_tile(shape, tile, level, PayloadVersion::kAdaptive);
+  std::vector<std::byte> payload(encoded.payload_bytes);
+  inflate_exactly(encoded.deflated, payload);
+  return payload;
+}
+
+/// The tile, or nothing where it is refused.
+template <typename Decode>
+std::optional<TileCodes> decoded_by(const Decode& decode, const TileShape& shape, CodeType type,
+                                    std::span<const std::byte> payload) {
+  try {
+    return decode(shape, type, payload);
+  } catch (const Error&) {
+    return std::nullopt;
+  }
+}
+
+TEST(AdaptiveCodec, BringsBackEveryTileByBothDecodersWithAndWithoutSimd) {
+  for (const TileShape& shape : {TileShape::make(5, 5, 1), TileShape::make(6, 7, 1), TileShape::make(12, 11, 3),
+                                 TileShape::make(24, 29, 1), TileShape::make(300, 9, 1), TileShape::make(52, 67, 4)}) {
+    for (const CodeType type : {CodeType::kU16, CodeType::kU8}) {
+      for (const Kind kind : test::kAllKinds) {
+        if (kind == Kind::kConstant || kind == Kind::kAllVoid) continue;
+        for (const int level : {1, kDefaultLevel, kMaxLevel}) {
+          const TileCodes tile = test::make_tile(shape, type, kind, 7);
+          const std::vector<std::byte> payload = adaptive_payload(shape, tile, level);
+          EXPECT_LE(payload.size(), max_payload_bytes(shape, type));
+          if (!is_adaptive(payload)) continue;
+          ASSERT_EQ(decode_adaptive(shape, type, payload), tile) << shape.columns() << " " << static_cast<int>(kind);
+          ASSERT_EQ(decode_tile(shape, type, payload), tile) << shape.columns() << " " << static_cast<int>(kind);
+          set_simd(false);
+          EXPECT_EQ(decode_tile(shape, type, payload), tile);
+          EXPECT_EQ(adaptive_payload(shape, tile, level), payload);
+          set_simd(true);
+        }
+      }
+    }
+  }
+}
+
+TEST(AdaptiveCodec, IsWhatTilesOfManyCodesGet) {
+  const TileShape shape = TileShape::make(52, 67, 4);
+  for (const CodeType type : {CodeType::kU16, CodeType::kU8}) {
+    const EncodedTile encoded = encode_tile(shape, test::make_tile(shape, type, Kind::kTerrain, 1));
+    std::vector<std::byte> payload(encoded.payload_bytes);
+    inflate_exactly(encoded.deflated, payload);
+    EXPECT_TRUE(is_adaptive(payload));
+  }
+}
+
+TEST(AdaptiveCodec, RefusesByTheFastDecoderWhatThePlainOneRefuses) {
+  const TileShape shape = TileShape::make(12, 19, 1);
+  for (const Kind kind : {Kind::kTerrain, Kind::kTwoLevels, Kind::kVoidNoise}) {
+    std::vector<std::byte> payload = adaptive_payload(shape, test::make_tile(shape, CodeType::kU16, kind, 2));
+    ASSERT_TRUE(is_adaptive(payload));
+    std::size_t refused = 0;
+    for (std::size_t bit = 0; bit < 8 * payload.size(); ++bit) {
+      payload[bit / 8] ^= static_cast<std::byte>(1U << bit % 8);
+      const auto fast = decoded_by(decode_tile, shape, CodeType::kU16, payload);
+      ASSERT_EQ(fast, decoded_by(decode_tile_slowly, shape, CodeType::kU16, payload)) << bit;
+      refused += fast ? 0 : 1;
+      payload[bit / 8] ^= static_cast<std::byte>(1U << bit % 8);
+    }
+    EXPECT_GT(refused, 2 * payload.size()) << "states that must end where they began tell of most changes";
+    for (std::size_t size = 0; size < payload.size(); ++size) {
+      EXPECT_FALSE(decoded_by(decode_tile, shape, CodeType::kU16, std::span(payload).first(size))) << size;
+    }
+    payload.push_back(std::byte{0});
+    EXPECT_FALSE(decoded_by(decode_tile, shape, CodeType::kU16, payload));
+  }
+}
+
+TEST(AdaptiveCodec, SurvivesNoiseBehindAValidHeader) {
+  const TileShape shape = TileShape::make(24, 29, 1);
+  std::mt19937 random(1);
+  const std::vector<std::byte> good =
+      adaptive_payload(shape, test::make_tile(shape, CodeType::kU16, Kind::kTerrain, 2));
+  for (int round = 0; round < 1000; ++round) {
+    std::vector<std::byte> payload = good;
+    for (std::size_t i = 9 + random() % (payload.size() - 9); i < payload.size(); ++i) {
+      payload[i] = static_cast<std::byte>(random());
+    }
+    ASSERT_EQ(decoded_by(decode_tile, shape, CodeType::kU16, payload),
+              decoded_by(decode_tile_slowly, shape, CodeType::kU16, payload));
+  }
+}
+
+TEST(SymbolModel, GivesAllSlotsToSymbolsWhateverWasCounted) {
+  std::mt19937 engine(4);
+  const auto random = [&] { return static_cast<std::uint32_t>(engine()); };
+  SymbolModel model;
+  for (int band = 0; band < 40; ++band) {
+    for (int i = 0; i < 3000; ++i) {
+      model.count(random() % 8 == 0 ? random() % kAllContexts : random() % 100,
+                  random() % 3 == 0 ? random() % std::uint32_t{kModelSymbols} : 4 + random() % 2);
+    }
+    model.end_band();
+    for (std::uint32_t context = 0; context < kAllContexts; ++context) {
+      const SymbolTable& table = model.table(context);
+      std::uint32_t start = 0;
+      for (std::size_t s = 0; s < kModelSymbols; ++s) {
+        ASSERT_EQ(table.starts[s], start);
+        start += table.frequencies[s];
+      }
+      ASSERT_EQ(start, kFrequencySum);
+      ASSERT_GT(table.frequencies[kEscape], 0);
+    }
+  }
+}
+
+TEST(SymbolModel, LearnsFromBandsThatAreDone) {
+  SymbolModel model;
+  const std::uint32_t context = context_of(3, 1, kLevelPattern);
+  const SymbolTable before = model.table(context);
+  for (int i = 0; i < 1000; ++i) model.count(context, 2);
+  EXPECT_EQ(model.table(context).frequencies, before.frequencies);
+  model.end_band();
+  EXPECT_GT(model.table(context).frequencies[2], kFrequencySum * 9 / 10);
+  EXPECT_GT(model.table(context_of(3, 1, 0)).frequencies[2], kFrequencySum * 9 / 10) << "its parent's";
+  EXPECT_EQ(model.table(context_of(3, 2, kLevelPattern)).frequencies, before.frequencies);
+}
+
+/// Tiles of smooth ground that is rounded ever more coarsely, as `--max-rounding` does.
+TEST(AdaptiveCodec, TakesNoMoreBytesAtHigherLevels) {
+  const TileShape shape = TileShape::make(100, 99, 1);
+  for (const unsigned shift : {0U, 3U, 6U, 8U}) {
+    for (const Kind kind : {Kind::kTerrain, Kind::kPlane, Kind::kVoidIsland}) {
+      std::size_t before = std::numeric_limits<std::size_t>::max();
+      for (int level = 6; level <= kMaxLevel; ++level) {
+        TileCodes tile = test::make_tile(shape, CodeType::kU16, kind, 3);
+        for (std::uint16_t& code : tile.codes) code = code == 65535 ? code : static_cast<std::uint16_t>(code >> shift);
+        const std::size_t bytes = encode_tile(shape, tile, level).deflated.size();
+        EXPECT_LE(bytes, before) << level << " " << shift;
+        before = bytes;
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace isohf
