@@ -32,6 +32,7 @@ constexpr Command kCommands[] = {
     {"sample", "Print elevation and normal at places", command_sample},
     {"shade", "Draw a picture of the surface with its shadows", command_shade},
     {"view", "Fly over an archive in a window, or draw it without one", command_view},
+    {"attach", "Add files to an archive", command_attach},
     {"formats", "List the formats that are read and written", command_formats},
     {"experiment", "Measure iso and ortho meshes against sine waves, as the paper does",
      [](const Arguments& arguments) -> int { become_program("isohf-experiment", arguments); }, true},

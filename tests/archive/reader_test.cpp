@@ -145,7 +145,7 @@ TEST_F(ArchiveReaderTest, SaysThatAnotherProgramCutTheOpenFile) {
     test::write_file(path(), large);
     const ArchiveReader reader(path());
     const ArchiveReader knows_members(path());
-    const MemberEntry member = knows_members.members().back();
+    const MemberEntry member = knows_members.members()[1];  // not in the tail
     std::filesystem::resize_file(path(), left);
     const TileIndex last{0, 20};
     EXPECT_THAT(io_error_of([&] { (void)reader.read_tile(last); }), is_told);

@@ -83,6 +83,12 @@ class Contradictions {
     if (const auto found = json_.at("samples").value("void", Json()); found != expected) {
       add("samples.void", fmt::format("is {}, must be {}", found.dump(), expected.dump()));
     }
+    if (!metadata_.z_range || codes.type == CodeType::kF32) return;
+    const auto [first, second] = *metadata_.z_range;
+    const double code = (second - first) / codes.scale;
+    if (first != codes.offset) add("samples.range", fmt::format("begins at {}, the codes at {}", first, codes.offset));
+    if (!(std::abs(code - std::round(code)) <= 1e-6) || code > codes.max_code())
+      add("samples.range", fmt::format("ends at {}, which is no code's elevation", second));
   }
 
   void check_names() {

@@ -262,9 +262,22 @@ class Verification {
     }
     tile.readable = true;
     tile.digest = tile_content_digest(tile.codes);
+    check_digest(index, tile);
     fill_heights(index, tile);
     check_entry(index, entry, tile);
     tile.statistics = tile_statistics(counted_, index, tile.codes, archive_.metadata().quantisation);
+  }
+
+  void check_digest(TileIndex index, TileState& tile) const {
+    try {
+      const auto stated = archive_.tile_digest(index);
+      if (stated && !std::ranges::equal(*stated, tile.digest))
+        tile.findings.push_back(make(finding::kContentHash, index,
+                                     fmt::format("its elevations have the digest {}, the index says {}",
+                                                 hex(tile.digest), hex(*stated))));
+    } catch (const Error& error) {
+      tile.findings.push_back(make(finding::kStructure, index, error.what()));
+    }
   }
 
   void fill_heights(TileIndex index, TileState& tile) const {
@@ -420,6 +433,10 @@ class Verification {
     if (const std::string hash = hash_.finish(metadata); hash != metadata.content_sha256) {
       add(make(finding::kContentHash, {},
                fmt::format("content hash is {}, the metadata says {}", hash, metadata.content_sha256)));
+    }
+    if (const std::string hash = ground_hash(metadata); metadata.version >= 2 && hash != metadata.ground_sha256) {
+      add(make(finding::kContentHash, {},
+               fmt::format("ground hash is {}, the metadata says {}", hash, metadata.ground_sha256)));
     }
     const Statistics& said = metadata.statistics;
     const auto differ = [&](const char* what, double found, double stated) {
