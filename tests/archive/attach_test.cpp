@@ -63,11 +63,12 @@ TEST_F(Attach, LeavesAnArchiveAsAWriterMakesIt) {
 
 TEST_F(Attach, RefusesNamesThatAreTakenOrBad) {
   const std::vector<std::byte> before = test::read_bytes(path());
-  for (const char* name : {"isohf.json", "index.bin", "mimetype", "preview.png", "tiles/0/0.tile", "tiles/x", "planes/1",
-                           "../x", "", "a/"}) {
+  for (const char* name : {"isohf.json", "index.bin", "mimetype", "preview.png", "tiles/0/0.tile", "tiles/x",
+                           "planes/1", "../x", "", "a/"}) {
     EXPECT_THROW(static_cast<void>(attach_members(path(), {{folder_ / "short", name}})), Error) << name;
   }
-  EXPECT_THROW(static_cast<void>(attach_members(path(), {{folder_ / "short", "x"}, {folder_ / "long.txt", "x"}})), Error);
+  EXPECT_THROW(static_cast<void>(attach_members(path(), {{folder_ / "short", "x"}, {folder_ / "long.txt", "x"}})),
+               Error);
   EXPECT_THROW(static_cast<void>(attach_members(path(), {{folder_ / "nothing", "x"}})), Error);
   EXPECT_EQ(test::read_bytes(path()), before);
 }
@@ -86,9 +87,9 @@ TEST_F(Attach, ZipMayAddMembersToo) {
 }
 
 TEST_F(Attach, PythonMayAddMembersToo) {
-  const std::string program = fmt::format(
-      "python3 -c \"import zipfile; z = zipfile.ZipFile('{}', 'a'); z.write('{}', 'long.txt'); z.close()\"", path(),
-      folder_ / "long.txt");
+  const std::string program =
+      fmt::format("python3 -c \"import zipfile; z = zipfile.ZipFile('{}', 'a'); z.write('{}', 'long.txt'); z.close()\"",
+                  path(), folder_ / "long.txt");
   if (std::system("command -v python3 >/dev/null 2>&1") != 0) GTEST_SKIP() << "python3 is not installed";
   ASSERT_EQ(std::system(program.c_str()), 0);
   expect_whole({"long.txt"});

@@ -28,8 +28,8 @@ void make(const std::string& path, const TileGrid& grid, std::int64_t every) {
   std::vector<std::byte> bytes;
   JournalRecord record;
   record.kind = JournalRecord::Kind::kMember;
-  record.member = {kMediaTypeName, ZipMethod::kStored, crc32(std::as_bytes(std::span(kMediaType))), kMediaType.size(),
-                   kMediaType.size(), 0};
+  record.member = {kMediaTypeName,    ZipMethod::kStored, crc32(std::as_bytes(std::span(kMediaType))),
+                   kMediaType.size(), kMediaType.size(),  0};
   append_local_header(record.member, bytes);
   file.append(bytes);
   file.append(std::as_bytes(std::span(kMediaType)));

@@ -272,9 +272,9 @@ class Verification {
     try {
       const auto stated = archive_.tile_digest(index);
       if (stated && !std::ranges::equal(*stated, tile.digest))
-        tile.findings.push_back(make(finding::kContentHash, index,
-                                     fmt::format("its elevations have the digest {}, the index says {}",
-                                                 hex(tile.digest), hex(*stated))));
+        tile.findings.push_back(
+            make(finding::kContentHash, index,
+                 fmt::format("its elevations have the digest {}, the index says {}", hex(tile.digest), hex(*stated))));
     } catch (const Error& error) {
       tile.findings.push_back(make(finding::kStructure, index, error.what()));
     }
