@@ -31,6 +31,7 @@ constexpr Command kCommands[] = {
     {"export", "Write the surface as a raster of any grid, whole or cut into tiles", command_export},
     {"sample", "Print elevation and normal at places", command_sample},
     {"shade", "Draw a picture of the surface with its shadows", command_shade},
+    {"planes", "Add to an archive what it is looked at by from afar", command_planes},
     {"view", "Fly over an archive in a window, or draw it without one", command_view},
     {"attach", "Add files to an archive", command_attach},
     {"formats", "List the formats that are read and written", command_formats},

@@ -213,7 +213,7 @@ TEST(PlaneBuilder, GoesOnAfterAnyTileAsIfItHadNeverStopped) {
       handed_on.push_back(whole.order.size());
       whole.builder.add(sample_of(whole.builder, c.shape, field.codes(grid.tile_at(i))));
     }
-    for (std::int64_t done = 0; done < grid.tile_count(); done += 1 + done / 7) {
+    for (std::int64_t done = 0; done < grid.tile_count(); done += 1 + done / 3) {
       Recorder rest(planes, c.type);
       rest.builder.resume_after(done, [&](int plane, TileIndex tile) {
         PlaneBuilder::Stored stored;

@@ -12,6 +12,7 @@ int command_export(const Arguments& arguments);
 int command_formats(const Arguments& arguments);
 int command_info(const Arguments& arguments);
 int command_plan(const Arguments& arguments);
+int command_planes(const Arguments& arguments);
 int command_restore(const Arguments& arguments);
 int command_sample(const Arguments& arguments);
 int command_shade(const Arguments& arguments);

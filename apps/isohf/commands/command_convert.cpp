@@ -125,6 +125,7 @@ void share_memory(ConvertCommandOptions& options) {
 
 std::optional<ConvertCommandOptions> parse(const Arguments& arguments) {
   ConvertCommandOptions options;
+  bool no_planes = false;
   std::optional<double> sun_min_deg;
   std::vector<std::string> names;
   CommandLine line("convert", "Turns rasters of elevations into an archive of isometric heightfield tiles.");
@@ -170,6 +171,7 @@ std::optional<ConvertCommandOptions> parse(const Arguments& arguments) {
               [&](const std::string& text) {
                 options.convert.level = static_cast<int>(parse_whole_number(text, kMinLevel, kMaxLevel));
               });
+  line.flag("--no-planes", "Leave out the coarse planes, by which the archive is looked at from afar", no_planes);
   line.group("Shadows");
   line.option_or_numbers(
       "--shadow-seeds", "[DEG,...]", "all",
@@ -223,6 +225,7 @@ std::optional<ConvertCommandOptions> parse(const Arguments& arguments) {
     throw Error(ErrorCode::kInvalidArgument,
                 "convert: --lossless keeps the input's own samples, --geoid changes them; give one of the two");
   }
+  options.convert.planes = !no_planes;
   options.inputs.as_given = recorded_options(line);
   check_texture_options(options.texture);
   if (!line.given("--tmpdir")) {
@@ -272,6 +275,7 @@ ordered_json json_from(const ConvertCommandOptions& options, const ConvertSummar
           {"tiles_void", summary.tiles_void},
           {"archive_bytes", summary.archive_bytes},
           {"tile_bytes", summary.tile_bytes},
+          {"plane_bytes", summary.plane_bytes},
           {"shadow_seed_bytes", summary.seed_bytes},
           {"residual_bytes", summary.residual_bytes},
           {"texture_bytes", summary.texture_bytes},
@@ -327,6 +331,11 @@ std::string text_from(const ConvertCommandOptions& options, const ConvertSummary
     say("error", describe_accuracy(*accuracy, unit));
   } else {
     say("expected", describe_estimate(expected, unit));
+  }
+  if (metadata.planes.count > 0) {
+    say("planes",
+        fmt::format("{}, {}, {:.1f} % of the tiles'", metadata.planes.count, describe_bytes(summary.plane_bytes),
+                    100.0 * static_cast<double>(summary.plane_bytes) / static_cast<double>(summary.tile_bytes)));
   }
   if (summary.seed_bytes > 0) {
     const auto tile_bytes = static_cast<double>(summary.tile_bytes);

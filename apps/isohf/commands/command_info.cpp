@@ -206,6 +206,20 @@ std::string describe_mosaic(const MosaicRecord& mosaic) {
   return fmt::format("{} files, the {} on top: {}", describe_count(mosaic.files), mosaic.overlap, names);
 }
 
+std::string describe_planes(const ArchiveReader& archive, std::uint64_t tile_bytes) {
+  std::int64_t tiles = 0;
+  std::uint64_t bytes = 0;
+  for (const MemberTable& table : archive.tables()) {
+    if (table.name.rfind("planes/", 0) != 0) continue;
+    tiles += table.stored;
+    bytes += table.compressed_bytes;
+  }
+  const PlaneInfo& planes = archive.metadata().planes;
+  return fmt::format("{}, each of every {}th vertex of the one before; {} tiles, {}, {:.1f} % of the tiles'",
+                     planes.count, planes.stride, describe_count(tiles), describe_bytes(bytes),
+                     100.0 * static_cast<double>(bytes) / static_cast<double>(tile_bytes));
+}
+
 std::string describe_archive(const ArchiveReader& archive) {
   const Metadata& metadata = archive.metadata();
   const TileGrid& grid = metadata.grid;
@@ -228,6 +242,7 @@ std::string describe_archive(const ArchiveReader& archive) {
                            describe_count(grid.tile_count() - metadata.tiles_stored)));
   say("tile shape", fmt::format("{}x{} (C x R), {} levels, aspect {:.5f}, {} triangles", shape.columns(), shape.rows(),
                                 shape.levels(), triangle_aspect(grid), describe_count(shape.triangle_count())));
+  if (metadata.planes.count > 0) say("planes", describe_planes(archive, derived.tile_bytes));
   say("tile extent",
       fmt::format("{} by {}", describe_length(grid.extent_x(), metres), describe_length(grid.extent_z(), metres)));
   say("lattice", fmt::format("columns {} apart, rows {}", describe_length(2.0 * grid.sigma_x(), metres),

@@ -156,6 +156,7 @@ int run(ShadeCommand options) {
   sink->finish();
 
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const std::int64_t tiles = archive.metadata().plane_grid(report.plane).tile_count();
   StandardOutput out;
   if (common.json) {
     out.write(json_text({{"archive", options.archive},
@@ -163,13 +164,15 @@ int run(ShadeCommand options) {
                          {"files_written", sink->files()},
                          {"width", size.first},
                          {"height", size.second},
-                         {"tiles", archive.grid().tile_count()},
+                         {"plane", report.plane},
+                         {"tiles", tiles},
                          {"used_shadow_seeds", report.used_seeds},
                          {"seconds", seconds}}));
   } else if (!common.quiet) {
-    out.write(fmt::format("picture      {}: {} x {} pixels of {} tiles in {}{}\n", options.output, size.first,
-                          size.second, describe_count(archive.grid().tile_count()), describe_seconds(seconds),
-                          report.used_seeds ? ", with the archive's shadow seeds" : ""));
+    out.write(fmt::format("picture      {}: {} x {} pixels of {} tiles{} in {}{}\n", options.output, size.first,
+                          size.second, describe_count(tiles),
+                          report.plane > 0 ? fmt::format(" of coarse plane {}", report.plane) : "",
+                          describe_seconds(seconds), report.used_seeds ? ", with the archive's shadow seeds" : ""));
   }
   out.finish();
   return kExitDone;

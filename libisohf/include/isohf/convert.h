@@ -95,6 +95,7 @@ struct ConvertOptions {
   bool resume = false;        ///< go on with what an interrupted run left in NAME.part
   bool strict = false;        ///< a warning is an Error{kWarning}, and nothing is written
   int level = kDefaultLevel;  ///< kMinLevel to kMaxLevel: the higher, the fewer bytes and the slower
+  bool planes = true;         ///< write coarse planes, by which the archive is looked at from afar
   bool lossless = false;      ///< write residuals beside the tiles, so that the source's samples come back bit for bit
   /// Hold the surface, as drawn, to within that of every source sample that it has an elevation for. The smallest
   /// density that does is looked for, unless `plan` gives one; the step is chosen where none is asked for. Archives are
@@ -122,8 +123,9 @@ struct ConvertSummary {
   std::uint64_t lattice_samples = 0;         ///< C*R for every tile
   double step = 0.0;                         ///< elevation of one code
   double worst_rounding = 0.0;
-  std::uint64_t tile_bytes = 0;  ///< of all tiles, compressed
-  std::uint64_t seed_bytes = 0;  ///< of shadow seeds, compressed
+  std::uint64_t tile_bytes = 0;   ///< of all tiles, compressed
+  std::uint64_t plane_bytes = 0;  ///< of all coarse planes' tiles, compressed
+  std::uint64_t seed_bytes = 0;   ///< of shadow seeds, compressed
   std::uint64_t texture_bytes = 0;
   double pixels_per_texel = 0.0;  ///< photo pixels under the side of a texel; above 1 where max_size is in the way
   double seconds = 0.0;
@@ -138,6 +140,21 @@ struct ConvertSummary {
 /// reading the source and writing do.
 ConvertSummary convert(HeightSource& source, const std::string& output, const ConvertOptions& options = {},
                        const Job& job = {});
+
+/// What add_planes() did.
+struct AddPlanesSummary {
+  PlaneInfo planes;               ///< count 0: one tile is all, or their shape allows none
+  std::int64_t tiles = 0;         ///< of all coarse planes, stored
+  std::uint64_t plane_bytes = 0;  ///< of these, compressed
+  std::uint64_t archive_bytes = 0;
+  std::uint64_t archive_bytes_before = 0;
+};
+
+/// Writes an archive once more with the coarse planes that convert() gives it; those that it has are made anew. Members
+/// are copied as they are, each tile is decoded and none is coded again. `output` may be the archive itself. Stage
+/// "planes". Throws Error{kInvalidArgument} where `output` exists, is another file and `overwrite` is false;
+/// Error{kCorrupt} where a tile cannot be decoded or differs from the content hash.
+AddPlanesSummary add_planes(const std::string& archive, const std::string& output, bool overwrite, const Job& job = {});
 
 /// How far a surface will lie from the source's samples, by some of them.
 struct ErrorEstimate {

@@ -40,7 +40,9 @@ struct ShadeOptions {
 /// How a picture was made.
 struct ShadeReport {
   GridSize size;
-  bool used_seeds = false;  ///< shadow seeds of the archive; else shadows were carried along each row of tiles
+  int plane = 0;  ///< coarse plane that was drawn; 0: the tiles themselves
+  bool used_seeds =
+      false;  ///< shadow seeds of the archive, which a coarse plane has none of; else shadows were carried along each row of tiles
 };
 
 /// Bytes of a pixel: red, green, blue, alpha, sRGB; 0 everywhere without elevation.
@@ -53,7 +55,8 @@ inline constexpr std::int64_t kShadeChannels = 4;
 using TakeShadedRows = std::function<void(std::span<const std::uint8_t> rows)>;
 
 /// Renders a picture and hands over whole rows. The pixels do not depend on the number of threads; every pixel is the
-/// mean of up to 4 x 4 points. Memory: a few dozen tiles, and the picture's rows across one row of tiles, at most 64 MB
+/// mean of up to 4 x 4 points. Where a coarse plane has two vertices or more in a pixel, either way, the coarsest such one
+/// is drawn and nothing finer read, unless textures are. Memory: a few dozen tiles, and the picture's rows across one row of tiles, at most 64 MB
 /// or one row. Throws Error{kInvalidArgument} for options out of range, and for textures of an archive that has none;
 /// as the reader does; kCancelled.
 ShadeReport shade_rows(const ArchiveReader& archive, const ShadeOptions& options, const TakeShadedRows& take,

@@ -137,6 +137,9 @@ inline constexpr int kDrawnCrack = 32;
 inline constexpr int kDrawnMesh = 33;
 inline constexpr int kDrawnShadow = 34;
 inline constexpr int kDrawnSunShare = 35;
+// Coarse planes.
+inline constexpr int kPlane = 36;
+inline constexpr int kPlaneRange = 37;
 }  // namespace finding
 
 /// Severity of a catalogue id.

@@ -315,6 +315,10 @@ void ArchiveWriter::flush_tiles() {
   state_->named([&] { state_->part.flush(); });
 }
 
+TileEntry ArchiveWriter::tile_entry(TileIndex tile, int plane) const {
+  return state_->contents.tile_entry(tile, plane);
+}
+
 TileCodes ArchiveWriter::read_tile(TileIndex tile, const Quantisation& quantisation, int plane) const {
   const State& state = *state_;
   const TileEntry entry = state.contents.tile_entry(tile, plane);

@@ -76,6 +76,8 @@ class ArchiveWriter {
   void flush_tiles();
   /// Decodes a tile that was added before flush_tiles(), for members that are made from the tiles as stored; also those
   /// that a resumed job found. Any number of threads at once, but none beside the other functions.
+  /// What is known of a tile that was added, or of a coarse plane's.
+  [[nodiscard]] TileEntry tile_entry(TileIndex tile, int plane = 0) const;
   [[nodiscard]] TileCodes read_tile(TileIndex tile, const Quantisation& quantisation, int plane = 0) const;
 
   /// Makes the part file a whole archive with these metadata, which may be read as part() until the next call: so

@@ -11,6 +11,7 @@
 
 #include "isohf/archive/container/content_hash.h"
 
+#include "isohf/archive/planes/archive_planes.h"
 #include "isohf/archive/tile_statistics.h"
 
 namespace isohf {
@@ -104,6 +105,7 @@ std::string fingerprint(const SourceInfo& info, const Plan& plan, const ConvertO
   std::string job = heights_fingerprint(info, plan, options, of_files);
   if (of_files && !options.source_note.fingerprint.empty()) job += " | " + options.source_note.fingerprint;
   if (const std::string& datum = info.georeference.system.vertical_datum; !datum.empty()) job += " | above " + datum;
+  if (of_files && !options.planes) job += " | no planes";
   if (options.max_error) job += fmt::format(" | max error {}", *options.max_error);
   if (plan.frame.projection) {
     const ProjectionRecord& on = *plan.frame.projection;
@@ -149,6 +151,7 @@ Metadata describe_job(const SourceInfo& info, const Plan& plan, const ConvertOpt
   metadata.outside = plan.outside;
   metadata.projection = plan.frame.projection;
   metadata.wraps_x = plan.frame.wraps_x;
+  if (options.planes) metadata.planes = planes_for(plan.grid);
   metadata.filter = options.filter.value_or(kDefaultFilter);
   metadata.edges = Edges::kOdd;
   metadata.acquisition = options.acquisition;
@@ -166,15 +169,16 @@ std::string difference_from_job(const std::string& metadata_json, const SourceIn
                                 const ConvertOptions& options) {
   const auto made = nlohmann::json::parse(metadata_json);
   const auto asked = nlohmann::json::parse(format_metadata(describe_job(info, plan, options, {})));
-  if (made.contains(kJobName) && made.at(kJobName) == asked.at(kJobName)) return {};
+  const bool same_job = made.contains(kJobName) && made.at(kJobName) == asked.at(kJobName);
+  if (same_job && made.value("planes", nlohmann::json()) == asked.value("planes", nlohmann::json())) return {};
   // Members that are known before the work, by themselves and then by their own members.
   std::string found;
   const auto compare = [&](const std::string& name, const nlohmann::json& theirs, const nlohmann::json& ours) {
     if (theirs == ours) return;
     found += fmt::format("{}{} {}, not {}", found.empty() ? "" : ", ", name, theirs.dump(), ours.dump());
   };
-  for (const char* name : {"tile_shape", "tiles", "extent", "valid", "outside", "projection", "wraps_x", "filter",
-                           "acquisition", "edges", "level", "source"}) {
+  for (const char* name : {"tile_shape", "tiles", "extent", "valid", "outside", "projection", "planes", "wraps_x",
+                           "filter", "acquisition", "edges", "level", "source"}) {
     const nlohmann::json theirs = made.value(name, nlohmann::json());
     const nlohmann::json ours = asked.value(name, nlohmann::json());
     if (!theirs.is_object() || !ours.is_object()) {

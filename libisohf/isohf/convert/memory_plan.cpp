@@ -6,6 +6,8 @@
 #include <array>
 #include <cmath>
 
+#include "isohf/archive/planes/archive_planes.h"
+#include "isohf/archive/planes/plane_builder.h"
 #include "isohf/base/arena.h"
 #include "isohf/convert/stages/residual_stage.h"
 #include "isohf/convert/stages/seed_stage.h"
@@ -128,13 +130,19 @@ class Estimate {
                            static_cast<double>(source_.buffer_bytes(memory.source_buffer_bytes)) +
                            static_cast<double>(map_bytes());
     const double seeds = options_.shadow_seeds ? static_cast<double>(seed_stage_memory_bytes(plan_.grid)) : 0.0;
-    const double tiles = tiles_pass(memory) + seeds + static_cast<double>(texture_bytes_);
+    const double tiles =
+        tiles_pass(memory) + seeds + static_cast<double>(plane_bytes()) + static_cast<double>(texture_bytes_);
     double peak = std::max(scan_pass(memory), tiles);
     if (options_.lossless) {
       peak = std::max(peak,
                       static_cast<double>(residual_stage_memory_bytes(info_, plan_, threads_, memory.members_at_once)));
     }
     return static_cast<std::uint64_t>(program + peak);
+  }
+
+  [[nodiscard]] std::uint64_t plane_bytes() const {
+    const PlaneInfo info = options_.planes ? planes_for(plan_.grid) : PlaneInfo();
+    return plane_builder_memory_bytes(Planes(plan_.grid, info.stride, info.count, false), options_.code_type);
   }
 
   [[nodiscard]] double scan_pass(const MemoryPlan& memory) const {

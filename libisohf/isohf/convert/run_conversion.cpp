@@ -14,6 +14,7 @@
 
 #include "isohf/archive/codec/tile_codes.h"
 #include "isohf/archive/metadata/accuracy_info.h"
+#include "isohf/archive/planes/archive_planes.h"
 #include "isohf/archive/tile_statistics.h"
 #include "isohf/archive/writer.h"
 #include "isohf/base/arena.h"
@@ -23,6 +24,7 @@
 #include "isohf/convert/job_description.h"
 #include "isohf/convert/memory_plan.h"
 #include "isohf/convert/stages/choose_quantisation.h"
+#include "isohf/convert/stages/plane_stage.h"
 #include "isohf/convert/stages/residual_stage.h"
 #include "isohf/convert/stages/seed_stage.h"
 #include "isohf/convert/stages/texture_stage.h"
@@ -46,12 +48,14 @@ struct TileJob {
   std::shared_ptr<const TileSource::Part> part;
   EncodedTile encoded;
   Outliers outliers;
+  PlaneSample planes;
   SeedStage::Tile seeds;
   TextureStage::Encoded texture;
 };
 
 /// What goes into an archive beside the tiles, made in the same pass; nullptr: not asked for.
 struct Stages {
+  PlaneStage* planes = nullptr;
   SeedStage* seeds = nullptr;
   const TextureStage* textures = nullptr;
 };
@@ -105,6 +109,7 @@ void make_tile(const Conversion& conversion, const TileSource& source, const Cou
   encoded.statistics = tile_statistics(counted, tile.index, codes, conversion.quantisation);
   encoded.statistics.clamped = tile.outliers.visible;
   encoded.statistics.worst_rounding = counts.worst_rounding;
+  if (stages.planes != nullptr && is_new) tile.planes = stages.planes->sample(codes, encoded);
   if (stages.seeds != nullptr) tile.seeds = stages.seeds->prepare(codes);
   tile.seeds.is_empty = encoded.is_empty;
   if (stages.textures != nullptr && is_new && !encoded.is_empty) tile.texture = stages.textures->encode(tile.index);
@@ -157,6 +162,7 @@ void write_tiles(const Conversion& conversion, ArchiveWriter& writer, const Stag
     if (written >= first_new) {
       if (stages.textures != nullptr) stages.textures->add(tile->index, tile->texture, writer);
       writer.add_tile(tile->encoded);
+      if (stages.planes != nullptr) stages.planes->add(tile->planes);
     }
     if (stages.seeds != nullptr) stages.seeds->add(tile->index, std::move(tile->seeds), writer);
     conversion.job.report({"tiles", "tiles", ++written, grid.tile_count(), writer.bytes_written()});
@@ -258,9 +264,11 @@ ConversionResult run_conversion(HeightSource& source, const Plan& plan, const st
   Metadata& metadata = summary.metadata;
   warn_of_plan(info, plan, options.plan, textures ? &*textures : nullptr, summary.warnings);
   refuse_warnings(summary, options);
+  const PlaneInfo coarse = options.planes ? planes_for(plan.grid) : PlaneInfo();
   ArchiveWriter writer(output, plan.grid,
-                       {options.overwrite, options.resume, job_fingerprint(info, plan, options), {}});
+                       {options.overwrite, options.resume, job_fingerprint(info, plan, options), coarse});
   Conversion conversion{source, options, plan, memory, kernel, std::move(prefilter), job};
+  std::optional<PlaneStage> planes;
   std::optional<SeedStage> seeds;
   std::optional<LosslessRecord> lossless;
   try {
@@ -273,7 +281,12 @@ ConversionResult run_conversion(HeightSource& source, const Plan& plan, const st
         seeds.emplace(plan.grid, conversion.quantisation, *options.shadow_seeds,
                       known ? 1.0 / info.metres_per_vertical_unit : 1.0);
       }
-      write_tiles(conversion, writer, {seeds ? &*seeds : nullptr, textures ? &*textures : nullptr});
+      if (coarse.count > 0) {
+        planes.emplace(Planes(plan.grid, coarse.stride, coarse.count, plan.frame.wraps_x), conversion.quantisation,
+                       options.level, writer);
+      }
+      write_tiles(conversion, writer,
+                  {planes ? &*planes : nullptr, seeds ? &*seeds : nullptr, textures ? &*textures : nullptr});
       if (options.lossless) {
         lossless = write_residuals(source.as_stored(), plan.frame, plan.grid, conversion.quantisation,
                                    memory.members_at_once, writer, job);
@@ -285,6 +298,7 @@ ConversionResult run_conversion(HeightSource& source, const Plan& plan, const st
     refuse_warnings(summary, options);
     metadata = describe_job(info, plan, options, conversion.quantisation);
     metadata.statistics = total_statistics(all);
+    summary.plane_bytes = writer.members_in("planes/").bytes;
     if (seeds) {
       const ShadowSeedInfo record = seeds->info(writer);
       summary.seed_bytes = record.bytes;

@@ -104,8 +104,8 @@ class TileSurface {
 
 }  // namespace
 
-ReadTiles tiles_of(const ArchiveReader& archive) {
-  return [&archive](std::span<const TileIndex> tiles) { return archive.read_tiles(tiles); };
+ReadTiles tiles_of(const ArchiveReader& archive, int plane) {
+  return [&archive, plane](std::span<const TileIndex> tiles) { return archive.read_tiles(tiles, plane); };
 }
 
 void for_each_tile(const ReadTiles& read_tiles, std::span<const TileIndex> tiles,

@@ -15,7 +15,7 @@ namespace isohf {
 
 /// Decodes several tiles, void ones too; called from many threads at once.
 using ReadTiles = std::function<std::vector<TileCodes>(std::span<const TileIndex>)>;
-[[nodiscard]] ReadTiles tiles_of(const ArchiveReader& archive);
+[[nodiscard]] ReadTiles tiles_of(const ArchiveReader& archive, int plane = 0);
 
 /// Decodes tiles on all threads of the caller's oneTBB arena, several together in each where there are enough, and
 /// hands them to use(number in `tiles`, codes) on the thread that decoded them.

@@ -58,6 +58,10 @@ const std::vector<FindingKind>& finding_catalogue() {
        "a vertex's drawn shadow height is not the one that is carried along the row of tiles"},
       {finding::kDrawnSunShare, Severity::kError,
        "inside a triangle the drawn share of the sun is not that of the interpolated shadow height"},
+      {finding::kPlane, Severity::kError,
+       "a coarse plane's tile is missing, or does not hold the elevations of the tiles below it"},
+      {finding::kPlaneRange, Severity::kError,
+       "the range that the index states for a coarse plane's tile is not that of the tiles below it"},
   };
   return kinds;
 }

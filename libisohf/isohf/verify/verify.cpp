@@ -23,6 +23,7 @@
 #include "isohf/surface.h"
 #include "isohf/surface/shade/normals.h"
 #include "isohf/verify/metadata_check.h"
+#include "isohf/verify/plane_check.h"
 #include "isohf/verify/seed_check.h"
 #include "isohf/verify/texture_check.h"
 
@@ -106,11 +107,13 @@ class Verification {
     const bool has_members = check_members();
     for (std::string& problem : contradictions_in(archive_)) add(make(finding::kMetadata, {}, std::move(problem)));
     start_seeds();
+    if (archive_.metadata().planes.count > 0) planes_.emplace(archive_);
     TileRow above;
     for (std::int64_t row = 0; row < grid_.tile_rows(); ++row) {
       TileRow current = read_row(row);
       compare_row(row, current, above);
       check_seeds(row, current);
+      check_planes(current);
       collect(current);
       above = std::move(current);
       job.report({"verify", "tiles", (row + 1) * grid_.tile_columns(), grid_.tile_count()});
@@ -193,6 +196,16 @@ class Verification {
       codes.push_back(tile.entry.stored ? &tile.codes : nullptr);
     }
     add_seed_problems(seeds_->check_row(row, codes));
+  }
+
+  /// Planes follow from all tiles: behind one that cannot be read, nothing is said of them.
+  void check_planes(const TileRow& tiles) {
+    for (const TileState& tile : tiles) {
+      if (!tile.readable) planes_.reset();
+      if (!planes_) return;
+      planes_->add(tile.entry.stored ? &tile.codes : nullptr, tile.entry.code_min, tile.entry.code_max);
+    }
+    for (auto& [id, text] : planes_->problems()) add(make(id, {}, std::move(text)));
   }
 
   void add_seed_problems(const std::vector<SeedCheck::Problem>& problems) {
@@ -473,6 +486,7 @@ class Verification {
   VerifyReport report_;
   ContentHash hash_;
   std::optional<SeedCheck> seeds_;
+  std::optional<PlaneCheck> planes_;
   std::int64_t stored_ = 0;
   TileStatistics all_;
   bool all_readable_ = true;

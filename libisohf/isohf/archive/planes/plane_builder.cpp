@@ -31,10 +31,10 @@ std::int64_t sample_rows(const Planes& planes) {
   return planes.grid(0).shape().cell_rows() / planes.stride() + 1;
 }
 
-/// Samples that are kept for a plane's row: its own, a row of padding North of it, and South of it what the tiles there
-/// bring.
-std::int64_t kept_columns(const Planes& planes, int plane) {
-  return planes.grid(plane - 1).tile_columns() * (sample_columns(planes) - 1) + 1;
+/// Samples that are kept for a tile of a plane's row: its own, a row of padding North of them, and South of them what
+/// the tiles there bring. Its East edge is the next one's.
+std::int64_t kept_columns(const Planes& planes) {
+  return 2 * planes.grid(0).shape().cell_columns();
 }
 std::int64_t kept_rows(const Planes& planes) {
   return 1 + planes.grid(0).shape().cell_rows() + sample_rows(planes);
@@ -134,8 +134,8 @@ class PlaneBuilder::Level {
       : planes_(planes),
         plane_(plane),
         type_(type),
-        row_bytes_(static_cast<std::size_t>(kept_columns(planes, plane)) * width_of(type)),
-        kept_(row_bytes_ * static_cast<std::size_t>(kept_rows(planes))) {
+        row_bytes_(static_cast<std::size_t>(kept_columns(planes)) * width_of(type)),
+        kept_(static_cast<std::size_t>(planes.grid(plane).tile_columns() + 1)) {
     begin_at(0);
   }
 
@@ -155,7 +155,7 @@ class PlaneBuilder::Level {
   void begin_at(std::int64_t row) {
     row_ = row;
     next_ = std::max(row * planes_.stride() - 1, std::int64_t{0}) * fine().tile_columns();
-    forget_rows(0);
+    for (std::vector<std::byte>& kept : kept_) kept.clear();
     for (std::vector<Range>& ranges : ranges_) ranges.assign(static_cast<std::size_t>(grid().tile_columns()), {});
   }
 
@@ -166,13 +166,10 @@ class PlaneBuilder::Level {
       ranges_[static_cast<std::size_t>(above.row - row_)][static_cast<std::size_t>(above.column)].add(type_, sample);
     }
     if (sample.codes.empty()) return;
-    const std::int64_t first = tile.row * (sample_rows(planes_) - 1) - first_z();
-    const std::size_t from_bytes = static_cast<std::size_t>(sample_columns(planes_)) * width_of(type_);
-    const std::size_t column_bytes = static_cast<std::size_t>(tile.column) * (from_bytes - width_of(type_));
-    for (std::int64_t j = std::max(std::int64_t{0}, -first); j < sample_rows(planes_); ++j) {
-      std::memcpy(kept_.data() + static_cast<std::size_t>(first + j) * row_bytes_ + column_bytes,
-                  sample.codes.data() + static_cast<std::size_t>(j) * from_bytes, from_bytes);
-    }
+    const std::int64_t columns = sample_columns(planes_) - 1;
+    keep(sample.codes, tile, 0, columns);
+    // The East edge comes with the neighbour; one that isn't stored holds no elevation there either.
+    if (tile.column + 1 == fine().tile_columns()) keep(sample.codes, tile, columns, columns + 1);
   }
 
   /// The codes of a tile of the current row, also those of places beyond, and the range of what lies below it.
@@ -194,8 +191,11 @@ class PlaneBuilder::Level {
   void next_row() {
     const std::int64_t dropped = grid().shape().cell_rows();
     const std::size_t stays = row_bytes_ * static_cast<std::size_t>(kept_rows(planes_) - dropped);
-    std::memmove(kept_.data(), kept_.data() + static_cast<std::size_t>(dropped) * row_bytes_, stays);
-    forget_rows(kept_rows(planes_) - dropped);
+    for (std::vector<std::byte>& kept : kept_) {
+      if (kept.empty()) continue;
+      std::memmove(kept.data(), kept.data() + static_cast<std::size_t>(dropped) * row_bytes_, stays);
+      make_void(std::span(kept).subspan(stays));
+    }
     ++row_;
     ranges_[0].swap(ranges_[1]);
     std::fill(ranges_[1].begin(), ranges_[1].end(), Range{});
@@ -205,9 +205,25 @@ class PlaneBuilder::Level {
   /// z of the first row that is kept, counted as the plane's own rows are.
   [[nodiscard]] std::int64_t first_z() const { return row_ * grid().shape().cell_rows() - 1; }
 
-  /// Makes rows void from the first on that is named.
-  void forget_rows(std::int64_t first) {
-    const std::span<std::byte> rows = std::span(kept_).subspan(static_cast<std::size_t>(first) * row_bytes_);
+  /// Keeps columns of a tile's samples, all in one tile of the plane.
+  void keep(std::span<const std::byte> samples, TileIndex tile, std::int64_t begin, std::int64_t end) {
+    const std::int64_t x = tile.column * (sample_columns(planes_) - 1) + begin;
+    std::vector<std::byte>& kept = kept_[static_cast<std::size_t>(x / kept_columns(planes_))];
+    if (kept.empty()) {
+      kept.resize(row_bytes_ * static_cast<std::size_t>(kept_rows(planes_)));
+      make_void(kept);
+    }
+    const std::size_t width = width_of(type_);
+    const std::int64_t first = tile.row * (sample_rows(planes_) - 1) - first_z();
+    for (std::int64_t j = std::max(std::int64_t{0}, -first); j < sample_rows(planes_); ++j) {
+      std::memcpy(kept.data() + static_cast<std::size_t>(first + j) * row_bytes_ +
+                      static_cast<std::size_t>(x % kept_columns(planes_)) * width,
+                  samples.data() + static_cast<std::size_t>(j * sample_columns(planes_) + begin) * width,
+                  static_cast<std::size_t>(end - begin) * width);
+    }
+  }
+
+  void make_void(std::span<std::byte> rows) const {
     const auto fill = [&](auto none) {
       for (std::size_t at = 0; at < rows.size(); at += sizeof none) std::memcpy(rows.data() + at, &none, sizeof none);
     };
@@ -217,13 +233,16 @@ class PlaneBuilder::Level {
   template <typename T>
   void cut(const Places& places, std::vector<T>& codes) const {
     const TileShape& shape = grid().shape();
-    codes.resize(static_cast<std::size_t>(shape.stored_vertex_count()));
+    codes.assign(static_cast<std::size_t>(shape.stored_vertex_count()), void_value<T>(type_));
     auto to = codes.begin();
     for (int r = 0; r < shape.rows(); ++r) {
       const std::int64_t z = planes_.z_below(plane_ - 1, plane_, row_ * shape.cell_rows() + r - 1) / planes_.stride();
-      const std::byte* const row = kept_.data() + static_cast<std::size_t>(z - first_z()) * row_bytes_;
+      const std::size_t row = static_cast<std::size_t>(z - first_z()) * row_bytes_;
       for (const std::int64_t x : places[static_cast<std::size_t>(r % 2)]) {
-        std::memcpy(&*to++, row + static_cast<std::size_t>(x) * sizeof(T), sizeof(T));
+        const std::vector<std::byte>& kept = kept_[static_cast<std::size_t>(x / kept_columns(planes_))];
+        const std::size_t at = row + static_cast<std::size_t>(x % kept_columns(planes_)) * sizeof(T);
+        if (!kept.empty()) std::memcpy(&*to, kept.data() + at, sizeof(T));
+        ++to;
       }
     }
   }
@@ -232,7 +251,7 @@ class PlaneBuilder::Level {
   int plane_;
   CodeType type_;
   std::size_t row_bytes_;
-  std::vector<std::byte> kept_;  ///< rows of samples from first_z() on
+  std::vector<std::vector<std::byte>> kept_;  ///< rows of samples from first_z() on, by the plane's tiles; empty: void
   std::int64_t row_ = 0;
   std::int64_t next_ = 0;                     ///< tile of the plane below
   std::array<std::vector<Range>, 2> ranges_;  ///< of the tiles of the current row and of the next
@@ -240,7 +259,9 @@ class PlaneBuilder::Level {
 
 std::uint64_t plane_builder_memory_bytes(const Planes& planes, CodeType type) {
   std::int64_t samples = kBatch * planes.grid(0).shape().stored_vertex_count();
-  for (int plane = 1; plane <= planes.count(); ++plane) samples += kept_columns(planes, plane) * kept_rows(planes);
+  for (int plane = 1; plane <= planes.count(); ++plane) {
+    samples += planes.grid(plane).tile_columns() * kept_columns(planes) * kept_rows(planes);
+  }
   return planes.count() == 0 ? 0 : static_cast<std::uint64_t>(samples) * width_of(type);
 }
 
@@ -293,7 +314,7 @@ void PlaneBuilder::finish_row(int plane) {
     const auto count = static_cast<std::size_t>(std::min(kBatch, columns - first));
     std::vector<EncodedTile> encoded(count);
     std::vector<PlaneSample> samples(count);
-    oneapi::tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
+    const auto make = [&](std::size_t i) {
       const std::int64_t column = first + static_cast<std::int64_t>(i);
       const Range& range = level.range(column);
       encoded[i].is_empty = true;
@@ -304,7 +325,10 @@ void PlaneBuilder::finish_row(int plane) {
       encoded[i] = encode_(codes);
       encoded[i].code_min = range.min;
       encoded[i].code_max = range.max;
-    });
+    };
+    // All of it, also while the pipeline around has failed elsewhere.
+    oneapi::tbb::task_group_context whole(oneapi::tbb::task_group_context::isolated);
+    oneapi::tbb::parallel_for(std::size_t{0}, count, make, whole);
     for (std::size_t i = 0; i < count; ++i) {
       take_(plane, {first + static_cast<std::int64_t>(i), level.row()}, encoded[i]);
       add(plane + 1, samples[i]);

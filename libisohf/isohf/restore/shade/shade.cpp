@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "isohf/archive/codec/quantise.h"
+#include "isohf/archive/planes/archive_planes.h"
 #include "isohf/archive/shadow_seeds/shadow_seed_reader.h"
 #include "isohf/archive/textures/texture_reader.h"
 #include "isohf/base/arena.h"
@@ -28,6 +29,9 @@ namespace {
 constexpr std::int64_t kBatch = 16;
 /// The most points in a pixel, either way.
 constexpr std::int64_t kMaxPointsPerPixel = 4;
+/// Vertices in a pixel, either way, that a coarse plane must have to be drawn: with two its picture can hardly be told
+/// from that of all vertices (decision 41).
+constexpr double kVerticesPerPixel = 2.0;
 constexpr std::size_t kMaxRowBytes = std::size_t{64} << 20U;
 
 /// The colours of an archive's textures, for places that lie a given distance apart.
@@ -123,6 +127,7 @@ class PixelAxis {
   [[nodiscard]] std::int64_t per_pixel() const { return per_pixel_; }
   [[nodiscard]] std::int64_t count() const { return count_; }
   [[nodiscard]] double step() const { return step_; }
+  [[nodiscard]] double pixel() const { return step_ * static_cast<double>(per_pixel_); }
   [[nodiscard]] double world(std::int64_t point) const { return start_ + (static_cast<double>(point) + 0.5) * step_; }
   /// The first point at or behind a world coordinate; count() where there is none.
   [[nodiscard]] std::int64_t first_from(double world) const {
@@ -189,13 +194,17 @@ class ShadeRenderer {
       : archive_(archive),
         request_(request),
         job_(job),
-        read_tiles_(tiles_of(archive)),
+        x_(archive.metadata().valid.x0, archive.metadata().valid.x1, size.first, 2.0 * archive.grid().sigma_x()),
+        z_(archive.metadata().valid.z0, archive.metadata().valid.z1, size.second, archive.grid().sigma_z()),
+        plane_(request.texture
+                   ? 0
+                   : planes_of(archive.metadata())
+                         .plane_for_spacing(x_.pixel() / kVerticesPerPixel, z_.pixel() / kVerticesPerPixel)),
+        read_tiles_(tiles_of(archive, plane_)),
         width_(size.first),
-        grid_(archive.grid()),
+        grid_(archive.metadata().plane_grid(plane_)),
         palette_(request.palette, low(archive), high(archive)),
-        illumination_(request.sun, request.sun_elevation_deg, request.hillshade),
-        x_(archive.metadata().valid.x0, archive.metadata().valid.x1, size.first, 2.0 * grid_.sigma_x()),
-        z_(archive.metadata().valid.z0, archive.metadata().valid.z1, size.second, grid_.sigma_z()) {
+        illumination_(request.sun, request.sun_elevation_deg, request.hillshade) {
     if (request.texture) textures_.emplace(archive, x_.step(), z_.step());
     datum_ = low(archive);
     softness_ = request.softness.value_or(default_softness(archive.metadata()));
@@ -203,12 +212,14 @@ class ShadeRenderer {
     fall_ = std::tan(request.sun_elevation_deg * std::numbers::pi / 180.0);
     // Heights that are drawn larger need a sun that much higher for the same shadows.
     seed_sun_deg_ = std::atan(fall_ / request.exaggeration) * 180.0 / std::numbers::pi;
-    if (request.shadows && shadow_seed_info(archive.metadata())) {
+    if (plane_ == 0 && request.shadows && shadow_seed_info(archive.metadata())) {
       seeds_.emplace(archive);
       const bool same_units = seeds_->info().elevation_units_per_world_unit == request.elevation_units_per_world_unit;
       if (!same_units || !seeds_->covers(seed_sun_deg_)) seeds_.reset();
     }
   }
+
+  [[nodiscard]] int plane() const { return plane_; }
 
   /// Returns whether shadow seeds were used.
   bool run(const TakeShadedRows& take) {
@@ -405,13 +416,14 @@ class ShadeRenderer {
   const ArchiveReader& archive_;
   const ShadeOptions& request_;
   const Job& job_;
-  ReadTiles read_tiles_;
-  std::int64_t width_;
-  const TileGrid& grid_;
-  Palette palette_;
-  Illumination illumination_;
   PixelAxis x_;
   PixelAxis z_;
+  int plane_;  ///< the coarsest with vertices enough
+  ReadTiles read_tiles_;
+  std::int64_t width_;
+  TileGrid grid_;
+  Palette palette_;
+  Illumination illumination_;
   double datum_ = 0.0;
   double world_per_elevation_ = 1.0;
   double fall_ = 1.0;
@@ -439,7 +451,11 @@ ShadeReport shade_rows(const ArchiveReader& archive, const ShadeOptions& options
                        const Job& job) {
   ShadeReport report{options.size.value_or(shade_size(archive))};
   require(options, report.size);
-  Arena(job).execute([&] { report.used_seeds = ShadeRenderer(archive, options, report.size, job).run(take); });
+  Arena(job).execute([&] {
+    ShadeRenderer renderer(archive, options, report.size, job);
+    report.plane = renderer.plane();
+    report.used_seeds = renderer.run(take);
+  });
   return report;
 }
 

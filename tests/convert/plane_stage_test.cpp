@@ -1,0 +1,229 @@
+#include "isohf/convert/stages/plane_stage.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <set>
+
+#include "isohf/archive.h"
+#include "isohf/archive/planes/archive_planes.h"
+#include "isohf/convert.h"
+#include "isohf/error.h"
+#include "isohf/shade.h"
+#include "isohf/verify.h"
+#include "support/altered_archive.h"
+#include "support/memory_source.h"
+#include "support/temporary_folder.h"
+
+namespace isohf {
+namespace {
+
+/// Hills with a lake of voids, wide enough for planes of 12x19 tiles.
+class Hills : public test::MemorySource<float> {
+ public:
+  Hills()
+      : MemorySource(SampleType::kFloat32, 210, 150, [](std::int64_t c, std::int64_t r) {
+          const auto x = static_cast<double>(c);
+          const auto z = static_cast<double>(r);
+          if (std::hypot(x - 60.0, z - 40.0) < 25.0) return std::numeric_limits<double>::quiet_NaN();
+          return 300.0 + 20.0 * std::sin(x * 0.05) * std::cos(z * 0.04) + 3.0 * std::sin(x * 0.6 + z * 0.3);
+        }) {}
+
+  void read_window(const Window& window, std::span<std::byte> out) override {
+    if (window.row + window.rows > fail_from_row) throw Error(ErrorCode::kCancelled, "interrupted");
+    MemorySource::read_window(window, out);
+  }
+  std::int64_t fail_from_row = std::numeric_limits<std::int64_t>::max();
+};
+
+ConvertOptions options_of(CodeType type = CodeType::kU16) {
+  ConvertOptions options;
+  options.plan.shape = {12, 19};
+  options.plan.levels = 2;
+  options.code_type = type;
+  options.overwrite = true;
+  options.producer = "isohf test";
+  options.z_range = {270.0, 330.0};
+  return options;
+}
+
+std::string content(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+std::set<int> findings_in(const std::string& archive) {
+  std::set<int> ids;
+  for (const Finding& found : verify_archive(archive).findings) ids.insert(found.id);
+  return ids;
+}
+
+TEST(PlaneStage, PlanesOfEveryCodeTypeHoldWhatTheTilesBelowHold) {
+  const test::TemporaryFolder folder;
+  for (const CodeType type : {CodeType::kU16, CodeType::kU8, CodeType::kF32}) {
+    Hills source;
+    const ConvertSummary summary = convert(source, folder / "a.isohf", options_of(type));
+    EXPECT_GT(summary.plane_bytes, 0U);
+    EXPECT_EQ(summary.metadata.planes, (PlaneInfo{8, 2}));
+    const ArchiveReader archive(folder / "a.isohf");
+    const Planes planes = planes_of(archive.metadata());
+    const TileShape& shape = archive.grid().shape();
+    std::int64_t same = 0;
+    for (int plane = 1; plane <= planes.count(); ++plane) {
+      EXPECT_EQ(archive.metadata().plane_grid(plane), planes.grid(plane));
+      for (std::int64_t i = 0; i < planes.grid(plane).tile_count(); ++i) {
+        const TileIndex tile = planes.grid(plane).tile_at(i);
+        const std::vector<double> heights = archive.read_elevations(tile, plane);
+        for (int r = 1; r < shape.rows() - 1; r += 3) {
+          for (int c = 1; c < shape.columns() - 3; ++c) {
+            if (planes.is_beyond(plane, planes.grid(plane).lattice_vertex(tile, {c, r}))) continue;
+            const TileVertex below = planes.vertex_below(plane, tile, {c, r});
+            const double wanted = archive.read_elevations(
+                below.tile)[static_cast<std::size_t>(below.vertex.row * shape.columns() + below.vertex.column)];
+            const double found = heights[static_cast<std::size_t>(r * shape.columns() + c)];
+            ASSERT_TRUE(found == wanted || (std::isnan(found) && std::isnan(wanted)));
+            same += std::isnan(found) ? 0 : 1;
+          }
+        }
+      }
+    }
+    EXPECT_GT(same, 100);
+    EXPECT_EQ(findings_in(folder / "a.isohf"), std::set<int>());
+  }
+}
+
+TEST(PlaneStage, BytesDependNeitherOnThreadsNorOnMemory) {
+  const test::TemporaryFolder folder;
+  Hills source;
+  (void)convert(source, folder / "a.isohf", options_of());
+  const std::string wanted = content(folder / "a.isohf");
+  for (const int threads : {1, 3}) {
+    Job job;
+    job.threads = threads;
+    job.memory_bytes = threads == 1 ? 20'000'000 : 0;
+    (void)convert(source, folder / "b.isohf", options_of(), job);
+    ASSERT_EQ(content(folder / "b.isohf"), wanted) << threads << " threads";
+  }
+}
+
+TEST(PlaneStage, AConversionThatIsResumedGivesTheSameBytes) {
+  const test::TemporaryFolder folder;
+  Hills source;
+  ConvertOptions options = options_of();
+  (void)convert(source, folder / "a.isohf", options);
+  const std::string wanted = content(folder / "a.isohf");
+  for (std::int64_t row = 10; row < 150; row += 9) {
+    std::filesystem::remove(folder / "b.isohf.part");
+    std::filesystem::remove(folder / "b.isohf.part.journal");
+    Hills failing;
+    options.resume = false;
+    failing.fail_from_row = row;
+    EXPECT_THROW((void)convert(failing, folder / "b.isohf", options), Error);
+    options.resume = true;
+    (void)convert(source, folder / "b.isohf", options);
+    ASSERT_EQ(content(folder / "b.isohf"), wanted) << "interrupted at row " << row;
+    std::filesystem::remove(folder / "b.isohf");
+  }
+}
+
+TEST(PlaneStage, PlanesThatAreAddedLaterAreTheSame) {
+  const test::TemporaryFolder folder;
+  Hills source;
+  ConvertOptions options = options_of();
+  options.shadow_seeds.emplace();
+  options.lossless = true;
+  (void)convert(source, folder / "a.isohf", options);
+  options.planes = false;
+  const ConvertSummary without = convert(source, folder / "b.isohf", options);
+  EXPECT_EQ(without.plane_bytes, 0U);
+  EXPECT_EQ(without.metadata.planes, PlaneInfo());
+  EXPECT_EQ(findings_in(folder / "b.isohf"), std::set<int>());
+  const AddPlanesSummary added = add_planes(folder / "b.isohf", folder / "b.isohf", false);
+  EXPECT_EQ(added.planes, (PlaneInfo{8, 2}));
+  EXPECT_EQ(content(folder / "b.isohf"), content(folder / "a.isohf"));
+  (void)add_planes(folder / "a.isohf", folder / "c.isohf", false);  // made anew
+  EXPECT_EQ(content(folder / "c.isohf"), content(folder / "a.isohf"));
+  EXPECT_THROW((void)add_planes(folder / "a.isohf", folder / "c.isohf", false), Error);
+}
+
+TEST(PlaneStage, VerifyFindsWhatIsNotThatOfTheTilesBelow) {
+  const test::TemporaryFolder folder;
+  Hills source;
+  (void)convert(source, folder / "a.isohf", options_of());
+  {
+    test::AlteredArchive altered(folder / "a.isohf");
+    altered.set("planes/1/0/1.tile", altered.bytes("planes/1/0/2.tile"));
+    altered.write(folder / "b.isohf");
+    EXPECT_TRUE(findings_in(folder / "b.isohf").count(finding::kPlane));
+  }
+  {
+    test::AlteredArchive altered(folder / "a.isohf");
+    altered.remove("planes/2/0/0.tile");
+    altered.write(folder / "b.isohf");
+    EXPECT_TRUE(findings_in(folder / "b.isohf").count(finding::kPlane));
+  }
+}
+
+/// Counts what is read of a file.
+class CountedFile : public ByteSource {
+ public:
+  explicit CountedFile(const std::string& path) : file_(open_file_source(path)) {}
+  [[nodiscard]] std::uint64_t size_bytes() const override { return file_->size_bytes(); }
+  std::size_t read(std::uint64_t offset_bytes, std::span<std::byte> out) const override {
+    bytes += out.size();
+    return file_->read(offset_bytes, out);
+  }
+  mutable std::atomic<std::uint64_t> bytes = 0;
+
+ private:
+  std::shared_ptr<const ByteSource> file_;
+};
+
+TEST(PlaneStage, ShadeReadsThePlaneThatSuffices) {
+  const test::TemporaryFolder folder;
+  test::MemorySource<float> source(SampleType::kFloat32, 1200, 900, [](std::int64_t c, std::int64_t r) {
+    const auto x = static_cast<double>(c);
+    const auto z = static_cast<double>(r);
+    return 300.0 + 90.0 * std::sin(x * 0.011) * std::cos(z * 0.013) + 0.2 * std::sin(x * 1.7) * std::sin(z * 1.1);
+  });
+  ConvertOptions options;
+  options.plan.shape = {36, 35};
+  (void)convert(source, folder / "a.isohf", options);
+  const auto file = std::make_shared<CountedFile>(folder / "a.isohf");
+  const ArchiveReader archive(file, "a.isohf");
+  ASSERT_EQ(archive.metadata().planes.stride, 8);
+  ShadeOptions request;
+  request.hillshade = true;
+  request.sun_elevation_deg = 30.0;
+  request.size = GridSize{60, 45};
+  file->bytes = 0;
+  int plane = 0;
+  Picture coarse(60, 45, 4);
+  std::size_t at = 0;
+  plane = shade_rows(archive, request, [&](std::span<const std::uint8_t> rows) {
+            std::copy(rows.begin(), rows.end(), coarse.samples.begin() + static_cast<std::ptrdiff_t>(at));
+            at += rows.size();
+          }).plane;
+  EXPECT_EQ(plane, 1);
+  EXPECT_LT(file->bytes * 10, archive.size_bytes());
+  // The ground is drawn to its edge, and looks as the tiles themselves do.
+  options.planes = false;
+  (void)convert(source, folder / "b.isohf", options);
+  const Picture fine = shade(ArchiveReader(folder / "b.isohf"), request);
+  double sum = 0.0;
+  for (std::size_t i = 0; i < coarse.samples.size(); ++i) {
+    if (i % 4 == 3) {
+      ASSERT_EQ(coarse.samples[i], 255);
+    }
+    sum += std::abs(int{coarse.samples[i]} - int{fine.samples[i]});
+  }
+  EXPECT_LT(sum / static_cast<double>(coarse.samples.size()), 4.0) << "of 255";
+}
+
+}  // namespace
+}  // namespace isohf
