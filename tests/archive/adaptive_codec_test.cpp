@@ -149,7 +149,7 @@ TEST(AdaptiveCodec, TakesNoMoreBytesAtHigherLevels) {
   for (const unsigned shift : {0U, 3U, 6U, 8U}) {
     for (const Kind kind : {Kind::kTerrain, Kind::kPlane, Kind::kVoidIsland}) {
       std::size_t before = std::numeric_limits<std::size_t>::max();
-      for (int level = 6; level <= kMaxLevel; ++level) {
+      for (int level = kMinLevel; level <= kMaxLevel; ++level) {
         TileCodes tile = test::make_tile(shape, CodeType::kU16, kind, 3);
         for (std::uint16_t& code : tile.codes) code = code == 65535 ? code : static_cast<std::uint16_t>(code >> shift);
         const std::size_t bytes = encode_tile(shape, tile, level).deflated.size();

@@ -1,16 +1,35 @@
-// Any bytes are a tile payload or an error, for every sample type. The first byte chooses shape and type.
+// Any bytes are a tile payload or an error, for every sample type and both versions. The first byte chooses shape and type.
 
 #include <array>
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
+#include <optional>
 #include <span>
+#include <vector>
 
 #include "isohf/archive/codec/simd/batch_decoder.h"
 #include "isohf/archive/codec/tile_decoder.h"
 #include "isohf/archive/codec/tile_encoder.h"
 #include "isohf/archive/container/content_hash.h"
+#include "isohf/archive/deflate/deflate.h"
 #include "isohf/error.h"
+
+namespace {
+
+using Decode = isohf::TileCodes (*)(const isohf::TileShape&, isohf::CodeType, std::span<const std::byte>);
+
+/// The digest of the tile, or nothing where it is refused.
+std::optional<std::vector<std::byte>> digest_by(Decode decode, const isohf::TileShape& shape, isohf::CodeType type,
+                                                std::span<const std::byte> payload) {
+  try {
+    return tile_content_digest(decode(shape, type, payload));
+  } catch (const isohf::Error&) {
+    return std::nullopt;
+  }
+}
+
+}  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using isohf::CodeType;
@@ -28,11 +47,20 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   std::array<bool, 2> is_decoded{};
   decode_batch(shape, type, twice, lanes, is_decoded);
   if (is_decoded[0] != is_decoded[1]) std::abort();
+  if (digest_by(isohf::decode_tile, shape, type, payload) !=
+      digest_by(isohf::decode_tile_slowly, shape, type, payload)) {
+    std::abort();
+  }
   try {
     const isohf::TileCodes tile = decode_tile(shape, type, payload);
     // What is read can be written, and reads back the same.
-    const isohf::EncodedTile encoded = encode_tile(shape, tile);
+    const isohf::EncodedTile encoded = encode_tile(shape, tile, isohf::kDefaultLevel, isohf::PayloadVersion::kAdaptive);
     if (encoded.content_digest.size() != 32) std::abort();
+    if (!encoded.is_empty) {
+      std::vector<std::byte> written(encoded.payload_bytes);
+      isohf::inflate_exactly(encoded.deflated, written);
+      if (digest_by(isohf::decode_tile, shape, type, written) != encoded.content_digest) std::abort();
+    }
     for (const isohf::TileCodes& lane : lanes) {
       if (is_decoded[0] && tile_content_digest(lane) != encoded.content_digest) std::abort();
     }

@@ -39,14 +39,17 @@ constexpr std::array<CodingEffort, kMaxLevel> kEfforts = {{
     {.fit = {2, 1, 2, 8, 1, 6, true}, .streams = {1, true}},
 }};
 
-/// What payloads of version 2 are worth: one predictor, as what is learnt does what several would. Each level tries what
-/// those below try.
+/// What payloads of version 2 are worth: one predictor, as what is learnt does what several would. From level 6 on all
+/// efforts from the fifth to the one asked for are tried and the shortest payload kept, below they are the same, so that
+/// no level takes more bytes than the one before.
+constexpr FitEffort kNoFit = {0, 1, 1, 0, 1, 0, false};
+constexpr FitEffort kUsualFit = {2, 9, 1, 0, 1, 0, false};
 constexpr std::array<FitEffort, kMaxLevel> kAdaptiveEfforts = {{
-    {0, 1, 1, 0, 1, 0, false},
-    {1, 15, 1, 0, 1, 0, false},
-    {1, 9, 1, 0, 1, 0, false},
-    {2, 15, 1, 0, 1, 0, false},
-    {2, 9, 1, 0, 1, 0, false},
+    kNoFit,
+    kUsualFit,
+    kUsualFit,
+    kUsualFit,
+    kUsualFit,
     {2, 5, 1, 0, 1, 0, false},
     {3, 3, 1, 0, 1, 0, false},
     {2, 5, 1, 0, 1, 0, true},
@@ -55,7 +58,8 @@ constexpr std::array<FitEffort, kMaxLevel> kAdaptiveEfforts = {{
     {6, 1, 1, 0, 1, 0, true},
     {8, 1, 1, 0, 1, 0, true},
 }};
-constexpr int kFirstTryingLevel = 6;        ///< from here on all efforts from this level to the one asked for are tried
+constexpr int kLastUsualLevel = 5;
+constexpr std::size_t kFewBytes = 1200;     ///< of a payload in which weights of its own may not pay
 constexpr std::int64_t kFewSamples = 1024;  ///< below, there is little to learn from
 
 /// The void mask, as 0 and 1; empty where nothing is void.
@@ -202,13 +206,16 @@ bool encode_adaptively(const TileShape& shape, const PayloadHeader& header, std:
   payload.base = header.base;
   payload.is_void = std::move(voids);
   std::vector<std::byte> best;
-  for (int tried = std::min(level, kFirstTryingLevel - 1); tried <= level; ++tried) {
-    const FitEffort& fit = kAdaptiveEfforts[static_cast<std::size_t>(tried - kMinLevel)];
+  const auto try_fit = [&](const FitEffort& fit) {
     payload.predictors = fit_predictors<std::int32_t>(lattice, header.low, header.high, fit);
     payload.has_weights = payload.predictors.weights.front() != kThirdRowWeights;
     std::vector<std::byte> bytes = encode_adaptive(lattice, payload);
     if (best.empty() || bytes.size() < best.size()) best = std::move(bytes);
+  };
+  for (int tried = std::min(level, kLastUsualLevel); tried <= level; ++tried) {
+    try_fit(kAdaptiveEfforts[static_cast<std::size_t>(tried - kMinLevel)]);
   }
+  if (level > kMinLevel && best.size() < kFewBytes) try_fit(kNoFit);
   if (best.size() > max_payload_bytes(shape, header.type)) return false;
   DeflateWriter writer(tile.deflated);
   writer.add(best);

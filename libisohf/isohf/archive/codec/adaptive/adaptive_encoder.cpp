@@ -56,24 +56,18 @@ ISOHF_KERNEL void find_contexts(const ContextRows& rows, int first, int last, st
   }
 }
 
-/// A row's residuals and what they are coded with, by place; slid vertices apart.
+/// A row's residuals and what they are coded with, by place; the last two are the slid vertices.
 struct CodedRow {
   std::vector<std::uint16_t> residuals;
   std::vector<std::uint16_t> contexts;
   std::vector<std::uint8_t> plain_bits;
-  std::array<std::uint16_t, 2> slid_residuals;
-  std::array<std::uint16_t, 2> slid_contexts;
-  std::array<std::uint8_t, 2> slid_plain_bits;
+  std::vector<std::uint32_t> extra;  ///< extra bits above their number; with zeros around, as steps have
 };
+constexpr unsigned kExtraShift = 5;
 
-/// A step of the coder: first slot and number of slots of a symbol, and which state takes them, in one number.
-constexpr unsigned kStateShift = 2 * kFrequencyBits + 1;
-constexpr std::uint32_t step_of(const SymbolTable& table, std::uint32_t symbol, int row_in_band) {
-  return table.starts[symbol] | std::uint32_t{table.frequencies[symbol]} << kFrequencyBits |
-         static_cast<std::uint32_t>(row_in_band) << kStateShift;
-}
-constexpr std::uint32_t frequency_of(std::uint32_t step) {
-  return step >> kFrequencyBits & (2 * kFrequencySum - 1);
+/// A step of the coder: first slot and number of slots of a symbol, in one number; 0 for none.
+constexpr std::uint32_t step_of(const SymbolTable& table, std::uint32_t symbol) {
+  return table.starts[symbol] | std::uint32_t{table.frequencies[symbol]} << kFrequencyBits;
 }
 
 class AdaptiveEncoder {
@@ -83,13 +77,15 @@ class AdaptiveEncoder {
         payload_(payload),
         columns_(lattice.columns()),
         eighths_(static_cast<std::size_t>(columns_)),
-        steps_(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(lattice.rows())),
+        stride_(2 * kMostBandDelay + columns_ + 2),
+        steps_(static_cast<std::size_t>(stride_) * static_cast<std::size_t>(bands() * kBandRows)),
         extra_(3 * static_cast<std::size_t>(columns_) * static_cast<std::size_t>(lattice.rows())) {
     for (auto& row : deviations_) row.resize(static_cast<std::size_t>(columns_) + 2 * kMargin);
     for (CodedRow& row : band_) {
-      row.residuals.resize(static_cast<std::size_t>(columns_));
+      row.residuals.resize(static_cast<std::size_t>(columns_) + 2);
       row.contexts.resize(row.residuals.size());
       row.plain_bits.resize(row.residuals.size());
+      row.extra.resize(static_cast<std::size_t>(stride_));
     }
   }
 
@@ -97,14 +93,22 @@ class AdaptiveEncoder {
     const int rows = lattice_.rows();
     for (int top = 0; top < rows; top += kBandRows) {
       const int count = std::min(kBandRows, rows - top);
-      for (int i = 0; i < count; ++i) find_row(top + i, band_[static_cast<std::size_t>(i)]);
-      code_band(top, count);
+      bool has_extra = false;
+      for (int i = 0; i < count; ++i) {
+        CodedRow& row = band_[static_cast<std::size_t>(i)];
+        find_row(top + i, row);
+        has_extra |= code_row(row, i, steps_of(top + i));
+      }
+      if (has_extra) put_extra(count);
       model_.end_band();
     }
     return finish();
   }
 
  private:
+  [[nodiscard]] int bands() const { return (lattice_.rows() + kBandRows - 1) / kBandRows; }
+  /// Those of a row's places, with zeros around as far as other rows of its band are ahead or behind.
+  std::uint32_t* steps_of(int r) { return steps_.data() + static_cast<std::ptrdiff_t>(r) * stride_ + kMostBandDelay; }
   std::int32_t* deviations(int r) { return deviations_[static_cast<std::size_t>(r % 3)].data() + kMargin; }
   [[nodiscard]] bool is_void(int r, int column) const {
     return payload_.is_void[static_cast<std::size_t>(r) * static_cast<std::size_t>(columns_) +
@@ -135,7 +139,7 @@ class AdaptiveEncoder {
       if (is_void(r, column_of_place(columns_, r, p))) row.contexts[static_cast<std::size_t>(p)] = kNoContext;
     }
     for (std::size_t side = 0; r % 2 == 0 && side < 2; ++side) {
-      if (is_void(r, column_of_slid(columns_, static_cast<int>(side)))) row.slid_contexts[side] = kNoContext;
+      if (is_void(r, column_of_slid(columns_, static_cast<int>(side)))) row.contexts[slid_place(side)] = kNoContext;
     }
   }
 
@@ -145,74 +149,108 @@ class AdaptiveEncoder {
     const std::int32_t* const off = deviations(r);
     const FinePrediction prediction(4 * (own[at] + own[at + 1]));
     const std::uint32_t of_class = class_of(fine_energy_of_slid(off[at], off[at + 1]));
-    row.slid_residuals[side] =
-        static_cast<std::uint16_t>(prediction.residual_of(lattice_.slid(r, static_cast<int>(side))));
-    row.slid_contexts[side] = static_cast<std::uint16_t>(context_of(of_class, prediction.quarter, kLevelPattern));
-    row.slid_plain_bits[side] = static_cast<std::uint8_t>(plain_bits_of(of_class));
+    const std::size_t place = slid_place(side);
+    row.residuals[place] = static_cast<std::uint16_t>(prediction.residual_of(lattice_.slid(r, static_cast<int>(side))));
+    row.contexts[place] = static_cast<std::uint16_t>(context_of(of_class, prediction.quarter, kLevelPattern));
+    row.plain_bits[place] = static_cast<std::uint8_t>(plain_bits_of(of_class));
+  }
+  [[nodiscard]] std::size_t slid_place(std::size_t side) const { return static_cast<std::size_t>(columns_) + side; }
+
+  /// Finds the steps of a row, counts its symbols; true where some have extra bits.
+  bool code_row(CodedRow& row, int row_in_band, std::uint32_t* steps) {
+    const auto first = static_cast<std::size_t>(Lattice<std::int32_t>::first(row_in_band));
+    const auto end = static_cast<std::size_t>(lattice_.last(row_in_band)) + 1;
+    std::uint32_t* const extra = row.extra.data() + kMostBandDelay;
+    bool has_extra = code_places(row, first, end, steps, extra);
+    if (row_in_band % 2 == 0) {
+      has_extra |= code_places(row, slid_place(0), slid_place(2), steps + kMostBandDelay, extra + kMostBandDelay);
+    }
+    return has_extra;
+  }
+  bool code_places(const CodedRow& coded, std::size_t begin, std::size_t end, std::uint32_t* steps,
+                   std::uint32_t* extra_out) {
+    std::uint32_t any = 0;
+    for (std::size_t place = begin; place < end; ++place) {
+      extra_out[place] = 0;
+      if (coded.contexts[place] == kNoContext) continue;
+      SymbolModel::Row& row = model_.row(coded.contexts[place]);
+      const std::uint32_t residual = coded.residuals[place];
+      const unsigned plain_bits = coded.plain_bits[place];
+      std::uint32_t symbol = std::min(residual >> plain_bits, kEscape);
+      if (row.table.frequencies[symbol] == 0) symbol = kEscape;
+      steps[place] = step_of(row.table, symbol);
+      ++row.pending[symbol];
+      std::uint32_t extra = (residual & ((1U << plain_bits) - 1)) << kExtraShift | plain_bits;
+      if (symbol == kEscape) {
+        const auto bits = static_cast<unsigned>(std::bit_width(residual + 1)) - 1;
+        const std::uint32_t both = bits | ((residual + 1) & ((1U << bits) - 1)) << kEscapeBits;
+        extra = both << kExtraShift | (kEscapeBits + bits);
+      }
+      extra_out[place] = extra;
+      any |= extra;
+    }
+    return any != 0;
   }
 
-  void code_band(int top, int count) {
+  /// The extra bits of a band in coding order.
+  void put_extra(int rows) {
+    const auto put = [&](int i, int place) {
+      const std::uint32_t extra =
+          band_[static_cast<std::size_t>(i)].extra[static_cast<std::size_t>(place + kMostBandDelay)];
+      if (extra != 0) extra_.put(extra >> kExtraShift, extra & ((1U << kExtraShift) - 1));
+    };
     for (int t = 0; t < columns_ + kMostBandDelay; ++t) {
-      for (int i = 0; i < count; ++i) {
-        const int place = t - delay_of_row(i);
-        if (place < Lattice<std::int32_t>::first(i) || place > lattice_.last(top + i)) continue;
-        const CodedRow& row = band_[static_cast<std::size_t>(i)];
-        const auto at = static_cast<std::size_t>(place);
-        code(i, row.residuals[at], row.contexts[at], row.plain_bits[at]);
-      }
+      for (int i = 0; i < rows; ++i) put(i, t - delay_of_row(i));
     }
-    for (int i = 0; i < count; i += 2) {
-      const CodedRow& row = band_[static_cast<std::size_t>(i)];
-      for (std::size_t side = 0; side < 2; ++side) {
-        code(i, row.slid_residuals[side], row.slid_contexts[side], row.slid_plain_bits[side]);
-      }
-    }
-  }
-
-  void code(int row_in_band, std::uint32_t residual, std::uint32_t context, unsigned plain_bits) {
-    if (context == kNoContext) return;
-    SymbolModel::Row& row = model_.row(context);
-    std::uint32_t symbol = std::min(residual >> plain_bits, kEscape);
-    if (row.table.frequencies[symbol] == 0) symbol = kEscape;
-    *step_++ = step_of(row.table, symbol, row_in_band);
-    ++row.pending[symbol];
-    if (symbol == kEscape) {
-      const auto bits = static_cast<unsigned>(std::bit_width(residual + 1)) - 1;
-      extra_.put(bits | ((residual + 1) & ((1U << bits) - 1)) << kEscapeBits, kEscapeBits + bits);
-    } else if (plain_bits != 0) {
-      extra_.put(residual & ((1U << plain_bits) - 1), plain_bits);
+    for (int i = 0; i < rows; i += 2) {
+      put(i, columns_ + kMostBandDelay);
+      put(i, columns_ + kMostBandDelay + 1);
     }
   }
 
   /// Runs the coder from the last step to the first, as a decoder runs from the first to the last. The words come to
   /// stand at the end of `words`; returns how many there are.
-  std::size_t run_coder(std::size_t state_count, std::span<std::uint16_t> words) {
-    std::array<std::uint32_t, kMostStates> states;
+  template <std::size_t kStates>
+  std::size_t run_coder(std::span<std::uint16_t> words) {
+    std::array<std::uint32_t, kStates> states;
     states.fill(kFirstState);
     std::uint16_t* const end = words.data() + words.size();
     std::uint16_t* word = end;
-    const std::size_t mask = state_count - 1;
-    for (const std::uint32_t* step = step_; step != steps_.data();) {
-      --step;
-      const std::uint32_t frequency = frequency_of(*step);
-      std::uint32_t& state = states[(*step >> kStateShift) & mask];
+    const auto take = [&](std::uint32_t step, int row_in_band) {
+      if (step == 0) return;
+      const std::uint32_t frequency = step >> kFrequencyBits;
+      std::uint32_t& state = states[static_cast<std::size_t>(row_in_band) % kStates];
       std::uint32_t now = state;
       word[-1] = static_cast<std::uint16_t>(now);
       const bool is_full = now >> (32 - kFrequencyBits) >= frequency;
       word -= is_full ? 1 : 0;
       now = is_full ? now >> 16U : now;
-      state = (now / frequency << kFrequencyBits) + now % frequency + *step % kFrequencySum;
+      state = (now / frequency << kFrequencyBits) + now % frequency + step % kFrequencySum;
+    };
+    for (int band = bands() - 1; band >= 0; --band) {
+      const std::uint32_t* const steps = steps_of(band * kBandRows);
+      for (int i = kBandRows - 2; i >= 0; i -= 2) {
+        take(steps[i * stride_ + columns_ + kMostBandDelay + 1], i);
+        take(steps[i * stride_ + columns_ + kMostBandDelay], i);
+      }
+      for (int t = columns_ + kMostBandDelay - 1; t >= 0; --t) {
+#pragma GCC unroll 8
+        for (int i = kBandRows - 1; i >= 0; --i) {
+          take(steps[i * stride_ + t - delay_of_row(i)], i);
+        }
+      }
     }
-    payload_.states.assign(states.begin(), states.begin() + static_cast<std::ptrdiff_t>(state_count));
+    payload_.states.assign(states.begin(), states.end());
     return static_cast<std::size_t>(end - word);
   }
 
   std::vector<std::byte> finish() {
     // A step takes no more than a word; the one before the first is written to as well.
-    Scratch<std::uint16_t> room(static_cast<std::size_t>(step_ - steps_.data()) + 1);
-    const std::span<std::uint16_t> words(room.data(), static_cast<std::size_t>(step_ - steps_.data()) + 1);
-    std::size_t count = run_coder(kMostStates, words);
-    if (count < kFewWords) count = run_coder(1, words);
+    const std::size_t most = static_cast<std::size_t>(columns_) * static_cast<std::size_t>(lattice_.rows()) + 1;
+    Scratch<std::uint16_t> room(most);
+    const std::span<std::uint16_t> words(room.data(), most);
+    std::size_t count = run_coder<kMostStates>(words);
+    if (count < kFewWords) count = run_coder<1>(words);
     std::vector<std::byte> bytes;
     write_adaptive_payload(payload_, words.last(count), extra_.finish(), bytes);
     return bytes;
@@ -225,8 +263,8 @@ class AdaptiveEncoder {
   std::array<std::vector<std::int32_t>, 3> deviations_;
   std::array<CodedRow, kBandRows> band_{};
   SymbolModel model_;
-  Scratch<std::uint32_t> steps_;
-  std::uint32_t* step_ = steps_.data();
+  int stride_;
+  std::vector<std::uint32_t> steps_;
   BitPacker extra_;
 };
 

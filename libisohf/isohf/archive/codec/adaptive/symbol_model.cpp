@@ -44,16 +44,18 @@ ISOHF_KERNEL void mix(std::uint32_t* __restrict counts, std::uint32_t* __restric
   using Eight = std::uint16_t __attribute__((vector_size(16)));
   using Sixteen = std::uint16_t __attribute__((vector_size(32)));
   Half symbols[2];
-  std::uint32_t more = 0;
+  Half more{};
   for (std::size_t i = 0; i < 2; ++i) {
     auto& waiting = unaligned<Half>(pending + 8 * i);
     const Half now = waiting.value;
-    for (std::size_t s = 0; s < 8; ++s) more += now[s];
+    more += now;
     symbols[i] = unaligned<Half>(counts + 8 * i).value + now;
     unaligned<Half>(counts + 8 * i).value = symbols[i];
     waiting.value = Half{};
   }
-  all += more;
+  more += __builtin_shufflevector(more, more, 4, 5, 6, 7, 0, 1, 2, 3);
+  more += __builtin_shufflevector(more, more, 2, 3, 0, 1, 6, 7, 4, 5);
+  all += more[0] + more[1];
   const std::uint32_t inverse = 0x7ff80000U / (all + 8);  // less than 2^31 parts, so that four slots are left
   Eight halves[2];
   for (std::size_t i = 0; i < 2; ++i) {
@@ -99,7 +101,11 @@ const std::array<SymbolTable, kPlainContexts>& first_tables() {
 }  // namespace
 
 SymbolModel::SymbolModel()
-    : rows_(kPlainContexts), counts_(kPlainContexts), is_pending_(kPlainContexts), row_of_(kAllContexts, kNoRow) {
+    : rows_(kPlainContexts),
+      counts_(kPlainContexts),
+      is_pending_(kPlainContexts),
+      row_of_(kAllContexts, kNoRow),
+      pending_(kAllContexts + 1) {
   rows_.reserve(4 * kPlainContexts);
   counts_.reserve(4 * kPlainContexts);
   for (std::uint16_t i = 0; i < kPlainContexts; ++i) {
@@ -119,11 +125,6 @@ std::uint32_t SymbolModel::open_row(std::uint32_t context) {
   return static_cast<std::uint32_t>(index);
 }
 
-void SymbolModel::add_to_pending(std::uint32_t index) {
-  is_pending_[index] = 1;
-  pending_.push_back(static_cast<std::uint16_t>(index));
-}
-
 void SymbolModel::remake(std::uint32_t index) {
   Row& row = rows_[index];
   Counts& counts = counts_[index];
@@ -135,21 +136,21 @@ void SymbolModel::remake(std::uint32_t index) {
 void SymbolModel::end_band() {
   if (!is_due(++bands_)) return;
   // What occurred with a pattern occurred without one. Parents come first, as what is expected of their children.
-  const std::size_t occurred = pending_.size();
+  const std::size_t occurred = pending_count_;
   for (std::size_t i = 0; i < occurred; ++i) {
     const std::uint16_t index = pending_[i];
     if (index < kPlainContexts) continue;
     const std::uint32_t parent = parent_of(counts_[index].context);
     for (std::size_t s = 0; s < kModelSymbols; ++s) rows_[parent].pending[s] += rows_[index].pending[s];
-    if (is_pending_[parent] == 0) add_to_pending(parent);
+    add_to_pending(parent);
   }
-  for (const std::uint16_t index : pending_) {
-    if (index < kPlainContexts) remake(index);
+  for (std::size_t i = 0; i < pending_count_; ++i) {
+    if (pending_[i] < kPlainContexts) remake(pending_[i]);
   }
-  for (const std::uint16_t index : pending_) {
-    if (index >= kPlainContexts) remake(index);
+  for (std::size_t i = 0; i < pending_count_; ++i) {
+    if (pending_[i] >= kPlainContexts) remake(pending_[i]);
   }
-  pending_.clear();
+  pending_count_ = 0;
 }
 
 }  // namespace isohf

@@ -37,7 +37,7 @@ class SymbolModel {
   [[nodiscard]] Row& row(std::uint32_t context) {
     std::uint32_t index = row_of_[context];
     if (index == kNoRow) index = open_row(context);
-    if (is_pending_[index] == 0) add_to_pending(index);
+    add_to_pending(index);
     return rows_[index];
   }
   /// Without opening one: what the context would start with.
@@ -60,7 +60,12 @@ class SymbolModel {
   };
 
   std::uint32_t open_row(std::uint32_t context);
-  void add_to_pending(std::uint32_t index);
+  /// Once each, without a branch that nobody could foresee.
+  void add_to_pending(std::uint32_t index) {
+    pending_[pending_count_] = static_cast<std::uint16_t>(index);
+    pending_count_ += 1U - is_pending_[index];
+    is_pending_[index] = 1;
+  }
   void remake(std::uint32_t index);
 
   std::uint32_t bands_ = 0;
@@ -68,7 +73,8 @@ class SymbolModel {
   std::vector<Counts> counts_;            ///< likewise
   std::vector<std::uint8_t> is_pending_;  ///< likewise
   std::vector<std::uint16_t> row_of_;     ///< by context
-  std::vector<std::uint16_t> pending_;
+  std::vector<std::uint16_t> pending_;    ///< rows to make anew, the first pending_count_
+  std::size_t pending_count_ = 0;
 };
 
 }  // namespace isohf
