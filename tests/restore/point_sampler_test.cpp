@@ -189,5 +189,68 @@ TEST_P(PointSamplerTest, WorksOnTheJobsThreadsUntilItIsCancelled) {
 INSTANTIATE_TEST_SUITE_P(Types, PointSamplerTest, testing::Values(CodeType::kU16, CodeType::kU8, CodeType::kF32),
                          [](const auto& tested) { return to_string(tested.param); });
 
+/// Every visible vertex at its own place, as products and quotients give it, beside voids or not.
+TEST_P(PointSamplerTest, FindsAVertexAtItsOwnPlaceBesideVoids) {
+  const ArchiveReader archive(folder / "a.isohf");
+  const TileGrid& grid = archive.grid();
+  Surface surface(archive);
+  int beside_voids = 0;
+  for (std::int64_t flat = 0; flat < grid.tile_count(); ++flat) {
+    const TileIndex tile = grid.tile_at(flat);
+    const std::vector<double> stored = archive.read_elevations(tile);
+    std::vector<WorldPoint> places;
+    std::vector<double> wanted;
+    for (int r = 0; r < grid.shape().rows(); ++r) {
+      for (int c = 0; c < grid.shape().columns(); ++c) {
+        if (!is_visible(grid.shape(), {c, r})) continue;
+        const WorldPoint at = grid.world_from_lattice(grid.lattice_vertex(tile, {c, r}));
+        // As coordinates of a map with its origin far away bring it back.
+        places.push_back({std::clamp((at.x + 654321.7) - 654321.7, 0.0, grid.world_width()),
+                          std::clamp((at.z + 4654321.3) - 4654321.3, 0.0, grid.world_height())});
+        wanted.push_back(stored[static_cast<std::size_t>(r * grid.shape().columns() + c)]);
+      }
+    }
+    std::vector<double> found(places.size());
+    std::vector<SurfaceSample> samples(places.size());
+    surface.sample(places, found);
+    surface.sample(places, samples);
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      ASSERT_EQ(std::isnan(found[i]), std::isnan(wanted[i])) << places[i].x << "," << places[i].z;
+      ASSERT_EQ(samples[i].state == SurfaceState::kNodata, std::isnan(wanted[i]));
+      if (std::isnan(wanted[i])) continue;
+      ASSERT_NEAR(found[i], wanted[i], 1e-6);  // 1e-9 of a step down slopes of 20 a step, and sums of the three
+      ASSERT_NEAR(samples[i].elevation, wanted[i], 1e-6);
+      beside_voids += places[i].x > 85.0 && places[i].x < 145.0 && places[i].z > 55.0 && places[i].z < 95.0 ? 1 : 0;
+    }
+  }
+  EXPECT_GT(beside_voids, 100);
+}
+
+/// A grid of samples that are vertices of even rows' neighbours: the same by both methods.
+TEST_P(PointSamplerTest, RestoresSamplesThatAreVerticesBesideVoids) {
+  const ArchiveReader archive(folder / "a.isohf");
+  const TileGrid& grid = archive.grid();
+  const std::int64_t across = grid.shape().cell_columns() * grid.tile_columns();
+  const std::int64_t down = grid.shape().cell_rows() * grid.tile_rows() / 2;
+  // Odd rows of vertices, by spacings that are no sums of powers of two.
+  const SampleGrid samples{across, down, 1e-13, 1e-13, 2.0 * grid.sigma_x(), 2.0 * grid.sigma_z()};
+  std::vector<double> exact(static_cast<std::size_t>(across * down));
+  std::vector<WorldPoint> places;
+  for (std::int64_t r = 0; r < down; ++r) {
+    for (std::int64_t c = 0; c < across; ++c) places.push_back(grid.world_from_lattice({2 * c, 2 * r}));
+  }
+  Surface(archive).sample(places, exact);
+  for (const RestoreMethod method : {RestoreMethod::kBarycentric, RestoreMethod::kHex}) {
+    std::vector<double> found(exact.size());
+    RowReader(archive, samples, method).read(0, down, found);
+    std::int64_t voids = 0;
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      ASSERT_EQ(std::isnan(found[i]), std::isnan(exact[i])) << to_string(method) << " " << i;
+      voids += std::isnan(found[i]) ? 1 : 0;
+    }
+    EXPECT_GT(voids, 20);
+  }
+}
+
 }  // namespace
 }  // namespace isohf

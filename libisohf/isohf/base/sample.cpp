@@ -152,6 +152,8 @@ void convert(const SourceInfo& info, double datum, const std::byte* raw, std::sp
   using Wide = decltype(number_of(T{}));
   const double scale = info.z_scale;
   const double offset = info.z_offset - datum;
+  const bool is_whole = offset == std::floor(offset) && std::abs(offset) < 0x1p23;
+  const std::int32_t whole = is_whole ? static_cast<std::int32_t>(offset) : 0;
   const std::size_t count = heights.size();
   const auto sample = [&](std::size_t i) { return number_of(stored_at<T>(raw + i * sizeof(T))); };
   const auto convert_all = [&](auto is_void) {
@@ -159,6 +161,12 @@ void convert(const SourceInfo& info, double datum, const std::byte* raw, std::sp
       for (std::size_t i = 0; i < count; ++i) {
         const Wide value = sample(i);
         heights[i] = is_void(value) ? kVoid : static_cast<float>(value);
+      }
+    } else if (sizeof(T) <= 2 && std::is_integral_v<T> && scale == 1.0 && is_whole) {
+      for (std::size_t i = 0; i < count; ++i) {  // no rounding, and no doubles
+        const Wide value = sample(i);
+        const auto height = static_cast<float>(static_cast<std::int32_t>(value) + whole);
+        heights[i] = is_void(value) ? kVoid : height;
       }
     } else {
       for (std::size_t i = 0; i < count; ++i) {

@@ -21,6 +21,7 @@ struct Conversion {
   const Prefilter prefilter;
   const Job& job;
   double datum = 0.0;
+  double height_error = 0.0;  ///< of heights above it
   Quantisation quantisation{};
   CodeLimits limits{};  ///< of what is stored; the ends of options.z_range where it is given
 

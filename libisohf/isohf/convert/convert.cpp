@@ -85,7 +85,7 @@ class Windows {
     if (!datum_) {
       heights_from_samples(info_, 0.0, raw, window.heights);
       const auto valid = std::find_if(window.heights.begin(), window.heights.end(), [](float h) { return h == h; });
-      if (valid != window.heights.end()) datum_ = choose_datum(info_, {double{*valid}, double{*valid}});
+      if (valid != window.heights.end()) datum_ = choose_datum({double{*valid}, double{*valid}});
     }
     heights_from_samples(info_, datum_.value_or(0.0), raw, window.heights);
     if (std::any_of(window.heights.begin(), window.heights.end(), [](float h) { return h != h; })) {

@@ -205,11 +205,12 @@ void check_statistics(const Conversion& conversion, const TileStatistics& all, s
     throw Error(ErrorCode::kInvalidArgument,
                 fmt::format("{}: every one of the {} lattice vertices is void, nothing to write", path, all.vertices));
   }
-  if (options.max_rounding && all.worst_rounding > *options.max_rounding * (1.0 + 1e-6)) {
+  const double worst = all.worst_rounding + conversion.height_error;
+  if (options.max_rounding && worst > *options.max_rounding * (1.0 + 1e-6)) {
     throw Error(ErrorCode::kInvalidArgument,
                 fmt::format("{}: elevations are rounded by up to {:.3g} as {}, more than `max_rounding` {}; use that "
                             "much, or another `code_type`",
-                            path, all.worst_rounding, to_string(options.code_type), *options.max_rounding));
+                            path, worst, to_string(options.code_type), *options.max_rounding));
   }
   if (all.clamped > 0) {
     warnings.push_back(

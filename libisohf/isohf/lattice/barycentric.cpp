@@ -45,4 +45,17 @@ Barycentric barycentric(const TileShape& shape, ObjectPoint point) {
           {weight_g, 1.0 - even_share, weight_i}};
 }
 
+Barycentric snapped(Barycentric at) {
+  double& heaviest = *std::max_element(at.weights.begin(), at.weights.end());
+  int off = 0;
+  for (double& weight : at.weights) {
+    if (weight > kOnSide) continue;
+    heaviest += weight;
+    weight = 0.0;
+    ++off;
+  }
+  if (off == 2) heaviest = 1.0;
+  return at;
+}
+
 }  // namespace isohf

@@ -38,6 +38,12 @@ struct Barycentric {
 /// so that interpolated values agree. O(1), cannot fail.
 [[nodiscard]] Barycentric barycentric(const TileShape& shape, ObjectPoint point);
 
+/// Points nearer than this to a side or a vertex, in lattice steps, lie on it for whoever asks for a place: places are
+/// found by products and quotients, and next to a void the last bit of one would decide.
+inline constexpr double kOnSide = 1e-9;
+/// The same point, moved to the side or vertex that it lies on: the weights off it are 0.
+[[nodiscard]] Barycentric snapped(Barycentric at);
+
 /// Value of a per-vertex property at the point.
 /// values [C x R], float or double; NaN is void. NaN where a vertex with weight > 0 is void; vertices of weight 0 are
 /// not read, so that a point on a valid side is valid from both of its triangles.

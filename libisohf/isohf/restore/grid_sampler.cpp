@@ -60,12 +60,13 @@ void require_samples(const SampleGrid& grid) {
 }
 
 GridSampler::GridSampler(const TileGrid& grid, bool wraps_x, const Quantisation& quantisation, ReadTiles read_tiles,
-                         const SampleGrid& samples, RestoreMethod method)
+                         const SampleGrid& samples, RestoreMethod method, bool snaps)
     : grid_(grid),
       quantisation_(quantisation),
       read_tiles_(std::move(read_tiles)),
       samples_(require_samples_near(samples, grid)),
       method_(method),
+      snaps_(snaps),
       spline_(grid, method == RestoreMethod::kHex ? columns_of(samples) : std::vector<double>{}, wraps_x) {
   for (const double x : columns_of(samples)) {
     const TilePoint at = grid_.locate({x, 0.0});
@@ -155,7 +156,8 @@ void GridSampler::read_on_triangles(const TilePoint& at, std::span<double> out) 
     const Column& column = columns_[c];
     const View2D<const double> heights(tiles.elevations[static_cast<std::size_t>(column.tile)].data(), shape.columns(),
                                        shape.rows());
-    out[c] = column.inside ? interpolate(barycentric(shape, {column.x, at.point.z}), heights) : kVoid;
+    const Barycentric where = barycentric(shape, {column.x, at.point.z});
+    out[c] = column.inside ? interpolate(snaps_ ? snapped(where) : where, heights) : kVoid;
   }
 }
 

@@ -23,8 +23,9 @@ const SampleGrid& require_samples_near(const SampleGrid& samples, const TileGrid
 class GridSampler {
  public:
   /// wraps_x  the grid's East edge is its West edge
+  /// snaps    as in PointSampler
   GridSampler(const TileGrid& grid, bool wraps_x, const Quantisation& quantisation, ReadTiles read_tiles,
-              const SampleGrid& samples, RestoreMethod method);
+              const SampleGrid& samples, RestoreMethod method, bool snaps = true);
 
   /// Rows `first` to `first + rows - 1`; calls come in increasing order.
   /// elevations [rows * width] out, vertical units; NaN where the surface has a void or ends.
@@ -62,6 +63,7 @@ class GridSampler {
   ReadTiles read_tiles_;
   SampleGrid samples_;
   RestoreMethod method_;
+  bool snaps_;
   SplineRows spline_;
   std::vector<Column> columns_;
   std::deque<TileRow> tile_rows_;

@@ -173,7 +173,8 @@ SamplePredictor::SamplePredictor(const TileGrid& grid, bool wraps_x, const Quant
     case SamplePrediction::kHex:
     case SamplePrediction::kBarycentric:
       rows_.emplace(grid, wraps_x, quantisation, std::move(read_tiles), samples,
-                    record.prediction == SamplePrediction::kHex ? RestoreMethod::kHex : RestoreMethod::kBarycentric);
+                    record.prediction == SamplePrediction::kHex ? RestoreMethod::kHex : RestoreMethod::kBarycentric,
+                    false);
       return;
     case SamplePrediction::kTriangles:
       nodes_ = read_mesh<PlaceMesh>(read_member, kNodesName, record);
@@ -182,7 +183,7 @@ SamplePredictor::SamplePredictor(const TileGrid& grid, bool wraps_x, const Quant
       positions_ = read_mesh<PositionMesh>(read_member, kPositionsName, record);
       break;
   }
-  points_.emplace(grid, quantisation, std::move(read_tiles), kTileBytes / 2);  // as much again is in hand
+  points_.emplace(grid, quantisation, std::move(read_tiles), kTileBytes / 2, false);  // as much again is in hand
 }
 
 template <typename Mesh, typename Place>

@@ -46,7 +46,7 @@ class TileSurface {
   }
 
   void sample(ObjectPoint point, SurfaceSample& sample) {
-    const Barycentric where = barycentric(grid_.shape(), point);
+    const Barycentric where = snapped(barycentric(grid_.shape(), point));
     sample.elevation = elevation(where);
     sample.state = std::isnan(sample.elevation) ? SurfaceState::kNodata : SurfaceState::kSurface;
     if (sample.state == SurfaceState::kNodata) return;
@@ -121,8 +121,8 @@ void for_each_tile(const ReadTiles& read_tiles, std::span<const TileIndex> tiles
 }
 
 PointSampler::PointSampler(const TileGrid& grid, const Quantisation& quantisation, ReadTiles read_tiles,
-                           std::uint64_t memory_bytes)
-    : grid_(grid), quantisation_(quantisation), read_tiles_(std::move(read_tiles)) {
+                           std::uint64_t memory_bytes, bool snaps)
+    : grid_(grid), quantisation_(quantisation), read_tiles_(std::move(read_tiles)), snaps_(snaps) {
   const std::uint64_t bytes = quantisation.type == CodeType::kF32 ? 4 : 2;
   const std::uint64_t tile_bytes = static_cast<std::uint64_t>(grid.shape().stored_vertex_count()) * bytes;
   const auto threads = static_cast<std::uint64_t>(oneapi::tbb::this_task_arena::max_concurrency());
@@ -219,7 +219,8 @@ void PointSampler::sample(std::span<const WorldPoint> points, std::span<double> 
     const TileSurface surface(grid_, quantisation_, codes, no_scratch);
     for (const Run& run : runs) {
       for (std::size_t i = run.first; i < run.end; ++i) {
-        elevations[i] = surface.elevation(barycentric(grid_.shape(), grid_.locate(points[i]).point));
+        const Barycentric where = barycentric(grid_.shape(), grid_.locate(points[i]).point);
+        elevations[i] = surface.elevation(snaps_ ? snapped(where) : where);
       }
     }
   });

@@ -29,8 +29,10 @@ class PointSampler {
  public:
   /// Keeps at most `memory_bytes` of decoded tiles, and has as much again in hand during a call; one tile in each
   /// thread at least.
-  PointSampler(const TileGrid& grid, const Quantisation& quantisation, ReadTiles read_tiles,
-               std::uint64_t memory_bytes);
+  /// snaps  places on a side or vertex of their triangle need nothing off it (lattice/barycentric.h); not so in
+  ///        predictions of old archives
+  PointSampler(const TileGrid& grid, const Quantisation& quantisation, ReadTiles read_tiles, std::uint64_t memory_bytes,
+               bool snaps = true);
 
   void sample(std::span<const WorldPoint> points, std::span<SurfaceSample> samples);
   void sample(std::span<const WorldPoint> points, std::span<double> elevations);
@@ -53,6 +55,7 @@ class PointSampler {
   TileGrid grid_;
   Quantisation quantisation_;
   ReadTiles read_tiles_;
+  bool snaps_;
   std::size_t capacity_;        ///< tiles to keep
   std::size_t tiles_together_;  ///< decoded at once by one thread
   std::mutex mutex_;            ///< of what follows

@@ -3,13 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <vector>
 
 #include "isohf/archive/codec/quantise.h"
 #include "isohf/base/arena.h"
 #include "isohf/error.h"
 #include "isohf/restore/archive_geometry.h"
+#include "isohf/surface/resample/height_error.h"
 #include "isohf/surface/source/band_reader.h"
 #include "isohf/surface/source/source_statistics.h"
 #include "isohf/verify.h"
@@ -36,12 +36,11 @@ class VertexCheck {
     const Quantisation& q = metadata_.quantisation;
     const Statistics& statistics = metadata_.statistics;
     const ElevationRange range{statistics.min.value_or(0.0), statistics.max.value_or(0.0)};
-    datum_ = choose_datum(source.info(), range);
-    const bool is_float = q.type == CodeType::kF32;
-    // Heights are floats relative to a datum that need not be the one that was used; elevations in f32 are floats.
-    const double largest = std::max(std::abs(range.min), std::abs(range.max)) + std::abs(datum_);
-    const double rounding = 4.0 * largest * double{std::numeric_limits<float>::epsilon()};
-    report_.bound = (is_float ? 0.0 : 0.5 * q.scale) + rounding;
+    // Whatever the archive was made with; floats are rounded once more.
+    datum_ = choose_datum(range);
+    const double largest = std::max(std::abs(range.min), std::abs(range.max));
+    const double stored = q.type == CodeType::kF32 ? 0x1p-24 * largest : 0.5 * q.scale;
+    report_.bound = stored + height_error(kernel_, prefilter_, range, datum_);
     can_clamp_ = metadata_.z_range || statistics.clamped > 0;
   }
 

@@ -12,6 +12,7 @@
 #include "isohf/convert/stages/choose_quantisation.h"
 #include "isohf/convert/stages/tile_source.h"
 #include "isohf/error.h"
+#include "isohf/surface/resample/height_error.h"
 #include "isohf/surface/source/edge_range.h"
 #include "isohf/surface/source/source_statistics.h"
 
@@ -113,8 +114,14 @@ ElevationRange measure_surface(const Conversion& conversion, const ElevationRang
   return all.min <= all.max ? all : ElevationRange{};
 }
 
-QuantisationRequest request_of(const SourceInfo& info, const ConvertOptions& options) {
+/// Also chooses the datum.
+QuantisationRequest request_of(Conversion& conversion, const ElevationRange& range) {
+  const SourceInfo& info = conversion.source.info();
+  const ConvertOptions& options = conversion.options;
   QuantisationRequest request{options.code_type, options.step, options.max_rounding};
+  conversion.datum = choose_datum(range);
+  conversion.height_error = height_error(conversion.kernel, conversion.prefilter, range, conversion.datum);
+  request.height_error = conversion.height_error;
   // Of the error that is allowed an eighth is left to the rounding, which then takes few bytes.
   if (options.max_error) request.wish = *options.max_error / 4.0;
   // Samples that are vertices lose nothing by the step that is usual.
@@ -127,7 +134,6 @@ QuantisationRequest request_of(const SourceInfo& info, const ConvertOptions& opt
 /// By the range of the data.
 void choose_codes_by_data(Conversion& conversion, ConvertSummary& summary) {
   const SourceInfo& info = conversion.source.info();
-  const QuantisationRequest request = request_of(conversion.source.info(), conversion.options);
   const SourceAxes axes = make_axes(conversion.plan.grid, conversion.geometry());
   EdgeRange edge(info, axes.x.continued_samples(), axes.z.continued_samples());
   const SourceSurvey survey = survey_source(conversion, edge);
@@ -142,7 +148,7 @@ void choose_codes_by_data(Conversion& conversion, ConvertSummary& summary) {
   if (const std::string warning = survey.warning(); !warning.empty()) {
     summary.warnings.push_back(info.path + ": " + warning);
   }
-  conversion.datum = choose_datum(info, found.range);
+  const QuantisationRequest request = request_of(conversion, found.range);
   if (conversion.plan.outside == Outside::kCover) found.range = edge.widen(found.range);
   conversion.quantisation = choose_quantisation(request, found.range, info);
   const double over = overshoot(conversion.kernel, conversion.prefilter);
@@ -165,9 +171,7 @@ void choose_codes_by_data(Conversion& conversion, ConvertSummary& summary) {
 void choose_codes(Conversion& conversion, ConvertSummary& summary) {
   if (conversion.options.z_range) {
     const ElevationRange range{conversion.options.z_range->first, conversion.options.z_range->second};
-    conversion.datum = choose_datum(conversion.source.info(), range);
-    conversion.quantisation = quantisation_of_range(request_of(conversion.source.info(), conversion.options), range,
-                                                    conversion.source.info());
+    conversion.quantisation = quantisation_of_range(request_of(conversion, range), range, conversion.source.info());
     conversion.limits = {range.min, range.max};
     return;
   }

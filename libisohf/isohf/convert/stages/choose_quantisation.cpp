@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "isohf/error.h"
+#include "isohf/surface/resample/height_error.h"
 
 namespace isohf {
 namespace {
@@ -29,7 +30,14 @@ double codes_needed(const ElevationRange& range, double step) {
 
 /// The step that is asked for or that suits the source; nullopt: the finest.
 std::optional<double> wanted_step(const QuantisationRequest& request, const SourceInfo& info) {
-  const std::optional<double> step = request.max_rounding ? 2.0 * *request.max_rounding : request.step;
+  const std::optional<double> step =
+      request.max_rounding ? 2.0 * (*request.max_rounding - request.height_error) : request.step;
+  if (request.max_rounding && !(*step > 0.0)) {
+    throw Error(ErrorCode::kInvalidArgument,
+                fmt::format("`max_rounding` {} is below what sums in single precision hold of elevations so far from "
+                            "each other; use {:.3g} or more",
+                            *request.max_rounding, 1.25 * request.height_error));
+  }
   if (step && *step != 0.0) {
     if (!(std::isfinite(*step) && *step > 0.0)) {
       throw Error(ErrorCode::kInvalidArgument, fmt::format("step is {}, must be positive, or 0 for the finest", *step));
@@ -59,7 +67,7 @@ bool is_asked_for(const QuantisationRequest& request) {
                           "`code_type` f32",
                           by_rounding ? "`max_rounding`" : "step", by_rounding ? *request.max_rounding : *request.step,
                           steps + 1.0, range.min, range.max, to_string(request.type), codes + 1.0,
-                          by_rounding ? finest / 2.0 : finest));
+                          by_rounding ? finest / 2.0 + request.height_error : finest));
 }
 
 }  // namespace
@@ -111,7 +119,7 @@ Quantisation quantisation_of_range(const QuantisationRequest& request, const Ele
                     fmt::format("`step` {} does not divide `z_range` {}:{}, whose ends are both codes: {:.6g} steps; "
                                 "use `step` {:.9g}, `z_range` {}:{:.9g}, or `max_rounding` {}",
                                 *step, range.min, range.max, span / *step, span / steps, range.min,
-                                range.min + steps * *step, *step / 2.0));
+                                range.min + steps * *step, *step / 2.0 + request.height_error));
       }
     }
     while (steps > codes) steps = steps_of(*step *= 2.0);
@@ -129,31 +137,7 @@ double overshoot(const Kernel& kernel, const Prefilter& prefilter) {
   const bool stays_within =
       kernel.filter() == Filter::kNearest || kernel.filter() == Filter::kBilinear || kernel.is_limited();
   if (stays_within && prefilter.is_identity()) return 0.0;
-  constexpr int kPlaces = 256;
-  const std::vector<double>& response = prefilter.impulse_response();
-  const auto reach = static_cast<std::int64_t>(response.size()) - 1;
-  const std::int64_t taps = kernel.taps();
-  // Cells at a row's end, where samples stand in for others as well, up to one that is as good as in the middle.
-  const std::int64_t cells = taps + std::min<std::int64_t>(reach, 8);
-  double lebesgue = 1.0;
-  for (std::int64_t place = 0; place <= cells * kPlaces; ++place) {
-    const TapWeights at = kernel.at(static_cast<double>(place) / kPlaces);
-    // Weight of sample k: the kernel's taps spread by the prefilter's impulse response.
-    std::vector<double> weights(static_cast<std::size_t>(cells + taps + 2 * reach), 0.0);
-    const auto count = static_cast<std::int64_t>(weights.size()) * 2;  // the other end is far
-    for (std::int64_t tap = 0; tap < taps; ++tap) {
-      for (std::int64_t j = -reach; j <= reach; ++j) {
-        const double weight =
-            double{at.weights[static_cast<std::size_t>(tap)]} * response[static_cast<std::size_t>(std::abs(j))];
-        continue_row(at.first + tap + j, count, kernel.edges(),
-                     [&](std::int64_t k, int share) { weights[static_cast<std::size_t>(k)] += share * weight; });
-      }
-    }
-    double sum = 0.0;
-    for (const double weight : weights) sum += std::abs(weight);
-    lebesgue = std::max(lebesgue, sum);
-  }
-  lebesgue *= 1.01;
+  const double lebesgue = lebesgue_constant(kernel, prefilter);
   return (lebesgue * lebesgue - 1.0) / 2.0;
 }
 

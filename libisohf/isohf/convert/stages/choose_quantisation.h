@@ -15,7 +15,8 @@ namespace isohf {
 struct QuantisationRequest {
   CodeType type = CodeType::kU16;
   std::optional<double> step;  ///< elevation of one code; 0: the finest that the type holds; nullopt: chosen
-  std::optional<double> max_rounding = {};  ///< instead: steps of at most twice that
+  std::optional<double> max_rounding = {};  ///< instead: half a step and height_error are at most that
+  double height_error = 0.0;                ///< how far heights are off before they are rounded
   std::optional<double> wish = {};          ///< where neither is given: a step of about that, or as fine as can be
 };
 
@@ -42,8 +43,7 @@ struct QuantisationRequest {
 /// samples around, by their weights or by their limits. Holds for rasters without voids that are larger than the
 /// prefilter's halo and the kernel along both axes.
 ///
-/// m = (L^2 - 1)/2 with L the Lebesgue constant of the kernel with its prefilter, max over u of sum |weight of sample k
-/// at u|, at the ends of a row as well, taken at 256 places between two samples and rounded up by a hundredth.
+/// m = (L^2 - 1)/2 with L the Lebesgue constant of the kernel with its prefilter.
 [[nodiscard]] double overshoot(const Kernel& kernel, const Prefilter& prefilter);
 
 /// `range` widened by `fraction` of its length at both ends.

@@ -137,11 +137,8 @@ void scan_samples(const SourceInfo& info, std::span<const std::byte> raw, Source
   with_stored_type(info.sample_type, [&](auto sample) { scan<decltype(sample)>(info, raw, found); });
 }
 
-double choose_datum(const SourceInfo& info, const ElevationRange& range) {
-  const bool wide = info.sample_type == SampleType::kUint32 || info.sample_type == SampleType::kInt32 ||
-                    info.sample_type == SampleType::kFloat64;
-  const bool scaled = info.z_scale != 1.0 || info.z_offset != 0.0;
-  return wide || scaled ? std::round((range.min + range.max) / 2.0) : 0.0;
+double choose_datum(const ElevationRange& range) {
+  return std::round((range.min + range.max) / 2.0);
 }
 
 SourceSurvey::SourceSurvey(const SourceInfo& info, bool with_mean)

@@ -31,9 +31,9 @@ void scan_samples(const SourceInfo& info, std::span<const std::byte> raw, Source
 /// The sum of all valid raw samples, z_scale and z_offset left aside. The order of summation is fixed.
 [[nodiscard]] double sum_of_samples(const SourceInfo& info, std::span<const std::byte> raw);
 
-/// The datum that heights of this source are taken from (heights_from_samples): the middle of the range, rounded, for
-/// samples of more than 24 bits or scaled ones, so that single precision holds them; 0 for all others.
-[[nodiscard]] double choose_datum(const SourceInfo& info, const ElevationRange& range);
+/// The datum that heights of this source are taken from (heights_from_samples): the middle of the range, rounded, so
+/// that single precision holds them as well as it can.
+[[nodiscard]] double choose_datum(const ElevationRange& range);
 
 /// A raw value that looks like a mark for voids that the source does not declare.
 struct UndeclaredVoid {

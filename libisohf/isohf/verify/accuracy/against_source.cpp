@@ -83,7 +83,7 @@ class Comparison {
     }
     const Statistics& statistics = archive.metadata().statistics;
     const ElevationRange range{statistics.min.value_or(0.0), statistics.max.value_or(0.0)};
-    datum_ = choose_datum(info_, range);
+    datum_ = choose_datum(range);
     span_ = range.max - range.min;
     const double reach = std::max(grid_.sigma_x() * 2.0 / record_.spacing_x, grid_.sigma_z() / record_.spacing_z);
     reach_ = static_cast<std::int64_t>(std::ceil(reach)) + 1;
@@ -189,7 +189,7 @@ class Comparison {
     at.point = {snapped(at.point.x), snapped(at.point.z)};
     const std::vector<double>& elevations = surface.elevations[static_cast<std::size_t>(at.tile.column)];
     const View2D<const double> view(elevations.data(), grid_.shape().columns(), grid_.shape().rows());
-    return interpolate(barycentric(grid_.shape(), at.point), view);
+    return interpolate(snapped(barycentric(grid_.shape(), at.point)), view);
   }
 
   void compare_rows(const TileRowSurface& surface, const Band& band, std::int64_t first, std::int64_t end,

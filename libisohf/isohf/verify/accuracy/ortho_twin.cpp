@@ -243,7 +243,7 @@ class OrthoComparison {
         info_(source.info()),
         spacing_(spacing),
         range_{surface.statistics.min.value_or(0.0), surface.statistics.max.value_or(0.0)},
-        datum_(choose_datum(info_, range_)),
+        datum_(choose_datum(range_)),
         kernel_(Kernel::make(known(surface.filter, "filter"), known(surface.edges, "edges"))),
         prefilter_(Prefilter::make(kernel_.filter(), known(surface.acquisition, "acquisition"), kernel_.edges())),
         ground_(OrthoGround::make(surface, kernel_, datum_, spacing)),
