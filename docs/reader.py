@@ -56,6 +56,8 @@ def symbols_of(payload, at, count, is_paired):
 def decode(payload, columns, rows, kind):
     """The integers of a tile in row order, None where void, and the number of dropped bits."""
     require(len(payload) >= 16, "a payload ends early")
+    if payload[0] == 2:
+        return decode_adaptive(payload, columns, rows, kind)
     version, found_kind, flags, dropped, low, high, mask_bytes = struct.unpack_from("<BBBBiiI", payload)
     require(version == 1 and found_kind == kind and flags < 4 and dropped <= (30 if kind == 2 else 0), "a header's fields")
     ends = (-(1 << 31), (1 << 31) - 1) if kind == 2 else (0, (65534, 254)[kind])
@@ -153,6 +155,186 @@ def decode(payload, columns, rows, kind):
         above, rough = [v] + above[:2], [g, rough[0]]
     require(all(next(stream, None) is None for stream in streams), "a context keeps symbols")
     return out, dropped
+
+
+class Bits:
+    def __init__(self, data):
+        self.number, self.at = int.from_bytes(data, "little"), 0
+
+    def take(self, count):
+        value = self.number >> self.at & (1 << count) - 1
+        self.at += count
+        return value
+
+
+def first_table(of_class):
+    j = 1 if of_class >= 15 else (17 - of_class) // 2
+    weights = [(32768 >> min(31, s * j)) + 1 for s in range(16)]
+    return finish([w * 16380 // sum(weights) for w in weights])
+
+
+def finish(shares):
+    """Symbols 1 to 3 and 15 get one slot more, symbol 0 what is left."""
+    slots = [0] + [share + (s in (1, 2, 3, 15)) for s, share in enumerate(shares) if s]
+    slots[0] = 16384 - sum(slots)
+    return slots
+
+
+def mixed(counts, parent):
+    inverse = (2**31 - 2**19) // (sum(counts) + 8)
+    return finish([(c * inverse >> 17) + (p * (inverse >> 12) >> 16) for c, p in zip(counts, parent)])
+
+
+class Model:
+    """Slots of symbols by context: (class, quarter, pattern), without the pattern, or (class,) above class 15."""
+
+    def __init__(self):
+        self.slots, self.counts, self.waiting, self.bands = {}, {}, {}, 0
+
+    def table(self, context):
+        for key in (context, context[:2]):
+            if key in self.slots:
+                return self.slots[key]
+        return first_table(context[0])
+
+    def count(self, context, symbol):
+        for key in {context, context[:2]}:
+            self.waiting.setdefault(key, [0] * 16)[symbol] += 1
+
+    def end_band(self):
+        self.bands += 1
+        shift = max(0, self.bands.bit_length() - 3)
+        if self.bands >> shift << shift != self.bands:
+            return
+        for key in sorted(self.waiting, key=len):
+            self.counts[key] = [a + b for a, b in zip(self.counts.get(key, [0] * 16), self.waiting[key])]
+            parent = self.table(key[:2]) if len(key) == 3 else first_table(key[0])
+            self.slots[key] = mixed(self.counts[key], parent)
+        self.waiting = {}
+
+
+def decode_adaptive(payload, columns, rows, kind):
+    """The same of codec version 2, section 5.2."""
+    _, found_kind, flags, low, high, base = struct.unpack_from("<BBBHHH", payload)
+    require(found_kind == kind < 2 and flags < 16 and low <= base <= high, "a header's fields")
+    at = 9
+
+    def number():
+        nonlocal at
+        value, shift = 0, 0
+        while True:
+            require(at < len(payload) and shift < 35, "a number that does not end")
+            at += 1
+            value |= (payload[at - 1] & 127) << shift
+            shift += 7
+            if payload[at - 1] < 128:
+                return value
+
+    weights = FIXED[2]
+    if flags & 2:
+        n = 18 if flags & 4 else 12
+        weights = struct.unpack_from("<%dh" % n, payload, at)
+        at += 2 * n
+    mask = [0] * (columns * rows)
+    if flags & 1:
+        size = number()
+        mask = void_mask(payload[at : at + size], columns * rows)
+        at += size
+    states = list(struct.unpack_from("<%dI" % (8 if flags & 8 else 1), payload, at))
+    at += 4 * len(states)
+    size = number()
+    words = iter(struct.unpack_from("<%dH" % size, payload, at))
+    extra = Bits(payload[at + 2 * size :])
+    model = Model()
+    out = [None] * (columns * rows)
+
+    def take(i, eighths, energy, pattern):
+        """The sample that a prediction and the next symbol give, by the rules of row i of the band."""
+        code = (eighths + 4) >> 3
+        off = eighths - 8 * code
+        above, quarter = off >= 0, off if off >= 0 else -1 - off
+        if energy == 0:
+            k = 0
+        else:
+            octave = energy.bit_length() - 1
+            k = 1 + 2 * octave + (energy >> (octave - 1) & 1 if octave else 0)
+        context = (k, quarter, pattern if above else -pattern) if k <= 15 else (k,)
+        slots = model.table(context)
+        state = states[i % len(states)]
+        slot, symbol, start = state % 16384, 0, 0
+        while start + slots[symbol] <= slot:
+            start += slots[symbol]
+            symbol += 1
+        state = slots[symbol] * (state >> 14) + slot - start
+        if state < 65536:
+            state = state << 16 | next(words, 0)
+        states[i % len(states)] = state
+        model.count(context, symbol)
+        if symbol < 15:
+            bits = max(0, (k - 15) // 2)
+            zigzagged = symbol << bits | extra.take(bits)
+        else:
+            bits = extra.take(5)
+            zigzagged = (1 << bits | extra.take(bits)) - 1
+        difference = zigzagged // 2 if zigzagged % 2 == 0 else -(zigzagged + 1) // 2
+        value = (code - difference if above else code + difference) % 65536
+        require(low <= value <= high, "a sample outside low … high")
+        return value
+
+    def compared(a, b):
+        return (a > b) - (a < b)
+
+    places = range(-3, columns + 3)
+    V = {r: dict.fromkeys(places, base) for r in (-3, -2, -1)}
+    D = {r: dict.fromkeys(places, 0) for r in (-2, -1)}
+    for top in range(0, rows, 8):
+        band = range(top, min(top + 8, rows))
+        for t in range(columns + 25):
+            for r in band:
+                s = r % 2
+                p = t - (7 * (r - top) + 1) // 2
+                first, last = (0, columns - 1) if s else (1, columns - 2)
+                if not first <= p <= last:
+                    continue
+                if p == first:
+                    V[r] = {p - 2: V[r - 1][p + s], p - 1: V[r - 1][p + s]}
+                    D[r] = {p - 2: 0, p - 1: 0}
+                v, near, far, farther, d, n, f = V[r], V[r - 1], V[r - 2], V[r - 3], D[r], D[r - 1], D[r - 2]
+                column = {1: 0, columns - 2: columns - 1}.get(p, p) if not s else p
+                ne = near[p + s]
+                if mask[r * columns + column]:
+                    v[p], d[p] = (v[p - 1] + ne) >> 1, 0
+                else:
+                    w = FIXED.get(r) or weights
+                    neighbours = [v[p - 1], near[p + s - 1], v[p - 2], near[p + s + 1], near[p + s - 2], far[p],
+                                  far[p + 1], far[p - 1], far[p + 2], far[p - 2], farther[p + s], farther[p + s - 1],
+                                  farther[p + s + 1], farther[p + s - 2], near[p + s + 2], near[p + s - 3], far[p + 3],
+                                  far[p - 3]] if len(w) > 12 else [v[p - 1], near[p + s - 1], v[p - 2], near[p + s + 1],
+                                  near[p + s - 2], far[p], far[p + 1], far[p - 1], far[p + 2], far[p - 2],
+                                  farther[p + s], farther[p + s - 1]]
+                    total = 4096 * ne + sum(a * (b - ne) for a, b in zip(w, neighbours))
+                    eighths = min(max(total >> 9, 8 * low), 8 * high)
+                    energy = (4 * (n[p + s] + n[p + s - 1] + f[p]) + 3 * n[p + s + 1]
+                              + 2 * (n[p + s + 2] + n[p + s - 2] + f[p + 1] + f[p - 1])
+                              + n[p + s - 3] + f[p + 2] + f[p - 2] + 6 * d[p - 1] + 3 * d[p - 2])
+                    pattern = (27 * compared(v[p - 1], ne) + 9 * compared(near[p + s - 1], ne)
+                               + 3 * compared(near[p + s + 1], ne) + compared(near[p + s - 2], ne))
+                    v[p] = take(r - top, eighths, energy, pattern)
+                    d[p] = min(abs(8 * v[p] - eighths), 65535)
+                    out[r * columns + column] = v[p]
+                for row in (v, d):
+                    if p == first + 1:
+                        row.update({q: row[first] for q in places if q < first})
+                    if p == last:
+                        row.update({q: row[last] for q in places if q > last})
+        for r in band[::2]:
+            for c, p in (1, 1), (columns - 2, columns - 3):
+                if not mask[r * columns + c]:
+                    out[r * columns + c] = take(r - top, 4 * (V[r][p] + V[r][p + 1]), 17 * (D[r][p] + D[r][p + 1]), 0)
+        model.end_band()
+    require(next(words, None) is None and set(states) == {65536}, "words are left over, or states do not end as they began")
+    require((extra.at + 7) // 8 == len(payload) - at - 2 * size and extra.number >> extra.at == 0, "extra bits are left over")
+    return out, 0
 
 
 # ---- Residuals, section 7 -------------------------------------------------------------------------------------------
@@ -382,42 +564,115 @@ class Archive:
             self.data = file.read()
         self.read_directory()
         self.metadata = json.loads(self.member("isohf.json"))
-        require(self.metadata["format"] == "isohf" and self.metadata["version"] == 1, "another version of the metadata")
+        require(self.metadata["format"] == "isohf" and self.metadata["version"] in (1, 2), "another version: not supported")
+        require(not self.metadata.get("requires"), "requires what is not known: not supported")
         self.shape, self.grid = self.metadata["tile_shape"], self.metadata["tiles"]
         self.kind, self.letter, self.void = KINDS[self.metadata["samples"]["type"]]
+        count, there = self.grid["columns"] * self.grid["rows"], len(self.members)
+        require(0 < count <= 65536 + 4096 * there, "a grid of more tiles than its members make likely")
+        own = ("mimetype", "isohf.json", "index.bin")
+        names = [name for name in self.members if name not in own]
+        crcs = b"".join(struct.pack("<I", zlib.crc32(self.raw(name))) for name in names
+                        if self.members[name][1] < self.members.get("index.bin", (0, len(self.data)))[1])
+        mime = [struct.pack("<I", zlib.crc32(self.raw("mimetype")))] if "mimetype" in self.members else []
+        stated = self.metadata.get("data_crc32")
+        require(stated is None or zlib.crc32(b"".join(mime) + crcs) == int(stated, 16), "the members have another CRC")
+        for name in names:
+            parts = name.split("/")
+            if parts[0] == "tiles":
+                require(len(parts) == 3 and name == "tiles/%d/%d.tile" % self.place_of(parts[1:]), "no tile's name: " + name)
+        self.digests = self.index() if self.metadata["version"] == 2 and "index.bin" in self.members else {}
 
-    def unpack(self, layout, at):
-        require(0 <= at and at + struct.calcsize("<" + layout) <= len(self.data), "a record ends behind the file's end")
-        return struct.unpack_from("<" + layout, self.data, at)
+    def place_of(self, parts):
+        row, column = parts[0], parts[1].partition(".")[0]
+        require(row.isdecimal() and column.isdecimal() and int(row) < self.grid["rows"] and int(column) < self.grid["columns"],
+                "no tile's name: " + "/".join(parts))
+        return int(row), int(column)
+
+    def unpack(self, layout, at, data=None):
+        data = self.data if data is None else data
+        require(0 <= at and at + struct.calcsize("<" + layout) <= len(data), "a record ends behind the end")
+        return struct.unpack_from("<" + layout, data, at)
 
     def read_directory(self):
-        end64 = self.unpack("IQHHIIQQQQ", len(self.data) - 98)
-        require(end64[0] == 0x06064B50 and end64[9] + end64[8] == len(self.data) - 98, "the end records")
+        require(self.data[:4] == b"PK\3\4", "no archive")
+        end64, end = self.unpack("IQHHIIQQQQ", len(self.data) - 98), self.unpack("IHHHHIIH", len(self.data) - 22)
+        require(end64[:2] == (0x06064B50, 44) and end[0] == 0x06054B50 and end64[9] + end64[8] == len(self.data) - 98
+                and end64[6] == end64[7] and not any(end64[4:6]), "the end records")
         self.members, at, entries, end = {}, end64[9], end64[7], 0
         for _ in range(entries):
-            magic, _, _, flags, method, _, crc, size, full, name_size, extra, _, _, _, _, offset = self.unpack("IHHHHIIIIHHHHHII", at)
-            require(magic == 0x02014B50 and flags in (0, 0x800) and method in (0, 8), "a directory entry")
+            (magic, _, _, flags, method, _, _, crc, size, full, name_size, extra, comment, _, _, _,
+             offset) = self.unpack("IHHHHHHIIIHHHHHII", at)
+            require(magic == 0x02014B50 and flags in (0, 0x800) and method in (0, 8) and not comment, "a directory entry")
             name = self.data[at + 46 : at + 46 + name_size]
             wide = list(self.unpack("%dQ" % (extra // 8), at + 46 + name_size + 4)) if extra else []
             if full == 0xFFFFFFFF:
                 full, size = wide.pop(0), wide.pop(0)
             offset = wide.pop(0) if offset == 0xFFFFFFFF else offset
             require(offset >= end, "members overlap")
-            local = self.unpack("IHHHIIIIHH", offset)
-            start = offset + 30 + local[8] + local[9]
-            require(local[0] == 0x04034B50 and local[2:4] == (flags, method) and local[5] == crc
-                    and self.data[offset + 30 : offset + 30 + local[8]] == name, "a local header that is not the directory's")
-            require(local[9] or local[6:8] == (size, full), "a local header's sizes")
-            end = start + size
-            require(end <= end64[9] and name.decode() not in self.members, "a member reaches into the directory, or occurs twice")
-            self.members[name.decode()] = (method, start, size, full, crc)
+            local = self.unpack("IHHHHHIIIHH", offset)
+            start, named = offset + 30 + local[9] + local[10], self.data[offset + 30 : offset + 30 + local[9]]
+            require(local[0] == 0x04034B50 and local[2:4] == (flags, method) and local[6] == crc and named == name
+                    and (local[10] or local[7:9] == (size, full)), "a local header that is not the directory's")
+            end, name = start + size, name.decode()
+            require(end <= end64[9] and name not in self.members, "a member reaches into the directory, or occurs twice")
+            require(not any(part in ("", ".", "..") for part in name.split("/")) and not set(name) & set("\\:\0"), "a name")
+            self.members[name] = (method, start, size, full, crc)
             at += 46 + name_size + extra
         require(at == len(self.data) - 98, "the directory's entries do not fill it")
 
+    def index(self):
+        """Digests of the stored tiles by flat index, out of index.bin of version 2, all of which is checked."""
+        index, digests, used = self.member("index.bin"), {}, 0
+        magic, version, tables, size, stands, _, _, described, crc, zero, own = self.unpack("8sII4QIIII", len(index) - 64, index)
+        require(magic == b"ISOHFIDX" and version == 2 and size == len(index) and not zero
+                and zlib.crc32(index[-64:-4]) == own, "the index's footer")
+        if stands != self.members["index.bin"][1]:
+            return {}  # an archiver has moved members
+        at = len(index) - 64 - described
+        require(at >= 0 and zlib.crc32(index[at:-64]) == crc, "the index's descriptions")
+        for _ in range(tables):
+            size, flags, columns, rows, stored, total, root, root_crc, n = self.unpack("II5QII", at, index)
+            name_size, zero = self.unpack("IQ", at + 68, index)
+            name, places, left = index[at + 80 : at + 80 + name_size].decode(), columns * rows, stored
+            require(flags < 2 and n and not zero and size >= 80 + name_size, "a table's description")
+            pages = -(-places // n)
+            require(root + 48 * pages <= len(index) and zlib.crc32(index[root : root + 48 * pages]) == root_crc, "a root")
+            for page in range(pages):
+                entry = self.unpack("QQQIIIIII", root + 48 * page, index)
+                page_at, digests_at, page_bytes, present, page_crc, digest_crc = entry[:6]
+                if not present:
+                    require(not any(entry), "an entry of no stored place")
+                    continue
+                count = min(n, places - page * n)
+                bits, records = index[page_at : page_at + (count + 7) // 8], page_at + (count + 7) // 8
+                there = [i for i in range(8 * len(bits)) if bits[i // 8] >> i % 8 & 1]
+                require(zlib.crc32(index[page_at : records + 32 * present]) == page_crc and len(there) == present
+                        and there[-1] < count, "a page of the index")
+                require(not flags or zlib.crc32(index[digests_at : digests_at + 32 * present]) == digest_crc, "digests")
+                for rank, i in enumerate(there):
+                    row, column = divmod(page * n + i, columns)
+                    member = name.replace("{row}", str(row)).replace("{column}", str(column)).replace("{row:8}", "%08d" % row)
+                    offset, size_, full, crc_, _, _, flag = self.unpack("QIIIIII", records + 32 * rank, index)
+                    require(member in self.members and self.members[member][1:] == (offset, size_, full, crc_)
+                            and flag & 1 and flag < 8, "a record that is not " + member)
+                    page_bytes -= size_
+                    if name == "tiles/{row}/{column}.tile":
+                        digests[page * n + i] = index[digests_at + 32 * rank : digests_at + 32 * rank + 32]
+                require(page_bytes == 0, "a page's sum")
+                left -= present
+            require(left == 0, "a table's stored places")
+            at += size
+        return digests
+
+    def raw(self, name):
+        _, start, size, _, _ = self.members[name]
+        return self.data[start : start + size]
+
     def member(self, name):
         require(name in self.members, name + " is missing")
-        method, start, size, full, crc = self.members[name]
-        content = self.data[start : start + size]
+        method, _, _, full, crc = self.members[name]
+        content = self.raw(name)
         if method == 8:
             inflater = zlib.decompressobj(wbits=-15)
             try:
@@ -450,11 +705,41 @@ class Archive:
         everything, samples = hashlib.sha256(), self.metadata["samples"]
         for i in range(len(self.tiles)):
             codes = self.codes(i)
-            everything.update(hashlib.sha256(struct.pack("<%d%s" % (len(codes), self.letter), *codes)).digest())
+            digest = hashlib.sha256(struct.pack("<%d%s" % (len(codes), self.letter), *codes)).digest()
+            require(self.digests.get(i, digest) == digest, "tile %d has another digest" % i)
+            everything.update(digest)
         everything.update(struct.pack("<IIIQQddBdd", self.shape["columns"], self.shape["rows"], self.shape["levels"],
                                       self.grid["columns"], self.grid["rows"], self.metadata["extent"]["x"],
                                       self.metadata["extent"]["z"], self.kind, samples["offset"], samples["scale"]))
         return everything.hexdigest()
+
+    def ground_hash(self):
+        m, source, of = self.metadata, self.metadata["source"], self.metadata["source"].get("crs") or {}
+        body, datum, on = source.get("body") or {}, source.get("vertical_datum") or {}, self.metadata.get("projection")
+        first, step, out = source["first_sample"], source["spacing"], b""
+
+        def text(value):
+            raw = (value or "").encode()
+            return struct.pack("<I", len(raw)) + raw
+
+        def optional(value):
+            return struct.pack("<Bd", value is not None, value or 0.0)
+
+        out += text(m["content_sha256"]) + text(m["units"]["horizontal"]) + text(m["units"]["vertical"])
+        out += struct.pack("<BB", bool(m.get("wraps_x")), bool(on))
+        if on:
+            names = ("semi_major_axis_m", "inverse_flattening", "longitude_0", "latitude_0", "parallel_1", "parallel_2",
+                     "scale_0", "false_easting", "false_northing")
+            out += text(on["kind"]) + struct.pack("<9di2d", *(on[name] for name in names), on.get("utm_zone") or 0,
+                                                  on["origin"]["easting"], on["origin"]["northing"])
+        else:
+            out += struct.pack("<4d", first["x"], first["z"], step["x"], step["z"])
+            out += optional(of.get("origin_x")) + optional(of.get("origin_y"))
+            out += struct.pack("<2d", of["spacing_x"], of["spacing_y"])
+        out += text(of.get("unit")) + struct.pack("<di", of.get("metres_per_unit", 1.0), of.get("epsg") or 0)
+        out += text("" if of.get("epsg") else of.get("wkt")) + text(body.get("name"))
+        out += optional(body.get("semi_major_axis_m")) + optional(body.get("inverse_flattening"))
+        return hashlib.sha256(out + text(datum.get("name")) + struct.pack("<i", datum.get("epsg") or 0)).hexdigest()
 
     def integers(self, bits):
         """The tiles as section 7 counts them."""
@@ -496,6 +781,8 @@ def main(path, samples=None):
         archive.member(name)
     archive.read_tiles()
     require(archive.content_hash() == archive.metadata["content_sha256"], "another content hash")
+    if archive.metadata["version"] == 2:
+        require(archive.ground_hash() == archive.metadata["ground_sha256"], "another ground hash")
     print("content", archive.metadata["content_sha256"])
     if "lossless" in archive.metadata:
         found = archive.source_samples()
@@ -508,5 +795,5 @@ def main(path, samples=None):
 if __name__ == "__main__":
     try:
         main(*sys.argv[1:])
-    except Refused as refusal:
-        sys.exit("%s: %s" % (sys.argv[1], refusal))
+    except (Refused, ValueError, LookupError, TypeError, struct.error, OverflowError) as refusal:
+        sys.exit("%s: refused: %s" % (sys.argv[1], refusal))

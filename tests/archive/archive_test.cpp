@@ -44,7 +44,7 @@ TEST(Archive, BringsBackTilesMembersAndMetadata) {
 }
 
 TEST(Archive, IsReadByThePageAboutItsFormat) {
-  // page_reader.py was written from docs/archive_format.md; it compares content hashes.
+  // docs/reader.py was written from docs/archive_format.md; it compares content hashes.
   if (std::system("command -v python3 >/dev/null 2>&1") != 0) GTEST_SKIP() << "python3 is not installed";
   const TemporaryFolder folder;
   const std::string path = folder / "a.isohf";
@@ -52,7 +52,7 @@ TEST(Archive, IsReadByThePageAboutItsFormat) {
     for (const CodeType type : {CodeType::kU16, CodeType::kU8, CodeType::kF32}) {
       std::filesystem::remove(path);
       test::make_archive(path, TileGrid::make(shape, 5, 4, 100.0, 1.0 / 3.0), type);
-      const std::string command = std::string("python3 \"" ISOHF_SOURCE_DIR "/tests/archive/page_reader.py\" ") + path;
+      const std::string command = std::string("python3 \"" ISOHF_SOURCE_DIR "/docs/reader.py\" ") + path;
       EXPECT_EQ(std::system(command.c_str()), 0) << to_string(type) << " " << shape.columns();
     }
   }
@@ -80,7 +80,7 @@ TEST(Archive, IsReadByThePageWithPredictorsOfEveryKind) {
       }
       writer.add_tile(tile);
       static_cast<void>(writer.finish(test::make_metadata(grid, type)));
-      const std::string command = std::string("python3 \"" ISOHF_SOURCE_DIR "/tests/archive/page_reader.py\" ") + path;
+      const std::string command = std::string("python3 \"" ISOHF_SOURCE_DIR "/docs/reader.py\" ") + path;
       EXPECT_EQ(std::system(command.c_str()), 0) << to_string(type) << " at level " << level;
     }
   }

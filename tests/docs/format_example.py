@@ -11,8 +11,8 @@ import tempfile
 import zlib
 
 sys.dont_write_bytecode = True
-sys.path.append(str(pathlib.Path(__file__).parent.parent / "archive"))
-import page_reader  # noqa: E402
+sys.path.append(str(pathlib.Path(__file__).parent.parent.parent / "docs"))
+import reader  # noqa: E402
 
 GRID = "ncols 3\nnrows 3\nxllcorner 500000\nyllcorner 4000000\ncellsize 10\n10 11 12\n11 13 15\n12 15 20\n"
 ARGUMENTS = ["--shape", "5x5", "--levels", "1", "--tiles", "1x1"]
@@ -97,7 +97,7 @@ def describe(data):
     counts = struct.unpack_from(f"<{contexts}I", payload, at)
     at += 4 * contexts
     symbols, extra = payload[at : len(payload) - extra_bytes], payload[len(payload) - extra_bytes :]
-    codes, _ = page_reader.decode(payload, 5, 5, 0)
+    codes, _ = reader.decode(payload, 5, 5, 0)
     metadata = json.loads(data[json_at:json_end])
     offset, scale = metadata["samples"]["offset"], metadata["samples"]["scale"]
     return f"""

@@ -20,6 +20,8 @@ def globe(folder):
         lines.append(" ".join(heights))
     path = folder / "globe.asc"
     path.write_text("\n".join(lines) + "\n")
+    path.with_suffix(".prj").write_text('GEOGCS["GCS_WGS_1984",DATUM["D_WGS_1984",SPHEROID["WGS_1984",6378137.0,298.257223563]],'
+                                        'PRIMEM["Greenwich",0.0],UNIT["Degree",0.0174532925199433]]')
     return path
 
 
@@ -31,7 +33,7 @@ def cases(folder):
     yield VOIDS, ["--projection", "utm", "--max-error", "7"]
     yield RIDGES, ["--density", "0.4"]
     yield RIDGES, ["--type", "f32", "--filter", "bspline5"]
-    yield globe(folder), ["--shape", "12x11", "--levels", "2"]
+    yield globe(folder), ["--wrap-x", "--shape", "12x11", "--levels", "2"]
 
 
 def read(archive, samples=None):
