@@ -372,7 +372,15 @@ std::vector<TileCodes> ArchiveReader::read_tiles(std::span<const TileIndex> tile
                  std::span(decoded).first(lanes), std::span(is_decoded).first(lanes));
     for (std::size_t lane = 0; lane < lanes; ++lane) {
       const std::size_t i = place[lane];
-      codes[i] = is_decoded[lane] ? std::move(decoded[lane]) : read_tile(tiles[i], plane);
+      if (is_decoded[lane]) {
+        codes[i] = std::move(decoded[lane]);
+        continue;
+      }
+      try {
+        codes[i] = decode_tile(grid().shape(), metadata().quantisation.type, spans[lane]);
+      } catch (const Error&) {
+        codes[i] = read_tile(tiles[i], plane);  // tells which tile and why
+      }
     }
   }
   return codes;
