@@ -44,6 +44,10 @@ bool is_free(const std::string& path) {
   static const std::vector<std::string> free = {"/producer",
                                                 "/level",
                                                 "/outside",
+                                                "/edges",
+                                                "/data_crc32",  // which putting together states anew
+                                                "/job_sha256",
+                                                "/source/ground",
                                                 "/filter",
                                                 "/acquisition",
                                                 "/units/vertical",
@@ -84,8 +88,11 @@ TEST(AlteredArchives, ContradictoryMetadataAreFindings) {
   const TemporaryFolder folder;
   std::size_t refused = 0;
   std::size_t found = 0;
-  for (const char* name : {"globe.isohf", "projected.isohf", "lossless.isohf"}) {
-    const AlteredArchive whole(kKept + name);
+  ASSERT_EQ(run_isohf({"convert", ISOHF_SOURCE_DIR "/testdata/voids_200x150_int16.tif", folder / "new.isohf"}).exit_code,
+            0);
+  for (const std::string& name :
+       {kKept + "globe.isohf", kKept + "projected.isohf", kKept + "lossless.isohf", folder / "new.isohf"}) {
+    const AlteredArchive whole(name);
     std::vector<json::json_pointer> leaves;
     add_leaves(whole.metadata, json::json_pointer(), leaves);
     for (const json::json_pointer& leaf : leaves) {
@@ -111,6 +118,25 @@ TEST(AlteredArchives, ContradictoryMetadataAreFindings) {
   EXPECT_GT(found, refused + 20);
 }
 
+TEST(AlteredArchives, GroundThatIsNoneIsAFinding) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(run_isohf({"convert", ISOHF_SOURCE_DIR "/testdata/voids_200x150_int16.tif", folder / "a.isohf"}).exit_code,
+            0);
+  const AlteredArchive whole(folder / "a.isohf");
+  for (const auto& [place, value] : {std::pair<const char*, double>{"bounds/south", -91.0},
+                                     {"bounds/north", -91.0},
+                                     {"bounds/west", 1e308},
+                                     {"centre/latitude", 91.0},
+                                     {"map_scale/least", 0.0},
+                                     {"map_scale/mean", 9e9},
+                                     {"map_scale/latitude", 91.0}}) {
+    AlteredArchive altered = whole;
+    altered.metadata[json::json_pointer(std::string("/source/ground/") + place)] = value;
+    altered.write(folder / "b.isohf");
+    EXPECT_THAT(findings_in(folder / "b.isohf"), testing::Contains(finding::kMetadata)) << place;
+  }
+}
+
 TEST(AlteredArchives, NamesThatNobodyKnowsAreFindings) {
   const TemporaryFolder folder;
   for (const char* path : {"/outside", "/filter", "/acquisition", "/units/horizontal", "/source/registration",
@@ -120,6 +146,31 @@ TEST(AlteredArchives, NamesThatNobodyKnowsAreFindings) {
     altered.write(folder / "a.isohf");
     EXPECT_THAT(findings_in(folder / "a.isohf"), testing::Contains(finding::kMetadata)) << path;
   }
+}
+
+TEST(AlteredArchives, OtherGroundAndOtherDigestsAreFindings) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(run_isohf({"convert", ISOHF_SOURCE_DIR "/testdata/voids_200x150_int16.tif", folder / "whole.isohf"}).exit_code,
+            0);
+  const AlteredArchive whole(folder / "whole.isohf");
+  for (const auto& [place, value] : {std::pair<const char*, json>{"/units/vertical", "foot"},
+                                     {"/source/crs/epsg", 4711},
+                                     {"/source/vertical_datum/name", "another"},
+                                     {"/source/body/semi_major_axis_m", 1737400.0},
+                                     {"/ground_sha256", std::string(64, '0')}}) {
+    AlteredArchive altered = whole;
+    altered.metadata[json::json_pointer(place)] = value;
+    altered.write(folder / "a.isohf");
+    EXPECT_THAT(findings_in(folder / "a.isohf"), testing::Contains(finding::kContentHash)) << place;
+  }
+  AlteredArchive other = whole;
+  ASSERT_NE(other.bytes("tiles/0/0.tile"), other.bytes("tiles/0/1.tile"));
+  other.set("tiles/0/0.tile", whole.bytes("tiles/0/1.tile"));
+  other.write(folder / "a.isohf");
+  const VerifyReport report = verify_archive(folder / "a.isohf");
+  EXPECT_TRUE(std::any_of(report.findings.begin(), report.findings.end(), [](const Finding& found) {
+    return found.id == finding::kContentHash && found.tile == TileIndex{0, 0};
+  }));
 }
 
 TEST(AlteredArchives, AFalseCountInTheIndexIsAFinding) {

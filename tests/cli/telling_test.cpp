@@ -110,8 +110,10 @@ TEST(JsonError, NamesTheByteOfADamagedArchive) {
   const Rasters rasters(folder);
   ASSERT_EQ(run_isohf({"convert", rasters.plain, rasters.out}).exit_code, 0);
   {
+    const std::size_t in_metadata = read_file(rasters.out).find("\"producer\"");
+    ASSERT_NE(in_metadata, std::string::npos);
     std::fstream file(rasters.out, std::ios::in | std::ios::out | std::ios::binary);
-    file.seekp(200);
+    file.seekp(static_cast<std::streamoff>(in_metadata));
     file << "damaged";
   }
   const json error = error_of({"info", rasters.out, "--json"}, 1);

@@ -32,6 +32,7 @@ class Contradictions {
     check_lattice();
     check_names();
     check_place();
+    check_ground();
     check_statistics();
     check_mosaic();
     check_residuals();
@@ -99,6 +100,8 @@ class Contradictions {
     check_one_of("outside", text(json_, "outside"), {"cover", "clamp", "void"});
     check_name("filter", [&] { (void)filter_from_string(text(json_, "filter")); });
     check_name("acquisition", [&] { (void)acquisition_from_string(text(json_, "acquisition")); });
+    if (json_.contains("edges") && !json_.at("edges").is_null())
+      check_name("edges", [&] { (void)edges_from_string(text(json_, "edges")); });
     check_one_of("source.registration", text(json_.at("source"), "registration"), {"area", "point"});
     check_name("source.sample_type", [&] { (void)sample_type_from_string(source.sample_type); });
     check_one_of("source.crs.unit", source.crs_unit, {"metre", "degree", "unknown", ""});
@@ -129,6 +132,27 @@ class Contradictions {
     check_number("valid.z1", length(source.height, area, source.spacing_z, grid.world_height()), grid.world_height());
     if (metadata_.projection && source.crs_unit == "degree" && source.origin_x && source.origin_y)
       check_scaled_degrees();
+  }
+
+  /// The ground under a source on a map: only who understands the map can tell more.
+  void check_ground() {
+    if (!metadata_.source.ground) return;
+    const MapGround& ground = *metadata_.source.ground;
+    const GeoExtent& bounds = ground.extent;
+    constexpr double kSlack = 1e-6;
+    const auto within = [](double value, double least, double most) {
+      return value >= least - kSlack && value <= most + kSlack;
+    };
+    const bool is_ground = within(bounds.south, -90.0, bounds.north) && within(bounds.north, bounds.south, 90.0) &&
+                           within(bounds.east, bounds.west, bounds.west + 360.0) && within(bounds.west, -720.0, 720.0);
+    if (!is_ground) add("source.ground.bounds", "are no rectangle of longitudes and latitudes");
+    if (!within(ground.centre.latitude, bounds.south, bounds.north))
+      add("source.ground.centre", "lies outside of the bounds");
+    if (!(ground.least_scale > 0.0 && ground.least_scale <= ground.mean_scale + kSlack &&
+          ground.mean_scale <= ground.most_scale + kSlack && ground.worst_error >= 0.0)) {
+      add("source.ground.map_scale", "has a mean that is not between least and most, or an error below 0");
+    }
+    if (!within(ground.worst_place.latitude, -90.0, 90.0)) add("source.ground.map_scale", "names no latitude");
   }
 
   /// The map is of the source's body.

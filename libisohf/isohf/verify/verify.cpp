@@ -498,6 +498,7 @@ VerifyReport verify_archive(const std::string& path, const Job& job, std::size_t
   std::unique_ptr<ArchiveReader> archive;
   try {
     archive = std::make_unique<ArchiveReader>(path);
+    (void)counts_source_ground(archive->metadata());  // what cannot be understood is found before anything is counted
   } catch (const Error& error) {
     if (error.code() == ErrorCode::kIo) throw;
     VerifyReport report;
