@@ -88,8 +88,8 @@ TEST(AlteredArchives, ContradictoryMetadataAreFindings) {
   const TemporaryFolder folder;
   std::size_t refused = 0;
   std::size_t found = 0;
-  ASSERT_EQ(run_isohf({"convert", ISOHF_SOURCE_DIR "/testdata/voids_200x150_int16.tif", folder / "new.isohf"}).exit_code,
-            0);
+  ASSERT_EQ(
+      run_isohf({"convert", ISOHF_SOURCE_DIR "/testdata/voids_200x150_int16.tif", folder / "new.isohf"}).exit_code, 0);
   for (const std::string& name :
        {kKept + "globe.isohf", kKept + "projected.isohf", kKept + "lossless.isohf", folder / "new.isohf"}) {
     const AlteredArchive whole(name);
@@ -150,8 +150,9 @@ TEST(AlteredArchives, NamesThatNobodyKnowsAreFindings) {
 
 TEST(AlteredArchives, OtherGroundAndOtherDigestsAreFindings) {
   const TemporaryFolder folder;
-  ASSERT_EQ(run_isohf({"convert", ISOHF_SOURCE_DIR "/testdata/voids_200x150_int16.tif", folder / "whole.isohf"}).exit_code,
-            0);
+  ASSERT_EQ(
+      run_isohf({"convert", ISOHF_SOURCE_DIR "/testdata/voids_200x150_int16.tif", folder / "whole.isohf"}).exit_code,
+      0);
   const AlteredArchive whole(folder / "whole.isohf");
   for (const auto& [place, value] : {std::pair<const char*, json>{"/units/vertical", "foot"},
                                      {"/source/crs/epsg", 4711},
