@@ -5,7 +5,10 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <functional>
 #include <limits>
+#include <map>
+#include <mutex>
 #include <optional>
 
 #include "formats/georeference/units.h"
@@ -27,11 +30,59 @@ double world_per_elevation(const Metadata& metadata) {
   return unit ? unit->metres : 1.0;
 }
 
+/// Shadows on the tiles of a coarse plane, which has no seeds: swept along a row of tiles from the sun on. What enters
+/// each tile of a row is kept for the sun that was asked for last.
+class RowShadows {
+ public:
+  /// The heights of a tile in codes, unrounded, NaN void.
+  using Heights = std::function<std::vector<float>(TileIndex)>;
+
+  /// shadow [C x R] out. fall  codes of a world unit
+  void shade(const TileGrid& grid, TileIndex tile, const RowSun& sun, double fall, const Heights& heights,
+             std::vector<float>& shadow) {
+    const TileShape& shape = grid.shape();
+    const bool east = sun.travel == LightTravel::kEastward;
+    const auto column_at = [&](std::size_t step) {
+      return east ? static_cast<std::int64_t>(step) : grid.tile_columns() - 1 - static_cast<std::int64_t>(step);
+    };
+    const auto cast = [&](TileIndex on, std::span<const double> entering, std::span<double> leaving) {
+      const std::vector<float> ground = heights(on);
+      tile_shadow(grid, View2D<const float>(ground.data(), shape.columns(), shape.rows()), {sun.travel, fall}, entering,
+                  View2D<float>(shadow.data(), shape.columns(), shape.rows()), leaving);
+    };
+    std::vector<double> entering;
+    {
+      const std::lock_guard lock(mutex_);
+      if (!(sun == sun_)) rows_.clear();
+      sun_ = sun;
+      auto& row = rows_[tile.row];
+      if (row.empty()) row.emplace_back(static_cast<std::size_t>(shape.rows() - 2), kNoShadow);
+      const auto step = static_cast<std::size_t>(east ? tile.column : grid.tile_columns() - 1 - tile.column);
+      while (row.size() <= step) {
+        std::vector<double> leaving = row.back();
+        cast({column_at(row.size() - 1), tile.row}, row.back(), leaving);
+        row.push_back(std::move(leaving));
+      }
+      entering = row[step];
+    }
+    cast(tile, entering, {});
+  }
+
+ private:
+  std::mutex mutex_;
+  RowSun sun_;
+  std::map<std::int64_t, std::vector<std::vector<double>>> rows_;
+};
+
 class ArchiveSource final : public TileSource {
  public:
   explicit ArchiveSource(const std::string& path)
       : reader_(path), world_per_elevation_(world_per_elevation(reader_.metadata())) {
     const Metadata& metadata = reader_.metadata();
+    if (metadata.planes.count > 0) {
+      planes_.emplace(metadata.grid, metadata.planes.stride, metadata.planes.count, metadata.wraps_x);
+      for (int plane = 1; plane <= planes_->count(); ++plane) coarse_.push_back(std::make_unique<Coarse>(*this, plane));
+    }
     const Quantisation& stored = metadata.quantisation;
     scale_ = {stored.offset * world_per_elevation_, stored.scale * world_per_elevation_};
     if (stored.type == CodeType::kF32) {
@@ -61,19 +112,53 @@ class ArchiveSource final : public TileSource {
   [[nodiscard]] bool rounds() const override { return is_float(); }
   [[nodiscard]] WorldBounds covered() const override { return reader_.metadata().valid; }
 
-  [[nodiscard]] TileBounds bounds(TileIndex tile) const override {
-    const TileEntry entry = reader_.tile_entry(tile);
-    if (!entry.stored) return {};
-    if (is_float()) {
-      return {true, entry.has_voids, std::bit_cast<float>(entry.code_min) * world_per_elevation_,
-              std::bit_cast<float>(entry.code_max) * world_per_elevation_};
-    }
-    return {true, entry.has_voids, scale_.offset + scale_.scale * entry.code_min,
-            scale_.offset + scale_.scale * entry.code_max};
+  [[nodiscard]] TileBounds bounds(TileIndex tile) const override { return bounds(tile, 0); }
+  [[nodiscard]] const Planes* planes() const override { return planes_ ? &*planes_ : nullptr; }
+  [[nodiscard]] const TileSource& plane(int plane) const override {
+    if (plane == 0) return *this;
+    return *coarse_[static_cast<std::size_t>(plane) - 1];
   }
 
   void read(TileIndex tile, std::span<std::uint16_t> codes) const override { convert(reader_.read_tile(tile), codes); }
 
+ private:
+  /// A coarse plane of the archive.
+  class Coarse final : public TileSource {
+   public:
+    Coarse(const ArchiveSource& whole, int plane) : whole_(whole), plane_(plane) {}
+    [[nodiscard]] const TileGrid& grid() const override { return whole_.planes_->grid(plane_); }
+    [[nodiscard]] ViewScale scale() const override { return whole_.scale(); }
+    [[nodiscard]] bool is_to_scale() const override { return whole_.is_to_scale(); }
+    [[nodiscard]] bool rounds() const override { return whole_.rounds(); }
+    [[nodiscard]] WorldBounds covered() const override { return whole_.covered(); }
+    [[nodiscard]] TileBounds bounds(TileIndex tile) const override { return whole_.bounds(tile, plane_); }
+    void read(TileIndex tile, std::span<std::uint16_t> codes) const override {
+      whole_.convert(whole_.reader_.read_tile(tile, plane_), codes);
+    }
+    [[nodiscard]] const ShadowSeedInfo* shadow_seeds() const override { return whole_.shadow_seeds(); }
+    void read_lit(TileIndex tile, const RowSun& sun, std::span<std::uint16_t> codes,
+                  std::span<std::uint16_t> shadow) const override {
+      read(tile, codes);
+      std::vector<float> lit(codes.size());
+      shadows_.shade(
+          grid(), tile, sun, whole_.fall_of(sun), [this](TileIndex at) { return heights(at); }, lit);
+      std::transform(lit.begin(), lit.end(), shadow.begin(), shadow_code);
+    }
+
+   private:
+    [[nodiscard]] std::vector<float> heights(TileIndex tile) const {
+      std::vector<float> heights(static_cast<std::size_t>(grid().shape().stored_vertex_count()),
+                                 std::numeric_limits<float>::quiet_NaN());
+      if (whole_.bounds(tile, plane_).stored) whole_.exact_codes(whole_.reader_.read_tile(tile, plane_), heights);
+      return heights;
+    }
+
+    const ArchiveSource& whole_;
+    int plane_;
+    mutable RowShadows shadows_;
+  };
+
+ public:
   [[nodiscard]] const ShadowSeedInfo* shadow_seeds() const override { return seeds_ ? &seeds_->info() : nullptr; }
 
   [[nodiscard]] std::vector<std::string> describe_place(WorldPoint at, double height) const override {
@@ -106,28 +191,50 @@ class ArchiveSource final : public TileSource {
     std::vector<double> entering = seeds_->entering(tile, stored, sun.travel, sun.elevation_deg);
     for (double& height : entering) height = exact_code_of(height);
     std::vector<float> heights(codes.size());
-    if (is_float()) {
-      std::transform(stored.heights.begin(), stored.heights.end(), heights.begin(),
-                     [this](float height) { return static_cast<float>(exact_code_of(height)); });
-    } else {
-      std::transform(codes.begin(), codes.end(), heights.begin(), [](std::uint16_t code) {
-        return code == kVoidCode ? std::numeric_limits<float>::quiet_NaN() : static_cast<float>(code);
-      });
-    }
-    const Quantisation unit{CodeType::kF32, 0.0, scale_.scale / world_per_elevation_};  // elevation units of a code
-    const double fall = seeds_->info().fall_per_half_step(grid(), unit, sun.elevation_deg) / grid().sigma_x();
+    exact_codes(stored, heights);
+    const double fall = fall_of(sun);
     const TileShape& shape = grid().shape();
     std::vector<float> lit(codes.size());
     tile_shadow(grid(), View2D<const float>(heights.data(), shape.columns(), shape.rows()), {sun.travel, fall},
                 entering, View2D<float>(lit.data(), shape.columns(), shape.rows()), {});
-    std::transform(lit.begin(), lit.end(), shadow.begin(),
-                   [](float height) { return std::isfinite(height) ? rounded(height) : std::uint16_t{0}; });
+    std::transform(lit.begin(), lit.end(), shadow.begin(), shadow_code);
   }
 
  private:
+  [[nodiscard]] TileBounds bounds(TileIndex tile, int plane) const {
+    const TileEntry entry = reader_.tile_entry(tile, plane);
+    if (!entry.stored) return {};
+    if (is_float()) {
+      return {true, entry.has_voids, std::bit_cast<float>(entry.code_min) * world_per_elevation_,
+              std::bit_cast<float>(entry.code_max) * world_per_elevation_};
+    }
+    return {true, entry.has_voids, scale_.offset + scale_.scale * entry.code_min,
+            scale_.offset + scale_.scale * entry.code_max};
+  }
+
   [[nodiscard]] bool is_float() const { return reader_.metadata().quantisation.type == CodeType::kF32; }
   [[nodiscard]] static std::uint16_t rounded(double code) {
     return static_cast<std::uint16_t>(std::clamp(std::round(code), 0.0, kVoidCode - 1.0));
+  }
+  [[nodiscard]] static std::uint16_t shadow_code(float height) {
+    return std::isfinite(height) ? rounded(height) : std::uint16_t{0};
+  }
+  /// Codes of a world unit that the sun's light falls by.
+  [[nodiscard]] double fall_of(const RowSun& sun) const {
+    const Quantisation unit{CodeType::kF32, 0.0, scale_.scale / world_per_elevation_};  // elevation units of a code
+    return seeds_->info().fall_per_half_step(grid(), unit, sun.elevation_deg) / grid().sigma_x();
+  }
+  /// A tile's heights in codes, unrounded: [C x R] out, NaN void.
+  void exact_codes(const TileCodes& stored, std::span<float> heights) const {
+    if (is_float()) {
+      std::transform(stored.heights.begin(), stored.heights.end(), heights.begin(),
+                     [this](float height) { return static_cast<float>(exact_code_of(height)); });
+      return;
+    }
+    const std::uint32_t void_code = reader_.metadata().quantisation.void_code();
+    std::transform(stored.codes.begin(), stored.codes.end(), heights.begin(), [=](std::uint16_t code) {
+      return code == void_code ? std::numeric_limits<float>::quiet_NaN() : static_cast<float>(code);
+    });
   }
   [[nodiscard]] double exact_code_of(double elevation) const {
     return (elevation * world_per_elevation_ - scale_.offset) / scale_.scale;
@@ -153,6 +260,8 @@ class ArchiveSource final : public TileSource {
   std::optional<WorldGeoreference> georeference_;
   std::optional<ShadowSeedReader> seeds_;
   std::optional<TextureReader> textures_;
+  std::optional<Planes> planes_;
+  std::vector<std::unique_ptr<Coarse>> coarse_;
 };
 
 }  // namespace
