@@ -1,19 +1,21 @@
 #include "formats/registry.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <cmath>
 #include <cstring>
+#include <limits>
 #include <span>
 
+#include "formats/files/file_stamp.h"
 #include "formats/files/raw_file.h"
 #include "formats/files/text.h"
 #include "formats/readers.h"
+#include "isohf/base/file.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
 
@@ -81,15 +83,9 @@ Head read_head(const std::string& path) {
   if (S_ISDIR(status.st_mode)) refuse(ErrorCode::kIo, "is a folder; a raster file is wanted");
   if (!S_ISREG(status.st_mode)) refuse(ErrorCode::kIo, "is not a regular file; a raster must be seekable");
   if (status.st_size == 0) refuse(ErrorCode::kCorrupt, "is empty (0 bytes)");
-  const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  if (file < 0) refuse(ErrorCode::kIo, fmt::format("cannot be opened: {}", std::strerror(errno)));
   Head head;
   std::array<std::byte, kStoredHeadBytes> stored{};
-  const ssize_t got = ::pread(file, stored.data(), stored.size(), 0);
-  const int error = errno;
-  ::close(file);
-  if (got < 0) refuse(ErrorCode::kIo, fmt::format("cannot be read: {}", std::strerror(error)));
-  const auto there = std::span(stored).first(static_cast<std::size_t>(got));
+  const auto there = std::span(stored).first(File(path, File::Mode::kRead).read_at(0, stored));
   head.in_gzip = is_gzip_name(path) && looks_like_gzip(there);
   if (head.in_gzip) {
     head.size = inflate_head(there, head.bytes);
@@ -154,6 +150,82 @@ std::string library_of(const Format& format) {
 
 namespace {
 
+/// No body's, in any unit.
+constexpr double kBeyondAnyHeight = 1e30;
+
+/// Numbers that no raster of ground has, and for which sizes and errors would be told in hundreds of digits.
+void check_numbers(const SourceInfo& info) {
+  constexpr double kLeast = 1e-12;
+  constexpr double kMost = 1e12;
+  const Georeference& place = info.georeference;
+  const auto check = [&](const char* what, double value, double least) {
+    if (std::abs(value) >= least && std::abs(value) <= kMost) return;
+    throw Error(ErrorCode::kCorrupt, {fmt::format("{}: {}", info.path, what), fmt::format("{:.3g}", value),
+                                      fmt::format("from {} to {}", least > 0.0 ? least : -kMost, kMost), ""});
+  };
+  check("the spacing of columns", place.spacing_x, kLeast);
+  check("the spacing of rows", place.spacing_y, kLeast);
+  if (place.has_origin) {
+    check("the first sample's x", place.origin_x, 0.0);
+    check("the first sample's y", place.origin_y, 0.0);
+  }
+}
+
+/// A raster whose file stays as it is while it is read: of one that another program writes, part would be old and part
+/// new, or not there yet.
+class UnchangedSource final : public HeightSource {
+ public:
+  UnchangedSource(std::unique_ptr<HeightSource> source, const FileStamp& stamp)
+      : source_(std::move(source)), path_(source_->info().path), stamp_(stamp) {}
+
+  [[nodiscard]] const SourceInfo& info() const override { return source_->info(); }
+  void read_window(const Window& window, std::span<std::byte> samples) override {
+    source_->read_window(window, samples);
+    require_unchanged(path_, stamp_);
+    check_elevations(samples);
+  }
+  void limit_buffers(std::uint64_t bytes) override { source_->limit_buffers(bytes); }
+  [[nodiscard]] std::uint64_t buffer_bytes(std::uint64_t limit) const override { return source_->buffer_bytes(limit); }
+
+ private:
+  /// Numbers that no elevation is, and that no void value or range declares: one of them would stretch the codes of all
+  /// others to nothing.
+  void check_elevations(std::span<const std::byte> samples) const {
+    const SourceInfo& info = source_->info();
+    if (info.valid_max <= kBeyondAnyHeight && info.valid_min >= -kBeyondAnyHeight) return;  // voids, then
+    if (info.sample_type == SampleType::kFloat32) check_floats<float>(samples);
+    if (info.sample_type == SampleType::kFloat64) check_floats<double>(samples);
+  }
+
+  template <typename Float>
+  void check_floats(std::span<const std::byte> samples) const {
+    const SourceInfo& info = source_->info();
+    const auto is_beyond = [](Float value) {
+      return std::abs(value) > static_cast<Float>(kBeyondAnyHeight) && std::abs(value) <= std::numeric_limits<Float>::max();
+    };
+    const std::size_t count = samples.size() / sizeof(Float);
+    const auto at = [&](std::size_t i) {
+      Float value;
+      std::memcpy(&value, samples.data() + i * sizeof(Float), sizeof(Float));
+      return value;
+    };
+    int beyond = 0;
+    for (std::size_t i = 0; i < count; ++i) beyond |= static_cast<int>(is_beyond(at(i)));
+    for (std::size_t i = 0; beyond != 0 && i < count; ++i) {
+      const double value = double{at(i)};
+      if (!is_beyond(at(i)) || value < info.valid_min || value > info.valid_max) continue;
+      if (std::ranges::find(info.void_values, value) != info.void_values.end()) continue;
+      throw Error(ErrorCode::kCorrupt, {path_, fmt::format("an elevation of {:.9g}", value),
+                                        fmt::format("{} at most either way", kBeyondAnyHeight),
+                                        fmt::format("`void_values` {:.9g} takes it as nodata", value)});
+    }
+  }
+
+  std::unique_ptr<HeightSource> source_;
+  std::string path_;  ///< of the samples, where a header was named
+  FileStamp stamp_;
+};
+
 std::unique_ptr<HeightSource> open_by_head(const std::string& path, const OpenOptions& options) {
   const Head head = read_head(path);
   if (options.raw) return open_raw(path, options);
@@ -174,7 +246,14 @@ std::unique_ptr<HeightSource> open_by_head(const std::string& path, const OpenOp
 
 std::unique_ptr<HeightSource> open_raster(const std::string& path, const OpenOptions& options) {
   try {
-    return open_by_head(path, options);
+    const FileStamp named = FileStamp::of(path);
+    std::unique_ptr<HeightSource> source = open_by_head(path, options);
+    // A header that was named is read for good by now.
+    const std::string& samples = source->info().path;
+    const FileStamp stamp = samples == path ? named : FileStamp::of(samples);
+    require_unchanged(path, named);
+    check_numbers(source->info());
+    return std::make_unique<UnchangedSource>(std::move(source), stamp);
   } catch (const Error& error) {
     throw error.at(path);  // which every reader's message names
   }

@@ -1,5 +1,6 @@
 #include "program.h"
 
+#include <execinfo.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -23,6 +24,25 @@ void prepare_telling(const Arguments& arguments) {
   }
 }
 
+/// What nothing can catch, as an exception where none may pass: one line, and no core file.
+[[noreturn]] void end_in_one_line() noexcept {
+  const auto say = [](const char* text) { static_cast<void>(::write(STDERR_FILENO, text, std::strlen(text)) < 0); };
+  say(program_name().c_str());
+  try {
+    if (const std::exception_ptr thrown = std::current_exception()) std::rethrow_exception(thrown);
+    say(": internal error");
+  } catch (const std::bad_alloc&) {
+    say(": out of memory");
+  } catch (const std::exception& error) {
+    say(": ended early: ");
+    say(error.what());
+  } catch (...) {
+    say(": internal error");
+  }
+  say("\n");
+  ::_exit(kExitFailed);
+}
+
 }  // namespace
 
 void print_version() {
@@ -34,6 +54,10 @@ void print_version() {
 int run_program(const char* name, int argc, char** argv, int (*body)(const Arguments& arguments)) {
   occupy_standard_descriptors();
   program_name() = name;
+  std::set_terminate(end_in_one_line);
+  // The C library loads what unwinds a stack when it is needed first, and aborts where there is no memory left for that.
+  void* frame = nullptr;
+  static_cast<void>(::backtrace(&frame, 1));
   // A closed pipe or a file over its size limit is an error that write() reports, not a reason to die.
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGXFSZ, SIG_IGN);
@@ -48,6 +72,11 @@ int run_program(const char* name, int argc, char** argv, int (*body)(const Argum
   } catch (const std::bad_alloc&) {
     return print_error(Error(ErrorCode::kOutOfMemory, "out of memory"), kExitFailed);
   } catch (const std::exception& error) {
+    // oneTBB's words; it starts its threads when there is work.
+    if (std::string_view(error.what()).starts_with("pthread_create")) {
+      return print_error(Error(ErrorCode::kOutOfMemory, "the system lets no more threads start; give fewer, as -j 1"),
+                         kExitFailed);
+    }
     return print_internal_error(error.what());
   }
 }

@@ -7,10 +7,8 @@
 #include "isohf/error.h"
 
 namespace isohf::cli {
-namespace {
 
-/// What the file is; empty where it may be an archive that is damaged.
-std::string otherwise(const std::string& path) {
+std::string what_else(const std::string& path) {
   if (const Format* const format = native_format_of(path, {}); format != nullptr) {
     return fmt::format("is no isohf archive but a raster ({0}); isohf convert {1} -o OUT.isohf makes one", format->name,
                        path);
@@ -20,13 +18,11 @@ std::string otherwise(const std::string& path) {
   return "is no isohf archive but " + found.is;
 }
 
-}  // namespace
-
 ArchiveReader open_archive(const std::string& path) {
   try {
     return ArchiveReader(path);
   } catch (const Error& error) {
-    const std::string found = error.code() == ErrorCode::kCorrupt ? otherwise(path) : "";
+    const std::string found = error.code() == ErrorCode::kCorrupt ? what_else(path) : "";
     if (found.empty()) throw;
     throw Error(ErrorCode::kUnsupported, path + ": " + found);
   }

@@ -1,32 +1,39 @@
 #pragma once
 
-#include <oneapi/tbb/global_control.h>
-#include <oneapi/tbb/task_arena.h>
+#include <optional>
+#include <type_traits>
+#include <utility>
 
-#include <cstddef>
+#include "isohf/base/arena.h"
 
 namespace isohf::cli {
 
-/// The threads that -j asks for, while it lives: also for arenas that the library makes. Without the limit raised
-/// first, oneTBB says on standard error that it ignores a request for more threads than there are cores.
+/// The threads that -j asks for, while it lives: also for arenas that the library makes.
 class WorkArena {
  public:
   /// threads  0 for one a core
-  explicit WorkArena(int threads)
-      : threads_(threads > 0 ? threads : oneapi::tbb::this_task_arena::max_concurrency()),
-        limit_(oneapi::tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads_)),
-        arena_(threads_) {}
+  explicit WorkArena(int threads) : arena_(job_of(threads)) {}
 
   /// Works on those threads.
   template <typename Work>
   auto execute(Work work) {
-    return arena_.execute(work);
+    if constexpr (std::is_void_v<decltype(work())>) {
+      arena_.execute(work);
+    } else {
+      std::optional<decltype(work())> result;
+      arena_.execute([&] { result.emplace(work()); });
+      return std::move(*result);
+    }
   }
 
  private:
-  int threads_;
-  oneapi::tbb::global_control limit_;
-  oneapi::tbb::task_arena arena_;
+  static Job job_of(int threads) {
+    Job job;
+    job.threads = threads;
+    return job;
+  }
+
+  Arena arena_;
 };
 
 }  // namespace isohf::cli

@@ -32,6 +32,7 @@
 #include "formats/files/text.h"
 #include "formats/georeference/files_beside.h"
 #include "formats/open_options.h"
+#include "isohf/base/arena.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
 
@@ -387,7 +388,8 @@ std::unique_ptr<HeightSource> open_exr(const std::string& path, const OpenOption
 void start_exr_threads() {
   static std::once_flag once;
   std::call_once(once, [] {
-    Imf::setGlobalThreadCount(static_cast<int>(std::clamp(std::thread::hardware_concurrency(), 1U, 4U)));
+    Imf::setGlobalThreadCount(
+        possible_threads(static_cast<int>(std::clamp(std::thread::hardware_concurrency(), 1U, 4U))));
   });
 }
 

@@ -1,17 +1,13 @@
 #include "formats/files/raw_file.h"
 
-#include <fcntl.h>
 #include <fmt/core.h>
 #include <sys/stat.h>
-#include <unistd.h>
 #include <zlib.h>
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <cstring>
 #include <optional>
-#include <system_error>
 #include <vector>
 
 #include "formats/files/text.h"
@@ -20,10 +16,6 @@
 
 namespace isohf {
 namespace {
-
-[[noreturn]] void fail(const std::string& path, const char* what, int error) {
-  throw Error(ErrorCode::kIo, fmt::format("{}: {}: {}", path, what, std::generic_category().message(error)));
-}
 
 /// Written as shifts on whole words so that the loop vectorises.
 template <typename Word, typename Swap>
@@ -83,31 +75,15 @@ std::string without_gzip(const std::string& path) {
   return is_gzip_name(path) ? path.substr(0, path.size() - 3) : path;
 }
 
-RawFile::RawFile(const std::string& path, std::uint64_t held_bytes) : path_(path) {
-  descriptor_ = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  if (descriptor_ < 0) fail(path, "cannot open", errno);
+RawFile::RawFile(const std::string& path, std::uint64_t held_bytes)
+    : path_(path), file_(path, File::Mode::kRead), size_bytes_(file_.size_bytes()) {
   struct stat status = {};
-  if (::fstat(descriptor_, &status) != 0) {
-    const int error = errno;
-    ::close(descriptor_);
-    fail(path, "cannot open", error);
+  if (::fstat(file_.descriptor(), &status) == 0 && !S_ISREG(status.st_mode)) {
+    throw Error(ErrorCode::kIo, path + ": is not a regular file, which is required");
   }
-  if (!S_ISREG(status.st_mode)) {
-    ::close(descriptor_);
-    throw Error(ErrorCode::kIo, path + (S_ISDIR(status.st_mode) ? ": is a folder, must be a file"
-                                                                : ": is not a regular file, which is required"));
-  }
-  size_bytes_ = static_cast<std::uint64_t>(status.st_size);
   if (!is_gzip_name(path)) return;
-  try {
-    std::array<std::byte, 3> head = {};
-    if (looks_like_gzip(std::span(head).first(read_stored(0, head)))) {
-      unpack_gzip(held_bytes);
-    }
-  } catch (...) {
-    ::close(descriptor_);
-    throw;
-  }
+  std::array<std::byte, 3> head = {};
+  if (looks_like_gzip(std::span(head).first(file_.read_at(0, head)))) unpack_gzip(held_bytes);
 }
 
 RawFile::RawFile(const std::string& path, const ZipEntry& member, std::uint64_t held_bytes)
@@ -149,13 +125,9 @@ void RawFile::unpack_member(const ZipEntry& member, std::uint64_t held_bytes) {
   }
 }
 
-RawFile::~RawFile() {
-  ::close(descriptor_);
-}
-
 std::vector<std::byte> RawFile::stored_bytes() const {
   std::vector<std::byte> stored(static_cast<std::size_t>(packed_.stored_bytes));
-  stored.resize(read_stored(packed_.begin_bytes, stored));
+  stored.resize(file_.read_at(packed_.begin_bytes, stored));
   return stored;
 }
 
@@ -163,7 +135,7 @@ InflatedBytes::ReadStored RawFile::packed_reader() const {
   return [this](std::uint64_t offset, std::span<std::byte> bytes) {
     if (offset >= packed_.stored_bytes) return std::size_t{0};
     const std::uint64_t most = std::min<std::uint64_t>(bytes.size(), packed_.stored_bytes - offset);
-    return read_stored(packed_.begin_bytes + offset, bytes.first(static_cast<std::size_t>(most)));
+    return file_.read_at(packed_.begin_bytes + offset, bytes.first(static_cast<std::size_t>(most)));
   };
 }
 
@@ -185,22 +157,9 @@ std::size_t RawFile::read_some(std::uint64_t offset_bytes, std::span<std::byte> 
     std::memcpy(bytes.data(), held_->bytes().data() + offset_bytes, bytes.size());
     return bytes.size();
   }
-  if (!inflated_) return read_stored(begin_bytes_ + offset_bytes, bytes);
+  if (!inflated_) return file_.read_at(begin_bytes_ + offset_bytes, bytes);
   const std::lock_guard lock(one_inflates_);
   return inflated_->read_some(offset_bytes, bytes);
-}
-
-std::size_t RawFile::read_stored(std::uint64_t offset_bytes, std::span<std::byte> bytes) const {
-  std::size_t done = 0;
-  while (done < bytes.size()) {
-    const ssize_t got =
-        ::pread(descriptor_, bytes.data() + done, bytes.size() - done, static_cast<off_t>(offset_bytes + done));
-    if (got < 0 && errno == EINTR) continue;
-    if (got < 0) fail(path_, "cannot read", errno);
-    if (got == 0) break;
-    done += static_cast<std::size_t>(got);
-  }
-  return done;
 }
 
 void RawFile::read(std::uint64_t offset_bytes, std::span<std::byte> bytes) const {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "formats/files/inflated_bytes.h"
+#include "isohf/base/file.h"
 #include "isohf/base/zip.h"
 
 namespace isohf {
@@ -37,12 +38,11 @@ class RawFile {
   RawFile(const std::string& path, const ZipEntry& member, std::uint64_t held_bytes = kMostHeldBytes);
   RawFile(const RawFile&) = delete;
   RawFile& operator=(const RawFile&) = delete;
-  ~RawFile();
 
   [[nodiscard]] const std::string& path() const { return path_; }
   [[nodiscard]] std::uint64_t size_bytes() const { return size_bytes_; }
   /// Of the file as it is stored.
-  [[nodiscard]] int descriptor() const { return descriptor_; }
+  [[nodiscard]] int descriptor() const { return file_.descriptor(); }
 
   /// Reads up to bytes.size() bytes at `offset_bytes`; returns how many there were before the end of the file.
   /// Throws Error{kIo}.
@@ -65,14 +65,13 @@ class RawFile {
     InflatedBytes::Kind kind = InflatedBytes::Kind::kGzip;
   };
 
-  std::size_t read_stored(std::uint64_t offset_bytes, std::span<std::byte> bytes) const;
   [[nodiscard]] std::vector<std::byte> stored_bytes() const;
   [[nodiscard]] InflatedBytes::ReadStored packed_reader() const;
   void unpack_gzip(std::uint64_t held_bytes);
   void unpack_member(const ZipEntry& member, std::uint64_t held_bytes);
 
   std::string path_;
-  int descriptor_ = -1;
+  File file_;
   std::uint64_t begin_bytes_ = 0;  // of a stored zip member
   std::uint64_t size_bytes_ = 0;
   Packed packed_;

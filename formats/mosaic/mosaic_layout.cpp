@@ -2,12 +2,9 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <sys/stat.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
-#include <cstring>
 #include <map>
 #include <numeric>
 #include <optional>
@@ -305,14 +302,6 @@ std::int64_t uncovered(const MosaicPlan& plan, std::optional<SampleRectangle>& f
 }
 
 }  // namespace
-
-FileStamp FileStamp::of(const std::string& path) {
-  struct stat status {};
-  if (::stat(path.c_str(), &status) != 0) {
-    throw Error(ErrorCode::kIo, {path, errno == ENOENT ? "no such file" : std::strerror(errno), "", ""});
-  }
-  return {static_cast<std::uint64_t>(status.st_size), status.st_mtim.tv_sec, status.st_mtim.tv_nsec};
-}
 
 void join_antimeridian(std::vector<PlacedMember>& members) {
   constexpr double kTurn = 360.0;

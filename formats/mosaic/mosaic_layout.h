@@ -6,20 +6,11 @@
 #include <vector>
 
 #include "formats/decorate/cropped_source.h"
+#include "formats/files/file_stamp.h"
 #include "formats/mosaic/mosaic_samples.h"
 #include "isohf/raster.h"
 
 namespace isohf {
-
-/// Size of a file and when it was changed last. Throws Error{kIo} naming the path.
-struct FileStamp {
-  std::uint64_t size_bytes = 0;
-  std::int64_t changed_s = 0;
-  std::int64_t changed_ns = 0;
-
-  [[nodiscard]] static FileStamp of(const std::string& path);
-  friend bool operator==(const FileStamp&, const FileStamp&) = default;
-};
 
 /// Members' samples may lie this far from the mosaic's grid, in samples: the rounding of origins and spacings that are
 /// written in few digits. They count as lying on it.

@@ -63,9 +63,7 @@ std::unique_ptr<HeightSource> ReaderPool::take(std::int64_t key, const MosaicMem
   }
   closed.clear();
   try {
-    if (FileStamp::of(member.path) != member.stamp) {
-      throw Error(ErrorCode::kIo, member.path + ": was changed while the mosaic was being read; begin again");
-    }
+    require_unchanged(member.path, member.stamp);
     std::unique_ptr<HeightSource> reader = open_raster(member.path, options_);
     const SourceInfo& info = reader->info();
     if (info.width != member.width || info.height != member.height) {

@@ -97,8 +97,8 @@ bool holds(const Sidecar& sidecar) {
 std::vector<std::unique_ptr<OutputFile>> begin_sidecars(const std::string& path, const RasterSpec& spec) {
   std::vector<std::unique_ptr<OutputFile>> files;
   for (const Sidecar& sidecar : sidecars_of(path, spec)) {
-    if (holds(sidecar)) continue;
     try {
+      if (holds(sidecar)) continue;
       check_sidecar_target(sidecar.path);
       files.push_back(std::make_unique<OutputFile>(sidecar.path, OutputFile::Options{spec.overwrite}));
       files.back()->append(sidecar.text);
@@ -150,6 +150,7 @@ void RasterSink::finish() {
     throw Error(ErrorCode::kInvalidArgument,
                 fmt::format("{}: finished after {} of {} rows", path_, rows_written_, spec_.height));
   }
+  bool is_removed = false;
   try {
     encoder_->close();
     encoder_.reset();
@@ -157,7 +158,7 @@ void RasterSink::finish() {
     // appears. Whoever ends the program in between finds no raster, never old samples with a new description.
     file_->sync();
     for (const auto& sidecar : sidecars_) sidecar->sync();
-    if (!sidecars_.empty()) file_->remove_replaced();
+    if (!sidecars_.empty()) is_removed = file_->remove_replaced();
     for (const auto& sidecar : sidecars_) {
       try {
         sidecar->commit();
@@ -167,6 +168,10 @@ void RasterSink::finish() {
     }
     file_->commit();
   } catch (const Error& error) {
+    if (is_removed) {
+      throw Error(error.code(),
+                  fmt::format("{}: {}; the samples are complete in {}", path_, error.what(), file_->part_path()));
+    }
     throw error.within(path_);
   }
 }

@@ -10,7 +10,7 @@ expect() {  # expect CODE SCRIPT ARGUMENT...
   found=$?
   ((found == code)) || { echo "$*: ended with $found, must be $code"; failed=1; }
 }
-for script in accuracy_table bench check flight fuzz make_testdata quickstart setup test; do
+for script in accuracy_table bench check faults flight fuzz make_testdata quickstart setup test; do
   expect 0 "scripts/$script" --help
   [[ $script == test ]] || expect 2 "scripts/$script" --nonsense
 done

@@ -6,6 +6,9 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <fstream>
 #include <set>
 #include <string>
 
@@ -53,7 +56,69 @@ TEST(OpenSource, ReportsAFileThatMayNotBeRead) {
   write_file(path, "abcdefgh");
   ASSERT_EQ(::chmod(path.c_str(), 0), 0);
   EXPECT_EQ(refusal(path).code(), ErrorCode::kIo);
-  EXPECT_THAT(refusal(path).what(), HasSubstr("cannot be opened: Permission denied"));
+  EXPECT_THAT(refusal(path).what(), HasSubstr("cannot open: Permission denied"));
+}
+
+/// Part of the samples would be old and part new, zeros or not there yet.
+TEST(OpenSource, NoticesAFileThatChangesWhileItIsRead) {
+  namespace fs = std::filesystem;
+  const TemporaryFolder folder;
+  RasterSpec spec;
+  spec.width = 40;
+  spec.height = 30;
+  const std::vector<std::byte> rows(40 * 30 * 2);
+  spec.sample_type = SampleType::kUint16;
+  for (const std::string name : {"a.tif", "a.png", "a.r16", "a.npy", "a.asc"}) {
+    SCOPED_TRACE(name);
+    const std::string path = folder / name;
+    const auto sink = create_raster(path, spec);
+    sink->write_rows(rows);
+    sink->finish();
+    const std::string whole = read_file(path);
+    const auto source = open_raster(path, {});
+    const Window window = {0, 0, source->info().width, 1};
+    (void)read_window(*source, window);
+    const auto expect_refused = [&] {
+      EXPECT_THAT(error_of([&] { (void)read_window(*source, window); }).what(),
+                  HasSubstr(path + ": was changed or replaced while it was read"));
+    };
+    {  // in place, the same size
+      std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
+      file.write(whole.data(), static_cast<std::streamsize>(whole.size()));
+    }
+    fs::last_write_time(path, fs::last_write_time(path) + std::chrono::seconds(5));
+    expect_refused();
+    const auto again = open_raster(path, {});
+    (void)read_window(*again, window);
+    fs::copy_file(path, folder / "other");
+    fs::last_write_time(folder / "other", fs::last_write_time(path));
+    fs::rename(folder / "other", path);  // the same size and time
+    EXPECT_THAT(error_of([&] { (void)read_window(*again, window); }).what(), HasSubstr("changed or replaced"));
+  }
+}
+
+TEST(OpenSource, RefusesNumbersThatNoGroundHas) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "a.asc";
+  const auto grid = [&](const std::string& corner, const std::string& cell, const std::string& height) {
+    write_file(path, "ncols 3\nnrows 2\nxllcorner " + corner + "\nyllcorner 0\ncellsize " + cell + "\n1 2 3\n4 5 " +
+                         height + "\n");
+  };
+  grid("0", "1e-153", "6");
+  EXPECT_EQ(refusal(path).what(), path + ": the spacing of columns: found 1e-153, must be from 1e-12 to 1000000000000");
+  grid("1e300", "1", "6");
+  EXPECT_THAT(refusal(path).what(), HasSubstr(path + ": the first sample's x: found 1e+300, must be from"));
+  grid("0", "1", "3e38");
+  const auto source = open_raster(path, {});
+  EXPECT_EQ(error_of([&] {
+              (void)read_window(*source, {0, 0, 3, 2});
+            }).what(),
+            path +
+                ": found an elevation of 3e+38, must be 1e+30 at most either way; `void_values` 3e+38 takes it as "
+                "nodata");
+  OpenOptions options;
+  options.void_values = {3e38};
+  EXPECT_NO_THROW((void)read_window(*open_raster(path, options), {0, 0, 3, 2}));
 }
 
 TEST(OpenSource, SaysThatTextIsNoRaster) {

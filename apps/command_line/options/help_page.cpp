@@ -87,7 +87,7 @@ void HelpPage::row(const std::string& name, const std::string& description) {
 
 void HelpPage::print() const {
   StandardOutput out;
-  out.write(page_);
+  out.write_styled(page_);
   out.finish();
 }
 

@@ -2,6 +2,7 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstring>
@@ -87,6 +88,22 @@ void write_line_to_stderr(const std::string& text) {
   }
 }
 
+/// Control characters become blanks, but for those of `kept`.
+std::string without_controls(std::string text, std::string_view kept) {
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const auto at = [&](std::size_t k) { return k < text.size() ? static_cast<unsigned char>(text[k]) : 0U; };
+    const bool is_c0 = (at(i) < 0x20 || at(i) == 0x7f) && kept.find(text[i]) == std::string_view::npos;
+    // In UTF-8: U+0080 to U+009F, and what turns the direction of writing or breaks a line.
+    const bool is_c1 = at(i) == 0xc2 && at(i + 1) >= 0x80 && at(i + 1) < 0xa0;
+    const bool is_format = at(i) == 0xe2 && ((at(i + 1) == 0x80 && at(i + 2) >= 0xa8 && at(i + 2) <= 0xae) ||
+                                             (at(i + 1) == 0x81 && at(i + 2) >= 0xa6 && at(i + 2) <= 0xa9));
+    if (!is_c0 && !is_c1 && !is_format) continue;
+    text[i] = ' ';
+    text.erase(i + 1, is_c0 ? 0 : is_c1 ? 1 : 2);
+  }
+  return text;
+}
+
 /// On one line; bytes that are no UTF-8 are replaced.
 std::string line_of(const ordered_json& object) {
   return object.dump(-1, ' ', false, ordered_json::error_handler_t::replace);
@@ -117,12 +134,17 @@ int report(const std::string& text, const ordered_json& object, int exit_code) {
 }  // namespace
 
 void StandardOutput::write(std::string_view text) {
-  // Documents quote what the library said; rows of numbers pass as they are.
-  if (text.find('`') == std::string_view::npos) {
-    pending_ += text;
-  } else {
-    pending_ += spelled(std::string(text));
-  }
+  // Documents quote what the library said, and what stands in files; rows of numbers pass as they are.
+  const bool is_plain = std::ranges::all_of(text, [](char c) {
+    const auto byte = static_cast<unsigned char>(c);
+    return (byte >= 0x20 && byte < 0x7f && c != '`') || c == '\n';
+  });
+  if (is_plain) return write_styled(text);
+  write_styled(without_controls(spelled(std::string(text)), "\n\t"));
+}
+
+void StandardOutput::write_styled(std::string_view text) {
+  pending_ += text;
   if (pending_.size() >= kBufferBytes) flush();
 }
 
@@ -141,18 +163,7 @@ void StandardOutput::flush() {
 }
 
 std::string printable(std::string text) {
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    const auto at = [&](std::size_t k) { return k < text.size() ? static_cast<unsigned char>(text[k]) : 0U; };
-    const bool is_c0 = at(i) < 0x20 || at(i) == 0x7f;
-    // In UTF-8: U+0080 to U+009F, and what turns the direction of writing or breaks a line.
-    const bool is_c1 = at(i) == 0xc2 && at(i + 1) >= 0x80 && at(i + 1) < 0xa0;
-    const bool is_format = at(i) == 0xe2 && ((at(i + 1) == 0x80 && at(i + 2) >= 0xa8 && at(i + 2) <= 0xae) ||
-                                             (at(i + 1) == 0x81 && at(i + 2) >= 0xa6 && at(i + 2) <= 0xa9));
-    if (is_c0) text[i] = ' ';
-    if (is_c1) text.replace(i, 2, " ");
-    if (is_format) text.replace(i, 3, " ");
-  }
-  return text;
+  return without_controls(std::move(text), "");
 }
 
 int exit_code_for(ErrorCode code) {

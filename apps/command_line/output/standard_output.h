@@ -30,7 +30,10 @@ enum ExitCode : int {
 /// nothing said. Any other failure throws Error{kIo}.
 class StandardOutput {
  public:
+  /// Text that may quote files: control characters but for ends of lines and tabs become blanks, as printable() has it.
   void write(std::string_view text);
+  /// Text of the program's own, with escape codes.
+  void write_styled(std::string_view text);
   /// Hands everything to the operating system.
   void flush();
   /// flush(), named for the end: output that was not finished is lost.

@@ -12,6 +12,7 @@
 
 #include "commands/command.h"
 #include "commands/convert_each.h"
+#include "formats/files/file_stamp.h"
 #include "formats/files/text.h"
 #include "interrupt.h"
 #include "isohf/archive.h"
@@ -360,6 +361,14 @@ struct Prepared {
   std::unique_ptr<PhotoSource> photo;
 };
 
+/// Files beside the input that decide what is written.
+std::vector<std::string> files_beside(const ConvertCommandOptions& options) {
+  std::vector<std::string> files;
+  if (!options.geoid.path.empty()) files.push_back(options.geoid.path);
+  if (!options.convert.acquisition.path.empty()) files.push_back(options.convert.acquisition.path);
+  return files;
+}
+
 Prepared prepare(ConvertCommandOptions& options, std::vector<std::string> files) {
   OpenedInputs opened = open_inputs(std::move(files), options.inputs, options.open, options.work.threads);
   Prepared prepared{std::move(opened.files),
@@ -367,6 +376,10 @@ Prepared prepare(ConvertCommandOptions& options, std::vector<std::string> files)
   understand_ground(prepared.source->info(), options.convert.plan.ground);
   options.input = prepared.source->info().path;
   options.convert.source_note = opened.note;
+  for (const std::string& file : files_beside(options)) {
+    prepared.files.push_back(file);
+    options.convert.source_note.fingerprint += fmt::format(" | {} {}", file, FileStamp::of(file).text());
+  }
   if (!options.source_name.empty()) {
     options.convert.source_note.name = options.source_name;
     options.convert.source_note.mosaic.reset();

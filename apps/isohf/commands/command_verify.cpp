@@ -259,6 +259,11 @@ int check_one(VerifyCommandOptions options, const Arguments& arguments, bool is_
                                          options.common.verbose);
   const Job job = job_from(options.work, *display);
   VerifyReport report = verify_archive(options.archive, job);
+  if (!report.findings.empty() && report.findings.front().id == finding::kNotReadable) {
+    if (const std::string what = what_else(options.archive); !what.empty()) {
+      report.findings.front().text = options.archive + ": " + what;
+    }
+  }
   std::optional<Accuracy> accuracy;
   // An archive that is not whole has no surface to measure.
   const bool compares = !options.against.names.empty() && report.passed();

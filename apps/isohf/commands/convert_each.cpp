@@ -255,7 +255,12 @@ int convert_each(const std::vector<EachFile>& files, const EachOptions& options,
     }
   };
   std::vector<std::thread> others;
-  for (std::size_t i = 1; i < workers; ++i) others.emplace_back(run);
+  try {
+    others.reserve(workers);
+    for (std::size_t i = 1; i < workers; ++i) others.emplace_back(run);
+  } catch (const std::system_error&) {
+    // No more threads to be had: those that there are do it all.
+  }
   run();
   for (std::thread& other : others) other.join();
   return batch.finish();

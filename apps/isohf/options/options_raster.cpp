@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "isohf/error.h"
 #include "options/option_values.h"
 
@@ -34,6 +36,13 @@ std::optional<double> spacing_in_world(const RasterOptions& options, const Metad
                 options.archive +
                     ": --spacing has a unit, but the archive's world units are not known; give a plain "
                     "number of these");
+  }
+  const WorldBounds& ground = metadata.valid;
+  const double samples = std::max(ground.x1 - ground.x0, ground.z1 - ground.z0) / options.spacing->value;
+  if (!(samples <= static_cast<double>(kMostSide))) {
+    throw Error(ErrorCode::kInvalidArgument,
+                {"--spacing", fmt::format("{}, for {:.3g} samples along a side", options.spacing->value, samples),
+                 fmt::format("wide enough for {} at most", kMostSide), ""});
   }
   return options.spacing->value;
 }

@@ -1,7 +1,6 @@
 #include "options/source_inputs.h"
 
 #include <fmt/format.h>
-#include <oneapi/tbb/task_arena.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -12,6 +11,7 @@
 #include "isohf/raster.h"
 #include "isohf/surface/decorate/filled_source.h"
 #include "options/option_values.h"
+#include "work_arena.h"
 
 namespace isohf::cli {
 namespace {
@@ -59,8 +59,7 @@ std::string fingerprint_of(const MosaicPlan& plan, OverlapRule rule) {
             [](const MosaicMember* a, const MosaicMember* b) { return a->order < b->order; });
   std::string text;
   for (const MosaicMember* member : members) {
-    text += fmt::format("{} {} bytes {}.{:09} at {} {}\n", file_name(member->path), member->stamp.size_bytes,
-                        member->stamp.changed_s, member->stamp.changed_ns, member->column, member->row);
+    text += fmt::format("{} {} at {} {}\n", file_name(member->path), member->stamp.text(), member->column, member->row);
   }
   return fmt::format("mosaic {} {} files {}", to_string(rule), members.size(), sha256_of(text));
 }
@@ -127,7 +126,7 @@ OpenedInputs open_inputs(std::vector<std::string> files, const SourceInputs& inp
     return opened;
   }
   const std::string name = fmt::format("mosaic of {} files", files.size());
-  oneapi::tbb::task_arena arena(threads > 0 ? threads : oneapi::tbb::task_arena::automatic);
+  WorkArena arena(threads);
   MosaicPlan plan = arena.execute([&] { return plan_mosaic(files, options, inputs.box); });
   if (inputs.require_complete && plan.holes.samples > 0) {
     throw Error(ErrorCode::kIo, name + ": --require-complete: " + plan.holes.describe(MosaicHoles::kMostNamed));

@@ -17,6 +17,15 @@ namespace {
   throw Error(ErrorCode::kInvalidArgument, {output, "exists and is " + kind, "", remedy});
 }
 
+template <typename Look>
+auto named(const std::string& output, Look look) {
+  try {
+    return look();
+  } catch (const Error& error) {
+    throw error.within(output);
+  }
+}
+
 /// What a file is that somebody was about to lose.
 std::string kind_of(const std::string& path) {
   const Format* found = nullptr;
@@ -32,7 +41,7 @@ std::string kind_of(const std::string& path) {
 
 void check_archive_output(const std::vector<std::string>& inputs, const std::string& output, bool overwrite) {
   const std::string place = check_output_place(inputs, output);
-  if (!head_of_file(place, 1).empty() && !is_archive_file(place)) {
+  if (named(output, [&] { return !head_of_file(place, 1).empty() && !is_archive_file(place); })) {
     refuse(output, kind_of(place), "an archive replaces only archives, choose another name");
   }
   check_output_file(inputs, output, overwrite);
@@ -50,7 +59,8 @@ void check_raster_output(const std::vector<std::string>& inputs, const std::stri
 
 void check_report_output(const std::vector<std::string>& inputs, const std::string& output, bool overwrite) {
   constexpr std::size_t kMostBytes = std::size_t{1} << 20U;
-  const std::vector<std::byte> head = head_of_file(check_output_place(inputs, output), kMostBytes);
+  const std::string place = check_output_place(inputs, output);
+  const std::vector<std::byte> head = named(output, [&] { return head_of_file(place, kMostBytes); });
   const auto* begin = reinterpret_cast<const char*>(head.data());
   const auto json = nlohmann::json::parse(begin, begin + head.size(), nullptr, false);
   if (!head.empty() && !(json.is_object() && json.contains("rms"))) {

@@ -3,7 +3,14 @@
 #include <oneapi/tbb/global_control.h>
 #include <oneapi/tbb/task_arena.h>
 
+#include <algorithm>
+#include <atomic>
 #include <cstddef>
+#include <limits>
+#include <semaphore>
+#include <system_error>
+#include <thread>
+#include <vector>
 
 namespace isohf {
 
@@ -11,6 +18,28 @@ using oneapi::tbb::global_control;
 
 int threads_of(const Job& job) {
   return job.threads > 0 ? job.threads : oneapi::tbb::this_task_arena::max_concurrency();
+}
+
+int possible_threads(int wanted) {
+  // Once there were too few, it stays at that: arenas lie within each other, and oneTBB complains on standard error of
+  // one that wants more than the outer one may have.
+  static std::atomic<int> known = 1;
+  static std::atomic<int> most = std::numeric_limits<int>::max();
+  wanted = std::min<int>(wanted, most);
+  if (wanted <= known) return wanted;
+  std::counting_semaphore<> end(0);
+  std::vector<std::thread> others;
+  try {
+    others.reserve(static_cast<std::size_t>(wanted));
+    while (static_cast<int>(others.size()) + 1 < wanted) others.emplace_back([&] { end.acquire(); });
+  } catch (const std::system_error&) {
+    // Then fewer.
+  }
+  const int possible = static_cast<int>(others.size()) + 1;
+  end.release(possible);
+  for (std::thread& other : others) other.join();
+  (possible == wanted ? known : most) = possible;
+  return possible;
 }
 
 /// Without the limit raised first, oneTBB says on standard error that it ignores a request for more threads than there
@@ -23,7 +52,7 @@ struct Arena::Threads {
   oneapi::tbb::task_arena arena;
 };
 
-Arena::Arena(const Job& job) : threads_(std::make_unique<Threads>(threads_of(job))) {}
+Arena::Arena(const Job& job) : threads_(std::make_unique<Threads>(possible_threads(threads_of(job)))) {}
 Arena::~Arena() = default;
 
 void Arena::execute(const std::function<void()>& work) {

@@ -151,10 +151,6 @@ void File::start_writeback(std::uint64_t offset_bytes, std::uint64_t size_bytes)
                                       SYNC_FILE_RANGE_WRITE));
 }
 
-void File::close() {
-  if (descriptor_ >= 0 && ::close(std::exchange(descriptor_, -1)) != 0) fail(name_, "cannot close", errno);
-}
-
 bool rename_file(const std::string& from, const std::string& to, bool overwrite) {
   const auto fail_rename = [&](int error_number) { fail(from, fmt::format("cannot rename to {}", to), error_number); };
   if (overwrite) {

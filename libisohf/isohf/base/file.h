@@ -45,7 +45,6 @@ class File {
   void truncate(std::uint64_t size_bytes);
   void sync();                                                                 ///< data and size reach the disk
   void start_writeback(std::uint64_t offset_bytes, std::uint64_t size_bytes);  ///< a hint, never fails
-  void close();  ///< throws where the system reports a late error
 
  private:
   std::string path_;

@@ -89,11 +89,13 @@ std::string output_place(const std::string& path, bool overwrite) {
 }
 
 std::vector<std::byte> head_of_file(const std::string& path, std::size_t most_bytes) {
+  struct stat status {};
+  if (::stat(path.c_str(), &status) != 0 || !S_ISREG(status.st_mode)) return {};
   std::vector<std::byte> head(most_bytes);
   try {
     head.resize(File(path, File::Mode::kRead).read_at(0, head));
-  } catch (const Error&) {
-    head.clear();
+  } catch (const Error& error) {
+    throw Error(error.code(), "what it replaces " + error.parts().found);
   }
   return head;
 }
@@ -129,6 +131,7 @@ OutputFile::~OutputFile() {
 void OutputFile::append(std::span<const std::byte> bytes) {
   if (buffer_.size() + bytes.size() > buffer_bytes_) flush();
   if (bytes.size() >= buffer_bytes_) {
+    is_synced_ = false;
     file_.write_at(flushed_, bytes);
     flushed_ += bytes.size();
     return;
@@ -138,6 +141,7 @@ void OutputFile::append(std::span<const std::byte> bytes) {
 
 void OutputFile::flush() {
   if (buffer_.empty()) return;
+  is_synced_ = false;
   file_.write_at(flushed_, buffer_);
   // The disk starts at once, so that the last flush does not wait for all of it.
   if (buffer_.size() >= kWritebackBytes) file_.start_writeback(flushed_, buffer_.size());
@@ -148,19 +152,23 @@ void OutputFile::flush() {
 void OutputFile::write_at(std::uint64_t offset_bytes, std::span<const std::byte> bytes) {
   if (offset_bytes == position()) return append(bytes);
   flush();
+  is_synced_ = false;
   file_.write_at(offset_bytes, bytes);
   flushed_ = std::max(flushed_, offset_bytes + bytes.size());
 }
 
 void OutputFile::truncate(std::uint64_t size_bytes) {
   buffer_.clear();
+  is_synced_ = false;
   file_.truncate(size_bytes);
   flushed_ = size_bytes;
 }
 
 void OutputFile::sync() {
   flush();
+  if (is_synced_) return;
   file_.sync();
+  is_synced_ = true;
 }
 
 void OutputFile::commit() {
@@ -175,9 +183,10 @@ void OutputFile::commit() {
     throw Error(ErrorCode::kIo,
                 fmt::format("was made by another program meanwhile; what was to replace it is {}", part_path_));
   }
+  // In place and on the disk: what fails from here on takes nothing back.
   keeps_ = true;
   sync_folder_of(place_);
-  file_.close();
+  file_ = File();
 }
 
 void write_output(const std::string& path, std::string_view text, bool overwrite) {
@@ -190,10 +199,10 @@ void write_output(const std::string& path, std::string_view text, bool overwrite
   }
 }
 
-void OutputFile::remove_replaced() {
-  if (!replaced_) return;
+bool OutputFile::remove_replaced() {
+  if (!replaced_) return false;
   if (!remove_file(place_)) throw Error(ErrorCode::kIo, "cannot be replaced: " + reason(errno));
-  keeps_ = true;
+  return keeps_ = true;
 }
 
 }  // namespace isohf

@@ -18,8 +18,8 @@ namespace isohf {
 /// link to nothing; a file that exists, without `overwrite`; Error{kIo}: its folder is missing or may not be written.
 [[nodiscard]] std::string output_place(const std::string& path, bool overwrite);
 
-/// What a file that exists holds in its first bytes, up to `most_bytes`; nothing where there is no file or it cannot
-/// be read.
+/// What a file that exists holds in its first bytes, up to `most_bytes`; nothing where there is no regular file. Throws,
+/// without the path, Error{kIo} where it cannot be read.
 [[nodiscard]] std::vector<std::byte> head_of_file(const std::string& path, std::size_t most_bytes);
 
 /// The one way in which a file is written: as NAME.part, locked against other writers, which gets the name in one step
@@ -66,8 +66,9 @@ class OutputFile {
   /// Leaves NAME.part behind.
   void keep() { keeps_ = true; }
 
-  /// The file that is replaced goes: nothing stands under the name until commit(), and NAME.part stays in any case.
-  void remove_replaced();
+  /// The file that is replaced goes, if there is one: nothing stands under the name until commit(), and NAME.part stays
+  /// in any case. Returns whether there was one.
+  bool remove_replaced();
 
  private:
   struct Rights {
@@ -85,6 +86,7 @@ class OutputFile {
   std::size_t buffer_bytes_;
   File file_;
   std::uint64_t flushed_ = 0;
+  bool is_synced_ = false;  ///< nothing was written since the last sync()
   bool keeps_ = false;
 };
 
