@@ -201,7 +201,8 @@ class UnchangedSource final : public HeightSource {
   void check_floats(std::span<const std::byte> samples) const {
     const SourceInfo& info = source_->info();
     const auto is_beyond = [](Float value) {
-      return std::abs(value) > static_cast<Float>(kBeyondAnyHeight) && std::abs(value) <= std::numeric_limits<Float>::max();
+      return std::abs(value) > static_cast<Float>(kBeyondAnyHeight) &&
+             std::abs(value) <= std::numeric_limits<Float>::max();
     };
     const std::size_t count = samples.size() / sizeof(Float);
     const auto at = [&](std::size_t i) {

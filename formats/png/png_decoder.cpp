@@ -68,6 +68,8 @@ bool PngDecoder::read_header(PngHeader& header, int& color_type) {
   if (setjmp(png_jmpbuf(png_)) != 0) return false;  // NOLINT(cert-err52-cpp): libpng's way to return errors
   png_set_user_limits(png_, PNG_UINT_31_MAX, PNG_UINT_31_MAX);
   png_init_io(png_, file_);
+  // A damaged chunk is left out with a warning else; it may hold the sample that means void.
+  png_set_crc_action(png_, PNG_CRC_ERROR_QUIT, PNG_CRC_ERROR_QUIT);
   png_read_info(png_, info_);
   header.width = png_get_image_width(png_, info_);
   header.height = png_get_image_height(png_, info_);

@@ -301,6 +301,11 @@ TEST(PngSource, TakesTransparentGrayAsVoid) {
   picture.transparent_gray = 777;
   write_picture(path, picture);
   EXPECT_EQ(open_png(path, {})->info().void_values, std::vector<double>{777.0});
+  // One bit of it damaged: neither another void value nor none.
+  std::string bytes = read_file(path);
+  bytes[bytes.find("tRNS") + 5] ^= 1;
+  write_file(path, bytes);
+  EXPECT_EQ(error_of([&] { (void)open_png(path, {}); }).code(), ErrorCode::kCorrupt);
 }
 
 TEST(PngSource, RefusesPalettesAndUnknownChannels) {
