@@ -71,7 +71,7 @@ TEST_F(BadInput, UnreadableFileAndFolder) {
   if (run_isohf({"--version"}, plain_user).exit_code != 0) GTEST_SKIP() << "other users cannot run the program";
   const RunResult input = run_isohf({"convert", folder / "secret.tif", folder / "out/out.isohf"}, plain_user);
   EXPECT_EQ(input.exit_code, 1);
-  EXPECT_THAT(input.err, HasSubstr("secret.tif: cannot be opened: Permission denied\n"));
+  EXPECT_THAT(input.err, HasSubstr("secret.tif: cannot open: Permission denied\n"));
   const RunResult output = run_isohf({"convert", folder / "open.tif", folder / "out.isohf"}, plain_user);
   EXPECT_EQ(output.exit_code, 1);
   EXPECT_THAT(output.err, HasSubstr("out.isohf"));
