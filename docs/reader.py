@@ -594,18 +594,36 @@ class Archive:
         require(0 <= at and at + struct.calcsize("<" + layout) <= len(data), "a record ends behind the end")
         return struct.unpack_from("<" + layout, data, at)
 
+    def zip64_field(self, at, size):
+        """The numbers of the ZIP64 field among the extra fields of an entry; other tools add fields of their own."""
+        end = at + size
+        while at + 4 <= end:
+            kind, length = self.unpack("HH", at)
+            require(at + 4 + length <= end, "an extra field")
+            if kind == 1:
+                return list(self.unpack("%dQ" % (length // 8), at + 4))
+            at += 4 + length
+        require(at == end, "an extra field")
+        return []
+
     def read_directory(self):
         require(self.data[:4] == b"PK\3\4", "no archive")
-        end64, end = self.unpack("IQHHIIQQQQ", len(self.data) - 98), self.unpack("IHHHHIIH", len(self.data) - 22)
-        require(end64[:2] == (0x06064B50, 44) and end[0] == 0x06054B50 and end64[9] + end64[8] == len(self.data) - 98
-                and end64[6] == end64[7] and not any(end64[4:6]), "the end records")
-        self.members, at, entries, end = {}, end64[9], end64[7], 0
+        end = self.unpack("IHHHHIIH", len(self.data) - 22)
+        end64 = self.unpack("IQHHIIQQQQ", len(self.data) - 98) if len(self.data) >= 98 else (0, 0)
+        require(end[0] == 0x06054B50 and not any(end[1:3]) and end[7] == 0, "the end record")
+        if end64[:2] == (0x06064B50, 44):
+            require(end64[9] + end64[8] == len(self.data) - 98 and end64[6] == end64[7] and not any(end64[4:6]), "the end records")
+            at, entries, last = end64[9], end64[7], len(self.data) - 98
+        else:  # another tool wrote it, which needed no ZIP64
+            require(end[3] == end[4] and end[6] + end[5] == len(self.data) - 22, "the end record")
+            at, entries, last = end[6], end[4], len(self.data) - 22
+        self.members, end, first = {}, 0, at
         for _ in range(entries):
             (magic, _, _, flags, method, _, _, crc, size, full, name_size, extra, comment, _, _, _,
              offset) = self.unpack("IHHHHHHIIIHHHHHII", at)
             require(magic == 0x02014B50 and flags in (0, 0x800) and method in (0, 8) and not comment, "a directory entry")
             name = self.data[at + 46 : at + 46 + name_size]
-            wide = list(self.unpack("%dQ" % (extra // 8), at + 46 + name_size + 4)) if extra else []
+            wide = self.zip64_field(at + 46 + name_size, extra)
             if full == 0xFFFFFFFF:
                 full, size = wide.pop(0), wide.pop(0)
             offset = wide.pop(0) if offset == 0xFFFFFFFF else offset
@@ -615,11 +633,11 @@ class Archive:
             require(local[0] == 0x04034B50 and local[2:4] == (flags, method) and local[6] == crc and named == name
                     and (local[10] or local[7:9] == (size, full)), "a local header that is not the directory's")
             end, name = start + size, name.decode()
-            require(end <= end64[9] and name not in self.members, "a member reaches into the directory, or occurs twice")
+            require(end <= first and name not in self.members, "a member reaches into the directory, or occurs twice")
             require(not any(part in ("", ".", "..") for part in name.split("/")) and not set(name) & set("\\:\0"), "a name")
             self.members[name] = (method, start, size, full, crc)
             at += 46 + name_size + extra
-        require(at == len(self.data) - 98, "the directory's entries do not fill it")
+        require(at == last, "the directory's entries do not fill it")
 
     def index(self):
         """Digests of the stored tiles by flat index, out of index.bin of version 2, all of which is checked."""

@@ -30,7 +30,8 @@ void prepare_telling(const Arguments& arguments) {
   say(program_name().c_str());
   try {
     if (const std::exception_ptr thrown = std::current_exception()) std::rethrow_exception(thrown);
-    say(": internal error");
+    // Nothing was thrown: there was no room to.
+    say(": ended early, most likely for lack of memory");
   } catch (const std::bad_alloc&) {
     say(": out of memory");
   } catch (const std::exception& error) {

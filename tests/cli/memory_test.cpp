@@ -54,7 +54,7 @@ TEST(Memory, ConvertStaysWithinATenthOfWhatItIsGivenAndWritesTheSameBytes) {
        {std::vector<std::string>{"--filter", "bilinear"}, {"--filter", "bspline5", "--shadow-seeds"}}) {
     ASSERT_EQ(convert("free.isohf", filter).exit_code, 0);
     const std::string expected = read_file(folder / "free.isohf");
-    for (const int megabytes : {60, 80, 120}) {
+    for (const int megabytes : {80, 100, 140}) {
       std::vector<std::string> bound = filter;
       bound.insert(bound.end(), {"--memory", std::to_string(megabytes) + "MB"});
       const RunResult result = convert("bound.isohf", bound);

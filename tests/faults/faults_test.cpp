@@ -221,6 +221,8 @@ TEST_P(Faults, ACallThatFailsLeavesAllOrNothing) {
 }
 
 TEST_P(Faults, MemoryThatRunsOutEndsInOneLine) {
+  // Where memory ran out as it set up its threads, oneTBB 2021.8 may wait for them for ever.
+  if (!tries_all()) GTEST_SKIP() << "scripts/faults does this";
   // PROJ tells no lack of memory from a system that it does not know; the archive then lacks its WKT.
   if (job().name == "convert_asc") GTEST_SKIP() << "the .prj is read by PROJ";
   const long count = learn()["malloc"];

@@ -290,7 +290,7 @@ TEST(MosaicSource, AChangedOrBrokenMemberIsAnErrorThatNamesIt) {
     FAIL() << "read";
   } catch (const Error& error) {
     EXPECT_EQ(error.code(), ErrorCode::kIo);
-    EXPECT_THAT(error.what(), HasSubstr("piece1.tif: was changed while the mosaic was being read"));
+    EXPECT_THAT(error.what(), HasSubstr("piece1.tif: was changed or replaced while it was read"));
   }
   std::filesystem::remove(paths[1]);
   EXPECT_THROW(static_cast<void>(read_whole(*mosaic)), Error);

@@ -171,7 +171,7 @@ TEST_F(Pds3, ReadsEverySampleType) {
     const std::string image = replaced(replaced(kImage, "MSB_INTEGER", big_endian ? "IEEE_REAL" : "PC_REAL"),
                                        "SAMPLE_BITS = 16", "SAMPLE_BITS = 32\r\n MISSING_CONSTANT = 16#FF7FFFFB#");
     std::string data;
-    for (const float value : {1.5F, std::bit_cast<float>(0xFF7FFFFBU), std::bit_cast<float>(0xFF7FFFFAU)}) {
+    for (const float value : {1.5F, std::bit_cast<float>(0xFF7FFFFBU), -1e29F}) {
       const auto bits = std::bit_cast<std::uint32_t>(value);
       for (int b = 0; b < 4; ++b) data.push_back(static_cast<char>(bits >> (8 * (big_endian ? 3 - b : b))));
     }

@@ -40,12 +40,18 @@ RasterSpec spec_of(std::int64_t width, std::int64_t height, SampleType type, int
   return spec;
 }
 
-/// Any bits are samples that must come back: infinities, NaNs and subnormals too.
+/// Any bits are samples that must come back, infinities, NaNs and subnormals too, but for what is larger than any ground.
 std::vector<std::byte> noise(const RasterSpec& spec) {
   std::vector<std::byte> samples(static_cast<std::size_t>(spec.width * spec.height * spec.channels) *
                                  size_bytes(spec.sample_type));
   std::mt19937 random(7);
   for (std::byte& byte : samples) byte = static_cast<std::byte>(random() & 0xFFU);
+  const std::size_t size = size_bytes(spec.sample_type);
+  if (spec.sample_type != SampleType::kFloat32 && spec.sample_type != SampleType::kFloat64) return samples;
+  for (std::size_t at = 0; at < samples.size(); at += size) {
+    const double value = value_at(spec.sample_type, std::span(samples).subspan(at, size), 0);
+    if (std::isfinite(value) && std::abs(value) > 1e30) samples[at + size - 1] &= std::byte{0xBF};
+  }
   return samples;
 }
 

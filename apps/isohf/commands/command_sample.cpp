@@ -222,7 +222,7 @@ class Answers {
                                               : text_from(samples[i]) + columns_from(output_, places_[i]);
       }
     });
-    for (const std::string& text : texts) out_.write(text);
+    for (const std::string& text : texts) options_.binary ? out_.write_bytes(text) : out_.write(text);
     places_.clear();
   }
 
