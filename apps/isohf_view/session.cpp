@@ -215,7 +215,7 @@ bool Session::is_settled() const {
 void Session::draw_overlay(double frames_per_second, bool figures, bool help,
                            const std::vector<std::string>& reading) const {
   const int size = std::max(1, view.height / 350);
-  if (figures) {
+  if (figures && !help) {  // both would cover each other in a small window
     const TileBoxFigures& box = boxes_.figures();
     std::vector<std::string> lines{
         fmt::format("{:5.1f} fps   {} triangles   {} draw calls", frames_per_second,
