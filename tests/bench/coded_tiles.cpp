@@ -31,11 +31,11 @@ std::vector<float> terrain(std::size_t tile) {
   return heights;
 }
 
-Coded::Coded(CodeType of) : type(of) {
+Coded::Coded(CodeType of, PayloadVersion version) : type(of) {
   const Quantisation quantisation{type, 0.0, type == CodeType::kU8 ? 6.0 : 0.5};
   for (std::size_t i = 0; i < kTiles; ++i) {
     quantise(quantisation, 0.0, terrain(i), tiles.emplace_back());
-    encoded.push_back(encode_tile(kShape, tiles.back()));
+    encoded.push_back(encode_tile(kShape, tiles.back(), kDefaultLevel, version));
     payloads.emplace_back(encoded.back().payload_bytes);
     inflate_exactly(encoded.back().deflated, payloads.back());
   }
@@ -45,6 +45,13 @@ const Coded& coded(CodeType type) {
   static const Coded u16(CodeType::kU16);
   static const Coded u8(CodeType::kU8);
   static const Coded f32(CodeType::kF32);
+  return type == CodeType::kU16 ? u16 : type == CodeType::kU8 ? u8 : f32;
+}
+
+const Coded& coded_first(CodeType type) {
+  static const Coded u16(CodeType::kU16, PayloadVersion::kFirst);
+  static const Coded u8(CodeType::kU8, PayloadVersion::kFirst);
+  static const Coded f32(CodeType::kF32, PayloadVersion::kFirst);
   return type == CodeType::kU16 ? u16 : type == CodeType::kU8 ? u8 : f32;
 }
 

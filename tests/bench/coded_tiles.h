@@ -9,6 +9,7 @@
 #include "isohf/archive/codec/residuals/residual_streams.h"
 #include "isohf/archive/codec/simd/batch_decoder.h"
 #include "isohf/archive/codec/tile_codes.h"
+#include "isohf/archive/codec/tile_encoder.h"
 
 /// What the kernels of the tile codec are measured on.
 namespace isohf::bench {
@@ -21,7 +22,7 @@ inline constexpr std::size_t kTiles = kBatchLanes;
 
 /// Tiles of a sample type at every stage of their way.
 struct Coded {
-  explicit Coded(CodeType of);
+  explicit Coded(CodeType of, PayloadVersion version = PayloadVersion::kBest);
 
   CodeType type;
   std::vector<TileCodes> tiles;
@@ -30,6 +31,8 @@ struct Coded {
 };
 
 [[nodiscard]] const Coded& coded(CodeType type);
+/// The same in payloads of version 1, which are decoded side by side.
+[[nodiscard]] const Coded& coded_first(CodeType type);
 
 /// One tile of u16 inside the encoder.
 struct Inside {

@@ -62,7 +62,7 @@ void expand(benchmark::State& state) {
 BENCHMARK(expand)->Name("extra bits to symbols");
 
 void decode_side_by_side(benchmark::State& state) {
-  const Coded& of = coded(static_cast<CodeType>(state.range(1)));
+  const Coded& of = coded_first(static_cast<CodeType>(state.range(1)));
   const auto count = static_cast<std::size_t>(state.range(0));
   const std::vector<std::span<const std::byte>> payloads(of.payloads.begin(),
                                                          of.payloads.begin() + static_cast<std::ptrdiff_t>(count));
