@@ -48,6 +48,7 @@ CubicTaps taps_at(std::int64_t sample, std::int64_t samples, std::int64_t cells)
 template <typename Node>
 FixedPlace blend(const CubicTaps& taps, const Node& node) {
   const FixedPlace base = node(taps.first + 1);
+  if (base.x == FixedPlace::kNone) return {FixedPlace::kNone, 0};
   std::int64_t x = 0;
   std::int64_t z = 0;
   for (std::int64_t i = 0; i < 4; ++i) {
