@@ -91,16 +91,6 @@ class ArchiveSource final : public TileSource {
       const TileBounds whole = whole_bounds(*this);
       scale_ = {whole.low, whole.high > whole.low ? (whole.high - whole.low) / (kVoidCode - 1) : 1.0};
     }
-    try {
-      understand_source(reader_);
-    } catch (const Error&) {
-      // Its map is not understood: places have no longitude and latitude then.
-    }
-    try {
-      georeference_.emplace(metadata);
-    } catch (const Error&) {
-      // Nor coordinates.
-    }
     if (shadow_seed_info(metadata)) seeds_.emplace(reader_);
     if (texture_info(metadata)) textures_.emplace(reader_);
   }
@@ -165,6 +155,7 @@ class ArchiveSource final : public TileSource {
     std::vector<std::string> lines = TileSource::describe_place(at, height / world_per_elevation_);
     const std::string& unit = reader_.metadata().vertical_unit;
     if (unit != "unknown") lines.back() += " " + unit;
+    std::call_once(georeference_once_, [this] { find_georeference(); });
     if (!georeference_) return lines;
     if (georeference_->has_source() && reader_.metadata().source.crs_unit != "degree") {
       const MapPoint place = georeference_->source_from_world(at);
@@ -212,6 +203,21 @@ class ArchiveSource final : public TileSource {
             scale_.offset + scale_.scale * entry.code_max};
   }
 
+  /// When it is first asked for: understanding a map may load PROJ. From a reader of its own, as others read reader_.
+  void find_georeference() const {
+    ArchiveReader archive(reader_.path());
+    try {
+      understand_source(archive);
+    } catch (const Error&) {
+      // Its map is not understood: places have no longitude and latitude then.
+    }
+    try {
+      georeference_.emplace(archive.metadata());
+    } catch (const Error&) {
+      // Nor coordinates.
+    }
+  }
+
   [[nodiscard]] bool is_float() const { return reader_.metadata().quantisation.type == CodeType::kF32; }
   [[nodiscard]] static std::uint16_t rounded(double code) {
     return static_cast<std::uint16_t>(std::clamp(std::round(code), 0.0, kVoidCode - 1.0));
@@ -257,7 +263,8 @@ class ArchiveSource final : public TileSource {
   ArchiveReader reader_;
   double world_per_elevation_;
   ViewScale scale_;
-  std::optional<WorldGeoreference> georeference_;
+  mutable std::once_flag georeference_once_;
+  mutable std::optional<WorldGeoreference> georeference_;
   std::optional<ShadowSeedReader> seeds_;
   std::optional<TextureReader> textures_;
   std::optional<Planes> planes_;
@@ -293,7 +300,9 @@ Planes planes_of(const TileSource& source) {
   return source.planes() != nullptr ? *source.planes() : Planes(source.grid(), 0, 0, false);
 }
 
-TileBounds whole_bounds(const TileSource& source_of_tiles) {
+namespace {
+
+TileBounds find_whole_bounds(const TileSource& source_of_tiles) {
   // The coarsest plane knows of all that lies below.
   const Planes* planes = source_of_tiles.planes();
   const TileSource& source = planes == nullptr ? source_of_tiles : source_of_tiles.plane(planes->count());
@@ -309,6 +318,13 @@ TileBounds whole_bounds(const TileSource& source_of_tiles) {
   }
   if (!whole.stored) return {};
   return whole;
+}
+
+}  // namespace
+
+TileBounds whole_bounds(const TileSource& source) {
+  std::call_once(source.whole_once_, [&] { source.whole_ = find_whole_bounds(source); });
+  return source.whole_;
 }
 
 std::unique_ptr<TileSource> open_archive(const std::string& path) {

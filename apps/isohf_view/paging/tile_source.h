@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <memory>
+#include <mutex>
 #include <span>
 #include <string>
 #include <vector>
@@ -80,6 +81,11 @@ class TileSource {
   [[nodiscard]] virtual bool has_texture(TileIndex) const { return false; }
   /// A level of a tile's texture as RGBA with straight alpha. Throws Error naming the tile.
   [[nodiscard]] virtual Picture read_texture(TileIndex tile, int level) const;
+
+ private:
+  friend TileBounds whole_bounds(const TileSource& source);
+  mutable std::once_flag whole_once_;
+  mutable TileBounds whole_;
 };
 
 /// Opens an archive for viewing. 16- and 8-bit codes are taken as they are; float elevations are rounded to 65535
@@ -114,7 +120,7 @@ struct TileVolume {
 /// Its planes, or its tiles alone.
 [[nodiscard]] Planes planes_of(const TileSource& source);
 
-/// Lowest and highest elevation of the tiles together; {0, 0} where all is void.
+/// Lowest and highest elevation of the tiles together; {0, 0} where all is void. Found once, and kept.
 [[nodiscard]] TileBounds whole_bounds(const TileSource& source);
 
 }  // namespace isohf::view

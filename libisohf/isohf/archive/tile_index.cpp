@@ -13,16 +13,20 @@ constexpr std::uint32_t kHasVoids = 2;
 
 }  // namespace
 
-std::optional<TileEntry> parse_index_record(std::span<const std::byte> record) {
+std::uint32_t read_record(std::span<const std::byte> record, TileEntry& entry) {
   ByteReader reader(record);
-  TileEntry entry;
   entry.offset_bytes = reader.read<std::uint64_t>();
   entry.compressed_bytes = reader.read<std::uint32_t>();
   entry.payload_bytes = reader.read<std::uint32_t>();
   entry.payload_crc32 = reader.read<std::uint32_t>();
   entry.code_min = reader.read<std::uint32_t>();
   entry.code_max = reader.read<std::uint32_t>();
-  const auto flags = reader.read<std::uint32_t>();
+  return reader.read<std::uint32_t>();
+}
+
+std::optional<TileEntry> parse_index_record(std::span<const std::byte> record) {
+  TileEntry entry;
+  const std::uint32_t flags = read_record(record, entry);
   entry.stored = (flags & kStored) != 0;
   entry.has_voids = (flags & kHasVoids) != 0;
   if ((flags & ~(kStored | kHasVoids)) != 0) return std::nullopt;

@@ -26,6 +26,8 @@ struct IndexFooter {
   std::uint32_t records_crc32 = 0;
 };
 
+/// What records of both versions begin with, into `entry`; returns the flags behind it.
+[[nodiscard]] std::uint32_t read_record(std::span<const std::byte> record, TileEntry& entry);
 /// The record as it stands; reserved bits and the rules for absent tiles are checked: nullopt where they are broken.
 [[nodiscard]] std::optional<TileEntry> parse_index_record(std::span<const std::byte> record);
 /// nullopt where there is no valid footer of a known version.
