@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
 #include <optional>
 #include <random>
@@ -61,13 +62,44 @@ TEST(AdaptiveCodec, BringsBackEveryTileByBothDecodersWithAndWithoutSimd) {
   }
 }
 
-TEST(AdaptiveCodec, IsWhatTilesOfManyCodesGet) {
-  const TileShape shape = TileShape::make(52, 67, 4);
+/// Waves and noise of some codes, in steps of 2^shift: what `--max-rounding` makes of one ground.
+TileCodes ground_in_steps(const TileShape& shape, CodeType type, unsigned shift) {
+  std::mt19937 random(7);
+  TileCodes tile;
+  tile.type = type;
+  for (int r = 0; r < shape.rows(); ++r) {
+    for (int c = 0; c < shape.columns(); ++c) {
+      const double waves = 20000 + 6000 * std::sin(0.05 * c + 0.02 * r) + 3000 * std::sin(0.11 * r - 0.03 * c);
+      const auto code = static_cast<std::uint32_t>(waves) + random() % 64;
+      tile.codes.push_back(static_cast<std::uint16_t>(code >> shift));
+    }
+  }
+  return tile;
+}
+
+std::size_t bytes_of(const TileShape& shape, const TileCodes& tile, PayloadVersion version) {
+  return encode_tile(shape, tile, kDefaultLevel, version).deflated.size();
+}
+
+TEST(AdaptiveCodec, IsTakenWhereCodesAreCoarseAndPaysThere) {
+  const TileShape shape = TileShape::make(100, 99, 1);
   for (const CodeType type : {CodeType::kU16, CodeType::kU8}) {
-    const EncodedTile encoded = encode_tile(shape, test::make_tile(shape, type, Kind::kTerrain, 1));
-    std::vector<std::byte> payload(encoded.payload_bytes);
-    inflate_exactly(encoded.deflated, payload);
-    EXPECT_TRUE(is_adaptive(payload));
+    for (const unsigned shift : {8U, 9U, 10U, 11U}) {
+      const TileCodes tile = ground_in_steps(shape, type, shift);
+      const std::size_t bytes = bytes_of(shape, tile, PayloadVersion::kBest);
+      EXPECT_EQ(bytes, bytes_of(shape, tile, PayloadVersion::kAdaptive)) << shift;
+      EXPECT_LT(bytes, bytes_of(shape, tile, PayloadVersion::kFirst) * 95 / 100) << shift;
+    }
+  }
+}
+
+TEST(AdaptiveCodec, IsLeftToTilesOfCoarseCodes) {
+  const TileShape shape = TileShape::make(100, 99, 1);
+  for (const unsigned shift : {0U, 2U, 4U, 5U}) {
+    const TileCodes tile = ground_in_steps(shape, CodeType::kU16, shift);
+    const std::size_t bytes = bytes_of(shape, tile, PayloadVersion::kBest);
+    EXPECT_EQ(bytes, bytes_of(shape, tile, PayloadVersion::kFirst)) << shift;
+    EXPECT_LT(bytes, bytes_of(shape, tile, PayloadVersion::kAdaptive) * 105 / 100) << shift;
   }
 }
 
@@ -143,18 +175,22 @@ TEST(SymbolModel, LearnsFromBandsThatAreDone) {
   EXPECT_EQ(model.table(context_of(3, 2, kLevelPattern)).frequencies, before.frequencies);
 }
 
-/// Tiles of smooth ground that is rounded ever more coarsely, as `--max-rounding` does.
-TEST(AdaptiveCodec, TakesNoMoreBytesAtHigherLevels) {
+TEST(TileCodec, TakesNoMoreBytesAtHigherLevels) {
   const TileShape shape = TileShape::make(100, 99, 1);
-  for (const unsigned shift : {0U, 3U, 6U, 8U}) {
-    for (const Kind kind : {Kind::kTerrain, Kind::kPlane, Kind::kVoidIsland}) {
-      std::size_t before = std::numeric_limits<std::size_t>::max();
-      for (int level = kMinLevel; level <= kMaxLevel; ++level) {
-        TileCodes tile = test::make_tile(shape, CodeType::kU16, kind, 3);
-        for (std::uint16_t& code : tile.codes) code = code == 65535 ? code : static_cast<std::uint16_t>(code >> shift);
-        const std::size_t bytes = encode_tile(shape, tile, level).deflated.size();
-        EXPECT_LE(bytes, before) << level << " " << shift;
-        before = bytes;
+  for (const unsigned shift : {0U, 3U, 5U, 6U, 7U, 8U, 10U, 12U, 14U}) {
+    const TileCodes waves = ground_in_steps(shape, CodeType::kU16, shift);
+    TileCodes other = test::make_tile(shape, CodeType::kU16, shift % 2 == 0 ? Kind::kTerrain : Kind::kVoidIsland, 3);
+    for (std::uint16_t& code : other.codes) {
+      code = code == 65535 ? code : static_cast<std::uint16_t>(code >> std::min(shift, 8U));
+    }
+    for (const PayloadVersion version : {PayloadVersion::kBest, PayloadVersion::kAdaptive}) {
+      for (const TileCodes& tile : {waves, other}) {
+        std::size_t before = std::numeric_limits<std::size_t>::max();
+        for (int level = kMinLevel; level <= kMaxLevel; ++level) {
+          const std::size_t bytes = encode_tile(shape, tile, level, version).deflated.size();
+          EXPECT_LE(bytes, before) << level << " " << shift << " " << static_cast<int>(version);
+          before = bytes;
+        }
       }
     }
   }

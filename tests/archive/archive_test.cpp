@@ -64,24 +64,20 @@ TEST(Archive, IsReadByThePageWithPredictorsOfEveryKind) {
   const std::string path = folder / "a.isohf";
   const TileGrid grid = TileGrid::make(TileShape::make(68, 67, 1), 1, 1, 100.0, 1.0 / 3.0);
   for (const CodeType type : {CodeType::kU16, CodeType::kU8, CodeType::kF32}) {
-    for (const int level : {kMinLevel, kDefaultLevel, kMaxLevel, kMinLevel - 1, -kDefaultLevel, -kMaxLevel}) {
+    const TileCodes halves = test::make_halves(grid.shape(), type);
+    const auto with = [&](std::size_t count, bool is_wide) {
+      return encode_tile_with(grid.shape(), halves, test::make_predictors(grid.shape(), count, is_wide));
+    };
+    for (const EncodedTile& tile :
+         {with(1, false), with(2, false), with(kMaxPredictors, true), encode_tile(grid.shape(), halves, kMinLevel),
+          encode_tile(grid.shape(), halves, kMinLevel, PayloadVersion::kAdaptive),
+          encode_tile(grid.shape(), halves, kDefaultLevel, PayloadVersion::kAdaptive)}) {
       std::filesystem::remove(path);
       ArchiveWriter writer(path, grid, WriterOptions{});
-      const PayloadVersion version = level > 0 ? PayloadVersion::kFirst : PayloadVersion::kAdaptive;
-      const EncodedTile tile =
-          encode_tile(grid.shape(), test::make_halves(grid.shape(), type), std::max(1, std::abs(level)), version);
-      std::vector<std::byte> payload(tile.payload_bytes);
-      inflate_exactly(tile.deflated, payload);
-      if (type == CodeType::kF32 || version == PayloadVersion::kFirst) {
-        EXPECT_TRUE(level != kDefaultLevel || std::to_integer<int>(payload[28]) > 1) << "one predictor";
-        EXPECT_EQ(std::to_integer<int>(payload[29]), std::abs(level) == kMaxLevel ? 18 : 12);
-      } else {
-        EXPECT_EQ(std::to_integer<int>(payload[0]), 2);
-      }
       writer.add_tile(tile);
       static_cast<void>(writer.finish(test::make_metadata(grid, type)));
       const std::string command = std::string("python3 \"" ISOHF_SOURCE_DIR "/docs/reader.py\" ") + path;
-      EXPECT_EQ(std::system(command.c_str()), 0) << to_string(type) << " at level " << level;
+      EXPECT_EQ(std::system(command.c_str()), 0) << to_string(type) << ", " << tile.payload_bytes;
     }
   }
 }

@@ -89,9 +89,10 @@ TEST(BatchDecoder, GivesWhatThePlainDecoderGivesForPredictorsOfEveryKind) {
   for (const CodeType type : {CodeType::kU16, CodeType::kU8, CodeType::kF32}) {
     const TileCodes tile = test::make_halves(shape, type);
     std::vector<std::vector<std::byte>> payloads;
-    for (const int level : {kMinLevel, kDefaultLevel, kMaxLevel})
-      payloads.push_back(payload_of(encode_tile(shape, tile, level, PayloadVersion::kFirst)));
-    EXPECT_GT(std::to_integer<int>(payloads[1][28]), 1);
+    for (const auto& [count, is_wide] : {std::pair<std::size_t, bool>{1, false}, {3, false}, {kMaxPredictors, true}}) {
+      payloads.push_back(payload_of(encode_tile_with(shape, tile, test::make_predictors(shape, count, is_wide))));
+      EXPECT_EQ(std::to_integer<std::size_t>(payloads.back()[28]), count);
+    }
     payloads.push_back(payload_of(shape, type, Kind::kVoidNoise, 1));
     for (std::size_t begin = 0; begin < payloads.size(); ++begin) {  // with and without the others beside it
       const Decoded fast = decode(shape, type, {payloads.begin() + static_cast<std::ptrdiff_t>(begin), payloads.end()});

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "isohf/archive/codec/predict/predictors.h"
 #include "isohf/archive/codec/tile_codes.h"
 #include "isohf/metadata.h"
 
@@ -24,6 +25,8 @@ inline constexpr Kind kAllKinds[] = {Kind::kConstant,   Kind::kPlane,     Kind::
 
 /// Codes or floats that want a predictor of their own in each half: noise in the West, waves in the East.
 [[nodiscard]] TileCodes make_halves(const TileShape& shape, CodeType type);
+/// Several predictors and a map that takes them in turn, or one.
+[[nodiscard]] Predictors make_predictors(const TileShape& shape, std::size_t count, bool is_wide);
 
 /// NaN equals NaN; otherwise bits decide.
 [[nodiscard]] bool same_samples(const TileCodes& a, const TileCodes& b);

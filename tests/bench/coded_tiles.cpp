@@ -41,18 +41,13 @@ Coded::Coded(CodeType of, PayloadVersion version) : type(of) {
   }
 }
 
-const Coded& coded(CodeType type) {
-  static const Coded u16(CodeType::kU16);
-  static const Coded u8(CodeType::kU8);
-  static const Coded f32(CodeType::kF32);
-  return type == CodeType::kU16 ? u16 : type == CodeType::kU8 ? u8 : f32;
-}
-
-const Coded& coded_first(CodeType type) {
-  static const Coded u16(CodeType::kU16, PayloadVersion::kFirst);
-  static const Coded u8(CodeType::kU8, PayloadVersion::kFirst);
-  static const Coded f32(CodeType::kF32, PayloadVersion::kFirst);
-  return type == CodeType::kU16 ? u16 : type == CodeType::kU8 ? u8 : f32;
+const Coded& coded(CodeType type, PayloadVersion version) {
+  static const Coded first[] = {Coded(CodeType::kU16, PayloadVersion::kFirst),
+                                Coded(CodeType::kU8, PayloadVersion::kFirst),
+                                Coded(CodeType::kF32, PayloadVersion::kFirst)};
+  static const Coded adaptive[] = {Coded(CodeType::kU16, PayloadVersion::kAdaptive),
+                                   Coded(CodeType::kU8, PayloadVersion::kAdaptive)};
+  return (version == PayloadVersion::kAdaptive ? adaptive : first)[static_cast<std::size_t>(type)];
 }
 
 Inside::Inside() : lattice(kShape), residuals(samples(), false), sorted(samples()) {

@@ -22,7 +22,7 @@ inline constexpr std::size_t kTiles = kBatchLanes;
 
 /// Tiles of a sample type at every stage of their way.
 struct Coded {
-  explicit Coded(CodeType of, PayloadVersion version = PayloadVersion::kBest);
+  Coded(CodeType of, PayloadVersion version);
 
   CodeType type;
   std::vector<TileCodes> tiles;
@@ -30,9 +30,8 @@ struct Coded {
   std::vector<std::vector<std::byte>> payloads;
 };
 
-[[nodiscard]] const Coded& coded(CodeType type);
-/// The same in payloads of version 1, which are decoded side by side.
-[[nodiscard]] const Coded& coded_first(CodeType type);
+/// Of floats there is version 1 alone.
+[[nodiscard]] const Coded& coded(CodeType type, PayloadVersion version = PayloadVersion::kFirst);
 
 /// One tile of u16 inside the encoder.
 struct Inside {

@@ -62,7 +62,7 @@ void expand(benchmark::State& state) {
 BENCHMARK(expand)->Name("extra bits to symbols");
 
 void decode_side_by_side(benchmark::State& state) {
-  const Coded& of = coded_first(static_cast<CodeType>(state.range(1)));
+  const Coded& of = coded(static_cast<CodeType>(state.range(1)));
   const auto count = static_cast<std::size_t>(state.range(0));
   const std::vector<std::span<const std::byte>> payloads(of.payloads.begin(),
                                                          of.payloads.begin() + static_cast<std::ptrdiff_t>(count));
@@ -79,18 +79,18 @@ void decode_side_by_side(benchmark::State& state) {
 BENCHMARK(decode_side_by_side)->Name("decode, tiles side by side")->ArgsProduct({{1, kTiles}, {0, 1, 2}});
 
 void decode_one(benchmark::State& state) {
-  const Coded& of = coded(static_cast<CodeType>(state.range(0)));
+  const Coded& of = coded(static_cast<CodeType>(state.range(0)), static_cast<PayloadVersion>(state.range(1)));
   for (auto _ : state) {
     const TileCodes tile = decode_tile(kShape, of.type, of.payloads[0]);
     benchmark::DoNotOptimize(&tile);
   }
   set_samples(state, Inside::samples(), of.type);
-  state.SetLabel(to_string(of.type));
+  state.SetLabel(std::string(to_string(of.type)) + ", version " + std::to_string(state.range(1)));
 }
-BENCHMARK(decode_one)->Name("decode, one tile")->DenseRange(0, 2);
+BENCHMARK(decode_one)->Name("decode, one tile")->ArgsProduct({{0, 1, 2}, {1}})->ArgsProduct({{0, 1}, {2}});
 
 void decode_all(benchmark::State& state) {
-  const Coded& of = coded(static_cast<CodeType>(state.range(0)));
+  const Coded& of = coded(static_cast<CodeType>(state.range(0)), static_cast<PayloadVersion>(state.range(1)));
   std::vector<std::vector<std::byte>> payloads = of.payloads;
   for (auto _ : state) {
     for (std::size_t i = 0; i < kTiles; ++i) inflate_exactly(of.encoded[i].deflated, payloads[i]);
@@ -104,9 +104,12 @@ void decode_all(benchmark::State& state) {
     benchmark::DoNotOptimize(tiles.data());
   }
   set_samples(state, kTiles * Inside::samples(), of.type);
-  state.SetLabel(to_string(of.type));
+  state.SetLabel(std::string(to_string(of.type)) + ", version " + std::to_string(state.range(1)));
 }
-BENCHMARK(decode_all)->Name("inflate and decode, eight tiles")->DenseRange(0, 2);
+BENCHMARK(decode_all)
+    ->Name("inflate and decode, eight tiles")
+    ->ArgsProduct({{0, 1, 2}, {1}})
+    ->ArgsProduct({{0, 1}, {2}});
 
 }  // namespace
 }  // namespace isohf::bench

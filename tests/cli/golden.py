@@ -32,7 +32,8 @@ MASKS = [(r"\b\d+(\.\d+)? (ms|s)\b", "<s>"),
          (r"[0-9.]+ million input samples a second", "<rate>"),
          (r"\b\d+(\.\d+)? (bytes|kB|MB|GB)\b(?! as raw| take| of)", "<size>"),
          (r"[0-9.]+ bits a source sample: [0-9.]+ times", "<ratio>"),
-         (r'("(archive_)?bytes"): \d+', r"\1: <size>")]
+         (r'("(archive_)?bytes"): \d+', r"\1: <size>"),
+         (r"[0-9.]+ % of the tiles'", "<share> of the tiles'")]
 
 
 def prefixed(prefix, text):

@@ -23,44 +23,26 @@
 namespace isohf {
 namespace {
 
-//                          passes thinning predictors rounds thinning moves wide
+/// One predictor each: a second one by blocks took more bytes than it saved (decision 44).
+//      passes thinning wide     thinning pairs
 constexpr std::array<CodingEffort, kMaxLevel> kEfforts = {{
-    {.fit = {0, 1, 1, 0, 1, 0, false}, .streams = {15, false}},
-    {.fit = {1, 15, 1, 0, 1, 0, false}, .streams = {15, true}},
-    {.fit = {2, 9, 1, 0, 1, 0, false}, .streams = {3, true}},
-    {.fit = {1, 25, 2, 1, 15, 1, false}, .streams = {9, true}},
-    {.fit = {1, 15, 2, 1, 9, 1, false}, .streams = {7, true}},
-    {.fit = {1, 7, 2, 1, 5, 2, false}, .streams = {5, true}},
-    {.fit = {2, 5, 2, 1, 3, 3, false}, .streams = {3, true}},
-    {.fit = {2, 5, 2, 1, 3, 3, true}, .streams = {3, true}},
-    {.fit = {2, 5, 2, 2, 3, 3, true}, .streams = {3, true}},
-    {.fit = {2, 3, 2, 2, 1, 4, true}, .streams = {1, true}},
-    {.fit = {2, 3, 2, 4, 1, 4, true}, .streams = {1, true}},
-    {.fit = {2, 1, 2, 8, 1, 6, true}, .streams = {1, true}},
+    {.fit = {0, 1, false}, .streams = {15, false}},
+    {.fit = {2, 9, false}, .streams = {3, true}},
+    {.fit = {2, 9, false}, .streams = {3, true}},
+    {.fit = {2, 9, true}, .streams = {3, true}},
+    {.fit = {2, 9, true}, .streams = {3, true}},
+    {.fit = {2, 5, true}, .streams = {3, true}},
+    {.fit = {3, 5, true}, .streams = {3, true}},
+    {.fit = {3, 3, true}, .streams = {3, true}},
+    {.fit = {4, 3, true}, .streams = {1, true}},
+    {.fit = {6, 3, true}, .streams = {1, true}},
+    {.fit = {6, 1, true}, .streams = {1, true}},
+    {.fit = {8, 1, true}, .streams = {1, true}},
 }};
-
-/// What payloads of version 2 are worth: one predictor, as what is learnt does what several would. From level 6 on all
-/// efforts from the fifth to the one asked for are tried and the shortest payload kept, below they are the same, so that
-/// no level takes more bytes than the one before.
-constexpr FitEffort kNoFit = {0, 1, 1, 0, 1, 0, false};
-constexpr FitEffort kUsualFit = {2, 9, 1, 0, 1, 0, false};
-constexpr std::array<FitEffort, kMaxLevel> kAdaptiveEfforts = {{
-    kNoFit,
-    kUsualFit,
-    kUsualFit,
-    kUsualFit,
-    kUsualFit,
-    {2, 5, 1, 0, 1, 0, false},
-    {3, 3, 1, 0, 1, 0, false},
-    {2, 5, 1, 0, 1, 0, true},
-    {3, 3, 1, 0, 1, 0, true},
-    {4, 3, 1, 0, 1, 0, true},
-    {6, 1, 1, 0, 1, 0, true},
-    {8, 1, 1, 0, 1, 0, true},
-}};
-constexpr int kLastUsualLevel = 5;
+constexpr int kNearLevel = 3;               ///< the last with twelve weights
 constexpr std::size_t kFewBytes = 1200;     ///< of a payload in which weights of its own may not pay
 constexpr std::int64_t kFewSamples = 1024;  ///< below, there is little to learn from
+constexpr std::int64_t kCoarseShare = 110;  ///< of 256 samples that their neighbours foretell (decision 44)
 
 /// The void mask, as 0 and 1; empty where nothing is void.
 template <typename Sample, typename IsVoid>
@@ -170,89 +152,158 @@ void find_all_energies(int columns, int rows, unsigned shift, Residuals<Zigzagge
   }
 }
 
-/// Completes payload and Deflate stream; a block for each part.
-void assemble(PayloadHeader& header, std::span<const std::byte> mask, const Streams& streams, EncodedTile& tile) {
-  header.mask_bytes = static_cast<std::uint32_t>(mask.size());
-  header.extra_bytes = static_cast<std::uint32_t>(streams.extra.size());
+/// A payload and its Deflate stream.
+struct Deflated {
   std::vector<std::byte> bytes;
-  write_payload_header(header, bytes);
-  DeflateWriter writer(tile.deflated);
-  const auto add = [&](std::span<const std::byte> part) {
+  std::uint32_t payload_bytes = 0;
+  std::uint32_t payload_crc32 = 0;
+};
+
+/// A block for each part.
+Deflated deflate_parts(std::span<const std::span<const std::byte>> parts) {
+  Deflated deflated;
+  DeflateWriter writer(deflated.bytes);
+  for (const std::span<const std::byte> part : parts) {
     writer.add(part);
-    tile.payload_crc32 = crc32(part, tile.payload_crc32);
-    tile.payload_bytes += static_cast<std::uint32_t>(part.size());
-  };
-  add(bytes);
-  add(mask);
-  add(std::as_bytes(std::span(header.predictors.map)));
-  for (const auto& symbols : streams.symbols) add(symbols);
-  add(streams.extra);
+    deflated.payload_crc32 = crc32(part, deflated.payload_crc32);
+    deflated.payload_bytes += static_cast<std::uint32_t>(part.size());
+  }
   writer.finish();
+  return deflated;
 }
 
 /// What encode_tile was asked for.
 struct Request {
   int level;
   PayloadVersion version;
+  const Predictors* predictors = nullptr;  ///< instead of those that fit
 };
 
-/// A payload of version 2; false where it would be longer than a tile's may be.
-bool encode_adaptively(const TileShape& shape, const PayloadHeader& header, std::vector<std::uint8_t> voids,
-                       Lattice<std::int32_t>& lattice, int level, EncodedTile& tile) {
-  AdaptivePayload payload;
-  payload.type = header.type;
-  payload.low = header.low;
-  payload.high = header.high;
-  payload.base = header.base;
-  payload.is_void = std::move(voids);
-  std::vector<std::byte> best;
-  const auto try_fit = [&](const FitEffort& fit) {
-    payload.predictors = fit_predictors<std::int32_t>(lattice, header.low, header.high, fit);
-    payload.has_weights = payload.predictors.weights.front() != kThirdRowWeights;
-    std::vector<std::byte> bytes = encode_adaptive(lattice, payload);
-    if (best.empty() || bytes.size() < best.size()) best = std::move(bytes);
-  };
-  for (int tried = std::min(level, kLastUsualLevel); tried <= level; ++tried) {
-    try_fit(kAdaptiveEfforts[static_cast<std::size_t>(tried - kMinLevel)]);
-  }
-  if (level > kMinLevel && best.size() < kFewBytes) try_fit(kNoFit);
-  if (best.size() > max_payload_bytes(shape, header.type)) return false;
-  DeflateWriter writer(tile.deflated);
-  writer.add(best);
-  writer.finish();
-  tile.payload_crc32 = crc32(best);
-  tile.payload_bytes = static_cast<std::uint32_t>(best.size());
-  return true;
+ISOHF_KERNEL std::int32_t count_foretold(const std::int32_t* own, const std::int32_t* north, int first, int last) {
+  std::int32_t count = 0;
+  for (int p = first; p <= last; ++p) count += own[p] == own[p - 1] + north[p] - north[p - 1] ? 1 : 0;
+  return count;
 }
 
-template <typename Wide, typename Zigzagged, typename SampleAt>
-void encode_samples(const TileShape& shape, PayloadHeader header, std::span<const std::uint8_t> voids,
-                    const SampleAt& sample_at, const Request& request, EncodedTile& tile) {
-  const CodingEffort effort = coding_effort(request.level);
-  std::vector<std::byte> mask;
-  if (!voids.empty()) mask = pack_void_mask(voids);
-  header.has_voids = !mask.empty();
-  header.is_constant = header.low == header.high;
-  Streams streams;
-  if (!header.is_constant) {
-    Lattice<Wide> lattice(shape);
-    load<Wide>(lattice, voids, header.base, sample_at);
-    if constexpr (std::is_same_v<Wide, std::int32_t>) {
-      const bool is_wanted = request.version == PayloadVersion::kBest ? shape.stored_vertex_count() >= kFewSamples
-                                                                      : request.version == PayloadVersion::kAdaptive;
-      if (is_wanted && encode_adaptively(shape, header, {voids.begin(), voids.end()}, lattice, request.level, tile)) {
-        return;
-      }
-    }
-    header.predictors = fit_predictors<Wide>(lattice, header.low, header.high, effort.fit);
-    Residuals<Zigzagged> residuals(static_cast<std::size_t>(shape.stored_vertex_count()), !voids.empty());
-    find_residuals<Wide, Zigzagged>(lattice, voids, header, residuals);
-    header.energy_shift = choose_energy_shift(residuals);
-    find_all_energies(shape.columns(), shape.rows(), header.energy_shift, residuals);
-    if (header.has_voids) residuals.drop_voids();
-    streams = make_streams(residuals, effort.streams, header);
+/// True where W + NE - NW foretells so many samples of every fourth row that they take about a bit or less each: there
+/// payloads of version 2 are shorter by a twentieth and more. Elsewhere they bring 1 %, and are decoded more slowly.
+bool is_coarse(const Lattice<std::int32_t>& lattice) {
+  std::int64_t foretold = 0;
+  std::int64_t all = 0;
+  for (int r = 3; r < lattice.rows(); r += 4) {
+    const int first = Lattice<std::int32_t>::first(r) + 1;
+    foretold += vectorised<count_foretold>(lattice.row(r), lattice.row(r - 1) + r % 2, first, lattice.last(r));
+    all += lattice.last(r) + 1 - first;
   }
-  assemble(header, mask, streams, tile);
+  return foretold * 256 >= all * kCoarseShare;
+}
+
+/// One tile, and the shortest coding of it so far.
+template <typename Wide, typename Zigzagged>
+class TileCoder {
+ public:
+  TileCoder(const TileShape& shape, PayloadHeader header, std::span<const std::uint8_t> voids, Lattice<Wide>& lattice)
+      : shape_(shape), header_(std::move(header)), voids_(voids), lattice_(lattice) {
+    if (header_.has_voids) mask_ = pack_void_mask(voids);
+    header_.mask_bytes = static_cast<std::uint32_t>(mask_.size());
+  }
+
+  /// The level's effort; from the default on also those between, and of little the lower ones, so that no level takes
+  /// more bytes than the one before.
+  template <typename Try>
+  void try_efforts(int level, const Try& try_effort) {
+    const int first = std::min(level, kDefaultLevel);
+    for (int tried = first; tried <= level; ++tried) try_effort(coding_effort(tried));
+    if (best_.bytes.size() >= kFewBytes) return;
+    for (const int tried : {kMinLevel, kNearLevel}) {
+      if (tried < first) try_effort(coding_effort(tried));
+    }
+  }
+
+  void try_streams(const CodingEffort& effort, const Predictors* given) {
+    PayloadHeader header = header_;
+    header.predictors = given != nullptr ? *given : fit_predictors<Wide>(lattice_, header.low, header.high, effort.fit);
+    Residuals<Zigzagged> residuals(static_cast<std::size_t>(shape_.stored_vertex_count()), !voids_.empty());
+    find_residuals<Wide, Zigzagged>(lattice_, voids_, header, residuals);
+    header.energy_shift = choose_energy_shift(residuals);
+    find_all_energies(shape_.columns(), shape_.rows(), header.energy_shift, residuals);
+    if (header.has_voids) residuals.drop_voids();
+    const Streams streams = make_streams(residuals, effort.streams, header);
+    header.extra_bytes = static_cast<std::uint32_t>(streams.extra.size());
+    std::vector<std::byte> bytes;
+    write_payload_header(header, bytes);
+    std::vector<std::span<const std::byte>> parts = {bytes, mask_, std::as_bytes(std::span(header.predictors.map))};
+    parts.insert(parts.end(), streams.symbols.begin(), streams.symbols.end());
+    parts.emplace_back(streams.extra);
+    keep(deflate_parts(parts));
+  }
+
+  /// A payload of version 2; none where it would be longer than a tile's may be.
+  void try_adaptive(const CodingEffort& effort) {
+    AdaptivePayload payload;
+    payload.type = header_.type;
+    payload.low = header_.low;
+    payload.high = header_.high;
+    payload.base = header_.base;
+    payload.is_void.assign(voids_.begin(), voids_.end());
+    payload.predictors = fit_predictors<Wide>(lattice_, header_.low, header_.high, effort.fit);
+    payload.has_weights = payload.predictors.weights.front() != kThirdRowWeights;
+    const std::vector<std::byte> bytes = encode_adaptive(lattice_, std::move(payload));
+    if (bytes.size() > max_payload_bytes(shape_, header_.type)) return;
+    keep(deflate_parts(std::array{std::span<const std::byte>(bytes)}));
+  }
+
+  [[nodiscard]] bool has_any() const { return !best_.bytes.empty(); }
+  [[nodiscard]] Deflated take() { return std::move(best_); }
+
+ private:
+  void keep(Deflated now) {
+    if (!has_any() || now.bytes.size() < best_.bytes.size()) best_ = std::move(now);
+  }
+
+  const TileShape& shape_;
+  PayloadHeader header_;
+  std::span<const std::uint8_t> voids_;
+  Lattice<Wide>& lattice_;
+  std::vector<std::byte> mask_;
+  Deflated best_;
+};
+
+template <typename Wide, typename Zigzagged, typename SampleAt>
+Deflated encode_samples(const TileShape& shape, PayloadHeader header, std::span<const std::uint8_t> voids,
+                        const SampleAt& sample_at, const Request& request) {
+  header.has_voids = !voids.empty();
+  header.is_constant = header.low == header.high;
+  if (header.is_constant) {
+    std::vector<std::byte> mask;
+    if (header.has_voids) mask = pack_void_mask(voids);
+    header.mask_bytes = static_cast<std::uint32_t>(mask.size());
+    std::vector<std::byte> bytes;
+    write_payload_header(header, bytes);
+    return deflate_parts(std::array{std::span<const std::byte>(bytes), std::span<const std::byte>(mask)});
+  }
+  Lattice<Wide> lattice(shape);
+  load<Wide>(lattice, voids, header.base, sample_at);
+  TileCoder<Wide, Zigzagged> coder(shape, std::move(header), voids, lattice);
+  if constexpr (std::is_same_v<Wide, std::int32_t>) {
+    const bool is_wanted = request.version == PayloadVersion::kBest
+                               ? shape.stored_vertex_count() >= kFewSamples && is_coarse(lattice)
+                               : request.version == PayloadVersion::kAdaptive;
+    // Where codes are coarse, twelve weights may be worth as much as eighteen.
+    const int level = request.level == kMinLevel ? kMinLevel : std::max(request.level, kDefaultLevel);
+    if (is_wanted) coder.try_efforts(level, [&](const CodingEffort& effort) { coder.try_adaptive(effort); });
+  }
+  if (!coder.has_any()) {
+    coder.try_efforts(request.level,
+                      [&](const CodingEffort& effort) { coder.try_streams(effort, request.predictors); });
+  }
+  return coder.take();
+}
+
+void store(EncodedTile& tile, Deflated deflated) {
+  tile.deflated = std::move(deflated.bytes);
+  tile.payload_bytes = deflated.payload_bytes;
+  tile.payload_crc32 = deflated.payload_crc32;
 }
 
 /// Smallest and largest code, and how many are void; `low` is the void code where all are.
@@ -296,9 +347,9 @@ EncodedTile encode_codes(const TileShape& shape, const TileCodes& tile, const Re
   ISOHF_ASSERT(header.high <= static_cast<std::int32_t>(quantisation.max_code()));
   encoded.code_min = static_cast<std::uint32_t>(header.low);
   encoded.code_max = static_cast<std::uint32_t>(header.high);
-  encode_samples<std::int32_t, std::uint16_t>(
-      shape, header, find_voids(codes, range.voids, is_void), [&](std::size_t i) { return std::int32_t{codes[i]}; },
-      request, encoded);
+  store(encoded, encode_samples<std::int32_t, std::uint16_t>(
+                     shape, header, find_voids(codes, range.voids, is_void),
+                     [&](std::size_t i) { return std::int32_t{codes[i]}; }, request));
   return encoded;
 }
 
@@ -359,9 +410,9 @@ EncodedTile encode_floats(const TileShape& shape, const TileCodes& tile, const R
   header.high = range.high;
   encoded.code_min = std::bit_cast<std::uint32_t>(float_from_ordered(header.low, header.dropped_bits));
   encoded.code_max = std::bit_cast<std::uint32_t>(float_from_ordered(header.high, header.dropped_bits));
-  encode_samples<std::int64_t, std::uint32_t>(
-      shape, header, find_voids(heights, bits.voids, is_void),
-      [&](std::size_t i) { return std::int64_t{ordered.data()[i]}; }, request, encoded);
+  store(encoded, encode_samples<std::int64_t, std::uint32_t>(
+                     shape, header, find_voids(heights, bits.voids, is_void),
+                     [&](std::size_t i) { return std::int64_t{ordered.data()[i]}; }, request));
   return encoded;
 }
 
@@ -387,17 +438,28 @@ TileCodes void_tile(const TileShape& shape, const Quantisation& quantisation) {
   return tile;
 }
 
-EncodedTile encode_tile(const TileShape& shape, const TileCodes& tile, int level, PayloadVersion version) {
+namespace {
+
+EncodedTile encode(const TileShape& shape, const TileCodes& tile, const Request& request) {
   const auto samples = static_cast<std::size_t>(shape.stored_vertex_count());
   const bool is_float = tile.type == CodeType::kF32;
   ISOHF_ASSERT(tile.codes.size() == (is_float ? 0 : samples) && tile.heights.size() == (is_float ? samples : 0));
   try {
-    static_cast<void>(coding_effort(level));
-    const Request request{level, version};
+    static_cast<void>(coding_effort(request.level));
     return is_float ? encode_floats(shape, tile, request) : encode_codes(shape, tile, request);
   } catch (const std::bad_alloc&) {
     throw Error(ErrorCode::kOutOfMemory, "no memory to code a tile of " + std::to_string(samples) + " samples");
   }
+}
+
+}  // namespace
+
+EncodedTile encode_tile(const TileShape& shape, const TileCodes& tile, int level, PayloadVersion version) {
+  return encode(shape, tile, {level, version});
+}
+
+EncodedTile encode_tile_with(const TileShape& shape, const TileCodes& tile, const Predictors& predictors) {
+  return encode(shape, tile, {kDefaultLevel, PayloadVersion::kFirst, &predictors});
 }
 
 }  // namespace isohf

@@ -15,7 +15,7 @@ struct CodingEffort {
 /// The effort of a level. Throws Error{kInvalidArgument} where it is not kMinLevel to kMaxLevel.
 [[nodiscard]] CodingEffort coding_effort(int level);
 
-/// The versions of payloads. Floats, samples that are all equal and tiles of few samples have version 1, others 2.
+/// The versions of payloads: 2 where codes are coarse for their ground, else 1 (decision 44).
 enum class PayloadVersion : std::uint8_t { kBest, kFirst, kAdaptive };
 
 /// Codes one tile: hexagonal prediction, residuals in contexts, Deflate. Deterministic; thread-safe.
@@ -23,5 +23,9 @@ enum class PayloadVersion : std::uint8_t { kBest, kFirst, kAdaptive };
 /// also for few samples. Never fails on data; throws Error{kOutOfMemory}, and Error{kInvalidArgument} for another level.
 [[nodiscard]] EncodedTile encode_tile(const TileShape& shape, const TileCodes& tile, int level = kDefaultLevel,
                                       PayloadVersion version = PayloadVersion::kBest);
+
+/// The same in version 1, by these predictors instead of one that fits: several of them and their map, as isohf wrote them
+/// before decision 44. For tests.
+[[nodiscard]] EncodedTile encode_tile_with(const TileShape& shape, const TileCodes& tile, const Predictors& predictors);
 
 }  // namespace isohf

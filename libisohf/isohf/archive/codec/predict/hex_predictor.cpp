@@ -45,6 +45,7 @@ ISOHF_KERNEL void predict_codes(const Neighbours<std::int32_t>& at, const Predic
   const std::int32_t most = kIsFine ? 8 * high : 2 * high - 1;
   for (int c = begin; c < end; ++c) {
     std::uint32_t sum = rows.anchor * static_cast<std::uint32_t>(at.north[c]);
+#pragma GCC unroll 18  // or the compiler leaves eighteen terms a loop, and samples one by one
     for (std::size_t i = 0; i < kTerms; ++i) {
       if (takes_part(i, kIsAbove)) sum += rows.w[i] * static_cast<std::uint32_t>(rows.from[i][c]);
     }
@@ -66,6 +67,7 @@ ISOHF_KERNEL void predict_floats(const Neighbours<std::int64_t>& at, const Predi
   int c = begin;
   for (; c + 4 <= end; c += 4) {
     Longs sum = multiply_low_halves<kIsWide>(unaligned<Longs>(at.north + c).value, Longs{} + rows.anchor);
+#pragma GCC unroll 18
     for (std::size_t i = 0; i < kTerms; ++i) {
       if (!takes_part(i, kIsAbove)) continue;
       sum += multiply_low_halves<kIsWide>(unaligned<Longs>(rows.from[i] + c).value, Longs{} + rows.w[i]);

@@ -26,10 +26,9 @@ class Lattice {
       : columns_(shape.columns()),
         rows_(shape.rows()),
         stride_(columns_ + 2 * kMargin),
-        samples_(std::make_unique_for_overwrite<Wide[]>(sample_count() + kSpare)),
-        slid_(2 * static_cast<std::size_t>(rows_)) {
-    std::fill_n(samples_.get() + sample_count(), kSpare, Wide{0});
-  }
+        samples_(std::make_unique_for_overwrite<Wide[]>(static_cast<std::size_t>(stride_) *
+                                                        static_cast<std::size_t>(rows_ + kRowsAbove))),
+        slid_(2 * static_cast<std::size_t>(rows_)) {}
 
   [[nodiscard]] int columns() const { return columns_; }
   [[nodiscard]] int rows() const { return rows_; }
@@ -80,12 +79,6 @@ class Lattice {
   }
 
  private:
-  static constexpr std::size_t kSpare = 2 * kBlockPlaces;  ///< whole blocks are read past the end of a row
-
-  [[nodiscard]] std::size_t sample_count() const {
-    return static_cast<std::size_t>(stride_) * static_cast<std::size_t>(rows_ + kRowsAbove);
-  }
-
   int columns_;
   int rows_;
   int stride_;
