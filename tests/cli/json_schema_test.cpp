@@ -168,6 +168,13 @@ TEST(JsonSchema, HoldsForEveryCommandsSuccessAndFailure) {
   documents.run(0, "convert", {"convert", coast, folder / "plain.isohf", "--no-planes"});
   documents.run(0, "planes", {"planes", folder / "plain.isohf", "-o", folder / "planes.isohf"});
   documents.run(2, "error", {"planes", folder / "plain.isohf", "-o", folder / "planes.isohf"});
+  documents.run(0, "part", {"extract", b, "-o", folder / "one.isohf", "--tiles", "0:1,0:1"});
+  documents.run(2, "error", {"extract", b, "-o", folder / "one.isohf", "--tiles", "0:1,0:1"});
+  documents.run(0, "part", {"merge", b, "-o", folder / "merged.isohf"});
+  documents.run(2, "error", {"merge", a, b, "-o", folder / "two.isohf"});
+  documents.run(0, "diff", {"diff", b, folder / "merged.isohf", "--surface"});
+  documents.run(3, "diff", {"diff", a, b});
+  documents.run(1, "error", {"diff", a, folder / "none.isohf"});
   documents.run(2, "error", {"formats", "all"});
   documents.run(2, "error", {"frmats"});
 

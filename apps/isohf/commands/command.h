@@ -8,9 +8,12 @@ namespace isohf::cli {
 
 int command_attach(const Arguments& arguments);
 int command_convert(const Arguments& arguments);
+int command_diff(const Arguments& arguments);
 int command_export(const Arguments& arguments);
+int command_extract(const Arguments& arguments);
 int command_formats(const Arguments& arguments);
 int command_info(const Arguments& arguments);
+int command_merge(const Arguments& arguments);
 int command_plan(const Arguments& arguments);
 int command_planes(const Arguments& arguments);
 int command_restore(const Arguments& arguments);

@@ -18,6 +18,7 @@
 #include "isohf/restore/sample_grids.h"
 #include "isohf/surface.h"
 #include "open_archive.h"
+#include "options/box_ground.h"
 #include "options/describe.h"
 #include "options/option_values.h"
 #include "options/options_common.h"
@@ -124,21 +125,9 @@ struct ExportGrid {
   TileCut cut;
 };
 
-ExportGrid asked_grid(const ExportOptions& options, const Metadata& metadata) {
-  WorldBounds ground = metadata.valid;
-  if (options.bbox) {
-    const BoundingBox& box = *options.bbox;
-    try {
-      ground = world_bounds(metadata, {box.west, box.south, box.east, box.north});
-    } catch (const Error& error) {
-      throw error.within(fmt::format("--bbox {},{},{},{}", box.west, box.south, box.east, box.north));
-    }
-    const TileGrid& tiles = metadata.grid;
-    if (!(ground.x0 < tiles.world_width() && ground.x1 > 0.0 && ground.z0 < tiles.world_height() && ground.z1 > 0.0)) {
-      throw Error(ErrorCode::kInvalidArgument,
-                  options.raster.archive + ": --bbox lies outside of what the archive covers");
-    }
-  }
+ExportGrid asked_grid(const ExportOptions& options, ArchiveReader& archive) {
+  const Metadata& metadata = archive.metadata();
+  const WorldBounds ground = options.bbox ? ground_in_box(archive, *options.bbox) : metadata.valid;
   const bool area = samples_are_areas(metadata);
   ExportGrid grid;
   if (options.raster.size || options.raster.spacing) {
@@ -261,8 +250,7 @@ class Exporter {
 
 int run(const ExportOptions& options) {
   ArchiveReader archive = open_archive(options.raster.archive);
-  if (options.bbox && is_warped(archive.metadata())) understand_source(archive);
-  const ExportGrid grid = asked_grid(options, archive.metadata());
+  const ExportGrid grid = asked_grid(options, archive);
   for (const std::string& file : ExportTiles(options.raster.output, grid.cut, grid.samples.width).names()) {
     check_raster_output({options.raster.archive}, file, options.raster.overwrite);
   }

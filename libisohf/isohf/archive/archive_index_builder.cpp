@@ -99,10 +99,22 @@ void ArchiveIndexBuilder::add_up(const TileStatistics& tile) {
   statistics_.vertices += tile.vertices;
   statistics_.voids += tile.voids;
   statistics_.clamped += tile.clamped;
-  statistics_.sum += tile.sum;
+  row_sums_.resize(static_cast<std::size_t>(next_ / grid_.tile_columns()) + 1);
+  row_sums_.back() += tile.sum;
   statistics_.min = std::min(statistics_.min, tile.min);
   statistics_.max = std::max(statistics_.max, tile.max);
   statistics_.worst_rounding = std::max(statistics_.worst_rounding, tile.worst_rounding);
+}
+
+TileStatistics ArchiveIndexBuilder::statistics() const {
+  TileStatistics all = statistics_;
+  for (const double sum : row_sums_) all.sum += sum;
+  return all;
+}
+
+void ArchiveIndexBuilder::skip(std::int64_t tiles, std::span<const std::byte> void_digest) {
+  for (std::int64_t i = 0; i < tiles; ++i) content_.add_tile(void_digest);
+  next_ += tiles;
 }
 
 bool ArchiveIndexBuilder::has_member(const std::string& name) const {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <string>
 #include <unordered_set>
 #include <vector>
@@ -16,7 +17,7 @@
 namespace isohf {
 
 /// What an archive that is being written holds so far, and what follows from it: index, directory, content hash.
-/// Memory: some 60 bytes for every 512 tiles; records and directory lie in scratch files beside the archive.
+/// Memory: some 60 bytes for every 512 tiles and 8 for a row of them; records and directory lie in scratch files beside the archive.
 class ArchiveIndexBuilder {
  public:
   /// folder  where the scratch files are made
@@ -24,11 +25,15 @@ class ArchiveIndexBuilder {
 
   /// Takes a step of writing: the tile with flat index next_tile(), or a member that stands before it.
   void add(const JournalRecord& record);
+  /// Takes tiles from next_tile() on that are not there, by the digest of a void one.
+  void skip(std::int64_t tiles, std::span<const std::byte> void_digest);
 
   [[nodiscard]] std::int64_t next_tile() const { return next_; }
   [[nodiscard]] std::int64_t tiles_stored() const { return tables_.front().members().stored; }
   [[nodiscard]] std::uint64_t tile_bytes() const { return tables_.front().members().compressed_bytes; }
-  [[nodiscard]] const TileStatistics& statistics() const { return statistics_; }
+  [[nodiscard]] TileStatistics statistics() const;
+  /// Sums of the elevations by row of tiles, as far as there are such; statistics() adds these up in order.
+  [[nodiscard]] const std::vector<double>& row_sums() const { return row_sums_; }
   [[nodiscard]] bool has_member(const std::string& name) const;
   /// Whether a coarse plane's tile may be added: there is such a one, behind all of its plane that were added.
   [[nodiscard]] bool takes(TileIndex tile, int plane) const;
@@ -58,7 +63,8 @@ class ArchiveIndexBuilder {
   SpillBuffer directory_;
   std::uint64_t entries_ = 0;  ///< in it
   ContentHash content_;
-  TileStatistics statistics_;
+  TileStatistics statistics_;  ///< but for the sum
+  std::vector<double> row_sums_;
   std::int64_t next_ = 0;
   std::uint32_t data_crc32_ = 0;
 };

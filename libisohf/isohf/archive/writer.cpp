@@ -58,7 +58,8 @@ struct ArchiveWriter::State {
   std::optional<Journal> journal;
   std::uint64_t journalled = 0;  ///< bytes of the part file that the journal's file vouches for
   std::uint64_t synced = 0;
-  std::string content_hash;       ///< once complete
+  std::vector<std::byte> void_digest;
+  std::string content_hash;       ///< once all tiles are there
   std::uint64_t members_end = 0;  ///< likewise: where index and directory begin
   bool finished = false;
   bool keep = false;
@@ -83,6 +84,7 @@ struct ArchiveWriter::State {
 
   void start_over();
   void resume();
+  void begin_contents();
   [[nodiscard]] bool is_intact(const JournalRecord& record, std::uint64_t expected_offset) const;
   void append(const ZipMember& member, std::span<const std::byte> data);
   void add_member(ZipMember member, std::span<const std::byte> data);
@@ -101,12 +103,18 @@ JournalRecord media_type_record() {
   return record;
 }
 
+/// The first member, and the tiles that are not there.
+void ArchiveWriter::State::begin_contents() {
+  contents.add(media_type_record());
+  void_digest = tile_content_digest(void_tile(grid.shape(), {options.type, 0.0, 1.0}));
+  contents.skip(options.first_tile, void_digest);
+}
+
 void ArchiveWriter::State::start_over() {
   part.truncate(0);
   journal = Journal::start(journal_path, job_digest(grid, options));
-  const JournalRecord record = media_type_record();
-  append(record.member, std::as_bytes(std::span(kMediaType)));
-  contents.add(record);
+  append(media_type_record().member, std::as_bytes(std::span(kMediaType)));
+  begin_contents();
 }
 
 /// True where the part file holds what the record says, at the offset that it must stand at.
@@ -159,7 +167,7 @@ void ArchiveWriter::State::resume() {
     journal_end = opened.ends[i];
     kept = i + 1;
   }
-  contents.add(media_type);
+  begin_contents();
   for (std::size_t i = 0; i < kept && contents.next_tile() < grid.tile_count(); ++i) contents.add(opened.records[i]);
   part.truncate(good_end);
   journal = std::move(opened.journal);
@@ -241,6 +249,10 @@ TileStatistics ArchiveWriter::statistics() const {
   return state_->contents.statistics();
 }
 
+const std::vector<double>& ArchiveWriter::row_sums() const {
+  return state_->contents.row_sums();
+}
+
 MemberTotals ArchiveWriter::members_in(const std::string& folder) const {
   return state_->contents.members_in(folder);
 }
@@ -271,6 +283,10 @@ void ArchiveWriter::add_tile(const EncodedTile& tile) {
   ISOHF_ASSERT(flat < state_->grid.tile_count());
   state_->add_tile_member(tile.is_empty ? JournalRecord::Kind::kEmptyTile : JournalRecord::Kind::kTile,
                           {0, state_->grid.tile_at(flat)}, tile, {tile.code_min, tile.code_max});
+}
+
+void ArchiveWriter::skip_tiles(std::int64_t tiles) {
+  state_->contents.skip(tiles, state_->void_digest);
 }
 
 void ArchiveWriter::add_plane_tile(int plane, TileIndex tile, const EncodedTile& encoded,
@@ -337,17 +353,22 @@ const std::string& ArchiveWriter::part() const {
   return state_->part.part_path();
 }
 
+const std::string& ArchiveWriter::content_hash(const Metadata& metadata) {
+  State& state = *state_;
+  ISOHF_ASSERT(state.contents.next_tile() == state.grid.tile_count());
+  if (state.content_hash.empty()) state.content_hash = state.contents.finish_hash(metadata);
+  return state.content_hash;
+}
+
 void ArchiveWriter::complete(Metadata metadata) {
   State& state = *state_;
-  ISOHF_ASSERT(state.contents.next_tile() == state.grid.tile_count() && !state.finished);
+  ISOHF_ASSERT(!state.finished);
+  (void)content_hash(metadata);
   state.named([&] {
     state.part.flush();
-    if (!state.content_hash.empty()) state.part.truncate(state.members_end);
+    if (state.members_end != 0) state.part.truncate(state.members_end);
   });
-  if (state.content_hash.empty()) {
-    state.content_hash = state.contents.finish_hash(metadata);
-    state.members_end = state.part.position();
-  }
+  state.members_end = state.part.position();
   metadata.version = kFormatVersion;
   metadata.planes = state.options.planes;
   metadata.tiles_stored = state.contents.tiles_stored();

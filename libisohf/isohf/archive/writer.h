@@ -6,6 +6,7 @@
 #include <span>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "isohf/archive/codec/tile_codes.h"
 #include "isohf/metadata.h"
@@ -18,7 +19,9 @@ struct WriterOptions {
   bool resume = false;     ///< continue NAME.part where its journal says so, after checking what is there
   /// Identifies the job for resuming: the same text means the same input and options. Stored in the journal.
   std::string job_fingerprint;
-  PlaneInfo planes;  ///< coarse planes that add_plane_tile fills, up to as many
+  PlaneInfo planes;                ///< coarse planes that add_plane_tile fills, up to as many
+  std::int64_t first_tile = 0;     ///< flat index of the first that is added; those before are not there
+  CodeType type = CodeType::kU16;  ///< of tiles that are not there
 };
 
 /// Whether a file begins as an archive of any version of the format. No other file is ever replaced by one, but an empty
@@ -51,12 +54,17 @@ class ArchiveWriter {
   [[nodiscard]] std::uint64_t bytes_written() const;
   [[nodiscard]] std::uint64_t tile_bytes() const;  ///< of the tiles' members alone, compressed
   [[nodiscard]] TileStatistics statistics() const;
+  /// Sums of elevations by row of tiles, from the first on, as far as tiles were added.
+  [[nodiscard]] const std::vector<double>& row_sums() const;
 
   /// How many members other than tiles there are so far under a folder ("seeds/"), and their compressed bytes.
   [[nodiscard]] MemberTotals members_in(const std::string& folder) const;
 
   /// Appends the tile with flat index next_tile(). An empty tile takes no bytes.
   void add_tile(const EncodedTile& tile);
+
+  /// Goes on behind so many tiles that are not there. A resume does not know of it.
+  void skip_tiles(std::int64_t tiles);
 
   /// Appends a tile of a coarse plane, 1 to WriterOptions::planes.count; those of one plane by ascending flat index. An
   /// empty one takes no bytes. Like members between two tiles it belongs to the tile of plane 0 that follows.
@@ -79,6 +87,9 @@ class ArchiveWriter {
   /// What is known of a tile that was added, or of a coarse plane's.
   [[nodiscard]] TileEntry tile_entry(TileIndex tile, int plane = 0) const;
   [[nodiscard]] TileCodes read_tile(TileIndex tile, const Quantisation& quantisation, int plane = 0) const;
+
+  /// Once all tiles are there: the hash that the metadata will state, by their grid and quantisation.
+  [[nodiscard]] const std::string& content_hash(const Metadata& metadata);
 
   /// Makes the part file a whole archive with these metadata, which may be read as part() until the next call: so
   /// that finish() can say in the metadata what was found by reading it. Then only complete() and finish() may follow.

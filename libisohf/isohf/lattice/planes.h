@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "isohf/lattice.h"
+#include "isohf/tile_range.h"
 
 /// Coarse planes: the levels of detail (paper sections 3.4-3.8) carried on above a tile.
 ///
@@ -52,12 +53,6 @@ struct TileVertex {
   TileIndex tile;
   GridVertex vertex;
   friend bool operator==(const TileVertex&, const TileVertex&) = default;
-};
-
-/// Tiles of one plane, `end` past the last ones.
-struct TileRange {
-  TileIndex first;
-  TileIndex end;
 };
 
 /// All planes of a heightfield. Immutable.

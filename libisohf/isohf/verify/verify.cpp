@@ -8,7 +8,6 @@
 #include <bit>
 #include <cmath>
 #include <limits>
-#include <map>
 #include <memory>
 #include <utility>
 
@@ -17,9 +16,11 @@
 #include "isohf/archive/codec/tile_codes.h"
 #include "isohf/archive/container/content_hash.h"
 #include "isohf/archive/metadata/accuracy_info.h"
+#include "isohf/archive/metadata/part_record.h"
 #include "isohf/archive/tile_statistics.h"
 #include "isohf/base/arena.h"
 #include "isohf/error.h"
+#include "isohf/lattice/shared_vertices.h"
 #include "isohf/surface.h"
 #include "isohf/surface/shade/normals.h"
 #include "isohf/verify/metadata_check.h"
@@ -29,48 +30,6 @@
 
 namespace isohf {
 namespace {
-
-/// One lattice vertex as two neighbouring tiles store it, visible or padding.
-struct SharedVertex {
-  GridVertex here;
-  GridVertex there;
-  bool visible;  ///< in both tiles: on their common edge or corner; else padding of at least one of them
-};
-
-/// The neighbours that a tile is compared with; the other four compare themselves with it.
-constexpr TileIndex kComparedNeighbours[] = {{1, 0}, {0, 1}, {1, 1}, {-1, 1}};
-
-/// All vertices that a tile and its neighbour at `step` (one of kComparedNeighbours) both store, row by row.
-std::vector<SharedVertex> shared_vertices(const TileShape& shape, TileIndex step) {
-  // Only the stored vertices near the common edge can coincide; looked up by place, so that no index arithmetic of the
-  // mapping is repeated here.
-  const std::int64_t shift_x = step.column * 2 * shape.cell_columns();
-  const std::int64_t shift_z = step.row * shape.cell_rows();
-  std::map<std::pair<std::int64_t, std::int64_t>, GridVertex> there;
-  const auto near_edge = [](int index, int count) { return index <= 4 || index >= count - 5; };
-  const auto may_coincide = [&](GridVertex vertex) {
-    return (step.column == 0 || near_edge(vertex.column, shape.columns())) &&
-           (step.row == 0 || near_edge(vertex.row, shape.rows()));
-  };
-  for (int r = 0; r < shape.rows(); ++r) {
-    for (int c = 0; c < shape.columns(); ++c) {
-      if (!may_coincide({c, r})) continue;
-      const ObjectVertex object = object_from_grid(shape, GridVertex{c, r});
-      there[{object.z + shift_z, object.x + shift_x}] = {c, r};
-    }
-  }
-  std::vector<SharedVertex> shared;
-  for (int r = 0; r < shape.rows(); ++r) {
-    for (int c = 0; c < shape.columns(); ++c) {
-      if (!may_coincide({c, r})) continue;
-      const ObjectVertex object = object_from_grid(shape, GridVertex{c, r});
-      const auto at = there.find({object.z, object.x});
-      if (at == there.end()) continue;
-      shared.push_back({{c, r}, at->second, is_visible(shape, {c, r}) && is_visible(shape, at->second)});
-    }
-  }
-  return shared;
-}
 
 /// At most this many findings of one kind are kept for one tile: the first says where, the count says how many.
 constexpr int kKeptPerTileAndKind = 1;
@@ -98,7 +57,8 @@ class Verification {
         shape_(grid_.shape()),
         void_heights_(static_cast<std::size_t>(shape_.stored_vertex_count()), std::numeric_limits<float>::quiet_NaN()),
         void_digest_(tile_content_digest(void_tile(shape_, archive.metadata().quantisation))),
-        counted_(archive.metadata()) {
+        counted_(archive.metadata()),
+        here_(tiles_here(archive.metadata())) {
     for (std::size_t i = 0; i < shared_.size(); ++i) shared_[i] = shared_vertices(shape_, kComparedNeighbours[i]);
   }
 
@@ -189,7 +149,8 @@ class Verification {
 
   /// Seeds follow from the whole row: where a tile of it cannot be read, that is said already.
   void check_seeds(std::int64_t row, const TileRow& tiles) {
-    if (!seeds_) return;
+    // Of a part that holds a piece of the row they tell of what isn't here.
+    if (!seeds_ || here_.end.column - here_.first.column < grid_.tile_columns()) return;
     std::vector<const TileCodes*> codes;
     for (const TileState& tile : tiles) {
       if (!tile.readable) return;
@@ -248,6 +209,7 @@ class Verification {
     if (tile.entry.stored) return true;
     tile.readable = true;
     tile.digest = void_digest_;
+    if (!here_.contains(index)) return false;
     for (int row = 1; row <= shape_.rows() - 2; ++row) {
       const CountedVertices::Columns columns = counted_.of_row(index, row);
       tile.statistics.vertices += std::max(0, columns.last - columns.first + 1);
@@ -377,6 +339,9 @@ class Verification {
     const TileIndex step = kComparedNeighbours[neighbour];
     const TileIndex other_index = tile_is_there ? TileIndex{index.column - step.column, index.row - step.row}
                                                 : TileIndex{index.column + step.column, index.row + step.row};
+    const std::int64_t columns = grid_.tile_columns();
+    if (!here_.contains(index) || !here_.contains({(other_index.column + columns) % columns, other_index.row}))
+      return 0;
     std::array<int, 3> found{};
     const auto report = [&](int id, int kind, GridVertex vertex, const std::string& what) {
       if (found[static_cast<std::size_t>(kind)]++ < kKeptPerTileAndKind) {
@@ -482,6 +447,7 @@ class Verification {
   std::vector<float> void_heights_;
   std::vector<std::byte> void_digest_;
   CountedVertices counted_;
+  TileRange here_;  ///< of a part: nothing is said of the other tiles
   std::array<std::vector<SharedVertex>, std::size(kComparedNeighbours)> shared_;
   VerifyReport report_;
   ContentHash hash_;
@@ -498,7 +464,8 @@ VerifyReport verify_archive(const std::string& path, const Job& job, std::size_t
   std::unique_ptr<ArchiveReader> archive;
   try {
     archive = std::make_unique<ArchiveReader>(path);
-    (void)counts_source_ground(archive->metadata());  // what cannot be understood is found before anything is counted
+    (void)counts_source_ground(archive->metadata());
+    (void)part_record(archive->metadata());  // what cannot be understood is found before anything is counted
   } catch (const Error& error) {
     if (error.code() == ErrorCode::kIo) throw;
     VerifyReport report;

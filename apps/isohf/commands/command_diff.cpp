@@ -1,0 +1,126 @@
+/// isohf diff: what two archives have in another way.
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "commands/command.h"
+#include "isohf/parts.h"
+#include "open_archive.h"
+#include "options/describe.h"
+#include "options/options_common.h"
+#include "output/json_output.h"
+#include "output/part_output.h"
+#include "output/standard_output.h"
+
+namespace isohf::cli {
+namespace {
+
+constexpr const char* kFooter =
+    R"(Tiles are compared by the digests that the archives state, so that none is decoded. Exit code 3 says that something
+differs: metadata that tell of the making (producer, level, sizes) count as well.
+
+Examples:
+  isohf diff old.isohf new.isohf
+  isohf diff old.isohf new.isohf --surface        how far the elevations lie apart)";
+
+struct DiffCommand {
+  CommonOptions common;
+  WorkOptions work;
+  std::vector<std::string> archives;
+  bool surface = false;
+};
+
+std::optional<DiffCommand> parse(const Arguments& arguments) {
+  DiffCommand options;
+  CommandLine line("diff", "Compares two archives: metadata, tiles, and elevations if asked.");
+  line.group("Arguments");
+  line.positionals("FIRST SECOND", "The two archives", options.archives);
+  line.flag("--surface", "Decode the tiles that differ, and say how far their elevations lie apart", options.surface);
+  add_work_options(line, options.work);
+  add_common_options(line, options.common);
+  line.footer(kFooter);
+  if (!line.parse(arguments)) return std::nullopt;
+  if (options.archives.size() != 2) line.fail(fmt::format("found {} archives, must be two", options.archives.size()));
+  return options;
+}
+
+using nlohmann::ordered_json;
+
+ordered_json json_from(const DiffCommand& options, const ArchiveDifference& found) {
+  ordered_json members = ordered_json::array();
+  const auto value = [](const std::string& text) { return text.empty() ? ordered_json() : ordered_json::parse(text); };
+  for (const auto& member : found.metadata) {
+    members.push_back({{"name", member.name}, {"first", value(member.first)}, {"second", value(member.second)}});
+  }
+  ordered_json tiles = ordered_json::array();
+  for (const TileIndex& tile : found.first_few) tiles.push_back({tile.column, tile.row});
+  ordered_json json = {{"first", options.archives[0]},
+                       {"second", options.archives[1]},
+                       {"metadata", members},
+                       {"same_lattice", found.why_other_lattice.empty()},
+                       {"why_other_lattice", found.why_other_lattice},
+                       {"tiles_compared", found.compared.count()},
+                       {"tiles_same", found.tiles_same},
+                       {"tiles_differing", found.tiles_differing},
+                       {"only_in_first", found.only_first},
+                       {"only_in_second", found.only_second},
+                       {"differing", tiles},
+                       {"surface", nullptr}};
+  if (found.surface) {
+    json["surface"] = {
+        {"vertices", found.surface->compared}, {"voids", found.surface->voids},
+        {"rms", found.surface->rms},           {"mean", found.surface->mean},
+        {"max", found.surface->max},           {"worst_tile", {found.surface->worst.column, found.surface->worst.row}}};
+  }
+  return json;
+}
+
+std::string text_from(const DiffCommand& options, const ArchiveDifference& found) {
+  std::string text;
+  const auto say = [&](const char* what, const std::string& value) { text += fmt::format("{:<12} {}\n", what, value); };
+  for (const auto& member : found.metadata) {
+    const auto shown = [](const std::string& value) { return value.empty() ? "nothing" : value; };
+    say("metadata", fmt::format("{}: {}, then {}", member.name, shown(member.first), shown(member.second)));
+  }
+  if (!found.why_other_lattice.empty()) {
+    say("lattice", fmt::format("{} {}", options.archives[1], found.why_other_lattice));
+    return text;
+  }
+  say("tiles",
+      fmt::format("{} alike, {} differ{}", describe_count(found.tiles_same), describe_count(found.tiles_differing),
+                  found.tiles_differing == 0
+                      ? ""
+                      : fmt::format(": in {}; {} in the first alone, {} in the second", describe_tiles(found.bounds),
+                                    describe_count(found.only_first), describe_count(found.only_second))));
+  if (found.surface && found.tiles_differing > 0) {
+    const auto& surface = *found.surface;
+    say("surface",
+        fmt::format("rms {:.6g}, mean {:.6g}, largest {:.6g} in tile ({},{}), over {} vertices of tiles that "
+                    "differ; {} void on one side",
+                    surface.rms, surface.mean, surface.max, surface.worst.column, surface.worst.row,
+                    describe_count(surface.compared), describe_count(surface.voids)));
+  }
+  return text;
+}
+
+}  // namespace
+
+int command_diff(const Arguments& arguments) {
+  const auto options = parse(arguments);
+  if (!options) return kExitDone;
+  for (const std::string& archive : options->archives) (void)open_archive(archive);
+  std::optional<ProgressDisplay> display(std::in_place, options->work.progress, options->common.quiet,
+                                         options->common.verbose);
+  const ArchiveDifference found =
+      diff_archives(options->archives[0], options->archives[1], options->surface, job_from(options->work, *display));
+  display.reset();
+  StandardOutput out;
+  if (options->common.json) out.write(json_text(json_from(*options, found)));
+  if (!options->common.json && !options->common.quiet) out.write(text_from(*options, found));
+  out.finish();
+  return found.same_tiles() && found.metadata.empty() ? kExitDone : kExitDifferences;
+}
+
+}  // namespace isohf::cli

@@ -1,0 +1,102 @@
+/// isohf extract: some tiles of an archive as one of their own.
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "commands/command.h"
+#include "isohf/error.h"
+#include "isohf/parts.h"
+#include "open_archive.h"
+#include "options/box_ground.h"
+#include "options/option_values.h"
+#include "options/options_common.h"
+#include "output/output_kinds.h"
+#include "output/part_output.h"
+
+namespace isohf::cli {
+namespace {
+
+constexpr const char* kFooter =
+    R"(Tiles are copied as they are, with their textures and shadow seeds, under their names and on their lattice; coarse
+planes are made anew, residuals stay behind. Parts that make up the whole give its bytes again: isohf merge.
+
+Examples:
+  isohf extract land.isohf -o valley.isohf --bbox 6.5,45,7,45.5
+  isohf extract land.isohf -o north.isohf --tiles 0:40,0:12       columns 0 to 39, rows 0 to 11)";
+
+struct ExtractCommand {
+  CommonOptions common;
+  WorkOptions work;
+  std::string archive;
+  std::string output;
+  std::optional<BoundingBox> bbox;
+  std::optional<TileRange> tiles;
+  bool overwrite = false;
+};
+
+/// "A:B,C:D".
+TileRange tile_range_from_string(const std::string& text) {
+  const auto refuse = [&]() -> std::int64_t {
+    throw Error(
+        ErrorCode::kInvalidArgument,
+        fmt::format("found \"{}\", must be A:B,C:D: columns A to B-1 and rows C to D-1 of tiles, from 0", text));
+  };
+  const auto split = [&](const std::string& of, char at) {
+    const std::size_t place = of.find(at);
+    if (place == std::string::npos) refuse();
+    return std::pair(of.substr(0, place), of.substr(place + 1));
+  };
+  const auto number = [&](const std::string& of) {
+    return of.empty() || of.find_first_not_of("0123456789") != std::string::npos || of.size() > 9 ? refuse()
+                                                                                                  : std::stoll(of);
+  };
+  const auto [columns, rows] = split(text, ',');
+  const auto [west, east] = split(columns, ':');
+  const auto [north, south] = split(rows, ':');
+  const TileRange range{{number(west), number(north)}, {number(east), number(south)}};
+  if (range.first.column >= range.end.column || range.first.row >= range.end.row) refuse();
+  return range;
+}
+
+std::optional<ExtractCommand> parse(const Arguments& arguments) {
+  ExtractCommand options;
+  CommandLine line("extract", "Cuts an archive: some of its tiles become an archive of their own.");
+  line.group("Arguments");
+  line.positional("ARCHIVE", "-i,--input", "Archive to cut", options.archive);
+  line.option("-o,--output", "PART", "Archive to write", options.output);
+  line.flag("--overwrite", "Replace PART where it exists", options.overwrite);
+  line.option("--bbox", "W,S,E,N", "All tiles that touch this rectangle, in the units of the source's reference system",
+              [&](const std::string& text) { options.bbox = bounding_box_from_string(text); });
+  line.option("--tiles", "A:B,C:D", "Columns A to B-1 and rows C to D-1 of tiles, counted from 0 in the North-West",
+              [&](const std::string& text) { options.tiles = tile_range_from_string(text); });
+  line.exclusive({"--bbox", "--tiles"});
+  add_work_options(line, options.work);
+  add_common_options(line, options.common);
+  line.footer(kFooter);
+  if (!line.parse(arguments)) return std::nullopt;
+  line.require("ARCHIVE", options.archive);
+  line.require("PART (-o)", options.output);
+  if (!options.bbox && !options.tiles) {
+    throw Error(ErrorCode::kInvalidArgument, "extract: which tiles? Give --bbox W,S,E,N or --tiles A:B,C:D");
+  }
+  return options;
+}
+
+}  // namespace
+
+int command_extract(const Arguments& arguments) {
+  const auto options = parse(arguments);
+  if (!options) return kExitDone;
+  check_archive_output({options->archive}, options->output, options->overwrite);
+  const TileRange tiles = options->tiles ? *options->tiles : [&] {
+    ArchiveReader archive = open_archive(options->archive);
+    return tiles_touching(archive.grid(), ground_in_box(archive, *options->bbox));
+  }();
+  return print_part(options->output, options->common, options->work, [&](const Job& job) {
+    return extract_tiles(options->archive, options->output, tiles, {options->overwrite, options->common.strict}, job);
+  });
+}
+
+}  // namespace isohf::cli

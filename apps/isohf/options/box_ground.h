@@ -1,0 +1,12 @@
+#pragma once
+
+#include "formats/decorate/cropped_source.h"
+#include "isohf/archive.h"
+
+namespace isohf::cli {
+
+/// The part of an archive's world in --bbox. Throws Error{kInvalidArgument} naming the option, also where it lies
+/// outside of what the archive covers. Has a source that was projected from another map understood.
+[[nodiscard]] WorldBounds ground_in_box(ArchiveReader& archive, const BoundingBox& box);
+
+}  // namespace isohf::cli

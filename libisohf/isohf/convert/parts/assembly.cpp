@@ -1,0 +1,271 @@
+#include "isohf/convert/parts/assembly.h"
+
+#include <fmt/format.h>
+#include <oneapi/tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "isohf/archive/codec/simd/batch_decoder.h"
+#include "isohf/archive/container/archive_directory.h"
+#include "isohf/archive/container/content_hash.h"
+#include "isohf/archive/container/member_tables.h"
+#include "isohf/archive/metadata/part_record.h"
+#include "isohf/base/arena.h"
+#include "isohf/base/source_bytes.h"
+#include "isohf/byte_source.h"
+#include "isohf/error.h"
+#include "isohf/lattice/shared_vertices.h"
+
+namespace isohf {
+namespace {
+
+constexpr const char* kSeedTable = "seeds/{row}/{column}.seed";
+
+/// Names of the tables of members that come with a tile.
+std::vector<std::string> tile_tables(const ArchiveReader& archive) {
+  std::vector<std::string> names;
+  for (const MemberTable& table : archive.tables()) {
+    if (table.name.find("{column}") == std::string::npos || table.name == kSeedTable) continue;
+    if (!is_in_tile_folder(table.name)) names.push_back(table.name);
+  }
+  return names;
+}
+
+}  // namespace
+
+Assembly::Assembly(const Metadata& metadata, ArchiveWriter& writer, AssemblyRequest request, const Job& job)
+    : metadata_(metadata),
+      writer_(writer),
+      request_(std::move(request)),
+      job_(job),
+      void_codes_(void_tile(metadata.grid.shape(), metadata.quantisation)),
+      void_digest_(tile_content_digest(void_codes_)) {
+  for (const AssemblyInput& input : request_.inputs) tables_.push_back(tile_tables(*input.archive));
+  if (request_.recount) counted_.emplace(metadata);
+  if (request_.one_origin) return;
+  if (const auto info = shadow_seed_info(metadata)) seeds_.emplace(metadata.grid, metadata.quantisation, *info);
+}
+
+bool Assembly::decodes() const {
+  return request_.planes != nullptr || request_.recount || request_.checks_digests || !request_.one_origin;
+}
+
+void Assembly::add_tiles() {
+  const TileGrid& grid = metadata_.grid;
+  const std::int64_t columns = grid.tile_columns();
+  const auto batch = static_cast<std::size_t>(kBatchLanes) * static_cast<std::size_t>(threads_of(job_));
+  Row above;
+  for (std::int64_t row = 0; row < grid.tile_rows(); ++row) {
+    Row tiles(static_cast<std::size_t>(columns));
+    const std::vector<const AssemblyInput*> inputs = inputs_of_row(row);
+    for (std::size_t first = 0; first < tiles.size(); first += batch) {
+      job_.throw_if_cancelled();
+      const auto some = std::span(tiles).subspan(first, std::min(batch, tiles.size() - first));
+      if (!inputs.empty()) read(inputs, {static_cast<std::int64_t>(first), row}, some);
+      for (std::size_t i = 0; i < some.size(); ++i) {
+        const TileIndex index{static_cast<std::int64_t>(first + i), row};
+        Tile& tile = some[i];
+        if (tile.from != nullptr) add_textures(index, *tile.from);
+        request_.tiles.contains(index) ? writer_.add_tile(tile.encoded) : writer_.skip_tiles(1);
+        if (request_.planes != nullptr) request_.planes->add(tile.sample);
+        tile.encoded.deflated = {};
+        tile.sample = {};
+        if (request_.one_origin) tile.codes = {};
+      }
+    }
+    if (!inputs.empty()) add_seeds(row, tiles);
+    if (!request_.one_origin) compare_edges(row, tiles, above);
+    above = std::move(tiles);
+    job_.report({"tiles", "tiles", (row + 1) * columns, grid.tile_count(), writer_.bytes_written()});
+  }
+}
+
+std::vector<const AssemblyInput*> Assembly::inputs_of_row(std::int64_t row) const {
+  std::vector<const AssemblyInput*> found;
+  if (row < request_.tiles.first.row || row >= request_.tiles.end.row) return found;
+  for (auto input = request_.inputs.rbegin(); input != request_.inputs.rend(); ++input) {
+    if (row >= input->tiles.first.row && row < input->tiles.end.row) found.push_back(&*input);
+  }
+  return found;
+}
+
+void Assembly::read(std::span<const AssemblyInput* const> inputs, TileIndex first, std::span<Tile> tiles) const {
+  oneapi::tbb::parallel_for(std::size_t{0}, (tiles.size() + kBatchLanes - 1) / kBatchLanes, [&](std::size_t group) {
+    const std::size_t begin = group * kBatchLanes;
+    const auto lanes = tiles.subspan(begin, std::min<std::size_t>(kBatchLanes, tiles.size() - begin));
+    const auto index_of = [&](std::size_t i) {
+      return TileIndex{first.column + static_cast<std::int64_t>(begin + i), first.row};
+    };
+    std::map<const ArchiveReader*, std::vector<std::size_t>> stored;
+    for (std::size_t i = 0; i < lanes.size(); ++i) {
+      const TileIndex index = index_of(i);
+      if (!request_.tiles.contains(index)) continue;
+      for (const AssemblyInput* const input : inputs) {
+        if (!input->tiles.contains(index) || !input->archive->tile_entry(index).stored) continue;
+        lanes[i].from = input->archive;
+        stored[input->archive].push_back(i);
+        break;
+      }
+      read(index, lanes[i]);
+    }
+    if (!decodes()) return;
+    for (const auto& [archive, places] : stored) {
+      std::vector<TileIndex> indices;
+      for (const std::size_t i : places) indices.push_back(index_of(i));
+      std::vector<TileCodes> codes = archive->read_tiles(indices);
+      for (std::size_t k = 0; k < places.size(); ++k) {
+        Tile& tile = lanes[places[k]];
+        EncodedTile& encoded = tile.encoded;
+        tile.codes = std::move(codes[k]);
+        if (request_.checks_digests || encoded.content_digest.empty()) {
+          std::vector<std::byte> digest = tile_content_digest(tile.codes);
+          if (!encoded.content_digest.empty() && digest != encoded.content_digest) {
+            throw Error(ErrorCode::kCorrupt, fmt::format("{}: tile ({},{}) differs from its digest; see isohf verify",
+                                                         archive->path(), indices[k].column, indices[k].row));
+          }
+          encoded.content_digest = std::move(digest);
+        }
+        if (counted_) encoded.statistics = tile_statistics(*counted_, indices[k], tile.codes, metadata_.quantisation);
+        if (request_.planes != nullptr) tile.sample = request_.planes->sample(tile.codes, encoded);
+      }
+    }
+  });
+}
+
+/// A tile's record and bytes.
+void Assembly::read(TileIndex index, Tile& tile) const {
+  EncodedTile& encoded = tile.encoded;
+  encoded.is_empty = tile.from == nullptr;
+  if (encoded.is_empty) {
+    encoded.content_digest = void_digest_;
+    if (counted_) encoded.statistics = tile_statistics(*counted_, index, void_codes_, metadata_.quantisation);
+    return;
+  }
+  const TileEntry entry = tile.from->tile_entry(index);
+  encoded.deflated = SourceBytes(tile.from->source(), entry.offset_bytes, entry.compressed_bytes).take();
+  encoded.payload_bytes = entry.payload_bytes;
+  encoded.payload_crc32 = entry.payload_crc32;
+  encoded.code_min = entry.code_min;
+  encoded.code_max = entry.code_max;
+  encoded.has_voids = entry.has_voids;
+  if (const auto digest = tile.from->tile_digest(index)) encoded.content_digest.assign(digest->begin(), digest->end());
+}
+
+void Assembly::copy_member(const ArchiveReader& from, const MemberEntry& member) {
+  const SourceBytes data(from.source(), member.offset_bytes, member.compressed_bytes);
+  if (member.deflated) writer_.add_deflated_member(member.name, data.bytes(), member.bytes, member.crc32);
+  if (!member.deflated) writer_.add_member(member.name, data.bytes(), false);
+}
+
+void Assembly::add_textures(TileIndex index, const ArchiveReader& from) {
+  const auto input = std::find_if(request_.inputs.begin(), request_.inputs.end(),
+                                  [&](const AssemblyInput& known) { return known.archive == &from; });
+  std::vector<MemberEntry> members;
+  for (const std::string& table : tables_[static_cast<std::size_t>(input - request_.inputs.begin())]) {
+    if (auto member = from.find_member(member_name(table, index.row, index.column))) {
+      members.push_back(std::move(*member));
+    }
+  }
+  std::sort(members.begin(), members.end(),
+            [](const auto& a, const auto& b) { return a.offset_bytes < b.offset_bytes; });
+  for (const MemberEntry& member : members) copy_member(from, member);
+}
+
+/// Copied where what they tell of is of one origin, else made of the row as it is now.
+void Assembly::add_seeds(std::int64_t row, const Row& tiles) {
+  const ArchiveReader* const first = tiles.front().from;
+  const bool is_one = std::all_of(tiles.begin(), tiles.end(), [&](const Tile& tile) { return tile.from == first; });
+  if (!seeds_ || is_one) {
+    for (std::size_t i = 0; i < tiles.size(); ++i) {
+      if (tiles[i].from == nullptr) continue;
+      const auto member = tiles[i].from->find_member(seed_name({static_cast<std::int64_t>(i), row}));
+      if (member) copy_member(*tiles[i].from, *member);
+    }
+    return;
+  }
+  std::vector<SeedRow::Tile> prepared(tiles.size());
+  oneapi::tbb::parallel_for(std::size_t{0}, tiles.size(), [&](std::size_t i) {
+    const bool is_void = tiles[i].from == nullptr;
+    prepared[i] = seeds_->prepare(is_void ? void_codes_ : tiles[i].codes);
+    prepared[i].is_empty = is_void;
+  });
+  const std::vector<EncodedSeeds> encoded = seeds_->encode(prepared);
+  for (std::size_t i = 0; i < encoded.size(); ++i) {
+    if (encoded[i].payload_bytes == 0) continue;
+    writer_.add_deflated_member(seed_name({static_cast<std::int64_t>(i), row}), encoded[i].deflated,
+                                encoded[i].payload_bytes, encoded[i].payload_crc32);
+  }
+}
+
+/// What two tiles share must be equal, also where they come from two archives.
+void Assembly::compare_edges(std::int64_t row, const Row& tiles, const Row& above) const {
+  const TileShape& shape = metadata_.grid.shape();
+  const auto columns = static_cast<std::int64_t>(tiles.size());
+  const auto value = [&](const Tile& tile, GridVertex vertex) -> double {
+    const TileCodes& codes = tile.from == nullptr ? void_codes_ : tile.codes;
+    const auto at = static_cast<std::size_t>(vertex.row * shape.columns() + vertex.column);
+    if (codes.type != CodeType::kF32) return codes.codes[at];
+    return codes.heights[at] == codes.heights[at] ? double{codes.heights[at]} : HUGE_VAL;
+  };
+  for (const TileIndex step : kComparedNeighbours) {
+    std::vector<SharedVertex> shared;
+    for (std::int64_t column = 0; column < columns; ++column) {
+      // This tile is the neighbour's South or East, or the one that looks East.
+      std::int64_t other = step.row == 0 ? column + 1 : column - step.column;
+      if (metadata_.wraps_x) other = (other + columns) % columns;
+      if (other < 0 || other >= columns || (step.row == 1 && above.empty())) continue;
+      const Tile& here =
+          step.row == 0 ? tiles[static_cast<std::size_t>(column)] : above[static_cast<std::size_t>(other)];
+      const Tile& there = tiles[static_cast<std::size_t>(step.row == 0 ? other : column)];
+      if (here.from == there.from) continue;
+      if (shared.empty()) shared = shared_vertices(shape, step);
+      for (const SharedVertex& vertex : shared) {
+        if (value(here, vertex.here) == value(there, vertex.there)) continue;
+        const auto name = [](const Tile& tile) { return tile.from == nullptr ? "void" : tile.from->path(); };
+        throw Error(
+            ErrorCode::kInvalidArgument,
+            fmt::format("tile ({},{}) of {} does not meet its neighbour of {}: a vertex that both hold differs; "
+                        "join whole regions that were made alike",
+                        column, row, step.row == 0 ? name(here) : name(there),
+                        step.row == 0 ? name(there) : name(here)));
+      }
+    }
+  }
+}
+
+void Assembly::add_other_members(bool everything) {
+  struct Found {
+    const ArchiveReader* from;
+    MemberEntry member;
+  };
+  std::vector<Found> all;
+  std::map<std::string, std::size_t> places;
+  for (const AssemblyInput& input : request_.inputs) {
+    std::vector<MemberEntry> members;
+    for (const MemberEntry& member : input.archive->loose_members()) {
+      const std::string& name = member.name;
+      const bool is_own = name == kMediaTypeName || name == kMetadataName || name == kIndexName;
+      if (!is_own && (everything || (!name.starts_with("residual/") && name != kWholeName))) members.push_back(member);
+    }
+    for (const MemberTable& table : input.archive->tables()) {
+      if (!everything || table.name.find("{column}") != std::string::npos) continue;
+      for (std::int64_t row = 0; row < table.rows; ++row) {
+        if (auto member = input.archive->find_member(member_name(table.name, row, 0))) members.push_back(*member);
+      }
+    }
+    std::sort(members.begin(), members.end(),
+              [](const auto& a, const auto& b) { return a.offset_bytes < b.offset_bytes; });
+    for (MemberEntry& member : members) {
+      const auto [at, is_new] = places.try_emplace(member.name, all.size());
+      if (is_new)
+        all.push_back({input.archive, std::move(member)});
+      else
+        all[at->second] = {input.archive, std::move(member)};
+    }
+  }
+  for (const auto& [from, member] : all) copy_member(*from, member);
+}
+
+}  // namespace isohf

@@ -1,0 +1,74 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "isohf/archive.h"
+#include "isohf/archive/tile_statistics.h"
+#include "isohf/archive/writer.h"
+#include "isohf/convert/stages/plane_stage.h"
+#include "isohf/convert/stages/seed_row.h"
+#include "isohf/job.h"
+#include "isohf/tile_range.h"
+
+namespace isohf {
+
+/// An archive that tiles are copied from, and which of them.
+struct AssemblyInput {
+  const ArchiveReader* archive;
+  TileRange tiles;
+};
+
+/// What becomes of what is copied.
+struct AssemblyRequest {
+  std::vector<AssemblyInput> inputs;  ///< the last that holds a tile gives it; all on one grid
+  TileRange tiles;                    ///< that are to be there
+  PlaneStage* planes = nullptr;       ///< takes all tiles
+  bool one_origin = true;             ///< edges meet and seeds hold wherever the inputs are joined
+  bool recount = false;               ///< give the writer each tile's statistics, by counting
+  bool checks_digests = false;        ///< decode every tile and hold it against its digest
+};
+
+/// Writes an archive of other archives' tiles, which are not coded again, in the order in which convert() does: a tile's
+/// textures, the tile; behind a row, planes and seeds. On the caller's oneTBB arena. Stage "tiles".
+class Assembly {
+ public:
+  /// metadata  of what is written: grid, quantisation, seeds
+  Assembly(const Metadata& metadata, ArchiveWriter& writer, AssemblyRequest request, const Job& job);
+
+  /// All tiles with what belongs to them. Throws Error{kInvalidArgument} where edges don't meet.
+  void add_tiles();
+  /// Members of no tile, in file order: once each by name, the last archive's. Residuals, and the whole's metadata in a
+  /// part, where `everything` is copied.
+  void add_other_members(bool everything);
+
+ private:
+  struct Tile {
+    const ArchiveReader* from = nullptr;  ///< nullptr: void
+    EncodedTile encoded;
+    TileCodes codes;
+    PlaneSample sample;
+  };
+  using Row = std::vector<Tile>;
+
+  [[nodiscard]] std::vector<const AssemblyInput*> inputs_of_row(std::int64_t row) const;
+  void read(std::span<const AssemblyInput* const> inputs, TileIndex first, std::span<Tile> tiles) const;
+  void read(TileIndex index, Tile& tile) const;
+  void add_textures(TileIndex index, const ArchiveReader& from);
+  void add_seeds(std::int64_t row, const Row& tiles);
+  void compare_edges(std::int64_t row, const Row& tiles, const Row& above) const;
+  void copy_member(const ArchiveReader& from, const MemberEntry& member);
+  [[nodiscard]] bool decodes() const;
+
+  const Metadata& metadata_;
+  ArchiveWriter& writer_;
+  AssemblyRequest request_;
+  const Job& job_;
+  std::vector<std::vector<std::string>> tables_;  ///< of each input: names of its tiles' own members, seeds apart
+  std::optional<SeedRow> seeds_;
+  std::optional<CountedVertices> counted_;
+  TileCodes void_codes_;
+  std::vector<std::byte> void_digest_;
+};
+
+}  // namespace isohf

@@ -1,0 +1,138 @@
+#include <oneapi/tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "isohf/archive/codec/quantise.h"
+#include "isohf/archive/container/content_hash.h"
+#include "isohf/archive/metadata/part_record.h"
+#include "isohf/base/arena.h"
+#include "isohf/convert/parts/parts.h"
+#include "isohf/error.h"
+
+namespace isohf {
+namespace {
+
+constexpr std::size_t kMostListed = 1000;
+constexpr std::int64_t kBatch = 256;  ///< tiles that are looked at side by side
+
+std::vector<ArchiveDifference::Member> differing_members(const ArchiveReader& first, const ArchiveReader& second) {
+  const auto members = [](const ArchiveReader& archive) {
+    return nlohmann::json::parse(archive.metadata_json()).flatten();
+  };
+  const nlohmann::json a = members(first);
+  const nlohmann::json b = members(second);
+  std::set<std::string> names;
+  for (const nlohmann::json& side : {a, b}) {
+    for (const auto& [name, value] : side.items()) names.insert(name);
+  }
+  std::vector<ArchiveDifference::Member> found;
+  for (const std::string& name : names) {
+    const auto text = [&](const nlohmann::json& side) { return side.contains(name) ? side.at(name).dump() : ""; };
+    if (text(a) != text(b)) found.push_back({name, text(a), text(b)});
+  }
+  return found;
+}
+
+/// Stated, or found by decoding where nothing is stated.
+std::vector<std::byte> digest_of(const ArchiveReader& archive, TileIndex tile) {
+  if (const auto stated = archive.tile_digest(tile)) return {stated->begin(), stated->end()};
+  return tile_content_digest(archive.read_tile(tile));
+}
+
+/// What differs between two tiles, added up.
+struct Sums {
+  std::int64_t compared = 0;
+  std::int64_t voids = 0;
+  double sum = 0.0;
+  double squares = 0.0;
+  double max = 0.0;
+
+  void add(const std::vector<double>& a, const std::vector<double>& b) {
+    for (std::size_t i = 0; i < a.size(); ++i) {
+      const bool is_void = std::isnan(a[i]);
+      if (is_void != std::isnan(b[i])) ++voids;
+      if (is_void || std::isnan(b[i])) continue;
+      const double difference = b[i] - a[i];
+      ++compared;
+      sum += difference;
+      squares += difference * difference;
+      max = std::max(max, std::abs(difference));
+    }
+  }
+};
+
+}  // namespace
+
+ArchiveDifference diff_archives(const std::string& first, const std::string& second, bool surface, const Job& job) {
+  const ArchiveReader a(first);
+  const ArchiveReader b(second);
+  ArchiveDifference found;
+  found.metadata = differing_members(a, b);
+  found.why_other_lattice = why_other_lattice(a.metadata(), b.metadata());
+  const TileRange of_a = tiles_here(a.metadata());
+  const TileRange of_b = tiles_here(b.metadata());
+  TileRange& tiles = found.compared;
+  tiles.first = {std::max(of_a.first.column, of_b.first.column), std::max(of_a.first.row, of_b.first.row)};
+  tiles.end = {std::min(of_a.end.column, of_b.end.column), std::min(of_a.end.row, of_b.end.row)};
+  const bool is_apart = tiles.first.column >= tiles.end.column || tiles.first.row >= tiles.end.row;
+  if (found.why_other_lattice.empty() && is_apart) found.why_other_lattice = "holds other tiles of the lattice";
+  if (!found.why_other_lattice.empty()) {
+    tiles = {};
+    return found;
+  }
+  Sums all;
+  TileIndex worst{};
+  const std::int64_t columns = tiles.end.column - tiles.first.column;
+  Arena(job).execute([&] {
+    for (std::int64_t at = 0; at < tiles.count(); at += kBatch) {
+      job.throw_if_cancelled();
+      enum class State { kSame, kDiffers, kOnlyFirst, kOnlySecond };
+      std::vector<State> states(static_cast<std::size_t>(std::min(kBatch, tiles.count() - at)));
+      std::vector<Sums> sums(states.size());
+      const auto tile_at = [&](std::size_t i) {
+        const std::int64_t flat = at + static_cast<std::int64_t>(i);
+        return TileIndex{tiles.first.column + flat % columns, tiles.first.row + flat / columns};
+      };
+      oneapi::tbb::parallel_for(std::size_t{0}, states.size(), [&](std::size_t i) {
+        const TileIndex tile = tile_at(i);
+        const bool in_a = a.tile_entry(tile).stored;
+        const bool in_b = b.tile_entry(tile).stored;
+        if (!in_a && !in_b) return;
+        if (in_a != in_b) states[i] = in_a ? State::kOnlyFirst : State::kOnlySecond;
+        if (in_a && in_b && digest_of(a, tile) != digest_of(b, tile)) states[i] = State::kDiffers;
+        if (surface && states[i] != State::kSame) sums[i].add(a.read_elevations(tile), b.read_elevations(tile));
+      });
+      for (std::size_t i = 0; i < states.size(); ++i) {
+        if (states[i] == State::kSame) {
+          ++found.tiles_same;
+          continue;
+        }
+        const TileIndex tile = tile_at(i);
+        TileRange& bounds = found.bounds;
+        if (found.tiles_differing++ == 0) bounds = {tile, tile};
+        bounds.first = {std::min(bounds.first.column, tile.column), std::min(bounds.first.row, tile.row)};
+        bounds.end = {std::max(bounds.end.column, tile.column + 1), std::max(bounds.end.row, tile.row + 1)};
+        found.only_first += states[i] == State::kOnlyFirst ? 1 : 0;
+        found.only_second += states[i] == State::kOnlySecond ? 1 : 0;
+        if (found.first_few.size() < kMostListed) found.first_few.push_back(tile);
+        if (sums[i].max > all.max) worst = tile;
+        all.compared += sums[i].compared;
+        all.voids += sums[i].voids;
+        all.sum += sums[i].sum;
+        all.squares += sums[i].squares;
+        all.max = std::max(all.max, sums[i].max);
+      }
+      job.report({"compare", "tiles", std::min(at + kBatch, tiles.count()), tiles.count()});
+    }
+  });
+  if (surface) {
+    const double count = std::max(static_cast<double>(all.compared), 1.0);
+    found.surface = {all.compared, all.voids, std::sqrt(all.squares / count), all.sum / count, all.max, worst};
+  }
+  return found;
+}
+
+}  // namespace isohf

@@ -1,0 +1,149 @@
+#include <fmt/format.h>
+#include <oneapi/tbb/parallel_for.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <map>
+#include <set>
+
+#include "isohf/archive/container/archive_directory.h"
+#include "isohf/archive/metadata/part_record.h"
+#include "isohf/base/arena.h"
+#include "isohf/convert/parts/parts.h"
+#include "isohf/error.h"
+
+namespace isohf {
+namespace {
+
+/// What is wrong with the archives that are to be joined, all of it.
+class Problems {
+ public:
+  void add(const Error& error) { add(error.code(), error.what()); }
+  void add(ErrorCode code, const std::string& what) {
+    if (lines_.empty()) code_ = code;
+    lines_.push_back(what);
+  }
+  void throw_if_any() const {
+    if (lines_.empty()) return;
+    std::string text;
+    for (const std::string& line : lines_) text += (text.empty() ? "" : "; ") + line;
+    throw Error(code_, text);
+  }
+
+ private:
+  ErrorCode code_ = ErrorCode::kInvalidArgument;
+  std::vector<std::string> lines_;
+};
+
+/// An archive's bytes against the CRC that it states.
+void check_data(const ArchiveReader& archive) {
+  for (const auto& [name, stated] : archive.metadata().extensions) {
+    if (name != kDataCrcName) continue;
+    if (const std::string found = fmt::format("\"{:08x}\"", data_crc32(archive.source())); found != stated) {
+      throw Error(ErrorCode::kCorrupt,
+                  fmt::format("{}: its members' data have the CRC-32 {}, {} is stated", archive.path(), found, stated));
+    }
+  }
+}
+
+std::string text_of(const TileRange& tiles) {
+  return fmt::format("columns {} to {} and rows {} to {}", tiles.first.column, tiles.end.column - 1, tiles.first.row,
+                     tiles.end.row - 1);
+}
+
+/// Rectangles of `all` that none of `parts` covers.
+std::vector<TileRange> gaps_in(const TileRange& all, const std::vector<AssemblyInput>& parts) {
+  std::set<std::int64_t> cuts = {all.first.row, all.end.row};
+  for (const AssemblyInput& part : parts) cuts.insert({part.tiles.first.row, part.tiles.end.row});
+  std::vector<TileRange> gaps;
+  for (auto cut = cuts.begin(); std::next(cut) != cuts.end(); ++cut) {
+    std::vector<std::pair<std::int64_t, std::int64_t>> covered;
+    for (const AssemblyInput& part : parts) {
+      if (*cut >= part.tiles.first.row && *cut < part.tiles.end.row)
+        covered.emplace_back(part.tiles.first.column, part.tiles.end.column);
+    }
+    std::sort(covered.begin(), covered.end());
+    covered.emplace_back(all.end.column, all.end.column);
+    std::int64_t column = all.first.column;
+    for (const auto& [first, end] : covered) {
+      if (first > column) gaps.push_back({{column, *cut}, {first, *std::next(cut)}});
+      column = std::max(column, end);
+    }
+  }
+  return gaps;
+}
+
+}  // namespace
+
+PartSummary merge_archives(const std::vector<std::string>& archives, const std::string& output,
+                           const PartOptions& options, const Job& job) {
+  if (archives.empty()) throw Error(ErrorCode::kInvalidArgument, "there is no archive to join");
+  std::vector<std::unique_ptr<ArchiveReader>> readers(archives.size());
+  std::vector<std::optional<Error>> failed(archives.size());
+  std::atomic<std::int64_t> checked = 0;
+  Arena(job).execute([&] {
+    oneapi::tbb::parallel_for(std::size_t{0}, archives.size(), [&](std::size_t i) {
+      if (job.cancel != nullptr && job.cancel->load()) return;
+      try {
+        auto reader = std::make_unique<ArchiveReader>(archives[i]);
+        require_copyable(*reader);
+        (void)part_record(reader->metadata());
+        check_data(*reader);
+        readers[i] = std::move(reader);
+      } catch (const Error& error) {
+        failed[i] = error;
+      }
+    });
+  });
+  job.throw_if_cancelled();
+  Problems problems;
+  for (std::size_t i = 0; i < archives.size(); ++i) {
+    std::error_code none;
+    if (failed[i]) problems.add(*failed[i]);
+    if (std::filesystem::equivalent(archives[i], output, none))
+      problems.add(ErrorCode::kInvalidArgument, output + ": is the output and one of the archives to join");
+  }
+  problems.throw_if_any();
+
+  std::vector<AssemblyInput> inputs;
+  std::vector<PartOrigin> origins;
+  for (const auto& reader : readers) {
+    const std::string why = why_other_lattice(readers.front()->metadata(), reader->metadata());
+    if (!why.empty()) {
+      problems.add(ErrorCode::kInvalidArgument,
+                   fmt::format("{}: {} as {} has", reader->path(), why, readers.front()->path()));
+    }
+    inputs.push_back({reader.get(), tiles_here(reader->metadata())});
+    origins.push_back(origin_of(*reader));
+    if (origins.back().is_shard) {
+      problems.add(ErrorCode::kInvalidArgument,
+                   reader->path() + ": is a shard; name its plan first, isohf merge PLAN PART...");
+    }
+  }
+  problems.throw_if_any();
+  TileRange all = inputs.front().tiles;
+  for (const AssemblyInput& input : inputs) {
+    all.first = {std::min(all.first.column, input.tiles.first.column), std::min(all.first.row, input.tiles.first.row)};
+    all.end = {std::max(all.end.column, input.tiles.end.column), std::max(all.end.row, input.tiles.end.row)};
+  }
+  for (const TileRange& gap : gaps_in(all, inputs)) {
+    problems.add(ErrorCode::kInvalidArgument,
+                 fmt::format("tiles of {} are in none of the archives, which together reach over {}", text_of(gap),
+                             text_of(all)));
+  }
+  problems.throw_if_any();
+  const bool one_origin = std::all_of(origins.begin(), origins.end(),
+                                      [&](const PartOrigin& origin) { return origin.id == origins.front().id; });
+  Metadata metadata = readers.front()->metadata();
+  for (const auto& reader : readers) {
+    Statistics& most = metadata.statistics;
+    const Statistics& statistics = reader->metadata().statistics;
+    most.worst_rounding = std::max(most.worst_rounding, statistics.worst_rounding);
+    most.clamped = std::max(most.clamped, statistics.clamped);
+  }
+  return write_parts({std::move(inputs), all, std::move(metadata), one_origin ? origins.front().whole_json : "",
+                      one_origin, std::nullopt},
+                     output, options, job);
+}
+
+}  // namespace isohf

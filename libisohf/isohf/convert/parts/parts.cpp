@@ -1,0 +1,202 @@
+#include "isohf/convert/parts/parts.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "isohf/archive/container/content_hash.h"
+#include "isohf/archive/metadata/accuracy_info.h"
+#include "isohf/archive/metadata/part_record.h"
+#include "isohf/archive/planes/archive_planes.h"
+#include "isohf/archive/shadow_seeds/shadow_seeds.h"
+#include "isohf/archive/textures/texture_info.h"
+#include "isohf/base/arena.h"
+#include "isohf/convert/job_description.h"
+#include "isohf/error.h"
+#include "isohf/restore/lossless.h"
+
+namespace isohf {
+namespace {
+
+void drop_extension(Metadata& metadata, const char* name) {
+  std::erase_if(metadata.extensions, [&](const auto& extension) { return extension.first == name; });
+}
+
+void set_extension(Metadata& metadata, const char* name, std::string text) {
+  const auto at = std::find_if(metadata.extensions.begin(), metadata.extensions.end(),
+                               [&](const auto& extension) { return extension.first == name; });
+  if (at != metadata.extensions.end())
+    at->second = std::move(text);
+  else
+    metadata.extensions.emplace_back(name, std::move(text));
+}
+
+void count_members(const ArchiveWriter& writer, Metadata& metadata) {
+  const auto count = [&](auto info, const char* folder, const char* name, auto format) {
+    if (!info) return;
+    const MemberTotals totals = writer.members_in(folder);
+    info->members = totals.members;
+    info->bytes = totals.bytes;
+    set_extension(metadata, name, format(*info));
+  };
+  count(shadow_seed_info(metadata), "seeds/", kShadowSeedsName, format_shadow_seed_info);
+  count(texture_info(metadata), kTextureFolder, kTileTexturesName, format_texture_info);
+}
+
+}  // namespace
+
+TileRange tiles_of(const Metadata& metadata) {
+  return tiles_here(metadata);
+}
+
+TileRange tiles_touching(const TileGrid& grid, const WorldBounds& bounds) {
+  const auto range = [](double first, double last, double extent, std::int64_t tiles) {
+    const double most = static_cast<double>(tiles);
+    return std::pair(static_cast<std::int64_t>(std::clamp(std::floor(first / extent), 0.0, most)),
+                     static_cast<std::int64_t>(std::clamp(std::ceil(last / extent), 0.0, most)));
+  };
+  const auto [west, east] = range(bounds.x0, bounds.x1, grid.extent_x(), grid.tile_columns());
+  const auto [north, south] = range(bounds.z0, bounds.z1, grid.extent_z(), grid.tile_rows());
+  if (!(west < east && north < south)) {
+    throw Error(ErrorCode::kInvalidArgument, "the rectangle lies outside of what the archive covers");
+  }
+  return {{west, north}, {east, south}};
+}
+
+std::string why_other_lattice(const Metadata& one, const Metadata& other) {
+  const TileGrid& a = one.grid;
+  const TileGrid& b = other.grid;
+  const auto shape = [](const TileGrid& grid) {
+    return fmt::format("{}x{} tiles of {}x{}", grid.tile_columns(), grid.tile_rows(), grid.shape().columns(),
+                       grid.shape().rows());
+  };
+  if (shape(a) != shape(b)) return fmt::format("has {}, not {}", shape(b), shape(a));
+  if (!(a.shape() == b.shape())) return fmt::format("has {} levels, not {}", b.shape().levels(), a.shape().levels());
+  if (a.extent_x() != b.extent_x() || a.extent_z() != b.extent_z()) {
+    return fmt::format("has tiles of {} by {} world units, not {} by {}", b.extent_x(), b.extent_z(), a.extent_x(),
+                       a.extent_z());
+  }
+  const Quantisation& codes = one.quantisation;
+  const Quantisation& others = other.quantisation;
+  if (codes.type != others.type || codes.offset != others.offset || codes.scale != others.scale) {
+    const auto text = [](const Quantisation& q) {
+      return fmt::format("{} {} + {} code", to_string(q.type), q.offset, q.scale);
+    };
+    return fmt::format("has elevations {}, not {}", text(others), text(codes));
+  }
+  const auto ground = [](Metadata metadata) {
+    metadata.content_sha256.clear();
+    return ground_hash(metadata);
+  };
+  if (ground(one) != ground(other)) return "lies on other ground: projection, place, reference system or unit differ";
+  return {};
+}
+
+void require_copyable(const ArchiveReader& archive) {
+  const auto refuse = [&](const char* why) {
+    throw Error(ErrorCode::kInvalidArgument, fmt::format("{}: {}", archive.path(), why));
+  };
+  if (archive.metadata().version < 2) refuse("is of version 1 of the format; isohf planes writes it in version 2");
+  if (archive.reads_by_directory()) refuse("was repacked by another tool; isohf planes puts it in order");
+}
+
+PartOrigin origin_of(const ArchiveReader& archive) {
+  const auto part = part_record(archive.metadata());
+  if (!part) return {archive.metadata().ground_sha256, archive.metadata_json(), false};
+  if (part->shard) return {"plan " + part->shard->plan, {}, true};
+  const auto whole = archive.read_member(kWholeName);
+  if (!whole) {  // joined from archives of several origins
+    return {archive.path(), {}, false};
+  }
+  std::string json(reinterpret_cast<const char*>(whole->data()), whole->size());
+  std::string id = parse_metadata(json).ground_sha256;
+  return {std::move(id), std::move(json), false};
+}
+
+PartSummary write_parts(PartsJob parts, const std::string& output, const PartOptions& options, const Job& job) {
+  Metadata& metadata = parts.metadata;
+  PartSummary summary;
+  summary.tiles = parts.tiles;
+  summary.is_whole = parts.tiles == all_tiles(metadata.grid);
+  drop_extension(metadata, kPartName);
+  const bool had_residuals = std::any_of(parts.inputs.begin(), parts.inputs.end(), [](const AssemblyInput& input) {
+    return lossless_record(input.archive->metadata()).has_value();
+  });
+  if (had_residuals) summary.warnings.push_back(loss("residuals are left out: they belong to rows of the source"));
+  drop_extension(metadata, kLosslessName);
+  if (options.strict && !summary.warnings.empty()) throw error_from(summary.warnings);
+  WriterOptions how;
+  how.overwrite = options.overwrite;
+  how.planes = metadata.planes;
+  how.type = metadata.quantisation.type;
+  ArchiveWriter writer(output, metadata.grid, how);
+  Arena(job).execute([&] {
+    std::optional<PlaneStage> planes;
+    if (metadata.planes.count > 0) {
+      planes.emplace(planes_of(metadata), metadata.quantisation, metadata.level.value_or(kDefaultLevel), writer);
+    }
+    AssemblyRequest request{parts.inputs,     parts.tiles,       planes ? &*planes : nullptr,
+                            parts.one_origin, !parts.statistics, false};
+    Assembly assembly(metadata, writer, std::move(request), job);
+    assembly.add_tiles();
+    assembly.add_other_members(false);
+  });
+  std::optional<Metadata> whole;
+  if (summary.is_whole && !parts.whole_json.empty()) whole.emplace(parse_metadata(parts.whole_json));
+  if (whole && whole->content_sha256 == writer.content_hash(*whole)) {
+    summary.same_as_whole = !lossless_record(*whole).has_value();
+    drop_extension(*whole, kLosslessName);
+    metadata = *whole;
+  } else {
+    for (const char* name : {kAccuracyName, kJobName}) {
+      if (!parts.statistics) drop_extension(metadata, name);
+    }
+    const Statistics before = metadata.statistics;
+    metadata.statistics = parts.statistics ? *parts.statistics : total_statistics(writer.statistics());
+    if (!parts.statistics) {
+      // Of each tile these are not known: they are no more than in the whole.
+      metadata.statistics.worst_rounding = before.worst_rounding;
+      metadata.statistics.clamped = before.clamped;
+    }
+    if (!summary.is_whole) {
+      PartRecord record;
+      record.tiles = parts.tiles;
+      set_extension(metadata, kPartName, format_part_record(record));
+      if (!parts.whole_json.empty()) {
+        writer.add_member(kWholeName, std::as_bytes(std::span<const char>(parts.whole_json)), true);
+      }
+    }
+  }
+  count_members(writer, metadata);
+  summary.tiles_stored = writer.tiles_stored();
+  summary.content_sha256 = writer.content_hash(metadata);
+  summary.archive_bytes = writer.finish(metadata);
+  return summary;
+}
+
+PartSummary extract_tiles(const std::string& archive, const std::string& output, const TileRange& tiles,
+                          const PartOptions& options, const Job& job) {
+  const ArchiveReader reader(archive);
+  require_copyable(reader);
+  const TileRange here = tiles_here(reader.metadata());
+  const auto inside = [](std::int64_t first, std::int64_t end, std::int64_t least, std::int64_t most) {
+    return first >= least && first < end && end <= most;
+  };
+  if (!inside(tiles.first.column, tiles.end.column, here.first.column, here.end.column) ||
+      !inside(tiles.first.row, tiles.end.row, here.first.row, here.end.row)) {
+    throw Error(ErrorCode::kInvalidArgument,
+                fmt::format("{}: columns {} to {} and rows {} to {} of tiles are asked for, it holds columns {} to {} "
+                            "and rows {} to {}",
+                            archive, tiles.first.column, tiles.end.column - 1, tiles.first.row, tiles.end.row - 1,
+                            here.first.column, here.end.column - 1, here.first.row, here.end.row - 1));
+  }
+  const PartOrigin origin = origin_of(reader);
+  if (origin.is_shard) {
+    throw Error(ErrorCode::kInvalidArgument, archive + ": is a shard of a plan; join the shards first");
+  }
+  return write_parts({{{&reader, tiles}}, tiles, reader.metadata(), origin.whole_json, true, std::nullopt}, output,
+                     options, job);
+}
+
+}  // namespace isohf

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "isohf/convert/parts/assembly.h"
+#include "isohf/metadata.h"
+#include "isohf/parts.h"
+
+namespace isohf {
+
+/// Why tiles of one archive have no place in the other, one clause; empty where both lie on one lattice.
+[[nodiscard]] std::string why_other_lattice(const Metadata& one, const Metadata& other);
+
+/// Throws Error{kInvalidArgument} where an archive's members cannot be copied as they are: of version 1, repacked.
+void require_copyable(const ArchiveReader& archive);
+
+/// What an archive is a part of; equal where parts fit together without a look at their elevations.
+struct PartOrigin {
+  std::string id;
+  std::string whole_json;  ///< the metadata of what it was cut from, or its own where it is whole; empty for shards
+  bool is_shard = false;
+};
+[[nodiscard]] PartOrigin origin_of(const ArchiveReader& archive);
+
+/// What is joined, and what is said of it.
+struct PartsJob {
+  std::vector<AssemblyInput> inputs;
+  TileRange tiles;
+  Metadata metadata;       ///< counts, hashes and what says that it is a part are filled in
+  std::string whole_json;  ///< as in PartOrigin; empty where the parts are of several
+  bool one_origin = true;
+  std::optional<Statistics> statistics;  ///< where they are known; else tiles are decoded and counted
+};
+/// Throws as merge_archives() does once it writes.
+[[nodiscard]] PartSummary write_parts(PartsJob parts, const std::string& output, const PartOptions& options,
+                                      const Job& job);
+
+}  // namespace isohf

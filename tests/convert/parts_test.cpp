@@ -1,0 +1,175 @@
+#include "isohf/parts.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <limits>
+
+#include "isohf/archive/attach.h"
+#include "isohf/convert.h"
+#include "isohf/error.h"
+#include "isohf/verify.h"
+#include "support/memory_photo.h"
+#include "support/memory_source.h"
+#include "support/temporary_folder.h"
+
+namespace isohf {
+namespace {
+
+using testing::HasSubstr;
+
+/// Hills with a lake of voids, of tiles of 12x19 that planes of two kinds stand on.
+class Hills : public test::MemorySource<float> {
+ public:
+  explicit Hills(double rise = 0.0)
+      : MemorySource(SampleType::kFloat32, 210, 150, [rise](std::int64_t c, std::int64_t r) {
+          const auto x = static_cast<double>(c);
+          const auto z = static_cast<double>(r);
+          if (std::hypot(x - 60.0, z - 40.0) < 25.0) return std::numeric_limits<double>::quiet_NaN();
+          const double bump = std::hypot(x - 150.0, z - 100.0) < 12.0 ? rise : 0.0;
+          return 300.0 + 20.0 * std::sin(x * 0.05) * std::cos(z * 0.04) + 3.0 * std::sin(x * 0.6 + z * 0.3) + bump;
+        }) {}
+};
+
+class Parts : public testing::Test {
+ protected:
+  Parts() {
+    options.plan.shape = {12, 19};
+    options.plan.levels = 2;
+    options.overwrite = true;
+    options.producer = "isohf test";
+    options.z_range = {270.0, 330.0};
+    options.shadow_seeds.emplace();
+  }
+  std::string make(const std::string& name, double rise = 0.0) {
+    Hills source(rise);
+    (void)convert(source, folder / name, options);
+    return folder / name;
+  }
+  std::string cut(const std::string& archive, const std::string& name, const TileRange& tiles) {
+    (void)extract_tiles(archive, folder / name, tiles, {.overwrite = true});
+    return folder / name;
+  }
+  std::string message_of(const std::vector<std::string>& archives) {
+    try {
+      (void)merge_archives(archives, folder / "refused.isohf");
+    } catch (const Error& error) {
+      EXPECT_FALSE(std::filesystem::exists(folder / "refused.isohf"));
+      EXPECT_FALSE(std::filesystem::exists(folder / "refused.isohf.part"));
+      return error.what();
+    }
+    return "nothing was refused";
+  }
+
+  test::TemporaryFolder folder;
+  ConvertOptions options;
+};
+
+TEST_F(Parts, ComplementaryOnesGiveTheWholesBytesInAnyOrder) {
+  test::MemoryPhoto photo(210, 150, 3, [](std::int64_t c, std::int64_t r, int channel) {
+    return static_cast<std::uint8_t>((c * 3 + r * 5 + channel * 60) % 256);
+  });
+  for (const CodeType type : {CodeType::kU16, CodeType::kU8, CodeType::kF32}) {
+    options.code_type = type;
+    options.texture.emplace();
+    options.texture->photo = &photo;
+    const std::string whole = make("whole.isohf");
+    test::write_file(folder / "note.txt", "belongs to all of it");
+    (void)attach_members(whole, {{folder / "note.txt", "note.txt"}});
+    const TileGrid grid = ArchiveReader(whole).grid();
+    const std::int64_t columns = grid.tile_columns();
+    const std::int64_t rows = grid.tile_rows();
+    ASSERT_GT(columns, 9);
+    ASSERT_GT(rows, 8);
+    const std::string west = cut(whole, "w.isohf", {{0, 0}, {9, 7}});
+    const std::string east = cut(whole, "e.isohf", {{9, 0}, {columns, 7}});
+    const std::string south = cut(whole, "s.isohf", {{0, 7}, {columns, rows}});
+    for (const std::string& part : {west, east, south}) {
+      EXPECT_TRUE(verify_archive(part).passed()) << part;
+      const ArchiveReader reader(part);
+      EXPECT_FALSE(tiles_of(reader.metadata()) == tiles_of(ArchiveReader(whole).metadata()));
+      EXPECT_TRUE(reader.find_member("note.txt").has_value());
+    }
+    const PartSummary joined = merge_archives({south, west, east}, folder / "joined.isohf", {.overwrite = true});
+    EXPECT_TRUE(joined.is_whole);
+    EXPECT_TRUE(joined.same_as_whole);
+    EXPECT_EQ(test::read_file(folder / "joined.isohf"), test::read_file(whole));
+    // By way of a part of two parts, and of a part cut from that.
+    (void)merge_archives({west, east}, folder / "north.isohf", {.overwrite = true});
+    EXPECT_TRUE(verify_archive(folder / "north.isohf").passed());
+    const std::string again = cut(folder / "north.isohf", "again.isohf", {{0, 0}, {9, 7}});
+    EXPECT_EQ(test::read_file(again), test::read_file(west));
+    (void)merge_archives({folder / "north.isohf", south}, folder / "joined.isohf", {.overwrite = true});
+    EXPECT_EQ(test::read_file(folder / "joined.isohf"), test::read_file(whole));
+  }
+}
+
+TEST_F(Parts, LastArchiveGivesTheTileAndEverythingFollows) {
+  const std::string old = make("old.isohf");
+  const std::string changed = make("changed.isohf", 9.0);
+  const ArchiveDifference difference = diff_archives(old, changed, true);
+  ASSERT_GT(difference.tiles_differing, 1);
+  EXPECT_NEAR(difference.surface->max, 9.0, 1.5);  // the cubic goes beyond a cliff
+  EXPECT_EQ(difference.surface->voids, 0);
+  // With what is around, so that edges meet: but the seeds of these rows are those of the joined tiles.
+  const TileRange& around = difference.bounds;
+  const std::string update = cut(changed, "update.isohf", around);
+  const PartSummary joined = merge_archives({old, update}, folder / "joined.isohf");
+  EXPECT_FALSE(joined.same_as_whole);
+  EXPECT_EQ(ArchiveReader(folder / "joined.isohf").metadata().content_sha256,
+            ArchiveReader(changed).metadata().content_sha256);
+  EXPECT_TRUE(verify_archive(folder / "joined.isohf").passed());
+  EXPECT_TRUE(diff_archives(changed, folder / "joined.isohf").same_tiles());
+  // A piece of it does not meet what lies around.
+  const std::string torn = cut(changed, "torn.isohf", {around.first, {around.first.column + 1, around.end.row}});
+  if (around.end.column - around.first.column > 1) {
+    EXPECT_THAT(message_of({old, torn}), HasSubstr("does not meet its neighbour of"));
+  }
+}
+
+TEST_F(Parts, AllThatIsWrongIsSaidBeforeAnythingIsWritten) {
+  const std::string whole = make("whole.isohf");
+  const std::int64_t columns = ArchiveReader(whole).grid().tile_columns();
+  const std::string west = cut(whole, "w.isohf", {{0, 0}, {4, 5}});
+  const std::string east = cut(whole, "e.isohf", {{6, 0}, {columns, 5}});
+  EXPECT_THAT(message_of({west, east}), HasSubstr("tiles of columns 4 to 5 and rows 0 to 4 are in none"));
+  std::string bytes = test::read_file(east);
+  test::write_file(folder / "cut.isohf", bytes.substr(0, bytes.size() / 2));
+  bytes[bytes.size() / 3] = static_cast<char>(bytes[bytes.size() / 3] ^ 1);
+  test::write_file(folder / "bit.isohf", bytes);
+  const std::string found = message_of({west, folder / "cut.isohf", folder / "none.isohf", folder / "bit.isohf"});
+  for (const char* name : {"cut.isohf: ", "none.isohf: ", "bit.isohf: its members' data"}) {
+    EXPECT_THAT(found, HasSubstr(name));
+  }
+  options.step = 0.01;
+  options.z_range.reset();
+  const std::string other = make("other.isohf");
+  EXPECT_THAT(message_of({whole, other}), HasSubstr("other.isohf: has elevations"));
+  EXPECT_THAT(diff_archives(whole, other).why_other_lattice, HasSubstr("has elevations"));
+  EXPECT_THROW((void)merge_archives({whole}, whole, {.overwrite = true}), Error);
+  EXPECT_THROW(cut(whole, "beyond.isohf", {{0, 0}, {columns + 1, 1}}), Error);
+  EXPECT_THROW(cut(west, "beyond.isohf", {{3, 0}, {5, 1}}), Error);
+}
+
+TEST_F(Parts, DiffDecodesNothingAndListsMetadata) {
+  const std::string whole = make("whole.isohf");
+  options.level = 3;
+  const std::string other = make("other.isohf");
+  const ArchiveDifference difference = diff_archives(whole, other);
+  EXPECT_TRUE(difference.same_tiles());
+  EXPECT_FALSE(difference.surface.has_value());
+  bool names_level = false;
+  for (const auto& member : difference.metadata) {
+    names_level = names_level || (member.name == "/level" && member.second == "3");
+  }
+  EXPECT_TRUE(names_level);
+  const TileGrid grid = ArchiveReader(whole).grid();
+  const TileRange touched = tiles_touching(grid, {0.5 * grid.extent_x(), 0.0, 2.0 * grid.extent_x(), 1e-3});
+  EXPECT_EQ(touched, (TileRange{{0, 0}, {2, 1}}));
+  EXPECT_THROW((void)tiles_touching(grid, {-9.0, -9.0, -8.0, -8.0}), Error);
+}
+
+}  // namespace
+}  // namespace isohf
