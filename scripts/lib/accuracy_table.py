@@ -66,6 +66,13 @@ class Row:
         self.iso, self.ortho, self.equal = report["iso"], report["ortho"], report["ortho_at_equal_rms"]
         self.error = report
         self.rms_ratio = report["rms"] / self.ortho["rms"] if self.ortho["rms"] > 0 else None
+        over = lambda mesh, key, iso: iso / mesh[key] if mesh and mesh[key] > 0 else None
+        self.one_ratio = over(self.ortho, "rms", self.iso["rms_regular"])
+        self.least_ratio = over(self.ortho, "rms_least_curvature", self.iso["rms_regular"])
+        self.best_ratio = over(self.ortho, "rms_best_diagonals", self.iso["rms_regular"])
+        kept = report["decimated"]
+        self.kept_ratio, self.kept_least_ratio = (over(kept, key, kept and kept["rms_iso"])
+                                                  for key in ("rms", "rms_least_curvature"))
         self.p99_ratio = report["p99"] / self.ortho["p99"] if self.ortho["p99"] > 0 else None
         self.triangles_ratio = self.plain_ratio = self.stored_ratio = None
         self.codec_ratio = self.iso["tile_bytes"] / self.iso["plain_bytes"]
@@ -77,14 +84,15 @@ class Row:
     def cells(self):
         both = lambda key, form: f"{self.error[key]:{form}} / {self.ortho[key]:{form}}"
         ratio = lambda value: "-" if value is None else f"{value:.3f}"
-        return [self.name, both("rms", ".3g"), ratio(self.rms_ratio), both("p99", ".3g"), both("max", ".4g"),
+        return [self.name, both("rms", ".3g"), ratio(self.rms_ratio), ratio(self.least_ratio), ratio(self.best_ratio),
+                ratio(self.kept_ratio), ratio(self.kept_least_ratio), both("p99", ".3g"), both("max", ".4g"),
                 both("psnr_db", ".1f"), f"{self.iso['triangles']:,}".replace(",", " "),
                 f"{self.iso['tile_bytes'] / 1000:.0f}",
                 f"{self.iso['plain_bytes'] / 1000:.0f} / {self.ortho['plain_bytes'] / 1000:.0f}",
                 ratio(self.triangles_ratio), ratio(self.plain_ratio)]
 
 
-HEAD = ["raster", "rms", "ratio", "99 %", "largest", "PSNR dB", "triangles", "tiles kB", "plain kB", "triangles ×",
+HEAD = ["raster", "rms", "ratio", "least curv.", "best", "kept", "kept, least curv.", "99 %", "largest", "PSNR dB", "triangles", "tiles kB", "plain kB", "triangles ×",
         "plain bytes ×"]
 
 
@@ -100,6 +108,20 @@ def median(values):
 def extent(values):
     values = [v for v in values if v is not None]
     return f"{min(values):.3f} to {max(values):.3f}" if values else "-"
+
+
+def shares(rows, key):
+    values = [value for value in (getattr(row, key) for row in rows) if value is not None]
+    return f"{median(values):.3f} ({extent(values)})" if values else "-"
+
+
+def alternatives(results):
+    """Iso against what users could draw instead, both at the four placements."""
+    lines = [[label, kernel] + [shares(rows, key) for key in ("one_ratio", "least_ratio", "best_ratio", "kept_ratio",
+                                                              "kept_least_ratio")]
+             for (label, kernel), rows in results.items()]
+    return table(["density", "filter", "one diagonal", "least curvature", "best for the source", "samples kept, one diagonal",
+                  "samples kept, least curvature"], lines)
 
 
 def wins(rows):
@@ -159,7 +181,7 @@ def main():
             results[label, kernel] = [Row(path.name, label, kernel, measure(isohf, path, work, density, kernel))
                                       for path, _ in chosen]
             print(f"accuracy_table: density {label}, {kernel}: done", file=sys.stderr)
-    print(PAGE.format(reading=reading(results), summary=summary(results), count=len(chosen),
+    print(PAGE.format(reading=reading(results), summary=summary(results), alternatives=alternatives(results), count=len(chosen),
                       rasters="\n".join(f"- `{p.name}`: {s['width']} x {s['height']}, {s['sample_type']}, "
                                         f"{s['spacing_x']:.4g} x {s['spacing_z']:.4g}"
                                         f"{' m' if s['in_metres'] else ''}" for p, s in chosen)))
@@ -175,10 +197,21 @@ Written by `scripts/accuracy_table`, which runs `isohf convert --report` on {cou
 
 {reading}
 
-Two things to keep in mind. Errors are measured at the raster's own samples: the raster as it stands is an ortho grid without
-error, and a mesh of density 1 or more that may keep its samples should. And the ortho mesh has one diagonal for all squares,
-the better of the two; diagonals chosen square by square do better than either mesh
-([experiment.md](experiment.md)), where they can be afforded.
+That is against squares all cut one way, and resampled as iso is. What else could be drawn with as many triangles, in rms of
+iso over the other, medians and ranges over the rasters, both laid at four places:
+
+{alternatives}
+
+- *One diagonal*: all squares cut one way, the better of the two.
+- *Least curvature*: each square cut along the diagonal on which its vertices bend less; that needs no more than the vertices.
+- *Best for the source*: each cut as suits the source's samples inside it. No rule can do better; it takes the source to find.
+- *Samples kept*: every second (density 1/4) or fourth (1/16) sample of each row and column, unchanged, and iso at just that
+  density. At density 1 that is the source itself, without error: a mesh that may keep all samples should.
+
+So iso with a good filter errs less than a mesh that keeps its rows and columns straight and chooses its diagonals by its
+vertices, by little, and more than one whose diagonals are fitted to the source. Chosen diagonals lose what the lattice is
+for, though: one strip for all tiles of a level, a lookup without a bit for each square, shadows along three axes,
+and coarser levels that meet without cracks.
 
 For long waves of all directions the closed form is 0.816 (erratum E19) and 1.22 times the triangles. Ground has detail that
 neither lattice resolves, which both miss alike, so that its figures lie between that and 1.
@@ -196,6 +229,7 @@ equal rms error over iso; the last column is the archive's tiles over that mesh 
 
 ## All figures
 
-Pairs are iso / ortho at as many triangles. "ratio" is rms iso over ortho. Errors are in the raster's own vertical units."""
+Pairs are iso / ortho at as many triangles. "ratio" is rms of the archive over ortho; the four columns after it are the ratios of
+the table above. Errors are in the raster's own vertical units."""
 
 main()

@@ -3,7 +3,9 @@
 #include <oneapi/tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -107,23 +109,38 @@ double rounding_of(const Metadata& metadata) {
 void compare(const ArchiveReader& archive, HeightSource& source, double iso_rms, LatticeReport& report,
              const Job& job) {
   measure_archive(archive, report, job);
+  const Metadata& metadata = archive.metadata();
+  const SourceRecord& record = metadata.source;
   int pass = 0;
-  const auto measure = [&](double spacing, bool in_full) {
-    return measure_ortho_twin(archive.metadata(), source, spacing, in_full, "ortho " + std::to_string(++pass), job);
+  const auto measure = [&](std::span<const MeshLayout> layouts) {
+    return measure_meshes(metadata, source, layouts, "ortho " + std::to_string(++pass), job);
   };
-  const double spacing = ortho_spacing(archive.grid());
-  report.twin = measure(spacing, true);
+  const auto measure_squares = [&](double spacing, bool in_full) {
+    return measure(std::array{MeshLayout::squares(spacing, in_full)}).front();
+  };
+  const double area = vertex_area(archive.grid());
+  const double spacing = std::sqrt(area);
+  const std::int64_t stride = std::llround(std::sqrt(area / (record.spacing_x * record.spacing_z)));
+  std::vector<MeshLayout> layouts{MeshLayout::squares(spacing, true), MeshLayout::equilateral(area)};
+  if (stride >= 2) {
+    const MeshLayout& kept = layouts.emplace_back(MeshLayout::every(stride, record));
+    layouts.push_back(MeshLayout::equilateral(kept.spacing_x * kept.spacing_z));
+  }
+  const std::vector<MeshErrors> found = measure(layouts);
+  report.twin = found[0];
+  report.regular_rms = found[1].rms;
+  if (stride >= 2) report.decimated = {stride, found[2], found[3].rms};
   if (std::min(iso_rms, report.twin.rms) <= rounding_of(archive.metadata())) return;
   SpacingSearch search(iso_rms);
   search.add(1.0, report.twin.rms);
   while (!search.found()) {
     const std::optional<double> ratio = search.next();
     if (!ratio) return;
-    const double rms = measure(spacing * *ratio, false).rms;
+    const double rms = measure_squares(spacing * *ratio, false).rms;
     if (!(rms > 0.0)) return;
     search.add(*ratio, rms);
   }
-  report.equal = measure(spacing * *search.found(), true);
+  report.equal = measure_squares(spacing * *search.found(), true);
 }
 
 }  // namespace
