@@ -210,8 +210,8 @@ iso over the other, medians and ranges over the rasters, both laid at four place
 
 So iso with a good filter errs less than a mesh that keeps its rows and columns straight and chooses its diagonals by its
 vertices, by little, and more than one whose diagonals are fitted to the source. Chosen diagonals lose what the lattice is
-for, though: one strip for all tiles of a level, a lookup without a bit for each square, shadows along three axes,
-and coarser levels that meet without cracks.
+for, though: one strip for all tiles of a level, a lookup without a bit for each square, shadows along rows, and
+coarser levels that meet without cracks.
 
 For long waves of all directions the closed form is 0.816 (erratum E19) and 1.22 times the triangles. Ground has detail that
 neither lattice resolves, which both miss alike, so that its figures lie between that and 1.
