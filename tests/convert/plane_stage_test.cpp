@@ -15,6 +15,7 @@
 #include "isohf/convert.h"
 #include "isohf/error.h"
 #include "isohf/shade.h"
+#include "isohf/surface.h"
 #include "isohf/verify.h"
 #include "support/altered_archive.h"
 #include "support/memory_source.h"
@@ -184,16 +185,93 @@ class CountedFile : public ByteSource {
   std::shared_ptr<const ByteSource> file_;
 };
 
+/// Waves, and finer ones on them; 1200 x 900 samples.
+double wave(double x, double z) {
+  return 300.0 + 90.0 * std::sin(x * 0.011) * std::cos(z * 0.013) + 0.2 * std::sin(x * 1.7) * std::sin(z * 1.1);
+}
+
+void convert_waves(const std::string& path, ConvertOptions options) {
+  test::MemorySource<float> source(SampleType::kFloat32, 1200, 900, [](std::int64_t c, std::int64_t r) {
+    return wave(static_cast<double>(c), static_cast<double>(r));
+  });
+  options.plan.shape = {36, 35};
+  (void)convert(source, path, options);
+}
+
+std::vector<double> rows_of(const ArchiveReader& archive, const SampleGrid& grid, RestoreMethod method) {
+  std::vector<double> all;
+  RowReader(archive, grid, method).read_all([&](std::int64_t, std::span<const double> rows) {
+    all.insert(all.end(), rows.begin(), rows.end());
+  });
+  return all;
+}
+
+TEST(PlaneStage, RowsFarApartAreReadFromThePlaneThatSuffices) {
+  const test::TemporaryFolder folder;
+  convert_waves(folder / "a.isohf", {});
+  const auto file = std::make_shared<CountedFile>(folder / "a.isohf");
+  const ArchiveReader archive(file, "a.isohf");
+  const Metadata& metadata = archive.metadata();
+  const TileGrid& tiles = metadata.grid;
+  const SampleGrid every_other = {18, 26, 0.0, 0.0, 4 * 8 * tiles.sigma_x(), 2 * 8 * tiles.sigma_z()};
+  ASSERT_EQ(usual_method(metadata, every_other), RestoreMethod::kPlane);
+  file->bytes = 0;
+  const std::vector<double> of_plane = rows_of(archive, every_other, RestoreMethod::kPlane);
+  EXPECT_LT(file->bytes * 20, archive.size_bytes());
+  EXPECT_EQ(of_plane, rows_of(archive, every_other, RestoreMethod::kBarycentric))
+      << "on vertices of the plane, exactly";
+
+  // Elsewhere a blend of vertices within half a spacing, so that slopes bound what is missed.
+  const SampleGrid over = grid_over(metadata.valid, true, GridSize{40, 30}, {});
+  ASSERT_EQ(usual_method(metadata, over), RestoreMethod::kPlane);
+  const std::vector<double> coarse = rows_of(archive, over, RestoreMethod::kPlane);
+  const std::vector<double> fine = rows_of(archive, over, RestoreMethod::kHex);
+  constexpr double kSlope = 90.0 * 0.011 + 90.0 * 0.013 + 0.2 * 1.7 + 0.2 * 1.1;
+  double sum = 0.0;
+  for (std::size_t i = 0; i < coarse.size(); ++i) {
+    ASSERT_LE(std::abs(coarse[i] - fine[i]), kSlope * over.spacing_x) << i;
+    sum += std::abs(coarse[i] - fine[i]);
+  }
+  EXPECT_LT(sum / static_cast<double>(coarse.size()), 2.0) << "of 180";
+}
+
+TEST(PlaneStage, RowsThatNoPlaneSufficesForAreReadFromTheTiles) {
+  const test::TemporaryFolder folder;
+  convert_waves(folder / "a.isohf", {});
+  const ArchiveReader archive(folder / "a.isohf");
+  const TileGrid& tiles = archive.metadata().grid;
+  EXPECT_EQ(usual_method(archive.metadata(), {9, 9, 0.0, 0.0, 31 * tiles.sigma_x(), 20 * tiles.sigma_z()}),
+            RestoreMethod::kHex);
+  EXPECT_EQ(usual_method(archive.metadata(), {9, 9, 0.0, 0.0, 40 * tiles.sigma_x(), 15 * tiles.sigma_z()}),
+            RestoreMethod::kHex);
+  ConvertOptions options;
+  options.planes = false;
+  convert_waves(folder / "b.isohf", options);
+  EXPECT_EQ(usual_method(ArchiveReader(folder / "b.isohf").metadata(), {9, 9, 0.0, 0.0, 400.0, 400.0}),
+            RestoreMethod::kHex);
+}
+
+TEST(PlaneStage, RowsOfAPlaneEndWhereTheSurfaceDoes) {
+  const test::TemporaryFolder folder;
+  convert_waves(folder / "a.isohf", {});
+  const ArchiveReader archive(folder / "a.isohf");
+  const TileGrid& tiles = archive.metadata().grid;
+  const double step = 5 * 8 * tiles.sigma_x();
+  const auto across = static_cast<std::int64_t>(tiles.world_width() / step) + 3;
+  const auto down = static_cast<std::int64_t>(tiles.world_height() / step) + 3;
+  const std::vector<double> rows = rows_of(archive, {across, down, 0.0, 0.0, step, step}, RestoreMethod::kPlane);
+  for (std::int64_t r = 0; r < down; ++r) {
+    for (std::int64_t c = 0; c < across; ++c) {
+      const bool is_outside = static_cast<double>(c) * step > tiles.world_width() + 1e-3 ||
+                              static_cast<double>(r) * step > tiles.world_height() + 1e-3;
+      EXPECT_EQ(std::isnan(rows[static_cast<std::size_t>(r * across + c)]), is_outside) << c << " " << r;
+    }
+  }
+}
+
 TEST(PlaneStage, ShadeReadsThePlaneThatSuffices) {
   const test::TemporaryFolder folder;
-  test::MemorySource<float> source(SampleType::kFloat32, 1200, 900, [](std::int64_t c, std::int64_t r) {
-    const auto x = static_cast<double>(c);
-    const auto z = static_cast<double>(r);
-    return 300.0 + 90.0 * std::sin(x * 0.011) * std::cos(z * 0.013) + 0.2 * std::sin(x * 1.7) * std::sin(z * 1.1);
-  });
-  ConvertOptions options;
-  options.plan.shape = {36, 35};
-  (void)convert(source, folder / "a.isohf", options);
+  convert_waves(folder / "a.isohf", {});
   const auto file = std::make_shared<CountedFile>(folder / "a.isohf");
   const ArchiveReader archive(file, "a.isohf");
   ASSERT_EQ(archive.metadata().planes.stride, 8);
@@ -212,8 +290,9 @@ TEST(PlaneStage, ShadeReadsThePlaneThatSuffices) {
   EXPECT_EQ(plane, 1);
   EXPECT_LT(file->bytes * 10, archive.size_bytes());
   // The ground is drawn to its edge, and looks as the tiles themselves do.
+  ConvertOptions options;
   options.planes = false;
-  (void)convert(source, folder / "b.isohf", options);
+  convert_waves(folder / "b.isohf", options);
   const Picture fine = shade(ArchiveReader(folder / "b.isohf"), request);
   double sum = 0.0;
   for (std::size_t i = 0; i < coarse.samples.size(); ++i) {

@@ -61,7 +61,9 @@ struct ExportOptions {
   std::optional<GridSize> tile_size;
   std::int64_t overlap = 0;
 
-  [[nodiscard]] RestoreMethod method() const { return raster.method.value_or(RestoreMethod::kHex); }
+  [[nodiscard]] RestoreMethod method(const Metadata& metadata, const SampleGrid& grid) const {
+    return raster.method.value_or(usual_method(metadata, grid));
+  }
 };
 
 /// "1009" is a square.
@@ -213,7 +215,7 @@ class Exporter {
     job.threads = options_.work.threads;
     job.cancel = &watch_interrupts();
     job.progress = [&](const Progress& at) { display_.update(stage, at.unit, at.done, at.total); };
-    RowReader(archive_, grid_.samples, options_.method()).read_all(take, job);
+    RowReader(archive_, grid_.samples, options_.method(archive_.metadata(), grid_.samples)).read_all(take, job);
   }
 
   SampleMapping choose_mapping() {
@@ -263,7 +265,7 @@ int run(const ExportOptions& options) {
   if (options.common.json) {
     out.write(json_text({{"archive", options.raster.archive},
                          {"output", options.raster.output},
-                         {"method", to_string(options.method())},
+                         {"method", to_string(options.method(archive.metadata(), samples))},
                          {"width", samples.width},
                          {"height", samples.height},
                          {"first_sample", {{"x", samples.first_x}, {"z", samples.first_z}}},

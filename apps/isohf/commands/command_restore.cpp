@@ -44,7 +44,8 @@ and .r32, have room for scale and offset.
 An archive whose input was projected takes --like of a raster in degrees, each of whose samples then goes
 through the projection, or of one on its own map.
 Methods: hex, quintic B-splines along the lattice rows and then down the columns, is nearest to the source;
-barycentric is what a renderer shows. The format follows from RASTER's extension: .tif, .exr,
+barycentric is what a renderer shows. Samples far apart are read from a coarse plane, unless a method is
+asked for. The format follows from RASTER's extension: .tif, .exr,
 .png, .hgt, .asc, .flt, .r16, .raw, .r32 or .npy.
 
 Examples:
@@ -114,11 +115,6 @@ SampleGrid asked_grid(const RestoreOptions& options, const Metadata& metadata) {
   if (!options.like.empty()) return grid_of_other(options, metadata);
   if (!raster.size && !raster.spacing) return natural_grid(metadata);
   return grid_over(metadata.valid, samples_are_areas(metadata), raster.size, spacing_in_world(raster, metadata));
-}
-
-/// Rows of another map than the archive's are read on the triangles.
-RestoreMethod method_of(const RestoreOptions& options, const SampleGrid& grid) {
-  return grid.in_degrees ? RestoreMethod::kBarycentric : options.raster.method.value_or(RestoreMethod::kHex);
 }
 
 struct Restored {
@@ -198,7 +194,7 @@ class Restorer {
     const SampleStore store(mapping, void_value, options_.raster.clamp_range);
     const auto sink = open(raster_spec(metadata, grid_, mapping, void_value), mapping);
     Restored restored;
-    RowReader(archive_, grid_, method_of(options_, grid_))
+    RowReader(archive_, grid_, options_.raster.method.value_or(usual_method(metadata, grid_)))
         .read_all(
             [&](std::int64_t row, std::span<const double> elevations) {
               sink->write_rows(store_rows(store, mapping.type, options_.raster.output, grid_.width, row, elevations,
@@ -247,7 +243,8 @@ int run(const RestoreOptions& options) {
     if (!is_lossless || error.code() != ErrorCode::kCorrupt) throw;
     return print_error(error, kExitDifferences);
   }
-  const std::string how = restored.is_source ? "source" : to_string(method_of(options, grid));
+  const RestoreMethod method = options.raster.method.value_or(usual_method(archive.metadata(), grid));
+  const std::string how = restored.is_source ? "source" : to_string(method);
   StandardOutput out;
   if (options.common.json) {
     ordered_json json = {{"archive", options.raster.archive},

@@ -47,6 +47,7 @@ struct ShadeCommand {
   std::string output;
   bool overwrite = false;
   bool no_shadow = false;
+  std::optional<std::int64_t> longest;  ///< pixels of the longer side
   ShadeOptions picture;
 };
 
@@ -79,8 +80,13 @@ std::optional<ShadeCommand> parse(const Arguments& arguments) {
               "range where that is less)",
               [&](const std::string& text) { request.softness = parse_positive_number(text); });
   line.group("Picture");
-  line.option("--size", "WxH", "Pixels (default: one for each lattice step, at most 2048 a side)",
-              [&](const std::string& text) { request.size = parse_size(text, 1, kMaxPixels); });
+  line.option("--size", "N|WxH",
+              "Pixels, of the longer side or both (default: one for each lattice step, at most 2048)",
+              [&](const std::string& text) {
+                const bool is_side = text.find_first_of("xX") == std::string::npos;
+                options.longest = is_side ? std::optional(parse_whole_number(text, 1, kMaxPixels)) : std::nullopt;
+                request.size = is_side ? std::nullopt : std::optional(parse_size(text, 1, kMaxPixels));
+              });
   line.option("--exaggeration", "F", "Draw heights F times as high (default 1)",
               [&](const std::string& text) { request.exaggeration = parse_positive_number(text); });
   line.flag("--texture", "Show the archive's textures; where there is none, the palette's colours", request.texture);
@@ -130,7 +136,8 @@ int run(ShadeCommand options) {
   const ArchiveReader archive = open_archive(options.archive);
   print_warnings(archive.warnings());
   ShadeOptions& request = options.picture;
-  const GridSize size = request.size.value_or(shade_size(archive));
+  const GridSize size = request.size.value_or(shade_size(archive, options.longest));
+  request.size = size;
   request.elevation_units_per_world_unit = elevation_units_per_world_unit(archive.metadata());
 
   RasterSpec spec;

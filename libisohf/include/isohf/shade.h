@@ -48,8 +48,9 @@ struct ShadeReport {
 /// Bytes of a pixel: red, green, blue, alpha, sRGB; 0 everywhere without elevation.
 inline constexpr std::int64_t kShadeChannels = 4;
 
-/// A pixel for each lattice step, at most 2048 a side.
-[[nodiscard]] GridSize shade_size(const ArchiveReader& archive);
+/// A pixel for each lattice step, at most 2048 a side; or so many along the longer side, and as many as keep the shape
+/// along the other.
+[[nodiscard]] GridSize shade_size(const ArchiveReader& archive, std::optional<std::int64_t> longest = {});
 
 /// Whole rows of the picture, from North to South: [k * width * kShadeChannels].
 using TakeShadedRows = std::function<void(std::span<const std::uint8_t> rows)>;

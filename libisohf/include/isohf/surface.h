@@ -104,10 +104,12 @@ class Surface {
 enum class RestoreMethod {
   kBarycentric,  ///< on the triangles, as the renderer draws them
   kHex,          ///< by quintic B-splines along the rows and then down the columns; on the triangles beside nodata
+  kPlane,        ///< on the triangles of a coarse plane: blends of vertices within half a sample's spacing
 };
 
-[[nodiscard]] std::string to_string(RestoreMethod method);                        ///< "barycentric", "hex"
-[[nodiscard]] RestoreMethod restore_method_from_string(const std::string& text);  ///< throws Error{kInvalidArgument}
+[[nodiscard]] std::string to_string(RestoreMethod method);  ///< "barycentric", "hex", "plane"
+[[nodiscard]] RestoreMethod restore_method_from_string(
+    const std::string& text);  ///< the first two; throws Error{kInvalidArgument}
 
 /// The samples of a raster on the ground: evenly spaced columns from West to East and rows from North to South, in world
 /// units or in degrees.
@@ -139,6 +141,10 @@ using GridSize = std::pair<std::int64_t, std::int64_t>;
 /// True where the surface may have no elevation at a sample of the grid.
 [[nodiscard]] bool may_have_nodata(const Metadata& metadata, const SampleGrid& grid);
 
+/// How a grid is read where nobody says: by kPlane where the archive has a coarse plane with two vertices or more between
+/// samples, either way, so that its tiles suffice; else by kHex, in degrees by kBarycentric.
+[[nodiscard]] RestoreMethod usual_method(const Metadata& metadata, const SampleGrid& grid);
+
 /// True where the archive's source was projected, so that its rows are no rows of the world.
 [[nodiscard]] bool is_warped(const Metadata& metadata);
 /// Where the source's samples lie, as its file said.
@@ -152,8 +158,9 @@ using GridSize = std::pair<std::int64_t, std::int64_t>;
 /// Memory grows with the width, not with the height. The bits depend on archive and grid alone.
 class RowReader {
  public:
-  /// A grid in degrees is read on the triangles, each sample at its own longitude and latitude. The archive must outlive
-  /// the reader. Throws Error{kInvalidArgument} for a grid without samples or far beyond the surface, and for one in
+  /// A grid in degrees is read on the triangles, each sample at its own longitude and latitude. kPlane reads the tiles of
+  /// the coarsest plane that suffices, and no other; it is for grids of which usual_method() says so. The archive must
+  /// outlive the reader. Throws Error{kInvalidArgument} for a grid without samples or far beyond the surface, and for one in
   /// degrees where the archive's are not known.
   RowReader(const ArchiveReader& archive, const SampleGrid& grid, RestoreMethod method = RestoreMethod::kHex);
   ~RowReader();

@@ -60,17 +60,20 @@ void require_samples(const SampleGrid& grid) {
 }
 
 GridSampler::GridSampler(const TileGrid& grid, bool wraps_x, const Quantisation& quantisation, ReadTiles read_tiles,
-                         const SampleGrid& samples, RestoreMethod method, bool snaps)
+                         const SampleGrid& samples, RestoreMethod method, bool snaps,
+                         const std::optional<TileGrid>& world)
     : grid_(grid),
       quantisation_(quantisation),
       read_tiles_(std::move(read_tiles)),
-      samples_(require_samples_near(samples, grid)),
+      samples_(require_samples_near(samples, world.value_or(grid))),
       method_(method),
+      end_z_(world.value_or(grid).world_height()),
       snaps_(snaps),
       spline_(grid, method == RestoreMethod::kHex ? columns_of(samples) : std::vector<double>{}, wraps_x) {
   for (const double x : columns_of(samples)) {
     const TilePoint at = grid_.locate({x, 0.0});
-    columns_.push_back({is_inside(x, samples.spacing_x, grid.world_width()), at.tile.column, at.point.x});
+    columns_.push_back(
+        {is_inside(x, samples.spacing_x, world.value_or(grid).world_width()), at.tile.column, at.point.x});
   }
 }
 
@@ -81,10 +84,14 @@ const GridSampler::TileRow& GridSampler::tile_row(std::int64_t row) {
   TileRow made{row, false, {}};
   made.elevations.resize(static_cast<std::size_t>(grid_.tile_columns()));
   std::atomic<bool> any = false;
+  // Splines run along whole rows, triangles need what is under them.
+  const bool needs_all = method_ == RestoreMethod::kHex;
+  const std::int64_t first = needs_all ? 0 : columns_.front().tile;
+  const std::int64_t last = needs_all ? grid_.tile_columns() - 1 : columns_.back().tile;
   std::vector<TileIndex> tiles;
-  for (std::int64_t column = 0; column < grid_.tile_columns(); ++column) tiles.push_back({column, row});
+  for (std::int64_t column = first; column <= last; ++column) tiles.push_back({column, row});
   for_each_tile(read_tiles_, tiles, [&](std::size_t i, const TileCodes& codes) {
-    std::vector<double>& elevations = made.elevations[i];
+    std::vector<double>& elevations = made.elevations[static_cast<std::size_t>(first) + i];
     elevations = elevations_of(codes, quantisation_);
     if (std::any_of(elevations.begin(), elevations.end(), [](double h) { return std::isnan(h); })) any = true;
   });
@@ -163,12 +170,12 @@ void GridSampler::read_on_triangles(const TilePoint& at, std::span<double> out) 
 
 void GridSampler::read_row(std::int64_t row, std::span<double> out) const {
   const double z = world_z(row);
-  if (!is_inside(z, samples_.spacing_z, grid_.world_height())) {
+  if (!is_inside(z, samples_.spacing_z, end_z_)) {
     std::fill(out.begin(), out.end(), kVoid);
     return;
   }
   const TilePoint at = grid_.locate({0.0, z});
-  if (method_ == RestoreMethod::kBarycentric) return read_on_triangles(at, out);
+  if (method_ != RestoreMethod::kHex) return read_on_triangles(at, out);
   const QuinticResponse response = quintic_response(spline_.row_at(std::clamp(z, 0.0, grid_.world_height())));
   bool beside_voids = kept_tile_row(at.tile.row).has_voids;
   for (std::int64_t t = 0; t < QuinticResponse::kTaps; ++t) {

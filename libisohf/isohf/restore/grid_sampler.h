@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <deque>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -24,8 +25,10 @@ class GridSampler {
  public:
   /// wraps_x  the grid's East edge is its West edge
   /// snaps    as in PointSampler
+  /// world    where the surface ends; nullopt: with the grid, beyond which a coarse plane's may reach
   GridSampler(const TileGrid& grid, bool wraps_x, const Quantisation& quantisation, ReadTiles read_tiles,
-              const SampleGrid& samples, RestoreMethod method, bool snaps = true);
+              const SampleGrid& samples, RestoreMethod method, bool snaps = true,
+              const std::optional<TileGrid>& world = {});
 
   /// Rows `first` to `first + rows - 1`; calls come in increasing order.
   /// elevations [rows * width] out, vertical units; NaN where the surface has a void or ends.
@@ -35,7 +38,7 @@ class GridSampler {
   struct TileRow {
     std::int64_t row;
     bool has_voids;
-    std::vector<std::vector<double>> elevations;  ///< [tile columns][C*R]
+    std::vector<std::vector<double>> elevations;  ///< [tile columns][C*R]; kHex: all, else those under samples
   };
   struct LatticeRow {
     std::vector<double> heights;
@@ -63,6 +66,7 @@ class GridSampler {
   ReadTiles read_tiles_;
   SampleGrid samples_;
   RestoreMethod method_;
+  double end_z_;  ///< of the surface, world units
   bool snaps_;
   SplineRows spline_;
   std::vector<Column> columns_;

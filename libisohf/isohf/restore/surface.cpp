@@ -6,6 +6,7 @@
 
 #include <algorithm>
 
+#include "isohf/archive/planes/archive_planes.h"
 #include "isohf/base/arena.h"
 #include "isohf/base/assert.h"
 #include "isohf/error.h"
@@ -21,6 +22,11 @@ constexpr std::int64_t kSamplesAtOnce = std::int64_t{1} << 20U;
 constexpr std::uint64_t kDefaultMemory = std::uint64_t{256} << 20U;
 /// What tiles under a grid in degrees take.
 constexpr std::uint64_t kTileBytes = std::uint64_t{16} << 20U;
+
+/// The coarsest plane with two vertices between samples of a grid in world units, either way (decision 45).
+int plane_for(const Metadata& metadata, const SampleGrid& grid) {
+  return planes_of(metadata).plane_for_spacing(grid.spacing_x / 2.0, grid.spacing_z / 2.0);
+}
 
 [[noreturn]] void refuse(const char* what) {
   throw Error(ErrorCode::kInvalidArgument,
@@ -84,7 +90,13 @@ const WorldGeoreference& Surface::georeference() const {
 }
 
 std::string to_string(RestoreMethod method) {
+  if (method == RestoreMethod::kPlane) return "plane";
   return method == RestoreMethod::kHex ? "hex" : "barycentric";
+}
+
+RestoreMethod usual_method(const Metadata& metadata, const SampleGrid& grid) {
+  if (grid.in_degrees) return RestoreMethod::kBarycentric;
+  return plane_for(metadata, grid) > 0 ? RestoreMethod::kPlane : RestoreMethod::kHex;
 }
 
 RestoreMethod restore_method_from_string(const std::string& text) {
@@ -97,7 +109,9 @@ struct RowReader::State {
   State(const ArchiveReader& archive, const SampleGrid& its_grid, RestoreMethod method) : grid(its_grid) {
     const Metadata& metadata = archive.metadata();
     if (!grid.in_degrees) {
-      rows.emplace(metadata.grid, metadata.wraps_x, metadata.quantisation, tiles_of(archive), grid, method);
+      const int plane = method == RestoreMethod::kPlane ? plane_for(metadata, grid) : 0;
+      rows.emplace(metadata.plane_grid(plane), metadata.wraps_x, metadata.quantisation, tiles_of(archive, plane), grid,
+                   method, true, metadata.grid);
       return;
     }
     require_samples(grid);

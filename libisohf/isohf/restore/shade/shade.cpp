@@ -437,12 +437,14 @@ class ShadeRenderer {
 
 }  // namespace
 
-GridSize shade_size(const ArchiveReader& archive) {
+GridSize shade_size(const ArchiveReader& archive, std::optional<std::int64_t> longest) {
   const WorldBounds& bounds = archive.metadata().valid;
-  const double longest = std::max(bounds.x1 - bounds.x0, bounds.z1 - bounds.z0);
-  const double pixel = std::max(2.0 * archive.grid().sigma_x(), longest / static_cast<double>(kDefaultPixels));
-  const auto pixels = [pixel](double length) {
-    return std::clamp<std::int64_t>(static_cast<std::int64_t>(std::lround(length / pixel)), 1, kDefaultPixels);
+  const double side = std::max(bounds.x1 - bounds.x0, bounds.z1 - bounds.z0);
+  const std::int64_t most = longest.value_or(kDefaultPixels);
+  const double least = longest ? 0.0 : 2.0 * archive.grid().sigma_x();
+  const double pixel = std::max(least, side / static_cast<double>(most));
+  const auto pixels = [&](double length) {
+    return std::clamp<std::int64_t>(static_cast<std::int64_t>(std::lround(length / pixel)), 1, most);
   };
   return {pixels(bounds.x1 - bounds.x0), pixels(bounds.z1 - bounds.z0)};
 }
