@@ -175,6 +175,12 @@ TEST(JsonSchema, HoldsForEveryCommandsSuccessAndFailure) {
   documents.run(0, "diff", {"diff", b, folder / "merged.isohf", "--surface"});
   documents.run(3, "diff", {"diff", a, b});
   documents.run(1, "error", {"diff", a, folder / "none.isohf"});
+  const std::string land = folder / "land.plan";
+  documents.run(0, "shards", {"plan", coast, "--write", land, "--shards", "2"});
+  documents.run(0, "shards", {"convert", "--plan", land, "--shard", "1/2", "-o", folder / "p1.isohf"});
+  documents.run(0, "shards", {"convert", "--plan", land, "--shard", "1/2", "-o", folder / "p1.isohf"});
+  documents.run(0, "shards", {"merge", land, folder / "p1.isohf", "--missing"});
+  documents.run(2, "error", {"merge", land, folder / "p1.isohf", "-o", folder / "land.isohf"});
   documents.run(2, "error", {"formats", "all"});
   documents.run(2, "error", {"frmats"});
 

@@ -22,6 +22,10 @@ expect 2 scripts/check --fix --nonsense
 expect 2 scripts/flight --frames
 expect 2 scripts/flight --frames none
 expect 2 scripts/fuzz archive soon
+expect 0 scripts/slurm/submit --help
+expect 2 scripts/slurm/submit a.plan
+expect 0 scripts/slurm/try --help
+expect 2 scripts/slurm/try --nonsense
 expect 2 scripts/setup --all --nonsense
 expect 2 scripts/test --golden nonsense
 exit $failed

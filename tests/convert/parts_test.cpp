@@ -1,15 +1,18 @@
-#include "isohf/parts.h"
+#include "isohf/shards.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <cmath>
 #include <filesystem>
+#include <functional>
 #include <limits>
 
 #include "isohf/archive/attach.h"
 #include "isohf/convert.h"
 #include "isohf/error.h"
+#include "isohf/parts.h"
 #include "isohf/verify.h"
 #include "support/memory_photo.h"
 #include "support/memory_source.h"
@@ -69,7 +72,7 @@ class Parts : public testing::Test {
 
 TEST_F(Parts, ComplementaryOnesGiveTheWholesBytesInAnyOrder) {
   test::MemoryPhoto photo(210, 150, 3, [](std::int64_t c, std::int64_t r, int channel) {
-    return static_cast<std::uint8_t>((c * 3 + r * 5 + channel * 60) % 256);
+    return static_cast<int>((c * 3 + r * 5 + channel * 60) % 256);
   });
   for (const CodeType type : {CodeType::kU16, CodeType::kU8, CodeType::kF32}) {
     options.code_type = type;
@@ -151,6 +154,116 @@ TEST_F(Parts, AllThatIsWrongIsSaidBeforeAnythingIsWritten) {
   EXPECT_THROW((void)merge_archives({whole}, whole, {.overwrite = true}), Error);
   EXPECT_THROW(cut(whole, "beyond.isohf", {{0, 0}, {columns + 1, 1}}), Error);
   EXPECT_THROW(cut(west, "beyond.isohf", {{3, 0}, {5, 1}}), Error);
+}
+
+/// The shards of a plan, made in an odd order.
+class Shards : public Parts {
+ protected:
+  std::vector<std::string> make_shards(HeightSource& source, const ShardPlan& plan, const std::string& name) {
+    std::vector<std::string> files;
+    const int count = static_cast<int>(plan.shards.size());
+    for (int i = 0; i < count; ++i) {
+      const int number = (i * 2 + 1) % count + 1;
+      files.push_back(folder / (name + std::to_string(number) + ".isohf"));
+      (void)convert_shard(source, plan, number, files.back(), options);
+      EXPECT_TRUE(is_shard(files.back(), plan, number));
+      EXPECT_EQ(is_shard(files.back(), plan, number % count + 1), count == 1);
+      EXPECT_TRUE(verify_archive(files.back()).passed()) << number;
+    }
+    return files;
+  }
+  std::string refusal(const std::function<void()>& action) {
+    try {
+      action();
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "nothing was refused";
+  }
+};
+
+TEST_F(Shards, JoinToTheBytesOfOneRun) {
+  test::MemoryPhoto photo(210, 150, 3, [](std::int64_t c, std::int64_t r, int channel) {
+    return static_cast<int>((c * 3 + r * 5 + channel * 60) % 256);
+  });
+  for (const CodeType type : {CodeType::kU16, CodeType::kF32}) {
+    for (const bool given : {true, false}) {
+      options.code_type = type;
+      if (!given) options.z_range.reset();
+      options.filter = given ? Filter::kBspline3 : Filter::kBilinear;
+      options.texture.emplace();
+      options.texture->photo = &photo;
+      const std::string whole = make("whole.isohf");
+      Hills source;
+      const ShardPlan plan = parse_shard_plan(format_shard_plan(plan_shards(source, options, 5)));
+      ASSERT_EQ(plan.shards.size(), 5U);
+      const std::vector<std::string> files = make_shards(source, plan, "part-");
+      EXPECT_TRUE(missing_shards(plan, files).empty());
+      const PartSummary joined = merge_shards(plan, files, folder / "joined.isohf", {.overwrite = true});
+      EXPECT_TRUE(joined.is_whole);
+      EXPECT_EQ(test::read_file(folder / "joined.isohf"), test::read_file(whole));
+    }
+    options.z_range = {270.0, 330.0};
+  }
+}
+
+TEST_F(Shards, OfFewRowsAreAsManyAsThereAreRows) {
+  Hills source;
+  const ShardPlan plan = plan_shards(source, options, 1000);
+  EXPECT_EQ(static_cast<std::int64_t>(plan.shards.size()), plan.tile_rows);
+  const ShardPlan two = plan_shards(source, options, 1);
+  ASSERT_EQ(two.shards.size(), 1U);
+  (void)make("whole.isohf");
+  (void)merge_shards(two, make_shards(source, two, "one-"), folder / "joined.isohf");
+  EXPECT_EQ(test::read_file(folder / "joined.isohf"), test::read_file(folder / "whole.isohf"));
+}
+
+TEST_F(Shards, InterruptedGoOnAndGiveTheSameBytes) {
+  Hills source;
+  const ShardPlan plan = plan_shards(source, options, 3);
+  const std::vector<std::string> files = make_shards(source, plan, "part-");
+  const std::string file = folder / "again.isohf";
+  std::atomic<bool> cancel = false;
+  Job job;
+  job.cancel = &cancel;
+  job.progress = [&](const Progress& at) { cancel = at.done > at.total / 2; };
+  options.resume = true;
+  EXPECT_THROW((void)convert_shard(source, plan, 2, file, options, job), Error);
+  EXPECT_FALSE(is_shard(file, plan, 2));
+  (void)convert_shard(source, plan, 2, file, options);
+  EXPECT_EQ(test::read_file(file), test::read_file(folder / "part-2.isohf"));
+}
+
+TEST_F(Shards, AreRefusedWhereTheyAreNotWhatWasPlanned) {
+  Hills source;
+  const ShardPlan plan = plan_shards(source, options, 3);
+  const std::vector<std::string> files = make_shards(source, plan, "part-");
+  const auto merged = [&](const std::vector<std::string>& parts) {
+    return refusal([&] { (void)merge_shards(plan, parts, folder / "refused.isohf"); });
+  };
+  options.level = 2;
+  EXPECT_THAT(refusal([&] { (void)convert_shard(source, plan, 1, folder / "a.isohf", options); }),
+              HasSubstr("are not those that were planned: \"level 2\", planned was \"level"));
+  EXPECT_THAT(refusal([&] { (void)convert_shard(source, plan, 4, folder / "a.isohf", options); }),
+              HasSubstr("there is no shard 4: the plan has 1 to 3"));
+  const ShardPlan other = plan_shards(source, options, 3);
+  const std::vector<std::string> foreign = make_shards(source, other, "other-");
+  const std::string found = merged({files[0], files[0], foreign[1], folder / "none.isohf"});
+  EXPECT_THAT(found, HasSubstr("none.isohf"));
+  EXPECT_THAT(found, HasSubstr("other-1.isohf: is a shard of another plan"));
+  EXPECT_THAT(found, HasSubstr("is shard 2, as "));
+  EXPECT_THAT(found, HasSubstr("of the plan's 3 shards these are missing: 1,3"));
+  EXPECT_EQ(missing_shards(plan, {files[0], foreign[1]}), (std::vector<int>{1, 3}));
+  EXPECT_THAT(refusal([&] { (void)merge_archives(files, folder / "refused.isohf"); }),
+              HasSubstr("name its plan first"));
+  EXPECT_THAT(merged({make("whole.isohf"), files[0], files[1], files[2]}), HasSubstr("is no shard of a plan"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "refused.isohf"));
+  options.lossless = true;
+  EXPECT_THAT(refusal([&] { (void)plan_shards(source, options, 2); }), HasSubstr("`lossless` needs all of the source"));
+  std::string json = format_shard_plan(plan);
+  EXPECT_THAT(refusal([&] { (void)parse_shard_plan("{}"); }), HasSubstr("format: is missing"));
+  json.replace(json.find("\"version\": 1"), 12, "\"version\": 9");
+  EXPECT_THAT(refusal([&] { (void)parse_shard_plan(json); }), HasSubstr("version 9, 1 is read"));
 }
 
 TEST_F(Parts, DiffDecodesNothingAndListsMetadata) {

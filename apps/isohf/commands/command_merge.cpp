@@ -2,13 +2,18 @@
 
 #include <fmt/format.h>
 
+#include <nlohmann/json.hpp>
 #include <optional>
 
 #include "commands/command.h"
+#include "commands/shards.h"
+#include "isohf/error.h"
 #include "isohf/parts.h"
 #include "options/options_common.h"
+#include "output/json_output.h"
 #include "output/output_kinds.h"
 #include "output/part_output.h"
+#include "output/standard_output.h"
 
 namespace isohf::cli {
 namespace {
@@ -18,6 +23,8 @@ constexpr const char* kFooter =
 and checked before anything is written, and all that is wrong is said at once.
 
 Examples:
+  isohf merge land.plan part-*.isohf -o land.isohf     the shards of a plan, to the bytes of one run
+  isohf merge land.plan part-*.isohf --missing         which shards are to be made (again)
   isohf merge west.isohf east.isohf -o land.isohf      what isohf extract cut
   isohf merge land.isohf newer.isohf -o update.isohf   tiles of newer.isohf over those of land.isohf)";
 
@@ -26,6 +33,8 @@ struct MergeCommand {
   WorkOptions work;
   std::vector<std::string> archives;
   std::string output;
+  std::string plan;  ///< empty: archives alone
+  bool missing = false;
   bool overwrite = false;
 };
 
@@ -33,16 +42,49 @@ std::optional<MergeCommand> parse(const Arguments& arguments) {
   MergeCommand options;
   CommandLine line("merge", "Joins archives that share a lattice: parts, or an update and what it updates.");
   line.group("Arguments");
-  line.positionals("ARCHIVE...", "Archives to join, the older before the newer", options.archives);
+  line.positionals("[PLAN] ARCHIVE...", "Archives to join, the older before the newer; or a plan and its shards",
+                   options.archives);
   line.option("-o,--output", "OUTPUT", "Archive to write", options.output);
   line.flag("--overwrite", "Replace OUTPUT where it exists", options.overwrite);
+  line.flag("--missing", "Print the numbers of the plan's shards that are missing or damaged, and write nothing",
+            options.missing);
   add_work_options(line, options.work);
   add_common_options(line, options.common);
   line.footer(kFooter);
   if (!line.parse(arguments)) return std::nullopt;
   line.require("ARCHIVE", options.archives);
+  if (looks_like_plan(options.archives.front())) {
+    options.plan = options.archives.front();
+    options.archives.erase(options.archives.begin());
+  }
+  if (options.missing && options.plan.empty())
+    throw Error(ErrorCode::kInvalidArgument, "merge: --missing needs a plan before the archives");
+  if (options.missing) return options;
   line.require("OUTPUT (-o)", options.output);
   return options;
+}
+
+/// As Slurm's --array takes them: "3,7-9"; an empty line where none is missing.
+int print_missing(const MergeCommand& options, const ShardPlan& plan) {
+  ProgressDisplay display(options.work.progress, options.common.quiet, options.common.verbose);
+  const std::vector<int> missing = missing_shards(plan, options.archives, job_from(options.work, display));
+  display.clear();
+  StandardOutput out;
+  if (options.common.json) {
+    out.write(json_text({{"plan", options.plan}, {"shards", plan.shards.size()}, {"missing", missing}}));
+  } else {
+    std::string text;
+    for (std::size_t i = 0; i < missing.size();) {
+      std::size_t last = i;
+      while (last + 1 < missing.size() && missing[last + 1] == missing[last] + 1) ++last;
+      text += fmt::format("{}{}", text.empty() ? "" : ",", missing[i]);
+      if (last > i) text += fmt::format("-{}", missing[last]);
+      i = last + 1;
+    }
+    out.write(text + "\n");
+  }
+  out.finish();
+  return kExitDone;
 }
 
 }  // namespace
@@ -50,9 +92,14 @@ std::optional<MergeCommand> parse(const Arguments& arguments) {
 int command_merge(const Arguments& arguments) {
   const auto options = parse(arguments);
   if (!options) return kExitDone;
+  std::optional<ShardPlan> plan;
+  if (!options->plan.empty()) plan = read_plan(options->plan);
+  if (options->missing) return print_missing(*options, *plan);
   check_archive_output(options->archives, options->output, options->overwrite);
   return print_part(options->output, options->common, options->work, [&](const Job& job) {
-    return merge_archives(options->archives, options->output, {options->overwrite, options->common.strict}, job);
+    const PartOptions how{options->overwrite, options->common.strict};
+    if (plan) return merge_shards(*plan, options->archives, options->output, how, job);
+    return merge_archives(options->archives, options->output, how, job);
   });
 }
 

@@ -2,10 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <optional>
 
 #include "commands/command.h"
+#include "commands/shards.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
 #include "options/describe.h"
@@ -34,6 +36,7 @@ Examples:
   isohf plan --shape 212x243
   isohf plan dem.tif --density 0.866
   isohf plan tiles/                   what many rasters make together
+  isohf plan dem.tif --write land.plan --shards 16     one conversion on many machines
   isohf plan --table1                 the paper's Table 1 with true aspects)";
 
 struct PlanOptions {
@@ -71,6 +74,11 @@ std::optional<PlanOptions> parse(const Arguments& arguments) {
   add_geoid_option(line, options.geoid);
   add_source_options(line, options.open);
   add_mosaic_options(line, options.inputs);
+  line.group("Many machines");
+  line.option(
+      "--write", "FILE",
+      "Write a plan for isohf convert --plan, and isohf merge; takes all options of isohf convert and --shards N",
+      [](const std::string&) {});
   add_common_options(line, options.common);
   line.footer(kFooter);
   if (!line.parse(arguments)) return std::nullopt;
@@ -203,6 +211,10 @@ int run(const PlanOptions& options) {
 }  // namespace
 
 int command_plan(const Arguments& arguments) {
+  const bool writes = std::any_of(arguments.begin(), arguments.end(), [](const std::string& argument) {
+    return argument == "--write" || argument.starts_with("--write=");
+  });
+  if (writes) return write_plan(arguments);
   const std::optional<PlanOptions> options = parse(arguments);
   return options ? run(*options) : static_cast<int>(kExitDone);
 }

@@ -16,6 +16,7 @@
 #include "isohf/raster.h"
 #include "isohf/resampling.h"
 #include "isohf/shade.h"
+#include "isohf/shards.h"
 #include "isohf/surface.h"
 #include "isohf/tile_range.h"
 #include "isohf/verify.h"

@@ -23,7 +23,9 @@ struct Conversion {
   double datum = 0.0;
   double height_error = 0.0;  ///< of heights above it
   Quantisation quantisation{};
-  CodeLimits limits{};  ///< of what is stored; the ends of options.z_range where it is given
+  CodeLimits limits{};          ///< of what is stored; the ends of options.z_range where it is given
+  std::int64_t first_tile = 0;  ///< flat index; of a shard
+  std::int64_t end_tile = plan.grid.tile_count();
 
   [[nodiscard]] SourceGeometry geometry() const { return plan.frame.geometry(plan.outside); }
   /// Elevations beyond the source's edge are held within a range.

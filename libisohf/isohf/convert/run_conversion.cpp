@@ -124,7 +124,9 @@ void write_tiles(const Conversion& conversion, ArchiveWriter& writer, const Stag
   const CountedVertices counted(
       describe_job(conversion.source.info(), conversion.plan, conversion.options, conversion.quantisation));
   const std::int64_t first_new = writer.next_tile();
-  std::int64_t next = stages.seeds != nullptr ? SeedStage::first_tile_needed(grid, first_new) : first_new;
+  std::int64_t next = stages.seeds != nullptr
+                          ? std::max(SeedStage::first_tile_needed(grid, first_new), conversion.first_tile)
+                          : first_new;
   std::shared_ptr<const TileSource::Part> part;
 
   // Tiles leave the pipeline in the order in which they enter it, so that a ring of as many as may be in flight always
@@ -135,7 +137,7 @@ void write_tiles(const Conversion& conversion, ArchiveWriter& writer, const Stag
 
   const auto read = [&](oneapi::tbb::flow_control& control) -> TileJob* {
     conversion.job.throw_if_cancelled();
-    if (next == grid.tile_count()) {
+    if (next == conversion.end_tile) {
       part.reset();
       control.stop();
       return nullptr;
@@ -165,7 +167,9 @@ void write_tiles(const Conversion& conversion, ArchiveWriter& writer, const Stag
       if (stages.planes != nullptr) stages.planes->add(tile->planes);
     }
     if (stages.seeds != nullptr) stages.seeds->add(tile->index, std::move(tile->seeds), writer);
-    conversion.job.report({"tiles", "tiles", ++written, grid.tile_count(), writer.bytes_written()});
+    ++written;
+    conversion.job.report({"tiles", "tiles", written - conversion.first_tile,
+                           conversion.end_tile - conversion.first_tile, writer.bytes_written()});
   };
 
   using oneapi::tbb::filter_mode;
@@ -173,6 +177,11 @@ void write_tiles(const Conversion& conversion, ArchiveWriter& writer, const Stag
   oneapi::tbb::parallel_pipeline(ring.size(), make_filter<void, TileJob*>(filter_mode::serial_in_order, read) &
                                                   make_filter<TileJob*, TileJob*>(filter_mode::parallel, encode) &
                                                   make_filter<TileJob*, void>(filter_mode::serial_in_order, write));
+  // Of a shard: what lies behind it is not there.
+  for (std::int64_t flat = conversion.end_tile; flat < grid.tile_count() && stages.planes != nullptr; ++flat) {
+    stages.planes->add({});
+  }
+  writer.skip_tiles(grid.tile_count() - conversion.end_tile);
 }
 
 void check_range(const std::pair<double, double>& range) {
@@ -198,10 +207,11 @@ void warn_of_plan(const SourceInfo& info, const Plan& plan, const PlanRequest& r
 }
 
 /// Holds what all tiles together came to against the options.
-void check_statistics(const Conversion& conversion, const TileStatistics& all, std::vector<Warning>& warnings) {
+void check_statistics(const Conversion& conversion, const TileStatistics& all, bool may_be_void,
+                      std::vector<Warning>& warnings) {
   const std::string& path = conversion.source.info().path;
   const ConvertOptions& options = conversion.options;
-  if (all.voids == all.vertices) {
+  if (all.voids == all.vertices && !may_be_void) {
     throw Error(ErrorCode::kInvalidArgument,
                 fmt::format("{}: every one of the {} lattice vertices is void, nothing to write", path, all.vertices));
   }
@@ -239,8 +249,22 @@ AccuracyInfo info_of(const AccuracyReport& report, const ConvertOptions& options
 
 }  // namespace
 
+FoundCodes find_codes(HeightSource& source, const Plan& plan, const ConvertOptions& options, const Job& job) {
+  if (options.z_range) check_range(*options.z_range);
+  if (options.shadow_seeds) check_seed_request(*options.shadow_seeds, plan.grid);
+  const Kernel kernel = Kernel::make(options.filter.value_or(kDefaultFilter));
+  const MemoryPlan memory = plan_memory(source, plan, options, job, 0);
+  check_memory(memory, job);
+  source.limit_buffers(memory.source_buffer_bytes);
+  Conversion conversion{source, options, plan, memory, kernel, Prefilter::make(kernel.filter(), options.acquisition),
+                        job};
+  ConvertSummary summary(plan.grid);
+  Arena(job).execute([&] { choose_codes(conversion, summary); });
+  return {conversion.quantisation, conversion.datum, conversion.height_error, summary.source_voids};
+}
+
 ConversionResult run_conversion(HeightSource& source, const Plan& plan, const std::string& output,
-                                const ConvertOptions& options, const Job& job, bool is_retry) {
+                                const ConvertOptions& options, const Job& job, bool is_retry, const ShardWork* shard) {
   const auto start = std::chrono::steady_clock::now();
   const SourceInfo& info = source.info();
   if (options.z_range) check_range(*options.z_range);
@@ -266,15 +290,29 @@ ConversionResult run_conversion(HeightSource& source, const Plan& plan, const st
   warn_of_plan(info, plan, options.plan, textures ? &*textures : nullptr, summary.warnings);
   refuse_warnings(summary, options);
   const PlaneInfo coarse = options.planes ? planes_for(plan.grid) : PlaneInfo();
-  ArchiveWriter writer(output, plan.grid,
-                       {options.overwrite, options.resume, job_fingerprint(info, plan, options), coarse});
   Conversion conversion{source, options, plan, memory, kernel, std::move(prefilter), job};
+  WriterOptions how{options.overwrite, options.resume, job_fingerprint(info, plan, options), coarse, 0,
+                    options.code_type};
+  if (shard != nullptr) {
+    conversion.first_tile = how.first_tile = shard->first_row * plan.grid.tile_columns();
+    conversion.end_tile = shard->end_row * plan.grid.tile_columns();
+    how.job_fingerprint += fmt::format(" | shard {} of {}", shard->record.number, shard->record.plan);
+  }
+  ArchiveWriter writer(output, plan.grid, how);
   std::optional<PlaneStage> planes;
   std::optional<SeedStage> seeds;
   std::optional<LosslessRecord> lossless;
   try {
     Arena(job).execute([&] {
-      choose_codes(conversion, summary);
+      if (shard == nullptr) {
+        choose_codes(conversion, summary);
+      } else {
+        conversion.quantisation = shard->quantisation;
+        conversion.datum = shard->datum;
+        conversion.height_error = shard->height_error;
+        conversion.limits = options.z_range ? CodeLimits{options.z_range->first, options.z_range->second}
+                                            : code_limits(shard->quantisation);
+      }
       refuse_warnings(summary, options);
       if (options.shadow_seeds) {
         // Lengths of both kinds are compared as metres where both are known to be.
@@ -295,7 +333,7 @@ ConversionResult run_conversion(HeightSource& source, const Plan& plan, const st
     });
 
     const TileStatistics all = writer.statistics();
-    check_statistics(conversion, all, summary.warnings);
+    check_statistics(conversion, all, shard != nullptr, summary.warnings);
     refuse_warnings(summary, options);
     metadata = describe_job(info, plan, options, conversion.quantisation);
     metadata.statistics = total_statistics(all);
@@ -316,10 +354,16 @@ ConversionResult run_conversion(HeightSource& source, const Plan& plan, const st
       summary.residual_bytes = lossless->residual_bytes;
       metadata.extensions.emplace_back(kLosslessName, format_lossless(*lossless));
     }
-    summary.tiles_expected = plan.grid.tile_count();
-    summary.tiles_written = writer.next_tile();
+    if (shard != nullptr) {
+      PartRecord part{{{0, shard->first_row}, {plan.grid.tile_columns(), shard->end_row}}, shard->record};
+      std::vector<double> sums = writer.row_sums();
+      sums.resize(static_cast<std::size_t>(shard->end_row));
+      part.shard->row_sums.assign(sums.begin() + static_cast<std::ptrdiff_t>(shard->first_row), sums.end());
+      metadata.extensions.emplace_back(kPartName, format_part_record(part));
+    }
+    ISOHF_ASSERT(writer.next_tile() == plan.grid.tile_count());
+    summary.tiles_expected = summary.tiles_written = conversion.end_tile - conversion.first_tile;
     summary.tiles_void = summary.tiles_written - writer.tiles_stored();
-    ISOHF_ASSERT(summary.tiles_written == summary.tiles_expected);
     summary.tile_bytes = writer.tile_bytes();
     if (options.measure || options.max_error) {
       writer.complete(metadata);

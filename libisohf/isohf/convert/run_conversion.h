@@ -3,6 +3,7 @@
 #include <optional>
 #include <string>
 
+#include "isohf/archive/metadata/part_record.h"
 #include "isohf/convert.h"
 #include "isohf/convert/frame/plan.h"
 
@@ -15,9 +16,30 @@ struct ConversionResult {
   bool is_finished = true;                 ///< false: the surface errs by more than max_error, nothing was left
 };
 
+/// The rows of tiles that one shard of a plan makes, and what the plan found.
+struct ShardWork {
+  std::int64_t first_row;
+  std::int64_t end_row;
+  Quantisation quantisation;
+  double datum;
+  double height_error;
+  PartRecord::Shard record;  ///< but for its sums
+};
+
+/// Codes alone: the first pass over the source, where one is needed. `plan` must be made of options.plan.
+struct FoundCodes {
+  Quantisation quantisation;
+  double datum;
+  double height_error;
+  std::optional<std::int64_t> source_voids;
+};
+[[nodiscard]] FoundCodes find_codes(HeightSource& source, const Plan& plan, const ConvertOptions& options,
+                                    const Job& job);
+
 /// One conversion, by a plan that was made of options.plan. `is_retry`: an interrupt leaves no part file behind, which
 /// `resume` could not use.
 [[nodiscard]] ConversionResult run_conversion(HeightSource& source, const Plan& plan, const std::string& output,
-                                              const ConvertOptions& options, const Job& job, bool is_retry = false);
+                                              const ConvertOptions& options, const Job& job, bool is_retry = false,
+                                              const ShardWork* shard = nullptr);
 
 }  // namespace isohf

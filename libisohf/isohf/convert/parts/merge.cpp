@@ -3,48 +3,19 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <map>
+#include <memory>
+#include <mutex>
 #include <set>
 
 #include "isohf/archive/container/archive_directory.h"
 #include "isohf/archive/metadata/part_record.h"
 #include "isohf/base/arena.h"
 #include "isohf/convert/parts/parts.h"
+#include "isohf/convert/parts/problems.h"
 #include "isohf/error.h"
 
 namespace isohf {
 namespace {
-
-/// What is wrong with the archives that are to be joined, all of it.
-class Problems {
- public:
-  void add(const Error& error) { add(error.code(), error.what()); }
-  void add(ErrorCode code, const std::string& what) {
-    if (lines_.empty()) code_ = code;
-    lines_.push_back(what);
-  }
-  void throw_if_any() const {
-    if (lines_.empty()) return;
-    std::string text;
-    for (const std::string& line : lines_) text += (text.empty() ? "" : "; ") + line;
-    throw Error(code_, text);
-  }
-
- private:
-  ErrorCode code_ = ErrorCode::kInvalidArgument;
-  std::vector<std::string> lines_;
-};
-
-/// An archive's bytes against the CRC that it states.
-void check_data(const ArchiveReader& archive) {
-  for (const auto& [name, stated] : archive.metadata().extensions) {
-    if (name != kDataCrcName) continue;
-    if (const std::string found = fmt::format("\"{:08x}\"", data_crc32(archive.source())); found != stated) {
-      throw Error(ErrorCode::kCorrupt,
-                  fmt::format("{}: its members' data have the CRC-32 {}, {} is stated", archive.path(), found, stated));
-    }
-  }
-}
 
 std::string text_of(const TileRange& tiles) {
   return fmt::format("columns {} to {} and rows {} to {}", tiles.first.column, tiles.end.column - 1, tiles.first.row,
@@ -73,14 +44,25 @@ std::vector<TileRange> gaps_in(const TileRange& all, const std::vector<AssemblyI
   return gaps;
 }
 
+/// An archive's bytes against the CRC that it states.
+void check_data(const ArchiveReader& archive) {
+  for (const auto& [name, stated] : archive.metadata().extensions) {
+    if (name != kDataCrcName) continue;
+    if (const std::string found = fmt::format("\"{:08x}\"", data_crc32(archive.source())); found != stated) {
+      throw Error(ErrorCode::kCorrupt,
+                  fmt::format("{}: its members' data have the CRC-32 {}, {} is stated", archive.path(), found, stated));
+    }
+  }
+}
+
 }  // namespace
 
-PartSummary merge_archives(const std::vector<std::string>& archives, const std::string& output,
-                           const PartOptions& options, const Job& job) {
-  if (archives.empty()) throw Error(ErrorCode::kInvalidArgument, "there is no archive to join");
+std::vector<std::unique_ptr<ArchiveReader>> open_parts(const std::vector<std::string>& archives,
+                                                       const std::string& output, Problems& problems, const Job& job) {
   std::vector<std::unique_ptr<ArchiveReader>> readers(archives.size());
   std::vector<std::optional<Error>> failed(archives.size());
-  std::atomic<std::int64_t> checked = 0;
+  std::int64_t checked = 0;
+  std::mutex mutex;
   Arena(job).execute([&] {
     oneapi::tbb::parallel_for(std::size_t{0}, archives.size(), [&](std::size_t i) {
       if (job.cancel != nullptr && job.cancel->load()) return;
@@ -93,16 +75,25 @@ PartSummary merge_archives(const std::vector<std::string>& archives, const std::
       } catch (const Error& error) {
         failed[i] = error;
       }
+      const std::lock_guard lock(mutex);
+      job.report({"check", "archives", ++checked, static_cast<std::int64_t>(archives.size())});
     });
   });
   job.throw_if_cancelled();
-  Problems problems;
   for (std::size_t i = 0; i < archives.size(); ++i) {
     std::error_code none;
     if (failed[i]) problems.add(*failed[i]);
     if (std::filesystem::equivalent(archives[i], output, none))
-      problems.add(ErrorCode::kInvalidArgument, output + ": is the output and one of the archives to join");
+      problems.add(output + ": is the output and one of the archives to join");
   }
+  return readers;
+}
+
+PartSummary merge_archives(const std::vector<std::string>& archives, const std::string& output,
+                           const PartOptions& options, const Job& job) {
+  if (archives.empty()) throw Error(ErrorCode::kInvalidArgument, "there is no archive to join");
+  Problems problems;
+  const std::vector<std::unique_ptr<ArchiveReader>> readers = open_parts(archives, output, problems, job);
   problems.throw_if_any();
 
   std::vector<AssemblyInput> inputs;
@@ -110,14 +101,12 @@ PartSummary merge_archives(const std::vector<std::string>& archives, const std::
   for (const auto& reader : readers) {
     const std::string why = why_other_lattice(readers.front()->metadata(), reader->metadata());
     if (!why.empty()) {
-      problems.add(ErrorCode::kInvalidArgument,
-                   fmt::format("{}: {} as {} has", reader->path(), why, readers.front()->path()));
+      problems.add(fmt::format("{}: {} as {} has", reader->path(), why, readers.front()->path()));
     }
     inputs.push_back({reader.get(), tiles_here(reader->metadata())});
     origins.push_back(origin_of(*reader));
     if (origins.back().is_shard) {
-      problems.add(ErrorCode::kInvalidArgument,
-                   reader->path() + ": is a shard; name its plan first, isohf merge PLAN PART...");
+      problems.add(reader->path() + ": is a shard; name its plan first, isohf merge PLAN PART...");
     }
   }
   problems.throw_if_any();
@@ -127,8 +116,7 @@ PartSummary merge_archives(const std::vector<std::string>& archives, const std::
     all.end = {std::max(all.end.column, input.tiles.end.column), std::max(all.end.row, input.tiles.end.row)};
   }
   for (const TileRange& gap : gaps_in(all, inputs)) {
-    problems.add(ErrorCode::kInvalidArgument,
-                 fmt::format("tiles of {} are in none of the archives, which together reach over {}", text_of(gap),
+    problems.add(fmt::format("tiles of {} are in none of the archives, which together reach over {}", text_of(gap),
                              text_of(all)));
   }
   problems.throw_if_any();

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "isohf/convert/parts/assembly.h"
+#include "isohf/convert/parts/problems.h"
 #include "isohf/metadata.h"
 #include "isohf/parts.h"
 
@@ -24,6 +25,12 @@ struct PartOrigin {
   bool is_shard = false;
 };
 [[nodiscard]] PartOrigin origin_of(const ArchiveReader& archive);
+
+/// Opens archives that are to be joined, all of whose bytes are held against the CRC that they state; of those with a
+/// problem there is none. Stage "check".
+[[nodiscard]] std::vector<std::unique_ptr<ArchiveReader>> open_parts(const std::vector<std::string>& archives,
+                                                                     const std::string& output, Problems& problems,
+                                                                     const Job& job);
 
 /// What is joined, and what is said of it.
 struct PartsJob {

@@ -1,0 +1,285 @@
+#include "options/convert_setup.h"
+
+#include <fmt/format.h>
+#include <sys/resource.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <set>
+
+#include "formats/files/file_stamp.h"
+#include "formats/files/text.h"
+#include "interrupt.h"
+#include "isohf/archive.h"
+#include "isohf/archive/metadata/accuracy_info.h"
+#include "isohf/base/file.h"
+#include "isohf/base/output_file.h"
+#include "isohf/convert.h"
+#include "isohf/convert/frame/plan.h"
+#include "isohf/convert/job_description.h"
+#include "isohf/convert/memory_plan.h"
+#include "isohf/error.h"
+#include "isohf/raster.h"
+#include "isohf/resampling.h"
+#include "options/describe.h"
+#include "options/input_files.h"
+#include "options/option_values.h"
+#include "options/options_common.h"
+#include "options/options_ground.h"
+#include "options/options_lattice.h"
+#include "options/options_source.h"
+#include "options/options_texture.h"
+#include "options/source_inputs.h"
+#include "options/source_size.h"
+#include "output/accuracy_output.h"
+#include "output/json_output.h"
+#include "output/output_kinds.h"
+#include "output/plan_report.h"
+#include "output/standard_output.h"
+#include "output/void_counts_output.h"
+
+namespace isohf::cli {
+namespace {
+
+constexpr const char* kFooter =
+    R"(The archive is written as OUTPUT.part and renamed when it is complete; an interrupted run leaves the
+part for --resume and nothing under the final name. The bytes do not depend on --threads.
+
+Examples:
+  isohf convert dem.tif dem.isohf
+  isohf convert dem.tif -o dem.isohf --density 0.866 --outside void --overwrite
+  isohf convert dem.tif dem.isohf --texture orthophoto.tif
+  isohf convert N4*E00*.hgt alps.isohf               many inputs form one surface
+  isohf convert tiles/ -o land.isohf --require-complete
+  isohf convert heights.exr h.isohf --channel R --z-scale 1200 --sample-spacing 2
+  isohf plan dem.tif                  the same options without writing: see what comes out
+  isohf convert --each tiles/ --recursive --out-dir archives --keep-going    one archive of each
+  isohf convert --each tiles/ --recursive --out-dir archives --resume        goes on after an interrupt)";
+
+bool is_archive_name(const std::string& name) {
+  return lower_case(name).ends_with(".isohf");
+}
+
+/// The last name is the output where -o names none and it is called .isohf. Any other name is an input: a forgotten
+/// output must not cost the last of them.
+void take_output(std::vector<std::string> names, ConvertCommandOptions& options) {
+  std::vector<std::string>& inputs = options.inputs.names;
+  if (options.output.empty() && !names.empty() && inputs.size() + names.size() > 1) {
+    if (is_archive_name(names.back())) {
+      options.output = names.back();
+      names.pop_back();
+    } else if (!options.dry_run) {
+      throw Error(ErrorCode::kInvalidArgument,
+                  fmt::format("convert: no OUTPUT given: {0} is not called .isohf and counts as an input; name the "
+                              "archive NAME.isohf, or give -o {0} if that is meant",
+                              names.back()));
+    }
+  }
+  inputs.insert(inputs.end(), names.begin(), names.end());
+}
+
+/// What belongs to --each alone, and what has no meaning for many archives.
+void check_each_options(const CommandLine& line, const ConvertCommandOptions& options, bool is_plan) {
+  const auto refuse = [](const std::string& why) {
+    throw Error(ErrorCode::kInvalidArgument, {"convert", why, "", ""});
+  };
+  for (const char* option : {"--out-dir", "--skip-existing", "--keep-going"}) {
+    if (!options.each.each && line.given(option)) refuse(std::string(option) + " needs --each");
+  }
+  for (const char* option : {"--each", "--report"}) {
+    if (is_plan && line.given(option)) refuse(std::string(option) + " has no place in a plan");
+  }
+  if (!options.each.each) return;
+  if (options.each.folder.empty()) refuse("--each needs --out-dir DIR, where the archives go");
+  for (const char* option : {"--output", "--dry-run", "--source-name", "--report", "--overlap", "--require-complete"}) {
+    if (line.given(option)) refuse(fmt::format("{} is for one archive, --each makes many; leave one out", option));
+  }
+}
+
+}  // namespace
+
+/// What is packed shares the memory with what is read from it, and with the tiles.
+void share_memory(ConvertCommandOptions& options) {
+  if (options.work.memory_bytes == 0) return;
+  options.open.unpacked_bytes = std::min(options.open.unpacked_bytes, options.work.memory_bytes / 3);
+}
+
+std::optional<ConvertCommandOptions> parse_convert(const Arguments& arguments, ConvertLine kind) {
+  const bool is_plan = kind == ConvertLine::kPlan;
+  ConvertCommandOptions options;
+  bool no_planes = false;
+  std::optional<double> sun_min_deg;
+  std::vector<std::string> names;
+  CommandLine line(is_plan ? "plan" : "convert",
+                   "Turns rasters of elevations into an archive of isometric heightfield tiles.");
+  line.group("Arguments");
+  if (is_plan) {
+    line.positionals("INPUT...", "Rasters of elevations, as isohf convert takes them", names);
+    line.option("--write", "FILE", "The plan to write", options.plan);
+    line.option("--shards", "N", "Cut the work into N shards", [&](const std::string& text) {
+      options.shards = static_cast<int>(parse_whole_number(text, 1, 1000000));
+    });
+    line.flag("--overwrite", "Replace FILE where it exists", options.convert.overwrite);
+    line.repeated("-i,--input", "INPUT", "An input, before those without a name; may be given again",
+                  options.inputs.names);
+  } else {
+    line.positionals("INPUT... OUTPUT",
+                     "Rasters of elevations: files, folders, \"patterns*\" and @lists, which form one source; then the "
+                     "archive to write, NAME.isohf",
+                     names);
+    line.repeated("-i,--input", "INPUT", "An input, before those without a name; may be given again",
+                  options.inputs.names);
+    line.option("-o,--output", "OUTPUT", "The archive to write; then all others are inputs", options.output);
+    line.flag("--overwrite", "Replace OUTPUT where it exists", options.convert.overwrite);
+    line.flag("--resume", "Continue OUTPUT.part of an interrupted run, after checking what is there",
+              options.convert.resume);
+    line.flag("--dry-run", "Print the plan and write nothing, as isohf plan INPUT does", options.dry_run);
+    add_each_options(line, options.each);
+
+    line.option("--plan", "PLAN", "Take INPUT and all options from a plan of isohf plan --write", options.plan);
+    line.option("--shard", "K/N", "With --plan: make the Kth of its N shards",
+                [](const std::string&) { throw Error(ErrorCode::kInvalidArgument, "needs --plan PLAN"); });
+  }
+  add_source_options(line, options.open);
+  add_mosaic_options(line, options.inputs);
+  line.option("--source-name", "NAME",
+              "Record NAME as the source, instead of the input's file name or a mosaic's files", options.source_name);
+  add_lattice_options(line, options.convert.plan, options.spacing_in_metres);
+  add_ground_options(line, options.convert.plan.ground);
+  add_geoid_option(line, options.geoid);
+  add_shape_options(line, options.convert.plan);
+  add_quantisation_options(line, options.convert);
+  line.group("Reconstruction");
+  line.option(
+      "--filter", "NAME",
+      "nearest, bilinear, limited-cubic, catmull-rom, bspline2, bspline3, bspline5, lanczos3 or lanczos6 (default " +
+          to_string(kDefaultFilter) + ")",
+      [&](const std::string& text) { options.convert.filter = filter_from_string(text); });
+  line.words({"nearest", "bilinear", "limited-cubic", "catmull-rom", "bspline2", "bspline3", "bspline5", "lanczos3",
+              "lanczos6"});
+  line.option("--acquisition", "NAME",
+              "Account for how samples were taken: point, box, tent, gaussian:SIGMA or fir:FILE (default " +
+                  to_string(options.convert.acquisition) + ")",
+              [&](const std::string& text) { options.convert.acquisition = acquisition_from_string(text); });
+  line.words({"point", "box", "tent", "gaussian", "fir"});
+  line.group("Size and speed");
+  line.option("--level", "N",
+              fmt::format("Effort to make the archive small, {} to {} (default {}); the elevations are the same",
+                          kMinLevel, kMaxLevel, kDefaultLevel),
+              [&](const std::string& text) {
+                options.convert.level = static_cast<int>(parse_whole_number(text, kMinLevel, kMaxLevel));
+              });
+  line.flag("--no-planes", "Leave out the coarse planes, by which the archive is looked at from afar", no_planes);
+  line.group("Shadows");
+  line.option_or_numbers(
+      "--shadow-seeds", "[DEG,...]", "all",
+      "Store the shadows that tiles cast over their neighbours, so that none needs another: for every sun elevation "
+      "from --sun-min on, or for the given ones, as in 5,15,30",
+      [&](const std::string& text) {
+        options.convert.shadow_seeds.emplace();
+        if (text != "all") options.convert.shadow_seeds->sun_deg = parse_numbers(text);
+      });
+  line.option("--sun-min", "DEG", "Lowest sun elevation for --shadow-seeds (default 2); a lower one takes more room",
+              [&](const std::string& text) { sun_min_deg = parse_number(text); });
+  add_texture_options(line, options.texture);
+  line.group("Residuals");
+  line.flag("--lossless", "Keep residuals as well, so that restore gives INPUT's samples bit for bit",
+            options.convert.lossless);
+  line.group("Report");
+  line.option_or_value(
+      "--report", "[FILE.json|-]", "-", [](const std::string& text) { return text == "-" || text.ends_with(".json"); },
+      "Measure the archive against INPUT afterwards, and ortho meshes beside it; print it with the summary, and write "
+      "it to FILE.json as well",
+      [&](const std::string& text) { options.report = text; });
+  add_work_options(line, options.work);
+  add_memory_option(line, "Stay within SIZE of memory, to a tenth (default: as is fastest)", options.work.memory_bytes);
+  line.option("--tmpdir", "FOLDER", "Put the scratch file that --memory may need there (default: OUTPUT's folder)",
+              options.convert.scratch_folder);
+  add_common_options(line, options.common);
+  line.footer(kFooter);
+  if (!line.parse(arguments)) return std::nullopt;
+  check_each_options(line, options, is_plan);
+  if (options.each.each || is_plan) {
+    options.inputs.names.insert(options.inputs.names.end(), names.begin(), names.end());
+  } else {
+    take_output(std::move(names), options);
+  }
+  line.require("INPUT", options.inputs.names);
+  if (is_plan)
+    line.require("FILE (--write)", options.plan);
+  else if (!options.dry_run && !options.each.each)
+    line.require("OUTPUT", options.output);
+  if (options.convert.clamp_range && !options.convert.z_range) {
+    throw Error(ErrorCode::kInvalidArgument, "convert: --clamp-range needs --z-range MIN:MAX");
+  }
+  if (options.convert.max_error && options.dry_run) {
+    throw Error(ErrorCode::kInvalidArgument,
+                "convert: --dry-run cannot tell what --max-error will choose; leave one of the two out");
+  }
+  if (sun_min_deg) {
+    if (!options.convert.shadow_seeds || !options.convert.shadow_seeds->sun_deg.empty()) {
+      throw Error(ErrorCode::kInvalidArgument, "convert: --sun-min needs --shadow-seeds without angles");
+    }
+    options.convert.shadow_seeds->sun_min_deg = *sun_min_deg;
+  }
+  if (options.convert.lossless && !options.geoid.path.empty()) {
+    throw Error(ErrorCode::kInvalidArgument,
+                "convert: --lossless keeps the input's own samples, --geoid changes them; give one of the two");
+  }
+  options.convert.planes = !no_planes;
+  options.inputs.as_given = recorded_options(line);
+  check_texture_options(options.texture);
+  if (!line.given("--tmpdir")) {
+    options.convert.scratch_folder = options.each.each ? options.each.folder : folder_of(options.output);
+  }
+  share_memory(options);
+  options.convert.strict = options.common.strict;
+  return options;
+}
+
+namespace {
+
+/// Files beside the input that decide what is written.
+std::vector<std::string> files_beside(const ConvertCommandOptions& options) {
+  std::vector<std::string> files;
+  if (!options.geoid.path.empty()) files.push_back(options.geoid.path);
+  if (!options.convert.acquisition.path.empty()) files.push_back(options.convert.acquisition.path);
+  return files;
+}
+
+}  // namespace
+
+Prepared prepare(ConvertCommandOptions& options, std::vector<std::string> files) {
+  OpenedInputs opened = open_inputs(std::move(files), options.inputs, options.open, options.work.threads);
+  Prepared prepared{std::move(opened.files),
+                    laid_out(std::move(opened.source), options.geoid, options.convert.plan.ground), nullptr};
+  understand_ground(prepared.source->info(), options.convert.plan.ground);
+  options.input = prepared.source->info().path;
+  options.convert.source_note = opened.note;
+  for (const std::string& file : files_beside(options)) {
+    prepared.files.push_back(file);
+    options.convert.source_note.fingerprint += fmt::format(" | {} {}", file, FileStamp::of(file).text());
+  }
+  if (!options.source_name.empty()) {
+    options.convert.source_note.name = options.source_name;
+    options.convert.source_note.mosaic.reset();
+  }
+  prepared.photo = open_texture(options.texture, options.convert.texture);
+  check_spacing_unit(prepared.source->info(), options.convert.plan, options.spacing_in_metres);
+  return prepared;
+}
+
+std::uint64_t peak_memory_bytes() {
+  std::ifstream status("/proc/self/status");
+  for (std::string line; std::getline(status, line);) {
+    if (line.rfind("VmHWM:", 0) == 0) return std::strtoull(line.c_str() + 6, nullptr, 10) * 1024;
+  }
+  struct rusage usage {};
+  ::getrusage(RUSAGE_SELF, &usage);
+  return static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;
+}
+
+}  // namespace isohf::cli

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "commands/convert_each.h"
+#include "isohf/convert.h"
+#include "isohf/raster.h"
+#include "options/options_common.h"
+#include "options/options_ground.h"
+#include "options/options_source.h"
+#include "options/options_texture.h"
+#include "options/source_inputs.h"
+
+namespace isohf::cli {
+
+struct ConvertCommandOptions {
+  CommonOptions common;
+  WorkOptions work;
+  SourceInputs inputs;
+  std::string input;  ///< what messages and reports call them: the file, or "mosaic of 12 files"
+  std::string output;
+  std::string source_name;
+  OpenOptions open;
+  TextureOptions texture;
+  ConvertOptions convert;
+  GeoidRequest geoid;
+  bool spacing_in_metres = false;
+  bool dry_run = false;
+  int shards = 1;  ///< of plan --write
+  std::string plan;
+  EachOptions each;
+  /// Measure the archive against the input; the file for the report, "-" for none beside the summary.
+  std::optional<std::string> report;
+};
+
+/// Whose line it is: convert's, or that of plan --write, whose names are all inputs.
+enum class ConvertLine { kConvert, kPlan };
+/// nullopt: help was printed. Throws Error{kInvalidArgument}.
+[[nodiscard]] std::optional<ConvertCommandOptions> parse_convert(const Arguments& arguments, ConvertLine kind);
+/// What is packed shares the memory with what is read from it, and with the tiles.
+void share_memory(ConvertCommandOptions& options);
+
+/// A source, and what is read beside it.
+struct Prepared {
+  std::vector<std::string> files;
+  std::unique_ptr<HeightSource> source;
+  std::unique_ptr<PhotoSource> photo;
+};
+
+/// Opens the inputs and completes the options by them.
+[[nodiscard]] Prepared prepare(ConvertCommandOptions& options, std::vector<std::string> files);
+
+/// The largest resident set so far. getrusage() would also count the program that started this one.
+[[nodiscard]] std::uint64_t peak_memory_bytes();
+
+}  // namespace isohf::cli
