@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Reads an isohf archive by archive_format.md, with nothing but Python's standard library: checks every member and the content
-hash and, where it was made with --lossless, brings back the source's samples. usage: reader.py ARCHIVE [SAMPLES]: prints the
+"""Reads an isohf archive by archive_format.md, with nothing but Python's standard library: checks every member, the content
+hash, coarse planes, shadow seeds and textures and, where it was made with --lossless, brings back the source's samples. usage: reader.py ARCHIVE [SAMPLES]: prints the
 hashes; SAMPLES: writes the source's samples there, little-endian, row by row."""
 
 import hashlib
@@ -51,6 +51,22 @@ def symbols_of(payload, at, count, is_paired):
         at += 1 if payload[at] < 225 else 3
     require(len(symbols) >= count and (len(symbols) == count or symbols.pop() == 0), "symbols are missing or left over")
     return symbols, at if is_paired else at + count
+
+
+def neighbours_of(v, near, far, farther, p, s):
+    """W, NW, WW, …, NNWWW, in the order of the weights."""
+    return [v[p - 1], near[p + s - 1], v[p - 2], near[p + s + 1], near[p + s - 2], far[p], far[p + 1], far[p - 1],
+            far[p + 2], far[p - 2], farther[p + s], farther[p + s - 1], farther[p + s + 1], farther[p + s - 2],
+            near[p + s + 2], near[p + s - 3], far[p + 3], far[p - 3]]
+
+
+def energy_above(n, f, p, s):
+    return (4 * (n[p + s] + n[p + s - 1] + f[p]) + 3 * n[p + s + 1] + n[p + s - 3] + f[p + 2] + f[p - 2]
+            + 2 * (n[p + s + 2] + n[p + s - 2] + f[p + 1] + f[p - 1]))
+
+
+def unzigzag(folded):
+    return folded // 2 if folded % 2 == 0 else -(folded + 1) // 2
 
 
 def decode(payload, columns, rows, kind):
@@ -110,8 +126,7 @@ def decode(payload, columns, rows, kind):
         return folded
 
     def restore(halves, folded):
-        difference = folded // 2 if folded % 2 == 0 else -(folded + 1) // 2
-        prediction = (halves + 1) >> 1
+        difference, prediction = unzigzag(folded), (halves + 1) >> 1
         value = (prediction + difference if halves % 2 else prediction - difference) % modulus
         value -= modulus if kind == 2 and value >= modulus // 2 else 0
         require(low <= value <= high, "a sample outside low … high")
@@ -136,14 +151,9 @@ def decode(payload, columns, rows, kind):
                 v[p], g[p] = (v[p - 1] + ne) >> 1, 0
                 continue
             w = FIXED.get(r) or weights[block_map[r // 16 * across + p // 16] if blocks else 0]
-            neighbours = [v[p - 1], near[p + s - 1], v[p - 2], near[p + s + 1], near[p + s - 2], far[p], far[p + 1],
-                          far[p - 1], far[p + 2], far[p - 2], farther[p + s], farther[p + s - 1], farther[p + s + 1],
-                          farther[p + s - 2], near[p + s + 2], near[p + s - 3], far[p + 3], far[p - 3]]
-            total = sum(a * (b - ne) for a, b in zip(w, neighbours))
+            total = sum(a * (b - ne) for a, b in zip(w, neighbours_of(v, near, far, farther, p, s)))
             halves = min(max((4096 * ne + total) >> 11, 2 * low), 2 * high - 1)
-            folded = residual(4 * (n[p + s] + n[p + s - 1] + f[p]) + 3 * n[p + s + 1]
-                              + 2 * (n[p + s + 2] + n[p + s - 2] + f[p + 1] + f[p - 1])
-                              + n[p + s - 3] + f[p + 2] + f[p - 2])
+            folded = residual(energy_above(n, f, p, s))
             out[r * columns + column[p]] = v[p] = restore(halves, folded)
             g[p] = min(folded >> shift, 157)
         for c, p in (() if s else ((1, 1), (columns - 2, columns - 3))):
@@ -276,7 +286,7 @@ def decode_adaptive(payload, columns, rows, kind):
         else:
             bits = extra.take(5)
             zigzagged = (1 << bits | extra.take(bits)) - 1
-        difference = zigzagged // 2 if zigzagged % 2 == 0 else -(zigzagged + 1) // 2
+        difference = unzigzag(zigzagged)
         value = (code - difference if above else code + difference) % 65536
         require(low <= value <= high, "a sample outside low … high")
         return value
@@ -306,17 +316,9 @@ def decode_adaptive(payload, columns, rows, kind):
                     v[p], d[p] = (v[p - 1] + ne) >> 1, 0
                 else:
                     w = FIXED.get(r) or weights
-                    neighbours = [v[p - 1], near[p + s - 1], v[p - 2], near[p + s + 1], near[p + s - 2], far[p],
-                                  far[p + 1], far[p - 1], far[p + 2], far[p - 2], farther[p + s], farther[p + s - 1],
-                                  farther[p + s + 1], farther[p + s - 2], near[p + s + 2], near[p + s - 3], far[p + 3],
-                                  far[p - 3]] if len(w) > 12 else [v[p - 1], near[p + s - 1], v[p - 2], near[p + s + 1],
-                                  near[p + s - 2], far[p], far[p + 1], far[p - 1], far[p + 2], far[p - 2],
-                                  farther[p + s], farther[p + s - 1]]
-                    total = 4096 * ne + sum(a * (b - ne) for a, b in zip(w, neighbours))
+                    total = 4096 * ne + sum(a * (b - ne) for a, b in zip(w, neighbours_of(v, near, far, farther, p, s)))
                     eighths = min(max(total >> 9, 8 * low), 8 * high)
-                    energy = (4 * (n[p + s] + n[p + s - 1] + f[p]) + 3 * n[p + s + 1]
-                              + 2 * (n[p + s + 2] + n[p + s - 2] + f[p + 1] + f[p - 1])
-                              + n[p + s - 3] + f[p + 2] + f[p - 2] + 6 * d[p - 1] + 3 * d[p - 2])
+                    energy = energy_above(n, f, p, s) + 6 * d[p - 1] + 3 * d[p - 2]
                     pattern = (27 * compared(v[p - 1], ne) + 9 * compared(near[p + s - 1], ne)
                                + 3 * compared(near[p + s + 1], ne) + compared(near[p + s - 2], ne))
                     v[p] = take(r - top, eighths, energy, pattern)
@@ -546,11 +548,90 @@ def restored(member, predicted, record):
             require(folded is not None, "a stream ends early")
             widths[c] = folded.bit_length()
             guess = key_of_guess((elevation - record["z_offset"]) / record["z_scale"], kind)
-            code = (guess + (folded // 2 if folded % 2 == 0 else -(folded + 1) // 2)) % modulus
+            code = (guess + unzigzag(folded)) % modulus
             code = code if kind not in "efd" else code ^ sign if code & sign else code ^ modulus - 1
         out += code.to_bytes(size, "little")
     require(all(next(stream, None) is None for stream in streams), "residuals or kept samples are left over")
     return bytes(out)
+
+
+# ---- Shadow seeds and textures, sections 8 and 9 --------------------------------------------------------------------
+
+
+def shadow_seeds(payload, columns, rows, kind, angles, edges):
+    """Of both directions and each row the casters (distance, height), or of each angle the height of S, None for the edge's own;
+    heights as integers."""
+    require(struct.unpack_from("<BBBBHH", payload) == (1, angles > 0, kind, 0, rows - 2, angles), "a seed's header")
+    counts, at = struct.unpack_from("<%dI" % (1 if angles else 5), payload, 8), 8 + (4 if angles else 20)
+    (extra_bytes,), at, symbols = struct.unpack_from("<I", payload, at), at + 4, []
+    for count in counts:
+        symbols.append(iter(payload[at : at + count]))
+        at += count
+    extra, across = Bits(payload[at:]), 2 * (columns - 4)
+    require(len(payload) == at + extra_bytes, "bytes behind a seed's end")
+
+    def number(stream):
+        symbol = next(symbols[stream], 255)
+        require(symbol < 240, "a seed's stream ends early")
+        x = (symbol - 16) // 8 + 1 if symbol >= 16 else 0
+        return symbol if symbol < 16 else ((8 + (symbol & 7)) << x) + extra.take(x)
+
+    def wrapped(value):
+        return (value + 2**31) % 2**32 - 2**31
+
+    found, rise = {}, 0
+    for direction in (0, 1):
+        for angle in range(angles):
+            for r in range(1, rows - 1):
+                rise = (rise + unzigzag(number(0))) % 2**32
+                found[direction, angle, r] = wrapped(edges[direction][r] + rise) if rise else None
+        above = []
+        for r in range(1, rows - 1) if not angles else ():
+            near = [((d + 1) // 2 if r % 2 else d // across * (columns - 3) + (d % across + 1) // 2, h) for d, h in above]
+            n, h, p, above = 0, edges[direction][r], 0, []
+            for _ in range(len(near) + unzigzag(number(0))):
+                while p < len(near) and near[p][0] <= n:
+                    p += 1
+                base, before = near[p][0] if p < len(near) else n + 1, n
+                n = base + unzigzag(number(1))
+                require(n > before, "casters out of order")
+                if p == len(near) or abs(n - base) > 6:
+                    h = wrapped(h + number(4))
+                else:
+                    h = wrapped(near[p][1] + unzigzag(number(2 if abs(n - base) <= 1 else 3)))
+                q, m = divmod(n, columns - 3)
+                above.append((2 * n if r % 2 else across * q + (2 * m - 1 if m else 0), h))
+                p += p < len(near) and n - base >= -2
+            found[direction, 0, r] = above
+    require(all(next(stream, None) is None for stream in symbols) and extra.number >> extra.at == 0, "a seed keeps symbols")
+    return found
+
+
+def picture(data, kind, size, channels):
+    """The rows of a PNG as bytes; of a JPEG none, but its size is looked at."""
+    if kind == "jpeg":
+        at = 2
+        while data[at + 1] not in (0xC0, 0xC1):
+            at += 2 + struct.unpack_from(">H", data, at + 2)[0]
+        require(struct.unpack_from(">HHB", data, at + 5) == (size, size, channels), "a picture of another size")
+        return None
+    require(struct.unpack_from(">IIBB", data, 16) == (size, size, 8, {1: 0, 3: 2, 4: 6}[channels]), "a picture of another kind")
+    at, packed = 8, b""
+    while at < len(data):
+        length, name = struct.unpack_from(">I4s", data, at)
+        packed += data[at + 8 : at + 8 + length] if name == b"IDAT" else b""
+        at += 12 + length
+    raw, above, rows = zlib.decompress(packed), bytes(size * channels), []
+    for y in range(size):
+        method, line, row = raw[y * (size * channels + 1)], raw[y * (size * channels + 1) + 1 :][: size * channels], bytearray()
+        for i, byte in enumerate(line):
+            a, c = (row[i - channels], above[i - channels]) if i >= channels else (0, 0)
+            b = above[i]
+            paeth = min((abs(b - c), 0, a), (abs(a - c), 1, b), (abs(a + b - 2 * c), 2, c))[2]
+            row.append((byte + (0, a, b, (a + b) // 2, paeth)[method]) % 256)
+        rows.append(bytes(row))
+        above = row
+    return rows
 
 
 # ---- The archive, sections 1 to 4 and 6 -----------------------------------------------------------------------------
@@ -712,6 +793,104 @@ class Archive:
             self.dropped.append(dropped)
         require(sum(name.startswith("tiles/") for name in self.members) == self.grid["stored"], "another number of tiles")
 
+    def height(self, tile, c, r):
+        """A vertex as an integer of section 5 with d = 0, None where void."""
+        v, d = self.tiles[tile][c + r * self.shape["columns"]], self.dropped[tile]
+        return v if v is None else v << d if v >= 0 else ((v + 1) << d) - 1
+
+    def check_planes(self):
+        """Each tile of each plane against the tiles, by the three rules."""
+        columns, rows, across, down = *(self.shape[n] for n in ("columns", "rows")), *(self.grid[n] for n in ("columns", "rows"))
+        planes, names = self.metadata.get("planes") or {"stride": 1, "count": 0}, set()
+        wide, high = 2 * (columns - 4), rows - 3
+        reach = 2 ** max(self.shape["levels"] - 1, planes["stride"].bit_length() - 1)
+        for plane in range(1, planes["count"] + 1):
+            F = planes["stride"] ** plane
+            joined = self.metadata.get("wraps_x") and across % F == 0
+            for j, i in ((j, i) for j in range(-(-down // F)) for i in range(-(-across // F))):
+                expected = []
+                for r in range(rows):
+                    for c in range(columns):
+                        x = 2 * (c - 1) - (r % 2 == 0 and c > 1) - (r % 2 == 0 and c == columns - 2) + (r % 2 == 0 and c == 0)
+                        X, Z = i * wide + x, j * high + r - 1
+                        if (not joined and F * (X - 2 * reach) > wide * across) or F * (Z - reach) > high * down:
+                            expected.append(None)
+                            continue
+                        X, Z = F * X, min(max(F * Z, 0), high * down)
+                        X += wide * across * ((X < 0) - (X > wide * across)) if joined else 0
+                        X = min(max(X, 0), wide * across)
+                        a, b = min(X // wide, across - 1), min(Z // high, down - 1)
+                        expected.append(self.height(b * across + a, (X - a * wide) // 2 + 1, Z - b * high + 1))
+                name, found = "planes/%d/%d/%d.tile" % (plane, j, i), [None] * (columns * rows)
+                names.add(name)
+                if name in self.members:
+                    found, d = decode(self.member(name), columns, rows, self.kind)
+                    found = [v if v is None else v << d if v >= 0 else ((v + 1) << d) - 1 for v in found]
+                require(found == expected and (name in self.members) == any(v is not None for v in found),
+                        name + " is not that of the tiles below")
+        require(all(name in names for name in self.members if name.startswith("planes/")), "no plane's tile")
+
+    def check_seeds(self):
+        """What seeds say enters each tile against what the tiles before it send."""
+        info, columns, rows = self.metadata["shadow_seeds"], self.shape["columns"], self.shape["rows"]
+        suns = info["sun_deg"] if info["kind"] == "angles" else [info["sun_min_deg"] * (1 - k / 3) + 30 * k for k in range(3)]
+        angles = len(suns) if info["kind"] == "angles" else 0
+        unit = self.metadata["extent"]["x"] / (2 * (columns - 4)) * info["elevation_units_per_world_unit"]
+        falls = [math.tan(math.radians(sun)) * unit / (1 if self.kind == 2 else self.metadata["samples"]["scale"]) for sun in suns]
+
+        def number(v):
+            if v is None or self.kind < 2:
+                return v
+            return struct.unpack("<f", struct.pack("<I", v if v >= 0 else (-v - 1) | 1 << 31))[0]
+
+        none, wide, seen = -1 if self.kind < 2 else -0x7F800001, 2 * (columns - 4), 0
+        last = lambda r: columns - 3 if r % 2 else columns - 2
+        for j, direction in ((j, d) for j in range(self.grid["rows"]) for d in (0, 1)):
+            entering = {(k, r): -math.inf for k in range(len(suns)) for r in range(1, rows - 1)}
+            order = range(self.grid["columns"])
+            for i in order if direction == 0 else reversed(order):
+                tile, name = j * self.grid["columns"] + i, "seeds/%d/%d.seed" % (j, i)
+                edges = [[none] + [none if (v := self.height(tile, 1 if way == 0 else last(r), r)) is None else v
+                                   for r in range(1, rows - 1)] for way in (0, 1)]
+                found = None
+                if name in self.members:
+                    seen += direction
+                    found = shadow_seeds(self.member(name), columns, rows, self.kind, angles, edges)
+                for (k, r), s in entering.items():
+                    edge = number(edges[direction][r])
+                    stated = [edge]
+                    if found and angles and found[direction, k, r] is not None:
+                        stated.append(number(found[direction, k, r]))
+                    elif found and not angles:
+                        stated += [number(h) - d * falls[k] for d, h in found[direction, 0, r]]
+                    slack = (0.5 if angles and self.kind < 2 else 0) + 1e-6 * max(1, abs(s) if s > -math.inf else 0)
+                    if "tiles/%d/%d.tile" % (j, i) in self.members:
+                        require(max(s, edge) == max(stated) or abs(max(s, edge) - max(stated)) <= slack,
+                                name + " is not what the tiles of its row send")
+                    heights = (self.height(tile, c, r) for c in range(1, last(r) + 1))
+                    xs = (min(max(2 * c - 2 - (r % 2 == 0), 0), wide - (r % 2 == 0 and c < last(r))) for c in range(1, last(r) + 1))
+                    left = [number(h) - (wide - x if direction == 0 else x) * falls[k] for x, h in zip(xs, heights) if h is not None]
+                    entering[k, r] = max([s - wide * falls[k]] + left)
+        require(seen == info["members"] == sum(name.startswith("seeds/") for name in self.members), "another number of seeds")
+
+    def check_textures(self):
+        """All levels or none of each tile, and texels on common edges."""
+        info, borders, count = self.metadata["tile_textures"], {}, 0
+        for j, i in ((j, i) for j in range(self.grid["rows"]) for i in range(self.grid["columns"])):
+            sizes = [info["size"] >> level for level in range(info["levels"])]
+            names = ["textures/%d/%d/%d.%s" % (j, i, size, "jpg" if info["format"] == "jpeg" else "png") for size in sizes]
+            there = [name in self.members for name in names]
+            require(all(there) or not any(there), "a tile has some of its texture's levels")
+            count += sum(there)
+            for size, name in zip(sizes, names) if all(there) else ():
+                rows, n = picture(self.member(name), info["format"], size, info["channels"]), info["channels"]
+                if rows:
+                    west, east = (b"".join(row[at : at + n] for row in rows) for at in (0, (size - 1) * n))
+                    borders[j, i, size] = (rows[-1], east)
+                    require(borders.get((j - 1, i, size), (rows[0], 0))[0] == rows[0]
+                            and borders.get((j, i - 1, size), (0, west))[1] == west, name + " has other texels on a common edge")
+        require(count == info["members"] == sum(name.startswith("textures/") for name in self.members), "other textures")
+
     def codes(self, tile):
         """A tile's codes; of f32 the bits."""
         values, d = self.tiles[tile], self.dropped[tile]
@@ -801,6 +980,11 @@ def main(path, samples=None):
     require(archive.content_hash() == archive.metadata["content_sha256"], "another content hash")
     if archive.metadata["version"] == 2:
         require(archive.ground_hash() == archive.metadata["ground_sha256"], "another ground hash")
+    archive.check_planes()
+    if "shadow_seeds" in archive.metadata:
+        archive.check_seeds()
+    if "tile_textures" in archive.metadata:
+        archive.check_textures()
     print("content", archive.metadata["content_sha256"])
     if "lossless" in archive.metadata:
         found = archive.source_samples()

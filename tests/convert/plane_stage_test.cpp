@@ -170,6 +170,20 @@ TEST(PlaneStage, VerifyFindsWhatIsNotThatOfTheTilesBelow) {
   }
 }
 
+TEST(PlaneStage, VerifyFindsARangeThatIsNotThatOfAllBelow) {
+  const test::TemporaryFolder folder;
+  Hills source;
+  (void)convert(source, folder / "a.isohf", options_of());
+  const TileEntry entry = ArchiveReader(folder / "a.isohf").tile_entry({1, 0}, 1);
+  for (const auto& [low, high] :
+       {std::pair{entry.code_min + 1, entry.code_max}, {entry.code_min, entry.code_max - 1}}) {
+    test::AlteredArchive altered(folder / "a.isohf");
+    altered.ranges["planes/1/0/1.tile"] = {low, high};
+    altered.write(folder / "b.isohf");
+    EXPECT_EQ(findings_in(folder / "b.isohf"), std::set<int>{finding::kPlaneRange});
+  }
+}
+
 /// Counts what is read of a file.
 class CountedFile : public ByteSource {
  public:

@@ -20,15 +20,14 @@ def run(*command):
 
 
 def findings(verified):
-    """What verify finds but that there is no index, as where another tool packed the archive: its ranges are then unknown."""
-    expected = ("ISOHF-0002 ", "ISOHF-0004 ", "ISOHF-0015 error: index and ZIP directory do not agree")
-    return [line for line in verified.stdout.splitlines() if line.startswith("ISOHF-") and not line.startswith(expected)]
+    """What verify finds but that there is no index, as where another tool packed the archive."""
+    return [line for line in verified.stdout.splitlines() if line.startswith("ISOHF-") and not line.startswith("ISOHF-0002 ")]
 
 
 for name, hashes in manifest["good"].items():
     path = folder / "good" / (name + ".isohf")
     verified, read = run(isohf, "verify", path), run(sys.executable, root / "docs" / "reader.py", path)
-    if verified.returncode != 0 if name != "repacked" else findings(verified):
+    if findings(verified) or (name == "repacked") != (verified.returncode != 0):
         failures.append("%s: verify: %s%s" % (name, verified.stdout, verified.stderr))
     wanted = ["content " + hashes["content_sha256"]]
     wanted += ["samples " + hashes["samples_sha256"]] if "samples_sha256" in hashes else []

@@ -6,6 +6,7 @@
 #include <cstring>
 #include <span>
 #include <stdexcept>
+#include <tuple>
 
 #include "isohf/archive/archive_index_builder.h"
 #include "isohf/archive/container/archive_directory.h"
@@ -144,6 +145,9 @@ void AlteredArchive::write_now(const std::string& path) const {
       const TileEntry entry = was.tile_entry(tile->tile, tile->plane);
       record.code_min = entry.code_min;
       record.code_max = entry.code_max;
+      if (const auto range = ranges.find(member.name); range != ranges.end()) {
+        std::tie(record.code_min, record.code_max) = range->second;
+      }
       record.has_voids = entry.has_voids;
       record.digest = was.tile_digest(tile->tile, tile->plane).value_or(Digest{});
     }

@@ -2,9 +2,11 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace isohf::test {
@@ -16,6 +18,8 @@ class AlteredArchive {
   explicit AlteredArchive(const std::string& path);
 
   nlohmann::json metadata;
+  std::map<std::string, std::pair<std::uint32_t, std::uint32_t>>
+      ranges;                                 ///< of codes, instead of the index's; not of version 1
   std::optional<std::uint64_t> stored_count;  ///< what the index's footer says, instead of the truth; of version 1
 
   [[nodiscard]] std::vector<std::string> names() const;

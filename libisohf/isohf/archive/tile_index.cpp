@@ -56,4 +56,17 @@ std::optional<IndexFooter> parse_index_footer(std::span<const std::byte> bytes) 
   return footer;
 }
 
+void set_unknown_range(const Quantisation& quantisation, TileEntry& entry) {
+  const bool is_float = quantisation.type == CodeType::kF32;
+  entry.has_voids = true;
+  entry.code_min = is_float ? 0xff800000U : 0U;
+  entry.code_max = is_float ? 0x7f800000U : quantisation.max_code();
+}
+
+bool has_unknown_range(const Quantisation& quantisation, const TileEntry& entry) {
+  TileEntry unknown = entry;
+  set_unknown_range(quantisation, unknown);
+  return entry.has_voids && entry.code_min == unknown.code_min && entry.code_max == unknown.code_max;
+}
+
 }  // namespace isohf

@@ -33,4 +33,8 @@ struct IndexFooter {
 /// nullopt where there is no valid footer of a known version.
 [[nodiscard]] std::optional<IndexFooter> parse_index_footer(std::span<const std::byte> footer);
 
+/// What no index says and nobody knows without decoding, as of repacked archives: voids, and the widest range.
+void set_unknown_range(const Quantisation& quantisation, TileEntry& entry);
+[[nodiscard]] bool has_unknown_range(const Quantisation& quantisation, const TileEntry& entry);
+
 }  // namespace isohf

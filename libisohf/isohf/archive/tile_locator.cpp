@@ -91,7 +91,6 @@ void TileLocator::use_directory() {
   data_end_ = end_.directory_offset;
   const ArchiveDirectory directory =
       read_directory(file_, end_, grids_, [](const std::string& what) { throw Error(ErrorCode::kCorrupt, what); });
-  const bool is_float = metadata_.quantisation.type == CodeType::kF32;
   for (const ArchiveDirectory::Tile& tile : directory.tiles) {
     if (tile.entry.method != ZipMethod::kStored && tile.entry.method != ZipMethod::kDeflated) {
       throw Error(ErrorCode::kUnsupported, fmt::format("{}: compression method {}, only 0 and 8 are read",
@@ -103,9 +102,7 @@ void TileLocator::use_directory() {
     entry.compressed_bytes = static_cast<std::uint32_t>(tile.entry.compressed_bytes);
     entry.payload_bytes = static_cast<std::uint32_t>(tile.entry.bytes);
     entry.payload_crc32 = tile.entry.crc32;
-    entry.has_voids = true;  // what is not known without decoding: the widest range
-    entry.code_min = is_float ? 0xff800000U : 0U;
-    entry.code_max = is_float ? 0x7f800000U : metadata_.quantisation.max_code();
+    set_unknown_range(metadata_.quantisation, entry);
     listed_.push_back({tile.plane, tile.flat, entry, tile.entry.method == ZipMethod::kDeflated});
   }
   take_ranges_from_index(directory);
