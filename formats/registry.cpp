@@ -14,6 +14,7 @@
 #include "formats/files/file_stamp.h"
 #include "formats/files/raw_file.h"
 #include "formats/files/text.h"
+#include "formats/georeference/reference_system.h"
 #include "formats/readers.h"
 #include "isohf/base/file.h"
 #include "isohf/error.h"
@@ -227,6 +228,37 @@ class UnchangedSource final : public HeightSource {
   FileStamp stamp_;
 };
 
+/// A raster whose coordinates are in the system that the user names.
+class PlacedSource final : public HeightSource {
+ public:
+  PlacedSource(std::unique_ptr<HeightSource> source, const std::string& system)
+      : source_(std::move(source)), info_(source_->info()) {
+    const Georeference& place = info_.georeference;
+    if (!place.has_origin && place.unit == HorizontalUnit::kUnknown && place.spacing_x == 1.0 &&
+        place.spacing_y == 1.0) {
+      throw Error(
+          ErrorCode::kInvalidArgument,
+          info_.path + ": has no coordinates that `reference_system` could be about; a world file gives it some");
+    }
+    try {
+      take_system(system, info_);
+    } catch (const Error& error) {
+      throw error.within(info_.path);
+    }
+  }
+
+  [[nodiscard]] const SourceInfo& info() const override { return info_; }
+  void read_window(const Window& window, std::span<std::byte> samples) override {
+    source_->read_window(window, samples);
+  }
+  void limit_buffers(std::uint64_t bytes) override { source_->limit_buffers(bytes); }
+  [[nodiscard]] std::uint64_t buffer_bytes(std::uint64_t limit) const override { return source_->buffer_bytes(limit); }
+
+ private:
+  std::unique_ptr<HeightSource> source_;
+  SourceInfo info_;
+};
+
 std::unique_ptr<HeightSource> open_by_head(const std::string& path, const OpenOptions& options) {
   const Head head = read_head(path);
   if (options.raw) return open_raw(path, options);
@@ -253,6 +285,9 @@ std::unique_ptr<HeightSource> open_raster(const std::string& path, const OpenOpt
     const std::string& samples = source->info().path;
     const FileStamp stamp = samples == path ? named : FileStamp::of(samples);
     require_unchanged(path, named);
+    if (!options.reference_system.empty()) {
+      source = std::make_unique<PlacedSource>(std::move(source), options.reference_system);
+    }
     check_numbers(source->info());
     return std::make_unique<UnchangedSource>(std::move(source), stamp);
   } catch (const Error& error) {

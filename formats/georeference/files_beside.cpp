@@ -21,6 +21,7 @@
 
 #include "formats/files/raw_file.h"
 #include "formats/files/text.h"
+#include "formats/georeference/reference_system.h"
 #include "formats/georeference/wkt.h"
 #include "formats/tiff/gdal_tags.h"
 #include "isohf/error.h"
@@ -170,6 +171,10 @@ void place_by_transform(const std::string& path, const std::string& text, Georef
 
 }  // namespace
 
+std::string world_file_name(const std::string& raster_path) {
+  return std::filesystem::path(raster_path).replace_extension(world_extensions(raster_path).front()).string();
+}
+
 std::optional<WorldFile> world_file_beside(const std::string& raster_path) {
   for (const std::string& extension : spellings(world_extensions(raster_path))) {
     const std::filesystem::path path = std::filesystem::path(raster_path).replace_extension(extension);
@@ -232,7 +237,11 @@ void read_auxiliary_metadata(SourceInfo& info, int band) {
     place_by_transform(path, transform, place);
   }
   if (const std::string system = text("SRS"); !has_reference_system(place) && !system.empty()) {
-    (void)read_wkt(system, place);
+    try {
+      if (!read_wkt(system, info)) take_system(system, info);  // GDAL takes a code as well
+    } catch (const Error& failure) {
+      throw failure.within(path);
+    }
   }
   if (place.registration == Registration::kUnknown) {
     const std::string kind = text("AREA_OR_POINT");
@@ -253,7 +262,11 @@ void read_auxiliary_metadata(SourceInfo& info, int band) {
 
 void read_prj_beside(SourceInfo& info) {
   const std::string text = prj_beside(info.path);
-  if (!text.empty() && read_prj(text, info.georeference)) return;
+  try {
+    if (!text.empty() && read_prj(text, info)) return;
+  } catch (const Error& error) {
+    throw error.within(info.path);
+  }
   if (!text.empty()) {
     info.warnings.push_back(loss("the .prj beside the file is not the WKT of a map's reference system; it is ignored"));
   }

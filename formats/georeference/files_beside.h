@@ -24,6 +24,9 @@ struct WorldFile {
 /// where it rotates the raster.
 [[nodiscard]] std::optional<WorldFile> world_file_beside(const std::string& raster_path);
 
+/// The commonest name of a world file beside a raster: raster.pgw beside raster.png.
+[[nodiscard]] std::string world_file_name(const std::string& raster_path);
+
 /// The text of raster.prj (or .PRJ) beside raster.tif; empty where none is. At most 64 KiB.
 [[nodiscard]] std::string prj_beside(const std::string& raster_path);
 

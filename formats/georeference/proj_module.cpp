@@ -1,10 +1,12 @@
 #include "formats/georeference/proj_module.h"
 
 #include <proj.h>
+#include <proj_experimental.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <exception>
 #include <limits>
@@ -56,7 +58,7 @@ struct IsohfProjSystem {
   Object system;      ///< all of it
   Object horizontal;  ///< its horizontal part
   Object to_geo;      ///< horizontal -> its own longitudes and latitudes, East before North
-  std::string wkt;
+  std::string wkt[ISOHF_WKTS];
   double degrees_per_unit = 1.0;  ///< of those longitudes and latitudes
   double prime_meridian_deg = 0.0;
   mutable std::mutex mutex;
@@ -135,6 +137,25 @@ double unit_of(PJ_CONTEXT* context, const PJ* system) {
   return unit[0];
 }
 
+void describe_heights(PJ_CONTEXT* context, const PJ* system, IsohfProjInfo& info) {
+  if (proj_get_type(system) != PJ_TYPE_COMPOUND_CRS) return;
+  const Object vertical(proj_crs_get_sub_crs(context, system, 1));
+  const Object axes(vertical ? proj_crs_get_coordinate_system(context, vertical.get()) : nullptr);
+  const char* direction = nullptr;
+  const char* unit = nullptr;
+  if (!axes || proj_cs_get_axis_info(context, axes.get(), 0, nullptr, nullptr, &direction,
+                                     &info.metres_per_vertical_unit, &unit, nullptr, nullptr) == 0) {
+    return;
+  }
+  isohf::put_text(info.vertical_name, proj_get_name(vertical.get()));
+  isohf::put_text(info.vertical_unit, unit);
+  if (std::string(direction) == "down") info.metres_per_vertical_unit *= -1.0;
+  const char* const authority = proj_get_id_auth_name(vertical.get(), 0);
+  if (authority != nullptr && std::string(authority) == "EPSG") {
+    info.vertical_epsg = std::atoi(proj_get_id_code(vertical.get(), 0));
+  }
+}
+
 void describe(IsohfProjSystem& system, IsohfProjInfo& info) {
   PJ_CONTEXT* const context = system.context.get();
   const PJ* const part = system.horizontal.get();
@@ -162,20 +183,24 @@ void describe(IsohfProjSystem& system, IsohfProjInfo& info) {
   double longitude = 0.0;
   double radians = 0.0;
   if (meridian) proj_prime_meridian_get_parameters(context, meridian.get(), &longitude, &radians, nullptr);
-  system.prime_meridian_deg = longitude * radians * kDegreesPerRadian;
+  info.prime_meridian_deg = system.prime_meridian_deg = longitude * radians * kDegreesPerRadian;
   system.degrees_per_unit = unit_of(context, geographic.get()) * kDegreesPerRadian;
 
   const Object operation(proj_create_crs_to_crs_from_pj(context, part, geographic.get(), nullptr, nullptr));
   if (operation) system.to_geo.reset(proj_normalize_for_visualization(context, operation.get()));
   if (!system.to_geo) refuse("has no way to longitudes and latitudes that PROJ knows");
 
+  describe_heights(context, system.system.get(), info);
   const char* const one_line[] = {"MULTILINE=NO", nullptr};
-  const char* const wkt = proj_as_wkt(context, system.system.get(), PJ_WKT2_2019, one_line);
-  system.wkt = wkt != nullptr ? wkt : "";
-  info.wkt_bytes = system.wkt.size() + 1;
+  constexpr PJ_WKT_TYPE kDialects[ISOHF_WKTS] = {PJ_WKT2_2019, PJ_WKT1_GDAL, PJ_WKT1_ESRI};
+  for (int dialect = 0; dialect < ISOHF_WKTS; ++dialect) {
+    const char* const wkt = proj_as_wkt(context, system.system.get(), kDialects[dialect], one_line);
+    system.wkt[dialect] = wkt != nullptr ? wkt : "";
+    info.wkt_bytes[dialect] = system.wkt[dialect].size() + 1;
+  }
 }
 
-void open(const std::string& text, IsohfProjSystem& system, IsohfProjInfo& info) {
+void open(const std::string& text, const char* heights, IsohfProjSystem& system, IsohfProjInfo& info) {
   system.context = make_context();
   PJ_CONTEXT* const context = system.context.get();
   system.system.reset(proj_create(context, as_system(text).c_str()));
@@ -188,19 +213,35 @@ void open(const std::string& text, IsohfProjSystem& system, IsohfProjInfo& info)
            (proj_context_errno(context) != 0 && why != nullptr ? std::string(": ") + why : ""));
   }
   system.horizontal = horizontal_part(context, system.system.get());
+  if (*heights != '\0' && proj_get_type(system.system.get()) != PJ_TYPE_COMPOUND_CRS) {
+    const Object vertical(proj_create(context, heights));
+    const std::string name =
+        vertical ? std::string(proj_get_name(system.horizontal.get())) + " + " + proj_get_name(vertical.get())
+                 : std::string();
+    Object both(vertical ? proj_create_compound_crs(context, name.c_str(), system.horizontal.get(), vertical.get())
+                         : nullptr);
+    if (both) system.system = std::move(both);
+  }
   describe(system, info);
 }
 
-int module_open(const char* text, IsohfProjSystem** system, IsohfProjInfo* info, IsohfProjMessage* message) {
+int module_open(const char* text, const char* vertical, IsohfProjSystem** system, IsohfProjInfo* info,
+                IsohfProjMessage* message) {
   return isohf::guarded(message, "PROJ", ErrorCode::kUnsupported, [&] {
     auto made = std::make_unique<IsohfProjSystem>();
-    open(text, *made, *info);
+    open(text, vertical, *made, *info);
     *system = made.release();
   });
 }
 
-void module_wkt(const IsohfProjSystem* system, char* wkt) {
-  std::memcpy(wkt, system->wkt.c_str(), system->wkt.size() + 1);
+void module_wkt(const IsohfProjSystem* system, int dialect, char* wkt) {
+  std::memcpy(wkt, system->wkt[dialect].c_str(), system->wkt[dialect].size() + 1);
+}
+
+int module_same(const IsohfProjSystem* a, const IsohfProjSystem* b) {
+  // Rasters have East before North, whatever the axes.
+  return proj_is_equivalent_to_with_ctx(a->context.get(), a->horizontal.get(), b->horizontal.get(),
+                                        PJ_COMP_EQUIVALENT_EXCEPT_AXIS_ORDER_GEOGCRS);
 }
 
 /// NaN where PROJ found no place: it says infinity, or leaves an error.
@@ -252,7 +293,7 @@ const char* module_library() {
 }  // namespace
 
 extern "C" __attribute__((visibility("default"))) const IsohfProjModule* isohf_proj_module() {
-  static const IsohfProjModule module = {ISOHF_PROJ_ABI,  module_open,  module_wkt,    module_to_geo,
-                                         module_from_geo, module_close, module_library};
+  static const IsohfProjModule module = {ISOHF_PROJ_ABI, module_open,     module_wkt,   module_same,
+                                         module_to_geo,  module_from_geo, module_close, module_library};
   return &module;
 }

@@ -12,11 +12,14 @@
 extern "C" {
 
 /// Raised whenever anything below changes; the loader refuses any other.
-#define ISOHF_PROJ_ABI 1
+#define ISOHF_PROJ_ABI 2
 
 typedef struct IsohfProjSystem IsohfProjSystem;
 
-/// The horizontal part of a system.
+/// The dialects of well-known text that systems are written in.
+enum { ISOHF_WKT2 = 0, ISOHF_WKT1 = 1, ISOHF_WKT_ESRI = 2, ISOHF_WKTS = 3 };
+
+/// The horizontal part of a system, and what it says of heights.
 typedef struct IsohfProjInfo {
   char name[256];          ///< "WGS 84 / UTM zone 32N"
   char authority[32];      ///< "EPSG", "ESRI", "IAU_2015", ...; empty where the text gives none
@@ -26,19 +29,28 @@ typedef struct IsohfProjInfo {
   int32_t is_compound;     ///< heights belong to it
   double metres_per_unit;  ///< of both axes; degrees in a unit where not projected
   double semi_major_axis_m;
-  double inverse_flattening;  ///< 0 for a sphere
-  size_t wkt_bytes;           ///< of the WKT, with the 0 behind it
+  double inverse_flattening;        ///< 0 for a sphere
+  double prime_meridian_deg;        ///< East of Greenwich: where its longitudes are counted from
+  char vertical_name[256];          ///< "NAVD88 height (ftUS)"; empty where nothing is said of heights
+  int32_t vertical_epsg;            ///< its code; 0: none
+  char vertical_unit[64];           ///< "US survey foot"
+  double metres_per_vertical_unit;  ///< negative: depths
+  size_t wkt_bytes[ISOHF_WKTS];     ///< of each dialect, with the 0 behind it; 1 where it cannot say the system
 } IsohfProjInfo;
 
 typedef struct IsohfProjMessage {
   char text[512];
 } IsohfProjMessage;
 
-/// Understands `text`: "EPSG:2154", WKT of any version and dialect, a PROJ string, PROJJSON.
-typedef int (*IsohfProjOpen)(const char* text, IsohfProjSystem** system, IsohfProjInfo* info,
+/// Understands `text`: "EPSG:2154", WKT of any version and dialect, a PROJ string, PROJJSON. `vertical`, where it is not
+/// empty, is the system of the heights of a `text` that says nothing of them.
+typedef int (*IsohfProjOpen)(const char* text, const char* vertical, IsohfProjSystem** system, IsohfProjInfo* info,
                              IsohfProjMessage* message);
-/// WKT2 (ISO 19162:2019) of all of the system, on one line; `wkt` holds `wkt_bytes`.
-typedef void (*IsohfProjWkt)(const IsohfProjSystem* system, char* wkt);
+/// The text of all of the system, on one line: WKT2 (ISO 19162:2019), WKT1 as GDAL writes it, ESRI's WKT1.
+/// `wkt` holds `wkt_bytes`.
+typedef void (*IsohfProjWkt)(const IsohfProjSystem* system, int dialect, char* wkt);
+/// Whether both are one system, however they are spelled and named.
+typedef int (*IsohfProjSame)(const IsohfProjSystem* a, const IsohfProjSystem* b);
 /// Coordinates of the system, East before North and in its units, to degrees from Greenwich, and back, in place: x and
 /// y of `count` places. NaN where there is no such place. Any number of threads at once.
 typedef void (*IsohfProjMove)(const IsohfProjSystem* system, double* places, size_t count);
@@ -50,6 +62,7 @@ typedef struct IsohfProjModule {
   int32_t abi;
   IsohfProjOpen open;
   IsohfProjWkt wkt;
+  IsohfProjSame same;
   IsohfProjMove to_geo;
   IsohfProjMove from_geo;
   IsohfProjClose close;

@@ -10,6 +10,7 @@
 #include "formats/files/raw_file.h"
 #include "formats/files/text.h"
 #include "formats/georeference/units.h"
+#include "formats/georeference/wkt.h"
 #include "formats/open_options.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
@@ -79,6 +80,8 @@ void RasterDescription::describe(SourceInfo& info) const {
   if (word("vertical_unit") != "unknown") info.vertical_unit = word("vertical_unit");
   if (const auto unit = linear_unit(info.vertical_unit)) info.metres_per_vertical_unit = unit->metres;
   describe_place(info.georeference);
+  const std::string wkt = word("crs_wkt");
+  if (!wkt.empty() && !read_wkt(wkt, info)) refuse("crs_wkt is no WKT of a map's reference system");
 }
 
 void RasterDescription::describe_place(Georeference& place) const {

@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <mutex>
 
 #include "formats/georeference/proj_module.h"
+#include "formats/georeference/units.h"
 #include "formats/module_loader.h"
 #include "isohf/convert.h"
 #include "isohf/error.h"
@@ -20,10 +22,12 @@ const IsohfProjModule& proj_module() {
 
 class ProjSystem final : public UnderstoodSystem {
  public:
-  ProjSystem(const std::string& text, std::optional<double> metres_per_unit) : module_(proj_module()) {
+  ProjSystem(const std::string& text, std::optional<double> metres_per_unit, std::optional<int> vertical_epsg)
+      : module_(proj_module()) {
     IsohfProjInfo info{};
     IsohfProjMessage message{};
-    const int result = module_.open(text.c_str(), &system_, &info, &message);
+    const std::string vertical = vertical_epsg ? fmt::format("EPSG:{}", *vertical_epsg) : "";
+    const int result = module_.open(text.c_str(), vertical.c_str(), &system_, &info, &message);
     if (result != 0) {
       const std::string shown = text.size() > 60 ? text.substr(0, 60) + "..." : text;
       throw Error(module_error_code(result), fmt::format("the reference system {}: {}", shown, message.text));
@@ -34,13 +38,17 @@ class ProjSystem final : public UnderstoodSystem {
     description_.datum = info.datum;
     description_.is_projected = info.is_projected != 0;
     description_.is_compound = info.is_compound != 0;
-    // PROJ's database has 15 digits of it.
-    constexpr double kUsFoot = 1200.0 / 3937.0;
-    description_.unit = std::abs(info.metres_per_unit - kUsFoot) < 1e-14 ? kUsFoot : info.metres_per_unit;
+    description_.unit = exact(info.metres_per_unit);
+    description_.prime_meridian_deg = info.prime_meridian_deg;
     description_.ellipsoid = {info.semi_major_axis_m, info.inverse_flattening};
-    description_.wkt2.resize(info.wkt_bytes);
-    module_.wkt(system_, description_.wkt2.data());
-    description_.wkt2.pop_back();
+    description_.wkt2 = wkt(info, ISOHF_WKT2);
+    description_.wkt1 = wkt(info, ISOHF_WKT1);
+    description_.esri = wkt(info, ISOHF_WKT_ESRI);
+    description_.vertical_name = info.vertical_name;
+    if (info.vertical_epsg > 0) description_.vertical_epsg = info.vertical_epsg;
+    description_.vertical_unit = info.vertical_unit;
+    if (!description_.vertical_name.empty())
+      description_.metres_per_vertical_unit = exact(info.metres_per_vertical_unit);
     metres_per_unit_ = description_.is_projected ? metres_per_unit.value_or(description_.unit) : 1.0;
     scale_ = description_.is_projected ? metres_per_unit_ / description_.unit : 1.0;
   }
@@ -49,6 +57,30 @@ class ProjSystem final : public UnderstoodSystem {
   [[nodiscard]] const Description& description() const override { return description_; }
   [[nodiscard]] double metres_per_unit() const override { return metres_per_unit_; }
   [[nodiscard]] const Ellipsoid& ellipsoid() const override { return description_.ellipsoid; }
+  [[nodiscard]] bool is_same(const UnderstoodSystem& other) const override {
+    const auto& theirs = static_cast<const ProjSystem&>(other);
+    if (module_.same(system_, theirs.system_) != 0) return true;
+    // PROJ does not hold one method's variants against each other (polar stereographic by its scale, or by a parallel).
+    const Description& other_one = theirs.description_;
+    if (!description_.is_projected || !other_one.is_projected || description_.datum != other_one.datum ||
+        description_.ellipsoid != other_one.ellipsoid || description_.unit != other_one.unit) {
+      return false;
+    }
+    constexpr double kSameMetres = 1e-6;
+    int compared = 0;
+    for (double latitude = -80.0; latitude <= 80.0; latitude += 20.0) {
+      for (double longitude = -170.0; longitude < 180.0; longitude += 20.0) {
+        const MapPoint ours = map_from_geo({longitude, latitude});
+        const MapPoint there = theirs.map_from_geo({longitude, latitude});
+        if (std::isnan(ours.easting) != std::isnan(there.easting)) return false;
+        if (std::isnan(ours.easting)) continue;
+        const double apart = std::hypot(ours.easting - there.easting, ours.northing - there.northing);
+        if (!(apart * description_.unit <= kSameMetres)) return false;
+        ++compared;
+      }
+    }
+    return compared > 4;
+  }
   /// libproj, SQLite and what they read of proj.db.
   [[nodiscard]] std::uint64_t memory_bytes() const override { return 14'000'000; }
 
@@ -64,6 +96,18 @@ class ProjSystem final : public UnderstoodSystem {
   }
 
  private:
+  /// PROJ's database has 15 digits of it.
+  static double exact(double metres) {
+    constexpr double kUsFoot = 1200.0 / 3937.0;
+    return std::abs(metres - kUsFoot) < 1e-14 ? kUsFoot : metres;
+  }
+  [[nodiscard]] std::string wkt(const IsohfProjInfo& info, int dialect) const {
+    std::string text(info.wkt_bytes[dialect], '\0');
+    module_.wkt(system_, dialect, text.data());
+    text.pop_back();
+    return text;
+  }
+
   const IsohfProjModule& module_;
   IsohfProjSystem* system_ = nullptr;
   Description description_;
@@ -74,8 +118,19 @@ class ProjSystem final : public UnderstoodSystem {
 }  // namespace
 
 std::shared_ptr<const UnderstoodSystem> understand_system(const std::string& text,
-                                                          std::optional<double> metres_per_unit) {
-  return std::make_shared<ProjSystem>(text, metres_per_unit);
+                                                          std::optional<double> metres_per_unit,
+                                                          std::optional<int> vertical_epsg) {
+  // The files of a mosaic name one system thousands of times.
+  static std::mutex mutex;
+  static std::string last;
+  static std::shared_ptr<const UnderstoodSystem> system;
+  const std::string asked = fmt::format("{} {} {}", metres_per_unit.value_or(0.0), vertical_epsg.value_or(0), text);
+  const std::lock_guard lock(mutex);
+  if (system && asked == last) return system;
+  auto found = std::make_shared<ProjSystem>(text, metres_per_unit, vertical_epsg);
+  last = asked;
+  system = std::move(found);
+  return system;
 }
 
 std::shared_ptr<const ReferenceMap> understand_map(const std::string& text, std::optional<double> metres_per_unit) {
@@ -85,6 +140,88 @@ std::shared_ptr<const ReferenceMap> understand_map(const std::string& text, std:
 
 std::string system_text(const ReferenceSystem& system) {
   return system.epsg ? fmt::format("EPSG:{}", *system.epsg) : system.wkt;
+}
+
+namespace {
+
+[[noreturn]] void refuse(const std::string& name, const char* why, const char* remedy) {
+  throw Error(ErrorCode::kUnsupported, fmt::format("the reference system \"{}\" {}; {}", name, why, remedy));
+}
+
+void take_vertical(const UnderstoodSystem::Description& found, SourceInfo& info) {
+  if (found.vertical_name.empty()) return;
+  if (found.metres_per_vertical_unit < 0.0) {
+    refuse(found.vertical_name, "counts depths downwards", "isohf reads heights (`z_scale` -1 turns them)");
+  }
+  info.georeference.system.vertical_datum = found.vertical_name;
+  info.georeference.system.vertical_epsg = found.vertical_epsg;
+  info.vertical_unit = found.vertical_unit;
+  info.metres_per_vertical_unit = found.metres_per_vertical_unit;
+}
+
+}  // namespace
+
+void take_system(const std::string& text, SourceInfo& info) {
+  const auto understood = understand_system(text);
+  const UnderstoodSystem::Description& found = understood->description();
+  constexpr double kSame = 1e-12;
+  if (!found.is_projected && (std::abs(found.unit - 1.0) > kSame || std::abs(found.prime_meridian_deg) > kSame)) {
+    refuse(found.name, "counts no degrees from Greenwich", "gdalwarp brings the raster to one that does");
+  }
+  Georeference& place = info.georeference;
+  place.unit = found.is_projected ? HorizontalUnit::kMetre : HorizontalUnit::kDegree;
+  place.metres_per_unit = found.is_projected ? found.unit : 1.0;
+  ReferenceSystem system;
+  system.name = found.name;
+  system.semi_major_axis_m = found.ellipsoid.semi_major_axis_m;
+  system.inverse_flattening = found.ellipsoid.inverse_flattening;
+  system.body = body_of(found.name + ' ' + found.datum, system.semi_major_axis_m);
+  system.vertical_datum = place.system.vertical_datum;
+  system.vertical_epsg = place.system.vertical_epsg;
+  if (found.authority == "EPSG") {
+    system.epsg = std::stoi(found.code);
+  } else {
+    system.wkt = found.wkt2;
+  }
+  place.system = system;
+  take_vertical(found, info);
+}
+
+void take_heights(int vertical_epsg, SourceInfo& info) {
+  constexpr const char* kAny = "EPSG:4326";
+  try {
+    take_vertical(understand_system(kAny, std::nullopt, vertical_epsg)->description(), info);
+  } catch (const Error& error) {
+    info.warnings.push_back(
+        fmt::format("the unit of heights in EPSG:{} is not known: {}", vertical_epsg, error.what()));
+  }
+}
+
+std::string wkt_of(const ReferenceSystem& system, WktDialect dialect) {
+  const std::string text = system_text(system);
+  if (text.empty()) return {};
+  try {
+    const auto& found = understand_system(text, std::nullopt, system.vertical_epsg)->description();
+    const std::string& wanted = dialect == WktDialect::kEsri ? found.esri : found.wkt1;
+    if (!wanted.empty()) return wanted;
+    return dialect == WktDialect::kEsri && !found.wkt1.empty() ? found.wkt1 : found.wkt2;
+  } catch (const Error&) {
+    return system.wkt;
+  }
+}
+
+std::optional<bool> are_same(const ReferenceSystem& a, const ReferenceSystem& b) {
+  if (a.epsg && b.epsg) return *a.epsg == *b.epsg;
+  const std::string ours = system_text(a);
+  const std::string theirs = system_text(b);
+  if (ours.empty() || theirs.empty()) return std::nullopt;
+  if (ours == theirs) return true;
+  try {
+    const auto first = understand_system(ours);
+    return first->is_same(*understand_system(theirs));
+  } catch (const Error&) {
+    return std::nullopt;
+  }
 }
 
 void understand_ground(const SourceInfo& info, GroundRequest& request) {

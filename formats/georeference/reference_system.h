@@ -18,20 +18,31 @@ class UnderstoodSystem : public ReferenceMap {
     std::string code;  ///< "EPSG" and "32632"; empty where the text gives none
     std::string datum;
     bool is_projected = false;
-    bool is_compound = false;  ///< heights belong to it
-    double unit = 1.0;         ///< of the system's axes: metres, or degrees where it is not projected
-    std::string wkt2;          ///< of all of it (ISO 19162:2019)
+    bool is_compound = false;         ///< heights belong to it
+    double unit = 1.0;                ///< of the system's axes: metres, or degrees where it is not projected
+    double prime_meridian_deg = 0.0;  ///< East of Greenwich
+    std::string wkt2;                 ///< of all of it (ISO 19162:2019)
+    std::string wkt1;                 ///< as GDAL writes it; empty where that cannot say it
+    std::string esri;                 ///< as a .prj has it; the same
     Ellipsoid ellipsoid;
+    std::string vertical_name;  ///< "NAVD88 height (ftUS)"; empty where nothing is said of heights
+    std::optional<int> vertical_epsg;
+    std::string vertical_unit;              ///< "US survey foot"
+    double metres_per_vertical_unit = 1.0;  ///< negative: depths
   };
   [[nodiscard]] virtual const Description& description() const = 0;
+  /// Whether both are one system, however they are spelled and named.
+  [[nodiscard]] virtual bool is_same(const UnderstoodSystem& other) const = 0;
 };
 
 /// Understands "EPSG:2154", WKT of any version and dialect, PROJ strings and PROJJSON, by the module isohf_proj.so,
 /// which is loaded at the first call. Coordinates are the system's own, East before North. metres_per_unit  of the
-/// coordinates that are asked for; nullopt: as the system has it Throws Error{kUnsupported}, in one line, where the
-/// module or PROJ's database is missing, or PROJ does not understand the text.
+/// coordinates that are asked for; nullopt: as the system has it. vertical_epsg  of the heights, where the text has
+/// none. Throws Error{kUnsupported}, in one line, where the module or PROJ's database is missing, or PROJ does not
+/// understand the text.
 [[nodiscard]] std::shared_ptr<const UnderstoodSystem> understand_system(
-    const std::string& text, std::optional<double> metres_per_unit = std::nullopt);
+    const std::string& text, std::optional<double> metres_per_unit = std::nullopt,
+    std::optional<int> vertical_epsg = std::nullopt);
 
 /// The same where coordinates and places are all that is wanted: PROJ is left alone where utm_map() knows the system.
 [[nodiscard]] std::shared_ptr<const ReferenceMap> understand_map(const std::string& text,
@@ -39,5 +50,23 @@ class UnderstoodSystem : public ReferenceMap {
 
 /// What names the system to PROJ: "EPSG:n", or the WKT; empty where a file has neither.
 [[nodiscard]] std::string system_text(const ReferenceSystem& system);
+
+/// Takes `text`, which understand_system() understands, for what the coordinates of a raster are in, whatever its file
+/// says, and for its heights where it speaks of them. Throws what that throws; Error{kUnsupported} for angles that are
+/// no degrees from Greenwich, and for depths.
+void take_system(const std::string& text, SourceInfo& info);
+
+/// Unit and name of the heights of a vertical system by its code; nothing where there is no module.
+void take_heights(int vertical_epsg, SourceInfo& info);
+
+/// Text that other programs read: WKT1 as a GeoTIFF's citation and an .aux.xml carry it, or the ESRI dialect of a .prj;
+/// heights included. Without the module, or where a dialect has no words for it: the WKT as it was found; without one
+/// empty.
+enum class WktDialect { kGdal, kEsri };
+[[nodiscard]] std::string wkt_of(const ReferenceSystem& system, WktDialect dialect);
+
+/// Whether two systems are one, as far as it can be told: by their codes, their texts, else by PROJ. nullopt where one
+/// of them says nothing, or neither can be understood.
+[[nodiscard]] std::optional<bool> are_same(const ReferenceSystem& a, const ReferenceSystem& b);
 
 }  // namespace isohf

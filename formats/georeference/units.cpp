@@ -92,6 +92,11 @@ std::optional<LinearUnit> linear_unit(std::string_view name) {
   return std::nullopt;
 }
 
+std::string linear_unit_name(double metres) {
+  const auto known = std::ranges::find(kUnits, metres, &UnitRow::metres);
+  return known == kUnits.end() ? "unit" : known->name;
+}
+
 ReferenceSystem wgs84_system() {
   ReferenceSystem system;
   system.name = "WGS 84";

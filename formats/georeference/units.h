@@ -21,6 +21,9 @@ struct LinearUnit {
 /// text.
 [[nodiscard]] std::optional<LinearUnit> linear_unit(std::string_view name);
 
+/// What a length of so many metres is called; "unit" where it has no name.
+[[nodiscard]] std::string linear_unit_name(double metres);
+
 /// WGS 84 in degrees, on the Earth.
 [[nodiscard]] ReferenceSystem wgs84_system();
 

@@ -1,15 +1,25 @@
 #include "formats/georeference/wkt.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cctype>
 #include <charconv>
 #include <cmath>
+#include <cstdlib>
 #include <initializer_list>
+#include <locale>
+#include <map>
 #include <optional>
+#include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "formats/files/text.h"
+#include "formats/georeference/reference_system.h"
 #include "formats/georeference/units.h"
+#include "isohf/error.h"
 
 namespace isohf {
 namespace {
@@ -49,11 +59,15 @@ class Parser {
  public:
   explicit Parser(std::string_view text) : text_(text) {}
 
+  /// The systems in a row: ESRI's dialect has that of heights behind the other, with a comma between.
   std::optional<Node> whole() {
-    Node node;
-    if (!read_node(node, 0)) return std::nullopt;
-    skip_blanks();
-    return at_ == text_.size() ? std::optional(std::move(node)) : std::nullopt;
+    Node row;
+    for (bool is_first = true; is_first || at_ < text_.size(); is_first = false) {
+      if (!is_first && text_[at_++] != ',') return std::nullopt;
+      if (!read_node(row.children.emplace_back(), 0)) return std::nullopt;
+      skip_blanks();
+    }
+    return row;
   }
 
  private:
@@ -138,32 +152,59 @@ std::optional<int> epsg_of(const Node& system) {
   return error == std::errc{} && end == text.data() + text.size() ? std::optional(value) : std::nullopt;
 }
 
-void read_unit(const Node& system, bool projected, Georeference& place) {
-  // The system's own unit, or that of its axes (ISO 19162).
+/// The system's own unit, or that of its axes (ISO 19162); nullptr where none is given.
+const Node* unit_of(const Node& system) {
   const Node* unit = system.child({"UNIT", "LENGTHUNIT", "ANGLEUNIT"});
   if (unit == nullptr) {
-    if (const Node* axis = system.child({"AXIS"})) unit = axis->child({"UNIT", "LENGTHUNIT", "ANGLEUNIT"});
+    if (const Node* axis = system.below({"AXIS"})) unit = axis->child({"UNIT", "LENGTHUNIT", "ANGLEUNIT"});
   }
-  if (unit == nullptr || unit->numbers.empty() || !(unit->numbers[0] > 0.0)) return;
-  if (projected) {
+  return unit == nullptr || unit->numbers.empty() || !(unit->numbers[0] > 0.0) ? nullptr : unit;
+}
+
+void read_unit(const Node& system, bool projected, Georeference& place) {
+  const Node* const unit = unit_of(system);
+  if (!projected) {
+    const Node* const meridian = system.below({"PRIMEM", "PRIMEMERIDIAN"});
+    const bool is_degree = unit == nullptr || std::abs(unit->numbers[0] - kRadiansPerDegree) < kDegreeTolerance;
+    if (!is_degree || (meridian != nullptr && !meridian->numbers.empty() && meridian->numbers[0] != 0.0)) {
+      throw Error(
+          ErrorCode::kUnsupported,
+          fmt::format("the reference system \"{}\" counts no degrees from Greenwich; gdalwarp brings the raster "
+                      "to one that does",
+                      system.texts[0]));
+    }
+    if (unit != nullptr) place.unit = HorizontalUnit::kDegree;
+  } else if (unit != nullptr) {
     place.unit = HorizontalUnit::kMetre;
     place.metres_per_unit = unit->numbers[0];
-  } else if (std::abs(unit->numbers[0] - kRadiansPerDegree) < kDegreeTolerance) {
-    place.unit = HorizontalUnit::kDegree;
   }
+}
+
+void read_heights(const Node& system, SourceInfo& info) {
+  ReferenceSystem& reference = info.georeference.system;
+  if (!system.texts.empty()) reference.vertical_datum = system.texts[0];
+  if (const auto code = epsg_of(system)) reference.vertical_epsg = code;
+  const Node* const unit = unit_of(system);
+  if (unit == nullptr) return;
+  info.metres_per_vertical_unit = unit->numbers[0];
+  const std::string name = unit->texts.empty() ? std::string() : unit->texts[0];
+  const auto known = linear_unit(name);
+  info.vertical_unit = known ? known->name : name;
+  if (known) info.metres_per_vertical_unit = known->metres;
 }
 
 }  // namespace
 
-bool read_wkt(std::string_view text, Georeference& place) {
+bool read_wkt(std::string_view text, SourceInfo& info) {
   const std::optional<Node> root = Parser(text).whole();
   if (!root) return false;
   const std::initializer_list<std::string_view> projected = {"PROJCS", "PROJCRS", "PROJECTEDCRS"};
   const std::initializer_list<std::string_view> geographic = {"GEOGCS", "GEOGCRS", "GEOGRAPHICCRS"};
-  const Node* system = root->is(projected) || root->is(geographic) ? &*root : root->below(projected);
+  const Node* system = root->below(projected);
   if (system == nullptr) system = root->below(geographic);
   if (system == nullptr || system->texts.empty()) return false;
-  ReferenceSystem& reference = place.system;
+  read_unit(*system, system->is(projected), info.georeference);
+  ReferenceSystem& reference = info.georeference.system;
   reference.name = system->texts[0];
   reference.epsg = epsg_of(*system);
   reference.wkt = std::string(text);
@@ -174,35 +215,124 @@ bool read_wkt(std::string_view text, Georeference& place) {
     reference.inverse_flattening = ellipsoid->numbers[1];
   }
   reference.body = body_of(reference.name, reference.semi_major_axis_m);
-  read_unit(*system, system->is(projected), place);
+  const Node* const heights = root->below({"VERT_CS", "VERTCS", "VERTCRS", "VERTICALCRS"});
+  if (heights != nullptr) read_heights(*heights, info);
   return true;
 }
 
 namespace {
 
-/// "Projection GEOGRAPHIC", "Datum WGS84", "Units DD", a line each: what stood in a .prj before WKT did (GTOPO30).
-/// False, and nothing changed, where it says anything else.
-bool read_old_prj(std::string_view text, Georeference& place) {
-  std::string words;
-  for (const char c : text) {
-    if (std::isspace(static_cast<unsigned char>(c)) == 0) {
-      words += static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
-    } else if (!words.empty() && words.back() != ' ') {
-      words += ' ';
+/// A .prj of before WKT: "Projection UTM", "Zone 11", "Datum NAD27", "Units METERS", a line each, and behind
+/// "Parameters" numbers in the order that the projection has, degrees with minutes and seconds.
+class OldPrj {
+ public:
+  explicit OldPrj(std::string_view text) {
+    std::istringstream lines{std::string(text)};
+    for (std::string line; std::getline(lines, line);) {
+      line = upper_case(line.substr(0, line.find("/*")));
+      std::istringstream words(line);
+      std::string key;
+      if (!(words >> key)) continue;
+      if (is_number(key)) {
+        parameters_.push_back(number_in(line));
+      } else {
+        std::string& value = values_[key];
+        std::getline(words >> std::ws, value);
+        while (!value.empty() && std::isspace(static_cast<unsigned char>(value.back())) != 0) value.pop_back();
+      }
     }
   }
-  const auto says = [&](std::string_view what) { return words.find(what) != std::string::npos; };
-  if (words.rfind("PROJECTION GEOGRAPHIC", 0) != 0 || !says("UNITS DD")) return false;
-  place.unit = HorizontalUnit::kDegree;
-  if (!says("DATUM WGS84")) return true;
-  place.system = wgs84_system();
+
+  [[nodiscard]] std::string value(const std::string& key) const {
+    const auto found = values_.find(key);
+    return found == values_.end() ? std::string() : found->second;
+  }
+
+  /// Of what is no geographic system; empty where it is none that is known.
+  [[nodiscard]] std::string proj_string() const {
+    const std::string kind = value("PROJECTION");
+    std::string text;
+    if (kind == "UTM") {
+      const int zone = std::atoi(value("ZONE").c_str());
+      text = fmt::format("+proj=utm +zone={}{}", std::abs(zone), zone < 0 ? " +south" : "");
+    } else {
+      // Names of PROJ's parameters, in the order in which the lines come.
+      static const std::map<std::string, std::pair<const char*, std::vector<const char*>>> kKinds = {
+          {"ALBERS", {"aea", {"lat_1", "lat_2", "lon_0", "lat_0", "x_0", "y_0"}}},
+          {"LAMBERT", {"lcc", {"lat_1", "lat_2", "lon_0", "lat_0", "x_0", "y_0"}}},
+          {"EQUIDISTANT_CONIC", {"eqdc", {"lat_1", "lat_2", "lon_0", "lat_0", "x_0", "y_0"}}},
+          {"TRANSVERSE", {"tmerc", {"k_0", "lon_0", "lat_0", "x_0", "y_0"}}},
+          {"MERCATOR", {"merc", {"lon_0", "lat_ts", "x_0", "y_0"}}},
+          {"POLAR", {"stere", {"lon_0", "lat_ts", "x_0", "y_0"}}},
+          {"POLYCONIC", {"poly", {"lon_0", "lat_0", "x_0", "y_0"}}},
+      };
+      const auto known = kKinds.find(kind);
+      if (known == kKinds.end() || parameters_.size() < known->second.second.size()) return {};
+      text = fmt::format("+proj={}", known->second.first);
+      for (std::size_t i = 0; i < known->second.second.size(); ++i) {
+        text += fmt::format(" +{}={}", known->second.second[i], parameters_[i]);
+      }
+      if (kind == "POLAR") text += parameters_[1] < 0.0 ? " +lat_0=-90" : " +lat_0=90";
+    }
+    const std::string datum = value("DATUM");
+    static const std::map<std::string, const char*> kDatums = {
+        {"WGS84", "+datum=WGS84"}, {"NAD83", "+datum=NAD83"}, {"NAD27", "+datum=NAD27"}, {"WGS72", "+ellps=WGS72"}};
+    static const std::map<std::string, const char*> kSpheroids = {{"CLARKE1866", "+ellps=clrk66"},
+                                                                  {"GRS1980", "+ellps=GRS80"},
+                                                                  {"WGS84", "+ellps=WGS84"},
+                                                                  {"INTERNATIONAL1909", "+ellps=intl"},
+                                                                  {"BESSEL", "+ellps=bessel"}};
+    const auto by_datum = kDatums.find(datum);
+    const auto by_spheroid = kSpheroids.find(value("SPHEROID"));
+    if (by_datum == kDatums.end() && by_spheroid == kSpheroids.end()) return {};
+    text += ' ';
+    text += by_datum != kDatums.end() ? by_datum->second : by_spheroid->second;
+    const std::string units = value("UNITS");
+    if (units == "FEET") return text + " +units=us-ft";
+    return units == "METERS" || units.empty() ? text + " +units=m" : std::string();
+  }
+
+ private:
+  static bool is_number(const std::string& word) {
+    return word.find_first_not_of("+-0123456789.") == std::string::npos &&
+           word.find_first_of("0123456789") != std::string::npos;
+  }
+  /// "-96 30 0.0": degrees, minutes, seconds, or a number alone.
+  static double number_in(const std::string& text) {
+    std::istringstream words(text);
+    words.imbue(std::locale::classic());
+    double parts[3] = {0.0, 0.0, 0.0};
+    for (double& part : parts) {
+      if (!(words >> part)) break;
+    }
+    const double rest = parts[1] / 60.0 + parts[2] / 3600.0;
+    return text.find('-') < text.find_first_of("0123456789") ? parts[0] - rest : parts[0] + rest;
+  }
+
+  std::map<std::string, std::string> values_;
+  std::vector<double> parameters_;
+};
+
+/// False, and nothing changed, where it says anything else.
+bool read_old_prj(std::string_view text, SourceInfo& info) {
+  const OldPrj prj(text);
+  if (prj.value("PROJECTION").empty()) return false;
+  if (prj.value("PROJECTION") != "GEOGRAPHIC") {
+    const std::string system = prj.proj_string();
+    if (system.empty()) return false;
+    take_system(system, info);
+    return true;
+  }
+  if (prj.value("UNITS") != "DD") return false;
+  info.georeference.unit = HorizontalUnit::kDegree;
+  if (prj.value("DATUM") == "WGS84") info.georeference.system = wgs84_system();
   return true;
 }
 
 }  // namespace
 
-bool read_prj(std::string_view text, Georeference& place) {
-  return read_wkt(text, place) || read_old_prj(text, place);
+bool read_prj(std::string_view text, SourceInfo& info) {
+  return read_wkt(text, info) || read_old_prj(text, info);
 }
 
 }  // namespace isohf

@@ -12,6 +12,7 @@
 #include <optional>
 #include <utility>
 
+#include "formats/georeference/reference_system.h"
 #include "formats/mosaic/reader_pool.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
@@ -104,7 +105,15 @@ class Agreement {
 };
 
 void agree_on_system(ReferenceSystem& ours, const ReferenceSystem& other, Agreement& agreement) {
+  // Of two texts, or a text and a code, PROJ tells whether they are one system.
   const bool by_code = ours.epsg && other.epsg;
+  const bool same_text = ours.wkt == other.wkt && ours.epsg == other.epsg;
+  const std::optional<bool> same = by_code || same_text ? std::nullopt : are_same(ours, other);
+  if (same == false) {
+    agreement.differ("reference system", system_text(other), system_text(ours));
+  } else if (same == true) {
+    return;
+  }
   agreement.same(ours.epsg, other.epsg, "EPSG code");
   agreement.same(ours.body, other.body, "body");
   agreement.same_length(ours.semi_major_axis_m, other.semi_major_axis_m, "semi-major axis");

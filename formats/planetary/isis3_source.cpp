@@ -13,6 +13,7 @@
 
 #include "formats/files/file_source.h"
 #include "formats/georeference/files_beside.h"
+#include "formats/georeference/map_wkt.h"
 #include "formats/georeference/units.h"
 #include "formats/open_options.h"
 #include "formats/planetary/label_text.h"
@@ -181,6 +182,19 @@ class Isis3Source final : public FileSource {
     geo.system.body = body_of(target, std::nullopt);
     if (geo.system.body.empty()) geo.system.body = target;
     geo.system.name = fmt::format("{} {}", map.text("PROJECTIONNAME").value_or("unknown projection"), target);
+    PlanetaryMap planet{map.text("PROJECTIONNAME").value_or("unknown projection"),
+                        target,
+                        geo.system.semi_major_axis_m.value_or(0.0),
+                        polar.value_or(0.0),
+                        map.word("LATITUDETYPE").value_or("") == "PLANETOGRAPHIC",
+                        {}};
+    const bool to_west = map.word("LONGITUDEDIRECTION").value_or("") == "POSITIVEWEST";
+    planet.parameters.longitude = map.number("CENTERLONGITUDE").value_or(0.0) * (to_west ? -1.0 : 1.0);
+    planet.parameters.latitude = map.number("CENTERLATITUDE").value_or(0.0);
+    planet.parameters.scale = map.number("SCALEFACTOR").value_or(1.0);
+    planet.parameters.parallel_1 = map.number("FIRSTSTANDARDPARALLEL").value_or(0.0);
+    planet.parameters.parallel_2 = map.number("SECONDSTANDARDPARALLEL").value_or(0.0);
+    geo.system.wkt = planetary_wkt(planet);
     if (map.number("ROTATION").value_or(0.0) != 0.0) {
       info_.warnings.push_back(loss("the map is rotated; its place is left out"));
       return;

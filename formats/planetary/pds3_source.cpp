@@ -20,6 +20,7 @@
 #include "formats/files/file_source.h"
 #include "formats/files/text.h"
 #include "formats/georeference/files_beside.h"
+#include "formats/georeference/map_wkt.h"
 #include "formats/georeference/units.h"
 #include "formats/open_options.h"
 #include "formats/planetary/label_text.h"
@@ -208,6 +209,7 @@ class Placer {
       geo_.unit = HorizontalUnit::kMetre;
       geo_.system.name = fmt::format("{} {}", projection_.empty() ? "UNKNOWN PROJECTION" : projection_, target);
     }
+    name_map(target);
     geo_.spacing_x = geo_.spacing_y = spacing_;
     geo_.registration = Registration::kArea;
     read_bounds();
@@ -230,6 +232,23 @@ class Placer {
     if (!a) return;
     geo_.system.semi_major_axis_m = a;
     geo_.system.inverse_flattening = c && *c != *a ? *a / (*a - *c) : 0.0;
+  }
+
+  /// The WKT of the map, in degrees or metres as it is placed.
+  void name_map(const std::string& target) {
+    PlanetaryMap planet{degrees_ ? "" : projection_,
+                        capitalised(target),
+                        geo_.system.semi_major_axis_m.value_or(0.0),
+                        metres(map_, "C_AXIS_RADIUS").value_or(0.0),
+                        map_.word("COORDINATE_SYSTEM_NAME").value_or("") == "PLANETOGRAPHIC",
+                        {}};
+    const bool to_west = map_.word("POSITIVE_LONGITUDE_DIRECTION").value_or("EAST") == "WEST";
+    planet.parameters.longitude = map_.number("CENTER_LONGITUDE").value_or(0.0) * (to_west ? -1.0 : 1.0);
+    planet.parameters.latitude = map_.number("CENTER_LATITUDE").value_or(0.0);
+    if (cylindrical_) planet.parameters.latitude = true_latitude_;
+    planet.parameters.parallel_1 = map_.number("FIRST_STANDARD_PARALLEL").value_or(0.0);
+    planet.parameters.parallel_2 = map_.number("SECOND_STANDARD_PARALLEL").value_or(0.0);
+    geo_.system.wkt = planetary_wkt(planet);
   }
 
   /// Which unit the map has, and how many of them lie between samples; false where the label does not say.

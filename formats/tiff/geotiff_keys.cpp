@@ -10,6 +10,7 @@
 #include <optional>
 #include <utility>
 
+#include "formats/georeference/map_wkt.h"
 #include "formats/georeference/reference_system.h"
 #include "formats/georeference/units.h"
 #include "formats/georeference/wkt.h"
@@ -26,6 +27,7 @@ enum Key : std::uint16_t {
   kGeodeticCrs = 2048,
   kGeodeticCitation = 2049,
   kDatum = 2050,
+  kPrimeMeridian = 2051,
   kAngularUnits = 2054,
   kAngularUnitSize = 2055,
   kEllipsoid = 2056,
@@ -51,7 +53,12 @@ enum Key : std::uint16_t {
   kCentreLongitude = 3088,
   kCentreLatitude = 3089,
   kNaturalScale = 3092,
+  kCentreEasting = 3090,
+  kCentreNorthing = 3091,
+  kCentreScale = 3093,
+  kAzimuth = 3094,
   kVerticalLongitude = 3095,
+  kGridAngle = 3096,
   kVerticalCrs = 4096,
   kVerticalCitation = 4097,
   kVerticalUnits = 4099,
@@ -279,7 +286,16 @@ std::string esri_wkt(Keys& keys) {
   return {};
 }
 
-/// "GCS Name = A|Datum = B" is A; an ESRI string is its first quoted name, and the whole of it the WKT.
+/// What "GCS Name = A|Datum = B|Ellipsoid = C|Primem = D" says of `what`; empty where it says nothing.
+std::string part_of_citation(const std::string& citation, const std::string& what) {
+  const std::string wanted = what + " = ";
+  const std::size_t at = citation.find(wanted);
+  if (at == std::string::npos) return {};
+  const std::size_t begin = at + wanted.size();
+  return citation.substr(begin, std::min(citation.find('|', begin), citation.size()) - begin);
+}
+
+/// The name of a citation; an ESRI string is its first quoted name, and the whole of it the WKT.
 void read_name(Keys& keys, bool projected, ReferenceSystem& system) {
   std::string name = projected ? keys.text(kProjectedCitation) : keys.text(kGeodeticCitation);
   if (name.empty()) name = keys.text(kCitation);
@@ -299,9 +315,9 @@ void read_name(Keys& keys, bool projected, ReferenceSystem& system) {
 /// The unit of a map whose file has no key for it: that of its WKT or of its code.
 void assume_unit(const std::string& wkt, GeoTiffPlace& place) {
   Georeference& geo = place.georeference;
-  Georeference told;
-  if (!wkt.empty() && read_wkt(wkt, told) && told.unit == HorizontalUnit::kMetre) {
-    geo.metres_per_unit = told.metres_per_unit;
+  SourceInfo told;
+  if (!wkt.empty() && read_wkt(wkt, told) && told.georeference.unit == HorizontalUnit::kMetre) {
+    geo.metres_per_unit = told.georeference.metres_per_unit;
     return;
   }
   // These are in metres, and in nearly every file.
@@ -367,20 +383,115 @@ void read_vertical(Keys& keys, GeoTiffPlace& place) {
     } else {
       place.warnings.push_back(loss(fmt::format("vertical unit {} is not known", *code)));
     }
+    return;
   }
+  if (!system.vertical_epsg) return;
+  const bool in_metres =
+      std::ranges::any_of(kVerticalDatums, [&](const auto& known) { return known.first == system.vertical_epsg; });
+  SourceInfo told;
+  told.vertical_unit = in_metres ? "metre" : "";
+  told.georeference.system = system;
+  if (!in_metres) take_heights(*system.vertical_epsg, told);
+  if (system.vertical_datum.empty()) system.vertical_datum = told.georeference.system.vertical_datum;
+  place.vertical_unit = told.vertical_unit;
+  place.metres_per_vertical_unit = told.metres_per_vertical_unit;
+  place.warnings.insert(place.warnings.end(), told.warnings.begin(), told.warnings.end());
+}
+
+/// The geographic system beneath a map, as WKT; empty where PROJ is needed for it and not there.
+std::string geographic_beneath(Keys& keys, const ReferenceSystem& system, double degrees) {
+  if (const std::optional<int> code = keys.code(kGeodeticCrs)) {
+    ReferenceSystem base;
+    base.epsg = code;
+    return wkt_of(base, WktDialect::kGdal);
+  }
+  if (!system.semi_major_axis_m) return {};
+  const std::string citation = keys.text(kGeodeticCitation);
+  const auto named = [&](const char* what, const std::string& otherwise) {
+    const std::string name = part_of_citation(citation, what);
+    return name.empty() ? otherwise : name;
+  };
+  return geographic_wkt(named("GCS Name", citation.empty() ? "unknown" : citation.substr(0, citation.find('|'))),
+                        named("Datum", "unknown"), named("Ellipsoid", "unknown"), *system.semi_major_axis_m,
+                        system.inverse_flattening.value_or(0.0), degrees);
+}
+
+/// The map that keys spell out instead of naming it by a code, as WKT 1; empty, with a warning, where its method is not
+/// known or its geographic system needs PROJ.
+std::string map_from_keys(Keys& keys, GeoTiffPlace& place, double degrees) {
+  const Georeference& geo = place.georeference;
+  const int method = keys.code(kMethod).value_or(0);
+  const int zone = keys.code(kProjection).value_or(0);  // 16001 to 16060 and 16101 to 16160 are the UTM zones
+  if (method == 0 && zone == 0) return {};
+  const bool is_utm = zone > 16000 && zone <= 16160 && zone % 100 >= 1 && zone % 100 <= 60;
+  std::string_view name = method_of_code(is_utm ? 1 : method);
+  const std::string geographic = geographic_beneath(keys, geo.system, degrees);
+  if (name.empty() || geographic.empty()) {
+    place.warnings.push_back(loss(
+        name.empty() ? fmt::format("its map is of the kind {} (GeoTIFF's code), which is not known: where it lies on "
+                                   "the ground is not kept",
+                                   method != 0 ? method : zone)
+                     : "its map lies on a geographic system that is not understood: where it lies on the ground is "
+                       "not kept"));
+    return {};
+  }
+  const auto first_of = [&](std::initializer_list<Key> names, double otherwise) {
+    for (const Key key : names) {
+      if (const auto value = keys.real(key)) return *value;
+    }
+    return otherwise;
+  };
+  if (name == method_of_code(7) && keys.real(kParallel1)) name = "Mercator_2SP";
+  MapParameters parameters;
+  parameters.latitude = first_of({kNaturalLatitude, kFalseOriginLatitude, kCentreLatitude}, 0.0);
+  parameters.longitude =
+      first_of({kNaturalLongitude, kFalseOriginLongitude, kCentreLongitude, kVerticalLongitude}, 0.0);
+  parameters.parallel_1 = first_of({kParallel1}, 0.0);
+  parameters.parallel_2 = first_of({kParallel2}, 0.0);
+  parameters.scale = first_of({kNaturalScale, kCentreScale}, 1.0);
+  parameters.azimuth = first_of({kAzimuth}, 0.0);
+  parameters.grid_angle = first_of({kGridAngle}, parameters.azimuth);
+  parameters.easting = first_of({kFalseEasting, kFalseOriginEasting, kCentreEasting}, 0.0);
+  parameters.northing = first_of({kFalseNorthing, kFalseOriginNorthing, kCentreNorthing}, 0.0);
+  if (is_utm) {
+    parameters.longitude = 6.0 * (zone % 100) - 183.0;
+    parameters.scale = 0.9996;
+    parameters.easting = 500000.0 / geo.metres_per_unit;
+    parameters.northing = (zone > 16100 ? 10000000.0 : 0.0) / geo.metres_per_unit;
+  }
+  return map_wkt(geo.system.name.empty() ? "unknown" : geo.system.name, geographic, name, parameters,
+                 geo.metres_per_unit);
+}
+
+/// Longitudes that are not counted from Greenwich, which are read as if they were by nobody's wish.
+void refuse_other_meridians(Keys& keys, double degrees, GeoTiffPlace& place) {
+  constexpr int kGreenwich = 8901;
+  std::optional<int>& code = place.georeference.system.epsg;
+  // EPSG's geographic systems on other meridians: "Bern 1898 (Bern)" to "Voirol 1879 (Paris)", "ATF (Paris)" to ...
+  const bool by_code = code && ((*code >= 4801 && *code <= 4821) || (*code >= 4901 && *code <= 4904));
+  if (by_code || keys.number(kPrimeMeridian).value_or(kGreenwich) != kGreenwich) {
+    throw Error(
+        ErrorCode::kUnsupported,
+        fmt::format("the reference system {} counts no degrees from Greenwich; gdalwarp brings the raster to one "
+                    "that does",
+                    code ? fmt::format("EPSG:{}", *code) : place.georeference.system.name));
+  }
+  if (degrees != 1.0) code.reset();  // its angles are degrees from now on
 }
 
 void read_system(Keys& keys, GeoTiffPlace& place, double& degrees) {
   ReferenceSystem& system = place.georeference.system;
-  std::optional<int> model = keys.number(kModelType);
-  if (model == kUserDefined || model == 0) model.reset();  // what ESRI's strings come with: the other keys tell
+  const std::optional<int> model = keys.code(kModelType);  // none comes with ESRI's strings: the other keys tell
   const std::optional<int> projected_crs = keys.number(kProjectedCrs);
   const std::string esri = esri_wkt(keys);
-  if (Georeference told; !model && !projected_crs && !esri.empty() && read_wkt(esri, told)) {
-    place.georeference.unit = told.unit;
-    place.georeference.metres_per_unit = told.metres_per_unit;
-    system = told.system;
-    read_vertical(keys, place);
+  if (SourceInfo told; !model && !projected_crs && !esri.empty() && read_wkt(esri, told)) {
+    place.georeference.unit = told.georeference.unit;
+    place.georeference.metres_per_unit = told.georeference.metres_per_unit;
+    place.vertical_unit = told.vertical_unit;
+    place.metres_per_vertical_unit = told.metres_per_vertical_unit;
+    system = told.georeference.system;
+    if (const std::string name = keys.text(kCitation); !name.empty() && !name.starts_with(kEsri)) system.name = name;
+    if (!system.vertical_epsg && system.vertical_datum.empty()) read_vertical(keys, place);
     return;
   }
   const bool projected = model ? *model == kModelProjected : projected_crs.has_value();
@@ -393,6 +504,11 @@ void read_system(Keys& keys, GeoTiffPlace& place, double& degrees) {
   read_ellipsoid(keys, system);
   const std::string citations = system.name + ' ' + keys.text(kCitation) + ' ' + keys.text(kGeodeticCitation) + ' ' +
                                 keys.text(kProjectedCitation);
+  if (projected && !system.epsg && system.wkt.empty()) system.wkt = map_from_keys(keys, place, degrees);
+  if (geographic) {
+    refuse_other_meridians(keys, degrees, place);
+    if (!system.epsg && system.wkt.empty()) system.wkt = geographic_beneath(keys, system, 1.0);
+  }
   // An EPSG code without anything else names a place on the Earth.
   system.body = body_of(citations, system.semi_major_axis_m);
   if (system.body.empty() && system.epsg) system.body = "Earth";
@@ -423,9 +539,11 @@ class KeyWriter {
     tags_.ascii += value + '|';
   }
 
-  /// The directory: version 1.1.0, the count, then the keys in order.
+  /// The directory: version 1.1.0, or 1.1.1 (GeoTIFF 1.1) where codes name vertical systems, which GDAL reads in that
+  /// alone; the count, then the keys in order.
   void finish() {
-    tags_.directory = {1, 1, 0, static_cast<std::uint16_t>(keys_.size())};
+    const std::uint16_t minor = keys_.contains(kVerticalCrs) ? 1 : 0;
+    tags_.directory = {1, 1, minor, static_cast<std::uint16_t>(keys_.size())};
     for (const auto& [key, entry] : keys_) {
       tags_.directory.insert(tags_.directory.end(), {key, entry.location, entry.count, entry.value});
     }
@@ -454,23 +572,23 @@ std::uint16_t code_or_user_defined(const std::optional<int>& epsg) {
   return epsg && *epsg > 0 && *epsg < kUserDefined ? static_cast<std::uint16_t>(*epsg) : kUserDefined;
 }
 
+void write_linear_unit(double metres, KeyWriter& keys) {
+  if (const auto code = linear_unit_code(metres)) return keys.number(kLinearUnits, *code);
+  keys.number(kLinearUnits, kUserDefined);
+  keys.real(kLinearUnitSize, metres);
+}
+
+/// A system by its code, or, of degrees, by its ellipsoid.
 void write_system(const Georeference& geo, KeyWriter& keys) {
   const ReferenceSystem& system = geo.system;
   const bool projected = geo.unit == HorizontalUnit::kMetre;
   keys.number(kModelType, projected ? kModelProjected : kModelGeographic);
   keys.number(projected ? kProjectedCrs : kGeodeticCrs, code_or_user_defined(system.epsg));
-  if (!projected) {
-    keys.number(kAngularUnits, kDegree);
-  } else if (const auto code = linear_unit_code(geo.metres_per_unit)) {
-    keys.number(kLinearUnits, *code);
-  } else {
-    keys.number(kLinearUnits, kUserDefined);
-    keys.real(kLinearUnitSize, geo.metres_per_unit);
-  }
   keys.text(kCitation, system.name);
-  if (!system.wkt.empty()) {
-    keys.text(projected ? kProjectedCitation : kGeodeticCitation, "ESRI PE String = " + system.wkt);
-  } else if (!projected) {
+  if (projected) {
+    write_linear_unit(geo.metres_per_unit, keys);
+  } else {
+    keys.number(kAngularUnits, kDegree);
     keys.text(kGeodeticCitation, system.name);
   }
   if (!system.semi_major_axis_m) return;
@@ -484,62 +602,24 @@ void write_system(const Georeference& geo, KeyWriter& keys) {
   }
 }
 
-/// Methods and parameters: GeoTIFF 1.0, sections 6.3.3.3 and 2.7, as readers of it know them.
-void write_projection(const ProjectionSpec& spec, KeyWriter& keys) {
-  constexpr std::uint16_t kTransverseMercator = 1;
-  constexpr std::uint16_t kMercator = 7;
-  constexpr std::uint16_t kLambertConformalTwoParallels = 8;
-  constexpr std::uint16_t kAzimuthalEquidistant = 12;
-  constexpr std::uint16_t kPolarStereographic = 15;
-  keys.number(kProjectedCrs, kUserDefined);
-  keys.number(kProjection, kUserDefined);
-  keys.number(kAngularUnits, kDegree);
-  const bool is_wgs84 = spec.ellipsoid == Ellipsoid{};
-  constexpr std::uint16_t kWgs84 = 4326;
-  keys.number(kGeodeticCrs, is_wgs84 ? kWgs84 : kUserDefined);
-  if (!is_wgs84) {
-    keys.number(kDatum, kUserDefined);
-    keys.number(kEllipsoid, kUserDefined);
-  }
-  switch (spec.kind) {
-    case ProjectionKind::kTransverseMercator:
-    case ProjectionKind::kUtm:
-      keys.number(kMethod, kTransverseMercator);
-      keys.real(kNaturalLatitude, spec.latitude_0);
-      keys.real(kNaturalLongitude, spec.longitude_0);
-      keys.real(kNaturalScale, spec.scale_0);
-      break;
-    case ProjectionKind::kLambertConformal:
-      keys.real(kParallel1, spec.parallel_1 == -spec.parallel_2 ? std::abs(spec.parallel_1) : spec.parallel_1);
-      if (spec.parallel_1 == -spec.parallel_2) {
-        keys.number(kMethod, kMercator);
-        keys.real(kNaturalLongitude, spec.longitude_0);
-        break;
-      }
-      keys.number(kMethod, kLambertConformalTwoParallels);
-      keys.real(kParallel2, spec.parallel_2);
-      keys.real(kFalseOriginLatitude, spec.latitude_0);
-      keys.real(kFalseOriginLongitude, spec.longitude_0);
-      keys.real(kFalseOriginEasting, spec.false_easting);
-      keys.real(kFalseOriginNorthing, spec.false_northing);
-      return;
-    case ProjectionKind::kPolarStereographic:
-      keys.number(kMethod, kPolarStereographic);
-      keys.real(kNaturalLatitude, spec.parallel_1);
-      keys.real(kVerticalLongitude, spec.longitude_0);
-      keys.real(kNaturalScale, 1.0);
-      break;
-    case ProjectionKind::kLocal:
-      keys.number(kMethod, kAzimuthalEquidistant);
-      keys.real(kCentreLatitude, spec.latitude_0);
-      keys.real(kCentreLongitude, spec.longitude_0);
-      break;
-    case ProjectionKind::kEquirectangular:
-    case ProjectionKind::kNone:
-      return;
-  }
-  keys.real(kFalseEasting, spec.false_easting);
-  keys.real(kFalseNorthing, spec.false_northing);
+/// A map without a code, in the way that ArcGIS and GDAL have for what keys cannot say: user-defined, and its WKT.
+void write_wkt(const Georeference& geo, const std::string& wkt, KeyWriter& keys) {
+  keys.number(kModelType, kUserDefined);
+  keys.text(kCitation, geo.system.name);
+  keys.text(kProjectedCitation, std::string(kEsri) + wkt);
+  write_linear_unit(geo.metres_per_unit, keys);
+}
+
+/// GDAL reads this much of a citation.
+constexpr std::size_t kLongestWkt = 2300;
+
+/// The WKT of a map without a code; of two dialects the shorter one where the first is too long for GDAL.
+std::string citation_wkt(const ReferenceSystem& system) {
+  const bool is_alone = !system.vertical_epsg;
+  if (is_alone && system.wkt.starts_with("PROJCS[") && system.wkt.size() <= kLongestWkt) return system.wkt;
+  std::string wkt = wkt_of(system, WktDialect::kGdal);
+  if (wkt.size() > kLongestWkt) wkt = wkt_of(system, WktDialect::kEsri);
+  return wkt;
 }
 
 void write_vertical(const ReferenceSystem& system, double metres_per_unit, const std::string& unit, KeyWriter& keys) {
@@ -583,8 +663,8 @@ GeoTiffPlace place_from_geotiff(const GeoTags& tags, std::int64_t rows) {
   return place;
 }
 
-GeoTags geotiff_tags(const Georeference& georeference, const std::optional<ProjectionSpec>& projection,
-                     double metres_per_vertical_unit, const std::string& vertical_unit) {
+GeoTags geotiff_tags(const Georeference& georeference, double metres_per_vertical_unit,
+                     const std::string& vertical_unit) {
   GeoTags tags;
   const bool has_unit = georeference.unit != HorizontalUnit::kUnknown;
   const bool has_spacing = georeference.spacing_x != 1.0 || georeference.spacing_y != 1.0;
@@ -602,12 +682,10 @@ GeoTags geotiff_tags(const Georeference& georeference, const std::optional<Proje
   }
   KeyWriter keys(tags);
   keys.number(kRasterType, georeference.registration == Registration::kPoint ? kRasterIsPoint : kRasterIsArea);
-  if (has_unit && projection) {
-    Georeference on_map = georeference;
-    on_map.system.wkt.clear();
-    write_system(on_map, keys);
-    write_projection(*projection, keys);
-    keys.text(kProjectedCitation, georeference.system.name);
+  const bool by_wkt =
+      georeference.unit == HorizontalUnit::kMetre && !georeference.system.epsg && !georeference.system.wkt.empty();
+  if (by_wkt) {
+    write_wkt(georeference, citation_wkt(georeference.system), keys);
   } else if (has_unit) {
     write_system(georeference, keys);
   }

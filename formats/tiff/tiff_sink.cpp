@@ -284,8 +284,7 @@ class TiffEncoder final : public RasterEncoder {
                                                  text(kGdalNodataTag, "GDALNoDataValue")};
     if (TIFFMergeFieldInfo(tiff_, fields.data(), static_cast<std::uint32_t>(fields.size())) != 0) fail();
     if (spec.georeference) {
-      const GeoTags tags =
-          geotiff_tags(*spec.georeference, spec.projection, spec.metres_per_vertical_unit, spec.vertical_unit);
+      const GeoTags tags = geotiff_tags(*spec.georeference, spec.metres_per_vertical_unit, spec.vertical_unit);
       set_counted(kPixelScaleTag, tags.pixel_scale);
       set_counted(kTiepointTag, tags.tiepoints);
       set_counted(kGeoDirectoryTag, tags.directory);

@@ -50,7 +50,8 @@ struct Sidecar {
 };
 
 /// The files that stand beside a raster of that name and spec: .hdr for GridFloat, .json (NAME.r16.json) for raw
-/// samples and, where spec.describe says so, PNG, and .prj for grids whose reference system has a WKT.
+/// samples and, where spec.describe says so, PNG, .prj for grids, and a world file and GDAL's .aux.xml for PNG and OpenEXR
+/// that lie somewhere.
 [[nodiscard]] std::vector<Sidecar> sidecars_of(const std::string& path, const RasterSpec& spec);
 
 /// The names of all that may stand beside a raster of that name.

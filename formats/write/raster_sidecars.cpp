@@ -9,6 +9,8 @@
 #include <nlohmann/json.hpp>
 
 #include "formats/files/text.h"
+#include "formats/georeference/files_beside.h"
+#include "formats/georeference/reference_system.h"
 #include "isohf/base/output_file.h"
 #include "isohf/error.h"
 
@@ -45,24 +47,64 @@ std::string grid_float_header(const RasterSpec& spec) {
       place.spacing_y, grid_void(spec));
 }
 
-/// ESRI's WKT of the reference system: as found, or made for WGS 84 in degrees and its UTM zones; else empty.
-std::string prj_text(const RasterSpec& spec) {
-  if (!spec.georeference) return {};
-  const ReferenceSystem& system = spec.georeference->system;
-  if (!system.wkt.empty()) return system.wkt;
+/// ESRI's WKT of the reference system, without PROJ for the commonest: WGS 84 in degrees and its UTM zones. Empty where
+/// nothing names the system.
+std::string esri_text(const ReferenceSystem& system) {
   const std::string wgs84 = R"(GEOGCS["GCS_WGS_1984",DATUM["D_WGS_1984",SPHEROID["WGS_1984",6378137.0,298.257223563]],)"
                             R"(PRIMEM["Greenwich",0.0],UNIT["Degree",0.0174532925199433]])";
-  const int epsg = system.epsg.value_or(0);
+  const int epsg = system.vertical_epsg ? 0 : system.epsg.value_or(0);
   if (epsg == 4326) return wgs84;
   const bool north = epsg > 32600 && epsg <= 32660;
   const bool south = epsg > 32700 && epsg <= 32760;
-  if (!north && !south) return {};
+  if (!north && !south) return wkt_of(system, WktDialect::kEsri);
   const int zone = epsg % 100;
   return fmt::format(
       R"(PROJCS["WGS_1984_UTM_Zone_{}{}",{},PROJECTION["Transverse_Mercator"],PARAMETER["False_Easting",500000.0],)"
       R"(PARAMETER["False_Northing",{}],PARAMETER["Central_Meridian",{}],PARAMETER["Scale_Factor",0.9996],)"
       R"(PARAMETER["Latitude_Of_Origin",0.0],UNIT["Meter",1.0]])",
       zone, north ? 'N' : 'S', wgs84, north ? "0.0" : "10000000.0", 6 * zone - 183);
+}
+
+std::string prj_text(const RasterSpec& spec) {
+  return spec.georeference ? esri_text(spec.georeference->system) : std::string();
+}
+
+std::string xml_text(const std::string& text) {
+  std::string escaped;
+  for (const char c : text) {
+    escaped += c == '<' ? "&lt;" : c == '&' ? "&amp;" : c == '>' ? "&gt;" : std::string(1, c);
+  }
+  return escaped;
+}
+
+/// GDAL's Persistent Auxiliary Metadata: the place, and of elevations what the numbers mean.
+std::string auxiliary_text(const RasterSpec& spec) {
+  const Georeference& place = *spec.georeference;
+  std::string text = "<PAMDataset>\n";
+  std::string system = wkt_of(place.system, WktDialect::kGdal);
+  if (system.empty() && place.system.epsg) system = fmt::format("EPSG:{}", *place.system.epsg);
+  if (!system.empty()) text += fmt::format("  <SRS>{}</SRS>\n", xml_text(system));
+  text += fmt::format("  <GeoTransform>{}, {}, 0, {}, 0, {}</GeoTransform>\n", place.origin_x - place.spacing_x / 2.0,
+                      place.spacing_x, place.origin_y + place.spacing_y / 2.0, -place.spacing_y);
+  if (place.registration != Registration::kUnknown) {
+    text += fmt::format("  <Metadata>\n    <MDI key=\"AREA_OR_POINT\">{}</MDI>\n  </Metadata>\n",
+                        place.registration == Registration::kPoint ? "Point" : "Area");
+  }
+  if (spec.channels == 1) {
+    text += "  <PAMRasterBand band=\"1\">\n";
+    if (spec.void_value) text += fmt::format("    <NoDataValue>{}</NoDataValue>\n", *spec.void_value);
+    if (!spec.vertical_unit.empty()) text += fmt::format("    <UnitType>{}</UnitType>\n", xml_text(spec.vertical_unit));
+    if (spec.z_scale != 1.0 || spec.z_offset != 0.0) {
+      text += fmt::format("    <Offset>{}</Offset>\n    <Scale>{}</Scale>\n", spec.z_offset, spec.z_scale);
+    }
+    text += "  </PAMRasterBand>\n";
+  }
+  return text + "</PAMDataset>\n";
+}
+
+/// The six numbers of a world file: the middle of the first sample, whatever samples stand for.
+std::string world_text(const Georeference& place) {
+  return fmt::format("{}\n0\n0\n{}\n{}\n{}\n", place.spacing_x, -place.spacing_y, place.origin_x, place.origin_y);
 }
 
 std::string json_text(const std::string& extension, const RasterSpec& spec) {
@@ -91,6 +133,7 @@ std::string json_text(const std::string& extension, const RasterSpec& spec) {
     }
     if (!place.system.name.empty()) json["crs_name"] = place.system.name;
     if (place.system.epsg) json["crs_epsg"] = *place.system.epsg;
+    if (!place.system.epsg && !place.system.wkt.empty()) json["crs_wkt"] = place.system.wkt;
     if (!place.system.body.empty()) json["body"] = place.system.body;
   }
   // What is no UTF-8 in a name found in a file must not keep it from being written.
@@ -120,7 +163,9 @@ std::vector<std::string> sidecar_paths(const std::string& path) {
   const auto beside = [&](const char* other) { return std::filesystem::path(path).replace_extension(other).string(); };
   if (extension == ".flt") return {beside(".hdr"), beside(".prj")};
   if (extension == ".asc") return {beside(".prj")};
-  const bool described = extension == ".r16" || extension == ".r32" || extension == ".raw" || extension == ".png";
+  if (extension == ".exr") return {world_file_name(path), path + ".aux.xml"};
+  if (extension == ".png") return {path + ".json", world_file_name(path), path + ".aux.xml"};
+  const bool described = extension == ".r16" || extension == ".r32" || extension == ".raw";
   return described ? std::vector<std::string>{path + ".json"} : std::vector<std::string>{};
 }
 
@@ -134,6 +179,10 @@ void check_sidecar_target(const std::string& path) {
   if (extension == ".json") {
     const auto json = nlohmann::json::parse(text, nullptr, false);
     is_kind = json.is_object() && json.contains("width") && json.contains("sample_type");
+  } else if (extension == ".xml") {
+    is_kind = text.starts_with("<pamdataset");
+  } else if (extension == ".pgw" || extension == ".erw") {
+    is_kind = text.find_first_not_of("0123456789+-.e \t\r\n") == std::string::npos;
   } else if (extension == ".hdr") {
     is_kind = text.find("ncols") != std::string::npos && text.find("nrows") != std::string::npos;
   } else {
@@ -158,6 +207,10 @@ std::vector<Sidecar> sidecars_of(const std::string& path, const RasterSpec& spec
   }
   const bool raw = extension == ".r16" || extension == ".r32" || extension == ".raw";
   if (raw || (extension == ".png" && spec.describe)) list.push_back({path + ".json", json_text(extension, spec)});
+  if ((extension == ".exr" || extension == ".png") && spec.georeference && spec.georeference->has_origin) {
+    list.push_back({world_file_name(path), world_text(*spec.georeference)});
+    list.push_back({path + ".aux.xml", auxiliary_text(spec)});
+  }
   return list;
 }
 

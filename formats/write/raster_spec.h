@@ -4,7 +4,6 @@
 #include <optional>
 #include <string>
 
-#include "isohf/projection.h"
 #include "isohf/raster.h"
 
 namespace isohf {
@@ -18,8 +17,7 @@ struct RasterSpec {
   int channels = 1;                  ///< 1 gray (Y), 3 RGB, 4 RGBA
   std::optional<double> void_value;  ///< raw value that means "no elevation"
   std::optional<Georeference> georeference;
-  std::optional<ProjectionSpec> projection;  ///< the map that the georeference is on, where no EPSG code names it
-  double z_scale = 1.0;                      ///< elevation = raw * z_scale + z_offset, in vertical units
+  double z_scale = 1.0;  ///< elevation = raw * z_scale + z_offset, in vertical units
   double z_offset = 0.0;
   std::string vertical_unit;  ///< "metre", ...; empty where unknown
   double metres_per_vertical_unit = 1.0;

@@ -77,9 +77,9 @@ struct Written {
   bool whole_codes;  ///< integers over the range of elevations
 };
 constexpr Written kFormats[] = {
-    {".tif", true, false, false}, {".exr", false, false, false}, {".png", true, false, true},
-    {".r16", true, false, true},  {".raw", true, false, true},   {".r32", true, false, false},
-    {".asc", true, true, false},  {".flt", true, true, false},   {".npy", false, false, false},
+    {".tif", true, false, false}, {".exr", true, false, false}, {".png", true, false, true},
+    {".r16", true, false, true},  {".raw", true, false, true},  {".r32", true, false, false},
+    {".asc", true, true, false},  {".flt", true, true, false},  {".npy", false, false, false},
 };
 
 class HalfPixel : public testing::Test {

@@ -9,6 +9,7 @@
 #include <thread>
 #include <vector>
 
+#include "formats/georeference/wkt.h"
 #include "formats/reader_failure.h"
 #include "formats/registry.h"
 #include "formats/tiff/geotiff_keys.h"
@@ -261,5 +262,145 @@ TEST_F(UnderstandSystem, AnEsriStringWithoutAModelIsWhatItSays) {
   }
 }
 
+SourceInfo read_as_prj(const std::string& text) {
+  SourceInfo info;
+  EXPECT_TRUE(read_prj(text, info)) << text;
+  return info;
+}
+
+TEST_F(UnderstandSystem, KeywordsOfArcInfoAreTheSystemThatTheySpell) {
+  const auto is = [](const std::string& keywords, const std::string& expected) {
+    const ReferenceSystem found = read_as_prj(keywords).georeference.system;
+    return understand_system(found.wkt)->is_same(*understand_system(expected));
+  };
+  EXPECT_TRUE(is("Projection    UTM\nZone          11\nDatum         NAD27\nUnits         METERS\nParameters\n",
+                 "+proj=utm +zone=11 +datum=NAD27"));
+  EXPECT_TRUE(is("Projection UTM\nZone -33\nDatum WGS84\nUnits METERS\n", "EPSG:32733"));
+  const std::string albers =
+      "Projection ALBERS\r\nDatum NAD83\r\nUnits METERS\r\nParameters\r\n29 30 0.000 /* 1st standard parallel\r\n"
+      "45 30 0.000 /* 2nd standard parallel\r\n-96 0 0.0 /* central meridian\r\n23 0 0.0 /* latitude of origin\r\n"
+      "0.0 /* false easting (meters)\r\n0.0 /* false northing (meters)\r\n";
+  EXPECT_TRUE(is(albers, "EPSG:5070"));
+  EXPECT_FALSE(is(albers, "EPSG:6350")) << "of another datum";
+  EXPECT_TRUE(is("Projection POLAR\nSpheroid GRS1980\nUnits METERS\nParameters\n-45 0 0\n70 0 0\n0\n0\n",
+                 "+proj=stere +lat_0=90 +lat_ts=70 +lon_0=-45 +ellps=GRS80"));
+  EXPECT_EQ(
+      read_as_prj("Projection TRANSVERSE\nDatum NAD27\nUnits FEET\nParameters\n0.9999\n-100 0 0\n40 0 0\n500000\n0\n")
+          .georeference.metres_per_unit,
+      1200.0 / 3937.0);
+  for (const char* unknown : {"Projection STATEPLANE\nZone 3476\nDatum NAD83\nUnits FEET\n", "Projection UTM\nZone 3\n",
+                              "Projection ALBERS\nDatum NAD83\nUnits METERS\nParameters\n29 30 0\n", "nonsense", ""}) {
+    SourceInfo info;
+    EXPECT_FALSE(read_prj(unknown, info)) << unknown;
+    EXPECT_EQ(info.georeference.unit, HorizontalUnit::kUnknown);
+  }
+}
+
+constexpr const char* kUtm17 =
+    R"(PROJCS["NAD_1983_UTM_Zone_17N",GEOGCS["GCS_North_American_1983",DATUM["D_North_American_1983",)"
+    R"(SPHEROID["GRS_1980",6378137.0,298.257222101]],PRIMEM["Greenwich",0.0],UNIT["Degree",0.0174532925199433]],)"
+    R"(PROJECTION["Transverse_Mercator"],PARAMETER["False_Easting",500000.0],PARAMETER["False_Northing",0.0],)"
+    R"(PARAMETER["Central_Meridian",-81.0],PARAMETER["Scale_Factor",0.9996],PARAMETER["Latitude_Of_Origin",0.0],)"
+    R"(UNIT["Meter",1.0]])";
+
+TEST_F(UnderstandSystem, HeightsOfAPrjHaveNameAndUnit) {
+  const std::string heights =
+      R"(,VERTCS["NAVD_1988",VDATUM["North_American_Vertical_Datum_1988"],)"
+      R"(PARAMETER["Vertical_Shift",0.0],PARAMETER["Direction",1.0],UNIT["Foot_US",0.3048006096]])";
+  const SourceInfo info = read_as_prj(kUtm17 + heights);
+  EXPECT_EQ(info.georeference.system.name, "NAD_1983_UTM_Zone_17N");
+  EXPECT_EQ(info.georeference.metres_per_unit, 1.0) << "not the heights' unit";
+  EXPECT_EQ(info.georeference.system.vertical_datum, "NAVD_1988");
+  EXPECT_EQ(info.vertical_unit, "US survey foot");
+  EXPECT_EQ(info.metres_per_vertical_unit, 1200.0 / 3937.0);
+  EXPECT_TRUE(understand_system(kUtm17 + heights)->is_same(*understand_system("EPSG:26917")));
+}
+
+TEST_F(UnderstandSystem, AnglesThatAreNoDegreesFromGreenwichAreRefused) {
+  for (const char* beneath : {R"(PRIMEM["Paris",2.5969213],UNIT["Grad",0.01570796326794897])",
+                              R"(PRIMEM["Greenwich",0],UNIT["Grad",0.01570796326794897])",
+                              R"(PRIMEM["Paris",2.337229],UNIT["Degree",0.0174532925199433])"}) {
+    const std::string wkt =
+        R"(GEOGCS["NTF",DATUM["NTF",SPHEROID["Clarke",6378249.2,293.46602]],)" + std::string(beneath) + "]";
+    SourceInfo info;
+    EXPECT_THAT(std::string(error_of([&] { (void)read_wkt(wkt, info); }).what()), HasSubstr("gdalwarp"));
+    EXPECT_EQ(info.georeference.unit, HorizontalUnit::kUnknown);
+  }
+}
+
+TEST_F(UnderstandSystem, TakesWhatTheUserNames) {
+  SourceInfo info;
+  take_system("EPSG:2263+6360", info);
+  EXPECT_EQ(info.georeference.unit, HorizontalUnit::kMetre);
+  EXPECT_EQ(info.georeference.metres_per_unit, 1200.0 / 3937.0);
+  EXPECT_EQ(info.georeference.system.epsg, 2263);
+  EXPECT_EQ(info.georeference.system.vertical_epsg, 6360);
+  EXPECT_EQ(info.metres_per_vertical_unit, 1200.0 / 3937.0);
+  take_system("IAU_2015:49900", info);
+  EXPECT_EQ(info.georeference.unit, HorizontalUnit::kDegree);
+  EXPECT_EQ(info.georeference.system.body, "Mars");
+  EXPECT_FALSE(info.georeference.system.epsg);
+  EXPECT_THAT(info.georeference.system.wkt, StartsWith("GEOGCRS[\"Mars"));
+  EXPECT_EQ(info.georeference.system.vertical_epsg, 6360) << "nothing was said of heights";
+  EXPECT_THAT(std::string(error_of([&] { take_system("EPSG:4807", info); }).what()), HasSubstr("Greenwich"));
+  EXPECT_THAT(std::string(error_of([&] { take_system("EPSG:32632+5831", info); }).what()), HasSubstr("depths"));
+  EXPECT_THAT(std::string(error_of([&] { take_system("EPSG:5773", info); }).what()),
+              HasSubstr("no projected or geographic"));
+  EXPECT_THAT(std::string(error_of([&] { take_system("no system", info); }).what()), HasSubstr("does not understand"));
+}
+
+TEST_F(UnderstandSystem, OneParameterMakesAnotherSystem) {
+  const auto system = [](const std::string& text) {
+    ReferenceSystem found;
+    if (text.starts_with("EPSG:")) {
+      found.epsg = std::stoi(text.substr(5));
+    } else {
+      found.wkt = understand_system(text)->description().wkt2;
+    }
+    return found;
+  };
+  const ReferenceSystem utm = system(kUtm17);
+  EXPECT_EQ(are_same(utm, system("EPSG:26917")), true);
+  EXPECT_EQ(are_same(utm, system("EPSG:26918")), false);
+  EXPECT_EQ(are_same(utm, system("EPSG:32617")), false) << "of another datum";
+  EXPECT_EQ(are_same(utm, ReferenceSystem{}), std::nullopt);
+  const ReferenceSystem laea = system("+proj=laea +lat_0=47 +lon_0=11 +ellps=GRS80");
+  EXPECT_EQ(are_same(laea, laea), true);
+  for (const char* other :
+       {"+proj=laea +lat_0=47.0001 +lon_0=11 +ellps=GRS80", "+proj=laea +lat_0=47 +lon_0=11 +x_0=1 +ellps=GRS80",
+        "+proj=laea +lat_0=47 +lon_0=11 +ellps=intl", "+proj=laea +lat_0=47 +lon_0=11 +ellps=GRS80 +units=us-ft",
+        "+proj=aeqd +lat_0=47 +lon_0=11 +ellps=GRS80"}) {
+    EXPECT_EQ(are_same(laea, system(other)), false) << other;
+  }
+}
+
+TEST_F(UnderstandSystem, MapsThatKeysSpellOutAreMapsOfTheirParameters) {
+  // Lambert azimuthal equal area, 47 N 11 E, on ETRS89, kilometres; then one parameter less, and an unknown method.
+  const auto keys = [](std::uint16_t method, bool has_latitude) {
+    GeoTags tags = tags_of({1024,  0,     1,
+                            1,     1025,  0,
+                            1,     1,     2048,
+                            0,     1,     4258,
+                            3072,  0,     1,
+                            32767, 3074,  0,
+                            1,     32767, 3075,
+                            0,     1,     method,
+                            3076,  0,     1,
+                            9036,  3088,  34736,
+                            1,     0,     static_cast<std::uint16_t>(has_latitude ? 3089 : 3092),
+                            34736, 1,     1});
+    tags.doubles = {11.0, has_latitude ? 47.0 : 1.0};
+    return place_from_geotiff(tags, 10);
+  };
+  const GeoTiffPlace laea = keys(10, true);
+  EXPECT_TRUE(laea.warnings.empty());
+  const auto expected = understand_system("+proj=laea +lat_0=47 +lon_0=11 +ellps=GRS80 +units=km");
+  const MapPoint at = understand_system(laea.georeference.system.wkt)->map_from_geo({12.0, 48.0});
+  EXPECT_NEAR(at.easting, expected->map_from_geo({12.0, 48.0}).easting, 1e-9);
+  EXPECT_NEAR(at.northing, expected->map_from_geo({12.0, 48.0}).northing, 1e-9);
+  EXPECT_EQ(are_same(laea.georeference.system, keys(10, false).georeference.system), false);
+  ASSERT_EQ(keys(99, true).warnings.size(), 1U);
+  EXPECT_THAT(keys(99, true).warnings[0].c_str(), HasSubstr("99"));
+}
 }  // namespace
 }  // namespace isohf::test

@@ -41,6 +41,7 @@ constexpr std::pair<std::string_view, std::string_view> kSpellings[] = {
     {"part", "--part"},
     {"projection", "--projection"},
     {"raw", "--raw"},
+    {"reference_system", "--crs"},
     {"registration", "--registration"},
     {"resume", "--resume"},
     {"sample_spacing", "--sample-spacing"},

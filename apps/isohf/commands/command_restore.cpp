@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "commands/command.h"
+#include "formats/georeference/reference_system.h"
 #include "formats/registry.h"
 #include "interrupt.h"
 #include "isohf/base/sample.h"
@@ -83,10 +84,30 @@ std::optional<RestoreOptions> parse(const Arguments& arguments) {
   return options;
 }
 
+/// A system is named and spelled in many ways: the archive's, where the raster's is that.
+SourceInfo in_words_of(const Metadata& metadata, SourceInfo other) {
+  const auto own = grid_georeference(metadata, natural_grid(metadata));
+  const Georeference source = source_georeference(metadata.source);
+  ReferenceSystem& theirs = other.georeference.system;
+  for (const Georeference& known : {own.value_or(source), source}) {
+    if (are_same(known.system, theirs) == true) {
+      theirs = known.system;
+      return other;
+    }
+  }
+  const bool on_maps = source.unit == HorizontalUnit::kMetre && other.georeference.unit == HorizontalUnit::kMetre;
+  if (on_maps && !is_warped(metadata) && are_same(source.system, theirs) == false) {
+    throw Error(ErrorCode::kInvalidArgument,
+                fmt::format("{}: is in \"{}\", the archive's source in \"{}\"; bring it to that (gdalwarp)", other.path,
+                            theirs.name, source.system.name));
+  }
+  return other;
+}
+
 /// Of the raster in --like.
 SampleGrid grid_of_other(const RestoreOptions& options, const Metadata& metadata) {
   const OpenedInputs like = open_inputs(expand_inputs({options.like}, false), {}, {}, options.work.threads);
-  const SourceInfo& other = like.source->info();
+  const SourceInfo other = in_words_of(metadata, like.source->info());
   std::vector<std::string> warnings;
   std::optional<SampleGrid> grid = grid_like(metadata, other, warnings);
   for (const std::string& warning : warnings) {

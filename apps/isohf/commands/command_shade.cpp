@@ -146,9 +146,6 @@ int run(ShadeCommand options) {
   spec.sample_type = SampleType::kUint8;
   spec.channels = static_cast<int>(kShadeChannels);
   spec.georeference = georeference_of(archive.metadata(), size);
-  if (is_warped(archive.metadata()) && !spec.georeference->system.epsg) {
-    spec.projection = archive.metadata().projection->spec;
-  }
   spec.overwrite = options.overwrite;
   const auto sink = create_raster(options.output, spec);
 

@@ -1,8 +1,12 @@
 #include "options/options_source.h"
 
+#include <cctype>
 #include <cmath>
+#include <filesystem>
+#include <vector>
 
 #include "formats/readers.h"
+#include "isohf/base/output_file.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
 #include "isohf/surface/decorate/filled_source.h"
@@ -10,6 +14,25 @@
 #include "options/option_values.h"
 
 namespace isohf::cli {
+namespace {
+
+/// What is called so is a file that holds the text (a .prj), else the text itself.
+std::string system_from(const std::string& text) {
+  constexpr std::size_t kMostBytes = 65536;
+  std::error_code ignored;
+  if (text.empty())
+    throw Error(ErrorCode::kInvalidArgument, "found '', must be EPSG:2154, WKT, a PROJ string or a file");
+  if (!std::filesystem::is_regular_file(text, ignored)) return text;
+  const std::vector<std::byte> bytes = head_of_file(text, kMostBytes);
+  std::string held(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  while (!held.empty() && std::isspace(static_cast<unsigned char>(held.back())) != 0) held.pop_back();
+  if (held.empty() || held.find('\0') != held.npos) {
+    throw Error(ErrorCode::kInvalidArgument, "found '" + text + "', a file that must hold WKT or a PROJ string");
+  }
+  return held;
+}
+
+}  // namespace
 
 void add_source_options(CommandLine& line, OpenOptions& options) {
   line.group("Input");
@@ -69,6 +92,11 @@ void add_source_options(CommandLine& line, OpenOptions& options) {
   line.option("--sample-spacing", "METRES",
               "Set the distance of neighbouring samples, instead of the file's: metres, or with a unit as in 100ft",
               [&](const std::string& text) { options.spacing = parse_length(text).value; });
+  line.option("--crs", "SYSTEM",
+              "Take the coordinates for those of this reference system, whatever the file says: EPSG:2154, WKT, a PROJ "
+              "string, or a file with one of them",
+              [&](const std::string& text) { options.reference_system = system_from(text); });
+  line.exclusive({"--crs", "--sample-spacing"});
 }
 
 std::unique_ptr<HeightSource> open_input(const std::string& path, const OpenOptions& options) {

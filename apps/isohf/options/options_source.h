@@ -11,7 +11,7 @@ namespace isohf::cli {
 
 /// The group "Input", what a user may say about an input: --channel, --part, --encoding, --registration, --nodata,
 /// --valid-range, --fill,
-/// --fill-distance, --z-scale, --z-offset, --raw, --sample-spacing.
+/// --fill-distance, --z-scale, --z-offset, --raw, --sample-spacing, --crs.
 void add_source_options(CommandLine& line, OpenOptions& options);
 
 /// Opens the input with all of them: its voids are treated as options.voids says.

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "formats/files/text.h"
+#include "formats/georeference/units.h"
 #include "isohf/error.h"
 #include "output/standard_output.h"
 
@@ -24,6 +25,7 @@ RasterSpec plain_spec(const Metadata& metadata, const SampleGrid& grid, const Sa
   if (void_value && !std::isnan(*void_value)) spec.void_value = void_value;
   spec.describe = true;
   if (metadata.vertical_unit != "unknown") spec.vertical_unit = metadata.vertical_unit;
+  if (const auto unit = linear_unit(spec.vertical_unit)) spec.metres_per_vertical_unit = unit->metres;
   return spec;
 }
 
@@ -71,9 +73,6 @@ RasterSpec raster_spec(const Metadata& metadata, const SampleGrid& grid, const S
                        std::optional<double> void_value) {
   RasterSpec spec = plain_spec(metadata, grid, mapping, void_value);
   spec.georeference = grid_georeference(metadata, grid);
-  if (is_warped(metadata) && !grid.in_degrees && !spec.georeference->system.epsg) {
-    spec.projection = metadata.projection->spec;
-  }
   return spec;
 }
 

@@ -123,6 +123,8 @@ void check_same_system(const Metadata& metadata, const SourceInfo& other) {
     const double metres = source.spacing_x / source.crs_spacing_x;
     same = same && std::abs(theirs.metres_per_unit - metres) <= 1e-9 * metres &&
            (!source.crs_epsg || !theirs.system.epsg || source.crs_epsg == theirs.system.epsg);
+    const bool by_text = !source.crs_epsg && !theirs.system.epsg && !theirs.system.wkt.empty();
+    if (by_text && !source.crs_wkt.empty()) same = same && source.crs_wkt == theirs.system.wkt;
   }
   if (same) return;
   refuse(fmt::format("{}: is in {}, the archive's source in {}; bring it to that (gdalwarp)", other.path,

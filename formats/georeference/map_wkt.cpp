@@ -1,0 +1,152 @@
+#include "formats/georeference/map_wkt.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cmath>
+#include <numbers>
+
+#include "formats/files/text.h"
+#include "formats/georeference/units.h"
+
+namespace isohf {
+namespace {
+
+/// A method as keys and WKT 1 name it: what its origin is called there, and which parameters it has besides: 1 and 2 are
+/// standard parallels, k a scale, a the azimuth and the angle of the grid.
+struct Method {
+  int code;
+  std::string_view name;
+  const char* latitude;  ///< nullptr: it has none
+  const char* longitude;
+  std::string_view parameters;
+};
+
+constexpr const char* kOriginLatitude = "latitude_of_origin";
+constexpr const char* kMeridian = "central_meridian";
+constexpr const char* kMiddleLatitude = "latitude_of_center";
+constexpr const char* kMiddleLongitude = "longitude_of_center";
+
+// Codes: GeoTIFF 1.0, section 6.3.3.3; names: OGC 01-009 and GDAL.
+constexpr std::array<Method, 27> kMethods = {{
+    {1, "Transverse_Mercator", kOriginLatitude, kMeridian, "k"},
+    {3, "Hotine_Oblique_Mercator_Azimuth_Center", kMiddleLatitude, kMiddleLongitude, "ka"},
+    {9812, "Hotine_Oblique_Mercator", kMiddleLatitude, kMiddleLongitude, "ka"},
+    {9815, "Hotine_Oblique_Mercator_Azimuth_Center", kMiddleLatitude, kMiddleLongitude, "ka"},
+    {5, "Swiss_Oblique_Cylindrical", kMiddleLatitude, kMiddleLongitude, ""},
+    {7, "Mercator_1SP", kOriginLatitude, kMeridian, "k"},
+    {0, "Mercator_2SP", nullptr, kMeridian, "1"},
+    {8, "Lambert_Conformal_Conic_2SP", kOriginLatitude, kMeridian, "12"},
+    {9, "Lambert_Conformal_Conic_1SP", kOriginLatitude, kMeridian, "k"},
+    {10, "Lambert_Azimuthal_Equal_Area", kMiddleLatitude, kMiddleLongitude, ""},
+    {11, "Albers_Conic_Equal_Area", kMiddleLatitude, kMiddleLongitude, "12"},
+    {12, "Azimuthal_Equidistant", kMiddleLatitude, kMiddleLongitude, ""},
+    {13, "Equidistant_Conic", kMiddleLatitude, kMiddleLongitude, "12"},
+    {14, "Stereographic", kOriginLatitude, kMeridian, "k"},
+    {15, "Polar_Stereographic", kOriginLatitude, kMeridian, "k"},
+    {16, "Oblique_Stereographic", kOriginLatitude, kMeridian, "k"},
+    {17, "Equirectangular", kOriginLatitude, kMeridian, "1"},
+    {18, "Cassini_Soldner", kOriginLatitude, kMeridian, ""},
+    {19, "Gnomonic", kOriginLatitude, kMeridian, ""},
+    {20, "Miller_Cylindrical", kMiddleLatitude, kMiddleLongitude, ""},
+    {21, "Orthographic", kOriginLatitude, kMeridian, ""},
+    {22, "Polyconic", kOriginLatitude, kMeridian, ""},
+    {23, "Robinson", nullptr, kMiddleLongitude, ""},
+    {24, "Sinusoidal", nullptr, kMiddleLongitude, ""},
+    {25, "VanDerGrinten", nullptr, kMeridian, ""},
+    {26, "New_Zealand_Map_Grid", kOriginLatitude, kMeridian, ""},
+    {28, "Cylindrical_Equal_Area", nullptr, kMeridian, "1"},
+}};
+
+/// Quotes end names.
+std::string quoted(std::string name) {
+  std::replace(name.begin(), name.end(), '"', '\'');
+  return '"' + name + '"';
+}
+
+}  // namespace
+
+std::string_view method_of_code(int code) {
+  const auto* const found = std::ranges::find(kMethods, code, &Method::code);
+  return code == 0 || found == kMethods.end() ? std::string_view() : found->name;
+}
+
+std::string map_wkt(const std::string& name, const std::string& geographic, std::string_view method,
+                    const MapParameters& parameters, double metres_per_unit) {
+  const auto* const found = std::ranges::find(kMethods, method, &Method::name);
+  if (found == kMethods.end()) return {};
+  std::string text = fmt::format("PROJCS[{},{},PROJECTION[\"{}\"]", quoted(name), geographic, method);
+  const auto add = [&](const char* what, double value) { text += fmt::format(",PARAMETER[\"{}\",{}]", what, value); };
+  if (found->latitude != nullptr) add(found->latitude, parameters.latitude);
+  add(found->longitude, parameters.longitude);
+  for (const char parameter : found->parameters) {
+    if (parameter == '1') add("standard_parallel_1", parameters.parallel_1);
+    if (parameter == '2') add("standard_parallel_2", parameters.parallel_2);
+    if (parameter == 'k') add("scale_factor", parameters.scale);
+    if (parameter != 'a') continue;
+    add("azimuth", parameters.azimuth);
+    add("rectified_grid_angle", parameters.grid_angle);
+  }
+  add("false_easting", parameters.easting);
+  add("false_northing", parameters.northing);
+  return text + fmt::format(",UNIT[\"{}\",{}],AXIS[\"Easting\",EAST],AXIS[\"Northing\",NORTH]]",
+                            linear_unit_name(metres_per_unit), metres_per_unit);
+}
+
+std::string geographic_wkt(const std::string& name, const std::string& datum, const std::string& ellipsoid,
+                           double semi_major_axis_m, double inverse_flattening, double degrees_per_unit) {
+  const bool is_degree = degrees_per_unit == 1.0;
+  return fmt::format("GEOGCS[{},DATUM[{},SPHEROID[{},{},{}]],PRIMEM[\"Greenwich\",0],UNIT[\"{}\",{}]]", quoted(name),
+                     quoted(datum), quoted(ellipsoid), semi_major_axis_m, inverse_flattening,
+                     is_degree ? "degree" : "angle",
+                     is_degree ? 0.0174532925199433 : degrees_per_unit * std::numbers::pi / 180.0);
+}
+
+std::string planetary_wkt(const PlanetaryMap& map) {
+  std::string kind;
+  for (const char c : upper_case(map.projection)) {
+    if (std::isalpha(static_cast<unsigned char>(c)) != 0) kind += c;
+  }
+  struct Known {
+    std::string_view kind;
+    std::string_view method;
+  };
+  static constexpr std::array<Known, 13> kKnown = {{{"SIMPLECYLINDRICAL", "Equirectangular"},
+                                                    {"EQUIRECTANGULAR", "Equirectangular"},
+                                                    {"EQUIDISTANTCYLINDRICAL", "Equirectangular"},
+                                                    {"SINUSOIDAL", "Sinusoidal"},
+                                                    {"POLARSTEREOGRAPHIC", "Polar_Stereographic"},
+                                                    {"STEREOGRAPHIC", "Stereographic"},
+                                                    {"MERCATOR", "Mercator_1SP"},
+                                                    {"TRANSVERSEMERCATOR", "Transverse_Mercator"},
+                                                    {"ORTHOGRAPHIC", "Orthographic"},
+                                                    {"LAMBERTCONFORMAL", "Lambert_Conformal_Conic_2SP"},
+                                                    {"LAMBERTCONFORMALCONIC", "Lambert_Conformal_Conic_2SP"},
+                                                    {"LAMBERTAZIMUTHALEQUALAREA", "Lambert_Azimuthal_Equal_Area"},
+                                                    {"", ""}}};
+  const auto* const known = std::ranges::find(kKnown, kind, &Known::kind);
+  if (known == kKnown.end() || !(map.equatorial_radius_m > 0.0)) return {};
+  const double a = map.equatorial_radius_m;
+  const double c = map.polar_radius_m > 0.0 ? map.polar_radius_m : a;
+  MapParameters parameters = map.parameters;
+  double radius = a;
+  const bool is_cylinder = known->method == "Equirectangular";
+  if (is_cylinder) {
+    parameters.parallel_1 = kind == "SIMPLECYLINDRICAL" ? 0.0 : parameters.latitude;
+    parameters.latitude = 0.0;
+    const double latitude = parameters.parallel_1 * std::numbers::pi / 180.0;
+    radius = a * c / std::hypot(c * std::cos(latitude), a * std::sin(latitude));
+  } else if (known->method == "Polar_Stereographic" ||
+             (known->method == "Stereographic" && std::abs(parameters.latitude) == 90.0)) {
+    radius = c;
+  }
+  const bool on_sphere = is_cylinder || !map.planetographic || a == c;
+  const std::string beneath = geographic_wkt("GCS_" + map.target, "D_" + map.target, map.target, on_sphere ? radius : a,
+                                             on_sphere ? 0.0 : a / (a - c));
+  if (known->method.empty()) return beneath;
+  return map_wkt(map.projection + ' ' + map.target, beneath, known->method, parameters, 1.0);
+}
+
+}  // namespace isohf

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace isohf {
+
+/// The parameters of a map: degrees, and units of the map.
+struct MapParameters {
+  double latitude = 0.0;  ///< of the origin or the centre
+  double longitude = 0.0;
+  double parallel_1 = 0.0;
+  double parallel_2 = 0.0;
+  double scale = 1.0;
+  double azimuth = 0.0;
+  double grid_angle = 0.0;
+  double easting = 0.0;
+  double northing = 0.0;
+};
+
+/// What the code of a method in GeoTIFF's keys (1.0, section 6.3.3.3) is called in WKT 1; empty for an unknown one.
+[[nodiscard]] std::string_view method_of_code(int code);
+
+/// A projected system in WKT 1 as GDAL writes it; of the parameters those that the method has. `method` is one of
+/// method_of_code() or "Mercator_2SP"; `geographic` the WKT of the system beneath.
+[[nodiscard]] std::string map_wkt(const std::string& name, const std::string& geographic, std::string_view method,
+                                  const MapParameters& parameters, double metres_per_unit);
+
+/// A geographic system on an ellipsoid (inverse flattening 0: a sphere), from Greenwich or what the body has for it.
+[[nodiscard]] std::string geographic_wkt(const std::string& name, const std::string& datum,
+                                         const std::string& ellipsoid, double semi_major_axis_m,
+                                         double inverse_flattening, double degrees_per_unit = 1.0);
+
+/// A map of a planet or moon, as its agencies' labels describe it.
+struct PlanetaryMap {
+  std::string
+      projection;  ///< "SimpleCylindrical", "POLAR STEREOGRAPHIC", ...: in any case, with and without blanks; empty: degrees
+  std::string target;  ///< "Mars"
+  double equatorial_radius_m = 0.0;
+  double polar_radius_m = 0.0;
+  bool planetographic = false;  ///< latitudes are those of normals on the ellipsoid; else of a sphere
+  MapParameters parameters;
+};
+
+/// Its WKT, as GDAL understands the labels: maps of planetocentric latitudes lie on a sphere of the equatorial radius,
+/// polar ones on that of the polar radius. Empty for a projection that is not known.
+[[nodiscard]] std::string planetary_wkt(const PlanetaryMap& map);
+
+}  // namespace isohf
