@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -193,6 +194,14 @@ TEST_F(ShadeCommand, AnySizeWorks) {
   EXPECT_LT(red.width, 250);
 }
 
+TEST_F(ShadeCommand, ASingleSizeIsTheLongerSide) {
+  const Channel whole = read_channel(draw({}), "1");
+  const Channel half = read_channel(draw({"--size", std::to_string(std::max(whole.width, whole.height) / 2)}), "1");
+  EXPECT_EQ(std::max(half.width, half.height), std::max(whole.width, whole.height) / 2);
+  EXPECT_NEAR(static_cast<double>(half.width) / static_cast<double>(half.height),
+              static_cast<double>(whole.width) / static_cast<double>(whole.height), 0.02);
+}
+
 TEST_F(ShadeCommand, RefusesWrongUsage) {
   (void)draw({});
   const auto code = [&](std::vector<std::string> more) {
@@ -205,7 +214,8 @@ TEST_F(ShadeCommand, RefusesWrongUsage) {
                                              {"--sun-elevation", "x"},
                                              {"--azimuth", "N"},
                                              {"--size", "0x5"},
-                                             {"--size", "5"},
+                                             {"--size", "0"},
+                                             {"--size", "5.5"},
                                              {"--exaggeration", "0"},
                                              {"--palette", "blue"},
                                              {"--shadow-softness", "-1"},
