@@ -35,8 +35,10 @@ Json parse_json(const std::string& text) {
       if (depth > kMaxDepth) refuse_metadata("JSON", fmt::format("nests deeper than {}", kMaxDepth));
       return true;
     });
-  } catch (const Json::exception& error) {
-    refuse_metadata("is no valid JSON", error.what());
+  } catch (const Json::parse_error& error) {
+    refuse_metadata("JSON", fmt::format("ends or breaks off its grammar at byte {}", error.byte));
+  } catch (const Json::exception&) {
+    refuse_metadata("JSON", "has a number that no float64 holds");
   }
 }
 
