@@ -12,7 +12,6 @@ int main(int argc, char** argv) {
     isohf::ShadeOptions options;
     options.size = isohf::GridSize{640, 480};
     options.sun_elevation_deg = 20.0;
-    options.hillshade = true;
     const isohf::Picture picture = isohf::shade(archive, options);
     std::ofstream file(argv[2], std::ios::binary);
     file << "P6 " << picture.width << ' ' << picture.height << " 255\n";

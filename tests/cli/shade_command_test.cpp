@@ -1,14 +1,20 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstring>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <numbers>
 
 #include "formats/registry.h"
 #include "isohf/archive.h"
 #include "isohf/raster.h"
+#include "support/gdal_answers.h"
 #include "support/place_at.h"
 #include "support/plain_tiff.h"
 #include "support/raster.h"
@@ -105,33 +111,184 @@ TEST_F(ShadeCommand, NoShadowLeavesLevelLandAlike) {
   EXPECT_EQ(green.at(kWall + 20, 60), green.at(kWall - 20, 60));
 }
 
-TEST_F(ShadeCommand, SeedsGiveTheSamePicture) {
-  for (const char* azimuth : {"E", "W"}) {
-    const std::vector<std::string> options = {"--sun-elevation", "7",       "--azimuth",      azimuth, "--hillshade",
-                                              "--size",          "400x240", "--exaggeration", "1.7"};
-    const Channel without = read_channel(draw(options, {}, "1.tif"), "1");
-    const Channel with = read_channel(draw(options, {"--shadow-seeds"}, "2.tif"), "1");
-    int differing = 0;
-    for (std::size_t i = 0; i < without.bytes.size(); ++i) {
-      const int off = std::abs(static_cast<int>(without.bytes[i]) - static_cast<int>(with.bytes[i]));
-      ASSERT_LE(off, 1);  // the last bit of a shadow's height
-      differing += off;
+/// Ranks of values, ties sharing the mean of theirs, and how two rankings go together: 1 where they are the same.
+double spearman(const std::vector<std::byte>& a, const std::vector<std::byte>& b) {
+  const auto ranks = [](const std::vector<std::byte>& values) {
+    std::array<double, 256> counts{};
+    for (const std::byte value : values) counts[static_cast<std::size_t>(value)] += 1.0;
+    std::array<double, 256> rank{};
+    double below = 0.0;
+    for (std::size_t i = 0; i < counts.size(); ++i) {
+      rank[i] = below + counts[i] / 2.0;
+      below += counts[i];
     }
-    EXPECT_LT(differing, 100);
-  }
-  const auto used = [&](const char* sun) {
-    return json::parse(run_isohf({"shade", folder / "a.isohf", "-o", folder / "3.tif", "--overwrite", "--json",
-                                  "--sun-elevation", sun})
-                           .out)
-        .at("used_shadow_seeds")
-        .get<bool>();
+    return rank;
   };
-  EXPECT_TRUE(used("7"));
-  EXPECT_FALSE(used("1"));  // lower than --sun-min
+  const auto rank_a = ranks(a);
+  const auto rank_b = ranks(b);
+  const double middle = static_cast<double>(a.size()) / 2.0;
+  double ab = 0.0;
+  double aa = 0.0;
+  double bb = 0.0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    const double x = rank_a[static_cast<std::size_t>(a[i])] - middle;
+    const double y = rank_b[static_cast<std::size_t>(b[i])] - middle;
+    ab += x * y;
+    aa += x * x;
+    bb += y * y;
+  }
+  return ab / std::sqrt(aa * bb);
+}
+
+TEST_F(ShadeCommand, HillshadesRankPixelsAsGdalDoes) {
+  if (!has_gdal()) GTEST_SKIP() << "gdaldem is not installed (Debian: gdal-bin)";
+  const std::string input = ISOHF_SOURCE_DIR "/testdata/coast_512x384_int16.tif";
+  ASSERT_EQ(run_isohf({"convert", input, folder / "r.isohf", "-q"}).exit_code, 0);
+  const Channel source = read_channel(input, "0");
+  const std::string size = fmt::format("{}x{}", source.width, source.height);
+  for (const std::vector<std::string>& light :
+       std::vector<std::vector<std::string>>{{}, {"-az", "200", "-alt", "30"}, {"-multidirectional"}, {"-z", "0.5"}}) {
+    std::vector<std::string> theirs = {"gdaldem", "hillshade", input, folder / "g.tif", "-q", "-compute_edges"};
+    theirs.insert(theirs.end(), light.begin(), light.end());
+    ASSERT_EQ(run_gdal(theirs).exit_code, 0);
+    std::vector<std::string> ours = {"shade", folder / "r.isohf", folder / "h.tif", "--overwrite", "-q", "--size",
+                                     size};
+    if (light.empty() || light[0] != "-multidirectional") ours.emplace_back("--hillshade");
+    for (const std::string& word : light) {
+      const std::map<std::string, std::string> names = {{"-az", "--azimuth"},
+                                                        {"-alt", "--altitude"},
+                                                        {"-z", "--z-factor"},
+                                                        {"-multidirectional", "--multidirectional"}};
+      ours.push_back(names.contains(word) ? names.at(word) : word);
+    }
+    const RunResult made = run_isohf(ours);
+    ASSERT_EQ(made.exit_code, 0) << made.err;
+    const Channel a = read_channel(folder / "g.tif", "");
+    const Channel b = read_channel(folder / "h.tif", "");
+    ASSERT_EQ(a.bytes.size(), b.bytes.size());
+    EXPECT_GE(spearman(a.bytes, b.bytes), 0.99) << fmt::format("{}", fmt::join(light, " "));
+    EXPECT_NEAR(a.place.origin_x, b.place.origin_x, 1e-6);
+  }
+}
+
+// A plane that rises by 1 in 2 towards the East and falls by 1 in 4 towards the South.
+TEST_F(ShadeCommand, SlopesAspectsAndHillshadesOfAPlaneAreThoseOfItsNormal) {
+  write_int16_tiff(folder / "plane.tif", 40, 30,
+                   [](std::int64_t c, std::int64_t r) { return static_cast<std::int16_t>(100 + 2 * c - r); });
+  ASSERT_EQ(
+      run_isohf({"convert", folder / "plane.tif", folder / "p.isohf", "-q", "--sample-spacing", "4", "--type", "f32"})
+          .exit_code,
+      0);
+  const auto value = [&](const std::vector<std::string>& kind, std::int64_t column, std::int64_t row) {
+    std::vector<std::string> shade = {"shade", folder / "p.isohf", folder / "p.tif", "--overwrite",
+                                      "-q",    "--size",           "40x30"};
+    shade.insert(shade.end(), kind.begin(), kind.end());
+    const RunResult made = run_isohf(shade);
+    EXPECT_EQ(made.exit_code, 0) << made.err;
+    const auto source = open_raster(folder / "p.tif", {});
+    EXPECT_EQ(source->info().channel, "") << "one band";
+    std::vector<std::byte> sample(size_bytes(source->info().sample_type));
+    source->read_window({column, row, 1, 1}, sample);
+    if (source->info().sample_type == SampleType::kUint8) return static_cast<double>(sample[0]);
+    float number = 0.0F;
+    std::memcpy(&number, sample.data(), sizeof(number));
+    return static_cast<double>(number);
+  };
+  for (const auto& [column, row] : {std::pair<std::int64_t, std::int64_t>{20, 15}, {0, 0}, {39, 29}}) {
+    EXPECT_NEAR(value({"--slope"}, column, row), std::atan(std::hypot(0.5, 0.25)) * 180.0 / std::numbers::pi, 0.05);
+    EXPECT_NEAR(value({"--aspect"}, column, row), 270.0 - std::atan(0.5) * 180.0 / std::numbers::pi, 0.2) << "downhill";
+    // Downhill is West and South: n = (-0.5, 1, 0.25), the light comes from the North-West, 45 degrees high.
+    const double towards = (0.5 * 0.5 + std::sqrt(0.5) - 0.25 * 0.5) / std::hypot(1.0, std::hypot(0.5, 0.25));
+    EXPECT_NEAR(value({"--hillshade"}, column, row), 1.0 + 254.0 * towards, 1.0);
+  }
+}
+
+TEST_F(ShadeCommand, PngHasAWorldFileAndExrHasShares) {
+  std::vector<float> heights(12 * 10, 50.0F);
+  heights[0] = -9999.0F;
+  RasterSpec spec;
+  spec.width = 12;
+  spec.height = 10;
+  spec.sample_type = SampleType::kFloat32;
+  spec.void_value = -9999.0;
+  spec.georeference = place_at(Registration::kArea, HorizontalUnit::kMetre, 500005.0, 4000195.0, 10.0, 32632);
+  write_raster(folder / "level.tif", spec, std::as_bytes(std::span(heights)));
+  ASSERT_EQ(run_isohf({"convert", folder / "level.tif", folder / "l.isohf", "-q"}).exit_code, 0);
+  const RunResult made =
+      run_isohf({"shade", folder / "l.isohf", folder / "l.png", "--hillshade", "--size", "12x10", "--json"});
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  EXPECT_EQ(json::parse(made.out).at("files_written").size(), 3U);
+  EXPECT_EQ(read_file(folder / "l.pgw"), "10\n0\n0\n-10\n500005\n4000195\n");
+  EXPECT_THAT(read_file(folder / "l.png.aux.xml"), HasSubstr("32632"));
+  const Channel grey = read_channel(folder / "l.png", "");
+  EXPECT_EQ(grey.at(0, 0), 0);
+  EXPECT_EQ(grey.at(6, 5), 181) << "1 + 254 sin 45";
+  // Somebody else's file stays.
+  write_file(folder / "m.pgw", "notes");
+  const RunResult refused = run_isohf({"shade", folder / "l.isohf", folder / "m.png"});
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.err, HasSubstr("m.pgw"));
+  EXPECT_EQ(read_file(folder / "m.pgw"), "notes");
+  ASSERT_EQ(run_isohf({"shade", folder / "l.isohf", folder / "l.exr", "--shadow-mask", "--size", "12x10"}).exit_code,
+            0);
+  const auto shares = open_raster(folder / "l.exr", {});
+  std::vector<float> row(12);
+  shares->read_window({0, 0, 12, 1}, std::as_writable_bytes(std::span(row)));
+  EXPECT_TRUE(std::isnan(row[0]));
+  EXPECT_EQ(row[8], 1.0F);
+  ASSERT_EQ(run_isohf({"shade", folder / "l.isohf", folder / "c.exr", "--size", "12x10"}).exit_code, 0);
+}
+
+TEST_F(ShadeCommand, ColoursComeFromAColourReliefFile) {
+  write_file(folder / "c.txt", "# sharp at 110\n0% black\n110 0 0 0\n110,255,0,0\r\n100%: Blue\nnv 1 2 3\n");
+  const std::string picture =
+      draw({"--palette", folder / "c.txt", "--no-relief", "--no-shadow", "--altitude", "60", "--size", "200x120"});
+  EXPECT_EQ(read_channel(picture, "0").at(60, 60), 0) << "100: black";
+  EXPECT_GT(read_channel(picture, "2").at(kWall, 60), 150) << "120: blue";
+  for (const auto& [text, why] : std::map<std::string, std::string>{{"high 1 2 3\n", "line 1: no elevation"},
+                                                                    {"1 2 3 4\n2 0 0 256\n", "line 2: no colour"},
+                                                                    {"1 2 3\n", "line 1: found too few"},
+                                                                    {"1 mauve\n", "line 1: no colour"},
+                                                                    {"nan red\n", "line 1: no elevation"},
+                                                                    {"# none\n", "no line has"}}) {
+    write_file(folder / "bad.txt", text);
+    const RunResult refused =
+        run_isohf({"shade", folder / "a.isohf", folder / "z.png", "--palette", folder / "bad.txt"});
+    EXPECT_EQ(refused.exit_code, 2) << text;
+    EXPECT_THAT(refused.err, HasSubstr("bad.txt: ")) << text;
+    EXPECT_THAT(refused.err, HasSubstr(why)) << text;
+  }
+  EXPECT_EQ(run_isohf({"shade", folder / "a.isohf", folder / "z.png", "--palette", folder / "none.txt"}).exit_code, 1);
+}
+
+TEST_F(ShadeCommand, PalettesSuitTheBody) {
+  // A body that is not Earth is grey by itself, and Mars is red.
+  const auto hue = [&](int semi_major_m, const std::vector<std::string>& more) {
+    std::vector<float> heights(200);
+    for (std::size_t i = 0; i < heights.size(); ++i) heights[i] = static_cast<float>(i);
+    RasterSpec spec;
+    spec.width = 20;
+    spec.height = 10;
+    spec.georeference = place_at(Registration::kArea, HorizontalUnit::kMetre, 0.0, 0.0, 100.0, 0);
+    spec.georeference->system = {};
+    spec.georeference->system.body = semi_major_m == 3396190 ? "Mars" : "Moon";
+    spec.georeference->system.semi_major_axis_m = semi_major_m;
+    spec.georeference->system.inverse_flattening = 0.0;
+    spec.overwrite = true;
+    write_raster(folder / "body.tif", spec, std::as_bytes(std::span(heights)));
+    EXPECT_EQ(run_isohf({"convert", folder / "body.tif", folder / "b.isohf", "-q", "--overwrite"}).exit_code, 0);
+    std::vector<std::string> shade = {"shade",       folder / "b.isohf", folder / "b.tif", "--overwrite", "-q",
+                                      "--no-relief", "--no-shadow",      "--altitude",     "60"};
+    shade.insert(shade.end(), more.begin(), more.end());
+    EXPECT_EQ(run_isohf(shade).exit_code, 0);
+    return read_channel(folder / "b.tif", "0").at(15, 5) - read_channel(folder / "b.tif", "2").at(15, 5);
+  };
+  EXPECT_GT(hue(3396190, {}), hue(1737400, {}) + 30) << "red over blue";
+  EXPECT_EQ(hue(3396190, {"--palette", "gray"}), hue(1737400, {}));
 }
 
 TEST_F(ShadeCommand, BytesDoNotDependOnThreads) {
-  const std::vector<std::string> options = {"--hillshade", "--size", "77x33", "-j"};
+  const std::vector<std::string> options = {"--azimuth", "160", "--size", "77x33", "-j"};
   std::string first;
   for (const char* threads : {"1", "2", "5"}) {
     std::vector<std::string> all = options;
@@ -167,7 +324,7 @@ TEST_F(ShadeCommand, PixelsLieOnTheGroundThatTheyShow) {
     EXPECT_EQ(run_isohf({"convert", folder / "ramp.tif", folder / "a.isohf", "--overwrite", "-q", "--fit"}).exit_code,
               0);
     const RunResult shaded = run_isohf({"shade", folder / "a.isohf", folder / "a.tif", "--overwrite", "-q", "--palette",
-                                        "gray", "--azimuth", rises_east ? "W" : "E", "--size", "12x12"});
+                                        "gray", "--no-relief", "--azimuth", rises_east ? "W" : "E", "--size", "12x12"});
     EXPECT_EQ(shaded.exit_code, 0) << shaded.err;
     const Channel green = read_channel(folder / "a.tif", "1");
     EXPECT_NEAR(green.place.origin_x, 500005.0, 1e-6);
@@ -212,7 +369,16 @@ TEST_F(ShadeCommand, RefusesWrongUsage) {
        std::vector<std::vector<std::string>>{{"--sun-elevation", "0"},
                                              {"--sun-elevation", "90"},
                                              {"--sun-elevation", "x"},
-                                             {"--azimuth", "N"},
+                                             {"--azimuth", "up"},
+                                             {"--azimuth", "361"},
+                                             {"--hillshade", "--slope"},
+                                             {"--slope", "--azimuth", "20"},
+                                             {"--multidirectional", "--azimuth", "20"},
+                                             {"--aspect", "--altitude", "20"},
+                                             {"--hillshade", "--texture"},
+                                             {"--shadow-mask", "--no-shadow"},
+                                             {"--hillshade", "--shadow-softness", "1"},
+                                             {"--shadow-mask", "--sun-elevation", "90"},
                                              {"--size", "0x5"},
                                              {"--size", "0"},
                                              {"--size", "5.5"},

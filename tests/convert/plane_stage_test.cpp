@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <limits>
@@ -290,15 +291,14 @@ TEST(PlaneStage, ShadeReadsThePlaneThatSuffices) {
   const ArchiveReader archive(file, "a.isohf");
   ASSERT_EQ(archive.metadata().planes.stride, 8);
   ShadeOptions request;
-  request.hillshade = true;
   request.sun_elevation_deg = 30.0;
   request.size = GridSize{60, 45};
   file->bytes = 0;
   int plane = 0;
   Picture coarse(60, 45, 4);
   std::size_t at = 0;
-  plane = shade_rows(archive, request, [&](std::span<const std::uint8_t> rows) {
-            std::copy(rows.begin(), rows.end(), coarse.samples.begin() + static_cast<std::ptrdiff_t>(at));
+  plane = shade_rows(archive, request, [&](std::span<const std::byte> rows) {
+            std::memcpy(coarse.samples.data() + at, rows.data(), rows.size());
             at += rows.size();
           }).plane;
   EXPECT_EQ(plane, 1);

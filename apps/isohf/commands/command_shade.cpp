@@ -5,10 +5,12 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
 
 #include "commands/command.h"
+#include "formats/files/text.h"
 #include "formats/georeference/units.h"
 #include "formats/write/raster_sink.h"
 #include "interrupt.h"
@@ -30,15 +32,18 @@ using nlohmann::ordered_json;
 constexpr std::int64_t kMaxPixels = 1 << 20;  ///< of a side
 constexpr const char* kFooter =
     R"(The picture covers what the input covered, North at the top; where there is no elevation it is transparent.
-Shadows are those of a sun due West or due East. Shadow seeds in the archive (convert --shadow-seeds) are used
-where they hold for the sun asked for; the picture is the same without them.
-Memory is bounded whatever the archive's and the picture's size: a few dozen tiles and about 64 MB.
+North is the map's, as with GDAL. Shadows fall for a sun that stands anywhere; the ground beyond what the input covered casts
+none. --hillshade, --multidirectional, --slope and --aspect are those of gdaldem, by Horn's formula: one band. Hillshades
+and shadow masks hold 1 to 255, and 0 where there is no elevation; slopes and aspects hold degrees, and -9999.
+.tif has the georeference, .png a world file beside it. .exr holds light, or shares from 0 to 1.
+Memory is bounded whatever the archive's height: a row of its tiles twice, and about 64 MB.
 
 Examples:
-  isohf shade dem.isohf -o dem.png --hillshade
-  isohf shade dem.isohf -o evening.png --hillshade --sun-elevation 5 --azimuth W --size 4096x2300
-  isohf shade dem.isohf -o map.png --hillshade --texture
-  isohf shade dem.isohf -o shadows.tif --palette gray --sun-elevation 8)";
+  isohf shade dem.isohf -o dem.png
+  isohf shade dem.isohf -o evening.png --sun-elevation 5 --azimuth 250 --size 4096x2300
+  isohf shade dem.isohf -o map.png --texture
+  isohf shade dem.isohf -o hillshade.tif --hillshade
+  isohf shade dem.isohf -o shadows.tif --shadow-mask --azimuth 120 --altitude 8)";
 
 struct ShadeCommand {
   CommonOptions common;
@@ -46,15 +51,57 @@ struct ShadeCommand {
   std::string archive;
   std::string output;
   bool overwrite = false;
+  bool uncompressed = false;
   bool no_shadow = false;
   std::optional<std::int64_t> longest;  ///< pixels of the longer side
+  bool no_relief = false;
+  std::string palette;  ///< a file of colours
+  std::optional<double> azimuth;
+  std::optional<double> elevation;
   ShadeOptions picture;
 };
 
-double parse_sun(const std::string& text) {
+struct Kind {
+  const char* option;
+  const char* help;
+  ShadeKind kind;
+};
+constexpr Kind kKinds[] = {
+    {"--hillshade", "Grey, by how slopes face the sun: one band, as gdaldem hillshade", ShadeKind::kHillshade},
+    {"--multidirectional", "The same with light from four sides", ShadeKind::kMultidirectional},
+    {"--slope", "Slopes in degrees", ShadeKind::kSlope},
+    {"--aspect", "The directions that slopes face, in degrees clockwise from North", ShadeKind::kAspect},
+    {"--shadow-mask", "The share of the sun that is seen", ShadeKind::kShadowMask},
+};
+
+/// The name of a file, where it is no palette's.
+std::string parse_palette(const std::string& text, std::optional<ShadePalette>& palette) {
+  constexpr ShadePalette kPalettes[] = {ShadePalette::kElevation, ShadePalette::kGray, ShadePalette::kMars};
+  if (text.find_first_of("./") != std::string::npos) return text;
+  palette = kPalettes[parse_word(text, {"elevation", "gray", "mars"})];
+  return {};
+}
+
+double parse_altitude(const std::string& text) {
   const double degrees = parse_number(text);
-  if (!(degrees >= 0.01 && degrees < 90.0)) {
-    throw Error(ErrorCode::kInvalidArgument, "found '" + text + "', must be degrees from 0.01 to below 90");
+  if (!(degrees >= 0.01 && degrees <= 90.0)) {
+    throw Error(ErrorCode::kInvalidArgument, "found '" + text + "', must be degrees from 0.01 to 90");
+  }
+  return degrees;
+}
+
+double parse_azimuth(const std::string& text) {
+  constexpr std::pair<const char*, double> kSides[] = {{"N", 0.0}, {"E", 90.0}, {"S", 180.0}, {"W", 270.0}};
+  for (const auto& [side, degrees] : kSides) {
+    if (text == side) return degrees;
+  }
+  double degrees = -1.0;
+  try {
+    degrees = parse_number(text);
+  } catch (const Error&) {
+  }
+  if (!(degrees >= 0.0 && degrees <= 360.0)) {
+    throw Error(ErrorCode::kInvalidArgument, "found '" + text + "', must be degrees from 0 to 360, or N, E, S, W");
   }
   return degrees;
 }
@@ -65,15 +112,39 @@ std::optional<ShadeCommand> parse(const Arguments& arguments) {
   CommandLine line("shade", "Draws a picture of an archive's surface with the shadows that it casts.");
   line.group("Arguments");
   line.positional("ARCHIVE", "-i,--input", "Archive to draw", options.archive);
-  line.positional("OUTPUT", "-o,--output", "Picture to write, .png or .tif", options.output);
+  line.positional("OUTPUT", "-o,--output", "Picture to write: .png, .tif or .exr", options.output);
   line.flag("--overwrite", "Replace OUTPUT where it exists", options.overwrite);
+  line.flag("--uncompressed", "TIFF, EXR: no compression", options.uncompressed);
+  line.group("In place of a picture");
+  bool asked = false;
+  std::vector<std::string> kinds;
+  for (const Kind& kind : kKinds) {
+    kinds.emplace_back(kind.option);
+    line.flag(kind.option, kind.help, asked, [&request, &kind] { request.kind = kind.kind; });
+  }
+  // What a kind has no use for.
+  for (const char* option : {"--no-relief", "--no-shadow", "--texture", "--palette"}) {
+    std::vector<std::string> rivals = kinds;
+    rivals.emplace_back(option);
+    line.exclusive(rivals);
+  }
+  for (const Kind& kind : kKinds) {
+    if (kind.kind == ShadeKind::kShadowMask) continue;
+    line.exclusive({kind.option, "--shadow-softness"});
+    if (kind.kind != ShadeKind::kHillshade) line.exclusive({kind.option, "--azimuth"});
+    if (kind.kind == ShadeKind::kSlope || kind.kind == ShadeKind::kAspect) {
+      line.exclusive({kind.option, "--sun-elevation"});
+    }
+  }
+  line.exclusive({"--no-shadow", "--shadow-softness"});
   line.group("Light");
-  line.option("--sun-elevation", "DEG", "Height of the sun above the horizon, 0.01 to below 90 (default 15)",
-              [&](const std::string& text) { request.sun_elevation_deg = parse_sun(text); });
-  line.option("--azimuth", "E|W", "Put the sun in the East or the West (default W)", [&](const std::string& text) {
-    request.sun = parse_word(text, {"E", "W"}) == 0 ? SunSide::kEast : SunSide::kWest;
-  });
-  line.flag("--hillshade", "Shade slopes by how they face the sun", request.hillshade);
+  line.option("--azimuth", "DEG",
+              "Where the sun stands, clockwise from North; N, E, S or W (default 270; --hillshade 315)",
+              [&](const std::string& text) { options.azimuth = parse_azimuth(text); });
+  line.option("--altitude,--sun-elevation", "DEG",
+              "Height of the sun above the horizon, 0.01 to 90 (default 15; --hillshade, --multidirectional 45)",
+              [&](const std::string& text) { options.elevation = parse_altitude(text); });
+  line.flag("--no-relief", "Light all ground as if it were level", options.no_relief);
   line.flag("--no-shadow", "Leave out the shadows that land casts on land beyond it", options.no_shadow);
   line.option("--shadow-softness", "K",
               "The sun's apparent size at the caster's distance, vertical units (default 2, or 0.5 % of the elevation "
@@ -87,24 +158,24 @@ std::optional<ShadeCommand> parse(const Arguments& arguments) {
                 options.longest = is_side ? std::optional(parse_whole_number(text, 1, kMaxPixels)) : std::nullopt;
                 request.size = is_side ? std::nullopt : std::optional(parse_size(text, 1, kMaxPixels));
               });
-  line.option("--exaggeration", "F", "Draw heights F times as high (default 1)",
+  line.option("--z-factor,--exaggeration", "F", "Draw heights F times as high (default 1)",
               [&](const std::string& text) { request.exaggeration = parse_positive_number(text); });
   line.flag("--texture", "Show the archive's textures; where there is none, the palette's colours", request.texture);
-  line.option(
-      "--palette", "NAME", "Colours of the ground: elevation or gray (default elevation)",
-      [&](const std::string& text) {
-        request.palette = parse_word(text, {"elevation", "gray"}) == 0 ? ShadePalette::kElevation : ShadePalette::kGray;
-      });
+  line.option("--palette", "NAME|FILE",
+              "Colours of the ground: elevation, gray, mars (default: its body's), or a text file of elevations and "
+              "colours as for gdaldem color-relief",
+              [&](const std::string& text) { options.palette = parse_palette(text, request.palette); });
   add_work_options(line, options.work);
   add_common_options(line, options.common);
   line.footer(kFooter);
   if (!line.parse(arguments)) return std::nullopt;
   line.require("ARCHIVE", options.archive);
   line.require("OUTPUT", options.output);
-  if (options.no_shadow && request.softness) {
-    throw Error(ErrorCode::kInvalidArgument, "shade: --shadow-softness and --no-shadow exclude each other");
-  }
   request.shadows = !options.no_shadow;
+  request.relief = !options.no_relief;
+  const bool as_gdal = request.kind == ShadeKind::kHillshade || request.kind == ShadeKind::kMultidirectional;
+  request.sun_azimuth_deg = options.azimuth.value_or(as_gdal ? 315.0 : 270.0);
+  request.sun_elevation_deg = options.elevation.value_or(as_gdal ? 45.0 : 15.0);
   return options;
 }
 
@@ -138,13 +209,19 @@ int run(ShadeCommand options) {
   ShadeOptions& request = options.picture;
   const GridSize size = request.size.value_or(shade_size(archive, options.longest));
   request.size = size;
+  if (!options.palette.empty()) request.colours = read_colour_relief(options.palette, archive.metadata());
   request.elevation_units_per_world_unit = elevation_units_per_world_unit(archive.metadata());
+
+  request.floats = lower_case(std::filesystem::path(options.output).extension().string()) == ".exr";
+  const ShadeSamples samples = shade_samples(request);
 
   RasterSpec spec;
   spec.width = size.first;
   spec.height = size.second;
-  spec.sample_type = SampleType::kUint8;
-  spec.channels = static_cast<int>(kShadeChannels);
+  spec.sample_type = samples.type;
+  spec.channels = samples.channels;
+  spec.void_value = samples.void_value;
+  spec.compress = !options.uncompressed;
   spec.georeference = georeference_of(archive.metadata(), size);
   spec.overwrite = options.overwrite;
   const auto sink = create_raster(options.output, spec);
@@ -155,7 +232,7 @@ int run(ShadeCommand options) {
   job.cancel = &watch_interrupts();
   job.progress = [&](const Progress& at) { display.update(at.stage, at.unit, at.done, at.total); };
   const ShadeReport report = shade_rows(
-      archive, request, [&](std::span<const std::uint8_t> rows) { sink->write_rows(std::as_bytes(rows)); }, job);
+      archive, request, [&](std::span<const std::byte> rows) { sink->write_rows(rows); }, job);
   display.clear();
   sink->finish();
 
@@ -170,13 +247,12 @@ int run(ShadeCommand options) {
                          {"height", size.second},
                          {"plane", report.plane},
                          {"tiles", tiles},
-                         {"used_shadow_seeds", report.used_seeds},
                          {"seconds", seconds}}));
   } else if (!common.quiet) {
-    out.write(fmt::format("picture      {}: {} x {} pixels of {} tiles{} in {}{}\n", options.output, size.first,
+    out.write(fmt::format("picture      {}: {} x {} pixels of {} tiles{} in {}\n", options.output, size.first,
                           size.second, describe_count(tiles),
                           report.plane > 0 ? fmt::format(" of coarse plane {}", report.plane) : "",
-                          describe_seconds(seconds), report.used_seeds ? ", with the archive's shadow seeds" : ""));
+                          describe_seconds(seconds)));
   }
   out.finish();
   return kExitDone;

@@ -1,69 +1,108 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <optional>
 #include <span>
+#include <string>
+#include <vector>
 
 #include "isohf/archive.h"
 #include "isohf/job.h"
 #include "isohf/picture.h"
+#include "isohf/raster.h"
 #include "isohf/surface.h"
 
-/// A shaded picture of an archive's surface: hill shading, cast shadows, textures.
+/// Pictures of an archive's surface: shaded relief with cast shadows and textures, and what GDAL's gdaldem makes of it.
 
 namespace isohf {
 
-/// Where the sun stands: shadows fall along the lattice's rows.
-enum class SunSide { kWest, kEast };
+/// What is drawn. All but the first have one channel.
+enum class ShadeKind {
+  kPicture,           ///< colours, sun, sky and cast shadows
+  kHillshade,         ///< 1...255, as `gdaldem hillshade`; 0 where there is no elevation
+  kMultidirectional,  ///< the same from four sides, as its -multidirectional
+  kSlope,             ///< degrees; kShadeVoid where there is no elevation
+  kAspect,            ///< degrees clockwise from North that a slope faces; kShadeVoid also on level ground
+  kShadowMask,        ///< share of the sun that is seen, 1...255; 0 where there is no elevation
+};
 
-/// Colours of the ground by elevation.
-enum class ShadePalette { kElevation, kGray };
+/// Colours of the ground by elevation: meadows to snow, and the sea below 0 on Earth; greys; the dust of Mars.
+enum class ShadePalette { kElevation, kGray, kMars };
+
+/// The colour at one elevation; sRGB.
+struct ColourStop {
+  double elevation = 0.0;
+  std::uint8_t red = 0;
+  std::uint8_t green = 0;
+  std::uint8_t blue = 0;
+};
+
+/// The palette's colours over the archive's range, by rising elevation; at one elevation there may be two. nullopt: the
+/// palette of its body, grey where that is neither Earth nor Mars.
+[[nodiscard]] std::vector<ColourStop> shade_colours(const Metadata& metadata, std::optional<ShadePalette> palette = {});
+
+/// The colours of a text file for `gdaldem color-relief`: lines of an elevation, or a percentage of the archive's range,
+/// and red, green, blue, or a colour's name. Throws Error naming the path: kIo, kInvalidArgument with the line.
+[[nodiscard]] std::vector<ColourStop> read_colour_relief(const std::string& path, const Metadata& metadata);
 
 /// What a picture of an archive's surface shows. It covers the part of the world that the source covered.
 struct ShadeOptions {
-  std::optional<GridSize> size;  ///< pixels, >= 1; nullopt: shade_size()
-  SunSide sun = SunSide::kWest;
-  double sun_elevation_deg = 15.0;  ///< above 0, below 90
-  bool shadows = true;              ///< that land casts on land beyond it
-  bool hillshade = false;           ///< shade slopes by how they face the sun
+  ShadeKind kind = ShadeKind::kPicture;
+  std::optional<GridSize> size;     ///< pixels, >= 1; nullopt: shade_size()
+  double sun_azimuth_deg = 270.0;   ///< clockwise from the North of the archive's map
+  double sun_elevation_deg = 15.0;  ///< above 0; below 90 where shadows are cast, else 90 at most
+  bool shadows = true;              ///< of kPicture: that land casts on land beyond it
+  bool relief = true;               ///< of kPicture: shade slopes by how they face the sun
   double exaggeration = 1.0;        ///< of heights, > 0
   /// The sun's apparent size at the caster's distance, elevation units, > 0 (paper Eq. 16); nullopt: 2, or 0.5 % of the
   /// elevation range where that is less.
   std::optional<double> softness;
-  ShadePalette palette = ShadePalette::kElevation;
-  bool texture = false;  ///< the archive's textures where it has them, over the palette's colours
+  std::optional<ShadePalette> palette;  ///< nullopt: its body's
+  std::vector<ColourStop> colours;      ///< in place of the palette, by rising elevation; linear between them
+  bool texture = false;                 ///< the archive's textures where it has them, over the palette's colours
   double elevation_units_per_world_unit = 1.0;  ///< feet for one metre, say; > 0
+  /// Samples are floats: linear light with premultiplied alpha, or shares from 0 to 1, NaN where there is no elevation.
+  bool floats = false;
 };
 
 /// How a picture was made.
 struct ShadeReport {
   GridSize size;
   int plane = 0;  ///< coarse plane that was drawn; 0: the tiles themselves
-  bool used_seeds =
-      false;  ///< shadow seeds of the archive, which a coarse plane has none of; else shadows were carried along each row of tiles
 };
 
-/// Bytes of a pixel: red, green, blue, alpha, sRGB; 0 everywhere without elevation.
-inline constexpr std::int64_t kShadeChannels = 4;
+/// Samples of a pixel.
+struct ShadeSamples {
+  SampleType type = SampleType::kUint8;
+  int channels = 4;  ///< red, green, blue, alpha (bytes: sRGB, straight alpha, 0 everywhere without elevation), or one
+  std::optional<double> void_value;  ///< of one channel
+};
+[[nodiscard]] ShadeSamples shade_samples(const ShadeOptions& options);
+
+/// Slopes and aspects without elevation, as GDAL has them.
+inline constexpr float kShadeVoid = -9999.0F;
 
 /// A pixel for each lattice step, at most 2048 a side; or so many along the longer side, and as many as keep the shape
 /// along the other.
 [[nodiscard]] GridSize shade_size(const ArchiveReader& archive, std::optional<std::int64_t> longest = {});
 
-/// Whole rows of the picture, from North to South: [k * width * kShadeChannels].
-using TakeShadedRows = std::function<void(std::span<const std::uint8_t> rows)>;
+/// Whole rows of the picture, from North to South, in shade_samples().
+using TakeShadedRows = std::function<void(std::span<const std::byte> rows)>;
 
-/// Renders a picture and hands over whole rows. The pixels do not depend on the number of threads; every pixel is the
-/// mean of up to 4 x 4 points. Where a coarse plane has two vertices or more in a pixel, either way, the coarsest such one
-/// is drawn and nothing finer read, unless textures are. Memory: a few dozen tiles, and the picture's rows across one row of tiles, at most 64 MB
-/// or one row. Throws Error{kInvalidArgument} for options out of range, and for textures of an archive that has none;
-/// as the reader does; kCancelled.
+/// Renders a picture and hands over whole rows. The pixels do not depend on the number of threads. A pixel's height and
+/// its share of the sun are means of up to 4 x 4 points; slopes are Horn's, of the pixels around. Where a coarse plane
+/// has two vertices or more in a pixel, either way, the coarsest such one is drawn and nothing finer read, unless
+/// textures are. Memory: a row of tiles twice, and 64 MB of the picture's rows, or three rows. A sun in the South reads
+/// the tiles once more, and keeps 64 MB of shadows. Ground beyond the source casts none.
+/// Throws Error{kInvalidArgument} for options out of range, and for textures of an archive that has none; as the reader
+/// does; kCancelled.
 ShadeReport shade_rows(const ArchiveReader& archive, const ShadeOptions& options, const TakeShadedRows& take,
                        const Job& job = {});
 
-/// The whole picture at once.
+/// The whole picture at once, of bytes: not of slopes and aspects, nor with `floats`.
 [[nodiscard]] Picture shade(const ArchiveReader& archive, const ShadeOptions& options, const Job& job = {});
 
 }  // namespace isohf

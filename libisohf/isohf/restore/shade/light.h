@@ -15,29 +15,26 @@ using Light = std::array<float, 3>;
 /// Colours of the ground by elevation.
 class Palette {
  public:
-  /// The colours run from `low` to `high`, elevation units; at least one of any two elevations apart where they are
-  /// equal.
-  Palette(ShadePalette name, double low, double high);
-  [[nodiscard]] const Light& at(double elevation) const;
+  /// At least one stop; elevations rise. Beyond the first and last their colours go on.
+  explicit Palette(std::vector<ColourStop> stops) : stops_(std::move(stops)) {}
+  [[nodiscard]] Light at(double elevation) const;
 
  private:
-  double low_;
-  double per_unit_;
-  std::vector<Light> colours_;
+  std::vector<ColourStop> stops_;
 };
 
 /// Sun and sky over a landscape: how much light falls on a piece of ground, and what a picture shows of it.
 class Illumination {
  public:
-  Illumination(SunSide side, double sun_elevation_deg, bool hillshade);
+  /// relief  slopes are lit by how they face the sun; else all ground is level ground
+  Illumination(double sun_azimuth_deg, double sun_elevation_deg, bool relief);
 
   /// Light that falls on ground with that normal where `sun_share` of the sun is seen.
-  [[nodiscard]] Light on(const Normal& normal, double sun_share) const;
+  [[nodiscard]] Light on(const Normal& normal, float sun_share) const;
 
  private:
-  bool hillshade_;
-  float sun_x_;
-  float sun_y_;
+  bool relief_;
+  Normal towards_;
   Light sun_;
   Light sky_;
 };

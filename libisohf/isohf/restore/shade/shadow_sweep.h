@@ -1,0 +1,62 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "isohf/lattice.h"
+#include "isohf/metadata.h"
+#include "isohf/surface/shade/shadow_front.h"
+
+namespace isohf {
+
+/// Values of the stored vertices of each tile of a row, from West to East: [tile columns][C*R].
+using TileRowValues = std::vector<std::vector<float>>;
+
+/// Light that passes over the tiles of an archive, a row of them at a time, from the sun's side.
+///
+/// The steps of the light are rows of the lattice, or columns half a lattice step apart where it passes more along the
+/// rows than across them. On both the mesh's heights between two lanes are linear, so that lines of light lie on the
+/// mesh at each step; along the six directions of the lattice they pass through its vertices.
+class ShadowSweep {
+ public:
+  /// ground       that casts shadows: what the source covered
+  /// azimuth_deg  of the sun, clockwise from North
+  /// fall         of a shadow in one world unit, > 0
+  /// softness     the most depth that is told apart, height units
+  ShadowSweep(const TileGrid& grid, const WorldBounds& ground, double azimuth_deg, double fall, double softness);
+
+  /// Whether light comes to a row of tiles from the row South of it.
+  [[nodiscard]] bool from_south() const { return from_south_; }
+
+  /// What passes from one row of tiles to the next: heights of lines of light.
+  using State = std::vector<float>;
+  [[nodiscard]] std::uint64_t state_bytes() const;
+
+  /// Passes over a row of tiles.
+  /// entering  what the row before it left; empty: nothing, at the first row
+  /// heights   NaN where void
+  /// depths    of visible vertices below the height up to which it is dark, < 0 in the sun; null: not wanted
+  /// Returns what the next row is entered by.
+  State pass(std::int64_t tile_row, const State& entering, const TileRowValues& heights, TileRowValues* depths);
+
+ private:
+  State pass_along_rows(std::int64_t tile_row, const State& entering, const TileRowValues& heights,
+                        TileRowValues* depths);
+  State pass_along_columns(std::int64_t tile_row, const State& entering, const TileRowValues& heights,
+                           TileRowValues* depths);
+  [[nodiscard]] ShadowFront::Casting casting_columns() const;
+  [[nodiscard]] ShadowFront::Casting casting_rows(std::int64_t tile_row) const;
+
+  TileGrid grid_;
+  WorldBounds ground_;
+  bool from_south_;
+  bool by_columns_;
+  bool mirrored_;  ///< rows: light drifts West; columns: light travels West
+  double shift_ = 0.0;
+  double fall_ = 0.0;  ///< at a step
+  double most_depth_ = 0.0;
+  int half_steps_;  ///< of a tile's width
+};
+
+}  // namespace isohf

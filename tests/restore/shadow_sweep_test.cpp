@@ -1,0 +1,254 @@
+#include "isohf/restore/shade/shadow_sweep.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <random>
+#include <vector>
+
+#include "isohf/convert.h"
+#include "isohf/lattice/shadow_path.h"
+#include "isohf/shade.h"
+#include "support/memory_source.h"
+#include "support/temporary_folder.h"
+
+namespace isohf {
+namespace {
+
+constexpr double kVoid = std::numeric_limits<double>::quiet_NaN();
+
+/// A height for every place of the lattice, the same for all tiles that share it.
+float height_at(LatticeVertex vertex) {
+  const auto mixed = static_cast<std::uint64_t>(vertex.x * 7919 + vertex.z * 104729 + 17) * 0x9E3779B97F4A7C15U;
+  return static_cast<float>(mixed >> 40U) / static_cast<float>(1U << 24U) * 30.0F;
+}
+
+/// Depths of all tiles, passed over from the sun's side.
+std::vector<TileRowValues> depths_of(const TileGrid& grid, ShadowSweep& sweep) {
+  std::vector<TileRowValues> all(static_cast<std::size_t>(grid.tile_rows()));
+  ShadowSweep::State light;
+  for (std::int64_t k = 0; k < grid.tile_rows(); ++k) {
+    const std::int64_t row = sweep.from_south() ? grid.tile_rows() - 1 - k : k;
+    TileRowValues heights(static_cast<std::size_t>(grid.tile_columns()));
+    for (std::int64_t column = 0; column < grid.tile_columns(); ++column) {
+      for (int r = 0; r < grid.shape().rows(); ++r) {
+        for (int c = 0; c < grid.shape().columns(); ++c) {
+          heights[static_cast<std::size_t>(column)].push_back(height_at(grid.lattice_vertex({column, row}, {c, r})));
+        }
+      }
+    }
+    light = sweep.pass(row, light, heights, &all[static_cast<std::size_t>(row)]);
+  }
+  return all;
+}
+
+// Along each of the lattice's axes S is the greatest height of a vertex on the way, less what the shadow falls up to
+// there, to float's rounding.
+TEST(ShadowSweep, IsExactAtTheVerticesOnTheSixAzimuthsOfTheLattice) {
+  const TileGrid grid = TileGrid::make(TileShape::make(12, 11, 1), 3, 4, 160.0, 150.0);
+  const std::int64_t width = half_steps_across(grid.shape()) * grid.tile_columns();
+  const std::int64_t height = grid.shape().cell_rows() * grid.tile_rows();
+  const WorldBounds ground{0.0, 0.0, grid.world_width(), grid.world_height()};
+  const double diagonal = std::atan2(grid.sigma_x(), grid.sigma_z()) * 180.0 / std::numbers::pi;
+  struct Way {
+    double azimuth;
+    int x;  ///< towards the sun, half steps
+    int z;
+  };
+  const Way ways[] = {{270.0, -2, 0},           {90.0, 2, 0},
+                      {diagonal, 1, -1},        {360.0 - diagonal, -1, -1},
+                      {180.0 - diagonal, 1, 1}, {180.0 + diagonal, -1, 1}};
+  for (const Way& way : ways) {
+    for (const double fall : {0.05, 0.3, 1.0}) {
+      ShadowSweep sweep(grid, ground, way.azimuth, fall, 1000.0);
+      const std::vector<TileRowValues> depths = depths_of(grid, sweep);
+      const double step = fall * std::hypot(way.x * grid.sigma_x(), way.z * grid.sigma_z());
+      int compared = 0;
+      for (std::int64_t tile = 0; tile < grid.tile_count(); ++tile) {
+        const TileIndex index = grid.tile_at(tile);
+        for (int r = 1; r <= grid.shape().rows() - 2; ++r) {
+          for (int c = 1; c <= last_visible_column(grid.shape(), r); ++c) {
+            // Slid vertices lie between the lattice's lines, and on its rows half a step from their neighbours.
+            if (is_slid(grid.shape(), {c, r}) || (way.z == 0 && r % 2 == 0)) continue;
+            const LatticeVertex at = grid.lattice_vertex(index, {c, r});
+            double dark = -std::numeric_limits<double>::infinity();
+            LatticeVertex on{at.x + way.x, at.z + way.z};
+            for (int n = 1; on.x >= 0 && on.x <= width && on.z >= 0 && on.z <= height; ++n) {
+              dark = std::max(dark, static_cast<double>(height_at(on)) - n * step);
+              on = {on.x + way.x, on.z + way.z};
+            }
+            // In the sun a depth says how near the light's line passes, also between vertices.
+            const double depth = std::max(dark - static_cast<double>(height_at(at)), 0.0);
+            const auto found =
+                static_cast<double>(depths[static_cast<std::size_t>(index.row)][static_cast<std::size_t>(index.column)]
+                                          [static_cast<std::size_t>(r * grid.shape().columns() + c)]);
+            ASSERT_NEAR(std::max(found, 0.0), depth, 1e-4) << way.azimuth << " at " << at.x << ' ' << at.z;
+            ++compared;
+          }
+        }
+      }
+      EXPECT_GT(compared, 300);
+    }
+  }
+}
+
+// Tiles that share a vertex find the same depth there, whichever way the light comes.
+TEST(ShadowSweep, AgreesWhereTilesMeet) {
+  const TileGrid grid = TileGrid::make(TileShape::make(10, 13, 1), 3, 3, 100.0, 130.0);
+  const WorldBounds ground{0.0, 0.0, grid.world_width(), grid.world_height()};
+  const int last = grid.shape().rows() - 2;
+  for (int azimuth = 0; azimuth < 360; azimuth += 7) {
+    ShadowSweep sweep(grid, ground, azimuth, 0.2, 5.0);
+    const std::vector<TileRowValues> depths = depths_of(grid, sweep);
+    for (std::size_t row = 0; row + 1 < depths.size(); ++row) {
+      for (std::size_t column = 0; column < depths[row].size(); ++column) {
+        for (int c = 1; c <= last_visible_column(grid.shape(), last); ++c) {
+          const auto at = [&](int r) { return static_cast<std::size_t>(r * grid.shape().columns() + c); };
+          ASSERT_NEAR(depths[row][column][at(last)], depths[row + 1][column][at(1)], 1e-3) << azimuth;
+        }
+      }
+    }
+  }
+}
+
+class ShadowsOfAnySun : public testing::Test {
+ protected:
+  /// Which pixels of a converted raster, one a sample, see the sun: by a ray from each, and by the picture.
+  struct Compared {
+    int wrong = 0;  ///< further than a cell from the border of a shadow
+    int pixels = 0;
+    int dark = 0;
+  };
+
+  static constexpr int kColumns = 72;
+  static constexpr int kRows = 60;
+
+  static Compared compare(const ArchiveReader& archive, double azimuth, double elevation) {
+    ShadeOptions options;
+    options.kind = ShadeKind::kShadowMask;
+    options.size = GridSize{kColumns, kRows};
+    options.sun_azimuth_deg = azimuth;
+    options.sun_elevation_deg = elevation;
+    options.softness = 0.01;
+    const Picture found = shade(archive, options);
+    const std::vector<int> lit = rays(archive, azimuth, elevation);
+    Compared result;
+    for (int r = 0; r < kRows; ++r) {
+      for (int c = 0; c < kColumns; ++c) {
+        const auto at = [&](int column, int row) { return lit[static_cast<std::size_t>(row * kColumns + column)]; };
+        const int value = found.pixel(c, r)[0];
+        EXPECT_EQ(value == 0, at(c, r) < 0);
+        if (at(c, r) < 0) continue;
+        bool on_border = false;
+        for (int dr = -1; dr <= 1; ++dr) {
+          for (int dc = -1; dc <= 1; ++dc) {
+            const int column = std::clamp(c + dc, 0, kColumns - 1);
+            const int row = std::clamp(r + dr, 0, kRows - 1);
+            on_border = on_border || at(column, row) != at(c, r);
+          }
+        }
+        ++result.pixels;
+        result.dark += at(c, r) == 0 ? 1 : 0;
+        if (!on_border && (value >= 128) != (at(c, r) == 1)) ++result.wrong;
+      }
+    }
+    return result;
+  }
+
+  /// 1 lit, 0 dark, -1 void.
+  static std::vector<int> rays(const ArchiveReader& archive, double azimuth, double elevation) {
+    Surface surface(archive);
+    const WorldBounds& ground = archive.metadata().valid;
+    const double pixel_x = (ground.x1 - ground.x0) / kColumns;
+    const double pixel_z = (ground.z1 - ground.z0) / kRows;
+    const double angle = azimuth * std::numbers::pi / 180.0;
+    constexpr double kStep = 0.25;
+    const double x_step = std::sin(angle) * kStep;
+    const double z_step = -std::cos(angle) * kStep;
+    const double rise = std::tan(elevation * std::numbers::pi / 180.0) * kStep;
+    std::vector<int> lit;
+    std::vector<WorldPoint> points;
+    std::vector<double> heights;
+    for (int r = 0; r < kRows; ++r) {
+      for (int c = 0; c < kColumns; ++c) {
+        points.clear();
+        WorldPoint at{ground.x0 + (c + 0.5) * pixel_x, ground.z0 + (r + 0.5) * pixel_z};
+        while (at.x >= ground.x0 && at.x <= ground.x1 && at.z >= ground.z0 && at.z <= ground.z1) {
+          points.push_back(at);
+          at = {at.x + x_step, at.z + z_step};
+        }
+        heights.resize(points.size());
+        surface.sample(points, std::span(heights));
+        int is_lit = std::isnan(heights[0]) ? -1 : 1;
+        for (std::size_t i = 1; i < heights.size() && is_lit == 1; ++i) {
+          if (heights[i] > heights[0] + static_cast<double>(i) * rise) is_lit = 0;
+        }
+        lit.push_back(is_lit);
+      }
+    }
+    return lit;
+  }
+
+  /// Of all pixels at many azimuths, for each of three elevations.
+  void expect_shadows_of_rays(const std::function<double(std::int64_t, std::int64_t)>& height) {
+    test::MemorySource<float> source(SampleType::kFloat32, kColumns, kRows, height);
+    ConvertOptions convert_options;
+    convert_options.plan.shape = {20, 19};
+    convert_options.plan.levels = 1;
+    (void)convert(source, folder / "a.isohf", convert_options);
+    const ArchiveReader archive(folder / "a.isohf");
+    for (const double elevation : {4.0, 12.0, 30.0}) {
+      Compared sum;
+      for (int azimuth = 5; azimuth < 360; azimuth += 31) {
+        const Compared one = compare(archive, azimuth, elevation);
+        sum.wrong += one.wrong;
+        sum.pixels += one.pixels;
+        sum.dark += one.dark;
+        EXPECT_LE(one.wrong, one.pixels / 100) << azimuth << " degrees, " << elevation << " high";
+      }
+      EXPECT_LE(sum.wrong * 200, sum.pixels) << elevation << " degrees high, " << sum.dark << " dark";
+      EXPECT_GT(sum.dark, elevation < 20.0 ? sum.pixels / 50 : 0);
+    }
+  }
+
+  test::TemporaryFolder folder;
+};
+
+TEST_F(ShadowsOfAnySun, AreThoseOfRaysOverHills) {
+  expect_shadows_of_rays([](std::int64_t c, std::int64_t r) {
+    const auto x = static_cast<double>(c);
+    const auto z = static_cast<double>(r);
+    return 4.0 * std::sin(x * 0.35) * std::cos(z * 0.28 + 0.1 * x) + 1.2 * std::sin(x * 0.9 - z * 0.7) + 0.02 * x;
+  });
+}
+
+TEST_F(ShadowsOfAnySun, AreThoseOfRaysOverTowersAndHoles) {
+  std::mt19937 random(5);
+  std::vector<double> heights(static_cast<std::size_t>(kColumns * kRows), 0.0);
+  for (int i = 0; i < 12; ++i) {
+    const int column = static_cast<int>(random() % (kColumns - 8));
+    const int row = static_cast<int>(random() % (kRows - 8));
+    const bool is_hole = i % 4 == 3;
+    for (int k = 0; k < 25; ++k) {
+      heights[static_cast<std::size_t>((row + k / 5) * kColumns + column + k % 5)] = is_hole ? kVoid : 3.0 + i;
+    }
+  }
+  expect_shadows_of_rays(
+      [&](std::int64_t c, std::int64_t r) { return heights[static_cast<std::size_t>(r * kColumns + c)]; });
+}
+
+TEST_F(ShadowsOfAnySun, AreThoseOfRaysOverRoughGround) {
+  std::mt19937 random(7);
+  std::vector<double> heights(static_cast<std::size_t>(kColumns * kRows));
+  for (double& height : heights) height = static_cast<double>(random() % 1000) * 0.0004;
+  expect_shadows_of_rays([&](std::int64_t c, std::int64_t r) {
+    const auto i = static_cast<std::size_t>(r * kColumns + c);
+    return heights[i] + 5.0 * std::exp(-std::hypot(static_cast<double>(c) - 40.0, static_cast<double>(r) - 25.0) / 6.0);
+  });
+}
+
+}  // namespace
+}  // namespace isohf
