@@ -21,9 +21,9 @@ struct RasterSpec {
   double z_offset = 0.0;
   std::string vertical_unit;  ///< "metre", ...; empty where unknown
   double metres_per_vertical_unit = 1.0;
-  bool describe = false;    ///< of PNG: write NAME.png.json beside it, which says what the numbers mean
-  bool compress = true;     ///< TIFF, OpenEXR
-  bool overwrite = false;   ///< replace a file of that name
+  bool describe = false;   ///< of PNG: write NAME.png.json beside it, which says what the numbers mean
+  bool compress = true;    ///< TIFF, OpenEXR
+  bool overwrite = false;  ///< replace a file of that name
 };
 
 }  // namespace isohf
