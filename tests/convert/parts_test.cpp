@@ -207,6 +207,42 @@ TEST_F(Shards, JoinToTheBytesOfOneRun) {
   }
 }
 
+TEST_F(Shards, ScansOfRowsMakeThePlanOfOnePass) {
+  options.z_range.reset();
+  for (const auto& [type, filter] :
+       {std::pair(CodeType::kU16, Filter::kBilinear), std::pair(CodeType::kF32, Filter::kLanczos3),
+        std::pair(CodeType::kU8, Filter::kLimitedCubic)}) {
+    options.code_type = type;
+    options.filter = filter;
+    Hills source;
+    const std::string planned = format_shard_plan(plan_shards(source, options, 7));
+    const ShardPlan draft = parse_shard_plan(format_shard_plan(draft_shards(source, options, 7)));
+    EXPECT_FALSE(draft.codes.has_value());
+    EXPECT_THAT(refusal([&] { (void)convert_shard(source, draft, 1, folder / "a.isohf", options); }),
+                HasSubstr("is a draft"));
+    std::vector<std::string> scans;
+    for (const int number : {4, 1, 7, 2, 6, 3, 5}) {
+      scans.push_back(scan_shard(source, draft, number, options));
+      EXPECT_TRUE(is_scan(scans.back(), draft, number));
+      EXPECT_FALSE(is_scan(scans.back(), draft, number + 1));
+    }
+    EXPECT_EQ(format_shard_plan(scanned(source, draft, scans, options)), planned);
+    scans.push_back(scans.front());
+    scans.erase(scans.begin() + 1);
+    const std::string found = refusal([&] { (void)scanned(source, draft, scans, options); });
+    EXPECT_THAT(found, HasSubstr("scan 4 is there twice"));
+    EXPECT_THAT(found, HasSubstr("these scans are missing: 1"));
+  }
+  // What only the surface can tell.
+  options.code_type = CodeType::kU16;
+  options.filter = Filter::kLanczos3;
+  Hills source;
+  const ShardPlan draft = draft_shards(source, options, 1);
+  EXPECT_THAT(refusal([&] { (void)scanned(source, draft, {scan_shard(source, draft, 1, options)}, options); }),
+              HasSubstr("can leave the range of the samples"));
+  EXPECT_EQ(shard_list({1, 3, 4, 5, 9}), "1,3-5,9");
+}
+
 TEST_F(Shards, OfFewRowsAreAsManyAsThereAreRows) {
   Hills source;
   const ShardPlan plan = plan_shards(source, options, 1000);

@@ -27,7 +27,8 @@ ElevationRange widened_by(HeightSource& source, const ReadStep& step) {
     }
   }
   // So wide that neither end is cut off at an eighth of it.
-  return {edge.widen({0.0, 10000.0}).min, edge.widen({-10000.0, 100.0}).max};
+  const ElevationRange bound = edge.bound();
+  return {EdgeRange::widen({0.0, 10000.0}, bound).min, EdgeRange::widen({-10000.0, 100.0}, bound).max};
 }
 
 TEST(EdgeRange, DoesNotDependOnHowTheSourceIsCutIntoWindows) {

@@ -1,7 +1,9 @@
 /// isohf merge: archives that share a lattice become one.
 
 #include <fmt/format.h>
+#include <sys/resource.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <optional>
 
@@ -64,7 +66,16 @@ std::optional<MergeCommand> parse(const Arguments& arguments) {
   return options;
 }
 
-/// As Slurm's --array takes them: "3,7-9"; an empty line where none is missing.
+/// All archives stay open; shells allow a thousand files, systems many more.
+void allow_open_files(std::size_t files) {
+  struct rlimit limit {};
+  const rlim_t needed = files + 64;
+  if (::getrlimit(RLIMIT_NOFILE, &limit) != 0 || limit.rlim_cur >= needed) return;
+  limit.rlim_cur = std::min(limit.rlim_max, needed);
+  ::setrlimit(RLIMIT_NOFILE, &limit);
+}
+
+/// An empty line where none is missing.
 int print_missing(const MergeCommand& options, const ShardPlan& plan) {
   ProgressDisplay display(options.work.progress, options.common.quiet, options.common.verbose);
   const std::vector<int> missing = missing_shards(plan, options.archives, job_from(options.work, display));
@@ -73,15 +84,7 @@ int print_missing(const MergeCommand& options, const ShardPlan& plan) {
   if (options.common.json) {
     out.write(json_text({{"plan", options.plan}, {"shards", plan.shards.size()}, {"missing", missing}}));
   } else {
-    std::string text;
-    for (std::size_t i = 0; i < missing.size();) {
-      std::size_t last = i;
-      while (last + 1 < missing.size() && missing[last + 1] == missing[last] + 1) ++last;
-      text += fmt::format("{}{}", text.empty() ? "" : ",", missing[i]);
-      if (last > i) text += fmt::format("-{}", missing[last]);
-      i = last + 1;
-    }
-    out.write(text + "\n");
+    out.write(shard_list(missing) + "\n");
   }
   out.finish();
   return kExitDone;
@@ -92,6 +95,7 @@ int print_missing(const MergeCommand& options, const ShardPlan& plan) {
 int command_merge(const Arguments& arguments) {
   const auto options = parse(arguments);
   if (!options) return kExitDone;
+  allow_open_files(options->archives.size());
   std::optional<ShardPlan> plan;
   if (!options->plan.empty()) plan = read_plan(options->plan);
   if (options->missing) return print_missing(*options, *plan);

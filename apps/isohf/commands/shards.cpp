@@ -41,7 +41,7 @@ std::vector<std::string> recorded(const Arguments& arguments) {
   std::vector<std::string> kept;
   for (std::size_t i = 0; i < arguments.size(); ++i) {
     const std::string& argument = arguments[i];
-    if (argument == "--overwrite") continue;
+    if (argument == "--overwrite" || argument == "--no-scan") continue;
     if (argument == "--write" || argument == "--shards") {
       ++i;
       continue;
@@ -51,6 +51,15 @@ std::vector<std::string> recorded(const Arguments& arguments) {
   return kept;
 }
 
+constexpr const char* kScanFooter =
+    R"(Where one machine takes long to read all of the input for the range of its elevations, many do: plan --no-scan writes a
+draft, each shard's rows are scanned, and all scans together make the plan. With --z-range no scan is needed.
+
+Examples:
+  isohf plan tiles/ --write draft.plan --shards 16 --no-scan
+  isohf scan --plan draft.plan --shard 3/16 -o scan-3.json
+  isohf scan --plan draft.plan scan-*.json -o land.plan)";
+
 struct ShardCommand {
   CommonOptions common;
   WorkOptions work;
@@ -58,16 +67,20 @@ struct ShardCommand {
   int shard = 0;
   int shards = 0;
   std::string output;
+  std::vector<std::string> scans;  ///< of isohf scan: they make the plan
   std::optional<std::string> scratch_folder;
   bool overwrite = false;
 };
 
-std::optional<ShardCommand> parse(const Arguments& arguments) {
+std::optional<ShardCommand> parse(const Arguments& arguments, bool scans) {
   ShardCommand options;
-  CommandLine line("convert", "Makes one shard of a plan: some rows of tiles of its archive.");
+  CommandLine line(scans ? "scan" : "convert", scans ? "Finds the range of elevations for a plan, on many machines."
+                                                     : "Makes one shard of a plan: some rows of tiles of its archive.");
   line.group("Arguments");
-  line.option("--plan", "PLAN", "Plan of isohf plan --write", options.plan);
-  line.option("--shard", "K/N", "Make the Kth of the plan's N shards, from 1 on", [&](const std::string& text) {
+  if (scans) line.positionals("[SCAN...]", "Scans of all shards, which make the draft a plan", options.scans);
+  line.option("--plan", "PLAN", scans ? "Draft of isohf plan --write --no-scan" : "Plan of isohf plan --write",
+              options.plan);
+  line.option("--shard", "K/N", "The Kth of the plan's N shards, from 1 on", [&](const std::string& text) {
     const std::size_t slash = text.find('/');
     if (slash == std::string::npos) {
       throw Error(ErrorCode::kInvalidArgument, fmt::format("found \"{}\", must be K/N, as in 3/16", text));
@@ -75,19 +88,54 @@ std::optional<ShardCommand> parse(const Arguments& arguments) {
     options.shard = static_cast<int>(parse_whole_number(text.substr(0, slash), 1, 1000000));
     options.shards = static_cast<int>(parse_whole_number(text.substr(slash + 1), 1, 1000000));
   });
-  line.option("-o,--output", "PART", "The archive to write", options.output);
-  line.flag("--overwrite", "Make PART anew where it exists", options.overwrite);
+  const char* const output = scans ? "OUTPUT" : "PART";
+  line.option("-o,--output", output, scans ? "The scan to write, or the plan" : "The archive to write", options.output);
+  line.flag("--overwrite", "Make it anew where it exists", options.overwrite);
   add_work_options(line, options.work);
   add_memory_option(line, "Stay within SIZE of memory, to a tenth (default: as is fastest)", options.work.memory_bytes);
-  line.option("--tmpdir", "FOLDER", "Put the scratch file that --memory may need there (default: PART's folder)",
+  line.option("--tmpdir", "FOLDER", "Put the scratch file that --memory may need there (default: that of -o)",
               [&](const std::string& text) { options.scratch_folder = text; });
   add_common_options(line, options.common);
-  line.footer(kFooter);
+  line.footer(scans ? kScanFooter : kFooter);
   if (!line.parse(arguments)) return std::nullopt;
   line.require("PLAN (--plan)", options.plan);
-  line.require("PART (-o)", options.output);
-  if (options.shard == 0) throw Error(ErrorCode::kInvalidArgument, "convert: which shard? Give --shard K/N");
+  line.require(fmt::format("{} (-o)", output), options.output);
+  if (options.shard == 0 && options.scans.empty())
+    line.fail(scans ? "which shard? Give --shard K/N, or all scans" : "which shard? Give --shard K/N");
+  if (options.shard != 0 && !options.scans.empty()) line.fail("give --shard K/N or all scans, not both");
   return options;
+}
+
+/// What both --plan and --shard must agree on.
+ShardPlan read_plan_of(const ShardCommand& options) {
+  ShardPlan plan = read_plan(options.plan);
+  const int count = static_cast<int>(plan.shards.size());
+  if (options.shard != 0 && (options.shards != count || options.shard > count)) {
+    throw Error(ErrorCode::kInvalidArgument, fmt::format("--shard {}/{}: {} has shards 1/{} to {}/{}", options.shard,
+                                                         options.shards, options.plan, count, count, count));
+  }
+  return plan;
+}
+
+/// The plan's conversion, with what is this machine's own.
+ConvertCommandOptions conversion_of(const ShardCommand& command, const ShardPlan& plan) {
+  Arguments again = plan.arguments;
+  again.insert(again.end(), {"--write", command.plan});
+  std::optional<ConvertCommandOptions> options = parse_convert(again, ConvertLine::kPlan);
+  if (!options) throw Error(ErrorCode::kCorrupt, command.plan + ": its arguments make no conversion");
+  options->work = command.work;
+  share_memory(*options);
+  options->convert.scratch_folder = command.scratch_folder.value_or(folder_of(command.output));
+  options->convert.strict = command.common.strict;
+  options->convert.overwrite = command.overwrite;
+  options->convert.resume = !command.overwrite;
+  return std::move(*options);
+}
+
+std::string text_of_file(const std::string& path) {
+  const auto file = open_file_source(path);
+  const std::vector<std::byte> bytes = SourceBytes(*file, 0, file->size_bytes()).take();
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
 /// A line that the log of a scheduler can be searched for.
@@ -141,7 +189,9 @@ int write_plan(const Arguments& arguments) {
   const Prepared prepared = prepare(*options, expand_inputs(options->inputs.names, options->inputs.recursive));
   std::optional<ProgressDisplay> display(std::in_place, options->work.progress, options->common.quiet,
                                          options->common.verbose);
-  ShardPlan plan = plan_shards(*prepared.source, options->convert, options->shards, job_from(options->work, *display));
+  ShardPlan plan = options->draft ? draft_shards(*prepared.source, options->convert, options->shards)
+                                  : plan_shards(*prepared.source, options->convert, options->shards,
+                                                job_from(options->work, *display));
   display.reset();
   plan.arguments = recorded(arguments);
   write_output(options->plan, format_shard_plan(plan), options->convert.overwrite);
@@ -162,37 +212,70 @@ int write_plan(const Arguments& arguments) {
 }
 
 int convert_shard_of(const Arguments& arguments) {
-  const auto command = parse(arguments);
+  const auto command = parse(arguments, false);
   if (!command) return kExitDone;
-  const ShardPlan plan = read_plan(command->plan);
-  const int count = static_cast<int>(plan.shards.size());
-  if (command->shards != count || command->shard > count) {
-    throw Error(ErrorCode::kInvalidArgument, fmt::format("--shard {}/{}: {} has shards 1/{} to {}/{}", command->shard,
-                                                         command->shards, command->plan, count, count, count));
-  }
+  const ShardPlan plan = read_plan_of(*command);
   if (!command->overwrite && is_shard(command->output, plan, command->shard)) {
     print_shard(*command, "done already", nullptr);
     return kExitDone;
   }
-  Arguments again = plan.arguments;
-  again.insert(again.end(), {"--write", command->plan});
-  std::optional<ConvertCommandOptions> options = parse_convert(again, ConvertLine::kPlan);
-  if (!options) throw Error(ErrorCode::kCorrupt, command->plan + ": its arguments make no conversion");
-  options->work = command->work;
-  share_memory(*options);
-  options->convert.scratch_folder = command->scratch_folder.value_or(folder_of(command->output));
-  options->convert.strict = command->common.strict;
-  options->convert.overwrite = command->overwrite;
-  options->convert.resume = !command->overwrite;
-  check_archive_output(options->inputs.names, command->output, command->overwrite);
-  const Prepared prepared = prepare(*options, expand_inputs(options->inputs.names, options->inputs.recursive));
+  ConvertCommandOptions options = conversion_of(*command, plan);
+  check_archive_output(options.inputs.names, command->output, command->overwrite);
+  const Prepared prepared = prepare(options, expand_inputs(options.inputs.names, options.inputs.recursive));
   std::optional<ProgressDisplay> display(std::in_place, command->work.progress, command->common.quiet,
                                          command->common.verbose);
-  const ConvertSummary summary = convert_shard(*prepared.source, plan, command->shard, command->output,
-                                               options->convert, job_from(command->work, *display));
+  const ConvertSummary summary = convert_shard(*prepared.source, plan, command->shard, command->output, options.convert,
+                                               job_from(command->work, *display));
   display.reset();
   print_warnings(summary.warnings);
   print_shard(*command, "done", &summary);
+  return kExitDone;
+}
+
+int command_scan(const Arguments& arguments) {
+  const auto command = parse(arguments, true);
+  if (!command) return kExitDone;
+  const ShardPlan draft = read_plan_of(*command);
+  std::error_code none;
+  const bool exists = std::filesystem::exists(command->output, none);
+  const bool makes_plan = !command->scans.empty();
+  const bool is_done =
+      exists && !makes_plan && !command->overwrite && is_scan(text_of_file(command->output), draft, command->shard);
+  if (!is_done) {
+    ConvertCommandOptions options = conversion_of(*command, draft);
+    std::vector<std::string> read = options.inputs.names;
+    read.insert(read.end(), command->scans.begin(), command->scans.end());
+    check_plan_output(read, command->output, command->overwrite);
+    const Prepared prepared = prepare(options, expand_inputs(options.inputs.names, options.inputs.recursive));
+    std::optional<ProgressDisplay> display(std::in_place, command->work.progress, command->common.quiet,
+                                           command->common.verbose);
+    std::string text;
+    if (makes_plan) {
+      std::vector<std::string> scans;
+      for (const std::string& file : command->scans) {
+        scans.push_back(text_of_file(file));
+        if (!scans.back().starts_with('{')) throw Error(ErrorCode::kCorrupt, file + ": is no scan of a plan");
+      }
+      text = format_shard_plan(scanned(*prepared.source, draft, scans, options.convert));
+    } else {
+      text = scan_shard(*prepared.source, draft, command->shard, options.convert, job_from(command->work, *display));
+    }
+    display.reset();
+    write_output(command->output, text, command->overwrite);
+  }
+  StandardOutput out;
+  const char* const status = is_done ? "done already" : "done";
+  if (command->common.json) {
+    ordered_json document = {
+        {"plan", command->plan}, {"shards", draft.shards.size()}, {"output", command->output}, {"status", status}};
+    if (!makes_plan) document["shard"] = command->shard;
+    out.write(json_text(document));
+  } else if (!command->common.quiet) {
+    out.write(makes_plan
+                  ? fmt::format("{:<12} {}: {} scans\n", "plan", command->output, command->scans.size())
+                  : fmt::format("scan {}/{} {}: {}\n", command->shard, command->shards, status, command->output));
+  }
+  out.finish();
   return kExitDone;
 }
 

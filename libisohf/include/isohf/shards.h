@@ -23,10 +23,13 @@ struct ShardPlan {
   std::string job;                     ///< sources, lattice, options, program: equal text, equal bytes
   std::int64_t tile_columns = 0;
   std::int64_t tile_rows = 0;
-  Quantisation quantisation;
-  double datum = 0.0;         ///< that heights are computed from
-  double height_error = 0.0;  ///< of such heights, at most
-  std::optional<std::int64_t> source_voids;
+  /// By the range of elevations; nullopt in a draft, which has yet to be scanned.
+  struct Codes {
+    Quantisation quantisation;
+    double datum = 0.0;         ///< that heights are computed from
+    double height_error = 0.0;  ///< of such heights, at most
+  };
+  std::optional<Codes> codes;
   std::vector<std::pair<std::int64_t, std::int64_t>> shards;  ///< rows of tiles: first, and past the last
 };
 
@@ -36,6 +39,18 @@ struct ShardPlan {
 /// `measure`, which need all rows at once.
 [[nodiscard]] ShardPlan plan_shards(HeightSource& source, const ConvertOptions& options, int shards,
                                     const Job& job = {});
+/// The same without a look at any sample. What one machine takes long to read many can: scan_shard() and scanned().
+[[nodiscard]] ShardPlan draft_shards(const HeightSource& source, const ConvertOptions& options, int shards);
+/// Looks at as many of the source's rows as fall to one shard, and gives what scanned() takes, JSON.
+[[nodiscard]] std::string scan_shard(HeightSource& source, const ShardPlan& draft, int number,
+                                     const ConvertOptions& options, const Job& job = {});
+/// Whether a text is what scan_shard() gives for that shard of the draft.
+[[nodiscard]] bool is_scan(const std::string& json, const ShardPlan& draft, int number);
+/// The plan of a draft whose shards were all scanned: the one of plan_shards(). Throws Error{kInvalidArgument} naming
+/// scans that are missing, there twice or of another draft, and where the filter can leave the samples' range so that
+/// the surface has to be looked at: then `z_range` helps, or plan_shards().
+[[nodiscard]] ShardPlan scanned(HeightSource& source, const ShardPlan& draft, const std::vector<std::string>& scans,
+                                const ConvertOptions& options);
 
 /// A plan as JSON, and back. parse_shard_plan() throws Error{kCorrupt} naming the member at fault, Error{kUnsupported}
 /// for other versions than 1.
@@ -49,6 +64,9 @@ ConvertSummary convert_shard(HeightSource& source, const ShardPlan& plan, int nu
 
 /// Whether a file is that shard of the plan, complete; all of its bytes are read.
 [[nodiscard]] bool is_shard(const std::string& archive, const ShardPlan& plan, int number);
+
+/// "3,7-9": numbers of shards, ascending, as Slurm's --array takes them.
+[[nodiscard]] std::string shard_list(const std::vector<int>& numbers);
 
 /// Shards that none of the files is, ascending: also where a file is damaged, or missing.
 [[nodiscard]] std::vector<int> missing_shards(const ShardPlan& plan, const std::vector<std::string>& files,

@@ -249,7 +249,12 @@ AccuracyInfo info_of(const AccuracyReport& report, const ConvertOptions& options
 
 }  // namespace
 
-FoundCodes find_codes(HeightSource& source, const Plan& plan, const ConvertOptions& options, const Job& job) {
+namespace {
+
+/// The codes of a conversion that writes nothing, after `look`.
+template <typename Look>
+ShardPlan::Codes before_writing(HeightSource& source, const Plan& plan, const ConvertOptions& options, const Job& job,
+                                Look look) {
   if (options.z_range) check_range(*options.z_range);
   if (options.shadow_seeds) check_seed_request(*options.shadow_seeds, plan.grid);
   const Kernel kernel = Kernel::make(options.filter.value_or(kDefaultFilter));
@@ -258,9 +263,36 @@ FoundCodes find_codes(HeightSource& source, const Plan& plan, const ConvertOptio
   source.limit_buffers(memory.source_buffer_bytes);
   Conversion conversion{source, options, plan, memory, kernel, Prefilter::make(kernel.filter(), options.acquisition),
                         job};
+  Arena(job).execute([&] { look(conversion); });
+  return {conversion.quantisation, conversion.datum, conversion.height_error};
+}
+
+}  // namespace
+
+ShardPlan::Codes find_codes(HeightSource& source, const Plan& plan, const ConvertOptions& options, const Job& job) {
   ConvertSummary summary(plan.grid);
-  Arena(job).execute([&] { choose_codes(conversion, summary); });
-  return {conversion.quantisation, conversion.datum, conversion.height_error, summary.source_voids};
+  return before_writing(source, plan, options, job, [&](Conversion& conversion) { choose_codes(conversion, summary); });
+}
+
+RangeScan find_range(HeightSource& source, const Plan& plan, const ConvertOptions& options, const RowRange& rows,
+                     const Job& job) {
+  RangeScan found;
+  std::vector<Warning> warnings;
+  (void)before_writing(source, plan, options, job,
+                       [&](Conversion& conversion) { found = scan_range(conversion, rows, warnings); });
+  return found;
+}
+
+ShardPlan::Codes codes_of(HeightSource& source, const Plan& plan, const ConvertOptions& options,
+                          const RangeScan& scan) {
+  return before_writing(source, plan, options, {}, [&](Conversion& conversion) {
+    if (choose_codes_by(conversion, scan, false)) return;
+    throw Error(
+        ErrorCode::kInvalidArgument,
+        fmt::format("{}: the surface that {} makes can leave the range of the samples, which scans do not tell; "
+                    "give `z_range`, or plan without a draft",
+                    source.info().path, to_string(conversion.kernel.filter())));
+  });
 }
 
 ConversionResult run_conversion(HeightSource& source, const Plan& plan, const std::string& output,
@@ -307,11 +339,11 @@ ConversionResult run_conversion(HeightSource& source, const Plan& plan, const st
       if (shard == nullptr) {
         choose_codes(conversion, summary);
       } else {
-        conversion.quantisation = shard->quantisation;
-        conversion.datum = shard->datum;
-        conversion.height_error = shard->height_error;
+        conversion.quantisation = shard->codes.quantisation;
+        conversion.datum = shard->codes.datum;
+        conversion.height_error = shard->codes.height_error;
         conversion.limits = options.z_range ? CodeLimits{options.z_range->first, options.z_range->second}
-                                            : code_limits(shard->quantisation);
+                                            : code_limits(shard->codes.quantisation);
       }
       refuse_warnings(summary, options);
       if (options.shadow_seeds) {

@@ -5,7 +5,9 @@
 
 #include "isohf/archive/metadata/part_record.h"
 #include "isohf/convert.h"
+#include "isohf/convert/conversion.h"
 #include "isohf/convert/frame/plan.h"
+#include "isohf/shards.h"
 
 namespace isohf {
 
@@ -20,21 +22,19 @@ struct ConversionResult {
 struct ShardWork {
   std::int64_t first_row;
   std::int64_t end_row;
-  Quantisation quantisation;
-  double datum;
-  double height_error;
+  ShardPlan::Codes codes;
   PartRecord::Shard record;  ///< but for its sums
 };
 
 /// Codes alone: the first pass over the source, where one is needed. `plan` must be made of options.plan.
-struct FoundCodes {
-  Quantisation quantisation;
-  double datum;
-  double height_error;
-  std::optional<std::int64_t> source_voids;
-};
-[[nodiscard]] FoundCodes find_codes(HeightSource& source, const Plan& plan, const ConvertOptions& options,
-                                    const Job& job);
+[[nodiscard]] ShardPlan::Codes find_codes(HeightSource& source, const Plan& plan, const ConvertOptions& options,
+                                          const Job& job);
+/// That pass over some rows, and codes by what it found in all of them. Throws Error{kInvalidArgument} where these must be
+/// found by the surface itself.
+[[nodiscard]] RangeScan find_range(HeightSource& source, const Plan& plan, const ConvertOptions& options,
+                                   const RowRange& rows, const Job& job);
+[[nodiscard]] ShardPlan::Codes codes_of(HeightSource& source, const Plan& plan, const ConvertOptions& options,
+                                        const RangeScan& scan);
 
 /// One conversion, by a plan that was made of options.plan. `is_retry`: an interrupt leaves no part file behind, which
 /// `resume` could not use.

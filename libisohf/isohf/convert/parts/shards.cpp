@@ -1,7 +1,6 @@
 #include "isohf/shards.h"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -11,6 +10,7 @@
 #include "isohf/archive/metadata/json_members.h"
 #include "isohf/archive/planes/archive_planes.h"
 #include "isohf/archive/tile_statistics.h"
+#include "isohf/convert/conversion.h"
 #include "isohf/convert/frame/plan.h"
 #include "isohf/convert/job_description.h"
 #include "isohf/convert/parts/parts.h"
@@ -22,9 +22,14 @@ namespace {
 
 constexpr int kPlanVersion = 1;
 
+void codes_members(JsonMembers& json, ShardPlan::Codes& codes) {
+  json.name("type", codes.quantisation.type, code_type_from_string);
+  json("offset", codes.quantisation.offset);
+  json("scale", codes.quantisation.scale, {.least = 0.0, .above_least = true});
+  json.all("datum", codes.datum, "height_error", codes.height_error);
+}
+
 void plan_members(JsonMembers& json, ShardPlan& plan) {
-  constexpr JsonRule kAbsent{.presence = JsonRule::kAbsent};
-  Quantisation& codes = plan.quantisation;
   std::string format = "isohf-plan";
   int version = kPlanVersion;
   json.all("format", format, "version", version);
@@ -34,13 +39,7 @@ void plan_members(JsonMembers& json, ShardPlan& plan) {
   }
   json.all("arguments", plan.arguments, "job", plan.job);
   json.object("tiles", "columns", plan.tile_columns, "rows", plan.tile_rows);
-  json.object("codes", [&](JsonMembers& members) {
-    members.name("type", codes.type, code_type_from_string);
-    members("offset", codes.offset);
-    members("scale", codes.scale, {.least = 0.0, .above_least = true});
-    members.all("datum", plan.datum, "height_error", plan.height_error);
-  });
-  json("source_voids", plan.source_voids, kAbsent);
+  json.object("codes", plan.codes, codes_members, {.presence = JsonRule::kAbsent});
   // The rows that shards end before.
   std::vector<double> ends;
   for (const auto& [first, end] : plan.shards) ends.push_back(static_cast<double>(end));
@@ -80,6 +79,81 @@ TileRange tiles_of_shard(const ShardPlan& plan, int number) {
   return {{0, first}, {plan.tile_columns, end}};
 }
 
+/// The conversion that a plan is of. Throws Error{kInvalidArgument} where there is no such shard, or source and options
+/// are no longer what was planned.
+Plan planned(const HeightSource& source, const ShardPlan& plan, int number, const ConvertOptions& options) {
+  refuse_what_needs_all(options);
+  const int count = static_cast<int>(plan.shards.size());
+  if (number < 1 || number > count) {
+    throw Error(ErrorCode::kInvalidArgument, fmt::format("there is no shard {}: the plan has 1 to {}", number, count));
+  }
+  Plan whole = make_plan(source.info(), options.plan);
+  const std::string found = job_fingerprint(source.info(), whole, options);
+  if (found != plan.job) {
+    const auto at = std::mismatch(found.begin(), found.end(), plan.job.begin(), plan.job.end());
+    const auto around = [](const std::string& text, std::ptrdiff_t place) {
+      const std::size_t from = text.rfind(" | ", static_cast<std::size_t>(place));
+      const std::size_t first = from == std::string::npos ? 0 : from + 3;
+      return text.substr(first, std::min<std::size_t>(text.find(" | ", first + 1) - first, 160));
+    };
+    throw Error(
+        ErrorCode::kInvalidArgument,
+        fmt::format("{}: source, options or program are not those that were planned: \"{}\", planned was \"{}\"",
+                    source.info().path, around(found, at.first - found.begin()),
+                    around(plan.job, at.second - plan.job.begin())));
+  }
+  return whole;
+}
+
+/// What one scan found, and of which draft.
+struct ShardScan {
+  std::string plan;
+  int number = 0;
+  int shards = 0;
+  RangeScan found;
+};
+
+void scan_members(JsonMembers& json, ShardScan& scan) {
+  std::string format = "isohf-scan";
+  json.all("format", format, "plan_sha256", scan.plan, "number", scan.number, "of", scan.shards);
+  if (format != "isohf-scan") json.refuse("format", fmt::format("is \"{}\", must be \"isohf-scan\"", format));
+  json.all("valid", scan.found.samples.valid, "voids", scan.found.samples.voids);
+  const auto range = [&](const char* key, ElevationRange& of) {
+    std::vector<double> ends = {of.min, of.max};
+    json(key, ends);
+    if (ends.size() != 2) json.refuse(key, "has not two ends");
+    of = {ends[0], ends[1]};
+  };
+  range("range", scan.found.samples.range);
+  range("edges", scan.found.edges);
+}
+
+/// Reads what formatted() wrote. The table of members serves metadata, of which none is here.
+template <typename T>
+T parsed(const std::string& json, void (*members)(JsonMembers&, T&), const char* what) {
+  if (!json.starts_with('{')) throw Error(ErrorCode::kCorrupt, fmt::format("is no {} of a conversion", what));
+  T value;
+  try {
+    nlohmann::ordered_json object = parse_json(json);
+    JsonMembers reader(JsonMembers::Pass::kRead, object, "");
+    members(reader, value);
+  } catch (const Error& error) {
+    const std::string text = error.what();
+    const std::string prefix = "metadata: ";
+    throw Error(error.code(),
+                text.starts_with(prefix) ? fmt::format("{}: {}", what, text.substr(prefix.size())) : text);
+  }
+  return value;
+}
+
+template <typename T>
+std::string formatted(T value, void (*members)(JsonMembers&, T&)) {
+  nlohmann::ordered_json object = nlohmann::ordered_json::object();
+  JsonMembers writer(JsonMembers::Pass::kWrite, object, "");
+  members(writer, value);
+  return text_of(object, 1) + "\n";
+}
+
 /// Why an archive is none of the plan's shards; empty where it is, and which.
 std::string why_foreign(const Metadata& metadata, const ShardPlan& plan, const std::string& digest, int& number) {
   const auto part = part_record(metadata);
@@ -111,18 +185,19 @@ Statistics joined_statistics(const std::vector<const ArchiveReader*>& shards) {
 }  // namespace
 
 ShardPlan plan_shards(HeightSource& source, const ConvertOptions& options, int shards, const Job& job) {
+  ShardPlan plan = draft_shards(source, options, shards);
+  plan.codes = find_codes(source, make_plan(source.info(), options.plan), options, job);
+  return plan;
+}
+
+ShardPlan draft_shards(const HeightSource& source, const ConvertOptions& options, int shards) {
   refuse_what_needs_all(options);
   if (shards < 1) throw Error(ErrorCode::kInvalidArgument, fmt::format("{} shards are asked for, at least 1", shards));
   const Plan plan = make_plan(source.info(), options.plan);
-  const FoundCodes codes = find_codes(source, plan, options, job);
   ShardPlan found;
   found.job = job_fingerprint(source.info(), plan, options);
   found.tile_columns = plan.grid.tile_columns();
   found.tile_rows = plan.grid.tile_rows();
-  found.quantisation = codes.quantisation;
-  found.datum = codes.datum;
-  found.height_error = codes.height_error;
-  found.source_voids = codes.source_voids;
   const PlaneInfo planes = options.planes ? planes_for(plan.grid) : PlaneInfo();
   const std::int64_t stride = planes.count > 0 ? planes.stride : 1;
   const std::int64_t unit = found.tile_rows / stride >= shards ? stride : 1;
@@ -135,55 +210,84 @@ ShardPlan plan_shards(HeightSource& source, const ConvertOptions& options, int s
 }
 
 std::string format_shard_plan(const ShardPlan& plan) {
-  ShardPlan copy = plan;
-  nlohmann::ordered_json object = nlohmann::ordered_json::object();
-  JsonMembers members(JsonMembers::Pass::kWrite, object, "");
-  plan_members(members, copy);
-  return text_of(object, 1) + "\n";
+  return formatted(plan, plan_members);
 }
 
 ShardPlan parse_shard_plan(const std::string& json) {
-  ShardPlan plan;
-  if (!json.starts_with('{')) throw Error(ErrorCode::kCorrupt, "is no plan of a conversion");
-  try {
-    nlohmann::ordered_json object = parse_json(json);
-    JsonMembers members(JsonMembers::Pass::kRead, object, "");
-    plan_members(members, plan);
-  } catch (const Error& error) {
-    // The table of members serves metadata.
-    const std::string what = error.what();
-    const std::string prefix = "metadata: ";
-    throw Error(error.code(), what.starts_with(prefix) ? "plan: " + what.substr(prefix.size()) : what);
+  return parsed(json, plan_members, "plan");
+}
+
+std::string scan_shard(HeightSource& source, const ShardPlan& draft, int number, const ConvertOptions& options,
+                       const Job& job) {
+  const Plan plan = planned(source, draft, number, options);
+  const auto count = static_cast<std::int64_t>(draft.shards.size());
+  const std::int64_t height = source.info().height;
+  if (count > height) {
+    throw Error(ErrorCode::kInvalidArgument, fmt::format("{} shards are to scan {} rows of samples", count, height));
   }
-  return plan;
+  const RowRange rows{height * (number - 1) / count, height * number / count - 1};
+  const RangeScan found = find_range(source, plan, options, rows, job);
+  return formatted(ShardScan{digest_of(draft), number, static_cast<int>(count), found}, scan_members);
+}
+
+bool is_scan(const std::string& json, const ShardPlan& draft, int number) {
+  try {
+    const auto scan = parsed(json, scan_members, "scan");
+    return scan.plan == digest_of(draft) && scan.number == number;
+  } catch (const Error&) {
+    return false;
+  }
+}
+
+ShardPlan scanned(HeightSource& source, const ShardPlan& draft, const std::vector<std::string>& scans,
+                  const ConvertOptions& options) {
+  const Plan plan = planned(source, draft, 1, options);
+  const std::string digest = digest_of(draft);
+  std::vector<std::optional<RangeScan>> found(draft.shards.size());
+  Problems problems;
+  for (const std::string& text : scans) {
+    const auto scan = parsed(text, scan_members, "scan");
+    if (scan.plan != digest || scan.number < 1 || scan.number > static_cast<int>(found.size())) {
+      problems.add(fmt::format("scan {} is of another plan", scan.number));
+      continue;
+    }
+    auto& place = found[static_cast<std::size_t>(scan.number - 1)];
+    if (place) problems.add(fmt::format("scan {} is there twice", scan.number));
+    place = scan.found;
+  }
+  RangeScan all;
+  std::vector<int> missing;
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    if (!found[i]) missing.push_back(static_cast<int>(i) + 1);
+    if (found[i]) all.add(*found[i]);
+  }
+  if (!missing.empty()) problems.add("these scans are missing: " + shard_list(missing));
+  problems.throw_if_any();
+  ShardPlan result = draft;
+  result.codes = codes_of(source, plan, options, all);
+  return result;
 }
 
 ConvertSummary convert_shard(HeightSource& source, const ShardPlan& plan, int number, const std::string& output,
                              const ConvertOptions& options, const Job& job) {
-  refuse_what_needs_all(options);
+  if (!plan.codes) throw Error(ErrorCode::kInvalidArgument, "the plan is a draft: its shards are to be scanned first");
+  const Plan whole = planned(source, plan, number, options);
   const int count = static_cast<int>(plan.shards.size());
-  if (number < 1 || number > count) {
-    throw Error(ErrorCode::kInvalidArgument, fmt::format("there is no shard {}: the plan has 1 to {}", number, count));
-  }
-  const Plan whole = make_plan(source.info(), options.plan);
-  const std::string found = job_fingerprint(source.info(), whole, options);
-  if (found != plan.job) {
-    const auto at = std::mismatch(found.begin(), found.end(), plan.job.begin(), plan.job.end());
-    const auto around = [](const std::string& text, std::ptrdiff_t place) {
-      const std::size_t from = text.rfind(" | ", static_cast<std::size_t>(place));
-      const std::size_t first = from == std::string::npos ? 0 : from + 3;
-      return text.substr(first, std::min<std::size_t>(text.find(" | ", first + 1) - first, 160));
-    };
-    throw Error(
-        ErrorCode::kInvalidArgument,
-        fmt::format("{}: source, options or program are not those that were planned: \"{}\", planned was \"{}\"",
-                    source.info().path, around(found, at.first - found.begin()),
-                    around(plan.job, at.second - plan.job.begin())));
-  }
   const auto [first, end] = plan.shards[static_cast<std::size_t>(number - 1)];
-  const ShardWork work{
-      first, end, plan.quantisation, plan.datum, plan.height_error, {digest_of(plan), number, count, {}}};
+  const ShardWork work{first, end, *plan.codes, {digest_of(plan), number, count, {}}};
   return run_conversion(source, whole, output, options, job, false, &work).summary;
+}
+
+std::string shard_list(const std::vector<int>& numbers) {
+  std::string text;
+  for (std::size_t i = 0; i < numbers.size();) {
+    std::size_t last = i;
+    while (last + 1 < numbers.size() && numbers[last + 1] == numbers[last] + 1) ++last;
+    text += fmt::format("{}{}", text.empty() ? "" : ",", numbers[i]);
+    if (last > i) text += fmt::format("-{}", numbers[last]);
+    i = last + 1;
+  }
+  return text;
 }
 
 bool is_shard(const std::string& archive, const ShardPlan& plan, int number) {
@@ -231,7 +335,7 @@ PartSummary merge_shards(const ShardPlan& plan, const std::vector<std::string>& 
     if (shards[i] == nullptr) missing.push_back(static_cast<int>(i) + 1);
   }
   if (!missing.empty())
-    problems.add(fmt::format("of the plan's {} shards these are missing: {}", shards.size(), fmt::join(missing, ",")));
+    problems.add(fmt::format("of the plan's {} shards these are missing: {}", shards.size(), shard_list(missing)));
   problems.throw_if_any();
   PartsJob parts{{},   all_tiles(shards.front()->grid()), shards.front()->metadata(), {},
                  true, joined_statistics(shards)};

@@ -23,8 +23,11 @@ void include(ElevationRange& range, float height) {
 
 }  // namespace
 
-EdgeRange::EdgeRange(const SourceInfo& info, std::int64_t depth_columns, std::int64_t depth_rows)
+EdgeRange::EdgeRange(const SourceInfo& info, std::int64_t depth_columns, std::int64_t depth_rows, bool north,
+                     bool south)
     : info_(info),
+      has_north_(north),
+      has_south_(south),
       depth_columns_(static_cast<std::size_t>(std::min(depth_columns + 2, info.width))),
       depth_rows_(static_cast<std::size_t>(std::min(depth_rows + 2, info.height))),
       bound_{kInfinity, -kInfinity} {}
@@ -75,8 +78,8 @@ void EdgeRange::add_window(const Window& window, std::span<const std::byte> raw)
           info_, 0.0, row,
           std::span(rows).subspan(from_edge * width + static_cast<std::size_t>(window.column), columns));
     };
-    keep(north_, from_north);
-    keep(south_, from_south);
+    if (has_north_) keep(north_, from_north);
+    if (has_south_) keep(south_, from_south);
   }
 }
 
@@ -106,10 +109,14 @@ void EdgeRange::add_edge_rows(const std::vector<float>& rows, ElevationRange& bo
   }
 }
 
-ElevationRange EdgeRange::widen(const ElevationRange& range) const {
+ElevationRange EdgeRange::bound() const {
   ElevationRange bound = bound_;
   if (!north_.empty()) add_edge_rows(north_, bound);
   if (!south_.empty()) add_edge_rows(south_, bound);
+  return bound;
+}
+
+ElevationRange EdgeRange::widen(const ElevationRange& range, const ElevationRange& bound) {
   // Heights were rounded to single precision.
   const double slack = 1e-6 * std::max(std::abs(range.min), std::abs(range.max));
   const double most = (range.max - range.min) * kMostWidening;
