@@ -57,8 +57,33 @@ namespace isohf {
 /// byte orders, padded rows, skipped bytes; cells are areas. A .prj beside them is read, and a world file (.blw, .bqw,
 /// .flw) where the header gives no place. Where the header leaves byte order or sign open, little-endian and signed
 /// samples are read, with a warning.
-[[nodiscard]] bool looks_like_grid_header(std::span<const std::byte> head);  ///< EHdr's, or ENVI's, which is refused
+[[nodiscard]] bool looks_like_grid_header(std::span<const std::byte> head);  ///< EHdr's
 [[nodiscard]] std::unique_ptr<HeightSource> open_header_grid(const std::string& path, const OpenOptions& options);
+
+/// Plain samples that an ENVI header (NAME.hdr or NAME.EXT.hdr) describes; `path` is either. Bands in any order, of which
+/// options.channel picks one by its number; integers of 8 to 32 bits, floats of 32 and 64, both byte orders. Cells are
+/// areas; "coordinate system string" is WKT.
+[[nodiscard]] bool looks_like_envi(std::span<const std::byte> head);
+/// Whether a file has an ENVI header beside it.
+[[nodiscard]] bool has_envi_header(const std::string& path);
+[[nodiscard]] std::unique_ptr<HeightSource> open_envi(const std::string& path, const OpenOptions& options);
+
+/// A SAGA grid: samples (.sdat) and their header (.sgrd), of which either is `path`, usually from South to North; cells
+/// are areas. A .prj beside is read.
+[[nodiscard]] std::unique_ptr<HeightSource> open_saga(const std::string& path, const OpenOptions& options);
+
+/// A variable of two dimensions (those before of one value) in a netCDF file of the classic formats, which
+/// options.channel names, else the first; coordinates that are evenly spaced place it, "crs_wkt" or "spatial_ref" of its
+/// grid mapping say where, degrees without one are on WGS 84. Also GMT's grids of before CF. _FillValue and missing_value
+/// are nodata, scale_factor and add_offset the vertical scale and offset.
+[[nodiscard]] bool looks_like_netcdf(std::span<const std::byte> head);
+[[nodiscard]] std::unique_ptr<HeightSource> open_netcdf(const std::string& path, const OpenOptions& options);
+
+/// A GDAL virtual raster (VRT): rectangles of other files, read by whichever reader knows them, side by side and over
+/// each other (SimpleSource, ComplexSource with NODATA, ScaleOffset and ScaleRatio). At most 16 files are open at once.
+/// Warped, derived and raw ones, and sources that would be resampled, are refused.
+[[nodiscard]] bool looks_like_vrt(std::span<const std::byte> head);
+[[nodiscard]] std::unique_ptr<HeightSource> open_vrt(const std::string& path, const OpenOptions& options);
 
 /// The IMAGE of a PDS3 product (PDS Standards Reference 3.8): a label with the samples behind it, a label (.lbl) that
 /// names the data file beside it, or that data file. Integers of 8 to 32 bits and IEEE floats, both byte orders; line

@@ -107,10 +107,6 @@ GridHeader read_header(const std::string& path) {
     const auto [name, value] = two_words(rest.substr(0, end));
     rest.remove_prefix(std::min(end + 1, rest.size()));
     const std::string plain = GridHeader::plain_name(name);
-    if (line == 1 && plain == "envi") {
-      throw Error(ErrorCode::kUnsupported,
-                  path + ": is an ENVI header, which isohf does not read; an ESRI one is wanted");
-    }
     if (std::find(kWords.begin(), kWords.end(), plain) == kWords.end() || plain.empty()) continue;
     if (value.empty()) {
       throw Error(ErrorCode::kCorrupt, fmt::format("{}: line {}: {} has no value", path, line, printable(name)));
@@ -264,13 +260,14 @@ bool looks_like_grid_header(std::span<const std::byte> head) {
   text.remove_prefix(std::min(text.find_first_not_of(" \t\r\n"), text.size()));
   const std::string_view line = text.substr(0, text.find('\n'));
   const std::string name = GridHeader::plain_name(two_words(line)[0]);
-  constexpr std::array<std::string_view, 14> kFirst = {
-      "envi",   "nbands", "nbits", "pixeltype", "byteorder",    "layout",        "skipbytes",
-      "ulxmap", "ulymap", "xdim",  "ydim",      "bandrowbytes", "totalrowbytes", "bandgapbytes"};
+  constexpr std::array<std::string_view, 13> kFirst = {
+      "nbands", "nbits", "pixeltype", "byteorder",    "layout",        "skipbytes",   "ulxmap",
+      "ulymap", "xdim",  "ydim",      "bandrowbytes", "totalrowbytes", "bandgapbytes"};
   return line.size() < text.size() && !name.empty() && std::find(kFirst.begin(), kFirst.end(), name) != kFirst.end();
 }
 
 std::unique_ptr<HeightSource> open_header_grid(const std::string& path, const OpenOptions& options) {
+  if (has_envi_header(path)) return open_envi(path, options);
   return std::make_unique<HeaderGridSource>(pair_of(path), options);
 }
 

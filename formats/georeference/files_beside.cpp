@@ -147,12 +147,15 @@ std::array<double, 6> six_numbers(const std::string& path, std::string_view text
     while (at != end && (*at == ' ' || *at == ',' || *at == '\n' || *at == '+')) ++at;
     const auto [after, failure] = std::from_chars(at, end, number);
     if (failure != std::errc() || !std::isfinite(number)) {
-      throw Error(ErrorCode::kCorrupt, fmt::format("{}: GeoTransform is \"{}\", must be six numbers", path, text));
+      throw Error(ErrorCode::kCorrupt,
+                  fmt::format("{}: GeoTransform is \"{}\", must be six numbers", path, printable(text)));
     }
     at = after;
   }
   return numbers;
 }
+
+}  // namespace
 
 void place_by_transform(const std::string& path, const std::string& text, Georeference& place) {
   const auto [x0, dx, turn_x, y0, turn_y, dy] = six_numbers(path, text);
@@ -160,7 +163,7 @@ void place_by_transform(const std::string& path, const std::string& text, Georef
     throw Error(ErrorCode::kUnsupported,
                 fmt::format("{}: GeoTransform is \"{}\": isohf reads pictures whose columns run from West to East and "
                             "whose rows run from North to South",
-                            path, text));
+                            path, printable(text)));
   }
   place.has_origin = true;
   place.spacing_x = dx;
@@ -169,7 +172,13 @@ void place_by_transform(const std::string& path, const std::string& text, Georef
   place.origin_y = y0 + dy / 2;
 }
 
-}  // namespace
+void read_system_text(const std::string& text, const std::string& path, SourceInfo& info) {
+  try {
+    if (!read_wkt(text, info)) take_system(text, info);
+  } catch (const Error& error) {
+    throw error.within(path);
+  }
+}
 
 std::string world_file_name(const std::string& raster_path) {
   return std::filesystem::path(raster_path).replace_extension(world_extensions(raster_path).front()).string();
@@ -237,11 +246,7 @@ void read_auxiliary_metadata(SourceInfo& info, int band) {
     place_by_transform(path, transform, place);
   }
   if (const std::string system = text("SRS"); !has_reference_system(place) && !system.empty()) {
-    try {
-      if (!read_wkt(system, info)) take_system(system, info);  // GDAL takes a code as well
-    } catch (const Error& failure) {
-      throw failure.within(path);
-    }
+    read_system_text(system, path, info);  // GDAL takes a code as well
   }
   if (place.registration == Registration::kUnknown) {
     const std::string kind = text("AREA_OR_POINT");

@@ -48,6 +48,14 @@ void read_auxiliary_metadata(SourceInfo& info, int band);
 /// Spacing and origin of a raster of `rows` rows; the origin is the northernmost row's, whichever the file has first.
 void place_by(const WorldFile& world, std::int64_t rows, Georeference& place);
 
+/// The same by GDAL's six numbers, "x0, dx, 0, y0, 0, -dy", of the outer corner of the first sample. Throws Error naming
+/// `path`: kCorrupt, kUnsupported for a raster that is turned or has South on top.
+void place_by_transform(const std::string& path, const std::string& text, Georeference& place);
+
+/// Takes a reference system that `path` gives as WKT, or as a code or PROJ string, which need PROJ. Throws Error naming
+/// `path`.
+void read_system_text(const std::string& text, const std::string& path, SourceInfo& info);
+
 /// Whether the file has said what its coordinates are.
 [[nodiscard]] bool has_reference_system(const Georeference& place);
 

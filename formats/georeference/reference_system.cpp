@@ -5,6 +5,7 @@
 #include <cmath>
 #include <mutex>
 
+#include "formats/files/text.h"
 #include "formats/georeference/proj_module.h"
 #include "formats/georeference/units.h"
 #include "formats/module_loader.h"
@@ -29,7 +30,7 @@ class ProjSystem final : public UnderstoodSystem {
     const std::string vertical = vertical_epsg ? fmt::format("EPSG:{}", *vertical_epsg) : "";
     const int result = module_.open(text.c_str(), vertical.c_str(), &system_, &info, &message);
     if (result != 0) {
-      const std::string shown = text.size() > 60 ? text.substr(0, 60) + "..." : text;
+      const std::string shown = one_line(text.size() > 60 ? text.substr(0, 60) + "..." : text);
       throw Error(module_error_code(result), fmt::format("the reference system {}: {}", shown, message.text));
     }
     description_.name = info.name;

@@ -200,7 +200,63 @@ TEST_F(GdalVariants, OtherFormats) {
            {"t.cub", {"-of", "ISIS3", "-co", "TILED=YES", "-co", "BLOCKXSIZE=64", "-co", "BLOCKYSIZE=64"}}}) {
     expect_same("real.tif", variant);
   }
-  expect_refused({"envi.bil", {"-of", "ENVI"}}, "envi.hdr: is an ENVI header");
+}
+
+TEST_F(GdalVariants, SamplesThatAHeaderDescribes) {
+  for (const Variant& variant :
+       std::vector<Variant>{{"a.bsq", {"-of", "ENVI"}},
+                            {"b.dat", {"-of", "ENVI", "-co", "INTERLEAVE=BIP", "-a_nodata", "0"}},
+                            {"c.bil", {"-of", "ENVI", "-co", "SUFFIX=ADD", "-ot", "UInt16"}},
+                            {"d.sdat", {"-of", "SAGA"}},
+                            {"e.nc", {"-of", "netCDF"}},
+                            {"f.nc", {"-of", "netCDF", "-co", "FORMAT=NC2", "-a_nodata", "0"}}}) {
+    expect_same("whole.tif", variant);
+  }
+  for (const Variant& variant : std::vector<Variant>{{"r.img", {"-of", "ENVI", "-ot", "Float64"}},
+                                                     {"s.sdat", {"-of", "SAGA"}},
+                                                     {"t.nc", {"-of", "netCDF", "-co", "WRITE_BOTTOMUP=NO"}}}) {
+    expect_same("real.tif", variant);
+  }
+  // Bands in each order.
+  for (const std::string order : {"BSQ", "BIL", "BIP"}) {
+    const std::string name = order + ".dat";
+    translate(folder_ / "whole.tif", name, {"-of", "ENVI", "-b", "1", "-b", "1", "-co", "INTERLEAVE=" + order});
+    const RunResult second = run_isohf({"info", folder_ / name, "--channel", "1", "--stats", "--json", "--quiet"});
+    const RunResult whole = run_isohf({"info", folder_ / "whole.tif", "--stats", "--json", "--quiet"});
+    ASSERT_EQ(second.exit_code, 0) << second.err;
+    EXPECT_EQ(json::parse(second.out).at("statistics"), json::parse(whole.out).at("statistics")) << order;
+  }
+  expect_refused({"four.nc", {"-of", "netCDF", "-co", "FORMAT=NC4"}}, "gdal_translate");
+}
+
+TEST_F(GdalVariants, VirtualRasters) {
+  expect_same("whole.tif", {"whole.vrt", {"-of", "VRT"}});
+  expect_same("whole.tif", {"part.vrt", {"-of", "VRT", "-srcwin", "20", "30", "70", "60", "-a_nodata", "0"}});
+  expect_same("whole.tif", {"real.vrt", {"-of", "VRT", "-ot", "Float32", "-scale", "0", "4096", "0", "1024"}});
+  // Four pieces with voids, one over the other, one VRT in another.
+  for (const auto& [name, column, row] :
+       {std::tuple("nw.tif", "0", "0"), {"ne.tif", "70", "0"}, {"sw.tif", "0", "60"}, {"se.tif", "90", "80"}}) {
+    translate(folder_ / "whole.tif", name, {"-srcwin", column, row, "70", "60", "-a_nodata", "0"});
+  }
+  const RunResult built =
+      run_gdal({"gdalbuildvrt", "-q", folder_ / "west.vrt", folder_ / "nw.tif", folder_ / "sw.tif"});
+  ASSERT_EQ(built.exit_code, 0) << built.err;
+  ASSERT_EQ(run_gdal({"gdalbuildvrt", "-q", folder_ / "all.vrt", folder_ / "west.vrt", folder_ / "ne.tif",
+                      folder_ / "se.tif"})
+                .exit_code,
+            0);
+  for (const char* name : {"west.vrt", "all.vrt"}) {
+    const json gdal = json::parse(run_gdal({"gdalinfo", "-json", folder_ / name}).out);
+    const json ours = json::parse(run_isohf({"info", folder_ / name, "--json", "--quiet"}).out);
+    expect_same_place(ours, gdal);
+    expect_same_samples(folder_ / name, false);
+  }
+  expect_refused({"small.vrt", {"-of", "VRT", "-outsize", "50%", "50%"}}, "resamples");
+  ASSERT_EQ(
+      run_gdal({"gdalwarp", "-q", "-of", "VRT", "-t_srs", "EPSG:3857", folder_ / "whole.tif", folder_ / "warped.vrt"})
+          .exit_code,
+      0);
+  EXPECT_THAT(run_isohf({"info", folder_ / "warped.vrt"}).err, HasSubstr("VRTWarpedDataset"));
 }
 
 TEST_F(GdalVariants, ThroughOpenImageIo) {

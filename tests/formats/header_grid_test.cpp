@@ -200,7 +200,6 @@ TEST_F(HeaderGrid, RefusesWhatItDoesNotRead) {
   EXPECT_THAT(refusal(header + "LAYOUT tiles\n", bytes(12)), HasSubstr("layout is \"tiles\""));
   EXPECT_THAT(refusal("NROWS 2\nNCOLS 3\nNBITS 4\n", bytes(12)), HasSubstr("of 4 bits"));
   EXPECT_THAT(refusal("NROWS 2\nNCOLS 3\nBYTEORDER VMS_FFLOAT\n", bytes(24), "grid.flt"), HasSubstr("vms_ffloat"));
-  EXPECT_THAT(refusal("ENVI\nsamples = 3\n", bytes(12)), HasSubstr("ENVI header"));
   EXPECT_THAT(refusal("", bytes(12)), HasSubstr("does not say ncols"));
   EXPECT_THAT(refusal(header + "TOTALROWBYTES 5\n", bytes(12)), HasSubstr("rows have 5 bytes"));
   EXPECT_THAT(refusal(header + "NROWS 3\n", bytes(12)), HasSubstr("line 6: NROWS is \"3\""));

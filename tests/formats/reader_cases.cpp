@@ -205,6 +205,77 @@ const char* const kWkt =
     R"(PROJCS["WGS_1984_UTM_Zone_11N",GEOGCS["GCS_WGS_1984",DATUM["D_WGS_1984",SPHEROID["WGS_1984",6378137.0,298.25]],)"
     R"(PRIMEM["Greenwich",0.0],UNIT["Degree",0.0174532925199433]],PARAMETER["Central_Meridian",-117],UNIT["Meter",1.0]])";
 
+/// 4 x 3 shorts named z on evenly spaced x and y, degrees, in netCDF's first format.
+std::string netcdf() {
+  std::string bytes("CDF\1\0\0\0\0", 8);
+  const auto word = [&](std::uint32_t value) {
+    for (int shift = 24; shift >= 0; shift -= 8) bytes += static_cast<char>(value >> shift & 0xFFU);
+  };
+  const auto name = [&](const std::string& text) {
+    word(static_cast<std::uint32_t>(text.size()));
+    bytes += text;
+    bytes.resize((bytes.size() + 3) / 4 * 4);
+  };
+  const auto big_endian = [&](double value) {
+    std::string stored(sizeof(double), '\0');
+    std::memcpy(stored.data(), &value, sizeof(double));
+    bytes.append(stored.rbegin(), stored.rend());
+  };
+  const auto of_list = [&](std::uint32_t tag, std::uint32_t count) {
+    word(tag);
+    word(count);
+  };
+  of_list(10, 2);
+  name("y");
+  word(3);
+  name("x");
+  word(4);
+  of_list(0, 0);
+  of_list(11, 3);
+  constexpr std::uint32_t kBegin = 320;
+  std::uint32_t begin = kBegin;
+  const auto variable = [&](const std::string& called, const std::vector<std::uint32_t>& dimensions, std::uint32_t type,
+                            std::uint32_t size, const std::string& unit) {
+    name(called);
+    word(static_cast<std::uint32_t>(dimensions.size()));
+    for (const std::uint32_t dimension : dimensions) word(dimension);
+    of_list(12, 1);
+    name("units");
+    of_list(2, static_cast<std::uint32_t>(unit.size()));
+    bytes += unit;
+    bytes.resize((bytes.size() + 3) / 4 * 4);
+    word(type);
+    word(size);
+    word(begin);
+    begin += size;
+  };
+  variable("y", {0}, 6, 24, "degrees_north");
+  variable("x", {1}, 6, 32, "degrees_east");
+  variable("z", {0, 1}, 3, 24, "m");
+  bytes.resize(kBegin);
+  for (const double y : {10.0, 10.5, 11.0}) big_endian(y);
+  for (const double x : {20.0, 20.5, 21.0, 21.5}) big_endian(x);
+  return bytes + counting(12, 2);
+}
+
+constexpr const char* kVrt =
+    R"(<VRTDataset rasterXSize="8" rasterYSize="4"><SRS>GEOGCS["WGS 84",)"
+    R"(DATUM["WGS_1984",SPHEROID["WGS 84",6378137,298.257223563]],PRIMEM["Greenwich",0],)"
+    R"(UNIT["degree",0.0174532925199433]]</SRS><GeoTransform>10, 0.5, 0, 5e1, 0, -0.5</GeoTransform>)"
+    R"(<VRTRasterBand dataType="Int32" band="1"><NoDataValue>-9</NoDataValue><SimpleSource><SourceFilename relativeToVRT="1">)"
+    R"(a.npy</SourceFilename><SourceBand>1</SourceBand><SrcRect xOff="0" yOff="0" xSize="4" ySize="3"/><DstRect xOff="0" )"
+    R"(yOff="0" xSize="4" ySize="3"/></SimpleSource><ComplexSource><SourceFilename relativeToVRT="1">a.npy</SourceFilename>)"
+    R"(<SourceBand>1</SourceBand><SrcRect xOff="1" yOff="0" xSize="3" ySize="3"/><DstRect xOff="3" yOff="1" xSize="3" )"
+    R"(ySize="3"/><ScaleOffset>2</ScaleOffset><ScaleRatio>3</ScaleRatio><NODATA>5</NODATA></ComplexSource></VRTRasterBand>)"
+    R"(</VRTDataset>)";
+constexpr const char* kEnvi =
+    "ENVI\nsamples = 4\nlines = 3\nbands = 2\nheader offset = 2\ndata type = 2\ninterleave = bip\nbyte order = 1\n"
+    "map info = {UTM, 1, 1, 500000, 4000000, 30, 30, 32, North, WGS-84}\ndata ignore value = 5\n";
+constexpr const char* kSaga =
+    "NAME = a\nDATAFORMAT = SHORTINT\nDATAFILE_OFFSET = 2\nBYTEORDER_BIG = FALSE\nPOSITION_XMIN = 5\nPOSITION_YMIN = "
+    "7\n"
+    "CELLCOUNT_X = 4\nCELLCOUNT_Y = 3\nCELLSIZE = 10\nZ_FACTOR = 0.5\nNODATA_VALUE = 5\nTOPTOBOTTOM = FALSE\n";
+
 }  // namespace
 
 std::vector<ReaderCase> reader_cases() {
@@ -246,6 +317,12 @@ std::vector<ReaderCase> reader_cases() {
       {"SurferText", "a.grd", "DSAA\n4 3\n100 130\n200 220\n0 9\n" + numbers, open_surfer_grid, {}},
       {"Surfer6", "a.grd", surfer6(), open_surfer_grid, {}},
       {"Surfer7", "a.grd", surfer7(), open_surfer_grid, {}},
+      {"Vrt", "a.vrt", kVrt, open_vrt, {}},
+      {"EnviHeader", "a.hdr", kEnvi, open_envi, {}},
+      {"EnviSamples", "a.dat", "  " + counting(24, 2), open_envi, {}},
+      {"SagaHeader", "a.sgrd", kSaga, open_saga, {}},
+      {"SagaSamples", "a.sdat", "  " + counting(12, 2), open_saga, {}},
+      {"NetcdfClassic", "a.nc", netcdf(), open_netcdf, {}},
       {"StreamedAsciiGrid", "a.asc.gz", gzip(esri + numbers), open_ascii_grid, streamed},
       {"PngDescription", "described.png.json", "", open_png, {}},
       {"RawDescription", "a.r16.json", "", open_raw, {}},
@@ -263,6 +340,18 @@ std::vector<ReaderCase> reader_cases() {
     each.beside = {{"a.bil", counting(12, 2)}, {"a.hdr", kEhdr}};
     if (each.name == "EhdrHeader") each.beside.pop_back();
   }
+  find("Vrt").beside = {{"a.npy", npy()}};
+  for (const auto& [header, samples, text] :
+       {std::tuple("EnviHeader", "EnviSamples", kEnvi), {"SagaHeader", "SagaSamples", kSaga}}) {
+    ReaderCase& damaged = find(header);
+    ReaderCase& whole = find(samples);
+    damaged.text = true;
+    damaged.shortest_valid = 1;  // what is left out is taken for granted, or asked for
+    damaged.opened = whole.file_name;
+    damaged.beside = {{whole.file_name, whole.bytes}};
+    whole.beside = {{damaged.file_name, text}};
+  }
+  find("EnviSamples").shortest_valid = find("EnviSamples").bytes.size() - 2;  // those of the other band
   find("GridFloatSamples").beside = {{"a.hdr", esri + "byteorder LSBFIRST\n"}};
   find("Isis3Label").beside = {{"core.cub", counting(24, 2)}};
   ReaderCase& raw = find("RawDescription");
@@ -275,7 +364,7 @@ std::vector<ReaderCase> reader_cases() {
   picture.beside = {{picture.opened, written(folder, picture.opened, 6, 5, SampleType::kUint16)}};
   picture.bytes = read_file(folder / picture.file_name);
   for (const char* name : {"EsriAsciiGrid", "GrassAsciiGrid", "Pds3", "Isis3", "Isis3Label", "Dted", "UsgsDem",
-                           "PngDescription", "RawDescription", "Npy", "SurferText"}) {
+                           "PngDescription", "RawDescription", "Npy", "SurferText", "Vrt"}) {
     find(name).text = true;
   }
   // The last digits of a text can be missing without trace; a world file, a .prj and a label's last words are not

@@ -1,0 +1,319 @@
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <limits>
+#include <list>
+#include <optional>
+#include <pugixml.hpp>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "formats/files/file_source.h"
+#include "formats/files/text.h"
+#include "formats/files/text_tokens.h"
+#include "formats/georeference/files_beside.h"
+#include "formats/open_options.h"
+#include "formats/readers.h"
+#include "formats/tiff/gdal_tags.h"
+#include "isohf/base/sample.h"
+#include "isohf/error.h"
+#include "isohf/raster.h"
+
+namespace isohf {
+namespace {
+
+constexpr std::uint64_t kLongestVrt = std::uint64_t{256} << 20U;
+constexpr std::int64_t kMostSide = std::int64_t{1} << 31;
+/// Files of a mosaic that stay open.
+constexpr std::size_t kMostOpen = 16;
+/// A VRT of VRTs of ...; more go round in a circle.
+constexpr int kDeepest = 8;
+/// Of a sample: places in a VRT are written in decimals.
+constexpr double kOnTheGrid = 1e-3;
+
+thread_local int depth = 0;
+
+struct Deeper {
+  Deeper() { ++depth; }
+  ~Deeper() { --depth; }
+  Deeper(const Deeper&) = delete;
+  Deeper& operator=(const Deeper&) = delete;
+};
+
+/// A rectangle of one file, and where it lies in the mosaic.
+struct Piece {
+  std::string path;
+  std::int64_t band = 1;
+  Window from;  ///< of the file
+  std::int64_t column = 0;
+  std::int64_t row = 0;
+  std::optional<double> skipped;  ///< of its values, which let what lies beneath through
+  double scale = 1.0;
+  double offset = 0.0;
+};
+
+class VrtSource final : public FileSource {
+ public:
+  VrtSource(const std::string& path, const OpenOptions& options)
+      : FileSource(path, "VRT", options), unpacked_bytes_(options.unpacked_bytes / kMostOpen) {
+    if (depth >= kDeepest) fail(ErrorCode::kUnsupported, "is one of itself, or of too many within each other");
+    std::string text(static_cast<std::size_t>(std::min(file_->size_bytes(), kLongestVrt + 1)), '\0');
+    if (text.size() > kLongestVrt) fail(ErrorCode::kUnsupported, "is larger than 256 MiB");
+    file_->read(0, std::as_writable_bytes(std::span(text)));
+    pugi::xml_document document;
+    const pugi::xml_parse_result parsed = document.load_buffer_inplace(text.data(), text.size());
+    if (!parsed) {
+      fail(ErrorCode::kCorrupt, fmt::format("is no whole XML: {} at byte {}", parsed.description(), parsed.offset));
+    }
+    read(document.child("VRTDataset"), options);
+  }
+
+  void read_window(const Window& window, std::span<std::byte> samples) override {
+    ISOHF_ASSERT(is_window_of(info_, window, samples.size()));
+    const std::size_t size = empty_.size();
+    for (std::size_t at = 0; at < samples.size(); at += size) std::memcpy(samples.data() + at, empty_.data(), size);
+    for (const Piece& piece : pieces_) copy(piece, window, samples);
+  }
+  void limit_buffers(std::uint64_t bytes) override {
+    limit_ = bytes / kMostOpen;
+    for (Opened& each : opened_) each.source->limit_buffers(*limit_);
+  }
+  [[nodiscard]] std::uint64_t buffer_bytes(std::uint64_t limit) const override { return limit; }
+
+ private:
+  struct Opened {
+    const Piece* piece;
+    std::unique_ptr<HeightSource> source;
+  };
+
+  [[noreturn]] void refuse(const std::string& what) const {
+    fail(ErrorCode::kUnsupported, what + "; gdal_translate makes a GeoTIFF of it");
+  }
+
+  double number(const pugi::xml_node& node, const char* attribute, std::optional<double> otherwise = {}) const {
+    const pugi::xml_attribute found = node.attribute(attribute);
+    double value = 0.0;
+    if (!found && otherwise) return *otherwise;
+    if (!found || !read_decimal(found.value(), value) || !std::isfinite(value)) {
+      fail(ErrorCode::kCorrupt,
+           fmt::format("{} of {} is \"{}\", must be a number", attribute, node.name(), printable(found.value())));
+    }
+    return value;
+  }
+
+  std::int64_t whole(const pugi::xml_node& node, const char* attribute, std::optional<double> otherwise = {}) const {
+    const double value = number(node, attribute, otherwise);
+    const double nearest = std::round(value);
+    if (std::abs(value - nearest) > kOnTheGrid) {
+      refuse(fmt::format("resamples: {} of {} is {}, between samples", attribute, node.name(), value));
+    }
+    if (!(nearest >= 0.0 && nearest <= static_cast<double>(kMostSide))) {
+      fail(ErrorCode::kCorrupt,
+           fmt::format("{} of {} is {}, must be 0 to {}", attribute, node.name(), value, kMostSide));
+    }
+    return static_cast<std::int64_t>(nearest);
+  }
+
+  std::optional<double> element_number(const pugi::xml_node& parent, const char* name) const {
+    const pugi::xml_node node = parent.child(name);
+    if (!node) return std::nullopt;
+    double value = 0.0;
+    if (!read_decimal(trimmed(node.text().get()), value)) {
+      fail(ErrorCode::kCorrupt, fmt::format("{} is \"{}\", must be a number", name, printable(node.text().get())));
+    }
+    return value;
+  }
+
+  static std::string trimmed(std::string text) {
+    text.erase(0, std::min(text.find_first_not_of(" \t\r\n"), text.size()));
+    text.erase(text.find_last_not_of(" \t\r\n") + 1);
+    return text;
+  }
+
+  void read(const pugi::xml_node& root, const OpenOptions& options) {
+    if (!root) fail(ErrorCode::kCorrupt, "has no VRTDataset");
+    if (const std::string kind = root.attribute("subClass").value(); !kind.empty()) refuse("is a " + printable(kind));
+    info_.width = whole(root, "rasterXSize");
+    info_.height = whole(root, "rasterYSize");
+    if (info_.width < 1 || info_.height < 1) fail(ErrorCode::kCorrupt, "has a rasterXSize or rasterYSize of 0");
+    std::vector<pugi::xml_node> bands;
+    for (const pugi::xml_node& band : root.children("VRTRasterBand")) bands.push_back(band);
+    if (bands.empty()) fail(ErrorCode::kCorrupt, "has no VRTRasterBand");
+    const pugi::xml_node band =
+        bands[static_cast<std::size_t>(choose_band(info_, options, static_cast<std::int64_t>(bands.size())))];
+    const std::string kind = band.attribute("subClass").value();
+    if (!kind.empty() && kind != "VRTSourcedRasterBand") refuse("has a " + printable(kind));
+    read_type(band);
+    read_system(root);
+    if (const auto nodata = band.child("NoDataValue")) read_gdal_nodata(nodata.text().get(), info_);
+    for (const auto& [role, element] : {std::pair{"unittype", "UnitType"}, {"scale", "Scale"}, {"offset", "Offset"}}) {
+      if (const auto node = band.child(element)) read_gdal_item(role, trimmed(node.text().get()), info_);
+    }
+    empty_ = stored_sample(info_.sample_type, info_.void_values.empty() ? 0.0 : info_.void_values.front());
+    for (const pugi::xml_node& node : band.children()) read_source(node);
+    info_.block_width = info_.width;
+    apply_open_options(info_, options);
+  }
+
+  void read_type(const pugi::xml_node& band) {
+    const std::string name = band.attribute("dataType").as_string("Byte");
+    static constexpr std::array<std::pair<std::string_view, SampleType>, 8> kTypes = {
+        {{"Byte", SampleType::kUint8},
+         {"Int8", SampleType::kInt8},
+         {"UInt16", SampleType::kUint16},
+         {"Int16", SampleType::kInt16},
+         {"UInt32", SampleType::kUint32},
+         {"Int32", SampleType::kInt32},
+         {"Float32", SampleType::kFloat32},
+         {"Float64", SampleType::kFloat64}}};
+    const auto* const found = std::ranges::find(kTypes, name, &std::pair<std::string_view, SampleType>::first);
+    if (found == kTypes.end()) refuse("has samples of the type " + printable(name));
+    info_.sample_type = found->second;
+  }
+
+  void read_system(const pugi::xml_node& root) {
+    Georeference& place = info_.georeference;
+    if (const auto node = root.child("GeoTransform")) place_by_transform(info_.path, node.text().get(), place);
+    if (const std::string system = trimmed(root.child("SRS").text().get()); !system.empty()) {
+      read_system_text(system, info_.path, info_);
+    }
+    place.registration = place.has_origin ? Registration::kArea : Registration::kUnknown;
+    for (const pugi::xml_node& metadata : root.children("Metadata")) {
+      if (metadata.attribute("domain")) continue;
+      const auto item = metadata.find_child_by_attribute("MDI", "key", "AREA_OR_POINT");
+      if (item && std::string_view(item.text().get()) == "Point") place.registration = Registration::kPoint;
+    }
+  }
+
+  void read_source(const pugi::xml_node& node) {
+    const std::string_view kind = node.name();
+    if (!kind.ends_with("Source")) return;
+    if (kind != "SimpleSource" && kind != "ComplexSource") refuse(fmt::format("has a {}", printable(kind)));
+    for (const char* calculated : {"LUT", "Exponent", "ColorTableComponent", "OpenOptions"}) {
+      if (node.child(calculated)) refuse(fmt::format("has a {} with {}", kind, calculated));
+    }
+    const pugi::xml_node file = node.child("SourceFilename");
+    Piece piece;
+    piece.path = file.text().get();
+    if (piece.path.empty()) fail(ErrorCode::kCorrupt, fmt::format("has a {} without SourceFilename", kind));
+    if (file.attribute("relativeToVRT").as_bool()) {
+      piece.path = (std::filesystem::path(info_.path).parent_path() / piece.path).string();
+    }
+    const std::string band = node.child("SourceBand").text().as_string("1");
+    double band_number = 0.0;
+    if (!read_decimal(band, band_number) || !(band_number >= 1.0 && band_number < 65536.0)) {
+      refuse("takes the band " + printable(band));
+    }
+    piece.band = static_cast<std::int64_t>(band_number);
+    const pugi::xml_node from = node.child("SrcRect");
+    const pugi::xml_node to = node.child("DstRect");
+    const auto width = static_cast<double>(info_.width);
+    const auto height = static_cast<double>(info_.height);
+    piece.column = whole(to, "xOff", 0.0);
+    piece.row = whole(to, "yOff", 0.0);
+    piece.from = {whole(from, "xOff", 0.0), whole(from, "yOff", 0.0), whole(from, "xSize", width),
+                  whole(from, "ySize", height)};
+    if (to && (whole(to, "xSize", width) != piece.from.columns || whole(to, "ySize", height) != piece.from.rows)) {
+      refuse(fmt::format("resamples {}: {} x {} samples become {} x {}", printable(piece.path), piece.from.columns,
+                         piece.from.rows, number(to, "xSize"), number(to, "ySize")));
+    }
+    if (kind == "ComplexSource") {
+      piece.skipped = element_number(node, "NODATA");
+      piece.scale = element_number(node, "ScaleRatio").value_or(1.0);
+      piece.offset = element_number(node, "ScaleOffset").value_or(0.0);
+    }
+    pieces_.push_back(std::move(piece));
+  }
+
+  HeightSource& source_of(const Piece& piece) {
+    const auto found = std::ranges::find(opened_, &piece, &Opened::piece);
+    if (found != opened_.end()) {
+      opened_.splice(opened_.begin(), opened_, found);
+      return *opened_.front().source;
+    }
+    const Deeper deeper;
+    OpenOptions options;
+    options.unpacked_bytes = unpacked_bytes_;
+    if (piece.band > 1) options.channel = fmt::format("{}", piece.band - 1);
+    std::unique_ptr<HeightSource> source;
+    try {
+      source = open_raster(piece.path, options);
+    } catch (const Error& error) {
+      throw error.within(info_.path);
+    }
+    const SourceInfo& info = source->info();
+    if (piece.from.column + piece.from.columns > info.width || piece.from.row + piece.from.rows > info.height) {
+      fail(ErrorCode::kCorrupt,
+           fmt::format("takes samples beyond the {} x {} of {}", info.width, info.height, printable(piece.path)));
+    }
+    if (limit_) source->limit_buffers(*limit_);
+    if (opened_.size() == kMostOpen) opened_.pop_back();
+    opened_.push_front({&piece, std::move(source)});
+    return *opened_.front().source;
+  }
+
+  void copy(const Piece& piece, const Window& window, std::span<std::byte> samples) {
+    const std::int64_t west = std::max(window.column, piece.column);
+    const std::int64_t north = std::max(window.row, piece.row);
+    const std::int64_t east = std::min(window.column + window.columns, piece.column + piece.from.columns);
+    const std::int64_t south = std::min(window.row + window.rows, piece.row + piece.from.rows);
+    if (west >= east || north >= south) return;
+    HeightSource& source = source_of(piece);
+    const SampleType type = source.info().sample_type;
+    const Window part{piece.from.column + west - piece.column, piece.from.row + north - piece.row, east - west,
+                      south - north};
+    const std::size_t size = size_bytes(type);
+    buffer_.resize(static_cast<std::size_t>(part.columns * part.rows) * size);
+    source.read_window(part, buffer_);
+    const std::size_t out_size = empty_.size();
+    const auto out_at = [&](std::int64_t row) {
+      return samples.data() +
+             static_cast<std::size_t>((north - window.row + row) * window.columns + west - window.column) * out_size;
+    };
+    const bool as_it_is = type == info_.sample_type && !piece.skipped && piece.scale == 1.0 && piece.offset == 0.0;
+    const auto store = store_sample(info_.sample_type);
+    const bool to_whole = !is_floating(info_.sample_type);
+    with_stored_type(type, [&](auto kind) {
+      using Stored = decltype(kind);
+      for (std::int64_t row = 0; row < part.rows; ++row) {
+        const std::byte* in = buffer_.data() + static_cast<std::size_t>(row * part.columns) * size;
+        std::byte* out = out_at(row);
+        if (as_it_is) {
+          std::memcpy(out, in, static_cast<std::size_t>(part.columns) * size);
+          continue;
+        }
+        for (std::int64_t column = 0; column < part.columns; ++column, in += size, out += out_size) {
+          double value = static_cast<double>(number_of(stored_at<Stored>(in)));
+          if (piece.skipped && (value == *piece.skipped || (std::isnan(value) && std::isnan(*piece.skipped)))) continue;
+          value = value * piece.scale + piece.offset;
+          if (to_whole && std::isnan(value)) value = 0.0;
+          store(std::isnan(value) ? value : nearest_sample(info_.sample_type, value), out);
+        }
+      }
+    });
+  }
+
+  std::uint64_t unpacked_bytes_;
+  std::optional<std::uint64_t> limit_;
+  std::vector<std::byte> empty_;  ///< what stands where no piece is
+  std::vector<Piece> pieces_;     ///< later ones lie above
+  std::list<Opened> opened_;      ///< those last used first
+  std::vector<std::byte> buffer_;
+};
+
+}  // namespace
+
+bool looks_like_vrt(std::span<const std::byte> head) {
+  return text_of(head).find("<VRTDataset") != std::string_view::npos;
+}
+
+std::unique_ptr<HeightSource> open_vrt(const std::string& path, const OpenOptions& options) {
+  return std::make_unique<VrtSource>(path, options);
+}
+
+}  // namespace isohf
