@@ -82,7 +82,7 @@ std::string auxiliary_text(const RasterSpec& spec) {
   const Georeference& place = *spec.georeference;
   std::string text = "<PAMDataset>\n";
   std::string system = wkt_of(place.system, WktDialect::kGdal);
-  if (system.empty() && place.system.epsg) system = fmt::format("EPSG:{}", *place.system.epsg);
+  if (system.empty()) system = prj_text(spec);  // without PROJ
   if (!system.empty()) text += fmt::format("  <SRS>{}</SRS>\n", xml_text(system));
   text += fmt::format("  <GeoTransform>{}, {}, 0, {}, 0, {}</GeoTransform>\n", place.origin_x - place.spacing_x / 2.0,
                       place.spacing_x, place.origin_y + place.spacing_y / 2.0, -place.spacing_y);

@@ -192,7 +192,8 @@ TEST(Formats, AreListedWithTheLibraryThatReadsThem) {
     for (const std::string extension : format.extensions) {
       const bool first = extensions.insert(extension).second;
       // Of these the content tells which format it is.
-      EXPECT_TRUE(first || extension == ".lbl" || extension == ".dem") << extension << " is listed twice";
+      EXPECT_TRUE(first || extension == ".lbl" || extension == ".dem" || extension == ".hdr" || extension == ".grd")
+          << extension << " is listed twice";
     }
   }
   const auto library = [](const std::vector<Format>& formats, const std::string& name) {
