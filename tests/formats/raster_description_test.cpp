@@ -101,6 +101,7 @@ TEST(RasterDescription, OfAnotherProgramIsLeftAsideWithAWarning) {
   write_picture(path);
   std::filesystem::remove(path + ".json");
   std::filesystem::remove(path + ".aux.xml");  // which says the same in GDAL's words
+  std::filesystem::remove(folder / "a.pgw");
   write_file(path + ".json", R"({"z_scale": 9, "tiles": []})");
   const auto source = open_raster(path, {});
   EXPECT_EQ(source->info().z_scale, 1.0);
