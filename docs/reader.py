@@ -811,7 +811,8 @@ class Archive:
                 expected = []
                 for r in range(rows):
                     for c in range(columns):
-                        x = 2 * (c - 1) - (r % 2 == 0 and c > 1) - (r % 2 == 0 and c == columns - 2) + (r % 2 == 0 and c == 0)
+                        slid = 0 if r % 2 else {0: 2, 1: 1, columns - 2: -1, columns - 1: -2}.get(c, 0)
+                        x = 2 * c + r % 2 + slid - 3
                         X, Z = i * wide + x, j * high + r - 1
                         if (not joined and F * (X - 2 * reach) > wide * across) or F * (Z - reach) > high * down:
                             expected.append(None)

@@ -686,11 +686,14 @@ bool begins_with(const std::string& path, std::string_view wanted) {
          head == wanted;
 }
 
+/// x.hdr, or x.dat.hdr where there is none: what else x.hdr says is said of the same samples.
 std::string envi_header_of(const std::string& path) {
-  for (const char* extension : {".hdr", ".HDR"}) {
-    for (const std::string& header :
-         {std::filesystem::path(path).replace_extension(extension).string(), path + extension}) {
-      if (header != path && begins_with(header, "ENVI")) return header;
+  for (const bool is_replaced : {true, false}) {
+    for (const char* extension : {".hdr", ".HDR"}) {
+      const std::string header =
+          is_replaced ? std::filesystem::path(path).replace_extension(extension).string() : path + extension;
+      if (header == path || !is_file(header)) continue;
+      return begins_with(header, "ENVI") ? header : std::string();
     }
   }
   return {};

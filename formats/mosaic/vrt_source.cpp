@@ -201,6 +201,9 @@ class VrtSource final : public FileSource {
     Piece piece;
     piece.path = file.text().get();
     if (piece.path.empty()) fail(ErrorCode::kCorrupt, fmt::format("has a {} without SourceFilename", kind));
+    if (piece.path != printable(piece.path)) {
+      fail(ErrorCode::kCorrupt, "names a file with control characters: " + printable(piece.path));
+    }
     if (file.attribute("relativeToVRT").as_bool()) {
       piece.path = (std::filesystem::path(info_.path).parent_path() / piece.path).string();
     }

@@ -164,7 +164,7 @@ TEST(JsonFiles, AreAllThatRestoreExportAndShadeWrote) {
   expect_all({"restore", "--size", "20x20"}, "a.flt", 2);
   expect_all({"export"}, "a.r16", 2);
   expect_all({"export", "--tiles", "2x2"}, "a.r16", 8);
-  expect_all({"shade"}, "a.png", 1);
+  expect_all({"shade"}, "a.png", 3);  // with a world file and .aux.xml
 }
 
 TEST(Strict, AWarningIsAnErrorAndNothingIsWritten) {

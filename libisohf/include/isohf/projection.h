@@ -75,10 +75,9 @@ struct ProjectionSpec {
 struct ProjectionRequest {
   bool is_auto = true;
   ProjectionKind kind = ProjectionKind::kNone;
-  std::vector<double> parameters;           ///< as written behind the kind; empty: from the extent
-  int utm_zone = 0;                         ///< 0: from the extent
-  bool is_given = false;                    ///< by the user: an input on a map of its own leaves it for nothing else
-  std::optional<ProjectionSpec> spec = {};  ///< all of it, as a reference system says (projection_from_system)
+  std::vector<double> parameters;  ///< as written behind the kind; empty: from the extent
+  int utm_zone = 0;                ///< 0: from the extent
+  bool is_given = false;           ///< by the user: an input on a map of its own leaves it for nothing else
 
   /// "auto", "KIND" or "KIND:PARAMETERS": local:LON,LAT  transverse-mercator:LON[,SCALE]  utm:32N
   /// lambert-conformal:LAT1,LAT2[,LON]  polar-stereographic:LAT[,LON]. Throws Error{kInvalidArgument}, "found ..., must
