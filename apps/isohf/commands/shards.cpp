@@ -132,8 +132,14 @@ ConvertCommandOptions conversion_of(const ShardCommand& command, const ShardPlan
   return std::move(*options);
 }
 
+/// A plan or a scan.
 std::string text_of_file(const std::string& path) {
+  constexpr std::uint64_t kMostBytes = std::uint64_t{256} << 20U;
   const auto file = open_file_source(path);
+  if (file->size_bytes() > kMostBytes) {
+    throw Error(ErrorCode::kCorrupt,
+                fmt::format("{}: is neither plan nor scan: it has {} bytes", path, file->size_bytes()));
+  }
   const std::vector<std::byte> bytes = SourceBytes(*file, 0, file->size_bytes()).take();
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
@@ -171,12 +177,9 @@ bool looks_like_plan(const std::string& path) {
 }
 
 ShardPlan read_plan(const std::string& path) {
-  const auto file = open_file_source(path);
-  constexpr std::uint64_t kMostBytes = std::uint64_t{256} << 20U;
+  const std::string text = text_of_file(path);
   try {
-    if (file->size_bytes() > kMostBytes) throw Error(ErrorCode::kCorrupt, "is no plan: it is too large");
-    const std::vector<std::byte> bytes = SourceBytes(*file, 0, file->size_bytes()).take();
-    return parse_shard_plan({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+    return parse_shard_plan(text);
   } catch (const Error& error) {
     throw error.within(path);
   }
