@@ -686,13 +686,18 @@ bool begins_with(const std::string& path, std::string_view wanted) {
          head == wanted;
 }
 
+constexpr std::string_view kEnviData[] = {"", ".dat", ".img", ".bin", ".raw", ".bsq", ".bil", ".bip", ".flt", ".envi"};
+
 /// x.hdr, or x.dat.hdr where there is none: what else x.hdr says is said of the same samples.
 std::string envi_header_of(const std::string& path) {
+  // Another file may have the name of the samples but for its extension.
+  const std::string own = lower_case(std::filesystem::path(path).extension().string());
+  const bool is_data = std::ranges::find(kEnviData, own) != std::end(kEnviData);
   for (const bool is_replaced : {true, false}) {
     for (const char* extension : {".hdr", ".HDR"}) {
       const std::string header =
           is_replaced ? std::filesystem::path(path).replace_extension(extension).string() : path + extension;
-      if (header == path || !is_file(header)) continue;
+      if (header == path || (is_replaced && !is_data) || !is_file(header)) continue;
       return begins_with(header, "ENVI") ? header : std::string();
     }
   }
@@ -716,7 +721,7 @@ std::unique_ptr<HeightSource> open_envi(const std::string& path, const OpenOptio
     return std::make_unique<EnviSource>(path, header, options);
   }
   // The header was named.
-  for (const char* extension : {"", ".dat", ".img", ".bin", ".raw", ".bsq", ".bil", ".bip", ".flt"}) {
+  for (const std::string_view extension : kEnviData) {
     const std::string data = std::filesystem::path(path).replace_extension(extension).string();
     if (data != path && is_file(data)) return std::make_unique<EnviSource>(data, path, options);
   }

@@ -174,9 +174,14 @@ void place_by_transform(const std::string& path, const std::string& text, Georef
 
 void read_system_text(const std::string& text, const std::string& path, SourceInfo& info) {
   try {
-    if (!read_wkt(text, info)) take_system(text, info);
+    if (read_wkt(text, info)) return;
   } catch (const Error& error) {
     throw error.within(path);
+  }
+  try {
+    take_system(text, info);
+  } catch (const Error& error) {  // the samples are what they are: a local grid, what no PROJ is there to read
+    info.warnings.push_back(loss(fmt::format("{}: {}: the reference system is left out", path, error.what())));
   }
 }
 

@@ -201,7 +201,7 @@ class VrtSource final : public FileSource {
     Piece piece;
     piece.path = file.text().get();
     if (piece.path.empty()) fail(ErrorCode::kCorrupt, fmt::format("has a {} without SourceFilename", kind));
-    if (piece.path != printable(piece.path)) {
+    if (piece.path != one_line(piece.path)) {
       fail(ErrorCode::kCorrupt, "names a file with control characters: " + printable(piece.path));
     }
     if (file.attribute("relativeToVRT").as_bool()) {
@@ -239,7 +239,6 @@ class VrtSource final : public FileSource {
       opened_.splice(opened_.begin(), opened_, found);
       return *opened_.front().source;
     }
-    const Deeper deeper;
     OpenOptions options;
     options.unpacked_bytes = unpacked_bytes_;
     if (piece.band > 1) options.channel = fmt::format("{}", piece.band - 1);
@@ -261,6 +260,8 @@ class VrtSource final : public FileSource {
   }
 
   void copy(const Piece& piece, const Window& window, std::span<std::byte> samples) {
+    const Deeper deeper;  // sources open and read theirs in turn
+    if (depth > kDeepest) fail(ErrorCode::kUnsupported, "is one of itself, or of too many within each other");
     const std::int64_t west = std::max(window.column, piece.column);
     const std::int64_t north = std::max(window.row, piece.row);
     const std::int64_t east = std::min(window.column + window.columns, piece.column + piece.from.columns);
@@ -268,6 +269,9 @@ class VrtSource final : public FileSource {
     if (west >= east || north >= south) return;
     HeightSource& source = source_of(piece);
     const SampleType type = source.info().sample_type;
+    // What stands for a void in a wider type than the VRT's, as of masks, has no sample in it.
+    const std::vector<double>& voids = source.info().void_values;
+    const bool drops_voids = type != info_.sample_type;
     const Window part{piece.from.column + west - piece.column, piece.from.row + north - piece.row, east - west,
                       south - north};
     const std::size_t size = size_bytes(type);
@@ -293,6 +297,14 @@ class VrtSource final : public FileSource {
         for (std::int64_t column = 0; column < part.columns; ++column, in += size, out += out_size) {
           double value = static_cast<double>(number_of(stored_at<Stored>(in)));
           if (piece.skipped && (value == *piece.skipped || (std::isnan(value) && std::isnan(*piece.skipped)))) continue;
+          if (drops_voids && std::ranges::find(voids, value) != voids.end()) {
+            if (!info_.void_values.empty()) continue;
+            if (nearest_sample(info_.sample_type, value) != value) {
+              fail(ErrorCode::kUnsupported, printable(piece.path) +
+                                                " has samples without an elevation, and the VRT no "
+                                                "NoDataValue for them (gdalbuildvrt -vrtnodata)");
+            }
+          }
           value = value * piece.scale + piece.offset;
           if (to_whole && std::isnan(value)) value = 0.0;
           store(std::isnan(value) ? value : nearest_sample(info_.sample_type, value), out);

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <optional>
 
@@ -92,7 +93,15 @@ int command_extract(const Arguments& arguments) {
   check_archive_output({options->archive}, options->output, options->overwrite);
   const TileRange tiles = options->tiles ? *options->tiles : [&] {
     ArchiveReader archive = open_archive(options->archive);
-    return tiles_touching(archive.grid(), ground_in_box(archive, *options->bbox));
+    TileRange touched = tiles_touching(archive.grid(), ground_in_box(archive, *options->bbox));
+    const TileRange here = tiles_of(archive.metadata());
+    touched.first = {std::max(touched.first.column, here.first.column), std::max(touched.first.row, here.first.row)};
+    touched.end = {std::min(touched.end.column, here.end.column), std::min(touched.end.row, here.end.row)};
+    if (touched.first.column >= touched.end.column || touched.first.row >= touched.end.row) {
+      throw Error(ErrorCode::kInvalidArgument,
+                  options->archive + ": is a part of its land, and holds no tile that --bbox touches");
+    }
+    return touched;
   }();
   return print_part(options->output, options->common, options->work, [&](const Job& job) {
     return extract_tiles(options->archive, options->output, tiles, {options->overwrite, options->common.strict}, job);

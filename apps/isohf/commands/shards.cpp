@@ -41,6 +41,10 @@ std::vector<std::string> recorded(const Arguments& arguments) {
   std::vector<std::string> kept;
   for (std::size_t i = 0; i < arguments.size(); ++i) {
     const std::string& argument = arguments[i];
+    if (argument == "--") {
+      kept.insert(kept.end(), arguments.begin() + static_cast<std::ptrdiff_t>(i), arguments.end());
+      break;
+    }
     if (argument == "--overwrite" || argument == "--no-scan") continue;
     if (argument == "--write" || argument == "--shards") {
       ++i;
@@ -120,7 +124,7 @@ ShardPlan read_plan_of(const ShardCommand& options) {
 /// The plan's conversion, with what is this machine's own.
 ConvertCommandOptions conversion_of(const ShardCommand& command, const ShardPlan& plan) {
   Arguments again = plan.arguments;
-  again.insert(again.end(), {"--write", command.plan});
+  again.insert(again.begin(), {"--write", command.plan});
   std::optional<ConvertCommandOptions> options = parse_convert(again, ConvertLine::kPlan);
   if (!options) throw Error(ErrorCode::kCorrupt, command.plan + ": its arguments make no conversion");
   options->work = command.work;
@@ -196,6 +200,7 @@ int write_plan(const Arguments& arguments) {
                                   : plan_shards(*prepared.source, options->convert, options->shards,
                                                 job_from(options->work, *display));
   display.reset();
+  print_warnings(plan.warnings);
   plan.arguments = recorded(arguments);
   write_output(options->plan, format_shard_plan(plan), options->convert.overwrite);
   StandardOutput out;
@@ -248,6 +253,7 @@ int command_scan(const Arguments& arguments) {
     ConvertCommandOptions options = conversion_of(*command, draft);
     std::vector<std::string> read = options.inputs.names;
     read.insert(read.end(), command->scans.begin(), command->scans.end());
+    read.push_back(command->plan);
     check_plan_output(read, command->output, command->overwrite);
     const Prepared prepared = prepare(options, expand_inputs(options.inputs.names, options.inputs.recursive));
     std::optional<ProgressDisplay> display(std::in_place, command->work.progress, command->common.quiet,

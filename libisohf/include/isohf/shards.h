@@ -31,6 +31,7 @@ struct ShardPlan {
   };
   std::optional<Codes> codes;
   std::vector<std::pair<std::int64_t, std::int64_t>> shards;  ///< rows of tiles: first, and past the last
+  std::vector<Warning> warnings;  ///< of the pass over the source, where there was one; no part of what is written
 };
 
 /// Plans a conversion, with one pass over the source where its range is not given (z_range). Shards have about equally

@@ -1,12 +1,12 @@
 #include <filesystem>
 #include <optional>
 
-#include "isohf/archive/metadata/part_record.h"
 #include "isohf/archive/planes/archive_planes.h"
 #include "isohf/archive/writer.h"
 #include "isohf/base/arena.h"
 #include "isohf/convert.h"
 #include "isohf/convert/parts/assembly.h"
+#include "isohf/convert/parts/parts.h"
 #include "isohf/convert/stages/plane_stage.h"
 #include "isohf/error.h"
 
@@ -34,7 +34,7 @@ AddPlanesSummary add_planes(const std::string& archive, const std::string& outpu
     if (metadata.planes.count > 0) {
       planes.emplace(planes_of(metadata), metadata.quantisation, metadata.level.value_or(kDefaultLevel), writer);
     }
-    const TileRange tiles = tiles_here(metadata);
+    const TileRange tiles = tiles_here(reader);
     Assembly copy(metadata, writer, {{{&reader, tiles}}, tiles, planes ? &*planes : nullptr, true, false, true}, job);
     copy.add_tiles();
     copy.add_other_members(true);
@@ -42,6 +42,7 @@ AddPlanesSummary add_planes(const std::string& archive, const std::string& outpu
   if (writer.content_hash(metadata) != reader.metadata().content_sha256) {
     throw Error(ErrorCode::kCorrupt, archive + ": its tiles differ from its content hash; see isohf verify");
   }
+  count_members(writer, metadata);  // another tool may have packed them again
   const MemberTotals totals = writer.members_in(kPlanesFolder);
   summary.planes = metadata.planes;
   summary.tiles = totals.members;

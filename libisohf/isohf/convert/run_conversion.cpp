@@ -269,9 +269,14 @@ ShardPlan::Codes before_writing(HeightSource& source, const Plan& plan, const Co
 
 }  // namespace
 
-ShardPlan::Codes find_codes(HeightSource& source, const Plan& plan, const ConvertOptions& options, const Job& job) {
+ShardPlan::Codes find_codes(HeightSource& source, const Plan& plan, const ConvertOptions& options, const Job& job,
+                            std::vector<Warning>& warnings) {
   ConvertSummary summary(plan.grid);
-  return before_writing(source, plan, options, job, [&](Conversion& conversion) { choose_codes(conversion, summary); });
+  const ShardPlan::Codes codes =
+      before_writing(source, plan, options, job, [&](Conversion& conversion) { choose_codes(conversion, summary); });
+  refuse_warnings(summary, options);
+  warnings = std::move(summary.warnings);
+  return codes;
 }
 
 RangeScan find_range(HeightSource& source, const Plan& plan, const ConvertOptions& options, const RowRange& rows,
@@ -280,12 +285,17 @@ RangeScan find_range(HeightSource& source, const Plan& plan, const ConvertOption
   std::vector<Warning> warnings;
   (void)before_writing(source, plan, options, job,
                        [&](Conversion& conversion) { found = scan_range(conversion, rows, warnings); });
+  if (options.strict && !warnings.empty()) throw error_from(warnings);
   return found;
 }
 
 ShardPlan::Codes codes_of(HeightSource& source, const Plan& plan, const ConvertOptions& options,
                           const RangeScan& scan) {
   return before_writing(source, plan, options, {}, [&](Conversion& conversion) {
+    if (options.z_range) {  // says it all
+      ConvertSummary unused(plan.grid);
+      return choose_codes(conversion, unused);
+    }
     if (choose_codes_by(conversion, scan, false)) return;
     throw Error(
         ErrorCode::kInvalidArgument,

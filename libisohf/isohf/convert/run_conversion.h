@@ -28,7 +28,7 @@ struct ShardWork {
 
 /// Codes alone: the first pass over the source, where one is needed. `plan` must be made of options.plan.
 [[nodiscard]] ShardPlan::Codes find_codes(HeightSource& source, const Plan& plan, const ConvertOptions& options,
-                                          const Job& job);
+                                          const Job& job, std::vector<Warning>& warnings);
 /// That pass over some rows, and codes by what it found in all of them. Throws Error{kInvalidArgument} where these must be
 /// found by the surface itself.
 [[nodiscard]] RangeScan find_range(HeightSource& source, const Plan& plan, const ConvertOptions& options,

@@ -8,6 +8,7 @@
 #include <map>
 
 #include "isohf/archive/codec/simd/batch_decoder.h"
+#include "isohf/archive/codec/tile_encoder.h"
 #include "isohf/archive/container/archive_directory.h"
 #include "isohf/archive/container/content_hash.h"
 #include "isohf/archive/container/member_tables.h"
@@ -119,6 +120,12 @@ void Assembly::read(std::span<const AssemblyInput* const> inputs, TileIndex firs
         Tile& tile = lanes[places[k]];
         EncodedTile& encoded = tile.encoded;
         tile.codes = std::move(codes[k]);
+        // Another tool's members may be stored, and their ranges are not known: only what was packed again is coded again.
+        if (archive->reads_by_directory()) {
+          const std::vector<std::byte> digest = std::move(encoded.content_digest);
+          encoded = encode_tile(metadata_.grid.shape(), tile.codes, metadata_.level.value_or(kDefaultLevel));
+          if (!digest.empty()) encoded.content_digest = digest;
+        }
         if (request_.checks_digests || encoded.content_digest.empty()) {
           std::vector<std::byte> digest = tile_content_digest(tile.codes);
           if (!encoded.content_digest.empty() && digest != encoded.content_digest) {
@@ -175,8 +182,13 @@ void Assembly::add_textures(TileIndex index, const ArchiveReader& from) {
 
 /// Copied where what they tell of is of one origin, else made of the row as it is now.
 void Assembly::add_seeds(std::int64_t row, const Row& tiles) {
-  const ArchiveReader* const first = tiles.front().from;
-  const bool is_one = std::all_of(tiles.begin(), tiles.end(), [&](const Tile& tile) { return tile.from == first; });
+  const ArchiveReader* first = nullptr;
+  bool is_one = true;
+  for (const Tile& tile : tiles) {
+    if (tile.from == nullptr) continue;  // void, or not asked for
+    if (first == nullptr) first = tile.from;
+    is_one = is_one && tile.from == first;
+  }
   if (!seeds_ || is_one) {
     for (std::size_t i = 0; i < tiles.size(); ++i) {
       if (tiles[i].from == nullptr) continue;
@@ -216,6 +228,9 @@ void Assembly::compare_edges(std::int64_t row, const Row& tiles, const Row& abov
       std::int64_t other = step.row == 0 ? column + 1 : column - step.column;
       if (metadata_.wraps_x) other = (other + columns) % columns;
       if (other < 0 || other >= columns || (step.row == 1 && above.empty())) continue;
+      const TileIndex one = step.row == 0 ? TileIndex{column, row} : TileIndex{other, row - 1};
+      const TileIndex two = step.row == 0 ? TileIndex{other, row} : TileIndex{column, row};
+      if (!request_.tiles.contains(one) || !request_.tiles.contains(two)) continue;
       const Tile& here =
           step.row == 0 ? tiles[static_cast<std::size_t>(column)] : above[static_cast<std::size_t>(other)];
       const Tile& there = tiles[static_cast<std::size_t>(step.row == 0 ? other : column)];

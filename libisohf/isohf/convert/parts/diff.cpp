@@ -72,8 +72,8 @@ ArchiveDifference diff_archives(const std::string& first, const std::string& sec
   ArchiveDifference found;
   found.metadata = differing_members(a, b);
   found.why_other_lattice = why_other_lattice(a.metadata(), b.metadata());
-  const TileRange of_a = tiles_here(a.metadata());
-  const TileRange of_b = tiles_here(b.metadata());
+  const TileRange of_a = tiles_here(a);
+  const TileRange of_b = tiles_here(b);
   TileRange& tiles = found.compared;
   tiles.first = {std::max(of_a.first.column, of_b.first.column), std::max(of_a.first.row, of_b.first.row)};
   tiles.end = {std::min(of_a.end.column, of_b.end.column), std::min(of_a.end.row, of_b.end.row)};

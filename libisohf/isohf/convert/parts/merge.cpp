@@ -9,6 +9,8 @@
 
 #include "isohf/archive/container/archive_directory.h"
 #include "isohf/archive/metadata/part_record.h"
+#include "isohf/archive/shadow_seeds/shadow_seeds.h"
+#include "isohf/archive/textures/texture_info.h"
 #include "isohf/base/arena.h"
 #include "isohf/convert/parts/parts.h"
 #include "isohf/convert/parts/problems.h"
@@ -44,6 +46,23 @@ std::vector<TileRange> gaps_in(const TileRange& all, const std::vector<AssemblyI
   return gaps;
 }
 
+/// What lies beside the tiles of one archive and cannot be joined to the other's; empty where all can.
+std::string why_other_extras(const Metadata& one, const Metadata& other) {
+  const auto seeds = [](const Metadata& metadata) {
+    auto info = shadow_seed_info(metadata);
+    if (info) info->members = 0, info->bytes = 0;
+    return info ? format_shadow_seed_info(*info) : std::string();
+  };
+  const auto textures = [](const Metadata& metadata) {
+    const auto info = texture_info(metadata);
+    return info ? fmt::format("{} {} {} {}", static_cast<int>(info->format), info->channels, info->size, info->levels)
+                : std::string();
+  };
+  if (seeds(one) != seeds(other)) return "shadow seeds";
+  if (textures(one) != textures(other)) return "textures";
+  return {};
+}
+
 /// An archive's bytes against the CRC that it states.
 void check_data(const ArchiveReader& archive) {
   for (const auto& [name, stated] : archive.metadata().extensions) {
@@ -69,7 +88,7 @@ std::vector<std::unique_ptr<ArchiveReader>> open_parts(const std::vector<std::st
       try {
         auto reader = std::make_unique<ArchiveReader>(archives[i]);
         require_copyable(*reader);
-        (void)part_record(reader->metadata());
+        (void)tiles_here(*reader);
         check_data(*reader);
         readers[i] = std::move(reader);
       } catch (const Error& error) {
@@ -103,7 +122,10 @@ PartSummary merge_archives(const std::vector<std::string>& archives, const std::
     if (!why.empty()) {
       problems.add(fmt::format("{}: {} as {} has", reader->path(), why, readers.front()->path()));
     }
-    inputs.push_back({reader.get(), tiles_here(reader->metadata())});
+    if (const std::string other = why_other_extras(readers.front()->metadata(), reader->metadata()); !other.empty()) {
+      problems.add(fmt::format("{}: has other {} than {}", reader->path(), other, readers.front()->path()));
+    }
+    inputs.push_back({reader.get(), tiles_here(*reader)});
     origins.push_back(origin_of(*reader));
     if (origins.back().is_shard) {
       problems.add(reader->path() + ": is a shard; name its plan first, isohf merge PLAN PART...");
@@ -120,8 +142,10 @@ PartSummary merge_archives(const std::vector<std::string>& archives, const std::
                              text_of(all)));
   }
   problems.throw_if_any();
-  const bool one_origin = std::all_of(origins.begin(), origins.end(),
-                                      [&](const PartOrigin& origin) { return origin.id == origins.front().id; });
+  const PartOrigin& first = origins.front();
+  const bool one_origin = std::all_of(origins.begin(), origins.end(), [&](const PartOrigin& origin) {
+    return origin.id == first.id && origin.whole_json == first.whole_json;
+  });
   Metadata metadata = readers.front()->metadata();
   for (const auto& reader : readers) {
     Statistics& most = metadata.statistics;

@@ -32,6 +32,8 @@ void set_extension(Metadata& metadata, const char* name, std::string text) {
     metadata.extensions.emplace_back(name, std::move(text));
 }
 
+}  // namespace
+
 void count_members(const ArchiveWriter& writer, Metadata& metadata) {
   const auto count = [&](auto info, const char* folder, const char* name, auto format) {
     if (!info) return;
@@ -44,7 +46,13 @@ void count_members(const ArchiveWriter& writer, Metadata& metadata) {
   count(texture_info(metadata), kTextureFolder, kTileTexturesName, format_texture_info);
 }
 
-}  // namespace
+TileRange tiles_here(const ArchiveReader& archive) {
+  try {
+    return tiles_here(archive.metadata());
+  } catch (const Error& error) {
+    throw error.within(archive.path());
+  }
+}
 
 TileRange tiles_of(const Metadata& metadata) {
   return tiles_here(metadata);
@@ -110,8 +118,15 @@ PartOrigin origin_of(const ArchiveReader& archive) {
     return {archive.path(), {}, false};
   }
   std::string json(reinterpret_cast<const char*>(whole->data()), whole->size());
-  std::string id = parse_metadata(json).ground_sha256;
-  return {std::move(id), std::move(json), false};
+  try {
+    const Metadata of_whole = parse_metadata(json);
+    if (const std::string why = why_other_lattice(archive.metadata(), of_whole); !why.empty()) {
+      throw Error(ErrorCode::kCorrupt, why + " as the archive itself has");
+    }
+    return {of_whole.ground_sha256, std::move(json), false};
+  } catch (const Error& error) {
+    throw error.within(fmt::format("{}: {}", archive.path(), kWholeName));
+  }
 }
 
 PartSummary write_parts(PartsJob parts, const std::string& output, const PartOptions& options, const Job& job) {
@@ -179,7 +194,7 @@ PartSummary extract_tiles(const std::string& archive, const std::string& output,
                           const PartOptions& options, const Job& job) {
   const ArchiveReader reader(archive);
   require_copyable(reader);
-  const TileRange here = tiles_here(reader.metadata());
+  const TileRange here = tiles_here(reader);
   const auto inside = [](std::int64_t first, std::int64_t end, std::int64_t least, std::int64_t most) {
     return first >= least && first < end && end <= most;
   };

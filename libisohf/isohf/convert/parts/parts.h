@@ -18,6 +18,12 @@ namespace isohf {
 /// Throws Error{kInvalidArgument} where an archive's members cannot be copied as they are: of version 1, repacked.
 void require_copyable(const ArchiveReader& archive);
 
+/// As of its metadata; errors name the archive.
+[[nodiscard]] TileRange tiles_here(const ArchiveReader& archive);
+
+/// Says in the metadata how many seeds and textures were written, and how large.
+void count_members(const ArchiveWriter& writer, Metadata& metadata);
+
 /// What an archive is a part of; equal where parts fit together without a look at their elevations.
 struct PartOrigin {
   std::string id;

@@ -186,7 +186,7 @@ Statistics joined_statistics(const std::vector<const ArchiveReader*>& shards) {
 
 ShardPlan plan_shards(HeightSource& source, const ConvertOptions& options, int shards, const Job& job) {
   ShardPlan plan = draft_shards(source, options, shards);
-  plan.codes = find_codes(source, make_plan(source.info(), options.plan), options, job);
+  plan.codes = find_codes(source, make_plan(source.info(), options.plan), options, job, plan.warnings);
   return plan;
 }
 
@@ -336,6 +336,11 @@ PartSummary merge_shards(const ShardPlan& plan, const std::vector<std::string>& 
   }
   if (!missing.empty())
     problems.add(fmt::format("of the plan's {} shards these are missing: {}", shards.size(), shard_list(missing)));
+  problems.throw_if_any();
+  for (const ArchiveReader* const shard : shards) {
+    const std::string why = why_other_lattice(shards.front()->metadata(), shard->metadata());
+    if (!why.empty()) problems.add(fmt::format("{}: {} as {} has", shard->path(), why, shards.front()->path()));
+  }
   problems.throw_if_any();
   PartsJob parts{{},   all_tiles(shards.front()->grid()), shards.front()->metadata(), {},
                  true, joined_statistics(shards)};

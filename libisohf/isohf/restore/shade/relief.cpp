@@ -130,7 +130,9 @@ void relief_aspect(const ReliefRows& rows, const PixelSize& pixel, std::span<flo
     const float degrees = std::atan2(-slope.x, slope.z) * kDegrees;
     const float clockwise = degrees < 0.0F ? degrees + 360.0F : degrees;
     const bool is_level = slope.x == 0.0F && slope.z == 0.0F;
-    out[static_cast<std::size_t>(i)] = is_level ? std::numeric_limits<float>::quiet_NaN() : clockwise;
+    // -0 and what rounds to 360 are North.
+    const float north_is_0 = clockwise >= 360.0F ? 0.0F : clockwise + 0.0F;
+    out[static_cast<std::size_t>(i)] = is_level ? std::numeric_limits<float>::quiet_NaN() : north_is_0;
   }
 }
 

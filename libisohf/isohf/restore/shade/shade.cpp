@@ -603,8 +603,12 @@ class ShadeRenderer {
         relief_aspect(rows, pixel, one);
         break;
       case ShadeKind::kShadowMask:
-        for (std::size_t i = 0; i < width_; ++i) one[i] = std::isnan(rows.here[i]) ? kVoid : pixels.shares[i];
+        std::copy_n(pixels.shares.begin(), width_, one.begin());
         break;
+    }
+    // A slope is known by a pixel's neighbours alone.
+    for (std::size_t i = 0; i < width_; ++i) {
+      if (std::isnan(rows.here[i])) one[i] = kVoid;
     }
     if (samples_.type == SampleType::kUint8) {
       return bytes_from_shares(one, {reinterpret_cast<std::uint8_t*>(out), width_});
