@@ -95,7 +95,8 @@ TEST(AlteredArchives, ContradictoryMetadataAreFindings) {
     const AlteredArchive whole(name);
     std::vector<json::json_pointer> leaves;
     add_leaves(whole.metadata, json::json_pointer(), leaves);
-    for (const json::json_pointer& leaf : leaves) {
+    for (std::size_t i = 0; i < leaves.size(); i += kSanitized ? 5 : 1) {
+      const json::json_pointer& leaf = leaves[i];
       const json& before = whole.metadata.at(leaf);
       std::vector<json> values = {nullptr, "nonsense", 9223372036854775808.0, -1e308};
       if (before.is_number()) values.push_back(2.0 * before.get<double>() + 100.0);
@@ -114,8 +115,8 @@ TEST(AlteredArchives, ContradictoryMetadataAreFindings) {
       }
     }
   }
-  EXPECT_GT(refused, 100U);
-  EXPECT_GT(found, refused + 20);
+  EXPECT_GT(refused, kSanitized ? 20U : 100U);
+  EXPECT_GT(found, refused + (kSanitized ? 2 : 20));
 }
 
 TEST(AlteredArchives, GroundThatIsNoneIsAFinding) {
@@ -204,7 +205,7 @@ TEST(AlteredArchives, OtherSeedsAreFindings) {
     std::size_t bytes = 0;
     for (std::size_t s = 0; s < seeds.size(); s += 7) {
       const std::vector<std::byte> payload = whole.bytes(seeds[s]);
-      for (std::size_t i = s % 5; i < payload.size(); i += 5, ++bytes) {
+      for (std::size_t i = s % 5; i < payload.size(); i += kSanitized ? 25 : 5, ++bytes) {
         std::vector<std::byte> other = payload;
         other[i] ^= std::byte{1};
         AlteredArchive altered = whole;
@@ -214,7 +215,7 @@ TEST(AlteredArchives, OtherSeedsAreFindings) {
         EXPECT_THAT(findings_in(folder / "a.isohf"), testing::Contains(finding::kShadowSeeds)) << seeds[s] << " " << i;
       }
     }
-    EXPECT_GT(bytes, 50U);
+    EXPECT_GT(bytes, kSanitized ? 10U : 50U);
     AlteredArchive missing = whole;
     missing.remove(seeds.front());
     missing.metadata["shadow_seeds"]["bytes"] = missing.compressed_bytes("seeds/");
@@ -264,7 +265,7 @@ TEST(AlteredArchives, EveryFlippedBitIsFound) {
   for (std::size_t at = whole.find("PK\x03\x04", 1); at != std::string::npos; at = whole.find("PK\x03\x04", at + 1)) {
     for (std::size_t bit = 8 * (at - 2); bit < 8 * at; ++bit) bits.push_back(bit);
   }
-  for (std::size_t bit = 0; bit < 8 * whole.size(); bit += 101) bits.push_back(bit);
+  for (std::size_t bit = 0; bit < 8 * whole.size(); bit += kSanitized ? 1009 : 101) bits.push_back(bit);
   for (const std::size_t bit : bits) {
     std::string flipped = whole;
     flipped[bit / 8] = static_cast<char>(flipped[bit / 8] ^ (1 << (bit % 8)));

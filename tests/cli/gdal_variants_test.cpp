@@ -251,6 +251,19 @@ TEST_F(GdalVariants, VirtualRasters) {
     expect_same_place(ours, gdal);
     expect_same_samples(folder_ / name, false);
   }
+  // Names as they are: long, and not of ASCII alone.
+  const std::string far = "a folder whose name is long enough for forty-one letters/für Höhen.tif";
+  std::filesystem::create_directory(std::filesystem::path(folder_ / far).parent_path());
+  std::filesystem::copy(folder_ / "whole.tif", folder_ / far);
+  ASSERT_EQ(run_gdal({"gdalbuildvrt", "-q", folder_ / "far.vrt", folder_ / far}).exit_code, 0);
+  expect_same_samples(folder_ / "far.vrt", false);
+  std::string text = read_file(folder_ / "far.vrt");
+  const std::size_t at = text.find(far);
+  ASSERT_NE(at, std::string::npos);
+  write_file(folder_ / "self.vrt", text.replace(at, far.size(), "self.vrt"));
+  const RunResult self = run_isohf({"convert", folder_ / "self.vrt", folder_ / "self.isohf"});
+  EXPECT_EQ(self.exit_code, 1);
+  EXPECT_THAT(self.err, HasSubstr("is one of itself"));
   expect_refused({"small.vrt", {"-of", "VRT", "-outsize", "50%", "50%"}}, "resamples");
   ASSERT_EQ(
       run_gdal({"gdalwarp", "-q", "-of", "VRT", "-t_srs", "EPSG:3857", folder_ / "whole.tif", folder_ / "warped.vrt"})

@@ -125,6 +125,13 @@ TEST_F(Parts, LastArchiveGivesTheTileAndEverythingFollows) {
             ArchiveReader(changed).metadata().content_sha256);
   EXPECT_TRUE(verify_archive(folder / "joined.isohf").passed());
   EXPECT_TRUE(diff_archives(changed, folder / "joined.isohf").same_tiles());
+  // Parts of two origins need no neighbours beyond their own; what lies beside tiles must be of one kind.
+  const PartSummary small = merge_archives({cut(old, "old_part.isohf", around), update}, folder / "parts.isohf");
+  EXPECT_EQ(small.tiles, around);
+  EXPECT_TRUE(diff_archives(changed, folder / "parts.isohf").same_tiles());
+  options.shadow_seeds.reset();
+  EXPECT_THAT(message_of({old, make("unlit.isohf")}), HasSubstr("has other shadow seeds than"));
+  options.shadow_seeds.emplace();
   // A piece of it does not meet what lies around.
   const std::string torn = cut(changed, "torn.isohf", {around.first, {around.first.column + 1, around.end.row}});
   if (around.end.column - around.first.column > 1) {
@@ -233,6 +240,14 @@ TEST_F(Shards, ScansOfRowsMakeThePlanOfOnePass) {
     EXPECT_THAT(found, HasSubstr("scan 4 is there twice"));
     EXPECT_THAT(found, HasSubstr("these scans are missing: 1"));
   }
+  // A range that is given is the plan's, whatever scans find.
+  options.code_type = CodeType::kU16;
+  options.z_range = {100.0, 900.0};
+  Hills given;
+  const ShardPlan ranged = draft_shards(given, options, 1);
+  EXPECT_EQ(format_shard_plan(scanned(given, ranged, {scan_shard(given, ranged, 1, options)}, options)),
+            format_shard_plan(plan_shards(given, options, 1)));
+  options.z_range.reset();
   // What only the surface can tell.
   options.code_type = CodeType::kU16;
   options.filter = Filter::kLanczos3;
