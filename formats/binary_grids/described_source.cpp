@@ -413,10 +413,11 @@ class ClassicHeader {
   std::uint64_t word() { return integer(4); }
   std::uint64_t long_word() { return integer(8); }
   std::uint64_t size() { return version_ == 5 ? long_word() : word(); }
-  /// How many items follow, each of four bytes at least.
+  /// How many items follow, each of four bytes at least. No raster's header has so many: reading them would take minutes.
   std::uint64_t items() {
+    static constexpr std::uint64_t kMost = 65536;
     const std::uint64_t count = size();
-    if (count > file_.size_bytes() / 4) corrupt(fmt::format("says that {} items follow", count));
+    if (count > std::min(kMost, file_.size_bytes() / 4)) corrupt(fmt::format("says that {} items follow", count));
     return count;
   }
   std::string name() {
@@ -462,7 +463,8 @@ class ClassicHeader {
       if (bytes_of(type) == 0) corrupt(fmt::format("has values of the type {}", type));
       const std::uint64_t count = size();
       const std::uint64_t bytes = count * bytes_of(type);
-      if (count > file_.size_bytes() || bytes > file_.size_bytes())
+      static constexpr std::uint64_t kMostBytes = std::uint64_t{1} << 20U;
+      if (count > kMostBytes || bytes > std::min(kMostBytes, file_.size_bytes()))
         corrupt(fmt::format("has an attribute of {} values", count));
       const std::uint64_t end = at_ + bytes + (4 - bytes % 4) % 4;
       if (type == 2) {
@@ -544,7 +546,12 @@ class NetcdfSource final : public DescribedSource {
     std::string names;
     int rasters = 0;
     for (const Variable& variable : header.variables) {
-      if (!is_raster(header, variable) || text_in(variable.attributes, "long_name").ends_with("_bnds")) continue;
+      if (!is_raster(header, variable)) continue;
+      // Bounds of cells and places of a curved grid are no elevations, unless they are asked for.
+      const std::string unit = text_in(variable.attributes, "units");  // degrees_north, degree_E
+      const bool is_place = variable.name.ends_with("_bnds") || variable.name.ends_with("_bounds") ||
+                            unit.starts_with("degrees_") || unit.starts_with("degree_");
+      if (is_place && variable.name != options.channel) continue;
       names += (names.empty() ? "" : ", ") + printable(variable.name);
       ++rasters;
       if (options.channel.empty() ? chosen == nullptr : variable.name == options.channel) chosen = &variable;
@@ -627,6 +634,13 @@ class NetcdfSource final : public DescribedSource {
     const auto& attributes = variable.attributes;
     for (const char* key : {"_FillValue", "missing_value"}) {
       if (const auto value = number_in(attributes, key)) set_void(*value);
+    }
+    // What the format fills with where nothing is said, but for bytes.
+    static const std::map<int, double> kFilled = {
+        {3, -32767.0}, {4, -2147483647.0}, {5, 9.969209968386869e36}, {6, 9.969209968386869e36},
+        {8, 65535.0},  {9, 4294967295.0}};
+    if (const auto filled = kFilled.find(variable.type); filled != kFilled.end() && info_.void_values.empty()) {
+      set_void(filled->second);
     }
     info_.z_scale = number_in(attributes, "scale_factor").value_or(1.0);
     info_.z_offset = number_in(attributes, "add_offset").value_or(0.0);
