@@ -73,6 +73,12 @@ std::vector<std::byte> stored_sample(SampleType type, double value) {
   return bytes;
 }
 
+void bound_undeclared_voids(SourceInfo& info) {
+  if (!is_floating(info.sample_type) || !info.void_values.empty()) return;
+  info.valid_min = -kBeyondAnyGround;
+  info.valid_max = kBeyondAnyGround;
+}
+
 void apply_open_options(SourceInfo& info, const OpenOptions& options) {
   require_finite(options.z_scale, info, "the vertical scale");
   require_finite(options.z_offset, info, "the vertical offset");

@@ -16,6 +16,11 @@ namespace isohf {
 /// The bytes of a sample of `type` that holds `value`, which it can (void_value_as_stored); infinities are NaN in halves.
 [[nodiscard]] std::vector<std::byte> stored_sample(SampleType type, double value);
 
+/// Beyond it floats are no ground's, in any unit: voids that a file forgot to declare (-3.4e38, 1.7e308, 1e31).
+inline constexpr double kBeyondAnyGround = 1e30;
+/// Makes them voids where a raster of floats declares none.
+void bound_undeclared_voids(SourceInfo& info);
+
 /// Lets what the user says override what the file says; every reader calls it last, on a complete `info`.
 ///
 /// registration replaces only the meaning of the samples: the place of sample (0, 0) stays where the file puts it.

@@ -15,6 +15,7 @@
 #include "formats/files/raw_file.h"
 #include "formats/files/text.h"
 #include "formats/georeference/reference_system.h"
+#include "formats/open_options.h"
 #include "formats/readers.h"
 #include "isohf/base/file.h"
 #include "isohf/error.h"
@@ -159,9 +160,6 @@ std::string library_of(const Format& format) {
 
 namespace {
 
-/// No body's, in any unit.
-constexpr double kBeyondAnyHeight = 1e30;
-
 /// Numbers that no raster of ground has, and for which sizes and errors would be told in hundreds of digits.
 void check_numbers(const SourceInfo& info) {
   constexpr double kLeast = 1e-12;
@@ -201,7 +199,7 @@ class UnchangedSource final : public HeightSource {
   /// others to nothing.
   void check_elevations(std::span<const std::byte> samples) const {
     const SourceInfo& info = source_->info();
-    if (info.valid_max <= kBeyondAnyHeight && info.valid_min >= -kBeyondAnyHeight) return;  // voids, then
+    if (info.valid_max <= kBeyondAnyGround && info.valid_min >= -kBeyondAnyGround) return;  // voids, then
     if (info.sample_type == SampleType::kFloat32) check_floats<float>(samples);
     if (info.sample_type == SampleType::kFloat64) check_floats<double>(samples);
   }
@@ -210,7 +208,7 @@ class UnchangedSource final : public HeightSource {
   void check_floats(std::span<const std::byte> samples) const {
     const SourceInfo& info = source_->info();
     const auto is_beyond = [](Float value) {
-      return std::abs(value) > static_cast<Float>(kBeyondAnyHeight) &&
+      return std::abs(value) > static_cast<Float>(kBeyondAnyGround) &&
              std::abs(value) <= std::numeric_limits<Float>::max();
     };
     const std::size_t count = samples.size() / sizeof(Float);
@@ -226,7 +224,7 @@ class UnchangedSource final : public HeightSource {
       if (!is_beyond(at(i)) || value < info.valid_min || value > info.valid_max) continue;
       if (std::ranges::find(info.void_values, value) != info.void_values.end()) continue;
       throw Error(ErrorCode::kCorrupt, {path_, fmt::format("an elevation of {:.9g}", value),
-                                        fmt::format("{} at most either way", kBeyondAnyHeight),
+                                        fmt::format("{} at most either way", kBeyondAnyGround),
                                         fmt::format("`void_values` {:.9g} takes it as nodata", value)});
     }
   }

@@ -32,19 +32,6 @@ namespace {
 
 constexpr double kMostSide = 2147483647.0;
 constexpr std::uint64_t kLongestHeader = std::uint64_t{1} << 20U;
-/// Beyond it floats without a declared void value mean voids.
-constexpr double kBeyondAnyHeight = 1e30;
-
-std::string trimmed(std::string_view text) {
-  constexpr std::string_view kBlanks = " \t\r\n\f\v\0";
-  text.remove_prefix(std::min(text.find_first_not_of(kBlanks), text.size()));
-  return std::string(text.substr(0, text.find_last_not_of(kBlanks) + 1));
-}
-
-bool is_file(const std::filesystem::path& path) {
-  std::error_code ignored;
-  return std::filesystem::is_regular_file(path, ignored);
-}
 
 /// "key = value" by its lower case key; a value in braces goes on over lines.
 using Words = std::map<std::string, std::string, std::less<>>;
@@ -135,10 +122,7 @@ class DescribedSource : public PlainSource {
 
   void finish(const OpenOptions& options) {
     require_length();
-    if (is_floating(info_.sample_type) && info_.void_values.empty()) {
-      info_.valid_min = -kBeyondAnyHeight;
-      info_.valid_max = kBeyondAnyHeight;
-    }
+    bound_undeclared_voids(info_);
     if (!has_reference_system(info_.georeference)) read_prj_beside(info_);
     info_.block_width = info_.width;
     apply_open_options(info_, options);
@@ -744,12 +728,10 @@ std::unique_ptr<HeightSource> open_envi(const std::string& path, const OpenOptio
 }
 
 std::unique_ptr<HeightSource> open_saga(const std::string& path, const OpenOptions& options) {
-  const auto beside = [&](const char* extension) {
-    return std::filesystem::path(path).replace_extension(extension).string();
-  };
   const bool is_data = lower_case(path).ends_with(".sdat");
-  const std::string other = is_data ? beside(".sgrd") : beside(".sdat");
-  if (!is_file(other)) throw Error(ErrorCode::kIo, fmt::format("{}: {} must be beside it", path, other));
+  const std::filesystem::path name = std::filesystem::path(path).replace_extension(is_data ? ".sgrd" : ".sdat");
+  const std::string other = file_beside(path, name.filename().string());
+  if (other.empty()) throw Error(ErrorCode::kIo, fmt::format("{}: {} must be beside it", path, name.string()));
   return std::make_unique<SagaSource>(is_data ? path : other, is_data ? other : path, options);
 }
 

@@ -49,11 +49,6 @@ std::array<std::string_view, 2> two_words(std::string_view line) {
   return words;
 }
 
-bool is_file(const std::filesystem::path& path) {
-  std::error_code ignored;
-  return std::filesystem::is_regular_file(path, ignored);
-}
-
 struct Pair {
   std::string data;
   std::string header;

@@ -67,6 +67,11 @@ class FileBytes final : public ByteSource {
 
 }  // namespace
 
+bool is_file(const std::filesystem::path& path) {
+  std::error_code ignored;
+  return std::filesystem::is_regular_file(path, ignored);
+}
+
 bool is_gzip_name(const std::string& path) {
   return path.size() > 3 && lower_case(std::string_view(path).substr(path.size() - 3)) == ".gz";
 }

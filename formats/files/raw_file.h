@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -15,6 +16,8 @@
 
 namespace isohf {
 
+/// Whether a regular file is there; what cannot be looked at is none.
+[[nodiscard]] bool is_file(const std::filesystem::path& path);
 /// Whether the name ends in .gz, in any case.
 [[nodiscard]] bool is_gzip_name(const std::string& path);
 /// The name without a .gz at its end.

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <span>
 #include <string>
@@ -18,6 +19,13 @@ namespace isohf {
   std::string result(text);
   for (char& c : result) c = c >= 'a' && c <= 'z' ? static_cast<char>(c - 'a' + 'A') : c;
   return result;
+}
+
+/// A text without the blanks, line ends and zero bytes around it.
+[[nodiscard]] inline std::string trimmed(std::string_view text) {
+  constexpr std::string_view kBlanks(" \t\r\n\f\v\0", 7);
+  text.remove_prefix(std::min(text.find_first_not_of(kBlanks), text.size()));
+  return std::string(text.substr(0, text.find_last_not_of(kBlanks) + 1));
 }
 
 /// Bytes of a file as the characters that they may be.

@@ -36,8 +36,7 @@ constexpr double kFinestAsMetres = 0.01;
 constexpr std::size_t kLongestText = 65536;
 
 std::optional<std::string> text_of(const std::filesystem::path& path) {
-  std::error_code error;
-  if (!std::filesystem::is_regular_file(path, error)) return std::nullopt;
+  if (!is_file(path)) return std::nullopt;
   std::ifstream in(path, std::ios::binary);
   std::string text(kLongestText, '\0');
   in.read(text.data(), static_cast<std::streamsize>(text.size()));
@@ -227,9 +226,9 @@ std::string prj_beside(const std::string& raster_path) {
 
 std::string file_beside(const std::string& beside, const std::string& name) {
   const std::filesystem::path folder = std::filesystem::path(beside).parent_path();
-  std::error_code ignored;
-  if (std::filesystem::is_regular_file(folder / name, ignored)) return (folder / name).string();
+  if (is_file(folder / name)) return (folder / name).string();
   std::string found;
+  std::error_code ignored;
   for (const auto& entry : std::filesystem::directory_iterator(folder.empty() ? "." : folder, ignored)) {
     const std::string candidate = entry.path().filename().string();
     if (lower_case(candidate) == lower_case(name) && (found.empty() || candidate < found)) found = candidate;
@@ -239,8 +238,7 @@ std::string file_beside(const std::string& beside, const std::string& name) {
 
 void read_auxiliary_metadata(SourceInfo& info, int band) {
   const std::string path = info.path + ".aux.xml";
-  std::error_code error;
-  if (!std::filesystem::is_regular_file(path, error)) return;
+  if (!is_file(path)) return;
   const Texts texts = read(path);
   const auto text = [&](const std::string& key) {
     const auto found = texts.find(key);

@@ -52,8 +52,8 @@ void place_by(const WorldFile& world, std::int64_t rows, Georeference& place);
 /// `path`: kCorrupt, kUnsupported for a raster that is turned or has South on top.
 void place_by_transform(const std::string& path, const std::string& text, Georeference& place);
 
-/// Takes a reference system that `path` gives as WKT, or as a code or PROJ string, which need PROJ. Throws Error naming
-/// `path`.
+/// Takes a reference system that `path` gives as WKT, or as a code or PROJ string, which need PROJ. One that is none of a
+/// map, or that nothing here understands, is left out with a warning. Throws Error naming `path` for WKT that is refused.
 void read_system_text(const std::string& text, const std::string& path, SourceInfo& info);
 
 /// Whether the file has said what its coordinates are.

@@ -28,8 +28,7 @@ struct RasterDescription::Json {
 };
 
 bool has_raster_description(const std::string& raster_path) {
-  std::error_code ignored;
-  return std::filesystem::is_regular_file(raster_path + ".json", ignored);
+  return is_file(raster_path + ".json");
 }
 
 RasterDescription::RasterDescription(const std::string& raster_path)

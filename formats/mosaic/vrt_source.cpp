@@ -129,12 +129,6 @@ class VrtSource final : public FileSource {
     return value;
   }
 
-  static std::string trimmed(std::string text) {
-    text.erase(0, std::min(text.find_first_not_of(" \t\r\n"), text.size()));
-    text.erase(text.find_last_not_of(" \t\r\n") + 1);
-    return text;
-  }
-
   void read(const pugi::xml_node& root, const OpenOptions& options) {
     if (!root) fail(ErrorCode::kCorrupt, "has no VRTDataset");
     if (const std::string kind = root.attribute("subClass").value(); !kind.empty()) refuse("is a " + printable(kind));

@@ -3,24 +3,17 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <string_view>
 #include <system_error>
 
+#include "formats/files/text.h"
 #include "formats/georeference/units.h"
 #include "formats/open_options.h"
 
 namespace isohf {
 namespace {
-
-std::string trimmed(std::string_view text) {
-  const auto is_blank = [](char c) { return c == '\0' || std::isspace(static_cast<unsigned char>(c)) != 0; };
-  while (!text.empty() && is_blank(text.back())) text.remove_suffix(1);
-  while (!text.empty() && is_blank(text.front())) text.remove_prefix(1);
-  return std::string(text);
-}
 
 /// A whole text as a number, whatever the program's locale; nullopt for anything else.
 std::optional<double> number_from(std::string_view text) {

@@ -135,9 +135,6 @@ constexpr int kComplexFloating = 6;
 constexpr int kTopLeft = 1;
 constexpr int kBottomLeft = 4;
 
-/// Floats beyond this are voids that a file forgot to declare (-3.4e38, 1.7e308, 1e31), in any unit.
-constexpr double kBeyondAnyHeight = 1e30;
-
 SampleType sample_type_of(const TiffLayout& layout) {
   struct Row {
     int format;
@@ -264,8 +261,7 @@ class TiffSource final : public HeightSource {
   [[nodiscard]] std::unique_ptr<HeightSource> open_opacity() const {
     if (mask_) return open_tiff_mask(info_.path, *mask_, turned_);
     const std::string beside = info_.path + ".msk";  // as GDAL writes them
-    std::error_code error;
-    if (std::filesystem::is_regular_file(beside, error)) return open_tiff_mask(beside, 0, turned_);
+    if (is_file(beside)) return open_tiff_mask(beside, 0, turned_);
     if (!has_grey_and_opacity(layout_) || channel_ != 0) return nullptr;
     OpenOptions options;
     options.channel = "A";
@@ -306,10 +302,7 @@ class TiffSource final : public HeightSource {
     read_gdal_nodata(tags.gdal_nodata, info_);
     read_files_beside();
     check_orientation();
-    if (is_floating(info_.sample_type) && info_.void_values.empty()) {
-      info_.valid_min = -kBeyondAnyHeight;
-      info_.valid_max = kBeyondAnyHeight;
-    }
+    bound_undeclared_voids(info_);
   }
 
   void place(const TiffTags& tags) {
