@@ -317,6 +317,16 @@ TEST_F(Shards, AreRefusedWhereTheyAreNotWhatWasPlanned) {
   EXPECT_THAT(refusal([&] { (void)parse_shard_plan(json); }), HasSubstr("version 9, 1 is read"));
 }
 
+TEST(TileRange, MeetsAndIsPutAround) {
+  const TileRange west{{0, 2}, {4, 6}};
+  const TileRange east{{3, 0}, {9, 5}};
+  EXPECT_EQ(intersection(west, east), (TileRange{{3, 2}, {4, 5}}));
+  EXPECT_EQ(around(west, east), (TileRange{{0, 0}, {9, 6}}));
+  EXPECT_FALSE(intersection(west, east).is_empty());
+  EXPECT_TRUE(intersection(west, {{4, 2}, {5, 6}}).is_empty());  // side by side
+  EXPECT_TRUE((TileRange{{0, 3}, {4, 3}}).is_empty());
+}
+
 TEST_F(Parts, DiffDecodesNothingAndListsMetadata) {
   const std::string whole = make("whole.isohf");
   options.level = 3;

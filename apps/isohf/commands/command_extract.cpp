@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <optional>
 
@@ -57,7 +56,7 @@ TileRange tile_range_from_string(const std::string& text) {
   const auto [west, east] = split(columns, ':');
   const auto [north, south] = split(rows, ':');
   const TileRange range{{number(west), number(north)}, {number(east), number(south)}};
-  if (range.first.column >= range.end.column || range.first.row >= range.end.row) refuse();
+  if (range.is_empty()) refuse();
   return range;
 }
 
@@ -93,11 +92,9 @@ int command_extract(const Arguments& arguments) {
   check_archive_output({options->archive}, options->output, options->overwrite);
   const TileRange tiles = options->tiles ? *options->tiles : [&] {
     ArchiveReader archive = open_archive(options->archive);
-    TileRange touched = tiles_touching(archive.grid(), ground_in_box(archive, *options->bbox));
-    const TileRange here = tiles_of(archive.metadata());
-    touched.first = {std::max(touched.first.column, here.first.column), std::max(touched.first.row, here.first.row)};
-    touched.end = {std::min(touched.end.column, here.end.column), std::min(touched.end.row, here.end.row)};
-    if (touched.first.column >= touched.end.column || touched.first.row >= touched.end.row) {
+    const TileRange touched = intersection(tiles_touching(archive.grid(), ground_in_box(archive, *options->bbox)),
+                                           tiles_of(archive.metadata()));
+    if (touched.is_empty()) {
       throw Error(ErrorCode::kInvalidArgument,
                   options->archive + ": is a part of its land, and holds no tile that --bbox touches");
     }

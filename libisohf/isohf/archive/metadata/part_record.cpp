@@ -33,8 +33,7 @@ std::optional<PartRecord> part_record(const Metadata& metadata) {
     refuse_metadata(fmt::format("{}.{}", kPartName, member), why);
   };
   const TileGrid& grid = metadata.grid;
-  if (tiles.first.column < 0 || tiles.first.row < 0 || tiles.end.column > grid.tile_columns() ||
-      tiles.end.row > grid.tile_rows() || tiles.first.column >= tiles.end.column || tiles.first.row >= tiles.end.row) {
+  if (tiles.is_empty() || intersection(tiles, all_tiles(grid)) != tiles) {
     refuse("end", fmt::format("makes columns {} to {} and rows {} to {}, of {}x{} tiles", tiles.first.column,
                               tiles.end.column, tiles.first.row, tiles.end.row, grid.tile_columns(), grid.tile_rows()));
   }

@@ -72,13 +72,9 @@ ArchiveDifference diff_archives(const std::string& first, const std::string& sec
   ArchiveDifference found;
   found.metadata = differing_members(a, b);
   found.why_other_lattice = why_other_lattice(a.metadata(), b.metadata());
-  const TileRange of_a = tiles_here(a);
-  const TileRange of_b = tiles_here(b);
   TileRange& tiles = found.compared;
-  tiles.first = {std::max(of_a.first.column, of_b.first.column), std::max(of_a.first.row, of_b.first.row)};
-  tiles.end = {std::min(of_a.end.column, of_b.end.column), std::min(of_a.end.row, of_b.end.row)};
-  const bool is_apart = tiles.first.column >= tiles.end.column || tiles.first.row >= tiles.end.row;
-  if (found.why_other_lattice.empty() && is_apart) found.why_other_lattice = "holds other tiles of the lattice";
+  tiles = intersection(tiles_here(a), tiles_here(b));
+  if (found.why_other_lattice.empty() && tiles.is_empty()) found.why_other_lattice = "holds other tiles of the lattice";
   if (!found.why_other_lattice.empty()) {
     tiles = {};
     return found;
@@ -111,10 +107,8 @@ ArchiveDifference diff_archives(const std::string& first, const std::string& sec
           continue;
         }
         const TileIndex tile = tile_at(i);
-        TileRange& bounds = found.bounds;
-        if (found.tiles_differing++ == 0) bounds = {tile, tile};
-        bounds.first = {std::min(bounds.first.column, tile.column), std::min(bounds.first.row, tile.row)};
-        bounds.end = {std::max(bounds.end.column, tile.column + 1), std::max(bounds.end.row, tile.row + 1)};
+        const TileRange alone{tile, {tile.column + 1, tile.row + 1}};
+        found.bounds = found.tiles_differing++ == 0 ? alone : around(found.bounds, alone);
         found.only_first += states[i] == State::kOnlyFirst ? 1 : 0;
         found.only_second += states[i] == State::kOnlySecond ? 1 : 0;
         if (found.first_few.size() < kMostListed) found.first_few.push_back(tile);

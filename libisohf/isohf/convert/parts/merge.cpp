@@ -19,11 +19,6 @@
 namespace isohf {
 namespace {
 
-std::string text_of(const TileRange& tiles) {
-  return fmt::format("columns {} to {} and rows {} to {}", tiles.first.column, tiles.end.column - 1, tiles.first.row,
-                     tiles.end.row - 1);
-}
-
 /// Rectangles of `all` that none of `parts` covers.
 std::vector<TileRange> gaps_in(const TileRange& all, const std::vector<AssemblyInput>& parts) {
   std::set<std::int64_t> cuts = {all.first.row, all.end.row};
@@ -133,10 +128,7 @@ PartSummary merge_archives(const std::vector<std::string>& archives, const std::
   }
   problems.throw_if_any();
   TileRange all = inputs.front().tiles;
-  for (const AssemblyInput& input : inputs) {
-    all.first = {std::min(all.first.column, input.tiles.first.column), std::min(all.first.row, input.tiles.first.row)};
-    all.end = {std::max(all.end.column, input.tiles.end.column), std::max(all.end.row, input.tiles.end.row)};
-  }
+  for (const AssemblyInput& input : inputs) all = around(all, input.tiles);
   for (const TileRange& gap : gaps_in(all, inputs)) {
     problems.add(fmt::format("tiles of {} are in none of the archives, which together reach over {}", text_of(gap),
                              text_of(all)));

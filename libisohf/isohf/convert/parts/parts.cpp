@@ -46,6 +46,11 @@ void count_members(const ArchiveWriter& writer, Metadata& metadata) {
   count(texture_info(metadata), kTextureFolder, kTileTexturesName, format_texture_info);
 }
 
+std::string text_of(const TileRange& tiles) {
+  return fmt::format("columns {} to {} and rows {} to {}", tiles.first.column, tiles.end.column - 1, tiles.first.row,
+                     tiles.end.row - 1);
+}
+
 TileRange tiles_here(const ArchiveReader& archive) {
   try {
     return tiles_here(archive.metadata());
@@ -195,16 +200,9 @@ PartSummary extract_tiles(const std::string& archive, const std::string& output,
   const ArchiveReader reader(archive);
   require_copyable(reader);
   const TileRange here = tiles_here(reader);
-  const auto inside = [](std::int64_t first, std::int64_t end, std::int64_t least, std::int64_t most) {
-    return first >= least && first < end && end <= most;
-  };
-  if (!inside(tiles.first.column, tiles.end.column, here.first.column, here.end.column) ||
-      !inside(tiles.first.row, tiles.end.row, here.first.row, here.end.row)) {
+  if (tiles.is_empty() || intersection(tiles, here) != tiles) {
     throw Error(ErrorCode::kInvalidArgument,
-                fmt::format("{}: columns {} to {} and rows {} to {} of tiles are asked for, it holds columns {} to {} "
-                            "and rows {} to {}",
-                            archive, tiles.first.column, tiles.end.column - 1, tiles.first.row, tiles.end.row - 1,
-                            here.first.column, here.end.column - 1, here.first.row, here.end.row - 1));
+                fmt::format("{}: {} of tiles are asked for, it holds {}", archive, text_of(tiles), text_of(here)));
   }
   const PartOrigin origin = origin_of(reader);
   if (origin.is_shard) {

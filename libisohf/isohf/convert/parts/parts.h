@@ -18,6 +18,9 @@ namespace isohf {
 /// Throws Error{kInvalidArgument} where an archive's members cannot be copied as they are: of version 1, repacked.
 void require_copyable(const ArchiveReader& archive);
 
+/// "columns 0 to 5 and rows 2 to 3", for messages.
+[[nodiscard]] std::string text_of(const TileRange& tiles);
+
 /// As of its metadata; errors name the archive.
 [[nodiscard]] TileRange tiles_here(const ArchiveReader& archive);
 
