@@ -7,7 +7,6 @@
 #include <optional>
 
 #include "commands/command.h"
-#include "interrupt.h"
 #include "isohf/convert.h"
 #include "isohf/error.h"
 #include "open_archive.h"
@@ -55,11 +54,8 @@ std::optional<PlanesCommand> parse(const Arguments& arguments) {
 int run(const PlanesCommand& options) {
   const CommonOptions& common = options.common;
   ProgressDisplay display(options.work.progress, common.quiet, common.verbose);
-  Job job;
-  job.threads = options.work.threads;
-  job.cancel = &watch_interrupts();
-  job.progress = [&](const Progress& at) { display.update(at.stage, at.unit, at.done, at.total); };
-  const AddPlanesSummary summary = add_planes(options.archive, options.output, options.overwrite, job);
+  const AddPlanesSummary summary =
+      add_planes(options.archive, options.output, options.overwrite, job_from(options.work, display));
   display.clear();
   StandardOutput out;
   if (common.json) {

@@ -13,7 +13,6 @@
 #include "formats/files/text.h"
 #include "formats/georeference/units.h"
 #include "formats/write/raster_sink.h"
-#include "interrupt.h"
 #include "isohf/error.h"
 #include "isohf/shade.h"
 #include "open_archive.h"
@@ -227,12 +226,9 @@ int run(ShadeCommand options) {
   const auto sink = create_raster(options.output, spec);
 
   ProgressDisplay display(options.work.progress, common.quiet, common.verbose);
-  Job job;
-  job.threads = options.work.threads;
-  job.cancel = &watch_interrupts();
-  job.progress = [&](const Progress& at) { display.update(at.stage, at.unit, at.done, at.total); };
   const ShadeReport report = shade_rows(
-      archive, request, [&](std::span<const std::byte> rows) { sink->write_rows(rows); }, job);
+      archive, request, [&](std::span<const std::byte> rows) { sink->write_rows(rows); },
+      job_from(options.work, display));
   display.clear();
   sink->finish();
 

@@ -73,8 +73,9 @@ std::vector<ColourStop> shade_colours(const Metadata& metadata, std::optional<Sh
 
 Light Palette::at(double elevation) const {
   // At an elevation with two colours the second begins.
-  std::size_t i = 0;
-  while (i < stops_.size() && stops_[i].elevation <= elevation) ++i;
+  const auto behind = std::upper_bound(stops_.begin(), stops_.end(), elevation,
+                                       [](double value, const ColourStop& stop) { return value < stop.elevation; });
+  const auto i = static_cast<std::size_t>(behind - stops_.begin());
   const ColourStop& low = stops_[i == 0 ? 0 : i - 1];
   const ColourStop& high = stops_[std::min(i, stops_.size() - 1)];
   const double range = high.elevation - low.elevation;

@@ -274,7 +274,7 @@ Diagonal least_curved(const Square& square, const double* before, const double* 
 class PlacedMesh {
  public:
   PlacedMesh(const MeshGround& ground, const MeshLayout& layout, MeshPlacement placement, bool is_coded)
-      : rows(ground, layout, placement, is_coded), in_full_(layout.in_full) {
+      : rows(ground, layout, placement, is_coded), histograms(layout.in_full ? 2 : 0) {
     if (!rows.is_iso()) squares_.resize(static_cast<std::size_t>(rows.columns()));
   }
 
@@ -291,7 +291,7 @@ class PlacedMesh {
   ErrorSums least_curvature;
   double best_squares = 0.0;
   std::int64_t best_count = 0;
-  std::array<ErrorHistogram, 2> histograms;  ///< [diagonal]
+  std::vector<ErrorHistogram> histograms;  ///< [diagonal], where p99 is asked for
 
  private:
   void compare_iso(const float* samples, std::span<const double> world_x, MeshRows::Place place, double datum) {
@@ -326,7 +326,7 @@ class PlacedMesh {
         error[d] = std::abs(found[d] - (double{samples[c]} + datum));
         if (std::isnan(error[d])) continue;
         sums[d].add(error[d], {});
-        if (in_full_) histograms[d].add(error[d]);
+        if (!histograms.empty()) histograms[d].add(error[d]);
       }
       if (std::isnan(error[0] + error[1])) continue;
       const Diagonal cut = least_curved(square, before, after, i, rows.columns());
@@ -341,7 +341,6 @@ class PlacedMesh {
     std::fill(squares_.begin(), squares_.end(), std::array<double, 2>{});
   }
 
-  bool in_full_;
   std::int64_t square_row_ = -1;
   std::vector<std::array<double, 2>> squares_;  ///< [column][diagonal] sums of squared errors, of one row of squares
 };
@@ -437,14 +436,12 @@ class MeshComparison {
     ErrorSums least;
     double best_squares = 0.0;
     std::int64_t best_count = 0;
-    std::array<ErrorHistogram, 2> histograms;
     const std::size_t first = layout * kPlacements;
     for (std::size_t p = first; p < first + kPlacements; ++p) {
       const PlacedMesh& mesh = meshes_[p];
       for (std::size_t d = 0; d < 2; ++d) {
         all[d].add(mesh.sums[d]);
         max[d] += mesh.sums[d].max / static_cast<double>(kPlacements);
-        histograms[d].add(mesh.histograms[d]);
       }
       least.add(mesh.least_curvature);
       best_squares += mesh.best_squares;
@@ -468,7 +465,9 @@ class MeshComparison {
     errors.rms_least_curvature = least.rms();
     if (best_count > 0) errors.rms_best = std::sqrt(best_squares / static_cast<double>(best_count));
     if (errors.layout.in_full) {
-      errors.p99 = std::min(histograms[d].percentile(0.99), all[d].max);
+      ErrorHistogram histogram;
+      for (std::size_t p = first; p < first + kPlacements; ++p) histogram.add(meshes_[p].histograms[d]);
+      errors.p99 = std::min(histogram.percentile(0.99), all[d].max);
       errors.plain_bytes = meshes_[first].rows.plain_bytes();
     }
     return errors;
