@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <cstddef>
 #include <limits>
 #include <semaphore>
@@ -42,11 +43,46 @@ int possible_threads(int wanted) {
   return possible;
 }
 
+/// Has oneTBB start its workers while nothing is at stake: where it cannot start one it throws from whatever call wanted
+/// it, past the tasks that another worker has begun. Workers stay for as long as the process, so once is enough.
+void start_workers(oneapi::tbb::task_arena& arena, int workers) {
+  static std::atomic<int> started = 0;
+  if (workers <= started) return;
+  struct Gate {
+    std::atomic<int> arrived = 0;
+    std::atomic<bool> is_open = false;
+  };
+  const auto gate = std::make_shared<Gate>();  // tasks outlive this call where one of them throws
+  const auto open = [&gate] {
+    gate->is_open = true;
+    gate->is_open.notify_all();
+  };
+  try {
+    for (int i = 0; i < workers; ++i) {
+      arena.enqueue([gate] {
+        ++gate->arrived;
+        gate->is_open.wait(false);
+      });
+    }
+  } catch (...) {
+    open();
+    throw;
+  }
+  // A program around this one may allow fewer workers, which then never arrive.
+  constexpr auto kLongest = std::chrono::milliseconds(50);
+  const auto end = std::chrono::steady_clock::now() + kLongest;
+  while (gate->arrived < workers && std::chrono::steady_clock::now() < end) std::this_thread::yield();
+  open();
+  started = workers;
+}
+
 /// Without the limit raised first, oneTBB says on standard error that it ignores a request for more threads than there
 /// are cores.
 struct Arena::Threads {
   explicit Threads(int threads)
-      : limit(global_control::max_allowed_parallelism, static_cast<std::size_t>(threads)), arena(threads) {}
+      : limit(global_control::max_allowed_parallelism, static_cast<std::size_t>(threads)), arena(threads) {
+    start_workers(arena, threads - 1);
+  }
 
   global_control limit;
   oneapi::tbb::task_arena arena;
