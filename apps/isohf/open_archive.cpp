@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "formats/files/foreign_file.h"
+#include "formats/georeference/units.h"
 #include "formats/registry.h"
 #include "isohf/error.h"
 
@@ -26,6 +27,12 @@ ArchiveReader open_archive(const std::string& path) {
     if (found.empty()) throw;
     throw Error(ErrorCode::kUnsupported, path + ": " + found);
   }
+}
+
+double elevation_units_per_world_unit(const Metadata& metadata) {
+  if (metadata.horizontal_unit != "metre") return 1.0;
+  const auto unit = linear_unit(metadata.vertical_unit);
+  return unit ? 1.0 / unit->metres : 1.0;
 }
 
 }  // namespace isohf::cli

@@ -39,6 +39,58 @@ class SampleCommand : public testing::Test {
   TemporaryFolder folder;
 };
 
+/// The plane's edge in the East shadows all of it from a sun there that stands lower than it rises.
+TEST_F(SampleCommand, ShadowsReachAsHighAsTheEdgeTowardsTheSunLetsThem) {
+  const std::string archive = folder / "plane.isohf";
+  const double surface = 1000.0 + kSlopeX * 1000.0 + kSlopeZ * 1000.0;
+  const double edge = surface + kSlopeX * 990.0 - 990.0 * std::tan(8.0 * 0.017453292519943295);
+  const std::vector<std::string> sun = {"sample",   archive,     "--at", "1000",       "1000",
+                                        "--shadow", "--azimuth", "E",    "--altitude", "8"};
+  const auto with = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> arguments = sun;
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return run_isohf(arguments);
+  };
+  double numbers[8] = {};
+  std::istringstream text(with({"--shadow-softness", "4"}).out);
+  for (double& number : numbers) text >> number;
+  EXPECT_NEAR(numbers[0], surface, 1e-3);
+  EXPECT_NEAR(numbers[6], edge, kSlopeX * 3.0 * kSpacing);  // the surface is level from a lattice step before the edge
+  EXPECT_EQ(numbers[7], 0.0);
+  const double above = numbers[6] - numbers[0];
+  for (const auto& [height, share] :
+       {std::pair{above - 1.0, 0.25}, {above, 0.5}, {above + 1.0, 0.75}, {above + 3.0, 1.0}}) {
+    const json line = json::parse(with({"--shadow-softness", "4", "--json", "--above", std::to_string(height)}).out);
+    EXPECT_NEAR(line.at("shadow").at("sun_share").get<double>(), share, 1e-5);
+    EXPECT_NEAR(line.at("shadow").at("elevation").get<double>(), numbers[6], 1e-5);
+  }
+  RunOptions place;
+  const double at[] = {1000.0, 1000.0};
+  place.input.assign(reinterpret_cast<const char*>(at), sizeof(at));
+  const std::string record =
+      run_isohf({"sample", archive, "--binary", "--shadow", "--azimuth", "90", "--sun-elevation", "8"}, place).out;
+  ASSERT_EQ(record.size(), 48U);
+  double shadow = 0.0;
+  std::memcpy(&shadow, record.data() + 32, sizeof(shadow));
+  EXPECT_NEAR(shadow, numbers[6], 1e-5);
+  EXPECT_EQ(run_isohf({"sample", archive, "--at", "50", "50", "--shadow"}).out, "void\n");
+}
+
+TEST_F(SampleCommand, RefusesASunThatCastsNoShadow) {
+  const std::string archive = folder / "plane.isohf";
+  const auto refused = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), {"sample", archive, "--at", "1000", "1000"});
+    const RunResult result = run_isohf(more);
+    EXPECT_EQ(result.exit_code, 2);
+    return result.err;
+  };
+  using testing::HasSubstr;
+  EXPECT_THAT(refused({"--above", "3"}), HasSubstr("--above is for --shadow, which is not given"));
+  EXPECT_THAT(refused({"--shadow", "--above", "-3"}), HasSubstr("must be 0 or more"));
+  EXPECT_THAT(refused({"--shadow", "--altitude", "90"}), HasSubstr("the sun must stand above 0 and below 90 degrees"));
+  EXPECT_THAT(refused({"--shadow", "--azimuth", "NW"}), HasSubstr("must be degrees from 0 to 360, or N, E, S, W"));
+}
+
 TEST_F(SampleCommand, PlaneComesBackEverywhere) {
   // Beyond the input the edge value goes on: the plane ends a lattice step before its border, its normals two.
   std::mt19937 random(7);

@@ -116,7 +116,7 @@ std::string completions_of(const std::string& words, int at) {
 TEST(Usage, BashCompletesCommandsAndOptions) {
   EXPECT_EQ(completions_of(" co", 1), "convert\n");
   EXPECT_EQ(completions_of(" convert --dens", 2), "--density\n");
-  EXPECT_EQ(completions_of(" sample --a", 2), "--at --at-lonlat --at-crs\n");
+  EXPECT_EQ(completions_of(" sample --at", 2), "--at --at-lonlat --at-crs\n");
   EXPECT_EQ(completions_of(" --js", 1), "--json\n");
   EXPECT_EQ(completions_of(" --json co", 2), "convert\n");
   EXPECT_EQ(completions_of(" --config my.toml co", 3), "convert\n");

@@ -19,6 +19,7 @@
 #include "open_archive.h"
 #include "options/option_values.h"
 #include "options/options_common.h"
+#include "options/quantities.h"
 #include "output/json_output.h"
 #include "output/standard_output.h"
 #include "work_arena.h"
@@ -38,15 +39,21 @@ start with # are passed over. For each place one line is printed:
 The elevation is that of the triangle there, as it is drawn; the normal (x, y up, z) is the vertex normals'
 blend over it, of length 1. A place without elevation gives 'void', one beyond the tiles 'outside'.
 
+With --shadow two numbers follow: the elevation up to which the surface's shadow reaches there, and the share of the
+sun that is seen, 0 to 1, from the surface or from --above it. Nothing is swept: the line to the sun is followed over
+each triangle.
+
 With --binary places are pairs of little-endian float64, and each answer is 32 bytes, little-endian: float64
-elevation, float32 nx ny nz, uint32 state (0 surface, 1 void, 2 outside), int32 tile_column tile_row. Elevation is
-NaN and the normal 0 unless the state is 0; the tile is -1 -1 where it is 2.
+elevation, float32 nx ny nz, uint32 state (0 surface, 1 void, 2 outside), int32 tile_column tile_row; with --shadow 16
+more, float64 shadow elevation and share. Elevations and the share are NaN and the normal 0 unless the state is 0; the
+tile is -1 -1 where it is 2.
 
 Examples:
   isohf sample dem.isohf --at 1200.5 340
   isohf sample dem.isohf --at-lonlat 6.865 45.833
   isohf sample dem.isohf --at-crs 334000 5077500 --with-lonlat      in metres of the input's own map
-  isohf sample dem.isohf < places.txt > elevations.txt)";
+  isohf sample dem.isohf < places.txt > elevations.txt
+  isohf sample dem.isohf --at 1200.5 340 --shadow --azimuth 120 --altitude 8 --above 30    a roof in the sun?)";
 
 struct SampleOptions {
   CommonOptions common;
@@ -59,9 +66,18 @@ struct SampleOptions {
   bool with_degrees = false;   ///< answers hold them
   bool with_source = false;
   bool binary = false;
+  bool with_shadow = false;
+  Sun sun;
+  double above = 0.0;
   int threads = 0;
   std::uint64_t memory_bytes = std::uint64_t{256} << 20;
 };
+
+double parse_height(const std::string& text) {
+  const double height = parse_number(text);
+  if (height >= 0.0) return height;
+  throw Error(ErrorCode::kInvalidArgument, "found '" + text + "', must be 0 or more");
+}
 
 std::optional<SampleOptions> parse(const Arguments& arguments) {
   SampleOptions options;
@@ -86,6 +102,19 @@ std::optional<SampleOptions> parse(const Arguments& arguments) {
   line.flag("--with-crs", "Add the input's own coordinates to each line", options.with_source);
   line.exclusive({"--at", "--at-lonlat", "--at-crs", "--lonlat", "--crs"});
   line.flag("--binary", "Read and write binary records instead of lines; see below", options.binary);
+  line.group("Shadow");
+  line.flag("--shadow", "Add the shadow's elevation and the share of the sun that is seen", options.with_shadow);
+  line.option("--azimuth", "DEG", "Where the sun stands, clockwise from North; N, E, S or W (default 270)",
+              [&](const std::string& text) { options.sun.azimuth_deg = parse_azimuth(text); });
+  line.option("--altitude,--sun-elevation", "DEG", "Height of the sun above the horizon, 0.01 to 90 (default 15)",
+              [&](const std::string& text) { options.sun.elevation_deg = parse_altitude(text); });
+  line.option("--above", "H", "Height above the surface that the sun is seen from, vertical units (default 0)",
+              [&](const std::string& text) { options.above = parse_height(text); });
+  line.option("--shadow-softness", "K",
+              "The sun's apparent size at the caster's distance, vertical units (default 2, or 0.5 % of the elevation "
+              "range where that is less)",
+              [&](const std::string& text) { options.sun.softness = parse_positive_number(text); });
+  line.group("Work");
   line.option("-j,--threads", "N", "Threads, 1 to 1024 (default: all cores); the result does not depend on it",
               [&](const std::string& text) { options.threads = static_cast<int>(parse_whole_number(text, 1, 1024)); });
   add_memory_option(line, "Decoded tiles to keep (default 256M)", options.memory_bytes);
@@ -96,6 +125,10 @@ std::optional<SampleOptions> parse(const Arguments& arguments) {
   line.footer(kFooter);
   if (!line.parse(arguments)) return std::nullopt;
   line.require("ARCHIVE", options.archive);
+  for (const char* option : {"--azimuth", "--sun-elevation", "--above", "--shadow-softness"}) {
+    if (!options.with_shadow && line.given(option))
+      line.fail(std::string(option) + " is for --shadow, which is not given");
+  }
   return options;
 }
 
@@ -137,14 +170,17 @@ std::string columns_from(const PlaceOutput& output, WorldPoint place) {
   return text + '\n';
 }
 
-std::string text_from(const SurfaceSample& sample) {
+/// sun  null: not asked for
+std::string text_from(const SurfaceSample& sample, const SunSample* sun) {
   if (sample.state == SurfaceState::kOutside) return "outside";
   if (sample.state == SurfaceState::kNodata) return "void";
-  return fmt::format("{:.9g} {:.7f} {:.7f} {:.7f} {} {}", sample.elevation, sample.normal[0], sample.normal[1],
-                     sample.normal[2], sample.tile.column, sample.tile.row);
+  std::string text = fmt::format("{:.9g} {:.7f} {:.7f} {:.7f} {} {}", sample.elevation, sample.normal[0],
+                                 sample.normal[1], sample.normal[2], sample.tile.column, sample.tile.row);
+  if (sun != nullptr) text += fmt::format(" {:.9g} {:.7f}", sun->shadow_height, sun->share);
+  return text;
 }
 
-std::string json_from(const SurfaceSample& sample, WorldPoint place, const PlaceOutput& output) {
+std::string json_from(const SurfaceSample& sample, const SunSample* sun, WorldPoint place, const PlaceOutput& output) {
   // A place that the map does not show has no world coordinates.
   const auto number = [](double value) { return std::isnan(value) ? ordered_json(nullptr) : ordered_json(value); };
   ordered_json json = {{"x", number(place.x)}, {"z", number(place.z)}};
@@ -167,11 +203,12 @@ std::string json_from(const SurfaceSample& sample, WorldPoint place, const Place
   if (sample.state == SurfaceState::kSurface) {
     json["elevation"] = sample.elevation;
     json["normal"] = sample.normal;
+    if (sun != nullptr) json["shadow"] = {{"elevation", sun->shadow_height}, {"sun_share", sun->share}};
   }
   return json_line(json);
 }
 
-std::string record_from(const SurfaceSample& sample) {
+std::string record_from(const SurfaceSample& sample, const SunSample* sun) {
   std::vector<std::byte> bytes;
   ByteWriter writer(bytes);
   const bool is_surface = sample.state == SurfaceState::kSurface;
@@ -180,6 +217,10 @@ std::string record_from(const SurfaceSample& sample) {
   writer.write(static_cast<std::uint32_t>(sample.state));
   writer.write(static_cast<std::int32_t>(sample.tile.column));
   writer.write(static_cast<std::int32_t>(sample.tile.row));
+  if (sun != nullptr) {
+    writer.write(sun->shadow_height);
+    writer.write(sun->share);
+  }
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
@@ -213,13 +254,16 @@ class Answers {
   void answer() {
     std::vector<SurfaceSample> samples(places_.size());
     surface_.sample(places_, std::span(samples));
+    std::vector<SunSample> suns(options_.with_shadow ? places_.size() : 0);
+    if (options_.with_shadow) surface_.sample(places_, options_.sun, options_.above, suns);
     std::vector<std::string> texts((samples.size() + kPlacesOfText - 1) / kPlacesOfText);
     oneapi::tbb::parallel_for(std::size_t{0}, texts.size(), [&](std::size_t part) {
       const std::size_t end = std::min((part + 1) * kPlacesOfText, samples.size());
       for (std::size_t i = part * kPlacesOfText; i < end; ++i) {
-        texts[part] += options_.binary        ? record_from(samples[i])
-                       : options_.common.json ? json_from(samples[i], places_[i], output_)
-                                              : text_from(samples[i]) + columns_from(output_, places_[i]);
+        const SunSample* sun = options_.with_shadow ? &suns[i] : nullptr;
+        texts[part] += options_.binary        ? record_from(samples[i], sun)
+                       : options_.common.json ? json_from(samples[i], sun, places_[i], output_)
+                                              : text_from(samples[i], sun) + columns_from(output_, places_[i]);
       }
     });
     for (const std::string& text : texts) options_.binary ? out_.write_bytes(text) : out_.write(text);
@@ -280,8 +324,16 @@ WorldGeoreference places_of(ArchiveReader& archive, bool needs_geo, bool needs_s
                                                "; give places in world units, --at X Z");
 }
 
-int run(const SampleOptions& options) {
+int run(SampleOptions options) {
   ArchiveReader archive = open_archive(options.archive);
+  const Metadata& metadata = archive.metadata();
+  options.sun.elevation_units_per_world_unit = elevation_units_per_world_unit(metadata);
+  if (options.with_shadow && metadata.horizontal_unit != "metre" && metadata.source.crs_unit == "degree") {
+    throw Error(ErrorCode::kInvalidArgument,
+                archive.path() +
+                    ": is laid out in degrees, along which no shadow has a length; convert its source with "
+                    "--projection auto for --shadow");
+  }
   print_warnings(archive.warnings());
   const bool takes_geo = options.reads_degrees || !options.geo_places.empty();
   const bool takes_source = options.reads_source || !options.source_places.empty();
@@ -315,8 +367,8 @@ int run(const SampleOptions& options) {
 }  // namespace
 
 int command_sample(const Arguments& arguments) {
-  const std::optional<SampleOptions> options = parse(arguments);
-  return options ? run(*options) : static_cast<int>(kExitDone);
+  std::optional<SampleOptions> options = parse(arguments);
+  return options ? run(std::move(*options)) : static_cast<int>(kExitDone);
 }
 
 }  // namespace isohf::cli

@@ -11,7 +11,6 @@
 
 #include "commands/command.h"
 #include "formats/files/text.h"
-#include "formats/georeference/units.h"
 #include "formats/write/raster_sink.h"
 #include "isohf/error.h"
 #include "isohf/shade.h"
@@ -19,6 +18,7 @@
 #include "options/describe.h"
 #include "options/option_values.h"
 #include "options/options_common.h"
+#include "options/quantities.h"
 #include "output/json_output.h"
 #include "output/output_kinds.h"
 #include "output/standard_output.h"
@@ -79,30 +79,6 @@ std::string parse_palette(const std::string& text, std::optional<ShadePalette>& 
   if (text.find_first_of("./") != std::string::npos) return text;
   palette = kPalettes[parse_word(text, {"elevation", "gray", "mars"})];
   return {};
-}
-
-double parse_altitude(const std::string& text) {
-  const double degrees = parse_number(text);
-  if (!(degrees >= 0.01 && degrees <= 90.0)) {
-    throw Error(ErrorCode::kInvalidArgument, "found '" + text + "', must be degrees from 0.01 to 90");
-  }
-  return degrees;
-}
-
-double parse_azimuth(const std::string& text) {
-  constexpr std::pair<const char*, double> kSides[] = {{"N", 0.0}, {"E", 90.0}, {"S", 180.0}, {"W", 270.0}};
-  for (const auto& [side, degrees] : kSides) {
-    if (text == side) return degrees;
-  }
-  double degrees = -1.0;
-  try {
-    degrees = parse_number(text);
-  } catch (const Error&) {
-  }
-  if (!(degrees >= 0.0 && degrees <= 360.0)) {
-    throw Error(ErrorCode::kInvalidArgument, "found '" + text + "', must be degrees from 0 to 360, or N, E, S, W");
-  }
-  return degrees;
 }
 
 std::optional<ShadeCommand> parse(const Arguments& arguments) {
@@ -176,13 +152,6 @@ std::optional<ShadeCommand> parse(const Arguments& arguments) {
   request.sun_azimuth_deg = options.azimuth.value_or(as_gdal ? 315.0 : 270.0);
   request.sun_elevation_deg = options.elevation.value_or(as_gdal ? 45.0 : 15.0);
   return options;
-}
-
-/// 1 where either unit is not known.
-double elevation_units_per_world_unit(const Metadata& metadata) {
-  if (metadata.horizontal_unit != "metre") return 1.0;
-  const auto unit = linear_unit(metadata.vertical_unit);
-  return unit ? 1.0 / unit->metres : 1.0;
 }
 
 /// Where the picture lies, for GeoTIFF; nullopt where the source did not say.

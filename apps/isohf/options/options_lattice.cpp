@@ -4,8 +4,8 @@
 
 #include "isohf/convert/frame/source_frame.h"
 #include "isohf/error.h"
-#include "options/length_value.h"
 #include "options/option_values.h"
+#include "options/quantities.h"
 
 namespace isohf::cli {
 namespace {

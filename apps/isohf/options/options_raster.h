@@ -5,7 +5,7 @@
 
 #include "isohf/surface.h"
 #include "options/command_line.h"
-#include "options/length_value.h"
+#include "options/quantities.h"
 
 namespace isohf::cli {
 

@@ -10,8 +10,8 @@
 #include "isohf/error.h"
 #include "isohf/raster.h"
 #include "isohf/surface/decorate/filled_source.h"
-#include "options/length_value.h"
 #include "options/option_values.h"
+#include "options/quantities.h"
 
 namespace isohf::cli {
 namespace {

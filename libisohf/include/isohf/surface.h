@@ -68,6 +68,22 @@ struct SurfaceSample {
   std::array<double, 3> normal = {0.0, 1.0, 0.0};  ///< x East, y up, z South, of length 1: vertex normals, blended
 };
 
+/// A sun so far away that its light comes from one direction everywhere.
+struct Sun {
+  double azimuth_deg = 270.0;   ///< clockwise from the North of the archive's map
+  double elevation_deg = 15.0;  ///< above the horizon; above 0 and below 90
+  /// The sun's apparent size k at the caster's distance, elevation units, > 0 (paper Eq. 16); nullopt: 2, or 0.5 % of the
+  /// elevation range where that is less.
+  std::optional<double> softness;
+  double elevation_units_per_world_unit = 1.0;  ///< feet for one metre, say; > 0
+};
+
+/// How the sun shines at a point of the surface, or above it. NaN where the surface has no elevation.
+struct SunSample {
+  double shadow_height;  ///< S: the elevation up to which the surface's shadow reaches; never below the surface
+  double share;          ///< I: of the sun that is seen, 0 to 1
+};
+
 /// The surface of an archive at any number of points in any order.
 ///
 /// Each tile under the points of a call is decoded once, several at a time on all threads. Tiles used last are kept. What
@@ -92,6 +108,13 @@ class Surface {
   void sample(std::span<const WorldPoint> points, std::span<SurfaceSample> samples);
   /// Elevations alone, which is quicker: elevations [n] out, vertical units, NaN where there is none.
   void sample(std::span<const WorldPoint> points, std::span<double> elevations);
+
+  /// How the sun shines on the surface, or on what stands `above` it, elevation units, >= 0. S is the greatest elevation
+  /// of the triangles between the point and the sun, less what the shadow falls from there: to rounding, no sweep.
+  /// Ground beyond what the source covered casts none. The share is that of Eq. 16 (docs/paper.md, E16); on the surface
+  /// itself, where S is at least its elevation, twice that, at most 1 (A10).
+  /// points [n]   samples [n] out. Throws Error{kInvalidArgument} where the sun, or `above`, is out of range.
+  void sample(std::span<const WorldPoint> points, const Sun& sun, double above, std::span<SunSample> samples);
 
   [[nodiscard]] const WorldGeoreference& georeference() const;
 

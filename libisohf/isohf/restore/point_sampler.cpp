@@ -141,12 +141,22 @@ PointSampler::Codes PointSampler::kept(std::int64_t tile) {
 
 void PointSampler::keep(std::int64_t tile, const Codes& codes) {
   const std::lock_guard lock(mutex_);
+  if (by_tile_.contains(tile)) return;  // another thread has decoded it too
   if (used_.size() >= capacity_) {
     by_tile_.erase(used_.back().tile);
     used_.pop_back();
   }
   used_.push_front({tile, codes});
   by_tile_[tile] = used_.begin();
+}
+
+PointSampler::Codes PointSampler::codes(TileIndex tile) {
+  const std::int64_t index = grid_.flat_index(tile);
+  Codes found = kept(index);
+  if (found) return found;
+  found = std::make_shared<const TileCodes>(std::move(read_tiles_({&tile, 1}).front()));
+  keep(index, found);
+  return found;
 }
 
 /// Calls sample(codes, points of a tile) for each tile, `points` as runs of their numbers. tile_of(i) is the flat index

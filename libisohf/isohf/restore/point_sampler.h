@@ -39,8 +39,11 @@ class PointSampler {
   /// In integers, on the triangles.
   void sample(std::span<const FixedPlace> places, const FixedHeights& heights, std::span<double> elevations);
 
- private:
   using Codes = std::shared_ptr<const TileCodes>;
+  /// One tile, decoded now or kept; from many threads at once.
+  [[nodiscard]] Codes codes(TileIndex tile);
+
+ private:
   struct Kept {
     std::int64_t tile;
     Codes codes;

@@ -12,6 +12,7 @@
 #include "isohf/error.h"
 #include "isohf/restore/grid_sampler.h"
 #include "isohf/restore/point_sampler.h"
+#include "isohf/restore/point_shadow.h"
 
 namespace isohf {
 namespace {
@@ -36,8 +37,9 @@ int plane_for(const Metadata& metadata, const SampleGrid& grid) {
 }  // namespace
 
 struct Surface::State {
-  State(const ArchiveReader& archive, const Job& its_job)
-      : job(its_job),
+  State(const ArchiveReader& its_archive, const Job& its_job)
+      : archive(its_archive),
+        job(its_job),
         sampler(archive.grid(), archive.metadata().quantisation, tiles_of(archive),
                 job.memory_bytes > 0 ? job.memory_bytes : kDefaultMemory),
         georeference(archive.metadata()) {
@@ -51,6 +53,7 @@ struct Surface::State {
     arena->execute([&] { sampler.sample(points, found); });
   }
 
+  const ArchiveReader& archive;
   Job job;
   std::optional<Arena> arena;
   PointSampler sampler;
@@ -83,6 +86,14 @@ void Surface::sample(std::span<const WorldPoint> points, std::span<SurfaceSample
 
 void Surface::sample(std::span<const WorldPoint> points, std::span<double> elevations) {
   state_->sample(points, elevations);
+}
+
+void Surface::sample(std::span<const WorldPoint> points, const Sun& sun, double above, std::span<SunSample> samples) {
+  const PointShadow shadow(state_->archive, sun, above);
+  std::vector<double> elevations(points.size());
+  state_->sample(points, std::span(elevations));
+  const auto run = [&] { shadow.sample(points, elevations, state_->sampler, samples); };
+  state_->arena ? state_->arena->execute(run) : run();
 }
 
 const WorldGeoreference& Surface::georeference() const {

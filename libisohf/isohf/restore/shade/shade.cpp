@@ -257,16 +257,6 @@ struct PixelRow {
 
 constexpr std::int64_t kMostPixels = 1 << 20;  ///< of a side
 constexpr std::int64_t kDefaultPixels = 2048;
-/// Eq. 16's k where the relief is that of mountains; in flatter lands this share of the elevation range.
-constexpr double kDefaultSoftness = 2.0;
-constexpr double kDefaultSoftnessShare = 0.005;
-
-double default_softness(const Metadata& metadata) {
-  const Statistics& statistics = metadata.statistics;
-  const double range = statistics.min && statistics.max ? *statistics.max - *statistics.min : 0.0;
-  return range > 0.0 ? std::min(kDefaultSoftness, kDefaultSoftnessShare * range) : kDefaultSoftness;
-}
-
 bool casts_shadows(const ShadeOptions& options) {
   return options.kind == ShadeKind::kShadowMask || (options.kind == ShadeKind::kPicture && options.shadows);
 }

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <span>
+
+#include "isohf/lattice/crossings.h"
+#include "isohf/restore/point_sampler.h"
+#include "isohf/surface.h"
+
+namespace isohf {
+
+/// The shadow over single points: along the line from each to the sun, over every triangle that it passes (paper section
+/// 3.13). What lies below the line's shadow so far by what the index says of its tile is not decoded.
+class PointShadow {
+ public:
+  /// Throws Error{kInvalidArgument} where the sun, or the height `above` the surface, is out of range. The archive must
+  /// outlive it.
+  PointShadow(const ArchiveReader& archive, const Sun& sun, double above);
+
+  /// elevations  of the surface at the points, NaN where there is none
+  /// On the caller's oneTBB arena.
+  void sample(std::span<const WorldPoint> points, std::span<const double> elevations, PointSampler& tiles,
+              std::span<SunSample> samples) const;
+
+ private:
+  [[nodiscard]] double height(WorldPoint at, double elevation, PointSampler& tiles) const;
+  [[nodiscard]] double elevation_from_index(std::uint32_t code) const;
+  [[nodiscard]] double highest_on(const ObjectLine& line, double begin, double end, const TileCodes& codes,
+                                  double so_far) const;
+
+  const ArchiveReader& archive_;
+  WorldPoint towards_sun_;  ///< of length 1
+  double fall_;             ///< elevation units in one world unit
+  double softness_;
+  double above_;
+  double highest_;  ///< elevation of all tiles
+};
+
+}  // namespace isohf
