@@ -60,7 +60,7 @@ std::string text_from(const ViewReport& report, const std::string& archive) {
       cli::describe_count(report.vertices), cli::describe_count(report.shared_vertices),
       cli::describe_count(report.seam_pixels), report.worst_height, report.worst_normal);
   if (report.suns_deg.empty()) {
-    text += "shadows: the archive has no shadow seeds\n";
+    text += "shadows: not looked at, as tiles are at fault\n";
   } else {
     text += fmt::format(
         "shadows: suns of {:g} degrees, East and West, {} vertices, worst {:.4f} codes, share of the sun {:.2e}\n",

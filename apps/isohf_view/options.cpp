@@ -17,10 +17,8 @@ constexpr const char* kFooter =
 
 Positions are world units of the archive from its North-West corner: x eastwards, y up, z southwards.
 
-Shadows need an archive with shadow seeds (isohf convert --shadow-seeds). They follow light along the rows, from East or
-West: at azimuth 90 or 270 they are exactly the sun's, as isohf shade draws them. At other azimuths they are those of the
-sun as seen in that plane, whose elevation has the tangent tan(elevation) / |sin(azimuth)|; a sun due North or South casts
-none.
+Shadows are those of isohf shade, for a sun that stands anywhere. Tiles towards the sun that may cast on what is shown are
+read as well, some thousand at most.
 
 Tiles and textures on the GPU and on their way there never take more than --memory together; in an archive with
 textures, a third goes to tiles and two thirds to textures. Where the far distance would need more, it is shortened and
@@ -103,10 +101,9 @@ void add_light(CommandLine& line, Options& options) {
                 options.sun_azimuth_deg = azimuth;
                 options.sun_elevation_deg = elevation;
               });
-  line.option("--shadows", "on|off", "Draw cast shadows (default: on where the archive has shadow seeds)",
-              [&](const std::string& text) {
-                options.shadows = cli::parse_word(text, {"on", "off"}) == 0;
-              });
+  line.option("--shadows", "on|off", "Draw cast shadows (default: on)", [&](const std::string& text) {
+    options.shadows = cli::parse_word(text, {"on", "off"}) == 0;
+  });
   line.option("--shadow-softness", "K",
               "Apparent size of the sun at the caster's distance, world units (default: 2, or 0.5 % of the range of "
               "heights where that is less)",

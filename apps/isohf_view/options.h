@@ -30,9 +30,9 @@ struct Options {
   bool fly = false;
   double sun_azimuth_deg = 300.0;
   double sun_elevation_deg = 35.0;
-  std::optional<double> exaggeration;     ///< nullopt: default_exaggeration()
-  bool mode_given = false;                ///< else textures are shown where the archive has them
-  std::optional<bool> shadows;            ///< nullopt: where the archive has seeds
+  std::optional<double> exaggeration;  ///< nullopt: default_exaggeration()
+  bool mode_given = false;             ///< else textures are shown where the archive has them
+  bool shadows = true;
   std::optional<double> shadow_softness;  ///< k of Eq. 16, world units; nullopt: default_softness()
   std::optional<double> far_distance;
   std::optional<int> samples;  ///< a pixel; nullopt: 4, but 1 in a window that software draws

@@ -246,8 +246,6 @@ void Renderer::begin_shading(const Frame& frame, const TerrainProgram& program) 
   set_vec3(program.uniform("sun_light"), (sun.y > 0.0 ? 0.95 : 0.0) * warm);
   set_vec3(program.uniform("sky_light"), std::clamp(sun.y * 6.0 + 0.25, 0.05, 1.0) * Vec3{0.33, 0.39, 0.48});
   set_vec3(program.uniform("horizon"), by_day(kHorizon, sun));
-  const double gain = view.shadow_softness ? 2.0 * scale.scale / *view.shadow_softness : 0.0;
-  glUniform1f(program.uniform("shadow_gain"), static_cast<float>(gain));
   const double haze_begin = 0.55 * view.far_distance;
   const double haze_rise = view.haze ? 1.0 / (view.far_distance - haze_begin) : 0.0;
   glUniform2f(program.uniform("haze"), static_cast<float>(haze_begin), static_cast<float>(haze_rise));
@@ -259,6 +257,7 @@ void Renderer::draw_mesh(Frame& frame, const TerrainProgram& program, const Item
   glUniform1i(program.uniform("level"), level);
   glUniform1i(program.uniform("is_stitch"), 0);
   set_vec3(program.uniform("level_colour"), level_colour(level));
+  glUniform1f(program.uniform("shadow_gain"), frame.view.shadows ? item.slot->shadow_gain() : 0.0F);
   item.slot->bind();
   if (item.texture != 0) glBindTexture(GL_TEXTURE_2D, item.texture);
   if (item.is_cut) set_cutting(true);

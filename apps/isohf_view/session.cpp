@@ -59,46 +59,28 @@ const char* mode_name(ColourMode mode) {
 }
 
 constexpr double kDegree = std::numbers::pi / 180.0;
-/// A sun that stands higher than this in the rows' plane shades nothing to speak of.
+/// A sun that stands higher than this shades nothing to speak of.
 constexpr double kOverhead_deg = 89.5;
-/// Suns closer together than this are one to the eye; the sun itself is half a degree wide.
-constexpr double kSame_deg = 0.01;
 
 SharedGeometry shared_geometry(const TileSource& source) {
   const Planes planes = planes_of(source);
   return {planes.mesh_shape(), make_index_arrays(planes.mesh_shape(), planes.count() > 0 ? planes.stride() : 0)};
 }
 
-double nearest_of(const ShadowSeedInfo& seeds, double wanted_deg) {
-  if (seeds.kind == ShadowSeedInfo::Kind::kHulls) return std::max(wanted_deg, seeds.sun_min_deg);
-  return *std::min_element(seeds.sun_deg.begin(), seeds.sun_deg.end(),
-                           [&](double a, double b) { return std::abs(a - wanted_deg) < std::abs(b - wanted_deg); });
-}
-
 }  // namespace
 
-ShadowSun shadow_sun(const ShadowSeedInfo* seeds, double azimuth_deg, double elevation_deg, double exaggeration) {
-  ShadowSun out;
-  if (seeds == nullptr) return out;
-  out.state = ShadowSun::State::kNone;
-  if (elevation_deg <= 0.0 || elevation_deg >= 90.0) return out;
-  const double eastward = std::sin(azimuth_deg * kDegree);
-  const double rise = std::tan(elevation_deg * kDegree);
-  const double wanted_deg = std::atan2(rise / exaggeration, std::abs(eastward)) / kDegree;
-  if (std::atan2(rise, std::abs(eastward)) / kDegree > kOverhead_deg || wanted_deg > kOverhead_deg) return out;
-  out.sun.travel = eastward > 0.0 ? LightTravel::kWestward : LightTravel::kEastward;
-  out.sun.elevation_deg = nearest_of(*seeds, wanted_deg);
-  const bool exact = std::abs(out.sun.elevation_deg - wanted_deg) < kSame_deg;
-  out.state = exact ? ShadowSun::State::kExact : ShadowSun::State::kNearest;
-  out.seen_deg = std::atan(std::tan(out.sun.elevation_deg * kDegree) * exaggeration) / kDegree;
-  return out;
+std::optional<CastingSun> casting_sun(double azimuth_deg, double elevation_deg, double exaggeration, double softness) {
+  if (elevation_deg <= 0.0 || elevation_deg >= 90.0) return std::nullopt;
+  const double over_true_deg = std::atan(std::tan(elevation_deg * kDegree) / exaggeration) / kDegree;
+  if (std::max(elevation_deg, over_true_deg) > kOverhead_deg) return std::nullopt;
+  return CastingSun{azimuth_deg, over_true_deg, softness};
 }
 
 Session::Session(const TileSource& source, const Options& options)
     : view(options.view),
       sun_azimuth_deg(options.sun_azimuth_deg),
       sun_elevation_deg(options.sun_elevation_deg),
-      shadows(options.shadows.value_or(true)),
+      shadows(options.shadows),
       source_(source),
       whole_(whole_bounds(source)),
       shadow_softness_(options.shadow_softness.value_or(default_softness(whole_))),
@@ -113,10 +95,6 @@ Session::Session(const TileSource& source, const Options& options)
       throw Error(ErrorCode::kInvalidArgument,
                   fmt::format("--level {}: this archive has levels 0 to {}", *level, levels - 1));
     }
-  }
-  if (options.shadows.value_or(false) && source.shadow_seeds() == nullptr) {
-    throw Error(ErrorCode::kInvalidArgument,
-                "--shadows on: this archive has no shadow seeds; convert with --shadow-seeds");
   }
   view.exaggeration = options.exaggeration.value_or(default_exaggeration(source, whole_));
   if (source.textures() != nullptr) {
@@ -159,11 +137,9 @@ void Session::prepare() {
   const double farthest = farthest_corner(source_.grid(), whole_, camera.eye, view.exaggeration);
   view.far_distance = far_distance_ ? *far_distance_ : 1.8 * farthest;
   reach_wanted_ = std::min(view.far_distance, farthest);
-  shadow_sun_ = shadow_sun(source_.shadow_seeds(), sun_azimuth_deg, sun_elevation_deg, view.exaggeration);
-  const bool casts = shadow_sun_.state == ShadowSun::State::kExact || shadow_sun_.state == ShadowSun::State::kNearest;
-  view.shadow_softness.reset();
-  if (shadows && casts) view.shadow_softness = shadow_softness_;
-  boxes_.set_sun(shadows && casts ? std::optional(shadow_sun_.sun) : std::nullopt);
+  const auto sun = casting_sun(sun_azimuth_deg, sun_elevation_deg, view.exaggeration, shadow_softness_);
+  view.shadows = shadows && sun;
+  boxes_.set_sun(view.shadows ? sun : std::nullopt);
 }
 
 void Session::draw() {
@@ -196,15 +172,10 @@ void Session::complete_frame() {
 }
 
 std::string Session::shadow_line() const {
-  if (shadow_sun_.state == ShadowSun::State::kNoSeeds) return "no shadows: the archive has no shadow seeds";
-  if (shadow_sun_.state == ShadowSun::State::kNone) return "no shadows: no sun along the rows";
   if (!shadows) return "shadows off";
-  std::string line =
-      fmt::format("shadows from the {}, {:.1f} deg", shadow_sun_.sun.travel == LightTravel::kEastward ? "West" : "East",
-                  shadow_sun_.seen_deg);
-  if (shadow_sun_.state == ShadowSun::State::kNearest) line += ", the nearest that the seeds hold for";
+  if (!view.shadows) return sun_elevation_deg > 0.0 ? "no shadows: the sun is overhead" : "no shadows: it is night";
   const std::int64_t to_come = boxes_.figures().shadows_to_come;
-  return to_come > 0 ? fmt::format("{}, {} to come", line, to_come) : line;
+  return to_come > 0 ? fmt::format("shadows: {} tiles to come", to_come) : "shadows";
 }
 
 bool Session::is_settled() const {

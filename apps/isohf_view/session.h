@@ -12,32 +12,16 @@
 
 namespace isohf::view {
 
-/// The sun whose shadows are drawn.
-struct ShadowSun {
-  enum class State {
-    kNoSeeds,  ///< the source has none
-    kNone,     ///< nothing is shaded: it is night, or light travels along the columns
-    kExact,    ///< `sun` is the one asked for
-    kNearest,  ///< the seeds do not hold for that one: `sun` is the nearest that they hold for
-  };
-  State state = State::kNoSeeds;
-  RowSun sun;
-  double seen_deg = 0.0;  ///< kExact, kNearest: elevation of `sun` as it is drawn, exaggeration included
-};
-
-/// Shadows are those of light along the rows (paper section 3.13). The sun is taken as it is seen in the rows' plane:
-/// in the East or West as its azimuth has it, at the elevation whose tangent is tan(elevation) / |sin(azimuth)|, as
-/// high as the real one in the due East and West, where this is `isohf shade`'s sun, and overhead due North and South.
-/// Exaggerated heights cast what true ones cast under the sun of tan(elevation) / exaggeration.
-/// seeds  may be nullptr      azimuth_deg  clockwise from North     elevation_deg  of the sun that shines
-[[nodiscard]] ShadowSun shadow_sun(const ShadowSeedInfo* seeds, double azimuth_deg, double elevation_deg,
-                                   double exaggeration);
+/// The sun that casts over true heights what this one casts over exaggerated ones: that of tan(elevation) /
+/// exaggeration. nullopt: it casts nothing, as it is night, or overhead.
+[[nodiscard]] std::optional<CastingSun> casting_sun(double azimuth_deg, double elevation_deg, double exaggeration,
+                                                    double softness);
 
 /// An open heightfield with a camera: all that window, picture and flight have in common. A GL context must be
 /// current as long as it lives.
 class Session {
  public:
-  /// Throws Error{kInvalidArgument} where a level beyond the archive's is asked for, or shadows without seeds.
+  /// Throws Error{kInvalidArgument} where a level beyond the archive's is asked for, or textures that it hasn't.
   Session(const TileSource& source, const Options& options);
 
   /// Updates the tile box and draws a frame into the bound framebuffer; never waits for a tile.
@@ -53,7 +37,7 @@ class Session {
   ViewState view;
   double sun_azimuth_deg;
   double sun_elevation_deg;
-  bool shadows;  ///< wanted; drawn where the source has seeds
+  bool shadows;  ///< wanted
 
   /// True where the next frame would show the same: nothing is on its way.
   [[nodiscard]] bool is_settled() const;
@@ -77,7 +61,6 @@ class Session {
   const TileSource& source_;
   TileBounds whole_;
   double shadow_softness_;
-  ShadowSun shadow_sun_;
   SharedGeometry shared_;
   Renderer renderer_;
   PlaneBoxes boxes_;

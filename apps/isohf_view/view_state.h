@@ -18,8 +18,7 @@ struct ViewState {
   double far_distance = 1.0;      ///< world units, > 0
   Vec3 sun{-0.6, 0.6, -0.5};      ///< towards the sun; need not be a unit vector
   double exaggeration = 1.0;      ///< of elevations, > 0
-  /// Draws shadows: the sun's apparent size k (Eq. 16), world units before exaggeration, > 0. nullopt: no shadows.
-  std::optional<double> shadow_softness;
+  bool shadows = false;           ///< draws those that the tiles have
   ColourMode mode = ColourMode::kElevation;
   bool wireframe = false;
   bool borders = false;

@@ -19,7 +19,8 @@ TileGrid wide_grid() {
 }
 
 /// What the buffer behind a vertex attribute of a slot holds from `first` on; empty where the attribute has no buffer.
-std::vector<std::uint16_t> on_gpu(const TileSlot& slot, GLuint attribute, int first) {
+template <typename Value>
+std::vector<Value> on_gpu(const TileSlot& slot, GLuint attribute, int first) {
   slot.bind();
   GLint enabled = 0;
   GLint buffer = 0;
@@ -27,17 +28,17 @@ std::vector<std::uint16_t> on_gpu(const TileSlot& slot, GLuint attribute, int fi
   glGetVertexAttribiv(attribute, GL_VERTEX_ATTRIB_ARRAY_BUFFER_BINDING, &buffer);
   glBindVertexArray(0);
   if (enabled == 0) return {};
-  std::vector<std::uint16_t> values(static_cast<std::size_t>(wide_grid().shape().stored_vertex_count()));
+  std::vector<Value> values(static_cast<std::size_t>(wide_grid().shape().stored_vertex_count()));
   glBindBuffer(GL_COPY_READ_BUFFER, static_cast<GLuint>(buffer));
   glGetBufferSubData(GL_COPY_READ_BUFFER, 2 * first, static_cast<GLsizeiptr>(2 * values.size()), values.data());
   return values;
 }
 /// A row and two vertices of nothing lie before the codes.
 std::vector<std::uint16_t> codes_on_gpu(const TileSlot& slot) {
-  return on_gpu(slot, 1, wide_grid().shape().columns() + 2);
+  return on_gpu<std::uint16_t>(slot, 1, wide_grid().shape().columns() + 2);
 }
-std::vector<std::uint16_t> shadow_on_gpu(const TileSlot& slot) {
-  return on_gpu(slot, 4, 0);
+std::vector<std::int16_t> shadow_on_gpu(const TileSlot& slot) {
+  return on_gpu<std::int16_t>(slot, 4, 0);
 }
 
 class TileBoxTest : public test::GlTest {
@@ -116,7 +117,7 @@ TEST_F(TileBoxTest, ShowsTheSameBytesWhateverTheRoute) {
   // After any flight, each resident tile's buffer holds that tile's codes and no other's.
   const MemoryTiles source(wide_grid());
   const SharedGeometry shared(source.grid().shape(), make_index_arrays(source.grid().shape()));
-  TileBox box(source, shared, limits_for(80, 3));
+  TileBox box(source, shared, limits_for(100, 3));
   for (int step = 0; step < 40; ++step) {
     box.update({static_cast<double>(step * 977 % 3000), static_cast<double>(step * 571 % 2000)}, 300.0);
     std::this_thread::sleep_for(milliseconds(1));
@@ -133,19 +134,17 @@ TEST_F(TileBoxTest, ShowsTheSameBytesWhateverTheRoute) {
   EXPECT_GT(seen, 40);
 }
 
-std::vector<std::uint16_t> shadow_of(const MemoryTiles& source, TileIndex tile, const RowSun& sun) {
-  std::vector<std::uint16_t> codes(static_cast<std::size_t>(source.grid().shape().stored_vertex_count()));
-  std::vector<std::uint16_t> shadow(codes.size());
-  source.read_lit(tile, sun, codes, shadow);
-  return shadow;
+std::vector<std::int16_t> shadow_of(const MemoryTiles& source, TileIndex tile, const CastingSun& sun) {
+  const std::atomic<bool> leaves{false};
+  std::string unread;
+  return cast_shadows(source, sun, {tile}, {}, leaves, unread).front().depths;
 }
 
 TEST_F(TileBoxTest, ShadesAllTilesAnewWhenTheSunMoves) {
-  MemoryTiles source(wide_grid());
-  source.set_seeds({});
+  const MemoryTiles source(wide_grid());
   const SharedGeometry shared(source.grid().shape(), make_index_arrays(source.grid().shape()));
   TileBox box(source, shared, limits_for(400, 4));
-  for (const RowSun& sun : {RowSun{LightTravel::kEastward, 2.0}, RowSun{LightTravel::kWestward, 6.0}}) {
+  for (const CastingSun& sun : {CastingSun{270.0, 2.0, 2.0}, CastingSun{131.0, 6.0, 2.0}}) {
     box.set_sun(sun);
     box.finish({700.0, 900.0}, 300.0);
     EXPECT_EQ(box.figures().shadows_to_come, 0);
@@ -156,7 +155,8 @@ TEST_F(TileBoxTest, ShadesAllTilesAnewWhenTheSunMoves) {
       const TileSlot* slot = box.resident(tile);
       if (slot == nullptr) continue;
       EXPECT_EQ(codes_on_gpu(*slot), test::analytic_tile(source.grid(), tile));
-      EXPECT_EQ(shadow_on_gpu(*slot), shadow_of(source, tile, sun));
+      EXPECT_GT(slot->shadow_gain(), 0.0F);
+      EXPECT_EQ(shadow_on_gpu(*slot), shadow_of(source, tile, sun)) << tile.column << ',' << tile.row;
       ++shaded;
     }
     EXPECT_GT(shaded, 40);
@@ -164,21 +164,20 @@ TEST_F(TileBoxTest, ShadesAllTilesAnewWhenTheSunMoves) {
 }
 
 TEST_F(TileBoxTest, KeepsOldShadowsUntilNewOnesAreThere) {
-  const RowSun old_sun{LightTravel::kEastward, 2.0};
+  const CastingSun old_sun{250.0, 2.0, 2.0};
   std::promise<void> gate;
   const std::shared_future<void> opened = gate.get_future().share();
   std::atomic<bool> closed{false};
-  MemoryTiles source(wide_grid(), {}, [&] {
+  const MemoryTiles source(wide_grid(), {}, [&] {
     if (closed) opened.wait();
   });
-  source.set_seeds({});
   const SharedGeometry shared(source.grid().shape(), make_index_arrays(source.grid().shape()));
   TileBox box(source, shared, limits_for(400, 4));
   box.set_sun(old_sun);
   box.finish({700.0, 900.0}, 300.0);
   closed = true;
   for (int frame = 0; frame < 5; ++frame) {
-    box.set_sun(RowSun{LightTravel::kEastward, 3.0 + frame});
+    box.set_sun(CastingSun{250.0, 3.0 + frame, 2.0});
     box.update({700.0, 900.0}, 300.0);
     EXPECT_EQ(box.figures().shadows_to_come, box.figures().resident_tiles);
   }
@@ -187,21 +186,21 @@ TEST_F(TileBoxTest, KeepsOldShadowsUntilNewOnesAreThere) {
   gate.set_value();
   EXPECT_EQ(kept, shadow_of(source, {7, 9}, old_sun));
   box.finish({700.0, 900.0}, 300.0);
-  EXPECT_EQ(shadow_on_gpu(*box.resident({7, 9})), shadow_of(source, {7, 9}, {LightTravel::kEastward, 7.0}));
+  EXPECT_EQ(shadow_on_gpu(*box.resident({7, 9})), shadow_of(source, {7, 9}, {250.0, 7.0, 2.0}));
 }
 
-TEST_F(TileBoxTest, ShowsTilesWithBrokenSeedsWithoutShadows) {
+TEST_F(TileBoxTest, NamesATileThatCastsNothingAsItCannotBeRead) {
   MemoryTiles source(wide_grid());
-  source.set_seeds({}, [](TileIndex tile, LightTravel, std::vector<double>&) {
-    if (tile == TileIndex{7, 9}) throw Error(ErrorCode::kCorrupt, "seeds of tile (7,9)");
+  source.set_heights([](TileIndex tile, std::span<float>) {
+    if (tile == TileIndex{7, 9}) throw Error(ErrorCode::kCorrupt, "tile (7,9)");
   });
   const SharedGeometry shared(source.grid().shape(), make_index_arrays(source.grid().shape()));
   TileBox box(source, shared, limits_for(400, 4));
-  box.set_sun(RowSun{LightTravel::kEastward, 2.0});
+  box.set_sun(CastingSun{});
   box.finish({700.0, 900.0}, 300.0);
   ASSERT_NE(box.resident({7, 9}), nullptr);
-  EXPECT_TRUE(shadow_on_gpu(*box.resident({7, 9})).empty());
-  EXPECT_EQ(box.error(), "seeds of tile (7,9)");
+  EXPECT_EQ(box.figures().shadows_to_come, 0);
+  EXPECT_EQ(box.error(), "tile (7,9)");
 }
 
 TEST_F(TileBoxTest, RefusesTooLittleMemory) {

@@ -25,7 +25,7 @@ layout(location = 0) in ivec2 object_xz;
 layout(location = 1) in uvec3 here;
 layout(location = 2) in uvec4 north;
 layout(location = 3) in uvec4 south;
-layout(location = 4) in uint shadow_code;
+layout(location = 4) in float shadow;
 
 uniform ivec2 last_xz;          // 2(C-4), R-3: the East and South edges
 uniform ivec2 tile_lattice;     // the tile's North-West corner, lattice steps from the anchor
@@ -38,7 +38,7 @@ uniform float code_slope;       // the same for normals
 uniform mat4 clip_from_eye;
 // Two slots of four: a software rasteriser pays for each slot and triangle.
 out vec4 v_facing;              // unit normal, distance from the eye
-out vec4 v_place;               // object space x and z, elevation code, codes that the shadow lies above
+out vec4 v_place;               // object space x and z, elevation code, depth in the shadow
 #ifdef RIM
 uniform vec4 covered;           // West, North, East, South of what is shown, seen from the eye
 out gl_PerVertex {
@@ -97,7 +97,7 @@ void main() {
   float height = float(here.y) * code_height;
   vec3 eye = anchor + vec3(float(lattice.x) * sigma.x, height, float(lattice.y) * sigma.y);
   v_facing = vec4(vertex_normal(), length(eye));
-  v_place = vec4(vec2(object_xz), float(here.y), max(float(shadow_code) - float(here.y), 0.0));
+  v_place = vec4(vec2(object_xz), float(here.y), shadow);
   gl_Position = clip_from_eye * vec4(eye, 1.0);
 #ifdef RIM
   v_void = here.y == 65535u ? 1.0 : 0.0;
@@ -118,10 +118,10 @@ in float v_void;
 #endif
 )glsl";
 
-// Eq. 16 on the surface itself (isohf/surface/shadow.h): all of the sun where the ground is its own shadow height, none
-// where that lies k/2 above. Interpolated along the triangles, as heights are.
+// Eq. 16 on the surface itself (isohf/surface/shade/shadow.h): all of the sun where the ground is its own shadow height, none
+// where that lies k/2 above. Depths are negative in the sun, so that a border lies between two vertices.
 constexpr const char* kSunShare = R"glsl(
-uniform float shadow_gain;      // 2/k, per code; 0: no shadows
+uniform float shadow_gain;      // share of the sun that a depth of 1 takes; 0: no shadows
 float sun_share() { return clamp(1.0 - v_place.w * shadow_gain, 0.0, 1.0); }
 )glsl";
 

@@ -17,7 +17,7 @@ namespace isohf::view {
 [[nodiscard]] std::string terrain_fragment_shader(bool rim, ColourMode mode, bool borders);
 /// (elevation code, normal x, normal z, 1): what verifying reads back.
 [[nodiscard]] std::string probe_fragment_shader(bool rim);
-/// (share of the sun, shadow height above the ground in codes, 0, 1): what verifying reads back of shadows.
+/// (share of the sun, depth in the shadow, 0, 1): what verifying reads back of shadows.
 [[nodiscard]] std::string shadow_probe_fragment_shader(bool rim);
 /// One flat colour: wireframes.
 [[nodiscard]] std::string flat_fragment_shader(bool rim);
@@ -35,7 +35,7 @@ struct TerrainFrame {
 
 /// A program with the terrain's vertex shader, which every picture and every check draws through, and one fragment
 /// shader or another. Vertex attributes: 0 the shared object-space (x, z); 1, 2, 3 the tile's elevation codes around the
-/// vertex; 4 the tile's shadow heights in codes (constant 0 without them).
+/// vertex; 4 the depth in the shadow (constant 0 without).
 class TerrainProgram {
  public:
   TerrainProgram(const std::string& name, bool rim, const std::string& fragment_source,

@@ -133,7 +133,7 @@ TileSlot::TileSlot(const SharedGeometry& shared)
   glVertexAttribIPointer(2, 4, GL_UNSIGNED_SHORT, kStep, offset_pointer((rim_ - row - 1) * kStep));
   glVertexAttribIPointer(3, 4, GL_UNSIGNED_SHORT, kStep, offset_pointer((rim_ + row - 1) * kStep));
   for (GLuint attribute = 0; attribute < 4; ++attribute) glEnableVertexAttribArray(attribute);
-  glVertexAttribI4ui(kShadowAttribute, 0, 0, 0, 0);
+  glVertexAttrib1f(kShadowAttribute, 0.0F);
   glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, shared.indices());
   glBindVertexArray(0);
   check_gl("making a tile's elevation buffer");
@@ -141,26 +141,22 @@ TileSlot::TileSlot(const SharedGeometry& shared)
 
 void TileSlot::upload(std::span<const std::uint16_t> codes) {
   ISOHF_ASSERT(codes.size() == vertices_);
+  shadow_gain_ = 0.0F;  // what it has is of another tile
   glBindBuffer(GL_ARRAY_BUFFER, codes_.get());
   glBufferSubData(GL_ARRAY_BUFFER, static_cast<GLintptr>(rim_ * sizeof(std::uint16_t)),
                   static_cast<GLsizeiptr>(codes.size_bytes()), codes.data());
 }
 
-void TileSlot::upload_shadow(std::span<const std::uint16_t> shadow) {
+void TileSlot::upload_shadow(std::span<const std::int16_t> depths, float gain) {
+  ISOHF_ASSERT(depths.size() == vertices_);
   glBindVertexArray(array_.get());
-  if (shadow.empty()) {
-    glDisableVertexAttribArray(kShadowAttribute);
-    shadow_.reset();
-    glBindVertexArray(0);
-    return;
-  }
-  ISOHF_ASSERT(shadow.size() == vertices_);
   if (!shadow_) shadow_.emplace();
   glBindBuffer(GL_ARRAY_BUFFER, shadow_->get());
-  glBufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(shadow.size_bytes()), shadow.data(), GL_DYNAMIC_DRAW);
-  glVertexAttribIPointer(kShadowAttribute, 1, GL_UNSIGNED_SHORT, 0, nullptr);
+  glBufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(depths.size_bytes()), depths.data(), GL_DYNAMIC_DRAW);
+  glVertexAttribPointer(kShadowAttribute, 1, GL_SHORT, GL_TRUE, 0, nullptr);
   glEnableVertexAttribArray(kShadowAttribute);
   glBindVertexArray(0);
+  shadow_gain_ = gain;
 }
 
 }  // namespace isohf::view

@@ -58,7 +58,7 @@ class SharedGeometry {
 
 /// One tile on the GPU: two bytes a vertex. The one buffer is bound as three overlapping attributes, so that the vertex
 /// shader finds the neighbours that a normal needs: v-1..v+1, v-C-1..v-C+2 and v+C-1..v+C+2. A row and two vertices of
-/// nothing lie before and behind the codes. Shadow heights take two more bytes a vertex. A slot is reused for tile
+/// nothing lie before and behind the codes. Shadows take two more bytes a vertex. A slot is reused for tile
 /// after tile.
 class TileSlot {
  public:
@@ -66,9 +66,11 @@ class TileSlot {
 
   /// codes [C x R]
   void upload(std::span<const std::uint16_t> codes);
-  /// Shadow heights in codes of the same scale, [C x R]; two more bytes a vertex from the first call on. An empty span
-  /// takes the shadow away.
-  void upload_shadow(std::span<const std::uint16_t> shadow);
+  /// How deep vertices lie in the shadow, [C x R], and the share of the sun that 32767 takes; two more bytes a vertex
+  /// from the first call on.
+  void upload_shadow(std::span<const std::int16_t> depths, float gain);
+  /// 0 without a shadow.
+  [[nodiscard]] float shadow_gain() const { return shadow_gain_; }
 
   /// Binds the vertex array.
   void bind() const { glBindVertexArray(array_.get()); }
@@ -86,6 +88,7 @@ class TileSlot {
   std::size_t rim_;  ///< unused vertices before and behind the codes
   Buffer codes_;
   std::optional<Buffer> shadow_;
+  float shadow_gain_ = 0.0F;
   VertexArray array_;
 };
 

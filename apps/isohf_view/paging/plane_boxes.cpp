@@ -43,7 +43,7 @@ std::optional<double> PlaneBoxes::radius(int plane, const ViewState& view, doubl
   return std::min(reach, around + std::hypot(coarser.extent_x(), coarser.extent_z()));
 }
 
-void PlaneBoxes::set_sun(const std::optional<RowSun>& sun) {
+void PlaneBoxes::set_sun(const std::optional<CastingSun>& sun) {
   for (const auto& box : boxes_) box->set_sun(sun);
 }
 

@@ -17,7 +17,7 @@ class PlaneBoxes {
   /// Throws Error{kInvalidArgument} where limits.memory_bytes are too few.
   PlaneBoxes(const TileSource& source, const SharedGeometry& shared, const TileBoxLimits& limits);
 
-  void set_sun(const std::optional<RowSun>& sun);
+  void set_sun(const std::optional<CastingSun>& sun);
   /// Once a frame. reach  distance from the eye in which anything is wanted
   void update(const ViewState& view, double reach);
   /// Updates until all is resident that is wanted: for pictures, not for frames.

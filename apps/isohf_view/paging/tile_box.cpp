@@ -7,7 +7,6 @@
 #include <cmath>
 #include <exception>
 #include <thread>
-#include <tuple>
 
 #include "isohf/error.h"
 
@@ -15,34 +14,34 @@ namespace isohf::view {
 namespace {
 
 /// What a tile takes on the CPU while it is decoded and waits, in arrays of its codes: the codes twice over, the
-/// inflated payload, and room for what zlib and the seeds need. Shadows take two arrays of floats, and one of codes.
+/// inflated payload, and room for what zlib needs.
 constexpr std::uint64_t kCpuCopies = 4;
-constexpr std::uint64_t kCpuCopiesLit = 9;
+/// What light that is swept over a tile takes: heights and depths, floats.
+constexpr std::uint64_t kSweptBytes = 8;
 
-LoadedTile load_tile(const TileSource& source, const TileRequest& request) {
-  LoadedTile loaded;
-  loaded.request = request;
-  const auto vertices = static_cast<std::size_t>(source.grid().shape().stored_vertex_count());
-  const auto attempt = [&](auto&& read) {
-    try {
-      loaded.codes.resize(vertices);
-      read();
-      return true;
-    } catch (const std::exception& error) {
-      if (loaded.error.empty()) loaded.error = error.what();
-      loaded.codes.clear();
-      loaded.shadow.clear();
-      return false;
-    }
-  };
-  const bool lit = request.sun && attempt([&] {
-                     loaded.shadow.resize(vertices);
-                     source.read_lit(request.tile, *request.sun, loaded.codes, loaded.shadow);
-                   });
-  // Broken seeds take nothing but the shadow away.
-  if (!lit && request.codes) attempt([&] { source.read(request.tile, loaded.codes); });
-  if (!request.codes) loaded.codes = {};
+std::uint64_t vertices_of(const TileSource& source) {
+  return static_cast<std::uint64_t>(source.grid().shape().stored_vertex_count());
+}
+
+LoadedTile load_tile(const TileSource& source, TileIndex tile) {
+  LoadedTile loaded{tile, std::vector<std::uint16_t>(vertices_of(source)), {}};
+  try {
+    source.read(tile, loaded.codes);
+  } catch (const std::exception& error) {
+    loaded.error = error.what();
+    loaded.codes.clear();
+  }
   return loaded;
+}
+
+CastShadows cast(const TileSource& source, const ShadowRequest& request, const std::atomic<bool>& leaves) {
+  CastShadows cast{{}, request.sun_number, {}};
+  try {
+    cast.shadows = cast_shadows(source, request.sun, request.tiles, request.limits, leaves, cast.error);
+  } catch (const std::exception& error) {
+    cast.error = error.what();
+  }
+  return cast;
 }
 
 }  // namespace
@@ -51,26 +50,34 @@ TileBox::TileBox(const TileSource& source, const SharedGeometry& shared, const T
     : source_(source),
       shared_(shared),
       limits_(limits),
-      slot_bytes_(TileSlot::bytes(shared.shape(), source.shadow_seeds() != nullptr)),
-      on_the_way_bytes_(TileSlot::bytes(shared.shape()) *
-                        (source.shadow_seeds() == nullptr ? kCpuCopies : kCpuCopiesLit)),
-      loader_([&source](const TileRequest& request) { return load_tile(source, request); }, limits.workers) {
+      slot_bytes_(TileSlot::bytes(shared.shape(), true)),
+      on_the_way_bytes_(TileSlot::bytes(shared.shape()) * kCpuCopies),
+      depth_bytes_(vertices_of(source) * sizeof(std::int16_t)),
+      loader_([&source](TileIndex tile) { return load_tile(source, tile); }, limits.workers),
+      caster_([this](const ShadowRequest& request) { return cast(source_, request, leaves_); }, 1) {
   const std::uint64_t per_frame = limits.upload_bytes_per_frame / slot_bytes_ + 1;
   // A quarter of the memory at most is for tiles on their way.
   in_flight_limit_ = static_cast<std::size_t>(
       std::max<std::uint64_t>(1, std::min<std::uint64_t>(per_frame + 2 * static_cast<std::uint64_t>(limits.workers),
                                                          limits.memory_bytes / 4 / on_the_way_bytes_)));
   const std::uint64_t on_the_way = in_flight_limit_ * on_the_way_bytes_;
-  if (limits.memory_bytes < on_the_way + 4 * slot_bytes_) {
-    throw Error(ErrorCode::kInvalidArgument,
-                fmt::format("memory for tiles: {} bytes hold fewer than four tiles of {} bytes and those on their way; "
-                            "{} are required",
-                            limits.memory_bytes, slot_bytes_, on_the_way + 4 * slot_bytes_));
+  bytes_for_slots_ = limits.memory_bytes - std::min(limits.memory_bytes, on_the_way);
+  if (!fits(2, 2)) {
+    throw Error(
+        ErrorCode::kInvalidArgument,
+        fmt::format("memory for tiles: {} bytes do not hold four tiles of {} bytes, those on their way and their "
+                    "shadows",
+                    limits.memory_bytes, slot_bytes_));
   }
-  max_slots_ = static_cast<std::int64_t>((limits.memory_bytes - on_the_way) / slot_bytes_);
 }
 
-void TileBox::set_sun(const std::optional<RowSun>& sun) {
+bool TileBox::fits(std::int64_t columns, std::int64_t rows) const {
+  const auto slots = static_cast<std::uint64_t>(columns * rows);
+  const auto swept = static_cast<std::uint64_t>(swept_columns(columns));
+  return slots * (slot_bytes_ + depth_bytes_) + swept * vertices_of(source_) * kSweptBytes <= bytes_for_slots_;
+}
+
+void TileBox::set_sun(const std::optional<CastingSun>& sun) {
   if (sun == sun_) return;
   sun_ = sun;
   if (sun_) ++sun_number_;
@@ -93,7 +100,7 @@ double TileBox::fitting_radius(double radius) const {
   const double least = 1e-6 * source_.grid().extent_x();
   for (;; radius *= 0.98) {
     const auto [columns, rows] = tiles_across(radius);
-    if (columns * rows <= max_slots_ || radius < least) return radius;
+    if (fits(columns, rows) || radius < least) return radius;
   }
 }
 
@@ -101,9 +108,7 @@ void TileBox::resize(WorldPoint centre, double radius) {
   const TileGrid& grid = source_.grid();
   // A box that memory does not hold shrinks to one that it does; figures say so.
   const double kept = fitting_radius(radius);
-  auto [columns, rows] = tiles_across(kept);
-  columns = std::min(columns, max_slots_);
-  rows = std::min(rows, std::max<std::int64_t>(1, max_slots_ / columns));
+  const auto [columns, rows] = tiles_across(kept);
   figures_.radius = kept;
   if (columns != box_columns_ || rows != box_rows_) {
     // Rehouse what is resident and still fits.
@@ -135,11 +140,9 @@ void TileBox::enter(Cell& cell, TileIndex tile) {
   if (cell.slot) spare_.push_back(std::move(cell.slot));
   cell.tile = tile;
   cell.state = source_.bounds(tile).stored ? State::kMissing : State::kVoid;
-  cell.shadow_requested = false;
-  cell.shadow_broken = false;
 }
 
-void TileBox::update(WorldPoint centre, double radius) {
+void TileBox::update(WorldPoint centre, double radius, bool shades) {
   const auto begin = std::chrono::steady_clock::now();
   figures_.uploads = 0;
   figures_.upload_bytes = 0;
@@ -155,14 +158,16 @@ void TileBox::update(WorldPoint centre, double radius) {
   upload();
   request(centre);
   count();
+  if (shades || figures_.missing_tiles == 0) request_shadows();
   figures_.update_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
 }
 
 std::uint64_t TileBox::most_bytes_of_a_tile(const TileSource& source) {
-  const bool lit = source.shadow_seeds() != nullptr;
   const TileShape& shape = source.grid().shape();
-  // A quarter of the memory is for tiles on their way.
-  return (TileSlot::bytes(shape, lit) + TileSlot::bytes(shape) * (lit ? kCpuCopiesLit : kCpuCopies)) * 4 / 3;
+  // A quarter of the memory is for tiles on their way. Each may be a column that is swept.
+  return (TileSlot::bytes(shape, true) + TileSlot::bytes(shape) * kCpuCopies +
+          vertices_of(source) * (sizeof(std::int16_t) + 2 * kSweptBytes)) *
+         4 / 3;
 }
 
 void TileBox::rest() {
@@ -179,22 +184,38 @@ void TileBox::rest() {
 
 void TileBox::upload() {
   for (; !waiting_.empty(); waiting_.pop_front()) {
-    const std::uint64_t next = waiting_.front().bytes();
+    const std::uint64_t next = waiting_.front().codes.size() * sizeof(std::uint16_t);
     if (figures_.upload_bytes > 0 && figures_.upload_bytes + next > limits_.upload_bytes_per_frame) return;
     place(waiting_.front());
   }
+  upload_shadows();
+}
+
+void TileBox::upload_shadows() {
+  caster_.collect(cast_);
+  for (; !cast_.empty(); cast_.pop_front()) {
+    CastShadows& cast = cast_.front();
+    if (!error_ && !cast.error.empty()) error_ = cast.error;
+    for (; !cast.shadows.empty(); cast.shadows.pop_back()) {
+      if (figures_.upload_bytes > 0 && figures_.upload_bytes + depth_bytes_ > limits_.upload_bytes_per_frame) return;
+      const TileShadow& shadow = cast.shadows.back();
+      if (!range_.contains(shadow.tile)) continue;  // the box has moved on
+      Cell& cell = cells_[cell_of(shadow.tile)];
+      if (!(cell.tile == shadow.tile) || cell.state != State::kResident) continue;
+      cell.slot->upload_shadow(shadow.depths, shadow.gain);
+      cell.sun_number = cast.sun_number;
+      figures_.upload_bytes += depth_bytes_;
+      ++figures_.shadow_uploads;
+    }
+  }
+  if (caster_.in_flight() == 0) sweep_bytes_ = 0;
 }
 
 void TileBox::place(LoadedTile& loaded) {
-  if (!range_.contains(loaded.request.tile)) return;  // the box has moved on
-  Cell& cell = cells_[cell_of(loaded.request.tile)];
-  if (!(cell.tile == loaded.request.tile)) return;
+  if (!range_.contains(loaded.tile)) return;  // the box has moved on
+  Cell& cell = cells_[cell_of(loaded.tile)];
+  if (!(cell.tile == loaded.tile)) return;
   if (!error_ && !loaded.error.empty()) error_ = loaded.error;
-  if (!loaded.request.codes) {
-    if (cell.state == State::kResident) place_shadow(cell, loaded);
-    if (cell.state == State::kResident && !loaded.shadow.empty()) ++figures_.shadow_uploads;
-    return;
-  }
   if (cell.state != State::kRequested && cell.state != State::kMissing) return;
   if (loaded.codes.empty()) {
     cell.state = State::kBroken;
@@ -207,18 +228,10 @@ void TileBox::place(LoadedTile& loaded) {
     spare_.pop_back();
   }
   cell.slot->upload(loaded.codes);
+  cell.sun_number = 0;
   cell.state = State::kResident;
   ++figures_.uploads;
   figures_.upload_bytes += loaded.codes.size() * sizeof(std::uint16_t);
-  place_shadow(cell, loaded);
-}
-
-void TileBox::place_shadow(Cell& cell, const LoadedTile& loaded) {
-  cell.shadow_requested = false;
-  cell.shadow_broken = loaded.request.sun && loaded.shadow.empty();
-  cell.slot->upload_shadow(loaded.shadow);
-  cell.sun_number = loaded.shadow.empty() ? 0 : loaded.request.sun_number;
-  figures_.upload_bytes += loaded.shadow.size() * sizeof(std::uint16_t);
 }
 
 double TileBox::distance_squared(const Cell& cell, WorldPoint centre) const {
@@ -241,25 +254,22 @@ void TileBox::request(WorldPoint centre) {
                     [](const auto& a, const auto& b) { return a.first < b.first; });
   for (std::size_t i = 0; i < wanted; ++i) {
     missing[i].second->state = State::kRequested;
-    loader_.request({missing[i].second->tile, true, sun_, sun_number_});
+    loader_.request(missing[i].second->tile);
   }
-  if (sun_) request_shadows(centre, in_flight_limit_ - busy - wanted);
 }
 
-void TileBox::request_shadows(WorldPoint centre, std::size_t most) {
-  if (most == 0) return;
-  std::vector<std::tuple<std::uint64_t, double, Cell*>> outdated;
-  for (Cell& cell : cells_) {
-    if (!is_outdated(cell) || cell.shadow_requested) continue;
-    outdated.emplace_back(cell.sun_number, distance_squared(cell, centre), &cell);
+void TileBox::request_shadows() {
+  if (!sun_ || caster_.in_flight() > 0 || !cast_.empty()) return;
+  ShadowRequest request{{}, *sun_, sun_number_, {}};
+  for (const Cell& cell : cells_) {
+    if (is_outdated(cell)) request.tiles.push_back(cell.tile);
   }
-  const std::size_t wanted = std::min(outdated.size(), most);
-  std::partial_sort(outdated.begin(), outdated.begin() + static_cast<std::ptrdiff_t>(wanted), outdated.end());
-  for (std::size_t i = 0; i < wanted; ++i) {
-    Cell& cell = *std::get<Cell*>(outdated[i]);
-    cell.shadow_requested = true;
-    loader_.request({cell.tile, false, sun_, sun_number_});
-  }
+  if (request.tiles.empty()) return;
+  request.limits.tiles += static_cast<std::int64_t>(cells_.size());
+  request.limits.columns = swept_columns(box_columns_);
+  sweep_bytes_ = request.tiles.size() * depth_bytes_ +
+                 static_cast<std::uint64_t>(request.limits.columns) * vertices_of(source_) * kSweptBytes;
+  caster_.request(request);
 }
 
 void TileBox::count() {
@@ -273,12 +283,13 @@ void TileBox::count() {
     if (is_outdated(cell)) ++figures_.shadows_to_come;
     if (cell.state == State::kMissing || cell.state == State::kRequested) ++figures_.missing_tiles;
   }
-  figures_.resident_bytes = slot_bytes_ * slots + on_the_way_bytes_ * (loader_.in_flight() + waiting_.size());
+  figures_.resident_bytes =
+      slot_bytes_ * slots + on_the_way_bytes_ * (loader_.in_flight() + waiting_.size()) + sweep_bytes_;
 }
 
 void TileBox::finish(WorldPoint centre, double radius) {
   for (;;) {
-    update(centre, radius);
+    update(centre, radius, false);
     if (figures_.missing_tiles == 0 && figures_.shadows_to_come == 0) return;
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }

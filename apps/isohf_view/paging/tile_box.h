@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <deque>
 #include <memory>
@@ -10,26 +11,29 @@
 
 #include "gl/tile_buffers.h"
 #include "paging/background_loader.h"
+#include "paging/shadow_cast.h"
 #include "paging/tile_source.h"
 
 namespace isohf::view {
 
-/// What a worker is to do: read a tile, compute its shadow heights, or both.
-struct TileRequest {
-  TileIndex tile{};
-  bool codes = true;             ///< false: only its shadow is wanted
-  std::optional<RowSun> sun;     ///< for shadow heights; nullopt: none
-  std::uint64_t sun_number = 0;  ///< handed back
-};
-
 /// A tile that a worker has decoded, or what went wrong.
 struct LoadedTile {
-  TileRequest request;
-  std::vector<std::uint16_t> codes;   ///< empty where reading failed, or where they were not wanted
-  std::vector<std::uint16_t> shadow;  ///< empty where there is none, or no seeds could be read
+  TileIndex tile{};
+  std::vector<std::uint16_t> codes;  ///< empty where reading failed
   std::string error;
+};
 
-  [[nodiscard]] std::uint64_t bytes() const { return (codes.size() + shadow.size()) * sizeof(std::uint16_t); }
+/// Tiles that a worker is to shade, and what it has found.
+struct ShadowRequest {
+  std::vector<TileIndex> tiles;
+  CastingSun sun;
+  std::uint64_t sun_number = 0;  ///< handed back
+  CastingLimits limits;
+};
+struct CastShadows {
+  std::vector<TileShadow> shadows;
+  std::uint64_t sun_number = 0;
+  std::string error;
 };
 
 /// Bounds that a TileBox keeps.
@@ -56,16 +60,18 @@ struct TileBoxFigures {
 ///
 /// Tile (c, r) lives in cell (c mod box columns, r mod box rows), so that rows and columns that leave the box hand
 /// their cells, and GPU buffers, to those that enter on the other side. Workers decode; update() uploads what they have
-/// finished, within the frame's budget, and never waits for them. When the sun moves they compute all resident tiles'
-/// shadows anew, the longest outdated first; until then the old ones stay. A TileBox lives on the GL thread.
+/// finished, within the frame's budget, and never waits for them. Another one sweeps light over the tiles whose shadows are
+/// not those of the sun, and those that may cast on them; until then the old ones stay. A TileBox lives on the GL thread.
 class TileBox {
  public:
   /// Throws Error{kInvalidArgument} where memory_bytes does not hold four tiles.
   TileBox(const TileSource& source, const SharedGeometry& shared, const TileBoxLimits& limits);
+  ~TileBox() { leaves_ = true; }
+  TileBox(const TileBox&) = delete;
+  TileBox& operator=(const TileBox&) = delete;
 
-  /// The sun that shadows are wanted for, one that the source's seeds hold for; nullopt: none are. From the next update
-  /// on.
-  void set_sun(const std::optional<RowSun>& sun);
+  /// The sun that shadows are wanted for; nullopt: none are. From the next update on.
+  void set_sun(const std::optional<CastingSun>& sun);
 
   /// What a tile takes at most, resident or on its way, with a share of what is decoded besides.
   [[nodiscard]] static std::uint64_t most_bytes_of_a_tile(const TileSource& source);
@@ -73,7 +79,7 @@ class TileBox {
   /// Nothing is wanted in this frame: keeps what there is and asks for nothing.
   void rest();
   /// Moves the box to the bounding square of a circle round `centre`, world units; once a frame.
-  void update(WorldPoint centre, double radius);
+  void update(WorldPoint centre, double radius) { update(centre, radius, true); }
 
   /// Updates until the box is complete: for pictures, not for frames.
   void finish(WorldPoint centre, double radius);
@@ -95,22 +101,24 @@ class TileBox {
     State state = State::kUnused;
     std::unique_ptr<TileSlot> slot;
     std::uint64_t sun_number = 0;  ///< of the sun that its shadow is of; 0: it has none
-    bool shadow_requested = false;
-    bool shadow_broken = false;
   };
 
+  void update(WorldPoint centre, double radius, bool shades);
   [[nodiscard]] std::size_t cell_of(TileIndex tile) const;
   [[nodiscard]] std::pair<std::int64_t, std::int64_t> tiles_across(double radius) const;
   void resize(WorldPoint centre, double radius);
   void enter(Cell& cell, TileIndex tile);
   void place(LoadedTile& loaded);
   void upload();
-  void place_shadow(Cell& cell, const LoadedTile& loaded);
+  void upload_shadows();
   [[nodiscard]] bool is_outdated(const Cell& cell) const {
-    return sun_ && cell.state == State::kResident && cell.sun_number != sun_number_ && !cell.shadow_broken;
+    return sun_ && cell.state == State::kResident && cell.sun_number != sun_number_;
   }
   void request(WorldPoint centre);
-  void request_shadows(WorldPoint centre, std::size_t most);
+  void request_shadows();
+  /// Tile columns that a sweep holds at most, for a box of so many.
+  [[nodiscard]] static std::int64_t swept_columns(std::int64_t columns) { return 2 * columns + 8; }
+  [[nodiscard]] bool fits(std::int64_t columns, std::int64_t rows) const;
   [[nodiscard]] double distance_squared(const Cell& cell, WorldPoint centre) const;
   void count();
 
@@ -120,18 +128,23 @@ class TileBox {
   std::uint64_t slot_bytes_;
   std::uint64_t on_the_way_bytes_;  ///< of one tile
   std::size_t in_flight_limit_;
-  std::int64_t max_slots_;
+  std::uint64_t bytes_for_slots_;
+  std::uint64_t depth_bytes_;  ///< of a tile's shadow
   std::int64_t box_columns_ = 0;
   std::int64_t box_rows_ = 0;
   TileRange range_;
   std::vector<Cell> cells_;
   std::vector<std::unique_ptr<TileSlot>> spare_;
   std::deque<LoadedTile> waiting_;  ///< decoded, for a later frame's budget
-  std::optional<RowSun> sun_;
+  std::deque<CastShadows> cast_;    ///< shadows for a later frame's budget
+  std::optional<CastingSun> sun_;
   std::uint64_t sun_number_ = 0;  ///< counts suns
   TileBoxFigures figures_;
   std::optional<std::string> error_;
-  BackgroundLoader<TileRequest, LoadedTile> loader_;  // last: its threads stop first
+  std::uint64_t sweep_bytes_ = 0;  ///< of the sweep in flight, or of what it has cast
+  std::atomic<bool> leaves_{false};
+  BackgroundLoader<TileIndex, LoadedTile> loader_;  // last: their threads stop first
+  BackgroundLoader<ShadowRequest, CastShadows> caster_;
 };
 
 }  // namespace isohf::view

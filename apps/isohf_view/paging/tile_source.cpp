@@ -5,20 +5,16 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <functional>
 #include <limits>
-#include <map>
 #include <mutex>
 #include <optional>
 
 #include "formats/georeference/units.h"
 #include "isohf/archive.h"
-#include "isohf/archive/shadow_seeds/shadow_seed_reader.h"
 #include "isohf/archive/textures/texture_reader.h"
 #include "isohf/base/assert.h"
 #include "isohf/error.h"
 #include "isohf/surface.h"
-#include "isohf/surface/shade/shadow.h"
 
 namespace isohf::view {
 namespace {
@@ -29,50 +25,6 @@ double world_per_elevation(const Metadata& metadata) {
   const auto unit = linear_unit(metadata.vertical_unit);
   return unit ? unit->metres : 1.0;
 }
-
-/// Shadows on the tiles of a coarse plane, which has no seeds: swept along a row of tiles from the sun on. What enters
-/// each tile of a row is kept for the sun that was asked for last.
-class RowShadows {
- public:
-  /// The heights of a tile in codes, unrounded, NaN void.
-  using Heights = std::function<std::vector<float>(TileIndex)>;
-
-  /// shadow [C x R] out. fall  codes of a world unit
-  void shade(const TileGrid& grid, TileIndex tile, const RowSun& sun, double fall, const Heights& heights,
-             std::vector<float>& shadow) {
-    const TileShape& shape = grid.shape();
-    const bool east = sun.travel == LightTravel::kEastward;
-    const auto column_at = [&](std::size_t step) {
-      return east ? static_cast<std::int64_t>(step) : grid.tile_columns() - 1 - static_cast<std::int64_t>(step);
-    };
-    const auto cast = [&](TileIndex on, std::span<const double> entering, std::span<double> leaving) {
-      const std::vector<float> ground = heights(on);
-      tile_shadow(grid, View2D<const float>(ground.data(), shape.columns(), shape.rows()), {sun.travel, fall}, entering,
-                  View2D<float>(shadow.data(), shape.columns(), shape.rows()), leaving);
-    };
-    std::vector<double> entering;
-    {
-      const std::lock_guard lock(mutex_);
-      if (!(sun == sun_)) rows_.clear();
-      sun_ = sun;
-      auto& row = rows_[tile.row];
-      if (row.empty()) row.emplace_back(static_cast<std::size_t>(shape.rows() - 2), kNoShadow);
-      const auto step = static_cast<std::size_t>(east ? tile.column : grid.tile_columns() - 1 - tile.column);
-      while (row.size() <= step) {
-        std::vector<double> leaving = row.back();
-        cast({column_at(row.size() - 1), tile.row}, row.back(), leaving);
-        row.push_back(std::move(leaving));
-      }
-      entering = row[step];
-    }
-    cast(tile, entering, {});
-  }
-
- private:
-  std::mutex mutex_;
-  RowSun sun_;
-  std::map<std::int64_t, std::vector<std::vector<double>>> rows_;
-};
 
 class ArchiveSource final : public TileSource {
  public:
@@ -91,7 +43,6 @@ class ArchiveSource final : public TileSource {
       const TileBounds whole = whole_bounds(*this);
       scale_ = {whole.low, whole.high > whole.low ? (whole.high - whole.low) / (kVoidCode - 1) : 1.0};
     }
-    if (shadow_seed_info(metadata)) seeds_.emplace(reader_);
     if (texture_info(metadata)) textures_.emplace(reader_);
   }
 
@@ -99,7 +50,6 @@ class ArchiveSource final : public TileSource {
   [[nodiscard]] ViewScale scale() const override { return scale_; }
 
   [[nodiscard]] bool is_to_scale() const override { return reader_.metadata().horizontal_unit == "metre"; }
-  [[nodiscard]] bool rounds() const override { return is_float(); }
   [[nodiscard]] WorldBounds covered() const override { return reader_.metadata().valid; }
 
   [[nodiscard]] TileBounds bounds(TileIndex tile) const override { return bounds(tile, 0); }
@@ -110,6 +60,9 @@ class ArchiveSource final : public TileSource {
   }
 
   void read(TileIndex tile, std::span<std::uint16_t> codes) const override { convert(reader_.read_tile(tile), codes); }
+  void read_heights(TileIndex tile, std::span<float> heights) const override {
+    exact_codes(reader_.read_tile(tile), heights);
+  }
 
  private:
   /// A coarse plane of the archive.
@@ -119,38 +72,21 @@ class ArchiveSource final : public TileSource {
     [[nodiscard]] const TileGrid& grid() const override { return whole_.planes_->grid(plane_); }
     [[nodiscard]] ViewScale scale() const override { return whole_.scale(); }
     [[nodiscard]] bool is_to_scale() const override { return whole_.is_to_scale(); }
-    [[nodiscard]] bool rounds() const override { return whole_.rounds(); }
     [[nodiscard]] WorldBounds covered() const override { return whole_.covered(); }
     [[nodiscard]] TileBounds bounds(TileIndex tile) const override { return whole_.bounds(tile, plane_); }
     void read(TileIndex tile, std::span<std::uint16_t> codes) const override {
       whole_.convert(whole_.reader_.read_tile(tile, plane_), codes);
     }
-    [[nodiscard]] const ShadowSeedInfo* shadow_seeds() const override { return whole_.shadow_seeds(); }
-    void read_lit(TileIndex tile, const RowSun& sun, std::span<std::uint16_t> codes,
-                  std::span<std::uint16_t> shadow) const override {
-      read(tile, codes);
-      std::vector<float> lit(codes.size());
-      shadows_.shade(
-          grid(), tile, sun, whole_.fall_of(sun), [this](TileIndex at) { return heights(at); }, lit);
-      std::transform(lit.begin(), lit.end(), shadow.begin(), shadow_code);
+    void read_heights(TileIndex tile, std::span<float> heights) const override {
+      whole_.exact_codes(whole_.reader_.read_tile(tile, plane_), heights);
     }
 
    private:
-    [[nodiscard]] std::vector<float> heights(TileIndex tile) const {
-      std::vector<float> heights(static_cast<std::size_t>(grid().shape().stored_vertex_count()),
-                                 std::numeric_limits<float>::quiet_NaN());
-      if (whole_.bounds(tile, plane_).stored) whole_.exact_codes(whole_.reader_.read_tile(tile, plane_), heights);
-      return heights;
-    }
-
     const ArchiveSource& whole_;
     int plane_;
-    mutable RowShadows shadows_;
   };
 
  public:
-  [[nodiscard]] const ShadowSeedInfo* shadow_seeds() const override { return seeds_ ? &seeds_->info() : nullptr; }
-
   [[nodiscard]] std::vector<std::string> describe_place(WorldPoint at, double height) const override {
     std::vector<std::string> lines = TileSource::describe_place(at, height / world_per_elevation_);
     const std::string& unit = reader_.metadata().vertical_unit;
@@ -172,23 +108,6 @@ class ArchiveSource final : public TileSource {
   [[nodiscard]] bool has_texture(TileIndex tile) const override { return textures_ && textures_->has(tile); }
   [[nodiscard]] Picture read_texture(TileIndex tile, int level) const override {
     return textures_->read_rgba(tile, level);
-  }
-
-  void read_lit(TileIndex tile, const RowSun& sun, std::span<std::uint16_t> codes,
-                std::span<std::uint16_t> shadow) const override {
-    const TileCodes stored = reader_.read_tile(tile);
-    convert(stored, codes);
-    // Shadow heights are found in the viewer's codes, unrounded: single precision holds these to 1/256 of a code.
-    std::vector<double> entering = seeds_->entering(tile, stored, sun.travel, sun.elevation_deg);
-    for (double& height : entering) height = exact_code_of(height);
-    std::vector<float> heights(codes.size());
-    exact_codes(stored, heights);
-    const double fall = fall_of(sun);
-    const TileShape& shape = grid().shape();
-    std::vector<float> lit(codes.size());
-    tile_shadow(grid(), View2D<const float>(heights.data(), shape.columns(), shape.rows()), {sun.travel, fall},
-                entering, View2D<float>(lit.data(), shape.columns(), shape.rows()), {});
-    std::transform(lit.begin(), lit.end(), shadow.begin(), shadow_code);
   }
 
  private:
@@ -221,14 +140,6 @@ class ArchiveSource final : public TileSource {
   [[nodiscard]] bool is_float() const { return reader_.metadata().quantisation.type == CodeType::kF32; }
   [[nodiscard]] static std::uint16_t rounded(double code) {
     return static_cast<std::uint16_t>(std::clamp(std::round(code), 0.0, kVoidCode - 1.0));
-  }
-  [[nodiscard]] static std::uint16_t shadow_code(float height) {
-    return std::isfinite(height) ? rounded(height) : std::uint16_t{0};
-  }
-  /// Codes of a world unit that the sun's light falls by.
-  [[nodiscard]] double fall_of(const RowSun& sun) const {
-    const Quantisation unit{CodeType::kF32, 0.0, scale_.scale / world_per_elevation_};  // elevation units of a code
-    return seeds_->info().fall_per_half_step(grid(), unit, sun.elevation_deg) / grid().sigma_x();
   }
   /// A tile's heights in codes, unrounded: [C x R] out, NaN void.
   void exact_codes(const TileCodes& stored, std::span<float> heights) const {
@@ -265,7 +176,6 @@ class ArchiveSource final : public TileSource {
   ViewScale scale_;
   mutable std::once_flag georeference_once_;
   mutable std::optional<WorldGeoreference> georeference_;
-  std::optional<ShadowSeedReader> seeds_;
   std::optional<TextureReader> textures_;
   std::optional<Planes> planes_;
   std::vector<std::unique_ptr<Coarse>> coarse_;
@@ -273,8 +183,12 @@ class ArchiveSource final : public TileSource {
 
 }  // namespace
 
-void TileSource::read_lit(TileIndex, const RowSun&, std::span<std::uint16_t>, std::span<std::uint16_t>) const {
-  throw Error(ErrorCode::kUnsupported, "this source has no shadow seeds");
+void TileSource::read_heights(TileIndex tile, std::span<float> heights) const {
+  std::vector<std::uint16_t> codes(heights.size());
+  read(tile, codes);
+  std::transform(codes.begin(), codes.end(), heights.begin(), [](std::uint16_t code) {
+    return code == kVoidCode ? std::numeric_limits<float>::quiet_NaN() : static_cast<float>(code);
+  });
 }
 
 std::vector<std::string> TileSource::describe_place(WorldPoint at, double height) const {

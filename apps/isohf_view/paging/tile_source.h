@@ -8,7 +8,6 @@
 #include <string>
 #include <vector>
 
-#include "isohf/archive/shadow_seeds/shadow_seeds.h"
 #include "isohf/archive/textures/texture_info.h"
 #include "isohf/lattice.h"
 #include "isohf/lattice/planes.h"
@@ -36,13 +35,6 @@ struct TileBounds {
   double high = 0.0;
 };
 
-/// A sun in the plane of the rows, over true heights: what shadows are computed for.
-struct RowSun {
-  LightTravel travel = LightTravel::kEastward;
-  double elevation_deg = 15.0;  ///< above 0, below 90
-  friend bool operator==(const RowSun&, const RowSun&) = default;
-};
-
 /// Where tiles come from. All functions may be called from any number of threads at once.
 class TileSource {
  public:
@@ -65,15 +57,8 @@ class TileSource {
   /// A plane as a source of its own, 0 <= plane <= planes()->count(): its grid, ranges of all that lies below, codes of
   /// the same scale. It covers what this one does.
   [[nodiscard]] virtual const TileSource& plane(int) const { return *this; }
-  /// True where codes are rounded from finer heights, from which shadows are computed.
-  [[nodiscard]] virtual bool rounds() const { return false; }
-  /// The record of the shadow seeds; nullptr where the source has none.
-  [[nodiscard]] virtual const ShadowSeedInfo* shadow_seeds() const { return nullptr; }
-  /// Reads a tile with its shadow heights, from no other tile. sun must be one that the seeds hold for.
-  /// shadow [C x R] out: in codes like heights, rounded, at visible vertices; 0 at others. Throws Error naming the
-  /// tile.
-  virtual void read_lit(TileIndex tile, const RowSun& sun, std::span<std::uint16_t> codes,
-                        std::span<std::uint16_t> shadow) const;
+  /// A tile's heights in codes, not rounded, NaN where void: what shadows are computed from. [C x R] out.
+  virtual void read_heights(TileIndex tile, std::span<float> heights) const;
   /// What to tell a reader of a place on the surface and its height, world units: a line for each way to name it.
   [[nodiscard]] virtual std::vector<std::string> describe_place(WorldPoint at, double height) const;
   /// The record of the textures; nullptr where the source has none.

@@ -68,11 +68,11 @@ void TileProbe::draw_level(const TileSlot& slot, bool voids, int level, const Pi
   add_up(slot, level, cull, out);
 }
 
-void TileProbe::draw_shadow(const TileSlot& slot, bool voids, int level, const PixelWindow& window, double softness,
+void TileProbe::draw_shadow(const TileSlot& slot, bool voids, int level, const PixelWindow& window, float gain,
                             std::vector<float>& out) {
   const TerrainProgram& program = shadow_.of(voids);
   begin(program, window);
-  glUniform1f(program.uniform("shadow_gain"), static_cast<float>(2.0 / softness));
+  glUniform1f(program.uniform("shadow_gain"), gain);
   add_up(slot, level, true, out);
 }
 

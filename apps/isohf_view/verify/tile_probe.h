@@ -29,9 +29,9 @@ class TileProbe {
   /// The two-stage transition, by the same passes as pictures.
   void draw_blend(const TileSlot& slot, bool voids, const LodBlend& blend, const PixelWindow& window,
                   std::vector<float>& out);
-  /// What the fragment shader makes of the shadow, strip and stitch of one level added up: (share of the sun, shadow
-  /// height above the ground in codes, 0, count). softness is k of Eq. 16 in codes.
-  void draw_shadow(const TileSlot& slot, bool voids, int level, const PixelWindow& window, double softness,
+  /// What the fragment shader makes of the shadow, strip and stitch of one level added up: (share of the sun, depth,
+  /// 0, count). gain is the slot's.
+  void draw_shadow(const TileSlot& slot, bool voids, int level, const PixelWindow& window, float gain,
                    std::vector<float>& out);
   /// All stored vertices; padding gets no sensible normal.
   void capture(const TileSlot& slot, bool voids, std::vector<ProbedVertex>& out);

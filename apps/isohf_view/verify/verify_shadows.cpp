@@ -6,6 +6,7 @@
 
 #include "isohf/error.h"
 #include "isohf/surface/shade/shadow.h"
+#include "paging/shadow_cast.h"
 #include "verify/verify_view.h"
 
 namespace isohf::view {
@@ -13,24 +14,16 @@ namespace {
 
 /// k of Eq. 16 for the pictures looked at, codes: wide enough for many pixels to lie in half shadow.
 constexpr double kSoftness = 64.0;
-constexpr std::size_t kMostSuns = 4;
+/// Codes: heights that are floats are rounded here but not where shadows come from, and light falls step by step in
+/// floats.
+constexpr double kTolerance = 2.01;
+constexpr int kDepthSteps = 32767;
+constexpr double kElevations_deg[] = {3.0, 7.0, 15.0, 35.0};
 
-/// Suns that the seeds hold for: the lowest first.
-std::vector<double> suns_of(const ShadowSeedInfo& seeds) {
-  std::vector<double> suns;
-  if (seeds.kind == ShadowSeedInfo::Kind::kHulls) {
-    suns.push_back(seeds.sun_min_deg);
-    for (const double sun : {5.0, 14.0, 35.0}) {
-      if (sun > seeds.sun_min_deg) suns.push_back(sun);
-    }
-    return suns;
-  }
-  const std::size_t count = std::min(kMostSuns, seeds.sun_deg.size());
-  for (std::size_t i = 0; i < count; ++i) {
-    suns.push_back(seeds.sun_deg[count == 1 ? 0 : i * (seeds.sun_deg.size() - 1) / (count - 1)]);
-  }
-  return suns;
-}
+struct RowSun {
+  LightTravel travel;
+  double elevation_deg;
+};
 
 std::string sun_name(const RowSun& sun) {
   return fmt::format("sun in the {} at {:g} degrees", sun.travel == LightTravel::kEastward ? "West" : "East",
@@ -53,11 +46,11 @@ class ShadowVerifier {
   TileProbe& probe_;
   ViewReport& report_;
   TileSlot slot_;
-  double tolerance_;  ///< codes
   std::vector<std::uint16_t> codes_;
-  std::vector<float> heights_;         ///< the same, NaN where void
-  std::vector<float> carried_;         ///< shadow heights by the library
-  std::vector<std::uint16_t> seeded_;  ///< by the tile's own seeds
+  std::vector<float> heights_;          ///< the same, NaN where void
+  std::vector<float> carried_;          ///< shadow heights by the library
+  TileShadow cast_;                     ///< what pictures are drawn with
+  std::vector<std::uint16_t> sampled_;  ///< its depths, from 0 on
   std::vector<ProbedVertex> captured_;
   std::vector<float> pixels_;
 };
@@ -70,16 +63,11 @@ ShadowVerifier::ShadowVerifier(const CheckContext& context)
       slot_(context.shared),
       codes_(static_cast<std::size_t>(source_.grid().shape().stored_vertex_count())),
       carried_(codes_.size()),
-      seeded_(codes_.size()) {
-  // Shadow heights are rounded to a code. Seeds of angles have been so before, and heights that are floats are rounded
-  // here but not where the shadows come from: half a code each. Besides, the float rounding of 65535.
-  const bool twice = source_.rounds() || source_.shadow_seeds()->kind == ShadowSeedInfo::Kind::kAngles;
-  tolerance_ = (twice ? 1.0 : 0.5) + 0.01;
-}
+      sampled_(codes_.size()) {}
 
 void ShadowVerifier::verify() {
   const TileGrid& grid = source_.grid();
-  report_.suns_deg = suns_of(*source_.shadow_seeds());
+  report_.suns_deg.assign(std::begin(kElevations_deg), std::end(kElevations_deg));
   for (std::int64_t row = 0; row < grid.tile_rows(); ++row) {
     for (const LightTravel travel : {LightTravel::kEastward, LightTravel::kWestward}) verify_row(row, travel);
     if (context_.options.progress) context_.options.progress((row + 1) * grid.tile_columns(), grid.tile_count());
@@ -90,6 +78,18 @@ void ShadowVerifier::verify_row(std::int64_t row, LightTravel travel) {
   const TileGrid& grid = source_.grid();
   const std::vector<double> dark(static_cast<std::size_t>(visible_rows(grid.shape())), kNoShadow);
   std::vector<std::vector<double>> entering(report_.suns_deg.size(), dark);
+  // As along the row, ground that lies beyond the source casts too.
+  const CastingLimits all_ground{.ground = WorldBounds{0.0, 0.0, grid.world_width(), grid.world_height()}};
+  std::vector<TileIndex> tiles;
+  for (std::int64_t i = 0; i < grid.tile_columns(); ++i) tiles.push_back({i, row});
+  std::vector<std::vector<TileShadow>> cast;
+  const std::atomic<bool> leaves{false};
+  for (const double elevation_deg : report_.suns_deg) {
+    std::string unread;  // the tile's own check says so
+    cast.push_back(cast_shadows(
+        source_, {travel == LightTravel::kEastward ? 270.0 : 90.0, elevation_deg, kSoftness * source_.scale().scale},
+        tiles, all_ground, leaves, unread));
+  }
   for (std::int64_t i = 0; i < grid.tile_columns(); ++i) {
     const TileIndex tile{travel == LightTravel::kEastward ? i : grid.tile_columns() - 1 - i, row};
     try {
@@ -100,6 +100,7 @@ void ShadowVerifier::verify_row(std::int64_t row, LightTravel travel) {
     heights_ = heights_from(codes_);
     slot_.upload(codes_);
     for (std::size_t k = 0; k < entering.size(); ++k) {
+      cast_ = std::move(cast[k][static_cast<std::size_t>(tile.column)]);
       verify_tile(tile, {travel, report_.suns_deg[k]}, k, entering[k]);
     }
   }
@@ -112,14 +113,9 @@ void ShadowVerifier::verify_tile(TileIndex tile, const RowSun& sun, std::size_t 
   const double fall = std::tan(sun.elevation_deg * std::numbers::pi / 180.0) / source_.scale().scale;
   tile_shadow(grid, View2D<const float>(heights_.data(), shape.columns(), shape.rows()), {sun.travel, fall}, entering,
               View2D<float>(carried_.data(), shape.columns(), shape.rows()), entering);
-  try {
-    std::vector<std::uint16_t> codes(codes_.size());
-    source_.read_lit(tile, sun, codes, seeded_);
-  } catch (const Error& error) {
-    report_.add({finding::kDrawnShadow, tile, 0.0, error.what(), 0.0, 1});
-    return;
-  }
-  slot_.upload_shadow(seeded_);
+  std::transform(cast_.depths.begin(), cast_.depths.end(), sampled_.begin(),
+                 [](std::int16_t depth) { return static_cast<std::uint16_t>(depth + kDepthSteps); });
+  slot_.upload_shadow(cast_.depths, cast_.gain);
   probe_.capture(slot_, context_.has_voids(tile), captured_);
   check_vertices(tile, sun);
   // Each tile at one level a sun, all levels in turn.
@@ -130,19 +126,20 @@ void ShadowVerifier::verify_tile(TileIndex tile, const RowSun& sun, std::size_t 
 
 void ShadowVerifier::check_vertices(TileIndex tile, const RowSun& sun) {
   const TileShape& shape = source_.grid().shape();
+  const double deepest = 0.5 * cast_.gain * kSoftness;  // codes
   Worst worst;
   for (int row = 1; row < shape.rows() - 1; ++row) {
     for (int column = 1; column <= last_visible_column(shape, row); ++column) {
       const auto i = static_cast<std::size_t>(row * shape.columns() + column);
       if (codes_[i] == kVoidCode) continue;
       ++report_.shadow_vertices;
-      const double got = captured_[i].code + captured_[i].shadow;
-      const double want = carried_[i];
+      const double got = std::max(0.0, captured_[i].shadow * deepest);
+      const double want = std::clamp(static_cast<double>(carried_[i]) - codes_[i], 0.0, deepest);
       const double off = std::abs(got - want);
       report_.worst_shadow = std::max(report_.worst_shadow, off);
-      if (off <= tolerance_) continue;
+      if (off <= kTolerance) continue;
       worst.add(off, [&] {
-        return fmt::format("{}, {}: shadow height {} codes, carried along the row {:.2f}, ground {}",
+        return fmt::format("{}, {}: {:.2f} codes below the shadow, carried along the row {:.2f}, ground {}",
                            vertex_name({column, row}), sun_name(sun), got, want, codes_[i]);
       });
     }
@@ -150,10 +147,10 @@ void ShadowVerifier::check_vertices(TileIndex tile, const RowSun& sun) {
   worst.report(report_, finding::kDrawnShadow, tile, 0.0);
 }
 
-// The vertices' shadow heights have been looked at: from them the library's barycentric S and Eq. 16.
+// The vertices' depths have been looked at: from them the library's barycentric depth and Eq. 16.
 void ShadowVerifier::check_share(TileIndex tile, const RowSun& sun, int level, const PixelWindow& window) {
   const TileShape& shape = source_.grid().shape();
-  probe_.draw_shadow(slot_, context_.has_voids(tile), level, window, kSoftness, pixels_);
+  probe_.draw_shadow(slot_, context_.has_voids(tile), level, window, cast_.gain, pixels_);
   ++report_.pictures;
   const std::span<const PixelSample> samples = context_.oracle.samples(level, window);
   const double reach = window.x0 + window.z0 + window.width + window.height;
@@ -163,16 +160,15 @@ void ShadowVerifier::check_share(TileIndex tile, const RowSun& sun, int level, c
     const float* got = pixels_.data() + at;
     if (!ground.valid || got[3] != 1.0F) return;  // coverage is another check's
     ++report_.pixels;
-    const SampledCode shadow = sample_code(samples[k], seeded_);
-    const double want = sun_share_on_surface(ground.code, shadow.code, kSoftness);
+    const SampledCode depth = sample_code(samples[k], sampled_);
+    const double deep = (depth.code - kDepthSteps) / kDepthSteps;
+    const double want = std::clamp(1.0 - cast_.gain * deep, 0.0, 1.0);
     const double off = std::abs(got[0] - want);
     report_.worst_share = std::max(report_.worst_share, off);
-    const double codes = kCodeTolerance + (ground.spread + shadow.spread) * reach * kPerPixel;
-    if (off <= 2.0 * codes / kSoftness) return;
+    if (off <= cast_.gain * (kCodeTolerance + depth.spread * reach * kPerPixel) / kDepthSteps) return;
     worst.add(off, [&] {
-      return fmt::format("{}, {}: share {:.4f} of the sun, library {:.4f} (ground {:.3f}, shadow {:.3f})",
-                         pixel_name(shape, window, i, j, samples[k]), sun_name(sun), got[0], want, ground.code,
-                         shadow.code);
+      return fmt::format("{}, {}: share {:.4f} of the sun, library {:.4f}", pixel_name(shape, window, i, j, samples[k]),
+                         sun_name(sun), got[0], want);
     });
   });
   worst.report(report_, finding::kDrawnSunShare, tile, level);

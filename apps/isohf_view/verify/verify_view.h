@@ -25,7 +25,7 @@ struct ViewFinding {
 struct ViewChecks {
   std::vector<double> fractions{0.25, 0.5, 0.8};  ///< β of the transitions looked at between each two levels
   bool seams = true;
-  bool shadows = true;  ///< where the source has seeds
+  bool shadows = true;
   /// Called now and then with tiles done and all tiles.
   std::function<void(std::int64_t, std::int64_t)> progress;
 };
@@ -93,9 +93,9 @@ void verify_mesh(const SharedGeometry& shared, ViewReport& report);
 /// The checks that need one tile at a time, and those between a tile and the ones before it.
 void verify_tiles(const CheckContext& context);
 
-/// Checks the shadows that pictures are drawn with: for some sun elevations and both directions of light, shadow
-/// heights are carried by the library from tile to tile along each row of tiles, without seeds, and compared with what
-/// the shaders make of those that each tile gets from its own seeds.
+/// Checks the shadows that pictures are drawn with: for some suns in the East and West, shadow heights are carried by the
+/// library from tile to tile along each row of tiles (paper section 3.13), and compared with what the shaders make of
+/// those that are swept.
 void verify_shadows(const CheckContext& context);
 
 /// Looks for cracks: draws blocks of neighbouring tiles at differing levels, slanted, and seeks background.

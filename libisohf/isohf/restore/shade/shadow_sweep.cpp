@@ -62,6 +62,11 @@ ShadowSweep::ShadowSweep(const TileGrid& grid, const WorldBounds& ground, double
   most_depth_ = std::max(softness, 2.0 * fall_);
 }
 
+void ShadowSweep::begin_behind(std::int64_t tiles_west, std::int64_t tiles_east, std::int64_t rows_before) {
+  columns_before_ = mirrored_ ? tiles_east : tiles_west;
+  rows_before_ = rows_before;
+}
+
 std::uint64_t ShadowSweep::state_bytes() const {
   const auto lanes = static_cast<double>(half_steps_ * grid_.tile_columns());
   return static_cast<std::uint64_t>(lanes * (by_columns_ ? shift_ : 1.0) * sizeof(float)) + 64;
@@ -99,9 +104,9 @@ ShadowSweep::State ShadowSweep::pass_along_rows(std::int64_t tile_row, const Sta
                                                 const TileRowValues& heights, TileRowValues* depths) {
   const TileShape& shape = grid_.shape();
   const auto lanes = static_cast<int>(half_steps_ * grid_.tile_columns()) + 1;
-  const std::int64_t row_of_light = from_south_ ? grid_.tile_rows() - 1 - tile_row : tile_row;
+  const std::int64_t row_of_light = rows_before_ + (from_south_ ? grid_.tile_rows() - 1 - tile_row : tile_row);
   ShadowFront front(lanes, shift_, fall_, most_depth_);
-  if (!entering.empty()) front.resume(row_of_light * shape.cell_rows(), entering);
+  front.resume(row_of_light * shape.cell_rows(), entering.empty() ? front.lines() : entering);
   State leaving;
   const ShadowFront::Casting columns = casting_columns();
   const ShadowFront::Casting rows = casting_rows(tile_row);
@@ -136,6 +141,7 @@ ShadowSweep::State ShadowSweep::pass_along_columns(std::int64_t tile_row, const 
   const TileShape& shape = grid_.shape();
   const int lanes = shape.rows();
   ShadowFront front(lanes, shift_, fall_, most_depth_);
+  front.resume(columns_before_ * half_steps_, front.lines());
   State leaving;
   std::size_t entered = 0;
   const ShadowFront::Casting columns = casting_columns();

@@ -26,6 +26,12 @@ class ShadowSweep {
   /// softness     the most depth that is told apart, height units
   ShadowSweep(const TileGrid& grid, const WorldBounds& ground, double azimuth_deg, double fall, double softness);
 
+  /// For a grid that is part of another: the tiles of that one to its West and East, and the rows of tiles that light has
+  /// passed over before it. Lines of light then lie where they would lie over all of it.
+  void begin_behind(std::int64_t tiles_west, std::int64_t tiles_east, std::int64_t rows_before);
+
+  /// Depths are cut off at it, either way; height units.
+  [[nodiscard]] double most_depth() const { return most_depth_; }
   /// Whether light comes to a row of tiles from the row South of it.
   [[nodiscard]] bool from_south() const { return from_south_; }
 
@@ -56,7 +62,9 @@ class ShadowSweep {
   double shift_ = 0.0;
   double fall_ = 0.0;  ///< at a step
   double most_depth_ = 0.0;
-  int half_steps_;  ///< of a tile's width
+  int half_steps_;                   ///< of a tile's width
+  std::int64_t columns_before_ = 0;  ///< tiles of another grid, on the light's way
+  std::int64_t rows_before_ = 0;
 };
 
 }  // namespace isohf

@@ -1,0 +1,125 @@
+#include "paging/shadow_cast.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "isohf/error.h"
+#include "isohf/restore/shade/shadow_sweep.h"
+
+namespace isohf::view {
+namespace {
+
+constexpr double kDegree = std::numbers::pi / 180.0;
+constexpr float kDepthSteps = 32767.0F;
+
+TileRange range_of(const std::vector<TileIndex>& tiles) {
+  TileRange range{tiles.front().column, tiles.front().column, tiles.front().row, tiles.front().row};
+  for (const TileIndex tile : tiles) {
+    range.first_column = std::min(range.first_column, tile.column);
+    range.last_column = std::max(range.last_column, tile.column);
+    range.first_row = std::min(range.first_row, tile.row);
+    range.last_row = std::max(range.last_row, tile.row);
+  }
+  return range;
+}
+
+/// Lowest elevation of the stored tiles of a range; infinite where there are none.
+double lowest(const TileSource& source, const TileRange& range) {
+  double low = std::numeric_limits<double>::infinity();
+  for (std::int64_t row = range.first_row; row <= range.last_row; ++row) {
+    for (std::int64_t column = range.first_column; column <= range.last_column; ++column) {
+      const TileBounds bounds = source.bounds({column, row});
+      if (bounds.stored) low = std::min(low, bounds.low);
+    }
+  }
+  return low;
+}
+
+}  // namespace
+
+TileRange casting_range(const TileSource& source, const CastingSun& sun, const TileRange& shaded,
+                        const CastingLimits& limits) {
+  const TileGrid& grid = source.grid();
+  const double fall = std::tan(sun.elevation_deg * kDegree);
+  double reach = std::max(0.0, (whole_bounds(source).high - lowest(source, shaded)) / fall);
+  for (;; reach *= 0.9) {
+    // A lane more, as light drifts between lanes.
+    const auto tiles = [reach](double towards, double extent, double lane) {
+      return std::abs(towards) < 1e-9 ? 0.0 : std::min(std::ceil((reach * std::abs(towards) + lane) / extent), 1e9);
+    };
+    const double towards_x = std::sin(sun.azimuth_deg * kDegree);
+    const double towards_z = -std::cos(sun.azimuth_deg * kDegree);
+    const auto x = static_cast<std::int64_t>(tiles(towards_x, grid.extent_x(), 2.0 * grid.sigma_x()));
+    const auto z = static_cast<std::int64_t>(tiles(towards_z, grid.extent_z(), 2.0 * grid.sigma_z()));
+    TileRange range = shaded;
+    // On its other side the last lane lies between two lines.
+    const std::int64_t other = x > 0 && z > 0 ? 1 : 0;
+    range.first_column = std::max<std::int64_t>(0, shaded.first_column - (towards_x < 0.0 ? x : other));
+    range.last_column = std::min(grid.tile_columns() - 1, shaded.last_column + (towards_x > 0.0 ? x : other));
+    if (towards_z < 0.0) range.first_row = std::max<std::int64_t>(0, shaded.first_row - z);
+    if (towards_z > 0.0) range.last_row = std::min(grid.tile_rows() - 1, shaded.last_row + z);
+    const std::int64_t columns = range.last_column - range.first_column + 1;
+    const std::int64_t count = columns * (range.last_row - range.first_row + 1);
+    if ((count <= limits.tiles && columns <= limits.columns) || reach < 1e-3 * grid.extent_x()) {
+      return range;
+    }
+  }
+}
+
+std::vector<TileShadow> cast_shadows(const TileSource& source, const CastingSun& sun,
+                                     const std::vector<TileIndex>& tiles, const CastingLimits& limits,
+                                     const std::atomic<bool>& cancelled, std::string& unread) {
+  std::vector<TileShadow> shadows;
+  if (tiles.empty()) return shadows;
+  const TileGrid& grid = source.grid();
+  const TileRange range = casting_range(source, sun, range_of(tiles), limits);
+  const std::int64_t columns = range.last_column - range.first_column + 1;
+  const std::int64_t rows = range.last_row - range.first_row + 1;
+  const WorldPoint corner{static_cast<double>(range.first_column) * grid.extent_x(),
+                          static_cast<double>(range.first_row) * grid.extent_z()};
+  const WorldBounds covered = limits.ground.value_or(source.covered());
+  const double scale = source.scale().scale;
+  ShadowSweep sweep(TileGrid::make(grid.shape(), columns, rows, grid.extent_x(), grid.extent_z()),
+                    {covered.x0 - corner.x, covered.z0 - corner.z, covered.x1 - corner.x, covered.z1 - corner.z},
+                    sun.azimuth_deg, std::tan(sun.elevation_deg * kDegree) / scale, sun.softness / scale);
+  // Lines of light lie where a sweep over all tiles would have them, so that shadows go on from one range to the next.
+  sweep.begin_behind(range.first_column, grid.tile_columns() - 1 - range.last_column,
+                     sweep.from_south() ? grid.tile_rows() - 1 - range.last_row : range.first_row);
+  const auto vertices = static_cast<std::size_t>(grid.shape().stored_vertex_count());
+  const auto steps = static_cast<float>(kDepthSteps / sweep.most_depth());
+  TileRowValues heights(static_cast<std::size_t>(columns), std::vector<float>(vertices));
+  TileRowValues depths;
+  ShadowSweep::State light;
+  for (std::int64_t k = 0; k < rows && !cancelled; ++k) {
+    const std::int64_t row = sweep.from_south() ? rows - 1 - k : k;
+    for (std::int64_t column = 0; column < columns; ++column) {
+      std::vector<float>& tile = heights[static_cast<std::size_t>(column)];
+      const TileIndex at{range.first_column + column, range.first_row + row};
+      std::fill(tile.begin(), tile.end(), std::numeric_limits<float>::quiet_NaN());
+      try {
+        if (source.bounds(at).stored) source.read_heights(at, tile);
+      } catch (const Error& error) {
+        if (unread.empty()) unread = error.what();
+      }
+    }
+    const bool wanted =
+        std::any_of(tiles.begin(), tiles.end(), [&](TileIndex tile) { return tile.row == range.first_row + row; });
+    light = sweep.pass(row, light, heights, wanted ? &depths : nullptr);
+    if (!wanted) continue;
+    for (const TileIndex tile : tiles) {
+      if (tile.row != range.first_row + row) continue;
+      const std::vector<float>& found = depths[static_cast<std::size_t>(tile.column - range.first_column)];
+      TileShadow shadow{tile, std::vector<std::int16_t>(vertices),
+                        static_cast<float>(2.0 * sweep.most_depth() * scale / sun.softness)};
+      std::transform(found.begin(), found.end(), shadow.depths.begin(), [steps](float depth) {
+        return static_cast<std::int16_t>(std::lround(std::clamp(depth * steps, -kDepthSteps, kDepthSteps)));
+      });
+      shadows.push_back(std::move(shadow));
+    }
+  }
+  return shadows;
+}
+
+}  // namespace isohf::view

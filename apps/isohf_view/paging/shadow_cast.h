@@ -1,0 +1,51 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "paging/tile_source.h"
+
+namespace isohf::view {
+
+/// A sun over true heights: what shadows are computed for.
+struct CastingSun {
+  double azimuth_deg = 270.0;   ///< clockwise from North, any
+  double elevation_deg = 15.0;  ///< above 0, below 90
+  double softness = 2.0;        ///< k of Eq. 16, world units, > 0
+  friend bool operator==(const CastingSun&, const CastingSun&) = default;
+};
+
+/// What a tile is shaded by.
+struct TileShadow {
+  TileIndex tile{};
+  /// [C x R] at visible vertices: how far the ground lies below the height up to which it is dark, negative in the sun;
+  /// 32767 for as far as is told apart.
+  std::vector<std::int16_t> depths;
+  /// Share of the sun that a depth of 32767 takes; all of it where that is 1 or more.
+  float gain = 0.0F;
+};
+
+/// Bounds on what is read for shadows.
+struct CastingLimits {
+  std::int64_t tiles = 1024;
+  std::int64_t columns = 1024;                       ///< that are held at once, a row of tiles at a time
+  std::optional<WorldBounds> ground = std::nullopt;  ///< that casts; nullopt: what the source covers
+};
+
+/// Shadows of tiles of one plane, swept as `isohf shade` sweeps them (decision 48). Besides the tiles asked for, those are
+/// read that may cast shadows on them: as far towards the sun as what is known of the tiles' heights says, within the
+/// limits; of what lies farther nothing is cast. What the source does not cover casts none either.
+/// cancelled  ends it early, with what it has
+/// unread     what the first tile said that could not be read; such tiles count as void
+[[nodiscard]] std::vector<TileShadow> cast_shadows(const TileSource& source, const CastingSun& sun,
+                                                   const std::vector<TileIndex>& tiles, const CastingLimits& limits,
+                                                   const std::atomic<bool>& cancelled, std::string& unread);
+
+/// The tiles that are swept for those of a range.
+[[nodiscard]] TileRange casting_range(const TileSource& source, const CastingSun& sun, const TileRange& shaded,
+                                      const CastingLimits& limits);
+
+}  // namespace isohf::view

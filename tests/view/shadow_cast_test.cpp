@@ -1,0 +1,182 @@
+#include "paging/shadow_cast.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "isohf/lattice/barycentric.h"
+#include "isohf/lattice/shadow_path.h"
+#include "memory_tiles.h"
+#include "session.h"
+
+namespace isohf::view {
+namespace {
+
+using test::MemoryTiles;
+constexpr double kDegree = std::numbers::pi / 180.0;
+
+TileGrid grid() {
+  return TileGrid::make(TileShape::make(20, 19, 3), 5, 4, 160.0, 160.0);
+}
+
+/// A ground with a ridge here and there, a height for each place of the lattice.
+void raise_ridges(const TileGrid& over, TileIndex tile, std::vector<std::uint16_t>& codes) {
+  const TileShape& shape = over.shape();
+  for (int r = 0; r < shape.rows(); ++r) {
+    for (int c = 0; c < shape.columns(); ++c) {
+      const LatticeVertex at = over.lattice_vertex(tile, {c, r});
+      const double x = 0.07 * static_cast<double>(at.x);
+      const double z = 0.11 * static_cast<double>(at.z);
+      const double height =
+          std::sin(x + 0.4 * z) * std::cos(1.3 * z - 0.5 * x) + 0.4 * std::sin(3.1 * x) * std::sin(2.7 * z);
+      codes[static_cast<std::size_t>(r * shape.columns() + c)] = static_cast<std::uint16_t>(15000.0 + 9000.0 * height);
+    }
+  }
+}
+
+std::vector<TileShadow> cast(const TileSource& source, const CastingSun& sun, const std::vector<TileIndex>& tiles,
+                             std::string* unread = nullptr) {
+  const std::atomic<bool> leaves{false};
+  std::string nobody;
+  return cast_shadows(source, sun, tiles, {}, leaves, unread != nullptr ? *unread : nobody);
+}
+
+class Field {
+ public:
+  explicit Field(const MemoryTiles& source) : source_(source) {
+    for (std::int64_t tile = 0; tile < source.grid().tile_count(); ++tile) {
+      tiles_.emplace_back(static_cast<std::size_t>(source.grid().shape().stored_vertex_count()));
+      source.read_heights(source.grid().tile_at(tile), tiles_.back());
+    }
+  }
+  /// World units; NaN beyond.
+  [[nodiscard]] double at(double x, double z) const {
+    const TileGrid& over = source_.grid();
+    if (x < 0.0 || z < 0.0 || x > over.world_width() || z > over.world_height()) return std::nan("");
+    const auto place = over.locate({x, z});
+    const View2D<const float> values(tiles_[static_cast<std::size_t>(over.flat_index(place.tile))].data(),
+                                     over.shape().columns(), over.shape().rows());
+    return interpolate(barycentric(over.shape(), place.point), values) * source_.scale().scale;
+  }
+  /// Whether a ray from there meets the ground.
+  [[nodiscard]] bool is_dark(double x, double z, const CastingSun& sun) const {
+    const double height = at(x, z);
+    const double step = 0.2 * source_.grid().sigma_x();
+    for (int n = 1;; ++n) {
+      const double way = n * step;
+      const double there =
+          at(x + way * std::sin(sun.azimuth_deg * kDegree), z - way * std::cos(sun.azimuth_deg * kDegree));
+      if (std::isnan(there)) return false;
+      if (there > height + way * std::tan(sun.elevation_deg * kDegree) + 1e-6) return true;
+    }
+  }
+
+ private:
+  const MemoryTiles& source_;
+  std::vector<std::vector<float>> tiles_;
+};
+
+// Vertices of all tiles, lit and dark as a ray from each says, but for those within a cell of a border.
+TEST(CastShadows, AgreeWithRaysForSunsThatStandAnywhere) {
+  const MemoryTiles source(grid(), [](TileIndex tile, auto& codes) { raise_ridges(grid(), tile, codes); });
+  const Field field(source);
+  const TileShape& shape = source.grid().shape();
+  std::vector<TileIndex> all;
+  for (std::int64_t tile = 0; tile < source.grid().tile_count(); ++tile) all.push_back(source.grid().tile_at(tile));
+  for (int azimuth = 0; azimuth < 360; azimuth += 24) {
+    const CastingSun sun{azimuth + 3.0, azimuth % 72 == 0 ? 4.0 : 13.0, 0.05};
+    int wrong = 0;
+    int compared = 0;
+    int dark = 0;
+    for (const TileShadow& shadow : cast(source, sun, all)) {
+      for (int r = 1; r <= shape.rows() - 2; r += 2) {
+        for (int c = 2; c < last_visible_column(shape, r); c += 3) {
+          const WorldPoint at = source.grid().world_from_object(
+              shadow.tile, {static_cast<double>(object_x(shape.columns(), c, r)), r - 1.0});
+          const bool want = field.is_dark(at.x, at.z, sun);
+          const double cell = 2.0 * source.grid().sigma_x();
+          bool on_border = false;
+          for (const auto& [dx, dz] : {std::pair{cell, 0.0}, {-cell, 0.0}, {0.0, cell}, {0.0, -cell}}) {
+            if (!std::isnan(field.at(at.x + dx, at.z + dz))) {
+              on_border = on_border || field.is_dark(at.x + dx, at.z + dz, sun) != want;
+            }
+          }
+          if (on_border) continue;
+          ++compared;
+          dark += want ? 1 : 0;
+          const int depth = shadow.depths[static_cast<std::size_t>(r * shape.columns() + c)];
+          wrong += (depth > 0) != want && depth != 0 ? 1 : 0;
+        }
+      }
+    }
+    EXPECT_GT(compared, 500) << azimuth;
+    EXPECT_GT(dark, 30) << azimuth;
+    EXPECT_LE(wrong, compared / 200) << azimuth;
+  }
+}
+
+// A tile by itself has the shadows that it has among all others: casters are looked for as far as they may stand, and
+// lines of light lie at the same places.
+TEST(CastShadows, AreThoseOfAllTilesTogether) {
+  const MemoryTiles source(grid(), [](TileIndex tile, auto& codes) { raise_ridges(grid(), tile, codes); });
+  std::vector<TileIndex> all;
+  for (std::int64_t tile = 0; tile < source.grid().tile_count(); ++tile) all.push_back(source.grid().tile_at(tile));
+  for (int azimuth = 0; azimuth < 360; azimuth += 15) {
+    const CastingSun sun{azimuth + 1.0, 11.0, 5.0};
+    for (const TileShadow& whole : cast(source, sun, all)) {
+      const TileShadow own = std::move(cast(source, sun, {whole.tile}).front());
+      EXPECT_EQ(own.gain, whole.gain);
+      int differ = 0;
+      int worst = 0;
+      for (std::size_t i = 0; i < whole.depths.size(); ++i) {
+        // In the sun a depth says how near a caster's line passes; beyond the tiles swept there is none.
+        const int off = std::abs(std::max<int>(0, own.depths[i]) - std::max<int>(0, whole.depths[i]));
+        worst = std::max(worst, off);
+        differ += off > 60 ? 1 : 0;
+      }
+      EXPECT_LE(differ, 2) << azimuth << " tile " << whole.tile.column << ',' << whole.tile.row << " worst " << worst;
+    }
+  }
+}
+
+TEST(CastShadows, ReadNoMoreThanMayCast) {
+  const MemoryTiles source(grid());
+  const TileRange one{2, 2, 2, 2};
+  const CastingLimits limits;
+  // From high above only what is near.
+  EXPECT_EQ(casting_range(source, {315.0, 89.0, 1.0}, one, limits), (TileRange{1, 3, 1, 2}));
+  EXPECT_EQ(casting_range(source, {90.0, 89.0, 1.0}, one, limits), (TileRange{2, 3, 2, 2}));
+  EXPECT_EQ(casting_range(source, {180.0, 0.1, 1.0}, one, limits), (TileRange{2, 2, 2, 3}));
+  EXPECT_EQ(casting_range(source, {225.0, 0.1, 1.0}, one, limits), (TileRange{0, 3, 2, 3}));
+  EXPECT_EQ(casting_range(source, {270.0, 0.1, 1.0}, one, {2, 100}), (TileRange{1, 2, 2, 2}));
+  EXPECT_EQ(casting_range(source, {270.0, 0.1, 1.0}, one, {100, 2}), (TileRange{1, 2, 2, 2}));
+}
+
+TEST(CastShadows, SayWhatCouldNotBeRead) {
+  MemoryTiles source(grid());
+  source.set_heights([](TileIndex tile, std::span<float>) {
+    if (tile == TileIndex{1, 2}) throw Error(ErrorCode::kCorrupt, "tile (1,2)");
+  });
+  std::string unread;
+  EXPECT_EQ(cast(source, {270.0, 2.0, 1.0}, {{2, 2}}, &unread).size(), 1U);
+  EXPECT_EQ(unread, "tile (1,2)");
+}
+
+TEST(CastingSun, StandsLowerOverTrueHeightsThanOverExaggeratedOnes) {
+  const auto sun = casting_sun(123.0, 20.0, 3.0, 2.0);
+  ASSERT_TRUE(sun);
+  EXPECT_EQ(sun->azimuth_deg, 123.0);
+  EXPECT_NEAR(std::tan(sun->elevation_deg * kDegree), std::tan(20.0 * kDegree) / 3.0, 1e-12);
+}
+
+TEST(CastingSun, CastsNothingAtNightOrOverhead) {
+  EXPECT_FALSE(casting_sun(90.0, -1.0, 1.0, 2.0));
+  EXPECT_FALSE(casting_sun(90.0, 0.0, 1.0, 2.0));
+  EXPECT_FALSE(casting_sun(90.0, 90.0, 1.0, 2.0));
+  EXPECT_FALSE(casting_sun(90.0, 89.8, 1.0, 2.0));
+  EXPECT_TRUE(casting_sun(0.0, 5.0, 1.0, 2.0));
+}
+
+}  // namespace
+}  // namespace isohf::view
