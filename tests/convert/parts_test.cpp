@@ -13,6 +13,7 @@
 #include "isohf/convert.h"
 #include "isohf/error.h"
 #include "isohf/parts.h"
+#include "isohf/surface.h"
 #include "isohf/verify.h"
 #include "support/memory_photo.h"
 #include "support/memory_source.h"
@@ -109,6 +110,33 @@ TEST_F(Parts, ComplementaryOnesGiveTheWholesBytesInAnyOrder) {
   }
 }
 
+TEST_F(Parts, OfALosslessArchiveShareItsResidualsAndGiveThemBack) {
+  options.lossless = true;
+  const std::string whole = make("whole.isohf");
+  const TileGrid grid = ArchiveReader(whole).grid();
+  const std::int64_t columns = grid.tile_columns();
+  const std::string north_west = cut(whole, "nw.isohf", {{0, 0}, {5, 4}});
+  const std::string north_east = cut(whole, "ne.isohf", {{5, 0}, {columns, 4}});
+  const std::string south = cut(whole, "s.isohf", {{0, 4}, {columns, grid.tile_rows()}});
+  for (const std::string& part : {north_west, north_east, south}) {
+    const ArchiveReader reader(part);
+    EXPECT_TRUE(verify_archive(part).passed()) << part;
+    EXPECT_FALSE(lossless_record(reader.metadata()).has_value()) << "it cannot give the samples";
+    EXPECT_EQ(reader.find_member("residual/00000000").has_value(), part == north_west);
+  }
+  const PartSummary joined = merge_archives({south, north_east, north_west}, folder / "joined.isohf");
+  EXPECT_TRUE(joined.same_as_whole);
+  EXPECT_TRUE(joined.warnings.empty());
+  EXPECT_EQ(test::read_file(folder / "joined.isohf"), test::read_file(whole));
+  // Joined with other land they are nobody's.
+  const std::string changed = make("changed.isohf", 9.0);
+  const PartSummary mixed = merge_archives({whole, changed}, folder / "mixed.isohf");
+  ASSERT_EQ(mixed.warnings.size(), 1U);
+  EXPECT_THAT(mixed.warnings.front(), HasSubstr("residuals are left out"));
+  EXPECT_FALSE(ArchiveReader(folder / "mixed.isohf").find_member("residual/00000000").has_value());
+  EXPECT_TRUE(verify_archive(folder / "mixed.isohf").passed());
+}
+
 TEST_F(Parts, LastArchiveGivesTheTileAndEverythingFollows) {
   const std::string old = make("old.isohf");
   const std::string changed = make("changed.isohf", 9.0);
@@ -170,7 +198,7 @@ class Shards : public Parts {
     std::vector<std::string> files;
     const int count = static_cast<int>(plan.shards.size());
     for (int i = 0; i < count; ++i) {
-      const int number = (i * 2 + 1) % count + 1;
+      const int number = count % 2 == 0 ? count - i : (i * 2 + 1) % count + 1;
       files.push_back(folder / (name + std::to_string(number) + ".isohf"));
       (void)convert_shard(source, plan, number, files.back(), options);
       EXPECT_TRUE(is_shard(files.back(), plan, number));
@@ -202,8 +230,9 @@ TEST_F(Shards, JoinToTheBytesOfOneRun) {
       options.texture->photo = &photo;
       const std::string whole = make("whole.isohf");
       Hills source;
-      const ShardPlan plan = parse_shard_plan(format_shard_plan(plan_shards(source, options, 5)));
-      ASSERT_EQ(plan.shards.size(), 5U);
+      const int count = given ? 5 : 2;  // two end with rows of the first plane
+      const ShardPlan plan = parse_shard_plan(format_shard_plan(plan_shards(source, options, count)));
+      ASSERT_EQ(static_cast<int>(plan.shards.size()), count);
       const std::vector<std::string> files = make_shards(source, plan, "part-");
       EXPECT_TRUE(missing_shards(plan, files).empty());
       const PartSummary joined = merge_shards(plan, files, folder / "joined.isohf", {.overwrite = true});
@@ -211,6 +240,35 @@ TEST_F(Shards, JoinToTheBytesOfOneRun) {
       EXPECT_EQ(test::read_file(folder / "joined.isohf"), test::read_file(whole));
     }
     options.z_range = {270.0, 330.0};
+  }
+}
+
+TEST_F(Shards, OfALosslessConversionJoinToItsBytes) {
+  options.lossless = true;
+  for (const CodeType type : {CodeType::kU8, CodeType::kF32}) {
+    for (const int count : {2, 5, 9}) {
+      options.code_type = type;
+      options.filter = Filter::kBilinear;
+      if (type == CodeType::kF32) options.z_range.reset();
+      const std::string whole = make("whole.isohf");
+      Hills source;
+      const ShardPlan plan = parse_shard_plan(format_shard_plan(plan_shards(source, options, count)));
+      EXPECT_EQ(plan.samples_sha256, lossless_record(ArchiveReader(whole).metadata())->sha256);
+      const std::vector<std::string> files = make_shards(source, plan, "part-");
+      const PartSummary joined = merge_shards(plan, files, folder / "joined.isohf", {.overwrite = true});
+      EXPECT_TRUE(joined.warnings.empty());
+      EXPECT_EQ(test::read_file(folder / "joined.isohf"), test::read_file(whole));
+      // From a draft, by scans.
+      std::vector<std::string> scans;
+      const ShardPlan draft = draft_shards(source, options, 3);
+      for (int number = 1; number <= 3; ++number) scans.push_back(scan_shard(source, draft, number, options));
+      EXPECT_EQ(format_shard_plan(scanned(source, draft, scans, options)),
+                format_shard_plan(plan_shards(source, options, 3)));
+      options.lossless = false;
+      EXPECT_THAT(refusal([&] { (void)convert_shard(source, plan, 1, folder / "a.isohf", options); }),
+                  HasSubstr("planned was \"lossless\""));
+      options.lossless = true;
+    }
   }
 }
 
@@ -309,12 +367,13 @@ TEST_F(Shards, AreRefusedWhereTheyAreNotWhatWasPlanned) {
               HasSubstr("name its plan first"));
   EXPECT_THAT(merged({make("whole.isohf"), files[0], files[1], files[2]}), HasSubstr("is no shard of a plan"));
   EXPECT_FALSE(std::filesystem::exists(folder / "refused.isohf"));
-  options.lossless = true;
-  EXPECT_THAT(refusal([&] { (void)plan_shards(source, options, 2); }), HasSubstr("`lossless` needs all of the source"));
+  options.max_error = 1.0;
+  EXPECT_THAT(refusal([&] { (void)plan_shards(source, options, 2); }),
+              HasSubstr("`max_error` needs all of the source"));
   std::string json = format_shard_plan(plan);
   EXPECT_THAT(refusal([&] { (void)parse_shard_plan("{}"); }), HasSubstr("format: is missing"));
-  json.replace(json.find("\"version\": 1"), 12, "\"version\": 9");
-  EXPECT_THAT(refusal([&] { (void)parse_shard_plan(json); }), HasSubstr("version 9, 1 is read"));
+  json.replace(json.find("\"version\": 2"), 12, "\"version\": 9");
+  EXPECT_THAT(refusal([&] { (void)parse_shard_plan(json); }), HasSubstr("version 9, 2 is read"));
 }
 
 TEST(TileRange, MeetsAndIsPutAround) {

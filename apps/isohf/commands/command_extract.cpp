@@ -20,7 +20,7 @@ namespace {
 
 constexpr const char* kFooter =
     R"(Tiles are copied as they are, with their textures and shadow seeds, under their names and on their lattice; coarse
-planes are made anew, residuals stay behind. Parts that make up the whole give its bytes again: isohf merge.
+planes are made anew. Parts that make up the whole give its bytes again, residuals included: isohf merge.
 
 Examples:
   isohf extract land.isohf -o valley.isohf --bbox 6.5,45,7,45.5

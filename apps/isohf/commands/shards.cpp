@@ -265,7 +265,8 @@ int command_scan(const Arguments& arguments) {
         scans.push_back(text_of_file(file));
         if (!scans.back().starts_with('{')) throw Error(ErrorCode::kCorrupt, file + ": is no scan of a plan");
       }
-      text = format_shard_plan(scanned(*prepared.source, draft, scans, options.convert));
+      text = format_shard_plan(
+          scanned(*prepared.source, draft, scans, options.convert, job_from(command->work, *display)));
     } else {
       text = scan_shard(*prepared.source, draft, command->shard, options.convert, job_from(command->work, *display));
     }

@@ -40,7 +40,8 @@ struct PartSummary {
 };
 
 /// Writes some tiles of an archive as one of their own. Tiles, their textures and their seeds are copied byte for byte,
-/// coarse planes are made anew; residuals are left out, with a warning. Stage "tiles". Memory: a batch of tiles, and
+/// coarse planes are made anew; residual members belong to tiles of the first column, and come along with these (the
+/// samples come back once the parts are joined). Stage "tiles". Memory: a batch of tiles, and
 /// what planes need. Throws Error{kInvalidArgument} where `tiles` reach beyond the archive, where it is of version 1 or
 /// repacked by another tool, and where `output` exists without overwrite; Error{kCorrupt} for damage.
 PartSummary extract_tiles(const std::string& archive, const std::string& output, const TileRange& tiles,

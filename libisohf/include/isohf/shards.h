@@ -28,16 +28,18 @@ struct ShardPlan {
     Quantisation quantisation;
     double datum = 0.0;         ///< that heights are computed from
     double height_error = 0.0;  ///< of such heights, at most
+    double largest = 0.0;       ///< no elevation is meant to lie further from 0
   };
   std::optional<Codes> codes;
+  std::optional<std::string> samples_sha256;                  ///< of all samples, for `lossless`
   std::vector<std::pair<std::int64_t, std::int64_t>> shards;  ///< rows of tiles: first, and past the last
   std::vector<Warning> warnings;  ///< of the pass over the source, where there was one; no part of what is written
 };
 
 /// Plans a conversion, with one pass over the source where its range is not given (z_range). Shards have about equally
 /// many rows, and end where rows of the first coarse plane do if there are enough of these; there are no more of them
-/// than rows. Stage "range". Throws as convert() does, and Error{kInvalidArgument} for `lossless`, `max_error` and
-/// `measure`, which need all rows at once.
+/// than rows. With `lossless` one more pass takes the samples' hash. Stages "range", "hash". Throws as convert() does, and
+/// Error{kInvalidArgument} for `max_error` and `measure`, which need all rows at once.
 [[nodiscard]] ShardPlan plan_shards(HeightSource& source, const ConvertOptions& options, int shards,
                                     const Job& job = {});
 /// The same without a look at any sample. What one machine takes long to read many can: scan_shard() and scanned().
@@ -47,14 +49,14 @@ struct ShardPlan {
                                      const ConvertOptions& options, const Job& job = {});
 /// Whether a text is what scan_shard() gives for that shard of the draft.
 [[nodiscard]] bool is_scan(const std::string& json, const ShardPlan& draft, int number);
-/// The plan of a draft whose shards were all scanned: the one of plan_shards(). Throws Error{kInvalidArgument} naming
+/// The plan of a draft whose shards were all scanned: the one of plan_shards(), also with the pass for the hash. Throws Error{kInvalidArgument} naming
 /// scans that are missing, there twice or of another draft, and where the filter can leave the samples' range so that
 /// the surface has to be looked at: then `z_range` helps, or plan_shards().
 [[nodiscard]] ShardPlan scanned(HeightSource& source, const ShardPlan& draft, const std::vector<std::string>& scans,
-                                const ConvertOptions& options);
+                                const ConvertOptions& options, const Job& job = {});
 
 /// A plan as JSON, and back. parse_shard_plan() throws Error{kCorrupt} naming the member at fault, Error{kUnsupported}
-/// for other versions than 1.
+/// for other versions than 2.
 [[nodiscard]] std::string format_shard_plan(const ShardPlan& plan);
 [[nodiscard]] ShardPlan parse_shard_plan(const std::string& json);
 

@@ -32,10 +32,12 @@ AddPlanesSummary add_planes(const std::string& archive, const std::string& outpu
   Arena(job).execute([&] {
     std::optional<PlaneStage> planes;
     if (metadata.planes.count > 0) {
-      planes.emplace(planes_of(metadata), metadata.quantisation, metadata.level.value_or(kDefaultLevel), writer);
+      planes.emplace(planes_of(metadata), metadata.quantisation, metadata.level.value_or(kDefaultLevel), writer,
+                     RowRange{0, metadata.grid.tile_rows() - 1});
     }
     const TileRange tiles = tiles_here(reader);
-    Assembly copy(metadata, writer, {{{&reader, tiles}}, tiles, planes ? &*planes : nullptr, true, false, true}, job);
+    Assembly copy(metadata, writer, {{{&reader, tiles}}, tiles, planes ? &*planes : nullptr, false, true, false, true},
+                  job);
     copy.add_tiles();
     copy.add_other_members(true);
   });

@@ -29,6 +29,7 @@
 #include "isohf/convert/stages/seed_stage.h"
 #include "isohf/convert/stages/texture_stage.h"
 #include "isohf/convert/stages/tile_source.h"
+#include "isohf/convert/stages/tiles_around.h"
 #include "isohf/error.h"
 
 namespace isohf {
@@ -177,11 +178,31 @@ void write_tiles(const Conversion& conversion, ArchiveWriter& writer, const Stag
   oneapi::tbb::parallel_pipeline(ring.size(), make_filter<void, TileJob*>(filter_mode::serial_in_order, read) &
                                                   make_filter<TileJob*, TileJob*>(filter_mode::parallel, encode) &
                                                   make_filter<TileJob*, void>(filter_mode::serial_in_order, write));
-  // Of a shard: what lies behind it is not there.
+  // Of a shard: what lies behind it.
   for (std::int64_t flat = conversion.end_tile; flat < grid.tile_count() && stages.planes != nullptr; ++flat) {
-    stages.planes->add({});
+    stages.planes->add_outside(grid.tile_at(flat));
   }
   writer.skip_tiles(grid.tile_count() - conversion.end_tile);
+}
+
+/// Rows of tiles on either side of a shard, for its coarse planes and its residuals: what is needed as a rule.
+std::int64_t rows_around(const ConvertOptions& options, const PlaneInfo& planes) {
+  return (planes.count > 0 ? 1 : 0) + (options.lossless ? 2 : 0);
+}
+
+/// What is beside a shard's own rows.
+TilesAround make_around(const Conversion& conversion, const ShardWork& shard, const PlaneInfo& planes,
+                        const ResidualStage* residuals) {
+  RowRange north{shard.first_row, shard.first_row - 1};
+  RowRange south{shard.end_row, shard.end_row - 1};
+  const auto reach_over = [&](const RowRange& needed) {
+    if (needed.first > needed.last) return;
+    north.first = std::max<std::int64_t>(std::min(north.first, needed.first), 0);
+    south.last = std::min(std::max(south.last, needed.last), conversion.plan.grid.tile_rows() - 1);
+  };
+  if (planes.count > 0) reach_over({shard.first_row - 1, shard.end_row});
+  if (residuals != nullptr) reach_over(residuals->tile_rows_needed());
+  return {conversion, north, south};
 }
 
 void check_range(const std::pair<double, double>& range) {
@@ -264,7 +285,7 @@ ShardPlan::Codes before_writing(HeightSource& source, const Plan& plan, const Co
   Conversion conversion{source, options, plan, memory, kernel, Prefilter::make(kernel.filter(), options.acquisition),
                         job};
   Arena(job).execute([&] { look(conversion); });
-  return {conversion.quantisation, conversion.datum, conversion.height_error};
+  return {conversion.quantisation, conversion.datum, conversion.height_error, conversion.largest};
 }
 
 }  // namespace
@@ -317,7 +338,11 @@ ConversionResult run_conversion(HeightSource& source, const Plan& plan, const st
   }
   const Kernel kernel = Kernel::make(options.filter.value_or(kDefaultFilter));
   Prefilter prefilter = Prefilter::make(kernel.filter(), options.acquisition);
-  const MemoryPlan memory = plan_memory(source, plan, options, job, textures ? textures->memory_bytes() : 0);
+  const PlaneInfo coarse = options.planes ? planes_for(plan.grid) : PlaneInfo();
+  const std::int64_t beside = shard != nullptr ? 2 * rows_around(options, coarse) : 0;
+  const MemoryPlan memory =
+      plan_memory(source, plan, options, job,
+                  (textures ? textures->memory_bytes() : 0) + TilesAround::memory_bytes(plan.grid, beside));
   check_memory(memory, job);
   source.limit_buffers(memory.source_buffer_bytes);
   if (options.lossless && info.fill_distance > 0 && &source.as_stored() == &source) {
@@ -331,7 +356,6 @@ ConversionResult run_conversion(HeightSource& source, const Plan& plan, const st
   Metadata& metadata = summary.metadata;
   warn_of_plan(info, plan, options.plan, textures ? &*textures : nullptr, summary.warnings);
   refuse_warnings(summary, options);
-  const PlaneInfo coarse = options.planes ? planes_for(plan.grid) : PlaneInfo();
   Conversion conversion{source, options, plan, memory, kernel, std::move(prefilter), job};
   WriterOptions how{options.overwrite, options.resume, job_fingerprint(info, plan, options), coarse, 0,
                     options.code_type};
@@ -343,6 +367,8 @@ ConversionResult run_conversion(HeightSource& source, const Plan& plan, const st
   ArchiveWriter writer(output, plan.grid, how);
   std::optional<PlaneStage> planes;
   std::optional<SeedStage> seeds;
+  std::optional<ResidualStage> residuals;
+  std::optional<TilesAround> around;
   std::optional<LosslessRecord> lossless;
   try {
     Arena(job).execute([&] {
@@ -352,6 +378,7 @@ ConversionResult run_conversion(HeightSource& source, const Plan& plan, const st
         conversion.quantisation = shard->codes.quantisation;
         conversion.datum = shard->codes.datum;
         conversion.height_error = shard->codes.height_error;
+        conversion.largest = shard->codes.largest;
         conversion.limits = options.z_range ? CodeLimits{options.z_range->first, options.z_range->second}
                                             : code_limits(shard->codes.quantisation);
       }
@@ -362,15 +389,33 @@ ConversionResult run_conversion(HeightSource& source, const Plan& plan, const st
         seeds.emplace(plan.grid, conversion.quantisation, *options.shadow_seeds,
                       known ? 1.0 / info.metres_per_vertical_unit : 1.0);
       }
+      const RowRange rows =
+          shard != nullptr ? RowRange{shard->first_row, shard->end_row - 1} : RowRange{0, plan.grid.tile_rows() - 1};
+      if (options.lossless) {
+        residuals.emplace(source.as_stored(), plan.frame, plan.grid, conversion.quantisation, conversion.largest, rows);
+      }
+      if (shard != nullptr) {
+        around.emplace(make_around(conversion, *shard, coarse, residuals ? &*residuals : nullptr));
+      }
       if (coarse.count > 0) {
         planes.emplace(Planes(plan.grid, coarse.stride, coarse.count, plan.frame.wraps_x), conversion.quantisation,
-                       options.level, writer);
+                       options.level, writer, rows, around ? &*around : nullptr);
       }
       write_tiles(conversion, writer,
                   {planes ? &*planes : nullptr, seeds ? &*seeds : nullptr, textures ? &*textures : nullptr});
-      if (options.lossless) {
-        lossless = write_residuals(source.as_stored(), plan.frame, plan.grid, conversion.quantisation,
-                                   memory.members_at_once, writer, job);
+      if (residuals) {
+        writer.flush_tiles();
+        const auto read_tiles = [&](std::span<const TileIndex> tiles) {
+          std::vector<TileCodes> codes;
+          for (const TileIndex tile : tiles) {
+            const bool is_beside = around && around->holds(tile);
+            ISOHF_ASSERT(is_beside || shard == nullptr || (tile.row >= shard->first_row && tile.row < shard->end_row));
+            codes.push_back(is_beside ? around->codes(tile) : writer.read_tile(tile, conversion.quantisation));
+          }
+          return codes;
+        };
+        lossless = residuals->write(read_tiles, memory.members_at_once,
+                                    shard != nullptr ? shard->samples_sha256 : std::nullopt, writer, job);
       }
     });
 
@@ -394,7 +439,8 @@ ConversionResult run_conversion(HeightSource& source, const Plan& plan, const st
     }
     if (lossless) {
       summary.residual_bytes = lossless->residual_bytes;
-      metadata.extensions.emplace_back(kLosslessName, format_lossless(*lossless));
+      metadata.extensions.emplace_back(shard != nullptr ? kPartLosslessName : kLosslessName,
+                                       format_lossless(*lossless));
     }
     if (shard != nullptr) {
       PartRecord part{{{0, shard->first_row}, {plan.grid.tile_columns(), shard->end_row}}, shard->record};

@@ -24,6 +24,7 @@ struct ShardWork {
   std::int64_t end_row;
   ShardPlan::Codes codes;
   PartRecord::Shard record;  ///< but for its sums
+  std::optional<std::string> samples_sha256;
 };
 
 /// Codes alone: the first pass over the source, where one is needed. `plan` must be made of options.plan.

@@ -12,6 +12,7 @@
 
 #include "isohf/archive/container/content_hash.h"
 #include "isohf/base/arena.h"
+#include "isohf/base/assert.h"
 #include "isohf/base/bytes.h"
 #include "isohf/error.h"
 
@@ -117,9 +118,11 @@ std::string format_lossless(const LosslessRecord& record) {
   return json.dump();
 }
 
-std::optional<LosslessRecord> lossless_record(const Metadata& metadata) {
+namespace {
+
+std::optional<LosslessRecord> record_named(const char* name, const Metadata& metadata) {
   const auto found = std::find_if(metadata.extensions.begin(), metadata.extensions.end(),
-                                  [](const auto& extension) { return extension.first == kLosslessName; });
+                                  [&](const auto& extension) { return extension.first == name; });
   if (found == metadata.extensions.end()) return std::nullopt;
   LosslessRecord record;
   try {
@@ -141,6 +144,25 @@ std::optional<LosslessRecord> lossless_record(const Metadata& metadata) {
   }
   check(record, metadata);
   return record;
+}
+
+}  // namespace
+
+std::optional<LosslessRecord> lossless_record(const Metadata& metadata) {
+  return record_named(kLosslessName, metadata);
+}
+
+std::optional<LosslessRecord> part_lossless_record(const Metadata& metadata) {
+  return record_named(kPartLosslessName, metadata);
+}
+
+RowRange residual_rows_at(const LosslessRecord& record, std::int64_t all_tile_rows, const RowRange& tile_rows) {
+  const std::int64_t members = (record.height + record.rows_per_member - 1) / record.rows_per_member;
+  // Member k belongs to row k * all_tile_rows / members.
+  const auto first_at = [&](std::int64_t row) {
+    return std::min((row * members + all_tile_rows - 1) / all_tile_rows * record.rows_per_member, record.height);
+  };
+  return {first_at(tile_rows.first), first_at(tile_rows.last + 1) - 1};
 }
 
 std::string residual_name(std::int64_t first_row) {
@@ -165,7 +187,7 @@ PositionMesh positions_from_bytes(std::int64_t width, std::int64_t height, std::
 SamplePredictor::SamplePredictor(const TileGrid& grid, bool wraps_x, const Quantisation& quantisation,
                                  ReadTiles read_tiles, const SampleGrid& samples, const LosslessRecord& record,
                                  const ReadMember& read_member)
-    : width_(record.width), heights_(quantisation, record.fraction_bits) {
+    : width_(record.width), grid_(grid), heights_(quantisation, record.fraction_bits) {
   switch (record.prediction) {
     case SamplePrediction::kSpline:
       spline_.emplace(grid, wraps_x, heights_, std::move(read_tiles), samples);
@@ -194,6 +216,22 @@ std::vector<Place> SamplePredictor::places(const Mesh& mesh, std::int64_t first,
     mesh.row(first + row, std::span(found).subspan(static_cast<std::size_t>(row) * width, width));
   });
   return found;
+}
+
+RowRange SamplePredictor::tile_rows_needed(std::int64_t first, std::int64_t rows) const {
+  if (spline_) return spline_->tile_rows_needed(first, rows);
+  ISOHF_ASSERT(nodes_.has_value());  // what is written today
+  RowRange needed{grid_.tile_rows(), -1};
+  std::vector<FixedPlace> places(static_cast<std::size_t>(width_));
+  for (std::int64_t row = first; row < first + rows; ++row) {
+    nodes_->row(row, places);
+    for (const FixedPlace& place : places) {
+      FixedTilePlace found{};
+      if (place.x == FixedPlace::kNone || !locate(grid_, place, found)) continue;
+      needed = {std::min(needed.first, found.tile.row), std::max(needed.last, found.tile.row)};
+    }
+  }
+  return needed;
 }
 
 void SamplePredictor::read(std::int64_t first, std::int64_t rows, std::span<double> predicted) {

@@ -16,16 +16,26 @@
 #include "isohf/restore/predict/spline_predictor.h"
 #include "isohf/restore/residual_codec.h"
 #include "isohf/surface.h"
+#include "isohf/surface/source/source_band.h"
 
 namespace isohf {
 
 /// The metadata's member beside the residual members: a LosslessRecord.
 inline constexpr const char* kLosslessName = "lossless";
+/// The same in a part that holds some of these members, of the whole.
+inline constexpr const char* kPartLosslessName = "part_lossless";
+/// As lossless_record(), of a part.
+[[nodiscard]] std::optional<LosslessRecord> part_lossless_record(const Metadata& metadata);
 /// Its JSON text.
 [[nodiscard]] std::string format_lossless(const LosslessRecord& record);
 
 /// "residual/00000000": the member that starts with source row `first_row`.
 [[nodiscard]] std::string residual_name(std::int64_t first_row);
+
+/// Of archives that are cut by rows of tiles each member belongs to one row, evenly: the source's rows that belong to some
+/// rows of tiles. Empty where there are more rows of tiles than members.
+[[nodiscard]] RowRange residual_rows_at(const LosslessRecord& record, std::int64_t all_tile_rows,
+                                        const RowRange& tile_rows);
 
 /// Where the samples of a source that was projected lie: a PlaceMesh's bytes, or in old archives a PositionMesh's.
 inline constexpr const char* kNodesName = "residual/nodes";
@@ -47,6 +57,8 @@ class SamplePredictor {
   SamplePredictor(const TileGrid& grid, bool wraps_x, const Quantisation& quantisation, ReadTiles read_tiles,
                   const SampleGrid& samples, const LosslessRecord& record, const ReadMember& read_member);
 
+  /// The rows of tiles that read() reads; none where there are none under the samples.
+  [[nodiscard]] RowRange tile_rows_needed(std::int64_t first, std::int64_t rows) const;
   /// As GridSampler::read.
   void read(std::int64_t first, std::int64_t rows, std::span<double> predicted);
 
@@ -55,6 +67,7 @@ class SamplePredictor {
   [[nodiscard]] std::vector<Place> places(const Mesh& mesh, std::int64_t first, std::int64_t rows) const;
 
   std::int64_t width_;
+  TileGrid grid_;
   FixedHeights heights_;
   std::optional<SplinePredictor> spline_;
   std::optional<GridSampler> rows_;

@@ -1,12 +1,14 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "isohf/archive.h"
 #include "isohf/archive/planes/plane_builder.h"
+#include "isohf/tile_range.h"
 
 namespace isohf {
 
@@ -27,8 +29,11 @@ class PlaneCheck {
 
  private:
   void check(int plane, TileIndex tile, const EncodedTile& expected);
+  [[nodiscard]] bool is_known(int plane, std::int64_t row) const;
 
   const ArchiveReader& archive_;
+  std::optional<TileRange>
+      shard_;  ///< what it holds, where it is a plan's shard: planes are made of what is beside, too
   PlaneBuilder builder_;
   std::vector<Problem> problems_;
 };

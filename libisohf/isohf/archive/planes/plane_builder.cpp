@@ -337,34 +337,34 @@ void PlaneBuilder::finish_row(int plane) {
   level.next_row();
 }
 
+PlaneSample PlaneBuilder::sample_of(int plane, TileIndex tile, const Read& read) const {
+  Stored stored = read(plane, tile);
+  if (!stored.entry.is_empty) {
+    recall_beyond(planes_, plane, tile, stored.codes);
+    return sample(stored.codes, stored.entry.code_min, stored.entry.code_max);
+  }
+  PlaneSample none;
+  if (plane == 0) return none;
+  Range range;
+  const TileRange below = planes_.below(plane, tile);
+  for (TileIndex at = below.first; at.row < below.end.row; ++at.row) {
+    for (at.column = below.first.column; at.column < below.end.column; ++at.column) {
+      range.add(type_, sample_of(plane - 1, at, read));
+    }
+  }
+  none.is_void = range.is_void;
+  none.code_min = range.min;
+  none.code_max = range.max;
+  return none;
+}
+
 void PlaneBuilder::resume_after(std::int64_t tiles, const Read& read) {
-  // A tile of a plane without an elevation of its own isn't there; what lies below it has a range nevertheless.
-  const std::function<PlaneSample(int, TileIndex)> sample_of = [&](int plane, TileIndex tile) {
-    Stored stored = read(plane, tile);
-    if (!stored.entry.is_empty) {
-      recall_beyond(planes_, plane, tile, stored.codes);
-      return sample(stored.codes, stored.entry.code_min, stored.entry.code_max);
-    }
-    PlaneSample none;
-    if (plane == 0) return none;
-    Range range;
-    const TileRange below = planes_.below(plane, tile);
-    for (TileIndex at = below.first; at.row < below.end.row; ++at.row) {
-      for (at.column = below.first.column; at.column < below.end.column; ++at.column) {
-        range.add(type_, sample_of(plane - 1, at));
-      }
-    }
-    none.is_void = range.is_void;
-    none.code_min = range.min;
-    none.code_max = range.max;
-    return none;
-  };
   int plane = 0;
   for (const std::unique_ptr<Level>& level : levels_) {
     std::int64_t row = 0;
     while (level->is_ready(row, tiles)) ++row;
     level->begin_at(row);
-    while (level->next_tile() < tiles) level->add(sample_of(plane, level->fine().tile_at(level->next_tile())));
+    while (level->next_tile() < tiles) level->add(sample_of(plane, level->fine().tile_at(level->next_tile()), read));
     tiles = row * level->grid().tile_columns();
     ++plane;
   }

@@ -52,6 +52,12 @@ class PlaneBuilder {
   /// read, and isn't handed on again.
   void resume_after(std::int64_t tiles, const Read& read);
 
+  /// Instead of the tiles of plane 0: the next one of plane 1, as a builder made it. It is not handed on.
+  ///   sample  as sample_of() gives it
+  void add_finished(const PlaneSample& sample) { add(2, sample); }
+  /// What a finished tile brings to the plane above: of one that isn't stored the range of what lies below it. Any thread.
+  [[nodiscard]] PlaneSample sample_of(int plane, TileIndex tile, const Read& read) const;
+
  private:
   class Level;
   void add(int plane, const PlaneSample& sample);

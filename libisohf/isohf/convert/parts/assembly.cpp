@@ -13,6 +13,7 @@
 #include "isohf/archive/container/content_hash.h"
 #include "isohf/archive/container/member_tables.h"
 #include "isohf/archive/metadata/part_record.h"
+#include "isohf/archive/planes/archive_planes.h"
 #include "isohf/base/arena.h"
 #include "isohf/base/source_bytes.h"
 #include "isohf/byte_source.h"
@@ -34,6 +35,22 @@ std::vector<std::string> tile_tables(const ArchiveReader& archive) {
   return names;
 }
 
+/// A tile's record and bytes.
+EncodedTile encoded_tile(const ArchiveReader& from, TileIndex index, int plane) {
+  EncodedTile encoded;
+  const TileEntry entry = from.tile_entry(index, plane);
+  encoded.is_empty = !entry.stored;
+  if (encoded.is_empty) return encoded;
+  encoded.deflated = SourceBytes(from.source(), entry.offset_bytes, entry.compressed_bytes).take();
+  encoded.payload_bytes = entry.payload_bytes;
+  encoded.payload_crc32 = entry.payload_crc32;
+  encoded.code_min = entry.code_min;
+  encoded.code_max = entry.code_max;
+  encoded.has_voids = entry.has_voids;
+  if (const auto digest = from.tile_digest(index, plane)) encoded.content_digest.assign(digest->begin(), digest->end());
+  return encoded;
+}
+
 }  // namespace
 
 Assembly::Assembly(const Metadata& metadata, ArchiveWriter& writer, AssemblyRequest request, const Job& job)
@@ -50,7 +67,8 @@ Assembly::Assembly(const Metadata& metadata, ArchiveWriter& writer, AssemblyRequ
 }
 
 bool Assembly::decodes() const {
-  return request_.planes != nullptr || request_.recount || request_.checks_digests || !request_.one_origin;
+  const bool for_planes = request_.planes != nullptr && !request_.has_plane_rows;
+  return for_planes || request_.recount || request_.checks_digests || !request_.one_origin;
 }
 
 void Assembly::add_tiles() {
@@ -63,23 +81,60 @@ void Assembly::add_tiles() {
     const std::vector<const AssemblyInput*> inputs = inputs_of_row(row);
     for (std::size_t first = 0; first < tiles.size(); first += batch) {
       job_.throw_if_cancelled();
-      const auto some = std::span(tiles).subspan(first, std::min(batch, tiles.size() - first));
+      std::vector<Tile> some(std::min(batch, tiles.size() - first));
       if (!inputs.empty()) read(inputs, {static_cast<std::int64_t>(first), row}, some);
       for (std::size_t i = 0; i < some.size(); ++i) {
         const TileIndex index{static_cast<std::int64_t>(first + i), row};
         Tile& tile = some[i];
         if (tile.from != nullptr) add_textures(index, *tile.from);
         request_.tiles.contains(index) ? writer_.add_tile(tile.encoded) : writer_.skip_tiles(1);
-        if (request_.planes != nullptr) request_.planes->add(tile.sample);
-        tile.encoded.deflated = {};
-        tile.sample = {};
-        if (request_.one_origin) tile.codes = {};
+        if (request_.planes != nullptr && !request_.has_plane_rows) request_.planes->add(tile.sample);
+        tiles[first + i] = {tile.from, request_.one_origin ? TileCodes() : std::move(tile.codes)};
       }
     }
+    if (request_.planes != nullptr && request_.has_plane_rows) add_plane_rows(row);
     if (!inputs.empty()) add_seeds(row, tiles);
     if (!request_.one_origin) compare_edges(row, tiles, above);
     above = std::move(tiles);
     job_.report({"tiles", "tiles", (row + 1) * columns, grid.tile_count(), writer_.bytes_written()});
+  }
+}
+
+/// Rows of the first plane that were finished when all tiles of `row` were there: copied; the planes above are made of them.
+void Assembly::add_plane_rows(std::int64_t row) {
+  const Planes planes = planes_of(metadata_);
+  const TileGrid& grid = planes.grid(1);
+  const auto batch = static_cast<std::int64_t>(kBatchLanes) * threads_of(job_);
+  for (; next_plane_row_ < grid.tile_rows(); ++next_plane_row_) {
+    const std::int64_t needed = std::min((next_plane_row_ + 1) * planes.stride() + 1, metadata_.grid.tile_rows());
+    if (row + 1 < needed) return;
+    const ArchiveReader& from = *inputs_of_row(next_plane_row_ * planes.stride()).front()->archive;
+    const auto read = [&](int plane, TileIndex tile) {
+      PlaneBuilder::Stored stored;
+      const TileEntry entry = from.tile_entry(tile, plane);
+      stored.entry.is_empty = !entry.stored;
+      stored.entry.code_min = entry.code_min;
+      stored.entry.code_max = entry.code_max;
+      if (entry.stored) stored.codes = from.read_tile(tile, plane);
+      return stored;
+    };
+    for (std::int64_t first = 0; first < grid.tile_columns(); first += batch) {
+      job_.throw_if_cancelled();
+      std::vector<PlaneSample> samples(static_cast<std::size_t>(std::min(batch, grid.tile_columns() - first)));
+      const auto tile_at = [&](std::size_t i) {
+        return TileIndex{first + static_cast<std::int64_t>(i), next_plane_row_};
+      };
+      if (planes.count() > 1) {
+        oneapi::tbb::parallel_for(std::size_t{0}, samples.size(), [&](std::size_t i) {
+          samples[i] = request_.planes->finished_sample(tile_at(i), read);
+        });
+      }
+      for (std::size_t i = 0; i < samples.size(); ++i) {
+        const EncodedTile encoded = encoded_tile(from, tile_at(i), 1);
+        writer_.add_plane_tile(1, tile_at(i), encoded, {encoded.code_min, encoded.code_max});
+        if (planes.count() > 1) request_.planes->add_finished(samples[i]);
+      }
+    }
   }
 }
 
@@ -141,7 +196,6 @@ void Assembly::read(std::span<const AssemblyInput* const> inputs, TileIndex firs
   });
 }
 
-/// A tile's record and bytes.
 void Assembly::read(TileIndex index, Tile& tile) const {
   EncodedTile& encoded = tile.encoded;
   encoded.is_empty = tile.from == nullptr;
@@ -150,20 +204,13 @@ void Assembly::read(TileIndex index, Tile& tile) const {
     if (counted_) encoded.statistics = tile_statistics(*counted_, index, void_codes_, metadata_.quantisation);
     return;
   }
-  const TileEntry entry = tile.from->tile_entry(index);
-  encoded.deflated = SourceBytes(tile.from->source(), entry.offset_bytes, entry.compressed_bytes).take();
-  encoded.payload_bytes = entry.payload_bytes;
-  encoded.payload_crc32 = entry.payload_crc32;
-  encoded.code_min = entry.code_min;
-  encoded.code_max = entry.code_max;
-  encoded.has_voids = entry.has_voids;
-  if (const auto digest = tile.from->tile_digest(index)) encoded.content_digest.assign(digest->begin(), digest->end());
+  encoded = encoded_tile(*tile.from, index, 0);
 }
 
-void Assembly::copy_member(const ArchiveReader& from, const MemberEntry& member) {
+void copy_member(const ArchiveReader& from, const MemberEntry& member, ArchiveWriter& writer) {
   const SourceBytes data(from.source(), member.offset_bytes, member.compressed_bytes);
-  if (member.deflated) writer_.add_deflated_member(member.name, data.bytes(), member.bytes, member.crc32);
-  if (!member.deflated) writer_.add_member(member.name, data.bytes(), false);
+  if (member.deflated) writer.add_deflated_member(member.name, data.bytes(), member.bytes, member.crc32);
+  if (!member.deflated) writer.add_member(member.name, data.bytes(), false);
 }
 
 void Assembly::add_textures(TileIndex index, const ArchiveReader& from) {
@@ -177,14 +224,14 @@ void Assembly::add_textures(TileIndex index, const ArchiveReader& from) {
   }
   std::sort(members.begin(), members.end(),
             [](const auto& a, const auto& b) { return a.offset_bytes < b.offset_bytes; });
-  for (const MemberEntry& member : members) copy_member(from, member);
+  for (const MemberEntry& member : members) copy_member(from, member, writer_);
 }
 
 /// Copied where what they tell of is of one origin, else made of the row as it is now.
 void Assembly::add_seeds(std::int64_t row, const Row& tiles) {
   const ArchiveReader* first = nullptr;
   bool is_one = true;
-  for (const Tile& tile : tiles) {
+  for (const RowTile& tile : tiles) {
     if (tile.from == nullptr) continue;  // void, or not asked for
     if (first == nullptr) first = tile.from;
     is_one = is_one && tile.from == first;
@@ -193,7 +240,7 @@ void Assembly::add_seeds(std::int64_t row, const Row& tiles) {
     for (std::size_t i = 0; i < tiles.size(); ++i) {
       if (tiles[i].from == nullptr) continue;
       const auto member = tiles[i].from->find_member(seed_name({static_cast<std::int64_t>(i), row}));
-      if (member) copy_member(*tiles[i].from, *member);
+      if (member) copy_member(*tiles[i].from, *member, writer_);
     }
     return;
   }
@@ -215,7 +262,7 @@ void Assembly::add_seeds(std::int64_t row, const Row& tiles) {
 void Assembly::compare_edges(std::int64_t row, const Row& tiles, const Row& above) const {
   const TileShape& shape = metadata_.grid.shape();
   const auto columns = static_cast<std::int64_t>(tiles.size());
-  const auto value = [&](const Tile& tile, GridVertex vertex) -> double {
+  const auto value = [&](const RowTile& tile, GridVertex vertex) -> double {
     const TileCodes& codes = tile.from == nullptr ? void_codes_ : tile.codes;
     const auto at = static_cast<std::size_t>(vertex.row * shape.columns() + vertex.column);
     if (codes.type != CodeType::kF32) return codes.codes[at];
@@ -231,14 +278,14 @@ void Assembly::compare_edges(std::int64_t row, const Row& tiles, const Row& abov
       const TileIndex one = step.row == 0 ? TileIndex{column, row} : TileIndex{other, row - 1};
       const TileIndex two = step.row == 0 ? TileIndex{other, row} : TileIndex{column, row};
       if (!request_.tiles.contains(one) || !request_.tiles.contains(two)) continue;
-      const Tile& here =
+      const RowTile& here =
           step.row == 0 ? tiles[static_cast<std::size_t>(column)] : above[static_cast<std::size_t>(other)];
-      const Tile& there = tiles[static_cast<std::size_t>(step.row == 0 ? other : column)];
+      const RowTile& there = tiles[static_cast<std::size_t>(step.row == 0 ? other : column)];
       if (here.from == there.from) continue;
       if (shared.empty()) shared = shared_vertices(shape, step);
       for (const SharedVertex& vertex : shared) {
         if (value(here, vertex.here) == value(there, vertex.there)) continue;
-        const auto name = [](const Tile& tile) { return tile.from == nullptr ? "void" : tile.from->path(); };
+        const auto name = [](const RowTile& tile) { return tile.from == nullptr ? "void" : tile.from->path(); };
         throw Error(
             ErrorCode::kInvalidArgument,
             fmt::format("tile ({},{}) of {} does not meet its neighbour of {}: a vertex that both hold differs; "
@@ -280,7 +327,7 @@ void Assembly::add_other_members(bool everything) {
         all[at->second] = {input.archive, std::move(member)};
     }
   }
-  for (const auto& [from, member] : all) copy_member(*from, member);
+  for (const auto& [from, member] : all) copy_member(*from, member, writer_);
 }
 
 }  // namespace isohf

@@ -24,10 +24,14 @@ struct AssemblyRequest {
   std::vector<AssemblyInput> inputs;  ///< the last that holds a tile gives it; all on one grid
   TileRange tiles;                    ///< that are to be there
   PlaneStage* planes = nullptr;       ///< takes all tiles
+  bool has_plane_rows = false;        ///< no: the inputs hold the first plane's tiles as they will be
   bool one_origin = true;             ///< edges meet and seeds hold wherever the inputs are joined
   bool recount = false;               ///< give the writer each tile's statistics, by counting
   bool checks_digests = false;        ///< decode every tile and hold it against its digest
 };
+
+/// Copies a member as it is.
+void copy_member(const ArchiveReader& from, const MemberEntry& member, ArchiveWriter& writer);
 
 /// Writes an archive of other archives' tiles, which are not coded again, in the order in which convert() does: a tile's
 /// textures, the tile; behind a row, planes and seeds. On the caller's oneTBB arena. Stage "tiles".
@@ -49,15 +53,20 @@ class Assembly {
     TileCodes codes;
     PlaneSample sample;
   };
-  using Row = std::vector<Tile>;
+  /// What is kept of it for its row.
+  struct RowTile {
+    const ArchiveReader* from = nullptr;
+    TileCodes codes;  ///< where origins differ
+  };
+  using Row = std::vector<RowTile>;
 
   [[nodiscard]] std::vector<const AssemblyInput*> inputs_of_row(std::int64_t row) const;
   void read(std::span<const AssemblyInput* const> inputs, TileIndex first, std::span<Tile> tiles) const;
   void read(TileIndex index, Tile& tile) const;
+  void add_plane_rows(std::int64_t row);
   void add_textures(TileIndex index, const ArchiveReader& from);
   void add_seeds(std::int64_t row, const Row& tiles);
   void compare_edges(std::int64_t row, const Row& tiles, const Row& above) const;
-  void copy_member(const ArchiveReader& from, const MemberEntry& member);
   [[nodiscard]] bool decodes() const;
 
   const Metadata& metadata_;
@@ -69,6 +78,7 @@ class Assembly {
   std::optional<CountedVertices> counted_;
   TileCodes void_codes_;
   std::vector<std::byte> void_digest_;
+  std::int64_t next_plane_row_ = 0;
 };
 
 }  // namespace isohf

@@ -146,7 +146,7 @@ PartSummary merge_archives(const std::vector<std::string>& archives, const std::
     most.clamped = std::max(most.clamped, statistics.clamped);
   }
   return write_parts({std::move(inputs), all, std::move(metadata), one_origin ? origins.front().whole_json : "",
-                      one_origin, std::nullopt},
+                      one_origin, false, std::nullopt},
                      output, options, job);
 }
 

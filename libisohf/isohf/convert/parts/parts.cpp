@@ -13,6 +13,7 @@
 #include "isohf/archive/textures/texture_info.h"
 #include "isohf/base/arena.h"
 #include "isohf/convert/job_description.h"
+#include "isohf/convert/parts/residual_members.h"
 #include "isohf/error.h"
 #include "isohf/restore/lossless.h"
 
@@ -134,17 +135,39 @@ PartOrigin origin_of(const ArchiveReader& archive) {
   }
 }
 
+namespace {
+
+/// Those of one archive or plan; nullopt where there are none, or not of one.
+std::optional<ResidualMembers> residuals_of(const PartsJob& parts, const std::optional<Metadata>& whole) {
+  std::optional<LosslessRecord> record;
+  if (whole) record = lossless_record(*whole);
+  if (!whole && parts.one_origin) record = part_lossless_record(parts.metadata);
+  if (!record) return std::nullopt;
+  return ResidualMembers(std::move(*record), parts.inputs, parts.tiles, parts.metadata.grid.tile_rows());
+}
+
+}  // namespace
+
 PartSummary write_parts(PartsJob parts, const std::string& output, const PartOptions& options, const Job& job) {
   Metadata& metadata = parts.metadata;
   PartSummary summary;
   summary.tiles = parts.tiles;
   summary.is_whole = parts.tiles == all_tiles(metadata.grid);
   drop_extension(metadata, kPartName);
-  const bool had_residuals = std::any_of(parts.inputs.begin(), parts.inputs.end(), [](const AssemblyInput& input) {
-    return lossless_record(input.archive->metadata()).has_value();
-  });
-  if (had_residuals) summary.warnings.push_back(loss("residuals are left out: they belong to rows of the source"));
+  std::optional<Metadata> whole;
+  if (!parts.whole_json.empty()) whole.emplace(parse_metadata(parts.whole_json));
+  std::optional<ResidualMembers> residuals = residuals_of(parts, whole);
+  if (residuals && summary.is_whole && !residuals->are_complete())
+    residuals.reset();  // older programs cut without them
+  const auto has_some = [](const AssemblyInput& input) {
+    const auto& tables = input.archive->tables();
+    return std::any_of(tables.begin(), tables.end(), [](const auto& table) { return is_residual(table.name); });
+  };
+  if (!residuals && std::any_of(parts.inputs.begin(), parts.inputs.end(), has_some)) {
+    summary.warnings.push_back(loss("residuals are left out: they are not those of all that is joined"));
+  }
   drop_extension(metadata, kLosslessName);
+  drop_extension(metadata, kPartLosslessName);
   if (options.strict && !summary.warnings.empty()) throw error_from(summary.warnings);
   WriterOptions how;
   how.overwrite = options.overwrite;
@@ -154,19 +177,20 @@ PartSummary write_parts(PartsJob parts, const std::string& output, const PartOpt
   Arena(job).execute([&] {
     std::optional<PlaneStage> planes;
     if (metadata.planes.count > 0) {
-      planes.emplace(planes_of(metadata), metadata.quantisation, metadata.level.value_or(kDefaultLevel), writer);
+      planes.emplace(planes_of(metadata), metadata.quantisation, metadata.level.value_or(kDefaultLevel), writer,
+                     RowRange{0, metadata.grid.tile_rows() - 1});
     }
-    AssemblyRequest request{parts.inputs,     parts.tiles,       planes ? &*planes : nullptr,
-                            parts.one_origin, !parts.statistics, false};
+    AssemblyRequest request{
+        parts.inputs,      parts.tiles, planes ? &*planes : nullptr, parts.has_plane_rows, parts.one_origin,
+        !parts.statistics, false};
     Assembly assembly(metadata, writer, std::move(request), job);
     assembly.add_tiles();
+    if (residuals) residuals->copy_to(writer);
     assembly.add_other_members(false);
   });
-  std::optional<Metadata> whole;
-  if (summary.is_whole && !parts.whole_json.empty()) whole.emplace(parse_metadata(parts.whole_json));
-  if (whole && whole->content_sha256 == writer.content_hash(*whole)) {
-    summary.same_as_whole = !lossless_record(*whole).has_value();
-    drop_extension(*whole, kLosslessName);
+  if (whole && summary.is_whole && whole->content_sha256 == writer.content_hash(*whole)) {
+    summary.same_as_whole = residuals || !lossless_record(*whole);
+    if (!residuals) drop_extension(*whole, kLosslessName);
     metadata = *whole;
   } else {
     for (const char* name : {kAccuracyName, kJobName}) {
@@ -179,6 +203,7 @@ PartSummary write_parts(PartsJob parts, const std::string& output, const PartOpt
       metadata.statistics.worst_rounding = before.worst_rounding;
       metadata.statistics.clamped = before.clamped;
     }
+    if (residuals && summary.is_whole) set_extension(metadata, kLosslessName, format_lossless(residuals->record()));
     if (!summary.is_whole) {
       PartRecord record;
       record.tiles = parts.tiles;
@@ -208,8 +233,8 @@ PartSummary extract_tiles(const std::string& archive, const std::string& output,
   if (origin.is_shard) {
     throw Error(ErrorCode::kInvalidArgument, archive + ": is a shard of a plan; join the shards first");
   }
-  return write_parts({{{&reader, tiles}}, tiles, reader.metadata(), origin.whole_json, true, std::nullopt}, output,
-                     options, job);
+  return write_parts({{{&reader, tiles}}, tiles, reader.metadata(), origin.whole_json, true, false, std::nullopt},
+                     output, options, job);
 }
 
 }  // namespace isohf

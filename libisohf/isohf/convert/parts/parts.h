@@ -48,6 +48,7 @@ struct PartsJob {
   Metadata metadata;       ///< counts, hashes and what says that it is a part are filled in
   std::string whole_json;  ///< as in PartOrigin; empty where the parts are of several
   bool one_origin = true;
+  bool has_plane_rows = false;           ///< AssemblyRequest's
   std::optional<Statistics> statistics;  ///< where they are known; else tiles are decoded and counted
 };
 /// Throws as merge_archives() does once it writes.

@@ -15,18 +15,19 @@
 #include "isohf/convert/job_description.h"
 #include "isohf/convert/parts/parts.h"
 #include "isohf/convert/run_conversion.h"
+#include "isohf/convert/stages/residual_stage.h"
 #include "isohf/error.h"
 
 namespace isohf {
 namespace {
 
-constexpr int kPlanVersion = 1;
+constexpr int kPlanVersion = 2;
 
 void codes_members(JsonMembers& json, ShardPlan::Codes& codes) {
   json.name("type", codes.quantisation.type, code_type_from_string);
   json("offset", codes.quantisation.offset);
   json("scale", codes.quantisation.scale, {.least = 0.0, .above_least = true});
-  json.all("datum", codes.datum, "height_error", codes.height_error);
+  json.all("datum", codes.datum, "height_error", codes.height_error, "largest", codes.largest);
 }
 
 void plan_members(JsonMembers& json, ShardPlan& plan) {
@@ -40,6 +41,7 @@ void plan_members(JsonMembers& json, ShardPlan& plan) {
   json.all("arguments", plan.arguments, "job", plan.job);
   json.object("tiles", "columns", plan.tile_columns, "rows", plan.tile_rows);
   json.object("codes", plan.codes, codes_members, {.presence = JsonRule::kAbsent});
+  json("samples_sha256", plan.samples_sha256, {.presence = JsonRule::kAbsent});
   // The rows that shards end before.
   std::vector<double> ends;
   for (const auto& [first, end] : plan.shards) ends.push_back(static_cast<double>(end));
@@ -69,9 +71,13 @@ void refuse_what_needs_all(const ConvertOptions& options) {
                                                          "leave it out, or convert without a plan",
                                                          what));
   };
-  if (options.lossless) refuse("`lossless`");
   if (options.max_error) refuse("`max_error`");
   if (options.measure) refuse("measuring");
+}
+
+/// What shards must agree on, beside the plan's own members.
+std::string job_of(const SourceInfo& info, const Plan& plan, const ConvertOptions& options) {
+  return job_fingerprint(info, plan, options) + (options.lossless ? " | lossless" : "");
 }
 
 TileRange tiles_of_shard(const ShardPlan& plan, int number) {
@@ -88,7 +94,7 @@ Plan planned(const HeightSource& source, const ShardPlan& plan, int number, cons
     throw Error(ErrorCode::kInvalidArgument, fmt::format("there is no shard {}: the plan has 1 to {}", number, count));
   }
   Plan whole = make_plan(source.info(), options.plan);
-  const std::string found = job_fingerprint(source.info(), whole, options);
+  const std::string found = job_of(source.info(), whole, options);
   if (found != plan.job) {
     const auto at = std::mismatch(found.begin(), found.end(), plan.job.begin(), plan.job.end());
     const auto around = [](const std::string& text, std::ptrdiff_t place) {
@@ -102,6 +108,8 @@ Plan planned(const HeightSource& source, const ShardPlan& plan, int number, cons
                     source.info().path, around(found, at.first - found.begin()),
                     around(plan.job, at.second - plan.job.begin())));
   }
+  if (plan.codes && options.lossless && !plan.samples_sha256)
+    throw Error(ErrorCode::kCorrupt, "the plan is of a lossless conversion, its `samples_sha256` is missing");
   return whole;
 }
 
@@ -182,11 +190,19 @@ Statistics joined_statistics(const std::vector<const ArchiveReader*>& shards) {
   return total_statistics(all);
 }
 
+/// Whether each row of the first plane is above tiles of one shard, which then has it.
+bool holds_plane_rows(const ShardPlan& plan, const PlaneInfo& planes) {
+  return planes.count > 0 && std::all_of(plan.shards.begin(), plan.shards.end(), [&](const auto& shard) {
+           return shard.second % planes.stride == 0 || shard.second == plan.tile_rows;
+         });
+}
+
 }  // namespace
 
 ShardPlan plan_shards(HeightSource& source, const ConvertOptions& options, int shards, const Job& job) {
   ShardPlan plan = draft_shards(source, options, shards);
   plan.codes = find_codes(source, make_plan(source.info(), options.plan), options, job, plan.warnings);
+  if (options.lossless) plan.samples_sha256 = hash_of_samples(source.as_stored(), job);
   return plan;
 }
 
@@ -195,7 +211,7 @@ ShardPlan draft_shards(const HeightSource& source, const ConvertOptions& options
   if (shards < 1) throw Error(ErrorCode::kInvalidArgument, fmt::format("{} shards are asked for, at least 1", shards));
   const Plan plan = make_plan(source.info(), options.plan);
   ShardPlan found;
-  found.job = job_fingerprint(source.info(), plan, options);
+  found.job = job_of(source.info(), plan, options);
   found.tile_columns = plan.grid.tile_columns();
   found.tile_rows = plan.grid.tile_rows();
   const PlaneInfo planes = options.planes ? planes_for(plan.grid) : PlaneInfo();
@@ -240,7 +256,7 @@ bool is_scan(const std::string& json, const ShardPlan& draft, int number) {
 }
 
 ShardPlan scanned(HeightSource& source, const ShardPlan& draft, const std::vector<std::string>& scans,
-                  const ConvertOptions& options) {
+                  const ConvertOptions& options, const Job& job) {
   const Plan plan = planned(source, draft, 1, options);
   const std::string digest = digest_of(draft);
   std::vector<std::optional<RangeScan>> found(draft.shards.size());
@@ -265,6 +281,7 @@ ShardPlan scanned(HeightSource& source, const ShardPlan& draft, const std::vecto
   problems.throw_if_any();
   ShardPlan result = draft;
   result.codes = codes_of(source, plan, options, all);
+  if (options.lossless) result.samples_sha256 = hash_of_samples(source.as_stored(), job);
   return result;
 }
 
@@ -274,7 +291,7 @@ ConvertSummary convert_shard(HeightSource& source, const ShardPlan& plan, int nu
   const Plan whole = planned(source, plan, number, options);
   const int count = static_cast<int>(plan.shards.size());
   const auto [first, end] = plan.shards[static_cast<std::size_t>(number - 1)];
-  const ShardWork work{first, end, *plan.codes, {digest_of(plan), number, count, {}}};
+  const ShardWork work{first, end, *plan.codes, {digest_of(plan), number, count, {}}, plan.samples_sha256};
   return run_conversion(source, whole, output, options, job, false, &work).summary;
 }
 
@@ -342,8 +359,13 @@ PartSummary merge_shards(const ShardPlan& plan, const std::vector<std::string>& 
     if (!why.empty()) problems.add(fmt::format("{}: {} as {} has", shard->path(), why, shards.front()->path()));
   }
   problems.throw_if_any();
-  PartsJob parts{{},   all_tiles(shards.front()->grid()), shards.front()->metadata(), {},
-                 true, joined_statistics(shards)};
+  PartsJob parts{{},
+                 all_tiles(shards.front()->grid()),
+                 shards.front()->metadata(),
+                 {},
+                 true,
+                 holds_plane_rows(plan, shards.front()->metadata().planes),
+                 joined_statistics(shards)};
   for (std::size_t i = 0; i < shards.size(); ++i)
     parts.inputs.push_back({shards[i], tiles_of_shard(plan, static_cast<int>(i) + 1)});
   return write_parts(std::move(parts), output, options, job);

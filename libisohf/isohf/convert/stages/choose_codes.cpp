@@ -126,6 +126,7 @@ QuantisationRequest request_of(Conversion& conversion, const ElevationRange& ran
   const ConvertOptions& options = conversion.options;
   QuantisationRequest request{options.code_type, options.step, options.max_rounding};
   conversion.datum = choose_datum(range);
+  conversion.largest = std::max(std::abs(range.min), std::abs(range.max));
   conversion.height_error = height_error(conversion.kernel, conversion.prefilter, range, conversion.datum);
   request.height_error = conversion.height_error;
   // Of the error that is allowed an eighth is left to the rounding, which then takes few bytes.

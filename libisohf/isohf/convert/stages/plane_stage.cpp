@@ -4,12 +4,17 @@
 
 namespace isohf {
 
-PlaneStage::PlaneStage(const Planes& planes, const Quantisation& quantisation, int level, ArchiveWriter& writer)
-    : builder_(
+PlaneStage::PlaneStage(const Planes& planes, const Quantisation& quantisation, int level, ArchiveWriter& writer,
+                       const RowRange& rows, const TilesAround* around)
+    : around_(around),
+      builder_(
           planes, quantisation.type,
           [shape = planes.grid(0).shape(), level](const TileCodes& codes) { return encode_tile(shape, codes, level); },
-          [&writer](int plane, TileIndex tile, const EncodedTile& encoded) {
-            if (!encoded.is_empty) writer.add_plane_tile(plane, tile, encoded, {encoded.code_min, encoded.code_max});
+          [&writer, rows, planes](int plane, TileIndex tile, const EncodedTile& encoded) {
+            const std::int64_t height = planes.scale(plane);  // in rows of tiles
+            const bool is_ours = tile.row * height <= rows.last && (tile.row + 1) * height > rows.first;
+            if (is_ours && !encoded.is_empty)
+              writer.add_plane_tile(plane, tile, encoded, {encoded.code_min, encoded.code_max});
           }) {
   const std::int64_t tiles = writer.next_tile();
   if (tiles == 0) return;
@@ -18,6 +23,11 @@ PlaneStage::PlaneStage(const Planes& planes, const Quantisation& quantisation, i
   const auto read = [&](int plane, TileIndex tile) {
     const TileEntry entry = writer.tile_entry(tile, plane);
     PlaneBuilder::Stored stored;
+    if (plane == 0 && around_ != nullptr && around_->holds(tile)) {
+      stored.entry = around_->entry(tile);
+      stored.codes = around_->codes(tile);
+      return stored;
+    }
     stored.entry.is_empty = !entry.stored;
     stored.entry.code_min = entry.code_min;
     stored.entry.code_max = entry.code_max;
@@ -27,6 +37,11 @@ PlaneStage::PlaneStage(const Planes& planes, const Quantisation& quantisation, i
   builder_.resume_after(tiles - 1, read);
   const PlaneBuilder::Stored last = read(0, planes.grid(0).tile_at(tiles - 1));
   builder_.add(sample(last.codes, last.entry));
+}
+
+void PlaneStage::add_outside(TileIndex tile) {
+  const bool is_known = around_ != nullptr && around_->holds(tile);
+  add(is_known ? sample(around_->codes(tile), around_->entry(tile)) : PlaneSample());
 }
 
 }  // namespace isohf

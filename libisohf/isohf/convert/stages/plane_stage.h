@@ -4,6 +4,7 @@
 
 #include "isohf/archive/planes/plane_builder.h"
 #include "isohf/archive/writer.h"
+#include "isohf/convert/stages/tiles_around.h"
 
 namespace isohf {
 
@@ -12,7 +13,10 @@ namespace isohf {
 class PlaneStage {
  public:
   /// Goes on where the writer stands; it outlives this. `level` is that of the tiles. On the caller's oneTBB arena.
-  PlaneStage(const Planes& planes, const Quantisation& quantisation, int level, ArchiveWriter& writer);
+  ///   rows    of tiles that are made: all but a shard's; tiles of planes above none of them are not made
+  ///   around  the rows beside a shard's, so that its planes' tiles are those of the whole
+  PlaneStage(const Planes& planes, const Quantisation& quantisation, int level, ArchiveWriter& writer,
+             const RowRange& rows, const TilesAround* around = nullptr);
 
   /// Any thread.
   [[nodiscard]] PlaneSample sample(const TileCodes& codes, const EncodedTile& encoded) const {
@@ -21,8 +25,16 @@ class PlaneStage {
 
   /// Takes the tile that was added to the writer last. One thread.
   void add(const PlaneSample& sample) { builder_.add(sample); }
+  /// Takes a tile that another shard makes.
+  void add_outside(TileIndex tile);
+  /// Instead of tiles those of plane 1, which are there: PlaneBuilder.
+  void add_finished(const PlaneSample& sample) { builder_.add_finished(sample); }
+  [[nodiscard]] PlaneSample finished_sample(TileIndex tile, const PlaneBuilder::Read& read) const {
+    return builder_.sample_of(1, tile, read);
+  }
 
  private:
+  const TilesAround* around_;
   PlaneBuilder builder_;
 };
 

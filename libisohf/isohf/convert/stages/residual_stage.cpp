@@ -76,51 +76,57 @@ std::uint64_t residual_stage_memory_bytes(const SourceInfo& info, const Plan& pl
   return static_cast<std::uint64_t>(bands + encoding + tiles + lattice_rows * width * 17.0);
 }
 
-LosslessRecord write_residuals(HeightSource& source, const SourceFrame& frame, const TileGrid& grid,
-                               const Quantisation& quantisation, std::size_t members_at_once, ArchiveWriter& writer,
-                               const Job& job) {
+ResidualStage::ResidualStage(HeightSource& source, const SourceFrame& frame, const TileGrid& grid,
+                             const Quantisation& quantisation, double largest, const RowRange& tile_rows)
+    : source_(source) {
   const SourceInfo& info = source.info();
-  LosslessRecord record;
-  record.mapping = {info.sample_type, info.z_scale, info.z_offset};
-  record.width = info.width;
-  record.height = info.height;
-  record.void_values = info.void_values;
-  record.rows_per_member = rows_per_member(info);
-  writer.flush_tiles();
-  const TileStatistics stored = writer.statistics();
-  record.fraction_bits = FixedHeights::bits_for(quantisation, std::max(std::abs(stored.min), std::abs(stored.max)));
-  std::vector<std::byte> nodes;
+  record_.mapping = {info.sample_type, info.z_scale, info.z_offset};
+  record_.width = info.width;
+  record_.height = info.height;
+  record_.void_values = info.void_values;
+  record_.rows_per_member = rows_per_member(info);
+  record_.fraction_bits = FixedHeights::bits_for(quantisation, largest);
+  rows_ = residual_rows_at(record_, grid.tile_rows(), tile_rows);
   if (frame.warp) {
     const ExactWarp warp(*frame.warp);
     const PlaceMesh places(info.width, info.height, grid, [&](double column, double row) {
       return warp.world_from_source({column, row});
     });
-    record.prediction = SamplePrediction::kTriangles;
-    nodes = places.bytes();
-    writer.add_member(kNodesName, nodes, true);
+    record_.prediction = SamplePrediction::kTriangles;
+    nodes_ = places.bytes();
   }
-  const ReadTiles read_tiles = [&](std::span<const TileIndex> tiles) {
-    std::vector<TileCodes> codes;
-    for (const TileIndex tile : tiles) codes.push_back(writer.read_tile(tile, quantisation));
-    return codes;
-  };
-  SamplePredictor surface(
-      grid, frame.wraps_x, quantisation, read_tiles,
-      {frame.width, frame.height, frame.first_sample_x, frame.first_sample_z, frame.spacing_x, frame.spacing_z}, record,
-      [&](const char*) { return nodes; });
+  surface_.emplace(
+      grid, frame.wraps_x, quantisation, [this](std::span<const TileIndex> tiles) { return read_tiles_(tiles); },
+      SampleGrid{frame.width, frame.height, frame.first_sample_x, frame.first_sample_z, frame.spacing_x,
+                 frame.spacing_z},
+      record_, [this](const char*) { return nodes_; });
+}
+
+RowRange ResidualStage::tile_rows_needed() const {
+  if (rows_.first > rows_.last) return {0, -1};
+  return surface_->tile_rows_needed(rows_.first, rows_.last - rows_.first + 1);
+}
+
+LosslessRecord ResidualStage::write(const ReadTiles& read_tiles, std::size_t members_at_once,
+                                    const std::optional<std::string>& sha256, ArchiveWriter& writer, const Job& job) {
+  const SourceInfo& info = source_.info();
+  const std::int64_t end = rows_.last + 1;
+  LosslessRecord record = record_;
+  read_tiles_ = read_tiles;
+  if (!nodes_.empty() && rows_.first == 0) writer.add_member(kNodesName, nodes_, true);
   Sha256 hash;
-  for (std::int64_t row = 0; row < info.height;) {
+  for (std::int64_t row = rows_.first; row < end;) {
     std::vector<ResidualBand> bands;
-    for (; row < info.height && bands.size() < members_at_once; row += record.rows_per_member) {
+    for (; row < end && bands.size() < members_at_once; row += record.rows_per_member) {
       job.throw_if_cancelled();
       ResidualBand& band = bands.emplace_back();
       const std::int64_t rows = std::min(record.rows_per_member, info.height - row);
       band.first_row = row;
       band.predicted.resize(static_cast<std::size_t>(rows * info.width));
       band.raw.resize(band.predicted.size() * size_bytes(info.sample_type));
-      source.read_window({0, row, info.width, rows}, band.raw);
-      hash.add(band.raw);
-      surface.read(row, rows, band.predicted);
+      source_.read_window({0, row, info.width, rows}, band.raw);
+      if (!sha256) hash.add(band.raw);
+      surface_->read(row, rows, band.predicted);
     }
     oneapi::tbb::parallel_for(std::size_t{0}, bands.size(),
                               [&](std::size_t i) { bands[i].encode(info, record.mapping); });
@@ -128,10 +134,26 @@ LosslessRecord write_residuals(HeightSource& source, const SourceFrame& frame, c
       writer.add_deflated_member(residual_name(band.first_row), band.deflated, band.payload_bytes, band.payload_crc32);
       record.residual_bytes += band.deflated.size();
     }
-    job.report({"residuals", "rows", std::min(row, info.height), info.height, writer.bytes_written()});
+    job.report({"residuals", "rows", std::min(row, end) - rows_.first, end - rows_.first, writer.bytes_written()});
   }
-  record.sha256 = hex(hash.finish());
+  record.sha256 = sha256 ? *sha256 : hex(hash.finish());
   return record;
+}
+
+std::string hash_of_samples(HeightSource& source, const Job& job) {
+  const SourceInfo& info = source.info();
+  Sha256 hash;
+  std::vector<std::byte> raw;
+  const std::int64_t step = rows_per_member(info);
+  for (std::int64_t row = 0; row < info.height; row += step) {
+    job.throw_if_cancelled();
+    const std::int64_t rows = std::min(step, info.height - row);
+    raw.resize(static_cast<std::size_t>(rows * info.width) * size_bytes(info.sample_type));
+    source.read_window({0, row, info.width, rows}, raw);
+    hash.add(raw);
+    job.report({"hash", "rows", row + rows, info.height});
+  }
+  return hex(hash.finish());
 }
 
 }  // namespace isohf

@@ -260,18 +260,30 @@ void SplinePredictor::keep_lattice_rows(std::int64_t first, std::int64_t last) {
   }
 }
 
-void SplinePredictor::read(std::int64_t first, std::int64_t rows, std::span<double> elevations) {
-  ISOHF_ASSERT(elevations.size() == static_cast<std::size_t>(rows * samples_.width));
-  const std::int64_t count = lattice_rows();
-  const std::int64_t last_z = kPlaceParts * (count - 3);
+/// The lattice rows at or before the first and the last of some rows of samples.
+RowRange SplinePredictor::middles(std::int64_t first, std::int64_t rows) const {
+  const std::int64_t last_z = kPlaceParts * (lattice_rows() - 3);
   const auto middle = [&](std::int64_t row) {
     return std::clamp<std::int64_t>(z_of(row), 0, last_z) / kPlaceParts + 1;
   };
-  const std::int64_t north = middle(first);
-  const std::int64_t south = middle(first + rows - 1);
-  // What is mirrored at an end lies less far inside.
-  const std::int64_t low = std::max<std::int64_t>(north - kReach + 1, 0);
-  const std::int64_t high = std::min(south + kReach, count - 1);
+  return {middle(first), middle(first + rows - 1)};
+}
+
+/// What is mirrored at an end lies less far inside.
+RowRange SplinePredictor::lattice_rows_needed(const RowRange& middles) const {
+  return {std::max<std::int64_t>(middles.first - kReach + 1, 0), std::min(middles.last + kReach, lattice_rows() - 1)};
+}
+
+RowRange SplinePredictor::tile_rows_needed(std::int64_t first, std::int64_t rows) const {
+  const RowRange needed = lattice_rows_needed(middles(first, rows));
+  return {tile_row_of(needed.first), tile_row_of(needed.last)};
+}
+
+void SplinePredictor::read(std::int64_t first, std::int64_t rows, std::span<double> elevations) {
+  ISOHF_ASSERT(elevations.size() == static_cast<std::size_t>(rows * samples_.width));
+  const std::int64_t count = lattice_rows();
+  const auto [north, south] = middles(first, rows);
+  const auto [low, high] = lattice_rows_needed({north, south});
   for (std::int64_t row = tile_row_of(north); row <= tile_row_of(south); ++row) (void)tile_row(row);
   keep_lattice_rows(low, high);
   std::vector<std::int64_t> wanted;
@@ -283,7 +295,7 @@ void SplinePredictor::read(std::int64_t first, std::int64_t rows, std::span<doub
     read_row(first + i, elevations.subspan(static_cast<std::size_t>(i * samples_.width), x_.size()));
   });
   // What lies North of the next row's tiles is done with.
-  const std::int64_t next = tile_row_of(middle(first + rows));
+  const std::int64_t next = tile_row_of(middles(first + rows, 1).first);
   std::erase_if(tile_rows_, [next](const TileRow& kept) { return kept.row < next; });
 }
 

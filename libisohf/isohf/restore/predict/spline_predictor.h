@@ -8,6 +8,7 @@
 
 #include "isohf/restore/point_sampler.h"
 #include "isohf/restore/predict/fixed_point.h"
+#include "isohf/surface/source/source_band.h"
 
 namespace isohf {
 
@@ -28,6 +29,8 @@ class SplinePredictor {
   SplinePredictor(const TileGrid& grid, bool wraps_x, const FixedHeights& heights, ReadTiles read_tiles,
                   const SampleGrid& samples);
 
+  /// The rows of tiles that read() reads.
+  [[nodiscard]] RowRange tile_rows_needed(std::int64_t first, std::int64_t rows) const;
   /// Rows `first` to `first + rows - 1`; calls come in increasing order.
   /// elevations [rows * width] out, vertical units; NaN where there is no prediction.
   void read(std::int64_t first, std::int64_t rows, std::span<double> elevations);
@@ -55,6 +58,8 @@ class SplinePredictor {
   [[nodiscard]] std::int64_t tile_row_of(std::int64_t lattice_row) const;
   [[nodiscard]] const LatticeRow& at(std::int64_t lattice_row) const;
   [[nodiscard]] std::int64_t z_of(std::int64_t row) const;
+  [[nodiscard]] RowRange middles(std::int64_t first, std::int64_t rows) const;
+  [[nodiscard]] RowRange lattice_rows_needed(const RowRange& middles) const;
   [[nodiscard]] std::vector<double> line_of(const TileRow& tiles, std::int64_t lattice_row) const;
   void straighten(const TileRow& tiles, std::int64_t lattice_row, LatticeRow& made) const;
   void make_coefficients(std::int64_t lattice_row);
