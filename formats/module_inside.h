@@ -9,7 +9,7 @@
 
 #include "isohf/error.h"
 
-/// What crosses a module's C boundary, seen from inside the modules isohf_oiio.so and isohf_proj.so.
+/// What crosses a module's C boundary, seen from inside the modules isohf_oiio.so, isohf_proj.so and isohf_netcdf.so.
 
 namespace isohf {
 

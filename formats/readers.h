@@ -61,8 +61,8 @@ namespace isohf {
 [[nodiscard]] std::unique_ptr<HeightSource> open_header_grid(const std::string& path, const OpenOptions& options);
 
 /// Plain samples that an ENVI header (NAME.hdr or NAME.EXT.hdr) describes; `path` is either. Bands in any order, of which
-/// options.channel picks one by its number; integers of 8 to 32 bits, floats of 32 and 64, both byte orders. Cells are
-/// areas; "coordinate system string" is WKT.
+/// options.channel picks one by its name or number; integers of 8 to 64 bits, floats of 32 and 64, both byte orders.
+/// Cells are areas; "coordinate system string" is WKT; gains and offsets are the vertical scale and offset.
 [[nodiscard]] bool looks_like_envi(std::span<const std::byte> head);
 /// Whether a file has an ENVI header beside it.
 [[nodiscard]] bool has_envi_header(const std::string& path);
@@ -72,12 +72,17 @@ namespace isohf {
 /// are areas. A .prj beside is read.
 [[nodiscard]] std::unique_ptr<HeightSource> open_saga(const std::string& path, const OpenOptions& options);
 
-/// A variable of two dimensions (those before of one value) in a netCDF file of the classic formats, which
-/// options.channel names, else the first; coordinates that are evenly spaced place it, "crs_wkt" or "spatial_ref" of its
-/// grid mapping say where, degrees without one are on WGS 84. Also GMT's grids of before CF. _FillValue and missing_value
+/// A variable of two dimensions (those before of one value, columns first or last) in a netCDF file of the classic
+/// formats, which options.channel names, else the first; coordinates that are evenly spaced place it, "crs_wkt" or
+/// "spatial_ref" of its grid mapping say where, degrees without one are on WGS 84. Also GMT's grids of before CF. _FillValue and missing_value
 /// are nodata, scale_factor and add_offset the vertical scale and offset.
 [[nodiscard]] bool looks_like_netcdf(std::span<const std::byte> head);
 [[nodiscard]] std::unique_ptr<HeightSource> open_netcdf(const std::string& path, const OpenOptions& options);
+
+/// The same of a netCDF-4 file, which is HDF5, through libnetcdf in the module isohf_netcdf.so, which is loaded at the
+/// first call. Blocks are its chunks, of 1 GiB at most; two rows of them are kept.
+[[nodiscard]] bool looks_like_hdf5(std::span<const std::byte> head);
+[[nodiscard]] std::unique_ptr<HeightSource> open_netcdf4(const std::string& path, const OpenOptions& options);
 
 /// A GDAL virtual raster (VRT): rectangles of other files, read by whichever reader knows them, side by side and over
 /// each other (SimpleSource, ComplexSource with NODATA, ScaleOffset and ScaleRatio). At most 16 files are open at once.
@@ -94,6 +99,15 @@ namespace isohf {
 /// Whether `path` is a data file (.img) whose PDS3 label lies beside it: the same name with .lbl, in any case.
 [[nodiscard]] bool has_pds3_label(const std::string& path);
 [[nodiscard]] std::unique_ptr<HeightSource> open_pds3(const std::string& path, const OpenOptions& options);
+
+/// The first array of a PDS4 product (XML label; PDS4 Data Standards, Array_2D_Image, Array_3D_Image and their kin): the
+/// label, or the data file (.img) beside which it lies. Integers of 8 to 64 bits and IEEE floats, both byte orders, axes
+/// in any order; options.channel picks a band by its number. Special_Constants are nodata, scaling_factor and
+/// value_offset the vertical scale and offset; the area Cartography places the samples.
+[[nodiscard]] bool looks_like_pds4(std::span<const std::byte> head);
+/// Whether `path` is a label, or has one beside it: long prologues put the product beyond a file's first bytes.
+[[nodiscard]] bool is_pds4(const std::string& path);
+[[nodiscard]] std::unique_ptr<HeightSource> open_pds4(const std::string& path, const OpenOptions& options);
 
 /// An ISIS 3 cube with its label in the file, or a label whose ^Core names the file beside it (USGS, ISIS 3 logical and
 /// physical cube formats): tiles or bands in sequence, both byte orders; Base and Multiplier are the vertical offset and
@@ -149,6 +163,7 @@ namespace isohf {
 
 /// Name and version of the libraries that formats are read and written with, as they run: "libtiff 4.5.0".
 [[nodiscard]] std::string exr_library();
+[[nodiscard]] std::string netcdf_library();
 [[nodiscard]] std::string png_library();
 [[nodiscard]] std::string tiff_library();
 

@@ -127,9 +127,6 @@ class HeaderParser {
   std::size_t at_ = 0;
 };
 
-/// Whole numbers of 64 bits are delivered as float64, NumPy's integers by default among them.
-enum class Wide { kNo, kSigned, kUnsigned };
-
 std::optional<SampleType> sample_type(std::string_view kind) {
   constexpr std::array<std::pair<std::string_view, SampleType>, 11> kTypes = {{{"u1", SampleType::kUint8},
                                                                                {"i1", SampleType::kInt8},
@@ -146,18 +143,6 @@ std::optional<SampleType> sample_type(std::string_view kind) {
   return found == kTypes.end() ? std::nullopt : std::optional(found->second);
 }
 
-/// A whole number as the float64 that it is; false where it is none.
-template <typename Whole>
-bool widen(std::byte* at, Whole& number) {
-  std::memcpy(&number, at, sizeof number);
-  const auto value = static_cast<double>(number);
-  // 2^63 and 2^64 are not in the types' ranges, but what their largest numbers round to.
-  constexpr double kEnd = std::numeric_limits<Whole>::is_signed ? 0x1p63 : 0x1p64;
-  if (value >= kEnd || static_cast<Whole>(value) != number) return false;
-  std::memcpy(at, &value, sizeof value);
-  return true;
-}
-
 class NpySource final : public PlainSource {
  public:
   NpySource(const std::string& path, const OpenOptions& options) : PlainSource(path, "NumPy", options) {
@@ -172,16 +157,6 @@ class NpySource final : public PlainSource {
   }
 
   [[nodiscard]] SourceInfo& mutable_info() { return info_; }
-
-  void read_window(const Window& window, std::span<std::byte> samples) override {
-    if (fortran_order_) {
-      read_by_columns(window, samples);
-    } else {
-      PlainSource::read_window(window, samples);
-    }
-    if (wide_ == Wide::kSigned) widen_all<std::int64_t>(window, samples);
-    if (wide_ == Wide::kUnsigned) widen_all<std::uint64_t>(window, samples);
-  }
 
  private:
   void read_header() {
@@ -223,9 +198,9 @@ class NpySource final : public PlainSource {
     if (shape.size() != 2) {
       unsupported(fmt::format("the array's shape is ({}), must have 2 dimensions", fmt::join(header.shape, ", ")));
     }
-    fortran_order_ = header.fortran_order && shape[0] > 1 && shape[1] > 1;
-    if (header.descr.ends_with("i8")) wide_ = Wide::kSigned;
-    if (header.descr.ends_with("u8")) wide_ = Wide::kUnsigned;
+    const bool by_columns = header.fortran_order && shape[0] > 1 && shape[1] > 1;
+    if (header.descr.ends_with("i8")) layout_.stored_as = StoredAs::kInt64;
+    if (header.descr.ends_with("u8")) layout_.stored_as = StoredAs::kUint64;
     info_.height = shape[0];
     info_.width = shape[1];
     if (info_.width < 1 || info_.height < 1 || info_.width > kMostSide || info_.height > kMostSide) {
@@ -234,12 +209,13 @@ class NpySource final : public PlainSource {
     }
     info_.sample_type = type.value_or(SampleType::kFloat32);
     info_.block_width = info_.width;
-    info_.block_height = fortran_order_ ? std::min(info_.height, kRowsAtOnce) : 1;
+    info_.block_height = by_columns ? std::min(info_.height, kRowsAtOnce) : 1;
     layout_.big_endian = order == '>';
-    layout_.row_bytes = static_cast<std::uint64_t>(info_.width) * size_bytes(info_.sample_type);
-    // At most 2^31 rows of 2^34 bytes would overflow; no file is that large.
-    const double wanted = static_cast<double>(layout_.offset_bytes) +
-                          static_cast<double>(layout_.row_bytes) * static_cast<double>(info_.height);
+    if (by_columns) {
+      layout_.row_bytes = size_bytes(info_.sample_type);
+      layout_.column_bytes = static_cast<std::uint64_t>(info_.height) * layout_.row_bytes;
+    }
+    const double wanted = layout_.end_bytes(info_);
     const auto there = static_cast<double>(file_->size_bytes());
     if (there < wanted) {
       throw Error(ErrorCode::kCorrupt,
@@ -248,40 +224,6 @@ class NpySource final : public PlainSource {
     }
     if (there > wanted) info_.warnings.push_back(loss(fmt::format("{:.0f} bytes follow the array", there - wanted)));
   }
-
-  /// Fortran order: the samples of a column follow each other.
-  void read_by_columns(const Window& window, std::span<std::byte> samples) {
-    const std::size_t size = size_bytes(info_.sample_type);
-    ISOHF_ASSERT(is_window_of(info_, window, samples.size()));
-    column_.resize(static_cast<std::size_t>(window.rows) * size);
-    const std::size_t row_bytes = static_cast<std::size_t>(window.columns) * size;
-    for (std::int64_t c = 0; c < window.columns; ++c) {
-      const auto first = static_cast<std::uint64_t>((window.column + c) * info_.height + window.row);
-      file_->read(layout_.offset_bytes + first * size, column_);
-      std::byte* out = samples.data() + static_cast<std::size_t>(c) * size;
-      for (std::size_t at = 0; at < column_.size(); at += size, out += row_bytes) {
-        std::memcpy(out, column_.data() + at, size);
-      }
-    }
-    if (layout_.big_endian != (std::endian::native == std::endian::big)) swap_byte_order(samples, size);
-  }
-
-  template <typename Whole>
-  void widen_all(const Window& window, std::span<std::byte> samples) const {
-    for (std::size_t at = 0; at < samples.size(); at += sizeof(Whole)) {
-      Whole number{};
-      if (widen(samples.data() + at, number)) continue;
-      const auto index = static_cast<std::int64_t>(at / sizeof(Whole));
-      throw Error(
-          ErrorCode::kUnsupported,
-          fmt::format("{}: sample ({}, {}) is {}, which float64 does not hold; store the array as float64", info_.path,
-                      window.column + index % window.columns, window.row + index / window.columns, number));
-    }
-  }
-
-  bool fortran_order_ = false;
-  Wide wide_ = Wide::kNo;
-  std::vector<std::byte> column_;
 };
 
 /// "elevation.npy" is the array elevation.

@@ -113,7 +113,7 @@ std::string planetary_wkt(const PlanetaryMap& map) {
     std::string_view kind;
     std::string_view method;
   };
-  static constexpr std::array<Known, 13> kKnown = {{{"SIMPLECYLINDRICAL", "Equirectangular"},
+  static constexpr std::array<Known, 21> kKnown = {{{"SIMPLECYLINDRICAL", "Equirectangular"},
                                                     {"EQUIRECTANGULAR", "Equirectangular"},
                                                     {"EQUIDISTANTCYLINDRICAL", "Equirectangular"},
                                                     {"SINUSOIDAL", "Sinusoidal"},
@@ -125,6 +125,14 @@ std::string planetary_wkt(const PlanetaryMap& map) {
                                                     {"LAMBERTCONFORMAL", "Lambert_Conformal_Conic_2SP"},
                                                     {"LAMBERTCONFORMALCONIC", "Lambert_Conformal_Conic_2SP"},
                                                     {"LAMBERTAZIMUTHALEQUALAREA", "Lambert_Azimuthal_Equal_Area"},
+                                                    {"ALBERSCONICALEQUALAREA", "Albers_Conic_Equal_Area"},
+                                                    {"AZIMUTHALEQUIDISTANT", "Azimuthal_Equidistant"},
+                                                    {"EQUIDISTANTCONIC", "Equidistant_Conic"},
+                                                    {"POLYCONIC", "Polyconic"},
+                                                    {"GNOMONIC", "Gnomonic"},
+                                                    {"ROBINSON", "Robinson"},
+                                                    {"MILLERCYLINDRICAL", "Miller_Cylindrical"},
+                                                    {"VANDERGRINTEN", "VanDerGrinten"},
                                                     {"", ""}}};
   const auto* const known = std::ranges::find(kKnown, kind, &Known::kind);
   if (known == kKnown.end() || !(map.equatorial_radius_m > 0.0)) return {};

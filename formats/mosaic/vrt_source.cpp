@@ -277,6 +277,10 @@ class VrtSource final : public FileSource {
              static_cast<std::size_t>((north - window.row + row) * window.columns + west - window.column) * out_size;
     };
     const bool as_it_is = type == info_.sample_type && !piece.skipped && piece.scale == 1.0 && piece.offset == 0.0;
+    // A value of its type, which is written with as few as 15 digits.
+    const auto skips = piece.skipped ? void_value_as_stored(type, *piece.skipped) : std::nullopt;
+    const double skipped = skips.value_or(0.0);
+    const double digits = type == SampleType::kFloat64 ? 5e-15 * std::abs(skipped) : 0.0;
     const auto store = store_sample(info_.sample_type);
     const bool to_whole = !is_floating(info_.sample_type);
     with_stored_type(type, [&](auto kind) {
@@ -290,7 +294,7 @@ class VrtSource final : public FileSource {
         }
         for (std::int64_t column = 0; column < part.columns; ++column, in += size, out += out_size) {
           double value = static_cast<double>(number_of(stored_at<Stored>(in)));
-          if (piece.skipped && (value == *piece.skipped || (std::isnan(value) && std::isnan(*piece.skipped)))) continue;
+          if (skips && (std::abs(value - skipped) <= digits || (std::isnan(value) && std::isnan(skipped)))) continue;
           if (drops_voids && std::ranges::find(voids, value) != voids.end()) {
             if (!info_.void_values.empty()) continue;
             if (nearest_sample(info_.sample_type, value) != value) {

@@ -17,7 +17,7 @@
 #include <tuple>
 #include <vector>
 
-#include "formats/files/file_source.h"
+#include "formats/binary_grids/plain_samples.h"
 #include "formats/files/text.h"
 #include "formats/georeference/files_beside.h"
 #include "formats/georeference/map_wkt.h"
@@ -36,13 +36,10 @@ struct Pds3Layout {
   std::int64_t rows = 0;
   std::int64_t bands = 1;
   SampleType type = SampleType::kInt16;
-  bool big_endian = false;
-  bool vax = false;                ///< VAX F-floats
-  std::uint64_t offset_bytes = 0;  ///< of the first sample: the first line's prefix
-  std::int64_t sample_stride_bytes = 0;
-  std::int64_t line_stride_bytes = 0;
-  std::int64_t band_stride_bytes = 0;
-  std::uint64_t total_bytes = 0;  ///< all bands with prefixes and suffixes, below 2^50
+  BandOrder order = BandOrder::kBands;
+  PlainLayout samples;
+  std::uint64_t margin_bytes = 0;  ///< of a line: prefix and suffix
+  std::uint64_t total_bytes = 0;   ///< all bands with them, below 2^50
 };
 
 constexpr std::int64_t kMostSamples = std::int64_t{1} << 31;
@@ -107,8 +104,8 @@ void read_sample_type(const LabelFields& image, Pds3Layout& layout) {
                                                      image.path(), type));
   }
   layout.type = sample_type(kind->kind, image.count("SAMPLE_BITS", 1, 64), image);
-  layout.big_endian = kind->big_endian;
-  layout.vax = kind->kind == 'v';
+  layout.samples.big_endian = kind->big_endian;
+  if (kind->kind == 'v') layout.samples.stored_as = StoredAs::kVaxFloat;
 }
 
 /// Reads an IMAGE object. Throws Error: kCorrupt for a field that says nothing, kUnsupported for what is not read.
@@ -131,11 +128,12 @@ Pds3Layout pds3_layout(const LabelFields& image) {
   const std::int64_t suffix = image.count("LINE_SUFFIX_BYTES", 0, kMostMarginBytes, 0);
   const auto size = static_cast<std::int64_t>(size_bytes(layout.type));
   const std::string order = image.word("BAND_STORAGE_TYPE").value_or("BAND_SEQUENTIAL");
-  const bool by_sample = layout.bands > 1 && order == "SAMPLE_INTERLEAVED";
-  const bool by_line = layout.bands > 1 && order == "LINE_INTERLEAVED";
+  const bool by_sample = order == "SAMPLE_INTERLEAVED";
+  const bool by_line = order == "LINE_INTERLEAVED";
   if (layout.bands > 1 && !by_sample && !by_line && order != "BAND_SEQUENTIAL") {
     image.refuse("BAND_STORAGE_TYPE", "BAND_SEQUENTIAL, LINE_INTERLEAVED or SAMPLE_INTERLEAVED");
   }
+  layout.order = by_sample ? BandOrder::kSamples : by_line ? BandOrder::kLines : BandOrder::kBands;
   // At most 2^50: the factors are bounded.
   const std::int64_t line = prefix + layout.columns * size * (by_sample ? layout.bands : 1) + suffix;
   const std::int64_t lines_of_a_row = by_sample ? 1 : layout.bands;
@@ -145,10 +143,8 @@ Pds3Layout pds3_layout(const LabelFields& image) {
                 fmt::format("{}: {} x {} samples in {} bands need {:.3g} bytes, must be below 2^50", image.path(),
                             layout.columns, layout.rows, layout.bands, total));
   }
-  layout.offset_bytes = static_cast<std::uint64_t>(prefix);
-  layout.sample_stride_bytes = by_sample ? size * layout.bands : size;
-  layout.line_stride_bytes = by_line ? line * layout.bands : line;
-  layout.band_stride_bytes = by_sample ? size : by_line ? line : line * layout.rows;
+  layout.samples.offset_bytes = static_cast<std::uint64_t>(prefix);
+  layout.margin_bytes = static_cast<std::uint64_t>(prefix + suffix);
   layout.total_bytes = static_cast<std::uint64_t>(line * layout.rows * lines_of_a_row);
   return layout;
 }
@@ -412,25 +408,14 @@ Pds3Place place_from_pds3(const std::string& path, const LabelBlock& root, std::
   return place;
 }
 
-/// A VAX F-float, its bytes as stored, as an IEEE float: words in the other order, no leading 1 in front of the point,
-/// exponents up to 127; its reserved operand is a NaN. The smallest ones lose bits, which are no elevation.
-float float_from_vax(std::uint32_t stored) {
-  const std::uint32_t bits = stored >> 16U | stored << 16U;
-  const auto exponent = static_cast<int>(bits >> 23U & 0xFFU);
-  const bool negative = bits >> 31U != 0;
-  if (exponent == 0) return negative ? std::numeric_limits<float>::quiet_NaN() : 0.0F;
-  const double magnitude = std::ldexp(static_cast<double>((bits & 0x7FFFFFU) | 0x800000U), exponent - 128 - 24);
-  return static_cast<float>(negative ? -magnitude : magnitude);
-}
-
-class Pds3Source final : public FileSource {
+class Pds3Source final : public PlainSource {
  public:
-  Pds3Source(const std::string& path, const OpenOptions& options) : FileSource(path, "PDS3"), label_path_(path) {
+  Pds3Source(const std::string& path, const OpenOptions& options) : PlainSource(path, "PDS3"), label_path_(path) {
     if (has_pds3_label(path)) label_path_ = file_beside(path, std::filesystem::path(path).stem().string() + ".lbl");
     const LabelText label = read_label(label_path_, options.unpacked_bytes);
     const LabelBlock& image = only_image(label.root);
     const LabelFields fields(label_path_, image);
-    layout_ = pds3_layout(fields);
+    image_ = pds3_layout(fields);
     find_data(label);
     if (label_path_ != path && !same_file(path, data_path_)) {
       throw Error(ErrorCode::kUnsupported,
@@ -439,38 +424,9 @@ class Pds3Source final : public FileSource {
     file_.emplace(data_path_, options.unpacked_bytes);
     check_size(label);
     describe(fields, label.root);
-    const std::int64_t band = choose_band(info_, options, layout_.bands);
-    layout_.offset_bytes += static_cast<std::uint64_t>(band * layout_.band_stride_bytes);
+    layout_.take_band(info_, image_.order, choose_band(info_, options, image_.bands), image_.bands, label_path_,
+                      image_.margin_bytes);
     apply_open_options(info_, options);
-  }
-
-  void read_window(const Window& window, std::span<std::byte> samples) override {
-    ISOHF_ASSERT(is_window_of(info_, window, samples.size()));
-    const auto size = static_cast<std::int64_t>(size_bytes(info_.sample_type));
-    if (samples.empty()) return;
-    const bool together = layout_.sample_stride_bytes == size;
-    if (together && window.columns == info_.width && layout_.line_stride_bytes == window.columns * size) {
-      file_->read(place_of(window.row, 0), samples);
-    } else {
-      const auto run = static_cast<std::size_t>(window.columns * size);
-      for (std::int64_t r = 0; r < window.rows; ++r) {
-        const auto out = samples.subspan(static_cast<std::size_t>(r) * run, run);
-        const std::uint64_t at = place_of(window.row + r, window.column);
-        if (together) {
-          file_->read(at, out);
-        } else {
-          read_interleaved(at, window.columns, out);
-        }
-      }
-    }
-    if (layout_.big_endian) swap_byte_order(samples, static_cast<std::size_t>(size));
-    if (!layout_.vax) return;
-    for (std::size_t at = 0; at < samples.size(); at += sizeof(float)) {
-      std::uint32_t stored = 0;
-      std::memcpy(&stored, samples.data() + at, sizeof(stored));
-      const float value = float_from_vax(stored);
-      std::memcpy(samples.data() + at, &value, sizeof(value));
-    }
   }
 
  private:
@@ -534,7 +490,7 @@ class Pds3Source final : public FileSource {
 
   /// Every sample must be in the file, and none inside the label.
   void check_size(const LabelText& label) {
-    const std::uint64_t total = layout_.total_bytes;
+    const std::uint64_t total = image_.total_bytes;
     const std::uint64_t there = file_->size_bytes();
     if (data_path_ == label_path_ && image_bytes_ < label.end_bytes) {
       // Editing a label's text moves the samples. Where they fill the rest of the file there is no doubt.
@@ -551,17 +507,18 @@ class Pds3Source final : public FileSource {
       image_bytes_ = label.end_bytes;
     }
     if (image_bytes_ + total > there) {
-      throw Error(ErrorCode::kCorrupt, fmt::format("{}: has {} bytes; {} x {} samples of {} from byte {} need {}",
-                                                   data_path_, there, layout_.columns, layout_.rows,
-                                                   to_string(layout_.type), image_bytes_, image_bytes_ + total));
+      throw Error(ErrorCode::kCorrupt,
+                  fmt::format("{}: has {} bytes; {} x {} samples of {} from byte {} need {}", data_path_, there,
+                              image_.columns, image_.rows, to_string(image_.type), image_bytes_, image_bytes_ + total));
     }
+    layout_ = image_.samples;
     layout_.offset_bytes += image_bytes_;
   }
 
   void describe(const LabelFields& image, const LabelBlock& root) {
-    info_.width = layout_.columns;
-    info_.height = layout_.rows;
-    info_.sample_type = layout_.type;
+    info_.width = image_.columns;
+    info_.height = image_.rows;
+    info_.sample_type = image_.type;
     info_.block_width = info_.width;
     info_.block_height = 1;
     info_.z_scale = image.number("SCALING_FACTOR").value_or(1.0);
@@ -582,7 +539,8 @@ class Pds3Source final : public FileSource {
       }
     }
     // ISIS writes its special pixels into PDS products: the lowest values of 32 bit floats, up to FF7FFFF9.
-    if (info_.sample_type == SampleType::kFloat32 && !layout_.vax) info_.valid_min = std::bit_cast<float>(0xFF7FFFFAU);
+    if (info_.sample_type == SampleType::kFloat32 && layout_.stored_as != StoredAs::kVaxFloat)
+      info_.valid_min = std::bit_cast<float>(0xFF7FFFFAU);
     Pds3Place place = place_from_pds3(label_path_, root, info_.width, info_.height);
     info_.georeference = std::move(place.georeference);
     info_.warnings.insert(info_.warnings.end(), place.warnings.begin(), place.warnings.end());
@@ -594,7 +552,8 @@ class Pds3Source final : public FileSource {
     if (!number) return;  // N/A
     if (info_.sample_type == SampleType::kFloat32 && value.text.find('#') != std::string::npos) {
       const auto bits = static_cast<std::uint32_t>(*number);
-      number = static_cast<double>(layout_.vax ? float_from_vax(bits) : std::bit_cast<float>(bits));
+      number = static_cast<double>(layout_.stored_as == StoredAs::kVaxFloat ? float_from_vax(bits)
+                                                                            : std::bit_cast<float>(bits));
     }
     const std::optional<double> stored = void_value_as_stored(info_.sample_type, *number);
     if (!stored) {
@@ -605,31 +564,11 @@ class Pds3Source final : public FileSource {
     }
   }
 
-  [[nodiscard]] std::uint64_t place_of(std::int64_t row, std::int64_t column) const {
-    return layout_.offset_bytes +
-           static_cast<std::uint64_t>(row * layout_.line_stride_bytes + column * layout_.sample_stride_bytes);
-  }
-
-  /// Picks one band's samples out of those of all bands, a bounded piece at a time.
-  void read_interleaved(std::uint64_t at, std::int64_t columns, std::span<std::byte> out) {
-    constexpr std::int64_t kColumnsAtOnce = 4096;
-    const std::size_t size = size_bytes(info_.sample_type);
-    const auto stride = static_cast<std::size_t>(layout_.sample_stride_bytes);
-    for (std::int64_t done = 0; done < columns; done += kColumnsAtOnce) {
-      const auto count = static_cast<std::size_t>(std::min(kColumnsAtOnce, columns - done));
-      piece_.resize((count - 1) * stride + size);
-      file_->read(at + static_cast<std::uint64_t>(done) * stride, piece_);
-      std::byte* to = out.data() + static_cast<std::size_t>(done) * size;
-      for (std::size_t i = 0; i < count; ++i) std::memcpy(to + i * size, piece_.data() + i * stride, size);
-    }
-  }
-
   std::string label_path_;
-  Pds3Layout layout_;
+  Pds3Layout image_;
   std::string data_path_;
   std::uint64_t image_bytes_ = 0;  // where ^IMAGE points
   int pointer_line_ = 0;
-  std::vector<std::byte> piece_;
 };
 
 }  // namespace

@@ -209,11 +209,14 @@ TEST_F(GdalVariants, SamplesThatAHeaderDescribes) {
                             {"c.bil", {"-of", "ENVI", "-co", "SUFFIX=ADD", "-ot", "UInt16"}},
                             {"d.sdat", {"-of", "SAGA"}},
                             {"e.nc", {"-of", "netCDF"}},
+                            {"g.xml", {"-of", "PDS4"}},
+                            {"h.xml", {"-of", "PDS4", "-a_nodata", "0", "-co", "INTERLEAVE=BIP"}},
                             {"f.nc", {"-of", "netCDF", "-co", "FORMAT=NC2", "-a_nodata", "0"}}}) {
     expect_same("whole.tif", variant);
   }
   for (const Variant& variant : std::vector<Variant>{{"r.img", {"-of", "ENVI", "-ot", "Float64"}},
                                                      {"s.sdat", {"-of", "SAGA"}},
+                                                     {"u.xml", {"-of", "PDS4", "-ot", "Float64"}},
                                                      {"t.nc", {"-of", "netCDF", "-co", "WRITE_BOTTOMUP=NO"}}}) {
     expect_same("real.tif", variant);
   }
@@ -226,7 +229,40 @@ TEST_F(GdalVariants, SamplesThatAHeaderDescribes) {
     ASSERT_EQ(second.exit_code, 0) << second.err;
     EXPECT_EQ(json::parse(second.out).at("statistics"), json::parse(whole.out).at("statistics")) << order;
   }
-  expect_refused({"four.nc", {"-of", "netCDF", "-co", "FORMAT=NC4"}}, "gdal_translate");
+}
+
+TEST_F(GdalVariants, MapsOfPds4LabelsAreThoseThatGdalFinds) {
+  for (const char* map : {"+proj=eqc +lat_ts=30 +lon_0=40 +R=3396190", "+proj=sinu +lon_0=10 +R=1737400",
+                          "+proj=laea +lat_0=20 +lon_0=10 +R=1737400", "+proj=merc +lon_0=10 +k=1 +R=1737400",
+                          "+proj=stere +lat_0=90 +lon_0=0 +k=1 +a=3396190 +b=3376200",
+                          "+proj=lcc +lat_0=40 +lat_1=30 +lat_2=50 +lon_0=10 +R=1737400"}) {
+    SCOPED_TRACE(map);
+    expect_same("whole.tif", {"map.xml", {"-of", "PDS4", "-a_srs", map, "-a_ullr", "1000", "90000", "49000", "48000"}});
+    const std::string wkt = open_raster(folder_ / "map.xml", {})->info().georeference.system.wkt;
+    const auto proj = [](const std::string& system) {
+      std::string text = run_gdal({"gdalsrsinfo", "-o", "proj4", system}, {}, true).out;
+      for (const std::string same : {" +k=1", " +lat_ts=90"}) {  // two spellings of one map, at a pole
+        if (const std::size_t at = text.find(same + ' '); at != std::string::npos) text.erase(at, same.size());
+      }
+      return text;
+    };
+    EXPECT_EQ(proj(wkt), proj(folder_ / "map.xml"));
+    EXPECT_THAT(proj(wkt), HasSubstr("+proj="));
+  }
+}
+
+TEST_F(GdalVariants, Netcdf4) {
+  if (!std::filesystem::exists(std::string(ISOHF_BIN_DIR) + "/isohf_netcdf.so")) GTEST_SKIP() << "no netCDF module";
+  const std::vector<std::string> netcdf = {"-of", "netCDF", "-co", "FORMAT=NC4"};
+  const auto of = [&](const char* name, std::vector<std::string> more) {
+    more.insert(more.begin(), netcdf.begin(), netcdf.end());
+    return Variant{name, more};
+  };
+  expect_same("whole.tif", of("plain.nc", {}));
+  expect_same("whole.tif", of("deflated.nc", {"-co", "COMPRESS=DEFLATE", "-a_nodata", "0"}));
+  expect_same("whole.tif", of("degrees.nc", {"-a_srs", "EPSG:4326", "-a_ullr", "10", "50", "11", "49.5"}));
+  expect_same("real.tif", of("down.nc", {"-co", "WRITE_BOTTOMUP=NO", "-co", "COMPRESS=DEFLATE"}));
+  expect_same("real.tif", of("double.nc", {"-ot", "Float64", "-a_scale", "2", "-a_offset", "100"}));
 }
 
 TEST_F(GdalVariants, VirtualRasters) {

@@ -128,7 +128,7 @@ TEST_F(Npy, ReadsWholeNumbersOf64BitsAsFloatsThatHoldThem) {
             -1);
   EXPECT_THAT(
       failure(number("<u8", ones)),
-      HasSubstr("sample (0, 0) is 18446744073709551615, which float64 does not hold; store the array as float64"));
+      HasSubstr("sample (0, 0) is 18446744073709551615, which float64 does not hold; store the samples as float64"));
   EXPECT_THAT(failure(number("<i8", std::string("\1\0\0\0\0\0\x20\0", 8))),
               HasSubstr("is 9007199254740993, which float64 does not hold"));
   EXPECT_THAT(failure(number("<i8", std::string(7, '\xff') + '\x7f')), HasSubstr("is 9223372036854775807, which"));

@@ -4,6 +4,8 @@
 
 #include <cstring>
 
+#include "formats/netcdf_bytes.h"
+#include "formats/pds4_label.h"
 #include "formats/readers.h"
 #include "formats/tiff_bytes.h"
 #include "formats/write/raster_sink.h"
@@ -205,57 +207,25 @@ const char* const kWkt =
     R"(PROJCS["WGS_1984_UTM_Zone_11N",GEOGCS["GCS_WGS_1984",DATUM["D_WGS_1984",SPHEROID["WGS_1984",6378137.0,298.25]],)"
     R"(PRIMEM["Greenwich",0.0],UNIT["Degree",0.0174532925199433]],PARAMETER["Central_Meridian",-117],UNIT["Meter",1.0]])";
 
-/// 4 x 3 shorts named z on evenly spaced x and y, degrees, in netCDF's first format.
-std::string netcdf() {
-  std::string bytes("CDF\1\0\0\0\0", 8);
-  const auto word = [&](std::uint32_t value) {
-    for (int shift = 24; shift >= 0; shift -= 8) bytes += static_cast<char>(value >> shift & 0xFFU);
+/// 4 x 3 shorts named z on evenly spaced x and y, degrees, in netCDF's first format; by columns: longitudes first.
+std::string netcdf(bool by_columns = false) {
+  const auto doubles = [](const std::vector<double>& values) {
+    std::string bytes;
+    for (const double value : values) {
+      std::string stored(sizeof(double), '\0');
+      std::memcpy(stored.data(), &value, sizeof(double));
+      bytes.append(stored.rbegin(), stored.rend());
+    }
+    return bytes;
   };
-  const auto name = [&](const std::string& text) {
-    word(static_cast<std::uint32_t>(text.size()));
-    bytes += text;
-    bytes.resize((bytes.size() + 3) / 4 * 4);
-  };
-  const auto big_endian = [&](double value) {
-    std::string stored(sizeof(double), '\0');
-    std::memcpy(stored.data(), &value, sizeof(double));
-    bytes.append(stored.rbegin(), stored.rend());
-  };
-  const auto of_list = [&](std::uint32_t tag, std::uint32_t count) {
-    word(tag);
-    word(count);
-  };
-  of_list(10, 2);
-  name("y");
-  word(3);
-  name("x");
-  word(4);
-  of_list(0, 0);
-  of_list(11, 3);
-  constexpr std::uint32_t kBegin = 320;
-  std::uint32_t begin = kBegin;
-  const auto variable = [&](const std::string& called, const std::vector<std::uint32_t>& dimensions, std::uint32_t type,
-                            std::uint32_t size, const std::string& unit) {
-    name(called);
-    word(static_cast<std::uint32_t>(dimensions.size()));
-    for (const std::uint32_t dimension : dimensions) word(dimension);
-    of_list(12, 1);
-    name("units");
-    of_list(2, static_cast<std::uint32_t>(unit.size()));
-    bytes += unit;
-    bytes.resize((bytes.size() + 3) / 4 * 4);
-    word(type);
-    word(size);
-    word(begin);
-    begin += size;
-  };
-  variable("y", {0}, 6, 24, "degrees_north");
-  variable("x", {1}, 6, 32, "degrees_east");
-  variable("z", {0, 1}, 3, 24, "m");
-  bytes.resize(kBegin);
-  for (const double y : {10.0, 10.5, 11.0}) big_endian(y);
-  for (const double x : {20.0, 20.5, 21.0, 21.5}) big_endian(x);
-  return bytes + counting(12, 2);
+  NetcdfBytes file;
+  file.dimension("y", 3).dimension("x", 4);
+  file.variable("y", {0}, 6, doubles({10.0, 10.5, 11.0}), {{"units", "degrees_north"}});
+  file.variable("x", {1}, 6, doubles({20.0, 20.5, 21.0, 21.5}), {{"units", "degrees_east"}});
+  const std::vector<std::uint32_t> dimensions =
+      by_columns ? std::vector<std::uint32_t>{1, 0} : std::vector<std::uint32_t>{0, 1};
+  file.variable("z", dimensions, 3, counting(12, 2), {{"units", "m"}});
+  return file.bytes();
 }
 
 constexpr const char* kVrt =
@@ -323,10 +293,18 @@ std::vector<ReaderCase> reader_cases() {
       {"SagaHeader", "a.sgrd", kSaga, open_saga, {}},
       {"SagaSamples", "a.sdat", "  " + counting(12, 2), open_saga, {}},
       {"NetcdfClassic", "a.nc", netcdf(), open_netcdf, {}},
+      {"NetcdfByColumns", "a.nc", netcdf(true), open_netcdf, {}},
+      {"Pds4Label", "a.xml", pds4_label("a.dat"), open_pds4, {}},
+      {"Pds4Samples", "a.dat", counting(7, 2), open_pds4, {}},
       {"StreamedAsciiGrid", "a.asc.gz", gzip(esri + numbers), open_ascii_grid, streamed},
       {"PngDescription", "described.png.json", "", open_png, {}},
       {"RawDescription", "a.r16.json", "", open_raw, {}},
   };
+#ifdef ISOHF_WITH_NETCDF
+  const std::string written_by_gdal = std::string(ISOHF_SOURCE_DIR) + "/tests/formats/data/lat_lon.nc";
+  cases.push_back({"Netcdf4", "a.nc", read_file(written_by_gdal), open_netcdf4, {}});
+  cases.back().share = 100;
+#endif
   const auto find = [&](const char* name) -> ReaderCase& {
     for (ReaderCase& each : cases) {
       if (each.name == name) return each;
@@ -351,6 +329,9 @@ std::vector<ReaderCase> reader_cases() {
     damaged.beside = {{whole.file_name, whole.bytes}};
     whole.beside = {{damaged.file_name, text}};
   }
+  find("Pds4Label").beside = {{"a.dat", counting(7, 2)}};
+  find("Pds4Label").shortest_valid = find("Pds4Label").bytes.size() - 1;
+  find("Pds4Samples").beside = {{"a.xml", pds4_label("a.dat")}};
   find("EnviSamples").shortest_valid = find("EnviSamples").bytes.size() - 2;  // those of the other band
   find("GridFloatSamples").beside = {{"a.hdr", esri + "byteorder LSBFIRST\n"}};
   find("Isis3Label").beside = {{"core.cub", counting(24, 2)}};
@@ -364,7 +345,7 @@ std::vector<ReaderCase> reader_cases() {
   picture.beside = {{picture.opened, written(folder, picture.opened, 6, 5, SampleType::kUint16)}};
   picture.bytes = read_file(folder / picture.file_name);
   for (const char* name : {"EsriAsciiGrid", "GrassAsciiGrid", "Pds3", "Isis3", "Isis3Label", "Dted", "UsgsDem",
-                           "PngDescription", "RawDescription", "Npy", "SurferText", "Vrt"}) {
+                           "PngDescription", "RawDescription", "Npy", "SurferText", "Vrt", "Pds4Label"}) {
     find(name).text = true;
   }
   // The last digits of a text can be missing without trace; a world file, a .prj and a label's last words are not

@@ -23,6 +23,7 @@ struct ReaderCase {
   /// Shorter ones may open: what follows is padding, or is not needed.
   std::size_t shortest_valid = 0;  ///< 0: all of it is needed; 1: nobody knows
   bool text = false;               ///< mutations put in digits and signs as well
+  int share = 1;                   ///< one in so many truncations and mutations: opening one takes a process
 };
 
 /// A file for every native reader and every way of storing that it tells apart. Makes them in an empty folder of its

@@ -1,0 +1,238 @@
+#include "formats/netcdf/cf_file.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "formats/files/text.h"
+#include "formats/georeference/files_beside.h"
+#include "formats/georeference/units.h"
+#include "formats/open_options.h"
+#include "isohf/error.h"
+
+namespace isohf {
+namespace {
+
+using Variable = CfFile::Variable;
+
+constexpr int kFloat = 5;
+constexpr std::uint64_t kMostSide = std::uint64_t{1} << 31U;
+
+/// An axis of evenly spaced coordinates.
+struct Axis {
+  double first = 0.0;
+  double step = 0.0;
+};
+
+class CfReader {
+ public:
+  CfReader(CfFile& file, SourceInfo& info) : file_(file), info_(info) {}
+
+  CfRaster read(const OpenOptions& options) {
+    CfRaster raster;
+    raster.variable = &choose(options);
+    const Variable& variable = *raster.variable;
+    info_.sample_type = *variable.sample_type();
+    const std::size_t last = variable.dimensions.size() - 1;
+    const auto of_dimension = [&](std::size_t i) {
+      return file_.variable(file_.dimensions[variable.dimensions[i]].name);
+    };
+    const Variable* rows = of_dimension(last - 1);
+    const Variable* columns = of_dimension(last);
+    std::uint64_t height = file_.size_of(variable, last - 1);
+    std::uint64_t width = file_.size_of(variable, last);
+    raster.by_columns = rows != nullptr && columns != nullptr && is_along_x(*rows) && !is_along_x(*columns);
+    if (raster.by_columns) {
+      std::swap(rows, columns);
+      std::swap(height, width);
+    }
+    if (std::max(width, height) >= kMostSide) {
+      refuse(ErrorCode::kCorrupt, fmt::format("{} has more than 2147483647 samples a side", printable(variable.name)));
+    }
+    info_.width = static_cast<std::int64_t>(width);
+    info_.height = static_cast<std::int64_t>(height);
+    if (rows != nullptr && columns != nullptr) read_place(variable, *rows, *columns, raster);
+    read_attributes(variable);
+    return raster;
+  }
+
+ private:
+  [[noreturn]] void refuse(ErrorCode code, const std::string& what) const {
+    throw Error(code, info_.path + ": " + what);
+  }
+
+  /// Whether the last two dimensions make a raster, and those before are of one.
+  [[nodiscard]] bool is_raster(const Variable& variable) const {
+    const std::size_t count = variable.dimensions.size();
+    if (count < 2 || !variable.sample_type()) return false;
+    for (std::size_t axis = 0; axis < count; ++axis) {
+      const std::uint64_t size = file_.size_of(variable, axis);
+      if (axis + 2 < count ? size != 1 : size < 2) return false;
+    }
+    return true;
+  }
+
+  const Variable& choose(const OpenOptions& options) {
+    const Variable* chosen = nullptr;
+    std::string names;
+    int rasters = 0;
+    for (const Variable& variable : file_.variables) {
+      if (!is_raster(variable)) continue;
+      // Bounds of cells and places of a curved grid are no elevations, unless they are asked for.
+      const std::string unit = variable.text("units");  // degrees_north, degree_E
+      const bool is_place = variable.name.ends_with("_bnds") || variable.name.ends_with("_bounds") ||
+                            unit.starts_with("degrees_") || unit.starts_with("degree_");
+      if (is_place && variable.name != options.channel) continue;
+      names += (names.empty() ? "" : ", ") + printable(variable.name);
+      ++rasters;
+      if (options.channel.empty() ? chosen == nullptr : variable.name == options.channel) chosen = &variable;
+    }
+    if (rasters == 0) {
+      refuse(ErrorCode::kUnsupported, "has no variable of two dimensions that do not grow (nccopy -u makes them so)");
+    }
+    if (chosen == nullptr) {
+      refuse(ErrorCode::kInvalidArgument,
+             fmt::format("there is no channel \"{}\"; there are {}", printable(options.channel), names));
+    }
+    if (rasters > 1) {
+      info_.channel = printable(chosen->name);
+      if (options.channel.empty())
+        info_.warnings.push_back(
+            fmt::format("there are {} variables ({}); {} is read", rasters, names, printable(chosen->name)));
+    }
+    return *chosen;
+  }
+
+  static bool is_along_x(const Variable& axis) {
+    const std::string unit = lower_case(axis.text("units"));
+    const std::string name = lower_case(axis.name);
+    const std::string standard = axis.text("standard_name");
+    return axis.text("axis") == "X" || unit.starts_with("degrees_e") || unit.starts_with("degree_e") ||
+           standard == "longitude" || standard == "projection_x_coordinate" || name == "lon" || name == "longitude" ||
+           name == "x";
+  }
+
+  /// nullopt where coordinates lie off the grid by more than a hundredth of a step, and more than float32 rounds them.
+  std::optional<Axis> axis_of(const Variable& of, std::uint64_t count) {
+    if (of.dimensions.size() != 1 || !of.sample_type()) return std::nullopt;
+    const double first = file_.numbers(of, 0, 1)[0];
+    const double last = file_.numbers(of, count - 1, 1)[0];
+    const double step = (last - first) / static_cast<double>(count - 1);
+    const double rounded = of.type == kFloat ? 1.5 * std::max(std::abs(first), std::abs(last)) * 0x1p-24 : 0.0;
+    const double most = std::max(0.01 * std::abs(step), std::min(rounded, 0.2 * std::abs(step)));
+    constexpr std::uint64_t kAtOnce = 65536;
+    for (std::uint64_t done = 0; done < count; done += kAtOnce) {
+      const std::vector<double> there = file_.numbers(of, done, std::min(kAtOnce, count - done));
+      for (std::size_t i = 0; i < there.size(); ++i) {
+        if (!(std::abs(there[i] - first - static_cast<double>(done + i) * step) <= most)) return std::nullopt;
+      }
+    }
+    return step == 0.0 ? std::nullopt : std::optional(Axis{first, step});
+  }
+
+  void read_place(const Variable& variable, const Variable& rows, const Variable& columns, CfRaster& raster) {
+    const auto y = axis_of(rows, static_cast<std::uint64_t>(info_.height));
+    const auto x = axis_of(columns, static_cast<std::uint64_t>(info_.width));
+    if (!x || !y) {
+      info_.warnings.push_back(loss("its coordinates are not evenly spaced: where it lies is left out"));
+      return;
+    }
+    if (x->step < 0.0) refuse(ErrorCode::kUnsupported, "its columns run from East to West (gdalwarp turns it)");
+    const auto offset = file_.attributes.find("node_offset");  // GMT: 1 for pixels
+    const auto* const pixels =
+        offset == file_.attributes.end() ? nullptr : std::get_if<std::vector<double>>(&offset->second);
+    Georeference& place = info_.georeference;
+    place.registration =
+        pixels != nullptr && !pixels->empty() && pixels->front() == 0.0 ? Registration::kPoint : Registration::kArea;
+    place.spacing_x = x->step;
+    place.spacing_y = std::abs(y->step);
+    place.has_origin = true;
+    place.origin_x = x->first;
+    raster.from_south = y->step > 0.0;
+    place.origin_y = raster.from_south ? y->first + static_cast<double>(info_.height - 1) * y->step : y->first;
+    const std::string unit = columns.text("units");
+    const std::string mapping = variable.text("grid_mapping");
+    const Variable* const system = mapping.empty() ? nullptr : file_.variable(mapping);
+    std::string wkt = system == nullptr ? "" : system->text("crs_wkt");
+    if (wkt.empty() && system != nullptr) wkt = system->text("spatial_ref");
+    if (!wkt.empty()) {
+      read_system_text(wkt, info_.path, info_);
+    } else if (unit.starts_with("degree")) {
+      place.unit = HorizontalUnit::kDegree;
+      place.system = wgs84_system();  // what CF means where nothing else stands
+    } else if (const auto length = linear_unit(unit)) {
+      place.unit = HorizontalUnit::kMetre;
+      place.metres_per_unit = length->metres;
+    }
+  }
+
+  void read_attributes(const Variable& variable) {
+    const auto set_void = [&](double value) {
+      const auto stored = void_value_as_stored(info_.sample_type, value);
+      if (stored && std::ranges::find(info_.void_values, *stored) == info_.void_values.end())
+        info_.void_values.push_back(*stored);
+    };
+    for (const char* key : {"_FillValue", "missing_value"}) {
+      if (const auto value = variable.number(key)) set_void(*value);
+    }
+    // What the format fills with where nothing is said, but for bytes.
+    static const std::map<int, double> kFilled = {
+        {3, -32767.0}, {4, -2147483647.0}, {5, 9.969209968386869e36}, {6, 9.969209968386869e36},
+        {8, 65535.0},  {9, 4294967295.0}};
+    if (const auto filled = kFilled.find(variable.type); filled != kFilled.end() && info_.void_values.empty()) {
+      set_void(filled->second);
+    }
+    info_.z_scale = variable.number("scale_factor").value_or(1.0);
+    info_.z_offset = variable.number("add_offset").value_or(0.0);
+    if (info_.z_scale == 0.0 || !std::isfinite(info_.z_scale) || !std::isfinite(info_.z_offset)) {
+      refuse(ErrorCode::kCorrupt, "scale_factor or add_offset is no scale");
+    }
+    const auto unit = linear_unit(variable.text("units"));
+    if (!unit) return;
+    info_.vertical_unit = unit->name;
+    info_.metres_per_vertical_unit = unit->metres;
+  }
+
+  CfFile& file_;
+  SourceInfo& info_;
+};
+
+}  // namespace
+
+std::optional<SampleType> CfFile::Variable::sample_type() const {
+  static constexpr std::array<std::optional<SampleType>, 12> kTypes = {
+      std::nullopt,        SampleType::kInt8,    std::nullopt,         SampleType::kInt16,
+      SampleType::kInt32,  SampleType::kFloat32, SampleType::kFloat64, SampleType::kUint8,
+      SampleType::kUint16, SampleType::kUint32,  SampleType::kFloat64, SampleType::kFloat64};
+  if (type < 0 || type >= static_cast<int>(kTypes.size())) return std::nullopt;
+  const auto stored = kTypes[static_cast<std::size_t>(type)];
+  // Of before there were unsigned types.
+  if (text("_Unsigned") != "true" || !stored) return stored;
+  return stored == SampleType::kInt8 ? SampleType::kUint8 : stored == SampleType::kInt16 ? SampleType::kUint16 : stored;
+}
+
+std::string CfFile::Variable::text(std::string_view key) const {
+  const auto found = attributes.find(key);
+  const auto* const text = found == attributes.end() ? nullptr : std::get_if<std::string>(&found->second);
+  return text == nullptr ? std::string() : *text;
+}
+
+std::optional<double> CfFile::Variable::number(std::string_view key) const {
+  const auto found = attributes.find(key);
+  const auto* const list = found == attributes.end() ? nullptr : std::get_if<std::vector<double>>(&found->second);
+  return list == nullptr || list->empty() ? std::nullopt : std::optional(list->front());
+}
+
+const CfFile::Variable* CfFile::variable(std::string_view name) const {
+  const auto found = std::ranges::find(variables, name, &Variable::name);
+  return found == variables.end() ? nullptr : &*found;
+}
+
+CfRaster read_cf(CfFile& file, SourceInfo& info, const OpenOptions& options) {
+  return CfReader(file, info).read(options);
+}
+
+}  // namespace isohf

@@ -1,0 +1,288 @@
+/// Plain samples that a header or label describes: ENVI, netCDF in its classic formats, PDS4, GDAL's virtual rasters.
+/// What GDAL writes in these formats is tests/cli/gdal_variants_test.cpp.
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstring>
+
+#include "formats/netcdf_bytes.h"
+#include "formats/pds4_label.h"
+#include "formats/reader_failure.h"
+#include "isohf/raster.h"
+#include "support/samples.h"
+#include "support/temporary_folder.h"
+
+namespace isohf::test {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+template <typename T>
+std::string stored(const std::vector<T>& values, bool big_endian = false) {
+  std::string bytes;
+  for (const T value : values) {
+    std::string each(sizeof(T), '\0');
+    std::memcpy(each.data(), &value, sizeof(T));
+    if (big_endian) std::reverse(each.begin(), each.end());
+    bytes += each;
+  }
+  return bytes;
+}
+
+class Described : public ::testing::Test {
+ protected:
+  void write(const std::string& name, const std::string& bytes) const { write_file(folder_ / name, bytes); }
+  [[nodiscard]] std::unique_ptr<HeightSource> open(const std::string& name, const std::string& channel = {}) const {
+    OpenOptions options;
+    options.channel = channel;
+    return open_raster(folder_ / name, options);
+  }
+  [[nodiscard]] std::string failure(const std::string& name, ErrorCode* code = nullptr) const {
+    return failure_of(folder_.path(), code, [&] { read_corner(*open(name)); });
+  }
+
+  TemporaryFolder folder_;
+};
+
+using Envi = Described;
+
+std::string envi(const std::string& more) {
+  return "ENVI\nsamples = 2\nlines = 2\nbands = 2\ndata type = 2\ninterleave = bip\nbyte order = 0\n" + more;
+}
+
+TEST_F(Envi, FeetOfMapInfoAreUsSurveyFeet) {
+  write("a.dat", stored<std::int16_t>({1, 2, 3, 4, 5, 6, 7, 8}));
+  write("a.hdr", envi("map info = {State Plane (NAD 83), 1, 1, 600000, 400000, 10, 10, 3104, units=Feet}\n"));
+  const Georeference place = open("a.dat")->info().georeference;
+  EXPECT_EQ(place.unit, HorizontalUnit::kMetre);
+  EXPECT_DOUBLE_EQ(place.metres_per_unit, 1200.0 / 3937.0);
+  write("a.hdr", envi("map info = {Geographic Lat/Lon, 1, 1, 6, 40, 10, 10, WGS-84, units=Seconds}\n"));
+  EXPECT_THAT(failure("a.dat"), HasSubstr("its coordinates are in seconds"));
+}
+
+TEST_F(Envi, GainsAndOffsetsAreTheBandsOwn) {
+  write("a.dat", stored<std::int16_t>({1, 2, 3, 4, 5, 6, 7, 8}));
+  write("a.hdr", envi("data gain values = {1, 0.5}\ndata offset values = {0, 100}\nband names = {height, slope}\n"));
+  const auto second = open("a.dat", "slope");
+  EXPECT_THAT(values_of(*second), ElementsAre(2, 4, 6, 8));
+  EXPECT_EQ(second->info().z_scale, 0.5);
+  EXPECT_EQ(second->info().z_offset, 100.0);
+  EXPECT_EQ(second->info().channel, "slope");
+  EXPECT_EQ(open("a.dat", "1")->info().z_scale, 0.5);
+  EXPECT_THAT(open("a.dat")->info().warnings.front(), HasSubstr("channel height is read"));
+  EXPECT_THAT(failure_of(folder_.path(), nullptr, [&] { (void)open("a.dat", "aspect"); }),
+              HasSubstr("are 0 to 1: height, slope"));
+  write("a.hdr", envi("data gain values = {0, 1}\n"));
+  EXPECT_THAT(failure("a.dat"), HasSubstr("data gain values gives a scale of 0"));
+}
+
+TEST_F(Envi, WholeNumbersOf64BitsAreFloat64) {
+  write("a.dat", stored<std::int64_t>({1, -2, 1LL << 50, 4}, true));
+  write("a.hdr", "ENVI\nsamples = 2\nlines = 2\ndata type = 14\nbyte order = 1\n");
+  EXPECT_THAT(values_of(*open("a.dat")), ElementsAre(1, -2, 0x1p50, 4));
+  write("a.dat", stored<std::int64_t>({1, -2, (1LL << 60) + 1, 4}, true));
+  EXPECT_THAT(failure("a.dat"), HasSubstr("sample (0, 1) is 1152921504606846977, which float64 does not hold"));
+}
+
+using Netcdf = Described;
+
+TEST_F(Netcdf, LongitudesMayComeBeforeLatitudes) {
+  NetcdfBytes file;
+  file.dimension("lon", 3).dimension("lat", 2);
+  file.variable("lon", {0}, 6, stored<double>({10.0, 10.5, 11.0}, true), {{"units", "degrees_east"}});
+  file.variable("lat", {1}, 6, stored<double>({40.0, 40.5}, true), {{"units", "degrees_north"}});
+  file.variable("z", {0, 1}, 3, stored<std::int16_t>({1, 2, 3, 4, 5, 6}, true), {});
+  write("a.nc", file.bytes());
+  const auto source = open("a.nc");
+  ASSERT_EQ(source->info().width, 3);
+  ASSERT_EQ(source->info().height, 2);
+  EXPECT_THAT(values_of(*source), ElementsAre(2, 4, 6, 1, 3, 5));  // the South comes first
+  const Georeference& place = source->info().georeference;
+  EXPECT_EQ(place.origin_x, 10.0);
+  EXPECT_EQ(place.origin_y, 40.5);
+  EXPECT_THAT(values_of(source->info().sample_type, read_window(*source, {1, 1, 2, 1})), ElementsAre(3, 5));
+}
+
+TEST_F(Netcdf, CoordinatesOfFloat32MayBeRounded) {
+  const auto grid = [](double step, double jitter) {
+    std::vector<float> longitudes;
+    for (int i = 0; i < 5; ++i) longitudes.push_back(static_cast<float>(179.0 + step * i + (i == 2 ? jitter : 0.0)));
+    NetcdfBytes file;
+    file.dimension("lat", 2).dimension("lon", 5);
+    file.variable("lon", {1}, 5, stored<float>(longitudes, true), {{"units", "degrees_east"}});
+    file.variable("lat", {0}, 6, stored<double>({1.0, 1.0 - step}, true), {{"units", "degrees_north"}});
+    file.variable("z", {0, 1}, 3, std::string(20, '\1'), {});
+    return file.bytes();
+  };
+  constexpr double kSecond = 1.0 / 3600.0;
+  write("a.nc", grid(kSecond, 0.0));
+  EXPECT_TRUE(open("a.nc")->info().georeference.has_origin);
+  EXPECT_NEAR(open("a.nc")->info().georeference.spacing_x, kSecond, 0.02 * kSecond);
+  write("a.nc", grid(kSecond, 0.3 * kSecond));
+  EXPECT_FALSE(open("a.nc")->info().georeference.has_origin);
+  write("a.nc", grid(0.5, 0.02));  // of which float32 rounds none
+  EXPECT_FALSE(open("a.nc")->info().georeference.has_origin);
+}
+
+#ifdef ISOHF_WITH_NETCDF
+// GDAL's netCDF driver wrote these: CF conventions, deflated chunks of 4 x 3 samples.
+class Netcdf4 : public ::testing::Test {
+ protected:
+  void SetUp() override { set_module_folder(ISOHF_BIN_DIR); }
+  static std::string file(const char* name) { return std::string(ISOHF_SOURCE_DIR) + "/tests/formats/data/" + name; }
+};
+
+TEST_F(Netcdf4, RowsFromTheSouthAreTurned) {
+  const auto source = open_raster(file("lat_lon.nc"), {});
+  const SourceInfo& info = source->info();
+  ASSERT_EQ(info.width, 9);
+  ASSERT_EQ(info.height, 7);
+  EXPECT_EQ(info.sample_type, SampleType::kInt16);
+  EXPECT_EQ(info.block_width, 4);
+  EXPECT_EQ(info.block_height, 3);
+  EXPECT_EQ(info.vertical_unit, "metre");
+  EXPECT_THAT(info.void_values, ElementsAre(-32767));
+  EXPECT_EQ(info.georeference.unit, HorizontalUnit::kDegree);
+  EXPECT_DOUBLE_EQ(info.georeference.origin_x, 6.0);
+  EXPECT_DOUBLE_EQ(info.georeference.origin_y, 45.025);
+  const std::vector<double> values = values_of(*source);
+  for (int row = 0; row < 7; ++row) {
+    for (int column = 0; column < 9; ++column) {
+      const int stored_row = 6 - row;
+      const double expected = stored_row == 3 && column == 4 ? -32767 : (stored_row * 9 + column) * 7 - 100;
+      EXPECT_EQ(values[static_cast<std::size_t>(row * 9 + column)], expected) << column << ' ' << row;
+    }
+  }
+  for (const std::uint64_t limit : {std::uint64_t{0}, std::uint64_t{1000}}) {
+    source->limit_buffers(limit);
+    EXPECT_EQ(values_of(*source), values);
+    EXPECT_THAT(values_of(info.sample_type, read_window(*source, {3, 2, 2, 2})),
+                ElementsAre(values[21], values[22], values[30], values[31]));
+  }
+}
+
+TEST_F(Netcdf4, LongitudesMayComeBeforeLatitudes) {
+  const auto source = open_raster(file("lon_lat.nc"), {});
+  const SourceInfo& info = source->info();
+  ASSERT_EQ(info.width, 9);
+  ASSERT_EQ(info.height, 7);
+  EXPECT_EQ(info.z_scale, 2.0);
+  EXPECT_EQ(info.z_offset, 10.0);
+  EXPECT_EQ(info.vertical_unit, "foot");
+  // float32 coordinates: a hundredth of a sample
+  EXPECT_NEAR(info.georeference.origin_x, 6.0, 4e-5);
+  EXPECT_NEAR(info.georeference.origin_y, 45.025, 4e-5);
+  const std::vector<double> values = values_of(*source);
+  for (int row = 0; row < 7; ++row) {
+    for (int column = 0; column < 9; ++column) {
+      const int stored_row = 6 - row;
+      const double expected = stored_row == 3 && column == 4 ? -16383.5 : ((stored_row * 9 + column) * 7 - 100) * 0.5;
+      EXPECT_EQ(values[static_cast<std::size_t>(row * 9 + column)], expected) << column << ' ' << row;
+    }
+  }
+}
+#endif
+
+using Vrt = Described;
+
+TEST_F(Vrt, NodataOf15DigitsIsTheFloatThatItMeans) {
+  write("a.dat", stored<float>({1.0F, -3.4028234663852886e38F, 0.1F, 4.0F}));
+  write("a.hdr", "ENVI\nsamples = 2\nlines = 2\ndata type = 4\n");
+  const auto vrt = [&](const std::string& nodata) {
+    write("a.vrt",
+          fmt::format(R"(<VRTDataset rasterXSize="2" rasterYSize="2"><VRTRasterBand dataType="Float32" band="1">)"
+                      R"(<NoDataValue>-9</NoDataValue><ComplexSource><SourceFilename relativeToVRT="1">a.dat)"
+                      R"(</SourceFilename><SourceBand>1</SourceBand><NODATA>{}</NODATA></ComplexSource>)"
+                      R"(</VRTRasterBand></VRTDataset>)",
+                      nodata));
+    return values_of(*open("a.vrt"));
+  };
+  EXPECT_THAT(vrt("-3.40282346638529e+38"), ElementsAre(1.0, -9.0, 0.1F, 4.0));
+  write("a.dat", stored<float>({1.0F, 2.0F, 0.1F, 4.0F}));
+  EXPECT_THAT(vrt("0.100000001490116"), ElementsAre(1.0, 2.0, -9.0, 4.0));
+  EXPECT_THAT(vrt("0.11"), ElementsAre(1.0, 2.0, 0.1F, 4.0));
+}
+
+using Pds4 = Described;
+
+TEST_F(Pds4, ReadsTheArrayThatTheLabelDescribes) {
+  write("a.dat", "xy" + stored<std::int16_t>({1, 2, 3, -32768, 5, 6}, true));
+  write("a.xml", pds4_label("a.dat"));
+  for (const char* name : {"a.xml", "a.dat"}) {
+    const auto source = open(name);
+    const SourceInfo& info = source->info();
+    EXPECT_EQ(info.format, "PDS4");
+    EXPECT_THAT(values_of(*source), ElementsAre(1, 2, 3, -32768, 5, 6));
+    EXPECT_THAT(info.void_values, ElementsAre(-32768));
+    EXPECT_EQ(info.z_scale, 0.5);
+    EXPECT_EQ(info.z_offset, 1000.0);
+    EXPECT_EQ(info.vertical_unit, "metre");
+    const Georeference& place = info.georeference;
+    EXPECT_EQ(place.registration, Registration::kArea);
+    EXPECT_EQ(place.unit, HorizontalUnit::kMetre);
+    EXPECT_EQ(place.spacing_x, 100.0);
+    EXPECT_EQ(place.origin_x, 5050.0);
+    EXPECT_EQ(place.origin_y, 8950.0);
+    EXPECT_EQ(place.system.body, "Mars");
+    EXPECT_THAT(place.system.wkt, HasSubstr(R"(PARAMETER["standard_parallel_1",30])"));
+    EXPECT_THAT(place.system.wkt, HasSubstr(R"(PARAMETER["central_meridian",-20])"));
+  }
+}
+
+TEST_F(Pds4, AxesComeInAnyOrderAndRowsFromTheBottom) {
+  write("a.dat", "xy" + stored<std::int16_t>({1, 10, 2, 20, 3, 30, 4, 40, 5, 50, 6, 60}, true));
+  Pds4Options options;
+  options.axes = {{"Line", 2}, {"Sample", 3}, {"Band", 2}};
+  write("a.xml", pds4_label("a.dat", options));
+  EXPECT_THAT(values_of(*open("a.xml", "1")), ElementsAre(10, 20, 30, 40, 50, 60));
+  options.axes = {{"Line", 2}, {"Band", 2}, {"Sample", 3}};
+  write("a.xml", pds4_label("a.dat", options));
+  EXPECT_THAT(values_of(*open("a.xml")), ElementsAre(1, 10, 2, 4, 40, 5));
+  options.axes = {{"Sample", 3}, {"Line", 2}, {"Band", 2}};
+  write("a.xml", pds4_label("a.dat", options));
+  EXPECT_THAT(values_of(*open("a.xml")), ElementsAre(1, 3, 5, 2, 4, 6));
+  options.axes = {{"Band", 2}, {"Line", 2}, {"Sample", 3}};
+  options.direction = "Bottom to Top";
+  write("a.xml", pds4_label("a.dat", options));
+  EXPECT_THAT(values_of(*open("a.xml", "1")), ElementsAre(50, 6, 60, 4, 40, 5));
+}
+
+TEST_F(Pds4, ConstantsMayBeBits) {
+  write("a.dat", "xy" + stored<float>({1.0F, -3.4028226550889045e38F, 3.0F, 4.0F, 5.0F, 6.0F}));
+  Pds4Options options;
+  options.type = "IEEE754LSBSingle";
+  for (const char* bits : {"16#FF7FFFFB#", "0xFF7FFFFB", "-3.4028226550889045e+38"}) {
+    options.constants = fmt::format("<missing_constant>{}</missing_constant><valid_maximum>5</valid_maximum>", bits);
+    write("a.xml", pds4_label("a.dat", options));
+    const auto source = open("a.xml");
+    const std::vector<double> values = values_of(*source);
+    EXPECT_TRUE(is_void(source->info(), values[1])) << bits;
+    EXPECT_FALSE(is_void(source->info(), values[4])) << bits;
+    EXPECT_TRUE(is_void(source->info(), values[5])) << bits;
+  }
+}
+
+TEST_F(Pds4, LabelsOfOtherThingsAreRefused) {
+  write("a.dat", "xy");
+  ErrorCode code{};
+  write("a.xml", pds4_label("a.dat"));
+  EXPECT_THAT(failure("a.xml", &code), HasSubstr("has 2 bytes, 3 x 2 samples"));
+  EXPECT_EQ(code, ErrorCode::kCorrupt);
+  write("a.xml", pds4_label("b.dat"));
+  EXPECT_THAT(failure("a.xml"), HasSubstr("its samples, b.dat, are not beside it"));
+  write("b.dat", std::string(20, 'x'));
+  EXPECT_THAT(failure("a.dat"), HasSubstr("describes"));
+  write("a.xml", "<?xml version=\"1.0\"?>\n<Product_Observational></Product_Observational>");
+  EXPECT_THAT(failure("a.xml", &code), HasSubstr("describes no array"));
+  EXPECT_EQ(code, ErrorCode::kUnsupported);
+  Pds4Options options;
+  options.type = "ComplexLSB8";
+  write("a.xml", pds4_label("b.dat", options));
+  EXPECT_THAT(failure("a.xml", &code), HasSubstr("data_type is \"ComplexLSB8\""));
+}
+
+}  // namespace
+}  // namespace isohf::test
