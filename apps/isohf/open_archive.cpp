@@ -6,6 +6,7 @@
 #include "formats/georeference/units.h"
 #include "formats/registry.h"
 #include "isohf/error.h"
+#include "isohf/surface.h"
 
 namespace isohf::cli {
 
@@ -21,7 +22,13 @@ std::string what_else(const std::string& path) {
 
 ArchiveReader open_archive(const std::string& path) {
   try {
-    return ArchiveReader(path);
+    ArchiveReader archive(path);
+    try {
+      understand_world(archive);
+    } catch (const Error&) {
+      // Whoever needs a place says that it is not understood.
+    }
+    return archive;
   } catch (const Error& error) {
     const std::string found = error.code() == ErrorCode::kCorrupt ? what_else(path) : "";
     if (found.empty()) throw;

@@ -4,6 +4,7 @@
 namespace isohf {
 
 void understand_source(ArchiveReader& archive) {
+  understand_world(archive);
   const SourceRecord& source = archive.metadata().source;
   const Georeference own = source_georeference(source);
   if (source.map || own.unit != HorizontalUnit::kMetre) return;
@@ -15,7 +16,17 @@ void understand_source(ArchiveReader& archive) {
   try {
     archive.set_source_map(understand_map(text, source.metres_per_unit));
   } catch (const Error& error) {
-    throw Error(error.code(), archive.path() + ": " + error.what());
+    throw error.within(archive.path());
+  }
+}
+
+void understand_world(ArchiveReader& archive) {
+  const auto& projection = archive.metadata().projection;
+  if (!projection || projection->spec.kind != ProjectionKind::kSystem || projection->spec.map) return;
+  try {
+    archive.set_world_map(understand_way(projection->spec.system, projection->spec.ellipsoid));
+  } catch (const Error& error) {
+    throw error.within(archive.path());
   }
 }
 

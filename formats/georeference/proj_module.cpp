@@ -13,6 +13,7 @@
 #include <memory>
 #include <mutex>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "formats/module_inside.h"
@@ -55,9 +56,10 @@ Context make_context() {
 
 struct IsohfProjSystem {
   Context context;
-  Object system;      ///< all of it
-  Object horizontal;  ///< its horizontal part
-  Object to_geo;      ///< horizontal -> its own longitudes and latitudes, East before North
+  Object system;             ///< all of it
+  Object horizontal;         ///< its horizontal part
+  Object to_geo;             ///< horizontal -> its own longitudes and latitudes, East before North
+  bool is_pipeline = false;  ///< to_geo runs from degrees to coordinates, and nothing else is there
   std::string wkt[ISOHF_WKTS];
   double degrees_per_unit = 1.0;  ///< of those longitudes and latitudes
   double prime_meridian_deg = 0.0;
@@ -90,6 +92,13 @@ namespace {
 
 [[noreturn]] void refuse(const std::string& why) {
   throw Error(ErrorCode::kUnsupported, why);
+}
+
+/// With PROJ's reason, where it has one.
+[[noreturn]] void refuse_text(PJ_CONTEXT* context) {
+  const int code = proj_context_errno(context);
+  const char* const why = code != 0 && code != PROJ_ERR_OTHER ? proj_context_errno_string(context, code) : nullptr;
+  refuse(std::string("PROJ does not understand it") + (why != nullptr ? std::string(": ") + why : ""));
 }
 
 /// PROJ takes its own strings for operations unless they say that they are systems.
@@ -208,9 +217,7 @@ void open(const std::string& text, const char* heights, IsohfProjSystem& system,
     if (proj_context_get_database_path(context) == nullptr) {
       refuse("PROJ finds no proj.db (Debian package proj-data; the environment variable PROJ_DATA names its folder)");
     }
-    const char* const why = proj_context_errno_string(context, proj_context_errno(context));
-    refuse(std::string("PROJ does not understand it") +
-           (proj_context_errno(context) != 0 && why != nullptr ? std::string(": ") + why : ""));
+    refuse_text(context);
   }
   system.horizontal = horizontal_part(context, system.system.get());
   if (*heights != '\0' && proj_get_type(system.system.get()) != PJ_TYPE_COMPOUND_CRS) {
@@ -223,6 +230,89 @@ void open(const std::string& text, const char* heights, IsohfProjSystem& system,
     if (both) system.system = std::move(both);
   }
   describe(system, info);
+}
+
+/// The system without heights, but with its binding to another datum: what operations are looked for with.
+Object with_datum(PJ_CONTEXT* context, const PJ* system) {
+  if (proj_get_type(system) == PJ_TYPE_COMPOUND_CRS) {
+    const Object part(proj_crs_get_sub_crs(context, system, 0));
+    return with_datum(context, part.get());
+  }
+  return Object(proj_clone(context, system));
+}
+
+/// The longitudes and latitudes of a system, bound to another datum where the system is.
+Object geographic_part(PJ_CONTEXT* context, const PJ* system) {
+  if (proj_get_type(system) != PJ_TYPE_BOUND_CRS) return Object(proj_crs_get_geodetic_crs(context, system));
+  const Object base(proj_get_source_crs(context, system));
+  const Object hub(proj_get_target_crs(context, system));
+  const Object way(proj_crs_get_coordoperation(context, system));
+  const Object geographic(base ? proj_crs_get_geodetic_crs(context, base.get()) : nullptr);
+  if (!geographic || !hub || !way) return nullptr;
+  return Object(proj_crs_create_bound_crs(context, geographic.get(), hub.get(), way.get()));
+}
+
+void find_operation(const char* from, const char* to, const double* ground, IsohfProjOperation& found) {
+  IsohfProjSystem source;
+  IsohfProjSystem target;
+  IsohfProjInfo info{};
+  open(from, "", source, info);
+  const double meridian_deg = info.prime_meridian_deg;
+  open(to, "", target, info);
+  if (info.is_projected == 0) refuse("counts degrees, and is no map");
+  PJ_CONTEXT* const context = target.context.get();
+  const Object ours = geographic_part(context, with_datum(context, source.system.get()).get());
+  const Object theirs = with_datum(context, target.system.get());
+  const std::unique_ptr<PJ_OPERATION_FACTORY_CONTEXT, Destroy<proj_operation_factory_context_destroy>> factory(
+      proj_create_operation_factory_context(context, nullptr));
+  if (!ours || !theirs || !factory) refuse("has no longitudes and latitudes that PROJ knows");
+  proj_operation_factory_context_set_area_of_interest(context, factory.get(), ground[0], ground[1], ground[2],
+                                                      ground[3]);
+  proj_operation_factory_context_set_spatial_criterion(context, factory.get(),
+                                                       PROJ_SPATIAL_CRITERION_PARTIAL_INTERSECTION);
+  proj_operation_factory_context_set_grid_availability_use(context, factory.get(),
+                                                           PROJ_GRID_AVAILABILITY_DISCARD_OPERATION_IF_MISSING_GRID);
+  const std::unique_ptr<PJ_OBJ_LIST, Destroy<proj_list_destroy>> ways(
+      proj_create_operations(context, ours.get(), theirs.get(), factory.get()));
+  const Object first(ways && proj_list_get_count(ways.get()) > 0 ? proj_list_get(context, ways.get(), 0) : nullptr);
+  const Object way(first ? proj_normalize_for_visualization(context, first.get()) : nullptr);
+  const char* const text = way ? proj_as_proj_string(context, way.get(), PJ_PROJ_5, nullptr) : nullptr;
+  if (text == nullptr) refuse("cannot be reached from the input's reference system: PROJ knows no way");
+  found.is_ballpark = proj_coordoperation_has_ballpark_transformation(context, first.get());
+  std::string pipeline = text;
+  // Degrees from Greenwich first become what the input's system counts.
+  const double unit = source.degrees_per_unit;
+  if (std::abs(unit - 1.0) > 1e-12 || std::abs(meridian_deg) > 1e-12) {
+    constexpr std::string_view kHead = "+proj=pipeline";
+    char head[256];
+    std::snprintf(head, sizeof(head), "+proj=pipeline +step +proj=affine +xoff=%.17g +s11=%.17g +s22=%.17g",
+                  -meridian_deg / unit, 1.0 / unit, 1.0 / unit);
+    pipeline = head + (pipeline.starts_with(kHead) ? pipeline.substr(kHead.size()) : " +step " + pipeline);
+  }
+  if (pipeline.size() >= sizeof(found.pipeline)) refuse("needs an operation that is too long");
+  isohf::put_text(found.pipeline, pipeline);
+}
+
+void open_pipeline(const char* pipeline, IsohfProjSystem& system) {
+  system.context = make_context();
+  system.is_pipeline = true;
+  system.to_geo.reset(proj_create(system.context.get(), pipeline));
+  if (system.to_geo) return;
+  refuse_text(system.context.get());
+}
+
+int module_find_operation(const char* from, const char* to, const double* ground, IsohfProjOperation* operation,
+                          IsohfProjMessage* message) {
+  return isohf::guarded(message, "PROJ", ErrorCode::kUnsupported,
+                        [&] { find_operation(from, to, ground, *operation); });
+}
+
+int module_open_pipeline(const char* pipeline, IsohfProjSystem** system, IsohfProjMessage* message) {
+  return isohf::guarded(message, "PROJ", ErrorCode::kUnsupported, [&] {
+    auto made = std::make_unique<IsohfProjSystem>();
+    open_pipeline(pipeline, *made);
+    *system = made.release();
+  });
 }
 
 int module_open(const char* text, const char* vertical, IsohfProjSystem** system, IsohfProjInfo* info,
@@ -248,6 +338,8 @@ int module_same(const IsohfProjSystem* a, const IsohfProjSystem* b) {
 void move(const IsohfProjSystem& system, PJ_DIRECTION direction, double* places, std::size_t count) {
   constexpr double kNowhere = std::numeric_limits<double>::quiet_NaN();
   Worker worker = system.take();
+  // A pipeline runs the other way.
+  const PJ_DIRECTION along = system.is_pipeline ? (direction == PJ_FWD ? PJ_INV : PJ_FWD) : direction;
   for (std::size_t i = 0; i < count; ++i) {
     double* const at = places + 2 * i;
     PJ_COORD from = proj_coord(at[0], at[1], 0.0, HUGE_VAL);
@@ -257,7 +349,7 @@ void move(const IsohfProjSystem& system, PJ_DIRECTION direction, double* places,
     }
     PJ_COORD to = proj_coord(kNowhere, kNowhere, 0.0, 0.0);
     if (worker.operation && std::isfinite(from.xy.x) && std::isfinite(from.xy.y)) {
-      to = proj_trans(worker.operation.get(), direction, from);
+      to = proj_trans(worker.operation.get(), along, from);
       if (proj_errno(worker.operation.get()) != 0) {
         proj_errno_reset(worker.operation.get());
         to = proj_coord(kNowhere, kNowhere, 0.0, 0.0);
@@ -293,7 +385,8 @@ const char* module_library() {
 }  // namespace
 
 extern "C" __attribute__((visibility("default"))) const IsohfProjModule* isohf_proj_module() {
-  static const IsohfProjModule module = {ISOHF_PROJ_ABI, module_open,     module_wkt,   module_same,
-                                         module_to_geo,  module_from_geo, module_close, module_library};
+  static const IsohfProjModule module = {ISOHF_PROJ_ABI, module_open,   module_find_operation, module_open_pipeline,
+                                         module_wkt,     module_same,   module_to_geo,         module_from_geo,
+                                         module_close,   module_library};
   return &module;
 }

@@ -12,7 +12,7 @@
 extern "C" {
 
 /// Raised whenever anything below changes; the loader refuses any other.
-#define ISOHF_PROJ_ABI 2
+#define ISOHF_PROJ_ABI 3
 
 typedef struct IsohfProjSystem IsohfProjSystem;
 
@@ -42,10 +42,22 @@ typedef struct IsohfProjMessage {
   char text[512];
 } IsohfProjMessage;
 
+/// A way from the longitudes and latitudes of one system to the coordinates of another.
+typedef struct IsohfProjOperation {
+  char pipeline[4096];  ///< PROJ's: degrees from Greenwich -> coordinates, East before North
+  int32_t is_ballpark;  ///< no relation of the datums is known: they are taken for one
+} IsohfProjOperation;
+
 /// Understands `text`: "EPSG:2154", WKT of any version and dialect, a PROJ string, PROJJSON. `vertical`, where it is not
 /// empty, is the system of the heights of a `text` that says nothing of them.
 typedef int (*IsohfProjOpen)(const char* text, const char* vertical, IsohfProjSystem** system, IsohfProjInfo* info,
                              IsohfProjMessage* message);
+/// The best way, over a ground of West, South, East, North in degrees, from the longitudes and latitudes of the system
+/// `from` to the projected system `to`, of those that need no grid that is not installed.
+typedef int (*IsohfProjFindOperation)(const char* from, const char* to, const double* ground,
+                                      IsohfProjOperation* operation, IsohfProjMessage* message);
+/// Such a pipeline again, as a system that can be moved by and closed, and nothing else.
+typedef int (*IsohfProjOpenPipeline)(const char* pipeline, IsohfProjSystem** system, IsohfProjMessage* message);
 /// The text of all of the system, on one line: WKT2 (ISO 19162:2019), WKT1 as GDAL writes it, ESRI's WKT1.
 /// `wkt` holds `wkt_bytes`.
 typedef void (*IsohfProjWkt)(const IsohfProjSystem* system, int dialect, char* wkt);
@@ -61,6 +73,8 @@ typedef const char* (*IsohfProjText)(void);
 typedef struct IsohfProjModule {
   int32_t abi;
   IsohfProjOpen open;
+  IsohfProjFindOperation find_operation;
+  IsohfProjOpenPipeline open_pipeline;
   IsohfProjWkt wkt;
   IsohfProjSame same;
   IsohfProjMove to_geo;

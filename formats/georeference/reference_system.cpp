@@ -21,6 +21,9 @@ const IsohfProjModule& proj_module() {
                    "ISOHF_BUILD_PROJ_MODULE"}));
 }
 
+/// libproj, SQLite and what they read of proj.db.
+constexpr std::uint64_t kProjBytes = 14'000'000;
+
 class ProjSystem final : public UnderstoodSystem {
  public:
   ProjSystem(const std::string& text, std::optional<double> metres_per_unit, std::optional<int> vertical_epsg)
@@ -82,8 +85,7 @@ class ProjSystem final : public UnderstoodSystem {
     }
     return compared > 4;
   }
-  /// libproj, SQLite and what they read of proj.db.
-  [[nodiscard]] std::uint64_t memory_bytes() const override { return 14'000'000; }
+  [[nodiscard]] std::uint64_t memory_bytes() const override { return kProjBytes; }
 
   [[nodiscard]] GeoPoint geo_from_map(MapPoint place) const override {
     double at[2] = {place.easting * scale_, place.northing * scale_};
@@ -114,6 +116,42 @@ class ProjSystem final : public UnderstoodSystem {
   Description description_;
   double metres_per_unit_ = 1.0;
   double scale_ = 1.0;  ///< units of the system in one of the coordinates
+};
+
+/// A reference system's coordinates, metres, and longitudes and latitudes on another datum.
+class PipelineMap final : public ReferenceMap {
+ public:
+  PipelineMap(const MappedSystem& system, const Ellipsoid& ellipsoid)
+      : module_(proj_module()), metres_(system.metres_per_unit), ellipsoid_(ellipsoid) {
+    IsohfProjMessage message{};
+    const int result = module_.open_pipeline(system.operation.c_str(), &system_, &message);
+    if (result != 0) {
+      throw Error(
+          module_error_code(result),
+          fmt::format("the way to the map {}: {}", system.name.empty() ? system.text : system.name, message.text));
+    }
+  }
+  ~PipelineMap() override { module_.close(system_); }
+
+  [[nodiscard]] GeoPoint geo_from_map(MapPoint place) const override {
+    double at[2] = {place.easting / metres_, place.northing / metres_};
+    module_.to_geo(system_, at, 1);
+    return {at[0], at[1]};
+  }
+  [[nodiscard]] MapPoint map_from_geo(GeoPoint place) const override {
+    double at[2] = {place.longitude, place.latitude};
+    module_.from_geo(system_, at, 1);
+    return {at[0] * metres_, at[1] * metres_};
+  }
+  [[nodiscard]] double metres_per_unit() const override { return 1.0; }
+  [[nodiscard]] const Ellipsoid& ellipsoid() const override { return ellipsoid_; }
+  [[nodiscard]] std::uint64_t memory_bytes() const override { return kProjBytes; }
+
+ private:
+  const IsohfProjModule& module_;
+  IsohfProjSystem* system_ = nullptr;
+  double metres_;
+  Ellipsoid ellipsoid_;
 };
 
 }  // namespace
@@ -225,7 +263,78 @@ std::optional<bool> are_same(const ReferenceSystem& a, const ReferenceSystem& b)
   }
 }
 
-void understand_ground(const SourceInfo& info, GroundRequest& request) {
+std::shared_ptr<const ReferenceMap> understand_way(const MappedSystem& system, const Ellipsoid& ellipsoid) {
+  return std::make_shared<PipelineMap>(system, ellipsoid);
+}
+
+namespace {
+
+/// What names the datum of a source's longitudes and latitudes: its system, else its ellipsoid, else WGS 84.
+std::string datum_text(const ReferenceSystem& system) {
+  if (std::string text = system_text(system); !text.empty()) return text;
+  if (!system.semi_major_axis_m) return "EPSG:4326";
+  const double inverse = system.inverse_flattening.value_or(0.0);
+  return inverse > 0.0 ? fmt::format("+proj=longlat +a={} +rf={}", *system.semi_major_axis_m, inverse)
+                       : fmt::format("+proj=longlat +R={}", *system.semi_major_axis_m);
+}
+
+/// The ground of a source that says where it lies, for the choice among ways between datums.
+GeoExtent rough_ground(const SourceInfo& info, const ReferenceMap* map) {
+  const Georeference& place = info.georeference;
+  GeoExtent ground{-180.0, -90.0, 180.0, 90.0};
+  if (!place.has_origin) return ground;
+  const MapBounds bounds{place.origin_x, place.origin_y - static_cast<double>(info.height - 1) * place.spacing_y,
+                         place.origin_x + static_cast<double>(info.width - 1) * place.spacing_x, place.origin_y};
+  if (map != nullptr) {
+    const auto found = ground_under(*map, bounds);
+    if (!found) return ground;
+    ground = found->extent;
+  } else {
+    ground = {bounds.west, bounds.south, bounds.east, bounds.north};
+  }
+  if (ground.east - ground.west >= 360.0) return {-180.0, ground.south, 180.0, ground.north};
+  return {std::remainder(ground.west, 360.0), ground.south, std::remainder(ground.east, 360.0), ground.north};
+}
+
+void understand_projection(const SourceInfo& info, const ReferenceMap* source_map, ProjectionRequest& request) {
+  try {
+    const auto understood = understand_system(request.system);
+    const UnderstoodSystem::Description& target = understood->description();
+    if (!target.is_projected) {
+      throw Error(ErrorCode::kInvalidArgument,
+                  fmt::format("\"{}\" counts degrees and is no map; `projection` none leaves degrees as they are",
+                              target.name));
+    }
+    const GeoExtent ground = rough_ground(info, source_map);
+    const double area[4] = {ground.west, ground.south, ground.east, ground.north};
+    const std::string from = datum_text(info.georeference.system);
+    IsohfProjOperation operation{};
+    IsohfProjMessage message{};
+    const int result = proj_module().find_operation(from.c_str(), request.system.c_str(), area, &operation, &message);
+    if (result != 0) throw Error(module_error_code(result), fmt::format("\"{}\" {}", target.name, message.text));
+    ProjectionSpec& spec = request.system_map;
+    spec.kind = ProjectionKind::kSystem;
+    if (info.georeference.system.semi_major_axis_m) {
+      spec.ellipsoid = {*info.georeference.system.semi_major_axis_m,
+                        info.georeference.system.inverse_flattening.value_or(0.0)};
+    } else if (source_map != nullptr) {
+      spec.ellipsoid = source_map->ellipsoid();
+    }
+    spec.system = {target.authority == "EPSG" ? "EPSG:" + target.code : target.wkt2, target.name, operation.pipeline,
+                   target.unit};
+    spec.map = understand_way(spec.system, spec.ellipsoid);
+    if (operation.is_ballpark != 0) {
+      request.system_note = fmt::format(
+          "{}: PROJ knows no way from its datum to that of \"{}\": they are taken for one, which may be off by some "
+          "hundred metres",
+          info.path, target.name);
+    }
+  } catch (const Error& error) {
+    throw Error(error.code(), fmt::format("{}: `projection`: {}", info.path, error.what()));
+  }
+}
+
+void understand_source_map(const SourceInfo& info, GroundRequest& request) {
   const Georeference& place = info.georeference;
   const std::string text = system_text(place.system);
   if (place.unit != HorizontalUnit::kMetre || !place.has_origin || text.empty()) return;
@@ -234,6 +343,18 @@ void understand_ground(const SourceInfo& info, GroundRequest& request) {
   } catch (const Error& error) {
     request.why_no_map = error.what();
   }
+}
+
+}  // namespace
+
+void understand_ground(const SourceInfo& info, GroundRequest& request) {
+  understand_source_map(info, request);
+  ProjectionRequest& projection = request.projection;
+  if (projection.kind != ProjectionKind::kSystem) return;
+  // Without a place of its own the input is refused later, with the remedy.
+  if (!info.georeference.has_origin || info.georeference.unit == HorizontalUnit::kUnknown) return;
+  if (info.georeference.unit == HorizontalUnit::kMetre && !request.source_map) return;
+  understand_projection(info, request.source_map.get(), projection);
 }
 
 }  // namespace isohf

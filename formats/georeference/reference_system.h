@@ -48,6 +48,11 @@ class UnderstoodSystem : public ReferenceMap {
 [[nodiscard]] std::shared_ptr<const ReferenceMap> understand_map(const std::string& text,
                                                                  std::optional<double> metres_per_unit);
 
+/// The map of an archive that lies on a reference system, metres, `ellipsoid` being that of its longitudes and
+/// latitudes. Throws Error{kUnsupported} where the module or a grid is missing.
+[[nodiscard]] std::shared_ptr<const ReferenceMap> understand_way(const MappedSystem& system,
+                                                                 const Ellipsoid& ellipsoid);
+
 /// What names the system to PROJ: "EPSG:n", or the WKT; empty where a file has neither.
 [[nodiscard]] std::string system_text(const ReferenceSystem& system);
 

@@ -243,6 +243,23 @@ TEST(Metadata, ProjectionsComeBackAsTheyWere) {
             std::numeric_limits<double>::infinity());
 }
 
+TEST(Metadata, RequiresOfReadersToKnowReferenceSystemsAsProjections) {
+  Metadata metadata = projected();
+  ProjectionSpec& spec = metadata.projection->spec;
+  EXPECT_THAT(format_metadata(metadata), testing::Not(testing::HasSubstr("requires")));
+  spec = {};
+  spec.kind = ProjectionKind::kSystem;
+  spec.system = {"EPSG:2263", "NAD83 / New York", "+proj=pipeline +step +proj=noop", 1200.0 / 3937.0};
+  const std::string json = format_metadata(metadata);
+  EXPECT_THAT(json, testing::HasSubstr("\"projection-system\""));
+  const Metadata back = parse_metadata(json);
+  EXPECT_EQ(back.projection->spec, spec);
+  EXPECT_EQ(format_metadata(back), json);
+  // Of another kind it says nothing, and this kind is nothing without it.
+  EXPECT_THROW((void)parse_metadata(replaced(json, "\"kind\": \"system\"", "\"kind\": \"utm\"")), Error);
+  EXPECT_THROW((void)parse_metadata(replaced(json, "\"crs\": \"EPSG:2263\"", "\"crs\": 2263")), Error);
+}
+
 TEST(Metadata, OldArchivesHaveNoProjectionAndDoNotJoin) {
   std::string json = replaced(format_metadata(full()), "\n \"projection\": null,", "");
   json = replaced(json, "\n \"wraps_x\": false,", "");

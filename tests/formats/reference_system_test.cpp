@@ -13,8 +13,14 @@
 #include "formats/reader_failure.h"
 #include "formats/registry.h"
 #include "formats/tiff/geotiff_keys.h"
+#include "isohf/convert.h"
 #include "isohf/error.h"
+#include "isohf/projection/choose_projection.h"
+#include "isohf/projection/projection_wkt.h"
 #include "isohf/raster.h"
+#include "isohf/surface.h"
+#include "support/memory_source.h"
+#include "support/temporary_folder.h"
 
 namespace isohf::test {
 namespace {
@@ -104,6 +110,139 @@ TEST_F(UnderstandSystem, UtmAgreesWithGeographicLibAndComesBack) {
       }
     }
   }
+}
+
+/// What both know, by the text that rasters of the map are written with.
+TEST_F(UnderstandSystem, AgreesWithGeographicLibOnEveryKindOfGroundProjection) {
+  struct Case {
+    const char* request;
+    GeoExtent ground;
+  };
+  const Case cases[] = {{"local", {5.0, 40.0, 15.0, 50.0}},
+                        {"local:10,-33.3", {0.0, -40.0, 20.0, -20.0}},
+                        {"transverse-mercator:9,0.9996", {5.0, -60.0, 13.0, 60.0}},
+                        {"utm:32N", {6.0, 1.0, 12.0, 84.0}},
+                        {"utm:60S", {174.0, -80.0, 180.0, -1.0}},
+                        {"lambert-conformal:46,49,3", {-5.0, 41.0, 10.0, 51.0}},
+                        {"lambert-conformal:-20,20,30", {-20.0, -60.0, 80.0, 60.0}},
+                        {"polar-stereographic:-71,0", {-180.0, -90.0, 180.0, -60.0}},
+                        {"polar-stereographic:70,-45", {-180.0, 60.0, 180.0, 90.0}}};
+  std::mt19937 random(54);
+  for (const Case& test : cases) {
+    const ProjectionSpec spec = choose_projection(ProjectionRequest::parse(test.request),
+                                                  {"dem", "Earth", Ellipsoid{}, test.ground, false, false, true})
+                                    .spec;
+    const Projection ours(spec);
+    GroundRequest request;
+    request.projection = ProjectionRequest::parse(projection_wkt(spec, ""));
+    SourceInfo info;
+    info.path = "dem";
+    info.width = info.height = 2;
+    info.georeference.unit = HorizontalUnit::kDegree;
+    info.georeference.has_origin = true;
+    info.georeference.origin_x = test.ground.west;
+    info.georeference.origin_y = test.ground.north;
+    understand_ground(info, request);
+    const Projection theirs(request.projection.system_map);
+    std::uniform_real_distribution<double> longitude(test.ground.west, test.ground.east);
+    std::uniform_real_distribution<double> latitude(test.ground.south, test.ground.north);
+    for (int i = 0; i < 1000; ++i) {
+      const GeoPoint place{longitude(random), latitude(random)};
+      const MapPoint a = ours.forward(place);
+      const MapPoint b = theirs.forward(place);
+      ASSERT_NEAR(a.easting, b.easting, 1e-6) << test.request << " at " << place.longitude << " " << place.latitude;
+      ASSERT_NEAR(a.northing, b.northing, 1e-6) << test.request << " at " << place.longitude << " " << place.latitude;
+      const GeoPoint back = theirs.inverse(a);
+      constexpr double kMicrometre = 1e-6 / 111000.0;
+      ASSERT_NEAR(back.latitude, place.latitude, kMicrometre) << test.request;
+      ASSERT_NEAR(std::remainder(back.longitude - place.longitude, 360.0) * std::cos(place.latitude * kDegree), 0.0,
+                  kMicrometre)
+          << test.request;
+    }
+  }
+}
+
+/// A system of another datum is reached by PROJ's operation, which the archive keeps.
+TEST_F(UnderstandSystem, ProjectionsOnAnotherDatumKeepTheWayThere) {
+  SourceInfo info;
+  info.path = "dem";
+  info.width = info.height = 11;
+  info.georeference.unit = HorizontalUnit::kDegree;
+  info.georeference.has_origin = true;
+  info.georeference.origin_x = 7.0;
+  info.georeference.origin_y = 47.0;
+  info.georeference.spacing_x = info.georeference.spacing_y = 0.1;
+  info.georeference.system.epsg = 4326;
+  GroundRequest request;
+  request.projection = ProjectionRequest::parse("EPSG:21781");
+  understand_ground(info, request);
+  const ProjectionSpec& spec = request.projection.system_map;
+  EXPECT_EQ(spec.system.text, "EPSG:21781");
+  EXPECT_EQ(spec.system.name, "CH1903 / LV03");
+  EXPECT_THAT(spec.system.operation, HasSubstr("+proj=somerc"));
+  // swisstopo's own example of its formulas, which are good to a metre: 8 43 49.79, 46 02 38.87 is 699999.76 99999.97.
+  const MapPoint at =
+      Projection(spec).forward({8.0 + 43.0 / 60.0 + 49.79 / 3600.0, 46.0 + 2.0 / 60.0 + 38.87 / 3600.0});
+  EXPECT_NEAR(at.easting, 700000.0, 1.5);
+  EXPECT_NEAR(at.northing, 100000.0, 1.5);
+  const auto again = understand_way(spec.system, spec.ellipsoid);
+  EXPECT_EQ(again->map_from_geo({7.5, 46.5}).easting, spec.map->map_from_geo({7.5, 46.5}).easting);
+
+  for (const auto& [text, why] : {std::pair{"EPSG:4258", "counts degrees and is no map"},
+                                  {"EPSG:99999", "PROJ does not understand it"},
+                                  {"IAU_2015:49910", "cannot be reached"}}) {
+    request.projection = ProjectionRequest::parse(text);
+    const Error error = error_of([&] { understand_ground(info, request); });
+    EXPECT_THAT(error.what(), StartsWith("dem: `projection`: ")) << text;
+    EXPECT_THAT(error.what(), HasSubstr(why)) << text;
+  }
+  EXPECT_THAT(error_of([&] {
+                (void)understand_way({"EPSG:1", "a map", "+proj=nonsense", 1.0}, {});
+              }).what(),
+              StartsWith("the way to the map a map: "));
+}
+
+/// An archive on a reference system has no places until that is understood, and then those of the system.
+TEST_F(UnderstandSystem, ArchivesOnAReferenceSystemFindTheirPlacesByIt) {
+  MemorySource<float> source(SampleType::kFloat32, 60, 50, [](std::int64_t c, std::int64_t r) {
+    return static_cast<double>(c) + 100.0 * static_cast<double>(r);
+  });
+  Georeference& place = source.mutable_info().georeference;
+  place.registration = Registration::kArea;
+  place.unit = HorizontalUnit::kDegree;
+  place.spacing_x = place.spacing_y = 0.01;
+  place.has_origin = true;
+  place.origin_x = -74.3;
+  place.origin_y = 41.0;
+  place.system.epsg = 4326;
+  ConvertOptions options;
+  options.code_type = CodeType::kF32;
+  options.plan.ground.projection = ProjectionRequest::parse("EPSG:2263");
+  understand_ground(source.info(), options.plan.ground);
+  const TemporaryFolder folder;
+  (void)convert(source, folder / "a.isohf", options);
+
+  ArchiveReader archive(folder / "a.isohf");
+  EXPECT_FALSE(WorldGeoreference(archive.metadata()).has_geo());
+  EXPECT_THAT(error_of([&] { (void)Projection(archive.metadata().projection->spec); }).what(),
+              HasSubstr("NAD83 / New York Long Island (ftUS) needs the PROJ module"));
+  understand_world(archive);
+  const WorldGeoreference places(archive.metadata());
+  ASSERT_TRUE(places.has_geo());
+  const auto feet = understand_system("EPSG:2263");
+  const Georeference grid = *grid_georeference(archive.metadata(), natural_grid(archive.metadata()));
+  EXPECT_EQ(grid.metres_per_unit, 1200.0 / 3937.0);
+  EXPECT_EQ(grid.system.epsg, 2263);
+  const SampleGrid samples = natural_grid(archive.metadata());
+  for (const GeoPoint at : {GeoPoint{-74.0, 40.7}, {-73.8, 40.9}, {-74.25, 40.55}}) {
+    const MapPoint there = feet->map_from_geo(at);
+    const WorldPoint world = places.world_from_geo(at);
+    EXPECT_NEAR((world.x - samples.first_x) / grid.metres_per_unit + grid.origin_x, there.easting, 1e-3);
+    EXPECT_NEAR(grid.origin_y - (world.z - samples.first_z) / grid.metres_per_unit, there.northing, 1e-3);
+    EXPECT_NEAR(places.geo_from_world(world).latitude, at.latitude, 1e-9);
+  }
+  archive.set_world_map(nullptr);
+  EXPECT_FALSE(WorldGeoreference(archive.metadata()).has_geo());
 }
 
 TEST_F(UnderstandSystem, LongitudesCountFromGreenwichInDegreesWhateverTheSystemDoes) {

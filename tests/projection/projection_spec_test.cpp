@@ -35,6 +35,19 @@ TEST(ProjectionRequest, ReadsKindsAndParameters) {
   EXPECT_EQ(ProjectionRequest::parse("utm").utm_zone, 0);
 }
 
+TEST(ProjectionRequest, TakesReferenceSystems) {
+  for (const char* text : {"EPSG:2154", "epsg:2154", "ESRI:54009", "IAU_2015:49910", "urn:ogc:def:crs:EPSG::2154",
+                           "+proj=laea +lat_0=52 +lon_0=10", "PROJCS[\"a\"]", "{\"type\": \"ProjectedCRS\"}"}) {
+    const ProjectionRequest request = ProjectionRequest::parse(text);
+    EXPECT_EQ(request.kind, ProjectionKind::kSystem) << text;
+    EXPECT_FALSE(request.is_auto);
+    EXPECT_EQ(request.system, text);
+    EXPECT_EQ(request.name(), text);
+  }
+  EXPECT_THAT(refusal_of("system"), HasSubstr("or a reference system: EPSG:3035"));
+  EXPECT_THAT(refusal_of("utn:32N"), HasSubstr("must be one of auto"));
+}
+
 TEST(ProjectionRequest, SaysWhatItFoundAndWhatMustBe) {
   EXPECT_THAT(refusal_of("mercator"), HasSubstr("found 'mercator', must be one of auto, none, equirectangular, local"));
   EXPECT_THAT(refusal_of("utm:61N"), HasSubstr("a zone from 1 to 60"));

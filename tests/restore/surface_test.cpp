@@ -38,7 +38,8 @@ class SurfaceInDegrees : public testing::Test {
     options.code_type = CodeType::kF32;
     options.plan.shape = {20, 19};
     options.plan.levels = 1;
-    options.plan.ground.projection = {false, kind, {}, 0};
+    options.plan.ground.projection.is_auto = false;
+    options.plan.ground.projection.kind = kind;
     options.overwrite = true;
     (void)convert(source, folder / "a.isohf", options);
   }

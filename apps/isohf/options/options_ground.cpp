@@ -2,6 +2,7 @@
 
 #include "formats/decorate/windowed_source.h"
 #include "isohf/convert/frame/source_frame.h"
+#include "options/options_source.h"
 
 namespace isohf::cli {
 
@@ -11,8 +12,8 @@ void add_ground_options(CommandLine& line, GroundRequest& request) {
               "Project degrees to metres, and maps to truer ones: equirectangular, local, transverse-mercator, utm, "
               "lambert-conformal, polar-stereographic, none, or chosen by extent (default: auto of degrees, none of "
               "maps); parameters may "
-              "follow, as in utm:32N",
-              [&](const std::string& text) { request.projection = ProjectionRequest::parse(text); });
+              "follow, as in utm:32N; or a reference system: EPSG:3035, WKT, a PROJ string, or a file with one of them",
+              [&](const std::string& text) { request.projection = ProjectionRequest::parse(system_from(text)); });
   line.words({"auto", "equirectangular", "local", "transverse-mercator", "utm", "lambert-conformal",
               "polar-stereographic", "none"});
   line.flag("--wrap-x", "Join the East edge of an input all the way round to its West edge", request.wrap_x);

@@ -14,9 +14,7 @@
 #include "options/quantities.h"
 
 namespace isohf::cli {
-namespace {
 
-/// What is called so is a file that holds the text (a .prj), else the text itself.
 std::string system_from(const std::string& text) {
   constexpr std::size_t kMostBytes = 65536;
   std::error_code ignored;
@@ -31,8 +29,6 @@ std::string system_from(const std::string& text) {
   }
   return held;
 }
-
-}  // namespace
 
 void add_source_options(CommandLine& line, OpenOptions& options) {
   line.group("Input");

@@ -73,6 +73,7 @@ class ArchiveReader {
   /// and some MiB of them kept, so that a tile mostly costs one range. Of version 1 the whole index is read and kept.
   ArchiveReader(std::shared_ptr<const ByteSource> source, const std::string& name);
   ~ArchiveReader();
+  ArchiveReader(ArchiveReader&&) noexcept;
   ArchiveReader(const ArchiveReader&) = delete;
   ArchiveReader& operator=(const ArchiveReader&) = delete;
 
@@ -84,6 +85,8 @@ class ArchiveReader {
   [[nodiscard]] const std::string& metadata_json() const;  ///< as stored, for --json
   /// Has metadata().source.map be what the source's reference system was understood as.
   void set_source_map(std::shared_ptr<const ReferenceMap> map);
+  /// The same of metadata().projection->spec.map, where the archive lies on a reference system.
+  void set_world_map(std::shared_ptr<const ReferenceMap> map);
 
   /// True where the index disagreed with the ZIP directory and tiles are found by the directory instead.
   [[nodiscard]] bool reads_by_directory() const;

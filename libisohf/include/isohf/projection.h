@@ -2,11 +2,14 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 namespace isohf {
+
+class ReferenceMap;
 
 /// A place on a body: degrees, East and North positive. Latitudes are those of the ellipsoid's normal.
 struct GeoPoint {
@@ -48,12 +51,25 @@ enum class ProjectionKind {
   kUtm,                 ///< the same with the parameters of zone utm_zone
   kLambertConformal,    ///< conformal between two parallels; a Mercator map where they lie opposite each other
   kPolarStereographic,  ///< conformal around the pole on the side of parallel_1, true to scale there
+  kSystem,              ///< a reference system, by PROJ
 };
 
-/// "none", "equirectangular", "local", "transverse-mercator", "utm", "lambert-conformal", "polar-stereographic".
+/// "none", "equirectangular", "local", "transverse-mercator", "utm", "lambert-conformal", "polar-stereographic",
+/// "system".
 [[nodiscard]] std::string to_string(ProjectionKind kind);
 /// The inverse; throws Error{kInvalidArgument} naming all of them for any other text.
 [[nodiscard]] ProjectionKind projection_kind_from_string(const std::string& text);
+
+/// A projected reference system as a map of ground whose longitudes and latitudes are on another datum, as they may be.
+struct MappedSystem {
+  std::string text;  ///< "EPSG:3035", or WKT
+  std::string name;  ///< "ETRS89-extended / LAEA Europe"
+  std::string
+      operation;  ///< PROJ's pipeline: degrees on the ground's datum -> easting and northing, units of the system
+  double metres_per_unit = 1.0;
+
+  friend bool operator==(const MappedSystem&, const MappedSystem&) = default;
+};
 
 /// A map projection with all its parameters. What a kind does not use is 0; scale_0 then is 1.
 struct ProjectionSpec {
@@ -66,9 +82,17 @@ struct ProjectionSpec {
   double scale_0 = 1.0;      ///< transverse-mercator: scale along longitude_0
   double false_easting = 0.0;
   double false_northing = 0.0;
-  int utm_zone = 0;  ///< 1...60, negative in the South
+  int utm_zone = 0;     ///< 1...60, negative in the South
+  MappedSystem system;  ///< of kind system, which uses nothing else but the ellipsoid
+  /// The map of kind system, metres, once its operation is understood; never stored.
+  std::shared_ptr<const ReferenceMap> map;
 
-  friend bool operator==(const ProjectionSpec&, const ProjectionSpec&) = default;
+  friend bool operator==(const ProjectionSpec& a, const ProjectionSpec& b) {
+    return a.kind == b.kind && a.ellipsoid == b.ellipsoid && a.longitude_0 == b.longitude_0 &&
+           a.latitude_0 == b.latitude_0 && a.parallel_1 == b.parallel_1 && a.parallel_2 == b.parallel_2 &&
+           a.scale_0 == b.scale_0 && a.false_easting == b.false_easting && a.false_northing == b.false_northing &&
+           a.utm_zone == b.utm_zone && a.system == b.system;
+  }
 };
 
 /// What a user asks for: a kind, or that one be chosen, and parameters (docs/cli.md).
@@ -78,11 +102,16 @@ struct ProjectionRequest {
   std::vector<double> parameters;  ///< as written behind the kind; empty: from the extent
   int utm_zone = 0;                ///< 0: from the extent
   bool is_given = false;           ///< by the user: an input on a map of its own leaves it for nothing else
+  std::string system;              ///< of kind system, as the user has it
+  ProjectionSpec system_map;       ///< the same, once it is understood for the input: understand_ground()
+  std::string system_note;         ///< what a user must hear of the way there, one line; mostly empty
 
-  /// "auto", "KIND" or "KIND:PARAMETERS": local:LON,LAT  transverse-mercator:LON[,SCALE]  utm:32N
-  /// lambert-conformal:LAT1,LAT2[,LON]  polar-stereographic:LAT[,LON]. Throws Error{kInvalidArgument}, "found ..., must
-  /// be ...".
+  /// "auto", "KIND", "KIND:PARAMETERS" or a reference system: local:LON,LAT  transverse-mercator:LON[,SCALE]  utm:32N
+  /// lambert-conformal:LAT1,LAT2[,LON]  polar-stereographic:LAT[,LON]  EPSG:3035  WKT  a PROJ string. Throws
+  /// Error{kInvalidArgument}, "found ..., must be ...".
   [[nodiscard]] static ProjectionRequest parse(const std::string& text);
+  /// What the user wrote of it: the system, else the kind, or "auto".
+  [[nodiscard]] std::string name() const;
 };
 
 /// A horizontal reference system that is understood: its coordinates <-> places on the body. Longitudes and latitudes

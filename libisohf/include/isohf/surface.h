@@ -57,6 +57,11 @@ class WorldGeoreference {
 /// Throws Error, naming the archive, where it names no system, or one that is not understood.
 void understand_source(ArchiveReader& archive);
 
+/// The same of the map on which the archive's world lies, where that is a reference system (`projection` EPSG:3035):
+/// nothing of it finds a place before that. Loads PROJ for such archives alone.
+/// Throws Error, naming the archive, where it is not understood.
+void understand_world(ArchiveReader& archive);
+
 /// Whether the surface has an elevation at a point.
 enum class SurfaceState : std::uint8_t { kSurface, kNodata, kOutside };
 

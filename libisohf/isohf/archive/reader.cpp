@@ -253,6 +253,7 @@ ArchiveReader::ArchiveReader(const std::string& path)
 ArchiveReader::ArchiveReader(std::shared_ptr<const ByteSource> source, const std::string& name)
     : state_(std::make_unique<State>(std::move(source), name, true)) {}
 
+ArchiveReader::ArchiveReader(ArchiveReader&&) noexcept = default;
 ArchiveReader::~ArchiveReader() = default;
 
 const std::string& ArchiveReader::path() const {
@@ -269,6 +270,9 @@ const Metadata& ArchiveReader::metadata() const {
 }
 void ArchiveReader::set_source_map(std::shared_ptr<const ReferenceMap> map) {
   state_->metadata->source.map = std::move(map);
+}
+void ArchiveReader::set_world_map(std::shared_ptr<const ReferenceMap> map) {
+  if (state_->metadata->projection) state_->metadata->projection->spec.map = std::move(map);
 }
 const std::string& ArchiveReader::metadata_json() const {
   return state_->json;

@@ -113,6 +113,7 @@ std::string fingerprint(const SourceInfo& info, const Plan& plan, const ConvertO
                        on.spec.ellipsoid.semi_major_axis_m, on.spec.longitude_0, on.spec.latitude_0, on.spec.parallel_1,
                        on.spec.parallel_2, on.spec.scale_0, on.origin.easting, on.origin.northing,
                        plan.frame.wraps_x ? " round" : "");
+    if (!on.spec.system.text.empty()) job += fmt::format(" by {} {}", on.spec.system.text, on.spec.system.operation);
   }
   if (options.texture) {
     const TextureRequest& texture = *options.texture;

@@ -120,7 +120,9 @@ class Estimate {
 
   [[nodiscard]] std::uint64_t map_bytes() const {
     const auto& map = options_.plan.ground.source_map;
-    return map ? map->memory_bytes() : 0;
+    if (map && map->memory_bytes() > 0) return map->memory_bytes();
+    const auto& world = options_.plan.ground.projection.system_map.map;
+    return world ? world->memory_bytes() : 0;
   }
 
   [[nodiscard]] std::uint64_t total(const MemoryPlan& memory) const {

@@ -255,6 +255,7 @@ AccuracyReport measure(const std::string& archive, const Conversion& conversion)
   if (conversion.options.measure) return conversion.options.measure(archive);
   ArchiveReader reader(archive);
   reader.set_source_map(conversion.options.plan.ground.source_map);
+  reader.set_world_map(conversion.options.plan.ground.projection.system_map.map);
   return compare_with_source(reader, conversion.source, conversion.job);
 }
 

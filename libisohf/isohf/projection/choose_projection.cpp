@@ -71,8 +71,8 @@ class Choice {
  private:
   [[noreturn]] void refuse(const std::string& fault) const {
     throw Error(ErrorCode::kInvalidArgument,
-                fmt::format("{}: `projection` {}: {}; `projection` {} works", problem_.path, to_string(request_.kind),
-                            fault, to_string(automatic().spec.kind)));
+                fmt::format("{}: `projection` {}: {}; `projection` {} works", problem_.path, request_.name(), fault,
+                            to_string(automatic().spec.kind)));
   }
 
   [[nodiscard]] double parameter(std::size_t i, double otherwise) const {
@@ -116,6 +116,10 @@ class Choice {
         // A whole cap has its conventional side down.
         spec.longitude_0 = parameter(1, problem_.goes_round ? 0.0 : spec.longitude_0);
         break;
+      case Kind::kSystem:
+        spec = request_.system_map;
+        spec.ellipsoid = problem_.ellipsoid;
+        break;
       case Kind::kNone:
         break;
     }
@@ -143,7 +147,8 @@ class Choice {
       return "`wrap_x` needs the input's rows to stay rows";
     }
     if (std::string fault = fault_of_ground(spec); !fault.empty()) return fault;
-    if (spec.kind == Kind::kEquirectangular) return {};
+    // Whoever names a system has data of it, whatever its lengths are worth.
+    if (spec.kind == Kind::kEquirectangular || spec.kind == Kind::kSystem) return {};
     ScaleError error;
     try {
       error = worst_scale_error(Projection(spec), ground_);
@@ -204,6 +209,7 @@ class Choice {
           return "the input reaches more than a quarter of the way round the body from the centre";
         }
         return {};
+      case Kind::kSystem:
       case Kind::kNone:
         break;
     }

@@ -55,6 +55,11 @@ MapBounds bounds_of_image(const MapBounds& rectangle, const Image& image) {
     }
   }
   if (!is_whole) return {NAN, NAN, NAN, NAN};
+  // Between two places of a side the map is cut open.
+  constexpr double kMostBend = 0.25;
+  if (bend > kMostBend * std::max(bounds.east - bounds.west, bounds.north - bounds.south)) {
+    return {NAN, NAN, NAN, NAN};
+  }
   // An arc rises above its chord by an eighth of its second difference.
   const double rise = bend / 8.0;
   return {bounds.west - rise, bounds.south - rise, bounds.east + rise, bounds.north + rise};

@@ -7,7 +7,7 @@ namespace isohf {
 
 /// Bounds, metres, of a ground's image, found by walking along its four sides in many short steps. The curve between
 /// two of these places is allowed for: the bounds hold it, and exceed the image by less than 1e-5 of its size. NaN
-/// where a place on the way has no image.
+/// where a place on the way has no image, or the map is cut open between two.
 [[nodiscard]] MapBounds projected_bounds(const Projection& projection, const GeoExtent& ground);
 
 /// The same of the image of a rectangle of another map.

@@ -14,6 +14,7 @@
 #include <type_traits>
 
 #include "isohf/error.h"
+#include "isohf/projection/reference_map.h"
 
 namespace isohf {
 namespace {
@@ -50,6 +51,7 @@ class Projection::Map {
 
   class Equirectangular;
   class Local;
+  class System;
   template <typename Library, typename Side>
   class Conformal;
 };
@@ -142,6 +144,26 @@ class Projection::Map::Conformal final : public Map {
   double northing_0_ = 0.0;
 };
 
+/// A reference system, whose map somebody else has understood.
+class Projection::Map::System final : public Map {
+ public:
+  explicit System(const ProjectionSpec& map_spec) : Map(map_spec) {
+    if (!spec.map) {
+      throw Error(ErrorCode::kUnsupported,
+                  fmt::format("the map {} needs the PROJ module, and is not understood without",
+                              spec.system.name.empty() ? spec.system.text : spec.system.name));
+    }
+  }
+  [[nodiscard]] MapPoint forward(double longitude, double latitude) const override {
+    return spec.map->map_from_geo({longitude, latitude});
+  }
+  [[nodiscard]] GeoPoint inverse(double x, double y) const override { return spec.map->geo_from_map({x, y}); }
+  [[nodiscard]] MapScale scale(double longitude, double latitude) const override {
+    const PlaceScale at = scale_at(*spec.map, forward(longitude, latitude));
+    return {at.least, at.most};
+  }
+};
+
 std::shared_ptr<const Projection::Map> Projection::Map::make(const ProjectionSpec& spec) {
   const double radius_m = spec.ellipsoid.semi_major_axis_m;
   const double flattening = spec.ellipsoid.flattening();
@@ -164,6 +186,8 @@ std::shared_ptr<const Projection::Map> Projection::Map::make(const ProjectionSpe
       map.SetScale(std::abs(spec.parallel_1), 1.0);
       return conformal(map, spec.parallel_1 > 0.0);
     }
+    case ProjectionKind::kSystem:
+      return std::make_shared<System>(spec);
     case ProjectionKind::kNone:
       break;
   }
@@ -173,6 +197,8 @@ std::shared_ptr<const Projection::Map> Projection::Map::make(const ProjectionSpe
 Projection::Projection(const ProjectionSpec& spec) {
   try {
     map_ = Map::make(spec);
+  } catch (const Error&) {
+    throw;
   } catch (const std::exception& error) {
     throw Error(ErrorCode::kInvalidArgument, fmt::format("projection {}: {}", to_string(spec.kind), error.what()));
   }

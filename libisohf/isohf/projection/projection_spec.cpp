@@ -26,6 +26,7 @@ constexpr KindName kKinds[] = {
     {ProjectionKind::kUtm, "utm", "32N", 0, 0},
     {ProjectionKind::kLambertConformal, "lambert-conformal", "LAT1,LAT2[,LON]", 2, 3},
     {ProjectionKind::kPolarStereographic, "polar-stereographic", "LAT[,LON]", 1, 2},
+    {ProjectionKind::kSystem, "system", "", 0, 0},
 };
 
 const KindName& name_of(ProjectionKind kind) {
@@ -37,8 +38,20 @@ const KindName& name_of(ProjectionKind kind) {
 
 std::string all_kinds() {
   std::string text = "auto";
-  for (const KindName& known : kKinds) text += fmt::format(", {}", known.name);
-  return text;
+  for (const KindName& known : kKinds) {
+    if (known.kind != ProjectionKind::kSystem) text += fmt::format(", {}", known.name);
+  }
+  return text + ", or a reference system: EPSG:3035, WKT, a PROJ string";
+}
+
+/// A code of an authority in capitals, well-known text, a PROJ string or PROJJSON.
+bool names_system(const std::string& text) {
+  if (text.find_first_of("[{") != text.npos || text.find("+proj=") != text.npos || text.find("+init=") != text.npos)
+    return true;
+  const std::size_t colon = text.find(':');
+  if (colon == text.npos || colon == 0) return false;
+  if (text.starts_with("epsg:") || text.starts_with("esri:")) return true;
+  return text.starts_with("urn:") || text.find_first_not_of("ABCDEFGHIJKLMNOPQRSTUVWXYZ_0123456789") == colon;
 }
 
 [[noreturn]] void refuse(const std::string& found, const std::string& required) {
@@ -114,13 +127,25 @@ ProjectionKind projection_kind_from_string(const std::string& text) {
   refuse(text, "one of " + all_kinds());
 }
 
+std::string ProjectionRequest::name() const {
+  if (is_auto) return "auto";
+  return kind == ProjectionKind::kSystem ? system : to_string(kind);
+}
+
 ProjectionRequest ProjectionRequest::parse(const std::string& text) {
   ProjectionRequest request;
   request.is_given = true;
   if (text == "auto") return request;
+  if (names_system(text)) {
+    request.is_auto = false;
+    request.kind = ProjectionKind::kSystem;
+    request.system = text;
+    return request;
+  }
   const std::size_t colon = std::min(text.find(':'), text.size());
   request.is_auto = false;
   request.kind = projection_kind_from_string(text.substr(0, colon));
+  if (request.kind == ProjectionKind::kSystem) refuse(text, "one of " + all_kinds());
   if (colon == text.size()) return request;
   const KindName& known = name_of(request.kind);
   const std::string parameters = text.substr(colon + 1);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <utility>
 #include <vector>
 
@@ -54,6 +55,7 @@ std::pair<const char*, Parameters> method_of(const ProjectionSpec& spec) {
                easting,
                northing}};
     case ProjectionKind::kNone:
+    case ProjectionKind::kSystem:
       break;
   }
   return {"", {}};
@@ -72,6 +74,7 @@ std::string quoted(std::string name) {
 }  // namespace
 
 std::string projection_wkt(const ProjectionSpec& spec, const std::string& geographic_name) {
+  if (spec.kind == ProjectionKind::kSystem) return spec.system.text;
   const auto [method, parameters] = method_of(spec);
   const bool wgs84 = is_wgs84(spec.ellipsoid);
   const std::string name = geographic_name.empty() ? (wgs84 ? "WGS 84" : "unknown") : geographic_name;
@@ -86,6 +89,9 @@ std::string projection_wkt(const ProjectionSpec& spec, const std::string& geogra
 
 std::optional<int> projection_epsg(const ProjectionSpec& spec, std::optional<int> geographic_epsg) {
   constexpr int kWgs84 = 4326;
+  if (spec.kind == ProjectionKind::kSystem && spec.system.text.starts_with("EPSG:")) {
+    return std::atoi(spec.system.text.c_str() + 5);
+  }
   if (spec.kind != ProjectionKind::kUtm || geographic_epsg != kWgs84 || !is_wgs84(spec.ellipsoid)) return std::nullopt;
   return spec.utm_zone > 0 ? 32600 + spec.utm_zone : 32700 - spec.utm_zone;
 }
@@ -110,6 +116,11 @@ std::string describe_projection(const ProjectionSpec& spec) {
     case ProjectionKind::kPolarStereographic:
       return fmt::format("{} around longitude {:.8g}, true at latitude {:.8g}", kind, spec.longitude_0,
                          spec.parallel_1);
+    case ProjectionKind::kSystem: {
+      const bool is_code = spec.system.text.find('[') == std::string::npos;
+      if (spec.system.name.empty()) return spec.system.text;
+      return is_code ? fmt::format("{} ({})", spec.system.name, spec.system.text) : spec.system.name;
+    }
   }
   return kind;
 }

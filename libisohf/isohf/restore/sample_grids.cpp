@@ -23,19 +23,23 @@ Georeference map_georeference(const Metadata& metadata, const SampleGrid& grid) 
   Georeference place;
   place.registration = Registration::kArea;
   place.unit = HorizontalUnit::kMetre;
-  place.spacing_x = grid.spacing_x;
-  place.spacing_y = grid.spacing_z;
+  const double metres = place.metres_per_unit = on.spec.system.metres_per_unit;
+  place.spacing_x = grid.spacing_x / metres;
+  place.spacing_y = grid.spacing_z / metres;
   place.has_origin = true;
-  place.origin_x = on.origin.easting + grid.first_x;
-  place.origin_y = on.origin.northing - grid.first_z;
+  place.origin_x = (on.origin.easting + grid.first_x) / metres;
+  place.origin_y = (on.origin.northing - grid.first_z) / metres;
   // A map's own code and name are none of degrees.
   const bool in_degrees = source_georeference(source).unit == HorizontalUnit::kDegree;
   place.system.epsg = projection_epsg(on.spec, in_degrees ? source.crs_epsg : std::nullopt);
-  place.system.name = describe_projection(on.spec);
+  place.system.name = on.spec.system.name.empty() ? describe_projection(on.spec) : on.spec.system.name;
   if (!place.system.epsg) place.system.wkt = projection_wkt(on.spec, in_degrees ? source.crs_name : "");
   place.system.body = source.body;
-  place.system.semi_major_axis_m = on.spec.ellipsoid.semi_major_axis_m;
-  place.system.inverse_flattening = on.spec.ellipsoid.inverse_flattening;
+  // A reference system has an ellipsoid of its own; the record has that of longitudes and latitudes.
+  if (on.spec.kind != ProjectionKind::kSystem) {
+    place.system.semi_major_axis_m = on.spec.ellipsoid.semi_major_axis_m;
+    place.system.inverse_flattening = on.spec.ellipsoid.inverse_flattening;
+  }
   place.system.vertical_datum = source.vertical_datum;
   place.system.vertical_epsg = source.vertical_epsg;
   return place;
@@ -135,7 +139,7 @@ void check_same_system(const Metadata& metadata, const SourceInfo& other) {
 bool is_own_map(const Metadata& metadata, const SourceInfo& other) {
   const Georeference own = map_georeference(metadata, natural_grid(metadata));
   const Georeference& theirs = other.georeference;
-  if (theirs.unit != HorizontalUnit::kMetre || theirs.metres_per_unit != 1.0) return false;
+  if (theirs.unit != HorizontalUnit::kMetre || theirs.metres_per_unit != own.metres_per_unit) return false;
   if (own.system.epsg || theirs.system.epsg) return own.system.epsg == theirs.system.epsg;
   if (!theirs.system.wkt.empty()) return own.system.wkt == theirs.system.wkt;
   if (own.system.name != theirs.system.name) return false;
@@ -149,9 +153,13 @@ SampleGrid grid_through_map(const Metadata& metadata, const SourceInfo& other) {
   const ProjectionRecord& on = *metadata.projection;
   const Georeference& theirs = other.georeference;
   if (theirs.has_origin && is_own_map(metadata, other)) {
-    return {
-        other.width,      other.height,    theirs.origin_x - on.origin.easting, on.origin.northing - theirs.origin_y,
-        theirs.spacing_x, theirs.spacing_y};
+    const double metres = on.spec.system.metres_per_unit;
+    return {other.width,
+            other.height,
+            theirs.origin_x * metres - on.origin.easting,
+            on.origin.northing - theirs.origin_y * metres,
+            theirs.spacing_x * metres,
+            theirs.spacing_y * metres};
   }
   const std::string map = describe_projection(on.spec);
   if (source_georeference(metadata.source).unit != HorizontalUnit::kDegree) {

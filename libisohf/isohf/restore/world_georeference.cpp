@@ -63,6 +63,7 @@ struct WorldGeoreference::State {
   std::shared_ptr<const ReferenceMap> map;  ///< nullptr: the source was in degrees, or is not understood
   bool in_degrees = false;
   bool has_origin = false;
+  bool is_lost = false;  ///< the world lies on a reference system that is not understood
   MapPoint first_sample;
   double step_x = 0.0;
   double step_y = 0.0;
@@ -89,17 +90,19 @@ WorldGeoreference::WorldGeoreference(const Metadata& metadata) {
     state->first_sample = {*source.origin_x, *source.origin_y};
     state->step_x = source.crs_spacing_x;
     state->step_y = source.crs_spacing_y;
-    if (state->geometry.warp) state->warp.emplace(*state->geometry.warp);
+    state->is_lost = state->geometry.warp && state->geometry.warp->projection.kind == ProjectionKind::kSystem &&
+                     !state->geometry.warp->projection.map;
+    if (state->geometry.warp && !state->is_lost) state->warp.emplace(*state->geometry.warp);
   }
   state_ = std::move(state);
 }
 
 bool WorldGeoreference::has_geo() const {
-  return state_->has_origin && (state_->in_degrees || state_->map || state_->warp);
+  return state_->has_origin && !state_->is_lost && (state_->in_degrees || state_->map || state_->warp);
 }
 
 bool WorldGeoreference::has_source() const {
-  return state_->has_origin && (state_->in_degrees || state_->map || !state_->warp);
+  return state_->has_origin && !state_->is_lost && (state_->in_degrees || state_->map || !state_->warp);
 }
 
 WorldPoint WorldGeoreference::world_from_geo(GeoPoint point) const {

@@ -117,7 +117,9 @@ class Contradictions {
     check_number("valid.z0", 0.0, grid.world_height());
     if (metadata_.projection && source.crs_unit == "degree") check_ellipsoid();
     if (is_warped(metadata_)) {
-      if (source.crs_unit != "degree") return;  // of another map, which only PROJ understands
+      const ProjectionSpec& spec = metadata_.projection->spec;
+      // Of another map, or on one, which only PROJ understands.
+      if (source.crs_unit != "degree" || (spec.kind == ProjectionKind::kSystem && !spec.map)) return;
       if (!source.origin_x || !source.origin_y) return add("source.crs", "has no origin, which the projection needs");
       return check_name("source.crs", [&] { check_warped_degrees(); });
     }

@@ -109,6 +109,11 @@ std::string ground_hash(const Metadata& metadata) {
       out.write(value);
     }
     out.write(std::int32_t{spec.utm_zone});
+    if (spec.kind == ProjectionKind::kSystem) {
+      text(spec.system.text);
+      text(spec.system.operation);
+      out.write(spec.system.metres_per_unit);
+    }
     out.write(metadata.projection->origin.easting);
     out.write(metadata.projection->origin.northing);
   } else {

@@ -29,10 +29,16 @@ JsonRule within(double most) {
 
 // --- what metadata consist of, in the order in which it is written ---
 
-/// What an archive may require of its readers and this build knows: nothing yet.
-constexpr std::array<std::string_view, 0> kKnownRequirements{};
+/// What an archive may require of its readers and this build knows.
+constexpr const char* kProjectionSystem = "projection-system";
+constexpr std::array<std::string_view, 1> kKnownRequirements{kProjectionSystem};
 
-void version_members(JsonMembers& json, int& version) {
+bool is_on_system(const Metadata& metadata) {
+  return metadata.projection && metadata.projection->spec.kind == ProjectionKind::kSystem;
+}
+
+void version_members(JsonMembers& json, Metadata& metadata) {
+  int& version = metadata.version;
   std::string format = kFormatName;
   json("format", format);
   if (format != kFormatName) json.refuse("format", fmt::format("is \"{}\", must be \"{}\"", format, kFormatName));
@@ -43,6 +49,7 @@ void version_members(JsonMembers& json, int& version) {
                                                      version, kOldestFormatVersion, kFormatVersion));
   }
   std::optional<std::vector<std::string>> requirements;
+  if (!json.reads() && is_on_system(metadata)) requirements = {kProjectionSystem};
   json("requires", requirements, kAbsent);
   for (const std::string& name : requirements.value_or(std::vector<std::string>{})) {
     if (std::find(kKnownRequirements.begin(), kKnownRequirements.end(), name) != kKnownRequirements.end()) continue;
@@ -131,6 +138,11 @@ void sample_members(JsonMembers& json, Metadata& metadata) {
     json.refuse("range", "is not the smaller number first");
 }
 
+void system_members(JsonMembers& json, MappedSystem& system) {
+  json.all("crs", system.text, "name", system.name, "operation", system.operation);
+  json("metres_per_unit", system.metres_per_unit, {.least = 0.0, .most = 1e12, .above_least = true});
+}
+
 void projection_members(JsonMembers& json, ProjectionRecord& record) {
   ProjectionSpec& spec = record.spec;
   json.name("kind", spec.kind, projection_kind_from_string);
@@ -149,6 +161,11 @@ void projection_members(JsonMembers& json, ProjectionRecord& record) {
   std::optional<int> zone = spec.utm_zone == 0 ? std::nullopt : std::optional(spec.utm_zone);
   json("utm_zone", zone, {.presence = JsonRule::kNull, .least = -60, .most = 60});
   spec.utm_zone = zone.value_or(0);
+  const bool is_system = spec.kind == ProjectionKind::kSystem;
+  auto system = is_system ? std::optional(spec.system) : std::nullopt;
+  json.object("system", system, system_members, kAbsent);
+  if (json.reads() && is_system != system.has_value()) json.refuse("system", "must be there with kind system alone");
+  spec.system = system.value_or(MappedSystem{});
   json.object("origin", [&](JsonMembers& origin) {
     origin("easting", record.origin.easting, within(1e15));
     origin("northing", record.origin.northing, within(1e15));
@@ -229,7 +246,7 @@ void source_members(JsonMembers& json, SourceRecord& source) {
 }
 
 void metadata_members(JsonMembers& json, Metadata& metadata) {
-  version_members(json, metadata.version);
+  version_members(json, metadata);
   json("producer", metadata.producer);
   grid_members(json, metadata.grid, metadata.tiles_stored);
   auto planes = metadata.planes.count > 0 ? std::optional(metadata.planes) : std::nullopt;

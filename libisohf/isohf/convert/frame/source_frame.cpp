@@ -74,7 +74,7 @@ void place_by_warp(const SourceInfo& info, const MapBounds& bounds, std::shared_
   const ProjectionSpec& spec = frame.projection->spec;
   if (!std::isfinite(bounds.west)) {
     refuse(fmt::format("{}: `projection` {} has no place for a part of the input; give `projection` auto", info.path,
-                       to_string(spec.kind)));
+                       spec.kind == ProjectionKind::kSystem ? spec.system.text : to_string(spec.kind)));
   }
   const double grain = grain_of(std::min(frame.spacing_x, frame.spacing_z));
   const MapPoint origin{std::floor(bounds.west / grain) * grain, std::ceil(bounds.north / grain) * grain};
@@ -116,7 +116,7 @@ void place_on_map(const SourceInfo& info, const GroundRequest& request, SourceFr
   const bool is_asked = asked.is_given && (asked.is_auto || asked.kind != ProjectionKind::kNone);
   const bool is_placed = request.source_map && info.georeference.has_origin;
   const auto refuse_request = [&](const std::string& why) {
-    refuse(fmt::format("{}: `projection` {} {}", info.path, asked.is_auto ? "auto" : to_string(asked.kind), why));
+    refuse(fmt::format("{}: `projection` {} {}", info.path, asked.name(), why));
   };
   if (!is_placed) {
     if (!is_asked || (asked.is_auto && request.why_no_map.empty())) return;
@@ -162,9 +162,12 @@ void place_degrees(const SourceInfo& info, const GroundRequest& request, SourceF
   if (!place.has_origin) {
     if (!asked.is_auto && asked.kind != ProjectionKind::kEquirectangular && asked.kind != ProjectionKind::kNone) {
       refuse(fmt::format("{}: `projection` {} needs to know where the input lies; it has no georeference", info.path,
-                         to_string(asked.kind)));
+                         asked.name()));
     }
-    if (asked.is_auto) asked = {false, ProjectionKind::kEquirectangular, {}, 0, asked.is_given};
+    if (asked.is_auto) {
+      asked.is_auto = false;
+      asked.kind = ProjectionKind::kEquirectangular;
+    }
   }
   const Closure closure = closure_of(info);
   const ProjectionProblem problem{info.path, place.system.body,         ellipsoid_of(place.system),
@@ -271,6 +274,7 @@ SourceFrame make_source_frame(const SourceInfo& info, const GroundRequest& reque
 }
 
 std::string scale_warning(const SourceInfo& info, const SourceFrame& frame, const ProjectionRequest& request) {
+  if (frame.projection && !request.system_note.empty()) return request.system_note;
   const bool is_known = request.is_given && !request.is_auto && request.kind == ProjectionKind::kNone;
   if (!frame.ground || frame.projection || is_known || frame.ground->worst_error <= MapGround::kTrueEnough) return {};
   const MapGround& ground = *frame.ground;
