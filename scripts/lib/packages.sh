@@ -10,6 +10,7 @@ ISOHF_PACKAGES_BUILD=(
 ISOHF_PACKAGES_CHECK=(clang-format-14 clang-tidy-14)
 ISOHF_PACKAGES_FUZZ=(clang-14 libclang-rt-14-dev)
 ISOHF_PACKAGES_BENCH=(gdal-bin time python3 python3-numpy openimageio-tools)
+ISOHF_PACKAGES_CLUSTER=(munge slurmctld slurmd slurm-client bc)
 
 # isohf_require_packages NAME...: installs those that are missing; quick when none is.
 isohf_require_packages() {

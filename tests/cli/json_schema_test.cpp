@@ -50,6 +50,9 @@ class Documents {
     (exit_code == 0 ? succeeded_ : failed_).insert(arguments.front());
   }
 
+  /// Of what a file holds.
+  void keep_file(const std::string& schema, const std::string& file) { keep(schema, test::read_file(file)); }
+
   [[nodiscard]] const std::set<std::string>& succeeded() const { return succeeded_; }
   [[nodiscard]] const std::set<std::string>& failed() const { return failed_; }
 
@@ -187,6 +190,10 @@ TEST(JsonSchema, HoldsForEveryCommandsSuccessAndFailure) {
     documents.run(0, "shards", {"scan", "--plan", draft, "--shard", half, "-o", folder / (std::string("s") + half[0])});
   }
   documents.run(0, "shards", {"scan", "--plan", draft, folder / "s1", folder / "s2", "-o", folder / "scanned.plan"});
+  const std::string whole = folder / "lossless.plan";
+  documents.run(0, "shards", {"plan", coast, "--write", whole, "--lossless"});
+  for (const std::string& plan : {land, draft, folder / "scanned.plan", whole}) documents.keep_file("plan-file", plan);
+  for (const char* scan : {"s1", "s2"}) documents.keep_file("scan-file", folder / scan);
   documents.run(2, "error", {"scan", "--plan", draft, folder / "s1", "-o", folder / "half.plan"});
   documents.run(2, "error", {"formats", "all"});
   documents.run(2, "error", {"frmats"});

@@ -26,6 +26,8 @@ expect 0 scripts/slurm/submit --help
 expect 2 scripts/slurm/submit a.plan
 expect 0 scripts/slurm/try --help
 expect 2 scripts/slurm/try --nonsense
+expect 0 scripts/slurm/kills --help
+expect 2 scripts/slurm/kills many
 expect 2 scripts/setup --all --nonsense
 expect 2 scripts/test --golden nonsense
 exit $failed

@@ -259,9 +259,9 @@ TEST_F(Shards, OfALosslessConversionJoinToItsBytes) {
       EXPECT_TRUE(joined.warnings.empty());
       EXPECT_EQ(test::read_file(folder / "joined.isohf"), test::read_file(whole));
       // From a draft, by scans.
-      std::vector<std::string> scans;
+      std::vector<NamedScan> scans;
       const ShardPlan draft = draft_shards(source, options, 3);
-      for (int number = 1; number <= 3; ++number) scans.push_back(scan_shard(source, draft, number, options));
+      for (int number = 1; number <= 3; ++number) scans.push_back({"scan", scan_shard(source, draft, number, options)});
       EXPECT_EQ(format_shard_plan(scanned(source, draft, scans, options)),
                 format_shard_plan(plan_shards(source, options, 3)));
       options.lossless = false;
@@ -285,17 +285,20 @@ TEST_F(Shards, ScansOfRowsMakeThePlanOfOnePass) {
     EXPECT_FALSE(draft.codes.has_value());
     EXPECT_THAT(refusal([&] { (void)convert_shard(source, draft, 1, folder / "a.isohf", options); }),
                 HasSubstr("is a draft"));
-    std::vector<std::string> scans;
+    std::vector<NamedScan> scans;
     for (const int number : {4, 1, 7, 2, 6, 3, 5}) {
-      scans.push_back(scan_shard(source, draft, number, options));
-      EXPECT_TRUE(is_scan(scans.back(), draft, number));
-      EXPECT_FALSE(is_scan(scans.back(), draft, number + 1));
+      scans.push_back({"scan-" + std::to_string(number), scan_shard(source, draft, number, options)});
+      EXPECT_TRUE(is_scan(scans.back().json, draft, number));
+      EXPECT_FALSE(is_scan(scans.back().json, draft, number + 1));
     }
     EXPECT_EQ(format_shard_plan(scanned(source, draft, scans, options)), planned);
     scans.push_back(scans.front());
+    scans.back().name = "again";
     scans.erase(scans.begin() + 1);
+    scans.push_back({"torn", "{}"});
     const std::string found = refusal([&] { (void)scanned(source, draft, scans, options); });
-    EXPECT_THAT(found, HasSubstr("scan 4 is there twice"));
+    EXPECT_THAT(found, HasSubstr("again: is scan 4, as scan-4 is"));
+    EXPECT_THAT(found, HasSubstr("torn: scan: format: is missing"));
     EXPECT_THAT(found, HasSubstr("these scans are missing: 1"));
   }
   // A range that is given is the plan's, whatever scans find.
@@ -303,7 +306,7 @@ TEST_F(Shards, ScansOfRowsMakeThePlanOfOnePass) {
   options.z_range = {100.0, 900.0};
   Hills given;
   const ShardPlan ranged = draft_shards(given, options, 1);
-  EXPECT_EQ(format_shard_plan(scanned(given, ranged, {scan_shard(given, ranged, 1, options)}, options)),
+  EXPECT_EQ(format_shard_plan(scanned(given, ranged, {{"one", scan_shard(given, ranged, 1, options)}}, options)),
             format_shard_plan(plan_shards(given, options, 1)));
   options.z_range.reset();
   // What only the surface can tell.
@@ -311,7 +314,9 @@ TEST_F(Shards, ScansOfRowsMakeThePlanOfOnePass) {
   options.filter = Filter::kLanczos3;
   Hills source;
   const ShardPlan draft = draft_shards(source, options, 1);
-  EXPECT_THAT(refusal([&] { (void)scanned(source, draft, {scan_shard(source, draft, 1, options)}, options); }),
+  EXPECT_THAT(refusal([&] {
+                (void)scanned(source, draft, {{"one", scan_shard(source, draft, 1, options)}}, options);
+              }),
               HasSubstr("can leave the range of the samples"));
   EXPECT_EQ(shard_list({1, 3, 4, 5, 9}), "1,3-5,9");
 }
@@ -341,6 +346,15 @@ TEST_F(Shards, InterruptedGoOnAndGiveTheSameBytes) {
   EXPECT_FALSE(is_shard(file, plan, 2));
   (void)convert_shard(source, plan, 2, file, options);
   EXPECT_EQ(test::read_file(file), test::read_file(folder / "part-2.isohf"));
+  // What another shard left under the name is told of, and where it was removed its journal is in nobody's way.
+  std::filesystem::remove(file);
+  cancel = false;
+  EXPECT_THROW((void)convert_shard(source, plan, 2, file, options, job), Error);
+  EXPECT_THAT(refusal([&] { (void)convert_shard(source, plan, 3, file, options); }),
+              HasSubstr(".part belongs to another input or other options; remove it to start over"));
+  std::filesystem::remove(file + ".part");
+  (void)convert_shard(source, plan, 3, file, options);
+  EXPECT_EQ(test::read_file(file), test::read_file(folder / "part-3.isohf"));
 }
 
 TEST_F(Shards, AreRefusedWhereTheyAreNotWhatWasPlanned) {

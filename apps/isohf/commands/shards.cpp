@@ -232,8 +232,16 @@ int convert_shard_of(const Arguments& arguments) {
   const Prepared prepared = prepare(options, expand_inputs(options.inputs.names, options.inputs.recursive));
   std::optional<ProgressDisplay> display(std::in_place, command->work.progress, command->common.quiet,
                                          command->common.verbose);
-  const ConvertSummary summary = convert_shard(*prepared.source, plan, command->shard, command->output, options.convert,
-                                               job_from(command->work, *display));
+  const ConvertSummary summary = [&] {
+    try {
+      return convert_shard(*prepared.source, plan, command->shard, command->output, options.convert,
+                           job_from(command->work, *display));
+    } catch (const Error& error) {
+      if (error.code() != ErrorCode::kCancelled) throw;
+      throw Error(ErrorCode::kCancelled, {command->output, "interrupted", "",
+                                          "the same command goes on with what is in " + command->output + ".part"});
+    }
+  }();
   display.reset();
   print_warnings(summary.warnings);
   print_shard(*command, "done", &summary);
@@ -260,11 +268,8 @@ int command_scan(const Arguments& arguments) {
                                            command->common.verbose);
     std::string text;
     if (makes_plan) {
-      std::vector<std::string> scans;
-      for (const std::string& file : command->scans) {
-        scans.push_back(text_of_file(file));
-        if (!scans.back().starts_with('{')) throw Error(ErrorCode::kCorrupt, file + ": is no scan of a plan");
-      }
+      std::vector<NamedScan> scans;
+      for (const std::string& file : command->scans) scans.push_back({file, text_of_file(file)});
       text = format_shard_plan(
           scanned(*prepared.source, draft, scans, options.convert, job_from(command->work, *display)));
     } else {

@@ -49,10 +49,15 @@ struct ShardPlan {
                                      const ConvertOptions& options, const Job& job = {});
 /// Whether a text is what scan_shard() gives for that shard of the draft.
 [[nodiscard]] bool is_scan(const std::string& json, const ShardPlan& draft, int number);
+/// Of a file, or wherever it comes from.
+struct NamedScan {
+  std::string name;  ///< for messages
+  std::string json;  ///< as scan_shard() gave it
+};
 /// The plan of a draft whose shards were all scanned: the one of plan_shards(), also with the pass for the hash. Throws Error{kInvalidArgument} naming
 /// scans that are missing, there twice or of another draft, and where the filter can leave the samples' range so that
 /// the surface has to be looked at: then `z_range` helps, or plan_shards().
-[[nodiscard]] ShardPlan scanned(HeightSource& source, const ShardPlan& draft, const std::vector<std::string>& scans,
+[[nodiscard]] ShardPlan scanned(HeightSource& source, const ShardPlan& draft, const std::vector<NamedScan>& scans,
                                 const ConvertOptions& options, const Job& job = {});
 
 /// A plan as JSON, and back. parse_shard_plan() throws Error{kCorrupt} naming the member at fault, Error{kUnsupported}

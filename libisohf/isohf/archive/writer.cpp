@@ -26,7 +26,8 @@ namespace {
 constexpr std::uint64_t kSyncBytes = std::uint64_t{256} << 20U;
 constexpr std::uint64_t kJournalBytes = std::uint64_t{4} << 20U;
 
-constexpr std::size_t kBufferBytes = std::size_t{4} << 20U;
+/// What is collected before it is written: it stays in a core's cache between the two copies.
+constexpr std::size_t kBufferBytes = std::size_t{256} << 10U;
 
 Digest job_digest(const TileGrid& grid, const WriterOptions& options) {
   std::vector<std::byte> bytes;
@@ -112,7 +113,7 @@ void ArchiveWriter::State::begin_contents() {
 
 void ArchiveWriter::State::start_over() {
   part.truncate(0);
-  journal = Journal::start(journal_path, job_digest(grid, options));
+  if (options.journal) journal = Journal::start(journal_path, job_digest(grid, options));
   append(media_type_record().member, std::as_bytes(std::span(kMediaType)));
   begin_contents();
 }
@@ -139,11 +140,11 @@ bool ArchiveWriter::State::is_intact(const JournalRecord& record, std::uint64_t 
 }
 
 void ArchiveWriter::State::resume() {
+  if (part.size_on_disk() == 0) return start_over();  // whatever its journal was of
   Journal::Opened opened = Journal::open(journal_path, job_digest(grid, options));
   if (!opened.matches) {
-    throw Error(
-        ErrorCode::kInvalidArgument,
-        fmt::format("{} belongs to another input or other options; start over without `resume`", part.part_path()));
+    throw Error(ErrorCode::kInvalidArgument,
+                fmt::format("{} belongs to another input or other options; remove it to start over", part.part_path()));
   }
   const JournalRecord media_type = media_type_record();
   if (opened.records.empty() || !is_intact(media_type, 0)) {
@@ -188,7 +189,7 @@ void ArchiveWriter::State::append(const ZipMember& member, std::span<const std::
 }
 
 void ArchiveWriter::State::checkpoint() {
-  if (part.position() - journalled < kJournalBytes) return;
+  if (!journal || part.position() - journalled < kJournalBytes) return;
   named([&] {
     // The part file first: what the journal says is then there, as long as the machine keeps running.
     part.flush();
@@ -273,7 +274,7 @@ void ArchiveWriter::State::add_tile_member(JournalRecord::Kind kind, PlaneTile t
     record.has_voids = encoded.has_voids;
     append(record.member, encoded.deflated);
   }
-  journal->add(record);
+  if (journal) journal->add(record);
   contents.add(record);
   checkpoint();
 }
@@ -309,7 +310,7 @@ void ArchiveWriter::State::add_member(ZipMember member, std::span<const std::byt
   record.member.header_offset = part.position();
   record.data_crc32 = crc32(data);
   append(record.member, data);
-  journal->add(record);
+  if (journal) journal->add(record);
   contents.add(record);
   checkpoint();
 }

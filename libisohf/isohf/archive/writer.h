@@ -22,6 +22,7 @@ struct WriterOptions {
   PlaneInfo planes;                ///< coarse planes that add_plane_tile fills, up to as many
   std::int64_t first_tile = 0;     ///< flat index of the first that is added; those before are not there
   CodeType type = CodeType::kU16;  ///< of tiles that are not there
+  bool journal = true;             ///< keep one for a resume; without it a part file is never kept
 };
 
 /// Whether a file begins as an archive of any version of the format. No other file is ever replaced by one, but an empty

@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kWritebackBytes = std::size_t{1} << 20U;
+constexpr std::uint64_t kWritebackBytes = std::uint64_t{4} << 20U;
 
 [[noreturn]] void refuse(const std::string& why) {
   throw Error(ErrorCode::kInvalidArgument, why);
@@ -144,8 +144,10 @@ void OutputFile::flush() {
   is_synced_ = false;
   file_.write_at(flushed_, buffer_);
   // The disk starts at once, so that the last flush does not wait for all of it.
-  if (buffer_.size() >= kWritebackBytes) file_.start_writeback(flushed_, buffer_.size());
+  const std::uint64_t begun = flushed_ / kWritebackBytes * kWritebackBytes;
   flushed_ += buffer_.size();
+  const std::uint64_t full = flushed_ / kWritebackBytes * kWritebackBytes;
+  if (full > begun) file_.start_writeback(begun, full - begun);
   buffer_.clear();
 }
 

@@ -25,6 +25,7 @@ AddPlanesSummary add_planes(const std::string& archive, const std::string& outpu
   metadata.planes = planes_for(metadata.grid);
   WriterOptions options;
   options.overwrite = overwrite || in_place;
+  options.journal = false;
   options.planes = metadata.planes;
   options.type = metadata.quantisation.type;
   ArchiveWriter writer(output, metadata.grid, options);
@@ -36,8 +37,8 @@ AddPlanesSummary add_planes(const std::string& archive, const std::string& outpu
                      RowRange{0, metadata.grid.tile_rows() - 1});
     }
     const TileRange tiles = tiles_here(reader);
-    Assembly copy(metadata, writer, {{{&reader, tiles}}, tiles, planes ? &*planes : nullptr, false, true, false, true},
-                  job);
+    Assembly copy(metadata, writer,
+                  {{{part_file(reader), tiles}}, tiles, planes ? &*planes : nullptr, false, true, false, true}, job);
     copy.add_tiles();
     copy.add_other_members(true);
   });

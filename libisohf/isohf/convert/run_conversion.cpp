@@ -94,11 +94,27 @@ Outliers find_outliers(const TileShape& shape, const CodeLimits& limits, double 
                           conversion.limits.lowest, conversion.limits.highest, outliers.vertices - 1));
 }
 
+/// A tile over nothing but voids, made once for all.
+struct VoidTile {
+  TileCodes codes;
+  EncodedTile encoded;
+
+  explicit VoidTile(const Conversion& conversion)
+      : codes(void_tile(conversion.plan.grid.shape(), conversion.quantisation)),
+        encoded(encode_tile(conversion.plan.grid.shape(), codes, conversion.options.level)) {}
+};
+
 void make_tile(const Conversion& conversion, const TileSource& source, const CountedVertices& counted,
-               const Stages& stages, bool is_new, TileJob& tile) {
+               const VoidTile& nothing, const Stages& stages, bool is_new, TileJob& tile) {
   const TileShape& shape = conversion.plan.grid.shape();
   std::vector<float> heights(static_cast<std::size_t>(shape.stored_vertex_count()));
-  source.cut(tile.index, *tile.part, heights);
+  if (!source.cut(tile.index, *tile.part, heights)) {
+    tile.encoded = nothing.encoded;
+    tile.encoded.statistics = tile_statistics(counted, tile.index, nothing.codes, conversion.quantisation);
+    if (stages.seeds != nullptr) tile.seeds = stages.seeds->prepare(nothing.codes);
+    tile.seeds.is_empty = true;
+    return;
+  }
   TileCodes codes;
   const QuantiserCounts counts = quantise(conversion.quantisation, conversion.limits, conversion.datum, heights, codes);
   // Without a range from the user the codes reach over all that there is.
@@ -124,6 +140,7 @@ void write_tiles(const Conversion& conversion, ArchiveWriter& writer, const Stag
   TileSource source(conversion, {limits.lowest - conversion.datum, limits.highest - conversion.datum});
   const CountedVertices counted(
       describe_job(conversion.source.info(), conversion.plan, conversion.options, conversion.quantisation));
+  const VoidTile nothing(conversion);
   const std::int64_t first_new = writer.next_tile();
   std::int64_t next = stages.seeds != nullptr
                           ? std::max(SeedStage::first_tile_needed(grid, first_new), conversion.first_tile)
@@ -154,7 +171,7 @@ void write_tiles(const Conversion& conversion, ArchiveWriter& writer, const Stag
     return tile;
   };
   const auto encode = [&](TileJob* tile) {
-    make_tile(conversion, source, counted, stages, grid.flat_index(tile->index) >= first_new, *tile);
+    make_tile(conversion, source, counted, nothing, stages, grid.flat_index(tile->index) >= first_new, *tile);
     tile->part.reset();
     return tile;
   };

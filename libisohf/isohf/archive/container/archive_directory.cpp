@@ -1,5 +1,6 @@
 #include "isohf/archive/container/archive_directory.h"
 
+#include <fmt/compile.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -7,6 +8,7 @@
 #include <utility>
 
 #include "isohf/archive/deflate/deflate.h"
+#include "isohf/base/read_ahead.h"
 #include "isohf/base/source_bytes.h"
 #include "isohf/error.h"
 
@@ -73,8 +75,8 @@ std::string why_bad_tile(const ZipEntry& entry, std::span<const TileGrid> grids)
 }  // namespace
 
 std::string tile_name(TileIndex tile, int plane) {
-  return plane == 0 ? fmt::format("tiles/{}/{}.tile", tile.row, tile.column)
-                    : fmt::format("planes/{}/{}/{}.tile", plane, tile.row, tile.column);
+  return plane == 0 ? fmt::format(FMT_COMPILE("tiles/{}/{}.tile"), tile.row, tile.column)
+                    : fmt::format(FMT_COMPILE("planes/{}/{}/{}.tile"), plane, tile.row, tile.column);
 }
 
 std::optional<PlaneTile> tile_from_name(std::string_view name) {
@@ -313,10 +315,11 @@ std::uint32_t crc32_in(const ByteSource& file, std::uint64_t offset_bytes, std::
 
 std::uint32_t data_crc32(const ByteSource& file) {
   std::uint32_t all = 0;
+  const AheadSource ahead(file);  // members follow one another
   for (ZipEntries entries(file, find_archive_end(file)); const auto entry = entries.next();) {
     if (entry->name == kIndexName) break;
     if (entry->name == kMetadataName) continue;
-    all = crc32_of_crc32(crc32_in(file, checked_data_offset(file, *entry), entry->compressed_bytes), all);
+    all = crc32_of_crc32(crc32_in(ahead, checked_data_offset(ahead, *entry), entry->compressed_bytes), all);
   }
   return all;
 }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <bit>
 #include <charconv>
+#include <cstring>
 
 #include "isohf/archive/deflate/deflate.h"
 #include "isohf/archive/tile_index.h"
@@ -57,12 +58,23 @@ std::uint64_t page_bytes(std::uint64_t records, std::uint32_t stored) {
 }
 
 std::optional<std::size_t> rank_in_page(std::span<const std::byte> bits, std::uint64_t i) {
-  const auto count = [](unsigned byte) { return static_cast<std::size_t>(std::popcount(byte)); };
+  return rank_in_page(bits, i, {0, 0});
+}
+
+std::optional<std::size_t> rank_in_page(std::span<const std::byte> bits, std::uint64_t i, const PlaceInPage& known) {
   const auto last = std::to_integer<unsigned>(bits[i / 8]);
   if ((last >> (i % 8) & 1U) == 0) return std::nullopt;
-  std::size_t rank = count(last & ((1U << (i % 8)) - 1));
-  for (std::size_t byte = 0; byte < i / 8; ++byte) rank += count(std::to_integer<unsigned>(bits[byte]));
-  return rank;
+  const auto count = [](std::uint64_t word) { return static_cast<std::size_t>(std::popcount(word)); };
+  // From a whole byte on, eight at a time.
+  std::size_t byte = known.bit / 8;
+  std::size_t rank = known.rank - count(std::to_integer<unsigned>(bits[byte]) & ((1U << (known.bit % 8)) - 1));
+  for (; byte + 8 <= i / 8; byte += 8) {
+    std::uint64_t word = 0;
+    std::memcpy(&word, bits.data() + byte, sizeof word);
+    rank += count(word);
+  }
+  for (; byte < i / 8; ++byte) rank += count(std::to_integer<unsigned>(bits[byte]));
+  return rank + count(last & ((1U << (i % 8)) - 1));
 }
 
 void append_record(const TableRecord& record, std::vector<std::byte>& out) {

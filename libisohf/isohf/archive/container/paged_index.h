@@ -49,6 +49,7 @@ class PagedIndex {
                             const TableDescription& table) const;
   [[nodiscard]] Bytes cached(std::uint64_t offset_bytes, std::uint64_t size_bytes, std::uint32_t crc,
                              const TableDescription& table) const;
+  [[nodiscard]] std::optional<std::size_t> rank(const Bytes& page, std::size_t bits, std::uint64_t bit) const;
   [[nodiscard]] RootEntry root_entry(std::size_t table, std::uint64_t page) const;
   /// A page's bits and records.
   [[nodiscard]] Bytes page(std::size_t table, std::uint64_t page, const RootEntry& entry) const;
@@ -63,6 +64,8 @@ class PagedIndex {
   mutable std::list<std::pair<std::uint64_t, Bytes>> recent_;  ///< by last use, the latest first
   mutable std::unordered_map<std::uint64_t, std::list<std::pair<std::uint64_t, Bytes>>::iterator> places_;
   mutable std::uint64_t recent_bytes_ = 0;
+  mutable Bytes ranked_;  ///< the page in which a place was counted last
+  mutable PlaceInPage ranked_place_{0, 0};
 };
 
 }  // namespace isohf

@@ -15,7 +15,6 @@
 #include "isohf/archive/metadata/part_record.h"
 #include "isohf/archive/planes/archive_planes.h"
 #include "isohf/base/arena.h"
-#include "isohf/base/source_bytes.h"
 #include "isohf/byte_source.h"
 #include "isohf/error.h"
 #include "isohf/lattice/shared_vertices.h"
@@ -23,25 +22,14 @@
 namespace isohf {
 namespace {
 
-constexpr const char* kSeedTable = "seeds/{row}/{column}.seed";
-
-/// Names of the tables of members that come with a tile.
-std::vector<std::string> tile_tables(const ArchiveReader& archive) {
-  std::vector<std::string> names;
-  for (const MemberTable& table : archive.tables()) {
-    if (table.name.find("{column}") == std::string::npos || table.name == kSeedTable) continue;
-    if (!is_in_tile_folder(table.name)) names.push_back(table.name);
-  }
-  return names;
-}
-
 /// A tile's record and bytes.
-EncodedTile encoded_tile(const ArchiveReader& from, TileIndex index, int plane) {
+EncodedTile encoded_tile(const ArchiveReader& from, TileIndex index, int plane, ReadAhead& ahead) {
   EncodedTile encoded;
   const TileEntry entry = from.tile_entry(index, plane);
   encoded.is_empty = !entry.stored;
   if (encoded.is_empty) return encoded;
-  encoded.deflated = SourceBytes(from.source(), entry.offset_bytes, entry.compressed_bytes).take();
+  const auto data = ahead.bytes(from.source(), entry.offset_bytes, entry.compressed_bytes);
+  encoded.deflated.assign(data.begin(), data.end());
   encoded.payload_bytes = entry.payload_bytes;
   encoded.payload_crc32 = entry.payload_crc32;
   encoded.code_min = entry.code_min;
@@ -60,10 +48,10 @@ Assembly::Assembly(const Metadata& metadata, ArchiveWriter& writer, AssemblyRequ
       job_(job),
       void_codes_(void_tile(metadata.grid.shape(), metadata.quantisation)),
       void_digest_(tile_content_digest(void_codes_)) {
-  for (const AssemblyInput& input : request_.inputs) tables_.push_back(tile_tables(*input.archive));
   if (request_.recount) counted_.emplace(metadata);
-  if (request_.one_origin) return;
-  if (const auto info = shadow_seed_info(metadata)) seeds_.emplace(metadata.grid, metadata.quantisation, *info);
+  const auto info = shadow_seed_info(metadata);
+  has_seeds_ = info.has_value();
+  if (!request_.one_origin && info) seeds_.emplace(metadata.grid, metadata.quantisation, *info);
 }
 
 bool Assembly::decodes() const {
@@ -86,17 +74,26 @@ void Assembly::add_tiles() {
       for (std::size_t i = 0; i < some.size(); ++i) {
         const TileIndex index{static_cast<std::int64_t>(first + i), row};
         Tile& tile = some[i];
-        if (tile.from != nullptr) add_textures(index, *tile.from);
+        if (tile.from != nullptr && !tile.tables->empty()) add_textures(index, tile);
         request_.tiles.contains(index) ? writer_.add_tile(tile.encoded) : writer_.skip_tiles(1);
         if (request_.planes != nullptr && !request_.has_plane_rows) request_.planes->add(tile.sample);
         tiles[first + i] = {tile.from, request_.one_origin ? TileCodes() : std::move(tile.codes)};
       }
     }
     if (request_.planes != nullptr && request_.has_plane_rows) add_plane_rows(row);
-    if (!inputs.empty()) add_seeds(row, tiles);
+    if (!inputs.empty() && has_seeds_) add_seeds(row, tiles);
     if (!request_.one_origin) compare_edges(row, tiles, above);
     above = std::move(tiles);
+    close_before(row);
     job_.report({"tiles", "tiles", (row + 1) * columns, grid.tile_count(), writer_.bytes_written()});
+  }
+}
+
+/// Closes what no row needs any more, the first plane's of these rows included.
+void Assembly::close_before(std::int64_t row) {
+  for (const AssemblyInput& input : request_.inputs) {
+    const std::int64_t done = input.tiles.end.row + std::max<std::int64_t>(metadata_.planes.stride, 1) + 1;
+    if (row >= done && row < done + 1) input.file->close();
   }
 }
 
@@ -108,7 +105,7 @@ void Assembly::add_plane_rows(std::int64_t row) {
   for (; next_plane_row_ < grid.tile_rows(); ++next_plane_row_) {
     const std::int64_t needed = std::min((next_plane_row_ + 1) * planes.stride() + 1, metadata_.grid.tile_rows());
     if (row + 1 < needed) return;
-    const ArchiveReader& from = *inputs_of_row(next_plane_row_ * planes.stride()).front()->archive;
+    const ArchiveReader& from = inputs_of_row(next_plane_row_ * planes.stride()).front()->file->archive();
     const auto read = [&](int plane, TileIndex tile) {
       PlaneBuilder::Stored stored;
       const TileEntry entry = from.tile_entry(tile, plane);
@@ -130,7 +127,7 @@ void Assembly::add_plane_rows(std::int64_t row) {
         });
       }
       for (std::size_t i = 0; i < samples.size(); ++i) {
-        const EncodedTile encoded = encoded_tile(from, tile_at(i), 1);
+        const EncodedTile encoded = encoded_tile(from, tile_at(i), 1, plane_bytes_);
         writer_.add_plane_tile(1, tile_at(i), encoded, {encoded.code_min, encoded.code_max});
         if (planes.count() > 1) request_.planes->add_finished(samples[i]);
       }
@@ -147,7 +144,22 @@ std::vector<const AssemblyInput*> Assembly::inputs_of_row(std::int64_t row) cons
   return found;
 }
 
-void Assembly::read(std::span<const AssemblyInput* const> inputs, TileIndex first, std::span<Tile> tiles) const {
+void Assembly::read(std::span<const AssemblyInput* const> inputs, TileIndex first, std::span<Tile> tiles) {
+  for (std::size_t i = 0; i < tiles.size(); ++i) {
+    const TileIndex index{first.column + static_cast<std::int64_t>(i), first.row};
+    if (!request_.tiles.contains(index)) continue;
+    for (const AssemblyInput* const input : inputs) {
+      if (!input->tiles.contains(index)) continue;
+      const ArchiveReader& archive = input->file->archive();
+      tiles[i].encoded = encoded_tile(archive, index, 0, tile_bytes_);
+      if (tiles[i].encoded.is_empty) continue;
+      tiles[i].from = &archive;
+      tiles[i].tables = &input->file->tile_tables();
+      break;
+    }
+    if (tiles[i].from == nullptr) make_void(index, tiles[i].encoded);
+  }
+  if (!decodes()) return;
   oneapi::tbb::parallel_for(std::size_t{0}, (tiles.size() + kBatchLanes - 1) / kBatchLanes, [&](std::size_t group) {
     const std::size_t begin = group * kBatchLanes;
     const auto lanes = tiles.subspan(begin, std::min<std::size_t>(kBatchLanes, tiles.size() - begin));
@@ -156,17 +168,8 @@ void Assembly::read(std::span<const AssemblyInput* const> inputs, TileIndex firs
     };
     std::map<const ArchiveReader*, std::vector<std::size_t>> stored;
     for (std::size_t i = 0; i < lanes.size(); ++i) {
-      const TileIndex index = index_of(i);
-      if (!request_.tiles.contains(index)) continue;
-      for (const AssemblyInput* const input : inputs) {
-        if (!input->tiles.contains(index) || !input->archive->tile_entry(index).stored) continue;
-        lanes[i].from = input->archive;
-        stored[input->archive].push_back(i);
-        break;
-      }
-      read(index, lanes[i]);
+      if (lanes[i].from != nullptr) stored[lanes[i].from].push_back(i);
     }
-    if (!decodes()) return;
     for (const auto& [archive, places] : stored) {
       std::vector<TileIndex> indices;
       for (const std::size_t i : places) indices.push_back(index_of(i));
@@ -196,35 +199,28 @@ void Assembly::read(std::span<const AssemblyInput* const> inputs, TileIndex firs
   });
 }
 
-void Assembly::read(TileIndex index, Tile& tile) const {
-  EncodedTile& encoded = tile.encoded;
-  encoded.is_empty = tile.from == nullptr;
-  if (encoded.is_empty) {
-    encoded.content_digest = void_digest_;
-    if (counted_) encoded.statistics = tile_statistics(*counted_, index, void_codes_, metadata_.quantisation);
-    return;
-  }
-  encoded = encoded_tile(*tile.from, index, 0);
+void Assembly::make_void(TileIndex index, EncodedTile& tile) const {
+  tile.is_empty = true;
+  tile.content_digest = void_digest_;
+  if (counted_) tile.statistics = tile_statistics(*counted_, index, void_codes_, metadata_.quantisation);
 }
 
-void copy_member(const ArchiveReader& from, const MemberEntry& member, ArchiveWriter& writer) {
-  const SourceBytes data(from.source(), member.offset_bytes, member.compressed_bytes);
-  if (member.deflated) writer.add_deflated_member(member.name, data.bytes(), member.bytes, member.crc32);
-  if (!member.deflated) writer.add_member(member.name, data.bytes(), false);
+void copy_member(const ArchiveReader& from, const MemberEntry& member, ArchiveWriter& writer, ReadAhead& ahead) {
+  const auto data = ahead.bytes(from.source(), member.offset_bytes, member.compressed_bytes);
+  if (member.deflated) writer.add_deflated_member(member.name, data, member.bytes, member.crc32);
+  if (!member.deflated) writer.add_member(member.name, data, false);
 }
 
-void Assembly::add_textures(TileIndex index, const ArchiveReader& from) {
-  const auto input = std::find_if(request_.inputs.begin(), request_.inputs.end(),
-                                  [&](const AssemblyInput& known) { return known.archive == &from; });
+void Assembly::add_textures(TileIndex index, const Tile& tile) {
   std::vector<MemberEntry> members;
-  for (const std::string& table : tables_[static_cast<std::size_t>(input - request_.inputs.begin())]) {
-    if (auto member = from.find_member(member_name(table, index.row, index.column))) {
+  for (const std::string& table : *tile.tables) {
+    if (auto member = tile.from->find_member(member_name(table, index.row, index.column))) {
       members.push_back(std::move(*member));
     }
   }
   std::sort(members.begin(), members.end(),
             [](const auto& a, const auto& b) { return a.offset_bytes < b.offset_bytes; });
-  for (const MemberEntry& member : members) copy_member(from, member, writer_);
+  for (const MemberEntry& member : members) copy_member(*tile.from, member, writer_, member_bytes_);
 }
 
 /// Copied where what they tell of is of one origin, else made of the row as it is now.
@@ -240,7 +236,7 @@ void Assembly::add_seeds(std::int64_t row, const Row& tiles) {
     for (std::size_t i = 0; i < tiles.size(); ++i) {
       if (tiles[i].from == nullptr) continue;
       const auto member = tiles[i].from->find_member(seed_name({static_cast<std::int64_t>(i), row}));
-      if (member) copy_member(*tiles[i].from, *member, writer_);
+      if (member) copy_member(*tiles[i].from, *member, writer_, member_bytes_);
     }
     return;
   }
@@ -305,16 +301,18 @@ void Assembly::add_other_members(bool everything) {
   std::vector<Found> all;
   std::map<std::string, std::size_t> places;
   for (const AssemblyInput& input : request_.inputs) {
+    if (!everything && !input.file->has_loose_members) continue;
+    const ArchiveReader& archive = input.file->archive();
     std::vector<MemberEntry> members;
-    for (const MemberEntry& member : input.archive->loose_members()) {
+    for (const MemberEntry& member : archive.loose_members()) {
       const std::string& name = member.name;
-      const bool is_own = name == kMediaTypeName || name == kMetadataName || name == kIndexName;
-      if (!is_own && (everything || (!name.starts_with("residual/") && name != kWholeName))) members.push_back(member);
+      if (!is_own_member(name) && (everything || (!name.starts_with("residual/") && name != kWholeName)))
+        members.push_back(member);
     }
-    for (const MemberTable& table : input.archive->tables()) {
+    for (const MemberTable& table : archive.tables()) {
       if (!everything || table.name.find("{column}") != std::string::npos) continue;
       for (std::int64_t row = 0; row < table.rows; ++row) {
-        if (auto member = input.archive->find_member(member_name(table.name, row, 0))) members.push_back(*member);
+        if (auto member = archive.find_member(member_name(table.name, row, 0))) members.push_back(*member);
       }
     }
     std::sort(members.begin(), members.end(),
@@ -322,12 +320,12 @@ void Assembly::add_other_members(bool everything) {
     for (MemberEntry& member : members) {
       const auto [at, is_new] = places.try_emplace(member.name, all.size());
       if (is_new)
-        all.push_back({input.archive, std::move(member)});
+        all.push_back({&archive, std::move(member)});
       else
-        all[at->second] = {input.archive, std::move(member)};
+        all[at->second] = {&archive, std::move(member)};
     }
   }
-  for (const auto& [from, member] : all) copy_member(*from, member, writer_);
+  for (const auto& [from, member] : all) copy_member(*from, member, writer_, member_bytes_);
 }
 
 }  // namespace isohf

@@ -6,6 +6,8 @@
 #include "isohf/archive.h"
 #include "isohf/archive/tile_statistics.h"
 #include "isohf/archive/writer.h"
+#include "isohf/base/read_ahead.h"
+#include "isohf/convert/parts/part_file.h"
 #include "isohf/convert/stages/plane_stage.h"
 #include "isohf/convert/stages/seed_row.h"
 #include "isohf/job.h"
@@ -15,7 +17,7 @@ namespace isohf {
 
 /// An archive that tiles are copied from, and which of them.
 struct AssemblyInput {
-  const ArchiveReader* archive;
+  std::shared_ptr<PartFile> file;
   TileRange tiles;
 };
 
@@ -31,7 +33,7 @@ struct AssemblyRequest {
 };
 
 /// Copies a member as it is.
-void copy_member(const ArchiveReader& from, const MemberEntry& member, ArchiveWriter& writer);
+void copy_member(const ArchiveReader& from, const MemberEntry& member, ArchiveWriter& writer, ReadAhead& ahead);
 
 /// Writes an archive of other archives' tiles, which are not coded again, in the order in which convert() does: a tile's
 /// textures, the tile; behind a row, planes and seeds. On the caller's oneTBB arena. Stage "tiles".
@@ -49,6 +51,7 @@ class Assembly {
  private:
   struct Tile {
     const ArchiveReader* from = nullptr;  ///< nullptr: void
+    const std::vector<std::string>* tables = nullptr;
     EncodedTile encoded;
     TileCodes codes;
     PlaneSample sample;
@@ -61,10 +64,11 @@ class Assembly {
   using Row = std::vector<RowTile>;
 
   [[nodiscard]] std::vector<const AssemblyInput*> inputs_of_row(std::int64_t row) const;
-  void read(std::span<const AssemblyInput* const> inputs, TileIndex first, std::span<Tile> tiles) const;
-  void read(TileIndex index, Tile& tile) const;
+  void read(std::span<const AssemblyInput* const> inputs, TileIndex first, std::span<Tile> tiles);
+  void make_void(TileIndex index, EncodedTile& tile) const;
   void add_plane_rows(std::int64_t row);
-  void add_textures(TileIndex index, const ArchiveReader& from);
+  void add_textures(TileIndex index, const Tile& tile);
+  void close_before(std::int64_t row);
   void add_seeds(std::int64_t row, const Row& tiles);
   void compare_edges(std::int64_t row, const Row& tiles, const Row& above) const;
   [[nodiscard]] bool decodes() const;
@@ -73,12 +77,15 @@ class Assembly {
   ArchiveWriter& writer_;
   AssemblyRequest request_;
   const Job& job_;
-  std::vector<std::vector<std::string>> tables_;  ///< of each input: names of its tiles' own members, seeds apart
+  bool has_seeds_ = false;
   std::optional<SeedRow> seeds_;
   std::optional<CountedVertices> counted_;
   TileCodes void_codes_;
   std::vector<std::byte> void_digest_;
   std::int64_t next_plane_row_ = 0;
+  ReadAhead tile_bytes_;  ///< each kind stands in its own order
+  ReadAhead plane_bytes_;
+  ReadAhead member_bytes_;
 };
 
 }  // namespace isohf

@@ -71,9 +71,8 @@ void check_data(const ArchiveReader& archive) {
 
 }  // namespace
 
-std::vector<std::unique_ptr<ArchiveReader>> open_parts(const std::vector<std::string>& archives,
-                                                       const std::string& output, Problems& problems, const Job& job) {
-  std::vector<std::unique_ptr<ArchiveReader>> readers(archives.size());
+void check_parts(const std::vector<std::string>& archives, const std::string& output, Problems& problems,
+                 const Job& job, const std::function<void(std::size_t, std::unique_ptr<ArchiveReader>)>& take) {
   std::vector<std::optional<Error>> failed(archives.size());
   std::int64_t checked = 0;
   std::mutex mutex;
@@ -85,7 +84,8 @@ std::vector<std::unique_ptr<ArchiveReader>> open_parts(const std::vector<std::st
         require_copyable(*reader);
         (void)tiles_here(*reader);
         check_data(*reader);
-        readers[i] = std::move(reader);
+        const std::lock_guard lock(mutex);
+        take(i, std::move(reader));
       } catch (const Error& error) {
         failed[i] = error;
       }
@@ -100,14 +100,14 @@ std::vector<std::unique_ptr<ArchiveReader>> open_parts(const std::vector<std::st
     if (std::filesystem::equivalent(archives[i], output, none))
       problems.add(output + ": is the output and one of the archives to join");
   }
-  return readers;
 }
 
 PartSummary merge_archives(const std::vector<std::string>& archives, const std::string& output,
                            const PartOptions& options, const Job& job) {
   if (archives.empty()) throw Error(ErrorCode::kInvalidArgument, "there is no archive to join");
   Problems problems;
-  const std::vector<std::unique_ptr<ArchiveReader>> readers = open_parts(archives, output, problems, job);
+  std::vector<std::shared_ptr<const ArchiveReader>> readers(archives.size());
+  check_parts(archives, output, problems, job, [&](std::size_t i, auto reader) { readers[i] = std::move(reader); });
   problems.throw_if_any();
 
   std::vector<AssemblyInput> inputs;
@@ -120,7 +120,7 @@ PartSummary merge_archives(const std::vector<std::string>& archives, const std::
     if (const std::string other = why_other_extras(readers.front()->metadata(), reader->metadata()); !other.empty()) {
       problems.add(fmt::format("{}: has other {} than {}", reader->path(), other, readers.front()->path()));
     }
-    inputs.push_back({reader.get(), tiles_here(*reader)});
+    inputs.push_back({std::make_shared<PartFile>(reader), tiles_here(*reader)});
     origins.push_back(origin_of(*reader));
     if (origins.back().is_shard) {
       problems.add(reader->path() + ": is a shard; name its plan first, isohf merge PLAN PART...");

@@ -160,10 +160,10 @@ PartSummary write_parts(PartsJob parts, const std::string& output, const PartOpt
   if (residuals && summary.is_whole && !residuals->are_complete())
     residuals.reset();  // older programs cut without them
   const auto has_some = [](const AssemblyInput& input) {
-    const auto& tables = input.archive->tables();
+    const auto& tables = input.file->archive().tables();
     return std::any_of(tables.begin(), tables.end(), [](const auto& table) { return is_residual(table.name); });
   };
-  if (!residuals && std::any_of(parts.inputs.begin(), parts.inputs.end(), has_some)) {
+  if (!residuals && !parts.statistics && std::any_of(parts.inputs.begin(), parts.inputs.end(), has_some)) {
     summary.warnings.push_back(loss("residuals are left out: they are not those of all that is joined"));
   }
   drop_extension(metadata, kLosslessName);
@@ -171,6 +171,7 @@ PartSummary write_parts(PartsJob parts, const std::string& output, const PartOpt
   if (options.strict && !summary.warnings.empty()) throw error_from(summary.warnings);
   WriterOptions how;
   how.overwrite = options.overwrite;
+  how.journal = false;  // copying again takes no longer than a look at what is there
   how.planes = metadata.planes;
   how.type = metadata.quantisation.type;
   ArchiveWriter writer(output, metadata.grid, how);
@@ -233,8 +234,9 @@ PartSummary extract_tiles(const std::string& archive, const std::string& output,
   if (origin.is_shard) {
     throw Error(ErrorCode::kInvalidArgument, archive + ": is a shard of a plan; join the shards first");
   }
-  return write_parts({{{&reader, tiles}}, tiles, reader.metadata(), origin.whole_json, true, false, std::nullopt},
-                     output, options, job);
+  return write_parts(
+      {{{part_file(reader), tiles}}, tiles, reader.metadata(), origin.whole_json, true, false, std::nullopt}, output,
+      options, job);
 }
 
 }  // namespace isohf

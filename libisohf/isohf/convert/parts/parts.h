@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -35,11 +36,10 @@ struct PartOrigin {
 };
 [[nodiscard]] PartOrigin origin_of(const ArchiveReader& archive);
 
-/// Opens archives that are to be joined, all of whose bytes are held against the CRC that they state; of those with a
-/// problem there is none. Stage "check".
-[[nodiscard]] std::vector<std::unique_ptr<ArchiveReader>> open_parts(const std::vector<std::string>& archives,
-                                                                     const std::string& output, Problems& problems,
-                                                                     const Job& job);
+/// Opens archives that are to be joined, all of whose bytes are held against the CRC that they state, and hands over those
+/// without a problem: take(number in `archives`, archive), one at a time, in any order. Stage "check".
+void check_parts(const std::vector<std::string>& archives, const std::string& output, Problems& problems,
+                 const Job& job, const std::function<void(std::size_t, std::unique_ptr<ArchiveReader>)>& take);
 
 /// What is joined, and what is said of it.
 struct PartsJob {

@@ -8,6 +8,7 @@
 
 #include "isohf/archive/container/content_hash.h"
 #include "isohf/archive/metadata/json_members.h"
+#include "isohf/archive/metadata/part_record.h"
 #include "isohf/archive/planes/archive_planes.h"
 #include "isohf/archive/tile_statistics.h"
 #include "isohf/convert/conversion.h"
@@ -109,7 +110,7 @@ Plan planned(const HeightSource& source, const ShardPlan& plan, int number, cons
                     around(plan.job, at.second - plan.job.begin())));
   }
   if (plan.codes && options.lossless && !plan.samples_sha256)
-    throw Error(ErrorCode::kCorrupt, "the plan is of a lossless conversion, its `samples_sha256` is missing");
+    throw Error(ErrorCode::kCorrupt, "plan: samples_sha256: is missing, of a lossless conversion");
   return whole;
 }
 
@@ -173,19 +174,26 @@ std::string why_foreign(const Metadata& metadata, const ShardPlan& plan, const s
   return {};
 }
 
+/// What is kept of a shard that was looked at.
+struct CheckedShard {
+  std::string path;
+  Statistics statistics;
+  std::vector<double> row_sums;
+  bool has_loose_members = false;
+};
+
 /// The statistics of all shards, in order.
-Statistics joined_statistics(const std::vector<const ArchiveReader*>& shards) {
+Statistics joined_statistics(const std::vector<CheckedShard>& shards) {
   TileStatistics all;
-  for (const ArchiveReader* const shard : shards) {
-    const Statistics& one = shard->metadata().statistics;
+  for (const CheckedShard& shard : shards) {
+    const Statistics& one = shard.statistics;
     all.vertices += one.vertices;
     all.voids += one.voids;
     all.clamped += one.clamped;
     all.worst_rounding = std::max(all.worst_rounding, one.worst_rounding);
     if (one.min) all.min = std::min(all.min, *one.min);
     if (one.max) all.max = std::max(all.max, *one.max);
-    const auto part = part_record(shard->metadata());
-    for (const double sum : part->shard->row_sums) all.sum += sum;
+    for (const double sum : shard.row_sums) all.sum += sum;
   }
   return total_statistics(all);
 }
@@ -255,21 +263,30 @@ bool is_scan(const std::string& json, const ShardPlan& draft, int number) {
   }
 }
 
-ShardPlan scanned(HeightSource& source, const ShardPlan& draft, const std::vector<std::string>& scans,
+ShardPlan scanned(HeightSource& source, const ShardPlan& draft, const std::vector<NamedScan>& scans,
                   const ConvertOptions& options, const Job& job) {
   const Plan plan = planned(source, draft, 1, options);
   const std::string digest = digest_of(draft);
   std::vector<std::optional<RangeScan>> found(draft.shards.size());
+  std::vector<const NamedScan*> files(draft.shards.size());
   Problems problems;
-  for (const std::string& text : scans) {
-    const auto scan = parsed(text, scan_members, "scan");
-    if (scan.plan != digest || scan.number < 1 || scan.number > static_cast<int>(found.size())) {
-      problems.add(fmt::format("scan {} is of another plan", scan.number));
+  for (const NamedScan& file : scans) {
+    ShardScan scan;
+    try {
+      scan = parsed(file.json, scan_members, "scan");
+    } catch (const Error& error) {
+      problems.add(error.within(file.name));
       continue;
     }
-    auto& place = found[static_cast<std::size_t>(scan.number - 1)];
-    if (place) problems.add(fmt::format("scan {} is there twice", scan.number));
-    place = scan.found;
+    if (scan.plan != digest || scan.number < 1 || scan.number > static_cast<int>(found.size())) {
+      problems.add(fmt::format("{}: is a scan of another plan", file.name));
+      continue;
+    }
+    const auto place = static_cast<std::size_t>(scan.number - 1);
+    if (files[place] != nullptr)
+      problems.add(fmt::format("{}: is scan {}, as {} is", file.name, scan.number, files[place]->name));
+    files[place] = &file;
+    found[place] = scan.found;
   }
   RangeScan all;
   std::vector<int> missing;
@@ -309,20 +326,23 @@ std::string shard_list(const std::vector<int>& numbers) {
 
 bool is_shard(const std::string& archive, const ShardPlan& plan, int number) {
   Problems none;
-  const auto reader = std::move(open_parts({archive}, {}, none, {}).front());
-  int found = 0;
-  return reader != nullptr && why_foreign(reader->metadata(), plan, digest_of(plan), found).empty() && found == number;
+  bool is_it = false;
+  check_parts({archive}, {}, none, {}, [&](std::size_t, const auto& reader) {
+    int found = 0;
+    is_it = why_foreign(reader->metadata(), plan, digest_of(plan), found).empty() && found == number;
+  });
+  return is_it;
 }
 
 std::vector<int> missing_shards(const ShardPlan& plan, const std::vector<std::string>& files, const Job& job) {
   Problems none;
   std::vector<bool> is_there(plan.shards.size(), false);
   const std::string digest = digest_of(plan);
-  for (const auto& reader : open_parts(files, {}, none, job)) {
+  check_parts(files, {}, none, job, [&](std::size_t, const auto& reader) {
     int number = 0;
-    if (reader != nullptr && why_foreign(reader->metadata(), plan, digest, number).empty())
+    if (why_foreign(reader->metadata(), plan, digest, number).empty())
       is_there[static_cast<std::size_t>(number - 1)] = true;
-  }
+  });
   std::vector<int> missing;
   for (std::size_t i = 0; i < is_there.size(); ++i) {
     if (!is_there[i]) missing.push_back(static_cast<int>(i) + 1);
@@ -333,41 +353,49 @@ std::vector<int> missing_shards(const ShardPlan& plan, const std::vector<std::st
 PartSummary merge_shards(const ShardPlan& plan, const std::vector<std::string>& files, const std::string& output,
                          const PartOptions& options, const Job& job) {
   Problems problems;
-  const std::vector<std::unique_ptr<ArchiveReader>> readers = open_parts(files, output, problems, job);
   const std::string digest = digest_of(plan);
-  std::vector<const ArchiveReader*> shards(plan.shards.size());
-  for (const auto& reader : readers) {
-    if (reader == nullptr) continue;
+  std::vector<CheckedShard> shards(plan.shards.size());
+  std::vector<int> numbers(files.size(), 0);
+  std::vector<std::string> foreign(files.size());
+  std::optional<Metadata> metadata;
+  check_parts(files, output, problems, job, [&](std::size_t i, const auto& reader) {
     int number = 0;
-    if (const std::string why = why_foreign(reader->metadata(), plan, digest, number); !why.empty()) {
-      problems.add(fmt::format("{}: {}", reader->path(), why));
-      continue;
-    }
-    const ArchiveReader*& place = shards[static_cast<std::size_t>(number - 1)];
-    if (place != nullptr) problems.add(fmt::format("{}: is shard {}, as {} is", reader->path(), number, place->path()));
-    place = reader.get();
+    foreign[i] = why_foreign(reader->metadata(), plan, digest, number);
+    if (!foreign[i].empty()) return;
+    numbers[i] = number;
+    const std::vector<MemberEntry>& loose = reader->loose_members();
+    shards[static_cast<std::size_t>(number - 1)] = {
+        files[i], reader->metadata().statistics, part_record(reader->metadata())->shard->row_sums,
+        !std::all_of(loose.begin(), loose.end(), [](const auto& member) { return is_own_member(member.name); })};
+    if (number == 1) metadata = reader->metadata();
+  });
+  std::vector<const std::string*> first(shards.size());
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    if (!foreign[i].empty()) problems.add(fmt::format("{}: {}", files[i], foreign[i]));
+    if (numbers[i] == 0) continue;
+    const std::string*& place = first[static_cast<std::size_t>(numbers[i] - 1)];
+    if (place != nullptr) problems.add(fmt::format("{}: is shard {}, as {} is", files[i], numbers[i], *place));
+    place = &files[i];
   }
   std::vector<int> missing;
   for (std::size_t i = 0; i < shards.size(); ++i) {
-    if (shards[i] == nullptr) missing.push_back(static_cast<int>(i) + 1);
+    if (first[i] == nullptr) missing.push_back(static_cast<int>(i) + 1);
   }
   if (!missing.empty())
     problems.add(fmt::format("of the plan's {} shards these are missing: {}", shards.size(), shard_list(missing)));
   problems.throw_if_any();
-  for (const ArchiveReader* const shard : shards) {
-    const std::string why = why_other_lattice(shards.front()->metadata(), shard->metadata());
-    if (!why.empty()) problems.add(fmt::format("{}: {} as {} has", shard->path(), why, shards.front()->path()));
-  }
-  problems.throw_if_any();
   PartsJob parts{{},
-                 all_tiles(shards.front()->grid()),
-                 shards.front()->metadata(),
+                 all_tiles(metadata->grid),
+                 *metadata,
                  {},
                  true,
-                 holds_plane_rows(plan, shards.front()->metadata().planes),
+                 holds_plane_rows(plan, metadata->planes),
                  joined_statistics(shards)};
-  for (std::size_t i = 0; i < shards.size(); ++i)
-    parts.inputs.push_back({shards[i], tiles_of_shard(plan, static_cast<int>(i) + 1)});
+  for (std::size_t i = 0; i < shards.size(); ++i) {
+    auto file = std::make_shared<PartFile>(shards[i].path);
+    file->has_loose_members = shards[i].has_loose_members;
+    parts.inputs.push_back({std::move(file), tiles_of_shard(plan, static_cast<int>(i) + 1)});
+  }
   return write_parts(std::move(parts), output, options, job);
 }
 

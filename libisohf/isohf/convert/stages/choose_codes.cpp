@@ -103,7 +103,7 @@ ElevationRange measure_surface(const Conversion& conversion, const ElevationRang
     oneapi::tbb::parallel_for(first, next, [&](std::int64_t flat) {
       const TileIndex tile = grid.tile_at(flat);
       std::vector<float> heights(static_cast<std::size_t>(grid.shape().stored_vertex_count()));
-      tiles.cut(tile, *part, heights);
+      if (!tiles.cut(tile, *part, heights)) return;
       ElevationRange& range = ranges[static_cast<std::size_t>(tile.column)];
       for (const float height : heights) {
         const double elevation = double{height} + conversion.datum;  // NaN compares false

@@ -4,6 +4,7 @@
 #include <oneapi/tbb/enumerable_thread_specific.h>
 
 #include <algorithm>
+#include <cmath>
 
 namespace isohf {
 namespace {
@@ -62,8 +63,11 @@ std::shared_ptr<const TileSource::Part> TileSource::read(TileIndex tile) {
   return part;
 }
 
-void TileSource::cut(TileIndex tile, const Part& part, std::span<float> heights) const {
-  if (part.band) return cutter_->cut(tile, part.band->view(), heights);
+bool TileSource::cut(TileIndex tile, const Part& part, std::span<float> heights) const {
+  if (part.band) {
+    cutter_->cut(tile, part.band->view(), heights);
+    return true;
+  }
   const SourceInfo& info = conversion_.source.info();
   const RowRange& columns = columns_needed_[static_cast<std::size_t>(tile.column)];
   const std::int64_t width = columns.last - columns.first + 1;
@@ -74,7 +78,10 @@ void TileSource::cut(TileIndex tile, const Part& part, std::span<float> heights)
     heights_from_samples(info, conversion_.datum, part.raw->part(part.rows.first + r, columns.first, width, window.raw),
                          {window.heights.data() + r * width, static_cast<std::size_t>(width)});
   }
+  const auto is_void = [](float height) { return std::isnan(height); };
+  if (std::all_of(window.heights.begin(), window.heights.end(), is_void)) return false;
   cutter_->cut(tile, {{window.heights.data(), width, rows}, part.rows.first, {}, columns.first}, heights);
+  return true;
 }
 
 }  // namespace isohf

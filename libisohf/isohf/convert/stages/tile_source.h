@@ -38,8 +38,9 @@ class TileSource {
   /// MemoryPlan::tiles_in_flight have entered after.
   [[nodiscard]] std::shared_ptr<const Part> read(TileIndex tile);
 
-  /// heights [C x R] out, as TileResampler::cut. Any thread.
-  void cut(TileIndex tile, const Part& part, std::span<float> heights) const;
+  /// heights [C x R] out, as TileResampler::cut. False, and nothing is done, where none of the samples under the tile has
+  /// an elevation. Any thread.
+  [[nodiscard]] bool cut(TileIndex tile, const Part& part, std::span<float> heights) const;
 
  private:
   struct Windows;

@@ -37,7 +37,8 @@ void TilesAround::make(const RowRange& rows) {
     std::vector<EncodedTile> made(static_cast<std::size_t>(next - first));
     oneapi::tbb::parallel_for(std::size_t{0}, made.size(), [&](std::size_t i) {
       std::vector<float> heights(static_cast<std::size_t>(grid.shape().stored_vertex_count()));
-      source.cut(grid.tile_at(first + static_cast<std::int64_t>(i)), *part, heights);
+      made[i].is_empty = true;
+      if (!source.cut(grid.tile_at(first + static_cast<std::int64_t>(i)), *part, heights)) return;
       TileCodes codes;
       (void)quantise(conversion_.quantisation, limits, datum, heights, codes);
       made[i] = encode_tile(grid.shape(), codes, kLevel);

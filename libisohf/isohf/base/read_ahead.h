@@ -1,0 +1,40 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "isohf/base/source_bytes.h"
+
+namespace isohf {
+
+/// Reads a source in large pieces, for ranges that ascend. One thread.
+class ReadAhead {
+ public:
+  static constexpr std::uint64_t kPieceBytes = std::uint64_t{256} << 10U;
+
+  /// The bytes of a range, until the next call. Throws as read_exactly().
+  [[nodiscard]] std::span<const std::byte> bytes(const ByteSource& source, std::uint64_t offset, std::uint64_t size);
+
+ private:
+  const ByteSource* source_ = nullptr;
+  std::uint64_t offset_ = 0;
+  std::vector<std::byte> piece_;
+};
+
+/// A source that is read so.
+class AheadSource final : public ByteSource {
+ public:
+  /// `source` outlives it.
+  explicit AheadSource(const ByteSource& source) : source_(source) {}
+
+  [[nodiscard]] std::uint64_t size_bytes() const override { return source_.size_bytes(); }
+  [[nodiscard]] std::size_t read(std::uint64_t offset_bytes, std::span<std::byte> out) const override;
+
+ private:
+  const ByteSource& source_;
+  mutable ReadAhead ahead_;
+};
+
+}  // namespace isohf

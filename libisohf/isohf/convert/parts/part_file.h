@@ -1,0 +1,46 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "isohf/archive.h"
+
+namespace isohf {
+
+/// An archive that members are copied from. One thread; what archive() gives is good until close().
+class PartFile {
+ public:
+  explicit PartFile(std::shared_ptr<const ArchiveReader> open) : open_(std::move(open)) {}
+  /// Opened when it is asked for, and again after close(): of a thousand shards no more are open than are read.
+  explicit PartFile(std::string path) : path_(std::move(path)) {}
+
+  [[nodiscard]] const ArchiveReader& archive() {
+    if (!open_) open_ = std::make_shared<const ArchiveReader>(path_);
+    return *open_;
+  }
+  void close() {
+    if (!path_.empty()) open_.reset();
+  }
+
+  /// Names of the tables of members that come with a tile, but for seeds.
+  [[nodiscard]] const std::vector<std::string>& tile_tables();
+
+  bool has_loose_members = true;  ///< may have, beside its own ones
+
+ private:
+  std::string path_;
+  std::shared_ptr<const ArchiveReader> open_;
+  std::vector<std::string> tables_;
+  bool knows_tables_ = false;
+};
+
+/// A reader that outlives it.
+[[nodiscard]] inline std::shared_ptr<PartFile> part_file(const ArchiveReader& archive) {
+  return std::make_shared<PartFile>(std::shared_ptr<const ArchiveReader>(std::shared_ptr<void>(), &archive));
+}
+
+/// Whether a member is one that every archive has.
+[[nodiscard]] bool is_own_member(const std::string& name);
+
+}  // namespace isohf
