@@ -14,6 +14,7 @@
 #include "output/output_file.h"
 #include "output/standard_output.h"
 #include "program.h"
+#include "reading/place.h"
 #include "session.h"
 #include "verify/verify_view.h"
 
@@ -116,6 +117,28 @@ int verify(const TileSource& source, const Options& options) {
   return report.passed() ? cli::kExitDone : cli::kExitDifferences;
 }
 
+int say_place(const TileSource& source, const Options& options) {
+  Ground ground(source);
+  std::vector<Place> places;
+  for (std::size_t i = 0; i < options.probe.size(); i += 2) {
+    places.push_back(probe(source, ground, {options.probe[i], options.probe[i + 1]}));
+  }
+  std::optional<Profile> profile;
+  if (places.size() > 1) profile = profile_between(source, ground, places[0].at, places[1].at);
+  std::string text;
+  for (const Place& place : places) text += fmt::format("{}\n", fmt::join(lines_of(place), "\n"));
+  if (profile) {
+    text += describe_length(profile->length, source.ground_unit()) + " from the first to the second\n";
+  }
+  print_result(options.common, text, [&] {
+    ordered_json json{{"archive", options.archive}, {"places", ordered_json::array()}};
+    for (const Place& place : places) json["places"].push_back(json_of(place));
+    if (profile) json["profile"] = json_of(*profile);
+    return json;
+  });
+  return cli::kExitDone;
+}
+
 int run(const cli::Arguments& arguments) {
   const std::optional<Options> options = parse_options(arguments);
   if (!options) return cli::kExitDone;
@@ -128,6 +151,7 @@ int run(const cli::Arguments& arguments) {
     run_window(*source, *options);
     return cli::kExitDone;
   }
+  if (options->action == Options::Action::kProbe) return say_place(*source, *options);
   const HeadlessContext context;
   require_gl();
   switch (options->action) {

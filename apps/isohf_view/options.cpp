@@ -13,7 +13,7 @@ namespace {
 using cli::CommandLine;
 
 constexpr const char* kFooter =
-    R"(Without --screenshot, --flight, --verify or --sweep a window opens; H shows its keys.
+    R"(Without --screenshot, --flight, --verify, --sweep or --probe a window opens; H shows its keys.
 
 Positions are world units of the archive from its North-West corner: x eastwards, y up, z southwards.
 
@@ -33,6 +33,8 @@ Exit codes: 0 done, 1 failed, 2 wrong usage, 3 --verify found differences, 130 i
 Examples:
   isohf view dem.isohf
   isohf view dem.isohf --screenshot view.png --sun 110,20 --exaggeration 1.5
+  isohf view dem.isohf --date 2026-12-21 --time 15:30
+  isohf view dem.isohf --probe 12000,8000 --json
   isohf view dem.isohf --flight path.txt --frames 600 --csv frames.csv
   isohf view dem.isohf --verify)";
 
@@ -77,9 +79,15 @@ void add_actions(CommandLine& line, Options& options, bool& window, bool& verify
   line.option("--flight", "FILE", "Fly along the path in FILE without a screen and print figures", options.flight);
   line.flag("--verify", "Check that archive, index arrays and shaders agree with the library", verify);
   line.flag("--sweep", "Go from level 0 to 2 in small steps and measure how the picture changes", sweep);
+  line.option("--probe", "X,Z[,X,Z]",
+              "Say what is known of a place, in world units; of two also the heights between them",
+              [&](const std::string& text) {
+                options.probe = cli::parse_numbers(text);
+                if (options.probe.size() != 2 && options.probe.size() != 4) refuse(text, "X,Z or X,Z,X,Z");
+              });
   line.flag("--window", "Open a window even with --screenshot, which then shows the window", window);
-  line.exclusive({"--screenshot", "--flight", "--verify", "--sweep"});
-  line.exclusive({"--window", "--flight", "--verify", "--sweep"});
+  line.exclusive({"--screenshot", "--flight", "--verify", "--sweep", "--probe"});
+  line.exclusive({"--window", "--flight", "--verify", "--sweep", "--probe"});
   line.option(
       "--frames", "N", "Draw N frames of the flight (default 300), or close the window after N",
       [&](const std::string& text) { options.frames = static_cast<int>(cli::parse_whole_number(text, 1, 10000000)); });
@@ -93,7 +101,7 @@ void add_actions(CommandLine& line, Options& options, bool& window, bool& verify
   line.flag("--overwrite", "Replace files that exist", options.overwrite);
 }
 
-void add_light(CommandLine& line, Options& options) {
+void add_light(CommandLine& line, Options& options, std::optional<double>& time) {
   line.group("Light");
   line.option("--sun", "AZIMUTH,ELEVATION", "Degrees, clockwise from North and above the horizon (default 300,35)",
               [&](const std::string& text) {
@@ -101,6 +109,15 @@ void add_light(CommandLine& line, Options& options) {
                 options.sun_azimuth_deg = azimuth;
                 options.sun_elevation_deg = elevation;
               });
+  line.option("--date", "YYYY-MM-DD",
+              "The sun of that day over the archive's middle (Earth and Mars); the window has a slider for its hours",
+              [&](const std::string& text) {
+                const auto [year, month, day] = cli::parse_date(text);
+                options.date = {year, month, day};
+              });
+  line.option("--time", "HH:MM", "With --date: mean solar time there (default 12:00)",
+              [&time](const std::string& text) { time = cli::parse_time(text); });
+  line.exclusive({"--date", "--sun"});
   line.option("--shadows", "on|off", "Draw cast shadows (default: on)", [&](const std::string& text) {
     options.shadows = cli::parse_word(text, {"on", "off"}) == 0;
   });
@@ -147,6 +164,10 @@ void add_picture(CommandLine& line, Options& options) {
                     kModes[cli::parse_word(text, {"elevation", "plain", "levels", "strips", "texture", "normals"})];
                 options.mode_given = true;
               });
+  line.option("--palette", "NAME|FILE",
+              "Colours of elevations: elevation, gray, mars (default: its body's), or a text file of elevations and "
+              "colours as for gdaldem color-relief",
+              [&](const std::string& text) { options.palette_file = cli::parse_palette(text, options.palette); });
   line.option("--level", "L[,L2]",
               "Draw every tile at this level of detail, 0 to 12, fractional; two levels alternate like a chessboard",
               [&](const std::string& text) {
@@ -175,6 +196,7 @@ std::optional<Options> parse_options(const cli::Arguments& arguments) {
   bool sweep = false;
   bool no_haze = false;
   bool no_overlay = false;
+  std::optional<double> time;
   CommandLine line("view", "Views an archive of an isometric heightfield, or draws and checks it without a screen.");
   line.group("Arguments");
   line.positional("ARCHIVE", "-i,--input", "Archive to view", options.archive);
@@ -182,7 +204,7 @@ std::optional<Options> parse_options(const cli::Arguments& arguments) {
   add_picture(line, options);
   line.flag("--no-haze", "Leave out the haze towards the far distance", no_haze);
   line.flag("--no-overlay", "Leave out the figures on the picture", no_overlay);
-  add_light(line, options);
+  add_light(line, options, time);
   line.group("Work");
   line.option(
       "-j,--threads", "N", "Decode tiles with N threads, 1 to 256 (default: one less than there are cores)",
@@ -203,6 +225,9 @@ std::optional<Options> parse_options(const cli::Arguments& arguments) {
   needs("--baseline", flies, "--flight");
   needs("--csv", flies || sweep, "--flight or --sweep");
   needs("--steps", sweep, "--sweep");
+  needs("--time", options.date.has_value(), "--date");
+  if (time) options.date->hours = *time;
+  if (!options.probe.empty()) options.action = Options::Action::kProbe;
   options.view.haze = !no_haze;
   options.overlay = !no_overlay;
   if (!options.screenshot.empty() && !window) options.action = Options::Action::kScreenshot;

@@ -3,7 +3,9 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
+#include "isohf/shade.h"
 #include "options/options_common.h"
 #include "view_state.h"
 
@@ -11,7 +13,7 @@ namespace isohf::view {
 
 /// What the command line asks for; no file has been touched.
 struct Options {
-  enum class Action { kWindow, kScreenshot, kFlight, kVerify, kSweep };
+  enum class Action { kWindow, kScreenshot, kFlight, kVerify, kSweep, kProbe };
 
   Action action = Action::kWindow;
   cli::CommonOptions common;
@@ -28,6 +30,10 @@ struct Options {
   std::optional<Vec3> position;  ///< world units, y before exaggeration
   std::optional<Vec3> look_at;
   bool fly = false;
+  std::optional<SolarTime> date;  ///< the sun of that day and time
+  std::optional<ShadePalette> palette;
+  std::string palette_file;
+  std::vector<double> probe;  ///< x, z of a place, or of two
   double sun_azimuth_deg = 300.0;
   double sun_elevation_deg = 35.0;
   std::optional<double> exaggeration;  ///< nullopt: default_exaggeration()

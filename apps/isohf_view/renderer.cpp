@@ -5,6 +5,8 @@
 #include <bit>
 #include <cmath>
 
+#include "reading/hud.h"
+
 namespace isohf::view {
 namespace {
 
@@ -165,6 +167,25 @@ Renderer::Renderer(const TileSource& source, const SharedGeometry& shared)
   glBindTexture(GL_TEXTURE_2D, 0);
 }
 
+void Renderer::set_palette(const std::vector<ColourStop>& stops) {
+  constexpr int kColours = 1024;
+  std::vector<std::uint16_t> texels;
+  for (int i = 0; i < kColours; ++i) {
+    const double height = whole_.low + (i + 0.5) / kColours * (whole_.high - whole_.low);
+    const OverlayColour colour = colour_at(stops, height / source_.world_per_elevation());
+    for (const float value : {colour.red, colour.green, colour.blue}) {
+      texels.push_back(static_cast<std::uint16_t>(65535.0F * std::pow(value, 1.6F) + 0.5F));
+    }
+  }
+  glBindTexture(GL_TEXTURE_2D, palette_.get());
+  glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
+  glTexImage2D(GL_TEXTURE_2D, 0, GL_RGB16, kColours, 1, 0, GL_RGB, GL_UNSIGNED_SHORT, texels.data());
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAX_LEVEL, 0);
+  glBindTexture(GL_TEXTURE_2D, 0);
+}
+
 const TerrainProgram& Renderer::shading(const ViewState& view, bool is_rim) {
   const std::tuple key{view.mode, view.borders, is_rim};
   const auto found = shading_.find(key);
@@ -227,6 +248,9 @@ void Renderer::find_visible(Frame& frame, const TileRange& top, const ResidentTi
 void Renderer::begin_shading(const Frame& frame, const TerrainProgram& program) const {
   const ViewState& view = frame.view;
   program.begin(source_.grid(), frame.terrain);
+  glActiveTexture(GL_TEXTURE1);
+  glBindTexture(GL_TEXTURE_2D, palette_.get());
+  glActiveTexture(GL_TEXTURE0);
   const Vec3 sun = normalised(view.sun);
   const ViewScale scale = source_.scale();
   const double codes = std::max(whole_.high - whole_.low, 1e-9) / scale.scale;

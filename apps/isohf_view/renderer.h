@@ -52,6 +52,9 @@ class Renderer {
   /// Where ColourMode::kTexture finds its textures.
   void set_textures(TileTexture textures) { textures_ = std::move(textures); }
 
+  /// Colours of the ground by elevation, in the source's elevation units.
+  void set_palette(const std::vector<ColourStop>& stops);
+
   /// Draws what the tiles of a range of the coarsest plane stand for, as far as resident, into the bound framebuffer.
   FrameFigures draw(const ViewState& view, const TileRange& top, const ResidentTile& resident);
 
@@ -107,6 +110,7 @@ class Renderer {
   Program sky_;
   TileTexture textures_;
   Texture no_texture_;  ///< one texel without alpha
+  Texture palette_;
   VertexArray nothing_;
 };
 

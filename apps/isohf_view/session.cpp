@@ -7,6 +7,7 @@
 #include <numbers>
 #include <thread>
 
+#include "gl/offscreen.h"
 #include "isohf/error.h"
 #include "options/describe.h"
 
@@ -45,9 +46,10 @@ double default_exaggeration(const TileSource& source, const TileBounds& whole) {
 const std::vector<std::string> kHelpLines{"drag left   move the ground      wheel         nearer, farther",
                                           "drag right  turn about it        double click  go there",
                                           "W A S D, arrows  fly   Q E  down, up   Shift, Ctrl  fast, slow",
-                                          "C or Alt  left button looks round      Y  measure from here",
+                                          "C or Alt  left button looks round      Y  measure from here, to here",
                                           "Home  all   N  North up   T  from above   R  back to the start",
                                           "J L  sun round   I K  sun up and down   U  shadows",
+                                          "O  the sun of a day   , .  earlier, later: or drag the slider",
                                           "+ -  vertical exaggeration     [ ]  far distance",
                                           "M  colours       X  wires      B  tile borders",
                                           "G  fade or switch levels       Z  haze   V  beyond the source",
@@ -104,6 +106,13 @@ Session::Session(const TileSource& source, const Options& options)
   } else if (view.mode == ColourMode::kTexture) {
     throw Error(ErrorCode::kInvalidArgument, "--mode texture: this archive has no textures; convert with --texture");
   }
+  if (const Metadata* metadata = source.metadata()) {
+    colours_ = options.palette_file.empty() ? shade_colours(*metadata, options.palette)
+                                            : read_colour_relief(options.palette_file, *metadata);
+  }
+  renderer_.set_palette(colours_);
+  driver_ = driver_name();
+  if (options.date) begin_day(*options.date);
   Vec3 target;
   camera = first_camera(target);
   const auto exaggerated = [this](Vec3 at) { return Vec3{at.x, at.y * view.exaggeration, at.z}; };
@@ -111,6 +120,19 @@ Session::Session(const TileSource& source, const Options& options)
     camera.look_at(options.position ? exaggerated(*options.position) : camera.eye,
                    options.look_at ? exaggerated(*options.look_at) : target);
   }
+}
+
+void Session::begin_day(const SolarTime& time) {
+  if (!sky_) sky_ = source_.sky();
+  time_ = time;
+  set_hours(time.hours);
+}
+
+void Session::set_hours(double hours) {
+  time_->hours = std::clamp(hours, 0.0, 24.0);
+  const SunPlace sun = sky_->sun(*time_);
+  sun_azimuth_deg = sun.azimuth_deg;
+  sun_elevation_deg = sun.elevation_deg;
 }
 
 Camera Session::first_camera(Vec3& target) const {
@@ -183,35 +205,45 @@ bool Session::is_settled() const {
   return box.missing_tiles == 0 && box.shadows_to_come == 0 && (!shows_textures() || textures_->figures().to_come == 0);
 }
 
-void Session::draw_overlay(double frames_per_second, bool figures, bool help,
-                           const std::vector<std::string>& reading) const {
-  const int size = std::max(1, view.height / 350);
-  if (figures && !help) {  // both would cover each other in a small window
+void Session::draw_overlay(const Shown& shown) {
+  Reading reading;
+  if (shown.help) reading.help = kHelpLines;
+  if (shown.figures) {
     const TileBoxFigures& box = boxes_.figures();
-    std::vector<std::string> lines{
-        fmt::format("{:5.1f} fps   {} triangles   {} draw calls", frames_per_second,
-                    cli::describe_count(figures_.triangles), figures_.draw_calls),
-        fmt::format("{} tiles drawn, {} resident, {} to come, {:.1f} MiB", figures_.visible_tiles, box.resident_tiles,
-                    box.missing_tiles, static_cast<double>(box.resident_bytes) / (1 << 20)),
-        fmt::format("eye x {:.0f}  y {:.0f}  z {:.0f}   {}", camera.eye.x, camera.eye.y / view.exaggeration,
-                    camera.eye.z, mode_name(view.mode)),
-        fmt::format("sun {:.0f}, {:.0f} deg   height x {:.2g}   {}", sun_azimuth_deg, sun_elevation_deg,
-                    view.exaggeration, help ? "" : "H help"),
-        shadow_line()};
+    std::vector<std::string>& lines = reading.figures;
+    lines = {fmt::format("{:5.1f} fps   {} triangles   {} draw calls", shown.frames_per_second,
+                         cli::describe_count(figures_.triangles), figures_.draw_calls),
+             fmt::format("{} tiles drawn, {} resident, {} to come, {:.1f} MiB", figures_.visible_tiles,
+                         box.resident_tiles, box.missing_tiles, static_cast<double>(box.resident_bytes) / (1 << 20)),
+             fmt::format("eye x {:.0f}  y {:.0f}  z {:.0f}   {}", camera.eye.x, camera.eye.y / view.exaggeration,
+                         camera.eye.z, mode_name(view.mode)),
+             fmt::format("sun {:.0f}, {:.0f} deg   heights x {:.3g}   H help", sun_azimuth_deg, sun_elevation_deg,
+                         view.exaggeration),
+             shadow_line(),
+             driver_};
+    if (time_) {
+      lines.push_back(fmt::format("{:04}-{:02}-{:02}, mean solar time", time_->year, time_->month, time_->day));
+    }
     if (shows_textures()) {
       const TextureBoxFigures& textures = textures_->figures();
       lines.push_back(fmt::format("{} textures resident, {} to come, {:.1f} MiB", textures.resident, textures.to_come,
                                   static_cast<double>(textures.resident_bytes) / (1 << 20)));
       if (textures_->error()) lines.push_back(textures_->error()->substr(0, 100));
     }
-    if (cut_) {
-      lines.push_back(fmt::format("far distance cut to {:.0f} by --memory", box.radius));
-    }
+    if (cut_) lines.push_back(fmt::format("far distance cut to {:.0f} by --memory", box.radius));
     if (boxes_.error()) lines.push_back(boxes_.error()->substr(0, 100));
-    lines.insert(lines.end(), reading.begin(), reading.end());
-    overlay_.draw(lines, view.width, view.height, size);
+    lines.insert(lines.end(), shown.place.begin(), shown.place.end());
+    if (view.mode == ColourMode::kElevation) reading.colours = colours_;
+    reading.low = whole_.low / source_.world_per_elevation();
+    reading.high = whole_.high / source_.world_per_elevation();
+    reading.height_unit = source_.height_unit();
+    reading.ground_unit = source_.ground_unit();
+    reading.world_per_px = shown.middle_distance / view.focal_px();
+    reading.heading_rad = camera.heading_rad;
   }
-  if (help) overlay_.draw(kHelpLines, view.width, view.height, size, true);
+  reading.hours = hours();
+  reading.profile = shown.profile;
+  hud_.draw(reading, view.width, view.height, shown.screen_scale);
 }
 
 }  // namespace isohf::view

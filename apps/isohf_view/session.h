@@ -4,10 +4,10 @@
 #include <vector>
 
 #include "camera.h"
-#include "gl/overlay.h"
 #include "options.h"
 #include "paging/plane_boxes.h"
 #include "paging/texture_box.h"
+#include "reading/hud.h"
 #include "renderer.h"
 
 namespace isohf::view {
@@ -30,8 +30,24 @@ class Session {
   void complete_frame();
   /// Changes the far distance by a factor.
   void scale_far(double factor) { far_distance_ = view.far_distance * factor; }
-  /// Figures, and the keys where `help`, over the frame; `reading` is of the place under the cursor.
-  void draw_overlay(double frames_per_second, bool figures, bool help, const std::vector<std::string>& reading) const;
+  /// What a person reads over the frame.
+  struct Shown {
+    double frames_per_second = 0.0;
+    bool figures = true;
+    bool help = false;
+    std::vector<std::string> place;  ///< under the cursor
+    double middle_distance = 0.0;    ///< of the ground in the middle of the picture; 0: there is none
+    std::optional<Profile> profile;
+    double screen_scale = 1.0;
+  };
+  void draw_overlay(const Shown& shown);
+
+  /// Follows the sun of a day from here on. Throws Error{kInvalidArgument} where its way is not known.
+  void begin_day(const SolarTime& time);
+  void set_hours(double hours);
+  /// The sun stands where it is put.
+  void end_day() { time_.reset(); }
+  [[nodiscard]] std::optional<double> hours() const { return time_ ? std::optional(time_->hours) : std::nullopt; }
 
   Camera camera;
   ViewState view;
@@ -66,7 +82,11 @@ class Session {
   PlaneBoxes boxes_;
   std::optional<TextureBox> textures_;
   std::uint64_t upload_bytes_;  ///< a frame, tiles and textures together
-  Overlay overlay_;
+  Hud hud_;
+  std::vector<ColourStop> colours_;
+  std::string driver_;
+  std::optional<DaySky> sky_;
+  std::optional<SolarTime> time_;
   std::optional<double> far_distance_;
   FrameFigures figures_;
   double reach_wanted_ = 0.0;  ///< the far distance, or to the farthest corner where that is nearer

@@ -20,6 +20,7 @@
 #include "gl/offscreen.h"
 #include "isohf/error.h"
 #include "output/standard_output.h"
+#include "reading/place.h"
 #include "session.h"
 #include "steering.h"
 
@@ -110,24 +111,37 @@ class Controls {
     steering_.update(seconds, walk, hurry);
     const double round = axis(GLFW_KEY_L, GLFW_KEY_L, GLFW_KEY_J, GLFW_KEY_J);
     const double up = axis(GLFW_KEY_I, GLFW_KEY_I, GLFW_KEY_K, GLFW_KEY_K);
+    const double later = axis(GLFW_KEY_PERIOD, GLFW_KEY_PERIOD, GLFW_KEY_COMMA, GLFW_KEY_COMMA);
+    if (later != 0.0 && session_.hours()) session_.set_hours(*session_.hours() + 2.0 * seconds * later);
+    if (round != 0.0 || up != 0.0) session_.end_day();
     session_.sun_azimuth_deg += 40.0 * seconds * round;
-    session_.sun_elevation_deg = std::clamp(session_.sun_elevation_deg + 25.0 * seconds * up, -10.0, 90.0);
+    if (up != 0.0) {
+      session_.sun_elevation_deg = std::clamp(session_.sun_elevation_deg + 25.0 * seconds * up, -10.0, 90.0);
+    }
     tapped_.clear();
-    return moves || !(walk == Vec3{}) || round != 0.0 || up != 0.0;
+    return moves || !(walk == Vec3{}) || round != 0.0 || up != 0.0 || later != 0.0;
   }
 
-  /// What is under the cursor, and what lies between it and the place measured from; empty where there is nothing.
-  [[nodiscard]] std::vector<std::string> reading() {
-    std::vector<std::string> lines;
+  /// What is under the cursor and what is measured; the rest is the caller's.
+  [[nodiscard]] Session::Shown shown() {
+    Session::Shown shown;
+    shown.figures = show_figures;
+    shown.help = show_help;
+    shown.screen_scale = screen_scale();
+    const ViewState& view = session_.view;
+    const auto middle = steering_.pick({0.5 * view.width, 0.5 * view.height});
+    if (middle) shown.middle_distance = length(*middle - session_.camera.eye);
     const auto there = inside_ ? steering_.pick(cursor_) : std::nullopt;
-    if (!there) return lines;
-    const double lift = session_.view.exaggeration;
-    lines = session_.source().describe_place({there->x, there->z}, there->y / lift);
-    if (measured_from_) {
-      const Vec3 way = *there - *measured_from_;
-      lines.push_back(fmt::format("{:.6g} away on the ground, {:+.6g} up", std::hypot(way.x, way.z), way.y / lift));
+    if (there) shown.place = lines_of(session_.source().describe({there->x, there->z}, there->y / view.exaggeration));
+    const std::optional<Vec3> end = measured_to_ ? measured_to_ : there;
+    if (measured_from_ && end) {
+      const Vec3 way = *end - *measured_from_;
+      shown.place.push_back(fmt::format("{} away, {:+.6g} up",
+                                        describe_length(std::hypot(way.x, way.z), session_.source().ground_unit()),
+                                        way.y / view.exaggeration / session_.source().world_per_elevation()));
     }
-    return lines;
+    shown.profile = profile_;
+    return shown;
   }
 
   /// As drawn, without exaggeration.
@@ -150,13 +164,18 @@ class Controls {
     int height = 1;
     glfwGetWindowSize(window_, &width, &height);
     cursor_ = {x * session_.view.width / std::max(width, 1), y * session_.view.height / std::max(height, 1)};
-    steering_.move(cursor_);
     inside_ = changed_ = true;
+    if (!slides_) return steering_.move(cursor_);
+    if (const auto hours = slider_hours()) session_.set_hours(*hours);
   }
 
   void click(int button, int action, int mods) {
     changed_ = true;
-    if (action == GLFW_RELEASE) return steering_.release();
+    if (action == GLFW_RELEASE) return slides_ = false, steering_.release();
+    if (const auto hours = slider_hours(); hours && button == GLFW_MOUSE_BUTTON_LEFT) {
+      slides_ = true;
+      return session_.set_hours(*hours);
+    }
     const double now = glfwGetTime();
     const bool twice = button == GLFW_MOUSE_BUTTON_LEFT && now - last_click_s_ < kDoubleClick_s &&
                        std::hypot(cursor_.x - last_click_.x, cursor_.y - last_click_.y) < 6.0;
@@ -168,6 +187,18 @@ class Controls {
                     : look                           ? Steering::Drag::kLook
                                                      : Steering::Drag::kPan,
                     cursor_);
+  }
+
+  [[nodiscard]] double screen_scale() const {
+    float x = 1.0F;
+    float y = 1.0F;
+    glfwGetWindowContentScale(window_, &x, &y);
+    return std::max(1.0F, y);
+  }
+  /// Under the cursor; nullopt beside the slider, or where there is none.
+  [[nodiscard]] std::optional<double> slider_hours() const {
+    if (!session_.hours()) return std::nullopt;
+    return Hud::slider_hours(cursor_.x, cursor_.y, session_.view.width, session_.view.height, screen_scale());
   }
 
   void press(int key) {
@@ -187,8 +218,9 @@ class Controls {
       case GLFW_KEY_T:
         return steering_.look_down();
       case GLFW_KEY_Y:
-        measured_from_ = measured_from_ ? std::nullopt : steering_.pick(cursor_);
-        return;
+        return measure();
+      case GLFW_KEY_O:
+        return toggle_day();
       case GLFW_KEY_M:
         return next_mode();
       case GLFW_KEY_X:
@@ -226,6 +258,31 @@ class Controls {
     }
   }
 
+  /// From here, to here, no more.
+  void measure() {
+    profile_.reset();
+    if (measured_to_) return measured_from_.reset(), measured_to_.reset();
+    const auto here = steering_.pick(cursor_);
+    if (!measured_from_) return static_cast<void>(measured_from_ = here);
+    measured_to_ = here;
+    if (here) {
+      profile_ =
+          profile_between(session_.source(), ground_, {measured_from_->x, measured_from_->z}, {here->x, here->z});
+    }
+  }
+
+  /// The sun of today, where its way is known.
+  void toggle_day() {
+    if (session_.hours()) return session_.end_day();
+    const std::chrono::year_month_day today{std::chrono::floor<std::chrono::days>(std::chrono::system_clock::now())};
+    try {
+      session_.begin_day({static_cast<int>(today.year()), static_cast<int>(static_cast<unsigned>(today.month())),
+                          static_cast<int>(static_cast<unsigned>(today.day()))});
+    } catch (const Error& error) {
+      cli::print_note(error.what());
+    }
+  }
+
   void next_mode() {
     std::vector<ColourMode> order{ColourMode::kElevation, ColourMode::kPlain, ColourMode::kLevels, ColourMode::kStrips,
                                   ColourMode::kNormals};
@@ -254,7 +311,10 @@ class Controls {
   bool inside_ = false;  ///< the cursor, the window
   bool changed_ = true;
   std::set<int> tapped_;  ///< keys pressed since the last frame
+  bool slides_ = false;   ///< the left button holds the time slider
   std::optional<Vec3> measured_from_;
+  std::optional<Vec3> measured_to_;
+  std::optional<Profile> profile_;
   double last_click_s_ = -1.0;
   PicturePoint last_click_;
 };
@@ -313,7 +373,9 @@ void run_window(const TileSource& source, const Options& options) {
       if (!options.common.quiet) cli::print_note("wrote " + name);
     }
     target->show();
-    session.draw_overlay(1.0 / smooth_s, controls.show_figures, controls.show_help, controls.reading());
+    Session::Shown shown = controls.shown();
+    shown.frames_per_second = 1.0 / smooth_s;
+    session.draw_overlay(shown);
     if (is_last && !options.screenshot.empty()) write_picture(options.screenshot, width, height);
     glfwSwapBuffers(window.get());
     ++drawn;
@@ -328,6 +390,8 @@ void run_window(const TileSource& source, const Options& options) {
                                   {"heading_deg", camera.heading_rad * kDegrees},
                                   {"pitch_deg", camera.pitch_rad * kDegrees},
                                   {"height_above_ground", controls.height_above_ground()},
+                                  {"sun_azimuth_deg", session.sun_azimuth_deg},
+                                  {"sun_elevation_deg", session.sun_elevation_deg},
                                   {"triangles", session.figures().triangles},
                                   {"frames", drawn}};
   });

@@ -359,6 +359,28 @@ TEST_F(ShadeCommand, ASingleSizeIsTheLongerSide) {
               static_cast<double>(whole.width) / static_cast<double>(whole.height), 0.02);
 }
 
+TEST_F(ShadeCommand, DrawsEachHourOfADay) {
+  std::string grid = "ncols 20\nnrows 20\nxllcorner 7\nyllcorner 46\ncellsize 0.001\n";
+  for (int i = 0; i < 400; ++i) grid += std::to_string(i * 7 % 50) + ' ';
+  write_file(folder / "alps.asc", grid);
+  const RunResult converted =
+      run_isohf({"convert", folder / "alps.asc", folder / "alps.isohf", "--crs", "EPSG:4326", "-q"});
+  ASSERT_EQ(converted.exit_code, 0) << converted.err;
+  const RunResult day = run_isohf({"shade", folder / "alps.isohf", "-o", folder / "day.png", "--date", "2026-12-21",
+                                   "--hours", "--size", "20", "--json"});
+  ASSERT_EQ(day.exit_code, 0) << day.err;
+  const json suns = json::parse(day.out).at("suns");
+  ASSERT_EQ(suns.size(), 9U) << day.out;  // from 8 to 16 hours
+  EXPECT_EQ(suns[4].at("output"), folder / "day-12.png");
+  EXPECT_NEAR(suns[4].at("elevation_deg").get<double>(), 90.0 - 46.01 - 23.44, 0.02);
+  for (const json& sun : suns) EXPECT_GT(read_file(sun.at("output").get<std::string>()).size(), 100U);
+  const RunResult night =
+      run_isohf({"shade", folder / "alps.isohf", "-o", folder / "night.png", "--date", "2026-12-21", "--time", "3:00"});
+  EXPECT_EQ(night.exit_code, 2);
+  EXPECT_THAT(night.err, HasSubstr("degrees below the horizon"));
+  EXPECT_EQ(std::count(night.err.begin(), night.err.end(), '\n'), 1);
+}
+
 TEST_F(ShadeCommand, RefusesWrongUsage) {
   (void)draw({});
   const auto code = [&](std::vector<std::string> more) {
@@ -379,6 +401,16 @@ TEST_F(ShadeCommand, RefusesWrongUsage) {
                                              {"--shadow-mask", "--no-shadow"},
                                              {"--hillshade", "--shadow-softness", "1"},
                                              {"--shadow-mask", "--sun-elevation", "90"},
+                                             {"--date", "2026-02-30"},
+                                             {"--date", "21.6.2026"},
+                                             {"--date", "2026-06-21", "--azimuth", "20"},
+                                             {"--date", "2026-06-21", "--time", "25"},
+                                             {"--date", "2026-06-21", "--time", "12:3"},
+                                             {"--date", "2026-06-21", "--time", "12:30", "--hours"},
+                                             {"--date", "2026-06-21", "--slope"},
+                                             {"--date", "2026-06-21"},  // the archive has no place
+                                             {"--time", "12:30"},
+                                             {"--hours"},
                                              {"--size", "0x5"},
                                              {"--size", "0"},
                                              {"--size", "5.5"},

@@ -210,6 +210,39 @@ TEST_F(ViewProgramTest, PrintsJsonOrNothing) {
   EXPECT_NE(run(good + " --sweep --steps 4 --size 64x48 --json").out.find("\"fading\""), std::string::npos);
 }
 
+TEST_F(ViewProgramTest, SaysWhatIsKnownOfAPlace) {
+  const Outcome one = run(path("good.isohf") + " --probe 480,300 --json");
+  EXPECT_EQ(one.exit_code, 0) << one.err;
+  const auto place = nlohmann::json::parse(one.out).at("places").at(0);
+  EXPECT_EQ(place.at("x"), 480.0);
+  EXPECT_TRUE(place.at("elevation").is_number());
+  const Outcome two = run(path("good.isohf") + " --probe 480,300,480,340");
+  EXPECT_NE(two.out.find("\n40 "), std::string::npos) << two.out;
+  EXPECT_EQ(run(path("good.isohf") + " --probe -5,0 -q").out, "");
+  const Outcome wrong = run(path("good.isohf") + " --probe 3");
+  EXPECT_EQ(wrong.exit_code, 2);
+  EXPECT_NE(wrong.err.find("--probe: found '3', must be X,Z or X,Z,X,Z"), std::string::npos) << wrong.err;
+}
+
+TEST_F(ViewProgramTest, RefusesADayWhereTheSunsWayIsNotKnown) {
+  const Outcome refused = run(path("good.isohf") + " --date 2026-06-21 --screenshot " + path("day.png"));
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_NE(refused.err.find("--date: "), std::string::npos) << refused.err;
+  EXPECT_EQ(run(path("good.isohf") + " --time 12:00").exit_code, 2);
+  EXPECT_EQ(run(path("good.isohf") + " --sun 1,2 --date 2026-06-21").exit_code, 2);
+}
+
+TEST_F(ViewProgramTest, TakesColoursFromAFile) {
+  test::write_file(path("red.txt"), "0% 255 0 0\n100% 255 0 0\n");
+  const std::string shot = path("good.isohf") + " --size 64x48 --overwrite --screenshot " + path("red.png");
+  EXPECT_EQ(run(shot).exit_code, 0);
+  const std::string own = text("red.png");
+  EXPECT_EQ(run(shot + " --palette " + path("red.txt")).exit_code, 0);
+  EXPECT_NE(text("red.png"), own);
+  EXPECT_EQ(run(shot + " --palette " + path("none.txt")).exit_code, 1);
+  EXPECT_EQ(run(shot + " --palette pink").exit_code, 2);
+}
+
 TEST_F(ViewProgramTest, ReadsItsPartOfAConfigFileForAllCommands) {
   test::write_file(path("all.toml"),
                    "quiet = true\ndensity = 0.5\n[convert]\nlevel = 3\n[view]\nsize = \"64x48\"\nquiet = false\n"

@@ -90,6 +90,46 @@ std::pair<std::int64_t, std::int64_t> parse_size(const std::string& text, std::i
   }
 }
 
+std::string parse_palette(const std::string& text, std::optional<ShadePalette>& palette) {
+  constexpr ShadePalette kPalettes[] = {ShadePalette::kElevation, ShadePalette::kGray, ShadePalette::kMars};
+  if (text.find_first_of("./") != std::string::npos) return text;
+  palette = kPalettes[parse_word(text, {"elevation", "gray", "mars"})];
+  return {};
+}
+
+std::array<int, 3> parse_date(const std::string& text) {
+  constexpr const char* kForm = "a day as 2026-06-21";
+  constexpr int kDays[] = {31, 28, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31};
+  if (text.size() != 10 || text[4] != '-' || text[7] != '-') refuse(text, kForm);
+  const auto part = [&](std::size_t at, std::size_t size) {
+    std::int64_t number = 0;
+    for (const char digit : text.substr(at, size)) {
+      if (digit < '0' || digit > '9') refuse(text, kForm);
+      number = number * 10 + (digit - '0');
+    }
+    return static_cast<int>(number);
+  };
+  const std::array<int, 3> date{part(0, 4), part(5, 2), part(8, 2)};
+  const bool is_leap = date[0] % 4 == 0 && (date[0] % 100 != 0 || date[0] % 400 == 0);
+  const bool has_month = date[1] >= 1 && date[1] <= 12;
+  const int days = !has_month ? 0 : date[1] == 2 && is_leap ? 29 : kDays[date[1] - 1];
+  if (date[0] < 1 || date[2] < 1 || date[2] > days) refuse(text, "a day of the calendar, as 2026-06-21");
+  return date;
+}
+
+double parse_time(const std::string& text) {
+  constexpr const char* kForm = "a time from 0:00 to 24:00, as 14:30";
+  const std::size_t colon = text.find(':');
+  try {
+    const auto hours = static_cast<double>(parse_whole_number(text.substr(0, colon), 0, 24));
+    if (colon == std::string::npos) return hours;
+    const auto minutes = static_cast<double>(parse_whole_number(text.substr(colon + 1), 0, 59));
+    if (text.size() - colon == 3 && hours + minutes / 60.0 <= 24.0) return hours + minutes / 60.0;
+  } catch (const Error&) {
+  }
+  refuse(text, kForm);
+}
+
 std::pair<double, double> parse_range(const std::string& text) {
   const std::size_t colon = text.find_first_of(":,");
   double low = 0.0;

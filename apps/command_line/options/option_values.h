@@ -1,10 +1,14 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
+
+#include "isohf/shade.h"
 
 namespace isohf::cli {
 
@@ -21,6 +25,12 @@ namespace isohf::cli {
                                                                std::int64_t most);
 /// "MIN:MAX" or "MIN,MAX", MIN < MAX.
 [[nodiscard]] std::pair<double, double> parse_range(const std::string& text);
+/// The name of a palette, or of a file, which is returned: what has a dot or a slash.
+[[nodiscard]] std::string parse_palette(const std::string& text, std::optional<ShadePalette>& palette);
+/// A day of the calendar, "2026-06-21": year, month, day.
+[[nodiscard]] std::array<int, 3> parse_date(const std::string& text);
+/// A time of day, "14" or "14:30": hours from 0 to 24.
+[[nodiscard]] double parse_time(const std::string& text);
 /// "5,15,30": numbers, at least one.
 [[nodiscard]] std::vector<double> parse_numbers(const std::string& text);
 /// Bytes: 400M, 1.5GiB, 2GB; K, M, G, T and KiB... are powers of 1024, KB, MB, GB, TB powers of 1000.

@@ -26,6 +26,7 @@ constexpr std::pair<std::string_view, std::string_view> kSpellings[] = {
     {"clamp_range", "--clamp-range"},
     {"code_type", "--type"},
     {"density", "--density"},
+    {"date", "--date"},
     {"encoding", "--encoding"},
     {"fill", "--fill"},
     {"fit", "--fit"},

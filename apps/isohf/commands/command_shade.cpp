@@ -14,6 +14,7 @@
 #include "formats/write/raster_sink.h"
 #include "isohf/error.h"
 #include "isohf/shade.h"
+#include "isohf/surface.h"
 #include "open_archive.h"
 #include "options/describe.h"
 #include "options/option_values.h"
@@ -29,17 +30,23 @@ namespace {
 using nlohmann::ordered_json;
 
 constexpr std::int64_t kMaxPixels = 1 << 20;  ///< of a side
+/// Heights of the sun that are drawn.
+constexpr double kLowest_deg = 0.01;
+constexpr double kHighest_deg = 89.9;
 constexpr const char* kFooter =
     R"(The picture covers what the input covered, North at the top; where there is no elevation it is transparent.
 North is the map's, as with GDAL. Shadows fall for a sun that stands anywhere; the ground beyond what the input covered casts
 none. --hillshade, --multidirectional, --slope and --aspect are those of gdaldem, by Horn's formula: one band. Hillshades
 and shadow masks hold 1 to 255, and 0 where there is no elevation; slopes and aspects hold degrees, and -9999.
 .tif has the georeference, .png a world file beside it. .exr holds light, or shares from 0 to 1.
+--date asks for the sun over the archive's middle, on Earth or Mars, at --time: mean solar time there, which is noon where the
+sun stands highest, but for a quarter of an hour. --hours draws a picture for each hour of sun, OUTPUT-06.png and so on.
 Memory is bounded whatever the archive's height: a row of its tiles twice, and about 64 MB.
 
 Examples:
   isohf shade dem.isohf -o dem.png
   isohf shade dem.isohf -o evening.png --sun-elevation 5 --azimuth 250 --size 4096x2300
+  isohf shade dem.isohf -o midsummer.png --date 2026-06-21 --hours
   isohf shade dem.isohf -o map.png --texture
   isohf shade dem.isohf -o hillshade.tif --hillshade
   isohf shade dem.isohf -o shadows.tif --shadow-mask --azimuth 120 --altitude 8)";
@@ -57,6 +64,9 @@ struct ShadeCommand {
   std::string palette;  ///< a file of colours
   std::optional<double> azimuth;
   std::optional<double> elevation;
+  std::optional<SolarTime> date;
+  double time = 12.0;
+  bool hours = false;
   ShadeOptions picture;
 };
 
@@ -72,14 +82,6 @@ constexpr Kind kKinds[] = {
     {"--aspect", "The directions that slopes face, in degrees clockwise from North", ShadeKind::kAspect},
     {"--shadow-mask", "The share of the sun that is seen", ShadeKind::kShadowMask},
 };
-
-/// The name of a file, where it is no palette's.
-std::string parse_palette(const std::string& text, std::optional<ShadePalette>& palette) {
-  constexpr ShadePalette kPalettes[] = {ShadePalette::kElevation, ShadePalette::kGray, ShadePalette::kMars};
-  if (text.find_first_of("./") != std::string::npos) return text;
-  palette = kPalettes[parse_word(text, {"elevation", "gray", "mars"})];
-  return {};
-}
 
 std::optional<ShadeCommand> parse(const Arguments& arguments) {
   ShadeCommand options;
@@ -106,7 +108,10 @@ std::optional<ShadeCommand> parse(const Arguments& arguments) {
   for (const Kind& kind : kKinds) {
     if (kind.kind == ShadeKind::kShadowMask) continue;
     line.exclusive({kind.option, "--shadow-softness"});
-    if (kind.kind != ShadeKind::kHillshade) line.exclusive({kind.option, "--azimuth"});
+    if (kind.kind != ShadeKind::kHillshade) {
+      line.exclusive({kind.option, "--azimuth"});
+      line.exclusive({kind.option, "--date"});
+    }
     if (kind.kind == ShadeKind::kSlope || kind.kind == ShadeKind::kAspect) {
       line.exclusive({kind.option, "--sun-elevation"});
     }
@@ -119,6 +124,17 @@ std::optional<ShadeCommand> parse(const Arguments& arguments) {
   line.option("--altitude,--sun-elevation", "DEG",
               "Height of the sun above the horizon, 0.01 to 90 (default 15; --hillshade, --multidirectional 45)",
               [&](const std::string& text) { options.elevation = parse_altitude(text); });
+  line.option("--date", "YYYY-MM-DD", "The sun of that day over the archive's middle (Earth and Mars)",
+              [&](const std::string& text) {
+                const auto [year, month, day] = parse_date(text);
+                options.date = {year, month, day};
+              });
+  line.option("--time", "HH:MM", "With --date: mean solar time there (default 12:00)",
+              [&](const std::string& text) { options.time = parse_time(text); });
+  line.flag("--hours", "With --date: a picture for each full hour that has sun, the hour before OUTPUT's ending",
+            options.hours);
+  for (const char* option : {"--azimuth", "--sun-elevation"}) line.exclusive({"--date", option});
+  line.exclusive({"--time", "--hours"});
   line.flag("--no-relief", "Light all ground as if it were level", options.no_relief);
   line.flag("--no-shadow", "Leave out the shadows that land casts on land beyond it", options.no_shadow);
   line.option("--shadow-softness", "K",
@@ -146,6 +162,9 @@ std::optional<ShadeCommand> parse(const Arguments& arguments) {
   if (!line.parse(arguments)) return std::nullopt;
   line.require("ARCHIVE", options.archive);
   line.require("OUTPUT", options.output);
+  for (const char* option : {"--time", "--hours"}) {
+    if (line.given(option) && !options.date) line.fail(std::string(option) + " needs --date");
+  }
   request.shadows = !options.no_shadow;
   request.relief = !options.no_relief;
   const bool as_gdal = request.kind == ShadeKind::kHillshade || request.kind == ShadeKind::kMultidirectional;
@@ -168,18 +187,61 @@ std::optional<Georeference> georeference_of(const Metadata& metadata, const Grid
   return found;
 }
 
+/// A picture to draw, and where the sun stands.
+struct Frame {
+  std::string output;
+  double azimuth_deg;
+  double elevation_deg;
+  std::optional<double> hours;  ///< of the day, with --date
+};
+
+/// With the hour before the ending.
+std::string with_hour(const std::string& output, int hour) {
+  const std::filesystem::path path(output);
+  return (path.parent_path() / fmt::format("{}-{:02}{}", path.stem().string(), hour, path.extension().string()))
+      .string();
+}
+
+std::vector<Frame> frames_of(const ShadeCommand& options, ArchiveReader& archive) {
+  const ShadeOptions& request = options.picture;
+  if (!options.date) return {{options.output, request.sun_azimuth_deg, request.sun_elevation_deg, std::nullopt}};
+  try {
+    understand_source(archive);
+  } catch (const Error&) {
+    // It may have degrees all the same; else DaySky says so.
+  }
+  const DaySky sky(archive);
+  SolarTime time = *options.date;
+  std::vector<Frame> frames;
+  const auto add = [&](double hours, const std::string& output) {
+    time.hours = hours;
+    const SunPlace sun = sky.sun(time);
+    if (sun.elevation_deg < kLowest_deg) return sun;
+    frames.push_back({output, sun.azimuth_deg, std::min(sun.elevation_deg, kHighest_deg), hours});
+    return sun;
+  };
+  if (options.hours) {
+    for (int hour = 0; hour < 24; ++hour) add(hour, with_hour(options.output, hour));
+    if (frames.empty()) throw Error(ErrorCode::kInvalidArgument, "--date: the sun does not rise on that day");
+    return frames;
+  }
+  const SunPlace sun = add(options.time, options.output);
+  if (!frames.empty()) return frames;
+  throw Error(ErrorCode::kInvalidArgument, fmt::format("--time: the sun stands {:.1f} degrees below the horizon then",
+                                                       std::max(0.0, -sun.elevation_deg)));
+}
+
 int run(ShadeCommand options) {
   const auto start = std::chrono::steady_clock::now();
   const CommonOptions& common = options.common;
-  check_raster_output({options.archive}, options.output, options.overwrite);
-  const ArchiveReader archive = open_archive(options.archive);
+  if (!options.date) check_raster_output({options.archive}, options.output, options.overwrite);
+  ArchiveReader archive = open_archive(options.archive);
   print_warnings(archive.warnings());
   ShadeOptions& request = options.picture;
   const GridSize size = request.size.value_or(shade_size(archive, options.longest));
   request.size = size;
   if (!options.palette.empty()) request.colours = read_colour_relief(options.palette, archive.metadata());
   request.elevation_units_per_world_unit = elevation_units_per_world_unit(archive.metadata());
-
   request.floats = lower_case(std::filesystem::path(options.output).extension().string()) == ".exr";
   const ShadeSamples samples = shade_samples(request);
 
@@ -192,32 +254,50 @@ int run(ShadeCommand options) {
   spec.compress = !options.uncompressed;
   spec.georeference = georeference_of(archive.metadata(), size);
   spec.overwrite = options.overwrite;
-  const auto sink = create_raster(options.output, spec);
 
-  ProgressDisplay display(options.work.progress, common.quiet, common.verbose);
-  const ShadeReport report = shade_rows(
-      archive, request, [&](std::span<const std::byte> rows) { sink->write_rows(rows); },
-      job_from(options.work, display));
-  display.clear();
-  sink->finish();
+  const std::vector<Frame> frames = frames_of(options, archive);
+  for (const Frame& frame : frames) check_raster_output({options.archive}, frame.output, options.overwrite);
+  ShadeReport report;
+  ordered_json files = ordered_json::array();
+  ordered_json pictures = ordered_json::array();
+  std::string text;
+  for (const Frame& frame : frames) {
+    request.sun_azimuth_deg = frame.azimuth_deg;
+    request.sun_elevation_deg = frame.elevation_deg;
+    const auto sink = create_raster(frame.output, spec);
+    ProgressDisplay display(options.work.progress, common.quiet, common.verbose);
+    report = shade_rows(
+        archive, request, [&](std::span<const std::byte> rows) { sink->write_rows(rows); },
+        job_from(options.work, display));
+    display.clear();
+    sink->finish();
+    for (const std::string& file : sink->files()) files.push_back(file);
+    if (!frame.hours) continue;
+    pictures.push_back({{"output", frame.output},
+                        {"hours", *frame.hours},
+                        {"azimuth_deg", frame.azimuth_deg},
+                        {"elevation_deg", frame.elevation_deg}});
+    text += fmt::format("sun          {}: {:02}:{:02.0f} solar time, azimuth {:.2f}, {:.2f} degrees high\n",
+                        frame.output, static_cast<int>(*frame.hours), (*frame.hours - std::floor(*frame.hours)) * 60.0,
+                        frame.azimuth_deg, frame.elevation_deg);
+  }
 
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   const std::int64_t tiles = archive.metadata().plane_grid(report.plane).tile_count();
   StandardOutput out;
   if (common.json) {
-    out.write(json_text({{"archive", options.archive},
-                         {"output", options.output},
-                         {"files_written", sink->files()},
-                         {"width", size.first},
-                         {"height", size.second},
-                         {"plane", report.plane},
-                         {"tiles", tiles},
-                         {"seconds", seconds}}));
+    ordered_json document{
+        {"archive", options.archive}, {"output", options.output}, {"files_written", files}, {"width", size.first},
+        {"height", size.second},      {"plane", report.plane},    {"tiles", tiles},         {"seconds", seconds}};
+    if (options.date) document["suns"] = pictures;
+    out.write(json_text(document));
   } else if (!common.quiet) {
-    out.write(fmt::format("picture      {}: {} x {} pixels of {} tiles{} in {}\n", options.output, size.first,
-                          size.second, describe_count(tiles),
-                          report.plane > 0 ? fmt::format(" of coarse plane {}", report.plane) : "",
-                          describe_seconds(seconds)));
+    const std::string what = options.hours ? describe_count(static_cast<std::int64_t>(frames.size())) : options.output;
+    out.write(text + fmt::format("{:<13}{}: {} x {} pixels of {} tiles{} in {}\n",
+                                 options.hours ? "pictures" : "picture", what, size.first, size.second,
+                                 describe_count(tiles),
+                                 report.plane > 0 ? fmt::format(" of coarse plane {}", report.plane) : "",
+                                 describe_seconds(seconds)));
   }
   out.finish();
   return kExitDone;

@@ -74,8 +74,12 @@ HeadlessContext::HeadlessContext() : state_(std::make_unique<State>()) {
 
 HeadlessContext::~HeadlessContext() = default;
 
+std::string driver_name() {
+  return reinterpret_cast<const char*>(glGetString(GL_RENDERER));
+}
+
 bool is_software_driver() {
-  const std::string renderer = reinterpret_cast<const char*>(glGetString(GL_RENDERER));
+  const std::string renderer = driver_name();
   return renderer.find("llvmpipe") != std::string::npos || renderer.find("softpipe") != std::string::npos ||
          renderer.find("swrast") != std::string::npos;
 }

@@ -26,6 +26,8 @@ class HeadlessContext {
 
 /// Samples a pixel that pictures are drawn with unless the user says: 4, or 1 where software draws a window.
 [[nodiscard]] int default_samples();
+/// The name that the driver gives itself.
+[[nodiscard]] std::string driver_name();
 /// True where no GPU draws.
 [[nodiscard]] bool is_software_driver();
 

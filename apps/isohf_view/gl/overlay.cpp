@@ -1,6 +1,7 @@
 #include "gl/overlay.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <string_view>
 
@@ -8,7 +9,8 @@ namespace isohf::view {
 namespace {
 
 // A glyph is seven digits in base 32, its rows from the top; bit 4 is the leftmost pixel. In the order of ASCII, from
-// blank to '~'; a separator follows each. Drawn for isohf on squared paper.
+// blank to '~'; a separator follows each. Drawn for isohf on squared paper: strokes join neighbouring pixels, straight
+// before slanting, so that letters are smooth at any size.
 constexpr int kGlyphWidth = 5;
 constexpr int kGlyphHeight = 7;
 constexpr int kFirstGlyph = 32;
@@ -23,120 +25,202 @@ gg84211 e22222e 4ah0000 000000v 8400000 00e1fhf gguhhhu 00eggge 11fhhhf 00ehvge 
 gguhhhh 40c444e 20622ic ggikoki c44444e 00qllll 00uhhhh 00ehhhe 00uhugg 00fhf11 00mpggg 00fge1u
 88s8896 00hhhhf 00hhha4 00hllla 00ha4ah 00hhf1e 00v248v 2448442 4444444 8442448 00dm000)";
 
+constexpr int kTexels = 4;  ///< of the font texture in a font pixel
+constexpr int kCellWidth = (kGlyphWidth + 2) * kTexels;
+constexpr int kCellHeight = (kGlyphHeight + 2) * kTexels;
+constexpr int kColumns = 16;  ///< glyphs a row of the font texture
+constexpr int kAdvance = kGlyphWidth + 1;
+constexpr int kLeading = kGlyphHeight + 4;
+constexpr float kStroke = 0.48F;  ///< half a stroke's width, font pixels
+
 constexpr const char* kVertex = R"glsl(#version 330 core
 layout(location = 0) in vec2 pixel;
 layout(location = 1) in vec2 glyph;
+layout(location = 2) in vec4 tint;
 uniform vec2 view_size;
+uniform vec2 font_size;
 out vec2 v_glyph;
+out vec4 v_tint;
 void main() {
-  v_glyph = glyph;
+  v_glyph = glyph.x < 0.0 ? vec2(-1.0) : glyph / font_size;
+  v_tint = tint;
   gl_Position = vec4(pixel.x / view_size.x * 2.0 - 1.0, 1.0 - pixel.y / view_size.y * 2.0, 0.0, 1.0);
 }
 )glsl";
 
 constexpr const char* kFragment = R"glsl(#version 330 core
 in vec2 v_glyph;
+in vec4 v_tint;
 out vec4 colour;
-uniform sampler2D font;
+uniform sampler2D font;  // 0.5 on a stroke's rim, more within
 void main() {
-  // A negative x marks the panel behind the text.
-  if (v_glyph.x < 0.0) {
-    colour = vec4(0.04, 0.05, 0.08, 0.62);
-    return;
-  }
-  if (texelFetch(font, ivec2(v_glyph), 0).r < 0.5) discard;
-  colour = vec4(0.96, 0.96, 0.92, 1.0);
+  colour = v_tint;
+  float inside = texture(font, max(v_glyph, 0.0)).r;
+  float soft = max(fwidth(inside), 1e-4);
+  if (v_glyph.x >= 0.0) colour.a *= clamp((inside - 0.5) / soft + 0.5, 0.0, 1.0);
 }
 )glsl";
 
-constexpr int kColumns = 16;  ///< glyphs a row of the font texture
-constexpr int kAdvance = kGlyphWidth + 1;
-constexpr int kLeading = kGlyphHeight + 3;
-
-struct Corner {
-  float x, y;  ///< pixels from the top left
-  float u, v;  ///< font texels; u < 0: panel
+struct Stroke {
+  float x0, y0, x1, y1;
 };
 
-void add_quad(std::vector<Corner>& out, float x, float y, float width, float height, float u, float v, float uw,
-              float vh) {
-  const Corner a{x, y, u, v};
-  const Corner b{x + width, y, u + uw, v};
-  const Corner c{x, y + height, u, v + vh};
-  const Corner d{x + width, y + height, u + uw, v + vh};
-  out.insert(out.end(), {a, b, c, c, b, d});
+std::vector<Stroke> strokes_of(int glyph) {
+  const auto is_set = [glyph](int x, int y) {
+    if (x < 0 || x >= kGlyphWidth || y < 0 || y >= kGlyphHeight) return false;
+    const char digit = kGlyphs[static_cast<std::size_t>(glyph * (kGlyphHeight + 1) + y)];
+    const int row = digit <= '9' ? digit - '0' : digit - 'a' + 10;
+    return (row >> (kGlyphWidth - 1 - x) & 1) != 0;
+  };
+  std::vector<Stroke> strokes;
+  for (int y = 0; y < kGlyphHeight; ++y) {
+    for (int x = 0; x < kGlyphWidth; ++x) {
+      if (!is_set(x, y)) continue;
+      const auto join = [&](int dx, int dy) {
+        strokes.push_back(
+            {static_cast<float>(x), static_cast<float>(y), static_cast<float>(x + dx), static_cast<float>(y + dy)});
+      };
+      join(0, 0);
+      if (is_set(x + 1, y)) join(1, 0);
+      if (is_set(x, y + 1)) join(0, 1);
+      for (const int dx : {-1, 1}) {
+        if (is_set(x + dx, y + 1) && !is_set(x + dx, y) && !is_set(x, y + 1)) join(dx, 1);
+      }
+    }
+  }
+  return strokes;
+}
+
+float distance(const Stroke& stroke, float x, float y) {
+  const float dx = stroke.x1 - stroke.x0;
+  const float dy = stroke.y1 - stroke.y0;
+  const float square = dx * dx + dy * dy;
+  const float along = square > 0.0F ? ((x - stroke.x0) * dx + (y - stroke.y0) * dy) / square : 0.0F;
+  const float t = std::clamp(along, 0.0F, 1.0F);
+  return std::hypot(x - stroke.x0 - t * dx, y - stroke.y0 - t * dy);
 }
 
 }  // namespace
 
 Overlay::Overlay() : program_("overlay", kVertex, kFragment) {
   constexpr int kRows = (kGlyphCount + kColumns - 1) / kColumns;
-  constexpr int kWidth = kColumns * kGlyphWidth;
-  std::vector<std::uint8_t> texels(static_cast<std::size_t>(kWidth * kRows * kGlyphHeight), 0);
+  constexpr int kWidth = kColumns * kCellWidth;
+  constexpr int kHeight = kRows * kCellHeight;
+  std::vector<std::uint8_t> texels(static_cast<std::size_t>(kWidth * kHeight), 0);
   for (int glyph = 0; glyph < kGlyphCount; ++glyph) {
-    for (int y = 0; y < kGlyphHeight; ++y) {
-      const char digit = kGlyphs[static_cast<std::size_t>(glyph * (kGlyphHeight + 1) + y)];
-      const int row = digit <= '9' ? digit - '0' : digit - 'a' + 10;
-      for (int x = 0; x < kGlyphWidth; ++x) {
-        if ((row >> (kGlyphWidth - 1 - x) & 1) == 0) continue;
-        const int at = (glyph / kColumns * kGlyphHeight + y) * kWidth + glyph % kColumns * kGlyphWidth + x;
-        texels[static_cast<std::size_t>(at)] = 255;
+    const std::vector<Stroke> strokes = strokes_of(glyph);
+    for (int y = 0; y < kCellHeight; ++y) {
+      for (int x = 0; x < kCellWidth; ++x) {
+        const auto place = [](int texel) { return (static_cast<float>(texel) + 0.5F) / kTexels - 1.5F; };
+        float nearest = 2.0F;
+        for (const Stroke& stroke : strokes) nearest = std::min(nearest, distance(stroke, place(x), place(y)));
+        const int at = (glyph / kColumns * kCellHeight + y) * kWidth + glyph % kColumns * kCellWidth + x;
+        texels[static_cast<std::size_t>(at)] =
+            static_cast<std::uint8_t>(255.0F * std::clamp(0.5F + (kStroke - nearest) * 0.5F, 0.0F, 1.0F));
       }
     }
   }
   glBindTexture(GL_TEXTURE_2D, font_.get());
   glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
-  glTexImage2D(GL_TEXTURE_2D, 0, GL_R8, kWidth, kRows * kGlyphHeight, 0, GL_RED, GL_UNSIGNED_BYTE, texels.data());
-  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
-  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
+  glTexImage2D(GL_TEXTURE_2D, 0, GL_R8, kWidth, kHeight, 0, GL_RED, GL_UNSIGNED_BYTE, texels.data());
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
   glBindVertexArray(array_.get());
-  glBindBuffer(GL_ARRAY_BUFFER, corners_.get());
-  glVertexAttribPointer(0, 2, GL_FLOAT, GL_FALSE, sizeof(Corner), nullptr);
-  glVertexAttribPointer(1, 2, GL_FLOAT, GL_FALSE, sizeof(Corner), reinterpret_cast<const void*>(2 * sizeof(float)));
-  glEnableVertexAttribArray(0);
-  glEnableVertexAttribArray(1);
+  glBindBuffer(GL_ARRAY_BUFFER, buffer_.get());
+  for (GLuint attribute = 0, first = 0; attribute < 3; first += attribute == 2 ? 4 : 2, ++attribute) {
+    glVertexAttribPointer(attribute, attribute == 2 ? 4 : 2, GL_FLOAT, GL_FALSE, sizeof(Corner),
+                          reinterpret_cast<const void*>(first * sizeof(float)));
+    glEnableVertexAttribArray(attribute);
+  }
   glBindVertexArray(0);
+  program_.use();
+  glUniform2f(program_.uniform("font_size"), kWidth, kHeight);
+  glUniform1i(program_.uniform("font"), 0);
 }
 
-void Overlay::draw(const std::vector<std::string>& lines, int view_width, int view_height, int size, bool right) const {
-  std::size_t longest = 0;
-  for (const std::string& line : lines) longest = std::max(longest, line.size());
-  const auto scale = static_cast<float>(size);
-  const float margin = 4.0F * scale;
-  const float width = static_cast<float>(longest) * kAdvance * scale + 2.0F * margin;
-  const float height = static_cast<float>(lines.size()) * kLeading * scale + 2.0F * margin;
-  const float left = right ? static_cast<float>(view_width) - width - margin : margin;
-  std::vector<Corner> corners;
-  add_quad(corners, left, margin, width, height, -1.0F, 0.0F, 0.0F, 0.0F);
-  float y = 2.0F * margin;
-  for (const std::string& line : lines) {
-    float x = left + margin;
-    for (const char character : line) {
-      const int glyph = character - kFirstGlyph;
-      if (glyph > 0 && glyph < kGlyphCount) {
-        const int column = glyph % kColumns;
-        const int row = glyph / kColumns;
-        add_quad(corners, x, y, kGlyphWidth * scale, kGlyphHeight * scale, static_cast<float>(column * kGlyphWidth),
-                 static_cast<float>(row * kGlyphHeight), kGlyphWidth, kGlyphHeight);
-      }
-      x += kAdvance * scale;
+void Overlay::begin(int view_width, int view_height, float size) {
+  corners_.clear();
+  width_ = view_width;
+  height_ = view_height;
+  size_ = size;
+}
+
+float Overlay::width_of(std::string_view text) const {
+  return static_cast<float>(text.size() * kAdvance) * size_;
+}
+
+float Overlay::line_height() const {
+  return kLeading * size_;
+}
+
+void Overlay::quad(const float (&xy)[8], float u, float v, float uw, float vh, const OverlayColour& colour) {
+  const Corner a{xy[0], xy[1], u, v, colour};
+  const Corner b{xy[2], xy[3], u + uw, v, colour};
+  const Corner c{xy[4], xy[5], u, v + vh, colour};
+  const Corner d{xy[6], xy[7], u + uw, v + vh, colour};
+  corners_.insert(corners_.end(), {a, b, c, c, b, d});
+}
+
+void Overlay::box(float x, float y, float width, float height, const OverlayColour& colour) {
+  quad({x, y, x + width, y, x, y + height, x + width, y + height}, -1.0F, -1.0F, 0.0F, 0.0F, colour);
+}
+
+void Overlay::line(float x0, float y0, float x1, float y1, float width, const OverlayColour& colour) {
+  const float length = std::max(std::hypot(x1 - x0, y1 - y0), 1e-6F);
+  const float dx = -(y1 - y0) / length * width / 2.0F;
+  const float dy = (x1 - x0) / length * width / 2.0F;
+  quad({x0 + dx, y0 + dy, x1 + dx, y1 + dy, x0 - dx, y0 - dy, x1 - dx, y1 - dy}, -1.0F, -1.0F, 0.0F, 0.0F, colour);
+}
+
+void Overlay::text(float x, float y, std::string_view text, const OverlayColour& colour) {
+  // A glyph's cell reaches a font pixel beyond it on all sides.
+  const float width = static_cast<float>(kCellWidth) / kTexels * size_;
+  const float height = static_cast<float>(kCellHeight) / kTexels * size_;
+  for (const char character : text) {
+    const int glyph = character - kFirstGlyph;
+    if (glyph > 0 && glyph < kGlyphCount) {
+      const float left = x - size_;
+      const float top = y - size_;
+      quad({left, top, left + width, top, left, top + height, left + width, top + height},
+           static_cast<float>(glyph % kColumns * kCellWidth), static_cast<float>(glyph / kColumns * kCellHeight),
+           kCellWidth, kCellHeight, colour);
     }
-    y += kLeading * scale;
+    x += kAdvance * size_;
   }
+}
+
+float Overlay::panel(float x, float y, const std::vector<std::string>& lines, bool right) {
+  float widest = 0.0F;
+  for (const std::string& line : lines) widest = std::max(widest, width_of(line));
+  const float margin = 4.0F * size_;
+  const float width = widest + 2.0F * margin;
+  const float height = static_cast<float>(lines.size()) * line_height() + 2.0F * margin - 3.0F * size_;
+  if (right) x -= width;
+  box(x, y, width, height, kPanel);
+  float at = y + margin;
+  for (const std::string& line : lines) {
+    text(x + margin, at, line);
+    at += line_height();
+  }
+  return height;
+}
+
+void Overlay::finish() {
   glBindVertexArray(array_.get());
-  glBindBuffer(GL_ARRAY_BUFFER, corners_.get());
-  glBufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(corners.size() * sizeof(Corner)), corners.data(),
+  glBindBuffer(GL_ARRAY_BUFFER, buffer_.get());
+  glBufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(corners_.size() * sizeof(Corner)), corners_.data(),
                GL_STREAM_DRAW);
   program_.use();
-  glUniform2f(program_.uniform("view_size"), static_cast<float>(view_width), static_cast<float>(view_height));
-  glUniform1i(program_.uniform("font"), 0);
+  glUniform2f(program_.uniform("view_size"), static_cast<float>(width_), static_cast<float>(height_));
   glActiveTexture(GL_TEXTURE0);
   glBindTexture(GL_TEXTURE_2D, font_.get());
   glDisable(GL_DEPTH_TEST);
   glDisable(GL_CULL_FACE);
   glEnable(GL_BLEND);
   glBlendFunc(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA);
-  glDrawArrays(GL_TRIANGLES, 0, static_cast<GLsizei>(corners.size()));
+  glDrawArrays(GL_TRIANGLES, 0, static_cast<GLsizei>(corners_.size()));
   glDisable(GL_BLEND);
   glBindTexture(GL_TEXTURE_2D, 0);
   glBindVertexArray(0);

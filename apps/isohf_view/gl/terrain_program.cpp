@@ -144,18 +144,13 @@ uniform vec3 sun_light;         // on ground that faces it
 uniform vec3 sky_light;         // on level ground
 uniform vec2 haze;              // distance where it begins, 1/distance to where it is complete; y = 0: none
 uniform vec3 horizon;
+uniform sampler2D palette;      // colours along the ramp, to the power of 1.6
 uniform sampler2D tile_texture; // colours as coded, multiplied by alpha
 uniform vec3 texture_place;     // texture coordinates = object space * xy + z
 float sun_share();
 
 #if MODE == 0 || MODE == 4
-vec3 hypsometric(float t) {
-  float at = 7.0 * t;
-  return vec3(0.17, 0.36, 0.30) + vec3(0.13, 0.12, -0.03) * clamp(at, 0.0, 1.0) +
-         vec3(0.23, 0.12, 0.07) * clamp(at - 1.0, 0.0, 1.0) + vec3(0.21, 0.09, 0.11) * clamp(at - 2.0, 0.0, 1.0) +
-         vec3(-0.07, -0.16, -0.09) * clamp(at - 3.0, 0.0, 1.0) + vec3(-0.13, -0.11, -0.02) * clamp(at - 4.0, 0.0, 1.0) +
-         vec3(0.12, 0.21, 0.27) * clamp(at - 5.0, 0.0, 1.0) + vec3(0.29, 0.33, 0.37) * clamp(at - 6.0, 0.0, 1.0);
-}
+vec3 hypsometric() { return texture(palette, vec2((v_place.z - ramp.x) * ramp.y, 0.5)).rgb; }
 #endif
 
 #if MODE == 3
@@ -175,7 +170,7 @@ vec3 strip_colour() {
 
 vec3 base_colour() {
 #if MODE == 0
-  return hypsometric((v_place.z - ramp.x) * ramp.y);
+  return hypsometric();
 #elif MODE == 2
   return level_colour;
 #elif MODE == 3
@@ -185,7 +180,7 @@ vec3 base_colour() {
   // texture has no alpha.
   vec4 photo = texture(tile_texture, v_place.xy * texture_place.xy + texture_place.z);
   vec3 own = pow(min(photo.rgb / max(photo.a, 0.004), 1.0), vec3(1.6));
-  return mix(hypsometric((v_place.z - ramp.x) * ramp.y), own, photo.a);
+  return mix(hypsometric(), own, photo.a);
 #else
   return vec3(0.80, 0.79, 0.76);
 #endif
@@ -272,6 +267,7 @@ void TerrainProgram::begin(const TileGrid& grid, const TerrainFrame& frame) cons
     glUniform2f(uniform(name), static_cast<float>(x), static_cast<float>(y));
   };
   glUniform1i(uniform("tile_texture"), 0);
+  glUniform1i(uniform("palette"), 1);
   glUniform2i(uniform("last_xz"), 2 * grid.shape().cell_columns(), grid.shape().cell_rows());
   set_vec2("sigma", grid.sigma_x(), grid.sigma_z());
   set_vec2("object_size", 2.0 * grid.shape().cell_columns(), grid.shape().cell_rows());

@@ -20,7 +20,7 @@ namespace isohf::view {
 namespace {
 
 /// World units of one elevation unit; 1 where either is not known.
-double world_per_elevation(const Metadata& metadata) {
+double elevation_unit(const Metadata& metadata) {
   if (metadata.horizontal_unit != "metre") return 1.0;
   const auto unit = linear_unit(metadata.vertical_unit);
   return unit ? unit->metres : 1.0;
@@ -29,7 +29,7 @@ double world_per_elevation(const Metadata& metadata) {
 class ArchiveSource final : public TileSource {
  public:
   explicit ArchiveSource(const std::string& path)
-      : reader_(path), world_per_elevation_(world_per_elevation(reader_.metadata())) {
+      : reader_(path), world_per_elevation_(elevation_unit(reader_.metadata())) {
     const Metadata& metadata = reader_.metadata();
     if (metadata.planes.count > 0) {
       planes_.emplace(metadata.grid, metadata.planes.stride, metadata.planes.count, metadata.wraps_x);
@@ -87,21 +87,23 @@ class ArchiveSource final : public TileSource {
   };
 
  public:
-  [[nodiscard]] std::vector<std::string> describe_place(WorldPoint at, double height) const override {
-    std::vector<std::string> lines = TileSource::describe_place(at, height / world_per_elevation_);
-    const std::string& unit = reader_.metadata().vertical_unit;
-    if (unit != "unknown") lines.back() += " " + unit;
+  [[nodiscard]] Place describe(WorldPoint at, std::optional<double> height) const override {
+    Place place = TileSource::describe(at, height);
+    place.unit = height_unit();
     std::call_once(georeference_once_, [this] { find_georeference(); });
-    if (!georeference_) return lines;
+    if (!georeference_) return place;
     if (georeference_->has_source() && reader_.metadata().source.crs_unit != "degree") {
-      const MapPoint place = georeference_->source_from_world(at);
-      lines.push_back(fmt::format("E {:.2f}  N {:.2f}", place.easting, place.northing));
+      place.map = georeference_->source_from_world(at);
     }
-    if (georeference_->has_geo()) {
-      const GeoPoint place = georeference_->geo_from_world(at);
-      lines.push_back(fmt::format("lon {:.6f}  lat {:.6f}", place.longitude, place.latitude));
-    }
-    return lines;
+    if (georeference_->has_geo()) place.geo = georeference_->geo_from_world(at);
+    return place;
+  }
+  [[nodiscard]] double world_per_elevation() const override { return world_per_elevation_; }
+  [[nodiscard]] const Metadata* metadata() const override { return &reader_.metadata(); }
+  [[nodiscard]] DaySky sky() const override {
+    ArchiveReader archive(reader_.path());
+    try_to_understand(archive);
+    return DaySky(archive);
   }
 
   [[nodiscard]] const TextureInfo* textures() const override { return textures_ ? &textures_->info() : nullptr; }
@@ -122,14 +124,18 @@ class ArchiveSource final : public TileSource {
             scale_.offset + scale_.scale * entry.code_max};
   }
 
-  /// When it is first asked for: understanding a map may load PROJ. From a reader of its own, as others read reader_.
-  void find_georeference() const {
-    ArchiveReader archive(reader_.path());
+  /// Of a reader of its own, as others read reader_. May load PROJ.
+  static void try_to_understand(ArchiveReader& archive) {
     try {
       understand_source(archive);
     } catch (const Error&) {
-      // Its map is not understood: places have no longitude and latitude then.
+      // Places have no longitude and latitude then.
     }
+  }
+
+  void find_georeference() const {
+    ArchiveReader archive(reader_.path());
+    try_to_understand(archive);
     try {
       georeference_.emplace(archive.metadata());
     } catch (const Error&) {
@@ -191,12 +197,24 @@ void TileSource::read_heights(TileIndex tile, std::span<float> heights) const {
   });
 }
 
-std::vector<std::string> TileSource::describe_place(WorldPoint at, double height) const {
-  // As many decimals as codes have steps.
-  const int decimals = std::clamp(static_cast<int>(std::ceil(-std::log10(scale().scale))), 0, 6);
-  const double unit = std::pow(10.0, decimals);
-  return {fmt::format("x {:.7g}  z {:.7g}  elevation {:.{}f}", at.x, at.z, std::round(height * unit) / unit + 0.0,
-                      decimals)};
+Place TileSource::describe(WorldPoint at, std::optional<double> height) const {
+  Place place;
+  place.at = at;
+  if (height) place.elevation = *height / world_per_elevation();
+  place.decimals = std::clamp(static_cast<int>(std::ceil(-std::log10(scale().scale / world_per_elevation()))), 0, 6);
+  return place;
+}
+
+std::string TileSource::ground_unit() const {
+  return metadata() == nullptr || metadata()->horizontal_unit == "unknown" ? "" : metadata()->horizontal_unit;
+}
+
+std::string TileSource::height_unit() const {
+  return metadata() == nullptr || metadata()->vertical_unit == "unknown" ? "" : metadata()->vertical_unit;
+}
+
+DaySky TileSource::sky() const {
+  throw Error(ErrorCode::kInvalidArgument, "the sun's way over this ground is not known");
 }
 
 Picture TileSource::read_texture(TileIndex, int) const {

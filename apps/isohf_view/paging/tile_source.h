@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -13,6 +14,7 @@
 #include "isohf/lattice/planes.h"
 #include "isohf/metadata.h"
 #include "isohf/picture.h"
+#include "isohf/shade.h"
 #include "view_state.h"
 
 namespace isohf::view {
@@ -33,6 +35,16 @@ struct TileBounds {
   bool has_voids = false;
   double low = 0.0;  ///< world units
   double high = 0.0;
+};
+
+/// The names of a place.
+struct Place {
+  WorldPoint at{};
+  std::optional<double> elevation;  ///< in `unit`
+  std::string unit;                 ///< empty where it is not known
+  int decimals = 0;                 ///< of the elevation: as many as codes have steps
+  std::optional<MapPoint> map;      ///< in the source's system, where that is a map
+  std::optional<GeoPoint> geo;
 };
 
 /// Where tiles come from. All functions may be called from any number of threads at once.
@@ -59,8 +71,17 @@ class TileSource {
   [[nodiscard]] virtual const TileSource& plane(int) const { return *this; }
   /// A tile's heights in codes, not rounded, NaN where void: what shadows are computed from. [C x R] out.
   virtual void read_heights(TileIndex tile, std::span<float> heights) const;
-  /// What to tell a reader of a place on the surface and its height, world units: a line for each way to name it.
-  [[nodiscard]] virtual std::vector<std::string> describe_place(WorldPoint at, double height) const;
+  /// All names of a place whose height is known, world units.
+  [[nodiscard]] virtual Place describe(WorldPoint at, std::optional<double> height) const;
+  /// World units of one elevation unit; 1 where either is not known.
+  [[nodiscard]] virtual double world_per_elevation() const { return 1.0; }
+  /// nullptr where there is no archive.
+  [[nodiscard]] virtual const Metadata* metadata() const { return nullptr; }
+  /// Names of the ground's and the elevations' units; empty where they are not known.
+  [[nodiscard]] std::string ground_unit() const;
+  [[nodiscard]] std::string height_unit() const;
+  /// Throws Error{kInvalidArgument} where the sun's way is not known.
+  [[nodiscard]] virtual DaySky sky() const;
   /// The record of the textures; nullptr where the source has none.
   [[nodiscard]] virtual const TextureInfo* textures() const { return nullptr; }
   [[nodiscard]] virtual bool has_texture(TileIndex) const { return false; }

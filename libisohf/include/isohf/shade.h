@@ -48,6 +48,37 @@ struct ColourStop {
 /// and red, green, blue, or a colour's name. Throws Error naming the path: kIo, kInvalidArgument with the line.
 [[nodiscard]] std::vector<ColourStop> read_colour_relief(const std::string& path, const Metadata& metadata);
 
+/// A day of the Gregorian calendar and a time of day, 0 to 24: mean solar time, which is near to what clocks say, and
+/// takes no account of time zones. On Mars hours are 24 of its own day, the date is the Earth's.
+struct SolarTime {
+  int year = 2000;
+  int month = 6;
+  int day = 21;
+  double hours = 12.0;
+};
+
+/// Where the sun stands: degrees clockwise from the North of the archive's map, and above the horizon, below it < 0. Without
+/// the air's refraction.
+struct SunPlace {
+  double azimuth_deg;
+  double elevation_deg;
+};
+
+/// The sun's way over the middle of an archive's ground.
+class DaySky {
+ public:
+  /// Throws Error{kInvalidArgument} where the body is neither Earth nor Mars or the archive has no place in degrees. Ask
+  /// understand_source() first for those whose source lies on a map of its own.
+  explicit DaySky(const ArchiveReader& archive);
+  [[nodiscard]] SunPlace sun(const SolarTime& time) const;
+  [[nodiscard]] GeoPoint place() const { return place_; }
+
+ private:
+  bool is_mars_ = false;
+  GeoPoint place_{};
+  double north_deg_ = 0.0;  ///< clockwise from the map's to the body's
+};
+
 /// What a picture of an archive's surface shows. It covers the part of the world that the source covered.
 struct ShadeOptions {
   ShadeKind kind = ShadeKind::kPicture;

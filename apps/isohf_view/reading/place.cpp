@@ -1,0 +1,75 @@
+#include "reading/place.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+namespace isohf::view {
+namespace {
+
+using nlohmann::ordered_json;
+
+constexpr int kProfilePoints = 256;
+
+double rounded(double value, int decimals) {
+  const double unit = std::pow(10.0, decimals);
+  return std::round(value * unit) / unit + 0.0;
+}
+
+}  // namespace
+
+std::vector<std::string> lines_of(const Place& place) {
+  std::vector<std::string> lines{fmt::format("x {:.7g}  z {:.7g}", place.at.x, place.at.z)};
+  if (place.elevation) {
+    lines.back() += fmt::format("  elevation {:.{}f}", rounded(*place.elevation, place.decimals), place.decimals);
+    if (!place.unit.empty()) lines.back() += " " + place.unit;
+  }
+  if (place.map) lines.push_back(fmt::format("E {:.2f}  N {:.2f}", place.map->easting, place.map->northing));
+  if (place.geo) {
+    const double east = place.geo->longitude;
+    const double north = place.geo->latitude;
+    lines.push_back(fmt::format("{:.6f} {}  {:.6f} {}", std::abs(north), north < 0.0 ? 'S' : 'N', std::abs(east),
+                                east < 0.0 ? 'W' : 'E'));
+  }
+  return lines;
+}
+
+ordered_json json_of(const Place& place) {
+  ordered_json json{{"x", place.at.x}, {"z", place.at.z}, {"elevation", nullptr}};
+  if (place.elevation) json["elevation"] = rounded(*place.elevation, place.decimals);
+  json["unit"] = place.unit.empty() ? ordered_json(nullptr) : ordered_json(place.unit);
+  if (place.map) json["map"] = {place.map->easting, place.map->northing};
+  if (place.geo) json["longitude"] = place.geo->longitude;
+  if (place.geo) json["latitude"] = place.geo->latitude;
+  return json;
+}
+
+Place probe(const TileSource& source, Ground& ground, WorldPoint at) {
+  return source.describe(at, ground.height(at, source.covered()));
+}
+
+Profile profile_between(const TileSource& source, Ground& ground, WorldPoint from, WorldPoint to) {
+  Profile profile;
+  profile.length = std::hypot(to.x - from.x, to.z - from.z);
+  for (int i = 0; i < kProfilePoints; ++i) {
+    const double share = i / (kProfilePoints - 1.0);
+    const WorldPoint at{from.x + share * (to.x - from.x), from.z + share * (to.z - from.z)};
+    const auto height = ground.height(at, source.covered());
+    profile.heights.push_back(height ? *height / source.world_per_elevation()
+                                     : std::numeric_limits<double>::quiet_NaN());
+  }
+  return profile;
+}
+
+ordered_json json_of(const Profile& profile) {
+  ordered_json heights = ordered_json::array();
+  for (const double height : profile.heights) {
+    heights.push_back(std::isnan(height) ? ordered_json(nullptr) : ordered_json(height));
+  }
+  return {{"length", profile.length}, {"heights", heights}};
+}
+
+}  // namespace isohf::view

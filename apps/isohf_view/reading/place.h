@@ -1,0 +1,24 @@
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
+
+#include "ground.h"
+#include "paging/tile_source.h"
+#include "reading/hud.h"
+
+namespace isohf::view {
+
+/// What to tell a reader of a place: a line for each way to name it.
+[[nodiscard]] std::vector<std::string> lines_of(const Place& place);
+[[nodiscard]] nlohmann::ordered_json json_of(const Place& place);
+
+/// The place and its elevation by the triangles of full detail.
+[[nodiscard]] Place probe(const TileSource& source, Ground& ground, WorldPoint at);
+
+/// Heights between two places, of full detail, at as many points as a screen is wide.
+[[nodiscard]] Profile profile_between(const TileSource& source, Ground& ground, WorldPoint from, WorldPoint to);
+[[nodiscard]] nlohmann::ordered_json json_of(const Profile& profile);
+
+}  // namespace isohf::view
