@@ -1,13 +1,17 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <unistd.h>
 
+#include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 
 #include "actions.h"
+#include "formats/registry.h"
 #include "formats/write/raster_sink.h"
 #include "gl/offscreen.h"
 #include "interrupt.h"
+#include "isohf/convert.h"
 #include "isohf/error.h"
 #include "options/describe.h"
 #include "output/json_output.h"
@@ -139,14 +143,52 @@ int say_place(const TileSource& source, const Options& options) {
   return cli::kExitDone;
 }
 
+/// A file that goes when this does, and what a conversion may leave of it.
+class ScratchArchive {
+ public:
+  ScratchArchive()
+      : path_((std::filesystem::temp_directory_path() / fmt::format("isohf-view-{}.isohf", ::getpid())).string()) {}
+  ~ScratchArchive() {
+    std::error_code ignored;
+    for (const char* ending : {"", ".part"}) std::filesystem::remove(path_ + ending, ignored);
+  }
+  ScratchArchive(const ScratchArchive&) = delete;
+  ScratchArchive& operator=(const ScratchArchive&) = delete;
+  [[nodiscard]] const std::string& path() const { return path_; }
+
+ private:
+  std::string path_;
+};
+
+/// Converts what is named where it is a raster; nullptr where it is none.
+std::unique_ptr<ScratchArchive> convert_for_viewing(const Options& options) {
+  if (native_format_of(options.archive, {}) == nullptr) return nullptr;
+  const std::unique_ptr<HeightSource> source = open_raster(options.archive, {});
+  auto scratch = std::make_unique<ScratchArchive>();
+  ConvertOptions request;
+  request.overwrite = true;
+  request.scratch_folder = std::filesystem::temp_directory_path().string();
+  understand_ground(source->info(), request.plan.ground);
+  Job job;
+  job.threads = options.threads;
+  job.cancel = &cli::watch_interrupts();
+  const ConvertSummary summary = convert(*source, scratch->path(), request, job);
+  if (options.common.quiet) return scratch;
+  for (const Warning& warning : summary.warnings) cli::print_warning(warning);
+  return scratch;
+}
+
 int run(const cli::Arguments& arguments) {
   const std::optional<Options> options = parse_options(arguments);
   if (!options) return cli::kExitDone;
-  for (const std::string& output : {options->screenshot, options->csv, options->plot}) {
+  // A flight's pictures are looked at one by one.
+  const bool is_picture = !options->screenshot.empty() && options->action != Options::Action::kFlight;
+  for (const std::string& output : {is_picture ? options->screenshot : std::string(), options->csv, options->plot}) {
     if (!output.empty()) cli::check_output_file({options->archive}, output, options->overwrite);
   }
-  if (!options->screenshot.empty()) check_raster_target(options->screenshot, options->overwrite);
-  const std::unique_ptr<TileSource> source = open_archive(options->archive);
+  if (is_picture) check_raster_target(options->screenshot, options->overwrite);
+  const std::unique_ptr<ScratchArchive> scratch = convert_for_viewing(*options);
+  const std::unique_ptr<TileSource> source = open_archive(scratch ? scratch->path() : options->archive);
   if (options->action == Options::Action::kWindow) {
     run_window(*source, *options);
     return cli::kExitDone;

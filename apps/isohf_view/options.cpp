@@ -75,7 +75,9 @@ CommandLine::Take name_ending_with(const char* ending, std::string& name) {
 
 void add_actions(CommandLine& line, Options& options, bool& window, bool& verify, bool& sweep) {
   line.group("Actions");
-  line.option("--screenshot", "FILE.png", "Write a picture and end", name_ending_with(".png", options.screenshot));
+  line.option("--screenshot", "FILE.png",
+              "Write a picture and end; with --flight one of each frame, FILE-0001.png and so on",
+              name_ending_with(".png", options.screenshot));
   line.option("--flight", "FILE", "Fly along the path in FILE without a screen and print figures", options.flight);
   line.flag("--verify", "Check that archive, index arrays and shaders agree with the library", verify);
   line.flag("--sweep", "Go from level 0 to 2 in small steps and measure how the picture changes", sweep);
@@ -86,7 +88,8 @@ void add_actions(CommandLine& line, Options& options, bool& window, bool& verify
                 if (options.probe.size() != 2 && options.probe.size() != 4) refuse(text, "X,Z or X,Z,X,Z");
               });
   line.flag("--window", "Open a window even with --screenshot, which then shows the window", window);
-  line.exclusive({"--screenshot", "--flight", "--verify", "--sweep", "--probe"});
+  line.exclusive({"--screenshot", "--verify", "--sweep", "--probe"});
+  line.exclusive({"--flight", "--verify", "--sweep", "--probe"});
   line.exclusive({"--window", "--flight", "--verify", "--sweep", "--probe"});
   line.option(
       "--frames", "N", "Draw N frames of the flight (default 300), or close the window after N",
@@ -199,7 +202,8 @@ std::optional<Options> parse_options(const cli::Arguments& arguments) {
   std::optional<double> time;
   CommandLine line("view", "Views an archive of an isometric heightfield, or draws and checks it without a screen.");
   line.group("Arguments");
-  line.positional("ARCHIVE", "-i,--input", "Archive to view", options.archive);
+  line.positional("ARCHIVE", "-i,--input",
+                  "Archive to view, or a raster: it is converted for as long as it is looked at", options.archive);
   add_actions(line, options, window, verify, sweep);
   add_picture(line, options);
   line.flag("--no-haze", "Leave out the haze towards the far distance", no_haze);

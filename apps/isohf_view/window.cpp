@@ -18,6 +18,7 @@
 
 #include "actions.h"
 #include "gl/offscreen.h"
+#include "interrupt.h"
 #include "isohf/error.h"
 #include "output/standard_output.h"
 #include "reading/place.h"
@@ -339,8 +340,10 @@ void run_window(const TileSource& source, const Options& options) {
   using Clock = std::chrono::steady_clock;
   auto last = Clock::now();
   double smooth_s = 1.0 / 60.0;
+  const std::atomic<bool>& interrupted = cli::watch_interrupts();
   std::int64_t drawn = 0;
   for (int frame = 1; glfwWindowShouldClose(window.get()) == GLFW_FALSE; ++frame) {
+    if (interrupted) throw Error(ErrorCode::kCancelled, "interrupted");
     glfwPollEvents();
     const auto now = Clock::now();
     const double seconds = std::chrono::duration<double>(now - last).count();

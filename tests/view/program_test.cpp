@@ -1,6 +1,8 @@
 // The real program, run as a person runs it.
 #include <gtest/gtest.h>
 
+#include <filesystem>
+
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
@@ -208,6 +210,36 @@ TEST_F(ViewProgramTest, PrintsJsonOrNothing) {
   EXPECT_NE(drawn.out.find("\"width\": 64"), std::string::npos) << drawn.out;
   EXPECT_EQ(run(good + " --verify -q").out, "");
   EXPECT_NE(run(good + " --sweep --steps 4 --size 64x48 --json").out.find("\"fading\""), std::string::npos);
+}
+
+TEST_F(ViewProgramTest, ShowsARasterAndLeavesNothingBehind) {
+  const std::string raster = ISOHF_SOURCE_DIR "/testdata/coast_512x384_int16.tif";
+  const std::string folder = path("scratch");
+  std::filesystem::create_directory(folder);
+  const Outcome drawn = run(raster + " --size 64x48 --json --screenshot " + path("coast.png"), "TMPDIR=" + folder);
+  EXPECT_EQ(drawn.exit_code, 0) << drawn.err;
+  EXPECT_TRUE(is_png("coast.png"));
+  EXPECT_NE(drawn.out.find("coast_512x384_int16.tif"), std::string::npos) << drawn.out;
+  EXPECT_TRUE(std::filesystem::is_empty(folder));
+  const std::string bytes = test::read_file(raster);
+  test::write_file(path("cut.tif"), bytes.substr(0, 3000));
+  const Outcome cut = run(path("cut.tif") + " --size 64x48 --screenshot " + path("cut.png"), "TMPDIR=" + folder);
+  EXPECT_EQ(cut.exit_code, 1);
+  EXPECT_EQ(std::count(cut.err.begin(), cut.err.end(), '\n'), 1) << cut.err;
+  EXPECT_TRUE(std::filesystem::is_empty(folder));
+}
+
+TEST_F(ViewProgramTest, FilmsAFlight) {
+  test::write_file(path("way.txt"), "0 100 200 600  480 0 100\n2 500 150 500  480 0 0\n");
+  const std::string film =
+      path("good.isohf") + " --size 64x48 --frames 3 --flight " + path("way.txt") + " --screenshot " + path("film.png");
+  EXPECT_EQ(run(film).exit_code, 0);
+  EXPECT_TRUE(is_png("film-0001.png"));
+  EXPECT_TRUE(is_png("film-0003.png"));
+  EXPECT_NE(text("film-0001.png"), text("film-0003.png"));
+  EXPECT_FALSE(std::filesystem::exists(path("film.png")));
+  EXPECT_EQ(run(film).exit_code, 2);  // exist
+  EXPECT_EQ(run(film + " --overwrite").exit_code, 0);
 }
 
 TEST_F(ViewProgramTest, SaysWhatIsKnownOfAPlace) {

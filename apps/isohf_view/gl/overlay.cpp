@@ -57,7 +57,7 @@ void main() {
   colour = v_tint;
   float inside = texture(font, max(v_glyph, 0.0)).r;
   float soft = max(fwidth(inside), 1e-4);
-  if (v_glyph.x >= 0.0) colour.a *= clamp((inside - 0.5) / soft + 0.5, 0.0, 1.0);
+  if (v_glyph.x > -0.5) colour.a *= clamp((inside - 0.5) / soft + 0.5, 0.0, 1.0);
 }
 )glsl";
 

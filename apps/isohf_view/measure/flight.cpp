@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <ctime>
+#include <filesystem>
 #include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -12,11 +13,13 @@
 #include <sstream>
 
 #include "actions.h"
+#include "formats/write/raster_sink.h"
 #include "gl/offscreen.h"
 #include "isohf/base/output_file.h"
 #include "isohf/error.h"
 #include "measure/flight_path.h"
 #include "options/describe.h"
+#include "output/output_file.h"
 #include "output/svg_chart.h"
 #include "session.h"
 
@@ -370,7 +373,8 @@ void fly(const TileSource& source, const Options& options, const std::function<v
       "texture_bytes,"
       "textures_to_come");
   Session session(source, options);
-  const Offscreen target(options.view.width, options.view.height, GL_RGBA8);
+  const bool films = !options.screenshot.empty();
+  const Offscreen target(options.view.width, options.view.height, GL_RGBA8, films ? options.samples.value_or(4) : 1);
   FlightTotals totals;
   totals.anonymous_before = process_memory().anonymous;
   // The flight begins with everything in reach; from then on no frame waits.
@@ -390,6 +394,15 @@ void fly(const TileSource& source, const Options& options, const std::function<v
     session.frame();
     glFinish();
     const double ms = milliseconds_since(begin);
+    if (films) {
+      session.complete_frame();
+      const std::filesystem::path name(options.screenshot);
+      const std::string numbered =
+          (name.parent_path() / fmt::format("{}-{:04}.png", name.stem().string(), frame + 1)).string();
+      cli::check_output_file({options.archive}, numbered, options.overwrite);
+      check_raster_target(numbered, options.overwrite);
+      target.write_picture(numbered);
+    }
     const FrameFigures& figures = session.figures();
     const TileBoxFigures& box = session.boxes().figures();
     const TextureBoxFigures textures =
