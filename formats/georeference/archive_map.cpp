@@ -1,4 +1,10 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
 #include "formats/georeference/reference_system.h"
+#include "isohf/error.h"
 #include "isohf/surface.h"
 
 namespace isohf {
@@ -15,6 +21,51 @@ void understand_source(ArchiveReader& archive) {
   }
   try {
     archive.set_source_map(understand_map(text, source.metres_per_unit));
+  } catch (const Error& error) {
+    throw error.within(archive.path());
+  }
+}
+
+std::shared_ptr<const GridSystem> understand_grid_system(ArchiveReader& archive, const std::string& text,
+                                                         std::vector<Warning>& warnings) {
+  understand_source(archive);
+  const Metadata& metadata = archive.metadata();
+  const WorldGeoreference places(metadata);
+  if (!places.has_geo()) {
+    throw Error(ErrorCode::kInvalidArgument,
+                archive.path() + ": does not say where it lies: it has no place in another reference system");
+  }
+  // The middle of each side and the corners: what the choice among datum shifts goes by.
+  GeoExtent ground{HUGE_VAL, HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
+  for (const double u : {0.0, 0.5, 1.0}) {
+    for (const double v : {0.0, 0.5, 1.0}) {
+      const WorldBounds& all = metadata.valid;
+      const GeoPoint at = places.geo_from_world({all.x0 + u * (all.x1 - all.x0), all.z0 + v * (all.z1 - all.z0)});
+      if (!std::isfinite(at.longitude)) continue;
+      ground = {std::min(ground.west, at.longitude), std::min(ground.south, at.latitude),
+                std::max(ground.east, at.longitude), std::max(ground.north, at.latitude)};
+    }
+  }
+  if (!(ground.west <= ground.east)) ground = {-180.0, -90.0, 180.0, 90.0};
+  const Georeference own = source_georeference(metadata.source);
+  Ellipsoid ellipsoid;
+  if (own.system.semi_major_axis_m)
+    ellipsoid = {*own.system.semi_major_axis_m, own.system.inverse_flattening.value_or(0.0)};
+  try {
+    const WayToSystem way = find_way(own.system, text, ground, ellipsoid);
+    SourceInfo there;
+    take_system(text, there);
+    if (way.is_ballpark) {
+      warnings.push_back(fmt::format(
+          "{}: PROJ knows no way from its datum to that of \"{}\": they are taken for one, which may be off by some "
+          "hundred metres",
+          archive.path(), way.system.name));
+    }
+    auto system = std::make_shared<GridSystem>(GridSystem{way.map, there.georeference});
+    // The heights stay the archive's own.
+    system->place.system.vertical_datum.clear();
+    system->place.system.vertical_epsg.reset();
+    return system;
   } catch (const Error& error) {
     throw error.within(archive.path());
   }

@@ -259,7 +259,6 @@ void find_operation(const char* from, const char* to, const double* ground, Isoh
   open(from, "", source, info);
   const double meridian_deg = info.prime_meridian_deg;
   open(to, "", target, info);
-  if (info.is_projected == 0) refuse("counts degrees, and is no map");
   PJ_CONTEXT* const context = target.context.get();
   const Object ours = geographic_part(context, with_datum(context, source.system.get()).get());
   const Object theirs = with_datum(context, target.system.get());

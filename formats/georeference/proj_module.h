@@ -53,7 +53,7 @@ typedef struct IsohfProjOperation {
 typedef int (*IsohfProjOpen)(const char* text, const char* vertical, IsohfProjSystem** system, IsohfProjInfo* info,
                              IsohfProjMessage* message);
 /// The best way, over a ground of West, South, East, North in degrees, from the longitudes and latitudes of the system
-/// `from` to the projected system `to`, of those that need no grid that is not installed.
+/// `from` to the system `to`, of those that need no grid that is not installed.
 typedef int (*IsohfProjFindOperation)(const char* from, const char* to, const double* ground,
                                       IsohfProjOperation* operation, IsohfProjMessage* message);
 /// Such a pipeline again, as a system that can be moved by and closed, and nothing else.

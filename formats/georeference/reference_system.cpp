@@ -296,38 +296,53 @@ GeoExtent rough_ground(const SourceInfo& info, const ReferenceMap* map) {
   return {std::remainder(ground.west, 360.0), ground.south, std::remainder(ground.east, 360.0), ground.north};
 }
 
+}  // namespace
+
+WayToSystem find_way(const ReferenceSystem& from, const std::string& to, const GeoExtent& ground,
+                     const Ellipsoid& ellipsoid) {
+  const auto understood = understand_system(to);
+  const UnderstoodSystem::Description& target = understood->description();
+  const double area[4] = {ground.west, ground.south, ground.east, ground.north};
+  IsohfProjOperation operation{};
+  IsohfProjMessage message{};
+  const int result = proj_module().find_operation(datum_text(from).c_str(), to.c_str(), area, &operation, &message);
+  if (result != 0) throw Error(module_error_code(result), fmt::format("\"{}\" {}", target.name, message.text));
+  WayToSystem way;
+  way.system = {target.authority == "EPSG" ? "EPSG:" + target.code : target.wkt2, target.name, operation.pipeline,
+                target.is_projected ? target.unit : 1.0};
+  way.is_projected = target.is_projected;
+  MappedSystem in_units = way.system;
+  in_units.metres_per_unit = 1.0;
+  way.map = std::make_shared<PipelineMap>(in_units, ellipsoid);
+  way.is_ballpark = operation.is_ballpark != 0;
+  return way;
+}
+
+namespace {
+
 void understand_projection(const SourceInfo& info, const ReferenceMap* source_map, ProjectionRequest& request) {
   try {
-    const auto understood = understand_system(request.system);
-    const UnderstoodSystem::Description& target = understood->description();
-    if (!target.is_projected) {
-      throw Error(ErrorCode::kInvalidArgument,
-                  fmt::format("\"{}\" counts degrees and is no map; `projection` none leaves degrees as they are",
-                              target.name));
-    }
-    const GeoExtent ground = rough_ground(info, source_map);
-    const double area[4] = {ground.west, ground.south, ground.east, ground.north};
-    const std::string from = datum_text(info.georeference.system);
-    IsohfProjOperation operation{};
-    IsohfProjMessage message{};
-    const int result = proj_module().find_operation(from.c_str(), request.system.c_str(), area, &operation, &message);
-    if (result != 0) throw Error(module_error_code(result), fmt::format("\"{}\" {}", target.name, message.text));
     ProjectionSpec& spec = request.system_map;
     spec.kind = ProjectionKind::kSystem;
-    if (info.georeference.system.semi_major_axis_m) {
-      spec.ellipsoid = {*info.georeference.system.semi_major_axis_m,
-                        info.georeference.system.inverse_flattening.value_or(0.0)};
+    const ReferenceSystem& own = info.georeference.system;
+    if (own.semi_major_axis_m) {
+      spec.ellipsoid = {*own.semi_major_axis_m, own.inverse_flattening.value_or(0.0)};
     } else if (source_map != nullptr) {
       spec.ellipsoid = source_map->ellipsoid();
     }
-    spec.system = {target.authority == "EPSG" ? "EPSG:" + target.code : target.wkt2, target.name, operation.pipeline,
-                   target.unit};
+    const WayToSystem way = find_way(own, request.system, rough_ground(info, source_map), spec.ellipsoid);
+    spec.system = way.system;
+    if (!way.is_projected) {
+      throw Error(ErrorCode::kInvalidArgument,
+                  fmt::format("\"{}\" counts degrees and is no map; `projection` none leaves degrees as they are",
+                              spec.system.name));
+    }
     spec.map = understand_way(spec.system, spec.ellipsoid);
-    if (operation.is_ballpark != 0) {
+    if (way.is_ballpark) {
       request.system_note = fmt::format(
           "{}: PROJ knows no way from its datum to that of \"{}\": they are taken for one, which may be off by some "
           "hundred metres",
-          info.path, target.name);
+          info.path, spec.system.name);
     }
   } catch (const Error& error) {
     throw Error(error.code(), fmt::format("{}: `projection`: {}", info.path, error.what()));

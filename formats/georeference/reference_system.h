@@ -48,6 +48,19 @@ class UnderstoodSystem : public ReferenceMap {
 [[nodiscard]] std::shared_ptr<const ReferenceMap> understand_map(const std::string& text,
                                                                  std::optional<double> metres_per_unit);
 
+/// A way from the longitudes and latitudes of one reference system to the coordinates of another.
+struct WayToSystem {
+  MappedSystem system;
+  bool is_projected = true;                 ///< else coordinates are longitudes and latitudes of the other system
+  std::shared_ptr<const ReferenceMap> map;  ///< in units of the system
+  bool is_ballpark = false;                 ///< PROJ knows no relation of the datums: they are taken for one
+};
+
+/// PROJ's best way over a ground, without grids that are missing. `from` is a system whose datum alone matters; where it
+/// says nothing, WGS 84. Throws Error{kUnsupported}, in one line, as understand_system, and where there is no way.
+[[nodiscard]] WayToSystem find_way(const ReferenceSystem& from, const std::string& to, const GeoExtent& ground,
+                                   const Ellipsoid& ellipsoid);
+
 /// The map of an archive that lies on a reference system, metres, `ellipsoid` being that of its longitudes and
 /// latitudes. Throws Error{kUnsupported} where the module or a grid is missing.
 [[nodiscard]] std::shared_ptr<const ReferenceMap> understand_way(const MappedSystem& system,

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <numeric>
 #include <optional>
@@ -12,6 +13,7 @@
 #include <utility>
 
 #include "isohf/error.h"
+#include "isohf/projection/projected_extent.h"
 
 namespace isohf {
 namespace {
@@ -36,8 +38,8 @@ bool is_same_resolution(const Spacing& a, const Spacing& b) {
   return std::abs(a.first / b.first - 1.0) <= kSameResolution && std::abs(a.second / b.second - 1.0) <= kSameResolution;
 }
 
-/// By resolution, finest columns first; independent of the members' order.
-std::vector<Resolution> by_resolution(std::vector<PlacedMember> members) {
+/// Of members in one reference system, finest columns first; independent of the members' order.
+std::vector<Resolution> of_one_system(std::vector<PlacedMember> members) {
   std::map<Spacing, std::int64_t> counts;
   for (const PlacedMember& placed : members) ++counts[{placed.spacing_x, placed.spacing_y}];
   std::vector<Resolution> found;
@@ -58,6 +60,21 @@ std::vector<Resolution> by_resolution(std::vector<PlacedMember> members) {
   }
   for (PlacedMember& placed : members) {
     found[where[{placed.spacing_x, placed.spacing_y}]].members.push_back(std::move(placed));
+  }
+  return found;
+}
+
+/// By reference system, then by resolution.
+std::vector<Resolution> by_resolution(std::vector<PlacedMember> members) {
+  std::vector<Resolution> found;
+  while (!members.empty()) {
+    const auto other =
+        std::stable_partition(members.begin(), members.end(),
+                              [way = members.front().way](const PlacedMember& placed) { return placed.way == way; });
+    std::vector<PlacedMember> others(std::make_move_iterator(other), std::make_move_iterator(members.end()));
+    members.erase(other, members.end());
+    for (Resolution& resolution : of_one_system(std::move(members))) found.push_back(std::move(resolution));
+    members = std::move(others);
   }
   return found;
 }
@@ -88,6 +105,7 @@ Snapped snap(double distance, double spacing, double own_spacing, std::int64_t s
 MosaicLayer lay_out(Resolution resolution, double& worst) {
   MosaicLayer layer;
   std::tie(layer.spacing_x, layer.spacing_y) = resolution.spacing;
+  layer.way = resolution.members.front().way;
   const std::vector<PlacedMember>& placed = resolution.members;
   const auto west = [](const PlacedMember& a, const PlacedMember& b) { return a.origin_x < b.origin_x; };
   const auto south = [](const PlacedMember& a, const PlacedMember& b) { return a.origin_y < b.origin_y; };
@@ -132,6 +150,63 @@ std::pair<std::int64_t, std::int64_t> covered(double offset, double ratio, std::
                                               double reach) {
   return whole_numbers(offset + (static_cast<double>(first) - reach) * ratio,
                        offset + (static_cast<double>(last) + reach) * ratio);
+}
+
+/// The rectangle of the mosaic's coordinates that samples of a layer of another system stand for.
+MapBounds bounds_of(const MosaicLayer& layer, const SampleRectangle& samples, double reach) {
+  constexpr int kSteps = 32;
+  const double west = layer.origin_x + (static_cast<double>(samples.column) - reach) * layer.spacing_x;
+  const double north = layer.origin_y - (static_cast<double>(samples.row) - reach) * layer.spacing_y;
+  const MapBounds own{west, north - (static_cast<double>(samples.rows - 1) + 2.0 * reach) * layer.spacing_y,
+                      west + (static_cast<double>(samples.columns - 1) + 2.0 * reach) * layer.spacing_x, north};
+  const MapBounds image = image_bounds(
+      own, [&](const MapPoint& at) { return layer.way->mosaic_from_members(at); }, kSteps);
+  if (std::isfinite(image.west)) return image;
+  throw Error(ErrorCode::kInvalidArgument, layer.members.front().path +
+                                               ": the map on which files are joined has no place for it; `projection` "
+                                               "names another, or leave it out");
+}
+
+/// How far apart a layer's samples are in the mosaic's coordinates, in the middle.
+void measure(MosaicLayer& layer) {
+  layer.size_x = layer.spacing_x;
+  layer.size_y = layer.spacing_y;
+  if (!layer.way) return;
+  const MapPoint middle{layer.origin_x + static_cast<double>(layer.width - 1) / 2.0 * layer.spacing_x,
+                        layer.origin_y - static_cast<double>(layer.height - 1) / 2.0 * layer.spacing_y};
+  const auto apart = [&](double x, double y) {
+    const MapPoint a = layer.way->mosaic_from_members({middle.easting - x / 2.0, middle.northing - y / 2.0});
+    const MapPoint b = layer.way->mosaic_from_members({middle.easting + x / 2.0, middle.northing + y / 2.0});
+    return std::hypot(b.easting - a.easting, b.northing - a.northing);
+  };
+  layer.size_x = apart(layer.spacing_x, 0.0);
+  layer.size_y = apart(0.0, layer.spacing_y);
+}
+
+/// A grid for layers of which none is in the mosaic's system, or none as fine as others: spacings of three digits, samples on
+/// whole multiples of them.
+void make_grid(const std::vector<MosaicLayer>& layers, Georeference& place) {
+  const auto round_down = [](double spacing) {
+    const double grain = std::pow(10.0, std::floor(std::log10(spacing)) - 2.0);
+    return std::round(spacing / grain) * grain;
+  };
+  double finest = HUGE_VAL;
+  MapBounds all{HUGE_VAL, HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
+  const double reach = place.registration == Registration::kArea ? 0.5 : 0.0;
+  for (const MosaicLayer& layer : layers) {
+    finest = std::min({finest, layer.size_x, layer.size_y});
+    const MapBounds bounds =
+        layer.way ? bounds_of(layer, {0, 0, layer.width, layer.height}, reach)
+                  : MapBounds{layer.origin_x - reach * layer.spacing_x,
+                              layer.origin_y - (static_cast<double>(layer.height - 1) + reach) * layer.spacing_y,
+                              layer.origin_x + (static_cast<double>(layer.width - 1) + reach) * layer.spacing_x,
+                              layer.origin_y + reach * layer.spacing_y};
+    all = {std::min(all.west, bounds.west), std::min(all.south, bounds.south), std::max(all.east, bounds.east),
+           std::max(all.north, bounds.north)};
+  }
+  place.spacing_x = place.spacing_y = round_down(finest);
+  place.origin_x = (std::floor(all.west / place.spacing_x) + reach) * place.spacing_x;
+  place.origin_y = (std::ceil(all.north / place.spacing_y) - reach) * place.spacing_y;
 }
 
 struct Extent {
@@ -303,6 +378,15 @@ std::int64_t uncovered(const MosaicPlan& plan, std::optional<SampleRectangle>& f
 
 }  // namespace
 
+MapPoint MosaicWay::members_from_mosaic(MapPoint place) const {
+  const GeoPoint geo = mosaic->geo_from_map(place);
+  return members ? members->map_from_geo(geo) : MapPoint{geo.longitude, geo.latitude};
+}
+
+MapPoint MosaicWay::mosaic_from_members(MapPoint place) const {
+  return mosaic->map_from_geo(members ? members->geo_from_map(place) : GeoPoint{place.easting, place.northing});
+}
+
 void join_antimeridian(std::vector<PlacedMember>& members) {
   constexpr double kTurn = 360.0;
   const auto end_of = [](const PlacedMember& placed) {
@@ -342,6 +426,7 @@ void place_members(std::vector<PlacedMember> members, MosaicPlan& plan) {
   double worst = 0.0;
   for (Resolution& resolution : by_resolution(std::move(members))) {
     plan.layers.push_back(lay_out(std::move(resolution), worst));
+    measure(plan.layers.back());
   }
   if (worst > kWorthAWord) {
     plan.info.warnings.push_back(fmt::format(
@@ -349,26 +434,48 @@ void place_members(std::vector<PlacedMember> members, MosaicPlan& plan) {
         worst));
   }
   // Coarsest first; of two of one area, the one with the wider columns.
-  std::sort(plan.layers.begin(), plan.layers.end(), [](const MosaicLayer& a, const MosaicLayer& b) {
-    const double area_a = a.spacing_x * a.spacing_y;
-    const double area_b = b.spacing_x * b.spacing_y;
-    return area_a != area_b ? area_a > area_b : a.spacing_x > b.spacing_x;
+  std::stable_sort(plan.layers.begin(), plan.layers.end(), [](const MosaicLayer& a, const MosaicLayer& b) {
+    const double area_a = a.size_x * a.size_y;
+    const double area_b = b.size_x * b.size_y;
+    return area_a != area_b ? area_a > area_b : a.size_x > b.size_x;
   });
-  const auto finer_x = [](const MosaicLayer& a, const MosaicLayer& b) { return a.spacing_x < b.spacing_x; };
-  const auto finer_y = [](const MosaicLayer& a, const MosaicLayer& b) { return a.spacing_y < b.spacing_y; };
-  // The last of equally fine layers: the finest in the other direction as well, the one that is on the grid.
-  const auto x_from = std::min_element(plan.layers.rbegin(), plan.layers.rend(), finer_x);
-  const auto y_from = std::min_element(plan.layers.rbegin(), plan.layers.rend(), finer_y);
   Georeference& place = plan.info.georeference;
-  place.spacing_x = x_from->spacing_x;
-  place.spacing_y = y_from->spacing_y;
-  place.origin_x = x_from->origin_x;
-  place.origin_y = y_from->origin_y;
   const double reach = place.registration == Registration::kArea ? 0.5 : 0.0;
-  Extent columns{0, x_from->width - 1};
-  Extent rows{0, y_from->height - 1};
+  // The finest of the mosaic's own system; of equally fine layers the last, the finest in the other direction as well.
+  const MosaicLayer* x_from = nullptr;
+  const MosaicLayer* y_from = nullptr;
+  double finest = HUGE_VAL;
+  for (auto layer = plan.layers.rbegin(); layer != plan.layers.rend(); ++layer) {
+    finest = std::min({finest, layer->size_x, layer->size_y});
+    if (layer->way) continue;
+    if (x_from == nullptr || layer->spacing_x < x_from->spacing_x) x_from = &*layer;
+    if (y_from == nullptr || layer->spacing_y < y_from->spacing_y) y_from = &*layer;
+  }
+  // Maps of neighbouring zones differ in scale.
+  constexpr double kAboutAsFine = 1.05;
+  const bool has_grid = x_from != nullptr && std::min(x_from->spacing_x, y_from->spacing_y) <= kAboutAsFine * finest;
+  Extent columns{0, 0};
+  Extent rows{0, 0};
+  if (has_grid) {
+    place.spacing_x = x_from->spacing_x;
+    place.spacing_y = y_from->spacing_y;
+    place.origin_x = x_from->origin_x;
+    place.origin_y = y_from->origin_y;
+    columns.last = x_from->width - 1;
+    rows.last = y_from->height - 1;
+  } else {
+    make_grid(plan.layers, place);
+  }
   for (const MosaicLayer& layer : plan.layers) {
     if (plan.is_on_grid(layer)) continue;
+    if (layer.way) {
+      const MapBounds bounds = bounds_of(layer, {0, 0, layer.width, layer.height}, reach);
+      columns.include(whole_numbers((bounds.west - place.origin_x) / place.spacing_x,
+                                    (bounds.east - place.origin_x) / place.spacing_x));
+      rows.include(whole_numbers((place.origin_y - bounds.north) / place.spacing_y,
+                                 (place.origin_y - bounds.south) / place.spacing_y));
+      continue;
+    }
     columns.include(covered((layer.origin_x - place.origin_x) / place.spacing_x, layer.spacing_x / place.spacing_x, 0,
                             layer.width - 1, reach));
     rows.include(covered((place.origin_y - layer.origin_y) / place.spacing_y, layer.spacing_y / place.spacing_y, 0,
@@ -376,6 +483,11 @@ void place_members(std::vector<PlacedMember> members, MosaicPlan& plan) {
   }
   plan.info.width = columns.last - columns.first + 1;
   plan.info.height = rows.last - rows.first + 1;
+  if (!(static_cast<double>(plan.info.width) < kMostSamples && static_cast<double>(plan.info.height) < kMostSamples)) {
+    throw Error(ErrorCode::kInvalidArgument,
+                fmt::format("{} files make a mosaic of {} x {} samples; are their georeferences right?",
+                            plan.layers.size(), plan.info.width, plan.info.height));
+  }
   // Not touched where the finest members reach as far as any: the whole has the very origin of its pieces then.
   if (columns.first != 0) place.origin_x += static_cast<double>(columns.first) * place.spacing_x;
   if (rows.first != 0) place.origin_y -= static_cast<double>(rows.first) * place.spacing_y;
@@ -395,6 +507,17 @@ void place_members(std::vector<PlacedMember> members, MosaicPlan& plan) {
 SampleRectangle ground_of(const MosaicPlan& plan, const MosaicLayer& layer, const MosaicMember& member, double reach) {
   if (plan.is_on_grid(layer)) return {member.column, member.row, member.width, member.height};
   const Georeference& place = plan.info.georeference;
+  if (layer.way) {
+    const MapBounds bounds = bounds_of(layer, {member.column, member.row, member.width, member.height}, reach);
+    const auto columns = whole_numbers((bounds.west - place.origin_x) / place.spacing_x,
+                                       (bounds.east - place.origin_x) / place.spacing_x);
+    const auto rows = whole_numbers((place.origin_y - bounds.north) / place.spacing_y,
+                                    (place.origin_y - bounds.south) / place.spacing_y);
+    const std::int64_t column = std::max<std::int64_t>(columns.first, 0);
+    const std::int64_t row = std::max<std::int64_t>(rows.first, 0);
+    return {column, row, std::max<std::int64_t>(std::min(columns.second, plan.info.width - 1) - column + 1, 0),
+            std::max<std::int64_t>(std::min(rows.second, plan.info.height - 1) - row + 1, 0)};
+  }
   auto [west, east] = covered((layer.origin_x - place.origin_x) / place.spacing_x, layer.spacing_x / place.spacing_x,
                               member.column, member.column + member.width - 1, reach);
   auto [north, south] = covered((place.origin_y - layer.origin_y) / place.spacing_y, layer.spacing_y / place.spacing_y,

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -8,6 +9,7 @@
 #include "formats/decorate/cropped_source.h"
 #include "formats/files/file_stamp.h"
 #include "formats/mosaic/mosaic_samples.h"
+#include "isohf/projection/reference_map.h"
 #include "isohf/raster.h"
 
 namespace isohf {
@@ -28,16 +30,28 @@ struct MosaicMember {
   FileStamp stamp;         ///< of the file when it was opened first
 };
 
-/// Members of one resolution on one grid.
+/// Where places of the mosaic lie in another reference system, that of some members.
+struct MosaicWay {
+  std::shared_ptr<const ReferenceMap> mosaic;   ///< the mosaic's coordinates <-> degrees on the members' datum
+  std::shared_ptr<const ReferenceMap> members;  ///< the members' coordinates <-> the same; nullptr: they are these
+
+  [[nodiscard]] MapPoint members_from_mosaic(MapPoint place) const;
+  [[nodiscard]] MapPoint mosaic_from_members(MapPoint place) const;
+};
+
+/// Members of one resolution, in one reference system, on one grid.
 struct MosaicLayer {
-  double spacing_x = 1.0;  ///< units of the mosaic's coordinates
+  double spacing_x = 1.0;  ///< units of the mosaic's coordinates, or of the members' where there is a way
   double spacing_y = 1.0;
   double origin_x = 0.0;  ///< of sample (0, 0)
   double origin_y = 0.0;
   std::int64_t width = 0;
   std::int64_t height = 0;
-  std::vector<MosaicMember> members;  ///< by row, then column, then order
-  std::int64_t tallest = 0;           ///< height of the highest member
+  std::vector<MosaicMember> members;     ///< by row, then column, then order
+  std::int64_t tallest = 0;              ///< height of the highest member
+  std::shared_ptr<const MosaicWay> way;  ///< nullptr: the members are in the mosaic's reference system
+  double size_x = 1.0;                   ///< the spacings in units of the mosaic's coordinates
+  double size_y = 1.0;
 };
 
 /// Ground of a mosaic that no member covers.
@@ -65,9 +79,11 @@ struct MosaicPlan {
   std::int64_t block_height = 1;   ///< the members' largest
   std::uint64_t reader_bytes = 0;  ///< that a member's reader keeps at most
   int readers_at_once = 1;         ///< as many threads read, each a member of its own
+  bool is_reprojected = false;     ///< some members are brought to the mosaic's reference system
 
   [[nodiscard]] bool is_on_grid(const MosaicLayer& layer) const {
-    return layer.spacing_x == info.georeference.spacing_x && layer.spacing_y == info.georeference.spacing_y;
+    return !layer.way && layer.spacing_x == info.georeference.spacing_x &&
+           layer.spacing_y == info.georeference.spacing_y;
   }
 };
 
@@ -78,6 +94,7 @@ struct PlacedMember {
   double origin_y = 0.0;
   double spacing_x = 1.0;
   double spacing_y = 1.0;
+  std::shared_ptr<const MosaicWay> way;  ///< nullptr: in the mosaic's reference system
 };
 
 /// A rectangle of the mosaic's samples.
@@ -111,7 +128,10 @@ void place_members(std::vector<PlacedMember> members, MosaicPlan& plan);
 /// Throws Error naming the file at fault: as open_raster does; kInvalidArgument for a file that is named twice, does
 /// not say where it lies, lies off the grid of others of its resolution by more than kSnapTolerance, or disagrees.
 /// box: the part that will be read; holes elsewhere do not matter.
+/// onto: the map on which files of different reference systems are joined, by bilinear interpolation; those that are in
+/// it already keep their samples, and give the grid where none is finer. Where all are in one system it is left alone.
 [[nodiscard]] MosaicPlan plan_mosaic(const std::vector<std::string>& paths, const OpenOptions& options,
-                                     const std::optional<BoundingBox>& box = std::nullopt);
+                                     const std::optional<BoundingBox>& box = std::nullopt,
+                                     const ProjectionRequest& onto = {});
 
 }  // namespace isohf

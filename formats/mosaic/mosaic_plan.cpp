@@ -15,6 +15,8 @@
 #include "formats/georeference/reference_system.h"
 #include "formats/mosaic/reader_pool.h"
 #include "isohf/error.h"
+#include "isohf/projection/choose_projection.h"
+#include "isohf/projection/projection_wkt.h"
 #include "isohf/raster.h"
 
 namespace isohf {
@@ -104,6 +106,11 @@ class Agreement {
   std::string wanted_;
 };
 
+void agree_on_heights(ReferenceSystem& ours, const ReferenceSystem& other, Agreement& agreement) {
+  agreement.same(ours.body, other.body, "body");
+  agreement.same(ours.vertical_epsg, other.vertical_epsg, "vertical EPSG code");
+}
+
 void agree_on_system(ReferenceSystem& ours, const ReferenceSystem& other, Agreement& agreement) {
   // Of two texts, or a text and a code, PROJ tells whether they are one system.
   const bool by_code = ours.epsg && other.epsg;
@@ -115,10 +122,8 @@ void agree_on_system(ReferenceSystem& ours, const ReferenceSystem& other, Agreem
     return;
   }
   agreement.same(ours.epsg, other.epsg, "EPSG code");
-  agreement.same(ours.body, other.body, "body");
   agreement.same_length(ours.semi_major_axis_m, other.semi_major_axis_m, "semi-major axis");
   agreement.same_length(ours.inverse_flattening, other.inverse_flattening, "inverse flattening");
-  agreement.same(ours.vertical_epsg, other.vertical_epsg, "vertical EPSG code");
   // Codes say all; texts are compared where there are none. Names of one system differ from program to program.
   if (by_code) return;
   const bool by_text = !ours.wkt.empty() && !other.wkt.empty();
@@ -129,7 +134,12 @@ void agree_on_system(ReferenceSystem& ours, const ReferenceSystem& other, Agreem
 /// Collects what the files say, one after the other.
 class Survey {
  public:
-  explicit Survey(MosaicPlan& plan) : plan_(&plan) {}
+  /// joins: files in different reference systems may stand beside each other.
+  Survey(MosaicPlan& plan, bool joins) : plan_(&plan), joins_(joins) {}
+
+  /// What the files' coordinates are in: of each reference system once, and which is whose.
+  [[nodiscard]] const std::vector<Georeference>& systems() const { return systems_; }
+  [[nodiscard]] const std::vector<std::size_t>& system_of() const { return system_of_; }
 
   void add(const std::string& path, SourceInfo info, const FileStamp& stamp) {
     Georeference& place = info.georeference;
@@ -202,6 +212,36 @@ class Survey {
     whole.vertical_unit = info.vertical_unit;
     whole.metres_per_vertical_unit = info.metres_per_vertical_unit;
     whole.georeference = info.georeference;
+    systems_.push_back(info.georeference);
+    system_of_.push_back(0);
+  }
+
+  /// Finds the system of a file among those of the ones before; a new one where they may differ.
+  void find_system(const std::string& path, const Georeference& place) {
+    std::string why;
+    for (std::size_t i = 0; i < systems_.size(); ++i) {
+      Georeference& ours = systems_[i];
+      if (place.unit == ours.unit && place.metres_per_unit == ours.metres_per_unit) {
+        Agreement agreement;
+        agree_on_system(ours.system, place.system, agreement);
+        if (agreement.holds()) return system_of_.push_back(i);
+        if (why.empty()) why = agreement.why(first_);
+      } else if (why.empty()) {
+        why = fmt::format("its coordinates are in {}, those of {} in {}", unit_name(place), first_, unit_name(ours));
+      }
+    }
+    const auto is_known = [](const Georeference& each) {
+      return each.unit == HorizontalUnit::kDegree ||
+             (each.unit == HorizontalUnit::kMetre && !system_text(each.system).empty());
+    };
+    if (!is_known(place) || !is_known(systems_.front())) {
+      refuse(path, why +
+                       "; not both of the reference systems are known, so that they cannot be joined: `crs` says "
+                       "what all are in, or leave it out");
+    }
+    if (!joins_) refuse(path, why + "; `projection` joins them on one map (auto, EPSG:n, ...), or leave it out");
+    systems_.push_back(place);
+    system_of_.push_back(systems_.size() - 1);
   }
 
   void compare(const std::string& path, const SourceInfo& info) {
@@ -209,18 +249,15 @@ class Survey {
     if (whole.format != info.format) whole.format = "mosaic";
     const Georeference& place = info.georeference;
     const Georeference& ours = whole.georeference;
-    if (place.unit != ours.unit || place.metres_per_unit != ours.metres_per_unit) {
-      refuse(path, fmt::format("its coordinates are in {}, those of {} in {}; reproject one of them (gdalwarp -t_srs)",
-                               unit_name(place), first_, unit_name(ours)));
-    }
     if (place.registration != ours.registration) {
       refuse(path, fmt::format("its samples stand for {}, those of {} for {}; `registration` says what holds for all",
                                words(place.registration), first_, words(ours.registration)));
     }
+    find_system(path, place);
     Agreement agreement;
-    agree_on_system(whole.georeference.system, place.system, agreement);
+    agree_on_heights(whole.georeference.system, place.system, agreement);
     if (!agreement.holds()) {
-      refuse(path, agreement.why(first_) + "; reproject one of them (gdalwarp -t_srs) or leave it out");
+      refuse(path, agreement.why(first_) + "; bring one of them to the other's (gdalwarp) or leave it out");
     }
     if (!info.vertical_unit.empty()) {
       if (whole.vertical_unit.empty()) {
@@ -253,14 +290,115 @@ class Survey {
   }
 
   MosaicPlan* plan_;
+  bool joins_;
+  std::vector<Georeference> systems_;
+  std::vector<std::size_t> system_of_;
   std::string first_;
   std::vector<PlacedMember> placed_;
   std::vector<FileWarning> warnings_;
   std::int64_t silent_ = 0;
 };
 
+/// What the files of a mosaic are brought to, where they are in different reference systems.
+class Joining {
+ public:
+  Joining(const std::vector<Georeference>& systems, const std::vector<PlacedMember>& members,
+          const std::vector<std::size_t>& system_of)
+      : systems_(systems), grounds_(systems.size()), maps_(systems.size()) {
+    std::vector<MapBounds> bounds(systems.size(), MapBounds{HUGE_VAL, HUGE_VAL, -HUGE_VAL, -HUGE_VAL});
+    for (std::size_t i = 0; i < members.size(); ++i) {
+      const PlacedMember& placed = members[i];
+      MapBounds& all = bounds[system_of[i]];
+      all.west = std::min(all.west, placed.origin_x);
+      all.north = std::max(all.north, placed.origin_y);
+      all.east = std::max(all.east, placed.origin_x + static_cast<double>(placed.member.width) * placed.spacing_x);
+      all.south = std::min(all.south, placed.origin_y - static_cast<double>(placed.member.height) * placed.spacing_y);
+    }
+    for (std::size_t i = 0; i < systems.size(); ++i) {
+      grounds_[i] = {bounds[i].west, bounds[i].south, bounds[i].east, bounds[i].north};
+      if (systems[i].unit == HorizontalUnit::kDegree) continue;
+      maps_[i] = understand_map(system_text(systems[i].system), systems[i].metres_per_unit);
+      if (const auto ground = ground_under(*maps_[i], bounds[i])) grounds_[i] = ground->extent;
+    }
+  }
+
+  /// What the request comes to for all of the ground: a code or WKT.
+  [[nodiscard]] std::string target(const ProjectionRequest& onto) const {
+    if (onto.kind == ProjectionKind::kSystem) return onto.system;
+    GeoExtent all = grounds_.front();
+    for (const GeoExtent& ground : grounds_) {
+      const double turn = 360.0 * std::round((all.middle().longitude - ground.middle().longitude) / 360.0);
+      all.west = std::min(all.west, ground.west + turn);
+      all.east = std::max(all.east, ground.east + turn);
+      all.south = std::min(all.south, ground.south);
+      all.north = std::max(all.north, ground.north);
+    }
+    const Georeference& first = systems_.front();
+    const ProjectionSpec spec =
+        choose_projection(onto, {"mosaic", first.system.body, ellipsoid(0), all, false, false, false}).spec;
+    constexpr int kWgs84 = 4326;
+    const auto code = projection_epsg(spec, kWgs84);
+    return code ? fmt::format("EPSG:{}", *code) : projection_wkt(spec, "");
+  }
+
+  /// Has the whole lie in the system `target`, and says how the members of each system come there.
+  [[nodiscard]] std::vector<std::shared_ptr<const MosaicWay>> ways_to(const std::string& target,
+                                                                      SourceInfo& whole) const {
+    std::vector<std::shared_ptr<const MosaicWay>> ways(systems_.size());
+    SourceInfo there;
+    take_system(target, there);
+    Georeference& place = whole.georeference;
+    for (std::size_t i = 0; i < systems_.size(); ++i) {
+      if (systems_[i].unit == there.georeference.unit &&
+          systems_[i].metres_per_unit == there.georeference.metres_per_unit &&
+          are_same(systems_[i].system, there.georeference.system) == true) {
+        continue;
+      }
+      GeoExtent ground = grounds_[i];
+      if (ground.east - ground.west < 360.0) {
+        ground.west = std::remainder(ground.west, 360.0);
+        ground.east = std::remainder(ground.east, 360.0);
+      }
+      WayToSystem way = find_way(systems_[i].system, target, ground, ellipsoid(i));
+      if (way.is_ballpark) {
+        whole.warnings.push_back(
+            fmt::format("PROJ knows no way from the datum of {} to that of \"{}\": they are taken for one, which may "
+                        "be off by some "
+                        "hundred metres",
+                        name_of(systems_[i]), way.system.name));
+      }
+      ways[i] = std::make_shared<MosaicWay>(MosaicWay{std::move(way.map), maps_[i]});
+    }
+    const std::string datum = place.system.vertical_datum;
+    const std::optional<int> code = place.system.vertical_epsg;
+    place.unit = there.georeference.unit;
+    place.metres_per_unit = there.georeference.metres_per_unit;
+    place.system = there.georeference.system;
+    place.system.vertical_datum = datum;
+    place.system.vertical_epsg = code;
+    return ways;
+  }
+
+ private:
+  [[nodiscard]] Ellipsoid ellipsoid(std::size_t i) const {
+    if (maps_[i]) return maps_[i]->ellipsoid();
+    const ReferenceSystem& system = systems_[i].system;
+    if (!system.semi_major_axis_m) return {};
+    return {*system.semi_major_axis_m, system.inverse_flattening.value_or(0.0)};
+  }
+  static std::string name_of(const Georeference& place) {
+    if (place.system.epsg) return fmt::format("EPSG:{}", *place.system.epsg);
+    return place.system.name.empty() ? unit_name(place) : "\"" + place.system.name + "\"";
+  }
+
+  const std::vector<Georeference>& systems_;
+  std::vector<GeoExtent> grounds_;
+  std::vector<std::shared_ptr<const ReferenceMap>> maps_;  ///< nullptr: degrees
+};
+
 /// What the files say, read in parallel, taken up in their order: the first error is that of the first file at fault.
-std::vector<PlacedMember> survey(const std::vector<std::string>& paths, const OpenOptions& options, MosaicPlan& plan) {
+std::vector<PlacedMember> survey(const std::vector<std::string>& paths, const OpenOptions& options,
+                                 const ProjectionRequest& onto, MosaicPlan& plan) {
   struct Opened {
     SourceInfo info;
     FileStamp stamp;
@@ -270,7 +408,7 @@ std::vector<PlacedMember> survey(const std::vector<std::string>& paths, const Op
   plan.readers_at_once = oneapi::tbb::this_task_arena::max_concurrency();
   OpenOptions share = options;
   share.unpacked_bytes /= static_cast<std::uint64_t>(plan.readers_at_once);
-  Survey found(plan);
+  Survey found(plan, onto.is_given && (onto.is_auto || onto.kind != ProjectionKind::kNone));
   const std::size_t at_once = std::min(kOpenedAtOnce, most_open_rasters());
   for (std::size_t from = 0; from < paths.size(); from += at_once) {
     std::vector<Opened> opened(std::min(at_once, paths.size() - from));
@@ -290,24 +428,30 @@ std::vector<PlacedMember> survey(const std::vector<std::string>& paths, const Op
       found.add(paths[from + i], std::move(opened[i].info), opened[i].stamp);
     }
   }
-  return found.finish();
+  std::vector<PlacedMember> members = found.finish();
+  if (found.systems().size() == 1) return members;
+  const Joining joining(found.systems(), members, found.system_of());
+  const auto ways = joining.ways_to(joining.target(onto), plan.info);
+  for (std::size_t i = 0; i < members.size(); ++i) members[i].way = ways[found.system_of()[i]];
+  plan.is_reprojected = true;
+  return members;
 }
 
 }  // namespace
 
 MosaicPlan plan_mosaic(const std::vector<std::string>& paths, const OpenOptions& options,
-                       const std::optional<BoundingBox>& box) {
+                       const std::optional<BoundingBox>& box, const ProjectionRequest& onto) {
   if (paths.empty()) throw Error(ErrorCode::kInvalidArgument, "a mosaic of no files");
   refuse_duplicates(paths);
   MosaicPlan plan;
-  std::vector<PlacedMember> members = survey(paths, options, plan);
-  if (plan.info.georeference.unit == HorizontalUnit::kDegree) join_antimeridian(members);
+  std::vector<PlacedMember> members = survey(paths, options, onto, plan);
+  if (plan.info.georeference.unit == HorizontalUnit::kDegree && !plan.is_reprojected) join_antimeridian(members);
   place_members(std::move(members), plan);
   plan.info.path = fmt::format("mosaic of {} files", paths.size());
   plan.region = box ? samples_in(*box, plan.info) : Window{0, 0, plan.info.width, plan.info.height};
   plan.holes = find_holes(plan);
   const bool interpolated = plan.layers.size() > 1 || !plan.is_on_grid(plan.layers.front());
-  plan.samples = choose_mosaic_samples(plan.kinds, plan.holes.samples > 0, interpolated);
+  plan.samples = choose_mosaic_samples(plan.kinds, plan.holes.samples > 0 || plan.is_reprojected, interpolated);
   SourceInfo& info = plan.info;
   info.sample_type = plan.samples.kind.type;
   info.void_values = plan.samples.kind.void_values;

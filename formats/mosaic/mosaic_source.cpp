@@ -126,6 +126,116 @@ double interpolate_at(const Numbers& numbers, const Between& x, const Between& y
   return area && weights > 0.0 ? sum / weights : kVoid;
 }
 
+/// Samples of the mosaic between two places that are computed: on a side of a cell, whose corners lie on multiples of it.
+constexpr std::int64_t kCell = 16;
+/// Where the middles of a cell's sides lie farther, in samples, from where its corners say, all its samples are computed.
+constexpr double kStraight = 0.005;
+/// Places are rounded to this, which hides last bits of libraries.
+constexpr double kPlaceGrain = 4096.0;
+
+/// Where a block of the mosaic's samples lies among those of a layer in another reference system.
+class LayerPlaces {
+ public:
+  LayerPlaces(const MosaicLayer& layer, const Georeference& mosaic, const Window& block)
+      : layer_(layer), mosaic_(mosaic), block_(block), places_(static_cast<std::size_t>(block.columns * block.rows)) {
+    const std::int64_t first_x = block.column / kCell;
+    const std::int64_t first_y = block.row / kCell;
+    const std::int64_t across = (block.column + block.columns - 1) / kCell - first_x + 1;
+    const std::int64_t down = (block.row + block.rows - 1) / kCell - first_y + 1;
+    // Corners of cells and middles of their sides: every half cell but the middles of cells.
+    const std::int64_t stride = 2 * across + 1;
+    std::vector<MapPoint> nodes(static_cast<std::size_t>(stride * (2 * down + 1)));
+    oneapi::tbb::parallel_for(std::int64_t{0}, 2 * down + 1, [&](std::int64_t j) {
+      for (std::int64_t i = 0; i < stride; ++i) {
+        if (i % 2 == 1 && j % 2 == 1) continue;
+        nodes[static_cast<std::size_t>(j * stride + i)] =
+            exact(first_x * kCell + i * (kCell / 2), first_y * kCell + j * (kCell / 2));
+      }
+    });
+    oneapi::tbb::parallel_for(std::int64_t{0}, across * down, [&](std::int64_t cell) {
+      const std::int64_t i = cell % across;
+      const std::int64_t j = cell / across;
+      fill((first_x + i) * kCell, (first_y + j) * kCell, nodes.data() + 2 * j * stride + 2 * i, stride);
+    });
+  }
+
+  [[nodiscard]] const MapPoint& at(std::int64_t column, std::int64_t row) const {
+    return places_[static_cast<std::size_t>((row - block_.row) * block_.columns + column - block_.column)];
+  }
+  /// The layer's samples that interpolating needs; empty where it has none there.
+  [[nodiscard]] Window needed() const {
+    double west = HUGE_VAL;
+    double east = -HUGE_VAL;
+    double north = HUGE_VAL;
+    double south = -HUGE_VAL;
+    for (const MapPoint& place : places_) {
+      west = std::fmin(west, place.easting);
+      east = std::fmax(east, place.easting);
+      north = std::fmin(north, place.northing);
+      south = std::fmax(south, place.northing);
+    }
+    const auto width = static_cast<double>(layer_.width);
+    const auto height = static_cast<double>(layer_.height);
+    if (!(west < width && east > -1.0 && north < height && south > -1.0)) return {};
+    Window window;
+    window.column = static_cast<std::int64_t>(std::clamp(std::floor(west), 0.0, width - 1.0));
+    window.row = static_cast<std::int64_t>(std::clamp(std::floor(north), 0.0, height - 1.0));
+    window.columns =
+        static_cast<std::int64_t>(std::clamp(std::floor(east) + 1.0, 0.0, width - 1.0)) - window.column + 1;
+    window.rows = static_cast<std::int64_t>(std::clamp(std::floor(south) + 1.0, 0.0, height - 1.0)) - window.row + 1;
+    return window;
+  }
+
+ private:
+  [[nodiscard]] MapPoint exact(std::int64_t column, std::int64_t row) const {
+    const MapPoint there =
+        layer_.way->members_from_mosaic({mosaic_.origin_x + static_cast<double>(column) * mosaic_.spacing_x,
+                                         mosaic_.origin_y - static_cast<double>(row) * mosaic_.spacing_y});
+    double columns = (there.easting - layer_.origin_x) / layer_.spacing_x;
+    if (!layer_.way->members) {  // degrees: on the turn nearest to the layer's middle
+      const double round = 360.0 / layer_.spacing_x;
+      const double middle = static_cast<double>(layer_.width - 1) / 2.0;
+      columns = middle + std::remainder(columns - middle, round);
+    }
+    return {columns, (layer_.origin_y - there.northing) / layer_.spacing_y};
+  }
+  static double apart(const MapPoint& a, const MapPoint& b, const MapPoint& middle) {
+    return std::hypot((a.easting + b.easting) / 2.0 - middle.easting,
+                      (a.northing + b.northing) / 2.0 - middle.northing);
+  }
+  void fill(std::int64_t column, std::int64_t row, const MapPoint* corner, std::int64_t stride) {
+    const MapPoint& a = corner[0];
+    const MapPoint& b = corner[2];
+    const MapPoint& c = corner[2 * stride];
+    const MapPoint& d = corner[2 * stride + 2];
+    const double bend = std::max(apart(a, b, corner[1]), apart(c, d, corner[2 * stride + 1])) +
+                        std::max(apart(a, c, corner[stride]), apart(b, d, corner[stride + 2]));
+    const bool is_straight = bend <= kStraight;  // not where one of them is no place
+    const std::int64_t end_column = std::min(column + kCell, block_.column + block_.columns);
+    const std::int64_t end_row = std::min(row + kCell, block_.row + block_.rows);
+    for (std::int64_t y = std::max(row, block_.row); y < end_row; ++y) {
+      for (std::int64_t x = std::max(column, block_.column); x < end_column; ++x) {
+        const double s = static_cast<double>(x - column) / kCell;
+        const double t = static_cast<double>(y - row) / kCell;
+        const auto blend = [&](double from_a, double from_b, double from_c, double from_d) {
+          return (1.0 - t) * ((1.0 - s) * from_a + s * from_b) + t * ((1.0 - s) * from_c + s * from_d);
+        };
+        const MapPoint place = is_straight ? MapPoint{blend(a.easting, b.easting, c.easting, d.easting),
+                                                      blend(a.northing, b.northing, c.northing, d.northing)}
+                                           : exact(x, y);
+        places_[static_cast<std::size_t>((y - block_.row) * block_.columns + x - block_.column)] = {
+            std::round(place.easting * kPlaceGrain) / kPlaceGrain,
+            std::round(place.northing * kPlaceGrain) / kPlaceGrain};
+      }
+    }
+  }
+
+  const MosaicLayer& layer_;
+  const Georeference& mosaic_;
+  Window block_;
+  std::vector<MapPoint> places_;  ///< columns and rows of the layer
+};
+
 std::int64_t overlap(std::int64_t& first, std::int64_t& begin, std::int64_t& count, std::int64_t samples,
                      std::int64_t window_first, std::int64_t window_count) {
   // first: the member's place in the layer; begin: of the part in the member.
@@ -258,9 +368,15 @@ void MosaicSource::compose(const Window& window, std::span<std::byte> out) {
   for (std::size_t layer = 0; layer < plan_.layers.size(); ++layer) {
     if (plan_.is_on_grid(plan_.layers[layer])) {
       draw(layer, window, out);
+    } else if (plan_.layers[layer].way) {
+      reproject(layer, false, window, out);
     } else {
       interpolate(layer, window, out);
     }
+  }
+  if (plan_.info.georeference.registration == Registration::kPoint) return;
+  for (std::size_t layer = plan_.layers.size(); layer-- > 0;) {
+    if (plan_.layers[layer].way) reproject(layer, true, window, out);
   }
 }
 
@@ -366,6 +482,63 @@ void MosaicSource::interpolate(std::size_t layer, const Window& window, std::spa
     std::vector<std::byte> samples(row_bytes);
     samples_from_numbers(plan_.info.sample_type, values, samples);
     lay_over(plan_.samples.kind, samples, out.subspan(static_cast<std::size_t>(row) * row_bytes, row_bytes));
+  });
+}
+
+/// outer: where nothing else is, outermost samples as far as their areas reach; else between samples alone, so that
+/// none is continued beside a layer that knows better.
+void MosaicSource::reproject(std::size_t layer, bool outer, const Window& window, std::span<std::byte> out) {
+  // Blocks as wide as high: what they need of a layer that lies askew is little more than they have themselves.
+  constexpr std::int64_t kBlock = 512;
+  for (std::int64_t row = window.row; row < window.row + window.rows; row += kBlock) {
+    for (std::int64_t column = window.column; column < window.column + window.columns; column += kBlock) {
+      const Window block{column, row, std::min(kBlock, window.column + window.columns - column),
+                         std::min(kBlock, window.row + window.rows - row)};
+      if (!outer || has_void(block, window, out)) reproject_block(layer, outer, block, window, out);
+    }
+  }
+}
+
+bool MosaicSource::has_void(const Window& block, const Window& window, std::span<const std::byte> out) const {
+  const std::size_t sample_bytes = size_bytes(plan_.info.sample_type);
+  std::vector<double> numbers(static_cast<std::size_t>(block.columns));
+  for (std::int64_t row = block.row; row < block.row + block.rows; ++row) {
+    const std::int64_t first = (row - window.row) * window.columns + block.column - window.column;
+    numbers_from_samples(plan_.samples.kind,
+                         out.subspan(static_cast<std::size_t>(first) * sample_bytes, numbers.size() * sample_bytes),
+                         numbers);
+    if (std::any_of(numbers.begin(), numbers.end(), [](double number) { return std::isnan(number); })) return true;
+  }
+  return false;
+}
+
+void MosaicSource::reproject_block(std::size_t layer, bool outer, const Window& block, const Window& window,
+                                   std::span<std::byte> out) {
+  const MosaicLayer& other = plan_.layers[layer];
+  const LayerPlaces places(other, plan_.info.georeference, block);
+  Numbers numbers;
+  numbers.window = places.needed();
+  if (numbers.window.columns <= 0 || numbers.window.rows <= 0) return;
+  std::vector<std::byte> drawn(bytes_of(numbers.window));
+  fill_with(plan_.samples.gap, drawn);
+  draw(layer, numbers.window, drawn);
+  numbers.values.resize(static_cast<std::size_t>(numbers.window.columns * numbers.window.rows));
+  numbers_from_samples(plan_.samples.kind, drawn, numbers.values);
+  const std::size_t sample_bytes = size_bytes(plan_.info.sample_type);
+  oneapi::tbb::parallel_for(block.row, block.row + block.rows, [&](std::int64_t row) {
+    std::vector<double> values(static_cast<std::size_t>(block.columns));
+    for (std::int64_t i = 0; i < block.columns; ++i) {
+      const MapPoint& place = places.at(block.column + i, row);
+      values[static_cast<std::size_t>(i)] = interpolate_at(numbers, place_between(place.easting, other.width, outer),
+                                                           place_between(place.northing, other.height, outer), outer);
+    }
+    std::vector<std::byte> samples(values.size() * sample_bytes);
+    samples_from_numbers(plan_.info.sample_type, values, samples);
+    const std::int64_t first = (row - window.row) * window.columns + block.column - window.column;
+    const auto there = out.subspan(static_cast<std::size_t>(first) * sample_bytes, samples.size());
+    if (!outer) return lay_over(plan_.samples.kind, samples, there);
+    lay_over(plan_.samples.kind, there, samples);
+    std::copy(samples.begin(), samples.end(), there.begin());
   });
 }
 

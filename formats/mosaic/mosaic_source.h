@@ -19,7 +19,8 @@ enum class OverlapRule { kLast, kFirst };
 /// Many rasters as one, whose samples are theirs bit for bit where they agree in kind and resolution.
 ///
 /// Members of the finest resolution lie on the mosaic's grid. Coarser ones are interpolated bilinearly in double
-/// between samples of their own resolution, across their files' borders, so that no seam is there. A void of one member
+/// between samples of their own resolution, across their files' borders, so that no seam is there; so are those of
+/// another reference system, at the places to which PROJ brings the mosaic's samples. A void of one member
 /// shows what lies below it.
 /// Memory: one strip of whole rows (info().block_height of them), and what the readers keep that are open, which
 /// buffer_bytes() counts; about 150 bytes and the path for each member. At most most_open_rasters() files are open.
@@ -48,6 +49,10 @@ class MosaicSource final : public HeightSource {
   void compose(const Window& window, std::span<std::byte> out);
   void draw(std::size_t layer, const Window& window, std::span<std::byte> out);
   void interpolate(std::size_t layer, const Window& window, std::span<std::byte> out);
+  void reproject(std::size_t layer, bool outer, const Window& window, std::span<std::byte> out);
+  void reproject_block(std::size_t layer, bool outer, const Window& block, const Window& window,
+                       std::span<std::byte> out);
+  [[nodiscard]] bool has_void(const Window& block, const Window& window, std::span<const std::byte> out) const;
   [[nodiscard]] std::vector<Part> parts_in(std::size_t layer, const Window& window) const;
   void read_part(Part& part);
   [[nodiscard]] std::size_t bytes_of(const Window& window) const;

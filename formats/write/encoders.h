@@ -57,6 +57,11 @@ struct Sidecar {
 /// The names of all that may stand beside a raster of that name.
 [[nodiscard]] std::vector<std::string> sidecar_paths(const std::string& path);
 
+/// Files beside a raster that it replaces, which would be taken for the new one's: those of sidecar_paths() and GDAL's
+/// .aux.xml, and where the new one says nothing of its place or system a world file and a .prj. Those that the new one
+/// has, and files of another kind under such a name, are not among them.
+[[nodiscard]] std::vector<std::string> stale_sidecars(const std::string& path, const RasterSpec& spec);
+
 /// Throws Error{kInvalidArgument} without the path where another kind of file would be replaced: a Radiance picture or
 /// an ENVI header for .hdr, somebody else's .json.
 void check_sidecar_target(const std::string& path);

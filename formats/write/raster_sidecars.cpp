@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cctype>
 #include <cmath>
 #include <filesystem>
@@ -169,6 +170,32 @@ std::vector<std::string> sidecar_paths(const std::string& path) {
   return described ? std::vector<std::string>{path + ".json"} : std::vector<std::string>{};
 }
 
+std::vector<std::string> stale_sidecars(const std::string& path, const RasterSpec& spec) {
+  std::vector<std::string> stale = sidecar_paths(path);
+  stale.push_back(path + ".aux.xml");
+  const auto beside = [&](const char* other) { return std::filesystem::path(path).replace_extension(other).string(); };
+  if (!spec.georeference || !spec.georeference->has_origin) {
+    stale.push_back(world_file_name(path));
+    stale.push_back(beside(".wld"));
+  }
+  if (!spec.georeference || system_text(spec.georeference->system).empty()) stale.push_back(beside(".prj"));
+  std::sort(stale.begin(), stale.end());
+  stale.erase(std::unique(stale.begin(), stale.end()), stale.end());
+  const std::vector<Sidecar> kept = sidecars_of(path, spec);
+  std::erase_if(stale, [&](const std::string& file) {
+    std::error_code ignored;
+    if (std::ranges::any_of(kept, [&](const Sidecar& sidecar) { return sidecar.path == file; })) return true;
+    if (!std::filesystem::is_regular_file(file, ignored)) return true;
+    try {
+      check_sidecar_target(file);
+    } catch (const Error&) {
+      return true;
+    }
+    return false;
+  });
+  return stale;
+}
+
 void check_sidecar_target(const std::string& path) {
   constexpr std::size_t kMostBytes = std::size_t{1} << 16U;
   const std::vector<std::byte> bytes = head_of_file(path, kMostBytes);
@@ -181,7 +208,7 @@ void check_sidecar_target(const std::string& path) {
     is_kind = json.is_object() && json.contains("width") && json.contains("sample_type");
   } else if (extension == ".xml") {
     is_kind = text.starts_with("<pamdataset");
-  } else if (extension == ".pgw" || extension == ".erw") {
+  } else if (extension == ".wld" || (extension.size() > 2 && extension.back() == 'w')) {
     is_kind = text.find_first_not_of("0123456789+-.e \t\r\n") == std::string::npos;
   } else if (extension == ".hdr") {
     is_kind = text.find("ncols") != std::string::npos && text.find("nrows") != std::string::npos;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <limits>
 #include <span>
 
@@ -118,7 +119,8 @@ RasterSink::RasterSink(std::string path, const RasterSpec& spec, std::unique_ptr
       spec_(spec),
       file_(std::move(file)),
       sidecars_(std::move(sidecars)),
-      encoder_(std::move(encoder)) {}
+      encoder_(std::move(encoder)),
+      replaces_(std::filesystem::exists(path_)) {}
 
 RasterSink::~RasterSink() = default;
 
@@ -167,6 +169,11 @@ void RasterSink::finish() {
       }
     }
     file_->commit();
+    if (!replaces_) return;
+    for (const std::string& stale : stale_sidecars(path_, spec_)) {
+      std::error_code ignored;
+      std::filesystem::remove(stale, ignored);
+    }
   } catch (const Error& error) {
     if (is_removed) {
       throw Error(error.code(),

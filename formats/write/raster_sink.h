@@ -48,6 +48,7 @@ class RasterSink {
   std::vector<std::unique_ptr<OutputFile>> sidecars_;
   std::unique_ptr<RasterEncoder> encoder_;
   std::int64_t rows_written_ = 0;
+  bool replaces_ = false;  ///< there was a raster of this name
 };
 
 /// Begins a raster whose format follows from the extension of `path`, in any case:

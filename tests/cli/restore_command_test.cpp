@@ -252,7 +252,7 @@ TEST_F(RestoreCommand, ExactSamplesGoIntoEveryFormatThatHoldsThem) {
           << i;
     }
   }
-  expect_refused(run("back.png"), 2, "uint16 does not hold the void value -32768; write .tif");
+  expect_refused(run("back.png"), 2, "is -32768, which uint16 does not hold; write .tif");
   convert(kRidges, {"--lossless"});
   expect_refused(run("back.png"), 2, "which uint16 does not hold; write .tif");
 }

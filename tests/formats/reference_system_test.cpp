@@ -241,6 +241,26 @@ TEST_F(UnderstandSystem, ArchivesOnAReferenceSystemFindTheirPlacesByIt) {
     EXPECT_NEAR(grid.origin_y - (world.z - samples.first_z) / grid.metres_per_unit, there.northing, 1e-3);
     EXPECT_NEAR(places.geo_from_world(world).latitude, at.latitude, 1e-9);
   }
+  // A grid in a third system has the elevations of these places.
+  std::vector<Warning> warnings;
+  const auto utm = understand_grid_system(archive, "EPSG:32618", warnings);
+  EXPECT_TRUE(warnings.empty());
+  const SampleGrid there = grid_in_system(archive.metadata(), archive.metadata().valid, utm, GridSize{30, 20}, {});
+  EXPECT_TRUE(there.goes_by_places());
+  EXPECT_EQ(usual_method(archive.metadata(), there), RestoreMethod::kBarycentric);
+  EXPECT_EQ(grid_georeference(archive.metadata(), there)->system.epsg, 32618);
+  std::vector<double> rows(600);
+  RowReader(archive, there).read(0, 20, rows);
+  const auto zone = understand_system("EPSG:32618");
+  Surface surface(archive);
+  for (const std::size_t i : {std::size_t{225}, std::size_t{315}, std::size_t{432}}) {
+    const GeoPoint at = zone->geo_from_map({there.first_x + static_cast<double>(i % 30) * there.spacing_x,
+                                            there.first_z - static_cast<double>(i / 30) * there.spacing_z});
+    EXPECT_NEAR(rows[i], surface.at(at).elevation, 1e-3);
+    EXPECT_NEAR(rows[i], (at.longitude + 74.3) * 100.0 + (41.0 - at.latitude) * 10000.0, 0.5);
+  }
+  EXPECT_THAT(error_of([&] { (void)understand_grid_system(archive, "EPSG:99999", warnings); }).what(),
+              HasSubstr("a.isohf: the reference system EPSG:99999"));
   archive.set_world_map(nullptr);
   EXPECT_FALSE(WorldGeoreference(archive.metadata()).has_geo());
 }

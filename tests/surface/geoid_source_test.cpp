@@ -114,6 +114,26 @@ TEST(GeoidSource, FeetAreFeet) {
   EXPECT_NEAR(sample, 100.0 - 12.5 / 0.3048, 0.006);
 }
 
+TEST(GeoidSource, WarnsWhereHeightsAreWhatItMakes) {
+  const test::TemporaryFolder folder;
+  test::write_geoid(folder / "egm96-test.pgm", 360, 181, waves);
+  const auto warnings = [&](const char* datum, std::optional<int> code, const char* way) {
+    auto source = globe<float>(SampleType::kFloat32);
+    source->mutable_info().georeference.system.vertical_datum = datum;
+    source->mutable_info().georeference.system.vertical_epsg = code;
+    const GeoidSource moved(std::move(source), GeoidRequest::parse(folder / "egm96-test.pgm" + std::string(way)));
+    std::string all;
+    for (const Warning& warning : moved.info().warnings) all += warning;
+    return all;
+  };
+  EXPECT_THAT(warnings("EGM96 height", 5773, ":to-orthometric"), HasSubstr("above EGM96 height already"));
+  EXPECT_THAT(warnings("", 5703, ":to-orthometric"), HasSubstr("above EPSG:5703 already"));
+  EXPECT_THAT(warnings("the ellipsoid, by egm96", {}, ""), HasSubstr("once more, to ellipsoidal heights"));
+  EXPECT_EQ(warnings("EGM96 height", 5773, ""), "");
+  EXPECT_EQ(warnings("the ellipsoid, by egm96", {}, ":to-orthometric"), "");
+  EXPECT_EQ(warnings("", {}, "") + warnings("", {}, ":to-orthometric"), "");
+}
+
 TEST(GeoidSource, WhatItCannotUseIsRefusedInOneLine) {
   const test::TemporaryFolder folder;
   const auto open = [&](const std::string& name, const std::function<void(SourceInfo&)>& change = {}) {

@@ -43,6 +43,7 @@ constexpr std::pair<std::string_view, std::string_view> kSpellings[] = {
     {"projection", "--projection"},
     {"raw", "--raw"},
     {"reference_system", "--crs"},
+    {"crs", "--crs"},
     {"registration", "--registration"},
     {"resume", "--resume"},
     {"sample_spacing", "--sample-spacing"},

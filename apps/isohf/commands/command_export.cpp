@@ -132,7 +132,9 @@ ExportGrid asked_grid(const ExportOptions& options, ArchiveReader& archive) {
   const WorldBounds ground = options.bbox ? ground_in_box(archive, *options.bbox) : metadata.valid;
   const bool area = samples_are_areas(metadata);
   ExportGrid grid;
-  if (options.raster.size || options.raster.spacing) {
+  if (!options.raster.system.empty()) {
+    grid.samples = asked_grid_in_system(options.raster, archive, ground, options.common.quiet);
+  } else if (options.raster.size || options.raster.spacing) {
     grid.samples = grid_over(ground, area, options.raster.size, spacing_in_world(options.raster, metadata));
   } else {
     grid.samples = natural_grid(metadata);
@@ -149,6 +151,12 @@ ExportGrid asked_grid(const ExportOptions& options, ArchiveReader& archive) {
   grid.cut = cut_into_tiles(size, !options.raster.size && !options.raster.spacing, options.tiles, options.tile_size,
                             options.overlap);
   if (size != GridSize{grid.samples.width, grid.samples.height}) {
+    if (grid.samples.system) {
+      RasterOptions sized = options.raster;
+      sized.size = size;
+      grid.samples = asked_grid_in_system(sized, archive, ground, true);
+      return grid;
+    }
     grid.samples = grid_over(ground, area, size, std::nullopt);
   }
   return grid;
@@ -186,7 +194,8 @@ class Exporter {
       part.width = grid_.cut.columns;
       part.height = grid_.cut.rows;
       part.first_x += static_cast<double>(column * (grid_.cut.columns - grid_.cut.overlap)) * part.spacing_x;
-      part.first_z += static_cast<double>(row * (grid_.cut.rows - grid_.cut.overlap)) * part.spacing_z;
+      const double south = static_cast<double>(row * (grid_.cut.rows - grid_.cut.overlap)) * part.spacing_z;
+      part.first_z += part.system ? -south : south;  // northings, and world z
       RasterSpec spec = raster_spec(archive_.metadata(), part, mapping, void_value);
       spec.overwrite = options_.raster.overwrite;
       return spec;

@@ -194,15 +194,16 @@ int run(const PlanOptions& options) {
   } else if (options.inputs.names.empty()) {
     list_candidates(options);
   } else {
-    const std::unique_ptr<HeightSource> source = laid_out(
-        open_inputs(expand_inputs(options.inputs.names, options.inputs.recursive), options.inputs, options.open, 0)
-            .source,
-        options.geoid, options.request.ground);
+    SourceInputs inputs = options.inputs;
+    inputs.onto = options.request.ground.projection;
+    OpenedInputs opened = open_inputs(expand_inputs(inputs.names, inputs.recursive), inputs, options.open, 0);
     ConvertOptions convert;
     convert.plan = options.request;
+    if (opened.is_reprojected) convert.plan.ground.projection = ProjectionRequest{};
+    const std::unique_ptr<HeightSource> source = laid_out(std::move(opened.source), options.geoid, convert.plan.ground);
     understand_ground(source->info(), convert.plan.ground);
     convert.code_type = options.code_type;
-    check_spacing_unit(source->info(), options.request, options.spacing_in_metres);
+    check_spacing_unit(source->info(), convert.plan, options.spacing_in_metres);
     print_plan(*source, convert, {}, options.common);
   }
   return kExitDone;

@@ -60,6 +60,7 @@ struct RestoreOptions {
   WorkOptions work;
   RasterOptions raster;
   std::string like;
+  bool rounds = false;
 };
 
 std::optional<RestoreOptions> parse(const Arguments& arguments) {
@@ -74,11 +75,14 @@ std::optional<RestoreOptions> parse(const Arguments& arguments) {
   add_size_options(line, "Write so many samples over the source's ground", options.raster);
   add_method_option(line, "hex; the source's own samples where they are kept", options.raster);
   add_clamp_option(line, "RASTER's type", options.raster);
+  line.flag("--round", "Round the source's samples to the nearest that a floating RASTER holds, instead of refusing",
+            options.rounds);
   add_work_options(line, options.work);
   add_common_options(line, options.common);
   line.footer(kFooter);
   line.exclusive({"--like", "--size"});
   line.exclusive({"--like", "--spacing"});
+  line.exclusive({"--like", "--crs"});
   if (!line.parse(arguments)) return std::nullopt;
   require_raster_arguments(line, "RASTER", options.raster);
   return options;
@@ -131,8 +135,10 @@ SampleGrid grid_of_other(const RestoreOptions& options, const Metadata& metadata
   return *grid;
 }
 
-SampleGrid asked_grid(const RestoreOptions& options, const Metadata& metadata) {
+SampleGrid asked_grid(const RestoreOptions& options, ArchiveReader& archive) {
   const RasterOptions& raster = options.raster;
+  const Metadata& metadata = archive.metadata();
+  if (!raster.system.empty()) return asked_grid_in_system(raster, archive, metadata.valid, options.common.quiet);
   if (!options.like.empty()) return grid_of_other(options, metadata);
   if (!raster.size && !raster.spacing) return natural_grid(metadata);
   return grid_over(metadata.valid, samples_are_areas(metadata), raster.size, spacing_in_world(raster, metadata));
@@ -142,6 +148,7 @@ struct Restored {
   SampleStore::Result counts;
   bool is_source = false;          ///< the source's own samples, hash checked
   std::vector<std::string> files;  ///< written
+  std::optional<double> rounding;  ///< the largest error of the source's samples, with --round
 };
 
 class Restorer {
@@ -171,19 +178,21 @@ class Restorer {
     const LosslessRecord& record = reader.record();
     const SampleMapping kept = record.mapping;
     SampleMapping written = kept;
+    // Text holds any number, and has no place for a scale.
+    const bool as_elevations =
+        raster_kind(options_.raster.output) == RasterKind::kAsc && (kept.z_scale != 1.0 || kept.z_offset != 0.0);
     written.type = restored_type(options_.raster.output, kept.type);
+    if (as_elevations) written = {SampleType::kFloat64, 1.0, 0.0};
     auto void_value = record.void_values.empty() ? std::nullopt : std::optional(record.void_values.front());
     // OpenEXR has no void value; what came from there has none but the user's.
     const bool voids_to_nan = raster_kind(options_.raster.output) == RasterKind::kExr && is_floating(written.type) &&
                               archive_.metadata().source.format != "OpenEXR";
-    const bool as_kept = written.type == kept.type && !voids_to_nan;
-    if (voids_to_nan) void_value.reset();
-    if (void_value && !as_kept && !SampleStore(written, std::nullopt, false).holds(*void_value)) {
-      throw Error(ErrorCode::kInvalidArgument,
-                  fmt::format("{}: {} does not hold the void value {}; write .tif", options_.raster.output,
-                              to_string(written.type), *void_value));
-    }
+    const bool as_kept = written.type == kept.type && !voids_to_nan && !as_elevations;
+    // A void value that the type does not hold is missed only where a sample is void.
+    const bool lacks_void = void_value && !as_kept && !SampleStore(written, std::nullopt, false).holds(*void_value);
+    if (voids_to_nan || as_elevations || lacks_void) void_value.reset();
     const auto sink = open(source_raster_spec(archive_.metadata(), written, void_value), written);
+    double rounding = 0.0;
     std::int64_t row = 0;
     while (!reader.at_end()) {
       const std::vector<std::byte> raw = reader.read_next();
@@ -192,17 +201,22 @@ class Restorer {
         sink->write_rows(raw);
       } else {
         std::vector<std::byte> out(count * size_bytes(written.type));
-        if (const auto refused = convert_exactly(kept.type, raw, record.void_values, voids_to_nan, written.type, out)) {
+        if (as_elevations) {
+          elevations_of(kept, raw, record.void_values, out);
+        } else if (const auto refused = convert_exactly(kept.type, raw, record.void_values, voids_to_nan, written.type,
+                                                        out, options_.rounds ? &rounding : nullptr)) {
           const auto sample = static_cast<std::int64_t>(*refused);
           refuse_sample(options_.raster.output, written.type, sample % grid_.width, row + sample / grid_.width,
-                        load_sample(kept.type)(raw.data() + *refused * size_bytes(kept.type)), "write .tif");
+                        load_sample(kept.type)(raw.data() + *refused * size_bytes(kept.type)),
+                        is_floating(written.type) && !options_.rounds ? "--round takes the nearest, .tif holds it"
+                                                                      : "write .tif");
         }
         sink->write_rows(out);
       }
       row += static_cast<std::int64_t>(count) / record.width;
     }
     sink->finish();
-    return {{}, true, sink->files()};
+    return {{}, true, sink->files(), options_.rounds && !as_kept ? std::optional(rounding) : std::nullopt};
   }
 
   Restored run_surface() {
@@ -236,8 +250,8 @@ class Restorer {
 
 /// First sample and spacing, for JSON.
 void add_grid(const SampleGrid& grid, ordered_json& json) {
-  const char* const x = grid.in_degrees ? "longitude" : "x";
-  const char* const z = grid.in_degrees ? "latitude" : "z";
+  const char* const x = grid.in_degrees ? "longitude" : grid.system ? "easting" : "x";
+  const char* const z = grid.in_degrees ? "latitude" : grid.system ? "northing" : "z";
   json["width"] = grid.width;
   json["height"] = grid.height;
   json["first_sample"] = {{x, grid.first_x}, {z, grid.first_z}};
@@ -251,12 +265,11 @@ int run(const RestoreOptions& options) {
   }
   check_raster_output(inputs, options.raster.output, options.raster.overwrite);
   WorkArena arena(options.work.threads);
-  const ArchiveReader archive = open_archive(options.raster.archive);
-  const bool wants_source =
-      options.like.empty() && !options.raster.size && !options.raster.spacing && !options.raster.method;
+  ArchiveReader archive = open_archive(options.raster.archive);
+  const bool wants_source = options.like.empty() && options.raster.system.empty() && !options.raster.size &&
+                            !options.raster.spacing && !options.raster.method;
   const bool is_lossless = wants_source && lossless_record(archive.metadata());
-  const SampleGrid grid =
-      is_lossless ? source_grid(archive.metadata().source) : asked_grid(options, archive.metadata());
+  const SampleGrid grid = is_lossless ? source_grid(archive.metadata().source) : asked_grid(options, archive);
   Restored restored;
   try {
     arena.execute([&] { restored = Restorer(options, archive, grid).run(is_lossless); });
@@ -276,9 +289,13 @@ int run(const RestoreOptions& options) {
     json["source_samples"] = restored.is_source;
     json["voids"] = restored.is_source ? ordered_json(nullptr) : ordered_json(restored.counts.nodata);
     json["clamped"] = restored.counts.clamped;
+    json["rounded_by"] = restored.rounding ? ordered_json(*restored.rounding) : ordered_json(nullptr);
     out.write(json_text(json));
   } else if (!options.common.quiet) {
     std::string what = "the source's own samples, SHA-256 as stated";
+    if (restored.rounding) {
+      what = fmt::format("the source's own samples, SHA-256 as stated, rounded by up to {:.3g}", *restored.rounding);
+    }
     if (!restored.is_source) what = fmt::format("method {}, {} voids", how, describe_count(restored.counts.nodata));
     if (restored.counts.clamped > 0)
       what += fmt::format(", {} moved into the range", describe_count(restored.counts.clamped));

@@ -9,8 +9,10 @@
 #include <optional>
 
 #include "commands/command.h"
+#include "formats/georeference/reference_system.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
+#include "isohf/surface.h"
 #include "isohf/verify.h"
 #include "open_archive.h"
 #include "options/describe.h"
@@ -230,6 +232,14 @@ std::unique_ptr<HeightSource> open_as_recorded(VerifyCommandOptions options, con
     if (open.voids.distance() == 0 && record.fill_distance > 0) open.voids.fill_distance = record.fill_distance;
     if (!options.against.overlap_given && record.mosaic && record.mosaic->overlap == "first")
       options.against.overlap = OverlapRule::kFirst;
+  }
+  // Inputs of different reference systems were joined in that of the record.
+  if (const std::string system = system_text(source_georeference(record).system); record.mosaic && !system.empty()) {
+    ProjectionRequest& onto = options.against.onto;
+    onto.is_auto = false;
+    onto.is_given = true;
+    onto.kind = ProjectionKind::kSystem;
+    onto.system = system;
   }
   GroundRequest ground;
   ground.wrap_x = metadata.wraps_x;

@@ -6,6 +6,8 @@
 
 #include "isohf/error.h"
 #include "options/option_values.h"
+#include "options/options_source.h"
+#include "output/standard_output.h"
 
 namespace isohf::cli {
 
@@ -27,6 +29,42 @@ void add_size_options(CommandLine& line, const std::string& size_description, Ra
               [&](const std::string& text) { options.size = parse_size(text, 1, kMostSide); });
   line.option("--spacing", "LENGTH", "Write samples so far apart: world units, or with a unit as in 30m, 0.5km, 100ft",
               [&](const std::string& text) { options.spacing = parse_length(text); });
+  line.option("--crs", "SYSTEM",
+              "Write the raster in this reference system, each sample by its place: EPSG:2154, WKT, a PROJ string, or "
+              "a file with one of them (default: the archive's)",
+              [&](const std::string& text) { options.system = system_from(text); });
+}
+
+SampleGrid asked_grid_in_system(const RasterOptions& options, ArchiveReader& archive, const WorldBounds& ground,
+                                bool quiet) {
+  if (options.method == RestoreMethod::kHex) {
+    throw Error(ErrorCode::kInvalidArgument,
+                "--crs: rows of another reference system are no rows of the archive, along which --method hex goes; "
+                "leave it out, or give --method barycentric");
+  }
+  std::vector<Warning> warnings;
+  auto system = understand_grid_system(archive, options.system, warnings);
+  if (!quiet) print_warnings(warnings);
+  std::optional<double> spacing;
+  if (options.spacing) {
+    const Georeference& place = system->place;
+    if (options.spacing->in_metres && place.unit == HorizontalUnit::kDegree) {
+      throw Error(
+          ErrorCode::kInvalidArgument,
+          fmt::format("--spacing has a unit, and coordinates of \"{}\" are degrees; give a plain number of these",
+                      place.system.name));
+    }
+    spacing = options.spacing->in_metres ? options.spacing->value / place.metres_per_unit : options.spacing->value;
+  }
+  try {
+    const SampleGrid grid = grid_in_system(archive.metadata(), ground, std::move(system), options.size, spacing);
+    if (grid.width <= kMostSide && grid.height <= kMostSide) return grid;
+    throw Error(ErrorCode::kInvalidArgument, fmt::format("--spacing makes {} x {} samples, at most {} a side are "
+                                                         "possible",
+                                                         grid.width, grid.height, kMostSide));
+  } catch (const Error& error) {
+    throw error.within(options.archive);
+  }
 }
 
 std::optional<double> spacing_in_world(const RasterOptions& options, const Metadata& metadata) {

@@ -16,6 +16,7 @@ struct RasterOptions {
   bool overwrite = false;
   std::optional<GridSize> size;
   std::optional<LengthValue> spacing;
+  std::string system;  ///< a reference system; empty: the archive's own
   std::optional<RestoreMethod> method;
   bool clamp_range = false;
 };
@@ -28,11 +29,15 @@ void add_raster_arguments(CommandLine& line, const std::string& output_name, Ras
 /// Throws Error{kInvalidArgument} where one of the two is not given.
 void require_raster_arguments(const CommandLine& line, const std::string& output_name, const RasterOptions& options);
 
-/// --size, --spacing. `size_description` is what --help says of the first.
+/// --size, --spacing, --crs. `size_description` is what --help says of the first.
 void add_size_options(CommandLine& line, const std::string& size_description, RasterOptions& options);
 /// The spacing asked for in the archive's world units. Throws Error{kInvalidArgument} for metres where these are
 /// unknown.
 [[nodiscard]] std::optional<double> spacing_in_world(const RasterOptions& options, const Metadata& metadata);
+/// The grid in --crs over a part of the world; warnings are printed. Throws Error{kInvalidArgument} for a system that
+/// is not understood, --method hex, and a spacing in metres where coordinates are degrees.
+[[nodiscard]] SampleGrid asked_grid_in_system(const RasterOptions& options, ArchiveReader& archive,
+                                              const WorldBounds& ground, bool quiet);
 /// --method. `without` is what --help says of the default.
 void add_method_option(CommandLine& line, const std::string& without, RasterOptions& options);
 /// --clamp-range. `type` is whose range it is.

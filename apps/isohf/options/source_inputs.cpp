@@ -127,10 +127,11 @@ OpenedInputs open_inputs(std::vector<std::string> files, const SourceInputs& inp
   }
   const std::string name = fmt::format("mosaic of {} files", files.size());
   WorkArena arena(threads);
-  MosaicPlan plan = arena.execute([&] { return plan_mosaic(files, options, inputs.box); });
+  MosaicPlan plan = arena.execute([&] { return plan_mosaic(files, options, inputs.box, inputs.onto); });
   if (inputs.require_complete && plan.holes.samples > 0) {
     throw Error(ErrorCode::kIo, name + ": --require-complete: " + plan.holes.describe(MosaicHoles::kMostNamed));
   }
+  opened.is_reprojected = plan.is_reprojected;
   opened.note.name = name;
   opened.note.mosaic = record_of(plan, inputs.overlap);
   opened.note.fingerprint = fingerprint_of(plan, inputs.overlap);

@@ -27,6 +27,7 @@ struct SourceInputs {
   bool recursive = false;
   std::optional<BoundingBox> box;           ///< of the whole, only this part
   std::optional<RecordedOptions> as_given;  ///< for the archive's metadata
+  ProjectionRequest onto;                   ///< the map on which inputs of different reference systems are joined
 };
 
 /// --bbox, and the group "Several inputs": --overlap, --require-complete, --recursive.
@@ -42,7 +43,8 @@ void add_mosaic_options(CommandLine& line, SourceInputs& inputs);
 struct OpenedInputs {
   std::vector<std::string> files;
   std::unique_ptr<HeightSource> source;
-  SourceNote note;  ///< for the archive's metadata and --resume; says nothing of a single file
+  SourceNote note;              ///< for the archive's metadata and --resume; says nothing of a single file
+  bool is_reprojected = false;  ///< inputs of different systems lie on SourceInputs::onto already
 };
 
 /// Opens what `files`, as expand_inputs gives them, are together: the file itself where it is one, else their mosaic.

@@ -62,6 +62,13 @@ void understand_source(ArchiveReader& archive);
 /// Throws Error, naming the archive, where it is not understood.
 void understand_world(ArchiveReader& archive);
 
+struct GridSystem;
+/// The reference system `text` ("EPSG:3035", WKT, a PROJ string) for grids of an archive, whose source is understood
+/// first. Throws Error{kInvalidArgument, kUnsupported}, in one line, where that or the system is not understood, or PROJ
+/// knows no way. A warning says where datums are taken for one.
+[[nodiscard]] std::shared_ptr<const GridSystem> understand_grid_system(ArchiveReader& archive, const std::string& text,
+                                                                       std::vector<Warning>& warnings);
+
 /// Whether the surface has an elevation at a point.
 enum class SurfaceState : std::uint8_t { kSurface, kNodata, kOutside };
 
@@ -139,17 +146,28 @@ enum class RestoreMethod {
 [[nodiscard]] RestoreMethod restore_method_from_string(
     const std::string& text);  ///< the first two; throws Error{kInvalidArgument}
 
+/// A reference system in which a raster is to lie, whatever the archive's.
+struct GridSystem {
+  /// Its coordinates <-> longitudes and latitudes of the archive.
+  std::shared_ptr<const ReferenceMap> map;
+  Georeference place;  ///< unit and system; spacing and origin are the grid's
+};
+
 /// The samples of a raster on the ground: evenly spaced columns from West to East and rows from North to South, in world
-/// units or in degrees.
+/// units, in degrees or in coordinates of a reference system.
 struct SampleGrid {
   std::int64_t width = 0;   ///< columns, >= 1
   std::int64_t height = 0;  ///< rows, >= 1
-  double first_x = 0.0;     ///< of sample (0, 0): world x, or longitude
-  double first_z = 0.0;     ///< world z, or latitude
+  double first_x = 0.0;     ///< of sample (0, 0): world x, or longitude, or easting
+  double first_z = 0.0;     ///< world z, or latitude, or northing
   double spacing_x = 1.0;   ///< between columns, > 0
   double spacing_z = 1.0;   ///< between rows, > 0: southwards, also in degrees
   bool in_degrees = false;
-  Registration registration = Registration::kArea;  ///< in degrees; in world units it is samples_are_areas()
+  Registration registration = Registration::kArea;     ///< in degrees; in world units it is samples_are_areas()
+  std::shared_ptr<const GridSystem> system = nullptr;  ///< of coordinates that are neither
+
+  /// Each sample is looked up by its longitude and latitude: rows are none of the world.
+  [[nodiscard]] bool goes_by_places() const { return in_degrees || system; }
 };
 
 /// Columns and rows.
@@ -164,6 +182,12 @@ using GridSize = std::pair<std::int64_t, std::int64_t>;
 /// two is needed.
 [[nodiscard]] SampleGrid grid_over(const WorldBounds& ground, bool areas, const std::optional<GridSize>& size,
                                    const std::optional<double>& spacing);
+/// A grid over a part of the world in a reference system, its rectangle around that ground, on whole multiples of its
+/// spacing where no size is given. spacing  units of the system; nullopt: as far apart as the archive's own samples.
+/// Throws Error{kInvalidArgument} where the system has no place for a part of the ground.
+[[nodiscard]] SampleGrid grid_in_system(const Metadata& metadata, const WorldBounds& ground,
+                                        std::shared_ptr<const GridSystem> system, const std::optional<GridSize>& size,
+                                        const std::optional<double>& spacing);
 /// True where samples of rasters made of the archive stand for areas: as the source's do, or on a map.
 [[nodiscard]] bool samples_are_areas(const Metadata& metadata);
 /// True where the surface may have no elevation at a sample of the grid.

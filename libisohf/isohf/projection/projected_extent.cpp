@@ -22,9 +22,10 @@ void include(double& low, double& high, double value) {
   if (!(value <= high)) high = value;
 }
 
-/// Bounds of what `image` makes of a rectangle's sides.
-template <typename Image>
-MapBounds bounds_of_image(const MapBounds& rectangle, const Image& image) {
+}  // namespace
+
+MapBounds image_bounds(const MapBounds& rectangle, const std::function<MapPoint(const MapPoint&)>& image,
+                       int steps_per_side) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   MapBounds bounds{kInfinity, kInfinity, -kInfinity, -kInfinity};
   const std::array<MapPoint, 5> corners = {{{rectangle.west, rectangle.north},
@@ -39,9 +40,9 @@ MapBounds bounds_of_image(const MapBounds& rectangle, const Image& image) {
     const MapPoint& to = corners[side + 1];
     MapPoint before;
     MapPoint last;
-    for (int i = 0; i <= kStepsPerSide; ++i) {
-      const MapPoint at = image(MapPoint{between(from.easting, to.easting, i, kStepsPerSide),
-                                         between(from.northing, to.northing, i, kStepsPerSide)});
+    for (int i = 0; i <= steps_per_side; ++i) {
+      const MapPoint at = image(MapPoint{between(from.easting, to.easting, i, steps_per_side),
+                                         between(from.northing, to.northing, i, steps_per_side)});
       is_whole = is_whole && std::isfinite(at.easting) && std::isfinite(at.northing);
       include(bounds.west, bounds.east, at.easting);
       include(bounds.south, bounds.north, at.northing);
@@ -65,17 +66,19 @@ MapBounds bounds_of_image(const MapBounds& rectangle, const Image& image) {
   return {bounds.west - rise, bounds.south - rise, bounds.east + rise, bounds.north + rise};
 }
 
-}  // namespace
-
 MapBounds projected_bounds(const Projection& projection, const GeoExtent& ground) {
   // Sides of the extent may lie 360 degrees apart: longitudes are left as they are but for the first's sake.
-  return bounds_of_image({ground.west, ground.south, ground.east, ground.north}, [&](const MapPoint& at) {
-    return projection.forward({at.easting, at.northing});
-  });
+  return image_bounds(
+      {ground.west, ground.south, ground.east, ground.north},
+      [&](const MapPoint& at) {
+        return projection.forward({at.easting, at.northing});
+      },
+      kStepsPerSide);
 }
 
 MapBounds projected_bounds(const Projection& projection, const ReferenceMap& map, const MapBounds& rectangle) {
-  return bounds_of_image(rectangle, [&](const MapPoint& at) { return projection.forward(map.geo_from_map(at)); });
+  return image_bounds(
+      rectangle, [&](const MapPoint& at) { return projection.forward(map.geo_from_map(at)); }, kStepsPerSide);
 }
 
 ScaleError worst_scale_error(const Projection& projection, const GeoExtent& ground) {

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <functional>
+
 #include "isohf/projection/projection.h"
 #include "isohf/projection/reference_map.h"
 
@@ -13,6 +15,10 @@ namespace isohf {
 /// The same of the image of a rectangle of another map.
 [[nodiscard]] MapBounds projected_bounds(const Projection& projection, const ReferenceMap& map,
                                          const MapBounds& rectangle);
+
+/// The same of what `image` makes of a rectangle, in so many steps a side.
+[[nodiscard]] MapBounds image_bounds(const MapBounds& rectangle, const std::function<MapPoint(const MapPoint&)>& image,
+                                     int steps_per_side);
 
 /// The worst scale on a ground, and where.
 struct ScaleError {

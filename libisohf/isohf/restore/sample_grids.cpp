@@ -282,12 +282,55 @@ SampleGrid grid_over(const WorldBounds& ground, bool areas, const std::optional<
   return grid;
 }
 
+SampleGrid grid_in_system(const Metadata& metadata, const WorldBounds& ground, std::shared_ptr<const GridSystem> system,
+                          const std::optional<GridSize>& size, const std::optional<double>& spacing) {
+  constexpr int kStepsPerSide = 128;
+  const WorldGeoreference places(metadata);
+  const auto image = [&](const MapPoint& at) {
+    return system->map->map_from_geo(places.geo_from_world({at.easting, -at.northing}));
+  };
+  if (!places.has_geo()) refuse("the archive does not say where it lies; coordinates mean nothing");
+  const MapBounds bounds = image_bounds({ground.x0, -ground.z1, ground.x1, -ground.z0}, image, kStepsPerSide);
+  if (!std::isfinite(bounds.west)) {
+    refuse(fmt::format("{} has no place for a part of the ground", system->place.system.name));
+  }
+  SampleGrid grid;
+  grid.registration = Registration::kArea;
+  if (size) {
+    grid.width = size->first;
+    grid.height = size->second;
+    grid.spacing_x = spacing.value_or((bounds.east - bounds.west) / static_cast<double>(grid.width));
+    grid.spacing_z = spacing.value_or((bounds.north - bounds.south) / static_cast<double>(grid.height));
+    grid.first_x = bounds.west + grid.spacing_x / 2.0;
+    grid.first_z = bounds.north - grid.spacing_z / 2.0;
+  } else {
+    double step = spacing.value_or(0.0);
+    if (!spacing) {
+      // As many samples as the archive's own grid has there, to three digits.
+      const SampleGrid own = natural_grid(metadata);
+      const double samples = (ground.x1 - ground.x0) * (ground.z1 - ground.z0) / (own.spacing_x * own.spacing_z);
+      step = std::sqrt((bounds.east - bounds.west) * (bounds.north - bounds.south) / samples);
+      const double grain = std::pow(10.0, std::floor(std::log10(step)) - 2.0);
+      step = std::round(step / grain) * grain;
+    }
+    const double west = std::floor(bounds.west / step);
+    const double north = std::ceil(bounds.north / step);
+    grid.width = std::max<std::int64_t>(std::llround(std::ceil(bounds.east / step) - west), 1);
+    grid.height = std::max<std::int64_t>(std::llround(north - std::floor(bounds.south / step)), 1);
+    grid.spacing_x = grid.spacing_z = step;
+    grid.first_x = (west + 0.5) * step;
+    grid.first_z = (north - 0.5) * step;
+  }
+  grid.system = std::move(system);
+  return grid;
+}
+
 bool samples_are_areas(const Metadata& metadata) {
   return is_warped(metadata) || metadata.source.registration == Registration::kArea;
 }
 
 bool may_have_nodata(const Metadata& metadata, const SampleGrid& grid) {
-  if (grid.in_degrees) return true;
+  if (grid.goes_by_places()) return true;
   const TileGrid& tiles = metadata.grid;
   const double last_x = grid.first_x + static_cast<double>(grid.width - 1) * grid.spacing_x;
   const double last_z = grid.first_z + static_cast<double>(grid.height - 1) * grid.spacing_z;
@@ -321,10 +364,18 @@ Georeference source_georeference(const SourceRecord& source) {
 std::optional<Georeference> grid_georeference(const Metadata& metadata, const SampleGrid& grid) {
   const SourceRecord& source = metadata.source;
   Georeference found = source_georeference(source);
-  if (grid.in_degrees) {
+  if (grid.goes_by_places()) {
+    if (grid.system) {
+      ReferenceSystem system = grid.system->place.system;
+      system.vertical_datum = found.system.vertical_datum;
+      system.vertical_epsg = found.system.vertical_epsg;
+      found = grid.system->place;
+      found.system = system;
+    } else {
+      found.unit = HorizontalUnit::kDegree;
+      found.metres_per_unit = 1.0;
+    }
     found.registration = grid.registration;
-    found.unit = HorizontalUnit::kDegree;
-    found.metres_per_unit = 1.0;
     found.has_origin = true;
     found.origin_x = grid.first_x;
     found.origin_y = grid.first_z;

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <tuple>
 
 #include "isohf/base/assert.h"
@@ -75,7 +76,7 @@ SampleStore::Result SampleStore::store(std::span<const double> elevations, std::
 
 std::optional<std::size_t> convert_exactly(SampleType from, std::span<const std::byte> raw,
                                            const std::vector<double>& nodata, bool nodata_to_nan, SampleType to,
-                                           std::span<std::byte> out) {
+                                           std::span<std::byte> out, double* largest_error) {
   const SampleStore store({to, 1.0, 0.0}, std::nullopt, false);
   const std::size_t count = raw.size() / size_bytes(from);
   ISOHF_ASSERT(out.size() == count * size_bytes(to));
@@ -86,11 +87,34 @@ std::optional<std::size_t> convert_exactly(SampleType from, std::span<const std:
     std::byte* const at = out.data() + i * size_bytes(to);
     const bool is_nodata = !std::isfinite(value) || std::find(nodata.begin(), nodata.end(), value) != nodata.end();
     const SampleStore::Outcome outcome = store.store(is_nodata && nodata_to_nan ? std::nan("") : value, at);
-    const bool same = outcome == SampleStore::Outcome::kNodata ||
-                      (outcome == SampleStore::Outcome::kStored && load_again(at) == value);
-    if (!same) return i;
+    if (outcome == SampleStore::Outcome::kNodata) continue;
+    if (outcome != SampleStore::Outcome::kStored) return i;
+    const double error = std::abs(load_again(at) - value);
+    if (error == 0.0) continue;
+    // A void value that came out as another number would be an elevation.
+    if (largest_error == nullptr || !is_floating(to) || !std::isfinite(error) || is_nodata) return i;
+    *largest_error = std::max(*largest_error, error);
   }
   return std::nullopt;
+}
+
+void elevations_of(const SampleMapping& mapping, std::span<const std::byte> raw, const std::vector<double>& nodata,
+                   std::span<std::byte> out) {
+  const std::size_t bytes = size_bytes(mapping.type);
+  const std::size_t count = raw.size() / bytes;
+  ISOHF_ASSERT(out.size() == count * sizeof(double));
+  const LoadSample load = load_sample(mapping.type);
+  // 123 / 10 is the decimal 12.3, 123 * 0.1 is not.
+  constexpr double kWhole = 1e-12;
+  const double inverse = std::round(1.0 / mapping.z_scale);
+  const bool divides = std::abs(inverse) > 1.0 && std::abs(inverse * mapping.z_scale - 1.0) < kWhole;
+  for (std::size_t i = 0; i < count; ++i) {
+    const double number = load(raw.data() + i * bytes);
+    const bool is_void = !std::isfinite(number) || std::find(nodata.begin(), nodata.end(), number) != nodata.end();
+    const double elevation = (divides ? number / inverse : number * mapping.z_scale) + mapping.z_offset;
+    const double value = is_void ? std::nan("") : elevation;
+    std::memcpy(out.data() + i * sizeof(double), &value, sizeof value);
+  }
 }
 
 }  // namespace isohf

@@ -106,7 +106,7 @@ std::string to_string(RestoreMethod method) {
 }
 
 RestoreMethod usual_method(const Metadata& metadata, const SampleGrid& grid) {
-  if (grid.in_degrees) return RestoreMethod::kBarycentric;
+  if (grid.goes_by_places()) return RestoreMethod::kBarycentric;
   return plane_for(metadata, grid) > 0 ? RestoreMethod::kPlane : RestoreMethod::kHex;
 }
 
@@ -119,7 +119,7 @@ RestoreMethod restore_method_from_string(const std::string& text) {
 struct RowReader::State {
   State(const ArchiveReader& archive, const SampleGrid& its_grid, RestoreMethod method) : grid(its_grid) {
     const Metadata& metadata = archive.metadata();
-    if (!grid.in_degrees) {
+    if (!grid.goes_by_places()) {
       const int plane = method == RestoreMethod::kPlane ? plane_for(metadata, grid) : 0;
       rows.emplace(metadata.plane_grid(plane), metadata.wraps_x, metadata.quantisation, tiles_of(archive, plane), grid,
                    method, true, metadata.grid);
@@ -131,7 +131,7 @@ struct RowReader::State {
     points.emplace(metadata.grid, metadata.quantisation, tiles_of(archive), kTileBytes);
   }
 
-  void read_degrees(std::int64_t first, std::int64_t count, std::span<double> elevations) {
+  void read_by_places(std::int64_t first, std::int64_t count, std::span<double> elevations) {
     ISOHF_ASSERT(elevations.size() == static_cast<std::size_t>(count * grid.width));
     std::vector<WorldPoint> at(elevations.size());
     oneapi::tbb::parallel_for(oneapi::tbb::blocked_range<std::size_t>(0, at.size(), 1024), [&](const auto& part) {
@@ -139,8 +139,10 @@ struct RowReader::State {
         const auto sample = static_cast<std::int64_t>(i);
         const std::int64_t column = sample % grid.width;
         const std::int64_t row = first + sample / grid.width;
-        at[i] = georeference->world_from_geo({grid.first_x + static_cast<double>(column) * grid.spacing_x,
-                                              grid.first_z - static_cast<double>(row) * grid.spacing_z});
+        const MapPoint place{grid.first_x + static_cast<double>(column) * grid.spacing_x,
+                             grid.first_z - static_cast<double>(row) * grid.spacing_z};
+        at[i] = georeference->world_from_geo(grid.system ? grid.system->map->geo_from_map(place)
+                                                         : GeoPoint{place.easting, place.northing});
       }
     });
     points->sample(at, elevations);
@@ -161,7 +163,7 @@ void RowReader::read(std::int64_t first, std::int64_t rows, std::span<double> el
   if (state_->rows) {
     state_->rows->read(first, rows, elevations);
   } else {
-    state_->read_degrees(first, rows, elevations);
+    state_->read_by_places(first, rows, elevations);
   }
 }
 

@@ -167,6 +167,17 @@ GeoidSource::GeoidSource(std::unique_ptr<HeightSource> source, const GeoidReques
   info_.z_scale = 1.0;
   info_.z_offset = 0.0;
   ReferenceSystem& system = info_.georeference.system;
+  const std::string& datum = system.vertical_datum;
+  const bool is_ellipsoidal = datum.find("llipsoid") != std::string::npos;
+  const bool is_orthometric = !is_ellipsoidal && (!datum.empty() || system.vertical_epsg);
+  const bool was_orthometric_wanted = request.shift == GeoidShift::kToOrthometric;
+  if (was_orthometric_wanted ? is_orthometric : is_ellipsoidal) {
+    info_.warnings.push_back(
+        fmt::format("{}: heights are above {} already, and `geoid` moves them once more, to {}; leave it out, or give "
+                    "the other way",
+                    info_.path, datum.empty() ? fmt::format("EPSG:{}", *system.vertical_epsg) : datum,
+                    was_orthometric_wanted ? "orthometric heights" : "ellipsoidal heights"));
+  }
   const std::string name = std::filesystem::path(request.path).stem().string();
   system.vertical_epsg.reset();
   if (request.shift == GeoidShift::kToEllipsoidal) {

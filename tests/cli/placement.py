@@ -1,0 +1,326 @@
+#!/usr/bin/env python3
+"""Where surfaces lie once they are brought to another reference system, held against GDAL (a test tool here).
+
+usage: placement.py BIN_DIR
+
+Heights are metres to the East of a place, or to the North of it, so that a height says where its sample lies. Ends with 77 where GDAL's Python package is missing (Debian: python3-gdal).
+"""
+import math
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+
+try:
+    import numpy
+    from osgeo import gdal, osr
+except ImportError:
+    print("GDAL's Python package or numpy is missing")
+    sys.exit(77)
+
+gdal.UseExceptions()
+osr.UseExceptions()
+METRES_PER_DEGREE = 111320.0
+SIZE = 120
+NEAR = 0.3  # metres: a hundredth of a sample of 30 m
+
+# Each differs from the one before it, or from the first, in one parameter.
+FIRST = "+proj=lcc +lat_1=46 +lat_2=48 +lat_0=47 +lon_0=11 +x_0=500000 +y_0=100000 +ellps=GRS80 +units=m"
+OTHERS = [("lat_1=46", "lat_1=46.001"), ("lat_2=48", "lat_2=48.001"), ("lat_0=47", "lat_0=47.001"),
+          ("lon_0=11", "lon_0=11.001"), ("x_0=500000", "x_0=500001"), ("y_0=100000", "y_0=100001"),
+          ("ellps=GRS80", "ellps=intl"), ("units=m", "units=us-ft"), ("proj=lcc", "proj=eqdc")]
+
+failures = []
+
+
+def check(holds, what):
+    if not holds:
+        failures.append(what)
+        print("FAILED " + what)
+
+
+def system(text):
+    made = osr.SpatialReference()
+    made.SetFromUserInput(text)
+    made.SetAxisMappingStrategy(osr.OAMS_TRADITIONAL_GIS_ORDER)
+    return made
+
+
+def plane(lon, lat, middle, axis):
+    """Metres from the middle, East (axis 0) or North (axis 1)."""
+    scale = METRES_PER_DEGREE * (math.cos(math.radians(middle[1])) if axis == 0 else 1.0)
+    return ((lon - middle[0]) if axis == 0 else (lat - middle[1])) * scale
+
+
+def write(path, text, lon, lat, spacing, middle, axis, size=SIZE):
+    """A raster of `text` around a place; spacing is metres."""
+    own = system(text)
+    place = osr.CoordinateTransformation(system("EPSG:4326"), own).TransformPoint(lon, lat)
+    step = spacing / METRES_PER_DEGREE if own.IsGeographic() else spacing / own.GetLinearUnits()
+    west = place[0] - step * size / 2
+    north = place[1] + step * size / 2
+    points = [(west + (c + 0.5) * step, north - (r + 0.5) * step) for r in range(size) for c in range(size)]
+    geo = osr.CoordinateTransformation(own, system("EPSG:4326")).TransformPoints(points)
+    heights = numpy.array([plane(p[0], p[1], middle, axis) for p in geo], dtype=numpy.float32).reshape(size, size)
+    raster = gdal.GetDriverByName("GTiff").Create(str(path), size, size, 1, gdal.GDT_Float32)
+    raster.SetGeoTransform((west, step, 0, north, 0, -step))
+    raster.SetProjection(own.ExportToWkt())
+    raster.GetRasterBand(1).WriteArray(heights)
+    raster = None
+
+
+def worst(path, wanted, middle, axis, reach=1000.0):
+    """How far, in metres, samples of a raster lie at worst from where their heights say, and how many there are: not at
+    the edges, where nothing is known of the ground beyond."""
+    raster = gdal.Open(str(path))
+    own = raster.GetSpatialRef()
+    own.SetAxisMappingStrategy(osr.OAMS_TRADITIONAL_GIS_ORDER)
+    check(own.IsSame(system(wanted), ["CRITERION=EQUIVALENT_EXCEPT_AXIS_ORDER_GEOGCRS"]), f"{path}: is not in {wanted}")
+    x0, dx, _, y0, _, dy = raster.GetGeoTransform()
+    band = raster.GetRasterBand(1)
+    heights = band.ReadAsArray()
+    void = band.GetNoDataValue()
+    transform = osr.CoordinateTransformation(own, system("EPSG:4326"))
+    far = 0.0
+    count = 0
+    for row in range(0, raster.RasterYSize, 7):
+        for column in range(0, raster.RasterXSize, 7):
+            height = float(heights[row, column])
+            if math.isnan(height) or height == void:
+                continue
+            lon, lat, _ = transform.TransformPoint(x0 + (column + 0.5) * dx, y0 + (row + 0.5) * dy)
+            if abs(plane(lon, lat, middle, 0)) > reach or abs(plane(lon, lat, middle, 1)) > 1400.0:
+                continue
+            far = max(far, abs(height - plane(lon, lat, middle, axis)))
+            count += 1
+    return far, count
+
+
+class Program:
+    def __init__(self, folder, bin_dir):
+        self.folder = folder
+        self.bin = bin_dir
+
+    def run(self, *arguments):
+        return subprocess.run([f"{self.bin}/isohf", *map(str, arguments)], capture_output=True, text=True, check=False)
+
+    def must(self, *arguments):
+        result = self.run(*arguments)
+        check(result.returncode == 0, f"isohf {' '.join(map(str, arguments))}: {result.stderr.strip()}")
+        return result
+
+    def refuses(self, said, *arguments):
+        result = self.run(*arguments)
+        lines = result.stderr.strip().splitlines()
+        check(result.returncode != 0 and len(lines) == 1 and said in lines[0],
+              f"isohf {' '.join(map(str, arguments))}: must say '{said}' in one line, said: {result.stderr.strip()}")
+
+
+def projections(isohf, folder):
+    """convert --projection SYSTEM, and what is sampled and exported of it."""
+    middle = (7.2, 46.6)
+    for axis in (0, 1):
+        source = folder / f"degrees{axis}.tif"
+        write(source, "EPSG:4326", *middle, 30.0, middle, axis)
+        for text in ("EPSG:2154", "EPSG:3035", "EPSG:2056", "EPSG:3857", "ESRI:54009",
+                     "+proj=tmerc +lat_0=0 +lon_0=7 +k=1 +x_0=0 +y_0=0 +datum=WGS84 +units=us-ft"):
+            archive = folder / "a.isohf"
+            isohf.must("convert", source, "-o", archive, "--overwrite", "--type", "f32", "--projection", text, "-q")
+            isohf.must("export", archive, folder / "a.tif", "--overwrite", "-q")
+            far, count = worst(folder / "a.tif", text, middle, axis)
+            check(far <= NEAR and count > 100, f"--projection {text}: off by {far} m at {count} samples")
+            for lon, lat in (middle, (7.21, 46.61), (7.19, 46.592)):
+                at = isohf.must("sample", archive, "--at-lonlat", lon, lat).stdout.split()
+                off = abs(float(at[0]) - plane(lon, lat, middle, axis))
+                check(off <= NEAR, f"--projection {text}: {lon} {lat} is off by {off} m")
+                isohf.must("shade", archive, "-o", folder / "a.png", "--overwrite", "-q") if lon == 7.21 else None
+            isohf.must("verify", archive, "--against", source, "-q")
+    results = []
+    for threads in (1, 2, 7):
+        isohf.must("convert", folder / "degrees0.tif", "-o", folder / "t.isohf", "--overwrite", "--projection", "EPSG:2056",
+                   "-q", "-j", threads)
+        results.append((folder / "t.isohf").read_bytes())
+    check(len(set(results)) == 1, "bytes depend on the number of threads")
+    for text, why in (("EPSG:4258", "counts degrees and is no map"), ("EPSG:999999", "does not understand"),
+                      ("IAU_2015:49910", "cannot be reached"), ("EPSG:5773", "no projected or geographic")):
+        isohf.refuses(why, "convert", folder / "degrees0.tif", "-o", folder / "n.isohf", "--projection", text)
+
+
+def joined(isohf, folder):
+    """Rasters of two zones as one surface."""
+    middle = (12.0, 46.6)
+    for axis in (0, 1):
+        write(folder / "w.tif", "EPSG:32632", 11.985, 46.6, 30.0, middle, axis)
+        write(folder / "e.tif", "EPSG:32633", 12.015, 46.6, 30.0, middle, axis)
+        pair = (folder / "w.tif", folder / "e.tif")
+        isohf.refuses("--projection joins them", "convert", *pair, "-o", folder / "n.isohf")
+        for text, wanted in (("EPSG:3035", "EPSG:3035"), ("EPSG:32632", "EPSG:32632"), ("utm:33N", "EPSG:32633"),
+                             ("auto", None), ("EPSG:3857", "EPSG:3857")):
+            archive = folder / "j.isohf"
+            isohf.must("convert", *pair, "-o", archive, "--overwrite", "--type", "f32", "--projection", text, "-q")
+            isohf.must("export", archive, folder / "j.tif", "--overwrite", "-q")
+            own = gdal.Open(str(folder / "j.tif")).GetProjection()
+            far, count = worst(folder / "j.tif", wanted or own, middle, axis, 2400.0)
+            check(far <= NEAR and count > 200, f"joined by {text}: off by {far} m at {count} samples")
+            isohf.must("verify", archive, "--against", pair[0], "--against", pair[1], "-q")
+            for lon in (11.97, 12.0, 12.03):
+                at = isohf.must("sample", archive, "--at-lonlat", lon, 46.6).stdout.split()
+                off = abs(float(at[0]) - plane(lon, 46.6, middle, axis))
+                check(off <= NEAR, f"joined by {text}: {lon} is off by {off} m")
+        # Files of the map that they are joined on keep their samples.
+        isohf.must("convert", *pair, "-o", folder / "l.isohf", "--overwrite", "--lossless", "--projection", "EPSG:32632", "-q")
+        isohf.must("restore", folder / "l.isohf", folder / "l.tif", "--overwrite", "-q")
+        whole = gdal.Open(str(folder / "l.tif"))
+        west = gdal.Open(str(pair[0]))
+        a = whole.GetGeoTransform()
+        b = west.GetGeoTransform()
+        column = round((b[0] - a[0]) / a[1])
+        row = round((b[3] - a[3]) / a[5])
+        part = whole.ReadAsArray(column, row, 40, SIZE)
+        check(numpy.array_equal(part, west.ReadAsArray(0, 0, 40, SIZE)), "samples on the map itself are not kept")
+    results = []
+    for threads in (1, 3):
+        isohf.must("convert", *pair, "-o", folder / "t.isohf", "--overwrite", "--projection", "EPSG:3035", "-q", "-j", threads)
+        results.append((folder / "t.isohf").read_bytes())
+    check(results[0] == results[1], "bytes of a joined mosaic depend on the number of threads")
+
+
+def other_parameters(isohf, folder):
+    """Two maps that differ in one parameter never join as if they were equal."""
+    middle = (11.2, 47.1)
+    write(folder / "first.tif", FIRST, *middle, 30.0, middle, 0, 40)
+    isohf.must("convert", folder / "first.tif", "-o", folder / "first.isohf", "--overwrite", "-q")
+    for old, new in OTHERS:
+        text = FIRST.replace(old, new)
+        assert text != FIRST
+        write(folder / "other.tif", text, *middle, 30.0, middle, 0, 40)
+        isohf.refuses("--projection joins them", "convert", folder / "first.tif", folder / "other.tif", "-o",
+                      folder / "n.isohf")
+        like = isohf.run("restore", folder / "first.isohf", folder / "like.tif", "--overwrite", "--like",
+                         folder / "other.tif")
+        check(like.returncode != 0 and len(like.stderr.strip().splitlines()) == 1, f"--like takes {new} for {old}")
+        photo = gdal.GetDriverByName("GTiff").CreateCopy(str(folder / "photo.tif"), gdal.Translate(
+            "", str(folder / "other.tif"), format="MEM", outputType=gdal.GDT_Byte))
+        photo = None
+        texture = isohf.run("convert", folder / "first.tif", "-o", folder / "n.isohf", "--overwrite", "--texture",
+                            folder / "photo.tif")
+        check(texture.returncode != 0 and len(texture.stderr.strip().splitlines()) == 1,
+              f"--texture takes {new} for {old}")
+
+
+def written_elsewhere(isohf, folder):
+    """export and restore --crs."""
+    middle = (9.4, 46.8)
+    for axis in (0, 1):
+        for own in ("EPSG:32632", "EPSG:4326", "EPSG:2056"):
+            source = folder / "own.tif"
+            write(source, own, *middle, 30.0, middle, axis)
+            for options in ([], ["--projection", "EPSG:3035"]):
+                isohf.must("convert", source, "-o", folder / "o.isohf", "--overwrite", "--type", "f32", "-q", *options)
+                for text in ("EPSG:4326", "EPSG:3035", "EPSG:21781", "EPSG:3857", "EPSG:25832"):
+                    for command in ("export", "restore"):
+                        isohf.must(command, folder / "o.isohf", folder / "o.tif", "--overwrite", "-q", "--crs", text)
+                        far, count = worst(folder / "o.tif", text, middle, axis)
+                        check(far <= NEAR and count > 100,
+                              f"{command} of {own} {options} --crs {text}: off by {far} m at {count} samples")
+    isohf.must("export", folder / "o.isohf", folder / "cut.tif", "--overwrite", "-q", "--crs", "EPSG:3857", "--tiles", "2x2",
+               "--tile-size", "32")
+    far, count = worst(folder / "cut_x1_y1.tif", "EPSG:3857", middle, 1)
+    check(far <= NEAR and count > 5, f"the South-East tile is off by {far} m at {count} samples")
+    isohf.refuses("hex", "export", folder / "o.isohf", folder / "n.tif", "--crs", "EPSG:3857", "--method", "hex")
+    isohf.refuses("does not understand", "export", folder / "o.isohf", folder / "n.tif", "--crs", "EPSG:999999")
+    isohf.refuses("degrees", "export", folder / "o.isohf", folder / "n.tif", "--crs", "EPSG:4326", "--spacing", "30m")
+
+
+def loads_no_proj(isohf, folder):
+    """What reads and says nothing of maps loads no PROJ: .hgt, degrees, UTM zones and archives of these."""
+    rows = numpy.zeros((1201, 1201), dtype=">i2")
+    (folder / "N46E009.hgt").write_bytes(rows.tobytes())
+    write(folder / "utm.tif", "EPSG:32632", 9.0, 46.0, 30.0, (9.0, 46.0), 0)
+    isohf.must("convert", folder / "N46E009.hgt", "-o", folder / "h.isohf", "--overwrite", "-q")
+    isohf.must("convert", folder / "utm.tif", "-o", folder / "u.isohf", "--overwrite", "-q")
+    for path in ("N46E009.hgt", "h.isohf", "utm.tif", "u.isohf"):
+        environment = dict(os.environ, LD_DEBUG="files")
+        result = subprocess.run([f"{isohf.bin}/isohf", "info", str(folder / path)], env=environment, capture_output=True,
+                                text=True, check=False)
+        check(result.returncode == 0 and "calling init" in result.stderr and "libproj" not in result.stderr
+              and "isohf_proj" not in result.stderr, f"info {path} loads PROJ")
+
+
+def beside(isohf, folder):
+    """Files beside a raster that is replaced say nothing of the new one; other kinds stay."""
+    write(folder / "placed.tif", "EPSG:3035", 10.0, 52.0, 30.0, (10.0, 52.0), 0, 40)
+    isohf.must("convert", folder / "placed.tif", "-o", folder / "p.isohf", "--overwrite", "-q")
+    raster = gdal.GetDriverByName("GTiff").Create(str(folder / "bare.tif"), 40, 40, 1, gdal.GDT_Float32)
+    raster.GetRasterBand(1).WriteArray(numpy.arange(1600, dtype=numpy.float32).reshape(40, 40))
+    raster = None
+    isohf.must("convert", folder / "bare.tif", "-o", folder / "b.isohf", "--overwrite", "-q")
+    for name, said in (("a.png", ("a.pgw", "a.png.aux.xml")), ("a.exr", ("a.erw", "a.exr.aux.xml")), ("b.asc", ("b.prj",)),
+                       ("b.flt", ("b.prj",)), ("c.tif", ("c.tif.aux.xml", "c.tfw", "c.prj"))):
+        isohf.must("export", folder / "p.isohf", folder / name, "--overwrite", "-q")
+        if name == "c.tif":
+            (folder / "c.tif.aux.xml").write_text("<PAMDataset><SRS>EPSG:4326</SRS></PAMDataset>")
+            (folder / "c.tfw").write_text("1\n0\n0\n-1\n5\n6\n")
+            (folder / "c.prj").write_text(system("EPSG:4326").ExportToWkt())
+        for other in said:
+            check((folder / other).exists(), f"{name} has no {other} beside it")
+        isohf.must("export", folder / "b.isohf", folder / name, "--overwrite", "-q")
+        for other in said:
+            check(not (folder / other).exists(), f"{other} of the raster before is still beside {name}")
+    (folder / "k.tif.aux.xml").write_text("my notes")
+    for _ in range(2):
+        isohf.must("export", folder / "b.isohf", folder / "k.tif", "--overwrite", "-q")
+    check((folder / "k.tif.aux.xml").exists(), "a file of another kind is gone")
+
+
+def samples(isohf, folder):
+    """The source's own samples in formats that hold them otherwise."""
+    def kept(name, array, kind, scale=None, void=None):
+        raster = gdal.GetDriverByName("GTiff").Create(str(folder / name), array.shape[1], array.shape[0], 1, kind)
+        raster.SetGeoTransform((500000, 10, 0, 5000000, 0, -10))
+        raster.SetProjection(system("EPSG:32632").ExportToWkt())
+        band = raster.GetRasterBand(1)
+        if scale:
+            band.SetScale(scale)
+        if void is not None:
+            band.SetNoDataValue(void)
+        band.WriteArray(array)
+        band = raster = None
+        isohf.must("convert", folder / name, "-o", folder / "k.isohf", "--overwrite", "--lossless", "-q")
+
+    decimals = numpy.round(numpy.linspace(100.0, 220.0, 1600).reshape(40, 40), 2)
+    kept("d.tif", decimals, gdal.GDT_Float64)
+    isohf.refuses("--round takes the nearest", "restore", folder / "k.isohf", folder / "d.exr")
+    said = isohf.must("restore", folder / "k.isohf", folder / "d.exr", "--round").stdout
+    error = numpy.abs(decimals.astype(numpy.float32).astype(numpy.float64) - decimals).max()
+    check(f"rounded by up to {error:.3g}" in said, f"--round says {said}, must say {error:.3g}")
+    tenths = numpy.arange(1600, dtype=numpy.int16).reshape(40, 40)
+    tenths[3, 4] = -32768
+    kept("t.tif", tenths, gdal.GDT_Int16, 0.1, -32768)
+    isohf.must("restore", folder / "k.isohf", folder / "t.asc", "-q")
+    found = numpy.loadtxt(str(folder / "t.asc"), skiprows=6)
+    check(found[3, 3] == 12.3, f"123 tenths are {found[3, 3]}")
+    check(found[3, 4] < -1e38, f"a void is {found[3, 4]}")
+    isohf.refuses("which uint16 does not hold", "restore", folder / "k.isohf", folder / "t.png")
+    whole = numpy.arange(1600, dtype=numpy.int16).reshape(40, 40)
+    kept("w.tif", whole, gdal.GDT_Int16, None, -32768)
+    for name in ("w.png", "w.r16"):
+        isohf.must("restore", folder / "k.isohf", folder / name, "-q")
+    check(numpy.array_equal(gdal.Open(str(folder / "w.png")).ReadAsArray(), whole), "samples of a PNG differ")
+
+
+def main():
+    if len(sys.argv) != 2:
+        print(__doc__, file=sys.stderr)
+        return 2
+    bin_dir = pathlib.Path(sys.argv[1]).resolve()
+    for part in (projections, joined, other_parameters, written_elsewhere, loads_no_proj, beside, samples):
+        with tempfile.TemporaryDirectory(prefix="placement") as folder:
+            part(Program(pathlib.Path(folder), bin_dir), pathlib.Path(folder))
+    print(f"{len(failures)} failures")
+    return 1 if failures else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
