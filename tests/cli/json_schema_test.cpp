@@ -175,7 +175,7 @@ TEST(JsonSchema, HoldsForEveryCommandsSuccessAndFailure) {
   documents.run(2, "error", {"extract", b, "-o", folder / "one.isohf", "--tiles", "0:1,0:1"});
   documents.run(0, "part", {"merge", b, "-o", folder / "merged.isohf"});
   documents.run(2, "error", {"merge", a, b, "-o", folder / "two.isohf"});
-  documents.run(0, "diff", {"diff", b, folder / "merged.isohf", "--surface"});
+  documents.run(0, "diff", {"diff", b, folder / "merged.isohf", "--surface", "--raster", folder / "difference.tif"});
   documents.run(3, "diff", {"diff", a, b});
   documents.run(1, "error", {"diff", a, folder / "none.isohf"});
   const std::string land = folder / "land.plan";

@@ -144,6 +144,23 @@ TEST_F(Parts, LastArchiveGivesTheTileAndEverythingFollows) {
   ASSERT_GT(difference.tiles_differing, 1);
   EXPECT_NEAR(difference.surface->max, 9.0, 1.5);  // the cubic goes beyond a cliff
   EXPECT_EQ(difference.surface->voids, 0);
+  double most = 0.0;
+  std::int64_t changed_samples = 0;
+  std::int64_t voids = 0;
+  subtract_archives(old, changed, [&](std::int64_t row, std::span<const double> samples) {
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+      const double x = static_cast<double>(static_cast<std::int64_t>(i) % 210) - 150.0;
+      const double z = static_cast<double>(row + static_cast<std::int64_t>(i) / 210) - 100.0;
+      voids += std::isnan(samples[i]) ? 1 : 0;
+      if (!(std::abs(samples[i]) > 0.0)) continue;
+      ++changed_samples;
+      EXPECT_LT(std::hypot(x, z), 16.0);
+      most = std::max(most, samples[i]);
+    }
+  });
+  EXPECT_NEAR(most, 9.0, 1.5);
+  EXPECT_NEAR(static_cast<double>(changed_samples), 3.14 * 14.0 * 14.0, 100.0);  // the filter reaches beyond it
+  EXPECT_NEAR(static_cast<double>(voids), 3.14 * 25.0 * 25.0, 250.0);            // the lake
   // With what is around, so that edges meet: but the seeds of these rows are those of the joined tiles.
   const TileRange& around = difference.bounds;
   const std::string update = cut(changed, "update.isohf", around);

@@ -7,12 +7,15 @@
 
 #include "commands/command.h"
 #include "isohf/parts.h"
+#include "isohf/surface.h"
 #include "open_archive.h"
 #include "options/describe.h"
 #include "options/options_common.h"
 #include "output/json_output.h"
+#include "output/output_kinds.h"
 #include "output/part_output.h"
 #include "output/standard_output.h"
+#include "raster/restored_raster.h"
 
 namespace isohf::cli {
 namespace {
@@ -23,13 +26,16 @@ differs: metadata that tell of the making (producer, level, sizes) count as well
 
 Examples:
   isohf diff old.isohf new.isohf
-  isohf diff old.isohf new.isohf --surface        how far the elevations lie apart)";
+  isohf diff old.isohf new.isohf --surface             how far the elevations lie apart
+  isohf diff old.isohf new.isohf --raster changes.tif  and where)";
 
 struct DiffCommand {
   CommonOptions common;
   WorkOptions work;
   std::vector<std::string> archives;
   bool surface = false;
+  std::string raster;
+  bool overwrite = false;
 };
 
 std::optional<DiffCommand> parse(const Arguments& arguments) {
@@ -38,6 +44,9 @@ std::optional<DiffCommand> parse(const Arguments& arguments) {
   line.group("Arguments");
   line.positionals("FIRST SECOND", "The two archives", options.archives);
   line.flag("--surface", "Decode the tiles that differ, and say how far their elevations lie apart", options.surface);
+  line.option("--raster", "RASTER",
+              "Write SECOND minus FIRST at the places of FIRST's source samples (.tif, .exr, ...)", options.raster);
+  line.flag("--overwrite", "Replace RASTER where it exists", options.overwrite);
   add_work_options(line, options.work);
   add_common_options(line, options.common);
   line.footer(kFooter);
@@ -67,7 +76,8 @@ ordered_json json_from(const DiffCommand& options, const ArchiveDifference& foun
                        {"only_in_first", found.only_first},
                        {"only_in_second", found.only_second},
                        {"differing", tiles},
-                       {"surface", nullptr}};
+                       {"surface", nullptr},
+                       {"raster", options.raster.empty() ? ordered_json(nullptr) : ordered_json(options.raster)}};
   if (found.surface) {
     json["surface"] = {
         {"vertices", found.surface->compared}, {"voids", found.surface->voids},
@@ -105,16 +115,36 @@ std::string text_from(const DiffCommand& options, const ArchiveDifference& found
   return text;
 }
 
+/// Floats where the format has them.
+void write_difference(const DiffCommand& options, const Job& job) {
+  const Metadata metadata = open_archive(options.archives[0]).metadata();
+  const SampleGrid grid = natural_grid(metadata);
+  const SampleMapping mapping{restored_type(options.raster, SampleType::kFloat32), 1.0, 0.0};
+  const auto void_value = usual_nodata(mapping.type);
+  const SampleStore store(mapping, void_value, false);
+  RasterSpec spec = raster_spec(metadata, grid, mapping, void_value);
+  spec.overwrite = options.overwrite;
+  const auto sink = create_raster(options.raster, spec);
+  SampleStore::Result counts;
+  const auto take = [&](std::int64_t row, std::span<const double> difference) {
+    sink->write_rows(store_rows(store, mapping.type, options.raster, grid.width, row, difference, counts));
+  };
+  subtract_archives(options.archives[0], options.archives[1], take, job);
+  sink->finish();
+}
+
 }  // namespace
 
 int command_diff(const Arguments& arguments) {
   const auto options = parse(arguments);
   if (!options) return kExitDone;
   for (const std::string& archive : options->archives) (void)open_archive(archive);
+  if (!options->raster.empty()) check_raster_output(options->archives, options->raster, options->overwrite);
   std::optional<ProgressDisplay> display(std::in_place, options->work.progress, options->common.quiet,
                                          options->common.verbose);
   const ArchiveDifference found =
       diff_archives(options->archives[0], options->archives[1], options->surface, job_from(options->work, *display));
+  if (!options->raster.empty()) write_difference(*options, job_from(options->work, *display));
   display.reset();
   StandardOutput out;
   if (options->common.json) out.write(json_text(json_from(*options, found)));

@@ -9,6 +9,7 @@
 #include "isohf/archive.h"
 #include "isohf/job.h"
 #include "isohf/metadata.h"
+#include "isohf/surface.h"
 #include "isohf/tile_range.h"
 
 /// Archives that are cut, joined and compared without coding a tile again (docs/cluster.md). A part is an archive on the
@@ -90,5 +91,10 @@ struct ArchiveDifference {
 /// with `surface` those that differ. Stage "compare". Memory is bounded.
 [[nodiscard]] ArchiveDifference diff_archives(const std::string& first, const std::string& second, bool surface = false,
                                               const Job& job = {});
+
+/// Elevations of second - first, by the triangles, on natural_grid() of the first; NaN where one of them has none. As
+/// RowReader::read_all(). Throws Error{kInvalidArgument} where they lie on two lattices. Stage "difference".
+void subtract_archives(const std::string& first, const std::string& second, const RowReader::Take& take,
+                       const Job& job = {});
 
 }  // namespace isohf

@@ -203,13 +203,12 @@ void write_tiles(const Conversion& conversion, ArchiveWriter& writer, const Stag
 }
 
 /// Rows of tiles on either side of a shard, for its coarse planes and its residuals: what is needed as a rule.
-std::int64_t rows_around(const ConvertOptions& options, const PlaneInfo& planes) {
-  return (planes.count > 0 ? 1 : 0) + (options.lossless ? 2 : 0);
+std::int64_t rows_around(const ConvertOptions& options, const ShardWork& shard) {
+  return (shard.has_plane_rows ? 1 : 0) + (options.lossless ? 2 : 0);
 }
 
 /// What is beside a shard's own rows.
-TilesAround make_around(const Conversion& conversion, const ShardWork& shard, const PlaneInfo& planes,
-                        const ResidualStage* residuals) {
+TilesAround make_around(const Conversion& conversion, const ShardWork& shard, const ResidualStage* residuals) {
   RowRange north{shard.first_row, shard.first_row - 1};
   RowRange south{shard.end_row, shard.end_row - 1};
   const auto reach_over = [&](const RowRange& needed) {
@@ -217,7 +216,7 @@ TilesAround make_around(const Conversion& conversion, const ShardWork& shard, co
     north.first = std::max<std::int64_t>(std::min(north.first, needed.first), 0);
     south.last = std::min(std::max(south.last, needed.last), conversion.plan.grid.tile_rows() - 1);
   };
-  if (planes.count > 0) reach_over({shard.first_row - 1, shard.end_row});
+  if (shard.has_plane_rows) reach_over({shard.first_row - 1, shard.end_row});
   if (residuals != nullptr) reach_over(residuals->tile_rows_needed());
   return {conversion, north, south};
 }
@@ -357,7 +356,7 @@ ConversionResult run_conversion(HeightSource& source, const Plan& plan, const st
   const Kernel kernel = Kernel::make(options.filter.value_or(kDefaultFilter));
   Prefilter prefilter = Prefilter::make(kernel.filter(), options.acquisition);
   const PlaneInfo coarse = options.planes ? planes_for(plan.grid) : PlaneInfo();
-  const std::int64_t beside = shard != nullptr ? 2 * rows_around(options, coarse) : 0;
+  const std::int64_t beside = shard != nullptr ? 2 * rows_around(options, *shard) : 0;
   const MemoryPlan memory =
       plan_memory(source, plan, options, job,
                   (textures ? textures->memory_bytes() : 0) + TilesAround::memory_bytes(plan.grid, beside));
@@ -413,7 +412,7 @@ ConversionResult run_conversion(HeightSource& source, const Plan& plan, const st
         residuals.emplace(source.as_stored(), plan.frame, plan.grid, conversion.quantisation, conversion.largest, rows);
       }
       if (shard != nullptr) {
-        around.emplace(make_around(conversion, *shard, coarse, residuals ? &*residuals : nullptr));
+        around.emplace(make_around(conversion, *shard, residuals ? &*residuals : nullptr));
       }
       if (coarse.count > 0) {
         planes.emplace(Planes(plan.grid, coarse.stride, coarse.count, plan.frame.wraps_x), conversion.quantisation,

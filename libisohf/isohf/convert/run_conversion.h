@@ -25,6 +25,8 @@ struct ShardWork {
   ShardPlan::Codes codes;
   PartRecord::Shard record;  ///< but for its sums
   std::optional<std::string> samples_sha256;
+  bool has_plane_rows =
+      false;  ///< each row of the first plane is above tiles of one shard, which makes it as the whole has it
 };
 
 /// Codes alone: the first pass over the source, where one is needed. `plan` must be made of options.plan.

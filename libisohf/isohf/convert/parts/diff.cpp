@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <oneapi/tbb/parallel_for.h>
 
 #include <algorithm>
@@ -127,6 +128,33 @@ ArchiveDifference diff_archives(const std::string& first, const std::string& sec
     found.surface = {all.compared, all.voids, std::sqrt(all.squares / count), all.sum / count, all.max, worst};
   }
   return found;
+}
+
+void subtract_archives(const std::string& first, const std::string& second, const RowReader::Take& take,
+                       const Job& job) {
+  constexpr std::int64_t kSamplesAtOnce = std::int64_t{1} << 18U;
+  const ArchiveReader a(first);
+  const ArchiveReader b(second);
+  if (const std::string why = why_other_lattice(a.metadata(), b.metadata()); !why.empty()) {
+    throw Error(ErrorCode::kInvalidArgument, fmt::format("{}: {} as {} has", second, why, first));
+  }
+  const SampleGrid grid = natural_grid(a.metadata());
+  Arena(job).execute([&] {
+    RowReader minuend(b, grid, RestoreMethod::kBarycentric);
+    RowReader subtrahend(a, grid, RestoreMethod::kBarycentric);
+    const std::int64_t step = std::max<std::int64_t>(kSamplesAtOnce / grid.width, 1);
+    for (std::int64_t row = 0; row < grid.height; row += step) {
+      job.throw_if_cancelled();
+      const std::int64_t rows = std::min(step, grid.height - row);
+      std::vector<double> difference(static_cast<std::size_t>(rows * grid.width));
+      std::vector<double> before(difference.size());
+      minuend.read(row, rows, difference);
+      subtrahend.read(row, rows, before);
+      for (std::size_t i = 0; i < before.size(); ++i) difference[i] -= before[i];
+      take(row, difference);
+      job.report({"difference", "rows", row + rows, grid.height});
+    }
+  });
 }
 
 }  // namespace isohf

@@ -308,7 +308,12 @@ ConvertSummary convert_shard(HeightSource& source, const ShardPlan& plan, int nu
   const Plan whole = planned(source, plan, number, options);
   const int count = static_cast<int>(plan.shards.size());
   const auto [first, end] = plan.shards[static_cast<std::size_t>(number - 1)];
-  const ShardWork work{first, end, *plan.codes, {digest_of(plan), number, count, {}}, plan.samples_sha256};
+  const ShardWork work{first,
+                       end,
+                       *plan.codes,
+                       {digest_of(plan), number, count, {}},
+                       plan.samples_sha256,
+                       holds_plane_rows(plan, options.planes ? planes_for(whole.grid) : PlaneInfo())};
   return run_conversion(source, whole, output, options, job, false, &work).summary;
 }
 
