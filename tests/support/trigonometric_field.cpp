@@ -113,14 +113,19 @@ double evaluate(const Kernel& kernel, View2D<const float> coefficients, View2D<c
            static_cast<double>(down.weights[static_cast<std::size_t>(j)]);
   };
   double valid = 0.0;
+  bool has_void = false;
   for (int j = 0; j < taps; ++j) {
     for (int i = 0; i < taps; ++i) {
       tap(i, j) = coefficient(across.first + i, down.first + j);
-      if (is_valid(across.first + i, down.first + j)) valid += weight_of(i, j);
+      if (is_valid(across.first + i, down.first + j)) {
+        valid += weight_of(i, j);
+      } else {
+        has_void = true;
+      }
     }
   }
   if (valid < 0.5) return nothing;
-  if (kernel.edges() == Edges::kOdd && taps % 2 == 0) {
+  if (kernel.edges() != Edges::kMirror && taps % 2 == 0) {
     for (int line = 0; line < 2 * taps; ++line) {  // rows, then columns
       go_on(taps, [&](int k) -> double& { return line < taps ? tap(k, line) : tap(line - taps, k); });
     }
@@ -137,9 +142,28 @@ double evaluate(const Kernel& kernel, View2D<const float> coefficients, View2D<c
     }
   }
   const double height = whole ? sum : sum / weight;
-  if (!kernel.is_limited()) return height;
   double least = std::numeric_limits<double>::infinity();
   double most = -least;
+  if (kernel.edges() == Edges::kHeld && has_void) {
+    // Samples around the place are what the kernel has at whole positions, where they are no voids.
+    for (const std::int64_t row : {down.first + taps / 2 - 1, down.first + taps / 2}) {
+      for (const std::int64_t column : {across.first + taps / 2 - 1, across.first + taps / 2}) {
+        if (!is_valid(column, row)) continue;
+        double sample = 0.0;
+        for (int j = 0; j < taps; ++j) {
+          for (int i = 0; i < taps; ++i) {
+            const double share = kernel.value(static_cast<double>(row - down.first - j)) *
+                                 kernel.value(static_cast<double>(column - across.first - i));
+            if (share != 0.0) sample += share * tap(i, j);
+          }
+        }
+        least = std::min(least, sample);
+        most = std::max(most, sample);
+      }
+    }
+    return std::clamp(height, 1.25 * least - 0.25 * most, 1.25 * most - 0.25 * least);
+  }
+  if (!kernel.is_limited()) return height;
   for (const std::int64_t row : {down.first + 1, down.first + 2}) {
     for (const std::int64_t column : {across.first + 1, across.first + 2}) {
       const std::int64_t c = mirror_index(column, samples.columns());

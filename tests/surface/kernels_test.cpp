@@ -160,7 +160,14 @@ TEST(Kernel, LimitedCubicAddsFourThirdsOfWhatCatmullRomAddsToAStraightLine) {
 }
 
 TEST(Edges, NamesRoundTripAndOthersAreRefused) {
-  for (const Edges edges : {Edges::kMirror, Edges::kOdd}) EXPECT_EQ(edges_from_string(to_string(edges)), edges);
+  for (const Edges edges : {Edges::kMirror, Edges::kOdd, Edges::kHeld})
+    EXPECT_EQ(edges_from_string(to_string(edges)), edges);
+  for (const Filter filter : {Filter::kNearest, Filter::kBilinear, Filter::kLimitedCubic, Filter::kBspline2}) {
+    EXPECT_EQ(usual_edges(filter), Edges::kOdd) << to_string(filter);
+  }
+  for (const Filter filter : {Filter::kCatmullRom, Filter::kBspline3, Filter::kBspline5, Filter::kLanczos6}) {
+    EXPECT_EQ(usual_edges(filter), Edges::kHeld) << to_string(filter);
+  }
   EXPECT_THROW((void)edges_from_string("Odd"), Error);
 }
 

@@ -21,8 +21,9 @@ void add_shape_options(CommandLine& line, PlanRequest& request) {
                 const auto [columns, rows] = parse_size(text, 1, kMaxTileRows);
                 request.shape = {static_cast<int>(columns), static_cast<int>(rows)};
               });
-  line.option("--levels", "N", "Levels of detail, 1 to 13 (default 4, fewer for a small input)",
-              [&](const std::string& text) { request.levels = static_cast<int>(parse_whole_number(text, 1, 13)); });
+  line.option(
+      "--levels", "N", "Levels of detail, 1 to 14 (default 4, fewer for a small input)",
+      [&](const std::string& text) { request.levels = static_cast<int>(parse_whole_number(text, 1, kMaxTileLevels)); });
   line.option("--triangles", "N", "Choose the shape of tiles with about N triangles each",
               [&](const std::string& text) {
                 request.budget = ShapeBudget{ShapeBudget::Kind::kTriangles, parse_whole_number(text, 1, kMostCount)};

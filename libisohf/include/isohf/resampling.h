@@ -31,10 +31,13 @@ inline constexpr Filter kDefaultFilter = Filter::kLimitedCubic;
 enum class Edges {
   kMirror,  ///< s[-k] = s[k]: bends a slope; archives that do not name a rule
   kOdd,     ///< s[-k] = 2 s[0] - s[k], mirrored at the last sample as a point: planes stay planes
+  kHeld,  ///< the same, and next to voids held near the samples around the place: at most a quarter of their range beyond it
 };
 
-[[nodiscard]] std::string to_string(Edges edges);                ///< "mirror", "odd"
+[[nodiscard]] std::string to_string(Edges edges);                ///< "mirror", "odd", "odd-held"
 [[nodiscard]] Edges edges_from_string(const std::string& text);  ///< throws Error{kInvalidArgument}
+/// What convert() does: kHeld, and kOdd of filters that it changes nothing of or that read three samples.
+[[nodiscard]] Edges usual_edges(Filter filter);
 
 /// What surrounds the source: tiles reach past its last sample unless they were fitted to it.
 enum class Outside {

@@ -154,7 +154,7 @@ Metadata describe_job(const SourceInfo& info, const Plan& plan, const ConvertOpt
   metadata.wraps_x = plan.frame.wraps_x;
   if (options.planes) metadata.planes = planes_for(plan.grid);
   metadata.filter = options.filter.value_or(kDefaultFilter);
-  metadata.edges = Edges::kOdd;
+  metadata.edges = usual_edges(*metadata.filter);
   metadata.acquisition = options.acquisition;
   metadata.level = options.level;
   metadata.source = record_of(info, plan.frame, options.source_note);
@@ -183,7 +183,9 @@ std::string difference_from_job(const std::string& metadata_json, const SourceIn
     const nlohmann::json theirs = made.value(name, nlohmann::json());
     const nlohmann::json ours = asked.value(name, nlohmann::json());
     if (!theirs.is_object() || !ours.is_object()) {
-      compare(name, theirs, ours);
+      const bool follows_filter =
+          std::string_view(name) == "edges" && made.value("filter", "") != asked.value("filter", "");
+      if (!follows_filter) compare(name, theirs, ours);
       continue;
     }
     for (const auto& [member, value] : ours.items()) {

@@ -170,13 +170,20 @@ Filter filter_from_string(const std::string& text) {
 }
 
 std::string to_string(Edges edges) {
+  if (edges == Edges::kHeld) return "odd-held";
   return edges == Edges::kOdd ? "odd" : "mirror";
 }
 
+Edges usual_edges(Filter filter) {
+  const Kernel kernel = Kernel::make(filter, Edges::kOdd);
+  return kernel.taps() >= 4 && !kernel.is_limited() ? Edges::kHeld : Edges::kOdd;
+}
+
 Edges edges_from_string(const std::string& text) {
+  if (text == "odd-held") return Edges::kHeld;
   if (text == "odd") return Edges::kOdd;
   if (text == "mirror") return Edges::kMirror;
-  throw Error(ErrorCode::kInvalidArgument, "edges is \"" + text + "\", must be odd or mirror");
+  throw Error(ErrorCode::kInvalidArgument, "edges is \"" + text + "\", must be odd-held, odd or mirror");
 }
 
 Kernel Kernel::make(Filter filter, Edges edges) {

@@ -27,20 +27,24 @@ struct TapWeights {
 ///   3. Let W = sum of w[i] v[j] over the taps whose sample is not void. A point with W < 1/2 is void.
 ///   4. The value is the sum of w[i] v[j] c[i, j]. Where some of these coefficients are NaN, they are left out and the
 ///      sum is divided by the weight of the others; a Prefilter leaves none NaN where rule 2 holds, so that happens
-///      only to samples that are their own coefficients. With Edges::kOdd and four samples around the point that are
-///      no voids, nothing is left out: the missing taps are continued like those beyond the raster's ends, first along
-///      each row whose two middle taps are samples, then row by row.
-///   5. Where is_limited(), a value beyond the range of the four samples around the point (of those that are no voids)
+///      only to samples that are their own coefficients. But with four samples around the
+///      point that are no voids, nothing is left out unless the rule is Edges::kMirror: the missing taps are continued
+///      like those beyond the raster's ends, first along each row whose two middle taps are samples, then row by row.
+///   5. With Edges::kHeld and four taps or more, where a tap's sample is a void: of the four samples around the point
+///      those that are no voids, as the kernel reconstructs them, have a range; a value farther beyond it than a
+///      quarter of it is moved to there.
+///   6. Where is_limited(), a value beyond the range of the four samples around the point (of those that are no voids)
 ///      is moved to its end.
 /// W is the plain sum, negative lobes included: the weights of the taps that were dropped then sum to at most 1/2, and
 /// the result stays an affine combination of heights, exact on level ground.
 class Kernel {
  public:
-  [[nodiscard]] static Kernel make(Filter filter, Edges edges = Edges::kOdd);
+  [[nodiscard]] static Kernel make(Filter filter, Edges edges);
+  [[nodiscard]] static Kernel make(Filter filter) { return make(filter, usual_edges(filter)); }
 
   [[nodiscard]] Filter filter() const { return filter_; }
   [[nodiscard]] Edges edges() const { return edges_; }
-  /// Rule 5 above.
+  /// Rule 6 above.
   [[nodiscard]] bool is_limited() const { return filter_ == Filter::kLimitedCubic; }
   /// Number of coefficients that one position reads: 1, 2, 3, 4, 6 or 12.
   [[nodiscard]] int taps() const { return taps_; }

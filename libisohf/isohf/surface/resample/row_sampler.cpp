@@ -109,7 +109,7 @@ void cell_ranges(const SourceBand& band, const TapWeights& rows, const SourceAxi
   vectorised<widen_to_next>(columns.width, least.data(), most.data());
 }
 
-/// Rule 5 of kernels.h; a NaN stays.
+/// Rule 6 of kernels.h; a NaN stays.
 ISOHF_KERNEL void hold_within_cells(const ColumnTaps& columns, const float* __restrict least,
                                     const float* __restrict most, float* __restrict values) {
   const std::int32_t* __restrict start = columns.start.data();

@@ -12,6 +12,7 @@ float VoidRule::at(double u, double v, const TapWeights& columns, const TapWeigh
   Taps taps;
   double valid_weight = 0.0;
   bool whole = true;
+  bool any_void = false;
   const auto weight = [&](std::size_t j, std::size_t i) { return double{columns.weights[i]} * rows.weights[j]; };
   const auto count = static_cast<std::size_t>(kernel_.taps());
   for (std::size_t j = 0; j < count; ++j) {
@@ -20,11 +21,13 @@ float VoidRule::at(double u, double v, const TapWeights& columns, const TapWeigh
       const std::int64_t row = rows.first + static_cast<std::int64_t>(j);
       taps[j][i] = coefficient(column, row);
       whole = whole && !std::isnan(taps[j][i]);
-      if (!is_void(column, row)) valid_weight += weight(j, i);
+      const bool here = is_void(column, row);
+      any_void = any_void || here;
+      if (!here) valid_weight += weight(j, i);
     }
   }
   if (valid_weight < 0.5) return std::numeric_limits<float>::quiet_NaN();
-  if (!whole && kernel_.edges() == Edges::kOdd) complete(taps);
+  if (!whole && kernel_.edges() != Edges::kMirror) complete(taps);
   double sum = 0.0;
   double missing_weight = 0.0;
   double weight_sum = 0.0;
@@ -39,6 +42,7 @@ float VoidRule::at(double u, double v, const TapWeights& columns, const TapWeigh
     }
   }
   const auto height = static_cast<float>(missing_weight == 0.0 ? sum : sum / weight_sum);
+  if (any_void && kernel_.edges() == Edges::kHeld) return held_near_samples(height, taps, columns, rows);
   if (!kernel_.is_limited()) return height;
   float least = std::numeric_limits<float>::infinity();
   float most = -least;
@@ -51,6 +55,32 @@ float VoidRule::at(double u, double v, const TapWeights& columns, const TapWeigh
     }
   }
   return held_within(height, least, most);
+}
+
+float VoidRule::held_near_samples(float height, const Taps& taps, const TapWeights& columns,
+                                  const TapWeights& rows) const {
+  const int middle = kernel_.taps() / 2 - 1;
+  const int reach = kernel_.interpolates() ? 0 : middle;
+  double least = std::numeric_limits<double>::infinity();
+  double most = -least;
+  for (const int z : {middle, middle + 1}) {
+    for (const int x : {middle, middle + 1}) {
+      if (is_void(columns.first + x, rows.first + z)) continue;
+      double corner = 0.0;
+      for (int j = -reach; j <= reach; ++j) {
+        for (int i = -reach; i <= reach; ++i) {
+          corner += kernel_.value(j) * kernel_.value(i) *
+                    taps[static_cast<std::size_t>(z + j)][static_cast<std::size_t>(x + i)];
+        }
+      }
+      if (std::isnan(corner)) continue;
+      least = std::min(least, corner);
+      most = std::max(most, corner);
+    }
+  }
+  if (least > most) return height;
+  const double more = 0.25 * (most - least);
+  return held_within(height, static_cast<float>(least - more), static_cast<float>(most + more));
 }
 
 /// Missing taps go on along each row whose middle two are there, then along each column: by distance from the middle,

@@ -23,6 +23,8 @@ class VoidRule {
   using Taps = std::array<std::array<double, kMaxTaps>, kMaxTaps>;  ///< [row][column], NaN where missing
   [[nodiscard]] double coefficient(std::int64_t column, std::int64_t row) const;
   void complete(Taps& taps) const;
+  [[nodiscard]] float held_near_samples(float height, const Taps& taps, const TapWeights& columns,
+                                        const TapWeights& rows) const;
   [[nodiscard]] float at_index(std::int64_t column, std::int64_t row) const;
   [[nodiscard]] bool is_void(std::int64_t column, std::int64_t row) const;
   [[nodiscard]] bool all_nearest_void(double u, double v) const;
