@@ -72,6 +72,15 @@ namespace isohf {
 /// are areas. A .prj beside is read.
 [[nodiscard]] std::unique_ptr<HeightSource> open_saga(const std::string& path, const OpenOptions& options);
 
+/// IDRISI's samples (.rst) and their documentation (.rdc), of which either is `path`; ROI_PAC's NAME.dem beside
+/// NAME.dem.rsc; a band of a VICAR file, whose map is left out; Terragen's heightfield, whose rows begin in the South.
+[[nodiscard]] std::unique_ptr<HeightSource> open_idrisi(const std::string& path, const OpenOptions& options);
+[[nodiscard]] std::unique_ptr<HeightSource> open_roi_pac(const std::string& path, const OpenOptions& options);
+[[nodiscard]] bool looks_like_vicar(std::span<const std::byte> head);
+[[nodiscard]] std::unique_ptr<HeightSource> open_vicar(const std::string& path, const OpenOptions& options);
+[[nodiscard]] bool looks_like_terragen(std::span<const std::byte> head);
+[[nodiscard]] std::unique_ptr<HeightSource> open_terragen(const std::string& path, const OpenOptions& options);
+
 /// A variable of two dimensions (those before of one value, columns first or last) in a netCDF file of the classic
 /// formats, which options.channel names, else the first; coordinates that are evenly spaced place it, "crs_wkt" or
 /// "spatial_ref" of its grid mapping say where, degrees without one are on WGS 84. Also GMT's grids of before CF. _FillValue and missing_value
@@ -141,6 +150,15 @@ namespace isohf {
 /// .prj beside. Blanked nodes, 1.70141e38 and above or the grid's own value, are nodata.
 [[nodiscard]] bool looks_like_surfer_grid(std::span<const std::byte> head);
 [[nodiscard]] std::unique_ptr<HeightSource> open_surfer_grid(const std::string& path, const OpenOptions& options);
+
+/// Points of a regular grid in text: x, y and z on each line, in any order of lines, some of them missing perhaps; blanks,
+/// commas or semicolons (with decimal commas) between them, a line of names, comments (#). Elevations that are all whole
+/// are int32, any others float64; points are posts. Opening reads the text twice, and puts the elevations into a file
+/// without a name in the folder for temporary files; in memory are the coordinates of rows and columns.
+[[nodiscard]] bool looks_like_xyz(std::span<const std::byte> head);
+/// Whether the file is called .xyz and begins with a point.
+[[nodiscard]] bool is_xyz(const std::string& path);
+[[nodiscard]] std::unique_ptr<HeightSource> open_xyz(const std::string& path, const OpenOptions& options);
 
 /// Whether the file is called .zip and is an archive with an .hgt inside, as NASADEM_HGT_n44e006.zip is.
 [[nodiscard]] bool is_zip_of_hgt(const std::string& path);

@@ -65,7 +65,8 @@ void DescribedSource::refuse(ErrorCode code, const std::string& what) const {
 }
 
 void DescribedSource::refuse_type(std::string_view name, const char* key) const {
-  refuse(ErrorCode::kUnsupported, fmt::format("{} is \"{}\", which isohf does not read", key, printable(name)));
+  refuse(name.empty() ? ErrorCode::kCorrupt : ErrorCode::kUnsupported,
+         fmt::format("{} is \"{}\", which isohf does not read", key, printable(name)));
 }
 
 double DescribedSource::number(const std::string& text, const std::string& what) const {

@@ -136,10 +136,14 @@ class VrtSource final : public FileSource {
     info_.height = whole(root, "rasterYSize");
     if (info_.width < 1 || info_.height < 1) fail(ErrorCode::kCorrupt, "has a rasterXSize or rasterYSize of 0");
     std::vector<pugi::xml_node> bands;
-    for (const pugi::xml_node& band : root.children("VRTRasterBand")) bands.push_back(band);
+    std::vector<std::string> names;
+    for (const pugi::xml_node& band : root.children("VRTRasterBand")) {
+      bands.push_back(band);
+      names.push_back(trimmed(band.child("Description").text().get()));
+    }
     if (bands.empty()) fail(ErrorCode::kCorrupt, "has no VRTRasterBand");
     const pugi::xml_node band =
-        bands[static_cast<std::size_t>(choose_band(info_, options, static_cast<std::int64_t>(bands.size())))];
+        bands[static_cast<std::size_t>(choose_band(info_, options, static_cast<std::int64_t>(bands.size()), names))];
     const std::string kind = band.attribute("subClass").value();
     if (!kind.empty() && kind != "VRTSourcedRasterBand") refuse("has a " + printable(kind));
     read_type(band);

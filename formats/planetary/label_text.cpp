@@ -132,6 +132,14 @@ class Parser {
     if (text_[at_] == '"' || text_[at_] == '\'') return quoted(key);
     std::string result = bare();
     if (result.empty()) fail(line_, fmt::format("{} has no value: found {}", key, what_is_here()));
+    // GDAL writes Mars_2000_(Sphere) without quotes.
+    while (at_ < text_.size() && text_[at_] == '(') {
+      const std::size_t end = text_.find_first_of(")\n", at_);
+      if (end == std::string_view::npos || text_[end] == '\n') break;
+      result += text_.substr(at_, end + 1 - at_);
+      at_ = end + 1;
+      result += bare();
+    }
     return result;
   }
 

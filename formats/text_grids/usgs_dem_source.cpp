@@ -115,8 +115,12 @@ std::int64_t UsgsDemHeader::whole(std::size_t first, std::size_t size, const cha
 }
 
 void UsgsDemHeader::read_grid(SourceInfo& info) {
-  if (whole(151, 6, "elevation pattern", 1, 4) != 1) {
-    throw Error(ErrorCode::kUnsupported, path_ + ": the elevation pattern is not regular (1), which is read");
+  // The oldest say none; 4 is what SDTS2DEM writes for a regular one.
+  if (!trimmed(field(151, 6)).empty()) {
+    const std::int64_t pattern = whole(151, 6, "elevation pattern", 1, 4);
+    if (pattern != 1 && pattern != 4) {
+      throw Error(ErrorCode::kUnsupported, path_ + ": the elevation pattern is not regular (1 or 4), which is read");
+    }
   }
   unit_ = static_cast<Unit>(whole(529, 6, "unit of the ground coordinates", 0, 3));
   if (unit_ == Unit::kRadian)
@@ -246,7 +250,7 @@ class UsgsDemSource final : public FileSource {
     std::uint64_t at = 0;
     UsgsDemHeader header(path, record(at));
     header.read_grid(info_);
-    read_profiles(at);
+    read_profiles(lines_ ? at : first_profile());
     place_profiles(header);
     header.read_system(info_);
     info_.block_width = info_.width;
@@ -276,6 +280,17 @@ class UsgsDemSource final : public FileSource {
     const std::size_t end = text.find('\n');
     if (end == std::string_view::npos || end > kRecordBytes + 1) return;
     lines_ = true;
+  }
+
+  /// Where the profiles begin: behind 1024 bytes, or fewer of the oldest header, of a Canadian one, and of one more.
+  [[nodiscard]] std::uint64_t first_profile() const {
+    for (const std::uint64_t at :
+         {std::uint64_t{kRecordBytes}, std::uint64_t{kLeastBytes}, std::uint64_t{1021}, std::uint64_t{893}}) {
+      std::string numbers(12, '\0');
+      numbers.resize(file_->read_some(at, std::as_writable_bytes(std::span(numbers))));
+      if (numbers == "     1     1") return at;  // row and column
+    }
+    return kRecordBytes;
   }
 
   /// The record at `at`, without its line end; moves `at` to the next. Empty at the end of the file.
@@ -462,8 +477,8 @@ bool looks_like_usgs_dem(std::span<const std::byte> head) {
     return value && *value >= low && *value <= high;
   };
   const auto is_text = [](char c) { return c >= ' ' && c <= '~'; };
-  return std::all_of(text.begin(), text.begin() + 168, is_text) && code(144, 0, 9) && code(150, 1, 4) &&
-         code(156, -9999, 99) && code(162, -9999, 9999);
+  return std::all_of(text.begin(), text.begin() + 168, is_text) && code(144, 0, 9) &&
+         (code(150, 1, 4) || text.substr(150, 6) == "      ") && code(156, -9999, 99) && code(162, -9999, 9999);
 }
 
 std::unique_ptr<HeightSource> open_usgs_dem(const std::string& path, const OpenOptions& options) {

@@ -65,8 +65,11 @@ void read_gdal_nodata(const std::string& text, SourceInfo& info) {
   }
 }
 
-void read_gdal_metadata(const std::string& xml, int sample, SourceInfo& info) {
-  const std::string band = std::to_string(sample);
+namespace {
+
+/// Calls take(role, band, text) for each <Item role="..." sample="...">.
+template <typename Take>
+void for_each_item(const std::string& xml, Take take) {
   std::size_t at = 0;
   while ((at = xml.find("<Item ", at)) != std::string::npos) {
     const std::size_t tag_end = xml.find('>', at);
@@ -76,12 +79,29 @@ void read_gdal_metadata(const std::string& xml, int sample, SourceInfo& info) {
     if (tag.back() == '/') continue;
     const std::size_t text_end = xml.find('<', at);
     if (text_end == std::string::npos) return;
-    const std::string role = attribute(tag, "role");
-    if (attribute(tag, "sample") == band && (role == "scale" || role == "offset" || role == "unittype")) {
-      read_gdal_item(role, trimmed(std::string_view(xml).substr(at, text_end - at)), info);
-    }
+    take(attribute(tag, "role"), attribute(tag, "sample"), trimmed(std::string_view(xml).substr(at, text_end - at)));
     at = text_end;
   }
+}
+
+}  // namespace
+
+void read_gdal_metadata(const std::string& xml, int sample, SourceInfo& info) {
+  const std::string band = std::to_string(sample);
+  for_each_item(xml, [&](const std::string& role, const std::string& of, const std::string& text) {
+    if (of == band && (role == "scale" || role == "offset" || role == "unittype")) read_gdal_item(role, text, info);
+  });
+}
+
+std::vector<std::string> gdal_band_names(const std::string& xml, std::size_t bands) {
+  std::vector<std::string> names(bands);
+  for_each_item(xml, [&](const std::string& role, const std::string& of, const std::string& text) {
+    std::size_t band = 0;
+    const auto [end, failure] = std::from_chars(of.data(), of.data() + of.size(), band);
+    if (role == "description" && failure == std::errc() && end == of.data() + of.size() && band < bands)
+      names[band] = text;
+  });
+  return names;
 }
 
 }  // namespace isohf

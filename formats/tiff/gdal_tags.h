@@ -19,4 +19,7 @@ void read_gdal_item(const std::string& role, const std::string& text, SourceInfo
 /// What isohf has no use for is skipped; malformed numbers become warnings.
 void read_gdal_metadata(const std::string& xml, int sample, SourceInfo& info);
 
+/// What GDAL_METADATA calls the bands, empty where it says nothing.
+[[nodiscard]] std::vector<std::string> gdal_band_names(const std::string& xml, std::size_t bands);
+
 }  // namespace isohf

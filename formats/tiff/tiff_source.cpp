@@ -35,11 +35,11 @@
 namespace isohf {
 namespace {
 
-/// Rows of bits are rows of bytes, each of up to eight pixels: blocks begin at whole bytes.
+/// Rows of samples that fill no bytes are rows of bytes: blocks begin at whole ones.
 TiffLayout layout_of_bytes(TiffLayout layout) {
-  if (layout.bits_per_sample == 1) {
-    layout.width = (layout.width + 7) / 8;
-    layout.block_width = (layout.block_width + 7) / 8;
+  if (layout.bits_per_sample != 8) {
+    layout.width = (layout.width * layout.bits_per_sample + 7) / 8;
+    layout.block_width = (layout.block_width * layout.bits_per_sample + 7) / 8;
     layout.bits_per_sample = 8;
   }
   return layout;
@@ -141,15 +141,20 @@ SampleType sample_type_of(const TiffLayout& layout) {
     int bits;
     SampleType type;
   };
-  constexpr std::array<Row, 9> kTypes = {{{kUnsigned, 8, SampleType::kUint8},
-                                          {kUnsigned, 16, SampleType::kUint16},
-                                          {kUnsigned, 32, SampleType::kUint32},
-                                          {kSigned, 8, SampleType::kInt8},
-                                          {kSigned, 16, SampleType::kInt16},
-                                          {kSigned, 32, SampleType::kInt32},
-                                          {kFloating, 16, SampleType::kFloat16},
-                                          {kFloating, 32, SampleType::kFloat32},
-                                          {kFloating, 64, SampleType::kFloat64}}};
+  constexpr std::array<Row, 14> kTypes = {{{kUnsigned, 8, SampleType::kUint8},
+                                           {kUnsigned, 10, SampleType::kUint16},
+                                           {kUnsigned, 12, SampleType::kUint16},
+                                           {kUnsigned, 24, SampleType::kUint32},
+                                           {kUnsigned, 64, SampleType::kFloat64},
+                                           {kSigned, 64, SampleType::kFloat64},
+                                           {kUnsigned, 16, SampleType::kUint16},
+                                           {kUnsigned, 32, SampleType::kUint32},
+                                           {kSigned, 8, SampleType::kInt8},
+                                           {kSigned, 16, SampleType::kInt16},
+                                           {kSigned, 32, SampleType::kInt32},
+                                           {kFloating, 16, SampleType::kFloat16},
+                                           {kFloating, 32, SampleType::kFloat32},
+                                           {kFloating, 64, SampleType::kFloat64}}};
   // Any other number means what no number does.
   const bool is_known = layout.sample_format >= kUnsigned && layout.sample_format <= kComplexFloating;
   const int stored_as = is_known && layout.sample_format != kUndefined ? layout.sample_format : kUnsigned;
@@ -160,10 +165,10 @@ SampleType sample_type_of(const TiffLayout& layout) {
       "undefined", "unsigned integer", "signed integer",        "floating-point",
       "undefined", "complex integer",  "complex floating-point"};
   const char* format = layout.sample_format < kFormats.size() ? kFormats[layout.sample_format] : "undefined";
-  throw Error(
-      ErrorCode::kUnsupported,
-      fmt::format("the samples are {} bit {}; isohf reads 8, 16 and 32 bit integers and 16, 32 and 64 bit floats",
-                  layout.bits_per_sample, format));
+  throw Error(ErrorCode::kUnsupported,
+              fmt::format("the samples are {} bit {}; isohf reads integers of 8, 16, 32 and 64 bits, unsigned ones of "
+                          "10, 12 and 24, and floats of 16, 32 and 64",
+                          layout.bits_per_sample, format));
 }
 
 void require_heights(const TiffLayout& layout) {
@@ -208,8 +213,17 @@ std::vector<std::string> channel_names(const TiffLayout& layout) {
   return names;
 }
 
-int choose_channel(const TiffLayout& layout, const std::string& wanted, SourceInfo& info) {
-  const std::vector<std::string> names = channel_names(layout);
+int choose_channel(const TiffLayout& layout, const std::vector<std::string>& described, const std::string& wanted,
+                   SourceInfo& info) {
+  std::vector<std::string> names = channel_names(layout);
+  const auto by_description = std::ranges::find(described, wanted);
+  if (!wanted.empty() && by_description != described.end()) {
+    if (names.size() > 1) info.channel = printable(wanted);
+    return static_cast<int>(by_description - described.begin());
+  }
+  for (std::size_t i = 0; i < std::min(names.size(), described.size()); ++i) {
+    if (!described[i].empty()) names[i] = printable(described[i]);
+  }
   const auto label = [&](std::size_t i) { return names[i].empty() ? std::to_string(i) : names[i]; };
   std::size_t chosen = 0;
   if (!wanted.empty()) {
@@ -251,7 +265,8 @@ class TiffSource final : public HeightSource {
       throw error.within(path);
     }
     apply_open_options(info_, options);
-    blocks_.emplace(file_, layout_, std::move(image), channel_);
+    if (fills_no_bytes()) require_readable_bits();
+    blocks_.emplace(file_, fills_no_bytes() ? layout_of_bytes(layout_) : layout_, std::move(image), channel_);
     describe_missing_blocks();
   }
 
@@ -269,9 +284,16 @@ class TiffSource final : public HeightSource {
   }
 
   void read_window(const Window& window, std::span<std::byte> samples) override {
-    if (!turned_) return blocks_->read(window, samples);
-    blocks_->read(turned(window, info_.height), samples);
-    turn_rows(samples, static_cast<std::size_t>(window.columns) * size_bytes(info_.sample_type));
+    const Window stored = turned_ ? turned(window, info_.height) : window;
+    if (fills_no_bytes()) {
+      read_bits(stored, samples);
+    } else {
+      blocks_->read(stored, samples);
+    }
+    if (turned_) turn_rows(samples, static_cast<std::size_t>(window.columns) * size_bytes(info_.sample_type));
+    if (layout_.bits_per_sample == 64 && layout_.sample_format != kFloating) {
+      widen_whole_numbers(info_.path, layout_.sample_format == kSigned, window, samples);
+    }
   }
 
   // From the South the windows of a caller do not begin where blocks do.
@@ -290,7 +312,8 @@ class TiffSource final : public HeightSource {
     info_.height = layout_.height;
     info_.sample_type = sample_type_of(layout_);
     for (const std::string& warning : tags.warnings) info_.warnings.push_back("libtiff: " + warning);
-    channel_ = choose_channel(layout_, options.channel, info_);
+    channel_ =
+        choose_channel(layout_, gdal_band_names(tags.gdal_metadata, layout_.samples_per_pixel), options.channel, info_);
     if (directories.has_more_pages)
       info_.warnings.emplace_back("there are several images in the file; the first is read");
     if (directories.has_broken)
@@ -303,6 +326,46 @@ class TiffSource final : public HeightSource {
     read_files_beside();
     check_orientation();
     bound_undeclared_voids(info_);
+  }
+
+  [[nodiscard]] bool fills_no_bytes() const {
+    return layout_.bits_per_sample == 10 || layout_.bits_per_sample == 12 || layout_.bits_per_sample == 24;
+  }
+
+  void require_readable_bits() const {
+    if (layout_.samples_per_pixel == 1 && !(layout_.bits_per_sample == 24 && layout_.big_endian)) return;
+    throw Error(
+        ErrorCode::kUnsupported,
+        fmt::format("{}: the samples are {} bit integers, {}; isohf reads little-endian ones of one channel",
+                    info_.path, layout_.bits_per_sample, layout_.big_endian ? "big-endian" : "of several channels"));
+  }
+
+  /// Bits follow each other from the highest on, as GDAL has it of 24 too; rows begin at a byte.
+  void read_bits(const Window& window, std::span<std::byte> samples) {
+    const std::int64_t bits = layout_.bits_per_sample;
+    const std::int64_t first = window.column * bits / 8;
+    const std::int64_t bytes = ((window.column + window.columns) * bits + 7) / 8 - first;
+    bits_.resize(static_cast<std::size_t>(bytes * window.rows));
+    blocks_->read({first, window.row, bytes, window.rows}, bits_);
+    std::byte* out = samples.data();
+    for (std::int64_t row = 0; row < window.rows; ++row) {
+      const std::byte* in = bits_.data() + row * bytes;
+      if (bits == 24) {
+        for (std::int64_t i = 0; i < window.columns; ++i, in += 3, out += sizeof(std::uint32_t)) {
+          const auto value = static_cast<std::uint32_t>(in[0]) << 16U | static_cast<std::uint32_t>(in[1]) << 8U |
+                             static_cast<std::uint32_t>(in[2]);
+          std::memcpy(out, &value, sizeof value);
+        }
+        continue;
+      }
+      std::int64_t at = window.column * bits - first * 8;
+      for (std::int64_t i = 0; i < window.columns; ++i, at += bits, out += sizeof(std::uint16_t)) {
+        // Ten or twelve bits from an even place lie in two bytes.
+        const unsigned both = static_cast<unsigned>(in[at / 8]) << 8U | static_cast<unsigned>(in[at / 8 + 1]);
+        const auto value = static_cast<std::uint16_t>(both >> (16 - at % 8 - bits) & ((1U << bits) - 1));
+        std::memcpy(out, &value, sizeof value);
+      }
+    }
   }
 
   void place(const TiffTags& tags) {
@@ -365,6 +428,7 @@ class TiffSource final : public HeightSource {
   bool is_placed_ = false;  // by its tags, if without an origin
   bool turned_ = false;     // the stored rows run from South to North
   std::optional<TiffBlocks> blocks_;
+  std::vector<std::byte> bits_;
 };
 
 }  // namespace

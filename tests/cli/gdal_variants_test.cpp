@@ -1,5 +1,6 @@
 /// One raster in the ways in which GDAL stores rasters, against what GDAL says of each.
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -157,11 +158,21 @@ TEST_F(GdalVariants, TransparentSamplesAreVoids) {
 }
 
 TEST_F(GdalVariants, TiffSampleTypes) {
-  for (const char* type : {"Byte", "UInt16", "UInt32", "Int32", "Float32", "Float64"}) {
+  for (const char* type : {"Byte", "UInt16", "UInt32", "Int32", "Int64", "Float32", "Float64"}) {
     const std::string name = std::string(type) + ".tif";
     expect_same("whole.tif", {name.c_str(), {"-ot", type, "-a_nodata", "none"}});
   }
-  expect_refused({"twelve.tif", {"-ot", "UInt16", "-co", "NBITS=12", "-a_nodata", "none"}}, "12 bit unsigned integer");
+  for (const char* bits : {"10", "12", "24"}) {
+    for (const std::vector<std::string>& more : std::vector<std::vector<std::string>>{
+             {}, {"-co", "COMPRESS=DEFLATE"}, {"-co", "TILED=YES", "-co", "BLOCKXSIZE=32", "-co", "BLOCKYSIZE=16"}}) {
+      std::vector<std::string> options = {
+          "-ot", bits[0] == '2' ? "UInt32" : "UInt16", "-co", std::string("NBITS=") + bits, "-a_nodata", "none"};
+      options.insert(options.end(), more.begin(), more.end());
+      const std::string name = fmt::format("bits{}_{}.tif", bits, more.empty() ? "plain" : more[1]);
+      expect_same("whole.tif", {name.c_str(), options});
+    }
+  }
+  expect_refused({"eleven.tif", {"-ot", "UInt16", "-co", "NBITS=11", "-a_nodata", "none"}}, "11 bit unsigned integer");
   expect_refused({"complex.tif", {"-ot", "CInt16", "-a_nodata", "none"}}, "complex integer");
 }
 
@@ -185,6 +196,7 @@ TEST_F(GdalVariants, OtherFormats) {
        std::vector<Variant>{{"a.asc", {"-of", "AAIGrid"}},
                             {"b.bil", {"-of", "EHdr"}},
                             {"c.cub", {"-of", "ISIS3"}},
+                            {"sphere.cub", {"-of", "ISIS3", "-a_srs", "ESRI:104971"}},
                             {"d.lbl", {"-of", "ISIS3", "-co", "DATA_LOCATION=EXTERNAL"}},
                             {"e.lbl", {"-of", "ISIS3", "-co", "DATA_LOCATION=GEOTIFF"}},
                             {"f.png", {"-of", "PNG", "-ot", "UInt16", "-a_nodata", "none"}},
@@ -209,6 +221,10 @@ TEST_F(GdalVariants, SamplesThatAHeaderDescribes) {
                             {"c.bil", {"-of", "ENVI", "-co", "SUFFIX=ADD", "-ot", "UInt16"}},
                             {"d.sdat", {"-of", "SAGA"}},
                             {"e.nc", {"-of", "netCDF"}},
+                            {"k.rst", {"-of", "RST"}},
+                            {"l.dem", {"-of", "ROI_PAC"}},
+                            {"i.xyz", {"-of", "XYZ"}},
+                            {"j.xyz", {"-of", "XYZ", "-co", "COLUMN_SEPARATOR=,", "-co", "ADD_HEADER_LINE=YES"}},
                             {"g.xml", {"-of", "PDS4"}},
                             {"h.xml", {"-of", "PDS4", "-a_nodata", "0", "-co", "INTERLEAVE=BIP"}},
                             {"f.nc", {"-of", "netCDF", "-co", "FORMAT=NC2", "-a_nodata", "0"}}}) {
@@ -219,6 +235,16 @@ TEST_F(GdalVariants, SamplesThatAHeaderDescribes) {
                                                      {"u.xml", {"-of", "PDS4", "-ot", "Float64"}},
                                                      {"t.nc", {"-of", "netCDF", "-co", "WRITE_BOTTOMUP=NO"}}}) {
     expect_same("real.tif", variant);
+  }
+  // Without a place, which GDAL gives these or isohf leaves out.
+  for (const Variant& variant : std::vector<Variant>{
+           {"m.vic", {"-of", "VICAR"}},
+           {"n.vic", {"-of", "VICAR", "-ot", "Float32"}},
+           {"o.ter",
+            {"-of", "Terragen", "-ot", "Float32", "-co", "MINUSERPIXELVALUE=-1", "-co", "MAXUSERPIXELVALUE=510"}}}) {
+    SCOPED_TRACE(variant.name);
+    ASSERT_NO_FATAL_FAILURE(translate(folder_ / "whole.tif", variant.name, variant.options));
+    expect_same_samples(folder_ / variant.name, false);
   }
   // Bands in each order.
   for (const std::string order : {"BSQ", "BIL", "BIP"}) {

@@ -246,6 +246,29 @@ constexpr const char* kSaga =
     "7\n"
     "CELLCOUNT_X = 4\nCELLCOUNT_Y = 3\nCELLSIZE = 10\nZ_FACTOR = 0.5\nNODATA_VALUE = 5\nTOPTOBOTTOM = FALSE\n";
 
+constexpr const char* kIdrisi =
+    "file format : Idrisi Raster A.1\ndata type   : integer\nfile type   : binary\ncolumns     : 4\nrows        : 3\n"
+    "ref. system : utm-33n\nref. units  : m\nunit dist.  : 1\nmin. X      : 10\nmax. X      : 50\nmin. Y      : 0\n"
+    "max. Y      : 30\nflag value  : 5\n";
+constexpr const char* kRoiPac =
+    "WIDTH 4\nFILE_LENGTH 3\nX_FIRST 10\nX_STEP 0.5\nY_FIRST 50\nY_STEP -0.5\nPROJECTION LATLON\nDATUM WGS84\n";
+
+std::string vicar() {
+  std::string label =
+      "LBLSIZE=256 FORMAT='HALF' TYPE='IMAGE' RECSIZE=16 ORG='BIL' NL=3 NS=4 NB=2 NBB=8 NLB=1 INTFMT='HIGH' "
+      "REALFMT='IEEE' COMPRESS='NONE'";
+  label.resize(256, ' ');
+  return label + std::string(16, 'h') + counting(48, 2);
+}
+
+std::string terragen() {
+  const auto chunk = [](const char* name, std::int16_t first, std::int16_t second) {
+    return name + little(first) + little(second);
+  };
+  return "TERRAGENTERRAIN " + chunk("SIZE", 2, 0) + chunk("XPTS", 4, 0) + chunk("YPTS", 3, 0) + "SCAL" + little(30.0F) +
+         little(20.0F) + little(10.0F) + chunk("ALTW", 100, 5) + counting(12, 2);
+}
+
 }  // namespace
 
 std::vector<ReaderCase> reader_cases() {
@@ -294,6 +317,12 @@ std::vector<ReaderCase> reader_cases() {
       {"SagaSamples", "a.sdat", "  " + counting(12, 2), open_saga, {}},
       {"NetcdfClassic", "a.nc", netcdf(), open_netcdf, {}},
       {"NetcdfByColumns", "a.nc", netcdf(true), open_netcdf, {}},
+      {"IdrisiHeader", "a.rdc", kIdrisi, open_idrisi, {}},
+      {"IdrisiSamples", "a.rst", counting(12, 2), open_idrisi, {}},
+      {"RoiPacHeader", "a.dem.rsc", kRoiPac, open_roi_pac, {}},
+      {"Vicar", "a.vic", vicar(), open_vicar, {}},
+      {"Terragen", "a.ter", terragen(), open_terragen, {}},
+      {"XyzText", "a.xyz", "x y z\n0 0 1\n1 0 2.5\n0 1 3\n1 1 4\n", open_xyz, {}},
       {"Pds4Label", "a.xml", pds4_label("a.dat"), open_pds4, {}},
       {"Pds4Samples", "a.dat", counting(7, 2), open_pds4, {}},
       {"StreamedAsciiGrid", "a.asc.gz", gzip(esri + numbers), open_ascii_grid, streamed},
@@ -319,8 +348,9 @@ std::vector<ReaderCase> reader_cases() {
     if (each.name == "EhdrHeader") each.beside.pop_back();
   }
   find("Vrt").beside = {{"a.npy", npy()}};
-  for (const auto& [header, samples, text] :
-       {std::tuple("EnviHeader", "EnviSamples", kEnvi), {"SagaHeader", "SagaSamples", kSaga}}) {
+  for (const auto& [header, samples, text] : {std::tuple("EnviHeader", "EnviSamples", kEnvi),
+                                              {"SagaHeader", "SagaSamples", kSaga},
+                                              {"IdrisiHeader", "IdrisiSamples", kIdrisi}}) {
     ReaderCase& damaged = find(header);
     ReaderCase& whole = find(samples);
     damaged.text = true;
@@ -345,7 +375,7 @@ std::vector<ReaderCase> reader_cases() {
   picture.beside = {{picture.opened, written(folder, picture.opened, 6, 5, SampleType::kUint16)}};
   picture.bytes = read_file(folder / picture.file_name);
   for (const char* name : {"EsriAsciiGrid", "GrassAsciiGrid", "Pds3", "Isis3", "Isis3Label", "Dted", "UsgsDem",
-                           "PngDescription", "RawDescription", "Npy", "SurferText", "Vrt", "Pds4Label"}) {
+                           "PngDescription", "RawDescription", "Npy", "SurferText", "Vrt", "Pds4Label", "XyzText"}) {
     find(name).text = true;
   }
   // The last digits of a text can be missing without trace; a world file, a .prj and a label's last words are not
@@ -357,6 +387,13 @@ std::vector<ReaderCase> reader_cases() {
   find("EhdrProjection").shortest_valid = 1;
   find("Isis3Label").shortest_valid = find("Isis3Label").bytes.size() - 1;
   find("UsgsDem").shortest_valid = find("UsgsDem").bytes.find_last_not_of(' ') + 1;
+  ReaderCase& roi_pac = find("RoiPacHeader");
+  roi_pac.text = true;
+  roi_pac.shortest_valid = 1;
+  roi_pac.opened = "a.dem";
+  roi_pac.beside = {{"a.dem", counting(12, 2)}};
+  find("Vicar").shortest_valid = find("Vicar").bytes.size() - 20;  // the other band's, and its prefix
+  find("XyzText").shortest_valid = find("XyzText").bytes.size() - 1;
   find("SurferText").shortest_valid = find("SurferText").bytes.size() - 2;
   find("PngDescription").shortest_valid = find("PngDescription").bytes.size() - 1;
   find("RawDescription").shortest_valid = find("RawDescription").bytes.size() - 1;

@@ -259,6 +259,20 @@ TEST_F(UsgsDem, NamesWhatItRefuses) {
   EXPECT_THAT(failure(std::string(records).replace(858, 6, "999999")), HasSubstr("says 999999 profiles"));
 }
 
+TEST_F(UsgsDem, ReadsHeadersOfOtherLengthsAndWithoutAPattern) {
+  const std::string records = header(small_dem()) + body(small_dem());
+  for (const std::size_t length : {864, 893, 1021}) {
+    EXPECT_EQ(test::values_of(*open_raster(write(records.substr(0, length) + records.substr(1024)), {})), kSmall)
+        << length;
+  }
+  for (const char* pattern : {"     4", "      "}) {
+    EXPECT_EQ(test::values_of(*open_raster(write(std::string(records).replace(150, 6, pattern)), {})), kSmall)
+        << pattern;
+  }
+  EXPECT_THAT(failure(std::string(records).replace(150, 6, "     2")),
+              HasSubstr("the elevation pattern is not regular"));
+}
+
 TEST_F(UsgsDem, RefusesEveryTruncation) {
   const std::string records = header(small_dem()) + body(small_dem());
   const std::size_t used = records.find_last_not_of(' ') + 1;

@@ -1,0 +1,266 @@
+/// More plain samples with a header: IDRISI's .rdc, ROI_PAC's .rsc, the labels of VICAR, and Terragen's chunks.
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "formats/binary_grids/described_source.h"
+#include "formats/files/text.h"
+#include "formats/georeference/files_beside.h"
+#include "formats/georeference/units.h"
+#include "formats/open_options.h"
+#include "formats/readers.h"
+#include "isohf/error.h"
+#include "isohf/raster.h"
+
+namespace isohf {
+namespace {
+
+std::string word_in(const HeaderWords& words, const char* key) {
+  const auto found = words.find(key);
+  return found == words.end() ? std::string() : lower_case(found->second);
+}
+
+class IdrisiSource final : public DescribedSource {
+ public:
+  IdrisiSource(const std::string& data, const std::string& header, const OpenOptions& options)
+      : DescribedSource(data, "IDRISI", header, options) {
+    (void)choose_band(info_, options, 1);
+    const HeaderWords words = read_header_words(header, ':');
+    set_size(number(words, "columns"), number(words, "rows"));
+    static constexpr std::array<std::pair<std::string_view, SampleType>, 3> kTypes = {
+        {{"byte", SampleType::kUint8}, {"integer", SampleType::kInt16}, {"real", SampleType::kFloat32}}};
+    if (const std::string kind = word_in(words, "file type"); kind != "binary") {
+      refuse(kind.empty() ? ErrorCode::kCorrupt : ErrorCode::kUnsupported,
+             fmt::format("file type is \"{}\", must be binary", printable(kind)));
+    }
+    set_type(kTypes, word_in(words, "data type"), "data type");
+    const double west = number(words, "min. x");
+    const double north = number(words, "max. y");
+    place_by_corner(west, north, (number(words, "max. x") - west) / static_cast<double>(info_.width),
+                    (north - number(words, "min. y")) / static_cast<double>(info_.height));
+    read_system(words);
+    const std::string flag = word_in(words, "flag value");
+    if (!flag.empty() && flag != "none") set_void(number(flag, "flag value"));
+    if (const auto unit = linear_unit(word_in(words, "value units"))) {
+      info_.vertical_unit = unit->name;
+      info_.metres_per_vertical_unit = unit->metres;
+    }
+    finish(options);
+  }
+
+ private:
+  void read_system(const HeaderWords& words) {
+    Georeference& place = info_.georeference;
+    const std::string system = word_in(words, "ref. system");
+    const std::string unit = word_in(words, "ref. units");
+    int zone = 0;
+    char half = 'n';
+    if (system == "latlong" || unit == "deg" || unit == "degrees") {
+      place.unit = HorizontalUnit::kDegree;
+      if (system == "latlong") place.system = wgs84_system();
+    } else if (const auto length = linear_unit(unit)) {
+      place.unit = HorizontalUnit::kMetre;
+      place.metres_per_unit = length->metres * number(words, "unit dist.", 1.0);
+    }
+    if (std::sscanf(system.c_str(), "utm-%d%c", &zone, &half) != 2 || zone < 1 || zone > 60) return;
+    place.system = wgs84_system();
+    place.system.epsg = (half == 's' ? 32700 : 32600) + zone;
+    place.system.name = fmt::format("WGS 84 / UTM zone {}{}", zone, half == 's' ? 'S' : 'N');
+  }
+};
+
+/// An interferometric DEM: NAME.dem of int16, and NAME.dem.rsc.
+class RoiPacSource final : public DescribedSource {
+ public:
+  RoiPacSource(const std::string& data, const std::string& header, const OpenOptions& options)
+      : DescribedSource(data, "ROI_PAC DEM", header, options) {
+    (void)choose_band(info_, options, 1);
+    const HeaderWords words = read_header_words(header, ' ');
+    info_.sample_type = SampleType::kInt16;
+    set_size(number(words, "width"), number(words, "file_length"));
+    if (words.contains("x_first") && words.contains("y_first")) {
+      place_by_corner(number(words, "x_first"), number(words, "y_first"), number(words, "x_step"),
+                      -number(words, "y_step"));
+    }
+    set_scale(number(words, "z_scale", 1.0), number(words, "z_offset", 0.0), "Z_SCALE");
+    Georeference& place = info_.georeference;
+    const std::string projection = word_in(words, "projection");
+    const bool is_wgs84 = word_in(words, "datum") == "wgs84";
+    int zone = 0;
+    if (projection.empty() || projection == "latlon" || projection == "ll") {
+      place.unit = HorizontalUnit::kDegree;
+      if (is_wgs84) place.system = wgs84_system();
+    } else if (std::sscanf(projection.c_str(), "utm%d", &zone) == 1 && zone >= 1 && zone <= 60) {
+      place.unit = HorizontalUnit::kMetre;
+      if (is_wgs84) {
+        place.system = wgs84_system();
+        place.system.epsg = 32600 + zone;
+        place.system.name = fmt::format("WGS 84 / UTM zone {}N", zone);
+      }
+    }
+    finish(options);
+  }
+};
+
+/// KEY=VALUE items apart by blanks, texts in quotes, lists in brackets (VICAR File Format, 1992); the first of a key
+/// counts, which is the system's.
+HeaderWords vicar_words(std::string_view text) {
+  HeaderWords words;
+  std::size_t at = 0;
+  while ((at = text.find_first_not_of(" \n\r\t\0", at)) != std::string_view::npos) {
+    const std::size_t equals = text.find('=', at);
+    if (equals == std::string_view::npos) break;
+    const std::string key = lower_case(trimmed(text.substr(at, equals - at)));
+    std::size_t begin = equals + 1;
+    while (begin < text.size() && text[begin] == ' ') ++begin;
+    const char first = begin < text.size() ? text[begin] : ' ';
+    const char closing = first == '\'' ? '\'' : first == '(' ? ')' : ' ';
+    const std::size_t end = std::min(text.find(closing, begin + 1), text.size());
+    words.emplace(key,
+                  std::string(text.substr(begin + (closing == '\'' ? 1 : 0), end - begin - (closing == '\'' ? 1 : 0))));
+    at = std::min(end + 1, text.size());
+  }
+  return words;
+}
+
+class VicarSource final : public DescribedSource {
+ public:
+  VicarSource(const std::string& path, const OpenOptions& options) : DescribedSource(path, "VICAR", path, options) {
+    constexpr std::size_t kMostLabelBytes = std::size_t{1} << 20U;
+    std::string head(64, '\0');
+    head.resize(file_->read_some(0, std::as_writable_bytes(std::span(head))));
+    const std::int64_t label = count(number(vicar_words(head), "lblsize"), "LBLSIZE");
+    if (static_cast<std::size_t>(label) > kMostLabelBytes)
+      refuse(ErrorCode::kCorrupt, "has a label of more than 1 MiB");
+    std::string text(static_cast<std::size_t>(label), '\0');
+    file_->read(0, std::as_writable_bytes(std::span(text)));
+    const HeaderWords words = vicar_words(text);
+    static constexpr std::array<std::pair<std::string_view, SampleType>, 7> kTypes = {{{"byte", SampleType::kUint8},
+                                                                                       {"half", SampleType::kInt16},
+                                                                                       {"word", SampleType::kInt16},
+                                                                                       {"full", SampleType::kInt32},
+                                                                                       {"long", SampleType::kInt32},
+                                                                                       {"real", SampleType::kFloat32},
+                                                                                       {"doub", SampleType::kFloat64}}};
+    set_type(kTypes, word_in(words, "format"), "FORMAT");
+    set_size(number(words, "ns"), number(words, "nl"));
+    const std::int64_t bands = count(number(words, "nb", 1.0), "NB");
+    const bool is_real = is_floating(info_.sample_type);
+    const std::string real = word_in(words, "realfmt");
+    if (is_real && real == "vax") {
+      if (info_.sample_type == SampleType::kFloat64) refuse(ErrorCode::kUnsupported, "REALFMT of its doubles is VAX");
+      layout_.stored_as = StoredAs::kVaxFloat;
+    }
+    layout_.big_endian = is_real ? real == "ieee" : word_in(words, "intfmt") == "high";
+    if (word_in(words, "compress") != "" && word_in(words, "compress") != "none") {
+      refuse(ErrorCode::kUnsupported, "its samples are compressed");
+    }
+    const std::string order = word_in(words, "org");
+    if (order != "bsq" && order != "bil" && order != "bip") {
+      refuse(ErrorCode::kCorrupt, fmt::format("ORG is \"{}\", must be BSQ, BIL or BIP", printable(order)));
+    }
+    if (word_in(words, "property") == "map")
+      info_.warnings.push_back(loss("the label's map is not read; the place is left out"));
+    const double prefix = static_cast<double>(count(number(words, "nbb", 0.0), "NBB", 0.0));
+    const double headers = static_cast<double>(count(number(words, "nlb", 0.0), "NLB", 0.0));
+    const double offset = static_cast<double>(label) + headers * number(words, "recsize", 0.0) + prefix;
+    layout_.offset_bytes = static_cast<std::uint64_t>(count(offset, "the samples' offset", 0.0));
+    layout_.take_band(info_,
+                      order == "bil"   ? BandOrder::kLines
+                      : order == "bip" ? BandOrder::kSamples
+                                       : BandOrder::kBands,
+                      choose_band(info_, options, bands), bands, header_, static_cast<std::uint64_t>(prefix));
+    finish(options);
+  }
+};
+
+class TerragenSource final : public DescribedSource {
+ public:
+  TerragenSource(const std::string& path, const OpenOptions& options)
+      : DescribedSource(path, "Terragen", path, options) {
+    (void)choose_band(info_, options, 1);
+    info_.sample_type = SampleType::kInt16;
+    layout_.from_south = true;
+    double columns = 0.0;
+    double rows = 0.0;
+    float scale_x = 30.0F;
+    float scale_y = 30.0F;
+    float scale_z = 30.0F;
+    for (std::uint64_t at = 16;;) {
+      std::array<std::byte, 16> chunk{};
+      if (file_->read_some(at, chunk) < 8) refuse(ErrorCode::kCorrupt, "ends before its elevations (ALTW)");
+      const std::string_view name = text_of(chunk).substr(0, 4);
+      const auto whole = [&](std::size_t offset) {
+        std::uint16_t value = 0;
+        std::memcpy(&value, chunk.data() + offset, sizeof value);
+        return value;
+      };
+      if (name == "SIZE") columns = rows = whole(4) + 1.0;
+      if (name == "XPTS") columns = whole(4);
+      if (name == "YPTS") rows = whole(4);
+      if (name == "SCAL") {
+        std::memcpy(&scale_x, chunk.data() + 4, sizeof scale_x);
+        std::memcpy(&scale_y, chunk.data() + 8, sizeof scale_y);
+        std::memcpy(&scale_z, chunk.data() + 12, sizeof scale_z);
+      }
+      if (name == "ALTW") {
+        const auto height = static_cast<double>(static_cast<std::int16_t>(whole(4)));
+        const auto base = static_cast<double>(static_cast<std::int16_t>(whole(6)));
+        set_scale(height / 65536.0 * static_cast<double>(scale_z), base * static_cast<double>(scale_z), "ALTW");
+        layout_.offset_bytes = at + 8;
+        break;
+      }
+      if (name == "EOF ") refuse(ErrorCode::kCorrupt, "has no elevations (ALTW)");
+      at += name == "SCAL" ? 16 : 8;
+    }
+    set_size(columns, rows);
+    Georeference& place = info_.georeference;
+    if (!(scale_x > 0.0F && scale_y > 0.0F)) refuse(ErrorCode::kCorrupt, "gives no positive spacing (SCAL)");
+    place.unit = HorizontalUnit::kMetre;
+    place.spacing_x = static_cast<double>(scale_x);
+    place.spacing_y = static_cast<double>(scale_y);
+    info_.vertical_unit = "metre";
+    finish(options);
+  }
+};
+
+}  // namespace
+
+std::unique_ptr<HeightSource> open_idrisi(const std::string& path, const OpenOptions& options) {
+  const bool is_data = lower_case(path).ends_with(".rst");
+  const std::filesystem::path name = std::filesystem::path(path).replace_extension(is_data ? ".rdc" : ".rst");
+  const std::string other = file_beside(path, name.filename().string());
+  if (other.empty()) throw Error(ErrorCode::kIo, fmt::format("{}: {} must be beside it", path, name.string()));
+  return std::make_unique<IdrisiSource>(is_data ? path : other, is_data ? other : path, options);
+}
+
+std::unique_ptr<HeightSource> open_roi_pac(const std::string& path, const OpenOptions& options) {
+  return std::make_unique<RoiPacSource>(path, path + ".rsc", options);
+}
+
+bool looks_like_vicar(std::span<const std::byte> head) {
+  return text_of(head).starts_with("LBLSIZE=");
+}
+
+std::unique_ptr<HeightSource> open_vicar(const std::string& path, const OpenOptions& options) {
+  return std::make_unique<VicarSource>(path, options);
+}
+
+bool looks_like_terragen(std::span<const std::byte> head) {
+  return text_of(head).starts_with("TERRAGENTERRAIN ");
+}
+
+std::unique_ptr<HeightSource> open_terragen(const std::string& path, const OpenOptions& options) {
+  return std::make_unique<TerragenSource>(path, options);
+}
+
+}  // namespace isohf
