@@ -56,10 +56,10 @@ std::shared_ptr<const GridSystem> understand_grid_system(ArchiveReader& archive,
     SourceInfo there;
     take_system(text, there);
     if (way.is_ballpark) {
-      warnings.push_back(fmt::format(
+      warnings.push_back(loss(fmt::format(
           "{}: PROJ knows no way from its datum to that of \"{}\": they are taken for one, which may be off by some "
           "hundred metres",
-          archive.path(), way.system.name));
+          archive.path(), way.system.name)));
     }
     auto system = std::make_shared<GridSystem>(GridSystem{way.map, there.georeference});
     // The heights stay the archive's own.

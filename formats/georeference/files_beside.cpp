@@ -279,8 +279,8 @@ void read_prj_beside(SourceInfo& info) {
     info.warnings.push_back(loss("the .prj beside the file is not the WKT of a map's reference system; it is ignored"));
   }
   const Georeference& place = info.georeference;
-  if (place.has_origin && place.spacing_x < kFinestAsMetres && place.spacing_y < kFinestAsMetres &&
-      std::abs(place.origin_x) <= 360.0 && std::abs(place.origin_y) <= 90.0) {
+  if (place.unit == HorizontalUnit::kUnknown && place.has_origin && place.spacing_x < kFinestAsMetres &&
+      place.spacing_y < kFinestAsMetres && std::abs(place.origin_x) <= 360.0 && std::abs(place.origin_y) <= 90.0) {
     info.warnings.emplace_back(
         "the coordinates look like degrees, but no .prj beside the file says so; with one, or with `sample_spacing`, "
         "distances would be in metres");
@@ -310,7 +310,9 @@ void read_place_beside(SourceInfo& info, int band) {
     }
     place_by(*world, info.height, place);
   }
-  if (!has_reference_system(place)) read_prj_beside(info);
+  // A header may know metres without a name for their map.
+  const bool is_unnamed_map = place.unit == HorizontalUnit::kMetre && !place.system.epsg && place.system.wkt.empty();
+  if (!has_reference_system(place) || is_unnamed_map) read_prj_beside(info);
 }
 
 }  // namespace isohf

@@ -154,7 +154,9 @@ std::string planetary_wkt(const PlanetaryMap& map) {
   const std::string beneath = geographic_wkt("GCS_" + map.target, "D_" + map.target, map.target, on_sphere ? radius : a,
                                              on_sphere ? 0.0 : a / (a - c));
   if (known->method.empty()) return beneath;
-  return map_wkt(map.projection + ' ' + map.target, beneath, known->method, parameters, 1.0);
+  const bool is_secant = known->method == "Mercator_1SP" && parameters.parallel_1 != 0.0;
+  return map_wkt(map.projection + ' ' + map.target, beneath, is_secant ? "Mercator_2SP" : known->method, parameters,
+                 1.0);
 }
 
 }  // namespace isohf

@@ -265,15 +265,27 @@ void find_operation(const char* from, const char* to, const double* ground, Isoh
   const std::unique_ptr<PJ_OPERATION_FACTORY_CONTEXT, Destroy<proj_operation_factory_context_destroy>> factory(
       proj_create_operation_factory_context(context, nullptr));
   if (!ours || !theirs || !factory) refuse("has no longitudes and latitudes that PROJ knows");
-  proj_operation_factory_context_set_area_of_interest(context, factory.get(), ground[0], ground[1], ground[2],
-                                                      ground[3]);
   proj_operation_factory_context_set_spatial_criterion(context, factory.get(),
                                                        PROJ_SPATIAL_CRITERION_PARTIAL_INTERSECTION);
   proj_operation_factory_context_set_grid_availability_use(context, factory.get(),
                                                            PROJ_GRID_AVAILABILITY_DISCARD_OPERATION_IF_MISSING_GRID);
-  const std::unique_ptr<PJ_OBJ_LIST, Destroy<proj_list_destroy>> ways(
-      proj_create_operations(context, ours.get(), theirs.get(), factory.get()));
-  const Object first(ways && proj_list_get_count(ways.get()) > 0 ? proj_list_get(context, ways.get(), 0) : nullptr);
+  // Ground beyond a datum's area of use is better moved by what holds there than not at all.
+  Object first;
+  for (const bool anywhere : {false, true}) {
+    if (anywhere && first && proj_coordoperation_has_ballpark_transformation(context, first.get()) == 0) break;
+    anywhere ? proj_operation_factory_context_set_area_of_interest(context, factory.get(), -180.0, -90.0, 180.0, 90.0)
+             : proj_operation_factory_context_set_area_of_interest(context, factory.get(), ground[0], ground[1],
+                                                                   ground[2], ground[3]);
+    const std::unique_ptr<PJ_OBJ_LIST, Destroy<proj_list_destroy>> ways(
+        proj_create_operations(context, ours.get(), theirs.get(), factory.get()));
+    const int count = ways ? proj_list_get_count(ways.get()) : 0;
+    for (int i = 0; i < count; ++i) {
+      Object way(proj_list_get(context, ways.get(), i));
+      const bool is_ballpark = proj_coordoperation_has_ballpark_transformation(context, way.get()) != 0;
+      if (!first || !is_ballpark) first = std::move(way);
+      if (!is_ballpark) break;
+    }
+  }
   const Object way(first ? proj_normalize_for_visualization(context, first.get()) : nullptr);
   const char* const text = way ? proj_as_proj_string(context, way.get(), PJ_PROJ_5, nullptr) : nullptr;
   if (text == nullptr) refuse("cannot be reached from the input's reference system: PROJ knows no way");

@@ -361,11 +361,11 @@ class Joining {
       }
       WayToSystem way = find_way(systems_[i].system, target, ground, ellipsoid(i));
       if (way.is_ballpark) {
-        whole.warnings.push_back(
+        whole.warnings.push_back(loss(
             fmt::format("PROJ knows no way from the datum of {} to that of \"{}\": they are taken for one, which may "
                         "be off by some "
                         "hundred metres",
-                        name_of(systems_[i]), way.system.name));
+                        name_of(systems_[i]), way.system.name)));
       }
       ways[i] = std::make_shared<MosaicWay>(MosaicWay{std::move(way.map), maps_[i]});
     }

@@ -91,6 +91,16 @@ class CfReader {
       if (options.channel.empty() ? chosen == nullptr : variable.name == options.channel) chosen = &variable;
     }
     if (rasters == 0) {
+      for (const Variable& variable : file_.variables) {
+        if (variable.dimensions.size() < 3 || !variable.sample_type()) continue;
+        for (std::size_t axis = 0; axis + 2 < variable.dimensions.size(); ++axis) {
+          const std::uint64_t steps = file_.size_of(variable, axis);
+          if (steps < 2) continue;
+          const std::string along = printable(file_.dimensions[variable.dimensions[axis]].name);
+          refuse(ErrorCode::kUnsupported, fmt::format("{} has {} steps along {}, must have 1 (ncks -d {},0 takes one)",
+                                                      printable(variable.name), steps, along, along));
+        }
+      }
       refuse(ErrorCode::kUnsupported, "has no variable of two dimensions that do not grow (nccopy -u makes them so)");
     }
     if (chosen == nullptr) {
@@ -116,26 +126,55 @@ class CfReader {
   }
 
   /// nullopt where coordinates lie off the grid by more than a hundredth of a step, and more than float32 rounds them.
-  std::optional<Axis> axis_of(const Variable& of, std::uint64_t count) {
+  /// Longitudes may go on at -180 after 180.
+  std::optional<Axis> axis_of(const Variable& of, std::uint64_t count, bool turns) {
     if (of.dimensions.size() != 1 || !of.sample_type()) return std::nullopt;
-    const double first = file_.numbers(of, 0, 1)[0];
-    const double last = file_.numbers(of, count - 1, 1)[0];
-    const double step = (last - first) / static_cast<double>(count - 1);
-    const double rounded = of.type == kFloat ? 1.5 * std::max(std::abs(first), std::abs(last)) * 0x1p-24 : 0.0;
-    const double most = std::max(0.01 * std::abs(step), std::min(rounded, 0.2 * std::abs(step)));
+    const auto [first, last] = ends_of(of, count);
+    if (const auto axis = even_axis(of, count, {first, (last - first) / static_cast<double>(count - 1)}, 0.0))
+      return axis;
+    if (!turns || last >= first) return std::nullopt;
+    return even_axis(of, count, {first, (last + 360.0 - first) / static_cast<double>(count - 1)}, 360.0);
+  }
+
+  /// Coordinates of an axis, packed or not.
+  std::vector<double> coordinates(const Variable& of, std::uint64_t first, std::uint64_t count) {
+    std::vector<double> there = file_.numbers(of, first, count);
+    const double scale = of.number("scale_factor").value_or(1.0);
+    const double offset = of.number("add_offset").value_or(0.0);
+    for (double& coordinate : there) coordinate = coordinate * scale + offset;
+    return there;
+  }
+
+  std::pair<double, double> ends_of(const Variable& of, std::uint64_t count) {
+    return {coordinates(of, 0, 1)[0], coordinates(of, count - 1, 1)[0]};
+  }
+
+  /// turn  what coordinates may be apart by and still be one; 0: nothing
+  std::optional<Axis> even_axis(const Variable& of, std::uint64_t count, const Axis& axis, double turn) {
+    const double last = axis.first + static_cast<double>(count - 1) * axis.step;
+    const double rounded = of.type == kFloat ? 1.5 * std::max(std::abs(axis.first), std::abs(last)) * 0x1p-24 : 0.0;
+    const double most = std::max(0.01 * std::abs(axis.step), std::min(rounded, 0.2 * std::abs(axis.step)));
     constexpr std::uint64_t kAtOnce = 65536;
     for (std::uint64_t done = 0; done < count; done += kAtOnce) {
-      const std::vector<double> there = file_.numbers(of, done, std::min(kAtOnce, count - done));
+      const std::vector<double> there = coordinates(of, done, std::min(kAtOnce, count - done));
       for (std::size_t i = 0; i < there.size(); ++i) {
-        if (!(std::abs(there[i] - first - static_cast<double>(done + i) * step) <= most)) return std::nullopt;
+        double off = there[i] - axis.first - static_cast<double>(done + i) * axis.step;
+        if (turn > 0.0) off -= turn * std::round(off / turn);
+        if (!(std::abs(off) <= most)) return std::nullopt;
       }
     }
-    return step == 0.0 ? std::nullopt : std::optional(Axis{first, step});
+    return axis.step == 0.0 ? std::nullopt : std::optional(axis);
   }
 
   void read_place(const Variable& variable, const Variable& rows, const Variable& columns, CfRaster& raster) {
-    const auto y = axis_of(rows, static_cast<std::uint64_t>(info_.height));
-    const auto x = axis_of(columns, static_cast<std::uint64_t>(info_.width));
+    const auto is_degrees = [](const Variable& of) { return of.text("units").starts_with("degree"); };
+    const auto y = axis_of(rows, static_cast<std::uint64_t>(info_.height), false);
+    const auto x = axis_of(columns, static_cast<std::uint64_t>(info_.width), is_degrees(columns));
+    // Rows run as their coordinates do, even where these are uneven.
+    if (rows.dimensions.size() == 1 && rows.sample_type()) {
+      const auto [first, last] = ends_of(rows, static_cast<std::uint64_t>(info_.height));
+      raster.from_south = last > first;
+    }
     if (!x || !y) {
       info_.warnings.push_back(loss("its coordinates are not evenly spaced: where it lies is left out"));
       return;
@@ -151,32 +190,85 @@ class CfReader {
     place.spacing_y = std::abs(y->step);
     place.has_origin = true;
     place.origin_x = x->first;
-    raster.from_south = y->step > 0.0;
     place.origin_y = raster.from_south ? y->first + static_cast<double>(info_.height - 1) * y->step : y->first;
     const std::string unit = columns.text("units");
     const std::string mapping = variable.text("grid_mapping");
     const Variable* const system = mapping.empty() ? nullptr : file_.variable(mapping);
     std::string wkt = system == nullptr ? "" : system->text("crs_wkt");
     if (wkt.empty() && system != nullptr) wkt = system->text("spatial_ref");
+    const auto length = linear_unit(unit);
+    const std::string kind = system == nullptr ? "" : system->text("grid_mapping_name");
     if (!wkt.empty()) {
       read_system_text(wkt, info_.path, info_);
-    } else if (unit.starts_with("degree")) {
+      if (place.unit == HorizontalUnit::kMetre && length) place.metres_per_unit = length->metres;
+    } else if (!kind.empty() && kind != "latitude_longitude" && !length) {
+      leave_out_place(fmt::format("its grid mapping {} comes without crs_wkt", printable(kind)));
+    } else if (columns.text("standard_name").starts_with("grid_")) {
+      leave_out_place("its degrees are those of a rotated grid");
+    } else if (is_degrees(columns)) {
       place.unit = HorizontalUnit::kDegree;
-      place.system = wgs84_system();  // what CF means where nothing else stands
-    } else if (const auto length = linear_unit(unit)) {
+      const std::string figure = system == nullptr ? "" : figure_of(*system);
+      if (figure.empty()) {
+        place.system = wgs84_system();  // what CF means where nothing else stands
+      } else {
+        read_system_text("+proj=longlat" + figure + " +no_defs +type=crs", info_.path, info_);
+      }
+    } else if (length) {
       place.unit = HorizontalUnit::kMetre;
       place.metres_per_unit = length->metres;
+      if (kind.empty()) return;
+      info_.warnings.push_back(loss(
+          fmt::format("its grid mapping {} comes without crs_wkt: the reference system is left out", printable(kind))));
     }
   }
 
+  void leave_out_place(const std::string& why) {
+    info_.warnings.push_back(loss(why + ": where it lies is left out"));
+    const Registration registration = info_.georeference.registration;
+    info_.georeference = {};
+    info_.georeference.registration = registration;
+  }
+
+  /// The ellipsoid and prime meridian of latitude_longitude, as PROJ spells them; empty for WGS 84's.
+  static std::string figure_of(const Variable& system) {
+    std::string figure;
+    const auto add = [&](const char* name, const char* key) {
+      if (const auto value = system.number(name)) figure += fmt::format(" +{}={:.17g}", key, *value);
+    };
+    const auto axis = system.number("semi_major_axis");
+    if (axis) {
+      add("semi_major_axis", "a");
+      const auto flattening = system.number("inverse_flattening");
+      if (flattening.value_or(0.0) > 0.0) {
+        add("inverse_flattening", "rf");
+      } else if (system.number("semi_minor_axis")) {
+        add("semi_minor_axis", "b");
+      } else {
+        figure += fmt::format(" +b={:.17g}", *axis);
+      }
+      if (*axis == 6378137.0 && std::abs(flattening.value_or(0.0) - 298.257223563) < 1e-6) figure.clear();
+    } else {
+      add("earth_radius", "R");
+    }
+    if (system.number("longitude_of_prime_meridian").value_or(0.0) == 0.0) return figure;
+    if (figure.empty()) figure = " +ellps=WGS84";
+    add("longitude_of_prime_meridian", "pm");
+    return figure;
+  }
+
   void read_attributes(const Variable& variable) {
+    const double unsigned_range = variable.text("_Unsigned") != "true" ? 0.0 : variable.type == 1 ? 256.0 : 65536.0;
     const auto set_void = [&](double value) {
+      if (value < 0.0) value += unsigned_range;
       const auto stored = void_value_as_stored(info_.sample_type, value);
       if (stored && std::ranges::find(info_.void_values, *stored) == info_.void_values.end())
         info_.void_values.push_back(*stored);
     };
     for (const char* key : {"_FillValue", "missing_value"}) {
-      if (const auto value = variable.number(key)) set_void(*value);
+      const auto found = variable.attributes.find(key);
+      const auto* const list =
+          found == variable.attributes.end() ? nullptr : std::get_if<std::vector<double>>(&found->second);
+      if (list != nullptr) std::ranges::for_each(*list, set_void);
     }
     // What the format fills with where nothing is said, but for bytes.
     static const std::map<int, double> kFilled = {

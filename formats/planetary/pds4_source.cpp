@@ -144,6 +144,16 @@ class Pds4Source final : public DescribedSource {
   }
 
  private:
+  /// What stands there is a number, or nothing stands there.
+  [[nodiscard]] double number_or(const pugi::xml_node& of, std::string_view name, double otherwise) const {
+    const auto value = number_in(of, name);
+    const std::string text = trimmed(inner(of, name).text().get());
+    if (!value && !text.empty()) {
+      refuse(ErrorCode::kCorrupt, fmt::format("{} is \"{}\", must be a number", name, printable(text)));
+    }
+    return value.value_or(otherwise);
+  }
+
   void read_elements(const pugi::xml_node& elements) {
     const std::string name = text_in(elements, "data_type");
     const auto* const type = std::ranges::find(kTypes, name, &ElementType::name);
@@ -153,8 +163,7 @@ class Pds4Source final : public DescribedSource {
     info_.sample_type = type->type;
     layout_.big_endian = type->big_endian;
     layout_.stored_as = type->stored_as;
-    set_scale(number_in(elements, "scaling_factor").value_or(1.0), number_in(elements, "value_offset").value_or(0.0),
-              "scaling_factor");
+    set_scale(number_or(elements, "scaling_factor", 1.0), number_or(elements, "value_offset", 0.0), "scaling_factor");
     const std::string unit = text_in(elements, "unit");
     if (unit.empty()) return;
     const std::optional<LinearUnit> length = linear_unit(unit);
@@ -170,6 +179,11 @@ class Pds4Source final : public DescribedSource {
       double sequence = 0.0;
       double step = 0.0;  ///< bytes from one element to the next
     };
+    if (const std::string order = text_in(array_, "axis_index_order");
+        !order.empty() && order != "Last Index Fastest") {
+      refuse(ErrorCode::kUnsupported,
+             fmt::format("axis_index_order is \"{}\", must be \"Last Index Fastest\"", printable(order)));
+    }
     std::vector<Axis> axes;
     for (const pugi::xml_node& node : array_.children()) {
       if (local_name(node) != "Axis_Array" || axes.size() > 3) continue;
@@ -209,7 +223,7 @@ class Pds4Source final : public DescribedSource {
     }
     layout_.row_bytes = static_cast<std::uint64_t>(line->step);
     layout_.column_bytes = static_cast<std::uint64_t>(sample->step);
-    const double offset = number_in(array_, "offset").value_or(0.0);
+    const double offset = number_or(array_, "offset", 0.0);
     layout_.offset_bytes =
         static_cast<std::uint64_t>(count(offset, "offset", 0.0)) +
         static_cast<std::uint64_t>(choose_band(info_, options, bands)) * static_cast<std::uint64_t>(band_step);
@@ -295,6 +309,10 @@ class Pds4Source final : public DescribedSource {
     const pugi::xml_node degrees = inner(system, "Geographic");
     if (projection) {
       place.system.wkt = planetary_wkt(map);
+      if (place.system.wkt.empty()) {
+        info_.warnings.push_back(loss(fmt::format(
+            "the map projection {} is not known: coordinates are metres of a map without a name", printable(kind))));
+      }
       place.system.name = fmt::format("{} {}", kind, target);
       place.unit = HorizontalUnit::kMetre;
       const pugi::xml_node corner = inner(system, "Geo_Transformation");

@@ -127,6 +127,63 @@ TEST_F(Netcdf, CoordinatesOfFloat32MayBeRounded) {
   EXPECT_FALSE(open("a.nc")->info().georeference.has_origin);
 }
 
+/// Whole degrees in int16 unless said otherwise; the raster's own attributes after them.
+NetcdfBytes netcdf_grid(const std::vector<double>& longitudes, const std::vector<double>& latitudes) {
+  NetcdfBytes file;
+  file.dimension("lat", static_cast<std::uint32_t>(latitudes.size()));
+  file.dimension("lon", static_cast<std::uint32_t>(longitudes.size()));
+  file.variable("lon", {1}, 6, stored<double>(longitudes, true), {{"units", "degrees_east"}});
+  file.variable("lat", {0}, 6, stored<double>(latitudes, true), {{"units", "degrees_north"}});
+  return file;
+}
+
+TEST_F(Netcdf, LongitudesMayGoOnAtMinus180) {
+  NetcdfBytes file = netcdf_grid({179.0, 180.0, -179.0}, {1.0, 0.0});
+  write("a.nc", file.variable("z", {0, 1}, 3, std::string(12, '\1'), {}).bytes());
+  const Georeference place = open("a.nc")->info().georeference;
+  EXPECT_EQ(place.origin_x, 179.0);
+  EXPECT_EQ(place.spacing_x, 1.0);
+}
+
+TEST_F(Netcdf, UnevenRowsFromTheSouthAreTurnedToo) {
+  NetcdfBytes file = netcdf_grid({1.0, 2.0}, {0.0, 1.0, 2.5});
+  write("a.nc", file.variable("z", {0, 1}, 3, stored<std::int16_t>({1, 2, 3, 4, 5, 6}, true), {}).bytes());
+  const auto source = open("a.nc");
+  EXPECT_THAT(values_of(*source), ElementsAre(5, 6, 3, 4, 1, 2));
+  EXPECT_FALSE(source->info().georeference.has_origin);
+}
+
+TEST_F(Netcdf, CoordinatesMayBePacked) {
+  NetcdfBytes file;
+  file.dimension("lat", 2).dimension("lon", 3);
+  file.variable("lon", {1}, 3, stored<std::int16_t>({0, 5, 10}, true), {{"units", "degrees_east"}},
+                {{"scale_factor", {0.1}}, {"add_offset", {10.0}}});
+  file.variable("lat", {0}, 6, stored<double>({50.5, 50.0}, true), {{"units", "degrees_north"}});
+  write("a.nc", file.variable("z", {0, 1}, 3, std::string(12, '\1'), {}).bytes());
+  EXPECT_EQ(open("a.nc")->info().georeference.origin_x, 10.0);
+  EXPECT_NEAR(open("a.nc")->info().georeference.spacing_x, 0.5, 1e-12);
+}
+
+TEST_F(Netcdf, EveryMissingValueIsAVoidAlsoOfUnsignedSamples) {
+  NetcdfBytes file = netcdf_grid({1.0, 2.0}, {1.0, 0.0});
+  const std::string samples = stored<std::int16_t>({1, -1, -9, 4}, true);
+  write("a.nc",
+        file.variable("z", {0, 1}, 3, samples, {{"_Unsigned", "true"}}, {{"missing_value", {-1.0, -9.0}}}).bytes());
+  const auto source = open("a.nc");
+  EXPECT_EQ(source->info().sample_type, SampleType::kUint16);
+  EXPECT_THAT(source->info().void_values, ElementsAre(65535, 65527));
+}
+
+TEST_F(Netcdf, DegreesOfARotatedGridAreNone) {
+  NetcdfBytes file = netcdf_grid({1.0, 2.0}, {1.0, 0.0});
+  file.variable("rotated", {}, 3, "", {{"grid_mapping_name", "rotated_latitude_longitude"}});
+  write("a.nc", file.variable("z", {0, 1}, 3, std::string(8, '\1'), {{"grid_mapping", "rotated"}}).bytes());
+  const auto source = open("a.nc");
+  EXPECT_EQ(source->info().georeference.unit, HorizontalUnit::kUnknown);
+  ASSERT_EQ(source->info().warnings.size(), 1U);
+  EXPECT_THAT(source->info().warnings[0], HasSubstr("rotated_latitude_longitude comes without crs_wkt"));
+}
+
 #ifdef ISOHF_WITH_NETCDF
 // GDAL's netCDF driver wrote these: CF conventions, deflated chunks of 4 x 3 samples.
 class Netcdf4 : public ::testing::Test {
@@ -278,6 +335,15 @@ TEST_F(Pds4, LabelsOfOtherThingsAreRefused) {
   write("a.xml", "<?xml version=\"1.0\"?>\n<Product_Observational></Product_Observational>");
   EXPECT_THAT(failure("a.xml", &code), HasSubstr("describes no array"));
   EXPECT_EQ(code, ErrorCode::kUnsupported);
+  std::string label = pds4_label("b.dat");
+  label.replace(label.find("<scaling_factor>0.5"), 19, "<scaling_factor>abc");
+  write("a.xml", label);
+  EXPECT_THAT(failure("a.xml", &code), HasSubstr("scaling_factor is \"abc\", must be a number"));
+  EXPECT_EQ(code, ErrorCode::kCorrupt);
+  label = pds4_label("b.dat");
+  label.insert(label.find("<Axis_Array>"), "<axis_index_order>First Index Fastest</axis_index_order>");
+  write("a.xml", label);
+  EXPECT_THAT(failure("a.xml"), HasSubstr("must be \"Last Index Fastest\""));
   Pds4Options options;
   options.type = "ComplexLSB8";
   write("a.xml", pds4_label("b.dat", options));

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <bit>
 #include <cstdint>
 #include <string>
 #include <utility>
@@ -17,11 +18,20 @@ class NetcdfBytes {
   }
   /// type  5: float, 6: double, 3: short; samples are big-endian
   NetcdfBytes& variable(const std::string& name, const std::vector<std::uint32_t>& dimensions, std::uint32_t type,
-                        std::string samples, const std::vector<std::pair<std::string, std::string>>& attributes) {
+                        std::string samples, const std::vector<std::pair<std::string, std::string>>& attributes,
+                        const std::vector<std::pair<std::string, std::vector<double>>>& numbers = {}) {
     std::string head = text(name) + word(static_cast<std::uint32_t>(dimensions.size()));
     for (const std::uint32_t dimension : dimensions) head += word(dimension);
-    head += word(attributes.empty() ? 0 : 12) + word(static_cast<std::uint32_t>(attributes.size()));
+    const std::size_t count = attributes.size() + numbers.size();
+    head += word(count == 0 ? 0 : 12) + word(static_cast<std::uint32_t>(count));
     for (const auto& [key, value] : attributes) head += text(key) + word(2) + text(value);
+    for (const auto& [key, list] : numbers) {
+      head += text(key) + word(6) + word(static_cast<std::uint32_t>(list.size()));
+      for (const double number : list) {
+        const auto bits = std::bit_cast<std::uint64_t>(number);
+        head += word(static_cast<std::uint32_t>(bits >> 32U)) + word(static_cast<std::uint32_t>(bits));
+      }
+    }
     samples.resize((samples.size() + 3) / 4 * 4);
     variables_.push_back({head + word(type) + word(static_cast<std::uint32_t>(samples.size())), samples});
     return *this;

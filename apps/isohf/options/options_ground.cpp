@@ -1,5 +1,8 @@
 #include "options/options_ground.h"
 
+#include <algorithm>
+#include <vector>
+
 #include "formats/decorate/windowed_source.h"
 #include "isohf/convert/frame/source_frame.h"
 #include "options/options_source.h"
@@ -7,15 +10,21 @@
 namespace isohf::cli {
 
 void add_ground_options(CommandLine& line, GroundRequest& request) {
+  static const std::vector<std::string> kinds = {
+      "auto", "equirectangular", "local", "transverse-mercator", "utm", "lambert-conformal", "polar-stereographic",
+      "none"};
   line.group("Ground");
   line.option("--projection", "KIND",
               "Project degrees to metres, and maps to truer ones: equirectangular, local, transverse-mercator, utm, "
               "lambert-conformal, polar-stereographic, none, or chosen by extent (default: auto of degrees, none of "
               "maps); parameters may "
               "follow, as in utm:32N; or a reference system: EPSG:3035, WKT, a PROJ string, or a file with one of them",
-              [&](const std::string& text) { request.projection = ProjectionRequest::parse(system_from(text)); });
-  line.words({"auto", "equirectangular", "local", "transverse-mercator", "utm", "lambert-conformal",
-              "polar-stereographic", "none"});
+              [&](const std::string& text) {
+                // A file may be called as a kind is.
+                const bool is_kind = std::ranges::find(kinds, text.substr(0, text.find(':'))) != kinds.end();
+                request.projection = ProjectionRequest::parse(is_kind ? text : system_from(text));
+              });
+  line.words(kinds);
   line.flag("--wrap-x", "Join the East edge of an input all the way round to its West edge", request.wrap_x);
 }
 
