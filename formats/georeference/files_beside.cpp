@@ -248,7 +248,8 @@ void read_auxiliary_metadata(SourceInfo& info, int band) {
   if (const std::string transform = text("GeoTransform"); !place.has_origin && !transform.empty()) {
     place_by_transform(path, transform, place);
   }
-  if (const std::string system = text("SRS"); !has_reference_system(place) && !system.empty()) {
+  if (const std::string system = text("SRS");
+      place.unit == HorizontalUnit::kUnknown && !has_reference_system(place) && !system.empty()) {
     read_system_text(system, path, info);  // GDAL takes a code as well
   }
   if (place.registration == Registration::kUnknown) {
@@ -296,7 +297,7 @@ void place_by(const WorldFile& world, std::int64_t rows, Georeference& place) {
 }
 
 bool has_reference_system(const Georeference& place) {
-  return place.unit != HorizontalUnit::kUnknown || place.system.epsg || !place.system.wkt.empty();
+  return place.unit == HorizontalUnit::kDegree || place.system.epsg || !place.system.wkt.empty();
 }
 
 void read_place_beside(SourceInfo& info, int band) {
@@ -310,9 +311,7 @@ void read_place_beside(SourceInfo& info, int band) {
     }
     place_by(*world, info.height, place);
   }
-  // A header may know metres without a name for their map.
-  const bool is_unnamed_map = place.unit == HorizontalUnit::kMetre && !place.system.epsg && place.system.wkt.empty();
-  if (!has_reference_system(place) || is_unnamed_map) read_prj_beside(info);
+  if (!has_reference_system(place)) read_prj_beside(info);
 }
 
 }  // namespace isohf

@@ -56,7 +56,7 @@ void place_by_transform(const std::string& path, const std::string& text, Georef
 /// map, or that nothing here understands, is left out with a warning. Throws Error naming `path` for WKT that is refused.
 void read_system_text(const std::string& text, const std::string& path, SourceInfo& info);
 
-/// Whether the file has said what its coordinates are.
+/// Whether the file has said what its coordinates are: a header may know metres without a name for their map.
 [[nodiscard]] bool has_reference_system(const Georeference& place);
 
 /// For pictures, which have nothing to say of their place: GDAL's .aux.xml beside, or else the world file, and the
