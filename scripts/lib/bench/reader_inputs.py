@@ -124,7 +124,7 @@ class Maker:
         self.inputs["NumPy .npy"] = Input(self.behind("land.npy", npy, samples), self.integers, peer="numpy")
 
     def described(self):
-        """Formats whose samples a header, a label or an archive describes."""
+        """Formats whose samples a header or a label describes."""
         self.add("ENVI", "land.dat", self.integers, "-of", "ENVI")
         self.add("SAGA", "land.sdat", self.integers, "-of", "SAGA")
         self.add("IDRISI", "land.rst", self.integers, "-of", "RST")
@@ -134,18 +134,8 @@ class Maker:
         self.add("netCDF classic", "classic.nc", self.integers, "-of", "netCDF")
         self.add("netCDF-4, Deflate", "deflated.nc", self.integers, "-of", "netCDF", "-co", "FORMAT=NC4", "-co",
                  "COMPRESS=DEFLATE")
-        self.add("VRT of a GeoTIFF", "land.vrt", self.integers, "-of", "VRT")
+        self.add("VRT of a GeoTIFF", "land_tif.vrt", self.integers, "-of", "VRT")
         self.add("XYZ text", "land.xyz", self.text, "-of", "XYZ")
-        plain = self.gdal("plain.tif", self.integers)
-        zipped, gzipped = self.folder / "plain.zip", self.folder / "plain.tif.gz"
-        if not zipped.exists():
-            with zipfile.ZipFile(zipped, "w", zipfile.ZIP_DEFLATED) as target:
-                target.write(plain, plain.name)
-        if not gzipped.exists():
-            with open(plain, "rb") as source, gzip.open(gzipped, "wb", 6) as target:
-                shutil.copyfileobj(source, target)
-        self.inputs["GeoTIFF in ZIP"] = Input(zipped, self.integers, peer_path=f"/vsizip/{zipped}/{plain.name}")
-        self.inputs["GeoTIFF in gzip"] = Input(gzipped, self.integers, peer_path=f"/vsigzip/{gzipped}")
 
     def pictures(self):
         self.add("PNG, 16 bits", "land.png", self.integers, "-of", "PNG", "-ot", "UInt16")
