@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <cmath>
+#include <filesystem>
 
 #include "formats/files/text.h"
 #include "formats/files/text_tokens.h"
@@ -17,6 +18,20 @@ constexpr double kMostSide = 2147483647.0;
 constexpr std::uint64_t kLongestHeader = std::uint64_t{1} << 20U;
 
 }  // namespace
+
+std::string word_in(const HeaderWords& words, std::string_view key) {
+  const auto found = words.find(key);
+  return found == words.end() ? std::string() : lower_case(found->second);
+}
+
+std::pair<std::string, std::string> data_and_header(const std::string& path, const char* data_extension,
+                                                    const char* header_extension) {
+  const bool is_data = lower_case(path).ends_with(data_extension);
+  const auto name = std::filesystem::path(path).replace_extension(is_data ? header_extension : data_extension);
+  const std::string other = file_beside(path, name.filename().string());
+  if (other.empty()) throw Error(ErrorCode::kIo, fmt::format("{}: {} must be beside it", path, name.string()));
+  return is_data ? std::pair(path, other) : std::pair(other, path);
+}
 
 std::string read_header_text(const std::string& path) {
   const RawFile file(path);

@@ -20,6 +20,14 @@ using HeaderWords = std::map<std::string, std::string, std::less<>>;
 /// of a key that comes twice the first counts. Throws Error{kCorrupt} for more than 1 MiB.
 [[nodiscard]] HeaderWords read_header_words(const std::string& path, char separator);
 
+/// What a word says, in lower case; empty where it is not there.
+[[nodiscard]] std::string word_in(const HeaderWords& words, std::string_view key);
+
+/// The files of samples and header, of which `path` is one, by their extensions in lower case. Throws Error{kIo} where the
+/// other is not beside it.
+[[nodiscard]] std::pair<std::string, std::string> data_and_header(const std::string& path, const char* data_extension,
+                                                                  const char* header_extension);
+
 /// The whole of a small file that describes another: at most 1 MiB, else Error{kCorrupt}.
 [[nodiscard]] std::string read_header_text(const std::string& path);
 

@@ -123,9 +123,7 @@ class EnviSource final : public DescribedSource {
       place.unit = HorizontalUnit::kMetre;
       const double zone = number(parts[7], "map info");
       if (is_wgs84 && zone >= 1.0 && zone <= 60.0) {
-        place.system = wgs84_system();
-        place.system.epsg = (lower_case(parts[8]) == "south" ? 32700 : 32600) + static_cast<int>(zone);
-        place.system.name = fmt::format("WGS 84 / UTM zone {}{}", zone, lower_case(parts[8]) == "south" ? 'S' : 'N');
+        place.system = wgs84_utm_zone(static_cast<int>(zone), lower_case(parts[8]) == "south");
       }
     }
     read_unit(parts);

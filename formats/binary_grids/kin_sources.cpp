@@ -6,7 +6,6 @@
 #include <array>
 #include <cstdio>
 #include <cstring>
-#include <filesystem>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -14,7 +13,6 @@
 
 #include "formats/binary_grids/described_source.h"
 #include "formats/files/text.h"
-#include "formats/georeference/files_beside.h"
 #include "formats/georeference/units.h"
 #include "formats/open_options.h"
 #include "formats/readers.h"
@@ -23,11 +21,6 @@
 
 namespace isohf {
 namespace {
-
-std::string word_in(const HeaderWords& words, const char* key) {
-  const auto found = words.find(key);
-  return found == words.end() ? std::string() : lower_case(found->second);
-}
 
 class IdrisiSource final : public DescribedSource {
  public:
@@ -72,9 +65,7 @@ class IdrisiSource final : public DescribedSource {
       place.metres_per_unit = length->metres * number(words, "unit dist.", 1.0);
     }
     if (std::sscanf(system.c_str(), "utm-%d%c", &zone, &half) != 2 || zone < 1 || zone > 60) return;
-    place.system = wgs84_system();
-    place.system.epsg = (half == 's' ? 32700 : 32600) + zone;
-    place.system.name = fmt::format("WGS 84 / UTM zone {}{}", zone, half == 's' ? 'S' : 'N');
+    place.system = wgs84_utm_zone(zone, half == 's');
   }
 };
 
@@ -101,11 +92,7 @@ class RoiPacSource final : public DescribedSource {
       if (is_wgs84) place.system = wgs84_system();
     } else if (std::sscanf(projection.c_str(), "utm%d", &zone) == 1 && zone >= 1 && zone <= 60) {
       place.unit = HorizontalUnit::kMetre;
-      if (is_wgs84) {
-        place.system = wgs84_system();
-        place.system.epsg = 32600 + zone;
-        place.system.name = fmt::format("WGS 84 / UTM zone {}N", zone);
-      }
+      if (is_wgs84) place.system = wgs84_utm_zone(zone, false);
     }
     finish(options);
   }
@@ -236,11 +223,8 @@ class TerragenSource final : public DescribedSource {
 }  // namespace
 
 std::unique_ptr<HeightSource> open_idrisi(const std::string& path, const OpenOptions& options) {
-  const bool is_data = lower_case(path).ends_with(".rst");
-  const std::filesystem::path name = std::filesystem::path(path).replace_extension(is_data ? ".rdc" : ".rst");
-  const std::string other = file_beside(path, name.filename().string());
-  if (other.empty()) throw Error(ErrorCode::kIo, fmt::format("{}: {} must be beside it", path, name.string()));
-  return std::make_unique<IdrisiSource>(is_data ? path : other, is_data ? other : path, options);
+  const auto [data, header] = data_and_header(path, ".rst", ".rdc");
+  return std::make_unique<IdrisiSource>(data, header, options);
 }
 
 std::unique_ptr<HeightSource> open_roi_pac(const std::string& path, const OpenOptions& options) {

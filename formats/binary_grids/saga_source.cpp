@@ -1,17 +1,10 @@
-#include <fmt/core.h>
-
-#include <algorithm>
 #include <array>
-#include <filesystem>
 #include <string>
 #include <string_view>
 #include <utility>
-#include <vector>
 
 #include "formats/binary_grids/described_source.h"
 #include "formats/files/text.h"
-#include "formats/georeference/files_beside.h"
-#include "formats/georeference/units.h"
 #include "formats/open_options.h"
 #include "formats/readers.h"
 #include "isohf/error.h"
@@ -27,10 +20,7 @@ class SagaSource final : public DescribedSource {
     (void)choose_band(info_, options, 1);
     const HeaderWords words = read_header_words(header, '=');
     set_size(number(words, "cellcount_x"), number(words, "cellcount_y"));
-    const auto text = [&](const char* key) {
-      const auto found = words.find(key);
-      return found == words.end() ? std::string() : lower_case(found->second);
-    };
+    const auto text = [&](const char* key) { return word_in(words, key); };
     static constexpr std::array<std::pair<std::string_view, SampleType>, 8> kTypes = {
         {{"byte_unsigned", SampleType::kUint8},
          {"byte", SampleType::kInt8},
@@ -58,11 +48,8 @@ class SagaSource final : public DescribedSource {
 }  // namespace
 
 std::unique_ptr<HeightSource> open_saga(const std::string& path, const OpenOptions& options) {
-  const bool is_data = lower_case(path).ends_with(".sdat");
-  const std::filesystem::path name = std::filesystem::path(path).replace_extension(is_data ? ".sgrd" : ".sdat");
-  const std::string other = file_beside(path, name.filename().string());
-  if (other.empty()) throw Error(ErrorCode::kIo, fmt::format("{}: {} must be beside it", path, name.string()));
-  return std::make_unique<SagaSource>(is_data ? path : other, is_data ? other : path, options);
+  const auto [data, header] = data_and_header(path, ".sdat", ".sgrd");
+  return std::make_unique<SagaSource>(data, header, options);
 }
 
 }  // namespace isohf

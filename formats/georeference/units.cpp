@@ -1,5 +1,7 @@
 #include "formats/georeference/units.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cctype>
@@ -104,6 +106,13 @@ ReferenceSystem wgs84_system() {
   system.body = "Earth";
   system.semi_major_axis_m = 6378137.0;
   system.inverse_flattening = 298.257223563;
+  return system;
+}
+
+ReferenceSystem wgs84_utm_zone(int zone, bool is_south) {
+  ReferenceSystem system = wgs84_system();
+  system.epsg = (is_south ? 32700 : 32600) + zone;
+  system.name = fmt::format("WGS 84 / UTM zone {}{}", zone, is_south ? 'S' : 'N');
   return system;
 }
 

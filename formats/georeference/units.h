@@ -26,6 +26,8 @@ struct LinearUnit {
 
 /// WGS 84 in degrees, on the Earth.
 [[nodiscard]] ReferenceSystem wgs84_system();
+/// A zone of UTM on it, 1 to 60.
+[[nodiscard]] ReferenceSystem wgs84_utm_zone(int zone, bool is_south);
 
 /// The planet or moon that a reference system's name (or, failing that, its semi-major axis) belongs to; else empty.
 /// Axes: reports of the IAU working group on cartographic coordinates; anything from 6.35e6 m to 6.38e6 m is the Earth.

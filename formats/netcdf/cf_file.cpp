@@ -265,10 +265,7 @@ class CfReader {
         info_.void_values.push_back(*stored);
     };
     for (const char* key : {"_FillValue", "missing_value"}) {
-      const auto found = variable.attributes.find(key);
-      const auto* const list =
-          found == variable.attributes.end() ? nullptr : std::get_if<std::vector<double>>(&found->second);
-      if (list != nullptr) std::ranges::for_each(*list, set_void);
+      std::ranges::for_each(variable.numbers(key), set_void);
     }
     // What the format fills with where nothing is said, but for bytes.
     static const std::map<int, double> kFilled = {
@@ -312,10 +309,15 @@ std::string CfFile::Variable::text(std::string_view key) const {
   return text == nullptr ? std::string() : *text;
 }
 
-std::optional<double> CfFile::Variable::number(std::string_view key) const {
+std::span<const double> CfFile::Variable::numbers(std::string_view key) const {
   const auto found = attributes.find(key);
   const auto* const list = found == attributes.end() ? nullptr : std::get_if<std::vector<double>>(&found->second);
-  return list == nullptr || list->empty() ? std::nullopt : std::optional(list->front());
+  return list == nullptr ? std::span<const double>() : *list;
+}
+
+std::optional<double> CfFile::Variable::number(std::string_view key) const {
+  const std::span<const double> list = numbers(key);
+  return list.empty() ? std::nullopt : std::optional(list.front());
 }
 
 const CfFile::Variable* CfFile::variable(std::string_view name) const {

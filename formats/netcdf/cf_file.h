@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <variant>
@@ -34,7 +35,8 @@ class CfFile {
     /// As its samples are delivered; nullopt for characters and all that is no number.
     [[nodiscard]] std::optional<SampleType> sample_type() const;
     [[nodiscard]] std::string text(std::string_view key) const;
-    [[nodiscard]] std::optional<double> number(std::string_view key) const;
+    [[nodiscard]] std::span<const double> numbers(std::string_view key) const;  ///< empty where it has none
+    [[nodiscard]] std::optional<double> number(std::string_view key) const;     ///< the first of them
   };
 
   CfFile() = default;

@@ -14,7 +14,6 @@
 #include "isohf/archive/codec/quantise.h"
 #include "isohf/archive/codec/simd/batch_decoder.h"
 #include "isohf/base/assert.h"
-#include "isohf/lattice/barycentric.h"
 #include "isohf/surface/shade/normals.h"
 
 namespace isohf {
@@ -38,11 +37,7 @@ class TileSurface {
       : grid_(grid), quantisation_(quantisation), codes_(codes), scratch_(scratch) {}
 
   [[nodiscard]] double elevation(const Barycentric& where) const {
-    double sum = 0.0;
-    for (std::size_t i = 0; i < 3; ++i) {
-      if (where.weights[i] > 0.0) sum += where.weights[i] * elevation_at(at(where.vertices[i]));
-    }
-    return sum;
+    return isohf::elevation_at(grid_.shape(), codes_, quantisation_, where);
   }
 
   void sample(ObjectPoint point, SurfaceSample& sample) {
@@ -103,6 +98,20 @@ class TileSurface {
 };
 
 }  // namespace
+
+double elevation_at(const TileShape& shape, const TileCodes& codes, const Quantisation& quantisation,
+                    const Barycentric& where) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < 3; ++i) {
+    if (where.weights[i] <= 0.0) continue;
+    const GridVertex vertex = where.vertices[i];
+    sum += where.weights[i] *
+           elevation_of_vertex(codes, quantisation,
+                               static_cast<std::size_t>(vertex.row) * static_cast<std::size_t>(shape.columns()) +
+                                   static_cast<std::size_t>(vertex.column));
+  }
+  return sum;
+}
 
 ReadTiles tiles_of(const ArchiveReader& archive, int plane) {
   return [&archive, plane](std::span<const TileIndex> tiles) { return archive.read_tiles(tiles, plane); };

@@ -8,10 +8,15 @@
 #include <unordered_map>
 #include <vector>
 
+#include "isohf/lattice/barycentric.h"
 #include "isohf/restore/predict/fixed_point.h"
 #include "isohf/surface.h"
 
 namespace isohf {
+
+/// The elevation of a tile's surface at a point of it, on the triangle there; NaN where a vertex of weight is void.
+[[nodiscard]] double elevation_at(const TileShape& shape, const TileCodes& codes, const Quantisation& quantisation,
+                                  const Barycentric& where);
 
 /// Decodes several tiles, void ones too; called from many threads at once.
 using ReadTiles = std::function<std::vector<TileCodes>(std::span<const TileIndex>)>;

@@ -11,7 +11,6 @@
 #include "isohf/archive/codec/quantise.h"
 #include "isohf/base/assert.h"
 #include "isohf/error.h"
-#include "isohf/lattice/barycentric.h"
 #include "isohf/restore/shade/light.h"
 #include "isohf/surface/shade/shadow.h"
 
@@ -56,15 +55,7 @@ double PointShadow::highest_on(const ObjectLine& line, double begin, double end,
   const Quantisation& quantisation = archive_.metadata().quantisation;
   auto sides = side_crossings(line, begin);
   for (double t = begin;; t = std::clamp(pass_first(sides), t, end)) {
-    const Barycentric where = snapped(barycentric(shape, line.at(t)));
-    double elevation = 0.0;
-    for (std::size_t i = 0; i < 3; ++i) {
-      if (where.weights[i] <= 0.0) continue;
-      const GridVertex vertex = where.vertices[i];
-      elevation += where.weights[i] *
-                   elevation_of_vertex(codes, quantisation,
-                                       static_cast<std::size_t>(vertex.row * shape.columns() + vertex.column));
-    }
+    const double elevation = elevation_at(shape, codes, quantisation, snapped(barycentric(shape, line.at(t))));
     if (elevation - t * fall_ > so_far) so_far = elevation - t * fall_;  // not where void, NaN
     if (t >= end) return so_far;
   }
