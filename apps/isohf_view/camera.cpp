@@ -3,9 +3,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "reading/hud.h"
+
 namespace isohf::view {
 namespace {
 
+/// Range of heights of the shorter side below which ground looks flat, and above which it towers.
+constexpr double kFlat = 0.01;
+constexpr double kSteep = 0.5;
 constexpr double kSteepest_rad = 1.5707;  // straight down has no heading
 
 /// Turns a vector about an axis of length 1, counter-clockwise seen against the axis.
@@ -99,6 +104,16 @@ Camera overview_camera(const TileSource& source, const ViewState& view, Vec3* ta
   Camera out;
   out.look_at(pivot + distance * way, pivot);
   return out;
+}
+
+double default_exaggeration(const TileSource& source) {
+  const TileBounds whole = whole_bounds(source);
+  const WorldBounds covered = source.covered();
+  const double side = std::min(covered.x1 - covered.x0, covered.z1 - covered.z0);
+  const double share = (whole.high - whole.low) / side;
+  const bool is_fine = share > kFlat && (source.is_to_scale() || share < kSteep);
+  if (!(share > 0.0) || is_fine) return 1.0;
+  return round_length((source.is_to_scale() ? 4.0 * kFlat : 0.5 * kSteep) / share);
 }
 
 double farthest_corner(const TileGrid& grid, const TileBounds& whole, Vec3 eye, double exaggeration) {

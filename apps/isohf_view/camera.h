@@ -34,6 +34,10 @@ struct Camera {
 /// to `target` where wanted.
 [[nodiscard]] Camera overview_camera(const TileSource& source, const ViewState& view, Vec3* target = nullptr);
 
+/// 1, but where the heights of all are in no known proportion to the ground, or so low that nothing would be seen of
+/// them: 1, 2 or 5 times a power of ten.
+[[nodiscard]] double default_exaggeration(const TileSource& source);
+
 /// Distance from a point to the farthest corner of the heightfield, of which `whole` are the bounds.
 [[nodiscard]] double farthest_corner(const TileGrid& grid, const TileBounds& whole, Vec3 eye, double exaggeration);
 

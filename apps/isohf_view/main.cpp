@@ -48,11 +48,9 @@ int take_screenshot(const TileSource& source, const Options& options) {
   }
   target.write_picture(options.screenshot);
   print_result(options.common, "", [&] {
-    return ordered_json{{"archive", options.archive},
-                        {"screenshot", options.screenshot},
-                        {"width", target.width()},
-                        {"height", target.height()},
-                        {"cut", session.is_cut()}};
+    return ordered_json{
+        {"archive", options.archive}, {"screenshot", options.screenshot},          {"width", target.width()},
+        {"height", target.height()},  {"exaggeration", session.view.exaggeration}, {"cut", session.is_cut()}};
   });
   return cli::kExitDone;
 }
@@ -125,10 +123,12 @@ int say_place(const TileSource& source, const Options& options) {
   Ground ground(source);
   std::vector<Place> places;
   for (std::size_t i = 0; i < options.probe.size(); i += 2) {
-    places.push_back(probe(source, ground, {options.probe[i], options.probe[i + 1]}));
+    places.push_back(probe(source, ground, source.from_archive({options.probe[i], options.probe[i + 1]})));
   }
   std::optional<Profile> profile;
-  if (places.size() > 1) profile = profile_between(source, ground, places[0].at, places[1].at);
+  if (places.size() > 1) {
+    profile = profile_between(source, ground, source.from_archive(places[0].at), source.from_archive(places[1].at));
+  }
   std::string text;
   for (const Place& place : places) text += fmt::format("{}\n", fmt::join(lines_of(place), "\n"));
   if (profile) {

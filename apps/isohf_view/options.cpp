@@ -15,7 +15,8 @@ using cli::CommandLine;
 constexpr const char* kFooter =
     R"(Without --screenshot, --flight, --verify, --sweep or --probe a window opens; H shows its keys.
 
-Positions are world units of the archive from its North-West corner: x eastwards, y up, z southwards.
+Positions are world units of the archive from its North-West corner: x eastwards, y up, z southwards. An archive laid out
+in degrees is drawn in metres, but for x and z, which stay degrees.
 
 Shadows are those of isohf shade, for a sun that stands anywhere. Tiles towards the sun that may cast on what is shown are
 read as well, some thousand at most.
@@ -147,10 +148,11 @@ void add_picture(CommandLine& line, Options& options) {
   });
   line.option("--far", "D", "Draw as far as D world units (default: all of the heightfield)",
               [&](const std::string& text) { options.far_distance = cli::parse_positive_number(text); });
-  line.option("--exaggeration", "F",
-              "Draw heights F times as high (default 1, or less where the ground's unit is not known and heights would "
-              "tower over it)",
-              [&](const std::string& text) { options.exaggeration = cli::parse_positive_number(text); });
+  line.option(
+      "--exaggeration", "F",
+      "Draw heights F times as high (default 1; more where the ground would look flat, less where its unit is not "
+      "known and heights would tower over it)",
+      [&](const std::string& text) { options.exaggeration = cli::parse_positive_number(text); });
   line.option("--samples", "N",
               "Draw pixels as means of 1, 2, 4 or 8 samples (default 4; 1 in a window that no GPU draws)",
               [&](const std::string& text) {

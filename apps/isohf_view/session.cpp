@@ -34,15 +34,6 @@ double default_softness(const TileBounds& whole) {
   return range > 0.0 ? std::min(2.0, 0.005 * range) : 2.0;
 }
 
-/// 1, but where heights are in no known proportion to the ground and would tower over it: a quarter of its shorter
-/// side.
-double default_exaggeration(const TileSource& source, const TileBounds& whole) {
-  const WorldBounds covered = source.covered();
-  const double side = std::min(covered.x1 - covered.x0, covered.z1 - covered.z0);
-  const double range = whole.high - whole.low;
-  return source.is_to_scale() || range < 0.5 * side ? 1.0 : 0.25 * side / range;
-}
-
 const std::vector<std::string> kHelpLines{"drag left   move the ground      wheel         nearer, farther",
                                           "drag right  turn about it        double click  go there",
                                           "W A S D, arrows  fly   Q E  down, up   Shift, Ctrl  fast, slow",
@@ -98,7 +89,7 @@ Session::Session(const TileSource& source, const Options& options)
                   fmt::format("--level {}: this archive has levels 0 to {}", *level, levels - 1));
     }
   }
-  view.exaggeration = options.exaggeration.value_or(default_exaggeration(source, whole_));
+  view.exaggeration = options.exaggeration.value_or(default_exaggeration(source));
   if (source.textures() != nullptr) {
     textures_.emplace(source, texture_bytes(source, options), limits_from(source, options).workers);
     renderer_.set_textures([this](TileIndex tile) { return textures_->texture(tile); });
@@ -115,11 +106,20 @@ Session::Session(const TileSource& source, const Options& options)
   if (options.date) begin_day(*options.date);
   Vec3 target;
   camera = first_camera(target);
-  const auto exaggerated = [this](Vec3 at) { return Vec3{at.x, at.y * view.exaggeration, at.z}; };
   if (options.position || options.look_at) {
-    camera.look_at(options.position ? exaggerated(*options.position) : camera.eye,
-                   options.look_at ? exaggerated(*options.look_at) : target);
+    camera.look_at(options.position ? from_archive(*options.position) : camera.eye,
+                   options.look_at ? from_archive(*options.look_at) : target);
   }
+}
+
+Vec3 Session::from_archive(Vec3 at) const {
+  const WorldPoint place = source_.from_archive({at.x, at.z});
+  return {place.x, at.y * view.exaggeration, place.z};
+}
+
+Vec3 Session::eye_in_archive() const {
+  const WorldPoint place = source_.to_archive({camera.eye.x, camera.eye.z});
+  return {place.x, camera.eye.y / view.exaggeration, place.z};
 }
 
 void Session::begin_day(const SolarTime& time) {
@@ -210,13 +210,13 @@ void Session::draw_overlay(const Shown& shown) {
   if (shown.help) reading.help = kHelpLines;
   if (shown.figures) {
     const TileBoxFigures& box = boxes_.figures();
+    const Vec3 eye = eye_in_archive();
     std::vector<std::string>& lines = reading.figures;
     lines = {fmt::format("{:5.1f} fps   {} triangles   {} draw calls", shown.frames_per_second,
                          cli::describe_count(figures_.triangles), figures_.draw_calls),
              fmt::format("{} tiles drawn, {} resident, {} to come, {:.1f} MiB", figures_.visible_tiles,
                          box.resident_tiles, box.missing_tiles, static_cast<double>(box.resident_bytes) / (1 << 20)),
-             fmt::format("eye x {:.0f}  y {:.0f}  z {:.0f}   {}", camera.eye.x, camera.eye.y / view.exaggeration,
-                         camera.eye.z, mode_name(view.mode)),
+             fmt::format("eye x {:.7g}  y {:.0f}  z {:.7g}   {}", eye.x, eye.y, eye.z, mode_name(view.mode)),
              fmt::format("sun {:.0f}, {:.0f} deg   heights x {:.3g}   H help", sun_azimuth_deg, sun_elevation_deg,
                          view.exaggeration),
              shadow_line(),

@@ -42,6 +42,10 @@ class Session {
   };
   void draw_overlay(const Shown& shown);
 
+  /// A place of the archive's world, y without exaggeration, as drawn; and the eye's, back.
+  [[nodiscard]] Vec3 from_archive(Vec3 at) const;
+  [[nodiscard]] Vec3 eye_in_archive() const;
+
   /// Follows the sun of a day from here on. Throws Error{kInvalidArgument} where its way is not known.
   void begin_day(const SolarTime& time);
   void set_hours(double hours);

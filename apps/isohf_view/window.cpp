@@ -133,7 +133,7 @@ class Controls {
     const auto middle = steering_.pick({0.5 * view.width, 0.5 * view.height});
     if (middle) shown.middle_distance = length(*middle - session_.camera.eye);
     const auto there = inside_ ? steering_.pick(cursor_) : std::nullopt;
-    if (there) shown.place = lines_of(session_.source().describe({there->x, there->z}, there->y / view.exaggeration));
+    if (there) shown.place = lines_of(describe(*there));
     const std::optional<Vec3> end = measured_to_ ? measured_to_ : there;
     if (measured_from_ && end) {
       const Vec3 way = *end - *measured_from_;
@@ -143,6 +143,12 @@ class Controls {
     }
     shown.profile = profile_;
     return shown;
+  }
+
+  /// nullopt: no ground.
+  [[nodiscard]] std::optional<Place> under_cursor() {
+    const auto there = inside_ ? steering_.pick(cursor_) : std::nullopt;
+    return there ? std::optional(describe(*there)) : std::nullopt;
   }
 
   /// As drawn, without exaggeration.
@@ -157,6 +163,10 @@ class Controls {
   [[nodiscard]] bool held(int key) const { return glfwGetKey(window_, key) == GLFW_PRESS || tapped_.count(key) != 0; }
   [[nodiscard]] double axis(int plus, int plus_too, int minus, int minus_too) const {
     return (held(plus) || held(plus_too) ? 1.0 : 0.0) - (held(minus) || held(minus_too) ? 1.0 : 0.0);
+  }
+
+  [[nodiscard]] Place describe(Vec3 at) const {
+    return session_.source().describe({at.x, at.z}, at.y / session_.view.exaggeration);
   }
 
   void move(double x, double y) {
@@ -387,11 +397,15 @@ void run_window(const TileSource& source, const Options& options) {
   if (!options.common.json) return;
   print_result(options.common, "", [&] {
     const Camera& camera = session.camera;
+    const Vec3 eye = session.eye_in_archive();
+    const std::optional<Place> place = controls.under_cursor();
     constexpr double kDegrees = 180.0 / std::numbers::pi;
     return nlohmann::ordered_json{{"archive", options.archive},
-                                  {"eye", {camera.eye.x, camera.eye.y / session.view.exaggeration, camera.eye.z}},
+                                  {"eye", {eye.x, eye.y, eye.z}},
                                   {"heading_deg", camera.heading_rad * kDegrees},
                                   {"pitch_deg", camera.pitch_rad * kDegrees},
+                                  {"exaggeration", session.view.exaggeration},
+                                  {"under_cursor", place ? json_of(*place) : nlohmann::ordered_json()},
                                   {"height_above_ground", controls.height_above_ground()},
                                   {"sun_azimuth_deg", session.sun_azimuth_deg},
                                   {"sun_elevation_deg", session.sun_elevation_deg},

@@ -318,19 +318,53 @@ TEST_F(ViewProgramTest, IsSteeredByMouseAndKeys) {
     for button in 1 2 3; do xdotool mousemove 160 120 mousedown $button mousemove 210 150 mousemove 120 90 mouseup $button; done
     xdotool mousemove 160 130 click --repeat 2 --delay 60 1 sleep 0.6
     xdotool keydown w keydown Shift_L sleep 1.5 keyup Shift_L keyup w key n sleep 0.6 key t sleep 0.6
-    kill -0 $viewer && sleep 3
+    sleep 1
+    ticks() { cut -d' ' -f14,15 /proc/$viewer/stat | tr ' ' + ; }
+    before=$(($(ticks))) && sleep 4 && echo $(($(ticks) - before)) >"$4"
     xdotool key Escape
     wait $viewer
   )sh");
   const Outcome outcome =
       test::run_program({"/usr/bin/env", "xvfb-run", "-a", "-s", "-screen 0 400x300x24", "sh", path("hand.sh"),
-                         ISOHF_BIN_DIR "/isohf-view", path("good.isohf"), path("hand.json")});
+                         ISOHF_BIN_DIR "/isohf-view", path("good.isohf"), path("hand.json"), path("ticks")});
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
   const auto end = nlohmann::json::parse(text("hand.json"));
   EXPECT_GT(end.at("height_above_ground").get<double>(), 0.0) << end;
   EXPECT_GT(end.at("triangles").get<std::int64_t>(), 0) << end;
   EXPECT_NEAR(end.at("heading_deg").get<double>(), 0.0, 0.01) << end;
   EXPECT_LT(end.at("pitch_deg").get<double>(), -89.0) << end;
+  EXPECT_LE(std::stoi(text("ticks")), 4)
+      << "an idle window takes no more than 1 % of a processor: 100 ticks are a second";
+}
+
+/// The place under the cursor, before a drag and after it, is the same.
+TEST_F(ViewProgramTest, ADragInTheWindowTakesTheGroundAlong) {
+  if (std::system("command -v xvfb-run >/dev/null 2>&1 && command -v xdotool >/dev/null 2>&1") != 0) {
+    GTEST_SKIP() << "xvfb-run or xdotool is not installed";
+  }
+  test::write_file(path("drag.sh"), R"sh(
+    "$1" "$2" --json --window --size 320x240 --position 480,900,1500 --look-at 480,0,400 >"$3" & viewer=$!
+    id=$(timeout 30 xdotool search --sync --onlyvisible --name isohf-view | head -1)
+    xdotool windowmove "$id" 0 0 windowfocus "$id" sleep 1 mousemove 150 140 sleep 0.3
+    [ -z "$4" ] || xdotool mousedown 1 mousemove 170 150 sleep 0.1 mousemove 200 160 sleep 0.1 mouseup 1 sleep 0.3
+    xdotool key Escape
+    wait $viewer
+  )sh");
+  const auto under_cursor = [&](const std::string& drag) {
+    const Outcome outcome =
+        test::run_program({"/usr/bin/env", "xvfb-run", "-a", "-s", "-screen 0 400x300x24", "sh", path("drag.sh"),
+                           ISOHF_BIN_DIR "/isohf-view", path("good.isohf"), path("drag.json"), drag});
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    return nlohmann::json::parse(text("drag.json"));
+  };
+  const auto before = under_cursor("");
+  const auto after = under_cursor("drag");
+  EXPECT_NE(before.at("eye"), after.at("eye"));
+  // Seen from 1200 units a pixel is 5 wide; two of them, slanted.
+  for (const char* axis : {"x", "z"}) {
+    EXPECT_NEAR(before.at("under_cursor").at(axis).get<double>(), after.at("under_cursor").at(axis).get<double>(),
+                10.0);
+  }
 }
 
 TEST_F(ViewProgramTest, OpensAWindow) {

@@ -380,8 +380,7 @@ void fly(const TileSource& source, const Options& options, const std::function<v
   // The flight begins with everything in reach; from then on no frame waits.
   const auto stand = [&](double time_s) {
     const Waypoint at = path.at(time_s);
-    const double lift = session.view.exaggeration;
-    session.camera.look_at({at.eye.x, at.eye.y * lift, at.eye.z}, {at.target.x, at.target.y * lift, at.target.z});
+    session.camera.look_at(session.from_archive(at.eye), session.from_archive(at.target));
   };
   stand(path.begin_s());
   session.complete_frame();

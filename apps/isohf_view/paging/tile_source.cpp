@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <mutex>
+#include <numbers>
 #include <optional>
 
 #include "formats/georeference/units.h"
@@ -19,9 +20,27 @@
 namespace isohf::view {
 namespace {
 
+bool is_in_degrees(const Metadata& metadata) {
+  return metadata.horizontal_unit != "metre" && metadata.source.crs_unit == "degree";
+}
+
+GroundScale scale_of(const Metadata& metadata) {
+  const SourceRecord& source = metadata.source;
+  if (!is_in_degrees(metadata) || !source.origin_y) return {};
+  const double degree = std::numbers::pi / 180.0;
+  const double middle = *source.origin_y - 0.5 * static_cast<double>(source.height - 1) * source.crs_spacing_y;
+  const double length = degree * source.semi_major_axis_m.value_or(Ellipsoid{}.semi_major_axis_m);
+  return {length * std::max(std::cos(middle * degree), 0.01), length};
+}
+
+TileGrid scaled(const TileGrid& grid, GroundScale scale) {
+  return TileGrid::make(grid.shape(), grid.tile_columns(), grid.tile_rows(), grid.extent_x() * scale.x,
+                        grid.extent_z() * scale.z);
+}
+
 /// World units of one elevation unit; 1 where either is not known.
 double elevation_unit(const Metadata& metadata) {
-  if (metadata.horizontal_unit != "metre") return 1.0;
+  if (metadata.horizontal_unit != "metre" && !is_in_degrees(metadata)) return 1.0;
   const auto unit = linear_unit(metadata.vertical_unit);
   return unit ? unit->metres : 1.0;
 }
@@ -29,10 +48,13 @@ double elevation_unit(const Metadata& metadata) {
 class ArchiveSource final : public TileSource {
  public:
   explicit ArchiveSource(const std::string& path)
-      : reader_(path), world_per_elevation_(elevation_unit(reader_.metadata())) {
+      : reader_(path),
+        ground_scale_(scale_of(reader_.metadata())),
+        grid_(scaled(reader_.grid(), ground_scale_)),
+        world_per_elevation_(elevation_unit(reader_.metadata())) {
     const Metadata& metadata = reader_.metadata();
     if (metadata.planes.count > 0) {
-      planes_.emplace(metadata.grid, metadata.planes.stride, metadata.planes.count, metadata.wraps_x);
+      planes_.emplace(grid_, metadata.planes.stride, metadata.planes.count, metadata.wraps_x);
       for (int plane = 1; plane <= planes_->count(); ++plane) coarse_.push_back(std::make_unique<Coarse>(*this, plane));
     }
     const Quantisation& stored = metadata.quantisation;
@@ -46,11 +68,16 @@ class ArchiveSource final : public TileSource {
     if (texture_info(metadata)) textures_.emplace(reader_);
   }
 
-  [[nodiscard]] const TileGrid& grid() const override { return reader_.grid(); }
+  [[nodiscard]] const TileGrid& grid() const override { return grid_; }
   [[nodiscard]] ViewScale scale() const override { return scale_; }
 
-  [[nodiscard]] bool is_to_scale() const override { return reader_.metadata().horizontal_unit == "metre"; }
-  [[nodiscard]] WorldBounds covered() const override { return reader_.metadata().valid; }
+  [[nodiscard]] bool is_to_scale() const override { return ground_unit() == "metre"; }
+  [[nodiscard]] GroundScale ground_scale() const override { return ground_scale_; }
+  [[nodiscard]] WorldBounds covered() const override {
+    const WorldBounds& valid = reader_.metadata().valid;
+    return {valid.x0 * ground_scale_.x, valid.z0 * ground_scale_.z, valid.x1 * ground_scale_.x,
+            valid.z1 * ground_scale_.z};
+  }
 
   [[nodiscard]] TileBounds bounds(TileIndex tile) const override { return bounds(tile, 0); }
   [[nodiscard]] const Planes* planes() const override { return planes_ ? &*planes_ : nullptr; }
@@ -93,9 +120,11 @@ class ArchiveSource final : public TileSource {
     std::call_once(georeference_once_, [this] { find_georeference(); });
     if (!georeference_) return place;
     if (georeference_->has_source() && reader_.metadata().source.crs_unit != "degree") {
-      place.map = georeference_->source_from_world(at);
+      place.map = georeference_->source_from_world(place.at);
     }
-    if (georeference_->has_geo()) place.geo = georeference_->geo_from_world(at);
+    if (georeference_->has_geo()) place.geo = georeference_->geo_from_world(place.at);
+    // Sources that are registered by areas may end half a sample beyond a pole.
+    if (place.geo && std::abs(place.geo->latitude) > 90.0) place.geo.reset();
     return place;
   }
   [[nodiscard]] double world_per_elevation() const override { return world_per_elevation_; }
@@ -178,6 +207,8 @@ class ArchiveSource final : public TileSource {
   }
 
   ArchiveReader reader_;
+  GroundScale ground_scale_;
+  TileGrid grid_;
   double world_per_elevation_;
   ViewScale scale_;
   mutable std::once_flag georeference_once_;
@@ -199,13 +230,22 @@ void TileSource::read_heights(TileIndex tile, std::span<float> heights) const {
 
 Place TileSource::describe(WorldPoint at, std::optional<double> height) const {
   Place place;
-  place.at = at;
+  place.at = to_archive(at);
   if (height) place.elevation = *height / world_per_elevation();
   place.decimals = std::clamp(static_cast<int>(std::ceil(-std::log10(scale().scale / world_per_elevation()))), 0, 6);
   return place;
 }
 
+WorldPoint TileSource::from_archive(WorldPoint at) const {
+  return {at.x * ground_scale().x, at.z * ground_scale().z};
+}
+
+WorldPoint TileSource::to_archive(WorldPoint at) const {
+  return {at.x / ground_scale().x, at.z / ground_scale().z};
+}
+
 std::string TileSource::ground_unit() const {
+  if (ground_scale().z != 1.0) return "metre";
   return metadata() == nullptr || metadata()->horizontal_unit == "unknown" ? "" : metadata()->horizontal_unit;
 }
 

@@ -37,9 +37,16 @@ struct TileBounds {
   double high = 0.0;
 };
 
+/// Units that the viewer's ground has in one of the archive's world. An archive laid out in degrees is shown in metres, a
+/// degree of longitude as long as it is in the middle.
+struct GroundScale {
+  double x = 1.0;
+  double z = 1.0;
+};
+
 /// The names of a place.
 struct Place {
-  WorldPoint at{};
+  WorldPoint at{};                  ///< in the archive's world
   std::optional<double> elevation;  ///< in `unit`
   std::string unit;                 ///< empty where it is not known
   int decimals = 0;                 ///< of the elevation: as many as codes have steps
@@ -71,6 +78,10 @@ class TileSource {
   [[nodiscard]] virtual const TileSource& plane(int) const { return *this; }
   /// A tile's heights in codes, not rounded, NaN where void: what shadows are computed from. [C x R] out.
   virtual void read_heights(TileIndex tile, std::span<float> heights) const;
+  /// From the archive's world to that of all else here.
+  [[nodiscard]] virtual GroundScale ground_scale() const { return {}; }
+  [[nodiscard]] WorldPoint from_archive(WorldPoint at) const;
+  [[nodiscard]] WorldPoint to_archive(WorldPoint at) const;
   /// All names of a place whose height is known, world units.
   [[nodiscard]] virtual Place describe(WorldPoint at, std::optional<double> height) const;
   /// World units of one elevation unit; 1 where either is not known.

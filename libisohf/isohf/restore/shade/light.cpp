@@ -65,10 +65,12 @@ std::vector<ColourStop> shade_colours(const Metadata& metadata, std::optional<Sh
   std::vector<ColourStop> stops;
   switch (*palette) {
     case ShadePalette::kElevation: {
-      const bool has_sea =
-          is_earth && low < 0.0 && !metadata.vertical_unit.empty() && metadata.vertical_unit != "unknown";
-      if (has_sea) append(kSeaStops, low, 0.0, stops);
-      if (!has_sea || high > 0.0) append(kElevationStops, has_sea ? 0.0 : low, high, stops);
+      // 0 is the sea, and what rounds to it.
+      const Quantisation& codes = metadata.quantisation;
+      const double shore = codes.type == CodeType::kF32 ? 0.0 : std::min(0.5 * codes.scale, 0.5 * high);
+      const bool has_sea = is_earth && low < 0.0;
+      if (has_sea) append(kSeaStops, low, std::max(shore, 0.0), stops);
+      if (!has_sea || high > 0.0) append(kElevationStops, has_sea ? shore : low, high, stops);
       break;
     }
     case ShadePalette::kGray:
