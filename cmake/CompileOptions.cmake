@@ -43,12 +43,10 @@ if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND NOT CMAKE_DISABLE_PRECOMPILE_HEADERS
                          -Wno-use-after-free)
 endif()
 
-# isohf_precompile(TARGET HEADER...): parses what most sources of the product include once for the target, where the
-# sanitizers make builds long. Release builds parse it everywhere and so keep all warnings.
+# isohf_precompile(TARGET HEADER...): parses what most sources of the product include once for the target. A build with
+# ccache (scripts/lib/build.sh) and the preset lean parse it everywhere and so keep all warnings.
 function(isohf_precompile target)
-  if(ISOHF_SANITIZE)
-    target_link_libraries(${target} PRIVATE $<BUILD_INTERFACE:isohf_precompiled>)
-    target_precompile_headers(${target} PRIVATE <algorithm> <array> <cmath> <cstdint> <functional> <memory> <optional> <span>
-                              <string> <utility> <vector> <fmt/format.h> ${ARGN})
-  endif()
+  target_link_libraries(${target} PRIVATE $<BUILD_INTERFACE:isohf_precompiled>)
+  target_precompile_headers(${target} PRIVATE <algorithm> <array> <cmath> <cstdint> <functional> <memory> <optional> <span>
+                            <string> <utility> <vector> <fmt/format.h> ${ARGN})
 endfunction()

@@ -103,6 +103,7 @@ bool PngDecoder::update(PngHeader& header, For use) {
   if (header.interlaced) (void)png_set_interlace_handling(png_);
   png_read_update_info(png_, info_);
   header.row_bytes = png_get_rowbytes(png_, info_);
+  if (use == For::kPicture) header.bit_depth = png_get_bit_depth(png_, info_);
   return true;
 }
 

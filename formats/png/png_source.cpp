@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
+#include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <optional>
@@ -33,12 +35,41 @@ constexpr std::uint64_t kMaxCompressionRatio = 1032;
 constexpr std::size_t kKeptBytes = std::size_t{8} << 20U;
 constexpr std::size_t kMaxKeptRows = 1024;
 
+/// A tile of a web map lies where the end of its path says: ZOOM/COLUMN/ROW.png, the rows counted from the North, of
+/// 2^ZOOM by 2^ZOOM squares of the Web Mercator map. Nothing where a path does not end so.
+void place_web_tile(SourceInfo& info) {
+  constexpr double kHalfMap = 20037508.342789244;  // metres: pi times WGS 84's semi-major axis
+  constexpr int kMaxZoom = 30;
+  std::filesystem::path name(info.path);
+  std::array<std::int64_t, 3> numbers{};  // row, column, zoom
+  for (std::int64_t& number : numbers) {
+    const std::string text = name.stem().string();
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+    if (error != std::errc{} || number < 0 || (end != text.data() + text.size() && *end != '@')) return;
+    name = name.parent_path();
+  }
+  const auto [row, column, zoom] = numbers;
+  if (zoom > kMaxZoom || std::max(row, column) >> zoom != 0 || info.width != info.height) return;
+  Georeference& geo = info.georeference;
+  geo.registration = Registration::kArea;
+  geo.unit = HorizontalUnit::kMetre;
+  geo.spacing_x = geo.spacing_y =
+      std::ldexp(2.0 * kHalfMap, -static_cast<int>(zoom)) / static_cast<double>(info.width);
+  geo.has_origin = true;
+  geo.origin_x = (static_cast<double>(column * info.width) + 0.5) * geo.spacing_x - kHalfMap;
+  geo.origin_y = kHalfMap - (static_cast<double>(row * info.height) + 0.5) * geo.spacing_y;
+  geo.system.name = "WGS 84 / Pseudo-Mercator";
+  geo.system.epsg = 3857;
+  geo.system.body = "Earth";
+}
+
 /// Rows of one channel, decoded in order.
 class PngSource final : public HeightSource {
  public:
   PngSource(const std::string& path, const OpenOptions& options) {
     info_.path = path;
     info_.format = "PNG";
+    wants_packed_ = packing_from_string(options.channel).has_value();
     restart();
     info_.width = info_.block_width = header_.width;
     info_.height = header_.height;
@@ -102,12 +133,13 @@ class PngSource final : public HeightSource {
       throw Error(decoder_.has_file() ? ErrorCode::kCorrupt : ErrorCode::kIo,
                   fmt::format("{}: PNG header: {}", info_.path, decoder_.message()));
     }
-    if (header_.has_palette) {
+    if (header_.has_palette && !wants_packed_) {
       throw Error(ErrorCode::kUnsupported,
-                  info_.path + ": PNG with a palette: its numbers are colours, not elevations");
+                  info_.path + ": PNG with a palette: its numbers are colours, not elevations, unless these are packed "
+                               "into them (`encoding` terrarium, mapbox or rgba-float)");
     }
     check_size();
-    if (!decoder_.start(header_)) {
+    if (!decoder_.start(header_, header_.has_palette ? PngDecoder::For::kPicture : PngDecoder::For::kNumbers)) {
       throw Error(ErrorCode::kCorrupt, fmt::format("{}: PNG header: {}", info_.path, decoder_.message()));
     }
   }
@@ -157,6 +189,7 @@ class PngSource final : public HeightSource {
       info_.warnings.push_back(loss("the .json beside it names no format, as one of isohf's would: it is left aside"));
     }
     read_place_beside(info_, packing_ ? 0 : static_cast<int>(channel_) + 1);
+    if (packing_ && !info_.georeference.has_origin) place_web_tile(info_);
   }
 
   /// All channels together are one elevation.
@@ -256,6 +289,7 @@ class PngSource final : public HeightSource {
   std::size_t channels_ = 1;
   std::size_t channel_ = 0;
   std::optional<Packing> packing_;
+  bool wants_packed_ = false;  ///< the user says that all channels are one elevation: a palette is expanded
   std::size_t next_row_ = 0;   ///< the row that the decoder delivers next
   std::size_t kept_rows_ = 0;  ///< rows next_row_ - kept_rows_ ... next_row_ - 1 are in kept_, at row % kept_rows_
   std::vector<std::byte> kept_;

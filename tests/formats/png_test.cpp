@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <filesystem>
 
 #include "formats/raster_reference.h"
 #include "formats/reader_failure.h"
@@ -252,6 +253,59 @@ TEST(PngSource, TakesTransparentPixelsOfPackedElevationsAsVoid) {
     }
   }
   EXPECT_GT(voids, 0);
+}
+
+TEST(PngSource, UnpacksElevationsOutOfAPalette) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "flat.png";
+  Picture picture;
+  picture.bit_depth = 2;
+  picture.color_type = PNG_COLOR_TYPE_PALETTE;
+  write_picture(path, picture);
+  EXPECT_THAT(error_of([&] { (void)open_raster(path, {}); }).what(), HasSubstr("unless these are packed into them"));
+  OpenOptions options;
+  options.channel = "mapbox";
+  const std::vector<double> values = values_of(*open_raster(path, options));
+  for (std::uint32_t row = 0; row < picture.height; ++row) {
+    for (std::uint32_t column = 0; column < picture.width; ++column) {
+      ASSERT_EQ(values[row * picture.width + column], picture.value(column, row, 0) * 0x010101);
+    }
+  }
+}
+
+TEST(PngSource, PlacesTilesOfWebMapsByTheirNumbers) {
+  const TemporaryFolder folder;
+  std::filesystem::create_directories(folder / "3/5");
+  Picture picture;
+  picture.width = picture.height = 32;
+  picture.bit_depth = 8;
+  picture.color_type = PNG_COLOR_TYPE_RGB;
+  OpenOptions packed;
+  packed.channel = "terrarium";
+  const auto place_of = [&](const std::string& name, const OpenOptions& options) {
+    write_picture(folder / name, picture);
+    return open_raster(folder / name, options)->info().georeference;
+  };
+  constexpr double kTile = 40075016.68557849 / 8.0;
+  for (const char* name : {"3/5/2.png", "3/5/2@2x.png"}) {
+    const Georeference place = place_of(name, packed);
+    EXPECT_EQ(place.registration, Registration::kArea);
+    EXPECT_EQ(place.unit, HorizontalUnit::kMetre);
+    EXPECT_EQ(place.system.epsg, 3857);
+    EXPECT_DOUBLE_EQ(place.spacing_x, kTile / 32.0);
+    EXPECT_DOUBLE_EQ(place.spacing_y, kTile / 32.0);
+    ASSERT_TRUE(place.has_origin);
+    EXPECT_NEAR(place.origin_x, kTile + kTile / 64.0, 1e-6);
+    EXPECT_NEAR(place.origin_y, 2.0 * kTile - kTile / 64.0, 1e-6);
+  }
+  OpenOptions red;
+  red.channel = "R";
+  EXPECT_FALSE(place_of("3/5/3.png", red).has_origin);
+  for (const char* name : {"3/5/8.png", "3/5/-1.png", "3/5/2a.png", "3/2.png"}) {
+    EXPECT_FALSE(place_of(name, packed).has_origin) << name;
+  }
+  picture.height = 31;
+  EXPECT_FALSE(place_of("3/5/4.png", packed).has_origin);
 }
 
 TEST(PngSource, UnpacksNothingButColoursOfEightBits) {
