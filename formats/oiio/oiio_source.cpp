@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <optional>
 #include <sstream>
 #include <vector>
 
@@ -14,6 +15,7 @@
 #include "formats/module_loader.h"
 #include "formats/oiio/oiio_module.h"
 #include "formats/open_options.h"
+#include "formats/png/packed_elevations.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
 
@@ -39,39 +41,30 @@ const IsohfOiioModule& oiio_module() {
 class OiioSource final : public HeightSource {
  public:
   OiioSource(const IsohfOiioModule& module, const std::string& path, const OpenOptions& options) : module_(module) {
-    IsohfOiioInfo found{};
-    IsohfOiioMessage message{};
-    const int result = module_.open(path.c_str(), options.channel.c_str(), &raster_, &found, &message);
-    if (result == ISOHF_OIIO_UNKNOWN) refuse_unknown(path);
-    if (result != 0) throw Error(module_error_code(result), fmt::format("{}: {}", path, message.text));
     info_.path = path;
-    info_.format = found.format;
-    info_.width = found.width;
-    info_.height = found.height;
-    info_.block_width = found.block_width;
-    info_.block_height = found.block_height;
-    info_.sample_type = static_cast<SampleType>(found.sample_type);
-    info_.channel = found.channel;
-    if (found.warning[0] != '\0') info_.warnings.emplace_back(found.warning);
     try {
+      packing_ = packing_from_string(options.channel);
+      std::string channel = options.channel;
+      if (channel.empty()) channel = decide_on_colours();
+      const std::string warning = open(packing_ ? ISOHF_OIIO_ALL_CHANNELS : channel);
+      if (!warning.empty()) info_.warnings.push_back(warning);
       read_place_beside(info_, info_.channel.empty() ? 1 : 0);
+      if (packing_) place_web_tile(info_);
       apply_open_options(info_, options);
     } catch (...) {
-      module_.close(raster_);
+      close();
       throw;
     }
   }
-  ~OiioSource() override { module_.close(raster_); }
+  ~OiioSource() override { close(); }
 
   [[nodiscard]] const SourceInfo& info() const override { return info_; }
 
   void read_window(const Window& window, std::span<std::byte> samples) override {
     ISOHF_ASSERT(is_window_of(info_, window, samples.size()));
     if (samples.empty()) return;
-    IsohfOiioMessage message{};
-    const int result = module_.read(raster_, window.column, window.row, window.columns, window.rows, samples.data(),
-                                    samples.size(), &message);
-    if (result != 0) throw Error(module_error_code(result), fmt::format("{}: {}", info_.path, message.text));
+    if (!packing_) return read(window, samples);
+    unpack_elevations(*packing_, channels_, read_pixels(window), samples);
   }
 
   void limit_buffers(std::uint64_t bytes) override { module_.bound(raster_, signed_bytes(bytes)); }
@@ -80,6 +73,60 @@ class OiioSource final : public HeightSource {
   }
 
  private:
+  /// Opens the channel, or all of them; returns what is to be said of that.
+  std::string open(const std::string& channel) {
+    close();
+    IsohfOiioInfo found{};
+    IsohfOiioMessage message{};
+    const int result = module_.open(info_.path.c_str(), channel.c_str(), &raster_, &found, &message);
+    if (result == ISOHF_OIIO_UNKNOWN) refuse_unknown(info_.path);
+    if (result != 0) throw Error(module_error_code(result), fmt::format("{}: {}", info_.path, message.text));
+    info_.format = found.format;
+    info_.width = found.width;
+    info_.height = found.height;
+    info_.block_width = found.block_width;
+    info_.block_height = found.block_height;
+    info_.sample_type = static_cast<SampleType>(found.sample_type);
+    info_.channel = found.channel;
+    channels_ = static_cast<std::size_t>(found.channels);
+    if (packing_) describe_packing(*packing_, channels_, static_cast<int>(8 * size_bytes(info_.sample_type)), info_);
+    return found.warning;
+  }
+
+  void close() {
+    if (raster_ != nullptr) module_.close(raster_);
+    raster_ = nullptr;
+  }
+
+  void read(const Window& window, std::span<std::byte> samples) {
+    IsohfOiioMessage message{};
+    const int result = module_.read(raster_, window.column, window.row, window.columns, window.rows, samples.data(),
+                                    samples.size(), &message);
+    if (result != 0) throw Error(module_error_code(result), fmt::format("{}: {}", info_.path, message.text));
+  }
+
+  /// Of all channels, 8 bits each.
+  std::span<const std::byte> read_pixels(const Window& window) {
+    pixels_.resize(static_cast<std::size_t>(window.columns * window.rows) * channels_);
+    read(window, pixels_);
+    return pixels_;
+  }
+
+  /// What a picture of red, green and blue, and maybe opacity, holds; returns the channel to read where that is one.
+  std::string decide_on_colours() {
+    (void)open(ISOHF_OIIO_ALL_CHANNELS);
+    if ((channels_ != 3 && channels_ != 4) || is_floating(info_.sample_type)) return {};
+    PackingEvidence evidence(channels_);
+    if (info_.sample_type == SampleType::kUint8) {
+      const std::int64_t rows = std::min<std::int64_t>(PackingEvidence::kRows, info_.height);
+      const std::span<const std::byte> pixels = read_pixels({0, 0, info_.width, rows});
+      const std::size_t row_bytes = pixels.size() / static_cast<std::size_t>(rows);
+      for (std::size_t at = 0; at < pixels.size(); at += row_bytes) evidence.add(pixels.subspan(at, row_bytes));
+    }
+    packing_ = evidence.decide(channels_ == 3 ? "R, G, B" : "R, G, B, A", info_);
+    return "0";
+  }
+
   static std::int64_t signed_bytes(std::uint64_t bytes) {
     return static_cast<std::int64_t>(std::min<std::uint64_t>(bytes, INT64_MAX));
   }
@@ -87,6 +134,9 @@ class OiioSource final : public HeightSource {
   const IsohfOiioModule& module_;
   IsohfOiioRaster* raster_ = nullptr;
   SourceInfo info_;
+  std::size_t channels_ = 1;  ///< that are read
+  std::optional<Packing> packing_;
+  std::vector<std::byte> pixels_;  ///< of all channels
 };
 
 class OiioRows final : public PhotoRows {

@@ -1,9 +1,17 @@
 #include "formats/png/packed_elevations.h"
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <array>
 #include <bit>
+#include <charconv>
+#include <cmath>
 #include <cstdlib>
 #include <cstring>
+#include <filesystem>
+
+#include "isohf/error.h"
 
 namespace isohf {
 namespace {
@@ -35,7 +43,13 @@ std::optional<Packing> packing_from_string(const std::string& text) {
   return std::nullopt;
 }
 
-void describe_packing(Packing packing, bool has_alpha, SourceInfo& info) {
+void describe_packing(Packing packing, std::size_t channels, int bits, SourceInfo& info) {
+  const std::size_t least = packing == Packing::kRgbaFloat ? 4 : 3;
+  if (channels < least || channels > 4 || bits != 8) {
+    throw Error(ErrorCode::kInvalidArgument,
+                fmt::format("{}: has {} channels of {} bits; encoding {} packs an elevation into {} of 8", info.path,
+                            channels, bits, to_string(packing), least));
+  }
   info.channel = to_string(packing);
   info.vertical_unit = "metre";
   info.void_values.clear();
@@ -46,7 +60,33 @@ void describe_packing(Packing packing, bool has_alpha, SourceInfo& info) {
   info.sample_type = SampleType::kInt32;
   info.z_scale = packing == Packing::kTerrarium ? 1.0 / 256.0 : 0.1;
   info.z_offset = packing == Packing::kTerrarium ? -32768.0 : -10000.0;
-  if (has_alpha) info.void_values = {static_cast<double>(kVoid)};
+  if (channels == 4) info.void_values = {static_cast<double>(kVoid)};
+}
+
+void place_web_tile(SourceInfo& info) {
+  constexpr double kHalfMap = 20037508.342789244;  // metres: pi times WGS 84's semi-major axis
+  constexpr int kMaxZoom = 30;
+  if (info.georeference.has_origin) return;
+  std::filesystem::path name(info.path);
+  std::array<std::int64_t, 3> numbers{};  // row, column, zoom
+  for (std::int64_t& number : numbers) {
+    const std::string text = name.stem().string();
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+    if (error != std::errc{} || number < 0 || (end != text.data() + text.size() && *end != '@')) return;
+    name = name.parent_path();
+  }
+  const auto [row, column, zoom] = numbers;
+  if (zoom > kMaxZoom || std::max(row, column) >> zoom != 0 || info.width != info.height) return;
+  Georeference& geo = info.georeference;
+  geo.registration = Registration::kArea;
+  geo.unit = HorizontalUnit::kMetre;
+  geo.spacing_x = geo.spacing_y = std::ldexp(2.0 * kHalfMap, -static_cast<int>(zoom)) / static_cast<double>(info.width);
+  geo.has_origin = true;
+  geo.origin_x = (static_cast<double>(column * info.width) + 0.5) * geo.spacing_x - kHalfMap;
+  geo.origin_y = kHalfMap - (static_cast<double>(row * info.height) + 0.5) * geo.spacing_y;
+  geo.system.name = "WGS 84 / Pseudo-Mercator";
+  geo.system.epsg = 3857;
+  geo.system.body = "Earth";
 }
 
 void unpack_elevations(Packing packing, std::size_t channels, std::span<const std::byte> pixels,
@@ -96,6 +136,25 @@ std::optional<Packing> PackingEvidence::packing() const {
   // Elevations of the Earth: -11000 to 9000 m are 85 to 163 in Terrarium, 0 to 2.9 in Mapbox.
   if (red >= 85.0 && red <= 163.0) return Packing::kTerrarium;
   if (red <= 3.0) return Packing::kMapbox;
+  return std::nullopt;
+}
+
+std::optional<Packing> PackingEvidence::decide(const std::string& names, SourceInfo& info) const {
+  if (const std::optional<Packing> found = packing()) {
+    info.warnings.push_back(
+        fmt::format("its colours are packed elevations, as their bytes show: decoded as with `encoding` {0}; give "
+                    "`encoding` {0} to say so, or `channel` R for one channel alone",
+                    to_string(*found)));
+    return found;
+  }
+  if (!is_grey()) {
+    throw Error(
+        ErrorCode::kInvalidArgument,
+        fmt::format("{}: is a colour picture with channels {}; say which one holds elevations (`channel` R), or "
+                    "how they are packed into all (`encoding` terrarium, mapbox or rgba-float)",
+                    info.path, names));
+  }
+  info.warnings.emplace_back("colour picture in greys: channel R is read");
   return std::nullopt;
 }
 

@@ -23,8 +23,13 @@ enum class Packing {
 [[nodiscard]] std::optional<Packing> packing_from_string(const std::string& text);
 
 /// Sample type, scale, offset, unit, void value and channel of a picture with that packing. The codes of the first two
-/// are int32, exact; where there is an alpha channel, a wholly transparent pixel is void (-1).
-void describe_packing(Packing packing, bool has_alpha, SourceInfo& info);
+/// are int32, exact; where there is an alpha channel, a wholly transparent pixel is void (-1). Throws
+/// Error{kInvalidArgument} for other than 3 or 4 `channels` of 8 `bits`, 4 of floats.
+void describe_packing(Packing packing, std::size_t channels, int bits, SourceInfo& info);
+
+/// A tile of a web map lies where the end of its path says: ZOOM/COLUMN/ROW.png, the rows counted from the North, of
+/// 2^ZOOM by 2^ZOOM squares of the Web Mercator map. Leaves a place alone that is known, and paths that end otherwise.
+void place_web_tile(SourceInfo& info);
 
 /// Pixels of `channels` bytes each, 3 or 4, into samples of the type that describe_packing names.
 void unpack_elevations(Packing packing, std::size_t channels, std::span<const std::byte> pixels,
@@ -34,14 +39,21 @@ void unpack_elevations(Packing packing, std::size_t channels, std::span<const st
 /// not do; floats have exponents of heights, and an alpha channel that is noise.
 class PackingEvidence {
  public:
+  static constexpr std::size_t kRows = 64;  ///< that are enough to see it
+
   explicit PackingEvidence(std::size_t channels) : channels_(channels) {}
-  void add(std::span<const std::byte> row);
+  void add(std::span<const std::byte> row);  ///< pixels of 8-bit channels
+  /// One channel of a colour picture is seldom what is meant: packed elevations are unpacked where that is beyond
+  /// doubt, and grey in three channels is grey (nullopt: the first one is read), which `info` warns of. Throws
+  /// Error{kInvalidArgument} where the user has to say what is meant; `names` of the channels.
+  [[nodiscard]] std::optional<Packing> decide(const std::string& names, SourceInfo& info) const;
+
+ private:
   /// nullopt where nothing speaks for it, as in land so flat that no byte overflows.
   [[nodiscard]] std::optional<Packing> packing() const;
   /// Whether red, green and blue were equal everywhere.
-  [[nodiscard]] bool is_grey() const { return differing_ == 0; }
+  [[nodiscard]] bool is_grey() const { return pixels_ > 0 && differing_ == 0; }
 
- private:
   std::size_t channels_;
   double of_codes_ = 0.0;     ///< sum of the steps from pixel to pixel, of whole codes
   double of_channels_ = 0.0;  ///< and of the channels by themselves, weighted as in the code

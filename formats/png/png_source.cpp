@@ -4,8 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
-#include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <optional>
@@ -34,34 +32,6 @@ constexpr std::uint64_t kMaxCompressionRatio = 1032;
 /// Decoded rows of the channel that are kept for a reader whose windows overlap.
 constexpr std::size_t kKeptBytes = std::size_t{8} << 20U;
 constexpr std::size_t kMaxKeptRows = 1024;
-
-/// A tile of a web map lies where the end of its path says: ZOOM/COLUMN/ROW.png, the rows counted from the North, of
-/// 2^ZOOM by 2^ZOOM squares of the Web Mercator map. Nothing where a path does not end so.
-void place_web_tile(SourceInfo& info) {
-  constexpr double kHalfMap = 20037508.342789244;  // metres: pi times WGS 84's semi-major axis
-  constexpr int kMaxZoom = 30;
-  std::filesystem::path name(info.path);
-  std::array<std::int64_t, 3> numbers{};  // row, column, zoom
-  for (std::int64_t& number : numbers) {
-    const std::string text = name.stem().string();
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-    if (error != std::errc{} || number < 0 || (end != text.data() + text.size() && *end != '@')) return;
-    name = name.parent_path();
-  }
-  const auto [row, column, zoom] = numbers;
-  if (zoom > kMaxZoom || std::max(row, column) >> zoom != 0 || info.width != info.height) return;
-  Georeference& geo = info.georeference;
-  geo.registration = Registration::kArea;
-  geo.unit = HorizontalUnit::kMetre;
-  geo.spacing_x = geo.spacing_y =
-      std::ldexp(2.0 * kHalfMap, -static_cast<int>(zoom)) / static_cast<double>(info.width);
-  geo.has_origin = true;
-  geo.origin_x = (static_cast<double>(column * info.width) + 0.5) * geo.spacing_x - kHalfMap;
-  geo.origin_y = kHalfMap - (static_cast<double>(row * info.height) + 0.5) * geo.spacing_y;
-  geo.system.name = "WGS 84 / Pseudo-Mercator";
-  geo.system.epsg = 3857;
-  geo.system.body = "Earth";
-}
 
 /// Rows of one channel, decoded in order.
 class PngSource final : public HeightSource {
@@ -135,8 +105,9 @@ class PngSource final : public HeightSource {
     }
     if (header_.has_palette && !wants_packed_) {
       throw Error(ErrorCode::kUnsupported,
-                  info_.path + ": PNG with a palette: its numbers are colours, not elevations, unless these are packed "
-                               "into them (`encoding` terrarium, mapbox or rgba-float)");
+                  info_.path +
+                      ": PNG with a palette: its numbers are colours, not elevations, unless these are packed "
+                      "into them (`encoding` terrarium, mapbox or rgba-float)");
     }
     check_size();
     if (!decoder_.start(header_, header_.has_palette ? PngDecoder::For::kPicture : PngDecoder::For::kNumbers)) {
@@ -189,52 +160,28 @@ class PngSource final : public HeightSource {
       info_.warnings.push_back(loss("the .json beside it names no format, as one of isohf's would: it is left aside"));
     }
     read_place_beside(info_, packing_ ? 0 : static_cast<int>(channel_) + 1);
-    if (packing_ && !info_.georeference.has_origin) place_web_tile(info_);
+    if (packing_) place_web_tile(info_);
   }
 
   /// All channels together are one elevation.
   void unpack(Packing packing) {
-    const std::size_t least = packing == Packing::kRgbaFloat ? 4 : 3;
-    if (channels_ < least || header_.bit_depth != 8) {
-      throw Error(ErrorCode::kInvalidArgument,
-                  fmt::format("{}: has {} channels of {} bits; encoding {} packs an elevation into {} of 8", info_.path,
-                              channels_, header_.bit_depth, to_string(packing), least));
-    }
     packing_ = packing;
-    describe_packing(packing, channels_ == 4, info_);
+    describe_packing(packing, channels_, header_.bit_depth, info_);
     sample_bytes_ = size_bytes(info_.sample_type);
   }
 
-  /// One channel of a colour picture is seldom what is meant: packed elevations are unpacked where that is beyond
-  /// doubt, grey in three channels is grey, and what is left is for the user to decide.
   void decide_on_colours() {
-    constexpr std::size_t kRowsLookedAt = 64;
     PackingEvidence evidence(channels_);
     if (header_.bit_depth == 8 && !header_.interlaced) {
       row_.resize(header_.row_bytes);
-      const std::size_t rows = std::min<std::size_t>(kRowsLookedAt, header_.height);
+      const std::size_t rows = std::min<std::size_t>(PackingEvidence::kRows, header_.height);
       for (std::size_t row = 0; row < rows && decoder_.read_row(row_); ++row) {
         evidence.add(row_);
       }
       restart();
-      if (const std::optional<Packing> packing = evidence.packing()) {
-        unpack(*packing);
-        info_.warnings.push_back(
-            fmt::format("its colours are packed elevations, as their bytes show: decoded as with `encoding` {0}; give "
-                        "`encoding` {0} to say so, or `channel` R for one channel alone",
-                        to_string(*packing)));
-        return;
-      }
-      if (evidence.is_grey()) {
-        info_.warnings.emplace_back("colour picture in greys: channel R is read");
-        return;
-      }
     }
-    throw Error(
-        ErrorCode::kInvalidArgument,
-        fmt::format("{}: is a colour picture with channels {}; say which one holds elevations (`channel` R), or "
-                    "how they are packed into all (`encoding` terrarium, mapbox or rgba-float)",
-                    info_.path, fmt::join(header_.channels, ", ")));
+    if (const auto packing = evidence.decide(fmt::format("{}", fmt::join(header_.channels, ", ")), info_))
+      unpack(*packing);
   }
 
   [[nodiscard]] std::byte* kept_row(std::size_t row) {

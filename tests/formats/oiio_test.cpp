@@ -1,6 +1,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <filesystem>
+
 #include "formats/reader_failure.h"
 #include "formats/registry.h"
 #include "isohf/error.h"
@@ -83,10 +85,8 @@ TEST_F(OiioModule, KeepsNoMoreThanItIsAskedTo) {
 
 TEST_F(OiioModule, ReadsTheChannelAskedFor) {
   const std::string path = write_pixmap();
-  const auto first = open_raster(path, {});
-  EXPECT_EQ(first->info().channel, "R");
-  ASSERT_EQ(first->info().warnings.size(), 1U);
-  EXPECT_EQ(first->info().warnings[0], "channel R is read, of 3");
+  EXPECT_THAT(error_of([&] { (void)open_raster(path, {}); }).what(),
+              HasSubstr("is a colour picture with channels R, G, B; say which one holds elevations"));
   for (const char* name : {"G", "1"}) {
     OpenOptions options;
     options.channel = name;
@@ -100,6 +100,30 @@ TEST_F(OiioModule, ReadsTheChannelAskedFor) {
   const Error error = error_of([&] { (void)open_raster(path, options); });
   EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
   EXPECT_EQ(error.what(), path + ": has no channel \"Z\"; it has R, G, B (or 0...2)");
+}
+
+TEST_F(OiioModule, UnpacksElevationsOutOfColours) {
+  std::filesystem::create_directories(folder_ / "4/3");
+  const std::string path = folder_ / "4/3/5.ppm";
+  std::string bytes = "P6\n16 16\n255\n";
+  for (int at = 0; at < 256; ++at) {
+    const int code = 100000 + 37 * at;
+    for (const int byte : {code >> 16, code >> 8, code}) bytes.push_back(static_cast<char>(byte & 0xFF));
+  }
+  write_file(path, bytes);
+  OpenOptions options;
+  options.channel = "mapbox";
+  const auto source = open_raster(path, options);
+  EXPECT_TRUE(source->info().warnings.empty());
+  EXPECT_EQ(source->info().georeference.system.epsg, 3857);
+  const auto samples = read_window(*source, {3, 2, 4, 5});
+  for (std::size_t at = 0; at < 20; ++at) {
+    EXPECT_EQ(value_at(source->info().sample_type, samples, at),
+              static_cast<double>(100000 + 37 * ((2 + at / 4) * 16 + 3 + at % 4)));
+  }
+  const auto untold = open_raster(path, {});
+  EXPECT_THAT(untold->info().warnings, ::testing::ElementsAre(HasSubstr("decoded as with `encoding` mapbox")));
+  EXPECT_EQ(read_whole(*untold), read_whole(*source));
 }
 
 TEST_F(OiioModule, RefusesFilesWhoseNumbersItWouldNotGet) {
