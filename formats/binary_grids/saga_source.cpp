@@ -1,4 +1,6 @@
 #include <array>
+#include <cmath>
+#include <limits>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -7,6 +9,7 @@
 #include "formats/files/text.h"
 #include "formats/open_options.h"
 #include "formats/readers.h"
+#include "isohf/base/sample.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
 
@@ -39,10 +42,42 @@ class SagaSource final : public DescribedSource {
     const double cell = number(words, "cellsize");
     place_by_corner(number(words, "position_xmin") - cell / 2.0,
                     number(words, "position_ymin") + (static_cast<double>(info_.height) - 0.5) * cell, cell, cell);
-    if (const auto value = text("nodata_value"); !value.empty())
-      set_void(number(value.substr(0, value.find(';')), "NODATA_VALUE"));
+    if (const auto value = text("nodata_value"); !value.empty()) read_voids(value);
+    if (!options.void_values.empty()) most_void_ = least_void_;  // the user knows better
     finish(options);
   }
+
+  void read_window(const Window& window, std::span<std::byte> samples) override {
+    DescribedSource::read_window(window, samples);
+    if (!(least_void_ < most_void_)) return;
+    const LoadSample load = load_sample(info_.sample_type);
+    const StoreSample store = store_sample(info_.sample_type);
+    const std::size_t size = size_bytes(info_.sample_type);
+    for (std::size_t at = 0; at < samples.size(); at += size) {
+      const double value = load(samples.data() + at);
+      if (value > least_void_ && value <= most_void_) store(least_void_, samples.data() + at);
+    }
+  }
+
+ private:
+  /// "-9999", or a range, "-99999;-9999": all of it is void, and delivered as its least value.
+  void read_voids(const std::string& text) {
+    const std::size_t semicolon = text.find(';');
+    double least = number(text.substr(0, semicolon), "NODATA_VALUE");
+    if (semicolon == std::string::npos) return set_void(least);
+    double most = number(text.substr(semicolon + 1), "NODATA_VALUE");
+    if (most < least) std::swap(least, most);
+    const auto [lowest, highest] = sample_range(info_.sample_type);
+    if (most < lowest || least > highest) return;
+    least = nearest_sample(info_.sample_type, is_floating(info_.sample_type) ? least : std::ceil(least));
+    if (least > most) return;
+    set_void(least);
+    least_void_ = least;
+    most_void_ = most;
+  }
+
+  double least_void_ = std::numeric_limits<double>::quiet_NaN();
+  double most_void_ = least_void_;
 };
 
 }  // namespace

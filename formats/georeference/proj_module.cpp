@@ -252,19 +252,11 @@ Object geographic_part(PJ_CONTEXT* context, const PJ* system) {
   return Object(proj_crs_create_bound_crs(context, geographic.get(), hub.get(), way.get()));
 }
 
-void find_operation(const char* from, const char* to, const double* ground, IsohfProjOperation& found) {
-  IsohfProjSystem source;
-  IsohfProjSystem target;
-  IsohfProjInfo info{};
-  open(from, "", source, info);
-  const double meridian_deg = info.prime_meridian_deg;
-  open(to, "", target, info);
-  PJ_CONTEXT* const context = target.context.get();
-  const Object ours = geographic_part(context, with_datum(context, source.system.get()).get());
-  const Object theirs = with_datum(context, target.system.get());
+/// The best of PROJ's ways over a ground, one that moves between the datums before any other; null where it knows none.
+Object best_way(PJ_CONTEXT* context, const PJ* from, const PJ* to, const double* ground) {
   const std::unique_ptr<PJ_OPERATION_FACTORY_CONTEXT, Destroy<proj_operation_factory_context_destroy>> factory(
       proj_create_operation_factory_context(context, nullptr));
-  if (!ours || !theirs || !factory) refuse("has no longitudes and latitudes that PROJ knows");
+  if (from == nullptr || to == nullptr || !factory) refuse("has no longitudes and latitudes that PROJ knows");
   proj_operation_factory_context_set_spatial_criterion(context, factory.get(),
                                                        PROJ_SPATIAL_CRITERION_PARTIAL_INTERSECTION);
   proj_operation_factory_context_set_grid_availability_use(context, factory.get(),
@@ -277,7 +269,7 @@ void find_operation(const char* from, const char* to, const double* ground, Isoh
              : proj_operation_factory_context_set_area_of_interest(context, factory.get(), ground[0], ground[1],
                                                                    ground[2], ground[3]);
     const std::unique_ptr<PJ_OBJ_LIST, Destroy<proj_list_destroy>> ways(
-        proj_create_operations(context, ours.get(), theirs.get(), factory.get()));
+        proj_create_operations(context, from, to, factory.get()));
     const int count = ways ? proj_list_get_count(ways.get()) : 0;
     for (int i = 0; i < count; ++i) {
       Object way(proj_list_get(context, ways.get(), i));
@@ -286,13 +278,41 @@ void find_operation(const char* from, const char* to, const double* ground, Isoh
       if (!is_ballpark) break;
     }
   }
+  return first;
+}
+
+void find_operation(const char* from, const char* to, const double* ground, IsohfProjOperation& found) {
+  IsohfProjSystem source;
+  IsohfProjSystem target;
+  IsohfProjInfo ours{};
+  IsohfProjInfo theirs{};
+  open(from, "", source, ours);
+  open(to, "", target, theirs);
+  PJ_CONTEXT* const context = target.context.get();
+  const Object there = with_datum(context, target.system.get());
+  const Object here = geographic_part(context, with_datum(context, source.system.get()).get());
+  Object first = best_way(context, here.get(), there.get(), ground);
+  const IsohfProjSystem* counted = &source;  // whose longitudes and latitudes the way begins with
+  found.is_ballpark = first ? proj_coordoperation_has_ballpark_transformation(context, first.get()) : 1;
+  // PROJ goes to no other body, and knows none by a radius. Bodies whose radii are as alike as these are one.
+  constexpr double kSameBody = 0.01;
+  const double apart = std::abs(ours.semi_major_axis_m / theirs.semi_major_axis_m - 1.0);
+  if (!first && apart < kSameBody) {
+    counted = &target;
+    first = best_way(context, geographic_part(context, there.get()).get(), there.get(), ground);
+  }
+  // On other bodies an ellipsoid says what datum there is.
+  const bool is_earth = std::abs(ours.semi_major_axis_m / 6378137.0 - 1.0) < kSameBody;
+  if (!is_earth && apart < 1e-9 && std::abs(ours.inverse_flattening - theirs.inverse_flattening) < 1e-6) {
+    found.is_ballpark = 0;
+  }
   const Object way(first ? proj_normalize_for_visualization(context, first.get()) : nullptr);
   const char* const text = way ? proj_as_proj_string(context, way.get(), PJ_PROJ_5, nullptr) : nullptr;
   if (text == nullptr) refuse("cannot be reached from the input's reference system: PROJ knows no way");
-  found.is_ballpark = proj_coordoperation_has_ballpark_transformation(context, first.get());
   std::string pipeline = text;
-  // Degrees from Greenwich first become what the input's system counts.
-  const double unit = source.degrees_per_unit;
+  // Degrees from Greenwich first become what that system counts.
+  const double unit = counted->degrees_per_unit;
+  const double meridian_deg = counted->prime_meridian_deg;
   if (std::abs(unit - 1.0) > 1e-12 || std::abs(meridian_deg) > 1e-12) {
     constexpr std::string_view kHead = "+proj=pipeline";
     char head[256];

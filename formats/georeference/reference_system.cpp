@@ -21,6 +21,16 @@ const IsohfProjModule& proj_module() {
                    "ISOHF_BUILD_PROJ_MODULE"}));
 }
 
+/// For messages, of what may be a WKT of any length.
+std::string shortened(const std::string& text) {
+  return one_line(text.size() > 60 ? text.substr(0, 60) + "..." : text);
+}
+
+/// For messages: PROJ strings have no name of their own.
+std::string shown_name(const std::string& name, const std::string& text) {
+  return name.empty() || name == "unknown" ? shortened(text) : name;
+}
+
 /// libproj, SQLite and what they read of proj.db.
 constexpr std::uint64_t kProjBytes = 14'000'000;
 
@@ -33,8 +43,7 @@ class ProjSystem final : public UnderstoodSystem {
     const std::string vertical = vertical_epsg ? fmt::format("EPSG:{}", *vertical_epsg) : "";
     const int result = module_.open(text.c_str(), vertical.c_str(), &system_, &info, &message);
     if (result != 0) {
-      const std::string shown = one_line(text.size() > 60 ? text.substr(0, 60) + "..." : text);
-      throw Error(module_error_code(result), fmt::format("the reference system {}: {}", shown, message.text));
+      throw Error(module_error_code(result), fmt::format("the reference system {}: {}", shortened(text), message.text));
     }
     description_.name = info.name;
     description_.authority = info.authority;
@@ -205,7 +214,8 @@ void take_system(const std::string& text, SourceInfo& info) {
   const UnderstoodSystem::Description& found = understood->description();
   constexpr double kSame = 1e-12;
   if (!found.is_projected && (std::abs(found.unit - 1.0) > kSame || std::abs(found.prime_meridian_deg) > kSame)) {
-    refuse(found.name, "counts no degrees from Greenwich", "gdalwarp brings the raster to one that does");
+    refuse(shown_name(found.name, text), "counts no degrees from Greenwich",
+           "gdalwarp brings the raster to one that does");
   }
   Georeference& place = info.georeference;
   place.unit = found.is_projected ? HorizontalUnit::kMetre : HorizontalUnit::kDegree;
@@ -298,17 +308,34 @@ GeoExtent rough_ground(const SourceInfo& info, const ReferenceMap* map) {
 
 }  // namespace
 
+namespace {
+
+/// Heights are moved by nobody: a system that speaks of others is not what the raster would be in.
+void require_same_heights(const ReferenceSystem& from, const UnderstoodSystem::Description& target,
+                          const std::string& name) {
+  if (target.vertical_name.empty() || target.vertical_name == from.vertical_datum) return;
+  if (target.vertical_epsg && target.vertical_epsg == from.vertical_epsg) return;
+  throw Error(ErrorCode::kInvalidArgument,
+              fmt::format("\"{}\" speaks of heights, \"{}\", and the input's stay what they are; name the system "
+                          "without its heights",
+                          name, target.vertical_name));
+}
+
+}  // namespace
+
 WayToSystem find_way(const ReferenceSystem& from, const std::string& to, const GeoExtent& ground,
                      const Ellipsoid& ellipsoid) {
   const auto understood = understand_system(to);
   const UnderstoodSystem::Description& target = understood->description();
+  const std::string name = shown_name(target.name, to);
+  require_same_heights(from, target, name);
   const double area[4] = {ground.west, ground.south, ground.east, ground.north};
   IsohfProjOperation operation{};
   IsohfProjMessage message{};
   const int result = proj_module().find_operation(datum_text(from).c_str(), to.c_str(), area, &operation, &message);
-  if (result != 0) throw Error(module_error_code(result), fmt::format("\"{}\" {}", target.name, message.text));
+  if (result != 0) throw Error(module_error_code(result), fmt::format("\"{}\" {}", name, message.text));
   WayToSystem way;
-  way.system = {target.authority == "EPSG" ? "EPSG:" + target.code : target.wkt2, target.name, operation.pipeline,
+  way.system = {target.authority == "EPSG" ? "EPSG:" + target.code : target.wkt2, name, operation.pipeline,
                 target.is_projected ? target.unit : 1.0};
   way.is_projected = target.is_projected;
   MappedSystem in_units = way.system;

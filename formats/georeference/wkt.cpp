@@ -220,6 +220,17 @@ bool read_wkt(std::string_view text, SourceInfo& info) {
   return true;
 }
 
+DatumNames datum_names(std::string_view wkt) {
+  const std::optional<Node> root = Parser(wkt).whole();
+  if (!root) return {};
+  const auto name = [&](std::initializer_list<std::string_view> words) {
+    const Node* const node = root->below(words);
+    return node == nullptr || node->texts.empty() ? std::string() : node->texts[0];
+  };
+  return {name({"DATUM", "GEODETICDATUM", "TRF", "ENSEMBLE"}), name({"SPHEROID", "ELLIPSOID"}),
+          name({"PRIMEM", "PRIMEMERIDIAN"})};
+}
+
 namespace {
 
 /// A .prj of before WKT: "Projection UTM", "Zone 11", "Datum NAD27", "Units METERS", a line each, and behind

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <string>
 #include <string_view>
 
 #include "isohf/raster.h"
@@ -12,7 +13,15 @@ namespace isohf {
 /// Throws Error{kUnsupported} where its longitudes and latitudes are no degrees from Greenwich.
 [[nodiscard]] bool read_wkt(std::string_view text, SourceInfo& info);
 
-/// The same of a .prj, which may be older than WKT: lines of keywords ("Projection UTM"), as Arc/Info wrote them. Those
+/// What a system is called that its longitudes and latitudes are on; empty where a WKT does not say it.
+struct DatumNames {
+  std::string datum;
+  std::string ellipsoid;
+  std::string meridian;
+};
+[[nodiscard]] DatumNames datum_names(std::string_view wkt);
+
+/// What read_wkt() does of a .prj, which may be older than WKT: lines of keywords ("Projection UTM"), as Arc/Info wrote them. Those
 /// other than GEOGRAPHIC need PROJ. Throws also what take_system() throws.
 [[nodiscard]] bool read_prj(std::string_view text, SourceInfo& info);
 

@@ -530,14 +530,19 @@ class KeyWriter {
     tags_.doubles.push_back(value);
   }
 
-  /// A bar ends each text, so that none may contain one.
-  void text(Key key, std::string value) {
+  /// A bar ends each text, so that none may contain one; nor may a part of a citation of several.
+  void text(Key key, std::initializer_list<std::string> parts) {
+    std::string value;
+    for (std::string part : parts) {
+      std::replace(part.begin(), part.end(), '|', '/');
+      value += (value.empty() ? "" : "|") + part;
+    }
     if (value.empty() || tags_.ascii.size() + value.size() > kMaxText) return;
-    std::replace(value.begin(), value.end(), '|', '/');
     keys_[key] = {kAsciiTag, static_cast<std::uint16_t>(value.size() + 1),
                   static_cast<std::uint16_t>(tags_.ascii.size())};
     tags_.ascii += value + '|';
   }
+  void text(Key key, const std::string& value) { text(key, {value}); }
 
   /// The directory: version 1.1.0, or 1.1.1 (GeoTIFF 1.1) where codes name vertical systems, which GDAL reads in that
   /// alone; the count, then the keys in order.
@@ -589,7 +594,14 @@ void write_system(const Georeference& geo, KeyWriter& keys) {
     write_linear_unit(geo.metres_per_unit, keys);
   } else {
     keys.number(kAngularUnits, kDegree);
-    keys.text(kGeodeticCitation, system.name);
+    const auto [datum, ellipsoid, meridian] = system.epsg ? DatumNames{} : datum_names(system.wkt);
+    if (datum.empty()) {
+      keys.text(kGeodeticCitation, system.name);
+    } else {  // as GDAL writes and reads it
+      keys.text(kGeodeticCitation, {"GCS Name = " + system.name, "Datum = " + datum,
+                                    "Ellipsoid = " + (ellipsoid.empty() ? "unknown" : ellipsoid),
+                                    "Primem = " + (meridian.empty() ? "Greenwich" : meridian)});
+    }
   }
   if (!system.semi_major_axis_m) return;
   if (projected && !system.epsg) keys.number(kGeodeticCrs, kUserDefined);
@@ -679,6 +691,11 @@ GeoTags geotiff_tags(const Georeference& georeference, double metres_per_vertica
                       georeference.origin_x - to_corner * georeference.spacing_x,
                       georeference.origin_y + to_corner * georeference.spacing_y,
                       0.0};
+  }
+  // Areas are what a place without keys stands for, and GDAL makes a system of its own of any key.
+  if (!has_unit && is_area && !tags.pixel_scale.empty() && vertical_unit.empty() &&
+      georeference.system.vertical_datum.empty() && !georeference.system.vertical_epsg) {
+    return tags;
   }
   KeyWriter keys(tags);
   keys.number(kRasterType, georeference.registration == Registration::kPoint ? kRasterIsPoint : kRasterIsArea);

@@ -147,6 +147,90 @@ def projections(isohf, folder):
         isohf.refuses(why, "convert", folder / "degrees0.tif", "-o", folder / "n.isohf", "--projection", text)
 
 
+def write_globe(path, west):
+    """All the way round from a meridian; heights are those of turned()."""
+    lon, lat = numpy.meshgrid(west + numpy.arange(360) + 0.5, 59.5 - numpy.arange(120))
+    raster = gdal.GetDriverByName("GTiff").Create(str(path), 360, 120, 1, gdal.GDT_Float32)
+    raster.SetGeoTransform((west, 1.0, 0.0, 60.0, 0.0, -1.0))
+    raster.SetProjection(system("EPSG:4326").ExportToWkt())
+    raster.GetRasterBand(1).WriteArray(turned(lon, lat).astype(numpy.float32))
+    raster = None
+
+
+def turned(lon, lat):
+    return 1000.0 * numpy.cos(numpy.radians(lon)) + 300.0 * numpy.sin(numpy.radians(lon)) + 2.0 * lat
+
+
+def globes(isohf, folder):
+    """Rasters of longitudes from 0 to 360: maps that are cut open at 180 degrees show all of them."""
+    for west in (0.0, -180.0, 20.0):
+        write_globe(folder / "globe.tif", west)
+        for text in ("EPSG:3857", "ESRI:54009"):
+            isohf.must("convert", folder / "globe.tif", "-o", folder / "g.isohf", "--overwrite", "--type", "f32", "-q",
+                       "--projection", text)
+            isohf.must("export", folder / "g.isohf", folder / "g.tif", "--overwrite", "-q")
+            raster = gdal.Open(str(folder / "g.tif"))
+            x0, dx, _, y0, _, dy = raster.GetGeoTransform()
+            heights = raster.ReadAsArray()
+            to_map = osr.CoordinateTransformation(system("EPSG:4326"), system(text))
+            for lon in range(-178, 179, 7):
+                for lat in (-50.0, 0.0, 33.0):
+                    x, y, _ = to_map.TransformPoint(float(lon), lat)
+                    column, row = int((x - x0) / dx), int((y - y0) / dy)
+                    back = osr.CoordinateTransformation(system(text), system("EPSG:4326")).TransformPoint(
+                        x0 + (column + 0.5) * dx, y0 + (row + 0.5) * dy)
+                    off = abs(float(heights[row, column]) - float(turned(*back[:2])))
+                    check(off <= 1.0, f"{text} of a globe from {west}: {lon} {lat} is off by {off} m")
+        for options in (["--projection", "none"], ["--projection", "equirectangular"]):
+            isohf.must("convert", folder / "globe.tif", "-o", folder / "g.isohf", "--overwrite", "-q", *options)
+            for lon in (200.5, 100.5):
+                said = isohf.must("sample", folder / "g.isohf", "--at-lonlat", lon, 3, "--with-crs").stdout.split()
+                own = west + (lon - west) % 360.0
+                check(abs(float(said[-2]) - own) < 1e-6, f"--with-crs says {said[-2]} for {own}, from {west} on")
+    write(folder / "across.tif", "EPSG:4326", 180.0, 10.0, 30.0, (180.0, 10.0), 0)
+    isohf.refuses("its edge runs through it", "convert", folder / "across.tif", "-o", folder / "n.isohf", "--projection",
+                  "+proj=moll +datum=WGS84")
+
+
+def planets(isohf, folder):
+    """Systems of other bodies by their radii alone, which PROJ knows no bodies of."""
+    for own, text, loses in (
+            ("+proj=longlat +R=3396190", "+proj=eqc +R=3396190", False),
+            ("IAU_2015:49900", "+proj=sinu +lon_0=137 +R=3396190", False),
+            ("+proj=longlat +R=3396190", "IAU_2015:49910", False),
+            ("+proj=longlat +a=3396190 +b=3376200", "+proj=stere +lat_0=-90 +a=3396190 +b=3376200", False),
+            ("+proj=longlat +a=3396190 +b=3376200", "+proj=eqc +R=3396190", True),
+            ("+proj=longlat +R=1737400", "+proj=merc +R=1737400", False)):
+        raster = gdal.GetDriverByName("GTiff").Create(str(folder / "body.tif"), 60, 60, 1, gdal.GDT_Float32)
+        raster.SetGeoTransform((136.0, 0.01, 0.0, -4.0, 0.0, -0.01))
+        raster.SetProjection(system(own).ExportToWkt())
+        raster.GetRasterBand(1).WriteArray(numpy.tile(numpy.arange(60, dtype=numpy.float32) * 0.01, (60, 1)))
+        raster = None
+        result = isohf.must("convert", folder / "body.tif", "-o", folder / "b.isohf", "--overwrite", "--type", "f32",
+                            "--projection", text)
+        check(("taken for one" in result.stderr) == loses, f"{own} to {text}: {result.stderr}")
+        isohf.must("export", folder / "b.isohf", folder / "b.tif", "--overwrite", "-q")
+        raster = gdal.Open(str(folder / "b.tif"))
+        x0, dx, _, y0, _, dy = raster.GetGeoTransform()
+        geographic = system(text).CloneGeogCS()
+        geographic.SetAxisMappingStrategy(osr.OAMS_TRADITIONAL_GIS_ORDER)
+        to_own = osr.CoordinateTransformation(system(text), geographic)
+        column, row = raster.RasterXSize // 2, raster.RasterYSize // 2
+        lon, _, _ = to_own.TransformPoint(x0 + (column + 0.5) * dx, y0 + (row + 0.5) * dy)
+        height = float(raster.ReadAsArray()[row, column])
+        check(abs(height - (lon - 136.005)) < 1e-4, f"{own} to {text}: {height}, must be {lon - 136.005}")
+
+
+def heights_of_a_projection(isohf, folder):
+    """A system that speaks of heights is taken where the input's are the same."""
+    for own, text, taken in (("EPSG:32632", "EPSG:3035+5773", False), ("EPSG:32632+5773", "EPSG:3035+5773", True),
+                             ("EPSG:32632+5773", "EPSG:3035+3855", False)):
+        write(folder / "h.tif", "EPSG:32632", 8.5, 46.5, 30.0, (8.5, 46.5), 0, 40)
+        arguments = ("convert", folder / "h.tif", "-o", folder / "h.isohf", "--overwrite", "-q", "--crs", own,
+                     "--projection", text)
+        isohf.must(*arguments) if taken else isohf.refuses("speaks of heights", *arguments)
+
+
 def joined(isohf, folder):
     """Rasters of two zones as one surface."""
     middle = (12.0, 46.6)
@@ -310,12 +394,53 @@ def samples(isohf, folder):
     check(numpy.array_equal(gdal.Open(str(folder / "w.png")).ReadAsArray(), whole), "samples of a PNG differ")
 
 
+def ranges_of_voids(isohf, folder):
+    """SAGA's NODATA_VALUE may be a range, of which every value is void."""
+    grid = numpy.arange(1600, dtype="<f4").reshape(40, 40)
+    grid[2, 3:7] = (-99999.0, -50000.25, -9999.0, -9998.0)
+    (folder / "s.sdat").write_bytes(grid.tobytes())
+    for text, voids in (("-99999;-9999", 3), ("-9999;-99999", 3), ("-9999", 1), ("-60000;-9999", 2)):
+        (folder / "s.sgrd").write_text(f"DATAFORMAT\t= FLOAT\nBYTEORDER_BIG\t= FALSE\nTOPTOBOTTOM\t= TRUE\nPOSITION_XMIN\t= 0\n"
+                                       f"POSITION_YMIN\t= 0\nCELLCOUNT_X\t= 40\nCELLCOUNT_Y\t= 40\nCELLSIZE\t= 10\n"
+                                       f"NODATA_VALUE\t= {text}\n")
+        isohf.must("convert", folder / "s.sgrd", "-o", folder / "s.isohf", "--overwrite", "--lossless", "-q")
+        isohf.must("restore", folder / "s.isohf", folder / "s.tif", "--overwrite", "-q")
+        raster = gdal.Open(str(folder / "s.tif"))
+        band = raster.GetRasterBand(1)
+        found = band.ReadAsArray()
+        count = int(((found == band.GetNoDataValue()) | numpy.isnan(found)).sum())
+        check(count == voids, f"NODATA_VALUE {text}: {count} voids, must be {voids}")
+
+
+def large_chunks(isohf, folder):
+    """What is looked at in a netCDF-4 file before it is read decodes no chunk of a gigabyte."""
+    path = folder / "c.nc"
+    subprocess.run([sys.executable, "-c", WRITE_CHUNK, str(path)], check=True)
+    program = subprocess.Popen([f"{isohf.bin}/isohf", "info", str(path)], stdout=subprocess.DEVNULL)
+    _, status, used = os.wait4(program.pid, 0)
+    check(status == 0, "info of a large chunk fails")
+    check(used.ru_maxrss < 300000, f"info of a large chunk takes {used.ru_maxrss} kB")
+
+
+WRITE_CHUNK = """
+import sys
+import numpy
+from osgeo import gdal
+root = gdal.GetDriverByName("netCDF").CreateMultiDimensional(sys.argv[1]).GetRootGroup()
+y, x = (root.CreateDimension(name, "", "", 12000) for name in "yx")
+made = root.CreateMDArray("z", [y, x], gdal.ExtendedDataType.Create(gdal.GDT_Float32),
+                          ["BLOCKSIZE=12000,12000", "COMPRESS=DEFLATE", "ZLEVEL=1"])
+made.Write(numpy.zeros((12000, 12000), dtype=numpy.float32))
+"""
+
+
 def main():
     if len(sys.argv) != 2:
         print(__doc__, file=sys.stderr)
         return 2
     bin_dir = pathlib.Path(sys.argv[1]).resolve()
-    for part in (projections, joined, other_parameters, written_elsewhere, loads_no_proj, beside, samples):
+    for part in (projections, globes, planets, heights_of_a_projection, joined, other_parameters, written_elsewhere, loads_no_proj, beside,
+                 samples, ranges_of_voids, large_chunks):
         with tempfile.TemporaryDirectory(prefix="placement") as folder:
             part(Program(pathlib.Path(folder), bin_dir), pathlib.Path(folder))
     print(f"{len(failures)} failures")

@@ -7,7 +7,8 @@ usage: reference_systems.py BIN_DIR PAGE [--write]
 Makes a raster of each system in SYSTEMS in each format of READERS with GDAL, converts it, restores it as GeoTIFF, and
 the first of them in each format of WRITERS too; then holds system, heights and the four corners of both files, as GDAL
 reads them, beside each other. PAGE has the table of all of it; --write writes it anew, else a cell that differs is an
-error. With --real it does the same with every raster of FOLDER that GDAL reads; what KNOWN names may differ. Ends with
+error. With --real it does so with every raster of FOLDER, and of the folder that ISOHF_REAL_DATA names, that has a place
+for GDAL, exported as well as restored; what KNOWN names may differ. Ends with
 77 where GDAL's Python package is missing (Debian: python3-gdal).
 """
 import concurrent.futures
@@ -105,6 +106,8 @@ SYSTEMS = [
     ("Mars, degrees", "IAU_2015:49900", 137.4, -4.6),
     ("Mars, IAU equirectangular", "IAU_2015:49910", 137.4, -4.6),
     ("Moon, degrees", "IAU_2015:30100", 20.0, 10.0),
+    ("degrees on an own datum", 'GEOGCS["GCS_Tachikawa",DATUM["D_Tachikawa",SPHEROID["Bessel_1841",6377397.155,'
+     '299.1528128]],PRIMEM["Greenwich",0],UNIT["Degree",0.0174532925199433]]', 139.4, 35.7),
     ("Moon, Mercator", "+proj=merc +lat_ts=20 +lon_0=0 +R=1737400", 20.0, 10.0),
 ]
 
@@ -176,15 +179,45 @@ def heights_differ(first, second):
     return None if abs(units[0] - units[1]) < 1e-7 else f"unit of heights {units[0]} -> {units[1]}"
 
 
+def datum_of(system):
+    """Its name as every dialect has it: "D_My_datum", "My datum"; empty where it has none."""
+    name = re.sub(r"[^a-z0-9]+", "", re.sub(r"^D_", "", system.GetAttrValue("DATUM") or "").lower())
+    return "" if name in ("unknown", "unnamed") else name
+
+
+def north_up(raster):
+    """Its six numbers, from the North on, whichever way its rows run."""
+    t = list(raster.GetGeoTransform())
+    if t[5] > 0.0:
+        t[3], t[5] = t[3] + raster.RasterYSize * t[5], -t[5]
+    return t
+
+
+def corners_differ(a, b, to_first):
+    """Whether a size or a corner is another, by more than a hundredth of a sample."""
+    height, width = a.RasterYSize, a.RasterXSize
+    t, u = north_up(a), north_up(b)
+    if (b.RasterXSize, b.RasterYSize) != (width, height):
+        return ["size"]
+    for column, row in ((0, 0), (width, 0), (0, height), (width, height)):
+        x, y = t[0] + column * t[1], t[3] + row * t[5]
+        v, w = u[0] + column * u[1], u[3] + row * u[5]
+        if to_first:
+            v, w, _ = to_first.TransformPoint(v, w)
+        if not (abs(v - x) <= 0.01 * t[1] and abs(w - y) <= 0.01 * abs(t[5])):
+            return [f"corner {column},{row}: {x:.10g} {y:.10g} -> {v:.10g} {w:.10g}"]
+    return []
+
+
 def differences(theirs, ours):
     """What the second file has lost of the first; empty: nothing."""
     a, b = gdal.Open(theirs), gdal.Open(ours)
     found = []
     first, second = a.GetSpatialRef(), b.GetSpatialRef()
+    if (first is None) != (second is None):
+        return ["no system" if first else "a system that GDAL finds nowhere"]
     if first is None:
-        return ["GDAL reads no system of the source"]
-    if second is None:
-        return ["no system"]
+        return corners_differ(a, b, None)
     flat = [first.Clone(), second.Clone()]
     for system in flat:
         if system.IsCompound():
@@ -202,19 +235,10 @@ def differences(theirs, ours):
                          ("angular unit", osr.SpatialReference.GetAngularUnits)):
             if abs(of(flat[0]) - of(flat[1])) > 1e-9 * abs(of(flat[0])):
                 found.append(f"{name} {of(flat[0])} -> {of(flat[1])}")
-    height, width = a.RasterYSize, a.RasterXSize
-    t, u = a.GetGeoTransform(), b.GetGeoTransform()
-    if (b.RasterXSize, b.RasterYSize) != (width, height):
-        found.append("size")
-    to_first = None if same or found else osr.CoordinateTransformation(flat[1], flat[0])
-    for column, row in ((0, 0), (width, 0), (0, height), (width, height)):
-        x, y = t[0] + column * t[1], t[3] + row * t[5]
-        v, w = u[0] + column * u[1], u[3] + row * u[5]
-        if to_first:
-            v, w, _ = to_first.TransformPoint(v, w)
-        if not (abs(v - x) <= 0.01 * t[1] and abs(w - y) <= 0.01 * t[1]):
-            found.append(f"corner {column},{row}: {x:.10g} {y:.10g} -> {v:.10g} {w:.10g}")
-            break
+    has_code = flat[0].GetAuthorityCode("GEOGCS") or flat[0].GetAuthorityCode("DATUM")
+    if not has_code and datum_of(flat[0]) and datum_of(flat[1]) != datum_of(flat[0]):
+        found.append(f"datum {flat[0].GetAttrValue('DATUM')} -> {flat[1].GetAttrValue('DATUM')}")
+    found += corners_differ(a, b, None if same or found else osr.CoordinateTransformation(flat[1], flat[0]))
     if heights := heights_differ(first, second):
         found.append(heights)
     return found
@@ -281,17 +305,15 @@ def lost_by_real_files(isohf, folder, names):
             source = gdal.Open(str(name))
         except RuntimeError:
             continue
-        if source.GetSpatialRef() is None:
+        if source.GetSpatialRef() is None and source.GetGeoTransform(can_return_null=True) is None:
             continue
-        archive, restored = str(folder / (name.name + ".isohf")), str(folder / (name.name + "_restored.tif"))
-        for arguments in (["convert", str(name), archive, "--quiet", "--projection", "none", "--overwrite"],
-                          ["restore", archive, restored, "--quiet", "--overwrite"]):
-            code, said = run(isohf, *arguments)
-            if code != 0:
-                found[name.name] = [said]
-                break
-        else:
-            found[name.name] = differences(str(name), restored)
+        archive = str(folder / (name.name + ".isohf"))
+        code, said = run(isohf, "convert", str(name), archive, "--quiet", "--projection", "none", "--overwrite")
+        found[name.name] = [said] if code != 0 else []
+        for command in ("restore", "export") if code == 0 else ():
+            written = str(folder / f"{name.name}_{command}.tif")
+            code, said = run(isohf, command, archive, written, "--quiet", "--overwrite")
+            found[name.name] += [f"{command}: {what}" for what in ([said] if code != 0 else differences(str(name), written))]
     return found
 
 
@@ -338,7 +360,7 @@ def check_real(isohf, folders):
 def main():
     isohf = str(pathlib.Path(sys.argv[1]) / "isohf")
     if sys.argv[2] == "--real":
-        return check_real(isohf, sys.argv[3:])
+        return check_real(isohf, sys.argv[3:] + [name for name in [os.environ.get("ISOHF_REAL_DATA")] if name])
     with tempfile.TemporaryDirectory() as folder:
         with concurrent.futures.ThreadPoolExecutor(2) as pool:
             rows = list(pool.map(lambda item: cells_of(isohf, pathlib.Path(folder), *item), enumerate(SYSTEMS)))

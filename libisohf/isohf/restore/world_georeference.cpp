@@ -68,6 +68,12 @@ struct WorldGeoreference::State {
   double step_x = 0.0;
   double step_y = 0.0;
 
+  /// Of all turns of a longitude the one nearest to the source's middle: its own, from -180 or from 0 on.
+  [[nodiscard]] double own_turn(double longitude) const {
+    const double middle = first_sample.easting + 0.5 * static_cast<double>(geometry.width - 1) * step_x;
+    return middle + std::remainder(longitude - middle, 360.0);
+  }
+
   [[nodiscard]] WorldPoint world_from_position(SourcePosition at) const {
     if (warp) return warp->world_from_source(at);
     double x = geometry.first_sample_x + at.u * geometry.spacing_x;
@@ -118,16 +124,12 @@ WorldPoint WorldGeoreference::world_from_geo(GeoPoint point) const {
 GeoPoint WorldGeoreference::geo_from_world(WorldPoint point) const {
   if (state_->warp) return state_->warp->geo_from_world(point);
   const MapPoint at = source_from_world(point);
-  return state_->map ? state_->map->geo_from_map(at) : GeoPoint{at.easting, at.northing};
+  return state_->map ? state_->map->geo_from_map(at) : GeoPoint{std::remainder(at.easting, 360.0), at.northing};
 }
 
 WorldPoint WorldGeoreference::world_from_source(MapPoint point) const {
   const State& s = *state_;
-  if (s.in_degrees) {
-    // Of all turns the one nearest to the source's middle.
-    const double middle = s.first_sample.easting + 0.5 * static_cast<double>(s.geometry.width - 1) * s.step_x;
-    point.easting = middle + std::remainder(point.easting - middle, 360.0);
-  }
+  if (s.in_degrees) point.easting = s.own_turn(point.easting);
   return s.world_from_position(
       {(point.easting - s.first_sample.easting) / s.step_x, (s.first_sample.northing - point.northing) / s.step_y});
 }
@@ -136,12 +138,12 @@ MapPoint WorldGeoreference::source_from_world(WorldPoint point) const {
   const State& s = *state_;
   if (s.warp) {
     const GeoPoint geo = s.warp->geo_from_world(point);
-    return s.map ? s.map->map_from_geo(geo) : MapPoint{geo.longitude, geo.latitude};
+    return s.map ? s.map->map_from_geo(geo) : MapPoint{s.own_turn(geo.longitude), geo.latitude};
   }
   const SourceGeometry& g = s.geometry;
   const MapPoint at{s.first_sample.easting + (point.x - g.first_sample_x) / g.spacing_x * s.step_x,
                     s.first_sample.northing - (point.z - g.first_sample_z) / g.spacing_z * s.step_y};
-  return s.in_degrees ? MapPoint{std::remainder(at.easting, 360.0), at.northing} : at;
+  return s.in_degrees ? MapPoint{s.own_turn(at.easting), at.northing} : at;
 }
 
 }  // namespace isohf

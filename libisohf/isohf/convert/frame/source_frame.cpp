@@ -68,13 +68,15 @@ MapBounds bounds_of(const SourceInfo& info, Registration registration) {
 }
 
 /// `bounds` of the source on the map of frame.projection; its spacings are those of the ground in the middle.
-void place_by_warp(const SourceInfo& info, const MapBounds& bounds, std::shared_ptr<const ReferenceMap> source_map,
-                   SourceFrame& frame) {
+void place_by_warp(const SourceInfo& info, const ProjectionRequest& asked, const MapBounds& bounds,
+                   std::shared_ptr<const ReferenceMap> source_map, SourceFrame& frame) {
   const Georeference& place = info.georeference;
   const ProjectionSpec& spec = frame.projection->spec;
   if (!std::isfinite(bounds.west)) {
-    refuse(fmt::format("{}: `projection` {} has no place for a part of the input; give `projection` auto", info.path,
-                       spec.kind == ProjectionKind::kSystem ? spec.system.text : to_string(spec.kind)));
+    refuse(
+        fmt::format("{}: `projection` {} has no place for a part of the input, or its edge runs through it; convert "
+                    "what lies within (`bbox`), or give `projection` auto",
+                    info.path, asked.name()));
   }
   const double grain = grain_of(std::min(frame.spacing_x, frame.spacing_z));
   const MapPoint origin{std::floor(bounds.west / grain) * grain, std::ceil(bounds.north / grain) * grain};
@@ -152,7 +154,7 @@ void place_on_map(const SourceInfo& info, const GroundRequest& request, SourceFr
   const bool is_known = std::isfinite(middle.areal);
   frame.spacing_x *= is_known ? middle.ground_m_per_easting / map.metres_per_unit() : 1.0 / ground.mean_scale;
   frame.spacing_z *= is_known ? middle.ground_m_per_northing / map.metres_per_unit() : 1.0 / ground.mean_scale;
-  place_by_warp(info, projected_bounds(projection, map, bounds), request.source_map, frame);
+  place_by_warp(info, asked, projected_bounds(projection, map, bounds), request.source_map, frame);
 }
 
 void place_degrees(const SourceInfo& info, const GroundRequest& request, SourceFrame& frame) {
@@ -187,7 +189,12 @@ void place_degrees(const SourceInfo& info, const GroundRequest& request, SourceF
     const DegreeLengths degree = degree_lengths(choice.spec.ellipsoid, ground.middle().latitude);
     frame.spacing_x = place.spacing_x * degree.along_parallel;
     frame.spacing_z = place.spacing_y * degree.along_meridian;
-    return place_by_warp(info, projected_bounds(Projection(choice.spec), ground), nullptr, frame);
+    MapBounds bounds = projected_bounds(Projection(choice.spec), ground);
+    if (closure != Closure::kOpen && !std::isfinite(bounds.west)) {
+      // All the way round from some other meridian: most maps are cut open at the 180th.
+      bounds = projected_bounds(Projection(choice.spec), {-180.0, ground.south, 180.0, ground.north});
+    }
+    return place_by_warp(info, asked, bounds, nullptr, frame);
   }
   place_by_scale(frame.projection->spec, info, frame);
 }
