@@ -9,9 +9,9 @@
 
 namespace isohf::view {
 
-/// Opens a window and lets a person fly until it is closed, or for options.frames frames; writes options.screenshot of
-/// the last frame where asked, and with --json says where the eye stood at the end. Throws Error{kUnsupported} where no window or no OpenGL 3.3 can be had.
-void run_window(const TileSource& source, const Options& options);
+/// Opens the archives and a window and lets a person fly until it is closed, or for options.frames frames; writes
+/// options.screenshot of the last frame where asked, and with --json says where the eye stood at the end. Throws Error{kUnsupported} where no window or no OpenGL 3.3 can be had.
+void run_window(const Options& options);
 
 /// Flies along options.flight offscreen, prints figures on standard output, writes --csv and --plot. `poll` is called
 /// before each frame and may throw. Throws Error{kCorrupt} where a tile cannot be read.

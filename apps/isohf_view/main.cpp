@@ -1,18 +1,15 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <unistd.h>
 
-#include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 
 #include "actions.h"
-#include "formats/registry.h"
 #include "formats/write/raster_sink.h"
 #include "gl/offscreen.h"
 #include "interrupt.h"
-#include "isohf/convert.h"
 #include "isohf/error.h"
+#include "opening.h"
 #include "options/describe.h"
 #include "output/json_output.h"
 #include "output/output_file.h"
@@ -49,8 +46,8 @@ int take_screenshot(const TileSource& source, const Options& options) {
   target.write_picture(options.screenshot);
   print_result(options.common, "", [&] {
     return ordered_json{
-        {"archive", options.archive}, {"screenshot", options.screenshot},          {"width", target.width()},
-        {"height", target.height()},  {"exaggeration", session.view.exaggeration}, {"cut", session.is_cut()}};
+        {"archive", options.archives[0]}, {"screenshot", options.screenshot},          {"width", target.width()},
+        {"height", target.height()},      {"exaggeration", session.view.exaggeration}, {"cut", session.is_cut()}};
   });
   return cli::kExitDone;
 }
@@ -115,7 +112,8 @@ int verify(const TileSource& source, const Options& options) {
   ViewChecks wanted;
   wanted.progress = [check = interrupt_check()](std::int64_t, std::int64_t) { check(); };
   const ViewReport report = verify_view(source, make_index_arrays(source.grid().shape()), wanted);
-  print_result(options.common, text_from(report, options.archive), [&] { return json_from(report, options.archive); });
+  print_result(options.common, text_from(report, options.archives[0]),
+               [&] { return json_from(report, options.archives[0]); });
   return report.passed() ? cli::kExitDone : cli::kExitDifferences;
 }
 
@@ -135,47 +133,12 @@ int say_place(const TileSource& source, const Options& options) {
     text += describe_length(profile->length, source.ground_unit()) + " from the first to the second\n";
   }
   print_result(options.common, text, [&] {
-    ordered_json json{{"archive", options.archive}, {"places", ordered_json::array()}};
+    ordered_json json{{"archive", options.archives[0]}, {"places", ordered_json::array()}};
     for (const Place& place : places) json["places"].push_back(json_of(place));
     if (profile) json["profile"] = json_of(*profile);
     return json;
   });
   return cli::kExitDone;
-}
-
-/// A file that goes when this does, and what a conversion may leave of it.
-class ScratchArchive {
- public:
-  ScratchArchive()
-      : path_((std::filesystem::temp_directory_path() / fmt::format("isohf-view-{}.isohf", ::getpid())).string()) {}
-  ~ScratchArchive() {
-    std::error_code ignored;
-    for (const char* ending : {"", ".part"}) std::filesystem::remove(path_ + ending, ignored);
-  }
-  ScratchArchive(const ScratchArchive&) = delete;
-  ScratchArchive& operator=(const ScratchArchive&) = delete;
-  [[nodiscard]] const std::string& path() const { return path_; }
-
- private:
-  std::string path_;
-};
-
-/// Converts what is named where it is a raster; nullptr where it is none.
-std::unique_ptr<ScratchArchive> convert_for_viewing(const Options& options) {
-  if (native_format_of(options.archive, {}) == nullptr) return nullptr;
-  const std::unique_ptr<HeightSource> source = open_raster(options.archive, {});
-  auto scratch = std::make_unique<ScratchArchive>();
-  ConvertOptions request;
-  request.overwrite = true;
-  request.scratch_folder = std::filesystem::temp_directory_path().string();
-  understand_ground(source->info(), request.plan.ground);
-  Job job;
-  job.threads = options.threads;
-  job.cancel = &cli::watch_interrupts();
-  const ConvertSummary summary = convert(*source, scratch->path(), request, job);
-  if (options.common.quiet) return scratch;
-  for (const Warning& warning : summary.warnings) cli::print_warning(warning);
-  return scratch;
 }
 
 int run(const cli::Arguments& arguments) {
@@ -184,15 +147,15 @@ int run(const cli::Arguments& arguments) {
   // A flight's pictures are looked at one by one.
   const bool is_picture = !options->screenshot.empty() && options->action != Options::Action::kFlight;
   for (const std::string& output : {is_picture ? options->screenshot : std::string(), options->csv, options->plot}) {
-    if (!output.empty()) cli::check_output_file({options->archive}, output, options->overwrite);
+    if (!output.empty()) cli::check_output_file(options->archives, output, options->overwrite);
   }
   if (is_picture) check_raster_target(options->screenshot, options->overwrite);
-  const std::unique_ptr<ScratchArchive> scratch = convert_for_viewing(*options);
-  const std::unique_ptr<TileSource> source = open_archive(scratch ? scratch->path() : options->archive);
   if (options->action == Options::Action::kWindow) {
-    run_window(*source, *options);
+    run_window(*options);
     return cli::kExitDone;
   }
+  const Opened opened = open_shown(options->archives[0], *options, options->difference ? options->archives[1] : "");
+  const TileSource* source = opened.source.get();
   if (options->action == Options::Action::kProbe) return say_place(*source, *options);
   const HeadlessContext context;
   require_gl();

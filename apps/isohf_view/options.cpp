@@ -37,7 +37,8 @@ Examples:
   isohf view dem.isohf --date 2026-12-21 --time 15:30
   isohf view dem.isohf --probe 12000,8000 --json
   isohf view dem.isohf --flight path.txt --frames 600 --csv frames.csv
-  isohf view dem.isohf --verify)";
+  isohf view dem.isohf --verify
+  isohf view before.isohf after.isohf --difference)";
 
 [[noreturn]] void refuse(const std::string& text, const std::string& required) {
   throw Error(ErrorCode::kInvalidArgument, "found '" + text + "', must be " + required);
@@ -169,6 +170,8 @@ void add_picture(CommandLine& line, Options& options) {
                     kModes[cli::parse_word(text, {"elevation", "plain", "levels", "strips", "texture", "normals"})];
                 options.mode_given = true;
               });
+  line.flag("--difference", "Colour the ground by how far the second archive's lies above it, red, or below, blue",
+            options.difference);
   line.option("--palette", "NAME|FILE",
               "Colours of elevations: elevation, gray, mars (default: its body's), or a text file of elevations and "
               "colours as for gdaldem color-relief",
@@ -202,10 +205,12 @@ std::optional<Options> parse_options(const cli::Arguments& arguments) {
   bool no_haze = false;
   bool no_overlay = false;
   std::optional<double> time;
+  std::string archive;
   CommandLine line("view", "Views an archive of an isometric heightfield, or draws and checks it without a screen.");
   line.group("Arguments");
   line.positional("ARCHIVE", "-i,--input",
-                  "Archive to view, or a raster: it is converted for as long as it is looked at", options.archive);
+                  "Archive to view, or a raster: it is converted for as long as it is looked at", archive);
+  line.positionals("[SECOND]", "Another one: Tab goes to and fro between the two in the window", options.archives);
   add_actions(line, options, window, verify, sweep);
   add_picture(line, options);
   line.flag("--no-haze", "Leave out the haze towards the far distance", no_haze);
@@ -222,7 +227,9 @@ std::optional<Options> parse_options(const cli::Arguments& arguments) {
   cli::add_common_options(line, options.common);
   line.footer(kFooter);
   if (!line.parse(arguments)) return std::nullopt;
-  line.require("ARCHIVE", options.archive);
+  line.require("ARCHIVE", archive);
+  options.archives.insert(options.archives.begin(), archive);
+  if (options.archives.size() > 2) line.fail("found " + options.archives[2] + ", must be one archive, or two");
   const auto needs = [&](const char* option, bool is_met, const char* needed) {
     if (line.given(option) && !is_met) line.fail(std::string(option) + " needs " + needed);
   };
@@ -233,6 +240,8 @@ std::optional<Options> parse_options(const cli::Arguments& arguments) {
   needs("--steps", sweep, "--sweep");
   needs("--time", options.date.has_value(), "--date");
   if (time) options.date->hours = *time;
+  needs("--difference", options.archives.size() == 2, "a second archive");
+  if (options.difference && !options.mode_given) options.view.mode = ColourMode::kDifference;
   if (!options.probe.empty()) options.action = Options::Action::kProbe;
   options.view.haze = !no_haze;
   options.overlay = !no_overlay;
@@ -240,6 +249,9 @@ std::optional<Options> parse_options(const cli::Arguments& arguments) {
   if (flies) options.action = Options::Action::kFlight;
   if (verify) options.action = Options::Action::kVerify;
   if (sweep) options.action = Options::Action::kSweep;
+  if (options.archives.size() == 2 && !options.difference && options.action != Options::Action::kWindow) {
+    line.fail("a second archive needs a window or --difference");
+  }
   return options;
 }
 

@@ -17,8 +17,9 @@ struct Options {
 
   Action action = Action::kWindow;
   cli::CommonOptions common;
-  std::string archive;
-  std::string screenshot;  ///< PNG to write; with kWindow: of the window, after `frames` frames
+  std::vector<std::string> archives;  ///< one, or two to go to and fro between
+  bool difference = false;            ///< colours by how far the second lies above the first
+  std::string screenshot;             ///< PNG to write; with kWindow: of the window, after `frames` frames
   std::string flight;
   std::string csv;
   std::string plot;

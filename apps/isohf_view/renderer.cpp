@@ -167,12 +167,11 @@ Renderer::Renderer(const TileSource& source, const SharedGeometry& shared)
   glBindTexture(GL_TEXTURE_2D, 0);
 }
 
-void Renderer::set_palette(const std::vector<ColourStop>& stops) {
-  constexpr int kColours = 1024;
+void Renderer::set_palette(const std::vector<ColourStop>& stops, double low, double high) {
+  constexpr int kColours = 4096;
   std::vector<std::uint16_t> texels;
   for (int i = 0; i < kColours; ++i) {
-    const double height = whole_.low + (i + 0.5) / kColours * (whole_.high - whole_.low);
-    const OverlayColour colour = colour_at(stops, height / source_.world_per_elevation());
+    const OverlayColour colour = colour_at(stops, low + (i + 0.5) / kColours * (high - low));
     for (const float value : {colour.red, colour.green, colour.blue}) {
       texels.push_back(static_cast<std::uint16_t>(65535.0F * std::pow(value, 1.6F) + 0.5F));
     }

@@ -52,8 +52,8 @@ class Renderer {
   /// Where ColourMode::kTexture finds its textures.
   void set_textures(TileTexture textures) { textures_ = std::move(textures); }
 
-  /// Colours of the ground by elevation, in the source's elevation units.
-  void set_palette(const std::vector<ColourStop>& stops);
+  /// Colours of the ground from one value to another: elevations, in the source's units, or differences of them.
+  void set_palette(const std::vector<ColourStop>& stops, double low, double high);
 
   /// Draws what the tiles of a range of the coarsest plane stand for, as far as resident, into the bound framebuffer.
   FrameFigures draw(const ViewState& view, const TileRange& top, const ResidentTile& resident);

@@ -38,6 +38,7 @@ const std::vector<std::string> kHelpLines{"drag left   move the ground      whee
                                           "drag right  turn about it        double click  go there",
                                           "W A S D, arrows  fly   Q E  down, up   Shift, Ctrl  fast, slow",
                                           "C or Alt  left button looks round      Y  measure from here, to here",
+                                          "Tab  the other archive",
                                           "Home  all   N  North up   T  from above   R  back to the start",
                                           "J L  sun round   I K  sun up and down   U  shadows",
                                           "O  the sun of a day   , .  earlier, later: or drag the slider",
@@ -47,9 +48,17 @@ const std::vector<std::string> kHelpLines{"drag left   move the ground      whee
                                           "P  picture       F  figures    H  this help     Esc  end"};
 
 const char* mode_name(ColourMode mode) {
-  constexpr const char* kNames[] = {"elevation", "plain", "levels of detail", "strip order", "texture", "normals"};
+  constexpr const char* kNames[] = {"elevation", "plain",   "levels of detail", "strip order",
+                                    "texture",   "normals", "differences"};
   return kNames[static_cast<std::size_t>(mode)];
 }
+
+/// Below, the same, above.
+constexpr struct {
+  double share;
+  std::uint8_t red, green, blue;
+} kDifferenceStops[] = {
+    {-1.0, 33, 72, 158}, {-0.5, 92, 154, 210}, {0.0, 240, 240, 236}, {0.5, 230, 138, 96}, {1.0, 164, 24, 38}};
 
 constexpr double kDegree = std::numbers::pi / 180.0;
 /// A sun that stands higher than this shades nothing to speak of.
@@ -89,11 +98,13 @@ Session::Session(const TileSource& source, const Options& options)
                   fmt::format("--level {}: this archive has levels 0 to {}", *level, levels - 1));
     }
   }
+  const bool differs = source.difference_range().has_value();
+  if (view.mode == ColourMode::kDifference && !differs) view.mode = ColourMode::kElevation;
   view.exaggeration = options.exaggeration.value_or(default_exaggeration(source));
   if (source.textures() != nullptr) {
     textures_.emplace(source, texture_bytes(source, options), limits_from(source, options).workers);
     renderer_.set_textures([this](TileIndex tile) { return textures_->texture(tile); });
-    if (!options.mode_given) view.mode = ColourMode::kTexture;
+    if (!options.mode_given && !differs) view.mode = ColourMode::kTexture;
   } else if (view.mode == ColourMode::kTexture) {
     throw Error(ErrorCode::kInvalidArgument, "--mode texture: this archive has no textures; convert with --texture");
   }
@@ -101,7 +112,7 @@ Session::Session(const TileSource& source, const Options& options)
     colours_ = options.palette_file.empty() ? shade_colours(*metadata, options.palette)
                                             : read_colour_relief(options.palette_file, *metadata);
   }
-  renderer_.set_palette(colours_);
+  choose_colours();
   driver_ = driver_name();
   if (options.date) begin_day(*options.date);
   Vec3 target;
@@ -110,6 +121,47 @@ Session::Session(const TileSource& source, const Options& options)
     camera.look_at(options.position ? from_archive(*options.position) : camera.eye,
                    options.look_at ? from_archive(*options.look_at) : target);
   }
+}
+
+void Session::choose_colours() {
+  const double unit = source_.world_per_elevation();
+  legend_ = {colours_, whole_.low / unit, whole_.high / unit};
+  if (view.mode == ColourMode::kDifference) {
+    const double range = *source_.difference_range();
+    legend_ = {{}, -range, range};
+    for (const auto& [share, red, green, blue] : kDifferenceStops) {
+      legend_.stops.push_back({share * range, red, green, blue});
+    }
+  }
+  renderer_.set_palette(legend_.stops, legend_.low, legend_.high);
+}
+
+void Session::set_mode(ColourMode mode) {
+  view.mode = mode;
+  choose_colours();
+}
+
+std::vector<ColourMode> Session::modes() const {
+  std::vector<ColourMode> modes{ColourMode::kElevation, ColourMode::kPlain, ColourMode::kLevels, ColourMode::kStrips,
+                                ColourMode::kNormals};
+  if (textures_) modes.insert(modes.begin(), ColourMode::kTexture);
+  if (source_.difference_range()) modes.insert(modes.begin(), ColourMode::kDifference);
+  return modes;
+}
+
+void Session::look_as(const Session& other) {
+  const std::vector<ColourMode> known = modes();
+  const ColourMode own = view.mode;
+  view = other.view;
+  view.mode = own;
+  if (std::find(known.begin(), known.end(), other.view.mode) != known.end() && own != ColourMode::kDifference) {
+    set_mode(other.view.mode);
+  }
+  sun_azimuth_deg = other.sun_azimuth_deg;
+  sun_elevation_deg = other.sun_elevation_deg;
+  shadows = other.shadows;
+  far_distance_ = other.far_distance_;
+  camera = other.camera;
 }
 
 Vec3 Session::from_archive(Vec3 at) const {
@@ -161,6 +213,10 @@ void Session::prepare() {
   reach_wanted_ = std::min(view.far_distance, farthest);
   const auto sun = casting_sun(sun_azimuth_deg, sun_elevation_deg, view.exaggeration, shadow_softness_);
   view.shadows = shadows && sun;
+  if (view.mode == ColourMode::kDifference) {
+    view.shadows = false;
+    return boxes_.set_sun(CastingSun{.difference = true});
+  }
   boxes_.set_sun(view.shadows ? sun : std::nullopt);
 }
 
@@ -194,6 +250,7 @@ void Session::complete_frame() {
 }
 
 std::string Session::shadow_line() const {
+  if (view.mode == ColourMode::kDifference) return "colours: how far the second archive lies above the first";
   if (!shadows) return "shadows off";
   if (!view.shadows) return sun_elevation_deg > 0.0 ? "no shadows: the sun is overhead" : "no shadows: it is night";
   const std::int64_t to_come = boxes_.figures().shadows_to_come;
@@ -233,9 +290,9 @@ void Session::draw_overlay(const Shown& shown) {
     if (cut_) lines.push_back(fmt::format("far distance cut to {:.0f} by --memory", box.radius));
     if (boxes_.error()) lines.push_back(boxes_.error()->substr(0, 100));
     lines.insert(lines.end(), shown.place.begin(), shown.place.end());
-    if (view.mode == ColourMode::kElevation) reading.colours = colours_;
-    reading.low = whole_.low / source_.world_per_elevation();
-    reading.high = whole_.high / source_.world_per_elevation();
+    if (view.mode == ColourMode::kElevation || view.mode == ColourMode::kDifference) reading.colours = legend_.stops;
+    reading.low = legend_.low;
+    reading.high = legend_.high;
     reading.height_unit = source_.height_unit();
     reading.ground_unit = source_.ground_unit();
     reading.world_per_px = shown.middle_distance / view.focal_px();

@@ -53,8 +53,14 @@ class Session {
   void end_day() { time_.reset(); }
   [[nodiscard]] std::optional<double> hours() const { return time_ ? std::optional(time_->hours) : std::nullopt; }
 
+  /// Other colours of the ground; those that the source has.
+  void set_mode(ColourMode mode);
+  [[nodiscard]] std::vector<ColourMode> modes() const;
+  /// Takes camera, light and all switches from another session; its own colours where they are those of a difference.
+  void look_as(const Session& other);
+
   Camera camera;
-  ViewState view;
+  ViewState view;  ///< the mode by set_mode()
   double sun_azimuth_deg;
   double sun_elevation_deg;
   bool shadows;  ///< wanted
@@ -74,6 +80,7 @@ class Session {
  private:
   void prepare();
   void draw();
+  void choose_colours();
   [[nodiscard]] Camera first_camera(Vec3& target) const;
   [[nodiscard]] bool shows_textures() const { return textures_ && view.mode == ColourMode::kTexture; }
   [[nodiscard]] std::string shadow_line() const;
@@ -87,7 +94,11 @@ class Session {
   std::optional<TextureBox> textures_;
   std::uint64_t upload_bytes_;  ///< a frame, tiles and textures together
   Hud hud_;
-  std::vector<ColourStop> colours_;
+  std::vector<ColourStop> colours_;  ///< of elevations
+  struct {
+    std::vector<ColourStop> stops;
+    double low, high;
+  } legend_{};
   std::string driver_;
   std::optional<DaySky> sky_;
   std::optional<SolarTime> time_;

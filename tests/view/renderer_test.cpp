@@ -24,7 +24,7 @@ TEST_F(RendererTest, DrawsEveryVisibleTileWithAtMostTwoCallsAPass) {
   const SharedGeometry shared(source.grid().shape(), make_index_arrays(source.grid().shape()));
   TileBox box(source, shared, {});
   Renderer renderer(source, shared);
-  renderer.set_palette({{0.0, 90, 160, 80}});
+  renderer.set_palette({{0.0, 90, 160, 80}}, 0.0, 1.0);
   ViewState view;
   view.width = 640;
   view.height = 360;

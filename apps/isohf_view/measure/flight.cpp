@@ -144,7 +144,7 @@ std::string text_from(const FlightTotals& totals, const Options& options) {
 
 ordered_json json_from(const FlightTotals& totals, const Options& options) {
   const FlightSummary summary = summary_of(totals);
-  return {{"archive", options.archive},
+  return {{"archive", options.archives[0]},
           {"frames", summary.frames},
           {"mean_ms", summary.mean_ms},
           {"median_ms", summary.median_ms},
@@ -398,7 +398,7 @@ void fly(const TileSource& source, const Options& options, const std::function<v
       const std::filesystem::path name(options.screenshot);
       const std::string numbered =
           (name.parent_path() / fmt::format("{}-{:04}.png", name.stem().string(), frame + 1)).string();
-      cli::check_output_file({options.archive}, numbered, options.overwrite);
+      cli::check_output_file({options.archives[0]}, numbered, options.overwrite);
       check_raster_target(numbered, options.overwrite);
       target.write_picture(numbered);
     }

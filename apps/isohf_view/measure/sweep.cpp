@@ -30,7 +30,7 @@ void sweep(const TileSource& source, const Options& options) {
       fading.largest_retreat, plain.largest_jump, plain.largest_mean_jump);
   print_result(options.common, text, [&] {
     return ordered_json{
-        {"archive", options.archive},
+        {"archive", options.archives[0]},
         {"steps", options.sweep_steps},
         {"last_level", fading.steps.back().level},
         {"fading",

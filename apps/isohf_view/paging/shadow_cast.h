@@ -15,6 +15,7 @@ struct CastingSun {
   double azimuth_deg = 270.0;   ///< clockwise from North, any
   double elevation_deg = 15.0;  ///< above 0, below 90
   double softness = 2.0;        ///< k of Eq. 16, world units, > 0
+  bool difference = false;      ///< no light at all: how far another surface lies above this one, in its place
   friend bool operator==(const CastingSun&, const CastingSun&) = default;
 };
 

@@ -16,6 +16,7 @@
 #include "isohf/base/assert.h"
 #include "isohf/error.h"
 #include "isohf/surface.h"
+#include "paging/difference.h"
 
 namespace isohf::view {
 namespace {
@@ -47,7 +48,7 @@ double elevation_unit(const Metadata& metadata) {
 
 class ArchiveSource final : public TileSource {
  public:
-  explicit ArchiveSource(const std::string& path)
+  ArchiveSource(const std::string& path, const std::string& second)
       : reader_(path),
         ground_scale_(scale_of(reader_.metadata())),
         grid_(scaled(reader_.grid(), ground_scale_)),
@@ -66,6 +67,7 @@ class ArchiveSource final : public TileSource {
       scale_ = {whole.low, whole.high > whole.low ? (whole.high - whole.low) / (kVoidCode - 1) : 1.0};
     }
     if (texture_info(metadata)) textures_.emplace(reader_);
+    if (!second.empty()) difference_.emplace(reader_, second);
   }
 
   [[nodiscard]] const TileGrid& grid() const override { return grid_; }
@@ -101,6 +103,9 @@ class ArchiveSource final : public TileSource {
     [[nodiscard]] bool is_to_scale() const override { return whole_.is_to_scale(); }
     [[nodiscard]] WorldBounds covered() const override { return whole_.covered(); }
     [[nodiscard]] TileBounds bounds(TileIndex tile) const override { return whole_.bounds(tile, plane_); }
+    [[nodiscard]] std::vector<std::int16_t> differences(TileIndex tile) const override {
+      return whole_.differences(tile, *this);
+    }
     void read(TileIndex tile, std::span<std::uint16_t> codes) const override {
       whole_.convert(whole_.reader_.read_tile(tile, plane_), codes);
     }
@@ -117,7 +122,12 @@ class ArchiveSource final : public TileSource {
   [[nodiscard]] Place describe(WorldPoint at, std::optional<double> height) const override {
     Place place = TileSource::describe(at, height);
     place.unit = height_unit();
-    std::call_once(georeference_once_, [this] { find_georeference(); });
+    if (difference_ && place.elevation) {
+      double difference = *place.elevation;
+      difference_->take_from({&place.at, 1}, {&difference, 1});
+      if (!std::isnan(difference)) place.difference = difference;
+    }
+    std::call_once(georeference_once_, [this] { georeference_ = understood_places(reader_.path()); });
     if (!georeference_) return place;
     if (georeference_->has_source() && reader_.metadata().source.crs_unit != "degree") {
       place.map = georeference_->source_from_world(place.at);
@@ -131,8 +141,19 @@ class ArchiveSource final : public TileSource {
   [[nodiscard]] const Metadata* metadata() const override { return &reader_.metadata(); }
   [[nodiscard]] DaySky sky() const override {
     ArchiveReader archive(reader_.path());
-    try_to_understand(archive);
+    try {
+      understand_source(archive);
+    } catch (const Error&) {
+      // Then it has no place in the sky, which the next line says.
+    }
     return DaySky(archive);
+  }
+  [[nodiscard]] const ArchiveReader* archive() const override { return &reader_; }
+  [[nodiscard]] std::optional<double> difference_range() const override {
+    return difference_ ? std::optional(difference_->range()) : std::nullopt;
+  }
+  [[nodiscard]] std::vector<std::int16_t> differences(TileIndex tile) const override {
+    return differences(tile, *this);
   }
 
   [[nodiscard]] const TextureInfo* textures() const override { return textures_ ? &textures_->info() : nullptr; }
@@ -153,23 +174,32 @@ class ArchiveSource final : public TileSource {
             scale_.offset + scale_.scale * entry.code_max};
   }
 
-  /// Of a reader of its own, as others read reader_. May load PROJ.
-  static void try_to_understand(ArchiveReader& archive) {
-    try {
-      understand_source(archive);
-    } catch (const Error&) {
-      // Places have no longitude and latitude then.
+  /// At the vertices of a tile of this source or of a coarse plane, `at`, whose edge tiles end with the world.
+  [[nodiscard]] std::vector<std::int16_t> differences(TileIndex tile, const TileSource& at) const {
+    constexpr double kSteps = 32767.0;
+    const TileShape& shape = at.grid().shape();
+    const auto count = static_cast<std::size_t>(shape.stored_vertex_count());
+    std::vector<float> codes(count);
+    at.read_heights(tile, codes);
+    std::vector<WorldPoint> places;
+    std::vector<double> values;
+    for (std::size_t i = 0; i < count; ++i) {
+      const auto columns = static_cast<std::size_t>(shape.columns());
+      const ObjectVertex vertex =
+          object_from_grid(shape, GridVertex{static_cast<int>(i % columns), static_cast<int>(i / columns)});
+      const WorldPoint place =
+          at.grid().world_from_object(tile, {static_cast<double>(vertex.x), static_cast<double>(vertex.z)});
+      places.push_back(
+          to_archive({std::clamp(place.x, 0.0, grid_.world_width()), std::clamp(place.z, 0.0, grid_.world_height())}));
+      values.push_back((scale_.offset + scale_.scale * static_cast<double>(codes[i])) / world_per_elevation_);
     }
-  }
-
-  void find_georeference() const {
-    ArchiveReader archive(reader_.path());
-    try_to_understand(archive);
-    try {
-      georeference_.emplace(archive.metadata());
-    } catch (const Error&) {
-      // Nor coordinates.
+    difference_->take_from(places, values);
+    std::vector<std::int16_t> found;
+    for (const double value : values) {
+      const double share = std::isnan(value) ? 0.0 : std::clamp(value / difference_->range(), -1.0, 1.0);
+      found.push_back(static_cast<std::int16_t>(std::lround(kSteps * share)));
     }
+    return found;
   }
 
   [[nodiscard]] bool is_float() const { return reader_.metadata().quantisation.type == CodeType::kF32; }
@@ -214,6 +244,7 @@ class ArchiveSource final : public TileSource {
   mutable std::once_flag georeference_once_;
   mutable std::optional<WorldGeoreference> georeference_;
   std::optional<TextureReader> textures_;
+  std::optional<SurfaceDifference> difference_;
   std::optional<Planes> planes_;
   std::vector<std::unique_ptr<Coarse>> coarse_;
 };
@@ -255,6 +286,10 @@ std::string TileSource::height_unit() const {
 
 DaySky TileSource::sky() const {
   throw Error(ErrorCode::kInvalidArgument, "the sun's way over this ground is not known");
+}
+
+std::vector<std::int16_t> TileSource::differences(TileIndex) const {
+  return std::vector<std::int16_t>(static_cast<std::size_t>(grid().shape().stored_vertex_count()));
 }
 
 Picture TileSource::read_texture(TileIndex, int) const {
@@ -299,8 +334,8 @@ TileBounds whole_bounds(const TileSource& source) {
   return source.whole_;
 }
 
-std::unique_ptr<TileSource> open_archive(const std::string& path) {
-  return std::make_unique<ArchiveSource>(path);
+std::unique_ptr<TileSource> open_archive(const std::string& path, const std::string& second) {
+  return std::make_unique<ArchiveSource>(path, second);
 }
 
 }  // namespace isohf::view

@@ -27,6 +27,11 @@ std::vector<std::string> lines_of(const Place& place) {
     lines.back() += fmt::format("  elevation {:.{}f}", rounded(*place.elevation, place.decimals), place.decimals);
     if (!place.unit.empty()) lines.back() += " " + place.unit;
   }
+  if (place.difference) {
+    const int decimals = place.decimals + 1;
+    lines.push_back(fmt::format("the second lies {:+.{}f}", rounded(*place.difference, decimals), decimals));
+    if (!place.unit.empty()) lines.back() += " " + place.unit;
+  }
   if (place.map) lines.push_back(fmt::format("E {:.2f}  N {:.2f}", place.map->easting, place.map->northing));
   if (place.geo) {
     const double east = place.geo->longitude;
@@ -41,6 +46,7 @@ ordered_json json_of(const Place& place) {
   ordered_json json{{"x", place.at.x}, {"z", place.at.z}, {"elevation", nullptr}};
   if (place.elevation) json["elevation"] = rounded(*place.elevation, place.decimals);
   json["unit"] = place.unit.empty() ? ordered_json(nullptr) : ordered_json(place.unit);
+  if (place.difference) json["difference"] = *place.difference;
   if (place.map) json["map"] = {place.map->easting, place.map->northing};
   if (place.geo) json["longitude"] = place.geo->longitude;
   if (place.geo) json["latitude"] = place.geo->latitude;
