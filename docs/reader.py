@@ -650,7 +650,8 @@ class Archive:
         self.shape, self.grid = self.metadata["tile_shape"], self.metadata["tiles"]
         self.kind, self.letter, self.void = KINDS[self.metadata["samples"]["type"]]
         count, there = self.grid["columns"] * self.grid["rows"], len(self.members)
-        require(0 < count <= 65536 + 4096 * there, "a grid of more tiles than its members make likely")
+        vertices = self.shape["columns"] * self.shape["rows"]
+        require(0 < count <= 2 ** 22 // vertices + 64 * there, "a grid of more tiles than its members make likely")
         own = ("mimetype", "isohf.json", "index.bin")
         names = [name for name in self.members if name not in own]
         crcs = b"".join(struct.pack("<I", zlib.crc32(self.raw(name))) for name in names

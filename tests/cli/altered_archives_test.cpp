@@ -325,6 +325,50 @@ TEST(AlteredArchives, NoProgramCrashesOnThem) {
   }
 }
 
+TEST(AlteredArchives, MetadataOfTooManyMembersOrValuesAreRefusedAtOnce) {
+  const TemporaryFolder folder;
+  const AlteredArchive whole(kKept + "lossless.isohf");
+  json many;
+  for (int i = 0; i < 200000; ++i) many["k" + std::to_string(i)] = i;
+  for (const auto& [place, value, why] : {std::tuple<const char*, json, const char*>{"/more", many, "10000 members"},
+                                          {"/source/more", many, "10000 members"},
+                                          {"/more", std::vector<int>(1000001), "1000000 values"}}) {
+    AlteredArchive altered = whole;
+    altered.metadata[json::json_pointer(place)] = value;
+    altered.write(folder / "a.isohf");
+    const VerifyReport report = verify_archive(folder / "a.isohf");
+    ASSERT_EQ(report.findings.size(), 1U) << place;
+    EXPECT_EQ(report.findings[0].id, finding::kNotReadable);
+    EXPECT_THAT(report.findings[0].text, HasSubstr(why));
+  }
+}
+
+TEST(AlteredArchives, MembersThatInflateAThousandfoldTakeNoMemory) {
+  const TemporaryFolder folder;
+  AlteredArchive altered(kKept + "lossless.isohf");
+  altered.set("residual/00000000", std::vector<std::byte>(std::size_t{250} << 20U));
+  altered.write(folder / "a.isohf");
+  RunOptions limits;
+  if (!kSanitized) limits.address_space_bytes = std::uint64_t{300} << 20U;
+  const RunResult verified = run_isohf({"verify", folder / "a.isohf", "-j", "1"}, limits);
+  EXPECT_EQ(verified.exit_code, 3) << verified.err;
+  EXPECT_THAT(verified.out, testing::AllOf(HasSubstr("residual/00000000"), HasSubstr("too many for")));
+  EXPECT_THAT(verified.out + verified.err, testing::Not(HasSubstr("memory")));
+  const RunResult restored = run_isohf({"restore", folder / "a.isohf", folder / "r.tif", "-j", "1"}, limits);
+  EXPECT_EQ(restored.exit_code, 3) << restored.err;
+  EXPECT_THAT(restored.err, HasSubstr("too many for"));
+}
+
+TEST(AlteredArchives, AGridOfTilesThatNobodyHasIsRefused) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(
+      run_isohf({"convert", ISOHF_SOURCE_DIR "/testdata/voids_200x150_int16.tif", folder / "new.isohf"}).exit_code, 0);
+  AlteredArchive altered(folder / "new.isohf");
+  altered.metadata["tiles"]["columns"] = 65535;
+  altered.write(folder / "a.isohf");
+  EXPECT_THAT(findings_in(folder / "a.isohf"), testing::Contains(finding::kNotReadable));
+}
+
 TEST(RestoreSpacing, ASpacingBeyondTheSurfaceIsRefused) {
   const TemporaryFolder folder;
   for (const char* method : {"hex", "barycentric"}) {

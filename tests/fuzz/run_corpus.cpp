@@ -18,8 +18,12 @@ void run(const std::vector<std::uint8_t>& bytes) {
   static_cast<void>(LLVMFuzzerTestOneInput(bytes.data(), bytes.size()));
 }
 
+#ifndef ISOHF_FUZZ_ROUNDS
+#define ISOHF_FUZZ_ROUNDS 1500
+#endif
+
 void run_altered(const std::vector<std::uint8_t>& bytes, std::mt19937& random) {
-  constexpr int kRounds = 1500;
+  constexpr int kRounds = ISOHF_FUZZ_ROUNDS;
   const auto pick = [&](std::size_t below) {
     return static_cast<std::size_t>(random()) % std::max<std::size_t>(below, 1);
   };

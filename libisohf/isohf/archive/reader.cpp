@@ -130,6 +130,12 @@ void ArchiveReader::State::open(bool keeps_index) {
     throw Error(ErrorCode::kCorrupt, fmt::format("{}: {} bytes, more than the {} that metadata may have",
                                                  describe(entry), entry.bytes, kMaxMetadataBytes));
   }
+  // No text of metadata is worth more: memory follows what is stored, not what is claimed.
+  constexpr std::uint64_t kSmallBytes = std::uint64_t{1} << 20U;
+  if (entry.bytes > kSmallBytes && entry.bytes / 8 > entry.compressed_bytes) {
+    throw Error(ErrorCode::kCorrupt, fmt::format("{}: {} bytes inflate to {}, more than eight times as many",
+                                                 describe(entry), entry.compressed_bytes, entry.bytes));
+  }
   const std::vector<std::byte> bytes = member_from(file, entry, checked_data_offset(file, entry));
   json.assign(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   try {
@@ -442,7 +448,7 @@ std::vector<std::string> ArchiveReader::check_structure() const {
         check_profile(state.file, state.end, metadata().version, complain);
     }
     for (const auto& [entry, data_offset] : directory.members) {
-      static_cast<void>(member_from(state.file, entry, data_offset));
+      check_member(state.file, entry, data_offset);
     }
   } catch (const Error& error) {
     complain(error.what());

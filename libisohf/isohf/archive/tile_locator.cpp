@@ -13,8 +13,9 @@
 namespace isohf {
 namespace {
 
-/// A grid of so many tiles may be stated where there is no index, and some for each tile that is there.
-constexpr std::uint64_t kMostTilesOnTrust = std::uint64_t{1} << 16U;
+/// A grid of so many vertices may be stated where there is no index, and of so many tiles for each that is there.
+constexpr std::uint64_t kMostVerticesOnTrust = std::uint64_t{1} << 22U;
+constexpr std::uint64_t kMostTilesOnTrust = 64;
 
 /// Gives a tile of a repacked archive the range that its old index states, where that is of the same tile.
 void take_range(const std::optional<TileEntry>& found, TileEntry& tile) {
@@ -124,7 +125,8 @@ void TileLocator::take_ranges_from_index(const ArchiveDirectory& directory) {
   if (!is_first_version) {
     if (!old.empty() && take_ranges_from_pages(std::move(old))) return;
     // Without an index as large, the metadata's word alone stands for the grid: going through it must have an end.
-    if (tiles <= kMostTilesOnTrust + kMostTilesOnTrust / 16 * listed_.size()) return;
+    const auto vertices = static_cast<std::uint64_t>(metadata_.grid.shape().stored_vertex_count());
+    if (tiles <= kMostVerticesOnTrust / vertices + kMostTilesOnTrust * listed_.size()) return;
     throw Error(ErrorCode::kCorrupt,
                 fmt::format("metadata: tiles: {}x{} are stated, {} are there, and no index of as many",
                             metadata_.grid.tile_columns(), metadata_.grid.tile_rows(), listed_.size()));

@@ -247,8 +247,17 @@ struct SourceRowReader::State {
         record(std::move(its_record)),
         job(std::move(its_job)),
         surface(archive.grid(), archive.metadata().wraps_x, archive.metadata().quantisation, tiles_of(archive),
-                source_grid(archive.metadata().source), record,
-                [&](const char* name) { return archive.read_member(name); }) {}
+                source_grid(archive.metadata().source), record, [&](const char* name) { return mesh_bytes(name); }) {}
+
+  /// Of the places' member, which takes eight bytes a value; nullopt where there is none.
+  [[nodiscard]] std::optional<std::vector<std::byte>> mesh_bytes(const char* name) const {
+    const auto found = archive.find_member(name);
+    if (!found) return std::nullopt;
+    if (found->bytes != 8 * PositionMesh::value_count(record.width, record.height))
+      throw Error(ErrorCode::kCorrupt, fmt::format("{}: member \"{}\" has {} bytes, not those of so many places",
+                                                   archive.path(), name, found->bytes));
+    return archive.read_member(*found);
+  }
 
   const ArchiveReader& archive;
   LosslessRecord record;
@@ -284,15 +293,21 @@ std::vector<std::byte> SourceRowReader::read_next() {
   state.job.throw_if_cancelled();
   const std::int64_t rows = std::min(record.rows_per_member, record.height - state.next_row);
   const std::string name = residual_name(state.next_row);
-  const auto payload = state.archive.read_member(name);
-  if (!payload) {
+  const auto found = state.archive.find_member(name);
+  if (!found) {
     throw Error(ErrorCode::kCorrupt, fmt::format("{}: member \"{}\" is missing", state.archive.path(), name));
   }
   std::vector<double> predicted(static_cast<std::size_t>(rows * record.width));
+  // Every sample in as many bytes as it has, a mask of bits, and counts.
+  if (found->bytes > predicted.size() * size_bytes(record.mapping.type) + predicted.size() / 8 + 1024) {
+    throw Error(ErrorCode::kCorrupt, fmt::format("{}: member \"{}\" has {} bytes, too many for {} samples",
+                                                 state.archive.path(), name, found->bytes, predicted.size()));
+  }
+  const std::vector<std::byte> payload = state.archive.read_member(*found);
   Arena(state.job).execute([&] { state.surface.read(state.next_row, rows, predicted); });
   std::vector<std::byte> raw(predicted.size() * size_bytes(record.mapping.type));
   try {
-    decode_residuals(record.mapping, record.width, *payload, predicted, raw);
+    decode_residuals(record.mapping, record.width, payload, predicted, raw);
   } catch (const Error& error) {
     throw error.within(fmt::format("{}: member \"{}\"", state.archive.path(), name));
   }
@@ -300,9 +315,9 @@ std::vector<std::byte> SourceRowReader::read_next() {
   state.next_row += rows;
   state.job.report({"rows", "rows", state.next_row, record.height});
   if (!at_end()) return raw;
-  if (const std::string found = hex(state.hash.finish()); found != record.sha256) {
+  if (const std::string sum = hex(state.hash.finish()); sum != record.sha256) {
     throw Error(ErrorCode::kCorrupt, fmt::format("{}: the restored samples have the SHA-256 {}, the source's is {}",
-                                                 state.archive.path(), found, record.sha256));
+                                                 state.archive.path(), sum, record.sha256));
   }
   return raw;
 }

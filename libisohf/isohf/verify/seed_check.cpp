@@ -36,7 +36,7 @@ std::string SeedCheck::why_wrong(TileIndex tile, const EncodedSeeds& expected) c
   std::vector<std::byte> payload(expected.payload_bytes);
   inflate_exactly(expected.deflated, payload);
   try {
-    if (archive_.read_member(*found->second) == payload) return {};
+    if (found->second->bytes == payload.size() && archive_.read_member(*found->second) == payload) return {};
   } catch (const Error& error) {
     return error.what();
   }

@@ -91,6 +91,12 @@ struct OwnEntries {
                                                  std::uint64_t data_offset);
 /// The same of its data.
 [[nodiscard]] std::vector<std::byte> member_from(std::span<const std::byte> data, const ZipEntry& entry);
+/// A deflated member may claim a thousand times the bytes that it has: one that claims more than this is looked through
+/// in pieces.
+inline constexpr std::uint64_t kInflatedAtOnceBytes = std::uint64_t{16} << 20U;
+/// Checks what member_from checks, and of a member looked through in pieces also that zlib reads it and that its idle
+/// bits are 0.
+void check_member(const ByteSource& file, const ZipEntry& entry, std::uint64_t data_offset);
 
 /// CRC-32 of a range, read in pieces.
 [[nodiscard]] std::uint32_t crc32_in(const ByteSource& file, std::uint64_t offset_bytes, std::uint64_t size_bytes);

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -16,9 +17,12 @@ namespace isohf {
 /// Thread-safe.
 void inflate_exactly(std::span<const std::byte> deflated, std::span<std::byte> out);
 
-/// Inflates with zlib, the reference that every archive must satisfy: true where it makes exactly `expected`, and bits
-/// that no inflater reads, before stored bytes and behind the last block, are 0. libdeflate is laxer about code tables
-/// that zlib calls invalid.
+/// Inflates with zlib, the reference that every archive must satisfy, in pieces that `take` may refuse: true where all of
+/// `deflated` is a stream, every piece is taken, and bits that no inflater reads, before stored bytes and behind the last
+/// block, are 0. libdeflate is laxer about code tables that zlib calls invalid.
+[[nodiscard]] bool zlib_inflates(std::span<const std::byte> deflated,
+                                 const std::function<bool(std::span<const std::byte>)>& take);
+/// The same; true where it makes exactly `expected`.
 [[nodiscard]] bool zlib_inflates_to(std::span<const std::byte> deflated, std::span<const std::byte> expected);
 
 /// CRC-32 as ZIP has it; `seed` continues an earlier one.

@@ -30,9 +30,18 @@ Json schema_of(const JsonMembers::Members& members) {
 
 Json parse_json(const std::string& text) {
   static constexpr int kMaxDepth = 64;
+  // A member is looked for among all of its object's, so that their number counts twice; a value takes 16 bytes and more.
+  static constexpr int kMaxNames = 10000;
+  static constexpr int kMaxValues = 1000000;
+  int names = 0;
+  int values = 0;
   try {
-    return Json::parse(text, [](int depth, Json::parse_event_t, const Json&) {
+    return Json::parse(text, [&](int depth, Json::parse_event_t event, const Json&) {
       if (depth > kMaxDepth) refuse_metadata("JSON", fmt::format("nests deeper than {}", kMaxDepth));
+      if (event == Json::parse_event_t::key && ++names > kMaxNames)
+        refuse_metadata("JSON", fmt::format("names more than {} members", kMaxNames));
+      if (event != Json::parse_event_t::key && ++values > kMaxValues)
+        refuse_metadata("JSON", fmt::format("holds more than {} values", kMaxValues));
       return true;
     });
   } catch (const Json::parse_error& error) {

@@ -42,7 +42,16 @@ std::vector<std::byte> ShadowSeedReader::payload(TileIndex index) const {
     throw Error(ErrorCode::kInvalidArgument,
                 fmt::format("{}: tile ({},{}) lies outside the grid", archive_.path(), index.column, index.row));
   }
-  return archive_.read_member(seed_name(index)).value_or(std::vector<std::byte>{});
+  const auto found = archive_.find_member(seed_name(index));
+  if (!found) return {};
+  // More than all vertices of its row would take, each a caster.
+  const TileGrid& grid = archive_.grid();
+  const auto vertices = static_cast<std::uint64_t>(grid.shape().stored_vertex_count() * grid.tile_columns());
+  if (found->bytes > 32 * vertices + 1024) {
+    throw Error(ErrorCode::kCorrupt, fmt::format("{}: member \"{}\" has {} bytes, too many for {} vertices",
+                                                 archive_.path(), found->name, found->bytes, vertices));
+  }
+  return archive_.read_member(*found);
 }
 
 HullSeeds ShadowSeedReader::hulls(TileIndex index, const TileCodes& tile) const {

@@ -36,9 +36,12 @@ Picture TextureReader::read(TileIndex tile, int level) const {
     throw Error(ErrorCode::kInvalidArgument, fmt::format("{}: tile ({},{}) has no texture of level {}", archive_.path(),
                                                          tile.column, tile.row, level));
   }
-  const std::vector<std::byte> bytes = archive_.read_member(*found);
   const int size = info_.level_size(level);
   try {
+    const auto pixels = static_cast<std::uint64_t>(size) * static_cast<std::uint64_t>(size);
+    if (found->bytes > 8 * pixels + 65536)
+      throw Error(ErrorCode::kCorrupt, fmt::format("has {} bytes, too many for {} pixels", found->bytes, pixels));
+    const std::vector<std::byte> bytes = archive_.read_member(*found);
     Picture picture = info_.format == TextureFormat::kPng ? decode_png(bytes, size) : decode_jpeg(bytes, size);
     if (picture.width != size || picture.height != size || picture.channels != info_.channels) {
       throw Error(ErrorCode::kCorrupt,

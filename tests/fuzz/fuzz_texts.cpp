@@ -1,0 +1,28 @@
+// Any text is a reference system as WKT or a .prj, or one line that says why it is none; numbers that came of it are
+// numbers.
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <string>
+
+#include "formats/georeference/reference_system.h"
+#include "formats/georeference/wkt.h"
+#include "isohf/error.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const std::string text(reinterpret_cast<const char*>(data), size);
+  for (const auto read : {isohf::read_wkt, isohf::read_prj}) {
+    isohf::SourceInfo info;
+    try {
+      if (!read(text, info)) continue;
+      const isohf::ReferenceSystem& system = info.georeference.system;
+      static_cast<void>(isohf::system_text(system));
+      static_cast<void>(isohf::wkt_of(system, isohf::WktDialect::kGdal));
+    } catch (const isohf::Error& error) {
+      if (std::string(error.what()).find_first_of("\n\r") != std::string::npos) std::abort();
+    }
+  }
+  return 0;
+}
