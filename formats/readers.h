@@ -160,13 +160,21 @@ namespace isohf {
 [[nodiscard]] bool is_xyz(const std::string& path);
 [[nodiscard]] std::unique_ptr<HeightSource> open_xyz(const std::string& path, const OpenOptions& options);
 
-/// Whether the file is called .zip and is an archive with an .hgt inside, as NASADEM_HGT_n44e006.zip is.
+/// Whether the file is called .zip and is an archive with one .hgt inside, as NASADEM_HGT_n44e006.zip is.
 [[nodiscard]] bool is_zip_of_hgt(const std::string& path);
 /// An SRTM tile, plain, in gzip, or as the one .hgt member of a zip archive (NASA, SRTM topography, 2005): big-endian
 /// 16 bit metres above EGM96 on posts, n x n of one degree (1201: 3", 3601: 1") or 1801 x 3601, nodata -32768. The name
 /// says where: N44E006.hgt has its South-West post at 44 N, 6 E; any other name leaves the origin unknown, with a
 /// warning. HGT has no signature.
 [[nodiscard]] std::unique_ptr<HeightSource> open_hgt(const std::string& path, const OpenOptions& options);
+
+/// The raster of a ZIP or tar archive, or of a .gz whose reader needs a file, with the files of its name that lie beside
+/// it. It is unpacked into a folder among the temporary files, which goes when it is closed. options.part names one of
+/// several; several .hgt tiles are one raster.
+[[nodiscard]] bool looks_like_tar(std::span<const std::byte> head);
+/// Whether the file is a whole ZIP archive that isohf did not write.
+[[nodiscard]] bool is_zip(const std::string& path);
+[[nodiscard]] std::unique_ptr<HeightSource> open_packed(const std::string& path, const OpenOptions& options);
 
 /// Nothing but samples, row by row from the North-West one on, as options.raw says, or a NAME.r16.json beside, as isohf
 /// writes it. Without either: kInvalidArgument, with a suggestion where the samples make a square.

@@ -66,6 +66,7 @@ const std::vector<Reader>& readers() {
       {{"Surfer grid", {".grd"}}, looks_like_surfer_grid, open_surfer_grid, nullptr, true},
       {{"XYZ text", {".xyz"}}, looks_like_xyz, open_xyz, is_xyz, true},
       {{"SRTM HGT", {".hgt", ".hgt.zip"}}, nullptr, open_hgt, is_zip_of_hgt, true},
+      {{"ZIP, tar", {".zip", ".tar", ".tgz"}, nullptr, "takes `part`"}, looks_like_tar, open_packed, is_zip, true},
       {{"raw samples",
         {".r8", ".r16", ".r32", ".f32", ".f64", ".raw"},
         nullptr,
@@ -79,7 +80,7 @@ const std::vector<Reader>& readers() {
 }
 
 /// Enough for every signature.
-constexpr std::size_t kHeadBytes = 256;
+constexpr std::size_t kHeadBytes = 512;
 /// Of a gzip file, to inflate so many from.
 constexpr std::size_t kStoredHeadBytes = 4096;
 
@@ -275,16 +276,16 @@ std::unique_ptr<HeightSource> open_by_head(const std::string& path, const OpenOp
   const Head head = read_head(path);
   if (options.raw) return open_raw(path, options);
   const Reader* reader = reader_of(path, std::span(head.bytes).first(head.size));
-  if (head.in_gzip && (reader == nullptr || !reader->in_gzip)) {
+  if (head.in_gzip && reader == nullptr) {
     throw Error(ErrorCode::kUnsupported,
-                fmt::format("{}: is {} in gzip, which isohf does not read; gunzip it first", path,
-                            reader == nullptr ? "something unknown" : reader->format.name));
+                path + ": is something unknown in gzip, which isohf does not read; gunzip it first");
   }
   if (reader == nullptr) return open_with_oiio(path, options);
-  if (!options.part.empty() && reader->open != open_exr) {
-    throw Error(ErrorCode::kInvalidArgument, path + ": has no parts; `part` is for OpenEXR files of several");
+  if (!options.part.empty() && reader->open != open_exr && reader->open != open_packed) {
+    throw Error(ErrorCode::kInvalidArgument,
+                path + ": has no parts; `part` is for archives and OpenEXR files of several");
   }
-  return reader->open(path, options);
+  return head.in_gzip && !reader->in_gzip ? open_packed(path, options) : reader->open(path, options);
 }
 
 }  // namespace

@@ -207,8 +207,8 @@ bool is_zip_of_hgt(const std::string& path) {
   if (!lower_case(path).ends_with(".zip")) return false;
   try {
     const std::vector<ZipEntry> members = zipped_files(RawFile(path));
-    return std::any_of(members.begin(), members.end(),
-                       [](const ZipEntry& member) { return lower_case(member.name).ends_with(".hgt"); });
+    return std::ranges::count_if(members,
+                                 [](const ZipEntry& member) { return lower_case(member.name).ends_with(".hgt"); }) == 1;
   } catch (const Error&) {
     return false;  // is something else, or too damaged to say
   }

@@ -23,7 +23,7 @@ struct Signature {
 
 constexpr Signature kSignatures[] = {
     {"isohf.json"sv, "an isohf archive", "isohf restore {} OUT.tif makes a raster of it", 30},
-    {"PK\x03\x04"sv, "a ZIP file", "unzip it first"},
+    {"PK\x03\x04"sv, "a damaged ZIP file"},
     {"\x1f\x8b"sv, "a gzip file", "gunzip it first"},
     {"BZh"sv, "a bzip2 file", kUnpack},
     {"\xfd"
@@ -32,7 +32,6 @@ constexpr Signature kSignatures[] = {
     {"\x28\xb5\x2f\xfd"sv, "a Zstandard file", kUnpack},
     {"7z\xbc\xaf"sv, "a 7-Zip file", kUnpack},
     {"Rar!"sv, "a RAR file", kUnpack},
-    {"ustar"sv, "a tar file", "tar xf {} unpacks it", 257},
     {"%PDF"sv, "a PDF document"},
     {"LASF"sv, "a LAS point cloud", "PDAL grids it: pdal translate {} OUT.tif --writers.gdal.resolution=1"},  // NOLINT
     {"ply\n"sv, "a PLY mesh"},

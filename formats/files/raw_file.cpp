@@ -73,11 +73,15 @@ bool is_file(const std::filesystem::path& path) {
 }
 
 bool is_gzip_name(const std::string& path) {
-  return path.size() > 3 && lower_case(std::string_view(path).substr(path.size() - 3)) == ".gz";
+  const std::string end =
+      lower_case(std::string_view(path).substr(path.size() - std::min<std::size_t>(path.size(), 4)));
+  return path.size() > 3 && (end.ends_with(".gz") || (path.size() > 4 && end == ".tgz"));
 }
 
 std::string without_gzip(const std::string& path) {
-  return is_gzip_name(path) ? path.substr(0, path.size() - 3) : path;
+  if (!is_gzip_name(path)) return path;
+  const std::string name = path.substr(0, path.size() - 3);
+  return name.back() == '.' ? name + "tar" : name;  // of .tgz
 }
 
 RawFile::RawFile(const std::string& path, std::uint64_t held_bytes)

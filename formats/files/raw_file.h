@@ -18,9 +18,9 @@ namespace isohf {
 
 /// Whether a regular file is there; what cannot be looked at is none.
 [[nodiscard]] bool is_file(const std::filesystem::path& path);
-/// Whether the name ends in .gz, in any case.
+/// Whether the name ends in .gz or .tgz, in any case.
 [[nodiscard]] bool is_gzip_name(const std::string& path);
-/// The name without a .gz at its end.
+/// The name without a .gz at its end, and with .tar for .tgz.
 [[nodiscard]] std::string without_gzip(const std::string& path);
 
 /// A regular file open for reading at any offset, by several threads at once. Closes itself.

@@ -226,7 +226,7 @@ TEST(Gzip, SaysWhichFormatsItDoesNotReadInside) {
     return std::string(error_of([&] { (void)open_raster(folder / name, {}); }).what());
   };
   EXPECT_THAT(says("a.tif.gz", std::string("II*\0\x08\0\0\0", 8) + std::string(90, ' ')),
-              HasSubstr("is TIFF in gzip, which isohf does not read; gunzip it first"));
+              HasSubstr("a.tif.gz/a.tif: is not a readable TIFF file"));
   EXPECT_THAT(says("a.txt.gz", "nothing that is known"), HasSubstr("is something unknown in gzip"));
   // A browser may have unpacked it already: the content decides.
   write_file(folder / "b.asc.gz", "ncols 2\nnrows 1\n1 2\n");

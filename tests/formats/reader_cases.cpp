@@ -7,6 +7,7 @@
 #include "formats/netcdf_bytes.h"
 #include "formats/pds4_label.h"
 #include "formats/readers.h"
+#include "formats/tar_archive.h"
 #include "formats/tiff_bytes.h"
 #include "formats/write/raster_sink.h"
 #include "formats/zip_archive.h"
@@ -326,6 +327,8 @@ std::vector<ReaderCase> reader_cases() {
       {"Pds4Label", "a.xml", pds4_label("a.dat"), open_pds4, {}},
       {"Pds4Samples", "a.dat", counting(7, 2), open_pds4, {}},
       {"StreamedAsciiGrid", "a.asc.gz", gzip(esri + numbers), open_ascii_grid, streamed},
+      {"ZipOfGrid", "a.zip", zip("d/a.asc", esri + numbers), open_packed, {}},
+      {"TarOfGrid", "a.tar", tar_archive({{"d/a.asc", esri + numbers}}), open_packed, {}},
       {"PngDescription", "described.png.json", "", open_png, {}},
       {"RawDescription", "a.r16.json", "", open_raw, {}},
   };
@@ -399,7 +402,8 @@ std::vector<ReaderCase> reader_cases() {
   find("RawDescription").shortest_valid = find("RawDescription").bytes.size() - 1;
   find("TiffStripsDeflated").shortest_valid = 1;  // the tags that isohf writes come last, and not all are needed
   find("TiffMasked").shortest_valid = 1;          // the mask's directory, without which the image opens with a warning
-  find("Hgt").shortest_valid = 1;                 // another square
+  for (const char* name : {"ZipOfGrid", "TarOfGrid"}) find(name).share = 4;
+  find("Hgt").shortest_valid = 1;  // another square
   return cases;
 }
 

@@ -37,8 +37,8 @@ void add_source_options(CommandLine& line, OpenOptions& options) {
       "Read this channel alone, by name or number from 0, without masks and opacity (default: the only or first "
       "fitting one, with them)",
       options.channel);
-  line.option("--part", "NAME|N", "Read this part of an OpenEXR file of several, by name or number from 0",
-              options.part);
+  line.option("--part", "NAME|N",
+              "Read this file of an archive, or this part of an OpenEXR file, by name or number from 0", options.part);
   line.option(
       "--encoding", "NAME",
       "Decode elevations packed into the colours of an 8-bit PNG: terrarium, mapbox or rgba-float (default: decode, "
