@@ -204,6 +204,7 @@ std::optional<Options> parse_options(const cli::Arguments& arguments) {
   bool sweep = false;
   bool no_haze = false;
   bool no_overlay = false;
+  bool no_base = false;
   std::optional<double> time;
   std::string archive;
   CommandLine line("view", "Views an archive of an isometric heightfield, or draws and checks it without a screen.");
@@ -214,6 +215,7 @@ std::optional<Options> parse_options(const cli::Arguments& arguments) {
   add_actions(line, options, window, verify, sweep);
   add_picture(line, options);
   line.flag("--no-haze", "Leave out the haze towards the far distance", no_haze);
+  line.flag("--no-base", "Leave out the block that the ground stands on, and the hatching below voids", no_base);
   line.flag("--no-overlay", "Leave out the figures on the picture", no_overlay);
   add_light(line, options, time);
   line.group("Work");
@@ -245,6 +247,7 @@ std::optional<Options> parse_options(const cli::Arguments& arguments) {
   if (!options.probe.empty()) options.action = Options::Action::kProbe;
   options.view.haze = !no_haze;
   options.overlay = !no_overlay;
+  options.view.base = !no_base;
   if (!options.screenshot.empty() && !window) options.action = Options::Action::kScreenshot;
   if (flies) options.action = Options::Action::kFlight;
   if (verify) options.action = Options::Action::kVerify;

@@ -56,6 +56,21 @@ Vec3 by_day(Vec3 colour, Vec3 sun) {
   return std::clamp(sun.y * 5.0 + 0.35, 0.06, 1.0) * colour;
 }
 
+/// The uniforms of light and haze.
+template <typename AnyProgram>
+void set_light(const AnyProgram& program, const ViewState& view) {
+  const Vec3 sun = normalised(view.sun);
+  set_vec3(program.uniform("sun"), sun);
+  const double height = std::clamp(sun.y * 2.5, 0.0, 1.0);
+  const Vec3 warm{1.0, 0.62 + height * 0.34, 0.36 + height * 0.52};
+  set_vec3(program.uniform("sun_light"), (sun.y > 0.0 ? 0.95 : 0.0) * warm);
+  set_vec3(program.uniform("sky_light"), std::clamp(sun.y * 6.0 + 0.25, 0.05, 1.0) * Vec3{0.33, 0.39, 0.48});
+  set_vec3(program.uniform("horizon"), by_day(kHorizon, sun));
+  const double haze_begin = 0.55 * view.far_distance;
+  const double haze_rise = view.haze ? 1.0 / (view.far_distance - haze_begin) : 0.0;
+  glUniform2f(program.uniform("haze"), static_cast<float>(haze_begin), static_cast<float>(haze_rise));
+}
+
 /// The least near distance, of the far distance.
 double least_near(DepthOrder order) {
   return order == DepthOrder::kNearIsOne ? 1e-7 : 2e-4;
@@ -250,12 +265,11 @@ void Renderer::begin_shading(const Frame& frame, const TerrainProgram& program) 
   glActiveTexture(GL_TEXTURE1);
   glBindTexture(GL_TEXTURE_2D, palette_.get());
   glActiveTexture(GL_TEXTURE0);
-  const Vec3 sun = normalised(view.sun);
   const ViewScale scale = source_.scale();
   const double codes = std::max(whole_.high - whole_.low, 1e-9) / scale.scale;
   glUniform2f(program.uniform("ramp"), static_cast<float>((whole_.low - scale.offset) / scale.scale),
               static_cast<float>(1.0 / codes));
-  set_vec3(program.uniform("sun"), sun);
+  set_light(program, view);
   if (const TextureInfo* textures = source_.textures()) {
     // Texel centres lie on the tile's edges (docs/archive_format.md, "Textures").
     const TileShape& shape = source_.grid().shape();
@@ -264,14 +278,6 @@ void Renderer::begin_shading(const Frame& frame, const TerrainProgram& program) 
     set_vec3(program.uniform("texture_place"),
              {whole / (2.0 * shape.cell_columns()), whole / shape.cell_rows(), 0.5 / size});
   }
-  const double height = std::clamp(sun.y * 2.5, 0.0, 1.0);
-  const Vec3 warm{1.0, 0.62 + height * 0.34, 0.36 + height * 0.52};
-  set_vec3(program.uniform("sun_light"), (sun.y > 0.0 ? 0.95 : 0.0) * warm);
-  set_vec3(program.uniform("sky_light"), std::clamp(sun.y * 6.0 + 0.25, 0.05, 1.0) * Vec3{0.33, 0.39, 0.48});
-  set_vec3(program.uniform("horizon"), by_day(kHorizon, sun));
-  const double haze_begin = 0.55 * view.far_distance;
-  const double haze_rise = view.haze ? 1.0 / (view.far_distance - haze_begin) : 0.0;
-  glUniform2f(program.uniform("haze"), static_cast<float>(haze_begin), static_cast<float>(haze_rise));
 }
 
 void Renderer::draw_mesh(Frame& frame, const TerrainProgram& program, const Item& item, int level) const {
@@ -362,6 +368,12 @@ void Renderer::draw_wires(Frame& frame) const {
   glPolygonMode(GL_FRONT_AND_BACK, GL_FILL);
 }
 
+void Renderer::draw_base(const Frame& frame) {
+  if (!block_) block_.emplace(source_);
+  set_light(block_->begin(frame.view, frame.terrain), frame.view);
+  block_->draw();
+}
+
 void Renderer::draw_sky(const ViewState& view) const {
   sky_.use();
   const Mat4 camera = look_along(view.forward);
@@ -396,6 +408,12 @@ FrameFigures Renderer::draw(const ViewState& view, const TileRange& top, const R
   // Depth is fine only near the eye: begin it where the ground begins, or two meshes of one hill cannot be told apart.
   double nearest = view.far_distance;
   for (const Item& item : frame.items) nearest = std::min(nearest, item.nearest);
+  if (view.base) {
+    const WorldBounds covered = source_.covered();
+    const TileVolume box{Vec3{covered.x0, Block::floor(source_, view), covered.z0} - view.eye,
+                         Vec3{covered.x1, whole_.low * view.exaggeration, covered.z1} - view.eye};
+    nearest = std::min(nearest, box.distance());
+  }
   // In the corners of the view depth is the least part of distance.
   const double half_y = std::tan(view.fov_y_rad / 2.0);
   const double half_x = half_y * view.width / view.height;
@@ -411,6 +429,7 @@ FrameFigures Renderer::draw(const ViewState& view, const TileRange& top, const R
   glClear(GL_DEPTH_BUFFER_BIT);
   glActiveTexture(GL_TEXTURE0);
   draw_opaque(frame);
+  if (view.base && !view.beyond && whole_.stored) draw_base(frame);
   draw_sky(view);
   frame.figures.passes = 1;
   if (std::any_of(frame.items.begin(), frame.items.end(), fades)) {

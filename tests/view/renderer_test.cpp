@@ -52,6 +52,36 @@ TEST_F(RendererTest, DrawsEveryVisibleTileWithAtMostTwoCallsAPass) {
   EXPECT_GT(green, pixels.size() / 4 / 10);
 }
 
+TEST_F(RendererTest, StandsOnABlockWhoseHatchedFloorShowsThroughVoids) {
+  const test::MemoryTiles source(small_grid(), [](TileIndex tile, std::vector<std::uint16_t>& codes) {
+    if (tile == TileIndex{1, 1}) std::fill(codes.begin(), codes.end(), kVoidCode);
+  });
+  Options options;
+  options.view.width = 320;
+  options.view.height = 240;
+  const auto sky = [&](Vec3 from, Vec3 to, bool base) {
+    options.view.base = base;
+    options.position = from;
+    options.look_at = to;
+    Session session(source, options);
+    const Offscreen target(320, 240, GL_RGBA8);
+    session.complete_frame();
+    check_gl("drawing");
+    const auto pixels = target.read_rgba8();
+    double share = 0.0;
+    for (std::size_t i = 0; i < pixels.size(); i += 4) share += pixels[i + 2] > pixels[i] + 15 ? 4.0 : 0.0;
+    return share / static_cast<double>(pixels.size());
+  };
+  const Vec3 above{960.0, 900.0, 961.0};
+  const Vec3 void_tile{960.0, 0.0, 960.0};
+  EXPECT_GT(sky(above, void_tile, false), 0.3) << "a hole";
+  EXPECT_LT(sky(above, void_tile, true), 0.01);
+  const Vec3 beside{1280.0, 100.0, 2600.0};
+  const Vec3 wall{1280.0, 0.0, 1920.0};
+  EXPECT_LT(sky(beside, wall, true), sky(beside, wall, false) - 0.03);
+  EXPECT_LT(Block::floor(source, options.view), whole_bounds(source).low * options.exaggeration.value_or(1.0));
+}
+
 /// The largest change of any pixel between small steps of level, fading and switching.
 TEST_F(RendererTest, FadesBetweenLevelsWithoutJumps) {
   // Low, and southwards: hills cover hills, and strips run from near to far.
