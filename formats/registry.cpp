@@ -55,6 +55,7 @@ const std::vector<Reader>& readers() {
       {{"GridFloat or EHdr header", {".hdr"}}, looks_like_grid_header, open_header_grid},
       {{"GridFloat", {".flt"}}, nullptr, open_header_grid},
       {{"EHdr", {".bil", ".bip", ".bsq"}}, nullptr, open_header_grid},
+      {{"ERDAS Imagine", {".img"}, nullptr, "takes `channel`"}, looks_like_imagine, open_imagine, nullptr, true},
       {{"PDS3", {".img", ".lbl"}, nullptr, "takes `channel`"}, looks_like_pds3, open_pds3, has_pds3_label, true},
       {{"PDS4", {".lblx"}, nullptr, "takes `channel`"}, looks_like_pds4, open_pds4, is_pds4},
       {{"ISIS3 cube", {".cub", ".lbl"}, nullptr, "takes `channel`"}, looks_like_isis3, open_isis3, nullptr, true},

@@ -23,7 +23,8 @@ struct Signature {
 
 constexpr Signature kSignatures[] = {
     {"isohf.json"sv, "an isohf archive", "isohf restore {} OUT.tif makes a raster of it", 30},
-    {"PK\x03\x04"sv, "a damaged ZIP file"},
+    {"mimetypeapplication/vnd.isohf"sv, "an isohf archive", "isohf restore {} OUT.tif makes a raster of it", 30},
+    {"PK\x03\x04"sv, "a ZIP file", "it is damaged or cut off"},
     {"\x1f\x8b"sv, "a gzip file", "gunzip it first"},
     {"BZh"sv, "a bzip2 file", kUnpack},
     {"\xfd"
@@ -38,7 +39,6 @@ constexpr Signature kSignatures[] = {
     {"glTF"sv, "a glTF model"},
     {"\x0e\x03\x13\x01"sv, "an HDF4 file", kGdal},
     {"GRIB"sv, "a GRIB file", kGdal},
-    {"EHFA_HEADER_TAG"sv, "an ERDAS Imagine raster", kGdal},
     {"NITF"sv, "a NITF raster", kGdal},
     {"msid"sv, "a MrSID picture", kGdal},
     {"SQLite format 3"sv, "an SQLite database, as a GeoPackage is one", kGdal},

@@ -7,6 +7,7 @@
 
 #include <cstring>
 
+#include "formats/imagine_bytes.h"
 #include "formats/netcdf_bytes.h"
 #include "formats/pds4_label.h"
 #include "formats/reader_failure.h"
@@ -348,6 +349,23 @@ TEST_F(Pds4, LabelsOfOtherThingsAreRefused) {
   options.type = "ComplexLSB8";
   write("a.xml", pds4_label("b.dat", options));
   EXPECT_THAT(failure("a.xml", &code), HasSubstr("data_type is \"ComplexLSB8\""));
+}
+
+TEST(Imagine, RunsAndPlainTilesAreTheSamples) {
+  const TemporaryFolder folder;
+  for (const bool spills : {false, true}) {
+    write_file(folder / "a.img", ImagineBytes().file(spills));
+    write_file(folder / "a.ige", ImagineBytes::spill());
+    const auto source = open_raster(folder / "a.img", {});
+    const std::vector<double> values = values_of(*source);
+    ASSERT_EQ(values.size(), 60U);
+    EXPECT_EQ(values[0], 16.0);
+    EXPECT_EQ(values[9], 33.0);
+    EXPECT_EQ(values[50], spills ? 16.0 : 19.0);  // the 41st sample of the tile
+    EXPECT_EQ(source->info().georeference.origin_x, 500000.0);
+    EXPECT_EQ(source->info().georeference.spacing_y, 10.0);
+    EXPECT_EQ(source->info().void_values, std::vector<double>{5.0});
+  }
 }
 
 }  // namespace

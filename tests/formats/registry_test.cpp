@@ -142,7 +142,7 @@ TEST(OpenSource, NamesForeignFilesAndTheCommandThatHelps) {
       {"%PDF-1.4\n", "this is a PDF document; isohf formats lists what is read"},
       {"LASF\x01\x02", "this is a LAS point cloud; PDAL grids it: pdal translate " + path},
       {std::string("PK\x03\x04") + std::string(26, '\0') + "isohf.json", "an isohf archive; isohf restore " + path},
-      {std::string("PK\x03\x04") + std::string(40, '\0'), "this is a damaged ZIP file"},
+      {std::string("PK\x03\x04") + std::string(40, '\0'), "this is a ZIP file; it is damaged or cut off"},
       {"GRIB\x01\x02", "this is a GRIB file; gdal_translate " + path + " OUT.tif makes a GeoTIFF of it"},
       {std::string("\x01\x02\x03", 3), "unknown format; isohf formats lists what is read"}};
   for (const auto& [content, message] : cases) {
@@ -192,7 +192,8 @@ TEST(Formats, AreListedWithTheLibraryThatReadsThem) {
     for (const std::string extension : format.extensions) {
       const bool first = extensions.insert(extension).second;
       // Of these the content tells which format it is.
-      EXPECT_TRUE(first || extension == ".lbl" || extension == ".dem" || extension == ".hdr" || extension == ".grd")
+      EXPECT_TRUE(first || extension == ".img" || extension == ".lbl" || extension == ".dem" || extension == ".hdr" ||
+                  extension == ".grd")
           << extension << " is listed twice";
     }
   }
