@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <filesystem>
 #include <functional>
 #include <nlohmann/json.hpp>
@@ -272,6 +273,31 @@ TEST(AlteredArchives, EveryFlippedBitIsFound) {
     write_file(folder / "a.isohf", flipped);
     EXPECT_THAT(findings_in(folder / "a.isohf"), testing::Not(testing::IsEmpty())) << "bit " << bit;
   }
+}
+
+/// ISOHF_FLIPS=N tries every N-th bit of each archive that is kept, ISOHF_FLIPS_OF=NAME of one.
+TEST(AlteredArchives, EveryFlippedBitOfThoseThatAreKeptIsFound) {
+  const TemporaryFolder folder;
+  const char* const step = std::getenv("ISOHF_FLIPS");
+  const char* const only = std::getenv("ISOHF_FLIPS_OF");
+  std::size_t flips = 0;
+  for (const char* kept : {"/testdata/archives/v1", "/testdata/conformance/good"}) {
+    for (const auto& entry : std::filesystem::directory_iterator(ISOHF_SOURCE_DIR + std::string(kept))) {
+      if (only != nullptr && entry.path().stem() != only) continue;
+      std::string bytes = read_file(entry.path());
+      const std::size_t every = step != nullptr ? std::stoul(step) : kSanitized ? 100003 : 10007;
+      for (std::size_t bit = 0; bit < 8 * bytes.size(); bit += every, ++flips) {
+        const auto flip = [&] { bytes[bit / 8] = static_cast<char>(bytes[bit / 8] ^ (1 << (bit % 8))); };
+        flip();
+        write_file(folder / "a.isohf", bytes);
+        EXPECT_THAT(findings_in(folder / "a.isohf"), testing::Not(testing::IsEmpty()))
+            << entry.path() << " bit " << bit;
+        flip();
+      }
+    }
+  }
+  EXPECT_GT(flips, 0U);
+  RecordProperty("flips", static_cast<int>(flips));
 }
 
 TEST(AlteredArchives, NoProgramCrashesOnThem) {

@@ -1,15 +1,15 @@
-// Any text is a reference system as WKT or a .prj, or one line that says why it is none; numbers that came of it are
-// numbers.
+// Any text is a reference system as WKT or a .prj, or an .aux.xml, or one line that says why it is none.
 
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
 #include <string>
 
+#include "formats/georeference/files_beside.h"
 #include "formats/georeference/reference_system.h"
 #include "formats/georeference/wkt.h"
 #include "isohf/error.h"
+#include "support/temporary_folder.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string text(reinterpret_cast<const char*>(data), size);
@@ -23,6 +23,18 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     } catch (const isohf::Error& error) {
       if (std::string(error.what()).find_first_of("\n\r") != std::string::npos) std::abort();
     }
+  }
+  static const isohf::test::TemporaryFolder folder("/dev/shm");
+  isohf::SourceInfo info;
+  info.path = folder / "a.png";
+  info.width = 5;
+  info.height = 4;
+  isohf::test::write_file(info.path + ".aux.xml", text);
+  try {
+    read_auxiliary_metadata(info, 1);
+  } catch (const isohf::Error& error) {
+    const std::string message = error.what();
+    if (!message.starts_with(info.path) || message.find_first_of("\n\r") != std::string::npos) std::abort();
   }
   return 0;
 }

@@ -274,7 +274,7 @@ std::string why_other_data(const ArchiveReader& archive) {
   if (archive.reads_by_directory()) return {};
   for (const auto& [name, stated] : archive.metadata().extensions) {
     if (name != kDataCrcName) continue;
-    const std::string found = fmt::format("\"{:08x}\"", data_crc32(archive.source()));
+    const std::string found = fmt::format("\"{:08x}\"", data_crc32(archive.source(), archive.path()));
     if (found != stated) return fmt::format("the members' data have the CRC-32 {}, the metadata say {}", found, stated);
   }
   return {};

@@ -217,7 +217,7 @@ ArchiveDirectory read_directory(const ByteSource& file, const ZipEnd& end, std::
 OwnEntries find_own_entries(const ByteSource& file, const ZipEnd& end) {
   OwnEntries found;
   const auto entry_at_end = [&](std::uint64_t behind, std::string_view name) -> std::optional<ZipEntry> {
-    for (const std::uint64_t extra : {0, 12, 20, 28}) {
+    for (const std::uint64_t extra : {0U, 12U, 20U, 28U}) {
       const std::uint64_t bytes = 46 + name.size() + extra;
       if (bytes > behind) break;
       const ZipEnd one{1, end.directory_offset + behind - bytes, bytes, 0, 0};
@@ -313,7 +313,7 @@ std::uint32_t crc32_in(const ByteSource& file, std::uint64_t offset_bytes, std::
   return crc;
 }
 
-std::uint32_t data_crc32(const ByteSource& file) {
+std::uint32_t data_crc32(const ByteSource& file, const std::string& name) try {
   std::uint32_t all = 0;
   const AheadSource ahead(file);  // members follow one another
   for (ZipEntries entries(file, find_archive_end(file)); const auto entry = entries.next();) {
@@ -322,6 +322,8 @@ std::uint32_t data_crc32(const ByteSource& file) {
     all = crc32_of_crc32(crc32_in(ahead, checked_data_offset(ahead, *entry), entry->compressed_bytes), all);
   }
   return all;
+} catch (const Error& error) {
+  throw error.within(name);
 }
 
 std::vector<std::byte> member_from(const ByteSource& file, const ZipEntry& entry, std::uint64_t data_offset) {

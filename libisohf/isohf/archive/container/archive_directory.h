@@ -102,8 +102,8 @@ void check_member(const ByteSource& file, const ZipEntry& entry, std::uint64_t d
 [[nodiscard]] std::uint32_t crc32_in(const ByteSource& file, std::uint64_t offset_bytes, std::uint64_t size_bytes);
 
 /// CRC-32 over the CRC-32s of the data of all members before the index as they stand in the file, in the directory's
-/// order, but those of the metadata. Throws as reading does.
-[[nodiscard]] std::uint32_t data_crc32(const ByteSource& file);
+/// order, but those of the metadata. Throws as reading does, with the name.
+[[nodiscard]] std::uint32_t data_crc32(const ByteSource& file, const std::string& name);
 /// The metadata's extension that holds it, as a string of hexadecimal digits.
 inline constexpr const char* kDataCrcName = "data_crc32";
 

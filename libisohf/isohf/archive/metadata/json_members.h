@@ -122,7 +122,7 @@ class JsonMembers {
   void optional(const char* key, std::optional<T>& value, const JsonRule& rule, const Known& known) {
     if (pass_ == Pass::kWrite && !value) return leave_out(key, rule);
     if (pass_ == Pass::kRead && !has(key)) return value.reset();
-    if (pass_ == Pass::kRead) value.emplace();
+    if (pass_ == Pass::kRead) value.emplace(T{});
     T none{};
     known(value ? *value : none);
   }

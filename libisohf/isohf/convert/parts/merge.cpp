@@ -62,7 +62,8 @@ std::string why_other_extras(const Metadata& one, const Metadata& other) {
 void check_data(const ArchiveReader& archive) {
   for (const auto& [name, stated] : archive.metadata().extensions) {
     if (name != kDataCrcName) continue;
-    if (const std::string found = fmt::format("\"{:08x}\"", data_crc32(archive.source())); found != stated) {
+    if (const std::string found = fmt::format("\"{:08x}\"", data_crc32(archive.source(), archive.path()));
+        found != stated) {
       throw Error(ErrorCode::kCorrupt,
                   fmt::format("{}: its members' data have the CRC-32 {}, {} is stated", archive.path(), found, stated));
     }

@@ -100,14 +100,17 @@ class AdaptiveDecoder {
   std::int32_t* deviations(int r) {
     return deviations_.data() + static_cast<std::ptrdiff_t>(r + 2) * (columns_ + 2 * kMargin) + kMargin;
   }
+  [[nodiscard]] std::size_t at(int r, int column) const {
+    return static_cast<std::size_t>(std::int64_t{r} * columns_ + column);
+  }
   [[nodiscard]] bool is_void(int r, int column) const {
-    return !payload_.is_void.empty() && payload_.is_void[static_cast<std::size_t>(r) * columns_ + column] != 0;
+    return !payload_.is_void.empty() && payload_.is_void[at(r, column)] != 0;
   }
   void store(int r, int column, std::int32_t sample) {
     if (sample < payload_.low || sample > payload_.high) {
       refuse(fmt::format("row {} leaves the range {}..{} that the header states", r, payload_.low, payload_.high));
     }
-    tile_.codes[static_cast<std::size_t>(r) * columns_ + column] = static_cast<std::uint16_t>(sample);
+    tile_.codes[at(r, column)] = static_cast<std::uint16_t>(sample);
   }
 
   void decode_place(int top, int row_in_band, int place) {

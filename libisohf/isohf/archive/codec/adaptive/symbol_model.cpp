@@ -82,7 +82,7 @@ ISOHF_KERNEL void mix(std::uint32_t* __restrict counts, std::uint32_t* __restric
 }
 
 constexpr bool is_due(std::uint32_t bands) {
-  const int shift = std::bit_width(bands) - 3;
+  const int shift = static_cast<int>(std::bit_width(bands)) - 3;
   return shift <= 0 || (bands >> shift << shift) == bands;
 }
 

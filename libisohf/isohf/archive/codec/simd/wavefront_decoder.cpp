@@ -140,7 +140,7 @@ ISOHF_KERNEL Ints compare(Ints a, Ints b) {
 
 /// A lane's value beside those of the lanes before it.
 ISOHF_KERNEL Ints one_lane_on(Ints values, std::int32_t first) {
-  Ints on = __builtin_shuffle(values, Ints{0, 0, 1, 2, 3, 4, 5, 6});
+  Ints on = __builtin_shufflevector(values, values, 0, 0, 1, 2, 3, 4, 5, 6);
   on[0] = first;
   return on;
 }
