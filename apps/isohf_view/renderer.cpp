@@ -248,7 +248,7 @@ void Renderer::find_visible(Frame& frame, const TileRange& top, const ResidentTi
     const LodBlend blend = lod_blend(own_level(at), planes_.mesh_shape().levels());
     GLuint texture = 0;
     if (view.mode == ColourMode::kTexture) {
-      if (textures_ && at.plane == 0) texture = textures_(at.tile);
+      if (textures_) texture = textures_(at);
       if (texture == 0) texture = no_texture_.get();
     }
     frame.items.push_back({at, chosen.coarser_sides, slot, is_cut, is_cut || bounds.has_voids,
@@ -270,14 +270,25 @@ void Renderer::begin_shading(const Frame& frame, const TerrainProgram& program) 
   glUniform2f(program.uniform("ramp"), static_cast<float>((whole_.low - scale.offset) / scale.scale),
               static_cast<float>(1.0 / codes));
   set_light(program, view);
-  if (const TextureInfo* textures = source_.textures()) {
-    // Texel centres lie on the tile's edges (docs/archive_format.md, "Textures").
-    const TileShape& shape = source_.grid().shape();
-    const double size = textures->size;
-    const double whole = (size - 1.0) / size;
-    set_vec3(program.uniform("texture_place"),
-             {whole / (2.0 * shape.cell_columns()), whole / shape.cell_rows(), 0.5 / size});
+}
+
+void Renderer::place_texture(const TerrainProgram& program, PlaneTile at) const {
+  const TileGrid& grid = source_.grid();
+  // Texel centres lie on the tile's edges (docs/archive_format.md, "Textures").
+  const double size = source_.textures()->size;
+  double x0 = 0.5 / size;
+  double z0 = x0;
+  double across = (size - 1.0) / size;
+  double down = across;
+  if (at.plane > 0) {
+    const auto tiles = static_cast<double>(planes_.scale(at.plane));
+    across = tiles / static_cast<double>(grid.tile_columns());
+    down = tiles / static_cast<double>(grid.tile_rows());
+    x0 = across * static_cast<double>(at.tile.column);
+    z0 = down * static_cast<double>(at.tile.row);
   }
+  glUniform4f(program.uniform("texture_place"), static_cast<float>(across / (2.0 * grid.shape().cell_columns())),
+              static_cast<float>(down / grid.shape().cell_rows()), static_cast<float>(x0), static_cast<float>(z0));
 }
 
 void Renderer::draw_mesh(Frame& frame, const TerrainProgram& program, const Item& item, int level) const {
@@ -288,7 +299,10 @@ void Renderer::draw_mesh(Frame& frame, const TerrainProgram& program, const Item
   set_vec3(program.uniform("level_colour"), level_colour(level));
   glUniform1f(program.uniform("shadow_gain"), frame.view.shadows ? item.slot->shadow_gain() : 0.0F);
   item.slot->bind();
-  if (item.texture != 0) glBindTexture(GL_TEXTURE_2D, item.texture);
+  if (item.texture != 0) {
+    glBindTexture(GL_TEXTURE_2D, item.texture);
+    if (source_.textures() != nullptr) place_texture(program, item.at);
+  }
   if (item.is_cut) set_cutting(true);
   glEnable(GL_CULL_FACE);
   shared_.draw_strip(level);

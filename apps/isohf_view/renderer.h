@@ -43,8 +43,9 @@ struct DrawnMesh {
 /// Finds a tile's buffers; nullptr where the tile is not resident.
 using ResidentTile = std::function<const TileSlot*(PlaneTile)>;
 
-/// The GL texture of a tile; 0 where there is none.
-using TileTexture = std::function<GLuint(TileIndex)>;
+/// The GL texture that a tile of any plane is drawn with: its own, or above plane 0 one of the whole archive. 0 where
+/// there is none.
+using TileTexture = std::function<GLuint(PlaneTile)>;
 
 /// Draws the heightfield: sky, opaque pass, fading pass (paper sections 3.3-3.9), wires.
 class Renderer {
@@ -99,6 +100,7 @@ class Renderer {
   void draw_fading(Frame& frame);
   void draw_wires(Frame& frame) const;
   void draw_base(const Frame& frame);
+  void place_texture(const TerrainProgram& program, PlaneTile at) const;
   void draw_mesh(Frame& frame, const TerrainProgram& program, const Item& item, int level) const;
   void begin_shading(const Frame& frame, const TerrainProgram& program) const;
 

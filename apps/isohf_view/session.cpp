@@ -102,8 +102,15 @@ Session::Session(const TileSource& source, const Options& options)
   if (view.mode == ColourMode::kDifference && !differs) view.mode = ColourMode::kElevation;
   view.exaggeration = options.exaggeration.value_or(default_exaggeration(source));
   if (source.textures() != nullptr) {
-    textures_.emplace(source, texture_bytes(source, options), limits_from(source, options).workers);
-    renderer_.set_textures([this](TileIndex tile) { return textures_->texture(tile); });
+    // Coarse planes are drawn with one picture of all, which gets an eighth.
+    std::uint64_t bytes = texture_bytes(source, options);
+    if (source.planes() != nullptr) {
+      texture_overview_.emplace(source, bytes / 8);
+      bytes -= bytes / 8;
+    }
+    textures_.emplace(source, bytes, limits_from(source, options).workers);
+    renderer_.set_textures(
+        [this](PlaneTile at) { return at.plane == 0 ? textures_->texture(at.tile) : texture_overview_->texture(); });
     if (!options.mode_given && !differs) view.mode = ColourMode::kTexture;
   } else if (view.mode == ColourMode::kTexture) {
     throw Error(ErrorCode::kInvalidArgument, "--mode texture: this archive has no textures; convert with --texture");
@@ -234,6 +241,7 @@ void Session::frame() {
   if (shows_textures()) {
     const std::uint64_t gone = boxes_.figures().upload_bytes;
     textures_->update(boxes_.finest(), view, upload_bytes_ > gone ? upload_bytes_ - gone : 0);
+    if (texture_overview_) texture_overview_->update(upload_bytes_ / 4);
   }
   draw();
 }
@@ -245,6 +253,10 @@ void Session::complete_frame() {
   if (shows_textures()) {
     textures_->finish(boxes_.finest(), view);
     if (textures_->error()) throw Error(ErrorCode::kCorrupt, *textures_->error());
+    if (texture_overview_) {
+      texture_overview_->finish();
+      if (texture_overview_->error()) throw Error(ErrorCode::kCorrupt, *texture_overview_->error());
+    }
   }
   draw();
 }
@@ -259,7 +271,9 @@ std::string Session::shadow_line() const {
 
 bool Session::is_settled() const {
   const TileBoxFigures& box = boxes_.figures();
-  return box.missing_tiles == 0 && box.shadows_to_come == 0 && (!shows_textures() || textures_->figures().to_come == 0);
+  if (box.missing_tiles > 0 || box.shadows_to_come > 0) return false;
+  if (!shows_textures()) return true;
+  return textures_->figures().to_come == 0 && (!texture_overview_ || texture_overview_->to_come() == 0);
 }
 
 void Session::draw_overlay(const Shown& shown) {

@@ -7,6 +7,7 @@
 #include "options.h"
 #include "paging/plane_boxes.h"
 #include "paging/texture_box.h"
+#include "paging/texture_overview.h"
 #include "reading/hud.h"
 #include "renderer.h"
 
@@ -92,7 +93,8 @@ class Session {
   Renderer renderer_;
   PlaneBoxes boxes_;
   std::optional<TextureBox> textures_;
-  std::uint64_t upload_bytes_;  ///< a frame, tiles and textures together
+  std::optional<TextureOverview> texture_overview_;  ///< where there are planes
+  std::uint64_t upload_bytes_;                       ///< a frame, tiles and textures together
   Hud hud_;
   std::vector<ColourStop> colours_;  ///< of elevations
   struct {

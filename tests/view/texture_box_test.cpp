@@ -12,6 +12,7 @@
 #include "gl_test.h"
 #include "isohf/surface/photo/texture_cutter.h"
 #include "memory_tiles.h"
+#include "paging/texture_overview.h"
 #include "session.h"
 #include "support/memory_photo.h"
 
@@ -289,6 +290,40 @@ TEST_F(TextureBoxTest, NamesATextureThatCannotBeRead) {
     EXPECT_THAT(error.what(), testing::HasSubstr("textures/0/1/64.png"));
   }
   EXPECT_EQ(session.textures()->figures().resident, 5);
+}
+
+TEST_F(TextureBoxTest, AnOverviewHoldsEveryTileAtTheLevelThatFits) {
+  MemoryPhoto photo = waves();
+  TexturedPlain plain(photo, 64, 4);
+  plain.without = {2, 1};
+  const auto texels_of = [](GLuint texture, int width, int height) {
+    std::vector<std::uint8_t> texels(static_cast<std::size_t>(width * height * 4));
+    glBindTexture(GL_TEXTURE_2D, texture);
+    glGetTexImage(GL_TEXTURE_2D, 0, GL_RGBA, GL_UNSIGNED_BYTE, texels.data());
+    return texels;
+  };
+  // 3 x 2 tiles of 64 x 64 texels, and a third for mip levels, are 131072 bytes.
+  for (const auto& [bytes, level] : {std::pair{131072U, 0}, {131071U, 1}, {2048U, 3}}) {
+    TextureOverview overview(plain, bytes);
+    overview.finish();
+    EXPECT_EQ(overview.to_come(), 0);
+    const int size = 64 >> level;
+    const auto texels = texels_of(overview.texture(), 3 * size, 2 * size);
+    for (const TileIndex tile : {TileIndex{0, 0}, {1, 0}, {2, 0}, {0, 1}, {1, 1}, {2, 1}}) {
+      const Picture expected = plain.has_texture(tile) ? read_texels(plain, tile, level) : Picture(size, size, 4);
+      for (int row = 0; row < size; ++row) {
+        const auto at = static_cast<std::size_t>(((tile.row * size + row) * 3 + tile.column) * size * 4);
+        ASSERT_TRUE(std::equal(expected.row(row), expected.row(row) + size * 4,
+                               texels.begin() + static_cast<std::ptrdiff_t>(at)))
+            << tile.column << " " << tile.row << " " << row;
+      }
+    }
+  }
+  EXPECT_EQ(TextureOverview(plain, 2047).texture(), 0U);
+  plain.broken = {1, 0};
+  TextureOverview broken(plain, 131072);
+  broken.finish();
+  EXPECT_EQ(broken.error(), "member \"textures/0/1/64.png\": broken");
 }
 
 }  // namespace

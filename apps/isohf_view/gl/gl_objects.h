@@ -2,6 +2,7 @@
 
 #include <epoxy/gl.h>
 
+#include <cstddef>
 #include <map>
 #include <string>
 #include <utility>
@@ -15,6 +16,7 @@ template <PFNGLGENBUFFERSPROC* kGenerate, PFNGLDELETEBUFFERSPROC* kDelete>
 class GlName {
  public:
   GlName() { (*kGenerate)(1, &name_); }
+  explicit GlName(std::nullptr_t) {}  ///< no name, 0
   GlName(GlName&& other) noexcept : name_(std::exchange(other.name_, 0)) {}
   GlName& operator=(GlName&& other) noexcept {
     std::swap(name_, other.name_);

@@ -97,7 +97,7 @@ void main() {
   float height = float(here.y) * code_height;
   vec3 eye = anchor + vec3(float(lattice.x) * sigma.x, height, float(lattice.y) * sigma.y);
   v_facing = vec4(vertex_normal(), length(eye));
-  v_place = vec4(vec2(object_xz), float(here.y), shadow);
+  v_place = vec4(vec2(lattice - tile_lattice) / float(stride), float(here.y), shadow);
   gl_Position = clip_from_eye * vec4(eye, 1.0);
 #ifdef RIM
   v_void = here.y == 65535u ? 1.0 : 0.0;
@@ -146,7 +146,7 @@ uniform vec2 haze;              // distance where it begins, 1/distance to where
 uniform vec3 horizon;
 uniform sampler2D palette;      // colours along the ramp, to the power of 1.6
 uniform sampler2D tile_texture; // colours as coded, multiplied by alpha
-uniform vec3 texture_place;     // texture coordinates = object space * xy + z
+uniform vec4 texture_place;     // texture coordinates = object space * xy + zw
 float sun_share();
 
 #if MODE == 0 || MODE == 4
@@ -180,7 +180,7 @@ vec3 base_colour() {
 #elif MODE == 4
   // Under full light a photo shows its own colours: the power of 1/1.6 below is undone. Where there is no photo the
   // texture has no alpha.
-  vec4 photo = texture(tile_texture, v_place.xy * texture_place.xy + texture_place.z);
+  vec4 photo = texture(tile_texture, v_place.xy * texture_place.xy + texture_place.zw);
   vec3 own = pow(min(photo.rgb / max(photo.a, 0.004), 1.0), vec3(1.6));
   return mix(hypsometric(), own, photo.a);
 #else

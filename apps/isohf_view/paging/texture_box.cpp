@@ -29,22 +29,11 @@ float best_anisotropy() {
   return std::min(most, kMostAnisotropy);
 }
 
-/// So that texels without colour lend none to their neighbours when the GPU filters.
-void multiply_by_alpha(Picture& picture) {
-  for (std::size_t i = 0; i < picture.samples.size(); i += 4) {
-    const unsigned alpha = picture.samples[i + 3];
-    for (std::size_t c = 0; alpha != 255 && c < 3; ++c) {
-      picture.samples[i + c] = static_cast<std::uint8_t>((picture.samples[i + c] * alpha + 127) / 255);
-    }
-  }
-}
-
 TextureChain load_chain(const TileSource& source, const TextureRequest& request) {
   TextureChain chain{request, {}, {}};
   try {
     for (int level = request.finest; level < source.textures()->levels; ++level) {
-      chain.levels.push_back(source.read_texture(request.tile, level));
-      multiply_by_alpha(chain.levels.back());
+      chain.levels.push_back(read_texels(source, request.tile, level));
     }
   } catch (const std::exception& error) {
     chain.error = error.what();
@@ -54,6 +43,17 @@ TextureChain load_chain(const TileSource& source, const TextureRequest& request)
 }
 
 }  // namespace
+
+Picture read_texels(const TileSource& source, TileIndex tile, int level) {
+  Picture picture = source.read_texture(tile, level);
+  for (std::size_t i = 0; i < picture.samples.size(); i += 4) {
+    const unsigned alpha = picture.samples[i + 3];
+    for (std::size_t c = 0; alpha != 255 && c < 3; ++c) {
+      picture.samples[i + c] = static_cast<std::uint8_t>((picture.samples[i + c] * alpha + 127) / 255);
+    }
+  }
+  return picture;
+}
 
 TextureBox::TextureBox(const TileSource& source, std::uint64_t memory_bytes, int workers)
     : source_(source),

@@ -28,6 +28,10 @@ struct TextureChain {
   std::string error;
 };
 
+/// A level of a tile's texture as it is drawn: RGBA, colours multiplied by alpha, so that texels without colour lend
+/// none to their neighbours when the GPU filters. Throws as TileSource::read_texture.
+[[nodiscard]] Picture read_texels(const TileSource& source, TileIndex tile, int level);
+
 /// What one update did, and where things stand.
 struct TextureBoxFigures {
   std::uint64_t upload_bytes = 0;    ///< in this frame
