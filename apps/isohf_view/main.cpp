@@ -13,6 +13,7 @@
 #include "options/describe.h"
 #include "output/json_output.h"
 #include "output/output_file.h"
+#include "output/progress.h"
 #include "output/standard_output.h"
 #include "program.h"
 #include "reading/place.h"
@@ -110,8 +111,21 @@ ordered_json json_from(const ViewReport& report, const std::string& archive) {
 
 int verify(const TileSource& source, const Options& options) {
   ViewChecks wanted;
-  wanted.progress = [check = interrupt_check()](std::int64_t, std::int64_t) { check(); };
-  const ViewReport report = verify_view(source, make_index_arrays(source.grid().shape()), wanted);
+  const TileGrid& grid = source.grid();
+  if (const std::optional<isohf::TileRange>& tiles = options.tiles) {
+    if (tiles->end.column > grid.tile_columns() || tiles->end.row > grid.tile_rows()) {
+      throw Error(ErrorCode::kInvalidArgument,
+                  fmt::format("--tiles: the archive has {} by {} tiles", grid.tile_columns(), grid.tile_rows()));
+    }
+    wanted.tiles = tiles;
+  }
+  cli::ProgressDisplay display(cli::ProgressMode::kAuto, options.common.quiet, options.common.verbose);
+  wanted.progress = [&display, check = interrupt_check()](const char* what, std::int64_t done, std::int64_t all) {
+    check();
+    display.update(what, std::string(what) == "tiles" ? "tiles" : "rows", done, all);
+  };
+  const ViewReport report = verify_view(source, make_index_arrays(grid.shape()), wanted);
+  display.clear();
   print_result(options.common, text_from(report, options.archives[0]),
                [&] { return json_from(report, options.archives[0]); });
   return report.passed() ? cli::kExitDone : cli::kExitDifferences;

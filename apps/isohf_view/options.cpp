@@ -6,6 +6,7 @@
 
 #include "isohf/error.h"
 #include "options/option_values.h"
+#include "options/tile_range.h"
 
 namespace isohf::view {
 namespace {
@@ -82,6 +83,9 @@ void add_actions(CommandLine& line, Options& options, bool& window, bool& verify
               name_ending_with(".png", options.screenshot));
   line.option("--flight", "FILE", "Fly along the path in FILE without a screen and print figures", options.flight);
   line.flag("--verify", "Check that archive, index arrays and shaders agree with the library", verify);
+  line.option("--tiles", "A:B,C:D",
+              "Verify columns A to B-1 and rows C to D-1 of tiles alone, from 0 in the North-West",
+              [&](const std::string& text) { options.tiles = cli::parse_tile_range(text); });
   line.flag("--sweep", "Go from level 0 to 2 in small steps and measure how the picture changes", sweep);
   line.option("--probe", "X,Z[,X,Z]",
               "Say what is known of a place, in world units; of two also the heights between them",
@@ -240,6 +244,7 @@ std::optional<Options> parse_options(const cli::Arguments& arguments) {
   needs("--baseline", flies, "--flight");
   needs("--csv", flies || sweep, "--flight or --sweep");
   needs("--steps", sweep, "--sweep");
+  needs("--tiles", verify, "--verify");
   needs("--time", options.date.has_value(), "--date");
   if (time) options.date->hours = *time;
   needs("--difference", options.archives.size() == 2, "a second archive");

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "isohf/parts.h"
 #include "isohf/shade.h"
 #include "options/options_common.h"
 #include "view_state.h"
@@ -34,7 +35,8 @@ struct Options {
   std::optional<SolarTime> date;  ///< the sun of that day and time
   std::optional<ShadePalette> palette;
   std::string palette_file;
-  std::vector<double> probe;  ///< x, z of a place, or of two
+  std::optional<isohf::TileRange> tiles;  ///< that --verify looks at
+  std::vector<double> probe;              ///< x, z of a place, or of two
   double sun_azimuth_deg = 300.0;
   double sun_elevation_deg = 35.0;
   std::optional<double> exaggeration;  ///< nullopt: default_exaggeration()

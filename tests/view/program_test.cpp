@@ -60,6 +60,12 @@ TEST_F(ViewProgramTest, VerifiesGoodAndBadArchives) {
   const Outcome bad = run(path("bad.isohf") + " --verify");
   EXPECT_EQ(bad.exit_code, 3) << bad.err;
   EXPECT_NE(bad.out.find("shared vertices: tile (1,1)"), std::string::npos) << bad.out;
+
+  const Outcome part = run(path("bad.isohf") + " --verify --tiles 2:3,0:1 --json");
+  EXPECT_EQ(nlohmann::json::parse(part.out).at("tiles"), 1) << part.out;
+  EXPECT_EQ(run(path("bad.isohf") + " --verify --tiles 1:2,1:2").exit_code, 3);
+  EXPECT_EQ(run(path("bad.isohf") + " --verify --tiles 2:4,0:1").exit_code, 2);
+  EXPECT_EQ(run(path("bad.isohf") + " --tiles 2:3,0:1").exit_code, 2);
 }
 
 TEST_F(ViewProgramTest, FliesAndCountsEachFrame) {

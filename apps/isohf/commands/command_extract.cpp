@@ -12,6 +12,7 @@
 #include "options/box_ground.h"
 #include "options/option_values.h"
 #include "options/options_common.h"
+#include "options/tile_range.h"
 #include "output/output_kinds.h"
 #include "output/part_output.h"
 
@@ -36,30 +37,6 @@ struct ExtractCommand {
   bool overwrite = false;
 };
 
-/// "A:B,C:D".
-TileRange tile_range_from_string(const std::string& text) {
-  const auto refuse = [&]() -> std::int64_t {
-    throw Error(
-        ErrorCode::kInvalidArgument,
-        fmt::format("found \"{}\", must be A:B,C:D: columns A to B-1 and rows C to D-1 of tiles, from 0", text));
-  };
-  const auto split = [&](const std::string& of, char at) {
-    const std::size_t place = of.find(at);
-    if (place == std::string::npos) refuse();
-    return std::pair(of.substr(0, place), of.substr(place + 1));
-  };
-  const auto number = [&](const std::string& of) {
-    return of.empty() || of.find_first_not_of("0123456789") != std::string::npos || of.size() > 9 ? refuse()
-                                                                                                  : std::stoll(of);
-  };
-  const auto [columns, rows] = split(text, ',');
-  const auto [west, east] = split(columns, ':');
-  const auto [north, south] = split(rows, ':');
-  const TileRange range{{number(west), number(north)}, {number(east), number(south)}};
-  if (range.is_empty()) refuse();
-  return range;
-}
-
 std::optional<ExtractCommand> parse(const Arguments& arguments) {
   ExtractCommand options;
   CommandLine line("extract", "Cuts an archive: some of its tiles become an archive of their own.");
@@ -70,7 +47,7 @@ std::optional<ExtractCommand> parse(const Arguments& arguments) {
   line.option("--bbox", "W,S,E,N", "All tiles that touch this rectangle, in the units of the source's reference system",
               [&](const std::string& text) { options.bbox = bounding_box_from_string(text); });
   line.option("--tiles", "A:B,C:D", "Columns A to B-1 and rows C to D-1 of tiles, counted from 0 in the North-West",
-              [&](const std::string& text) { options.tiles = tile_range_from_string(text); });
+              [&](const std::string& text) { options.tiles = parse_tile_range(text); });
   line.exclusive({"--bbox", "--tiles"});
   add_work_options(line, options.work);
   add_common_options(line, options.common);

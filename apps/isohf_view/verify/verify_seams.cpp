@@ -55,6 +55,7 @@ class SeamVerifier {
 
   const TileSource& source_;
   const SharedGeometry& shared_;
+  const ViewChecks& options_;
   ViewReport& report_;
   TerrainProgram program_;
   std::vector<TileSlot> slots_;
@@ -66,6 +67,7 @@ class SeamVerifier {
 SeamVerifier::SeamVerifier(const CheckContext& context)
     : source_(context.source),
       shared_(context.shared),
+      options_(context.options),
       report_(context.report),
       program_("seam", false, flat_fragment_shader(false)) {
   const TileBounds whole = whole_bounds(source_);
@@ -98,12 +100,18 @@ bool SeamVerifier::load(Block& block) {
 void SeamVerifier::verify() {
   const TileGrid& grid = source_.grid();
   std::int64_t number = 0;
-  for (const std::int64_t row : block_firsts(grid.tile_rows())) {
-    for (const std::int64_t column : block_firsts(grid.tile_columns())) {
+  const auto rows = block_firsts(grid.tile_rows());
+  const auto columns = block_firsts(grid.tile_columns());
+  for (const std::int64_t row : rows) {
+    for (const std::int64_t column : columns) {
       Block block;
       block.first = {column, row};
-      if (load(block)) verify_block(block, number);
+      const isohf::TileRange whole{{column, row}, {column + kBlockTiles, row + kBlockTiles}};
+      const auto& wanted = options_.tiles;
+      if ((!wanted || !intersection(*wanted, whole).is_empty()) && load(block)) verify_block(block, number);
       ++number;
+      if (options_.progress)
+        options_.progress("seams", number, static_cast<std::int64_t>(rows.size() * columns.size()));
     }
   }
 }

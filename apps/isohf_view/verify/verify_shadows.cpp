@@ -68,9 +68,11 @@ ShadowVerifier::ShadowVerifier(const CheckContext& context)
 void ShadowVerifier::verify() {
   const TileGrid& grid = source_.grid();
   report_.suns_deg.assign(std::begin(kElevations_deg), std::end(kElevations_deg));
+  const auto& wanted = context_.options.tiles;
   for (std::int64_t row = 0; row < grid.tile_rows(); ++row) {
+    if (wanted && (row < wanted->first.row || row >= wanted->end.row)) continue;
     for (const LightTravel travel : {LightTravel::kEastward, LightTravel::kWestward}) verify_row(row, travel);
-    if (context_.options.progress) context_.options.progress((row + 1) * grid.tile_columns(), grid.tile_count());
+    if (context_.options.progress) context_.options.progress("shadows", row + 1, grid.tile_rows());
   }
 }
 

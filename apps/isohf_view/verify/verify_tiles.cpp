@@ -274,8 +274,10 @@ void verify_tiles(const CheckContext& context) {
   const TileGrid& grid = context.source.grid();
   TileVerifier verifier(context);
   for (std::int64_t flat = 0; flat < grid.tile_count(); ++flat) {
-    verifier.verify(grid.tile_at(flat));
-    if (context.options.progress) context.options.progress(flat + 1, grid.tile_count());
+    const TileIndex tile = grid.tile_at(flat);
+    if (context.options.tiles && !context.options.tiles->contains(tile)) continue;
+    verifier.verify(tile);
+    if (context.options.progress) context.options.progress("tiles", flat + 1, grid.tile_count());
   }
 }
 

@@ -2,11 +2,13 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "isohf/tile_range.h"
 #include "isohf/verify.h"
 #include "verify/tile_probe.h"
 
@@ -26,8 +28,10 @@ struct ViewChecks {
   std::vector<double> fractions{0.25, 0.5, 0.8};  ///< β of the transitions looked at between each two levels
   bool seams = true;
   bool shadows = true;
-  /// Called now and then with tiles done and all tiles.
-  std::function<void(std::int64_t, std::int64_t)> progress;
+  /// Only these tiles, the rows of their shadows, and seams near them.
+  std::optional<isohf::TileRange> tiles;
+  /// Called now and then with what is looked at, how much of it has been, and all of it.
+  std::function<void(const char*, std::int64_t, std::int64_t)> progress;
 };
 
 struct ViewReport {
