@@ -84,15 +84,6 @@ std::optional<bool> first_component_is_signed(const std::vector<unsigned char>& 
   throw Error(ErrorCode::kUnsupported, what + "; store the raster as TIFF or PNG (gdal_translate does)");
 }
 
-/// Whether the file says where it lies in a way that OpenImageIO does not hand on: JPEG 2000 with the box of GeoJP2.
-bool states_a_place(const std::string& format, const std::string& path) {
-  if (format != "jpeg2000") return false;
-  constexpr std::array<unsigned char, 16> kGeoJp2 = {0xB1, 0x4B, 0xF8, 0xBD, 0x08, 0x3D, 0x4B, 0x43,
-                                                     0xA5, 0xAE, 0x8C, 0xD7, 0xD5, 0xA6, 0xCE, 0x03};
-  const std::vector<unsigned char> head = head_of(path);
-  return std::search(head.begin(), head.end(), kGeoJp2.begin(), kGeoJp2.end()) != head.end();
-}
-
 /// OpenImageIO hands out pictures: where it would deliver other numbers than the file holds, the file is refused.
 /// `bits` are those of a sample as delivered, `stored_bits` those in the file.
 void require_stored_numbers(const std::string& format, int bits, int stored_bits, bool is_floating,
@@ -208,13 +199,9 @@ bool open_raster(IsohfOiioRaster& raster, const char* path, const std::string& c
   info.sample_type = static_cast<int32_t>(sample_type_of(raster.type));
   put_text(info.format, raster.input->format_name());
   std::string warning;
-  if (states_a_place(raster.input->format_name(), path)) {
-    warning = "the place that it states itself (GeoJP2) is not read; a world file beside it would be";
-  }
   if (spec.nchannels > 1 && !all) put_text(info.channel, spec.channel_name(raster.channel));
   if (spec.nchannels > 1 && channel.empty()) {
-    warning += (warning.empty() ? "channel " : "; channel ") + std::string(spec.channel_name(0)) + " is read, of " +
-               std::to_string(spec.nchannels);
+    warning = "channel " + std::string(spec.channel_name(0)) + " is read, of " + std::to_string(spec.nchannels);
   }
   put_text(info.warning, warning);
   return true;

@@ -394,6 +394,31 @@ def samples(isohf, folder):
     check(numpy.array_equal(gdal.Open(str(folder / "w.png")).ReadAsArray(), whole), "samples of a PNG differ")
 
 
+def geojp2(isohf, folder):
+    """A JPEG 2000 file that GDAL gives a GeoTIFF's tags in a box, and nothing beside it, lies where GDAL says."""
+    driver = gdal.GetDriverByName("JP2OpenJPEG")
+    if driver is None:
+        return
+    for text, place in (("EPSG:32632", (500000.0, 10.0, 0.0, 5200000.0, 0.0, -10.0)),
+                        ("EPSG:2154", (700000.0, 25.0, 0.0, 6600000.0, 0.0, -25.0)),
+                        ("EPSG:4326", (8.0, 0.001, 0.0, 47.0, 0.0, -0.001))):
+        raster = gdal.GetDriverByName("MEM").Create("", 70, 50, 1, gdal.GDT_UInt16)
+        raster.SetProjection(system(text).ExportToWkt())
+        raster.SetGeoTransform(place)
+        raster.GetRasterBand(1).WriteArray(numpy.arange(3500, dtype=numpy.uint16).reshape(50, 70))
+        driver.CreateCopy(str(folder / "a.jp2"), raster, options=["REVERSIBLE=YES", "QUALITY=100", "GMLJP2=NO"])
+        (folder / "a.jp2.aux.xml").unlink(missing_ok=True)
+        said = isohf.must("convert", folder / "a.jp2", "-o", folder / "a.isohf", "--overwrite", "--projection", "none",
+                          "--lossless").stderr
+        check("place" not in said, f"GeoJP2: {said}")
+        isohf.must("restore", folder / "a.isohf", folder / "a.tif", "--overwrite", "-q")
+        ours = gdal.Open(str(folder / "a.tif"))
+        check(ours.GetGeoTransform() == place, f"GeoJP2 {text}: {ours.GetGeoTransform()}")
+        own = ours.GetSpatialRef()
+        check(own is not None and own.IsSame(system(text), ["IGNORE_DATA_AXIS_TO_SRS_AXIS_MAPPING=YES"]), f"GeoJP2 {text}: another system")
+        check(numpy.array_equal(ours.ReadAsArray(), raster.ReadAsArray()), f"GeoJP2 {text}: samples differ")
+
+
 def ranges_of_voids(isohf, folder):
     """SAGA's NODATA_VALUE may be a range, of which every value is void."""
     grid = numpy.arange(1600, dtype="<f4").reshape(40, 40)
@@ -440,7 +465,7 @@ def main():
         return 2
     bin_dir = pathlib.Path(sys.argv[1]).resolve()
     for part in (projections, globes, planets, heights_of_a_projection, joined, other_parameters, written_elsewhere, loads_no_proj, beside,
-                 samples, ranges_of_voids, large_chunks):
+                 samples, geojp2, ranges_of_voids, large_chunks):
         with tempfile.TemporaryDirectory(prefix="placement") as folder:
             part(Program(pathlib.Path(folder), bin_dir), pathlib.Path(folder))
     print(f"{len(failures)} failures")

@@ -132,12 +132,27 @@ def virtual(path, system, transform):
     dataset.SetGeoTransform(transform)
 
 
+def of_other_bodies(driver):
+    """Labels of planets name a body and its radii, no datum: of the Earth they say less than GDAL is given."""
+    make = create(driver)
+
+    def make_unless_earth(path, system, transform):
+        if abs(system.GetSemiMajor() / 6378137.0 - 1.0) < 0.01:
+            raise RuntimeError("is on the Earth")
+        make(path, system, transform)
+        pathlib.Path(path + ".aux.xml").unlink(missing_ok=True)  # what the label alone says
+    return make_unless_earth
+
+
 READERS = {
     "GeoTIFF 1.0": (".tif", create("GTiff", ["GEOTIFF_VERSION=1.0"])),
     "GeoTIFF 1.1": (".tif", create("GTiff", ["GEOTIFF_VERSION=1.1"])),
     "ESRI .prj": (".asc", create("AAIGrid", ["FORCE_CELLSIZE=YES"])),
     "VRT": (".vrt", virtual),
     "netCDF": (".nc", create("netCDF")),
+    "ERDAS Imagine": (".img", create("HFA")),
+    "PDS4": (".xml", of_other_bodies("PDS4")),
+    "ISIS3": (".cub", of_other_bodies("ISIS3")),
 }
 WRITERS = {"GeoTIFF": ".tif", "ASCII grid": ".asc", "GridFloat": ".flt", "PNG": ".png", "OpenEXR": ".exr"}
 
@@ -262,6 +277,8 @@ def cells_of(isohf, folder, index, system):
         restored = str(folder / f"{index}_{number}_restored.tif")
         try:
             make(source, reference, transform)
+            if gdal.Open(source).GetSpatialRef() is None:
+                raise RuntimeError("has no system")
         except RuntimeError:
             row[reader] = ("-", "")  # GDAL does not write it
             continue
