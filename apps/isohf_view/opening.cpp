@@ -20,9 +20,9 @@ std::unique_ptr<ScratchArchive> convert_for_viewing(const std::string& name, con
   auto scratch = std::make_unique<ScratchArchive>();
   ConvertOptions request;
   request.overwrite = true;
-  request.scratch_folder = std::filesystem::temp_directory_path().string();
   understand_ground(source->info(), request.plan.ground);
   Job job;
+  job.scratch_folder = std::filesystem::temp_directory_path().string();
   job.threads = options.threads;
   job.cancel = &cli::watch_interrupts();
   const ConvertSummary summary = convert(*source, scratch->path(), request, job);

@@ -1,4 +1,4 @@
-#include "isohf/base/spill_buffer.h"
+#include "isohf/base/memory/spill_buffer.h"
 
 #include <gtest/gtest.h>
 

@@ -103,8 +103,8 @@ TEST(MemoryPlan, TheArchiveDoesNotDependOnTheLimit) {
       options.filter = filter_from_string(filter);
       options.lossless = std::string(filter) == "bspline3";
       Job job{.threads = 2};
+      job.scratch_folder = folder.path();
       options.overwrite = true;
-      options.scratch_folder = folder.path();
       options.shadow_seeds.emplace();
       (void)convert(source, folder / "any.isohf", options, job);
       const std::string expected = test::read_file(folder / "any.isohf");
@@ -132,8 +132,8 @@ TEST(MemoryPlan, AScratchFileHoldsAllRowsOfTilesInFlightOfANarrowRaster) {
   options.plan.shape = {68, 75};
   options.plan.levels = 2;
   Job job{.threads = 4};
+  job.scratch_folder = folder.path();
   options.overwrite = true;
-  options.scratch_folder = folder.path();
   const Plan plan = make_plan(source.info(), options.plan);
   ASSERT_EQ(plan.grid.tile_columns(), 1);
   (void)convert(source, folder / "any.isohf", options, job);

@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "isohf/surface/resample/kernels.h"
+#include "support/temporary_folder.h"
 
 namespace isohf {
 namespace {
@@ -51,7 +52,7 @@ TEST(QuinticSpline, ResponseIsTheFilterAndTheSplineInOne) {
 /// Tiles of heights that are a function of the place, sampled at every stored vertex.
 template <typename Height>
 GridSampler surface_of(const TileGrid& grid, const SampleGrid& samples, RestoreMethod method, Height height,
-                       bool wraps_x = false) {
+                       bool wraps_x = false, const ScratchFolder& scratch = {}) {
   const auto read_one = [grid, height](TileIndex tile) {
     TileCodes codes;
     codes.type = CodeType::kF32;
@@ -68,7 +69,7 @@ GridSampler surface_of(const TileGrid& grid, const SampleGrid& samples, RestoreM
     for (const TileIndex tile : tiles) all.push_back(read_one(tile));
     return all;
   };
-  return {grid, wraps_x, {CodeType::kF32, 0.0, 1.0}, read, samples, method};
+  return {grid, wraps_x, {CodeType::kF32, 0.0, 1.0}, read, samples, method, true, std::nullopt, scratch};
 }
 
 TileGrid three_by_two() {
@@ -121,7 +122,8 @@ TEST(GridSampler, GoRoundWhereTheWorldDoes) {
   EXPECT_GT(bent, 1.0) << "mirrored ends are no seam: the test would not see one";
 }
 
-TEST(GridSampler, GivesTheSameBitsHoweverItIsCut) {
+TEST(GridSampler, GivesTheSameBitsHoweverItIsCutAndWhereverItsRowsAre) {
+  const test::TemporaryFolder folder;
   const TileGrid grid = three_by_two();
   const SampleGrid samples{61, 40, 0.3, 0.2, 0.7, 0.6};
   const auto hills = [](double x, double z) {
@@ -130,10 +132,11 @@ TEST(GridSampler, GivesTheSameBitsHoweverItIsCut) {
   for (const RestoreMethod method : {RestoreMethod::kBarycentric, RestoreMethod::kHex}) {
     std::vector<double> whole(61 * 40);
     surface_of(grid, samples, method, hills).read(0, 40, whole);
-    for (const std::int64_t step : {1, 3, 17}) {
-      GridSampler rows = surface_of(grid, samples, method, hills);
-      for (std::int64_t row = 0; row < 40; row += step) {
-        const std::int64_t count = std::min<std::int64_t>(step, 40 - row);
+    for (const std::int64_t step : {1, 3, 17, -1, -4, -40}) {
+      const ScratchFolder scratch = step < 0 ? ScratchFolder(folder.path()) : std::nullopt;
+      GridSampler rows = surface_of(grid, samples, method, hills, false, scratch);
+      for (std::int64_t row = 0; row < 40; row += std::abs(step)) {
+        const std::int64_t count = std::min<std::int64_t>(std::abs(step), 40 - row);
         std::vector<double> part(static_cast<std::size_t>(61 * count));
         rows.read(row, count, part);
         EXPECT_EQ(std::memcmp(part.data(), whole.data() + row * 61, part.size() * sizeof(double)), 0) << row;

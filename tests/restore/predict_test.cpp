@@ -12,7 +12,8 @@
 #include "isohf/restore/position_mesh.h"
 #include "isohf/restore/predict/place_mesh.h"
 #include "isohf/restore/predict/spline_predictor.h"
-#include "isohf/restore/spline_rows.h"
+#include "isohf/restore/rows/spline_rows.h"
+#include "support/temporary_folder.h"
 
 namespace isohf {
 namespace {
@@ -83,8 +84,7 @@ TEST(SplinePredictor, AgreesWithTheSplinesInDoublesAndIsVoidWhereTheTrianglesAre
     Field field;
     field.has_hole = has_hole;
     const SampleGrid samples{61, 57, 0.7, 0.4, 1.95, 2.1};
-    const FixedHeights heights(field.quantisation, 8);
-    SplinePredictor predictor(field.grid, false, heights, field.reader(), samples);
+    SplinePredictor predictor(field.grid, false, field.quantisation, 8, field.reader(), samples);
     GridSampler hex(field.grid, false, field.quantisation, field.reader(), samples, RestoreMethod::kHex);
     GridSampler flat(field.grid, false, field.quantisation, field.reader(), samples, RestoreMethod::kBarycentric);
     std::vector<double> found(static_cast<std::size_t>(samples.width));
@@ -107,16 +107,18 @@ TEST(SplinePredictor, AgreesWithTheSplinesInDoublesAndIsVoidWhereTheTrianglesAre
   }
 }
 
-TEST(SplinePredictor, GivesTheSameHoweverRowsAreCut) {
+TEST(SplinePredictor, GivesTheSameHoweverRowsAreCutAndWhereverTheyAre) {
+  const test::TemporaryFolder folder;
   Field field;
   field.has_hole = true;
   const SampleGrid samples{50, 70, 1.0, -3.0, 2.3, 1.8};
-  const FixedHeights heights(field.quantisation, 8);
   for (const bool wraps : {false, true}) {
     std::vector<double> whole(static_cast<std::size_t>(samples.width * samples.height));
-    SplinePredictor(field.grid, wraps, heights, field.reader(), samples).read(0, samples.height, whole);
-    for (const std::int64_t rows : {1, 7, 35}) {
-      SplinePredictor predictor(field.grid, wraps, heights, field.reader(), samples);
+    SplinePredictor(field.grid, wraps, field.quantisation, 8, field.reader(), samples).read(0, samples.height, whole);
+    for (const std::int64_t step : {1, 7, 35, -1, -8, -70}) {
+      const std::int64_t rows = std::abs(step);
+      const ScratchFolder scratch = step < 0 ? ScratchFolder(folder.path()) : std::nullopt;
+      SplinePredictor predictor(field.grid, wraps, field.quantisation, 8, field.reader(), samples, scratch);
       for (std::int64_t row = 0; row < samples.height; row += rows) {
         std::vector<double> part(static_cast<std::size_t>(samples.width * std::min(rows, samples.height - row)));
         predictor.read(row, std::min(rows, samples.height - row), part);

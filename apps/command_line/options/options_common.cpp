@@ -36,15 +36,19 @@ void add_work_options(CommandLine& line, WorkOptions& options) {
               });
 }
 
-void add_memory_option(CommandLine& line, const std::string& description, std::uint64_t& bytes) {
-  line.option("--memory", "SIZE", description + "; as in 400M or 1.5GiB",
-              [&](const std::string& text) { bytes = parse_bytes(text); });
+void add_memory_options(CommandLine& line, const std::string& usual_folder, WorkOptions& options) {
+  line.option("--memory", "SIZE",
+              "Stay within SIZE of memory, to a tenth (default: as is fastest); as in 400M or 1.5GiB",
+              [&](const std::string& text) { options.memory_bytes = parse_bytes(text); });
+  line.option("--tmpdir", "FOLDER", "Put the scratch file that --memory may need there (default: " + usual_folder + ")",
+              options.scratch_folder);
 }
 
 Job job_from(const WorkOptions& options, ProgressDisplay& display) {
   Job job;
   job.threads = options.threads;
   job.memory_bytes = options.memory_bytes;
+  if (!options.scratch_folder.empty()) job.scratch_folder = options.scratch_folder;
   job.progress = [&display](const Progress& at) { display.update(at.stage, at.unit, at.done, at.total); };
   job.cancel = &watch_interrupts();
   return job;

@@ -23,14 +23,15 @@ void add_common_options(CommandLine& line, CommonOptions& options);
 struct WorkOptions {
   int threads = 0;                 ///< 0: all cores
   std::uint64_t memory_bytes = 0;  ///< 0: no bound
+  std::string scratch_folder;      ///< empty: not said
   ProgressMode progress = ProgressMode::kAuto;
 };
 
 /// -j, --progress.
 void add_work_options(CommandLine& line, WorkOptions& options);
 
-/// --memory SIZE: bytes, 0 where not given.
-void add_memory_option(CommandLine& line, const std::string& description, std::uint64_t& bytes);
+/// --memory SIZE, --tmpdir FOLDER; usual_folder is described.
+void add_memory_options(CommandLine& line, const std::string& usual_folder, WorkOptions& options);
 
 /// A job with these threads and this memory, which `display` shows and an interrupt cancels.
 [[nodiscard]] Job job_from(const WorkOptions& options, ProgressDisplay& display);

@@ -13,7 +13,7 @@
 #include "commands/command.h"
 #include "commands/export_tiles.h"
 #include "formats/decorate/cropped_source.h"
-#include "interrupt.h"
+#include "isohf/base/file.h"
 #include "isohf/error.h"
 #include "isohf/restore/sample_grids.h"
 #include "isohf/surface.h"
@@ -110,12 +110,14 @@ std::optional<ExportOptions> parse(const Arguments& arguments) {
               [&](const std::string& text) { options.z_offset = parse_number(text); });
   add_clamp_option(line, "the type", options.raster);
   add_work_options(line, options.work);
+  add_memory_options(line, "OUTPUT's folder", options.work);
   add_common_options(line, options.common);
   line.footer(kFooter);
   line.exclusive({"--z-range", "--z-scale"});
   line.exclusive({"--z-range", "--z-offset"});
   if (!line.parse(arguments)) return std::nullopt;
   require_raster_arguments(line, "OUTPUT", options.raster);
+  if (options.work.scratch_folder.empty()) options.work.scratch_folder = folder_of(options.raster.output);
   if (options.overlap > 0 && !options.tiles && !options.tile_size) {
     throw Error(ErrorCode::kInvalidArgument, "export: --overlap needs --tiles or --tile-size");
   }
@@ -220,11 +222,9 @@ class Exporter {
 
  private:
   void scan(const char* stage, const RowReader::Take& take) {
-    Job job;
-    job.threads = options_.work.threads;
-    job.cancel = &watch_interrupts();
+    Job job = job_from(options_.work, display_);
     job.progress = [&](const Progress& at) { display_.update(stage, at.unit, at.done, at.total); };
-    RowReader(archive_, grid_.samples, options_.method(archive_.metadata(), grid_.samples)).read_all(take, job);
+    RowReader(archive_, grid_.samples, options_.method(archive_.metadata(), grid_.samples), job).read_all(take, job);
   }
 
   SampleMapping choose_mapping() {

@@ -11,7 +11,7 @@
 #include "commands/command.h"
 #include "formats/georeference/reference_system.h"
 #include "formats/registry.h"
-#include "interrupt.h"
+#include "isohf/base/file.h"
 #include "isohf/base/sample.h"
 #include "isohf/convert/frame/source_frame.h"
 #include "isohf/error.h"
@@ -78,6 +78,7 @@ std::optional<RestoreOptions> parse(const Arguments& arguments) {
   line.flag("--round", "Round the source's samples to the nearest that a floating RASTER holds, instead of refusing",
             options.rounds);
   add_work_options(line, options.work);
+  add_memory_options(line, "RASTER's folder", options.work);
   add_common_options(line, options.common);
   line.footer(kFooter);
   line.exclusive({"--like", "--size"});
@@ -85,6 +86,7 @@ std::optional<RestoreOptions> parse(const Arguments& arguments) {
   line.exclusive({"--like", "--crs"});
   if (!line.parse(arguments)) return std::nullopt;
   require_raster_arguments(line, "RASTER", options.raster);
+  if (options.work.scratch_folder.empty()) options.work.scratch_folder = folder_of(options.raster.output);
   return options;
 }
 
@@ -158,8 +160,7 @@ class Restorer {
         archive_(archive),
         grid_(grid),
         display_(options.work.progress, options.common.quiet, options.common.verbose) {
-    job_.threads = options.work.threads;
-    job_.cancel = &watch_interrupts();
+    job_ = job_from(options.work, display_);
     job_.progress = [this](const Progress& at) { display_.update("restore", at.unit, at.done, at.total); };
   }
 
@@ -229,7 +230,7 @@ class Restorer {
     const SampleStore store(mapping, void_value, options_.raster.clamp_range);
     const auto sink = open(raster_spec(metadata, grid_, mapping, void_value), mapping);
     Restored restored;
-    RowReader(archive_, grid_, options_.raster.method.value_or(usual_method(metadata, grid_)))
+    RowReader(archive_, grid_, options_.raster.method.value_or(usual_method(metadata, grid_)), job_)
         .read_all(
             [&](std::int64_t row, std::span<const double> elevations) {
               sink->write_rows(store_rows(store, mapping.type, options_.raster.output, grid_.width, row, elevations,

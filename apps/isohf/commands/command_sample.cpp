@@ -117,7 +117,8 @@ std::optional<SampleOptions> parse(const Arguments& arguments) {
   line.group("Work");
   line.option("-j,--threads", "N", "Threads, 1 to 1024 (default: all cores); the result does not depend on it",
               [&](const std::string& text) { options.threads = static_cast<int>(parse_whole_number(text, 1, 1024)); });
-  add_memory_option(line, "Decoded tiles to keep (default 256M)", options.memory_bytes);
+  line.option("--memory", "SIZE", "Decoded tiles to keep (default 256M); as in 400M or 1.5GiB",
+              [&](const std::string& text) { options.memory_bytes = parse_bytes(text); });
   add_common_options(line, options.common);
   line.exclusive({"--json", "--binary"});
   line.exclusive({"--with-lonlat", "--binary"});

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -100,9 +101,17 @@ std::optional<VerifyCommandOptions> parse(const Arguments& arguments, const Reco
   line.group("Ground");
   add_geoid_option(line, options.geoid);
   add_work_options(line, options.work);
+  add_memory_options(line, "that of temporary files", options.work);
   add_common_options(line, options.common);
   line.footer(kFooter);
   if (!line.parse(arguments)) return std::nullopt;
+  if (options.work.scratch_folder.empty()) {
+    std::error_code none;
+    options.work.scratch_folder = std::filesystem::temp_directory_path(none).string();
+  }
+  if (options.work.memory_bytes != 0) {
+    options.open.unpacked_bytes = std::min(options.open.unpacked_bytes, options.work.memory_bytes / 3);
+  }
   if (!recorded.empty()) {
     Arguments all = arguments_from(recorded, line);
     all.insert(all.end(), arguments.begin(), arguments.end());

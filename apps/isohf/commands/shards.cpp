@@ -72,7 +72,6 @@ struct ShardCommand {
   int shards = 0;
   std::string output;
   std::vector<std::string> scans;  ///< of isohf scan: they make the plan
-  std::optional<std::string> scratch_folder;
   bool overwrite = false;
 };
 
@@ -96,9 +95,7 @@ std::optional<ShardCommand> parse(const Arguments& arguments, bool scans) {
   line.option("-o,--output", output, scans ? "The scan to write, or the plan" : "The archive to write", options.output);
   line.flag("--overwrite", "Make it anew where it exists", options.overwrite);
   add_work_options(line, options.work);
-  add_memory_option(line, "Stay within SIZE of memory, to a tenth (default: as is fastest)", options.work.memory_bytes);
-  line.option("--tmpdir", "FOLDER", "Put the scratch file that --memory may need there (default: that of -o)",
-              [&](const std::string& text) { options.scratch_folder = text; });
+  add_memory_options(line, "that of -o", options.work);
   add_common_options(line, options.common);
   line.footer(scans ? kScanFooter : kFooter);
   if (!line.parse(arguments)) return std::nullopt;
@@ -129,7 +126,7 @@ ConvertCommandOptions conversion_of(const ShardCommand& command, const ShardPlan
   if (!options) throw Error(ErrorCode::kCorrupt, command.plan + ": its arguments make no conversion");
   options->work = command.work;
   share_memory(*options);
-  options->convert.scratch_folder = command.scratch_folder.value_or(folder_of(command.output));
+  if (options->work.scratch_folder.empty()) options->work.scratch_folder = folder_of(command.output);
   options->convert.strict = command.common.strict;
   options->convert.overwrite = command.overwrite;
   options->convert.resume = !command.overwrite;

@@ -196,9 +196,7 @@ std::optional<ConvertCommandOptions> parse_convert(const Arguments& arguments, C
       "it to FILE.json as well",
       [&](const std::string& text) { options.report = text; });
   add_work_options(line, options.work);
-  add_memory_option(line, "Stay within SIZE of memory, to a tenth (default: as is fastest)", options.work.memory_bytes);
-  line.option("--tmpdir", "FOLDER", "Put the scratch file that --memory may need there (default: OUTPUT's folder)",
-              options.convert.scratch_folder);
+  add_memory_options(line, "OUTPUT's folder", options.work);
   add_common_options(line, options.common);
   line.footer(kFooter);
   if (!line.parse(arguments)) return std::nullopt;
@@ -234,7 +232,7 @@ std::optional<ConvertCommandOptions> parse_convert(const Arguments& arguments, C
   options.inputs.as_given = recorded_options(line);
   check_texture_options(options.texture);
   if (!line.given("--tmpdir")) {
-    options.convert.scratch_folder = options.each.each ? options.each.folder : folder_of(options.output);
+    options.work.scratch_folder = options.each.each ? options.each.folder : folder_of(options.output);
   }
   share_memory(options);
   options.convert.strict = options.common.strict;

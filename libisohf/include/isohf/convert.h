@@ -90,7 +90,6 @@ struct ConvertOptions {
   Acquisition acquisition;
   std::optional<ShadowSeedRequest> shadow_seeds;  ///< nullopt: none
   std::optional<TextureRequest> texture;          ///< nullopt: none
-  std::string scratch_folder = ".";  ///< where rows go that memory has no room for, in a file without a name
   bool overwrite = false;
   bool resume = false;        ///< go on with what an interrupted run left in NAME.part
   bool strict = false;        ///< a warning is an Error{kWarning}, and nothing is written

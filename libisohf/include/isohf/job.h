@@ -20,8 +20,9 @@ struct Progress {
 /// How everything that takes long is run: on how many threads, within how much memory, who hears of it, and who may
 /// stop it. No result depends on it.
 struct Job {
-  int threads = 0;                 ///< 0: one a core
-  std::uint64_t memory_bytes = 0;  ///< peak of the resident set, held to within a tenth; 0: no bound
+  int threads = 0;                   ///< 0: one a core
+  std::uint64_t memory_bytes = 0;    ///< peak of the resident set, held to within a tenth; 0: no bound
+  std::string scratch_folder = ".";  ///< where rows go that memory has no room for, in a file without a name
   /// Called by one thread at a time, after every tile or band of rows; not to be waited in.
   std::function<void(const Progress&)> progress = {};
   const std::atomic<bool>* cancel = nullptr;  ///< once true, Error{kCancelled} within a fraction of a second

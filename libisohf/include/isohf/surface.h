@@ -207,14 +207,16 @@ using GridSize = std::pair<std::int64_t, std::int64_t>;
 
 /// The surface of an archive at the samples of a grid, from the first row to the last.
 ///
-/// Memory grows with the width, not with the height. The bits depend on archive and grid alone.
+/// Memory grows with the width, not with the height, as far as the job lets it: what it has no room for is in a scratch
+/// file. The bits depend on archive and grid alone.
 class RowReader {
  public:
   /// A grid in degrees is read on the triangles, each sample at its own longitude and latitude. kPlane reads the tiles of
   /// the coarsest plane that suffices, and no other; it is for grids of which usual_method() says so. The archive must
   /// outlive the reader. Throws Error{kInvalidArgument} for a grid without samples or far beyond the surface, and for one in
-  /// degrees where the archive's are not known.
-  RowReader(const ArchiveReader& archive, const SampleGrid& grid, RestoreMethod method = RestoreMethod::kHex);
+  /// degrees where the archive's are not known; kOutOfMemory where job.memory_bytes are too few for read_all().
+  RowReader(const ArchiveReader& archive, const SampleGrid& grid, RestoreMethod method = RestoreMethod::kHex,
+            const Job& job = {});
   ~RowReader();
   RowReader(const RowReader&) = delete;
   RowReader& operator=(const RowReader&) = delete;

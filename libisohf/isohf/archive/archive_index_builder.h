@@ -11,8 +11,8 @@
 #include "isohf/archive/container/content_hash.h"
 #include "isohf/archive/container/table_writer.h"
 #include "isohf/archive/journal.h"
+#include "isohf/base/memory/spill_buffer.h"
 #include "isohf/base/output_file.h"
-#include "isohf/base/spill_buffer.h"
 
 namespace isohf {
 

@@ -1,7 +1,5 @@
 #include "isohf/convert/memory_plan.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -9,6 +7,7 @@
 #include "isohf/archive/planes/archive_planes.h"
 #include "isohf/archive/planes/plane_builder.h"
 #include "isohf/base/arena.h"
+#include "isohf/base/memory/memory_budget.h"
 #include "isohf/convert/stages/residual_stage.h"
 #include "isohf/convert/stages/seed_stage.h"
 #include "isohf/convert/stages/texture_stage.h"
@@ -22,9 +21,6 @@ namespace {
 
 constexpr std::uint64_t kMiB = std::uint64_t{1} << 20U;
 
-// Measured (docs/performance.md, decision 23): the program with its libraries and its pools of memory that was freed.
-constexpr double kProgramBytes = 12.8e6;
-constexpr double kThreadBytes = 0.7e6;
 /// In each thread, of one tile: heights, codes, and what the encoder works with.
 constexpr double kBytesPerVertex = 24.0;
 /// Of a tile that waits to be written.
@@ -93,6 +89,15 @@ class Estimate {
       if (has_bands_ && !reads_whole_rows_) choose_columns(memory);
     }
     memory.bytes = total(memory);
+    // Where it helps: buffers for a file take as much as a few tiles.
+    const auto try_scratch = [&](bool MemoryPlan::*in_scratch_too) {
+      MemoryPlan other = memory;
+      other.*in_scratch_too = true;
+      other.bytes = total(other);
+      if (limit_ != 0 && memory.bytes > limit_ && other.bytes < memory.bytes) memory = other;
+    };
+    if (options_.shadow_seeds) try_scratch(&MemoryPlan::seeds_in_scratch);
+    if (options_.lossless) try_scratch(&MemoryPlan::residuals_in_scratch);
     return memory;
   }
 
@@ -131,13 +136,15 @@ class Estimate {
                            kBytesPerTile * static_cast<double>(plan_.grid.tile_count()) +
                            static_cast<double>(source_.buffer_bytes(memory.source_buffer_bytes)) +
                            static_cast<double>(map_bytes());
-    const double seeds = options_.shadow_seeds ? static_cast<double>(seed_stage_memory_bytes(plan_.grid)) : 0.0;
+    const double seeds =
+        options_.shadow_seeds ? static_cast<double>(SeedRow::memory_bytes(plan_.grid, memory.seeds_in_scratch)) : 0.0;
     const double tiles =
         tiles_pass(memory) + seeds + static_cast<double>(plane_bytes()) + static_cast<double>(texture_bytes_);
     double peak = std::max(scan_pass(memory), tiles);
     if (options_.lossless) {
-      peak = std::max(peak,
-                      static_cast<double>(residual_stage_memory_bytes(info_, plan_, threads_, memory.members_at_once)));
+      peak += static_cast<double>(residual_stage_kept_bytes(info_, plan_, memory.residuals_in_scratch));
+      peak = std::max(peak, static_cast<double>(residual_stage_memory_bytes(
+                                info_, plan_, threads_, memory.members_at_once, memory.residuals_in_scratch)));
     }
     return static_cast<std::uint64_t>(program + peak);
   }
@@ -240,16 +247,8 @@ MemoryPlan plan_memory(const HeightSource& source, const Plan& plan, const Conve
 }
 
 void check_memory(const MemoryPlan& memory, const Job& job) {
-  if (job.memory_bytes == 0 || memory.bytes <= job.memory_bytes) return;
-  constexpr std::uint64_t kMega = 1000000;
-  const std::uint64_t least = (memory.least_bytes + kMega - 1) / kMega;
-  throw Error(
-      ErrorCode::kOutOfMemory,
-      fmt::format("`memory_bytes` allows {} MB, this conversion needs at least {} MB; allow that much, or use smaller "
-                  "tiles (`shape`, `budget`) or fewer `threads` than {}",
-                  job.memory_bytes / kMega, least, threads_of(job)),
-      {"memory", fmt::format("{} MB", job.memory_bytes / kMega), fmt::format("at least {} MB", least),
-       "allow that much, or use smaller tiles or fewer threads"});
+  require_memory(job, static_cast<double>(memory.bytes), static_cast<double>(memory.least_bytes), "this conversion",
+                 "smaller tiles (`shape`, `budget`) or ");
 }
 
 }  // namespace isohf

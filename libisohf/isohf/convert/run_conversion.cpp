@@ -19,6 +19,7 @@
 #include "isohf/archive/writer.h"
 #include "isohf/base/arena.h"
 #include "isohf/base/assert.h"
+#include "isohf/base/memory/memory_budget.h"
 #include "isohf/convert/conversion.h"
 #include "isohf/convert/frame/plan.h"
 #include "isohf/convert/job_description.h"
@@ -184,7 +185,7 @@ void write_tiles(const Conversion& conversion, ArchiveWriter& writer, const Stag
       writer.add_tile(tile->encoded);
       if (stages.planes != nullptr) stages.planes->add(tile->planes);
     }
-    if (stages.seeds != nullptr) stages.seeds->add(tile->index, std::move(tile->seeds), writer);
+    if (stages.seeds != nullptr) stages.seeds->add(tile->index, tile->seeds, writer);
     ++written;
     conversion.job.report({"tiles", "tiles", written - conversion.first_tile,
                            conversion.end_tile - conversion.first_tile, writer.bytes_written()});
@@ -404,12 +405,14 @@ ConversionResult run_conversion(HeightSource& source, const Plan& plan, const st
         // Lengths of both kinds are compared as metres where both are known to be.
         const bool known = plan.frame.in_metres && !info.vertical_unit.empty();
         seeds.emplace(plan.grid, conversion.quantisation, *options.shadow_seeds,
-                      known ? 1.0 / info.metres_per_vertical_unit : 1.0);
+                      known ? 1.0 / info.metres_per_vertical_unit : 1.0,
+                      memory.seeds_in_scratch ? ScratchFolder(job.scratch_folder) : std::nullopt);
       }
       const RowRange rows =
           shard != nullptr ? RowRange{shard->first_row, shard->end_row - 1} : RowRange{0, plan.grid.tile_rows() - 1};
       if (options.lossless) {
-        residuals.emplace(source.as_stored(), plan.frame, plan.grid, conversion.quantisation, conversion.largest, rows);
+        residuals.emplace(source.as_stored(), plan.frame, plan.grid, conversion.quantisation, conversion.largest, rows,
+                          memory.residuals_in_scratch ? ScratchFolder(job.scratch_folder) : std::nullopt);
       }
       if (shard != nullptr) {
         around.emplace(make_around(conversion, *shard, residuals ? &*residuals : nullptr));
@@ -422,6 +425,7 @@ ConversionResult run_conversion(HeightSource& source, const Plan& plan, const st
                   {planes ? &*planes : nullptr, seeds ? &*seeds : nullptr, textures ? &*textures : nullptr});
       if (residuals) {
         writer.flush_tiles();
+        if (memory.residuals_in_scratch) give_back_freed_memory();
         const auto read_tiles = [&](std::span<const TileIndex> tiles) {
           std::vector<TileCodes> codes;
           for (const TileIndex tile : tiles) {

@@ -4,7 +4,6 @@
 #include <oneapi/tbb/parallel_for.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -30,6 +29,11 @@ std::vector<double> columns_of(const SampleGrid& samples) {
   }
   return columns;
 }
+
+/// Columns that are blended at once, of several rows where each must be read from a file.
+constexpr std::int64_t kBlock = 2048;
+/// Lattice rows that are straightened at once where memory is short: each takes a few copies of itself.
+constexpr std::int64_t kLinesInScratch = 2;
 
 bool is_inside(double place, double spacing, double end) {
   return place >= -kEndTolerance * spacing && place <= end + kEndTolerance * spacing;
@@ -59,144 +63,180 @@ void require_samples(const SampleGrid& grid) {
   }
 }
 
+/// Some columns of the samples, and of the lattice rows that they are made of.
+struct GridSampler::Block {
+  std::int64_t first;  ///< column
+  std::int64_t columns;
+  RowParts<double> heights;
+  RowParts<char> near_void;
+};
+
 GridSampler::GridSampler(const TileGrid& grid, bool wraps_x, const Quantisation& quantisation, ReadTiles read_tiles,
                          const SampleGrid& samples, RestoreMethod method, bool snaps,
-                         const std::optional<TileGrid>& world)
+                         const std::optional<TileGrid>& world, const ScratchFolder& scratch)
     : grid_(grid),
       quantisation_(quantisation),
-      read_tiles_(std::move(read_tiles)),
       samples_(require_samples_near(samples, world.value_or(grid))),
       method_(method),
       end_z_(world.value_or(grid).world_height()),
       snaps_(snaps),
-      spline_(grid, method == RestoreMethod::kHex ? columns_of(samples) : std::vector<double>{}, wraps_x) {
+      spline_(grid, method == RestoreMethod::kHex ? columns_of(samples) : std::vector<double>{}, wraps_x, scratch),
+      in_scratch_(scratch.has_value()),
+      heights_(static_cast<std::size_t>(samples.width), scratch),
+      near_void_(static_cast<std::size_t>(samples.width), scratch) {
   for (const double x : columns_of(samples)) {
     const TilePoint at = grid_.locate({x, 0.0});
     columns_.push_back(
         {is_inside(x, samples.spacing_x, world.value_or(grid).world_width()), at.tile.column, at.point.x});
   }
-}
-
-const GridSampler::TileRow& GridSampler::tile_row(std::int64_t row) {
-  for (const TileRow& kept : tile_rows_) {
-    if (kept.row == row) return kept;
-  }
-  TileRow made{row, false, {}};
-  made.elevations.resize(static_cast<std::size_t>(grid_.tile_columns()));
-  std::atomic<bool> any = false;
   // Splines run along whole rows, triangles need what is under them.
   const bool needs_all = method_ == RestoreMethod::kHex;
-  const std::int64_t first = needs_all ? 0 : columns_.front().tile;
-  const std::int64_t last = needs_all ? grid_.tile_columns() - 1 : columns_.back().tile;
-  std::vector<TileIndex> tiles;
-  for (std::int64_t column = first; column <= last; ++column) tiles.push_back({column, row});
-  for_each_tile(read_tiles_, tiles, [&](std::size_t i, const TileCodes& codes) {
-    std::vector<double>& elevations = made.elevations[static_cast<std::size_t>(first) + i];
-    elevations = elevations_of(codes, quantisation_);
-    if (std::any_of(elevations.begin(), elevations.end(), [](double h) { return std::isnan(h); })) any = true;
-  });
-  made.has_voids = any;
-  tile_rows_.push_back(std::move(made));
-  return tile_rows_.back();
+  tiles_.emplace(grid, quantisation, std::move(read_tiles), needs_all ? 0 : columns_.front().tile,
+                 needs_all ? grid.tile_columns() - 1 : columns_.back().tile, scratch);
 }
 
-const GridSampler::TileRow& GridSampler::kept_tile_row(std::int64_t row) const {
-  const auto found =
-      std::find_if(tile_rows_.begin(), tile_rows_.end(), [&](const TileRow& kept) { return kept.row == row; });
-  ISOHF_ASSERT(found != tile_rows_.end());
-  return *found;
+double GridSampler::memory_bytes(const TileGrid& grid, const SampleGrid& samples, RestoreMethod method,
+                                 std::int64_t rows, int threads, bool in_scratch) {
+  const auto width = static_cast<double>(samples.width);
+  const auto vertices = static_cast<double>(grid.tile_columns() * grid.shape().columns());
+  const bool by_splines = method == RestoreMethod::kHex;
+  const double lattice_rows = static_cast<double>(rows) * samples.spacing_z / grid.sigma_z() +
+                              (by_splines ? QuinticResponse::kTaps + 2.0 : 2.0);
+  double bytes =
+      width * (sizeof(Column) + sizeof(double)) + (in_scratch ? 0.0 : VertexRows::memory_bytes(grid, lattice_rows));
+  if (!by_splines) return bytes;
+  const auto lines = static_cast<double>(in_scratch ? std::min<std::int64_t>(threads, kLinesInScratch) : threads);
+  bytes += lines * (28.0 * vertices + 9.0 * width);
+  return bytes + (in_scratch ? threads * static_cast<double>(kBlock) * 9.0 * lattice_rows
+                             : width * (9.0 * lattice_rows + 2.0 * sizeof(QuinticWeights)));
 }
 
 /// Drops the lattice rows before `first` and makes those up to `last`.
 void GridSampler::keep_lattice_rows(std::int64_t first, std::int64_t last) {
-  while (!lattice_rows_.empty() && first_lattice_row_ < first) {
-    lattice_rows_.pop_front();
+  while (!is_any_near_void_.empty() && first_lattice_row_ < first) {
+    heights_.drop(first_lattice_row_);
+    near_void_.drop(first_lattice_row_);
+    is_any_near_void_.pop_front();
     ++first_lattice_row_;
   }
-  if (lattice_rows_.empty()) first_lattice_row_ = first;
+  if (is_any_near_void_.empty()) first_lattice_row_ = first;
   for (;;) {
-    const std::int64_t next = first_lattice_row_ + static_cast<std::int64_t>(lattice_rows_.size());
+    const std::int64_t next = first_lattice_row_ + static_cast<std::int64_t>(is_any_near_void_.size());
     if (next > last) return;
-    const TileRow& tiles = tile_row(spline_.tile_row_of(next));
+    const std::int64_t tile_row = spline_.tile_row_of(next);
+    tiles_->have(tile_row);
     std::int64_t end = next;
-    while (end <= last && spline_.tile_row_of(end) == tiles.row) ++end;
-    const std::size_t have = lattice_rows_.size();
-    lattice_rows_.resize(have + static_cast<std::size_t>(end - next));
-    oneapi::tbb::parallel_for(next, end, [&](std::int64_t row) {
-      LatticeRow& made = lattice_rows_[have + static_cast<std::size_t>(row - next)];
-      made.heights.resize(columns_.size());
-      made.near_void.resize(columns_.size());
-      made.any_near_void = spline_.straighten(row, tiles.elevations, made.heights, made.near_void);
+    for (; end <= last && spline_.tile_row_of(end) == tile_row; ++end) {
+      heights_.add(end);
+      near_void_.add(end);
+      is_any_near_void_.push_back(0);
+    }
+    const std::int64_t strands = in_scratch_ ? std::min(kLinesInScratch, end - next) : end - next;
+    oneapi::tbb::parallel_for(std::int64_t{0}, strands, [&](std::int64_t strand) {
+      std::vector<double> heights(columns_.size());
+      std::vector<char> near(columns_.size());
+      for (std::int64_t row = next + strand; row < end; row += strands) {
+        const std::vector<double> vertices =
+            elevations_of(tiles_->read(tile_row, spline_.vertex_row_of(row)), quantisation_);
+        const bool any = spline_.straighten(row, vertices, heights, near);
+        heights_.write(row, 0, heights);
+        if (any) near_void_.write(row, 0, near);
+        is_any_near_void_[static_cast<std::size_t>(row - first_lattice_row_)] = any ? 1 : 0;
+      }
     });
   }
+}
+
+/// The lattice rows that a row of samples is made of, mirrored at the ends.
+RowRange GridSampler::lattice_rows_of(std::int64_t row) const {
+  const double z = std::clamp(world_z(row), 0.0, grid_.world_height());
+  const std::int64_t start = quintic_weights(spline_.row_at(z)).first - QuinticResponse::kHalo;
+  RowRange rows{spline_.rows() - 1, 0};
+  for (std::int64_t k = start; k < start + QuinticResponse::kTaps; ++k) {
+    rows.first = std::min(rows.first, mirror_index(k, spline_.rows()));
+    rows.last = std::max(rows.last, mirror_index(k, spline_.rows()));
+  }
+  return rows;
 }
 
 void GridSampler::read(std::int64_t first, std::int64_t rows, std::span<double> elevations) {
   ISOHF_ASSERT(elevations.size() == static_cast<std::size_t>(rows * samples_.width));
   const auto tile_row_at = [&](std::int64_t row) { return grid_.locate({0.0, world_z(row)}).tile.row; };
-  for (std::int64_t row = first; row < first + rows; ++row) (void)tile_row(tile_row_at(row));
+  for (std::int64_t row = first; row < first + rows; ++row) tiles_->have(tile_row_at(row));
   if (method_ == RestoreMethod::kHex) {
-    std::int64_t low = spline_.rows() - 1;
-    std::int64_t high = 0;
-    for (const std::int64_t row : {first, first + rows - 1}) {
-      const double z = std::clamp(world_z(row), 0.0, grid_.world_height());
-      const std::int64_t start = quintic_weights(spline_.row_at(z)).first - QuinticResponse::kHalo;
-      for (std::int64_t k = start; k < start + QuinticResponse::kTaps; ++k) {
-        low = std::min(low, mirror_index(k, spline_.rows()));
-        high = std::max(high, mirror_index(k, spline_.rows()));
-      }
-    }
-    keep_lattice_rows(low, high);
+    const RowRange north = lattice_rows_of(first);
+    const RowRange south = lattice_rows_of(first + rows - 1);
+    keep_lattice_rows(std::min(north.first, south.first), std::max(north.last, south.last));
   }
-  oneapi::tbb::parallel_for(std::int64_t{0}, rows, [&](std::int64_t i) {
-    read_row(first + i, elevations.subspan(static_cast<std::size_t>(i * samples_.width), columns_.size()));
+  const std::int64_t blocks = (samples_.width + kBlock - 1) / kBlock;
+  const std::int64_t together = in_scratch_ ? rows : 1;
+  oneapi::tbb::parallel_for(std::int64_t{0}, blocks * (rows / together), [&](std::int64_t part) {
+    const std::int64_t column = part % blocks * kBlock;
+    const std::int64_t columns = std::min(kBlock, samples_.width - column);
+    const auto from = static_cast<std::size_t>(column);
+    const auto count = static_cast<std::size_t>(columns);
+    Block block{
+        column, columns, {heights_, first_lattice_row_, from, count}, {near_void_, first_lattice_row_, from, count}};
+    const std::int64_t start = part / blocks * together;
+    for (std::int64_t i = start; i < start + together; ++i) {
+      read_row(first + i, block, elevations.subspan(static_cast<std::size_t>(i * samples_.width) + from, count));
+    }
   });
   // What lies North of the next row's tiles is done with.
-  const std::int64_t next = tile_row_at(first + rows);
-  std::erase_if(tile_rows_, [next](const TileRow& kept) { return kept.row < next; });
+  tiles_->drop_before(tile_row_at(first + rows));
 }
 
-void GridSampler::read_on_triangles(const TilePoint& at, std::span<double> out) const {
-  const TileRow& tiles = kept_tile_row(at.tile.row);
-  const TileShape& shape = grid_.shape();
-  for (std::size_t c = 0; c < columns_.size(); ++c) {
-    const Column& column = columns_[c];
-    const View2D<const double> heights(tiles.elevations[static_cast<std::size_t>(column.tile)].data(), shape.columns(),
-                                       shape.rows());
-    const Barycentric where = barycentric(shape, {column.x, at.point.z});
-    out[c] = column.inside ? interpolate(snaps_ ? snapped(where) : where, heights) : kVoid;
+void GridSampler::read_on_triangles(const TilePoint& at, const Block& block, std::span<double> out) const {
+  const Column* const columns = columns_.data() + block.first;
+  const std::int64_t first = columns[0].tile;
+  const TriangleRows vertices(*tiles_, grid_.shape(), at.tile.row, at.point.z, first,
+                              columns[block.columns - 1].tile - first + 1);
+  for (std::size_t c = 0; c < out.size(); ++c) {
+    const Column& column = columns[c];
+    const Barycentric where = barycentric(grid_.shape(), {column.x, at.point.z});
+    out[c] = column.inside ? vertices.elevation(quantisation_, column.tile, snaps_ ? snapped(where) : where) : kVoid;
   }
 }
 
-void GridSampler::read_row(std::int64_t row, std::span<double> out) const {
+void GridSampler::read_row(std::int64_t row, Block& block, std::span<double> out) const {
   const double z = world_z(row);
   if (!is_inside(z, samples_.spacing_z, end_z_)) {
     std::fill(out.begin(), out.end(), kVoid);
     return;
   }
   const TilePoint at = grid_.locate({0.0, z});
-  if (method_ != RestoreMethod::kHex) return read_on_triangles(at, out);
+  if (method_ != RestoreMethod::kHex) return read_on_triangles(at, block, out);
   const QuinticResponse response = quintic_response(spline_.row_at(std::clamp(z, 0.0, grid_.world_height())));
-  bool beside_voids = kept_tile_row(at.tile.row).has_voids;
+  bool beside_voids = tiles_->has_voids(at.tile.row);
   for (std::int64_t t = 0; t < QuinticResponse::kTaps; ++t) {
     const std::int64_t k = mirror_index(response.first + t, spline_.rows());
-    beside_voids = beside_voids || lattice_rows_[static_cast<std::size_t>(k - first_lattice_row_)].any_near_void;
+    beside_voids = beside_voids || is_any_near_void_[static_cast<std::size_t>(k - first_lattice_row_)] != 0;
   }
-  if (beside_voids) read_on_triangles(at, out);
-  blend_lattice_rows(response, beside_voids, out);
+  if (beside_voids) read_on_triangles(at, block, out);
+  blend_lattice_rows(response, beside_voids, block, out);
 }
 
 /// Replaces the elevations of a row by the spline's; those that are void, or have voids around, stay.
-void GridSampler::blend_lattice_rows(const QuinticResponse& response, bool beside_voids, std::span<double> out) const {
-  std::array<const LatticeRow*, QuinticResponse::kTaps> rows{};
+void GridSampler::blend_lattice_rows(const QuinticResponse& response, bool beside_voids, Block& block,
+                                     std::span<double> out) const {
+  struct LatticeRow {
+    std::span<const double> heights;
+    std::span<const char> near_void;  ///< empty: nowhere
+  };
+  std::array<LatticeRow, QuinticResponse::kTaps> rows{};
   for (std::size_t t = 0; t < rows.size(); ++t) {
     const std::int64_t k = mirror_index(response.first + static_cast<std::int64_t>(t), spline_.rows());
-    rows[t] = &lattice_rows_[static_cast<std::size_t>(k - first_lattice_row_)];
+    rows[t].heights = block.heights.row(k);
+    if (is_any_near_void_[static_cast<std::size_t>(k - first_lattice_row_)] != 0)
+      rows[t].near_void = block.near_void.row(k);
   }
+  const auto is_near_void = [&](std::size_t t, std::size_t c) {
+    return !rows[t].near_void.empty() && rows[t].near_void[c] != 0;
+  };
   std::vector<double> sums(out.size(), 0.0);
   for (std::size_t t = 0; t < rows.size(); ++t) {
     const double weight = response.weights[t];
-    const double* heights = rows[t]->heights.data();
+    const double* heights = rows[t].heights.data();
     for (std::size_t c = 0; c < sums.size(); ++c) sums[c] += weight * heights[c];
   }
   if (!beside_voids) {
@@ -204,8 +244,8 @@ void GridSampler::blend_lattice_rows(const QuinticResponse& response, bool besid
     return;
   }
   std::vector<char> near(out.size(), 0);
-  for (const LatticeRow* row : rows) {
-    for (std::size_t c = 0; c < near.size(); ++c) near[c] = static_cast<char>(near[c] | row->near_void[c]);
+  for (const LatticeRow& row : rows) {
+    for (std::size_t c = 0; c < row.near_void.size(); ++c) near[c] = static_cast<char>(near[c] | row.near_void[c]);
   }
   const auto is_core = [](std::size_t t) {
     return t >= QuinticResponse::kHalo && t < QuinticResponse::kTaps - QuinticResponse::kHalo;
@@ -218,19 +258,19 @@ void GridSampler::blend_lattice_rows(const QuinticResponse& response, bool besid
     }
     // Beside voids the column goes on, level, from the last row that has a height.
     bool whole = true;
-    for (std::size_t t = 0; t < rows.size(); ++t) whole = whole && !(is_core(t) && rows[t]->near_void[c] != 0);
+    for (std::size_t t = 0; t < rows.size(); ++t) whole = whole && !(is_core(t) && is_near_void(t, c));
     if (!whole) continue;
     double sum = 0.0;
     const auto go = [&](std::size_t t, double& last, bool& ended) {
-      ended = ended || rows[t]->near_void[c] != 0;
-      if (!ended) last = rows[t]->heights[c];
+      ended = ended || is_near_void(t, c);
+      if (!ended) last = rows[t].heights[c];
       sum += response.weights[t] * last;
     };
     const std::size_t middle = rows.size() / 2;
-    double last = rows[middle]->heights[c];
+    double last = rows[middle].heights[c];
     bool ended = false;
     for (std::size_t t = middle; t < rows.size(); ++t) go(t, last, ended);
-    last = rows[middle]->heights[c];
+    last = rows[middle].heights[c];
     ended = false;
     for (std::size_t t = middle; t-- > 0;) go(t, last, ended);
     out[c] = sum;

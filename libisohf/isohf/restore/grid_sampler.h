@@ -6,8 +6,9 @@
 #include <span>
 #include <vector>
 
-#include "isohf/restore/point_sampler.h"
-#include "isohf/restore/spline_rows.h"
+#include "isohf/restore/rows/spline_rows.h"
+#include "isohf/restore/rows/vertex_rows.h"
+#include "isohf/surface/source/source_band.h"
 
 namespace isohf {
 
@@ -26,52 +27,51 @@ class GridSampler {
   /// wraps_x  the grid's East edge is its West edge
   /// snaps    as in PointSampler
   /// world    where the surface ends; nullopt: with the grid, beyond which a coarse plane's may reach
+  /// scratch  keeps tile rows and lattice rows where memory has no room for them
   GridSampler(const TileGrid& grid, bool wraps_x, const Quantisation& quantisation, ReadTiles read_tiles,
               const SampleGrid& samples, RestoreMethod method, bool snaps = true,
-              const std::optional<TileGrid>& world = {});
+              const std::optional<TileGrid>& world = {}, const ScratchFolder& scratch = {});
+
+  /// What a sampler holds that reads so many rows at once, beside the elevations; an estimate.
+  [[nodiscard]] static double memory_bytes(const TileGrid& grid, const SampleGrid& samples, RestoreMethod method,
+                                           std::int64_t rows, int threads, bool in_scratch);
 
   /// Rows `first` to `first + rows - 1`; calls come in increasing order.
   /// elevations [rows * width] out, vertical units; NaN where the surface has a void or ends.
   void read(std::int64_t first, std::int64_t rows, std::span<double> elevations);
 
  private:
-  struct TileRow {
-    std::int64_t row;
-    bool has_voids;
-    std::vector<std::vector<double>> elevations;  ///< [tile columns][C*R]; kHex: all, else those under samples
-  };
-  struct LatticeRow {
-    std::vector<double> heights;
-    std::vector<char> near_void;
-    bool any_near_void = false;
-  };
   struct Column {
     bool inside;
     std::int64_t tile;
     double x;  ///< object space
   };
 
-  const TileRow& tile_row(std::int64_t row);
-  [[nodiscard]] const TileRow& kept_tile_row(std::int64_t row) const;
+  struct Block;
+
   void keep_lattice_rows(std::int64_t first, std::int64_t last);
-  void read_on_triangles(const TilePoint& at, std::span<double> out) const;
-  void read_row(std::int64_t row, std::span<double> out) const;
-  void blend_lattice_rows(const QuinticResponse& response, bool beside_voids, std::span<double> out) const;
+  [[nodiscard]] RowRange lattice_rows_of(std::int64_t row) const;
+  void read_on_triangles(const TilePoint& at, const Block& block, std::span<double> out) const;
+  void read_row(std::int64_t row, Block& block, std::span<double> out) const;
+  void blend_lattice_rows(const QuinticResponse& response, bool beside_voids, Block& block,
+                          std::span<double> out) const;
   [[nodiscard]] double world_z(std::int64_t row) const {
     return samples_.first_z + static_cast<double>(row) * samples_.spacing_z;
   }
 
   TileGrid grid_;
   Quantisation quantisation_;
-  ReadTiles read_tiles_;
   SampleGrid samples_;
   RestoreMethod method_;
   double end_z_;  ///< of the surface, world units
   bool snaps_;
   SplineRows spline_;
   std::vector<Column> columns_;
-  std::deque<TileRow> tile_rows_;
-  std::deque<LatticeRow> lattice_rows_;
+  std::optional<VertexRows> tiles_;  ///< kHex: all of a row, else those under samples
+  bool in_scratch_;
+  KeptRows<double> heights_;           ///< of lattice rows
+  KeptRows<char> near_void_;           ///< written where any is
+  std::deque<char> is_any_near_void_;  ///< of the lattice rows that are kept
   std::int64_t first_lattice_row_ = 0;
 };
 

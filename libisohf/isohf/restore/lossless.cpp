@@ -14,6 +14,7 @@
 #include "isohf/base/arena.h"
 #include "isohf/base/assert.h"
 #include "isohf/base/bytes.h"
+#include "isohf/base/memory/memory_budget.h"
 #include "isohf/error.h"
 
 namespace isohf {
@@ -82,6 +83,24 @@ void check_members(const ArchiveReader& archive, const LosslessRecord& record) {
     throw Error(ErrorCode::kCorrupt, fmt::format("{}: member \"{}\" has {} bytes, too few for {} samples",
                                                  archive.path(), name, first->bytes, samples));
   }
+}
+
+/// Where the reader's rows are: a member's samples, predictions, payload and packed bytes, and what its caller makes of
+/// the samples, beside what predicts them.
+ScratchFolder scratch_of(const ArchiveReader& archive, const LosslessRecord& record, const Job& job) {
+  const Metadata& metadata = archive.metadata();
+  const int threads = threads_of(job);
+  const auto rows = static_cast<double>(std::min(record.rows_per_member, record.height));
+  const auto sample = static_cast<double>(size_bytes(record.mapping.type));
+  const auto bytes = [&](bool in_scratch) {
+    const double lattice_rows = rows * metadata.source.spacing_z / archive.grid().sigma_z();
+    return reading_bytes(job, static_cast<double>(archive.grid().shape().stored_vertex_count())) +
+           rows * static_cast<double>(record.width) * (8.0 + 4.0 * sample) +
+           static_cast<double>(SplinePredictor::kept_bytes(record.width, in_scratch)) +
+           SplinePredictor::lines_bytes(archive.grid(), threads, in_scratch) +
+           SplinePredictor::rows_bytes(archive.grid(), record.width, lattice_rows, threads, in_scratch);
+  };
+  return scratch_for(job, bytes(false), bytes(true), "restoring the source");
 }
 
 template <typename Mesh>
@@ -186,17 +205,17 @@ PositionMesh positions_from_bytes(std::int64_t width, std::int64_t height, std::
 
 SamplePredictor::SamplePredictor(const TileGrid& grid, bool wraps_x, const Quantisation& quantisation,
                                  ReadTiles read_tiles, const SampleGrid& samples, const LosslessRecord& record,
-                                 const ReadMember& read_member)
+                                 const ReadMember& read_member, const ScratchFolder& scratch)
     : width_(record.width), grid_(grid), heights_(quantisation, record.fraction_bits) {
   switch (record.prediction) {
     case SamplePrediction::kSpline:
-      spline_.emplace(grid, wraps_x, heights_, std::move(read_tiles), samples);
+      spline_.emplace(grid, wraps_x, quantisation, record.fraction_bits, std::move(read_tiles), samples, scratch);
       return;
     case SamplePrediction::kHex:
     case SamplePrediction::kBarycentric:
       rows_.emplace(grid, wraps_x, quantisation, std::move(read_tiles), samples,
                     record.prediction == SamplePrediction::kHex ? RestoreMethod::kHex : RestoreMethod::kBarycentric,
-                    false);
+                    false, std::nullopt, scratch);
       return;
     case SamplePrediction::kTriangles:
       nodes_ = read_mesh<PlaceMesh>(read_member, kNodesName, record);
@@ -246,8 +265,10 @@ struct SourceRowReader::State {
       : archive(its_archive),
         record(std::move(its_record)),
         job(std::move(its_job)),
-        surface(archive.grid(), archive.metadata().wraps_x, archive.metadata().quantisation, tiles_of(archive),
-                source_grid(archive.metadata().source), record, [&](const char* name) { return mesh_bytes(name); }) {}
+        surface(
+            archive.grid(), archive.metadata().wraps_x, archive.metadata().quantisation, tiles_of(archive),
+            source_grid(archive.metadata().source), record, [&](const char* name) { return mesh_bytes(name); },
+            scratch_of(archive, record, job)) {}
 
   /// Of the places' member, which takes eight bytes a value; nullopt where there is none.
   [[nodiscard]] std::optional<std::vector<std::byte>> mesh_bytes(const char* name) const {

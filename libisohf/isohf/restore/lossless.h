@@ -55,7 +55,8 @@ class SamplePredictor {
   /// As the record says; reads the places' member by read_member(name), nullopt where there is none.
   using ReadMember = std::function<std::optional<std::vector<std::byte>>(const char* name)>;
   SamplePredictor(const TileGrid& grid, bool wraps_x, const Quantisation& quantisation, ReadTiles read_tiles,
-                  const SampleGrid& samples, const LosslessRecord& record, const ReadMember& read_member);
+                  const SampleGrid& samples, const LosslessRecord& record, const ReadMember& read_member,
+                  const ScratchFolder& scratch = {});
 
   /// The rows of tiles that read() reads; none where there are none under the samples.
   [[nodiscard]] RowRange tile_rows_needed(std::int64_t first, std::int64_t rows) const;

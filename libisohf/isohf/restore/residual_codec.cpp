@@ -155,8 +155,12 @@ ResidualPayload encode(const SampleMapping& mapping, std::int64_t width, std::sp
   for (const auto& stream : streams) out.write(static_cast<std::uint32_t>(stream.size()));
   if (any_masked) out.write_bytes(mask);
   payload.end_part();
+  payload.bytes.reserve(payload.bytes.size() + predicted.size() * sizeof(Bits));
   add_planes<Bits>(kept, payload);
-  for (const auto& stream : streams) add_planes<Bits>(stream, payload);
+  for (auto& stream : streams) {
+    add_planes<Bits>(stream, payload);
+    stream = {};  // done with
+  }
   return payload;
 }
 

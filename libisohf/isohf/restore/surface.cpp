@@ -9,6 +9,7 @@
 #include "isohf/archive/planes/archive_planes.h"
 #include "isohf/base/arena.h"
 #include "isohf/base/assert.h"
+#include "isohf/base/memory/memory_budget.h"
 #include "isohf/error.h"
 #include "isohf/restore/grid_sampler.h"
 #include "isohf/restore/point_sampler.h"
@@ -19,6 +20,10 @@ namespace {
 
 /// Samples that are handed over at once, about.
 constexpr std::int64_t kSamplesAtOnce = std::int64_t{1} << 20U;
+/// Rows that are, at most, where what they are made of is read from a file for each of them.
+constexpr std::int64_t kRowsOfScratch = 16;
+/// Of a sample: its elevation, and what whoever takes it makes of that.
+constexpr double kSampleBytes = 20.0;
 /// What a Surface keeps of decoded tiles.
 constexpr std::uint64_t kDefaultMemory = std::uint64_t{256} << 20U;
 /// What tiles under a grid in degrees take.
@@ -117,18 +122,37 @@ RestoreMethod restore_method_from_string(const std::string& text) {
 }
 
 struct RowReader::State {
-  State(const ArchiveReader& archive, const SampleGrid& its_grid, RestoreMethod method) : grid(its_grid) {
+  State(const ArchiveReader& archive, const SampleGrid& its_grid, RestoreMethod method, const Job& job)
+      : grid(its_grid) {
     const Metadata& metadata = archive.metadata();
+    require_samples(grid);
+    rows_at_once = std::max<std::int64_t>(kSamplesAtOnce / grid.width, 1);
     if (!grid.goes_by_places()) {
       const int plane = method == RestoreMethod::kPlane ? plane_for(metadata, grid) : 0;
-      rows.emplace(metadata.plane_grid(plane), metadata.wraps_x, metadata.quantisation, tiles_of(archive, plane), grid,
-                   method, true, metadata.grid);
+      const TileGrid tiles = metadata.plane_grid(plane);
+      rows.emplace(tiles, metadata.wraps_x, metadata.quantisation, tiles_of(archive, plane), grid, method, true,
+                   metadata.grid, choose_memory(tiles, method, job));
       return;
     }
-    require_samples(grid);
     georeference.emplace(metadata);
     if (!georeference->has_geo()) refuse("degrees");
     points.emplace(metadata.grid, metadata.quantisation, tiles_of(archive), kTileBytes);
+  }
+
+  /// As many rows at once as there is room for.
+  ScratchFolder choose_memory(const TileGrid& tiles, RestoreMethod method, const Job& job) {
+    const auto bytes = [&](bool in_scratch) {
+      return reading_bytes(job, static_cast<double>(tiles.shape().stored_vertex_count())) +
+             static_cast<double>(rows_at_once * grid.width) * kSampleBytes +
+             GridSampler::memory_bytes(tiles, grid, method, rows_at_once, threads_of(job), in_scratch);
+    };
+    if (job.memory_bytes == 0) return std::nullopt;
+    const double in_memory = bytes(false);
+    if (in_memory > static_cast<double>(job.memory_bytes)) {
+      rows_at_once = std::min(std::max(kRowsOfScratch, rows_at_once), grid.height);
+      while (rows_at_once > 1 && bytes(true) > static_cast<double>(job.memory_bytes)) rows_at_once /= 2;
+    }
+    return scratch_for(job, in_memory, bytes(true), "this grid");
   }
 
   void read_by_places(std::int64_t first, std::int64_t count, std::span<double> elevations) {
@@ -149,13 +173,14 @@ struct RowReader::State {
   }
 
   SampleGrid grid;
+  std::int64_t rows_at_once = 1;
   std::optional<GridSampler> rows;  ///< of a grid in world units
   std::optional<WorldGeoreference> georeference;
   std::optional<PointSampler> points;
 };
 
-RowReader::RowReader(const ArchiveReader& archive, const SampleGrid& grid, RestoreMethod method)
-    : state_(std::make_unique<State>(archive, grid, method)) {}
+RowReader::RowReader(const ArchiveReader& archive, const SampleGrid& grid, RestoreMethod method, const Job& job)
+    : state_(std::make_unique<State>(archive, grid, method, job)) {}
 
 RowReader::~RowReader() = default;
 
@@ -169,7 +194,7 @@ void RowReader::read(std::int64_t first, std::int64_t rows, std::span<double> el
 
 void RowReader::read_all(const Take& take, const Job& job) {
   const SampleGrid& grid = state_->grid;
-  const std::int64_t rows_at_once = std::max<std::int64_t>(kSamplesAtOnce / grid.width, 1);
+  const std::int64_t rows_at_once = state_->rows_at_once;
   Arena(job).execute([&] {
     for (std::int64_t row = 0; row < grid.height; row += rows_at_once) {
       const std::int64_t rows = std::min(rows_at_once, grid.height - row);

@@ -10,8 +10,8 @@
 
 namespace isohf {
 
-SeedCheck::SeedCheck(const ArchiveReader& archive, const ShadowSeedInfo& info)
-    : archive_(archive), info_(info), row_(archive.grid(), archive.metadata().quantisation, info) {
+SeedCheck::SeedCheck(const ArchiveReader& archive, const ShadowSeedInfo& info, const ScratchFolder& scratch)
+    : archive_(archive), info_(info), row_(archive.grid(), archive.metadata().quantisation, info), tiles_(scratch) {
   if (!has_room_for_seeds(archive.grid())) {
     throw Error(ErrorCode::kCorrupt, "shadow_seeds: a grid of so many columns has none");
   }
@@ -44,24 +44,24 @@ std::string SeedCheck::why_wrong(TileIndex tile, const EncodedSeeds& expected) c
                      found->second->name);
 }
 
-std::vector<SeedCheck::Problem> SeedCheck::check_row(std::int64_t row, std::span<const TileCodes* const> tiles) const {
-  std::vector<SeedRow::Tile> prepared(tiles.size());
-  oneapi::tbb::parallel_for(std::size_t{0}, tiles.size(), [&](std::size_t i) {
-    if (tiles[i] != nullptr) {
-      prepared[i] = row_.prepare(*tiles[i]);
-    } else {
-      prepared[i] = {{no_casters(archive_.grid().shape()), no_casters(archive_.grid().shape())}, {}, true};
-    }
-  });
-  const std::vector<EncodedSeeds> expected = row_.encode(prepared);
-  std::vector<std::string> wrong(tiles.size());
-  oneapi::tbb::parallel_for(std::size_t{0}, tiles.size(), [&](std::size_t i) {
-    wrong[i] = why_wrong({static_cast<std::int64_t>(i), row}, expected[i]);
-  });
+SeedRow::Tile SeedCheck::prepare(const TileCodes* codes) const {
+  if (codes != nullptr) return row_.prepare(*codes);
+  return {{no_casters(archive_.grid().shape()), no_casters(archive_.grid().shape())}, {}, true};
+}
+
+std::vector<SeedCheck::Problem> SeedCheck::end_row(std::int64_t row, bool check) {
   std::vector<Problem> problems;
-  for (std::size_t i = 0; i < wrong.size(); ++i) {
-    if (!wrong[i].empty()) problems.emplace_back(TileIndex{static_cast<std::int64_t>(i), row}, std::move(wrong[i]));
-  }
+  const SeedRow::Take compare = [&](std::size_t first, std::span<const EncodedSeeds> expected) {
+    const auto index = [&](std::size_t i) { return TileIndex{static_cast<std::int64_t>(first + i), row}; };
+    std::vector<std::string> wrong(expected.size());
+    oneapi::tbb::parallel_for(std::size_t{0}, wrong.size(),
+                              [&](std::size_t i) { wrong[i] = why_wrong(index(i), expected[i]); });
+    for (std::size_t i = 0; i < wrong.size(); ++i) {
+      if (!wrong[i].empty()) problems.emplace_back(index(i), std::move(wrong[i]));
+    }
+  };
+  if (check) row_.encode(tiles_, compare);
+  tiles_.clear();
   return problems;
 }
 

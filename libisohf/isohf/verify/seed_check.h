@@ -13,16 +13,21 @@
 namespace isohf {
 
 /// Makes an archive's shadow seeds once more from its tiles. Seeds follow from the codes bit for bit, so that members
-/// must be equal to the byte. Memory: the casters of one row of tiles, and the places of the members.
+/// must be equal to the byte. Memory: the casters of one row of tiles, unless in a scratch file, and the places of the
+/// members.
 class SeedCheck {
  public:
   using Problem = std::pair<std::optional<TileIndex>, std::string>;
 
   /// The archive has seeds, and outlives this. Throws Error{kCorrupt} where their record cannot be used.
-  SeedCheck(const ArchiveReader& archive, const ShadowSeedInfo& info);
+  SeedCheck(const ArchiveReader& archive, const ShadowSeedInfo& info, const ScratchFolder& scratch);
 
-  /// The tiles of a row, nullptr where one is not stored. On the caller's oneTBB arena.
-  [[nodiscard]] std::vector<Problem> check_row(std::int64_t row, std::span<const TileCodes* const> tiles) const;
+  /// Of any tile, nullptr where it is not stored; on any thread.
+  [[nodiscard]] SeedRow::Tile prepare(const TileCodes* codes) const;
+  /// The next tile of a row, from West to East.
+  void add(const SeedRow::Tile& tile) { tiles_.add(tile); }
+  /// Whether the row that has been added is to be checked, or forgotten. On the caller's oneTBB arena.
+  [[nodiscard]] std::vector<Problem> end_row(std::int64_t row, bool check);
   /// What the record says of all members together.
   [[nodiscard]] std::vector<Problem> check_record() const;
 
@@ -32,6 +37,7 @@ class SeedCheck {
   const ArchiveReader& archive_;
   ShadowSeedInfo info_;
   SeedRow row_;
+  SeedRow::Tiles tiles_;
   std::vector<std::pair<std::int64_t, const MemberEntry*>> members_;  ///< by flat tile index
 };
 

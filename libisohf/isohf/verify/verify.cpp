@@ -18,9 +18,12 @@
 #include "isohf/archive/container/content_hash.h"
 #include "isohf/archive/metadata/accuracy_info.h"
 #include "isohf/archive/metadata/part_record.h"
+#include "isohf/archive/planes/archive_planes.h"
+#include "isohf/archive/planes/plane_builder.h"
 #include "isohf/archive/tile_index.h"
 #include "isohf/archive/tile_statistics.h"
 #include "isohf/base/arena.h"
+#include "isohf/base/memory/memory_budget.h"
 #include "isohf/error.h"
 #include "isohf/lattice/shared_vertices.h"
 #include "isohf/surface.h"
@@ -44,16 +47,35 @@ struct TileState {
   TileCodes codes;
   std::vector<float> heights;  ///< [C*R] vertical units, NaN where void
   std::vector<std::byte> digest;
+  SeedRow::Tile seeds;
   std::vector<Finding> findings;
   TileStatistics statistics;
 };
 
-using TileRow = std::vector<TileState>;
+/// What the tiles South of a tile share with it.
+struct TileBorder {
+  bool readable = false;
+  bool stored = false;
+  std::vector<float> heights;  ///< of its last rows
+};
+
+/// A tile as others are compared with it.
+struct TileView {
+  bool readable;
+  bool stored;
+  View2D<const float> heights;
+};
+
+/// Tiles in each thread that are in hand at once, beside each other.
+constexpr std::int64_t kTilesPerThread = 32;
+/// What a TileState takes of each vertex.
+constexpr double kBytesPerVertex = 10.0;
 
 class Verification {
  public:
-  Verification(const ArchiveReader& archive, std::size_t max_findings)
+  Verification(const ArchiveReader& archive, const Job& job, std::size_t max_findings)
       : archive_(archive),
+        job_(job),
         max_findings_(max_findings),
         grid_(archive.grid()),
         shape_(grid_.shape()),
@@ -61,25 +83,28 @@ class Verification {
         void_digest_(tile_content_digest(void_tile(shape_, archive.metadata().quantisation))),
         counted_(archive.metadata()),
         here_(tiles_here(archive.metadata())) {
-    for (std::size_t i = 0; i < shared_.size(); ++i) shared_[i] = shared_vertices(shape_, kComparedNeighbours[i]);
+    first_border_row_ = shape_.rows();
+    for (std::size_t i = 0; i < shared_.size(); ++i) {
+      shared_[i] = shared_vertices(shape_, kComparedNeighbours[i]);
+      if (kComparedNeighbours[i].row == 0) continue;
+      // Normals look at the rows beside a vertex.
+      for (const SharedVertex& shared : shared_[i]) {
+        first_border_row_ = std::min(first_border_row_, shared.here.row - (shared.visible ? 1 : 0));
+      }
+    }
+    require_room();
   }
 
-  VerifyReport run(const Job& job) {
+  VerifyReport run() {
     check_structure();
     const bool has_members = check_members();
     for (std::string& problem : contradictions_in(archive_)) add(make(finding::kMetadata, {}, std::move(problem)));
     start_seeds();
     if (archive_.metadata().planes.count > 0) planes_.emplace(archive_);
-    TileRow above;
+    std::vector<TileBorder> above;
     for (std::int64_t row = 0; row < grid_.tile_rows(); ++row) {
-      TileRow current = read_row(row);
-      compare_row(row, current, above);
-      check_seeds(row, current);
-      check_planes(current);
-      collect(current);
-      above = std::move(current);
-      job.report({"verify", "tiles", (row + 1) * grid_.tile_columns(), grid_.tile_count()});
-      job.throw_if_cancelled();
+      above = check_row(row, above);
+      job_.report({"verify", "tiles", (row + 1) * grid_.tile_columns(), grid_.tile_count()});
     }
     check_totals();
     if (seeds_) add_seed_problems(seeds_->check_record());
@@ -150,48 +175,99 @@ class Verification {
 
   void start_seeds() {
     try {
-      if (const auto info = shadow_seed_info(archive_.metadata())) seeds_.emplace(archive_, *info);
+      const ScratchFolder scratch = job_.memory_bytes != 0 ? ScratchFolder(job_.scratch_folder) : std::nullopt;
+      if (const auto info = shadow_seed_info(archive_.metadata())) seeds_.emplace(archive_, *info, scratch);
     } catch (const Error& error) {
       add(make(finding::kShadowSeeds, {}, error.what()));
     }
   }
 
-  /// Seeds follow from the whole row: where a tile of it cannot be read, that is said already.
-  void check_seeds(std::int64_t row, const TileRow& tiles) {
-    // Of a part that holds a piece of the row they tell of what isn't here.
-    if (!seeds_ || here_.end.column - here_.first.column < grid_.tile_columns()) return;
-    std::vector<const TileCodes*> codes;
-    for (const TileState& tile : tiles) {
-      if (!tile.readable) return;
-      codes.push_back(tile.entry.stored ? &tile.codes : nullptr);
-    }
-    add_seed_problems(seeds_->check_row(row, codes));
+  [[nodiscard]] std::int64_t tiles_at_once() const {
+    return std::min(kTilesPerThread * threads_of(job_), grid_.tile_columns());
   }
 
-  /// Planes follow from all tiles: behind one that cannot be read, nothing is said of them.
-  void check_planes(const TileRow& tiles) {
-    for (const TileState& tile : tiles) {
-      if (!tile.readable) planes_.reset();
-      if (!planes_) return;
-      planes_->add(tile.entry.stored ? &tile.codes : nullptr, tile.entry.code_min, tile.entry.code_max);
+  /// Throws Error{kOutOfMemory}. Seeds go to a scratch file where memory is limited.
+  void require_room() const {
+    const auto vertices = static_cast<double>(shape_.stored_vertex_count());
+    const auto border = static_cast<double>((shape_.rows() - first_border_row_) * shape_.columns());
+    const auto columns = static_cast<double>(grid_.tile_columns());
+    const double bytes = reading_bytes(job_, vertices) +
+                         static_cast<double>(tiles_at_once()) * vertices * kBytesPerVertex +
+                         2.0 * columns * (border * sizeof(float) + sizeof(TileBorder)) +
+                         static_cast<double>(SeedRow::memory_bytes(grid_, true)) +
+                         static_cast<double>(plane_builder_memory_bytes(planes_of(archive_.metadata()),
+                                                                        archive_.metadata().quantisation.type));
+    require_memory(job_, bytes, bytes, "verifying", "");
+  }
+
+  /// Checks a row of tiles, some beside each other at a time, and what it shares with the row above. Returns what the
+  /// row below shares with it.
+  std::vector<TileBorder> check_row(std::int64_t row, const std::vector<TileBorder>& above) {
+    const std::int64_t columns = grid_.tile_columns();
+    std::vector<TileBorder> borders;
+    borders.reserve(static_cast<std::size_t>(columns));
+    row_is_readable_ = true;
+    TileState westmost;            // where the East end is the West end
+    std::vector<TileState> tiles;  // from `first` on; the last waits for its neighbour in the East
+    for (std::int64_t first = 0, read = 0; read < columns;) {
+      job_.throw_if_cancelled();
+      const std::int64_t count = std::min(tiles_at_once(), columns - read);
+      read_tiles({read, row}, count, tiles);
+      if (read == 0 && archive_.metadata().wraps_x) westmost = tiles.front();
+      read += count;
+      const bool is_last = read == columns;
+      const TileState* east = is_last && archive_.metadata().wraps_x ? &westmost : nullptr;
+      const std::size_t complete = tiles.size() - (is_last ? 0 : 1);
+      compare_tiles({first, row}, tiles, complete, east, above);
+      for (std::size_t i = 0; i < complete; ++i) borders.push_back(finish_tile(tiles[i]));
+      first += static_cast<std::int64_t>(complete);
+      tiles.erase(tiles.begin(), tiles.begin() + static_cast<std::ptrdiff_t>(complete));
     }
-    for (auto& [id, text] : planes_->problems()) add(make(id, {}, std::move(text)));
+    // Seeds follow from the whole row: where a tile of it cannot be read, that is said already. Those of a part that
+    // holds a piece of the row tell of what isn't here.
+    if (seeds_) {
+      const bool is_whole = here_.end.column - here_.first.column >= columns;
+      add_seed_problems(seeds_->end_row(row, is_whole && row_is_readable_));
+    }
+    if (planes_) {
+      for (auto& [id, text] : planes_->problems()) add(make(id, {}, std::move(text)));
+    }
+    for (Finding& found : row_findings_) add(std::move(found));
+    row_findings_.clear();
+    return borders;
+  }
+
+  /// Adds a tile up that has been compared with all others.
+  TileBorder finish_tile(TileState& tile) {
+    row_is_readable_ = row_is_readable_ && tile.readable;
+    if (seeds_) seeds_->add(tile.seeds);
+    // Planes follow from all tiles: behind one that cannot be read, nothing is said of them.
+    if (!tile.readable) planes_.reset();
+    if (planes_) planes_->add(tile.entry.stored ? &tile.codes : nullptr, tile.entry.code_min, tile.entry.code_max);
+    collect(tile);
+    TileBorder border{tile.readable, tile.entry.stored, {}};
+    if (!tile.heights.empty()) {
+      border.heights.assign(tile.heights.begin() + first_border_row_ * shape_.columns(), tile.heights.end());
+    }
+    return border;
   }
 
   void add_seed_problems(const std::vector<SeedCheck::Problem>& problems) {
     for (const auto& [tile, text] : problems) add(make(finding::kShadowSeeds, tile, text));
   }
 
-  TileRow read_row(std::int64_t row) {
-    TileRow tiles(static_cast<std::size_t>(grid_.tile_columns()));
-    const std::size_t groups = (tiles.size() + kBatchLanes - 1) / kBatchLanes;
+  /// Appends `count` tiles from `first` on.
+  void read_tiles(TileIndex first, std::int64_t count, std::vector<TileState>& tiles) {
+    const std::size_t before = tiles.size();
+    tiles.resize(before + static_cast<std::size_t>(count));
+    const std::span<TileState> read = std::span(tiles).subspan(before);
+    const std::size_t groups = (read.size() + kBatchLanes - 1) / kBatchLanes;
     oneapi::tbb::parallel_for(std::size_t{0}, groups, [&](std::size_t group) {
-      const std::size_t first = group * kBatchLanes;
-      const std::size_t count = std::min(kBatchLanes, tiles.size() - first);
+      const std::size_t end = std::min((group + 1) * kBatchLanes, read.size());
       std::vector<TileIndex> indices;
-      for (std::size_t i = first; i < first + count; ++i) {
-        const TileIndex index{static_cast<std::int64_t>(i), row};
-        if (find_entry(index, tiles[i])) indices.push_back(index);
+      for (std::size_t i = group * kBatchLanes; i < end; ++i) {
+        const TileIndex index{first.column + static_cast<std::int64_t>(i), first.row};
+        if (find_entry(index, read[i])) indices.push_back(index);
       }
       std::vector<TileCodes> codes;
       try {
@@ -200,10 +276,13 @@ class Verification {
         codes.clear();  // one by one, to tell which
       }
       for (std::size_t i = 0; i < indices.size(); ++i) {
-        read_tile(indices[i], codes.empty() ? nullptr : &codes[i], tiles[static_cast<std::size_t>(indices[i].column)]);
+        read_tile(indices[i], codes.empty() ? nullptr : &codes[i],
+                  read[static_cast<std::size_t>(indices[i].column - first.column)]);
+      }
+      for (std::size_t i = group * kBatchLanes; seeds_ && i < end; ++i) {
+        if (read[i].readable) read[i].seeds = seeds_->prepare(read[i].entry.stored ? &read[i].codes : nullptr);
       }
     });
-    return tiles;
   }
 
   /// False where there is nothing to decode. A tile that is not stored takes neither time nor memory: only stored ones
@@ -227,8 +306,11 @@ class Verification {
     return false;
   }
 
-  [[nodiscard]] const std::vector<float>& heights_of(const TileState& tile) const {
-    return tile.entry.stored ? tile.heights : void_heights_;
+  [[nodiscard]] TileView view(const std::vector<float>& heights, bool readable, bool stored) const {
+    return {readable, stored, {(stored ? heights : void_heights_).data(), shape_.columns(), shape_.rows()}};
+  }
+  [[nodiscard]] TileView view(const TileState& tile) const {
+    return view(tile.heights, tile.readable, tile.entry.stored);
   }
 
   /// codes: the tile as read already, or nullptr.
@@ -316,36 +398,44 @@ class Verification {
     }
   }
 
-  void compare_row(std::int64_t row, TileRow& current, TileRow& above) {
-    std::vector<std::int64_t> compared(current.size(), 0);
-    oneapi::tbb::parallel_for(std::size_t{0}, current.size(), [&](std::size_t column) {
-      TileState& tile = current[column];
-      const TileIndex index{static_cast<std::int64_t>(column), row};
+  /// Compares the first `count` of some tiles of a row with their neighbours; east: that of the last, where it is not
+  /// among them.
+  void compare_tiles(TileIndex first, std::vector<TileState>& tiles, std::size_t count, const TileState* east,
+                     const std::vector<TileBorder>& above) {
+    std::vector<std::int64_t> compared(count, 0);
+    oneapi::tbb::parallel_for(std::size_t{0}, count, [&](std::size_t at) {
+      TileState& tile = tiles[at];
+      const TileIndex index{first.column + static_cast<std::int64_t>(at), first.row};
+      std::vector<float> heights;
       // Each pair once: this tile with the one East of it, and as the southern partner of the row above. The finding
       // goes to this tile, so that threads never write to one tile at once.
       for (std::size_t i = 0; i < shared_.size(); ++i) {
         const TileIndex step = kComparedNeighbours[i];
         if (step.row == 0) {
-          const bool joins = archive_.metadata().wraps_x;
-          if (column + 1 == current.size() && !joins) continue;
-          compared[column] += compare(index, tile, current[(column + 1) % current.size()], i, false);
+          const TileState* const other = at + 1 < tiles.size() ? &tiles[at + 1] : east;
+          if (other != nullptr) compared[at] += compare(index, tile, view(*other), i, false);
           continue;
         }
         std::int64_t other = index.column - step.column;
         if (archive_.metadata().wraps_x) other = (other + grid_.tile_columns()) % grid_.tile_columns();
         if (above.empty() || other < 0 || other >= grid_.tile_columns()) continue;
-        compared[column] += compare(index, tile, above[static_cast<std::size_t>(other)], i, true);
+        const TileBorder& border = above[static_cast<std::size_t>(other)];
+        if (!border.heights.empty()) {
+          heights.resize(void_heights_.size());
+          std::copy(border.heights.rbegin(), border.heights.rend(), heights.rbegin());
+        }
+        compared[at] += compare(index, tile, view(heights, border.readable, border.stored), i, true);
       }
     });
-    for (const std::int64_t count : compared) report_.shared_vertices_checked += count;
+    for (const std::int64_t shared : compared) report_.shared_vertices_checked += shared;
   }
 
   /// Compares `tile` with `other`; where `tile_is_there`, `tile` plays the neighbour's part of shared_[neighbour].
-  std::int64_t compare(TileIndex index, TileState& tile, const TileState& other, std::size_t neighbour,
+  std::int64_t compare(TileIndex index, TileState& tile, const TileView& other, std::size_t neighbour,
                        bool tile_is_there) const {
     if (!tile.readable || !other.readable) return 0;
     const auto shared_count = static_cast<std::int64_t>(shared_[neighbour].size());
-    if (!tile.entry.stored && !other.entry.stored) return shared_count;
+    if (!tile.entry.stored && !other.stored) return shared_count;
     const TileIndex step = kComparedNeighbours[neighbour];
     const TileIndex other_index = tile_is_there ? TileIndex{index.column - step.column, index.row - step.row}
                                                 : TileIndex{index.column + step.column, index.row + step.row};
@@ -360,8 +450,8 @@ class Verification {
                                                  vertex.row, what, other_index.column, other_index.row)));
       }
     };
-    const View2D<const float> here_heights(heights_of(tile).data(), shape_.columns(), shape_.rows());
-    const View2D<const float> there_heights(heights_of(other).data(), shape_.columns(), shape_.rows());
+    const View2D<const float> here_heights = view(tile).heights;
+    const View2D<const float> there_heights = other.heights;
     for (const SharedVertex& shared : shared_[neighbour]) {
       const GridVertex mine = tile_is_there ? shared.there : shared.here;
       const GridVertex theirs = tile_is_there ? shared.here : shared.there;
@@ -379,20 +469,17 @@ class Verification {
     return shared_count;
   }
 
-  void collect(TileRow& row) {
-    for (TileState& tile : row) {
-      ++report_.tiles_checked;
-      for (Finding& found : tile.findings) add(std::move(found));
-      tile.findings.clear();
-      stored_ += tile.entry.stored ? 1 : 0;
-      all_readable_ = all_readable_ && tile.readable;
-      all_.vertices += tile.statistics.vertices;
-      all_.voids += tile.statistics.voids;
-      all_.sum += tile.statistics.sum;
-      all_.min = std::min(all_.min, tile.statistics.min);
-      all_.max = std::max(all_.max, tile.statistics.max);
-      if (tile.readable) hash_.add_tile(tile.digest);
-    }
+  void collect(TileState& tile) {
+    ++report_.tiles_checked;
+    for (Finding& found : tile.findings) row_findings_.push_back(std::move(found));
+    stored_ += tile.entry.stored ? 1 : 0;
+    all_readable_ = all_readable_ && tile.readable;
+    all_.vertices += tile.statistics.vertices;
+    all_.voids += tile.statistics.voids;
+    all_.sum += tile.statistics.sum;
+    all_.min = std::min(all_.min, tile.statistics.min);
+    all_.max = std::max(all_.max, tile.statistics.max);
+    if (tile.readable) hash_.add_tile(tile.digest);
   }
 
   /// The source's samples, restored from tiles and residuals, against their hash.
@@ -400,8 +487,11 @@ class Verification {
     if (!all_readable_) return;
     try {
       if (!lossless_record(archive_.metadata())) return;
-      for (SourceRowReader reader(archive_); !reader.at_end();) (void)reader.read_next();
+      Job job = job_;
+      job.progress = {};
+      for (SourceRowReader reader(archive_, job); !reader.at_end();) (void)reader.read_next();
     } catch (const Error& error) {
+      if (error.code() == ErrorCode::kOutOfMemory || error.code() == ErrorCode::kCancelled) throw;
       add(make(finding::kLossless, {}, error.what()));
     }
   }
@@ -451,6 +541,7 @@ class Verification {
   }
 
   const ArchiveReader& archive_;
+  const Job& job_;
   std::size_t max_findings_;
   const TileGrid& grid_;
   TileShape shape_;
@@ -459,7 +550,10 @@ class Verification {
   CountedVertices counted_;
   TileRange here_;  ///< of a part: nothing is said of the other tiles
   std::array<std::vector<SharedVertex>, std::size(kComparedNeighbours)> shared_;
+  int first_border_row_ = 0;  ///< the first that the tiles South of a tile are compared with
   VerifyReport report_;
+  std::vector<Finding> row_findings_;  ///< of the tiles of the row at hand
+  bool row_is_readable_ = true;
   ContentHash hash_;
   std::optional<SeedCheck> seeds_;
   std::optional<PlaneCheck> planes_;
@@ -484,7 +578,7 @@ VerifyReport verify_archive(const std::string& path, const Job& job, std::size_t
     return report;
   }
   VerifyReport report;
-  Arena(job).execute([&] { report = Verification(*archive, max_findings).run(job); });
+  Arena(job).execute([&] { report = Verification(*archive, job, max_findings).run(); });
   return report;
 }
 

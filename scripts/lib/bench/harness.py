@@ -32,12 +32,21 @@ class Bench:
 
     def run(self, *command):
         """Runs once: wall and processor seconds, peak memory in MB, standard output."""
+        done = self.run_or_refusal(*command)
+        if "refused" in done:
+            self.fail(done["refused"])
+        return done
+
+    def run_or_refusal(self, *command):
+        """The same, or {"refused": why} where the program says how much memory it needs."""
         with open(self.work / "time.txt", "w+b") as figures:
             start = time.monotonic()
             result = subprocess.run(["/usr/bin/time", "-f", "%U %S %M", "-o", figures.name, *map(str, command)],
                                     capture_output=True, text=True, check=False)
             wall = time.monotonic() - start
             if result.returncode != 0:
+                if " needs at least " in result.stderr:
+                    return {"refused": result.stderr.strip()}
                 self.fail(f"{' '.join(map(str, command))}: {result.stderr.strip()}")
             user, system, peak = figures.read().split()[-3:]
         return {"wall_s": wall, "cpu_s": float(user) + float(system), "peak_mb": float(peak) / 1024,

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "isohf/archive/container/member_tables.h"
-#include "isohf/base/spill_buffer.h"
+#include "isohf/base/memory/spill_buffer.h"
 
 namespace isohf {
 

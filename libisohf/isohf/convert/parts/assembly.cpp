@@ -246,12 +246,15 @@ void Assembly::add_seeds(std::int64_t row, const Row& tiles) {
     prepared[i] = seeds_->prepare(is_void ? void_codes_ : tiles[i].codes);
     prepared[i].is_empty = is_void;
   });
-  const std::vector<EncodedSeeds> encoded = seeds_->encode(prepared);
-  for (std::size_t i = 0; i < encoded.size(); ++i) {
-    if (encoded[i].payload_bytes == 0) continue;
-    writer_.add_deflated_member(seed_name({static_cast<std::int64_t>(i), row}), encoded[i].deflated,
-                                encoded[i].payload_bytes, encoded[i].payload_crc32);
-  }
+  SeedRow::Tiles all(std::nullopt);
+  for (const SeedRow::Tile& tile : prepared) all.add(tile);
+  seeds_->encode(all, [&](std::size_t from, std::span<const EncodedSeeds> members) {
+    for (std::size_t i = 0; i < members.size(); ++i) {
+      if (members[i].payload_bytes == 0) continue;
+      writer_.add_deflated_member(seed_name({static_cast<std::int64_t>(from + i), row}), members[i].deflated,
+                                  members[i].payload_bytes, members[i].payload_crc32);
+    }
+  });
 }
 
 /// What two tiles share must be equal, also where they come from two archives.

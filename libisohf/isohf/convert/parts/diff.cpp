@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <set>
 
@@ -139,17 +140,26 @@ void subtract_archives(const std::string& first, const std::string& second, cons
     throw Error(ErrorCode::kInvalidArgument, fmt::format("{}: {} as {} has", second, why, first));
   }
   const SampleGrid grid = natural_grid(a.metadata());
+  Job half = job;
+  half.memory_bytes /= 2;
   Arena(job).execute([&] {
-    RowReader minuend(b, grid, RestoreMethod::kBarycentric);
-    RowReader subtrahend(a, grid, RestoreMethod::kBarycentric);
+    const auto rows_of = [&](const ArchiveReader& archive) {
+      try {
+        return std::make_unique<RowReader>(archive, grid, RestoreMethod::kBarycentric, half);
+      } catch (const Error& error) {
+        throw error.within("each of the two archives");
+      }
+    };
+    const auto minuend = rows_of(b);
+    const auto subtrahend = rows_of(a);
     const std::int64_t step = std::max<std::int64_t>(kSamplesAtOnce / grid.width, 1);
     for (std::int64_t row = 0; row < grid.height; row += step) {
       job.throw_if_cancelled();
       const std::int64_t rows = std::min(step, grid.height - row);
       std::vector<double> difference(static_cast<std::size_t>(rows * grid.width));
       std::vector<double> before(difference.size());
-      minuend.read(row, rows, difference);
-      subtrahend.read(row, rows, before);
+      minuend->read(row, rows, difference);
+      subtrahend->read(row, rows, before);
       for (std::size_t i = 0; i < before.size(); ++i) difference[i] -= before[i];
       take(row, difference);
       job.report({"difference", "rows", row + rows, grid.height});

@@ -16,7 +16,7 @@ namespace isohf {
 namespace {
 
 /// Samples of one residual member: enough for its tables, few enough for many to be made side by side.
-constexpr std::int64_t kSamplesPerMember = std::int64_t{1} << 19U;
+constexpr std::size_t kSamplesPerMember = std::size_t{1} << 19U;
 
 /// Some rows of the source on their way into a member.
 struct ResidualBand {
@@ -28,10 +28,15 @@ struct ResidualBand {
   std::uint32_t payload_crc32 = 0;
 
   void encode(const SourceInfo& info, const SampleMapping& mapping) {
-    std::vector<float> heights(predicted.size());
-    heights_from_samples(info, 0.0, raw, heights);
-    std::vector<char> voids(heights.size());
-    std::transform(heights.begin(), heights.end(), voids.begin(), [](float h) { return std::isnan(h) ? 1 : 0; });
+    std::vector<char> voids(predicted.size());
+    std::vector<float> heights(std::min(kSamplesPerMember / 8, voids.size()));
+    for (std::size_t from = 0; from < voids.size(); from += heights.size()) {
+      heights.resize(std::min(heights.size(), voids.size() - from));
+      const std::size_t bytes = size_bytes(info.sample_type);
+      heights_from_samples(info, 0.0, std::span(raw).subspan(from * bytes, heights.size() * bytes), heights);
+      std::transform(heights.begin(), heights.end(), voids.begin() + static_cast<std::ptrdiff_t>(from),
+                     [](float h) { return std::isnan(h) ? 1 : 0; });
+    }
     const ResidualPayload payload = encode_residuals(mapping, info.width, raw, voids, predicted);
     DeflateWriter writer(deflated);
     std::size_t from = 0;
@@ -46,22 +51,22 @@ struct ResidualBand {
 };
 
 std::int64_t rows_per_member(const SourceInfo& info) {
-  return std::clamp<std::int64_t>(kSamplesPerMember / info.width, 8, info.height + 8);
+  return std::clamp<std::int64_t>(static_cast<std::int64_t>(kSamplesPerMember) / info.width, 8, info.height + 8);
 }
 
 }  // namespace
 
 std::uint64_t residual_stage_memory_bytes(const SourceInfo& info, const Plan& plan, int threads,
-                                          std::size_t members_at_once) {
+                                          std::size_t members_at_once, bool in_scratch) {
   const TileShape& shape = plan.grid.shape();
   const auto width = static_cast<double>(info.width);
   const auto rows = static_cast<double>(std::min(rows_per_member(info), info.height));
   const auto sample = static_cast<double>(size_bytes(info.sample_type));
-  // Raw samples, predictions and what they deflate to; in each thread also heights, voids, streams and payload.
+  // Raw samples, predictions and what they deflate to; in each thread also voids, streams and payload.
   const double members =
       std::min(static_cast<double>(members_at_once), std::ceil(static_cast<double>(info.height) / rows));
   const double bands = members * rows * width * (2.0 * sample + 8.0);
-  const double encoding = threads * rows * width * (5.0 + 5.0 * sample);
+  const double encoding = std::min<double>(threads, members) * rows * width * (1.0 + 5.0 * sample);
   if (plan.frame.warp) {
     // A position for each sample of a member, tiles that are kept, and one in each thread.
     const double tile_bytes = 8.0 * static_cast<double>(shape.stored_vertex_count());
@@ -69,15 +74,20 @@ std::uint64_t residual_stage_memory_bytes(const SourceInfo& info, const Plan& pl
     return static_cast<std::uint64_t>(bands + encoding + rows * width * 16.0 + mesh + threads * 2.0 * tile_bytes +
                                       static_cast<double>(SamplePredictor::kTileBytes));
   }
-  const double tile_rows = std::ceil(rows * plan.frame.spacing_z / plan.grid.extent_z()) + 1.0;
-  const double tiles = tile_rows * static_cast<double>(plan.grid.tile_columns()) * 8.0 *
-                       static_cast<double>(shape.stored_vertex_count());
-  const double lattice_rows = rows * plan.frame.spacing_z / plan.grid.sigma_z() + 2.0 * SplinePredictor::kReach + 2.0;
-  return static_cast<std::uint64_t>(bands + encoding + tiles + lattice_rows * width * 17.0);
+  const double lattice_rows = rows * plan.frame.spacing_z / plan.grid.sigma_z();
+  return static_cast<std::uint64_t>(
+             bands + std::max(encoding, SplinePredictor::lines_bytes(plan.grid, threads, in_scratch)) +
+             SplinePredictor::rows_bytes(plan.grid, info.width, lattice_rows, threads, in_scratch)) +
+         residual_stage_kept_bytes(info, plan, in_scratch);
+}
+
+std::uint64_t residual_stage_kept_bytes(const SourceInfo& info, const Plan& plan, bool in_scratch) {
+  return plan.frame.warp ? 0 : SplinePredictor::kept_bytes(info.width, in_scratch);
 }
 
 ResidualStage::ResidualStage(HeightSource& source, const SourceFrame& frame, const TileGrid& grid,
-                             const Quantisation& quantisation, double largest, const RowRange& tile_rows)
+                             const Quantisation& quantisation, double largest, const RowRange& tile_rows,
+                             const ScratchFolder& scratch)
     : source_(source) {
   const SourceInfo& info = source.info();
   record_.mapping = {info.sample_type, info.z_scale, info.z_offset};
@@ -99,7 +109,7 @@ ResidualStage::ResidualStage(HeightSource& source, const SourceFrame& frame, con
       grid, frame.wraps_x, quantisation, [this](std::span<const TileIndex> tiles) { return read_tiles_(tiles); },
       SampleGrid{frame.width, frame.height, frame.first_sample_x, frame.first_sample_z, frame.spacing_x,
                  frame.spacing_z},
-      record_, [this](const char*) { return nodes_; });
+      record_, [this](const char*) { return nodes_; }, scratch);
 }
 
 RowRange ResidualStage::tile_rows_needed() const {

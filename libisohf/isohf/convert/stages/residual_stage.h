@@ -15,7 +15,9 @@ namespace isohf {
 
 /// What write_residuals() holds at most, beyond what convert() needs before it.
 [[nodiscard]] std::uint64_t residual_stage_memory_bytes(const SourceInfo& info, const Plan& plan, int threads,
-                                                        std::size_t members_at_once);
+                                                        std::size_t members_at_once, bool in_scratch);
+/// What a ResidualStage holds from its beginning on.
+[[nodiscard]] std::uint64_t residual_stage_kept_bytes(const SourceInfo& info, const Plan& plan, bool in_scratch);
 
 /// The residual members: every source sample is predicted from the tiles, and the difference kept. Works on the caller's
 /// oneTBB arena.
@@ -23,8 +25,9 @@ class ResidualStage {
  public:
   /// largest   no elevation is meant to lie further from 0 (FixedHeights::bits_for)
   /// tile_rows whose members are made; all but one row are a shard's
+  /// scratch   keeps what samples are predicted from where memory has no room for it
   ResidualStage(HeightSource& source, const SourceFrame& frame, const TileGrid& grid, const Quantisation& quantisation,
-                double largest, const RowRange& tile_rows);
+                double largest, const RowRange& tile_rows, const ScratchFolder& scratch);
 
   /// The rows of tiles that the predictions read.
   [[nodiscard]] RowRange tile_rows_needed() const;

@@ -1,13 +1,58 @@
 #include "isohf/convert/stages/seed_row.h"
 
 #include <oneapi/tbb/parallel_for.h>
-#include <oneapi/tbb/parallel_invoke.h>
 #include <oneapi/tbb/task_arena.h>
 
+#include <algorithm>
 #include <limits>
 #include <utility>
 
 namespace isohf {
+namespace {
+
+/// Bytes kept of one visible row of a tile: about four casters of its own and three that enter, either way, and as much
+/// again while a row of tiles is finished (measured).
+constexpr std::uint64_t kBytesPerRow = 2 * (2 * 7 * sizeof(ShadowCaster) + 32);
+/// The ends of two buffers that stay in memory.
+constexpr std::uint64_t kSpillBytes = std::uint64_t{16} << 20U;
+/// Tiles whose members are made side by side.
+constexpr std::size_t kTilesAtOnce = 64;
+
+/// Returns where it is.
+template <typename Value>
+std::uint64_t append(SpillBuffer& bytes, const std::vector<Value>& values) {
+  const std::uint64_t at = bytes.size_bytes();
+  const std::uint64_t count = values.size();
+  bytes.append(std::as_bytes(std::span(&count, 1)));
+  bytes.append(std::as_bytes(std::span(values)));
+  return at;
+}
+
+std::uint64_t append(SpillBuffer& bytes, const CasterRows& rows) {
+  const std::uint64_t at = append(bytes, rows.starts);
+  (void)append(bytes, rows.casters);
+  return at;
+}
+
+/// Leaves `at` behind the values.
+template <typename Value>
+std::vector<Value> read(const SpillBuffer& bytes, std::uint64_t& at) {
+  std::uint64_t count = 0;
+  bytes.read(at, std::as_writable_bytes(std::span(&count, 1)));
+  std::vector<Value> values(static_cast<std::size_t>(count));
+  bytes.read(at + sizeof count, std::as_writable_bytes(std::span(values)));
+  at += sizeof count + count * sizeof(Value);
+  return values;
+}
+
+CasterRows read_casters(const SpillBuffer& bytes, std::uint64_t at) {
+  CasterRows rows;
+  rows.starts = read<std::uint32_t>(bytes, at);
+  rows.casters = read<ShadowCaster>(bytes, at);
+  return rows;
+}
+
+}  // namespace
 
 SeedRow::SeedRow(const TileGrid& grid, const Quantisation& quantisation, const ShadowSeedInfo& info)
     : grid_(grid), quantisation_(quantisation) {
@@ -49,33 +94,65 @@ EncodedSeeds SeedRow::encode(const TileEdges& edges, const HullSeeds& seeds) con
   return heights.empty() ? EncodedSeeds{} : encode_seeds(grid_, edges, heights, falls_.size());
 }
 
-std::vector<EncodedSeeds> SeedRow::encode(std::span<const Tile> tiles) const {
+void SeedRow::Tiles::add(const Tile& tile) {
+  Place place{};
+  place.type = tile.edges.type;
+  place.is_empty = tile.is_empty;
+  place.eastward = append(bytes_, tile.casters.eastward);
+  place.westward = append(bytes_, tile.casters.westward);
+  place.edges = append(bytes_, tile.edges.west);
+  (void)append(bytes_, tile.edges.east);
+  places_.push_back(place);
+}
+
+void SeedRow::Tiles::clear() {
+  bytes_.clear();
+  places_.clear();
+}
+
+void SeedRow::encode(const Tiles& tiles, const Take& take) const {
   const TileShape& shape = grid_.shape();
-  const std::size_t n = tiles.size();
-  std::vector<HullSeeds> seeds(n);
-  std::vector<EncodedSeeds> encoded(n);
-  // Isolated: a thread that waits here must not take a tile of the pipeline in hand and come back late.
-  oneapi::tbb::this_task_arena::isolate([&] {
-    oneapi::tbb::parallel_invoke(
-        [&] {
-          CasterRows handed = no_casters(shape);
-          for (std::size_t i = 0; i < n; ++i) {
-            CasterRows next = pass_on_casters(shape, handed, tiles[i].casters.eastward, fall_min_, lowest_);
-            seeds[i].eastward = std::exchange(handed, std::move(next));
-          }
-        },
-        [&] {
-          CasterRows handed = no_casters(shape);
-          for (std::size_t i = n; i-- > 0;) {
-            CasterRows next = pass_on_casters(shape, handed, tiles[i].casters.westward, fall_min_, lowest_);
-            seeds[i].westward = std::exchange(handed, std::move(next));
-          }
-        });
-    oneapi::tbb::parallel_for(std::size_t{0}, n, [&](std::size_t i) {
-      if (!tiles[i].is_empty) encoded[i] = encode(tiles[i].edges, seeds[i]);
+  const std::size_t count = tiles.count();
+  // What light from the East brings into each tile, and then that from the West, on the way to the members.
+  SpillBuffer westward(tiles.scratch_);
+  std::vector<std::uint64_t> entering(count);
+  CasterRows handed = no_casters(shape);
+  for (std::size_t i = count; i-- > 0;) {
+    entering[i] = append(westward, handed);
+    handed = pass_on_casters(shape, handed, read_casters(tiles.bytes_, tiles.places_[i].westward), fall_min_, lowest_);
+  }
+  handed = no_casters(shape);
+  for (std::size_t first = 0; first < count; first += kTilesAtOnce) {
+    const std::size_t end = std::min(first + kTilesAtOnce, count);
+    std::vector<HullSeeds> seeds(end - first);
+    std::vector<TileEdges> edges(end - first);
+    for (std::size_t i = first; i < end; ++i) {
+      const Tiles::Place& place = tiles.places_[i];
+      seeds[i - first].westward = read_casters(westward, entering[i]);
+      CasterRows next = pass_on_casters(shape, handed, read_casters(tiles.bytes_, place.eastward), fall_min_, lowest_);
+      seeds[i - first].eastward = std::exchange(handed, std::move(next));
+      std::uint64_t at = place.edges;
+      edges[i - first].type = place.type;
+      edges[i - first].west = read<double>(tiles.bytes_, at);
+      edges[i - first].east = read<double>(tiles.bytes_, at);
+    }
+    std::vector<EncodedSeeds> encoded(end - first);
+    // Isolated: a thread that waits here must not take a tile of the pipeline in hand and come back late.
+    oneapi::tbb::this_task_arena::isolate([&] {
+      oneapi::tbb::parallel_for(std::size_t{0}, encoded.size(), [&](std::size_t i) {
+        if (!tiles.places_[first + i].is_empty) encoded[i] = encode(edges[i], seeds[i]);
+      });
     });
-  });
-  return encoded;
+    take(first, encoded);
+  }
+}
+
+std::uint64_t SeedRow::memory_bytes(const TileGrid& grid, bool in_scratch) {
+  const auto tiles = static_cast<std::uint64_t>(grid.tile_columns());
+  const auto rows = static_cast<std::uint64_t>(visible_rows(grid.shape()));
+  if (!in_scratch) return tiles * rows * kBytesPerRow;
+  return kSpillBytes + tiles * (sizeof(Tiles::Place) + sizeof(std::uint64_t)) +
+         std::min<std::uint64_t>(tiles, kTilesAtOnce) * rows * kBytesPerRow;
 }
 
 }  // namespace isohf

@@ -1,9 +1,11 @@
 #pragma once
 
+#include <functional>
 #include <span>
 #include <vector>
 
 #include "isohf/archive/shadow_seeds/shadow_seeds.h"
+#include "isohf/base/memory/spill_buffer.h"
 #include "isohf/surface/shade/shadow_hull.h"
 
 namespace isohf {
@@ -24,9 +26,35 @@ class SeedRow {
   /// Any tile, on any thread.
   [[nodiscard]] Tile prepare(const TileCodes& codes) const;
 
-  /// The members of a whole row, from West to East; payload_bytes 0 where a tile has none. On the caller's oneTBB
-  /// arena.
-  [[nodiscard]] std::vector<EncodedSeeds> encode(std::span<const Tile> tiles) const;
+  /// What the tiles of a row bring along, from West to East; in a scratch file where there is a folder for one.
+  class Tiles {
+   public:
+    explicit Tiles(const ScratchFolder& scratch) : scratch_(scratch), bytes_(scratch) {}
+    void add(const Tile& tile);
+    void clear();
+    [[nodiscard]] std::size_t count() const { return places_.size(); }
+
+   private:
+    friend class SeedRow;
+    struct Place {
+      std::uint64_t eastward;
+      std::uint64_t westward;
+      std::uint64_t edges;
+      CodeType type;
+      bool is_empty;
+    };
+    ScratchFolder scratch_;
+    SpillBuffer bytes_;
+    std::vector<Place> places_;
+  };
+
+  /// Hands over the members of a whole row, some at a time, from West to East; payload_bytes 0 where a tile has none.
+  /// On the caller's oneTBB arena.
+  using Take = std::function<void(std::size_t first, std::span<const EncodedSeeds> members)>;
+  void encode(const Tiles& tiles, const Take& take) const;
+
+  /// Peak memory of a row's Tiles and of encode(), bytes; an estimate.
+  [[nodiscard]] static std::uint64_t memory_bytes(const TileGrid& grid, bool in_scratch);
 
  private:
   [[nodiscard]] EncodedSeeds encode(const TileEdges& edges, const HullSeeds& seeds) const;

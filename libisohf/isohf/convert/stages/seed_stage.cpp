@@ -1,17 +1,12 @@
 #include "isohf/convert/stages/seed_stage.h"
 
 #include <fmt/format.h>
-#include <utility>
 
 #include "isohf/base/assert.h"
 #include "isohf/error.h"
 
 namespace isohf {
 namespace {
-
-/// Bytes kept of one visible row of a tile: about four casters of its own and three that enter, either way, and as much
-/// again while a row of tiles is finished (measured).
-constexpr std::uint64_t kBytesPerRow = 2 * (2 * 7 * sizeof(ShadowCaster) + 32);
 
 ShadowSeedInfo info_of(const ShadowSeedRequest& request, double elevation_units_per_world_unit) {
   ShadowSeedInfo info;
@@ -49,32 +44,31 @@ void check_seed_request(const ShadowSeedRequest& request, const TileGrid& grid) 
   }
 }
 
-std::uint64_t seed_stage_memory_bytes(const TileGrid& grid) {
-  return static_cast<std::uint64_t>(grid.tile_columns()) * static_cast<std::uint64_t>(visible_rows(grid.shape())) *
-         kBytesPerRow;
-}
-
 SeedStage::SeedStage(const TileGrid& grid, const Quantisation& quantisation, const ShadowSeedRequest& request,
-                     double elevation_units_per_world_unit)
-    : grid_(grid), info_(info_of(request, elevation_units_per_world_unit)), row_(grid, quantisation, info_) {}
+                     double elevation_units_per_world_unit, const ScratchFolder& scratch)
+    : grid_(grid),
+      info_(info_of(request, elevation_units_per_world_unit)),
+      row_(grid, quantisation, info_),
+      tiles_(scratch) {}
 
 std::int64_t SeedStage::first_tile_needed(const TileGrid& grid, std::int64_t next_tile) {
   return next_tile == 0 ? 0 : (next_tile - 1) / grid.tile_columns() * grid.tile_columns();
 }
 
-void SeedStage::add(TileIndex index, Tile tile, ArchiveWriter& writer) {
-  ISOHF_ASSERT(static_cast<std::int64_t>(tiles_.size()) == index.column);
-  tiles_.push_back(std::move(tile));
-  if (static_cast<std::int64_t>(tiles_.size()) == grid_.tile_columns()) finish_row(index.row, writer);
+void SeedStage::add(TileIndex index, const Tile& tile, ArchiveWriter& writer) {
+  ISOHF_ASSERT(static_cast<std::int64_t>(tiles_.count()) == index.column);
+  tiles_.add(tile);
+  if (static_cast<std::int64_t>(tiles_.count()) == grid_.tile_columns()) finish_row(index.row, writer);
 }
 
 void SeedStage::finish_row(std::int64_t row, ArchiveWriter& writer) {
-  const std::vector<EncodedSeeds> encoded = row_.encode(tiles_);
-  for (std::size_t i = 0; i < encoded.size(); ++i) {
-    if (encoded[i].payload_bytes == 0) continue;
-    writer.add_deflated_member(seed_name({static_cast<std::int64_t>(i), row}), encoded[i].deflated,
-                               encoded[i].payload_bytes, encoded[i].payload_crc32);
-  }
+  row_.encode(tiles_, [&](std::size_t first, std::span<const EncodedSeeds> members) {
+    for (std::size_t i = 0; i < members.size(); ++i) {
+      if (members[i].payload_bytes == 0) continue;
+      writer.add_deflated_member(seed_name({static_cast<std::int64_t>(first + i), row}), members[i].deflated,
+                                 members[i].payload_bytes, members[i].payload_crc32);
+    }
+  });
   tiles_.clear();
 }
 

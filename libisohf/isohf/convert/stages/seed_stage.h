@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <vector>
 
 #include "isohf/archive/writer.h"
 #include "isohf/convert.h"
@@ -12,17 +11,15 @@ namespace isohf {
 /// Throws Error{kInvalidArgument, kUnsupported} naming the option where the request cannot be met.
 void check_seed_request(const ShadowSeedRequest& request, const TileGrid& grid);
 
-/// Peak memory of a SeedStage, bytes; an estimate.
-[[nodiscard]] std::uint64_t seed_stage_memory_bytes(const TileGrid& grid);
-
 /// Shadow seeds in the pass that makes the tiles. What a tile's neighbours cast over its edges is known when its row of
 /// tiles is complete, for westward light from the East; so one row is kept, as hulls, and the members of a row follow
 /// its last tile. They depend on nothing but that row: a conversion that is resumed in a row begins that row again.
 class SeedStage {
  public:
   /// elevation_units_per_world_unit as in ShadowSeedInfo.
+  /// scratch  keeps what the tiles of a row bring along where memory has no room for it
   SeedStage(const TileGrid& grid, const Quantisation& quantisation, const ShadowSeedRequest& request,
-            double elevation_units_per_world_unit);
+            double elevation_units_per_world_unit, const ScratchFolder& scratch);
 
   using Tile = SeedRow::Tile;
   /// Any tile, on any thread.
@@ -33,7 +30,7 @@ class SeedStage {
 
   /// Takes the next tile in flat order, from first_tile_needed on; after the last of a row the row's members go to the
   /// writer. One thread.
-  void add(TileIndex index, Tile tile, ArchiveWriter& writer);
+  void add(TileIndex index, const Tile& tile, ArchiveWriter& writer);
 
   /// The metadata's record, once all tiles are in.
   [[nodiscard]] ShadowSeedInfo info(const ArchiveWriter& writer) const;
@@ -44,7 +41,7 @@ class SeedStage {
   TileGrid grid_;
   ShadowSeedInfo info_;
   SeedRow row_;
-  std::vector<Tile> tiles_;  ///< of the current row of tiles, so far
+  SeedRow::Tiles tiles_;  ///< of the current row of tiles, so far
 };
 
 }  // namespace isohf

@@ -12,7 +12,7 @@ namespace {
 SourceRows make_rows(const Conversion& conversion) {
   const MemoryPlan& memory = conversion.memory;
   if (memory.scratch_rows == 0) return {conversion.source, memory.read_step};
-  return {conversion.source, memory.read_step, conversion.options.scratch_folder, memory.scratch_rows};
+  return {conversion.source, memory.read_step, conversion.job.scratch_folder, memory.scratch_rows};
 }
 
 }  // namespace

@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
-#include "isohf/restore/point_sampler.h"
 #include "isohf/restore/predict/fixed_point.h"
+#include "isohf/restore/rows/vertex_rows.h"
 #include "isohf/surface/source/source_band.h"
 
 namespace isohf {
@@ -26,8 +26,16 @@ class SplinePredictor {
   static constexpr int kReach = 12 + 3;
 
   /// wraps_x  the grid's East edge is its West edge
-  SplinePredictor(const TileGrid& grid, bool wraps_x, const FixedHeights& heights, ReadTiles read_tiles,
-                  const SampleGrid& samples);
+  /// scratch  keeps tile rows and lattice rows where memory has no room for them
+  SplinePredictor(const TileGrid& grid, bool wraps_x, const Quantisation& quantisation, int fraction_bits,
+                  ReadTiles read_tiles, const SampleGrid& samples, const ScratchFolder& scratch = {});
+
+  /// Estimates: of what is held for the columns; of tiles and lattice rows, where those in hand span so many lattice
+  /// rows; of making lattice rows.
+  [[nodiscard]] static std::uint64_t kept_bytes(std::int64_t width, bool in_scratch);
+  [[nodiscard]] static double rows_bytes(const TileGrid& grid, std::int64_t width, double lattice_rows, int threads,
+                                         bool in_scratch);
+  [[nodiscard]] static double lines_bytes(const TileGrid& grid, int threads, bool in_scratch);
 
   /// The rows of tiles that read() reads.
   [[nodiscard]] RowRange tile_rows_needed(std::int64_t first, std::int64_t rows) const;
@@ -36,23 +44,18 @@ class SplinePredictor {
   void read(std::int64_t first, std::int64_t rows, std::span<double> elevations);
 
  private:
-  struct TileRow {
-    std::int64_t row;
-    std::vector<std::vector<double>> heights;  ///< [tile columns][C*R]
-  };
   struct LatticeRow {
-    std::vector<double> heights;       ///< at the samples' columns
-    std::vector<double> coefficients;  ///< the same, of the spline down the columns; made where they are needed
-    std::vector<char> near_void;       ///< empty where no column has a void around; all are void where `is_void`
-    bool is_void = false;
+    bool has_coefficients = false;
+    bool is_near_void = false;  ///< some columns have voids around
+    bool is_void = false;       ///< all of it
   };
-  /// Where the columns read a lattice row of one parity.
+  struct Block;
+  /// Where the columns read a lattice row of either parity.
   struct Taps {
-    std::vector<std::int32_t> start;  ///< [width] of the first of six
-    std::vector<double> weights;      ///< [6][width]
+    KeptRows<std::int32_t> start;  ///< [width] of the first of six
+    KeptRows<double> weights;      ///< [6] of each block of columns
   };
 
-  const TileRow& tile_row(std::int64_t row);
   void keep_lattice_rows(std::int64_t first, std::int64_t last);
   [[nodiscard]] std::int64_t lattice_rows() const;
   [[nodiscard]] std::int64_t tile_row_of(std::int64_t lattice_row) const;
@@ -60,20 +63,26 @@ class SplinePredictor {
   [[nodiscard]] std::int64_t z_of(std::int64_t row) const;
   [[nodiscard]] RowRange middles(std::int64_t first, std::int64_t rows) const;
   [[nodiscard]] RowRange lattice_rows_needed(const RowRange& middles) const;
-  [[nodiscard]] std::vector<double> line_of(const TileRow& tiles, std::int64_t lattice_row) const;
-  void straighten(const TileRow& tiles, std::int64_t lattice_row, LatticeRow& made) const;
-  void make_coefficients(std::int64_t lattice_row);
-  void read_row(std::int64_t row, std::span<double> out) const;
-  void read_triangles(std::int64_t z, const std::vector<char>& here, std::span<double> out) const;
+  [[nodiscard]] std::int64_t kept(std::int64_t lattice_row) const;
+  [[nodiscard]] std::vector<double> line_of(std::int64_t lattice_row) const;
+  void straighten(std::int64_t lattice_row);
+  void make_coefficients(std::int64_t lattice_row, Block& block);
+  void read_row(std::int64_t row, Block& block, std::span<double> out) const;
+  void read_triangles(std::int64_t z, std::int64_t first, const std::vector<char>& here, std::span<double> out) const;
+  template <typename Use>
+  void for_each_block(std::int64_t rows, const Use& use);
 
   TileGrid grid_;
   bool wraps_x_;
-  FixedHeights heights_;
-  ReadTiles read_tiles_;
+  FixedHeights numbers_;
   SampleGrid samples_;
   std::vector<std::int64_t> x_;  ///< of the columns
-  std::array<Taps, 2> taps_;     ///< of even lattice rows, and of odd ones
-  std::deque<TileRow> tile_rows_;
+  Taps taps_;                    ///< of even lattice rows, and of odd ones
+  VertexRows tiles_;
+  bool in_scratch_;
+  KeptRows<double> heights_;       ///< of lattice rows, at the samples' columns
+  KeptRows<double> coefficients_;  ///< the same, of the spline down the columns; made where they are needed
+  KeptRows<char> near_void_;       ///< 1 where a column has a void around; written where any has
   std::deque<LatticeRow> lattice_rows_;
   std::int64_t first_lattice_row_ = 0;
 };

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 #include <oneapi/tbb/enumerable_thread_specific.h>
 #include <oneapi/tbb/parallel_for.h>
+#include <oneapi/tbb/task_arena.h>
 
 #include <algorithm>
 #include <cmath>
@@ -13,9 +14,11 @@
 #include "isohf/archive/metadata/accuracy_info.h"
 #include "isohf/base/arena.h"
 #include "isohf/base/assert.h"
+#include "isohf/base/memory/memory_budget.h"
 #include "isohf/error.h"
 #include "isohf/lattice/barycentric.h"
 #include "isohf/restore/archive_geometry.h"
+#include "isohf/restore/rows/vertex_rows.h"
 #include "isohf/surface.h"
 #include "isohf/surface/source/band_reader.h"
 #include "isohf/surface/source/source_statistics.h"
@@ -62,11 +65,14 @@ void prune(std::vector<ErrorPeak>& peaks) {
   peaks.resize(std::min(peaks.size(), kMostPeaks));
 }
 
-/// A row of tiles, decoded.
+/// A row of tiles, decoded, where samples lie anywhere on it.
 struct TileRowSurface {
   std::int64_t tile_row = 0;
   std::vector<std::vector<double>> elevations;
 };
+
+/// Samples of the source that are compared at once, about, where they lie in rows.
+constexpr std::int64_t kSamplesAtOnce = std::int64_t{1} << 20U;
 
 class Comparison {
  public:
@@ -88,27 +94,36 @@ class Comparison {
     const double reach = std::max(grid_.sigma_x() * 2.0 / record_.spacing_x, grid_.sigma_z() / record_.spacing_z);
     reach_ = static_cast<std::int64_t>(std::ceil(reach)) + 1;
     if (is_warped(archive.metadata())) warp_.emplace(*archive_geometry(archive.metadata()).warp);
+    rows_at_once_ =
+        std::max<std::int64_t>(kSamplesAtOnce / info_.width, 2 * oneapi::tbb::this_task_arena::max_concurrency());
     draw_points(random_points);
   }
 
   AccuracyReport run(const Job& job) {
     const Prefilter samples_as_they_are = Prefilter::make(Filter::kBilinear, {});
+    const ScratchFolder scratch = choose_memory(job);
     BandReader reader(source_, datum_, samples_as_they_are);
     AccuracyReport report;
     ErrorSums errors;
     double random_squares = 0.0;
     std::int64_t first_row = 0;
     if (warp_) run_warped(reader, report, errors, random_squares, job);
+    VertexRows tiles(grid_, archive_.metadata().quantisation, tiles_of(archive_), 0, grid_.tile_columns() - 1, scratch);
     for (std::int64_t tile_row = 0; !warp_ && tile_row < grid_.tile_rows() && first_row < info_.height; ++tile_row) {
-      job.throw_if_cancelled();
       const std::int64_t end_row = rows_until(tile_row);
       if (end_row > first_row) {
+        tiles.drop_before(tile_row);
+        tiles.have(tile_row);
+      }
+      for (const std::int64_t first_of_tiles = first_row; first_row < end_row;) {
+        job.throw_if_cancelled();
+        const std::int64_t end = std::min(first_row + rows_at_once_, end_row);
         const auto band =
-            reader.read({std::max<std::int64_t>(first_row - reach_, 0), std::min(end_row + reach_, info_.height) - 1});
-        const TileRowSurface surface = decode(tile_row);
-        compare_rows(surface, *band, first_row, end_row, report, errors);
-        compare_points(surface, *band, first_row, end_row, report, random_squares);
-        first_row = end_row;
+            reader.read({std::max<std::int64_t>(first_row - reach_, 0), std::min(end + reach_, info_.height) - 1});
+        const RowSurface surface{tiles, tile_row};
+        compare_rows(surface, *band, first_row, end, report, errors);
+        compare_points(surface, *band, first_of_tiles, end, end == end_row, report, random_squares);
+        first_row = end;
       }
       job.report({"compare", "rows", tile_row + 1, grid_.tile_rows()});
     }
@@ -130,6 +145,34 @@ class Comparison {
  private:
   [[nodiscard]] double world_x(double column) const { return record_.first_sample_x + column * record_.spacing_x; }
   [[nodiscard]] double world_z(double row) const { return record_.first_sample_z + row * record_.spacing_z; }
+
+  /// A row of tiles, where samples lie in rows of its own.
+  struct RowSurface {
+    const VertexRows& tiles;
+    std::int64_t tile_row;
+  };
+
+  /// Where a row of tiles is kept. Throws Error{kOutOfMemory}.
+  ScratchFolder choose_memory(const Job& job) {
+    if (job.memory_bytes == 0) return std::nullopt;
+    constexpr std::uint64_t kBufferBytes = std::uint64_t{8} << 20U;
+    source_.limit_buffers(kBufferBytes);
+    const auto width = static_cast<double>(info_.width);
+    const double tiles = VertexRows::memory_bytes(grid_, 0.0);
+    // Of projected samples the rows under a row of tiles are many, and its tiles as doubles.
+    double rows = static_cast<double>(rows_at_once_ + 2 * reach_ + 4);
+    if (warp_) {
+      for (const SourceWarp::RowBounds& bounds : SourceWarp(grid_, warp_->place(), 0.0).reading_bounds())
+        rows =
+            std::max(rows, std::min(bounds.most - bounds.least + 2.0 * kMostReach, static_cast<double>(info_.height)));
+    }
+    const double bytes = reading_bytes(job, static_cast<double>(grid_.shape().stored_vertex_count())) +
+                         static_cast<double>(source_.buffer_bytes(kBufferBytes)) + 2.0 * kBufferBytes +
+                         rows * width * 10.0 + static_cast<double>(points_.size() * sizeof(Place)) +
+                         threads_of(job) * 8.0 * static_cast<double>(grid_.tile_columns() * grid_.shape().columns()) +
+                         (warp_ ? 2.0 * tiles : 0.0);
+    return scratch_for(job, bytes + tiles, bytes, "comparing");
+  }
 
   /// The tile row under a world place; the nearest one for places beside the tiles.
   [[nodiscard]] std::int64_t tile_row_at(WorldPoint world) const {
@@ -181,12 +224,25 @@ class Comparison {
     return surface;
   }
 
-  [[nodiscard]] double elevation_at(const TileRowSurface& surface, WorldPoint world) const {
+  [[nodiscard]] TilePoint locate(std::int64_t tile_row, WorldPoint world) const {
     TilePoint at = grid_.locate(world);
     // A source row on the edge of two tile rows may be rounded to either; their vertices on it are the same.
-    if (at.tile.row > surface.tile_row) at.point.z = grid_.shape().cell_rows();
-    if (at.tile.row < surface.tile_row) at.point.z = 0.0;
+    if (at.tile.row > tile_row) at.point.z = grid_.shape().cell_rows();
+    if (at.tile.row < tile_row) at.point.z = 0.0;
     at.point = {snapped(at.point.x), snapped(at.point.z)};
+    return at;
+  }
+
+  /// Of a point anywhere.
+  [[nodiscard]] double elevation_at(const RowSurface& surface, WorldPoint world) const {
+    const TilePoint at = locate(surface.tile_row, world);
+    const TriangleRows vertices(surface.tiles, grid_.shape(), surface.tile_row, at.point.z, at.tile.column, 1);
+    return vertices.elevation(archive_.metadata().quantisation, at.tile.column,
+                              snapped(barycentric(grid_.shape(), at.point)));
+  }
+
+  [[nodiscard]] double elevation_at(const TileRowSurface& surface, WorldPoint world) const {
+    const TilePoint at = locate(surface.tile_row, world);
     const std::vector<double>& elevations = surface.elevations[static_cast<std::size_t>(at.tile.column)];
     const View2D<const double> view(elevations.data(), grid_.shape().columns(), grid_.shape().rows());
     return interpolate(snapped(barycentric(grid_.shape(), at.point)), view);
@@ -195,17 +251,24 @@ class Comparison {
   void compare_rows(const TileRowSurface& surface, const Band& band, std::int64_t first, std::int64_t end,
                     AccuracyReport& report, ErrorSums& errors) {
     std::vector<Sums> sums(static_cast<std::size_t>(end - first));
-    if (warp_) {
-      oneapi::tbb::parallel_for(first / kBlock, (end + kBlock - 1) / kBlock, [&](std::int64_t block) {
-        const std::int64_t from = std::max(first, block * kBlock);
-        const std::int64_t to = std::min(end, (block + 1) * kBlock);
-        compare_warped_rows(surface, band, from, to, std::span(sums).subspan(static_cast<std::size_t>(from - first)));
-      });
-    } else {
-      oneapi::tbb::parallel_for(first, end, [&](std::int64_t row) {
-        compare_row(surface, band, row, sums[static_cast<std::size_t>(row - first)], histograms_.local());
-      });
-    }
+    oneapi::tbb::parallel_for(first / kBlock, (end + kBlock - 1) / kBlock, [&](std::int64_t block) {
+      const std::int64_t from = std::max(first, block * kBlock);
+      const std::int64_t to = std::min(end, (block + 1) * kBlock);
+      compare_warped_rows(surface, band, from, to, std::span(sums).subspan(static_cast<std::size_t>(from - first)));
+    });
+    add_up(sums, first, report, errors);
+  }
+
+  void compare_rows(const RowSurface& surface, const Band& band, std::int64_t first, std::int64_t end,
+                    AccuracyReport& report, ErrorSums& errors) {
+    std::vector<Sums> sums(static_cast<std::size_t>(end - first));
+    oneapi::tbb::parallel_for(first, end, [&](std::int64_t row) {
+      compare_row(surface, band, row, sums[static_cast<std::size_t>(row - first)], histograms_.local());
+    });
+    add_up(sums, first, report, errors);
+  }
+
+  void add_up(std::span<const Sums> sums, std::int64_t first, AccuracyReport& report, ErrorSums& errors) {
     for (std::size_t i = 0; i < sums.size(); ++i) {
       const Sums& row = sums[i];
       if (row.errors.max > 0.0) {
@@ -222,18 +285,23 @@ class Comparison {
     }
   }
 
-  void compare_row(const TileRowSurface& surface, const Band& band, std::int64_t row, Sums& sums,
+  void compare_row(const RowSurface& surface, const Band& band, std::int64_t row, Sums& sums,
                    ErrorHistogram& histogram) const {
+    const double z = world_z(static_cast<double>(row));
+    const TriangleRows vertices(surface.tiles, grid_.shape(), surface.tile_row,
+                                locate(surface.tile_row, {0.0, z}).point.z, 0, grid_.tile_columns());
     for (std::int64_t column = 0; column < info_.width; ++column) {
-      const WorldPoint world{world_x(static_cast<double>(column)), world_z(static_cast<double>(row))};
-      compare_sample(surface, band, column, row, world, sums, histogram);
+      const WorldPoint world{world_x(static_cast<double>(column)), z};
+      const TilePoint at = locate(surface.tile_row, world);
+      const double stored = vertices.elevation(archive_.metadata().quantisation, at.tile.column,
+                                               snapped(barycentric(grid_.shape(), at.point)));
+      compare_sample(stored, band, column, row, world, sums, histogram);
     }
   }
 
-  void compare_sample(const TileRowSurface& surface, const Band& band, std::int64_t column, std::int64_t row,
-                      WorldPoint world, Sums& sums, ErrorHistogram& histogram) const {
+  void compare_sample(double stored, const Band& band, std::int64_t column, std::int64_t row, WorldPoint world,
+                      Sums& sums, ErrorHistogram& histogram) const {
     const float sample = band.view().heights(column, row - band.rows.first);
-    const double stored = elevation_at(surface, world);
     const bool is_void = std::isnan(sample);
     sums.counts.samples_void += is_void ? 1 : 0;
     if (is_void || std::isnan(stored)) {
@@ -259,7 +327,7 @@ class Comparison {
           const WorldPoint world = warp_->world_from_source({static_cast<double>(c), static_cast<double>(row)});
           if (tile_row_at(world) != surface.tile_row) continue;
           ++of_row.visited;
-          compare_sample(surface, band, c, row, world, of_row, histogram);
+          compare_sample(elevation_at(surface, world), band, c, row, world, of_row, histogram);
         }
       }
     }
@@ -335,19 +403,21 @@ class Comparison {
     });
   }
 
-  /// Points whose place lies in this tile row: their source row is in [first - 1, end).
-  void compare_points(const TileRowSurface& surface, const Band& band, std::int64_t first, std::int64_t end,
-                      AccuracyReport& report, double& squares) {
+  /// Points whose place lies in this tile row, which begins at source row `first`, and before row `end`: in the tile
+  /// row's last rows their source row is in [first - 1, end).
+  void compare_points(const RowSurface& surface, const Band& band, std::int64_t first, std::int64_t end,
+                      bool ends_tile_row, AccuracyReport& report, double& squares) {
     const bool last = end == info_.height;
     for (; next_point_ < points_.size(); ++next_point_) {
       const Place& place = points_[next_point_];
-      if (!last && place.v > static_cast<double>(end - 1)) break;
+      if (!last && place.v > static_cast<double>(ends_tile_row ? end - 1 : end)) break;
       if (first > 0 && place.v < static_cast<double>(first)) continue;  // between the last row and the edge
       compare_point(surface, band, place, report, squares);
     }
   }
 
-  void compare_point(const TileRowSurface& surface, const Band& band, const Place& place, AccuracyReport& report,
+  template <typename Surface>
+  void compare_point(const Surface& surface, const Band& band, const Place& place, AccuracyReport& report,
                      double& squares) const {
     const auto i = static_cast<std::int64_t>(place.u);
     const auto j = static_cast<std::int64_t>(place.v);
@@ -375,6 +445,7 @@ class Comparison {
   double datum_ = 0.0;
   double span_ = 0.0;
   std::int64_t reach_ = 2;
+  std::int64_t rows_at_once_ = 1;  ///< that are compared, where samples lie in rows
   std::optional<ExactWarp> warp_;  ///< where the source was projected
   std::int64_t visited_ = 0;
   std::vector<Place> points_;  ///< from North to South

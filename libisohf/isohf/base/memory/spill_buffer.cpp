@@ -1,4 +1,4 @@
-#include "isohf/base/spill_buffer.h"
+#include "isohf/base/memory/spill_buffer.h"
 
 #include <algorithm>
 
@@ -14,10 +14,15 @@ constexpr std::size_t kTailBytes = std::size_t{4} << 20U;
 
 void SpillBuffer::append(std::span<const std::byte> bytes) {
   tail_.insert(tail_.end(), bytes.begin(), bytes.end());
-  if (tail_.size() < kTailBytes) return;
-  if (!file_.is_open()) file_ = File::scratch(folder_, 0);
+  if (!folder_ || tail_.size() < kTailBytes) return;
+  if (!file_.is_open()) file_ = File::scratch(*folder_, 0);
   file_.write_at(spilled_, tail_);
   spilled_ += tail_.size();
+  tail_.clear();
+}
+
+void SpillBuffer::clear() {
+  spilled_ = 0;
   tail_.clear();
 }
 

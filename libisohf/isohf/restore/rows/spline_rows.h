@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "isohf/base/memory/kept_rows.h"
 #include "isohf/lattice.h"
 
 /// The separable way back from the lattice (docs/decisions/0012): along each lattice row a quintic B-spline gives
@@ -37,26 +38,32 @@ class SplineRows {
  public:
   /// columns_x [n]  the world x of the columns that are wanted, increasing
   /// wraps_x        rows go all the way round: behind their East end they begin again
-  SplineRows(const TileGrid& grid, const std::vector<double>& columns_x, bool wraps_x);
+  /// scratch        keeps their weights where memory has no room for them
+  SplineRows(const TileGrid& grid, const std::vector<double>& columns_x, bool wraps_x, const ScratchFolder& scratch);
 
   [[nodiscard]] std::int64_t rows() const { return grid_.tile_rows() * grid_.shape().cell_rows() + 3; }
   [[nodiscard]] std::int64_t tile_row_of(std::int64_t row) const;
   /// Fractional row number of a world z.
   [[nodiscard]] double row_at(double z) const { return z / grid_.sigma_z() + 1.0; }
 
-  /// Heights of lattice row `row` at the columns. `tiles`: the C*R elevations of all tiles of its tile row.
+  /// Its number among the vertex rows of its tiles.
+  [[nodiscard]] int vertex_row_of(std::int64_t row) const {
+    return static_cast<int>(row - tile_row_of(row) * grid_.shape().cell_rows());
+  }
+
+  /// Heights of lattice row `row` at the columns. vertices: its C elevations of all tiles.
   /// heights [n] out; near_void [n] out: 1 where a void is among the six vertices around the column: the height means
   /// nothing there. Returns whether any is. Vertices that slid onto a tile's edge are left out: their lattice
   /// neighbours are in the tile beside.
-  bool straighten(std::int64_t row, const std::vector<std::vector<double>>& tiles, std::span<double> heights,
+  bool straighten(std::int64_t row, std::span<const double> vertices, std::span<double> heights,
                   std::span<char> near_void) const;
 
  private:
-  [[nodiscard]] std::vector<double> line_of(std::int64_t row, const std::vector<std::vector<double>>& tiles) const;
+  [[nodiscard]] std::vector<double> line_of(std::int64_t row, std::span<const double> vertices) const;
 
   TileGrid grid_;
   bool wraps_x_;
-  std::array<std::vector<QuinticWeights>, 2> taps_;  ///< on padding-first rows (even k), and on odd ones
+  KeptRows<QuinticWeights> taps_;  ///< on padding-first rows (even k), and on odd ones
 };
 
 }  // namespace isohf

@@ -1,4 +1,4 @@
-#include "isohf/restore/spline_rows.h"
+#include "isohf/restore/rows/spline_rows.h"
 
 #include <algorithm>
 #include <cmath>
@@ -51,9 +51,12 @@ double beta5(double x) {
 /// the spline itself.
 constexpr std::int64_t kRound = QuinticResponse::kHalo + 4;
 
+/// Columns whose weights are read together.
+constexpr std::size_t kBlock = 2048;
+
 /// Whether the vertices of a tile's row lie half a column step further West.
-bool is_shifted(std::int64_t tile_row) {
-  return tile_row % 2 == 0;
+bool is_shifted(int vertex_row) {
+  return vertex_row % 2 == 0;
 }
 
 /// Fills voids between two valid samples along the straight line, beyond the outermost with its value. False where
@@ -123,17 +126,21 @@ void quintic_prefilter(std::span<double> line) {
   for (double& value : line) value *= 120.0;
 }
 
-SplineRows::SplineRows(const TileGrid& grid, const std::vector<double>& columns_x, bool wraps_x)
-    : grid_(grid), wraps_x_(wraps_x) {
+SplineRows::SplineRows(const TileGrid& grid, const std::vector<double>& columns_x, bool wraps_x,
+                       const ScratchFolder& scratch)
+    : grid_(grid), wraps_x_(wraps_x), taps_(columns_x.size(), scratch) {
   // Even k are odd z, with vertices at object-space x = -1, 1, ...; odd k have them at -2, 0, ...
-  for (const double x : columns_x) {
-    const double half_steps = x / grid.sigma_x();
-    taps_[0].push_back(quintic_weights((half_steps + 1.0) / 2.0));
-    taps_[1].push_back(quintic_weights((half_steps + 2.0) / 2.0));
-  }
-  if (!wraps_x) return;
-  for (std::vector<QuinticWeights>& taps : taps_) {
-    for (QuinticWeights& at : taps) at.first += kRound - 1;
+  for (const std::int64_t parity : {0, 1}) {
+    taps_.add(parity);
+    std::vector<QuinticWeights> block;
+    for (std::size_t c = 0; c < columns_x.size(); ++c) {
+      const double half_steps = columns_x[c] / grid.sigma_x();
+      block.push_back(quintic_weights((half_steps + static_cast<double>(parity + 1)) / 2.0));
+      if (wraps_x) block.back().first += kRound - 1;
+      if (block.size() < kBlock && c + 1 < columns_x.size()) continue;
+      taps_.write(parity, c + 1 - block.size(), block);
+      block.clear();
+    }
   }
 }
 
@@ -142,15 +149,14 @@ std::int64_t SplineRows::tile_row_of(std::int64_t row) const {
 }
 
 /// The vertices of a lattice row, padding included; of a row that goes round, kRound more on either side instead.
-std::vector<double> SplineRows::line_of(std::int64_t row, const std::vector<std::vector<double>>& tiles) const {
+std::vector<double> SplineRows::line_of(std::int64_t row, std::span<const double> vertices) const {
   const std::int64_t columns = grid_.shape().columns();
   const std::int64_t cells = grid_.shape().cell_columns();
-  const std::int64_t r = row - tile_row_of(row) * grid_.shape().cell_rows();
-  const bool shifted = is_shifted(r);
+  const bool shifted = is_shifted(vertex_row_of(row));
   std::vector<double> line(static_cast<std::size_t>(cells * grid_.tile_columns() + (shifted ? 2 : 3)));
-  for (std::size_t t = 0; t < tiles.size(); ++t) {
-    const double* from = tiles[t].data() + r * columns;
-    double* to = line.data() + static_cast<std::int64_t>(t) * cells;
+  for (std::int64_t t = 0; t < grid_.tile_columns(); ++t) {
+    const double* from = vertices.data() + t * columns;
+    double* to = line.data() + t * cells;
     if (shifted) {
       to[0] = from[0];
       std::copy(from + 2, from + columns - 2, to + 1);
@@ -168,10 +174,10 @@ std::vector<double> SplineRows::line_of(std::int64_t row, const std::vector<std:
   return round;
 }
 
-bool SplineRows::straighten(std::int64_t row, const std::vector<std::vector<double>>& tiles, std::span<double> heights,
+bool SplineRows::straighten(std::int64_t row, std::span<const double> vertices, std::span<double> heights,
                             std::span<char> near_void) const {
-  const bool shifted = is_shifted(row - tile_row_of(row) * grid_.shape().cell_rows());
-  std::vector<double> line = line_of(row, tiles);
+  const bool shifted = is_shifted(vertex_row_of(row));
+  std::vector<double> line = line_of(row, vertices);
   std::vector<char> voids;
   if (std::any_of(line.begin(), line.end(), [](double h) { return std::isnan(h); })) {
     for (const double height : line) voids.push_back(std::isnan(height) ? 1 : 0);
@@ -183,21 +189,24 @@ bool SplineRows::straighten(std::int64_t row, const std::vector<std::vector<doub
   }
   quintic_prefilter(line);
   const auto count = static_cast<std::int64_t>(line.size());
-  const std::vector<QuinticWeights>& taps = taps_[shifted ? 0 : 1];
   bool any = false;
-  for (std::size_t c = 0; c < heights.size(); ++c) {
-    const QuinticWeights& at = taps[c];
-    const bool inside = at.first >= 0 && at.first + 6 <= count;
-    double sum = 0.0;
-    char near = 0;
-    for (std::int64_t i = 0; i < 6; ++i) {
-      const auto place = static_cast<std::size_t>(inside ? at.first + i : mirror_index(at.first + i, count));
-      sum += at.weights[static_cast<std::size_t>(i)] * line[place];
-      if (!voids.empty()) near = static_cast<char>(near | voids[place]);
+  std::vector<QuinticWeights> buffer;
+  for (std::size_t from = 0; from < heights.size(); from += kBlock) {
+    const auto taps = taps_.read(shifted ? 0 : 1, from, std::min(kBlock, heights.size() - from), buffer);
+    for (std::size_t c = 0; c < taps.size(); ++c) {
+      const QuinticWeights& at = taps[c];
+      const bool inside = at.first >= 0 && at.first + 6 <= count;
+      double sum = 0.0;
+      char near = 0;
+      for (std::int64_t i = 0; i < 6; ++i) {
+        const auto place = static_cast<std::size_t>(inside ? at.first + i : mirror_index(at.first + i, count));
+        sum += at.weights[static_cast<std::size_t>(i)] * line[place];
+        if (!voids.empty()) near = static_cast<char>(near | voids[place]);
+      }
+      heights[from + c] = sum;
+      near_void[from + c] = near;
+      any = any || near != 0;
     }
-    heights[c] = sum;
-    near_void[c] = near;
-    any = any || near != 0;
   }
   return any;
 }

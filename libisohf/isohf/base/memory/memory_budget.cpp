@@ -1,0 +1,43 @@
+#include "isohf/base/memory/memory_budget.h"
+
+#include <fmt/format.h>
+#if defined(__GLIBC__)
+#include <malloc.h>
+#endif
+
+#include <cmath>
+
+#include "isohf/base/arena.h"
+#include "isohf/error.h"
+
+namespace isohf {
+
+void give_back_freed_memory() {
+#if defined(__GLIBC__)
+  (void)::malloc_trim(0);
+#endif
+}
+
+double reading_bytes(const Job& job, double vertices_of_tile) {
+  return kProgramBytes + threads_of(job) * (kThreadBytes + kDecodingBytesPerVertex * vertices_of_tile);
+}
+
+void require_memory(const Job& job, double bytes, double least, const std::string& what, const std::string& remedy) {
+  if (job.memory_bytes == 0 || bytes <= static_cast<double>(job.memory_bytes)) return;
+  constexpr std::uint64_t kMega = 1000000;
+  const auto enough = static_cast<std::uint64_t>(std::ceil(least / static_cast<double>(kMega)));
+  const std::string use = fmt::format("{}fewer `threads` than {}", remedy, threads_of(job));
+  throw Error(ErrorCode::kOutOfMemory,
+              fmt::format("`memory_bytes` allows {} MB, {} needs at least {} MB; allow that much, or use {}",
+                          job.memory_bytes / kMega, what, enough, use),
+              {"memory", fmt::format("{} MB", job.memory_bytes / kMega), fmt::format("at least {} MB", enough),
+               "allow that much, or use smaller tiles or fewer threads"});
+}
+
+ScratchFolder scratch_for(const Job& job, double in_memory, double in_scratch, const std::string& what) {
+  if (job.memory_bytes == 0 || in_memory <= static_cast<double>(job.memory_bytes)) return std::nullopt;
+  require_memory(job, in_scratch, in_scratch, what, "");
+  return job.scratch_folder;
+}
+
+}  // namespace isohf
