@@ -12,6 +12,7 @@ namespace {
 using namespace std::string_view_literals;
 
 constexpr const char* kGdal = "gdal_translate {} OUT.tif makes a GeoTIFF of it";
+constexpr const char* kRestore = "isohf restore {} OUT.tif makes a raster of it";
 constexpr const char* kUnpack = "unpack it first";
 
 struct Signature {
@@ -22,7 +23,8 @@ struct Signature {
 };
 
 constexpr Signature kSignatures[] = {
-    {"isohf.json"sv, "an isohf archive", "isohf restore {} OUT.tif makes a raster of it", 30},
+    {"isohf.json"sv, "an isohf archive", kRestore, 30},
+    {"mimetypeapplication/vnd.isohf"sv, "an isohf archive", kRestore, 30},
     {"mimetypeapplication/vnd.isohf"sv, "an isohf archive", "isohf restore {} OUT.tif makes a raster of it", 30},
     {"PK\x03\x04"sv, "a ZIP file", "it is damaged or cut off"},
     {"\x1f\x8b"sv, "a gzip file", "gunzip it first"},

@@ -24,7 +24,7 @@ std::string extension_of(const std::string& path) {
 
 /// Size, place and void value in the words that GridFloat and ASCII grids share. Cells are areas: the corner of the
 /// South-West cell lies half a spacing off its sample.
-std::string grid_words(const RasterSpec& spec) {
+std::string grid_words(const RasterSpec& spec, const std::string& void_text) {
   std::string words = fmt::format("ncols {}\nnrows {}\n", spec.width, spec.height);
   const Georeference place = spec.georeference.value_or(Georeference{});
   const double south = place.origin_y - static_cast<double>(spec.height - 1) * place.spacing_y;
@@ -33,13 +33,14 @@ std::string grid_words(const RasterSpec& spec) {
   words += fmt::format("xllcorner {}\nyllcorner {}\n", x, y);
   words += place.spacing_x == place.spacing_y ? fmt::format("cellsize {}\n", place.spacing_x)
                                               : fmt::format("dx {}\ndy {}\n", place.spacing_x, place.spacing_y);
-  return words + fmt::format("NODATA_value {}\n", grid_void(spec));
+  return words + fmt::format("NODATA_value {}\n", void_text);
 }
 
 /// GridFloat knows one cell size; EHdr's words, which its readers take as well, know two.
 std::string grid_float_header(const RasterSpec& spec) {
   const Georeference place = spec.georeference.value_or(Georeference{});
-  if (place.spacing_x == place.spacing_y) return grid_words(spec) + "byteorder LSBFIRST\n";
+  if (place.spacing_x == place.spacing_y)
+    return grid_words(spec, fmt::format("{}", grid_void(spec))) + "byteorder LSBFIRST\n";
   return fmt::format(
       "NROWS {}\nNCOLS {}\nNBANDS 1\nNBITS 32\nPIXELTYPE FLOAT\nBYTEORDER LSBFIRST\nLAYOUT BIL\nULXMAP {}\n"
       "ULYMAP {}\nXDIM {}\nYDIM {}\nNODATA {}\n",
@@ -156,7 +157,10 @@ double grid_void(const RasterSpec& spec) {
 }
 
 std::string ascii_grid_header(const RasterSpec& spec) {
-  return grid_words(spec);
+  // In the digits of the voids themselves: a reader compares the two as doubles.
+  const bool is_single = spec.sample_type == SampleType::kFloat16 || spec.sample_type == SampleType::kFloat32;
+  return grid_words(
+      spec, is_single ? fmt::format("{}", static_cast<float>(grid_void(spec))) : fmt::format("{}", grid_void(spec)));
 }
 
 std::vector<std::string> sidecar_paths(const std::string& path) {

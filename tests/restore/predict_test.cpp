@@ -85,7 +85,7 @@ TEST(SplinePredictor, AgreesWithTheSplinesInDoublesAndIsVoidWhereTheTrianglesAre
     field.has_hole = has_hole;
     const SampleGrid samples{61, 57, 0.7, 0.4, 1.95, 2.1};
     SplinePredictor predictor(field.grid, false, field.quantisation, 8, field.reader(), samples);
-    GridSampler hex(field.grid, false, field.quantisation, field.reader(), samples, RestoreMethod::kHex);
+    GridSampler hex(field.grid, false, field.quantisation, field.reader(), samples, RestoreMethod::kHex, false);
     GridSampler flat(field.grid, false, field.quantisation, field.reader(), samples, RestoreMethod::kBarycentric);
     std::vector<double> found(static_cast<std::size_t>(samples.width));
     std::vector<double> smooth(found.size());

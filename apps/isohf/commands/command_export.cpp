@@ -6,7 +6,6 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
-#include <limits>
 #include <nlohmann/json.hpp>
 #include <optional>
 
@@ -188,7 +187,7 @@ class Exporter {
     has_voids = needs_void(archive_.metadata(), grid_.samples, options_.raster.output);
     mapping = choose_mapping();
     if (!options_.common.quiet) warn_of_lost_scale(options_.raster.output, mapping);
-    const auto void_value = has_voids ? usual_nodata(mapping.type) : std::nullopt;
+    const auto void_value = void_value_of(mapping.type, has_voids);
     const SampleStore store(mapping, void_value, options_.raster.clamp_range);
     ExportTiles tiles(options_.raster.output, grid_.cut, grid_.samples.width);
     const auto spec_of = [&](std::int64_t column, std::int64_t row) {
@@ -205,10 +204,13 @@ class Exporter {
     for (std::int64_t group = 0; group < tiles.groups(); ++group) {
       tiles.begin_group(group, spec_of);
       counts = {};
-      scan("export", [&](std::int64_t row, std::span<const double> elevations) {
-        tiles.write(
-            row, store_rows(store, mapping.type, options_.raster.output, grid_.samples.width, row, elevations, counts));
-      });
+      const Job reading = job("export");
+      rows(reading).read_all(
+          [&](std::int64_t row, std::span<const double> elevations) {
+            tiles.write(row, store_rows(store, mapping.type, options_.raster.output, grid_.samples.width, row,
+                                        elevations, counts));
+          },
+          reading);
     }
     files = tiles.files();
     written = tiles.keep();
@@ -221,10 +223,13 @@ class Exporter {
   std::vector<std::string> written;  ///< those beside them as well
 
  private:
-  void scan(const char* stage, const RowReader::Take& take) {
-    Job job = job_from(options_.work, display_);
-    job.progress = [&](const Progress& at) { display_.update(stage, at.unit, at.done, at.total); };
-    RowReader(archive_, grid_.samples, options_.method(archive_.metadata(), grid_.samples), job).read_all(take, job);
+  Job job(const char* stage) {
+    Job made = job_from(options_.work, display_);
+    made.progress = [this, stage](const Progress& at) { display_.update(stage, at.unit, at.done, at.total); };
+    return made;
+  }
+  [[nodiscard]] RowReader rows(const Job& job) const {
+    return {archive_, grid_.samples, options_.method(archive_.metadata(), grid_.samples), job};
   }
 
   SampleMapping choose_mapping() {
@@ -238,19 +243,15 @@ class Exporter {
       return {type, 1.0, 0.0};
     }
     if (options_.z_range) return spread(type, *options_.z_range, has_voids);
-    if (type != SampleType::kUint8 && type != SampleType::kUint16) return {type, 1.0, 0.0};
-    double low = std::numeric_limits<double>::infinity();
-    double high = -low;
-    bool voids = false;
-    scan("range", [&](std::int64_t, std::span<const double> elevations) {
-      for (const double z : elevations) {
-        voids = voids || std::isnan(z);
-        low = z < low ? z : low;
-        high = z > high ? z : high;
-      }
-    });
-    has_voids = voids;
-    return low <= high ? spread(type, {low, high}, has_voids) : SampleMapping{type, 1.0, 0.0};
+    const SampleMapping whole{type, 1.0, 0.0};
+    if (type == SampleType::kUint8 || type == SampleType::kUint16) {
+      const Job reading = job("range");
+      return spread_over(type, rows(reading), reading, has_voids);
+    }
+    if (takes_decimals(archive_.metadata(), whole) && !options_.common.quiet) {
+      warn_of_whole_numbers(options_.raster.output, archive_.metadata());
+    }
+    return whole;
   }
 
   const ExportOptions& options_;

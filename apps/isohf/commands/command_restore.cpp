@@ -148,9 +148,10 @@ SampleGrid asked_grid(const RestoreOptions& options, ArchiveReader& archive) {
 
 struct Restored {
   SampleStore::Result counts;
-  bool is_source = false;          ///< the source's own samples, hash checked
-  std::vector<std::string> files;  ///< written
-  std::optional<double> rounding;  ///< the largest error of the source's samples, with --round
+  bool is_source = false;               ///< the source's own samples, hash checked
+  std::vector<std::string> files;       ///< written
+  std::optional<double> rounding;       ///< the largest error of the source's samples, with --round
+  std::optional<SampleMapping> spread;  ///< of decimals over an integer type
 };
 
 class Restorer {
@@ -192,6 +193,8 @@ class Restorer {
     // A void value that the type does not hold is missed only where a sample is void.
     const bool lacks_void = void_value && !as_kept && !SampleStore(written, std::nullopt, false).holds(*void_value);
     if (voids_to_nan || as_elevations || lacks_void) void_value.reset();
+    if (!void_value && is_floating(written.type))
+      void_value = void_value_of(written.type, needs_void(archive_.metadata(), grid_, options_.raster.output));
     const auto sink = open(source_raster_spec(archive_.metadata(), written, void_value), written);
     double rounding = 0.0;
     std::int64_t row = 0;
@@ -217,20 +220,28 @@ class Restorer {
       row += static_cast<std::int64_t>(count) / record.width;
     }
     sink->finish();
-    return {{}, true, sink->files(), options_.rounds && !as_kept ? std::optional(rounding) : std::nullopt};
+    return {{}, true, sink->files(), options_.rounds && !as_kept ? std::optional(rounding) : std::nullopt, {}};
   }
 
   Restored run_surface() {
     const Metadata& metadata = archive_.metadata();
-    const SampleMapping mapping{
-        restored_type(options_.raster.output, sample_type_from_string(metadata.source.sample_type)),
-        metadata.source.z_scale, metadata.source.z_offset};
-    const bool has_voids = needs_void(metadata, grid_, options_.raster.output);
-    const auto void_value = has_voids ? usual_nodata(mapping.type) : std::nullopt;
+    bool has_voids = needs_void(metadata, grid_, options_.raster.output);
+    SampleMapping mapping{restored_type(options_.raster.output, sample_type_from_string(metadata.source.sample_type)),
+                          metadata.source.z_scale, metadata.source.z_offset};
+    const RestoreMethod method = options_.raster.method.value_or(usual_method(metadata, grid_));
+    Restored restored;
+    if (takes_decimals(metadata, mapping)) {
+      if (has_scale(options_.raster.output)) {
+        mapping = spread_over(mapping.type, RowReader(archive_, grid_, method, job_), job_, has_voids);
+        restored.spread = mapping;
+      } else if (!options_.common.quiet) {
+        warn_of_whole_numbers(options_.raster.output, metadata);
+      }
+    }
+    const auto void_value = void_value_of(mapping.type, has_voids);
     const SampleStore store(mapping, void_value, options_.raster.clamp_range);
     const auto sink = open(raster_spec(metadata, grid_, mapping, void_value), mapping);
-    Restored restored;
-    RowReader(archive_, grid_, options_.raster.method.value_or(usual_method(metadata, grid_)), job_)
+    RowReader(archive_, grid_, method, job_)
         .read_all(
             [&](std::int64_t row, std::span<const double> elevations) {
               sink->write_rows(store_rows(store, mapping.type, options_.raster.output, grid_.width, row, elevations,
@@ -298,6 +309,9 @@ int run(const RestoreOptions& options) {
       what = fmt::format("the source's own samples, SHA-256 as stated, rounded by up to {:.3g}", *restored.rounding);
     }
     if (!restored.is_source) what = fmt::format("method {}, {} voids", how, describe_count(restored.counts.nodata));
+    if (restored.spread) {
+      what += fmt::format("; elevation = sample * {} + {}", restored.spread->z_scale, restored.spread->z_offset);
+    }
     if (restored.counts.clamped > 0)
       what += fmt::format(", {} moved into the range", describe_count(restored.counts.clamped));
     out.write(fmt::format("{}: {} x {} samples, {}\n", options.raster.output, grid.width, grid.height, what));

@@ -255,6 +255,9 @@ class Answers {
   void answer() {
     std::vector<SurfaceSample> samples(places_.size());
     surface_.sample(places_, std::span(samples));
+    if (options_.sun.elevation_units_per_world_unit != 1.0) {
+      for (SurfaceSample& sample : samples) stand_in_metres(sample.normal);
+    }
     std::vector<SunSample> suns(options_.with_shadow ? places_.size() : 0);
     if (options_.with_shadow) surface_.sample(places_, options_.sun, options_.above, suns);
     std::vector<std::string> texts((samples.size() + kPlacesOfText - 1) / kPlacesOfText);
@@ -269,6 +272,13 @@ class Answers {
     });
     for (const std::string& text : texts) options_.binary ? out_.write_bytes(text) : out_.write(text);
     places_.clear();
+  }
+
+  /// Of ground whose heights and lengths both are metres.
+  void stand_in_metres(std::array<double, 3>& normal) const {
+    normal[1] *= options_.sun.elevation_units_per_world_unit;
+    const double length = std::hypot(normal[0], normal[1], normal[2]);
+    for (double& part : normal) part /= length;
   }
 
   const SampleOptions& options_;

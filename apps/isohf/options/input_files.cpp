@@ -73,7 +73,9 @@ std::vector<std::string> files_in(const std::string& folder, Wanted wanted) {
   Iterator entry(folder, error);
   for (; !error && entry != Iterator(); entry.increment(error)) {
     std::error_code gone;
-    if (entry->is_regular_file(gone) && has_wanted_name(entry->path(), wanted) && !is_label_of_another(entry->path())) {
+    // A link that leads nowhere stands for a file that is missing: whoever opens it says so.
+    const bool is_file = entry->is_regular_file(gone) || (entry->is_symlink(gone) && !entry->exists(gone));
+    if (is_file && has_wanted_name(entry->path(), wanted) && !is_label_of_another(entry->path())) {
       found.push_back(entry->path().string());
     }
   }

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <filesystem>
+#include <limits>
 #include <utility>
 
 #include "formats/files/text.h"
@@ -22,17 +23,11 @@ RasterSpec plain_spec(const Metadata& metadata, const SampleGrid& grid, const Sa
   spec.sample_type = mapping.type;
   spec.z_scale = mapping.z_scale;
   spec.z_offset = mapping.z_offset;
-  if (void_value && !std::isnan(*void_value)) spec.void_value = void_value;
+  spec.void_value = void_value;
   spec.describe = true;
   if (metadata.vertical_unit != "unknown") spec.vertical_unit = metadata.vertical_unit;
   if (const auto unit = linear_unit(spec.vertical_unit)) spec.metres_per_vertical_unit = unit->metres;
   return spec;
-}
-
-/// Whether the file, or the one beside it, says what scale and offset are.
-bool has_scale(RasterKind kind) {
-  return kind == RasterKind::kTiff || kind == RasterKind::kPng || kind == RasterKind::kRaw16 ||
-         kind == RasterKind::kRaw32;
 }
 
 }  // namespace
@@ -84,12 +79,50 @@ RasterSpec source_raster_spec(const Metadata& metadata, const SampleMapping& map
   return spec;
 }
 
+std::optional<double> void_value_of(SampleType type, bool has_voids) {
+  if (!has_voids) return std::nullopt;
+  return usual_nodata(type).value_or(std::numeric_limits<double>::quiet_NaN());
+}
+
 bool needs_void(const Metadata& metadata, const SampleGrid& grid, const std::string& output) {
   return may_have_nodata(metadata, grid) || raster_kind(output) == RasterKind::kHgt;
 }
 
+bool takes_decimals(const Metadata& metadata, const SampleMapping& mapping) {
+  return !is_floating(mapping.type) && mapping.z_scale == 1.0 &&
+         is_floating(sample_type_from_string(metadata.source.sample_type));
+}
+
+bool has_scale(const std::string& output) {
+  const RasterKind kind = raster_kind(output);
+  return kind == RasterKind::kTiff || kind == RasterKind::kPng || kind == RasterKind::kRaw16 ||
+         kind == RasterKind::kRaw32;
+}
+
+SampleMapping spread_over(SampleType type, RowReader rows, const Job& job, bool& has_voids) {
+  double low = std::numeric_limits<double>::infinity();
+  double high = -low;
+  has_voids = false;
+  rows.read_all(
+      [&](std::int64_t, std::span<const double> elevations) {
+        for (const double z : elevations) {
+          has_voids = has_voids || std::isnan(z);
+          low = z < low ? z : low;
+          high = z > high ? z : high;
+        }
+      },
+      job);
+  return low <= high ? spread(type, {low, high}, has_voids) : SampleMapping{type, 1.0, 0.0};
+}
+
+void warn_of_whole_numbers(const std::string& output, const Metadata& metadata) {
+  const std::string& unit = metadata.vertical_unit;
+  print_warning(loss(fmt::format("{}: holds whole numbers: elevations are rounded by up to 0.5 {}", output,
+                                 unit == "unknown" ? "of their unit" : unit)));
+}
+
 void warn_of_lost_scale(const std::string& output, const SampleMapping& mapping) {
-  if ((mapping.z_scale == 1.0 && mapping.z_offset == 0.0) || has_scale(raster_kind(output))) return;
+  if ((mapping.z_scale == 1.0 && mapping.z_offset == 0.0) || has_scale(output)) return;
   print_warning(loss(fmt::format("{}: has no place for what its raw numbers mean: elevation = raw * {} + {}", output,
                                  mapping.z_scale, mapping.z_offset)));
 }

@@ -20,16 +20,26 @@ enum class RasterKind { kTiff, kExr, kPng, kHgt, kAsc, kFlt, kRaw16, kRaw32, kNp
 [[nodiscard]] SampleType restored_type(const std::string& path, SampleType source_type);
 
 /// What a raster of that grid is: size, georeference and unit, so far as they are known, and what its raw numbers mean.
-/// A void value that is NaN goes without saying.
 [[nodiscard]] RasterSpec raster_spec(const Metadata& metadata, const SampleGrid& grid, const SampleMapping& mapping,
                                      std::optional<double> void_value);
 /// The source's own raster, in its own reference system also where it was projected.
 [[nodiscard]] RasterSpec source_raster_spec(const Metadata& metadata, const SampleMapping& mapping,
                                             std::optional<double> void_value);
 
+/// The raw value that stands for voids, if there are some: NaN in floats, which other programs want to be told.
+[[nodiscard]] std::optional<double> void_value_of(SampleType type, bool has_voids);
+
 /// Whether a raster of the grid in `output` needs a value for voids.
 [[nodiscard]] bool needs_void(const Metadata& metadata, const SampleGrid& grid, const std::string& output);
 
+/// Whether whole numbers of `mapping` would take the decimals of a source that has some.
+[[nodiscard]] bool takes_decimals(const Metadata& metadata, const SampleMapping& mapping);
+/// Whether a raster in `output` can say what its numbers mean, itself or in the file beside it.
+[[nodiscard]] bool has_scale(const std::string& output);
+/// All elevations of a grid, spread over an integer type. Reads them; `has_voids` becomes whether some are void.
+[[nodiscard]] SampleMapping spread_over(SampleType type, RowReader rows, const Job& job, bool& has_voids);
+/// A warning that elevations in `output` are rounded to whole units.
+void warn_of_whole_numbers(const std::string& output, const Metadata& metadata);
 /// A warning where scale or offset say something and the format of `output` has no place for them.
 void warn_of_lost_scale(const std::string& output, const SampleMapping& mapping);
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <filesystem>
 #include <set>
 
 #include "isohf/archive.h"
@@ -98,6 +99,11 @@ class Copy {
   }
 
   void add_file(const Attachment& file) {
+    std::error_code ignored;
+    const auto kind = std::filesystem::status(file.path, ignored).type();
+    if (kind != std::filesystem::file_type::not_found && kind != std::filesystem::file_type::regular) {
+      refuse(file.path + ": is no regular file; copy what it gives into one");
+    }
     const auto source = open_file_source(file.path);
     const std::vector<std::byte> bytes = SourceBytes(*source, 0, source->size_bytes()).take();
     const std::vector<std::byte> deflated = deflate_bytes(bytes);

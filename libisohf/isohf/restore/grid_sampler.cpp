@@ -80,7 +80,9 @@ GridSampler::GridSampler(const TileGrid& grid, bool wraps_x, const Quantisation&
       method_(method),
       end_z_(world.value_or(grid).world_height()),
       snaps_(snaps),
-      spline_(grid, method == RestoreMethod::kHex ? columns_of(samples) : std::vector<double>{}, wraps_x, scratch),
+      beyond_(snaps ? Beyond::kSloped : Beyond::kMirrored),
+      spline_(grid, method == RestoreMethod::kHex ? columns_of(samples) : std::vector<double>{}, wraps_x, beyond_,
+              scratch),
       in_scratch_(scratch.has_value()),
       heights_(static_cast<std::size_t>(samples.width), scratch),
       near_void_(static_cast<std::size_t>(samples.width), scratch) {
@@ -147,14 +149,15 @@ void GridSampler::keep_lattice_rows(std::int64_t first, std::int64_t last) {
   }
 }
 
-/// The lattice rows that a row of samples is made of, mirrored at the ends.
+/// The lattice rows that a row of samples is made of.
 RowRange GridSampler::lattice_rows_of(std::int64_t row) const {
   const double z = std::clamp(world_z(row), 0.0, grid_.world_height());
   const std::int64_t start = quintic_weights(spline_.row_at(z)).first - QuinticResponse::kHalo;
   RowRange rows{spline_.rows() - 1, 0};
   for (std::int64_t k = start; k < start + QuinticResponse::kTaps; ++k) {
-    rows.first = std::min(rows.first, mirror_index(k, spline_.rows()));
-    rows.last = std::max(rows.last, mirror_index(k, spline_.rows()));
+    const StandIn from = stand_in(k, spline_.rows(), beyond_);
+    rows.first = std::min(rows.first, from.first != 0.0 ? 0 : from.at);
+    rows.last = std::max(rows.last, from.last != 0.0 ? spline_.rows() - 1 : from.at);
   }
   return rows;
 }
@@ -209,7 +212,7 @@ void GridSampler::read_row(std::int64_t row, Block& block, std::span<double> out
   const QuinticResponse response = quintic_response(spline_.row_at(std::clamp(z, 0.0, grid_.world_height())));
   bool beside_voids = tiles_->has_voids(at.tile.row);
   for (std::int64_t t = 0; t < QuinticResponse::kTaps; ++t) {
-    const std::int64_t k = mirror_index(response.first + t, spline_.rows());
+    const std::int64_t k = stand_in(response.first + t, spline_.rows(), beyond_).at;
     beside_voids = beside_voids || is_any_near_void_[static_cast<std::size_t>(k - first_lattice_row_)] != 0;
   }
   if (beside_voids) read_on_triangles(at, block, out);
@@ -223,29 +226,57 @@ void GridSampler::blend_lattice_rows(const QuinticResponse& response, bool besid
     std::span<const double> heights;
     std::span<const char> near_void;  ///< empty: nowhere
   };
-  std::array<LatticeRow, QuinticResponse::kTaps> rows{};
-  for (std::size_t t = 0; t < rows.size(); ++t) {
-    const std::int64_t k = mirror_index(response.first + static_cast<std::int64_t>(t), spline_.rows());
-    rows[t].heights = block.heights.row(k);
-    if (is_any_near_void_[static_cast<std::size_t>(k - first_lattice_row_)] != 0)
-      rows[t].near_void = block.near_void.row(k);
-  }
-  const auto is_near_void = [&](std::size_t t, std::size_t c) {
-    return !rows[t].near_void.empty() && rows[t].near_void[c] != 0;
+  struct Tap {
+    StandIn share;
+    LatticeRow row;
+    LatticeRow first;  ///< the ends' rows, where they count
+    LatticeRow last;
+
+    [[nodiscard]] double height(std::size_t c) const {
+      double sum = share.sign * row.heights[c];
+      if (!first.heights.empty()) sum += share.first * first.heights[c];
+      if (!last.heights.empty()) sum += share.last * last.heights[c];
+      return sum;
+    }
+    [[nodiscard]] bool is_near_void(std::size_t c) const {
+      for (const LatticeRow* each : {&row, &first, &last}) {
+        if (!each->near_void.empty() && each->near_void[c] != 0) return true;
+      }
+      return false;
+    }
   };
+  const auto lattice_row = [&](std::int64_t k) {
+    LatticeRow row{block.heights.row(k), {}};
+    if (is_any_near_void_[static_cast<std::size_t>(k - first_lattice_row_)] != 0) row.near_void = block.near_void.row(k);
+    return row;
+  };
+  std::array<Tap, QuinticResponse::kTaps> rows{};
+  for (std::size_t t = 0; t < rows.size(); ++t) {
+    const StandIn from = stand_in(response.first + static_cast<std::int64_t>(t), spline_.rows(), beyond_);
+    rows[t] = {from, lattice_row(from.at), {}, {}};
+    if (from.first != 0.0) rows[t].first = lattice_row(0);
+    if (from.last != 0.0) rows[t].last = lattice_row(spline_.rows() - 1);
+  }
   std::vector<double> sums(out.size(), 0.0);
   for (std::size_t t = 0; t < rows.size(); ++t) {
     const double weight = response.weights[t];
-    const double* heights = rows[t].heights.data();
+    if (!rows[t].first.heights.empty() || !rows[t].last.heights.empty()) {
+      for (std::size_t c = 0; c < sums.size(); ++c) sums[c] += weight * rows[t].height(c);
+      continue;
+    }
+    const double* heights = rows[t].row.heights.data();
     for (std::size_t c = 0; c < sums.size(); ++c) sums[c] += weight * heights[c];
   }
   if (!beside_voids) {
-    for (std::size_t c = 0; c < out.size(); ++c) out[c] = columns_[c].inside ? sums[c] : kVoid;
+    const Column* const columns = columns_.data() + block.first;
+    for (std::size_t c = 0; c < out.size(); ++c) out[c] = columns[c].inside ? sums[c] : kVoid;
     return;
   }
   std::vector<char> near(out.size(), 0);
-  for (const LatticeRow& row : rows) {
-    for (std::size_t c = 0; c < row.near_void.size(); ++c) near[c] = static_cast<char>(near[c] | row.near_void[c]);
+  for (const Tap& tap : rows) {
+    for (const LatticeRow* row : {&tap.row, &tap.first, &tap.last}) {
+      for (std::size_t c = 0; c < row->near_void.size(); ++c) near[c] = static_cast<char>(near[c] | row->near_void[c]);
+    }
   }
   const auto is_core = [](std::size_t t) {
     return t >= QuinticResponse::kHalo && t < QuinticResponse::kTaps - QuinticResponse::kHalo;
@@ -258,19 +289,19 @@ void GridSampler::blend_lattice_rows(const QuinticResponse& response, bool besid
     }
     // Beside voids the column goes on, level, from the last row that has a height.
     bool whole = true;
-    for (std::size_t t = 0; t < rows.size(); ++t) whole = whole && !(is_core(t) && is_near_void(t, c));
+    for (std::size_t t = 0; t < rows.size(); ++t) whole = whole && !(is_core(t) && rows[t].is_near_void(c));
     if (!whole) continue;
     double sum = 0.0;
     const auto go = [&](std::size_t t, double& last, bool& ended) {
-      ended = ended || is_near_void(t, c);
-      if (!ended) last = rows[t].heights[c];
+      ended = ended || rows[t].is_near_void(c);
+      if (!ended) last = rows[t].height(c);
       sum += response.weights[t] * last;
     };
     const std::size_t middle = rows.size() / 2;
-    double last = rows[middle].heights[c];
+    double last = rows[middle].height(c);
     bool ended = false;
     for (std::size_t t = middle; t < rows.size(); ++t) go(t, last, ended);
-    last = rows[middle].heights[c];
+    last = rows[middle].height(c);
     ended = false;
     for (std::size_t t = middle; t-- > 0;) go(t, last, ended);
     out[c] = sum;

@@ -25,7 +25,8 @@ const SampleGrid& require_samples_near(const SampleGrid& samples, const TileGrid
 class GridSampler {
  public:
   /// wraps_x  the grid's East edge is its West edge
-  /// snaps    as in PointSampler
+  /// snaps    as in PointSampler; without it rows and columns are mirrored at their ends besides, as predictions of old
+  ///          archives have it
   /// world    where the surface ends; nullopt: with the grid, beyond which a coarse plane's may reach
   /// scratch  keeps tile rows and lattice rows where memory has no room for them
   GridSampler(const TileGrid& grid, bool wraps_x, const Quantisation& quantisation, ReadTiles read_tiles,
@@ -65,6 +66,7 @@ class GridSampler {
   RestoreMethod method_;
   double end_z_;  ///< of the surface, world units
   bool snaps_;
+  Beyond beyond_;
   SplineRows spline_;
   std::vector<Column> columns_;
   std::optional<VertexRows> tiles_;  ///< kHex: all of a row, else those under samples

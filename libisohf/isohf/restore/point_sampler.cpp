@@ -208,7 +208,11 @@ void PointSampler::visit(std::size_t points, const TileOf& tile_of, const Sample
 }
 
 std::int64_t PointSampler::tile_under(WorldPoint point) const {
-  return grid_.contains(point) ? grid_.flat_index(grid_.locate(point).tile) : -1;
+  // A place on the outline that went through degrees or a map comes back off it by roundings.
+  const double slack = snaps_ ? 1e-11 * std::max(grid_.world_width(), grid_.world_height()) : 0.0;
+  const bool is_inside = std::abs(std::clamp(point.x, 0.0, grid_.world_width()) - point.x) <= slack &&
+                         std::abs(std::clamp(point.z, 0.0, grid_.world_height()) - point.z) <= slack;
+  return is_inside ? grid_.flat_index(grid_.locate(point).tile) : -1;
 }
 
 void PointSampler::sample(std::span<const WorldPoint> points, std::span<SurfaceSample> samples) {

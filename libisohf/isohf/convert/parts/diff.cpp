@@ -73,7 +73,7 @@ ArchiveDifference diff_archives(const std::string& first, const std::string& sec
   const ArchiveReader b(second);
   ArchiveDifference found;
   found.metadata = differing_members(a, b);
-  found.why_other_lattice = why_other_lattice(a.metadata(), b.metadata());
+  found.why_other_lattice = why_other_vertices(a.metadata(), b.metadata());
   TileRange& tiles = found.compared;
   tiles = intersection(tiles_here(a), tiles_here(b));
   if (found.why_other_lattice.empty() && tiles.is_empty()) found.why_other_lattice = "holds other tiles of the lattice";
@@ -136,7 +136,7 @@ void subtract_archives(const std::string& first, const std::string& second, cons
   constexpr std::int64_t kSamplesAtOnce = std::int64_t{1} << 18U;
   const ArchiveReader a(first);
   const ArchiveReader b(second);
-  if (const std::string why = why_other_lattice(a.metadata(), b.metadata()); !why.empty()) {
+  if (const std::string why = why_other_vertices(a.metadata(), b.metadata()); !why.empty()) {
     throw Error(ErrorCode::kInvalidArgument, fmt::format("{}: {} as {} has", second, why, first));
   }
   const SampleGrid grid = natural_grid(a.metadata());

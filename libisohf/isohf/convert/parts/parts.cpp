@@ -78,7 +78,7 @@ TileRange tiles_touching(const TileGrid& grid, const WorldBounds& bounds) {
   return {{west, north}, {east, south}};
 }
 
-std::string why_other_lattice(const Metadata& one, const Metadata& other) {
+std::string why_other_vertices(const Metadata& one, const Metadata& other) {
   const TileGrid& a = one.grid;
   const TileGrid& b = other.grid;
   const auto shape = [](const TileGrid& grid) {
@@ -91,6 +91,15 @@ std::string why_other_lattice(const Metadata& one, const Metadata& other) {
     return fmt::format("has tiles of {} by {} world units, not {} by {}", b.extent_x(), b.extent_z(), a.extent_x(),
                        a.extent_z());
   }
+  const auto ground = [](Metadata metadata) {
+    metadata.content_sha256.clear();
+    return ground_hash(metadata);
+  };
+  if (ground(one) != ground(other)) return "lies on other ground: projection, place, reference system or unit differ";
+  return {};
+}
+
+std::string why_other_lattice(const Metadata& one, const Metadata& other) {
   const Quantisation& codes = one.quantisation;
   const Quantisation& others = other.quantisation;
   if (codes.type != others.type || codes.offset != others.offset || codes.scale != others.scale) {
@@ -99,12 +108,7 @@ std::string why_other_lattice(const Metadata& one, const Metadata& other) {
     };
     return fmt::format("has elevations {}, not {}", text(others), text(codes));
   }
-  const auto ground = [](Metadata metadata) {
-    metadata.content_sha256.clear();
-    return ground_hash(metadata);
-  };
-  if (ground(one) != ground(other)) return "lies on other ground: projection, place, reference system or unit differ";
-  return {};
+  return why_other_vertices(one, other);
 }
 
 void require_copyable(const ArchiveReader& archive) {

@@ -15,6 +15,8 @@ namespace isohf {
 
 /// Why tiles of one archive have no place in the other, one clause; empty where both lie on one lattice.
 [[nodiscard]] std::string why_other_lattice(const Metadata& one, const Metadata& other);
+/// The same for tiles that are compared by elevations, whatever their codes.
+[[nodiscard]] std::string why_other_vertices(const Metadata& one, const Metadata& other);
 
 /// Throws Error{kInvalidArgument} where an archive's members cannot be copied as they are: of version 1, repacked.
 void require_copyable(const ArchiveReader& archive);

@@ -47,8 +47,8 @@ double beta5(double x) {
   return rest * rest * rest * rest * rest / 120.0;
 }
 
-/// Vertices that a row which goes round is continued by: as far as the prefilter reaches (QuinticResponse::kHalo), and
-/// the spline itself.
+/// Vertices that a row which goes round, or whose slope goes on, is continued by: as far as the prefilter reaches
+/// (QuinticResponse::kHalo), and the spline itself.
 constexpr std::int64_t kRound = QuinticResponse::kHalo + 4;
 
 /// Columns whose weights are read together.
@@ -126,9 +126,20 @@ void quintic_prefilter(std::span<double> line) {
   for (double& value : line) value *= 120.0;
 }
 
-SplineRows::SplineRows(const TileGrid& grid, const std::vector<double>& columns_x, bool wraps_x,
+StandIn stand_in(std::int64_t k, std::int64_t count, Beyond beyond) {
+  if (k >= 0 && k < count) return {k};
+  if (beyond == Beyond::kMirrored) return {mirror_index(k, count)};
+  // Two ends further on the line is itself again, raised by twice what it rises.
+  const std::int64_t end = count - 1;
+  const std::int64_t in_turn = (k % (2 * end) + 2 * end) % (2 * end);
+  const auto turns = static_cast<double>((k - in_turn) / (2 * end));
+  if (in_turn <= end) return {in_turn, 1.0, -2.0 * turns, 2.0 * turns};
+  return {2 * end - in_turn, -1.0, -2.0 * turns, 2.0 + 2.0 * turns};
+}
+
+SplineRows::SplineRows(const TileGrid& grid, const std::vector<double>& columns_x, bool wraps_x, Beyond beyond,
                        const ScratchFolder& scratch)
-    : grid_(grid), wraps_x_(wraps_x), taps_(columns_x.size(), scratch) {
+    : grid_(grid), wraps_x_(wraps_x), beyond_(beyond), taps_(columns_x.size(), scratch) {
   // Even k are odd z, with vertices at object-space x = -1, 1, ...; odd k have them at -2, 0, ...
   for (const std::int64_t parity : {0, 1}) {
     taps_.add(parity);
@@ -136,7 +147,7 @@ SplineRows::SplineRows(const TileGrid& grid, const std::vector<double>& columns_
     for (std::size_t c = 0; c < columns_x.size(); ++c) {
       const double half_steps = columns_x[c] / grid.sigma_x();
       block.push_back(quintic_weights((half_steps + static_cast<double>(parity + 1)) / 2.0));
-      if (wraps_x) block.back().first += kRound - 1;
+      if (wraps_x || beyond == Beyond::kSloped) block.back().first += wraps_x ? kRound - 1 : kRound;
       if (block.size() < kBlock && c + 1 < columns_x.size()) continue;
       taps_.write(parity, c + 1 - block.size(), block);
       block.clear();
@@ -148,7 +159,8 @@ std::int64_t SplineRows::tile_row_of(std::int64_t row) const {
   return std::clamp<std::int64_t>((row - 1) / grid_.shape().cell_rows(), 0, grid_.tile_rows() - 1);
 }
 
-/// The vertices of a lattice row, padding included; of a row that goes round, kRound more on either side instead.
+/// The vertices of a lattice row, padding included; of a row that goes round kRound more on either side instead, of one
+/// whose slope goes on besides.
 std::vector<double> SplineRows::line_of(std::int64_t row, std::span<const double> vertices) const {
   const std::int64_t columns = grid_.shape().columns();
   const std::int64_t cells = grid_.shape().cell_columns();
@@ -165,9 +177,21 @@ std::vector<double> SplineRows::line_of(std::int64_t row, std::span<const double
       std::copy(from, from + columns - 1, to);
     }
   }
-  if (!wraps_x_) return line;
-  const std::int64_t period = cells * grid_.tile_columns();
+  if (!wraps_x_ && beyond_ == Beyond::kMirrored) return line;
   std::vector<double> round;
+  if (!wraps_x_) {
+    const auto count = static_cast<std::int64_t>(line.size());
+    for (std::int64_t k = -kRound; k < count + kRound; ++k) {
+      const StandIn from = stand_in(k, count, beyond_);
+      double height = from.sign * line[static_cast<std::size_t>(from.at)];
+      // An end that is void says nothing of the other.
+      if (from.first != 0.0) height += from.first * line.front();
+      if (from.last != 0.0) height += from.last * line.back();
+      round.push_back(height);
+    }
+    return round;
+  }
+  const std::int64_t period = cells * grid_.tile_columns();
   for (std::int64_t k = -kRound; k < period + kRound; ++k) {
     round.push_back(line[static_cast<std::size_t>(1 + (k % period + period) % period)]);
   }

@@ -239,11 +239,12 @@ std::string SourceSurvey::warning() const {
     if (warning.kind == Warning::Kind::kUndeclaredNodata) return {};
   }
   std::string values;
-  std::string list;  // the first one
+  std::string list;  // what is declared goes on to mean it
+  for (const double value : info_.void_values) list += fmt::format("{:.9g},", value);
   for (const UndeclaredVoid& found : undeclared_voids()) {
+    list += fmt::format("{}{:.9g}", values.empty() ? "" : ",", found.value);
     values += fmt::format("{}{} samples hold {:.9g}{}", values.empty() ? "" : ", ", found.count, found.value,
                           found.many_values ? " or the like" : "");
-    if (list.empty()) list = fmt::format("{:.9g}", found.value);
   }
   if (values.empty()) return {};
   return fmt::format("{}, far from all others ({:.6g} to {:.6g}): if that means no elevation, give `void_values` {}",
