@@ -6,8 +6,10 @@
 #include <array>
 #include <cctype>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
@@ -171,7 +173,15 @@ bool open_raster(IsohfOiioRaster& raster, const char* path, const std::string& c
   OIIO::ImageSpec config;
   config.attribute("oiio:UnassociatedAlpha", 1);  // numbers as stored, not multiplied by alpha
   config.attribute("oiio:RawColor", 1);
-  raster.input = OIIO::ImageInput::open(path, &config);
+  {
+    // Of a name that says nothing OpenImageIO tries every format, DICOM among them, which reads through zeros for minutes.
+    constexpr std::uintmax_t kMostToTry = std::uintmax_t{16} << 20U;
+    static std::mutex one_at_a_time;  // the attribute is the library's
+    const std::lock_guard lock(one_at_a_time);
+    std::error_code unknown;
+    OIIO::attribute("try_all_readers", std::filesystem::file_size(path, unknown) <= kMostToTry ? 1 : 0);
+    raster.input = OIIO::ImageInput::open(path, &config);
+  }
   if (!raster.input) {
     const std::string why = OIIO::geterror();
     if (why.find("could not find a format reader") != std::string::npos) return false;

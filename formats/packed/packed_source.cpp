@@ -418,6 +418,14 @@ bool is_zip(const std::string& path) {
   }
 }
 
+bool is_zip_of_rasters(const std::string& path) {
+  try {
+    return !rasters_in(members_of_zip(RawFile(path)), "").empty();
+  } catch (const Error&) {
+    return true;  // whoever opens it says what is wrong
+  }
+}
+
 std::unique_ptr<HeightSource> open_packed(const std::string& path, const OpenOptions& options) {
   return std::make_unique<PackedSource>(path, options);
 }

@@ -366,7 +366,8 @@ TEST(ExrSource, ReadsPartsOfAMultiPartFile) {
   wrong.part = "3";
   EXPECT_THAT(error_of([&] { (void)open_exr(path, wrong); }).what(), HasSubstr("in parts 0...2"));
   write_file(folder / "a.asc", "ncols 1\nnrows 1\n1\n");
-  EXPECT_THAT(error_of([&] { (void)open_raster(folder / "a.asc", wrong); }).what(), HasSubstr("`part` is for OpenEXR"));
+  EXPECT_THAT(error_of([&] { (void)open_raster(folder / "a.asc", wrong); }).what(),
+              HasSubstr("`part` is for archives and OpenEXR"));
 }
 
 TEST(ExrSource, RefusesSubsampledChannelsOnly) {

@@ -42,7 +42,7 @@ void require_one_line(const std::string& text) {
 void restore(const std::string& path) {
   try {
     const isohf::ArchiveReader archive(path);
-    isohf::SourceRowReader rows(archive, {1, 1000, {}});
+    isohf::SourceRowReader rows(archive, {.threads = 1});
     while (!rows.at_end()) static_cast<void>(rows.read_next());
   } catch (const isohf::Error& error) {
     require_one_line(error.what());
@@ -71,7 +71,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   } catch (const std::exception&) {
     return 0;  // no such archive can be put together
   }
-  const isohf::VerifyReport report = isohf::verify_archive(path, {1, 1000, {}});
+  const isohf::VerifyReport report = isohf::verify_archive(path, {.threads = 1});
   for (const isohf::Finding& finding : report.findings) require_one_line(finding.text);
   restore(path);
   return 0;

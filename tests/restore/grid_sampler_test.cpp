@@ -94,6 +94,23 @@ TEST(GridSampler, HoldsPlanesWhereverTilesMeet) {
   }
 }
 
+TEST(GridSampler, EndsWithTheSurfaceHoweverManyColumnsThereAre) {
+  const TileGrid grid = three_by_two();
+  const SampleGrid samples{6000, 1, 0.0, 5.0, grid.world_width() / 4500.0, 1.0};
+  for (const RestoreMethod method : {RestoreMethod::kBarycentric, RestoreMethod::kHex}) {
+    GridSampler rows = surface_of(grid, samples, method, [](double x, double) { return x; });
+    std::vector<double> row(6000);
+    rows.read(0, 1, row);
+    for (std::size_t c = 0; c < row.size(); ++c) {
+      const double x = static_cast<double>(c) * samples.spacing_x;
+      ASSERT_EQ(std::isnan(row[c]), c > 4500) << c;
+      if (c <= 4500) {
+        ASSERT_NEAR(row[c], x, 1e-4);
+      }
+    }
+  }
+}
+
 TEST(GridSampler, GoRoundWhereTheWorldDoes) {
   const TileGrid grid = three_by_two();
   const double round = grid.world_width();

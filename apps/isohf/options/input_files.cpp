@@ -49,7 +49,7 @@ bool has_wanted_name(const fs::path& path, Wanted wanted) {
   if (name.starts_with(".")) return false;
   const bool is_archive = name.size() > 6 && name.ends_with(".isohf");
   if (is_archive || wanted == Wanted::kArchives) return is_archive && wanted != Wanted::kRasters;
-  if (name.ends_with(".zip") && is_zip_of_hgt(path.string())) return true;
+  if (name.ends_with(".zip")) return is_zip_of_rasters(path.string());
   if (name.ends_with(".gz")) name.resize(name.size() - 3);
   return std::any_of(raster_extensions().begin(), raster_extensions().end(), [&](const std::string& extension) {
     return name.size() > extension.size() && name.ends_with(extension);

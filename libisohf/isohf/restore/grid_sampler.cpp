@@ -247,7 +247,8 @@ void GridSampler::blend_lattice_rows(const QuinticResponse& response, bool besid
   };
   const auto lattice_row = [&](std::int64_t k) {
     LatticeRow row{block.heights.row(k), {}};
-    if (is_any_near_void_[static_cast<std::size_t>(k - first_lattice_row_)] != 0) row.near_void = block.near_void.row(k);
+    if (is_any_near_void_[static_cast<std::size_t>(k - first_lattice_row_)] != 0)
+      row.near_void = block.near_void.row(k);
     return row;
   };
   std::array<Tap, QuinticResponse::kTaps> rows{};
