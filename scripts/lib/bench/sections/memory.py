@@ -8,10 +8,10 @@ KINDS = {"bilinear": ["--filter", "bilinear"], "bspline5": ["--filter", "bspline
          "with seeds": ["--filter", "bilinear", "--shadow-seeds"], "--lossless": ["--filter", "bilinear", "--lossless"]}
 LIMITS_MB = [None, 512, 256, 128, 64, 32]
 # What is read: the archive of a kind above, and how; OUT is written, or nothing.
-READERS = {"restore": ("bilinear", ["restore", "IN", "OUT.tif"]),
-           "restore, --lossless": ("--lossless", ["restore", "IN", "OUT.tif"]),
-           "export --method barycentric": ("bilinear", ["export", "IN", "OUT.tif", "--method", "barycentric"]),
-           "diff --raster": ("bilinear", ["diff", "IN", "IN", "--raster", "OUT.tif"]),
+READERS = {"restore": ("bilinear", ["restore", "IN", "OUT.npy"]),
+           "restore, --lossless": ("--lossless", ["restore", "IN", "OUT.npy"]),
+           "export --method barycentric": ("bilinear", ["export", "IN", "OUT.npy", "--method", "barycentric"]),
+           "diff --raster": ("bilinear", ["diff", "IN", "IN", "--raster", "OUT.npy"]),
            "verify": ("bilinear", ["verify", "IN"]),
            "verify, with seeds": ("with seeds", ["verify", "IN"]),
            "verify, --lossless": ("--lossless", ["verify", "IN"]),
@@ -77,9 +77,10 @@ def measure(bench):
                                        w.replace("OUT", str(bench.work / "memory_out")) for w in words]
             output = next((w for w in command if "memory_out" in w), None)
 
+            command += [] if output is None else ["--overwrite", "--quiet"]
+
             def run(bound, command=command, output=output):
-                rest = [] if output is None else ["--overwrite", "--quiet"]
-                measured = bench.run_or_refusal(*command, *rest, *bound)
+                measured = bench.run_or_refusal(*command, *bound)
                 if "refused" in measured:
                     return None
                 return measured, digest_of(output) if output else measured["out"]
