@@ -40,6 +40,7 @@ class Journal {
   /// Remembers a step; it reaches the file with the next flush().
   void add(const JournalRecord& record);
   void flush();
+  [[nodiscard]] std::size_t pending_bytes() const { return pending_.size(); }  ///< that flush() would write
   /// Whether a later open() finds anything.
   [[nodiscard]] bool has_flushed_records() const;
   /// Forgets everything behind the first `records` that open() returned. `sizes` as open() returned them.
