@@ -7,7 +7,9 @@
 #include <atomic>
 #include <chrono>
 #include <cstddef>
+#include <deque>
 #include <limits>
+#include <mutex>
 #include <semaphore>
 #include <system_error>
 #include <thread>
@@ -52,8 +54,15 @@ void start_workers(oneapi::tbb::task_arena& arena, int workers) {
     std::atomic<int> arrived = 0;
     std::atomic<bool> is_open = false;
   };
-  const auto gate = std::make_shared<Gate>();  // tasks outlive this call where one of them throws
-  const auto open = [&gate] {
+  // Tasks outlive this call where one of them throws, or where a worker comes late; some never run. So gates stay, one
+  // for each number of workers that is more than any before.
+  static std::mutex making;
+  static auto* const gates = new std::deque<Gate>;  // NOLINT(cppcoreguidelines-owning-memory)
+  Gate* const gate = [] {
+    const std::lock_guard lock(making);
+    return &gates->emplace_back();
+  }();
+  const auto open = [gate] {
     gate->is_open = true;
     gate->is_open.notify_all();
   };
