@@ -403,21 +403,23 @@ bool ArchiveWriter::keep_part() noexcept {
   State& state = *state_;
   if (state.finished || !state.journal) return false;
   // Where the disk is full, what reached it counts; a resume checks it.
-  const auto make_room = [&] {
-    // The journal is worth more than the last tiles: a resume writes these again.
-    constexpr std::uint64_t kBlocks = std::uint64_t{64} << 10U;
-    if (state.journal->has_flushed_records()) return;
-    const std::uint64_t room = state.journal->pending_bytes() + kBlocks;
-    if (state.part.size_on_disk() <= room) return;
-    state.part.truncate(state.part.size_on_disk() - room);
-    state.journal->flush();
-  };
-  for (const auto& save :
-       {std::function<void()>([&] { state.part.sync(); }), {[&] { state.journal->flush(); }}, {make_room}}) {
+  const auto attempt = [](const auto& save) {
     try {
       save();
     } catch (const std::exception&) {
     }
+  };
+  attempt([&] { state.part.sync(); });
+  attempt([&] { state.journal->flush(); });
+  if (!state.journal->has_flushed_records()) {
+    // The journal is worth more than the last tiles: a resume writes these again.
+    constexpr std::uint64_t kBlocks = std::uint64_t{64} << 10U;
+    const std::uint64_t room = state.journal->pending_bytes() + kBlocks;
+    attempt([&] {
+      if (state.part.size_on_disk() <= room) return;
+      state.part.truncate(state.part.size_on_disk() - room);
+      state.journal->flush();
+    });
   }
   if (!state.journal->has_flushed_records()) return false;
   state.keep = true;
