@@ -56,7 +56,7 @@ using MadeTiles = std::map<std::tuple<int, std::int64_t, std::int64_t>, Made>;
 
 class Recorder {
  public:
-  Recorder(const Planes& planes, CodeType type)
+  explicit Recorder(const Planes& planes, CodeType type, const ScratchFolder& scratch = std::nullopt)
       : builder(
             planes, type,
             [&planes](const TileCodes& codes) {
@@ -73,7 +73,8 @@ class Recorder {
               order.push_back({plane, tile.row, tile.column});
               Made& now = made[order.back()];
               now.encoded = encoded;
-            }) {}
+            },
+            scratch) {}
   std::vector<std::tuple<int, std::int64_t, std::int64_t>> order;
   MadeTiles made;
   PlaneBuilder builder;
@@ -202,7 +203,7 @@ TEST(PlaneBuilder, RangesAreThoseOfAllTilesBelow) {
   }
 }
 
-TEST(PlaneBuilder, GoesOnAfterAnyTileAsIfItHadNeverStopped) {
+TEST(PlaneBuilder, GoesOnAfterAnyTileAsIfItHadNeverStoppedInMemoryAndInAScratchFile) {
   for (const Case& c : cases()) {
     const TileGrid grid = TileGrid::make(c.shape, c.columns, c.rows, 1.0, 1.0);
     const Planes planes(grid, c.stride, plane_count(grid, c.stride), c.wraps_x);
@@ -214,7 +215,7 @@ TEST(PlaneBuilder, GoesOnAfterAnyTileAsIfItHadNeverStopped) {
       whole.builder.add(sample_of(whole.builder, c.shape, field.codes(grid.tile_at(i))));
     }
     for (std::int64_t done = 0; done < grid.tile_count(); done += 1 + done / 3) {
-      Recorder rest(planes, c.type);
+      Recorder rest(planes, c.type, done % 2 == 0 ? ScratchFolder(testing::TempDir()) : std::nullopt);
       rest.builder.resume_after(done, [&](int plane, TileIndex tile) {
         PlaneBuilder::Stored stored;
         if (plane == 0) {

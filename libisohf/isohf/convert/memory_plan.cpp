@@ -97,6 +97,7 @@ class Estimate {
       if (limit_ != 0 && memory.bytes > limit_ && other.bytes < memory.bytes) memory = other;
     };
     if (options_.shadow_seeds) try_scratch(&MemoryPlan::seeds_in_scratch);
+    if (options_.planes) try_scratch(&MemoryPlan::planes_in_scratch);
     if (options_.lossless) try_scratch(&MemoryPlan::residuals_in_scratch);
     return memory;
   }
@@ -139,7 +140,7 @@ class Estimate {
     const double seeds =
         options_.shadow_seeds ? static_cast<double>(SeedRow::memory_bytes(plan_.grid, memory.seeds_in_scratch)) : 0.0;
     const double tiles =
-        tiles_pass(memory) + seeds + static_cast<double>(plane_bytes()) + static_cast<double>(texture_bytes_);
+        tiles_pass(memory) + seeds + static_cast<double>(plane_bytes(memory)) + static_cast<double>(texture_bytes_);
     double peak = std::max(scan_pass(memory), tiles);
     if (options_.lossless) {
       peak += static_cast<double>(residual_stage_kept_bytes(info_, plan_, memory.residuals_in_scratch));
@@ -149,9 +150,10 @@ class Estimate {
     return static_cast<std::uint64_t>(program + peak);
   }
 
-  [[nodiscard]] std::uint64_t plane_bytes() const {
+  [[nodiscard]] std::uint64_t plane_bytes(const MemoryPlan& memory) const {
     const PlaneInfo info = options_.planes ? planes_for(plan_.grid) : PlaneInfo();
-    return plane_builder_memory_bytes(Planes(plan_.grid, info.stride, info.count, false), options_.code_type);
+    return plane_builder_memory_bytes(Planes(plan_.grid, info.stride, info.count, false), options_.code_type,
+                                      memory.planes_in_scratch);
   }
 
   [[nodiscard]] double scan_pass(const MemoryPlan& memory) const {

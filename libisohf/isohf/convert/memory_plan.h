@@ -24,6 +24,7 @@ struct MemoryPlan {
   std::size_t tiles_in_flight = 1;        ///< read, made, or waiting to be written
   std::size_t members_at_once = 1;        ///< of residuals
   bool seeds_in_scratch = false;          ///< what a row of tiles brings along for them
+  bool planes_in_scratch = false;         ///< rows of tiles that they are made of
   bool residuals_in_scratch = false;      ///< rows of tiles and lattice rows that they are predicted from
   std::uint64_t source_buffer_bytes = 0;  ///< what the source may keep of decoded blocks
 };

@@ -419,12 +419,14 @@ ConversionResult run_conversion(HeightSource& source, const Plan& plan, const st
       }
       if (coarse.count > 0) {
         planes.emplace(Planes(plan.grid, coarse.stride, coarse.count, plan.frame.wraps_x), conversion.quantisation,
-                       options.level, writer, rows, around ? &*around : nullptr);
+                       options.level, writer, rows, around ? &*around : nullptr,
+                       memory.planes_in_scratch ? ScratchFolder(job.scratch_folder) : std::nullopt);
       }
       write_tiles(conversion, writer,
                   {planes ? &*planes : nullptr, seeds ? &*seeds : nullptr, textures ? &*textures : nullptr});
       if (residuals) {
         writer.flush_tiles();
+        planes.reset();
         if (memory.residuals_in_scratch) give_back_freed_memory();
         const auto read_tiles = [&](std::span<const TileIndex> tiles) {
           std::vector<TileCodes> codes;

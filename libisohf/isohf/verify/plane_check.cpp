@@ -29,10 +29,11 @@ EncodedTile describe(const TileCodes& codes) {
 
 }  // namespace
 
-PlaneCheck::PlaneCheck(const ArchiveReader& archive)
+PlaneCheck::PlaneCheck(const ArchiveReader& archive, const ScratchFolder& scratch)
     : archive_(archive),
-      builder_(planes_of(archive.metadata()), archive.metadata().quantisation.type, describe,
-               [this](int plane, TileIndex tile, const EncodedTile& expected) { check(plane, tile, expected); }) {
+      builder_(
+          planes_of(archive.metadata()), archive.metadata().quantisation.type, describe,
+          [this](int plane, TileIndex tile, const EncodedTile& expected) { check(plane, tile, expected); }, scratch) {
   const auto part = part_record(archive.metadata());
   if (part && part->shard) shard_ = part->tiles;
 }

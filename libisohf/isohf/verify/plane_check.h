@@ -19,7 +19,7 @@ class PlaneCheck {
   using Problem = std::pair<int, std::string>;  ///< id of a finding, what
 
   /// The archive has planes, and outlives this.
-  explicit PlaneCheck(const ArchiveReader& archive);
+  PlaneCheck(const ArchiveReader& archive, const ScratchFolder& scratch);
 
   /// The next tile in flat order, nullptr where it is not stored, and its range as found in it. On the caller's oneTBB
   /// arena.

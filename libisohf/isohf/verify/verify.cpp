@@ -66,10 +66,12 @@ struct TileView {
   View2D<const float> heights;
 };
 
-/// Tiles in each thread that are in hand at once, beside each other.
+/// Tiles in each thread that are in hand at once, beside each other, and where memory is short.
 constexpr std::int64_t kTilesPerThread = 32;
-/// What a TileState takes of each vertex.
-constexpr double kBytesPerVertex = 10.0;
+constexpr std::int64_t kLeastTilesPerThread = static_cast<std::int64_t>(kBatchLanes);
+/// Of each vertex of a tile in hand, beside its codes, and in each thread while tiles are decoded (measured).
+constexpr double kHeightBytes = 4.0;
+constexpr double kDecodingBytes = 40.0;
 
 class Verification {
  public:
@@ -92,7 +94,7 @@ class Verification {
         first_border_row_ = std::min(first_border_row_, shared.here.row - (shared.visible ? 1 : 0));
       }
     }
-    require_room();
+    divide_memory();
   }
 
   VerifyReport run() {
@@ -100,12 +102,14 @@ class Verification {
     const bool has_members = check_members();
     for (std::string& problem : contradictions_in(archive_)) add(make(finding::kMetadata, {}, std::move(problem)));
     start_seeds();
-    if (archive_.metadata().planes.count > 0) planes_.emplace(archive_);
+    if (archive_.metadata().planes.count > 0) planes_.emplace(archive_, scratch_);
     std::vector<TileBorder> above;
     for (std::int64_t row = 0; row < grid_.tile_rows(); ++row) {
       above = check_row(row, above);
       job_.report({"verify", "tiles", (row + 1) * grid_.tile_columns(), grid_.tile_count()});
     }
+    above = {};
+    planes_.reset();
     check_totals();
     if (seeds_) add_seed_problems(seeds_->check_record());
     check_lossless();
@@ -175,29 +179,41 @@ class Verification {
 
   void start_seeds() {
     try {
-      const ScratchFolder scratch = job_.memory_bytes != 0 ? ScratchFolder(job_.scratch_folder) : std::nullopt;
-      if (const auto info = shadow_seed_info(archive_.metadata())) seeds_.emplace(archive_, *info, scratch);
+      if (const auto info = shadow_seed_info(archive_.metadata())) seeds_.emplace(archive_, *info, scratch_);
     } catch (const Error& error) {
       add(make(finding::kShadowSeeds, {}, error.what()));
     }
   }
 
-  [[nodiscard]] std::int64_t tiles_at_once() const {
-    return std::min(kTilesPerThread * threads_of(job_), grid_.tile_columns());
+  [[nodiscard]] bool has_seeds() const {
+    const auto& extensions = archive_.metadata().extensions;
+    return std::any_of(extensions.begin(), extensions.end(),
+                       [](const auto& extension) { return extension.first == kShadowSeedsName; });
   }
 
-  /// Throws Error{kOutOfMemory}. Seeds go to a scratch file where memory is limited.
-  void require_room() const {
+  [[nodiscard]] double memory_bytes(std::int64_t tiles_at_once, bool in_scratch) const {
     const auto vertices = static_cast<double>(shape_.stored_vertex_count());
     const auto border = static_cast<double>((shape_.rows() - first_border_row_) * shape_.columns());
     const auto columns = static_cast<double>(grid_.tile_columns());
-    const double bytes = reading_bytes(job_, vertices) +
-                         static_cast<double>(tiles_at_once()) * vertices * kBytesPerVertex +
-                         2.0 * columns * (border * sizeof(float) + sizeof(TileBorder)) +
-                         static_cast<double>(SeedRow::memory_bytes(grid_, true)) +
-                         static_cast<double>(plane_builder_memory_bytes(planes_of(archive_.metadata()),
-                                                                        archive_.metadata().quantisation.type));
-    require_memory(job_, bytes, bytes, "verifying", "");
+    const double seeds = has_seeds() ? static_cast<double>(SeedRow::memory_bytes(grid_, in_scratch)) : 0.0;
+    const double codes =
+        archive_.metadata().quantisation.type == CodeType::kF32 ? sizeof(float) : sizeof(std::uint16_t);
+    return kProgramBytes + threads_of(job_) * (kThreadBytes + kDecodingBytes * vertices) +
+           static_cast<double>(tiles_at_once) * vertices * (kHeightBytes + codes) +
+           2.0 * columns * (border * sizeof(float) + sizeof(TileBorder)) + seeds +
+           static_cast<double>(plane_builder_memory_bytes(planes_of(archive_.metadata()),
+                                                          archive_.metadata().quantisation.type, in_scratch));
+  }
+
+  /// Throws Error{kOutOfMemory}. Where memory is short, rows of seeds and planes go to a scratch file, and then fewer
+  /// tiles are in hand.
+  void divide_memory() {
+    const auto at_once = [&](std::int64_t tiles) { return std::min(tiles * threads_of(job_), grid_.tile_columns()); };
+    tiles_at_once_ = at_once(kTilesPerThread);
+    if (job_.memory_bytes != 0 && memory_bytes(tiles_at_once_, true) > static_cast<double>(job_.memory_bytes)) {
+      tiles_at_once_ = at_once(kLeastTilesPerThread);
+    }
+    scratch_ = scratch_for(job_, memory_bytes(tiles_at_once_, false), memory_bytes(tiles_at_once_, true), "verifying");
   }
 
   /// Checks a row of tiles, some beside each other at a time, and what it shares with the row above. Returns what the
@@ -211,7 +227,7 @@ class Verification {
     std::vector<TileState> tiles;  // from `first` on; the last waits for its neighbour in the East
     for (std::int64_t first = 0, read = 0; read < columns;) {
       job_.throw_if_cancelled();
-      const std::int64_t count = std::min(tiles_at_once(), columns - read);
+      const std::int64_t count = std::min(tiles_at_once_, columns - read);
       read_tiles({read, row}, count, tiles);
       if (read == 0 && archive_.metadata().wraps_x) westmost = tiles.front();
       read += count;
@@ -550,6 +566,8 @@ class Verification {
   CountedVertices counted_;
   TileRange here_;  ///< of a part: nothing is said of the other tiles
   std::array<std::vector<SharedVertex>, std::size(kComparedNeighbours)> shared_;
+  std::int64_t tiles_at_once_ = 0;
+  ScratchFolder scratch_;
   int first_border_row_ = 0;  ///< the first that the tiles South of a tile are compared with
   VerifyReport report_;
   std::vector<Finding> row_findings_;  ///< of the tiles of the row at hand

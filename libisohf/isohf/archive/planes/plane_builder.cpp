@@ -7,6 +7,7 @@
 #include <bit>
 #include <cstring>
 #include <limits>
+#include <optional>
 #include <span>
 #include <type_traits>
 #include <utility>
@@ -32,12 +33,13 @@ std::int64_t sample_rows(const Planes& planes) {
 }
 
 /// Samples that are kept for a tile of a plane's row: its own, a row of padding North of them, and South of them what
-/// the tiles there bring. Its East edge is the next one's.
+/// the tiles there bring, as far as there are tiles. Its East edge is the next one's.
 std::int64_t kept_columns(const Planes& planes) {
   return 2 * planes.grid(0).shape().cell_columns();
 }
-std::int64_t kept_rows(const Planes& planes) {
-  return 1 + planes.grid(0).shape().cell_rows() + sample_rows(planes);
+std::int64_t kept_rows(const Planes& planes, int plane) {
+  return 1 + std::min(planes.grid(0).shape().cell_rows() + sample_rows(planes),
+                      planes.grid(plane - 1).tile_rows() * (sample_rows(planes) - 1) + 1);
 }
 
 bool is_less(CodeType type, std::uint32_t a, std::uint32_t b) {
@@ -130,12 +132,14 @@ using Places = std::array<std::vector<std::int64_t>, 2>;
 /// A plane in the making: the row of its tiles that is not finished yet.
 class PlaneBuilder::Level {
  public:
-  Level(const Planes& planes, int plane, CodeType type)
+  Level(const Planes& planes, int plane, CodeType type, const ScratchFolder& scratch)
       : planes_(planes),
         plane_(plane),
         type_(type),
         row_bytes_(static_cast<std::size_t>(kept_columns(planes)) * width_of(type)),
-        kept_(static_cast<std::size_t>(planes.grid(plane).tile_columns() + 1)) {
+        blocks_(static_cast<std::size_t>(planes.grid(plane).tile_columns() + 1)) {
+    if (scratch) file_.emplace(blocks_ * row_bytes_, *scratch);
+    if (!scratch) kept_.resize(blocks_);
     begin_at(0);
   }
 
@@ -189,8 +193,11 @@ class PlaneBuilder::Level {
   [[nodiscard]] const Range& range(std::int64_t column) const { return ranges_[0][static_cast<std::size_t>(column)]; }
 
   void next_row() {
-    const std::int64_t dropped = grid().shape().cell_rows();
-    const std::size_t stays = row_bytes_ * static_cast<std::size_t>(kept_rows(planes_) - dropped);
+    const std::int64_t dropped = std::min<std::int64_t>(grid().shape().cell_rows(), kept_rows(planes_, plane_));
+    for (std::int64_t z = first_z(); file_ && z < first_z() + dropped; ++z) {
+      if (file_->has(z)) file_->drop(z);
+    }
+    const std::size_t stays = row_bytes_ * static_cast<std::size_t>(kept_rows(planes_, plane_) - dropped);
     for (std::vector<std::byte>& kept : kept_) {
       if (kept.empty()) continue;
       std::memmove(kept.data(), kept.data() + static_cast<std::size_t>(dropped) * row_bytes_, stays);
@@ -208,19 +215,47 @@ class PlaneBuilder::Level {
   /// Keeps columns of a tile's samples, all in one tile of the plane.
   void keep(std::span<const std::byte> samples, TileIndex tile, std::int64_t begin, std::int64_t end) {
     const std::int64_t x = tile.column * (sample_columns(planes_) - 1) + begin;
-    std::vector<std::byte>& kept = kept_[static_cast<std::size_t>(x / kept_columns(planes_))];
-    if (kept.empty()) {
-      kept.resize(row_bytes_ * static_cast<std::size_t>(kept_rows(planes_)));
-      make_void(kept);
-    }
     const std::size_t width = width_of(type_);
     const std::int64_t first = tile.row * (sample_rows(planes_) - 1) - first_z();
     for (std::int64_t j = std::max(std::int64_t{0}, -first); j < sample_rows(planes_); ++j) {
+      const auto part = samples.subspan(static_cast<std::size_t>(j * sample_columns(planes_) + begin) * width,
+                                        static_cast<std::size_t>(end - begin) * width);
+      if (file_) {
+        const std::int64_t z = first_z() + first + j;
+        if (!file_->has(z)) begin_row(z);
+        file_->write(z, static_cast<std::size_t>(x) * width, part);
+        continue;
+      }
+      std::vector<std::byte>& kept = kept_[static_cast<std::size_t>(x / kept_columns(planes_))];
+      if (kept.empty()) {
+        kept.resize(row_bytes_ * static_cast<std::size_t>(kept_rows(planes_, plane_)));
+        make_void(kept);
+      }
       std::memcpy(kept.data() + static_cast<std::size_t>(first + j) * row_bytes_ +
                       static_cast<std::size_t>(x % kept_columns(planes_)) * width,
-                  samples.data() + static_cast<std::size_t>(j * sample_columns(planes_) + begin) * width,
-                  static_cast<std::size_t>(end - begin) * width);
+                  part.data(), part.size());
     }
+  }
+
+  /// Of the file.
+  void begin_row(std::int64_t z) {
+    file_->add(z);
+    std::vector<std::byte> none(blocks_ * row_bytes_);
+    make_void(none);
+    file_->write(z, 0, none);
+  }
+
+  /// A row of one tile's samples, perhaps in `buffer`; nullptr where they are void.
+  [[nodiscard]] const std::byte* kept_row(std::int64_t z, std::int64_t block, std::vector<std::byte>& buffer) const {
+    const auto at = static_cast<std::size_t>(block);
+    if (file_) {
+      if (!file_->has(z)) return nullptr;
+      buffer.resize(row_bytes_);
+      file_->read(z, at * row_bytes_, buffer);
+      return buffer.data();
+    }
+    const std::size_t row = static_cast<std::size_t>(z - first_z()) * row_bytes_;
+    return row < kept_[at].size() ? kept_[at].data() + row : nullptr;
   }
 
   void make_void(std::span<std::byte> rows) const {
@@ -235,13 +270,16 @@ class PlaneBuilder::Level {
     const TileShape& shape = grid().shape();
     codes.assign(static_cast<std::size_t>(shape.stored_vertex_count()), void_value<T>(type_));
     auto to = codes.begin();
+    std::vector<std::byte> buffer;
     for (int r = 0; r < shape.rows(); ++r) {
       const std::int64_t z = planes_.z_below(plane_ - 1, plane_, row_ * shape.cell_rows() + r - 1) / planes_.stride();
-      const std::size_t row = static_cast<std::size_t>(z - first_z()) * row_bytes_;
+      std::int64_t block = -1;
+      const std::byte* row = nullptr;
       for (const std::int64_t x : places[static_cast<std::size_t>(r % 2)]) {
-        const std::vector<std::byte>& kept = kept_[static_cast<std::size_t>(x / kept_columns(planes_))];
-        const std::size_t at = row + static_cast<std::size_t>(x % kept_columns(planes_)) * sizeof(T);
-        if (!kept.empty()) std::memcpy(&*to, kept.data() + at, sizeof(T));
+        if (x / kept_columns(planes_) != block) row = kept_row(z, block = x / kept_columns(planes_), buffer);
+        if (row != nullptr) {
+          std::memcpy(&*to, row + static_cast<std::size_t>(x % kept_columns(planes_)) * sizeof(T), sizeof(T));
+        }
         ++to;
       }
     }
@@ -250,25 +288,27 @@ class PlaneBuilder::Level {
   const Planes& planes_;
   int plane_;
   CodeType type_;
-  std::size_t row_bytes_;
+  std::size_t row_bytes_;                     ///< of a tile
+  std::size_t blocks_;                        ///< tiles of a row, and the East edge of the last
   std::vector<std::vector<std::byte>> kept_;  ///< rows of samples from first_z() on, by the plane's tiles; empty: void
+  std::optional<RowFile> file_;               ///< or here, a row of all tiles each
   std::int64_t row_ = 0;
   std::int64_t next_ = 0;                     ///< tile of the plane below
   std::array<std::vector<Range>, 2> ranges_;  ///< of the tiles of the current row and of the next
 };
 
-std::uint64_t plane_builder_memory_bytes(const Planes& planes, CodeType type) {
+std::uint64_t plane_builder_memory_bytes(const Planes& planes, CodeType type, bool in_scratch) {
   std::int64_t samples = kBatch * planes.grid(0).shape().stored_vertex_count();
   for (int plane = 1; plane <= planes.count(); ++plane) {
-    samples += planes.grid(plane).tile_columns() * kept_columns(planes) * kept_rows(planes);
+    samples += planes.grid(plane).tile_columns() * kept_columns(planes) * (in_scratch ? 1 : kept_rows(planes, plane));
   }
   return planes.count() == 0 ? 0 : static_cast<std::uint64_t>(samples) * width_of(type);
 }
 
-PlaneBuilder::PlaneBuilder(const Planes& planes, CodeType type, Encode encode, Take take)
+PlaneBuilder::PlaneBuilder(const Planes& planes, CodeType type, Encode encode, Take take, const ScratchFolder& scratch)
     : planes_(planes), type_(type), encode_(std::move(encode)), take_(std::move(take)) {
   for (int plane = 1; plane <= planes.count(); ++plane) {
-    levels_.push_back(std::make_unique<Level>(planes_, plane, type));
+    levels_.push_back(std::make_unique<Level>(planes_, plane, type, scratch));
   }
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "isohf/archive/codec/tile_codes.h"
+#include "isohf/base/memory/kept_rows.h"
 #include "isohf/lattice/planes.h"
 
 namespace isohf {
@@ -20,7 +21,7 @@ struct PlaneSample {
 };
 
 /// Peak memory of a PlaneBuilder, bytes; an estimate.
-[[nodiscard]] std::uint64_t plane_builder_memory_bytes(const Planes& planes, CodeType type);
+[[nodiscard]] std::uint64_t plane_builder_memory_bytes(const Planes& planes, CodeType type, bool in_scratch);
 
 /// Makes coarse planes of tiles that come in flat order. Of each plane it keeps the vertices of one row of its tiles
 /// and of a row of the tiles below more. What comes out depends on nothing but the tiles' codes.
@@ -32,7 +33,8 @@ class PlaneBuilder {
   /// lies below it. One thread.
   using Take = std::function<void(int plane, TileIndex tile, const EncodedTile& encoded)>;
   /// planes.count() >= 1.
-  PlaneBuilder(const Planes& planes, CodeType type, Encode encode, Take take);
+  ///   scratch  keeps the vertices where memory has no room for them
+  PlaneBuilder(const Planes& planes, CodeType type, Encode encode, Take take, const ScratchFolder& scratch);
   ~PlaneBuilder();
 
   /// Any thread; code_min and code_max as encode_tile() gives them, or a plane's tile has them.

@@ -23,6 +23,7 @@ class RowFile {
 
   void add(std::int64_t row);
   void drop(std::int64_t row);
+  [[nodiscard]] bool has(std::int64_t row) const { return places_.contains(row); }
   /// From many threads at once, between add() and drop(). Throws Error{kIo}.
   void write(std::int64_t row, std::uint64_t offset_bytes, std::span<const std::byte> bytes);
   void read(std::int64_t row, std::uint64_t offset_bytes, std::span<std::byte> bytes) const;

@@ -5,7 +5,7 @@
 namespace isohf {
 
 PlaneStage::PlaneStage(const Planes& planes, const Quantisation& quantisation, int level, ArchiveWriter& writer,
-                       const RowRange& rows, const TilesAround* around)
+                       const RowRange& rows, const TilesAround* around, const ScratchFolder& scratch)
     : around_(around),
       builder_(
           planes, quantisation.type,
@@ -15,7 +15,8 @@ PlaneStage::PlaneStage(const Planes& planes, const Quantisation& quantisation, i
             const bool is_ours = tile.row * height <= rows.last && (tile.row + 1) * height > rows.first;
             if (is_ours && !encoded.is_empty)
               writer.add_plane_tile(plane, tile, encoded, {encoded.code_min, encoded.code_max});
-          }) {
+          },
+          scratch) {
   const std::int64_t tiles = writer.next_tile();
   if (tiles == 0) return;
   // What followed the last tile is no longer there: the writer goes on behind that tile itself.

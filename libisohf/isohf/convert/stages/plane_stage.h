@@ -15,8 +15,9 @@ class PlaneStage {
   /// Goes on where the writer stands; it outlives this. `level` is that of the tiles. On the caller's oneTBB arena.
   ///   rows    of tiles that are made: all but a shard's; tiles of planes above none of them are not made
   ///   around  the rows beside a shard's, so that its planes' tiles are those of the whole
+  ///   scratch keeps rows of tiles where memory has no room for them
   PlaneStage(const Planes& planes, const Quantisation& quantisation, int level, ArchiveWriter& writer,
-             const RowRange& rows, const TilesAround* around = nullptr);
+             const RowRange& rows, const TilesAround* around = nullptr, const ScratchFolder& scratch = std::nullopt);
 
   /// Any thread.
   [[nodiscard]] PlaneSample sample(const TileCodes& codes, const EncodedTile& encoded) const {
