@@ -21,11 +21,13 @@ namespace {
 
 constexpr const char* kFooter =
     R"(Tiles are copied as they are, with their textures and shadow seeds, under their names and on their lattice; coarse
-planes are made anew. Parts that make up the whole give its bytes again, residuals included: isohf merge.
+planes are made anew. Parts that make up the whole give its bytes again, residuals included: isohf merge. The tiles of a
+coarse plane become an archive of their own, without textures and seeds.
 
 Examples:
   isohf extract land.isohf -o valley.isohf --bbox 6.5,45,7,45.5
-  isohf extract land.isohf -o north.isohf --tiles 0:40,0:12       columns 0 to 39, rows 0 to 11)";
+  isohf extract land.isohf -o north.isohf --tiles 0:40,0:12       columns 0 to 39, rows 0 to 11
+  isohf extract land.isohf -o afar.isohf --plane 2                all of it, of every 64th vertex)";
 
 struct ExtractCommand {
   CommonOptions common;
@@ -34,6 +36,7 @@ struct ExtractCommand {
   std::string output;
   std::optional<BoundingBox> bbox;
   std::optional<TileRange> tiles;
+  int plane = 0;
   bool overwrite = false;
 };
 
@@ -48,6 +51,9 @@ std::optional<ExtractCommand> parse(const Arguments& arguments) {
               [&](const std::string& text) { options.bbox = bounding_box_from_string(text); });
   line.option("--tiles", "A:B,C:D", "Columns A to B-1 and rows C to D-1 of tiles, counted from 0 in the North-West",
               [&](const std::string& text) { options.tiles = parse_tile_range(text); });
+  line.option("--plane", "K",
+              "Tiles of this coarse plane, from 1 on, all or those that --bbox or --tiles ask for of it",
+              [&](const std::string& text) { options.plane = static_cast<int>(parse_whole_number(text, 1, 64)); });
   line.exclusive({"--bbox", "--tiles"});
   add_work_options(line, options.work);
   add_common_options(line, options.common);
@@ -55,8 +61,8 @@ std::optional<ExtractCommand> parse(const Arguments& arguments) {
   if (!line.parse(arguments)) return std::nullopt;
   line.require("ARCHIVE", options.archive);
   line.require("PART (-o)", options.output);
-  if (!options.bbox && !options.tiles) {
-    throw Error(ErrorCode::kInvalidArgument, "extract: which tiles? Give --bbox W,S,E,N or --tiles A:B,C:D");
+  if (!options.bbox && !options.tiles && options.plane == 0) {
+    throw Error(ErrorCode::kInvalidArgument, "extract: which tiles? Give --bbox W,S,E,N, --tiles A:B,C:D or --plane K");
   }
   return options;
 }
@@ -69,8 +75,10 @@ int command_extract(const Arguments& arguments) {
   check_archive_output({options->archive}, options->output, options->overwrite);
   const TileRange tiles = options->tiles ? *options->tiles : [&] {
     ArchiveReader archive = open_archive(options->archive);
-    const TileRange touched = intersection(tiles_touching(archive.grid(), ground_in_box(archive, *options->bbox)),
-                                           tiles_of(archive.metadata()));
+    const TileRange here = plane_tiles_of(archive, options->plane);
+    if (!options->bbox) return here;
+    const TileGrid grid = archive.metadata().plane_grid(options->plane);
+    const TileRange touched = intersection(tiles_touching(grid, ground_in_box(archive, *options->bbox)), here);
     if (touched.is_empty()) {
       throw Error(ErrorCode::kInvalidArgument,
                   options->archive + ": is a part of its land, and holds no tile that --bbox touches");
@@ -78,7 +86,8 @@ int command_extract(const Arguments& arguments) {
     return touched;
   }();
   return print_part(options->output, options->common, options->work, [&](const Job& job) {
-    return extract_tiles(options->archive, options->output, tiles, {options->overwrite, options->common.strict}, job);
+    return extract_plane(options->archive, options->output, options->plane, tiles,
+                         {options->overwrite, options->common.strict}, job);
   });
 }
 

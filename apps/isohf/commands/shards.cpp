@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -45,7 +46,9 @@ std::vector<std::string> recorded(const Arguments& arguments) {
       kept.insert(kept.end(), arguments.begin() + static_cast<std::ptrdiff_t>(i), arguments.end());
       break;
     }
-    if (argument == "--overwrite" || argument == "--no-scan") continue;
+    // What one machine prints is its own business.
+    constexpr std::array kDropped = {"--overwrite", "--no-scan", "-q", "--quiet", "--json"};
+    if (std::find(kDropped.begin(), kDropped.end(), argument) != kDropped.end()) continue;
     if (argument == "--write" || argument == "--shards") {
       ++i;
       continue;
@@ -118,6 +121,41 @@ ShardPlan read_plan_of(const ShardCommand& options) {
   return plan;
 }
 
+/// A plan or a scan.
+std::string text_of_file(const std::string& path) {
+  constexpr std::uint64_t kMostBytes = std::uint64_t{256} << 20U;
+  const auto file = open_file_source(path);
+  if (file->size_bytes() > kMostBytes) {
+    throw Error(ErrorCode::kCorrupt,
+                fmt::format("{}: is neither plan nor scan: it has {} bytes", path, file->size_bytes()));
+  }
+  const std::vector<std::byte> bytes = SourceBytes(*file, 0, file->size_bytes()).take();
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+/// What a plan's inputs say of themselves is kept beside it, so that not every shard opens all of them.
+std::string headers_of(const std::string& plan) {
+  return plan + ".headers";
+}
+
+void read_headers(const std::string& path, const ShardPlan& plan, SourceInputs& inputs) {
+  inputs.headers = std::make_shared<HeaderIndex>();
+  std::error_code none;
+  const std::string headers = headers_of(path);
+  if (!std::filesystem::exists(headers, none)) return;
+  try {
+    *inputs.headers = HeaderIndex(text_of_file(headers), plan.job);
+  } catch (const Error& error) {
+    print_warnings({fmt::format("{}: {}; all inputs are opened instead", headers, error.what())});
+  }
+}
+
+/// Of a single input there is nothing to keep.
+void write_headers(const std::string& path, const ShardPlan& plan, const SourceInputs& inputs) {
+  if (inputs.headers && inputs.headers->size() > 0)
+    write_output(headers_of(path), inputs.headers->bytes(plan.job), true);
+}
+
 /// The plan's conversion, with what is this machine's own.
 ConvertCommandOptions conversion_of(const ShardCommand& command, const ShardPlan& plan) {
   Arguments again = plan.arguments;
@@ -130,19 +168,8 @@ ConvertCommandOptions conversion_of(const ShardCommand& command, const ShardPlan
   options->convert.strict = command.common.strict;
   options->convert.overwrite = command.overwrite;
   options->convert.resume = !command.overwrite;
+  read_headers(command.plan, plan, options->inputs);
   return std::move(*options);
-}
-
-/// A plan or a scan.
-std::string text_of_file(const std::string& path) {
-  constexpr std::uint64_t kMostBytes = std::uint64_t{256} << 20U;
-  const auto file = open_file_source(path);
-  if (file->size_bytes() > kMostBytes) {
-    throw Error(ErrorCode::kCorrupt,
-                fmt::format("{}: is neither plan nor scan: it has {} bytes", path, file->size_bytes()));
-  }
-  const std::vector<std::byte> bytes = SourceBytes(*file, 0, file->size_bytes()).take();
-  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
 /// A line that the log of a scheduler can be searched for.
@@ -190,6 +217,7 @@ int write_plan(const Arguments& arguments) {
   std::optional<ConvertCommandOptions> options = parse_convert(arguments, ConvertLine::kPlan);
   if (!options) return kExitDone;
   check_plan_output(options->inputs.names, options->plan, options->convert.overwrite);
+  options->inputs.headers = std::make_shared<HeaderIndex>();
   const Prepared prepared = prepare(*options, expand_inputs(options->inputs.names, options->inputs.recursive));
   std::optional<ProgressDisplay> display(std::in_place, options->work.progress, options->common.quiet,
                                          options->common.verbose);
@@ -199,6 +227,7 @@ int write_plan(const Arguments& arguments) {
   display.reset();
   print_warnings(plan.warnings);
   plan.arguments = recorded(arguments);
+  write_headers(options->plan, plan, options->inputs);
   write_output(options->plan, format_shard_plan(plan), options->convert.overwrite);
   StandardOutput out;
   const std::int64_t shards = static_cast<std::int64_t>(plan.shards.size());
@@ -267,8 +296,10 @@ int command_scan(const Arguments& arguments) {
     if (makes_plan) {
       std::vector<NamedScan> scans;
       for (const std::string& file : command->scans) scans.push_back({file, text_of_file(file)});
-      text = format_shard_plan(
-          scanned(*prepared.source, draft, scans, options.convert, job_from(command->work, *display)));
+      const ShardPlan plan =
+          scanned(*prepared.source, draft, scans, options.convert, job_from(command->work, *display));
+      text = format_shard_plan(plan);
+      write_headers(command->output, plan, options.inputs);
     } else {
       text = scan_shard(*prepared.source, draft, command->shard, options.convert, job_from(command->work, *display));
     }

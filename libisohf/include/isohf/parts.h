@@ -48,6 +48,16 @@ struct PartSummary {
 PartSummary extract_tiles(const std::string& archive, const std::string& output, const TileRange& tiles,
                           const PartOptions& options = {}, const Job& job = {});
 
+/// The tiles of a coarse plane that stand above those that an archive is to hold; 0: these. Throws
+/// Error{kInvalidArgument} where there is no such plane.
+[[nodiscard]] TileRange plane_tiles_of(const ArchiveReader& archive, int plane);
+/// The same of tiles of a coarse plane, 1 to metadata().planes.count, which become those of an archive of their own: a
+/// look from afar, whose lattice has every stride^plane-th vertex. They are copied, and decoded for their statistics and
+/// the planes above. Beyond the whole's last tiles it goes on level. Seeds, textures and residuals tell of finer tiles
+/// and stay behind. 0: extract_tiles().
+PartSummary extract_plane(const std::string& archive, const std::string& output, int plane, const TileRange& tiles,
+                          const PartOptions& options = {}, const Job& job = {});
+
 /// Joins archives that share a lattice; where several hold a tile, the last of them gives it. What they hold together
 /// must be a rectangle of tiles. Parts cut from one archive, or shards of one plan, give its bytes again; of others the
 /// tiles are decoded, their common edges compared, seeds and statistics made anew. Stages "check", "tiles".

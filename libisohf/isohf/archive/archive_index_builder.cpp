@@ -50,48 +50,66 @@ ArchiveIndexBuilder::ArchiveIndexBuilder(const TileGrid& grid, const PlaneInfo& 
 }
 
 void ArchiveIndexBuilder::add(const JournalRecord& record) {
-  if (record.kind != JournalRecord::Kind::kEmptyTile) {
-    data_crc32_ = crc32_of_crc32(record.data_crc32, data_crc32_);
-    std::vector<std::byte> entry;
-    append_directory_entry(record.member, entry);
-    directory_.append(entry);
-    ++entries_;
-  }
-  if (record.kind == JournalRecord::Kind::kMember) {
-    if (put_in_table(record.member)) return;
-    loose_.push_back(record.member);
-    loose_names_.insert(record.member.name);
+  if (record.kind == JournalRecord::Kind::kEmptyTile) {
+    content_.add_tile(record.digest);
+    add_up(record.statistics);
+    ++next_;
     return;
   }
-  if (record.kind != JournalRecord::Kind::kEmptyTile) {
-    const PlaneTile tile = *tile_from_name(record.member.name);
-    TableRecord stored = record_of(record.member);
-    stored.entry.code_min = record.code_min;
-    stored.entry.code_max = record.code_max;
-    stored.entry.has_voids = record.has_voids;
-    tables_[static_cast<std::size_t>(tile.plane)].add(tile.tile.row, tile.tile.column, stored, record.digest);
+  add_data_crc32(record.data_crc32);
+  if (record.kind == JournalRecord::Kind::kMember) {
+    add_member(table_place(record.member.name), record.member);
+    return;
   }
-  if (record.kind == JournalRecord::Kind::kPlaneTile) return;
-  content_.add_tile(record.digest);
-  add_up(record.statistics);
+  TableRecord stored = record_of(record.member);
+  stored.entry.code_min = record.code_min;
+  stored.entry.code_max = record.code_max;
+  stored.entry.has_voids = record.has_voids;
+  if (record.kind == JournalRecord::Kind::kTile) add_up(record.statistics);
+  add_copy(*tile_from_name(record.member.name), record.member, stored, record.digest);
+}
+
+void ArchiveIndexBuilder::add_copy(PlaneTile tile, const ZipMember& member, const TableRecord& record,
+                                   const Digest& digest) {
+  add_entry(member);
+  tables_[static_cast<std::size_t>(tile.plane)].add(tile.tile.row, tile.tile.column, record, digest);
+  if (tile.plane != 0) return;
+  content_.add_tile(digest);
   ++next_;
 }
 
-/// False where the member is of no kind that has a table, or does not fit into it.
-bool ArchiveIndexBuilder::put_in_table(const ZipMember& member) {
-  const auto place = table_place(member.name);
-  if (!place || member.bytes > kMostInRecord || member.compressed_bytes > kMostInRecord) return false;
-  const auto is_it = [&](const TableWriter& known) { return known.members().name == place->table; };
+void ArchiveIndexBuilder::add_copy(const TablePlace& place, const ZipMember& member) {
+  add_member(place, member);
+}
+
+void ArchiveIndexBuilder::add_entry(const ZipMember& member) {
+  entry_.clear();
+  append_directory_entry(member, entry_);
+  directory_.append(entry_);
+  ++entries_;
+}
+
+void ArchiveIndexBuilder::add_member(const std::optional<TablePlace>& place, const ZipMember& member) {
+  add_entry(member);
+  if (place && put_in_table(*place, member)) return;
+  loose_.push_back(member);
+  loose_names_.insert(member.name);
+}
+
+/// False where the member does not fit into its kind's table.
+bool ArchiveIndexBuilder::put_in_table(const TablePlace& place, const ZipMember& member) {
+  if (member.bytes > kMostInRecord || member.compressed_bytes > kMostInRecord) return false;
+  const auto is_it = [&](const TableWriter& known) { return known.members().name == place.table; };
   auto table = std::find_if(tables_.begin(), tables_.end(), is_it);
   if (table == tables_.end()) {
-    const bool by_tile = place->table.find("{column}") != std::string::npos;
-    TableWriter made(place->table, by_tile ? grid_.tile_columns() : 1, by_tile ? grid_.tile_rows() : 0, false, folder_);
-    if (!made.takes(place->row, place->column)) return false;
+    const bool by_tile = place.table.find("{column}") != std::string::npos;
+    TableWriter made(place.table, by_tile ? grid_.tile_columns() : 1, by_tile ? grid_.tile_rows() : 0, false, folder_);
+    if (!made.takes(place.row, place.column)) return false;
     tables_.push_back(std::move(made));
     table = tables_.end() - 1;
   }
-  if (!table->takes(place->row, place->column)) return false;
-  table->add(place->row, place->column, record_of(member), {});
+  if (!table->takes(place.row, place.column)) return false;
+  table->add(place.row, place.column, record_of(member), {});
   return true;
 }
 

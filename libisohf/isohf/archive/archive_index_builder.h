@@ -8,8 +8,10 @@
 
 #include "isohf/archive.h"
 #include "isohf/archive/codec/tile_codes.h"
+#include "isohf/archive/container/archive_directory.h"
 #include "isohf/archive/container/content_hash.h"
 #include "isohf/archive/container/table_writer.h"
+#include "isohf/archive/deflate/deflate.h"
 #include "isohf/archive/journal.h"
 #include "isohf/base/memory/spill_buffer.h"
 #include "isohf/base/output_file.h"
@@ -25,6 +27,10 @@ class ArchiveIndexBuilder {
 
   /// Takes a step of writing: the tile with flat index next_tile(), or a member that stands before it.
   void add(const JournalRecord& record);
+  /// A tile of a plane, or another member at its place in a table, all but its CRC: add_data_crc32() follows, in file order.
+  void add_copy(PlaneTile tile, const ZipMember& member, const TableRecord& record, const Digest& digest);
+  void add_copy(const TablePlace& place, const ZipMember& member);
+  void add_data_crc32(std::uint32_t crc) { data_crc32_ = crc32_of_crc32(crc, data_crc32_); }
   /// Takes tiles from next_tile() on that are not there, by the digest of a void one.
   void skip(std::int64_t tiles, std::span<const std::byte> void_digest);
 
@@ -52,7 +58,9 @@ class ArchiveIndexBuilder {
 
  private:
   void add_up(const TileStatistics& tile);
-  [[nodiscard]] bool put_in_table(const ZipMember& member);
+  void add_entry(const ZipMember& member);
+  void add_member(const std::optional<TablePlace>& place, const ZipMember& member);
+  [[nodiscard]] bool put_in_table(const TablePlace& place, const ZipMember& member);
 
   TileGrid grid_;
   std::string folder_;
@@ -62,6 +70,7 @@ class ArchiveIndexBuilder {
   std::unordered_set<std::string> loose_names_;
   SpillBuffer directory_;
   std::uint64_t entries_ = 0;  ///< in it
+  std::vector<std::byte> entry_;
   ContentHash content_;
   TileStatistics statistics_;  ///< but for the sum
   std::vector<double> row_sums_;

@@ -3,6 +3,7 @@
 #include "isohf/archive/codec/tile_encoder.h"
 
 #include <fmt/format.h>
+#include <oneapi/tbb/task_group.h>
 
 #include <algorithm>
 #include <optional>
@@ -17,6 +18,7 @@
 #include "isohf/base/assert.h"
 #include "isohf/base/bytes.h"
 #include "isohf/base/output_file.h"
+#include "isohf/base/source_bytes.h"
 #include "isohf/error.h"
 
 namespace isohf {
@@ -28,6 +30,25 @@ constexpr std::uint64_t kJournalBytes = std::uint64_t{4} << 20U;
 
 /// What is collected before it is written: it stays in a core's cache between the two copies.
 constexpr std::size_t kBufferBytes = std::size_t{256} << 10U;
+
+/// Of other archives' members: what is copied at once.
+constexpr std::uint64_t kCopyBytes = std::uint64_t{256} << 10U;
+
+/// Members that follow one another in another archive.
+struct CopiedRun {
+  const ByteSource* from = nullptr;
+  const std::string* name = nullptr;
+  std::uint64_t offset = 0;  ///< of the first one's local header
+  std::uint64_t bytes = 0;
+  std::vector<std::byte> headers;                                ///< as they must stand there
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> members;  ///< bytes of header and of data
+
+  void clear() {
+    bytes = 0;
+    headers.clear();
+    members.clear();
+  }
+};
 
 Digest job_digest(const TileGrid& grid, const WriterOptions& options) {
   std::vector<std::byte> bytes;
@@ -64,6 +85,11 @@ struct ArchiveWriter::State {
   std::uint64_t members_end = 0;  ///< likewise: where index and directory begin
   bool finished = false;
   bool keep = false;
+  CopiedRun collected;  ///< by the caller's thread
+  CopiedRun copied;     ///< by the task
+  std::vector<std::byte> piece;
+  std::uint64_t announced = 0;  ///< bytes of both
+  oneapi::tbb::task_group copying;
 
   State(const std::string& target, const TileGrid& tile_grid, const WriterOptions& writer_options)
       : path(target),
@@ -85,6 +111,12 @@ struct ArchiveWriter::State {
 
   void start_over();
   void resume();
+  /// Where the next member is to stand.
+  [[nodiscard]] std::uint64_t position() const { return announced != 0 ? announced : part.position(); }
+  void copy(const CopySource& from, std::uint64_t data_offset, const ZipMember& member);
+  void hand_over();
+  void write_copies();
+  void end_copies();
   void begin_contents();
   [[nodiscard]] bool is_intact(const JournalRecord& record, std::uint64_t expected_offset) const;
   void append(const ZipMember& member, std::span<const std::byte> data);
@@ -177,6 +209,7 @@ void ArchiveWriter::State::resume() {
 }
 
 void ArchiveWriter::State::append(const ZipMember& member, std::span<const std::byte> data) {
+  end_copies();
   try {
     std::vector<std::byte> header;
     append_local_header(member, header);
@@ -186,6 +219,64 @@ void ArchiveWriter::State::append(const ZipMember& member, std::span<const std::
     throw Error(error.code(), fmt::format("{}: {}; {} of {} tiles are done", path, error.what(), contents.next_tile(),
                                           grid.tile_count()));
   }
+}
+
+void ArchiveWriter::State::copy(const CopySource& from, std::uint64_t data_offset, const ZipMember& member) {
+  ISOHF_ASSERT(!journal);
+  const std::uint64_t header = local_header_bytes(member);
+  const std::uint64_t bytes = header + member.compressed_bytes;
+  if (data_offset < header)
+    throw Error(ErrorCode::kCorrupt, fmt::format("{}: its index names byte {}", from.name, data_offset));
+  const std::uint64_t offset = data_offset - header;
+  const bool follows = collected.from == &from.bytes && collected.offset + collected.bytes == offset;
+  if (collected.bytes > 0 && (!follows || collected.bytes + bytes > kCopyBytes)) hand_over();
+  if (collected.bytes == 0) {
+    collected.from = &from.bytes;
+    collected.name = &from.name;
+    collected.offset = offset;
+  }
+  announced = position() + bytes;
+  append_local_header(member, collected.headers);
+  collected.members.emplace_back(static_cast<std::uint32_t>(header),
+                                 static_cast<std::uint32_t>(member.compressed_bytes));
+  collected.bytes += bytes;
+}
+
+/// Has the task copy what was collected.
+void ArchiveWriter::State::hand_over() {
+  copying.wait();
+  std::swap(collected, copied);
+  collected.clear();
+  if (copied.bytes > 0) copying.run([this] { write_copies(); });
+}
+
+void ArchiveWriter::State::write_copies() {
+  try {
+    piece.resize(copied.bytes);
+    read_exactly(*copied.from, copied.offset, piece);
+  } catch (const Error& error) {
+    throw error.within(*copied.name);
+  }
+  std::size_t at = 0;
+  auto header = copied.headers.begin();
+  for (const auto& [header_bytes, data_bytes] : copied.members) {
+    const auto found = std::span(piece).subspan(at, header_bytes);
+    if (!std::equal(found.begin(), found.end(), header)) {
+      throw Error(ErrorCode::kCorrupt, fmt::format("{}: at byte {}: no local header that says what the index says",
+                                                   *copied.name, copied.offset + at));
+    }
+    header += header_bytes;
+    contents.add_data_crc32(crc32(std::span(piece).subspan(at + header_bytes, data_bytes)));
+    at += header_bytes + data_bytes;
+  }
+  named([&] { part.append(piece); });
+}
+
+void ArchiveWriter::State::end_copies() {
+  if (announced == 0) return;
+  hand_over();
+  copying.wait();
+  announced = 0;
 }
 
 void ArchiveWriter::State::checkpoint() {
@@ -230,6 +321,7 @@ ArchiveWriter::ArchiveWriter(const std::string& path, const TileGrid& grid, cons
 }
 
 ArchiveWriter::~ArchiveWriter() {
+  stop_copies();
   if (state_ == nullptr || state_->finished || state_->keep) return;
   remove_file(state_->journal_path);
 }
@@ -241,7 +333,7 @@ std::int64_t ArchiveWriter::tiles_stored() const {
   return state_->contents.tiles_stored();
 }
 std::uint64_t ArchiveWriter::bytes_written() const {
-  return state_->part.position();
+  return state_->position();
 }
 std::uint64_t ArchiveWriter::tile_bytes() const {
   return state_->contents.tile_bytes();
@@ -260,6 +352,7 @@ MemberTotals ArchiveWriter::members_in(const std::string& folder) const {
 
 void ArchiveWriter::State::add_tile_member(JournalRecord::Kind kind, PlaneTile tile, const EncodedTile& encoded,
                                            std::pair<std::uint32_t, std::uint32_t> range) {
+  end_copies();
   JournalRecord record;
   record.kind = kind;
   ISOHF_ASSERT(encoded.content_digest.size() == record.digest.size());
@@ -304,6 +397,7 @@ void ArchiveWriter::State::add_member(ZipMember member, std::span<const std::byt
   if (const std::string why = why_bad_name(name); !why.empty()) refuse(why);
   if (name == kMetadataName || name == kIndexName || is_in_tile_folder(name)) refuse("the name is taken");
   if (contents.has_member(name)) refuse("it is there already");
+  end_copies();
   JournalRecord record;
   record.kind = JournalRecord::Kind::kMember;
   record.member = std::move(member);
@@ -328,7 +422,46 @@ void ArchiveWriter::add_deflated_member(const std::string& name, std::span<const
   state_->add_member({name, ZipMethod::kDeflated, crc32_of_bytes, deflated.size(), bytes, 0}, deflated);
 }
 
+void ArchiveWriter::copy_tile(const CopySource& from, PlaneTile tile, const TableRecord& record, const Digest& digest) {
+  State& state = *state_;
+  const TileEntry& entry = record.entry;
+  ISOHF_ASSERT(tile.plane != 0 || state.grid.flat_index(tile.tile) == state.contents.next_tile());
+  const ZipMember member{tile_name(tile.tile, tile.plane), ZipMethod::kDeflated, entry.payload_crc32,
+                         entry.compressed_bytes,           entry.payload_bytes,  state.position()};
+  TableRecord copied = record;
+  copied.entry.offset_bytes = member.header_offset + local_header_bytes(member);
+  state.copy(from, entry.offset_bytes, member);
+  state.contents.add_copy(tile, member, copied, digest);
+}
+
+void ArchiveWriter::copy_member(const CopySource& from, const TablePlace& place, const TableRecord& record) {
+  State& state = *state_;
+  const TileEntry& entry = record.entry;
+  const ZipMember member{member_name(place.table, place.row, place.column),
+                         record.deflated ? ZipMethod::kDeflated : ZipMethod::kStored,
+                         entry.payload_crc32,
+                         entry.compressed_bytes,
+                         entry.payload_bytes,
+                         state.position()};
+  state.copy(from, entry.offset_bytes, member);
+  state.contents.add_copy(place, member);
+}
+
+void ArchiveWriter::stop_copies() noexcept {
+  if (state_ == nullptr) return;
+  state_->collected.clear();
+  try {
+    state_->copying.wait();
+  } catch (...) {  // another failure is on its way
+  }
+}
+
+void ArchiveWriter::end_copies() {
+  state_->end_copies();
+}
+
 void ArchiveWriter::flush_tiles() {
+  state_->end_copies();
   state_->named([&] { state_->part.flush(); });
 }
 
@@ -365,6 +498,7 @@ void ArchiveWriter::complete(Metadata metadata) {
   State& state = *state_;
   ISOHF_ASSERT(!state.finished);
   (void)content_hash(metadata);
+  state.end_copies();
   state.named([&] {
     state.part.flush();
     if (state.members_end != 0) state.part.truncate(state.members_end);

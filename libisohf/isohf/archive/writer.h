@@ -9,6 +9,9 @@
 #include <vector>
 
 #include "isohf/archive/codec/tile_codes.h"
+#include "isohf/archive/container/archive_directory.h"
+#include "isohf/archive/container/member_tables.h"
+#include "isohf/byte_source.h"
 #include "isohf/metadata.h"
 
 namespace isohf {
@@ -23,6 +26,12 @@ struct WriterOptions {
   std::int64_t first_tile = 0;     ///< flat index of the first that is added; those before are not there
   CodeType type = CodeType::kU16;  ///< of tiles that are not there
   bool journal = true;             ///< keep one for a resume; without it a part file is never kept
+};
+
+/// Where members are copied from.
+struct CopySource {
+  const ByteSource& bytes;
+  const std::string& name;  ///< in errors
 };
 
 /// Whether a file begins as an archive of any version of the format. No other file is ever replaced by one, but an empty
@@ -80,6 +89,16 @@ class ArchiveWriter {
   /// The same for one that is deflated already: `bytes` and `crc32_of_bytes` are those of the inflated member.
   void add_deflated_member(const std::string& name, std::span<const std::byte> deflated, std::uint64_t bytes,
                            std::uint32_t crc32_of_bytes);
+
+  /// Appends a member of another archive at its place in a table as it stands there, local header included, which must
+  /// say what the record says: Error{kCorrupt} from here or a later call. What follows one another there is copied in
+  /// large pieces, beside the caller's thread, on its oneTBB arena: `from` must live until end_copies().
+  /// Without a journal only. A tile of a plane, which adds nothing to statistics():
+  void copy_tile(const CopySource& from, PlaneTile tile, const TableRecord& record, const Digest& digest);
+  void copy_member(const CopySource& from, const TablePlace& place, const TableRecord& record);
+  /// Waits for what is being copied, and forgets the rest: before the arena is left. Any other call copies all.
+  void stop_copies() noexcept;
+  void end_copies();
 
   /// Makes every tile added so far readable by read_tile.
   void flush_tiles();

@@ -130,24 +130,23 @@ OutputFile::~OutputFile() {
 
 void OutputFile::append(std::span<const std::byte> bytes) {
   if (buffer_.size() + bytes.size() > buffer_bytes_) flush();
-  if (bytes.size() >= buffer_bytes_) {
-    is_synced_ = false;
-    file_.write_at(flushed_, bytes);
-    flushed_ += bytes.size();
-    return;
-  }
+  if (bytes.size() >= buffer_bytes_) return write(bytes);
   buffer_.insert(buffer_.end(), bytes.begin(), bytes.end());
+}
+
+void OutputFile::write(std::span<const std::byte> bytes) {
+  is_synced_ = false;
+  file_.write_at(flushed_, bytes);
+  // The disk starts at once, so that the last flush does not wait for all of it.
+  const std::uint64_t begun = flushed_ / kWritebackBytes * kWritebackBytes;
+  flushed_ += bytes.size();
+  const std::uint64_t full = flushed_ / kWritebackBytes * kWritebackBytes;
+  if (full > begun) file_.start_writeback(begun, full - begun);
 }
 
 void OutputFile::flush() {
   if (buffer_.empty()) return;
-  is_synced_ = false;
-  file_.write_at(flushed_, buffer_);
-  // The disk starts at once, so that the last flush does not wait for all of it.
-  const std::uint64_t begun = flushed_ / kWritebackBytes * kWritebackBytes;
-  flushed_ += buffer_.size();
-  const std::uint64_t full = flushed_ / kWritebackBytes * kWritebackBytes;
-  if (full > begun) file_.start_writeback(begun, full - begun);
+  write(buffer_);
   buffer_.clear();
 }
 

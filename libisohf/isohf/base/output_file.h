@@ -77,6 +77,8 @@ class OutputFile {
     gid_t group;
   };
 
+  void write(std::span<const std::byte> bytes);
+
   std::string path_;
   std::string place_;  ///< with links followed
   std::string part_path_;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstring>
 #include <span>
 #include <string_view>
 
@@ -55,18 +56,36 @@ std::string_view text_of(std::span<const std::byte> bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
+/// Fills room that was made at the end of a vector, which a million headers would else grow field by field.
+class RoomWriter {
+ public:
+  RoomWriter(std::vector<std::byte>& out, std::uint64_t bytes) {
+    out.resize(out.size() + bytes);
+    at_ = out.data() + (out.size() - bytes);
+  }
+
+  template <typename T>
+  void write(T value) {
+    std::memcpy(at_, &value, sizeof value);
+    at_ += sizeof value;
+  }
+  void write(const std::string& text) {
+    std::memcpy(at_, text.data(), text.size());
+    at_ += text.size();
+  }
+
+ private:
+  std::byte* at_;
+};
+
 /// What local header and directory entry have in common, from the version on.
-void append_common(ByteWriter& writer, const ZipMember& member, bool large) {
+void append_common(RoomWriter& writer, const ZipMember& member, bool large) {
   writer.write(large ? kVersion64 : kVersionPlain);
   writer.write(is_ascii(member.name) ? std::uint16_t{0} : kFlagUtf8);
   writer.write(static_cast<std::uint16_t>(member.method));
   writer.write(std::uint16_t{0});  // time
   writer.write(kDate);
   writer.write(member.crc32);
-}
-
-void append_text(ByteWriter& writer, const std::string& text) {
-  writer.write_bytes(std::as_bytes(std::span<const char>(text)));
 }
 
 }  // namespace
@@ -76,7 +95,7 @@ std::uint64_t local_header_bytes(const ZipMember& member) {
 }
 
 void append_local_header(const ZipMember& member, std::vector<std::byte>& out) {
-  ByteWriter writer(out);
+  RoomWriter writer(out, local_header_bytes(member));
   const bool large = is_large(member);
   writer.write(kLocalSignature);
   append_common(writer, member, large);
@@ -84,7 +103,7 @@ void append_local_header(const ZipMember& member, std::vector<std::byte>& out) {
   writer.write(large ? kIn64 : static_cast<std::uint32_t>(member.bytes));
   writer.write(static_cast<std::uint16_t>(member.name.size()));
   writer.write(static_cast<std::uint16_t>(large ? 20 : 0));
-  append_text(writer, member.name);
+  writer.write(member.name);
   if (large) {
     writer.write(kZip64Tag);
     writer.write(std::uint16_t{16});
@@ -94,10 +113,10 @@ void append_local_header(const ZipMember& member, std::vector<std::byte>& out) {
 }
 
 void append_directory_entry(const ZipMember& member, std::vector<std::byte>& out) {
-  ByteWriter writer(out);
   const bool large = is_large(member);
   const bool far = member.header_offset >= kIn64;
   const unsigned extra = 8U * ((large ? 2U : 0U) + (far ? 1U : 0U));
+  RoomWriter writer(out, kEntryBytes + member.name.size() + (extra == 0 ? 0 : extra + 4));
   writer.write(kEntrySignature);
   writer.write(static_cast<std::uint16_t>(kMadeOnUnix | kVersion64));
   append_common(writer, member, large || far);
@@ -110,7 +129,7 @@ void append_directory_entry(const ZipMember& member, std::vector<std::byte>& out
   writer.write(std::uint16_t{0});  // internal attributes
   writer.write(kRegularFile);
   writer.write(low32(member.header_offset));
-  append_text(writer, member.name);
+  writer.write(member.name);
   if (extra == 0) return;
   writer.write(kZip64Tag);
   writer.write(static_cast<std::uint16_t>(extra));
@@ -241,8 +260,7 @@ std::size_t entry_bytes(std::span<const std::byte> entry) {
   return kEntryBytes + lengths.read<std::uint16_t>() + lengths.read<std::uint16_t>() + lengths.read<std::uint16_t>();
 }
 
-ZipEntry read_entry(ByteReader& reader, std::uint64_t at) {
-  ZipEntry entry;
+void read_entry(ByteReader& reader, std::uint64_t at, ZipEntry& entry) {
   entry.entry_offset = at;
   if (reader.read<std::uint32_t>() != kEntrySignature) refuse(at, "no directory entry, where one must stand");
   static_cast<void>(reader.read<std::uint32_t>());
@@ -260,16 +278,15 @@ ZipEntry read_entry(ByteReader& reader, std::uint64_t at) {
   entry.name = text_of(reader.read_bytes(name_bytes));
   read_zip64_field(reader.read_bytes(extra_bytes), at, entry);
   static_cast<void>(reader.read_bytes(comment_bytes));
-  return entry;
 }
 
 }  // namespace
 
-std::optional<ZipEntry> ZipEntries::next() {
+bool ZipEntries::read(ZipEntry& entry) {
   constexpr std::uint64_t kFirstPieceBytes = 4096;                // what is looked for is mostly the first
   constexpr std::uint64_t kPieceBytes = std::uint64_t{1} << 18U;  // no entry is longer
   if (position_ == end_.directory_bytes) {
-    if (entries_ == end_.entries) return std::nullopt;
+    if (entries_ == end_.entries) return false;
     refuse(end_.directory_offset,
            fmt::format("the directory holds {} entries, its end record says {}", entries_, end_.entries));
   }
@@ -283,10 +300,10 @@ std::optional<ZipEntry> ZipEntries::next() {
   }
   const std::uint64_t at = end_.directory_offset + position_;
   ByteReader reader(rest(), at);
-  const ZipEntry entry = read_entry(reader, at);
+  read_entry(reader, at, entry);
   position_ += reader.position();
   ++entries_;
-  return entry;
+  return true;
 }
 
 ZipLocal read_local_header(const ByteSource& file, const ZipEntry& entry) {

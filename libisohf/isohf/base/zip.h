@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "isohf/byte_source.h"
@@ -50,7 +51,12 @@ class ZipEntries {
   ZipEntries(const ByteSource& file, const ZipEnd& end) : file_(file), end_(end) {}
 
   /// nullopt behind the last one; checks that there are as many as the end record says.
-  [[nodiscard]] std::optional<ZipEntry> next();
+  [[nodiscard]] std::optional<ZipEntry> next() {
+    ZipEntry entry;
+    return read(entry) ? std::optional(std::move(entry)) : std::nullopt;
+  }
+  /// The same into an entry that was used before; false behind the last one.
+  [[nodiscard]] bool read(ZipEntry& entry);
 
  private:
   const ByteSource& file_;

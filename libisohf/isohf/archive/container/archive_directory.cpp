@@ -315,11 +315,23 @@ std::uint32_t crc32_in(const ByteSource& file, std::uint64_t offset_bytes, std::
 
 std::uint32_t data_crc32(const ByteSource& file, const std::string& name) try {
   std::uint32_t all = 0;
-  const AheadSource ahead(file);  // members follow one another
-  for (ZipEntries entries(file, find_archive_end(file)); const auto entry = entries.next();) {
-    if (entry->name == kIndexName) break;
-    if (entry->name == kMetadataName) continue;
-    all = crc32_of_crc32(crc32_in(ahead, checked_data_offset(ahead, *entry), entry->compressed_bytes), all);
+  ReadAhead ahead;  // members follow one another
+  ZipEntry entry;
+  std::vector<std::byte> header;
+  for (ZipEntries entries(file, find_archive_end(file)); entries.read(entry);) {
+    if (entry.name == kIndexName) break;
+    if (entry.name == kMetadataName) continue;
+    // Mostly it stands there as isohf writes it.
+    header.clear();
+    append_local_header(entry, header);
+    const std::uint64_t bytes = header.size() + entry.compressed_bytes;
+    std::span<const std::byte> stored;
+    if (bytes <= ReadAhead::kPieceBytes && entry.header_offset + bytes <= file.size_bytes())
+      stored = ahead.bytes(file, entry.header_offset, bytes);
+    const bool is_known = !stored.empty() && std::equal(header.begin(), header.end(), stored.begin());
+    all = crc32_of_crc32(is_known ? crc32(stored.subspan(header.size()))
+                                  : crc32_in(file, checked_data_offset(file, entry), entry.compressed_bytes),
+                         all);
   }
   return all;
 } catch (const Error& error) {

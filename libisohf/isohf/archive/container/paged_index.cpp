@@ -163,6 +163,45 @@ std::optional<Digest> PagedIndex::digest(std::size_t table, std::int64_t row, st
   return digest;
 }
 
+void PagedIndex::for_row(std::size_t table, std::int64_t row, std::int64_t first, std::int64_t end,
+                         const Found& found) const {
+  const TableDescription& of = tables_[table];
+  const auto start = static_cast<std::uint64_t>(row * of.members.columns);
+  const std::uint64_t behind = start + static_cast<std::uint64_t>(end);
+  for (std::uint64_t flat = start + static_cast<std::uint64_t>(first); flat < behind;) {
+    const std::uint64_t number = flat / of.page_records;
+    const std::uint64_t page_at = number * of.page_records;
+    const std::uint64_t page_end = std::min(behind, page_at + of.records_of(number));
+    const RootEntry entry = root_entry(table, number);
+    const std::size_t bits = (of.records_of(number) + 7) / 8;
+    Bytes bytes;
+    Bytes digests;
+    if (entry.stored > 0) {
+      bytes = page(table, number, entry);
+      if (of.has_digests)
+        digests = cached(entry.digests_offset, sizeof(Digest) * std::uint64_t{entry.stored}, entry.digests_crc32, of);
+    }
+    std::optional<std::size_t> next;  // its place among those that are stored
+    for (; flat < page_end && bytes; ++flat) {
+      const std::uint64_t bit = flat - page_at;
+      if ((std::to_integer<unsigned>((*bytes)[bit / 8]) >> (bit % 8) & 1U) == 0) continue;
+      const std::size_t rank = next ? *next : *rank_in_page(std::span(*bytes).first(bits), bit);
+      next = rank + 1;
+      const std::size_t at = bits + rank * kRecordBytes;
+      const auto record =
+          rank < entry.stored ? parse_record(std::span(*bytes).subspan(at, kRecordBytes)) : std::nullopt;
+      const auto column = static_cast<std::int64_t>(flat - start);
+      if (!record) refuse(entry.page_offset + at, of, fmt::format("the record of ({},{}) breaks a rule", column, row));
+      Digest digest{};
+      if (digests)
+        std::copy_n(digests->begin() + static_cast<std::ptrdiff_t>(rank * digest.size()), digest.size(),
+                    digest.begin());
+      found(column, *record, digests ? &digest : nullptr);
+    }
+    flat = page_end;
+  }
+}
+
 void PagedIndex::for_each(std::size_t table, const std::function<void(std::uint64_t, const TableRecord&)>& at,
                           const std::function<void(const std::string&)>& complain) const {
   const TableDescription& of = tables_[table];

@@ -32,6 +32,10 @@ class PagedIndex {
   [[nodiscard]] std::optional<TableRecord> record(std::size_t table, std::int64_t row, std::int64_t column) const;
   [[nodiscard]] std::optional<Digest> digest(std::size_t table, std::int64_t row, std::int64_t column) const;
 
+  /// Goes through what is there of a row, from column `first` to before `end`; digest  nullptr where the table has none
+  using Found = std::function<void(std::int64_t column, const TableRecord&, const Digest* digest)>;
+  void for_row(std::size_t table, std::int64_t row, std::int64_t first, std::int64_t end, const Found& found) const;
+
   /// Goes through a table by ascending place, and holds root and description against the records on the way: what does
   /// not agree goes to `complain`.
   void for_each(std::size_t table, const std::function<void(std::uint64_t flat, const TableRecord&)>& at,

@@ -103,9 +103,7 @@ std::uint32_t crc32(std::span<const std::byte> bytes, std::uint32_t seed) {
 }
 
 std::uint32_t crc32_of_crc32(std::uint32_t crc, std::uint32_t seed) {
-  std::vector<std::byte> bytes;
-  ByteWriter(bytes).write(crc);
-  return crc32(bytes, seed);
+  return libdeflate_crc32(seed, &crc, sizeof crc);
 }
 
 }  // namespace isohf

@@ -4,8 +4,10 @@
 #include <oneapi/tbb/parallel_for.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <map>
+#include <utility>
 
 #include "isohf/archive/codec/simd/batch_decoder.h"
 #include "isohf/archive/codec/tile_encoder.h"
@@ -21,6 +23,32 @@
 
 namespace isohf {
 namespace {
+
+/// The range of a tile's own codes: of a coarse plane's tile another one is stated.
+void set_own_range(const TileCodes& codes, const Quantisation& quantisation, EncodedTile& tile) {
+  bool is_first = true;
+  const auto add = [&](std::uint32_t code) {
+    TileEntry entry;
+    entry.code_min = entry.code_max = code;
+    widen(entry, std::exchange(is_first, false), tile.code_min, tile.code_max);
+  };
+  for (const std::uint16_t code : codes.codes) {
+    if (code != quantisation.void_code()) add(code);
+  }
+  for (const float height : codes.heights) {
+    if (!std::isnan(height)) add(std::bit_cast<std::uint32_t>(height));
+  }
+}
+
+/// Tiles of a row whose records are looked at together.
+constexpr std::int64_t kColumnsAtOnce = 4096;
+const std::string kSeedTable = "seeds/{row}/{column}.seed";
+
+struct Texture {
+  std::int64_t column;
+  const std::string* table;
+  TableRecord record;
+};
 
 /// A tile's record and bytes.
 EncodedTile encoded_tile(const ArchiveReader& from, TileIndex index, int plane, ReadAhead& ahead) {
@@ -65,8 +93,16 @@ void Assembly::add_tiles() {
   const auto batch = static_cast<std::size_t>(kBatchLanes) * static_cast<std::size_t>(threads_of(job_));
   Row above;
   for (std::int64_t row = 0; row < grid.tile_rows(); ++row) {
-    Row tiles(static_cast<std::size_t>(columns));
     const std::vector<const AssemblyInput*> inputs = inputs_of_row(row);
+    if (!decodes() && inputs.size() <= 1) {
+      inputs.empty() ? writer_.skip_tiles(columns) : copy_row(row, *inputs.front());
+      if (request_.planes != nullptr) add_plane_rows(row);
+      if (!inputs.empty() && has_seeds_) copy_seeds(row, *inputs.front());
+      close_before(row);
+      job_.report({"tiles", "tiles", (row + 1) * columns, grid.tile_count(), writer_.bytes_written()});
+      continue;
+    }
+    Row tiles(static_cast<std::size_t>(columns));
     for (std::size_t first = 0; first < tiles.size(); first += batch) {
       job_.throw_if_cancelled();
       std::vector<Tile> some(std::min(batch, tiles.size() - first));
@@ -74,7 +110,7 @@ void Assembly::add_tiles() {
       for (std::size_t i = 0; i < some.size(); ++i) {
         const TileIndex index{static_cast<std::int64_t>(first + i), row};
         Tile& tile = some[i];
-        if (tile.from != nullptr && !tile.tables->empty()) add_textures(index, tile);
+        if (tile.tables != nullptr) add_textures(index, tile);
         request_.tiles.contains(index) ? writer_.add_tile(tile.encoded) : writer_.skip_tiles(1);
         if (request_.planes != nullptr && !request_.has_plane_rows) request_.planes->add(tile.sample);
         tiles[first + i] = {tile.from, request_.one_origin ? TileCodes() : std::move(tile.codes)};
@@ -87,13 +123,55 @@ void Assembly::add_tiles() {
     close_before(row);
     job_.report({"tiles", "tiles", (row + 1) * columns, grid.tile_count(), writer_.bytes_written()});
   }
+  writer_.end_copies();
+}
+
+/// What one archive has of a row, without a look at the tiles: void ones are not there.
+void Assembly::copy_row(std::int64_t row, const AssemblyInput& input) {
+  const std::int64_t columns = metadata_.grid.tile_columns();
+  const TileRange range = intersection(request_.tiles, input.tiles);
+  std::int64_t next = 0;
+  for (std::int64_t first = range.first.column; first < range.end.column; first += kColumnsAtOnce) {
+    job_.throw_if_cancelled();
+    const std::pair some(first, std::min(first + kColumnsAtOnce, range.end.column));
+    std::vector<Texture> textures;
+    for (const std::string& table : input.file->tile_tables()) {
+      for (const PartFile::Stored& texture : input.file->stored(table, row, some))
+        textures.push_back({texture.column, &table, texture.record});
+    }
+    std::sort(textures.begin(), textures.end(), [](const Texture& a, const Texture& b) {
+      return std::pair(a.column, a.record.entry.offset_bytes) < std::pair(b.column, b.record.entry.offset_bytes);
+    });
+    auto texture = textures.begin();
+    for (const PartFile::Stored& tile : input.file->stored(tile_table_name(0), row, some)) {
+      writer_.skip_tiles(tile.column - next);
+      next = tile.column + 1;
+      for (; texture != textures.end() && texture->column <= tile.column; ++texture) {
+        if (texture->column == tile.column)
+          writer_.copy_member(input.file->source(), {*texture->table, row, tile.column}, texture->record);
+      }
+      writer_.copy_tile(input.file->source(), {0, {tile.column, row}}, tile.record, tile.digest);
+    }
+  }
+  writer_.skip_tiles(columns - next);
+}
+
+void Assembly::copy_seeds(std::int64_t row, const AssemblyInput& input) {
+  const TileRange range = intersection(request_.tiles, input.tiles);
+  for (std::int64_t first = range.first.column; first < range.end.column; first += kColumnsAtOnce) {
+    const std::pair some(first, std::min(first + kColumnsAtOnce, range.end.column));
+    for (const PartFile::Stored& seed : input.file->stored(kSeedTable, row, some))
+      writer_.copy_member(input.file->source(), {kSeedTable, row, seed.column}, seed.record);
+  }
 }
 
 /// Closes what no row needs any more, the first plane's of these rows included.
 void Assembly::close_before(std::int64_t row) {
   for (const AssemblyInput& input : request_.inputs) {
     const std::int64_t done = input.tiles.end.row + std::max<std::int64_t>(metadata_.planes.stride, 1) + 1;
-    if (row >= done && row < done + 1) input.file->close();
+    if (row != done) continue;
+    writer_.end_copies();
+    input.file->close();
   }
 }
 
@@ -105,32 +183,34 @@ void Assembly::add_plane_rows(std::int64_t row) {
   for (; next_plane_row_ < grid.tile_rows(); ++next_plane_row_) {
     const std::int64_t needed = std::min((next_plane_row_ + 1) * planes.stride() + 1, metadata_.grid.tile_rows());
     if (row + 1 < needed) return;
-    const ArchiveReader& from = inputs_of_row(next_plane_row_ * planes.stride()).front()->file->archive();
-    const auto read = [&](int plane, TileIndex tile) {
-      PlaneBuilder::Stored stored;
-      const TileEntry entry = from.tile_entry(tile, plane);
-      stored.entry.is_empty = !entry.stored;
-      stored.entry.code_min = entry.code_min;
-      stored.entry.code_max = entry.code_max;
-      if (entry.stored) stored.codes = from.read_tile(tile, plane);
-      return stored;
-    };
+    PartFile& file = *inputs_of_row(next_plane_row_ * planes.stride()).front()->file;
+    const ArchiveReader& from = file.archive();
     for (std::int64_t first = 0; first < grid.tile_columns(); first += batch) {
       job_.throw_if_cancelled();
       std::vector<PlaneSample> samples(static_cast<std::size_t>(std::min(batch, grid.tile_columns() - first)));
-      const auto tile_at = [&](std::size_t i) {
-        return TileIndex{first + static_cast<std::int64_t>(i), next_plane_row_};
-      };
-      if (planes.count() > 1) {
-        oneapi::tbb::parallel_for(std::size_t{0}, samples.size(), [&](std::size_t i) {
-          samples[i] = request_.planes->finished_sample(tile_at(i), read);
-        });
-      }
-      for (std::size_t i = 0; i < samples.size(); ++i) {
-        const EncodedTile encoded = encoded_tile(from, tile_at(i), 1, plane_bytes_);
-        writer_.add_plane_tile(1, tile_at(i), encoded, {encoded.code_min, encoded.code_max});
-        if (planes.count() > 1) request_.planes->add_finished(samples[i]);
-      }
+      const std::size_t groups = planes.count() > 1 ? (samples.size() + kBatchLanes - 1) / kBatchLanes : 0;
+      oneapi::tbb::parallel_for(std::size_t{0}, groups, [&](std::size_t group) {
+        std::vector<TileIndex> tiles;
+        for (std::size_t i = group * kBatchLanes; i < std::min(samples.size(), (group + 1) * kBatchLanes); ++i)
+          tiles.push_back({first + static_cast<std::int64_t>(i), next_plane_row_});
+        const std::vector<TileCodes> codes = from.read_tiles(tiles, 1);
+        for (std::size_t i = 0; i < tiles.size(); ++i) {
+          const auto read = [&](int plane, TileIndex tile) {
+            const TileEntry entry = from.tile_entry(tile, plane);
+            PlaneBuilder::Stored stored;
+            stored.entry.is_empty = !entry.stored;
+            stored.entry.code_min = entry.code_min;
+            stored.entry.code_max = entry.code_max;
+            if (entry.stored) stored.codes = plane == 1 ? codes[i] : from.read_tile(tile, plane);
+            return stored;
+          };
+          samples[group * kBatchLanes + i] = request_.planes->finished_sample(tiles[i], read);
+        }
+      });
+      const std::pair some(first, first + static_cast<std::int64_t>(samples.size()));
+      for (const PartFile::Stored& tile : file.stored(tile_table_name(1), next_plane_row_, some))
+        writer_.copy_tile(file.source(), {1, {tile.column, next_plane_row_}}, tile.record, tile.digest);
+      for (std::size_t i = 0; i < samples.size() && planes.count() > 1; ++i) request_.planes->add_finished(samples[i]);
     }
   }
 }
@@ -151,10 +231,10 @@ void Assembly::read(std::span<const AssemblyInput* const> inputs, TileIndex firs
     for (const AssemblyInput* const input : inputs) {
       if (!input->tiles.contains(index)) continue;
       const ArchiveReader& archive = input->file->archive();
-      tiles[i].encoded = encoded_tile(archive, index, 0, tile_bytes_);
+      tiles[i].encoded = encoded_tile(archive, index, request_.plane, tile_bytes_);
       if (tiles[i].encoded.is_empty) continue;
       tiles[i].from = &archive;
-      tiles[i].tables = &input->file->tile_tables();
+      if (request_.plane == 0) tiles[i].tables = &input->file->tile_tables();
       break;
     }
     if (tiles[i].from == nullptr) make_void(index, tiles[i].encoded);
@@ -173,7 +253,7 @@ void Assembly::read(std::span<const AssemblyInput* const> inputs, TileIndex firs
     for (const auto& [archive, places] : stored) {
       std::vector<TileIndex> indices;
       for (const std::size_t i : places) indices.push_back(index_of(i));
-      std::vector<TileCodes> codes = archive->read_tiles(indices);
+      std::vector<TileCodes> codes = archive->read_tiles(indices, request_.plane);
       for (std::size_t k = 0; k < places.size(); ++k) {
         Tile& tile = lanes[places[k]];
         EncodedTile& encoded = tile.encoded;
@@ -192,6 +272,7 @@ void Assembly::read(std::span<const AssemblyInput* const> inputs, TileIndex firs
           }
           encoded.content_digest = std::move(digest);
         }
+        if (request_.plane != 0) set_own_range(tile.codes, metadata_.quantisation, encoded);
         if (counted_) encoded.statistics = tile_statistics(*counted_, indices[k], tile.codes, metadata_.quantisation);
         if (request_.planes != nullptr) tile.sample = request_.planes->sample(tile.codes, encoded);
       }

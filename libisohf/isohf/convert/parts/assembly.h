@@ -30,6 +30,7 @@ struct AssemblyRequest {
   bool one_origin = true;             ///< edges meet and seeds hold wherever the inputs are joined
   bool recount = false;               ///< give the writer each tile's statistics, by counting
   bool checks_digests = false;        ///< decode every tile and hold it against its digest
+  int plane = 0;                      ///< of the inputs, whose tiles these become; another one: with `recount`
 };
 
 /// Copies a member as it is.
@@ -41,6 +42,9 @@ class Assembly {
  public:
   /// metadata  of what is written: grid, quantisation, seeds
   Assembly(const Metadata& metadata, ArchiveWriter& writer, AssemblyRequest request, const Job& job);
+  Assembly(const Assembly&) = delete;
+  Assembly& operator=(const Assembly&) = delete;
+  ~Assembly() { writer_.stop_copies(); }
 
   /// All tiles with what belongs to them. Throws Error{kInvalidArgument} where edges don't meet.
   void add_tiles();
@@ -50,8 +54,8 @@ class Assembly {
 
  private:
   struct Tile {
-    const ArchiveReader* from = nullptr;  ///< nullptr: void
-    const std::vector<std::string>* tables = nullptr;
+    const ArchiveReader* from = nullptr;               ///< nullptr: void
+    const std::vector<std::string>* tables = nullptr;  ///< of members that come with it
     EncodedTile encoded;
     TileCodes codes;
     PlaneSample sample;
@@ -65,6 +69,8 @@ class Assembly {
 
   [[nodiscard]] std::vector<const AssemblyInput*> inputs_of_row(std::int64_t row) const;
   void read(std::span<const AssemblyInput* const> inputs, TileIndex first, std::span<Tile> tiles);
+  void copy_row(std::int64_t row, const AssemblyInput& input);
+  void copy_seeds(std::int64_t row, const AssemblyInput& input);
   void make_void(TileIndex index, EncodedTile& tile) const;
   void add_plane_rows(std::int64_t row);
   void add_textures(TileIndex index, const Tile& tile);
@@ -84,7 +90,6 @@ class Assembly {
   std::vector<std::byte> void_digest_;
   std::int64_t next_plane_row_ = 0;
   ReadAhead tile_bytes_;  ///< each kind stands in its own order
-  ReadAhead plane_bytes_;
   ReadAhead member_bytes_;
 };
 

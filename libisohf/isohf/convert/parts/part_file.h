@@ -2,9 +2,12 @@
 
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "isohf/archive.h"
+#include "isohf/archive/container/paged_index.h"
+#include "isohf/archive/writer.h"
 
 namespace isohf {
 
@@ -20,8 +23,21 @@ class PartFile {
     return *open_;
   }
   void close() {
-    if (!path_.empty()) open_.reset();
+    if (path_.empty()) return;
+    index_.reset();
+    open_.reset();
   }
+
+  /// What its index says of members of a row, in `columns` from the first to before the second, by ascending column. The
+  /// file is one that require_copyable() lets through.
+  struct Stored {
+    std::int64_t column;
+    TableRecord record;
+    Digest digest;  ///< of tiles
+  };
+  [[nodiscard]] std::vector<Stored> stored(const std::string& table, std::int64_t row,
+                                           std::pair<std::int64_t, std::int64_t> columns);
+  [[nodiscard]] CopySource source() { return {archive().source(), archive().path()}; }
 
   /// Names of the tables of members that come with a tile, but for seeds.
   [[nodiscard]] const std::vector<std::string>& tile_tables();
@@ -31,6 +47,7 @@ class PartFile {
  private:
   std::string path_;
   std::shared_ptr<const ArchiveReader> open_;
+  std::unique_ptr<PagedIndex> index_;
   std::vector<std::string> tables_;
   bool knows_tables_ = false;
 };

@@ -12,6 +12,7 @@
 #include "isohf/archive/shadow_seeds/shadow_seeds.h"
 #include "isohf/archive/textures/texture_info.h"
 #include "isohf/base/arena.h"
+#include "isohf/base/file.h"
 #include "isohf/convert/job_description.h"
 #include "isohf/convert/parts/residual_members.h"
 #include "isohf/error.h"
@@ -19,6 +20,9 @@
 
 namespace isohf {
 namespace {
+
+/// Of the rows that coarse planes are made of: more lie in a file beside the output.
+constexpr std::uint64_t kMostPlaneBytes = std::uint64_t{16} << 20U;
 
 void drop_extension(Metadata& metadata, const char* name) {
   std::erase_if(metadata.extensions, [&](const auto& extension) { return extension.first == name; });
@@ -167,7 +171,8 @@ PartSummary write_parts(PartsJob parts, const std::string& output, const PartOpt
     const auto& tables = input.file->archive().tables();
     return std::any_of(tables.begin(), tables.end(), [](const auto& table) { return is_residual(table.name); });
   };
-  if (!residuals && !parts.statistics && std::any_of(parts.inputs.begin(), parts.inputs.end(), has_some)) {
+  if (!residuals && !parts.statistics && parts.plane == 0 &&
+      std::any_of(parts.inputs.begin(), parts.inputs.end(), has_some)) {
     summary.warnings.push_back(loss("residuals are left out: they are not those of all that is joined"));
   }
   drop_extension(metadata, kLosslessName);
@@ -182,12 +187,21 @@ PartSummary write_parts(PartsJob parts, const std::string& output, const PartOpt
   Arena(job).execute([&] {
     std::optional<PlaneStage> planes;
     if (metadata.planes.count > 0) {
-      planes.emplace(planes_of(metadata), metadata.quantisation, metadata.level.value_or(kDefaultLevel), writer,
-                     RowRange{0, metadata.grid.tile_rows() - 1});
+      const Planes all = planes_of(metadata);
+      const CodeType type = metadata.quantisation.type;
+      ScratchFolder scratch;
+      if (plane_builder_memory_bytes(all, type, false) > kMostPlaneBytes) scratch = folder_of(output);
+      planes.emplace(all, metadata.quantisation, metadata.level.value_or(kDefaultLevel), writer,
+                     RowRange{0, metadata.grid.tile_rows() - 1}, nullptr, scratch);
     }
-    AssemblyRequest request{
-        parts.inputs,      parts.tiles, planes ? &*planes : nullptr, parts.has_plane_rows, parts.one_origin,
-        !parts.statistics, false};
+    AssemblyRequest request{parts.inputs,
+                            parts.tiles,
+                            planes ? &*planes : nullptr,
+                            parts.has_plane_rows,
+                            parts.one_origin,
+                            !parts.statistics,
+                            false,
+                            parts.plane};
     Assembly assembly(metadata, writer, std::move(request), job);
     assembly.add_tiles();
     if (residuals) residuals->copy_to(writer);
@@ -225,22 +239,69 @@ PartSummary write_parts(PartsJob parts, const std::string& output, const PartOpt
   return summary;
 }
 
+namespace {
+
+/// Of an archive that can be cut: a shard cannot.
+PartOrigin cuttable(const ArchiveReader& reader) {
+  require_copyable(reader);
+  PartOrigin origin = origin_of(reader);
+  if (origin.is_shard) {
+    throw Error(ErrorCode::kInvalidArgument, reader.path() + ": is a shard of a plan; join the shards first");
+  }
+  return origin;
+}
+
+void require_tiles(const TileRange& tiles, const TileRange& here, const std::string& archive) {
+  if (!tiles.is_empty() && intersection(tiles, here) == tiles) return;
+  throw Error(ErrorCode::kInvalidArgument,
+              fmt::format("{}: {} of tiles are asked for, it holds {}", archive, text_of(tiles), text_of(here)));
+}
+
+}  // namespace
+
 PartSummary extract_tiles(const std::string& archive, const std::string& output, const TileRange& tiles,
                           const PartOptions& options, const Job& job) {
   const ArchiveReader reader(archive);
   require_copyable(reader);
-  const TileRange here = tiles_here(reader);
-  if (tiles.is_empty() || intersection(tiles, here) != tiles) {
-    throw Error(ErrorCode::kInvalidArgument,
-                fmt::format("{}: {} of tiles are asked for, it holds {}", archive, text_of(tiles), text_of(here)));
-  }
-  const PartOrigin origin = origin_of(reader);
-  if (origin.is_shard) {
-    throw Error(ErrorCode::kInvalidArgument, archive + ": is a shard of a plan; join the shards first");
-  }
+  require_tiles(tiles, tiles_here(reader), archive);
+  const PartOrigin origin = cuttable(reader);
   return write_parts(
       {{{part_file(reader), tiles}}, tiles, reader.metadata(), origin.whole_json, true, false, std::nullopt}, output,
       options, job);
+}
+
+TileRange plane_tiles_of(const ArchiveReader& archive, int plane) {
+  const Metadata& metadata = archive.metadata();
+  if (plane < 0 || plane > metadata.planes.count) {
+    throw Error(ErrorCode::kInvalidArgument, fmt::format("{}: has {} coarse planes, plane {} is asked for",
+                                                         archive.path(), metadata.planes.count, plane));
+  }
+  const TileRange here = tiles_here(archive);
+  std::int64_t scale = 1;
+  for (int i = 0; i < plane; ++i) scale *= metadata.planes.stride;
+  return {{here.first.column / scale, here.first.row / scale},
+          {(here.end.column + scale - 1) / scale, (here.end.row + scale - 1) / scale}};
+}
+
+PartSummary extract_plane(const std::string& archive, const std::string& output, int plane, const TileRange& tiles,
+                          const PartOptions& options, const Job& job) {
+  if (plane == 0) return extract_tiles(archive, output, tiles, options, job);
+  const ArchiveReader reader(archive);
+  (void)cuttable(reader);
+  require_tiles(tiles, plane_tiles_of(reader, plane), archive);
+  Metadata metadata = reader.metadata();
+  const std::int64_t columns = metadata.grid.tile_columns();
+  metadata.grid = metadata.plane_grid(plane);
+  metadata.planes = planes_for(metadata.grid);
+  const double width = static_cast<double>(metadata.grid.tile_columns()) * metadata.grid.extent_x();
+  metadata.wraps_x = metadata.wraps_x && width == static_cast<double>(columns) * reader.grid().extent_x();
+  metadata.textures.clear();
+  for (const char* name :
+       {kShadowSeedsName, kTileTexturesName, kLosslessName, kPartLosslessName, kAccuracyName, kJobName, kPartName}) {
+    drop_extension(metadata, name);
+  }
+  return write_parts({{{part_file(reader), tiles}}, tiles, std::move(metadata), {}, true, false, std::nullopt, plane},
+                     output, options, job);
 }
 
 }  // namespace isohf

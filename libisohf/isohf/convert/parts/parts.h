@@ -52,6 +52,7 @@ struct PartsJob {
   bool one_origin = true;
   bool has_plane_rows = false;           ///< AssemblyRequest's
   std::optional<Statistics> statistics;  ///< where they are known; else tiles are decoded and counted
+  int plane = 0;                         ///< AssemblyRequest's
 };
 /// Throws as merge_archives() does once it writes.
 [[nodiscard]] PartSummary write_parts(PartsJob parts, const std::string& output, const PartOptions& options,
