@@ -30,7 +30,7 @@ class SymbolReader {
     const std::uint32_t slot = state % kFrequencySum;
     std::uint32_t symbol = kEscape;
     while (table.starts[symbol] > slot) --symbol;
-    state = table.frequencies[symbol] * (state / kFrequencySum) + slot - table.starts[symbol];
+    state = table.frequency(symbol) * (state / kFrequencySum) + slot - table.starts[symbol];
     if (state < kFirstState) {
       if (next_word_ + 2 > words_.size()) refuse("it holds too few words");
       std::uint16_t word;

@@ -65,11 +65,6 @@ struct CodedRow {
 };
 constexpr unsigned kExtraShift = 5;
 
-/// A step of the coder: first slot and number of slots of a symbol, in one number; 0 for none.
-constexpr std::uint32_t step_of(const SymbolTable& table, std::uint32_t symbol) {
-  return table.starts[symbol] | std::uint32_t{table.frequencies[symbol]} << kFrequencyBits;
-}
-
 class AdaptiveEncoder {
  public:
   AdaptiveEncoder(Lattice<std::int32_t>& lattice, AdaptivePayload& payload)
@@ -173,13 +168,13 @@ class AdaptiveEncoder {
     for (std::size_t place = begin; place < end; ++place) {
       extra_out[place] = 0;
       if (coded.contexts[place] == kNoContext) continue;
-      SymbolModel::Row& row = model_.row(coded.contexts[place]);
+      SymbolTable& table = model_.opened(coded.contexts[place]);
       const std::uint32_t residual = coded.residuals[place];
       const unsigned plain_bits = coded.plain_bits[place];
       std::uint32_t symbol = std::min(residual >> plain_bits, kEscape);
-      if (row.table.frequencies[symbol] == 0) symbol = kEscape;
-      steps[place] = step_of(row.table, symbol);
-      ++row.pending[symbol];
+      if (table.frequency(symbol) == 0) symbol = kEscape;
+      steps[place] = table.starts[symbol] | table.frequency(symbol) << kFrequencyBits;
+      model_.count(table, symbol);
       std::uint32_t extra = (residual & ((1U << plain_bits) - 1)) << kExtraShift | plain_bits;
       if (symbol == kEscape) {
         const auto bits = static_cast<unsigned>(std::bit_width(residual + 1)) - 1;

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "isohf/archive/codec/adaptive/fine_prediction.h"
+#include "isohf/base/simd.h"
 
 namespace isohf {
 
@@ -14,11 +15,17 @@ inline constexpr std::size_t kModelSymbols = 16;
 inline constexpr std::uint32_t kEscape = kModelSymbols - 1;  ///< the residual stands in the extra bits
 inline constexpr unsigned kEscapeBits = 5;                   ///< of the number of bits after it
 
-/// A context's symbols: where each begins among kFrequencySum slots, and how many it has; none for what only the escape
-/// can say.
+/// A context's symbols: where each begins among kFrequencySum slots, whose last ones are the escape's, and how often it
+/// has occurred since tables were made and was not carried to the counts; 0 where it has not. A line of the cache: there
+/// may be a thousand of them.
 struct alignas(64) SymbolTable {
   std::array<std::uint16_t, kModelSymbols> starts{};
-  std::array<std::uint16_t, kModelSymbols> frequencies{};
+  std::array<std::uint16_t, kModelSymbols> pending{};
+
+  /// Its slots; none for what only the escape can say.
+  [[nodiscard]] std::uint32_t frequency(std::uint32_t symbol) const {
+    return (symbol == kEscape ? kFrequencySum : starts[symbol + 1]) - starts[symbol];
+  }
 };
 
 /// What symbols follow in which context, learnt from the bands of rows before (docs/archive_format.md, "Learning"):
@@ -27,54 +34,58 @@ class SymbolModel {
  public:
   SymbolModel();
 
-  /// A context's table, and what is counted in it until tables are made anew.
-  struct alignas(64) Row {
-    SymbolTable table;
-    std::array<std::uint32_t, kModelSymbols> pending{};
-  };
+  static constexpr std::uint16_t kNoTable = 0xffff;
+  /// A context of no sample, whose table may be written to.
+  static constexpr std::uint32_t kNoContext = kAllContexts;
 
-  /// The row of a context, opened where it is the first time; until the next is.
-  [[nodiscard]] Row& row(std::uint32_t context) {
-    std::uint32_t index = row_of_[context];
-    if (index == kNoRow) index = open_row(context);
-    add_to_pending(index);
-    return rows_[index];
+  /// Where all that is; until a table is opened.
+  struct View {
+    const std::uint16_t* table_of;
+    SymbolTable* tables;
+  };
+  [[nodiscard]] View view() { return {table_of_.data(), tables_.data()}; }
+  /// The table of a context in which a symbol occurs, opened where it is the first time. `at` is a view of this.
+  [[nodiscard]] SymbolTable& opened(std::uint32_t context, View& at) {
+    std::uint32_t index = at.table_of[context];
+    if (index == kNoTable) [[unlikely]] {
+      index = open_table(context);
+      at = view();
+    }
+    return at.tables[index];
+  }
+  [[nodiscard]] SymbolTable& opened(std::uint32_t context) {
+    View now = view();
+    return opened(context, now);
   }
   /// Without opening one: what the context would start with.
   [[nodiscard]] const SymbolTable& table(std::uint32_t context) const {
-    const std::uint32_t index = row_of_[context];
-    return rows_[index == kNoRow ? parent_of(context) : index].table;
+    const std::uint32_t index = table_of_[context];
+    return tables_[index == kNoTable ? parent_of(context) : index];
   }
   /// Counts a symbol; tables stay as they are.
-  void count(std::uint32_t context, std::uint32_t symbol) { ++row(context).pending[symbol]; }
+  void count(SymbolTable& table, std::uint32_t symbol) {
+    if (++table.pending[symbol] == 0) [[unlikely]] {
+      carry(table, symbol);
+    }
+  }
+  void count(std::uint32_t context, std::uint32_t symbol) { count(opened(context), symbol); }
+  /// Where a symbol was counted 2^16 times.
+  void carry(SymbolTable& table, std::uint32_t symbol);
   /// After each band: the tables of the contexts that occurred are made anew after 1 to 8 bands, 10, 12, 14, 16, 20, ...
   void end_band();
 
  private:
-  static constexpr std::uint16_t kNoRow = 0xffff;
+  using Counts = std::array<std::uint32_t, kModelSymbols>;
 
-  struct Counts {
-    std::array<std::uint32_t, kModelSymbols> symbols{};
-    std::uint32_t all = 0;
-    std::uint32_t context = 0;
-  };
-
-  std::uint32_t open_row(std::uint32_t context);
-  /// Once each, without a branch that nobody could foresee.
-  void add_to_pending(std::uint32_t index) {
-    pending_[pending_count_] = static_cast<std::uint16_t>(index);
-    pending_count_ += 1U - is_pending_[index];
-    is_pending_[index] = 1;
-  }
-  void remake(std::uint32_t index);
+  std::uint32_t open_table(std::uint32_t context);
+  ISOHF_KERNEL static void remake(SymbolModel& model);
 
   std::uint32_t bands_ = 0;
-  std::vector<Row> rows_;                 ///< of the plain contexts, then of those that have come
-  std::vector<Counts> counts_;            ///< likewise
-  std::vector<std::uint8_t> is_pending_;  ///< likewise
-  std::vector<std::uint16_t> row_of_;     ///< by context
-  std::vector<std::uint16_t> pending_;    ///< rows to make anew, the first pending_count_
-  std::size_t pending_count_ = 0;
+  std::vector<SymbolTable> tables_;      ///< of the plain contexts, of none, then of those that have come
+  std::vector<Counts> counts_;           ///< likewise, of all symbols but the pending ones
+  std::vector<std::uint16_t> parents_;   ///< likewise, the plain contexts that they belong to
+  std::vector<std::uint16_t> table_of_;  ///< by context
+  std::vector<std::uint16_t> pending_;   ///< scratch: tables to make anew
 };
 
 }  // namespace isohf

@@ -4,6 +4,9 @@
 #include <array>
 #include <bit>
 #include <cstring>
+#include <functional>
+#include <limits>
+#include <numeric>
 #include <vector>
 
 #include "isohf/archive/codec/adaptive/symbol_model.h"
@@ -20,82 +23,204 @@ namespace {
 constexpr int kLanes = kBandRows;
 constexpr int kMargin = 3;
 constexpr int kRowsAbove = 3;
-constexpr unsigned kAllLanes = 0xff;
 constexpr std::size_t kSlack = 64;  ///< bytes that a step may read past words and extra bits
+
+using Eight = std::uint16_t __attribute__((vector_size(16)));
 
 /// When place 0 of a lane's row is worked on; lanes below 0 are the rows above the band.
 constexpr int delay(int lane) {
   return (7 * lane + 1) >> 1;
 }
 
+/// Samples are kept less 2^15, so that they fit 16 bits with a sign, each behind that of the place West of it: one
+/// multiplication by a pair of weights does for both.
+constexpr std::int32_t kSampleShift = 1 << 15;
+constexpr std::int32_t pair_of(std::int32_t west, std::int32_t east) {
+  return static_cast<std::int32_t>((static_cast<std::uint32_t>(west) & 0xffffU) | static_cast<std::uint32_t>(east)
+                                                                                      << 16U);
+}
+
 /// What the lanes have at each time: lane i's place t - delay(i) at time t, so that each neighbour of all lanes' samples
 /// is one vector: of W the one a time before, of those on the row above the one a lane before, three times before.
 class SlantedRows {
  public:
-  explicit SlantedRows(int columns)
-      : values_(kStride *
-                static_cast<std::size_t>(columns + 2 * kMargin + delay(kLanes - 1) - delay(-kRowsAbove) + 2)) {}
+  static constexpr int kDeviationRowsAbove = 2;
+  /// A line of the cache.
+  struct alignas(64) Time {
+    std::array<std::int32_t, kRowsAbove + kLanes> pairs;
+    std::array<std::uint16_t, kDeviationRowsAbove + kLanes> deviations;
 
-  [[nodiscard]] std::int32_t* at(int lane, int time) {
-    return values_.data() + kStride * static_cast<std::size_t>(time - kFirstTime) + kRowsAbove + lane;
-  }
-  [[nodiscard]] std::int32_t& of(int lane, int place) { return *at(lane, place + delay(lane)); }
-  void fill(int lane, int begin, int end, std::int32_t value) {
-    for (int place = begin; place < end; ++place) of(lane, place) = value;
+    [[nodiscard]] std::int32_t& pair(int lane) { return pairs[static_cast<std::size_t>(kRowsAbove + lane)]; }
+    [[nodiscard]] std::uint16_t& deviation(int lane) {
+      return deviations[static_cast<std::size_t>(kDeviationRowsAbove + lane)];
+    }
+  };
+
+  explicit SlantedRows(int columns)
+      : times_(static_cast<std::size_t>(columns + kMargin + delay(kLanes - 1) + kAhead - kFirstTime)) {}
+
+  [[nodiscard]] Time& at(int time) { return times_[static_cast<std::size_t>(time - kFirstTime)]; }
+  [[nodiscard]] Time& at(int lane, int place) { return at(place + delay(lane)); }
+  [[nodiscard]] std::int32_t sample(int lane, int place) { return (at(lane, place).pair(lane) >> 16) + kSampleShift; }
+  [[nodiscard]] std::uint16_t deviation(int lane, int place) { return at(lane, place).deviation(lane); }
+  void fill(int lane, int begin, int end, std::int32_t sample, std::uint16_t deviation) {
+    const std::int32_t kept = sample - kSampleShift;
+    for (int place = begin; place < end; ++place) {
+      at(lane, place).pair(lane) = pair_of(kept, kept);
+      if (lane >= -kDeviationRowsAbove) at(lane, place).deviation(lane) = deviation;
+    }
+    std::int32_t& after = at(lane, end).pair(lane);
+    after = pair_of(kept, after >> 16);
   }
   /// The last rows become those above the next band.
   void next_band(int columns) {
-    for (int lane = -kRowsAbove; lane < 0; ++lane) {
-      for (int place = -kMargin; place < columns + kMargin; ++place) of(lane, place) = of(lane + kLanes, place);
+    for (int time = kFirstTime; time < columns + kMargin; ++time) {
+      Time& above = at(time);
+      const Time& done = at(time + kAhead);
+      for (std::size_t i = 0; i < kRowsAbove; ++i) above.pairs[i] = done.pairs[kLanes + i];
+      for (std::size_t i = 0; i < kDeviationRowsAbove; ++i) above.deviations[i] = done.deviations[kLanes + i];
     }
   }
 
  private:
-  static constexpr std::size_t kStride = 16;
   static constexpr int kFirstTime = delay(-kRowsAbove) - kMargin;
-  std::vector<std::int32_t> values_;
+  static constexpr int kAhead = delay(kLanes) - delay(0);  ///< a lane's row is one of the next band so much later
+
+  std::vector<Time> times_;
 };
 
+/// A symbol's start, 16 bits, and that of the one after it, or of the escape anything. Puts 2 + 2 times the symbol below
+/// `symbols`, which are those of the lanes after this one.
 template <bool kIsWide>
-ISOHF_KERNEL std::uint32_t symbol_at(const SymbolTable& table, std::uint32_t slot) {
+ISOHF_KERNEL std::uint32_t take_symbol(SymbolModel& model, SymbolModel::View& view, std::uint32_t context,
+                                       const std::uint32_t& end, std::uint64_t& symbols) {
+  SymbolTable& table = model.opened(context, view);
 #if defined(ISOHF_HAS_WIDE_BUILTINS)
   if constexpr (kIsWide) {
     using Shorts = short __attribute__((vector_size(32)));
     using Bytes = char __attribute__((vector_size(32)));
     const Shorts starts = unaligned<Shorts>(table.starts.data()).value;
-    const auto above =
-        static_cast<std::uint32_t>(__builtin_ia32_pmovmskb256((Bytes)(starts > (Shorts{} + static_cast<short>(slot)))));
-    return kEscape - static_cast<std::uint32_t>(__builtin_popcount(above)) / 2;
+    const Bytes begun = (Bytes)(Shorts{} + unaligned<short>(&end).value > starts);
+    // Two bits, and two bytes, for each symbol that has begun.
+    const auto bytes =
+        static_cast<std::uint64_t>(__builtin_popcountll(static_cast<std::uint32_t>(__builtin_ia32_pmovmskb256(begun))));
+    symbols = symbols << 8U | bytes;
+    std::byte* const after = reinterpret_cast<std::byte*>(&table) + bytes;
+    auto& pending = unaligned<std::uint16_t>(after + sizeof(table.starts) - sizeof(std::uint16_t));
+    pending.value = static_cast<std::uint16_t>(pending.value + 1);
+    if (pending.value == 0) [[unlikely]] {
+      model.carry(table, static_cast<std::uint32_t>(bytes / 2 - 1));
+    }
+    return unaligned<std::uint32_t>(after - sizeof(std::uint16_t)).value;
   }
 #endif
   std::uint32_t symbol = 0;
-  for (std::uint32_t s = 1; s < kModelSymbols; ++s) symbol += table.starts[s] <= slot ? 1 : 0;
-  return symbol;
+  for (std::size_t s = 1; s < kModelSymbols; ++s) symbol += table.starts[s] < end ? 1 : 0;
+  symbols = symbols << 8U | (2 * symbol + 2);
+  model.count(table, symbol);
+  const std::uint32_t next = symbol == kEscape ? 0U : table.starts[symbol + 1];
+  return table.starts[symbol] | next << 16U;
+}
+
+/// Eight numbers of 16 or 8 bits, as words.
+template <bool kIsWide>
+ISOHF_KERNEL Words from_shorts(const void* numbers) {
+  const Eight eight = unaligned<Eight>(numbers).value;
+#if defined(ISOHF_HAS_WIDE_BUILTINS)
+  using Shorts = short __attribute__((vector_size(16)));
+  if constexpr (kIsWide) return (Words)__builtin_ia32_pmovzxwd256((Shorts)eight);
+#endif
+  return __builtin_convertvector(eight, Words);
+}
+template <bool kIsWide>
+ISOHF_KERNEL Words from_bytes(const void* numbers) {
+#if defined(ISOHF_HAS_WIDE_BUILTINS)
+  using Bytes = char __attribute__((vector_size(16)));
+  using Two = long long __attribute__((vector_size(16)));
+  if constexpr (kIsWide) return (Words)__builtin_ia32_pmovzxbd256((Bytes)Two{unaligned<long long>(numbers).value, 0});
+#endif
+  using Indices = std::uint8_t __attribute__((vector_size(8)));
+  return __builtin_convertvector(unaligned<Indices>(numbers).value, Words);
+}
+
+/// For each set of lanes, which of the next words each of them takes.
+constexpr auto kWordOfLane = [] {
+  std::array<std::array<std::uint8_t, kLanes>, 1U << kLanes> words{};
+  for (unsigned lanes = 0; lanes < words.size(); ++lanes) {
+    for (int lane = 0; lane < kLanes; ++lane) {
+      words[lanes][static_cast<std::size_t>(lane)] =
+          static_cast<std::uint8_t>(std::popcount(lanes & ((1U << lane) - 1)));
+    }
+  }
+  return words;
+}();
+
+/// A bit for each lane.
+template <bool kIsWide>
+ISOHF_KERNEL unsigned lanes_of(Ints mask) {
+#if defined(ISOHF_HAS_WIDE_BUILTINS)
+  using Floats = float __attribute__((vector_size(32)));
+  if constexpr (kIsWide) return static_cast<unsigned>(__builtin_ia32_movmskps256((Floats)mask));
+#endif
+  unsigned lanes = 0;
+  for (int lane = 0; lane < kLanes; ++lane) lanes |= mask[lane] != 0 ? 1U << lane : 0;
+  return lanes;
 }
 
 /// Words and extra bits on their way.
 struct Source {
   std::array<std::uint32_t, kLanes> states{};
-  unsigned state_mask = 0;
+  std::array<std::uint32_t, kLanes> ends{};  ///< of many states: the slot after each one's
+  bool has_one_state = false;
   const std::byte* word;
   const std::byte* words_end;
   const std::byte* extra;
   std::uint64_t position = 0;
   std::uint64_t extra_end;
 
-  /// `next_word` is one's own copy, so that it stays in a register.
-  template <bool kIsWide>
-  ISOHF_KERNEL std::uint32_t take(const SymbolTable& table, unsigned lane, const std::byte*& next_word) {
-    std::uint32_t& state = states[lane & state_mask];
+  /// The next symbol of a lane alone.
+  std::uint32_t take(SymbolModel& model, SymbolModel::View& view, std::uint32_t context, std::size_t lane) {
+    std::uint32_t& state = states[has_one_state ? 0 : lane];
     const std::uint32_t slot = state % kFrequencySum;
-    const std::uint32_t symbol = symbol_at<kIsWide>(table, slot);
-    const std::uint32_t next = table.frequencies[symbol] * (state / kFrequencySum) + slot - table.starts[symbol];
-    std::uint16_t more;
-    std::memcpy(&more, next_word, sizeof(more));
-    const bool is_short = next < kFirstState;
-    state = is_short ? next << 16U | more : next;
-    next_word += is_short ? sizeof(more) : 0;
+    SymbolTable& table = model.opened(context, view);
+    std::uint32_t symbol = 0;
+    if (slot >= table.starts[1]) {  // seldom where one state suffices
+      while (symbol < kEscape && table.starts[symbol + 1] <= slot) ++symbol;
+    }
+    model.count(table, symbol);
+    state = table.frequency(symbol) * (state / kFrequencySum) + slot - table.starts[symbol];
+    if (state < kFirstState) {
+      std::uint16_t more;
+      std::memcpy(&more, word, sizeof(more));
+      word += sizeof(more);
+      state = state << 16U | more;
+    }
+    if (!has_one_state) ends[lane] = state % kFrequencySum + 1;
     return symbol;
+  }
+  /// The states after symbols with these starts and frequencies in each lane of `coded`.
+  template <bool kIsWide>
+  ISOHF_KERNEL void advance(Words starts, Words frequencies, Ints coded, Words slots) {
+    const Words before = unaligned<Words>(states.data()).value;
+    const Words next = frequencies * (before >> kFrequencyBits) + (before & slots) - starts;
+    const Ints is_short = (Ints)(next >> 16U == 0) & coded;
+    const unsigned lanes = lanes_of<kIsWide>(is_short);
+    const Words ready = from_shorts<kIsWide>(word);
+    const Words which = from_bytes<kIsWide>(kWordOfLane[lanes].data());
+    Words more;
+#if defined(ISOHF_HAS_WIDE_BUILTINS)
+    if constexpr (kIsWide) {
+      more = (Words)__builtin_ia32_permvarsi256((Ints)ready, (Ints)which);
+    } else
+#endif
+    {
+      for (int lane = 0; lane < kLanes; ++lane) more[lane] = ready[which[lane]];
+    }
+    const Words after = is_short != 0 ? next << 16U | more : next;
+    const Words now = coded != 0 ? after : before;
+    unaligned<Words>(states.data()).value = now;
+    unaligned<Words>(ends.data()).value = (now & slots) + 1;
+    word += sizeof(std::uint16_t) * static_cast<unsigned>(std::popcount(lanes));
   }
   ISOHF_KERNEL std::uint32_t bits(unsigned count) {
     std::uint64_t value;
@@ -111,193 +236,224 @@ struct Source {
     if (value > 0xffff) position = extra_end + 1;  // broken
     return value;
   }
-  [[nodiscard]] bool is_good() const { return word <= words_end && position <= extra_end; }
+  [[nodiscard]] bool is_good() const {
+    return word <= words_end && position <= extra_end;
+  }
 };
 
-using LaneWeights = std::array<Ints, kWeightCount + 1>;  ///< the last is NE's
+/// A pair of terms of the prediction: the lane and the times before at which its eastern sample stands, and the weights
+/// of both; a negative one for none.
+struct TermPair {
+  int lane;
+  int back;
+  int west;
+  int east;
+};
+constexpr int kAnchor = static_cast<int>(kWeightCount);  // NE's weight
+constexpr std::array<TermPair, 10> kTermPairs = {{{-3, 11, 13, 11},
+                                                  {-3, 9, 10, 12},
+                                                  {-2, 10, -1, 17},
+                                                  {-2, 8, 9, 7},
+                                                  {-2, 6, 5, 6},
+                                                  {-2, 4, 8, 16},
+                                                  {-1, 5, 15, 4},
+                                                  {-1, 3, 1, kAnchor},
+                                                  {-1, 1, 3, 14},
+                                                  {0, 1, 2, 0}}};
+constexpr std::size_t kNearestPairs = 2;  ///< the last ones, of the time before
+
+/// Numbers of a step that stand in memory, where nothing takes a register or is made anew for them.
+struct LaneConstants {
+  std::array<Words, kTermPairs.size()> weights{};
+  Words shifts = Words{} + (std::uint32_t{kSampleShift} << kWeightBits);  ///< of samples, in a sum
+  Ints least;                                                             ///< of predictions, in eighths
+  Ints most;
+  Ints low;  ///< of samples
+  Ints high;
+  Ints half = Ints{} + 4;
+  Ints whole = Ints{} - 8;
+  Words west_weights = Words{} + static_cast<std::uint32_t>(pair_of(9, 27));  ///< of NW and W in a pattern
+  Words east_weights = Words{} + static_cast<std::uint32_t>(pair_of(3, 1));   ///< of NEE and NWW
+  Ints least_class = Ints{} + 253;
+  Words class_weights = Words{} + static_cast<std::uint32_t>(pair_of(4 * kPatterns, kPatterns));
+  Ints smooth = Ints{} + static_cast<std::int32_t>(kPlainContexts + kLevelPattern);
+  Ints rough = Ints{} + static_cast<std::int32_t>(kSmoothContexts) - static_cast<std::int32_t>(kLastSmoothClass) - 1;
+  Ints last_smooth = Ints{} + static_cast<std::int32_t>(kLastSmoothClass);
+  Ints first_plain = Ints{} + static_cast<std::int32_t>(kLastSmoothClass) + 1;
+  Words one = Words{} + 1;
+  Words escape = Words{} + kEscape;
+  Ints sixteen_bits = Ints{} + 0xffff;
+  Words slots = Words{} + (kFrequencySum - 1);
+  Words all_slots = Words{} + kFrequencySum;
+  Ints east_shift = Ints{} + std::numeric_limits<std::int32_t>::min();  ///< of the eastern sample of a pair
+};
 
 struct Band {
-  SlantedRows& samples;
-  SlantedRows& deviations;
+  SlantedRows& slanted;
   Source& source;
   SymbolModel& model;
-  const LaneWeights& weights;
+  const LaneConstants& constants;
   int columns;
   int rows;
-  std::int32_t low;
-  std::int32_t high;
   const std::uint8_t* is_void;  ///< of the band's first row; nullptr where nothing is
 };
 
-ISOHF_KERNEL bool is_any(Ints mask) {
-  const LongWords any = (LongWords)mask;
-  return (any[0] | any[1] | any[2] | any[3]) != 0;
-}
-
-ISOHF_KERNEL Ints compare(Ints a, Ints b) {
-  return (Ints)(a < b) - (Ints)(a > b);
-}
-
-/// A lane's value beside those of the lanes before it.
-ISOHF_KERNEL Ints one_lane_on(Ints values, std::int32_t first) {
-  Ints on = __builtin_shufflevector(values, values, 0, 0, 1, 2, 3, 4, 5, 6);
-  on[0] = first;
-  return on;
-}
-
-/// What the last three times left, the latest first: a load that overlaps a store of just now would wait for it.
+/// What the last time left: a load that overlaps a store of just now would wait for it.
 struct Recent {
-  Ints own[2];
-  Ints north[3];  ///< of lanes one before
-  Ints off[2];
-  Ints off_north[3];
+  Ints own;
+  Ints north;  ///< of lanes one before
+  Ints off;
+  Ints off_north;
+  Ints lowest;  ///< of all samples
+  Ints highest;
 
-  ISOHF_KERNEL void push(const Band& band, int t, Ints sample, Ints deviation) {
-    own[1] = own[0];
-    own[0] = sample;
-    off[1] = off[0];
-    off[0] = deviation;
-    north[2] = north[1];
-    north[1] = north[0];
-    north[0] = one_lane_on(sample, *band.samples.at(-1, t));
-    off_north[2] = off_north[1];
-    off_north[1] = off_north[0];
-    off_north[0] = one_lane_on(deviation, *band.deviations.at(-1, t));
+  /// `before` is what the lanes one before had: of all but the first it is what they have now.
+  ISOHF_KERNEL void keep(Ints pairs, Ints deviations, Ints pairs_before, Ints deviations_before) {
+    own = pairs;
+    off = deviations;
+    north = __builtin_shufflevector(pairs, pairs_before, 8, 0, 1, 2, 3, 4, 5, 6);
+    off_north = __builtin_shufflevector(deviations, deviations_before, 8, 0, 1, 2, 3, 4, 5, 6);
   }
-  /// After a row has been opened or closed before time t.
-  ISOHF_KERNEL void reload(const Band& band, int t) {
-    for (int back = 3; back > 0; --back) {
-      push(band, t - back, unaligned<Ints>(band.samples.at(0, t - back)).value,
-           unaligned<Ints>(band.deviations.at(0, t - back)).value);
-    }
+  /// After a row has been opened or closed.
+  template <bool kIsWide>
+  ISOHF_KERNEL void reload(SlantedRows::Time& now) {
+    own = unaligned<Ints>(&now.pair(0)).value;
+    north = unaligned<Ints>(&now.pair(-1)).value;
+    off = (Ints)from_shorts<kIsWide>(&now.deviation(0));
+    off_north = (Ints)from_shorts<kIsWide>(&now.deviation(-1));
   }
 };
 
-/// Places of all lanes at a time.
-template <bool kIsWide, std::size_t kTerms>
-ISOHF_KERNEL bool decode_time(const Band& band, int t, unsigned active, Recent& recent) {
-  const auto near = [&](int lane, int time) { return unaligned<Ints>(band.samples.at(lane, time)).value; };
-  const auto off = [&](int lane, int time) { return unaligned<Ints>(band.deviations.at(lane, time)).value; };
-  const Ints w = recent.own[0];
-  const Ints ne = recent.north[2], nw = near(-1, t - 4), nee = recent.north[1], nww = near(-1, t - 5);
-  const LaneWeights& by = band.weights;
-  Words sum = (Words)by[kWeightCount] * (Words)ne;
-  const auto add = [&](std::size_t weight, Ints sample) { sum += (Words)by[weight] * (Words)sample; };
-  add(1, nw);
-  add(3, nee);
-  add(4, nww);
-  add(5, near(-2, t - 7));
-  add(6, near(-2, t - 6));
-  add(7, near(-2, t - 8));
-  add(8, near(-2, t - 5));
-  add(9, near(-2, t - 9));
-  add(10, near(-3, t - 10));
-  add(11, near(-3, t - 11));
-  if constexpr (kTerms == kWeightCount) {
-    add(12, near(-3, t - 9));
-    add(13, near(-3, t - 12));
-    add(14, recent.north[0]);
-    add(15, near(-1, t - 6));
-    add(16, near(-2, t - 4));
-    add(17, near(-2, t - 10));
+/// Of active lanes, and of others.
+ISOHF_KERNEL Ints voids_at(const Band& band, int t) {
+  Ints is_void{};
+  for (int lane = 0; lane < band.rows; ++lane) {
+    const int place = t - delay(lane);
+    if (place < 0 || place >= band.columns) continue;
+    const int column = column_of_place(band.columns, lane, place);
+    is_void[lane] = band.is_void[static_cast<std::ptrdiff_t>(lane) * band.columns + column] != 0 ? -1 : 0;
   }
-  const Ints* const north = recent.off_north;
-  const Ints above = 4 * (north[2] + off(-1, t - 4) + off(-2, t - 7)) + 3 * north[1] +
-                     2 * (north[0] + off(-1, t - 5) + off(-2, t - 6) + off(-2, t - 8)) + off(-1, t - 6) +
-                     off(-2, t - 5) + off(-2, t - 9);
-  const Ints energy = above + 3 * recent.off[1] + 6 * recent.off[0];
-  add(2, recent.own[1]);
-  add(0, w);
+  return is_void;
+}
 
-  // As FinePrediction, class_of, pattern_of and context_of have it.
-  Ints eighths = (Ints)sum >> (kWeightBits - kEighthsBits);
-  const Ints least = Ints{} + (band.low << kEighthsBits);
-  const Ints most = Ints{} + (band.high << kEighthsBits);
-  eighths = eighths < least ? least : eighths;
-  eighths = eighths > most ? most : eighths;
-  const Ints code = (eighths + 4) >> kEighthsBits;
-  const Ints beside = eighths - (code << kEighthsBits);
-  const Ints below = beside >> 31;  // all ones where the code below is likelier
-  const Ints quarter = beside ^ below;
-  using Floats = float __attribute__((vector_size(32)));
-  Ints of_class = ((Ints) __builtin_convertvector(energy, Floats) >> 22) - 253;
-  of_class = of_class < 0 ? Ints{} : of_class;
-  const Ints pattern = 27 * compare(w, ne) + 9 * compare(nw, ne) + 3 * compare(nee, ne) + compare(nww, ne);
-  const Ints turned = (pattern ^ below) - below;
-  constexpr auto kSmooth = static_cast<std::int32_t>(kPlainContexts + kLevelPattern);
-  constexpr auto kRough = static_cast<std::int32_t>(kSmoothContexts - kLastSmoothClass - 1);
-  constexpr auto kLast = static_cast<std::int32_t>(kLastSmoothClass);
-  const Ints smooth = (4 * of_class + quarter) * static_cast<std::int32_t>(kPatterns) + turned + kSmooth;
-  const Ints contexts = of_class > kLast ? of_class + kRough : smooth;
+/// Places of the active lanes at a time. False where words or extra bits have run out.
+template <bool kIsWide, bool kHasOneState>
+ISOHF_KERNEL bool decode_time(const Band& band, SymbolModel& model, SymbolModel::View& view, Source& source,
+                              SlantedRows::Time* now, int t, Ints active, bool is_full, Recent& recent) {
+  if (!source.is_good()) return false;  // a time takes no more than there is room for behind words and extra bits
+  using Shorts = short __attribute__((vector_size(32)));
+  const LaneConstants& by = band.constants;
+  const auto pairs = [&](int lane, int back) { return unaligned<Words>(&now[-back].pair(lane)).value; };
+  const auto off = [&](int lane, int back) { return (Ints)from_shorts<kIsWide>(&now[-back].deviation(lane)); };
 
-  alignas(32) std::array<std::int32_t, kLanes> context_of_lane;
-  alignas(32) std::array<std::int32_t, kLanes> class_of_lane;
-  alignas(32) std::array<std::uint32_t, kLanes> residuals{};
-  if (!band.source.is_good()) return false;  // a time takes no more than there is room for behind words and extra bits
-  unaligned<Ints>(context_of_lane.data()).value = contexts;
-  unsigned coded = active;
-  Ints is_void = {};
-  if (band.is_void != nullptr) {
-    for (int lane = 0; lane < kLanes; ++lane) {
-      if ((active >> lane & 1U) == 0) continue;
-      const int column = column_of_place(band.columns, lane, t - delay(lane));
-      if (band.is_void[static_cast<std::ptrdiff_t>(lane) * band.columns + column] == 0) continue;
-      coded &= ~(1U << lane);
-      is_void[lane] = -1;
-    }
+  Words sum = by.shifts;
+#pragma GCC unroll 10
+  for (std::size_t i = 0; i < kTermPairs.size() - kNearestPairs; ++i) {
+    sum += multiply_pairs<kIsWide>(by.weights[i], pairs(kTermPairs[i].lane, kTermPairs[i].back));
   }
-  const std::byte* next_word = band.source.word;
-  const auto take = [&](unsigned lane) -> std::uint32_t {
-    SymbolModel::Row& row = band.model.row(static_cast<std::uint32_t>(context_of_lane[lane]));
-    const std::uint32_t symbol = band.source.take<kIsWide>(row.table, lane, next_word);
-    ++row.pending[symbol];
-    return symbol;
+  sum += multiply_pairs<kIsWide>(by.weights[kTermPairs.size() - 2], (Words)recent.north);
+  // As fine_energy has it.
+  const Ints fours = off(-1, 3) + off(-1, 4) + off(-2, 7);
+  const Ints twos = recent.off_north + off(-1, 5) + off(-2, 6) + off(-2, 8);
+  const Ints ones = off(-1, 6) + off(-2, 5) + off(-2, 9);
+  const Ints threes = off(-1, 2) + off(0, 2);
+  const Ints energy = 4 * fours + 2 * twos + ones + 3 * (threes + 2 * recent.off);
+  // As pattern_of has it: of each neighbour whether it is above NE less whether it is below.
+  const auto ne_nw = (Shorts)pairs(-1, 3);
+  const auto own_west = (Shorts)recent.own;
+  const auto north_east = (Shorts)recent.north;
+  const auto north_west = (Shorts)pairs(-1, 5);
+  const Shorts ne = __builtin_shufflevector(ne_nw, ne_nw, 1, 1, 3, 3, 5, 5, 7, 7, 9, 9, 11, 11, 13, 13, 15, 15);
+  const auto beside = [](Shorts low_halves, Shorts high_halves) {
+    return __builtin_shufflevector(low_halves, high_halves, 0, 17, 2, 19, 4, 21, 6, 23, 8, 25, 10, 27, 12, 29, 14, 31);
   };
-  Words zigzagged;
-  if (coded == kAllLanes) {
-    const std::uint32_t a = take(0), b = take(1), c = take(2), d = take(3);
-    const std::uint32_t e = take(4), f = take(5), g = take(6), h = take(7);
-    zigzagged = Words{a, b, c, d, e, f, g, h};
-  } else {
-    for (unsigned lanes = coded; lanes != 0; lanes &= lanes - 1) {
-      const auto lane = static_cast<unsigned>(std::countr_zero(lanes));
-      residuals[lane] = take(lane);
-    }
-    zigzagged = unaligned<Words>(residuals.data()).value;
+  const auto compare = [&](Shorts with) { return (Words)((Shorts)(ne > with) - (Shorts)(with > ne)); };
+  const Ints pattern = (Ints)(multiply_pairs<kIsWide>(compare(beside(north_east, north_west)), by.east_weights) +
+                              multiply_pairs<kIsWide>(compare(beside(ne_nw, own_west)), by.west_weights));
+  // As FinePrediction, class_of and context_of have it.
+  Ints eighths = (Ints)(sum + multiply_pairs<kIsWide>(by.weights[kTermPairs.size() - 1], (Words)recent.own)) >>
+                 (kWeightBits - kEighthsBits);
+  eighths = eighths < by.least ? by.least : eighths;
+  eighths = eighths > by.most ? by.most : eighths;
+  const Ints code = (eighths + by.half) & by.whole;  // in eighths
+  const Ints off_code = eighths - code;
+  const Ints below = off_code >> 31;  // all ones where the code below is likelier
+  const Ints quarter = off_code ^ below;
+  using Floats = float __attribute__((vector_size(32)));
+  Ints of_class = ((Ints) __builtin_convertvector(energy, Floats) >> 22) - by.least_class;
+  of_class = of_class < 0 ? Ints{} : of_class;
+  const Ints turned = (pattern ^ below) - below;
+  const Ints smooth =
+      (Ints)multiply_pairs<kIsWide>((Words)(of_class | quarter << 16), by.class_weights) + turned + by.smooth;
+  Ints contexts = of_class > by.last_smooth ? of_class + by.rough : smooth;
+
+  Ints coded = active;
+  if (!is_full) {
+    if (band.is_void != nullptr) coded &= ~voids_at(band, t);
+    contexts = coded != 0 ? contexts : Ints{} + static_cast<std::int32_t>(SymbolModel::kNoContext);
   }
-  band.source.word = next_word;
-  if (is_any((Ints)(zigzagged == kEscape) | (Ints)(of_class > kLast + 1))) {
+  alignas(32) std::array<std::uint32_t, kLanes> context_of_lane;
+  unaligned<Ints>(context_of_lane.data()).value = contexts;
+  Words zigzagged;
+  if constexpr (kHasOneState) {
+    alignas(32) std::array<std::uint32_t, kLanes> symbols{};
+    for (unsigned lanes = lanes_of<kIsWide>(coded); lanes != 0; lanes &= lanes - 1) {
+      const auto lane = static_cast<std::size_t>(std::countr_zero(lanes));
+      symbols[lane] = source.take(model, view, context_of_lane[lane], lane);
+    }
+    zigzagged = unaligned<Words>(symbols.data()).value;
+  } else {
+    std::uint64_t symbols = 0;
+    const auto take = [&](std::size_t lane) {
+      return take_symbol<kIsWide>(model, view, context_of_lane[lane], source.ends[lane], symbols);
+    };
+    const std::uint32_t h = take(7), g = take(6), f = take(5), e = take(4);
+    const std::uint32_t d = take(3), c = take(2), b = take(1), a = take(0);
+    const Words slots = {a, b, c, d, e, f, g, h};
+    zigzagged = (from_bytes<kIsWide>(&symbols) >> 1U) - by.one;
+    const Words starts = slots & by.slots;
+    const Words ends = zigzagged == by.escape ? by.all_slots : slots >> 16U;
+    source.advance<kIsWide>(starts, ends - starts, coded, by.slots);
+  }
+  const unsigned longer = lanes_of<kIsWide>(((Ints)(zigzagged == by.escape) | (of_class > by.first_plain)) & coded);
+  if (longer != 0) {
+    alignas(32) std::array<std::uint32_t, kLanes> residuals;
+    alignas(32) std::array<std::int32_t, kLanes> class_of_lane;
     unaligned<Words>(residuals.data()).value = zigzagged;
     unaligned<Ints>(class_of_lane.data()).value = of_class;
-    for (unsigned lanes = coded; lanes != 0; lanes &= lanes - 1) {
-      const auto lane = static_cast<unsigned>(std::countr_zero(lanes));
+    for (unsigned lanes = longer; lanes != 0; lanes &= lanes - 1) {
+      const auto lane = static_cast<std::size_t>(std::countr_zero(lanes));
       residuals[lane] =
-          band.source.residual(residuals[lane], plain_bits_of(static_cast<std::uint32_t>(class_of_lane[lane])));
+          source.residual(residuals[lane], plain_bits_of(static_cast<std::uint32_t>(class_of_lane[lane])));
     }
     zigzagged = unaligned<Words>(residuals.data()).value;
   }
 
-  const Ints residual = (Ints)((zigzagged >> 1U) ^ -(zigzagged & 1U));
+  const Ints residual = (Ints)((zigzagged >> 1U) ^ -(zigzagged & by.one));
   const Ints plus = (residual ^ ~below) - ~below;  // less it where the code above is likelier
-  Ints own = (code + plus) & 0xffff;
+  Ints own = ((code >> kEighthsBits) + plus) & by.sixteen_bits;
   Ints deviations = (own << kEighthsBits) - eighths;
   deviations = deviations < 0 ? -deviations : deviations;
-  deviations = deviations > kMaxDeviation ? Ints{} + kMaxDeviation : deviations;
-  own = is_void != 0 ? (w + ne) >> 1 : own;
-  deviations = is_void != 0 ? Ints{} : deviations;
-  const Ints lanes = {1, 2, 4, 8, 16, 32, 64, 128};
-  const Ints is_active = (lanes & static_cast<std::int32_t>(active)) != 0;
-  const Ints is_out = is_active & ((own < band.low) | (own > band.high));
-  auto& samples_now = unaligned<Ints>(band.samples.at(0, t));
-  auto& deviations_now = unaligned<Ints>(band.deviations.at(0, t));
-  if (active != kAllLanes) {
-    own = is_active != 0 ? own : samples_now.value;
-    deviations = is_active != 0 ? deviations : deviations_now.value;
+  deviations = deviations > by.sixteen_bits ? by.sixteen_bits : deviations;
+  if (!is_full) {
+    const Ints fill = ((recent.own >> 16) + ((Ints)ne_nw >> 16)) >> 1;
+    own = coded != 0 ? own : fill + kSampleShift;
+    own = active != 0 ? own : by.low;
+    deviations &= coded;
   }
-  samples_now.value = own;
-  deviations_now.value = deviations;
-  recent.push(band, t, own, deviations);
-  return !is_any(is_out);
+  recent.lowest = own < recent.lowest ? own : recent.lowest;
+  recent.highest = own > recent.highest ? own : recent.highest;
+  Ints kept = (Ints)((Words)recent.own >> 16U) | (own << 16 ^ by.east_shift);
+  if (!is_full) {
+    kept = active != 0 ? kept : unaligned<Ints>(&now->pair(0)).value;
+    deviations = active != 0 ? deviations : off(0, 0);
+  }
+  const auto pairs_before = (Ints)pairs(-1, 0);
+  const Ints deviations_before = off(-1, 0);
+  unaligned<Ints>(&now->pair(0)).value = kept;
+  unaligned<Eight>(&now->deviation(0)).value = __builtin_convertvector(deviations, Eight);
+  recent.keep(kept, deviations, pairs_before, deviations_before);
+  return true;
 }
 
 int first_of(int lane) {
@@ -310,51 +466,53 @@ int last_of(int lane, int columns) {
 /// Sets the margins of a row that begins, of one whose first two places are known, of one that is done.
 void open_row(const Band& band, int lane) {
   const int first = first_of(lane);
-  band.samples.fill(lane, first - 2, first, band.samples.of(lane - 1, first + lane % 2));
-  band.deviations.fill(lane, first - 2, first, 0);
+  band.slanted.fill(lane, first - 2, first, band.slanted.sample(lane - 1, first + lane % 2), 0);
 }
 void close_west(const Band& band, int lane) {
   const int first = first_of(lane);
-  band.samples.fill(lane, -kMargin, first, band.samples.of(lane, first));
-  band.deviations.fill(lane, -kMargin, first, band.deviations.of(lane, first));
+  band.slanted.fill(lane, -kMargin, first, band.slanted.sample(lane, first), band.slanted.deviation(lane, first));
 }
 void close_east(const Band& band, int lane) {
   const int last = last_of(lane, band.columns);
-  band.samples.fill(lane, last + 1, band.columns + kMargin, band.samples.of(lane, last));
-  band.deviations.fill(lane, last + 1, band.columns + kMargin, band.deviations.of(lane, last));
+  band.slanted.fill(lane, last + 1, band.columns + kMargin, band.slanted.sample(lane, last),
+                    band.slanted.deviation(lane, last));
 }
 
-template <bool kIsWide, std::size_t kTerms>
+template <bool kIsWide, bool kHasOneState>
 ISOHF_KERNEL bool decode_band(const Band& band) {
-  Recent recent{};
-  unsigned active = 0;
+  SymbolModel::View view = band.model.view();
+  SymbolModel& model = band.model;
+  Source& source = band.source;
+  Recent recent;
+  recent.lowest = band.constants.high;
+  recent.highest = band.constants.low;
+  Ints active{};
   // The next lanes to open, to close in the West and in the East: rows begin and end one after the other.
   int opening = 0;
   int west = 0;
   int east = 0;
   const int times = band.columns + delay(kLanes - 1);
-  for (int t = 0; t < times; ++t) {
-    bool is_changed = t == 0;
+  for (int t = 0; t < times;) {
     if (opening < band.rows && t == first_of(opening) + delay(opening)) {
       open_row(band, opening);
-      active |= 1U << opening++;
-      is_changed = true;
+      active[opening++] = -1;
     }
-    if (is_changed) recent.reload(band, t);
-    if (!decode_time<kIsWide, kTerms>(band, t, active, recent)) return false;
-    is_changed = false;
-    if (west < band.rows && t == first_of(west) + 1 + delay(west)) {
-      close_west(band, west++);
-      is_changed = true;
+    recent.reload<kIsWide>(band.slanted.at(t - 1));
+    const int opens = opening < band.rows ? first_of(opening) + delay(opening) : times;
+    const int has_west = west < band.rows ? first_of(west) + 2 + delay(west) : times;
+    const int ends = east < band.rows ? last_of(east, band.columns) + 1 + delay(east) : times;
+    const bool is_full = opening == kLanes && east == 0 && band.is_void == nullptr;
+    for (const int until = std::min({times, opens, has_west, ends}); t < until; ++t) {
+      SlantedRows::Time* const now = &band.slanted.at(t);
+      if (!decode_time<kIsWide, kHasOneState>(band, model, view, source, now, t, active, is_full, recent)) return false;
     }
-    if (east < band.rows && t == last_of(east, band.columns) + delay(east)) {
+    if (t == has_west && west < band.rows) close_west(band, west++);
+    if (t == ends && east < band.rows) {
       close_east(band, east);
-      active &= ~(1U << east++);
-      is_changed = true;
+      active[east++] = 0;
     }
-    if (is_changed) recent.reload(band, t + 1);
   }
-  return true;
+  return lanes_of<kIsWide>((recent.lowest < band.constants.low) | (recent.highest > band.constants.high)) == 0;
 }
 
 class WavefrontDecoder {
@@ -364,35 +522,40 @@ class WavefrontDecoder {
         tile_(tile),
         columns_(shape.columns()),
         rows_(shape.rows()),
-        samples_(columns_),
-        deviations_(columns_),
+        slanted_(columns_),
         words_(payload.words.size() + kSlack),
         extra_(payload.extra.size() + kSlack) {
     std::copy(payload.words.begin(), payload.words.end(), words_.begin());
     std::copy(payload.extra.begin(), payload.extra.end(), extra_.begin());
     std::copy(payload.states.begin(), payload.states.end(), source_.states.begin());
-    source_.state_mask = static_cast<unsigned>(payload.states.size()) - 1;
+    std::transform(source_.states.begin(), source_.states.end(), source_.ends.begin(),
+                   [](std::uint32_t state) { return state % kFrequencySum + 1; });
+    constants_.low = Ints{} + payload.low;
+    constants_.high = Ints{} + payload.high;
+    constants_.least = constants_.low << kEighthsBits;
+    constants_.most = constants_.high << kEighthsBits;
+    source_.has_one_state = payload.states.size() == 1;
     source_.word = words_.data();
     source_.words_end = words_.data() + payload.words.size();
     source_.extra = extra_.data();
     source_.extra_end = 8 * std::uint64_t{payload.extra.size()};
-    for (int lane = -kRowsAbove; lane < 0; ++lane) samples_.fill(lane, -kMargin, columns_ + kMargin, payload.base);
+    for (int lane = -kRowsAbove; lane < 0; ++lane) slanted_.fill(lane, -kMargin, columns_ + kMargin, payload.base, 0);
   }
 
   bool run() {
     for (int top = 0; top < rows_; top += kBandRows) {
       const int rows = std::min(kBandRows, rows_ - top);
       if (top <= kBandRows) set_weights(top);
-      const std::uint8_t* const is_void =
-          payload_.is_void.empty() ? nullptr : payload_.is_void.data() + static_cast<std::ptrdiff_t>(top) * columns_;
-      if (!decode(
-              {samples_, deviations_, source_, model_, weights_, columns_, rows, payload_.low, payload_.high, is_void},
-              top)) {
+      const std::uint8_t* is_void = nullptr;
+      if (!payload_.is_void.empty()) {
+        is_void = payload_.is_void.data() + static_cast<std::ptrdiff_t>(top) * columns_;
+        if (std::find(is_void, is_void + rows * columns_, 1) == is_void + rows * columns_) is_void = nullptr;
+      }
+      if (!decode({slanted_, source_, model_, constants_, columns_, rows, is_void}, top)) {
         return false;
       }
       model_.end_band();
-      samples_.next_band(columns_);
-      deviations_.next_band(columns_);
+      slanted_.next_band(columns_);
     }
     return is_used_up();
   }
@@ -401,20 +564,20 @@ class WavefrontDecoder {
   void set_weights(int top) {
     for (int lane = 0; lane < kLanes; ++lane) {
       const PredictorWeights& of_row = payload_.predictors.of_block(top + lane, 0);
-      std::int32_t anchor = 1 << kWeightBits;
-      for (std::size_t i = 0; i < kWeightCount; ++i) {
-        weights_[i][lane] = of_row[i];
-        anchor -= of_row[i];
+      const auto weight_of = [&](int i) -> std::int32_t {
+        if (i == kAnchor) return std::accumulate(of_row.begin(), of_row.end(), 1 << kWeightBits, std::minus<>());
+        return i < 0 ? 0 : of_row[static_cast<std::size_t>(i)];
+      };
+      for (std::size_t i = 0; i < kTermPairs.size(); ++i) {
+        constants_.weights[i][lane] =
+            static_cast<std::uint32_t>(pair_of(weight_of(kTermPairs[i].west), weight_of(kTermPairs[i].east)));
       }
-      weights_[kWeightCount][lane] = anchor;
     }
   }
 
   bool decode(const Band& band, int top) {
-    const bool is_good =
-        payload_.predictors.is_wide
-            ? vectorised<decode_band<false, kWeightCount>, decode_band<true, kWeightCount>>(band)
-            : vectorised<decode_band<false, kNearWeightCount>, decode_band<true, kNearWeightCount>>(band);
+    const bool is_good = source_.has_one_state ? vectorised<decode_band<false, true>, decode_band<true, true>>(band)
+                                               : vectorised<decode_band<false, false>, decode_band<true, false>>(band);
     if (!is_good) return false;
     for (int lane = 0; lane < band.rows; ++lane) {
       std::uint16_t* const codes = tile_.codes.data() + static_cast<std::ptrdiff_t>(top + lane) * columns_;
@@ -433,7 +596,7 @@ class WavefrontDecoder {
   void store_row(const Band& band, int lane, std::uint16_t* codes) {
     const int first = first_of(lane);
     const int last = last_of(lane, columns_);
-    for (int p = first; p <= last; ++p) codes[p] = static_cast<std::uint16_t>(band.samples.of(lane, p));
+    for (int p = first; p <= last; ++p) codes[p] = static_cast<std::uint16_t>(band.slanted.sample(lane, p));
     if (lane % 2 != 0) return;
     codes[0] = codes[first];
     codes[columns_ - 1] = codes[last];
@@ -444,20 +607,22 @@ class WavefrontDecoder {
     if (band.is_void != nullptr && band.is_void[static_cast<std::ptrdiff_t>(lane) * columns_ + column] != 0)
       return true;
     const int at = side == 0 ? 1 : columns_ - 3;
-    const FinePrediction prediction(4 * (samples_.of(lane, at) + samples_.of(lane, at + 1)));
+    const FinePrediction prediction(4 * (slanted_.sample(lane, at) + slanted_.sample(lane, at + 1)));
     const std::uint32_t of_class =
-        class_of(fine_energy_of_slid(deviations_.of(lane, at), deviations_.of(lane, at + 1)));
+        class_of(fine_energy_of_slid(slanted_.deviation(lane, at), slanted_.deviation(lane, at + 1)));
     const std::uint32_t context = context_of(of_class, prediction.quarter, kLevelPattern);
-    const std::uint32_t symbol = source_.take<false>(model_.table(context), static_cast<unsigned>(lane), source_.word);
-    model_.count(context, symbol);
+    SymbolModel::View view = model_.view();
+    const std::uint32_t symbol = source_.take(model_, view, context, static_cast<std::size_t>(lane));
     const std::int32_t sample = prediction.sample_of(source_.residual(symbol, plain_bits_of(of_class)));
     codes[column] = static_cast<std::uint16_t>(sample);
     return sample >= payload_.low && sample <= payload_.high;
   }
 
   [[nodiscard]] bool is_used_up() const {
-    for (unsigned i = 0; i <= source_.state_mask; ++i) {
-      if (source_.states[i] != kFirstState) return false;
+    if (std::any_of(source_.states.begin(),
+                    source_.states.begin() + static_cast<std::ptrdiff_t>(payload_.states.size()),
+                    [](std::uint32_t state) { return state != kFirstState; })) {
+      return false;
     }
     if (source_.word != source_.words_end || (source_.position + 7) / 8 != payload_.extra.size()) return false;
     return source_.position % 8 == 0 ||
@@ -468,13 +633,12 @@ class WavefrontDecoder {
   TileCodes& tile_;
   int columns_;
   int rows_;
-  SlantedRows samples_;
-  SlantedRows deviations_;
+  SlantedRows slanted_;
   std::vector<std::byte> words_;
   std::vector<std::byte> extra_;
   Source source_{};
   SymbolModel model_;
-  LaneWeights weights_{};
+  LaneConstants constants_;
 };
 
 }  // namespace
