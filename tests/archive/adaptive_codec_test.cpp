@@ -103,6 +103,19 @@ TEST(AdaptiveCodec, IsLeftToTilesOfCoarseCodes) {
   }
 }
 
+TEST(AdaptiveCodec, IsTakenAtHighLevelsWhereItIsShorter) {
+  const TileShape shape = TileShape::make(100, 99, 1);
+  std::size_t taken = 0;
+  for (const unsigned shift : {0U, 2U, 4U, 5U}) {
+    const TileCodes tile = ground_in_steps(shape, CodeType::kU16, shift);
+    const std::size_t first = encode_tile(shape, tile, 6, PayloadVersion::kFirst).deflated.size();
+    const std::size_t adaptive = encode_tile(shape, tile, 6, PayloadVersion::kAdaptive).deflated.size();
+    EXPECT_EQ(encode_tile(shape, tile, 6).deflated.size(), std::min(first, adaptive)) << shift;
+    taken += adaptive < first ? 1 : 0;
+  }
+  EXPECT_GT(taken, 0U);
+}
+
 TEST(AdaptiveCodec, RefusesByTheFastDecoderWhatThePlainOneRefuses) {
   const TileShape shape = TileShape::make(12, 19, 1);
   for (const Kind kind : {Kind::kTerrain, Kind::kTwoLevels, Kind::kVoidNoise}) {

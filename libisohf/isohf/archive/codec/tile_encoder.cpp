@@ -40,6 +40,7 @@ constexpr std::array<CodingEffort, kMaxLevel> kEfforts = {{
     {.fit = {8, 1, true}, .streams = {1, true}},
 }};
 constexpr int kNearLevel = 3;               ///< the last with twelve weights
+constexpr int kDenseLevel = 6;              ///< from it on tiles are coded in both versions (decision 62)
 constexpr std::size_t kFewBytes = 1200;     ///< of a payload in which weights of its own may not pay
 constexpr std::int64_t kFewSamples = 1024;  ///< below, there is little to learn from
 constexpr std::int64_t kCoarseShare = 110;  ///< of 256 samples that their neighbours foretell (decision 44)
@@ -285,15 +286,17 @@ Deflated encode_samples(const TileShape& shape, PayloadHeader header, std::span<
   Lattice<Wide> lattice(shape);
   load<Wide>(lattice, voids, header.base, sample_at);
   TileCoder<Wide, Zigzagged> coder(shape, std::move(header), voids, lattice);
+  bool is_adaptive = false;
   if constexpr (std::is_same_v<Wide, std::int32_t>) {
-    const bool is_wanted = request.version == PayloadVersion::kBest
-                               ? shape.stored_vertex_count() >= kFewSamples && is_coarse(lattice)
-                               : request.version == PayloadVersion::kAdaptive;
+    const bool is_best = request.version == PayloadVersion::kBest && shape.stored_vertex_count() >= kFewSamples;
+    is_adaptive = request.version == PayloadVersion::kAdaptive || (is_best && is_coarse(lattice));
     // Where codes are coarse, twelve weights may be worth as much as eighteen.
     const int level = request.level == kMinLevel ? kMinLevel : std::max(request.level, kDefaultLevel);
-    if (is_wanted) coder.try_efforts(level, [&](const CodingEffort& effort) { coder.try_adaptive(effort); });
+    if (is_adaptive || (is_best && request.level >= kDenseLevel)) {
+      coder.try_efforts(level, [&](const CodingEffort& effort) { coder.try_adaptive(effort); });
+    }
   }
-  if (!coder.has_any()) {
+  if (!is_adaptive || !coder.has_any()) {
     coder.try_efforts(request.level,
                       [&](const CodingEffort& effort) { coder.try_streams(effort, request.predictors); });
   }

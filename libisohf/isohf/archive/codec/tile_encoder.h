@@ -15,7 +15,8 @@ struct CodingEffort {
 /// The effort of a level. Throws Error{kInvalidArgument} where it is not kMinLevel to kMaxLevel.
 [[nodiscard]] CodingEffort coding_effort(int level);
 
-/// The versions of payloads: 2 where codes are coarse for their ground, else 1 (decision 44).
+/// The versions of payloads. The best: 2 where codes are coarse for their ground, else 1 (decision 44), at high levels the
+/// shorter one (decision 62).
 enum class PayloadVersion : std::uint8_t { kBest, kFirst, kAdaptive };
 
 /// Codes one tile: hexagonal prediction, residuals in contexts, Deflate. Deterministic; thread-safe.

@@ -121,7 +121,7 @@ SymbolModel::SymbolModel()
   table_of_[kNoContext] = kPlainContexts;
 }
 
-std::uint32_t SymbolModel::open_table(std::uint32_t context) {
+std::size_t SymbolModel::open_table(std::uint32_t context) {
   const std::size_t index = tables_.size();
   const std::uint32_t parent = parent_of(context);
   // Tables change when those of all pending contexts do: the parent's is this one's until then.
@@ -129,7 +129,7 @@ std::uint32_t SymbolModel::open_table(std::uint32_t context) {
   counts_.emplace_back();
   parents_.push_back(static_cast<std::uint16_t>(parent));
   table_of_[context] = static_cast<std::uint16_t>(index);
-  return static_cast<std::uint32_t>(index);
+  return index;
 }
 
 ISOHF_KERNEL void SymbolModel::remake(SymbolModel& model) {

@@ -46,7 +46,7 @@ class SymbolModel {
   [[nodiscard]] View view() { return {table_of_.data(), tables_.data()}; }
   /// The table of a context in which a symbol occurs, opened where it is the first time. `at` is a view of this.
   [[nodiscard]] SymbolTable& opened(std::uint32_t context, View& at) {
-    std::uint32_t index = at.table_of[context];
+    std::size_t index = at.table_of[context];
     if (index == kNoTable) [[unlikely]] {
       index = open_table(context);
       at = view();
@@ -77,7 +77,7 @@ class SymbolModel {
  private:
   using Counts = std::array<std::uint32_t, kModelSymbols>;
 
-  std::uint32_t open_table(std::uint32_t context);
+  std::size_t open_table(std::uint32_t context);
   ISOHF_KERNEL static void remake(SymbolModel& model);
 
   std::uint32_t bands_ = 0;

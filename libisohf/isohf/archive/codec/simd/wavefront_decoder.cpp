@@ -358,6 +358,10 @@ ISOHF_KERNEL bool decode_time(const Band& band, SymbolModel& model, SymbolModel:
   const Ints ones = off(-1, 6) + off(-2, 5) + off(-2, 9);
   const Ints threes = off(-1, 2) + off(0, 2);
   const Ints energy = 4 * fours + 2 * twos + ones + 3 * (threes + 2 * recent.off);
+  // As class_of has it.
+  using Floats = float __attribute__((vector_size(32)));
+  Ints of_class = ((Ints) __builtin_convertvector(energy, Floats) >> 22) - by.least_class;
+  of_class = of_class < 0 ? Ints{} : of_class;
   // As pattern_of has it: of each neighbour whether it is above NE less whether it is below.
   const auto ne_nw = (Shorts)pairs(-1, 3);
   const auto own_west = (Shorts)recent.own;
@@ -370,7 +374,7 @@ ISOHF_KERNEL bool decode_time(const Band& band, SymbolModel& model, SymbolModel:
   const auto compare = [&](Shorts with) { return (Words)((Shorts)(ne > with) - (Shorts)(with > ne)); };
   const Ints pattern = (Ints)(multiply_pairs<kIsWide>(compare(beside(north_east, north_west)), by.east_weights) +
                               multiply_pairs<kIsWide>(compare(beside(ne_nw, own_west)), by.west_weights));
-  // As FinePrediction, class_of and context_of have it.
+  // As FinePrediction and context_of have it.
   Ints eighths = (Ints)(sum + multiply_pairs<kIsWide>(by.weights[kTermPairs.size() - 1], (Words)recent.own)) >>
                  (kWeightBits - kEighthsBits);
   eighths = eighths < by.least ? by.least : eighths;
@@ -379,9 +383,6 @@ ISOHF_KERNEL bool decode_time(const Band& band, SymbolModel& model, SymbolModel:
   const Ints off_code = eighths - code;
   const Ints below = off_code >> 31;  // all ones where the code below is likelier
   const Ints quarter = off_code ^ below;
-  using Floats = float __attribute__((vector_size(32)));
-  Ints of_class = ((Ints) __builtin_convertvector(energy, Floats) >> 22) - by.least_class;
-  of_class = of_class < 0 ? Ints{} : of_class;
   const Ints turned = (pattern ^ below) - below;
   const Ints smooth =
       (Ints)multiply_pairs<kIsWide>((Words)(of_class | quarter << 16), by.class_weights) + turned + by.smooth;
