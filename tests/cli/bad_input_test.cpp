@@ -2,10 +2,12 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/mount.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <cmath>
+#include <filesystem>
 #include <limits>
 
 #include "support/plain_tiff.h"
@@ -218,12 +220,17 @@ TEST_F(BadInput, MemoryLimitBelowTheNeed) {
   expect_refused(folder / "a.tif", {"--memory"}, {"--memory", "1M"});
 }
 
-TEST_F(BadInput, AFullDiskKeepsWhatIsDoneForAResume) {
-  std::uint32_t state = 1;  // noise, which no codec makes small
-  write_int16_tiff(folder / "noise.tif", 400, 400, [&](std::int64_t, std::int64_t) {
+/// Which no codec makes small.
+void write_noise(const std::string& path, int side) {
+  std::uint32_t state = 1;
+  write_int16_tiff(path, side, side, [&](std::int64_t, std::int64_t) {
     state = state * 1664525U + 1013904223U;
     return static_cast<std::int16_t>(state >> 16);
   });
+}
+
+TEST_F(BadInput, AFullDiskKeepsWhatIsDoneForAResume) {
+  write_noise(folder / "noise.tif", 400);
   RunOptions full;
   full.file_size_limit_bytes = 50000;
   const RunResult result = run_isohf({"convert", folder / "noise.tif", folder / "out.isohf"}, full);
@@ -238,6 +245,64 @@ TEST_F(BadInput, AFullDiskKeepsWhatIsDoneForAResume) {
   EXPECT_EQ(run_isohf({"convert", folder / "noise.tif", folder / "whole.isohf", "-q"}).exit_code, 0);
   EXPECT_EQ(read_file(folder / "out.isohf"), read_file(folder / "whole.isohf"));
   EXPECT_EQ(folder.names(), (std::vector<std::string>{"noise.tif", "out.isohf", "whole.isohf"}));
+}
+
+/// A file system in memory that holds so many bytes; needs the right to mount one.
+class SmallDisk {
+ public:
+  SmallDisk(std::string path, std::uint64_t bytes) : path_(std::move(path)) {
+    std::filesystem::create_directory(path_);
+    is_there_ = ::mount("none", path_.c_str(), "tmpfs", 0, ("size=" + std::to_string(bytes)).c_str()) == 0;
+  }
+  ~SmallDisk() {
+    if (is_there_) ::umount2(path_.c_str(), MNT_DETACH);
+    std::filesystem::remove(path_);
+  }
+  SmallDisk(const SmallDisk&) = delete;
+  SmallDisk& operator=(const SmallDisk&) = delete;
+
+  [[nodiscard]] bool is_there() const { return is_there_; }
+  bool grow(std::uint64_t bytes) const {
+    return ::mount("none", path_.c_str(), "tmpfs", MS_REMOUNT, ("size=" + std::to_string(bytes)).c_str()) == 0;
+  }
+
+ private:
+  std::string path_;
+  bool is_there_ = false;
+};
+
+TEST_F(BadInput, ADiskThatFillsAnywhereKeepsPartAndJournalAndAResumeGivesTheSameBytes) {
+  write_noise(folder / "noise.tif", 1000);
+  const std::vector<std::vector<std::string>> kinds = {{}, {"--lossless"}, {"--shadow-seeds", "--memory", "60M"}};
+  for (const std::vector<std::string>& more : kinds) {
+    const auto convert = [&](const std::string& output, std::vector<std::string> also) {
+      also.insert(also.begin(), {"convert", folder / "noise.tif", output, "-q", "--tmpdir", folder.path()});
+      also.insert(also.end(), more.begin(), more.end());
+      return run_isohf(also);
+    };
+    ASSERT_EQ(convert(folder / "whole.isohf", {"--overwrite"}).exit_code, 0);
+    const std::string whole = read_file(folder / "whole.isohf");
+    for (const double share : {0.05, 0.3, 0.6, 0.98}) {
+      SCOPED_TRACE((more.empty() ? "plain" : more[0]) + " at " + std::to_string(share));
+      const SmallDisk disk(folder / "disk", static_cast<std::uint64_t>(share * static_cast<double>(whole.size())));
+      if (!disk.is_there()) GTEST_SKIP() << "no right to mount a file system in memory";
+      const std::string output = folder / "disk/out.isohf";
+      const RunResult full = convert(output, {});
+      EXPECT_EQ(full.exit_code, 1);
+      EXPECT_THAT(full.err, HasSubstr("No space left on device"));
+      EXPECT_THAT(full.err, HasSubstr("out.isohf.part keeps what is done, --resume goes on from there"));
+      EXPECT_EQ(std::count(full.err.begin(), full.err.end(), '\n'), 1) << full.err;
+      EXPECT_TRUE(std::filesystem::exists(output + ".part") && std::filesystem::exists(output + ".part.journal"));
+      // Another try is no better, and loses nothing.
+      EXPECT_EQ(convert(output, {"--resume"}).exit_code, 1);
+      EXPECT_TRUE(std::filesystem::exists(output + ".part") && std::filesystem::exists(output + ".part.journal"));
+      ASSERT_TRUE(disk.grow(4 * whole.size()));
+      const RunResult done = convert(output, {"--resume"});
+      EXPECT_EQ(done.exit_code, 0) << done.err;
+      EXPECT_TRUE(read_file(output) == whole);
+      EXPECT_FALSE(std::filesystem::exists(output + ".part") || std::filesystem::exists(output + ".part.journal"));
+    }
+  }
 }
 
 }  // namespace

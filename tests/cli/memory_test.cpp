@@ -68,6 +68,9 @@ TEST(Memory, EveryCommandStaysWithinATenthOfWhatItIsGivenAndMakesTheSame) {
       {{"convert", folder / "wide.raw", folder / "seeds.isohf", "--raw", raw, "--shadow-seeds"},
        folder / "seeds.isohf",
        60},
+      {{"convert", folder / "wide.raw", folder / "full.isohf", "--raw", raw, "--nodata", "1150", "--fill"},
+       folder / "full.isohf",
+       85},
       {{"restore", folder / "kept.isohf", folder / "back.npy"}, folder / "back.npy", 60},
       {{"restore", folder / "seeds.isohf", folder / "hex.npy"}, folder / "hex.npy", 60},
       {{"export", folder / "seeds.isohf", folder / "flat.npy", "--method", "barycentric"}, folder / "flat.npy", 40},
@@ -103,8 +106,8 @@ TEST(Memory, EveryCommandStaysWithinATenthOfWhatItIsGivenAndMakesTheSame) {
     EXPECT_THAT(result.err, HasSubstr("--memory allows 14 MB, "));
     EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
   }
-  EXPECT_EQ(folder.names(), (std::vector<std::string>{"back.npy", "diff.npy", "flat.npy", "hex.npy", "kept.isohf",
-                                                      "seeds.isohf", "wide.raw"}));
+  EXPECT_EQ(folder.names(), (std::vector<std::string>{"back.npy", "diff.npy", "flat.npy", "full.isohf", "hex.npy",
+                                                      "kept.isohf", "seeds.isohf", "wide.raw"}));
 }
 
 TEST(Memory, ConvertStaysWithinATenthOfWhatItIsGivenAndWritesTheSameBytes) {

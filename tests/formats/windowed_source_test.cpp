@@ -119,7 +119,7 @@ TEST(Decorators, PassOnWhatBuffersMayHoldAndCountTheirOwn) {
   auto inner = std::make_unique<GlobeSource>();
   GlobeSource& globe = *inner;
   std::unique_ptr<HeightSource> source = filled(std::move(inner));
-  const std::uint64_t fill = fill_memory_bytes(source->info());
+  const std::uint64_t fill = fill_memory_bytes(source->info(), false);
   EXPECT_EQ(source->buffer_bytes(4096), 4096U + fill);
   source = std::make_unique<ClosedSource>(std::move(source));
   EXPECT_EQ(source->buffer_bytes(4096), 4096U + fill);

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstring>
 #include <functional>
@@ -23,11 +24,11 @@ template <typename T>
 struct Filled {
   Filled(SampleType type, std::int64_t width, std::int64_t height, const VoidTreatment& treatment,
          const std::function<double(std::int64_t, std::int64_t)>& sample,
-         const std::function<void(SourceInfo&)>& adapt = {}) {
+         const std::function<void(SourceInfo&)>& adapt = {}, const ScratchFolder& scratch = std::nullopt) {
     auto memory = std::make_unique<MemorySource<T>>(type, width, height, sample);
     if (adapt) adapt(memory->mutable_info());
     below = memory.get();
-    source = std::make_unique<FilledSource>(std::move(memory), treatment);
+    source = std::make_unique<FilledSource>(std::move(memory), treatment, scratch);
   }
 
   std::vector<T> read(const Window& window) {
@@ -174,6 +175,38 @@ TEST(FilledSource, DependsOnNothingBeyondItsReach) {
   });
   const Window window{0, 0, 61, 120};
   EXPECT_EQ(std::memcmp(before.read(window).data(), after.read(window).data(), 61 * 120 * sizeof(float)), 0);
+}
+
+TEST(FilledSource, WideVoidsAreTheSameWhereverTheyAreCutInMemoryAndInAScratchFile) {
+  const auto field = [](std::int64_t c, std::int64_t r) {
+    return r >= 20 && r < 90 && c % 1000 > 3
+               ? std::nan("")
+               : 300.0 + std::sin(static_cast<double>(c) / 31.0) * 50.0 + static_cast<double>(r);
+  };
+  constexpr std::int64_t kWidth = 9500;
+  constexpr std::int64_t kMoved = 1500;
+  Filled<float> all(SampleType::kFloat32, kWidth, 110, fill(60), field);
+  Filled<float> kept(SampleType::kFloat32, kWidth, 110, fill(60), field, {}, ScratchFolder(testing::TempDir()));
+  Filled<float> east(SampleType::kFloat32, kWidth - kMoved, 110, fill(60),
+                     [&](std::int64_t c, std::int64_t r) { return field(c + kMoved, r); });
+  const std::int64_t reach = VoidFiller(all.source->info(), 60).reach();
+  const std::vector<float> whole = all.read_all();
+  const auto bits = [](float value) { return std::isnan(value) ? 0U : std::bit_cast<std::uint32_t>(value); };
+  const std::vector<float> in_scratch = kept.read_all();
+  for (std::size_t i = 0; i < whole.size(); ++i) ASSERT_EQ(bits(in_scratch[i]), bits(whole[i])) << i;
+  EXPECT_EQ(kept.source->counts().filled, all.source->counts().filled);
+  const Window there{reach, 0, kWidth - kMoved - reach, 110};
+  const std::vector<float> moved = east.read(there);
+  for (std::int64_t r = 0; r < there.rows; ++r) {
+    for (std::int64_t c = 0; c < there.columns; ++c) {
+      ASSERT_EQ(bits(moved[static_cast<std::size_t>(r * there.columns + c)]),
+                bits(whole[static_cast<std::size_t>(r * kWidth + kMoved + reach + c)]))
+          << c << " " << r;
+    }
+  }
+  // Read again from the North: what was dropped is there anew.
+  const std::vector<float> again = kept.read({0, 0, kWidth, 30});
+  for (std::size_t i = 0; i < again.size(); ++i) ASSERT_EQ(bits(again[i]), bits(whole[i])) << i;
 }
 
 TEST(FilledSource, GivesAPlaneBackNearly) {

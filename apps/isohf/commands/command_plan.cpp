@@ -196,7 +196,7 @@ int run(const PlanOptions& options) {
   } else {
     SourceInputs inputs = options.inputs;
     inputs.onto = options.request.ground.projection;
-    OpenedInputs opened = open_inputs(expand_inputs(inputs.names, inputs.recursive), inputs, options.open, 0);
+    OpenedInputs opened = open_inputs(expand_inputs(inputs.names, inputs.recursive), inputs, options.open, {});
     ConvertOptions convert;
     convert.plan = options.request;
     if (opened.is_reprojected) convert.plan.ground.projection = ProjectionRequest{};

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "commands/command.h"
+#include "isohf/base/file.h"
 #include "isohf/convert.h"
 #include "isohf/error.h"
 #include "open_archive.h"
@@ -43,11 +44,13 @@ std::optional<PlanesCommand> parse(const Arguments& arguments) {
   line.option("-o,--output", "OUTPUT", "Archive to write (default: ARCHIVE itself)", options.output);
   line.flag("--overwrite", "Replace OUTPUT where it exists", options.overwrite);
   add_work_options(line, options.work);
+  add_memory_options(line, "OUTPUT's folder", options.work);
   add_common_options(line, options.common);
   line.footer(kFooter);
   if (!line.parse(arguments)) return std::nullopt;
   line.require("ARCHIVE", options.archive);
   if (options.output.empty()) options.output = options.archive;
+  if (options.work.scratch_folder.empty()) options.work.scratch_folder = folder_of(options.output);
   return options;
 }
 

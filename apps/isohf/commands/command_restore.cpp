@@ -112,7 +112,7 @@ SourceInfo in_words_of(const Metadata& metadata, SourceInfo other) {
 
 /// Of the raster in --like.
 SampleGrid grid_of_other(const RestoreOptions& options, const Metadata& metadata) {
-  const OpenedInputs like = open_inputs(expand_inputs({options.like}, false), {}, {}, options.work.threads);
+  const OpenedInputs like = open_inputs(expand_inputs({options.like}, false), {}, {}, options.work);
   const SourceInfo other = in_words_of(metadata, like.source->info());
   std::vector<std::string> warnings;
   std::optional<SampleGrid> grid = grid_like(metadata, other, warnings);

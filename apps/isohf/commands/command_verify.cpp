@@ -253,8 +253,7 @@ std::unique_ptr<HeightSource> open_as_recorded(VerifyCommandOptions options, con
   GroundRequest ground;
   ground.wrap_x = metadata.wraps_x;
   const auto opened = [&] {
-    return laid_out(std::move(open_inputs(files, options.against, open, options.work.threads).source), options.geoid,
-                    ground);
+    return laid_out(std::move(open_inputs(files, options.against, open, options.work).source), options.geoid, ground);
   };
   std::unique_ptr<HeightSource> source = opened();
   if (record.options || is_as_recorded(source->info(), record)) return source;

@@ -253,7 +253,7 @@ std::vector<std::string> files_beside(const ConvertCommandOptions& options) {
 
 Prepared prepare(ConvertCommandOptions& options, std::vector<std::string> files) {
   options.inputs.onto = options.convert.plan.ground.projection;
-  OpenedInputs opened = open_inputs(std::move(files), options.inputs, options.open, options.work.threads);
+  OpenedInputs opened = open_inputs(std::move(files), options.inputs, options.open, options.work);
   if (opened.is_reprojected) options.convert.plan.ground.projection = ProjectionRequest{};
   Prepared prepared{std::move(opened.files),
                     laid_out(std::move(opened.source), options.geoid, options.convert.plan.ground), nullptr};

@@ -96,7 +96,7 @@ void add_source_options(CommandLine& line, OpenOptions& options) {
 }
 
 std::unique_ptr<HeightSource> open_input(const std::string& path, const OpenOptions& options) {
-  return with_voids_treated(open_raster(path, options), options.voids);
+  return with_voids_treated(open_raster(path, options), options.voids, {});
 }
 
 }  // namespace isohf::cli

@@ -116,17 +116,19 @@ Arguments arguments_from(const RecordedOptions& recorded, const CommandLine& lin
 }
 
 OpenedInputs open_inputs(std::vector<std::string> files, const SourceInputs& inputs, const OpenOptions& options,
-                         int threads) {
+                         const WorkOptions& work) {
   OpenedInputs opened;
+  Job job{.threads = work.threads, .memory_bytes = work.memory_bytes};
+  if (!work.scratch_folder.empty()) job.scratch_folder = work.scratch_folder;
   opened.note.options = inputs.as_given;
   if (files.size() == 1) {
-    opened.source = with_voids_treated(open_raster(files.front(), options), options.voids);
+    opened.source = with_voids_treated(open_raster(files.front(), options), options.voids, job);
     opened.files = std::move(files);
     take_box(inputs, opened);
     return opened;
   }
   const std::string name = fmt::format("mosaic of {} files", files.size());
-  WorkArena arena(threads);
+  WorkArena arena(job.threads);
   MosaicPlan plan =
       arena.execute([&] { return plan_mosaic(files, options, inputs.box, inputs.onto, inputs.headers.get()); });
   if (inputs.require_complete && plan.holes.samples > 0) {
@@ -137,8 +139,8 @@ OpenedInputs open_inputs(std::vector<std::string> files, const SourceInputs& inp
   opened.note.mosaic = record_of(plan, inputs.overlap);
   opened.note.fingerprint = fingerprint_of(plan, inputs.overlap);
   // Voids are filled across the files' borders.
-  opened.source =
-      with_voids_treated(std::make_unique<MosaicSource>(name, std::move(plan), options, inputs.overlap), options.voids);
+  opened.source = with_voids_treated(std::make_unique<MosaicSource>(name, std::move(plan), options, inputs.overlap),
+                                     options.voids, job);
   opened.files = std::move(files);
   take_box(inputs, opened);
   return opened;

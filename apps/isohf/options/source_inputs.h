@@ -12,6 +12,7 @@
 #include "isohf/convert.h"
 #include "isohf/raster.h"
 #include "options/command_line.h"
+#include "options/options_common.h"
 
 namespace isohf::cli {
 
@@ -49,8 +50,8 @@ struct OpenedInputs {
 };
 
 /// Opens what `files`, as expand_inputs gives them, are together: the file itself where it is one, else their mosaic.
-/// With --require-complete ground without a file is an Error{kIo}. threads: 0 for all cores.
+/// With --require-complete ground without a file is an Error{kIo}.
 [[nodiscard]] OpenedInputs open_inputs(std::vector<std::string> files, const SourceInputs& inputs,
-                                       const OpenOptions& options, int threads);
+                                       const OpenOptions& options, const WorkOptions& work);
 
 }  // namespace isohf::cli

@@ -4,6 +4,7 @@
 #include "isohf/archive/planes/archive_planes.h"
 #include "isohf/archive/writer.h"
 #include "isohf/base/arena.h"
+#include "isohf/base/memory/memory_budget.h"
 #include "isohf/convert.h"
 #include "isohf/convert/parts/assembly.h"
 #include "isohf/convert/parts/parts.h"
@@ -14,6 +15,25 @@ namespace isohf {
 namespace {
 
 constexpr const char* kPlanesFolder = "planes/";
+/// In each thread, of each vertex of a tile: what the encoder works with; eight tiles that are decoded side by side.
+constexpr double kBytesPerVertex = 24.0;
+constexpr double kBatchBytesPerVertex = 8.0 * 4.0;
+/// Of each tile of the archive, and of each of a row.
+constexpr double kBytesPerTile = 200.0;
+constexpr double kBytesPerRowTile = 100.0;
+
+ScratchFolder room_for_planes(const Metadata& metadata, const Job& job) {
+  const TileGrid& grid = metadata.grid;
+  const auto bytes = [&](bool in_scratch) {
+    return reading_bytes(job, static_cast<double>(grid.shape().stored_vertex_count())) +
+           threads_of(job) * static_cast<double>(grid.shape().stored_vertex_count()) *
+               (kBytesPerVertex + kBatchBytesPerVertex) +
+           kBytesPerTile * static_cast<double>(grid.tile_count()) +
+           2.0 * kBytesPerRowTile * static_cast<double>(grid.tile_columns()) +
+           static_cast<double>(plane_builder_memory_bytes(planes_of(metadata), metadata.quantisation.type, in_scratch));
+  };
+  return scratch_for(job, bytes(false), bytes(true), "making planes");
+}
 
 }  // namespace
 
@@ -23,6 +43,7 @@ AddPlanesSummary add_planes(const std::string& archive, const std::string& outpu
   const bool in_place = std::filesystem::equivalent(archive, output, none);
   Metadata metadata = reader.metadata();
   metadata.planes = planes_for(metadata.grid);
+  const ScratchFolder scratch = room_for_planes(metadata, job);
   WriterOptions options;
   options.overwrite = overwrite || in_place;
   options.journal = false;
@@ -34,7 +55,7 @@ AddPlanesSummary add_planes(const std::string& archive, const std::string& outpu
     std::optional<PlaneStage> planes;
     if (metadata.planes.count > 0) {
       planes.emplace(planes_of(metadata), metadata.quantisation, metadata.level.value_or(kDefaultLevel), writer,
-                     RowRange{0, metadata.grid.tile_rows() - 1});
+                     RowRange{0, metadata.grid.tile_rows() - 1}, nullptr, scratch);
     }
     const TileRange tiles = tiles_here(reader);
     Assembly copy(metadata, writer,

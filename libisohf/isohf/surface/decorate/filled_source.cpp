@@ -49,6 +49,13 @@ std::int64_t chunk_rows(const SourceInfo& info) {
   return std::min(info.height, std::max<std::int64_t>(1, kChunkBytes / (row_bytes * block_rows)) * block_rows);
 }
 
+/// Rows that are filled together where what they look at is in a file.
+std::int64_t rows_together(const SourceInfo& info) {
+  constexpr std::int64_t kBytes = std::int64_t{32} << 20;
+  const std::int64_t row_bytes = static_cast<std::int64_t>(size_bytes(info.sample_type)) * info.width;
+  return std::clamp<std::int64_t>(kBytes / row_bytes, 1, VoidFiller::kRowsAtOnce);
+}
+
 SourceInfo treated_info(const SourceInfo& info, const VoidTreatment& treatment) {
   SourceInfo treated = info;
   if (treatment.valid_range) {
@@ -72,14 +79,19 @@ SourceInfo treated_info(const SourceInfo& info, const VoidTreatment& treatment) 
 
 /// 1 where a sample is void.
 void find_voids(const SourceInfo& info, std::span<const std::byte> raw, std::span<char> voids) {
-  std::vector<float> heights(voids.size());
-  heights_from_samples(info, 0.0, raw, heights);
-  for (std::size_t i = 0; i < heights.size(); ++i) voids[i] = heights[i] != heights[i] ? 1 : 0;
+  constexpr std::size_t kAtOnce = std::size_t{1} << 16U;
+  std::vector<float> heights;
+  const std::size_t size = size_bytes(info.sample_type);
+  for (std::size_t from = 0; from < voids.size(); from += kAtOnce) {
+    heights.resize(std::min(kAtOnce, voids.size() - from));
+    heights_from_samples(info, 0.0, raw.subspan(from * size, heights.size() * size), heights);
+    for (std::size_t i = 0; i < heights.size(); ++i) voids[from + i] = heights[i] != heights[i] ? 1 : 0;
+  }
 }
 
 }  // namespace
 
-/// Some rows as the other source has them.
+/// Some rows as the other source has them. Samples and voids may be in the file instead, one behind the other.
 struct FilledSource::Chunk {
   std::int64_t first_row = 0;
   std::int64_t rows = 0;
@@ -88,11 +100,13 @@ struct FilledSource::Chunk {
   std::vector<std::int64_t> voids_in_row;  ///< [rows]
 };
 
-FilledSource::FilledSource(std::unique_ptr<HeightSource> source, const VoidTreatment& treatment)
+FilledSource::FilledSource(std::unique_ptr<HeightSource> source, const VoidTreatment& treatment,
+                           const ScratchFolder& scratch)
     : source_(std::move(source)),
       info_(treated_info(source_->info(), treatment)),
       filler_(info_, treatment.distance()),
       chunk_rows_(chunk_rows(info_)) {
+  if (scratch) file_.emplace(static_cast<std::uint64_t>(info_.width) * (size_bytes(info_.sample_type) + 1), *scratch);
   if (treatment.distance() < 0 || treatment.distance() > kMaxFillDistance) {
     throw Error(ErrorCode::kInvalidArgument, fmt::format("{}: the fill distance is {} samples, must be 0 to {}",
                                                          info_.path, treatment.distance(), kMaxFillDistance));
@@ -114,7 +128,22 @@ std::unique_ptr<FilledSource::Chunk> FilledSource::read_chunk(std::int64_t index
     const char* const voids = chunk->voids.data() + row * info_.width;
     chunk->voids_in_row.push_back(std::accumulate(voids, voids + info_.width, std::int64_t{0}));
   }
+  if (!file_) return chunk;
+  const auto width = static_cast<std::size_t>(info_.width);
+  const std::size_t row_bytes = chunk->raw.size() / static_cast<std::size_t>(chunk->rows);
+  for (std::size_t row = 0; row < chunk->voids_in_row.size(); ++row) {
+    const std::int64_t at = chunk->first_row + static_cast<std::int64_t>(row);
+    file_->add(at);
+    file_->write(at, 0, std::span(chunk->raw).subspan(row * row_bytes, row_bytes));
+    file_->write(at, row_bytes, std::as_bytes(std::span(chunk->voids).subspan(row * width, width)));
+  }
+  chunk->raw = {};
+  chunk->voids = {};
   return chunk;
+}
+
+void FilledSource::drop_chunk(const Chunk& chunk) {
+  for (std::int64_t row = chunk.first_row; file_ && row < chunk.first_row + chunk.rows; ++row) file_->drop(row);
 }
 
 /// Has the rows at hand, with whatever lies between them and those that are.
@@ -123,6 +152,7 @@ void FilledSource::have_rows(std::int64_t first, std::int64_t end) {
   const std::int64_t last_chunk = (end - 1) / chunk_rows_;
   const auto index_of = [&](const std::unique_ptr<Chunk>& chunk) { return chunk->first_row / chunk_rows_; };
   if (chunks_.empty() || last_chunk < index_of(chunks_.front()) - 1 || first_chunk > index_of(chunks_.back()) + 1) {
+    for (const std::unique_ptr<Chunk>& chunk : chunks_) drop_chunk(*chunk);
     chunks_.clear();
     chunks_.push_back(read_chunk(first_chunk));
   }
@@ -131,7 +161,10 @@ void FilledSource::have_rows(std::int64_t first, std::int64_t end) {
 }
 
 void FilledSource::drop_rows_before(std::int64_t row) {
-  while (!chunks_.empty() && chunks_.front()->first_row + chunks_.front()->rows <= row) chunks_.pop_front();
+  while (!chunks_.empty() && chunks_.front()->first_row + chunks_.front()->rows <= row) {
+    drop_chunk(*chunks_.front());
+    chunks_.pop_front();
+  }
 }
 
 const FilledSource::Chunk& FilledSource::chunk_of(std::int64_t row) const {
@@ -143,9 +176,27 @@ std::int64_t FilledSource::voids_in(std::int64_t row) const {
   return chunk.voids_in_row[static_cast<std::size_t>(row - chunk.first_row)];
 }
 
-VoidRows FilledSource::rows_at(std::int64_t first, std::int64_t end) const {
+VoidRows FilledSource::rows_at(std::int64_t first, std::int64_t end, std::int64_t column,
+                               std::int64_t end_column) const {
   VoidRows rows;
   rows.first = first;
+  if (file_) {
+    const std::size_t size = size_bytes(info_.sample_type);
+    const auto columns = static_cast<std::size_t>(end_column - column);
+    rows.column = column;
+    rows.read.resize(columns * (size + 1) * static_cast<std::size_t>(end - first));
+    for (std::int64_t row = first; row < end; ++row) {
+      const auto all = std::span(rows.read).subspan(columns * (size + 1) * static_cast<std::size_t>(row - first));
+      const std::span<std::byte> raw = all.first(columns * size);
+      const std::span<std::byte> voids = all.subspan(columns * size, columns);
+      const auto from = static_cast<std::uint64_t>(column);
+      file_->read(row, from * size, raw);
+      if (voids_in(row) > 0) file_->read(row, static_cast<std::uint64_t>(info_.width) * size + from, voids);
+      rows.raw.push_back(raw.data());
+      rows.voids.push_back(voids_in(row) > 0 ? reinterpret_cast<const char*>(voids.data()) : nullptr);
+    }
+    return rows;
+  }
   for (std::int64_t row = first; row < end; ++row) {
     const Chunk& chunk = chunk_of(row);
     const auto samples = static_cast<std::size_t>((row - chunk.first_row) * info_.width);
@@ -163,9 +214,10 @@ void FilledSource::read_window(const Window& window, std::span<std::byte> sample
   // Whole rows are filled at once, a few of them at a time: of a --bbox all windows are narrower.
   const auto row_bytes = static_cast<std::size_t>(info_.width) * size;
   const std::size_t out_bytes = static_cast<std::size_t>(window.columns) * size;
-  std::vector<std::byte> rows(static_cast<std::size_t>(std::min(window.rows, VoidFiller::kRowsAtOnce)) * row_bytes);
-  for (std::int64_t first = 0; first < window.rows; first += VoidFiller::kRowsAtOnce) {
-    const auto count = static_cast<std::size_t>(std::min(window.rows - first, VoidFiller::kRowsAtOnce));
+  const std::int64_t at_once = std::min(VoidFiller::kRowsAtOnce, chunk_rows_);
+  std::vector<std::byte> rows(static_cast<std::size_t>(std::min(window.rows, at_once)) * row_bytes);
+  for (std::int64_t first = 0; first < window.rows; first += at_once) {
+    const auto count = static_cast<std::size_t>(std::min(window.rows - first, at_once));
     read_rows(window.row + first, window.row + first + static_cast<std::int64_t>(count),
               std::span(rows).first(count * row_bytes));
     for (std::size_t row = 0; row < count; ++row) {
@@ -176,16 +228,43 @@ void FilledSource::read_window(const Window& window, std::span<std::byte> sample
 }
 
 void FilledSource::read_rows(std::int64_t first, std::int64_t end, std::span<std::byte> samples) {
+  if (!file_) return make_rows(first, end, samples);
+  const auto row_bytes = static_cast<std::size_t>(info_.width) * size_bytes(info_.sample_type);
+  const std::int64_t together = rows_together(info_);
+  for (std::int64_t row = first; row < end; ++row) {
+    const std::int64_t begin = row / together * together;
+    if (made_.empty() || begin != first_made_) {
+      made_ = {};
+      const std::int64_t stop = std::min(begin + together, info_.height);
+      std::vector<std::byte> rows(static_cast<std::size_t>(stop - begin) * row_bytes);
+      make_rows(begin, stop, rows);
+      made_ = std::move(rows);
+      first_made_ = begin;
+    }
+    std::copy_n(made_.begin() + (row - begin) * static_cast<std::ptrdiff_t>(row_bytes), row_bytes,
+                samples.begin() + (row - first) * static_cast<std::ptrdiff_t>(row_bytes));
+  }
+}
+
+void FilledSource::make_rows(std::int64_t first, std::int64_t end, std::span<std::byte> samples) {
   const auto row_bytes = static_cast<std::size_t>(info_.width) * size_bytes(info_.sample_type);
   const std::int64_t reach = info_.fill_distance > 0 ? filler_.reach() : 0;
   for (std::int64_t row = first; row < end;) {
-    const std::int64_t stop = std::min(end, (row / chunk_rows_ + 1) * chunk_rows_);
+    const std::int64_t stop = file_ ? end : std::min(end, (row / chunk_rows_ + 1) * chunk_rows_);
     drop_rows_before(row - reach);
     have_rows(row, stop);
     const auto out = samples.subspan(static_cast<std::size_t>(row - first) * row_bytes,
                                      static_cast<std::size_t>(stop - row) * row_bytes);
-    const Chunk& chunk = chunk_of(row);
-    std::memcpy(out.data(), chunk.raw.data() + static_cast<std::size_t>(row - chunk.first_row) * row_bytes, out.size());
+    for (std::int64_t at = row; at < stop; ++at) {
+      const auto to = out.subspan(static_cast<std::size_t>(at - row) * row_bytes).first(row_bytes);
+      const Chunk& chunk = chunk_of(at);
+      if (file_) {
+        file_->read(at, 0, to);
+      } else {
+        std::copy_n(chunk.raw.begin() + (at - chunk.first_row) * static_cast<std::ptrdiff_t>(row_bytes), row_bytes,
+                    to.begin());
+      }
+    }
     treat_rows(row, stop, out);
     row = stop;
   }
@@ -205,7 +284,8 @@ void FilledSource::treat_rows(std::int64_t first, std::int64_t end, std::span<st
       const std::int64_t from = std::max<std::int64_t>(row - filler_.reach(), 0);
       const std::int64_t to = std::min(stop + filler_.reach(), info_.height);
       have_rows(from, to);
-      filled = filler_.fill(rows_at(from, to), row, stop,
+      const auto read = [this](auto... place) { return rows_at(place...); };
+      filled = filler_.fill(read, row, stop,
                             samples.subspan(static_cast<std::size_t>(row - first) * row_bytes,
                                             static_cast<std::size_t>(stop - row) * row_bytes));
     }
@@ -228,39 +308,46 @@ void FilledSource::count_out_of_range(std::int64_t first, std::int64_t end) {
   std::vector<char> voids(static_cast<std::size_t>(info_.width));
   for (std::int64_t row = std::max(first, counts_.rows); row < end; ++row) {
     if (voids_in(row) == 0) continue;
-    const Chunk& chunk = chunk_of(row);
-    find_voids(source_->info(),
-               std::span(chunk.raw).subspan(static_cast<std::size_t>(row - chunk.first_row) * row_bytes, row_bytes),
-               voids);
+    const VoidRows here = rows_at(row, row + 1, 0, info_.width);
+    find_voids(source_->info(), {here.raw.front(), row_bytes}, voids);
     counts_.by_valid_range += voids_in(row) - std::accumulate(voids.begin(), voids.end(), std::int64_t{0});
   }
 }
 
-std::uint64_t fill_memory_bytes(const SourceInfo& info) {
+std::uint64_t fill_memory_bytes(const SourceInfo& info, bool in_scratch) {
   if (!info.valid_range && info.fill_distance == 0) return 0;
   const bool fills = info.fill_distance > 0;
   const auto width = static_cast<double>(info.width);
   const auto height = static_cast<double>(info.height);
   const auto step = static_cast<double>(chunk_rows(info));
-  // Chunks with a byte a sample that tells voids, heights of one of them, and the values that are being made.
-  const double reach = fills ? static_cast<double>(info.fill_distance + VoidFiller::smoothing_reach()) : 0.0;
-  const double rows = std::ceil(2.0 * reach / step + 2.0) * step;
-  const double held = std::min(rows, height) * width * (static_cast<double>(size_bytes(info.sample_type)) + 1.0);
-  const double heights = std::min(step, height) * width * 4.0;
-  const auto box_rows = static_cast<double>(VoidFiller::kRowsAtOnce + 2 * VoidFiller::smoothing_reach());
+  const double sample = static_cast<double>(size_bytes(info.sample_type)) + 1.0;  // a byte tells voids
+  const VoidFiller filler(info, info.fill_distance);
+  const double reach = fills ? static_cast<double>(filler.reach()) : 0.0;
+  const double rows = in_scratch ? step : std::ceil(2.0 * reach / step + 2.0) * step;
+  const double held = std::min(rows, height) * width * sample;
   // Rows of which only a part is wanted.
-  const double narrow =
-      static_cast<double>(VoidFiller::kRowsAtOnce) * width * static_cast<double>(size_bytes(info.sample_type));
-  return static_cast<std::uint64_t>(held + heights + narrow + (fills ? box_rows * width * 19.0 : 0.0));
+  const auto most = static_cast<double>(VoidFiller::kRowsAtOnce);
+  const double at_once = in_scratch ? static_cast<double>(rows_together(info)) : std::min(most, step);
+  const double narrow = std::min(at_once + (in_scratch ? step : 0.0), height) * width * sample;
+  if (!fills) return static_cast<std::uint64_t>(held + narrow);
+  const double read =
+      in_scratch ? (at_once + 2.0 * reach) * static_cast<double>(filler.columns_at_once()) * sample : 0.0;
+  // Boxes of changing sizes leave gaps in the heap (measured).
+  const double boxes = 1.5 * (read + filler.memory_bytes(static_cast<std::int64_t>(at_once)));
+  return static_cast<std::uint64_t>(held + narrow + boxes);
 }
 
 std::uint64_t FilledSource::buffer_bytes(std::uint64_t limit) const {
-  return source_->buffer_bytes(limit) + fill_memory_bytes(info_);
+  return source_->buffer_bytes(limit) + fill_memory_bytes(info_, file_.has_value());
 }
 
-std::unique_ptr<HeightSource> with_voids_treated(std::unique_ptr<HeightSource> source, const VoidTreatment& treatment) {
+std::unique_ptr<HeightSource> with_voids_treated(std::unique_ptr<HeightSource> source, const VoidTreatment& treatment,
+                                                 const Job& job) {
   if (!treatment.does_anything()) return source;
-  return std::make_unique<FilledSource>(std::move(source), treatment);
+  const std::uint64_t in_memory = fill_memory_bytes(treated_info(source->info(), treatment), false);
+  const bool in_scratch = job.memory_bytes != 0 && in_memory > job.memory_bytes / 3;
+  return std::make_unique<FilledSource>(std::move(source), treatment,
+                                        in_scratch ? ScratchFolder(job.scratch_folder) : std::nullopt);
 }
 
 }  // namespace isohf

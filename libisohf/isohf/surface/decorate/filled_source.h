@@ -7,6 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include "isohf/base/memory/kept_rows.h"
+#include "isohf/job.h"
 #include "isohf/raster.h"
 #include "isohf/surface/decorate/void_filler.h"
 
@@ -33,12 +35,13 @@ struct VoidCounts {
 /// or the pieces of a mosaic. It is rounded to the source's sample type, and never to one of its void values. Samples
 /// that are no voids come through bit for bit.
 ///
-/// Memory: the rows of a window and VoidFiller::reach() more on either side. Windows without voids are read from the
+/// Memory: the rows of a window and VoidFiller::reach() more on either side, or a scratch file's. Windows without voids are read from the
 /// other source as they are, and looked through once. Works on the caller's oneTBB arena.
 class FilledSource final : public HeightSource {
  public:
   /// Throws Error{kInvalidArgument} where valid_range leaves nothing or fill_distance is beyond kMaxFillDistance.
-  FilledSource(std::unique_ptr<HeightSource> source, const VoidTreatment& treatment);
+  FilledSource(std::unique_ptr<HeightSource> source, const VoidTreatment& treatment,
+               const ScratchFolder& scratch = std::nullopt);
   ~FilledSource() override;
 
   [[nodiscard]] const SourceInfo& info() const override { return info_; }
@@ -54,10 +57,13 @@ class FilledSource final : public HeightSource {
   [[nodiscard]] std::unique_ptr<Chunk> read_chunk(std::int64_t index);
   void have_rows(std::int64_t first, std::int64_t end);
   void drop_rows_before(std::int64_t row);
+  void drop_chunk(const Chunk& chunk);
   [[nodiscard]] const Chunk& chunk_of(std::int64_t row) const;
   [[nodiscard]] std::int64_t voids_in(std::int64_t row) const;
-  [[nodiscard]] VoidRows rows_at(std::int64_t first, std::int64_t end) const;
+  [[nodiscard]] VoidRows rows_at(std::int64_t first, std::int64_t end, std::int64_t column,
+                                 std::int64_t end_column) const;
   void read_rows(std::int64_t first, std::int64_t end, std::span<std::byte> samples);
+  void make_rows(std::int64_t first, std::int64_t end, std::span<std::byte> samples);
   void treat_rows(std::int64_t first, std::int64_t end, std::span<std::byte> samples);
   void count_out_of_range(std::int64_t first, std::int64_t end);
 
@@ -65,15 +71,19 @@ class FilledSource final : public HeightSource {
   SourceInfo info_;
   VoidFiller filler_;
   std::int64_t chunk_rows_ = 1;
+  std::optional<RowFile> file_;                ///< of the chunks' samples and voids, where they are not in memory
   std::deque<std::unique_ptr<Chunk>> chunks_;  ///< neighbouring ones, from North to South
+  std::int64_t first_made_ = 0;  ///< with a file, rows that were filled together: each looks at many others
+  std::vector<std::byte> made_;
   VoidCounts counts_;
 };
 
 /// What a FilledSource with this info() holds at most, beyond its source; 0 for an info that says nothing of treatment.
-[[nodiscard]] std::uint64_t fill_memory_bytes(const SourceInfo& info);
+[[nodiscard]] std::uint64_t fill_memory_bytes(const SourceInfo& info, bool in_scratch);
 
-/// `source` itself where nothing is to be treated, else a FilledSource of it.
+/// `source` itself where nothing is to be treated, else a FilledSource of it, with a scratch file where it would take
+/// more than a third of the job's memory.
 [[nodiscard]] std::unique_ptr<HeightSource> with_voids_treated(std::unique_ptr<HeightSource> source,
-                                                               const VoidTreatment& treatment);
+                                                               const VoidTreatment& treatment, const Job& job);
 
 }  // namespace isohf

@@ -57,6 +57,11 @@ constexpr std::array<Ray, 16> kRays = {{{1, 0, 1.0, kAxis},
 /// Radii of the smoothing passes, samples.
 constexpr std::array<std::int64_t, 8> kRadii = {8, 4, 2, 1, 4, 2, 1, 1};
 
+/// Columns that are filled at once: wider voids are cut, and smoothed beyond the cuts as far as these are seen.
+constexpr std::int64_t kBoxColumns = 4096;
+/// Of each sample of a box: two values, its distance, and whether ground is near.
+constexpr double kBoxBytes = 19.0;
+
 std::int64_t sum_of_radii() {
   return std::accumulate(kRadii.begin(), kRadii.end(), std::int64_t{0});
 }
@@ -69,6 +74,8 @@ struct VoidFiller::Box {
   std::int64_t row = 0;
   std::int64_t columns = 0;
   std::int64_t rows = 0;
+  std::int64_t first_filled = 0;  ///< column, and the one behind the last: the others are margin
+  std::int64_t end_filled = 0;
   std::vector<double> values;          ///< raw; NaN where void and not (yet) filled
   std::vector<std::int16_t> distance;  ///< of a void to the nearest sample that was found, rounded down; 0: no void
   std::vector<char> is_near;           ///< 0: nothing but voids within the distance; empty: not looked into
@@ -88,12 +95,26 @@ std::int64_t VoidFiller::reach() const {
   return distance_ + smoothing_reach();
 }
 
+std::int64_t VoidFiller::box_columns() const {
+  return std::max(kBoxColumns, distance_);
+}
+
+std::int64_t VoidFiller::columns_at_once() const {
+  return std::min(box_columns() + 2 * reach(), info_.width);
+}
+
+double VoidFiller::memory_bytes(std::int64_t rows) const {
+  const std::int64_t columns = std::min(box_columns() + 2 * smoothing_reach(), info_.width);
+  return static_cast<double>((rows + 2 * smoothing_reach()) * columns) * kBoxBytes + static_cast<double>(info_.width);
+}
+
 /// Column intervals that hold the voids of the rows and what smoothing sees around them; as high as smoothing needs.
-std::vector<VoidFiller::Box> VoidFiller::boxes(const VoidRows& rows, std::int64_t first, std::int64_t end) const {
+std::vector<VoidFiller::Box> VoidFiller::boxes(const ReadVoidRows& read, std::int64_t first, std::int64_t end) const {
   const std::int64_t margin = smoothing_reach();
   std::vector<char> any(static_cast<std::size_t>(info_.width), 0);
   for (std::int64_t row = first; row < end; ++row) {
-    const char* const voids = rows.voids[static_cast<std::size_t>(row - rows.first)];
+    const VoidRows rows = read(row, row + 1, 0, info_.width);
+    const char* const voids = rows.voids.front();
     if (voids == nullptr) continue;
     for (std::size_t c = 0; c < any.size(); ++c) any[c] = static_cast<char>(any[c] | voids[c]);
   }
@@ -102,13 +123,18 @@ std::vector<VoidFiller::Box> VoidFiller::boxes(const VoidRows& rows, std::int64_
     if (any[static_cast<std::size_t>(c)] == 0) continue;
     const std::int64_t from = std::max<std::int64_t>(c - margin, 0);
     const std::int64_t to = std::min(c + margin + 1, info_.width);
-    if (found.empty() || found.back().column + found.back().columns < from) {
+    const bool follows = !found.empty() && found.back().column + found.back().columns >= from;
+    const bool is_cut = follows && c - found.back().first_filled >= box_columns();
+    if (is_cut) found.back().end_filled = c;
+    if (!follows || is_cut) {
       Box& box = found.emplace_back();
       box.column = from;
+      box.first_filled = is_cut ? c : from;
       box.row = std::max<std::int64_t>(first - margin, 0);
       box.rows = std::min(end + margin, info_.height) - box.row;
     }
     found.back().columns = to - found.back().column;
+    found.back().end_filled = to;
   }
   return found;
 }
@@ -121,8 +147,8 @@ void VoidFiller::cast_row(const VoidRows& rows, Box& box, std::int64_t row) cons
   const char* const voids = rows.voids[entry];
   for (std::int64_t c = box.column; c < box.column + box.columns; ++c) {
     const std::size_t at = box.at(c, row);
-    if (voids == nullptr || voids[c] == 0) {
-      box.values[at] = load(rows.raw[entry] + static_cast<std::size_t>(c) * size);
+    if (voids == nullptr || voids[c - rows.column] == 0) {
+      box.values[at] = load(rows.raw[entry] + static_cast<std::size_t>(c - rows.column) * size);
       continue;
     }
     if (!box.is_near.empty() && box.is_near[at] == 0) {
@@ -140,7 +166,7 @@ void VoidFiller::cast_row(const VoidRows& rows, Box& box, std::int64_t row) cons
       if (ray.dx != 0) steps = std::min(steps, ray.dx > 0 ? (info_.width - 1 - c) / ray.dx : c / -ray.dx);
       if (ray.dy != 0) steps = std::min(steps, ray.dy > 0 ? (info_.height - 1 - row) / ray.dy : row / -ray.dy);
       for (std::int64_t step = 1; step <= steps; ++step) {
-        const std::int64_t column = c + step * ray.dx;
+        const std::int64_t column = c + step * ray.dx - rows.column;
         const auto there = static_cast<std::size_t>(row + step * ray.dy - rows.first);
         if (rows.voids[there] != nullptr && rows.voids[there][column] != 0) continue;
         const double value = load(rows.raw[there] + static_cast<std::size_t>(column) * size);
@@ -169,7 +195,7 @@ void VoidFiller::look_for_ground(const VoidRows& rows, Box& box) const {
     if (row < 0 || row >= info_.height) return;
     const char* const voids = rows.voids[static_cast<std::size_t>(row - rows.first)];
     for (std::int64_t c = from; c < to; ++c) {
-      valid[static_cast<std::size_t>(c - from)] += sign * (voids == nullptr ? 1 : 1 - voids[c]);
+      valid[static_cast<std::size_t>(c - from)] += sign * (voids == nullptr ? 1 : 1 - voids[c - rows.column]);
     }
   };
   box.is_near.resize(static_cast<std::size_t>(box.columns * box.rows));
@@ -191,7 +217,9 @@ void VoidFiller::cast_rays(const VoidRows& rows, Box& box) const {
   std::int64_t voids = 0;
   for (std::int64_t row = box.row; row < box.row + box.rows; ++row) {
     const char* const in_row = rows.voids[static_cast<std::size_t>(row - rows.first)];
-    if (in_row != nullptr) voids += std::count(in_row + box.column, in_row + box.column + box.columns, 1);
+    if (in_row == nullptr) continue;
+    const char* const from = in_row + (box.column - rows.column);
+    voids += std::count(from, from + box.columns, 1);
   }
   constexpr std::int64_t kManyVoids = 1 << 16;  // below, the rays cost less than the look
   if (voids > kManyVoids) look_for_ground(rows, box);
@@ -238,17 +266,20 @@ void VoidFiller::smooth(Box& box) const {
   }
 }
 
-std::vector<std::int64_t> VoidFiller::fill(const VoidRows& rows, std::int64_t first, std::int64_t end,
+std::vector<std::int64_t> VoidFiller::fill(const ReadVoidRows& read, std::int64_t first, std::int64_t end,
                                            std::span<std::byte> samples) const {
   const StoreSample store = store_sample(info_.sample_type);
   const std::size_t size = size_bytes(info_.sample_type);
   std::vector<std::int64_t> filled(static_cast<std::size_t>(end - first), 0);
-  for (Box& box : boxes(rows, first, end)) {
-    cast_rays(rows, box);
+  for (Box box : boxes(read, first, end)) {
+    cast_rays(read(std::max<std::int64_t>(first - reach(), 0), std::min(end + reach(), info_.height),
+                   std::max<std::int64_t>(box.column - distance_, 0),
+                   std::min(box.column + box.columns + distance_, info_.width)),
+              box);
     smooth(box);
     for (std::int64_t row = first; row < end; ++row) {
       std::byte* const out = samples.data() + static_cast<std::size_t>((row - first) * info_.width) * size;
-      for (std::int64_t c = box.column; c < box.column + box.columns; ++c) {
+      for (std::int64_t c = box.first_filled; c < box.end_filled; ++c) {
         const std::size_t at = box.at(c, row);
         if (box.distance[at] == 0 || std::isnan(box.values[at])) continue;
         store(storable(box.values[at]), out + static_cast<std::size_t>(c) * size);
