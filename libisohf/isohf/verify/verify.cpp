@@ -108,7 +108,7 @@ class Verification {
       above = check_row(row, above);
       job_.report({"verify", "tiles", (row + 1) * grid_.tile_columns(), grid_.tile_count()});
     }
-    above = {};
+    above = std::vector<TileBorder>();
     planes_.reset();
     check_totals();
     if (seeds_) add_seed_problems(seeds_->check_record());

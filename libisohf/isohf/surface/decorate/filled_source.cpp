@@ -137,8 +137,8 @@ std::unique_ptr<FilledSource::Chunk> FilledSource::read_chunk(std::int64_t index
     file_->write(at, 0, std::span(chunk->raw).subspan(row * row_bytes, row_bytes));
     file_->write(at, row_bytes, std::as_bytes(std::span(chunk->voids).subspan(row * width, width)));
   }
-  chunk->raw = {};
-  chunk->voids = {};
+  chunk->raw = std::vector<std::byte>();  // = {} would keep the memory
+  chunk->voids = std::vector<char>();
   return chunk;
 }
 
@@ -234,7 +234,7 @@ void FilledSource::read_rows(std::int64_t first, std::int64_t end, std::span<std
   for (std::int64_t row = first; row < end; ++row) {
     const std::int64_t begin = row / together * together;
     if (made_.empty() || begin != first_made_) {
-      made_ = {};
+      made_ = std::vector<std::byte>();
       const std::int64_t stop = std::min(begin + together, info_.height);
       std::vector<std::byte> rows(static_cast<std::size_t>(stop - begin) * row_bytes);
       make_rows(begin, stop, rows);
