@@ -76,8 +76,8 @@ std::vector<std::byte> stored_sample(SampleType type, double value) {
 
 void bound_undeclared_voids(SourceInfo& info) {
   if (!is_floating(info.sample_type) || !info.void_values.empty()) return;
-  info.valid_min = -kBeyondAnyGround;
-  info.valid_max = kBeyondAnyGround;
+  info.valid_min = std::max(info.valid_min, -kBeyondAnyGround);
+  info.valid_max = std::min(info.valid_max, kBeyondAnyGround);
 }
 
 void apply_open_options(SourceInfo& info, const OpenOptions& options) {

@@ -18,6 +18,7 @@
 #include "formats/open_options.h"
 #include "formats/readers.h"
 #include "isohf/base/file.h"
+#include "isohf/base/void_values.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
 
@@ -233,7 +234,7 @@ class UnchangedSource final : public HeightSource {
       if (std::ranges::find(info.void_values, value) != info.void_values.end()) continue;
       throw Error(ErrorCode::kCorrupt, {path_, fmt::format("an elevation of {:.9g}", value),
                                         fmt::format("{} at most either way", kBeyondAnyGround),
-                                        fmt::format("`void_values` {:.9g} takes it as nodata", value)});
+                                        void_values_with(info, {value}) + " takes it as nodata"});
     }
   }
 

@@ -9,8 +9,10 @@
 #include <exception>
 #include <filesystem>
 #include <new>
+#include <nlohmann/json.hpp>
 
 #include "isohf/base/file.h"
+#include "output/json_output.h"
 
 namespace isohf::cli {
 namespace {
@@ -48,7 +50,8 @@ void prepare_telling(const Arguments& arguments) {
 
 void print_version() {
   StandardOutput out;
-  out.write(program_name() + " " ISOHF_VERSION "\n");
+  out.write(telling().json ? json_text({{"name", program_name()}, {"version", ISOHF_VERSION}})
+                           : program_name() + " " ISOHF_VERSION "\n");
   out.finish();
 }
 

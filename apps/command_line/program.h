@@ -14,7 +14,7 @@ using Arguments = std::vector<std::string>;
 /// how messages and help call the program.
 int run_program(const char* name, int argc, char** argv, int (*body)(const Arguments& arguments));
 
-/// "isohf 0.1.0" on standard output.
+/// "isohf 0.1.0" on standard output, or a document with --json.
 void print_version();
 
 /// Becomes the program `name`, which lies beside this one or on the path, with the same descriptors. Throws Error where

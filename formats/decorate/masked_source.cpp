@@ -40,6 +40,8 @@ class MaskedSource final : public HeightSource {
     }
     info_.sample_type = samples_.kind.type;
     info_.void_values = samples_.kind.void_values;
+    info_.valid_min = samples_.kind.valid_min;
+    info_.valid_max = samples_.kind.valid_max;
     info_.block_height = std::max(info_.block_height, mask.block_height);
   }
 

@@ -237,7 +237,7 @@ std::string file_beside(const std::string& beside, const std::string& name) {
 }
 
 void read_auxiliary_metadata(SourceInfo& info, int band) {
-  const std::string path = info.path + ".aux.xml";
+  const std::string path = without_gzip(info.path) + ".aux.xml";
   if (!is_file(path)) return;
   const Texts texts = read(path);
   const auto text = [&](const std::string& key) {
@@ -269,7 +269,7 @@ void read_auxiliary_metadata(SourceInfo& info, int band) {
   item("offset", "Offset", scaled);
 }
 
-void read_prj_beside(SourceInfo& info) {
+void read_prj_beside(SourceInfo& info, int band) {
   const std::string text = prj_beside(info.path);
   try {
     if (!text.empty() && read_prj(text, info)) return;
@@ -279,6 +279,7 @@ void read_prj_beside(SourceInfo& info) {
   if (!text.empty()) {
     info.warnings.push_back(loss("the .prj beside the file is not the WKT of a map's reference system; it is ignored"));
   }
+  read_auxiliary_metadata(info, band);
   const Georeference& place = info.georeference;
   if (place.unit == HorizontalUnit::kUnknown && place.has_origin && place.spacing_x < kFinestAsMetres &&
       place.spacing_y < kFinestAsMetres && std::abs(place.origin_x) <= 360.0 && std::abs(place.origin_y) <= 90.0) {

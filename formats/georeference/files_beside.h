@@ -34,9 +34,9 @@ struct WorldFile {
 /// systems without case. Empty where there is none.
 [[nodiscard]] std::string file_beside(const std::string& beside, const std::string& name);
 
-/// Reads the .prj beside info.path, where there is one, with read_wkt; a text that is no WKT becomes a
-/// warning, and so do coordinates that look like degrees without one.
-void read_prj_beside(SourceInfo& info);
+/// Reads the .prj beside info.path, where there is one, with read_wkt, else what read_auxiliary_metadata finds; a .prj
+/// that is no WKT becomes a warning, and so do coordinates that look like degrees without one.
+void read_prj_beside(SourceInfo& info, int band = 0);
 
 /// Reads NAME.EXT.aux.xml, in which GDAL keeps what a raster's format has no room for ("Persistent Auxiliary
 /// Metadata"): where the raster lies, its reference system, and a void value, unit, scale and offset for each band.

@@ -96,7 +96,7 @@ Snapped snap(double distance, double spacing, double own_spacing, std::int64_t s
 
 [[noreturn]] void refuse_misaligned(const std::string& path, const char* axis, double off) {
   throw Error(
-      ErrorCode::kInvalidArgument,
+      ErrorCode::kUnsupported,
       fmt::format("{}: lies {:.3g} of a sample off the grid of the other files of its resolution in {}, at most "
                   "{} is taken as rounding; resample it to their grid (gdalwarp -tap) or leave it out",
                   path, std::abs(off), axis, kSnapTolerance));
@@ -116,7 +116,7 @@ MosaicLayer lay_out(Resolution resolution, double& worst) {
     const double x = each.origin_x - layer.origin_x;
     const double y = layer.origin_y - each.origin_y;
     if (!(x / layer.spacing_x < kMostSamples && y / layer.spacing_y < kMostSamples)) {
-      throw Error(ErrorCode::kInvalidArgument,
+      throw Error(ErrorCode::kUnsupported,
                   fmt::format("{}: lies more than {:.0e} samples from other files of the mosaic; is its georeference "
                               "right? leave it out otherwise",
                               member.path, kMostSamples));
@@ -334,11 +334,12 @@ void find_missing_places(const MosaicPlan& plan, MosaicHoles& holes) {
 }
 
 /// Counts the samples of the region in no rectangle and remembers the first stretch of them.
-std::int64_t uncovered(const MosaicPlan& plan, std::optional<SampleRectangle>& first) {
-  std::vector<SampleRectangle> members = grounds(plan, 0.5);
+}  // namespace
+
+std::int64_t uncovered(std::vector<SampleRectangle> members, const Window& region,
+                       std::optional<SampleRectangle>& first) {
   std::sort(members.begin(), members.end(),
             [](const SampleRectangle& a, const SampleRectangle& b) { return a.row < b.row; });
-  const Window& region = plan.region;
   const auto in_region = [&](std::int64_t row) { return std::clamp(row, region.row, region.row + region.rows); };
   std::set<std::int64_t> cuts = {region.row, region.row + region.rows};
   for (const SampleRectangle& member : members) {
@@ -375,8 +376,6 @@ std::int64_t uncovered(const MosaicPlan& plan, std::optional<SampleRectangle>& f
   }
   return count;
 }
-
-}  // namespace
 
 MapPoint MosaicWay::members_from_mosaic(MapPoint place) const {
   const GeoPoint geo = mosaic->geo_from_map(place);
@@ -484,7 +483,7 @@ void place_members(std::vector<PlacedMember> members, MosaicPlan& plan) {
   plan.info.width = columns.last - columns.first + 1;
   plan.info.height = rows.last - rows.first + 1;
   if (!(static_cast<double>(plan.info.width) < kMostSamples && static_cast<double>(plan.info.height) < kMostSamples)) {
-    throw Error(ErrorCode::kInvalidArgument,
+    throw Error(ErrorCode::kUnsupported,
                 fmt::format("{} files make a mosaic of {} x {} samples; are their georeferences right?",
                             plan.layers.size(), plan.info.width, plan.info.height));
   }
@@ -544,7 +543,7 @@ std::string MosaicHoles::describe(std::size_t named) const {
 MosaicHoles find_holes(const MosaicPlan& plan) {
   MosaicHoles holes;
   std::optional<SampleRectangle> first;
-  holes.samples = uncovered(plan, first);
+  holes.samples = uncovered(grounds(plan, 0.5), plan.region, first);
   if (holes.samples == 0) return holes;
   find_missing_places(plan, holes);
   if (holes.tiles_missing == 0 && first) holes.missing = {place_name(plan, *first)};

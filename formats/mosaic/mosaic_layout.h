@@ -120,6 +120,10 @@ void place_members(std::vector<PlacedMember> members, MosaicPlan& plan);
 [[nodiscard]] SampleRectangle ground_of(const MosaicPlan& plan, const MosaicLayer& layer, const MosaicMember& member,
                                         double reach);
 
+/// How many samples of `region` lie in none of `members`, and the first rectangle of them.
+[[nodiscard]] std::int64_t uncovered(std::vector<SampleRectangle> members, const Window& region,
+                                     std::optional<SampleRectangle>& first);
+
 /// What lies in no member.
 [[nodiscard]] MosaicHoles find_holes(const MosaicPlan& plan);
 

@@ -30,7 +30,7 @@ constexpr std::size_t kHolesNamed = 4;
 constexpr double kSameBody = 1e-9;
 
 [[noreturn]] void refuse(const std::string& path, const std::string& why) {
-  throw Error(ErrorCode::kInvalidArgument, path + ": " + why);
+  throw Error(ErrorCode::kUnsupported, path + ": " + why);
 }
 
 void refuse_duplicates(const std::vector<std::string>& paths) {
@@ -41,7 +41,9 @@ void refuse_duplicates(const std::vector<std::string>& paths) {
     const auto [found, is_new] = known.insert({{status.st_dev, status.st_ino}, i});
     if (is_new) continue;
     const std::string& other = paths[found->second];
-    refuse(paths[i], other == paths[i] ? "is named twice among the inputs" : "is the same file as " + other);
+    throw Error(
+        ErrorCode::kInvalidArgument,
+        paths[i] + ": " + (other == paths[i] ? "is named twice among the inputs" : "is the same file as " + other));
   }
 }
 

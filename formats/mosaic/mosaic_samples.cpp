@@ -26,10 +26,6 @@ double load(const std::byte* at) {
   return static_cast<double>(number_of(stored_at<T>(at)));
 }
 
-bool is_bounded(const SampleKind& kind) {
-  return std::isfinite(kind.valid_min) || std::isfinite(kind.valid_max);
-}
-
 bool is_void(const SampleKind& kind, double number) {
   if (!std::isfinite(number) || number < kind.valid_min || number > kind.valid_max) return true;
   return std::find(kind.void_values.begin(), kind.void_values.end(), number) != kind.void_values.end();
@@ -45,6 +41,14 @@ Limits limits_of(SampleType type) {
   if (is_floating(type)) return {};
   const auto [lowest, highest] = sample_range(type);
   return {lowest, highest};
+}
+
+/// Whether values are void that are not listed.
+bool is_bounded(const SampleKind& kind) {
+  if (std::isfinite(kind.valid_max)) return true;
+  const bool is_listed = kind.void_values.size() == 1 && !is_floating(kind.type) &&
+                         kind.void_values.front() == limits_of(kind.type).lowest;
+  return std::isfinite(kind.valid_min) && !(is_listed && kind.valid_min == kind.void_values.front() + 1.0);
 }
 
 /// Whether some sample of this kind could be an elevation of that raw number.
@@ -137,8 +141,12 @@ MosaicSamples widened(const SampleKind& kind) {
   MosaicSamples samples;
   samples.kind = plain_kind(wider(kind.type), kind);
   const bool floating = is_floating(samples.kind.type);
-  if (!floating) samples.kind.void_values = {limits_of(samples.kind.type).lowest};
-  samples.gap = stored_sample(samples.kind.type, floating ? kNaN : samples.kind.void_values.front());
+  const double gap = floating ? kNaN : limits_of(samples.kind.type).lowest;
+  if (!floating) {
+    samples.kind.void_values = {gap};
+    samples.kind.valid_min = gap + 1.0;  // which tells that no file means it
+  }
+  samples.gap = stored_sample(samples.kind.type, gap);
   samples.notes.push_back(fmt::format("{} has no number to spare for voids in all files; samples become {}",
                                       to_string(kind.type), to_string(samples.kind.type)));
   return samples;

@@ -17,6 +17,7 @@
 #include "formats/files/text.h"
 #include "formats/files/text_tokens.h"
 #include "formats/georeference/files_beside.h"
+#include "formats/mosaic/mosaic_layout.h"
 #include "formats/open_options.h"
 #include "formats/readers.h"
 #include "formats/tiff/gdal_tags.h"
@@ -152,10 +153,23 @@ class VrtSource final : public FileSource {
     for (const auto& [role, element] : {std::pair{"unittype", "UnitType"}, {"scale", "Scale"}, {"offset", "Offset"}}) {
       if (const auto node = band.child(element)) read_gdal_item(role, trimmed(node.text().get()), info_);
     }
-    empty_ = stored_sample(info_.sample_type, info_.void_values.empty() ? 0.0 : info_.void_values.front());
     for (const pugi::xml_node& node : band.children()) read_source(node);
     info_.block_width = info_.width;
+    type_ = info_.sample_type;
+    if (info_.void_values.empty() && options.void_values.empty() && !is_floating(type_) && has_gaps()) {
+      const MosaicSamples samples = choose_mosaic_samples({SampleKind::of(info_)}, true, false);
+      info_.sample_type = samples.kind.type;
+      info_.void_values = samples.kind.void_values;
+      info_.valid_min = samples.kind.valid_min;
+      info_.warnings.push_back(
+          fmt::format("it has samples without a source and no NoDataValue for them: they are void, and samples become "
+                      "{} (`void_values` V gives them one)",
+                      to_string(info_.sample_type)));
+    }
     apply_open_options(info_, options);
+    // Where no source is, samples are void whatever makes them so.
+    const double none = is_floating(type_) ? std::numeric_limits<double>::quiet_NaN() : 0.0;
+    empty_ = stored_sample(info_.sample_type, info_.void_values.empty() ? none : info_.void_values.front());
   }
 
   void read_type(const pugi::xml_node& band) {
@@ -231,6 +245,16 @@ class VrtSource final : public FileSource {
     pieces_.push_back(std::move(piece));
   }
 
+  /// Whether some samples lie in no source, or only in values that a source leaves out.
+  [[nodiscard]] bool has_gaps() const {
+    std::vector<SampleRectangle> covered;
+    for (const Piece& piece : pieces_) {
+      if (!piece.skipped) covered.push_back({piece.column, piece.row, piece.from.columns, piece.from.rows});
+    }
+    std::optional<SampleRectangle> first;
+    return uncovered(std::move(covered), {0, 0, info_.width, info_.height}, first) > 0;
+  }
+
   HeightSource& source_of(const Piece& piece) {
     const auto found = std::ranges::find(opened_, &piece, &Opened::piece);
     if (found != opened_.end()) {
@@ -269,7 +293,7 @@ class VrtSource final : public FileSource {
     const SampleType type = source.info().sample_type;
     // What stands for a void in a wider type than the VRT's, as of masks, has no sample in it.
     const std::vector<double>& voids = source.info().void_values;
-    const bool drops_voids = type != info_.sample_type;
+    const bool drops_voids = type != type_;
     const Window part{piece.from.column + west - piece.column, piece.from.row + north - piece.row, east - west,
                       south - north};
     const std::size_t size = size_bytes(type);
@@ -286,7 +310,7 @@ class VrtSource final : public FileSource {
     const double skipped = skips.value_or(0.0);
     const double digits = type == SampleType::kFloat64 ? 5e-15 * std::abs(skipped) : 0.0;
     const auto store = store_sample(info_.sample_type);
-    const bool to_whole = !is_floating(info_.sample_type);
+    const bool to_whole = !is_floating(type_);
     with_stored_type(type, [&](auto kind) {
       using Stored = decltype(kind);
       for (std::int64_t row = 0; row < part.rows; ++row) {
@@ -301,7 +325,7 @@ class VrtSource final : public FileSource {
           if (skips && (std::abs(value - skipped) <= digits || (std::isnan(value) && std::isnan(skipped)))) continue;
           if (drops_voids && std::ranges::find(voids, value) != voids.end()) {
             if (!info_.void_values.empty()) continue;
-            if (nearest_sample(info_.sample_type, value) != value) {
+            if (nearest_sample(type_, value) != value) {
               fail(ErrorCode::kUnsupported, printable(piece.path) +
                                                 " has samples without an elevation, and the VRT no "
                                                 "NoDataValue for them (gdalbuildvrt -vrtnodata)");
@@ -309,7 +333,7 @@ class VrtSource final : public FileSource {
           }
           value = value * piece.scale + piece.offset;
           if (to_whole && std::isnan(value)) value = 0.0;
-          store(std::isnan(value) ? value : nearest_sample(info_.sample_type, value), out);
+          store(std::isnan(value) ? value : nearest_sample(type_, value), out);
         }
       }
     });
@@ -317,6 +341,7 @@ class VrtSource final : public FileSource {
 
   std::uint64_t unpacked_bytes_;
   std::optional<std::uint64_t> limit_;
+  SampleType type_{};             ///< as the VRT has it; that of `info_` may be wider, for a void
   std::vector<std::byte> empty_;  ///< what stands where no piece is
   std::vector<Piece> pieces_;     ///< later ones lie above
   std::list<Opened> opened_;      ///< those last used first

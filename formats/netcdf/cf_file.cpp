@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <tuple>
 
 #include "formats/files/text.h"
 #include "formats/georeference/files_beside.h"
@@ -201,6 +202,9 @@ class CfReader {
     if (!wkt.empty()) {
       read_system_text(wkt, info_.path, info_);
       if (place.unit == HorizontalUnit::kMetre && length) place.metres_per_unit = length->metres;
+    } else if (const std::string map = length && system != nullptr ? map_of(*system, kind, length->metres) : "";
+               !map.empty()) {
+      read_system_text(map, info_.path, info_);
     } else if (!kind.empty() && kind != "latitude_longitude" && !length) {
       leave_out_place(fmt::format("its grid mapping {} comes without crs_wkt", printable(kind)));
     } else if (columns.text("standard_name").starts_with("grid_")) {
@@ -227,6 +231,48 @@ class CfReader {
     const Registration registration = info_.georeference.registration;
     info_.georeference = {};
     info_.georeference.registration = registration;
+  }
+
+  /// A map by its parameters, as PROJ spells it; empty for a mapping that has no such spelling here.
+  static std::string map_of(const Variable& system, std::string_view kind, double metres) {
+    struct Mapping {
+      std::string_view kind;
+      const char* projection;
+      const char* parallel;  ///< what a standard parallel is to it
+    };
+    static constexpr std::array<Mapping, 9> kMappings = {{{"transverse_mercator", "tmerc", ""},
+                                                          {"mercator", "merc", "lat_ts"},
+                                                          {"polar_stereographic", "stere", "lat_ts"},
+                                                          {"stereographic", "stere", ""},
+                                                          {"lambert_conformal_conic", "lcc", "lat_1"},
+                                                          {"albers_conical_equal_area", "aea", "lat_1"},
+                                                          {"lambert_azimuthal_equal_area", "laea", ""},
+                                                          {"azimuthal_equidistant", "aeqd", ""},
+                                                          {"lambert_cylindrical_equal_area", "cea", "lat_ts"}}};
+    const auto* const found = std::ranges::find(kMappings, kind, &Mapping::kind);
+    if (found == kMappings.end()) return {};
+    std::string map = fmt::format("+proj={}", found->projection);
+    const auto add = [&](std::string_view key, double value) { map += fmt::format(" +{}={:.17g}", key, value); };
+    const auto parallels = system.numbers("standard_parallel");
+    const std::string_view parallel = found->parallel;
+    if (!parallels.empty() && !parallel.empty()) add(parallel, parallels.front());
+    if (parallel == "lat_1" && !parallels.empty()) add("lat_2", parallels.back());
+    if (kind == "polar_stereographic" && !system.number("latitude_of_projection_origin")) {
+      add("lat_0", !parallels.empty() && parallels.front() < 0.0 ? -90.0 : 90.0);
+    }
+    for (const auto& [name, key, scale] : {std::tuple{"latitude_of_projection_origin", "lat_0", 1.0},
+                                           {"longitude_of_projection_origin", "lon_0", 1.0},
+                                           {"longitude_of_central_meridian", "lon_0", 1.0},
+                                           {"straight_vertical_longitude_from_pole", "lon_0", 1.0},
+                                           {"scale_factor_at_central_meridian", "k_0", 1.0},
+                                           {"scale_factor_at_projection_origin", "k_0", 1.0},
+                                           {"false_easting", "x_0", metres},
+                                           {"false_northing", "y_0", metres}}) {
+      if (const auto value = system.number(name)) add(key, *value * scale);
+    }
+    if (metres != 1.0) add("to_meter", metres);
+    const std::string figure = figure_of(system);
+    return map + (figure.empty() ? " +datum=WGS84" : figure) + " +no_defs +type=crs";
   }
 
   /// The ellipsoid and prime meridian of latitude_longitude, as PROJ spells them; empty for WGS 84's.
@@ -274,6 +320,13 @@ class CfReader {
     if (const auto filled = kFilled.find(variable.type); filled != kFilled.end() && info_.void_values.empty()) {
       set_void(filled->second);
     }
+    const auto bound = [&](const char* key, std::size_t end, double& limit) {
+      const std::span<const double> range = variable.numbers("valid_range");
+      const std::span<const double> list = range.size() == 2 ? range.subspan(end, 1) : variable.numbers(key);
+      if (!list.empty() && !std::isnan(list[0])) limit = list[0] < 0.0 ? list[0] + unsigned_range : list[0];
+    };
+    bound("valid_min", 0, info_.valid_min);
+    bound("valid_max", 1, info_.valid_max);
     info_.z_scale = variable.number("scale_factor").value_or(1.0);
     info_.z_offset = variable.number("add_offset").value_or(0.0);
     if (info_.z_scale == 0.0 || !std::isfinite(info_.z_scale) || !std::isfinite(info_.z_offset)) {

@@ -37,6 +37,11 @@ std::mutex& one_at_a_time() {
 
 void require(int status) {
   if (status == NC_NOERR) return;
+  if (status == NC_ENOFILTER) {
+    throw Error(ErrorCode::kUnsupported,
+                "is packed by a filter that HDF5 does not have here; its plug-in in HDF5_PLUGIN_PATH lets it be read, "
+                "and h5repack -f GZIP=6 where it is installed makes a file that needs none");
+  }
   const bool is_system = status > 0 || status == NC_ENOMEM;
   throw Error(status == NC_ENOMEM ? ErrorCode::kOutOfMemory
               : is_system         ? ErrorCode::kIo
@@ -123,6 +128,25 @@ void require_harmless(const char* path) {
   if (status != 0) throw Error(ErrorCode::kCorrupt, "is so damaged that HDF5 breaks down over it");
 }
 
+/// Files that keep their rasters in groups, as BAG and HDF-EOS do.
+void require_outside_groups(int id, int variables) {
+  int groups = 0;
+  require(nc_inq_grps(id, &groups, nullptr));
+  int most = 0;
+  for (int variable = 0; variable < variables; ++variable) {
+    int rank = 0;
+    require(nc_inq_varndims(id, variable, &rank));
+    most = rank > most ? rank : most;
+  }
+  if (groups == 0 || most >= 2) return;
+  std::vector<int> list(static_cast<std::size_t>(groups));
+  require(nc_inq_grps(id, nullptr, list.data()));
+  std::array<char, NC_MAX_NAME + 1> name{};
+  require(nc_inq_grpname(list[0], name.data()));
+  throw Error(ErrorCode::kUnsupported, std::string("keeps its variables in groups (") + name.data() +
+                                           ", ...), which isohf does not read; gdal_translate makes a GeoTIFF of one");
+}
+
 int open_file(const char* path, IsohfNetcdfFile** file, IsohfNetcdfCounts* counts, IsohfNetcdfMessage* message) {
   return call(message, [&] {
     require_harmless(path);
@@ -131,6 +155,7 @@ int open_file(const char* path, IsohfNetcdfFile** file, IsohfNetcdfCounts* count
     *file = new IsohfNetcdfFile{id};
     int growing = 0;
     require(nc_inq(id, &counts->dimensions, &counts->variables, &counts->attributes, &growing));
+    require_outside_groups(id, counts->variables);
   });
 }
 

@@ -60,7 +60,10 @@ void describe_packing(Packing packing, std::size_t channels, int bits, SourceInf
   info.sample_type = SampleType::kInt32;
   info.z_scale = packing == Packing::kTerrarium ? 1.0 / 256.0 : 0.1;
   info.z_offset = packing == Packing::kTerrarium ? -32768.0 : -10000.0;
-  if (channels == 4) info.void_values = {static_cast<double>(kVoid)};
+  if (channels == 4) {
+    info.void_values = {static_cast<double>(kVoid)};
+    info.valid_min = static_cast<double>(kVoid) + 1.0;  // void whatever `void_values` say
+  }
 }
 
 void place_web_tile(SourceInfo& info) {
@@ -149,7 +152,7 @@ std::optional<Packing> PackingEvidence::decide(const std::string& names, SourceI
   }
   if (!is_grey()) {
     throw Error(
-        ErrorCode::kInvalidArgument,
+        ErrorCode::kUnsupported,
         fmt::format("{}: is a colour picture with channels {}; say which one holds elevations (`channel` R), or "
                     "how they are packed into all (`encoding` terrarium, mapbox or rgba-float)",
                     info.path, names));

@@ -292,7 +292,7 @@ class AsciiGridSource final : public FileSource {
     } else {
       header.read_void(info_);
     }
-    read_prj_beside(info_);
+    read_prj_beside(info_, 1);
     info_.block_width = info_.width;
     apply_open_options(info_, options);
   }

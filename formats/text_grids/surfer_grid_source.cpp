@@ -54,7 +54,7 @@ class SurferGridSource final : public PlainSource {
     } else {
       corrupt("does not begin as a Surfer grid does (DSAA, DSBB or DSRB)");
     }
-    read_prj_beside(info_);
+    read_prj_beside(info_, 1);
     info_.block_width = info_.width;
     info_.block_height = 1;
     apply_open_options(info_, options);

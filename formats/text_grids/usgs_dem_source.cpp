@@ -415,7 +415,7 @@ class UsgsDemSource final : public FileSource {
       const auto up = static_cast<std::ptrdiff_t>(static_cast<std::size_t>(window.columns) * sizeof(Sample));
       for (std::int64_t i = 0; i < window.rows; ++i, out -= up) {
         const std::int64_t post = south + i - profile.first;
-        std::int64_t value = kVoid;
+        auto value = static_cast<std::int64_t>(info_.void_values.front());  // where the profile has no post
         if (post >= begin && post < end) value = post_value(column, profile, post);
         const auto sample = static_cast<Sample>(value);
         if (sample != value) refuse_range(column, post, value);

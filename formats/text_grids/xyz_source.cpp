@@ -245,7 +245,10 @@ class XyzSource final : public PlainSource {
                        points_, info_.width, info_.height));
     }
     info_.sample_type = whole_ ? SampleType::kInt32 : SampleType::kFloat64;
-    if (whole_) info_.void_values = {static_cast<double>(kNoWhole)};
+    if (whole_) {
+      info_.void_values = {static_cast<double>(kNoWhole)};
+      info_.valid_min = static_cast<double>(kNoWhole) + 1.0;  // void whatever `void_values` say
+    }
     const auto size = static_cast<std::uint64_t>(size_bytes(info_.sample_type));
     layout_.from_south = true;
     if (by_columns_) {
@@ -265,7 +268,7 @@ class XyzSource final : public PlainSource {
     place.has_origin = true;
     place.origin_x = x.first();
     place.origin_y = y.first() + static_cast<double>(info_.height - 1) * y.step();
-    read_prj_beside(info_);
+    read_prj_beside(info_, 1);
     info_.block_width = info_.width;
     info_.block_height = by_columns_ ? std::min<std::int64_t>(info_.height, 64) : 1;
     apply_open_options(info_, options);

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <filesystem>
 #include <limits>
+#include <optional>
 
 #include "support/plain_tiff.h"
 #include "support/run_program.h"
@@ -24,12 +25,12 @@ class BadInput : public testing::Test {
  protected:
   /// Converts `input` and expects that it fails with one line holding all of `parts`, and leaves the folder as it was.
   void expect_refused(const std::string& input, const std::vector<std::string>& parts,
-                      const std::vector<std::string>& more = {}) {
+                      const std::vector<std::string>& more = {}, std::optional<int> code = std::nullopt) {
     const std::vector<std::string> before = folder.names();
     std::vector<std::string> arguments = {"convert", input, folder / "out.isohf"};
     arguments.insert(arguments.end(), more.begin(), more.end());
     const RunResult result = run_isohf(arguments);
-    EXPECT_THAT(result.exit_code, AnyOf(1, 2));
+    EXPECT_THAT(result.exit_code, AnyOf(code.value_or(1), code.value_or(2)));
     EXPECT_EQ(result.out, "");
     EXPECT_THAT(result.err, testing::StartsWith("isohf: "));
     EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
@@ -125,6 +126,19 @@ TEST_F(BadInput, OneRowOneColumnOneSample) {
     write_int16_tiff(folder / "thin.tif", width, height, level);
     expect_refused(folder / "thin.tif", {"thin.tif", std::to_string(width) + "x" + std::to_string(height), "2x2"});
   }
+}
+
+TEST_F(BadInput, AnInputAtFaultIsNoWrongUsage) {
+  write_int16_tiff(folder / "one.tif", 1, 1, [](std::int64_t, std::int64_t) { return std::int16_t{5}; });
+  expect_refused(folder / "one.tif", {"1x1"}, {}, 1);
+  write_float_tiff(folder / "nan.tif", 40, 30,
+                   [](std::int64_t, std::int64_t) { return std::numeric_limits<float>::quiet_NaN(); });
+  expect_refused(folder / "nan.tif", {"void"}, {}, 1);
+  expect_refused(folder / "nan.tif", {"void"}, {"--z-range", "0:1"}, 1);
+  write_hills("a.tif");
+  write_hills("b.tif");
+  expect_refused(folder / "a.tif", {"does not say where it lies"}, {folder / "b.tif", "-o", folder / "c.isohf"}, 1);
+  expect_refused(folder / "a.tif", {"found"}, {"--level", "77"}, 2);
 }
 
 TEST_F(BadInput, NoSamplesAtAll) {

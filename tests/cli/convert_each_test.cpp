@@ -1,7 +1,10 @@
 /// convert --each: one archive of each input, in one run.
 
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/file.h>
+#include <unistd.h>
 
 #include <csignal>
 #include <filesystem>
@@ -176,6 +179,31 @@ TEST_F(ConvertEach, SaysWhichOptionsAreForOneArchive) {
   }
   EXPECT_THAT(run_isohf({"convert", "a", "b", "--keep-going"}).err, HasSubstr("--keep-going needs --each"));
   EXPECT_THAT(run_isohf({"convert", "--each", "a"}).err, HasSubstr("--each needs --out-dir"));
+}
+
+TEST_F(ConvertEach, LeavesWhatAnotherRunMakesToIt) {
+  fs::create_directories(out_);
+  const std::string part = out_ + "/c.isohf.part";
+  write_text(part, "");
+  const int held = ::open(part.c_str(), O_RDWR);
+  ASSERT_EQ(::flock(held, LOCK_EX), 0);
+  const RunResult busy = each({"--skip-existing", "--keep-going", "--json"});
+  EXPECT_EQ(busy.exit_code, 0) << busy.err;
+  EXPECT_EQ(busy.err, "");
+  const std::vector<json> lines = lines_of(busy.out);
+  ASSERT_EQ(lines.size(), 7U);
+  EXPECT_EQ(lines[2].at("status"), "busy");
+  EXPECT_EQ(lines[6].at("summary").at("busy"), 1);
+  EXPECT_EQ(lines[6].at("summary").at("converted"), 5);
+  EXPECT_EQ(each({"--overwrite", "--keep-going"}).exit_code, 1);  // who did not ask to leave it
+  ::close(held);
+}
+
+TEST_F(ConvertEach, SaysWhyAFolderCannotBeMade) {
+  write_text(folder_ / "file", "");
+  const RunResult result = run_isohf({"convert", "--each", in_, "--out-dir", folder_ / "file/new"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.err, HasSubstr("cannot make the folder " + (folder_ / "file/new") + ": Not a directory"));
 }
 
 }  // namespace

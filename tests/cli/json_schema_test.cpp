@@ -165,6 +165,8 @@ TEST(JsonSchema, HoldsForEveryCommandsSuccessAndFailure) {
   documents.run(0, "experiment", {"experiment", "--quick", "--triangles", "1000", "-o", folder / "figures"});
   documents.run(2, "error", {"experiment", "--triangles", "5"});
   documents.run(0, "formats", {"formats"});
+  documents.run(0, "program", {"--version"});
+  documents.run(0, "program", {"--help"});
   test::write_file(folder / "note.txt", std::vector<std::byte>(9));
   documents.run(0, "attach", {"attach", a, folder / "note.txt"});
   documents.run(2, "error", {"attach", a, folder / "note.txt"});

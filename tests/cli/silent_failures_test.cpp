@@ -99,5 +99,71 @@ TEST_F(SilentFailures, LikeAGridWithoutAReferenceSystemKeepsItsPlace) {
   EXPECT_THAT(run({"restore", "a.isohf", "far.npy", "--like", "far.asc"}).err, HasSubstr("North-West corner"));
 }
 
+/// What a message says to type makes voids of what it names, and of what was void before.
+TEST_F(SilentFailures, TheNodataThatIsAskedForIsTakenAsItIsPrinted) {
+  const auto nodata_of = [](const std::string& text) {
+    const std::size_t at = text.find("--nodata ") + 9;
+    return text.substr(at, text.find_first_of(" \n", at) - at);
+  };
+  const auto voids_after = [&](const std::vector<std::string>& inputs, int exit_code) {
+    std::vector<std::string> arguments = {"convert", "-o", "x.isohf", "--overwrite", "--json"};
+    arguments.insert(arguments.end(), inputs.begin(), inputs.end());
+    const std::string said = run(arguments, exit_code).err;
+    EXPECT_THAT(said, HasSubstr("--nodata "));
+    arguments.insert(arguments.end(), {"--nodata", nodata_of(said)});
+    const RunResult mended = run(arguments);
+    EXPECT_THAT(mended.err, Not(HasSubstr("--nodata"))) << nodata_of(said);
+    const std::size_t at = mended.out.find("\"source_voids\"");
+    return at == std::string::npos ? std::string() : mended.out.substr(at, 60);
+  };
+  std::string points;
+  for (int i = 0; i < 600; ++i) {
+    if (i % 11 == 0 && i > 0) continue;  // 54 points are missing
+    points += std::to_string(i % 30) + " " + std::to_string(i / 30) + " " +
+              (i % 11 == 1 ? "-32768" : std::to_string(i)) + "\n";
+  }
+  write_file(folder / "miss.xyz", points);
+  EXPECT_THAT(voids_after({"miss.xyz"}, 0), HasSubstr("\"found\": 109,"));
+
+  std::ostringstream float_grid;
+  float_grid << "ncols 20\nnrows 20\nxllcorner 0\nyllcorner 0\ncellsize 10\nNODATA_value -9999\n";
+  for (int i = 0; i < 400; ++i)
+    float_grid << (i == 7 ? "-9999" : i == 99 ? "-3.4028235e38" : std::to_string(i) + ".5") << ' ';
+  write_file(folder / "stray.asc", float_grid.str());
+  EXPECT_THAT(voids_after({"stray.asc"}, 1), HasSubstr("\"found\": 2,"));
+}
+
+TEST_F(SilentFailures, GroundThatNoSourceOfAVrtCoversIsVoid) {
+  for (const char* name : {"p1", "p2"}) {
+    write_file(folder / (std::string(name) + ".asc"),
+               "ncols 4\nnrows 4\nxllcorner 0\nyllcorner 0\ncellsize 10\n9 8 7 6 5 4 3 2 9 8 7 6 5 4 3 2\n");
+  }
+  const auto source = [](const char* name, int at) {
+    return std::string("<SimpleSource><SourceFilename relativeToVRT=\"1\">") + name +
+           ".asc</SourceFilename><SourceBand>1</SourceBand><SrcRect xOff=\"0\" yOff=\"0\" xSize=\"4\" ySize=\"4\"/>"
+           "<DstRect xOff=\"" +
+           std::to_string(at) + "\" yOff=\"" + std::to_string(at) + "\" xSize=\"4\" ySize=\"4\"/></SimpleSource>";
+  };
+  const auto vrt = [&](const std::string& type, const std::string& nodata) {
+    write_file(folder / "a.vrt", "<VRTDataset rasterXSize=\"8\" rasterYSize=\"8\"><VRTRasterBand dataType=\"" + type +
+                                     "\" band=\"1\">" + nodata + source("p1", 0) + source("p2", 4) +
+                                     "</VRTRasterBand></VRTDataset>");
+  };
+  for (const char* type : {"Int16", "Float32", "Byte"}) {
+    for (const char* nodata : {"", "<NoDataValue>0</NoDataValue>"}) {
+      vrt(type, nodata);
+      for (const std::vector<std::string>& more : {std::vector<std::string>{}, {"--nodata", "9"}}) {
+        std::vector<std::string> arguments = {"info", "--stats", "a.vrt"};
+        arguments.insert(arguments.end(), more.begin(), more.end());
+        // Half of it, and the four nines that the option names.
+        EXPECT_THAT(run(arguments).out, HasSubstr(more.empty() ? "32 of them void" : "36 of them void"))
+            << type << nodata;
+      }
+    }
+  }
+  vrt("Int16", "");
+  EXPECT_THAT(run({"info", "a.vrt"}).out + run({"info", "a.vrt"}).err, HasSubstr("samples become int32"));
+}
+
 }  // namespace
 }  // namespace isohf::test

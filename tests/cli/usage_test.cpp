@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <map>
+#include <nlohmann/json.hpp>
 #include <regex>
 #include <set>
 
@@ -145,6 +146,21 @@ TEST(Usage, ReaderThatLeavesIsNoMessage) {
   const RunResult result = run_isohf({"plan"}, closed);
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_EQ(result.err, "");
+}
+
+TEST(Usage, VersionAndHelpAreDocumentsWhereTheseAreAskedFor) {
+  for (const std::vector<std::string>& arguments :
+       std::vector<std::vector<std::string>>{{"--json", "--version"}, {"info", "--json", "-V"}}) {
+    const nlohmann::json document = nlohmann::json::parse(run_isohf(arguments).out);
+    EXPECT_EQ(document.at("name"), "isohf");
+    EXPECT_EQ("isohf " + document.at("version").get<std::string>() + "\n", run_isohf({"-V"}).out);
+  }
+  for (const std::vector<std::string>& arguments :
+       std::vector<std::vector<std::string>>{{"--help"}, {"convert", "--help"}, {"help", "convert"}}) {
+    std::vector<std::string> asked = arguments;
+    asked.push_back("--json");
+    EXPECT_EQ(nlohmann::json::parse(run_isohf(asked).out).at("help"), run_isohf(arguments).out);
+  }
 }
 
 }  // namespace

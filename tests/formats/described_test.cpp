@@ -175,6 +175,24 @@ TEST_F(Netcdf, EveryMissingValueIsAVoidAlsoOfUnsignedSamples) {
   EXPECT_THAT(source->info().void_values, ElementsAre(65535, 65527));
 }
 
+TEST_F(Netcdf, ValuesOutsideTheValidRangeAreVoid) {
+  const std::string samples = stored<std::int16_t>({1, 1500, -9, 40}, true);
+  for (const auto& [key, list] : std::vector<std::pair<std::string, std::vector<double>>>{
+           {"valid_range", {0.0, 100.0}}, {"valid_min", {0.0}}, {"valid_max", {100.0}}}) {
+    NetcdfBytes file = netcdf_grid({1.0, 2.0}, {1.0, 0.0});
+    write("a.nc", file.variable("z", {0, 1}, 3, samples, {}, {{key, list}}).bytes());
+    const auto source = open("a.nc");
+    EXPECT_EQ(is_void(source->info(), 1500.0), key != "valid_min") << key;
+    EXPECT_EQ(is_void(source->info(), -9.0), key != "valid_max") << key;
+    EXPECT_FALSE(is_void(source->info(), 40.0)) << key;
+  }
+  NetcdfBytes file = netcdf_grid({1.0, 2.0}, {1.0, 0.0});
+  write("a.nc", file.variable("z", {0, 1}, 3, stored<std::int16_t>({1, -5536, -9, 4}, true), {{"_Unsigned", "true"}},
+                              {{"valid_range", {1.0, -5536.0}}})
+                    .bytes());
+  EXPECT_EQ(open("a.nc")->info().valid_max, 60000.0);
+}
+
 TEST_F(Netcdf, DegreesOfARotatedGridAreNone) {
   NetcdfBytes file = netcdf_grid({1.0, 2.0}, {1.0, 0.0});
   file.variable("rotated", {}, 3, "", {{"grid_mapping_name", "rotated_latitude_longitude"}});

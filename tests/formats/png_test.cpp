@@ -159,7 +159,7 @@ TEST(PngSource, WantsToKnowWhatTheColoursOfAPictureAre) {
     picture.bit_depth = depth;
     write_picture(path, picture);
     const Error error = error_of([&] { (void)open_png(path, {}); });
-    EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
+    EXPECT_EQ(error.code(), ErrorCode::kUnsupported);
     EXPECT_THAT(error.what(), HasSubstr("is a colour picture with channels R, G, B"));
     EXPECT_THAT(error.what(), HasSubstr("`channel` R"));
     EXPECT_THAT(error.what(), HasSubstr("`encoding` terrarium"));

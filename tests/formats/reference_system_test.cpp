@@ -4,12 +4,14 @@
 #include <gtest/gtest.h>
 
 #include <GeographicLib/UTMUPS.hpp>
+#include <bit>
 #include <cmath>
 #include <random>
 #include <thread>
 #include <vector>
 
 #include "formats/georeference/wkt.h"
+#include "formats/netcdf_bytes.h"
 #include "formats/reader_failure.h"
 #include "formats/registry.h"
 #include "formats/tiff/geotiff_keys.h"
@@ -367,6 +369,13 @@ TEST_F(UnderstandSystem, GroundUnderARectangleHasItsScalesAndItsPlaces) {
   EXPECT_NEAR(ground->worst_error, ground->most_scale - 1.0, 1e-12);
   EXPECT_NEAR(ground->worst_place.latitude, 45.0, 1e-9);
 
+  const auto plate = understand_system("+proj=eqc +datum=WGS84 +type=crs");
+  const MapPoint corner = plate->map_from_geo({180.0, 90.0});
+  const auto globe = ground_under(*plate, {-corner.easting, -corner.northing, corner.easting, corner.northing});
+  ASSERT_TRUE(globe);
+  EXPECT_LT(globe->mean_scale, 3.0);  // poles, which are lines of it, count for nothing
+  EXPECT_LT(globe->most_scale, 100.0);
+
   const auto polar = understand_system("EPSG:3413");
   const auto cap = ground_under(*polar, {-3e6, -3e6, 3e6, 3e6});
   ASSERT_TRUE(cap);
@@ -375,6 +384,81 @@ TEST_F(UnderstandSystem, GroundUnderARectangleHasItsScalesAndItsPlaces) {
   const auto fiji = ground_under(*mercator, {19.9e6, -2e6, 20.2e6, -1.8e6});
   ASSERT_TRUE(fiji);
   EXPECT_LT(fiji->extent.east - fiji->extent.west, 3.0);
+}
+
+TEST_F(UnderstandSystem, AGridMappingOfNetcdfWithoutWktIsOne) {
+  const TemporaryFolder folder;
+  const auto big_endian = [](const std::vector<double>& numbers) {
+    std::string bytes;
+    for (const double number : numbers) {
+      for (int shift = 56; shift >= 0; shift -= 8)
+        bytes += static_cast<char>(std::bit_cast<std::uint64_t>(number) >> static_cast<unsigned>(shift) & 0xFFU);
+    }
+    return bytes;
+  };
+  const auto system_of = [&](const std::string& kind,
+                             const std::vector<std::pair<std::string, std::vector<double>>>& of,
+                             const std::string& unit = "m") {
+    NetcdfBytes file;
+    file.dimension("y", 2).dimension("x", 2);
+    file.variable("x", {1}, 6, big_endian({500.0, 600.0}), {{"units", unit}});
+    file.variable("y", {0}, 6, big_endian({4600.0, 4500.0}), {{"units", unit}});
+    file.variable("map", {}, 3, "", {{"grid_mapping_name", kind}}, of);
+    write_file(folder / "a.nc", file.variable("z", {0, 1}, 3, std::string(8, '\1'), {{"grid_mapping", "map"}}).bytes());
+    const auto source = open_raster(folder / "a.nc", {});
+    EXPECT_TRUE(source->info().warnings.empty()) << source->info().warnings[0];
+    return understand_system(source->info().georeference.system.wkt);
+  };
+  const auto utm = system_of("transverse_mercator",
+                             {{"latitude_of_projection_origin", {0.0}},
+                              {"longitude_of_central_meridian", {9.0}},
+                              {"scale_factor_at_central_meridian", {0.9996}},
+                              {"false_easting", {500.0}},
+                              {"false_northing", {0.0}}},
+                             "km");
+  const auto known = understand_system("EPSG:32632");
+  EXPECT_NEAR(utm->map_from_geo({10.0, 45.0}).easting * 1000.0, known->map_from_geo({10.0, 45.0}).easting, 1e-5);
+  EXPECT_NEAR(utm->map_from_geo({10.0, 45.0}).northing * 1000.0, known->map_from_geo({10.0, 45.0}).northing, 1e-5);
+  const auto expect = [&](const std::string& kind, const std::vector<std::pair<std::string, std::vector<double>>>& of,
+                          const std::string& code, GeoPoint place) {
+    const MapPoint found = system_of(kind, of)->map_from_geo(place);
+    const MapPoint wanted = understand_system(code)->map_from_geo(place);
+    EXPECT_NEAR(found.easting, wanted.easting, 1e-3) << kind;
+    EXPECT_NEAR(found.northing, wanted.northing, 1e-3) << kind;
+  };
+  expect("polar_stereographic", {{"straight_vertical_longitude_from_pole", {-45.0}}, {"standard_parallel", {70.0}}},
+         "EPSG:3413", {-40.0, 75.0});
+  expect("polar_stereographic",
+         {{"latitude_of_projection_origin", {-90.0}},
+          {"standard_parallel", {-71.0}},
+          {"straight_vertical_longitude_from_pole", {0.0}}},
+         "EPSG:3031", {30.0, -75.0});
+  expect("lambert_azimuthal_equal_area",
+         {{"latitude_of_projection_origin", {52.0}},
+          {"longitude_of_projection_origin", {10.0}},
+          {"false_easting", {4321000.0}},
+          {"false_northing", {3210000.0}},
+          {"semi_major_axis", {6378137.0}},
+          {"inverse_flattening", {298.257222101}}},
+         "EPSG:3035", {6.0, 45.0});
+  expect("lambert_conformal_conic",
+         {{"standard_parallel", {49.0, 44.0}},
+          {"latitude_of_projection_origin", {46.5}},
+          {"longitude_of_central_meridian", {3.0}},
+          {"false_easting", {700000.0}},
+          {"false_northing", {6600000.0}},
+          {"semi_major_axis", {6378137.0}},
+          {"inverse_flattening", {298.257222101}}},
+         "EPSG:2154", {6.0, 45.0});
+  expect("albers_conical_equal_area",
+         {{"standard_parallel", {55.0, 65.0}},
+          {"latitude_of_projection_origin", {50.0}},
+          {"longitude_of_central_meridian", {-154.0}},
+          {"semi_major_axis", {6378137.0}},
+          {"inverse_flattening", {298.257222101}}},
+         "EPSG:3338", {-150.0, 60.0});
+  expect("mercator", {{"standard_parallel", {0.0}}, {"longitude_of_projection_origin", {150.0}}}, "EPSG:3832",
+         {160.0, 10.0});
 }
 
 GeoTags tags_of(const std::vector<std::uint16_t>& keys, const std::string& ascii = "") {

@@ -83,6 +83,29 @@ TEST_F(Xyz, MissingPointsAreVoid) {
   EXPECT_TRUE(is_void(whole->info(), values_of(*whole)[1]));
 }
 
+TEST_F(Xyz, MissingPointsStayVoidWhateverTheOptionSays) {
+  write_file(folder_ / "a.xyz", "0 0 1\n1 0 -9\n2 0 3\n0 1 4\n2 1 6\n");
+  OpenOptions options;
+  options.void_values = {-9.0};
+  const auto source = open_raster(folder_ / "a.xyz", options);
+  ASSERT_EQ(source->info().sample_type, SampleType::kInt32);
+  const std::vector<double> values = values_of(*source);
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    EXPECT_EQ(is_void(source->info(), values[i]), i == 1 || i == 4) << values[i];
+  }
+}
+
+TEST_F(Xyz, WhatGdalKeepsBesideIsRead) {
+  write_file(folder_ / "a.xyz.aux.xml",
+             "<PAMDataset><SRS>GEOGCS[\"WGS 84\",DATUM[\"WGS_1984\",SPHEROID[\"WGS 84\",6378137,298.257223563]],"
+             "PRIMEM[\"Greenwich\",0],UNIT[\"degree\",0.0174532925199433],AUTHORITY[\"EPSG\",\"4326\"]]</SRS>"
+             "<PAMRasterBand band=\"1\"><UnitType>ft</UnitType></PAMRasterBand></PAMDataset>");
+  const auto source = open("6 45 1\n6.5 45 2\n6 45.5 3\n6.5 45.5 4\n");
+  EXPECT_EQ(source->info().georeference.unit, HorizontalUnit::kDegree);
+  EXPECT_EQ(source->info().georeference.system.epsg, 4326);
+  EXPECT_EQ(source->info().vertical_unit, "foot");
+}
+
 TEST_F(Xyz, CoordinatesMayBeRounded) {
   std::string text;
   for (int row = 0; row < 40; ++row) {

@@ -3,9 +3,11 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 #include <sstream>
 #include <string_view>
 
+#include "output/json_output.h"
 #include "output/standard_output.h"
 #include "output/terminal.h"
 
@@ -36,16 +38,20 @@ std::string wrapped(std::string_view text, std::size_t indent, std::size_t width
   return out;
 }
 
+std::string heading_of(const std::string& text) {
+  return telling().json ? text : styled(text, Style::kHeading, STDOUT_FILENO);
+}
+
 }  // namespace
 
 void HelpPage::usage(const std::string& call) {
-  (page_ += '\n') += styled("Usage:", Style::kHeading, STDOUT_FILENO);
+  (page_ += '\n') += heading_of("Usage:");
   (((page_ += ' ') += call) += '\n');
 }
 
 void HelpPage::heading(const std::string& text) {
   if (!page_.empty()) page_ += '\n';
-  page_ += styled(text, Style::kHeading, STDOUT_FILENO);
+  page_ += heading_of(text);
   page_ += '\n';
 }
 
@@ -65,7 +71,7 @@ void HelpPage::text(const std::string& text) {
       continue;
     }
     if (!line.empty() && lines.ends_with(":")) {
-      (page_ += styled(lines, Style::kHeading, STDOUT_FILENO)) += '\n';
+      (page_ += heading_of(lines)) += '\n';
       lines.clear();
     }
     paragraph(lines);
@@ -87,7 +93,11 @@ void HelpPage::row(const std::string& name, const std::string& description) {
 
 void HelpPage::print() const {
   StandardOutput out;
-  out.write_styled(page_);
+  if (telling().json) {
+    out.write(json_text({{"name", program_name()}, {"version", ISOHF_VERSION}, {"help", page_}}));
+  } else {
+    out.write_styled(page_);
+  }
   out.finish();
 }
 

@@ -210,6 +210,29 @@ std::vector<EachFile> checked_files(const ConvertCommandOptions& options) {
   return files;
 }
 
+/// Throws Error where the archive is not complete.
+EachResult skipped(const EachFile& file) {
+  const ArchiveReader complete(file.output);
+  return {EachResult::State::kSkipped, json_line(json_of_complete(file.input, file.output, "skipped")), {}};
+}
+
+/// What became of a file that failed because another run makes its archive, or just has; nullopt where none does.
+std::optional<EachResult> made_by_another(const EachFile& file) {
+  try {
+    if (File part(file.output + ".part", File::Mode::kRead); !part.try_lock()) {
+      return EachResult{EachResult::State::kBusy,
+                        json_line({{"input", file.input}, {"output", file.output}, {"status", "busy"}}),
+                        {}};
+    }
+  } catch (const Error&) {  // there is no part
+  }
+  try {
+    return skipped(file);
+  } catch (const Error&) {
+    return std::nullopt;
+  }
+}
+
 /// One of --each; nullopt where the share is too small for it.
 std::optional<EachResult> convert_one(ConvertCommandOptions options, const EachFile& file, const EachShare& share) {
   /// What one thread does in a fraction of a second.
@@ -222,9 +245,7 @@ std::optional<EachResult> convert_one(ConvertCommandOptions options, const EachF
   std::error_code none;
   if (options.each.skip_existing && std::filesystem::exists(output, none)) {
     try {
-      const ArchiveReader complete(file.output);
-      return EachResult{
-          EachResult::State::kSkipped, json_line(json_of_complete(file.input, file.output, "skipped")), {}};
+      return skipped(file);
     } catch (const Error& error) {
       if (!options.convert.overwrite) {
         throw Error(error.code(), {file.output, std::string("is no complete archive: ") + error.what(), "",
@@ -232,7 +253,14 @@ std::optional<EachResult> convert_one(ConvertCommandOptions options, const EachF
       }
     }
   }
-  std::filesystem::create_directories(output.parent_path(), none);  // what fails is said next
+  std::error_code failure;
+  std::filesystem::create_directories(output.parent_path(), failure);
+  if (failure && !std::filesystem::exists(output.parent_path(), none)) {
+    throw Error(
+        ErrorCode::kIo,
+        {file.output, fmt::format("cannot make the folder {}: {}", output.parent_path().string(), failure.message()),
+         "", ""});
+  }
   check_archive_output({file.input}, file.output, options.convert.overwrite || options.convert.resume);
   const Prepared prepared = prepare(options, {file.input});
   const SourceInfo& info = prepared.source->info();
@@ -259,7 +287,16 @@ std::optional<EachResult> convert_one(ConvertCommandOptions options, const EachF
 int run_each(const ConvertCommandOptions& options) {
   return convert_each(
       checked_files(options), options.each, options.work, options.common,
-      [&](const EachFile& file, const EachShare& share) { return convert_one(options, file, share); },
+      [&](const EachFile& file, const EachShare& share) {
+        try {
+          return convert_one(options, file, share);
+        } catch (const Error& error) {
+          if (!options.each.skip_existing || error.code() == ErrorCode::kCancelled) throw;
+          std::optional<EachResult> result = made_by_another(file);
+          if (!result) throw;
+          return result;
+        }
+      },
       watch_interrupts());
 }
 
@@ -309,9 +346,7 @@ int run(ConvertCommandOptions options) {
       return convert(source, options.output, options.convert, job);
     } catch (const Error& error) {
       if (error.code() != ErrorCode::kCancelled) throw;
-      throw Error(ErrorCode::kCancelled,
-                  {options.output, "interrupted", "",
-                   "the same command with --resume goes on with what is in " + options.output + ".part"});
+      throw interrupted(options.output, "the same command with --resume");
     }
   }();
   display.reset();

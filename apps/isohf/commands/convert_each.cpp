@@ -107,7 +107,7 @@ class Batch {
   int finish() {
     if (fault_) std::rethrow_exception(fault_);
     display_.clear();
-    const std::size_t begun = converted_ + complete_ + skipped_ + failed_.size();
+    const std::size_t begun = converted_ + complete_ + skipped_ + busy_ + failed_.size();
     const double seconds = std::chrono::duration<double>(Clock::now() - started_).count();
     if (common_.json) {
       out_.write(json_line({{"summary",
@@ -115,6 +115,7 @@ class Batch {
                               {"converted", converted_},
                               {"complete", complete_},
                               {"skipped", skipped_},
+                              {"busy", busy_},
                               {"failed", failed_.size()},
                               {"not_done", files_.size() - begun},
                               {"seconds", seconds}}}}));
@@ -126,6 +127,7 @@ class Batch {
       };
       add(complete_, "complete before");
       add(skipped_, "skipped");
+      add(busy_, "being made by another run");
       add(failed_.size(), "failed");
       add(files_.size() - begun, "not done");
       out_.write(text + " in " + describe_seconds(seconds) + "\n");
@@ -146,7 +148,10 @@ class Batch {
     ordered_json document = {{"input", file.input}, {"output", file.output}};
     if (const auto* result = std::get_if<EachResult>(&outcome); result != nullptr) {
       using State = EachResult::State;
-      (result->state == State::kConverted ? converted_ : result->state == State::kComplete ? complete_ : skipped_) += 1;
+      (result->state == State::kConverted  ? converted_
+       : result->state == State::kComplete ? complete_
+       : result->state == State::kSkipped  ? skipped_
+                                           : busy_) += 1;
       if (!result->warnings.empty()) display_.clear();
       for (const Warning& warning : result->warnings) {
         const bool names_it = warning.find(file.input) != std::string::npos;
@@ -180,6 +185,7 @@ class Batch {
   std::size_t converted_ = 0;
   std::size_t complete_ = 0;
   std::size_t skipped_ = 0;
+  std::size_t busy_ = 0;
   std::vector<Error> failed_;
   bool stopped_ = false;
   bool interrupted_ = false;

@@ -41,7 +41,7 @@ struct EachShare {
 
 /// What became of a file.
 struct EachResult {
-  enum class State { kConverted, kComplete, kSkipped };
+  enum class State { kConverted, kComplete, kSkipped, kBusy };
   State state = State::kConverted;
   std::string document;  ///< JSON members on one line
   std::vector<Warning> warnings;

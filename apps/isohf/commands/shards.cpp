@@ -264,8 +264,7 @@ int convert_shard_of(const Arguments& arguments) {
                            job_from(command->work, *display));
     } catch (const Error& error) {
       if (error.code() != ErrorCode::kCancelled) throw;
-      throw Error(ErrorCode::kCancelled, {command->output, "interrupted", "",
-                                          "the same command goes on with what is in " + command->output + ".part"});
+      throw interrupted(command->output, "the same command");
     }
   }();
   display.reset();

@@ -283,4 +283,12 @@ std::uint64_t peak_memory_bytes() {
   return static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;
 }
 
+Error interrupted(const std::string& output, const std::string& again) {
+  const std::string part = output + ".part";
+  std::error_code none;
+  return {ErrorCode::kCancelled,
+          {output, std::filesystem::exists(part, none) ? "interrupted" : "interrupted before anything was written", "",
+           std::filesystem::exists(part, none) ? again + " goes on with what is in " + part : ""}};
+}
+
 }  // namespace isohf::cli

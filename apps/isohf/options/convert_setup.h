@@ -58,4 +58,7 @@ struct Prepared {
 /// The largest resident set so far. getrusage() would also count the program that started this one.
 [[nodiscard]] std::uint64_t peak_memory_bytes();
 
+/// Why making `output` ended; `again`, a command, where there is a part that it goes on with.
+[[nodiscard]] Error interrupted(const std::string& output, const std::string& again);
+
 }  // namespace isohf::cli

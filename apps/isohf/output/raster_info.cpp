@@ -110,10 +110,10 @@ std::string describe_registration(const RasterInfo& raster) {
 
 std::string describe_voids(const SourceInfo& info) {
   std::string text;
-  for (const double value : info.void_values) text += fmt::format("{:.10g}, ", value);
+  for (const double value : info.void_values) text += fmt::format("{}, ", value);
   if (is_floating(info.sample_type)) text += "NaN and infinities, ";
   if (std::isfinite(info.valid_min) || std::isfinite(info.valid_max)) {
-    text += fmt::format("samples outside {:.9g} to {:.9g}, ", info.valid_min, info.valid_max);
+    text += fmt::format("samples outside {} to {}, ", info.valid_min, info.valid_max);
   }
   if (text.empty()) return "none declared";
   return text.substr(0, text.size() - 2);

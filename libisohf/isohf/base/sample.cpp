@@ -1,13 +1,17 @@
 #include "isohf/base/sample.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <vector>
 
 #include "isohf/base/assert.h"
+#include "isohf/base/void_values.h"
 #include "isohf/error.h"
 
 namespace isohf {
@@ -317,6 +321,13 @@ void heights_from_samples(const SourceInfo& info, double datum, std::span<const 
                           std::span<float> heights) {
   ISOHF_ASSERT(raw.size() == heights.size() * size_bytes(info.sample_type));
   with_stored_type(info.sample_type, [&](auto sample) { convert<decltype(sample)>(info, datum, raw.data(), heights); });
+}
+
+std::string void_values_with(const SourceInfo& info, std::vector<double> values) {
+  // What is declared goes on to mean it, but what a range makes void anyway; as many digits as make the same number.
+  const auto is_void_anyway = [&](double value) { return !(value >= info.valid_min && value <= info.valid_max); };
+  std::ranges::remove_copy_if(info.void_values, std::inserter(values, values.begin()), is_void_anyway);
+  return fmt::format("`void_values` {}", fmt::join(values, ","));
 }
 
 }  // namespace isohf

@@ -250,7 +250,7 @@ void check_statistics(const Conversion& conversion, const TileStatistics& all, b
   const std::string& path = conversion.source.info().path;
   const ConvertOptions& options = conversion.options;
   if (all.voids == all.vertices && !may_be_void) {
-    throw Error(ErrorCode::kInvalidArgument,
+    throw Error(ErrorCode::kUnsupported,
                 fmt::format("{}: every one of the {} lattice vertices is void, nothing to write", path, all.vertices));
   }
   const double worst = all.worst_rounding + conversion.height_error;

@@ -37,6 +37,8 @@ double rounded(double value, double grain) {
 }
 constexpr double kDegreeGrain = 1e-8;
 constexpr double kScaleGrain = 1e-7;
+/// Of a scale: more is that of a place that the map draws as a line.
+constexpr double kBoundless = 1e6;
 
 GeoPoint rounded(const GeoPoint& place) {
   return {rounded(place.longitude, kDegreeGrain), rounded(place.latitude, kDegreeGrain)};
@@ -133,7 +135,7 @@ std::optional<MapGround> ground_under(const ReferenceMap& map, const MapBounds& 
       if (!std::isfinite(first.longitude)) first = geo;
       include(ground.extent, first, geo);
       const PlaceScale scale = scale_at(map, place);
-      if (!std::isfinite(scale.areal)) continue;
+      if (!(scale.most < kBoundless)) continue;  // a pole that is a line
       ++count;
       sum += scale.mean();
       ground.least_scale = std::min(ground.least_scale, scale.least);

@@ -331,7 +331,8 @@ double band_rows(const Plan& plan) {
 Plan make_plan(const SourceInfo& info, const PlanRequest& request) {
   check(request);
   if (info.width < 2 || info.height < 2) {
-    refuse(fmt::format("{}: {}x{} samples, a surface needs at least 2x2", info.path, info.width, info.height));
+    throw Error(ErrorCode::kUnsupported,
+                fmt::format("{}: {}x{} samples, a surface needs at least 2x2", info.path, info.width, info.height));
   }
   const SourceFrame frame = make_source_frame(info, request.ground);
   const bool may_fit =

@@ -39,7 +39,8 @@ void check_latitudes(const SourceInfo& info) {
   const double south = place.origin_y - place.spacing_y * static_cast<double>(info.height - 1);
   const double most = 90.0 + 0.51 * place.spacing_y;
   if (place.origin_y <= most && south >= -most) return;
-  refuse(
+  throw Error(
+      ErrorCode::kUnsupported,
       fmt::format("{}: reaches from latitude {:.8g} to {:.8g}, beyond a pole; projections need latitudes from -90 to "
                   "90",
                   info.path, south, place.origin_y));

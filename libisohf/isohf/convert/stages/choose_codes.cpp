@@ -179,7 +179,7 @@ bool choose_codes_by(Conversion& conversion, const RangeScan& scan, bool may_cut
   const SourceInfo& info = conversion.source.info();
   SourceScan found = scan.samples;
   if (found.valid == 0) {
-    throw Error(ErrorCode::kInvalidArgument,
+    throw Error(ErrorCode::kUnsupported,
                 fmt::format("{}: all {} samples are void or not finite, there is no elevation to convert", info.path,
                             found.voids));
   }

@@ -9,7 +9,10 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <map>
+#include <mutex>
 #include <numbers>
+#include <tuple>
 #include <utility>
 
 #include "isohf/base/assert.h"
@@ -212,6 +215,16 @@ Prefilter::Prefilter(std::vector<double> taps, int border, double worst_gain, Ed
     : taps_(std::move(taps)), border_(taps_.size() == 1 ? 0 : border), edges_(edges), worst_gain_(worst_gain) {}
 
 Prefilter Prefilter::make(Filter filter, const Acquisition& acquisition, Edges edges) {
+  // A conversion asks several times for the same, and many conversions do: it takes longer than a small raster.
+  static std::mutex mutex;
+  static std::map<std::tuple<Filter, Acquisition::Kind, double, Edges>, Prefilter> made;
+  constexpr std::size_t kMostMade = 16;
+  const std::tuple key(filter, acquisition.kind, acquisition.sigma, edges);
+  const bool is_kept = acquisition.kind != Acquisition::Kind::kFir;  // that of a file may change
+  if (is_kept) {
+    const std::lock_guard lock(mutex);
+    if (const auto found = made.find(key); found != made.end()) return found->second;
+  }
   const Kernel kernel = Kernel::make(filter);
   const std::vector<double> response = sampled_response(kernel, with_taps(acquisition));
   const std::vector<double> at_points = sampled_response(kernel, Acquisition{});
@@ -261,7 +274,13 @@ Prefilter Prefilter::make(Filter filter, const Acquisition& acquisition, Edges e
                                                          to_string(acquisition), kLongestHalo));
   }
   if (taps.size() == 1) taps[0] = 1.0;
-  return {std::move(taps), (kernel.taps() + 1) / 2, worst_gain, edges};
+  Prefilter prefilter(std::move(taps), (kernel.taps() + 1) / 2, worst_gain, edges);
+  if (is_kept) {
+    const std::lock_guard lock(mutex);
+    if (made.size() == kMostMade) made.clear();
+    made.emplace(key, prefilter);
+  }
+  return prefilter;
 }
 
 void Prefilter::filter_rows(View2D<float> band, bool wraps) const {

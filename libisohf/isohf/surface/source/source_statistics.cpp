@@ -9,6 +9,7 @@
 #include <type_traits>
 
 #include "isohf/base/sample.h"
+#include "isohf/base/void_values.h"
 
 namespace isohf {
 namespace {
@@ -239,16 +240,15 @@ std::string SourceSurvey::warning() const {
     if (warning.kind == Warning::Kind::kUndeclaredNodata) return {};
   }
   std::string values;
-  std::string list;  // what is declared goes on to mean it
-  for (const double value : info_.void_values) list += fmt::format("{:.9g},", value);
+  std::vector<double> list;
   for (const UndeclaredVoid& found : undeclared_voids()) {
-    list += fmt::format("{}{:.9g}", values.empty() ? "" : ",", found.value);
+    list.push_back(found.value);
     values += fmt::format("{}{} samples hold {:.9g}{}", values.empty() ? "" : ", ", found.count, found.value,
                           found.many_values ? " or the like" : "");
   }
   if (values.empty()) return {};
-  return fmt::format("{}, far from all others ({:.6g} to {:.6g}): if that means no elevation, give `void_values` {}",
-                     values, others_.range.min, others_.range.max, list);
+  return fmt::format("{}, far from all others ({:.6g} to {:.6g}): if that means no elevation, give {}", values,
+                     others_.range.min, others_.range.max, void_values_with(info_, list));
 }
 
 }  // namespace isohf
