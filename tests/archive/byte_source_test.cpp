@@ -30,7 +30,7 @@ TileGrid small_grid() {
 }
 /// More tiles than opening sees of the file's end.
 TileGrid large_grid() {
-  return TileGrid::make(TileShape::make(5, 5, 1), 200, 100, 100.0, 100.0);
+  return TileGrid::make(TileShape::make(5, 5, 1), 100, 60, 100.0, 100.0);
 }
 
 void expect_all_tiles(const ArchiveReader& reader) {
@@ -90,7 +90,7 @@ TEST(ByteSource, ReadsASmallArchiveInOneRange) {
 
 TEST(ByteSource, OpensALargeArchiveInTwoRangesAndReadsATileInTwoOrOne) {
   const std::vector<std::byte> bytes = archive_bytes(large_grid());
-  ASSERT_GT(bytes.size(), 4U << 20U);
+  ASSERT_GT(bytes.size(), 1U << 20U);
   const auto source = std::make_shared<TestSource>(bytes);
   const ArchiveReader reader(source, "large");
   EXPECT_EQ(source->ranges, 2U);

@@ -25,7 +25,7 @@ namespace {
 /// Of each file; ISOHF_MUTATIONS asks for another number.
 int mutations() {
   const char* wanted = std::getenv("ISOHF_MUTATIONS");
-  return wanted != nullptr ? std::stoi(wanted) : 10000;
+  return wanted != nullptr ? std::stoi(wanted) : 2000;
 }
 constexpr unsigned kSeed = 20040808;
 
@@ -144,7 +144,7 @@ TEST_P(ReaderMutation, RefusesOrReadsEveryTruncation) {
   }
 }
 
-TEST_P(ReaderMutation, SurvivesTenThousandDamagedFiles) {
+TEST_P(ReaderMutation, SurvivesDamagedFiles) {
   const ReaderCase& each = tested();
   const auto found = std::filesystem::path(ISOHF_SOURCE_DIR) / "tests/fuzz/corpus/reader" / each.name;
   if (std::filesystem::is_directory(found)) {  // by scripts/fuzz

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "isohf/error.h"
+#include "isohf/job.h"
 
 namespace isohf {
 
@@ -163,7 +164,7 @@ struct OpenOptions {
   /// What all files that are open at once may hold of the contents that they have packed (.gz, .zip): contents that
   /// do not fit are unpacked piece by piece whenever they are read.
   std::uint64_t unpacked_bytes = std::uint64_t{256} << 20U;
-  VoidTreatment voids;  ///< for whoever wraps the source in a FilledSource; open_raster does not
+  VoidTreatment voids;  ///< for with_voids_treated(), which is for the caller: open_raster leaves voids as they are
 };
 
 /// Opens a raster of elevations by its content, not by its name: the file's first bytes pick the reader; the extension
@@ -173,8 +174,14 @@ struct OpenOptions {
 /// there are).
 [[nodiscard]] std::unique_ptr<HeightSource> open_raster(const std::string& path, const OpenOptions& options);
 
-/// Names a folder in which the OpenImageIO module is looked for first; empty: only beside the program and in
-/// ../lib/isohf. A program calls it before it opens anything.
+/// `source` itself where nothing is to be treated, else one whose elevations outside the valid range are void and whose
+/// voids are filled; holds rows in a scratch file where they would take more than a third of the job's memory. Throws
+/// Error{kInvalidArgument} where the valid range leaves nothing or the distance is beyond kMaxFillDistance.
+[[nodiscard]] std::unique_ptr<HeightSource> with_voids_treated(std::unique_ptr<HeightSource> source,
+                                                               const VoidTreatment& treatment, const Job& job = {});
+
+/// Names a folder in which the modules (OpenImageIO, PROJ, netCDF-4) are looked for first; empty: only beside the
+/// program and in ../lib/isohf. A program calls it before it opens anything.
 void set_module_folder(const std::string& folder);
 
 }  // namespace isohf

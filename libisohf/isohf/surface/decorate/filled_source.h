@@ -81,9 +81,4 @@ class FilledSource final : public HeightSource {
 /// What a FilledSource with this info() holds at most, beyond its source; 0 for an info that says nothing of treatment.
 [[nodiscard]] std::uint64_t fill_memory_bytes(const SourceInfo& info, bool in_scratch);
 
-/// `source` itself where nothing is to be treated, else a FilledSource of it, with a scratch file where it would take
-/// more than a third of the job's memory.
-[[nodiscard]] std::unique_ptr<HeightSource> with_voids_treated(std::unique_ptr<HeightSource> source,
-                                                               const VoidTreatment& treatment, const Job& job);
-
 }  // namespace isohf
