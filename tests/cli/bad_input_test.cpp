@@ -137,7 +137,9 @@ TEST_F(BadInput, AnInputAtFaultIsNoWrongUsage) {
   expect_refused(folder / "nan.tif", {"void"}, {"--z-range", "0:1"}, 1);
   write_hills("a.tif");
   write_hills("b.tif");
-  expect_refused(folder / "a.tif", {"does not say where it lies"}, {folder / "b.tif", "-o", folder / "c.isohf"}, 1);
+  const RunResult mosaic = run_isohf({"convert", folder / "a.tif", folder / "b.tif", "-o", folder / "c.isohf"});
+  EXPECT_EQ(mosaic.exit_code, 1);
+  EXPECT_THAT(mosaic.err, HasSubstr("does not say where it lies"));
   expect_refused(folder / "a.tif", {"found"}, {"--level", "77"}, 2);
 }
 
