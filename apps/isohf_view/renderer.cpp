@@ -220,7 +220,7 @@ double Renderer::level_of(const ViewState& view, PlaneTile at) const {
     const TileVolume box = tile_volume(grid, at.tile, source_.plane(at.plane).bounds(at.tile), view);
     const double distance = at.plane == 0 ? length(0.5 * (box.low + box.high)) : box.distance();
     level = fractional_level(projected_area_px(triangle_area(source_.grid(), 1.0), view.focal_px(), distance), levels,
-                             view.triangle_px);
+                             view.triangle_px * view.coarser);
   }
   return view.plain_switching ? std::round(level) : level;
 }

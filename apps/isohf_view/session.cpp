@@ -34,18 +34,21 @@ double default_softness(const TileBounds& whole) {
   return range > 0.0 ? std::min(2.0, 0.005 * range) : 2.0;
 }
 
-const std::vector<std::string> kHelpLines{"drag left   move the ground      wheel         nearer, farther",
-                                          "drag right  turn about it        double click  go there",
-                                          "W A S D, arrows  fly   Q E  down, up   Shift, Ctrl  fast, slow",
-                                          "C or Alt  left button looks round      Y  measure from here, to here",
-                                          "Tab  the other archive",
-                                          "Home  all   N  North up   T  from above   R  back to the start",
-                                          "J L  sun round   I K  sun up and down   U  shadows",
-                                          "O  the sun of a day   , .  earlier, later: or drag the slider",
-                                          "+ -  vertical exaggeration     [ ]  far distance",
-                                          "M  colours       X  wires      B  tile borders",
-                                          "G  fade or switch levels       Z  haze   V  beyond the source",
-                                          "P  picture       F  figures    H  this help     Esc  end"};
+const std::vector<std::string> kHelpLines{"left drag    move the ground         wheel         zoom",
+                                          "right drag   orbit                   double click  fly there",
+                                          "W A S D      fly, arrows too         Q E           down, up",
+                                          "Shift, Ctrl  faster, slower          C, Alt        left drag looks around",
+                                          "Home         the whole terrain       R             first view",
+                                          "N            North up                T             from above",
+                                          "J L          turn the sun            I K           raise, lower it",
+                                          "O            sun of a day            , .           earlier, later",
+                                          "U            shadows                 Z             haze",
+                                          "M            colours                 + -           exaggeration",
+                                          "Y            measure from, to        Tab           other archive",
+                                          "X            wireframe               B             tile borders",
+                                          "G            fade or switch levels   V             beyond the source",
+                                          "[ ]          far distance            F             more, no figures",
+                                          "P            save a picture          H, Esc        help, quit"};
 
 const char* mode_name(ColourMode mode) {
   constexpr const char* kNames[] = {"elevation", "plain",   "levels of detail", "strip order",
@@ -279,30 +282,33 @@ bool Session::is_settled() const {
 void Session::draw_overlay(const Shown& shown) {
   Reading reading;
   if (shown.help) reading.help = kHelpLines;
-  if (shown.figures) {
+  if (shown.figures != Figures::kNone) {
     const TileBoxFigures& box = boxes_.figures();
     const Vec3 eye = eye_in_archive();
     std::vector<std::string>& lines = reading.figures;
-    lines = {fmt::format("{:5.1f} fps   {} triangles   {} draw calls", shown.frames_per_second,
-                         cli::describe_count(figures_.triangles), figures_.draw_calls),
-             fmt::format("{} tiles drawn, {} resident, {} to come, {:.1f} MiB", figures_.visible_tiles,
-                         box.resident_tiles, box.missing_tiles, static_cast<double>(box.resident_bytes) / (1 << 20)),
-             fmt::format("eye x {:.7g}  y {:.0f}  z {:.7g}   {}", eye.x, eye.y, eye.z, mode_name(view.mode)),
-             fmt::format("sun {:.0f}, {:.0f} deg   heights x {:.3g}   H help", sun_azimuth_deg, sun_elevation_deg,
-                         view.exaggeration),
-             shadow_line(),
-             driver_};
+    if (shown.figures == Figures::kAll) {
+      lines = {fmt::format("{:5.1f} fps   {} triangles   {} draw calls", shown.frames_per_second,
+                           cli::describe_count(figures_.triangles), figures_.draw_calls),
+               fmt::format("{} tiles drawn, {} resident, {} to come, {:.1f} MiB", figures_.visible_tiles,
+                           box.resident_tiles, box.missing_tiles, static_cast<double>(box.resident_bytes) / (1 << 20)),
+               fmt::format("eye at x {:.7g}  y {:.0f}  z {:.7g}", eye.x, eye.y, eye.z),
+               fmt::format("colours: {}", mode_name(view.mode)),
+               shadow_line(),
+               driver_};
+      if (shows_textures()) {
+        const TextureBoxFigures& textures = textures_->figures();
+        lines.push_back(fmt::format("{} textures resident, {} to come, {:.1f} MiB", textures.resident, textures.to_come,
+                                    static_cast<double>(textures.resident_bytes) / (1 << 20)));
+      }
+    }
+    lines.push_back(fmt::format("sun {:.0f}, {:.0f} deg   heights x {:.3g}   H: help", sun_azimuth_deg,
+                                sun_elevation_deg, view.exaggeration));
     if (time_) {
       lines.push_back(fmt::format("{:04}-{:02}-{:02}, mean solar time", time_->year, time_->month, time_->day));
     }
-    if (shows_textures()) {
-      const TextureBoxFigures& textures = textures_->figures();
-      lines.push_back(fmt::format("{} textures resident, {} to come, {:.1f} MiB", textures.resident, textures.to_come,
-                                  static_cast<double>(textures.resident_bytes) / (1 << 20)));
-      if (textures_->error()) lines.push_back(textures_->error()->substr(0, 100));
-    }
+    if (shows_textures() && textures_->error()) lines.push_back(*textures_->error());
     if (cut_) lines.push_back(fmt::format("far distance cut to {:.0f} by --memory", box.radius));
-    if (boxes_.error()) lines.push_back(boxes_.error()->substr(0, 100));
+    if (boxes_.error()) lines.push_back(*boxes_.error());
     lines.insert(lines.end(), shown.place.begin(), shown.place.end());
     if (view.mode == ColourMode::kElevation || view.mode == ColourMode::kDifference) reading.colours = legend_.stops;
     reading.low = legend_.low;

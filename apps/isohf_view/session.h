@@ -32,9 +32,10 @@ class Session {
   /// Changes the far distance by a factor.
   void scale_far(double factor) { far_distance_ = view.far_distance * factor; }
   /// What a person reads over the frame.
+  enum class Figures { kNone, kPlace, kAll };  ///< kPlace: what a person asks the ground; kAll: how it is drawn as well
   struct Shown {
     double frames_per_second = 0.0;
-    bool figures = true;
+    Figures figures = Figures::kPlace;
     bool help = false;
     std::vector<std::string> place;  ///< under the cursor
     double middle_distance = 0.0;    ///< of the ground in the middle of the picture; 0: there is none

@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "actions.h"
+#include "formats/registry.h"
 #include "gl/offscreen.h"
 #include "interrupt.h"
 #include "isohf/error.h"
@@ -179,7 +180,7 @@ class Controls {
   /// As drawn, without exaggeration.
   [[nodiscard]] double height_above_ground() { return steering_.height_above_ground() / session_.view.exaggeration; }
 
-  bool show_figures = true;
+  Session::Figures show_figures = Session::Figures::kPlace;
   bool show_help = false;
   bool wants_picture = false;
   bool wants_other = false;  ///< the other archive
@@ -278,7 +279,10 @@ class Controls {
       case GLFW_KEY_F1:
         return toggle(show_help);
       case GLFW_KEY_F:
-        return toggle(show_figures);
+        show_figures = show_figures == Session::Figures::kPlace ? Session::Figures::kAll
+                       : show_figures == Session::Figures::kAll ? Session::Figures::kNone
+                                                                : Session::Figures::kPlace;
+        return;
       case GLFW_KEY_TAB:
         wants_other = true;
         return;
@@ -386,7 +390,8 @@ class Scenes {
     if (options.difference) names_.insert(names_.begin(), names_.front());
     scenes_.resize(names_.size());
     show(0, std::make_unique<Scene>(std::move(first), window_, options_));
-    now().controls.show_figures = options.overlay;
+    if (!options.overlay) now().controls.show_figures = Session::Figures::kNone;
+    require_common_map();
   }
 
   [[nodiscard]] Scene& now() { return *scenes_[at_]; }
@@ -397,7 +402,11 @@ class Scenes {
       const std::string name = std::exchange(now().controls.dropped, "");
       attempt(name, [&] { drop(name); });
     }
-    if (std::exchange(now().controls.wants_other, false) && names_.size() > 1) {
+    if (std::exchange(now().controls.wants_other, false)) {
+      if (names_.size() == 1) {
+        now().controls.message = "this is the only archive; isohf view A B shows two";
+        return;
+      }
       attempt(names_[(at_ + 1) % names_.size()], [&] { go_to((at_ + 1) % names_.size()); });
     }
     const auto time = std::chrono::steady_clock::now();
@@ -418,6 +427,16 @@ class Scenes {
  private:
   static constexpr std::chrono::seconds kLookAgain{1};
 
+  /// Throws Error where another archive lies on no map of the first's: now, not when it is asked for. Rasters are
+  /// converted when they are looked at, and are held against it then.
+  void require_common_map() {
+    for (std::size_t i = 1; i < names_.size() && !options_.difference; ++i) {
+      if (native_format_of(names_[i], {}) != nullptr) continue;
+      const std::unique_ptr<TileSource> other = open_archive(names_[i]);
+      static_cast<void>(WorldJoin(*now().opened.source->archive(), *other->archive()));
+    }
+  }
+
   [[nodiscard]] Opened open(std::size_t which) const {
     return open_shown(names_[which], options_, options_.difference && which == 0 ? options_.archives[1] : "");
   }
@@ -428,7 +447,7 @@ class Scenes {
       what();
       now().controls.message.clear();
     } catch (const Error& error) {
-      now().controls.message = std::string(error.what()).substr(0, 100);
+      now().controls.message = error.what();
       now().controls.take_over();
       if (!options_.common.quiet) cli::print_note(name + ": not shown: " + error.what());
     }
@@ -480,6 +499,9 @@ class Scenes {
 
 }  // namespace
 
+/// Frames that take longer do not feel as if the ground were in the hand.
+constexpr double kSlow_s = 1.0 / 12.0;
+
 void run_window(const Options& options) {
   const bool differs = options.difference;
   Opened first = open_shown(options.archives[0], options, differs ? options.archives[1] : "");
@@ -490,6 +512,8 @@ void run_window(const Options& options) {
   using Clock = std::chrono::steady_clock;
   auto last = Clock::now();
   double smooth_s = 1.0 / 60.0;
+  double drawing_s = 0.0;  // the last frame that moved
+  double coarser = 1.0;
   const std::atomic<bool>& interrupted = cli::watch_interrupts();
   std::int64_t drawn = 0;
   for (int frame = 1; glfwWindowShouldClose(window.get()) == GLFW_FALSE; ++frame) {
@@ -507,13 +531,18 @@ void run_window(const Options& options) {
     glfwGetFramebufferSize(window.get(), &width, &height);
     const bool iconified = width < 1 || height < 1;
     // Where nothing moves and nothing is to come the picture stays; an event wakes us.
-    if (iconified || (!changed && options.frames == 0 && session.is_settled())) {
+    if (iconified || (!changed && options.frames == 0 && session.is_settled() && session.view.coarser == 1.0)) {
       glfwWaitEventsTimeout(kIdle_s);
       last = Clock::now();
       --frame;
       continue;
     }
     smooth_s += 0.1 * (seconds - smooth_s);
+    // What is drawn slowly is drawn coarser while it moves, and in full as soon as it stands still.
+    if (changed && options.frames == 0) {
+      coarser = std::clamp(coarser * (drawing_s > kSlow_s ? 1.5 : drawing_s < 0.4 * kSlow_s ? 0.8 : 1.0), 1.0, 64.0);
+    }
+    session.view.coarser = changed ? coarser : 1.0;
     session.view.width = width;
     session.view.height = height;
     if (!target || target->width() != width || target->height() != height) {
@@ -524,8 +553,9 @@ void run_window(const Options& options) {
     const bool is_last = options.frames > 0 && frame >= options.frames;
     if (controls.wants_picture) {
       controls.wants_picture = false;
-      const std::string name = next_picture_name();
+      const std::string name = std::filesystem::absolute(next_picture_name()).string();
       target->write_picture(name);
+      controls.message = "wrote " + name;
       if (!options.common.quiet) cli::print_note("wrote " + name);
     }
     target->show();
@@ -534,6 +564,7 @@ void run_window(const Options& options) {
     session.draw_overlay(shown);
     if (is_last && !options.screenshot.empty()) write_picture(options.screenshot, width, height);
     glfwSwapBuffers(window.get());
+    if (changed) drawing_s = std::chrono::duration<double>(Clock::now() - now).count();
     ++drawn;
     if (is_last) break;
   }

@@ -27,6 +27,21 @@ std::string short_unit(const std::string& unit) {
   return unit == "metre" ? "m" : unit;
 }
 
+/// Lines of at most so many letters, cut between words where there are any.
+std::vector<std::string> wrapped(const std::vector<std::string>& lines, std::size_t most) {
+  std::vector<std::string> all;
+  for (std::string_view rest : lines) {
+    while (rest.size() > most) {
+      const std::size_t space = rest.substr(0, most + 1).rfind(' ');
+      const bool between = space != std::string_view::npos && space > 0;
+      all.emplace_back(rest.substr(0, between ? space : most));
+      rest.remove_prefix(between ? space + 1 : most);
+    }
+    all.emplace_back(rest);
+  }
+  return all;
+}
+
 std::string number(double value) {
   return fmt::format("{:.6g}", value + 0.0);
 }
@@ -71,7 +86,8 @@ void Hud::draw(const Reading& reading, int width, int height, double scale) {
   if (reading.profile) draw_profile(*reading.profile, reading, w, h);
   if (reading.hours) draw_slider(*reading.hours, width, height, scale);
   const std::vector<std::string>& lines = reading.help.empty() ? reading.figures : reading.help;
-  if (!lines.empty()) overlay_.panel(edge, edge, lines);
+  const float letters = (w - 4.0F * edge) / overlay_.width_of("M");
+  if (!lines.empty()) overlay_.panel(edge, edge, wrapped(lines, static_cast<std::size_t>(std::max(letters, 8.0F))));
   overlay_.finish();
 }
 
