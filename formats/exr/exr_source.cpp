@@ -260,7 +260,7 @@ class ExrSource final : public HeightSource {
   void limit_buffers(std::uint64_t bytes) override {
     band_bytes_ = static_cast<std::int64_t>(std::min<std::uint64_t>(bytes, kBandBytes));
     band_ = {};
-    samples_ = {};
+    samples_ = std::vector<std::byte>();
   }
   /// Of the band, and of OpenEXR's chunks with all their channels: two for each of its threads, and about as much again
   /// as stored and once more while they are decoded.

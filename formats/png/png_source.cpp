@@ -78,7 +78,7 @@ class PngSource final : public HeightSource {
     if (rows >= kept_rows_) return;
     if (next_row_ > 0) restart();
     kept_rows_ = rows;
-    kept_ = {};
+    kept_ = std::vector<std::byte>();
   }
   /// The kept rows, and a decoded one here and in libpng; of an interlaced picture all rows twice while it is decoded.
   [[nodiscard]] std::uint64_t buffer_bytes(std::uint64_t limit) const override {

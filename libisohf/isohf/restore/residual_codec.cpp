@@ -159,7 +159,7 @@ ResidualPayload encode(const SampleMapping& mapping, std::int64_t width, std::sp
   add_planes<Bits>(kept, payload);
   for (auto& stream : streams) {
     add_planes<Bits>(stream, payload);
-    stream = {};  // done with
+    stream = std::decay_t<decltype(stream)>();  // done with; {} would keep the memory
   }
   return payload;
 }

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <type_traits>
 
 #include "isohf/base/assert.h"
 #include "isohf/base/sample.h"
@@ -28,7 +29,7 @@ template <typename T>
 void resize(std::vector<T>& values, std::size_t samples, std::size_t columns) {
   constexpr std::size_t kSpareRows = 4;
   if (values.capacity() < samples) {
-    values = {};
+    values = std::vector<T>();  // {} would keep the memory
     values.reserve(samples + kSpareRows * columns);
   }
   values.resize(samples);
@@ -122,7 +123,7 @@ void BandReader::move_heights_to(const RowRange& rows, const RowRange& columns) 
     // Not by resize(): what is kept must stay. The first band lacks the halo North of it.
     const auto spare = static_cast<std::size_t>(8 + (rows.first == 0 ? prefilter_.halo() : 0));
     if (values.capacity() < count_of(rows) * width) {
-      if (kept == 0) values = {};  // or both would be there for a while
+      if (kept == 0) values = std::decay_t<decltype(values)>();  // or both would be there for a while
       values.reserve((count_of(rows) + spare) * width);
     }
     if (kept > 0) std::copy_n(values.begin() + static_cast<std::ptrdiff_t>(skipped), kept * width, values.begin());
