@@ -180,8 +180,8 @@ namespace isohf {
 [[nodiscard]] bool looks_like_tar(std::span<const std::byte> head);
 /// Whether the file is a whole ZIP archive that isohf did not write.
 [[nodiscard]] bool is_zip(const std::string& path);
-/// Whether a ZIP archive holds a raster, or is too damaged to say.
-[[nodiscard]] bool is_zip_of_rasters(const std::string& path);
+/// Whether a ZIP or tar archive holds a raster, or is too damaged to say.
+[[nodiscard]] bool is_archive_of_rasters(const std::string& path);
 [[nodiscard]] std::unique_ptr<HeightSource> open_packed(const std::string& path, const OpenOptions& options);
 
 /// Nothing but samples, row by row from the North-West one on, as options.raw says, or a NAME.r16.json beside, as isohf

@@ -169,6 +169,15 @@ class TarReader {
 };
 
 /// By its name; headers, labels, archives and what names other files are none.
+/// nullopt: is neither ZIP nor tar.
+std::optional<std::vector<Member>> members_of(const RawFile& file) {
+  std::array<std::byte, kTarBlock> head{};
+  const auto there = std::span(head).first(file.read_some(0, head));
+  if (looks_like_tar(there)) return TarReader(file).members();
+  if (text_of(there).starts_with("PK")) return members_of_zip(file);
+  return std::nullopt;
+}
+
 bool is_raster(const Member& member) {
   const std::string name = lower_case(member.file_name());
   if (name.empty() || name.front() == '.') return false;
@@ -309,10 +318,7 @@ class PackedSource final : public HeightSource {
   /// The paths of the rasters, unpacked.
   [[nodiscard]] std::vector<std::string> unpack(const OpenOptions& options) {
     const RawFile file(path_, options.unpacked_bytes);
-    std::array<std::byte, kTarBlock> head{};
-    const auto there = std::span(head).first(file.read_some(0, head));
-    if (looks_like_tar(there)) return unpack(file, TarReader(file).members(), options);
-    if (text_of(there).starts_with("PK")) return unpack(file, members_of_zip(file), options);
+    if (auto members = members_of(file)) return unpack(file, std::move(*members), options);
     if (is_gzip_name(path_)) return {unpack_gzip(file)};
     fail(ErrorCode::kCorrupt, "is no whole ZIP or tar archive");
   }
@@ -418,9 +424,10 @@ bool is_zip(const std::string& path) {
   }
 }
 
-bool is_zip_of_rasters(const std::string& path) {
+bool is_archive_of_rasters(const std::string& path) {
   try {
-    return !rasters_in(members_of_zip(RawFile(path)), "").empty();
+    const auto members = members_of(RawFile(path));
+    return !members || !rasters_in(*members, "").empty();
   } catch (const Error&) {
     return true;  // whoever opens it says what is wrong
   }

@@ -8,6 +8,7 @@
 
 #include "formats/gzipped.h"
 #include "formats/reader_failure.h"
+#include "formats/readers.h"
 #include "formats/registry.h"
 #include "formats/tar_archive.h"
 #include "formats/tiff_bytes.h"
@@ -79,7 +80,18 @@ TEST_F(Packed, WhatLiesBesideTheRasterInAnArchiveBelongsToIt) {
     EXPECT_THAT(values(name), ElementsAre(1, 2, 3, 4)) << name;
     EXPECT_EQ(open(name)->info().format, "GridFloat");
     EXPECT_EQ(open(name)->info().georeference.origin_x, 12.5);
+    EXPECT_TRUE(is_archive_of_rasters(folder_ / name));
   }
+}
+
+TEST_F(Packed, ArchivesWithoutARasterAreToldFromOthers) {
+  const Files files = {{"readme.txt", "x"}, {"a.hdr", "x"}};
+  write_file(folder_ / "a.zip", zip(files));
+  write_file(folder_ / "a.tar", tar_archive(files));
+  write_file(folder_ / "a.tgz", gzipped(tar_archive(files)));
+  for (const char* name : {"a.zip", "a.tar", "a.tgz"}) EXPECT_FALSE(is_archive_of_rasters(folder_ / name)) << name;
+  write_file(folder_ / "b.tgz", std::string("cut"));
+  EXPECT_TRUE(is_archive_of_rasters(folder_ / "b.tgz"));  // whoever opens it says what is wrong
 }
 
 TEST_F(Packed, OfSeveralRastersPartTakesOne) {

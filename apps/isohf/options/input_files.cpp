@@ -43,13 +43,15 @@ const std::set<std::string>& raster_extensions() {
 /// What of a folder counts.
 enum class Wanted { kRasters, kArchives, kBoth };
 
-/// By its name; of a .zip by the names inside.
+/// By its name; of ZIP and tar archives by the names inside.
 bool has_wanted_name(const fs::path& path, Wanted wanted) {
   std::string name = lower_case(path.filename().string());
   if (name.starts_with(".")) return false;
   const bool is_archive = name.size() > 6 && name.ends_with(".isohf");
   if (is_archive || wanted == Wanted::kArchives) return is_archive && wanted != Wanted::kRasters;
-  if (name.ends_with(".zip")) return is_zip_of_rasters(path.string());
+  for (const char* packed : {".zip", ".tar", ".tgz", ".tar.gz"}) {
+    if (name.ends_with(packed)) return is_archive_of_rasters(path.string());
+  }
   if (name.ends_with(".gz")) name.resize(name.size() - 3);
   return std::any_of(raster_extensions().begin(), raster_extensions().end(), [&](const std::string& extension) {
     return name.size() > extension.size() && name.ends_with(extension);
