@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <cstdlib>
 #include <memory>
 #include <nlohmann/json.hpp>
 
@@ -9,6 +10,7 @@
 #include "gl/offscreen.h"
 #include "interrupt.h"
 #include "isohf/error.h"
+#include "isohf/raster.h"
 #include "opening.h"
 #include "options/describe.h"
 #include "output/json_output.h"
@@ -156,6 +158,7 @@ int say_place(const TileSource& source, const Options& options) {
 }
 
 int run(const cli::Arguments& arguments) {
+  if (const char* folder = std::getenv("ISOHF_MODULE_PATH"); folder != nullptr) set_module_folder(folder);
   const std::optional<Options> options = parse_options(arguments);
   if (!options) return cli::kExitDone;
   // A flight's pictures are looked at one by one.
