@@ -30,7 +30,7 @@ TileGrid small_grid() {
 }
 /// More tiles than opening sees of the file's end.
 TileGrid large_grid() {
-  return TileGrid::make(TileShape::make(5, 5, 1), 100, 60, 100.0, 100.0);
+  return TileGrid::make(TileShape::make(5, 5, 1), 160, 60, 100.0, 100.0);
 }
 
 void expect_all_tiles(const ArchiveReader& reader) {
