@@ -538,11 +538,11 @@ void run_window(const Options& options) {
       continue;
     }
     smooth_s += 0.1 * (seconds - smooth_s);
-    // What is drawn slowly is drawn coarser while it moves, and in full as soon as it stands still.
+    // What is drawn slowly is drawn coarser while it moves, and in full as soon as it stands still or is kept.
     if (changed && options.frames == 0) {
       coarser = std::clamp(coarser * (drawing_s > kSlow_s ? 1.5 : drawing_s < 0.4 * kSlow_s ? 0.8 : 1.0), 1.0, 64.0);
     }
-    session.view.coarser = changed ? coarser : 1.0;
+    session.view.coarser = changed && !controls.wants_picture ? coarser : 1.0;
     session.view.width = width;
     session.view.height = height;
     if (!target || target->width() != width || target->height() != height) {
