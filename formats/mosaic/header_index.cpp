@@ -1,5 +1,7 @@
 #include "formats/mosaic/header_index.h"
 
+#include <libdeflate.h>
+
 #include <algorithm>
 #include <concepts>
 #include <optional>
@@ -12,7 +14,7 @@
 namespace isohf {
 namespace {
 
-constexpr std::uint64_t kMagic = 0x31524448464f5349;  // "ISOFHDR1"
+constexpr std::uint64_t kMagic = 0x32524448464f5349;  // "ISOFHDR2"
 
 template <typename T>
 concept Plain = std::is_arithmetic_v<T> || std::is_enum_v<T>;
@@ -97,13 +99,6 @@ std::string text_of(const std::vector<std::byte>& bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
-/// FNV-1a of 64 bits.
-std::uint64_t checksum(std::string_view text) {
-  std::uint64_t sum = 0xcbf29ce484222325;
-  for (const char c : text) sum = (sum ^ static_cast<unsigned char>(c)) * 0x100000001b3;
-  return sum;
-}
-
 }  // namespace
 
 template <typename Io>
@@ -114,13 +109,13 @@ void HeaderIndex::each(Io& io, File& file) {
 
 HeaderIndex::HeaderIndex(const std::string& bytes, const std::string& key) {
   const auto refuse = [](const char* why) { throw Error(ErrorCode::kCorrupt, why); };
-  const std::size_t tail = sizeof(std::uint64_t);
-  if (bytes.size() < 2 * tail) refuse("is cut short");
+  const std::size_t tail = sizeof(std::uint32_t);
+  if (bytes.size() < sizeof kMagic + tail) refuse("is cut short");
   const auto all = std::as_bytes(std::span<const char>(bytes));
-  if (ByteReader(all.last(tail)).read<std::uint64_t>() !=
-      checksum(std::string_view(bytes).substr(0, bytes.size() - tail)))
+  const auto said = all.first(all.size() - tail);
+  if (ByteReader(all.last(tail)).read<std::uint32_t>() != libdeflate_crc32(0, said.data(), said.size()))
     refuse("is damaged");
-  Fields in(all.first(all.size() - tail));
+  Fields in(said);
   std::uint64_t magic = 0;
   std::string its_key;
   std::uint64_t kinds = 0;
@@ -142,7 +137,7 @@ std::string HeaderIndex::bytes(const std::string& key) const {
   out.all(magic, its_key, kinds);
   for (SourceInfo kind : kinds_) each_of_kind(out, kind);
   for (File file : files_) each(out, file);
-  std::uint64_t sum = checksum(text_of(bytes));
+  std::uint32_t sum = libdeflate_crc32(0, bytes.data(), bytes.size());
   out.all(sum);
   return text_of(bytes);
 }

@@ -9,7 +9,6 @@
 #include "isohf/base/output_file.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
-#include "isohf/surface/decorate/filled_source.h"
 #include "options/option_values.h"
 #include "options/quantities.h"
 
@@ -96,7 +95,7 @@ void add_source_options(CommandLine& line, OpenOptions& options) {
 }
 
 std::unique_ptr<HeightSource> open_input(const std::string& path, const OpenOptions& options) {
-  return with_voids_treated(open_raster(path, options), options.voids, {});
+  return with_voids_treated(open_raster(path, options), options.voids);
 }
 
 }  // namespace isohf::cli

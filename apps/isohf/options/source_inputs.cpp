@@ -9,7 +9,6 @@
 #include "isohf/archive/container/content_hash.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
-#include "isohf/surface/decorate/filled_source.h"
 #include "options/option_values.h"
 #include "work_arena.h"
 

@@ -18,10 +18,4 @@ std::span<const std::byte> ReadAhead::bytes(const ByteSource& source, std::uint6
   return std::span(piece_).subspan(offset - offset_, size);
 }
 
-std::size_t AheadSource::read(std::uint64_t offset_bytes, std::span<std::byte> out) const {
-  const auto found = ahead_.bytes(source_, offset_bytes, out.size());
-  std::copy(found.begin(), found.end(), out.begin());
-  return out.size();
-}
-
 }  // namespace isohf

@@ -23,18 +23,4 @@ class ReadAhead {
   std::vector<std::byte> piece_;
 };
 
-/// A source that is read so.
-class AheadSource final : public ByteSource {
- public:
-  /// `source` outlives it.
-  explicit AheadSource(const ByteSource& source) : source_(source) {}
-
-  [[nodiscard]] std::uint64_t size_bytes() const override { return source_.size_bytes(); }
-  [[nodiscard]] std::size_t read(std::uint64_t offset_bytes, std::span<std::byte> out) const override;
-
- private:
-  const ByteSource& source_;
-  mutable ReadAhead ahead_;
-};
-
 }  // namespace isohf

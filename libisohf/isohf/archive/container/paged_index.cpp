@@ -15,6 +15,12 @@ namespace {
 
 constexpr std::uint64_t kMostCachedBytes = std::uint64_t{4} << 20U;
 
+Digest digest_at(std::span<const std::byte> digests, std::size_t rank) {
+  Digest digest{};
+  std::ranges::copy(digests.subspan(rank * digest.size(), digest.size()), digest.begin());
+  return digest;
+}
+
 }  // namespace
 
 std::unique_ptr<PagedIndex> PagedIndex::open(const ByteSource& file, const ZipEntry& member) {
@@ -141,10 +147,14 @@ std::optional<TableRecord> PagedIndex::record(std::size_t table, std::int64_t ro
   const std::size_t bits = (of.records_of(number) + 7) / 8;
   const auto rank = this->rank(bytes, bits, flat % of.page_records);
   if (!rank) return std::nullopt;
-  const std::size_t at = bits + *rank * kRecordBytes;
-  const auto found = *rank < entry.stored ? parse_record(std::span(*bytes).subspan(at, kRecordBytes)) : std::nullopt;
+  return record_at(of, entry, *bytes, bits + *rank * kRecordBytes, row, column);
+}
+
+TableRecord PagedIndex::record_at(const TableDescription& of, const RootEntry& entry, std::span<const std::byte> page,
+                                  std::size_t at, std::int64_t row, std::int64_t column) const {
+  const auto found = at + kRecordBytes <= page.size() ? parse_record(page.subspan(at, kRecordBytes)) : std::nullopt;
   if (!found) refuse(entry.page_offset + at, of, fmt::format("the record of ({},{}) breaks a rule", column, row));
-  return found;
+  return *found;
 }
 
 std::optional<Digest> PagedIndex::digest(std::size_t table, std::int64_t row, std::int64_t column) const {
@@ -156,11 +166,11 @@ std::optional<Digest> PagedIndex::digest(std::size_t table, std::int64_t row, st
   const Bytes bits = page(table, number, entry);
   const auto rank = this->rank(bits, (of.records_of(number) + 7) / 8, flat % of.page_records);
   if (!rank || *rank >= entry.stored) return std::nullopt;
-  Digest digest{};
-  const Bytes digests =
-      cached(entry.digests_offset, digest.size() * std::uint64_t{entry.stored}, entry.digests_crc32, of);
-  std::copy_n(digests->begin() + static_cast<std::ptrdiff_t>(*rank * digest.size()), digest.size(), digest.begin());
-  return digest;
+  return digest_at(*digests_of(of, entry), *rank);
+}
+
+PagedIndex::Bytes PagedIndex::digests_of(const TableDescription& of, const RootEntry& entry) const {
+  return cached(entry.digests_offset, sizeof(Digest) * std::uint64_t{entry.stored}, entry.digests_crc32, of);
 }
 
 void PagedIndex::for_row(std::size_t table, std::int64_t row, std::int64_t first, std::int64_t end,
@@ -178,8 +188,7 @@ void PagedIndex::for_row(std::size_t table, std::int64_t row, std::int64_t first
     Bytes digests;
     if (entry.stored > 0) {
       bytes = page(table, number, entry);
-      if (of.has_digests)
-        digests = cached(entry.digests_offset, sizeof(Digest) * std::uint64_t{entry.stored}, entry.digests_crc32, of);
+      if (of.has_digests) digests = digests_of(of, entry);
     }
     std::optional<std::size_t> next;  // its place among those that are stored
     for (; flat < page_end && bytes; ++flat) {
@@ -187,16 +196,10 @@ void PagedIndex::for_row(std::size_t table, std::int64_t row, std::int64_t first
       if ((std::to_integer<unsigned>((*bytes)[bit / 8]) >> (bit % 8) & 1U) == 0) continue;
       const std::size_t rank = next ? *next : *rank_in_page(std::span(*bytes).first(bits), bit);
       next = rank + 1;
-      const std::size_t at = bits + rank * kRecordBytes;
-      const auto record =
-          rank < entry.stored ? parse_record(std::span(*bytes).subspan(at, kRecordBytes)) : std::nullopt;
       const auto column = static_cast<std::int64_t>(flat - start);
-      if (!record) refuse(entry.page_offset + at, of, fmt::format("the record of ({},{}) breaks a rule", column, row));
-      Digest digest{};
-      if (digests)
-        std::copy_n(digests->begin() + static_cast<std::ptrdiff_t>(rank * digest.size()), digest.size(),
-                    digest.begin());
-      found(column, *record, digests ? &digest : nullptr);
+      const TableRecord record = record_at(of, entry, *bytes, bits + rank * kRecordBytes, row, column);
+      const Digest digest = digests ? digest_at(*digests, rank) : Digest{};
+      found(column, record, digests ? &digest : nullptr);
     }
     flat = page_end;
   }

@@ -5,6 +5,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <unordered_map>
 #include <vector>
 
@@ -57,6 +58,11 @@ class PagedIndex {
   [[nodiscard]] RootEntry root_entry(std::size_t table, std::uint64_t page) const;
   /// A page's bits and records.
   [[nodiscard]] Bytes page(std::size_t table, std::uint64_t page, const RootEntry& entry) const;
+  [[nodiscard]] Bytes digests_of(const TableDescription& of, const RootEntry& entry) const;
+  /// The record that begins at a byte of a page: (column, row) of the table.
+  [[nodiscard]] TableRecord record_at(const TableDescription& of, const RootEntry& entry,
+                                      std::span<const std::byte> page, std::size_t at, std::int64_t row,
+                                      std::int64_t column) const;
   [[noreturn]] void refuse(std::uint64_t offset_bytes, const TableDescription& table, const std::string& why) const;
 
   const ByteSource& file_;

@@ -277,8 +277,7 @@ TileRange plane_tiles_of(const ArchiveReader& archive, int plane) {
                                                          archive.path(), metadata.planes.count, plane));
   }
   const TileRange here = tiles_here(archive);
-  std::int64_t scale = 1;
-  for (int i = 0; i < plane; ++i) scale *= metadata.planes.stride;
+  const std::int64_t scale = planes_of(metadata).scale(plane);
   return {{here.first.column / scale, here.first.row / scale},
           {(here.end.column + scale - 1) / scale, (here.end.row + scale - 1) / scale}};
 }
