@@ -27,12 +27,12 @@ void require_finite(const std::optional<double>& value, const SourceInfo& info, 
 void override_voids(SourceInfo& info, const std::vector<double>& values) {
   info.void_values.clear();
   for (const double value : values) {
-    const std::optional<double> stored = void_value_as_stored(info.sample_type, value);
-    if (!stored) {
-      throw Error(ErrorCode::kInvalidArgument, fmt::format("{}: void value is {}, which no {} sample can hold",
-                                                           info.path, value, to_string(info.sample_type)));
-    }
-    info.void_values.push_back(*stored);
+    if (const auto stored = void_value_as_stored(info.sample_type, value)) info.void_values.push_back(*stored);
+  }
+  // Files of several types are read with the void values of all.
+  if (info.void_values.empty()) {
+    throw Error(ErrorCode::kInvalidArgument, fmt::format("{}: void value is {}, which no {} sample can hold", info.path,
+                                                         values.front(), to_string(info.sample_type)));
   }
 }
 

@@ -44,6 +44,21 @@ namespace isohf {
 [[nodiscard]] bool looks_like_png(std::span<const std::byte> head);
 [[nodiscard]] std::unique_ptr<HeightSource> open_png(const std::string& path, const OpenOptions& options);
 
+/// The same of a WebP picture, through libwebp, decoded whole. A lossy one is read with a warning, packed elevations in it
+/// are refused.
+[[nodiscard]] bool looks_like_webp(std::span<const std::byte> head);
+[[nodiscard]] std::unique_ptr<HeightSource> open_webp(const std::string& path, const OpenOptions& options);
+
+/// Elevations packed into the tiles of a web map (PNG or lossless WebP, one size, a power of two), as one raster in Web
+/// Mercator: of the finest zoom level, or options.part's. Where a tile is missing, or transparent, is nodata.
+/// options.channel is the packing; else the file's "encoding" counts, else what the bytes show. A row of tiles is kept, up
+/// to 256 MiB. PMTiles (version 3, directories plain or in gzip) natively, MBTiles (1.3) through SQLite in the module
+/// isohf_mbtiles.so.
+[[nodiscard]] bool looks_like_pmtiles(std::span<const std::byte> head);
+[[nodiscard]] std::unique_ptr<HeightSource> open_pmtiles(const std::string& path, const OpenOptions& options);
+[[nodiscard]] bool looks_like_mbtiles(std::span<const std::byte> head);
+[[nodiscard]] std::unique_ptr<HeightSource> open_mbtiles(const std::string& path, const OpenOptions& options);
+
 /// An ESRI ASCII grid: header words in any order and case, then ncols x nrows numbers from the North-West corner on,
 /// broken into lines anywhere; cells are areas. A .prj beside it is read. A GRASS ASCII grid differs in its header
 /// (r.in.ascii), and in that the word of null:, or *, is nodata. Numbers have a decimal point or, all of them, a decimal
@@ -147,7 +162,8 @@ namespace isohf {
 [[nodiscard]] std::unique_ptr<HeightSource> open_usgs_dem(const std::string& path, const OpenOptions& options);
 
 /// A DTED cell of any level (MIL-PRF-89020B): columns of posts from South to North, each a record with a checksum,
-/// sign-magnitude metres, nodata -32767. A column's record is checked when it is first touched.
+/// sign-magnitude metres, nodata -32767. A column's record is checked when it is first touched, its checksum unless
+/// options.ignore_checksums.
 [[nodiscard]] bool looks_like_dted(std::span<const std::byte> head);
 [[nodiscard]] std::unique_ptr<HeightSource> open_dted(const std::string& path, const OpenOptions& options);
 
@@ -197,9 +213,11 @@ namespace isohf {
 
 /// Name and version of the libraries that formats are read and written with, as they run: "libtiff 4.5.0".
 [[nodiscard]] std::string exr_library();
+[[nodiscard]] std::string mbtiles_library();
 [[nodiscard]] std::string netcdf_library();
 [[nodiscard]] std::string png_library();
 [[nodiscard]] std::string tiff_library();
+[[nodiscard]] std::string webp_library();
 
 /// The most bytes that the pixels of an interlaced PNG may take: 1 GiB.
 inline constexpr std::uint64_t kMaxInterlacedBytes = std::uint64_t{1} << 30U;

@@ -40,6 +40,9 @@ const std::vector<Reader>& readers() {
       {{"OpenEXR", {".exr"}, exr_library, "takes `channel` and `part`"}, looks_like_exr, open_exr},
       {{"TIFF", {".tif", ".tiff"}, tiff_library, "takes `channel`"}, looks_like_tiff, open_tiff},
       {{"PNG", {".png"}, png_library, "takes `channel` and `encoding`"}, looks_like_png, open_png},
+      {{"WebP", {".webp"}, webp_library, "takes `channel` and `encoding`"}, looks_like_webp, open_webp},
+      {{"PMTiles", {".pmtiles"}, nullptr, "takes `encoding` and `part`"}, looks_like_pmtiles, open_pmtiles},
+      {{"MBTiles", {".mbtiles"}, mbtiles_library, "takes `encoding` and `part`"}, looks_like_mbtiles, open_mbtiles},
       {{"ESRI ASCII grid, GRASS ASCII", {".asc"}}, looks_like_ascii_grid, open_ascii_grid, nullptr, true},
       {{"GDAL virtual raster", {".vrt"}, nullptr, "takes `channel`"}, looks_like_vrt, open_vrt},
       {{"netCDF classic, GMT", {".nc", ".grd"}, nullptr, "takes `channel`"},
@@ -191,31 +194,43 @@ void check_numbers(const SourceInfo& info) {
 /// new, or not there yet.
 class UnchangedSource final : public HeightSource {
  public:
-  UnchangedSource(std::unique_ptr<HeightSource> source, const FileStamp& stamp)
-      : source_(std::move(source)), path_(source_->info().path), stamp_(stamp) {}
+  UnchangedSource(std::unique_ptr<HeightSource> source, const FileStamp& stamp, const OpenOptions& options)
+      : source_(std::move(source)), info_(source_->info()), stamp_(stamp) {
+    warn_of_feet(options);
+  }
 
-  [[nodiscard]] const SourceInfo& info() const override { return source_->info(); }
+  [[nodiscard]] const SourceInfo& info() const override { return info_; }
   void read_window(const Window& window, std::span<std::byte> samples) override {
     source_->read_window(window, samples);
-    require_unchanged(path_, stamp_);
+    require_unchanged(info_.path, stamp_);
     check_elevations(samples);
   }
   void limit_buffers(std::uint64_t bytes) override { source_->limit_buffers(bytes); }
   [[nodiscard]] std::uint64_t buffer_bytes(std::uint64_t limit) const override { return source_->buffer_bytes(limit); }
 
  private:
+  /// Heights beside coordinates in feet may be either, and nothing of the surface tells which.
+  void warn_of_feet(const OpenOptions& options) {
+    const Georeference& place = info_.georeference;
+    const bool is_in_feet = place.unit == HorizontalUnit::kMetre && std::abs(place.metres_per_unit - 0.3048) < 1e-5;
+    if (!is_in_feet || !info_.vertical_unit.empty() || options.z_scale) return;
+    info_.warnings.push_back(fmt::format(
+        "its coordinates are in feet, and nothing says what its elevations are in: they are taken for metres; "
+        "`reference_system` with heights says that they are feet (EPSG:2263+6360), `z_scale` {:.10g} turns them into "
+        "metres",
+        place.metres_per_unit));
+  }
+
   /// Numbers that no elevation is, and that no void value or range declares: one of them would stretch the codes of all
   /// others to nothing.
   void check_elevations(std::span<const std::byte> samples) const {
-    const SourceInfo& info = source_->info();
-    if (info.valid_max <= kBeyondAnyGround && info.valid_min >= -kBeyondAnyGround) return;  // voids, then
-    if (info.sample_type == SampleType::kFloat32) check_floats<float>(samples);
-    if (info.sample_type == SampleType::kFloat64) check_floats<double>(samples);
+    if (info_.valid_max <= kBeyondAnyGround && info_.valid_min >= -kBeyondAnyGround) return;  // voids, then
+    if (info_.sample_type == SampleType::kFloat32) check_floats<float>(samples);
+    if (info_.sample_type == SampleType::kFloat64) check_floats<double>(samples);
   }
 
   template <typename Float>
   void check_floats(std::span<const std::byte> samples) const {
-    const SourceInfo& info = source_->info();
     const auto is_beyond = [](Float value) {
       return std::abs(value) > static_cast<Float>(kBeyondAnyGround) &&
              std::abs(value) <= std::numeric_limits<Float>::max();
@@ -230,23 +245,23 @@ class UnchangedSource final : public HeightSource {
     for (std::size_t i = 0; i < count; ++i) beyond |= static_cast<int>(is_beyond(at(i)));
     for (std::size_t i = 0; beyond != 0 && i < count; ++i) {
       const double value = double{at(i)};
-      if (!is_beyond(at(i)) || value < info.valid_min || value > info.valid_max) continue;
-      if (std::ranges::find(info.void_values, value) != info.void_values.end()) continue;
-      throw Error(ErrorCode::kCorrupt, {path_, fmt::format("an elevation of {:.9g}", value),
+      if (!is_beyond(at(i)) || value < info_.valid_min || value > info_.valid_max) continue;
+      if (std::ranges::find(info_.void_values, value) != info_.void_values.end()) continue;
+      throw Error(ErrorCode::kCorrupt, {info_.path, fmt::format("an elevation of {:.9g}", value),
                                         fmt::format("{} at most either way", kBeyondAnyGround),
-                                        void_values_with(info, {value}) + " takes it as nodata"});
+                                        void_values_with(info_, {value}) + " takes it as nodata"});
     }
   }
 
   std::unique_ptr<HeightSource> source_;
-  std::string path_;  ///< of the samples, where a header was named
+  SourceInfo info_;  ///< its path is that of the samples, where a header was named
   FileStamp stamp_;
 };
 
 /// A raster whose coordinates are in the system that the user names.
 class PlacedSource final : public HeightSource {
  public:
-  PlacedSource(std::unique_ptr<HeightSource> source, const std::string& system)
+  PlacedSource(std::unique_ptr<HeightSource> source, const OpenOptions& options)
       : source_(std::move(source)), info_(source_->info()) {
     const Georeference& place = info_.georeference;
     if (!place.has_origin && place.unit == HorizontalUnit::kUnknown && place.spacing_x == 1.0 &&
@@ -256,10 +271,11 @@ class PlacedSource final : public HeightSource {
           info_.path + ": has no coordinates that `reference_system` could be about; a world file gives it some");
     }
     try {
-      take_system(system, info_);
+      take_system(options.reference_system, info_);
     } catch (const Error& error) {
       throw error.within(info_.path);
     }
+    if (!options.z_scale) require_unit_of_heights(source_->info());
   }
 
   [[nodiscard]] const SourceInfo& info() const override { return info_; }
@@ -270,6 +286,20 @@ class PlacedSource final : public HeightSource {
   [[nodiscard]] std::uint64_t buffer_bytes(std::uint64_t limit) const override { return source_->buffer_bytes(limit); }
 
  private:
+  /// Samples stay as they are: a system with heights in another unit would make hills of mountains.
+  void require_unit_of_heights(const SourceInfo& own) const {
+    constexpr double kSame = 1e-9;
+    const double factor = own.metres_per_vertical_unit / info_.metres_per_vertical_unit;
+    if (own.vertical_unit.empty() || std::abs(factor - 1.0) < kSame) return;
+    std::string remedy = fmt::format("`z_scale` {:.12g}", own.z_scale * factor);
+    if (own.z_offset != 0.0) remedy += fmt::format(" `z_offset` {:.12g}", own.z_offset * factor);
+    throw Error(
+        ErrorCode::kInvalidArgument,
+        {info_.path,
+         fmt::format("elevations in {}, which `reference_system` takes for {}", own.vertical_unit, info_.vertical_unit),
+         "the same unit", remedy + " turns them, a system without heights leaves them"});
+  }
+
   std::unique_ptr<HeightSource> source_;
   SourceInfo info_;
 };
@@ -283,9 +313,10 @@ std::unique_ptr<HeightSource> open_by_head(const std::string& path, const OpenOp
                 path + ": is something unknown in gzip, which isohf does not read; gunzip it first");
   }
   if (reader == nullptr) return open_with_oiio(path, options);
-  if (!options.part.empty() && reader->open != open_exr && reader->open != open_packed) {
+  const auto has_parts = {open_exr, open_packed, open_pmtiles, open_mbtiles};
+  if (!options.part.empty() && std::ranges::find(has_parts, reader->open) == has_parts.end()) {
     throw Error(ErrorCode::kInvalidArgument,
-                path + ": has no parts; `part` is for archives and OpenEXR files of several");
+                path + ": has no parts; `part` is for archives and OpenEXR files of several, and zoom levels of tiles");
   }
   return head.in_gzip && !reader->in_gzip ? open_packed(path, options) : reader->open(path, options);
 }
@@ -301,10 +332,10 @@ std::unique_ptr<HeightSource> open_raster(const std::string& path, const OpenOpt
     const FileStamp stamp = samples == path ? named : FileStamp::of(samples);
     require_unchanged(path, named);
     if (!options.reference_system.empty()) {
-      source = std::make_unique<PlacedSource>(std::move(source), options.reference_system);
+      source = std::make_unique<PlacedSource>(std::move(source), options);
     }
     check_numbers(source->info());
-    return std::make_unique<UnchangedSource>(std::move(source), stamp);
+    return std::make_unique<UnchangedSource>(std::move(source), stamp, options);
   } catch (const Error& error) {
     throw error.at(path);  // which every reader's message names
   }

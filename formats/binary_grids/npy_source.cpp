@@ -16,6 +16,7 @@
 #include "formats/binary_grids/plain_samples.h"
 #include "formats/files/file_source.h"
 #include "formats/files/text.h"
+#include "formats/georeference/files_beside.h"
 #include "formats/open_options.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
@@ -148,6 +149,7 @@ class NpySource final : public PlainSource {
   NpySource(const std::string& path, const OpenOptions& options) : PlainSource(path, "NumPy", options) {
     read_header();
     (void)choose_band(info_, options, 1);
+    read_place_beside(info_, 1);
     apply_open_options(info_, options);
   }
   /// One array of an .npz.

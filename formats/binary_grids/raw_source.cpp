@@ -10,6 +10,7 @@
 #include "formats/binary_grids/plain_samples.h"
 #include "formats/files/file_source.h"
 #include "formats/files/text.h"
+#include "formats/georeference/files_beside.h"
 #include "formats/georeference/raster_description.h"
 #include "formats/open_options.h"
 #include "isohf/error.h"
@@ -105,7 +106,11 @@ class RawSource final : public PlainSource {
                               file_->size_bytes(), layout.width, layout.height, size_bytes(layout.type), bytes),
                   {path, fmt::format("{} bytes", file_->size_bytes()), fmt::format("{} bytes", bytes), ""});
     }
-    if (description != nullptr) description->describe(info_);
+    if (description != nullptr) {
+      description->describe(info_);
+    } else {
+      read_place_beside(info_, 1);
+    }
     if (is_floating(layout.type)) {
       info_.valid_min = -kBeyondAnyHeight;
       info_.valid_max = kBeyondAnyHeight;

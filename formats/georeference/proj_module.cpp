@@ -120,6 +120,11 @@ Object horizontal_part(PJ_CONTEXT* context, const PJ* system) {
         break;
       case PJ_TYPE_GEOGRAPHIC_3D_CRS:
       case PJ_TYPE_GEOGRAPHIC_2D_CRS:
+        if (proj_is_derived_crs(context, part.get()) != 0) {
+          refuse(
+              "counts degrees about a rotated pole; gdalwarp -t_srs EPSG:4326 makes longitudes and latitudes of them");
+        }
+        return part;
       case PJ_TYPE_PROJECTED_CRS:
         return part;
       default:

@@ -203,6 +203,13 @@ bool read_wkt(std::string_view text, SourceInfo& info) {
   const Node* system = root->below(projected);
   if (system == nullptr) system = root->below(geographic);
   if (system == nullptr || system->texts.empty()) return false;
+  if (system->is(geographic) && system->below({"DERIVINGCONVERSION"}) != nullptr) {
+    throw Error(
+        ErrorCode::kUnsupported,
+        fmt::format("the reference system \"{}\" counts degrees about a rotated pole; gdalwarp -t_srs EPSG:4326 "
+                    "makes longitudes and latitudes of them",
+                    printable(system->texts[0])));
+  }
   read_unit(*system, system->is(projected), info.georeference);
   ReferenceSystem& reference = info.georeference.system;
   reference.name = system->texts[0];

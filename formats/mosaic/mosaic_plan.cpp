@@ -464,6 +464,13 @@ MosaicPlan plan_mosaic(const std::vector<std::string>& paths, const OpenOptions&
   SourceInfo& info = plan.info;
   info.sample_type = plan.samples.kind.type;
   info.void_values = plan.samples.kind.void_values;
+  for (const SampleKind& kind : plan.kinds) {
+    for (const double value : kind.void_values) {
+      if (std::ranges::find(info.void_values_of_files, value) == info.void_values_of_files.end())
+        info.void_values_of_files.push_back(value);
+    }
+  }
+  std::ranges::sort(info.void_values_of_files);
   info.valid_min = plan.samples.kind.valid_min;
   info.valid_max = plan.samples.kind.valid_max;
   info.z_scale = plan.samples.kind.z_scale;

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <tuple>
 
 #include "formats/files/text.h"
@@ -199,7 +200,9 @@ class CfReader {
     if (wkt.empty() && system != nullptr) wkt = system->text("spatial_ref");
     const auto length = linear_unit(unit);
     const std::string kind = system == nullptr ? "" : system->text("grid_mapping_name");
-    if (!wkt.empty()) {
+    if (kind == "rotated_latitude_longitude" || columns.text("standard_name").starts_with("grid_")) {
+      place_rotated(system);
+    } else if (!wkt.empty()) {
       read_system_text(wkt, info_.path, info_);
       if (place.unit == HorizontalUnit::kMetre && length) place.metres_per_unit = length->metres;
     } else if (const std::string map = length && system != nullptr ? map_of(*system, kind, length->metres) : "";
@@ -207,8 +210,6 @@ class CfReader {
       read_system_text(map, info_.path, info_);
     } else if (!kind.empty() && kind != "latitude_longitude" && !length) {
       leave_out_place(fmt::format("its grid mapping {} comes without crs_wkt", printable(kind)));
-    } else if (columns.text("standard_name").starts_with("grid_")) {
-      leave_out_place("its degrees are those of a rotated grid");
     } else if (is_degrees(columns)) {
       place.unit = HorizontalUnit::kDegree;
       const std::string figure = system == nullptr ? "" : figure_of(*system);
@@ -224,6 +225,29 @@ class CfReader {
       info_.warnings.push_back(loss(
           fmt::format("its grid mapping {} comes without crs_wkt: the reference system is left out", printable(kind))));
     }
+  }
+
+  /// Degrees about a pole that is not the Earth's are metres of an equidistant cylindrical map about it.
+  void place_rotated(const Variable* system) {
+    const auto latitude = system == nullptr ? std::nullopt : system->number("grid_north_pole_latitude");
+    const auto longitude = system == nullptr ? std::nullopt : system->number("grid_north_pole_longitude");
+    if (!latitude || !longitude)
+      return leave_out_place("its degrees are those of a rotated grid, whose pole it does not name");
+    const std::string figure = figure_of(*system);
+    double radius = 6378137.0;
+    for (const char* name : {"earth_radius", "semi_major_axis"}) radius = system->number(name).value_or(radius);
+    read_system_text(
+        fmt::format("+proj=ob_tran +o_proj=eqc +o_lat_p={:.17g} +o_lon_p={:.17g} +lon_0={:.17g}{} +no_defs +type=crs",
+                    *latitude, system->number("north_pole_grid_longitude").value_or(0.0), *longitude + 180.0,
+                    figure.empty() ? " +datum=WGS84" : figure),
+        info_.path, info_);
+    Georeference& place = info_.georeference;
+    if (place.unit != HorizontalUnit::kMetre) return leave_out_place("its degrees are those of a rotated grid");
+    const double metres = radius * std::numbers::pi / 180.0;
+    place.spacing_x *= metres;
+    place.spacing_y *= metres;
+    place.origin_x *= metres;
+    place.origin_y *= metres;
   }
 
   void leave_out_place(const std::string& why) {

@@ -66,9 +66,21 @@ void describe_packing(Packing packing, std::size_t channels, int bits, SourceInf
   }
 }
 
-void place_web_tile(SourceInfo& info) {
+void place_web_tiles(int zoom, std::int64_t column, std::int64_t row, std::int64_t side, SourceInfo& info) {
   constexpr double kHalfMap = 20037508.342789244;  // metres: pi times WGS 84's semi-major axis
-  constexpr int kMaxZoom = 30;
+  Georeference& geo = info.georeference;
+  geo.registration = Registration::kArea;
+  geo.unit = HorizontalUnit::kMetre;
+  geo.spacing_x = geo.spacing_y = std::ldexp(2.0 * kHalfMap, -zoom) / static_cast<double>(side);
+  geo.has_origin = true;
+  geo.origin_x = (static_cast<double>(column * side) + 0.5) * geo.spacing_x - kHalfMap;
+  geo.origin_y = kHalfMap - (static_cast<double>(row * side) + 0.5) * geo.spacing_y;
+  geo.system.name = "WGS 84 / Pseudo-Mercator";
+  geo.system.epsg = 3857;
+  geo.system.body = "Earth";
+}
+
+void place_web_tile(SourceInfo& info) {
   if (info.georeference.has_origin) return;
   std::filesystem::path name(info.path);
   std::array<std::int64_t, 3> numbers{};  // row, column, zoom
@@ -79,17 +91,15 @@ void place_web_tile(SourceInfo& info) {
     name = name.parent_path();
   }
   const auto [row, column, zoom] = numbers;
-  if (zoom > kMaxZoom || std::max(row, column) >> zoom != 0 || info.width != info.height) return;
-  Georeference& geo = info.georeference;
-  geo.registration = Registration::kArea;
-  geo.unit = HorizontalUnit::kMetre;
-  geo.spacing_x = geo.spacing_y = std::ldexp(2.0 * kHalfMap, -static_cast<int>(zoom)) / static_cast<double>(info.width);
-  geo.has_origin = true;
-  geo.origin_x = (static_cast<double>(column * info.width) + 0.5) * geo.spacing_x - kHalfMap;
-  geo.origin_y = kHalfMap - (static_cast<double>(row * info.height) + 0.5) * geo.spacing_y;
-  geo.system.name = "WGS 84 / Pseudo-Mercator";
-  geo.system.epsg = 3857;
-  geo.system.body = "Earth";
+  if (zoom > kMostZoom || std::max(row, column) >> zoom != 0 || info.width != info.height) return;
+  if (!std::has_single_bit(static_cast<std::uint64_t>(info.width))) {
+    info.warnings.push_back(loss(fmt::format(
+        "is called as a tile of a web map, but its {0} x {0} samples are no power of two, as where tiles have a rim of "
+        "their neighbours': where it lies is left out",
+        info.width)));
+    return;
+  }
+  place_web_tiles(static_cast<int>(zoom), column, row, info.width, info);
 }
 
 void unpack_elevations(Packing packing, std::size_t channels, std::span<const std::byte> pixels,

@@ -28,8 +28,13 @@ enum class Packing {
 void describe_packing(Packing packing, std::size_t channels, int bits, SourceInfo& info);
 
 /// A tile of a web map lies where the end of its path says: ZOOM/COLUMN/ROW.png, the rows counted from the North, of
-/// 2^ZOOM by 2^ZOOM squares of the Web Mercator map. Leaves a place alone that is known, and paths that end otherwise.
+/// 2^ZOOM by 2^ZOOM squares of the Web Mercator map. Leaves a place alone that is known, paths that end otherwise, and,
+/// with a warning, tiles whose size is no power of two: these have a rim.
 void place_web_tile(SourceInfo& info);
+
+inline constexpr int kMostZoom = 30;
+/// Places a raster whose North-West tile is that one, of tiles of `side` samples each way.
+void place_web_tiles(int zoom, std::int64_t column, std::int64_t row, std::int64_t side, SourceInfo& info);
 
 /// Pixels of `channels` bytes each, 3 or 4, into samples of the type that describe_packing names.
 void unpack_elevations(Packing packing, std::size_t channels, std::span<const std::byte> pixels,
@@ -47,10 +52,10 @@ class PackingEvidence {
   /// doubt, and grey in three channels is grey (nullopt: the first one is read), which `info` warns of. Throws
   /// Error{kInvalidArgument} where the user has to say what is meant; `names` of the channels.
   [[nodiscard]] std::optional<Packing> decide(const std::string& names, SourceInfo& info) const;
-
- private:
   /// nullopt where nothing speaks for it, as in land so flat that no byte overflows.
   [[nodiscard]] std::optional<Packing> packing() const;
+
+ private:
   /// Whether red, green and blue were equal everywhere.
   [[nodiscard]] bool is_grey() const { return pixels_ > 0 && differing_ == 0; }
 

@@ -37,7 +37,7 @@ struct PngDecoder::Callbacks {
   static void on_warning(png_structp, png_const_charp) {}
 };
 
-bool PngDecoder::fail(const char* text) {
+bool PictureDecoder::fail(const char* text) {
   std::snprintf(message_.data(), message_.size(), "%s", text);
   return false;
 }
@@ -53,6 +53,16 @@ void PngDecoder::close() {
 bool PngDecoder::open(const std::string& path, PngHeader& header) {
   close();
   file_ = std::fopen(path.c_str(), "rb");
+  return begin(header);
+}
+
+bool PngDecoder::open(std::span<const std::byte> stored, PngHeader& header) {
+  close();
+  file_ = ::fmemopen(const_cast<std::byte*>(stored.data()), stored.size(), "rb");  // which writes nothing
+  return begin(header);
+}
+
+bool PngDecoder::begin(PngHeader& header) {
   if (file_ == nullptr) return fail(std::strerror(errno));
   png_ = png_create_read_struct(PNG_LIBPNG_VER_STRING, this, Callbacks::on_error, Callbacks::on_warning);
   info_ = png_ != nullptr ? png_create_info_struct(png_) : nullptr;

@@ -6,6 +6,7 @@
 #include <array>
 #include <cstring>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <span>
 #include <utility>
@@ -33,12 +34,14 @@ constexpr std::uint64_t kMaxCompressionRatio = 1032;
 constexpr std::size_t kKeptBytes = std::size_t{8} << 20U;
 constexpr std::size_t kMaxKeptRows = 1024;
 
-/// Rows of one channel, decoded in order.
+/// Rows of one channel of a PNG or WebP picture, decoded in order.
 class PngSource final : public HeightSource {
  public:
-  PngSource(const std::string& path, const OpenOptions& options) {
+  PngSource(const std::string& path, const char* format, std::unique_ptr<PictureDecoder> decoder,
+            const OpenOptions& options)
+      : decoder_(std::move(decoder)) {
     info_.path = path;
-    info_.format = "PNG";
+    info_.format = format;
     wants_packed_ = packing_from_string(options.channel).has_value();
     restart();
     info_.width = info_.block_width = header_.width;
@@ -49,6 +52,7 @@ class PngSource final : public HeightSource {
     sample_bytes_ = size_bytes(info_.sample_type);
     choose_channel(options.channel);
     if (channels_ > 2 && options.channel.empty()) decide_on_colours();
+    if (header_.is_lossy) info_.warnings.emplace_back("lossy WebP: elevations are only about those that were stored");
     read_beside();
     apply_open_options(info_, options);
     kept_rows_ = rows_within(kKeptBytes);
@@ -99,9 +103,9 @@ class PngSource final : public HeightSource {
   /// Opens the file anew; the next row decoded is the first.
   void restart() {
     next_row_ = 0;
-    if (!decoder_.open(info_.path, header_)) {
-      throw Error(decoder_.has_file() ? ErrorCode::kCorrupt : ErrorCode::kIo,
-                  fmt::format("{}: PNG header: {}", info_.path, decoder_.message()));
+    if (!decoder_->open(info_.path, header_)) {
+      throw Error(decoder_->has_file() ? ErrorCode::kCorrupt : ErrorCode::kIo,
+                  fmt::format("{}: {} header: {}", info_.path, info_.format, decoder_->message()));
     }
     if (header_.has_palette && !wants_packed_) {
       throw Error(ErrorCode::kUnsupported,
@@ -110,8 +114,9 @@ class PngSource final : public HeightSource {
                       "into them (`encoding` terrarium, mapbox or rgba-float)");
     }
     check_size();
-    if (!decoder_.start(header_, header_.has_palette ? PngDecoder::For::kPicture : PngDecoder::For::kNumbers)) {
-      throw Error(ErrorCode::kCorrupt, fmt::format("{}: PNG header: {}", info_.path, decoder_.message()));
+    if (!decoder_->start(header_,
+                         header_.has_palette ? PictureDecoder::For::kPicture : PictureDecoder::For::kNumbers)) {
+      throw Error(ErrorCode::kCorrupt, fmt::format("{}: {} header: {}", info_.path, info_.format, decoder_->message()));
     }
   }
 
@@ -119,7 +124,7 @@ class PngSource final : public HeightSource {
     const std::uint64_t picture_bytes = (header_.row_bytes + 1) * std::uint64_t{header_.height};
     std::error_code error;
     const std::uint64_t file_size = std::filesystem::file_size(info_.path, error);
-    if (!error && picture_bytes / kMaxCompressionRatio > file_size) {
+    if (!error && picture_bytes / kMaxCompressionRatio > file_size && info_.format == "PNG") {
       throw Error(ErrorCode::kCorrupt, fmt::format("{}: PNG header declares {} x {} pixels, for which a file of {} "
                                                    "bytes has no room",
                                                    info_.path, header_.width, header_.height, file_size));
@@ -166,16 +171,26 @@ class PngSource final : public HeightSource {
   /// All channels together are one elevation.
   void unpack(Packing packing) {
     packing_ = packing;
+    if (header_.is_lossy) {
+      throw Error(ErrorCode::kUnsupported,
+                  info_.path + ": is lossy WebP, which does not keep the bytes of elevations; a lossless picture does");
+    }
     describe_packing(packing, channels_, header_.bit_depth, info_);
     sample_bytes_ = size_bytes(info_.sample_type);
   }
 
   void decide_on_colours() {
     PackingEvidence evidence(channels_);
-    if (header_.bit_depth == 8 && !header_.interlaced) {
+    const std::size_t rows = std::min<std::size_t>(PackingEvidence::kRows, header_.height);
+    if (header_.bit_depth == 8 && header_.interlaced) {
+      const std::unique_ptr<std::byte[]> picture = decoded_picture();
+      for (std::size_t row = 0; row < rows; ++row) {
+        evidence.add({picture.get() + row * header_.row_bytes, header_.row_bytes});
+      }
+      restart();
+    } else if (header_.bit_depth == 8) {
       row_.resize(header_.row_bytes);
-      const std::size_t rows = std::min<std::size_t>(PackingEvidence::kRows, header_.height);
-      for (std::size_t row = 0; row < rows && decoder_.read_row(row_); ++row) {
+      for (std::size_t row = 0; row < rows && decoder_->read_row(row_); ++row) {
         evidence.add(row_);
       }
       restart();
@@ -189,22 +204,32 @@ class PngSource final : public HeightSource {
   }
 
   void decode_next() {
-    if (kept_.empty()) kept_.resize(kept_rows_ * header_.width * sample_bytes_);
     if (header_.interlaced) return decode_all();
+    if (kept_.empty()) kept_.resize(kept_rows_ * header_.width * sample_bytes_);
     row_.resize(header_.row_bytes);
-    if (!decoder_.read_row(row_)) fail(fmt::format("PNG row {}", next_row_));
-    if (next_row_ + 1 == header_.height && !decoder_.finish()) fail(fmt::format("PNG row {}", next_row_));
+    if (!decoder_->read_row(row_)) fail(fmt::format("PNG row {}", next_row_));
+    if (next_row_ + 1 == header_.height && !decoder_->finish()) fail(fmt::format("PNG row {}", next_row_));
     pick_channel(row_.data(), kept_row(next_row_));
     ++next_row_;
   }
 
   void decode_all() {
-    std::vector<std::byte> picture(header_.row_bytes * header_.height);
-    if (!decoder_.read_picture(picture, header_) || !decoder_.finish()) fail("interlaced PNG");
+    const std::unique_ptr<std::byte[]> picture = decoded_picture();
+    if (kept_.empty()) kept_.resize(kept_rows_ * header_.width * sample_bytes_);
     for (std::size_t row = 0; row < header_.height; ++row) {
-      pick_channel(picture.data() + row * header_.row_bytes, kept_row(row));
+      pick_channel(picture.get() + row * header_.row_bytes, kept_row(row));
     }
     next_row_ = header_.height;
+  }
+
+  /// All of it; memory that a damaged picture does not come to is never touched.
+  [[nodiscard]] std::unique_ptr<std::byte[]> decoded_picture() {
+    const std::size_t bytes = header_.row_bytes * header_.height;
+    auto picture = std::make_unique_for_overwrite<std::byte[]>(bytes);
+    if (!decoder_->read_picture({picture.get(), bytes}, header_) || !decoder_->finish()) {
+      fail(info_.format == "PNG" ? "interlaced PNG" : "WebP");
+    }
+    return picture;
   }
 
   void pick_channel(const std::byte* pixels, std::byte* out) const {
@@ -226,10 +251,10 @@ class PngSource final : public HeightSource {
   /// The decoder cannot go on after an error: the next request starts again from the first row.
   [[noreturn]] void fail(const std::string& where) {
     next_row_ = header_.height + kept_rows_ + 1;
-    throw Error(ErrorCode::kCorrupt, fmt::format("{}: {}: {}", info_.path, where, decoder_.message()));
+    throw Error(ErrorCode::kCorrupt, fmt::format("{}: {}: {}", info_.path, where, decoder_->message()));
   }
 
-  PngDecoder decoder_;
+  std::unique_ptr<PictureDecoder> decoder_;
   PngHeader header_;
   SourceInfo info_;
   std::size_t sample_bytes_ = 0;
@@ -250,11 +275,16 @@ bool looks_like_png(std::span<const std::byte> head) {
 }
 
 std::unique_ptr<HeightSource> open_png(const std::string& path, const OpenOptions& options) {
-  auto source = std::make_unique<PngSource>(path, options);
+  auto source = std::make_unique<PngSource>(path, "PNG", std::make_unique<PngDecoder>(), options);
   if (!options.channel.empty() || !source->is_beside_opacity()) return source;
   OpenOptions opacity;
   opacity.channel = "A";
-  return mask_transparent(std::move(source), std::make_unique<PngSource>(path, opacity));
+  return mask_transparent(std::move(source),
+                          std::make_unique<PngSource>(path, "PNG", std::make_unique<PngDecoder>(), opacity));
+}
+
+std::unique_ptr<HeightSource> open_webp(const std::string& path, const OpenOptions& options) {
+  return std::make_unique<PngSource>(path, "WebP", std::make_unique<WebpDecoder>(), options);
 }
 
 }  // namespace isohf

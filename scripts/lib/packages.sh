@@ -2,7 +2,7 @@
 
 ISOHF_PACKAGES_BUILD=(
   g++ cmake ninja-build pkg-config git ca-certificates
-  zlib1g-dev libdeflate-dev libtiff-dev libpng-dev libjpeg-dev libexpat1-dev libpugixml-dev libopenexr-dev libopenimageio-dev
+  zlib1g-dev libdeflate-dev libtiff-dev libpng-dev libjpeg-dev libexpat1-dev libpugixml-dev libwebp-dev libsqlite3-dev libopenexr-dev libopenimageio-dev
   libtbb-dev libfmt-dev nlohmann-json3-dev libtomlplusplus-dev libgeographiclib-dev libproj-dev libnetcdf-dev nettle-dev libeigen3-dev
   libepoxy-dev libglfw3-dev libegl-dev libgl-dev libegl1 libgl1-mesa-dri
   libgtest-dev libgmock-dev libbenchmark-dev

@@ -5,6 +5,7 @@ usage: placement.py BIN_DIR
 
 Heights are metres to the East of a place, or to the North of it, so that a height says where its sample lies. Ends with 77 where GDAL's Python package is missing (Debian: python3-gdal).
 """
+import json
 import math
 import os
 import pathlib
@@ -447,6 +448,120 @@ def large_chunks(isohf, folder):
     check(used.ru_maxrss < 300000, f"info of a large chunk takes {used.ru_maxrss} kB")
 
 
+def feet(isohf, folder):
+    """Elevations beside coordinates in feet are in a unit that somebody has to say; a system with heights in another one
+    than the file's is refused."""
+    asks = "nothing says what its elevations are in"
+    write(folder / "feet.tif", "EPSG:2263", -74.0, 40.7, 30.0, (-74.0, 40.7), 0, 40)
+    write(folder / "both.tif", "EPSG:2263+6360", -74.0, 40.7, 30.0, (-74.0, 40.7), 0, 40)
+    for name, options, is_asked, unit in (("feet.tif", (), True, None), ("feet.tif", ("--z-scale", "0.3048006096"), False, None),
+                                          ("feet.tif", ("--crs", "EPSG:2263+6360"), False, "US survey foot"),
+                                          ("both.tif", (), False, "US survey foot"),
+                                          ("both.tif", ("--crs", "EPSG:2263"), False, "US survey foot"),
+                                          ("both.tif", ("--crs", "EPSG:2263+5703", "--z-scale", "0.3048006096"), False, "metre")):
+        said = isohf.must("info", folder / name, "--json", *options)
+        check((asks in said.stderr) == is_asked, f"{name} {options}: {said.stderr}")
+        found = json.loads(said.stdout)
+        check(f'"vertical_unit": {json.dumps(unit)}' in json.dumps(found), f"{name} {options}: another unit than {unit}: {found}")
+    isohf.refuses("--z-scale 0.304800609601", "info", folder / "both.tif", "--crs", "EPSG:2263+5703")
+    isohf.refuses("--z-scale 0.304800609601", "convert", folder / "both.tif", "-o", folder / "n.isohf", "--crs", "EPSG:32618+5773")
+
+
+def voids_of_files(isohf, folder):
+    """What a mosaic says of undeclared voids keeps those of every file."""
+    for i, void in enumerate((-9999, -32768)):
+        write(folder / f"v{i}.tif", "EPSG:32632", 9.0, 46.0, 30.0, (9.0, 46.0), 0, 40)
+        raster = gdal.Translate("", str(folder / f"v{i}.tif"), format="MEM", outputType=gdal.GDT_Int16)
+        place = list(raster.GetGeoTransform())
+        raster.SetGeoTransform((place[0] + i * 40 * place[1], *place[1:]))
+        heights = numpy.full((40, 40), 100 + i, dtype=numpy.int16)
+        heights[0, :3] = void
+        heights[1, :5] = 32767
+        raster.GetRasterBand(1).WriteArray(heights)
+        raster.GetRasterBand(1).SetNoDataValue(void)
+        gdal.GetDriverByName("GTiff").CreateCopy(str(folder / f"v{i}.tif"), raster)
+    said = isohf.must("convert", folder / "v0.tif", folder / "v1.tif", "-o", folder / "v.isohf").stderr
+    remedy = "--nodata -32768,-9999,32767"
+    check(remedy in said, f"void values of two files: {said}")
+    again = isohf.must("convert", folder / "v0.tif", folder / "v1.tif", "-o", folder / "v.isohf", "--overwrite", "--lossless",
+                       *remedy.split())
+    check("--nodata" not in again.stderr, f"the remedy asks again: {again.stderr}")
+    # The source's own samples have them all, and a TIFF one void value.
+    said = isohf.must("restore", folder / "v.isohf", folder / "v.tif").stderr
+    check("3 samples hold -9999," in said and "10 samples hold 32767," in said, f"restore of three void values: {said}")
+    isohf.must("export", folder / "v.isohf", folder / "v.tif", "--overwrite")
+    found = gdal.Open(str(folder / "v.tif"))
+    # A vertex beside a void is one.
+    count = int(((found.ReadAsArray() < 99) | (found.ReadAsArray() > 102) | numpy.isnan(found.ReadAsArray())).sum())
+    check(16 <= count < 40, f"{count} voids after the remedy, must be 16 and those beside")
+
+
+def beside_samples(isohf, folder):
+    """What GDAL's .aux.xml says of arrays and bare samples."""
+    heights = numpy.arange(1600, dtype="<u2").reshape(40, 40)
+    (folder / "a.r16").write_bytes(heights.tobytes())
+    numpy.save(folder / "a.npy", heights)
+    for name, options in (("a.r16", ("--raw", "40x40:u16le")), ("a.npy", ())):
+        (folder / (name + ".aux.xml")).write_text(
+            f"<PAMDataset><SRS>{system('EPSG:2154').ExportToWkt()}</SRS><GeoTransform>700000, 25, 0, 6600000, 0, -25"
+            "</GeoTransform><PAMRasterBand band='1'><NoDataValue>7</NoDataValue><UnitType>ft</UnitType></PAMRasterBand></PAMDataset>")
+        isohf.must("convert", folder / name, "-o", folder / "s.isohf", "--overwrite", "--lossless", "--projection", "none", "-q", *options)
+        isohf.must("restore", folder / "s.isohf", folder / "s.tif", "--overwrite", "-q")
+        found = gdal.Open(str(folder / "s.tif"))
+        check(found.GetGeoTransform() == (700000.0, 25.0, 0.0, 6600000.0, 0.0, -25.0), f"{name}: {found.GetGeoTransform()}")
+        check(found.GetSpatialRef().GetAuthorityCode("PROJCS") == "2154", f"{name}: another system")
+        check(found.GetRasterBand(1).GetUnitType() in ("ft", "foot"), f"{name}: unit {found.GetRasterBand(1).GetUnitType()}")
+        check(numpy.array_equal(found.ReadAsArray(), heights) and found.GetRasterBand(1).GetNoDataValue() == 7.0, f"{name}: samples differ")
+
+
+def rotated(isohf, folder):
+    """Degrees about another pole: of netCDF they are a map, elsewhere refused, never longitudes and latitudes."""
+    steps = 40
+    for number, (pole, own, figure) in enumerate((((39.25, -162.0), 0.0, {"earth_radius": 6371229.0}), ((32.5, -170.0), 10.0, {}),
+                                                  ((-30.0, 15.0), 0.0, {"semi_major_axis": 6371000.0, "inverse_flattening": 0.0}))):
+        path = folder / f"r{number}.nc"
+        root = gdal.GetDriverByName("netCDF").CreateMultiDimensional(str(path), [], ["FORMAT=NC"]).GetRootGroup()
+        number_type, text = gdal.ExtendedDataType.Create(gdal.GDT_Float64), gdal.ExtendedDataType.CreateString()
+        axes = [root.CreateDimension(name, "", "", steps) for name in ("rlat", "rlon")]
+        for axis, name, first in zip(axes, ("grid_latitude", "grid_longitude"), (-3.0, 2.0)):
+            made = root.CreateMDArray(axis.GetName(), [axis], number_type)
+            made.CreateAttribute("standard_name", [], text).Write(name)
+            made.CreateAttribute("units", [], text).Write("degrees")
+            made.Write(first + 0.11 * numpy.arange(steps))
+        map_of = root.CreateMDArray("rotated_pole", [], gdal.ExtendedDataType.Create(gdal.GDT_Int32))
+        map_of.CreateAttribute("grid_mapping_name", [], text).Write("rotated_latitude_longitude")
+        for name, value in {"grid_north_pole_latitude": pole[0], "grid_north_pole_longitude": pole[1],
+                            "north_pole_grid_longitude": own, **figure}.items():
+            map_of.CreateAttribute(name, [], number_type).Write(value)
+        heights = root.CreateMDArray("z", axes, gdal.ExtendedDataType.Create(gdal.GDT_Float32))
+        heights.CreateAttribute("grid_mapping", [], text).Write("rotated_pole")
+        heights.Write(numpy.arange(steps * steps, dtype=numpy.float32).reshape(steps, steps))
+        del made, map_of, heights, axes, axis, root
+        isohf.must("convert", path, "-o", folder / "r.isohf", "--overwrite", "-q", "--projection", "none")
+        isohf.must("export", folder / "r.isohf", folder / "r.tif", "--overwrite", "-q")
+        ours = gdal.Open(str(folder / "r.tif"))
+        own_system = ours.GetSpatialRef()
+        own_system.SetAxisMappingStrategy(osr.OAMS_TRADITIONAL_GIS_ORDER)
+        sphere = own_system.CloneGeogCS()
+        sphere.SetAxisMappingStrategy(osr.OAMS_TRADITIONAL_GIS_ORDER)
+        turn = system(f"+proj=ob_tran +o_proj=longlat +o_lat_p={pole[0]} +o_lon_p={own} +lon_0={pole[1] + 180.0} "
+                      f"+R={figure.get('earth_radius', figure.get('semi_major_axis', 6378137.0))}")
+        base = system(f"+proj=longlat +R={figure.get('earth_radius', figure.get('semi_major_axis', 6378137.0))}")
+        x0, dx, _, y0, _, dy = ours.GetGeoTransform()
+        for column, row in ((0, 0), (steps, 0), (0, steps), (steps, steps), (7, 11)):
+            found = osr.CoordinateTransformation(own_system, sphere).TransformPoint(x0 + column * dx, y0 + row * dy)
+            wanted = osr.CoordinateTransformation(turn, base).TransformPoint(2.0 + (column - 0.5) * 0.11, -3.0 + (steps - 0.5 - row) * 0.11)
+            off = max(abs(found[0] - wanted[0]), abs(found[1] - wanted[1]))
+            check(off <= 0.0011, f"rotated about {pole}: {found[:2]}, must be {wanted[:2]}")
+    raster = gdal.GetDriverByName("GTiff").Create(str(folder / "turned.tif"), 40, 40, 1, gdal.GDT_Float32)
+    raster.SetGeoTransform((2.0, 0.1, 0, 1.0, 0, -0.1))
+    raster.SetSpatialRef(system("+proj=ob_tran +o_proj=longlat +o_lat_p=39.25 +o_lon_p=0 +lon_0=18 +R=6371229"))
+    raster = None
+    isohf.refuses("rotated pole", "convert", folder / "turned.tif", "-o", folder / "n.isohf")
+    write(folder / "plain.tif", "EPSG:4326", 9.0, 46.0, 30.0, (9.0, 46.0), 0, 40)
+    isohf.refuses("rotated pole", "info", folder / "plain.tif", "--crs", "+proj=ob_tran +o_proj=longlat +o_lat_p=39.25 +o_lon_p=0 +lon_0=18 +R=6371229")
+
+
 WRITE_CHUNK = """
 import sys
 import numpy
@@ -465,7 +580,7 @@ def main():
         return 2
     bin_dir = pathlib.Path(sys.argv[1]).resolve()
     for part in (projections, globes, planets, heights_of_a_projection, joined, other_parameters, written_elsewhere, loads_no_proj, beside,
-                 samples, geojp2, ranges_of_voids, large_chunks):
+                 samples, geojp2, ranges_of_voids, large_chunks, feet, voids_of_files, beside_samples, rotated):
         with tempfile.TemporaryDirectory(prefix="placement") as folder:
             part(Program(pathlib.Path(folder), bin_dir), pathlib.Path(folder))
     print(f"{len(failures)} failures")

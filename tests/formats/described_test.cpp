@@ -200,7 +200,7 @@ TEST_F(Netcdf, DegreesOfARotatedGridAreNone) {
   const auto source = open("a.nc");
   EXPECT_EQ(source->info().georeference.unit, HorizontalUnit::kUnknown);
   ASSERT_EQ(source->info().warnings.size(), 1U);
-  EXPECT_THAT(source->info().warnings[0], HasSubstr("rotated_latitude_longitude comes without crs_wkt"));
+  EXPECT_THAT(source->info().warnings[0], HasSubstr("a rotated grid, whose pole it does not name"));
 }
 
 #ifdef ISOHF_WITH_NETCDF

@@ -278,6 +278,7 @@ std::vector<ReaderCase> reader_cases() {
   const std::string esri = "ncols 4\nnrows 3\nxllcorner 100\nyllcorner 200.5\ncellsize 10\nNODATA_value -9999\n";
   const std::string numbers = "1 2.5 3 4\n5 -9999 7e1 8\n9 10 nan 12\n";
   const std::string grass = "north: 200\nsouth: 180\neast: 130\nwest: 100\nrows: 2\ncols: 3\nnull: -1\ntype: int\n";
+  const std::string data = std::string(ISOHF_SOURCE_DIR) + "/tests/formats/data/";
   OpenOptions packed;
   packed.channel = "terrarium";
   OpenOptions streamed;
@@ -333,13 +334,18 @@ std::vector<ReaderCase> reader_cases() {
       {"ImagineSpilled", "a.ige", ImagineBytes::spill(), open_imagine, {}},
       {"ZipOfGrid", "a.zip", zip("d/a.asc", esri + numbers), open_packed, {}},
       {"TarOfGrid", "a.tar", tar_archive({{"d/a.asc", esri + numbers}}), open_packed, {}},
+      {"Webp", "a.webp", read_file(data + "small.webp"), open_webp, packed},
+      {"Pmtiles", "a.pmtiles", read_file(data + "small.pmtiles"), open_pmtiles, {}},
       {"PngDescription", "described.png.json", "", open_png, {}},
       {"RawDescription", "a.r16.json", "", open_raw, {}},
   };
 #ifdef ISOHF_WITH_NETCDF
-  const std::string written_by_gdal = std::string(ISOHF_SOURCE_DIR) + "/tests/formats/data/lat_lon.nc";
-  cases.push_back({"Netcdf4", "a.nc", read_file(written_by_gdal), open_netcdf4, {}});
+  cases.push_back({"Netcdf4", "a.nc", read_file(data + "lat_lon.nc"), open_netcdf4, {}});
   cases.back().share = 100;
+#endif
+#ifdef ISOHF_WITH_MBTILES
+  cases.push_back({"Mbtiles", "a.mbtiles", read_file(data + "small.mbtiles"), open_mbtiles, {}});
+  cases.back().shortest_valid = 1;  // pages that hold nothing
 #endif
   const auto find = [&](const char* name) -> ReaderCase& {
     for (ReaderCase& each : cases) {

@@ -31,6 +31,7 @@ constexpr std::pair<std::string_view, std::string_view> kSpellings[] = {
     {"fill", "--fill"},
     {"fit", "--fit"},
     {"geoid", "--geoid"},
+    {"ignore_checksums", "--ignore-checksums"},
     {"jpeg_quality", "--texture-quality"},
     {"levels", "--levels"},
     {"lossless", "--lossless"},

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -198,9 +199,19 @@ class Restorer {
     const auto sink = open(source_raster_spec(archive_.metadata(), written, void_value), written);
     double rounding = 0.0;
     std::int64_t row = 0;
+    std::map<double, std::int64_t>
+        untold;  // void values that the output has no word for, and how often they stand there
     while (!reader.at_end()) {
       const std::vector<std::byte> raw = reader.read_next();
       const std::size_t count = raw.size() / size_bytes(kept.type);
+      if (as_kept && record.void_values.size() > 1) {
+        const LoadSample load = load_sample(kept.type);
+        for (std::size_t i = 0; i < count; ++i) {
+          const double value = load(raw.data() + i * size_bytes(kept.type));
+          if (value != void_value && std::ranges::find(record.void_values, value) != record.void_values.end())
+            ++untold[value];
+        }
+      }
       if (as_kept) {
         sink->write_rows(raw);
       } else {
@@ -220,6 +231,13 @@ class Restorer {
       row += static_cast<std::int64_t>(count) / record.width;
     }
     sink->finish();
+    for (const auto& [value, count] : untold) {
+      if (options_.common.quiet) break;
+      print_warning(
+          loss(fmt::format("{}: {} samples hold {:.9g}, which meant no elevation: a reader must be told, as with "
+                           "--nodata; isohf export writes one void value",
+                           options_.raster.output, count, value)));
+    }
     return {{}, true, sink->files(), options_.rounds && !as_kept ? std::optional(rounding) : std::nullopt, {}};
   }
 

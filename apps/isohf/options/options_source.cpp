@@ -37,10 +37,12 @@ void add_source_options(CommandLine& line, OpenOptions& options) {
       "fitting one, with them)",
       options.channel);
   line.option("--part", "NAME|N",
-              "Read this file of an archive, or this part of an OpenEXR file, by name or number from 0", options.part);
+              "Read this file of an archive, or this part of an OpenEXR file, by name or number from 0, or this zoom "
+              "level of tiles",
+              options.part);
   line.option(
       "--encoding", "NAME",
-      "Decode elevations packed into the colours of an 8-bit PNG: terrarium, mapbox or rgba-float (default: decode, "
+      "Decode elevations packed into the colours of PNG or WebP: terrarium, mapbox or rgba-float (default: decode, "
       "with a warning, where the bytes leave no doubt)",
       [&](const std::string& text) {
         (void)parse_word(text, {"terrarium", "mapbox", "rgba-float"});
@@ -84,6 +86,9 @@ void add_source_options(CommandLine& line, OpenOptions& options) {
               "Read bare samples: columns, rows, and u8, i8, or u16, i16, u32, i32, f32, f64 with le or be, as in "
               "200x200:u16le",
               [&](const std::string& text) { options.raw = raw_layout_from_string(text); });
+  line.flag("--ignore-checksums",
+            "Take the columns of DTED files whose checksum is wrong as they are (default: refuse)",
+            options.ignore_checksums);
   line.option("--sample-spacing", "METRES",
               "Set the distance of neighbouring samples, instead of the file's: metres, or with a unit as in 100ft",
               [&](const std::string& text) { options.spacing = parse_length(text).value; });

@@ -83,8 +83,9 @@ struct SourceInfo {
   std::int64_t width = 0;   ///< columns, >= 1
   std::int64_t height = 0;  ///< rows, >= 1
   SampleType sample_type = SampleType::kFloat32;
-  std::string channel;              ///< the chosen channel's name or number; empty where there is but one
-  std::vector<double> void_values;  ///< raw values that mean "no elevation"; NaN and infinities always do
+  std::string channel;                       ///< the chosen channel's name or number; empty where there is but one
+  std::vector<double> void_values;           ///< raw values that mean "no elevation"; NaN and infinities always do
+  std::vector<double> void_values_of_files;  ///< of a mosaic: what means no elevation in one file or another
   /// Raw values outside [valid_min, valid_max] are void as well (special pixel ranges); infinite where unbounded.
   double valid_min = -std::numeric_limits<double>::infinity();
   double valid_max = std::numeric_limits<double>::infinity();
@@ -160,7 +161,8 @@ struct OpenOptions {
   std::optional<double> spacing;  ///< sample spacing in metres, for files that do not say; overrides
   /// "EPSG:2154", WKT, a PROJ string: what the coordinates are in; overrides. Understood by the PROJ module.
   std::string reference_system;
-  std::optional<RawLayout> raw;  ///< the file is nothing but these samples, whatever its name and content say
+  bool ignore_checksums = false;  ///< of DTED columns: samples beside a wrong one are taken
+  std::optional<RawLayout> raw;   ///< the file is nothing but these samples, whatever its name and content say
   /// What all files that are open at once may hold of the contents that they have packed (.gz, .zip): contents that
   /// do not fit are unpacked piece by piece whenever they are read.
   std::uint64_t unpacked_bytes = std::uint64_t{256} << 20U;
@@ -180,7 +182,7 @@ struct OpenOptions {
 [[nodiscard]] std::unique_ptr<HeightSource> with_voids_treated(std::unique_ptr<HeightSource> source,
                                                                const VoidTreatment& treatment, const Job& job = {});
 
-/// Names a folder in which the modules (OpenImageIO, PROJ, netCDF-4) are looked for first; empty: only beside the
+/// Names a folder in which the modules (OpenImageIO, PROJ, netCDF-4, MBTiles) are looked for first; empty: only beside the
 /// program and in ../lib/isohf. A program calls it before it opens anything.
 void set_module_folder(const std::string& folder);
 

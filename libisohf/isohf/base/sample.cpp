@@ -326,7 +326,8 @@ void heights_from_samples(const SourceInfo& info, double datum, std::span<const 
 std::string void_values_with(const SourceInfo& info, std::vector<double> values) {
   // What is declared goes on to mean it, but what a range makes void anyway; as many digits as make the same number.
   const auto is_void_anyway = [&](double value) { return !(value >= info.valid_min && value <= info.valid_max); };
-  std::ranges::remove_copy_if(info.void_values, std::inserter(values, values.begin()), is_void_anyway);
+  const auto& declared = info.void_values_of_files.empty() ? info.void_values : info.void_values_of_files;
+  std::ranges::remove_copy_if(declared, std::inserter(values, values.begin()), is_void_anyway);
   return fmt::format("`void_values` {}", fmt::join(values, ","));
 }
 

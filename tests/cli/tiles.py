@@ -1,0 +1,367 @@
+#!/usr/bin/env python3
+"""Elevations in the tiles of web maps: PMTiles, MBTiles and folders, PNG and WebP; GDAL writes the pictures and reads what isohf makes of them (a test tool here).
+
+usage: tiles.py BIN_DIR
+       tiles.py --small FOLDER
+
+Ends with 77 where GDAL's Python package is missing (Debian: python3-gdal). --small writes the files of
+tests/formats/data/.
+"""
+import gzip
+import json
+import pathlib
+import sqlite3
+import struct
+import subprocess
+import sys
+import tempfile
+
+try:
+    import numpy
+    from osgeo import gdal
+except ImportError:
+    print("GDAL's Python package or numpy is missing")
+    sys.exit(77)
+
+gdal.UseExceptions()
+gdal.SetConfigOption("GDAL_PAM_ENABLED", "NO")
+HALF_MAP = 20037508.342789244
+failures = []
+
+
+def check(holds, what):
+    if not holds:
+        failures.append(what)
+        print("FAILED " + what)
+
+
+def codes(zoom, column, row, side):
+    """Codes of a tile, 24 bits: slopes that tell every place from its neighbours, of elevations that the ground has."""
+    x, y = numpy.meshgrid(column * side + numpy.arange(side), row * side + numpy.arange(side))
+    return (100000 + zoom * 1000 + (x * 7 + y * 13) % 20000).astype(numpy.int64)
+
+
+def packed(values, encoding):
+    """Red, green and blue, and the elevations that they are."""
+    if encoding == "terrarium":
+        values = values + (32768 << 8) - 90000
+        heights = values / 256.0 - 32768.0
+    else:
+        heights = values * 0.1 - 10000.0
+    return numpy.stack([values >> 16 & 255, values >> 8 & 255, values & 255]).astype(numpy.uint8), heights
+
+
+def picture(bands, driver="PNG", options=()):
+    raster = gdal.GetDriverByName("MEM").Create("", bands.shape[2], bands.shape[1], len(bands), gdal.GDT_Byte)
+    for i, band in enumerate(bands):
+        raster.GetRasterBand(i + 1).WriteArray(band)
+    if len(bands) in (2, 4):
+        raster.GetRasterBand(len(bands)).SetColorInterpretation(gdal.GCI_AlphaBand)
+    gdal.GetDriverByName(driver).CreateCopy("/vsimem/picture", raster, options=list(options))
+    file = gdal.VSIFOpenL("/vsimem/picture", "rb")
+    size = gdal.VSIStatL("/vsimem/picture").size
+    found = bytes(gdal.VSIFReadL(1, size, file))
+    gdal.VSIFCloseL(file)
+    return found
+
+
+def webp(bands):
+    return picture(bands, "WEBP", ["LOSSLESS=YES"])
+
+
+def tiles_of(places, encoding, side=256, draw=picture):
+    return {place: draw(packed(codes(*place, side), encoding)[0]) for place in places}
+
+
+# PMTiles, version 3
+def tile_number(zoom, x, y):
+    number = (4 ** zoom - 1) // 3
+    side = 1 << zoom >> 1
+    while side:
+        right, low = int(bool(x & side)), int(bool(y & side))
+        number += side * side * ((3 * right) ^ low)
+        if not low:
+            if right:
+                x, y = side - 1 - x, side - 1 - y
+            x, y = y, x
+        side >>= 1
+    return number
+
+
+def varint(value):
+    out = bytearray()
+    while value >= 128:
+        out.append(value & 127 | 128)
+        value >>= 7
+    return bytes(out) + bytes([value])
+
+
+def directory(entries, packing):
+    """entries  (number, offset, length, run)"""
+    out = varint(len(entries))
+    out += b"".join(varint(e[0] - (entries[i - 1][0] if i else 0)) for i, e in enumerate(entries))
+    out += b"".join(varint(e[3]) for e in entries) + b"".join(varint(e[2]) for e in entries)
+    for i, e in enumerate(entries):
+        follows = i and e[1] == entries[i - 1][1] + entries[i - 1][2]
+        out += varint(0 if follows else e[1] + 1)
+    return gzip.compress(out, mtime=0) if packing == 2 else out
+
+
+def pmtiles(tiles, kind=2, packing=2, leaf=None, metadata=None):
+    """tiles by (zoom, column, row); equal ones that follow each other are stored once."""
+    data, entries, places = b"", [], {}
+    for number, stored in sorted((tile_number(*place), stored) for place, stored in tiles.items()):
+        if stored not in places:
+            places[stored] = len(data)
+            data += stored
+        last = entries[-1] if entries else None
+        if last and last[1] == places[stored] and last[0] + last[3] == number:
+            entries[-1] = (*last[:3], last[3] + 1)
+        else:
+            entries.append((number, places[stored], len(stored), 1))
+    leaves, root = b"", entries
+    if leaf:
+        root = []
+        for at in range(0, len(entries), leaf):
+            part = directory(entries[at:at + leaf], packing)
+            root.append((entries[at][0], len(leaves), len(part), 0))
+            leaves += part
+    root = directory(root, packing)
+    text = json.dumps(metadata or {}).encode()
+    text = gzip.compress(text, mtime=0) if packing == 2 else text
+    at = 127
+    offsets = []
+    for part in (root, text, leaves, data):
+        offsets += [at, len(part)]
+        at += len(part)
+    zooms = [place[0] for place in tiles]
+    header = b"PMTiles\x03" + struct.pack("<8Q", *offsets) + struct.pack("<3Q", len(tiles), len(entries), len(places))
+    header += bytes([1, packing, 1, kind, min(zooms), max(zooms)]) + bytes(25)
+    assert len(header) == 127
+    return header + root + text + leaves + data
+
+
+def mbtiles(path, tiles, metadata=None, views=False, page=4096):
+    path.unlink(missing_ok=True)
+    base = sqlite3.connect(path)
+    base.execute(f"PRAGMA page_size={page}")
+    base.execute("CREATE TABLE metadata (name text, value text)")
+    base.executemany("INSERT INTO metadata VALUES (?, ?)", (metadata or {}).items())
+    rows = [(z, x, (1 << z) - 1 - y, stored) for (z, x, y), stored in tiles.items()]
+    if views:  # equal pictures stored once
+        base.execute("CREATE TABLE map (zoom_level integer, tile_column integer, tile_row integer, tile_id text)")
+        base.execute("CREATE TABLE images (tile_data blob, tile_id text)")
+        base.executemany("INSERT INTO map VALUES (?, ?, ?, ?)", [(z, x, y, str(hash(s))) for z, x, y, s in rows])
+        base.executemany("INSERT INTO images VALUES (?, ?)", {(s, str(hash(s))) for *_, s in rows})
+        base.execute("CREATE VIEW tiles AS SELECT map.zoom_level AS zoom_level, map.tile_column AS tile_column, "
+                     "map.tile_row AS tile_row, images.tile_data AS tile_data FROM map JOIN images ON images.tile_id = map.tile_id")
+    else:
+        base.execute("CREATE TABLE tiles (zoom_level integer, tile_column integer, tile_row integer, tile_data blob)")
+        base.executemany("INSERT INTO tiles VALUES (?, ?, ?, ?)", rows)
+        base.execute("CREATE UNIQUE INDEX tile_index ON tiles (zoom_level, tile_column, tile_row)")
+    base.commit()
+    base.close()
+    return path
+
+
+def folder_of(root, tiles, ending):
+    for (zoom, column, row), stored in tiles.items():
+        path = root / str(zoom) / str(column) / f"{row}.{ending}"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(stored)
+    return root
+
+
+class Program:
+    def __init__(self, folder, bin_dir):
+        self.folder = folder
+        self.bin = bin_dir
+
+    def run(self, *arguments):
+        return subprocess.run([f"{self.bin}/isohf", *map(str, arguments)], capture_output=True, text=True, check=False)
+
+    def refuses(self, said, *arguments):
+        result = self.run(*arguments)
+        lines = result.stderr.strip().splitlines()
+        check(result.returncode in (1, 2) and len(lines) == 1 and said in lines[0],
+              f"isohf {' '.join(map(str, arguments))}: must say '{said}' in one line, said: {result.stderr.strip()}")
+
+    def holds(self, source, tiles, zoom, encoding, *options, side=256, missing_is_void=True):
+        """Samples, voids and place of all tiles of a level, as GDAL reads what comes back."""
+        archive, raster = self.folder / "a.isohf", self.folder / "a.tif"
+        for arguments in (("convert", source, "-o", archive, "--overwrite", "--lossless", "--projection", "none", "-q",
+                           *options), ("restore", archive, raster, "--overwrite", "-q")):
+            done = self.run(*arguments)
+            if done.returncode != 0:
+                return check(False, f"isohf {' '.join(map(str, arguments))}: {done.stderr.strip()}")
+        places = [place for place in tiles if place[0] == zoom]
+        west, north = min(p[1] for p in places), min(p[2] for p in places)
+        east, south = max(p[1] for p in places) + 1, max(p[2] for p in places) + 1
+        wanted = numpy.full(((south - north) * side, (east - west) * side), numpy.nan)
+        for _, column, row in places:
+            at = slice((row - north) * side, (row - north + 1) * side), slice((column - west) * side, (column - west + 1) * side)
+            wanted[at] = packed(codes(zoom, column, row, side), encoding)[1]
+        found = gdal.Open(str(raster))
+        band = found.GetRasterBand(1)
+        values = band.ReadAsArray().astype(numpy.float64)
+        void = band.GetNoDataValue()
+        values[values == void] = numpy.nan
+        values = values * (band.GetScale() or 1.0) + (band.GetOffset() or 0.0)
+        name = f"{pathlib.Path(source).name} {' '.join(map(str, options))}"
+        if values.shape != wanted.shape:
+            return check(False, f"{name}: {values.shape}, must be {wanted.shape}")
+        check(numpy.allclose(values, wanted, rtol=0, atol=1e-9, equal_nan=True), f"{name}: samples differ")
+        step = 2 * HALF_MAP / (side << zoom)
+        place = (west * side * step - HALF_MAP, step, 0, HALF_MAP - north * side * step, 0, -step)
+        check(numpy.allclose(found.GetGeoTransform(), place, rtol=0, atol=0.001 * step), f"{name}: {found.GetGeoTransform()}, must be {place}")
+        check(found.GetSpatialRef().GetAuthorityCode("PROJCS") == "3857", f"{name}: another system")
+
+
+BLOCK = [(9, x, y) for x in range(266, 269) for y in range(180, 183)]
+HOLES = [place for place in BLOCK if place not in ((9, 266, 180), (9, 267, 181))] + [(8, 133, 90), (8, 134, 90)]
+
+
+def read(isohf, folder):
+    for encoding in ("terrarium", "mapbox"):
+        for places in (BLOCK, HOLES):
+            plain, small = tiles_of(places, encoding), tiles_of(places, encoding, 256, webp)
+            for packing in (1, 2):
+                for leaf in (None, 1, 4):
+                    path = folder / f"a{packing}{leaf}.pmtiles"
+                    path.write_bytes(pmtiles(plain, 2, packing, leaf))
+                    isohf.holds(path, plain, 9, encoding)
+            (folder / "w.pmtiles").write_bytes(pmtiles(small, 4))
+            isohf.holds(folder / "w.pmtiles", small, 9, encoding)
+            for views in (False, True):
+                isohf.holds(mbtiles(folder / "a.mbtiles", plain, views=views), plain, 9, encoding)
+                isohf.holds(mbtiles(folder / "w.mbtiles", small, views=views), small, 9, encoding, "--encoding", encoding)
+    plain = tiles_of(HOLES, "mapbox")
+    path = folder / "z.pmtiles"
+    path.write_bytes(pmtiles(plain))
+    for source in (path, mbtiles(folder / "z.mbtiles", plain)):
+        isohf.holds(source, plain, 8, "mapbox", "--part", "8", "--encoding", "mapbox")
+        for part in ("7", "10", "x", "-1", "99999999999", "8 "):
+            isohf.refuses("has no zoom level", "convert", source, "-o", folder / "n.isohf", "--part", part)
+        isohf.refuses("has no channels but packed", "convert", source, "-o", folder / "n.isohf", "--channel", "R")
+    # Tiles of the sea alone look like nothing; what the file says counts.
+    large = tiles_of(BLOCK, "mapbox", 512)
+    sea = {place: picture(packed(numpy.full((64, 64), 100000), "mapbox")[0]) for place in BLOCK}
+    (folder / "sea.pmtiles").write_bytes(pmtiles(sea))
+    isohf.refuses("--encoding", "convert", folder / "sea.pmtiles", "-o", folder / "n.isohf")
+    for source in ((folder / "s.pmtiles", {"encoding": "mapbox"}), (folder / "s.mbtiles", {"encoding": "mapbox"}),
+                   (folder / "t.mbtiles", {"json": '{"encoding": "mapbox"}'})):
+        path, metadata = source
+        path.write_bytes(pmtiles(sea, metadata=metadata)) if path.suffix == ".pmtiles" else mbtiles(path, sea, metadata)
+        check(isohf.run("convert", path, "-o", folder / "s.isohf", "--overwrite", "-q").returncode == 0, f"{path.name}: its encoding is not taken")
+    (folder / "l.pmtiles").write_bytes(pmtiles(large))
+    isohf.holds(folder / "l.pmtiles", large, 9, "mapbox", side=512)
+    runs = {place: sea[BLOCK[0]] for place in [(6, x, y) for x in range(64) for y in range(64)]}
+    (folder / "runs.pmtiles").write_bytes(pmtiles(runs))
+    said = json.loads(isohf.run("info", folder / "runs.pmtiles", "--encoding", "mapbox", "--json").stdout)
+    check("4096" in json.dumps(said), f"64 x 64 tiles in one run: {said}")
+
+
+def folders(isohf, folder):
+    for ending, draw in (("png", picture), ("webp", webp)):
+        tiles = tiles_of(BLOCK, "terrarium", 256, draw)
+        isohf.holds(folder_of(folder / ending, tiles, ending), tiles, 9, "terrarium", "--recursive", "--encoding", "terrarium")
+    rim = tiles_of(BLOCK[:1], "mapbox", 258)
+    folder_of(folder / "rim", rim, "png")
+    said = isohf.run("info", folder / "rim/9/266/180.png", "--encoding", "mapbox").stderr
+    check("rim of their neighbours'" in said, f"a tile with a rim: {said}")
+
+
+def as_gdal(isohf, folder):
+    """Against GDAL's own reader and writer of MBTiles."""
+    step = 2 * HALF_MAP / (256 << 9)
+    tiles = tiles_of(BLOCK, "mapbox")
+    raster = gdal.GetDriverByName("MEM").Create("", 768, 768, 3, gdal.GDT_Byte)
+    raster.SetGeoTransform((266 * 256 * step - HALF_MAP, step, 0, HALF_MAP - 180 * 256 * step, 0, -step))
+    raster.SetSpatialRef(system())
+    for place in BLOCK:
+        bands = packed(codes(*place, 256), "mapbox")[0]
+        for i in range(3):
+            raster.GetRasterBand(i + 1).WriteArray(bands[i], (place[1] - 266) * 256, (place[2] - 180) * 256)
+    gdal.GetDriverByName("MBTiles").CreateCopy(str(folder / "g.mbtiles"), raster, options=["TILE_FORMAT=PNG"])
+    isohf.holds(folder / "g.mbtiles", tiles, 9, "mapbox")
+    ours = gdal.Open(str(mbtiles(folder / "o.mbtiles", tiles, {"format": "png", "bounds": "-180,-85,180,85"})))
+    check(ours is not None, "GDAL does not read what the test writes")
+
+
+def system():
+    from osgeo import osr
+    made = osr.SpatialReference()
+    made.ImportFromEPSG(3857)
+    return made
+
+
+def refused(isohf, folder):
+    def says(said, name, stored):
+        (folder / name).write_bytes(stored)
+        isohf.refuses(said, "convert", folder / name, "-o", folder / "n.isohf", "--encoding", "mapbox")
+
+    tiles = tiles_of(BLOCK, "mapbox")
+    good = pmtiles(tiles)
+    jpeg = {BLOCK[0]: picture(packed(codes(*BLOCK[0], 256), "mapbox")[0], "JPEG")}
+    lossy = {BLOCK[0]: picture(packed(codes(*BLOCK[0], 256), "mapbox")[0], "WEBP")}
+    outlines = {BLOCK[0]: gzip.compress(b"outlines")}
+    says("JPEG pictures, which do not keep", "j.pmtiles", pmtiles(jpeg, 3))
+    says("a JPEG picture, which does not keep", "k.pmtiles", pmtiles(jpeg, 2))
+    says("lossy WebP", "l.pmtiles", pmtiles(lossy, 4))
+    says("lossy WebP", "l.webp", lossy[BLOCK[0]])
+    says("vectors (MVT)", "v.pmtiles", pmtiles(outlines, 1))
+    says("packed outlines", "v2.pmtiles", pmtiles(outlines, 0))
+    says("must be 3", "two.pmtiles", good[:7] + b"\x02" + good[8:])
+    says("Brotli", "b.pmtiles", good[:97] + b"\x03" + good[98:])
+    says("", "cut.pmtiles", good[:len(good) - 100])
+    says("", "short.pmtiles", good[:100])
+    says("258 x 258", "rim.pmtiles", pmtiles(tiles_of(BLOCK, "mapbox", 258)))
+    mixed = {**tiles, BLOCK[4]: tiles_of([BLOCK[4]], "mapbox", 128)[BLOCK[4]]}
+    says("256 each way", "mixed.pmtiles", pmtiles(mixed))
+    for name, stored in (("j.mbtiles", jpeg), ("v.mbtiles", outlines), ("l.mbtiles", lossy), ("mixed.mbtiles", mixed)):
+        mbtiles(folder / name, stored)
+        isohf.refuses("tile 9/", "convert", folder / name, "-o", folder / "n.isohf", "--encoding", "mapbox")
+    base = sqlite3.connect(folder / "other.mbtiles")
+    base.execute("CREATE TABLE features (name text)")
+    base.commit()
+    base.close()
+    isohf.refuses("none of tiles", "info", folder / "other.mbtiles")
+    isohf.refuses("holds no tiles", "info", mbtiles(folder / "empty.mbtiles", {}))
+    isohf.refuses("must be from 0 to", "info", mbtiles(folder / "far.mbtiles", {(3, 9, 2): tiles[BLOCK[0]]}))
+    stored = mbtiles(folder / "g.mbtiles", tiles).read_bytes()
+    says("", "cut.mbtiles", stored[:len(stored) // 2])
+    # What a program has open in the journal beside it is part of the file.
+    writer = sqlite3.connect(mbtiles(folder / "wal.mbtiles", {place: tiles[place] for place in BLOCK[:8]}))
+    writer.execute("PRAGMA journal_mode=WAL")
+    writer.execute("INSERT INTO tiles VALUES (9, ?, ?, ?)", (BLOCK[8][1], 511 - BLOCK[8][2], tiles[BLOCK[8]]))
+    writer.commit()
+    isohf.holds(folder / "wal.mbtiles", tiles, 9, "mapbox")
+    writer.close()
+
+
+def write_small(folder):
+    """What tests damage: two tiles of 8 x 8 and a hole."""
+    places = [(3, 4, 2), (3, 5, 3)]
+    tiles = tiles_of(places, "mapbox", 8)
+    (folder / "small.pmtiles").write_bytes(pmtiles(tiles, metadata={"encoding": "mapbox"}, leaf=1))
+    (folder / "small.webp").write_bytes(webp(packed(codes(*places[0], 8), "mapbox")[0]))
+    mbtiles(folder / "small.mbtiles", tiles, {"encoding": "mapbox"}, page=512)
+
+
+def main():
+    if len(sys.argv) == 3 and sys.argv[1] == "--small":
+        write_small(pathlib.Path(sys.argv[2]))
+        return 0
+    if len(sys.argv) != 2:
+        print(__doc__, file=sys.stderr)
+        return 2
+    bin_dir = pathlib.Path(sys.argv[1]).resolve()
+    for part in (read, folders, as_gdal, refused):
+        with tempfile.TemporaryDirectory(prefix="tiles") as folder:
+            part(Program(pathlib.Path(folder), bin_dir), pathlib.Path(folder))
+    print(f"{len(failures)} failures")
+    return 1 if failures else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
