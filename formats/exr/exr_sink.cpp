@@ -3,6 +3,7 @@
 #include <OpenEXR/ImfHeader.h>
 #include <OpenEXR/ImfIO.h>
 #include <OpenEXR/ImfOutputFile.h>
+#include <OpenEXR/ImfThreading.h>
 #include <fmt/format.h>
 
 #include <array>
@@ -60,9 +61,14 @@ Imf::PixelType pixel_type(SampleType type) {
   }
 }
 
+/// Rows that are compressed together, where they take no more; of very wide pictures each for itself.
+constexpr std::size_t kRowsTogether = 16;
+constexpr std::size_t kMostBytesTogether = std::size_t{8} << 20U;
+
 Imf::Header header_of(const RasterSpec& spec) {
   Imf::Header header(static_cast<int>(spec.width), static_cast<int>(spec.height));
-  header.compression() = spec.compress ? Imf::ZIP_COMPRESSION : Imf::NO_COMPRESSION;
+  const bool is_wide = kRowsTogether * row_bytes(spec) > kMostBytesTogether;
+  header.compression() = !spec.compress ? Imf::NO_COMPRESSION : is_wide ? Imf::ZIPS_COMPRESSION : Imf::ZIP_COMPRESSION;
   return header;
 }
 
@@ -77,7 +83,8 @@ class ExrEncoder final : public RasterEncoder {
     }
     start_exr_threads();
     stream_.emplace(out);
-    translated([&] { file_.emplace(*stream_, header); });
+    // Each thread has buffers of its own.
+    translated([&] { file_.emplace(*stream_, header, spec.scratch ? 0 : Imf::globalThreadCount()); });
   }
 
   void write(std::span<const std::byte> rows, std::int64_t count) override {

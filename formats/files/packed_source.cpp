@@ -1,11 +1,15 @@
 /// Rasters in ZIP and tar archives, and in .gz where their reader needs a file: they are unpacked into a folder that goes
 /// when they are closed.
 
+#include <fcntl.h>
 #include <fmt/core.h>
+#include <sys/file.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <chrono>
 #include <cstdlib>
 #include <filesystem>
 #include <initializer_list>
@@ -217,17 +221,55 @@ std::string list_of_names(const std::vector<const Member*>& members) {
   return list.empty() ? "no files" : list;
 }
 
-/// A folder that goes with all that is in it.
+/// A folder's lock, which goes with the process that holds it, however that ends.
+class FolderLock {
+ public:
+  explicit FolderLock(const fs::path& folder)
+      : descriptor_(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC)),
+        held_(descriptor_ >= 0 && ::flock(descriptor_, LOCK_EX | LOCK_NB) == 0) {}
+  ~FolderLock() {
+    if (descriptor_ >= 0) ::close(descriptor_);
+  }
+  FolderLock(const FolderLock&) = delete;
+  FolderLock& operator=(const FolderLock&) = delete;
+  [[nodiscard]] bool held() const { return held_; }
+
+ private:
+  int descriptor_;
+  bool held_;
+};
+
+constexpr std::string_view kScratchName = "isohf-unpacked-";
+/// By then a folder that was made is locked.
+constexpr std::chrono::minutes kUntilLocked{1};
+
+/// Removes folders of runs that were killed.
+void remove_abandoned(const fs::path& folder) {
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(folder, error)) {
+    if (!entry.path().filename().string().starts_with(kScratchName)) continue;
+    std::error_code ignored;
+    const auto changed = entry.last_write_time(ignored);
+    if (ignored || fs::file_time_type::clock::now() - changed < kUntilLocked) continue;
+    if (const FolderLock lock(entry.path()); lock.held()) fs::remove_all(entry.path(), ignored);
+  }
+}
+
+/// A folder that goes with all that is in it. Its files have names that readers go by: where this process is killed, the
+/// next one that unpacks removes them.
 class Scratch {
  public:
   explicit Scratch(const std::string& archive) {
     std::error_code error;
-    std::string name = (fs::temp_directory_path(error) / "isohf-XXXXXX").string();
+    const fs::path folder = fs::temp_directory_path(error);
+    if (!error) remove_abandoned(folder);
+    std::string name = (folder / kScratchName).string() + "XXXXXX";
     if (error || ::mkdtemp(name.data()) == nullptr) {
       throw Error(ErrorCode::kIo,
                   archive + ": no folder to unpack it in can be made where temporary files are (TMPDIR)");
     }
     path_ = name;
+    lock_.emplace(path_);
   }
   ~Scratch() {
     std::error_code ignored;
@@ -262,6 +304,7 @@ class Scratch {
 
  private:
   fs::path path_;
+  std::optional<FolderLock> lock_;
 };
 
 /// A raster that was unpacked to be read, under its archive's name.

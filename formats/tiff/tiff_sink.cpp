@@ -13,6 +13,7 @@
 #include <cstring>
 #include <exception>
 #include <memory>
+#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -160,6 +161,10 @@ class TiffEncoder final : public RasterEncoder {
   ~TiffEncoder() override { release(); }
 
   void write(std::span<const std::byte> rows, std::int64_t /*count*/) override {
+    for (; tiled_ && !rows.empty(); rows = rows.subspan(row_bytes_)) {
+      band_->write(band_rows_++, 0, rows.first(row_bytes_));
+      if (band_rows_ == static_cast<std::int64_t>(kTileSide)) write_tiles();
+    }
     while (!rows.empty()) {
       const auto taken = rows.first(std::min(rows.size(), batch_bytes_ - pending_.size()));
       pending_.insert(pending_.end(), taken.begin(), taken.end());
@@ -246,7 +251,8 @@ class TiffEncoder final : public RasterEncoder {
     row_bytes_ = one_row;
     tiled_ = spec.width > kSide && spec.height > kSide && one_row <= kMostBandBytes / kTileSide;
     if (tiled_) {
-      batch_bytes_ = kTileSide * one_row;
+      band_.emplace(one_row, spec.scratch);
+      for (std::int64_t row = 0; row < kSide; ++row) band_->add(row);
       layout_ = {spec.sample_type, kTileSide * channels, channels};
       set(TIFFTAG_TILEWIDTH, static_cast<std::uint32_t>(kTileSide));
       set(TIFFTAG_TILELENGTH, static_cast<std::uint32_t>(kTileSide));
@@ -321,29 +327,29 @@ class TiffEncoder final : public RasterEncoder {
     pending_.clear();
   }
 
-  /// The same for the pending rows as tiles; what lies beyond the raster is zero.
+  /// The same for a band of rows as tiles; what lies beyond the raster is zero.
   void write_tiles() {
-    const std::size_t size = size_bytes(layout_.sample_type);
-    const std::size_t tile_row = layout_.samples_per_row * size;
-    const std::size_t across = (row_bytes_ + tile_row - 1) / tile_row;
-    const std::size_t rows = pending_.size() / row_bytes_;
-    if (rows == 0) return;
-    std::vector<std::vector<std::byte>> tiles(across);
-    tbb::parallel_for(std::size_t{0}, across, [&](std::size_t at) {
-      std::vector<std::byte> tile(tile_row * kTileSide);
-      const std::size_t begin = at * tile_row;
-      const std::size_t there = std::min(tile_row, row_bytes_ - begin);
-      for (std::size_t row = 0; row < rows; ++row) {
-        std::memcpy(tile.data() + row * tile_row, pending_.data() + row * row_bytes_ + begin, there);
+    const std::size_t tile_row = layout_.samples_per_row * size_bytes(layout_.sample_type);
+    const std::size_t across = band_rows_ > 0 ? (row_bytes_ + tile_row - 1) / tile_row : 0;
+    for (std::size_t first = 0; first < across; first += kBatchStrips) {
+      std::vector<std::vector<std::byte>> tiles(std::min(kBatchStrips, across - first));
+      tbb::parallel_for(std::size_t{0}, tiles.size(), [&](std::size_t at) {
+        std::vector<std::byte> tile(tile_row * kTileSide);
+        const std::size_t begin = (first + at) * tile_row;
+        std::vector<std::byte> buffer;
+        for (std::int64_t row = 0; row < band_rows_; ++row) {
+          const auto part = band_->read(row, begin, std::min(tile_row, row_bytes_ - begin), buffer);
+          std::memcpy(tile.data() + static_cast<std::size_t>(row) * tile_row, part.data(), part.size());
+        }
+        tiles[at] = compress_tiff_strip(layout_, tile);
+      });
+      for (std::vector<std::byte>& tile : tiles) {
+        const auto bytes = static_cast<tmsize_t>(tile.size());
+        if (TIFFWriteRawTile(tiff_, strip_, tile.data(), bytes) != bytes) fail();
+        ++strip_;
       }
-      tiles[at] = compress_tiff_strip(layout_, tile);
-    });
-    for (std::vector<std::byte>& tile : tiles) {
-      const auto bytes = static_cast<tmsize_t>(tile.size());
-      if (TIFFWriteRawTile(tiff_, strip_, tile.data(), bytes) != bytes) fail();
-      ++strip_;
     }
-    pending_.clear();
+    band_rows_ = 0;
   }
 
   void release() {
@@ -360,8 +366,10 @@ class TiffEncoder final : public RasterEncoder {
   std::size_t batch_bytes_ = 0;
   TiffStripLayout layout_;
   TIFF* tiff_ = nullptr;
-  std::uint32_t strip_ = 0;         ///< or tile, the next one
-  std::vector<std::byte> pending_;  ///< rows of the next strips
+  std::uint32_t strip_ = 0;                  ///< or tile, the next one
+  std::vector<std::byte> pending_;           ///< rows of the next strips
+  std::optional<KeptRows<std::byte>> band_;  ///< rows of the next tiles
+  std::int64_t band_rows_ = 0;
   bool failed_ = false;
   std::string message_;
 };

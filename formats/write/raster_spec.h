@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 
+#include "isohf/base/memory/kept_rows.h"
 #include "isohf/raster.h"
 
 namespace isohf {
@@ -24,6 +25,7 @@ struct RasterSpec {
   bool describe = false;   ///< of PNG: write NAME.png.json beside it, which says what the numbers mean
   bool compress = true;    ///< TIFF, OpenEXR
   bool overwrite = false;  ///< replace a file of that name
+  ScratchFolder scratch;   ///< for what is kept until it can be written, where memory is bounded
 };
 
 }  // namespace isohf

@@ -77,6 +77,14 @@ TEST(Memory, EveryCommandStaysWithinATenthOfWhatItIsGivenAndMakesTheSame) {
       {{"diff", folder / "seeds.isohf", folder / "kept.isohf", "--raster", folder / "diff.npy"},
        folder / "diff.npy",
        60},
+      {{"shade", folder / "seeds.isohf", folder / "east.tif", "--size", "60000x300"}, folder / "east.tif", 50},
+      {{"shade", folder / "seeds.isohf", folder / "south.png", "--size", "60000x300", "--shadow-mask", "--azimuth",
+        "190"},
+       folder / "south.png",
+       50},
+      {{"shade", folder / "seeds.isohf", folder / "slope.tif", "--size", "30000x150", "--slope"},
+       folder / "slope.tif",
+       45},
       {{"verify", folder / "kept.isohf"}, "", 45},
       {{"verify", folder / "seeds.isohf"}, "", 65},
       {{"verify", folder / "seeds.isohf", "--against", folder / "wide.raw", "--raw", raw}, "", 80}};
@@ -106,8 +114,9 @@ TEST(Memory, EveryCommandStaysWithinATenthOfWhatItIsGivenAndMakesTheSame) {
     EXPECT_THAT(result.err, HasSubstr("--memory allows 14 MB, "));
     EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
   }
-  EXPECT_EQ(folder.names(), (std::vector<std::string>{"back.npy", "diff.npy", "flat.npy", "full.isohf", "hex.npy",
-                                                      "kept.isohf", "seeds.isohf", "wide.raw"}));
+  EXPECT_EQ(folder.names(),
+            (std::vector<std::string>{"back.npy", "diff.npy", "east.tif", "flat.npy", "full.isohf", "hex.npy",
+                                      "kept.isohf", "seeds.isohf", "slope.tif", "south.png", "wide.raw"}));
 }
 
 TEST(Memory, ConvertStaysWithinATenthOfWhatItIsGivenAndWritesTheSameBytes) {

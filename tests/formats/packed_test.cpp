@@ -3,8 +3,13 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
+#include <chrono>
+#include <csignal>
 #include <cstdlib>
+#include <filesystem>
 
 #include "formats/gzipped.h"
 #include "formats/reader_failure.h"
@@ -67,6 +72,37 @@ class Packed : public ::testing::Test {
   TemporaryFolder folder_;
   TemporaryFolder temporary_;
 };
+
+TEST_F(Packed, RemovesWhatKilledRunsLeft) {
+  write_file(folder_ / "dem.zip", zip({{"dem.asc", grid()}}));
+  // A child that is killed while it has the archive open.
+  int opened[2] = {};
+  ASSERT_EQ(::pipe(opened), 0);
+  const ::pid_t child = ::fork();
+  if (child == 0) {
+    const auto source = open("dem.zip");
+    (void)!::write(opened[1], "x", 1);
+    ::pause();
+  }
+  char byte = 0;
+  ASSERT_EQ(::read(opened[0], &byte, 1), 1);
+  const std::vector<std::string> in_use = temporary_.names();
+  ASSERT_EQ(in_use.size(), 1U);
+  const auto age = [&] {
+    const auto now = std::filesystem::file_time_type::clock::now();
+    std::filesystem::last_write_time(temporary_ / in_use.front(), now - std::chrono::hours(1));
+  };
+  age();
+  EXPECT_THAT(values("dem.zip"), ElementsAre(1, 2, 3, 4));
+  EXPECT_EQ(temporary_.names(), in_use) << "of a run that goes on";
+  ::kill(child, SIGKILL);
+  ::waitpid(child, nullptr, 0);
+  age();
+  EXPECT_THAT(values("dem.zip"), ElementsAre(1, 2, 3, 4));
+  EXPECT_THAT(temporary_.names(), IsEmpty());
+  ::close(opened[0]);
+  ::close(opened[1]);
+}
 
 TEST_F(Packed, WhatLiesBesideTheRasterInAnArchiveBelongsToIt) {
   const Files files = {{"readme.txt", "x"}, {"other/a.hdr", "x"}, {"d/e/a.flt", kFloats}, {"d/e/a.hdr", kHeader}};

@@ -28,17 +28,20 @@ float height_at(LatticeVertex vertex) {
 
 /// Depths of all tiles, passed over from the sun's side.
 std::vector<TileRowValues> depths_of(const TileGrid& grid, ShadowSweep& sweep) {
-  std::vector<TileRowValues> all(static_cast<std::size_t>(grid.tile_rows()));
+  std::vector<TileRowValues> all;
+  for (std::int64_t row = 0; row < grid.tile_rows(); ++row) all.emplace_back(grid, std::nullopt);
   ShadowSweep::State light;
   for (std::int64_t k = 0; k < grid.tile_rows(); ++k) {
     const std::int64_t row = sweep.from_south() ? grid.tile_rows() - 1 - k : k;
-    TileRowValues heights(static_cast<std::size_t>(grid.tile_columns()));
+    TileRowValues heights(grid, std::nullopt);
     for (std::int64_t column = 0; column < grid.tile_columns(); ++column) {
+      std::vector<float> tile;
       for (int r = 0; r < grid.shape().rows(); ++r) {
         for (int c = 0; c < grid.shape().columns(); ++c) {
-          heights[static_cast<std::size_t>(column)].push_back(height_at(grid.lattice_vertex({column, row}, {c, r})));
+          tile.push_back(height_at(grid.lattice_vertex({column, row}, {c, r})));
         }
       }
+      heights.write_tile(column, tile);
     }
     light = sweep.pass(row, light, heights, &all[static_cast<std::size_t>(row)]);
   }
@@ -69,6 +72,7 @@ TEST(ShadowSweep, IsExactAtTheVerticesOnTheSixAzimuthsOfTheLattice) {
       int compared = 0;
       for (std::int64_t tile = 0; tile < grid.tile_count(); ++tile) {
         const TileIndex index = grid.tile_at(tile);
+        const std::vector<float> found_here = depths[static_cast<std::size_t>(index.row)].tile(index.column);
         for (int r = 1; r <= grid.shape().rows() - 2; ++r) {
           for (int c = 1; c <= last_visible_column(grid.shape(), r); ++c) {
             // Slid vertices lie between the lattice's lines, and on its rows half a step from their neighbours.
@@ -83,8 +87,7 @@ TEST(ShadowSweep, IsExactAtTheVerticesOnTheSixAzimuthsOfTheLattice) {
             // In the sun a depth says how near the light's line passes, also between vertices.
             const double depth = std::max(dark - static_cast<double>(height_at(at)), 0.0);
             const auto found =
-                static_cast<double>(depths[static_cast<std::size_t>(index.row)][static_cast<std::size_t>(index.column)]
-                                          [static_cast<std::size_t>(r * grid.shape().columns() + c)]);
+                static_cast<double>(found_here[static_cast<std::size_t>(r * grid.shape().columns() + c)]);
             ASSERT_NEAR(std::max(found, 0.0), depth, 1e-4) << way.azimuth << " at " << at.x << ' ' << at.z;
             ++compared;
           }
@@ -104,10 +107,12 @@ TEST(ShadowSweep, AgreesWhereTilesMeet) {
     ShadowSweep sweep(grid, ground, azimuth, 0.2, 5.0);
     const std::vector<TileRowValues> depths = depths_of(grid, sweep);
     for (std::size_t row = 0; row + 1 < depths.size(); ++row) {
-      for (std::size_t column = 0; column < depths[row].size(); ++column) {
+      for (std::int64_t column = 0; column < grid.tile_columns(); ++column) {
+        const std::vector<float> north = depths[row].tile(column);
+        const std::vector<float> south = depths[row + 1].tile(column);
         for (int c = 1; c <= last_visible_column(grid.shape(), last); ++c) {
           const auto at = [&](int r) { return static_cast<std::size_t>(r * grid.shape().columns() + c); };
-          ASSERT_NEAR(depths[row][column][at(last)], depths[row + 1][column][at(1)], 1e-3) << azimuth;
+          ASSERT_NEAR(north[at(last)], south[at(1)], 1e-3) << azimuth;
         }
       }
     }

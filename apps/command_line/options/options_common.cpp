@@ -44,6 +44,10 @@ void add_memory_options(CommandLine& line, const std::string& usual_folder, Work
               options.scratch_folder);
 }
 
+ScratchFolder scratch_of(const WorkOptions& options) {
+  return options.memory_bytes == 0 ? std::nullopt : ScratchFolder(options.scratch_folder);
+}
+
 Job job_from(const WorkOptions& options, ProgressDisplay& display) {
   Job job;
   job.threads = options.threads;

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 
+#include "isohf/base/memory/kept_rows.h"
 #include "isohf/job.h"
 #include "options/command_line.h"
 #include "output/progress.h"
@@ -32,6 +33,9 @@ void add_work_options(CommandLine& line, WorkOptions& options);
 
 /// --memory SIZE, --tmpdir FOLDER; usual_folder is described.
 void add_memory_options(CommandLine& line, const std::string& usual_folder, WorkOptions& options);
+
+/// Where files that are written keep what memory has no room for: nowhere where it is not bounded.
+[[nodiscard]] ScratchFolder scratch_of(const WorkOptions& options);
 
 /// A job with these threads and this memory, which `display` shows and an interrupt cancels.
 [[nodiscard]] Job job_from(const WorkOptions& options, ProgressDisplay& display);

@@ -127,6 +127,7 @@ void write_difference(const DiffCommand& options, const Job& job) {
   const SampleStore store(mapping, void_value, false);
   RasterSpec spec = raster_spec(metadata, grid, mapping, void_value);
   spec.overwrite = options.overwrite;
+  spec.scratch = scratch_of(options.work);
   const auto sink = create_raster(options.raster, spec);
   SampleStore::Result counts;
   const auto take = [&](std::int64_t row, std::span<const double> difference) {

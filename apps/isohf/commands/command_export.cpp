@@ -199,6 +199,7 @@ class Exporter {
       part.first_z += part.system ? -south : south;  // northings, and world z
       RasterSpec spec = raster_spec(archive_.metadata(), part, mapping, void_value);
       spec.overwrite = options_.raster.overwrite;
+      spec.scratch = scratch_of(options_.work);
       return spec;
     };
     for (std::int64_t group = 0; group < tiles.groups(); ++group) {

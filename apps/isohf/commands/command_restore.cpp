@@ -171,6 +171,7 @@ class Restorer {
  private:
   [[nodiscard]] std::unique_ptr<RasterSink> open(RasterSpec spec, const SampleMapping& mapping) const {
     spec.overwrite = options_.raster.overwrite;
+    spec.scratch = scratch_of(options_.work);
     std::unique_ptr<RasterSink> sink = create_raster(options_.raster.output, spec);
     if (!options_.common.quiet) warn_of_lost_scale(options_.raster.output, mapping);
     return sink;

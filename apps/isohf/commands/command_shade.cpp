@@ -12,6 +12,7 @@
 #include "commands/command.h"
 #include "formats/files/text.h"
 #include "formats/write/raster_sink.h"
+#include "isohf/base/file.h"
 #include "isohf/error.h"
 #include "isohf/shade.h"
 #include "isohf/surface.h"
@@ -41,7 +42,7 @@ and shadow masks hold 1 to 255, and 0 where there is no elevation; slopes and as
 .tif has the georeference, .png a world file beside it. .exr holds light, or shares from 0 to 1.
 --date asks for the sun over the archive's middle, on Earth or Mars, at --time: mean solar time there, which is noon where the
 sun stands highest, but for a quarter of an hour. --hours draws a picture for each hour of sun, OUTPUT-06.png and so on.
-Memory is bounded whatever the archive's height: a row of its tiles twice, and about 64 MB.
+Memory is bounded whatever the archive's height: a row of its tiles twice, and about 64 MB; or by --memory.
 
 Examples:
   isohf shade dem.isohf -o dem.png
@@ -157,11 +158,13 @@ std::optional<ShadeCommand> parse(const Arguments& arguments) {
               "colours as for gdaldem color-relief",
               [&](const std::string& text) { options.palette = parse_palette(text, request.palette); });
   add_work_options(line, options.work);
+  add_memory_options(line, "OUTPUT's folder", options.work);
   add_common_options(line, options.common);
   line.footer(kFooter);
   if (!line.parse(arguments)) return std::nullopt;
   line.require("ARCHIVE", options.archive);
   line.require("OUTPUT", options.output);
+  if (options.work.scratch_folder.empty()) options.work.scratch_folder = folder_of(options.output);
   for (const char* option : {"--time", "--hours"}) {
     if (line.given(option) && !options.date) line.fail(std::string(option) + " needs --date");
   }
@@ -254,6 +257,7 @@ int run(ShadeCommand options) {
   spec.compress = !options.uncompressed;
   spec.georeference = georeference_of(archive.metadata(), size);
   spec.overwrite = options.overwrite;
+  spec.scratch = scratch_of(options.work);
 
   const std::vector<Frame> frames = frames_of(options, archive);
   for (const Frame& frame : frames) check_raster_output({options.archive}, frame.output, options.overwrite);

@@ -81,37 +81,38 @@ std::vector<TileShadow> cast_shadows(const TileSource& source, const CastingSun&
                           static_cast<double>(range.first_row) * grid.extent_z()};
   const WorldBounds covered = limits.ground.value_or(source.covered());
   const double scale = source.scale().scale;
-  ShadowSweep sweep(TileGrid::make(grid.shape(), columns, rows, grid.extent_x(), grid.extent_z()),
-                    {covered.x0 - corner.x, covered.z0 - corner.z, covered.x1 - corner.x, covered.z1 - corner.z},
+  const TileGrid swept = TileGrid::make(grid.shape(), columns, rows, grid.extent_x(), grid.extent_z());
+  ShadowSweep sweep(swept, {covered.x0 - corner.x, covered.z0 - corner.z, covered.x1 - corner.x, covered.z1 - corner.z},
                     sun.azimuth_deg, std::tan(sun.elevation_deg * kDegree) / scale, sun.softness / scale);
   // Lines of light lie where a sweep over all tiles would have them, so that shadows go on from one range to the next.
   sweep.begin_behind(range.first_column, grid.tile_columns() - 1 - range.last_column,
                      sweep.from_south() ? grid.tile_rows() - 1 - range.last_row : range.first_row);
   const auto vertices = static_cast<std::size_t>(grid.shape().stored_vertex_count());
   const auto steps = static_cast<float>(kDepthSteps / sweep.most_depth());
-  TileRowValues heights(static_cast<std::size_t>(columns), std::vector<float>(vertices));
-  TileRowValues depths;
+  TileRowValues heights(swept, std::nullopt);
+  TileRowValues depths(swept, std::nullopt);
+  std::vector<float> read(vertices);
   ShadowSweep::State light;
   for (std::int64_t k = 0; k < rows && !cancelled; ++k) {
     const std::int64_t row = sweep.from_south() ? rows - 1 - k : k;
     for (std::int64_t column = 0; column < columns; ++column) {
-      std::vector<float>& tile = heights[static_cast<std::size_t>(column)];
       const TileIndex at{range.first_column + column, range.first_row + row};
-      std::fill(tile.begin(), tile.end(), std::numeric_limits<float>::quiet_NaN());
+      std::fill(read.begin(), read.end(), std::numeric_limits<float>::quiet_NaN());
       try {
-        if (source.bounds(at).stored) source.read_heights(at, tile);
+        if (source.bounds(at).stored) source.read_heights(at, read);
       } catch (const Error& error) {
         if (unread.empty()) unread = error.what();
       }
+      heights.write_tile(column, read);
     }
     const bool wanted =
         std::any_of(tiles.begin(), tiles.end(), [&](TileIndex tile) { return tile.row == range.first_row + row; });
     light = sweep.pass(row, light, heights, wanted ? &depths : nullptr);
     if (!wanted) continue;
-    for (const TileIndex tile : tiles) {
-      if (tile.row != range.first_row + row) continue;
-      const std::vector<float>& found = depths[static_cast<std::size_t>(tile.column - range.first_column)];
-      TileShadow shadow{tile, std::vector<std::int16_t>(vertices),
+    for (const TileIndex shaded : tiles) {
+      if (shaded.row != range.first_row + row) continue;
+      const std::vector<float> found = depths.tile(shaded.column - range.first_column);
+      TileShadow shadow{shaded, std::vector<std::int16_t>(vertices),
                         static_cast<float>(2.0 * sweep.most_depth() * scale / sun.softness)};
       std::transform(found.begin(), found.end(), shadow.depths.begin(), [steps](float depth) {
         return static_cast<std::int16_t>(std::lround(std::clamp(depth * steps, -kDepthSteps, kDepthSteps)));

@@ -127,7 +127,7 @@ using TakeShadedRows = std::function<void(std::span<const std::byte> rows)>;
 /// its share of the sun are means of up to 4 x 4 points; slopes are Horn's, of the pixels around. Where a coarse plane
 /// has two vertices or more in a pixel, either way, the coarsest such one is drawn and nothing finer read, unless
 /// textures are. Memory: a row of tiles twice, and 64 MB of the picture's rows, or three rows. A sun in the South reads
-/// the tiles once more, and keeps 64 MB of shadows. Ground beyond the source casts none.
+/// the tiles once more, and keeps 64 MB of shadows; or what job.memory_bytes allows. Ground beyond the source casts none.
 /// Throws Error{kInvalidArgument} for options out of range, and for textures of an archive that has none; as the reader
 /// does; kCancelled.
 ShadeReport shade_rows(const ArchiveReader& archive, const ShadeOptions& options, const TakeShadedRows& take,

@@ -117,15 +117,18 @@ ReadTiles tiles_of(const ArchiveReader& archive, int plane) {
   return [&archive, plane](std::span<const TileIndex> tiles) { return archive.read_tiles(tiles, plane); };
 }
 
-void for_each_tile(const ReadTiles& read_tiles, std::span<const TileIndex> tiles,
-                   const std::function<void(std::size_t, const TileCodes&)>& use) {
-  const auto threads = static_cast<std::size_t>(oneapi::tbb::this_task_arena::max_concurrency());
-  const std::size_t together = std::clamp<std::size_t>(tiles.size() / threads, 1, kBatchLanes);
-  const std::size_t groups = (tiles.size() + together - 1) / together;
-  oneapi::tbb::parallel_for(std::size_t{0}, groups, [&](std::size_t group) {
-    const std::size_t first = group * together;
-    const std::vector<TileCodes> codes = read_tiles(tiles.subspan(first, std::min(together, tiles.size() - first)));
-    for (std::size_t i = 0; i < codes.size(); ++i) use(first + i, codes[i]);
+void for_each_group(const ReadTiles& read_tiles, TileIndex first, std::int64_t tiles,
+                    const std::function<void(std::int64_t, std::span<const TileCodes>)>& use) {
+  const auto threads = static_cast<std::int64_t>(oneapi::tbb::this_task_arena::max_concurrency());
+  const std::int64_t together = std::clamp<std::int64_t>(tiles / threads, 1, kBatchLanes);
+  oneapi::tbb::parallel_for(std::int64_t{0}, (tiles + together - 1) / together, [&](std::int64_t group) {
+    const std::int64_t from = group * together;
+    std::vector<TileIndex> indices;
+    for (std::int64_t tile = from; tile < std::min(from + together, tiles); ++tile) {
+      indices.push_back({first.column + tile, first.row});
+    }
+    const std::vector<TileCodes> codes = read_tiles(indices);
+    use(from, codes);
   });
 }
 

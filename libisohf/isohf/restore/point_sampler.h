@@ -22,10 +22,10 @@ namespace isohf {
 using ReadTiles = std::function<std::vector<TileCodes>(std::span<const TileIndex>)>;
 [[nodiscard]] ReadTiles tiles_of(const ArchiveReader& archive, int plane = 0);
 
-/// Decodes tiles on all threads of the caller's oneTBB arena, several together in each where there are enough, and
-/// hands them to use(number in `tiles`, codes) on the thread that decoded them.
-void for_each_tile(const ReadTiles& read_tiles, std::span<const TileIndex> tiles,
-                   const std::function<void(std::size_t, const TileCodes&)>& use);
+/// Decodes tiles beside each other on all threads of the caller's oneTBB arena, several together in each where there are
+/// enough, and hands them to use(how far from the first, codes) on the thread that decoded them.
+void for_each_group(const ReadTiles& read_tiles, TileIndex first, std::int64_t tiles,
+                    const std::function<void(std::int64_t, std::span<const TileCodes>)>& use);
 
 /// What Surface does, for tiles that come from anywhere.
 ///

@@ -76,6 +76,8 @@ def main():
         print("\n\n".join(bench.tables.values()))
     if options.write:
         bench.write()
+    if bench.complaints:
+        bench.fail("; ".join(bench.complaints))
 
 
 if __name__ == "__main__":

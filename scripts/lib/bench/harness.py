@@ -23,12 +23,18 @@ class Bench:
         self.work.mkdir(parents=True, exist_ok=True)
         self.results = {}
         self.tables = {}
+        self.complaints = []
 
     def say(self, text):
         print(f"bench: {text}", file=sys.stderr)
 
     def fail(self, why):
         sys.exit(f"bench: {why}")
+
+    def complain(self, why):
+        """Goes on, and ends with 1."""
+        self.complaints.append(why)
+        self.say(why)
 
     def run(self, *command):
         """Runs once: wall and processor seconds, peak memory in MB, standard output."""
@@ -37,20 +43,21 @@ class Bench:
             self.fail(done["refused"])
         return done
 
-    def run_or_refusal(self, *command):
-        """The same, or {"refused": why} where the program says how much memory it needs."""
-        with open(self.work / "time.txt", "w+b") as figures:
+    def run_or_refusal(self, *command, given=None, passing=(0,)):
+        """The same, or {"refused": why} where the program says how much memory it needs. given: its standard input."""
+        with open(given or os.devnull, "rb") as stdin, open(self.work / "time.txt", "w+b") as figures:
             start = time.monotonic()
             result = subprocess.run(["/usr/bin/time", "-f", "%U %S %M", "-o", figures.name, *map(str, command)],
-                                    capture_output=True, text=True, check=False)
+                                    capture_output=True, stdin=stdin, check=False)
             wall = time.monotonic() - start
-            if result.returncode != 0:
+            result.stderr = result.stderr.decode(errors="replace")
+            if result.returncode not in passing:
                 if " needs at least " in result.stderr:
                     return {"refused": result.stderr.strip()}
                 self.fail(f"{' '.join(map(str, command))}: {result.stderr.strip()}")
             user, system, peak = figures.read().split()[-3:]
         return {"wall_s": wall, "cpu_s": float(user) + float(system), "peak_mb": float(peak) / 1024,
-                "out": result.stdout}
+                "out": result.stdout.decode(errors="replace")}
 
     def run_plainly(self, *command):
         """Standard output alone; several may run at once."""

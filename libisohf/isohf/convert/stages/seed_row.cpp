@@ -150,9 +150,10 @@ void SeedRow::encode(const Tiles& tiles, const Take& take) const {
 std::uint64_t SeedRow::memory_bytes(const TileGrid& grid, bool in_scratch) {
   const auto tiles = static_cast<std::uint64_t>(grid.tile_columns());
   const auto rows = static_cast<std::uint64_t>(visible_rows(grid.shape()));
-  if (!in_scratch) return tiles * rows * kBytesPerRow;
-  return kSpillBytes + tiles * (sizeof(Tiles::Place) + sizeof(std::uint64_t)) +
-         std::min<std::uint64_t>(tiles, kTilesAtOnce) * rows * kBytesPerRow;
+  const std::uint64_t in_memory = tiles * rows * kBytesPerRow;
+  if (!in_scratch) return in_memory;
+  return std::min(in_memory, kSpillBytes + tiles * (sizeof(Tiles::Place) + sizeof(std::uint64_t)) +
+                                 kTilesAtOnce * rows * kBytesPerRow);
 }
 
 }  // namespace isohf

@@ -1,15 +1,11 @@
 #include "isohf/restore/rows/vertex_rows.h"
 
-#include <oneapi/tbb/parallel_for.h>
-#include <oneapi/tbb/task_arena.h>
-
 #include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <utility>
 
 #include "isohf/archive/codec/quantise.h"
-#include "isohf/archive/codec/simd/batch_decoder.h"
 #include "isohf/base/assert.h"
 
 namespace isohf {
@@ -47,17 +43,8 @@ void VertexRows::decode(std::int64_t tile_row, Rows& rows, const Values& values_
   const int height = grid_.shape().rows();
   const auto columns = static_cast<std::size_t>(grid_.shape().columns());
   for (int row = 0; row < height; ++row) rows.add(number(tile_row, row));
-  // Several tiles together, so that what is written at once is long enough for a file.
-  const std::int64_t tiles = last_ - first_ + 1;
-  const auto threads = static_cast<std::int64_t>(oneapi::tbb::this_task_arena::max_concurrency());
-  const std::int64_t together = std::clamp<std::int64_t>(tiles / threads, 1, kBatchLanes);
   std::atomic<bool> any = false;
-  oneapi::tbb::parallel_for(std::int64_t{0}, (tiles + together - 1) / together, [&](std::int64_t group) {
-    const std::int64_t from = group * together;
-    std::vector<TileIndex> indices;
-    for (std::int64_t tile = from; tile < std::min(from + together, tiles); ++tile)
-      indices.push_back({first_ + tile, tile_row});
-    const std::vector<TileCodes> decoded = read_tiles_(indices);
+  for_each_group(read_tiles_, {first_, tile_row}, last_ - first_ + 1, [&](std::int64_t from, const auto& decoded) {
     auto line = values_of(decoded.front());  // of its type
     line.resize(decoded.size() * columns);
     for (int row = 0; row < height; ++row) {

@@ -15,6 +15,7 @@
 #include "isohf/archive/planes/archive_planes.h"
 #include "isohf/archive/textures/texture_reader.h"
 #include "isohf/base/arena.h"
+#include "isohf/base/memory/memory_budget.h"
 #include "isohf/base/simd.h"
 #include "isohf/error.h"
 #include "isohf/lattice/barycentric.h"
@@ -33,6 +34,15 @@ constexpr std::int64_t kMaxPointsPerPixel = 4;
 /// from that of all vertices (decision 41).
 constexpr double kVerticesPerPixel = 2.0;
 constexpr std::size_t kMaxRowBytes = std::size_t{64} << 20U;
+/// Pixels that are drawn together, of a row and of so many rows.
+constexpr std::int64_t kBlock = 2048;
+constexpr std::int64_t kLeastBlock = 64;
+constexpr std::int64_t kBlockRows = 16;
+/// What a picture's file takes, in rows of it, and besides (measured).
+constexpr double kRowsOfFile = 4.0;
+constexpr double kFileBytes = 12.0e6;
+/// Of a point, for rows of either kind: between which vertices it lies.
+constexpr double kPointBytes = 12.0;
 
 /// The colours of an archive's textures, for places that lie a given distance apart.
 class ShadeTexture {
@@ -46,20 +56,20 @@ class ShadeTexture {
     float alpha = 0.0F;
   };
 
-  /// One tile's texture, from the mip level whose texels are no larger than the steps.
-  class Tile {
-   public:
-    Tile() = default;
-    Tile(Picture rgba, int finest_size) : picture_(std::move(rgba)), finest_size_(finest_size) {}
-    /// s, t  0...1 from West to East and North to South, interpolated linearly; nothing where the tile has no texture.
-    [[nodiscard]] Colour at(double s, double t) const;
+  /// Texels of a tile, either way: from the mip level whose texels are no larger than the steps.
+  [[nodiscard]] std::size_t side() const { return static_cast<std::size_t>(reader_.info().level_size(level_)); }
+  /// [side][side] RGBA; zeros where the tile has no texture. Any thread.
+  [[nodiscard]] std::vector<std::uint8_t> read(TileIndex tile) const;
 
-   private:
-    Picture picture_;
-    int finest_size_ = 0;
+  /// A place between two texels, or two rows of them.
+  struct Place {
+    std::size_t first;
+    float share;
   };
-  /// Any thread.
-  [[nodiscard]] Tile read(TileIndex tile) const;
+  /// along  0...1 over a tile
+  [[nodiscard]] Place place(double along) const;
+  /// Interpolated linearly between two rows of a tile's texels; nothing where it has no texture.
+  [[nodiscard]] static Colour colour(const std::uint8_t* north, const std::uint8_t* south, float down, Place across);
 
  private:
   TextureReader reader_;
@@ -73,30 +83,28 @@ ShadeTexture::ShadeTexture(const ArchiveReader& archive, double step_x, double s
   level_ = static_cast<int>(std::clamp(std::floor(std::log2(std::max(texels, 1e-9)) + 1e-6), 0.0, last));
 }
 
-ShadeTexture::Tile ShadeTexture::read(TileIndex tile) const {
-  if (!reader_.has(tile)) return {};
-  return {reader_.read_rgba(tile, level_), reader_.info().size};
+std::vector<std::uint8_t> ShadeTexture::read(TileIndex tile) const {
+  if (!reader_.has(tile)) return std::vector<std::uint8_t>(4 * side() * side());
+  return reader_.read_rgba(tile, level_).samples;
 }
 
-ShadeTexture::Colour ShadeTexture::Tile::at(double s, double t) const {
-  Colour colour;
-  if (picture_.samples.empty()) return colour;
+ShadeTexture::Place ShadeTexture::place(double along) const {
   // docs/archive_format.md, "Textures": one texture coordinate for all levels.
-  const auto place = [this](double along) {
-    const double u = (0.5 + (finest_size_ - 1) * along) / finest_size_;
-    return std::clamp(u * picture_.width - 0.5, 0.0, picture_.width - 1.0);
-  };
-  const double x = place(s);
-  const double y = place(t);
-  const auto column = std::min(static_cast<int>(x), picture_.width - 2);
-  const auto row = std::min(static_cast<int>(y), picture_.height - 2);
-  const auto right = static_cast<float>(x - column);
-  const auto down = static_cast<float>(y - row);
+  const double u = (0.5 + (reader_.info().size - 1) * along) / reader_.info().size;
+  const auto texels = static_cast<double>(side());
+  const double at = std::clamp(u * texels - 0.5, 0.0, texels - 1.0);
+  const auto first = std::min(static_cast<std::size_t>(at), side() - 2);
+  return {first, static_cast<float>(at - static_cast<double>(first))};
+}
+
+ShadeTexture::Colour ShadeTexture::colour(const std::uint8_t* north, const std::uint8_t* south, float down,
+                                          Place across) {
+  Colour colour;
   for (int j = 0; j < 2; ++j) {
-    for (int i = 0; i < 2; ++i) {
-      const std::uint8_t* const texel = picture_.pixel(column + i, row + j);
+    for (std::size_t i = 0; i < 2; ++i) {
+      const std::uint8_t* const texel = (j == 0 ? north : south) + 4 * (across.first + i);
       const float alpha = static_cast<float>(texel[3]) / 255.0F;
-      const float weight = (i == 0 ? 1.0F - right : right) * (j == 0 ? 1.0F - down : down) * alpha;
+      const float weight = (i == 0 ? 1.0F - across.share : across.share) * (j == 0 ? 1.0F - down : down) * alpha;
       for (std::size_t c = 0; c < 3; ++c) colour.light[c] += weight * linear_from_srgb()[texel[c]];
       colour.alpha += weight;
     }
@@ -209,19 +217,31 @@ class PointColumns {
   [[nodiscard]] double object_x(std::size_t tile, std::size_t point) const {
     return axis_.world(static_cast<std::int64_t>(point)) / sigma_x_ - static_cast<double>(tile) * half_steps_;
   }
-  [[nodiscard]] Run of_tile(std::size_t tile) const {
-    return {static_cast<std::int64_t>(starts_[tile]), static_cast<std::int64_t>(starts_[tile + 1])};
+  /// The tiles under some of them.
+  [[nodiscard]] Run tiles_under(const Run& points) const {
+    const auto tile_of = [this](std::int64_t point) {
+      return std::upper_bound(starts_.begin(), starts_.end(), static_cast<std::size_t>(point)) - starts_.begin() - 1;
+    };
+    return {tile_of(points.first), tile_of(points.last - 1) + 1};
+  }
+  /// Those of `points` that lie on a tile.
+  [[nodiscard]] Run of_tile(std::int64_t tile, const Run& points) const {
+    const auto start = [this](std::int64_t of) {
+      return static_cast<std::int64_t>(starts_[static_cast<std::size_t>(of)]);
+    };
+    return {std::max(points.first, start(tile)), std::min(points.last, start(tile + 1))};
   }
 
-  /// Values of a stored row of the tiles at all columns of points.
-  void read(const TileRowValues& tiles, int row, int stored_columns, float* out) const {
+  /// Values of a stored row of tiles_under(points) at these points.
+  void read(const float* values, int row, int stored_columns, const Run& points, float* out) const {
     const auto parity = static_cast<std::size_t>(row % 2);
-    for (std::size_t tile = 0; tile < tiles.size(); ++tile) {
-      const std::size_t first = starts_[tile];
-      const auto points = static_cast<int>(starts_[tile + 1] - first);
-      vectorised<between_vertices>(tiles[tile].data() + static_cast<std::ptrdiff_t>(row) * stored_columns,
-                                   west_[parity].data() + first, east_[parity].data() + first,
-                                   share_[parity].data() + first, points, out + first);
+    const Run tiles = tiles_under(points);
+    for (std::int64_t tile = tiles.first; tile < tiles.last; ++tile, values += stored_columns) {
+      const Run here = of_tile(tile, points);
+      const auto first = static_cast<std::size_t>(here.first);
+      vectorised<between_vertices>(values, west_[parity].data() + first, east_[parity].data() + first,
+                                   share_[parity].data() + first, static_cast<int>(here.last - here.first),
+                                   out + (here.first - points.first));
     }
   }
 
@@ -304,11 +324,13 @@ class ShadeRenderer {
         datum_(archive.metadata().statistics.min.value_or(0.0)),
         world_per_elevation_(request.exaggeration / request.elevation_units_per_world_unit) {
     if (request.texture) textures_.emplace(archive, x_.step(), z_.step());
-    if (!casts_shadows(request)) return;
-    const double softness = request.softness.value_or(default_softness(archive.metadata())) * world_per_elevation_;
-    share_per_depth_ = static_cast<float>(2.0 / softness);
-    const double fall = std::tan(request.sun_elevation_deg * std::numbers::pi / 180.0);
-    sweep_.emplace(grid_, archive.metadata().valid, request.sun_azimuth_deg, fall, softness);
+    if (casts_shadows(request)) begin_sweep();
+    divide_memory();
+    heights_.emplace(grid_, scratch_);
+    if (sweep_) depths_.emplace(grid_, scratch_);
+    if (!textures_) return;
+    texels_.emplace(4 * textures_->side() * static_cast<std::size_t>(grid_.tile_columns()), scratch_);
+    for (std::size_t row = 0; row < textures_->side(); ++row) texels_->add(static_cast<std::int64_t>(row));
   }
 
   [[nodiscard]] int plane() const { return plane_; }
@@ -316,8 +338,10 @@ class ShadeRenderer {
   void run(const TakeShadedRows& take) {
     ShadowSweep::State light;
     for (std::int64_t row = 0; row < grid_.tile_rows(); ++row) {
+      if (sweep_ && sweep_->from_south()) light = from_south(row);
       decode(row);
-      if (sweep_) light = sweep_->pass(row, sweep_->from_south() ? from_south(row) : light, heights_, &depths_);
+      if (sweep_) light = sweep_->pass(row, light, *heights_, &*depths_);
+      if (textures_) read_textures(row);
       const Run points = points_of(row);
       for (Run part{points.first, points.first}; part.last < points.last; part.first = part.last) {
         part.last = end_of_part(part.first, points.last);
@@ -329,6 +353,72 @@ class ShadeRenderer {
   }
 
  private:
+  void begin_sweep() {
+    const ShadeOptions& request = request_;
+    const double softness = request.softness.value_or(default_softness(archive_.metadata())) * world_per_elevation_;
+    share_per_depth_ = static_cast<float>(2.0 / softness);
+    const double fall = std::tan(request.sun_elevation_deg * std::numbers::pi / 180.0);
+    sweep_.emplace(grid_, archive_.metadata().valid, request.sun_azimuth_deg, fall, softness);
+    if (!sweep_->from_south()) return;
+    // What enters every stride-th row of tiles is kept for all time, and those in between for the rows that are drawn
+    // next.
+    const auto most = static_cast<std::int64_t>(kMaxRowBytes / sweep_->state_bytes());
+    while (kept_states() > std::max<std::int64_t>(most, 2) && south_stride_ * south_stride_ < grid_.tile_rows()) {
+      ++south_stride_;
+    }
+  }
+
+  [[nodiscard]] std::int64_t kept_states() const { return grid_.tile_rows() / south_stride_ + south_stride_; }
+
+  /// Of a row of pixels: sums and means, and what is handed over.
+  [[nodiscard]] double sums_bytes() const {
+    const int fields = 1 + (sweep_ ? 1 : 0) + (points_in_pixel() > 1 ? 1 : 0) + (textures_ ? 4 : 0);
+    return static_cast<double>(width_) * fields * sizeof(float);
+  }
+  [[nodiscard]] double shaded_bytes() const {
+    return static_cast<double>(width_) * static_cast<double>(samples_.channels) *
+           static_cast<double>(size_bytes(samples_.type));
+  }
+  [[nodiscard]] std::int64_t points_in_pixel() const { return x_.per_pixel() * z_.per_pixel(); }
+
+  /// With so many rows of pixels at once.
+  [[nodiscard]] double memory_bytes(bool in_scratch, std::int64_t rows) const {
+    const TileShape& shape = grid_.shape();
+    const auto tiles = static_cast<double>(grid_.tile_columns());
+    const double threads = threads_of(job_);
+    const double picture = shaded_bytes() * static_cast<double>(size_.second);
+    double bytes = reading_bytes(job_, static_cast<double>(shape.stored_vertex_count())) +
+                   static_cast<double>(columns_.count()) * 2.0 * kPointBytes + std::min(kFileBytes, picture) +
+                   (static_cast<double>(rows) + 3.0) * sums_bytes() +
+                   (static_cast<double>(rows) + kRowsOfFile) * shaded_bytes();
+    if (textures_) {
+      const auto texels = static_cast<double>(textures_->side() * textures_->side());
+      bytes += 4.0 * texels * (threads * 3.0 + (in_scratch ? 0.0 : tiles));
+    }
+    if (!in_scratch) bytes += (sweep_ ? 2.0 : 1.0) * TileRowValues::memory_bytes(grid_);
+    if (!sweep_) return bytes;
+    const auto state = static_cast<double>(sweep_->state_bytes());
+    if (sweep_->from_south() && !in_scratch) bytes += static_cast<double>(kept_states()) * state;
+    // Rows of vertices, twice, and lines at half steps: their heights and depths, those of the ground, and what enters
+    // and leaves.
+    return bytes + 3.0 * state + sweep_->passing_bytes();
+  }
+
+  /// Throws Error{kOutOfMemory}. Where memory is short, rows of tiles lie in scratch files, and fewer rows of pixels
+  /// are drawn at once.
+  void divide_memory() {
+    const auto most = static_cast<std::int64_t>(static_cast<double>(kMaxRowBytes) / (sums_bytes() + shaded_bytes()));
+    rows_at_once_ = std::clamp<std::int64_t>(most, 1, size_.second);
+    const auto few = std::min<std::int64_t>(rows_at_once_, kBlockRows);
+    scratch_ = scratch_for(job_, memory_bytes(false, few), memory_bytes(true, 1), "this picture");
+    const auto fits = [this](std::int64_t rows) {
+      return memory_bytes(scratch_.has_value(), rows) <= static_cast<double>(job_.memory_bytes);
+    };
+    while (job_.memory_bytes != 0 && rows_at_once_ > 1 && !fits(rows_at_once_))
+      rows_at_once_ -= (rows_at_once_ + 7) / 8;
+    if (scratch_) south_stride_ = 1;
+  }
+
   [[nodiscard]] Run points_of(std::int64_t tile_row) const {
     const auto edge = [this](std::int64_t row) { return z_.first_from(static_cast<double>(row) * grid_.extent_z()); };
     return {tile_row == 0 ? 0 : edge(tile_row), tile_row + 1 == grid_.tile_rows() ? z_.count() : edge(tile_row + 1)};
@@ -336,77 +426,95 @@ class ShadeRenderer {
 
   /// Rows of pixels that are held at once are bounded: a row of tiles is drawn in parts where it is very large.
   [[nodiscard]] std::int64_t end_of_part(std::int64_t first, std::int64_t last) const {
-    const std::size_t row_bytes = width_ * sizeof(float) * (textures_ ? 7 : 3);
-    const auto rows = static_cast<std::int64_t>(std::max<std::size_t>(1, kMaxRowBytes / row_bytes));
-    return std::min(last, (first / z_.per_pixel() + rows) * z_.per_pixel());
+    return std::min(last, (first / z_.per_pixel() + rows_at_once_) * z_.per_pixel());
   }
 
-  /// The heights of a row of tiles, and its textures.
+  /// The heights of a row of tiles.
   void decode(std::int64_t tile_row) {
     job_.throw_if_cancelled();
-    std::vector<TileIndex> tiles;
-    for (std::int64_t column = 0; column < grid_.tile_columns(); ++column) tiles.push_back({column, tile_row});
-    heights_.resize(tiles.size());
     has_voids_ = false;
+    const auto columns = static_cast<std::size_t>(grid_.shape().columns());
+    const TileIndex begin{0, tile_row};
+    for_each_group(
+        read_tiles_, begin, grid_.tile_columns(), [&](std::int64_t first, std::span<const TileCodes> decoded) {
+          std::vector<float> line(decoded.size() * columns);
+          bool has_voids = false;
+          for (int row = 0; row < grid_.shape().rows(); ++row) {
+            for (std::size_t i = 0; i < decoded.size(); ++i) {
+              const std::span out = std::span(line).subspan(i * columns, columns);
+              has_voids = heights_of_row(decoded[i], static_cast<std::size_t>(row) * columns, out) || has_voids;
+            }
+            heights_->write_row(row, first, line);
+          }
+          if (has_voids) has_voids_ = true;
+        });
+  }
+
+  /// Heights of codes from the one numbered `first` on; returns whether one is void.
+  bool heights_of_row(const TileCodes& codes, std::size_t first, std::span<float> heights) const {
     const Quantisation& quantisation = archive_.metadata().quantisation;
-    const auto offset = static_cast<float>((quantisation.offset - datum_) * world_per_elevation_);
-    const auto scale = static_cast<float>(quantisation.scale * world_per_elevation_);
-    for_each_tile(read_tiles_, tiles, [&](std::size_t i, const TileCodes& codes) {
-      std::vector<float>& heights = heights_[i];
-      heights.resize(static_cast<std::size_t>(grid_.shape().stored_vertex_count()));
-      if (codes.type != CodeType::kF32) {
-        const int voids =
-            vectorised<heights_of_codes>(codes.codes.data(), static_cast<int>(heights.size()),
-                                         static_cast<int>(quantisation.void_code()), offset, scale, heights.data());
-        if (voids > 0) has_voids_ = true;
-        return;
-      }
-      for (std::size_t k = 0; k < heights.size(); ++k) {
-        const double height = (static_cast<double>(codes.heights[k]) - datum_) * world_per_elevation_;
-        heights[k] = std::isfinite(height) ? static_cast<float>(height) : kVoid;
-        if (!std::isfinite(height)) has_voids_ = true;
+    if (codes.type != CodeType::kF32) {
+      const auto offset = static_cast<float>((quantisation.offset - datum_) * world_per_elevation_);
+      const auto scale = static_cast<float>(quantisation.scale * world_per_elevation_);
+      return vectorised<heights_of_codes>(codes.codes.data() + first, static_cast<int>(heights.size()),
+                                          static_cast<int>(quantisation.void_code()), offset, scale,
+                                          heights.data()) > 0;
+    }
+    bool has_voids = false;
+    for (std::size_t k = 0; k < heights.size(); ++k) {
+      const double height = (static_cast<double>(codes.heights[first + k]) - datum_) * world_per_elevation_;
+      heights[k] = std::isfinite(height) ? static_cast<float>(height) : kVoid;
+      has_voids = has_voids || !std::isfinite(height);
+    }
+    return has_voids;
+  }
+
+  void read_textures(std::int64_t tile_row) {
+    oneapi::tbb::parallel_for(std::int64_t{0}, grid_.tile_columns(), [&](std::int64_t tile) {
+      const std::vector<std::uint8_t> texels = textures_->read({tile, tile_row});
+      const std::size_t line = 4 * textures_->side();
+      for (std::size_t row = 0; row < textures_->side(); ++row) {
+        texels_->write(static_cast<std::int64_t>(row), static_cast<std::size_t>(tile) * line,
+                       std::span(texels).subspan(row * line, line));
       }
     });
-    if (!textures_) return;
-    photos_.resize(tiles.size());
-    oneapi::tbb::parallel_for(std::size_t{0}, tiles.size(),
-                              [&](std::size_t i) { photos_[i] = textures_->read(tiles[i]); });
   }
 
   /// What enters a row of tiles from the South: rows further South are passed over first, and what entered some of
   /// them is kept, as many as memory is granted, evenly spaced.
-  const ShadowSweep::State& from_south(std::int64_t tile_row) {
+  ShadowSweep::State from_south(std::int64_t tile_row) {
     const std::int64_t rows = grid_.tile_rows();
-    if (south_.empty()) {
-      const auto most = static_cast<std::int64_t>(kMaxRowBytes / sweep_->state_bytes());
-      // Every stride-th is kept for all time, and those in between for the rows that are drawn next.
-      south_stride_ = 1;
-      while (rows / south_stride_ + south_stride_ > std::max<std::int64_t>(most, 2) &&
-             south_stride_ * south_stride_ < rows) {
-        ++south_stride_;
-      }
-      south_.resize(static_cast<std::size_t>(rows));
+    if (tile_row == 0) {
       pass_from_south(rows - 1, 0, [&](std::int64_t row) { return row % south_stride_ == south_stride_ - 1; });
     }
     const std::int64_t group_end = std::min(rows, (tile_row / south_stride_ + 1) * south_stride_) - 1;
     if (tile_row % south_stride_ == 0 && group_end > tile_row) {
       pass_from_south(group_end, tile_row, [](std::int64_t) { return true; });
     }
-    if (tile_row > 0) south_[static_cast<std::size_t>(tile_row) - 1] = {};
-    return south_[static_cast<std::size_t>(tile_row)];
+    if (tile_row > 0) south_->drop(tile_row - 1);
+    return kept_state(tile_row);
   }
 
-  /// Passes over the rows `first` down to `last`, but for that one, and keeps what enters those that are wanted. Leaves
-  /// the heights of row `last`.
+  [[nodiscard]] ShadowSweep::State kept_state(std::int64_t row) const {
+    ShadowSweep::State buffer;
+    if (row == grid_.tile_rows() - 1) return buffer;
+    const std::span<const float> kept = south_->read(row, 0, south_width_, buffer);
+    return {kept.begin(), kept.end()};
+  }
+
+  /// Passes over the rows `first` down to `last`, but for that one, and keeps what enters those that are wanted.
   template <typename Wanted>
   void pass_from_south(std::int64_t first, std::int64_t last, const Wanted& wanted) {
-    ShadowSweep::State light = south_[static_cast<std::size_t>(first)];
+    ShadowSweep::State light = kept_state(first);
     for (std::int64_t row = first; row > last; --row) {
       decode(row);
-      light = sweep_->pass(row, light, heights_, nullptr);
-      if (wanted(row - 1)) south_[static_cast<std::size_t>(row) - 1] = light;
+      light = sweep_->pass(row, light, *heights_, nullptr);
+      if (!wanted(row - 1)) continue;
+      south_width_ = light.size();
+      if (!south_) south_.emplace(south_width_, scratch_);
+      south_->add(row - 1);
+      south_->write(row - 1, 0, light);
     }
-    decode(last);
   }
 
   [[nodiscard]] PixelRow& pixel_row(std::int64_t row) { return rows_[static_cast<std::size_t>(row - first_row_)]; }
@@ -415,7 +523,7 @@ class ShadeRenderer {
     PixelRow row;
     row.heights.resize(width_ + 2);
     if (sweep_) row.shares.resize(width_);
-    if (x_.per_pixel() * z_.per_pixel() > 1) row.cover.resize(width_);
+    if (points_in_pixel() > 1) row.cover.resize(width_);
     if (textures_) row.photo.resize(4 * width_);
     return row;
   }
@@ -424,63 +532,106 @@ class ShadeRenderer {
     const std::int64_t first = points.first / z_.per_pixel();
     const std::int64_t end = (points.last - 1) / z_.per_pixel() + 1;
     while (first_row_ + static_cast<std::int64_t>(rows_.size()) < end) rows_.push_back(empty_row());
-    oneapi::tbb::parallel_for(oneapi::tbb::blocked_range<std::int64_t>(first, end, 16), [&](const auto& some) {
-      const std::int64_t from = std::max(points.first, some.begin() * z_.per_pixel());
-      const std::int64_t to = std::min(points.last, some.end() * z_.per_pixel());
-      draw_points(tile_row, {from, to});
+    for_each_block(first, end, [&](const Run& rows, const Run& pixels) {
+      const std::int64_t from = std::max(points.first, rows.first * z_.per_pixel());
+      const std::int64_t to = std::min(points.last, rows.last * z_.per_pixel());
+      draw_points(tile_row, {from, to}, pixels);
+    });
+    for (std::int64_t row = first; row < points.last / z_.per_pixel(); ++row) extend(pixel_row(row));
+  }
+
+  /// Work on blocks of rows and columns of pixels, on all threads.
+  template <typename Work>
+  void for_each_block(std::int64_t first, std::int64_t end, const Work& work) const {
+    // Of so many lattice columns that a few rows of their vertices are little.
+    const std::int64_t vertices = grid_.tile_columns() * grid_.shape().columns();
+    const std::int64_t width = std::clamp<std::int64_t>(2 * kBlock * size_.first / vertices, kLeastBlock, kBlock);
+    const std::int64_t across = (size_.first + width - 1) / width;
+    const std::int64_t down = (end - first + kBlockRows - 1) / kBlockRows;
+    oneapi::tbb::parallel_for(std::int64_t{0}, across * down, [&](std::int64_t block) {
+      const std::int64_t row = first + block / across * kBlockRows;
+      const std::int64_t column = block % across * width;
+      work(Run{row, std::min(row + kBlockRows, end)}, Run{column, std::min(column + width, size_.first)});
     });
   }
 
   /// A field of the tiles at rows of points, one after the other.
   class Field {
    public:
-    Field(const PointColumns& columns, const TileRowValues& tiles, const TileShape& shape)
-        : columns_(columns), tiles_(tiles), shape_(shape), north_(columns.count()), south_(columns.count()) {}
+    Field(const PointColumns& columns, const TileRowValues& values, const TileShape& shape, const Run& points)
+        : columns_(columns), values_(values), shape_(shape), points_(points), tiles_(columns.tiles_under(points)) {}
 
     void read(int row, float share, float* out) {
-      if (row == south_row_) std::swap(north_, south_), std::swap(north_row_, south_row_);
-      keep(row, north_, north_row_);
-      if (share == 0.0F) return static_cast<void>(std::copy(north_.begin(), north_.end(), out));
-      keep(row + 1, south_, south_row_);
-      vectorised<between_rows>(static_cast<const float*>(north_.data()), static_cast<const float*>(south_.data()),
-                               share, static_cast<int>(north_.size()), out);
+      if (row == south_.row) std::swap(north_, south_);
+      keep(row, north_);
+      if (share == 0.0F) return static_cast<void>(std::copy(north_.points.begin(), north_.points.end(), out));
+      keep(row + 1, south_);
+      vectorised<between_rows>(static_cast<const float*>(north_.points.data()),
+                               static_cast<const float*>(south_.points.data()), share,
+                               static_cast<int>(north_.points.size()), out);
     }
 
     /// Beside voids the mesh's own triangles say which points have a height: where one row has none.
     void mend(double z, float* out) const {
-      for (std::size_t tile = 0; tile < tiles_.size(); ++tile) {
-        const Run points = columns_.of_tile(tile);
-        for (auto i = static_cast<std::size_t>(points.first); i < static_cast<std::size_t>(points.last); ++i) {
-          if (std::isnan(north_[i]) == std::isnan(south_[i])) continue;
-          const View2D<const float> values(tiles_[tile].data(), shape_.columns(), shape_.rows());
-          out[i] = static_cast<float>(interpolate(barycentric(shape_, {columns_.object_x(tile, i), z}), values));
+      for (std::int64_t tile = tiles_.first; tile < tiles_.last; ++tile) {
+        const Run here = columns_.of_tile(tile, points_);
+        for (std::int64_t point = here.first; point < here.last; ++point) {
+          const auto i = static_cast<std::size_t>(point - points_.first);
+          if (std::isnan(north_.points[i]) == std::isnan(south_.points[i])) continue;
+          const auto x = columns_.object_x(static_cast<std::size_t>(tile), static_cast<std::size_t>(point));
+          out[i] = static_cast<float>(on_triangle(tile, barycentric(shape_, {x, z})));
         }
       }
     }
 
    private:
-    void keep(int row, std::vector<float>& values, int& kept) const {
-      if (kept != row) columns_.read(tiles_, row, shape_.columns(), values.data());
-      kept = row;
+    struct Row {
+      int row = -1;
+      std::vector<float> buffer;
+      std::span<const float> vertices;  ///< of the tiles
+      std::vector<float> points;
+    };
+
+    void keep(int row, Row& kept) const {
+      if (kept.row == row) return;
+      kept.row = row;
+      kept.vertices = values_.row(row, tiles_.first, tiles_.last - tiles_.first, kept.buffer);
+      kept.points.resize(static_cast<std::size_t>(points_.last - points_.first));
+      columns_.read(kept.vertices.data(), row, shape_.columns(), points_, kept.points.data());
     }
+    /// As interpolate() has it.
+    [[nodiscard]] double on_triangle(std::int64_t tile, const Barycentric& at) const {
+      double sum = 0.0;
+      for (std::size_t i = 0; i < 3; ++i) {
+        if (!(at.weights[i] > 0.0)) continue;
+        const std::int64_t column = (tile - tiles_.first) * shape_.columns() + at.vertices[i].column;
+        const Row& row = at.vertices[i].row == north_.row ? north_ : south_;
+        sum += at.weights[i] * static_cast<double>(row.vertices[static_cast<std::size_t>(column)]);
+      }
+      return sum;
+    }
+
     const PointColumns& columns_;
-    const TileRowValues& tiles_;
+    const TileRowValues& values_;
     const TileShape& shape_;
-    std::vector<float> north_;
-    std::vector<float> south_;
-    int north_row_ = -1;
-    int south_row_ = -1;
+    Run points_;
+    Run tiles_;
+    Row north_;
+    Row south_;
   };
 
-  void draw_points(std::int64_t tile_row, const Run& points) {
+  void draw_points(std::int64_t tile_row, const Run& rows, const Run& block) {
     const TileShape& shape = grid_.shape();
-    Field heights(columns_, heights_, shape);
+    const Run columns{block.first * x_.per_pixel(), block.last * x_.per_pixel()};
+    Field heights(columns_, *heights_, shape, columns);
     std::optional<Field> depths;
-    if (sweep_) depths.emplace(columns_, depths_, shape);
-    const bool single = x_.per_pixel() * z_.per_pixel() == 1;
-    std::vector<float> height(single ? 0 : columns_.count());
-    std::vector<float> share(single || !sweep_ ? 0 : columns_.count());
-    for (std::int64_t j = points.first; j < points.last; ++j) {
+    if (sweep_) depths.emplace(columns_, *depths_, shape, columns);
+    TexelRows texels;
+    const bool single = points_in_pixel() == 1;
+    const auto count = static_cast<std::size_t>(columns.last - columns.first);
+    std::vector<float> height(single ? 0 : count);
+    std::vector<float> share(single || !sweep_ ? 0 : count);
+    for (std::int64_t j = rows.first; j < rows.last; ++j) {
       const double z = (z_.world(j) - static_cast<double>(tile_row) * grid_.extent_z()) / grid_.sigma_z();
       const double inside = std::clamp(z, 0.0, static_cast<double>(shape.cell_rows()));
       const double nearest = std::round(inside);
@@ -488,23 +639,25 @@ class ShadeRenderer {
       const auto row = static_cast<int>(place);
       const auto part = static_cast<float>(place - row);
       PixelRow& pixels = pixel_row(j / z_.per_pixel());
-      float* const h = single ? pixels.heights.data() + 1 : height.data();
-      float* const s = single ? pixels.shares.data() : share.data();
+      float* const h = single ? pixels.heights.data() + 1 + block.first : height.data();
+      float* const s = single ? pixels.shares.data() + (sweep_ ? block.first : 0) : share.data();
       heights.read(row + 1, part, h);
       if (has_voids_ && part > 0.0F) heights.mend(place, h);
       if (sweep_) {
         depths->read(row + 1, part, s);
-        vectorised<share_of_depth>(s, static_cast<int>(columns_.count()), share_per_depth_);
+        vectorised<share_of_depth>(s, static_cast<int>(count), share_per_depth_);
       }
-      if (!single) add(height, share, pixels);
-      if (textures_) add_photo(z / shape.cell_rows(), pixels);
-      if ((j + 1) % z_.per_pixel() == 0) finish(pixels);
+      if (!single) add(height, share, block, pixels);
+      if (textures_) add_photo(texels, z / shape.cell_rows(), columns, pixels);
+      if ((j + 1) % z_.per_pixel() == 0) finish(pixels, block);
     }
   }
 
-  void add(const std::vector<float>& height, const std::vector<float>& share, PixelRow& pixels) const {
+  void add(const std::vector<float>& height, const std::vector<float>& share, const Run& block,
+           PixelRow& pixels) const {
     const auto per_pixel = static_cast<std::size_t>(x_.per_pixel());
-    for (std::size_t pixel = 0, i = 0; pixel < width_; ++pixel) {
+    const auto end = static_cast<std::size_t>(block.last);
+    for (std::size_t pixel = static_cast<std::size_t>(block.first), i = 0; pixel < end; ++pixel) {
       for (std::size_t k = 0; k < per_pixel; ++k, ++i) {
         if (std::isnan(height[i])) continue;
         pixels.heights[1 + pixel] += height[i];
@@ -514,28 +667,52 @@ class ShadeRenderer {
     }
   }
 
-  void add_photo(double t, PixelRow& pixels) const {
-    for (std::size_t tile = 0; tile < photos_.size(); ++tile) {
-      const Run columns = columns_.of_tile(tile);
+  struct TexelRows {
+    std::vector<std::uint8_t> north;
+    std::vector<std::uint8_t> south;
+  };
+
+  void add_photo(TexelRows& buffers, double t, const Run& points, PixelRow& pixels) const {
+    const Run tiles = columns_.tiles_under(points);
+    const ShadeTexture::Place down = textures_->place(t);
+    const std::size_t line = 4 * textures_->side();
+    const auto texels = [&](std::size_t row, std::vector<std::uint8_t>& buffer) {
+      return texels_
+          ->read(static_cast<std::int64_t>(row), static_cast<std::size_t>(tiles.first) * line,
+                 static_cast<std::size_t>(tiles.last - tiles.first) * line, buffer)
+          .data();
+    };
+    const std::uint8_t* north = texels(down.first, buffers.north);
+    const std::uint8_t* south = texels(down.first + 1, buffers.south);
+    for (std::int64_t tile = tiles.first; tile < tiles.last; ++tile) {
+      const Run columns = columns_.of_tile(tile, points);
       for (std::int64_t i = columns.first; i < columns.last; ++i) {
         const double s = x_.world(i) / grid_.extent_x() - static_cast<double>(tile);
-        const ShadeTexture::Colour colour = photos_[tile].at(s, t);
+        const ShadeTexture::Colour colour = ShadeTexture::colour(north, south, down.share, textures_->place(s));
         float* const out = pixels.photo.data() + 4 * (i / x_.per_pixel());
         for (std::size_t k = 0; k < 3; ++k) out[k] += colour.light[k] * colour.alpha;
         out[3] += colour.alpha;
       }
+      north += line;
+      south += line;
     }
   }
 
-  /// Means of sums, and the heights beyond both ends, which go on with the slope.
-  void finish(PixelRow& pixels) const {
-    for (std::size_t i = 0; i < pixels.cover.size(); ++i) {
+  /// Means of sums.
+  void finish(PixelRow& pixels, const Run& block) const {
+    const auto first = static_cast<std::size_t>(block.first);
+    const auto end = static_cast<std::size_t>(block.last);
+    for (std::size_t i = first; !pixels.cover.empty() && i < end; ++i) {
       const float cover = pixels.cover[i];
       pixels.heights[1 + i] = cover > 0.0F ? pixels.heights[1 + i] / cover : kVoid;
       if (sweep_ && cover > 0.0F) pixels.shares[i] /= cover;
     }
-    const auto points = static_cast<float>(x_.per_pixel() * z_.per_pixel());
-    for (float& value : pixels.photo) value /= points;
+    const auto points = static_cast<float>(points_in_pixel());
+    for (std::size_t i = 4 * first; textures_ && i < 4 * end; ++i) pixels.photo[i] /= points;
+  }
+
+  /// The heights beyond both ends, which go on with the slope.
+  void extend(PixelRow& pixels) const {
     std::vector<float>& heights = pixels.heights;
     heights.front() = width_ > 1 ? 2.0F * heights[1] - heights[2] : heights[1];
     heights.back() = width_ > 1 ? 2.0F * heights[width_] - heights[width_ - 1] : heights[1];
@@ -545,13 +722,16 @@ class ShadeRenderer {
   void hand_over(std::int64_t end, const TakeShadedRows& take) {
     const std::int64_t last = end == size_.second ? end : end - 1;
     if (last <= taken_) return;
-    const std::size_t row_bytes = width_ * static_cast<std::size_t>(samples_.channels) * size_bytes(samples_.type);
-    std::vector<std::byte> bytes(row_bytes * static_cast<std::size_t>(last - taken_));
-    oneapi::tbb::parallel_for(oneapi::tbb::blocked_range<std::int64_t>(taken_, last, 16), [&](const auto& some) {
-      std::vector<float> scratch(3 * width_);
-      std::vector<float> beyond(width_ + 2);
-      for (std::int64_t row = some.begin(); row < some.end(); ++row) {
-        shade_row(row, scratch, beyond, bytes.data() + row_bytes * static_cast<std::size_t>(row - taken_));
+    const std::size_t pixel_bytes = static_cast<std::size_t>(samples_.channels) * size_bytes(samples_.type);
+    std::vector<std::byte> bytes(width_ * pixel_bytes * static_cast<std::size_t>(last - taken_));
+    for_each_block(taken_, last, [&](const Run& rows, const Run& pixels) {
+      const auto count = static_cast<std::size_t>(pixels.last - pixels.first);
+      std::vector<float> scratch(3 * count);
+      std::vector<float> beyond(count + 2);
+      for (std::int64_t row = rows.first; row < rows.last; ++row) {
+        const std::size_t place =
+            width_ * static_cast<std::size_t>(row - taken_) + static_cast<std::size_t>(pixels.first);
+        shade_row(row, pixels, scratch, beyond, bytes.data() + pixel_bytes * place);
       }
     });
     take(bytes);
@@ -562,24 +742,28 @@ class ShadeRenderer {
     }
   }
 
-  void shade_row(std::int64_t row, std::vector<float>& scratch, std::vector<float>& beyond, std::byte* out) {
+  void shade_row(std::int64_t row, const Run& block, std::vector<float>& scratch, std::vector<float>& beyond,
+                 std::byte* out) {
     const PixelRow& pixels = pixel_row(row);
+    const auto count = static_cast<std::size_t>(block.last - block.first);
+    const auto heights_of = [&](const PixelRow& of) { return of.heights.data() + 1 + block.first; };
     const auto heights_at = [&](std::int64_t other) {
-      if (other >= 0 && other < size_.second) return pixel_row(other).heights.data() + 1;
+      if (other >= 0 && other < size_.second) return heights_of(pixel_row(other));
       // Beyond both ends the slope goes on.
       const std::int64_t opposite = 2 * row - other;
       const bool has = opposite >= 0 && opposite < size_.second;
-      const std::vector<float>& inner = has ? pixel_row(opposite).heights : pixels.heights;
-      for (std::size_t i = 0; i < beyond.size(); ++i) beyond[i] = 2.0F * pixels.heights[i] - inner[i];
-      return beyond.data() + 1;
+      const float* const here = heights_of(pixels) - 1;
+      const float* const inner = has ? heights_of(pixel_row(opposite)) - 1 : here;
+      for (std::size_t i = 0; i < beyond.size(); ++i) beyond[i] = 2.0F * here[i] - inner[i];
+      return static_cast<const float*>(beyond.data() + 1);
     };
-    const ReliefRows rows{heights_at(row - 1), pixels.heights.data() + 1, heights_at(row + 1)};
+    const ReliefRows rows{heights_at(row - 1), heights_of(pixels), heights_at(row + 1)};
     const PixelSize pixel{x_.pixel(), z_.pixel()};
-    const std::span<float> one(scratch.data(), width_);
+    const std::span<float> one(scratch.data(), count);
     switch (request_.kind) {
       case ShadeKind::kPicture:
         if (request_.relief) relief_normals(rows, pixel, scratch);
-        return colour_row(pixels, scratch, out);
+        return colour_row(pixels, block, scratch, out);
       case ShadeKind::kHillshade:
         relief_hillshade(rows, pixel, sun_, one);
         break;
@@ -593,34 +777,36 @@ class ShadeRenderer {
         relief_aspect(rows, pixel, one);
         break;
       case ShadeKind::kShadowMask:
-        std::copy_n(pixels.shares.begin(), width_, one.begin());
+        std::copy_n(pixels.shares.begin() + block.first, count, one.begin());
         break;
     }
     // A slope is known by a pixel's neighbours alone.
-    for (std::size_t i = 0; i < width_; ++i) {
+    for (std::size_t i = 0; i < count; ++i) {
       if (std::isnan(rows.here[i])) one[i] = kVoid;
     }
     if (samples_.type == SampleType::kUint8) {
-      return bytes_from_shares(one, {reinterpret_cast<std::uint8_t*>(out), width_});
+      return bytes_from_shares(one, {reinterpret_cast<std::uint8_t*>(out), count});
     }
     const bool is_share = !std::isfinite(*samples_.void_value);
     auto* const floats = static_cast<float*>(static_cast<void*>(out));
-    for (std::size_t i = 0; i < width_; ++i) floats[i] = std::isnan(one[i]) && !is_share ? kShadeVoid : one[i];
+    for (std::size_t i = 0; i < count; ++i) floats[i] = std::isnan(one[i]) && !is_share ? kShadeVoid : one[i];
   }
 
-  void colour_row(const PixelRow& pixels, const std::vector<float>& normals, std::byte* out) const {
-    const auto points = static_cast<float>(x_.per_pixel() * z_.per_pixel());
-    for (std::size_t i = 0; i < width_; ++i) {
-      const float height = pixels.heights[1 + i];
+  void colour_row(const PixelRow& pixels, const Run& block, const std::vector<float>& normals, std::byte* out) const {
+    const auto points = static_cast<float>(points_in_pixel());
+    const auto count = static_cast<std::size_t>(block.last - block.first);
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::size_t at = static_cast<std::size_t>(block.first) + i;
+      const float height = pixels.heights[1 + at];
       if (std::isnan(height)) continue;
-      const float alpha = pixels.cover.empty() ? 1.0F : pixels.cover[i] / points;
+      const float alpha = pixels.cover.empty() ? 1.0F : pixels.cover[at] / points;
       const Normal normal =
-          request_.relief ? Normal{normals[i], normals[width_ + i], normals[2 * width_ + i]} : Normal{0.0F, 1.0F, 0.0F};
-      Light light = illumination_.on(normal, sweep_ ? pixels.shares[i] : 1.0F);
+          request_.relief ? Normal{normals[i], normals[count + i], normals[2 * count + i]} : Normal{0.0F, 1.0F, 0.0F};
+      Light light = illumination_.on(normal, sweep_ ? pixels.shares[at] : 1.0F);
       const Light ground = palette_.at(static_cast<double>(height) / world_per_elevation_ + datum_);
       for (std::size_t k = 0; k < 3; ++k) {
         const float colour =
-            textures_ ? ground[k] * (1.0F - pixels.photo[4 * i + 3]) + pixels.photo[4 * i + k] : ground[k];
+            textures_ ? ground[k] * (1.0F - pixels.photo[4 * at + 3]) + pixels.photo[4 * at + k] : ground[k];
         light[k] *= colour;
       }
       if (request_.floats) {
@@ -655,11 +841,14 @@ class ShadeRenderer {
   float share_per_depth_ = 1.0F;
   std::optional<ShadowSweep> sweep_;
   std::optional<ShadeTexture> textures_;
-  TileRowValues heights_;  ///< of the row of tiles that is drawn
+  ScratchFolder scratch_;
+  std::int64_t rows_at_once_ = 1;         ///< of pixels
+  std::optional<TileRowValues> heights_;  ///< of the row of tiles that is drawn
   std::atomic<bool> has_voids_ = false;
-  TileRowValues depths_;
-  std::vector<ShadeTexture::Tile> photos_;
-  std::vector<ShadowSweep::State> south_;  ///< what enters each row of tiles from the South, where it is kept
+  std::optional<TileRowValues> depths_;
+  std::optional<KeptRows<std::uint8_t>> texels_;  ///< rows of [tile columns][side] texels
+  std::optional<KeptRows<float>> south_;          ///< what enters each row of tiles from the South, where it is kept
+  std::size_t south_width_ = 0;
   std::int64_t south_stride_ = 1;
   std::deque<PixelRow> rows_;  ///< from the last one handed over to those that are begun
   std::int64_t first_row_ = 0;

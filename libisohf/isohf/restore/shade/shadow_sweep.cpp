@@ -15,6 +15,8 @@ constexpr float kVoid = std::numeric_limits<float>::quiet_NaN();
 constexpr double kOnLattice = 1e-9;
 /// Columns that are turned into steps together: as many as share cache lines.
 constexpr int kColumnsTogether = 16;
+/// Tiles beside each other whose rows are read together.
+constexpr std::int64_t kTilesTogether = 8;
 
 /// A visible or padding row of a tile at every half step from its West edge to its East edge.
 void spread(const TileShape& shape, const float* row, bool is_odd, float* out) {
@@ -42,6 +44,38 @@ int half_step(const TileShape& shape, int column, int row) {
 }
 
 }  // namespace
+
+TileRowValues::TileRowValues(const TileGrid& grid, const ScratchFolder& scratch)
+    : vertex_rows_(grid.shape().rows()),
+      columns_(static_cast<std::size_t>(grid.shape().columns())),
+      rows_(static_cast<std::size_t>(grid.tile_columns()) * columns_, scratch) {
+  for (int row = 0; row < vertex_rows_; ++row) rows_.add(row);
+}
+
+double TileRowValues::memory_bytes(const TileGrid& grid) {
+  return static_cast<double>(grid.tile_columns() * grid.shape().stored_vertex_count()) * sizeof(float);
+}
+
+RowParts<float> TileRowValues::part(std::int64_t first_tile, std::int64_t tiles) const {
+  return {rows_, 0, static_cast<std::size_t>(first_tile) * columns_, static_cast<std::size_t>(tiles) * columns_};
+}
+
+void TileRowValues::write_row(int row, std::int64_t first_tile, std::span<const float> values) {
+  rows_.write(row, static_cast<std::size_t>(first_tile) * columns_, values);
+}
+
+void TileRowValues::write_tile(std::int64_t tile, std::span<const float> values) {
+  for (int row = 0; row < vertex_rows_; ++row) {
+    write_row(row, tile, values.subspan(static_cast<std::size_t>(row) * columns_, columns_));
+  }
+}
+
+std::vector<float> TileRowValues::tile(std::int64_t tile) const {
+  RowParts<float> rows = part(tile, 1);
+  std::vector<float> values;
+  for (int row = 0; row < vertex_rows_; ++row) values.insert(values.end(), rows.row(row).begin(), rows.row(row).end());
+  return values;
+}
 
 ShadowSweep::ShadowSweep(const TileGrid& grid, const WorldBounds& ground, double azimuth_deg, double fall,
                          double softness)
@@ -72,6 +106,14 @@ std::uint64_t ShadowSweep::state_bytes() const {
   return static_cast<std::uint64_t>(lanes * (by_columns_ ? shift_ : 1.0) * sizeof(float)) + 64;
 }
 
+double ShadowSweep::passing_bytes() const {
+  const TileShape& shape = grid_.shape();
+  if (by_columns_) return 2.0 * sizeof(float) * static_cast<double>(kTilesTogether * shape.stored_vertex_count());
+  // Lines, their depths, the ground under them, what is found; rows of vertices.
+  const auto tiles = static_cast<double>(grid_.tile_columns());
+  return tiles * sizeof(float) * (4.0 * half_steps_ + 2.0 * shape.columns());
+}
+
 ShadowFront::Casting ShadowSweep::casting_columns() const {
   const double first = ground_.x0 / grid_.sigma_x();
   const double last = ground_.x1 / grid_.sigma_x();
@@ -90,10 +132,6 @@ ShadowFront::Casting ShadowSweep::casting_rows(std::int64_t tile_row) const {
 
 ShadowSweep::State ShadowSweep::pass(std::int64_t tile_row, const State& entering, const TileRowValues& heights,
                                      TileRowValues* depths) {
-  if (depths != nullptr) {
-    depths->resize(heights.size());
-    for (std::vector<float>& tile : *depths) tile.resize(static_cast<std::size_t>(grid_.shape().stored_vertex_count()));
-  }
   return by_columns_ ? pass_along_columns(tile_row, entering, heights, depths)
                      : pass_along_rows(tile_row, entering, heights, depths);
 }
@@ -112,11 +150,13 @@ ShadowSweep::State ShadowSweep::pass_along_rows(std::int64_t tile_row, const Sta
   const ShadowFront::Casting rows = casting_rows(tile_row);
   std::vector<float> profile(static_cast<std::size_t>(lanes) + 2, kVoid);
   std::vector<float> found(static_cast<std::size_t>(lanes));
+  std::vector<float> values;
+  std::vector<float> made(depths != nullptr ? static_cast<std::size_t>(grid_.tile_columns() * shape.columns()) : 0);
   for (int step = 1; step <= shape.cell_rows() + 1; ++step) {
     const int row = from_south_ ? shape.rows() - 1 - step : step;
-    for (std::size_t tile = 0; tile < heights.size(); ++tile) {
-      spread(shape, heights[tile].data() + static_cast<std::ptrdiff_t>(row) * shape.columns(), row % 2 != 0,
-             profile.data() + 1 + static_cast<std::ptrdiff_t>(tile) * half_steps_);
+    const std::span<const float> vertices = heights.row(row, 0, grid_.tile_columns(), values);
+    for (std::int64_t tile = 0; tile < grid_.tile_columns(); ++tile) {
+      spread(shape, vertices.data() + tile * shape.columns(), row % 2 != 0, profile.data() + 1 + tile * half_steps_);
     }
     if (mirrored_) std::reverse(profile.begin(), profile.end());
     if (step == shape.cell_rows() + 1) leaving = front.lines();
@@ -125,11 +165,12 @@ ShadowSweep::State ShadowSweep::pass_along_rows(std::int64_t tile_row, const Sta
                   depths != nullptr ? found.data() : nullptr);
     if (depths == nullptr) continue;
     if (mirrored_) std::reverse(found.begin(), found.end());
-    for (std::size_t tile = 0; tile < heights.size(); ++tile) {
-      float* const out = (*depths)[tile].data() + static_cast<std::ptrdiff_t>(row) * shape.columns();
-      const float* const from = found.data() + static_cast<std::ptrdiff_t>(tile) * half_steps_;
+    for (std::int64_t tile = 0; tile < grid_.tile_columns(); ++tile) {
+      float* const out = made.data() + tile * shape.columns();
+      const float* const from = found.data() + tile * half_steps_;
       for (int c = 1; c <= last_visible_column(shape, row); ++c) out[c] = from[half_step(shape, c, row)];
     }
+    depths->write_row(row, 0, made);
   }
   return leaving;
 }
@@ -152,46 +193,59 @@ ShadowSweep::State ShadowSweep::pass_along_columns(std::int64_t tile_row, const 
   std::vector<float> profiles(lane_stride * across, kVoid);
   std::vector<float> found(static_cast<std::size_t>(lanes) * across);
   std::int64_t steps = 0;
-  for (std::size_t k = 0; k < heights.size(); ++k) {
-    const std::size_t tile = mirrored_ ? heights.size() - 1 - k : k;
-    for (int row = 0; row < lanes; ++row) {
-      const int lane = from_south_ ? lanes - 1 - row : row;
-      float* const out = spread_rows.data() + static_cast<std::size_t>(lane) * across;
-      spread(shape, heights[tile].data() + static_cast<std::ptrdiff_t>(row) * shape.columns(), row % 2 != 0, out);
-      if (mirrored_) std::reverse(out, out + across);
-    }
-    for (std::size_t first = 0; first < across; first += kColumnsTogether) {
-      const std::size_t last = std::min(first + kColumnsTogether, across);
-      for (int lane = 0; lane < lanes; ++lane) {
-        const float* const from = spread_rows.data() + static_cast<std::size_t>(lane) * across;
-        for (std::size_t x = first; x < last; ++x) {
-          profiles[x * lane_stride + 1 + static_cast<std::size_t>(lane)] = from[x];
+  for (std::int64_t k = 0; k < grid_.tile_columns(); k += kTilesTogether) {
+    const std::int64_t tiles = std::min(kTilesTogether, grid_.tile_columns() - k);
+    const std::int64_t first_tile = mirrored_ ? grid_.tile_columns() - k - tiles : k;
+    RowParts<float> vertices = heights.part(first_tile, tiles);
+    const std::int64_t stride = tiles * shape.columns();
+    std::vector<float> made(depths != nullptr ? static_cast<std::size_t>(stride * lanes) : 0);
+    for (std::int64_t i = 0; i < tiles; ++i) {
+      const std::ptrdiff_t column = (mirrored_ ? tiles - 1 - i : i) * shape.columns();
+      for (int row = 0; row < lanes; ++row) {
+        const int lane = from_south_ ? lanes - 1 - row : row;
+        float* const out = spread_rows.data() + static_cast<std::size_t>(lane) * across;
+        spread(shape, vertices.row(row).data() + column, row % 2 != 0, out);
+        if (mirrored_) std::reverse(out, out + across);
+      }
+      for (std::size_t first = 0; first < across; first += kColumnsTogether) {
+        const std::size_t last = std::min(first + kColumnsTogether, across);
+        for (int lane = 0; lane < lanes; ++lane) {
+          const float* const from = spread_rows.data() + static_cast<std::size_t>(lane) * across;
+          for (std::size_t x = first; x < last; ++x) {
+            profiles[x * lane_stride + 1 + static_cast<std::size_t>(lane)] = from[x];
+          }
+        }
+      }
+      // The first column is the last one of the tile before.
+      const bool is_first = k + i == 0;
+      if (!is_first) {
+        std::copy_n(found.begin() + static_cast<std::ptrdiff_t>(half_steps_) * lanes, lanes, found.begin());
+      }
+      for (std::size_t x = is_first ? 0 : 1; x < across; ++x, ++steps) {
+        if (front.is_shifting()) {
+          leaving.push_back(front.line_arriving(lanes - 3));
+          front.let_in(entered < entering.size() ? entering[entered++] : -std::numeric_limits<float>::infinity());
+        }
+        const auto at = static_cast<double>(steps);
+        const bool casts = at >= columns.first - 1e-6 && at <= columns.last + 1e-6;
+        front.advance(profiles.data() + x * lane_stride + 1, casts ? rows : ShadowFront::Casting{1.0, 0.0},
+                      found.data() + x * static_cast<std::size_t>(lanes));
+      }
+      if (depths == nullptr) continue;
+      for (int row = 1; row <= lanes - 2; ++row) {
+        const auto lane = static_cast<std::size_t>(from_south_ ? lanes - 1 - row : row);
+        float* const out = made.data() + row * stride + column;
+        for (int c = 1; c <= last_visible_column(shape, row); ++c) {
+          const int x = half_step(shape, c, row);
+          out[c] =
+              found[static_cast<std::size_t>(mirrored_ ? half_steps_ - x : x) * static_cast<std::size_t>(lanes) + lane];
         }
       }
     }
-    // The first column is the last one of the tile before.
-    if (k > 0) {
-      std::copy_n(found.begin() + static_cast<std::ptrdiff_t>(half_steps_) * lanes, lanes, found.begin());
-    }
-    for (std::size_t x = k > 0 ? 1 : 0; x < across; ++x, ++steps) {
-      if (front.is_shifting()) {
-        leaving.push_back(front.line_arriving(lanes - 3));
-        front.let_in(entered < entering.size() ? entering[entered++] : -std::numeric_limits<float>::infinity());
-      }
-      const auto at = static_cast<double>(steps);
-      const bool casts = at >= columns.first - 1e-6 && at <= columns.last + 1e-6;
-      front.advance(profiles.data() + x * lane_stride + 1, casts ? rows : ShadowFront::Casting{1.0, 0.0},
-                    found.data() + x * static_cast<std::size_t>(lanes));
-    }
-    if (depths == nullptr) continue;
-    for (int row = 1; row <= lanes - 2; ++row) {
-      const auto lane = static_cast<std::size_t>(from_south_ ? lanes - 1 - row : row);
-      float* const out = (*depths)[tile].data() + static_cast<std::ptrdiff_t>(row) * shape.columns();
-      for (int c = 1; c <= last_visible_column(shape, row); ++c) {
-        const int x = half_step(shape, c, row);
-        out[c] =
-            found[static_cast<std::size_t>(mirrored_ ? half_steps_ - x : x) * static_cast<std::size_t>(lanes) + lane];
-      }
+    for (int row = 1; depths != nullptr && row <= lanes - 2; ++row) {
+      depths->write_row(
+          row, first_tile,
+          std::span(made).subspan(static_cast<std::size_t>(row * stride), static_cast<std::size_t>(stride)));
     }
   }
   return leaving;

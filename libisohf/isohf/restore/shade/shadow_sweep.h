@@ -4,14 +4,39 @@
 #include <span>
 #include <vector>
 
+#include "isohf/base/memory/kept_rows.h"
 #include "isohf/lattice.h"
 #include "isohf/metadata.h"
 #include "isohf/surface/shade/shadow_front.h"
 
 namespace isohf {
 
-/// Values of the stored vertices of each tile of a row, from West to East: [tile columns][C*R].
-using TileRowValues = std::vector<std::vector<float>>;
+/// Values of the stored vertices of a row of tiles, vertex row by vertex row: R rows of [tile columns][C].
+class TileRowValues {
+ public:
+  TileRowValues(const TileGrid& grid, const ScratchFolder& scratch);
+  [[nodiscard]] static double memory_bytes(const TileGrid& grid);
+
+  /// A row of some tiles: [tiles * C]; `buffer` holds it where memory does not.
+  [[nodiscard]] std::span<const float> row(int row, std::int64_t first_tile, std::int64_t tiles,
+                                           std::vector<float>& buffer) const {
+    return rows_.read(row, static_cast<std::size_t>(first_tile) * columns_, static_cast<std::size_t>(tiles) * columns_,
+                      buffer);
+  }
+  /// The same tiles of several rows: [tiles * C] each.
+  [[nodiscard]] RowParts<float> part(std::int64_t first_tile, std::int64_t tiles) const;
+  /// Of as many tiles as there are values. From many threads at once, each on tiles of its own.
+  void write_row(int row, std::int64_t first_tile, std::span<const float> values);
+
+  /// values  [C*R] of one tile
+  void write_tile(std::int64_t tile, std::span<const float> values);
+  [[nodiscard]] std::vector<float> tile(std::int64_t tile) const;
+
+ private:
+  int vertex_rows_;
+  std::size_t columns_;  ///< of a tile
+  KeptRows<float> rows_;
+};
 
 /// Light that passes over the tiles of an archive, a row of them at a time, from the sun's side.
 ///
@@ -38,6 +63,8 @@ class ShadowSweep {
   /// What passes from one row of tiles to the next: heights of lines of light.
   using State = std::vector<float>;
   [[nodiscard]] std::uint64_t state_bytes() const;
+  /// What a pass takes beside that.
+  [[nodiscard]] double passing_bytes() const;
 
   /// Passes over a row of tiles.
   /// entering  what the row before it left; empty: nothing, at the first row
