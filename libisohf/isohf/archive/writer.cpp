@@ -6,7 +6,10 @@
 #include <oneapi/tbb/task_group.h>
 
 #include <algorithm>
+#include <deque>
+#include <mutex>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "isohf/archive/archive_index_builder.h"
@@ -31,23 +34,17 @@ constexpr std::uint64_t kJournalBytes = std::uint64_t{4} << 20U;
 /// What is collected before it is written: it stays in a core's cache between the two copies.
 constexpr std::size_t kBufferBytes = std::size_t{256} << 10U;
 
-/// Of other archives' members: what is copied at once.
+/// Of other archives' members: what is copied at once, and how many such pieces the caller may be ahead.
 constexpr std::uint64_t kCopyBytes = std::uint64_t{256} << 10U;
+constexpr std::size_t kMostAhead = 32;
 
 /// Members that follow one another in another archive.
 struct CopiedRun {
-  const ByteSource* from = nullptr;
-  const std::string* name = nullptr;
+  CopySource from;
   std::uint64_t offset = 0;  ///< of the first one's local header
   std::uint64_t bytes = 0;
   std::vector<std::byte> headers;                                ///< as they must stand there
   std::vector<std::pair<std::uint32_t, std::uint32_t>> members;  ///< bytes of header and of data
-
-  void clear() {
-    bytes = 0;
-    headers.clear();
-    members.clear();
-  }
 };
 
 Digest job_digest(const TileGrid& grid, const WriterOptions& options) {
@@ -86,9 +83,11 @@ struct ArchiveWriter::State {
   bool finished = false;
   bool keep = false;
   CopiedRun collected;  ///< by the caller's thread
-  CopiedRun copied;     ///< by the task
-  std::vector<std::byte> piece;
-  std::uint64_t announced = 0;  ///< bytes of both
+  std::mutex mutex;
+  std::deque<CopiedRun> ahead;  ///< to be copied by the task
+  bool has_task = false;
+  std::vector<std::byte> piece;  ///< the task's
+  std::uint64_t announced = 0;   ///< where the file will end; 0: nothing is being copied
   oneapi::tbb::task_group copying;
 
   State(const std::string& target, const TileGrid& tile_grid, const WriterOptions& writer_options)
@@ -115,7 +114,8 @@ struct ArchiveWriter::State {
   [[nodiscard]] std::uint64_t position() const { return announced != 0 ? announced : part.position(); }
   void copy(const CopySource& from, std::uint64_t data_offset, const ZipMember& member);
   void hand_over();
-  void write_copies();
+  void write_ahead();
+  void write_copies(const CopiedRun& run);
   void end_copies();
   void begin_contents();
   [[nodiscard]] bool is_intact(const JournalRecord& record, std::uint64_t expected_offset) const;
@@ -228,11 +228,10 @@ void ArchiveWriter::State::copy(const CopySource& from, std::uint64_t data_offse
   if (data_offset < header)
     throw Error(ErrorCode::kCorrupt, fmt::format("{}: its index names byte {}", from.name, data_offset));
   const std::uint64_t offset = data_offset - header;
-  const bool follows = collected.from == &from.bytes && collected.offset + collected.bytes == offset;
+  const bool follows = collected.from.bytes == from.bytes && collected.offset + collected.bytes == offset;
   if (collected.bytes > 0 && (!follows || collected.bytes + bytes > kCopyBytes)) hand_over();
   if (collected.bytes == 0) {
-    collected.from = &from.bytes;
-    collected.name = &from.name;
+    collected.from = from;
     collected.offset = offset;
   }
   announced = position() + bytes;
@@ -244,26 +243,42 @@ void ArchiveWriter::State::copy(const CopySource& from, std::uint64_t data_offse
 
 /// Has the task copy what was collected.
 void ArchiveWriter::State::hand_over() {
-  copying.wait();
-  std::swap(collected, copied);
-  collected.clear();
-  if (copied.bytes > 0) copying.run([this] { write_copies(); });
+  if (collected.bytes == 0) return;
+  bool is_idle = false;
+  bool is_full = false;
+  {
+    const std::lock_guard lock(mutex);
+    ahead.push_back(std::exchange(collected, {}));
+    is_idle = !std::exchange(has_task, true);
+    is_full = ahead.size() >= kMostAhead;
+  }
+  if (is_idle) copying.run([this] { write_ahead(); });
+  if (is_full) copying.wait();
 }
 
-void ArchiveWriter::State::write_copies() {
+void ArchiveWriter::State::write_ahead() {
+  for (CopiedRun run;; write_copies(run)) {
+    const std::lock_guard lock(mutex);
+    if (!(has_task = !ahead.empty())) return;
+    run = std::move(ahead.front());
+    ahead.pop_front();
+  }
+}
+
+void ArchiveWriter::State::write_copies(const CopiedRun& run) {
   try {
-    piece.resize(copied.bytes);
-    read_exactly(*copied.from, copied.offset, piece);
+    piece.resize(run.bytes);
+    read_exactly(*run.from.bytes, run.offset, piece);
   } catch (const Error& error) {
-    throw error.within(*copied.name);
+    throw error.within(run.from.name);
   }
   std::size_t at = 0;
-  auto header = copied.headers.begin();
-  for (const auto& [header_bytes, data_bytes] : copied.members) {
+  auto header = run.headers.begin();
+  for (const auto& [header_bytes, data_bytes] : run.members) {
     const auto found = std::span(piece).subspan(at, header_bytes);
     if (!std::equal(found.begin(), found.end(), header)) {
       throw Error(ErrorCode::kCorrupt, fmt::format("{}: at byte {}: no local header that says what the index says",
-                                                   *copied.name, copied.offset + at));
+                                                   run.from.name, run.offset + at));
     }
     header += header_bytes;
     contents.add_data_crc32(crc32(std::span(piece).subspan(at + header_bytes, data_bytes)));
@@ -449,7 +464,11 @@ void ArchiveWriter::copy_member(const CopySource& from, const TablePlace& place,
 
 void ArchiveWriter::stop_copies() noexcept {
   if (state_ == nullptr) return;
-  state_->collected.clear();
+  state_->collected = {};
+  {
+    const std::lock_guard lock(state_->mutex);
+    state_->ahead.clear();
+  }
   try {
     state_->copying.wait();
   } catch (...) {  // another failure is on its way

@@ -28,10 +28,10 @@ struct WriterOptions {
   bool journal = true;             ///< keep one for a resume; without it a part file is never kept
 };
 
-/// Where members are copied from.
+/// Where members are copied from. What is being copied keeps it.
 struct CopySource {
-  const ByteSource& bytes;
-  const std::string& name;  ///< in errors
+  std::shared_ptr<const ByteSource> bytes;
+  std::string name;  ///< in errors
 };
 
 /// Whether a file begins as an archive of any version of the format. No other file is ever replaced by one, but an empty
@@ -92,7 +92,7 @@ class ArchiveWriter {
 
   /// Appends a member of another archive at its place in a table as it stands there, local header included, which must
   /// say what the record says: Error{kCorrupt} from here or a later call. What follows one another there is copied in
-  /// large pieces, beside the caller's thread, on its oneTBB arena: `from` must live until end_copies().
+  /// large pieces, beside the caller's thread, on its oneTBB arena.
   /// Without a journal only. A tile of a plane, which adds nothing to statistics():
   void copy_tile(const CopySource& from, PlaneTile tile, const TableRecord& record, const Digest& digest);
   void copy_member(const CopySource& from, const TablePlace& place, const TableRecord& record);

@@ -102,10 +102,11 @@ void Assembly::add_tiles() {
       job_.report({"tiles", "tiles", (row + 1) * columns, grid.tile_count(), writer_.bytes_written()});
       continue;
     }
-    Row tiles(static_cast<std::size_t>(columns));
-    for (std::size_t first = 0; first < tiles.size(); first += batch) {
+    Row tiles{std::vector<const ArchiveReader*>(static_cast<std::size_t>(columns)),
+              std::vector<TileCodes>(request_.one_origin ? 0 : static_cast<std::size_t>(columns))};
+    for (std::size_t first = 0; first < tiles.from.size(); first += batch) {
       job_.throw_if_cancelled();
-      std::vector<Tile> some(std::min(batch, tiles.size() - first));
+      std::vector<Tile> some(std::min(batch, tiles.from.size() - first));
       if (!inputs.empty()) read(inputs, {static_cast<std::int64_t>(first), row}, some);
       for (std::size_t i = 0; i < some.size(); ++i) {
         const TileIndex index{static_cast<std::int64_t>(first + i), row};
@@ -113,13 +114,14 @@ void Assembly::add_tiles() {
         if (tile.tables != nullptr) add_textures(index, tile);
         request_.tiles.contains(index) ? writer_.add_tile(tile.encoded) : writer_.skip_tiles(1);
         if (request_.planes != nullptr && !request_.has_plane_rows) request_.planes->add(tile.sample);
-        tiles[first + i] = {tile.from, request_.one_origin ? TileCodes() : std::move(tile.codes)};
+        tiles.from[first + i] = tile.from;
+        if (!request_.one_origin) tiles.codes[first + i] = std::move(tile.codes);
       }
     }
     if (request_.planes != nullptr && request_.has_plane_rows) add_plane_rows(row);
     if (!inputs.empty() && has_seeds_) add_seeds(row, tiles);
     if (!request_.one_origin) compare_edges(row, tiles, above);
-    above = std::move(tiles);
+    if (!request_.one_origin) above = std::move(tiles);
     close_before(row);
     job_.report({"tiles", "tiles", (row + 1) * columns, grid.tile_count(), writer_.bytes_written()});
   }
@@ -170,8 +172,8 @@ void Assembly::close_before(std::int64_t row) {
   for (const AssemblyInput& input : request_.inputs) {
     const std::int64_t done = input.tiles.end.row + std::max<std::int64_t>(metadata_.planes.stride, 1) + 1;
     if (row != done) continue;
-    writer_.end_copies();
     input.file->close();
+    tile_bytes_ = member_bytes_ = {};  // another source may get its address
   }
 }
 
@@ -184,31 +186,43 @@ void Assembly::add_plane_rows(std::int64_t row) {
     const std::int64_t needed = std::min((next_plane_row_ + 1) * planes.stride() + 1, metadata_.grid.tile_rows());
     if (row + 1 < needed) return;
     PartFile& file = *inputs_of_row(next_plane_row_ * planes.stride()).front()->file;
-    const ArchiveReader& from = file.archive();
     for (std::int64_t first = 0; first < grid.tile_columns(); first += batch) {
       job_.throw_if_cancelled();
       std::vector<PlaneSample> samples(static_cast<std::size_t>(std::min(batch, grid.tile_columns() - first)));
+      const std::pair some(first, first + static_cast<std::int64_t>(samples.size()));
+      const std::vector<PartFile::Stored> tiles = file.stored(tile_table_name(1), next_plane_row_, some);
+      // Of a void tile those below are asked.
+      const ArchiveReader* const below = tiles.size() == samples.size() ? nullptr : &file.archive();
       const std::size_t groups = planes.count() > 1 ? (samples.size() + kBatchLanes - 1) / kBatchLanes : 0;
       oneapi::tbb::parallel_for(std::size_t{0}, groups, [&](std::size_t group) {
-        std::vector<TileIndex> tiles;
-        for (std::size_t i = group * kBatchLanes; i < std::min(samples.size(), (group + 1) * kBatchLanes); ++i)
-          tiles.push_back({first + static_cast<std::int64_t>(i), next_plane_row_});
-        const std::vector<TileCodes> codes = from.read_tiles(tiles, 1);
-        for (std::size_t i = 0; i < tiles.size(); ++i) {
+        const auto begin = std::partition_point(tiles.begin(), tiles.end(), [&](const PartFile::Stored& tile) {
+          return tile.column < first + static_cast<std::int64_t>(group * kBatchLanes);
+        });
+        const auto end = std::partition_point(begin, tiles.end(), [&](const PartFile::Stored& tile) {
+          return tile.column < first + static_cast<std::int64_t>((group + 1) * kBatchLanes);
+        });
+        std::vector<TileCodes> codes = file.decode(metadata_.grid.shape(), metadata_.quantisation.type, {begin, end});
+        for (std::size_t i = group * kBatchLanes; i < std::min(samples.size(), (group + 1) * kBatchLanes); ++i) {
+          const TileIndex index{first + static_cast<std::int64_t>(i), next_plane_row_};
           const auto read = [&](int plane, TileIndex tile) {
-            const TileEntry entry = from.tile_entry(tile, plane);
             PlaneBuilder::Stored stored;
+            const auto at = std::find_if(begin, end, [&](const auto& one) { return one.column == tile.column; });
+            const TileEntry entry = plane == 0  ? below->tile_entry(tile, 0)
+                                    : at != end ? at->record.entry
+                                                : TileEntry{};
             stored.entry.is_empty = !entry.stored;
             stored.entry.code_min = entry.code_min;
             stored.entry.code_max = entry.code_max;
-            if (entry.stored) stored.codes = plane == 1 ? codes[i] : from.read_tile(tile, plane);
+            if (entry.stored) {
+              stored.codes =
+                  plane == 0 ? below->read_tile(tile) : std::move(codes[static_cast<std::size_t>(at - begin)]);
+            }
             return stored;
           };
-          samples[group * kBatchLanes + i] = request_.planes->finished_sample(tiles[i], read);
+          samples[i] = request_.planes->finished_sample(index, read);
         }
       });
-      const std::pair some(first, first + static_cast<std::int64_t>(samples.size()));
-      for (const PartFile::Stored& tile : file.stored(tile_table_name(1), next_plane_row_, some))
+      for (const PartFile::Stored& tile : tiles)
         writer_.copy_tile(file.source(), {1, {tile.column, next_plane_row_}}, tile.record, tile.digest);
       for (std::size_t i = 0; i < samples.size() && planes.count() > 1; ++i) request_.planes->add_finished(samples[i]);
     }
@@ -308,23 +322,23 @@ void Assembly::add_textures(TileIndex index, const Tile& tile) {
 void Assembly::add_seeds(std::int64_t row, const Row& tiles) {
   const ArchiveReader* first = nullptr;
   bool is_one = true;
-  for (const RowTile& tile : tiles) {
-    if (tile.from == nullptr) continue;  // void, or not asked for
-    if (first == nullptr) first = tile.from;
-    is_one = is_one && tile.from == first;
+  for (const ArchiveReader* const from : tiles.from) {
+    if (from == nullptr) continue;  // void, or not asked for
+    if (first == nullptr) first = from;
+    is_one = is_one && from == first;
   }
   if (!seeds_ || is_one) {
-    for (std::size_t i = 0; i < tiles.size(); ++i) {
-      if (tiles[i].from == nullptr) continue;
-      const auto member = tiles[i].from->find_member(seed_name({static_cast<std::int64_t>(i), row}));
-      if (member) copy_member(*tiles[i].from, *member, writer_, member_bytes_);
+    for (std::size_t i = 0; i < tiles.from.size(); ++i) {
+      if (tiles.from[i] == nullptr) continue;
+      const auto member = tiles.from[i]->find_member(seed_name({static_cast<std::int64_t>(i), row}));
+      if (member) copy_member(*tiles.from[i], *member, writer_, member_bytes_);
     }
     return;
   }
-  std::vector<SeedRow::Tile> prepared(tiles.size());
-  oneapi::tbb::parallel_for(std::size_t{0}, tiles.size(), [&](std::size_t i) {
-    const bool is_void = tiles[i].from == nullptr;
-    prepared[i] = seeds_->prepare(is_void ? void_codes_ : tiles[i].codes);
+  std::vector<SeedRow::Tile> prepared(tiles.from.size());
+  oneapi::tbb::parallel_for(std::size_t{0}, tiles.from.size(), [&](std::size_t i) {
+    const bool is_void = tiles.from[i] == nullptr;
+    prepared[i] = seeds_->prepare(is_void ? void_codes_ : tiles.codes[i]);
     prepared[i].is_empty = is_void;
   });
   SeedRow::Tiles all(std::nullopt);
@@ -341,9 +355,11 @@ void Assembly::add_seeds(std::int64_t row, const Row& tiles) {
 /// What two tiles share must be equal, also where they come from two archives.
 void Assembly::compare_edges(std::int64_t row, const Row& tiles, const Row& above) const {
   const TileShape& shape = metadata_.grid.shape();
-  const auto columns = static_cast<std::int64_t>(tiles.size());
-  const auto value = [&](const RowTile& tile, GridVertex vertex) -> double {
-    const TileCodes& codes = tile.from == nullptr ? void_codes_ : tile.codes;
+  const auto columns = static_cast<std::int64_t>(tiles.from.size());
+  using Place = std::pair<const Row*, std::size_t>;
+  const auto from = [](const Place& tile) { return tile.first->from[tile.second]; };
+  const auto value = [&](const Place& tile, GridVertex vertex) -> double {
+    const TileCodes& codes = from(tile) == nullptr ? void_codes_ : tile.first->codes[tile.second];
     const auto at = static_cast<std::size_t>(vertex.row * shape.columns() + vertex.column);
     if (codes.type != CodeType::kF32) return codes.codes[at];
     return codes.heights[at] == codes.heights[at] ? double{codes.heights[at]} : HUGE_VAL;
@@ -354,18 +370,17 @@ void Assembly::compare_edges(std::int64_t row, const Row& tiles, const Row& abov
       // This tile is the neighbour's South or East, or the one that looks East.
       std::int64_t other = step.row == 0 ? column + 1 : column - step.column;
       if (metadata_.wraps_x) other = (other + columns) % columns;
-      if (other < 0 || other >= columns || (step.row == 1 && above.empty())) continue;
+      if (other < 0 || other >= columns || (step.row == 1 && above.from.empty())) continue;
       const TileIndex one = step.row == 0 ? TileIndex{column, row} : TileIndex{other, row - 1};
       const TileIndex two = step.row == 0 ? TileIndex{other, row} : TileIndex{column, row};
       if (!request_.tiles.contains(one) || !request_.tiles.contains(two)) continue;
-      const RowTile& here =
-          step.row == 0 ? tiles[static_cast<std::size_t>(column)] : above[static_cast<std::size_t>(other)];
-      const RowTile& there = tiles[static_cast<std::size_t>(step.row == 0 ? other : column)];
-      if (here.from == there.from) continue;
+      const Place here = step.row == 0 ? Place(&tiles, column) : Place(&above, other);
+      const Place there(&tiles, step.row == 0 ? other : column);
+      if (from(here) == from(there)) continue;
       if (shared.empty()) shared = shared_vertices(shape, step);
       for (const SharedVertex& vertex : shared) {
         if (value(here, vertex.here) == value(there, vertex.there)) continue;
-        const auto name = [](const RowTile& tile) { return tile.from == nullptr ? "void" : tile.from->path(); };
+        const auto name = [&](const Place& tile) { return from(tile) == nullptr ? "void" : from(tile)->path(); };
         throw Error(
             ErrorCode::kInvalidArgument,
             fmt::format("tile ({},{}) of {} does not meet its neighbour of {}: a vertex that both hold differs; "

@@ -60,12 +60,11 @@ class Assembly {
     TileCodes codes;
     PlaneSample sample;
   };
-  /// What is kept of it for its row.
-  struct RowTile {
-    const ArchiveReader* from = nullptr;
-    TileCodes codes;  ///< where origins differ
+  /// What is kept of a row's tiles.
+  struct Row {
+    std::vector<const ArchiveReader*> from;
+    std::vector<TileCodes> codes;  ///< where origins differ
   };
-  using Row = std::vector<RowTile>;
 
   [[nodiscard]] std::vector<const AssemblyInput*> inputs_of_row(std::int64_t row) const;
   void read(std::span<const AssemblyInput* const> inputs, TileIndex first, std::span<Tile> tiles);

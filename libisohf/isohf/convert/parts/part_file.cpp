@@ -1,37 +1,100 @@
 #include "isohf/convert/parts/part_file.h"
 
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+
+#include "isohf/archive/codec/simd/batch_decoder.h"
+#include "isohf/archive/codec/tile_decoder.h"
+#include "isohf/archive/codec/tile_payload.h"
 #include "isohf/archive/container/archive_directory.h"
+#include "isohf/archive/deflate/deflate.h"
+#include "isohf/base/source_bytes.h"
 #include "isohf/error.h"
 
 namespace isohf {
 
+const CopySource& PartFile::source() {
+  if (!source_.bytes) source_ = {open_file_source(path_), path_};
+  return source_;
+}
+
+const PagedIndex& PartFile::index() {
+  if (!index_) {
+    const ByteSource& file = *source().bytes;
+    const OwnEntries own = find_own_entries(file, find_archive_end(file));
+    if (own.index) index_ = PagedIndex::open(file, *own.index);
+    if (!index_) throw Error(ErrorCode::kCorrupt, "has no index as it was written");
+  }
+  return *index_;
+}
+
 const std::vector<std::string>& PartFile::tile_tables() {
   if (knows_tables_) return tables_;
-  for (const MemberTable& table : archive().tables()) {
+  const auto take = [&](const MemberTable& table) {
     const bool is_by_tile = table.name.find("{column}") != std::string::npos;
     if (is_by_tile && !table.name.starts_with("seeds/") && !is_in_tile_folder(table.name))
       tables_.push_back(table.name);
+  };
+  if (path_.empty()) {
+    for (const MemberTable& table : archive().tables()) take(table);
+  } else {
+    for (const TableDescription& table : index().tables()) take(table.members);
   }
   knows_tables_ = true;
   return tables_;
 }
 
 std::vector<PartFile::Stored> PartFile::stored(const std::string& table, std::int64_t row,
-                                               std::pair<std::int64_t, std::int64_t> columns) {
+                                               std::pair<std::int64_t, std::int64_t> columns) try {
   std::vector<Stored> all;
-  try {
-    const ByteSource& file = archive().source();
-    if (!index_) index_ = PagedIndex::open(file, find_own_entries(file, find_archive_end(file)).index.value());
-    const auto at = index_->find_table(table);
-    if (!at) return all;
-    index_->for_row(*at, row, columns.first, columns.second,
-                    [&](std::int64_t column, const TableRecord& record, const Digest* digest) {
-                      all.push_back({column, record, digest == nullptr ? Digest{} : *digest});
-                    });
-  } catch (const Error& error) {
-    throw error.within(archive().path());
+  const auto at = index().find_table(table);
+  if (!at) return all;
+  if (const MemberTable& members = index().tables()[*at].members;
+      row >= members.rows || columns.second > members.columns) {
+    throw Error(ErrorCode::kCorrupt,
+                fmt::format("its index has {}x{} of \"{}\"", members.columns, members.rows, table));
   }
+  all.reserve(static_cast<std::size_t>(columns.second - columns.first));
+  index().for_row(*at, row, columns.first, columns.second,
+                  [&](std::int64_t column, const TableRecord& record, const Digest* digest) {
+                    all.push_back({column, record, digest == nullptr ? Digest{} : *digest});
+                  });
   return all;
+} catch (const Error& error) {
+  throw error.within(source_.name);
+}
+
+std::vector<TileCodes> PartFile::decode(const TileShape& shape, CodeType type, std::span<const Stored> tiles) const {
+  const auto payload_of = [&](const TileEntry& entry) {
+    if (entry.payload_bytes > max_payload_bytes(shape, type))
+      throw Error(ErrorCode::kCorrupt, fmt::format("states a payload of {} bytes", entry.payload_bytes));
+    std::vector<std::byte> payload(entry.payload_bytes);
+    inflate_exactly(SourceBytes(*source_.bytes, entry.offset_bytes, entry.compressed_bytes).bytes(), payload);
+    if (crc32(payload) != entry.payload_crc32) throw Error(ErrorCode::kCorrupt, "has another CRC-32 than is stated");
+    return payload;
+  };
+  std::vector<TileCodes> codes(tiles.size());
+  for (std::size_t begin = 0; begin < tiles.size(); begin += kBatchLanes) {
+    const std::size_t lanes = std::min<std::size_t>(kBatchLanes, tiles.size() - begin);
+    std::array<std::vector<std::byte>, kBatchLanes> payloads;
+    std::array<std::span<const std::byte>, kBatchLanes> spans;
+    std::array<bool, kBatchLanes> is_decoded{};
+    std::size_t lane = 0;
+    try {
+      for (; lane < lanes; ++lane) spans[lane] = payloads[lane] = payload_of(tiles[begin + lane].record.entry);
+      decode_batch(shape, type, std::span(spans).first(lanes), std::span(codes).subspan(begin, lanes),
+                   std::span(is_decoded).first(lanes));
+      for (lane = 0; lane < lanes; ++lane) {
+        if (!is_decoded[lane]) codes[begin + lane] = decode_tile(shape, type, spans[lane]);
+      }
+    } catch (const Error& error) {
+      throw error.within(
+          fmt::format("{}: tile at byte {}", source_.name, tiles[begin + lane].record.entry.offset_bytes));
+    }
+  }
+  return codes;
 }
 
 bool is_own_member(const std::string& name) {

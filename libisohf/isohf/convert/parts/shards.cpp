@@ -224,7 +224,7 @@ ShardPlan draft_shards(const HeightSource& source, const ConvertOptions& options
   found.tile_rows = plan.grid.tile_rows();
   const PlaneInfo planes = options.planes ? planes_for(plan.grid) : PlaneInfo();
   const std::int64_t stride = planes.count > 0 ? planes.stride : 1;
-  const std::int64_t unit = found.tile_rows / stride >= shards ? stride : 1;
+  const std::int64_t unit = (found.tile_rows + stride - 1) / stride >= shards ? stride : 1;
   const std::int64_t units = (found.tile_rows + unit - 1) / unit;
   const std::int64_t count = std::min<std::int64_t>(shards, units);
   for (std::int64_t k = 0; k < count; ++k) {
