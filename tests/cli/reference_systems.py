@@ -151,6 +151,11 @@ READERS = {
     "ESRI .prj": (".asc", create("AAIGrid", ["FORCE_CELLSIZE=YES"])),
     "VRT": (".vrt", virtual),
     "netCDF": (".nc", create("netCDF")),
+    "EHdr": (".bil", create("EHdr")),
+    "ENVI": (".dat", create("ENVI")),
+    "SAGA": (".sdat", create("SAGA")),
+    "PNG": (".png", create("PNG", kind=gdal.GDT_UInt16)),
+    "JPEG 2000": (".jp2", create("JP2OpenJPEG", ["REVERSIBLE=YES", "QUALITY=100"], gdal.GDT_UInt16)),
     "ERDAS Imagine": (".img", create("HFA")),
     "PDS4": (".xml", of_other_bodies("PDS4")),
     "ISIS3": (".cub", of_other_bodies("ISIS3")),
@@ -370,20 +375,19 @@ BEGIN, END = "<!-- reference_systems.py writes what follows -->", "<!-- end -->"
 
 
 def table_of(rows):
-    """Marks of all cells, and the reasons of those that are not kept."""
-    columns = list(READERS) + list(WRITERS)
-    lines = ["| system | given as | " + " | ".join(columns) + " |", "|---|---|" + "---|" * len(columns)]
-    reasons = {}
-    for name, definition, row in rows:
-        cells = []
-        for column in columns:
-            word, reason = row[column]
-            if word != "kept":
-                reasons.setdefault(name, re.sub(r"isohf: (/\S+: )?|/\S+/", "", reason) if reason else "")
-            cells.append({"kept": "kept", "refused": "refused", "-": ""}.get(word, word))
-        lines.append(f"| {name} | `{definition}` | " + " | ".join(cells) + " |")
-    lines.append("")
-    lines += [f"{name}: {reason}." for name, reason in reasons.items() if reason]
+    """Marks of all cells, of readers and of writers, and the reasons of those that are not kept."""
+    lines, reasons = [], {}
+    for title, columns in (("read", READERS), ("written", WRITERS)):
+        given = " given as |" if columns is WRITERS else ""
+        lines += [f"| {title} |{given} " + " | ".join(columns) + " |", "|---|" + "---|" * (len(columns) + len(given[:1]))]
+        for name, definition, row in rows:
+            for word, reason in (row[column] for column in columns):
+                if word not in ("kept", "-"):
+                    reasons.setdefault(re.sub(r"isohf: (/\S+: )?|/\S+/|\d+_\d+\S* ?", "", reason), []).append(name)
+            given = f" `{definition}` |" if columns is WRITERS else ""
+            lines.append(f"| {name} |{given} " + " | ".join("" if row[column][0] == "-" else row[column][0] for column in columns) + " |")
+        lines.append("")
+    lines += [f"{', '.join(dict.fromkeys(names))}: {reason}." for reason, names in reasons.items() if reason]
     return "\n".join(lines)
 
 
