@@ -43,10 +43,23 @@ if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND NOT CMAKE_DISABLE_PRECOMPILE_HEADERS
                          -Wno-use-after-free)
 endif()
 
-# isohf_precompile(TARGET HEADER...): parses what most sources of the product include once for the target. A build with
-# ccache (scripts/lib/build.sh) and the preset lean parse it everywhere and so keep all warnings.
-function(isohf_precompile target)
+# isohf_compile(TARGET HEADER...): parses what most sources of the product include once for the target, and compiles the
+# sources of each folder together: most of a compilation is templates that the next one makes again. A build with ccache
+# (scripts/lib/build.sh) and the preset lean compile each source by itself, so that it includes what it uses and keeps all
+# warnings; scripts/check finds names that two sources of a folder have for themselves.
+function(isohf_compile target)
   target_link_libraries(${target} PRIVATE $<BUILD_INTERFACE:isohf_precompiled>)
   target_precompile_headers(${target} PRIVATE <algorithm> <array> <cmath> <cstdint> <functional> <memory> <optional> <span>
                             <string> <utility> <vector> <fmt/format.h> ${ARGN})
+  if(NOT CMAKE_CXX_COMPILER_LAUNCHER AND NOT CMAKE_DISABLE_PRECOMPILE_HEADERS)
+    set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_MODE GROUP)
+    # A private type of one source may have members of types that only it has.
+    target_compile_options(${target} PRIVATE -Wno-subobject-linkage)
+    get_target_property(sources ${target} SOURCES)
+    foreach(source IN LISTS sources)
+      cmake_path(GET source PARENT_PATH folder)
+      string(MAKE_C_IDENTIFIER "room_${folder}" folder)
+      set_source_files_properties(${source} PROPERTIES UNITY_GROUP "${folder}")
+    endforeach()
+  endif()
 endfunction()

@@ -145,14 +145,14 @@ struct ErrorColumn {
   double scale;
   int digits;
 };
-constexpr double kDegrees = 180.0 / std::numbers::pi;
+constexpr double kDegreesPerRadian = 180.0 / std::numbers::pi;
 constexpr ErrorColumn kColumns[] = {{"mean", &experiment::Errors::mean, 1.0, 6},
                                     {"rms", &experiment::Errors::rms, 1.0, 6},
-                                    {"face normal", &experiment::Errors::normal_rad, kDegrees, 4},
+                                    {"face normal", &experiment::Errors::normal_rad, kDegreesPerRadian, 4},
                                     {"shading", &experiment::Errors::shading, 1.0, 6},
-                                    {"vertex normal", &experiment::Errors::vertex_normal_rad, kDegrees, 4},
+                                    {"vertex normal", &experiment::Errors::vertex_normal_rad, kDegreesPerRadian, 4},
                                     {"shading", &experiment::Errors::vertex_shading, 1.0, 6},
-                                    {"curvature", &experiment::Errors::defect_rad, kDegrees, 4}};
+                                    {"curvature", &experiment::Errors::defect_rad, kDegreesPerRadian, 4}};
 
 std::string table_of(const ExperimentResult& result, bool as_ratio) {
   std::string text = fmt::format("{:>9} {:<12}", "triangles", "mesh");
@@ -192,8 +192,9 @@ std::string summary_text(const ExperimentResult& result) {
   text += fmt::format(
       "\nmean and rms in amplitudes, normals and curvature (angle defect of a vertex) in degrees\n"
       "shading: Lambert's law, by the normals before it, light {:.4g} degrees high {}\n",
-      light.elevation_rad * kDegrees,
-      light.azimuth_rad ? fmt::format("at azimuth {:.4g}", *light.azimuth_rad * kDegrees) : "in the wave's direction");
+      light.elevation_rad * kDegreesPerRadian,
+      light.azimuth_rad ? fmt::format("at azimuth {:.4g}", *light.azimuth_rad * kDegreesPerRadian)
+                        : "in the wave's direction");
   return text;
 }
 

@@ -14,8 +14,8 @@
 namespace isohf {
 namespace {
 
-constexpr double kMostSide = 2147483647.0;
-constexpr std::uint64_t kLongestHeader = std::uint64_t{1} << 20U;
+constexpr double kMostSamplesASide = 2147483647.0;
+constexpr std::uint64_t kLongestDescription = std::uint64_t{1} << 20U;
 
 }  // namespace
 
@@ -35,9 +35,9 @@ std::pair<std::string, std::string> data_and_header(const std::string& path, con
 
 std::string read_header_text(const std::string& path) {
   const RawFile file(path);
-  if (file.size_bytes() > kLongestHeader) {
+  if (file.size_bytes() > kLongestDescription) {
     throw Error(ErrorCode::kCorrupt,
-                fmt::format("{}: is longer than {} bytes, which no header is", path, kLongestHeader));
+                fmt::format("{}: is longer than {} bytes, which no header is", path, kLongestDescription));
   }
   std::string text(static_cast<std::size_t>(file.size_bytes()), '\0');
   file.read(0, std::as_writable_bytes(std::span(text)));
@@ -99,14 +99,15 @@ double DescribedSource::number(const HeaderWords& words, const char* key, std::o
 }
 
 std::int64_t DescribedSource::count(double value, const std::string& what, double least) const {
-  if (!(value >= least && value <= kMostSide * 65536.0) || value != std::floor(value)) {
+  if (!(value >= least && value <= kMostSamplesASide * 65536.0) || value != std::floor(value)) {
     refuse(ErrorCode::kCorrupt, fmt::format("{} is {}, must be a whole number from {} on", what, value, least));
   }
   return static_cast<std::int64_t>(value);
 }
 
 void DescribedSource::set_size(double width, double height) {
-  if (!(std::max(width, height) <= kMostSide)) refuse(ErrorCode::kCorrupt, "gives more than 2147483647 samples a side");
+  if (!(std::max(width, height) <= kMostSamplesASide))
+    refuse(ErrorCode::kCorrupt, "gives more than 2147483647 samples a side");
   info_.width = count(width, "the number of columns");
   info_.height = count(height, "the number of rows");
 }

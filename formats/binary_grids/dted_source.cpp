@@ -27,8 +27,8 @@ constexpr std::size_t kAccBytes = 2700;
 constexpr std::size_t kHeaderBytes = kUhlBytes + kDsiBytes + kAccBytes;
 constexpr std::int64_t kRecordHeadBytes = 8;    // sentinel, block count, longitude count, latitude count
 constexpr std::int64_t kRecordExtraBytes = 12;  // with the checksum
-constexpr std::int64_t kRowsAtOnce = 256;
-constexpr int kVoid = -32767;
+constexpr std::int64_t kProfileRows = 256;
+constexpr int kDtedVoid = -32767;
 /// Far below any ground; two's complement, which some programs write instead, lands there.
 constexpr int kLowestElevation = -16000;
 
@@ -145,10 +145,10 @@ class DtedSource final : public FileSource {
                   info_.path + ": DSI: the cell is rotated; only cells along meridians are read");
     }
     info_.sample_type = SampleType::kInt16;
-    info_.void_values = {static_cast<double>(kVoid)};
+    info_.void_values = {static_cast<double>(kDtedVoid)};
     info_.vertical_unit = "metre";
     info_.block_width = info_.width;
-    info_.block_height = std::min(info_.height, kRowsAtOnce);
+    info_.block_height = std::min(info_.height, kProfileRows);
     Georeference& geo = info_.georeference;
     geo.registration = Registration::kPoint;
     geo.unit = HorizontalUnit::kDegree;
@@ -244,7 +244,7 @@ class DtedSource final : public FileSource {
     }
     for (std::size_t i = kRecordHeadBytes; i < end; i += 2) {
       const int value = elevation(record[i], record[i + 1]);
-      if (value < kLowestElevation && value != kVoid) {
+      if (value < kLowestElevation && value != kDtedVoid) {
         corrupt(name, fmt::format("post {} from the South is at {} m, must be above {} (two's complement is no DTED)",
                                   (i - kRecordHeadBytes) / 2, value, kLowestElevation));
       }

@@ -13,12 +13,7 @@
 #include "isohf/error.h"
 
 namespace isohf {
-namespace {
-
-/// Voids of float grids are written as the lowest or highest float with 6 to 17 digits, seldom the same ones twice.
-constexpr double kBeyondAnyHeight = 1e38;
-
-}  // namespace
+namespace {}  // namespace
 
 std::string GridHeader::plain_name(std::string_view name) {
   std::string plain;

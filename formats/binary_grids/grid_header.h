@@ -11,6 +11,9 @@
 
 namespace isohf {
 
+/// From here on, either side of 0, floats mean voids: they are written with 6 to 17 digits, seldom the same ones twice.
+constexpr double kBeyondAnyHeight = 1e38;
+
 /// The words of an ESRI grid header ("ncols 4", "NODATA_value -9999"), in any order; names are compared in lower case
 /// without underscores and hyphens.
 class GridHeader {

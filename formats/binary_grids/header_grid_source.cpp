@@ -23,8 +23,6 @@ namespace isohf {
 namespace {
 
 constexpr std::size_t kLongestHeader = 65536;
-/// Beyond it floats without a declared void value mean voids.
-constexpr double kBeyondAnyHeight = 1e38;
 
 /// The header words that say something of the samples; others are passed over.
 constexpr std::array<std::string_view, 25> kWords = {

@@ -153,7 +153,7 @@ class HgtSource final : public PlainSource {
   }
 };
 
-constexpr double kVoid = -32768.0;
+constexpr double kHgtVoid = -32768.0;
 
 /// Big-endian int16, nothing else.
 class HgtEncoder final : public RasterEncoder {
@@ -228,7 +228,7 @@ std::unique_ptr<RasterEncoder> encode_hgt(OutputFile& out, const RasterSpec& spe
                 fmt::format("an HGT tile has 1201 x 1201, 3601 x 3601 or 1801 x 3601 samples, not {} x {}", spec.width,
                             spec.height));
   }
-  if (spec.void_value && *spec.void_value != kVoid) {
+  if (spec.void_value && *spec.void_value != kHgtVoid) {
     throw Error(ErrorCode::kInvalidArgument, fmt::format("HGT's void value is -32768, not {}", *spec.void_value));
   }
   check_place(out.path(), spec);

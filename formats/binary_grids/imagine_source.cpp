@@ -31,9 +31,9 @@
 namespace isohf {
 namespace {
 
-constexpr std::string_view kMagic("EHFA_HEADER_TAG\0", 16);
+constexpr std::string_view kImagineMagic("EHFA_HEADER_TAG\0", 16);
 constexpr std::string_view kSpillMagic("ERDAS_IMG_EXTERNAL_RASTER\0", 26);
-constexpr std::int64_t kMostSide = 2147483647;
+constexpr std::int64_t kMostImagineSide = 2147483647;
 constexpr std::uint64_t kMostTileBytes = std::uint64_t{1} << 26U;
 constexpr std::uint64_t kMostKeptBytes = std::uint64_t{64} << 20U;
 /// Layers and what describes them.
@@ -191,7 +191,7 @@ class ImagineSource final : public FileSource {
  public:
   ImagineSource(const std::string& path, const OpenOptions& options) : FileSource(path, "ERDAS Imagine", options) {
     std::array<std::byte, 4> pointer{};
-    file_->read(kMagic.size(), pointer);
+    file_->read(kImagineMagic.size(), pointer);
     std::array<std::byte, 18> head{};
     file_->read(number_at<std::uint32_t>(pointer, 0), head);
     std::vector<Node> layers;
@@ -642,7 +642,7 @@ class ImagineSource final : public FileSource {
 }  // namespace
 
 bool looks_like_imagine(std::span<const std::byte> head) {
-  return text_of(head).starts_with(kMagic);
+  return text_of(head).starts_with(kImagineMagic);
 }
 
 std::unique_ptr<HeightSource> open_imagine(const std::string& path, const OpenOptions& options) {

@@ -24,11 +24,11 @@
 namespace isohf {
 namespace {
 
-constexpr std::string_view kMagic = "\x93NUMPY";
+constexpr std::string_view kNpyMagic = "\x93NUMPY";
 constexpr std::size_t kLongestList = 200;  // of names in a message
 constexpr std::size_t kMostHeaderBytes = std::size_t{1} << 20U;
-constexpr std::int64_t kRowsAtOnce = 256;
-constexpr std::int64_t kMostSide = std::int64_t{1} << 31;
+constexpr std::int64_t kNpyRowsAtOnce = 256;
+constexpr std::int64_t kMostNpySide = std::int64_t{1} << 31;
 
 struct Header {
   std::string descr;
@@ -205,13 +205,13 @@ class NpySource final : public PlainSource {
     if (header.descr.ends_with("u8")) layout_.stored_as = StoredAs::kUint64;
     info_.height = shape[0];
     info_.width = shape[1];
-    if (info_.width < 1 || info_.height < 1 || info_.width > kMostSide || info_.height > kMostSide) {
+    if (info_.width < 1 || info_.height < 1 || info_.width > kMostNpySide || info_.height > kMostNpySide) {
       throw Error(ErrorCode::kCorrupt, fmt::format("{}: the array's shape is ({}), must be from 1 to {}", info_.path,
-                                                   fmt::join(header.shape, ", "), kMostSide));
+                                                   fmt::join(header.shape, ", "), kMostNpySide));
     }
     info_.sample_type = type.value_or(SampleType::kFloat32);
     info_.block_width = info_.width;
-    info_.block_height = by_columns ? std::min(info_.height, kRowsAtOnce) : 1;
+    info_.block_height = by_columns ? std::min(info_.height, kNpyRowsAtOnce) : 1;
     layout_.big_endian = order == '>';
     if (by_columns) {
       layout_.row_bytes = size_bytes(info_.sample_type);
@@ -247,7 +247,7 @@ std::unique_ptr<NpySource> open_array(const std::string& path, const ZipEntry& m
 }  // namespace
 
 bool looks_like_npy(std::span<const std::byte> head) {
-  return text_of(head).starts_with(kMagic);
+  return text_of(head).starts_with(kNpyMagic);
 }
 
 std::unique_ptr<HeightSource> open_npy(const std::string& path, const OpenOptions& options) {

@@ -7,6 +7,7 @@
 #include <charconv>
 #include <cmath>
 
+#include "formats/binary_grids/grid_header.h"
 #include "formats/binary_grids/plain_samples.h"
 #include "formats/files/file_source.h"
 #include "formats/files/text.h"
@@ -19,15 +20,12 @@
 namespace isohf {
 namespace {
 
-/// Beyond it floats without a declared void value mean voids.
-constexpr double kBeyondAnyHeight = 1e38;
-
 struct TypeName {
   std::string_view name;
   SampleType type;
 };
 
-constexpr std::array<TypeName, 8> kTypes = {{
+constexpr std::array<TypeName, 8> kRawTypes = {{
     {"u8", SampleType::kUint8},
     {"i8", SampleType::kInt8},
     {"u16", SampleType::kUint16},
@@ -130,7 +128,7 @@ RawLayout raw_layout_from_string(std::string_view text) {
   }
   // f64 samples of this many are 2^62 bytes; no file has more.
   if (layout.width > (std::int64_t{1} << 59U) / layout.height) refuse_layout(text);
-  for (const TypeName& row : kTypes) {
+  for (const TypeName& row : kRawTypes) {
     if (!take(rest, row.name)) continue;
     layout.type = row.type;
     if (size_bytes(row.type) == 1 && rest.empty()) return layout;

@@ -24,7 +24,7 @@ constexpr std::int64_t kLeastStripBytes = std::int64_t{4} << 20U;
 constexpr std::size_t kBatchBytes = std::size_t{8} << 20U;
 
 /// Coordinates this close to a sample, in samples, are its place: they are computed from origins and spacings.
-constexpr double kOnSample = 1e-6;
+constexpr double kAtSample = 1e-6;
 
 /// Between two reads of strips, all open readers together may keep this many times what one source would.
 constexpr std::uint64_t kOpenReaders = 32;
@@ -53,8 +53,8 @@ struct Between {
 
 Between place_between(double position, std::int64_t samples, bool area) {
   const double nearest = std::floor(position + 0.5);
-  if (std::abs(position - nearest) <= kOnSample) position = nearest;
-  const double reach = area ? 0.5 + kOnSample : 0.0;
+  if (std::abs(position - nearest) <= kAtSample) position = nearest;
+  const double reach = area ? 0.5 + kAtSample : 0.0;
   Between place;
   place.nearest = -1;
   if (!(position >= -reach && position <= static_cast<double>(samples - 1) + reach)) return place;

@@ -31,7 +31,7 @@ namespace {
 constexpr std::uint64_t kLongestVrt = std::uint64_t{256} << 20U;
 constexpr std::int64_t kMostSide = std::int64_t{1} << 31;
 /// Files of a mosaic that stay open.
-constexpr std::size_t kMostOpen = 16;
+constexpr std::size_t kMostVrtOpen = 16;
 /// A VRT of VRTs of ...; more go round in a circle.
 constexpr int kDeepest = 8;
 /// Of a sample: places in a VRT are written in decimals.
@@ -61,7 +61,7 @@ struct Piece {
 class VrtSource final : public FileSource {
  public:
   VrtSource(const std::string& path, const OpenOptions& options)
-      : FileSource(path, "VRT", options), unpacked_bytes_(options.unpacked_bytes / kMostOpen) {
+      : FileSource(path, "VRT", options), unpacked_bytes_(options.unpacked_bytes / kMostVrtOpen) {
     if (depth >= kDeepest) fail(ErrorCode::kUnsupported, "is one of itself, or of too many within each other");
     std::string text(static_cast<std::size_t>(std::min(file_->size_bytes(), kLongestVrt + 1)), '\0');
     if (text.size() > kLongestVrt) fail(ErrorCode::kUnsupported, "is larger than 256 MiB");
@@ -81,7 +81,7 @@ class VrtSource final : public FileSource {
     for (const Piece& piece : pieces_) copy(piece, window, samples);
   }
   void limit_buffers(std::uint64_t bytes) override {
-    limit_ = bytes / kMostOpen;
+    limit_ = bytes / kMostVrtOpen;
     for (Opened& each : opened_) each.source->limit_buffers(*limit_);
   }
   [[nodiscard]] std::uint64_t buffer_bytes(std::uint64_t limit) const override { return limit; }
@@ -276,7 +276,7 @@ class VrtSource final : public FileSource {
            fmt::format("takes samples beyond the {} x {} of {}", info.width, info.height, printable(piece.path)));
     }
     if (limit_) source->limit_buffers(*limit_);
-    if (opened_.size() == kMostOpen) opened_.pop_back();
+    if (opened_.size() == kMostVrtOpen) opened_.pop_back();
     opened_.push_front({&piece, std::move(source)});
     return *opened_.front().source;
   }

@@ -23,9 +23,6 @@
 namespace isohf {
 namespace {
 
-constexpr std::int64_t kMostSamples = std::int64_t{1} << 31;
-constexpr std::int64_t kMostBands = 65535;
-constexpr double kMostBytes = 1125899906842624.0;  // 2^50
 constexpr std::int64_t kPieceBytes = std::int64_t{1} << 20;
 
 struct PixelType {
@@ -49,7 +46,7 @@ const std::array<PixelType, 5>& pixel_types() {
 }
 
 /// A positive length in metres, which are meant where no unit stands there; "meters/pixel" counts as metres.
-std::optional<double> metres(const LabelFields& fields, const char* key) {
+std::optional<double> metres_by_default(const LabelFields& fields, const char* key) {
   const std::optional<double> number = fields.number(key);
   const std::string unit = fields.unit(key);
   const std::optional<LinearUnit> length = linear_unit(unit.empty() ? "m" : unit.substr(0, unit.find('/')));
@@ -174,8 +171,8 @@ class Isis3Source final : public FileSource {
     const LabelFields map(info_.path, *groups.front());
     Georeference& geo = info_.georeference;
     const std::string target = map.text("TARGETNAME").value_or("");
-    geo.system.semi_major_axis_m = metres(map, "EQUATORIALRADIUS");
-    const std::optional<double> polar = metres(map, "POLARRADIUS");
+    geo.system.semi_major_axis_m = metres_by_default(map, "EQUATORIALRADIUS");
+    const std::optional<double> polar = metres_by_default(map, "POLARRADIUS");
     if (const std::optional<double> a = geo.system.semi_major_axis_m) {
       geo.system.inverse_flattening = polar && *polar != *a ? *a / (*a - *polar) : 0.0;
     }
@@ -199,7 +196,7 @@ class Isis3Source final : public FileSource {
       info_.warnings.push_back(loss("the map is rotated; its place is left out"));
       return;
     }
-    const std::optional<double> resolution = metres(map, "PIXELRESOLUTION");
+    const std::optional<double> resolution = metres_by_default(map, "PIXELRESOLUTION");
     if (!resolution || !(*resolution > 0.0)) {
       info_.warnings.push_back(loss("the group Mapping gives no PixelResolution in metres; the place is left out"));
       return;
@@ -207,8 +204,8 @@ class Isis3Source final : public FileSource {
     geo.unit = HorizontalUnit::kMetre;
     geo.registration = Registration::kArea;
     geo.spacing_x = geo.spacing_y = *resolution;
-    const std::optional<double> x = metres(map, "UPPERLEFTCORNERX");
-    const std::optional<double> y = metres(map, "UPPERLEFTCORNERY");
+    const std::optional<double> x = metres_by_default(map, "UPPERLEFTCORNERX");
+    const std::optional<double> y = metres_by_default(map, "UPPERLEFTCORNERY");
     if (!x || !y) {
       info_.warnings.push_back(
           loss("the group Mapping gives no UpperLeftCornerX and Y in metres; the origin is unknown"));

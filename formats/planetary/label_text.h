@@ -11,6 +11,11 @@
 
 namespace isohf {
 
+/// What no image has more of, whatever its label says.
+constexpr std::int64_t kMostSamples = std::int64_t{1} << 31;  ///< on a side
+constexpr std::int64_t kMostBands = 65535;
+constexpr double kMostBytes = 1125899906842624.0;  ///< 2^50
+
 /// One value of a label statement: "4.0 <PIXEL/DEGREE>" is text "4.0", unit "PIXEL/DEGREE".
 struct LabelValue {
   std::string text;  ///< without quotes; runs of white space inside quotes are one space

@@ -42,10 +42,7 @@ struct Pds3Layout {
   std::uint64_t total_bytes = 0;   ///< all bands with them, below 2^50
 };
 
-constexpr std::int64_t kMostSamples = std::int64_t{1} << 31;
-constexpr std::int64_t kMostBands = 65535;
 constexpr std::int64_t kMostMarginBytes = std::int64_t{1} << 31;
-constexpr double kMostBytes = 1125899906842624.0;  // 2^50
 
 struct SampleKind {
   const char* name;

@@ -34,7 +34,7 @@ constexpr double kSame = 1e-7;
 /// Columns and rows are told apart by so many coordinates each.
 constexpr std::size_t kMostCoordinates = std::size_t{1} << 20U;
 /// Off the grid by more than this is no rounding, in spacings.
-constexpr double kOffGrid = 0.1;
+constexpr double kOffSpacing = 0.1;
 constexpr double kMostCellsToAPoint = 16.0;
 
 /// The fields of a line between blanks and one separator; where that is a semicolon, numbers may have decimal commas.
@@ -207,7 +207,7 @@ class Axis {
   /// The first coordinate that lies between those of a spacing; nullptr where none does.
   [[nodiscard]] const Seen* off_grid(double spacing) const {
     const auto found = std::ranges::find_if(seen_, [&](const Seen& each) {
-      return std::abs(std::remainder((each.value - first_) / spacing, 1.0)) > kOffGrid;
+      return std::abs(std::remainder((each.value - first_) / spacing, 1.0)) > kOffSpacing;
     });
     return found == seen_.end() ? nullptr : &*found;
   }

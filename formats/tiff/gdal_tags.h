@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -7,6 +8,9 @@
 #include "isohf/raster.h"
 
 namespace isohf {
+
+constexpr std::uint32_t kGdalMetadataTag = 42112;
+constexpr std::uint32_t kGdalNodataTag = 42113;
 
 /// Reads GDAL_NODATA (tag 42113) into info.void_values: a number in decimal, "nan" or "inf". A value that no sample of
 /// info.sample_type can hold, or a text that is no number, becomes a warning.

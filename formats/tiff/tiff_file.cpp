@@ -21,6 +21,7 @@
 #include "formats/files/raw_file.h"
 #include "formats/files/text.h"
 #include "formats/readers.h"
+#include "formats/tiff/gdal_tags.h"
 #include "isohf/error.h"
 
 namespace isohf {
@@ -63,8 +64,6 @@ constexpr std::uint32_t kModelTransformationTag = 34264;
 constexpr std::uint32_t kGeoKeyDirectoryTag = 34735;
 constexpr std::uint32_t kGeoDoubleParamsTag = 34736;
 constexpr std::uint32_t kGeoAsciiParamsTag = 34737;
-constexpr std::uint32_t kGdalMetadataTag = 42112;
-constexpr std::uint32_t kGdalNodataTag = 42113;
 
 }  // namespace
 

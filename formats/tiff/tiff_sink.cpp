@@ -18,6 +18,7 @@
 #include <utility>
 #include <vector>
 
+#include "formats/tiff/gdal_tags.h"
 #include "formats/tiff/geotiff_keys.h"
 #include "formats/write/encoders.h"
 #include "isohf/error.h"
@@ -111,8 +112,6 @@ constexpr ttag_t kTiepointTag = 33922;
 constexpr ttag_t kGeoDirectoryTag = 34735;
 constexpr ttag_t kGeoDoublesTag = 34736;
 constexpr ttag_t kGeoAsciiTag = 34737;
-constexpr ttag_t kGdalMetadataTag = 42112;
-constexpr ttag_t kGdalNodataTag = 42113;
 
 TIFFFieldInfo counted(ttag_t tag, TIFFDataType type, const char* name) {
   return {tag, TIFF_VARIABLE, TIFF_VARIABLE, type, FIELD_CUSTOM, 1, 1, const_cast<char*>(name)};

@@ -20,7 +20,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-constexpr std::size_t kHeader = 3428;
+constexpr std::size_t kDtedHeader = 3428;
 
 /// What test cells hold: a void in the South-West corner, else by column and post from the South, below and above 0.
 int height_at(int column, int post) {
@@ -40,7 +40,7 @@ void sign(std::string& cell, std::size_t record, int posts) {
 
 /// A cell of `columns` x `posts` at 80 W, 43 N, 30" by 15" apart.
 std::string cell(int columns = 4, int posts = 5) {
-  std::string bytes(kHeader, ' ');
+  std::string bytes(kDtedHeader, ' ');
   put(bytes, 0, "UHL10800000W0430000N030001500200U  ");
   put(bytes, 47, fmt::format("{:04}{:04}0", columns, posts));
   put(bytes, 80, "DSIU");
@@ -120,7 +120,7 @@ TEST_F(Dted, WrongChecksumsAreTakenWhereTheUserSaysSo) {
   test::expect_every_window(*source, test::stored<std::int16_t>(4, 5, [](std::int64_t c, std::int64_t r) {
     return height_at(static_cast<int>(c), static_cast<int>(4 - r));
   }));
-  put(damaged, kHeader, "\xBB");  // a record of another kind
+  put(damaged, kDtedHeader, "\xBB");  // a record of another kind
   EXPECT_THROW((void)test::read_whole(*open_raster(write(damaged), options)), Error);
 }
 
@@ -153,17 +153,17 @@ TEST_F(Dted, NamesTheColumnOfEveryDamagedRecord) {
   for (std::size_t column = 0; column < 4; ++column) {
     for (std::size_t i = 0; i < record; ++i) {
       std::string damaged = whole;
-      const std::size_t at = kHeader + column * record + i;
+      const std::size_t at = kDtedHeader + column * record + i;
       damaged[at] = static_cast<char>(damaged[at] ^ 0x04);
       ErrorCode code = ErrorCode::kCancelled;
       EXPECT_THAT(failure(damaged, &code),
-                  HasSubstr(fmt::format("column {} at byte {}", column, kHeader + column * record)));
+                  HasSubstr(fmt::format("column {} at byte {}", column, kDtedHeader + column * record)));
       EXPECT_EQ(code, ErrorCode::kCorrupt);
     }
   }
   std::string two = whole;
-  put(two, kHeader + 8, "\xFF\xFB");  // -5 in two's complement
-  sign(two, kHeader, 5);
+  put(two, kDtedHeader + 8, "\xFF\xFB");  // -5 in two's complement
+  sign(two, kDtedHeader, 5);
   EXPECT_THAT(failure(two), HasSubstr("post 0 from the South is at -32763 m"));
 }
 

@@ -27,7 +27,7 @@ namespace {
 using ::testing::HasSubstr;
 
 /// What to write: every combination of these is read back below.
-struct Picture {
+struct ExrPicture {
   int width = 37;
   int height = 41;
   Imath::V2i origin{0, 0};
@@ -46,7 +46,7 @@ int value_at(int column, int row, std::size_t channel) {
 
 class Samples {
  public:
-  explicit Samples(const Picture& picture) : picture_(picture) {
+  explicit Samples(const ExrPicture& picture) : picture_(picture) {
     for (std::size_t c = 0; c < picture.channels.size(); ++c) {
       auto& plane = planes_.emplace_back(static_cast<std::size_t>(picture.width * picture.height) * size());
       for (int row = 0; row < picture.height; ++row) {
@@ -78,11 +78,11 @@ class Samples {
     if (picture_.type == Imf::UINT) put(static_cast<std::uint32_t>(value));
   }
 
-  Picture picture_;
+  ExrPicture picture_;
   std::vector<std::vector<std::byte>> planes_;
 };
 
-Imf::Header header_of(const Picture& picture) {
+Imf::Header header_of(const ExrPicture& picture) {
   const Imath::Box2i window(picture.origin, picture.origin + Imath::V2i(picture.width - 1, picture.height - 1));
   Imf::Header header(window, window);
   header.compression() = picture.compression;
@@ -95,7 +95,7 @@ Imf::Header header_of(const Picture& picture) {
   return header;
 }
 
-void write_tiled(const std::string& path, const Picture& picture, Samples& samples) {
+void write_tiled(const std::string& path, const ExrPicture& picture, Samples& samples) {
   Imf::TiledOutputFile file(path.c_str(), header_of(picture));
   for (int ly = 0; ly < file.numYLevels(); ++ly) {
     for (int lx = 0; lx < file.numXLevels(); ++lx) {
@@ -107,7 +107,7 @@ void write_tiled(const std::string& path, const Picture& picture, Samples& sampl
   }
 }
 
-void write_picture(const std::string& path, const Picture& picture) {
+void write_exr(const std::string& path, const ExrPicture& picture) {
   Samples samples(picture);
   if (picture.tile_size > 0) return write_tiled(path, picture, samples);
   Imf::OutputFile file(path.c_str(), header_of(picture));
@@ -115,7 +115,7 @@ void write_picture(const std::string& path, const Picture& picture) {
   file.writePixels(picture.height);
 }
 
-void expect_reads_as(const std::string& path, const Picture& picture) {
+void expect_reads_as(const std::string& path, const ExrPicture& picture) {
   const Samples samples(picture);
   const auto source = open_exr(path, {});
   const SourceInfo& info = source->info();
@@ -150,7 +150,7 @@ TEST(ExrSource, ReadsEverySampleTypeCompressionAndLayout) {
           if (tile_size == 0 && levels != Imf::ONE_LEVEL) continue;
           for (const Imf::LineOrder order : {Imf::INCREASING_Y, Imf::DECREASING_Y, Imf::RANDOM_Y}) {
             if (tile_size == 0 && order == Imf::RANDOM_Y) continue;
-            Picture picture;
+            ExrPicture picture;
             picture.type = type;
             picture.compression = compression;
             picture.tile_size = tile_size;
@@ -158,7 +158,7 @@ TEST(ExrSource, ReadsEverySampleTypeCompressionAndLayout) {
             picture.order = order;
             SCOPED_TRACE(fmt::format("type {} compression {} tiles {} levels {} order {}", type, compression, tile_size,
                                      levels, order));
-            write_picture(path, picture);
+            write_exr(path, picture);
             expect_reads_as(path, picture);
           }
         }
@@ -171,12 +171,12 @@ TEST(ExrSource, ReadsLossyHalvesAsTheLibraryDecodesThem) {
   const TemporaryFolder folder;
   for (const Imf::Compression compression :
        {Imf::B44_COMPRESSION, Imf::B44A_COMPRESSION, Imf::DWAA_COMPRESSION, Imf::DWAB_COMPRESSION}) {
-    Picture picture;
+    ExrPicture picture;
     picture.type = Imf::HALF;
     picture.compression = compression;
     picture.height = 300;  // more than the 256 lines that DWAB packs together
     const std::string path = folder / "lossy.exr";
-    write_picture(path, picture);
+    write_exr(path, picture);
     const auto source = open_exr(path, {});
     const auto samples = read_whole(*source);
     // Rows one by one, from the last to the first, come out as they do all at once.
@@ -192,11 +192,11 @@ TEST(ExrSource, TakesTheDataWindowWhereverItLies) {
   const TemporaryFolder folder;
   for (const Imath::V2i& origin : {Imath::V2i(30, 40), Imath::V2i(-500, -7), Imath::V2i(-3, 1000000)}) {
     for (const int tile_size : {0, 8}) {
-      Picture picture;
+      ExrPicture picture;
       picture.origin = origin;
       picture.tile_size = tile_size;
       const std::string path = folder / "offset.exr";
-      write_picture(path, picture);
+      write_exr(path, picture);
       expect_reads_as(path, picture);
     }
   }
@@ -205,7 +205,7 @@ TEST(ExrSource, TakesTheDataWindowWhereverItLies) {
 TEST(ExrSource, WarnsWhenTheDisplayWindowDiffers) {
   const TemporaryFolder folder;
   const std::string path = folder / "windows.exr";
-  Picture picture;
+  ExrPicture picture;
   Samples samples(picture);
   Imf::Header header = header_of(picture);
   header.displayWindow() = Imath::Box2i({0, 0}, {99, 99});
@@ -249,10 +249,10 @@ TEST(ExrSource, PrefersElevationChannelsAndSaysSo) {
       {{"Y", "terrain.Height"}, "terrain.Height"},
       {{"Y", "ELEVATION"}, "ELEVATION"}};
   for (const auto& [channels, chosen] : cases) {
-    Picture picture;
+    ExrPicture picture;
     picture.channels = channels;
     const std::string path = folder / "channels.exr";
-    write_picture(path, picture);
+    write_exr(path, picture);
     const auto source = open_exr(path, {});
     EXPECT_EQ(source->info().channel, chosen);
     ASSERT_EQ(source->info().warnings.size(), 1U);
@@ -264,9 +264,9 @@ TEST(ExrSource, PrefersElevationChannelsAndSaysSo) {
 TEST(ExrSource, ReadsTheChannelAskedForByNameOrNumber) {
   const TemporaryFolder folder;
   const std::string path = folder / "channels.exr";
-  Picture picture;
+  ExrPicture picture;
   picture.channels = {"B", "G", "R"};
-  write_picture(path, picture);
+  write_exr(path, picture);
   const Samples samples(picture);
   for (std::size_t channel = 0; channel < 3; ++channel) {
     // Numbers count as oiiotool lists the channels: R, G, B.
@@ -283,9 +283,9 @@ TEST(ExrSource, ReadsTheChannelAskedForByNameOrNumber) {
 TEST(ExrSource, ListsTheChannelsWhenTheOneAskedForIsMissing) {
   const TemporaryFolder folder;
   const std::string path = folder / "channels.exr";
-  Picture picture;
+  ExrPicture picture;
   picture.channels = {"B", "G", "R"};
-  write_picture(path, picture);
+  write_exr(path, picture);
   for (const char* name : {"Y", "3", "-1", "1x", "r", "R "}) {
     OpenOptions options;
     options.channel = name;
@@ -298,7 +298,7 @@ TEST(ExrSource, ListsTheChannelsWhenTheOneAskedForIsMissing) {
 TEST(ExrSource, ReadsPartsOfAMultiPartFile) {
   const TemporaryFolder folder;
   const std::string path = folder / "parts.exr";
-  std::vector<Picture> pictures(3);
+  std::vector<ExrPicture> pictures(3);
   pictures[0].channels = {"mask"};
   pictures[1].channels = {"Y", "error"};
   pictures[1].type = Imf::HALF;
@@ -318,7 +318,7 @@ TEST(ExrSource, ReadsPartsOfAMultiPartFile) {
     }
     Imf::MultiPartOutputFile file(path.c_str(), headers.data(), static_cast<int>(headers.size()));
     for (int part = 0; part < 3; ++part) {
-      const Picture& picture = pictures[static_cast<std::size_t>(part)];
+      const ExrPicture& picture = pictures[static_cast<std::size_t>(part)];
       Samples samples(picture);
       if (picture.tile_size > 0) {
         Imf::TiledOutputPart out(file, part);
@@ -373,7 +373,7 @@ TEST(ExrSource, ReadsPartsOfAMultiPartFile) {
 TEST(ExrSource, RefusesSubsampledChannelsOnly) {
   const TemporaryFolder folder;
   const std::string path = folder / "chroma.exr";
-  Picture picture;
+  ExrPicture picture;
   picture.width = picture.height = 8;
   Samples samples(picture);
   std::vector<float> chroma(16, 1.0F);
@@ -408,11 +408,11 @@ void expect_right_or_refused(const std::string& path, const std::vector<std::byt
 TEST(ExrSource, ReportsEveryTruncation) {
   const TemporaryFolder folder;
   for (const int tile_size : {0, 16}) {
-    Picture picture;
+    ExrPicture picture;
     picture.tile_size = tile_size;
     picture.levels = tile_size > 0 ? Imf::MIPMAP_LEVELS : Imf::ONE_LEVEL;
     const std::string path = folder / "whole.exr";
-    write_picture(path, picture);
+    write_exr(path, picture);
     const Samples samples(picture);
     const auto bytes = read_file(path);
     const std::string cut = folder / "cut.exr";
@@ -426,10 +426,10 @@ TEST(ExrSource, ReportsEveryTruncation) {
 
 TEST(ExrSource, SurvivesEveryHeaderByteWrong) {
   const TemporaryFolder folder;
-  Picture picture;
+  ExrPicture picture;
   picture.width = picture.height = 9;
   const std::string path = folder / "whole.exr";
-  write_picture(path, picture);
+  write_exr(path, picture);
   const auto bytes = read_file(path);
   const std::string bad = folder / "bad.exr";
   for (std::size_t at = 4; at < std::min<std::size_t>(bytes.size(), 420); ++at) {
@@ -450,8 +450,8 @@ TEST(ExrSource, SurvivesEveryHeaderByteWrong) {
 TEST(ExrSource, RefusesAbsurdSizesBeforeAllocating) {
   const TemporaryFolder folder;
   const std::string path = folder / "absurd.exr";
-  Picture picture;
-  write_picture(path, picture);
+  ExrPicture picture;
+  write_exr(path, picture);
   const auto bytes = read_file(path);
   const auto patched = [&](const std::string& attribute, std::size_t skip, std::vector<std::int32_t> values) {
     auto changed = bytes;

@@ -15,7 +15,7 @@ using view::PicturePoint;
 using view::Steering;
 using view::Vec3;
 
-TileGrid grid() {
+TileGrid steered_grid() {
   return TileGrid::make(TileShape::make(28, 27, 3), 5, 4, 600.0, 600.0);
 }
 
@@ -24,7 +24,7 @@ WorldBounds all(const TileGrid& of) {
 }
 
 struct OwnTiles {
-  explicit OwnTiles(const MemoryTiles::Alter& alter) : tiles(grid(), alter) {}
+  explicit OwnTiles(const MemoryTiles::Alter& alter) : tiles(steered_grid(), alter) {}
   MemoryTiles tiles;
 };
 
@@ -49,11 +49,11 @@ double barycentric_height(const MemoryTiles& tiles, WorldPoint at) {
 TEST(Ground, HeightsAreThoseOfTheTriangles) {
   Scene scene;
   std::mt19937 random(1);
-  std::uniform_real_distribution<double> x(0.0, grid().world_width());
-  std::uniform_real_distribution<double> z(0.0, grid().world_height());
+  std::uniform_real_distribution<double> x(0.0, steered_grid().world_width());
+  std::uniform_real_distribution<double> z(0.0, steered_grid().world_height());
   for (int i = 0; i < 300; ++i) {
     const WorldPoint at{x(random), z(random)};
-    const auto found = scene.ground.height(at, all(grid()));
+    const auto found = scene.ground.height(at, all(steered_grid()));
     ASSERT_TRUE(found);
     EXPECT_NEAR(*found, barycentric_height(scene.tiles, at), 1e-9);
   }
@@ -63,7 +63,7 @@ TEST(Ground, HeightsAreThoseOfTheTriangles) {
 std::optional<double> first_meeting(const Scene& scene, Vec3 eye, Vec3 along, double step, double reach) {
   const auto above = [&](double t) {
     const Vec3 at = eye + t * along;
-    if (!grid().contains(WorldPoint{at.x, at.z})) return std::numeric_limits<double>::quiet_NaN();
+    if (!steered_grid().contains(WorldPoint{at.x, at.z})) return std::numeric_limits<double>::quiet_NaN();
     return at.y - scene.state.exaggeration * barycentric_height(scene.tiles, {at.x, at.z});
   };
   for (double t = step; t < reach; t += step) {
@@ -85,11 +85,11 @@ TEST(Ground, ARayMeetsTheSurfaceWhereItFirstCrossesIt) {
   std::uniform_real_distribution<double> share(0.0, 1.0);
   int met = 0;
   for (int i = 0; i < 60; ++i) {
-    const Vec3 eye{share(random) * grid().world_width(), 900.0 + 900.0 * share(random),
-                   share(random) * grid().world_height()};
+    const Vec3 eye{share(random) * steered_grid().world_width(), 900.0 + 900.0 * share(random),
+                   share(random) * steered_grid().world_height()};
     const Vec3 along = normalised(Vec3{share(random) - 0.5, -0.9 * share(random), share(random) - 0.5});
     const auto expected = first_meeting(scene, eye, along, 4.0, 5000.0);
-    const auto found = scene.ground.hit(eye, along, scene.state.exaggeration, all(grid()));
+    const auto found = scene.ground.hit(eye, along, scene.state.exaggeration, all(steered_grid()));
     ASSERT_EQ(found.has_value(), expected.has_value()) << "ray " << i;
     if (!found) continue;
     ++met;
@@ -100,11 +100,12 @@ TEST(Ground, ARayMeetsTheSurfaceWhereItFirstCrossesIt) {
 
 TEST(Ground, ARayAlongARowASlantOrStraightDownMeetsTheSurface) {
   Scene scene;
-  const double step = grid().sigma_x();
-  for (const Vec3 along : {Vec3{0.0, -1.0, 0.0}, Vec3{step, -4.0 * step, 0.0}, Vec3{0.0, -4.0 * step, step},
-                           Vec3{step, -4.0 * step, grid().sigma_z()}, Vec3{-step, -4.0 * step, grid().sigma_z()}}) {
-    const Vec3 eye{1200.0, 1500.0, 12.0 * grid().sigma_z()};
-    const auto found = scene.ground.hit(eye, along, scene.state.exaggeration, all(grid()));
+  const double step = steered_grid().sigma_x();
+  for (const Vec3 along :
+       {Vec3{0.0, -1.0, 0.0}, Vec3{step, -4.0 * step, 0.0}, Vec3{0.0, -4.0 * step, step},
+        Vec3{step, -4.0 * step, steered_grid().sigma_z()}, Vec3{-step, -4.0 * step, steered_grid().sigma_z()}}) {
+    const Vec3 eye{1200.0, 1500.0, 12.0 * steered_grid().sigma_z()};
+    const auto found = scene.ground.hit(eye, along, scene.state.exaggeration, all(steered_grid()));
     ASSERT_TRUE(found) << along.x << " " << along.y << " " << along.z;
     EXPECT_NEAR(found->y, scene.state.exaggeration * barycentric_height(scene.tiles, {found->x, found->z}), 1e-6);
   }
@@ -113,8 +114,8 @@ TEST(Ground, ARayAlongARowASlantOrStraightDownMeetsTheSurface) {
 TEST(Ground, ARayGoesThroughVoids) {
   Scene scene(
       [](TileIndex, std::vector<std::uint16_t>& codes) { std::fill(codes.begin(), codes.end(), view::kVoidCode); });
-  EXPECT_FALSE(scene.ground.hit({100.0, 1e4, 100.0}, {0.0, -1.0, 0.0}, 1.0, all(grid())));
-  EXPECT_FALSE(scene.ground.height({100.0, 100.0}, all(grid())));
+  EXPECT_FALSE(scene.ground.hit({100.0, 1e4, 100.0}, {0.0, -1.0, 0.0}, 1.0, all(steered_grid())));
+  EXPECT_FALSE(scene.ground.height({100.0, 100.0}, all(steered_grid())));
 }
 
 TEST(Steering, SixtyNotchesEndAboveGroundWithGroundInView) {
@@ -134,10 +135,11 @@ TEST(Steering, SixtyNotchesEndAboveGroundWithGroundInView) {
 TEST(Steering, SixtyNotchesOutStayWithinSightOfTheData) {
   Scene scene;
   for (int notch = 0; notch < 60; ++notch) scene.hand.wheel(-1.0, {600.0, 400.0});
-  const PicturePoint middle = scene.project({0.5 * grid().world_width(), 0.0, 0.5 * grid().world_height()});
+  const PicturePoint middle =
+      scene.project({0.5 * steered_grid().world_width(), 0.0, 0.5 * steered_grid().world_height()});
   EXPECT_GT(middle.x, 0.0);
   EXPECT_LT(middle.x, scene.state.width);
-  EXPECT_LT(scene.camera.eye.y, 20.0 * (grid().world_width() + grid().world_height()));
+  EXPECT_LT(scene.camera.eye.y, 20.0 * (steered_grid().world_width() + steered_grid().world_height()));
 }
 
 TEST(Steering, TheWheelKeepsWhatIsUnderTheCursorThere) {
@@ -199,7 +201,7 @@ TEST(Steering, HalfAMinuteOfFlightNeverEntersTheGround) {
 TEST(Steering, SpeedFollowsTheHeightAboveGround) {
   const auto way_from = [](double height) {
     Scene scene;
-    const double ground = 8.0 * *scene.ground.height({1500.0, 1200.0}, all(grid()));
+    const double ground = 8.0 * *scene.ground.height({1500.0, 1200.0}, all(steered_grid()));
     scene.camera.look_at({1500.0, ground + height, 1200.0}, {2500.0, ground + height, 1200.0});
     const Vec3 before = scene.camera.eye;
     scene.hand.update(0.01, {1.0, 0.0, 0.0}, 1.0);

@@ -14,19 +14,19 @@
 namespace isohf::cli {
 namespace {
 
-[[noreturn]] void refuse(const std::string& where, const std::string& why) {
+[[noreturn]] void refuse_at(const std::string& where, const std::string& why) {
   throw Error(ErrorCode::kInvalidArgument, where + ": " + why);
 }
 
 std::string content_of(const std::string& path) {
   constexpr std::size_t kMostBytes = 1 << 20;
   std::ifstream file(path, std::ios::binary);
-  if (!file) refuse("--config: " + path, std::strerror(errno));
+  if (!file) refuse_at("--config: " + path, std::strerror(errno));
   std::string text(kMostBytes + 1, '\0');
   file.read(text.data(), static_cast<std::streamsize>(text.size()));
-  if (file.bad()) refuse("--config: " + path, "cannot be read");
+  if (file.bad()) refuse_at("--config: " + path, "cannot be read");
   text.resize(static_cast<std::size_t>(file.gcount()));
-  if (text.size() > kMostBytes) refuse("--config: " + path, "is larger than 1 MiB, which no file of options is");
+  if (text.size() > kMostBytes) refuse_at("--config: " + path, "is larger than 1 MiB, which no file of options is");
   return text;
 }
 
@@ -65,7 +65,7 @@ ConfigValue value_from(const toml::node& node, const std::string& where) {
   if (const auto* number = node.as_floating_point()) return {Kind::kNumber, fmt::format("{}", number->get()), {}};
   if (const auto* flag = node.as_boolean()) return {Kind::kBoolean, flag->get() ? "true" : "false", {}};
   const auto* array = node.as_array();
-  if (array == nullptr) refuse(where, "is a date, a time or a table, which no option takes");
+  if (array == nullptr) refuse_at(where, "is a date, a time or a table, which no option takes");
   ConfigValue value{Kind::kArray, {}, {}};
   for (const toml::node& item : *array) value.items.push_back(value_from(item, where));
   return value;
@@ -85,7 +85,7 @@ std::vector<ConfigEntry> read_config_file(const std::string& path) {
     table = toml::parse(content, path);
   } catch (const toml::parse_error& error) {
     const std::size_t line = error.source().begin.line;
-    refuse(fmt::format("{}:{}", path, line), why_malformed(content, line, error.description()));
+    refuse_at(fmt::format("{}:{}", path, line), why_malformed(content, line, error.description()));
   }
   std::vector<std::pair<std::size_t, ConfigEntry>> found;
   const auto take = [&](const std::string& section, const toml::key& key, const toml::node& node) {

@@ -14,7 +14,7 @@
 namespace isohf::cli {
 namespace {
 
-constexpr const char* kFooter =
+constexpr const char* kAttachFooter =
     R"(A file keeps its name without its folder; FILE=NAME gives it another one, with folders of its own.
 The archive is copied and takes its name when it is complete: interrupted, it is as it was.
 
@@ -40,7 +40,7 @@ int command_attach(const Arguments& arguments) {
   line.positional("ARCHIVE", "-i,--input", "The archive", archive);
   line.positionals("FILE[=NAME]...", "Files to add, and the names they get", texts);
   add_common_options(line, common);
-  line.footer(kFooter);
+  line.footer(kAttachFooter);
   if (!line.parse(arguments)) return kExitDone;
   line.require("ARCHIVE", archive);
   line.require("FILE", texts);

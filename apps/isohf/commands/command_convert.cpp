@@ -64,8 +64,8 @@ Measured measure(const ConvertSummary& summary) {
   return measured;
 }
 
-ordered_json json_from(const ConvertCommandOptions& options, const ConvertSummary& summary,
-                       const std::optional<VoidCounts>& voids, const std::optional<ErrorEstimate>& expected) {
+ordered_json document_of(const ConvertCommandOptions& options, const ConvertSummary& summary,
+                         const std::optional<VoidCounts>& voids, const std::optional<ErrorEstimate>& expected) {
   const std::optional<AccuracyInfo> accuracy = accuracy_info(summary.metadata);
   const Measured measured = measure(summary);
   const SizeBesideSource size(summary.metadata.source, summary.tile_bytes);
@@ -280,7 +280,7 @@ std::optional<EachResult> convert_one(ConvertCommandOptions options, const EachF
   }
   ConvertSummary summary = convert(*prepared.source, file.output, options.convert, job);
   const ordered_json document =
-      json_from(options, summary, counts_of_voids(*prepared.source, summary.source_voids), std::nullopt);
+      document_of(options, summary, counts_of_voids(*prepared.source, summary.source_voids), std::nullopt);
   return EachResult{EachResult::State::kConverted, json_line(document), std::move(summary.warnings)};
 }
 
@@ -357,7 +357,7 @@ int run(ConvertCommandOptions options) {
   }
   StandardOutput out;
   if (common.json) {
-    ordered_json document = json_from(options, summary, voids, expected);
+    ordered_json document = document_of(options, summary, voids, expected);
     if (options.report) document["report"] = json_from(*accuracy);
     out.write(json_text(document));
   } else if (!common.quiet) {

@@ -21,7 +21,7 @@
 namespace isohf::cli {
 namespace {
 
-constexpr const char* kFooter =
+constexpr const char* kDiffFooter =
     R"(Tiles are compared by the digests that the archives state, so that none is decoded. Exit code 3 says that something
 differs: metadata that tell of the making (producer, level, sizes) count as well.
 
@@ -39,7 +39,7 @@ struct DiffCommand {
   bool overwrite = false;
 };
 
-std::optional<DiffCommand> parse(const Arguments& arguments) {
+std::optional<DiffCommand> parse_diff(const Arguments& arguments) {
   DiffCommand options;
   CommandLine line("diff", "Compares two archives: metadata, tiles, and elevations if asked.");
   line.group("Arguments");
@@ -51,7 +51,7 @@ std::optional<DiffCommand> parse(const Arguments& arguments) {
   add_work_options(line, options.work);
   add_memory_options(line, "RASTER's folder", options.work);
   add_common_options(line, options.common);
-  line.footer(kFooter);
+  line.footer(kDiffFooter);
   if (!line.parse(arguments)) return std::nullopt;
   if (options.archives.size() != 2) line.fail(fmt::format("found {} archives, must be two", options.archives.size()));
   if (options.work.scratch_folder.empty()) options.work.scratch_folder = folder_of(options.raster);
@@ -60,7 +60,7 @@ std::optional<DiffCommand> parse(const Arguments& arguments) {
 
 using nlohmann::ordered_json;
 
-ordered_json json_from(const DiffCommand& options, const ArchiveDifference& found) {
+ordered_json document_of(const DiffCommand& options, const ArchiveDifference& found) {
   ordered_json members = ordered_json::array();
   const auto value = [](const std::string& text) { return text.empty() ? ordered_json() : ordered_json::parse(text); };
   for (const auto& member : found.metadata) {
@@ -140,7 +140,7 @@ void write_difference(const DiffCommand& options, const Job& job) {
 }  // namespace
 
 int command_diff(const Arguments& arguments) {
-  const auto options = parse(arguments);
+  const auto options = parse_diff(arguments);
   if (!options) return kExitDone;
   for (const std::string& archive : options->archives) (void)open_archive(archive);
   if (!options->raster.empty()) check_raster_output(options->archives, options->raster, options->overwrite);
@@ -151,7 +151,7 @@ int command_diff(const Arguments& arguments) {
   if (!options->raster.empty()) write_difference(*options, job_from(options->work, *display));
   display.reset();
   StandardOutput out;
-  if (options->common.json) out.write(json_text(json_from(*options, found)));
+  if (options->common.json) out.write(json_text(document_of(*options, found)));
   if (!options->common.json && !options->common.quiet) out.write(text_from(*options, found));
   out.finish();
   return found.same_tiles() && found.metadata.empty() ? kExitDone : kExitDifferences;

@@ -33,7 +33,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-constexpr const char* kFooter =
+constexpr const char* kExportFooter =
     R"(Without options the samples lie where the source's lay. The format follows from OUTPUT's extension; .tif,
 .exr, .flt, .asc, .r32 and .npy take elevations as float32, .hgt as int16, .png, .r16 and .raw as uint16
 over the range of elevations that there is, with scale and offset in OUTPUT.json. Many tiles share one scale.
@@ -79,7 +79,7 @@ SampleType parse_type(const std::string& text) {
   return kTypes[parse_word(text, {"u8", "u16", "i16", "i32", "f16", "f32", "f64"})];
 }
 
-std::optional<ExportOptions> parse(const Arguments& arguments) {
+std::optional<ExportOptions> parse_export(const Arguments& arguments) {
   ExportOptions options;
   CommandLine line("export", "Writes the surface of an archive as a raster of elevations.");
   add_raster_arguments(line, "OUTPUT", options.raster);
@@ -111,7 +111,7 @@ std::optional<ExportOptions> parse(const Arguments& arguments) {
   add_work_options(line, options.work);
   add_memory_options(line, "OUTPUT's folder", options.work);
   add_common_options(line, options.common);
-  line.footer(kFooter);
+  line.footer(kExportFooter);
   line.exclusive({"--z-range", "--z-scale"});
   line.exclusive({"--z-range", "--z-offset"});
   if (!line.parse(arguments)) return std::nullopt;
@@ -317,7 +317,7 @@ int run(const ExportOptions& options) {
 }  // namespace
 
 int command_export(const Arguments& arguments) {
-  const std::optional<ExportOptions> options = parse(arguments);
+  const std::optional<ExportOptions> options = parse_export(arguments);
   return options ? run(*options) : static_cast<int>(kExitDone);
 }
 

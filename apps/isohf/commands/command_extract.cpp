@@ -19,7 +19,7 @@
 namespace isohf::cli {
 namespace {
 
-constexpr const char* kFooter =
+constexpr const char* kExtractFooter =
     R"(Tiles are copied as they are, with their textures and shadow seeds, under their names and on their lattice; coarse
 planes are made anew. Parts that make up the whole give its bytes again, residuals included: isohf merge. The tiles of a
 coarse plane become an archive of their own, without textures and seeds.
@@ -40,7 +40,7 @@ struct ExtractCommand {
   bool overwrite = false;
 };
 
-std::optional<ExtractCommand> parse(const Arguments& arguments) {
+std::optional<ExtractCommand> parse_extract(const Arguments& arguments) {
   ExtractCommand options;
   CommandLine line("extract", "Cuts an archive: some of its tiles become an archive of their own.");
   line.group("Arguments");
@@ -57,7 +57,7 @@ std::optional<ExtractCommand> parse(const Arguments& arguments) {
   line.exclusive({"--bbox", "--tiles"});
   add_work_options(line, options.work);
   add_common_options(line, options.common);
-  line.footer(kFooter);
+  line.footer(kExtractFooter);
   if (!line.parse(arguments)) return std::nullopt;
   line.require("ARCHIVE", options.archive);
   line.require("PART (-o)", options.output);
@@ -70,7 +70,7 @@ std::optional<ExtractCommand> parse(const Arguments& arguments) {
 }  // namespace
 
 int command_extract(const Arguments& arguments) {
-  const auto options = parse(arguments);
+  const auto options = parse_extract(arguments);
   if (!options) return kExitDone;
   check_archive_output({options->archive}, options->output, options->overwrite);
   const TileRange tiles = options->tiles ? *options->tiles : [&] {

@@ -20,7 +20,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-constexpr const char* kFooter =
+constexpr const char* kFormatsFooter =
     R"(Inputs are recognised by their first bytes; the extension decides only where a format has no signature.
 Every input takes --registration, --nodata, --valid-range, --fill, --fill-distance, --z-scale, --z-offset and
 --sample-spacing.
@@ -45,20 +45,20 @@ OtherFormats other_formats() {
   return other;
 }
 
-ordered_json json_from(const Format& format) {
+ordered_json list_of(const Format& format) {
   return {{"name", format.name},
           {"extensions", format.extensions},
           {"library", library_of(format)},
           {"note", format.note.empty() ? ordered_json(nullptr) : ordered_json(format.note)}};
 }
 
-ordered_json json_from(const std::vector<Format>& formats) {
+ordered_json list_of(const std::vector<Format>& formats) {
   ordered_json list = ordered_json::array();
-  for (const Format& format : formats) list.push_back(json_from(format));
+  for (const Format& format : formats) list.push_back(list_of(format));
   return list;
 }
 
-ordered_json json_from(const OtherFormats& other) {
+ordered_json list_of(const OtherFormats& other) {
   if (!other.formats) return {{"present", false}, {"why", other.why_none}};
   return {{"present", true}, {"library", other.formats->library}, {"extensions", other.formats->extensions}};
 }
@@ -86,14 +86,14 @@ int command_formats(const Arguments& arguments) {
   CommonOptions common;
   CommandLine line("formats", "Lists the formats that are read and written, and the libraries that do it.");
   add_common_options(line, common);
-  line.footer(kFooter);
+  line.footer(kFormatsFooter);
   if (!line.parse(arguments)) return kExitDone;
   const OtherFormats other = other_formats();
   StandardOutput out;
   if (common.json) {
-    out.write(json_text({{"read", json_from(native_formats())},
-                         {"read_by_module", json_from(other)},
-                         {"written", json_from(writable_formats())}}));
+    out.write(json_text({{"read", list_of(native_formats())},
+                         {"read_by_module", list_of(other)},
+                         {"written", list_of(writable_formats())}}));
   } else if (!common.quiet) {
     out.write(text_from("Read", native_formats()) + text_from(other) + text_from("Written", writable_formats()));
   }

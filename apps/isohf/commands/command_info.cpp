@@ -35,7 +35,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-constexpr const char* kFooter =
+constexpr const char* kInfoFooter =
     R"(Of an archive, the index and the metadata are read, no tile; of a raster, no sample unless --stats is given.
 
 Examples:
@@ -56,7 +56,7 @@ struct InfoOptions {
   std::string for_rasters;  ///< an option given that only rasters take
 };
 
-std::optional<InfoOptions> parse(const Arguments& arguments) {
+std::optional<InfoOptions> parse_info(const Arguments& arguments) {
   InfoOptions options;
   CommandLine line("info", "Describes archives and rasters.");
   line.group("Arguments");
@@ -70,7 +70,7 @@ std::optional<InfoOptions> parse(const Arguments& arguments) {
   add_source_options(line, options.open);
   add_work_options(line, options.work);
   add_common_options(line, options.common);
-  line.footer(kFooter);
+  line.footer(kInfoFooter);
   if (!line.parse(arguments)) return std::nullopt;
   line.require("INPUT", options.inputs);
   options.for_rasters = line.given("--stats") ? "--stats" : line.first_given({"Input"});
@@ -362,7 +362,7 @@ int run(const InfoOptions& options) {
 }  // namespace
 
 int command_info(const Arguments& arguments) {
-  const std::optional<InfoOptions> options = parse(arguments);
+  const std::optional<InfoOptions> options = parse_info(arguments);
   return options ? run(*options) : static_cast<int>(kExitDone);
 }
 

@@ -20,7 +20,7 @@
 namespace isohf::cli {
 namespace {
 
-constexpr const char* kFooter =
+constexpr const char* kMergeFooter =
     R"(Of a tile that several archives hold, the last one gives it. Tiles are copied as they are. Every archive is read
 and checked before anything is written, and all that is wrong is said at once.
 
@@ -40,7 +40,7 @@ struct MergeCommand {
   bool overwrite = false;
 };
 
-std::optional<MergeCommand> parse(const Arguments& arguments) {
+std::optional<MergeCommand> parse_merge(const Arguments& arguments) {
   MergeCommand options;
   CommandLine line("merge", "Joins archives that share a lattice: parts, or an update and what it updates.");
   line.group("Arguments");
@@ -52,7 +52,7 @@ std::optional<MergeCommand> parse(const Arguments& arguments) {
             options.missing);
   add_work_options(line, options.work);
   add_common_options(line, options.common);
-  line.footer(kFooter);
+  line.footer(kMergeFooter);
   if (!line.parse(arguments)) return std::nullopt;
   line.require("ARCHIVE", options.archives);
   if (looks_like_plan(options.archives.front())) {
@@ -93,7 +93,7 @@ int print_missing(const MergeCommand& options, const ShardPlan& plan) {
 }  // namespace
 
 int command_merge(const Arguments& arguments) {
-  const auto options = parse(arguments);
+  const auto options = parse_merge(arguments);
   if (!options) return kExitDone;
   allow_open_files(options->archives.size());
   std::optional<ShardPlan> plan;

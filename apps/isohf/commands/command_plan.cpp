@@ -27,7 +27,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-constexpr const char* kFooter =
+constexpr const char* kPlanFooter =
     R"(Without INPUT the candidates for a tile are listed, best true aspect first: (R-3)sin60/(C-4), 1 is
 equilateral. With INPUT nothing is written; sizes are estimates.
 
@@ -52,7 +52,7 @@ struct PlanOptions {
   bool spacing_in_metres = false;
 };
 
-std::optional<PlanOptions> parse(const Arguments& arguments) {
+std::optional<PlanOptions> parse_plan(const Arguments& arguments) {
   PlanOptions options;
   CommandLine line("plan", "Lists tile shapes, or previews a conversion.");
   line.group("Arguments");
@@ -80,7 +80,7 @@ std::optional<PlanOptions> parse(const Arguments& arguments) {
       "Write a plan for isohf convert --plan, and isohf merge; takes all options of isohf convert and --shards N",
       [](const std::string&) {});
   add_common_options(line, options.common);
-  line.footer(kFooter);
+  line.footer(kPlanFooter);
   if (!line.parse(arguments)) return std::nullopt;
   options.inputs.names.insert(options.inputs.names.end(), names.begin(), names.end());
   const auto refuse = [](const std::string& why) { throw Error(ErrorCode::kInvalidArgument, "plan: " + why); };
@@ -216,7 +216,7 @@ int command_plan(const Arguments& arguments) {
     return argument == "--write" || argument.starts_with("--write=");
   });
   if (writes) return write_plan(arguments);
-  const std::optional<PlanOptions> options = parse(arguments);
+  const std::optional<PlanOptions> options = parse_plan(arguments);
   return options ? run(*options) : static_cast<int>(kExitDone);
 }
 

@@ -19,7 +19,7 @@
 namespace isohf::cli {
 namespace {
 
-constexpr const char* kFooter =
+constexpr const char* kPlanesFooter =
     R"(convert writes coarse planes by itself, unless --no-planes was given; archives of older versions have none.
 Tiles are copied as they are, and so is everything else; the content hash stays the same. Planes that are there
 already are made anew.
@@ -36,7 +36,7 @@ struct PlanesCommand {
   bool overwrite = false;
 };
 
-std::optional<PlanesCommand> parse(const Arguments& arguments) {
+std::optional<PlanesCommand> parse_planes(const Arguments& arguments) {
   PlanesCommand options;
   CommandLine line("planes", "Adds coarse planes to an archive, so that it can be looked at from afar.");
   line.group("Arguments");
@@ -46,7 +46,7 @@ std::optional<PlanesCommand> parse(const Arguments& arguments) {
   add_work_options(line, options.work);
   add_memory_options(line, "OUTPUT's folder", options.work);
   add_common_options(line, options.common);
-  line.footer(kFooter);
+  line.footer(kPlanesFooter);
   if (!line.parse(arguments)) return std::nullopt;
   line.require("ARCHIVE", options.archive);
   if (options.output.empty()) options.output = options.archive;
@@ -85,7 +85,7 @@ int run(const PlanesCommand& options) {
 }  // namespace
 
 int command_planes(const Arguments& arguments) {
-  const auto options = parse(arguments);
+  const auto options = parse_planes(arguments);
   return options ? run(*options) : static_cast<int>(kExitDone);
 }
 

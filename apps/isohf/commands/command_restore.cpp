@@ -37,7 +37,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-constexpr const char* kFooter =
+constexpr const char* kRestoreFooter =
     R"(The raster has the samples of the archive's source, at their places, unless another grid is asked for. An
 archive made with --lossless gives the source's samples bit for bit, and their SHA-256 is checked; with
 --method it gives what its surface alone holds.
@@ -64,7 +64,7 @@ struct RestoreOptions {
   bool rounds = false;
 };
 
-std::optional<RestoreOptions> parse(const Arguments& arguments) {
+std::optional<RestoreOptions> parse_restore(const Arguments& arguments) {
   RestoreOptions options;
   CommandLine line("restore", "Turns an archive back into a raster of elevations.");
   add_raster_arguments(line, "RASTER", options.raster);
@@ -81,7 +81,7 @@ std::optional<RestoreOptions> parse(const Arguments& arguments) {
   add_work_options(line, options.work);
   add_memory_options(line, "RASTER's folder", options.work);
   add_common_options(line, options.common);
-  line.footer(kFooter);
+  line.footer(kRestoreFooter);
   line.exclusive({"--like", "--size"});
   line.exclusive({"--like", "--spacing"});
   line.exclusive({"--like", "--crs"});
@@ -342,7 +342,7 @@ int run(const RestoreOptions& options) {
 }  // namespace
 
 int command_restore(const Arguments& arguments) {
-  const std::optional<RestoreOptions> options = parse(arguments);
+  const std::optional<RestoreOptions> options = parse_restore(arguments);
   return options ? run(*options) : static_cast<int>(kExitDone);
 }
 

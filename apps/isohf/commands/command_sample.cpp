@@ -29,7 +29,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-constexpr const char* kFooter =
+constexpr const char* kSampleFooter =
     R"(Places are world units from the surface's North-West corner, x eastwards, z southwards: metres where the
 source's units are known. Standard input holds one place a line, "x z" or "x,z"; empty lines and lines that
 start with # are passed over. For each place one line is printed:
@@ -79,7 +79,7 @@ double parse_height(const std::string& text) {
   throw Error(ErrorCode::kInvalidArgument, "found '" + text + "', must be 0 or more");
 }
 
-std::optional<SampleOptions> parse(const Arguments& arguments) {
+std::optional<SampleOptions> parse_sample(const Arguments& arguments) {
   SampleOptions options;
   CommandLine line("sample", "Prints elevation and normal at places read from standard input.");
   line.group("Arguments");
@@ -123,7 +123,7 @@ std::optional<SampleOptions> parse(const Arguments& arguments) {
   line.exclusive({"--json", "--binary"});
   line.exclusive({"--with-lonlat", "--binary"});
   line.exclusive({"--with-crs", "--binary"});
-  line.footer(kFooter);
+  line.footer(kSampleFooter);
   if (!line.parse(arguments)) return std::nullopt;
   line.require("ARCHIVE", options.archive);
   for (const char* option : {"--azimuth", "--sun-elevation", "--above", "--shadow-softness"}) {
@@ -181,7 +181,7 @@ std::string text_from(const SurfaceSample& sample, const SunSample* sun) {
   return text;
 }
 
-std::string json_from(const SurfaceSample& sample, const SunSample* sun, WorldPoint place, const PlaceOutput& output) {
+std::string line_of(const SurfaceSample& sample, const SunSample* sun, WorldPoint place, const PlaceOutput& output) {
   // A place that the map does not show has no world coordinates.
   const auto number = [](double value) { return std::isnan(value) ? ordered_json(nullptr) : ordered_json(value); };
   ordered_json json = {{"x", number(place.x)}, {"z", number(place.z)}};
@@ -266,7 +266,7 @@ class Answers {
       for (std::size_t i = part * kPlacesOfText; i < end; ++i) {
         const SunSample* sun = options_.with_shadow ? &suns[i] : nullptr;
         texts[part] += options_.binary        ? record_from(samples[i], sun)
-                       : options_.common.json ? json_from(samples[i], sun, places_[i], output_)
+                       : options_.common.json ? line_of(samples[i], sun, places_[i], output_)
                                               : text_from(samples[i], sun) + columns_from(output_, places_[i]);
       }
     });
@@ -378,7 +378,7 @@ int run(SampleOptions options) {
 }  // namespace
 
 int command_sample(const Arguments& arguments) {
-  std::optional<SampleOptions> options = parse(arguments);
+  std::optional<SampleOptions> options = parse_sample(arguments);
   return options ? run(std::move(*options)) : static_cast<int>(kExitDone);
 }
 

@@ -34,7 +34,7 @@ constexpr std::int64_t kMaxPixels = 1 << 20;  ///< of a side
 /// Heights of the sun that are drawn.
 constexpr double kLowest_deg = 0.01;
 constexpr double kHighest_deg = 89.9;
-constexpr const char* kFooter =
+constexpr const char* kShadeFooter =
     R"(The picture covers what the input covered, North at the top; where there is no elevation it is transparent.
 North is the map's, as with GDAL. Shadows fall for a sun that stands anywhere; the ground beyond what the input covered casts
 none. --hillshade, --multidirectional, --slope and --aspect are those of gdaldem, by Horn's formula: one band. Hillshades
@@ -84,7 +84,7 @@ constexpr Kind kKinds[] = {
     {"--shadow-mask", "The share of the sun that is seen", ShadeKind::kShadowMask},
 };
 
-std::optional<ShadeCommand> parse(const Arguments& arguments) {
+std::optional<ShadeCommand> parse_shade(const Arguments& arguments) {
   ShadeCommand options;
   ShadeOptions& request = options.picture;
   CommandLine line("shade", "Draws a picture of an archive's surface with the shadows that it casts.");
@@ -160,7 +160,7 @@ std::optional<ShadeCommand> parse(const Arguments& arguments) {
   add_work_options(line, options.work);
   add_memory_options(line, "OUTPUT's folder", options.work);
   add_common_options(line, options.common);
-  line.footer(kFooter);
+  line.footer(kShadeFooter);
   if (!line.parse(arguments)) return std::nullopt;
   line.require("ARCHIVE", options.archive);
   line.require("OUTPUT", options.output);
@@ -310,7 +310,7 @@ int run(ShadeCommand options) {
 }  // namespace
 
 int command_shade(const Arguments& arguments) {
-  std::optional<ShadeCommand> options = parse(arguments);
+  std::optional<ShadeCommand> options = parse_shade(arguments);
   return options ? run(std::move(*options)) : static_cast<int>(kExitDone);
 }
 

@@ -32,7 +32,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-constexpr const char* kFooter =
+constexpr const char* kVerifyFooter =
     R"(Each finding is one line: its number, its severity, where, what. Exit code 0: nothing above a note was found;
 3: something was, or the surface is further from INPUT than allowed; 1: the check itself failed.
 Options of the input default to what the archive says it was made with.
@@ -60,7 +60,7 @@ struct VerifyCommandOptions {
 };
 
 /// `recorded`: how the archive's input was read; it counts where `arguments` say nothing.
-std::optional<VerifyCommandOptions> parse(const Arguments& arguments, const RecordedOptions& recorded = {}) {
+std::optional<VerifyCommandOptions> parse_verify(const Arguments& arguments, const RecordedOptions& recorded = {}) {
   VerifyCommandOptions options;
   CommandLine line("verify", "Checks archives, and compares one with what it was made from.");
   line.group("Arguments");
@@ -103,7 +103,7 @@ std::optional<VerifyCommandOptions> parse(const Arguments& arguments, const Reco
   add_work_options(line, options.work);
   add_memory_options(line, "that of temporary files", options.work);
   add_common_options(line, options.common);
-  line.footer(kFooter);
+  line.footer(kVerifyFooter);
   if (!line.parse(arguments)) return std::nullopt;
   if (options.work.scratch_folder.empty()) {
     std::error_code none;
@@ -115,7 +115,7 @@ std::optional<VerifyCommandOptions> parse(const Arguments& arguments, const Reco
   if (!recorded.empty()) {
     Arguments all = arguments_from(recorded, line);
     all.insert(all.end(), arguments.begin(), arguments.end());
-    std::optional<VerifyCommandOptions> parsed = parse(all);
+    std::optional<VerifyCommandOptions> parsed = parse_verify(all);
     parsed->geoid_is_recorded = !line.given("--geoid");
     return parsed;
   }
@@ -155,7 +155,7 @@ void list_checks(bool json) {
   out.finish();
 }
 
-ordered_json json_from(const VerifyReport& report) {
+ordered_json checks_of(const VerifyReport& report) {
   ordered_json findings = ordered_json::array();
   for (const Finding& finding : report.findings) {
     ordered_json json = {{"id", finding_name(finding.id)}, {"severity", to_word(finding.severity)}};
@@ -289,7 +289,7 @@ int check_one(VerifyCommandOptions options, const Arguments& arguments, bool is_
     const Metadata metadata = open_archive(options.archive).metadata();
     if (metadata.source.options) {
       const std::string archive = options.archive;
-      options = *parse(arguments, *metadata.source.options);
+      options = *parse_verify(arguments, *metadata.source.options);
       options.archive = archive;
     }
     const std::unique_ptr<HeightSource> source = open_as_recorded(options, metadata);
@@ -302,7 +302,7 @@ int check_one(VerifyCommandOptions options, const Arguments& arguments, bool is_
 
   StandardOutput out;
   if (options.common.json) {
-    ordered_json document = {{"archive", options.archive}, {"passed", passed}, {"checks", json_from(report)}};
+    ordered_json document = {{"archive", options.archive}, {"passed", passed}, {"checks", checks_of(report)}};
     if (accuracy) document["against"] = json_from(*accuracy);
     if (!too_far.empty()) document["difference"] = too_far;
     out.write(is_one_of_many ? json_line(document) : json_text(document));
@@ -342,7 +342,7 @@ int run(const VerifyCommandOptions& options, const Arguments& arguments) {
 }  // namespace
 
 int command_verify(const Arguments& arguments) {
-  const std::optional<VerifyCommandOptions> options = parse(arguments);
+  const std::optional<VerifyCommandOptions> options = parse_verify(arguments);
   return options ? run(*options, arguments) : static_cast<int>(kExitDone);
 }
 

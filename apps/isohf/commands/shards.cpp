@@ -28,7 +28,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-constexpr const char* kFooter =
+constexpr const char* kShardFooter =
     R"(INPUT and all options are the plan's; -j, --memory and --tmpdir are each machine's own. A shard that is there already
 is left alone; one that was interrupted goes on with PART.part.
 
@@ -78,7 +78,7 @@ struct ShardCommand {
   bool overwrite = false;
 };
 
-std::optional<ShardCommand> parse(const Arguments& arguments, bool scans) {
+std::optional<ShardCommand> parse_shards(const Arguments& arguments, bool scans) {
   ShardCommand options;
   CommandLine line(scans ? "scan" : "convert", scans ? "Finds the range of elevations for a plan, on many machines."
                                                      : "Makes one shard of a plan: some rows of tiles of its archive.");
@@ -100,7 +100,7 @@ std::optional<ShardCommand> parse(const Arguments& arguments, bool scans) {
   add_work_options(line, options.work);
   add_memory_options(line, "that of -o", options.work);
   add_common_options(line, options.common);
-  line.footer(scans ? kScanFooter : kFooter);
+  line.footer(scans ? kScanFooter : kShardFooter);
   if (!line.parse(arguments)) return std::nullopt;
   line.require("PLAN (--plan)", options.plan);
   line.require(fmt::format("{} (-o)", output), options.output);
@@ -246,7 +246,7 @@ int write_plan(const Arguments& arguments) {
 }
 
 int convert_shard_of(const Arguments& arguments) {
-  const auto command = parse(arguments, false);
+  const auto command = parse_shards(arguments, false);
   if (!command) return kExitDone;
   const ShardPlan plan = read_plan_of(*command);
   if (!command->overwrite && is_shard(command->output, plan, command->shard)) {
@@ -274,7 +274,7 @@ int convert_shard_of(const Arguments& arguments) {
 }
 
 int command_scan(const Arguments& arguments) {
-  const auto command = parse(arguments, true);
+  const auto command = parse_shards(arguments, true);
   if (!command) return kExitDone;
   const ShardPlan draft = read_plan_of(*command);
   std::error_code none;

@@ -22,7 +22,7 @@ double ratio(double a, double b) {
   return b > 0.0 ? a / b : 0.0;
 }
 
-ordered_json json_from(const MeshErrors& ortho) {
+ordered_json members_of(const MeshErrors& ortho) {
   return {{"spacing", ortho.layout.spacing_x},
           {"vertices", ortho.vertices},
           {"triangles", 2 * ortho.vertices},
@@ -45,8 +45,8 @@ void add_lattice(const LatticeReport& lattice, ordered_json& json) {
                  {"rms_regular", lattice.regular_rms},
                  {"tile_bytes", lattice.tile_bytes},
                  {"plain_bytes", lattice.plain_bytes}};
-  json["ortho"] = json_from(lattice.twin);
-  json["ortho_at_equal_rms"] = lattice.equal ? json_from(*lattice.equal) : ordered_json(nullptr);
+  json["ortho"] = members_of(lattice.twin);
+  json["ortho_at_equal_rms"] = lattice.equal ? members_of(*lattice.equal) : ordered_json(nullptr);
   json["decimated"] = nullptr;
   if (lattice.decimated) {
     const MeshErrors& mesh = lattice.decimated->mesh;
@@ -125,7 +125,7 @@ std::string text_from(const VertexReport& report) {
                                                          : std::string()));
 }
 
-ordered_json json_from(const VertexReport& report) {
+ordered_json members_of(const VertexReport& report) {
   return {{"checked", report.vertices}, {"voids", report.voids}, {"clamped", report.clamped},
           {"wrong", report.wrong},      {"bound", report.bound}, {"worst", report.worst}};
 }
@@ -150,7 +150,7 @@ std::string text_from(const AccuracyReport& report, const std::string& input) {
   return text;
 }
 
-ordered_json json_from(const AccuracyReport& report) {
+ordered_json members_of(const AccuracyReport& report) {
   return {{"samples", report.samples},
           {"samples_void", report.samples_void},
           {"samples_compared", report.samples_compared},
@@ -201,8 +201,8 @@ std::string describe_estimate(const std::optional<ErrorEstimate>& estimate, cons
 }
 
 ordered_json json_from(const Accuracy& accuracy) {
-  ordered_json json = json_from(accuracy.surface);
-  json["vertices"] = json_from(accuracy.vertices);
+  ordered_json json = members_of(accuracy.surface);
+  json["vertices"] = members_of(accuracy.vertices);
   if (accuracy.lattice) add_lattice(*accuracy.lattice, json);
   return json;
 }

@@ -176,7 +176,7 @@ ordered_json or_null(const std::optional<T>& value) {
   return value ? ordered_json(*value) : ordered_json(nullptr);
 }
 
-ordered_json json_from(const SourceSurvey& survey) {
+ordered_json document_of(const SourceSurvey& survey) {
   const SourceScan scan = survey.scan();
   ordered_json undeclared = ordered_json::array();
   for (const UndeclaredVoid& found : survey.undeclared_voids()) {
@@ -190,7 +190,7 @@ ordered_json json_from(const SourceSurvey& survey) {
           {"undeclared_voids", undeclared}};
 }
 
-ordered_json json_from(const RasterInfo& raster, const std::vector<Warning>& warnings) {
+ordered_json document_of(const RasterInfo& raster, const std::vector<Warning>& warnings) {
   const SourceInfo& info = raster.source;
   const Georeference& place = info.georeference;
   const ReferenceSystem& system = place.system;
@@ -223,7 +223,7 @@ ordered_json json_from(const RasterInfo& raster, const std::vector<Warning>& war
   json["z_offset"] = info.z_offset;
   json["void_values"] = voids;
   json["valid_samples"] = {{"min", number_or_text(info.valid_min)}, {"max", number_or_text(info.valid_max)}};
-  json["statistics"] = raster.survey ? json_from(*raster.survey) : ordered_json(nullptr);
+  json["statistics"] = raster.survey ? document_of(*raster.survey) : ordered_json(nullptr);
   json["voids"] = json_from_voids(raster.voids);
   json["warnings"] = warnings;
   return json;
@@ -268,7 +268,7 @@ void print_raster_info(const std::string& path, const OpenOptions& options, bool
   print_warnings(named);
   StandardOutput out;
   if (common.json) {
-    const ordered_json document = json_from(raster, warnings);
+    const ordered_json document = document_of(raster, warnings);
     out.write(is_one_of_many ? json_line(document) : json_text(document));
   } else if (!common.quiet) {
     out.write(text_from(raster));

@@ -11,7 +11,7 @@
 namespace isohf::view {
 namespace {
 
-constexpr const char* kVertex = R"glsl(#version 330 core
+constexpr const char* kBlockVertex = R"glsl(#version 330 core
 layout(location = 0) in vec4 place;   // x, z, height, 1 at the ground or 0 at the floor
 uniform mat4 clip_from_eye;
 uniform vec3 corner;                  // of what is covered, seen from the eye; y: height 0
@@ -25,7 +25,7 @@ void main() {
 }
 )glsl";
 
-constexpr const char* kFragment = R"glsl(#version 330 core
+constexpr const char* kBlockFragment = R"glsl(#version 330 core
 in vec4 v_place;
 out vec4 colour;
 uniform vec3 outwards;
@@ -70,7 +70,7 @@ double Block::floor(const TileSource& source, const ViewState& view) {
 }
 
 Block::Block(const TileSource& source)
-    : source_(source), covered_(source.covered()), program_("block", kVertex, kFragment) {
+    : source_(source), covered_(source.covered()), program_("block", kBlockVertex, kBlockFragment) {
   const Planes planes = planes_of(source);
   const auto around = [&](int plane) {
     const TileGrid& grid = planes.grid(plane);

@@ -33,7 +33,7 @@ constexpr int kAdvance = kGlyphWidth + 1;
 constexpr int kLeading = kGlyphHeight + 4;
 constexpr float kStroke = 0.48F;  ///< half a stroke's width, font pixels
 
-constexpr const char* kVertex = R"glsl(#version 330 core
+constexpr const char* kOverlayVertex = R"glsl(#version 330 core
 layout(location = 0) in vec2 pixel;
 layout(location = 1) in vec2 glyph;
 layout(location = 2) in vec4 tint;
@@ -48,7 +48,7 @@ void main() {
 }
 )glsl";
 
-constexpr const char* kFragment = R"glsl(#version 330 core
+constexpr const char* kOverlayFragment = R"glsl(#version 330 core
 in vec2 v_glyph;
 in vec4 v_tint;
 out vec4 colour;
@@ -102,7 +102,7 @@ float distance(const Stroke& stroke, float x, float y) {
 
 }  // namespace
 
-Overlay::Overlay() : program_("overlay", kVertex, kFragment) {
+Overlay::Overlay() : program_("overlay", kOverlayVertex, kOverlayFragment) {
   constexpr int kRows = (kGlyphCount + kColumns - 1) / kColumns;
   constexpr int kWidth = kColumns * kCellWidth;
   constexpr int kHeight = kRows * kCellHeight;

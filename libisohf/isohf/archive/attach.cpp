@@ -18,7 +18,7 @@
 namespace isohf {
 namespace {
 
-constexpr std::uint64_t kPieceBytes = std::uint64_t{1} << 20U;
+constexpr std::uint64_t kCopiedBytes = std::uint64_t{1} << 20U;
 
 [[noreturn]] void refuse(const std::string& why) {
   throw Error(ErrorCode::kInvalidArgument, why);
@@ -52,8 +52,8 @@ class Copy {
  private:
   template <typename To>
   void copy(std::uint64_t begin, std::uint64_t end, const To& to) const {
-    for (std::uint64_t at = begin; at < end; at += kPieceBytes)
-      to(SourceBytes(file_, at, std::min(kPieceBytes, end - at)).bytes());
+    for (std::uint64_t at = begin; at < end; at += kCopiedBytes)
+      to(SourceBytes(file_, at, std::min(kCopiedBytes, end - at)).bytes());
   }
 
   /// The digits of the metadata's data_crc32, which stand at crc_at_; empty where they state none.
@@ -181,7 +181,7 @@ std::uint64_t attach_members(const std::string& archive, const std::vector<Attac
       refuse("is of version 1 of the format, where nothing is attached; convert its source again");
     if (reader.reads_by_directory()) refuse("was repacked by another tool; add the files by that");
     check_names(reader, files);
-    OutputFile out(archive, {.overwrite = true, .buffer_bytes = kPieceBytes});
+    OutputFile out(archive, {.overwrite = true, .buffer_bytes = kCopiedBytes});
     Copy(reader, out).write(files);
     const std::uint64_t size = out.position();
     out.commit();

@@ -10,14 +10,14 @@
 namespace isohf {
 namespace {
 
-constexpr std::uint64_t kMagic = 0x324c4e4a46485349;  // "ISHFJNL2"
+constexpr std::uint64_t kJournalMagic = 0x324c4e4a46485349;  // "ISHFJNL2"
 constexpr std::size_t kHeaderBytes = 8 + 32 + 4;
 
 std::vector<std::byte> make_header(const Digest& job) {
   std::vector<std::byte> bytes;
   bytes.reserve(kHeaderBytes);
   ByteWriter writer(bytes);
-  writer.write(kMagic);
+  writer.write(kJournalMagic);
   writer.write_bytes(job);
   writer.write(crc32(bytes));
   return bytes;

@@ -6,7 +6,7 @@
 namespace isohf {
 namespace {
 
-constexpr std::uint64_t kMagic = 0x58444946484f5349;  // "ISOHFIDX"
+constexpr std::uint64_t kIndexMagic = 0x58444946484f5349;  // "ISOHFIDX"
 constexpr std::uint32_t kVersion = 1;
 constexpr std::uint32_t kStored = 1;
 constexpr std::uint32_t kHasVoids = 2;
@@ -40,7 +40,7 @@ std::optional<TileEntry> parse_index_record(std::span<const std::byte> record) {
 std::optional<IndexFooter> parse_index_footer(std::span<const std::byte> bytes) {
   if (bytes.size() != kIndexFooterBytes) return std::nullopt;
   ByteReader reader(bytes);
-  if (reader.read<std::uint64_t>() != kMagic || reader.read<std::uint32_t>() != kVersion ||
+  if (reader.read<std::uint64_t>() != kIndexMagic || reader.read<std::uint32_t>() != kVersion ||
       reader.read<std::uint32_t>() != kIndexRecordBytes) {
     return std::nullopt;
   }

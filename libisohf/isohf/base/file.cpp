@@ -17,15 +17,15 @@
 namespace isohf {
 namespace {
 
-std::string reason(int error_number) {
-  return std::generic_category().message(error_number);
-}
-
 [[noreturn]] void fail(const std::string& path, const std::string& deed, int error_number) {
   throw Error(ErrorCode::kIo, {path, deed + ": " + reason(error_number), "", ""});
 }
 
 }  // namespace
+
+std::string reason(int error_number) {
+  return std::generic_category().message(error_number);
+}
 
 std::string folder_of(const std::string& path) {
   const std::size_t slash = path.find_last_of('/');

@@ -56,6 +56,9 @@ class File {
 /// Throws Error{kIo} for anything else that goes wrong.
 [[nodiscard]] bool rename_file(const std::string& from, const std::string& to, bool overwrite);
 
+/// What the system calls this value of errno.
+[[nodiscard]] std::string reason(int error_number);
+
 /// The folder that a path lies in; "." for a bare name.
 [[nodiscard]] std::string folder_of(const std::string& path);
 

@@ -22,10 +22,6 @@ constexpr std::uint64_t kWritebackBytes = std::uint64_t{4} << 20U;
   throw Error(ErrorCode::kInvalidArgument, why);
 }
 
-std::string reason(int error_number) {
-  return std::generic_category().message(error_number);
-}
-
 void check_folder(const std::string& folder) {
   struct stat status {};
   const bool found = ::stat(folder.c_str(), &status) == 0;

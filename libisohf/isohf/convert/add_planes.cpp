@@ -15,11 +15,9 @@ namespace isohf {
 namespace {
 
 constexpr const char* kPlanesFolder = "planes/";
-/// In each thread, of each vertex of a tile: what the encoder works with; eight tiles that are decoded side by side.
-constexpr double kBytesPerVertex = 24.0;
+/// In each thread, of each vertex of eight tiles that are decoded side by side.
 constexpr double kBatchBytesPerVertex = 8.0 * 4.0;
-/// Of each tile of the archive, and of each of a row.
-constexpr double kBytesPerTile = 200.0;
+/// Of each tile of a row.
 constexpr double kBytesPerRowTile = 100.0;
 
 ScratchFolder room_for_planes(const Metadata& metadata, const Job& job) {

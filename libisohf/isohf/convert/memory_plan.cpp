@@ -21,12 +21,8 @@ namespace {
 
 constexpr std::uint64_t kMiB = std::uint64_t{1} << 20U;
 
-/// In each thread, of one tile: heights, codes, and what the encoder works with.
-constexpr double kBytesPerVertex = 24.0;
 /// Of a tile that waits to be written.
 constexpr double kWaitingBytesPerVertex = 1.3;
-/// Index, journal and directory of the archive.
-constexpr double kBytesPerTile = 200.0;
 
 /// What is set when memory is short: reads and tiles in flight, in the order of preference.
 struct Ration {

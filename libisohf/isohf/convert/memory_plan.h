@@ -10,6 +10,11 @@
 
 namespace isohf {
 
+/// In each thread, of each vertex of a tile: its height and code, and what the encoder works with.
+constexpr double kBytesPerVertex = 24.0;
+/// Of each tile of an archive that is written: index, journal and directory.
+constexpr double kBytesPerTile = 200.0;
+
 /// How a conversion uses memory. None of it changes a byte of the archive.
 struct MemoryPlan {
   std::uint64_t bytes = 0;        ///< resident set at its peak, the program itself included; within a tenth

@@ -9,7 +9,7 @@ namespace isohf {
 namespace {
 
 constexpr int kStepsPerSide = 1024;
-constexpr int kPlaces = 33;
+constexpr int kPlacesPerSide = 33;
 
 double between(double a, double b, int step, int steps) {
   // Ends exactly on b: a + (b - a) need not.
@@ -84,10 +84,10 @@ MapBounds projected_bounds(const Projection& projection, const ReferenceMap& map
 ScaleError worst_scale_error(const Projection& projection, const GeoExtent& ground) {
   ScaleError found;
   found.place = ground.middle();
-  for (int row = 0; row < kPlaces; ++row) {
-    const double latitude = between(ground.north, ground.south, row, kPlaces - 1);
-    for (int column = 0; column < kPlaces; ++column) {
-      const GeoPoint place{between(ground.west, ground.east, column, kPlaces - 1), latitude};
+  for (int row = 0; row < kPlacesPerSide; ++row) {
+    const double latitude = between(ground.north, ground.south, row, kPlacesPerSide - 1);
+    for (int column = 0; column < kPlacesPerSide; ++column) {
+      const GeoPoint place{between(ground.west, ground.east, column, kPlacesPerSide - 1), latitude};
       const double error = projection.scale(place).error();
       if (error > found.worst || std::isnan(error)) {
         found = {std::isnan(error) ? std::numeric_limits<double>::infinity() : error, place};

@@ -9,7 +9,7 @@ namespace isohf {
 namespace {
 
 constexpr int kPlaces = 33;
-constexpr double kDegree = M_PI / 180.0;
+constexpr double kRadiansPerDegree = M_PI / 180.0;
 /// Half of the step of differences, for the body's axis: of 40 m on the Earth. Their error is a square of it.
 constexpr double kStep = 3e-6;
 
@@ -24,11 +24,11 @@ double dot(const Vector& a, const Vector& b) {
 Vector place_in_space(const Ellipsoid& body, GeoPoint place) {
   const double f = body.flattening();
   const double e2 = f * (2.0 - f);
-  const double sine = std::sin(place.latitude * kDegree);
+  const double sine = std::sin(place.latitude * kRadiansPerDegree);
   const double normal = body.semi_major_axis_m / std::sqrt(1.0 - e2 * sine * sine);
-  const double from_axis = normal * std::cos(place.latitude * kDegree);
-  return {from_axis * std::cos(place.longitude * kDegree), from_axis * std::sin(place.longitude * kDegree),
-          normal * (1.0 - e2) * sine};
+  const double from_axis = normal * std::cos(place.latitude * kRadiansPerDegree);
+  return {from_axis * std::cos(place.longitude * kRadiansPerDegree),
+          from_axis * std::sin(place.longitude * kRadiansPerDegree), normal * (1.0 - e2) * sine};
 }
 
 /// To this many digits nothing shows the last bits in which mathematical libraries differ: 1 mm, and 1 mm in 10 km.
@@ -98,13 +98,15 @@ PlaceScale scale_at(const ReferenceMap& map, MapPoint place) {
   const double determinant = g11 * g22 - g12 * g12;
   scale.areal = metres * metres / std::sqrt(determinant);
   scale.most = scale.areal / scale.least;
-  scale.angular_deg = 2.0 * std::asin((scale.most - scale.least) / (scale.most + scale.least)) / kDegree;
+  scale.angular_deg = 2.0 * std::asin((scale.most - scale.least) / (scale.most + scale.least)) / kRadiansPerDegree;
   // A direction of the ground is J times one of the map.
   const GeoPoint geo = map.geo_from_map(place);
-  const double sine = std::sin(geo.latitude * kDegree);
-  const Vector to_east = {-std::sin(geo.longitude * kDegree), std::cos(geo.longitude * kDegree), 0.0};
-  const Vector to_north = {-sine * std::cos(geo.longitude * kDegree), -sine * std::sin(geo.longitude * kDegree),
-                           std::cos(geo.latitude * kDegree)};
+  const double sine = std::sin(geo.latitude * kRadiansPerDegree);
+  const Vector to_east = {-std::sin(geo.longitude * kRadiansPerDegree), std::cos(geo.longitude * kRadiansPerDegree),
+                          0.0};
+  const Vector to_north = {-sine * std::cos(geo.longitude * kRadiansPerDegree),
+                           -sine * std::sin(geo.longitude * kRadiansPerDegree),
+                           std::cos(geo.latitude * kRadiansPerDegree)};
   const auto scale_towards = [&](const Vector& direction) {
     const double a = dot(east, direction);
     const double b = dot(north, direction);

@@ -34,7 +34,7 @@ int plane_for(const Metadata& metadata, const SampleGrid& grid) {
   return planes_of(metadata).plane_for_spacing(grid.spacing_x / 2.0, grid.spacing_z / 2.0);
 }
 
-[[noreturn]] void refuse(const char* what) {
+[[noreturn]] void refuse_place(const char* what) {
   throw Error(ErrorCode::kInvalidArgument,
               fmt::format("the archive's source has no position in {}; use world coordinates", what));
 }
@@ -76,12 +76,12 @@ SurfaceSample Surface::at(WorldPoint point) {
 }
 
 SurfaceSample Surface::at(GeoPoint point) {
-  if (!state_->georeference.has_geo()) refuse("degrees");
+  if (!state_->georeference.has_geo()) refuse_place("degrees");
   return at(state_->georeference.world_from_geo(point));
 }
 
 SurfaceSample Surface::at(MapPoint point) {
-  if (!state_->georeference.has_source()) refuse("coordinates");
+  if (!state_->georeference.has_source()) refuse_place("coordinates");
   return at(state_->georeference.world_from_source(point));
 }
 
@@ -135,7 +135,7 @@ struct RowReader::State {
       return;
     }
     georeference.emplace(metadata);
-    if (!georeference->has_geo()) refuse("degrees");
+    if (!georeference->has_geo()) refuse_place("degrees");
     points.emplace(metadata.grid, metadata.quantisation, tiles_of(archive), kTileBytes);
   }
 

@@ -15,7 +15,7 @@ namespace isohf {
 namespace {
 
 /// What an index says of codes.
-EncodedTile describe(const TileCodes& codes) {
+EncodedTile described_as_stored(const TileCodes& codes) {
   EncodedTile tile;
   tile.content_digest = tile_content_digest(codes);
   std::int64_t voids = 0;
@@ -32,7 +32,7 @@ EncodedTile describe(const TileCodes& codes) {
 PlaneCheck::PlaneCheck(const ArchiveReader& archive, const ScratchFolder& scratch)
     : archive_(archive),
       builder_(
-          planes_of(archive.metadata()), archive.metadata().quantisation.type, describe,
+          planes_of(archive.metadata()), archive.metadata().quantisation.type, described_as_stored,
           [this](int plane, TileIndex tile, const EncodedTile& expected) { check(plane, tile, expected); }, scratch) {
   const auto part = part_record(archive.metadata());
   if (part && part->shard) shard_ = part->tiles;

@@ -27,7 +27,7 @@ std::uint8_t byte_of(CodeType type) {
   return 0;
 }
 
-[[noreturn]] void refuse(const std::string& why) {
+[[noreturn]] void refuse_payload(const std::string& why) {
   throw Error(ErrorCode::kCorrupt, "tile header: " + why);
 }
 
@@ -39,25 +39,28 @@ void check_range(const PayloadHeader& header) {
     least = -most - 1;
   }
   if (header.low < least || header.high > most || header.low > header.high) {
-    refuse(fmt::format("its range {}..{} is none within {}..{}", header.low, header.high, least, most));
+    refuse_payload(fmt::format("its range {}..{} is none within {}..{}", header.low, header.high, least, most));
   }
-  if (header.is_constant != (header.low == header.high)) refuse("its range contradicts its flag for equal samples");
+  if (header.is_constant != (header.low == header.high))
+    refuse_payload("its range contradicts its flag for equal samples");
 }
 
 void check_predictor(const PayloadHeader& header) {
   if (header.base < header.low || header.base > header.high) {
-    refuse(fmt::format("its base {} lies outside its range {}..{}", header.base, header.low, header.high));
+    refuse_payload(fmt::format("its base {} lies outside its range {}..{}", header.base, header.low, header.high));
   }
   for (const PredictorWeights& weights : header.predictors.weights) {
     int sum = 0;
     for (const std::int16_t weight : weights) sum += std::abs(int{weight});
-    if (sum >= kWeightSumLimit) refuse(fmt::format("its weights add up to {}, must be below {}", sum, kWeightSumLimit));
+    if (sum >= kWeightSumLimit)
+      refuse_payload(fmt::format("its weights add up to {}, must be below {}", sum, kWeightSumLimit));
   }
-  if (header.energy_shift > 31) refuse(fmt::format("its energy shift is {}, must lie in 0..31", header.energy_shift));
+  if (header.energy_shift > 31)
+    refuse_payload(fmt::format("its energy shift is {}, must lie in 0..31", header.energy_shift));
   for (std::size_t i = 0; i < header.thresholds.size(); ++i) {
     const unsigned before = i == 0 ? 0 : header.thresholds[i - 1];
     if (header.thresholds[i] <= before || header.thresholds[i] >= kEnergyLimit) {
-      refuse(
+      refuse_payload(
           fmt::format("its threshold {} is {}, must ascend within 1..{}", i, header.thresholds[i], kEnergyLimit - 1));
     }
   }
@@ -107,30 +110,32 @@ void write_payload_header(const PayloadHeader& header, std::vector<std::byte>& o
 PayloadHeader read_payload_header(const TileShape& shape, CodeType type, ByteReader& reader) {
   const auto version = reader.read<std::uint8_t>();
   if (version != kCodecVersion) {
-    if (version == 0) refuse("its codec version is 0");
+    if (version == 0) refuse_payload("its codec version is 0");
     throw Error(ErrorCode::kUnsupported,
                 fmt::format("tile codec version {}; this build reads versions 1 and 2", version));
   }
   PayloadHeader header;
   header.type = type;
   if (const auto found = reader.read<std::uint8_t>(); found != byte_of(type)) {
-    refuse(fmt::format("its sample type is {}, the archive's is {} ({})", found, byte_of(type), to_string(type)));
+    refuse_payload(
+        fmt::format("its sample type is {}, the archive's is {} ({})", found, byte_of(type), to_string(type)));
   }
   const auto flags = reader.read<std::uint8_t>();
-  if ((flags & ~(kHasVoids | kIsConstant)) != 0) refuse(fmt::format("reserved flags are set: {:#04x}", flags));
+  if ((flags & ~(kHasVoids | kIsConstant)) != 0) refuse_payload(fmt::format("reserved flags are set: {:#04x}", flags));
   header.has_voids = (flags & kHasVoids) != 0;
   header.is_constant = (flags & kIsConstant) != 0;
   header.dropped_bits = reader.read<std::uint8_t>();
   if (header.dropped_bits > (type == CodeType::kF32 ? 30 : 0)) {
-    refuse(fmt::format("{} low bits are left out, too many for {}", header.dropped_bits, to_string(type)));
+    refuse_payload(fmt::format("{} low bits are left out, too many for {}", header.dropped_bits, to_string(type)));
   }
   header.low = reader.read<std::int32_t>();
   header.high = reader.read<std::int32_t>();
   header.mask_bytes = reader.read<std::uint32_t>();
   check_range(header);
-  if (header.has_voids != (header.mask_bytes != 0)) refuse("its void mask contradicts its flag for voids");
+  if (header.has_voids != (header.mask_bytes != 0)) refuse_payload("its void mask contradicts its flag for voids");
   const auto samples = static_cast<std::uint64_t>(shape.stored_vertex_count());
-  if (header.mask_bytes > samples + 8) refuse(fmt::format("its void mask of {} bytes is too long", header.mask_bytes));
+  if (header.mask_bytes > samples + 8)
+    refuse_payload(fmt::format("its void mask of {} bytes is too long", header.mask_bytes));
   if (header.is_constant) return header;
 
   header.base = reader.read<std::int32_t>();
@@ -138,19 +143,20 @@ PayloadHeader read_payload_header(const TileShape& shape, CodeType type, ByteRea
   header.energy_shift = reader.read<std::uint8_t>();
   const std::size_t contexts = reader.read<std::uint8_t>();
   if (contexts < 1 || contexts > kMaxContexts)
-    refuse(fmt::format("it has {} contexts, must have 1..{}", contexts, kMaxContexts));
+    refuse_payload(fmt::format("it has {} contexts, must have 1..{}", contexts, kMaxContexts));
   header.paired = reader.read<std::uint16_t>();
   if ((std::uint32_t{header.paired} >> contexts) != 0) {
-    refuse(fmt::format("it has pairs in context {}, the last is {}", std::bit_width(header.paired) - 1, contexts - 1));
+    refuse_payload(
+        fmt::format("it has pairs in context {}, the last is {}", std::bit_width(header.paired) - 1, contexts - 1));
   }
   const std::size_t predictors = reader.read<std::uint8_t>();
   if (predictors < 1 || predictors > kMaxPredictors) {
-    refuse(fmt::format("it has {} predictors, must have 1..{}", predictors, kMaxPredictors));
+    refuse_payload(fmt::format("it has {} predictors, must have 1..{}", predictors, kMaxPredictors));
   }
   const std::size_t weight_count = reader.read<std::uint8_t>();
   if (weight_count != kNearWeightCount && weight_count != kWeightCount) {
-    refuse(fmt::format("its predictors have {} weights, must have {} or {}", weight_count, kNearWeightCount,
-                       kWeightCount));
+    refuse_payload(fmt::format("its predictors have {} weights, must have {} or {}", weight_count, kNearWeightCount,
+                               kWeightCount));
   }
   header.predictors.is_wide = weight_count == kWeightCount;
   header.predictors.weights.assign(predictors, {});
@@ -164,7 +170,8 @@ PayloadHeader read_payload_header(const TileShape& shape, CodeType type, ByteRea
     symbols += header.symbol_counts.back();
   }
   check_predictor(header);
-  if (symbols > samples) refuse(fmt::format("it has {} symbols, more than the tile's {} samples", symbols, samples));
+  if (symbols > samples)
+    refuse_payload(fmt::format("it has {} symbols, more than the tile's {} samples", symbols, samples));
   return header;
 }
 
@@ -176,7 +183,7 @@ void read_block_map(const TileShape& shape, ByteReader& reader, Predictors& pred
   predictors.map.clear();
   for (const std::byte byte : bytes) {
     const auto index = std::to_integer<std::uint8_t>(byte);
-    if (index >= count) refuse(fmt::format("its map names predictor {}, the last is {}", index, count - 1));
+    if (index >= count) refuse_payload(fmt::format("its map names predictor {}, the last is {}", index, count - 1));
     predictors.map.push_back(index);
   }
 }
@@ -213,7 +220,7 @@ std::vector<std::byte> pack_void_mask(std::span<const std::uint8_t> is_void) {
 }
 
 std::vector<std::uint8_t> unpack_void_mask(std::span<const std::byte> packed, std::size_t samples) {
-  const auto refuse = [](const std::string& why) { throw Error(ErrorCode::kCorrupt, "void mask: " + why); };
+  const auto refuse_payload = [](const std::string& why) { throw Error(ErrorCode::kCorrupt, "void mask: " + why); };
   std::vector<std::uint8_t> is_void(samples);
   std::size_t filled = 0;
   std::uint8_t of = 0;
@@ -223,19 +230,19 @@ std::vector<std::uint8_t> unpack_void_mask(std::span<const std::byte> packed, st
     const std::size_t start = i;
     unsigned byte = 128;
     while (byte >= 128) {
-      if (i == packed.size()) refuse("its last run is cut off");
-      if (shift > 28) refuse(fmt::format("its run at byte {} is too long a number", start));
+      if (i == packed.size()) refuse_payload("its last run is cut off");
+      if (shift > 28) refuse_payload(fmt::format("its run at byte {} is too long a number", start));
       byte = std::to_integer<unsigned>(packed[i++]);
       run |= std::uint64_t{byte & 127U} << shift;
       shift += 7;
     }
     if (byte == 0 && (start != 0 || i - start > 1))
-      refuse(fmt::format("its run at byte {} is not in shortest form", start));
-    if (run > samples - filled) refuse(fmt::format("its runs add up to more than {} samples", samples));
+      refuse_payload(fmt::format("its run at byte {} is not in shortest form", start));
+    if (run > samples - filled) refuse_payload(fmt::format("its runs add up to more than {} samples", samples));
     std::fill_n(is_void.begin() + static_cast<std::ptrdiff_t>(filled), run, of);
     filled += run;
   }
-  if (filled != samples) refuse(fmt::format("its runs add up to {} of {} samples", filled, samples));
+  if (filled != samples) refuse_payload(fmt::format("its runs add up to {} of {} samples", filled, samples));
   return is_void;
 }
 

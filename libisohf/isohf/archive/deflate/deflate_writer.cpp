@@ -8,7 +8,6 @@
 namespace isohf {
 namespace {
 
-constexpr unsigned kEndOfBlock = 256;
 constexpr std::size_t kBlockBytes = std::size_t{1} << 17;
 constexpr std::size_t kMaxRun = 258;  // the longest match of Deflate
 

@@ -13,6 +13,9 @@ namespace isohf {
 inline constexpr std::array<std::uint8_t, 19> kLengthOrder = {16, 17, 18, 0, 8,  7, 9,  6, 10, 5,
                                                               11, 4,  12, 3, 13, 2, 14, 1, 15};
 
+/// The symbol that ends a block (RFC 1951, 3.2.5).
+inline constexpr unsigned kEndOfBlock = 256;
+
 using ByteCounts = std::array<std::uint32_t, 256>;
 
 /// How often each byte occurs.

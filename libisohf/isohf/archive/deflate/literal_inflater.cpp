@@ -12,7 +12,6 @@
 namespace isohf {
 namespace {
 
-constexpr unsigned kEndOfBlock = 256;
 constexpr unsigned kLastSymbol = 285;
 constexpr unsigned kMaxLength = 15;
 constexpr unsigned kTableBits = 11;

@@ -13,7 +13,7 @@
 namespace isohf {
 namespace {
 
-constexpr double kNone = -std::numeric_limits<double>::infinity();
+constexpr double kNoHeight = -std::numeric_limits<double>::infinity();
 /// Sun elevations closer than this are the same.
 constexpr double kSameAngleDeg = 1e-9;
 
@@ -84,7 +84,7 @@ std::vector<double> ShadowSeedReader::entering(TileIndex index, const TileCodes&
   const TileGrid& grid = archive_.grid();
   const Quantisation& quantisation = archive_.metadata().quantisation;
   const auto rows = static_cast<std::size_t>(visible_rows(grid.shape()));
-  std::vector<double> heights(rows, kNone);
+  std::vector<double> heights(rows, kNoHeight);
   if (info_.kind == ShadowSeedInfo::Kind::kHulls) {
     const double fall = info_.fall_per_half_step(grid, quantisation, sun_elevation_deg);
     const HullSeeds seeds = hulls(index, tile);

@@ -10,7 +10,7 @@
 namespace isohf {
 namespace {
 
-[[noreturn]] void refuse(const std::string& why) {
+[[noreturn]] void refuse_source(const std::string& why) {
   throw Error(ErrorCode::kInvalidArgument, why);
 }
 
@@ -74,7 +74,7 @@ void place_by_warp(const SourceInfo& info, const ProjectionRequest& asked, const
   const Georeference& place = info.georeference;
   const ProjectionSpec& spec = frame.projection->spec;
   if (!std::isfinite(bounds.west)) {
-    refuse(
+    refuse_source(
         fmt::format("{}: `projection` {} has no place for a part of the input, or its edge runs through it; convert "
                     "what lies within (`bbox`), or give `projection` auto",
                     info.path, asked.name()));
@@ -119,7 +119,7 @@ void place_on_map(const SourceInfo& info, const GroundRequest& request, SourceFr
   const bool is_asked = asked.is_given && (asked.is_auto || asked.kind != ProjectionKind::kNone);
   const bool is_placed = request.source_map && info.georeference.has_origin;
   const auto refuse_request = [&](const std::string& why) {
-    refuse(fmt::format("{}: `projection` {} {}", info.path, asked.name(), why));
+    refuse_source(fmt::format("{}: `projection` {} {}", info.path, asked.name(), why));
   };
   if (!is_placed) {
     if (!is_asked || (asked.is_auto && request.why_no_map.empty())) return;
@@ -164,8 +164,8 @@ void place_degrees(const SourceInfo& info, const GroundRequest& request, SourceF
   ProjectionRequest asked = request.projection;
   if (!place.has_origin) {
     if (!asked.is_auto && asked.kind != ProjectionKind::kEquirectangular && asked.kind != ProjectionKind::kNone) {
-      refuse(fmt::format("{}: `projection` {} needs to know where the input lies; it has no georeference", info.path,
-                         asked.name()));
+      refuse_source(fmt::format("{}: `projection` {} needs to know where the input lies; it has no georeference",
+                                info.path, asked.name()));
     }
     if (asked.is_auto) {
       asked.is_auto = false;
@@ -258,7 +258,7 @@ SourceFrame make_source_frame(const SourceInfo& info, const GroundRequest& reque
   }
   if (request.wrap_x) {
     if (closure_of(info) != Closure::kClosed) {
-      refuse(
+      refuse_source(
           fmt::format("{}: `wrap_x` needs columns all the way round, 360 degrees; this input's {} columns {:.9g} "
                       "apart make {:.9g}",
                       info.path, info.width, place.spacing_x,

@@ -39,7 +39,7 @@ std::vector<ArchiveDifference::Member> differing_members(const ArchiveReader& fi
 }
 
 /// Stated, or found by decoding where nothing is stated.
-std::vector<std::byte> digest_of(const ArchiveReader& archive, TileIndex tile) {
+std::vector<std::byte> tile_digest(const ArchiveReader& archive, TileIndex tile) {
   if (const auto stated = archive.tile_digest(tile)) return {stated->begin(), stated->end()};
   return tile_content_digest(archive.read_tile(tile));
 }
@@ -100,7 +100,7 @@ ArchiveDifference diff_archives(const std::string& first, const std::string& sec
         const bool in_b = b.tile_entry(tile).stored;
         if (!in_a && !in_b) return;
         if (in_a != in_b) states[i] = in_a ? State::kOnlyFirst : State::kOnlySecond;
-        if (in_a && in_b && digest_of(a, tile) != digest_of(b, tile)) states[i] = State::kDiffers;
+        if (in_a && in_b && tile_digest(a, tile) != tile_digest(b, tile)) states[i] = State::kDiffers;
         if (surface && states[i] != State::kSame) sums[i].add(a.read_elevations(tile), b.read_elevations(tile));
       });
       for (std::size_t i = 0; i < states.size(); ++i) {

@@ -57,8 +57,8 @@ TileCodes TilesAround::codes(TileIndex tile) const {
 }
 
 std::uint64_t TilesAround::memory_bytes(const TileGrid& grid, std::int64_t rows) {
-  constexpr double kBytesPerVertex = 1.3;  // as of tiles that wait to be written
-  return static_cast<std::uint64_t>(kBytesPerVertex * static_cast<double>(rows) *
+  constexpr double kWaitingBytes = 1.3;  // as of tiles that wait to be written
+  return static_cast<std::uint64_t>(kWaitingBytes * static_cast<double>(rows) *
                                     static_cast<double>(grid.tile_columns()) *
                                     static_cast<double>(grid.shape().stored_vertex_count()));
 }

@@ -10,7 +10,7 @@
 namespace isohf {
 namespace {
 
-constexpr float kVoid = std::numeric_limits<float>::quiet_NaN();
+constexpr float kVoidHeight = std::numeric_limits<float>::quiet_NaN();
 /// Quotients this near to 0 or 1 are those of the lattice's own directions, rounded.
 constexpr double kOnLattice = 1e-9;
 /// Columns that are turned into steps together: as many as share cache lines.
@@ -148,7 +148,7 @@ ShadowSweep::State ShadowSweep::pass_along_rows(std::int64_t tile_row, const Sta
   State leaving;
   const ShadowFront::Casting columns = casting_columns();
   const ShadowFront::Casting rows = casting_rows(tile_row);
-  std::vector<float> profile(static_cast<std::size_t>(lanes) + 2, kVoid);
+  std::vector<float> profile(static_cast<std::size_t>(lanes) + 2, kVoidHeight);
   std::vector<float> found(static_cast<std::size_t>(lanes));
   std::vector<float> values;
   std::vector<float> made(depths != nullptr ? static_cast<std::size_t>(grid_.tile_columns() * shape.columns()) : 0);
@@ -190,7 +190,7 @@ ShadowSweep::State ShadowSweep::pass_along_columns(std::int64_t tile_row, const 
   const std::size_t across = static_cast<std::size_t>(half_steps_) + 1;
   const std::size_t lane_stride = static_cast<std::size_t>(lanes) + 2;
   std::vector<float> spread_rows(across * static_cast<std::size_t>(lanes));
-  std::vector<float> profiles(lane_stride * across, kVoid);
+  std::vector<float> profiles(lane_stride * across, kVoidHeight);
   std::vector<float> found(static_cast<std::size_t>(lanes) * across);
   std::int64_t steps = 0;
   for (std::int64_t k = 0; k < grid_.tile_columns(); k += kTilesTogether) {

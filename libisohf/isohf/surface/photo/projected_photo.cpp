@@ -28,7 +28,7 @@ double rounded(double position) {
 }
 
 /// Integral of the hat function max(0, 1 - |t|) from 0 to t.
-double hat_integral(double t) {
+double hat_integral_from_middle(double t) {
   const double inside = std::clamp(t, -1.0, 1.0);
   return inside - 0.5 * inside * std::abs(inside);
 }
@@ -45,7 +45,7 @@ struct Box {
     constexpr double kPoint = 1e-6;
     const double from = middle - static_cast<double>(k);
     if (width < kPoint) return std::max(0.0, 1.0 - std::abs(from));
-    return (hat_integral(from + 0.5 * width) - hat_integral(from - 0.5 * width)) / width;
+    return (hat_integral_from_middle(from + 0.5 * width) - hat_integral_from_middle(from - 0.5 * width)) / width;
   }
 };
 

@@ -34,26 +34,26 @@ std::optional<double> number_from(std::string_view text) {
   return value;
 }
 
-constexpr int kNodes = 16;
+constexpr int kGaussNodes = 16;
 
 /// Nodes and weights on [-1, 1], by Newton's method on the Legendre polynomial of degree 16.
 struct GaussLegendre {
-  std::array<double, kNodes> node;
-  std::array<double, kNodes> weight;
+  std::array<double, kGaussNodes> node;
+  std::array<double, kGaussNodes> weight;
 
   GaussLegendre() : node{}, weight{} {
-    for (int i = 0; i < kNodes; ++i) {
-      double x = std::cos(std::numbers::pi * (i + 0.75) / (kNodes + 0.5));
+    for (int i = 0; i < kGaussNodes; ++i) {
+      double x = std::cos(std::numbers::pi * (i + 0.75) / (kGaussNodes + 0.5));
       double slope = 1.0;
       for (int step = 0; step < 8; ++step) {  // converges in 4
         double previous = 1.0;
         double current = x;
-        for (int n = 2; n <= kNodes; ++n) {
+        for (int n = 2; n <= kGaussNodes; ++n) {
           const double next = ((2 * n - 1) * x * current - (n - 1) * previous) / n;
           previous = current;
           current = next;
         }
-        slope = kNodes * (x * current - previous) / (x * x - 1.0);
+        slope = kGaussNodes * (x * current - previous) / (x * x - 1.0);
         x -= current / slope;
       }
       node[static_cast<std::size_t>(i)] = x;
@@ -75,7 +75,7 @@ double integral(double begin, double end, double longest, const std::function<do
     const double radius = 0.5 * (to - from) / pieces;
     for (int piece = 0; piece < pieces; ++piece) {
       const double middle = from + (2 * piece + 1) * radius;
-      for (std::size_t i = 0; i < kNodes; ++i) sum += radius * rule.weight[i] * f(middle + radius * rule.node[i]);
+      for (std::size_t i = 0; i < kGaussNodes; ++i) sum += radius * rule.weight[i] * f(middle + radius * rule.node[i]);
     }
   }
   return sum;

@@ -21,8 +21,8 @@ constexpr double kNodeGrain = 4096.0;
 constexpr double kCheckedError = SourceWarp::kTolerance / 5.0;
 
 /// cos((2k + 1) pi / 8): the zeros of T4.
-constexpr std::array<double, 4> kNodes = {0.92387953251128674, 0.38268343236508977, -0.38268343236508977,
-                                          -0.92387953251128674};
+constexpr std::array<double, 4> kChebyshevNodes = {0.92387953251128674, 0.38268343236508977, -0.38268343236508977,
+                                                   -0.92387953251128674};
 /// Where T4 is 1 or -1: all of a T4(s) + b T4(t) that is largest, whatever the signs of a and b.
 constexpr double kRoot = 0.70710678118654752;
 constexpr std::array<std::pair<double, double>, 13> kChecks = {{{-1.0, -1.0},
@@ -41,11 +41,11 @@ constexpr std::array<std::pair<double, double>, 13> kChecks = {{{-1.0, -1.0},
 
 using Cubic = std::array<double, 4>;  ///< of 1, t, t^2, t^3
 
-/// The cubic through values at kNodes.
+/// The cubic through values at kChebyshevNodes.
 Cubic through(const Cubic& values) {
   Cubic chebyshev{};
   for (std::size_t k = 0; k < 4; ++k) {
-    const double t = kNodes[k];
+    const double t = kChebyshevNodes[k];
     const double t2 = 2.0 * t * t - 1.0;
     const double t3 = t * (2.0 * t2 - 1.0);
     chebyshev[0] += 0.25 * values[k];
@@ -63,7 +63,7 @@ double value_of(const Cubic& cubic, double t) {
 /// Coefficients of a bicubic polynomial: [power of s][power of t].
 class Bicubic {
  public:
-  /// values [row][column] at kNodes x kNodes.
+  /// values [row][column] at kChebyshevNodes x kChebyshevNodes.
   explicit Bicubic(const std::array<Cubic, 4>& values) {
     std::array<Cubic, 4> along_s{};
     for (std::size_t row = 0; row < 4; ++row) along_s[row] = through(values[row]);
@@ -238,7 +238,7 @@ void SourceWarp::fill(const Block& block, const Target& target) const {
   const double near_u = at(block.x_at(0.0), block.z_at(0.0)).u;
   bool is_somewhere = !std::isnan(near_u);
   for (std::size_t i = 0; is_somewhere && i < probes.size(); ++i) {
-    const auto [s, t] = i < 16 ? std::pair{kNodes[i % 4], kNodes[i / 4]} : kChecks[i - 16];
+    const auto [s, t] = i < 16 ? std::pair{kChebyshevNodes[i % 4], kChebyshevNodes[i / 4]} : kChecks[i - 16];
     probes[i] = at(block.x_at(s), block.z_at(t), near_u);
     is_somewhere = !std::isnan(probes[i].u) && !std::isnan(probes[i].v);
   }

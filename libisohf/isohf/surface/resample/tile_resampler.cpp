@@ -111,9 +111,9 @@ void GridResampler::cut(TileIndex tile, const SourceBand& band, std::span<float>
   }
 }
 
-constexpr float kVoid = std::numeric_limits<float>::quiet_NaN();
+constexpr float kVoidHeight = std::numeric_limits<float>::quiet_NaN();
 
-double reach_of(const SourceAxis& x, const SourceAxis& z, Outside outside) {
+double reach_beyond(const SourceAxis& x, const SourceAxis& z, Outside outside) {
   if (outside == Outside::kClamp) return HUGE_VAL;  // the edge goes on for ever
   return static_cast<double>(std::max(x.continued_samples(), z.continued_samples())) + 1.0;
 }
@@ -201,7 +201,7 @@ WarpedResampler::WarpedResampler(const TileGrid& grid, const WarpPlace& place, c
       axis_x_(axis_x),
       axis_z_(axis_z),
       kernel_(kernel),
-      warp_(grid, place, reach_of(axis_x, axis_z, outside)),
+      warp_(grid, place, reach_beyond(axis_x, axis_z, outside)),
       bounds_(warp_.reading_bounds()),
       lowest_(static_cast<float>(limits.min)),
       highest_(static_cast<float>(limits.max)) {}
@@ -232,7 +232,7 @@ float WarpedResampler::sample_inside(const SourceBand& band, double u, double v)
 }
 
 float WarpedResampler::sample(const SourceBand& band, double u, double v) const {
-  if (std::isnan(u) || std::isnan(v)) return kVoid;
+  if (std::isnan(u) || std::isnan(v)) return kVoidHeight;
   if (!axis_x_.wraps()) {
     // Beyond half a turn from the middle the other side is nearer.
     const double middle = static_cast<double>(axis_x_.samples() - 1) / 2.0;
@@ -240,7 +240,7 @@ float WarpedResampler::sample(const SourceBand& band, double u, double v) const 
   }
   const SourceAxis::Place x = axis_x_.place(u);
   const SourceAxis::Place z = axis_z_.place(v);
-  if (!x.has_elevation || !z.has_elevation) return kVoid;
+  if (!x.has_elevation || !z.has_elevation) return kVoidHeight;
   const auto along_row = [&](double row) {
     const float height = sample_inside(band, x.position, row);
     return x.continued ? continue_slope(sample_inside(band, x.edge, row), height) : height;
@@ -260,7 +260,7 @@ void WarpedResampler::sample_row(const SourceBand& band, const double* u, const 
   const std::int64_t end_row = band.first_row + band.heights.rows() - taps;
   const std::int64_t stride = band.heights.stride();
   for (int c = 0; c < grid_.shape().columns(); ++c) {
-    heights[c] = kVoid;
+    heights[c] = kVoidHeight;
     if (u[c] >= 0.0 && u[c] <= last_u && v[c] >= 0.0 && v[c] <= last_v) {
       const TapWeights columns = kernel_.at(u[c]);
       const TapWeights rows = kernel_.at(v[c]);
@@ -271,7 +271,7 @@ void WarpedResampler::sample_row(const SourceBand& band, const double* u, const 
         const std::int64_t at = (rows.first - first_row) * stride + columns.first - band.first_column;
         const bool near_void = band.voids.data() != nullptr && any_void(band.voids.data() + at, stride, taps);
         const float* from = band.heights.data() + at;
-        heights[c] = near_void ? kVoid : blend(taps, from, stride, columns, rows);
+        heights[c] = near_void ? kVoidHeight : blend(taps, from, stride, columns, rows);
         if (std::isnan(heights[c])) {
           heights[c] = VoidRule(band, axis_x_, axis_z_, kernel_).at(u[c], v[c], columns, rows);
         } else if (kernel_.is_limited()) {

@@ -11,7 +11,7 @@ namespace {
 // Heights are subtracted as doubles: no sum of floats overflows there, whatever a damaged source holds, and the only
 // roundings that show are those of the elevations and of the result.
 
-constexpr Normal kNone = {0.0F, 0.0F, 0.0F};
+constexpr Normal kNoNormal = {0.0F, 0.0F, 0.0F};
 
 /// Reciprocals of the spacings.
 struct Scale {
@@ -154,25 +154,25 @@ void tile_normals(const TileGrid& grid, View2D<const float> elevations, View2D<N
   const int columns = grid.shape().columns();
   const int tile_rows = grid.shape().rows();
   const Scale scale(grid);
-  std::fill_n(normals.row(0), columns, kNone);
+  std::fill_n(normals.row(0), columns, kNoNormal);
   for (int row = 1; row < tile_rows - 1; ++row) {
     const Rows rows(elevations, row);
     Normal* out = normals.row(row);
     const int first = first_inside(rows);
     const int inside_end = std::max(first, last_inside(columns) + 1);
     const int visible_end = columns - (rows.odd ? 2 : 1);
-    out[0] = kNone;
+    out[0] = kNoNormal;
     for (int c = 1; c < first; ++c) out[c] = near_edge(rows, c, columns, scale);
     inside_normals(rows, first, inside_end - first, scale, out + first);
     for (int c = inside_end; c < visible_end; ++c) out[c] = near_edge(rows, c, columns, scale);
-    std::fill(out + visible_end, out + columns, kNone);
+    std::fill(out + visible_end, out + columns, kNoNormal);
   }
-  std::fill_n(normals.row(tile_rows - 1), columns, kNone);
+  std::fill_n(normals.row(tile_rows - 1), columns, kNoNormal);
 }
 
 Normal vertex_normal(const TileGrid& grid, View2D<const float> elevations, GridVertex vertex) {
   const int columns = grid.shape().columns();
-  if (!is_visible(grid.shape(), vertex)) return kNone;
+  if (!is_visible(grid.shape(), vertex)) return kNoNormal;
   const Scale scale(grid);
   const Rows rows(elevations, vertex.row);
   const int c = vertex.column;

@@ -9,7 +9,7 @@
 namespace isohf {
 namespace {
 
-constexpr float kNone = -std::numeric_limits<float>::infinity();
+constexpr float kNoCaster = -std::numeric_limits<float>::infinity();
 /// Lanes this near to the end of those that cast shadows count as on it: ends are found by quotients.
 constexpr double kOnEnd = 1e-6;
 
@@ -26,7 +26,7 @@ ISOHF_KERNEL void move_lines(const float* west, const float* east, int count, fl
     const float ground = whole ? between : beside;
     const float dark = lines[i] - fall;
     // `none` is -infinity where ground casts no shadows, else 0.
-    const float caster = whole ? between + none : kNone;
+    const float caster = whole ? between + none : kNoCaster;
     lines[i] = caster > dark ? caster : dark;
     float depth = dark - ground;
     depth = depth > -most_depth ? depth : -most_depth;
@@ -44,7 +44,7 @@ ShadowFront::ShadowFront(int lanes, double shift, double fall, double most_depth
     : shift_(shift),
       fall_(static_cast<float>(fall)),
       most_depth_(static_cast<float>(most_depth)),
-      lines_(static_cast<std::size_t>(lanes) + 1, kNone),
+      lines_(static_cast<std::size_t>(lanes) + 1, kNoCaster),
       depths_(lines_.size()) {}
 
 void ShadowFront::resume(std::int64_t step, const std::vector<float>& lines) {
@@ -60,7 +60,7 @@ bool ShadowFront::is_shifting() const {
 void ShadowFront::advance(const float* profile, const Casting& casting, float* depths) {
   if (is_shifting()) {
     std::copy_backward(lines_.begin(), lines_.end() - 1, lines_.end());
-    lines_.front() = kNone;
+    lines_.front() = kNoCaster;
   }
   const double place = static_cast<double>(steps_++) * shift_;
   const double share = place - std::floor(place);
@@ -75,9 +75,9 @@ void ShadowFront::advance(const float* profile, const Casting& casting, float* d
     vectorised<move_lines>(west, part > 0.0F ? west + 1 : west, end - begin, part, fall_, most_depth_, none,
                            lines_.data() + begin, depths_.data() + begin);
   };
-  move(0, std::min(first, last), kNone);
+  move(0, std::min(first, last), kNoCaster);
   move(std::min(first, last), last, 0.0F);
-  move(last, static_cast<int>(lines_.size()), kNone);
+  move(last, static_cast<int>(lines_.size()), kNoCaster);
   if (depths != nullptr) {
     vectorised<mix_depths>(static_cast<const float*>(depths_.data()), static_cast<int>(lines_.size()) - 1, part,
                            depths);

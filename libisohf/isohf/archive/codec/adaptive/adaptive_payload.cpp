@@ -13,7 +13,7 @@ namespace {
 
 enum : std::uint8_t { kHasVoids = 1, kHasWeights = 2, kIsWide = 4, kHasEightStates = 8 };
 
-[[noreturn]] void refuse(const std::string& why) {
+[[noreturn]] void refuse_tables(const std::string& why) {
   throw Error(ErrorCode::kCorrupt, "tile header: " + why);
 }
 
@@ -28,11 +28,11 @@ std::size_t read_size(ByteReader& reader) {
     const auto byte = reader.read<std::uint8_t>();
     size |= std::size_t{byte & 127U} << shift;
     if (byte < 128) {
-      if (byte == 0 && shift != 0) refuse("a size is not in shortest form");
+      if (byte == 0 && shift != 0) refuse_tables("a size is not in shortest form");
       return size;
     }
   }
-  refuse("a size is too long a number");
+  refuse_tables("a size is too long a number");
 }
 
 void read_weights(AdaptivePayload& payload, bool is_wide, ByteReader& reader) {
@@ -42,7 +42,8 @@ void read_weights(AdaptivePayload& payload, bool is_wide, ByteReader& reader) {
     weights[i] = reader.read<std::int16_t>();
     sum += std::abs(int{weights[i]});
   }
-  if (sum >= kWeightSumLimit) refuse(fmt::format("its weights add up to {}, must be below {}", sum, kWeightSumLimit));
+  if (sum >= kWeightSumLimit)
+    refuse_tables(fmt::format("its weights add up to {}, must be below {}", sum, kWeightSumLimit));
   payload.predictors.weights = {weights};
   payload.predictors.is_wide = is_wide;
 }
@@ -82,39 +83,39 @@ AdaptivePayload read_adaptive_payload(const TileShape& shape, CodeType type, std
   static_cast<void>(reader.read<std::uint8_t>());
   if (const auto found = reader.read<std::uint8_t>();
       type == CodeType::kF32 || found != (type == CodeType::kU8 ? 1 : 0)) {
-    refuse(fmt::format("its sample type is {}, the archive's is {}", found, to_string(type)));
+    refuse_tables(fmt::format("its sample type is {}, the archive's is {}", found, to_string(type)));
   }
   const auto flags = reader.read<std::uint8_t>();
   if (flags > (kHasVoids | kHasWeights | kIsWide | kHasEightStates)) {
-    refuse(fmt::format("reserved flags are set: {:#04x}", flags));
+    refuse_tables(fmt::format("reserved flags are set: {:#04x}", flags));
   }
   payload.low = reader.read<std::uint16_t>();
   payload.high = reader.read<std::uint16_t>();
   payload.base = reader.read<std::uint16_t>();
   const int most = type == CodeType::kU8 ? 254 : 65534;
   if (payload.low >= payload.high || payload.high > most) {
-    refuse(fmt::format("its range {}..{} is none within 0..{}", payload.low, payload.high, most));
+    refuse_tables(fmt::format("its range {}..{} is none within 0..{}", payload.low, payload.high, most));
   }
   if (payload.base < payload.low || payload.base > payload.high) {
-    refuse(fmt::format("its base {} lies outside its range {}..{}", payload.base, payload.low, payload.high));
+    refuse_tables(fmt::format("its base {} lies outside its range {}..{}", payload.base, payload.low, payload.high));
   }
   payload.has_weights = (flags & kHasWeights) != 0;
   if (payload.has_weights) {
     read_weights(payload, (flags & kIsWide) != 0, reader);
   } else if ((flags & kIsWide) != 0) {
-    refuse("its flags speak of weights that are not there");
+    refuse_tables("its flags speak of weights that are not there");
   }
   if ((flags & kHasVoids) != 0) {
     const std::size_t size = read_size(reader);
     payload.is_void = unpack_void_mask(reader.read_bytes(size), static_cast<std::size_t>(shape.stored_vertex_count()));
     if (std::find(payload.is_void.begin(), payload.is_void.end(), std::uint8_t{1}) == payload.is_void.end()) {
-      refuse("its void mask holds no void");
+      refuse_tables("its void mask holds no void");
     }
   }
   payload.states.resize((flags & kHasEightStates) != 0 ? kMostStates : 1);
   for (std::uint32_t& state : payload.states) {
     state = reader.read<std::uint32_t>();
-    if (state < kFirstState) refuse(fmt::format("a state is {}, must be {} or more", state, kFirstState));
+    if (state < kFirstState) refuse_tables(fmt::format("a state is {}, must be {} or more", state, kFirstState));
   }
   payload.words = reader.read_bytes(2 * read_size(reader));
   payload.extra = reader.rest();

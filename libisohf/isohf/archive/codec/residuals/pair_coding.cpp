@@ -11,8 +11,8 @@
 namespace isohf {
 namespace {
 
-constexpr std::size_t kFewSymbols = 256;     // below, a larger table eats the gain
-constexpr std::uint64_t kBitsPerSymbol = 4;  // of a code length in a block header
+constexpr std::size_t kFewSymbols = 256;         // below, a larger table eats the gain
+constexpr std::uint64_t kBitsPerPairSymbol = 4;  // of a code length in a block header
 constexpr unsigned kCodeLimit = 15;
 
 /// What a Huffman code of these takes, table included.
@@ -21,7 +21,7 @@ std::uint64_t huffman_bits(const ByteCounts& counts) {
   build_code_lengths(counts, kCodeLimit, lengths);
   std::uint64_t bits = 0;
   for (std::size_t i = 0; i < counts.size(); ++i) {
-    bits += std::uint64_t{counts[i]} * lengths[i] + (counts[i] != 0 ? kBitsPerSymbol : 0);
+    bits += std::uint64_t{counts[i]} * lengths[i] + (counts[i] != 0 ? kBitsPerPairSymbol : 0);
   }
   return bits;
 }
@@ -36,7 +36,7 @@ std::uint64_t entropy_bits(const ByteCounts& counts) {
     parts += n_log_n(count);
     used += count != 0 ? 1 : 0;
   }
-  return ((n_log_n(total) - parts) >> 16U) + kBitsPerSymbol * used;
+  return ((n_log_n(total) - parts) >> 16U) + kBitsPerPairSymbol * used;
 }
 
 /// The bytes that a pair becomes, one or three.
