@@ -24,7 +24,6 @@ class Steering {
   void press(Drag kind, PicturePoint at);
   void move(PicturePoint at);
   void release() { drag_.reset(); }
-  [[nodiscard]] bool is_dragging() const { return drag_.has_value(); }
 
   /// Nearer to what is under the cursor (steps > 0), or away from it.
   void wheel(double steps, PicturePoint at);

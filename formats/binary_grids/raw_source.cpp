@@ -6,14 +6,18 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <limits>
+#include <vector>
 
 #include "formats/binary_grids/grid_header.h"
 #include "formats/binary_grids/plain_samples.h"
 #include "formats/files/file_source.h"
+#include "formats/files/raw_file.h"
 #include "formats/files/text.h"
 #include "formats/georeference/files_beside.h"
 #include "formats/georeference/raster_description.h"
 #include "formats/open_options.h"
+#include "isohf/base/sample.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
 
@@ -114,6 +118,50 @@ class RawSource final : public PlainSource {
       info_.valid_max = kBeyondAnyHeight;
     }
     apply_open_options(info_, options);
+    if (options.raw) warn_of_byte_order(*options.raw);
+  }
+
+ private:
+  /// Ground is smooth in one byte order alone. Looks at some rows.
+  void warn_of_byte_order(RawLayout layout) {
+    if (is_floating(layout.type) || size_bytes(layout.type) == 1) return;
+    constexpr std::int64_t kRows = 16;
+    constexpr double kMuchSmoother = 8.0;
+    const double as_given = roughness(kRows, false);
+    if (!(as_given > kMuchSmoother * roughness(kRows, true))) return;
+    const char* order = layout.big_endian ? "le" : "be";
+    for (const TypeName& row : kTypes) {
+      if (row.type != layout.type) continue;
+      info_.warnings.emplace_back(
+          fmt::format("the other byte order would be far smoother ground: perhaps the samples are `raw` {}x{}:{}{}",
+                      layout.width, layout.height, row.name, order));
+    }
+  }
+
+  /// The mean step from a sample to the next of its row, over the range of all; 0 of level ground, or of little.
+  [[nodiscard]] double roughness(std::int64_t most_rows, bool is_swapped) const {
+    const LoadSample load = load_sample(info_.sample_type);
+    const std::size_t bytes = size_bytes(info_.sample_type);
+    const std::int64_t rows = std::min(most_rows, info_.height);
+    const std::int64_t columns = std::min<std::int64_t>(info_.width, 4096);
+    if (rows * columns < 512) return 0.0;
+    std::vector<std::byte> row(static_cast<std::size_t>(columns) * bytes);
+    double low = std::numeric_limits<double>::infinity();
+    double high = -low;
+    double steps = 0.0;
+    for (std::int64_t i = 0; i < rows; ++i) {
+      read_plain_samples(*file_, info_, layout_, {0, info_.height * i / rows, columns, 1}, row);
+      if (is_swapped) swap_byte_order(row, bytes);
+      double before = load(row.data());
+      for (std::size_t at = 0; at < row.size(); at += bytes) {
+        const double sample = load(row.data() + at);
+        steps += std::abs(sample - before);
+        low = std::min(low, sample);
+        high = std::max(high, sample);
+        before = sample;
+      }
+    }
+    return high > low ? steps / static_cast<double>(rows * columns) / (high - low) : 0.0;
   }
 };
 

@@ -43,8 +43,10 @@ class PlainEncoder final : public RasterEncoder {
 
 void require(const RasterSpec& spec, SampleType type, const char* format) {
   if (spec.sample_type == type && spec.channels == 1) return;
-  throw Error(ErrorCode::kInvalidArgument, fmt::format("{} stores one channel of {}, not {} of {}", format,
-                                                       to_string(type), spec.channels, to_string(spec.sample_type)));
+  const bool has_floats = spec.sample_type == SampleType::kFloat32 && spec.channels == 1;
+  throw Error(ErrorCode::kInvalidArgument,
+              fmt::format("{} one channel of {}, not {} of {}{}", format, to_string(type), spec.channels,
+                          to_string(spec.sample_type), has_floats ? "; .r32 does" : ""));
 }
 
 /// NumPy's header, version 1 (NEP 1): blanks fill it up to a multiple of 64 bytes.
@@ -112,17 +114,17 @@ class AscEncoder final : public RasterEncoder {
 }  // namespace
 
 std::unique_ptr<RasterEncoder> encode_r16(OutputFile& out, const RasterSpec& spec) {
-  require(spec, SampleType::kUint16, ".r16");
+  require(spec, SampleType::kUint16, ".r16 and .raw store");
   return std::make_unique<PlainEncoder>(out, "", std::nullopt);
 }
 
 std::unique_ptr<RasterEncoder> encode_r32(OutputFile& out, const RasterSpec& spec) {
-  require(spec, SampleType::kFloat32, ".r32");
+  require(spec, SampleType::kFloat32, ".r32 stores");
   return std::make_unique<PlainEncoder>(out, "", std::nullopt);
 }
 
 std::unique_ptr<RasterEncoder> encode_flt(OutputFile& out, const RasterSpec& spec) {
-  require(spec, SampleType::kFloat32, "GridFloat");
+  require(spec, SampleType::kFloat32, "GridFloat stores");
   return std::make_unique<PlainEncoder>(out, "", static_cast<float>(grid_void(spec)));
 }
 

@@ -50,6 +50,15 @@ class BadInput : public testing::Test {
 
 TEST_F(BadInput, MissingFile) {
   expect_refused(folder / "none.tif", {"none.tif", "no such file"});
+  expect_refused("-", {"standard input", "save it in a file"});
+}
+
+TEST_F(BadInput, AScaleThatMakesEveryElevationInfinite) {
+  write_hills("a.tif");
+  for (const char* scale : {"1e300", "-1e300", "1e-300", "0"}) {
+    expect_refused(folder / "a.tif", {"--z-scale", "must be from 1e-20 to 1e20"}, {std::string("--z-scale=") + scale},
+                   2);
+  }
 }
 
 TEST_F(BadInput, EmptyFile) {

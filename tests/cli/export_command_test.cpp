@@ -216,8 +216,20 @@ TEST_F(ExportCommand, SpreadsElevationsOverTheRangeAskedFor) {
   const json unreal = exported({folder_ / "c.r16", "--z-scale", "0.0078125", "--z-offset", "-256", "--clamp-range"});
   EXPECT_EQ(unreal.at("z_scale"), 0.0078125);
   EXPECT_GT(unreal.at("clamped"), 0);
-  EXPECT_THAT(refused({folder_ / "d.r16", "--z-scale", "0.0078125"}),
-              HasSubstr("which uint16 does not hold; --clamp-range"));
+  // Of a scale that is too small: the number that would be stored, and a scale that does.
+  const std::string too_small = refused({folder_ / "d.r16", "--z-scale", "0.0078125", "--z-offset", "-256"});
+  EXPECT_THAT(too_small, HasSubstr(" is at elevation "));
+  EXPECT_THAT(too_small, HasSubstr(", which uint16 does not hold; --clamp-range moves it"));
+  const std::size_t from = too_small.find("--z-scale ");
+  ASSERT_NE(from, std::string::npos) << too_small;
+  const std::string scale = too_small.substr(from + 10, too_small.find(' ', from + 10) - from - 10);
+  const json would_do = exported({folder_ / "e.r16", "--z-scale", scale, "--z-offset", "-256"});
+  EXPECT_EQ(would_do.at("clamped"), 0);
+  EXPECT_THAT(refused({folder_ / "d.exr", "--type", "f16", "--z-scale", "0.0001", "-q"}),
+              HasSubstr("--type f32 holds it"));
+  EXPECT_THAT(refused({folder_ / "d.raw", "--type", "f32"}),
+              HasSubstr(".r16 and .raw store one channel of uint16, not 1 of float32; .r32 does"));
+  EXPECT_EQ(exported({folder_ / "u.exr", "--type", "u32", "--clamp-range"}).at("sample_type"), "uint32");
   EXPECT_THAT(refused({folder_ / "d.tif", "--z-range", "0:1"}), HasSubstr("--z-range is for integer types"));
   EXPECT_FALSE(std::filesystem::exists(folder_ / "d.r16"));
 }

@@ -6,6 +6,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "isohf/archive.h"
 #include "support/plain_tiff.h"
 #include "support/run_program.h"
 #include "support/temporary_folder.h"
@@ -47,6 +48,16 @@ TEST_F(InfoCommand, SaysThatTheSourcesSamplesAreKept) {
   const std::string text = run_isohf({"info", folder / "b.isohf"}).out;
   EXPECT_THAT(text, HasSubstr("restore gives the float32 samples bit for bit; residuals of "));
   EXPECT_THAT(text, HasSubstr("residual/ (1 members, "));
+}
+
+TEST_F(InfoCommand, SaysThatAPartIsOneAndOfWhichGround) {
+  ASSERT_EQ(run_isohf({"extract", folder / "a.isohf", "-o", folder / "p.isohf", "--tiles", "1:2,0:2", "-q"}).exit_code,
+            0);
+  const std::string text = run_isohf({"info", folder / "p.isohf"}).out;
+  const std::int64_t tiles = ArchiveReader(folder / "p.isohf").grid().tile_count();
+  EXPECT_THAT(text, HasSubstr("2 stored, 0 wholly void, " + std::to_string(tiles - 2) + " not in this part"));
+  EXPECT_THAT(text, HasSubstr("columns 1 to 1, rows 0 to 1 of a whole, x "));
+  EXPECT_THAT(run_isohf({"info", folder / "a.isohf"}).out, testing::Not(HasSubstr("part ")));
 }
 
 TEST_F(InfoCommand, TilesAreListedOneALine) {

@@ -257,19 +257,36 @@ TEST_F(RestoreCommand, ExactSamplesGoIntoEveryFormatThatHoldsThem) {
   expect_refused(run("back.png"), 2, "which uint16 does not hold; write .tif");
 }
 
-TEST_F(RestoreCommand, SamplesThatTheTypeDoesNotHoldAreRefusedOrClamped) {
+TEST_F(RestoreCommand, WhatOvershootsTheSourcesOwnTypeIsMovedToItsEndsWithAWord) {
   write_stripes(folder / "stripes.png");
-  convert(folder / "stripes.png", {"--filter", "bspline3"});
-  expect_refused(run("back.png"), 2, "which uint8 does not hold; --clamp-range moves it, .exr holds it");
-  const RunResult clamped = run("back.png", {"--clamp-range"});
+  convert(folder / "stripes.png", {"--filter", "bspline3", "--z-scale", "0.5", "--z-offset", "-100"});
+  const RunResult clamped = run("back.png");
   EXPECT_EQ(clamped.exit_code, 0) << clamped.err;
+  EXPECT_THAT(clamped.err, HasSubstr("back.png: the surface overshoots the uint8 of its source at "));
+  EXPECT_EQ(run("back.png", {"--overwrite", "--clamp-range"}).err, "") << "it was asked for";
+  convert(folder / "stripes.png", {"--filter", "bspline3"});
   EXPECT_THAT(clamped.out, HasSubstr("moved into the range"));
+  EXPECT_EQ(run("back.png", {"--overwrite"}).exit_code, 0);
   const Raster back = read_raster(folder / "back.png");
   // No void value takes a number away from a raster without voids.
   EXPECT_EQ(*std::max_element(back.elevations.begin(), back.elevations.end()), 255.0F);
   EXPECT_EQ(std::count_if(back.elevations.begin(), back.elevations.end(), [](float h) { return std::isnan(h); }), 0);
   const Raster wide = restore("back.exr");
   EXPECT_GT(*std::max_element(wide.elevations.begin(), wide.elevations.end()), 255.0F);
+}
+
+TEST_F(RestoreCommand, SamplesThatAnotherTypeDoesNotHoldAreRefusedWithARemedy) {
+  convert(kCoast);
+  expect_refused(run("back.png"), 2, "which uint16 does not hold; --clamp-range moves it");
+  expect_refused(run("back.png"), 2, ", --method barycentric does not overshoot, .exr holds it");
+  EXPECT_EQ(run("back.png", {"--clamp-range"}).exit_code, 0);
+}
+
+TEST_F(RestoreCommand, SaysThatTheArchiveComesFirst) {
+  convert(kPeaks);
+  const RunResult swapped = run_isohf({"restore", kPeaks, folder / "b.isohf"});
+  EXPECT_EQ(swapped.exit_code, 2);
+  EXPECT_THAT(swapped.err, HasSubstr("b.isohf: RASTER has an archive's name; ARCHIVE comes first, RASTER last"));
 }
 
 TEST_F(RestoreCommand, VoidsAndSamplesOfTheVoidValueStayApart) {
@@ -281,6 +298,22 @@ TEST_F(RestoreCommand, VoidsAndSamplesOfTheVoidValueStayApart) {
   EXPECT_EQ(*std::max_element(back.elevations.begin(), back.elevations.end(),
                               [](float a, float b) { return std::isnan(a) || a < b; }),
             254.0F);
+}
+
+TEST_F(RestoreCommand, OfAPartTheGroundThatIsElsewhereIsVoid) {
+  convert(kCoast, {"--shape", "60x67"});
+  const std::string part = folder / "part.isohf";
+  ASSERT_EQ(run_isohf({"extract", folder / "a.isohf", "-o", part, "--tiles", "1:2,0:2"}).exit_code, 0);
+  for (const char* output : {"a.tif", "a.asc", "a.hgt", "a.r16", "a.exr"}) {
+    for (const char* command : {"restore", "export"}) {
+      std::vector<std::string> words = {command, part, folder / output, "--overwrite", "--json"};
+      if (std::string(output) == "a.r16" && std::string(command) == "restore") words.push_back("--clamp-range");
+      if (std::string(output) == "a.hgt") words.insert(words.end(), {"--size", "1201x1201"});
+      const RunResult result = run_isohf(words);
+      ASSERT_EQ(result.exit_code, 0) << command << output << result.err;
+      EXPECT_GT(json::parse(result.out).at("voids").get<std::int64_t>(), 1000) << command << output;
+    }
+  }
 }
 
 TEST_F(RestoreCommand, SaysWhereScaleAndOffsetAreLost) {

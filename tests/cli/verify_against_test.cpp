@@ -166,6 +166,75 @@ TEST_F(VerifyAgainst, SaysWhichGeoidIsMissing) {
   EXPECT_EQ(verify("land.flt", {"--geoid", folder / "elsewhere/small.pgm:to-orthometric"}).exit_code, 0);
 }
 
+TEST_F(VerifyAgainst, RefusesARasterThatIsNotTheArchivesSource) {
+  ASSERT_EQ(convert("land.flt", {}).exit_code, 0);
+  const auto ground = [](double x, double y) { return height(90 * x, 90 * y); };
+  const auto refused = [&](const std::string& input, const Words& options, const std::string& what) {
+    const RunResult result = verify(input, options);
+    EXPECT_EQ(result.exit_code, 2) << what << result.out;
+    EXPECT_THAT(result.err, HasSubstr("is not what " + folder.path() + "/a.isohf was made from: "));
+    EXPECT_THAT(result.err, HasSubstr(what));
+  };
+  write_degrees(folder / "moved", kColumns, kRows, 5.01, 44.0, 0.01, ground);
+  refused("moved.flt", {}, "begins at (5.015, 44.445), not at (5.005, 44.445)");
+  write_degrees(folder / "wide", kColumns, kRows, 5.0, 44.0, 0.02, ground);
+  refused("wide.flt", {}, "has samples 0.02 by 0.02 apart, not 0.01 by 0.01; begins at");
+  write_degrees(folder / "small", kColumns, kRows - 1, 5.0, 44.01, 0.01, ground);
+  refused("small.flt", {}, "has 60x44 samples, not 60x45");
+  refused("land.flt", {"--crs", "EPSG:4267"}, "is in EPSG:4267, not \"WGS 84\"");
+  refused("land.flt", {"--crs", "EPSG:32631"}, "is in metres, not degrees");
+  // Of a thousandth of a sample nobody asks, nor from where longitudes are counted.
+  write_degrees(folder / "near", kColumns, kRows, 5.000005, 44.0, 0.01, ground);
+  EXPECT_THAT(verify("near.flt").err, testing::Not(HasSubstr("is not what")));
+  write_degrees(folder / "round", kColumns, kRows, 365.0, 44.0, 0.01, ground);
+  EXPECT_THAT(verify("round.flt").err, testing::Not(HasSubstr("is not what")));
+}
+
+TEST_F(VerifyAgainst, WarnsOfARasterWithoutAPlace) {
+  ASSERT_EQ(convert("land.flt", {}).exit_code, 0);
+  const RunResult bare = verify("plain.bin", {"--raw", "60x45:u16le", "--nodata", "0"});
+  EXPECT_EQ(bare.exit_code, 3) << "it has no lake";
+  EXPECT_THAT(bare.err, HasSubstr("plain.bin: does not say where it lies"));
+  ASSERT_EQ(convert("plain.bin", {"--raw", "60x45:u16le"}).exit_code, 0);
+  EXPECT_EQ(verify("plain.bin").err, "");
+}
+
+TEST_F(VerifyAgainst, OfAPartOnlyItsOwnGroundIsCompared) {
+  const std::string part = folder / "part.isohf";
+  for (const Words& with : std::vector<Words>{{}, {"--projection", "utm"}}) {
+    Words options = {"--shape", "12x19", "--outside", "void"};
+    options.insert(options.end(), with.begin(), with.end());
+    ASSERT_EQ(convert("land.flt", options).exit_code, 0);
+    ASSERT_EQ(run_isohf({"extract", folder / "a.isohf", "-o", part, "--tiles", "1:3,1:2", "--overwrite"}).exit_code, 0);
+    const Words against = {"verify", part, "--against", folder / "land.flt", "--json"};
+    const RunResult sound = run_isohf(against);
+    EXPECT_EQ(sound.exit_code, 0) << sound.out << sound.err;
+    const auto compared = nlohmann::json::parse(sound.out)["against"]["samples_compared"].get<std::int64_t>();
+    EXPECT_GT(compared, 50);
+    EXPECT_LT(compared, kColumns * kRows / 2);
+    // Ground of the part that is another is found all the same.
+    write_degrees(folder / "other", kColumns, kRows, 5.0, 44.0, 0.01, [](double, double) { return 400.0; });
+    EXPECT_EQ(run_isohf({"verify", part, "--against", folder / "other.flt"}).exit_code, 3);
+  }
+  const RunResult ortho = run_isohf({"verify", part, "--against", folder / "land.flt", "--ortho"});
+  EXPECT_EQ(ortho.exit_code, 2);
+  EXPECT_THAT(ortho.err, HasSubstr("part.isohf is a part of one"));
+}
+
+TEST_F(VerifyAgainst, TakesWhatWasCutFromACoarsePlane) {
+  for (const Words& with : std::vector<Words>{{}, {"--outside", "void"}, {"--type", "f32"}}) {
+    Words options = {"--shape", "12x19", "--density", "2"};
+    options.insert(options.end(), with.begin(), with.end());
+    ASSERT_EQ(convert("land.flt", options).exit_code, 0);
+    const std::string plane = folder / "plane.isohf";
+    ASSERT_EQ(run_isohf({"extract", folder / "a.isohf", "-o", plane, "--plane", "1", "--overwrite"}).exit_code, 0);
+    const RunResult sound = run_isohf({"verify", plane, "--against", folder / "land.flt"});
+    EXPECT_EQ(sound.exit_code, 0) << sound.out << sound.err;
+    write_degrees(folder / "other", kColumns, kRows, 5.0, 44.0, 0.01, [](double, double) { return 400.0; });
+    EXPECT_EQ(run_isohf({"verify", plane, "--against", folder / "other.flt"}).exit_code, 3);
+  }
+}
+
 TEST_F(VerifyAgainst, ArchivesWithoutARecordOfOptionsAreReadAsTheirSource) {
   // Made by isohf 0.1.0, which recorded no options.
   const std::string kept = ISOHF_SOURCE_DIR "/testdata/archives/v1/";

@@ -176,8 +176,10 @@ TEST(GeoTiffPlace, GroundControlPointsAreNotGuessedFrom) {
   EXPECT_FALSE(place_from_geotiff(tags, 10).georeference.has_origin);
 }
 
-TEST(GeoTiffPlace, MalformedKeysNeverCrash) {
+TEST(GeoTiffPlace, MalformedKeysAreRefusedOrGiveAPlace) {
   std::mt19937 random(7);
+  int refused = 0;
+  int placed = 0;
   for (int i = 0; i < 20000; ++i) {
     GeoTags tags = Keys().code(kModel, 2).code(2048, 4326).real(2057, 6378137.0).text(2049, "WGS 84").placed();
     const std::size_t at = random() % tags.directory.size();
@@ -189,10 +191,18 @@ TEST(GeoTiffPlace, MalformedKeysNeverCrash) {
     if (random() % 4 == 0) tags.tiepoints.resize(random() % 7);
     if (random() % 4 == 0) tags.transformation.resize(random() % 17, 1.0);
     try {
-      (void)place_from_geotiff(tags, 10);
-    } catch (const Error&) {
+      const Georeference place = place_from_geotiff(tags, 10).georeference;
+      ASSERT_TRUE(place.spacing_x > 0.0 && std::isfinite(place.spacing_x)) << i;
+      ASSERT_TRUE(place.spacing_y > 0.0 && std::isfinite(place.spacing_y)) << i;
+      ASSERT_TRUE(std::isfinite(place.origin_x) && std::isfinite(place.origin_y)) << i;
+      placed += place.has_origin ? 1 : 0;
+    } catch (const Error& error) {
+      ASSERT_NE(error.code(), ErrorCode::kIo) << error.what();
+      ++refused;
     }
   }
+  EXPECT_GT(placed, 1000);
+  EXPECT_GT(refused, 100);
 }
 
 TEST(LinearUnit, IsKnownByCodeAndByName) {

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <cmath>
 
 #include "formats/raster_reference.h"
 #include "formats/reader_failure.h"
@@ -98,6 +99,41 @@ TEST(RawSource, ReadsEveryTypeInBothByteOrders) {
       SCOPED_TRACE(name + order);
       expect_every_window(*source, std::as_bytes(std::span(wanted)));
     }
+  }
+}
+
+TEST(RawSource, SaysWhenTheOtherByteOrderIsFarSmoother) {
+  const TemporaryFolder folder;
+  std::string hills;
+  std::string noise;
+  std::string terraces;
+  unsigned state = 1;
+  for (int row = 0; row < 64; ++row) {
+    for (int column = 0; column < 64; ++column) {
+      const auto height = static_cast<unsigned>(30000 + 20000 * std::sin(0.05 * row) * std::cos(0.04 * column));
+      state = state * 1664525U + 1013904223U;
+      for (const int shift : {0, 8}) {
+        hills += static_cast<char>(height >> shift & 255U);
+        noise += static_cast<char>(state >> (16 + shift) & 255U);
+      }
+      terraces += '\0';
+      terraces += static_cast<char>(height >> 8U);
+    }
+  }
+  const auto warnings = [&](const std::string& bytes, const char* layout) {
+    write_file(folder / "a.r16", bytes);
+    OpenOptions options;
+    options.raw = raw_layout_from_string(layout);
+    return open_raster(folder / "a.r16", options)->info().warnings;
+  };
+  EXPECT_TRUE(warnings(hills, "64x64:u16le").empty());
+  ASSERT_EQ(warnings(hills, "64x64:u16be").size(), 1U);
+  EXPECT_THAT(warnings(hills, "64x64:u16be").front(), HasSubstr("perhaps the samples are `raw` 64x64:u16le"));
+  EXPECT_THAT(warnings(hills, "64x64:i16be").front(), HasSubstr("64x64:i16le"));
+  for (const char* layout : {"64x64:u16le", "64x64:u16be"}) {
+    EXPECT_TRUE(warnings(noise, layout).empty());
+    EXPECT_TRUE(warnings(terraces, layout).empty()) << "one byte says it all in either order";
+    EXPECT_TRUE(warnings(std::string(8192, '\7'), layout).empty());
   }
 }
 

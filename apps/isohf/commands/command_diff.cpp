@@ -124,14 +124,16 @@ void write_difference(const DiffCommand& options, const Job& job) {
   const SampleGrid grid = natural_grid(metadata);
   const SampleMapping mapping{restored_type(options.raster, SampleType::kFloat32), 1.0, 0.0};
   const auto void_value = usual_nodata(mapping.type);
-  const SampleStore store(mapping, void_value, false);
+  const SampleStore store(mapping, void_value, SampleStore::Clamp::kNone);
+  const RasterTarget target{options.raster, mapping,
+                            usual_remedy(options.raster, mapping.type, RestoreMethod::kBarycentric)};
   RasterSpec spec = raster_spec(metadata, grid, mapping, void_value);
   spec.overwrite = options.overwrite;
   spec.scratch = scratch_of(options.work);
   const auto sink = create_raster(options.raster, spec);
   SampleStore::Result counts;
   const auto take = [&](std::int64_t row, std::span<const double> difference) {
-    sink->write_rows(store_rows(store, mapping.type, options.raster, grid.width, row, difference, counts));
+    sink->write_rows(store_rows(store, target, grid.width, row, difference, counts));
   };
   subtract_archives(options.archives[0], options.archives[1], take, job);
   sink->finish();

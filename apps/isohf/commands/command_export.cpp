@@ -73,10 +73,10 @@ GridSize parse_side_or_size(const std::string& text) {
 }
 
 SampleType parse_type(const std::string& text) {
-  constexpr std::array<SampleType, 7> kTypes = {SampleType::kUint8,  SampleType::kUint16,  SampleType::kInt16,
-                                                SampleType::kInt32,  SampleType::kFloat16, SampleType::kFloat32,
-                                                SampleType::kFloat64};
-  return kTypes[parse_word(text, {"u8", "u16", "i16", "i32", "f16", "f32", "f64"})];
+  constexpr std::array<SampleType, 8> kTypes = {SampleType::kUint8,   SampleType::kUint16, SampleType::kInt16,
+                                                SampleType::kUint32,  SampleType::kInt32,  SampleType::kFloat16,
+                                                SampleType::kFloat32, SampleType::kFloat64};
+  return kTypes[parse_word(text, {"u8", "u16", "i16", "u32", "i32", "f16", "f32", "f64"})];
 }
 
 std::optional<ExportOptions> parse_export(const Arguments& arguments) {
@@ -97,7 +97,7 @@ std::optional<ExportOptions> parse_export(const Arguments& arguments) {
   line.option("--overlap", "K", "Samples that neighbouring tiles share (default 0; 1 for shared edges)",
               [&](const std::string& text) { options.overlap = parse_whole_number(text, 0, 65536); });
   line.group("Samples");
-  line.option("--type", "TYPE", "u8, u16, i16, i32, f16, f32 or f64 (default: by the format)",
+  line.option("--type", "TYPE", "u8, u16, i16, u32, i32, f16, f32 or f64 (default: by the format)",
               [&](const std::string& text) { options.type = parse_type(text); });
   line.option("--z-range", "MIN:MAX",
               "Elevations of the lowest and highest sample of an integer type (default of u8 and "
@@ -188,7 +188,9 @@ class Exporter {
     mapping = choose_mapping();
     if (!options_.common.quiet) warn_of_lost_scale(options_.raster.output, mapping);
     const auto void_value = void_value_of(mapping.type, has_voids);
-    const SampleStore store(mapping, void_value, options_.raster.clamp_range);
+    const SampleStore store(mapping, void_value,
+                            options_.raster.clamp_range ? SampleStore::Clamp::kAll : SampleStore::Clamp::kNone);
+    const RasterTarget target{options_.raster.output, mapping, remedy()};
     ExportTiles tiles(options_.raster.output, grid_.cut, grid_.samples.width);
     const auto spec_of = [&](std::int64_t column, std::int64_t row) {
       SampleGrid part = grid_.samples;
@@ -208,8 +210,7 @@ class Exporter {
       const Job reading = job("export");
       rows(reading).read_all(
           [&](std::int64_t row, std::span<const double> elevations) {
-            tiles.write(row, store_rows(store, mapping.type, options_.raster.output, grid_.samples.width, row,
-                                        elevations, counts));
+            tiles.write(row, store_rows(store, target, grid_.samples.width, row, elevations, counts));
           },
           reading);
     }
@@ -231,6 +232,18 @@ class Exporter {
   }
   [[nodiscard]] RowReader rows(const Job& job) const {
     return {archive_, grid_.samples, options_.method(archive_.metadata(), grid_.samples), job};
+  }
+
+  [[nodiscard]] std::string remedy() const {
+    const Metadata& metadata = archive_.metadata();
+    const std::string& output = options_.raster.output;
+    if (options_.z_scale || options_.z_offset) {
+      const std::string scale = scale_that_holds(metadata.statistics, mapping, has_voids);
+      if (!scale.empty()) return usual_remedy(output, mapping.type, RestoreMethod::kBarycentric) + ", " + scale;
+    }
+    std::string text = usual_remedy(output, mapping.type, options_.method(metadata, grid_.samples));
+    if (raster_kind(output) == RasterKind::kExr) text += ", --type f32 holds it";
+    return text;
   }
 
   SampleMapping choose_mapping() {

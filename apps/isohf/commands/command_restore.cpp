@@ -193,7 +193,8 @@ class Restorer {
                               archive_.metadata().source.format != "OpenEXR";
     const bool as_kept = written.type == kept.type && !voids_to_nan && !as_elevations;
     // A void value that the type does not hold is missed only where a sample is void.
-    const bool lacks_void = void_value && !as_kept && !SampleStore(written, std::nullopt, false).holds(*void_value);
+    const bool lacks_void =
+        void_value && !as_kept && !SampleStore(written, std::nullopt, SampleStore::Clamp::kNone).holds(*void_value);
     if (voids_to_nan || as_elevations || lacks_void) void_value.reset();
     if (!void_value && is_floating(written.type))
       void_value = void_value_of(written.type, needs_void(archive_.metadata(), grid_, options_.raster.output));
@@ -223,7 +224,7 @@ class Restorer {
                                                         out, options_.rounds ? &rounding : nullptr)) {
           const auto sample = static_cast<std::int64_t>(*refused);
           refuse_sample(options_.raster.output, written.type, sample % grid_.width, row + sample / grid_.width,
-                        load_sample(kept.type)(raw.data() + *refused * size_bytes(kept.type)),
+                        fmt::format("{:.9g}", load_sample(kept.type)(raw.data() + *refused * size_bytes(kept.type))),
                         is_floating(written.type) && !options_.rounds ? "--round takes the nearest, .tif holds it"
                                                                       : "write .tif");
         }
@@ -258,16 +259,29 @@ class Restorer {
       }
     }
     const auto void_value = void_value_of(mapping.type, has_voids);
-    const SampleStore store(mapping, void_value, options_.raster.clamp_range);
+    const SampleType source_type = sample_type_from_string(metadata.source.sample_type);
+    // All samples of the source are of its type: what lies beyond its ends is overshoot.
+    const bool is_source_type = mapping.type == source_type && !restored.spread;
+    const auto clamp = options_.raster.clamp_range ? SampleStore::Clamp::kAll
+                       : is_source_type            ? SampleStore::Clamp::kAtFreeEnds
+                                                   : SampleStore::Clamp::kNone;
+    const SampleStore store(mapping, void_value, clamp);
+    const std::string& output = options_.raster.output;
+    const RasterTarget target{output, mapping, usual_remedy(output, mapping.type, method)};
     const auto sink = open(raster_spec(metadata, grid_, mapping, void_value), mapping);
     RowReader(archive_, grid_, method, job_)
         .read_all(
             [&](std::int64_t row, std::span<const double> elevations) {
-              sink->write_rows(store_rows(store, mapping.type, options_.raster.output, grid_.width, row, elevations,
-                                          restored.counts));
+              sink->write_rows(store_rows(store, target, grid_.width, row, elevations, restored.counts));
             },
             job_);
     sink->finish();
+    if (restored.counts.clamped > 0 && !options_.raster.clamp_range && !options_.common.quiet) {
+      display_.clear();
+      print_warning(
+          fmt::format("{}: the surface overshoots the {} of its source at {} samples; they were moved to its ends",
+                      output, to_string(mapping.type), describe_count(restored.counts.clamped)));
+    }
     restored.files = sink->files();
     return restored;
   }

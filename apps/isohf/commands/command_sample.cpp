@@ -53,7 +53,7 @@ Examples:
   isohf sample dem.isohf --at-lonlat 6.865 45.833
   isohf sample dem.isohf --at-crs 334000 5077500 --with-lonlat      in metres of the input's own map
   isohf sample dem.isohf < places.txt > elevations.txt
-  isohf sample dem.isohf --at 1200.5 340 --shadow --azimuth 120 --altitude 8 --above 30    a roof in the sun?)";
+  isohf sample dem.isohf --at 1200.5 340 --shadow --azimuth 120 --altitude 8 --above 30    a roof)";
 
 struct SampleOptions {
   CommonOptions common;

@@ -11,10 +11,12 @@
 
 #include "commands/command.h"
 #include "formats/georeference/reference_system.h"
+#include "isohf/archive/metadata/part_record.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
 #include "isohf/surface.h"
 #include "isohf/verify.h"
+#include "isohf/verify/accuracy/same_source.h"
 #include "open_archive.h"
 #include "options/describe.h"
 #include "options/input_files.h"
@@ -286,13 +288,23 @@ int check_one(VerifyCommandOptions options, const Arguments& arguments, bool is_
   // An archive that is not whole has no surface to measure.
   const bool compares = !options.against.names.empty() && report.passed();
   if (compares) {
-    const Metadata metadata = open_archive(options.archive).metadata();
+    const ArchiveReader archive = open_archive(options.archive);
+    const Metadata& metadata = archive.metadata();
     if (metadata.source.options) {
-      const std::string archive = options.archive;
       options = *parse_verify(arguments, *metadata.source.options);
-      options.archive = archive;
+      options.archive = archive.path();
+    }
+    if (options.ortho && part_record(metadata)) {
+      throw Error(ErrorCode::kInvalidArgument,
+                  "verify: --ortho lays meshes over a whole archive, " + archive.path() + " is a part of one");
     }
     const std::unique_ptr<HeightSource> source = open_as_recorded(options, metadata);
+    const SourceInfo& info = source->info();
+    const auto same_system = are_same(source_georeference(metadata.source).system, info.georeference.system);
+    for (const Warning& warning : check_same_source(archive, info, same_system)) {
+      display->clear();
+      if (!options.common.quiet) print_warning(warning);
+    }
     accuracy = measure_accuracy(options.archive, *source, options.random_points, options.ortho, job);
     add_findings(*accuracy, contradiction(metadata, accuracy->surface), report);
   }

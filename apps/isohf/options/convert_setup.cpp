@@ -56,8 +56,8 @@ Examples:
   isohf convert tiles/ -o land.isohf --require-complete
   isohf convert heights.exr h.isohf --channel R --z-scale 1200 --sample-spacing 2
   isohf plan dem.tif                  the same options without writing: see what comes out
-  isohf convert --each tiles/ --recursive --out-dir archives --keep-going    one archive of each
-  isohf convert --each tiles/ --recursive --out-dir archives --resume        goes on after an interrupt)";
+  isohf convert --each tiles/ --recursive --out-dir archives --keep-going    one of each
+  isohf convert --each tiles/ --recursive --out-dir archives --resume        goes on)";
 
 bool is_archive_name(const std::string& name) {
   return lower_case(name).ends_with(".isohf");

@@ -121,6 +121,9 @@ std::vector<std::string> files_of(const std::string& input, bool recursive, Want
   const fs::file_status status = fs::status(input, error);
   if (fs::is_directory(status)) return files_of_folder(input, recursive, wanted);
   if (fs::exists(status)) return {input};
+  if (input == "-") {
+    refuse(input, "standard input has no beginning to go back to, as reading an input needs; save it in a file");
+  }
   if (input.find_first_of("*?[") != std::string::npos) return files_of_pattern(input);
   refuse(input, error && error != std::errc::no_such_file_or_directory ? error.message() : "no such file");
 }

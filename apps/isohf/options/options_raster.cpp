@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <filesystem>
 
+#include "formats/files/text.h"
 #include "isohf/error.h"
 #include "options/option_values.h"
 #include "options/options_source.h"
@@ -22,6 +24,11 @@ void add_raster_arguments(CommandLine& line, const std::string& output_name, Ras
 void require_raster_arguments(const CommandLine& line, const std::string& output_name, const RasterOptions& options) {
   line.require("ARCHIVE", options.archive);
   line.require(output_name, options.output);
+  const bool is_archive_name = lower_case(std::filesystem::path(options.output).extension().string()) == ".isohf";
+  if (is_archive_name && options.archive != options.output) {
+    throw Error(ErrorCode::kInvalidArgument, fmt::format("{}: {} has an archive's name; ARCHIVE comes first, {} last",
+                                                         options.output, output_name, output_name));
+  }
 }
 
 void add_size_options(CommandLine& line, const std::string& size_description, RasterOptions& options) {

@@ -77,11 +77,14 @@ void add_source_options(CommandLine& line, OpenOptions& options) {
   line.option("--z-scale", "FACTOR", "Multiply raw values by FACTOR, then add --z-offset (default: the file's, else 1)",
               [&](const std::string& text) {
                 const double scale = parse_number(text);
-                if (scale == 0.0) throw Error(ErrorCode::kInvalidArgument, "found '" + text + "', must not be 0");
+                if (std::abs(scale) < 1e-20 || std::abs(scale) > 1e20) {
+                  throw Error(ErrorCode::kInvalidArgument,
+                              "found '" + text + "', must be from 1e-20 to 1e20, above or below 0");
+                }
                 options.z_scale = scale;
               });
   line.option("--z-offset", "NUMBER", "Add NUMBER to scaled values (default: the file's, else 0)",
-              [&](const std::string& text) { options.z_offset = parse_number(text); });
+              [&](const std::string& text) { options.z_offset = parse_number_in(text, -1e20, 1e20); });
   line.option("--raw", "WxH:TYPE",
               "Read bare samples: columns, rows, and u8, i8, or u16, i16, u32, i32, f32, f64 with le or be, as in "
               "200x200:u16le",

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <limits>
@@ -9,6 +10,7 @@
 
 #include "formats/files/text.h"
 #include "formats/georeference/units.h"
+#include "isohf/base/sample.h"
 #include "isohf/error.h"
 #include "output/standard_output.h"
 
@@ -127,24 +129,63 @@ void warn_of_lost_scale(const std::string& output, const SampleMapping& mapping)
                                  mapping.z_scale, mapping.z_offset)));
 }
 
-void refuse_sample(const std::string& output, SampleType type, std::int64_t column, std::int64_t row, double value,
-                   const char* remedy) {
+void refuse_sample(const std::string& output, SampleType type, std::int64_t column, std::int64_t row,
+                   const std::string& value, const std::string& remedy) {
   throw Error(ErrorCode::kInvalidArgument,
-              fmt::format("{}: sample (column {}, row {}) is {:.9g}, which {} does not hold; {}", output, column, row,
+              fmt::format("{}: sample (column {}, row {}) is {}, which {} does not hold; {}", output, column, row,
                           value, to_string(type), remedy));
 }
 
-std::vector<std::byte> store_rows(const SampleStore& store, SampleType type, const std::string& output,
-                                  std::int64_t width, std::int64_t first_row, std::span<const double> elevations,
+std::string usual_remedy(const std::string& output, SampleType type, RestoreMethod method) {
+  std::string text = "--clamp-range moves it";
+  if (method == RestoreMethod::kHex && !is_floating(type)) text += ", --method barycentric does not overshoot";
+  if (raster_kind(output) != RasterKind::kExr) text += ", .exr holds it";
+  return text;
+}
+
+std::string scale_that_holds(const Statistics& elevations, const SampleMapping& mapping, bool has_voids) {
+  if (is_floating(mapping.type) || !elevations.min || !elevations.max) return {};
+  // A spline goes a little beyond them.
+  const double beyond = 0.005 * (*elevations.max - *elevations.min);
+  const double least = *elevations.min - beyond;
+  const double most = *elevations.max + beyond;
+  const auto rounded_up = [](double scale) {
+    const double grain = std::pow(10.0, std::floor(std::log10(scale)) - 2.0);
+    return std::ceil(scale / grain) * grain;
+  };
+  auto [low, high] = sample_range(mapping.type);
+  const std::optional<double> nodata = has_voids ? usual_nodata(mapping.type) : std::nullopt;
+  if (nodata == low) low += 1.0;
+  if (nodata == high) high -= 1.0;
+  if (low < 0.0 || least >= mapping.z_offset) {
+    const double scale =
+        std::max({(most - mapping.z_offset) / high, low < 0.0 ? (least - mapping.z_offset) / low : 0.0, 1e-9});
+    return fmt::format("--z-scale {:.3g} holds it", rounded_up(scale));
+  }
+  const double offset = std::floor(least);
+  return fmt::format("--z-offset {} with --z-scale {:.3g} holds it", offset,
+                     rounded_up(std::max((most - offset) / high, 1e-9)));
+}
+
+std::vector<std::byte> store_rows(const SampleStore& store, const RasterTarget& target, std::int64_t width,
+                                  std::int64_t first_row, std::span<const double> elevations,
                                   SampleStore::Result& counts) {
-  std::vector<std::byte> raw(elevations.size() * size_bytes(type));
+  const SampleMapping& mapping = target.mapping;
+  std::vector<std::byte> raw(elevations.size() * size_bytes(mapping.type));
   const SampleStore::Result result = store.store(elevations, raw);
   counts.nodata += result.nodata;
   counts.clamped += result.clamped;
   if (result.refused) {
     const auto sample = static_cast<std::int64_t>(*result.refused);
-    refuse_sample(output, type, sample % width, first_row + sample / width, elevations[*result.refused],
-                  "--clamp-range moves it, .exr holds it");
+    const double elevation = elevations[*result.refused];
+    std::string value = fmt::format("{:.9g}", elevation);
+    if (mapping.z_scale != 1.0 || mapping.z_offset != 0.0) {
+      value =
+          fmt::format("at elevation {:.9g}, so {:.9g}", elevation, (elevation - mapping.z_offset) / mapping.z_scale);
+    }
+    const bool is_void = std::isnan(elevation);
+    refuse_sample(target.output, mapping.type, sample % width, first_row + sample / width, is_void ? "void" : value,
+                  is_void ? "a floating type does" : target.remedy);
   }
   return raw;
 }

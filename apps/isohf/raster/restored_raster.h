@@ -45,11 +45,23 @@ void warn_of_lost_scale(const std::string& output, const SampleMapping& mapping)
 
 /// Throws Error{kInvalidArgument} for a sample that a raster's type does not hold, naming column, row and remedy.
 [[noreturn]] void refuse_sample(const std::string& output, SampleType type, std::int64_t column, std::int64_t row,
-                                double value, const char* remedy);
+                                const std::string& value, const std::string& remedy);
+
+/// Where samples go, and what helps where the type of one does not hold it.
+struct RasterTarget {
+  std::string output;
+  SampleMapping mapping;
+  std::string remedy;
+};
+/// What helps whatever the command: --clamp-range, another --method than hex, another format.
+[[nodiscard]] std::string usual_remedy(const std::string& output, SampleType type, RestoreMethod method);
+/// The options by which `mapping`'s type would hold all elevations of an archive, "--z-scale 0.04": its offset stays
+/// where it can. Empty of floats, and where the archive has no elevation.
+[[nodiscard]] std::string scale_that_holds(const Statistics& elevations, const SampleMapping& mapping, bool has_voids);
 
 /// Rows of elevations, NaN where void, into raw samples; the first row's number and the width are for messages. Adds to
 /// `counts`. Throws Error{kInvalidArgument} as refuse_sample.
-[[nodiscard]] std::vector<std::byte> store_rows(const SampleStore& store, SampleType type, const std::string& output,
+[[nodiscard]] std::vector<std::byte> store_rows(const SampleStore& store, const RasterTarget& target,
                                                 std::int64_t width, std::int64_t first_row,
                                                 std::span<const double> elevations, SampleStore::Result& counts);
 

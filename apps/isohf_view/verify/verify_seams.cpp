@@ -17,9 +17,9 @@ constexpr int kMargin_px = 40;  ///< beside the slanted picture
 constexpr int kLargest_px = 4096;
 
 /// Firsts of blocks along an axis, so that every two neighbours are together in one.
-std::vector<std::int64_t> block_firsts(std::int64_t tiles) {
+std::vector<std::int64_t> block_firsts(std::int64_t from, std::int64_t end) {
   std::vector<std::int64_t> firsts;
-  for (std::int64_t first = 0; first == 0 || first < tiles - 1; first += kBlockTiles - 1) firsts.push_back(first);
+  for (std::int64_t first = from; first == from || first < end - 1; first += kBlockTiles - 1) firsts.push_back(first);
   return firsts;
 }
 
@@ -56,6 +56,7 @@ class SeamVerifier {
   const TileSource& source_;
   const SharedGeometry& shared_;
   const ViewChecks& options_;
+  const isohf::TileRange here_;
   ViewReport& report_;
   TerrainProgram program_;
   std::vector<TileSlot> slots_;
@@ -68,6 +69,7 @@ SeamVerifier::SeamVerifier(const CheckContext& context)
     : source_(context.source),
       shared_(context.shared),
       options_(context.options),
+      here_(context.here),
       report_(context.report),
       program_("seam", false, flat_fragment_shader(false)) {
   const TileBounds whole = whole_bounds(source_);
@@ -79,8 +81,8 @@ SeamVerifier::SeamVerifier(const CheckContext& context)
 
 bool SeamVerifier::load(Block& block) {
   const TileGrid& grid = source_.grid();
-  block.columns = static_cast<int>(std::min<std::int64_t>(kBlockTiles, grid.tile_columns() - block.first.column));
-  block.rows = static_cast<int>(std::min<std::int64_t>(kBlockTiles, grid.tile_rows() - block.first.row));
+  block.columns = static_cast<int>(std::min<std::int64_t>(kBlockTiles, here_.end.column - block.first.column));
+  block.rows = static_cast<int>(std::min<std::int64_t>(kBlockTiles, here_.end.row - block.first.row));
   for (int row = 0; row < block.rows; ++row) {
     for (int column = 0; column < block.columns; ++column) {
       std::vector<std::uint16_t> codes(static_cast<std::size_t>(grid.shape().stored_vertex_count()));
@@ -98,10 +100,9 @@ bool SeamVerifier::load(Block& block) {
 }
 
 void SeamVerifier::verify() {
-  const TileGrid& grid = source_.grid();
   std::int64_t number = 0;
-  const auto rows = block_firsts(grid.tile_rows());
-  const auto columns = block_firsts(grid.tile_columns());
+  const auto rows = block_firsts(here_.first.row, here_.end.row);
+  const auto columns = block_firsts(here_.first.column, here_.end.column);
   for (const std::int64_t row : rows) {
     for (const std::int64_t column : columns) {
       Block block;

@@ -79,6 +79,7 @@ struct CheckContext {
   MeshOracle& oracle;
   TileProbe& probe;
   const ViewChecks& options;
+  isohf::TileRange here;  ///< of an archive that is a part: nothing is said of the others
   ViewReport& report;
 
   /// True where a tile must be drawn with the shaders that discard voids.

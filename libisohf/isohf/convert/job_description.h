@@ -2,6 +2,7 @@
 
 #include <string>
 
+#include "isohf/archive/metadata/part_record.h"
 #include "isohf/convert.h"
 #include "isohf/convert/frame/plan.h"
 #include "isohf/metadata.h"
@@ -15,10 +16,6 @@ namespace isohf {
 /// The metadata that is known before a tile is cut: all but statistics, counts and hash.
 [[nodiscard]] Metadata describe_job(const SourceInfo& info, const Plan& plan, const ConvertOptions& options,
                                     const Quantisation& quantisation);
-
-/// The metadata's member that holds a digest of the options and of what the source says of itself, without its path,
-/// size and time.
-inline constexpr const char* kJobName = "job_sha256";
 
 /// In which way a finished archive with these metadata is another one than the job would make, as "filter "bilinear",
 /// not "nearest""; empty where there is none. The source's samples are not looked at.

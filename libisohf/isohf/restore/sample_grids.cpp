@@ -7,6 +7,7 @@
 #include <string>
 #include <utility>
 
+#include "isohf/archive/metadata/part_record.h"
 #include "isohf/error.h"
 #include "isohf/projection/projected_extent.h"
 #include "isohf/projection/projection_wkt.h"
@@ -332,10 +333,14 @@ bool samples_are_areas(const Metadata& metadata) {
 bool may_have_nodata(const Metadata& metadata, const SampleGrid& grid) {
   if (grid.goes_by_places()) return true;
   const TileGrid& tiles = metadata.grid;
+  const TileRange here = tiles_here(metadata);
+  const auto edge = [](std::int64_t tile, double extent) { return static_cast<double>(tile) * extent; };
   const double last_x = grid.first_x + static_cast<double>(grid.width - 1) * grid.spacing_x;
   const double last_z = grid.first_z + static_cast<double>(grid.height - 1) * grid.spacing_z;
   return is_warped(metadata) || metadata.statistics.voids > 0 || metadata.outside == Outside::kVoid ||
-         grid.first_x < 0.0 || grid.first_z < 0.0 || last_x > tiles.world_width() || last_z > tiles.world_height();
+         grid.first_x < edge(here.first.column, tiles.extent_x()) ||
+         grid.first_z < edge(here.first.row, tiles.extent_z()) || last_x > edge(here.end.column, tiles.extent_x()) ||
+         last_z > edge(here.end.row, tiles.extent_z());
 }
 
 Georeference source_georeference(const SourceRecord& source) {

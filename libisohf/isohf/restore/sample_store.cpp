@@ -28,7 +28,7 @@ SampleMapping spread(SampleType type, std::pair<double, double> elevations, bool
   return {type, scale, elevations.first - low * scale};
 }
 
-SampleStore::SampleStore(const SampleMapping& mapping, std::optional<double> nodata, bool clamp)
+SampleStore::SampleStore(const SampleMapping& mapping, std::optional<double> nodata, Clamp clamp)
     : mapping_(mapping), nodata_(nodata), clamp_(clamp) {
   std::tie(low_, high_) = sample_range(mapping.type);
   if (nodata == low_) low_ += 1.0;
@@ -48,8 +48,11 @@ SampleStore::Outcome SampleStore::store(double elevation, std::byte* raw) const 
     put(*held, raw);
     return Outcome::kStored;
   }
-  if (!clamp_) return Outcome::kRefused;
-  put(sample < low_ + (high_ - low_) / 2.0 ? low_ : high_, raw);
+  const double end = sample < low_ + (high_ - low_) / 2.0 ? low_ : high_;
+  const auto [lowest, highest] = sample_range(mapping_.type);
+  const bool is_free = end == lowest || end == highest;
+  if (clamp_ == Clamp::kNone || (clamp_ == Clamp::kAtFreeEnds && !is_free)) return Outcome::kRefused;
+  put(end, raw);
   return Outcome::kClamped;
 }
 
@@ -77,7 +80,7 @@ SampleStore::Result SampleStore::store(std::span<const double> elevations, std::
 std::optional<std::size_t> convert_exactly(SampleType from, std::span<const std::byte> raw,
                                            const std::vector<double>& nodata, bool nodata_to_nan, SampleType to,
                                            std::span<std::byte> out, double* largest_error) {
-  const SampleStore store({to, 1.0, 0.0}, std::nullopt, false);
+  const SampleStore store({to, 1.0, 0.0}, std::nullopt, SampleStore::Clamp::kNone);
   const std::size_t count = raw.size() / size_bytes(from);
   ISOHF_ASSERT(out.size() == count * size_bytes(to));
   const LoadSample load = load_sample(from);

@@ -23,10 +23,12 @@ class SampleStore {
  public:
   enum class Outcome : std::uint8_t { kStored, kNodata, kClamped, kRefused };
 
+  /// Which samples that the type does not hold are moved to the end of its range.
+  enum class Clamp { kNone, kAtFreeEnds, kAll };  ///< a free end is none that is kept for nodata
+
   /// nodata  raw value kept for nodata, at an end of an integer type's range; nullopt: floats take NaN, and an integer
   ///         type uses its whole range and holds no nodata
-  /// clamp   move what the type does not hold to the end of its range
-  SampleStore(const SampleMapping& mapping, std::optional<double> nodata, bool clamp);
+  SampleStore(const SampleMapping& mapping, std::optional<double> nodata, Clamp clamp);
 
   /// Writes size_bytes(type) bytes at `raw`, none where it refuses. NaN is nodata.
   Outcome store(double elevation, std::byte* raw) const;
@@ -44,7 +46,7 @@ class SampleStore {
  private:
   SampleMapping mapping_;
   std::optional<double> nodata_;
-  bool clamp_;
+  Clamp clamp_;
   double low_;  ///< smallest and largest raw number that is an elevation
   double high_;
 };

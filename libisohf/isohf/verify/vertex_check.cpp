@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "isohf/archive/codec/quantise.h"
+#include "isohf/archive/metadata/part_record.h"
 #include "isohf/base/arena.h"
 #include "isohf/base/memory/memory_budget.h"
 #include "isohf/error.h"
@@ -14,9 +15,15 @@
 #include "isohf/surface/source/band_reader.h"
 #include "isohf/surface/source/source_statistics.h"
 #include "isohf/verify.h"
+#include "isohf/verify/accuracy/same_source.h"
 
 namespace isohf {
 namespace {
+
+/// False of what was cut or joined.
+bool states_job(const Metadata& metadata) {
+  return std::ranges::any_of(metadata.extensions, [](const auto& extension) { return extension.first == kJobName; });
+}
 
 class VertexCheck {
  public:
@@ -27,13 +34,10 @@ class VertexCheck {
         source_(source),
         kernel_(Kernel::make(known(metadata_.filter, "filter"), known(metadata_.edges, "edges"))),
         prefilter_(Prefilter::make(kernel_.filter(), known(metadata_.acquisition, "acquisition"), kernel_.edges())),
-        limits_(code_limits(metadata_)) {
-    const SourceInfo& info = source.info();
-    if (info.width != metadata_.source.width || info.height != metadata_.source.height) {
-      throw Error(ErrorCode::kInvalidArgument,
-                  fmt::format("{}: {}x{} samples, {} was made from {}x{}", info.path, info.width, info.height,
-                              archive.path(), metadata_.source.width, metadata_.source.height));
-    }
+        limits_(code_limits(metadata_)),
+        here_(tiles_here(metadata_)),
+        only_on_ground_(!states_job(metadata_) && !archive.find_member(kWholeName)) {
+    (void)check_same_source(archive, source.info());
     const Quantisation& q = metadata_.quantisation;
     const Statistics& statistics = metadata_.statistics;
     const ElevationRange range{statistics.min.value_or(0.0), statistics.max.value_or(0.0)};
@@ -53,10 +57,10 @@ class VertexCheck {
                                          : SourceRows(source_, ways.step);
     BandReader reader(rows, datum_, prefilter_, archive_geometry(metadata_).wraps_x);
     std::vector<VertexReport> tiles(static_cast<std::size_t>(grid_.tile_columns()));
-    for (std::int64_t row = 0; row < grid_.tile_rows(); ++row) {
-      for (std::int64_t first = 0; first < grid_.tile_columns(); first += ways.tile_columns) {
+    for (std::int64_t row = here_.first.row; row < here_.end.row; ++row) {
+      for (std::int64_t first = here_.first.column; first < here_.end.column; first += ways.tile_columns) {
         job.throw_if_cancelled();
-        const std::int64_t end = std::min(first + ways.tile_columns, grid_.tile_columns());
+        const std::int64_t end = std::min(first + ways.tile_columns, here_.end.column);
         const auto band = reader.read(cutter->rows_needed(row), columns_of(*cutter, first, end));
         oneapi::tbb::parallel_for(first, end, [&](std::int64_t column) {
           tiles[static_cast<std::size_t>(column)] = check_tile(*cutter, *band, {column, row});
@@ -131,6 +135,8 @@ class VertexCheck {
     const std::vector<double> stored = archive_.read_elevations(tile);
     VertexReport found;
     for (std::size_t i = 0; i < heights.size(); ++i) {
+      if (only_on_ground_ && !is_on_ground(tile, i)) continue;
+      ++found.vertices;
       const double resampled = double{heights[i]} + datum_;
       if (std::isnan(resampled) || std::isnan(stored[i])) {
         const bool both = std::isnan(resampled) && std::isnan(stored[i]);
@@ -147,9 +153,17 @@ class VertexCheck {
       found.worst = std::max(found.worst, error);
       found.wrong += error > report_.bound ? 1 : 0;
     }
-    found.vertices = static_cast<std::int64_t>(heights.size());
     if (found.wrong > 0) found.first_wrong = tile;
     return found;
+  }
+
+  [[nodiscard]] bool is_on_ground(TileIndex tile, std::size_t index) const {
+    const auto columns = static_cast<std::size_t>(grid_.shape().columns());
+    const GridVertex vertex{static_cast<int>(index % columns), static_cast<int>(index / columns)};
+    const ObjectVertex place = object_from_grid(grid_.shape(), vertex);
+    const WorldPoint at = grid_.world_from_object(tile, {static_cast<double>(place.x), static_cast<double>(place.z)});
+    const WorldBounds& ground = metadata_.valid;
+    return at.x >= ground.x0 && at.x <= ground.x1 && at.z >= ground.z0 && at.z <= ground.z1;
   }
 
   void add(const VertexReport& tile) {
@@ -169,6 +183,9 @@ class VertexCheck {
   Prefilter prefilter_;
   double datum_ = 0.0;
   const CodeLimits limits_;
+  const TileRange here_;  ///< of a part: it says nothing of the others
+  /// What was cut from a coarse plane goes on level where the whole's tiles end, and nothing tells where that is.
+  const bool only_on_ground_;
   bool can_clamp_ = false;
   VertexReport report_;
 };

@@ -25,6 +25,9 @@ class JsonMembers;
 void part_members(JsonMembers& json, PartRecord& part);
 
 inline constexpr const char* kPartName = "part";
+/// The metadata's member that holds a digest of the options and of what the source says of itself, without its path,
+/// size and time.
+inline constexpr const char* kJobName = "job_sha256";
 /// The member of a part that holds the metadata of the archive that it was cut from.
 inline constexpr const char* kWholeName = "whole.json";
 

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "isohf/archive/metadata/accuracy_info.h"
+#include "isohf/archive/metadata/part_record.h"
 #include "isohf/base/arena.h"
 #include "isohf/base/assert.h"
 #include "isohf/base/memory/memory_budget.h"
@@ -24,6 +25,7 @@
 #include "isohf/surface/source/source_statistics.h"
 #include "isohf/verify.h"
 #include "isohf/verify/accuracy/error_statistics.h"
+#include "isohf/verify/accuracy/same_source.h"
 
 namespace isohf {
 namespace {
@@ -81,12 +83,9 @@ class Comparison {
         grid_(archive.grid()),
         record_(archive.metadata().source),
         source_(source),
-        info_(source.info()) {
-    if (info_.width != record_.width || info_.height != record_.height) {
-      throw Error(ErrorCode::kInvalidArgument,
-                  fmt::format("{}: {}x{} samples, {} was made from {}x{}", info_.path, info_.width, info_.height,
-                              archive.path(), record_.width, record_.height));
-    }
+        info_(source.info()),
+        here_(tiles_here(archive.metadata())) {
+    (void)check_same_source(archive, info_);
     const Statistics& statistics = archive.metadata().statistics;
     const ElevationRange range{statistics.min.value_or(0.0), statistics.max.value_or(0.0)};
     datum_ = choose_datum(range);
@@ -111,6 +110,7 @@ class Comparison {
     VertexRows tiles(grid_, archive_.metadata().quantisation, tiles_of(archive_), 0, grid_.tile_columns() - 1, scratch);
     for (std::int64_t tile_row = 0; !warp_ && tile_row < grid_.tile_rows() && first_row < info_.height; ++tile_row) {
       const std::int64_t end_row = rows_until(tile_row);
+      if (tile_row < here_.first.row || tile_row >= here_.end.row) first_row = end_row;
       if (end_row > first_row) {
         tiles.drop_before(tile_row);
         tiles.have(tile_row);
@@ -293,6 +293,7 @@ class Comparison {
     for (std::int64_t column = 0; column < info_.width; ++column) {
       const WorldPoint world{world_x(static_cast<double>(column)), z};
       const TilePoint at = locate(surface.tile_row, world);
+      if (!here_.contains({at.tile.column, surface.tile_row})) continue;
       const double stored = vertices.elevation(archive_.metadata().quantisation, at.tile.column,
                                                snapped(barycentric(grid_.shape(), at.point)));
       compare_sample(stored, band, column, row, world, sums, histogram);
@@ -327,6 +328,7 @@ class Comparison {
           const WorldPoint world = warp_->world_from_source({static_cast<double>(c), static_cast<double>(row)});
           if (tile_row_at(world) != surface.tile_row) continue;
           ++of_row.visited;
+          if (!here_.contains({grid_.locate(world).tile.column, surface.tile_row})) continue;
           compare_sample(elevation_at(surface, world), band, c, row, world, of_row, histogram);
         }
       }
@@ -442,6 +444,7 @@ class Comparison {
   const SourceRecord& record_;
   HeightSource& source_;
   const SourceInfo& info_;
+  const TileRange here_;  ///< of a part: samples on other tiles are not compared
   double datum_ = 0.0;
   double span_ = 0.0;
   std::int64_t reach_ = 2;
