@@ -8,6 +8,18 @@
 #include "isohf/surface.h"
 
 namespace isohf {
+namespace {
+
+bool is_system_of(const Georeference& own, const Georeference& other) {
+  if (!own.has_origin || own.unit != other.unit) return false;
+  if (const auto same = are_same(own.system, other.system)) return *same;
+  // Longitudes and latitudes of a body that names no system are known by its ellipsoid.
+  return own.unit == HorizontalUnit::kDegree && own.system.semi_major_axis_m &&
+         own.system.semi_major_axis_m == other.system.semi_major_axis_m &&
+         own.system.inverse_flattening.value_or(0.0) == other.system.inverse_flattening.value_or(0.0);
+}
+
+}  // namespace
 
 void understand_source(ArchiveReader& archive) {
   understand_world(archive);
@@ -62,6 +74,12 @@ std::shared_ptr<const GridSystem> understand_grid_system(ArchiveReader& archive,
           archive.path(), way.system.name)));
     }
     auto system = std::make_shared<GridSystem>(GridSystem{way.map, there.georeference});
+    const auto natural = grid_georeference(metadata, natural_grid(metadata));
+    for (const Georeference& known : {natural.value_or(own), own}) {
+      if (system->place.has_origin || !is_system_of(known, there.georeference)) continue;
+      system->place = known;
+      system->place.system = there.georeference.system;
+    }
     // The heights stay the archive's own.
     system->place.system.vertical_datum.clear();
     system->place.system.vertical_epsg.reset();

@@ -110,6 +110,37 @@ TEST_F(CrsOption, RefusesInOneLineWhatIsNoSystemOrHasNoPlace) {
          "no coordinates that --crs could be about");
 }
 
+TEST_F(CrsOption, RowsThatPassThePoleMakeAWholeArchive) {
+  // Posts at the poles and the 180th meridian on plate carree: half of an area lies beyond.
+  std::string text = "ncols 36\nnrows 19\nxllcorner -20037508\nyllcorner -10575351\ncellsize 1113194.9\n";
+  for (int i = 0; i < 36 * 19; ++i) text += std::to_string(i % 36 * 10 + i / 36) + (i % 36 == 35 ? "\n" : " ");
+  write_text(grid_, text);
+  ASSERT_EQ(convert("EPSG:4087").err, "");
+  EXPECT_EQ(run_isohf({"verify", archive_, "--quiet"}).exit_code, 0);
+  const json ground = json::parse(run_isohf({"info", archive_, "--json"}).out).at("metadata").at("source").at("ground");
+  EXPECT_EQ(ground.at("bounds").at("north"), 90.0);
+  EXPECT_EQ(ground.at("bounds").at("south"), -90.0);
+}
+
+TEST_F(CrsOption, GroundBesideAPoleThatIsALineKeepsItsLongitudes) {
+  std::string text = "ncols 4\nnrows 4\nxllcorner 0\nyllcorner 9900000\ncellsize 50000\n";
+  for (int i = 0; i < 16; ++i) text += std::to_string(i * i) + (i % 4 == 3 ? "\n" : " ");
+  write_text(grid_, text);
+  ASSERT_EQ(convert("EPSG:4087").err, "");
+  const json bounds =
+      json::parse(run_isohf({"info", archive_, "--json"}).out).at("metadata").at("source").at("ground").at("bounds");
+  EXPECT_EQ(bounds.at("north"), 90.0);
+  EXPECT_NEAR(bounds.at("west").get<double>(), 0.0, 1e-6);
+  EXPECT_NEAR(bounds.at("east").get<double>(), 200000.0 / 111319.49, 1e-4);
+}
+
+TEST_F(CrsOption, RestoreToTheArchivesOwnSystemAddsNoBorder) {
+  ASSERT_EQ(convert("EPSG:32611").err, "");
+  ASSERT_EQ(run_isohf({"restore", archive_, folder_ / "plain.asc", "--quiet"}).err, "");
+  ASSERT_EQ(run_isohf({"restore", archive_, folder_ / "own.asc", "--crs", "EPSG:32611", "--quiet"}).err, "");
+  EXPECT_EQ(read_text(folder_ / "own.asc"), read_text(folder_ / "plain.asc"));
+}
+
 TEST_F(CrsOption, MapsThatDifferInOneParameterNeverJoin) {
   const auto prj = [](const char* latitude) {
     return std::string("Projection TRANSVERSE\nDatum WGS84\nUnits METERS\nParameters\n0.9996\n9 0 0\n") + latitude +

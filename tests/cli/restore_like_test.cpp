@@ -262,7 +262,7 @@ TEST_F(RestoreLike, RefusesWhatHasNoPlaceOnTheMap) {
   std::ofstream(folder / "old.prj") << "GEOGCS[\"NAD27\",DATUM[\"D_North_American_1927\",SPHEROID[\"Clarke_1866\","
                                        "6378206.4,294.9786982]],PRIMEM[\"Greenwich\",0],"
                                        "UNIT[\"degree\",0.0174532925199433]]";
-  refuses("old.flt", "is in \"NAD27\", the archive's source in \"WGS 84\"; bring it to that (gdalwarp)");
+  refuses("old.flt", "is in \"NAD27\" with an equatorial radius of 6378206.4 m, the archive's source in \"WGS 84\"");
 }
 
 TEST_F(RestoreLike, NeverTakesDegreesForMetresBesideAMap) {
@@ -283,6 +283,95 @@ TEST_F(RestoreLike, CountsLongitudesRoundTheBodyWhereRowsStayRows) {
   const Raster plain = like("plain.flt", "plain.tif");
   ASSERT_EQ(turned.heights.size(), plain.heights.size());
   for (std::size_t i = 0; i < plain.heights.size(); ++i) ASSERT_NEAR(turned.heights[i], plain.heights[i], 1e-3) << i;
+}
+
+double hills(double longitude, double latitude) {
+  return 800.0 + 400.0 * std::sin(longitude * M_PI / 60.0) * std::cos(latitude * M_PI / 60.0);
+}
+
+TEST_F(RestoreLike, FindsAllColumnsOfAGlobeThatCountsFromTheOtherSide) {
+  write_degrees(folder / "from_0", 144, 72, 0.0, -90.0, 2.5, hills);
+  write_degrees(folder / "around_0", 144, 72, -180.0, -90.0, 2.5, hills);
+  write_degrees(folder / "box", 24, 16, -30.0, -20.0, 2.5, hills);
+  for (const std::vector<std::string>& more : {std::vector<std::string>{}, {"--wrap-x"}}) {
+    convert("from_0.flt", "equirectangular", more);
+    for (const std::string name : {"around_0.flt", "box.flt"}) {
+      for (const std::string method : {"hex", "barycentric"}) {
+        SCOPED_TRACE(name + " " + method);
+        const Raster found = like(name, "like.tif", {"--method", method});
+        const Raster expected = read_raster(folder / name);
+        ASSERT_EQ(found.heights.size(), expected.heights.size());
+        EXPECT_DOUBLE_EQ(found.info.georeference.origin_x, expected.info.georeference.origin_x);
+        for (std::size_t i = 0; i < found.heights.size(); ++i)
+          ASSERT_NEAR(found.heights[i], expected.heights[i], 12.0) << i;
+      }
+    }
+  }
+}
+
+TEST_F(RestoreLike, CrsOfTheArchiveItselfGivesTheSourcesGrid) {
+  for (const std::string& kind : {std::string("equirectangular"), std::string("lambert-conformal")}) {
+    SCOPED_TRACE(kind);
+    convert("wide.flt", kind);
+    ASSERT_EQ(run("own.tif", {"--crs", "EPSG:4326", "-q", "--overwrite"}).exit_code, 0);
+    const Raster own = read_raster(folder / "own.tif");
+    const Raster beside = like("wide.flt");
+    EXPECT_EQ(own.info.width, 240);
+    EXPECT_EQ(own.info.height, 160);
+    EXPECT_NEAR(own.info.georeference.origin_x, 2.025, 1e-12);
+    EXPECT_NEAR(own.info.georeference.spacing_x, 0.05, 1e-12);
+    ASSERT_EQ(own.heights.size(), beside.heights.size());
+    for (std::size_t i = 0; i < own.heights.size(); ++i) ASSERT_NEAR(own.heights[i], beside.heights[i], 1e-3) << i;
+  }
+}
+
+TEST_F(RestoreLike, CrsTakesGroundAcrossThe180thMeridianAndWholeGlobes) {
+  write_degrees(folder / "fiji", 40, 30, 170.0, -20.0, 0.5, hills);
+  write_degrees(folder / "globe", 144, 72, 0.0, -90.0, 2.5, hills);
+  convert("fiji.flt", "lambert-conformal");
+  const auto in_system = [&](const std::string& system) {
+    const RunResult result = run("there.tif", {"--crs", system, "-q", "--overwrite"});
+    EXPECT_EQ(result.exit_code, 0) << system << ": " << result.err;
+    return read_raster(folder / "there.tif");
+  };
+  const auto voids = [](const Raster& raster) {
+    return std::count_if(raster.heights.begin(), raster.heights.end(), [](float height) { return std::isnan(height); });
+  };
+  EXPECT_NEAR(in_system("EPSG:4326").info.georeference.origin_x, 170.25, 1e-9);
+  const Raster other = in_system("EPSG:4258");
+  EXPECT_GT(other.info.georeference.origin_x, 169.0);
+  EXPECT_LT(other.info.width, 50);
+  convert("globe.flt", "equirectangular");
+  EXPECT_EQ(in_system("EPSG:4326").info.width, 144);
+  const Raster turned = in_system("EPSG:4258");
+  EXPECT_EQ(turned.info.width, 144);
+  EXPECT_EQ(turned.info.height, 72);
+  EXPECT_EQ(voids(turned), 0);
+  // On plate carree cut open at 180 degrees, where the source is not; Mercator's square; an ellipse in a rectangle.
+  const Raster flat = in_system("EPSG:4087");
+  EXPECT_NEAR(flat.info.georeference.origin_x, -20037508.0, 1.5 * flat.info.georeference.spacing_x);
+  EXPECT_NEAR(static_cast<double>(flat.info.width) * flat.info.georeference.spacing_x, 2.0 * 20037508.0,
+              2.0 * flat.info.georeference.spacing_x);
+  EXPECT_LT(voids(flat), 2 * (flat.info.width + flat.info.height));
+  const Raster mercator = in_system("EPSG:3857");
+  EXPECT_NEAR(mercator.info.georeference.origin_y, 20037508.0, mercator.info.georeference.spacing_y);
+  const Raster ellipse = in_system("+proj=moll +datum=WGS84");
+  EXPECT_NEAR(static_cast<double>(voids(ellipse)) / static_cast<double>(ellipse.heights.size()), 1.0 - M_PI / 4.0,
+              0.05);
+}
+
+TEST_F(RestoreLike, SaysByWhatSystemsDiffer) {
+  write_degrees(folder / "mars", 40, 30, 5.0, 40.0, 0.1, land);
+  write_degrees(folder / "round", 40, 30, 5.0, 40.0, 0.1, land);
+  const auto prj = [&](const std::string& name, const std::string& radius) {
+    std::ofstream(folder / name) << "GEOGCS[\"GCS_Mars\",DATUM[\"D_Mars\",SPHEROID[\"Mars\"," + radius +
+                                        ",0]],PRIMEM[\"Reference_Meridian\",0],UNIT[\"degree\",0.0174532925199433]]";
+  };
+  prj("mars.prj", "3396000");
+  prj("round.prj", "3396190");
+  convert("mars.flt", "none");
+  refuses("round.flt", "with an equatorial radius of 3396190 m");
+  refuses("round.flt", "one of 3396000 m");
 }
 
 }  // namespace

@@ -104,9 +104,7 @@ SourceInfo in_words_of(const Metadata& metadata, SourceInfo other) {
   }
   const bool on_maps = source.unit == HorizontalUnit::kMetre && other.georeference.unit == HorizontalUnit::kMetre;
   if (on_maps && !is_warped(metadata) && are_same(source.system, theirs) == false) {
-    throw Error(ErrorCode::kInvalidArgument,
-                fmt::format("{}: is in \"{}\", the archive's source in \"{}\"; bring it to that (gdalwarp)", other.path,
-                            theirs.name, source.system.name));
+    refuse_system(other, source.system);
   }
   return other;
 }
@@ -311,10 +309,14 @@ int run(const RestoreOptions& options) {
   check_raster_output(inputs, options.raster.output, options.raster.overwrite);
   WorkArena arena(options.work.threads);
   ArchiveReader archive = open_archive(options.raster.archive);
-  const bool wants_source = options.like.empty() && options.raster.system.empty() && !options.raster.size &&
-                            !options.raster.spacing && !options.raster.method;
-  const bool is_lossless = wants_source && lossless_record(archive.metadata());
-  const SampleGrid grid = is_lossless ? source_grid(archive.metadata().source) : asked_grid(options, archive);
+  const bool wants_source =
+      options.like.empty() && !options.raster.size && !options.raster.spacing && !options.raster.method;
+  bool is_lossless = wants_source && lossless_record(archive.metadata());
+  SampleGrid grid = source_grid(archive.metadata().source);
+  if (!is_lossless || !options.raster.system.empty()) grid = asked_grid(options, archive);
+  // In the archive's own system the samples are its source's.
+  is_lossless =
+      is_lossless && (options.raster.system.empty() || (!grid.goes_by_places() && !is_warped(archive.metadata())));
   Restored restored;
   try {
     arena.execute([&] { restored = Restorer(options, archive, grid).run(is_lossless); });

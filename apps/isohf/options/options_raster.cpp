@@ -44,11 +44,6 @@ void add_size_options(CommandLine& line, const std::string& size_description, Ra
 
 SampleGrid asked_grid_in_system(const RasterOptions& options, ArchiveReader& archive, const WorldBounds& ground,
                                 bool quiet) {
-  if (options.method == RestoreMethod::kHex) {
-    throw Error(ErrorCode::kInvalidArgument,
-                "--crs: rows of another reference system are no rows of the archive, along which --method hex goes; "
-                "leave it out, or give --method barycentric");
-  }
   std::vector<Warning> warnings;
   auto system = understand_grid_system(archive, options.system, warnings);
   if (!quiet) print_warnings(warnings);
@@ -65,6 +60,11 @@ SampleGrid asked_grid_in_system(const RasterOptions& options, ArchiveReader& arc
   }
   try {
     const SampleGrid grid = grid_in_system(archive.metadata(), ground, std::move(system), options.size, spacing);
+    if (grid.goes_by_places() && options.method == RestoreMethod::kHex) {
+      throw Error(ErrorCode::kInvalidArgument,
+                  "--crs: rows of another reference system are no rows of the archive, along which --method hex goes; "
+                  "leave it out, or give --method barycentric");
+    }
     if (grid.width <= kMostSide && grid.height <= kMostSide) return grid;
     throw Error(ErrorCode::kInvalidArgument, fmt::format("--spacing makes {} x {} samples, at most {} a side are "
                                                          "possible",

@@ -150,7 +150,7 @@ enum class RestoreMethod {
 struct GridSystem {
   /// Its coordinates <-> longitudes and latitudes of the archive.
   std::shared_ptr<const ReferenceMap> map;
-  Georeference place;  ///< unit and system; spacing and origin are the grid's
+  Georeference place;  ///< unit and system; where these are the archive's own, also its source's spacing and origin
 };
 
 /// The samples of a raster on the ground: evenly spaced columns from West to East and rows from North to South, in world

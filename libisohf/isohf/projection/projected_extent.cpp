@@ -22,12 +22,28 @@ void include(double& low, double& high, double value) {
   if (!(value <= high)) high = value;
 }
 
+bool is_shown(const MapPoint& at) {
+  return std::isfinite(at.easting) && std::isfinite(at.northing);
+}
+
+double distance(const MapPoint& a, const MapPoint& b) {
+  return std::hypot(a.easting - b.easting, a.northing - b.northing);
+}
+
+void include(MapBounds& bounds, const MapPoint& at) {
+  if (!is_shown(at)) return;
+  include(bounds.west, bounds.east, at.easting);
+  include(bounds.south, bounds.north, at.northing);
+}
+
+constexpr MapBounds kNothing{std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity(),
+                             -std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
+
 }  // namespace
 
 MapBounds image_bounds(const MapBounds& rectangle, const std::function<MapPoint(const MapPoint&)>& image,
                        int steps_per_side) {
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  MapBounds bounds{kInfinity, kInfinity, -kInfinity, -kInfinity};
+  MapBounds bounds = kNothing;
   const std::array<MapPoint, 5> corners = {{{rectangle.west, rectangle.north},
                                             {rectangle.east, rectangle.north},
                                             {rectangle.east, rectangle.south},
@@ -64,6 +80,69 @@ MapBounds image_bounds(const MapBounds& rectangle, const std::function<MapPoint(
   // An arc rises above its chord by an eighth of its second difference.
   const double rise = bend / 8.0;
   return {bounds.west - rise, bounds.south - rise, bounds.east + rise, bounds.north + rise};
+}
+
+ShownImage shown_image(const MapBounds& rectangle, const std::function<MapPoint(const MapPoint&)>& image,
+                       const std::vector<MapPoint>& more) {
+  constexpr int kSteps = 128;
+  constexpr int kLine = kSteps + 1;
+  constexpr int kHalvings = 50;
+  constexpr double kMostJump = 0.25;  // of the image's size
+  struct Place {
+    MapPoint from;
+    MapPoint at;
+  };
+  std::vector<Place> places;
+  MapBounds bounds = kNothing;
+  for (int i = 0; i < kLine * kLine; ++i) {
+    const MapPoint from{between(rectangle.west, rectangle.east, i % kLine, kSteps),
+                        between(rectangle.north, rectangle.south, i / kLine, kSteps)};
+    places.push_back({from, image(from)});
+    include(bounds, places.back().at);
+  }
+  for (const MapPoint& from : more) include(bounds, image(from));
+  if (!(bounds.west <= bounds.east)) return {{NAN, NAN, NAN, NAN}};
+  const double jump = kMostJump * std::max(bounds.east - bounds.west, bounds.north - bounds.south);
+  const auto in_one_piece = [&](const Place& a, const Place& b) {
+    return is_shown(a.at) && is_shown(b.at) && distance(a.at, b.at) <= jump;
+  };
+  const auto look_between = [&](Place a, Place b) {
+    if (in_one_piece(a, b) || (!is_shown(a.at) && !is_shown(b.at))) return;
+    for (int i = 0; i < kHalvings; ++i) {
+      Place middle{{(a.from.easting + b.from.easting) / 2.0, (a.from.northing + b.from.northing) / 2.0}, {}};
+      middle.at = image(middle.from);
+      const bool like_a =
+          is_shown(a.at) == is_shown(middle.at) && !(distance(b.at, middle.at) < distance(a.at, middle.at));
+      (like_a ? a : b) = middle;
+    }
+    include(bounds, a.at);
+    include(bounds, b.at);
+  };
+  double area = 0.0;
+  int cells = 0;
+  for (int row = 0; row < kLine; ++row) {
+    for (int column = 0; column < kLine; ++column) {
+      const Place* const place = &places[static_cast<std::size_t>(row * kLine + column)];
+      if (column < kSteps) look_between(place[0], place[1]);
+      if (row < kSteps) look_between(place[0], place[kLine]);
+      if (row == kSteps || column == kSteps) continue;
+      const std::array<const Place*, 4> corners = {place, place + 1, place + kLine + 1, place + kLine};
+      if (!in_one_piece(*corners[0], *corners[1]) || !in_one_piece(*corners[1], *corners[2]) ||
+          !in_one_piece(*corners[2], *corners[3]) || !in_one_piece(*corners[3], *corners[0])) {
+        continue;
+      }
+      const MapPoint across{corners[2]->at.easting - corners[0]->at.easting,
+                            corners[2]->at.northing - corners[0]->at.northing};
+      const MapPoint down{corners[3]->at.easting - corners[1]->at.easting,
+                          corners[3]->at.northing - corners[1]->at.northing};
+      area += std::abs(across.easting * down.northing - across.northing * down.easting) / 2.0;
+      ++cells;
+    }
+  }
+  const double of_cells = (rectangle.east - rectangle.west) * (rectangle.north - rectangle.south) * cells /
+                          (static_cast<double>(kSteps) * kSteps);
+  if (cells == 0) return {{NAN, NAN, NAN, NAN}};
+  return {bounds, area / of_cells};
 }
 
 MapBounds projected_bounds(const Projection& projection, const GeoExtent& ground) {

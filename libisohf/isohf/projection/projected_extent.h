@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <vector>
 
 #include "isohf/projection/projection.h"
 #include "isohf/projection/reference_map.h"
@@ -19,6 +20,18 @@ namespace isohf {
 /// The same of what `image` makes of a rectangle, in so many steps a side.
 [[nodiscard]] MapBounds image_bounds(const MapBounds& rectangle, const std::function<MapPoint(const MapPoint&)>& image,
                                      int steps_per_side);
+
+/// What a map shows of a rectangle.
+struct ShownImage {
+  MapBounds bounds;      ///< NaN: nothing
+  double stretch = 1.0;  ///< the image's area for the rectangle's, where it is shown in one piece
+};
+
+/// The same where the map ends on the rectangle, or is cut open there. Looks at 129 x 129 places, and between two on
+/// either side of such an end for the end.
+/// more  places besides, such as poles
+[[nodiscard]] ShownImage shown_image(const MapBounds& rectangle, const std::function<MapPoint(const MapPoint&)>& image,
+                                     const std::vector<MapPoint>& more);
 
 /// The worst scale on a ground, and where.
 struct ScaleError {

@@ -57,6 +57,11 @@ void include(GeoExtent& extent, const GeoPoint& middle, const GeoPoint& place) {
   extent.north = std::max(extent.north, place.latitude);
 }
 
+/// Rows of a map that go on beyond a pole, as half an area may, count as the pole.
+GeoPoint on_the_body(GeoPoint place) {
+  return {place.longitude, std::clamp(place.latitude, -90.0, 90.0)};
+}
+
 bool holds(const MapBounds& bounds, const MapPoint& place) {
   return place.easting >= bounds.west && place.easting <= bounds.east && place.northing >= bounds.south &&
          place.northing <= bounds.north;
@@ -121,7 +126,7 @@ PlaceScale scale_at(const ReferenceMap& map, MapPoint place) {
 
 std::optional<MapGround> ground_under(const ReferenceMap& map, const MapBounds& bounds) {
   MapGround ground;
-  ground.centre = map.geo_from_map(bounds.middle());
+  ground.centre = on_the_body(map.geo_from_map(bounds.middle()));
   GeoPoint first = ground.centre;
   ground.extent = {HUGE_VAL, HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
   ground.least_scale = HUGE_VAL;
@@ -135,7 +140,8 @@ std::optional<MapGround> ground_under(const ReferenceMap& map, const MapBounds& 
       const GeoPoint geo = map.geo_from_map(place);
       if (!std::isfinite(geo.longitude) || !std::isfinite(geo.latitude)) continue;
       if (!std::isfinite(first.longitude)) first = geo;
-      include(ground.extent, first, geo);
+      include(ground.extent, first, on_the_body(geo));
+      if (std::abs(geo.latitude) > 90.0) continue;
       const PlaceScale scale = scale_at(map, place);
       if (!(scale.most < kBoundless)) continue;  // a pole that is a line
       ++count;
@@ -159,8 +165,13 @@ std::optional<MapGround> ground_under(const ReferenceMap& map, const MapBounds& 
     *side = rounded(*side, kDegreeGrain);
   }
   for (const double pole : {90.0, -90.0}) {
-    if (!holds(bounds, map.map_from_geo({first.longitude, pole}))) continue;
+    const MapPoint here = map.map_from_geo({first.longitude, pole});
+    if (!holds(bounds, here)) continue;
     (pole > 0.0 ? ground.extent.north : ground.extent.south) = pole;
+    // Around a pole that is a point lie all longitudes, under one that is a line those that are found.
+    const MapPoint there = map.map_from_geo({first.longitude + 90.0, pole});
+    const double apart = std::hypot(there.easting - here.easting, there.northing - here.northing);
+    if (apart * map.metres_per_unit() > kStep * map.ellipsoid().semi_major_axis_m) continue;
     ground.extent.west = first.longitude - 180.0;
     ground.extent.east = first.longitude + 180.0;
   }

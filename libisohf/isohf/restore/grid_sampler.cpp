@@ -21,11 +21,12 @@ constexpr double kVoid = std::numeric_limits<double>::quiet_NaN();
 /// Samples this far beyond the surface's end, in their spacing, count as on it: ends are computed by products.
 constexpr double kEndTolerance = 1e-6;
 
-std::vector<double> columns_of(const SampleGrid& samples) {
+std::vector<double> columns_of(const SampleGrid& samples, const std::optional<Turn>& turn) {
   std::vector<double> columns;
   columns.reserve(static_cast<std::size_t>(samples.width));
   for (std::int64_t c = 0; c < samples.width; ++c) {
-    columns.push_back(samples.first_x + static_cast<double>(c) * samples.spacing_x);
+    const double x = samples.first_x + static_cast<double>(c) * samples.spacing_x;
+    columns.push_back(turn ? turn->onto_ground(x, kEndTolerance * samples.spacing_x) : x);
   }
   return columns;
 }
@@ -73,7 +74,8 @@ struct GridSampler::Block {
 
 GridSampler::GridSampler(const TileGrid& grid, bool wraps_x, const Quantisation& quantisation, ReadTiles read_tiles,
                          const SampleGrid& samples, RestoreMethod method, bool snaps,
-                         const std::optional<TileGrid>& world, const ScratchFolder& scratch)
+                         const std::optional<TileGrid>& world, const ScratchFolder& scratch,
+                         const std::optional<Turn>& turn)
     : grid_(grid),
       quantisation_(quantisation),
       samples_(require_samples_near(samples, world.value_or(grid))),
@@ -81,20 +83,26 @@ GridSampler::GridSampler(const TileGrid& grid, bool wraps_x, const Quantisation&
       end_z_(world.value_or(grid).world_height()),
       snaps_(snaps),
       beyond_(snaps ? Beyond::kSloped : Beyond::kMirrored),
-      spline_(grid, method == RestoreMethod::kHex ? columns_of(samples) : std::vector<double>{}, wraps_x, beyond_,
+      spline_(grid, method == RestoreMethod::kHex ? columns_of(samples, turn) : std::vector<double>{}, wraps_x, beyond_,
               scratch),
       in_scratch_(scratch.has_value()),
       heights_(static_cast<std::size_t>(samples.width), scratch),
       near_void_(static_cast<std::size_t>(samples.width), scratch) {
-  for (const double x : columns_of(samples)) {
+  for (const double x : columns_of(samples, turn)) {
     const TilePoint at = grid_.locate({x, 0.0});
     columns_.push_back(
         {is_inside(x, samples.spacing_x, world.value_or(grid).world_width()), at.tile.column, at.point.x});
   }
   // Splines run along whole rows, triangles need what is under them.
   const bool needs_all = method_ == RestoreMethod::kHex;
-  tiles_.emplace(grid, quantisation, std::move(read_tiles), needs_all ? 0 : columns_.front().tile,
-                 needs_all ? grid.tile_columns() - 1 : columns_.back().tile, scratch);
+  const Tiles under = needs_all ? Tiles{0, grid.tile_columns()} : tiles_under(0, samples.width);
+  tiles_.emplace(grid, quantisation, std::move(read_tiles), under.first, under.first + under.count - 1, scratch);
+}
+
+GridSampler::Tiles GridSampler::tiles_under(std::int64_t first, std::int64_t columns) const {
+  const auto [least, most] = std::minmax_element(columns_.begin() + first, columns_.begin() + first + columns,
+                                                 [](const Column& a, const Column& b) { return a.tile < b.tile; });
+  return {least->tile, most->tile - least->tile + 1};
 }
 
 double GridSampler::memory_bytes(const TileGrid& grid, const SampleGrid& samples, RestoreMethod method,
@@ -191,9 +199,8 @@ void GridSampler::read(std::int64_t first, std::int64_t rows, std::span<double> 
 
 void GridSampler::read_on_triangles(const TilePoint& at, const Block& block, std::span<double> out) const {
   const Column* const columns = columns_.data() + block.first;
-  const std::int64_t first = columns[0].tile;
-  const TriangleRows vertices(*tiles_, grid_.shape(), at.tile.row, at.point.z, first,
-                              columns[block.columns - 1].tile - first + 1);
+  const Tiles under = tiles_under(block.first, block.columns);
+  const TriangleRows vertices(*tiles_, grid_.shape(), at.tile.row, at.point.z, under.first, under.count);
   for (std::size_t c = 0; c < out.size(); ++c) {
     const Column& column = columns[c];
     const Barycentric where = barycentric(grid_.shape(), {column.x, at.point.z});

@@ -8,6 +8,7 @@
 
 #include "isohf/restore/rows/spline_rows.h"
 #include "isohf/restore/rows/vertex_rows.h"
+#include "isohf/restore/sample_grids.h"
 #include "isohf/surface/source/source_band.h"
 
 namespace isohf {
@@ -29,9 +30,11 @@ class GridSampler {
   ///          archives have it
   /// world    where the surface ends; nullopt: with the grid, beyond which a coarse plane's may reach
   /// scratch  keeps tile rows and lattice rows where memory has no room for them
+  /// turn     columns that miss the ground are looked for some turns away
   GridSampler(const TileGrid& grid, bool wraps_x, const Quantisation& quantisation, ReadTiles read_tiles,
               const SampleGrid& samples, RestoreMethod method, bool snaps = true,
-              const std::optional<TileGrid>& world = {}, const ScratchFolder& scratch = {});
+              const std::optional<TileGrid>& world = {}, const ScratchFolder& scratch = {},
+              const std::optional<Turn>& turn = {});
 
   /// What a sampler holds that reads so many rows at once, beside the elevations; an estimate.
   [[nodiscard]] static double memory_bytes(const TileGrid& grid, const SampleGrid& samples, RestoreMethod method,
@@ -49,7 +52,13 @@ class GridSampler {
   };
 
   struct Block;
+  struct Tiles {
+    std::int64_t first;
+    std::int64_t count;
+  };
 
+  /// Under some columns, those between them besides.
+  [[nodiscard]] Tiles tiles_under(std::int64_t first, std::int64_t columns) const;
   void keep_lattice_rows(std::int64_t first, std::int64_t last);
   [[nodiscard]] RowRange lattice_rows_of(std::int64_t row) const;
   void read_on_triangles(const TilePoint& at, const Block& block, std::span<double> out) const;

@@ -96,11 +96,6 @@ std::string describe_unit(HorizontalUnit unit) {
   return unit == HorizontalUnit::kDegree ? "degrees" : unit == HorizontalUnit::kMetre ? "metres" : "an unknown unit";
 }
 
-std::string describe_system(const ReferenceSystem& system) {
-  if (system.epsg) return fmt::format("EPSG:{}", *system.epsg);
-  return system.name.empty() ? "no named reference system" : "\"" + system.name + "\"";
-}
-
 /// Refuses coordinates that are known to mean another ground than the source's.
 void check_same_system(const Metadata& metadata, const SourceInfo& other) {
   const SourceRecord& source = metadata.source;
@@ -132,8 +127,14 @@ void check_same_system(const Metadata& metadata, const SourceInfo& other) {
     if (by_text && !source.crs_wkt.empty()) same = same && source.crs_wkt == theirs.system.wkt;
   }
   if (same) return;
-  refuse(fmt::format("{}: is in {}, the archive's source in {}; bring it to that (gdalwarp)", other.path,
-                     describe_system(theirs.system), describe_system(source_georeference(source).system)));
+  const ReferenceSystem own = source_georeference(source).system;
+  if (!same_ellipsoid) {
+    refuse(
+        fmt::format("{}: is in {} with an equatorial radius of {:.10g} m, the archive's source in {} with one of "
+                    "{:.10g} m; bring it to that (gdalwarp)",
+                    other.path, describe_system(theirs.system), *their_axis, describe_system(own), *ours));
+  }
+  refuse_system(other, own);
 }
 
 /// Whether a reference system is that which rasters of the archive's map are written in.
@@ -197,6 +198,63 @@ bool share_ground(const SourceRecord& source, const SourceInfo& other) {
                  theirs.origin_y);
 }
 
+/// Where ground of an archive lies in another reference system.
+class ImageFinder {
+ public:
+  ImageFinder(const Metadata& metadata, const GridSystem& system) : places_(metadata), system_(system) {
+    if (!places_.has_geo()) refuse("the archive does not say where it lies; coordinates mean nothing");
+    const WorldBounds& all = metadata.valid;
+    const WorldPoint middle{(all.x0 + all.x1) / 2.0, (all.z0 + all.z1) / 2.0};
+    const GeoPoint geo = places_.geo_from_world(middle);
+    const bool own = metadata.source.crs_unit == "degree" && places_.has_source();
+    const double longitude = own ? places_.source_from_world(middle).easting : geo.longitude;
+    if (std::isfinite(longitude)) middle_ = longitude;
+    const MapPoint equator = system.map->map_from_geo({middle_, 0.0});
+    if (std::isfinite(equator.northing)) equator_ = equator.northing;
+  }
+
+  [[nodiscard]] ShownImage image_of(const WorldBounds& ground) const {
+    constexpr int kStepsPerSide = 128;
+    const MapBounds rectangle{ground.x0, -ground.z1, ground.x1, -ground.z0};
+    const auto image = [this](const MapPoint& at) { return image_at(at); };
+    const MapBounds whole = image_bounds(rectangle, image, kStepsPerSide);
+    if (std::isfinite(whole.west)) {
+      const double area = (whole.east - whole.west) * (whole.north - whole.south);
+      return {whole, area / ((ground.x1 - ground.x0) * (ground.z1 - ground.z0))};
+    }
+    std::vector<MapPoint> poles;
+    for (const double pole : {90.0, -90.0}) {
+      const WorldPoint at = places_.world_from_geo({middle_, pole});
+      if (at.x >= ground.x0 && at.x <= ground.x1 && at.z >= ground.z0 && at.z <= ground.z1)
+        poles.push_back({at.x, -at.z});
+    }
+    const ShownImage shown = shown_image(rectangle, image, poles);
+    if (std::isfinite(shown.bounds.west)) return shown;
+    refuse(fmt::format("{} shows nothing of the ground; name a system for that part of the body",
+                       describe_system(system_.place.system)));
+  }
+
+ private:
+  /// NaN where the map does not show it, or where maps like Mercator's go on for ever.
+  [[nodiscard]] MapPoint image_at(const MapPoint& at) const {
+    GeoPoint geo = places_.geo_from_world({at.easting, -at.northing});
+    geo.latitude = std::clamp(geo.latitude, -90.0, 90.0);
+    MapPoint there = system_.map->map_from_geo(geo);
+    if (system_.place.unit == HorizontalUnit::kDegree) {
+      there.easting = middle_ + std::remainder(there.easting - middle_, kTurn);
+      return there;
+    }
+    const double half_round = M_PI * system_.map->ellipsoid().semi_major_axis_m / system_.map->metres_per_unit();
+    if (std::abs(there.northing - equator_) > half_round * (1.0 + 1e-9)) return {NAN, NAN};
+    return there;
+  }
+
+  WorldGeoreference places_;
+  const GridSystem& system_;
+  double middle_ = 0.0;  ///< longitude, as the source counts them
+  double equator_ = 0.0;
+};
+
 /// One axis of the cut: how many tiles, and of how many samples.
 struct AxisCut {
   std::int64_t tiles = 1;
@@ -243,6 +301,33 @@ AxisCut cut_axis(std::int64_t& size, bool free, std::optional<std::int64_t> tile
 
 }  // namespace
 
+double Turn::onto_ground(double x, double tolerance) const {
+  if (x >= ground_x0 - tolerance && x <= ground_x1 + tolerance) return x;
+  const double there = x - length * std::floor((x - ground_x0 + tolerance) / length);
+  return there <= ground_x1 + tolerance ? there : x;
+}
+
+std::string describe_system(const ReferenceSystem& system) {
+  if (system.epsg) return fmt::format("EPSG:{}", *system.epsg);
+  // PROJ's word where a PROJ string names none.
+  if (!system.name.empty() && system.name != "unknown") return "\"" + system.name + "\"";
+  return "a reference system without a name";
+}
+
+void refuse_system(const SourceInfo& other, const ReferenceSystem& own) {
+  refuse(
+      fmt::format("{}: is in {}, the archive's source in {}; bring it to that (gdalwarp), or write all of the archive "
+                  "in its system, with `crs` for `like`",
+                  other.path, describe_system(other.georeference.system), describe_system(own)));
+}
+
+std::optional<Turn> turn_of(const Metadata& metadata) {
+  const SourceRecord& source = metadata.source;
+  if (is_warped(metadata) || source.crs_unit != "degree" || !source.origin_x || !(source.crs_spacing_x > 0.0))
+    return std::nullopt;
+  return Turn{kTurn / source.crs_spacing_x * source.spacing_x, metadata.valid.x0, metadata.valid.x1};
+}
+
 SampleGrid source_grid(const SourceRecord& source) {
   return {source.width,          source.height,    source.first_sample_x,
           source.first_sample_z, source.spacing_x, source.spacing_z};
@@ -285,17 +370,36 @@ SampleGrid grid_over(const WorldBounds& ground, bool areas, const std::optional<
 
 SampleGrid grid_in_system(const Metadata& metadata, const WorldBounds& ground, std::shared_ptr<const GridSystem> system,
                           const std::optional<GridSize>& size, const std::optional<double>& spacing) {
-  constexpr int kStepsPerSide = 128;
-  const WorldGeoreference places(metadata);
-  const auto image = [&](const MapPoint& at) {
-    return system->map->map_from_geo(places.geo_from_world({at.easting, -at.northing}));
-  };
-  if (!places.has_geo()) refuse("the archive does not say where it lies; coordinates mean nothing");
-  const MapBounds bounds = image_bounds({ground.x0, -ground.z1, ground.x1, -ground.z0}, image, kStepsPerSide);
-  if (!std::isfinite(bounds.west)) {
-    refuse(fmt::format("{} has no place for a part of the ground", system->place.system.name));
+  const Georeference& place = system->place;
+  const std::optional<Georeference> own = grid_georeference(metadata, natural_grid(metadata));
+  const bool is_own = place.has_origin && own && own->origin_x == place.origin_x && own->origin_y == place.origin_y;
+  if (is_own && !spacing) {
+    if (size) return grid_over(ground, samples_are_areas(metadata), size, spacing);
+    if (const auto part = part_of(natural_grid(metadata), ground)) return *part;
+    refuse("no sample of the archive's own grid lies there; give `size` or `spacing`");
   }
+  const ImageFinder finder(metadata, *system);
+  const auto [bounds, stretch] = finder.image_of(ground);
   SampleGrid grid;
+  if (place.has_origin && !size && !spacing) {
+    // The samples of the source that lie on the ground.
+    const SourceRecord& source = metadata.source;
+    grid = {source.width, source.height, place.origin_x, -place.origin_y, place.spacing_x, place.spacing_y};
+    const double half = place.registration == Registration::kArea ? 0.5 : 0.0;
+    const SampleGrid all = grid;
+    const WorldBounds within{
+        std::max(bounds.west, all.first_x - half * all.spacing_x),
+        std::max(-bounds.north, all.first_z - half * all.spacing_z),
+        std::min(bounds.east, all.first_x + (static_cast<double>(all.width - 1) + half) * all.spacing_x),
+        std::min(-bounds.south, all.first_z + (static_cast<double>(all.height - 1) + half) * all.spacing_z)};
+    const auto part = part_of(all, within);
+    if (!part) refuse("no sample of the archive's source lies there; give `size` or `spacing`");
+    grid = *part;
+    grid.first_z = -grid.first_z;
+    grid.registration = place.registration;
+    grid.system = std::move(system);
+    return grid;
+  }
   grid.registration = Registration::kArea;
   if (size) {
     grid.width = size->first;
@@ -307,17 +411,23 @@ SampleGrid grid_in_system(const Metadata& metadata, const WorldBounds& ground, s
   } else {
     double step = spacing.value_or(0.0);
     if (!spacing) {
-      // As many samples as the archive's own grid has there, to three digits.
-      const SampleGrid own = natural_grid(metadata);
-      const double samples = (ground.x1 - ground.x0) * (ground.z1 - ground.z0) / (own.spacing_x * own.spacing_z);
-      step = std::sqrt((bounds.east - bounds.west) * (bounds.north - bounds.south) / samples);
-      const double grain = std::pow(10.0, std::floor(std::log10(step)) - 2.0);
-      step = std::round(step / grain) * grain;
+      const Georeference source = source_georeference(metadata.source);
+      const bool in_degrees = source.unit == HorizontalUnit::kDegree && place.unit == HorizontalUnit::kDegree;
+      if (in_degrees && std::abs(source.spacing_x - source.spacing_y) <= 1e-9 * source.spacing_x) {
+        step = source.spacing_x;
+      } else {
+        // As many samples as the archive's own grid has there, to three digits.
+        const SampleGrid natural = natural_grid(metadata);
+        step = std::sqrt(stretch * natural.spacing_x * natural.spacing_z);
+        const double grain = std::pow(10.0, std::floor(std::log10(step)) - 2.0);
+        step = std::round(step / grain) * grain;
+      }
     }
-    const double west = std::floor(bounds.west / step);
-    const double north = std::ceil(bounds.north / step);
-    grid.width = std::max<std::int64_t>(std::llround(std::ceil(bounds.east / step) - west), 1);
-    grid.height = std::max<std::int64_t>(std::llround(north - std::floor(bounds.south / step)), 1);
+    constexpr double kOnTheEdge = 1e-6;
+    const double west = std::floor(bounds.west / step + kOnTheEdge);
+    const double north = std::ceil(bounds.north / step - kOnTheEdge);
+    grid.width = std::max<std::int64_t>(std::llround(std::ceil(bounds.east / step - kOnTheEdge) - west), 1);
+    grid.height = std::max<std::int64_t>(std::llround(north - std::floor(bounds.south / step + kOnTheEdge)), 1);
     grid.spacing_x = grid.spacing_z = step;
     grid.first_x = (west + 0.5) * step;
     grid.first_z = (north - 0.5) * step;
@@ -335,12 +445,15 @@ bool may_have_nodata(const Metadata& metadata, const SampleGrid& grid) {
   const TileGrid& tiles = metadata.grid;
   const TileRange here = tiles_here(metadata);
   const auto edge = [](std::int64_t tile, double extent) { return static_cast<double>(tile) * extent; };
-  const double last_x = grid.first_x + static_cast<double>(grid.width - 1) * grid.spacing_x;
+  const auto turn = turn_of(metadata);
+  const bool goes_round = turn && turn->ground_x1 - turn->ground_x0 >= turn->length * (1.0 - 1e-9) &&
+                          here.first.column == 0 && here.end.column == tiles.tile_columns();
+  const double first_x = goes_round ? 0.0 : turn ? turn->onto_ground(grid.first_x, 0.0) : grid.first_x;
+  const double last_x = goes_round ? 0.0 : first_x + static_cast<double>(grid.width - 1) * grid.spacing_x;
   const double last_z = grid.first_z + static_cast<double>(grid.height - 1) * grid.spacing_z;
   return is_warped(metadata) || metadata.statistics.voids > 0 || metadata.outside == Outside::kVoid ||
-         grid.first_x < edge(here.first.column, tiles.extent_x()) ||
-         grid.first_z < edge(here.first.row, tiles.extent_z()) || last_x > edge(here.end.column, tiles.extent_x()) ||
-         last_z > edge(here.end.row, tiles.extent_z());
+         first_x < edge(here.first.column, tiles.extent_x()) || grid.first_z < edge(here.first.row, tiles.extent_z()) ||
+         last_x > edge(here.end.column, tiles.extent_x()) || last_z > edge(here.end.row, tiles.extent_z());
 }
 
 Georeference source_georeference(const SourceRecord& source) {
@@ -477,16 +590,9 @@ std::optional<SampleGrid> grid_like(const Metadata& metadata, const SourceInfo& 
   if (!placed || !same_unit) return std::nullopt;
   const double to_x = source.spacing_x / source.crs_spacing_x;
   const double to_z = source.spacing_z / source.crs_spacing_y;
-  double east = theirs.origin_x - *source.origin_x;
-  if (unit == HorizontalUnit::kDegree) {
-    // As many turns on as bring the middles nearest to each other.
-    const double apart = east + 0.5 * (static_cast<double>(other.width - 1) * theirs.spacing_x -
-                                       static_cast<double>(source.width - 1) * source.crs_spacing_x);
-    east -= kTurn * std::round(apart / kTurn);
-  }
   return SampleGrid{other.width,
                     other.height,
-                    source.first_sample_x + east * to_x,
+                    source.first_sample_x + (theirs.origin_x - *source.origin_x) * to_x,
                     source.first_sample_z + (*source.origin_y - theirs.origin_y) * to_z,
                     theirs.spacing_x * to_x,
                     theirs.spacing_y * to_z};

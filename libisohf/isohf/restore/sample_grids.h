@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "isohf/projection/reference_map.h"
@@ -12,6 +13,22 @@ namespace isohf {
 /// The samples of a grid in world units that lie in a part of the world; nullopt where none does.
 [[nodiscard]] std::optional<SampleGrid> part_of(const SampleGrid& grid, const WorldBounds& ground);
 
+/// Once round the body, where columns of an archive's world are longitudes.
+struct Turn {
+  double length;  ///< world units
+  double ground_x0;
+  double ground_x1;
+
+  /// As many turns on as bring x onto the ground; x itself where none do.
+  [[nodiscard]] double onto_ground(double x, double tolerance) const;
+};
+[[nodiscard]] std::optional<Turn> turn_of(const Metadata& metadata);
+
+/// "EPSG:32632", a name in quotes, or by the ellipsoid.
+[[nodiscard]] std::string describe_system(const ReferenceSystem& system);
+/// Throws Error{kInvalidArgument}: another raster is in another system than the archive's source.
+[[noreturn]] void refuse_system(const SourceInfo& other, const ReferenceSystem& own);
+
 /// The part of the world in a box of the source's coordinates. Longitudes are compared modulo 360 degrees; West above
 /// East crosses the 180th meridian.
 /// Throws Error{kInvalidArgument} where the archive does not know where its source lay, where West is not less than
@@ -21,7 +38,8 @@ namespace isohf {
 
 /// The grid of another raster of elevations, in the archive's world or, where the archive's input was projected, in
 /// degrees. By the origins of both, also where one has no unit that is known and their grounds meet; never through a
-/// projection, where it has to be in degrees or on the archive's own map. nullopt where nothing ties the two, and it is
+/// projection, where it has to be in degrees or on the archive's own map. Its longitudes stay as it counts them: RowReader
+/// finds each column by whole turns. nullopt where nothing ties the two, and it is
 /// to begin in the North-West corner. A warning says what was taken for granted.
 /// Throws Error{kInvalidArgument} where the two are known to be in different units, reference systems or bodies.
 [[nodiscard]] std::optional<SampleGrid> grid_like(const Metadata& metadata, const SourceInfo& other,

@@ -14,6 +14,7 @@
 #include "isohf/restore/grid_sampler.h"
 #include "isohf/restore/point_sampler.h"
 #include "isohf/restore/point_shadow.h"
+#include "isohf/restore/sample_grids.h"
 
 namespace isohf {
 namespace {
@@ -131,7 +132,7 @@ struct RowReader::State {
       const int plane = method == RestoreMethod::kPlane ? plane_for(metadata, grid) : 0;
       const TileGrid tiles = metadata.plane_grid(plane);
       rows.emplace(tiles, metadata.wraps_x, metadata.quantisation, tiles_of(archive, plane), grid, method, true,
-                   metadata.grid, choose_memory(tiles, method, job));
+                   metadata.grid, choose_memory(tiles, method, job), turn_of(metadata));
       return;
     }
     georeference.emplace(metadata);
