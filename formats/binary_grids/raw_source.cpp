@@ -130,7 +130,7 @@ class RawSource final : public PlainSource {
     const double as_given = roughness(kRows, false);
     if (!(as_given > kMuchSmoother * roughness(kRows, true))) return;
     const char* order = layout.big_endian ? "le" : "be";
-    for (const TypeName& row : kTypes) {
+    for (const TypeName& row : kRawTypes) {
       if (row.type != layout.type) continue;
       info_.warnings.emplace_back(
           fmt::format("the other byte order would be far smoother ground: perhaps the samples are `raw` {}x{}:{}{}",
