@@ -218,7 +218,7 @@ class ImageFinder {
     const MapBounds rectangle{ground.x0, -ground.z1, ground.x1, -ground.z0};
     const auto image = [this](const MapPoint& at) { return image_at(at); };
     const MapBounds whole = image_bounds(rectangle, image, kStepsPerSide);
-    if (std::isfinite(whole.west)) {
+    if (std::isfinite(whole.west) && surrounds(whole, rectangle)) {
       const double area = (whole.east - whole.west) * (whole.north - whole.south);
       return {whole, area / ((ground.x1 - ground.x0) * (ground.z1 - ground.z0))};
     }
@@ -235,6 +235,23 @@ class ImageFinder {
   }
 
  private:
+  /// The border's image does not where the border is a globe's cut and its poles, which may all fall on one line.
+  [[nodiscard]] bool surrounds(const MapBounds& image, const MapBounds& rectangle) const {
+    constexpr int kSteps = 16;
+    const double margin = 0.01 * std::max(image.east - image.west, image.north - image.south);
+    for (int i = 0; i < (kSteps - 1) * (kSteps - 1); ++i) {
+      const double across = static_cast<double>(1 + i % (kSteps - 1)) / kSteps;
+      const double down = static_cast<double>(1 + i / (kSteps - 1)) / kSteps;
+      const MapPoint at = image_at({rectangle.west + across * (rectangle.east - rectangle.west),
+                                    rectangle.south + down * (rectangle.north - rectangle.south)});
+      if (at.easting < image.west - margin || at.easting > image.east + margin || at.northing < image.south - margin ||
+          at.northing > image.north + margin) {
+        return false;
+      }
+    }
+    return true;
+  }
+
   /// NaN where the map does not show it, or where maps like Mercator's go on for ever.
   [[nodiscard]] MapPoint image_at(const MapPoint& at) const {
     GeoPoint geo = places_.geo_from_world({at.easting, -at.northing});
