@@ -12,6 +12,15 @@ FUNCTION = re.compile(r"^[\w:<>,&*\[\] ]*[ &*](\w+)\((.*?)\)[^()]* \{$", re.S)
 VARIABLE = re.compile(r"^(?:static |constexpr |const |thread_local |inline )+[\w:<>,&* ]*?(\w+)(?: =|\{|;|\[| = \{)")
 
 
+def kind(type_name):
+    """Types that become each other in a call are one: a call would take another source's function without a word."""
+    if re.search(r"\bstring\b|\bstring_view\b|\bchar ?\*", type_name):
+        return "text"
+    if re.fullmatch(r"(?:const )?(?:std::)?(?:u?int\d+_t|s?size_t|int|unsigned|long|double|float|bool|char)", type_name):
+        return "number"
+    return type_name
+
+
 def own_names(path):
     """Name, or name and parameters of a function, of what stands in unnamed namespaces, at the start of a line."""
     for body in UNNAMED.findall(re.sub(r'R"(\w*)\(.*?\)\1"', "", path.read_text(), flags=re.S)):
@@ -24,7 +33,7 @@ def own_names(path):
                 yield found.group(1)
             elif found := FUNCTION.match(line):
                 types = [re.sub(r"\s*\w+(?: = .*)?$", "", each.strip()) for each in found.group(2).split(",")]
-                yield f"{found.group(1)}({', '.join(types)})"
+                yield f"{found.group(1)}({', '.join(map(kind, types))})"
             elif found := VARIABLE.match(line):
                 yield found.group(1)
 

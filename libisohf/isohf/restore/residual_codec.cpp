@@ -109,7 +109,7 @@ class Neighbours {
   std::vector<unsigned char> bits_;  ///< West of the place at hand this row's, from there on the row above's
 };
 
-[[noreturn]] void refuse(const char* what) {
+[[noreturn]] void refuse_residuals(const char* what) {
   throw Error(ErrorCode::kCorrupt, what);
 }
 
@@ -172,7 +172,7 @@ struct Stream {
 
   template <typename Bits>
   Bits take() {
-    if (next == count) refuse("a stream of samples ends early");
+    if (next == count) refuse_residuals("a stream of samples ends early");
     Bits value = 0;
     for (std::size_t plane = 0; plane < sizeof(Bits); ++plane) {
       const auto byte = std::to_integer<Bits>(bytes[plane * count + next]);
@@ -189,21 +189,21 @@ void decode(const SampleMapping& mapping, std::int64_t width, std::span<const st
   using Bits = typename Type::Bits;
   ByteReader in(payload);
   const auto flags = in.read<std::uint8_t>();
-  if (flags > 1) refuse("residuals of a kind that this build does not know");
+  if (flags > 1) refuse_residuals("residuals of a kind that this build does not know");
   std::array<Stream, kContexts> streams;
   std::size_t coded = 0;
   for (Stream& stream : streams) {
     stream.count = in.read<std::uint32_t>();
     coded += stream.count;
   }
-  if (coded > predicted.size()) refuse("more residuals than samples");
+  if (coded > predicted.size()) refuse_residuals("more residuals than samples");
   std::span<const std::byte> mask;
   if (flags == 1) mask = in.read_bytes((predicted.size() + 7) / 8);
   Stream kept;
   kept.count = predicted.size() - coded;
   kept.bytes = in.read_bytes(kept.count * sizeof(Bits));
   for (Stream& stream : streams) stream.bytes = in.read_bytes(stream.count * sizeof(Bits));
-  if (in.remaining() != 0) refuse("bytes behind the residuals");
+  if (in.remaining() != 0) refuse_residuals("bytes behind the residuals");
   Neighbours neighbours(width);
   for (std::size_t i = 0; i < predicted.size(); ++i) {
     Bits bits = 0;
@@ -220,7 +220,7 @@ void decode(const SampleMapping& mapping, std::int64_t width, std::span<const st
     std::memcpy(raw.data() + i * sizeof(Bits), &bits, sizeof(Bits));
   }
   // As many samples as are kept and coded together: where all kept ones are used, so are all residuals.
-  if (kept.next != kept.count) refuse("more kept samples than there are places for");
+  if (kept.next != kept.count) refuse_residuals("more kept samples than there are places for");
 }
 
 }  // namespace
