@@ -13,8 +13,6 @@
 #include "isohf/error.h"
 
 namespace isohf {
-namespace {}  // namespace
-
 std::string GridHeader::plain_name(std::string_view name) {
   std::string plain;
   for (const char c : name) {

@@ -4,8 +4,8 @@
 #include <sys/stat.h>
 
 #include <cerrno>
-#include <system_error>
 
+#include "isohf/base/file.h"
 #include "isohf/error.h"
 
 namespace isohf {
@@ -14,8 +14,7 @@ FileStamp FileStamp::of(const std::string& path) {
   struct stat status {};
   if (::stat(path.c_str(), &status) != 0) {
     const int error = errno;
-    throw Error(ErrorCode::kIo,
-                {path, error == ENOENT ? "no such file" : std::generic_category().message(error), "", ""});
+    throw Error(ErrorCode::kIo, {path, error == ENOENT ? "no such file" : reason(error), "", ""});
   }
   return {status.st_dev, status.st_ino, static_cast<std::uint64_t>(status.st_size), status.st_mtim.tv_sec,
           status.st_mtim.tv_nsec};

@@ -10,25 +10,15 @@ import subprocess
 import sys
 import tempfile
 
-try:
-    import numpy
-    from osgeo import gdal, osr
-except ImportError:
-    print("GDAL's Python package or numpy is missing")
-    sys.exit(77)
+from against_gdal import check, failures
 
-gdal.UseExceptions()
-failures = []
+import numpy
+from osgeo import gdal, osr
+
 TYPES = {"u8": (gdal.GDT_Byte, 0, 250), "u16": (gdal.GDT_UInt16, 0, 65000), "s16": (gdal.GDT_Int16, -30000, 30000),
          "u32": (gdal.GDT_UInt32, 0, 100000), "s32": (gdal.GDT_Int32, -100000, 100000),
          "f32": (gdal.GDT_Float32, -11000, 8848), "f64": (gdal.GDT_Float64, -11000, 8848)}
 BITS = {1: 1, 2: 3, 4: 15}
-
-
-def check(holds, what):
-    if not holds:
-        failures.append(what)
-        print("FAILED " + what)
 
 
 def run(program, *arguments):

@@ -8,20 +8,14 @@ Heights are metres to the East of a place, or to the North of it, so that a heig
 import json
 import math
 import os
-import pathlib
 import subprocess
 import sys
-import tempfile
 
-try:
-    import numpy
-    from osgeo import gdal, osr
-except ImportError:
-    print("GDAL's Python package or numpy is missing")
-    sys.exit(77)
+from against_gdal import Program, check, run_parts
 
-gdal.UseExceptions()
-osr.UseExceptions()
+import numpy
+from osgeo import gdal, osr
+
 METRES_PER_DEGREE = 111320.0
 SIZE = 120
 NEAR = 0.3  # metres: a hundredth of a sample of 30 m
@@ -31,14 +25,6 @@ FIRST = "+proj=lcc +lat_1=46 +lat_2=48 +lat_0=47 +lon_0=11 +x_0=500000 +y_0=1000
 OTHERS = [("lat_1=46", "lat_1=46.001"), ("lat_2=48", "lat_2=48.001"), ("lat_0=47", "lat_0=47.001"),
           ("lon_0=11", "lon_0=11.001"), ("x_0=500000", "x_0=500001"), ("y_0=100000", "y_0=100001"),
           ("ellps=GRS80", "ellps=intl"), ("units=m", "units=us-ft"), ("proj=lcc", "proj=eqdc")]
-
-failures = []
-
-
-def check(holds, what):
-    if not holds:
-        failures.append(what)
-        print("FAILED " + what)
 
 
 def system(text):
@@ -96,26 +82,6 @@ def worst(path, wanted, middle, axis, reach=1000.0):
             far = max(far, abs(height - plane(lon, lat, middle, axis)))
             count += 1
     return far, count
-
-
-class Program:
-    def __init__(self, folder, bin_dir):
-        self.folder = folder
-        self.bin = bin_dir
-
-    def run(self, *arguments):
-        return subprocess.run([f"{self.bin}/isohf", *map(str, arguments)], capture_output=True, text=True, check=False)
-
-    def must(self, *arguments):
-        result = self.run(*arguments)
-        check(result.returncode == 0, f"isohf {' '.join(map(str, arguments))}: {result.stderr.strip()}")
-        return result
-
-    def refuses(self, said, *arguments):
-        result = self.run(*arguments)
-        lines = result.stderr.strip().splitlines()
-        check(result.returncode != 0 and len(lines) == 1 and said in lines[0],
-              f"isohf {' '.join(map(str, arguments))}: must say '{said}' in one line, said: {result.stderr.strip()}")
 
 
 def projections(isohf, folder):
@@ -574,18 +540,8 @@ made.Write(numpy.zeros((12000, 12000), dtype=numpy.float32))
 """
 
 
-def main():
-    if len(sys.argv) != 2:
-        print(__doc__, file=sys.stderr)
-        return 2
-    bin_dir = pathlib.Path(sys.argv[1]).resolve()
-    for part in (projections, globes, planets, heights_of_a_projection, joined, other_parameters, written_elsewhere, loads_no_proj, beside,
-                 samples, geojp2, ranges_of_voids, large_chunks, feet, voids_of_files, beside_samples, rotated):
-        with tempfile.TemporaryDirectory(prefix="placement") as folder:
-            part(Program(pathlib.Path(folder), bin_dir), pathlib.Path(folder))
-    print(f"{len(failures)} failures")
-    return 1 if failures else 0
-
+PARTS = (projections, globes, planets, heights_of_a_projection, joined, other_parameters, written_elsewhere, loads_no_proj, beside,
+         samples, geojp2, ranges_of_voids, large_chunks, feet, voids_of_files, beside_samples, rotated)
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(run_parts(PARTS, __doc__))

@@ -12,27 +12,15 @@ import json
 import pathlib
 import sqlite3
 import struct
-import subprocess
 import sys
-import tempfile
 
-try:
-    import numpy
-    from osgeo import gdal
-except ImportError:
-    print("GDAL's Python package or numpy is missing")
-    sys.exit(77)
+from against_gdal import Program, check, run_parts
 
-gdal.UseExceptions()
+import numpy
+from osgeo import gdal
+
 gdal.SetConfigOption("GDAL_PAM_ENABLED", "NO")
 HALF_MAP = 20037508.342789244
-failures = []
-
-
-def check(holds, what):
-    if not holds:
-        failures.append(what)
-        print("FAILED " + what)
 
 
 def codes(zoom, column, row, side):
@@ -172,20 +160,7 @@ def folder_of(root, tiles, ending):
     return root
 
 
-class Program:
-    def __init__(self, folder, bin_dir):
-        self.folder = folder
-        self.bin = bin_dir
-
-    def run(self, *arguments):
-        return subprocess.run([f"{self.bin}/isohf", *map(str, arguments)], capture_output=True, text=True, check=False)
-
-    def refuses(self, said, *arguments):
-        result = self.run(*arguments)
-        lines = result.stderr.strip().splitlines()
-        check(result.returncode in (1, 2) and len(lines) == 1 and said in lines[0],
-              f"isohf {' '.join(map(str, arguments))}: must say '{said}' in one line, said: {result.stderr.strip()}")
-
+class Tiles(Program):
     def holds(self, source, tiles, zoom, encoding, *options, side=256, missing_is_void=True):
         """Samples, voids and place of all tiles of a level, as GDAL reads what comes back."""
         archive, raster = self.folder / "a.isohf", self.folder / "a.tif"
@@ -352,15 +327,7 @@ def main():
     if len(sys.argv) == 3 and sys.argv[1] == "--small":
         write_small(pathlib.Path(sys.argv[2]))
         return 0
-    if len(sys.argv) != 2:
-        print(__doc__, file=sys.stderr)
-        return 2
-    bin_dir = pathlib.Path(sys.argv[1]).resolve()
-    for part in (read, folders, as_gdal, refused):
-        with tempfile.TemporaryDirectory(prefix="tiles") as folder:
-            part(Program(pathlib.Path(folder), bin_dir), pathlib.Path(folder))
-    print(f"{len(failures)} failures")
-    return 1 if failures else 0
+    return run_parts((read, folders, as_gdal, refused), __doc__, Tiles)
 
 
 if __name__ == "__main__":

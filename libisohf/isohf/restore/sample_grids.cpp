@@ -92,10 +92,6 @@ MapBounds turned(const MapBounds& box, const Metadata& metadata) {
                   west, east, again.west, east, west, there.east));
 }
 
-std::string describe_unit(HorizontalUnit unit) {
-  return unit == HorizontalUnit::kDegree ? "degrees" : unit == HorizontalUnit::kMetre ? "metres" : "an unknown unit";
-}
-
 /// Refuses coordinates that are known to mean another ground than the source's.
 void check_same_system(const Metadata& metadata, const SourceInfo& other) {
   const SourceRecord& source = metadata.source;
@@ -322,6 +318,10 @@ double Turn::onto_ground(double x, double tolerance) const {
   if (x >= ground_x0 - tolerance && x <= ground_x1 + tolerance) return x;
   const double there = x - length * std::floor((x - ground_x0 + tolerance) / length);
   return there <= ground_x1 + tolerance ? there : x;
+}
+
+std::string describe_unit(HorizontalUnit unit) {
+  return unit == HorizontalUnit::kDegree ? "degrees" : unit == HorizontalUnit::kMetre ? "metres" : "an unknown unit";
 }
 
 std::string describe_system(const ReferenceSystem& system) {

@@ -24,6 +24,8 @@ struct Turn {
 };
 [[nodiscard]] std::optional<Turn> turn_of(const Metadata& metadata);
 
+/// "metres".
+[[nodiscard]] std::string describe_unit(HorizontalUnit unit);
 /// "EPSG:32632", a name in quotes, or by the ellipsoid.
 [[nodiscard]] std::string describe_system(const ReferenceSystem& system);
 /// Throws Error{kInvalidArgument}: another raster is in another system than the archive's source.

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "isohf/error.h"
+#include "isohf/restore/sample_grids.h"
 #include "isohf/surface.h"
 
 namespace isohf {
@@ -17,21 +18,12 @@ constexpr double kOfSample = 1e-3;
 /// Radii of one body are told apart where the ground would move by more.
 constexpr double kSameEllipsoid = 1e-5;
 
-const char* name_of(HorizontalUnit unit) {
-  return unit == HorizontalUnit::kDegree ? "degrees" : unit == HorizontalUnit::kMetre ? "metres" : "an unknown unit";
-}
-
-std::string describe(const ReferenceSystem& system) {
-  if (system.epsg) return fmt::format("EPSG:{}", *system.epsg);
-  return system.name.empty() ? "another system without a name" : '"' + system.name + '"';
-}
-
 /// What of the two places differs, one clause each.
 void compare_places(const Georeference& ours, const Georeference& theirs, const SourceInfo& other,
                     std::vector<std::string>& found) {
   const bool units_known = ours.unit != HorizontalUnit::kUnknown && theirs.unit != HorizontalUnit::kUnknown;
   if (units_known && ours.unit != theirs.unit) {
-    found.push_back(fmt::format("is in {}, not {}", name_of(theirs.unit), name_of(ours.unit)));
+    found.push_back(fmt::format("is in {}, not {}", describe_unit(theirs.unit), describe_unit(ours.unit)));
     return;
   }
   if (units_known && std::abs(ours.metres_per_unit - theirs.metres_per_unit) > 1e-9 * ours.metres_per_unit) {
@@ -64,7 +56,7 @@ void compare_systems(const ReferenceSystem& ours, const ReferenceSystem& theirs,
     return;
   }
   if (same == false) {
-    found.push_back(fmt::format("is in {}, not {}", describe(theirs), describe(ours)));
+    found.push_back(fmt::format("is in {}, not {}", describe_system(theirs), describe_system(ours)));
     return;
   }
   const auto& a = ours.semi_major_axis_m;
