@@ -46,6 +46,11 @@ void prepare_telling(const Arguments& arguments) {
   ::_exit(kExitFailed);
 }
 
+/// Runs before the constructors of this program's globals, which may find no memory either.
+__attribute__((constructor(101))) void end_in_one_line_from_the_start() {
+  std::set_terminate(end_in_one_line);
+}
+
 }  // namespace
 
 void print_version() {
@@ -58,7 +63,6 @@ void print_version() {
 int run_program(const char* name, int argc, char** argv, int (*body)(const Arguments& arguments)) {
   occupy_standard_descriptors();
   program_name() = name;
-  std::set_terminate(end_in_one_line);
   // The C library loads what unwinds a stack when it is needed first, and aborts where there is no memory left for that.
   void* frame = nullptr;
   static_cast<void>(::backtrace(&frame, 1));

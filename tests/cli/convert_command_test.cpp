@@ -199,10 +199,12 @@ TEST_F(ConvertCommand, MemoryThatRunsOutIsOneLine) {
 #endif
   int refused = 0;
   int made = 0;
-  // From what does not even load the libraries, exit code 127, to what is enough.
-  for (std::uint64_t mebibytes = 12; made == 0 && mebibytes < 400; mebibytes += 2) {
+  // From what does not even load the libraries, exit code 127, to what is enough: by small steps where the first line
+  // of the program has no memory yet.
+  for (std::uint64_t kibibytes = 16U << 10U; made == 0 && kibibytes < 400U << 10U;
+       kibibytes += refused < 4 ? 32 : 2048) {
     RunOptions small;
-    small.address_space_bytes = mebibytes << 20U;
+    small.address_space_bytes = kibibytes << 10U;
     const RunResult result = run_isohf({"convert", folder / "a.tif", folder / "a.isohf", "-j", "1"}, small);
     if (result.exit_code == 127) continue;
     if (result.exit_code == 0) {
@@ -210,7 +212,7 @@ TEST_F(ConvertCommand, MemoryThatRunsOutIsOneLine) {
       continue;
     }
     ++refused;
-    EXPECT_EQ(result.exit_code, 1) << mebibytes;
+    EXPECT_EQ(result.exit_code, 1) << kibibytes;
     EXPECT_THAT(result.err, testing::AllOf(testing::StartsWith("isohf: "), HasSubstr("memory")));
     EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
     EXPECT_EQ(folder.names(), std::vector<std::string>{"a.tif"});
