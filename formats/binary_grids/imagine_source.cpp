@@ -33,7 +33,6 @@ namespace {
 
 constexpr std::string_view kImagineMagic("EHFA_HEADER_TAG\0", 16);
 constexpr std::string_view kSpillMagic("ERDAS_IMG_EXTERNAL_RASTER\0", 26);
-constexpr std::int64_t kMostImagineSide = 2147483647;
 constexpr std::uint64_t kMostTileBytes = std::uint64_t{1} << 26U;
 constexpr std::uint64_t kMostKeptBytes = std::uint64_t{64} << 20U;
 /// Layers and what describes them.

@@ -14,14 +14,8 @@
 namespace isohf {
 namespace {
 
-/// Strips of whole rows of members, or whole blocks of theirs, up to about this size...
-constexpr std::int64_t kStripBytes = std::int64_t{16} << 20U;
-/// ...and one row of blocks up to this size, so that no block is decoded twice.
-constexpr std::int64_t kMostStripBytes = std::int64_t{256} << 20U;
 /// Rows of small members are put together to strips of about this size.
 constexpr std::int64_t kLeastStripBytes = std::int64_t{4} << 20U;
-/// Parts of members that are read side by side.
-constexpr std::size_t kBatchBytes = std::size_t{8} << 20U;
 
 /// Coordinates this close to a sample, in samples, are its place: they are computed from origins and spacings.
 constexpr double kAtSample = 1e-6;
@@ -259,11 +253,14 @@ struct MosaicSource::Part {
 };
 
 MosaicSource::MosaicSource(std::string path, MosaicPlan plan, const OpenOptions& options, OverlapRule rule)
-    : plan_(std::move(plan)), rule_(rule), unpacked_bytes_(options.unpacked_bytes), pool_(options) {
+    : plan_(std::move(plan)),
+      rule_(rule),
+      unpacked_bytes_(options.unpacked_bytes),
+      pool_(options),
+      strips_(plan_.info, [this](const Window& window, std::span<std::byte> samples) { compose(window, samples); }) {
   plan_.info.path = std::move(path);
   choose_strips();
   share_memory(ReaderPool::kMostIdleBytes);
-  strip_columns_ = plan_.info.width;
 }
 
 void MosaicSource::choose_strips() {
@@ -326,41 +323,7 @@ void MosaicSource::read_window(const Window& window, std::span<std::byte> sample
   ISOHF_ASSERT(window.column >= 0 && window.row >= 0 && window.columns >= 0 && window.rows >= 0);
   ISOHF_ASSERT(window.column + window.columns <= info.width && window.row + window.rows <= info.height);
   ISOHF_ASSERT(samples.size() == bytes_of(window));
-  // Passes read the same columns again and again; the first window of others is read as it is.
-  const bool follows = window.column == strip_column_ && window.columns == strip_columns_;
-  if (!follows) {
-    strip_number_ = -1;
-    strip_column_ = window.column;
-    strip_columns_ = window.columns;
-  }
-  const std::size_t row_bytes = static_cast<std::size_t>(window.columns) * size_bytes(info.sample_type);
-  const std::int64_t end = window.row + window.rows;
-  for (std::int64_t row = window.row; row < end;) {
-    const std::int64_t strip = row / info.block_height;
-    const std::int64_t top = strip * info.block_height;
-    const std::int64_t bottom = std::min(top + info.block_height, info.height);
-    const std::int64_t rows = std::min(end, bottom) - row;
-    const auto out = samples.subspan(static_cast<std::size_t>(row - window.row) * row_bytes,
-                                     static_cast<std::size_t>(rows) * row_bytes);
-    const bool in_one_go = !follows || (row == top && row + rows == bottom);
-    if (strip != strip_number_ && in_one_go) {
-      compose({window.column, row, window.columns, rows}, out);
-    } else {
-      read_strip(strip);
-      std::memcpy(out.data(), strip_.data() + static_cast<std::size_t>(row - top) * row_bytes, out.size());
-    }
-    row += rows;
-  }
-}
-
-void MosaicSource::read_strip(std::int64_t strip) {
-  if (strip == strip_number_) return;
-  const std::int64_t top = strip * plan_.info.block_height;
-  const Window window{strip_column_, top, strip_columns_, std::min(plan_.info.block_height, plan_.info.height - top)};
-  strip_number_ = -1;
-  strip_.resize(bytes_of(window));
-  compose(window, strip_);
-  strip_number_ = strip;
+  strips_.read(window, samples);
 }
 
 void MosaicSource::compose(const Window& window, std::span<std::byte> out) {

@@ -9,6 +9,7 @@
 
 #include "formats/mosaic/mosaic_layout.h"
 #include "formats/mosaic/reader_pool.h"
+#include "formats/mosaic/strip_reader.h"
 #include "isohf/raster.h"
 
 namespace isohf {
@@ -45,7 +46,6 @@ class MosaicSource final : public HeightSource {
 
   void choose_strips();
   void share_memory(std::uint64_t idle_bytes);
-  void read_strip(std::int64_t strip);
   void compose(const Window& window, std::span<std::byte> out);
   void draw(std::size_t layer, const Window& window, std::span<std::byte> out);
   void interpolate(std::size_t layer, const Window& window, std::span<std::byte> out);
@@ -63,10 +63,7 @@ class MosaicSource final : public HeightSource {
   ReaderPool pool_;
   /// Of members that are read side by side; here because every thread's heap would grow.
   std::vector<std::byte> parts_;
-  std::vector<std::byte> strip_;  ///< rows of the strip that was read last
-  std::int64_t strip_number_ = -1;
-  std::int64_t strip_column_ = 0;  ///< the columns that strips hold: those that were asked for last
-  std::int64_t strip_columns_ = 0;
+  StripReader strips_;
 };
 
 }  // namespace isohf

@@ -1,4 +1,6 @@
 #include <fmt/core.h>
+#include <oneapi/tbb/parallel_for.h>
+#include <oneapi/tbb/task_arena.h>
 
 #include <algorithm>
 #include <array>
@@ -7,6 +9,7 @@
 #include <filesystem>
 #include <limits>
 #include <list>
+#include <numeric>
 #include <optional>
 #include <pugixml.hpp>
 #include <span>
@@ -18,6 +21,8 @@
 #include "formats/files/text_tokens.h"
 #include "formats/georeference/files_beside.h"
 #include "formats/mosaic/mosaic_layout.h"
+#include "formats/mosaic/reader_pool.h"
+#include "formats/mosaic/strip_reader.h"
 #include "formats/open_options.h"
 #include "formats/readers.h"
 #include "formats/tiff/gdal_tags.h"
@@ -30,8 +35,6 @@ namespace {
 
 constexpr std::uint64_t kLongestVrt = std::uint64_t{256} << 20U;
 constexpr std::int64_t kMostSide = std::int64_t{1} << 31;
-/// Files of a mosaic that stay open.
-constexpr std::size_t kMostVrtOpen = 16;
 /// A VRT of VRTs of ...; more go round in a circle.
 constexpr int kDeepest = 8;
 /// Of a sample: places in a VRT are written in decimals.
@@ -39,11 +42,16 @@ constexpr double kOnTheGrid = 1e-3;
 
 thread_local int depth = 0;
 
-struct Deeper {
-  Deeper() { ++depth; }
-  ~Deeper() { --depth; }
+/// In a VRT within what `outer` counts, on whatever thread.
+class Deeper {
+ public:
+  explicit Deeper(int outer) : before_(std::exchange(depth, outer + 1)) {}
+  ~Deeper() { depth = before_; }
   Deeper(const Deeper&) = delete;
   Deeper& operator=(const Deeper&) = delete;
+
+ private:
+  int before_;
 };
 
 /// A rectangle of one file, and where it lies in the mosaic.
@@ -58,10 +66,20 @@ struct Piece {
   double offset = 0.0;
 };
 
+/// What a window takes from a piece.
+struct Part {
+  const Piece* piece = nullptr;
+  Window own;               ///< in the file
+  std::int64_t column = 0;  ///< of its first sample in the window
+  std::int64_t row = 0;
+  HeightSource* source = nullptr;
+  std::span<std::byte> samples;  ///< of the file's kind
+};
+
 class VrtSource final : public FileSource {
  public:
   VrtSource(const std::string& path, const OpenOptions& options)
-      : FileSource(path, "VRT", options), unpacked_bytes_(options.unpacked_bytes / kMostVrtOpen) {
+      : FileSource(path, "VRT", options), unpacked_bytes_(options.unpacked_bytes) {
     if (depth >= kDeepest) fail(ErrorCode::kUnsupported, "is one of itself, or of too many within each other");
     std::string text(static_cast<std::size_t>(std::min(file_->size_bytes(), kLongestVrt + 1)), '\0');
     if (text.size() > kLongestVrt) fail(ErrorCode::kUnsupported, "is larger than 256 MiB");
@@ -76,15 +94,20 @@ class VrtSource final : public FileSource {
 
   void read_window(const Window& window, std::span<std::byte> samples) override {
     ISOHF_ASSERT(is_window_of(info_, window, samples.size()));
-    const std::size_t size = empty_.size();
-    for (std::size_t at = 0; at < samples.size(); at += size) std::memcpy(samples.data() + at, empty_.data(), size);
-    for (const Piece& piece : pieces_) copy(piece, window, samples);
+    strips_.read(window, samples);
   }
   void limit_buffers(std::uint64_t bytes) override {
-    limit_ = bytes / kMostVrtOpen;
+    limit_ = bytes / most_open_;
     for (Opened& each : opened_) each.source->limit_buffers(*limit_);
   }
-  [[nodiscard]] std::uint64_t buffer_bytes(std::uint64_t limit) const override { return limit; }
+  [[nodiscard]] std::uint64_t buffer_bytes(std::uint64_t limit) const override {
+    std::int64_t widest = 0;
+    for (const Piece& piece : pieces_) widest = std::max(widest, piece.from.columns);
+    const std::size_t row_bytes = size_bytes(info_.sample_type) * static_cast<std::size_t>(info_.block_height);
+    const std::size_t widest_part = row_bytes * static_cast<std::size_t>(widest);
+    const std::size_t strip = row_bytes * static_cast<std::size_t>(info_.width);
+    return limit + strip + std::min(strip, std::max(widest_part, kBatchBytes));
+  }
 
  private:
   struct Opened {
@@ -154,7 +177,7 @@ class VrtSource final : public FileSource {
       if (const auto node = band.child(element)) read_gdal_item(role, trimmed(node.text().get()), info_);
     }
     for (const pugi::xml_node& node : band.children()) read_source(node);
-    info_.block_width = info_.width;
+    arrange();
     type_ = info_.sample_type;
     if (info_.void_values.empty() && options.void_values.empty() && !is_floating(type_) && has_gaps()) {
       const MosaicSamples samples = choose_mosaic_samples({SampleKind::of(info_)}, true, false);
@@ -242,7 +265,92 @@ class VrtSource final : public FileSource {
       piece.scale = element_number(node, "ScaleRatio").value_or(1.0);
       piece.offset = element_number(node, "ScaleOffset").value_or(0.0);
     }
+    // A claim, which at worst costs time.
+    const double block = number(node.child("SourceProperties"), "BlockYSize", 1.0);
+    block_rows_ =
+        std::max(block_rows_, static_cast<std::int64_t>(std::clamp(block, 1.0, static_cast<double>(piece.from.rows))));
     pieces_.push_back(std::move(piece));
+  }
+
+  /// Chooses how many rows are best read at once, and finds what is needed to look for pieces.
+  void arrange() {
+    info_.block_width = info_.width;
+    const std::int64_t row_bytes = info_.width * static_cast<std::int64_t>(size_bytes(info_.sample_type));
+    const std::int64_t rows = block_rows_ <= kMostStripBytes / row_bytes
+                                  ? block_rows_ * std::max<std::int64_t>(1, kStripBytes / row_bytes / block_rows_)
+                                  : std::max<std::int64_t>(1, kMostStripBytes / row_bytes);
+    info_.block_height = std::min(rows, info_.height);
+    most_open_ = std::clamp<std::size_t>(pieces_.size(), 1, most_open_rasters());
+    unpacked_bytes_ /= most_open_;
+    by_row_.resize(pieces_.size());
+    std::iota(by_row_.begin(), by_row_.end(), std::size_t{0});
+    std::ranges::stable_sort(by_row_, {}, [&](std::size_t i) { return pieces_[i].row; });
+    for (const Piece& piece : pieces_) tallest_ = std::max(tallest_, piece.from.rows);
+  }
+
+  void compose(const Window& window, std::span<std::byte> samples) {
+    const std::size_t size = empty_.size();
+    for (std::size_t at = 0; at < samples.size(); at += size) std::memcpy(samples.data() + at, empty_.data(), size);
+    const Deeper deeper(depth);  // sources open and read theirs in turn
+    if (depth > kDeepest) fail(ErrorCode::kUnsupported, "is one of itself, or of too many within each other");
+    std::vector<Part> parts = parts_in(window);
+    for (std::size_t from = 0; from < parts.size();) {
+      std::size_t bytes = 0;
+      std::size_t end = from;
+      for (; end < parts.size() && end - from < most_open_; ++end) {
+        parts[end].source = &source_of(*parts[end].piece);
+        const std::size_t more = bytes_of(parts[end]);
+        if (end > from && bytes + more > kBatchBytes) break;
+        bytes += more;
+      }
+      read(std::span(parts).subspan(from, end - from), bytes);
+      for (; from < end; ++from) lay(parts[from], window, samples);
+    }
+  }
+
+  /// In the order in which they are laid over each other.
+  [[nodiscard]] std::vector<Part> parts_in(const Window& window) const {
+    std::vector<Part> parts;
+    const auto row_of = [&](std::size_t i) { return pieces_[i].row; };
+    auto next = std::ranges::lower_bound(by_row_, window.row - tallest_ + 1, {}, row_of);
+    for (; next != by_row_.end() && row_of(*next) < window.row + window.rows; ++next) {
+      const Piece& piece = pieces_[*next];
+      const std::int64_t west = std::max(window.column, piece.column);
+      const std::int64_t north = std::max(window.row, piece.row);
+      const std::int64_t east = std::min(window.column + window.columns, piece.column + piece.from.columns);
+      const std::int64_t south = std::min(window.row + window.rows, piece.row + piece.from.rows);
+      if (west >= east || north >= south) continue;
+      Part part;
+      part.piece = &piece;
+      part.own = {piece.from.column + west - piece.column, piece.from.row + north - piece.row, east - west,
+                  south - north};
+      part.column = west - window.column;
+      part.row = north - window.row;
+      parts.push_back(part);
+    }
+    std::ranges::sort(parts, {}, &Part::piece);
+    return parts;
+  }
+
+  [[nodiscard]] static std::size_t bytes_of(const Part& part) {
+    return static_cast<std::size_t>(part.own.columns * part.own.rows) * size_bytes(part.source->info().sample_type);
+  }
+
+  /// Each from a file of its own, side by side.
+  void read(std::span<Part> parts, std::size_t bytes) {
+    buffer_.resize(bytes);
+    std::size_t begin = 0;
+    for (Part& part : parts) {
+      part.samples = std::span(buffer_).subspan(begin, bytes_of(part));
+      begin += part.samples.size();
+    }
+    const int here = depth - 1;
+    const auto read_one = [&](std::size_t i) {
+      const Deeper deeper(here);
+      parts[i].source->read_window(parts[i].own, parts[i].samples);
+    };
+    // Isolated: a thread that waits here does not start on unrelated work of the caller's.
+    oneapi::tbb::this_task_arena::isolate([&] { oneapi::tbb::parallel_for(std::size_t{0}, parts.size(), read_one); });
   }
 
   /// Whether some samples lie in no source, or only in values that a source leaves out.
@@ -276,33 +384,21 @@ class VrtSource final : public FileSource {
            fmt::format("takes samples beyond the {} x {} of {}", info.width, info.height, printable(piece.path)));
     }
     if (limit_) source->limit_buffers(*limit_);
-    if (opened_.size() == kMostVrtOpen) opened_.pop_back();
+    if (opened_.size() == most_open_) opened_.pop_back();
     opened_.push_front({&piece, std::move(source)});
     return *opened_.front().source;
   }
 
-  void copy(const Piece& piece, const Window& window, std::span<std::byte> samples) {
-    const Deeper deeper;  // sources open and read theirs in turn
-    if (depth > kDeepest) fail(ErrorCode::kUnsupported, "is one of itself, or of too many within each other");
-    const std::int64_t west = std::max(window.column, piece.column);
-    const std::int64_t north = std::max(window.row, piece.row);
-    const std::int64_t east = std::min(window.column + window.columns, piece.column + piece.from.columns);
-    const std::int64_t south = std::min(window.row + window.rows, piece.row + piece.from.rows);
-    if (west >= east || north >= south) return;
-    HeightSource& source = source_of(piece);
-    const SampleType type = source.info().sample_type;
+  void lay(const Part& part, const Window& window, std::span<std::byte> samples) {
+    const Piece& piece = *part.piece;
+    const SampleType type = part.source->info().sample_type;
     // What stands for a void in a wider type than the VRT's, as of masks, has no sample in it.
-    const std::vector<double>& voids = source.info().void_values;
+    const std::vector<double>& voids = part.source->info().void_values;
     const bool drops_voids = type != type_;
-    const Window part{piece.from.column + west - piece.column, piece.from.row + north - piece.row, east - west,
-                      south - north};
     const std::size_t size = size_bytes(type);
-    buffer_.resize(static_cast<std::size_t>(part.columns * part.rows) * size);
-    source.read_window(part, buffer_);
     const std::size_t out_size = empty_.size();
     const auto out_at = [&](std::int64_t row) {
-      return samples.data() +
-             static_cast<std::size_t>((north - window.row + row) * window.columns + west - window.column) * out_size;
+      return samples.data() + static_cast<std::size_t>((part.row + row) * window.columns + part.column) * out_size;
     };
     const bool as_it_is = type == info_.sample_type && !piece.skipped && piece.scale == 1.0 && piece.offset == 0.0;
     // A value of its type, which is written with as few as 15 digits.
@@ -313,14 +409,14 @@ class VrtSource final : public FileSource {
     const bool to_whole = !is_floating(type_);
     with_stored_type(type, [&](auto kind) {
       using Stored = decltype(kind);
-      for (std::int64_t row = 0; row < part.rows; ++row) {
-        const std::byte* in = buffer_.data() + static_cast<std::size_t>(row * part.columns) * size;
+      for (std::int64_t row = 0; row < part.own.rows; ++row) {
+        const std::byte* in = part.samples.data() + static_cast<std::size_t>(row * part.own.columns) * size;
         std::byte* out = out_at(row);
         if (as_it_is) {
-          std::memcpy(out, in, static_cast<std::size_t>(part.columns) * size);
+          std::memcpy(out, in, static_cast<std::size_t>(part.own.columns) * size);
           continue;
         }
-        for (std::int64_t column = 0; column < part.columns; ++column, in += size, out += out_size) {
+        for (std::int64_t column = 0; column < part.own.columns; ++column, in += size, out += out_size) {
           double value = static_cast<double>(number_of(stored_at<Stored>(in)));
           if (skips && (std::abs(value - skipped) <= digits || (std::isnan(value) && std::isnan(skipped)))) continue;
           if (drops_voids && std::ranges::find(voids, value) != voids.end()) {
@@ -344,8 +440,13 @@ class VrtSource final : public FileSource {
   SampleType type_{};             ///< as the VRT has it; that of `info_` may be wider, for a void
   std::vector<std::byte> empty_;  ///< what stands where no piece is
   std::vector<Piece> pieces_;     ///< later ones lie above
-  std::list<Opened> opened_;      ///< those last used first
+  std::vector<std::size_t> by_row_;
+  std::int64_t tallest_ = 0;     ///< of the pieces
+  std::int64_t block_rows_ = 1;  ///< most that one of the sources says it has
+  std::size_t most_open_ = 1;
+  std::list<Opened> opened_;  ///< those last used first
   std::vector<std::byte> buffer_;
+  StripReader strips_{info_, [this](const Window& window, std::span<std::byte> samples) { compose(window, samples); }};
 };
 
 }  // namespace
