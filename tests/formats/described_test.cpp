@@ -282,6 +282,46 @@ TEST_F(Vrt, NodataOf15DigitsIsTheFloatThatItMeans) {
   EXPECT_THAT(vrt("0.11"), ElementsAre(1.0, 2.0, 0.1F, 4.0));
 }
 
+TEST_F(Vrt, MoreSourcesThanMayBeOpenLieOverEachOtherInTheirOrder) {
+  constexpr int kFiles = 100;
+  constexpr int kRows = 4;
+  // Each covers the first column of the next, which is laid over it; every third begins two rows further down.
+  std::string sources;
+  std::array<std::array<double, 2 * kFiles + 1>, kRows> expected{};
+  for (int i = 0; i < kFiles; ++i) {
+    std::vector<std::int16_t> samples;
+    const int top = i % 3 == 0 ? 2 : 0;
+    for (int row = 0; row < kRows - top; ++row) {
+      for (int column = 0; column < 3; ++column) {
+        samples.push_back(static_cast<std::int16_t>(100 * i + 10 * row + column));
+        expected.at(static_cast<std::size_t>(row + top)).at(static_cast<std::size_t>(2 * i + column)) = samples.back();
+      }
+    }
+    write(fmt::format("{}.dat", i), stored<std::int16_t>(samples));
+    write(fmt::format("{}.hdr", i), fmt::format("ENVI\nsamples = 3\nlines = {}\ndata type = 2\n", kRows - top));
+    sources += fmt::format(R"(<SimpleSource><SourceFilename relativeToVRT="1">{}.dat</SourceFilename>)"
+                           R"(<SourceBand>1</SourceBand><SourceProperties BlockYSize="{}"/>)"
+                           R"(<SrcRect xOff="0" yOff="0" xSize="3" ySize="{}"/>)"
+                           R"(<DstRect xOff="{}" yOff="{}" xSize="3" ySize="{}"/></SimpleSource>)",
+                           i, i % 2 + 1, kRows - top, 2 * i, top, kRows - top);
+  }
+  write("a.vrt",
+        fmt::format(R"(<VRTDataset rasterXSize="{}" rasterYSize="{}"><VRTRasterBand dataType="Int16" band="1">)"
+                    R"(<NoDataValue>0</NoDataValue>{}</VRTRasterBand></VRTDataset>)",
+                    2 * kFiles + 1, kRows, sources));
+  const auto source = open("a.vrt");
+  for (const Window& window : {Window{0, 0, 2 * kFiles + 1, kRows}, Window{0, 0, 2 * kFiles + 1, 1},
+                               Window{0, 3, 2 * kFiles + 1, 1}, Window{0, 2, 2 * kFiles + 1, 1}, Window{7, 1, 131, 3},
+                               Window{7, 1, 131, 1}, Window{7, 2, 131, 2}, Window{200, 0, 1, 4}}) {
+    const std::vector<double> values = values_of(source->info().sample_type, read_window(*source, window));
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      const std::size_t row = static_cast<std::size_t>(window.row) + i / static_cast<std::size_t>(window.columns);
+      const std::size_t column = static_cast<std::size_t>(window.column) + i % static_cast<std::size_t>(window.columns);
+      EXPECT_EQ(values[i], expected.at(row).at(column)) << row << ' ' << column;
+    }
+  }
+}
+
 using Pds4 = Described;
 
 TEST_F(Pds4, ReadsTheArrayThatTheLabelDescribes) {
