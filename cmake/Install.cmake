@@ -21,6 +21,8 @@ write_basic_package_version_file(${PROJECT_BINARY_DIR}/isohfConfigVersion.cmake 
 install(FILES ${PROJECT_BINARY_DIR}/isohfConfig.cmake ${PROJECT_BINARY_DIR}/isohfConfigVersion.cmake
         DESTINATION ${package_dir} COMPONENT development)
 
+# Of where the file lies, whatever `cmake --install --prefix` says.
+file(RELATIVE_PATH pc_to_prefix /${CMAKE_INSTALL_LIBDIR}/pkgconfig /)
 configure_file(cmake/isohf.pc.in ${PROJECT_BINARY_DIR}/isohf.pc @ONLY)
 install(FILES ${PROJECT_BINARY_DIR}/isohf.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig COMPONENT development)
 

@@ -22,6 +22,10 @@ foreach(path IN LISTS folders)
 endforeach()
 
 # As someone else's project, who has but the package.
+file(WRITE ${WORK_DIR}/says/CMakeLists.txt
+     "cmake_minimum_required(VERSION 3.25)\nproject(says CXX)\nfind_package(isohf REQUIRED)\n"
+     "file(WRITE ${WORK_DIR}/module_folder.txt \${isohf_MODULE_FOLDER})\n")
+run(${CMAKE_COMMAND} -S ${WORK_DIR}/says -B ${WORK_DIR}/says -DCMAKE_PREFIX_PATH=${prefix})
 file(COPY ${EXAMPLES_DIR} DESTINATION ${WORK_DIR})
 run(${CMAKE_COMMAND} -S ${WORK_DIR}/examples -B ${WORK_DIR}/build -DCMAKE_PREFIX_PATH=${prefix}
     -DCMAKE_CXX_COMPILER=${CXX} -DISOHF_EXAMPLE_RASTER=${RASTER})
@@ -29,7 +33,19 @@ run(${CMAKE_COMMAND} --build ${WORK_DIR}/build)
 run(${CMAKE_CTEST_COMMAND} --test-dir ${WORK_DIR}/build --output-on-failure)
 
 set(ENV{PKG_CONFIG_PATH} ${prefix}/${LIBDIR}/pkgconfig)
-execute_process(COMMAND pkg-config --define-variable=prefix=${prefix} --cflags --libs isohf OUTPUT_VARIABLE flags
+# Both say where the modules lie.
+file(STRINGS ${WORK_DIR}/module_folder.txt module_folder)
+execute_process(COMMAND pkg-config --variable=moduledir isohf OUTPUT_VARIABLE moduledir
+                COMMAND_ERROR_IS_FATAL ANY OUTPUT_STRIP_TRAILING_WHITESPACE)
+file(REAL_PATH "${moduledir}" moduledir)
+file(REAL_PATH ${prefix}/lib/isohf expected)
+foreach(said IN ITEMS "${module_folder}" "${moduledir}")
+  if(NOT said STREQUAL expected)
+    message(FATAL_ERROR "modules are said to be in ${said}, they are in ${expected}")
+  endif()
+endforeach()
+
+execute_process(COMMAND pkg-config --cflags --libs isohf OUTPUT_VARIABLE flags
                 COMMAND_ERROR_IS_FATAL ANY OUTPUT_STRIP_TRAILING_WHITESPACE)
 separate_arguments(flags UNIX_COMMAND "${flags}")
 run(${CXX} ${EXAMPLES_DIR}/convert.cpp -o ${WORK_DIR}/by_pkg_config ${flags})

@@ -134,6 +134,8 @@ TEST_P(PointSamplerTest, FindsWhatTheWholeTileHasAtAnyPlaceInAnyOrder) {
   Surface surface(archive, with_memory(1U << 20U));
   surface.sample(all, std::span(found));
   surface.sample(all, std::span(elevations));
+  EXPECT_THROW(surface.sample(all, std::span(found).first(1)), Error);
+  EXPECT_THROW(surface.sample(all, std::span(elevations).first(1)), Error);
   int states[3] = {};
   for (std::size_t i = 0; i < all.size(); ++i) {
     SCOPED_TRACE(testing::Message() << all[i].x << " " << all[i].z);

@@ -35,6 +35,12 @@ int plane_for(const Metadata& metadata, const SampleGrid& grid) {
   return planes_of(metadata).plane_for_spacing(grid.spacing_x / 2.0, grid.spacing_z / 2.0);
 }
 
+void require_as_many(std::size_t samples, std::size_t points) {
+  if (samples == points) return;
+  throw Error(ErrorCode::kInvalidArgument,
+              fmt::format("there is room for {} samples, must be as many as there are points, {}", samples, points));
+}
+
 [[noreturn]] void refuse_place(const char* what) {
   throw Error(ErrorCode::kInvalidArgument,
               fmt::format("the archive's source has no position in {}; use world coordinates", what));
@@ -87,14 +93,17 @@ SurfaceSample Surface::at(MapPoint point) {
 }
 
 void Surface::sample(std::span<const WorldPoint> points, std::span<SurfaceSample> samples) {
+  require_as_many(samples.size(), points.size());
   state_->sample(points, samples);
 }
 
 void Surface::sample(std::span<const WorldPoint> points, std::span<double> elevations) {
+  require_as_many(elevations.size(), points.size());
   state_->sample(points, elevations);
 }
 
 void Surface::sample(std::span<const WorldPoint> points, const Sun& sun, double above, std::span<SunSample> samples) {
+  require_as_many(samples.size(), points.size());
   const PointShadow shadow(state_->archive, sun, above);
   std::vector<double> elevations(points.size());
   state_->sample(points, std::span(elevations));
