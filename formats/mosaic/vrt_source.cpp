@@ -267,8 +267,8 @@ class VrtSource final : public FileSource {
     }
     // A claim, which at worst costs time.
     const double block = number(node.child("SourceProperties"), "BlockYSize", 1.0);
-    block_rows_ =
-        std::max(block_rows_, static_cast<std::int64_t>(std::clamp(block, 1.0, static_cast<double>(piece.from.rows))));
+    block_rows_ = std::max(
+        block_rows_, static_cast<std::int64_t>(std::max(1.0, std::min(block, static_cast<double>(piece.from.rows)))));
     pieces_.push_back(std::move(piece));
   }
 
