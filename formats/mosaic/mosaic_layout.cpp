@@ -336,6 +336,16 @@ void find_missing_places(const MosaicPlan& plan, MosaicHoles& holes) {
 /// Counts the samples of the region in no rectangle and remembers the first stretch of them.
 }  // namespace
 
+std::int64_t overlap(std::int64_t& first, std::int64_t& begin, std::int64_t& count, std::int64_t samples,
+                     std::int64_t window_first, std::int64_t window_count) {
+  const std::int64_t low = std::max(first, window_first);
+  const std::int64_t high = std::min(first + samples, window_first + window_count);
+  begin = low - first;
+  count = high - low;
+  first = low - window_first;
+  return count;
+}
+
 std::int64_t uncovered(std::vector<SampleRectangle> members, const Window& region,
                        std::optional<SampleRectangle>& first) {
   std::sort(members.begin(), members.end(),

@@ -120,6 +120,11 @@ void place_members(std::vector<PlacedMember> members, MosaicPlan& plan);
 [[nodiscard]] SampleRectangle ground_of(const MosaicPlan& plan, const MosaicLayer& layer, const MosaicMember& member,
                                         double reach);
 
+/// Along one axis: what a window takes of a member of so many `samples`, 0 or fewer where they do not meet.
+/// first  the member's place in the raster; out: that of the part, in the window   begin  out: that of the part in the member
+std::int64_t overlap(std::int64_t& first, std::int64_t& begin, std::int64_t& count, std::int64_t samples,
+                     std::int64_t window_first, std::int64_t window_count);
+
 /// How many samples of `region` lie in none of `members`, and the first rectangle of them.
 [[nodiscard]] std::int64_t uncovered(std::vector<SampleRectangle> members, const Window& region,
                                      std::optional<SampleRectangle>& first);

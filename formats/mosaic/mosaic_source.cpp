@@ -230,17 +230,6 @@ class LayerPlaces {
   std::vector<MapPoint> places_;  ///< columns and rows of the layer
 };
 
-std::int64_t overlap(std::int64_t& first, std::int64_t& begin, std::int64_t& count, std::int64_t samples,
-                     std::int64_t window_first, std::int64_t window_count) {
-  // first: the member's place in the layer; begin: of the part in the member.
-  const std::int64_t low = std::max(first, window_first);
-  const std::int64_t high = std::min(first + samples, window_first + window_count);
-  begin = low - first;
-  count = high - low;
-  first = low - window_first;
-  return count;
-}
-
 }  // namespace
 
 /// What a window takes from one member.
@@ -284,6 +273,7 @@ void MosaicSource::choose_strips() {
     rows = std::max<std::int64_t>(1, kMostStripBytes / row_bytes);
   }
   info.block_height = std::min(rows, info.height);
+  strips_.set_rows(info.block_height);
 }
 
 /// Packed members are held only where all those of a strip can be: opening one anew for each strip costs more than

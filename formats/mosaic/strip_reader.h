@@ -20,13 +20,19 @@ inline constexpr std::int64_t kMostStripBytes = std::int64_t{256} << 20U;
 /// Parts of members that are read side by side.
 inline constexpr std::size_t kBatchBytes = std::size_t{8} << 20U;
 
-/// Reads a raster that is composed of others by strips of its block height, of which windows of fewer rows take theirs.
+/// Reads a raster that is composed of others by strips of rows, of which windows of fewer rows take theirs.
 class StripReader {
  public:
   /// Fills all samples of a window.
   using Compose = std::function<void(const Window& window, std::span<std::byte> samples)>;
 
   StripReader(const SourceInfo& info, Compose compose) : info_(info), compose_(std::move(compose)) {}
+
+  /// rows  of a strip, > 0; needed before anything is read
+  void set_rows(std::int64_t rows) {
+    rows_ = rows;
+    number_ = -1;
+  }
 
   void read(const Window& window, std::span<std::byte> samples) {
     // Passes read the same columns again and again; the first window of others is read as it is.
@@ -38,9 +44,9 @@ class StripReader {
     const std::size_t row_bytes = static_cast<std::size_t>(window.columns) * size_bytes(info_.sample_type);
     const std::int64_t end = window.row + window.rows;
     for (std::int64_t row = window.row; row < end;) {
-      const std::int64_t strip = row / info_.block_height;
-      const std::int64_t top = strip * info_.block_height;
-      const std::int64_t bottom = std::min(top + info_.block_height, info_.height);
+      const std::int64_t strip = row / rows_;
+      const std::int64_t top = strip * rows_;
+      const std::int64_t bottom = std::min(top + rows_, info_.height);
       const std::int64_t rows = std::min(end, bottom) - row;
       const auto out = samples.subspan(static_cast<std::size_t>(row - window.row) * row_bytes,
                                        static_cast<std::size_t>(rows) * row_bytes);
@@ -63,6 +69,7 @@ class StripReader {
  private:
   const SourceInfo& info_;
   Compose compose_;
+  std::int64_t rows_ = 0;
   std::vector<std::byte> samples_;  ///< of strip `number_`, in the columns below
   std::int64_t number_ = -1;
   std::int64_t column_ = 0;

@@ -35,6 +35,10 @@ namespace {
 
 constexpr std::uint64_t kLongestVrt = std::uint64_t{256} << 20U;
 constexpr std::int64_t kMostSide = std::int64_t{1} << 31;
+/// Strips are as large as the blocks say that a VRT states of its sources, up to here, and to so many times what may be
+/// kept: a claim, which nothing is held against.
+constexpr std::uint64_t kMostClaimedBytes = std::uint64_t{64} << 20U;
+constexpr std::uint64_t kStripsOfLimit = 8;
 /// A VRT of VRTs of ...; more go round in a circle.
 constexpr int kDeepest = 8;
 /// Of a sample: places in a VRT are written in decimals.
@@ -98,15 +102,14 @@ class VrtSource final : public FileSource {
   }
   void limit_buffers(std::uint64_t bytes) override {
     limit_ = bytes / most_open_;
-    for (Opened& each : opened_) each.source->limit_buffers(*limit_);
+    for (Opened& each : opened_) each.source->limit_buffers(limit_);
+    strips_.set_rows(strip_rows(bytes));
   }
   [[nodiscard]] std::uint64_t buffer_bytes(std::uint64_t limit) const override {
-    std::int64_t widest = 0;
-    for (const Piece& piece : pieces_) widest = std::max(widest, piece.from.columns);
-    const std::size_t row_bytes = size_bytes(info_.sample_type) * static_cast<std::size_t>(info_.block_height);
-    const std::size_t widest_part = row_bytes * static_cast<std::size_t>(widest);
-    const std::size_t strip = row_bytes * static_cast<std::size_t>(info_.width);
-    return limit + strip + std::min(strip, std::max(widest_part, kBatchBytes));
+    const auto rows = static_cast<std::size_t>(strip_rows(limit));
+    const std::size_t part = rows * static_cast<std::size_t>(widest_) * size_bytes(info_.sample_type);
+    const std::size_t strip = rows * row_bytes();
+    return limit + strip + std::min(strip, std::max(part, kBatchBytes));
   }
 
  private:
@@ -177,7 +180,7 @@ class VrtSource final : public FileSource {
       if (const auto node = band.child(element)) read_gdal_item(role, trimmed(node.text().get()), info_);
     }
     for (const pugi::xml_node& node : band.children()) read_source(node);
-    arrange();
+    info_.block_width = info_.width;
     type_ = info_.sample_type;
     if (info_.void_values.empty() && options.void_values.empty() && !is_floating(type_) && has_gaps()) {
       const MosaicSamples samples = choose_mosaic_samples({SampleKind::of(info_)}, true, false);
@@ -193,6 +196,7 @@ class VrtSource final : public FileSource {
     // Where no source is, samples are void whatever makes them so.
     const double none = is_floating(type_) ? std::numeric_limits<double>::quiet_NaN() : 0.0;
     empty_ = stored_sample(info_.sample_type, info_.void_values.empty() ? none : info_.void_values.front());
+    arrange();
   }
 
   void read_type(const pugi::xml_node& band) {
@@ -272,25 +276,34 @@ class VrtSource final : public FileSource {
     pieces_.push_back(std::move(piece));
   }
 
-  /// Chooses how many rows are best read at once, and finds what is needed to look for pieces.
+  /// Finds what looking for pieces needs.
   void arrange() {
-    info_.block_width = info_.width;
-    const std::int64_t row_bytes = info_.width * static_cast<std::int64_t>(size_bytes(info_.sample_type));
-    const std::int64_t rows = block_rows_ <= kMostStripBytes / row_bytes
-                                  ? block_rows_ * std::max<std::int64_t>(1, kStripBytes / row_bytes / block_rows_)
-                                  : std::max<std::int64_t>(1, kMostStripBytes / row_bytes);
-    info_.block_height = std::min(rows, info_.height);
-    most_open_ = std::clamp<std::size_t>(pieces_.size(), 1, most_open_rasters());
-    unpacked_bytes_ /= most_open_;
     by_row_.resize(pieces_.size());
     std::iota(by_row_.begin(), by_row_.end(), std::size_t{0});
     std::ranges::stable_sort(by_row_, {}, [&](std::size_t i) { return pieces_[i].row; });
-    for (const Piece& piece : pieces_) tallest_ = std::max(tallest_, piece.from.rows);
+    for (const Piece& piece : pieces_) {
+      widest_ = std::max(widest_, piece.from.columns);
+      tallest_ = std::max(tallest_, piece.from.rows);
+    }
+    most_open_ = std::clamp<std::size_t>(pieces_.size(), 1, most_open_rasters());
+    unpacked_bytes_ /= most_open_;
+    limit_buffers(kMostClaimedBytes);
+  }
+
+  [[nodiscard]] std::size_t row_bytes() const {
+    return static_cast<std::size_t>(info_.width) * size_bytes(info_.sample_type);
+  }
+
+  /// Rows that are read at once: whole blocks of the sources where these are not too large for what may be kept.
+  [[nodiscard]] std::int64_t strip_rows(std::uint64_t limit) const {
+    const auto row = static_cast<std::int64_t>(row_bytes());
+    const auto most = static_cast<std::int64_t>(std::min(limit, kMostClaimedBytes / kStripsOfLimit) * kStripsOfLimit);
+    const std::int64_t rows = std::clamp<std::int64_t>(std::max(block_rows_, kStripBytes / row), 1, most / row + 1);
+    return rows > block_rows_ ? rows - rows % block_rows_ : rows;
   }
 
   void compose(const Window& window, std::span<std::byte> samples) {
-    const std::size_t size = empty_.size();
-    for (std::size_t at = 0; at < samples.size(); at += size) std::memcpy(samples.data() + at, empty_.data(), size);
+    fill_with(empty_, samples);
     const Deeper deeper(depth);  // sources open and read theirs in turn
     if (depth > kDeepest) fail(ErrorCode::kUnsupported, "is one of itself, or of too many within each other");
     std::vector<Part> parts = parts_in(window);
@@ -315,17 +328,16 @@ class VrtSource final : public FileSource {
     auto next = std::ranges::lower_bound(by_row_, window.row - tallest_ + 1, {}, row_of);
     for (; next != by_row_.end() && row_of(*next) < window.row + window.rows; ++next) {
       const Piece& piece = pieces_[*next];
-      const std::int64_t west = std::max(window.column, piece.column);
-      const std::int64_t north = std::max(window.row, piece.row);
-      const std::int64_t east = std::min(window.column + window.columns, piece.column + piece.from.columns);
-      const std::int64_t south = std::min(window.row + window.rows, piece.row + piece.from.rows);
-      if (west >= east || north >= south) continue;
       Part part;
       part.piece = &piece;
-      part.own = {piece.from.column + west - piece.column, piece.from.row + north - piece.row, east - west,
-                  south - north};
-      part.column = west - window.column;
-      part.row = north - window.row;
+      part.column = piece.column;
+      part.row = piece.row;
+      Window& own = part.own;
+      if (overlap(part.column, own.column, own.columns, piece.from.columns, window.column, window.columns) <= 0)
+        continue;
+      if (overlap(part.row, own.row, own.rows, piece.from.rows, window.row, window.rows) <= 0) continue;
+      own.column += piece.from.column;
+      own.row += piece.from.row;
       parts.push_back(part);
     }
     std::ranges::sort(parts, {}, &Part::piece);
@@ -383,7 +395,7 @@ class VrtSource final : public FileSource {
       fail(ErrorCode::kCorrupt,
            fmt::format("takes samples beyond the {} x {} of {}", info.width, info.height, printable(piece.path)));
     }
-    if (limit_) source->limit_buffers(*limit_);
+    source->limit_buffers(limit_);
     if (opened_.size() == most_open_) opened_.pop_back();
     opened_.push_front({&piece, std::move(source)});
     return *opened_.front().source;
@@ -436,12 +448,13 @@ class VrtSource final : public FileSource {
   }
 
   std::uint64_t unpacked_bytes_;
-  std::optional<std::uint64_t> limit_;
+  std::uint64_t limit_ = 0;       ///< of the buffers of one source
   SampleType type_{};             ///< as the VRT has it; that of `info_` may be wider, for a void
   std::vector<std::byte> empty_;  ///< what stands where no piece is
   std::vector<Piece> pieces_;     ///< later ones lie above
   std::vector<std::size_t> by_row_;
-  std::int64_t tallest_ = 0;     ///< of the pieces
+  std::int64_t widest_ = 0;  ///< of the pieces
+  std::int64_t tallest_ = 0;
   std::int64_t block_rows_ = 1;  ///< most that one of the sources says it has
   std::size_t most_open_ = 1;
   std::list<Opened> opened_;  ///< those last used first

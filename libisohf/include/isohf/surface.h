@@ -116,7 +116,7 @@ class Surface {
   /// In coordinates of the source. Throws Error{kInvalidArgument} where these are not known.
   [[nodiscard]] SurfaceSample at(MapPoint point);
 
-  /// points [n]   samples [n] out
+  /// points [n]   samples [n] out. Throws Error{kInvalidArgument} where these are not as many, as the others do.
   void sample(std::span<const WorldPoint> points, std::span<SurfaceSample> samples);
   /// Elevations alone, which is quicker: elevations [n] out, vertical units, NaN where there is none.
   void sample(std::span<const WorldPoint> points, std::span<double> elevations);
