@@ -322,6 +322,20 @@ TEST_F(Vrt, MoreSourcesThanMayBeOpenLieOverEachOtherInTheirOrder) {
   }
 }
 
+TEST_F(Vrt, TakesWhatItMayKeepWhateverBlocksItClaims) {
+  write("a.dat", stored<std::int16_t>({1}));
+  write("a.hdr", "ENVI\nsamples = 1\nlines = 1\ndata type = 2\n");
+  write(
+      "a.vrt",
+      R"(<VRTDataset rasterXSize="100000" rasterYSize="100000"><VRTRasterBand dataType="Int16" band="1"><SimpleSource>)"
+      R"(<SourceFilename relativeToVRT="1">a.dat</SourceFilename><SourceBand>1</SourceBand>)"
+      R"(<SourceProperties BlockYSize="100000"/></SimpleSource></VRTRasterBand></VRTDataset>)");
+  const auto source = open("a.vrt");
+  constexpr std::uint64_t kMiB = 1U << 20U;
+  EXPECT_LE(source->buffer_bytes(kMiB), 18 * kMiB);  // a strip of 8 times the limit, twice
+  EXPECT_LE(source->buffer_bytes(64 * kMiB), 193 * kMiB);
+}
+
 using Pds4 = Described;
 
 TEST_F(Pds4, ReadsTheArrayThatTheLabelDescribes) {

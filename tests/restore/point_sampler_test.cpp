@@ -136,6 +136,8 @@ TEST_P(PointSamplerTest, FindsWhatTheWholeTileHasAtAnyPlaceInAnyOrder) {
   surface.sample(all, std::span(elevations));
   EXPECT_THROW(surface.sample(all, std::span(found).first(1)), Error);
   EXPECT_THROW(surface.sample(all, std::span(elevations).first(1)), Error);
+  std::vector<SunSample> lit(1);
+  EXPECT_THROW(surface.sample(all, Sun{}, 0.0, lit), Error);
   int states[3] = {};
   for (std::size_t i = 0; i < all.size(); ++i) {
     SCOPED_TRACE(testing::Message() << all[i].x << " " << all[i].z);
