@@ -88,13 +88,16 @@ namespace isohf {
 [[nodiscard]] std::unique_ptr<HeightSource> open_saga(const std::string& path, const OpenOptions& options);
 
 /// IDRISI's samples (.rst) and their documentation (.rdc), of which either is `path`; ROI_PAC's NAME.dem beside
-/// NAME.dem.rsc; a band of a VICAR file, whose map is left out; Terragen's heightfield, whose rows begin in the South.
+/// NAME.dem.rsc; a band of a VICAR file, whose map is left out; Terragen's heightfield, whose rows begin in the South; a binary graymap
+/// (Netpbm's P5) of 8 or 16 bits, its numbers as stored.
 [[nodiscard]] std::unique_ptr<HeightSource> open_idrisi(const std::string& path, const OpenOptions& options);
 [[nodiscard]] std::unique_ptr<HeightSource> open_roi_pac(const std::string& path, const OpenOptions& options);
 [[nodiscard]] bool looks_like_vicar(std::span<const std::byte> head);
 [[nodiscard]] std::unique_ptr<HeightSource> open_vicar(const std::string& path, const OpenOptions& options);
 [[nodiscard]] bool looks_like_terragen(std::span<const std::byte> head);
 [[nodiscard]] std::unique_ptr<HeightSource> open_terragen(const std::string& path, const OpenOptions& options);
+[[nodiscard]] bool looks_like_graymap(std::span<const std::byte> head);
+[[nodiscard]] std::unique_ptr<HeightSource> open_graymap(const std::string& path, const OpenOptions& options);
 
 /// A variable of two dimensions (those before of one value, columns first or last) in a netCDF file of the classic
 /// formats, which options.channel names, else the first; coordinates that are evenly spaced place it, "crs_wkt" or

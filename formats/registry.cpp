@@ -56,6 +56,7 @@ const std::vector<Reader>& readers() {
       {{"IDRISI", {".rst", ".rdc"}}, nullptr, open_idrisi},
       {{"VICAR", {".vic", ".vicar"}, nullptr, "takes `channel`"}, looks_like_vicar, open_vicar, nullptr, true},
       {{"Terragen", {".ter"}}, looks_like_terragen, open_terragen, nullptr, true},
+      {{"Portable graymap", {".pgm"}}, looks_like_graymap, open_graymap, nullptr, true},
       {{"GridFloat or EHdr header", {".hdr"}}, looks_like_grid_header, open_header_grid},
       {{"GridFloat", {".flt"}}, nullptr, open_header_grid},
       {{"EHdr", {".bil", ".bip", ".bsq"}}, nullptr, open_header_grid},

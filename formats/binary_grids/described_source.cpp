@@ -135,13 +135,17 @@ void DescribedSource::place_by_corner(double west, double north, double dx, doub
   place.origin_y = north - dy / 2.0;
 }
 
-void DescribedSource::finish(const OpenOptions& options) {
+void DescribedSource::require_samples() const {
   const double end = layout_.end_bytes(info_);
   if (!(end <= static_cast<double>(file_->size_bytes()))) {
     throw Error(ErrorCode::kCorrupt,
                 fmt::format("{}: the file has {} bytes, {} x {} samples as {} says end at {:.0f}", info_.path,
                             file_->size_bytes(), info_.width, info_.height, header_, end));
   }
+}
+
+void DescribedSource::finish(const OpenOptions& options) {
+  require_samples();
   bound_undeclared_voids(info_);
   if (!has_reference_system(info_.georeference)) read_prj_beside(info_);
   info_.block_width = info_.width;

@@ -65,7 +65,9 @@ class DescribedSource : public PlainSource {
   void set_scale(double scale, double offset, const char* key);
   /// The place of the first sample's outer corner in the North-West, and the spacing. Cells are areas.
   void place_by_corner(double west, double north, double dx, double dy);
-  /// Checks that the file has every sample, and takes what lies beside it and what the user says.
+  /// Throws Error{kCorrupt} where the file has fewer bytes than the description says.
+  void require_samples() const;
+  /// Requires the samples, and takes what lies beside it and what the user says.
   void finish(const OpenOptions& options);
 
   std::string header_;  ///< for messages

@@ -1,4 +1,5 @@
-/// More plain samples with a header: IDRISI's .rdc, ROI_PAC's .rsc, the labels of VICAR, and Terragen's chunks.
+/// More plain samples with a header: IDRISI's .rdc, ROI_PAC's .rsc, the labels of VICAR, Terragen's chunks, and the
+/// numbers of a Netpbm graymap.
 
 #include <fmt/core.h>
 
@@ -13,6 +14,7 @@
 
 #include "formats/binary_grids/described_source.h"
 #include "formats/files/text.h"
+#include "formats/georeference/files_beside.h"
 #include "formats/georeference/units.h"
 #include "formats/open_options.h"
 #include "formats/readers.h"
@@ -220,6 +222,50 @@ class TerragenSource final : public DescribedSource {
   }
 };
 
+/// A graymap of bytes or big-endian words (Netpbm's pgm(5), P5), whose values are read as they stand, whatever the largest
+/// one is said to be.
+class GraymapSource final : public DescribedSource {
+ public:
+  GraymapSource(const std::string& path, const OpenOptions& options)
+      : DescribedSource(path, "Portable graymap", path, options) {
+    (void)choose_band(info_, options, 1);
+    constexpr std::size_t kMostHeaderBytes = std::size_t{64} << 10U;
+    std::string head(kMostHeaderBytes, '\0');
+    head.resize(file_->read_some(0, std::as_writable_bytes(std::span(head))));
+    std::size_t at = 2;
+    const double width = next_number(head, at, "width");
+    const double height = next_number(head, at, "height");
+    const double largest = next_number(head, at, "largest value");
+    if (largest < 1.0 || largest > 65535.0) {
+      refuse(ErrorCode::kCorrupt, fmt::format("largest value is {:.0f}, must be from 1 to 65535", largest));
+    }
+    info_.sample_type = largest > 255.0 ? SampleType::kUint16 : SampleType::kUint8;
+    set_size(width, height);
+    layout_.big_endian = true;
+    layout_.offset_bytes = at + 1;  // behind one blank
+    require_samples();
+    info_.block_width = info_.width;
+    info_.block_height = 1;
+    read_place_beside(info_, 1);  // a picture's .prj says nothing without a world file
+    apply_open_options(info_, options);
+    if (const double end = layout_.end_bytes(info_); end < static_cast<double>(file_->size_bytes())) {
+      info_.warnings.push_back(
+          loss(fmt::format("{:.0f} bytes follow the samples", static_cast<double>(file_->size_bytes()) - end)));
+    }
+  }
+
+ private:
+  /// Of the header, past blanks and comments, which a # begins.
+  double next_number(const std::string& head, std::size_t& at, const char* what) const {
+    constexpr std::string_view kBlanks = " \t\n\v\f\r";
+    while ((at = head.find_first_not_of(kBlanks, at)) != std::string::npos && head[at] == '#') at = head.find('\n', at);
+    const std::size_t end = std::min(at == std::string::npos ? at : head.find_first_of(kBlanks, at), head.size());
+    const std::size_t begin = std::min(at, end);
+    at = end;
+    return number(head.substr(begin, end - begin), what);
+  }
+};
+
 }  // namespace
 
 std::unique_ptr<HeightSource> open_idrisi(const std::string& path, const OpenOptions& options) {
@@ -245,6 +291,15 @@ bool looks_like_terragen(std::span<const std::byte> head) {
 
 std::unique_ptr<HeightSource> open_terragen(const std::string& path, const OpenOptions& options) {
   return std::make_unique<TerragenSource>(path, options);
+}
+
+bool looks_like_graymap(std::span<const std::byte> head) {
+  const std::string_view text = text_of(head);
+  return text.size() > 2 && text.starts_with("P5") && std::string_view(" \t\n\v\f\r#").find(text[2]) != text.npos;
+}
+
+std::unique_ptr<HeightSource> open_graymap(const std::string& path, const OpenOptions& options) {
+  return std::make_unique<GraymapSource>(path, options);
 }
 
 }  // namespace isohf

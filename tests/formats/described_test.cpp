@@ -423,6 +423,38 @@ TEST_F(Pds4, LabelsOfOtherThingsAreRefused) {
   EXPECT_THAT(failure("a.xml", &code), HasSubstr("data_type is \"ComplexLSB8\""));
 }
 
+using Graymap = Described;
+
+TEST_F(Graymap, EveryNumberOf16BitsIsAsStored) {
+  std::vector<std::uint16_t> all(65536);
+  for (std::size_t at = 0; at < all.size(); ++at) all[at] = static_cast<std::uint16_t>(at);
+  for (const char* largest : {"65535", "4095"}) {  // some write more than they say
+    write("a.pgm", fmt::format("P5 # of metres\n#P5\n256\n# rows\n256 {}\n", largest) + stored(all, true));
+    const auto source = open("a.pgm");
+    EXPECT_EQ(source->info().sample_type, SampleType::kUint16);
+    EXPECT_THAT(source->info().warnings, ::testing::IsEmpty());
+    const auto samples = values_of(*source);
+    for (std::size_t at = 0; at < all.size(); ++at) ASSERT_EQ(samples[at], static_cast<double>(at));
+  }
+}
+
+TEST_F(Graymap, BytesAreAsStoredAndDamageIsTold) {
+  write("a.pgm", "P5\t3 2 100 abcdef");
+  const auto source = open("a.pgm");
+  EXPECT_EQ(source->info().sample_type, SampleType::kUint8);
+  EXPECT_THAT(values_of(*source), ElementsAre('a', 'b', 'c', 'd', 'e', 'f'));
+  write("a.pgm", "P5\t3 2 100 abcdefghi");
+  EXPECT_THAT(open("a.pgm")->info().warnings, ElementsAre(HasSubstr("3 bytes follow the samples")));
+  write("a.pgm", "P5\t3 2 100 abcde");
+  EXPECT_THAT(failure("a.pgm"), HasSubstr("the file has 16 bytes, 3 x 2 samples"));
+  write("a.pgm", "P5\t3 2 65536 abcdef");
+  EXPECT_THAT(failure("a.pgm"), HasSubstr("largest value is 65536, must be from 1 to 65535"));
+  for (const char* header : {"P5", "P5 ", "P5 # 3 2 9", "P5 3 2", "P5 3 x 9 abc", "P5 0 2 9 "}) {
+    write("a.pgm", header);
+    EXPECT_THAT(failure("a.pgm"), HasSubstr("a.pgm: ")) << header;
+  }
+}
+
 TEST(Imagine, RunsAndPlainTilesAreTheSamples) {
   const TemporaryFolder folder;
   for (const bool spills : {false, true}) {

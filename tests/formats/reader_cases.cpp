@@ -325,6 +325,7 @@ std::vector<ReaderCase> reader_cases() {
       {"RoiPacHeader", "a.dem.rsc", kRoiPac, open_roi_pac, {}},
       {"Vicar", "a.vic", vicar(), open_vicar, {}},
       {"Terragen", "a.ter", terragen(), open_terragen, {}},
+      {"Graymap", "a.pgm", "P5\n# of metres\n4 3\n4095\n" + counting(12, 2), open_graymap, {}},
       {"XyzText", "a.xyz", "x y z\n0 0 1\n1 0 2.5\n0 1 3\n1 1 4\n", open_xyz, {}},
       {"Pds4Label", "a.xml", pds4_label("a.dat"), open_pds4, {}},
       {"Pds4Samples", "a.dat", counting(7, 2), open_pds4, {}},
