@@ -55,6 +55,19 @@ void override_spacing(SourceInfo& info, double spacing_m) {
   place.spacing_x = place.spacing_y = spacing_m;
 }
 
+/// A scale that is the unit's size in metres turns the elevations into metres.
+void override_scale(SourceInfo& info, double scale) {
+  const double in_metres = info.z_scale * info.metres_per_vertical_unit;
+  constexpr double kSameUnit = 1e-4;  // 0.3048 for US survey feet as well
+  if (info.metres_per_vertical_unit != 1.0 && std::abs(scale / in_metres - 1.0) < kSameUnit) {
+    info.warnings.push_back(
+        fmt::format("the vertical scale {} turns elevations in {} into metres", scale, info.vertical_unit));
+    info.vertical_unit = "metre";
+    info.metres_per_vertical_unit = 1.0;
+  }
+  info.z_scale = scale;
+}
+
 }  // namespace
 
 std::optional<double> void_value_as_stored(SampleType type, double value) {
@@ -94,7 +107,7 @@ void apply_open_options(SourceInfo& info, const OpenOptions& options) {
   }
   if (options.registration) info.georeference.registration = *options.registration;
   if (!options.void_values.empty()) override_voids(info, options.void_values);
-  if (options.z_scale) info.z_scale = *options.z_scale;
+  if (options.z_scale) override_scale(info, *options.z_scale);
   if (options.z_offset) info.z_offset = *options.z_offset;
   if (options.spacing) override_spacing(info, *options.spacing);
 }

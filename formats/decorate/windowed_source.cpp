@@ -3,10 +3,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstddef>
 #include <cstdint>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "isohf/base/assert.h"
+#include "isohf/base/sample.h"
+#include "isohf/error.h"
 
 namespace isohf {
 namespace {
@@ -18,6 +23,21 @@ bool begins_a_block(std::int64_t at, std::int64_t block) {
 
 Window all_but_the_last_column(const SourceInfo& info) {
   return {0, 0, info.width - 1, info.height};
+}
+
+/// A row, of some between the first and the last, in which the last column does not hold what the first does.
+std::optional<std::int64_t> row_that_differs(HeightSource& source) {
+  constexpr std::int64_t kRows = 16;
+  const SourceInfo& info = source.info();
+  std::vector<std::byte> first(size_bytes(info.sample_type));
+  std::vector<std::byte> last(first.size());
+  for (std::int64_t i = 0; i < kRows; ++i) {
+    const std::int64_t row = (info.height - 1) * i / (kRows - 1);
+    source.read_window({0, row, 1, 1}, first);
+    source.read_window({info.width - 1, row, 1, 1}, last);
+    if (first != last) return row;
+  }
+  return std::nullopt;
 }
 
 }  // namespace
@@ -66,9 +86,16 @@ ClosedSource::ClosedSource(std::unique_ptr<HeightSource> source)
     : ClosedSource(all_but_the_last_column(source->info()), std::move(source)) {}
 
 ClosedSource::ClosedSource(const Window& window, std::unique_ptr<HeightSource>&& source)
+    : ClosedSource(window, std::move(source), row_that_differs(*source)) {}
+
+ClosedSource::ClosedSource(const Window& window, std::unique_ptr<HeightSource>&& source,
+                           std::optional<std::int64_t> other_row)
     : WindowedSource(std::move(source), window) {
+  std::string text =
+      fmt::format("{}: column {} is the first one again, 360 degrees on, and is left out", info().path, info().width);
   mutable_info().warnings.push_back(
-      fmt::format("{}: column {} is the first one again, 360 degrees on, and is left out", info().path, info().width));
+      !other_row ? Warning(std::move(text))
+                 : loss(fmt::format("{}, although its samples are others: in row {}, for one", text, *other_row)));
 }
 
 }  // namespace isohf

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstdint>
 #include <memory>
+#include <optional>
 
 #include "isohf/raster.h"
 
@@ -42,6 +44,7 @@ class ClosedSource final : public WindowedSource {
 
  private:
   ClosedSource(const Window& window, std::unique_ptr<HeightSource>&& source);
+  ClosedSource(const Window& window, std::unique_ptr<HeightSource>&& source, std::optional<std::int64_t> other_row);
 };
 
 }  // namespace isohf

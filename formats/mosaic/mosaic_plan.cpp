@@ -261,15 +261,16 @@ class Survey {
     if (!agreement.holds()) {
       refuse(path, agreement.why(first_) + "; bring one of them to the other's (gdalwarp) or leave it out");
     }
-    if (!info.vertical_unit.empty()) {
-      if (whole.vertical_unit.empty()) {
-        whole.vertical_unit = info.vertical_unit;
-        whole.metres_per_vertical_unit = info.metres_per_vertical_unit;
-      } else if (whole.metres_per_vertical_unit != info.metres_per_vertical_unit) {
-        refuse(path, fmt::format("its elevations are in {}, those of {} in {}; convert one of them first (gdal_calc)",
-                                 info.vertical_unit, first_, whole.vertical_unit));
-      }
+    // Where nothing is said they are taken for metres.
+    if (whole.metres_per_vertical_unit != info.metres_per_vertical_unit) {
+      const auto words = [](const SourceInfo& of) {
+        return of.vertical_unit.empty() ? std::string("a unit that nothing states") : of.vertical_unit;
+      };
+      refuse(path, fmt::format("its elevations are in {}, those of {} in {}; convert one of them first (gdal_calc), or "
+                               "`reference_system` with heights (EPSG:2263+6360) says what all are in",
+                               words(info), first_, words(whole)));
     }
+    if (whole.vertical_unit.empty()) whole.vertical_unit = info.vertical_unit;
   }
 
   static const char* words(Registration registration) {

@@ -356,6 +356,12 @@ class CfReader {
     if (info_.z_scale == 0.0 || !std::isfinite(info_.z_scale) || !std::isfinite(info_.z_offset)) {
       refuse(ErrorCode::kCorrupt, "scale_factor or add_offset is no scale");
     }
+    if (lower_case(variable.text("positive")) == "down" ||
+        variable.text("standard_name").starts_with("sea_floor_depth")) {
+      info_.z_scale = -info_.z_scale;
+      info_.z_offset = -info_.z_offset;
+      info_.warnings.emplace_back("its numbers are depths, positive down: elevations are their negatives");
+    }
     const auto unit = linear_unit(variable.text("units"));
     if (!unit) return;
     info_.vertical_unit = unit->name;

@@ -87,11 +87,11 @@ std::optional<bool> first_component_is_signed(const std::vector<unsigned char>& 
 }
 
 /// OpenImageIO hands out pictures: where it would deliver other numbers than the file holds, the file is refused.
-/// `bits` are those of a sample as delivered, `stored_bits` those in the file.
-void require_stored_numbers(const std::string& format, int bits, int stored_bits, bool is_floating,
+/// `bits` are those of a sample as delivered, `stored_bits` those in the file. A photo's may be spread and rounded.
+void require_stored_numbers(const std::string& format, int bits, int stored_bits, bool is_floating, bool is_photo,
                             const std::string& path) {
   if (format == "fits") refuse("OpenImageIO displaces the rows of FITS images");
-  if (format != "pnm" && stored_bits != bits) {
+  if (!is_photo && format != "pnm" && stored_bits != bits) {
     refuse("the samples have " + std::to_string(stored_bits) + " bits, and OpenImageIO spreads them over " +
            std::to_string(bits));
   }
@@ -100,8 +100,9 @@ void require_stored_numbers(const std::string& format, int bits, int stored_bits
     if (!is_signed) refuse("there is no codestream in its first MiB, so that nothing says whether samples are signed");
     if (*is_signed) refuse("the samples are signed, which OpenImageIO reads as if they were not");
   }
-  if (format == "pnm" && bits == 16) refuse("OpenImageIO rounds the samples of any-maps of 16 bits");
-  if (format == "pnm" && !is_floating) {
+  if (is_photo || format != "pnm") return;
+  if (bits == 16) refuse("OpenImageIO rounds the samples of any-maps of 16 bits");
+  if (!is_floating) {
     const long largest = largest_value(head_of(path));
     if (largest != 255) {
       refuse("the largest value is stated as " + std::to_string(largest) +
@@ -191,10 +192,11 @@ bool open_raster(IsohfOiioRaster& raster, const char* path, const std::string& c
   const OIIO::ImageSpec& spec = raster.spec;
   check(spec);
   const auto bits = static_cast<int>(8 * spec.format.size());
+  const bool is_photo = channel == ISOHF_OIIO_PHOTO;
   require_stored_numbers(raster.input->format_name(), bits, spec.get_int_attribute("oiio:BitsPerSample", bits),
-                         spec.format.is_floating_point(), path);
+                         spec.format.is_floating_point(), is_photo, path);
   raster.band_bytes = kBandBytes;
-  const bool all = channel == ISOHF_OIIO_ALL_CHANNELS;
+  const bool all = is_photo || channel == ISOHF_OIIO_ALL_CHANNELS;
   raster.channel = all ? 0 : channel_index(spec, channel);
   raster.channels = all ? spec.nchannels : 1;
   raster.type = all ? spec.format : spec.channelformat(raster.channel);

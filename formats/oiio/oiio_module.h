@@ -13,12 +13,14 @@
 extern "C" {
 
 /// Raised whenever anything below changes; the loader refuses any other.
-#define ISOHF_OIIO_ABI 6
+#define ISOHF_OIIO_ABI 7
 
 #define ISOHF_OIIO_UNKNOWN (-1)
 
 /// As a channel: all of them, interleaved, as the type that holds each.
 #define ISOHF_OIIO_ALL_CHANNELS "*"
+/// The same of a photo: a picture, whose samples may be spread over the range of their type and rounded.
+#define ISOHF_OIIO_PHOTO "*photo"
 
 typedef struct IsohfOiioRaster IsohfOiioRaster;
 

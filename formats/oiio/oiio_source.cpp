@@ -50,7 +50,7 @@ class OiioSource final : public HeightSource {
       const std::string warning = open(packing_ ? ISOHF_OIIO_ALL_CHANNELS : channel);
       if (!warning.empty()) info_.warnings.push_back(warning);
       if (const GeoTags tags = geojp2_tags(path); !tags.empty()) place(tags);
-      if (!info_.georeference.has_origin) read_place_beside(info_, info_.channel.empty() ? 1 : 0);
+      read_place_beside(info_, info_.channel.empty() ? 1 : 0);
       if (packing_) place_web_tile(info_);
       apply_open_options(info_, options);
     } catch (...) {
@@ -157,7 +157,7 @@ class OiioRows final : public PhotoRows {
   explicit OiioRows(PhotoInfo& info) : module_(oiio_module()) {
     IsohfOiioInfo found{};
     IsohfOiioMessage message{};
-    const int result = module_.open(info.path.c_str(), ISOHF_OIIO_ALL_CHANNELS, &raster_, &found, &message);
+    const int result = module_.open(info.path.c_str(), ISOHF_OIIO_PHOTO, &raster_, &found, &message);
     if (result == ISOHF_OIIO_UNKNOWN) {
       throw Error(ErrorCode::kUnsupported, "is no picture of a format that isohf knows; PNG, JPEG or TIFF is best");
     }

@@ -384,6 +384,13 @@ def geojp2(isohf, folder):
         own = ours.GetSpatialRef()
         check(own is not None and own.IsSame(system(text), ["IGNORE_DATA_AXIS_TO_SRS_AXIS_MAPPING=YES"]), f"GeoJP2 {text}: another system")
         check(numpy.array_equal(ours.ReadAsArray(), raster.ReadAsArray()), f"GeoJP2 {text}: samples differ")
+    # What the box does not say stands beside it.
+    raster.GetRasterBand(1).SetNoDataValue(17)
+    raster.GetRasterBand(1).SetScale(0.5)
+    raster.GetRasterBand(1).SetOffset(-100)
+    driver.CreateCopy(str(folder / "a.jp2"), raster, options=["REVERSIBLE=YES", "QUALITY=100", "GMLJP2=NO"])
+    said = json.loads(isohf.must("info", folder / "a.jp2", "--json").stdout)
+    check((said["void_values"], said["z_scale"], said["z_offset"]) == ([17], 0.5, -100), f"GeoJP2 beside: {said}")
 
 
 def ranges_of_voids(isohf, folder):

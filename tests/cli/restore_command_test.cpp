@@ -332,6 +332,43 @@ TEST_F(RestoreCommand, SaysWhereScaleAndOffsetAreLost) {
   EXPECT_EQ(tiff.info.z_offset, -100.0);
 }
 
+TEST_F(RestoreCommand, VoidsByRangeNeverComeBackAsElevationsWithoutAWord) {
+  write_stripes(folder / "stripes.tif");
+  convert(folder / "stripes.tif", {"--valid-range", "-10:200", "--lossless"});
+  // As kept, bit for bit, told also where little is told; another type has one value for all of them.
+  const RunResult kept = run("kept.tif", {"-q"});
+  EXPECT_EQ(kept.exit_code, 0);
+  EXPECT_EQ(kept.err,
+            "isohf: warning: " + (folder / "kept.tif") +
+                ": 2048 samples lie outside -10 to 200, which meant no elevation: a reader must be told, as with "
+                "--valid-range; isohf export writes one void value\n");
+  const Raster wider = restore("wider.flt");
+  for (const float z : wider.elevations) EXPECT_TRUE(std::isnan(z) || z == 0.0F) << z;
+  EXPECT_EQ(std::count_if(wider.elevations.begin(), wider.elevations.end(), [](float z) { return std::isnan(z); }),
+            2048);
+}
+
+TEST_F(RestoreCommand, SaysWhatAFormatHasNoPlaceFor) {
+  RasterSpec spec;
+  spec.width = spec.height = 161;
+  spec.sample_type = SampleType::kInt16;
+  spec.vertical_unit = "foot";
+  spec.georeference.emplace();
+  spec.georeference->unit = HorizontalUnit::kDegree;
+  spec.georeference->has_origin = true;
+  spec.georeference->spacing_x = spec.georeference->spacing_y = 0.01;
+  spec.georeference->system.epsg = 4267;
+  write_raster(folder / "nad27.tif", spec, std::vector<std::byte>(std::size_t{2} * 161 * 161));
+  convert(folder / "nad27.tif");
+  for (const char* output : {"back.asc", "back.flt", "back.npy"}) {
+    EXPECT_THAT(run(output, {"-q"}).err, HasSubstr("has no place for the unit of its elevations, foot")) << output;
+  }
+  const RunResult hgt = run("back.hgt", {"-q", "--size", "1201x1201"});
+  EXPECT_THAT(hgt.err, HasSubstr("has no place for the unit of its elevations, foot"));
+  EXPECT_THAT(hgt.err, HasSubstr("readers take it for degrees of WGS 84, which its samples do not lie on"));
+  for (const char* output : {"back.tif", "back.png", "back.exr"}) EXPECT_EQ(run(output, {"-q"}).err, "") << output;
+}
+
 TEST_F(RestoreCommand, WrongUseIsOneClearLine) {
   expect_refused(run("back.tif"), 1, "a.isohf: cannot open: No such file");
   write_file(folder / "a.isohf", "no archive");

@@ -193,6 +193,20 @@ TEST_F(Netcdf, ValuesOutsideTheValidRangeAreVoid) {
   EXPECT_EQ(open("a.nc")->info().valid_max, 60000.0);
 }
 
+TEST_F(Netcdf, DepthsAreNegativeElevations) {
+  for (const auto& [key, value] : {std::pair("positive", "down"), {"standard_name", "sea_floor_depth_below_geoid"}}) {
+    NetcdfBytes file = netcdf_grid({1.0, 2.0}, {1.0, 0.0});
+    const std::string samples = stored<std::int16_t>({1, 2, 3, 4}, true);
+    write("a.nc", file.variable("z", {0, 1}, 3, samples, {{key, value}, {"units", "m"}},
+                                {{"scale_factor", {0.5}}, {"add_offset", {10.0}}})
+                      .bytes());
+    const auto source = open("a.nc");
+    EXPECT_EQ(source->info().z_scale, -0.5) << key;
+    EXPECT_EQ(source->info().z_offset, -10.0) << key;
+    EXPECT_THAT(source->info().warnings, ElementsAre(HasSubstr("depths, positive down")));
+  }
+}
+
 TEST_F(Netcdf, DegreesOfARotatedGridAreNone) {
   NetcdfBytes file = netcdf_grid({1.0, 2.0}, {1.0, 0.0});
   file.variable("rotated", {}, 3, "", {{"grid_mapping_name", "rotated_latitude_longitude"}});

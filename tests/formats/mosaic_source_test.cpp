@@ -261,6 +261,10 @@ TEST(MosaicSource, FilesThatDisagreeAreRefusedByName) {
   EXPECT_EQ(refused([](RasterSpec&) {}), "not refused");
   EXPECT_THAT(refused([](RasterSpec& b) { b.georeference->system.epsg = 32633; }),
               HasSubstr("b.tif: its EPSG code is 32633, that of"));
+  EXPECT_THAT(refused([](RasterSpec& b) { b.vertical_unit = "foot"; }),
+              HasSubstr("b.tif: its elevations are in foot, those of " + (folder / "a.tif") +
+                        " in a unit that nothing states"));
+  EXPECT_EQ(refused([](RasterSpec& b) { b.vertical_unit = "metre"; }), "not refused");
   EXPECT_THAT(refused([](RasterSpec& b) { b.georeference->registration = Registration::kPoint; }),
               HasSubstr("b.tif: its samples stand for points"));
   EXPECT_THAT(refused([](RasterSpec& b) {

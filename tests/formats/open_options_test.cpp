@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "isohf/base/sample.h"
 #include "isohf/error.h"
@@ -46,6 +47,21 @@ TEST(VoidValueAsStored, RefusesWhatAnIntegerTypeCannotHold) {
   EXPECT_FALSE(void_value_as_stored(SampleType::kInt32, 0.5));
   EXPECT_FALSE(void_value_as_stored(SampleType::kUint16, std::nan("")));
   EXPECT_TRUE(std::isnan(*void_value_as_stored(SampleType::kFloat32, std::nan(""))));
+}
+
+TEST(ApplyOpenOptions, AScaleOfTheUnitsSizeMakesMetres) {
+  for (const auto& [scale, unit] : {std::pair(0.3048, "metre"), {0.1, "foot"}, {1.0, "foot"}}) {
+    SourceInfo info = sample_info(SampleType::kInt16);
+    info.vertical_unit = "foot";
+    info.metres_per_vertical_unit = 0.3048;
+    OpenOptions options;
+    options.z_scale = scale;
+    apply_open_options(info, options);
+    EXPECT_EQ(info.z_scale, scale);
+    EXPECT_EQ(info.vertical_unit, unit);
+    EXPECT_EQ(info.metres_per_vertical_unit, info.vertical_unit == "metre" ? 1.0 : 0.3048);
+    EXPECT_EQ(info.warnings.size(), info.vertical_unit == "metre" ? 1U : 0U);
+  }
 }
 
 TEST(ApplyOpenOptions, OverridesWhatTheFileSays) {

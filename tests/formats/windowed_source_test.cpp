@@ -91,6 +91,18 @@ TEST(ClosedSource, LeavesOutTheLastColumn) {
   EXPECT_EQ(read(source, {0, 0, 72, 37}), read(whole, {0, 0, 72, 37}));
 }
 
+TEST(ClosedSource, SaysWhereTheLastColumnIsAnother) {
+  auto globe = std::make_unique<GlobeSource>();
+  globe->at(72, 36) = 7;
+  const ClosedSource source(std::move(globe));
+  ASSERT_EQ(source.info().warnings.size(), 1U);
+  EXPECT_EQ(
+      source.info().warnings[0],
+      "memory: column 72 is the first one again, 360 degrees on, and is left out, although its samples are others: "
+      "in row 36, for one");
+  EXPECT_EQ(source.info().warnings[0].kind, Warning::Kind::kLoss);
+}
+
 TEST(Decorators, HaveTheSamplesAsStoredBehindEveryWindow) {
   GlobeSource whole;
   const Window part{16, 8, 57, 20};

@@ -47,6 +47,14 @@ double hill(std::int64_t c, std::int64_t r) {
   return 800.0 + 300.0 * std::sin(static_cast<double>(c) * 0.11) * std::cos(static_cast<double>(r) * 0.07);
 }
 
+TEST(LosslessRecord, IsVoidByValueByRangeAndWhatIsNotFinite) {
+  LosslessRecord record;
+  record.void_values = {7.0};
+  record.valid.first = -100.0;
+  for (const double raw : {7.0, -100.5, HUGE_VAL, -HUGE_VAL, std::nan("")}) EXPECT_TRUE(record.is_void(raw)) << raw;
+  for (const double raw : {7.5, -100.0, 1e300}) EXPECT_FALSE(record.is_void(raw)) << raw;
+}
+
 TEST(Lossless, ReturnsIntegersForEveryFilterDensityAndCodeType) {
   const test::TemporaryFolder folder;
   test::MemorySource<std::int16_t> source(SampleType::kInt16, 90, 75, [](std::int64_t c, std::int64_t r) {

@@ -134,7 +134,7 @@ ExportGrid asked_grid(const ExportOptions& options, ArchiveReader& archive) {
   const bool area = samples_are_areas(metadata);
   ExportGrid grid;
   if (!options.raster.system.empty()) {
-    grid.samples = asked_grid_in_system(options.raster, archive, ground, options.common.quiet);
+    grid.samples = asked_grid_in_system(options.raster, archive, ground, false);
   } else if (options.raster.size || options.raster.spacing) {
     grid.samples = grid_over(ground, area, options.raster.size, spacing_in_world(options.raster, metadata));
   } else {
@@ -186,7 +186,6 @@ class Exporter {
   void run() {
     has_voids = needs_void(archive_.metadata(), grid_.samples, options_.raster.output);
     mapping = choose_mapping();
-    if (!options_.common.quiet) warn_of_lost_scale(options_.raster.output, mapping);
     const auto void_value = void_value_of(mapping.type, has_voids);
     const SampleStore store(mapping, void_value,
                             options_.raster.clamp_range ? SampleStore::Clamp::kAll : SampleStore::Clamp::kNone);
@@ -204,6 +203,7 @@ class Exporter {
       spec.scratch = scratch_of(options_.work);
       return spec;
     };
+    warn_of_losses(options_.raster.output, spec_of(0, 0));
     for (std::int64_t group = 0; group < tiles.groups(); ++group) {
       tiles.begin_group(group, spec_of);
       counts = {};
@@ -262,9 +262,7 @@ class Exporter {
       const Job reading = job("range");
       return spread_over(type, rows(reading), reading, has_voids);
     }
-    if (takes_decimals(archive_.metadata(), whole) && !options_.common.quiet) {
-      warn_of_whole_numbers(options_.raster.output, archive_.metadata());
-    }
+    if (takes_decimals(archive_.metadata(), whole)) warn_of_whole_numbers(options_.raster.output, archive_.metadata());
     return whole;
   }
 

@@ -115,9 +115,7 @@ SampleGrid grid_of_other(const RestoreOptions& options, const Metadata& metadata
   const SourceInfo other = in_words_of(metadata, like.source->info());
   std::vector<std::string> warnings;
   std::optional<SampleGrid> grid = grid_like(metadata, other, warnings);
-  for (const std::string& warning : warnings) {
-    if (!options.common.quiet) print_warning(warning);
-  }
+  for (const std::string& warning : warnings) print_warning(warning);
   if (!grid) {
     const SourceFrame frame = make_source_frame(other);
     grid = {frame.width,
@@ -139,7 +137,7 @@ SampleGrid grid_of_other(const RestoreOptions& options, const Metadata& metadata
 SampleGrid asked_grid(const RestoreOptions& options, ArchiveReader& archive) {
   const RasterOptions& raster = options.raster;
   const Metadata& metadata = archive.metadata();
-  if (!raster.system.empty()) return asked_grid_in_system(raster, archive, metadata.valid, options.common.quiet);
+  if (!raster.system.empty()) return asked_grid_in_system(raster, archive, metadata.valid, false);
   if (!options.like.empty()) return grid_of_other(options, metadata);
   if (!raster.size && !raster.spacing) return natural_grid(metadata);
   return grid_over(metadata.valid, samples_are_areas(metadata), raster.size, spacing_in_world(raster, metadata));
@@ -167,11 +165,11 @@ class Restorer {
   Restored run(bool is_lossless) { return is_lossless ? run_lossless() : run_surface(); }
 
  private:
-  [[nodiscard]] std::unique_ptr<RasterSink> open(RasterSpec spec, const SampleMapping& mapping) const {
+  [[nodiscard]] std::unique_ptr<RasterSink> open(RasterSpec spec) const {
     spec.overwrite = options_.raster.overwrite;
     spec.scratch = scratch_of(options_.work);
     std::unique_ptr<RasterSink> sink = create_raster(options_.raster.output, spec);
-    if (!options_.common.quiet) warn_of_lost_scale(options_.raster.output, mapping);
+    warn_of_losses(options_.raster.output, sink->spec());
     return sink;
   }
 
@@ -196,20 +194,22 @@ class Restorer {
     if (voids_to_nan || as_elevations || lacks_void) void_value.reset();
     if (!void_value && is_floating(written.type))
       void_value = void_value_of(written.type, needs_void(archive_.metadata(), grid_, options_.raster.output));
-    const auto sink = open(source_raster_spec(archive_.metadata(), written, void_value), written);
+    const auto sink = open(source_raster_spec(archive_.metadata(), written, void_value));
     double rounding = 0.0;
     std::int64_t row = 0;
-    std::map<double, std::int64_t>
-        untold;  // void values that the output has no word for, and how often they stand there
+    // Voids that the output has no word for, and how often they stand there: a value each, nullopt by a range.
+    std::map<std::optional<double>, std::int64_t> untold;
+    const std::optional<double> voids_as = voids_to_nan ? std::nan("") : void_value;
     while (!reader.at_end()) {
       const std::vector<std::byte> raw = reader.read_next();
       const std::size_t count = raw.size() / size_bytes(kept.type);
-      if (as_kept && record.void_values.size() > 1) {
+      if (as_kept && (record.void_values.size() > 1 || archive_.metadata().source.raw_range)) {
         const LoadSample load = load_sample(kept.type);
         for (std::size_t i = 0; i < count; ++i) {
           const double value = load(raw.data() + i * size_bytes(kept.type));
-          if (value != void_value && std::ranges::find(record.void_values, value) != record.void_values.end())
-            ++untold[value];
+          if (value == void_value || !std::isfinite(value) || !record.is_void(value)) continue;
+          const bool is_listed = std::ranges::find(record.void_values, value) != record.void_values.end();
+          ++untold[is_listed ? std::optional(value) : std::nullopt];
         }
       }
       if (as_kept) {
@@ -217,9 +217,9 @@ class Restorer {
       } else {
         std::vector<std::byte> out(count * size_bytes(written.type));
         if (as_elevations) {
-          elevations_of(kept, raw, record.void_values, out);
-        } else if (const auto refused = convert_exactly(kept.type, raw, record.void_values, voids_to_nan, written.type,
-                                                        out, options_.rounds ? &rounding : nullptr)) {
+          elevations_of(record, raw, out);
+        } else if (const auto refused = convert_exactly(record, raw, voids_as, written.type, out,
+                                                        options_.rounds ? &rounding : nullptr)) {
           const auto sample = static_cast<std::int64_t>(*refused);
           refuse_sample(options_.raster.output, written.type, sample % grid_.width, row + sample / grid_.width,
                         fmt::format("{:.9g}", load_sample(kept.type)(raw.data() + *refused * size_bytes(kept.type))),
@@ -232,11 +232,13 @@ class Restorer {
     }
     sink->finish();
     for (const auto& [value, count] : untold) {
-      if (options_.common.quiet) break;
+      const std::string which =
+          value ? fmt::format("hold {:.9g}", *value)
+                : fmt::format("lie outside {:.9g} to {:.9g}", record.valid.first, record.valid.second);
       print_warning(
-          loss(fmt::format("{}: {} samples hold {:.9g}, which meant no elevation: a reader must be told, as with "
-                           "--nodata; isohf export writes one void value",
-                           options_.raster.output, count, value)));
+          loss(fmt::format("{}: {} samples {}, which meant no elevation: a reader must be told, as with "
+                           "{}; isohf export writes one void value",
+                           options_.raster.output, count, which, value ? "--nodata" : "--valid-range")));
     }
     return {{}, true, sink->files(), options_.rounds && !as_kept ? std::optional(rounding) : std::nullopt, {}};
   }
@@ -252,7 +254,7 @@ class Restorer {
       if (has_scale(options_.raster.output)) {
         mapping = spread_over(mapping.type, RowReader(archive_, grid_, method, job_), job_, has_voids);
         restored.spread = mapping;
-      } else if (!options_.common.quiet) {
+      } else {
         warn_of_whole_numbers(options_.raster.output, metadata);
       }
     }
@@ -266,7 +268,7 @@ class Restorer {
     const SampleStore store(mapping, void_value, clamp);
     const std::string& output = options_.raster.output;
     const RasterTarget target{output, mapping, usual_remedy(output, mapping.type, method)};
-    const auto sink = open(raster_spec(metadata, grid_, mapping, void_value), mapping);
+    const auto sink = open(raster_spec(metadata, grid_, mapping, void_value));
     RowReader(archive_, grid_, method, job_)
         .read_all(
             [&](std::int64_t row, std::span<const double> elevations) {
@@ -274,7 +276,7 @@ class Restorer {
             },
             job_);
     sink->finish();
-    if (restored.counts.clamped > 0 && !options_.raster.clamp_range && !options_.common.quiet) {
+    if (restored.counts.clamped > 0 && !options_.raster.clamp_range) {
       display_.clear();
       print_warning(
           fmt::format("{}: the surface overshoots the {} of its source at {} samples; they were moved to its ends",

@@ -303,7 +303,7 @@ int check_one(VerifyCommandOptions options, const Arguments& arguments, bool is_
     const auto same_system = are_same(source_georeference(metadata.source).system, info.georeference.system);
     for (const Warning& warning : check_same_source(archive, info, same_system)) {
       display->clear();
-      if (!options.common.quiet) print_warning(warning);
+      print_warning(warning);
     }
     accuracy = measure_accuracy(options.archive, *source, options.random_points, options.ortho, job);
     add_findings(*accuracy, contradiction(metadata, accuracy->surface), report);

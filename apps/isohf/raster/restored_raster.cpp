@@ -123,10 +123,31 @@ void warn_of_whole_numbers(const std::string& output, const Metadata& metadata) 
                                  unit == "unknown" ? "of their unit" : unit)));
 }
 
-void warn_of_lost_scale(const std::string& output, const SampleMapping& mapping) {
-  if ((mapping.z_scale == 1.0 && mapping.z_offset == 0.0) || has_scale(output)) return;
-  print_warning(loss(fmt::format("{}: has no place for what its raw numbers mean: elevation = raw * {} + {}", output,
-                                 mapping.z_scale, mapping.z_offset)));
+void warn_of_losses(const std::string& output, const RasterSpec& spec) {
+  const RasterKind kind = raster_kind(output);
+  std::vector<Warning> lost;
+  const auto say = [&](const std::string& what) { lost.push_back(loss(output + ": " + what)); };
+  if ((spec.z_scale != 1.0 || spec.z_offset != 0.0) && !has_scale(output)) {
+    say(fmt::format("has no place for what its raw numbers mean: elevation = raw * {} + {}", spec.z_scale,
+                    spec.z_offset));
+  }
+  const ReferenceSystem system = spec.georeference ? spec.georeference->system : ReferenceSystem{};
+  const bool has_auxiliary =
+      (kind == RasterKind::kExr || kind == RasterKind::kPng) && spec.georeference && spec.georeference->has_origin;
+  if (spec.metres_per_vertical_unit != 1.0 && !has_scale(output) && !has_auxiliary) {
+    say(fmt::format("has no place for the unit of its elevations, {}: readers take them for metres",
+                    spec.vertical_unit));
+  }
+  if (kind == RasterKind::kHgt) {
+    const bool is_in_degrees = spec.georeference && spec.georeference->unit == HorizontalUnit::kDegree;
+    const bool is_on_earth = system.body.empty() || system.body == "Earth";
+    if (!is_on_earth || (is_in_degrees && system.epsg.value_or(4326) != 4326))
+      say("readers take it for degrees of WGS 84, which its samples do not lie on");
+    if (system.vertical_datum.find("llipsoid") != std::string::npos) {
+      say("readers take it for heights above the geoid, and these are above the ellipsoid");
+    }
+  }
+  print_warnings(lost);
 }
 
 void refuse_sample(const std::string& output, SampleType type, std::int64_t column, std::int64_t row,

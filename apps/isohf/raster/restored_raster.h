@@ -40,8 +40,8 @@ enum class RasterKind { kTiff, kExr, kPng, kHgt, kAsc, kFlt, kRaw16, kRaw32, kNp
 [[nodiscard]] SampleMapping spread_over(SampleType type, RowReader rows, const Job& job, bool& has_voids);
 /// A warning that elevations in `output` are rounded to whole units.
 void warn_of_whole_numbers(const std::string& output, const Metadata& metadata);
-/// A warning where scale or offset say something and the format of `output` has no place for them.
-void warn_of_lost_scale(const std::string& output, const SampleMapping& mapping);
+/// Warnings of what `spec` says and the format of `output` has no place for, or says otherwise.
+void warn_of_losses(const std::string& output, const RasterSpec& spec);
 
 /// Throws Error{kInvalidArgument} for a sample that a raster's type does not hold, naming column, row and remedy.
 [[noreturn]] void refuse_sample(const std::string& output, SampleType type, std::int64_t column, std::int64_t row,

@@ -78,6 +78,7 @@ struct SourceRecord {
   double z_scale = 1;  ///< elevation = raw sample * z_scale + z_offset, in vertical units
   double z_offset = 0;
   std::vector<double> void_values;                       ///< raw values that meant "no elevation"
+  std::optional<std::pair<double, double>> raw_range;    ///< raw values outside meant it as well; infinite: unbounded
   std::optional<std::pair<double, double>> valid_range;  ///< elevations outside were void, by the user's choice
   std::int64_t fill_distance = 0;  ///< voids up to so many samples from an elevation were filled; 0: none
   Registration registration = Registration::kUnknown;  ///< as used; unknown: a name that this build does not know

@@ -31,6 +31,8 @@ SourceRecord record_of(const SourceInfo& info, const SourceFrame& frame, const S
   record.z_scale = info.z_scale;
   record.z_offset = info.z_offset;
   record.void_values = info.void_values;
+  if (std::isfinite(info.valid_min) || std::isfinite(info.valid_max))
+    record.raw_range = {info.valid_min, info.valid_max};
   record.valid_range = info.valid_range;
   record.fill_distance = info.fill_distance;
   record.registration = frame.registration;

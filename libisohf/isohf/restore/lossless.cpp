@@ -161,11 +161,17 @@ std::optional<LosslessRecord> record_named(const char* name, const Metadata& met
   } catch (const Error& error) {
     throw error.within("metadata: lossless");
   }
+  if (metadata.source.raw_range) record.valid = *metadata.source.raw_range;
   check(record, metadata);
   return record;
 }
 
 }  // namespace
+
+bool LosslessRecord::is_void(double raw) const {
+  return !std::isfinite(raw) || raw < valid.first || raw > valid.second ||
+         std::find(void_values.begin(), void_values.end(), raw) != void_values.end();
+}
 
 std::optional<LosslessRecord> lossless_record(const Metadata& metadata) {
   return record_named(kLosslessName, metadata);

@@ -77,9 +77,10 @@ SampleStore::Result SampleStore::store(std::span<const double> elevations, std::
   return result;
 }
 
-std::optional<std::size_t> convert_exactly(SampleType from, std::span<const std::byte> raw,
-                                           const std::vector<double>& nodata, bool nodata_to_nan, SampleType to,
-                                           std::span<std::byte> out, double* largest_error) {
+std::optional<std::size_t> convert_exactly(const LosslessRecord& record, std::span<const std::byte> raw,
+                                           std::optional<double> nodata, SampleType to, std::span<std::byte> out,
+                                           double* largest_error) {
+  const SampleType from = record.mapping.type;
   const SampleStore store({to, 1.0, 0.0}, std::nullopt, SampleStore::Clamp::kNone);
   const std::size_t count = raw.size() / size_bytes(from);
   ISOHF_ASSERT(out.size() == count * size_bytes(to));
@@ -88,11 +89,12 @@ std::optional<std::size_t> convert_exactly(SampleType from, std::span<const std:
   for (std::size_t i = 0; i < count; ++i) {
     const double value = load(raw.data() + i * size_bytes(from));
     std::byte* const at = out.data() + i * size_bytes(to);
-    const bool is_nodata = !std::isfinite(value) || std::find(nodata.begin(), nodata.end(), value) != nodata.end();
-    const SampleStore::Outcome outcome = store.store(is_nodata && nodata_to_nan ? std::nan("") : value, at);
+    const bool is_nodata = record.is_void(value);
+    const double written = is_nodata ? nodata.value_or(value) : value;
+    const SampleStore::Outcome outcome = store.store(written, at);
     if (outcome == SampleStore::Outcome::kNodata) continue;
     if (outcome != SampleStore::Outcome::kStored) return i;
-    const double error = std::abs(load_again(at) - value);
+    const double error = std::abs(load_again(at) - written);
     if (error == 0.0) continue;
     // A void value that came out as another number would be an elevation.
     if (largest_error == nullptr || !is_floating(to) || !std::isfinite(error) || is_nodata) return i;
@@ -101,8 +103,8 @@ std::optional<std::size_t> convert_exactly(SampleType from, std::span<const std:
   return std::nullopt;
 }
 
-void elevations_of(const SampleMapping& mapping, std::span<const std::byte> raw, const std::vector<double>& nodata,
-                   std::span<std::byte> out) {
+void elevations_of(const LosslessRecord& record, std::span<const std::byte> raw, std::span<std::byte> out) {
+  const SampleMapping& mapping = record.mapping;
   const std::size_t bytes = size_bytes(mapping.type);
   const std::size_t count = raw.size() / bytes;
   ISOHF_ASSERT(out.size() == count * sizeof(double));
@@ -113,9 +115,8 @@ void elevations_of(const SampleMapping& mapping, std::span<const std::byte> raw,
   const bool divides = std::abs(inverse) > 1.0 && std::abs(inverse * mapping.z_scale - 1.0) < kWhole;
   for (std::size_t i = 0; i < count; ++i) {
     const double number = load(raw.data() + i * bytes);
-    const bool is_void = !std::isfinite(number) || std::find(nodata.begin(), nodata.end(), number) != nodata.end();
     const double elevation = (divides ? number / inverse : number * mapping.z_scale) + mapping.z_offset;
-    const double value = is_void ? std::nan("") : elevation;
+    const double value = record.is_void(number) ? std::nan("") : elevation;
     std::memcpy(out.data() + i * sizeof(double), &value, sizeof value);
   }
 }

@@ -51,17 +51,16 @@ class SampleStore {
   double high_;
 };
 
-/// Raw samples in another type, number for number; those that are `nodata`, or not finite, as NaN where nodata_to_nan.
-/// raw [n samples of `from`]   out [n samples of `to`]. Returns the first that `to` does not hold. largest_error  given:
-/// decimals that a floating `to` does not hold are rounded to nearest, and it becomes the largest difference if that is more.
-[[nodiscard]] std::optional<std::size_t> convert_exactly(SampleType from, std::span<const std::byte> raw,
-                                                         const std::vector<double>& nodata, bool nodata_to_nan,
-                                                         SampleType to, std::span<std::byte> out,
-                                                         double* largest_error = nullptr);
+/// Raw samples of a record in another type, number for number; those that are void as `nodata`, where that is given.
+/// raw [n samples of the record's type]   out [n samples of `to`]. Returns the first that `to` does not hold. largest_error
+/// given: decimals that a floating `to` does not hold are rounded to nearest, and it becomes the largest difference if that
+/// is more.
+[[nodiscard]] std::optional<std::size_t> convert_exactly(const LosslessRecord& record, std::span<const std::byte> raw,
+                                                         std::optional<double> nodata, SampleType to,
+                                                         std::span<std::byte> out, double* largest_error = nullptr);
 
 /// Raw samples as the elevations that they mean, NaN where void: decimals where the scale is one over a whole number.
-/// raw [n samples of `mapping.type`]   out [n doubles]
-void elevations_of(const SampleMapping& mapping, std::span<const std::byte> raw, const std::vector<double>& nodata,
-                   std::span<std::byte> out);
+/// raw [n samples of the record's type]   out [n doubles]
+void elevations_of(const LosslessRecord& record, std::span<const std::byte> raw, std::span<std::byte> out);
 
 }  // namespace isohf

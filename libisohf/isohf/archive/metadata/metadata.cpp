@@ -206,6 +206,13 @@ void source_members(JsonMembers& json, SourceRecord& source) {
       "voids",
       [&](JsonMembers& voids) {
         voids("values", source.void_values);
+        std::optional<std::vector<double>> ends;  // which may be infinite
+        if (source.raw_range) ends = {source.raw_range->first, source.raw_range->second};
+        voids("raw_range", ends, kAbsent);
+        if (voids.reads() && ends) {
+          if (ends->size() != 2) voids.refuse("raw_range", "is no array of two numbers");
+          source.raw_range = {ends->front(), ends->back()};
+        }
         voids("valid_range", source.valid_range, kNull);
         voids("fill_distance", source.fill_distance, {.most = std::numeric_limits<std::int32_t>::max()});
       },
