@@ -202,7 +202,6 @@ constexpr std::int64_t kPostsInNext = 170;
 constexpr std::size_t kPostBytes = 6;
 constexpr std::int64_t kMostPosts = UsgsDemHeader::kMostPosts;
 constexpr std::int64_t kRowsAtOnce = 256;
-constexpr std::int64_t kVoid = UsgsDemHeader::kVoid;
 /// Of a spacing; the coordinates have fifteen digits.
 constexpr double kOffGrid = 0.01;
 

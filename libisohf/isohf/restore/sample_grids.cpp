@@ -350,7 +350,20 @@ SampleGrid source_grid(const SourceRecord& source) {
           source.first_sample_z, source.spacing_x, source.spacing_z};
 }
 
-SampleGrid natural_grid(const Metadata& metadata) {
+WorldBounds ground_here(const Metadata& metadata) {
+  const TileRange here = tiles_here(metadata);
+  const TileGrid& tiles = metadata.grid;
+  const WorldBounds& all = metadata.valid;
+  const WorldBounds part{std::max(all.x0, static_cast<double>(here.first.column) * tiles.extent_x()),
+                         std::max(all.z0, static_cast<double>(here.first.row) * tiles.extent_z()),
+                         std::min(all.x1, static_cast<double>(here.end.column) * tiles.extent_x()),
+                         std::min(all.z1, static_cast<double>(here.end.row) * tiles.extent_z())};
+  return part_record(metadata) && part.x0 < part.x1 && part.z0 < part.z1 ? part : all;
+}
+
+namespace {
+
+SampleGrid natural_grid_of_all(const Metadata& metadata) {
   if (!is_warped(metadata)) return source_grid(metadata.source);
   const WorldBounds& ground = metadata.valid;
   SampleGrid grid;
@@ -361,6 +374,13 @@ SampleGrid natural_grid(const Metadata& metadata) {
   grid.first_x = ground.x0 + grid.spacing_x / 2.0;
   grid.first_z = ground.z0 + grid.spacing_z / 2.0;
   return grid;
+}
+
+}  // namespace
+
+SampleGrid natural_grid(const Metadata& metadata) {
+  const SampleGrid all = natural_grid_of_all(metadata);
+  return part_record(metadata) ? part_of(all, ground_here(metadata)).value_or(all) : all;
 }
 
 SampleGrid grid_over(const WorldBounds& ground, bool areas, const std::optional<GridSize>& size,

@@ -13,6 +13,9 @@ namespace isohf {
 /// The samples of a grid in world units that lie in a part of the world; nullopt where none does.
 [[nodiscard]] std::optional<SampleGrid> part_of(const SampleGrid& grid, const WorldBounds& ground);
 
+/// The ground that an archive has tiles of: all of it, or of a part that of its tiles.
+[[nodiscard]] WorldBounds ground_here(const Metadata& metadata);
+
 /// Once round the body, where columns of an archive's world are longitudes.
 struct Turn {
   double length;  ///< world units
