@@ -244,8 +244,8 @@ int choose_channel(const TiffLayout& layout, const std::vector<std::string>& des
   const bool colour = layout.photometric == kRgb || layout.photometric == kYCbCr;
   if (names.size() > 1) info.channel = label(chosen);
   if (wanted.empty() && colour && layout.bits_per_sample == 8) {
-    info.warnings.push_back(
-        fmt::format("this is an 8 bit colour picture; its channel {} is read as elevation", label(0)));
+    throw Error(ErrorCode::kUnsupported,
+                "is a colour picture of 8 bits; say which channel holds elevations (`channel` R)");
   } else if (wanted.empty() && names.size() > 1 && !has_grey_and_opacity(layout)) {
     info.warnings.push_back(fmt::format("there are {} channels; channel {} is read", names.size(), label(0)));
   }

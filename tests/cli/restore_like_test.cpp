@@ -355,6 +355,18 @@ TEST_F(RestoreLike, CrsTakesGroundAcrossThe180thMeridianAndWholeGlobes) {
   EXPECT_LT(voids(flat), 2 * (flat.info.width + flat.info.height));
   const Raster mercator = in_system("EPSG:3857");
   EXPECT_NEAR(mercator.info.georeference.origin_y, 20037508.0, mercator.info.georeference.spacing_y);
+  // Round a pole, as far as half the way round the body, where maps go on for ever.
+  for (const char* system :
+       {"EPSG:3413", "EPSG:3031", "EPSG:2154", "+proj=gnom +lat_0=90", "+proj=tmerc", "EPSG:3035"}) {
+    const Raster polar = in_system(system);
+    const Georeference& place = polar.info.georeference;
+    const double width = static_cast<double>(polar.info.width) * place.spacing_x;
+    const double height = static_cast<double>(polar.info.height) * place.spacing_y;
+    EXPECT_EQ(place.spacing_x, place.spacing_y) << system;
+    EXPECT_LT(std::max(width, height), 2.1 * 20037508.0) << system;
+    EXPECT_GT(std::min(width, height), 15e6) << system;
+    EXPECT_LT(voids(polar), static_cast<std::int64_t>(polar.heights.size()) * 8 / 10) << system;
+  }
   const Raster ellipse = in_system("+proj=moll +datum=WGS84");
   EXPECT_NEAR(static_cast<double>(voids(ellipse)) / static_cast<double>(ellipse.heights.size()), 1.0 - M_PI / 4.0,
               0.05);

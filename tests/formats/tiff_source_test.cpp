@@ -221,12 +221,14 @@ TEST_F(TiffSource, PicksTheChannel) {
   }
 }
 
-TEST_F(TiffSource, WarnsOfAColourPicture) {
+TEST_F(TiffSource, RefusesAColourPictureUnlessAChannelIsNamed) {
   TiffBytes tiff;
   tiff.image(1, 1, 8, 1, 1).shorts(262, {2}).shorts(277, {3}).shorts(258, {8, 8, 8}).shorts(339, {1, 1, 1});
-  const SourceInfo info = info_of(tiff.block("abc"));
-  ASSERT_EQ(info.warnings.size(), 1U);
-  EXPECT_NE(info.warnings[0].find("colour picture"), std::string::npos);
+  tiff.block("abc");
+  EXPECT_EQ(code_of(tiff), ErrorCode::kUnsupported);
+  OpenOptions options;
+  options.channel = "G";
+  EXPECT_EQ(values(tiff, options), (Values{'b'}));
 }
 
 TEST_F(TiffSource, ReadsMinIsWhiteAsHeights) {

@@ -205,8 +205,19 @@ class ImageFinder {
     const bool own = metadata.source.crs_unit == "degree" && places_.has_source();
     const double longitude = own ? places_.source_from_world(middle).easting : geo.longitude;
     if (std::isfinite(longitude)) middle_ = longitude;
-    const MapPoint equator = system.map->map_from_geo({middle_, 0.0});
-    if (std::isfinite(equator.northing)) equator_ = equator.northing;
+    half_round_ = M_PI * system.map->ellipsoid().semi_major_axis_m / system.map->metres_per_unit();
+    // Maps that show poles as points go round them; others are as wide as the body is round, and cut open anywhere.
+    const auto north = pole_image(90.0);
+    const auto south = pole_image(-90.0);
+    if (north && south) {
+      centre_ = {(north->easting + south->easting) / 2.0, (north->northing + south->northing) / 2.0};
+    } else if (north || south) {
+      centre_ = north ? *north : *south;
+    } else {
+      reach_x_ = 2.0;
+      const MapPoint equator = system.map->map_from_geo({middle_, 0.0});
+      if (std::isfinite(equator.easting) && std::isfinite(equator.northing)) centre_ = equator;
+    }
   }
 
   [[nodiscard]] ShownImage image_of(const WorldBounds& ground) const {
@@ -248,7 +259,16 @@ class ImageFinder {
     return true;
   }
 
-  /// NaN where the map does not show it, or where maps like Mercator's go on for ever.
+  /// nullopt where the map does not show the pole as a point.
+  [[nodiscard]] std::optional<MapPoint> pole_image(double latitude) const {
+    const MapPoint here = system_.map->map_from_geo({middle_, latitude});
+    const MapPoint other = system_.map->map_from_geo({std::remainder(middle_ + 90.0, kTurn), latitude});
+    const double apart = std::hypot(here.easting - other.easting, here.northing - other.northing);
+    if (!(apart < 1e-6 * half_round_)) return std::nullopt;
+    return here;
+  }
+
+  /// NaN where the map does not show it, or where maps like Mercator's and the stereographic go on for ever.
   [[nodiscard]] MapPoint image_at(const MapPoint& at) const {
     GeoPoint geo = places_.geo_from_world({at.easting, -at.northing});
     geo.latitude = std::clamp(geo.latitude, -90.0, 90.0);
@@ -257,15 +277,18 @@ class ImageFinder {
       there.easting = middle_ + std::remainder(there.easting - middle_, kTurn);
       return there;
     }
-    const double half_round = M_PI * system_.map->ellipsoid().semi_major_axis_m / system_.map->metres_per_unit();
-    if (std::abs(there.northing - equator_) > half_round * (1.0 + 1e-9)) return {NAN, NAN};
+    const double reach = half_round_ * (1.0 + 1e-9);
+    if (std::abs(there.northing - centre_.northing) > reach) return {NAN, NAN};
+    if (std::abs(there.easting - centre_.easting) > reach * reach_x_) return {NAN, NAN};
     return there;
   }
 
   WorldGeoreference places_;
   const GridSystem& system_;
-  double middle_ = 0.0;  ///< longitude, as the source counts them
-  double equator_ = 0.0;
+  double middle_ = 0.0;      ///< longitude, as the source counts them
+  double half_round_ = 0.0;  ///< the body's half circumference, units of the map
+  MapPoint centre_{};        ///< of what is shown, which reaches half_round_ from it
+  double reach_x_ = 1.0;     ///< East and West so many times as far
 };
 
 /// One axis of the cut: how many tiles, and of how many samples.
