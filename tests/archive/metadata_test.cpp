@@ -64,6 +64,7 @@ TEST(Metadata, RecordsHowVoidsWereTreated) {
   Metadata metadata = full();
   metadata.source.void_values = {-9999.0, std::nan(""), HUGE_VAL};
   metadata.source.valid_range = {-500.0, 9000.5};
+  metadata.source.raw_range = {-32752.0, HUGE_VAL};
   metadata.source.fill_distance = 100;
   const std::string json = format_metadata(metadata);
   const SourceRecord back = parse_metadata(json).source;
@@ -72,6 +73,7 @@ TEST(Metadata, RecordsHowVoidsWereTreated) {
   EXPECT_TRUE(std::isnan(back.void_values[1]));
   EXPECT_EQ(back.void_values[2], HUGE_VAL);
   EXPECT_EQ(back.valid_range, metadata.source.valid_range);
+  EXPECT_EQ(back.raw_range, metadata.source.raw_range);
   EXPECT_EQ(back.fill_distance, 100);
   for (const char* wrong : {"\"fill_distance\": -1", "\"fill_distance\": 1.5", "\"fill_distance\": \"far\""}) {
     EXPECT_THROW((void)parse_metadata(replaced(json, "\"fill_distance\": 100", wrong)), Error) << wrong;
