@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <filesystem>
+#include <system_error>
 
 #include "formats/registry.h"
 #include "interrupt.h"
@@ -12,6 +13,14 @@
 
 namespace isohf::view {
 namespace {
+
+std::filesystem::path temporary_folder() {
+  std::error_code error;
+  std::filesystem::path folder = std::filesystem::temp_directory_path(error);
+  if (error)
+    throw Error(ErrorCode::kIo, "needs a folder for temporary files, and TMPDIR names none: " + error.message());
+  return folder;
+}
 
 /// Converts what is named where it is a raster; nullptr where it is none.
 std::unique_ptr<ScratchArchive> convert_for_viewing(const std::string& name, const Options& options) {
@@ -22,7 +31,7 @@ std::unique_ptr<ScratchArchive> convert_for_viewing(const std::string& name, con
   request.overwrite = true;
   understand_ground(source->info(), request.plan.ground);
   Job job;
-  job.scratch_folder = std::filesystem::temp_directory_path().string();
+  job.scratch_folder = temporary_folder().string();
   job.threads = options.threads;
   job.cancel = &cli::watch_interrupts();
   const ConvertSummary summary = convert(*source, scratch->path(), request, job);
@@ -33,8 +42,7 @@ std::unique_ptr<ScratchArchive> convert_for_viewing(const std::string& name, con
 
 std::string next_path() {
   static int number = 0;
-  return (std::filesystem::temp_directory_path() / fmt::format("isohf-view-{}-{}.isohf", ::getpid(), ++number))
-      .string();
+  return (temporary_folder() / fmt::format("isohf-view-{}-{}.isohf", ::getpid(), ++number)).string();
 }
 
 }  // namespace

@@ -280,6 +280,9 @@ TEST_F(RestoreCommand, SamplesThatAnotherTypeDoesNotHoldAreRefusedWithARemedy) {
   expect_refused(run("back.png"), 2, "which uint16 does not hold; --clamp-range moves it");
   expect_refused(run("back.png"), 2, ", --method barycentric does not overshoot, .exr holds it");
   EXPECT_EQ(run("back.png", {"--clamp-range"}).exit_code, 0);
+  // No overshoot: the elevations themselves go beyond.
+  expect_refused(run_isohf({"export", folder / "a.isohf", folder / "b.tif", "--type", "u8", "--z-range", "0:100"}), 2,
+                 "uint8 does not hold; --clamp-range moves it (elevations run from ");
 }
 
 TEST_F(RestoreCommand, SaysThatTheArchiveComesFirst) {
@@ -304,6 +307,7 @@ TEST_F(RestoreCommand, OfAPartGivesThePartsGround) {
   convert(kCoast, {"--shape", "60x67"});
   const std::string part = folder / "part.isohf";
   ASSERT_EQ(run_isohf({"extract", folder / "a.isohf", "-o", part, "--tiles", "1:3,1:2"}).exit_code, 0);
+  EXPECT_THAT(run_isohf({"verify", part}).out, HasSubstr("passed: 2 tiles and "));
   for (const char* command : {"restore", "export"}) {
     const std::string cut = folder / (std::string(command) + ".tif");
     ASSERT_EQ(
@@ -371,6 +375,8 @@ TEST_F(RestoreCommand, VoidsByRangeNeverComeBackAsElevationsWithoutAWord) {
             "isohf: warning: " + (folder / "kept.tif") +
                 ": 2048 samples lie outside -10 to 200, which meant no elevation: a reader must be told, as with "
                 "--valid-range; isohf export writes one void value\n");
+  EXPECT_EQ(run("strict.tif", {"--strict"}).exit_code, 1);
+  EXPECT_FALSE(std::filesystem::exists(folder / "strict.tif"));
   const Raster wider = restore("wider.flt");
   for (const float z : wider.elevations) EXPECT_TRUE(std::isnan(z) || z == 0.0F) << z;
   EXPECT_EQ(std::count_if(wider.elevations.begin(), wider.elevations.end(), [](float z) { return std::isnan(z); }),

@@ -177,6 +177,11 @@ TEST_F(Parts, LastArchiveGivesTheTileAndEverythingFollows) {
   options.shadow_seeds.reset();
   EXPECT_THAT(message_of({old, make("unlit.isohf")}), HasSubstr("has other shadow seeds than"));
   options.shadow_seeds.emplace();
+  options.filter = Filter::kBilinear;
+  const PartSummary other = merge_archives({old, make("bilinear.isohf")}, folder / "other.isohf");
+  EXPECT_THAT(other.warnings, testing::ElementsAre(HasSubstr("bilinear.isohf: was made with another filter than")));
+  EXPECT_EQ(small.warnings.size(), 0U);
+  options.filter.reset();
   // A piece of it does not meet what lies around.
   const std::string torn = cut(changed, "torn.isohf", {around.first, {around.first.column + 1, around.end.row}});
   if (around.end.column - around.first.column > 1) {

@@ -126,7 +126,7 @@ void write_difference(const DiffCommand& options, const Job& job) {
   const auto void_value = usual_nodata(mapping.type);
   const SampleStore store(mapping, void_value, SampleStore::Clamp::kNone);
   const RasterTarget target{options.raster, mapping,
-                            usual_remedy(options.raster, mapping.type, RestoreMethod::kBarycentric)};
+                            usual_remedy(options.raster, mapping, {}, RestoreMethod::kBarycentric)};
   RasterSpec spec = raster_spec(metadata, grid, mapping, void_value);
   spec.overwrite = options.overwrite;
   spec.scratch = scratch_of(options.work);

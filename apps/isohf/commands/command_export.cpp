@@ -239,9 +239,10 @@ class Exporter {
     const std::string& output = options_.raster.output;
     if (options_.z_scale || options_.z_offset) {
       const std::string scale = scale_that_holds(metadata.statistics, mapping, has_voids);
-      if (!scale.empty()) return usual_remedy(output, mapping.type, RestoreMethod::kBarycentric) + ", " + scale;
+      if (!scale.empty())
+        return usual_remedy(output, mapping, metadata.statistics, RestoreMethod::kBarycentric) + ", " + scale;
     }
-    std::string text = usual_remedy(output, mapping.type, options_.method(metadata, grid_.samples));
+    std::string text = usual_remedy(output, mapping, metadata.statistics, options_.method(metadata, grid_.samples));
     if (raster_kind(output) == RasterKind::kExr) text += ", --type f32 holds it";
     return text;
   }
@@ -314,6 +315,9 @@ int run(const ExportOptions& options) {
     }
     if (mapping.z_scale != 1.0 || mapping.z_offset != 0.0) {
       what += fmt::format("; elevation = sample * {} + {}", mapping.z_scale, mapping.z_offset);
+    }
+    if (options.method(archive.metadata(), samples) == RestoreMethod::kPlane) {
+      what += ", on a coarse plane's triangles (--method barycentric reads all tiles)";
     }
     if (exporter.counts.nodata > 0) what += fmt::format(", {} voids", describe_count(exporter.counts.nodata));
     if (exporter.counts.clamped > 0) {

@@ -230,7 +230,6 @@ class Restorer {
       }
       row += static_cast<std::int64_t>(count) / record.width;
     }
-    sink->finish();
     for (const auto& [value, count] : untold) {
       const std::string which =
           value ? fmt::format("hold {:.9g}", *value)
@@ -240,6 +239,7 @@ class Restorer {
                            "{}; isohf export writes one void value",
                            options_.raster.output, count, which, value ? "--nodata" : "--valid-range")));
     }
+    sink->finish();
     return {{}, true, sink->files(), options_.rounds && !as_kept ? std::optional(rounding) : std::nullopt, {}};
   }
 
@@ -267,7 +267,7 @@ class Restorer {
                                                    : SampleStore::Clamp::kNone;
     const SampleStore store(mapping, void_value, clamp);
     const std::string& output = options_.raster.output;
-    const RasterTarget target{output, mapping, usual_remedy(output, mapping.type, method)};
+    const RasterTarget target{output, mapping, usual_remedy(output, mapping, metadata.statistics, method)};
     const auto sink = open(raster_spec(metadata, grid_, mapping, void_value));
     RowReader(archive_, grid_, method, job_)
         .read_all(

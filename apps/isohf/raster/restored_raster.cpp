@@ -157,9 +157,18 @@ void refuse_sample(const std::string& output, SampleType type, std::int64_t colu
                           value, to_string(type), remedy));
 }
 
-std::string usual_remedy(const std::string& output, SampleType type, RestoreMethod method) {
+std::string usual_remedy(const std::string& output, const SampleMapping& mapping, const Statistics& elevations,
+                         RestoreMethod method) {
   std::string text = "--clamp-range moves it";
-  if (method == RestoreMethod::kHex && !is_floating(type)) text += ", --method barycentric does not overshoot";
+  const auto holds = [&, range = sample_range(mapping.type)](double elevation) {
+    const double raw = std::round((elevation - mapping.z_offset) / mapping.z_scale);
+    return raw >= range.first && raw <= range.second;
+  };
+  if (elevations.min && elevations.max && !(holds(*elevations.min) && holds(*elevations.max))) {
+    text += fmt::format(" (elevations run from {:.9g} to {:.9g})", *elevations.min, *elevations.max);
+  } else if (method == RestoreMethod::kHex && !is_floating(mapping.type)) {
+    text += ", --method barycentric does not overshoot";
+  }
   if (raster_kind(output) != RasterKind::kExr) text += ", .exr holds it";
   return text;
 }

@@ -53,8 +53,10 @@ struct RasterTarget {
   SampleMapping mapping;
   std::string remedy;
 };
-/// What helps whatever the command: --clamp-range, another --method than hex, another format.
-[[nodiscard]] std::string usual_remedy(const std::string& output, SampleType type, RestoreMethod method);
+/// What helps whatever the command: --clamp-range, another --method than hex, another format; and how far elevations go,
+/// where it is not for an overshoot that the type does not hold them.
+[[nodiscard]] std::string usual_remedy(const std::string& output, const SampleMapping& mapping,
+                                       const Statistics& elevations, RestoreMethod method);
 /// The options by which `mapping`'s type would hold all elevations of an archive, "--z-scale 0.04": its offset stays
 /// where it can. Empty of floats, and where the archive has no elevation.
 [[nodiscard]] std::string scale_that_holds(const Statistics& elevations, const SampleMapping& mapping, bool has_voids);

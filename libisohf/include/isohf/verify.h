@@ -36,7 +36,7 @@ struct FindingKind {
 struct VerifyReport {
   std::vector<Finding> findings;
   std::int64_t findings_total = 0;
-  std::int64_t tiles_checked = 0;
+  std::int64_t tiles_checked = 0;  ///< of a part, its own
   std::int64_t shared_vertices_checked = 0;
   [[nodiscard]] bool passed() const;  ///< no finding above kNote
 };

@@ -235,7 +235,10 @@ class Verification {
       const TileState* east = is_last && archive_.metadata().wraps_x ? &westmost : nullptr;
       const std::size_t complete = tiles.size() - (is_last ? 0 : 1);
       compare_tiles({first, row}, tiles, complete, east, above);
-      for (std::size_t i = 0; i < complete; ++i) borders.push_back(finish_tile(tiles[i]));
+      for (std::size_t i = 0; i < complete; ++i) {
+        if (here_.contains({first + static_cast<std::int64_t>(i), row})) ++report_.tiles_checked;
+        borders.push_back(finish_tile(tiles[i]));
+      }
       first += static_cast<std::int64_t>(complete);
       tiles.erase(tiles.begin(), tiles.begin() + static_cast<std::ptrdiff_t>(complete));
     }
@@ -486,7 +489,6 @@ class Verification {
   }
 
   void collect(TileState& tile) {
-    ++report_.tiles_checked;
     for (Finding& found : tile.findings) row_findings_.push_back(std::move(found));
     stored_ += tile.entry.stored ? 1 : 0;
     all_readable_ = all_readable_ && tile.readable;

@@ -154,6 +154,26 @@ std::optional<ResidualMembers> residuals_of(const PartsJob& parts, const std::op
   return ResidualMembers(std::move(*record), parts.inputs, parts.tiles, parts.metadata.grid.tile_rows());
 }
 
+/// In what an archive was made otherwise than another: "filter, nodata"; empty where in nothing.
+std::string made_otherwise(const Metadata& one, const Metadata& other) {
+  const auto making = [](const Metadata& metadata) {
+    const SourceRecord& source = metadata.source;
+    const auto [low, high] = source.valid_range.value_or(std::pair(-HUGE_VAL, HUGE_VAL));
+    return std::vector<std::pair<const char*, std::string>>{
+        {"source", source.name},
+        {"filter", name_of(metadata.filter) + " " + name_of(metadata.edges)},
+        {"acquisition", name_of(metadata.acquisition)},
+        {"nodata", fmt::format("{} {} {} {}", fmt::join(source.void_values, " "), low, high, source.fill_distance)}};
+  };
+  std::string names;
+  const auto ours = making(one);
+  const auto theirs = making(other);
+  for (std::size_t i = 0; i < ours.size(); ++i) {
+    if (ours[i] != theirs[i]) names += (names.empty() ? "" : ", ") + std::string(ours[i].first);
+  }
+  return names;
+}
+
 }  // namespace
 
 PartSummary write_parts(PartsJob parts, const std::string& output, const PartOptions& options, const Job& job) {
@@ -174,6 +194,14 @@ PartSummary write_parts(PartsJob parts, const std::string& output, const PartOpt
   if (!residuals && !parts.statistics && parts.plane == 0 &&
       std::any_of(parts.inputs.begin(), parts.inputs.end(), has_some)) {
     summary.warnings.push_back(loss("residuals are left out: they are not those of all that is joined"));
+  }
+  for (const AssemblyInput& input : parts.inputs) {
+    const ArchiveReader& archive = input.file->archive();
+    const std::string names = parts.one_origin ? "" : made_otherwise(metadata, archive.metadata());
+    if (names.empty()) continue;
+    summary.warnings.push_back(
+        loss(fmt::format("{}: was made with another {} than {}, of which alone the archive tells", archive.path(),
+                         names, parts.inputs.front().file->archive().path())));
   }
   drop_extension(metadata, kLosslessName);
   drop_extension(metadata, kPartLosslessName);
