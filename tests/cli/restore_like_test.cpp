@@ -355,6 +355,15 @@ TEST_F(RestoreLike, CrsTakesGroundAcrossThe180thMeridianAndWholeGlobes) {
   EXPECT_LT(voids(flat), 2 * (flat.info.width + flat.info.height));
   const Raster mercator = in_system("EPSG:3857");
   EXPECT_NEAR(mercator.info.georeference.origin_y, 20037508.0, mercator.info.georeference.spacing_y);
+  // The same ground in other units.
+  write_degrees(folder / "north", 40, 30, 9.0, 60.0, 0.01, hills);
+  convert("north.flt", "lambert-conformal");
+  const Raster metres = in_system("+proj=utm +zone=32 +datum=WGS84");
+  const Raster feet = in_system("+proj=utm +zone=32 +datum=WGS84 +units=us-ft");
+  EXPECT_NEAR(static_cast<double>(feet.info.height) * feet.info.georeference.spacing_y * 1200.0 / 3937.0,
+              static_cast<double>(metres.info.height) * metres.info.georeference.spacing_y,
+              3.0 * metres.info.georeference.spacing_y);
+  convert("globe.flt", "equirectangular");
   // Round a pole, as far as half the way round the body, where maps go on for ever.
   for (const char* system :
        {"EPSG:3413", "EPSG:3031", "EPSG:2154", "+proj=gnom +lat_0=90", "+proj=tmerc", "EPSG:3035"}) {

@@ -75,15 +75,20 @@ std::optional<PlanOptions> parse_plan(const Arguments& arguments) {
   add_source_options(line, options.open);
   add_mosaic_options(line, options.inputs);
   line.group("Many machines");
-  line.option(
-      "--write", "FILE",
-      "Write a plan for isohf convert --plan, and isohf merge; takes all options of isohf convert and --shards N",
-      [](const std::string&) {});
+  line.option("--write", "FILE",
+              "Write a plan for isohf convert --plan, and isohf merge; takes all options of isohf convert",
+              [](const std::string&) {});
+  line.option("--shards", "N", "With --write: cut the work into N shards", [](const std::string&) {});
+  bool no_scan = false;
+  line.flag("--no-scan", "With --write: leave the range of elevations to isohf scan, on many machines", no_scan);
   add_common_options(line, options.common);
   line.footer(kPlanFooter);
   if (!line.parse(arguments)) return std::nullopt;
   options.inputs.names.insert(options.inputs.names.end(), names.begin(), names.end());
   const auto refuse = [](const std::string& why) { throw Error(ErrorCode::kInvalidArgument, "plan: " + why); };
+  for (const char* option : {"--shards", "--no-scan"}) {
+    if (line.given(option)) refuse(std::string(option) + " needs --write FILE");
+  }
   if (options.inputs.names.empty()) {
     const std::string option = line.first_given({"Lattice", "Ground", "Input", "Several inputs"});
     if (!option.empty()) refuse(option + " needs an INPUT");

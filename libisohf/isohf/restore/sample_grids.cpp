@@ -205,7 +205,7 @@ class ImageFinder {
     const bool own = metadata.source.crs_unit == "degree" && places_.has_source();
     const double longitude = own ? places_.source_from_world(middle).easting : geo.longitude;
     if (std::isfinite(longitude)) middle_ = longitude;
-    half_round_ = M_PI * system.map->ellipsoid().semi_major_axis_m / system.map->metres_per_unit();
+    half_round_ = M_PI * system.map->ellipsoid().semi_major_axis_m / system.place.metres_per_unit;
     // Maps that show poles as points go round them; others are as wide as the body is round, and cut open anywhere.
     const auto north = pole_image(90.0);
     const auto south = pole_image(-90.0);
@@ -410,9 +410,11 @@ SampleGrid grid_over(const WorldBounds& ground, bool areas, const std::optional<
                      const std::optional<double>& spacing) {
   const double width = ground.x1 - ground.x0;
   const double height = ground.z1 - ground.z0;
+  // Posts on the ground, and areas whose middle lies on it.
   const auto count = [&](double length) {
-    const double steps = std::floor(length / *spacing * (1.0 + 1e-12));
-    return std::max<std::int64_t>(static_cast<std::int64_t>(steps) + (areas ? 0 : 1), 1);
+    const double steps = length / *spacing * (1.0 + 1e-12);
+    return std::max<std::int64_t>(static_cast<std::int64_t>(areas ? std::ceil(steps - 0.5) : std::floor(steps) + 1.0),
+                                  1);
   };
   const auto step = [&](double length, std::int64_t samples) {
     const std::int64_t steps = areas ? samples : samples - 1;
