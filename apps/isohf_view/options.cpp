@@ -131,8 +131,8 @@ void add_light(CommandLine& line, Options& options, std::optional<double>& time)
     options.shadows = cli::parse_word(text, {"on", "off"}) == 0;
   });
   line.option("--shadow-softness", "K",
-              "Apparent size of the sun at the caster's distance, world units (default: 2, or 0.5 % of the range of "
-              "heights where that is less)",
+              "One size of all penumbrae, world units of height (default: the sun's disc, whose penumbra grows with "
+              "the caster's distance)",
               [&](const std::string& text) { options.shadow_softness = cli::parse_positive_number(text); });
 }
 

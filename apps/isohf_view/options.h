@@ -42,7 +42,7 @@ struct Options {
   std::optional<double> exaggeration;  ///< nullopt: default_exaggeration()
   bool mode_given = false;             ///< else textures are shown where the archive has them
   bool shadows = true;
-  std::optional<double> shadow_softness;  ///< k of Eq. 16, world units; nullopt: default_softness()
+  std::optional<double> shadow_softness;  ///< k of Eq. 16, world units; nullopt: the sun's disc
   std::optional<double> far_distance;
   std::optional<int> samples;  ///< a pixel; nullopt: 4, but 1 in a window that software draws
   std::uint64_t memory_mib = 512;

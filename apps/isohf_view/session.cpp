@@ -28,12 +28,6 @@ TileBoxLimits limits_from(const TileSource& source, const Options& options) {
   return limits;
 }
 
-/// The paper's k for the sun and mountains on Earth, 2 metres; less for small things. As isohf shade has it.
-double default_softness(const TileBounds& whole) {
-  const double range = whole.high - whole.low;
-  return range > 0.0 ? std::min(2.0, 0.005 * range) : 2.0;
-}
-
 const std::vector<std::string> kHelpLines{"left drag    move the ground         wheel         zoom",
                                           "right drag   orbit                   double click  fly there",
                                           "W A S D      fly, arrows too         Q E           down, up",
@@ -74,11 +68,12 @@ SharedGeometry shared_geometry(const TileSource& source) {
 
 }  // namespace
 
-std::optional<CastingSun> casting_sun(double azimuth_deg, double elevation_deg, double exaggeration, double softness) {
+std::optional<CastingSun> casting_sun(double azimuth_deg, double elevation_deg, double exaggeration,
+                                      std::optional<double> softness) {
   if (elevation_deg <= 0.0 || elevation_deg >= 90.0) return std::nullopt;
   const double over_true_deg = std::atan(std::tan(elevation_deg * kDegree) / exaggeration) / kDegree;
   if (std::max(elevation_deg, over_true_deg) > kOverhead_deg) return std::nullopt;
-  return CastingSun{azimuth_deg, over_true_deg, softness};
+  return CastingSun{azimuth_deg, elevation_deg, softness, exaggeration};
 }
 
 Session::Session(const TileSource& source, const Options& options)
@@ -88,7 +83,7 @@ Session::Session(const TileSource& source, const Options& options)
       shadows(options.shadows),
       source_(source),
       whole_(whole_bounds(source)),
-      shadow_softness_(options.shadow_softness.value_or(default_softness(whole_))),
+      shadow_softness_(options.shadow_softness),
       shared_(shared_geometry(source)),
       renderer_(source, shared_),
       boxes_(source, shared_, limits_from(source, options)),

@@ -16,7 +16,7 @@ namespace isohf::view {
 /// The sun that casts over true heights what this one casts over exaggerated ones: that of tan(elevation) /
 /// exaggeration. nullopt: it casts nothing, as it is night, or overhead.
 [[nodiscard]] std::optional<CastingSun> casting_sun(double azimuth_deg, double elevation_deg, double exaggeration,
-                                                    double softness);
+                                                    std::optional<double> softness);
 
 /// An open heightfield with a camera: all that window, picture and flight have in common. A GL context must be
 /// current as long as it lives.
@@ -89,7 +89,7 @@ class Session {
 
   const TileSource& source_;
   TileBounds whole_;
-  double shadow_softness_;
+  std::optional<double> shadow_softness_;
   SharedGeometry shared_;
   Renderer renderer_;
   PlaneBoxes boxes_;

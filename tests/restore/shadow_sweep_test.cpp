@@ -18,6 +18,8 @@
 namespace isohf {
 namespace {
 
+/// Of Eq. 16, with k twice as much: so deep in the shadow nothing is seen of the sun.
+constexpr double kDepthOfOne = 500.0;
 constexpr double kVoid = std::numeric_limits<double>::quiet_NaN();
 
 /// A height for every place of the lattice, the same for all tiles that share it.
@@ -26,8 +28,8 @@ float height_at(LatticeVertex vertex) {
   return static_cast<float>(mixed >> 40U) / static_cast<float>(1U << 24U) * 30.0F;
 }
 
-/// Depths of all tiles, passed over from the sun's side.
-std::vector<TileRowValues> depths_of(const TileGrid& grid, ShadowSweep& sweep) {
+/// What is hidden of the sun on all tiles, passed over from the sun's side.
+std::vector<TileRowValues> hidden_of(const TileGrid& grid, ShadowSweep& sweep) {
   std::vector<TileRowValues> all;
   for (std::int64_t row = 0; row < grid.tile_rows(); ++row) all.emplace_back(grid, std::nullopt);
   ShadowSweep::State light;
@@ -66,8 +68,8 @@ TEST(ShadowSweep, IsExactAtTheVerticesOnTheSixAzimuthsOfTheLattice) {
                       {180.0 - diagonal, 1, 1}, {180.0 + diagonal, -1, 1}};
   for (const Way& way : ways) {
     for (const double fall : {0.05, 0.3, 1.0}) {
-      ShadowSweep sweep(grid, ground, way.azimuth, fall, 1000.0);
-      const std::vector<TileRowValues> depths = depths_of(grid, sweep);
+      ShadowSweep sweep(grid, ground, {way.azimuth, fall, fall, fall, 2.0 * kDepthOfOne});
+      const std::vector<TileRowValues> depths = hidden_of(grid, sweep);
       const double step = fall * std::hypot(way.x * grid.sigma_x(), way.z * grid.sigma_z());
       int compared = 0;
       for (std::int64_t tile = 0; tile < grid.tile_count(); ++tile) {
@@ -87,7 +89,7 @@ TEST(ShadowSweep, IsExactAtTheVerticesOnTheSixAzimuthsOfTheLattice) {
             // In the sun a depth says how near the light's line passes, also between vertices.
             const double depth = std::max(dark - static_cast<double>(height_at(at)), 0.0);
             const auto found =
-                static_cast<double>(found_here[static_cast<std::size_t>(r * grid.shape().columns() + c)]);
+                kDepthOfOne * static_cast<double>(found_here[static_cast<std::size_t>(r * grid.shape().columns() + c)]);
             ASSERT_NEAR(std::max(found, 0.0), depth, 1e-4) << way.azimuth << " at " << at.x << ' ' << at.z;
             ++compared;
           }
@@ -104,8 +106,10 @@ TEST(ShadowSweep, AgreesWhereTilesMeet) {
   const WorldBounds ground{0.0, 0.0, grid.world_width(), grid.world_height()};
   const int last = grid.shape().rows() - 2;
   for (int azimuth = 0; azimuth < 360; azimuth += 7) {
-    ShadowSweep sweep(grid, ground, azimuth, 0.2, 5.0);
-    const std::vector<TileRowValues> depths = depths_of(grid, sweep);
+    SweptSun sun{static_cast<double>(azimuth), 0.2, 0.205, 0.195};
+    if (azimuth % 2 == 0) sun.softness = 5.0;
+    ShadowSweep sweep(grid, ground, sun);
+    const std::vector<TileRowValues> depths = hidden_of(grid, sweep);
     for (std::size_t row = 0; row + 1 < depths.size(); ++row) {
       for (std::int64_t column = 0; column < grid.tile_columns(); ++column) {
         const std::vector<float> north = depths[row].tile(column);
@@ -137,7 +141,6 @@ class ShadowsOfAnySun : public testing::Test {
     options.size = GridSize{kColumns, kRows};
     options.sun_azimuth_deg = azimuth;
     options.sun_elevation_deg = elevation;
-    options.softness = 0.01;
     const Picture found = shade(archive, options);
     const std::vector<int> lit = rays(archive, azimuth, elevation);
     Compared result;
@@ -221,6 +224,73 @@ class ShadowsOfAnySun : public testing::Test {
 
   test::TemporaryFolder folder;
 };
+
+// Behind a wall, higher in the North, on level ground: as much of the sun is seen as of its disc stands above the wall's top.
+TEST_F(ShadowsOfAnySun, HavePenumbraeThatGrowWithTheCastersDistance) {
+  constexpr int kWide = 900;
+  constexpr int kWall = 20;
+  test::MemorySource<float> source(SampleType::kFloat32, kWide, 40, [](std::int64_t c, std::int64_t r) {
+    return std::abs(c - kWall) > 2 ? 0.0 : r < 20 ? 60.0 : 15.0;
+  });
+  (void)convert(source, folder / "wall.isohf");
+  const ArchiveReader archive(folder / "wall.isohf");
+  for (const double elevation : {5.0, 11.0}) {
+    ShadeOptions options;
+    options.kind = ShadeKind::kShadowMask;
+    options.size = GridSize{kWide, 40};
+    options.sun_elevation_deg = elevation;  // in the West
+    const Picture found = shade(archive, options);
+    double widths[2] = {};
+    for (const int row : {10, 30}) {
+      const auto share_behind = [&](double distance) {
+        const double rise = std::atan2(row == 10 ? 60.0 : 15.0, distance) * 180.0 / std::numbers::pi;
+        return std::clamp(0.5 + (elevation - rise) / (2.0 * sun_radius_deg("Earth")), 0.0, 1.0);
+      };
+      for (int c = kWall + 20; c < kWide; ++c) {
+        const double share = (found.pixel(c, row)[0] - 1) / 254.0;
+        // The wall's top ends within a lattice step of its last sample.
+        ASSERT_GE(share, share_behind(c - kWall - 3.2) - 0.02) << elevation << " degrees, row " << row << ", " << c;
+        ASSERT_LE(share, share_behind(c - kWall - 0.8) + 0.02) << elevation << " degrees, row " << row << ", " << c;
+        widths[row / 20] += share > 0.0 && share < 1.0 ? 1.0 : 0.0;
+      }
+      EXPECT_GE(widths[row / 20], 3.0);
+    }
+    EXPECT_NEAR(widths[0] / widths[1], 4.0, 1.0);
+  }
+}
+
+// A penumbra of one size has it at all distances.
+TEST_F(ShadowsOfAnySun, HaveOneSoftnessWhereItIsAskedFor) {
+  test::MemorySource<float> source(SampleType::kFloat32, 300, 40, [](std::int64_t c, std::int64_t r) {
+    return std::abs(c - 20) > 2 ? 0.0 : r < 20 ? 40.0 : 10.0;
+  });
+  (void)convert(source, folder / "wall.isohf");
+  ShadeOptions options;
+  options.kind = ShadeKind::kShadowMask;
+  options.size = GridSize{300, 40};
+  options.sun_elevation_deg = 12.0;
+  options.softness = 4.0;
+  const Picture found = shade(ArchiveReader(folder / "wall.isohf"), options);
+  int between[2] = {};
+  for (const int row : {10, 30}) {
+    for (int c = 40; c < 300; ++c) {
+      const int value = found.pixel(c, row)[0];
+      between[row / 20] += value > 1 && value < 255 ? 1 : 0;
+    }
+  }
+  // k/2 over the slope of the light.
+  EXPECT_NEAR(between[0], 2.0 / std::tan(12.0 * std::numbers::pi / 180.0), 2.0);
+  EXPECT_NEAR(between[1], between[0], 2.0);
+}
+
+TEST(SweptSun, FallsLessOverTrueHeightsThanOverExaggeratedOnes) {
+  const SweptSun sun = swept_sun(123.0, 20.0, 0.25, 3.0, 0.5);
+  EXPECT_NEAR(sun.fall, std::tan(20.0 * std::numbers::pi / 180.0) / 6.0, 1e-12);
+  EXPECT_NEAR(sun.upper_fall, std::tan(20.25 * std::numbers::pi / 180.0) / 6.0, 1e-12);
+  EXPECT_NEAR(sun.lower_fall, std::tan(19.75 * std::numbers::pi / 180.0) / 6.0, 1e-12);
+  // Its lower edge stays above the horizon.
+  EXPECT_GT(swept_sun(0.0, 0.01, 0.25, 1.0, 1.0).lower_fall, 0.0);
+}
 
 TEST_F(ShadowsOfAnySun, AreThoseOfRaysOverHills) {
   expect_shadows_of_rays([](std::int64_t c, std::int64_t r) {

@@ -163,11 +163,15 @@ TEST(CastShadows, SayWhatCouldNotBeRead) {
   EXPECT_EQ(unread, "tile (1,2)");
 }
 
-TEST(CastingSun, StandsLowerOverTrueHeightsThanOverExaggeratedOnes) {
-  const auto sun = casting_sun(123.0, 20.0, 3.0, 2.0);
-  ASSERT_TRUE(sun);
-  EXPECT_EQ(sun->azimuth_deg, 123.0);
-  EXPECT_NEAR(std::tan(sun->elevation_deg * kDegree), std::tan(20.0 * kDegree) / 3.0, 1e-12);
+// Heights three times as high cast what true ones cast under a sun whose tangent is a third.
+TEST(CastShadows, AreThoseOfTheHeightsThatAreDrawn) {
+  const MemoryTiles source(grid(), [](TileIndex tile, auto& codes) { raise_ridges(grid(), tile, codes); });
+  const double over_true_deg = std::atan(std::tan(20.0 * kDegree) / 3.0) / kDegree;
+  const auto drawn = casting_sun(123.0, 20.0, 3.0, 2.0);
+  ASSERT_TRUE(drawn);
+  const TileShadow shadow = cast(source, *drawn, {{2, 2}}).front();
+  EXPECT_EQ(shadow.depths, cast(source, {123.0, over_true_deg, 2.0}, {{2, 2}}).front().depths);
+  EXPECT_NE(shadow.depths, cast(source, {123.0, 20.0, 2.0}, {{2, 2}}).front().depths);
 }
 
 TEST(CastingSun, CastsNothingAtNightOrOverhead) {

@@ -139,8 +139,8 @@ std::optional<ShadeCommand> parse_shade(const Arguments& arguments) {
   line.flag("--no-relief", "Light all ground as if it were level", options.no_relief);
   line.flag("--no-shadow", "Leave out the shadows that land casts on land beyond it", options.no_shadow);
   line.option("--shadow-softness", "K",
-              "The sun's apparent size at the caster's distance, vertical units (default 2, or 0.5 % of the elevation "
-              "range where that is less)",
+              "One size of all penumbrae, vertical units (default: the sun's disc, whose penumbra grows with the "
+              "caster's distance)",
               [&](const std::string& text) { request.softness = parse_positive_number(text); });
   line.group("Picture");
   line.option("--size", "N|WxH",

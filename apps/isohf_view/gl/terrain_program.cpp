@@ -118,10 +118,9 @@ in float v_void;
 #endif
 )glsl";
 
-// Eq. 16 on the surface itself (isohf/surface/shade/shadow.h): all of the sun where the ground is its own shadow height, none
-// where that lies k/2 above. Depths are negative in the sun, so that a border lies between two vertices.
+// What is hidden of the sun goes beyond 0 and 1, so that a border lies between two vertices (shadow_front.h).
 constexpr const char* kSunShare = R"glsl(
-uniform float shadow_gain;      // share of the sun that a depth of 1 takes; 0: no shadows
+uniform float shadow_gain;      // part of the sun that 1 hides; 0: no shadows
 float sun_share() { return clamp(1.0 - v_place.w * shadow_gain, 0.0, 1.0); }
 )glsl";
 

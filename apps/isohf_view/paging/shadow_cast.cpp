@@ -25,6 +25,15 @@ TileRange range_of(const std::vector<TileIndex>& tiles) {
   return range;
 }
 
+SweptSun swept(const TileSource& source, const CastingSun& sun) {
+  const Metadata* const metadata = source.metadata();
+  const double radius = sun_radius_deg(metadata != nullptr ? metadata->source.body : std::string());
+  const double scale = source.scale().scale;
+  SweptSun swept = swept_sun(sun.azimuth_deg, sun.elevation_deg, radius, sun.exaggeration, 1.0 / scale);
+  if (sun.softness) swept.softness = *sun.softness / scale;
+  return swept;
+}
+
 /// Lowest elevation of the stored tiles of a range; infinite where there are none.
 double lowest(const TileSource& source, const TileRange& range) {
   double low = std::numeric_limits<double>::infinity();
@@ -42,7 +51,7 @@ double lowest(const TileSource& source, const TileRange& range) {
 TileRange casting_range(const TileSource& source, const CastingSun& sun, const TileRange& shaded,
                         const CastingLimits& limits) {
   const TileGrid& grid = source.grid();
-  const double fall = std::tan(sun.elevation_deg * kDegree);
+  const double fall = swept(source, sun).lower_fall * source.scale().scale;
   double reach = std::max(0.0, (whole_bounds(source).high - lowest(source, shaded)) / fall);
   for (;; reach *= 0.9) {
     // A lane more, as light drifts between lanes.
@@ -80,17 +89,16 @@ std::vector<TileShadow> cast_shadows(const TileSource& source, const CastingSun&
   const WorldPoint corner{static_cast<double>(range.first_column) * grid.extent_x(),
                           static_cast<double>(range.first_row) * grid.extent_z()};
   const WorldBounds covered = limits.ground.value_or(source.covered());
-  const double scale = source.scale().scale;
-  const TileGrid swept = TileGrid::make(grid.shape(), columns, rows, grid.extent_x(), grid.extent_z());
-  ShadowSweep sweep(swept, {covered.x0 - corner.x, covered.z0 - corner.z, covered.x1 - corner.x, covered.z1 - corner.z},
-                    sun.azimuth_deg, std::tan(sun.elevation_deg * kDegree) / scale, sun.softness / scale);
+  const TileGrid box = TileGrid::make(grid.shape(), columns, rows, grid.extent_x(), grid.extent_z());
+  ShadowSweep sweep(box, {covered.x0 - corner.x, covered.z0 - corner.z, covered.x1 - corner.x, covered.z1 - corner.z},
+                    swept(source, sun));
   // Lines of light lie where a sweep over all tiles would have them, so that shadows go on from one range to the next.
   sweep.begin_behind(range.first_column, grid.tile_columns() - 1 - range.last_column,
                      sweep.from_south() ? grid.tile_rows() - 1 - range.last_row : range.first_row);
   const auto vertices = static_cast<std::size_t>(grid.shape().stored_vertex_count());
-  const auto steps = static_cast<float>(kDepthSteps / sweep.most_depth());
-  TileRowValues heights(swept, std::nullopt);
-  TileRowValues depths(swept, std::nullopt);
+  const auto steps = static_cast<float>(kDepthSteps / (0.5 + sweep.range()));
+  TileRowValues heights(box, std::nullopt);
+  TileRowValues hidden(box, std::nullopt);
   std::vector<float> read(vertices);
   ShadowSweep::State light;
   for (std::int64_t k = 0; k < rows && !cancelled; ++k) {
@@ -107,15 +115,14 @@ std::vector<TileShadow> cast_shadows(const TileSource& source, const CastingSun&
     }
     const bool wanted =
         std::any_of(tiles.begin(), tiles.end(), [&](TileIndex tile) { return tile.row == range.first_row + row; });
-    light = sweep.pass(row, light, heights, wanted ? &depths : nullptr);
+    light = sweep.pass(row, light, heights, wanted ? &hidden : nullptr);
     if (!wanted) continue;
     for (const TileIndex shaded : tiles) {
       if (shaded.row != range.first_row + row) continue;
-      const std::vector<float> found = depths.tile(shaded.column - range.first_column);
-      TileShadow shadow{shaded, std::vector<std::int16_t>(vertices),
-                        static_cast<float>(2.0 * sweep.most_depth() * scale / sun.softness)};
-      std::transform(found.begin(), found.end(), shadow.depths.begin(), [steps](float depth) {
-        return static_cast<std::int16_t>(std::lround(std::clamp(depth * steps, -kDepthSteps, kDepthSteps)));
+      const std::vector<float> found = hidden.tile(shaded.column - range.first_column);
+      TileShadow shadow{shaded, std::vector<std::int16_t>(vertices), static_cast<float>(0.5 + sweep.range())};
+      std::transform(found.begin(), found.end(), shadow.depths.begin(), [steps](float part) {
+        return static_cast<std::int16_t>(std::lround(std::clamp(part * steps, -kDepthSteps, kDepthSteps)));
       });
       shadows.push_back(std::move(shadow));
     }

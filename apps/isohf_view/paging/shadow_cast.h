@@ -10,22 +10,22 @@
 
 namespace isohf::view {
 
-/// A sun over true heights: what shadows are computed for.
+/// A sun over the heights as they are drawn: what shadows are computed for.
 struct CastingSun {
-  double azimuth_deg = 270.0;   ///< clockwise from North, any
-  double elevation_deg = 15.0;  ///< above 0, below 90
-  double softness = 2.0;        ///< k of Eq. 16, world units, > 0
-  bool difference = false;      ///< no light at all: how far another surface lies above this one, in its place
+  double azimuth_deg = 270.0;        ///< clockwise from North, any
+  double elevation_deg = 15.0;       ///< above 0, below 90
+  std::optional<double> softness{};  ///< k of Eq. 16, true world units, > 0; nullopt: the sun's disc
+  double exaggeration = 1.0;         ///< of heights, > 0
+  bool difference = false;           ///< no light at all: how far another surface lies above this one, in its place
   friend bool operator==(const CastingSun&, const CastingSun&) = default;
 };
 
 /// What a tile is shaded by.
 struct TileShadow {
   TileIndex tile{};
-  /// [C x R] at visible vertices: how far the ground lies below the height up to which it is dark, negative in the sun;
-  /// 32767 for as far as is told apart.
+  /// [C x R] at visible vertices: the part of the sun that is hidden, in 32767ths of `gain`; beyond 0 and 1 how near a
+  /// shadow's border is.
   std::vector<std::int16_t> depths;
-  /// Share of the sun that a depth of 32767 takes; all of it where that is 1 or more.
   float gain = 0.0F;
 };
 

@@ -128,7 +128,7 @@ void ShadowVerifier::verify_tile(TileIndex tile, const RowSun& sun, std::size_t 
 
 void ShadowVerifier::check_vertices(TileIndex tile, const RowSun& sun) {
   const TileShape& shape = source_.grid().shape();
-  const double deepest = 0.5 * cast_.gain * kSoftness;  // codes
+  const double deepest = 0.5 * cast_.gain * kSoftness;  // codes that 32767 stands for, with Eq. 16
   Worst worst;
   for (int row = 1; row < shape.rows() - 1; ++row) {
     for (int column = 1; column <= last_visible_column(shape, row); ++column) {

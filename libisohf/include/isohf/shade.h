@@ -88,8 +88,8 @@ struct ShadeOptions {
   bool shadows = true;              ///< of kPicture: that land casts on land beyond it
   bool relief = true;               ///< of kPicture: shade slopes by how they face the sun
   double exaggeration = 1.0;        ///< of heights, > 0
-  /// The sun's apparent size at the caster's distance, elevation units, > 0 (paper Eq. 16); nullopt: 2, or 0.5 % of the
-  /// elevation range where that is less.
+  /// A penumbra of one size at all distances, elevation units, > 0 (k of paper Eq. 16); nullopt: that of the sun's disc as
+  /// it is seen from the archive's body, which grows with the caster's distance.
   std::optional<double> softness;
   std::optional<ShadePalette> palette;  ///< nullopt: its body's
   std::vector<ColourStop> colours;      ///< in place of the palette, by rising elevation; linear between them

@@ -178,11 +178,10 @@ ISOHF_KERNEL void between_rows(const float* north, const float* south, float sha
   for (int i = 0; i < count; ++i) out[i] = north[i] + share * (south[i] - north[i]);
 }
 
-/// The share of the sun of ground so far below the height up to which it is dark: Eq. 16 as sun_share_on_surface()
-/// has it.
-ISOHF_KERNEL void share_of_depth(float* __restrict values, int count, float per_depth) {
+/// The share of the sun that is seen where so much of it is hidden.
+ISOHF_KERNEL void share_of_hidden(float* __restrict values, int count) {
   for (int i = 0; i < count; ++i) {
-    float share = 1.0F - values[i] * per_depth;
+    float share = 1.0F - values[i];
     share = share > 0.0F ? share : 0.0F;
     values[i] = share < 1.0F ? share : 1.0F;
   }
@@ -327,7 +326,7 @@ class ShadeRenderer {
     if (casts_shadows(request)) begin_sweep();
     divide_memory();
     heights_.emplace(grid_, scratch_);
-    if (sweep_) depths_.emplace(grid_, scratch_);
+    if (sweep_) hidden_.emplace(grid_, scratch_);
     if (!textures_) return;
     texels_.emplace(4 * textures_->side() * static_cast<std::size_t>(grid_.tile_columns()), scratch_);
     for (std::size_t row = 0; row < textures_->side(); ++row) texels_->add(static_cast<std::int64_t>(row));
@@ -340,7 +339,7 @@ class ShadeRenderer {
     for (std::int64_t row = 0; row < grid_.tile_rows(); ++row) {
       if (sweep_ && sweep_->from_south()) light = from_south(row);
       decode(row);
-      if (sweep_) light = sweep_->pass(row, light, *heights_, &*depths_);
+      if (sweep_) light = sweep_->pass(row, light, *heights_, &*hidden_);
       if (textures_) read_textures(row);
       const Run points = points_of(row);
       for (Run part{points.first, points.first}; part.last < points.last; part.first = part.last) {
@@ -355,10 +354,11 @@ class ShadeRenderer {
  private:
   void begin_sweep() {
     const ShadeOptions& request = request_;
-    const double softness = request.softness.value_or(default_softness(archive_.metadata())) * world_per_elevation_;
-    share_per_depth_ = static_cast<float>(2.0 / softness);
-    const double fall = std::tan(request.sun_elevation_deg * std::numbers::pi / 180.0);
-    sweep_.emplace(grid_, archive_.metadata().valid, request.sun_azimuth_deg, fall, softness);
+    // Heights are those of the picture, in world units.
+    SweptSun sun = swept_sun(request.sun_azimuth_deg, request.sun_elevation_deg,
+                             sun_radius_deg(archive_.metadata().source.body), 1.0, 1.0);
+    if (request.softness) sun.softness = *request.softness * world_per_elevation_;
+    sweep_.emplace(grid_, archive_.metadata().valid, sun);
     if (!sweep_->from_south()) return;
     // What enters every stride-th row of tiles is kept for all time, and those in between for the rows that are drawn
     // next.
@@ -399,7 +399,7 @@ class ShadeRenderer {
     if (!sweep_) return bytes;
     const auto state = static_cast<double>(sweep_->state_bytes());
     if (sweep_->from_south() && !in_scratch) bytes += static_cast<double>(kept_states()) * state;
-    // Rows of vertices, twice, and lines at half steps: their heights and depths, those of the ground, and what enters
+    // Rows of vertices, twice, and lines at half steps: their what they carry and hide, the ground, and what enters
     // and leaves.
     return bytes + 3.0 * state + sweep_->passing_bytes();
   }
@@ -624,8 +624,8 @@ class ShadeRenderer {
     const TileShape& shape = grid_.shape();
     const Run columns{block.first * x_.per_pixel(), block.last * x_.per_pixel()};
     Field heights(columns_, *heights_, shape, columns);
-    std::optional<Field> depths;
-    if (sweep_) depths.emplace(columns_, *depths_, shape, columns);
+    std::optional<Field> hidden;
+    if (sweep_) hidden.emplace(columns_, *hidden_, shape, columns);
     TexelRows texels;
     const bool single = points_in_pixel() == 1;
     const auto count = static_cast<std::size_t>(columns.last - columns.first);
@@ -644,8 +644,8 @@ class ShadeRenderer {
       heights.read(row + 1, part, h);
       if (has_voids_ && part > 0.0F) heights.mend(place, h);
       if (sweep_) {
-        depths->read(row + 1, part, s);
-        vectorised<share_of_depth>(s, static_cast<int>(count), share_per_depth_);
+        hidden->read(row + 1, part, s);
+        vectorised<share_of_hidden>(s, static_cast<int>(count));
       }
       if (!single) add(height, share, block, pixels);
       if (textures_) add_photo(texels, z / shape.cell_rows(), columns, pixels);
@@ -838,14 +838,13 @@ class ShadeRenderer {
   Normal sun_;
   double datum_;
   double world_per_elevation_;
-  float share_per_depth_ = 1.0F;
   std::optional<ShadowSweep> sweep_;
   std::optional<ShadeTexture> textures_;
   ScratchFolder scratch_;
   std::int64_t rows_at_once_ = 1;         ///< of pixels
   std::optional<TileRowValues> heights_;  ///< of the row of tiles that is drawn
   std::atomic<bool> has_voids_ = false;
-  std::optional<TileRowValues> depths_;
+  std::optional<TileRowValues> hidden_;
   std::optional<KeptRows<std::uint8_t>> texels_;  ///< rows of [tile columns][side] texels
   std::optional<KeptRows<float>> south_;          ///< what enters each row of tiles from the South, where it is kept
   std::size_t south_width_ = 0;

@@ -18,6 +18,10 @@ constexpr int kColumnsTogether = 16;
 /// Tiles beside each other whose rows are read together.
 constexpr std::int64_t kTilesTogether = 8;
 
+/// Steps behind its caster from which on a penumbra is one step of light wide at least: borders then have no teeth as
+/// large as cells, and the shade that a slope gives itself stays as sharp as it is.
+constexpr double kStepsToFullWidth = 8.0;
+
 /// A visible or padding row of a tile at every half step from its West edge to its East edge.
 void spread(const TileShape& shape, const float* row, bool is_odd, float* out) {
   const int cells = shape.cell_columns();
@@ -77,10 +81,24 @@ std::vector<float> TileRowValues::tile(std::int64_t tile) const {
   return values;
 }
 
-ShadowSweep::ShadowSweep(const TileGrid& grid, const WorldBounds& ground, double azimuth_deg, double fall,
-                         double softness)
+double sun_radius_deg(const std::string& body) {
+  constexpr double kAtOneAu_deg = 959.63 / 3600.0;  // IAU
+  constexpr double kOfMars_au = 1.523679;
+  return body == "Mars" ? kAtOneAu_deg / kOfMars_au : kAtOneAu_deg;
+}
+
+SweptSun swept_sun(double azimuth_deg, double elevation_deg, double radius_deg, double exaggeration,
+                   double height_per_world) {
+  const double radius = std::min({radius_deg, 0.5 * elevation_deg, 0.5 * (90.0 - elevation_deg)});
+  const auto fall = [&](double degrees) {
+    return std::tan(degrees * std::numbers::pi / 180.0) / exaggeration * height_per_world;
+  };
+  return {azimuth_deg, fall(elevation_deg), fall(elevation_deg + radius), fall(elevation_deg - radius)};
+}
+
+ShadowSweep::ShadowSweep(const TileGrid& grid, const WorldBounds& ground, const SweptSun& sun)
     : grid_(grid), ground_(ground), half_steps_(half_steps_across(grid.shape())) {
-  const double azimuth = azimuth_deg * std::numbers::pi / 180.0;
+  const double azimuth = sun.azimuth_deg * std::numbers::pi / 180.0;
   // The way of the light in half steps and rows.
   const double along = -std::sin(azimuth) / grid.sigma_x();
   const double across = std::cos(azimuth) / grid.sigma_z();
@@ -91,9 +109,27 @@ ShadowSweep::ShadowSweep(const TileGrid& grid, const WorldBounds& ground, double
   if (shift_ > 1.0 - kOnLattice) shift_ = 1.0;
   from_south_ = across < 0.0 && (!by_columns_ || shift_ > 0.0);
   mirrored_ = along < 0.0;
-  fall_ = fall * std::hypot(along / larger * grid.sigma_x(), across / larger * grid.sigma_z());
-  // Deep enough for half a softness, and for a border's place between two lines.
-  most_depth_ = std::max(softness, 2.0 * fall_);
+  const double step = std::hypot(along / larger * grid.sigma_x(), across / larger * grid.sigma_z());
+  const double fall = step * sun.fall;
+  if (sun.softness) {
+    // Eq. 16 on the surface: all of the sun where it is its own shadow height, none from k/2 below.
+    const double width = 0.5 * *sun.softness;
+    edges_ = {{.fall = fall,
+               .offset = -0.5 * width,
+               .least = width,
+               .most = width,
+               .deepest = std::max(*sun.softness, 2.0 * fall)}};
+    range_ = edges_.front().deepest / width;
+    return;
+  }
+  const double widening = step * (sun.upper_fall - sun.lower_fall);
+  const double steep = fall / (kStepsToFullWidth * widening);
+  const SunEdge upper{
+      .fall = step * sun.upper_fall, .widening = widening, .side = 0.5, .steep = steep, .most = fall, .deepest = fall};
+  edges_ = {upper, upper};
+  edges_[1].fall = step * sun.lower_fall;
+  edges_[1].side = -0.5;
+  range_ = kStepsToFullWidth;
 }
 
 void ShadowSweep::begin_behind(std::int64_t tiles_west, std::int64_t tiles_east, std::int64_t rows_before) {
@@ -103,15 +139,18 @@ void ShadowSweep::begin_behind(std::int64_t tiles_west, std::int64_t tiles_east,
 
 std::uint64_t ShadowSweep::state_bytes() const {
   const auto lanes = static_cast<double>(half_steps_ * grid_.tile_columns());
-  return static_cast<std::uint64_t>(lanes * (by_columns_ ? shift_ : 1.0) * sizeof(float)) + 64;
+  return static_cast<std::uint64_t>(lanes * (by_columns_ ? shift_ : 1.0) * 2.0 * static_cast<double>(edges_.size()) *
+                                    sizeof(float)) +
+         64;
 }
 
 double ShadowSweep::passing_bytes() const {
   const TileShape& shape = grid_.shape();
   if (by_columns_) return 2.0 * sizeof(float) * static_cast<double>(kTilesTogether * shape.stored_vertex_count());
-  // Lines, their depths, the ground under them, what is found; rows of vertices.
+  // What lines carry, what is hidden under them, the ground there, what is found; rows of vertices.
   const auto tiles = static_cast<double>(grid_.tile_columns());
-  return tiles * sizeof(float) * (4.0 * half_steps_ + 2.0 * shape.columns());
+  return tiles * sizeof(float) *
+         ((3.0 + 2.0 * static_cast<double>(edges_.size())) * half_steps_ + 2.0 * shape.columns());
 }
 
 ShadowFront::Casting ShadowSweep::casting_columns() const {
@@ -131,19 +170,19 @@ ShadowFront::Casting ShadowSweep::casting_rows(std::int64_t tile_row) const {
 }
 
 ShadowSweep::State ShadowSweep::pass(std::int64_t tile_row, const State& entering, const TileRowValues& heights,
-                                     TileRowValues* depths) {
-  return by_columns_ ? pass_along_columns(tile_row, entering, heights, depths)
-                     : pass_along_rows(tile_row, entering, heights, depths);
+                                     TileRowValues* hidden) {
+  return by_columns_ ? pass_along_columns(tile_row, entering, heights, hidden)
+                     : pass_along_rows(tile_row, entering, heights, hidden);
 }
 
 /// Steps are the lattice's rows, lanes are half steps over the whole width. The row that two rows of tiles share is a
 /// step of both: the first one's last is taken back.
 ShadowSweep::State ShadowSweep::pass_along_rows(std::int64_t tile_row, const State& entering,
-                                                const TileRowValues& heights, TileRowValues* depths) {
+                                                const TileRowValues& heights, TileRowValues* hidden) {
   const TileShape& shape = grid_.shape();
   const auto lanes = static_cast<int>(half_steps_ * grid_.tile_columns()) + 1;
   const std::int64_t row_of_light = rows_before_ + (from_south_ ? grid_.tile_rows() - 1 - tile_row : tile_row);
-  ShadowFront front(lanes, shift_, fall_, most_depth_);
+  ShadowFront front(lanes, shift_, edges_, range_);
   front.resume(row_of_light * shape.cell_rows(), entering.empty() ? front.lines() : entering);
   State leaving;
   const ShadowFront::Casting columns = casting_columns();
@@ -151,7 +190,7 @@ ShadowSweep::State ShadowSweep::pass_along_rows(std::int64_t tile_row, const Sta
   std::vector<float> profile(static_cast<std::size_t>(lanes) + 2, kVoidHeight);
   std::vector<float> found(static_cast<std::size_t>(lanes));
   std::vector<float> values;
-  std::vector<float> made(depths != nullptr ? static_cast<std::size_t>(grid_.tile_columns() * shape.columns()) : 0);
+  std::vector<float> made(hidden != nullptr ? static_cast<std::size_t>(grid_.tile_columns() * shape.columns()) : 0);
   for (int step = 1; step <= shape.cell_rows() + 1; ++step) {
     const int row = from_south_ ? shape.rows() - 1 - step : step;
     const std::span<const float> vertices = heights.row(row, 0, grid_.tile_columns(), values);
@@ -162,15 +201,15 @@ ShadowSweep::State ShadowSweep::pass_along_rows(std::int64_t tile_row, const Sta
     if (step == shape.cell_rows() + 1) leaving = front.lines();
     const bool casts = step >= rows.first - 1e-6 && step <= rows.last + 1e-6;
     front.advance(profile.data() + 1, casts ? columns : ShadowFront::Casting{1.0, 0.0},
-                  depths != nullptr ? found.data() : nullptr);
-    if (depths == nullptr) continue;
+                  hidden != nullptr ? found.data() : nullptr);
+    if (hidden == nullptr) continue;
     if (mirrored_) std::reverse(found.begin(), found.end());
     for (std::int64_t tile = 0; tile < grid_.tile_columns(); ++tile) {
       float* const out = made.data() + tile * shape.columns();
       const float* const from = found.data() + tile * half_steps_;
       for (int c = 1; c <= last_visible_column(shape, row); ++c) out[c] = from[half_step(shape, c, row)];
     }
-    depths->write_row(row, 0, made);
+    hidden->write_row(row, 0, made);
   }
   return leaving;
 }
@@ -178,10 +217,10 @@ ShadowSweep::State ShadowSweep::pass_along_rows(std::int64_t tile_row, const Sta
 /// Steps are columns half a lattice step apart, lanes are the stored rows of the tiles, padding included: one row of
 /// tiles sees the ground a row beyond its edge, so that the same lines lie beside vertices that two of them share.
 ShadowSweep::State ShadowSweep::pass_along_columns(std::int64_t tile_row, const State& entering,
-                                                   const TileRowValues& heights, TileRowValues* depths) {
+                                                   const TileRowValues& heights, TileRowValues* hidden) {
   const TileShape& shape = grid_.shape();
   const int lanes = shape.rows();
-  ShadowFront front(lanes, shift_, fall_, most_depth_);
+  ShadowFront front(lanes, shift_, edges_, range_);
   front.resume(columns_before_ * half_steps_, front.lines());
   State leaving;
   std::size_t entered = 0;
@@ -198,7 +237,7 @@ ShadowSweep::State ShadowSweep::pass_along_columns(std::int64_t tile_row, const 
     const std::int64_t first_tile = mirrored_ ? grid_.tile_columns() - k - tiles : k;
     RowParts<float> vertices = heights.part(first_tile, tiles);
     const std::int64_t stride = tiles * shape.columns();
-    std::vector<float> made(depths != nullptr ? static_cast<std::size_t>(stride * lanes) : 0);
+    std::vector<float> made(hidden != nullptr ? static_cast<std::size_t>(stride * lanes) : 0);
     for (std::int64_t i = 0; i < tiles; ++i) {
       const std::ptrdiff_t column = (mirrored_ ? tiles - 1 - i : i) * shape.columns();
       for (int row = 0; row < lanes; ++row) {
@@ -223,15 +262,16 @@ ShadowSweep::State ShadowSweep::pass_along_columns(std::int64_t tile_row, const 
       }
       for (std::size_t x = is_first ? 0 : 1; x < across; ++x, ++steps) {
         if (front.is_shifting()) {
-          leaving.push_back(front.line_arriving(lanes - 3));
-          front.let_in(entered < entering.size() ? entering[entered++] : -std::numeric_limits<float>::infinity());
+          front.append_arriving(lanes - 3, leaving);
+          front.let_in(entered < entering.size() ? entering.data() + entered : nullptr);
+          entered += front.carried();
         }
         const auto at = static_cast<double>(steps);
         const bool casts = at >= columns.first - 1e-6 && at <= columns.last + 1e-6;
         front.advance(profiles.data() + x * lane_stride + 1, casts ? rows : ShadowFront::Casting{1.0, 0.0},
                       found.data() + x * static_cast<std::size_t>(lanes));
       }
-      if (depths == nullptr) continue;
+      if (hidden == nullptr) continue;
       for (int row = 1; row <= lanes - 2; ++row) {
         const auto lane = static_cast<std::size_t>(from_south_ ? lanes - 1 - row : row);
         float* const out = made.data() + row * stride + column;
@@ -242,8 +282,8 @@ ShadowSweep::State ShadowSweep::pass_along_columns(std::int64_t tile_row, const 
         }
       }
     }
-    for (int row = 1; depths != nullptr && row <= lanes - 2; ++row) {
-      depths->write_row(
+    for (int row = 1; hidden != nullptr && row <= lanes - 2; ++row) {
+      hidden->write_row(
           row, first_tile,
           std::span(made).subspan(static_cast<std::size_t>(row * stride), static_cast<std::size_t>(stride)));
     }

@@ -1,7 +1,9 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "isohf/base/memory/kept_rows.h"
@@ -38,6 +40,26 @@ class TileRowValues {
   KeptRows<float> rows_;
 };
 
+/// A sun as it is swept.
+struct SweptSun {
+  double azimuth_deg = 0.0;  ///< clockwise from North
+  /// Of a shadow in one world unit, height units, > 0: of the sun's middle, and of its disc's upper and lower edge.
+  double fall = 1.0;
+  double upper_fall = 1.0;
+  double lower_fall = 1.0;
+  /// A penumbra of one width for all distances in place of the disc's: k of Eq. 16, height units, > 0.
+  std::optional<double> softness = std::nullopt;
+};
+
+/// Half the angle under which the sun's disc is seen, degrees: from Mars, else from the Earth.
+[[nodiscard]] double sun_radius_deg(const std::string& body);
+
+/// A disc of that radius over heights that are drawn `exaggeration` times as high. Near the horizon the disc is smaller, so
+/// that its lower edge stays above.
+/// height_per_world  height units in a world unit
+[[nodiscard]] SweptSun swept_sun(double azimuth_deg, double elevation_deg, double radius_deg, double exaggeration,
+                                 double height_per_world);
+
 /// Light that passes over the tiles of an archive, a row of them at a time, from the sun's side.
 ///
 /// The steps of the light are rows of the lattice, or columns half a lattice step apart where it passes more along the
@@ -45,22 +67,19 @@ class TileRowValues {
 /// mesh at each step; along the six directions of the lattice they pass through its vertices.
 class ShadowSweep {
  public:
-  /// ground       that casts shadows: what the source covered
-  /// azimuth_deg  of the sun, clockwise from North
-  /// fall         of a shadow in one world unit, > 0
-  /// softness     the most depth that is told apart, height units
-  ShadowSweep(const TileGrid& grid, const WorldBounds& ground, double azimuth_deg, double fall, double softness);
+  /// ground  that casts shadows: what the source covered
+  ShadowSweep(const TileGrid& grid, const WorldBounds& ground, const SweptSun& sun);
 
   /// For a grid that is part of another: the tiles of that one to its West and East, and the rows of tiles that light has
   /// passed over before it. Lines of light then lie where they would lie over all of it.
   void begin_behind(std::int64_t tiles_west, std::int64_t tiles_east, std::int64_t rows_before);
 
-  /// Depths are cut off at it, either way; height units.
-  [[nodiscard]] double most_depth() const { return most_depth_; }
+  /// What is hidden of the sun is cut off so far from 1/2, either way.
+  [[nodiscard]] double range() const { return range_; }
   /// Whether light comes to a row of tiles from the row South of it.
   [[nodiscard]] bool from_south() const { return from_south_; }
 
-  /// What passes from one row of tiles to the next: heights of lines of light.
+  /// What passes from one row of tiles to the next: what lines of light carry.
   using State = std::vector<float>;
   [[nodiscard]] std::uint64_t state_bytes() const;
   /// What a pass takes beside that.
@@ -69,15 +88,16 @@ class ShadowSweep {
   /// Passes over a row of tiles.
   /// entering  what the row before it left; empty: nothing, at the first row
   /// heights   NaN where void
-  /// depths    of visible vertices below the height up to which it is dark, < 0 in the sun; null: not wanted
+  /// hidden    part of the sun at visible vertices, interpolable: 0 or less it is seen, 1 or more it is not; null: not
+  ///           wanted
   /// Returns what the next row is entered by.
-  State pass(std::int64_t tile_row, const State& entering, const TileRowValues& heights, TileRowValues* depths);
+  State pass(std::int64_t tile_row, const State& entering, const TileRowValues& heights, TileRowValues* hidden);
 
  private:
   State pass_along_rows(std::int64_t tile_row, const State& entering, const TileRowValues& heights,
-                        TileRowValues* depths);
+                        TileRowValues* hidden);
   State pass_along_columns(std::int64_t tile_row, const State& entering, const TileRowValues& heights,
-                           TileRowValues* depths);
+                           TileRowValues* hidden);
   [[nodiscard]] ShadowFront::Casting casting_columns() const;
   [[nodiscard]] ShadowFront::Casting casting_rows(std::int64_t tile_row) const;
 
@@ -87,8 +107,8 @@ class ShadowSweep {
   bool by_columns_;
   bool mirrored_;  ///< rows: light drifts West; columns: light travels West
   double shift_ = 0.0;
-  double fall_ = 0.0;  ///< at a step
-  double most_depth_ = 0.0;
+  std::vector<SunEdge> edges_;
+  double range_ = 1.0;
   int half_steps_;                   ///< of a tile's width
   std::int64_t columns_before_ = 0;  ///< tiles of another grid, on the light's way
   std::int64_t rows_before_ = 0;
