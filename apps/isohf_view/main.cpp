@@ -63,7 +63,8 @@ std::string text_from(const ViewReport& report, const std::string& archive) {
       cli::describe_count(report.vertices), cli::describe_count(report.shared_vertices),
       cli::describe_count(report.seam_pixels), report.worst_height, report.worst_normal);
   if (report.suns_deg.empty()) {
-    text += "shadows: not looked at, as tiles are at fault\n";
+    text += fmt::format("shadows: not looked at, as {}\n",
+                        report.is_part ? "tiles that may cast them are elsewhere" : "tiles are at fault");
   } else {
     text += fmt::format(
         "shadows: suns of {:g} degrees, East and West, {} vertices, worst {:.4f} codes, share of the sun {:.2e}\n",

@@ -3,12 +3,15 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <system_error>
+#include <vector>
 
 #include "formats/registry.h"
 #include "interrupt.h"
 #include "isohf/convert.h"
+#include "isohf/error.h"
 #include "output/standard_output.h"
 
 namespace isohf::view {
@@ -22,22 +25,50 @@ std::filesystem::path temporary_folder() {
   return folder;
 }
 
+/// Messages name settings between backticks: options of `isohf convert`, of which this program takes none.
+constexpr const char* kWhoseOptions = "options named here are isohf convert's: convert with them, and view the archive";
+bool names_options(const std::string& message) {
+  return message.find('`') != std::string::npos;
+}
+
 /// Converts what is named where it is a raster; nullptr where it is none.
 std::unique_ptr<ScratchArchive> convert_for_viewing(const std::string& name, const Options& options) {
   if (native_format_of(name, {}) == nullptr) return nullptr;
-  const std::unique_ptr<HeightSource> source = open_raster(name, {});
   auto scratch = std::make_unique<ScratchArchive>();
   ConvertOptions request;
   request.overwrite = true;
-  understand_ground(source->info(), request.plan.ground);
   Job job;
   job.scratch_folder = temporary_folder().string();
   job.threads = options.threads;
   job.cancel = &cli::watch_interrupts();
-  const ConvertSummary summary = convert(*source, scratch->path(), request, job);
+  std::vector<Warning> warnings;
+  try {
+    const std::unique_ptr<HeightSource> source = open_raster(name, {});
+    understand_ground(source->info(), request.plan.ground);
+    warnings = convert(*source, scratch->path(), request, job).warnings;
+  } catch (const Error& error) {
+    if (!names_options(error.what())) throw;
+    throw Error(error.code(), fmt::format("{} ({})", error.what(), kWhoseOptions), error.parts());
+  }
   if (options.common.quiet) return scratch;
-  for (const Warning& warning : summary.warnings) cli::print_warning(warning);
+  cli::print_warnings(warnings);
+  if (std::any_of(warnings.begin(), warnings.end(), names_options)) cli::print_warning(kWhoseOptions);
   return scratch;
+}
+
+/// An archive, or what neither that nor a raster is.
+std::unique_ptr<TileSource> open_unconverted(const std::string& name, const std::string& second) {
+  try {
+    return open_archive(name, second);
+  } catch (const Error& error) {
+    const bool is_called_archive = std::filesystem::path(name).extension() == ".isohf";
+    if (is_called_archive || error.code() != ErrorCode::kCorrupt) throw;
+    throw Error(error.code(),
+                fmt::format("{}; nor is it a raster of a kind that is viewed: isohf formats lists those "
+                            "that isohf convert reads",
+                            error.what()),
+                error.parts());
+  }
 }
 
 std::string next_path() {
@@ -64,7 +95,7 @@ Opened open_shown(const std::string& name, const Options& options, const std::st
   Opened opened{name, stamp_of(name), convert_for_viewing(name, options), nullptr};
   const std::string& path = opened.scratch ? opened.scratch->path() : name;
   if (second.empty()) {
-    opened.source = open_archive(path);
+    opened.source = opened.scratch ? open_archive(path) : open_unconverted(path, {});
   } else {
     const auto other = convert_for_viewing(second, options);
     opened.source = open_archive(path, other ? other->path() : second);  // an open file outlives its name

@@ -41,11 +41,13 @@ std::string glfw_error() {
   return text == nullptr ? "unknown reason" : text;
 }
 
+constexpr const char* kWithoutWindow = "; --screenshot PICTURE.png draws without one";
+
 /// GLFW and one window with a current OpenGL 3.3 core context.
 class Window {
  public:
   Window(int width, int height, const std::string& title) {
-    if (glfwInit() != GLFW_TRUE) throw Error(ErrorCode::kUnsupported, "no window: " + glfw_error());
+    if (glfwInit() != GLFW_TRUE) throw Error(ErrorCode::kUnsupported, "no window: " + glfw_error() + kWithoutWindow);
     glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 3);
     glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 3);
     glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
@@ -55,7 +57,7 @@ class Window {
     if (window_ == nullptr) {
       const std::string reason = glfw_error();
       glfwTerminate();
-      throw Error(ErrorCode::kUnsupported, "no window with OpenGL 3.3: " + reason);
+      throw Error(ErrorCode::kUnsupported, "no window with OpenGL 3.3: " + reason + kWithoutWindow);
     }
     glfwMakeContextCurrent(window_);
     glfwSwapInterval(1);

@@ -159,6 +159,7 @@ TEST_F(ViewProgramTest, RefusesInOneLine) {
   // No display for a window.
   outcome = run(path("good.isohf"), "env -u DISPLAY -u WAYLAND_DISPLAY");
   EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_NE(outcome.err.find("; --screenshot PICTURE.png draws without one\n"), std::string::npos) << outcome.err;
   EXPECT_TRUE(one_line(outcome)) << outcome.err;
 }
 
@@ -216,6 +217,37 @@ TEST_F(ViewProgramTest, PrintsJsonOrNothing) {
   EXPECT_NE(drawn.out.find("\"width\": 64"), std::string::npos) << drawn.out;
   EXPECT_EQ(run(good + " --verify -q").out, "");
   EXPECT_NE(run(good + " --sweep --steps 4 --size 64x48 --json").out.find("\"fading\""), std::string::npos);
+}
+
+TEST_F(ViewProgramTest, SaysThatOptionsForARasterAreThoseOfConvert) {
+  const std::string shot = " --overwrite --size 64x48 --screenshot " + path("a.png");
+  const std::string whose = "options named here are isohf convert's: convert with them, and view the archive";
+  test::write_file(path("bare.r16"), std::string(80000, 'x'));
+  const Outcome bare = run(path("bare.r16") + shot);
+  EXPECT_EQ(bare.exit_code, 2) << bare.err;
+  EXPECT_NE(bare.err.find("--raw WxH:TYPE must say"), std::string::npos) << bare.err;
+  EXPECT_NE(bare.err.find(" (" + whose + ")\n"), std::string::npos) << bare.err;
+  // Elevations that look like shares of a height.
+  std::string asc = "ncols 20\nnrows 20\nxllcorner 0\nyllcorner 0\ncellsize 1\n";
+  for (int i = 0; i < 400; ++i) asc += std::to_string((i * 37 % 100) / 100.0) + (i % 20 == 19 ? "\n" : " ");
+  test::write_file(path("shares.asc"), asc);
+  const Outcome shares = run(path("shares.asc") + shot);
+  EXPECT_EQ(shares.exit_code, 0) << shares.err;
+  EXPECT_NE(shares.err.find("--z-scale"), std::string::npos) << shares.err;
+  EXPECT_NE(shares.err.find("isohf-view: warning: " + whose + "\n"), std::string::npos) << shares.err;
+  test::write_file(path("notes.txt"), "no raster, no archive\n");
+  const Outcome notes = run(path("notes.txt") + shot);
+  EXPECT_EQ(notes.exit_code, 1);
+  EXPECT_NE(notes.err.find("nor is it a raster of a kind that is viewed"), std::string::npos) << notes.err;
+}
+
+TEST_F(ViewProgramTest, VerifyOfAPartSaysWhyItLooksAtNoShadows) {
+  ASSERT_EQ(test::run_isohf({"extract", path("good.isohf"), "-o", path("part.isohf"), "--tiles", "0:2,0:1"}).exit_code,
+            0);
+  const Outcome part = run(path("part.isohf") + " --verify");
+  EXPECT_EQ(part.exit_code, 0) << part.out << part.err;
+  EXPECT_NE(part.out.find("\nshadows: not looked at, as tiles that may cast them are elsewhere\n"), std::string::npos)
+      << part.out;
 }
 
 TEST_F(ViewProgramTest, ShowsARasterAndLeavesNothingBehind) {

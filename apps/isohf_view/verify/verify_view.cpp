@@ -133,8 +133,9 @@ ViewReport verify_view(const TileSource& source, const IndexArrays& arrays, cons
   const isohf::TileRange here = source.metadata() != nullptr ? tiles_of(*source.metadata()) : all;
   const CheckContext context{source, shared, oracle, probe, options, here, report};
   verify_tiles(context);
+  report.is_part = !(here == all);
   // Tiles that disagree shade each other in two ways, and so do those that are elsewhere.
-  if (options.shadows && here == all && report.passed()) verify_shadows(context);
+  if (options.shadows && !report.is_part && report.passed()) verify_shadows(context);
   if (options.seams) verify_seams(context);
   return report;
 }

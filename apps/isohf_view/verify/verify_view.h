@@ -42,6 +42,7 @@ struct ViewReport {
   std::int64_t shared_vertices = 0;  ///< compared between tiles
   std::int64_t seam_pixels = 0;      ///< of oblique and perspective pictures
   std::int64_t shadow_vertices = 0;
+  bool is_part = false;          ///< of an archive: shadows from its other tiles are not known, and not looked at
   std::vector<double> suns_deg;  ///< that shadows were looked at for, from either side
   double worst_shadow = 0.0;     ///< codes
   double worst_share = 0.0;      ///< of the sun
