@@ -36,6 +36,7 @@ def void_mask(data, samples):
             mask += [of] * run
             run, shift, of = 0, 0, 1 - of
     require(len(mask) == samples and shift == 0, "the void mask has another size")
+    require(0 < sum(mask) < samples, "a void mask without a void, or of voids alone")
     return mask
 
 
@@ -226,7 +227,8 @@ class Model:
 def decode_adaptive(payload, columns, rows, kind):
     """The same of codec version 2, section 5.2."""
     _, found_kind, flags, low, high, base = struct.unpack_from("<BBBHHH", payload)
-    require(found_kind == kind < 2 and flags < 16 and low <= base <= high, "a header's fields")
+    require(found_kind == kind < 2 and flags < 16 and flags & 6 != 4 and low < high <= (65534, 254)[kind] and low <= base <= high,
+            "a header's fields")
     at = 9
 
     def number():
@@ -238,12 +240,14 @@ def decode_adaptive(payload, columns, rows, kind):
             value |= (payload[at - 1] & 127) << shift
             shift += 7
             if payload[at - 1] < 128:
+                require(payload[at - 1] > 0 or shift == 7, "a number of too many bytes")
                 return value
 
     weights = FIXED[2]
     if flags & 2:
         n = 18 if flags & 4 else 12
         weights = struct.unpack_from("<%dh" % n, payload, at)
+        require(sum(map(abs, weights)) < 28672, "weights that are too large")
         at += 2 * n
     mask = [0] * (columns * rows)
     if flags & 1:
@@ -251,6 +255,7 @@ def decode_adaptive(payload, columns, rows, kind):
         mask = void_mask(payload[at : at + size], columns * rows)
         at += size
     states = list(struct.unpack_from("<%dI" % (8 if flags & 8 else 1), payload, at))
+    require(min(states) >= 65536, "a state below 65536")
     at += 4 * len(states)
     size = number()
     words = iter(struct.unpack_from("<%dH" % size, payload, at))
@@ -286,6 +291,7 @@ def decode_adaptive(payload, columns, rows, kind):
         else:
             bits = extra.take(5)
             zigzagged = (1 << bits | extra.take(bits)) - 1
+            require(zigzagged < 65536, "a residual that is too large")
         difference = unzigzag(zigzagged)
         value = (code - difference if above else code + difference) % 65536
         require(low <= value <= high, "a sample outside low … high")
@@ -532,6 +538,7 @@ def restored(member, predicted, record):
     counts = struct.unpack_from("<8I", member, 1)
     require(sum(counts) <= count, "more residuals than samples")
     mask = int.from_bytes(member[33 : 33 + (count + 7) // 8], "little") if member[0] else 0
+    require(mask >> count == 0, "a mask of kept samples that goes on behind the last")
     at, streams = 33 + ((count + 7) // 8 if member[0] else 0), []
     for n in (count - sum(counts),) + counts:
         streams.append(planes(member, at, n, size))

@@ -64,7 +64,7 @@ TEST(Metadata, RecordsHowVoidsWereTreated) {
   Metadata metadata = full();
   metadata.source.void_values = {-9999.0, std::nan(""), HUGE_VAL};
   metadata.source.valid_range = {-500.0, 9000.5};
-  metadata.source.raw_range = {-32752.0, HUGE_VAL};
+  metadata.source.raw_range = {-HUGE_VAL, 32000.0};
   metadata.source.fill_distance = 100;
   const std::string json = format_metadata(metadata);
   const SourceRecord back = parse_metadata(json).source;
@@ -80,6 +80,8 @@ TEST(Metadata, RecordsHowVoidsWereTreated) {
   }
   EXPECT_THROW((void)parse_metadata(replaced(json, "\"nan\"", "\"none\"")), Error);
   EXPECT_THROW((void)parse_metadata(replaced(json, "9000.5", "\"high\"")), Error);
+  for (const char* wrong : {"\"inf\"", "\"nan\"", "32001.0"})  // nothing, or nobody knows what, lies between
+    EXPECT_THROW((void)parse_metadata(replaced(json, "\"-inf\"", wrong)), Error) << wrong;
   // Archives of the first builds say nothing of voids.
   const SourceRecord old =
       parse_metadata(replaced(json, "\"voids\": {\n   \"values\"", "\"other\": {\n   \"values\"")).source;

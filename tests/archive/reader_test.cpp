@@ -16,6 +16,7 @@
 
 #include "archive/tiles.h"
 #include "isohf/archive/container/archive_directory.h"
+#include "isohf/archive/container/member_tables.h"
 #include "isohf/archive/deflate/deflate.h"
 #include "isohf/error.h"
 #include "support/temporary_folder.h"
@@ -367,6 +368,21 @@ TEST_F(ArchiveReaderTest, ReadsFromManyThreadsAtOnce) {
   }
   for (std::thread& thread : threads) thread.join();
   EXPECT_EQ(wrong, 0);
+}
+
+TEST(MemberTables, ADescriptionWithReservedNumbersSetIsNone) {
+  TableDescription table;
+  table.members.name = "tiles/{row}/{column}.tile";
+  table.members.columns = table.members.rows = 1;
+  table.page_records = 512;
+  std::vector<std::byte> bytes;
+  append_description(table, bytes);
+  ASSERT_TRUE(parse_descriptions(bytes, 1));
+  for (const std::size_t reserved : {5U, 65U, 72U, 79U}) {
+    bytes[reserved] ^= std::byte{1};
+    EXPECT_FALSE(parse_descriptions(bytes, 1)) << reserved;
+    bytes[reserved] ^= std::byte{1};
+  }
 }
 
 }  // namespace

@@ -85,6 +85,24 @@ TEST(Zip, RefusesEveryTruncationOfADirectory) {
   }
 }
 
+TEST(Zip, RefusesEndRecordsThatContradictEachOther) {
+  std::vector<std::byte> file;
+  append_directory_entry({"name", ZipMethod::kStored, 0, 1, 1, 0}, file);
+  append_end_records(1, 0, file.size(), file);
+  EXPECT_EQ(entries_of(file).size(), 1U);
+  // Entries, size and offset of the plain record: others, and those that say "see the other one".
+  for (const auto& [behind_end, bytes] : {std::pair(14, 2), std::pair(12, 2), std::pair(10, 4), std::pair(6, 4)}) {
+    std::vector<std::byte> changed = file;
+    const auto field = changed.end() - behind_end;
+    *field ^= std::byte{2};
+    if (bytes == 2) *(changed.end() - 26 + behind_end) ^= std::byte{2};  // both counts
+    EXPECT_THROW(static_cast<void>(entries_of(changed)), Error) << behind_end;
+    std::fill_n(field, bytes, std::byte{0xff});
+    if (bytes == 2) std::fill_n(changed.end() - 26 + behind_end, bytes, std::byte{0xff});
+    EXPECT_EQ(entries_of(changed).size(), 1U) << behind_end;
+  }
+}
+
 TEST(Zip, ReachesTilesBeyondFourGibibytes) {
   // Five GiB of a hole as a member, one tile, index, metadata.
   const test::TemporaryFolder folder;

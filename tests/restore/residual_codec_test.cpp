@@ -64,6 +64,21 @@ TEST(ResidualCodec, RefusesEveryTruncationAndAnExtraByte) {
   EXPECT_THROW(decode_residuals(mapping, 10, payload, s.predicted, back), Error);
 }
 
+TEST(ResidualCodec, RefusesBitsOfTheMaskBehindTheLastSample) {
+  const SampleMapping mapping{SampleType::kInt16, 1.0, 0.0};
+  const Samples s = random_samples(SampleType::kInt16, 60, 3);
+  std::vector<std::byte> payload = encode_residuals(mapping, 10, s.raw, s.voids, s.predicted).bytes;
+  ASSERT_EQ(payload[0], std::byte{1});
+  std::vector<std::byte> back(s.raw.size());
+  const std::size_t last = 33 + 60 / 8;
+  EXPECT_NO_THROW(decode_residuals(mapping, 10, payload, s.predicted, back));
+  for (unsigned bit = 60 % 8; bit < 8; ++bit) {
+    payload[last] ^= std::byte{1} << bit;
+    EXPECT_THROW(decode_residuals(mapping, 10, payload, s.predicted, back), Error) << bit;
+    payload[last] ^= std::byte{1} << bit;
+  }
+}
+
 TEST(ResidualCodec, DamagedBytesAreRefusedOrGiveOtherSamples) {
   const SampleMapping mapping{SampleType::kFloat32, 1.0, 0.0};
   const Samples s = random_samples(SampleType::kFloat32, 60, 4);

@@ -202,12 +202,20 @@ void read_end64(const ByteSource& file, ZipEnd& end) {
   if (size != locator_offset - at - 12) refuse(at, fmt::format("the ZIP64 end record states {} bytes", size));
   static_cast<void>(reader.read<std::uint32_t>());
   const auto disk = reader.read<std::uint64_t>();
+  const ZipEnd plain = end;
   end.entries = reader.read<std::uint64_t>();
   const auto entries = reader.read<std::uint64_t>();
   end.directory_bytes = reader.read<std::uint64_t>();
   end.directory_offset = reader.read<std::uint64_t>();
   end.records_offset = at;
   if (disk != 0 || entries != end.entries) refuse(at, "the archive is split over several files");
+  const auto agree = [](std::uint64_t plain_one, std::uint64_t in_64, std::uint64_t see_64) {
+    return plain_one == in_64 || plain_one == see_64;
+  };
+  if (!agree(plain.entries, end.entries, 0xffff) || !agree(plain.directory_bytes, end.directory_bytes, kIn64) ||
+      !agree(plain.directory_offset, end.directory_offset, kIn64)) {
+    refuse(at, "the two end records state different directories");
+  }
 }
 
 }  // namespace

@@ -199,6 +199,9 @@ void decode(const SampleMapping& mapping, std::int64_t width, std::span<const st
   if (coded > predicted.size()) refuse_residuals("more residuals than samples");
   std::span<const std::byte> mask;
   if (flags == 1) mask = in.read_bytes((predicted.size() + 7) / 8);
+  if (!mask.empty() && predicted.size() % 8 != 0 &&
+      std::to_integer<unsigned>(mask.back()) >> (predicted.size() % 8) != 0)
+    refuse_residuals("the mask of kept samples has bits behind the last sample");
   Stream kept;
   kept.count = predicted.size() - coded;
   kept.bytes = in.read_bytes(kept.count * sizeof(Bits));

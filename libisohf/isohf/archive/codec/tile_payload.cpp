@@ -223,6 +223,7 @@ std::vector<std::uint8_t> unpack_void_mask(std::span<const std::byte> packed, st
   const auto refuse_payload = [](const std::string& why) { throw Error(ErrorCode::kCorrupt, "void mask: " + why); };
   std::vector<std::uint8_t> is_void(samples);
   std::size_t filled = 0;
+  std::size_t voids = 0;
   std::uint8_t of = 0;
   for (std::size_t i = 0; i < packed.size(); of ^= 1U) {
     std::uint64_t run = 0;
@@ -241,8 +242,11 @@ std::vector<std::uint8_t> unpack_void_mask(std::span<const std::byte> packed, st
     if (run > samples - filled) refuse_payload(fmt::format("its runs add up to more than {} samples", samples));
     std::fill_n(is_void.begin() + static_cast<std::ptrdiff_t>(filled), run, of);
     filled += run;
+    voids += of * run;
   }
   if (filled != samples) refuse_payload(fmt::format("its runs add up to {} of {} samples", filled, samples));
+  if (voids == 0 || voids == samples)
+    refuse_payload(fmt::format("{} of {} samples are void, a mask has some of each", voids, samples));
   return is_void;
 }
 

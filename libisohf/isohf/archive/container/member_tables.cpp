@@ -179,13 +179,13 @@ std::optional<std::vector<TableDescription>> parse_descriptions(std::span<const 
     const auto flags = reader.read<std::uint32_t>();
     members.has_voids = flags != 0;
     const auto name_bytes = reader.read<std::uint32_t>();
-    static_cast<void>(reader.read<std::uint64_t>());
-    const bool fits = (kind & ~kHasDigests) == 0 && (flags & ~kHasVoids) == 0 && members.columns >= 1 &&
-                      members.rows >= 1 && members.columns <= kMaxTilesPerAxis && members.rows <= kMaxTilesPerAxis &&
-                      members.columns * members.rows <= kMaxTiles && members.stored >= 0 &&
-                      members.stored <= members.columns * members.rows && table.page_records >= kLeastPageRecords &&
-                      table.page_records <= kMaxTiles / kMostPages && size <= bytes.size() &&
-                      size >= kDescriptionBytes && name_bytes <= size - kDescriptionBytes;
+    const auto reserved = reader.read<std::uint64_t>();
+    const bool fits = reserved == 0 && (kind & ~kHasDigests) == 0 && (flags & ~kHasVoids) == 0 &&
+                      members.columns >= 1 && members.rows >= 1 && members.columns <= kMaxTilesPerAxis &&
+                      members.rows <= kMaxTilesPerAxis && members.columns * members.rows <= kMaxTiles &&
+                      members.stored >= 0 && members.stored <= members.columns * members.rows &&
+                      table.page_records >= kLeastPageRecords && table.page_records <= kMaxTiles / kMostPages &&
+                      size <= bytes.size() && size >= kDescriptionBytes && name_bytes <= size - kDescriptionBytes;
     if (!fits) return std::nullopt;
     const auto name = reader.read_bytes(name_bytes);
     members.name.assign(reinterpret_cast<const char*>(name.data()), name.size());

@@ -212,6 +212,7 @@ void source_members(JsonMembers& json, SourceRecord& source) {
         if (voids.reads() && ends) {
           if (ends->size() != 2) voids.refuse("raw_range", "is no array of two numbers");
           source.raw_range = {ends->front(), ends->back()};
+          if (!(ends->front() <= ends->back())) voids.refuse("raw_range", "is not the smaller number first");
         }
         voids("valid_range", source.valid_range, kNull);
         voids("fill_distance", source.fill_distance, {.most = std::numeric_limits<std::int32_t>::max()});

@@ -108,9 +108,6 @@ AdaptivePayload read_adaptive_payload(const TileShape& shape, CodeType type, std
   if ((flags & kHasVoids) != 0) {
     const std::size_t size = read_size(reader);
     payload.is_void = unpack_void_mask(reader.read_bytes(size), static_cast<std::size_t>(shape.stored_vertex_count()));
-    if (std::find(payload.is_void.begin(), payload.is_void.end(), std::uint8_t{1}) == payload.is_void.end()) {
-      refuse_tables("its void mask holds no void");
-    }
   }
   payload.states.resize((flags & kHasEightStates) != 0 ? kMostStates : 1);
   for (std::uint32_t& state : payload.states) {
