@@ -282,7 +282,9 @@ def decode_adaptive(payload, columns, rows, kind):
             symbol += 1
         state = slots[symbol] * (state >> 14) + slot - start
         if state < 65536:
-            state = state << 16 | next(words, 0)
+            word = next(words, None)
+            require(word is not None, "too few words")
+            state = state << 16 | word
         states[i % len(states)] = state
         model.count(context, symbol)
         if symbol < 15:
@@ -340,7 +342,8 @@ def decode_adaptive(payload, columns, rows, kind):
                 if not mask[r * columns + c]:
                     out[r * columns + c] = take(r - top, 4 * (V[r][p] + V[r][p + 1]), 17 * (D[r][p] + D[r][p + 1]), 0)
         model.end_band()
-    require(next(words, None) is None and set(states) == {65536}, "words are left over, or states do not end as they began")
+    require(next(words, None) is None, "words are left over")
+    require(set(states) == {65536}, "states do not end as they began")
     require((extra.at + 7) // 8 == len(payload) - at - 2 * size and extra.number >> extra.at == 0, "extra bits are left over")
     return out, 0
 
@@ -654,6 +657,8 @@ class Archive:
         self.metadata = json.loads(self.member("isohf.json"))
         require(self.metadata["format"] == "isohf" and self.metadata["version"] in (1, 2), "another version: not supported")
         require(not self.metadata.get("requires"), "requires what is not known: not supported")
+        raw_range = self.metadata["source"].get("voids", {}).get("raw_range") or (0, 0)
+        require(float(raw_range[0]) <= float(raw_range[1]), "raw_range is not the smaller number first")
         self.shape, self.grid = self.metadata["tile_shape"], self.metadata["tiles"]
         self.kind, self.letter, self.void = KINDS[self.metadata["samples"]["type"]]
         count, there = self.grid["columns"] * self.grid["rows"], len(self.members)
@@ -661,16 +666,17 @@ class Archive:
         require(0 < count <= 2 ** 22 // vertices + 64 * there, "a grid of more tiles than its members make likely")
         own = ("mimetype", "isohf.json", "index.bin")
         names = [name for name in self.members if name not in own]
-        crcs = b"".join(struct.pack("<I", zlib.crc32(self.raw(name))) for name in names
-                        if self.members[name][1] < self.members.get("index.bin", (0, len(self.data)))[1])
-        mime = [struct.pack("<I", zlib.crc32(self.raw("mimetype")))] if "mimetype" in self.members else []
-        stated = self.metadata.get("data_crc32")
-        require(stated is None or zlib.crc32(b"".join(mime) + crcs) == int(stated, 16), "the members have another CRC")
         for name in names:
             parts = name.split("/")
             if parts[0] == "tiles":
                 require(len(parts) == 3 and name == "tiles/%d/%d.tile" % self.place_of(parts[1:]), "no tile's name: " + name)
-        self.digests = self.index() if self.metadata["version"] == 2 and "index.bin" in self.members else {}
+        digests = {} if self.metadata["version"] == 1 else self.index() if "index.bin" in self.members else None
+        if digests is not None:  # else another tool packed it, and its data are others
+            crcs = b"".join(struct.pack("<I", zlib.crc32(self.raw(name))) for name in self.members
+                            if name not in own[1:] and self.members[name][1] < self.members.get("index.bin", (0, len(self.data)))[1])
+            stated = self.metadata.get("data_crc32")
+            require(stated is None or zlib.crc32(crcs) == int(stated, 16), "the members have another CRC")
+        self.digests = digests or {}
 
     def place_of(self, parts):
         row, column = parts[0], parts[1].partition(".")[0]
@@ -697,20 +703,22 @@ class Archive:
 
     def read_directory(self):
         require(self.data[:4] == b"PK\3\4", "no archive")
-        end = self.unpack("IHHHHIIH", len(self.data) - 22)
-        end64 = self.unpack("IQHHIIQQQQ", len(self.data) - 98) if len(self.data) >= 98 else (0, 0)
-        require(end[0] == 0x06054B50 and not any(end[1:3]) and end[7] == 0, "the end record")
+        ends = [i for i in range(len(self.data) - 22, max(len(self.data) - 65558, -1), -1) if self.data[i : i + 4] == b"PK\5\6"
+                and self.unpack("H", i + 20)[0] == len(self.data) - i - 22]  # it ends with its comment
+        require(ends, "no end record")
+        last, end = ends[0], self.unpack("IHHHHIIH", ends[0])
+        end64 = self.unpack("IQHHIIQQQQ", last - 76) if last >= 76 else (0, 0)
+        entries, size, at = end[4], end[5], end[6]
         if end64[:2] == (0x06064B50, 44):
-            require(end64[9] + end64[8] == len(self.data) - 98 and end64[6] == end64[7] and not any(end64[4:6]), "the end records")
-            at, entries, last = end64[9], end64[7], len(self.data) - 98
-        else:  # another tool wrote it, which needed no ZIP64
-            require(end[3] == end[4] and end[6] + end[5] == len(self.data) - 22, "the end record")
-            at, entries, last = end[6], end[4], len(self.data) - 22
+            last, entries, size, at = last - 76, *end64[7:]
+            require(end64[6] == entries and not any(end64[4:6]) and all(
+                a in (b, most) for a, b, most in zip(end[4:7], end64[7:], (0xFFFF, 0xFFFFFFFF, 0xFFFFFFFF))), "the end records")
+        require(at + size == last and end[3] == end[4] and not any(end[1:3]), "the end record")
         self.members, end, first = {}, 0, at
         for _ in range(entries):
             (magic, _, _, flags, method, _, _, crc, size, full, name_size, extra, comment, _, _, _,
              offset) = self.unpack("IHHHHHHIIIHHHHHII", at)
-            require(magic == 0x02014B50 and flags in (0, 0x800) and method in (0, 8) and not comment, "a directory entry")
+            require(magic == 0x02014B50 and not flags & 1 and method in (0, 8), "a directory entry")
             name = self.data[at + 46 : at + 46 + name_size]
             wide = self.zip64_field(at + 46 + name_size, extra)
             if full == 0xFFFFFFFF:
@@ -719,13 +727,15 @@ class Archive:
             require(offset >= end, "members overlap")
             local = self.unpack("IHHHHHIIIHH", offset)
             start, named = offset + 30 + local[9] + local[10], self.data[offset + 30 : offset + 30 + local[9]]
-            require(local[0] == 0x04034B50 and local[2:4] == (flags, method) and local[6] == crc and named == name
-                    and (local[10] or local[7:9] == (size, full)), "a local header that is not the directory's")
+            require(local[0] == 0x04034B50 and not local[2] & 1 and local[3] == method and named == name and (local[2] & 8 or (
+                local[6] == crc and (local[10] or local[7:9] == (size, full)))), "a local header that is not the directory's")
             end, name = start + size, name.decode()
+            at += 46 + name_size + extra + comment
+            if name[-1:] == "/" and not full:
+                continue  # a folder
             require(end <= first and name not in self.members, "a member reaches into the directory, or occurs twice")
             require(not any(part in ("", ".", "..") for part in name.split("/")) and not set(name) & set("\\:\0"), "a name")
             self.members[name] = (method, start, size, full, crc)
-            at += 46 + name_size + extra
         require(at == last, "the directory's entries do not fill it")
 
     def index(self):
@@ -735,7 +745,7 @@ class Archive:
         require(magic == b"ISOHFIDX" and version == 2 and size == len(index) and not zero
                 and zlib.crc32(index[-64:-4]) == own, "the index's footer")
         if stands != self.members["index.bin"][1]:
-            return {}  # an archiver has moved members
+            return None  # an archiver has moved members
         at = len(index) - 64 - described
         require(at >= 0 and zlib.crc32(index[at:-64]) == crc, "the index's descriptions")
         for _ in range(tables):
@@ -829,6 +839,7 @@ class Archive:
                         X += wide * across * ((X < 0) - (X > wide * across)) if joined else 0
                         X = min(max(X, 0), wide * across)
                         a, b = min(X // wide, across - 1), min(Z // high, down - 1)
+                        b -= Z == b * high and b > 0 and "tiles/%d/%d.tile" % (b, a) not in self.members
                         expected.append(self.height(b * across + a, (X - a * wide) // 2 + 1, Z - b * high + 1))
                 name, found = "planes/%d/%d/%d.tile" % (plane, j, i), [None] * (columns * rows)
                 names.add(name)
@@ -958,7 +969,8 @@ class Archive:
             held = (None if v is None else min(max(h * 2.0**bits + 0.5, ends[0]), ends[1]) for h, v in zip(heights, values))
             yield [h if h is None else math.floor(h) for h in held]
 
-    def source_samples(self):
+    def predicted(self):
+        """The elevations that the surface has at the source's samples, None where it has none."""
         record, source = self.metadata["lossless"], self.metadata["source"]
         width, height, bits = record["width"], record["height"], record.get("fraction_bits")
         require(record["prediction"] in ("spline", "triangles"), "prediction %s: not supported" % record["prediction"])
@@ -973,8 +985,11 @@ class Archive:
             at = places(self.member("residual/nodes"), width, height)
             numbers = (None if place is None else surface.triangle(*place) for place in at)
         offset, scale, unit = self.metadata["samples"]["offset"], self.metadata["samples"]["scale"], 2.0**-bits
-        predicted = [p if p is None else offset + scale * (p * unit) for p in numbers]
-        found, rows = b"", record["rows_per_member"]
+        return [p if p is None else offset + scale * (p * unit) for p in numbers]
+
+    def source_samples(self):
+        record, predicted = self.metadata["lossless"], self.predicted()
+        found, rows, width, height = b"", record["rows_per_member"], record["width"], record["height"]
         for row in range(0, height, rows):
             found += restored(self.member("residual/%08d" % row), predicted[row * width : (row + rows) * width], record)
         require(hashlib.sha256(found).hexdigest() == record["sha256"], "the samples have another SHA-256")
@@ -990,7 +1005,7 @@ def main(path, samples=None):
     if archive.metadata["version"] == 2:
         require(archive.ground_hash() == archive.metadata["ground_sha256"], "another ground hash")
     archive.check_planes()
-    if "shadow_seeds" in archive.metadata:
+    if "shadow_seeds" in archive.metadata and "part" not in archive.metadata:  # a part's tell of what isn't here
         archive.check_seeds()
     if "tile_textures" in archive.metadata:
         archive.check_textures()

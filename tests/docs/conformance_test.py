@@ -20,14 +20,14 @@ def run(*command):
 
 
 def findings(verified):
-    """What verify finds but that there is no index, as where another tool packed the archive."""
+    """What verify finds but that there is no index, as where another tool packed the archive: those named repacked-…"""
     return [line for line in verified.stdout.splitlines() if line.startswith("ISOHF-") and not line.startswith("ISOHF-0002 ")]
 
 
 for name, hashes in manifest["good"].items():
     path = folder / "good" / (name + ".isohf")
     verified, read = run(isohf, "verify", path), run(sys.executable, root / "docs" / "reader.py", path)
-    if findings(verified) or (name == "repacked") != (verified.returncode != 0):
+    if findings(verified) or name.startswith("repacked") != (verified.returncode != 0):
         failures.append("%s: verify: %s%s" % (name, verified.stdout, verified.stderr))
     wanted = ["content " + hashes["content_sha256"]]
     wanted += ["samples " + hashes["samples_sha256"]] if "samples_sha256" in hashes else []
@@ -40,6 +40,6 @@ for name in manifest["refuse"]:
         failures.append("%s: isohf verify passes it: %s" % (name, verified.stdout))
     if run(sys.executable, root / "docs" / "reader.py", path).returncode == 0:
         failures.append("%s: reader.py reads it" % name)
-assert len(manifest["good"]) >= 40 and len(manifest["refuse"]) >= 60
+assert len(manifest["good"]) >= 75 and len(manifest["refuse"]) >= 85
 print("\n".join(failures))
 sys.exit(bool(failures))

@@ -1,7 +1,8 @@
 """The worked example of docs/archive_format.md: converts three by three elevations, takes the archive apart by that page,
 and prints it as Markdown. usage: format_example.py ISOHF PAGE [--write]: compares the example with the page's, from its
-last heading on; with --write puts it there."""
+last heading on, and the archive with the one in testdata/conformance; with --write puts it on the page."""
 
+import hashlib
 import json
 import pathlib
 import struct
@@ -56,7 +57,7 @@ def local_header(data, at):
 def describe(data):
     end64 = struct.unpack("<IQHHIIQQQQ", data[-98:-42])
     directory_bytes, directory = end64[8], end64[9]
-    text, header, media_at = local_header(data, 0)
+    _, header, media_at = local_header(data, 0)
     tile_start = media_at + header[7]
     tile_text, tile_header, tile_at = local_header(data, tile_start)
     deflated = data[tile_at : tile_at + tile_header[7]]
@@ -99,17 +100,20 @@ def describe(data):
     symbols, extra = payload[at : len(payload) - extra_bytes], payload[len(payload) - extra_bytes :]
     codes, _ = reader.decode(payload, 5, 5, 0)
     metadata = json.loads(data[json_at:json_end])
+    shape, tiles, extent, samples = (metadata[name] for name in ("tile_shape", "tiles", "extent", "samples"))
+    digest = data[index : index + 32]
+    hashed = struct.pack("<IIIQQddBdd", shape["columns"], shape["rows"], shape["levels"], tiles["columns"], tiles["rows"],
+                         extent["x"], extent["z"], 0, samples["offset"], samples["scale"])
+    assert hashlib.sha256(digest + hashed).hexdigest() == metadata["content_sha256"]
     offset, scale = metadata["samples"]["offset"], metadata["samples"]["scale"]
     return f"""
 Nine elevations, `tiny.asc`:
 
 {"".join("    " + line + chr(10) for line in GRID.splitlines())}
 make one tile of 5×5 samples with `isohf convert tiny.asc -o tiny.isohf {" ".join(ARGUMENTS)}`. The archive has {len(data)}
-bytes; `tests/docs/format_example.py` took it apart for this section, and a test holds the two against each other.
+bytes, those of `testdata/conformance/good/tiny.isohf`; `tests/docs/format_example.py` took it apart for this section, and a test
+holds all three against each other. It begins with the media type's local header of {media_at} bytes and `{data[media_at:tile_start].decode()}`.
 
-**The media type's local header**, at byte 0, and its data at byte {media_at}, `{data[media_at:tile_start].decode()}`:
-
-{text}
 **The tile's local header**:
 
 {tile_text}
@@ -144,11 +148,11 @@ and the footer:
 
 {footer_text}
 **The metadata**, whose local header of {30 + len("isohf.json")} bytes goes before them, are the {json_header[7]} bytes of JSON up to byte {json_end},
-where the directory begins.
+where the directory of {end64[6]} entries in {directory_bytes} bytes begins.
 
-**The directory**, {end64[6]} entries in {directory_bytes} bytes:
+**The content hash** is the SHA-256 of the tile's digest and these {len(hashed)} bytes, `{metadata["content_sha256"]}`:
 
-{hex_lines(data[directory:directory + directory_bytes], directory)}
+{hex_lines(hashed, 32)}
 **The end records**, the last 98 bytes:
 
 {hex_lines(data[-98:], len(data) - 98)}"""
@@ -159,7 +163,11 @@ def main(isohf, page, write):
         (pathlib.Path(folder) / "tiny.asc").write_text(GRID)
         subprocess.run([isohf, "convert", "tiny.asc", "-o", "tiny.isohf", "-q", *ARGUMENTS], cwd=folder, check=True,
                        stderr=subprocess.DEVNULL)
-        made = describe((pathlib.Path(folder) / "tiny.isohf").read_bytes())
+        data = (pathlib.Path(folder) / "tiny.isohf").read_bytes()
+    kept = pathlib.Path(page).parent.parent / "testdata" / "conformance" / "good" / "tiny.isohf"
+    if data != kept.read_bytes():
+        sys.exit(f"{kept} is another archive than the example's; scripts/make_conformance makes it anew")
+    made = describe(data)
     text = pathlib.Path(page).read_text()
     head, found = text.split(HEADING) if HEADING in text else (text + "\n", "")
     if write:
