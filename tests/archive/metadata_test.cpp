@@ -60,6 +60,15 @@ TEST(Metadata, ComesBackAsItWas) {
   EXPECT_EQ(back.extensions[0], metadata.extensions[0]);
 }
 
+TEST(Metadata, TellAUnitByTheSpacingsInVersion1Alone) {
+  Metadata metadata = full();
+  metadata.source.crs_unit = "metre";
+  metadata.source.crs_spacing_x = 2.0 * metadata.source.spacing_x;
+  const std::string json = format_metadata(metadata);
+  EXPECT_EQ(parse_metadata(json).source.metres_per_unit, 1.0);
+  EXPECT_EQ(parse_metadata(replaced(json, "\"version\": 2", "\"version\": 1")).source.metres_per_unit, 0.5);
+}
+
 TEST(Metadata, RecordsHowVoidsWereTreated) {
   Metadata metadata = full();
   metadata.source.void_values = {-9999.0, std::nan(""), HUGE_VAL};

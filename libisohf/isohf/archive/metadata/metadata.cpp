@@ -192,7 +192,7 @@ void mosaic_members(JsonMembers& json, MosaicRecord& mosaic) {
            mosaic.overlap);
 }
 
-void source_members(JsonMembers& json, SourceRecord& source) {
+void source_members(JsonMembers& json, SourceRecord& source, int version) {
   constexpr JsonRule kSamples{.most = 4294967296.0};
   json("name", source.name);
   json("format", source.format);
@@ -237,8 +237,8 @@ void source_members(JsonMembers& json, SourceRecord& source) {
     crs("metres_per_unit", metres_per_unit, kAbsent);
   });
   json.object("ground", source.ground, ground_members, kAbsent);
-  // Archives of the first builds tell the unit by the spacings alone.
-  const bool is_plain = !source.ground && source.crs_unit == "metre" && source.crs_spacing_x > 0.0;
+  // Archives of version 1 tell the unit by the spacings alone.
+  const bool is_plain = version == 1 && !source.ground && source.crs_unit == "metre" && source.crs_spacing_x > 0.0;
   if (json.reads())
     source.metres_per_unit = metres_per_unit.value_or(is_plain ? source.spacing_x / source.crs_spacing_x : 1.0);
   json.object("body", [&](JsonMembers& body) {
@@ -273,7 +273,7 @@ void metadata_members(JsonMembers& json, Metadata& metadata) {
   json.name("edges", metadata.edges, edges_from_string, kDefaulted);
   json.name("acquisition", metadata.acquisition, acquisition_from_string);
   json("level", metadata.level, {.presence = JsonRule::kAbsent, .least = 1, .most = 12});
-  json.object("source", [&](JsonMembers& source) { source_members(source, metadata.source); });
+  json.object("source", [&](JsonMembers& source) { source_members(source, metadata.source, metadata.version); });
   Statistics& counted = metadata.statistics;
   json.object("statistics", "min", counted.min, "max", counted.max, "mean", counted.mean, "vertices", counted.vertices,
               "voids", counted.voids, "clamped", counted.clamped, "worst_rounding", counted.worst_rounding);
