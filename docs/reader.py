@@ -6,6 +6,7 @@ hashes; SAMPLES: writes the source's samples there, little-endian, row by row.""
 import hashlib
 import json
 import math
+import re
 import struct
 import sys
 import zlib
@@ -25,19 +26,46 @@ def require(holds, what):
 FIXED = {0: [4096], 1: [4096, -4096], 2: [4750, -1050, -1180, 370, -1230, 350, -1230, -290, 50, 660]}
 
 
+def leb128(data, at):
+    """A number and where it ends."""
+    value = shift = 0
+    while True:
+        require(at < len(data) and shift < 35, "a number that does not end")
+        value |= (data[at] & 127) << shift
+        at, shift = at + 1, shift + 7
+        if data[at - 1] < 128:
+            require(data[at - 1] > 0 or shift == 7, "a number of too many bytes")
+            return value, at
+
+
 def void_mask(data, samples):
-    mask, run, shift, of = [], 0, 0, 0
-    for byte in data:
-        run |= (byte & 127) << shift
-        shift += 7
-        require(run <= samples, "a run of the void mask is too long")
-        if byte < 128:
-            require((run > 0 or not mask) and (byte > 0 or shift == 7), "a run of the void mask is empty or too wide")
-            mask += [of] * run
-            run, shift, of = 0, 0, 1 - of
-    require(len(mask) == samples and shift == 0, "the void mask has another size")
-    require(0 < sum(mask) < samples, "a void mask without a void, or of voids alone")
+    mask, at, of = [], 0, 0
+    while at < len(data):
+        is_first, (run, at) = at == 0, leb128(data, at)
+        require((run > 0 or is_first) and run <= samples - len(mask), "a run of the void mask is empty or too long")
+        mask += [of] * run
+        of = 1 - of
+    require(len(mask) == samples and 0 < sum(mask) < samples, "a void mask of another size, without a void or of voids alone")
     return mask
+
+
+class Bits:
+    def __init__(self, data):
+        self.number, self.at, self.bytes = int.from_bytes(data, "little"), 0, len(data)
+
+    def take(self, count):
+        value = self.number >> self.at & (1 << count) - 1
+        self.at += count
+        return value
+
+    def number_of(self, symbol, limit):
+        """What a symbol and its extra bits say."""
+        require(symbol < limit, "a symbol above the last")
+        x = (symbol - 16) // 8 + 1 if symbol >= 16 else 0
+        return symbol if symbol < 16 else ((8 + (symbol & 7)) << x) + self.take(x)
+
+    def check_used_up(self):
+        require((self.at + 7) // 8 == self.bytes and self.number >> self.at == 0, "extra bits that run out or are left over")
 
 
 def symbols_of(payload, at, count, is_paired):
@@ -64,6 +92,11 @@ def neighbours_of(v, near, far, farther, p, s):
 def energy_above(n, f, p, s):
     return (4 * (n[p + s] + n[p + s - 1] + f[p]) + 3 * n[p + s + 1] + n[p + s - 3] + f[p + 2] + f[p - 2]
             + 2 * (n[p + s + 2] + n[p + s - 2] + f[p + 1] + f[p - 1]))
+
+
+def undropped(v, d):
+    """An integer of d dropped bits with none dropped."""
+    return v if v is None else v << d if v >= 0 else ((v + 1) << d) - 1
 
 
 def unzigzag(folded):
@@ -108,17 +141,9 @@ def decode(payload, columns, rows, kind):
         found, at = symbols_of(payload, at, count, paired >> k & 1)
         symbols.append(found)
     require(at + extra_bytes == len(payload), "bytes behind the payload's end")
-    extra, taken = int.from_bytes(payload[at:], "little"), 0
-    streams = []
-    for found in symbols:
-        stream = []
-        for symbol in found:
-            require(symbol < (240 if kind == 2 else 112), "a symbol above the last")
-            x = (symbol - 16) // 8 + 1 if symbol >= 16 else 0
-            stream.append(symbol if symbol < 16 else ((8 + (symbol & 7)) << x) + (extra >> taken & (1 << x) - 1))
-            taken += x
-        streams.append(iter(stream))
-    require((taken + 7) // 8 == extra_bytes and extra >> taken == 0, "extra bits that run out or are left over")
+    extra = Bits(payload[at:])
+    streams = [iter([extra.number_of(symbol, 240 if kind == 2 else 112) for symbol in found]) for found in symbols]
+    extra.check_used_up()
     modulus = 1 << (32 if kind == 2 else 16)
 
     def residual(energy):
@@ -166,16 +191,6 @@ def decode(payload, columns, rows, kind):
         above, rough = [v] + above[:2], [g, rough[0]]
     require(all(next(stream, None) is None for stream in streams), "a context keeps symbols")
     return out, dropped
-
-
-class Bits:
-    def __init__(self, data):
-        self.number, self.at = int.from_bytes(data, "little"), 0
-
-    def take(self, count):
-        value = self.number >> self.at & (1 << count) - 1
-        self.at += count
-        return value
 
 
 def first_table(of_class):
@@ -231,18 +246,6 @@ def decode_adaptive(payload, columns, rows, kind):
             "a header's fields")
     at = 9
 
-    def number():
-        nonlocal at
-        value, shift = 0, 0
-        while True:
-            require(at < len(payload) and shift < 35, "a number that does not end")
-            at += 1
-            value |= (payload[at - 1] & 127) << shift
-            shift += 7
-            if payload[at - 1] < 128:
-                require(payload[at - 1] > 0 or shift == 7, "a number of too many bytes")
-                return value
-
     weights = FIXED[2]
     if flags & 2:
         n = 18 if flags & 4 else 12
@@ -251,13 +254,13 @@ def decode_adaptive(payload, columns, rows, kind):
         at += 2 * n
     mask = [0] * (columns * rows)
     if flags & 1:
-        size = number()
+        size, at = leb128(payload, at)
         mask = void_mask(payload[at : at + size], columns * rows)
         at += size
     states = list(struct.unpack_from("<%dI" % (8 if flags & 8 else 1), payload, at))
     require(min(states) >= 65536, "a state below 65536")
     at += 4 * len(states)
-    size = number()
+    size, at = leb128(payload, at)
     words = iter(struct.unpack_from("<%dH" % size, payload, at))
     extra = Bits(payload[at + 2 * size :])
     model = Model()
@@ -344,7 +347,7 @@ def decode_adaptive(payload, columns, rows, kind):
         model.end_band()
     require(next(words, None) is None, "words are left over")
     require(set(states) == {65536}, "states do not end as they began")
-    require((extra.at + 7) // 8 == len(payload) - at - 2 * size and extra.number >> extra.at == 0, "extra bits are left over")
+    extra.check_used_up()
     return out, 0
 
 
@@ -581,10 +584,7 @@ def shadow_seeds(payload, columns, rows, kind, angles, edges):
     require(len(payload) == at + extra_bytes, "bytes behind a seed's end")
 
     def number(stream):
-        symbol = next(symbols[stream], 255)
-        require(symbol < 240, "a seed's stream ends early")
-        x = (symbol - 16) // 8 + 1 if symbol >= 16 else 0
-        return symbol if symbol < 16 else ((8 + (symbol & 7)) << x) + extra.take(x)
+        return extra.number_of(next(symbols[stream], 255), 240)
 
     def wrapped(value):
         return (value + 2**31) % 2**32 - 2**31
@@ -613,7 +613,8 @@ def shadow_seeds(payload, columns, rows, kind, angles, edges):
                 above.append((2 * n if r % 2 else across * q + (2 * m - 1 if m else 0), h))
                 p += p < len(near) and n - base >= -2
             found[direction, 0, r] = above
-    require(all(next(stream, None) is None for stream in symbols) and extra.number >> extra.at == 0, "a seed keeps symbols")
+    require(all(next(stream, None) is None for stream in symbols), "a seed keeps symbols")
+    extra.check_used_up()
     return found
 
 
@@ -663,26 +664,18 @@ class Archive:
         self.kind, self.letter, self.void = KINDS[self.metadata["samples"]["type"]]
         count, there = self.grid["columns"] * self.grid["rows"], len(self.members)
         vertices = self.shape["columns"] * self.shape["rows"]
-        require(0 < count <= 2 ** 22 // vertices + 64 * there, "a grid of more tiles than its members make likely")
-        own = ("mimetype", "isohf.json", "index.bin")
-        names = [name for name in self.members if name not in own]
-        for name in names:
-            parts = name.split("/")
-            if parts[0] == "tiles":
-                require(len(parts) == 3 and name == "tiles/%d/%d.tile" % self.place_of(parts[1:]), "no tile's name: " + name)
+        for name in self.members:
+            tile = re.fullmatch(r"tiles/(0|[1-9]\d*)/(0|[1-9]\d*)\.tile", name)
+            require(not name.startswith("tiles/") or tile and int(tile[1]) < self.grid["rows"] and int(tile[2]) < self.grid["columns"],
+                    "no tile's name: " + name)
         digests = {} if self.metadata["version"] == 1 else self.index() if "index.bin" in self.members else None
+        require(digests is not None or count <= 2 ** 22 // vertices + 64 * there, "a grid of more tiles than its members make likely")
         if digests is not None:  # else another tool packed it, and its data are others
             crcs = b"".join(struct.pack("<I", zlib.crc32(self.raw(name))) for name in self.members
-                            if name not in own[1:] and self.members[name][1] < self.members.get("index.bin", (0, len(self.data)))[1])
+                            if name not in ("isohf.json", "index.bin") and self.members[name][1] < self.members.get("index.bin", (0, len(self.data)))[1])
             stated = self.metadata.get("data_crc32")
             require(stated is None or zlib.crc32(crcs) == int(stated, 16), "the members have another CRC")
         self.digests = digests or {}
-
-    def place_of(self, parts):
-        row, column = parts[0], parts[1].partition(".")[0]
-        require(row.isdecimal() and column.isdecimal() and int(row) < self.grid["rows"] and int(column) < self.grid["columns"],
-                "no tile's name: " + "/".join(parts))
-        return int(row), int(column)
 
     def unpack(self, layout, at, data=None):
         data = self.data if data is None else data
@@ -740,7 +733,7 @@ class Archive:
 
     def index(self):
         """Digests of the stored tiles by flat index, out of index.bin of version 2, all of which is checked."""
-        index, digests, used = self.member("index.bin"), {}, 0
+        index, digests = self.member("index.bin"), {}
         magic, version, tables, size, stands, _, _, described, crc, zero, own = self.unpack("8sII4QIIII", len(index) - 64, index)
         require(magic == b"ISOHFIDX" and version == 2 and size == len(index) and not zero
                 and zlib.crc32(index[-64:-4]) == own, "the index's footer")
@@ -813,8 +806,7 @@ class Archive:
 
     def height(self, tile, c, r):
         """A vertex as an integer of section 5 with d = 0, None where void."""
-        v, d = self.tiles[tile][c + r * self.shape["columns"]], self.dropped[tile]
-        return v if v is None else v << d if v >= 0 else ((v + 1) << d) - 1
+        return undropped(self.tiles[tile][c + r * self.shape["columns"]], self.dropped[tile])
 
     def check_planes(self):
         """Each tile of each plane against the tiles, by the three rules."""
@@ -845,7 +837,7 @@ class Archive:
                 names.add(name)
                 if name in self.members:
                     found, d = decode(self.member(name), columns, rows, self.kind)
-                    found = [v if v is None else v << d if v >= 0 else ((v + 1) << d) - 1 for v in found]
+                    found = [undropped(v, d) for v in found]
                 require(found == expected and (name in self.members) == any(v is not None for v in found),
                         name + " is not that of the tiles below")
         require(all(name in names for name in self.members if name.startswith("planes/")), "no plane's tile")

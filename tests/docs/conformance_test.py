@@ -3,6 +3,7 @@ in a line. usage: conformance_test.py ISOHF SOURCE_FOLDER"""
 
 import json
 import pathlib
+import re
 import subprocess
 import sys
 
@@ -40,6 +41,12 @@ for name in manifest["refuse"]:
         failures.append("%s: isohf verify passes it: %s" % (name, verified.stdout))
     if run(sys.executable, root / "docs" / "reader.py", path).returncode == 0:
         failures.append("%s: reader.py reads it" % name)
+# Section 11 of the page names each of these beside its fault, alone or as `BEGINNING…`.
+faults = (root / "docs" / "archive_format.md").read_text().partition("\n## 11 ")[2].partition("\n## 12 ")[0]
+named = re.findall(r"`([a-z0-9]+(?:-[a-z0-9]+)*-?…?)`", faults)
+for name in manifest["refuse"]:
+    if not any(name == told or told.endswith("-…") and name.startswith(told[:-1]) for told in named):
+        failures.append("%s: the page does not name it" % name)
 assert len(manifest["good"]) >= 75 and len(manifest["refuse"]) >= 85
 print("\n".join(failures))
 sys.exit(bool(failures))
