@@ -6,6 +6,7 @@
 #include "formats/georeference/units.h"
 #include "formats/registry.h"
 #include "isohf/error.h"
+#include "isohf/restore/ground_scale.h"
 #include "isohf/surface.h"
 
 namespace isohf::cli {
@@ -37,7 +38,7 @@ ArchiveReader open_archive(const std::string& path) {
 }
 
 double elevation_units_per_world_unit(const Metadata& metadata) {
-  if (metadata.horizontal_unit != "metre") return 1.0;
+  if (metadata.horizontal_unit != "metre" && !is_in_degrees(metadata)) return 1.0;
   const auto unit = linear_unit(metadata.vertical_unit);
   return unit ? 1.0 / unit->metres : 1.0;
 }

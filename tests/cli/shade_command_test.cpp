@@ -426,5 +426,25 @@ TEST_F(ShadeCommand, RefusesWrongUsage) {
   for (const std::string& name : folder.names()) EXPECT_THAT(name, testing::Not(HasSubstr("b.")));
 }
 
+TEST_F(ShadeCommand, TakesDegreesForTheMetresThatTheyAre) {
+  // Land that falls a metre in ten towards the East, at 60 degrees North: a degree of longitude is half as long.
+  std::string text = "ncols 120\nnrows 120\nxllcorner 8\nyllcorner 59.94\ncellsize 0.001\n";
+  for (int i = 0; i < 120 * 120; ++i) text += std::to_string(2000.0 - 5.56 * (i % 120)) + (i % 120 == 119 ? "\n" : " ");
+  write_file(folder / "slope.asc", text);
+  for (const char* projection : {"none", "auto"}) {
+    ASSERT_EQ(run_isohf({"convert", folder / "slope.asc", folder / "s.isohf", "--crs", "EPSG:4326", "--projection",
+                         projection, "--overwrite", "-q"})
+                  .exit_code,
+              0);
+    ASSERT_EQ(run_isohf({"shade", folder / "s.isohf", "-o", folder / "s.tif", "--slope", "--overwrite", "-q"}).exit_code, 0);
+    const Raster slopes = read_raster(folder / "s.tif");
+    const std::size_t middle = slopes.elevations.size() / 2 + static_cast<std::size_t>(slopes.info.width / 2);
+    EXPECT_NEAR(slopes.elevations[middle], 5.7, 0.1) << projection;
+    ASSERT_EQ(
+        run_isohf({"shade", folder / "s.isohf", "-o", folder / "m.tif", "--shadow-mask", "--overwrite", "-q"}).exit_code, 0);
+    EXPECT_EQ(read_channel(folder / "m.tif", "").at(30, 30), 255) << projection;
+  }
+}
+
 }  // namespace
 }  // namespace isohf::test

@@ -15,6 +15,7 @@
 #include "isohf/archive.h"
 #include "isohf/base/bytes.h"
 #include "isohf/error.h"
+#include "isohf/restore/ground_scale.h"
 #include "isohf/surface.h"
 #include "open_archive.h"
 #include "options/option_values.h"
@@ -339,7 +340,7 @@ int run(SampleOptions options) {
   ArchiveReader archive = open_archive(options.archive);
   const Metadata& metadata = archive.metadata();
   options.sun.elevation_units_per_world_unit = elevation_units_per_world_unit(metadata);
-  if (options.with_shadow && metadata.horizontal_unit != "metre" && metadata.source.crs_unit == "degree") {
+  if (options.with_shadow && is_in_degrees(metadata)) {
     throw Error(ErrorCode::kInvalidArgument,
                 archive.path() +
                     ": is laid out in degrees, along which no shadow has a length; convert its source with "

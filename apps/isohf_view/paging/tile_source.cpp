@@ -7,7 +7,6 @@
 #include <cmath>
 #include <limits>
 #include <mutex>
-#include <numbers>
 #include <optional>
 
 #include "formats/georeference/units.h"
@@ -21,24 +20,6 @@
 namespace isohf::view {
 namespace {
 
-bool is_in_degrees(const Metadata& metadata) {
-  return metadata.horizontal_unit != "metre" && metadata.source.crs_unit == "degree";
-}
-
-GroundScale scale_of(const Metadata& metadata) {
-  const SourceRecord& source = metadata.source;
-  if (!is_in_degrees(metadata) || !source.origin_y) return {};
-  const double degree = std::numbers::pi / 180.0;
-  const double middle = *source.origin_y - 0.5 * static_cast<double>(source.height - 1) * source.crs_spacing_y;
-  const double length = degree * source.semi_major_axis_m.value_or(Ellipsoid{}.semi_major_axis_m);
-  return {length * std::max(std::cos(middle * degree), 0.01), length};
-}
-
-TileGrid scaled(const TileGrid& grid, GroundScale scale) {
-  return TileGrid::make(grid.shape(), grid.tile_columns(), grid.tile_rows(), grid.extent_x() * scale.x,
-                        grid.extent_z() * scale.z);
-}
-
 /// World units of one elevation unit; 1 where either is not known.
 double elevation_unit(const Metadata& metadata) {
   if (metadata.horizontal_unit != "metre" && !is_in_degrees(metadata)) return 1.0;
@@ -50,7 +31,7 @@ class ArchiveSource final : public TileSource {
  public:
   ArchiveSource(const std::string& path, const std::string& second)
       : reader_(path),
-        ground_scale_(scale_of(reader_.metadata())),
+        ground_scale_(isohf::ground_scale(reader_.metadata())),
         grid_(scaled(reader_.grid(), ground_scale_)),
         world_per_elevation_(elevation_unit(reader_.metadata())) {
     const Metadata& metadata = reader_.metadata();
@@ -76,9 +57,7 @@ class ArchiveSource final : public TileSource {
   [[nodiscard]] bool is_to_scale() const override { return ground_unit() == "metre"; }
   [[nodiscard]] GroundScale ground_scale() const override { return ground_scale_; }
   [[nodiscard]] WorldBounds covered() const override {
-    const WorldBounds& valid = reader_.metadata().valid;
-    return {valid.x0 * ground_scale_.x, valid.z0 * ground_scale_.z, valid.x1 * ground_scale_.x,
-            valid.z1 * ground_scale_.z};
+    return scaled(reader_.metadata().valid, ground_scale_);
   }
 
   [[nodiscard]] TileBounds bounds(TileIndex tile) const override { return bounds(tile, 0); }

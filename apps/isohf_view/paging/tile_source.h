@@ -15,6 +15,7 @@
 #include "isohf/lattice/planes.h"
 #include "isohf/metadata.h"
 #include "isohf/picture.h"
+#include "isohf/restore/ground_scale.h"
 #include "isohf/shade.h"
 #include "view_state.h"
 
@@ -36,13 +37,6 @@ struct TileBounds {
   bool has_voids = false;
   double low = 0.0;  ///< world units
   double high = 0.0;
-};
-
-/// Units that the viewer's ground has in one of the archive's world. An archive laid out in degrees is shown in metres, a
-/// degree of longitude as long as it is in the middle.
-struct GroundScale {
-  double x = 1.0;
-  double z = 1.0;
 };
 
 /// The names of a place.

@@ -19,6 +19,7 @@
 #include "isohf/base/simd.h"
 #include "isohf/error.h"
 #include "isohf/lattice/barycentric.h"
+#include "isohf/restore/ground_scale.h"
 #include "isohf/restore/point_sampler.h"
 #include "isohf/restore/shade/light.h"
 #include "isohf/restore/shade/relief.h"
@@ -321,6 +322,7 @@ class ShadeRenderer {
         illumination_(request.sun_azimuth_deg, request.sun_elevation_deg, request.relief),
         sun_(towards_sun(request.sun_azimuth_deg, request.sun_elevation_deg)),
         datum_(archive.metadata().statistics.min.value_or(0.0)),
+        ground_(ground_scale(archive.metadata())),
         world_per_elevation_(request.exaggeration / request.elevation_units_per_world_unit) {
     if (request.texture) textures_.emplace(archive, x_.step(), z_.step());
     if (casts_shadows(request)) begin_sweep();
@@ -358,7 +360,7 @@ class ShadeRenderer {
     SweptSun sun = swept_sun(request.sun_azimuth_deg, request.sun_elevation_deg,
                              sun_radius_deg(archive_.metadata().source.body), 1.0, 1.0);
     if (request.softness) sun.softness = *request.softness * world_per_elevation_;
-    sweep_.emplace(grid_, archive_.metadata().valid, sun);
+    sweep_.emplace(scaled(grid_, ground_), scaled(archive_.metadata().valid, ground_), sun);
     if (!sweep_->from_south()) return;
     // What enters every stride-th row of tiles is kept for all time, and those in between for the rows that are drawn
     // next.
@@ -758,7 +760,7 @@ class ShadeRenderer {
       return static_cast<const float*>(beyond.data() + 1);
     };
     const ReliefRows rows{heights_at(row - 1), heights_of(pixels), heights_at(row + 1)};
-    const PixelSize pixel{x_.pixel(), z_.pixel()};
+    const PixelSize pixel{x_.pixel() * ground_.x, z_.pixel() * ground_.z};
     const std::span<float> one(scratch.data(), count);
     switch (request_.kind) {
       case ShadeKind::kPicture:
@@ -837,6 +839,7 @@ class ShadeRenderer {
   Illumination illumination_;
   Normal sun_;
   double datum_;
+  GroundScale ground_;
   double world_per_elevation_;
   std::optional<ShadowSweep> sweep_;
   std::optional<ShadeTexture> textures_;

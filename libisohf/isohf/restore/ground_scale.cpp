@@ -1,0 +1,33 @@
+#include "isohf/restore/ground_scale.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "isohf/projection.h"
+
+namespace isohf {
+
+bool is_in_degrees(const Metadata& metadata) {
+  return metadata.horizontal_unit != "metre" && metadata.source.crs_unit == "degree";
+}
+
+GroundScale ground_scale(const Metadata& metadata) {
+  const SourceRecord& source = metadata.source;
+  if (!is_in_degrees(metadata) || !source.origin_y) return {};
+  const double degree = std::numbers::pi / 180.0;
+  const double middle = *source.origin_y - 0.5 * static_cast<double>(source.height - 1) * source.crs_spacing_y;
+  const double length = degree * source.semi_major_axis_m.value_or(Ellipsoid{}.semi_major_axis_m);
+  return {length * std::max(std::cos(middle * degree), 0.01), length};
+}
+
+TileGrid scaled(const TileGrid& grid, GroundScale scale) {
+  return TileGrid::make(grid.shape(), grid.tile_columns(), grid.tile_rows(), grid.extent_x() * scale.x,
+                        grid.extent_z() * scale.z);
+}
+
+WorldBounds scaled(const WorldBounds& bounds, GroundScale scale) {
+  return {bounds.x0 * scale.x, bounds.z0 * scale.z, bounds.x1 * scale.x, bounds.z1 * scale.z};
+}
+
+}  // namespace isohf
