@@ -436,12 +436,14 @@ TEST_F(ShadeCommand, TakesDegreesForTheMetresThatTheyAre) {
                          projection, "--overwrite", "-q"})
                   .exit_code,
               0);
-    ASSERT_EQ(run_isohf({"shade", folder / "s.isohf", "-o", folder / "s.tif", "--slope", "--overwrite", "-q"}).exit_code, 0);
+    ASSERT_EQ(
+        run_isohf({"shade", folder / "s.isohf", "-o", folder / "s.tif", "--slope", "--overwrite", "-q"}).exit_code, 0);
     const Raster slopes = read_raster(folder / "s.tif");
     const std::size_t middle = slopes.elevations.size() / 2 + static_cast<std::size_t>(slopes.info.width / 2);
     EXPECT_NEAR(slopes.elevations[middle], 5.7, 0.1) << projection;
-    ASSERT_EQ(
-        run_isohf({"shade", folder / "s.isohf", "-o", folder / "m.tif", "--shadow-mask", "--overwrite", "-q"}).exit_code, 0);
+    ASSERT_EQ(run_isohf({"shade", folder / "s.isohf", "-o", folder / "m.tif", "--shadow-mask", "--overwrite", "-q"})
+                  .exit_code,
+              0);
     EXPECT_EQ(read_channel(folder / "m.tif", "").at(30, 30), 255) << projection;
   }
 }

@@ -236,6 +236,56 @@ TEST(TextureStage, PicksTheFormatByAlpha) {
   }
 }
 
+// Pixels of a metre, a photo of the ground's middle: beyond it textures are transparent, not its border drawn out.
+TEST(TextureStage, ShowsNothingBeyondAPhotoOfAPartOfTheGround) {
+  const test::TemporaryFolder folder;
+  Hills source(60, 60);
+  source.mutable_info().georeference = utm(500000.5, 3999999.5, 1.0);
+  for (const int channels : {1, 3, 4}) {
+    MemoryPhoto photo(20, 24, channels, [](std::int64_t, std::int64_t, int channel) {
+      return static_cast<std::uint8_t>(channel == 3 ? 255 : 180);
+    });
+    photo.mutable_info().georeference = utm(500010.5, 3999979.5, 1.0);  // columns 10 to 29, rows 20 to 43
+    ConvertOptions options = options_for(photo);
+    options.texture->format.reset();
+    const ConvertSummary summary = run(source, folder / "a.isohf", options);
+    EXPECT_EQ(texture_info(summary.metadata)->format, TextureFormat::kPng);
+    EXPECT_EQ(texture_info(summary.metadata)->photo_width, 20);
+    EXPECT_TRUE(verify_archive(folder / "a.isohf", {}).passed());
+    const ArchiveReader archive(folder / "a.isohf");
+    const TextureReader reader(archive);
+    int inside = 0;
+    int beyond = 0;
+    for (std::int64_t flat = 0; flat < archive.grid().tile_count(); ++flat) {
+      const TileIndex tile = archive.grid().tile_at(flat);
+      if (!reader.has(tile)) continue;
+      const Picture texels = reader.read_rgba(tile, 0);
+      for (int row = 0; row < texels.height; ++row) {
+        for (int column = 0; column < texels.width; ++column) {
+          const double x =
+              (static_cast<double>(tile.column) + column / (texels.width - 1.0)) * archive.grid().extent_x();
+          const double z = (static_cast<double>(tile.row) + row / (texels.height - 1.0)) * archive.grid().extent_z();
+          const double depth = std::min(std::min(x - 10.0, 30.0 - x), std::min(z - 20.0, 44.0 - z));
+          if (depth > 1.0) {
+            ASSERT_EQ(texels.pixel(column, row)[3], 255) << x << ' ' << z;
+            ASSERT_EQ(texels.pixel(column, row)[0], 180) << x << ' ' << z;
+            ++inside;
+          }
+          if (depth < -1.0) {
+            ASSERT_EQ(texels.pixel(column, row)[3], 0) << x << ' ' << z;
+            ++beyond;
+          }
+        }
+      }
+    }
+    EXPECT_GT(inside, 300);
+    EXPECT_GT(beyond, 300);
+    // JPEG has no way to say so.
+    options.texture->format = TextureFormat::kJpeg;
+    EXPECT_EQ(texture_info(run(source, folder / "a.isohf", options).metadata)->channels, std::min(channels, 3));
+  }
+}
+
 TEST(TextureStage, GivesTheSameBytesForAnyNumberOfThreads) {
   const test::TemporaryFolder folder;
   Hills source;

@@ -23,7 +23,8 @@ void add_texture_options(CommandLine& line, TextureOptions& options) {
       "the input's ground; any format that OpenImageIO reads, larger than memory if need be",
       options.photo);
   line.option(
-      "--texture-format", "KIND", "png or jpeg (default jpeg, png where the photo has alpha)",
+      "--texture-format", "KIND",
+      "png or jpeg (default jpeg, png where the photo has alpha or shows a part of the ground)",
       [&options, take](const std::string& text) {
         options.request.format = parse_word(text, {"png", "jpeg"}) == 0 ? TextureFormat::kPng : TextureFormat::kJpeg;
         take("--texture-format");

@@ -93,6 +93,10 @@ PhotoPlacement place_on_rows(const PhotoInfo& photo, const SourceInfo& source, c
                             photo.path, source.path, shown.x0, shown.x1, shown.z0, shown.z1, ground.x0, ground.x1,
                             ground.z0, ground.z1));
   }
+  const double half_x = 0.5 * at.spacing_x;
+  const double half_z = 0.5 * at.spacing_z;
+  placement.is_part = placement.by_georeference && (shown.x0 > ground.x0 + half_x || shown.x1 < ground.x1 - half_x ||
+                                                    shown.z0 > ground.z0 + half_z || shown.z1 < ground.z1 - half_z);
   return placement;
 }
 
@@ -139,6 +143,8 @@ PhotoPlacement place_by_projection(const PhotoInfo& photo, const SourceInfo& sou
 
   WorldBounds shown = own_units.bounds();
   const bool goes_round = !warp.source_map && placement.bounds.x1 - placement.bounds.x0 > 360.0 - 0.5 * warp.step_x;
+  // Its West is what lies beyond its East.
+  if (goes_round) placement.is_part = false;
   if (!goes_round) {
     shown.x0 = std::max(shown.x0, placement.bounds.x0);
     shown.x1 = std::min(shown.x1, placement.bounds.x1);

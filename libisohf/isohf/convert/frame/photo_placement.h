@@ -16,6 +16,7 @@ struct PhotoPlacement {
   WorldBounds bounds;  ///< outer edges of its pixels; a rectangle around what it shows of the source, where projected
   std::optional<WarpPlace> warp;  ///< where rows of the photo are no rows of the world
   bool by_georeference = false;
+  bool is_part = false;  ///< some of the source's ground lies beyond it, by half a pixel and more
   std::vector<Warning> warnings;
 };
 

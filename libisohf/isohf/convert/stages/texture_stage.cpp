@@ -10,6 +10,7 @@
 #include "isohf/archive/textures/picture_codec.h"
 #include "isohf/convert/frame/photo_placement.h"
 #include "isohf/error.h"
+#include "isohf/surface/photo/bordered_photo.h"
 
 namespace isohf {
 namespace {
@@ -60,6 +61,14 @@ TextureInfo describe(const Plan& plan, const TextureRequest& request, const Phot
   info.placed_by = placement.by_georeference ? "georeference" : "source";
   info.placement = placement.bounds;
   return info;
+}
+
+/// Whether anything of an RGBA picture is seen.
+bool has_opacity(const Picture& picture) {
+  for (std::size_t i = 3; i < picture.samples.size(); i += 4) {
+    if (picture.samples[i] != 0) return true;
+  }
+  return false;
 }
 
 /// Drops the alpha of an RGBA picture.
@@ -133,8 +142,9 @@ struct TextureStage::Layout {
   }
 };
 
-TextureStage::TextureStage(PhotoSource& photo, TextureInfo info, Layout layout)
-    : projected_(std::move(layout.projected)),
+TextureStage::TextureStage(std::unique_ptr<PhotoSource> bordered, PhotoSource& photo, TextureInfo info, Layout layout)
+    : bordered_(std::move(bordered)),
+      projected_(std::move(layout.projected)),
       photo_(projected_ ? *projected_ : photo),
       info_(std::move(info)),
       cutter_(layout.cutter),
@@ -142,11 +152,20 @@ TextureStage::TextureStage(PhotoSource& photo, TextureInfo info, Layout layout)
 
 TextureStage TextureStage::make(const Plan& plan, const SourceInfo& source, const TextureRequest& request, int threads,
                                 int tiles_at_once) {
-  PhotoSource& photo = *request.photo;
-  check(request, photo.info());
-  PhotoPlacement placement = place_photo(photo.info(), source, plan.frame);
-  const TextureInfo info = describe(plan, request, placement);
-  TextureStage stage(photo, info, Layout::make(photo, plan.grid, placement, info));
+  check(request, request.photo->info());
+  PhotoPlacement placement = place_photo(request.photo->info(), source, plan.frame);
+  TextureInfo info = describe(plan, request, placement);
+  // Beyond a photo of a part of the ground nothing is shown, which takes alpha: where JPEG is asked for, its border goes on.
+  std::unique_ptr<PhotoSource> bordered;
+  if (placement.is_part && request.format != TextureFormat::kJpeg) {
+    bordered = std::make_unique<BorderedPhoto>(*request.photo);
+    placement = place_photo(bordered->info(), source, plan.frame);
+    info.format = TextureFormat::kPng;
+    info.channels = 4;
+  }
+  PhotoSource& photo = bordered ? *bordered : *request.photo;
+  Layout layout = Layout::make(photo, plan.grid, placement, info);
+  TextureStage stage(std::move(bordered), photo, info, std::move(layout));
   stage.warnings_ = photo.info().warnings;
   stage.warnings_.insert(stage.warnings_.end(), placement.warnings.begin(), placement.warnings.end());
   if (info.channels == 3 && photo.info().channels == 4) {
@@ -184,6 +203,8 @@ TextureStage::Encoded TextureStage::encode(TileIndex tile) const {
   Encoded encoded;
   if (!shows(tile)) return encoded;
   std::vector<Picture> levels = cutter_.cut(photo_, tile);
+  // A transparent border alone shows nothing.
+  if (bordered_ && std::none_of(levels.begin(), levels.end(), has_opacity)) return encoded;
   for (auto level = levels.rbegin(); level != levels.rend(); ++level) {
     if (level->channels > info_.channels) *level = without_alpha(*level);
     encoded.push_back(info_.format == TextureFormat::kPng ? encode_png(*level) : encode_jpeg(*level, info_.quality));

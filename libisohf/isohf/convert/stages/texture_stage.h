@@ -42,11 +42,12 @@ class TextureStage {
 
  private:
   struct Layout;
-  TextureStage(PhotoSource& photo, TextureInfo info, Layout layout);
+  TextureStage(std::unique_ptr<PhotoSource> bordered, PhotoSource& photo, TextureInfo info, Layout layout);
   [[nodiscard]] bool shows(TileIndex tile) const;
 
-  std::unique_ptr<ProjectedPhoto> projected_;  ///< of the user's photo; nullptr where its rows are the world's
-  PhotoSource& photo_;                         ///< that one, or the user's
+  std::unique_ptr<PhotoSource> bordered_;      ///< the user's photo, where it shows a part of the ground; or nullptr
+  std::unique_ptr<ProjectedPhoto> projected_;  ///< of one of these; nullptr where its rows are the world's
+  PhotoSource& photo_;                         ///< the last of these
   TextureInfo info_;
   TextureCutter cutter_;
   double pixels_per_texel_;
