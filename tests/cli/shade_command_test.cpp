@@ -448,5 +448,15 @@ TEST_F(ShadeCommand, TakesDegreesForTheMetresThatTheyAre) {
   }
 }
 
+TEST_F(ShadeCommand, UnlitGroundHasThePalettesOwnColours) {
+  write_file(folder / "p.txt", "100 10 20 30\n120 210 220 230\n");
+  const std::string picture = draw({"--palette", folder / "p.txt", "--no-relief", "--no-shadow", "--size", "200x120"});
+  const std::array<int, 3> low = {10, 20, 30};
+  for (std::size_t k = 0; k < 3; ++k) {
+    EXPECT_EQ(read_channel(picture, std::string(1, "RGB"[k])).at(150, 60), low[k]);
+    EXPECT_NEAR(read_channel(picture, std::string(1, "RGB"[k])).at(kWall, 60), low[k] + 200, 40);
+  }
+}
+
 }  // namespace
 }  // namespace isohf::test

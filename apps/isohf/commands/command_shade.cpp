@@ -136,7 +136,9 @@ std::optional<ShadeCommand> parse_shade(const Arguments& arguments) {
             options.hours);
   for (const char* option : {"--azimuth", "--sun-elevation"}) line.exclusive({"--date", option});
   line.exclusive({"--time", "--hours"});
-  line.flag("--no-relief", "Light all ground as if it were level", options.no_relief);
+  line.flag("--no-relief",
+            "Light all ground as if it were level; with --no-shadow nothing is lit, colours are what they are",
+            options.no_relief);
   line.flag("--no-shadow", "Leave out the shadows that land casts on land beyond it", options.no_shadow);
   line.option("--shadow-softness", "K",
               "One size of all penumbrae, vertical units (default: the sun's disc, whose penumbra grows with the "

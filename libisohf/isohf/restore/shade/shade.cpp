@@ -797,6 +797,7 @@ class ShadeRenderer {
   void colour_row(const PixelRow& pixels, const Run& block, const std::vector<float>& normals, std::byte* out) const {
     const auto points = static_cast<float>(points_in_pixel());
     const auto count = static_cast<std::size_t>(block.last - block.first);
+    const bool is_lit = request_.relief || request_.shadows;  // else colours are what they are
     for (std::size_t i = 0; i < count; ++i) {
       const std::size_t at = static_cast<std::size_t>(block.first) + i;
       const float height = pixels.heights[1 + at];
@@ -804,7 +805,7 @@ class ShadeRenderer {
       const float alpha = pixels.cover.empty() ? 1.0F : pixels.cover[at] / points;
       const Normal normal =
           request_.relief ? Normal{normals[i], normals[count + i], normals[2 * count + i]} : Normal{0.0F, 1.0F, 0.0F};
-      Light light = illumination_.on(normal, sweep_ ? pixels.shares[at] : 1.0F);
+      Light light = is_lit ? illumination_.on(normal, sweep_ ? pixels.shares[at] : 1.0F) : Light{1.0F, 1.0F, 1.0F};
       const Light ground = palette_.at(static_cast<double>(height) / world_per_elevation_ + datum_);
       for (std::size_t k = 0; k < 3; ++k) {
         const float colour =
@@ -818,7 +819,7 @@ class ShadeRenderer {
         continue;
       }
       auto* const to = reinterpret_cast<std::uint8_t*>(out) + 4 * i;
-      for (std::size_t k = 0; k < 3; ++k) to[k] = value_from_light(light[k]);
+      for (std::size_t k = 0; k < 3; ++k) to[k] = is_lit ? value_from_light(light[k]) : srgb_from_linear(light[k]);
       to[3] = static_cast<std::uint8_t>(alpha * 255.0F + 0.5F);
     }
   }
