@@ -81,6 +81,7 @@ SourceSurvey survey_source(const Conversion& conversion, const RowRange& rows, E
 /// Elevations 0 to 1 in floats or scaled integers are most often a fraction of something.
 void warn_of_unit_range(const SourceInfo& info, const ElevationRange& range, std::vector<Warning>& warnings) {
   if (!is_floating(info.sample_type) || info.z_scale != 1.0 || info.z_offset != 0.0) return;
+  if (info.metres_per_vertical_unit > 1.0) return;  // kilometres
   if (range.min >= -0.1 && range.max <= 1.1 && range.max > range.min) {
     warnings.push_back(
         fmt::format("{}: elevations run from {:.4g} to {:.4g}, which looks like a fraction of a height, not "
