@@ -135,6 +135,12 @@ void DescribedSource::place_by_corner(double west, double north, double dx, doub
   place.origin_y = north - dy / 2.0;
 }
 
+void DescribedSource::leave_out_system(const char* what, const std::string& name) {
+  info_.warnings.push_back(loss(fmt::format(
+      "its {} \"{}\" is none that isohf knows: the reference system is left out (`reference_system` names it)", what,
+      printable(name))));
+}
+
 void DescribedSource::require_samples() const {
   const double end = layout_.end_bytes(info_);
   if (!(end <= static_cast<double>(file_->size_bytes()))) {

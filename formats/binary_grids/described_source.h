@@ -65,6 +65,8 @@ class DescribedSource : public PlainSource {
   void set_scale(double scale, double offset, const char* key);
   /// The place of the first sample's outer corner in the North-West, and the spacing. Cells are areas.
   void place_by_corner(double west, double north, double dx, double dy);
+  /// Warns that a name, of `what`, is not known.
+  void leave_out_system(const char* what, const std::string& name);
   /// Throws Error{kCorrupt} where the file has fewer bytes than the description says.
   void require_samples() const;
   /// Requires the samples, and takes what lies beside it and what the user says.

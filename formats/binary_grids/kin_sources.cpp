@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <string>
@@ -15,6 +16,7 @@
 #include "formats/binary_grids/described_source.h"
 #include "formats/files/text.h"
 #include "formats/georeference/files_beside.h"
+#include "formats/georeference/map_wkt.h"
 #include "formats/georeference/units.h"
 #include "formats/open_options.h"
 #include "formats/readers.h"
@@ -59,16 +61,81 @@ class IdrisiSource final : public DescribedSource {
     const std::string unit = word_in(words, "ref. units");
     int zone = 0;
     char half = 'n';
-    if (system == "latlong" || unit == "deg" || unit == "degrees") {
+    if (unit == "deg" || unit == "degrees" || system == "latlong") {
       place.unit = HorizontalUnit::kDegree;
-      if (system == "latlong") place.system = wgs84_system();
     } else if (const auto length = linear_unit(unit)) {
       place.unit = HorizontalUnit::kMetre;
       place.metres_per_unit = length->metres * number(words, "unit dist.", 1.0);
     }
-    if (std::sscanf(system.c_str(), "utm-%d%c", &zone, &half) != 2 || zone < 1 || zone > 60) return;
-    place.system = wgs84_utm_zone(zone, half == 's');
+    if (system == "latlong") {
+      place.system = wgs84_system();
+    } else if (std::sscanf(system.c_str(), "utm-%d%c", &zone, &half) == 2 && zone >= 1 && zone <= 60) {
+      place.system = wgs84_utm_zone(zone, half == 's');
+    } else if (!system.empty() && system != "plane" && !read_parameters(file_beside(header_, system + ".ref"))) {
+      leave_out_system("reference system", system);
+    }
   }
+
+  /// A reference system parameter file (.ref); false where it is not there or has a projection that is not known.
+  bool read_parameters(const std::string& path) {
+    if (path.empty()) return false;
+    const HeaderWords words = read_header_words(path, ':');
+    static constexpr std::array<std::pair<std::string_view, std::string_view>, 12> kMethods = {
+        {{"cylindrical equal area", "Cylindrical_Equal_Area"},
+         {"azimuthal equal area", "Lambert_Azimuthal_Equal_Area"},
+         {"polar stereographic", "Polar_Stereographic"},
+         {"oblique stereographic", "Oblique_Stereographic"},
+         {"transverse stereographic", "Stereographic"},
+         {"transverse mercator", "Transverse_Mercator"},
+         {"gauss-kruger", "Transverse_Mercator"},
+         {"mercator", "Mercator_1SP"},
+         {"lambert conformal conic", "Lambert_Conformal_Conic_2SP"},
+         {"alber's equal area conic", "Albers_Conic_Equal_Area"},
+         {"plate carr", "Equirectangular"},
+         {"sinusoidal", "Sinusoidal"}}};
+    const std::string projection = word_in(words, "projection");
+    const auto* const method = std::ranges::find_if(
+        kMethods, [&](const auto& known) { return projection.find(known.first) != std::string::npos; });
+    const bool is_map = projection != "none";
+    if (is_map ? method == kMethods.end() : !word_in(words, "units").starts_with("deg")) return false;
+    const double a = number(words, "major s-ax");
+    const double b = number(words, "minor s-ax");
+    if (!(a > 0.0 && b > 0.0)) refuse(ErrorCode::kCorrupt, path + " gives axes of no ellipsoid");
+    const auto name = [&](const char* key) {
+      const auto found = words.find(key);
+      return found == words.end() ? std::string("unknown") : found->second;
+    };
+    const double flattening = std::abs(a - b) < kAxisRounding ? 0.0 : a / (a - b);
+    const std::string geographic = geographic_wkt(is_map ? "unknown" : name("datum"), name("datum"), name("ellipsoid"),
+                                                  a, known_flattening(name("ellipsoid"), flattening));
+    const double scale = number(words, "scale fac", 1.0);
+    const MapParameters parameters{number(words, "origin lat", 0.0),
+                                   number(words, "origin long", 0.0),
+                                   number(words, "stand ln 1", 0.0),
+                                   number(words, "stand ln 2", 0.0),
+                                   scale == 0.0 ? 1.0 : scale,
+                                   0.0,
+                                   0.0,
+                                   number(words, "origin x", 0.0),
+                                   number(words, "origin y", 0.0)};
+    const double metres_per_unit =
+        std::exchange(info_.georeference.metres_per_unit, 1.0);  // the text's own unit counts
+    read_system_text(
+        is_map ? map_wkt(name("ref. system"), geographic, method->second, parameters, metres_per_unit) : geographic,
+        path, info_);
+    return true;
+  }
+
+  /// Axes are written to millimetres: the flattening that is meant, where WGS 84 and GRS 1980 differ by name alone.
+  static double known_flattening(const std::string& ellipsoid, double computed) {
+    constexpr double kMillimetre = 1e-4;
+    if (ellipsoid == "GRS 1980" && std::abs(computed - 298.257222101) < kMillimetre) return 298.257222101;
+    for (const double known : {298.257223563, 299.1528128, 297.0, 294.978698213898, 298.3, 293.465, 300.8017, 298.25}) {
+      if (std::abs(computed - known) < kMillimetre) return known;
+    }
+    return computed;
+  }
+  static constexpr double kAxisRounding = 0.0015;
 };
 
 /// An interferometric DEM: NAME.dem of int16, and NAME.dem.rsc.
@@ -87,16 +154,46 @@ class RoiPacSource final : public DescribedSource {
     set_scale(number(words, "z_scale", 1.0), number(words, "z_offset", 0.0), "Z_SCALE");
     Georeference& place = info_.georeference;
     const std::string projection = word_in(words, "projection");
-    const bool is_wgs84 = word_in(words, "datum") == "wgs84";
     int zone = 0;
     if (projection.empty() || projection == "latlon" || projection == "ll") {
       place.unit = HorizontalUnit::kDegree;
-      if (is_wgs84) place.system = wgs84_system();
+      read_datum(word_in(words, "datum"), 0);
     } else if (std::sscanf(projection.c_str(), "utm%d", &zone) == 1 && zone >= 1 && zone <= 60) {
       place.unit = HorizontalUnit::kMetre;
-      if (is_wgs84) place.system = wgs84_utm_zone(zone, false);
+      read_datum(word_in(words, "datum"), zone);
+    } else {
+      leave_out_system("projection", projection);
     }
     finish(options);
+  }
+
+ private:
+  /// zone  of UTM in the North; 0: degrees
+  void read_datum(const std::string& name, int zone) {
+    struct Datum {
+      std::string_view names[2];
+      int degrees;
+      int zones;  ///< code of zone 0
+      int first;
+      int last;
+    };
+    static constexpr std::array<Datum, 4> kDatums = {
+        {{{"nad83", "north_american_datum_1983"}, 4269, 26900, 1, 23},
+         {{"nad27", "north_american_datum_1927"}, 4267, 26700, 1, 22},
+         {{"etrs89", "european_terrestrial_reference_system_1989"}, 4258, 25800, 28, 38},
+         {{"ed50", "european_datum_1950"}, 4230, 23000, 28, 38}}};
+    if (name == "wgs84" || name == "wgs_1984") {
+      info_.georeference.system = zone == 0 ? wgs84_system() : wgs84_utm_zone(zone, false);
+      return;
+    }
+    if (name.empty()) return;
+    const auto* const known =
+        std::ranges::find_if(kDatums, [&](const Datum& each) { return std::ranges::count(each.names, name) != 0; });
+    if (known == kDatums.end() || (zone != 0 && (zone < known->first || zone > known->last))) {
+      return leave_out_system("datum", name);
+    }
+    info_.georeference.system.epsg = zone == 0 ? known->degrees : known->zones + zone;
+    info_.georeference.system.body = "Earth";
   }
 };
 

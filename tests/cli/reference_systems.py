@@ -7,7 +7,8 @@ usage: reference_systems.py BIN_DIR PAGE [--write]
 Makes a raster of each system in SYSTEMS in each format of READERS with GDAL, converts it, restores it as GeoTIFF, and
 the first of them in each format of WRITERS too; then holds system, heights and the four corners of both files, as GDAL
 reads them, beside each other. PAGE has the table of all of it; --write writes it anew, else a cell that differs is an
-error. With --real it does so with every raster of FOLDER, and of the folder that ISOHF_REAL_DATA names, that has a place
+error. Unless ISOHF_REFERENCE_SYSTEMS is "all", each system is tried in GeoTIFF, one other reader and one writer, so that
+each of these has its turn. With --real it does so with every raster of FOLDER, and of the folder that ISOHF_REAL_DATA names, that has a place
 for GDAL, exported as well as restored; what KNOWN names may differ. Ends with
 77 where GDAL's Python package is missing (Debian: python3-gdal).
 """
@@ -145,6 +146,20 @@ def of_other_bodies(driver):
     return make_unless_earth
 
 
+def without_heights(driver, datums=None):
+    """Formats that know no system of heights and, some of them, but a few datums: of others GDAL writes another one."""
+    make = create(driver)
+
+    def make_flat(path, system, transform):
+        if system.IsCompound() or (datums and datum_of(system) not in datums):
+            raise RuntimeError("says more than the format")
+        make(path, system, transform)
+        written = gdal.Open(path)
+        if max(written.GetRasterBand(1).ReadRaster(buf_type=gdal.GDT_Byte)) == 0:  # voids lie far below 0
+            raise RuntimeError("is on no map that the format has")
+    return make_flat
+
+
 READERS = {
     "GeoTIFF 1.0": (".tif", create("GTiff", ["GEOTIFF_VERSION=1.0"])),
     "GeoTIFF 1.1": (".tif", create("GTiff", ["GEOTIFF_VERSION=1.1"])),
@@ -154,9 +169,12 @@ READERS = {
     "EHdr": (".bil", create("EHdr")),
     "ENVI": (".dat", create("ENVI")),
     "SAGA": (".sdat", create("SAGA")),
-    "PNG": (".png", create("PNG", kind=gdal.GDT_UInt16)),
+    "PNG, .aux.xml": (".png", create("PNG", kind=gdal.GDT_UInt16)),
     "JPEG 2000": (".jp2", create("JP2OpenJPEG", ["REVERSIBLE=YES", "QUALITY=100"], gdal.GDT_UInt16)),
     "ERDAS Imagine": (".img", create("HFA")),
+    "IDRISI": (".rst", without_heights("RST")),
+    "ROI_PAC": (".dem", without_heights("ROI_PAC")),
+    "USGS DEM": (".dem", without_heights("USGSDEM", ("wgs1984", "northamericandatum1983", "northamericandatum1927"))),
     "PDS4": (".xml", of_other_bodies("PDS4")),
     "ISIS3": (".cub", of_other_bodies("ISIS3")),
 }
@@ -270,17 +288,37 @@ def run(program, *arguments):
     return done.returncode, (done.stderr.strip() or done.stdout.strip())
 
 
-def cells_of(isohf, folder, index, system):
-    """The row of the table: a word and a reason for each reader and writer."""
+def cell_read(isohf, source, archive, restored, kept_source):
+    """What becomes of a raster on its way through an archive: a word and a reason."""
+    code, said = run(isohf, "convert", source, archive, "--quiet", "--projection", "none")
+    if code != 0:
+        return "refused", said
+    code, warned = run(isohf, "restore", archive, restored, "--quiet")
+    if code != 0:
+        return "refused", warned
+    try:
+        lost = differences(source, restored)
+    except RuntimeError as error:  # GDAL reads a map that it cannot use
+        lost = [str(error)]
+    # Where GDAL reads less than it was given: its ENVI has other feet than its text.
+    lost = differences(kept_source, restored) if lost and kept_source else lost
+    if lost and "reference system is left out" in said:
+        return "told", said.replace("warning: ", "")
+    return ("lost", "; ".join(lost)) if lost else ("kept", said or warned)
+
+
+def cells_of(isohf, folder, index, system, chosen):
+    """The row of the table: a word and a reason for each reader and writer that is chosen."""
     name, definition, longitude, latitude = system
     row = {}
     kept_archive = kept_source = None
     reference = system_of(definition)
     transform = place_for(reference, longitude, latitude)
     for number, (reader, (ending, make)) in enumerate(READERS.items()):
+        if reader not in chosen:
+            continue
         source = str(folder / f"{index}_{number}{ending}")
         archive = str(folder / f"{index}_{number}.isohf")
-        restored = str(folder / f"{index}_{number}_restored.tif")
         try:
             make(source, reference, transform)
             written = gdal.Open(source).GetSpatialRef()
@@ -289,21 +327,12 @@ def cells_of(isohf, folder, index, system):
         except RuntimeError:
             row[reader] = ("-", "")  # GDAL does not write it
             continue
-        code, said = run(isohf, "convert", source, archive, "--quiet", "--projection", "none")
-        if code != 0:
-            row[reader] = ("refused", said)
-            continue
-        code, said = run(isohf, "restore", archive, restored, "--quiet")
-        if code != 0:
-            row[reader] = ("refused", said)
-            continue
-        lost = differences(source, restored)
-        # Where GDAL reads less than it was given: its ENVI has other feet than its text.
-        lost = differences(kept_source, restored) if lost and kept_source else lost
-        row[reader] = ("lost", "; ".join(lost)) if lost else ("kept", said)
-        if kept_archive is None:
+        row[reader] = cell_read(isohf, source, archive, str(folder / f"{index}_{number}_restored.tif"), kept_source)
+        if kept_archive is None and row[reader][0] == "kept":
             kept_archive, kept_source = archive, source
     for number, (writer, ending) in enumerate(WRITERS.items()):
+        if writer not in chosen:
+            continue
         written = str(folder / f"{index}_w{number}{ending}")
         if kept_archive is None:
             row[writer] = ("-", "")
@@ -405,21 +434,68 @@ def check_real(isohf, folders):
     return 1 if failed or (found and len(found) < 3) else 0
 
 
+def cells_in(text):
+    """The words of the page's two tables, by system and by reader or writer."""
+    cells, columns = {}, []
+    for line in text.splitlines():
+        parts = [part.strip() for part in line.strip("|").split("|")]
+        if line.startswith(("| read |", "| written |")):
+            columns = parts[1:]
+        elif line.startswith("| ") and columns:
+            cells.setdefault(parts[0], {}).update(zip(columns, parts[1:]))
+    return cells
+
+
+def sample_of(cells):
+    """For each system GeoTIFF, another reader and a writer, of those that it has cells of."""
+    readers, writers = list(READERS)[1:], list(WRITERS)
+    sample = []
+    for index, (name, *_) in enumerate(SYSTEMS):
+        # From another one on each time, and back to the first of those that are rarely there.
+        turned = [readers[(7 * index + step) % len(readers)] for step in range(len(readers))]
+        turned = [rare for rare in ("PDS4", "ISIS3", "ROI_PAC", "USGS DEM") if index % 2 == 0] + turned
+        there = [reader for reader in turned if cells[name].get(reader)]
+        sample.append({"GeoTIFF 1.0", writers[index % len(writers)], *there[index // 2 % 2:][:1]})
+    missing = {*READERS, *WRITERS}.difference(*sample)
+    return sample, [f"{column} is not in the sample" for column in sorted(missing)]
+
+
+def differ_in_sample(isohf, folder, pool, text):
+    """Cells of a part of the table that are not as the page has them."""
+    cells = cells_in(text)
+    if list(cells) != [name for name, *_ in SYSTEMS]:
+        return ["the page has rows of other systems: --write writes them"]
+    sample, wrong = sample_of(cells)
+    for name, definition, row in pool.map(lambda item: cells_of(isohf, folder, *item),
+                                          ((index, system, sample[index]) for index, system in enumerate(SYSTEMS))):
+        for column, (word, reason) in row.items():
+            if ("" if word == "-" else word) != cells[name].get(column) or word == "lost":
+                wrong.append(f"{name} ({definition}): {column}: {cells[name].get(column)}, now {word}: {reason}")
+    return wrong
+
+
 def main():
     isohf = str(pathlib.Path(sys.argv[1]) / "isohf")
     if sys.argv[2] == "--real":
         return check_real(isohf, sys.argv[3:] + [name for name in [os.environ.get("ISOHF_REAL_DATA")] if name])
-    with tempfile.TemporaryDirectory() as folder:
+    page = pathlib.Path(sys.argv[2])
+    text = page.read_text(encoding="utf-8")
+    is_whole = "--write" in sys.argv or os.environ.get("ISOHF_REFERENCE_SYSTEMS") == "all"
+    before, tables = text[:text.index(BEGIN) + len(BEGIN)], text[text.index(BEGIN):text.index(END)]
+    with tempfile.TemporaryDirectory() as name:
+        folder = pathlib.Path(name)
         with concurrent.futures.ThreadPoolExecutor(2) as pool:
-            rows = list(pool.map(lambda item: cells_of(isohf, pathlib.Path(folder), *item), enumerate(SYSTEMS)))
+            if not is_whole:
+                wrong = differ_in_sample(isohf, folder, pool, tables)
+                print("\n".join(wrong or ["each system in GeoTIFF, one other reader and one writer: as the page says"]))
+                return 1 if wrong else 0
+            everything = {*READERS, *WRITERS}
+            rows = list(pool.map(lambda item: cells_of(isohf, folder, *item, everything), enumerate(SYSTEMS)))
     for name, definition, row in rows:
         for what, (word, reason) in row.items():
             if word == "lost" or (word == "kept" and reason):
                 print(f"{name} ({definition}): {what}: {word}: {reason}")
-    page = pathlib.Path(sys.argv[2])
-    text = page.read_text(encoding="utf-8")
-    before, after = text[:text.index(BEGIN) + len(BEGIN)], text[text.index(END):]
-    wanted = f"{before}\n{table_of(rows)}\n{after}"
+    wanted = f"{before}\n{table_of(rows)}\n{text[text.index(END):]}"
     if "--write" in sys.argv:
         page.write_text(wanted, encoding="utf-8")
     elif wanted != text:

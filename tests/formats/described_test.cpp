@@ -437,6 +437,67 @@ TEST_F(Pds4, LabelsOfOtherThingsAreRefused) {
   EXPECT_THAT(failure("a.xml", &code), HasSubstr("data_type is \"ComplexLSB8\""));
 }
 
+using Idrisi = Described;
+
+TEST_F(Idrisi, ParametersBesideNameTheReferenceSystem) {
+  const std::string header =
+      "file type : binary\ndata type : byte\ncolumns : 2\nrows : 2\nref. units : m\nmin. X : 4000000\nmax. X : "
+      "4000020\nmin. Y : 3000000\nmax. Y : 3000020\nref. system : ";
+  write("a.rst", "\1\2\3\4");
+  write("a.rdc", header + "laea\n");
+  const auto parameters = [](const std::string& projection) {
+    return "ref. system : ETRS89 / LAEA\nprojection : " + projection +
+           "\ndatum : ETRS89\nellipsoid : GRS 1980\nmajor s-ax : 6378137.000\nminor s-ax : 6356752.314\norigin long : "
+           "10\norigin lat : 52\norigin X : 4321000\norigin Y : 3210000\nscale fac : na\nunits : m\nparameters : 0\n";
+  };
+  write("LAEA.ref", parameters("Lambert North Oblique Azimuthal Equal Area"));
+  EXPECT_THAT(failure("a.rst"), HasSubstr("scale fac is \"na\""));
+  std::string whole = parameters("Lambert North Oblique Azimuthal Equal Area");
+  write("LAEA.ref", whole.replace(whole.find(": na"), 4, ": 0"));
+  const auto source = open("a.rst");
+  EXPECT_TRUE(source->info().warnings.empty());
+  const ReferenceSystem& system = source->info().georeference.system;
+  EXPECT_THAT(system.wkt, HasSubstr("Lambert_Azimuthal_Equal_Area"));
+  EXPECT_EQ(system.inverse_flattening, 298.257222101);
+  for (const auto& [name, why] : {std::pair("spc83ny4", "a system without parameters"), {"laea", "an unknown map"}}) {
+    write("a.rdc", header + name + "\n");
+    write("LAEA.ref", parameters("Hammer Aitoff"));
+    ASSERT_EQ(open("a.rst")->info().warnings.size(), 1U) << why;
+    EXPECT_THAT(open("a.rst")->info().warnings.front(), HasSubstr("the reference system is left out"));
+  }
+}
+
+TEST_F(Idrisi, APlaneIsNoSystemThatIsLeftOut) {
+  write("a.rst", "\1\2\3\4");
+  write("a.rdc",
+        "file type : binary\ndata type : byte\ncolumns : 2\nrows : 2\nref. units : m\nmin. X : 0\nmax. X : 2\n"
+        "min. Y : 0\nmax. Y : 2\nref. system : plane\n");
+  EXPECT_TRUE(open("a.rst")->info().warnings.empty());
+}
+
+using RoiPac = Described;
+
+TEST_F(RoiPac, DatumsAreNamedOrTold) {
+  write("a.dem", stored<std::int16_t>({1, 2, 3, 4}));
+  const auto header = [&](const std::string& projection, const std::string& datum) {
+    write("a.dem.rsc", "WIDTH 2\nFILE_LENGTH 2\nX_FIRST 500000\nX_STEP 30\nY_FIRST 4000000\nY_STEP -30\nPROJECTION " +
+                           projection + "\nDATUM " + datum + "\n");
+  };
+  for (const auto& [projection, datum, code] : {std::tuple("UTM11", "North_American_Datum_1983", 26911),
+                                                {"UTM32", "ED50", 23032},
+                                                {"UTM32", "WGS84", 32632},
+                                                {"UTM33", "ETRS89", 25833}}) {
+    header(projection, datum);
+    EXPECT_EQ(open("a.dem")->info().georeference.system.epsg, code) << datum;
+    EXPECT_TRUE(open("a.dem")->info().warnings.empty());
+  }
+  for (const auto& [projection, datum] : {std::pair("UTM60", "NAD83"), {"UTM33", "SWEREF99"}, {"UPS", "WGS84"}}) {
+    header(projection, datum);
+    ASSERT_EQ(open("a.dem")->info().warnings.size(), 1U) << datum;
+    EXPECT_THAT(open("a.dem")->info().warnings.front(), HasSubstr("the reference system is left out"));
+  }
+}
+
 using Graymap = Described;
 
 TEST_F(Graymap, EveryNumberOf16BitsIsAsStored) {
