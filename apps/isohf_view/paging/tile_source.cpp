@@ -56,9 +56,7 @@ class ArchiveSource final : public TileSource {
 
   [[nodiscard]] bool is_to_scale() const override { return ground_unit() == "metre"; }
   [[nodiscard]] GroundScale ground_scale() const override { return ground_scale_; }
-  [[nodiscard]] WorldBounds covered() const override {
-    return scaled(reader_.metadata().valid, ground_scale_);
-  }
+  [[nodiscard]] WorldBounds covered() const override { return scaled(reader_.metadata().valid, ground_scale_); }
 
   [[nodiscard]] TileBounds bounds(TileIndex tile) const override { return bounds(tile, 0); }
   [[nodiscard]] const Planes* planes() const override { return planes_ ? &*planes_ : nullptr; }
