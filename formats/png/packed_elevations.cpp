@@ -140,6 +140,14 @@ void PackingEvidence::add(std::span<const std::byte> row) {
   }
 }
 
+void PackingEvidence::add_wide(std::span<const std::byte> row) {
+  for (std::size_t at = 0; at + 2 * channels_ <= row.size(); at += 2 * channels_) {
+    const auto channel = [&](std::size_t c) { return row.subspan(at + 2 * c, 2); };
+    if (!std::ranges::equal(channel(0), channel(1)) || !std::ranges::equal(channel(0), channel(2))) ++differing_;
+    ++pixels_;
+  }
+}
+
 std::optional<Packing> PackingEvidence::packing() const {
   constexpr std::size_t kNoise = 16;
   if (pixels_ > 0 && heights_ == pixels_ && alphas_.count() >= kNoise) return Packing::kRgbaFloat;

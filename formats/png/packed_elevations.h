@@ -47,7 +47,8 @@ class PackingEvidence {
   static constexpr std::size_t kRows = 64;  ///< that are enough to see it
 
   explicit PackingEvidence(std::size_t channels) : channels_(channels) {}
-  void add(std::span<const std::byte> row);  ///< pixels of 8-bit channels
+  void add(std::span<const std::byte> row);       ///< pixels of 8-bit channels
+  void add_wide(std::span<const std::byte> row);  ///< of 16-bit channels, which pack nothing but may be greys
   /// One channel of a colour picture is seldom what is meant: packed elevations are unpacked where that is beyond
   /// doubt, and grey in three channels is grey (nullopt: the first one is read), which `info` warns of. Throws
   /// Error{kInvalidArgument} where the user has to say what is meant; `names` of the channels.

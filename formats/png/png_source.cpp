@@ -188,10 +188,10 @@ class PngSource final : public HeightSource {
         evidence.add({picture.get() + row * header_.row_bytes, header_.row_bytes});
       }
       restart();
-    } else if (header_.bit_depth == 8) {
+    } else if (!header_.interlaced) {
       row_.resize(header_.row_bytes);
       for (std::size_t row = 0; row < rows && decoder_->read_row(row_); ++row) {
-        evidence.add(row_);
+        header_.bit_depth == 8 ? evidence.add(row_) : evidence.add_wide(row_);
       }
       restart();
     }

@@ -403,7 +403,7 @@ TEST(RestoreSpacing, ASpacingBeyondTheSurfaceIsRefused) {
       const RunResult result =
           run_isohf({"restore", kKept + "codes.isohf", folder / "a.tif", "--spacing", spacing, "--method", method});
       EXPECT_EQ(result.exit_code, 2) << result.err;
-      EXPECT_THAT(result.err, HasSubstr("far beyond the surface"));
+      EXPECT_THAT(result.err, HasSubstr("is wider than the ground"));
       EXPECT_THAT(folder.names(), testing::IsEmpty());
     }
   }

@@ -167,13 +167,16 @@ TEST(PngSource, WantsToKnowWhatTheColoursOfAPictureAre) {
     options.channel = "R";
     EXPECT_TRUE(open_png(path, options)->info().warnings.empty());
   }
-  picture.bit_depth = 8;
   picture.grey = true;
-  write_picture(path, picture);
-  const auto in_greys = open_png(path, {});
-  EXPECT_EQ(in_greys->info().channel, "R");
-  ASSERT_EQ(in_greys->info().warnings.size(), 1U);
-  EXPECT_THAT(in_greys->info().warnings[0], HasSubstr("greys"));
+  for (const int depth : {16, 8}) {
+    picture.bit_depth = depth;
+    write_picture(path, picture);
+    const auto in_greys = open_png(path, {});
+    EXPECT_EQ(in_greys->info().channel, "R");
+    EXPECT_EQ(in_greys->info().sample_type, depth == 8 ? SampleType::kUint8 : SampleType::kUint16);
+    ASSERT_EQ(in_greys->info().warnings.size(), 1U);
+    EXPECT_THAT(in_greys->info().warnings[0], HasSubstr("greys"));
+  }
   picture.grey = false;
   picture.color_type = PNG_COLOR_TYPE_GRAY_ALPHA;
   write_picture(path, picture);

@@ -412,6 +412,9 @@ SampleGrid grid_over(const WorldBounds& ground, bool areas, const std::optional<
   const double height = ground.z1 - ground.z0;
   // Posts on the ground, and areas whose middle lies on it.
   const auto count = [&](double length) {
+    if (length > 0.0 && *spacing > 2.0 * length) {
+      refuse(fmt::format("`spacing` of {:.6g} is wider than the ground, {:.6g} x {:.6g}", *spacing, width, height));
+    }
     const double steps = length / *spacing * (1.0 + 1e-12);
     return std::max<std::int64_t>(static_cast<std::int64_t>(areas ? std::ceil(steps - 0.5) : std::floor(steps) + 1.0),
                                   1);
