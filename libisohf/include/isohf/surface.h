@@ -256,7 +256,7 @@ struct LosslessRecord {
   int fraction_bits = 0;  ///< of the integers that kSpline and kTriangles count with
   std::int64_t rows_per_member = 0;
   std::vector<double> void_values;  ///< as SourceInfo has them
-  /// Raw values outside are void as well; archives of before 2026-11-25 do not tell.
+  /// Raw values outside are void as well; older archives do not tell.
   std::pair<double, double> valid = {-std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
   std::uint64_t residual_bytes = 0;  ///< of all residual members, compressed
   std::string sha256;                ///< over all raw samples, little-endian, row by row
