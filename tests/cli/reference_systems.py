@@ -447,15 +447,17 @@ def cells_in(text):
 
 
 def sample_of(cells):
-    """For each system GeoTIFF, another reader and a writer, of those that it has cells of."""
-    readers, writers = list(READERS)[1:], list(WRITERS)
-    sample = []
+    """For each system GeoTIFF, another reader and a writer, of those that it has cells of; what is in none."""
+    others, writers = list(READERS)[1:], list(WRITERS)
+    sample, often = [], dict.fromkeys(others, 0)
     for index, (name, *_) in enumerate(SYSTEMS):
-        # From another one on each time, and back to the first of those that are rarely there.
-        turned = [readers[(7 * index + step) % len(readers)] for step in range(len(readers))]
-        turned = [rare for rare in ("PDS4", "ISIS3", "ROI_PAC", "USGS DEM") if index % 2 == 0] + turned
-        there = [reader for reader in turned if cells[name].get(reader)]
-        sample.append({"GeoTIFF 1.0", writers[index % len(writers)], *there[index // 2 % 2:][:1]})
+        there = [reader for reader in others if cells[name].get(reader)]
+        chosen = {"GeoTIFF 1.0", writers[index % len(writers)]}
+        if there:
+            least = min(there, key=often.get)  # the one that had its turn least often
+            often[least] += 1
+            chosen.add(least)
+        sample.append(chosen)
     missing = {*READERS, *WRITERS}.difference(*sample)
     return sample, [f"{column} is not in the sample" for column in sorted(missing)]
 
