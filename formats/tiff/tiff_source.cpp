@@ -246,7 +246,8 @@ int choose_channel(const TiffLayout& layout, const std::vector<std::string>& des
   if (wanted.empty() && colour && layout.bits_per_sample == 8) {
     throw Error(ErrorCode::kUnsupported,
                 "is a colour picture of 8 bits; say which channel holds elevations (`channel` R)");
-  } else if (wanted.empty() && names.size() > 1 && !has_grey_and_opacity(layout)) {
+  }
+  if (wanted.empty() && names.size() > 1 && !has_grey_and_opacity(layout)) {
     info.warnings.push_back(fmt::format("there are {} channels; channel {} is read", names.size(), label(0)));
   }
   return static_cast<int>(chosen);

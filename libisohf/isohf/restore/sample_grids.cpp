@@ -374,14 +374,16 @@ SampleGrid source_grid(const SourceRecord& source) {
 }
 
 WorldBounds ground_here(const Metadata& metadata) {
-  const TileRange here = tiles_here(metadata);
-  const TileGrid& tiles = metadata.grid;
+  const auto record = part_record(metadata);
   const WorldBounds& all = metadata.valid;
+  if (!record) return all;
+  const TileRange& here = record->tiles;
+  const TileGrid& tiles = metadata.grid;
   const WorldBounds part{std::max(all.x0, static_cast<double>(here.first.column) * tiles.extent_x()),
                          std::max(all.z0, static_cast<double>(here.first.row) * tiles.extent_z()),
                          std::min(all.x1, static_cast<double>(here.end.column) * tiles.extent_x()),
                          std::min(all.z1, static_cast<double>(here.end.row) * tiles.extent_z())};
-  return part_record(metadata) && part.x0 < part.x1 && part.z0 < part.z1 ? part : all;
+  return part.x0 < part.x1 && part.z0 < part.z1 ? part : all;
 }
 
 namespace {

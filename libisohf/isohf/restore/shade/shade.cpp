@@ -401,7 +401,7 @@ class ShadeRenderer {
     if (!sweep_) return bytes;
     const auto state = static_cast<double>(sweep_->state_bytes());
     if (sweep_->from_south() && !in_scratch) bytes += static_cast<double>(kept_states()) * state;
-    // Rows of vertices, twice, and lines at half steps: their what they carry and hide, the ground, and what enters
+    // Rows of vertices, twice, and lines at half steps: what they carry and hide, the ground, and what enters
     // and leaves.
     return bytes + 3.0 * state + sweep_->passing_bytes();
   }
