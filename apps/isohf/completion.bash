@@ -38,7 +38,7 @@ _isohf() {
     *' --registration') values='area point auto' ;;
     *' --progress') values='auto plain json none' ;;
     *' --step') values='auto finest' ;;
-    *' --method') values='hex barycentric' ;;
+    *' --method') values='hex barycentric average' ;;
     *' --azimuth') values='E W' ;;
     *' --palette') values='elevation gray' ;;
     'experiment --fit') values='least-squares interpolate' ;;

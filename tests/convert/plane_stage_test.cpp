@@ -250,6 +250,35 @@ TEST(PlaneStage, RowsFarApartAreReadFromThePlaneThatSuffices) {
   EXPECT_LT(sum / static_cast<double>(coarse.size()), 2.0) << "of 180";
 }
 
+TEST(PlaneStage, RowsByAverageAreTheMeansOfTheSource) {
+  const test::TemporaryFolder folder;
+  convert_waves(folder / "a.isohf", {});
+  const ArchiveReader archive(folder / "a.isohf");
+  // 20 x 25 samples of the source each.
+  const SampleGrid grid = {60, 36, archive.metadata().valid.x0 + 9.5, archive.metadata().valid.z0 + 12.0, 20.0, 25.0};
+  const std::vector<double> found = rows_of(archive, grid, RestoreMethod::kAverage);
+  for (std::int64_t row = 0; row < grid.height; ++row) {
+    for (std::int64_t column = 0; column < grid.width; ++column) {
+      const double mean = found[static_cast<std::size_t>(row * grid.width + column)];
+      double sum = 0.0;
+      for (int z = 0; z < 25; ++z) {
+        for (int x = 0; x < 20; ++x) {
+          sum += wave(static_cast<double>(column * 20 + x), static_cast<double>(row * 25 + z));
+        }
+      }
+      // The surface ends on the middle of the source's first and last samples: half of those does not count.
+      const bool is_whole = column > 0 && column < 59 && row > 0 && row < 35;
+      ASSERT_NEAR(mean, sum / 500.0, is_whole ? 0.02 : 0.5) << column << " " << row;
+    }
+  }
+  // However many rows are read at once.
+  RowReader some(archive, grid, RestoreMethod::kAverage);
+  std::vector<double> rows(static_cast<std::size_t>(7 * grid.width));
+  some.read(3, 7, rows);
+  EXPECT_TRUE(
+      std::ranges::equal(rows, std::span(found).subspan(static_cast<std::size_t>(3 * grid.width), rows.size())));
+}
+
 TEST(PlaneStage, RowsThatNoPlaneSufficesForAreReadFromTheTiles) {
   const test::TemporaryFolder folder;
   convert_waves(folder / "a.isohf", {});

@@ -317,7 +317,7 @@ int run(const ExportOptions& options) {
       what += fmt::format("; elevation = sample * {} + {}", mapping.z_scale, mapping.z_offset);
     }
     if (options.method(archive.metadata(), samples) == RestoreMethod::kPlane) {
-      what += ", on a coarse plane's triangles (--method barycentric reads all tiles)";
+      what += ", on a coarse plane's triangles (of all tiles: --method barycentric, means: --method average)";
     }
     if (exporter.counts.nodata > 0) what += fmt::format(", {} voids", describe_count(exporter.counts.nodata));
     if (exporter.counts.clamped > 0) {

@@ -46,14 +46,14 @@ and .r32, have room for scale and offset.
 An archive whose input was projected takes --like of a raster in degrees, each of whose samples then goes
 through the projection, or of one on its own map.
 Methods: hex, quintic B-splines along the lattice rows and then down the columns, is nearest to the source;
-barycentric is what a renderer shows. Samples far apart are read from a coarse plane, unless a method is
-asked for. The format follows from RASTER's extension: .tif, .exr,
-.png, .hgt, .asc, .flt, .r16, .raw, .r32 or .npy.
+barycentric is what a renderer shows; average is the mean over the area of each sample. Samples far apart
+are points on a coarse plane, unless a method is asked for. The format follows from RASTER's extension:
+.tif, .exr, .png, .hgt, .asc, .flt, .r16, .raw, .r32 or .npy.
 
 Examples:
   isohf restore dem.isohf back.tif
   isohf restore dem.isohf seen.tif --method barycentric
-  isohf restore dem.isohf half.tif --size 600x600
+  isohf restore dem.isohf small.tif --size 600x600 --method average
   isohf restore dem.isohf beside.tif --like other.tif)";
 
 struct RestoreOptions {

@@ -93,9 +93,9 @@ std::optional<double> spacing_in_world(const RasterOptions& options, const Metad
 }
 
 void add_method_option(CommandLine& line, const std::string& without, RasterOptions& options) {
-  line.option("--method", "NAME", fmt::format("hex or barycentric (default {})", without),
+  line.option("--method", "NAME", fmt::format("hex, barycentric or average (default {})", without),
               [&](const std::string& text) { options.method = restore_method_from_string(text); });
-  line.words({"hex", "barycentric"});
+  line.words({"hex", "barycentric", "average"});
 }
 
 void add_clamp_option(CommandLine& line, const std::string& type, RasterOptions& options) {

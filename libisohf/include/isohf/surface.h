@@ -141,11 +141,13 @@ enum class RestoreMethod {
   kBarycentric,  ///< on the triangles, as the renderer draws them
   kHex,          ///< by quintic B-splines along the rows and then down the columns; on the triangles beside nodata
   kPlane,        ///< on the triangles of a coarse plane: blends of vertices within half a sample's spacing
+  kAverage,  ///< the mean over the area that a sample stands for: of places on the triangles in its middle and around
+             ///< it, no farther apart than vertices; those without an elevation do not count
 };
 
-[[nodiscard]] std::string to_string(RestoreMethod method);  ///< "barycentric", "hex", "plane"
+[[nodiscard]] std::string to_string(RestoreMethod method);  ///< "barycentric", "hex", "plane", "average"
 [[nodiscard]] RestoreMethod restore_method_from_string(
-    const std::string& text);  ///< the first two; throws Error{kInvalidArgument}
+    const std::string& text);  ///< all but "plane"; throws Error{kInvalidArgument}
 
 /// A reference system in which a raster is to lie, whatever the archive's.
 struct GridSystem {

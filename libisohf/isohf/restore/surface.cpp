@@ -5,6 +5,8 @@
 #include <oneapi/tbb/parallel_for.h>
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 
 #include "isohf/archive/planes/archive_planes.h"
 #include "isohf/base/arena.h"
@@ -35,15 +37,57 @@ int plane_for(const Metadata& metadata, const SampleGrid& grid) {
   return planes_of(metadata).plane_for_spacing(grid.spacing_x / 2.0, grid.spacing_z / 2.0);
 }
 
+[[noreturn]] void refuse_place(const char* what) {
+  throw Error(ErrorCode::kInvalidArgument,
+              fmt::format("the archive's source has no position in {}; use world coordinates", what));
+}
+
+/// Columns and rows of places in the area of each sample that are no farther apart than the archive's vertices, as the
+/// middle of the grid has it; no more than there are vertices.
+GridSize parts_of(const Metadata& metadata, const SampleGrid& grid) {
+  double wide = grid.spacing_x;
+  double high = grid.spacing_z;
+  if (grid.goes_by_places()) {
+    const WorldGeoreference georeference(metadata);
+    if (!georeference.has_geo()) refuse_place("degrees");
+    const MapPoint middle{grid.first_x + static_cast<double>(grid.width - 1) * grid.spacing_x / 2.0,
+                          grid.first_z - static_cast<double>(grid.height - 1) * grid.spacing_z / 2.0};
+    const auto world = [&](double columns, double rows) {
+      const MapPoint at{middle.easting + columns * grid.spacing_x, middle.northing - rows * grid.spacing_z};
+      return georeference.world_from_geo(grid.system ? grid.system->map->geo_from_map(at)
+                                                     : GeoPoint{at.easting, at.northing});
+    };
+    const auto apart = [](WorldPoint a, WorldPoint b) { return std::hypot(b.x - a.x, b.z - a.z); };
+    wide = apart(world(-0.5, 0.0), world(0.5, 0.0));
+    high = apart(world(0.0, -0.5), world(0.0, 0.5));
+  }
+  const TileGrid& tiles = metadata.grid;
+  const auto parts = [](double length, double step, double most) {
+    const double least = std::min(length, most) / step;  // not a number where the map has no place
+    return least > 1.0 ? static_cast<std::int64_t>(std::ceil(least * (1.0 - 1e-9))) : std::int64_t{1};
+  };
+  return {parts(wide, tiles.sigma_x(), tiles.world_width()), parts(high, tiles.sigma_z(), tiles.world_height())};
+}
+
+/// Those places: as many in the area of each sample.
+SampleGrid places_of(const SampleGrid& grid, const GridSize& parts) {
+  SampleGrid places = grid;
+  const auto columns = static_cast<double>(parts.first);
+  const auto rows = static_cast<double>(parts.second);
+  const double up = grid.spacing_z / 2.0 * (1.0 - 1.0 / rows);
+  places.width *= parts.first;
+  places.height *= parts.second;
+  places.spacing_x /= columns;
+  places.spacing_z /= rows;
+  places.first_x -= grid.spacing_x / 2.0 * (1.0 - 1.0 / columns);
+  places.first_z += grid.goes_by_places() ? up : -up;
+  return places;
+}
+
 void require_as_many(std::size_t samples, std::size_t points) {
   if (samples == points) return;
   throw Error(ErrorCode::kInvalidArgument,
               fmt::format("there is room for {} samples, must be as many as there are points, {}", samples, points));
-}
-
-[[noreturn]] void refuse_place(const char* what) {
-  throw Error(ErrorCode::kInvalidArgument,
-              fmt::format("the archive's source has no position in {}; use world coordinates", what));
 }
 
 }  // namespace
@@ -117,6 +161,7 @@ const WorldGeoreference& Surface::georeference() const {
 
 std::string to_string(RestoreMethod method) {
   if (method == RestoreMethod::kPlane) return "plane";
+  if (method == RestoreMethod::kAverage) return "average";
   return method == RestoreMethod::kHex ? "hex" : "barycentric";
 }
 
@@ -128,7 +173,8 @@ RestoreMethod usual_method(const Metadata& metadata, const SampleGrid& grid) {
 RestoreMethod restore_method_from_string(const std::string& text) {
   if (text == "barycentric") return RestoreMethod::kBarycentric;
   if (text == "hex") return RestoreMethod::kHex;
-  throw Error(ErrorCode::kInvalidArgument, fmt::format("found '{}', must be barycentric or hex", text));
+  if (text == "average") return RestoreMethod::kAverage;
+  throw Error(ErrorCode::kInvalidArgument, fmt::format("found '{}', must be hex, barycentric or average", text));
 }
 
 struct RowReader::State {
@@ -136,6 +182,12 @@ struct RowReader::State {
       : grid(its_grid) {
     const Metadata& metadata = archive.metadata();
     require_samples(grid);
+    if (method == RestoreMethod::kAverage) {
+      parts = parts_of(metadata, grid);
+      places = std::make_unique<RowReader>(archive, places_of(grid, parts), RestoreMethod::kBarycentric, job);
+      rows_at_once = std::max<std::int64_t>(kSamplesAtOnce / (grid.width * parts.first * parts.second), 1);
+      return;
+    }
     rows_at_once = std::max<std::int64_t>(kSamplesAtOnce / grid.width, 1);
     if (!grid.goes_by_places()) {
       const int plane = method == RestoreMethod::kPlane ? plane_for(metadata, grid) : 0;
@@ -182,9 +234,45 @@ struct RowReader::State {
     points->sample(at, elevations);
   }
 
+  /// Sums go from West to East in rows from North to South, however many rows are read at once.
+  void average(std::int64_t first, std::int64_t count, std::span<double> elevations) {
+    ISOHF_ASSERT(elevations.size() == static_cast<std::size_t>(count * grid.width));
+    const auto across = static_cast<std::size_t>(parts.first);
+    const std::int64_t at_once = places->state_->rows_at_once;
+    std::vector<std::int64_t> counts(elevations.size());
+    std::ranges::fill(elevations, 0.0);
+    std::vector<double> found;
+    for (std::int64_t row = 0; row < count * parts.second; row += at_once) {
+      const std::int64_t some = std::min(at_once, count * parts.second - row);
+      found.resize(static_cast<std::size_t>(some * grid.width) * across);
+      places->read(first * parts.second + row, some, found);
+      const auto width = static_cast<std::size_t>(grid.width);
+      oneapi::tbb::parallel_for(oneapi::tbb::blocked_range<std::size_t>(0, width, 64), [&](const auto& columns) {
+        for (std::int64_t r = 0; r < some; ++r) {
+          const double* const of_row = found.data() + static_cast<std::size_t>(r) * width * across;
+          const std::size_t into = static_cast<std::size_t>((row + r) / parts.second) * width;
+          for (std::size_t column = columns.begin(); column < columns.end(); ++column) {
+            for (std::size_t part = 0; part < across; ++part) {
+              const double elevation = of_row[column * across + part];
+              if (std::isnan(elevation)) continue;
+              elevations[into + column] += elevation;
+              ++counts[into + column];
+            }
+          }
+        }
+      });
+    }
+    for (std::size_t i = 0; i < counts.size(); ++i) {
+      elevations[i] =
+          counts[i] > 0 ? elevations[i] / static_cast<double>(counts[i]) : std::numeric_limits<double>::quiet_NaN();
+    }
+  }
+
   SampleGrid grid;
   std::int64_t rows_at_once = 1;
-  std::optional<GridSampler> rows;  ///< of a grid in world units
+  GridSize parts = {1, 1};
+  std::unique_ptr<RowReader> places;  ///< whose means are the samples
+  std::optional<GridSampler> rows;    ///< of a grid in world units
   std::optional<WorldGeoreference> georeference;
   std::optional<PointSampler> points;
 };
@@ -195,7 +283,9 @@ RowReader::RowReader(const ArchiveReader& archive, const SampleGrid& grid, Resto
 RowReader::~RowReader() = default;
 
 void RowReader::read(std::int64_t first, std::int64_t rows, std::span<double> elevations) {
-  if (state_->rows) {
+  if (state_->places) {
+    state_->average(first, rows, elevations);
+  } else if (state_->rows) {
     state_->rows->read(first, rows, elevations);
   } else {
     state_->read_by_places(first, rows, elevations);
