@@ -65,8 +65,9 @@ const void* load_module(const ModuleFile& module) {
     if (std::filesystem::exists(file, error)) return table = load_from(file, module);
     searched += (searched.empty() ? "" : ", ") + folder.string();
   }
-  throw Error(ErrorCode::kUnsupported, fmt::format("{} {} (configure with {}=ON), which is in none of {}",
-                                                   module.needed, module.file, module.option, searched));
+  throw Error(ErrorCode::kUnsupported, fmt::format("{} {}, which is in none of {} (a program names its folder by "
+                                                   "set_module_folder(); a build without it is configured with {}=ON)",
+                                                   module.needed, module.file, searched, module.option));
 }
 
 void set_module_folder(const std::string& folder) {

@@ -67,6 +67,9 @@ void RasterDescription::require(const std::string& format, const SourceInfo& inf
 }
 
 void RasterDescription::describe(SourceInfo& info) const {
+  if (const std::string order = word("row_order"); !order.empty() && order != "north to south") {
+    refuse(fmt::format("row_order is {}, must be north to south: turn the samples over", printable(order)));
+  }
   info.z_scale = number("z_scale").value_or(1.0);
   info.z_offset = number("z_offset").value_or(0.0);
   if (info.z_scale == 0.0) refuse("z_scale is 0");

@@ -31,6 +31,7 @@ constexpr std::string_view kGridSection = "GRID";
 constexpr std::string_view kDataSection = "DATA";
 /// Blanked nodes have this value or a greater one: just below 1.70141e38, which texts write in fewer digits.
 constexpr double kBlank = 1.7014e38;
+constexpr double kWrittenBlank = 1.70141e38F;
 constexpr std::size_t kSurfer6HeaderBytes = 56;
 constexpr std::size_t kGridSectionBytes = 72;
 /// More lie before no grid's data.
@@ -45,6 +46,7 @@ class SurferGridSource final : public PlainSource {
     file_->read(0, std::as_writable_bytes(std::span(magic)));
     const std::string_view kind(magic.data(), magic.size());
     info_.valid_max = kBlank;
+    info_.void_values = {kWrittenBlank};  // so that rasters made of it can say so
     if (kind == kText) {
       read_text_header();
     } else if (kind == kSurfer6) {
@@ -187,7 +189,7 @@ class SurferGridSource final : public PlainSource {
                   fmt::format("{}: the grid is turned by {}; only grids along the axes are read", info_.path, angle));
     }
     const auto blank = in.read<double>();
-    if (std::isfinite(blank) && blank < kBlank) info_.void_values = {blank};
+    if (std::isfinite(blank)) info_.void_values = {blank};
   }
 
   double next_number(const char* what) {

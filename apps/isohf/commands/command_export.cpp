@@ -317,13 +317,14 @@ int run(const ExportOptions& options) {
       what += fmt::format("; elevation = sample * {} + {}", mapping.z_scale, mapping.z_offset);
     }
     if (options.method(archive.metadata(), samples) == RestoreMethod::kPlane) {
-      what += ", on a coarse plane's triangles (of all tiles: --method barycentric, means: --method average)";
+      what += kOnAPlane;
     }
     if (exporter.counts.nodata > 0) what += fmt::format(", {} voids", describe_count(exporter.counts.nodata));
     if (exporter.counts.clamped > 0) {
       what += fmt::format(", {} moved into the range", describe_count(exporter.counts.clamped));
     }
-    out.write(fmt::format("{}: {}\n", options.raster.output, what));
+    const std::string& written = exporter.files == 1 ? exporter.written.front() : options.raster.output;
+    out.write(fmt::format("{}: {}\n", written, what));
   }
   out.finish();
   return kExitDone;

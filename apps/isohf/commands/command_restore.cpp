@@ -221,10 +221,13 @@ class Restorer {
         } else if (const auto refused = convert_exactly(record, raw, voids_as, written.type, out,
                                                         options_.rounds ? &rounding : nullptr)) {
           const auto sample = static_cast<std::int64_t>(*refused);
+          const double value = load_sample(kept.type)(raw.data() + *refused * size_bytes(kept.type));
+          const bool rounds = is_floating(written.type) && !options_.rounds;
           refuse_sample(options_.raster.output, written.type, sample % grid_.width, row + sample / grid_.width,
-                        fmt::format("{:.9g}", load_sample(kept.type)(raw.data() + *refused * size_bytes(kept.type))),
-                        is_floating(written.type) && !options_.rounds ? "--round takes the nearest, .tif holds it"
-                                                                      : "write .tif");
+                        fmt::format("{:.9g}{}", value, record.is_void(value) ? ", which means void" : ""),
+                        rounds ? "--round takes the nearest, .tif holds it"
+                               : "write .tif, or give --method hex for a void "
+                                 "value of its own");
         }
         sink->write_rows(out);
       }
@@ -346,6 +349,7 @@ int run(const RestoreOptions& options) {
       what = fmt::format("the source's own samples, SHA-256 as stated, rounded by up to {:.3g}", *restored.rounding);
     }
     if (!restored.is_source) what = fmt::format("method {}, {} voids", how, describe_count(restored.counts.nodata));
+    if (!restored.is_source && method == RestoreMethod::kPlane) what += kOnAPlane;
     if (restored.spread) {
       what += fmt::format("; elevation = sample * {} + {}", restored.spread->z_scale, restored.spread->z_offset);
     }

@@ -70,7 +70,7 @@ PartSummary merge_archives(const std::vector<std::string>& archives, const std::
 /// What two archives have in another way.
 struct ArchiveDifference {
   struct Member {
-    std::string name;   ///< of the metadata: "/source/name"
+    std::string name;   ///< of the metadata: "/source/name", or a member of its own: "member \"note.txt\""
     std::string first;  ///< JSON text; empty where it isn't there
     std::string second;
   };

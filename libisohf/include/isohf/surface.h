@@ -140,7 +140,7 @@ class Surface {
 enum class RestoreMethod {
   kBarycentric,  ///< on the triangles, as the renderer draws them
   kHex,          ///< by quintic B-splines along the rows and then down the columns; on the triangles beside nodata
-  kPlane,        ///< on the triangles of a coarse plane: blends of vertices within half a sample's spacing
+  kPlane,        ///< on the triangles of a coarse plane: blends of vertices within an eighth of a sample's spacing
   kAverage,  ///< the mean over the area that a sample stands for: of places on the triangles in its middle and around
              ///< it, no farther apart than vertices; those without an elevation do not count
 };
@@ -196,7 +196,7 @@ using GridSize = std::pair<std::int64_t, std::int64_t>;
 /// True where the surface may have no elevation at a sample of the grid.
 [[nodiscard]] bool may_have_nodata(const Metadata& metadata, const SampleGrid& grid);
 
-/// How a grid is read where nobody says: by kPlane where the archive has a coarse plane with two vertices or more between
+/// How a grid is read where nobody says: by kPlane where the archive has a coarse plane with eight vertices or more between
 /// samples, either way, so that its tiles suffice; else by kHex, in degrees by kBarycentric.
 [[nodiscard]] RestoreMethod usual_method(const Metadata& metadata, const SampleGrid& grid);
 

@@ -71,6 +71,11 @@ MemberEntry member_entry(const ZipEntry& entry, std::uint64_t data_offset) {
           entry.bytes, entry.crc32, entry.method == ZipMethod::kDeflated};
 }
 
+std::shared_ptr<const ByteSource> required(std::shared_ptr<const ByteSource> source, const std::string& name) {
+  if (source) return source;
+  throw Error(ErrorCode::kInvalidArgument, name + ": there is no source of its bytes");
+}
+
 }  // namespace
 
 struct ArchiveReader::State {
@@ -257,7 +262,7 @@ ArchiveReader::ArchiveReader(const std::string& path)
     : state_(std::make_unique<State>(open_file_source(path), path, false)) {}
 
 ArchiveReader::ArchiveReader(std::shared_ptr<const ByteSource> source, const std::string& name)
-    : state_(std::make_unique<State>(std::move(source), name, true)) {}
+    : state_(std::make_unique<State>(required(std::move(source), name), name, true)) {}
 
 ArchiveReader::ArchiveReader(ArchiveReader&&) noexcept = default;
 ArchiveReader::~ArchiveReader() = default;

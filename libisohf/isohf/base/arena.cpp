@@ -1,5 +1,6 @@
 #include "isohf/base/arena.h"
 
+#include <fmt/format.h>
 #include <oneapi/tbb/global_control.h>
 #include <oneapi/tbb/task_arena.h>
 
@@ -15,11 +16,18 @@
 #include <thread>
 #include <vector>
 
+#include "isohf/error.h"
+
 namespace isohf {
 
 using oneapi::tbb::global_control;
 
 int threads_of(const Job& job) {
+  constexpr int kMostThreads = 1024;
+  if (job.threads < 0 || job.threads > kMostThreads) {
+    throw Error(ErrorCode::kInvalidArgument,
+                fmt::format("`threads` is {}, must be 1 to {}, or 0 for one a core", job.threads, kMostThreads));
+  }
   return job.threads > 0 ? job.threads : oneapi::tbb::this_task_arena::max_concurrency();
 }
 

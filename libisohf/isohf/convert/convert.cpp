@@ -373,6 +373,9 @@ ConvertSummary convert_within(HeightSource& source, const std::string& output, c
 }  // namespace
 
 ConvertSummary convert(HeightSource& source, const std::string& output, const ConvertOptions& options, const Job& job) {
+  if (options.max_error && !(std::isfinite(*options.max_error) && *options.max_error > 0.0)) {
+    throw Error(ErrorCode::kInvalidArgument, fmt::format("`max_error` is {}, must be above 0", *options.max_error));
+  }
   if (options.max_error) return convert_within(source, output, options, job);
   return run_conversion(source, make_plan(source.info(), options.plan), output, options, job).summary;
 }

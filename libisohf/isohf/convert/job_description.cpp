@@ -17,6 +17,25 @@
 namespace isohf {
 namespace {
 
+/// As UTF-8, which JSON keeps and hashes are of: what is none is taken for ISO 8859-1, as .prj files have it.
+void make_utf8(std::string& text) {
+  try {
+    (void)nlohmann::json(text).dump();  // refuses what is none
+  } catch (const nlohmann::json::exception&) {
+    std::string converted;
+    for (const char byte : text) {
+      const auto code = static_cast<unsigned char>(byte);
+      if (code < 0x80U) {
+        converted += byte;
+      } else {
+        converted += static_cast<char>(0xC0U | (code >> 6U));
+        converted += static_cast<char>(0x80U | (code & 0x3FU));
+      }
+    }
+    text = std::move(converted);
+  }
+}
+
 SourceRecord record_of(const SourceInfo& info, const SourceFrame& frame, const SourceNote& note) {
   const Georeference& place = info.georeference;
   SourceRecord record;
@@ -61,6 +80,10 @@ SourceRecord record_of(const SourceInfo& info, const SourceFrame& frame, const S
   record.inverse_flattening = place.system.inverse_flattening;
   record.vertical_datum = place.system.vertical_datum;
   record.vertical_epsg = place.system.vertical_epsg;
+  for (std::string* text : {&record.name, &record.format, &record.channel, &record.crs_name, &record.crs_wkt,
+                            &record.body, &record.vertical_datum}) {
+    make_utf8(*text);
+  }
   return record;
 }
 
@@ -148,6 +171,7 @@ Metadata describe_job(const SourceInfo& info, const Plan& plan, const ConvertOpt
   metadata.z_range = options.z_range;
   metadata.horizontal_unit = plan.frame.in_metres ? "metre" : "unknown";
   metadata.vertical_unit = info.vertical_unit.empty() ? "unknown" : info.vertical_unit;
+  make_utf8(metadata.vertical_unit);
   metadata.valid = plan.frame.bounds();
   metadata.valid.x1 = std::min(metadata.valid.x1, plan.grid.world_width());
   metadata.valid.z1 = std::min(metadata.valid.z1, plan.grid.world_height());

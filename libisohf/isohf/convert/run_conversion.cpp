@@ -352,6 +352,8 @@ ConversionResult run_conversion(HeightSource& source, const Plan& plan, const st
   if (options.shadow_seeds) check_seed_request(*options.shadow_seeds, plan.grid);
   std::optional<TextureStage> textures;
   if (options.texture) {
+    if (options.texture->photo == nullptr)
+      throw Error(ErrorCode::kInvalidArgument, info.path + ": `texture` has no photo");
     textures.emplace(TextureStage::make(plan, info, *options.texture, threads_of(job), textured_tiles_in_flight(job)));
   }
   const Kernel kernel = Kernel::make(options.filter.value_or(kDefaultFilter));

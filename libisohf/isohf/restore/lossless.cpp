@@ -318,6 +318,10 @@ std::vector<std::byte> SourceRowReader::read_next() {
   State& state = *state_;
   const LosslessRecord& record = state.record;
   state.job.throw_if_cancelled();
+  if (at_end()) {
+    throw Error(ErrorCode::kInvalidArgument,
+                fmt::format("{}: all {} rows have been read; see at_end()", state.archive.path(), record.height));
+  }
   const std::int64_t rows = std::min(record.rows_per_member, record.height - state.next_row);
   const std::string name = residual_name(state.next_row);
   const auto found = state.archive.find_member(name);

@@ -32,9 +32,9 @@ constexpr std::uint64_t kDefaultMemory = std::uint64_t{256} << 20U;
 /// What tiles under a grid in degrees take.
 constexpr std::uint64_t kTileBytes = std::uint64_t{16} << 20U;
 
-/// The coarsest plane with two vertices between samples of a grid in world units, either way (decision 45).
+/// The coarsest plane with eight vertices between samples of a grid in world units, either way (decision 45).
 int plane_for(const Metadata& metadata, const SampleGrid& grid) {
-  return planes_of(metadata).plane_for_spacing(grid.spacing_x / 2.0, grid.spacing_z / 2.0);
+  return planes_of(metadata).plane_for_spacing(grid.spacing_x / 8.0, grid.spacing_z / 8.0);
 }
 
 [[noreturn]] void refuse_place(const char* what) {
@@ -87,7 +87,7 @@ SampleGrid places_of(const SampleGrid& grid, const GridSize& parts) {
 void require_as_many(std::size_t samples, std::size_t points) {
   if (samples == points) return;
   throw Error(ErrorCode::kInvalidArgument,
-              fmt::format("there is room for {} samples, must be as many as there are points, {}", samples, points));
+              fmt::format("there is room for {} samples, must be as many as are asked for, {}", samples, points));
 }
 
 }  // namespace
@@ -270,6 +270,7 @@ struct RowReader::State {
 
   SampleGrid grid;
   std::int64_t rows_at_once = 1;
+  std::int64_t next_row = 0;  ///< the first that may still be read
   GridSize parts = {1, 1};
   std::unique_ptr<RowReader> places;  ///< whose means are the samples
   std::optional<GridSampler> rows;    ///< of a grid in world units
@@ -283,6 +284,15 @@ RowReader::RowReader(const ArchiveReader& archive, const SampleGrid& grid, Resto
 RowReader::~RowReader() = default;
 
 void RowReader::read(std::int64_t first, std::int64_t rows, std::span<double> elevations) {
+  const SampleGrid& grid = state_->grid;
+  if (rows < 0 || first < state_->next_row || first > grid.height || rows > grid.height - first) {
+    throw Error(
+        ErrorCode::kInvalidArgument,
+        fmt::format("rows {} to {} - 1 are asked for, must be rows of {} to {} - 1: calls come in increasing order",
+                    first, first + rows, state_->next_row, grid.height));
+  }
+  require_as_many(elevations.size(), static_cast<std::size_t>(rows * grid.width));
+  state_->next_row = first + rows;
   if (state_->places) {
     state_->average(first, rows, elevations);
   } else if (state_->rows) {

@@ -3,11 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <set>
 
 #include "isohf/archive/codec/quantise.h"
+#include "isohf/archive/container/archive_directory.h"
 #include "isohf/archive/container/content_hash.h"
 #include "isohf/archive/metadata/part_record.h"
 #include "isohf/base/arena.h"
@@ -34,6 +36,19 @@ std::vector<ArchiveDifference::Member> differing_members(const ArchiveReader& fi
   for (const std::string& name : names) {
     const auto text = [&](const nlohmann::json& side) { return side.contains(name) ? side.at(name).dump() : ""; };
     if (text(a) != text(b)) found.push_back({name, text(a), text(b)});
+  }
+  // Those that hold neither metadata nor what these are about.
+  std::map<std::string, std::pair<std::string, std::string>> loose;
+  const auto take = [&](const ArchiveReader& archive, std::string std::pair<std::string, std::string>::*side) {
+    for (const MemberEntry& member : archive.loose_members()) {
+      if (member.name == kMediaTypeName || member.name == kIndexName || member.name == kMetadataName) continue;
+      loose[member.name].*side = nlohmann::json{{"bytes", member.bytes}, {"crc32", member.crc32}}.dump();
+    }
+  };
+  take(first, &std::pair<std::string, std::string>::first);
+  take(second, &std::pair<std::string, std::string>::second);
+  for (const auto& [name, sides] : loose) {
+    if (sides.first != sides.second) found.push_back({fmt::format("member \"{}\"", name), sides.first, sides.second});
   }
   return found;
 }

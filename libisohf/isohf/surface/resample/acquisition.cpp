@@ -172,6 +172,7 @@ std::string to_string(const Acquisition& acquisition) {
 Acquisition with_taps(const Acquisition& acquisition) {
   if (acquisition.kind != Acquisition::Kind::kFir || !acquisition.taps.empty()) return acquisition;
   const std::string& path = acquisition.path;
+  if (path.empty()) refuse("`acquisition` by taps has neither taps nor a file of them");
   std::ifstream file(path, std::ios::binary);
   std::string contents(kMostBytes + 1, ' ');
   file.read(contents.data(), static_cast<std::streamsize>(contents.size()));
