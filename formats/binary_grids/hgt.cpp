@@ -3,7 +3,6 @@
 
 #include <cctype>
 #include <cmath>
-#include <cstring>
 #include <optional>
 #include <string>
 #include <vector>
@@ -14,6 +13,7 @@
 #include "formats/open_options.h"
 #include "formats/readers.h"
 #include "formats/write/encoders.h"
+#include "isohf/base/bytes.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
 
@@ -162,7 +162,7 @@ class HgtEncoder final : public RasterEncoder {
 
   void write(std::span<const std::byte> rows, std::int64_t /*count*/) override {
     swapped_.assign(rows.begin(), rows.end());
-    swap_byte_order(swapped_, sizeof(std::int16_t));
+    if (!kSwapsBytes) swap_byte_order(swapped_, sizeof(std::int16_t));
     out_.append(swapped_);
   }
   void close() override {}

@@ -25,6 +25,7 @@
 #include "formats/georeference/units.h"
 #include "formats/open_options.h"
 #include "formats/readers.h"
+#include "isohf/base/bytes.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
 
@@ -56,9 +57,8 @@ class Fields {
 
   template <typename T>
   T number() {
-    T value{};
-    if (bytes_.size() - at_ < sizeof value) fail();
-    std::memcpy(&value, bytes_.data() + at_, sizeof value);
+    if (bytes_.size() - at_ < sizeof(T)) fail();
+    const T value = load_little<T>(bytes_.data() + at_);
     at_ += sizeof value;
     return value;
   }
@@ -136,21 +136,20 @@ class CodedTile {
   bool decode(std::span<std::byte> samples, std::size_t size) {
     constexpr std::size_t kHeadBytes = 13;
     if (stored_.size() < kHeadBytes) return false;
-    std::array<std::uint32_t, 3> head{};
-    std::memcpy(head.data(), stored_.data(), sizeof head);
-    const auto runs = static_cast<std::int32_t>(head[1]);
+    const auto head = [&](std::size_t i) { return load_little<std::uint32_t>(stored_.data() + 4 * i); };
+    const auto runs = static_cast<std::int32_t>(head(1));
     bits_ = std::to_integer<unsigned>(stored_[12]);
     if (bits_ > 32 || (bits_ & (bits_ - 1)) != 0) return false;
     std::size_t lengths = kHeadBytes;
-    first_ = runs == -1 ? kHeadBytes : head[2];
+    first_ = runs == -1 ? kHeadBytes : head(2);
     const std::size_t count = samples.size() / size;
     std::size_t done = 0;
     for (std::int64_t run = 0; runs == -1 ? done < count : run < runs; ++run) {
       std::size_t length = 1;
       std::uint32_t value = 0;
       if ((runs != -1 && !read_length(lengths, length)) || length > count - done || !read_value(value)) return false;
-      value += head[0];
-      for (std::size_t i = 0; i < length; ++i, ++done) std::memcpy(samples.data() + done * size, &value, size);
+      value += head(0);
+      for (std::size_t i = 0; i < length; ++i, ++done) store_little(samples.data() + done * size, value, size);
     }
     return done == count;
   }
@@ -239,9 +238,7 @@ class ImagineSource final : public FileSource {
  private:
   template <typename T>
   static T number_at(std::span<const std::byte> bytes, std::size_t at) {
-    T value{};
-    std::memcpy(&value, bytes.data() + at, sizeof value);
-    return value;
+    return load_little<T>(bytes.data() + at);
   }
 
   [[nodiscard]] Node node_at(std::uint32_t at) const {
@@ -606,6 +603,7 @@ class ImagineSource final : public FileSource {
     } else if (!is_plain) {
       unpack_bits(packed_, stored_.bits, tile);
     }
+    swap_to_little(tile, size);
   }
 
   /// Of a tile that was never written.

@@ -7,7 +7,6 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <cstring>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -20,6 +19,7 @@
 #include "formats/georeference/units.h"
 #include "formats/open_options.h"
 #include "formats/readers.h"
+#include "isohf/base/bytes.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
 
@@ -285,18 +285,14 @@ class TerragenSource final : public DescribedSource {
       std::array<std::byte, 16> chunk{};
       if (file_->read_some(at, chunk) < 8) refuse(ErrorCode::kCorrupt, "ends before its elevations (ALTW)");
       const std::string_view name = text_of(chunk).substr(0, 4);
-      const auto whole = [&](std::size_t offset) {
-        std::uint16_t value = 0;
-        std::memcpy(&value, chunk.data() + offset, sizeof value);
-        return value;
-      };
+      const auto whole = [&](std::size_t offset) { return load_little<std::uint16_t>(chunk.data() + offset); };
       if (name == "SIZE") columns = rows = whole(4) + 1.0;
       if (name == "XPTS") columns = whole(4);
       if (name == "YPTS") rows = whole(4);
       if (name == "SCAL") {
-        std::memcpy(&scale_x, chunk.data() + 4, sizeof scale_x);
-        std::memcpy(&scale_y, chunk.data() + 8, sizeof scale_y);
-        std::memcpy(&scale_z, chunk.data() + 12, sizeof scale_z);
+        scale_x = load_little<float>(chunk.data() + 4);
+        scale_y = load_little<float>(chunk.data() + 8);
+        scale_z = load_little<float>(chunk.data() + 12);
       }
       if (name == "ALTW") {
         const auto height = static_cast<double>(static_cast<std::int16_t>(whole(4)));

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cstring>
 #include <fstream>
 #include <optional>
 #include <vector>
@@ -125,9 +124,8 @@ void take_attribute(HeaderWalk& walk, const std::string& name, std::uint32_t siz
   constexpr std::uint32_t kMaxKept = 1U << 20U;  // of a channel list or type
   if (is("dataWindow", 16)) {
     const auto bytes = walk.take(size);
-    Box box{};
-    std::memcpy(&box, bytes.data(), sizeof box);
-    part.data_window = box;
+    const auto side = [&](std::size_t i) { return load_little<std::int32_t>(&bytes[4 * i]); };
+    part.data_window = {side(0), side(1), side(2), side(3)};
   } else if (is("compression", 1)) {
     part.compression = static_cast<std::uint8_t>(walk.take(1)[0]);
   } else if (is("tiles", 9)) {

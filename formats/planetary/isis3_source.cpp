@@ -17,6 +17,7 @@
 #include "formats/georeference/units.h"
 #include "formats/open_options.h"
 #include "formats/planetary/label_text.h"
+#include "isohf/base/bytes.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
 
@@ -76,7 +77,7 @@ class Isis3Source final : public FileSource {
       }
       row += rows;
     }
-    if (big_endian_) swap_byte_order(samples, static_cast<std::size_t>(size_));
+    if (big_endian_ != kSwapsBytes) swap_byte_order(samples, static_cast<std::size_t>(size_));
   }
 
  private:

@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <cstring>
 #include <span>
 #include <string_view>
 #include <vector>
 
 #include "formats/files/raw_file.h"
 #include "formats/files/text.h"
+#include "isohf/base/bytes.h"
 #include "isohf/error.h"
 
 namespace isohf {
@@ -70,7 +70,7 @@ class TinyTiff {
     if (at > bytes_.size() || sizeof(T) > bytes_.size() - at) return T{};
     std::copy_n(bytes_.begin() + static_cast<std::ptrdiff_t>(at), sizeof(T), raw.begin());
     if (swaps_) std::ranges::reverse(raw);
-    return std::bit_cast<T>(raw);
+    return load_little<T>(raw.data());
   }
   /// The values of the entry at a place, of one type.
   template <typename T>

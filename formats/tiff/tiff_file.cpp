@@ -22,6 +22,7 @@
 #include "formats/files/text.h"
 #include "formats/readers.h"
 #include "formats/tiff/gdal_tags.h"
+#include "isohf/base/bytes.h"
 #include "isohf/error.h"
 
 namespace isohf {
@@ -42,7 +43,7 @@ std::optional<std::uint64_t> tiff_stored_count(const RawFile& file, const TiffDi
     std::array<std::byte, 8> stored = {};
     file.read(offset, std::span(stored).first(bytes));
     if (place.swapped) std::reverse(stored.begin(), stored.begin() + static_cast<std::ptrdiff_t>(bytes));
-    return std::bit_cast<std::uint64_t>(stored);  // little-endian, which base/bytes.h asserts
+    return load_little<std::uint64_t>(stored.data());
   };
   const std::uint64_t entries = number(place.offset_bytes, place.big_tiff ? 8 : 2);
   for (std::uint64_t i = 0; i < entries; ++i) {
@@ -266,7 +267,7 @@ struct TiffHandle::Impl {
   }
 
   [[nodiscard]] std::optional<std::uint64_t> stored_count(std::uint16_t wanted) const {
-    return tiff_stored_count(file, {TIFFCurrentDirOffset(tif), TIFFIsBigTIFF(tif) != 0, TIFFIsByteSwapped(tif) != 0},
+    return tiff_stored_count(file, {TIFFCurrentDirOffset(tif), TIFFIsBigTIFF(tif) != 0, TIFFIsBigEndian(tif) != 0},
                              wanted);
   }
 

@@ -21,6 +21,7 @@
 #include "formats/tiff/gdal_tags.h"
 #include "formats/tiff/geotiff_keys.h"
 #include "formats/write/encoders.h"
+#include "isohf/base/bytes.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
 
@@ -68,6 +69,7 @@ void predict(const TiffStripLayout& layout, std::span<std::byte> rows) {
   for (std::size_t at = 0; at < rows.size(); at += row_bytes) {
     std::byte* row = rows.data() + at;
     if (is_floating(layout.sample_type)) {
+      swap_to_little({row, row_bytes}, size);
       difference_byte_planes(row, layout.samples_per_row, size, layout.channels, scratch);
     } else if (size == 1) {
       difference_row<std::uint8_t>(row, layout.samples_per_row, layout.channels);
@@ -84,8 +86,10 @@ void predict(const TiffStripLayout& layout, std::span<std::byte> rows) {
 /// The compression is a zlib stream. `rows` is overwritten. The same rows always give the same bytes.
 /// Throws Error{kOutOfMemory}.
 std::vector<std::byte> compress_tiff_strip(const TiffStripLayout& layout, std::span<std::byte> rows) {
+  const std::size_t size = size_bytes(layout.sample_type);
+  if (layout.compress) predict(layout, rows);
+  if (!layout.compress || !is_floating(layout.sample_type)) swap_to_little(rows, size);
   if (!layout.compress) return {rows.begin(), rows.end()};
-  predict(layout, rows);
   const std::unique_ptr<libdeflate_compressor, decltype(&libdeflate_free_compressor)> compressor(
       libdeflate_alloc_compressor(kLevel), libdeflate_free_compressor);
   if (!compressor) throw Error(ErrorCode::kOutOfMemory, "libdeflate ran out of memory");
@@ -144,7 +148,7 @@ class TiffEncoder final : public RasterEncoder {
     if (options == nullptr) throw Error(ErrorCode::kOutOfMemory, "libtiff ran out of memory");
     TIFFOpenOptionsSetErrorHandlerExtR(options, on_error, this);
     TIFFOpenOptionsSetWarningHandlerExtR(options, on_warning, this);
-    tiff_ = TIFFClientOpenExt(out.path().c_str(), raw_bytes > kClassicBytes ? "w8" : "w", this, on_read, on_write,
+    tiff_ = TIFFClientOpenExt(out.path().c_str(), raw_bytes > kClassicBytes ? "wl8" : "wl", this, on_read, on_write,
                               on_seek, on_close, on_size, nullptr, nullptr, options);
     TIFFOpenOptionsFree(options);
     if (tiff_ == nullptr) fail();

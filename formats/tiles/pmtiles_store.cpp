@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cstring>
 #include <map>
 #include <mutex>
 #include <optional>
@@ -17,6 +16,7 @@
 #include "formats/png/packed_elevations.h"
 #include "formats/readers.h"
 #include "formats/tiles/tile_store.h"
+#include "isohf/base/bytes.h"
 #include "isohf/error.h"
 
 namespace isohf {
@@ -87,11 +87,7 @@ class PmtilesStore final : public TileStore {
   explicit PmtilesStore(const std::string& path) : file_(path) {
     std::array<std::byte, kHeaderBytes> header{};
     if (file_.read_some(0, header) != header.size()) fail(ErrorCode::kCorrupt, "ends within its header");
-    const auto number = [&](std::size_t at) {
-      std::uint64_t value = 0;
-      std::memcpy(&value, header.data() + at, sizeof(value));
-      return value;
-    };
+    const auto number = [&](std::size_t at) { return load_little<std::uint64_t>(header.data() + at); };
     const auto byte = [&](std::size_t at) { return std::to_integer<int>(header[at]); };
     if (byte(7) != 3) fail(ErrorCode::kUnsupported, fmt::format("is of PMTiles version {}, must be 3", byte(7)));
     compression_ = byte(97);

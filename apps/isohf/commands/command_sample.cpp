@@ -4,7 +4,6 @@
 #include <oneapi/tbb/parallel_for.h>
 
 #include <cmath>
-#include <cstring>
 #include <functional>
 #include <limits>
 #include <nlohmann/json.hpp>
@@ -297,8 +296,7 @@ void read_places(bool binary, Answers& answers, const std::function<WorldPoint(W
   while (binary) {
     const std::string_view record = reader.next_record(2 * sizeof(double), flush);
     if (record.empty()) return;
-    std::memcpy(&place.x, record.data(), sizeof(double));
-    std::memcpy(&place.z, record.data() + sizeof(double), sizeof(double));
+    place = {load_little<double>(record.data()), load_little<double>(record.data() + sizeof(double))};
     if (!std::isfinite(place.x) || !std::isfinite(place.z)) {
       throw Error(ErrorCode::kCorrupt, fmt::format("standard input, record {}: found {} {}, must be two finite numbers",
                                                    reader.line_number(), place.x, place.z));

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
@@ -13,7 +15,41 @@
 
 namespace isohf {
 
-static_assert(std::endian::native == std::endian::little, "isohf stores and maps little-endian data");
+/// Files of ours, and most of others', have the lowest byte of a number first; memory has what the machine has.
+inline constexpr bool kSwapsBytes = std::endian::native == std::endian::big;
+static_assert(kSwapsBytes || std::endian::native == std::endian::little);
+
+/// The number whose bytes stand at a place, lowest first, aligned or not.
+template <typename T>
+[[nodiscard]] T load_little(const void* at) {
+  std::array<std::byte, sizeof(T)> bytes;
+  std::memcpy(bytes.data(), at, sizeof(T));
+  if constexpr (kSwapsBytes) std::reverse(bytes.begin(), bytes.end());
+  return std::bit_cast<T>(bytes);
+}
+
+/// Puts the bytes of a number, lowest first; of more than there is room for the first `count`.
+template <typename T>
+void store_little(void* at, T value, std::size_t count = sizeof(T)) {
+  auto bytes = std::bit_cast<std::array<std::byte, sizeof(T)>>(value);
+  if constexpr (kSwapsBytes) std::reverse(bytes.begin(), bytes.end());
+  std::memcpy(at, bytes.data(), count);
+}
+
+/// Numbers of `size` bytes each, from memory's order to that of files or back: nothing to do on most machines.
+inline void swap_to_little(std::span<std::byte> numbers, std::size_t size) {
+  if constexpr (kSwapsBytes) {
+    for (; numbers.size() >= size; numbers = numbers.subspan(size)) std::ranges::reverse(numbers.first(size));
+  }
+}
+/// Their bytes as files have them: they themselves on most machines, else a copy in `kept`.
+inline std::span<const std::byte> as_little(std::span<const std::byte> numbers, std::size_t size,
+                                            std::vector<std::byte>& kept) {
+  if constexpr (!kSwapsBytes) return numbers;
+  kept.assign(numbers.begin(), numbers.end());
+  swap_to_little(kept, size);
+  return kept;
+}
 
 /// Reads little-endian fields from a byte span; a read past the end throws Error{kCorrupt} naming the byte offset.
 class ByteReader {
@@ -26,8 +62,7 @@ class ByteReader {
   [[nodiscard]] T read() {
     static_assert(std::is_arithmetic_v<T>);
     require(sizeof(T));
-    T value;
-    std::memcpy(&value, bytes_.data() + position_, sizeof(T));
+    const T value = load_little<T>(bytes_.data() + position_);
     position_ += sizeof(T);
     return value;
   }
@@ -68,7 +103,7 @@ class ByteWriter {
     static_assert(std::is_arithmetic_v<T>);
     const std::size_t at = out_->size();
     out_->resize(at + sizeof(T));
-    std::memcpy(out_->data() + at, &value, sizeof(T));
+    store_little(out_->data() + at, value);
   }
 
   void write_bytes(std::span<const std::byte> bytes) { out_->insert(out_->end(), bytes.begin(), bytes.end()); }

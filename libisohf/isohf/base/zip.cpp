@@ -66,7 +66,7 @@ class RoomWriter {
 
   template <typename T>
   void write(T value) {
-    std::memcpy(at_, &value, sizeof value);
+    store_little(at_, value);
     at_ += sizeof value;
   }
   void write(const std::string& text) {

@@ -5,7 +5,6 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
-#include <cstring>
 #include <optional>
 
 #include "isohf/base/bytes.h"
@@ -23,6 +22,11 @@ Sha256::~Sha256() = default;
 
 void Sha256::add(std::span<const std::byte> bytes) {
   sha256_update(&state_->context, bytes.size(), reinterpret_cast<const std::uint8_t*>(bytes.data()));
+}
+
+void Sha256::add_numbers(std::span<const std::byte> numbers, std::size_t size) {
+  std::vector<std::byte> kept;
+  add(as_little(numbers, size, kept));
 }
 
 std::vector<std::byte> Sha256::finish() {
@@ -48,8 +52,10 @@ std::string hex(std::span<const std::byte> digest) {
 }
 
 std::vector<std::byte> tile_content_digest(const TileCodes& tile) {
-  if (tile.type == CodeType::kU16) return sha256(std::as_bytes(std::span(tile.codes)));
   std::vector<std::byte> bytes;
+  if (tile.type == CodeType::kU16) {
+    return sha256(as_little(std::as_bytes(std::span(tile.codes)), sizeof(std::uint16_t), bytes));
+  }
   if (tile.type == CodeType::kU8) {
     bytes.reserve(tile.codes.size());
     for (const std::uint16_t code : tile.codes) bytes.push_back(static_cast<std::byte>(code & 0xFFU));
@@ -59,7 +65,7 @@ std::vector<std::byte> tile_content_digest(const TileCodes& tile) {
   for (std::size_t i = 0; i < tile.heights.size(); ++i) {
     const float height = tile.heights[i];
     const std::uint32_t bits = std::isnan(height) ? 0x7FC00000U : std::bit_cast<std::uint32_t>(height);
-    std::memcpy(bytes.data() + i * sizeof(bits), &bits, sizeof(bits));
+    store_little(bytes.data() + i * sizeof(bits), bits);
   }
   return sha256(bytes);
 }

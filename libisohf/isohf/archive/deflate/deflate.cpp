@@ -5,6 +5,7 @@
 #include <zlib.h>
 
 #include <algorithm>
+#include <array>
 #include <memory>
 
 #include "isohf/archive/deflate/literal_inflater.h"
@@ -103,7 +104,9 @@ std::uint32_t crc32(std::span<const std::byte> bytes, std::uint32_t seed) {
 }
 
 std::uint32_t crc32_of_crc32(std::uint32_t crc, std::uint32_t seed) {
-  return libdeflate_crc32(seed, &crc, sizeof crc);
+  std::array<std::byte, sizeof crc> bytes;
+  store_little(bytes.data(), crc);
+  return libdeflate_crc32(seed, bytes.data(), bytes.size());
 }
 
 }  // namespace isohf

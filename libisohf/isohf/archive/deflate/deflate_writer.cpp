@@ -1,9 +1,9 @@
 #include "isohf/archive/deflate/deflate_writer.h"
 
 #include <algorithm>
-#include <cstring>
 
 #include "isohf/archive/deflate/huffman_code.h"
+#include "isohf/base/bytes.h"
 
 namespace isohf {
 namespace {
@@ -47,7 +47,7 @@ struct DeflateWriter::BitsOut {
   }
   void flush_words() {
     if (count < 32) return;
-    std::memcpy(next, &bits, 4);
+    store_little(next, bits, 4);
     next += 4;
     bits >>= 32U;
     count -= 32;
@@ -117,7 +117,7 @@ void DeflateWriter::flush_bits() {
   const unsigned bytes = bit_count_ / 8;
   const std::size_t at = out_->size();
   out_->resize(at + bytes);
-  std::memcpy(out_->data() + at, &bits_, bytes);
+  store_little(out_->data() + at, bits_, bytes);
   bits_ = bytes == 8 ? 0 : bits_ >> (8 * bytes);
   bit_count_ -= 8 * bytes;
 }

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "isohf/archive/deflate/huffman_code.h"
+#include "isohf/base/bytes.h"
 #include "isohf/base/simd.h"
 
 namespace isohf {
@@ -156,17 +157,14 @@ ISOHF_KERNEL void copy_literals(const Entry* table, std::uint64_t mask, Progress
   std::uint64_t bits = progress.bits;
   unsigned bit_count = progress.bit_count;
   while (progress.in_end - in >= 8 && progress.out_end - out >= 2 * kLookUps) {
-    std::uint64_t word;
-    std::memcpy(&word, in, sizeof(word));
-    bits |= word << bit_count;
+    bits |= load_little<std::uint64_t>(in) << bit_count;
     in += (63U - bit_count) >> 3U;
     bit_count |= 56U;
     Entry entry = 0;
     for (int i = 0; i < kLookUps; ++i) {
       entry = table[bits & mask];
       if (literals_of(entry) == 0) break;
-      const auto both = static_cast<std::uint16_t>(entry >> 8U);
-      std::memcpy(out, &both, sizeof(both));
+      store_little(out, static_cast<std::uint16_t>(entry >> 8U));
       out += literals_of(entry);
       bits >>= bits_of(entry);
       bit_count -= bits_of(entry);

@@ -4,9 +4,9 @@
 #include <array>
 #include <bit>
 #include <cmath>
-#include <cstring>
 #include <utility>
 
+#include "isohf/base/bytes.h"
 #include "isohf/surface/shade/shadow.h"
 
 namespace isohf {
@@ -83,9 +83,17 @@ class CasterSearch {
     return travel_ == LightTravel::kEastward ? x : half_steps_across(shape_) - x;
   }
 
+  /// Eight flags of a byte each in a word, the first lowest.
+  static std::array<std::uint64_t, kBlock / 8> words_of(const void* flags) {
+    std::array<std::uint64_t, kBlock / 8> words;
+    for (std::size_t i = 0; i < words.size(); ++i) {
+      words[i] = load_little<std::uint64_t>(static_cast<const std::byte*>(flags) + 8 * i);
+    }
+    return words;
+  }
+
   void consider_block(int begin) {
-    std::array<std::uint64_t, kBlock / 8> flags;
-    std::memcpy(flags.data(), peaks_ + begin, sizeof(flags));
+    const std::array<std::uint64_t, kBlock / 8> flags = words_of(peaks_ + begin);
     if ((flags[0] | flags[1]) == 0) return;
     const float* const rises = rises_[static_cast<std::size_t>(row_ % 2)].data() + begin;
     const float* const heights = heights_ + begin;
@@ -94,8 +102,7 @@ class CasterSearch {
     const float bar = best - slack_ - std::abs(best) * 0x1p-22F;
     std::array<std::uint8_t, kBlock> high;
     for (std::size_t i = 0; i < kBlock; ++i) high[i] = heights[i] + rises[i] > bar ? 1 : 0;
-    std::array<std::uint64_t, kBlock / 8> high_flags;
-    std::memcpy(high_flags.data(), high.data(), sizeof(high_flags));
+    const std::array<std::uint64_t, kBlock / 8> high_flags = words_of(high.data());
     const bool east = travel_ == LightTravel::kEastward;
     for (std::size_t k = 0; k < flags.size(); ++k) {
       const std::size_t word = east ? flags.size() - 1 - k : k;

@@ -3,13 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cstring>
 #include <vector>
 
 #include "isohf/archive/codec/adaptive/adaptive_payload.h"
 #include "isohf/archive/codec/adaptive/symbol_model.h"
 #include "isohf/archive/codec/predict/hex_predictor.h"
 #include "isohf/archive/codec/residuals/bits.h"
+#include "isohf/base/bytes.h"
 #include "isohf/error.h"
 
 namespace isohf {
@@ -33,8 +33,7 @@ class SymbolReader {
     state = table.frequency(symbol) * (state / kFrequencySum) + slot - table.starts[symbol];
     if (state < kFirstState) {
       if (next_word_ + 2 > words_.size()) refuse("it holds too few words");
-      std::uint16_t word;
-      std::memcpy(&word, words_.data() + next_word_, sizeof(word));
+      const auto word = load_little<std::uint16_t>(words_.data() + next_word_);
       next_word_ += sizeof(word);
       state = state << 16U | word;
     }

@@ -6,6 +6,7 @@
 #include <cstdlib>
 
 #include "isohf/archive/codec/tile_payload.h"
+#include "isohf/base/bytes.h"
 #include "isohf/error.h"
 
 namespace isohf {
@@ -72,7 +73,8 @@ void write_adaptive_payload(const AdaptivePayload& payload, std::span<const std:
   }
   for (const std::uint32_t state : payload.states) writer.write(state);
   write_size(words.size(), writer);
-  writer.write_bytes(std::as_bytes(words));
+  std::vector<std::byte> kept;
+  writer.write_bytes(as_little(std::as_bytes(words), sizeof(words[0]), kept));
   writer.write_bytes(extra);
 }
 

@@ -2,10 +2,10 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
 #include <span>
 #include <vector>
 
+#include "isohf/base/bytes.h"
 #include "isohf/base/scratch.h"
 
 /// Numbers of some bits each, the lowest bit of a byte first.
@@ -33,7 +33,7 @@ class BitReader {
  private:
   [[nodiscard]] std::uint64_t rest() const {
     std::uint64_t bits = 0;
-    if (position_ < end_) std::memcpy(&bits, bytes_.data() + position_ / 8, sizeof(bits));
+    if (position_ < end_) bits = load_little<std::uint64_t>(bytes_.data() + position_ / 8);
     return bits >> position_ % 8;
   }
 
@@ -52,7 +52,7 @@ class BitPacker {
     bits_ |= std::uint64_t{bits} << bit_count_;
     bit_count_ += count;
     if (bit_count_ < 32) return;
-    std::memcpy(to_, &bits_, 4);
+    store_little(to_, bits_, 4);
     to_ += 4;
     bits_ >>= 32U;
     bit_count_ -= 32;
@@ -60,14 +60,14 @@ class BitPacker {
   /// As many as 56 bits; where all are put so.
   void put_many(std::uint64_t bits, unsigned count) {
     bits_ |= bits << bit_count_;
-    std::memcpy(to_, &bits_, 8);
+    store_little(to_, bits_);
     bit_count_ += count;
     to_ += bit_count_ / 8;
     bits_ >>= bit_count_ / 8 * 8;
     bit_count_ %= 8;
   }
   [[nodiscard]] std::vector<std::byte> finish() {
-    std::memcpy(to_, &bits_, 8);
+    store_little(to_, bits_);
     return {room_.data(), to_ + (bit_count_ + 7) / 8};
   }
 

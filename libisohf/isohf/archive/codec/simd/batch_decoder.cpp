@@ -13,6 +13,7 @@
 #include "isohf/archive/codec/simd/batch_residuals.h"
 #include "isohf/archive/codec/tile_payload.h"
 #include "isohf/base/assert.h"
+#include "isohf/base/bytes.h"
 #include "isohf/error.h"
 
 namespace isohf {
@@ -153,6 +154,7 @@ void decode_batch(const TileShape& shape, CodeType type, std::span<const std::sp
                   std::span<TileCodes> tiles, std::span<bool> decoded) {
   ISOHF_ASSERT(payloads.size() <= kBatchLanes && tiles.size() == payloads.size());
   std::fill(decoded.begin(), decoded.end(), false);
+  if constexpr (kSwapsBytes) return;  // samples lie in vectors of both 16 and 32 bits
   if (type == CodeType::kF32) {
     decode_side_by_side<BatchFloats>(shape, type, payloads, tiles, decoded);
   } else {

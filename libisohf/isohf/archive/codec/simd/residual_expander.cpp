@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "isohf/archive/codec/residuals/residual_symbols.h"
+#include "isohf/base/bytes.h"
 #include "isohf/base/simd.h"
 #if defined(ISOHF_TARGET_WIDE)
 #include <immintrin.h>
@@ -32,9 +33,7 @@ std::uint64_t expand_plainly(const std::byte* symbols, std::size_t count, const 
   std::uint32_t seen = 0;
   for (std::size_t i = 0; i < count; ++i) {
     if (position > end) return kNotExpanded;
-    std::uint64_t bits;
-    std::memcpy(&bits, extra + position / 8, sizeof(bits));
-    bits >>= position % 8;
+    const std::uint64_t bits = load_little<std::uint64_t>(extra + position / 8) >> position % 8;
     const std::uint32_t entry = kSymbolTable[std::to_integer<std::size_t>(symbols[i])];
     const unsigned taken = (entry >> 16U) & 0xffU;
     seen |= entry;
@@ -125,17 +124,14 @@ ISOHF_KERNEL std::uint64_t expand_floats(const std::byte* symbols, std::size_t c
   std::size_t i = 0;
   for (; i + 2 <= count; i += 2) {
     if (position > end) return kNotExpanded;
-    std::uint64_t bits;
-    std::memcpy(&bits, extra + position / 8, sizeof(bits));
-    bits >>= position % 8;
+    const std::uint64_t bits = load_little<std::uint64_t>(extra + position / 8) >> position % 8;
     const unsigned first = put(i, bits);
     const unsigned second = put(i + 1, bits >> first);
     position += first + second;
   }
   if (position > end) return kNotExpanded;
   if (i < count) {
-    std::uint64_t bits;
-    std::memcpy(&bits, extra + position / 8, sizeof(bits));
+    const auto bits = load_little<std::uint64_t>(extra + position / 8);
     position += put(i, bits >> (position % 8));
   }
   return position > end || most >= kFloatSymbols ? kNotExpanded : position;

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <cstring>
 #include <functional>
 #include <limits>
 #include <numeric>
@@ -12,6 +11,7 @@
 #include "isohf/archive/codec/adaptive/symbol_model.h"
 #include "isohf/archive/codec/predict/sample_lattice.h"
 #include "isohf/archive/codec/simd/vector_operations.h"
+#include "isohf/base/bytes.h"
 #include "isohf/base/simd.h"
 #if defined(ISOHF_HAS_WIDE_BUILTINS)
 #include <immintrin.h>
@@ -190,8 +190,7 @@ struct Source {
     model.count(table, symbol);
     state = table.frequency(symbol) * (state / kFrequencySum) + slot - table.starts[symbol];
     if (state < kFirstState) {
-      std::uint16_t more;
-      std::memcpy(&more, word, sizeof(more));
+      const auto more = load_little<std::uint16_t>(word);
       word += sizeof(more);
       state = state << 16U | more;
     }
@@ -223,9 +222,7 @@ struct Source {
     word += sizeof(std::uint16_t) * static_cast<unsigned>(std::popcount(lanes));
   }
   ISOHF_KERNEL std::uint32_t bits(unsigned count) {
-    std::uint64_t value;
-    std::memcpy(&value, extra + position / 8, sizeof(value));
-    value >>= position % 8;
+    const std::uint64_t value = load_little<std::uint64_t>(extra + position / 8) >> position % 8;
     position += count;
     return static_cast<std::uint32_t>(value & ((std::uint64_t{1} << count) - 1));
   }
@@ -645,6 +642,7 @@ class WavefrontDecoder {
 }  // namespace
 
 bool decode_wavefront(const TileShape& shape, const AdaptivePayload& payload, TileCodes& tile) {
+  if constexpr (kSwapsBytes) return false;  // lanes lie in vectors of both 16 and 32 bits
   return WavefrontDecoder(shape, payload, tile).run();
 }
 
