@@ -1,9 +1,12 @@
 # Sourced. The Debian 12 packages that isohf needs, and the one function that installs what is missing of them.
 
+# Of the programs without viewer and modules, on whatever machine.
+ISOHF_PACKAGES_LEAN=(
+  zlib1g-dev libdeflate-dev libtiff-dev libpng-dev libjpeg-dev libexpat1-dev libpugixml-dev libwebp-dev libopenexr-dev
+  libtbb-dev libfmt-dev nlohmann-json3-dev libtomlplusplus-dev libgeographiclib-dev nettle-dev libeigen3-dev)
 ISOHF_PACKAGES_BUILD=(
   g++ cmake ninja-build pkg-config git ca-certificates
-  zlib1g-dev libdeflate-dev libtiff-dev libpng-dev libjpeg-dev libexpat1-dev libpugixml-dev libwebp-dev libsqlite3-dev libopenexr-dev libopenimageio-dev
-  libtbb-dev libfmt-dev nlohmann-json3-dev libtomlplusplus-dev libgeographiclib-dev libproj-dev libnetcdf-dev nettle-dev libeigen3-dev
+  "${ISOHF_PACKAGES_LEAN[@]}" libsqlite3-dev libopenimageio-dev libproj-dev libnetcdf-dev
   libepoxy-dev libglfw3-dev libegl-dev libgl-dev libegl1 libgl1-mesa-dri
   libgtest-dev libgmock-dev libbenchmark-dev
   gnuplot-nox unzip zip xvfb xauth xdotool python3-jsonschema)

@@ -41,6 +41,20 @@ std::filesystem::path fast_parent() {
   return std::filesystem::is_directory(in_memory) ? in_memory : std::filesystem::temp_directory_path();
 }
 
+// ISOHF_READER_CASES=FOLDER writes every case to FOLDER/NAME, beside .opened, which names what is opened: for
+// scripts/portability.
+TEST(ReaderCases, AreWrittenWhereScriptsWantThem) {
+  const char* const folder = std::getenv("ISOHF_READER_CASES");
+  if (folder == nullptr) GTEST_SKIP() << "ISOHF_READER_CASES names no folder";
+  for (const ReaderCase& each : cases()) {
+    const std::filesystem::path own = std::filesystem::path(folder) / each.name;
+    std::filesystem::create_directories(own);
+    for (const auto& [name, bytes] : each.beside) write_file(own / name, bytes);
+    write_file(own / each.file_name, each.bytes);
+    write_file(own / ".opened", each.opened.empty() ? each.file_name : each.opened);
+  }
+}
+
 class ReaderMutation : public ::testing::TestWithParam<std::size_t> {
  protected:
   void SetUp() override {
