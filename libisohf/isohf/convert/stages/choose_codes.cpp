@@ -185,7 +185,7 @@ bool choose_codes_by(Conversion& conversion, const RangeScan& scan, bool may_cut
                             found.voids));
   }
   const QuantisationRequest request = request_of(conversion, found.range);
-  if (conversion.plan.outside == Outside::kCover) found.range = EdgeRange::widen(found.range, scan.edges);
+  if (conversion.plan.outside != Outside::kClamp) found.range = EdgeRange::widen(found.range, scan.edges);
   conversion.quantisation = choose_quantisation(request, found.range, info);
   const double over = overshoot(conversion.kernel, conversion.prefilter);
   if (over == 0.0 || conversion.options.code_type == CodeType::kF32) return true;
