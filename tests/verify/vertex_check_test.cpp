@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <random>
 #include <vector>
 
 #include "isohf/archive.h"
@@ -139,6 +140,43 @@ TEST(VertexCheck, SeesOneSampleThatIsOffByAFloatsLastBit) {
   EXPECT_EQ(check_vertices(archive, source).wrong, 0);
   source.at(70, 80) = std::nextafter(source.at(70, 80), HUGE_VALF);
   EXPECT_GT(check_vertices(archive, source).wrong, 0);
+}
+
+/// Heights of a stated range are summed above its middle, however little of it there is.
+TEST(VertexCheck, HoldsHeightsOfAStatedRangeAgainstTheRoundingThatTheyHave) {
+  const test::TemporaryFolder folder;
+  std::mt19937_64 random(7);
+  for (int i = 0; i < 20; ++i) {
+    test::MemorySource<std::int8_t> source(SampleType::kInt8, 40, 52, [&](std::int64_t, std::int64_t) {
+      return static_cast<double>(static_cast<int>(random() % 200) - 100);
+    });
+    ConvertOptions options;
+    options.filter = Filter::kBspline2;
+    options.z_range = {-49790.25 - 7.0 * i, 31736.4};
+    options.step = 0.0;
+    options.overwrite = true;
+    (void)convert(source, folder / "a.isohf", options);
+    EXPECT_EQ(check_vertices(ArchiveReader(folder / "a.isohf"), source).wrong, 0) << i;
+  }
+}
+
+/// The step is a last bit less than a whole part of the range, so that the last code does not lie beyond it.
+TEST(VerifyArchive, TakesTheLastCodeOfAStatedRangeForOne) {
+  const test::TemporaryFolder folder;
+  test::MemorySource<float> source(SampleType::kFloat32, 20, 20,
+                                   [](std::int64_t c, std::int64_t r) { return 1000.0 + static_cast<double>(c * r); });
+  for (const auto& [low, high] : std::vector<std::pair<double, double>>{{243.9251386680371, 8579.8573802898},
+                                                                        {371.866902078179, 9239.989095354056},
+                                                                        {-3661.648081427241, 4939.154602649878}}) {
+    ConvertOptions options;
+    options.code_type = CodeType::kU8;
+    options.z_range = {low, high};
+    options.clamp_range = true;
+    options.overwrite = true;
+    (void)convert(source, folder / "a.isohf", options);
+    const VerifyReport report = verify_archive(folder / "a.isohf");
+    EXPECT_TRUE(report.passed()) << low << ": " << (report.findings.empty() ? "" : report.findings.front().text);
+  }
 }
 
 }  // namespace

@@ -88,7 +88,7 @@ class Contradictions {
     const auto [first, second] = *metadata_.z_range;
     const double code = (second - first) / codes.scale;
     if (first != codes.offset) add("samples.range", fmt::format("begins at {}, the codes at {}", first, codes.offset));
-    if (!(std::abs(code - std::round(code)) <= 1e-6) || code > codes.max_code())
+    if (!(std::abs(code - std::round(code)) <= 1e-6) || std::round(code) > codes.max_code())
       add("samples.range", fmt::format("ends at {}, which is no code's elevation", second));
   }
 

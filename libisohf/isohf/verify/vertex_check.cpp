@@ -40,8 +40,10 @@ class VertexCheck {
     (void)check_same_source(archive, source.info());
     const Quantisation& q = metadata_.quantisation;
     const Statistics& statistics = metadata_.statistics;
-    const ElevationRange range{statistics.min.value_or(0.0), statistics.max.value_or(0.0)};
-    // Whatever the archive was made with; floats are rounded once more.
+    // Heights were summed above the middle of the range that was asked for, or of what there is; floats are rounded once more.
+    const ElevationRange range = metadata_.z_range
+                                     ? ElevationRange{metadata_.z_range->first, metadata_.z_range->second}
+                                     : ElevationRange{statistics.min.value_or(0.0), statistics.max.value_or(0.0)};
     datum_ = choose_datum(range);
     const double largest = std::max(std::abs(range.min), std::abs(range.max));
     const double stored = q.type == CodeType::kF32 ? 0x1p-24 * largest : 0.5 * q.scale;
