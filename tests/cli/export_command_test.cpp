@@ -267,5 +267,19 @@ TEST_F(ExportCommand, LeavesNothingWhereTheDiskIsFullOrAFileIsThere) {
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(out), {}), 8);
 }
 
+TEST_F(ExportCommand, KeepsWhatTookAnOldFilesPlaceWhereALaterTileFails) {
+  const std::vector<std::string> cut = {"--tiles", "150x2", "--tile-size", "5x40", "--overlap", "2"};
+  std::vector<std::string> again = {folder_ / "t.npy", "--overwrite"};
+  again.insert(again.end(), cut.begin(), cut.end());
+  (void)exported(again);
+  std::filesystem::remove(folder_ / "t_x1_y0.npy");
+  std::filesystem::create_directory(folder_ / "t_x140_y0.npy.part");  // of the third group of columns
+  EXPECT_THAT(refused(again, 1), HasSubstr("t_x140_y0.npy"));
+  for (const char* old : {"t_x0_y0.npy", "t_x0_y1.npy", "t_x63_y1.npy", "t_x140_y0.npy"}) {
+    EXPECT_TRUE(std::filesystem::exists(folder_ / old)) << old;
+  }
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "t_x1_y0.npy"));
+}
+
 }  // namespace
 }  // namespace isohf::test

@@ -54,6 +54,12 @@ TEST_F(ResumeComplete, IsDoneInOneLine) {
   EXPECT_EQ(resume({"--filter", "nearest", "-j", "1", "--memory", "300M"}).exit_code, 0);
 }
 
+TEST_F(ResumeComplete, TakesAwayTheJournalOfARunThatWasKilledAtItsEnd) {
+  write_text(output_ + ".part.journal", "left");
+  EXPECT_EQ(resume().exit_code, 0);
+  EXPECT_FALSE(fs::exists(output_ + ".part.journal"));
+}
+
 TEST_F(ResumeComplete, SaysWhatDiffers) {
   expect_refused({"--filter", "bspline3"}, R"(was made otherwise: filter "nearest", not "bspline3"; --overwrite)");
   expect_refused({"--filter", "nearest", "--level", "3"}, "level 5, not 3");

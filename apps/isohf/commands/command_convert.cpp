@@ -176,7 +176,13 @@ bool is_complete(const ConvertCommandOptions& options, const Prepared& prepared)
   } catch (const Error& error) {
     difference = std::string("is no complete archive: ") + error.what();
   }
-  if (difference.empty()) return true;
+  if (difference.empty()) {
+    // A run that was killed between its last two steps left its journal.
+    if (!std::filesystem::exists(options.output + ".part", none)) {
+      std::filesystem::remove(options.output + ".part.journal", none);
+    }
+    return true;
+  }
   if (options.convert.overwrite) return false;
   throw Error(ErrorCode::kInvalidArgument, {options.output, difference, "", "--overwrite makes it anew"});
 }

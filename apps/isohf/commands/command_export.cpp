@@ -215,7 +215,7 @@ class Exporter {
           reading);
     }
     files = tiles.files();
-    written = tiles.keep();
+    written = tiles.written();
   }
 
   SampleMapping mapping;

@@ -22,7 +22,7 @@ ExportTiles::ExportTiles(const std::string& output, const TileCut& cut, std::int
 ExportTiles::~ExportTiles() {
   open_.clear();
   std::error_code ignored;
-  for (const std::string& file : written_) std::filesystem::remove(file, ignored);
+  for (const std::string& file : new_) std::filesystem::remove(file, ignored);
 }
 
 std::string ExportTiles::name(std::int64_t column, std::int64_t row) const {
@@ -94,8 +94,13 @@ void ExportTiles::write_part(TileRow& tiles, std::int64_t first, std::span<const
   });
   if (end < top + cut_.rows) return;
   for (const auto& sink : tiles.sinks) {
+    const bool is_new = !std::filesystem::exists(sink->files().front());
     sink->finish();
-    for (std::string& file : sink->files()) written_.push_back(std::move(file));
+    for (std::string& file : sink->files()) {
+      if (is_new) new_.push_back(file);
+      written_.push_back(std::move(file));
+    }
+    if (++finished_ == files()) new_.clear();  // all is written, whoever interrupts what is left
   }
 }
 

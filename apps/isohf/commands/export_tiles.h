@@ -6,7 +6,6 @@
 #include <memory>
 #include <span>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "formats/write/raster_sink.h"
@@ -17,8 +16,8 @@ namespace isohf::cli {
 /// The files that a raster is cut into: NAME_x0_y0.r16, the North-West one, and on to the East and South; NAME.r16
 /// where no tiles were asked for.
 ///
-/// Rows come from North to South, once for each group of tile columns: at most 64 columns are open at a time. What was
-/// written is removed again unless keep() is called.
+/// Rows come from North to South, once for each group of tile columns: at most 64 columns are open at a time. Unless all
+/// is written, what is new is removed again; what took an old file's place stays, as the old one is gone.
 class ExportTiles {
  public:
   using SpecOf = std::function<RasterSpec(std::int64_t column, std::int64_t row)>;  ///< of one tile
@@ -36,8 +35,8 @@ class ExportTiles {
   void begin_group(std::int64_t group, SpecOf spec_of);
   /// Whole rows of the raster from `row` on. Throws Error as RasterSink does.
   void write(std::int64_t row, std::span<const std::byte> rows);
-  /// All is written: the files stay, which are returned.
-  std::vector<std::string> keep() { return std::exchange(written_, {}); }
+  /// What was written.
+  [[nodiscard]] const std::vector<std::string>& written() const { return written_; }
 
  private:
   struct TileRow {
@@ -56,7 +55,9 @@ class ExportTiles {
   std::int64_t columns_ = 0;
   std::int64_t next_row_ = 0;  ///< of tiles, to be opened
   std::vector<TileRow> open_;
+  std::int64_t finished_ = 0;  ///< tiles
   std::vector<std::string> written_;
+  std::vector<std::string> new_;  ///< of these, where no file was before, unless all is written
 };
 
 }  // namespace isohf::cli
