@@ -120,8 +120,8 @@ PlaceScale scale_at(const ReferenceMap& map, MapPoint place) {
   scale.meridional = scale_towards(to_north);
   scale.parallel = scale_towards(to_east);
   if (std::isfinite(scale.areal + scale.meridional + scale.parallel)) return scale;
-  constexpr double kNowhere = std::numeric_limits<double>::quiet_NaN();
-  return {kNowhere, kNowhere, kNowhere, kNowhere, kNowhere, kNowhere, kNowhere, kNowhere};
+  constexpr double kNoNumber = std::numeric_limits<double>::quiet_NaN();
+  return {kNoNumber, kNoNumber, kNoNumber, kNoNumber, kNoNumber, kNoNumber, kNoNumber, kNoNumber};
 }
 
 std::optional<MapGround> ground_under(const ReferenceMap& map, const MapBounds& bounds) {
