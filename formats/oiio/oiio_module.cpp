@@ -10,8 +10,8 @@
 #include <fstream>
 #include <memory>
 #include <mutex>
-#include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "formats/module_inside.h"
@@ -24,7 +24,8 @@ struct IsohfOiioRaster {
   OIIO::ImageSpec spec;
   OIIO::TypeDesc type;
   int channel = 0;
-  int channels = 1;  ///< that are delivered, from `channel` on
+  int channels = 1;           ///< that are delivered, from `channel` on
+  bool is_displaced = false;  ///< undo_displacement() has work to do
   std::int64_t band_bytes = 0;
   std::vector<unsigned char> band;  ///< rows read around a window that does not end where the file's blocks do
 };
@@ -72,14 +73,28 @@ long largest_value(const std::vector<unsigned char>& head) {
   return numbers[2];
 }
 
-/// Whether the first component of a JPEG 2000 codestream is signed: ISO 15444-1, A.5.1, the marker SIZ behind SOC. The
-/// codestream stands in the box jp2c (I.5.4) or alone; nullopt where it was not found.
-std::optional<bool> first_component_is_signed(const std::vector<unsigned char>& head) {
+/// What a JPEG 2000 codestream says of the samples of one component.
+struct ComponentKind {
+  int bits = 0;
+  bool is_signed = false;
+};
+
+/// Of every component: ISO 15444-1, A.5.1, the marker SIZ behind SOC. The codestream stands in the box jp2c (I.5.4) or
+/// alone; empty where it was not found.
+std::vector<ComponentKind> component_kinds(const std::vector<unsigned char>& head) {
   constexpr std::array<unsigned char, 4> kStart = {0xFF, 0x4F, 0xFF, 0x51};  // SOC, SIZ
-  constexpr std::ptrdiff_t kPrecision = 42;                                  // Ssiz of the first component, from SOC
+  constexpr std::ptrdiff_t kCount = 40;                                      // Csiz, from SOC
+  constexpr std::ptrdiff_t kFirst = kCount + 2;                              // Ssiz, XRsiz, YRsiz of each
   const auto start = std::search(head.begin(), head.end(), kStart.begin(), kStart.end());
-  if (head.end() - start <= kPrecision) return std::nullopt;
-  return (start[kPrecision] & 0x80U) != 0;
+  std::vector<ComponentKind> kinds;
+  if (head.end() - start < kFirst) return kinds;
+  const std::ptrdiff_t count = 256 * start[kCount] + start[kCount + 1];
+  if (head.end() - start < kFirst + 3 * count) return kinds;
+  for (std::ptrdiff_t i = 0; i < count; ++i) {
+    const unsigned kind = start[kFirst + 3 * i];
+    kinds.push_back({static_cast<int>(kind & 0x7FU) + 1, (kind & 0x80U) != 0});
+  }
+  return kinds;
 }
 
 [[noreturn]] void refuse(const std::string& what) {
@@ -95,11 +110,6 @@ void require_stored_numbers(const std::string& format, int bits, int stored_bits
     refuse("the samples have " + std::to_string(stored_bits) + " bits, and OpenImageIO spreads them over " +
            std::to_string(bits));
   }
-  if (format == "jpeg2000") {
-    const std::optional<bool> is_signed = first_component_is_signed(head_of(path));
-    if (!is_signed) refuse("there is no codestream in its first MiB, so that nothing says whether samples are signed");
-    if (*is_signed) refuse("the samples are signed, which OpenImageIO reads as if they were not");
-  }
   if (is_photo || format != "pnm") return;
   if (bits == 16) refuse("OpenImageIO rounds the samples of any-maps of 16 bits");
   if (!is_floating) {
@@ -109,6 +119,37 @@ void require_stored_numbers(const std::string& format, int bits, int stored_bits
              ", and OpenImageIO spreads the samples over 0 to 255");
     }
   }
+}
+
+/// Makes raster.type that of signed samples where a JPEG 2000 file has them. OpenImageIO 2.4 hands out value + 2^(bits / 2
+/// - 1) modulo 2^bits for them, which undo_displacement() takes back.
+void find_displacement(IsohfOiioRaster& raster, int bits, bool is_photo, const std::string& path) {
+  const std::vector<ComponentKind> kinds = component_kinds(head_of(path));
+  if (kinds.empty()) refuse("there is no codestream in its first MiB, so that nothing says whether samples are signed");
+  if (static_cast<int>(kinds.size()) < raster.channel + raster.channels) return;  // made of a palette, unsigned
+  const auto first = kinds.begin() + raster.channel;
+  const auto end = first + raster.channels;
+  const auto is_signed = [](const ComponentKind& kind) { return kind.is_signed; };
+  const bool some = std::any_of(first, end, is_signed);
+  if (!is_photo && raster.channels == 1 && first->bits != bits) {
+    refuse("the samples of this channel have " + std::to_string(first->bits) +
+           " bits, and OpenImageIO spreads them over " + std::to_string(bits));
+  }
+  if (!some) return;
+  constexpr int kKnown = 204;  // 2.4
+  if (is_photo || OIIO::openimageio_version() / 100 != kKnown || (bits != 8 && bits != 16)) {
+    refuse("the samples are signed, which OpenImageIO reads as if they were not");
+  }
+  if (!std::all_of(first, end, is_signed)) refuse("some channels are signed, others are not; `channel` names one");
+  raster.is_displaced = true;
+  raster.type = bits == 8 ? OIIO::TypeDesc::INT8 : OIIO::TypeDesc::INT16;
+}
+
+template <typename Unsigned>
+void undo_displacement(void* samples, std::size_t count) {
+  constexpr unsigned kDisplacement = 1U << (sizeof(Unsigned) * 4 - 1);
+  auto* const values = static_cast<Unsigned*>(samples);
+  for (std::size_t i = 0; i < count; ++i) values[i] = static_cast<Unsigned>(values[i] - kDisplacement);
 }
 
 /// Windows narrower than the raster, or in tiles, are cut out of bands of about this size.
@@ -200,6 +241,7 @@ bool open_raster(IsohfOiioRaster& raster, const char* path, const std::string& c
   raster.channel = all ? 0 : channel_index(spec, channel);
   raster.channels = all ? spec.nchannels : 1;
   raster.type = all ? spec.format : spec.channelformat(raster.channel);
+  if (std::string_view(raster.input->format_name()) == "jpeg2000") find_displacement(raster, bits, is_photo, path);
   const std::string space = spec.get_string_attribute("oiio:ColorSpace");
   info.channels = raster.channels;
   info.alpha = spec.alpha_channel;
@@ -224,12 +266,22 @@ void read_rows(IsohfOiioRaster& raster, int begin, int end, void* out) {
   const OIIO::ImageSpec& spec = raster.spec;
   const int from = spec.y + begin;
   const int to = spec.y + end;
+  // What it hands out as signed it would convert.
+  const OIIO::TypeDesc stored = !raster.is_displaced      ? raster.type
+                                : raster.type.size() == 1 ? OIIO::TypeDesc(OIIO::TypeDesc::UINT8)
+                                                          : OIIO::TypeDesc(OIIO::TypeDesc::UINT16);
   const bool done = spec.tile_width > 0
                         ? raster.input->read_tiles(0, 0, spec.x, spec.x + spec.width, from, to, spec.z, spec.z + 1,
-                                                   raster.channel, raster.channel + raster.channels, raster.type, out)
+                                                   raster.channel, raster.channel + raster.channels, stored, out)
                         : raster.input->read_scanlines(0, 0, from, to, spec.z, raster.channel,
-                                                       raster.channel + raster.channels, raster.type, out);
-  if (done) return;
+                                                       raster.channel + raster.channels, stored, out);
+  if (done) {
+    if (!raster.is_displaced) return;
+    const auto count = static_cast<std::size_t>(end - begin) * static_cast<std::size_t>(spec.width) *
+                       static_cast<std::size_t>(raster.channels);
+    return stored.size() == 1 ? undo_displacement<std::uint8_t>(out, count)
+                              : undo_displacement<std::uint16_t>(out, count);
+  }
   throw Error(ErrorCode::kCorrupt,
               "rows " + std::to_string(begin) + " to " + std::to_string(end - 1) + ": " + raster.input->geterror());
 }

@@ -49,7 +49,13 @@ class OiioSource final : public HeightSource {
       if (channel.empty()) channel = decide_on_colours();
       const std::string warning = open(packing_ ? ISOHF_OIIO_ALL_CHANNELS : channel);
       if (!warning.empty()) info_.warnings.push_back(warning);
-      if (const GeoTags tags = geojp2_tags(path); !tags.empty()) place(tags);
+      if (const GeoTags tags = geojp2_tags(path); !tags.empty()) {
+        try {
+          place(tags);
+        } catch (const Error& error) {
+          throw error.within(path);
+        }
+      }
       read_place_beside(info_, info_.channel.empty() ? 1 : 0);
       if (packing_) place_web_tile(info_);
       apply_open_options(info_, options);
@@ -98,7 +104,7 @@ class OiioSource final : public HeightSource {
   void place(const GeoTags& tags) {
     GeoTiffPlace found = place_from_geotiff(tags, info_.height);
     if (found.rows_from_south) {
-      throw Error(ErrorCode::kUnsupported, info_.path + ": has its southernmost row first; gdalwarp turns it");
+      throw Error(ErrorCode::kUnsupported, "has its southernmost row first; gdalwarp turns it");
     }
     info_.georeference = std::move(found.georeference);
     info_.vertical_unit = found.vertical_unit;

@@ -391,6 +391,20 @@ def geojp2(isohf, folder):
     driver.CreateCopy(str(folder / "a.jp2"), raster, options=["REVERSIBLE=YES", "QUALITY=100", "GMLJP2=NO"])
     said = json.loads(isohf.must("info", folder / "a.jp2", "--json").stdout)
     check((said["void_values"], said["z_scale"], said["z_offset"]) == ([17], 0.5, -100), f"GeoJP2 beside: {said}")
+    # A system that is refused names the file.
+    raster.SetProjection(system("EPSG:4807").ExportToWkt())
+    driver.CreateCopy(str(folder / "b.jp2"), raster, options=["REVERSIBLE=YES", "QUALITY=100", "GMLJP2=NO"])
+    (folder / "b.jp2.aux.xml").unlink(missing_ok=True)
+    isohf.refuses(f"{folder / 'b.jp2'}: the reference system", "info", folder / "b.jp2")
+    # Every number of 16 signed bits, in one codestream, in tiles, and with losses.
+    for options in (["REVERSIBLE=YES", "QUALITY=100"], ["REVERSIBLE=YES", "QUALITY=100", "BLOCKXSIZE=64", "BLOCKYSIZE=64"], ["QUALITY=20"]):
+        signed = gdal.GetDriverByName("MEM").Create("", 256, 256, 1, gdal.GDT_Int16)
+        signed.GetRasterBand(1).WriteArray(numpy.arange(-32768, 32768, dtype=numpy.int16).reshape(256, 256))
+        driver.CreateCopy(str(folder / "s.jp2"), signed, options=options)
+        isohf.must("convert", folder / "s.jp2", "-o", folder / "s.isohf", "--overwrite", "-q", "--lossless")
+        isohf.must("restore", folder / "s.isohf", folder / "s.tif", "--overwrite", "-q")
+        theirs = gdal.Open(str(folder / "s.jp2")).ReadAsArray()
+        check(numpy.array_equal(gdal.Open(str(folder / "s.tif")).ReadAsArray(), theirs), f"signed JPEG 2000, {options}: samples differ")
 
 
 def ranges_of_voids(isohf, folder):
