@@ -57,6 +57,39 @@ TEST_F(SilentFailures, ASingleTileIsNamedLikeItsLikes) {
   run({"export", "a.isohf", "whole.npy", "-q"});
   EXPECT_EQ(folder.names(), (std::vector<std::string>{"a.isohf", "one_x0_y0.npy", "two_x0_y0.npy", "whole.npy"}));
   EXPECT_EQ(read_file(folder / "one_x0_y0.npy"), read_file(folder / "whole.npy"));
+  EXPECT_THAT(run({"export", "a.isohf", "three.npy", "--tiles", "1x1"}).out, HasSubstr("three_x0_y0.npy: "));
+}
+
+TEST_F(SilentFailures, NamesThatAreNoUtf8AreKeptAsLatin1AndVerify) {
+  write_file(folder / "a.asc",
+             "ncols 3\nnrows 3\nxllcorner 500000\nyllcorner 4000000\ncellsize 10\n10 11 12\n11 13 15\n12 15 20\n");
+  write_file(folder / "a.prj",
+             "PROJCS[\"M\xe9tropole\",GEOGCS[\"GCS_WGS_1984\",DATUM[\"D_WGS_1984\",SPHEROID[\"WGS_1984\",6378137,"
+             "298.257223563]],PRIMEM[\"Greenwich\",0],UNIT[\"Degree\",0.0174532925199433]],PROJECTION["
+             "\"Lambert_Conformal_Conic\"],PARAMETER[\"False_Easting\",700000],PARAMETER[\"False_Northing\",6600000],"
+             "PARAMETER[\"Central_Meridian\",3],PARAMETER[\"Standard_Parallel_1\",44],PARAMETER["
+             "\"Standard_Parallel_2\",49],PARAMETER[\"Latitude_Of_Origin\",46.5],UNIT[\"Meter\",1]]");
+  run({"convert", "a.asc", "a.isohf", "-q"});
+  run({"verify", "a.isohf"});
+  EXPECT_THAT(run({"info", "a.isohf"}).out, HasSubstr("M\xc3\xa9tropole"));
+}
+
+TEST_F(SilentFailures, DiffNamesAMemberThatOneArchiveAloneHas) {
+  run({"convert", kVoids, "a.isohf", "-q"});
+  run({"convert", kVoids, "b.isohf", "-q"});
+  write_file(folder / "note.txt", "hello");
+  run({"attach", "b.isohf", "note.txt"});
+  EXPECT_THAT(run({"diff", "a.isohf", "b.isohf"}, 3).out,
+              HasSubstr("member \"note.txt\": nothing, then {\"bytes\":5,"));
+  EXPECT_THAT(run({"diff", "b.isohf", "b.isohf"}).out, Not(HasSubstr("note.txt")));
+}
+
+TEST_F(SilentFailures, BlankedNodesOfASurferGridAreVoidInWhatRestoreWrites) {
+  write_file(folder / "a.grd", "DSAA\n3 3\n0 20\n0 20\n1 9\n1 2 3\n4 1.70141e+38 6\n7 8 9\n");
+  run({"convert", "a.grd", "a.isohf", "--lossless", "-q"});
+  const RunResult restored = run({"restore", "a.isohf", "a.tif"});
+  EXPECT_EQ(restored.err, "");
+  EXPECT_THAT(run({"info", "a.tif", "--stats"}).out, HasSubstr("1 of 9 void"));
 }
 
 TEST_F(SilentFailures, TheValidRangeCountsWhatItRemovesAndWarnsOfNothing) {

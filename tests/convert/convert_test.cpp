@@ -1,9 +1,11 @@
 #include "isohf/convert.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <filesystem>
+#include <functional>
 #include <limits>
 #include <random>
 #include <string>
@@ -11,6 +13,7 @@
 #include "isohf/archive.h"
 #include "isohf/error.h"
 #include "isohf/lattice/barycentric.h"
+#include "isohf/surface.h"
 #include "isohf/surface/resample/kernels.h"
 #include "isohf/verify.h"
 #include "support/memory_source.h"
@@ -20,6 +23,7 @@ namespace isohf {
 namespace {
 
 namespace fs = std::filesystem;
+using ::testing::HasSubstr;
 
 class Convert : public testing::Test {
  protected:
@@ -47,6 +51,76 @@ test::MemorySource<std::int16_t> hills(std::int64_t width = 90, std::int64_t hei
             return std::round(800.0 + 300.0 * std::sin(static_cast<double>(c) * 0.11) *
                                           std::cos(static_cast<double>(r) * 0.07));
           }};
+}
+
+/// What a caller gets wrong is one error, before a file is made.
+TEST_F(Convert, RefusesWhatCallersGetWrong) {
+  const auto message = [&](HeightSource& source, const ConvertOptions& options, const Job& job = {}) -> std::string {
+    try {
+      run(source, path("wrong.isohf"), options, job);
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument) << error.what();
+      return error.what();
+    }
+    return "done";
+  };
+  const auto of_source = [&](const std::function<void(SourceInfo&)>& change) {
+    auto source = hills();
+    change(source.mutable_info());
+    return message(source, small_tiles());
+  };
+  EXPECT_THAT(of_source([](SourceInfo& info) { info.z_scale = 0.0; }),
+              HasSubstr("z_scale is 0, must be a number other"));
+  EXPECT_THAT(of_source([](SourceInfo& info) { info.georeference.spacing_x = -1.0; }),
+              HasSubstr("spacing of columns is -1"));
+  EXPECT_THAT(of_source([](SourceInfo& info) { info.georeference.origin_x = std::nan(""); }),
+              HasSubstr("first easting is nan"));
+  EXPECT_THAT(of_source([](SourceInfo& info) { info.georeference.system.epsg = -5; }), HasSubstr("EPSG code is -5"));
+  const auto of_options = [&](const std::function<void(ConvertOptions&)>& change) {
+    auto source = hills();
+    ConvertOptions options = small_tiles();
+    change(options);
+    return message(source, options);
+  };
+  EXPECT_THAT(of_options([](ConvertOptions& options) { options.texture = TextureRequest{}; }), HasSubstr("no photo"));
+  EXPECT_THAT(of_options([](ConvertOptions& options) { options.max_error = std::nan(""); }),
+              HasSubstr("`max_error` is nan"));
+  EXPECT_THAT(of_options([](ConvertOptions& options) { options.acquisition.kind = Acquisition::Kind::kFir; }),
+              HasSubstr("neither taps nor a file"));
+  for (const int threads : {-7, 1 << 30}) {
+    auto source = hills();
+    Job job;
+    job.threads = threads;
+    EXPECT_THAT(message(source, small_tiles(), job), HasSubstr("must be 1 to 1024"));
+  }
+  EXPECT_FALSE(fs::exists(path("wrong.isohf")));
+  EXPECT_THROW(ArchiveReader(nullptr, "none"), Error);
+}
+
+TEST_F(Convert, RowsAreReadOnceFromNorthToSouth) {
+  auto source = hills();
+  ConvertOptions options = small_tiles();
+  options.lossless = true;
+  (void)run(source, path("hills.isohf"), options);
+  const ArchiveReader archive(path("hills.isohf"));
+  const SampleGrid grid = natural_grid(archive.metadata());
+  RowReader rows(archive, grid);
+  std::vector<double> some(static_cast<std::size_t>(2 * grid.width));
+  const auto row = std::span(some).first(static_cast<std::size_t>(grid.width));
+  rows.read(50, 1, row);
+  EXPECT_THROW(rows.read(0, 1, row), Error) << "back";
+  EXPECT_THROW(rows.read(51, 1, some), Error) << "room for two";
+  EXPECT_THROW(rows.read(51, -1, {}), Error);
+  EXPECT_THROW(rows.read(grid.height, 1, row), Error) << "beyond the last";
+  rows.read(grid.height - 1, 1, row);
+  SourceRowReader own(archive);
+  while (!own.at_end()) (void)own.read_next();
+  try {
+    (void)own.read_next();
+    ADD_FAILURE() << "went on";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
+  }
 }
 
 TEST_F(Convert, WritesAnArchiveThatVerifies) {

@@ -228,7 +228,7 @@ TEST(PlaneStage, RowsFarApartAreReadFromThePlaneThatSuffices) {
   const ArchiveReader archive(file, "a.isohf");
   const Metadata& metadata = archive.metadata();
   const TileGrid& tiles = metadata.grid;
-  const SampleGrid every_other = {18, 14, 0.0, 0.0, 8 * 8 * tiles.sigma_x(), 8 * 8 * tiles.sigma_z()};
+  const SampleGrid every_other = {9, 14, 0.0, 0.0, 16 * 8 * tiles.sigma_x(), 8 * 8 * tiles.sigma_z()};
   ASSERT_EQ(usual_method(metadata, every_other), RestoreMethod::kPlane);
   file->bytes = 0;
   const std::vector<double> of_plane = rows_of(archive, every_other, RestoreMethod::kPlane);
@@ -284,9 +284,9 @@ TEST(PlaneStage, RowsThatNoPlaneSufficesForAreReadFromTheTiles) {
   convert_waves(folder / "a.isohf", {});
   const ArchiveReader archive(folder / "a.isohf");
   const TileGrid& tiles = archive.metadata().grid;
-  EXPECT_EQ(usual_method(archive.metadata(), {9, 9, 0.0, 0.0, 63 * tiles.sigma_x(), 80 * tiles.sigma_z()}),
+  EXPECT_EQ(usual_method(archive.metadata(), {9, 9, 0.0, 0.0, 127 * tiles.sigma_x(), 80 * tiles.sigma_z()}),
             RestoreMethod::kHex);
-  EXPECT_EQ(usual_method(archive.metadata(), {9, 9, 0.0, 0.0, 80 * tiles.sigma_x(), 63 * tiles.sigma_z()}),
+  EXPECT_EQ(usual_method(archive.metadata(), {9, 9, 0.0, 0.0, 160 * tiles.sigma_x(), 63 * tiles.sigma_z()}),
             RestoreMethod::kHex);
   ConvertOptions options;
   options.planes = false;
@@ -300,7 +300,7 @@ TEST(PlaneStage, RowsOfAPlaneEndWhereTheSurfaceDoes) {
   convert_waves(folder / "a.isohf", {});
   const ArchiveReader archive(folder / "a.isohf");
   const TileGrid& tiles = archive.metadata().grid;
-  const double step = 9 * 8 * tiles.sigma_x();
+  const double step = 17 * 8 * tiles.sigma_x();
   const auto across = static_cast<std::int64_t>(tiles.world_width() / step) + 3;
   const auto down = static_cast<std::int64_t>(tiles.world_height() / step) + 3;
   const std::vector<double> rows = rows_of(archive, {across, down, 0.0, 0.0, step, step}, RestoreMethod::kPlane);

@@ -78,6 +78,16 @@ TEST(RasterDescription, GivesAPngPlaceAndMeaning) {
   EXPECT_TRUE(std::isnan(found[3]));
 }
 
+TEST(RasterDescription, OfRowsInAnotherOrderIsRefused) {
+  const TemporaryFolder folder;
+  write_picture(folder / "a.png");
+  std::string text = read_file(folder / "a.png.json");
+  const std::string order = "north to south";
+  text.replace(text.find(order), order.size(), "south to north");
+  write_file(folder / "a.png.json", text);
+  EXPECT_THAT(failure_of([&] { (void)open_raster(folder / "a.png"); }), HasSubstr("row_order is south to north"));
+}
+
 TEST(RasterDescription, IsOverruledByTheUser) {
   const TemporaryFolder folder;
   const std::string path = folder / "a.png";

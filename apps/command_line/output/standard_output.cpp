@@ -36,6 +36,7 @@ constexpr std::pair<std::string_view, std::string_view> kSpellings[] = {
     {"levels", "--levels"},
     {"like", "--like"},
     {"lossless", "--lossless"},
+    {"acquisition", "--acquisition"},
     {"max_error", "--max-error"},
     {"max_rounding", "--max-rounding"},
     {"max_size", "--texture-size"},

@@ -66,7 +66,7 @@ GridSize parts_of(const Metadata& metadata, const SampleGrid& grid) {
     const double least = std::min(length, most) / step;  // not a number where the map has no place
     return least > 1.0 ? static_cast<std::int64_t>(std::ceil(least * (1.0 - 1e-9))) : std::int64_t{1};
   };
-  return {parts(wide, tiles.sigma_x(), tiles.world_width()), parts(high, tiles.sigma_z(), tiles.world_height())};
+  return {parts(wide, 2.0 * tiles.sigma_x(), tiles.world_width()), parts(high, tiles.sigma_z(), tiles.world_height())};
 }
 
 /// Those places: as many in the area of each sample.
