@@ -68,13 +68,13 @@ Camera between(const Camera& from, const Camera& to, double share) {
   return out;
 }
 
-Camera overview_camera(const TileSource& source, const ViewState& view, Vec3* target) {
+Camera overview_camera(const TileSource& source, const ViewState& view, Vec3* target, Vec3 towards_eye) {
   const TileBounds whole = whole_bounds(source);
   const WorldBounds covered = source.covered();
   const double low = view.base ? Block::floor(source, view) : whole.low * view.exaggeration;
   const double high = whole.high * view.exaggeration;
   const Vec3 middle{0.5 * (covered.x0 + covered.x1), 0.5 * (low + high), 0.5 * (covered.z0 + covered.z1)};
-  const Vec3 way = normalised({0.25, 0.62, 0.95});
+  const Vec3 way = normalised(towards_eye);
   const Mat4 camera = look_along(-1.0 * way);
   const double half_y = std::tan(view.fov_y_rad / 2.0);
   const double half_x = half_y * view.width / view.height;

@@ -30,9 +30,14 @@ struct Camera {
 /// Part of the way from one camera to another, 0...1, the short way round.
 [[nodiscard]] Camera between(const Camera& from, const Camera& to, double share);
 
-/// A camera that sees all that the source covers from the South-East, as large as the view takes; what it looks at goes
-/// to `target` where wanted.
-[[nodiscard]] Camera overview_camera(const TileSource& source, const ViewState& view, Vec3* target = nullptr);
+/// Ways to an eye from what it looks at.
+inline constexpr Vec3 kFromTheSouthEast = {0.25, 0.62, 0.95};
+inline constexpr Vec3 kFromAbove = {0.0, 1.0, 0.02};  ///< North up
+
+/// A camera that sees all that the source covers, as large as the view takes; what it looks at goes to `target` where
+/// wanted.
+[[nodiscard]] Camera overview_camera(const TileSource& source, const ViewState& view, Vec3* target = nullptr,
+                                     Vec3 towards_eye = kFromTheSouthEast);
 
 /// 1, but where the heights of all are in no known proportion to the ground, or so low that nothing would be seen of
 /// them: 1, 2 or 5 times a power of ten.

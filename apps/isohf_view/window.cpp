@@ -243,6 +243,15 @@ class Controls {
     return Hud::slider_hours(cursor_.x, cursor_.y, session_.view.width, session_.view.height, screen_scale());
   }
 
+  /// From as far as Home, or farther, on all that there is.
+  void look_down() {
+    Vec3 middle{};
+    const Camera home = overview_camera(session_.source(), session_.view, &middle);
+    const bool sees_all = length(session_.view.eye - middle) > 0.95 * length(home.eye - middle);
+    if (!sees_all) return steering_.look_down();
+    steering_.go_to(overview_camera(session_.source(), session_.view, nullptr, kFromAbove));
+  }
+
   void press(int key) {
     ViewState& view = session_.view;
     const auto toggle = [](bool& what) { what = !what; };
@@ -258,7 +267,7 @@ class Controls {
       case GLFW_KEY_N:
         return steering_.face_north();
       case GLFW_KEY_T:
-        return steering_.look_down();
+        return look_down();
       case GLFW_KEY_Y:
         return measure();
       case GLFW_KEY_O:

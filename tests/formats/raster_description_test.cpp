@@ -85,7 +85,8 @@ TEST(RasterDescription, OfRowsInAnotherOrderIsRefused) {
   const std::string order = "north to south";
   text.replace(text.find(order), order.size(), "south to north");
   write_file(folder / "a.png.json", text);
-  EXPECT_THAT(failure_of([&] { (void)open_raster(folder / "a.png"); }), HasSubstr("row_order is south to north"));
+  EXPECT_THAT(failure_of(folder / "a.png", nullptr, [&] { (void)open_raster(folder / "a.png", {}); }),
+              HasSubstr("row_order is south to north"));
 }
 
 TEST(RasterDescription, IsOverruledByTheUser) {

@@ -52,6 +52,29 @@ TEST_F(RendererTest, DrawsEveryVisibleTileWithAtMostTwoCallsAPass) {
   EXPECT_GT(green, pixels.size() / 4 / 10);
 }
 
+TEST_F(RendererTest, OverviewsFromAnywhereHaveAllCornersInView) {
+  const test::MemoryTiles source(small_grid(), [](TileIndex, std::vector<std::uint16_t>&) {});
+  const WorldBounds ground = source.covered();
+  for (const auto& [width, height] : {std::pair{640, 360}, std::pair{300, 500}, std::pair{200, 80}}) {
+    for (const Vec3 way : {kFromTheSouthEast, kFromAbove}) {
+      ViewState view;
+      view.width = width;
+      view.height = height;
+      const Camera camera = overview_camera(source, view, nullptr, way);
+      for (const double x : {ground.x0, ground.x1}) {
+        for (const double z : {ground.z0, ground.z1}) {
+          const Vec3 at = Vec3{x, 0.0, z} - camera.eye;
+          const double depth = dot(at, camera.forward());
+          const double half_y = std::tan(view.fov_y_rad / 2.0) * depth;
+          EXPECT_LT(std::abs(dot(at, camera.right())), half_y * width / height) << width << " " << x << " " << z;
+          EXPECT_LT(std::abs(dot(at, cross(camera.right(), camera.forward()))), half_y)
+              << width << " " << x << " " << z;
+        }
+      }
+    }
+  }
+}
+
 TEST_F(RendererTest, StandsOnABlockWhoseHatchedFloorShowsThroughVoids) {
   const test::MemoryTiles source(small_grid(), [](TileIndex tile, std::vector<std::uint16_t>& codes) {
     if (tile == TileIndex{1, 1}) std::fill(codes.begin(), codes.end(), kVoidCode);
