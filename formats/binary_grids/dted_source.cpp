@@ -6,6 +6,7 @@
 #include <array>
 #include <cctype>
 #include <cmath>
+#include <cstring>
 #include <optional>
 #include <string_view>
 #include <vector>
@@ -63,8 +64,8 @@ class DtedSource final : public FileSource {
       std::byte* out = samples.data() + (c + (window.rows - 1) * window.columns) * 2;
       for (std::size_t i = 0; i < posts.size(); i += 2, out -= window.columns * 2) {
         const int value = elevation(posts[i], posts[i + 1]);
-        out[0] = static_cast<std::byte>(value & 0xFF);
-        out[1] = static_cast<std::byte>((value >> 8) & 0xFF);
+        const auto sample = static_cast<std::int16_t>(value);
+        std::memcpy(out, &sample, sizeof sample);
       }
     }
   }

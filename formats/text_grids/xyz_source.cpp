@@ -19,6 +19,7 @@
 #include "formats/georeference/files_beside.h"
 #include "formats/open_options.h"
 #include "formats/readers.h"
+#include "isohf/base/bytes.h"
 #include "isohf/base/file.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
@@ -251,6 +252,7 @@ class XyzSource final : public PlainSource {
     }
     const auto size = static_cast<std::uint64_t>(size_bytes(info_.sample_type));
     layout_.from_south = true;
+    layout_.big_endian = kSwapsBytes;  // the scratch file has memory's order
     if (by_columns_) {
       layout_.row_bytes = size;
       layout_.column_bytes = size * static_cast<std::uint64_t>(info_.height);
