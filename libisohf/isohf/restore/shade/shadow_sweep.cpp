@@ -20,7 +20,10 @@ constexpr std::int64_t kTilesTogether = 8;
 
 /// Steps behind its caster from which on a penumbra is one step of light wide at least: borders then have no teeth as
 /// large as cells, and the shade that a slope gives itself stays as sharp as it is.
-constexpr double kStepsToFullWidth = 8.0;
+constexpr double kStepsToFullWidth = 2.0;
+/// Depths are cut off beyond what light falls on so many steps. Less makes teeth of borders on steep ground, whose depth
+/// changes by more from vertex to vertex.
+constexpr double kDeepestSteps = 4.0;
 
 /// A visible or padding row of a tile at every half step from its West edge to its East edge.
 void spread(const TileShape& shape, const float* row, bool is_odd, float* out) {
@@ -124,12 +127,16 @@ ShadowSweep::ShadowSweep(const TileGrid& grid, const WorldBounds& ground, const 
   }
   const double widening = step * (sun.upper_fall - sun.lower_fall);
   const double steep = fall / (kStepsToFullWidth * widening);
-  const SunEdge upper{
-      .fall = step * sun.upper_fall, .widening = widening, .side = 0.5, .steep = steep, .most = fall, .deepest = fall};
+  const SunEdge upper{.fall = step * sun.upper_fall,
+                      .widening = widening,
+                      .side = 0.5,
+                      .steep = steep,
+                      .most = fall,
+                      .deepest = kDeepestSteps * fall};
   edges_ = {upper, upper};
   edges_[1].fall = step * sun.lower_fall;
   edges_[1].side = -0.5;
-  range_ = kStepsToFullWidth;
+  range_ = kStepsToFullWidth * kDeepestSteps;
 }
 
 void ShadowSweep::begin_behind(std::int64_t tiles_west, std::int64_t tiles_east, std::int64_t rows_before) {
