@@ -64,6 +64,15 @@ TEST_F(SampleCommand, ShadowsReachAsHighAsTheEdgeTowardsTheSunLetsThem) {
     EXPECT_NEAR(line.at("shadow").at("sun_share").get<double>(), share, 1e-5);
     EXPECT_NEAR(line.at("shadow").at("elevation").get<double>(), numbers[6], 1e-5);
   }
+  // Without a softness as much is seen as of the sun's disc stands above the edge.
+  constexpr double kDegree = 0.017453292519943295;
+  for (const double higher_deg : {-0.4, -0.2, 0.0, 0.1, 0.4}) {
+    const double height = above + 990.0 * (std::tan(8.0 * kDegree) - std::tan((8.0 + higher_deg) * kDegree));
+    const json line = json::parse(with({"--json", "--above", std::to_string(height)}).out);
+    EXPECT_NEAR(line.at("shadow").at("sun_share").get<double>(),
+                std::clamp(0.5 - higher_deg / (2.0 * 959.63 / 3600.0), 0.0, 1.0), 0.02)
+        << higher_deg;
+  }
   RunOptions place;
   const double at[] = {1000.0, 1000.0};
   place.input.assign(reinterpret_cast<const char*>(at), sizeof(at));

@@ -111,8 +111,8 @@ std::optional<SampleOptions> parse_sample(const Arguments& arguments) {
   line.option("--above", "H", "Height above the surface that the sun is seen from, vertical units (default 0)",
               [&](const std::string& text) { options.above = parse_height(text); });
   line.option("--shadow-softness", "K",
-              "The sun's apparent size at the caster's distance, vertical units (default 2, or 0.5 % of the elevation "
-              "range where that is less)",
+              "One size of all penumbrae, vertical units (default: the sun's disc, whose penumbra grows with the "
+              "caster's distance)",
               [&](const std::string& text) { options.sun.softness = parse_positive_number(text); });
   line.group("Work");
   line.option("-j,--threads", "N", "Threads, 1 to 1024 (default: all cores); the result does not depend on it",

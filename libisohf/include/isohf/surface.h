@@ -85,8 +85,8 @@ struct SurfaceSample {
 struct Sun {
   double azimuth_deg = 270.0;   ///< clockwise from the North of the archive's map
   double elevation_deg = 15.0;  ///< above the horizon; above 0 and below 90
-  /// The sun's apparent size k at the caster's distance, elevation units, > 0 (paper Eq. 16); nullopt: 2, or 0.5 % of the
-  /// elevation range where that is less.
+  /// One size k of the sun at all distances, elevation units, > 0 (paper Eq. 16); nullopt: its disc, as wide as it is
+  /// seen from the archive's body.
   std::optional<double> softness;
   double elevation_units_per_world_unit = 1.0;  ///< feet for one metre, say; > 0
 };
@@ -124,8 +124,8 @@ class Surface {
 
   /// How the sun shines on the surface, or on what stands `above` it, elevation units, >= 0. S is the greatest elevation
   /// of the triangles between the point and the sun, less what the shadow falls from there: to rounding, no sweep.
-  /// Ground beyond what the source covered casts none. The share is that of Eq. 16 (docs/paper.md, E16); on the surface
-  /// itself, where S is at least its elevation, twice that, at most 1 (A10).
+  /// Ground beyond what the source covered casts none. The share is that of the sun's disc, or with a softness that
+  /// of Eq. 16 (docs/paper.md, E16); on the surface itself, where S is at least its elevation, twice that, at most 1 (A10).
   /// points [n]   samples [n] out. Throws Error{kInvalidArgument} where the sun, or `above`, is out of range.
   void sample(std::span<const WorldPoint> points, const Sun& sun, double above, std::span<SunSample> samples);
 

@@ -11,13 +11,14 @@
 #include "isohf/archive/codec/quantise.h"
 #include "isohf/base/assert.h"
 #include "isohf/error.h"
-#include "isohf/restore/shade/light.h"
 #include "isohf/surface/shade/shadow.h"
 
 namespace isohf {
 namespace {
 
 constexpr double kRadians = std::numbers::pi / 180.0;
+/// Lattice steps: rises to what is nearer are roundings; the same triangle has another place farther on.
+constexpr double kNearest = 1e-6;
 
 void require(bool holds, const char* what) {
   if (!holds) throw Error(ErrorCode::kInvalidArgument, what);
@@ -28,14 +29,18 @@ void require(bool holds, const char* what) {
 PointShadow::PointShadow(const ArchiveReader& archive, const Sun& sun, double above)
     : archive_(archive),
       towards_sun_{std::sin(sun.azimuth_deg * kRadians), -std::cos(sun.azimuth_deg * kRadians)},
-      fall_(std::tan(sun.elevation_deg * kRadians) * sun.elevation_units_per_world_unit),
-      softness_(sun.softness.value_or(default_softness(archive.metadata()))),
+      sun_(swept_sun(sun.azimuth_deg, sun.elevation_deg, sun_radius_deg(archive.metadata().source.body), 1.0,
+                     sun.elevation_units_per_world_unit)),
+      units_(sun.elevation_units_per_world_unit),
+      elevation_deg_(sun.elevation_deg),
       above_(above),
       highest_(-std::numeric_limits<double>::infinity()) {
   require(std::isfinite(sun.azimuth_deg), "the sun's azimuth must be a number of degrees");
   require(sun.elevation_deg > 0.0 && sun.elevation_deg < 90.0, "the sun must stand above 0 and below 90 degrees");
   require(sun.elevation_units_per_world_unit > 0.0, "the elevation units in one world unit must be above 0");
-  require(softness_ > 0.0, "the sun's apparent size must be above 0");
+  sun_.softness = sun.softness;
+  radius_deg_ = elevation_deg_ - std::atan(sun_.lower_fall / units_) / kRadians;
+  require(sun_.softness.value_or(1.0) > 0.0, "the sun's apparent size must be above 0");
   require(above >= 0.0 && std::isfinite(above), "heights above the surface must be 0 or more");
   const MemberTable& tiles = archive.tables().front();
   if (tiles.stored > 0) highest_ = elevation_from_index(tiles.code_max);
@@ -47,41 +52,57 @@ double PointShadow::elevation_from_index(std::uint32_t code) const {
                                              : elevation_from_code(quantisation, code);
 }
 
-/// S at the line's beginning, where tiles between it and the part begin <= t <= end have found it `so_far`. Between
-/// crossings the surface is straight: its greatest height above the falling line is at one of them.
-double PointShadow::highest_on(const ObjectLine& line, double begin, double end, const TileCodes& codes,
-                               double so_far) const {
+/// Between crossings the surface is straight: its greatest height above a line from y, or a falling one, is at one of
+/// them.
+void PointShadow::look_over(const ObjectLine& line, double begin, double end, const TileCodes& codes,
+                            Horizon& seen) const {
   const TileShape& shape = archive_.grid().shape();
   const Quantisation& quantisation = archive_.metadata().quantisation;
+  const double nearest = kNearest * archive_.grid().sigma_x();
   auto sides = side_crossings(line, begin);
   for (double t = begin;; t = std::clamp(pass_first(sides), t, end)) {
     const double elevation = elevation_at(shape, codes, quantisation, snapped(barycentric(shape, line.at(t))));
-    if (elevation - t * fall_ > so_far) so_far = elevation - t * fall_;  // not where void, NaN
-    if (t >= end) return so_far;
+    // Not where void, NaN.
+    if (elevation - t * sun_.fall > seen.shadow) seen.shadow = elevation - t * sun_.fall;
+    if (t > nearest && elevation - seen.y > t * seen.rise) seen.rise = (elevation - seen.y) / t;
+    if (t >= end) return;
   }
 }
 
-double PointShadow::height(WorldPoint at, double elevation, PointSampler& tiles) const {
+/// Whether ground up to that elevation, from that distance on, can change what is seen.
+bool PointShadow::can_hide(double highest, double distance, const Horizon& seen) const {
+  if (highest - distance * sun_.fall > seen.shadow) return true;
+  return !sun_.softness && highest - distance * std::max(seen.rise, sun_.lower_fall) > seen.y;
+}
+
+void PointShadow::look(WorldPoint at, PointSampler& tiles, Horizon& seen) const {
   const TileGrid& grid = archive_.grid();
   const WorldBounds& ground = archive_.metadata().valid;
-  double shadow = elevation;
   double begin = 0.0;
   double end = std::numeric_limits<double>::infinity();
   cut_line(at.x, towards_sun_.x, std::max(ground.x0, 0.0), std::min(ground.x1, grid.world_width()), begin, end);
   cut_line(at.z, towards_sun_.z, std::max(ground.z0, 0.0), std::min(ground.z1, grid.world_height()), begin, end);
   auto borders = tile_crossings(grid, at, towards_sun_, begin);
-  for (double from = begin; from < end && highest_ - from * fall_ > shadow;) {
+  for (double from = begin; from < end && can_hide(highest_, from, seen);) {
     const double to = std::clamp(pass_first(borders), from, end);
     const double middle = 0.5 * (from + to);
     const TileIndex tile = grid.locate({at.x + middle * towards_sun_.x, at.z + middle * towards_sun_.z}).tile;
     const TileEntry entry = archive_.tile_entry(tile);
-    if (to > from && entry.stored && elevation_from_index(entry.code_max) - from * fall_ > shadow) {
-      const ObjectLine line = object_line(grid, tile, at, towards_sun_);
-      shadow = highest_on(line, from, to, *tiles.codes(tile), shadow);
+    if (to > from && entry.stored && can_hide(elevation_from_index(entry.code_max), from, seen)) {
+      look_over(object_line(grid, tile, at, towards_sun_), from, to, *tiles.codes(tile), seen);
     }
     from = to;
   }
-  return shadow;
+}
+
+double PointShadow::share(const Horizon& seen) const {
+  if (sun_.softness) {
+    return above_ > 0.0 ? sun_share(seen.y, seen.shadow, *sun_.softness)
+                        : sun_share_on_surface(seen.y, seen.shadow, *sun_.softness);
+  }
+  // The disc as a segment between its edges, as it is swept (decision 64).
+  const double horizon_deg = std::atan(seen.rise / units_) / kRadians;
+  return std::clamp(0.5 + (elevation_deg_ - horizon_deg) / (2.0 * radius_deg_), 0.0, 1.0);
 }
 
 void PointShadow::sample(std::span<const WorldPoint> points, std::span<const double> elevations, PointSampler& tiles,
@@ -92,9 +113,9 @@ void PointShadow::sample(std::span<const WorldPoint> points, std::span<const dou
       samples[i] = {elevations[i], elevations[i]};
       return;
     }
-    const double shadow = height(points[i], elevations[i], tiles);
-    const double y = elevations[i] + above_;
-    samples[i] = {shadow, above_ > 0.0 ? sun_share(y, shadow, softness_) : sun_share_on_surface(y, shadow, softness_)};
+    Horizon seen{elevations[i] + above_, elevations[i], -std::numeric_limits<double>::infinity()};
+    look(points[i], tiles, seen);
+    samples[i] = {seen.shadow, share(seen)};
   });
 }
 

@@ -4,6 +4,7 @@
 
 #include "isohf/lattice/crossings.h"
 #include "isohf/restore/point_sampler.h"
+#include "isohf/restore/shade/shadow_sweep.h"
 #include "isohf/surface.h"
 
 namespace isohf {
@@ -22,15 +23,24 @@ class PointShadow {
               std::span<SunSample> samples) const;
 
  private:
-  [[nodiscard]] double height(WorldPoint at, double elevation, PointSampler& tiles) const;
+  /// What stands towards the sun, from a point at some elevation.
+  struct Horizon {
+    double y;       ///< where the sun is looked for
+    double shadow;  ///< S
+    double rise;    ///< steepest from y to the ground, elevation units in one world unit
+  };
+  void look(WorldPoint at, PointSampler& tiles, Horizon& seen) const;
+  [[nodiscard]] bool can_hide(double highest, double distance, const Horizon& seen) const;
+  [[nodiscard]] double share(const Horizon& seen) const;
   [[nodiscard]] double elevation_from_index(std::uint32_t code) const;
-  [[nodiscard]] double highest_on(const ObjectLine& line, double begin, double end, const TileCodes& codes,
-                                  double so_far) const;
+  void look_over(const ObjectLine& line, double begin, double end, const TileCodes& codes, Horizon& seen) const;
 
   const ArchiveReader& archive_;
   WorldPoint towards_sun_;  ///< of length 1
-  double fall_;             ///< elevation units in one world unit
-  double softness_;
+  SweptSun sun_;            ///< falls in elevation units
+  double units_;            ///< of elevation in one world unit
+  double elevation_deg_;
+  double radius_deg_;
   double above_;
   double highest_;  ///< elevation of all tiles
 };

@@ -40,17 +40,7 @@ bool is_on(const Metadata& metadata, const char* body) {
   return metadata.source.body == body;
 }
 
-/// Eq. 16's k where the relief is that of mountains; in flatter lands this share of the elevation range.
-constexpr double kDefaultSoftness = 2.0;
-constexpr double kDefaultSoftnessShare = 0.005;
-
 }  // namespace
-
-double default_softness(const Metadata& metadata) {
-  const Statistics& statistics = metadata.statistics;
-  const double range = statistics.min && statistics.max ? *statistics.max - *statistics.min : 0.0;
-  return range > 0.0 ? std::min(kDefaultSoftness, kDefaultSoftnessShare * range) : kDefaultSoftness;
-}
 
 std::vector<ColourStop> shade_colours(const Metadata& metadata, std::optional<ShadePalette> palette) {
   const double low = metadata.statistics.min.value_or(0.0);

@@ -39,9 +39,6 @@ class Illumination {
   Light sky_;
 };
 
-/// Eq. 16's k, elevation units, where nobody says.
-[[nodiscard]] double default_softness(const Metadata& metadata);
-
 /// A picture's value, 0 to 255, of linear light: a film's shoulder for what is brighter than the ground in full sun,
 /// then sRGB.
 [[nodiscard]] std::uint8_t value_from_light(float light);
