@@ -267,6 +267,49 @@ TEST_F(UnderstandSystem, ArchivesOnAReferenceSystemFindTheirPlacesByIt) {
   EXPECT_FALSE(WorldGeoreference(archive.metadata()).has_geo());
 }
 
+/// A shift of the datum moves the pole off the map's own: a cone's far pole, nowhere on its map, lies somewhere then.
+TEST_F(UnderstandSystem, GridsLieOnMapsOfOtherDatumsWhereverThesePutThePoles) {
+  const auto corners_of = [](double west, double north, const std::string& system) {
+    MemorySource<float> source(SampleType::kFloat32, 150, 100,
+                               [](std::int64_t c, std::int64_t r) { return static_cast<double>(c + r); });
+    Georeference& place = source.mutable_info().georeference;
+    place.unit = HorizontalUnit::kDegree;
+    place.registration = Registration::kArea;
+    place.spacing_x = place.spacing_y = 1.0 / 1200.0;
+    place.has_origin = true;
+    place.origin_x = west;
+    place.origin_y = north;
+    place.system.epsg = 4326;
+    ConvertOptions options;
+    options.code_type = CodeType::kF32;
+    const TemporaryFolder folder;
+    (void)convert(source, folder / "a.isohf", options);
+    ArchiveReader archive(folder / "a.isohf");
+    std::vector<Warning> warnings;
+    const auto there = understand_grid_system(archive, system, warnings);
+    const SampleGrid grid = grid_in_system(archive.metadata(), archive.metadata().valid, there, {}, {});
+    const GeoPoint middle =
+        there->map->geo_from_map({grid.first_x + grid.spacing_x * static_cast<double>(grid.width - 1) / 2.0,
+                                  grid.first_z - grid.spacing_z * static_cast<double>(grid.height - 1) / 2.0});
+    EXPECT_NEAR(middle.longitude, west + 0.0625, 2e-3) << system;
+    EXPECT_NEAR(middle.latitude, north - 0.0417, 2e-3) << system;
+    EXPECT_NEAR(static_cast<double>(grid.width * grid.height), 15000.0, 5000.0) << system;
+  };
+  corners_of(2.0, 47.0, "EPSG:27572");
+  corners_of(2.0, 47.0, "EPSG:27562");
+  corners_of(4.5, 50.8, "EPSG:31370");
+  corners_of(15.0, 50.0, "EPSG:5514");
+  corners_of(14.0, 47.5, "EPSG:31287");
+  corners_of(-100.0, 40.0, "EPSG:32040");
+  corners_of(-72.0, 41.0, "EPSG:26754");
+  const std::string shift = " +ellps=clrk80ign +towgs84=-168,-60,320 +units=m";
+  corners_of(2.0, 47.0, "+proj=lcc +lat_1=45 +lat_2=49 +lat_0=47 +lon_0=2" + shift);
+  corners_of(2.0, 47.0, "+proj=aea +lat_1=45 +lat_2=49 +lat_0=47 +lon_0=2" + shift);
+  corners_of(170.0, 10.0, "+proj=merc +lon_0=0" + shift);
+  corners_of(-150.0, -60.0, "+proj=stere +lat_0=-90 +lat_ts=-71" + shift);
+  corners_of(15.0, 79.0, "+proj=stere +lat_0=75 +lon_0=15 +datum=WGS84");
+}
+
 TEST_F(UnderstandSystem, LongitudesCountFromGreenwichInDegreesWhateverTheSystemDoes) {
   // Paris lies 2.33722917 degrees East of Greenwich; Lambert zone II extended has its origin there, in grads.
   const auto lambert = understand_system("EPSG:27572");

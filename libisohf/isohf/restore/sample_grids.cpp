@@ -209,8 +209,15 @@ class ImageFinder {
     // Maps that show poles as points go round them; others are as wide as the body is round, and cut open anywhere.
     const auto north = pole_image(90.0);
     const auto south = pole_image(-90.0);
-    if (north && south) {
+    const auto apart = [](const MapPoint& a, const MapPoint& b) {
+      return std::hypot(a.easting - b.easting, a.northing - b.northing);
+    };
+    if (north && south && apart(*north, *south) <= 2.0 * half_round_) {
       centre_ = {(north->easting + south->easting) / 2.0, (north->northing + south->northing) / 2.0};
+    } else if (north && south) {
+      // A stereographic map shows the far one nearly for ever away.
+      const MapPoint at = system.map->map_from_geo(geo);
+      centre_ = apart(at, *south) < apart(at, *north) ? *south : *north;
     } else if (north || south) {
       centre_ = north ? *north : *south;
     } else {
@@ -259,13 +266,24 @@ class ImageFinder {
     return true;
   }
 
-  /// nullopt where the map does not show the pole as a point.
+  /// nullopt where the map does not show the pole as a point. A shift of the datum has the map's own pole lie beside it:
+  /// an arc or a place that is nowhere is known by the circles round the pole, which do not shrink to a point.
   [[nodiscard]] std::optional<MapPoint> pole_image(double latitude) const {
-    const MapPoint here = system_.map->map_from_geo({middle_, latitude});
-    const MapPoint other = system_.map->map_from_geo({std::remainder(middle_ + 90.0, kTurn), latitude});
-    const double apart = std::hypot(here.easting - other.easting, here.northing - other.northing);
-    if (!(apart < 1e-6 * half_round_)) return std::nullopt;
-    return here;
+    const auto across = [&](double degrees) {
+      const double at = std::copysign(90.0 - degrees, latitude);
+      double widest = 0.0;
+      for (const double turn : {90.0, 180.0, 270.0}) {
+        const MapPoint here = system_.map->map_from_geo({middle_, at});
+        const MapPoint other = system_.map->map_from_geo({std::remainder(middle_ + turn, kTurn), at});
+        widest = std::max(widest, std::hypot(here.easting - other.easting, here.northing - other.northing));
+      }
+      return widest;
+    };
+    constexpr double kShrunk = 0.9;  // circles of a tenth; a flat cone's by (1/10)^n
+    if (!(across(0.1) < kShrunk * across(1.0))) return std::nullopt;
+    const MapPoint pole = system_.map->map_from_geo({middle_, latitude});
+    if (!std::isfinite(pole.easting) || !std::isfinite(pole.northing)) return std::nullopt;
+    return pole;
   }
 
   /// NaN where the map does not show it, or where maps like Mercator's and the stereographic go on for ever.
