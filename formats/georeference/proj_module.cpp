@@ -257,8 +257,30 @@ Object geographic_part(PJ_CONTEXT* context, const PJ* system) {
   return Object(proj_crs_create_bound_crs(context, geographic.get(), hub.get(), way.get()));
 }
 
-/// The best of PROJ's ways over a ground, one that moves between the datums before any other; null where it knows none.
-Object best_way(PJ_CONTEXT* context, const PJ* from, const PJ* to, const double* ground) {
+constexpr int kPlaces = 9;
+
+/// Of kPlaces of a ground (West, South, East, North), how many a way from the longitudes and latitudes of a system has a
+/// place for: grids of shifts end.
+int places_shown(PJ_CONTEXT* context, const PJ* way, const IsohfProjSystem& counted, const double* ground) {
+  const Object operation(proj_normalize_for_visualization(context, way));
+  const double width = ground[2] - ground[0] + (ground[2] < ground[0] ? 360.0 : 0.0);
+  int shown = 0;
+  for (int i = 0; operation && i < kPlaces; ++i) {
+    const double longitude = ground[0] + 0.5 * (i % 3) * width - counted.prime_meridian_deg;
+    const double latitude = ground[1] + 0.5 * (i / 3) * (ground[3] - ground[1]);
+    const double unit = counted.degrees_per_unit;
+    const PJ_COORD to =
+        proj_trans(operation.get(), PJ_FWD, proj_coord(longitude / unit, latitude / unit, 0.0, HUGE_VAL));
+    if (proj_errno(operation.get()) == 0 && std::isfinite(to.xy.x) && std::isfinite(to.xy.y)) ++shown;
+    proj_errno_reset(operation.get());
+  }
+  return shown;
+}
+
+/// Of PROJ's ways over a ground that which shows most of it, one that moves between the datums before any other, and
+/// PROJ's first before the next; null where it knows none.
+Object best_way(PJ_CONTEXT* context, const PJ* from, const PJ* to, const double* ground,
+                const IsohfProjSystem& counted) {
   const std::unique_ptr<PJ_OPERATION_FACTORY_CONTEXT, Destroy<proj_operation_factory_context_destroy>> factory(
       proj_create_operation_factory_context(context, nullptr));
   if (from == nullptr || to == nullptr || !factory) refuse("has no longitudes and latitudes that PROJ knows");
@@ -267,9 +289,10 @@ Object best_way(PJ_CONTEXT* context, const PJ* from, const PJ* to, const double*
   proj_operation_factory_context_set_grid_availability_use(context, factory.get(),
                                                            PROJ_GRID_AVAILABILITY_DISCARD_OPERATION_IF_MISSING_GRID);
   // Ground beyond a datum's area of use is better moved by what holds there than not at all.
-  Object first;
+  Object best;
+  int most = -1;
   for (const bool anywhere : {false, true}) {
-    if (anywhere && first && proj_coordoperation_has_ballpark_transformation(context, first.get()) == 0) break;
+    if (anywhere && most > 0 && proj_coordoperation_has_ballpark_transformation(context, best.get()) == 0) break;
     anywhere ? proj_operation_factory_context_set_area_of_interest(context, factory.get(), -180.0, -90.0, 180.0, 90.0)
              : proj_operation_factory_context_set_area_of_interest(context, factory.get(), ground[0], ground[1],
                                                                    ground[2], ground[3]);
@@ -278,12 +301,17 @@ Object best_way(PJ_CONTEXT* context, const PJ* from, const PJ* to, const double*
     const int count = ways ? proj_list_get_count(ways.get()) : 0;
     for (int i = 0; i < count; ++i) {
       Object way(proj_list_get(context, ways.get(), i));
+      // One that takes the datums for one serves where no other shows anything.
       const bool is_ballpark = proj_coordoperation_has_ballpark_transformation(context, way.get()) != 0;
-      if (!first || !is_ballpark) first = std::move(way);
-      if (!is_ballpark) break;
+      const int shown = places_shown(context, way.get(), counted, ground);
+      const int worth = is_ballpark ? std::min(shown, 1) : 2 * shown;
+      if (worth <= most) continue;
+      most = worth;
+      best = std::move(way);
+      if (most == 2 * kPlaces) return best;
     }
   }
-  return first;
+  return best;
 }
 
 void find_operation(const char* from, const char* to, const double* ground, IsohfProjOperation& found) {
@@ -296,7 +324,7 @@ void find_operation(const char* from, const char* to, const double* ground, Isoh
   PJ_CONTEXT* const context = target.context.get();
   const Object there = with_datum(context, target.system.get());
   const Object here = geographic_part(context, with_datum(context, source.system.get()).get());
-  Object first = best_way(context, here.get(), there.get(), ground);
+  Object first = best_way(context, here.get(), there.get(), ground, source);
   const IsohfProjSystem* counted = &source;  // whose longitudes and latitudes the way begins with
   found.is_ballpark = first ? proj_coordoperation_has_ballpark_transformation(context, first.get()) : 1;
   // PROJ goes to no other body, and knows none by a radius. Bodies whose radii are as alike as these are one.
@@ -304,7 +332,7 @@ void find_operation(const char* from, const char* to, const double* ground, Isoh
   const double apart = std::abs(ours.semi_major_axis_m / theirs.semi_major_axis_m - 1.0);
   if (!first && apart < kSameBody) {
     counted = &target;
-    first = best_way(context, geographic_part(context, there.get()).get(), there.get(), ground);
+    first = best_way(context, geographic_part(context, there.get()).get(), there.get(), ground, target);
   }
   // On other bodies an ellipsoid says what datum there is.
   const bool is_earth = std::abs(ours.semi_major_axis_m / 6378137.0 - 1.0) < kSameBody;

@@ -267,6 +267,25 @@ TEST_F(UnderstandSystem, ArchivesOnAReferenceSystemFindTheirPlacesByIt) {
   EXPECT_FALSE(WorldGeoreference(archive.metadata()).has_geo());
 }
 
+/// Grids of shifts end where those for whom they were made do.
+TEST_F(UnderstandSystem, GroundBeyondAGridOfShiftsIsMovedByAWayThatShowsIt) {
+  ReferenceSystem wgs84;
+  wgs84.epsg = 4326;
+  const std::string helmert =
+      "+proj=tmerc +lat_0=0 +lon_0=9 +k=1 +x_0=3500000 +y_0=0 +ellps=bessel "
+      "+towgs84=598.1,73.7,418.2,0.202,0.045,-2.455,6.7 +units=m";
+  for (const GeoExtent& ground : {GeoExtent{8.0, 46.83, 8.25, 47.0}, {9.0, 50.0, 9.1, 50.1}}) {
+    const WayToSystem way = find_way(wgs84, "EPSG:31467", ground, {});
+    EXPECT_FALSE(way.is_ballpark);
+    EXPECT_EQ(way.system.operation.find("hgridshift") == std::string::npos, ground.north < 48.0);
+    const WayToSystem near = find_way(wgs84, helmert, ground, {});
+    const GeoPoint at{ground.west, ground.south};
+    const MapPoint there = way.map->map_from_geo(at);
+    EXPECT_NEAR(there.easting, near.map->map_from_geo(at).easting, 5.0);
+    EXPECT_NEAR(there.northing, near.map->map_from_geo(at).northing, 5.0);
+  }
+}
+
 /// A shift of the datum moves the pole off the map's own: a cone's far pole, nowhere on its map, lies somewhere then.
 TEST_F(UnderstandSystem, GridsLieOnMapsOfOtherDatumsWhereverThesePutThePoles) {
   const auto corners_of = [](double west, double north, const std::string& system) {
