@@ -216,6 +216,8 @@ void ArchiveWriter::State::append(const ZipMember& member, std::span<const std::
     part.append(header);
     part.append(data);
   } catch (const Error& error) {
+    // What can be gone on with; copies of tiles are made anew.
+    if (!journal) throw error.within(path);
     throw Error(error.code(), fmt::format("{}: {}; {} of {} tiles are done", path, error.what(), contents.next_tile(),
                                           grid.tile_count()));
   }
