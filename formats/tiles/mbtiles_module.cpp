@@ -2,10 +2,13 @@
 
 #include <sqlite3.h>
 
+#include <algorithm>
+#include <array>
 #include <initializer_list>
 #include <memory>
 #include <mutex>
 #include <string>
+#include <string_view>
 
 #include "formats/module_inside.h"
 #include "isohf/error.h"
@@ -19,6 +22,8 @@ struct IsohfMbtilesFile {
   }
   sqlite3* database = nullptr;
   sqlite3_stmt* tile = nullptr;
+  int64_t bytes = 0;  ///< of the file
+  int64_t steps = 0;  ///< that a question may still take
   std::mutex one_at_a_time;
 };
 
@@ -30,15 +35,38 @@ using isohf::ErrorCode;
 constexpr int kMostZoom = 30;
 /// Of a tile or text.
 constexpr int kMostBytes = 1 << 26;
+/// What SQLite may hold in the whole process, beside two tiles: views of views grow in it as they are put together.
+constexpr int64_t kHeldBytes = int64_t{1} << 25;
+/// SQLite's steps for a question: some ten for each tile that it looks at, which has a row of tens of bytes; a million take
+/// some hundredths of a second.
+constexpr int64_t kLeastSteps = 2'000'000;
+constexpr int64_t kStepsOfAByte = 8;
+constexpr int kStepsAtOnce = 1000;
+
+/// No recursion, and no functions that make long texts: views of tiles join, choose and count.
+int allow(void* /*unused*/, int action, const char* /*unused*/, const char* function, const char* /*unused*/,
+          const char* /*unused*/) {
+  static constexpr std::array<std::string_view, 12> kFunctions = {
+      "min", "max", "count", "coalesce", "ifnull", "nullif", "abs", "round", "length", "typeof", "sum", "iif"};
+  if (action == SQLITE_RECURSIVE) return SQLITE_DENY;
+  if (action != SQLITE_FUNCTION || function == nullptr) return SQLITE_OK;
+  return std::find(kFunctions.begin(), kFunctions.end(), function) != kFunctions.end() ? SQLITE_OK : SQLITE_DENY;
+}
 
 [[noreturn]] void fail(sqlite3* database, int status) {
   const int kind = status & 0xFF;
-  const ErrorCode code = kind == SQLITE_NOMEM                              ? ErrorCode::kOutOfMemory
-                         : kind == SQLITE_CORRUPT || kind == SQLITE_NOTADB ? ErrorCode::kCorrupt
-                         : kind == SQLITE_ERROR || kind == SQLITE_TOOBIG   ? ErrorCode::kUnsupported
-                                                                           : ErrorCode::kIo;
+  const bool is_full = kind == SQLITE_NOMEM;
+  const bool is_refused = kind == SQLITE_INTERRUPT || kind == SQLITE_AUTH;
+  const ErrorCode code = is_full                                                       ? ErrorCode::kOutOfMemory
+                         : kind == SQLITE_CORRUPT || kind == SQLITE_NOTADB             ? ErrorCode::kCorrupt
+                         : kind == SQLITE_ERROR || kind == SQLITE_TOOBIG || is_refused ? ErrorCode::kUnsupported
+                                                                                       : ErrorCode::kIo;
   std::string text = std::string("SQLite says: ") + sqlite3_errmsg(database);
   if (kind == SQLITE_ERROR) text = "is an SQLite database, but none of tiles (MBTiles); " + text;
+  if (is_refused || is_full) {
+    text = "its schema makes more work of a question than tiles do (sqlite3 FILE .schema shows it)";
+    if (kind != SQLITE_INTERRUPT) text += std::string("; SQLite says: ") + sqlite3_errmsg(database);
+  }
   if (kind == SQLITE_READONLY || kind == SQLITE_CANTOPEN || kind == SQLITE_BUSY) {
     text += "; sqlite3 FILE 'PRAGMA journal_mode=DELETE' ends what a program has left open";
   }
@@ -76,15 +104,26 @@ class Query {
 template <typename Action>
 int call(IsohfMbtilesFile* file, IsohfMbtilesMessage* message, Action action) {
   const std::lock_guard lock(file->one_at_a_time);
+  file->steps = kLeastSteps + kStepsOfAByte * file->bytes;
   return isohf::guarded(message, "SQLite", ErrorCode::kCorrupt, action);
 }
 
-int open_file(const char* path, IsohfMbtilesFile** out, IsohfMbtilesMessage* message) {
+int open_file(const char* path, int64_t size, IsohfMbtilesFile** out, IsohfMbtilesMessage* message) {
   return isohf::guarded(message, "SQLite", ErrorCode::kCorrupt, [&] {
     auto file = std::make_unique<IsohfMbtilesFile>();
     const int status = sqlite3_open_v2(path, &file->database, SQLITE_OPEN_READONLY | SQLITE_OPEN_NOMUTEX, nullptr);
     if (status != SQLITE_OK) fail(file->database, status);
-    sqlite3_limit(file->database, SQLITE_LIMIT_LENGTH, kMostBytes);
+    file->bytes = size;
+    // A view may make rows and texts out of nothing: both are bounded by what the file could hold.
+    constexpr int64_t kAlways = 1 << 14;
+    const int64_t longest = std::clamp<int64_t>(size, kAlways, kMostBytes);
+    sqlite3_limit(file->database, SQLITE_LIMIT_LENGTH, static_cast<int>(longest));
+    sqlite3_set_authorizer(file->database, allow, nullptr);
+    sqlite3_hard_heap_limit64(std::max<int64_t>(sqlite3_hard_heap_limit64(-1), kHeldBytes + 2 * longest));
+    file->steps = kLeastSteps;
+    sqlite3_progress_handler(
+        file->database, kStepsAtOnce,
+        [](void* of) { return (static_cast<IsohfMbtilesFile*>(of)->steps -= kStepsAtOnce) < 0 ? 1 : 0; }, file.get());
     // Nothing of what a schema may ask for runs.
     sqlite3_db_config(file->database, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
     sqlite3_db_config(file->database, SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);

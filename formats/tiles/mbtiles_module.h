@@ -12,7 +12,7 @@
 extern "C" {
 
 /// Raised whenever anything below changes; the loader refuses any other.
-#define ISOHF_MBTILES_ABI 1
+#define ISOHF_MBTILES_ABI 2
 
 typedef struct IsohfMbtilesFile IsohfMbtilesFile;
 
@@ -20,7 +20,8 @@ typedef struct IsohfMbtilesMessage {
   char text[512];
 } IsohfMbtilesMessage;
 
-typedef int (*IsohfMbtilesOpen)(const char* path, IsohfMbtilesFile** file, IsohfMbtilesMessage* message);
+/// bytes  of the file, which bound what its schema may cost
+typedef int (*IsohfMbtilesOpen)(const char* path, int64_t bytes, IsohfMbtilesFile** file, IsohfMbtilesMessage* message);
 /// The coarsest and finest level with tiles.
 typedef int (*IsohfMbtilesZooms)(IsohfMbtilesFile* file, int32_t* first, int32_t* last, IsohfMbtilesMessage* message);
 /// box  first and last column, first and last row, column and row of some tile; count  of the tiles: 0, box says nothing

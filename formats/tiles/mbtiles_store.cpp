@@ -28,8 +28,8 @@ const IsohfMbtilesModule& mbtiles_module() {
 class MbtilesStore final : public TileStore {
  public:
   explicit MbtilesStore(const std::string& path) : module_(mbtiles_module()), path_(path) {
-    require_whole_pages(path);
-    check([&](IsohfMbtilesMessage* message) { return module_.open(path.c_str(), &file_, message); });
+    const auto bytes = static_cast<std::int64_t>(whole_pages_bytes(path));
+    check([&](IsohfMbtilesMessage* message) { return module_.open(path.c_str(), bytes, &file_, message); });
   }
   ~MbtilesStore() override { module_.close(file_); }
 
@@ -67,8 +67,8 @@ class MbtilesStore final : public TileStore {
   }
 
  private:
-  /// SQLite takes what is missing of a last page for zeros, and these for an empty page.
-  static void require_whole_pages(const std::string& path) {
+  /// The file's size. SQLite takes what is missing of a last page for zeros, and these for an empty page.
+  static std::uint64_t whole_pages_bytes(const std::string& path) {
     const RawFile file(path);
     constexpr std::size_t kPageAt = 16;
     std::array<std::byte, kPageAt + 2> head{};
@@ -79,6 +79,7 @@ class MbtilesStore final : public TileStore {
       throw Error(ErrorCode::kCorrupt,
                   fmt::format("{}: ends early: {} bytes, in pages of {}", path, file.size_bytes(), page));
     }
+    return file.size_bytes();
   }
 
   template <typename Call>

@@ -305,6 +305,18 @@ def refused(isohf, folder):
     isohf.refuses("must be from 0 to", "info", mbtiles(folder / "far.mbtiles", {(3, 9, 2): tiles[BLOCK[0]]}))
     stored = mbtiles(folder / "g.mbtiles", tiles).read_bytes()
     says("", "cut.mbtiles", stored[:len(stored) // 2])
+    # Views that make much of nothing: rows without end, rows of every pair, long texts, views of views.
+    made = "SELECT 3 AS zoom_level, {} AS tile_column, 0 AS tile_row, {} AS tile_data FROM {}"
+    digits = "CREATE TABLE n (x); INSERT INTO n VALUES (0), (1), (2), (3), (4), (5), (6), (7), (8), (9);"
+    doubled = "CREATE VIEW v0 AS " + made.format(1, "x'00'", "n") + ";" + "".join(
+        f"CREATE VIEW v{i} AS SELECT * FROM v{i - 1} UNION ALL SELECT * FROM v{i - 1};" for i in range(1, 40))
+    endless = "WITH RECURSIVE c (x) AS (SELECT 1 UNION ALL SELECT x + 1 FROM c) "
+    for name, schema in (("endless", endless + made.format("x % 8", "x'00'", "c")), ("pairs", made.format("n0.x", "x'00'", ", ".join(f"n n{i}" for i in range(12)))),
+                         ("long", made.format(1, "zeroblob(60000000)", "n")), ("doubled", "SELECT * FROM v39")):
+        base = sqlite3.connect(folder / f"{name}.mbtiles")
+        base.executescript(digits + doubled + "CREATE VIEW tiles AS " + schema)
+        base.close()
+        isohf.refuses("not authorized to use function" if name == "long" else "more work of a question than tiles do", "info", folder / f"{name}.mbtiles")
     # What a program has open in the journal beside it is part of the file.
     writer = sqlite3.connect(mbtiles(folder / "wal.mbtiles", {place: tiles[place] for place in BLOCK[:8]}))
     writer.execute("PRAGMA journal_mode=WAL")
