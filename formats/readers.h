@@ -88,7 +88,7 @@ namespace isohf {
 [[nodiscard]] std::unique_ptr<HeightSource> open_saga(const std::string& path, const OpenOptions& options);
 
 /// IDRISI's samples (.rst) and their documentation (.rdc), of which either is `path`; ROI_PAC's NAME.dem beside
-/// NAME.dem.rsc; a band of a VICAR file, whose map is left out; Terragen's heightfield, whose rows begin in the South; a binary graymap
+/// NAME.dem.rsc; a band of a VICAR file, placed by its property MAP; Terragen's heightfield, whose rows begin in the South; a binary graymap
 /// (Netpbm's P5) of 8 or 16 bits, its numbers as stored.
 [[nodiscard]] std::unique_ptr<HeightSource> open_idrisi(const std::string& path, const OpenOptions& options);
 [[nodiscard]] std::unique_ptr<HeightSource> open_roi_pac(const std::string& path, const OpenOptions& options);

@@ -198,6 +198,8 @@ class UnchangedSource final : public HeightSource {
   UnchangedSource(std::unique_ptr<HeightSource> source, const FileStamp& stamp, const OpenOptions& options)
       : source_(std::move(source)), info_(source_->info()), stamp_(stamp) {
     warn_of_feet(options);
+    warn_of_latitudes();
+    take_heights_of_code();
   }
 
   [[nodiscard]] const SourceInfo& info() const override { return info_; }
@@ -220,6 +222,31 @@ class UnchangedSource final : public HeightSource {
         "`reference_system` with heights says that they are feet (EPSG:2263+6360), `z_scale` {:.10g} turns them into "
         "metres",
         place.metres_per_unit));
+  }
+
+  /// A system of three coordinates says what heights are above, whatever else the file says of them.
+  void take_heights_of_code() {
+    ReferenceSystem& system = info_.georeference.system;
+    if (!system.vertical_datum.empty()) return;
+    const bool is_in_degrees = info_.georeference.unit == HorizontalUnit::kDegree;
+    // GDAL writes EPSG:4979 as the system of heights beside EPSG:4326.
+    const auto code = system.vertical_epsg ? system.vertical_epsg : is_in_degrees ? system.epsg : std::nullopt;
+    if (code && gives_heights_above_ellipsoid(*code)) system.vertical_datum = kAboveEllipsoid;
+  }
+
+  /// No ground is beyond a pole: degrees there are no degrees, or a part of the raster is margin.
+  void warn_of_latitudes() {
+    const Georeference& place = info_.georeference;
+    if (place.unit != HorizontalUnit::kDegree || !place.has_origin) return;
+    constexpr double kPole = 90.0;
+    const double north = place.origin_y;
+    const double south = north - static_cast<double>(info_.height - 1) * place.spacing_y;
+    const double beyond = kPole + 0.01 * place.spacing_y;
+    if (north <= beyond && south >= -beyond) return;
+    info_.warnings.push_back(
+        fmt::format("its rows lie at latitudes from {:.10g} to {:.10g}, and there is no ground beyond 90: `bbox` "
+                    "leaves rows out, `reference_system` says what else its coordinates are",
+                    south, north));
   }
 
   /// Numbers that no elevation is, and that no void value or range declares: one of them would stretch the codes of all

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <filesystem>
 #include <string>
 #include <string_view>
@@ -92,15 +93,21 @@ class EnviSource final : public DescribedSource {
       const std::vector<std::string> parts = list_of(map->second);
       if (parts.size() < 7) refuse(ErrorCode::kCorrupt, "map info has fewer than seven parts");
       const auto part = [&](std::size_t i) { return number(parts[i], "map info"); };
+      double rotation = 0.0;
       for (const std::string& each : parts) {
-        if (lower_case(each).starts_with("rotation") &&
-            number(trimmed(each.substr(each.find('=') + 1)), "rotation") != 0.0) {
-          refuse(ErrorCode::kUnsupported, "the map is rotated (gdalwarp turns it)");
-        }
+        if (lower_case(each).starts_with("rotation"))
+          rotation = number(trimmed(each.substr(each.find('=') + 1)), "rotation");
       }
+      // GDAL writes 180 where rows run from South to North, columns as ever, and counts a pixel's place as if they did not.
+      constexpr double kSouthUp = 180.0;
+      if (rotation != 0.0 && (rotation != kSouthUp || part(6) < 0.0))
+        refuse(ErrorCode::kUnsupported, "the map is rotated (gdalwarp turns it)");
+      layout_.from_south = rotation == kSouthUp || part(6) < 0.0;
       const double dx = part(5);
-      const double dy = part(6);
-      place_by_corner(part(3) + (1.0 - part(1)) * dx, part(4) - (1.0 - part(2)) * dy, dx, dy);
+      const double dy = std::abs(part(6));
+      const double first = part(4) - (1.0 - part(2)) * part(6);
+      const double height = layout_.from_south ? static_cast<double>(info_.height) * dy : 0.0;
+      place_by_corner(part(3) + (1.0 - part(1)) * dx, first + height, dx, dy);
       read_named_system(parts);
     }
     const auto system = words.find("coordinate system string");

@@ -16,8 +16,11 @@
 #include "formats/files/text.h"
 #include "formats/georeference/files_beside.h"
 #include "formats/georeference/map_wkt.h"
+#include "formats/georeference/reference_system.h"
 #include "formats/georeference/units.h"
 #include "formats/open_options.h"
+#include "formats/planetary/label_text.h"
+#include "formats/planetary/pds3_place.h"
 #include "formats/readers.h"
 #include "isohf/base/bytes.h"
 #include "isohf/error.h"
@@ -71,9 +74,46 @@ class IdrisiSource final : public DescribedSource {
       place.system = wgs84_system();
     } else if (std::sscanf(system.c_str(), "utm-%d%c", &zone, &half) == 2 && zone >= 1 && zone <= 60) {
       place.system = wgs84_utm_zone(zone, half == 's');
-    } else if (!system.empty() && system != "plane" && !read_parameters(file_beside(header_, system + ".ref"))) {
+    } else if (!system.empty() && system != "plane" && !read_parameters(file_beside(header_, system + ".ref")) &&
+               !read_state_plane(system)) {
       leave_out_system("reference system", system);
     }
+  }
+
+  /// "spc83ca1": NAD83 or NAD27, the state, its zone. EPSG's conversions have the numbers of the zones in them; false
+  /// where there is none of that number, several systems are meant, or PROJ is not there.
+  bool read_state_plane(const std::string& name) {
+    int year = 0;
+    int zone = 0;
+    int read = 0;
+    std::array<char, 3> state{};
+    if (std::sscanf(name.c_str(), "spc%2d%2[a-z]%1d%n", &year, state.data(), &zone, &read) != 3 ||
+        static_cast<std::size_t>(read) != name.size() || (year != 27 && year != 83)) {
+      return false;
+    }
+    // State Plane Coordinate System of 1983 (NOAA NOS NGS 5), appendix A: numbers of zones are these and two digits.
+    static constexpr std::string_view kStates =
+        "al01az02ar03ca04co05ct06de07fl09ga10id11il12in13ia14ks15ky16la17me18md19ma20mi21mn22ms23mo24mt25ne26nv27nh28"
+        "nj29nm30ny31nc32nd33oh34ok35or36pa37ri38sc39sd40tn41tx42ut43vt44va45wa46wv47wi48wy49ak50hi51pr52";
+    std::size_t at = 0;
+    while (at < kStates.size() && kStates.substr(at, 2) != state.data()) at += 4;
+    if (at == kStates.size()) return false;
+    const int number = 10 * (kStates[at + 2] - '0') + kStates[at + 3] - '0';
+    constexpr double kSame = 1e-9;
+    const double metres = info_.georeference.metres_per_unit;
+    const int axes = std::abs(metres - 1.0) < kSame ? 4499 : std::abs(metres - 0.3048) < kSame ? 4495 : 4497;
+    // A state of one zone has it under 0.
+    for (const int each : {zone, 0}) {
+      if (each == 0 && zone > 1) return false;
+      try {
+        take_system(fmt::format("urn:ogc:def:crs,crs:EPSG::{},cs:EPSG::{},coordinateOperation:EPSG::{}",
+                                year == 83 ? 4269 : 4267, axes, 10000 + 100 * number + each + (year == 83 ? 30 : 0)),
+                    info_);
+        return true;
+      } catch (const Error&) {  // no such zone
+      }
+    }
+    return false;
   }
 
   /// A reference system parameter file (.ref); false where it is not there or has a projection that is not known.
@@ -229,6 +269,7 @@ class VicarSource final : public DescribedSource {
       refuse(ErrorCode::kCorrupt, "has a label of more than 1 MiB");
     std::string text(static_cast<std::size_t>(label), '\0');
     file_->read(0, std::as_writable_bytes(std::span(text)));
+    text.resize(std::min(text.find('\0'), text.size()));  // it is filled up with zeros
     const HeaderWords words = vicar_words(text);
     static constexpr std::array<std::pair<std::string_view, SampleType>, 7> kTypes = {{{"byte", SampleType::kUint8},
                                                                                        {"half", SampleType::kInt16},
@@ -254,8 +295,6 @@ class VicarSource final : public DescribedSource {
     if (order != "bsq" && order != "bil" && order != "bip") {
       refuse(ErrorCode::kCorrupt, fmt::format("ORG is \"{}\", must be BSQ, BIL or BIP", printable(order)));
     }
-    if (word_in(words, "property") == "map")
-      info_.warnings.push_back(loss("the label's map is not read; the place is left out"));
     const double prefix = static_cast<double>(count(number(words, "nbb", 0.0), "NBB", 0.0));
     const double headers = static_cast<double>(count(number(words, "nlb", 0.0), "NLB", 0.0));
     const double offset = static_cast<double>(label) + headers * number(words, "recsize", 0.0) + prefix;
@@ -265,7 +304,28 @@ class VicarSource final : public DescribedSource {
                       : order == "bip" ? BandOrder::kSamples
                                        : BandOrder::kBands,
                       choose_band(info_, options, bands), bands, header_, static_cast<std::uint64_t>(prefix));
+    place_by_map(text);
     finish(options);
+  }
+
+ private:
+  /// The property MAP, which goes on up to the next one or the first task: the words of PDS3's IMAGE_MAP_PROJECTION.
+  void place_by_map(const std::string& label) {
+    constexpr std::string_view kMap = "PROPERTY='MAP'";
+    const std::size_t begin = label.find(kMap);
+    if (begin == std::string::npos) return;
+    const std::size_t first = begin + kMap.size();
+    const std::size_t end = std::min(label.find(" PROPERTY=", first), label.find(" TASK=", first));
+    LabelBlock map{"IMAGE_MAP_PROJECTION", 0, {}, {}};
+    LabelBlock root;
+    for (const auto& [key, value] : vicar_words(std::string_view(label).substr(first, end - first))) {
+      auto& entries = key == "target_name" ? root.entries : map.entries;
+      entries.push_back({upper_case(key), {{value, {}}}, 0});
+    }
+    root.blocks.push_back(std::move(map));
+    Pds3Place place = place_from_pds3(header_, root, info_.width, info_.height, LabelOf::kVicar);
+    info_.georeference = std::move(place.georeference);
+    info_.warnings.insert(info_.warnings.end(), place.warnings.begin(), place.warnings.end());
   }
 };
 

@@ -14,7 +14,7 @@
 namespace isohf {
 namespace {
 
-constexpr double kMostBytes = 0x1p60;
+constexpr double kMostFileBytes = 0x1p60;
 /// What is read at once of samples that lie between others.
 constexpr std::uint64_t kPieceBytes = std::uint64_t{1} << 20U;
 
@@ -84,7 +84,7 @@ void PlainLayout::take_band(const SourceInfo& info, BandOrder order, std::int64_
   const std::uint64_t together = order == BandOrder::kSamples ? static_cast<std::uint64_t>(bands) : 1;
   const double all = (static_cast<double>(info.width) * static_cast<double>(size) + static_cast<double>(more_bytes)) *
                      static_cast<double>(info.height) * static_cast<double>(bands);
-  if (!(all < kMostBytes)) throw Error(ErrorCode::kCorrupt, header + ": says more samples than are in any file");
+  if (!(all < kMostFileBytes)) throw Error(ErrorCode::kCorrupt, header + ": says more samples than are in any file");
   const std::uint64_t line = static_cast<std::uint64_t>(info.width) * size * together + more_bytes;
   column_bytes = size * together;
   row_bytes = order == BandOrder::kLines ? line * static_cast<std::uint64_t>(bands) : line;
@@ -100,7 +100,7 @@ double PlainLayout::end_bytes(const SourceInfo& info) const {
   const double down = row_bytes == 0 ? across * width : static_cast<double>(row_bytes);
   const double end =
       static_cast<double>(offset_bytes) + static_cast<double>(info.height - 1) * down + (width - 1.0) * across + size;
-  return end < kMostBytes ? end : std::numeric_limits<double>::infinity();
+  return end < kMostFileBytes ? end : std::numeric_limits<double>::infinity();
 }
 
 void read_plain_samples(const RawFile& file, const SourceInfo& info, const PlainLayout& layout, const Window& window,

@@ -151,19 +151,23 @@ double unit_of(PJ_CONTEXT* context, const PJ* system) {
   return unit[0];
 }
 
-void describe_heights(PJ_CONTEXT* context, const PJ* system, IsohfProjInfo& info) {
-  if (proj_get_type(system) != PJ_TYPE_COMPOUND_CRS) return;
-  const Object vertical(proj_crs_get_sub_crs(context, system, 1));
+/// Of a compound system its second part; else the third axis, which counts from the ellipsoid.
+void describe_heights(PJ_CONTEXT* context, const PJ* system, const PJ* horizontal, IsohfProjInfo& info) {
+  const bool is_compound = proj_get_type(system) == PJ_TYPE_COMPOUND_CRS;
+  const Object vertical(is_compound ? proj_crs_get_sub_crs(context, system, 1) : proj_clone(context, horizontal));
   const Object axes(vertical ? proj_crs_get_coordinate_system(context, vertical.get()) : nullptr);
+  constexpr int kHeight = 2;
+  if (!is_compound && (!axes || proj_cs_get_axis_count(context, axes.get()) <= kHeight)) return;
   const char* direction = nullptr;
   const char* unit = nullptr;
-  if (!axes || proj_cs_get_axis_info(context, axes.get(), 0, nullptr, nullptr, &direction,
+  if (!axes || proj_cs_get_axis_info(context, axes.get(), is_compound ? 0 : kHeight, nullptr, nullptr, &direction,
                                      &info.metres_per_vertical_unit, &unit, nullptr, nullptr) == 0) {
     return;
   }
-  isohf::put_text(info.vertical_name, proj_get_name(vertical.get()));
+  isohf::put_text(info.vertical_name, is_compound ? proj_get_name(vertical.get()) : ISOHF_ELLIPSOIDAL_HEIGHT);
   isohf::put_text(info.vertical_unit, unit);
   if (std::string(direction) == "down") info.metres_per_vertical_unit *= -1.0;
+  if (!is_compound) return;
   const char* const authority = proj_get_id_auth_name(vertical.get(), 0);
   if (authority != nullptr && std::string(authority) == "EPSG") {
     info.vertical_epsg = std::atoi(proj_get_id_code(vertical.get(), 0));
@@ -204,7 +208,7 @@ void describe(IsohfProjSystem& system, IsohfProjInfo& info) {
   if (operation) system.to_geo.reset(proj_normalize_for_visualization(context, operation.get()));
   if (!system.to_geo) refuse("has no way to longitudes and latitudes that PROJ knows");
 
-  describe_heights(context, system.system.get(), info);
+  describe_heights(context, system.system.get(), part, info);
   const char* const one_line[] = {"MULTILINE=NO", nullptr};
   constexpr PJ_WKT_TYPE kDialects[ISOHF_WKTS] = {PJ_WKT2_2019, PJ_WKT1_GDAL, PJ_WKT1_ESRI};
   for (int dialect = 0; dialect < ISOHF_WKTS; ++dialect) {
@@ -212,6 +216,22 @@ void describe(IsohfProjSystem& system, IsohfProjInfo& info) {
     system.wkt[dialect] = wkt != nullptr ? wkt : "";
     info.wkt_bytes[dialect] = system.wkt[dialect].size() + 1;
   }
+}
+
+/// The system of EPSG's that a nameless one is, put together out of parts of EPSG's; null where none or several are.
+Object as_named(PJ_CONTEXT* context, const PJ* system) {
+  int* confidence = nullptr;
+  const std::unique_ptr<PJ_OBJ_LIST, Destroy<proj_list_destroy>> list(
+      proj_identify(context, system, "EPSG", nullptr, &confidence));
+  proj_int_list_destroy(confidence);
+  Object named;
+  for (int i = 0; list && i < proj_list_get_count(list.get()); ++i) {
+    Object each(proj_list_get(context, list.get(), i));
+    if (proj_is_equivalent_to_with_ctx(context, system, each.get(), PJ_COMP_EQUIVALENT) == 0) continue;
+    if (named) return nullptr;
+    named = std::move(each);
+  }
+  return named;
 }
 
 void open(const std::string& text, const char* heights, IsohfProjSystem& system, IsohfProjInfo& info) {
@@ -225,6 +245,12 @@ void open(const std::string& text, const char* heights, IsohfProjSystem& system,
     refuse_text(context);
   }
   system.horizontal = horizontal_part(context, system.system.get());
+  if (text.starts_with("urn:ogc:def:crs,") && proj_get_id_code(system.horizontal.get(), 0) == nullptr) {
+    if (Object named = as_named(context, system.system.get())) {
+      system.horizontal.reset(proj_clone(context, named.get()));
+      system.system = std::move(named);
+    }
+  }
   if (*heights != '\0' && proj_get_type(system.system.get()) != PJ_TYPE_COMPOUND_CRS) {
     const Object vertical(proj_create(context, heights));
     const std::string name =

@@ -12,12 +12,15 @@
 extern "C" {
 
 /// Raised whenever anything below changes; the loader refuses any other.
-#define ISOHF_PROJ_ABI 3
+#define ISOHF_PROJ_ABI 4
 
 typedef struct IsohfProjSystem IsohfProjSystem;
 
 /// The dialects of well-known text that systems are written in.
 enum { ISOHF_WKT2 = 0, ISOHF_WKT1 = 1, ISOHF_WKT_ESRI = 2, ISOHF_WKTS = 3 };
+
+/// What heights are called that are the third coordinate of longitudes and latitudes, or of a map.
+#define ISOHF_ELLIPSOIDAL_HEIGHT "the ellipsoid"
 
 /// The horizontal part of a system, and what it says of heights.
 typedef struct IsohfProjInfo {
@@ -29,11 +32,11 @@ typedef struct IsohfProjInfo {
   int32_t is_compound;     ///< heights belong to it
   double metres_per_unit;  ///< of both axes; degrees in a unit where not projected
   double semi_major_axis_m;
-  double inverse_flattening;        ///< 0 for a sphere
-  double prime_meridian_deg;        ///< East of Greenwich: where its longitudes are counted from
-  char vertical_name[256];          ///< "NAVD88 height (ftUS)"; empty where nothing is said of heights
-  int32_t vertical_epsg;            ///< its code; 0: none
-  char vertical_unit[64];           ///< "US survey foot"
+  double inverse_flattening;  ///< 0 for a sphere
+  double prime_meridian_deg;  ///< East of Greenwich: where its longitudes are counted from
+  char vertical_name[256];  ///< "NAVD88 height (ftUS)", or ISOHF_ELLIPSOIDAL_HEIGHT; empty: nothing is said of heights
+  int32_t vertical_epsg;    ///< its code; 0: none
+  char vertical_unit[64];   ///< "US survey foot"
   double metres_per_vertical_unit;  ///< negative: depths
   size_t wkt_bytes[ISOHF_WKTS];     ///< of each dialect, with the 0 behind it; 1 where it cannot say the system
 } IsohfProjInfo;

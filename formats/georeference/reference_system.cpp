@@ -246,6 +246,16 @@ void take_heights(int vertical_epsg, SourceInfo& info) {
   }
 }
 
+bool gives_heights_above_ellipsoid(int epsg) {
+  // EPSG keeps these ranges for systems of two dimensions: WGS 84, ETRS89, NAD83 and most others.
+  if ((epsg >= 4120 && epsg <= 4326) || (epsg >= 4600 && epsg <= 4826)) return false;
+  try {
+    return understand_system(fmt::format("EPSG:{}", epsg))->description().vertical_name == kAboveEllipsoid;
+  } catch (const Error&) {
+    return false;
+  }
+}
+
 std::string wkt_of(const ReferenceSystem& system, WktDialect dialect) {
   const std::string text = system_text(system);
   if (text.empty()) return {};

@@ -77,6 +77,13 @@ void take_system(const std::string& text, SourceInfo& info);
 /// Unit and name of the heights of a vertical system by its code; nothing where there is no module.
 void take_heights(int vertical_epsg, SourceInfo& info);
 
+/// What heights are above that a system of longitudes, latitudes and heights gives.
+inline constexpr const char* kAboveEllipsoid = "the ellipsoid";
+
+/// Whether a code of EPSG's is that of such a system (EPSG:4979). PROJ is left alone for the usual systems of two
+/// dimensions; false where there is no module.
+[[nodiscard]] bool gives_heights_above_ellipsoid(int epsg);
+
 /// Text that other programs read: WKT1 as a GeoTIFF's citation and an .aux.xml carry it, or the ESRI dialect of a .prj;
 /// heights included. Without the module, or where a dialect has no words for it: the WKT as it was found; without one
 /// empty.

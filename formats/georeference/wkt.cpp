@@ -184,6 +184,14 @@ void read_heights(const Node& system, SourceInfo& info) {
   ReferenceSystem& reference = info.georeference.system;
   if (!system.texts.empty()) reference.vertical_datum = system.texts[0];
   if (const auto code = epsg_of(system)) reference.vertical_epsg = code;
+  // OGC 01-009 has the type 2002 for it; ESRI a datum of longitudes and latitudes where others have a vertical one.
+  constexpr double kOfEllipsoid = 2002.0;
+  const Node* const datum = system.below({"VERT_DATUM"});
+  if ((datum != nullptr && !datum->numbers.empty() && datum->numbers[0] == kOfEllipsoid) ||
+      (datum == nullptr && system.below({"VDATUM", "VERTICALDATUM"}) == nullptr &&
+       system.below({"DATUM"}) != nullptr)) {
+    reference.vertical_datum = kAboveEllipsoid;
+  }
   const Node* const unit = unit_of(system);
   if (unit == nullptr) return;
   info.metres_per_vertical_unit = unit->numbers[0];
@@ -223,7 +231,12 @@ bool read_wkt(std::string_view text, SourceInfo& info) {
   }
   reference.body = body_of(reference.name, reference.semi_major_axis_m);
   const Node* const heights = root->below({"VERT_CS", "VERTCS", "VERTCRS", "VERTICALCRS"});
-  if (heights != nullptr) read_heights(*heights, info);
+  const Node* const axes = system->below({"CS"});
+  if (heights != nullptr) {
+    read_heights(*heights, info);
+  } else if (axes != nullptr && !axes->numbers.empty() && axes->numbers[0] == 3.0) {
+    reference.vertical_datum = kAboveEllipsoid;
+  }
   return true;
 }
 

@@ -56,6 +56,8 @@ class CfReader {
     }
     info_.width = static_cast<std::int64_t>(width);
     info_.height = static_cast<std::int64_t>(height);
+    raster.from_south =
+        runs_from_south(rows, file_.dimensions[variable.dimensions[raster.by_columns ? last : last - 1]].name);
     if (rows != nullptr && columns != nullptr) read_place(variable, *rows, *columns, raster);
     read_attributes(variable);
     return raster;
@@ -168,15 +170,22 @@ class CfReader {
     return axis.step == 0.0 ? std::nullopt : std::optional(axis);
   }
 
+  /// Rows run as their coordinates do, even where these are uneven. Without any the South comes first for GDAL and GMT.
+  bool runs_from_south(const Variable* rows, std::string_view dimension) {
+    if (rows != nullptr && rows->dimensions.size() == 1 && rows->sample_type()) {
+      const auto [first, last] = ends_of(*rows, static_cast<std::uint64_t>(info_.height));
+      return last > first;
+    }
+    if (dimension.starts_with("phony_dim_")) return false;  // libnetcdf's name for those of HDF5, which has none
+    info_.warnings.emplace_back(
+        "its rows have no coordinates: the first is taken for the southernmost, as GDAL and GMT take it");
+    return true;
+  }
+
   void read_place(const Variable& variable, const Variable& rows, const Variable& columns, CfRaster& raster) {
     const auto is_degrees = [](const Variable& of) { return of.text("units").starts_with("degree"); };
     const auto y = axis_of(rows, static_cast<std::uint64_t>(info_.height), false);
     const auto x = axis_of(columns, static_cast<std::uint64_t>(info_.width), is_degrees(columns));
-    // Rows run as their coordinates do, even where these are uneven.
-    if (rows.dimensions.size() == 1 && rows.sample_type()) {
-      const auto [first, last] = ends_of(rows, static_cast<std::uint64_t>(info_.height));
-      raster.from_south = last > first;
-    }
     if (!x || !y) {
       info_.warnings.push_back(loss("its coordinates are not evenly spaced: where it lies is left out"));
       return;

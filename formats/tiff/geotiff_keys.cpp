@@ -371,6 +371,11 @@ void read_vertical(Keys& keys, GeoTiffPlace& place) {
   ReferenceSystem& system = place.georeference.system;
   system.vertical_epsg = keys.code(kVerticalCrs);
   system.vertical_datum = keys.text(kVerticalCitation);
+  // GeoTIFF 1.0 had codes for heights above ellipsoids, which EPSG has no systems of.
+  if (system.vertical_epsg && *system.vertical_epsg >= 5001 && *system.vertical_epsg <= 5033) {
+    system.vertical_epsg.reset();
+    system.vertical_datum = kAboveEllipsoid;
+  }
   if (system.vertical_datum.empty() && system.vertical_epsg) {
     for (const auto& [code, name] : kVerticalDatums) {
       if (system.vertical_epsg == code) system.vertical_datum = name;
@@ -636,7 +641,9 @@ std::string citation_wkt(const ReferenceSystem& system) {
 
 void write_vertical(const ReferenceSystem& system, double metres_per_unit, const std::string& unit, KeyWriter& keys) {
   if (system.vertical_epsg) keys.number(kVerticalCrs, code_or_user_defined(system.vertical_epsg));
-  keys.text(kVerticalCitation, system.vertical_datum);
+  // What a code of three coordinates says already GDAL would take for a system of heights of its own.
+  const bool is_said = system.epsg && system.vertical_datum == kAboveEllipsoid;
+  if (!is_said) keys.text(kVerticalCitation, system.vertical_datum);
   if (unit.empty()) return;
   if (const auto code = linear_unit_code(metres_per_unit)) keys.number(kVerticalUnits, *code);
 }

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "formats/files/text.h"
+#include "formats/georeference/reference_system.h"
 #include "formats/georeference/units.h"
 #include "isohf/base/sample.h"
 #include "isohf/error.h"
@@ -141,9 +142,14 @@ void warn_of_losses(const std::string& output, const RasterSpec& spec) {
   if (kind == RasterKind::kHgt) {
     const bool is_in_degrees = spec.georeference && spec.georeference->unit == HorizontalUnit::kDegree;
     const bool is_on_earth = system.body.empty() || system.body == "Earth";
-    if (!is_on_earth || (is_in_degrees && system.epsg.value_or(4326) != 4326))
+    const bool is_above_ellipsoid =
+        system.vertical_datum.find("llipsoid") != std::string::npos ||
+        (is_in_degrees && system.epsg && system.vertical_datum.empty() && gives_heights_above_ellipsoid(*system.epsg));
+    constexpr int kWgs84WithHeights = 4979;
+    const int code = system.epsg.value_or(4326);
+    if (!is_on_earth || (is_in_degrees && code != 4326 && code != kWgs84WithHeights))
       say("readers take it for degrees of WGS 84, which its samples do not lie on");
-    if (system.vertical_datum.find("llipsoid") != std::string::npos) {
+    if (is_above_ellipsoid) {
       say("readers take it for heights above the geoid, and these are above the ellipsoid");
     }
   }
