@@ -219,6 +219,7 @@ TEST_F(GdalVariants, SamplesThatAHeaderDescribes) {
        std::vector<Variant>{{"a.bsq", {"-of", "ENVI"}},
                             {"b.dat", {"-of", "ENVI", "-co", "INTERLEAVE=BIP", "-a_nodata", "0"}},
                             {"c.bil", {"-of", "ENVI", "-co", "SUFFIX=ADD", "-ot", "UInt16"}},
+                            {"south.bin", {"-of", "ENVI", "-a_ullr", "10", "49", "11", "50", "-a_srs", "EPSG:4326"}},
                             {"d.sdat", {"-of", "SAGA"}},
                             {"e.nc", {"-of", "netCDF"}},
                             {"k.rst", {"-of", "RST"}},

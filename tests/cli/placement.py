@@ -407,6 +407,56 @@ def geojp2(isohf, folder):
         check(numpy.array_equal(gdal.Open(str(folder / "s.tif")).ReadAsArray(), theirs), f"signed JPEG 2000, {options}: samples differ")
 
 
+def vicar(isohf, folder):
+    """Maps in the label of a VICAR file lie where GDAL says, and a label that ends with one as well as one that goes on."""
+    samples = numpy.arange(12, dtype=numpy.int16).reshape(3, 4)
+
+    def same(name):
+        isohf.must("convert", folder / name, "-o", folder / "v.isohf", "--overwrite", "--projection", "none", "--lossless", "-q")
+        isohf.must("restore", folder / "v.isohf", folder / "v.tif", "--overwrite", "-q")
+        ours, theirs = gdal.Open(str(folder / "v.tif")), gdal.Open(str(folder / name))
+        check(ours.GetGeoTransform() == theirs.GetGeoTransform(), f"{name}: {ours.GetGeoTransform()}, must be {theirs.GetGeoTransform()}")
+        check(ours.GetSpatialRef().ExportToProj4() == theirs.GetSpatialRef().ExportToProj4(), f"{name}: another system")
+        check(numpy.array_equal(ours.ReadAsArray(), samples), f"{name}: samples differ")
+
+    raster = gdal.GetDriverByName("MEM").Create("", 4, 3, 1, gdal.GDT_Int16)
+    raster.GetRasterBand(1).WriteArray(samples)
+    raster.SetGeoTransform((500000, 100, 0, 200000, 0, -100))
+    for text in ("+proj=eqc +lat_ts=0 +lon_0=0 +R=3396190", "+proj=eqc +lat_ts=10 +lon_0=30 +R=1737400", "+proj=sinu +lon_0=137 +R=3396190"):
+        raster.SetProjection(system(text).ExportToWkt().replace('DATUM["unknown"', 'DATUM["D_Moon"'))
+        gdal.GetDriverByName("VICAR").CreateCopy(str(folder / "a.vic"), raster)
+        same("a.vic")
+    head = ("LBLSIZE=1024      FORMAT='HALF' TYPE='IMAGE' BUFSIZ=8 DIM=3 EOL=0 RECSIZE=8 ORG='BSQ' NL=3 NS=4 NB=1 N1=4 N2=3 N3=1 N4=0 NBB=0 NLB=0 "
+            "HOST='X86-64-LINX' INTFMT='LOW' REALFMT='RIEEE' BHOST='X86-64-LINX' BINTFMT='LOW' BLTYPE='' COMPRESS='NONE' EOCI1=0 EOCI2=0 "
+            "PROPERTY='MAP' TARGET_NAME='MARS' A_AXIS_RADIUS=3396.19 B_AXIS_RADIUS=3396.19 C_AXIS_RADIUS=3376.2 "
+            "COORDINATE_SYSTEM_NAME='PLANETOCENTRIC' POSITIVE_LONGITUDE_DIRECTION='EAST' MAP_PROJECTION_TYPE='{}' CENTER_LONGITUDE=30.0 "
+            "CENTER_LATITUDE={} FIRST_STANDARD_PARALLEL=10.0 SECOND_STANDARD_PARALLEL=20.0 SAMPLE_PROJECTION_OFFSET=12.5 "
+            "LINE_PROJECTION_OFFSET=-34.25 MAP_SCALE=0.1 PROPERTY='OTHER' MAP_SCALE=7 TASK='T' USER='me' ")
+    for kind, latitude in (("STEREOGRAPHIC", -90), ("MERCATOR", 10), ("TRANSVERSE_MERCATOR", 10), ("ORTHOGRAPHIC", 10), ("LAMBERT_CONFORMAL_CONIC", 10),
+                           ("LAMBERT_AZIMUTHAL_EQUAL_AREA", 10), ("SINUSOIDAL", 0), ("SIMPLE_CYLINDRICAL", 0)):
+        (folder / "b.vic").write_bytes(head.format(kind, latitude).encode().ljust(1024, b"\0") + samples.tobytes())
+        same("b.vic")
+    (folder / "c.vic").write_bytes(head.format("CYLINDRICAL_EQUAL_AREA", 0).encode().ljust(1024, b"\0") + samples.tobytes())
+    said = isohf.run("info", folder / "c.vic").stderr
+    check("CYLINDRICAL EQUAL AREA is not known" in said, f"VICAR: {said}")
+
+
+def ellipsoidal(isohf, folder):
+    """Codes of three coordinates count heights from the ellipsoid, whoever says them."""
+    for text in ("EPSG:4979", "EPSG:4937", "EPSG:6319"):
+        raster = gdal.GetDriverByName("GTiff").Create(str(folder / "e.tif"), 20, 20, 1, gdal.GDT_Int16)
+        raster.SetSpatialRef(system(text))
+        raster.SetGeoTransform((8.0, 0.01, 0, 47.0, 0, -0.01))
+        raster = None
+        check("heights above the ellipsoid" in isohf.must("info", folder / "e.tif").stdout, f"{text}: no heights above the ellipsoid")
+        isohf.must("convert", folder / "e.tif", "-o", folder / "e.isohf", "--overwrite", "-q", "--lossless")
+        isohf.must("restore", folder / "e.isohf", folder / "back.tif", "--overwrite", "-q")
+        own = gdal.Open(str(folder / "back.tif")).GetSpatialRef()
+        check(own.IsSame(system(text), ["IGNORE_DATA_AXIS_TO_SRS_AXIS_MAPPING=YES"]) and not own.IsCompound(), f"{text}: {own.ExportToWkt()}")
+    isohf.must("convert", folder / "e.tif", "-o", folder / "e.isohf", "--overwrite", "-q", "--lossless", "--crs", "EPSG:4979")
+    check("heights above the ellipsoid" in isohf.must("info", folder / "e.isohf").stdout, "--crs EPSG:4979: no heights above the ellipsoid")
+
+
 def ranges_of_voids(isohf, folder):
     """SAGA's NODATA_VALUE may be a range, of which every value is void."""
     grid = numpy.arange(1600, dtype="<f4").reshape(40, 40)
@@ -562,7 +612,7 @@ made.Write(numpy.zeros((12000, 12000), dtype=numpy.float32))
 
 
 PARTS = (projections, globes, planets, heights_of_a_projection, joined, other_parameters, written_elsewhere, loads_no_proj, beside,
-         samples, geojp2, ranges_of_voids, large_chunks, feet, voids_of_files, beside_samples, rotated)
+         samples, geojp2, vicar, ellipsoidal, ranges_of_voids, large_chunks, feet, voids_of_files, beside_samples, rotated)
 
 if __name__ == "__main__":
     sys.exit(run_parts(PARTS, __doc__))

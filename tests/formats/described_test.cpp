@@ -11,6 +11,7 @@
 #include "formats/netcdf_bytes.h"
 #include "formats/pds4_label.h"
 #include "formats/reader_failure.h"
+#include "formats/registry.h"
 #include "isohf/raster.h"
 #include "support/samples.h"
 #include "support/temporary_folder.h"
@@ -62,6 +63,21 @@ TEST_F(Envi, FeetOfMapInfoAreUsSurveyFeet) {
   EXPECT_DOUBLE_EQ(place.metres_per_unit, 1200.0 / 3937.0);
   write("a.hdr", envi("map info = {Geographic Lat/Lon, 1, 1, 6, 40, 10, 10, WGS-84, units=Seconds}\n"));
   EXPECT_THAT(failure("a.dat"), HasSubstr("its coordinates are in seconds"));
+}
+
+TEST_F(Envi, RowsFromTheSouthAreTurned) {
+  write("a.dat", stored<std::int16_t>({1, 2, 3, 4, 5, 6, 7, 8}));
+  for (const char* way : {"10, -20, 32, North, WGS-84", "10, 20, 32, North, WGS-84, rotation=180"}) {
+    write("a.hdr", envi(std::string("map info = {UTM, 1, 1, 500000, 4000000, ") + way + "}\n"));
+    const auto source = open("a.dat");
+    EXPECT_THAT(values_of(*source), ElementsAre(5, 7, 1, 3)) << way;
+    const Georeference& place = source->info().georeference;
+    EXPECT_EQ(place.spacing_y, 20.0);
+    EXPECT_EQ(place.origin_x, 500005.0);
+    EXPECT_EQ(place.origin_y, 4000030.0) << way;  // 4000000 is the southern edge, as GDAL reads both
+  }
+  write("a.hdr", envi("map info = {UTM, 1, 1, 500000, 4000000, 10, 20, 32, North, WGS-84, rotation=30}\n"));
+  EXPECT_THAT(failure("a.dat"), HasSubstr("the map is rotated"));
 }
 
 TEST_F(Envi, GainsAndOffsetsAreTheBandsOwn) {
@@ -152,6 +168,36 @@ TEST_F(Netcdf, UnevenRowsFromTheSouthAreTurnedToo) {
   const auto source = open("a.nc");
   EXPECT_THAT(values_of(*source), ElementsAre(5, 6, 3, 4, 1, 2));
   EXPECT_FALSE(source->info().georeference.has_origin);
+}
+
+TEST_F(Netcdf, WithoutCoordinatesTheFirstRowIsTheSouthernmost) {
+  const std::string samples = stored<std::int16_t>({1, 2, 3, 4, 5, 6}, true);
+  for (const bool has_columns : {false, true}) {
+    NetcdfBytes file;
+    file.dimension("y", 3).dimension("x", 2);
+    if (has_columns) file.variable("x", {1}, 6, stored<double>({1.0, 2.0}, true), {});
+    write("a.nc", file.variable("z", {0, 1}, 3, samples, {}).bytes());
+    const auto source = open("a.nc");
+    EXPECT_THAT(values_of(*source), ElementsAre(5, 6, 3, 4, 1, 2));
+    ASSERT_EQ(source->info().warnings.size(), 1U);
+    EXPECT_THAT(source->info().warnings.front(), HasSubstr("the first is taken for the southernmost, as GDAL and GMT"));
+  }
+  NetcdfBytes file;  // rows that say where they lie are followed
+  file.dimension("y", 3).dimension("x", 2).variable("y", {0}, 6, stored<double>({3.0, 2.0, 1.0}, true), {});
+  write("a.nc", file.variable("z", {0, 1}, 3, samples, {}).bytes());
+  EXPECT_THAT(values_of(*open("a.nc")), ElementsAre(1, 2, 3, 4, 5, 6));
+}
+
+TEST_F(Netcdf, LatitudesBeyondAPoleAreTold) {
+  for (const double north : {90.0, 90.5}) {
+    NetcdfBytes file = netcdf_grid({1.0, 2.0}, {north, north - 1.0});
+    write("a.nc", file.variable("z", {0, 1}, 3, stored<std::int16_t>({1, 2, 3, 4}, true), {}).bytes());
+    const auto& warnings = open("a.nc")->info().warnings;
+    ASSERT_EQ(warnings.size(), north > 90.0 ? 1U : 0U);
+    if (!warnings.empty()) {
+      EXPECT_THAT(warnings.front(), HasSubstr("its rows lie at latitudes from 89.5 to 90.5"));
+    }
+  }
 }
 
 TEST_F(Netcdf, CoordinatesMayBePacked) {
@@ -474,6 +520,28 @@ TEST_F(Idrisi, APlaneIsNoSystemThatIsLeftOut) {
         "min. Y : 0\nmax. Y : 2\nref. system : plane\n");
   EXPECT_TRUE(open("a.rst")->info().warnings.empty());
 }
+
+#ifdef ISOHF_WITH_PROJ
+TEST_F(Idrisi, NamesOfStatePlanesAreCodes) {
+  set_module_folder(ISOHF_BIN_DIR);
+  write("a.rst", "\1\2\3\4");
+  const auto of = [&](const std::string& name, const std::string& unit) {
+    write("a.rdc", "file type : binary\ndata type : byte\ncolumns : 2\nrows : 2\nref. units : " + unit +
+                       "\nmin. X : 0\nmax. X : 20\nmin. Y : 0\nmax. Y : 20\nref. system : " + name + "\n");
+    const SourceInfo info = open("a.rst")->info();
+    if (!info.georeference.system.epsg) {
+      EXPECT_THAT(info.warnings.front(), HasSubstr("the reference system is left out"));
+    }
+    return info.georeference.system.epsg.value_or(0);
+  };
+  EXPECT_EQ(of("spc83ca1", "m"), 26941);
+  EXPECT_EQ(of("spc83de1", "m"), 26957);
+  EXPECT_EQ(of("spc27ny3", "ft"), 0);  // international feet, which that zone has not
+  EXPECT_EQ(of("spc83xx1", "m"), 0);
+  EXPECT_EQ(of("spc83ca9", "m"), 0);
+  EXPECT_EQ(of("spc83ca1x", "m"), 0);
+}
+#endif
 
 using RoiPac = Described;
 

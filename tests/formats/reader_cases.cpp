@@ -248,6 +248,11 @@ constexpr const char* kSaga =
     "7\n"
     "CELLCOUNT_X = 4\nCELLCOUNT_Y = 3\nCELLSIZE = 10\nZ_FACTOR = 0.5\nNODATA_VALUE = 5\nTOPTOBOTTOM = FALSE\n";
 
+constexpr const char* kIdrisiParameters =
+    "ref. system : own\nprojection : Lambert Conformal Conic\ndatum : ETRS89\nellipsoid : GRS 1980\nmajor s-ax : "
+    "6378137.000\nminor s-ax : 6356752.314\norigin long : 10\norigin lat : 52\norigin X : 4321000\norigin Y : 3210000\n"
+    "stand ln 1 : 35\nstand ln 2 : 65\nscale fac : 1\nunits : m\n";
+
 constexpr const char* kIdrisi =
     "file format : Idrisi Raster A.1\ndata type   : integer\nfile type   : binary\ncolumns     : 4\nrows        : 3\n"
     "ref. system : utm-33n\nref. units  : m\nunit dist.  : 1\nmin. X      : 10\nmax. X      : 50\nmin. Y      : 0\n"
@@ -322,6 +327,7 @@ std::vector<ReaderCase> reader_cases() {
       {"NetcdfByColumns", "a.nc", netcdf(true), open_netcdf, {}},
       {"IdrisiHeader", "a.rdc", kIdrisi, open_idrisi, {}},
       {"IdrisiSamples", "a.rst", counting(12, 2), open_idrisi, {}},
+      {"IdrisiParameters", "own.ref", kIdrisiParameters, open_idrisi, {}},
       {"RoiPacHeader", "a.dem.rsc", kRoiPac, open_roi_pac, {}},
       {"Vicar", "a.vic", vicar(), open_vicar, {}},
       {"Terragen", "a.ter", terragen(), open_terragen, {}},
@@ -406,6 +412,13 @@ std::vector<ReaderCase> reader_cases() {
   roi_pac.shortest_valid = 1;
   roi_pac.opened = "a.dem";
   roi_pac.beside = {{"a.dem", counting(12, 2)}};
+  ReaderCase& parameters = find("IdrisiParameters");
+  parameters.text = true;
+  parameters.shortest_valid = 1;
+  parameters.opened = "a.rst";
+  parameters.beside = {{"a.rst", counting(12, 2)}, {"a.rdc", kIdrisi}};
+  std::string& header = parameters.beside.back().second;
+  header.replace(header.find("utm-33n"), std::string("utm-33n").size(), "own");
   find("Vicar").shortest_valid = find("Vicar").bytes.size() - 20;  // the other band's, and its prefix
   find("XyzText").shortest_valid = find("XyzText").bytes.size() - 1;
   find("SurferText").shortest_valid = find("SurferText").bytes.size() - 2;
