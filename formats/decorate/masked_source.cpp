@@ -25,7 +25,7 @@ class MaskedSource final : public HeightSource {
         opacity_(std::move(opacity)),
         info_(heights_->info()),
         stored_(SampleKind::of(info_)),
-        samples_(choose_mosaic_samples({stored_}, true, false)),
+        samples_(choose_mosaic_samples({stored_}, true, nullptr)),
         opacity_bytes_(size_bytes(opacity_->info().sample_type)) {
     const SourceInfo& mask = opacity_->info();
     if (mask.width != info_.width || mask.height != info_.height) {

@@ -20,6 +20,8 @@ namespace {
 
 /// Spacings that differ by less, relatively, are one resolution.
 constexpr double kSameResolution = 1e-3;
+/// The same across reference systems: maps of neighbouring zones differ in scale.
+constexpr double kAboutAsFine = 1.05;
 /// Rounding that moves samples by more than this is worth a word.
 constexpr double kWorthAWord = 1e-3;
 /// Sides of more samples would overflow byte counts; far beyond what memory bounds.
@@ -448,6 +450,15 @@ void place_members(std::vector<PlacedMember> members, MosaicPlan& plan) {
     const double area_b = b.size_x * b.size_y;
     return area_a != area_b ? area_a > area_b : a.size_x > b.size_x;
   });
+  const auto is_as_fine = [](double a, double b) { return std::max(a / b, b / a) <= kAboutAsFine; };
+  for (std::size_t i = 1, first = 0; i < plan.layers.size(); ++i) {
+    const MosaicLayer& coarsest = plan.layers[first];
+    MosaicLayer& layer = plan.layers[i];
+    const bool is_same =
+        plan.is_reprojected && is_as_fine(coarsest.size_x, layer.size_x) && is_as_fine(coarsest.size_y, layer.size_y);
+    layer.rank = coarsest.rank + (is_same ? 0 : 1);
+    if (!is_same) first = i;
+  }
   Georeference& place = plan.info.georeference;
   const double reach = place.registration == Registration::kArea ? 0.5 : 0.0;
   // The finest of the mosaic's own system; of equally fine layers the last, the finest in the other direction as well.
@@ -460,8 +471,6 @@ void place_members(std::vector<PlacedMember> members, MosaicPlan& plan) {
     if (x_from == nullptr || layer->spacing_x < x_from->spacing_x) x_from = &*layer;
     if (y_from == nullptr || layer->spacing_y < y_from->spacing_y) y_from = &*layer;
   }
-  // Maps of neighbouring zones differ in scale.
-  constexpr double kAboutAsFine = 1.05;
   const bool has_grid = x_from != nullptr && std::min(x_from->spacing_x, y_from->spacing_y) <= kAboutAsFine * finest;
   Extent columns{0, 0};
   Extent rows{0, 0};

@@ -53,6 +53,7 @@ struct MosaicLayer {
   std::shared_ptr<const MosaicWay> way;  ///< nullptr: the members are in the mosaic's reference system
   double size_x = 1.0;                   ///< the spacings in units of the mosaic's coordinates
   double size_y = 1.0;
+  std::int64_t rank = 0;  ///< its resolution's: among layers of one, the order of the files decides
 };
 
 /// Ground of a mosaic that no member covers.
@@ -82,6 +83,12 @@ struct MosaicPlan {
   int readers_at_once = 1;         ///< as many threads read, each a member of its own
   bool is_reprojected = false;     ///< some members are brought to the mosaic's reference system
 
+  [[nodiscard]] bool has_resolutions() const { return layers.front().rank != layers.back().rank; }
+  /// Another layer is of its resolution.
+  [[nodiscard]] bool is_tied(std::size_t layer) const {
+    return (layer > 0 && layers[layer - 1].rank == layers[layer].rank) ||
+           (layer + 1 < layers.size() && layers[layer + 1].rank == layers[layer].rank);
+  }
   [[nodiscard]] bool is_on_grid(const MosaicLayer& layer) const {
     return !layer.way && layer.spacing_x == info.georeference.spacing_x &&
            layer.spacing_y == info.georeference.spacing_y;

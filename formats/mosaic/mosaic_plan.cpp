@@ -461,7 +461,10 @@ MosaicPlan plan_mosaic(const std::vector<std::string>& paths, const OpenOptions&
   plan.region = box ? samples_in(*box, plan.info) : Window{0, 0, plan.info.width, plan.info.height};
   plan.holes = find_holes(plan);
   const bool interpolated = plan.layers.size() > 1 || !plan.is_on_grid(plan.layers.front());
-  plan.samples = choose_mosaic_samples(plan.kinds, plan.holes.samples > 0 || plan.is_reprojected, interpolated);
+  const char* const why = !interpolated            ? nullptr
+                          : plan.has_resolutions() ? "the files differ in resolution"
+                                                   : "the files differ in reference system";
+  plan.samples = choose_mosaic_samples(plan.kinds, plan.holes.samples > 0 || plan.is_reprojected, why);
   SourceInfo& info = plan.info;
   info.sample_type = plan.samples.kind.type;
   info.void_values = plan.samples.kind.void_values;

@@ -181,7 +181,8 @@ SampleKind SampleKind::of(const SourceInfo& info) {
   return {info.sample_type, info.void_values, info.valid_min, info.valid_max, info.z_scale, info.z_offset};
 }
 
-MosaicSamples choose_mosaic_samples(const std::vector<SampleKind>& kinds, bool gaps, bool interpolated) {
+MosaicSamples choose_mosaic_samples(const std::vector<SampleKind>& kinds, bool gaps, const char* why_interpolated) {
+  const bool interpolated = why_interpolated != nullptr;
   ISOHF_ASSERT(!kinds.empty());
   const SampleKind& first = kinds.front();
   const auto all = [&](auto holds) { return std::all_of(kinds.begin(), kinds.end(), holds); };
@@ -211,9 +212,9 @@ MosaicSamples choose_mosaic_samples(const std::vector<SampleKind>& kinds, bool g
     samples.gap = stored_sample(samples.kind.type, has_voids ? *value : 0.0);
   }
   if (!all([&](const SampleKind& kind) { return kind.type == samples.kind.type; })) {
-    samples.notes.push_back(fmt::format(
-        "{}; samples become {}", interpolated ? "the files differ in resolution" : "the files differ in sample type",
-        to_string(samples.kind.type)));
+    samples.notes.push_back(fmt::format("{}; samples become {}",
+                                        interpolated ? why_interpolated : "the files differ in sample type",
+                                        to_string(samples.kind.type)));
   }
   return samples;
 }

@@ -34,10 +34,12 @@ struct MosaicSamples {
 /// Members of one kind keep it, with their void values. Else, with one scale and offset, it is the smallest type that
 /// holds every raw sample exactly; with several, float64 elevations. Voids become one value that is no elevation in any
 /// member: one of the members' own, else NaN, or the lowest number of a larger type.
-/// gaps: there is ground without a member, which needs a void; interpolated: some samples are computed between
-/// others, which makes integers floats (float32 for types of up to 24 bits, float64 for others).
+/// gaps: there is ground without a member, which needs a void; why_interpolated, not nullptr where some samples are
+/// computed between others, which makes integers floats (float32 for types of up to 24 bits, float64 for others): what
+/// a note says of the files.
 /// kinds must not be empty. The result does not depend on their order.
-[[nodiscard]] MosaicSamples choose_mosaic_samples(const std::vector<SampleKind>& kinds, bool gaps, bool interpolated);
+[[nodiscard]] MosaicSamples choose_mosaic_samples(const std::vector<SampleKind>& kinds, bool gaps,
+                                                  const char* why_interpolated);
 
 /// Fills `out`, whole samples, with one sample.
 void fill_with(std::span<const std::byte> sample, std::span<std::byte> out);

@@ -120,6 +120,19 @@ double interpolate_at(const Numbers& numbers, const Between& x, const Between& y
   return area && weights > 0.0 ? sum / weights : kVoid;
 }
 
+/// Where nothing is drawn yet.
+constexpr std::int32_t kNoFile = -1;
+
+/// The file that a drawn sample of a layer is of.
+std::int32_t order_at(const std::vector<std::int32_t>& orders, const Window& window, std::int64_t column,
+                      std::int64_t row) {
+  if (column < window.column || row < window.row || column >= window.column + window.columns ||
+      row >= window.row + window.rows) {
+    return kNoFile;
+  }
+  return orders[static_cast<std::size_t>((row - window.row) * window.columns + column - window.column)];
+}
+
 /// Samples of the mosaic between two places that are computed: on a side of a cell, whose corners lie on multiples of it.
 constexpr std::int64_t kCell = 16;
 /// Where the middles of a cell's sides lie farther, in samples, from where its corners say, all its samples are computed.
@@ -291,8 +304,11 @@ void MosaicSource::limit_buffers(std::uint64_t bytes) {
 }
 
 std::uint64_t MosaicSource::buffer_bytes(std::uint64_t limit) const {
+  bool has_orders = false;
+  for (std::size_t layer = 0; layer < plan_.layers.size(); ++layer) has_orders = has_orders || plan_.is_tied(layer);
   const std::uint64_t strip = static_cast<std::uint64_t>(plan_.info.block_height) *
-                              static_cast<std::uint64_t>(plan_.info.width) * size_bytes(plan_.info.sample_type);
+                              static_cast<std::uint64_t>(plan_.info.width) *
+                              (size_bytes(plan_.info.sample_type) + (has_orders ? sizeof(std::int32_t) : 0));
   std::uint64_t members = 0;
   for (const MosaicLayer& layer : plan_.layers) members += layer.members.size();
   const std::uint64_t reading = static_cast<std::uint64_t>(plan_.readers_at_once) * plan_.reader_bytes;
@@ -318,18 +334,41 @@ void MosaicSource::read_window(const Window& window, std::span<std::byte> sample
 
 void MosaicSource::compose(const Window& window, std::span<std::byte> out) {
   fill_with(plan_.samples.gap, out);
+  Orders orders;
   for (std::size_t layer = 0; layer < plan_.layers.size(); ++layer) {
+    if (layer == 0 || plan_.layers[layer].rank != plan_.layers[layer - 1].rank) orders = orders_for(layer, window);
     if (plan_.is_on_grid(plan_.layers[layer])) {
-      draw(layer, window, out);
+      draw(layer, window, out, orders);
     } else if (plan_.layers[layer].way) {
-      reproject(layer, false, window, out);
+      reproject(layer, false, window, out, orders);
     } else {
-      interpolate(layer, window, out);
+      interpolate(layer, window, out, orders);
     }
   }
   if (plan_.info.georeference.registration == Registration::kPoint) return;
   for (std::size_t layer = plan_.layers.size(); layer-- > 0;) {
-    if (plan_.layers[layer].way) reproject(layer, true, window, out);
+    Orders none;
+    if (plan_.layers[layer].way) reproject(layer, true, window, out, none);
+  }
+}
+
+MosaicSource::Orders MosaicSource::orders_for(std::size_t layer, const Window& window) const {
+  if (!plan_.is_tied(layer)) return {};
+  return Orders(static_cast<std::size_t>(window.columns * window.rows), kNoFile);
+}
+
+void MosaicSource::lay_by_order(std::span<const std::byte> upper, std::span<const std::int32_t> upper_orders,
+                                std::span<std::byte> lower, std::span<std::int32_t> lower_orders) const {
+  const std::size_t sample_bytes = size_bytes(plan_.info.sample_type);
+  std::vector<double> numbers(upper_orders.size());
+  numbers_from_samples(plan_.samples.kind, upper, numbers);
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
+    const std::int32_t above = upper_orders[i];
+    const std::int32_t below = lower_orders[i];
+    if (std::isnan(numbers[i]) || (below != kNoFile && (rule_ == OverlapRule::kLast ? above < below : above > below)))
+      continue;
+    std::memcpy(lower.data() + i * sample_bytes, upper.data() + i * sample_bytes, sample_bytes);
+    lower_orders[i] = above;
   }
 }
 
@@ -373,7 +412,7 @@ void MosaicSource::read_part(Part& part) {
   convert_samples(kind, raw, plan_.samples, part.samples);
 }
 
-void MosaicSource::draw(std::size_t layer, const Window& window, std::span<std::byte> out) {
+void MosaicSource::draw(std::size_t layer, const Window& window, std::span<std::byte> out, Orders& orders) {
   std::vector<Part> parts = parts_in(layer, window);
   const std::size_t sample_bytes = size_bytes(plan_.info.sample_type);
   for (std::size_t from = 0; from < parts.size();) {
@@ -395,17 +434,24 @@ void MosaicSource::draw(std::size_t layer, const Window& window, std::span<std::
       for (std::size_t i = from; i < end; ++i) {
         const Part& part = parts[i];
         if (row < part.row || row >= part.row + part.own.rows) continue;
-        const std::size_t part_bytes = static_cast<std::size_t>(part.own.columns) * sample_bytes;
-        lay_over(plan_.samples.kind,
-                 part.samples.subspan(static_cast<std::size_t>(row - part.row) * part_bytes, part_bytes),
-                 out.subspan(static_cast<std::size_t>(row * window.columns + part.column) * sample_bytes, part_bytes));
+        const auto columns = static_cast<std::size_t>(part.own.columns);
+        const std::size_t part_bytes = columns * sample_bytes;
+        const auto first = static_cast<std::size_t>(row * window.columns + part.column);
+        const auto upper = part.samples.subspan(static_cast<std::size_t>(row - part.row) * part_bytes, part_bytes);
+        const auto lower = out.subspan(first * sample_bytes, part_bytes);
+        if (orders.empty()) {
+          lay_over(plan_.samples.kind, upper, lower);
+        } else {
+          const Orders own(columns, static_cast<std::int32_t>(part.member->order));
+          lay_by_order(upper, own, lower, std::span(orders).subspan(first, columns));
+        }
       }
     });
     from = end;
   }
 }
 
-void MosaicSource::interpolate(std::size_t layer, const Window& window, std::span<std::byte> out) {
+void MosaicSource::interpolate(std::size_t layer, const Window& window, std::span<std::byte> out, Orders& orders) {
   const MosaicLayer& coarse = plan_.layers[layer];
   const Georeference& place = plan_.info.georeference;
   const bool area = place.registration != Registration::kPoint;
@@ -419,10 +465,11 @@ void MosaicSource::interpolate(std::size_t layer, const Window& window, std::spa
   std::tie(numbers.window.column, numbers.window.columns) = needed(x, coarse.width);
   std::tie(numbers.window.row, numbers.window.rows) = needed(y, coarse.height);
   if (numbers.window.columns == 0 || numbers.window.rows == 0) return;
+  Orders drawn_orders = orders.empty() ? Orders() : orders_for(layer, numbers.window);
   {
     std::vector<std::byte> samples(bytes_of(numbers.window));
     fill_with(plan_.samples.gap, samples);
-    draw(layer, numbers.window, samples);
+    draw(layer, numbers.window, samples, drawn_orders);
     numbers.values.resize(static_cast<std::size_t>(numbers.window.columns * numbers.window.rows));
     numbers_from_samples(plan_.samples.kind, samples, numbers.values);
   }
@@ -434,20 +481,27 @@ void MosaicSource::interpolate(std::size_t layer, const Window& window, std::spa
     }
     std::vector<std::byte> samples(row_bytes);
     samples_from_numbers(plan_.info.sample_type, values, samples);
-    lay_over(plan_.samples.kind, samples, out.subspan(static_cast<std::size_t>(row) * row_bytes, row_bytes));
+    const auto lower = out.subspan(static_cast<std::size_t>(row) * row_bytes, row_bytes);
+    if (orders.empty()) return lay_over(plan_.samples.kind, samples, lower);
+    Orders own(x.size(), kNoFile);
+    for (std::size_t i = 0; i < x.size(); ++i) {
+      own[i] = order_at(drawn_orders, numbers.window, x[i].nearest, y[static_cast<std::size_t>(row)].nearest);
+    }
+    lay_by_order(samples, own, lower, std::span(orders).subspan(static_cast<std::size_t>(row) * x.size(), x.size()));
   });
 }
 
 /// outer: where nothing else is, outermost samples as far as their areas reach; else between samples alone, so that
 /// none is continued beside a layer that knows better.
-void MosaicSource::reproject(std::size_t layer, bool outer, const Window& window, std::span<std::byte> out) {
+void MosaicSource::reproject(std::size_t layer, bool outer, const Window& window, std::span<std::byte> out,
+                             Orders& orders) {
   // Blocks as wide as high: what they need of a layer that lies askew is little more than they have themselves.
   constexpr std::int64_t kBlock = 512;
   for (std::int64_t row = window.row; row < window.row + window.rows; row += kBlock) {
     for (std::int64_t column = window.column; column < window.column + window.columns; column += kBlock) {
       const Window block{column, row, std::min(kBlock, window.column + window.columns - column),
                          std::min(kBlock, window.row + window.rows - row)};
-      if (!outer || has_void(block, window, out)) reproject_block(layer, outer, block, window, out);
+      if (!outer || has_void(block, window, out)) reproject_block(layer, outer, block, window, out, orders);
     }
   }
 }
@@ -466,7 +520,7 @@ bool MosaicSource::has_void(const Window& block, const Window& window, std::span
 }
 
 void MosaicSource::reproject_block(std::size_t layer, bool outer, const Window& block, const Window& window,
-                                   std::span<std::byte> out) {
+                                   std::span<std::byte> out, Orders& orders) {
   const MosaicLayer& other = plan_.layers[layer];
   const LayerPlaces places(other, plan_.info.georeference, block);
   Numbers numbers;
@@ -474,21 +528,27 @@ void MosaicSource::reproject_block(std::size_t layer, bool outer, const Window& 
   if (numbers.window.columns <= 0 || numbers.window.rows <= 0) return;
   std::vector<std::byte> drawn(bytes_of(numbers.window));
   fill_with(plan_.samples.gap, drawn);
-  draw(layer, numbers.window, drawn);
+  Orders drawn_orders = orders.empty() ? Orders() : orders_for(layer, numbers.window);
+  draw(layer, numbers.window, drawn, drawn_orders);
   numbers.values.resize(static_cast<std::size_t>(numbers.window.columns * numbers.window.rows));
   numbers_from_samples(plan_.samples.kind, drawn, numbers.values);
   const std::size_t sample_bytes = size_bytes(plan_.info.sample_type);
   oneapi::tbb::parallel_for(block.row, block.row + block.rows, [&](std::int64_t row) {
     std::vector<double> values(static_cast<std::size_t>(block.columns));
+    Orders own(orders.empty() ? 0 : values.size(), kNoFile);
     for (std::int64_t i = 0; i < block.columns; ++i) {
       const MapPoint& place = places.at(block.column + i, row);
-      values[static_cast<std::size_t>(i)] = interpolate_at(numbers, place_between(place.easting, other.width, outer),
-                                                           place_between(place.northing, other.height, outer), outer);
+      const Between x = place_between(place.easting, other.width, outer);
+      const Between y = place_between(place.northing, other.height, outer);
+      values[static_cast<std::size_t>(i)] = interpolate_at(numbers, x, y, outer);
+      if (!own.empty()) own[static_cast<std::size_t>(i)] = order_at(drawn_orders, numbers.window, x.nearest, y.nearest);
     }
     std::vector<std::byte> samples(values.size() * sample_bytes);
     samples_from_numbers(plan_.info.sample_type, values, samples);
     const std::int64_t first = (row - window.row) * window.columns + block.column - window.column;
     const auto there = out.subspan(static_cast<std::size_t>(first) * sample_bytes, samples.size());
+    if (!own.empty())
+      return lay_by_order(samples, own, there, std::span(orders).subspan(static_cast<std::size_t>(first), own.size()));
     if (!outer) return lay_over(plan_.samples.kind, samples, there);
     lay_over(plan_.samples.kind, there, samples);
     std::copy(samples.begin(), samples.end(), there.begin());

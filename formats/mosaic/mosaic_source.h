@@ -43,15 +43,22 @@ class MosaicSource final : public HeightSource {
 
  private:
   struct Part;
+  using Orders = std::vector<std::int32_t>;  ///< places among the paths
 
   void choose_strips();
   void share_memory(std::uint64_t idle_bytes);
   void compose(const Window& window, std::span<std::byte> out);
-  void draw(std::size_t layer, const Window& window, std::span<std::byte> out);
-  void interpolate(std::size_t layer, const Window& window, std::span<std::byte> out);
-  void reproject(std::size_t layer, bool outer, const Window& window, std::span<std::byte> out);
+  /// orders, where it is not empty: of each sample the file that shows, which layers of one resolution go by.
+  void draw(std::size_t layer, const Window& window, std::span<std::byte> out, Orders& orders);
+  void interpolate(std::size_t layer, const Window& window, std::span<std::byte> out, Orders& orders);
+  void reproject(std::size_t layer, bool outer, const Window& window, std::span<std::byte> out, Orders& orders);
   void reproject_block(std::size_t layer, bool outer, const Window& block, const Window& window,
-                       std::span<std::byte> out);
+                       std::span<std::byte> out, Orders& orders);
+  /// Empty where no other layer is of the layer's resolution.
+  [[nodiscard]] Orders orders_for(std::size_t layer, const Window& window) const;
+  /// Lays samples over others where their file is to be seen, void ones nowhere.
+  void lay_by_order(std::span<const std::byte> upper, std::span<const std::int32_t> upper_orders,
+                    std::span<std::byte> lower, std::span<std::int32_t> lower_orders) const;
   [[nodiscard]] bool has_void(const Window& block, const Window& window, std::span<const std::byte> out) const;
   [[nodiscard]] std::vector<Part> parts_in(std::size_t layer, const Window& window) const;
   void read_part(Part& part);

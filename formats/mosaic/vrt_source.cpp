@@ -183,7 +183,7 @@ class VrtSource final : public FileSource {
     info_.block_width = info_.width;
     type_ = info_.sample_type;
     if (info_.void_values.empty() && options.void_values.empty() && !is_floating(type_) && has_gaps()) {
-      const MosaicSamples samples = choose_mosaic_samples({SampleKind::of(info_)}, true, false);
+      const MosaicSamples samples = choose_mosaic_samples({SampleKind::of(info_)}, true, nullptr);
       info_.sample_type = samples.kind.type;
       info_.void_values = samples.kind.void_values;
       info_.valid_min = samples.kind.valid_min;

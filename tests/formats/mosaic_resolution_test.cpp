@@ -185,7 +185,7 @@ TEST(MosaicSamples, CommonTypeHoldsEveryNumberOfBoth) {
                           Case{kInt32, kFloat32, kFloat64}, Case{kFloat32, kFloat64, kFloat64}}) {
     for (const auto& kinds :
          {std::vector{kind_of(one.a), kind_of(one.b)}, std::vector{kind_of(one.b), kind_of(one.a)}}) {
-      EXPECT_EQ(choose_mosaic_samples(kinds, false, false).kind.type, one.common)
+      EXPECT_EQ(choose_mosaic_samples(kinds, false, nullptr).kind.type, one.common)
           << to_string(one.a) << to_string(one.b);
     }
   }
@@ -194,7 +194,7 @@ TEST(MosaicSamples, CommonTypeHoldsEveryNumberOfBoth) {
 TEST(MosaicSamples, TheCommonVoidIsNoElevationOfAnyFile) {
   using enum SampleType;
   const auto chosen = [](const std::vector<SampleKind>& kinds, bool gaps) {
-    const MosaicSamples samples = choose_mosaic_samples(kinds, gaps, false);
+    const MosaicSamples samples = choose_mosaic_samples(kinds, gaps, nullptr);
     return std::pair(samples.kind.type, samples.kind.void_values);
   };
   using Chosen = std::pair<SampleType, std::vector<double>>;

@@ -7,10 +7,12 @@
 #include <bit>
 #include <cmath>
 #include <random>
+#include <span>
 #include <thread>
 #include <vector>
 
 #include "formats/georeference/wkt.h"
+#include "formats/mosaic_pieces.h"
 #include "formats/netcdf_bytes.h"
 #include "formats/reader_failure.h"
 #include "formats/registry.h"
@@ -265,6 +267,35 @@ TEST_F(UnderstandSystem, ArchivesOnAReferenceSystemFindTheirPlacesByIt) {
               HasSubstr("a.isohf: the reference system EPSG:99999"));
   archive.set_world_map(nullptr);
   EXPECT_FALSE(WorldGeoreference(archive.metadata()).has_geo());
+}
+
+/// Files of neighbouring zones are of one resolution, whatever their maps' scales.
+TEST_F(UnderstandSystem, AcrossZonesTheOrderOfTheFilesDecidesWhatShows) {
+  const TemporaryFolder folder;
+  const auto write = [&](const char* name, int epsg, double longitude, double elevation) {
+    const MapPoint at = understand_system("EPSG:" + std::to_string(epsg))->map_from_geo({longitude, 35.0});
+    RasterSpec spec = placed_spec(40, 40, SampleType::kInt16, Registration::kArea);
+    spec.georeference->system.epsg = epsg;
+    spec.georeference->origin_x = 30.0 * std::round(at.easting / 30.0);
+    spec.georeference->origin_y = 30.0 * std::round(at.northing / 30.0);
+    raster_of<std::int16_t>(spec, [&](auto, auto) { return elevation; }).cut(folder / name, {0, 0, 40, 40});
+    return folder / name;
+  };
+  const std::string zone11 = write("a.tif", 32611, -114.0, 100.0);
+  const std::string zone12 = write("z12.tif", 32612, -114.0, 200.0);
+  const ProjectionRequest onto = ProjectionRequest::parse("EPSG:32611");
+  for (const bool swapped : {false, true}) {
+    const std::vector<std::string> paths = swapped ? std::vector{zone12, zone11} : std::vector{zone11, zone12};
+    for (const OverlapRule rule : {OverlapRule::kLast, OverlapRule::kFirst}) {
+      MosaicSource mosaic("mosaic", plan_mosaic(paths, {}, std::nullopt, onto), {}, rule);
+      const SourceInfo& info = mosaic.info();
+      std::vector<float> sample(1);
+      mosaic.read_window({info.width / 2, info.height / 2, 1, 1}, std::as_writable_bytes(std::span(sample)));
+      EXPECT_EQ(sample[0], swapped == (rule == OverlapRule::kLast) ? 100.0F : 200.0F);
+      for (const Warning& warning : info.warnings)
+        EXPECT_THAT(warning, testing::Not(HasSubstr("differ in resolution")));
+    }
+  }
 }
 
 /// Grids of shifts end where those for whom they were made do.
