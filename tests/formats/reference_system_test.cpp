@@ -269,6 +269,46 @@ TEST_F(UnderstandSystem, ArchivesOnAReferenceSystemFindTheirPlacesByIt) {
   EXPECT_FALSE(WorldGeoreference(archive.metadata()).has_geo());
 }
 
+/// The Moon's simple cylindrical maps in metres, whose edges are poles and beyond by rounding.
+class CylindricalMoon : public UnderstandSystem {
+ protected:
+  static std::unique_ptr<MemorySource<float>> source_of(std::int64_t width, std::int64_t height, double west,
+                                                        double north, double spacing) {
+    auto source = std::make_unique<MemorySource<float>>(
+        SampleType::kFloat32, width, height, [](std::int64_t c, std::int64_t r) { return static_cast<double>(c + r); });
+    Georeference& place = source->mutable_info().georeference;
+    place.unit = HorizontalUnit::kMetre;
+    place.registration = Registration::kArea;
+    place.spacing_x = place.spacing_y = spacing;
+    place.has_origin = true;
+    place.origin_x = west + spacing / 2.0;
+    place.origin_y = north - spacing / 2.0;
+    place.system.wkt = "+proj=eqc +lon_0=180 +R=1737400 +units=m";
+    place.system.semi_major_axis_m = 1737400.0;
+    place.system.inverse_flattening = 0.0;
+    return source;
+  }
+};
+
+TEST_F(CylindricalMoon, ThatEndsAtThePoleLiesOnAPolarMap) {
+  for (const double north : {2729101.538173499982804, 2729200.0}) {
+    const auto owner = source_of(60, 50, -100000.0, north, 10000.0);
+    MemorySource<float>& source = *owner;
+    for (const char* const kind : {"auto", "polar-stereographic:90", "local"}) {
+      ConvertOptions options;
+      options.code_type = CodeType::kF32;
+      options.plan.ground.projection = ProjectionRequest::parse(kind);
+      understand_ground(source.info(), options.plan.ground);
+      const TemporaryFolder folder;
+      (void)convert(source, folder / "a.isohf", options);
+      ArchiveReader archive(folder / "a.isohf");
+      ASSERT_TRUE(archive.metadata().projection) << kind;
+      // Column 10.5 of the samples lies on the 180th meridian, the pole half a sample North of row 0.
+      EXPECT_NEAR(Surface(archive).at(GeoPoint{180.0, 89.0}).elevation, 9.5 + 2.53, 0.3) << kind;
+    }
+  }
+}
+
 /// Files of neighbouring zones are of one resolution, whatever their maps' scales.
 TEST_F(UnderstandSystem, AcrossZonesTheOrderOfTheFilesDecidesWhatShows) {
   const TemporaryFolder folder;

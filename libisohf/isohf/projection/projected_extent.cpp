@@ -156,8 +156,13 @@ MapBounds projected_bounds(const Projection& projection, const GeoExtent& ground
 }
 
 MapBounds projected_bounds(const Projection& projection, const ReferenceMap& map, const MapBounds& rectangle) {
-  return image_bounds(
-      rectangle, [&](const MapPoint& at) { return projection.forward(map.geo_from_map(at)); }, kStepsPerSide);
+  const auto image = [&](const MapPoint& at) {
+    GeoPoint geo = map.geo_from_map(at);
+    // Areas end at the poles, whose rounded coordinates may lie beyond.
+    geo.latitude = std::clamp(geo.latitude, -90.0, 90.0);
+    return projection.forward(geo);
+  };
+  return image_bounds(rectangle, image, kStepsPerSide);
 }
 
 ScaleError worst_scale_error(const Projection& projection, const GeoExtent& ground) {

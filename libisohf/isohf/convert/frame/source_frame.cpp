@@ -76,8 +76,8 @@ void place_by_warp(const SourceInfo& info, const ProjectionRequest& asked, const
   if (!std::isfinite(bounds.west)) {
     refuse_source(
         fmt::format("{}: `projection` {} has no place for a part of the input, or its edge runs through it; convert "
-                    "what lies within (`bbox`), or give `projection` auto",
-                    info.path, asked.name()));
+                    "what lies within (`bbox`){}",
+                    info.path, asked.name(), asked.is_auto ? "" : ", or give `projection` auto"));
   }
   const double grain = grain_of(std::min(frame.spacing_x, frame.spacing_z));
   const MapPoint origin{std::floor(bounds.west / grain) * grain, std::ceil(bounds.north / grain) * grain};
