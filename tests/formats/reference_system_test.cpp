@@ -18,6 +18,7 @@
 #include "formats/registry.h"
 #include "formats/tiff/geotiff_keys.h"
 #include "isohf/convert.h"
+#include "isohf/convert/frame/source_frame.h"
 #include "isohf/error.h"
 #include "isohf/projection/choose_projection.h"
 #include "isohf/projection/projection_wkt.h"
@@ -306,6 +307,17 @@ TEST_F(CylindricalMoon, ThatEndsAtThePoleLiesOnAPolarMap) {
       // Column 10.5 of the samples lies on the 180th meridian, the pole half a sample North of row 0.
       EXPECT_NEAR(Surface(archive).at(GeoPoint{180.0, 89.0}).elevation, 9.5 + 2.53, 0.3) << kind;
     }
+  }
+}
+
+TEST_F(CylindricalMoon, ThatGoesRoundHasAllLongitudes) {
+  for (const double spacing : {22742.52, 25000.0}) {
+    const SourceInfo info = source_of(480, 219, -240.0 * spacing, 2729000.0, spacing)->info();
+    GroundRequest request;
+    understand_ground(info, request);
+    const SourceFrame frame = make_source_frame(info, request);
+    ASSERT_TRUE(frame.ground);
+    EXPECT_NEAR(frame.ground->extent.east - frame.ground->extent.west, 360.0, 1e-9);
   }
 }
 

@@ -74,9 +74,11 @@ std::string text_from(const SourcePlace& place) {
   if (place.ground) {
     const GeoExtent& extent = place.ground->extent;
     const GeoPoint& centre = place.ground->centre;
+    const std::string longitudes = extent.east - extent.west > 360.0 - 1e-6
+                                       ? "all longitudes"
+                                       : fmt::format("longitude {:.9g} to {:.9g}", extent.west, extent.east);
     say("lon/lat",
-        fmt::format("longitude {:.9g} to {:.9g}, latitude {:.9g} to {:.9g}", extent.west, extent.east, extent.south,
-                    extent.north) +
+        fmt::format("{}, latitude {:.9g} to {:.9g}", longitudes, extent.south, extent.north) +
             (std::isfinite(centre.longitude) ? fmt::format("; centre {:.9g}, {:.9g}", centre.longitude, centre.latitude)
                                              : std::string()));
     say("map scale", describe_map_scale(*place.ground));

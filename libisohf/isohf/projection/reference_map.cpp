@@ -134,10 +134,15 @@ std::optional<MapGround> ground_under(const ReferenceMap& map, const MapBounds& 
   ground.worst_error = -1.0;
   double sum = 0.0;
   int count = 0;
+  bool goes_round = false;
   for (int row = 0; row < kPlaces; ++row) {
+    double turned = 0.0;
+    double before = NAN;
     for (int column = 0; column < kPlaces; ++column) {
       const MapPoint place{between(bounds.west, bounds.east, column), between(bounds.north, bounds.south, row)};
       const GeoPoint geo = map.geo_from_map(place);
+      if (column > 0) turned += std::remainder(geo.longitude - before, 360.0);
+      before = geo.longitude;
       if (!std::isfinite(geo.longitude) || !std::isfinite(geo.latitude)) continue;
       if (!std::isfinite(first.longitude)) first = geo;
       include(ground.extent, first, on_the_body(geo));
@@ -153,6 +158,7 @@ std::optional<MapGround> ground_under(const ReferenceMap& map, const MapBounds& 
       ground.worst_error = scale.error();
       ground.worst_place = geo;
     }
+    goes_round = goes_round || std::abs(turned) >= 360.0 - kDegreeGrain;
   }
   if (count == 0) return std::nullopt;
   ground.mean_scale = rounded(sum / count, kScaleGrain);
@@ -164,6 +170,7 @@ std::optional<MapGround> ground_under(const ReferenceMap& map, const MapBounds& 
   for (double* const side : {&ground.extent.west, &ground.extent.south, &ground.extent.east, &ground.extent.north}) {
     *side = rounded(*side, kDegreeGrain);
   }
+  if (goes_round) ground.extent.east = ground.extent.west + 360.0;
   for (const double pole : {90.0, -90.0}) {
     const MapPoint here = map.map_from_geo({first.longitude, pole});
     if (!holds(bounds, here)) continue;
