@@ -321,6 +321,19 @@ TEST_F(CylindricalMoon, ThatGoesRoundHasAllLongitudes) {
   }
 }
 
+TEST_F(CylindricalMoon, ThatGoesRoundIsOfferedNoRemedyThatIsRefused) {
+  const SourceInfo info = source_of(437, 219, -10925000.0, 2750000.0, 25000.0)->info();
+  GroundRequest request;
+  understand_ground(info, request);
+  const SourceFrame frame = make_source_frame(info, request);
+  EXPECT_THAT(
+      scale_warning(info, frame, request.projection),
+      HasSubstr("a part of it (`bbox`) can be laid on a truer map by `projection` auto; `projection` none keeps"));
+  request.wrap_x = true;
+  EXPECT_THAT(error_of([&] { (void)make_source_frame(info, request); }).what(),
+              HasSubstr("`wrap_x` joins columns of an input in degrees; this one's are not"));
+}
+
 /// Files of neighbouring zones are of one resolution, whatever their maps' scales.
 TEST_F(UnderstandSystem, AcrossZonesTheOrderOfTheFilesDecidesWhatShows) {
   const TemporaryFolder folder;

@@ -257,12 +257,16 @@ SourceFrame make_source_frame(const SourceInfo& info, const GroundRequest& reque
     frame.first_sample_z = frame.spacing_z / 2.0;
   }
   if (request.wrap_x) {
+    if (place.unit != HorizontalUnit::kDegree) {
+      refuse_source(info.path +
+                    ": `wrap_x` joins columns of an input in degrees; this one's are not, whether or not they go all "
+                    "the way round; leave the option out, or bring it to degrees (gdalwarp)");
+    }
     if (closure_of(info) != Closure::kClosed) {
       refuse_source(
           fmt::format("{}: `wrap_x` needs columns all the way round, 360 degrees; this input's {} columns {:.9g} "
                       "apart make {:.9g}",
-                      info.path, info.width, place.spacing_x,
-                      place.unit == HorizontalUnit::kDegree ? static_cast<double>(info.width) * place.spacing_x : 0.0));
+                      info.path, info.width, place.spacing_x, static_cast<double>(info.width) * place.spacing_x));
     }
     frame.wraps_x = true;
   }
@@ -287,12 +291,15 @@ std::string scale_warning(const SourceInfo& info, const SourceFrame& frame, cons
   if (!frame.ground || frame.projection || is_known || frame.ground->worst_error <= MapGround::kTrueEnough) return {};
   const MapGround& ground = *frame.ground;
   const GeoExtent& extent = ground.extent;
-  const bool has_pole = extent.north == 90.0 || extent.south == -90.0;
-  const char* const remedy = request.is_given ? "`projection` none keeps it without a warning"
-                             : extent.east - extent.west > 180.0 && !has_pole
-                                 ? "a part of it (`bbox`) can be laid on a truer map by `projection` auto"
-                                 : "`projection` auto lays the surface on a truer map, none keeps this one without a "
-                                   "warning";
+  // No truer map shows more than a hemisphere.
+  const bool is_cap = extent.south >= 0.0 || extent.north <= 0.0;
+  const char* const remedy =
+      request.is_given ? "`projection` none keeps it without a warning"
+      : extent.east - extent.west > 180.0 && !is_cap
+          ? "a part of it (`bbox`) can be laid on a truer map by `projection` auto; `projection` "
+            "none keeps this one without a warning"
+          : "`projection` auto lays the surface on a truer map, none keeps this one without a "
+            "warning";
   return fmt::format(
       "{}: lengths on its map are {:.4g} times those on the ground ({:.4g} to {:.4g}), and slopes, normals and shadows "
       "wrong by as much; {}",
