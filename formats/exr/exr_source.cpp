@@ -17,6 +17,7 @@
 #include <array>
 #include <charconv>
 #include <cstring>
+#include <iterator>
 #include <mutex>
 #include <new>
 #include <optional>
@@ -169,12 +170,10 @@ Channel named_channel(const std::vector<Channel>& channels, const std::string& w
                                                        list_of(channels), channels.size() - 1));
 }
 
-/// The channel that most likely holds elevations, in the first part that is not deep.
+/// The channel that most likely holds elevations; of those that are as likely the first, in the first part.
 Channel default_channel(const std::vector<Channel>& channels) {
   std::vector<Channel> candidates;
-  for (const Channel& channel : channels) {
-    if (!channel.deep && (candidates.empty() || candidates.front().part == channel.part)) candidates.push_back(channel);
-  }
+  std::ranges::copy_if(channels, std::back_inserter(candidates), [](const Channel& channel) { return !channel.deep; });
   if (candidates.empty()) return channels.front();
   // "height", then "height.Y" or "terrain.height", then "Y", then "beauty.Y", then what is left.
   const auto rank = [](const Channel& channel) {

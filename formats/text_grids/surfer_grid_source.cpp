@@ -31,7 +31,6 @@ constexpr std::string_view kGridSection = "GRID";
 constexpr std::string_view kDataSection = "DATA";
 /// Blanked nodes have this value or a greater one: just below 1.70141e38, which texts write in fewer digits.
 constexpr double kBlank = 1.7014e38;
-constexpr double kWrittenBlank = 1.70141e38F;
 constexpr std::size_t kSurfer6HeaderBytes = 56;
 constexpr std::size_t kGridSectionBytes = 72;
 /// More lie before no grid's data.
@@ -46,7 +45,6 @@ class SurferGridSource final : public PlainSource {
     file_->read(0, std::as_writable_bytes(std::span(magic)));
     const std::string_view kind(magic.data(), magic.size());
     info_.valid_max = kBlank;
-    info_.void_values = {kWrittenBlank};  // so that rasters made of it can say so
     if (kind == kText) {
       read_text_header();
     } else if (kind == kSurfer6) {
@@ -55,6 +53,10 @@ class SurferGridSource final : public PlainSource {
       read_surfer7();
     } else {
       corrupt("does not begin as a Surfer grid does (DSAA, DSBB or DSRB)");
+    }
+    // What programs write, so that rasters made of it can say so.
+    if (info_.void_values.empty()) {
+      info_.void_values = {info_.sample_type == SampleType::kFloat32 ? double{1.70141e38F} : 1.70141e38};
     }
     read_prj_beside(info_, 1);
     info_.block_width = info_.width;

@@ -253,7 +253,7 @@ TEST_F(RestoreCommand, ExactSamplesGoIntoEveryFormatThatHoldsThem) {
           << i;
     }
   }
-  expect_refused(run("back.png"), 2, "is -32768, which uint16 does not hold; write .tif");
+  expect_refused(run("back.png"), 2, "is -32768 (void), which uint16 does not hold; write .tif");
   convert(kRidges, {"--lossless"});
   expect_refused(run("back.png"), 2, "which uint16 does not hold; write .tif");
 }
@@ -420,7 +420,7 @@ TEST_F(RestoreCommand, WrongUseIsOneClearLine) {
   expect_refused(run("back.jpg"), 2, "no writer for the extension \".jpg\"");
   expect_refused(run("none/back.tif"), 1, "none: No such file or directory");
   expect_refused(run("back.hgt"), 2, "not 512 x 384");
-  expect_refused(run("new.tif", {"--method", "cubic"}), 2, "must be barycentric or hex");
+  expect_refused(run("new.tif", {"--method", "cubic"}), 2, "must be hex, barycentric or average");
   expect_refused(run("new.tif", {"--size", "0x3"}), 2, "COLUMNSxROWS");
   expect_refused(run("new.tif", {"--spacing", "-1"}), 2, "a number greater than 0");
   expect_refused(run("new.tif", {"--spacing", "1e-9"}), 2, "must be wide enough for 2147483648 at most");

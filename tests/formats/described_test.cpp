@@ -192,7 +192,8 @@ TEST_F(Netcdf, LatitudesBeyondAPoleAreTold) {
   for (const double north : {90.0, 90.5}) {
     NetcdfBytes file = netcdf_grid({1.0, 2.0}, {north, north - 1.0});
     write("a.nc", file.variable("z", {0, 1}, 3, stored<std::int16_t>({1, 2, 3, 4}, true), {}).bytes());
-    const auto& warnings = open("a.nc")->info().warnings;
+    const auto source = open("a.nc");
+    const auto& warnings = source->info().warnings;
     ASSERT_EQ(warnings.size(), north > 90.0 ? 1U : 0U);
     if (!warnings.empty()) {
       EXPECT_THAT(warnings.front(), HasSubstr("its rows lie at latitudes from 89.5 to 90.5"));
@@ -529,14 +530,16 @@ TEST_F(Idrisi, NamesOfStatePlanesAreCodes) {
     write("a.rdc", "file type : binary\ndata type : byte\ncolumns : 2\nrows : 2\nref. units : " + unit +
                        "\nmin. X : 0\nmax. X : 20\nmin. Y : 0\nmax. Y : 20\nref. system : " + name + "\n");
     const SourceInfo info = open("a.rst")->info();
-    if (!info.georeference.system.epsg) {
-      EXPECT_THAT(info.warnings.front(), HasSubstr("the reference system is left out"));
+    if (info.georeference.system.wkt.empty()) {
+      EXPECT_TRUE(std::ranges::any_of(info.warnings, [](const std::string& warning) {
+        return warning.find("the reference system is left out") != std::string::npos;
+      }));
     }
     return info.georeference.system.epsg.value_or(0);
   };
   EXPECT_EQ(of("spc83ca1", "m"), 26941);
   EXPECT_EQ(of("spc83de1", "m"), 26957);
-  EXPECT_EQ(of("spc27ny3", "ft"), 0);  // international feet, which that zone has not
+  EXPECT_EQ(of("spc27ny3", "ft"), 0);  // international feet, which that zone has not: by its parameters
   EXPECT_EQ(of("spc83xx1", "m"), 0);
   EXPECT_EQ(of("spc83ca9", "m"), 0);
   EXPECT_EQ(of("spc83ca1x", "m"), 0);

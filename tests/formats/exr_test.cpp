@@ -338,7 +338,8 @@ TEST(ExrSource, ReadsPartsOfAMultiPartFile) {
     EXPECT_EQ(read_whole(*source), Samples(pictures[part]).plane(plane)) << channel;
     EXPECT_EQ(source->info().channel, name);
   };
-  expect("", 0, 0, "cover.mask");
+  expect("", 1, 0, "ground.Y");
+  expect("mask", 0, 0, "cover.mask");
   expect("Y", 1, 0, "ground.Y");
   expect("error", 1, 1, "ground.error");
   expect("small.Y", 2, 0, "small.Y");

@@ -224,7 +224,7 @@ class Restorer {
           const double value = load_sample(kept.type)(raw.data() + *refused * size_bytes(kept.type));
           const bool rounds = is_floating(written.type) && !options_.rounds;
           refuse_sample(options_.raster.output, written.type, sample % grid_.width, row + sample / grid_.width,
-                        fmt::format("{:.9g}{}", value, record.is_void(value) ? ", which means void" : ""),
+                        fmt::format("{:.9g}{}", value, record.is_void(value) ? " (void)" : ""),
                         rounds ? "--round takes the nearest, .tif holds it"
                                : "write .tif, or give --method hex for a void "
                                  "value of its own");
