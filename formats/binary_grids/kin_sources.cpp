@@ -99,18 +99,30 @@ class IdrisiSource final : public DescribedSource {
     while (at < kStates.size() && kStates.substr(at, 2) != state.data()) at += 4;
     if (at == kStates.size()) return false;
     const int number = 10 * (kStates[at + 2] - '0') + kStates[at + 3] - '0';
-    constexpr double kSame = 1e-9;
-    const double metres = info_.georeference.metres_per_unit;
-    const int axes = std::abs(metres - 1.0) < kSame ? 4499 : std::abs(metres - 0.3048) < kSame ? 4495 : 4497;
-    // A state of one zone has it under 0.
-    for (const int each : {zone, 0}) {
-      if (each == 0 && zone > 1) return false;
-      try {
-        take_system(fmt::format("urn:ogc:def:crs,crs:EPSG::{},cs:EPSG::{},coordinateOperation:EPSG::{}",
-                                year == 83 ? 4269 : 4267, axes, 10000 + 100 * number + each + (year == 83 ? 30 : 0)),
-                    info_);
+    // A state of one zone has it under 0. IDRISI's feet are those that EPSG has a system of the zone in: the state's.
+    struct Unit {
+      int axes;  ///< EPSG's
+      double metres;
+    };
+    constexpr std::array<Unit, 3> kUnits = {{{4499, 1.0}, {4497, 1200.0 / 3937.0}, {4495, 0.3048}}};
+    const bool in_metres = info_.georeference.metres_per_unit == 1.0;
+    for (const Unit& unit : kUnits) {
+      if (in_metres != (unit.metres == 1.0)) continue;
+      for (const int each : {zone, 0}) {
+        if (each == 0 && zone > 1) continue;
+        SourceInfo found = info_;
+        found.georeference.metres_per_unit = unit.metres;
+        try {
+          take_system(
+              fmt::format("urn:ogc:def:crs,crs:EPSG::{},cs:EPSG::{},coordinateOperation:EPSG::{}",
+                          year == 83 ? 4269 : 4267, unit.axes, 10000 + 100 * number + each + (year == 83 ? 30 : 0)),
+              found);
+        } catch (const Error&) {  // no such zone
+          continue;
+        }
+        if (!found.georeference.system.epsg) continue;
+        info_ = found;
         return true;
-      } catch (const Error&) {  // no such zone
       }
     }
     return false;

@@ -530,7 +530,7 @@ TEST_F(Idrisi, NamesOfStatePlanesAreCodes) {
     write("a.rdc", "file type : binary\ndata type : byte\ncolumns : 2\nrows : 2\nref. units : " + unit +
                        "\nmin. X : 0\nmax. X : 20\nmin. Y : 0\nmax. Y : 20\nref. system : " + name + "\n");
     const SourceInfo info = open("a.rst")->info();
-    if (info.georeference.system.wkt.empty()) {
+    if (!info.georeference.system.epsg) {
       EXPECT_TRUE(std::ranges::any_of(info.warnings, [](const std::string& warning) {
         return warning.find("the reference system is left out") != std::string::npos;
       }));
@@ -539,7 +539,8 @@ TEST_F(Idrisi, NamesOfStatePlanesAreCodes) {
   };
   EXPECT_EQ(of("spc83ca1", "m"), 26941);
   EXPECT_EQ(of("spc83de1", "m"), 26957);
-  EXPECT_EQ(of("spc27ny3", "ft"), 0);  // international feet, which that zone has not: by its parameters
+  EXPECT_EQ(of("spc27ny3", "ft"), 32017);  // US feet, which are that zone's
+  EXPECT_EQ(of("spc83mt1", "ft"), 2256);   // feet, which are that state's
   EXPECT_EQ(of("spc83xx1", "m"), 0);
   EXPECT_EQ(of("spc83ca9", "m"), 0);
   EXPECT_EQ(of("spc83ca1x", "m"), 0);
