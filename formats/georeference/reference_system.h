@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 
+#include "formats/georeference/proj_module.h"
 #include "isohf/projection/reference_map.h"
 #include "isohf/raster.h"
 
@@ -78,7 +79,7 @@ void take_system(const std::string& text, SourceInfo& info);
 void take_heights(int vertical_epsg, SourceInfo& info);
 
 /// What heights are above that a system of longitudes, latitudes and heights gives.
-inline constexpr const char* kAboveEllipsoid = "the ellipsoid";
+inline constexpr const char* kAboveEllipsoid = ISOHF_ELLIPSOIDAL_HEIGHT;
 
 /// Whether a code of EPSG's is that of such a system (EPSG:4979). PROJ is left alone for the usual systems of two
 /// dimensions; false where there is no module.

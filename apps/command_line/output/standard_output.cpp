@@ -20,6 +20,7 @@ constexpr std::size_t kBufferBytes = 1 << 16;
 
 /// Settings as the library's messages name them, and the options that set them.
 constexpr std::pair<std::string_view, std::string_view> kSpellings[] = {
+    {"acquisition", "--acquisition"},
     {"bbox", "--bbox"},
     {"budget", "--triangles"},
     {"channel", "--channel"},
@@ -36,7 +37,6 @@ constexpr std::pair<std::string_view, std::string_view> kSpellings[] = {
     {"levels", "--levels"},
     {"like", "--like"},
     {"lossless", "--lossless"},
-    {"acquisition", "--acquisition"},
     {"max_error", "--max-error"},
     {"max_rounding", "--max-rounding"},
     {"max_size", "--texture-size"},

@@ -222,12 +222,11 @@ class Restorer {
                                                         options_.rounds ? &rounding : nullptr)) {
           const auto sample = static_cast<std::int64_t>(*refused);
           const double value = load_sample(kept.type)(raw.data() + *refused * size_bytes(kept.type));
-          const bool rounds = is_floating(written.type) && !options_.rounds;
+          const bool is_void = record.is_void(value);
+          std::string remedy = is_void ? "write .tif, or give --method hex for a void value of its own" : "write .tif";
+          if (is_floating(written.type) && !options_.rounds) remedy = "--round takes the nearest, .tif holds it";
           refuse_sample(options_.raster.output, written.type, sample % grid_.width, row + sample / grid_.width,
-                        fmt::format("{:.9g}{}", value, record.is_void(value) ? " (void)" : ""),
-                        rounds ? "--round takes the nearest, .tif holds it"
-                               : "write .tif, or give --method hex for a void "
-                                 "value of its own");
+                        fmt::format("{:.9g}{}", value, is_void ? " (void)" : ""), remedy);
         }
         sink->write_rows(out);
       }

@@ -42,6 +42,11 @@ int plane_for(const Metadata& metadata, const SampleGrid& grid) {
               fmt::format("the archive's source has no position in {}; use world coordinates", what));
 }
 
+/// Where a place of a grid that goes by places is.
+GeoPoint geo_of(const SampleGrid& grid, const MapPoint& place) {
+  return grid.system ? grid.system->map->geo_from_map(place) : GeoPoint{place.easting, place.northing};
+}
+
 /// Columns and rows of places in the area of each sample that are no farther apart than the archive's vertices, as the
 /// middle of the grid has it; no more than there are vertices.
 GridSize parts_of(const Metadata& metadata, const SampleGrid& grid) {
@@ -54,8 +59,7 @@ GridSize parts_of(const Metadata& metadata, const SampleGrid& grid) {
                           grid.first_z - static_cast<double>(grid.height - 1) * grid.spacing_z / 2.0};
     const auto world = [&](double columns, double rows) {
       const MapPoint at{middle.easting + columns * grid.spacing_x, middle.northing - rows * grid.spacing_z};
-      return georeference.world_from_geo(grid.system ? grid.system->map->geo_from_map(at)
-                                                     : GeoPoint{at.easting, at.northing});
+      return georeference.world_from_geo(geo_of(grid, at));
     };
     const auto apart = [](WorldPoint a, WorldPoint b) { return std::hypot(b.x - a.x, b.z - a.z); };
     wide = apart(world(-0.5, 0.0), world(0.5, 0.0));
@@ -227,8 +231,7 @@ struct RowReader::State {
         const std::int64_t row = first + sample / grid.width;
         const MapPoint place{grid.first_x + static_cast<double>(column) * grid.spacing_x,
                              grid.first_z - static_cast<double>(row) * grid.spacing_z};
-        at[i] = georeference->world_from_geo(grid.system ? grid.system->map->geo_from_map(place)
-                                                         : GeoPoint{place.easting, place.northing});
+        at[i] = georeference->world_from_geo(geo_of(grid, place));
       }
     });
     points->sample(at, elevations);

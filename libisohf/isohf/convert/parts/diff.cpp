@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -24,7 +23,12 @@ constexpr std::int64_t kBatch = 256;  ///< tiles that are looked at side by side
 
 std::vector<ArchiveDifference::Member> differing_members(const ArchiveReader& first, const ArchiveReader& second) {
   const auto members = [](const ArchiveReader& archive) {
-    return nlohmann::json::parse(archive.metadata_json()).flatten();
+    nlohmann::json all = nlohmann::json::parse(archive.metadata_json()).flatten();
+    for (const MemberEntry& member : archive.loose_members()) {
+      if (member.name == kMediaTypeName || member.name == kIndexName || member.name == kMetadataName) continue;
+      all[fmt::format("member \"{}\"", member.name)] = {{"bytes", member.bytes}, {"crc32", member.crc32}};
+    }
+    return all;
   };
   const nlohmann::json a = members(first);
   const nlohmann::json b = members(second);
@@ -36,19 +40,6 @@ std::vector<ArchiveDifference::Member> differing_members(const ArchiveReader& fi
   for (const std::string& name : names) {
     const auto text = [&](const nlohmann::json& side) { return side.contains(name) ? side.at(name).dump() : ""; };
     if (text(a) != text(b)) found.push_back({name, text(a), text(b)});
-  }
-  // Those that hold neither metadata nor what these are about.
-  std::map<std::string, std::pair<std::string, std::string>> loose;
-  const auto take = [&](const ArchiveReader& archive, std::string std::pair<std::string, std::string>::*side) {
-    for (const MemberEntry& member : archive.loose_members()) {
-      if (member.name == kMediaTypeName || member.name == kIndexName || member.name == kMetadataName) continue;
-      loose[member.name].*side = nlohmann::json{{"bytes", member.bytes}, {"crc32", member.crc32}}.dump();
-    }
-  };
-  take(first, &std::pair<std::string, std::string>::first);
-  take(second, &std::pair<std::string, std::string>::second);
-  for (const auto& [name, sides] : loose) {
-    if (sides.first != sides.second) found.push_back({fmt::format("member \"{}\"", name), sides.first, sides.second});
   }
   return found;
 }

@@ -901,14 +901,15 @@ Picture shade(const ArchiveReader& archive, const ShadeOptions& options, const J
   }
   const GridSize size = options.size.value_or(shade_size(archive));
   require(options, size);
-  std::optional<Picture> made;
-  try {
-    made.emplace(static_cast<int>(size.first), static_cast<int>(size.second), samples.channels);
-  } catch (const std::exception&) {  // too long for a vector, or no memory
-    throw Error(ErrorCode::kOutOfMemory, fmt::format("shade: {} x {} pixels do not fit memory; shade_rows() gives rows",
-                                                     size.first, size.second));
-  }
-  Picture& picture = *made;
+  Picture picture = [&] {
+    try {
+      return Picture(static_cast<int>(size.first), static_cast<int>(size.second), samples.channels);
+    } catch (const std::exception&) {  // too long for a vector, or no memory
+      throw Error(
+          ErrorCode::kOutOfMemory,
+          fmt::format("shade: {} x {} pixels do not fit memory; shade_rows() gives rows", size.first, size.second));
+    }
+  }();
   std::size_t done = 0;
   (void)shade_rows(
       archive, options,
@@ -918,7 +919,7 @@ Picture shade(const ArchiveReader& archive, const ShadeOptions& options, const J
         done += rows.size();
       },
       job);
-  return std::move(*made);
+  return picture;
 }
 
 }  // namespace isohf
