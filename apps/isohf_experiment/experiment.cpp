@@ -1,9 +1,7 @@
 #include "experiment.h"
 
 #include <fmt/format.h>
-#include <oneapi/tbb/global_control.h>
 #include <oneapi/tbb/parallel_for.h>
-#include <oneapi/tbb/task_arena.h>
 
 #include <algorithm>
 #include <cmath>
@@ -13,6 +11,7 @@
 #include <utility>
 
 #include "height_fit.h"
+#include "isohf/base/arena.h"
 #include "isohf/error.h"
 #include "reconstruction_error.h"
 #include "sine_wave.h"
@@ -207,7 +206,7 @@ std::vector<double> frequencies_of(const ExperimentSettings& settings) {
   return frequencies;
 }
 
-ExperimentResult run_experiment(const ExperimentSettings& settings) {
+ExperimentResult run_experiment(const ExperimentSettings& settings, const Job& job) {
   require(settings);
   ExperimentResult result;
   result.settings = settings;
@@ -231,20 +230,14 @@ ExperimentResult run_experiment(const ExperimentSettings& settings) {
   result.trials.resize(tasks.size() * kMeshKinds.size());
   std::mutex mutex;
   std::int64_t done = 0;
-  const int threads = settings.threads > 0 ? settings.threads : oneapi::tbb::this_task_arena::max_concurrency();
-  // Lifts the limit of one thread a core where more are asked for.
-  const oneapi::tbb::global_control workers(oneapi::tbb::global_control::max_allowed_parallelism,
-                                            static_cast<std::size_t>(threads));
-  oneapi::tbb::task_arena(threads).execute([&] {
+  Arena(job).execute([&] {
     oneapi::tbb::parallel_for(std::size_t{0}, tasks.size(), [&](std::size_t i) {
-      if (settings.cancel != nullptr && *settings.cancel) return;
+      job.throw_if_cancelled();
       run_task(tasks[i], settings, &result.trials[i * kMeshKinds.size()]);
       const std::scoped_lock lock(mutex);
-      ++done;
-      if (settings.progress) settings.progress(done, static_cast<std::int64_t>(tasks.size()));
+      job.report({"experiment", "orientations", ++done, static_cast<std::int64_t>(tasks.size())});
     });
   });
-  if (settings.cancel != nullptr && *settings.cancel) throw Error(ErrorCode::kCancelled, "experiment: interrupted");
   return result;
 }
 

@@ -1,11 +1,10 @@
 #pragma once
 
 #include <array>
-#include <atomic>
 #include <cstdint>
-#include <functional>
 #include <vector>
 
+#include "isohf/job.h"
 #include "reconstruction_error.h"
 
 /// Section 2 of the paper: how well meshes of equal triangle counts stand for plane sine waves (erratum E19).
@@ -38,10 +37,6 @@ struct ExperimentSettings {
   std::int64_t nyquist_triangles = 5000;
   HeightRule heights = HeightRule::kLeastSquares;
   Light light;
-  int threads = 0;  ///< 0: all cores. The result does not depend on it
-  /// Called now and then, from any thread but never from two at once.
-  std::function<void(std::int64_t done, std::int64_t total)> progress;
-  const std::atomic<bool>* cancel = nullptr;
 
   /// A subset with the same limits: 6 phases, 40 orientations, 7 frequencies up to 0.91.
   [[nodiscard]] static ExperimentSettings quick();
@@ -81,9 +76,9 @@ struct ExperimentResult {
 
 [[nodiscard]] std::vector<double> frequencies_of(const ExperimentSettings& settings);
 
-/// Runs them all on settings.threads threads. Memory: a few meshes a thread. The full set is hundreds of seconds of one
+/// Runs them all. Memory: a few meshes a thread, whatever the job's bound. The full set is hundreds of seconds of one
 /// core. Throws Error{kInvalidArgument} for settings out of range, Error{kCancelled}.
-[[nodiscard]] ExperimentResult run_experiment(const ExperimentSettings& settings);
+[[nodiscard]] ExperimentResult run_experiment(const ExperimentSettings& settings, const Job& job = {});
 
 /// Averages over frequencies and orientations, for one triangle count.
 [[nodiscard]] Errors average_errors(const ExperimentResult& result, MeshKind mesh, std::int64_t triangles);

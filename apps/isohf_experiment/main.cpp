@@ -10,7 +10,6 @@
 
 #include "experiment.h"
 #include "figures.h"
-#include "interrupt.h"
 #include "isohf/base/output_file.h"
 #include "isohf/error.h"
 #include "options/option_values.h"
@@ -241,15 +240,10 @@ int run(const ExperimentCommandOptions& options) {
   settings.nyquist_triangles = options.nyquist_triangles;
   settings.heights = options.heights;
   settings.light = options.light;
-  settings.threads = options.work.threads;
-  settings.cancel = &watch_interrupts();
   ExperimentResult result;
   {
     ProgressDisplay display(options.work.progress, options.common.quiet, options.common.verbose);
-    settings.progress = [&](std::int64_t done, std::int64_t total) {
-      display.update("experiment", "orientations", done, total);
-    };
-    result = run_experiment(settings);
+    result = run_experiment(settings, job_from(options.work, display));
   }
   const std::vector<std::string> written = folder.write(result);
   StandardOutput out;

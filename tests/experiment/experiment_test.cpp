@@ -35,11 +35,8 @@ TEST(Experiment, HasThePapersNumberOfWaves) {
 }
 
 TEST(Experiment, ResultDoesNotDependOnThreads) {
-  ExperimentSettings settings = small_settings();
-  settings.threads = 1;
-  const std::string one = trials_csv(run_experiment(settings));
-  settings.threads = 3;
-  EXPECT_EQ(trials_csv(run_experiment(settings)), one);
+  const std::string one = trials_csv(run_experiment(small_settings(), {.threads = 1}));
+  EXPECT_EQ(trials_csv(run_experiment(small_settings(), {.threads = 3})), one);
 }
 
 TEST(Experiment, LeavesOutWavesAboveTheNyquistFrequency) {
@@ -58,11 +55,9 @@ TEST(Experiment, RefusesSettingsOutOfRangeAndStopsWhenAsked) {
   settings = small_settings();
   settings.triangles = {};
   EXPECT_THROW((void)run_experiment(settings), Error);
-  settings = small_settings();
   const std::atomic<bool> cancel = true;
-  settings.cancel = &cancel;
   try {
-    (void)run_experiment(settings);
+    (void)run_experiment(small_settings(), {.cancel = &cancel});
     ADD_FAILURE() << "ran to its end";
   } catch (const Error& error) {
     EXPECT_EQ(error.code(), ErrorCode::kCancelled);
