@@ -3,7 +3,7 @@
 #include <cstdlib>
 #include <filesystem>
 
-#include "archive/tiles.h"
+#include "archive/codec/tiles.h"
 #include "isohf/archive.h"
 #include "isohf/archive/codec/tile_codes.h"
 #include "isohf/archive/codec/tile_encoder.h"

@@ -7,7 +7,7 @@
 #include <cstdlib>
 #include <filesystem>
 
-#include "archive/tiles.h"
+#include "archive/codec/tiles.h"
 #include "isohf/archive.h"
 #include "isohf/error.h"
 #include "isohf/verify.h"

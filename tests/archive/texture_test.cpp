@@ -8,7 +8,7 @@
 #include "isohf/archive/textures/picture_codec.h"
 #include "isohf/archive/textures/texture_info.h"
 #include "isohf/error.h"
-#include "support/memory_photo.h"
+#include "support/rasters/memory_photo.h"
 
 namespace isohf {
 namespace {

@@ -12,7 +12,7 @@
 #include <csignal>
 #include <tuple>
 
-#include "archive/tiles.h"
+#include "archive/codec/tiles.h"
 #include "isohf/archive.h"
 #include "isohf/archive/codec/tile_codes.h"
 #include "isohf/error.h"

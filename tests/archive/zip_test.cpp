@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "archive/tiles.h"
+#include "archive/codec/tiles.h"
 #include "isohf/archive.h"
 #include "isohf/archive/archive_index_builder.h"
 #include "isohf/archive/codec/tile_codes.h"

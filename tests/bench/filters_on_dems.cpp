@@ -12,7 +12,7 @@
 #include "formats/registry.h"
 #include "isohf/base/sample.h"
 #include "isohf/raster.h"
-#include "support/trigonometric_field.h"
+#include "support/rasters/trigonometric_field.h"
 
 namespace {
 

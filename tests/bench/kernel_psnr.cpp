@@ -8,8 +8,8 @@
 #include <cstdlib>
 #include <vector>
 
-#include "support/restored_field.h"
-#include "support/trigonometric_field.h"
+#include "support/rasters/restored_field.h"
+#include "support/rasters/trigonometric_field.h"
 
 namespace {
 

@@ -16,7 +16,7 @@
 #include "isohf/surface.h"
 #include "isohf/surface/resample/kernels.h"
 #include "isohf/verify.h"
-#include "support/memory_source.h"
+#include "support/rasters/memory_source.h"
 #include "support/temporary_folder.h"
 
 namespace isohf {

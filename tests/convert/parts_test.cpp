@@ -15,8 +15,8 @@
 #include "isohf/parts.h"
 #include "isohf/surface.h"
 #include "isohf/verify.h"
-#include "support/memory_photo.h"
-#include "support/memory_source.h"
+#include "support/rasters/memory_photo.h"
+#include "support/rasters/memory_source.h"
 #include "support/temporary_folder.h"
 
 namespace isohf {

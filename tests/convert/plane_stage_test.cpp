@@ -19,7 +19,7 @@
 #include "isohf/surface.h"
 #include "isohf/verify.h"
 #include "support/altered_archive.h"
-#include "support/memory_source.h"
+#include "support/rasters/memory_source.h"
 #include "support/temporary_folder.h"
 
 namespace isohf {

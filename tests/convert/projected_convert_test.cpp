@@ -14,8 +14,8 @@
 #include "isohf/projection/projection.h"
 #include "isohf/restore/archive_geometry.h"
 #include "isohf/verify.h"
-#include "support/memory_source.h"
-#include "support/place_at.h"
+#include "support/rasters/memory_source.h"
+#include "support/rasters/place_at.h"
 #include "support/temporary_folder.h"
 
 namespace isohf {

@@ -11,9 +11,9 @@
 #include "isohf/error.h"
 #include "isohf/projection/projection.h"
 #include "isohf/verify.h"
-#include "support/memory_photo.h"
-#include "support/memory_source.h"
-#include "support/place_at.h"
+#include "support/rasters/memory_photo.h"
+#include "support/rasters/memory_source.h"
+#include "support/rasters/place_at.h"
 #include "support/sanitizers.h"
 #include "support/temporary_folder.h"
 

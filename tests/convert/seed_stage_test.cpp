@@ -12,7 +12,7 @@
 #include "isohf/error.h"
 #include "isohf/surface/shade/shadow.h"
 #include "isohf/verify.h"
-#include "support/memory_source.h"
+#include "support/rasters/memory_source.h"
 #include "support/run_program.h"
 #include "support/temporary_folder.h"
 

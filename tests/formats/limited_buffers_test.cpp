@@ -5,8 +5,8 @@
 #include "formats/registry.h"
 #include "formats/write/raster_sink.h"
 #include "isohf/raster.h"
-#include "support/raster.h"
-#include "support/samples.h"
+#include "support/rasters/raster.h"
+#include "support/rasters/samples.h"
 #include "support/temporary_folder.h"
 
 namespace isohf::test {

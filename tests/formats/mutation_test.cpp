@@ -15,7 +15,7 @@
 #include "formats/reader_cases.h"
 #include "formats/reader_failure.h"
 #include "isohf/error.h"
-#include "support/samples.h"
+#include "support/rasters/samples.h"
 #include "support/sanitizers.h"
 #include "support/temporary_folder.h"
 

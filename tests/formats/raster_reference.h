@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
+#include "support/rasters/samples.h"
 #include "support/real_files.h"
-#include "support/samples.h"
 
 namespace isohf::test {
 

@@ -16,10 +16,10 @@
 #include "formats/registry.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
-#include "support/place_at.h"
-#include "support/raster.h"
+#include "support/rasters/place_at.h"
+#include "support/rasters/raster.h"
+#include "support/rasters/samples.h"
 #include "support/real_files.h"
-#include "support/samples.h"
 #include "support/temporary_folder.h"
 
 namespace isohf::test {

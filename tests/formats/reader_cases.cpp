@@ -4,17 +4,17 @@
 
 #include <cstring>
 
-#include "formats/imagine_bytes.h"
-#include "formats/netcdf_bytes.h"
-#include "formats/pds4_label.h"
+#include "formats/files/tar_archive.h"
+#include "formats/files/zip_archive.h"
+#include "formats/grids/imagine_bytes.h"
+#include "formats/grids/netcdf_bytes.h"
+#include "formats/planetary/pds4_label.h"
 #include "formats/readers.h"
-#include "formats/tar_archive.h"
-#include "formats/tiff_bytes.h"
+#include "formats/tiff/tiff_bytes.h"
 #include "formats/write/raster_sink.h"
-#include "formats/zip_archive.h"
 #include "isohf/raster.h"
-#include "support/place_at.h"
-#include "support/raster.h"
+#include "support/rasters/place_at.h"
+#include "support/rasters/raster.h"
 #include "support/temporary_folder.h"
 
 namespace isohf::test {

@@ -8,7 +8,7 @@
 #include <string>
 
 #include "isohf/error.h"
-#include "support/samples.h"
+#include "support/rasters/samples.h"
 
 namespace isohf::test {
 

@@ -16,8 +16,8 @@
 #include "formats/write/raster_sink.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
+#include "support/rasters/samples.h"
 #include "support/real_files.h"
-#include "support/samples.h"
 #include "support/temporary_folder.h"
 
 namespace isohf::test {

@@ -15,8 +15,8 @@
 #include "isohf/convert/frame/plan.h"
 #include "isohf/raster.h"
 #include "isohf/surface/source/source_statistics.h"
+#include "support/rasters/samples.h"
 #include "support/real_files.h"
-#include "support/samples.h"
 
 namespace isohf::test {
 namespace {

@@ -10,7 +10,7 @@
 #include "isohf/archive/container/content_hash.h"
 #include "isohf/convert.h"
 #include "isohf/verify.h"
-#include "support/memory_source.h"
+#include "support/rasters/memory_source.h"
 #include "support/temporary_folder.h"
 
 namespace isohf {

@@ -14,7 +14,7 @@
 #include "isohf/error.h"
 #include "isohf/lattice/barycentric.h"
 #include "isohf/surface/shade/normals.h"
-#include "support/memory_source.h"
+#include "support/rasters/memory_source.h"
 #include "support/temporary_folder.h"
 
 namespace isohf {

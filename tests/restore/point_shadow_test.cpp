@@ -14,7 +14,7 @@
 #include "isohf/error.h"
 #include "isohf/surface.h"
 #include "isohf/surface/shade/shadow.h"
-#include "support/memory_source.h"
+#include "support/rasters/memory_source.h"
 #include "support/temporary_folder.h"
 
 namespace isohf {

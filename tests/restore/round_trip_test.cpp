@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "support/restored_field.h"
+#include "support/rasters/restored_field.h"
 
 namespace isohf {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "isohf/convert.h"
 #include "isohf/error.h"
-#include "support/memory_source.h"
+#include "support/rasters/memory_source.h"
 #include "support/temporary_folder.h"
 
 namespace isohf {

@@ -13,7 +13,7 @@
 #include "isohf/lattice/shadow_path.h"
 #include "isohf/shade.h"
 #include "isohf/surface.h"
-#include "support/memory_source.h"
+#include "support/rasters/memory_source.h"
 #include "support/temporary_folder.h"
 
 namespace isohf {

@@ -5,7 +5,7 @@
 #include "isohf/convert.h"
 #include "isohf/error.h"
 #include "isohf/shade.h"
-#include "support/memory_source.h"
+#include "support/rasters/memory_source.h"
 #include "support/temporary_folder.h"
 
 namespace isohf {

@@ -13,7 +13,7 @@
 #include "isohf/convert.h"
 #include "isohf/error.h"
 #include "isohf/lattice/barycentric.h"
-#include "support/memory_source.h"
+#include "support/rasters/memory_source.h"
 #include "support/temporary_folder.h"
 
 namespace isohf {

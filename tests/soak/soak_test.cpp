@@ -23,8 +23,8 @@
 #include "isohf/surface.h"
 #include "isohf/verify.h"
 #include "soak/slow_oracle.h"
-#include "support/memory_source.h"
-#include "support/samples.h"
+#include "support/rasters/memory_source.h"
+#include "support/rasters/samples.h"
 #include "support/temporary_folder.h"
 
 namespace isohf {

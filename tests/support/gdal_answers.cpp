@@ -11,7 +11,7 @@
 
 #include "formats/registry.h"
 #include "isohf/raster.h"
-#include "support/samples.h"
+#include "support/rasters/samples.h"
 
 namespace isohf::test {
 

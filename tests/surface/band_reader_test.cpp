@@ -7,7 +7,7 @@
 #include <limits>
 #include <random>
 
-#include "support/trigonometric_field.h"
+#include "support/rasters/trigonometric_field.h"
 
 namespace isohf {
 namespace {

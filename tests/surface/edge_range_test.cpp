@@ -5,7 +5,7 @@
 #include <random>
 
 #include "isohf/surface/source/source_rows.h"
-#include "support/memory_source.h"
+#include "support/rasters/memory_source.h"
 
 namespace isohf {
 namespace {

@@ -12,7 +12,7 @@
 #include <random>
 
 #include "isohf/error.h"
-#include "support/memory_source.h"
+#include "support/rasters/memory_source.h"
 
 namespace isohf::test {
 namespace {

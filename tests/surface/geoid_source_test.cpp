@@ -9,9 +9,9 @@
 #include <filesystem>
 
 #include "isohf/error.h"
-#include "support/memory_source.h"
-#include "support/place_at.h"
-#include "support/small_geoid.h"
+#include "support/rasters/memory_source.h"
+#include "support/rasters/place_at.h"
+#include "support/rasters/small_geoid.h"
 #include "support/temporary_folder.h"
 
 namespace isohf {

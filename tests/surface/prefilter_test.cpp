@@ -11,7 +11,7 @@
 #include <random>
 
 #include "isohf/error.h"
-#include "support/trigonometric_field.h"
+#include "support/rasters/trigonometric_field.h"
 
 namespace isohf {
 namespace {

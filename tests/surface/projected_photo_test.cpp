@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "isohf/surface/photo/srgb.h"
-#include "support/memory_photo.h"
+#include "support/rasters/memory_photo.h"
 
 namespace isohf {
 namespace {

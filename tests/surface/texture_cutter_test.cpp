@@ -6,7 +6,7 @@
 #include <random>
 
 #include "isohf/surface/photo/srgb.h"
-#include "support/memory_photo.h"
+#include "support/rasters/memory_photo.h"
 
 namespace isohf {
 namespace {

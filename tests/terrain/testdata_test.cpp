@@ -8,7 +8,7 @@
 
 #include "formats/registry.h"
 #include "isohf/raster.h"
-#include "support/samples.h"
+#include "support/rasters/samples.h"
 #include "support/temporary_folder.h"
 
 namespace isohf {

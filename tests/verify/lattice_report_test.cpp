@@ -6,9 +6,9 @@
 
 #include "isohf/convert.h"
 #include "isohf/verify.h"
-#include "support/memory_source.h"
+#include "support/rasters/memory_source.h"
+#include "support/rasters/trigonometric_field.h"
 #include "support/temporary_folder.h"
-#include "support/trigonometric_field.h"
 
 namespace isohf {
 namespace {

@@ -17,8 +17,8 @@
 #include "isohf/surface/resample/acquisition.h"
 #include "isohf/surface/resample/prefilter.h"
 #include "isohf/surface/source/source_axis.h"
-#include "support/memory_source.h"
-#include "support/trigonometric_field.h"
+#include "support/rasters/memory_source.h"
+#include "support/rasters/trigonometric_field.h"
 
 namespace isohf {
 namespace {

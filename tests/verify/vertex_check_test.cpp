@@ -9,7 +9,7 @@
 #include "isohf/surface/resample/kernels.h"
 #include "isohf/surface/resample/prefilter.h"
 #include "isohf/verify.h"
-#include "support/memory_source.h"
+#include "support/rasters/memory_source.h"
 #include "support/temporary_folder.h"
 
 namespace isohf {

@@ -8,7 +8,7 @@
 
 #include "isohf/archive.h"
 #include "isohf/convert.h"
-#include "support/memory_source.h"
+#include "support/rasters/memory_source.h"
 #include "support/temporary_folder.h"
 
 namespace isohf::view {

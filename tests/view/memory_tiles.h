@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "paging/tile_source.h"
-#include "support/analytic_surface.h"
+#include "support/rasters/analytic_surface.h"
 
 namespace isohf::test {
 

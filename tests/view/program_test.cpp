@@ -9,7 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "gl_test.h"
-#include "support/analytic_archive.h"
+#include "support/rasters/analytic_archive.h"
 #include "support/run_program.h"
 #include "support/temporary_folder.h"
 

@@ -14,7 +14,7 @@
 #include "memory_tiles.h"
 #include "paging/texture_overview.h"
 #include "session.h"
-#include "support/memory_photo.h"
+#include "support/rasters/memory_photo.h"
 
 namespace isohf::view {
 namespace {

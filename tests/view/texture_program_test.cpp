@@ -4,7 +4,7 @@
 #include <algorithm>
 
 #include "program_fixture.h"
-#include "support/memory_photo.h"
+#include "support/rasters/memory_photo.h"
 
 namespace isohf::test {
 namespace {

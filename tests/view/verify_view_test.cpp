@@ -8,7 +8,7 @@
 #include "isohf/convert.h"
 #include "isohf/parts.h"
 #include "memory_tiles.h"
-#include "support/memory_source.h"
+#include "support/rasters/memory_source.h"
 #include "support/temporary_folder.h"
 
 namespace isohf::view {

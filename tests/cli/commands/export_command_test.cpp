@@ -1,0 +1,285 @@
+/// isohf export, as a user runs it.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "isohf/raster.h"
+#include "support/rasters/raster.h"
+#include "support/run_program.h"
+#include "support/temporary_folder.h"
+
+namespace isohf::test {
+namespace {
+
+using nlohmann::json;
+using testing::HasSubstr;
+
+const std::string kVoids = ISOHF_SOURCE_DIR "/testdata/voids_200x150_int16.tif";
+const std::string kCoast = ISOHF_SOURCE_DIR "/testdata/coast_512x384_int16.tif";
+
+/// The numbers as stored, whatever the file beside them says that they mean.
+Raster read_codes(const std::string& path) {
+  OpenOptions options;
+  options.z_scale = 1.0;
+  options.z_offset = 0.0;
+  return read_raster(path, options);
+}
+
+class ExportCommand : public ::testing::Test {
+ protected:
+  void SetUp() override { ASSERT_EQ(run_isohf({"convert", kCoast, folder_ / "coast.isohf", "-q"}).exit_code, 0); }
+
+  [[nodiscard]] json exported(std::vector<std::string> arguments, const std::string& archive = "coast.isohf") const {
+    arguments.insert(arguments.begin(), {"export", folder_ / archive});
+    arguments.emplace_back("--json");
+    const RunResult result = run_isohf(arguments);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_EQ(result.err, "");
+    return result.exit_code == 0 ? json::parse(result.out) : json();
+  }
+
+  [[nodiscard]] std::string refused(std::vector<std::string> arguments, int exit_code = 2) const {
+    arguments.insert(arguments.begin(), {"export", folder_ / "coast.isohf"});
+    const RunResult result = run_isohf(arguments);
+    EXPECT_EQ(result.exit_code, exit_code) << result.out;
+    const std::string error =
+        result.err.substr(result.err.starts_with("isohf: warning") ? result.err.find('\n') + 1 : 0);
+    EXPECT_EQ(std::count(error.begin(), error.end(), '\n'), 1) << result.err;
+    return error;
+  }
+
+  TemporaryFolder folder_;
+};
+
+TEST_F(ExportCommand, WritesTheSamePlaceAndElevationsInEveryFormat) {
+  const json first = exported({folder_ / "a.tif"});
+  EXPECT_EQ(first.at("width"), 512);
+  EXPECT_EQ(first.at("sample_type"), "float32");
+  const Raster tif = read_raster(folder_ / "a.tif");
+  EXPECT_EQ(tif.info.sample_type, SampleType::kFloat32);
+  EXPECT_EQ(tif.info.block_width, 256);
+  for (const std::string name : {"b.exr", "b.flt", "c.asc", "d.r16", "e.r32", "f.npy", "g.png"}) {
+    SCOPED_TRACE(name);
+    const json summary = exported({folder_ / name});
+    const Raster raster = read_raster(folder_ / name);
+    ASSERT_EQ(raster.info.width, tif.info.width);
+    ASSERT_EQ(raster.info.height, tif.info.height);
+    const bool whole_numbers = name == "d.r16" || name == "g.png";
+    // Half a step, and the rounding of floats of up to a few thousand metres.
+    const double tolerance = whole_numbers ? 0.5 * summary.at("z_scale").get<double>() + 3e-4 : 0.0;
+    for (std::size_t i = 0; i < tif.elevations.size(); ++i) {
+      ASSERT_NEAR(raster.elevations[i], tif.elevations[i], tolerance) << i;
+    }
+    if (name == "b.exr" || name == "f.npy") continue;
+    EXPECT_EQ(raster.info.georeference.has_origin, tif.info.georeference.has_origin);
+    EXPECT_DOUBLE_EQ(raster.info.georeference.origin_x, tif.info.georeference.origin_x);
+    EXPECT_DOUBLE_EQ(raster.info.georeference.origin_y, tif.info.georeference.origin_y);
+    EXPECT_EQ(raster.info.georeference.spacing_x, tif.info.georeference.spacing_x);
+  }
+}
+
+TEST_F(ExportCommand, IsReadByGdalWithTheSamePlaceAndElevations) {
+  if (run_program({"/bin/sh", "-c", "command -v gdal_translate gdalinfo"}).exit_code != 0)
+    GTEST_SKIP() << "gdal-bin is not installed";
+  ASSERT_EQ(run_isohf({"convert", kVoids, folder_ / "voids.isohf", "-q"}).exit_code, 0);
+  int checked = 0;
+  for (const std::string archive : {"coast.isohf", "voids.isohf"}) {
+    for (const std::vector<std::string>& options : {std::vector<std::string>{}, {"--size", "300x200"}}) {
+      for (const std::string extension : {".tif", ".flt", ".asc", ".png"}) {
+        const std::string name = "g" + std::to_string(++checked) + extension;
+        SCOPED_TRACE(archive + " " + name);
+        std::vector<std::string> arguments = {folder_ / name};
+        arguments.insert(arguments.end(), options.begin(), options.end());
+        const json summary = exported(arguments, archive);
+        const std::string raw = folder_ / (name + ".img");
+        const RunResult translated = run_program({"/usr/bin/env", "GDAL_PAM_ENABLED=NO", "gdal_translate", "-q", "-of",
+                                                  "ENVI", "-ot", "Float64", folder_ / name, raw});
+        ASSERT_EQ(translated.exit_code, 0) << translated.err;
+        const auto told =
+            json::parse(run_program({"/usr/bin/env", "GDAL_PAM_ENABLED=NO", "gdalinfo", "-json", folder_ / name}).out);
+        const Raster ours = extension == ".png" ? read_codes(folder_ / name) : read_raster(folder_ / name);
+        ASSERT_EQ(told.at("size").at(0), ours.info.width);
+        ASSERT_EQ(told.at("size").at(1), ours.info.height);
+        std::vector<double> theirs(ours.elevations.size());
+        std::ifstream in(raw, std::ios::binary);
+        in.read(reinterpret_cast<char*>(theirs.data()), static_cast<std::streamsize>(theirs.size() * sizeof(double)));
+        ASSERT_EQ(in.gcount(), static_cast<std::streamsize>(theirs.size() * sizeof(double)));
+        const json& band = told.at("bands").at(0);
+        for (std::size_t i = 0; i < theirs.size(); ++i) {
+          if (std::isnan(ours.elevations[i])) {
+            const bool is_void = std::isnan(theirs[i]) || theirs[i] < -1e38 ||
+                                 (band.contains("noDataValue") && band.at("noDataValue").get<double>() == theirs[i]);
+            ASSERT_TRUE(is_void) << i << " " << theirs[i];
+          } else {
+            ASSERT_EQ(static_cast<float>(theirs[i]), static_cast<float>(ours.elevations[i])) << i;
+          }
+        }
+        if (extension == ".png") continue;
+        const Georeference& place = ours.info.georeference;
+        ASSERT_TRUE(place.has_origin);
+        const json& transform = told.at("geoTransform");
+        EXPECT_NEAR(transform.at(0).get<double>() + place.spacing_x / 2.0, place.origin_x,
+                    1e-9 * std::abs(place.origin_x));
+        EXPECT_NEAR(transform.at(3).get<double>() - place.spacing_y / 2.0, place.origin_y,
+                    1e-9 * std::abs(place.origin_y));
+        EXPECT_NEAR(transform.at(1).get<double>(), place.spacing_x, 1e-12 * place.spacing_x);
+      }
+    }
+  }
+}
+
+TEST_F(ExportCommand, CutsTilesThatShareTheirEdges) {
+  const json summary = exported({folder_ / "t.r16", "--tile-size", "129", "--overlap", "1"});
+  const json& tiles = summary.at("tiles");
+  EXPECT_EQ(tiles.at("across"), 4);  // 512 samples are nearest to 513
+  EXPECT_EQ(tiles.at("down"), 3);
+  EXPECT_EQ(summary.at("width"), 513);
+  EXPECT_EQ(summary.at("height"), 385);
+  EXPECT_EQ(summary.at("files"), 12);
+  (void)exported({folder_ / "whole.r16", "--size", "513x385"});
+  const Raster whole = read_raster(folder_ / "whole.r16");
+  for (std::int64_t ty = 0; ty < 3; ++ty) {
+    for (std::int64_t tx = 0; tx < 4; ++tx) {
+      const Raster tile = read_raster(folder_ / ("t_x" + std::to_string(tx) + "_y" + std::to_string(ty) + ".r16"));
+      ASSERT_EQ(tile.info.width, 129);
+      ASSERT_EQ(tile.info.height, 129);
+      EXPECT_EQ(tile.info.z_scale, whole.info.z_scale);
+      EXPECT_DOUBLE_EQ(
+          tile.info.georeference.origin_x,
+          whole.info.georeference.origin_x + static_cast<double>(128 * tx) * whole.info.georeference.spacing_x);
+      EXPECT_DOUBLE_EQ(
+          tile.info.georeference.origin_y,
+          whole.info.georeference.origin_y - static_cast<double>(128 * ty) * whole.info.georeference.spacing_y);
+      for (std::int64_t row = 0; row < 129; ++row) {
+        for (std::int64_t column = 0; column < 129; ++column) {
+          ASSERT_EQ(tile.at(column, row), whole.at(128 * tx + column, 128 * ty + row));
+        }
+      }
+    }
+  }
+}
+
+TEST_F(ExportCommand, CutsMoreTilesThanItHasOpenAtATime) {
+  (void)exported({folder_ / "t.npy", "--tiles", "150x2", "--tile-size", "5x40", "--overlap", "2"});
+  (void)exported({folder_ / "whole.npy", "--size", "452x78"});
+  const Raster whole = read_raster(folder_ / "whole.npy");
+  for (std::int64_t ty = 0; ty < 2; ++ty) {
+    for (std::int64_t tx = 0; tx < 150; ++tx) {
+      const Raster tile = read_raster(folder_ / ("t_x" + std::to_string(tx) + "_y" + std::to_string(ty) + ".npy"));
+      for (std::int64_t row = 0; row < 40; ++row) {
+        for (std::int64_t column = 0; column < 5; ++column) {
+          ASSERT_EQ(tile.at(column, row), whole.at(3 * tx + column, 38 * ty + row)) << tx << " " << ty;
+        }
+      }
+    }
+  }
+}
+
+TEST_F(ExportCommand, TakesAPartOfTheSourcesGrid) {
+  (void)exported({folder_ / "whole.tif"});
+  const Raster whole = read_raster(folder_ / "whole.tif");
+  const Georeference& place = whole.info.georeference;
+  ASSERT_TRUE(place.has_origin);
+  // From a little West of column 100 to a little East of column 149, rows 30 to 59.
+  const double west = place.origin_x + 99.7 * place.spacing_x;
+  const double east = place.origin_x + 149.2 * place.spacing_x;
+  const double north = place.origin_y - 29.6 * place.spacing_y;
+  const double south = place.origin_y - 59.3 * place.spacing_y;
+  const std::string box =
+      std::to_string(west) + "," + std::to_string(south) + "," + std::to_string(east) + "," + std::to_string(north);
+  const json summary = exported({folder_ / "part.tif", "--bbox", box});
+  EXPECT_EQ(summary.at("width"), 50);
+  EXPECT_EQ(summary.at("height"), 30);
+  const Raster part = read_raster(folder_ / "part.tif");
+  EXPECT_NEAR(part.info.georeference.origin_x, place.origin_x + 100 * place.spacing_x, 1e-9 * std::abs(place.origin_x));
+  for (std::int64_t row = 0; row < 30; ++row) {
+    for (std::int64_t column = 0; column < 50; ++column) {
+      // The place of a sample is computed from another first one: the last bits may differ.
+      ASSERT_NEAR(part.at(column, row), whole.at(100 + column, 30 + row), 1e-3);
+    }
+  }
+}
+
+TEST_F(ExportCommand, SpreadsElevationsOverTheRangeAskedFor) {
+  const json measured = exported({folder_ / "a.png"});
+  const Raster codes = read_codes(folder_ / "a.png");
+  const auto [low, high] = std::minmax_element(codes.elevations.begin(), codes.elevations.end());
+  EXPECT_EQ(*low, 0.0);
+  EXPECT_EQ(*high, 65535.0);
+  const json asked = exported({folder_ / "b.png", "--z-range", "-5000:10000"});
+  EXPECT_DOUBLE_EQ(asked.at("z_scale"), 15000.0 / 65535.0);
+  EXPECT_DOUBLE_EQ(asked.at("z_offset"), -5000.0);
+  const json unreal = exported({folder_ / "c.r16", "--z-scale", "0.0078125", "--z-offset", "-256", "--clamp-range"});
+  EXPECT_EQ(unreal.at("z_scale"), 0.0078125);
+  EXPECT_GT(unreal.at("clamped"), 0);
+  // Of a scale that is too small: the number that would be stored, and a scale that does.
+  const std::string too_small = refused({folder_ / "d.r16", "--z-scale", "0.0078125", "--z-offset", "-256"});
+  EXPECT_THAT(too_small, HasSubstr(" is at elevation "));
+  EXPECT_THAT(too_small, HasSubstr(", which uint16 does not hold; --clamp-range moves it"));
+  const std::size_t from = too_small.find("--z-scale ");
+  ASSERT_NE(from, std::string::npos) << too_small;
+  const std::string scale = too_small.substr(from + 10, too_small.find(' ', from + 10) - from - 10);
+  const json would_do = exported({folder_ / "e.r16", "--z-scale", scale, "--z-offset", "-256"});
+  EXPECT_EQ(would_do.at("clamped"), 0);
+  EXPECT_THAT(refused({folder_ / "d.exr", "--type", "f16", "--z-scale", "0.0001", "-q"}),
+              HasSubstr("--type f32 holds it"));
+  EXPECT_THAT(refused({folder_ / "d.raw", "--type", "f32"}),
+              HasSubstr(".r16 and .raw store one channel of uint16, not 1 of float32; .r32 does"));
+  EXPECT_EQ(exported({folder_ / "u.exr", "--type", "u32", "--clamp-range"}).at("sample_type"), "uint32");
+  EXPECT_THAT(refused({folder_ / "d.tif", "--z-range", "0:1"}), HasSubstr("--z-range is for integer types"));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "d.r16"));
+}
+
+TEST_F(ExportCommand, RefusesTilesThatDoNotComeOutWhole) {
+  const std::string out = folder_ / "t.tif";
+  EXPECT_THAT(refused({out, "--size", "1000x1000", "--tile-size", "129", "--overlap", "1"}),
+              HasSubstr("1000 columns do not make 8 whole tiles of 129 that share 1; 1025 do"));
+  EXPECT_THAT(refused({out, "--size", "1000x1000", "--tiles", "3x1"}),
+              HasSubstr("1000 columns do not make 3 equal tiles that share 0; 999 do"));
+  EXPECT_THAT(refused({out, "--tile-size", "4", "--overlap", "3"}), HasSubstr("at least twice the overlap"));
+  EXPECT_THAT(refused({out, "--overlap", "1"}), HasSubstr("--overlap needs --tiles or --tile-size"));
+  EXPECT_THAT(refused({out, "--bbox", "1,2,1,3"}), HasSubstr("must be WEST,SOUTH,EAST,NORTH"));
+  EXPECT_THAT(refused({out, "--bbox", "-9e9,-9e9,-8e9,-8e9"}), HasSubstr("--bbox lies outside"));
+  EXPECT_THAT(refused({folder_ / "t.hgt"}), HasSubstr("an HGT tile has 1201 x 1201"));
+  EXPECT_THAT(refused({folder_ / "t.jpg"}), HasSubstr("no writer for the extension"));
+}
+
+TEST_F(ExportCommand, LeavesNothingWhereTheDiskIsFullOrAFileIsThere) {
+  const std::string out = folder_ / "full";
+  std::filesystem::create_directory(out);
+  RunOptions full;
+  full.file_size_limit_bytes = 20000;
+  const RunResult result =
+      run_isohf({"export", folder_ / "coast.isohf", out + "/t.r16", "--tiles", "2x2", "--tile-size", "128"}, full);
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.err, HasSubstr("t_x0_y0.r16: cannot write"));
+  EXPECT_TRUE(std::filesystem::is_empty(out));
+  std::ofstream(out + "/t_x1_y1.r16") << "mine";
+  EXPECT_THAT(refused({out + "/t.r16", "--tiles", "2x2", "--tile-size", "128"}),
+              HasSubstr("t_x1_y1.r16: exists; --overwrite replaces it"));
+  (void)exported({out + "/t.r16", "--tiles", "2x2", "--tile-size", "128", "--overwrite"});
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(out), {}), 8);
+}
+
+TEST_F(ExportCommand, KeepsWhatTookAnOldFilesPlaceWhereALaterTileFails) {
+  const std::vector<std::string> cut = {"--tiles", "150x2", "--tile-size", "5x40", "--overlap", "2"};
+  std::vector<std::string> again = {folder_ / "t.npy", "--overwrite"};
+  again.insert(again.end(), cut.begin(), cut.end());
+  (void)exported(again);
+  std::filesystem::remove(folder_ / "t_x1_y0.npy");
+  std::filesystem::create_directory(folder_ / "t_x140_y0.npy.part");  // of the third group of columns
+  EXPECT_THAT(refused(again, 1), HasSubstr("t_x140_y0.npy"));
+  for (const char* old : {"t_x0_y0.npy", "t_x0_y1.npy", "t_x63_y1.npy", "t_x140_y0.npy"}) {
+    EXPECT_TRUE(std::filesystem::exists(folder_ / old)) << old;
+  }
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "t_x1_y0.npy"));
+}
+
+}  // namespace
+}  // namespace isohf::test

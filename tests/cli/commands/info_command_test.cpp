@@ -1,0 +1,171 @@
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "isohf/archive.h"
+#include "support/rasters/plain_tiff.h"
+#include "support/run_program.h"
+#include "support/temporary_folder.h"
+
+namespace isohf::test {
+namespace {
+
+using nlohmann::json;
+using testing::HasSubstr;
+
+class InfoCommand : public testing::Test {
+ protected:
+  InfoCommand() {
+    // The East half is void.
+    write_float_tiff(folder / "a.tif", 200, 100, [](std::int64_t c, std::int64_t r) {
+      return c < 100 ? static_cast<float>(c + 2 * r) : std::numeric_limits<float>::quiet_NaN();
+    });
+    const RunResult result = run_isohf({"convert", folder / "a.tif", folder / "a.isohf", "--shape", "28x35", "--levels",
+                                        "2", "--type", "f32", "--outside", "void"});
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+  }
+
+  TemporaryFolder folder;
+};
+
+TEST_F(InfoCommand, SaysWhatTheArchiveHolds) {
+  const RunResult result = run_isohf({"info", folder / "a.isohf"});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_EQ(result.err, "");
+  for (const char* part : {"28x35 (C x R), 2 levels", "a.tif", "200 x 100 float32", "limited-cubic", "wholly void",
+                           "bits a source sample", "sha256 "}) {
+    EXPECT_THAT(result.out, HasSubstr(part));
+  }
+}
+
+TEST_F(InfoCommand, SaysThatTheSourcesSamplesAreKept) {
+  EXPECT_THAT(run_isohf({"info", folder / "a.isohf"}).out, HasSubstr("lossless     no"));
+  ASSERT_EQ(run_isohf({"convert", folder / "a.tif", folder / "b.isohf", "--lossless", "-q"}).exit_code, 0);
+  const std::string text = run_isohf({"info", folder / "b.isohf"}).out;
+  EXPECT_THAT(text, HasSubstr("restore gives the float32 samples bit for bit; residuals of "));
+  EXPECT_THAT(text, HasSubstr("residual/ (1 members, "));
+}
+
+TEST_F(InfoCommand, SaysThatAPartIsOneAndOfWhichGround) {
+  ASSERT_EQ(run_isohf({"extract", folder / "a.isohf", "-o", folder / "p.isohf", "--tiles", "1:2,0:2", "-q"}).exit_code,
+            0);
+  const std::string text = run_isohf({"info", folder / "p.isohf"}).out;
+  const std::int64_t tiles = ArchiveReader(folder / "p.isohf").grid().tile_count();
+  EXPECT_THAT(text, HasSubstr("2 stored, 0 wholly void, " + std::to_string(tiles - 2) + " not in this part"));
+  EXPECT_THAT(text, HasSubstr("columns 1 to 1, rows 0 to 1 of a whole, x "));
+  EXPECT_THAT(run_isohf({"info", folder / "a.isohf"}).out, testing::Not(HasSubstr("part ")));
+}
+
+TEST_F(InfoCommand, TilesAreListedOneALine) {
+  const json info = json::parse(run_isohf({"info", folder / "a.isohf", "--json", "--tiles"}).out);
+  const std::size_t count = info.at("grid").at("tiles").get<std::size_t>();
+  EXPECT_EQ(info.at("tiles").size(), count);
+  std::size_t stored = 0;
+  std::uint64_t bytes = 0;
+  for (const json& tile : info.at("tiles")) {
+    if (!tile.at("stored").get<bool>()) continue;
+    ++stored;
+    bytes += tile.at("compressed_bytes").get<std::uint64_t>();
+    EXPECT_GE(tile.at("min").get<double>(), 0.0);
+    EXPECT_LE(tile.at("max").get<double>(), 99.0 + 2 * 99.0 + 1e-3);
+    EXPECT_LE(tile.at("min").get<double>(), tile.at("max").get<double>());
+  }
+  EXPECT_GT(stored, 0U);
+  EXPECT_LT(stored, count);  // the void half stores nothing
+  EXPECT_EQ(info.at("tile_bytes"), bytes);
+
+  const RunResult text = run_isohf({"info", folder / "a.isohf", "--tiles"});
+  EXPECT_EQ(static_cast<std::size_t>(std::count(text.out.begin(), text.out.end(), '\n')), count + 1);
+  EXPECT_THAT(text.out, HasSubstr(" 0 void void all\n"));
+}
+
+TEST_F(InfoCommand, SaysWhatIsUnderstoodOfARaster) {
+  const RunResult result = run_isohf({"info", folder / "a.tif"});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_EQ(result.err, "");
+  for (const char* part : {"a.tif: TIFF, read by libtiff ", "200 x 100 float32, stored in blocks of 200 x ",
+                           "point: samples on posts, taken for granted without", "NaN and infinities"}) {
+    EXPECT_THAT(result.out, HasSubstr(part));
+  }
+  EXPECT_THAT(result.out, testing::Not(HasSubstr("range")));  // no sample is read
+
+  const RunResult stats = run_isohf({"info", folder / "a.tif", "--stats", "--registration", "area"});
+  EXPECT_EQ(stats.err, "");
+  EXPECT_THAT(stats.out, HasSubstr("area: samples in the middle of pixels, by --registration"));
+  EXPECT_THAT(stats.out, HasSubstr("0 .. 297, mean 148.5\n"));
+  EXPECT_THAT(stats.out, HasSubstr("20 000, 10 000 of them void\n"));
+
+  const json info = json::parse(run_isohf({"info", folder / "a.tif", "--json", "--stats"}).out);
+  EXPECT_EQ(info.at("width"), 200);
+  EXPECT_EQ(info.at("statistics").at("voids"), 10000);
+  EXPECT_EQ(info.at("statistics").at("mean"), 148.5);
+  EXPECT_EQ(info.at("registration_from"), "default");
+  EXPECT_TRUE(info.at("origin").is_null());
+  EXPECT_TRUE(json::parse(run_isohf({"info", folder / "a.tif", "--json"}).out).at("statistics").is_null());
+}
+
+TEST_F(InfoCommand, RastersAndArchivesTakeTheirOwnOptions) {
+  for (const std::vector<std::string>& arguments : {std::vector<std::string>{"info", folder / "a.tif", "--tiles"},
+                                                    {"info", folder / "a.isohf", "--stats"},
+                                                    {"info", folder / "a.isohf", "--nodata", "3"}}) {
+    const RunResult result = run_isohf(arguments);
+    EXPECT_EQ(result.exit_code, 2) << arguments.back();
+    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+  }
+}
+
+/// What says that a raster of these samples holds voids that it does not declare.
+std::string spike_warning(const TemporaryFolder& folder,
+                          const std::function<std::int16_t(std::int64_t, std::int64_t)>& height_at) {
+  write_int16_tiff(folder / "s.tif", 64, 48, height_at);
+  return run_isohf({"info", folder / "s.tif", "--stats"}).err;
+}
+
+TEST_F(InfoCommand, WarnsOfVoidsThatAreNotDeclared) {
+  const auto land = [](std::int64_t c, std::int64_t r) { return static_cast<std::int16_t>(100 + 3 * c + r); };
+  for (const int mark : {-32768, -9999, 9999, 32767}) {
+    const std::string warning = spike_warning(folder, [&](std::int64_t c, std::int64_t r) {
+      return c == 7 && r < 3 ? static_cast<std::int16_t>(mark) : land(c, r);
+    });
+    EXPECT_EQ(warning, fmt::format("isohf: warning: {}: 3 samples hold {}, far from all others (100 to 336): if that "
+                                   "means no elevation, give --nodata {}\n",
+                                   folder / "s.tif", mark, mark));
+  }
+  // Convert says the same; with --nodata nobody does.
+  EXPECT_THAT(run_isohf({"convert", folder / "s.tif", folder / "s.isohf"}).err, HasSubstr("3 samples hold 32767"));
+  EXPECT_EQ(run_isohf({"convert", folder / "s.tif", folder / "t.isohf", "--nodata", "32767"}).err, "");
+}
+
+TEST_F(InfoCommand, TakesNoOrdinaryElevationForAVoid) {
+  // All codes, a range that happens to end on a mark, and a step of -32768 under its neighbours.
+  EXPECT_EQ(spike_warning(folder, [](std::int64_t c,
+                                     std::int64_t r) { return static_cast<std::int16_t>(-32768 + 21 * (c + 64 * r)); }),
+            "");
+  EXPECT_EQ(spike_warning(folder,
+                          [](std::int64_t c, std::int64_t r) { return static_cast<std::int16_t>(-9999 + c * c + r); }),
+            "");
+  EXPECT_EQ(spike_warning(folder, [](std::int64_t c,
+                                     std::int64_t) { return static_cast<std::int16_t>(c == 0 ? -9999 : c * 200); }),
+            "");
+}
+
+TEST_F(InfoCommand, WhatIsNoArchiveIsRefusedInOneLine) {
+  write_file(folder / "empty.isohf", "");
+  write_file(folder / "short.isohf", read_file(folder / "a.isohf").substr(0, 500));
+  for (const char* name : {"none.isohf", "empty.isohf", "short.isohf"}) {
+    for (const char* command : {"info", "sample"}) {
+      const RunResult result = run_isohf({command, folder / name});
+      EXPECT_EQ(result.exit_code, 1) << name;
+      EXPECT_EQ(result.out, "");
+      EXPECT_THAT(result.err, HasSubstr(name));
+      EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace isohf::test

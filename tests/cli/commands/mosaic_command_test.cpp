@@ -1,0 +1,389 @@
+/// Many inputs that form one surface: what they give is what the whole gives.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <csignal>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "formats/mosaic/mosaic_pieces.h"
+#include "isohf/raster.h"
+#include "support/rasters/plain_tiff.h"
+#include "support/real_files.h"
+#include "support/run_program.h"
+#include "support/sanitizers.h"
+#include "support/temporary_folder.h"
+
+namespace isohf::test {
+namespace {
+
+using nlohmann::json;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+using Words = std::vector<std::string>;
+
+/// Hills with a lake of voids, in int16.
+CutRaster hills(const RasterSpec& like) {
+  RasterSpec spec = like;
+  spec.void_value = -9999.0;
+  return raster_of<std::int16_t>(spec, [](std::int64_t column, std::int64_t row) {
+    const auto c = static_cast<double>(column);
+    const auto r = static_cast<double>(row);
+    if (std::hypot(c - 120.0, r - 60.0) < 13.0) return -9999.0;
+    return std::round(900.0 + 300.0 * std::sin(0.07 * c) * std::cos(0.05 * r) + 40.0 * std::sin(0.9 * c + 1.3 * r));
+  });
+}
+
+class MosaicCommand : public ::testing::Test {
+ protected:
+  /// Converts and returns the archive's bytes.
+  std::string convert(const Words& inputs, const Words& options) {
+    Words command = {"convert", "-o", folder / "out.isohf", "--overwrite", "--quiet"};
+    command.insert(command.end(), options.begin(), options.end());
+    command.insert(command.end(), inputs.begin(), inputs.end());
+    const RunResult result = run_isohf(command);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_EQ(result.err, "");
+    return read_file(folder / "out.isohf");
+  }
+
+  json metadata() const { return json::parse(run_isohf({"info", folder / "out.isohf", "--json"}).out).at("metadata"); }
+
+  /// A folder inside the folder, with "/" behind it.
+  std::string subfolder(const std::string& name) const {
+    std::filesystem::create_directories(folder / name);
+    return folder / (name + "/");
+  }
+
+  void expect_error(const Words& command, int exit_code, const std::string& text) const {
+    const RunResult result = run_isohf(command);
+    EXPECT_EQ(result.exit_code, exit_code) << result.err;
+    EXPECT_EQ(result.out, "");
+    EXPECT_THAT(result.err, HasSubstr(text));
+    EXPECT_THAT(result.err, StartsWith("isohf: "));
+    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+  }
+
+  TemporaryFolder folder;
+};
+
+TEST_F(MosaicCommand, PiecesGiveTheWholesFileByteForByteWithEveryFilter) {
+  const Words name = {"--source-name", "hills"};
+  for (const Registration registration : {Registration::kArea, Registration::kPoint}) {
+    SCOPED_TRACE(to_string(registration));
+    const CutRaster raster = hills(placed_spec(190, 140, SampleType::kInt16, registration));
+    const std::string whole = folder / (to_string(registration) + ".tif");
+    raster.cut(whole, {0, 0, 190, 140});
+    const std::string pieces = subfolder(to_string(registration));
+    write_pieces(raster, pieces, ragged_cut(190, 140, 21, 17));
+    for (const char* filter : {"nearest", "bilinear", "limited-cubic", "catmull-rom", "bspline2", "bspline3",
+                               "bspline5", "lanczos3", "lanczos6"}) {
+      const Words options = {"--shape", "52x67", "--filter", filter, "--source-name", "hills"};
+      EXPECT_TRUE(convert({whole}, options) == convert({pieces}, options)) << filter;
+    }
+  }
+}
+
+TEST_F(MosaicCommand, SeedsResidualsAndFloatsOfPiecesAreThoseOfTheWholeInAnyOrder) {
+  const CutRaster raster = hills(placed_spec(190, 140, SampleType::kInt16, Registration::kPoint));
+  raster.cut(folder / "whole.tif", {0, 0, 190, 140});
+  const std::string one = subfolder("ragged");
+  Words pieces = write_pieces(raster, one, ragged_cut(190, 140, 3, 9));
+  Words reversed(pieces.rbegin(), pieces.rend());
+  const std::string two = subfolder("posts");
+  write_pieces(raster, two, regular_cut(190, 140, 60, 1));  // neighbours share a row and a column of posts
+  for (const Words& more : {Words{"--shadow-seeds"}, Words{"--lossless", "--filter", "bspline3"},
+                            Words{"--type", "f32", "--acquisition", "box", "--filter", "bspline5"},
+                            Words{"--density", "0.7", "--outside", "void", "-j", "1"}}) {
+    SCOPED_TRACE(more.front());
+    Words options = {"--shape", "52x67", "--source-name", "hills"};
+    options.insert(options.end(), more.begin(), more.end());
+    const std::string whole = convert({folder / "whole.tif"}, options);
+    EXPECT_TRUE(whole == convert(pieces, options));
+    EXPECT_TRUE(whole == convert(reversed, options));
+    EXPECT_TRUE(whole == convert({two + "*.tif"}, options));
+  }
+}
+
+TEST_F(MosaicCommand, WithoutANameTheArchiveSaysWhatItWasJoinedFrom) {
+  const CutRaster raster = hills(placed_spec(190, 140, SampleType::kInt16, Registration::kArea));
+  raster.cut(folder / "whole.tif", {0, 0, 190, 140});
+  convert({folder / "whole.tif"}, {});
+  const json whole = metadata();
+  EXPECT_FALSE(whole.at("source").contains("mosaic"));
+  const Words pieces = write_pieces(raster, subfolder("tiles"), regular_cut(190, 140, 50));
+  const std::string bytes = convert(pieces, {});
+  EXPECT_TRUE(bytes == convert(Words(pieces.rbegin(), pieces.rend()), {}))
+      << "the order tells nothing without overlaps";
+  const json joined = metadata();
+  EXPECT_EQ(joined.at("content_sha256"), whole.at("content_sha256"));
+  const json& record = joined.at("source").at("mosaic");
+  EXPECT_EQ(record.at("files"), 12);
+  EXPECT_EQ(record.at("names").size(), 8U);
+  EXPECT_EQ(record.at("names")[0], "piece0.tif");
+  EXPECT_EQ(record.at("overlap"), "last");
+  EXPECT_EQ(joined.at("source").at("name"), "mosaic of 12 files");
+  EXPECT_THAT(run_isohf({"info", folder / "out.isohf"}).out,
+              HasSubstr("joined from  12 files, the last on top: piece0.tif, piece1.tif,"));
+  const RunResult verified = run_isohf({"verify", folder / "out.isohf", "--against", folder / "tiles"});
+  EXPECT_EQ(verified.exit_code, 0) << verified.out << verified.err;
+  EXPECT_EQ(verified.err, "");
+}
+
+TEST_F(MosaicCommand, RestoringALosslessMosaicGivesTheWholeRaster) {
+  const CutRaster raster = hills(placed_spec(190, 140, SampleType::kInt16, Registration::kArea));
+  convert(write_pieces(raster, folder / "", ragged_cut(190, 140, 6, 12)), {"--lossless"});
+  const RunResult result = run_isohf({"restore", folder / "out.isohf", folder / "back.tif"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const auto back = open_raster(folder / "back.tif", {});
+  ASSERT_EQ(back->info().width, 190);
+  EXPECT_EQ(back->info().georeference.origin_x, raster.spec.georeference->origin_x);
+  std::vector<std::byte> samples(raster.samples.size());
+  back->read_window({0, 0, 190, 140}, samples);
+  EXPECT_TRUE(samples == raster.samples);
+}
+
+TEST_F(MosaicCommand, DegreeTilesWithSharedPostsGiveTheSurfaceOfTheWhole) {
+  CutRaster raster = hills(placed_spec(241, 121, SampleType::kInt16, Registration::kPoint, true));
+  raster.spec.georeference->spacing_x = raster.spec.georeference->spacing_y = 1.0 / 60.0;
+  raster.spec.georeference->origin_x = 178.0;
+  raster.spec.void_value = -32768.0;
+  for (std::size_t i = 0; i < raster.samples.size(); i += 2) {
+    std::int16_t value = 0;
+    std::memcpy(&value, raster.samples.data() + i, 2);
+    if (value == -9999) value = -32768;
+    std::memcpy(raster.samples.data() + i, &value, 2);
+  }
+  raster.cut(folder / "whole.tif", {0, 0, 241, 121});
+  const std::string tiles = subfolder("tiles");
+  const char* const columns[] = {"E178", "E179", "W180", "W179"};
+  for (int i = 0; i < 8; ++i) {
+    std::vector<std::byte> posts = raster.part({i % 4 * 60, i / 4 * 60, 61, 61});
+    for (std::size_t at = 0; at < posts.size(); at += 2) std::swap(posts[at], posts[at + 1]);
+    write_file(tiles + "N4" + (i < 4 ? "5" : "4") + columns[i % 4] + ".hgt",
+               {reinterpret_cast<const char*>(posts.data()), posts.size()});
+  }
+  convert({folder / "whole.tif"}, {"--shape", "52x67"});
+  const json whole = metadata();
+  convert({tiles}, {"--shape", "52x67"});
+  EXPECT_EQ(metadata().at("content_sha256"), whole.at("content_sha256"));
+}
+
+TEST_F(MosaicCommand, MissingTilesAreReportedAndCanBeAnError) {
+  const CutRaster raster = hills(placed_spec(200, 150, SampleType::kInt16, Registration::kArea));
+  const std::string tiles = subfolder("tiles");
+  write_pieces(raster, tiles, regular_cut(200, 150, 50));
+  std::filesystem::remove(tiles + "piece5.tif");
+  std::filesystem::remove(tiles + "piece6.tif");
+  const RunResult result = run_isohf({"convert", tiles, folder / "a.isohf"});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_THAT(result.err, HasSubstr("2 of 12 tiles are missing (5,000 samples): x 501500...503000, y "));
+  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+  expect_error(
+      {"convert", tiles, folder / "b.isohf", "--require-complete"}, 1,
+      "--require-complete: 2 of 12 tiles are missing (5,000 samples): x 501500...503000, y 5197015...5198515; x "
+      "503000...504500, y 5197015...5198515");
+  EXPECT_FALSE(std::filesystem::exists(folder / "b.isohf"));
+}
+
+TEST_F(MosaicCommand, InputsAreFilesFoldersPatternsAndLists) {
+  const CutRaster raster = hills(placed_spec(100, 100, SampleType::kInt16, Registration::kArea));
+  const std::string tiles = subfolder("tiles");
+  const std::string deep = subfolder("tiles/deep");
+  write_pieces(raster, tiles, {{0, 0, 50, 50}, {50, 0, 50, 50}, {0, 50, 50, 50}});
+  raster.cut(deep + "last.tif", {50, 50, 50, 50});
+  write_file(tiles + "notes.txt", "not a raster");
+  write_file(tiles + "piece0.tif.aux.xml", "<PAMDataset/>");
+  write_file(folder / "list.txt",
+             "\xEF\xBB\xBF# tiles\r\n\r\n  tiles/piece0.tif\r\ntiles/piece[12].tif \r\n" + deep + "\n");
+  const Words options = {"--source-name", "x"};
+  const std::string all = convert({tiles, "--recursive"}, options);
+  EXPECT_EQ(metadata().at("source").at("width"), 100);
+  EXPECT_TRUE(all == convert({tiles + "*.tif", deep + "last.tif"}, options));
+  EXPECT_TRUE(all == convert({"@" + (folder / "list.txt")}, options));
+  EXPECT_TRUE(all ==
+              convert({"-i", tiles + "piece1.tif", "-i", tiles + "piece0.tif", deep, tiles + "piece2.tif"}, options));
+  const RunResult plan = run_isohf({"plan", tiles, deep});
+  EXPECT_EQ(plan.exit_code, 0) << plan.err;
+  EXPECT_THAT(plan.out, HasSubstr("mosaic of 4 files: GeoTIFF, 100 x 100 int16"));
+  // One file, by whatever name, is no mosaic.
+  EXPECT_TRUE(convert({deep}, {}) == convert({deep + "last.tif"}, {}));
+  EXPECT_EQ(metadata().at("source").at("name"), "last.tif");
+}
+
+TEST_F(MosaicCommand, WhatIsNotThereOrTwiceThereIsNamed) {
+  const CutRaster raster = hills(placed_spec(100, 50, SampleType::kInt16, Registration::kArea));
+  write_pieces(raster, folder / "", {{0, 0, 50, 50}, {50, 0, 50, 50}});
+  const std::string empty = subfolder("empty");
+  const std::string a = folder / "piece0.tif";
+  const std::string b = folder / "piece1.tif";
+  const std::string out = folder / "out.isohf";
+  write_file(folder / "blank.txt", "# nothing\n\n");
+  write_file(folder / "list.txt", "piece0.tif\n\nnone.tif\n");
+  expect_error({"convert", a, folder / "none.tif", out}, 1, "none.tif: no such file");
+  expect_error({"convert", folder / "x*.tif", out}, 1, "x*.tif: no file matches");
+  expect_error({"convert", empty, out}, 1, "holds no raster that isohf reads (");
+  expect_error({"convert", "@" + (folder / "none.txt"), out}, 1, "none.txt: no such list of inputs");
+  expect_error({"convert", "@" + (folder / "blank.txt"), out}, 1, "blank.txt: names no input");
+  expect_error({"convert", "@" + (folder / "list.txt"), out}, 1, "list.txt: line 3: ");
+  expect_error({"convert", a, b, a, out}, 2, "piece0.tif: is named twice among the inputs");
+  expect_error({"convert", a, folder.path() + "/piece?.tif", "-o", b, "--overwrite"}, 2,
+               "piece1.tif: exists and is a raster (TIFF)");
+  expect_error({"convert", a, b, "--overwrite", "-o", b}, 2, "piece1.tif: the output is one of the inputs");
+  // A forgotten output.
+  raster.cut(folder / "piece2.tif", {0, 0, 50, 50});
+  expect_error({"convert", a, b, folder / "piece2.tif", "--overwrite"}, 2,
+               "piece2.tif is not called .isohf and counts as an input");
+  EXPECT_EQ(folder.names(), (Words{"blank.txt", "empty", "list.txt", "piece0.tif", "piece1.tif", "piece2.tif"}));
+}
+
+TEST_F(MosaicCommand, VerifyTakesTheOverlapRuleFromTheArchive) {
+  CutRaster raster = hills(placed_spec(120, 60, SampleType::kInt16, Registration::kArea));
+  const std::string tiles = subfolder("tiles");
+  raster.cut(tiles + "a.tif", {0, 0, 80, 60});
+  for (std::byte& byte : raster.samples) byte ^= std::byte{0x10};  // other elevations in the overlap
+  raster.cut(tiles + "b.tif", {60, 0, 60, 60});
+  const std::string first = convert({tiles}, {"--overlap", "first"});
+  EXPECT_EQ(metadata().at("source").at("mosaic").at("overlap"), "first");
+  const Words verify = {"verify", folder / "out.isohf", "--against", tiles};
+  EXPECT_EQ(run_isohf(verify).exit_code, 0);
+  Words other = verify;
+  other.insert(other.end(), {"--overlap", "last"});
+  EXPECT_EQ(run_isohf(other).exit_code, 3);
+  EXPECT_FALSE(first == convert({tiles}, {}));
+}
+
+TEST_F(MosaicCommand, ABoxOfPiecesIsThatOfTheWhole) {
+  const CutRaster raster = hills(placed_spec(190, 140, SampleType::kInt16, Registration::kArea));
+  raster.cut(folder / "whole.tif", {0, 0, 190, 140});
+  raster.cut(folder / "part.tif", {30, 20, 100, 80});
+  const std::string pieces = subfolder("pieces");
+  write_pieces(raster, pieces, regular_cut(190, 140, 45));
+  std::filesystem::remove(pieces + "piece4.tif");  // in the North-East, outside the box
+  const Words options = {"--source-name", "hills", "--shape", "52x67"};
+  Words in_box = options;
+  in_box.insert(in_box.end(), {"--bbox", "500900,5197015,503900,5199415"});
+  // The archives only differ in the box that they record.
+  const auto content = [&](const std::string& input, const Words& with) {
+    (void)convert({input}, with);
+    return metadata().at("content_sha256").get<std::string>();
+  };
+  const std::string part = content(folder / "part.tif", options);
+  EXPECT_EQ(content(folder / "whole.tif", in_box), part);
+  in_box.emplace_back("--require-complete");
+  EXPECT_EQ(content(pieces, in_box), part);
+  EXPECT_EQ(metadata().at("source").at("width"), 100);
+  const RunResult verified = run_isohf({"verify", folder / "out.isohf", "--against", pieces});
+  EXPECT_EQ(verified.exit_code, 0) << verified.out << verified.err;
+  EXPECT_EQ(run_isohf({"convert", folder / "whole.tif", folder / "x.isohf", "--bbox", "1,2,3,4"}).exit_code, 2);
+}
+
+TEST_F(MosaicCommand, FourHundredFilesGoThroughFewHandles) {
+  const CutRaster raster = hills(placed_spec(200, 200, SampleType::kInt16, Registration::kPoint));
+  raster.cut(folder / "whole.tif", {0, 0, 200, 200});
+  const std::string tiles = subfolder("tiles");
+  int number = 0;
+  for (const Window& window : regular_cut(200, 200, 10)) {
+    // Written by hand: hundreds of files that each reach the disk take long.
+    const std::string path = tiles + "t" + std::to_string(1000 + number++);
+    const RasterSpec spec = raster.spec_of(window);
+    write_int16_tiff(path + ".tif", 10, 10, [&](std::int64_t c, std::int64_t r) {
+      std::int16_t value = 0;
+      std::memcpy(&value, raster.part({window.column + c, window.row + r, 1, 1}).data(), 2);
+      return value;
+    });
+    write_file(path + ".tfw", "30\n0\n0\n-30\n" + std::to_string(spec.georeference->origin_x) + "\n" +
+                                  std::to_string(spec.georeference->origin_y) + "\n");
+  }
+  ASSERT_EQ(number, 400);
+  RunOptions few;
+  few.open_files = 40;
+  const Words command = {"--nodata", "-9999", "--registration", "point", "--json", "--quiet"};
+  const auto run = [&](const std::string& input, const RunOptions& limits) {
+    Words all = {"convert", input, folder / "out.isohf", "--overwrite"};
+    all.insert(all.end(), command.begin(), command.end());
+    const RunResult result = run_isohf(all, limits);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return result.exit_code == 0 ? json::parse(result.out) : json();
+  };
+  const json whole = run(folder / "whole.tif", {});
+  const json joined = run(tiles, few);
+  EXPECT_EQ(joined.at("files"), 400);
+  EXPECT_EQ(joined.at("metadata").at("content_sha256"), whole.at("metadata").at("content_sha256"));
+}
+
+TEST_F(MosaicCommand, ResumeRefusesOtherMembers) {
+  for (int i = 0; i < 2; ++i) {
+    const std::string name = std::string(i == 0 ? "a" : "b");
+    write_sparse_tiff(folder / (name + ".tif"), 5000, kSanitized ? 4000 : 16000);
+    write_file(folder / (name + ".tfw"), "1\n0\n0\n-1\n" + std::to_string(i * 5000) + "\n0\n");
+  }
+  const Words command = {
+      isohf_path(), "convert", folder / "a.tif", folder / "b.tif", folder / "out.isohf", "--z-range", "0:100",
+      "--progress", "json"};
+  RunningProgram program(command);
+  ASSERT_TRUE(program.wait_for_error_text("\"progress\":\"tiles\""));
+  program.send(SIGINT);
+  ASSERT_EQ(program.wait().exit_code, 130);
+  const auto before = std::filesystem::last_write_time(folder / "b.tif");
+  Words resume = command;
+  resume.emplace_back("--resume");
+  Words other = resume;
+  other.insert(other.end(), {"--overlap", "first"});
+  std::filesystem::last_write_time(folder / "b.tif", before + std::chrono::seconds(1));
+  const RunResult changed = run_program(resume);
+  EXPECT_NE(changed.exit_code, 0);
+  EXPECT_THAT(changed.err, HasSubstr("out.isohf.part"));
+  std::filesystem::last_write_time(folder / "b.tif", before);
+  EXPECT_NE(run_program(other).exit_code, 0);
+  const RunResult same = run_program(resume);
+  EXPECT_EQ(same.exit_code, 0) << same.err;
+}
+
+TEST_F(MosaicCommand, ARealRasterInPiecesHasNoSeam) {
+  const std::string path = real_data() / "srtm_bigtujunga30m_utm11.tif";
+  if (!std::filesystem::exists(path)) GTEST_SKIP() << kNoRealFiles;
+  const auto source = open_raster(path, {});
+  const SourceInfo& info = source->info();
+  CutRaster raster;
+  raster.spec = placed_spec(info.width, info.height, info.sample_type, info.georeference.registration);
+  raster.spec.georeference = info.georeference;
+  raster.spec.vertical_unit = info.vertical_unit;
+  if (!info.void_values.empty()) raster.spec.void_value = info.void_values.front();
+  raster.samples.resize(static_cast<std::size_t>(info.width * info.height) * size_bytes(info.sample_type));
+  source->read_window({0, 0, info.width, info.height}, raster.samples);
+  raster.cut(folder / "whole.tif", {0, 0, info.width, info.height});
+  const std::string pieces = subfolder("pieces");
+  write_pieces(raster, pieces, ragged_cut(info.width, info.height, 9, 25));
+  const Words options = {"--filter", "bspline3", "--shadow-seeds", "--lossless", "--source-name", "real"};
+  EXPECT_TRUE(convert({folder / "whole.tif"}, options) == convert({pieces}, options));
+}
+
+TEST_F(MosaicCommand, RealDegreeTilesJoin) {
+  const std::string data = real_data().string() + "/";
+  if (!std::filesystem::exists(data + "N44E006.hgt")) GTEST_SKIP() << kNoRealFiles;
+  convert({data + "N44E007.hgt", data + "N44E006.hgt"}, {"--lossless"});
+  const auto west = open_raster(data + "N44E006.hgt", {});
+  const auto east = open_raster(data + "N44E007.hgt", {});
+  const std::int64_t side = west->info().width;
+  EXPECT_EQ(metadata().at("source").at("width"), 2 * side - 1);
+  EXPECT_EQ(metadata().at("source").at("crs").at("origin_x"), 6.0);
+  ASSERT_EQ(run_isohf({"restore", folder / "out.isohf", folder / "back.tif", "-q"}).exit_code, 0);
+  const auto back = open_raster(folder / "back.tif", {});
+  const auto rows = static_cast<std::size_t>(side * side * 2);
+  std::vector<std::byte> expected(rows);
+  std::vector<std::byte> found(rows);
+  east->read_window({1, 0, side - 1, side}, std::span(expected).first(static_cast<std::size_t>((side - 1) * side * 2)));
+  back->read_window({side, 0, side - 1, side}, std::span(found).first(static_cast<std::size_t>((side - 1) * side * 2)));
+  EXPECT_TRUE(found == expected);
+  // The shared column is that of the last input, N44E006.
+  west->read_window({0, 0, side, side}, expected);
+  back->read_window({0, 0, side, side}, found);
+  EXPECT_TRUE(found == expected);
+}
+
+}  // namespace
+}  // namespace isohf::test

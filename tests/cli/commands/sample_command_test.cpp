@@ -1,0 +1,289 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <random>
+#include <sstream>
+
+#include "support/rasters/plain_tiff.h"
+#include "support/run_program.h"
+#include "support/temporary_folder.h"
+
+namespace isohf::test {
+namespace {
+
+using nlohmann::json;
+
+constexpr double kSlopeX = 0.25;  // rise per metre
+constexpr double kSlopeZ = -0.125;
+constexpr double kSpacing = 10.0;  // metres
+
+/// A plane over 200 x 150 samples on posts; its North-West quarter of 40 x 40 samples is void.
+class SampleCommand : public testing::Test {
+ protected:
+  SampleCommand() {
+    write_float_tiff(folder / "plane.tif", 200, 150, [](std::int64_t c, std::int64_t r) {
+      if (c < 40 && r < 40) return std::numeric_limits<float>::quiet_NaN();
+      return static_cast<float>(1000.0 + kSlopeX * kSpacing * static_cast<double>(c) +
+                                kSlopeZ * kSpacing * static_cast<double>(r));
+    });
+    const RunResult result =
+        run_isohf({"convert", folder / "plane.tif", folder / "plane.isohf", "--sample-spacing", "10", "--registration",
+                   "point", "--type", "f32", "--shape", "28x35", "--levels", "2"});
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+  }
+
+  TemporaryFolder folder;
+};
+
+/// The plane's edge in the East shadows all of it from a sun there that stands lower than it rises.
+TEST_F(SampleCommand, ShadowsReachAsHighAsTheEdgeTowardsTheSunLetsThem) {
+  const std::string archive = folder / "plane.isohf";
+  const double surface = 1000.0 + kSlopeX * 1000.0 + kSlopeZ * 1000.0;
+  const double edge = surface + kSlopeX * 990.0 - 990.0 * std::tan(8.0 * 0.017453292519943295);
+  const std::vector<std::string> sun = {"sample",   archive,     "--at", "1000",       "1000",
+                                        "--shadow", "--azimuth", "E",    "--altitude", "8"};
+  const auto with = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> arguments = sun;
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return run_isohf(arguments);
+  };
+  double numbers[8] = {};
+  std::istringstream text(with({"--shadow-softness", "4"}).out);
+  for (double& number : numbers) text >> number;
+  EXPECT_NEAR(numbers[0], surface, 1e-3);
+  EXPECT_NEAR(numbers[6], edge, kSlopeX * 3.0 * kSpacing);  // the surface is level from a lattice step before the edge
+  EXPECT_EQ(numbers[7], 0.0);
+  const double above = numbers[6] - numbers[0];
+  for (const auto& [height, share] :
+       {std::pair{above - 1.0, 0.25}, {above, 0.5}, {above + 1.0, 0.75}, {above + 3.0, 1.0}}) {
+    const json line = json::parse(with({"--shadow-softness", "4", "--json", "--above", std::to_string(height)}).out);
+    EXPECT_NEAR(line.at("shadow").at("sun_share").get<double>(), share, 1e-5);
+    EXPECT_NEAR(line.at("shadow").at("elevation").get<double>(), numbers[6], 1e-5);
+  }
+  // Without a softness as much is seen as of the sun's disc stands above the edge.
+  constexpr double kDegree = 0.017453292519943295;
+  for (const double higher_deg : {-0.4, -0.2, 0.0, 0.1, 0.4}) {
+    const double height = above + 990.0 * (std::tan(8.0 * kDegree) - std::tan((8.0 + higher_deg) * kDegree));
+    const json line = json::parse(with({"--json", "--above", std::to_string(height)}).out);
+    EXPECT_NEAR(line.at("shadow").at("sun_share").get<double>(),
+                std::clamp(0.5 - higher_deg / (2.0 * 959.63 / 3600.0), 0.0, 1.0), 0.02)
+        << higher_deg;
+  }
+  RunOptions place;
+  const double at[] = {1000.0, 1000.0};
+  place.input.assign(reinterpret_cast<const char*>(at), sizeof(at));
+  const std::string record =
+      run_isohf({"sample", archive, "--binary", "--shadow", "--azimuth", "90", "--sun-elevation", "8"}, place).out;
+  ASSERT_EQ(record.size(), 48U);
+  double shadow = 0.0;
+  std::memcpy(&shadow, record.data() + 32, sizeof(shadow));
+  EXPECT_NEAR(shadow, numbers[6], 1e-5);
+  EXPECT_EQ(run_isohf({"sample", archive, "--at", "50", "50", "--shadow"}).out, "void\n");
+}
+
+TEST_F(SampleCommand, RefusesASunThatCastsNoShadow) {
+  const std::string archive = folder / "plane.isohf";
+  const auto refused = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), {"sample", archive, "--at", "1000", "1000"});
+    const RunResult result = run_isohf(more);
+    EXPECT_EQ(result.exit_code, 2);
+    return result.err;
+  };
+  using testing::HasSubstr;
+  EXPECT_THAT(refused({"--above", "3"}), HasSubstr("--above is for --shadow, which is not given"));
+  EXPECT_THAT(refused({"--shadow", "--above", "-3"}), HasSubstr("must be 0 or more"));
+  EXPECT_THAT(refused({"--shadow", "--altitude", "90"}), HasSubstr("the sun must stand above 0 and below 90 degrees"));
+  EXPECT_THAT(refused({"--shadow", "--azimuth", "NW"}), HasSubstr("must be degrees from 0 to 360, or N, E, S, W"));
+}
+
+TEST_F(SampleCommand, PlaneComesBackEverywhere) {
+  // Beyond the input the edge value goes on: the plane ends a lattice step before its border, its normals two.
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> x_of(450.0, 1960.0);
+  std::uniform_real_distribution<double> z_of(30.0, 1460.0);
+  RunOptions input;
+  std::vector<std::pair<double, double>> places;
+  for (int i = 0; i < 2000; ++i) {
+    places.emplace_back(x_of(random), z_of(random));
+    std::ostringstream line;
+    line.precision(17);
+    line << places.back().first << (i % 2 == 0 ? " " : ",") << places.back().second << "\n";
+    input.input += line.str();
+  }
+  const RunResult result = run_isohf({"sample", folder / "plane.isohf", "--memory", "100K"}, input);
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(result.err, "");
+  std::istringstream lines(result.out);
+  const double length = std::sqrt(kSlopeX * kSlopeX + 1.0 + kSlopeZ * kSlopeZ);
+  for (const auto& [x, z] : places) {
+    double elevation = 0.0;
+    double nx = 0.0;
+    double ny = 0.0;
+    double nz = 0.0;
+    int column = -1;
+    int row = -1;
+    ASSERT_TRUE(lines >> elevation >> nx >> ny >> nz >> column >> row);
+    // Single precision at 1500 m is 1.2e-4 m apart; weights and sums add a few of its roundings.
+    EXPECT_NEAR(elevation, 1000.0 + kSlopeX * x + kSlopeZ * z, 5e-4);
+    // Slopes are differences of two such heights 10 m apart.
+    EXPECT_NEAR(nx, -kSlopeX / length, 1e-4);
+    EXPECT_NEAR(ny, 1.0 / length, 1e-4);
+    EXPECT_NEAR(nz, -kSlopeZ / length, 1e-4);
+    EXPECT_GE(column, 0);
+    EXPECT_GE(row, 0);
+  }
+}
+
+TEST_F(SampleCommand, VoidOutsideCommentsAndBlankLines) {
+  RunOptions input;
+  input.input = "# places\n\n100 100\r\n\t 1000 ,  1000 \n-1 5\n5 1e9\n1000 1000";
+  const RunResult result = run_isohf({"sample", folder / "plane.isohf"}, input);
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  std::istringstream stream(result.out);
+  std::vector<std::string> lines;
+  for (std::string line; std::getline(stream, line);) lines.push_back(line);
+  ASSERT_EQ(lines.size(), 5U);
+  EXPECT_EQ(lines[0], "void");
+  EXPECT_NEAR(std::stod(lines[1]), 1125.0, 5e-4);  // as above
+  EXPECT_EQ(lines[2], "outside");
+  EXPECT_EQ(lines[3], "outside");
+  EXPECT_EQ(lines[4], lines[1]);
+}
+
+TEST_F(SampleCommand, PlacesMayStandOnTheCommandLine) {
+  const RunResult result =
+      run_isohf({"sample", "--at", "1000", "1000", "--at", "-5", "-7", folder / "plane.isohf", "--json"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  std::istringstream stream(result.out);
+  std::string line;
+  std::getline(stream, line);
+  const json first = json::parse(line);
+  EXPECT_EQ(first.at("state"), "surface");
+  EXPECT_NEAR(first.at("elevation").get<double>(), 1125.0, 5e-4);  // as above
+  EXPECT_EQ(first.at("normal").size(), 3U);
+  std::getline(stream, line);
+  EXPECT_EQ(json::parse(line).at("state"), "outside");
+  EXPECT_EQ(json::parse(line).at("x"), -5.0);
+}
+
+TEST_F(SampleCommand, BadLineIsNamedAfterTheAnswersBeforeIt) {
+  for (const char* bad : {"1000", "1000 abc", "1000 1000 1000", "nan 5", "1000,,1000", "1000 1000x"}) {
+    RunOptions input;
+    input.input = std::string("1000 1000\n# comment\n") + bad + "\n1000 1000\n";
+    const RunResult result = run_isohf({"sample", folder / "plane.isohf"}, input);
+    EXPECT_EQ(result.exit_code, 1);
+    EXPECT_EQ(result.err,
+              std::string("isohf: standard input, line 3: found '") + bad + "', must be 'x z', two numbers\n");
+    EXPECT_EQ(std::count(result.out.begin(), result.out.end(), '\n'), 1);
+  }
+}
+
+TEST_F(SampleCommand, PlacesTakeACommaAsWellAsABlank) {
+  const RunResult apart = run_isohf({"sample", folder / "plane.isohf", "--at", "1000", "900", "--at", "-5", "7"});
+  ASSERT_EQ(apart.exit_code, 0) << apart.err;
+  for (const std::vector<std::string>& places :
+       std::vector<std::vector<std::string>>{{"--at", "1000,900", "--at", "-5,7"},
+                                             {"--at=1000,900", "--at", "-5,", "7"},
+                                             {"--at", "1000", "900", "--at=-5,7"}}) {
+    std::vector<std::string> arguments = {"sample"};
+    arguments.insert(arguments.end(), places.begin(), places.end());
+    arguments.push_back(folder / "plane.isohf");
+    const RunResult result = run_isohf(arguments);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_EQ(result.out, apart.out);
+  }
+  EXPECT_EQ(run_isohf({"sample", folder / "plane.isohf", "--at", "1,2,3"}).exit_code, 2);
+}
+
+TEST_F(SampleCommand, BinaryRecordsHoldWhatTheLinesSay) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> x_of(-100.0, 2300.0);
+  std::uniform_real_distribution<double> z_of(-100.0, 1700.0);
+  RunOptions lines;
+  RunOptions records;
+  for (int i = 0; i < 5000; ++i) {
+    const double place[2] = {x_of(random), z_of(random)};
+    records.input.append(reinterpret_cast<const char*>(place), sizeof place);
+    std::ostringstream line;
+    line.precision(17);
+    line << place[0] << " " << place[1] << "\n";
+    lines.input += line.str();
+  }
+  const RunResult text = run_isohf({"sample", folder / "plane.isohf"}, lines);
+  const RunResult binary = run_isohf({"sample", folder / "plane.isohf", "--binary", "-j", "3"}, records);
+  ASSERT_EQ(binary.exit_code, 0) << binary.err;
+  ASSERT_EQ(binary.out.size(), 5000U * 32U);
+  std::istringstream stream(text.out);
+  const char* record = binary.out.data();
+  for (std::string line; std::getline(stream, line); record += 32) {
+    double elevation = 0.0;
+    float normal[3] = {};
+    std::uint32_t state = 9;
+    std::int32_t tile[2] = {};
+    std::memcpy(&elevation, record, 8);
+    std::memcpy(normal, record + 8, 12);
+    std::memcpy(&state, record + 20, 4);
+    std::memcpy(tile, record + 24, 8);
+    if (state == 0) {
+      std::istringstream words(line);
+      double wanted[4] = {};
+      int wanted_tile[2] = {};
+      ASSERT_TRUE(words >> wanted[0] >> wanted[1] >> wanted[2] >> wanted[3] >> wanted_tile[0] >> wanted_tile[1])
+          << line;
+      EXPECT_NEAR(elevation, wanted[0], 1e-5);
+      for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(double{normal[i]}, wanted[i + 1], 1e-6);
+      EXPECT_EQ(tile[0], wanted_tile[0]);
+      EXPECT_EQ(tile[1], wanted_tile[1]);
+      continue;
+    }
+    EXPECT_EQ(line, state == 1 ? "void" : "outside");
+    EXPECT_TRUE(std::isnan(elevation));
+    EXPECT_EQ(normal[1], 0.0F);
+    EXPECT_EQ(tile[0] < 0, state == 2);
+  }
+}
+
+TEST_F(SampleCommand, ABadRecordIsNamedAfterTheAnswersBeforeIt) {
+  const double places[4] = {1000.0, 1000.0, std::numeric_limits<double>::quiet_NaN(), 0.0};
+  RunOptions input;
+  input.input.assign(reinterpret_cast<const char*>(places), sizeof places);
+  const RunResult not_a_number = run_isohf({"sample", folder / "plane.isohf", "--binary"}, input);
+  EXPECT_EQ(not_a_number.exit_code, 1);
+  EXPECT_EQ(not_a_number.err, "isohf: standard input, record 2: found nan 0, must be two finite numbers\n");
+  EXPECT_EQ(not_a_number.out.size(), 32U);
+  input.input.resize(20);
+  const RunResult cut = run_isohf({"sample", folder / "plane.isohf", "--binary"}, input);
+  EXPECT_EQ(cut.exit_code, 1);
+  EXPECT_EQ(cut.err, "isohf: standard input, record 2: ends after 4 bytes, must have 16\n");
+  EXPECT_EQ(cut.out.size(), 32U);
+}
+
+TEST_F(SampleCommand, ALineIsAnsweredBeforeTheNextIsSent) {
+  // A shell that sends the second line only once it has read the first answer: would wait for ever if that came late.
+  const std::string script = "coproc isohf sample " + (folder / "plane.isohf") +
+                             "; echo '1000 1000' >&${COPROC[1]}; read -t 20 -u ${COPROC[0]} first || exit 9; "
+                             "echo '1000,900' >&${COPROC[1]}; read -t 20 -u ${COPROC[0]} second || exit 9; "
+                             "echo \"$first\"; echo \"$second\"";
+  const std::string path = isohf_path();
+  const RunResult result =
+      run_program({"/bin/bash", "-c", "PATH=" + path.substr(0, path.rfind('/')) + ":$PATH; " + script});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(result.out, run_isohf({"sample", folder / "plane.isohf", "--at", "1000,1000", "--at", "1000,900"}).out);
+}
+
+TEST_F(SampleCommand, AnswersComeBeforeMoreIsAskedFor) {
+  // A closed output is noticed although more input would follow.
+  RunOptions closed;
+  closed.close_output = true;
+  for (int i = 0; i < 1000; ++i) closed.input += "1000 1000\n";
+  const RunResult result = run_isohf({"sample", folder / "plane.isohf"}, closed);
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_EQ(result.err, "");
+}
+
+}  // namespace
+}  // namespace isohf::test

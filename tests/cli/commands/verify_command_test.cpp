@@ -1,0 +1,176 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <regex>
+
+#include "support/rasters/plain_tiff.h"
+#include "support/run_program.h"
+#include "support/temporary_folder.h"
+
+namespace isohf::test {
+namespace {
+
+using nlohmann::json;
+using testing::HasSubstr;
+
+class VerifyCommand : public testing::Test {
+ protected:
+  VerifyCommand() {
+    write_int16_tiff(folder / "a.tif", 150, 120, height);
+    const RunResult result =
+        run_isohf({"convert", folder / "a.tif", folder / "a.isohf", "--shape", "28x35", "--levels", "2"});
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+  }
+
+  static std::int16_t height(std::int64_t c, std::int64_t r) {
+    return static_cast<std::int16_t>(
+        std::lround(700 + 300 * std::sin(0.05 * static_cast<double>(c)) * std::cos(0.04 * static_cast<double>(r))));
+  }
+
+  TemporaryFolder folder;
+};
+
+TEST_F(VerifyCommand, WholeArchivePasses) {
+  const RunResult result = run_isohf({"verify", folder / "a.isohf"});
+  EXPECT_EQ(result.exit_code, 0) << result.out;
+  EXPECT_EQ(result.err, "");
+  EXPECT_THAT(result.out, HasSubstr("passed"));
+  const json report = json::parse(run_isohf({"verify", folder / "a.isohf", "--json"}).out);
+  EXPECT_TRUE(report.at("passed").get<bool>());
+  EXPECT_GT(report.at("checks").at("tiles_checked").get<int>(), 1);
+  EXPECT_GT(report.at("checks").at("shared_vertices_checked").get<int>(), 1);
+  EXPECT_TRUE(report.at("checks").at("findings").empty());
+}
+
+TEST_F(VerifyCommand, ComparesWithTheSource) {
+  const RunResult text = run_isohf({"verify", folder / "a.isohf", "--against", folder / "a.tif"});
+  EXPECT_EQ(text.exit_code, 0) << text.out << text.err;
+  EXPECT_EQ(text.err, "");
+  EXPECT_THAT(text.out, HasSubstr("rms"));
+  const json report = json::parse(
+      run_isohf({"verify", folder / "a.isohf", "--against", folder / "a.tif", "--random", "500", "--json"}).out);
+  EXPECT_EQ(report.at("against").at("samples"), 150 * 120);
+  EXPECT_LE(report.at("against").at("random_points").get<int>(), 500);  // some fall where there is nothing to compare
+  EXPECT_GT(report.at("against").at("random_points").get<int>(), 400);
+  const double rms = report.at("against").at("rms").get<double>();
+  const double max = report.at("against").at("max").get<double>();
+  EXPECT_GT(rms, 0.0);
+  EXPECT_LT(max, 5.0);  // a smooth surface of 300 units in waves of 126 samples, rounded to whole units
+
+  const std::vector<std::string> base = {"verify", folder / "a.isohf", "--against", folder / "a.tif"};
+  const auto code_with = [&](const std::string& option, double limit) {
+    std::vector<std::string> arguments = base;
+    arguments.push_back(option);
+    arguments.push_back(std::to_string(limit));
+    return run_isohf(arguments).exit_code;
+  };
+  EXPECT_EQ(code_with("--max-error", max * 1.01), 0);
+  EXPECT_EQ(code_with("--max-error", max * 0.99), 3);
+  EXPECT_EQ(code_with("--max-rms", rms * 1.01), 0);
+  EXPECT_EQ(code_with("--max-rms", rms * 0.99), 3);
+}
+
+TEST_F(VerifyCommand, FindsAVertexThatTheSourceDoesNotGive) {
+  // One sample in the middle is raised by 3: four lattice vertices or so are off, the others are not.
+  write_int16_tiff(folder / "b.tif", 150, 120, [](std::int64_t c, std::int64_t r) {
+    return static_cast<std::int16_t>(height(c, r) + (c == 75 && r == 60 ? 3 : 0));
+  });
+  const RunResult result = run_isohf({"verify", folder / "a.isohf", "--against", folder / "b.tif", "--json"});
+  EXPECT_EQ(result.exit_code, 3);
+  const json report = json::parse(result.out);
+  ASSERT_EQ(report.at("checks").at("findings").size(), 1U) << result.out;
+  const json& found = report.at("checks").at("findings")[0];
+  EXPECT_EQ(found.at("id"), "ISOHF-0022");
+  EXPECT_FALSE(found.at("tile").is_null());
+  const json& vertices = report.at("against").at("vertices");
+  EXPECT_GE(vertices.at("wrong").get<int>(), 2);
+  EXPECT_LE(vertices.at("wrong").get<int>(), 24);  // in up to four tiles' padding as well
+  EXPECT_GT(vertices.at("worst").get<double>(), 1.0);
+}
+
+TEST_F(VerifyCommand, ComparesWithAnOrthoMeshOfAsManyVertices) {
+  const std::vector<std::string> base = {"verify", folder / "a.isohf", "--against", folder / "a.tif"};
+  const auto with = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> arguments = base;
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const RunResult result = run_isohf(arguments);
+    EXPECT_EQ(result.exit_code, 0) << result.out;
+    EXPECT_EQ(result.err, "");
+    return result.out;
+  };
+  const json against = json::parse(with({"--ortho", "--json"})).at("against");
+  EXPECT_EQ(against.at("iso").at("triangles"), against.at("ortho").at("triangles"));
+  for (const char* key : {"vertices", "triangles", "tile_bytes", "plain_bytes"}) {
+    EXPECT_GT(against.at("iso").at(key).get<int>(), 0) << key;
+  }
+  for (const char* mesh : {"ortho", "ortho_at_equal_rms"}) {
+    for (const char* key : {"spacing", "vertices", "triangles", "samples_compared", "rms", "rms_other_diagonal", "max",
+                            "p99", "psnr_db", "plain_bytes"}) {
+      EXPECT_GT(against.at(mesh).at(key).get<double>(), 0.0) << mesh << " " << key;
+    }
+    EXPECT_THAT(against.at(mesh).at("diagonal"), testing::AnyOf("nw-se", "sw-ne"));
+    EXPECT_EQ(against.at(mesh).at("clamped"), 0);
+  }
+  const double rms = against.at("rms").get<double>();
+  EXPECT_NEAR(against.at("ortho_at_equal_rms").at("rms").get<double>(), rms, 0.02 * rms);
+  EXPECT_THAT(with({"--ortho"}), testing::AllOf(HasSubstr("\northo  "), HasSubstr("\nequal rms ")));
+  EXPECT_EQ(run_isohf({"verify", folder / "a.isohf", "--ortho"}).exit_code, 2);  // needs --against
+}
+
+TEST_F(VerifyCommand, LeavesOrthoMeshesOutUnlessAskedForThem) {
+  for (const std::vector<std::string>& more : {std::vector<std::string>{}, {"--no-ortho"}}) {
+    std::vector<std::string> arguments = {"verify", folder / "a.isohf", "--against", folder / "a.tif"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    EXPECT_THAT(run_isohf(arguments).out, testing::Not(HasSubstr("ortho")));
+    arguments.emplace_back("--json");
+    const json against = json::parse(run_isohf(arguments).out).at("against");
+    EXPECT_TRUE(against.contains("rms"));
+    for (const char* key : {"iso", "ortho", "ortho_at_equal_rms"}) EXPECT_FALSE(against.contains(key)) << key;
+  }
+}
+
+TEST_F(VerifyCommand, AnotherSourceIsNoSource) {
+  write_int16_tiff(folder / "b.tif", 151, 120, [](std::int64_t, std::int64_t) { return std::int16_t{1}; });
+  const RunResult result = run_isohf({"verify", folder / "a.isohf", "--against", folder / "b.tif"});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("has 151x120 samples, not 150x120"));
+  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+}
+
+TEST_F(VerifyCommand, DamageIsFoundWithExitCode3) {
+  std::string bytes = read_file(folder / "a.isohf");
+  const json info = json::parse(run_isohf({"info", folder / "a.isohf", "--json", "--tiles"}).out);
+  // The largest tile, well behind its Huffman tables: a flipped length of a symbol that never occurs changes nothing.
+  const json& tiles = info.at("tiles");
+  const json& tile = *std::max_element(tiles.begin(), tiles.end(), [](const json& a, const json& b) {
+    return a.at("compressed_bytes") < b.at("compressed_bytes");
+  });
+  bytes[tile.at("offset_bytes").get<std::size_t>() + tile.at("compressed_bytes").get<std::size_t>() - 20] ^= 0x10;
+  write_file(folder / "bad.isohf", bytes);
+  const RunResult result = run_isohf({"verify", folder / "bad.isohf"});
+  EXPECT_EQ(result.exit_code, 3);
+  EXPECT_EQ(result.err, "");
+  EXPECT_TRUE(std::regex_search(result.out, std::regex("ISOHF-[0-9]{4} error tile \\([0-9]+,[0-9]+\\): ")))
+      << result.out;
+  EXPECT_THAT(result.out, HasSubstr("FAILED"));
+  const json report = json::parse(run_isohf({"verify", folder / "bad.isohf", "--json"}).out);
+  EXPECT_FALSE(report.at("passed").get<bool>());
+  EXPECT_EQ(report.at("checks").at("findings").at(0).at("tile").at("column"), tile.at("column"));
+  const RunResult against = run_isohf({"verify", folder / "bad.isohf", "--against", folder / "a.tif"});
+  EXPECT_EQ(against.exit_code, 3);
+  EXPECT_THAT(against.out, HasSubstr("not compared"));
+}
+
+TEST_F(VerifyCommand, ChecksAreListed) {
+  const RunResult result = run_isohf({"verify", "--list-checks"});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_THAT(result.out, HasSubstr("ISOHF-0001 "));
+  const json checks = json::parse(run_isohf({"verify", "--list-checks", "--json"}).out).at("checks");
+  EXPECT_GT(checks.size(), 10U);
+}
+
+}  // namespace
+}  // namespace isohf::test

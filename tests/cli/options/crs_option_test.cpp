@@ -1,0 +1,170 @@
+/// --crs says what an input's coordinates are in.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "cli/options/small_grid.h"
+#include "support/run_program.h"
+#include "support/temporary_folder.h"
+
+namespace isohf::test {
+namespace {
+
+using nlohmann::json;
+using testing::HasSubstr;
+using Words = std::vector<std::string>;
+
+class CrsOption : public testing::Test {
+ protected:
+  CrsOption() { write_text(grid_, small_grid()); }
+
+  [[nodiscard]] RunResult convert(const std::string& system, const Words& more = {}) const {
+    Words words = {"convert", grid_, archive_, "--crs", system, "--quiet", "--overwrite"};
+    words.insert(words.end(), more.begin(), more.end());
+    return run_isohf(words);
+  }
+  [[nodiscard]] json crs() const {
+    return json::parse(run_isohf({"info", archive_, "--json"}).out).at("metadata").at("source").at("crs");
+  }
+
+  TemporaryFolder folder_;
+  std::string grid_ = folder_ / "grid.asc";
+  std::string archive_ = folder_ / "a.isohf";
+};
+
+TEST_F(CrsOption, TakesACodeWktAProjStringAndAFile) {
+  const std::string mine = "+proj=laea +lat_0=47 +lon_0=11 +ellps=GRS80 +units=us-ft";
+  write_text(folder_ / "mine.txt", mine + "\n");
+  ASSERT_EQ(convert("EPSG:2263").err, "");
+  EXPECT_EQ(crs().at("epsg"), 2263);
+  EXPECT_NEAR(crs().at("metres_per_unit").get<double>(), 1200.0 / 3937.0, 1e-15);
+  ASSERT_EQ(convert(mine).exit_code, 0);
+  const json by_string = crs();
+  EXPECT_EQ(by_string.at("epsg"), nullptr);
+  EXPECT_THAT(by_string.at("wkt").get<std::string>(), HasSubstr("Lambert Azimuthal Equal Area"));
+  EXPECT_NEAR(by_string.at("metres_per_unit").get<double>(), 1200.0 / 3937.0, 1e-15);
+  ASSERT_EQ(convert(folder_ / "mine.txt").exit_code, 0);
+  EXPECT_EQ(crs(), by_string);
+  ASSERT_EQ(convert(by_string.at("wkt")).exit_code, 0);
+  EXPECT_EQ(crs().at("wkt"), by_string.at("wkt"));
+}
+
+TEST_F(CrsOption, WinsOverTheFileAndMovesNoSample) {
+  write_text(folder_ / "grid.prj", "Projection UTM\nZone 11\nDatum WGS84\nUnits METERS\n");
+  ASSERT_EQ(run_isohf({"convert", grid_, archive_, "--quiet"}).err, "");
+  const json as_filed = crs();
+  ASSERT_EQ(convert("EPSG:32612").err, "");
+  EXPECT_EQ(crs().at("epsg"), 32612);
+  EXPECT_EQ(crs().at("origin_x"), as_filed.at("origin_x"));
+  EXPECT_EQ(crs().at("spacing_x"), as_filed.at("spacing_x"));
+  // The archive records it, as all that was said of the input.
+  const RunResult verified = run_isohf({"verify", archive_, "--against", grid_, "--json", "--quiet"});
+  EXPECT_EQ(verified.exit_code, 0) << verified.out << verified.err;
+}
+
+TEST_F(CrsOption, PlacesRastersWithoutASystem) {
+  ASSERT_EQ(convert("EPSG:32611").err, "");
+  const RunResult answer = run_isohf({"sample", archive_, "--at-crs", "600", "600", "--with-lonlat"});
+  EXPECT_EQ(answer.exit_code, 0) << answer.err;
+  EXPECT_THAT(answer.out, HasSubstr(" -121.48")) << "half a million metres West of the zone's meridian, 117 W";
+  ASSERT_EQ(run_isohf({"restore", archive_, folder_ / "back.flt", "--quiet"}).err, "");
+  EXPECT_THAT(read_text(folder_ / "back.prj"), HasSubstr("WGS_1984_UTM_Zone_11N"));
+  ASSERT_EQ(run_isohf({"restore", archive_, folder_ / "back.exr", "--quiet"}).err, "");
+  EXPECT_THAT(read_text(folder_ / "back.erw"), HasSubstr("30\n0\n0\n-30\n15\n1185\n"));
+  EXPECT_THAT(read_text(folder_ / "back.exr.aux.xml"), HasSubstr("32611"));
+  ASSERT_EQ(run_isohf({"convert", folder_ / "back.exr", folder_ / "b.isohf", "--quiet"}).err, "");
+  const json back =
+      json::parse(run_isohf({"info", folder_ / "b.isohf", "--json"}).out).at("metadata").at("source").at("crs");
+  EXPECT_EQ(back.at("origin_x"), 15.0);
+  EXPECT_EQ(back.at("epsg"), 32611);
+}
+
+TEST_F(CrsOption, ReplacesNoForeignSidecar) {
+  ASSERT_EQ(convert("EPSG:32611").err, "");
+  write_text(folder_ / "x.exr.aux.xml", "<svg/>");
+  const RunResult refused = run_isohf({"restore", archive_, folder_ / "x.exr", "--quiet", "--overwrite"});
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.err, HasSubstr("x.exr.aux.xml"));
+  EXPECT_EQ(read_text(folder_ / "x.exr.aux.xml"), "<svg/>");
+}
+
+TEST_F(CrsOption, RefusesInOneLineWhatIsNoSystemOrHasNoPlace) {
+  write_text(folder_ / "zero.prj", std::string(3, '\0'));
+  const auto expect = [&](const RunResult& result, const char* why) {
+    EXPECT_NE(result.exit_code, 0);
+    EXPECT_THAT(result.err, HasSubstr(why));
+    EXPECT_EQ(result.err.find('\n'), result.err.size() - 1) << result.err;
+  };
+  expect(convert("nonsense"), "grid.asc: the reference system nonsense: PROJ does not understand it");
+  expect(convert("EPSG:5773"), "no projected or geographic");
+  expect(convert("EPSG:4807"), "Greenwich");
+  expect(convert(""), "--crs");
+  expect(convert(folder_ / "zero.prj"), "must hold WKT or a PROJ string");
+  expect(convert("EPSG:32611", {"--sample-spacing", "3"}), "--sample-spacing");
+  const std::string picture = std::string(ISOHF_SOURCE_DIR) + "/testdata/peaks_256x256_uint16.png";
+  expect(run_isohf({"convert", picture, folder_ / "b.isohf", "--crs", "EPSG:32611"}),
+         "no coordinates that --crs could be about");
+}
+
+TEST_F(CrsOption, RowsThatPassThePoleMakeAWholeArchive) {
+  // Posts at the poles and the 180th meridian on plate carree: half of an area lies beyond.
+  std::string text = "ncols 36\nnrows 19\nxllcorner -20037508\nyllcorner -10575351\ncellsize 1113194.9\n";
+  for (int i = 0; i < 36 * 19; ++i) text += std::to_string(i % 36 * 10 + i / 36) + (i % 36 == 35 ? "\n" : " ");
+  write_text(grid_, text);
+  ASSERT_EQ(convert("EPSG:4087").err, "");
+  EXPECT_EQ(run_isohf({"verify", archive_, "--quiet"}).exit_code, 0);
+  const json ground = json::parse(run_isohf({"info", archive_, "--json"}).out).at("metadata").at("source").at("ground");
+  EXPECT_EQ(ground.at("bounds").at("north"), 90.0);
+  EXPECT_EQ(ground.at("bounds").at("south"), -90.0);
+}
+
+TEST_F(CrsOption, GroundBesideAPoleThatIsALineKeepsItsLongitudes) {
+  std::string text = "ncols 4\nnrows 4\nxllcorner 0\nyllcorner 9900000\ncellsize 50000\n";
+  for (int i = 0; i < 16; ++i) text += std::to_string(i * i) + (i % 4 == 3 ? "\n" : " ");
+  write_text(grid_, text);
+  ASSERT_EQ(convert("EPSG:4087").err, "");
+  const json bounds =
+      json::parse(run_isohf({"info", archive_, "--json"}).out).at("metadata").at("source").at("ground").at("bounds");
+  EXPECT_EQ(bounds.at("north"), 90.0);
+  EXPECT_NEAR(bounds.at("west").get<double>(), 0.0, 1e-6);
+  EXPECT_NEAR(bounds.at("east").get<double>(), 200000.0 / 111319.49, 1e-4);
+}
+
+TEST_F(CrsOption, RestoreToTheArchivesOwnSystemAddsNoBorder) {
+  ASSERT_EQ(convert("EPSG:32611").err, "");
+  ASSERT_EQ(run_isohf({"restore", archive_, folder_ / "plain.asc", "--quiet"}).err, "");
+  ASSERT_EQ(run_isohf({"restore", archive_, folder_ / "own.asc", "--crs", "EPSG:32611", "--quiet"}).err, "");
+  EXPECT_EQ(read_text(folder_ / "own.asc"), read_text(folder_ / "plain.asc"));
+}
+
+TEST_F(CrsOption, MapsThatDifferInOneParameterNeverJoin) {
+  const auto prj = [](const char* latitude) {
+    return std::string("Projection TRANSVERSE\nDatum WGS84\nUnits METERS\nParameters\n0.9996\n9 0 0\n") + latitude +
+           "\n500000\n0\n";
+  };
+  write_text(folder_ / "west.asc", small_grid());
+  std::string east = small_grid(1);
+  east.replace(east.find("xllcorner 0"), 11, "xllcorner 1200");
+  write_text(folder_ / "east.asc", east);
+  write_text(folder_ / "west.prj", prj("0 0 0"));
+  write_text(folder_ / "east.prj", prj("0 0 1"));
+  const Words join = {"convert", folder_ / "west.asc", folder_ / "east.asc", "-o", archive_, "--quiet", "--overwrite"};
+  const RunResult apart = run_isohf(join);
+  EXPECT_NE(apart.exit_code, 0);
+  EXPECT_THAT(apart.err, HasSubstr("reference system"));
+  ASSERT_EQ(run_isohf({"convert", folder_ / "west.asc", archive_, "--quiet"}).exit_code, 0);
+  const RunResult like =
+      run_isohf({"restore", archive_, folder_ / "like.tif", "--like", folder_ / "east.asc", "--quiet"});
+  EXPECT_NE(like.exit_code, 0);
+  EXPECT_THAT(like.err, HasSubstr("bring it to that"));
+  // The same map in other words joins.
+  write_text(folder_ / "east.prj", "Projection UTM\nZone 32\nDatum WGS84\nUnits METERS\n");
+  EXPECT_EQ(run_isohf(join).err, "");
+}
+
+}  // namespace
+}  // namespace isohf::test

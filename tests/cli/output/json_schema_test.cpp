@@ -1,0 +1,238 @@
+/// Every document that --json and --progress json print is what docs/schema says, member by member. Where this fails
+/// for a member that you have added: add it to the schema that the failure names, and to docs/cli.md.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <map>
+#include <set>
+#include <sstream>
+
+#include "cli/options/small_grid.h"
+#include "support/run_program.h"
+#include "support/temporary_folder.h"
+
+namespace isohf::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+const std::string kData = ISOHF_SOURCE_DIR "/testdata/";
+const std::string kSchemas = ISOHF_SOURCE_DIR "/docs/schema/";
+
+/// small_grid() with its South-West corner and its spacing elsewhere.
+std::string grid_at(double x, double y, double spacing) {
+  const std::string rows = small_grid();
+  return "ncols 40\nnrows 40\nxllcorner " + std::to_string(x) + "\nyllcorner " + std::to_string(y) + "\ncellsize " +
+         std::to_string(spacing) + rows.substr(rows.find('\n', rows.find("cellsize")));
+}
+
+/// Collects documents as files SCHEMA.NUMBER.json for the validator.
+class Documents {
+ public:
+  explicit Documents(std::string folder) : folder_(std::move(folder)) { fs::create_directories(folder_); }
+
+  /// Runs and keeps standard output, a document or one a line, and the JSON lines on standard error.
+  void run(int exit_code, const std::string& schema, std::vector<std::string> arguments, const RunOptions& how = {}) {
+    SCOPED_TRACE(testing::PrintToString(arguments));
+    const bool each_line = schema.ends_with("-line");
+    arguments.emplace_back("--json");
+    const RunResult result = run_isohf(arguments, how);
+    EXPECT_EQ(result.exit_code, exit_code) << result.err;
+    if (!each_line) keep(schema, result.out);
+    keep_lines(schema, each_line ? result.out : "");
+    if (testing::PrintToString(arguments).find("--progress") != std::string::npos) {
+      keep_lines("stderr-line", result.err);
+    }
+    commands_.insert(arguments.front());
+    (exit_code == 0 ? succeeded_ : failed_).insert(arguments.front());
+  }
+
+  /// Of what a file holds.
+  void keep_file(const std::string& schema, const std::string& file) { keep(schema, test::read_file(file)); }
+
+  [[nodiscard]] const std::set<std::string>& succeeded() const { return succeeded_; }
+  [[nodiscard]] const std::set<std::string>& failed() const { return failed_; }
+
+ private:
+  void keep(const std::string& schema, const std::string& document) {
+    write_text(folder_ + "/" + schema + "." + std::to_string(next_++) + ".json", document);
+  }
+  void keep_lines(const std::string& schema, const std::string& lines) {
+    std::istringstream text(lines);
+    for (std::string line; std::getline(text, line);) keep(schema, line);
+  }
+
+  std::string folder_;
+  int next_ = 0;
+  std::set<std::string> commands_;
+  std::set<std::string> succeeded_;
+  std::set<std::string> failed_;
+};
+
+TEST(JsonSchema, HoldsForEveryCommandsSuccessAndFailure) {
+  if (std::system("python3 -c 'import jsonschema' >/dev/null 2>&1") != 0) {
+    GTEST_SKIP() << "python3-jsonschema is not installed";
+  }
+  const TemporaryFolder folder;
+  const char* const kept = std::getenv("ISOHF_KEEP_DOCUMENTS");  // a folder, to see them
+  const std::string collected = kept != nullptr ? kept : folder / "documents";
+  Documents documents(collected);
+  const std::string coast = kData + "coast_512x384_int16.tif";
+  const std::string voids = kData + "voids_200x150_int16.tif";
+  const std::string peaks = kData + "peaks_256x256_uint16.png";
+  const std::string a = folder / "a.isohf";
+  const std::string b = folder / "b.isohf";
+  write_text(folder / "odd.asc", small_grid(0, "-9999"));
+  const std::string d = folder / "d.isohf";
+  const std::string degrees = folder / "degrees.asc";
+  write_text(degrees, grid_at(7.0, 46.0, 0.001));
+  const std::string west = folder / "west.asc";
+  const std::string east = folder / "east.asc";
+  write_text(west, grid_at(0.0, 0.0, 30.0));
+  write_text(east, grid_at(1200.0, 0.0, 30.0));
+  write_text(folder / "bad.asc", "ncols 2\nnrows 2\ncellsize 1\n1 2 three 4\n");
+  write_text(folder / "bad.isohf", "no archive");
+
+  documents.run(0, "convert", {"convert", coast, a, "--shadow-seeds", "--lossless", "--report", "--progress", "json"});
+  documents.run(0, "convert", {"convert", voids, b, "--fill", "--z-range", "0:1000", "--clamp-range"});
+  documents.run(0, "convert", {"convert", peaks, folder / "c.isohf", "--type", "f32"});
+  documents.run(0, "convert", {"convert", coast, a, "--shadow-seeds", "--lossless", "--resume"});
+  documents.run(0, "convert", {"convert", degrees, d, "--max-error", "20"});
+  documents.run(0, "convert", {"convert", west, east, folder / "joined.isohf", "--texture", peaks});
+  documents.run(0, "plan", {"convert", coast, folder / "none.isohf", "--dry-run", "--memory", "200M"});
+  documents.run(1, "error", {"convert", folder / "none.tif", folder / "none.isohf"});
+  documents.run(2, "error", {"convert", coast, a, "--progress", "json"});
+  documents.run(1, "error", {"convert", folder / "odd.asc", folder / "none.isohf", "--strict", "--progress", "json"});
+  documents.run(1, "convert-each-line",
+                {"convert", "--each", coast, folder / "bad.asc", voids, "--out-dir", folder / "each", "--keep-going",
+                 "--progress", "json"});
+  documents.run(0, "convert-each-line",
+                {"convert", "--each", coast, voids, "--out-dir", folder / "each", "--skip-existing", "-v"});
+  documents.run(0, "convert-each-line", {"convert", "--each", coast, "--out-dir", folder / "each", "--resume"});
+
+  documents.run(0, "plan", {"plan"});
+  documents.run(0, "plan", {"plan", "--table1"});
+  documents.run(0, "plan", {"plan", "--shape", "212x243"});
+  documents.run(0, "plan", {"plan", coast});
+  documents.run(0, "plan", {"plan", folder / "odd.asc"});
+  documents.run(0, "plan", {"plan", degrees});
+  documents.run(2, "error", {"plan", "--shape", "5"});
+
+  documents.run(0, "info", {"info", a, "--tiles"});
+  documents.run(0, "info", {"info", b});
+  documents.run(0, "info", {"info", coast, "--stats", "--progress", "json"});
+  documents.run(0, "info", {"info", peaks});
+  documents.run(0, "info", {"info", folder / "odd.asc", "--stats"});
+  documents.run(0, "info", {"info", d});
+  documents.run(0, "info", {"info", folder / "joined.isohf"});
+  documents.run(0, "info", {"info", degrees});
+  documents.run(0, "info-line", {"info", a, peaks, degrees});
+  documents.run(1, "info-line", {"info", a, folder / "bad.isohf", folder / "none.tif"});
+  for (const char* old : {"codes", "floats", "globe", "lossless", "projected", "textured"}) {
+    documents.run(0, "info", {"info", kData + "archives/v1/" + old + ".isohf"});
+  }
+  documents.run(2, "info-line", {"info", a, b, "--level", "3"});
+  documents.run(1, "error", {"info", folder / "bad.isohf"});
+
+  documents.run(0, "verify", {"verify", a});
+  documents.run(0, "verify", {"verify", a, "--against", coast, "--progress", "json"});
+  documents.run(3, "verify", {"verify", a, "--against", coast, "--max-error", "0.1"});
+  documents.run(3, "verify", {"verify", folder / "bad.isohf"});
+  documents.run(0, "verify-line", {"verify", a, b});
+  documents.run(1, "verify-line", {"verify", a, folder / "bad.isohf", folder / "none.isohf"});
+  documents.run(0, "verify", {"verify", "--list-checks"});
+  documents.run(1, "error", {"verify", folder / "none.isohf"});
+
+  documents.run(0, "restore", {"restore", a, folder / "a.tif"});
+  documents.run(0, "restore", {"restore", b, folder / "b.npy", "--size", "50x50", "--progress", "json"});
+  documents.run(0, "restore", {"restore", d, folder / "d.tif", "--like", degrees});
+  documents.run(2, "error", {"restore", a, folder / "a.tif"});
+  documents.run(0, "export", {"export", a, folder / "t.r16", "--tiles", "2x2", "--progress", "json"});
+  documents.run(0, "export", {"export", a, folder / "t.asc", "--size", "30x20"});
+  documents.run(2, "error", {"export", a, folder / "t.xyz"});
+
+  RunOptions places;
+  places.input = "100 100\n-5 2\n";
+  documents.run(0, "sample-line", {"sample", b}, places);
+  documents.run(0, "sample-line", {"sample", d}, places);
+  places.input = "100 100\nnowhere\n";
+  documents.run(1, "sample-line", {"sample", a}, places);
+  documents.run(0, "shade", {"shade", a, "-o", folder / "s.png", "--progress", "json"});
+  documents.run(2, "error", {"shade", a});
+  documents.run(0, "experiment", {"experiment", "--quick", "--triangles", "1000", "-o", folder / "figures"});
+  documents.run(2, "error", {"experiment", "--triangles", "5"});
+  documents.run(0, "formats", {"formats"});
+  documents.run(0, "program", {"--version"});
+  documents.run(0, "program", {"--help"});
+  test::write_file(folder / "note.txt", std::vector<std::byte>(9));
+  documents.run(0, "attach", {"attach", a, folder / "note.txt"});
+  documents.run(2, "error", {"attach", a, folder / "note.txt"});
+  documents.run(0, "convert", {"convert", coast, folder / "plain.isohf", "--no-planes"});
+  documents.run(0, "planes", {"planes", folder / "plain.isohf", "-o", folder / "planes.isohf"});
+  documents.run(2, "error", {"planes", folder / "plain.isohf", "-o", folder / "planes.isohf"});
+  documents.run(0, "part", {"extract", b, "-o", folder / "one.isohf", "--tiles", "0:1,0:1"});
+  documents.run(2, "error", {"extract", b, "-o", folder / "one.isohf", "--tiles", "0:1,0:1"});
+  documents.run(0, "part", {"merge", b, "-o", folder / "merged.isohf"});
+  documents.run(2, "error", {"merge", a, b, "-o", folder / "two.isohf"});
+  documents.run(0, "diff", {"diff", b, folder / "merged.isohf", "--surface", "--raster", folder / "difference.tif"});
+  documents.run(3, "diff", {"diff", a, b});
+  documents.run(1, "error", {"diff", a, folder / "none.isohf"});
+  const std::string land = folder / "land.plan";
+  documents.run(0, "shards", {"plan", coast, "--write", land, "--shards", "2"});
+  documents.run(0, "shards", {"convert", "--plan", land, "--shard", "1/2", "-o", folder / "p1.isohf"});
+  documents.run(0, "shards", {"convert", "--plan", land, "--shard", "1/2", "-o", folder / "p1.isohf"});
+  documents.run(0, "shards", {"merge", land, folder / "p1.isohf", "--missing"});
+  documents.run(2, "error", {"merge", land, folder / "p1.isohf", "-o", folder / "land.isohf"});
+  const std::string draft = folder / "draft.plan";
+  documents.run(0, "shards", {"plan", coast, "--write", draft, "--shards", "2", "--no-scan"});
+  for (const char* half : {"1/2", "2/2"}) {
+    documents.run(0, "shards", {"scan", "--plan", draft, "--shard", half, "-o", folder / (std::string("s") + half[0])});
+  }
+  documents.run(0, "shards", {"scan", "--plan", draft, folder / "s1", folder / "s2", "-o", folder / "scanned.plan"});
+  const std::string whole = folder / "lossless.plan";
+  documents.run(0, "shards", {"plan", coast, "--write", whole, "--lossless"});
+  for (const std::string& plan : {land, draft, folder / "scanned.plan", whole}) documents.keep_file("plan-file", plan);
+  for (const char* scan : {"s1", "s2"}) documents.keep_file("scan-file", folder / scan);
+  documents.run(2, "error", {"scan", "--plan", draft, folder / "s1", "-o", folder / "half.plan"});
+  documents.run(2, "error", {"formats", "all"});
+  documents.run(2, "error", {"frmats"});
+
+  // No command was left out, neither doing what it is for nor failing.
+  const RunResult help = run_isohf({"--help"});
+  const std::size_t from = help.out.find("Commands:\n") + 10;
+  std::istringstream list(help.out.substr(from, help.out.find("\n\n", from) - from));
+  for (std::string line; std::getline(list, line);) {
+    std::istringstream words(line);
+    std::string command;
+    words >> command;
+    if (!line.starts_with("  ") || line.starts_with("   ") || command == "help" || command == "view") continue;
+    EXPECT_TRUE(documents.succeeded().contains(command)) << command;
+    EXPECT_TRUE(documents.failed().contains(command)) << command;
+  }
+  const RunResult valid = run_program(
+      {"/usr/bin/env", "python3", ISOHF_SOURCE_DIR "/tests/cli/output/validate_documents.py", kSchemas, collected});
+  EXPECT_EQ(valid.exit_code, 0) << valid.out << valid.err;
+}
+
+TEST(JsonSchema, RejectsAMemberThatNoSchemaKnows) {
+  if (std::system("python3 -c 'import jsonschema' >/dev/null 2>&1") != 0) {
+    GTEST_SKIP() << "python3-jsonschema is not installed";
+  }
+  const TemporaryFolder folder;
+  const auto validate = [&](const std::string& error) {
+    write_text(folder / "error.0.json", R"({"error":{"code":"io","message":"m")" + error + "}}");
+    return run_program({"/usr/bin/env", "python3", ISOHF_SOURCE_DIR "/tests/cli/output/validate_documents.py", kSchemas,
+                        folder.path()});
+  };
+  EXPECT_EQ(validate(R"(,"exit_code":1)").exit_code, 0);
+  EXPECT_EQ(validate("").exit_code, 1);
+  const RunResult unknown = validate(R"(,"exit_code":1,"colour":"red")");
+  EXPECT_EQ(unknown.exit_code, 1);
+  EXPECT_THAT(unknown.out, testing::HasSubstr("'colour' was unexpected"));
+}
+
+}  // namespace
+}  // namespace isohf::test

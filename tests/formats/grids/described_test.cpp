@@ -1,0 +1,623 @@
+/// Plain samples that a header or label describes: ENVI, netCDF in its classic formats, PDS4, GDAL's virtual rasters.
+/// What GDAL writes in these formats is tests/cli/gdal/gdal_variants_test.cpp.
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstring>
+
+#include "formats/grids/imagine_bytes.h"
+#include "formats/grids/netcdf_bytes.h"
+#include "formats/planetary/pds4_label.h"
+#include "formats/reader_failure.h"
+#include "formats/registry.h"
+#include "isohf/raster.h"
+#include "support/rasters/samples.h"
+#include "support/temporary_folder.h"
+
+namespace isohf::test {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+template <typename T>
+std::string stored(const std::vector<T>& values, bool big_endian = false) {
+  std::string bytes;
+  for (const T value : values) {
+    std::string each(sizeof(T), '\0');
+    std::memcpy(each.data(), &value, sizeof(T));
+    if (big_endian) std::reverse(each.begin(), each.end());
+    bytes += each;
+  }
+  return bytes;
+}
+
+class Described : public ::testing::Test {
+ protected:
+  void write(const std::string& name, const std::string& bytes) const { write_file(folder_ / name, bytes); }
+  [[nodiscard]] std::unique_ptr<HeightSource> open(const std::string& name, const std::string& channel = {}) const {
+    OpenOptions options;
+    options.channel = channel;
+    return open_raster(folder_ / name, options);
+  }
+  [[nodiscard]] std::string failure(const std::string& name, ErrorCode* code = nullptr) const {
+    return failure_of(folder_.path(), code, [&] { read_corner(*open(name)); });
+  }
+
+  TemporaryFolder folder_;
+};
+
+using Envi = Described;
+
+std::string envi(const std::string& more) {
+  return "ENVI\nsamples = 2\nlines = 2\nbands = 2\ndata type = 2\ninterleave = bip\nbyte order = 0\n" + more;
+}
+
+TEST_F(Envi, FeetOfMapInfoAreUsSurveyFeet) {
+  write("a.dat", stored<std::int16_t>({1, 2, 3, 4, 5, 6, 7, 8}));
+  write("a.hdr", envi("map info = {State Plane (NAD 83), 1, 1, 600000, 400000, 10, 10, 3104, units=Feet}\n"));
+  const Georeference place = open("a.dat")->info().georeference;
+  EXPECT_EQ(place.unit, HorizontalUnit::kMetre);
+  EXPECT_DOUBLE_EQ(place.metres_per_unit, 1200.0 / 3937.0);
+  write("a.hdr", envi("map info = {Geographic Lat/Lon, 1, 1, 6, 40, 10, 10, WGS-84, units=Seconds}\n"));
+  EXPECT_THAT(failure("a.dat"), HasSubstr("its coordinates are in seconds"));
+}
+
+TEST_F(Envi, RowsFromTheSouthAreTurned) {
+  write("a.dat", stored<std::int16_t>({1, 2, 3, 4, 5, 6, 7, 8}));
+  for (const char* way : {"10, -20, 32, North, WGS-84", "10, 20, 32, North, WGS-84, rotation=180"}) {
+    write("a.hdr", envi(std::string("map info = {UTM, 1, 1, 500000, 4000000, ") + way + "}\n"));
+    const auto source = open("a.dat");
+    EXPECT_THAT(values_of(*source), ElementsAre(5, 7, 1, 3)) << way;
+    const Georeference& place = source->info().georeference;
+    EXPECT_EQ(place.spacing_y, 20.0);
+    EXPECT_EQ(place.origin_x, 500005.0);
+    EXPECT_EQ(place.origin_y, 4000030.0) << way;  // 4000000 is the southern edge, as GDAL reads both
+  }
+  write("a.hdr", envi("map info = {UTM, 1, 1, 500000, 4000000, 10, 20, 32, North, WGS-84, rotation=30}\n"));
+  EXPECT_THAT(failure("a.dat"), HasSubstr("the map is rotated"));
+}
+
+TEST_F(Envi, GainsAndOffsetsAreTheBandsOwn) {
+  write("a.dat", stored<std::int16_t>({1, 2, 3, 4, 5, 6, 7, 8}));
+  write("a.hdr", envi("data gain values = {1, 0.5}\ndata offset values = {0, 100}\nband names = {height, slope}\n"));
+  const auto second = open("a.dat", "slope");
+  EXPECT_THAT(values_of(*second), ElementsAre(2, 4, 6, 8));
+  EXPECT_EQ(second->info().z_scale, 0.5);
+  EXPECT_EQ(second->info().z_offset, 100.0);
+  EXPECT_EQ(second->info().channel, "slope");
+  EXPECT_EQ(open("a.dat", "1")->info().z_scale, 0.5);
+  EXPECT_THAT(open("a.dat")->info().warnings.front(), HasSubstr("channel height is read"));
+  EXPECT_THAT(failure_of(folder_.path(), nullptr, [&] { (void)open("a.dat", "aspect"); }),
+              HasSubstr("are 0 to 1: height, slope"));
+  write("a.hdr", envi("data gain values = {0, 1}\n"));
+  EXPECT_THAT(failure("a.dat"), HasSubstr("data gain values gives a scale of 0"));
+}
+
+TEST_F(Envi, WholeNumbersOf64BitsAreFloat64) {
+  write("a.dat", stored<std::int64_t>({1, -2, 1LL << 50, 4}, true));
+  write("a.hdr", "ENVI\nsamples = 2\nlines = 2\ndata type = 14\nbyte order = 1\n");
+  EXPECT_THAT(values_of(*open("a.dat")), ElementsAre(1, -2, 0x1p50, 4));
+  write("a.dat", stored<std::int64_t>({1, -2, (1LL << 60) + 1, 4}, true));
+  EXPECT_THAT(failure("a.dat"), HasSubstr("sample (0, 1) is 1152921504606846977, which float64 does not hold"));
+}
+
+using Netcdf = Described;
+
+TEST_F(Netcdf, LongitudesMayComeBeforeLatitudes) {
+  NetcdfBytes file;
+  file.dimension("lon", 3).dimension("lat", 2);
+  file.variable("lon", {0}, 6, stored<double>({10.0, 10.5, 11.0}, true), {{"units", "degrees_east"}});
+  file.variable("lat", {1}, 6, stored<double>({40.0, 40.5}, true), {{"units", "degrees_north"}});
+  file.variable("z", {0, 1}, 3, stored<std::int16_t>({1, 2, 3, 4, 5, 6}, true), {});
+  write("a.nc", file.bytes());
+  const auto source = open("a.nc");
+  ASSERT_EQ(source->info().width, 3);
+  ASSERT_EQ(source->info().height, 2);
+  EXPECT_THAT(values_of(*source), ElementsAre(2, 4, 6, 1, 3, 5));  // the South comes first
+  const Georeference& place = source->info().georeference;
+  EXPECT_EQ(place.origin_x, 10.0);
+  EXPECT_EQ(place.origin_y, 40.5);
+  EXPECT_THAT(values_of(source->info().sample_type, read_window(*source, {1, 1, 2, 1})), ElementsAre(3, 5));
+}
+
+TEST_F(Netcdf, CoordinatesOfFloat32MayBeRounded) {
+  const auto grid = [](double step, double jitter) {
+    std::vector<float> longitudes;
+    for (int i = 0; i < 5; ++i) longitudes.push_back(static_cast<float>(179.0 + step * i + (i == 2 ? jitter : 0.0)));
+    NetcdfBytes file;
+    file.dimension("lat", 2).dimension("lon", 5);
+    file.variable("lon", {1}, 5, stored<float>(longitudes, true), {{"units", "degrees_east"}});
+    file.variable("lat", {0}, 6, stored<double>({1.0, 1.0 - step}, true), {{"units", "degrees_north"}});
+    file.variable("z", {0, 1}, 3, std::string(20, '\1'), {});
+    return file.bytes();
+  };
+  constexpr double kSecond = 1.0 / 3600.0;
+  write("a.nc", grid(kSecond, 0.0));
+  EXPECT_TRUE(open("a.nc")->info().georeference.has_origin);
+  EXPECT_NEAR(open("a.nc")->info().georeference.spacing_x, kSecond, 0.02 * kSecond);
+  write("a.nc", grid(kSecond, 0.3 * kSecond));
+  EXPECT_FALSE(open("a.nc")->info().georeference.has_origin);
+  write("a.nc", grid(0.5, 0.02));  // of which float32 rounds none
+  EXPECT_FALSE(open("a.nc")->info().georeference.has_origin);
+}
+
+/// Whole degrees in int16 unless said otherwise; the raster's own attributes after them.
+NetcdfBytes netcdf_grid(const std::vector<double>& longitudes, const std::vector<double>& latitudes) {
+  NetcdfBytes file;
+  file.dimension("lat", static_cast<std::uint32_t>(latitudes.size()));
+  file.dimension("lon", static_cast<std::uint32_t>(longitudes.size()));
+  file.variable("lon", {1}, 6, stored<double>(longitudes, true), {{"units", "degrees_east"}});
+  file.variable("lat", {0}, 6, stored<double>(latitudes, true), {{"units", "degrees_north"}});
+  return file;
+}
+
+TEST_F(Netcdf, LongitudesMayGoOnAtMinus180) {
+  NetcdfBytes file = netcdf_grid({179.0, 180.0, -179.0}, {1.0, 0.0});
+  write("a.nc", file.variable("z", {0, 1}, 3, std::string(12, '\1'), {}).bytes());
+  const Georeference place = open("a.nc")->info().georeference;
+  EXPECT_EQ(place.origin_x, 179.0);
+  EXPECT_EQ(place.spacing_x, 1.0);
+}
+
+TEST_F(Netcdf, UnevenRowsFromTheSouthAreTurnedToo) {
+  NetcdfBytes file = netcdf_grid({1.0, 2.0}, {0.0, 1.0, 2.5});
+  write("a.nc", file.variable("z", {0, 1}, 3, stored<std::int16_t>({1, 2, 3, 4, 5, 6}, true), {}).bytes());
+  const auto source = open("a.nc");
+  EXPECT_THAT(values_of(*source), ElementsAre(5, 6, 3, 4, 1, 2));
+  EXPECT_FALSE(source->info().georeference.has_origin);
+}
+
+TEST_F(Netcdf, WithoutCoordinatesTheFirstRowIsTheSouthernmost) {
+  const std::string samples = stored<std::int16_t>({1, 2, 3, 4, 5, 6}, true);
+  for (const bool has_columns : {false, true}) {
+    NetcdfBytes file;
+    file.dimension("y", 3).dimension("x", 2);
+    if (has_columns) file.variable("x", {1}, 6, stored<double>({1.0, 2.0}, true), {});
+    write("a.nc", file.variable("z", {0, 1}, 3, samples, {}).bytes());
+    const auto source = open("a.nc");
+    EXPECT_THAT(values_of(*source), ElementsAre(5, 6, 3, 4, 1, 2));
+    ASSERT_EQ(source->info().warnings.size(), 1U);
+    EXPECT_THAT(source->info().warnings.front(), HasSubstr("the first is taken for the southernmost, as GDAL and GMT"));
+  }
+  NetcdfBytes file;  // rows that say where they lie are followed
+  file.dimension("y", 3).dimension("x", 2).variable("y", {0}, 6, stored<double>({3.0, 2.0, 1.0}, true), {});
+  write("a.nc", file.variable("z", {0, 1}, 3, samples, {}).bytes());
+  EXPECT_THAT(values_of(*open("a.nc")), ElementsAre(1, 2, 3, 4, 5, 6));
+}
+
+TEST_F(Netcdf, LatitudesBeyondAPoleAreTold) {
+  for (const double north : {90.0, 90.5}) {
+    NetcdfBytes file = netcdf_grid({1.0, 2.0}, {north, north - 1.0});
+    write("a.nc", file.variable("z", {0, 1}, 3, stored<std::int16_t>({1, 2, 3, 4}, true), {}).bytes());
+    const auto source = open("a.nc");
+    const auto& warnings = source->info().warnings;
+    ASSERT_EQ(warnings.size(), north > 90.0 ? 1U : 0U);
+    if (!warnings.empty()) {
+      EXPECT_THAT(warnings.front(), HasSubstr("its rows lie at latitudes from 89.5 to 90.5"));
+    }
+  }
+}
+
+TEST_F(Netcdf, CoordinatesMayBePacked) {
+  NetcdfBytes file;
+  file.dimension("lat", 2).dimension("lon", 3);
+  file.variable("lon", {1}, 3, stored<std::int16_t>({0, 5, 10}, true), {{"units", "degrees_east"}},
+                {{"scale_factor", {0.1}}, {"add_offset", {10.0}}});
+  file.variable("lat", {0}, 6, stored<double>({50.5, 50.0}, true), {{"units", "degrees_north"}});
+  write("a.nc", file.variable("z", {0, 1}, 3, std::string(12, '\1'), {}).bytes());
+  EXPECT_EQ(open("a.nc")->info().georeference.origin_x, 10.0);
+  EXPECT_NEAR(open("a.nc")->info().georeference.spacing_x, 0.5, 1e-12);
+}
+
+TEST_F(Netcdf, EveryMissingValueIsAVoidAlsoOfUnsignedSamples) {
+  NetcdfBytes file = netcdf_grid({1.0, 2.0}, {1.0, 0.0});
+  const std::string samples = stored<std::int16_t>({1, -1, -9, 4}, true);
+  write("a.nc",
+        file.variable("z", {0, 1}, 3, samples, {{"_Unsigned", "true"}}, {{"missing_value", {-1.0, -9.0}}}).bytes());
+  const auto source = open("a.nc");
+  EXPECT_EQ(source->info().sample_type, SampleType::kUint16);
+  EXPECT_THAT(source->info().void_values, ElementsAre(65535, 65527));
+}
+
+TEST_F(Netcdf, ValuesOutsideTheValidRangeAreVoid) {
+  const std::string samples = stored<std::int16_t>({1, 1500, -9, 40}, true);
+  for (const auto& [key, list] : std::vector<std::pair<std::string, std::vector<double>>>{
+           {"valid_range", {0.0, 100.0}}, {"valid_min", {0.0}}, {"valid_max", {100.0}}}) {
+    NetcdfBytes file = netcdf_grid({1.0, 2.0}, {1.0, 0.0});
+    write("a.nc", file.variable("z", {0, 1}, 3, samples, {}, {{key, list}}).bytes());
+    const auto source = open("a.nc");
+    EXPECT_EQ(is_void(source->info(), 1500.0), key != "valid_min") << key;
+    EXPECT_EQ(is_void(source->info(), -9.0), key != "valid_max") << key;
+    EXPECT_FALSE(is_void(source->info(), 40.0)) << key;
+  }
+  NetcdfBytes file = netcdf_grid({1.0, 2.0}, {1.0, 0.0});
+  write("a.nc", file.variable("z", {0, 1}, 3, stored<std::int16_t>({1, -5536, -9, 4}, true), {{"_Unsigned", "true"}},
+                              {{"valid_range", {1.0, -5536.0}}})
+                    .bytes());
+  EXPECT_EQ(open("a.nc")->info().valid_max, 60000.0);
+}
+
+TEST_F(Netcdf, DepthsAreNegativeElevations) {
+  for (const auto& [key, value] : {std::pair("positive", "down"), {"standard_name", "sea_floor_depth_below_geoid"}}) {
+    NetcdfBytes file = netcdf_grid({1.0, 2.0}, {1.0, 0.0});
+    const std::string samples = stored<std::int16_t>({1, 2, 3, 4}, true);
+    write("a.nc", file.variable("z", {0, 1}, 3, samples, {{key, value}, {"units", "m"}},
+                                {{"scale_factor", {0.5}}, {"add_offset", {10.0}}})
+                      .bytes());
+    const auto source = open("a.nc");
+    EXPECT_EQ(source->info().z_scale, -0.5) << key;
+    EXPECT_EQ(source->info().z_offset, -10.0) << key;
+    EXPECT_THAT(source->info().warnings, ElementsAre(HasSubstr("depths, positive down")));
+  }
+}
+
+TEST_F(Netcdf, DegreesOfARotatedGridAreNone) {
+  NetcdfBytes file = netcdf_grid({1.0, 2.0}, {1.0, 0.0});
+  file.variable("rotated", {}, 3, "", {{"grid_mapping_name", "rotated_latitude_longitude"}});
+  write("a.nc", file.variable("z", {0, 1}, 3, std::string(8, '\1'), {{"grid_mapping", "rotated"}}).bytes());
+  const auto source = open("a.nc");
+  EXPECT_EQ(source->info().georeference.unit, HorizontalUnit::kUnknown);
+  ASSERT_EQ(source->info().warnings.size(), 1U);
+  EXPECT_THAT(source->info().warnings[0], HasSubstr("a rotated grid, whose pole it does not name"));
+}
+
+#ifdef ISOHF_WITH_NETCDF
+// GDAL's netCDF driver wrote these: CF conventions, deflated chunks of 4 x 3 samples.
+class Netcdf4 : public ::testing::Test {
+ protected:
+  void SetUp() override { set_module_folder(ISOHF_BIN_DIR); }
+  static std::string file(const char* name) { return std::string(ISOHF_SOURCE_DIR) + "/tests/formats/data/" + name; }
+};
+
+TEST_F(Netcdf4, RowsFromTheSouthAreTurned) {
+  const auto source = open_raster(file("lat_lon.nc"), {});
+  const SourceInfo& info = source->info();
+  ASSERT_EQ(info.width, 9);
+  ASSERT_EQ(info.height, 7);
+  EXPECT_EQ(info.sample_type, SampleType::kInt16);
+  EXPECT_EQ(info.block_width, 4);
+  EXPECT_EQ(info.block_height, 3);
+  EXPECT_EQ(info.vertical_unit, "metre");
+  EXPECT_THAT(info.void_values, ElementsAre(-32767));
+  EXPECT_EQ(info.georeference.unit, HorizontalUnit::kDegree);
+  EXPECT_DOUBLE_EQ(info.georeference.origin_x, 6.0);
+  EXPECT_DOUBLE_EQ(info.georeference.origin_y, 45.025);
+  const std::vector<double> values = values_of(*source);
+  for (int row = 0; row < 7; ++row) {
+    for (int column = 0; column < 9; ++column) {
+      const int stored_row = 6 - row;
+      const double expected = stored_row == 3 && column == 4 ? -32767 : (stored_row * 9 + column) * 7 - 100;
+      EXPECT_EQ(values[static_cast<std::size_t>(row * 9 + column)], expected) << column << ' ' << row;
+    }
+  }
+  for (const std::uint64_t limit : {std::uint64_t{0}, std::uint64_t{1000}}) {
+    source->limit_buffers(limit);
+    EXPECT_EQ(values_of(*source), values);
+    EXPECT_THAT(values_of(info.sample_type, read_window(*source, {3, 2, 2, 2})),
+                ElementsAre(values[21], values[22], values[30], values[31]));
+  }
+}
+
+TEST_F(Netcdf4, LongitudesMayComeBeforeLatitudes) {
+  const auto source = open_raster(file("lon_lat.nc"), {});
+  const SourceInfo& info = source->info();
+  ASSERT_EQ(info.width, 9);
+  ASSERT_EQ(info.height, 7);
+  EXPECT_EQ(info.z_scale, 2.0);
+  EXPECT_EQ(info.z_offset, 10.0);
+  EXPECT_EQ(info.vertical_unit, "foot");
+  // float32 coordinates: a hundredth of a sample
+  EXPECT_NEAR(info.georeference.origin_x, 6.0, 4e-5);
+  EXPECT_NEAR(info.georeference.origin_y, 45.025, 4e-5);
+  const std::vector<double> values = values_of(*source);
+  for (int row = 0; row < 7; ++row) {
+    for (int column = 0; column < 9; ++column) {
+      const int stored_row = 6 - row;
+      const double expected = stored_row == 3 && column == 4 ? -16383.5 : ((stored_row * 9 + column) * 7 - 100) * 0.5;
+      EXPECT_EQ(values[static_cast<std::size_t>(row * 9 + column)], expected) << column << ' ' << row;
+    }
+  }
+}
+#endif
+
+using Vrt = Described;
+
+TEST_F(Vrt, NodataOf15DigitsIsTheFloatThatItMeans) {
+  write("a.dat", stored<float>({1.0F, -3.4028234663852886e38F, 0.1F, 4.0F}));
+  write("a.hdr", "ENVI\nsamples = 2\nlines = 2\ndata type = 4\n");
+  const auto vrt = [&](const std::string& nodata) {
+    write("a.vrt",
+          fmt::format(R"(<VRTDataset rasterXSize="2" rasterYSize="2"><VRTRasterBand dataType="Float32" band="1">)"
+                      R"(<NoDataValue>-9</NoDataValue><ComplexSource><SourceFilename relativeToVRT="1">a.dat)"
+                      R"(</SourceFilename><SourceBand>1</SourceBand><NODATA>{}</NODATA></ComplexSource>)"
+                      R"(</VRTRasterBand></VRTDataset>)",
+                      nodata));
+    return values_of(*open("a.vrt"));
+  };
+  EXPECT_THAT(vrt("-3.40282346638529e+38"), ElementsAre(1.0, -9.0, 0.1F, 4.0));
+  write("a.dat", stored<float>({1.0F, 2.0F, 0.1F, 4.0F}));
+  EXPECT_THAT(vrt("0.100000001490116"), ElementsAre(1.0, 2.0, -9.0, 4.0));
+  EXPECT_THAT(vrt("0.11"), ElementsAre(1.0, 2.0, 0.1F, 4.0));
+}
+
+TEST_F(Vrt, MoreSourcesThanMayBeOpenLieOverEachOtherInTheirOrder) {
+  constexpr int kFiles = 100;
+  constexpr int kRows = 4;
+  // Each covers the first column of the next, which is laid over it; every third begins two rows further down.
+  std::string sources;
+  std::array<std::array<double, 2 * kFiles + 1>, kRows> expected{};
+  for (int i = 0; i < kFiles; ++i) {
+    std::vector<std::int16_t> samples;
+    const int top = i % 3 == 0 ? 2 : 0;
+    for (int row = 0; row < kRows - top; ++row) {
+      for (int column = 0; column < 3; ++column) {
+        samples.push_back(static_cast<std::int16_t>(100 * i + 10 * row + column));
+        expected.at(static_cast<std::size_t>(row + top)).at(static_cast<std::size_t>(2 * i + column)) = samples.back();
+      }
+    }
+    write(fmt::format("{}.dat", i), stored<std::int16_t>(samples));
+    write(fmt::format("{}.hdr", i), fmt::format("ENVI\nsamples = 3\nlines = {}\ndata type = 2\n", kRows - top));
+    sources += fmt::format(R"(<SimpleSource><SourceFilename relativeToVRT="1">{}.dat</SourceFilename>)"
+                           R"(<SourceBand>1</SourceBand><SourceProperties BlockYSize="{}"/>)"
+                           R"(<SrcRect xOff="0" yOff="0" xSize="3" ySize="{}"/>)"
+                           R"(<DstRect xOff="{}" yOff="{}" xSize="3" ySize="{}"/></SimpleSource>)",
+                           i, i % 2 + 1, kRows - top, 2 * i, top, kRows - top);
+  }
+  write("a.vrt",
+        fmt::format(R"(<VRTDataset rasterXSize="{}" rasterYSize="{}"><VRTRasterBand dataType="Int16" band="1">)"
+                    R"(<NoDataValue>0</NoDataValue>{}</VRTRasterBand></VRTDataset>)",
+                    2 * kFiles + 1, kRows, sources));
+  const auto source = open("a.vrt");
+  for (const Window& window : {Window{0, 0, 2 * kFiles + 1, kRows}, Window{0, 0, 2 * kFiles + 1, 1},
+                               Window{0, 3, 2 * kFiles + 1, 1}, Window{0, 2, 2 * kFiles + 1, 1}, Window{7, 1, 131, 3},
+                               Window{7, 1, 131, 1}, Window{7, 2, 131, 2}, Window{200, 0, 1, 4}}) {
+    const std::vector<double> values = values_of(source->info().sample_type, read_window(*source, window));
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      const std::size_t row = static_cast<std::size_t>(window.row) + i / static_cast<std::size_t>(window.columns);
+      const std::size_t column = static_cast<std::size_t>(window.column) + i % static_cast<std::size_t>(window.columns);
+      EXPECT_EQ(values[i], expected.at(row).at(column)) << row << ' ' << column;
+    }
+  }
+}
+
+TEST_F(Vrt, TakesWhatItMayKeepWhateverBlocksItClaims) {
+  write("a.dat", stored<std::int16_t>({1}));
+  write("a.hdr", "ENVI\nsamples = 1\nlines = 1\ndata type = 2\n");
+  write(
+      "a.vrt",
+      R"(<VRTDataset rasterXSize="100000" rasterYSize="100000"><VRTRasterBand dataType="Int16" band="1"><SimpleSource>)"
+      R"(<SourceFilename relativeToVRT="1">a.dat</SourceFilename><SourceBand>1</SourceBand>)"
+      R"(<SourceProperties BlockYSize="100000"/></SimpleSource></VRTRasterBand></VRTDataset>)");
+  const auto source = open("a.vrt");
+  constexpr std::uint64_t kMebibyte = 1U << 20U;
+  EXPECT_LE(source->buffer_bytes(kMebibyte), 18 * kMebibyte);  // a strip of 8 times the limit, twice
+  EXPECT_LE(source->buffer_bytes(64 * kMebibyte), 193 * kMebibyte);
+}
+
+using Pds4 = Described;
+
+TEST_F(Pds4, ReadsTheArrayThatTheLabelDescribes) {
+  write("a.dat", "xy" + stored<std::int16_t>({1, 2, 3, -32768, 5, 6}, true));
+  write("a.xml", pds4_label("a.dat"));
+  for (const char* name : {"a.xml", "a.dat"}) {
+    const auto source = open(name);
+    const SourceInfo& info = source->info();
+    EXPECT_EQ(info.format, "PDS4");
+    EXPECT_THAT(values_of(*source), ElementsAre(1, 2, 3, -32768, 5, 6));
+    EXPECT_THAT(info.void_values, ElementsAre(-32768));
+    EXPECT_EQ(info.z_scale, 0.5);
+    EXPECT_EQ(info.z_offset, 1000.0);
+    EXPECT_EQ(info.vertical_unit, "metre");
+    const Georeference& place = info.georeference;
+    EXPECT_EQ(place.registration, Registration::kArea);
+    EXPECT_EQ(place.unit, HorizontalUnit::kMetre);
+    EXPECT_EQ(place.spacing_x, 100.0);
+    EXPECT_EQ(place.origin_x, 5050.0);
+    EXPECT_EQ(place.origin_y, 8950.0);
+    EXPECT_EQ(place.system.body, "Mars");
+    EXPECT_THAT(place.system.wkt, HasSubstr(R"(PARAMETER["standard_parallel_1",30])"));
+    EXPECT_THAT(place.system.wkt, HasSubstr(R"(PARAMETER["central_meridian",-20])"));
+  }
+}
+
+TEST_F(Pds4, AxesComeInAnyOrderAndRowsFromTheBottom) {
+  write("a.dat", "xy" + stored<std::int16_t>({1, 10, 2, 20, 3, 30, 4, 40, 5, 50, 6, 60}, true));
+  Pds4Options options;
+  options.axes = {{"Line", 2}, {"Sample", 3}, {"Band", 2}};
+  write("a.xml", pds4_label("a.dat", options));
+  EXPECT_THAT(values_of(*open("a.xml", "1")), ElementsAre(10, 20, 30, 40, 50, 60));
+  options.axes = {{"Line", 2}, {"Band", 2}, {"Sample", 3}};
+  write("a.xml", pds4_label("a.dat", options));
+  EXPECT_THAT(values_of(*open("a.xml")), ElementsAre(1, 10, 2, 4, 40, 5));
+  options.axes = {{"Sample", 3}, {"Line", 2}, {"Band", 2}};
+  write("a.xml", pds4_label("a.dat", options));
+  EXPECT_THAT(values_of(*open("a.xml")), ElementsAre(1, 3, 5, 2, 4, 6));
+  options.axes = {{"Band", 2}, {"Line", 2}, {"Sample", 3}};
+  options.direction = "Bottom to Top";
+  write("a.xml", pds4_label("a.dat", options));
+  EXPECT_THAT(values_of(*open("a.xml", "1")), ElementsAre(50, 6, 60, 4, 40, 5));
+}
+
+TEST_F(Pds4, ConstantsMayBeBits) {
+  write("a.dat", "xy" + stored<float>({1.0F, -3.4028226550889045e38F, 3.0F, 4.0F, 5.0F, 6.0F}));
+  Pds4Options options;
+  options.type = "IEEE754LSBSingle";
+  for (const char* bits : {"16#FF7FFFFB#", "0xFF7FFFFB", "-3.4028226550889045e+38"}) {
+    options.constants = fmt::format("<missing_constant>{}</missing_constant><valid_maximum>5</valid_maximum>", bits);
+    write("a.xml", pds4_label("a.dat", options));
+    const auto source = open("a.xml");
+    const std::vector<double> values = values_of(*source);
+    EXPECT_TRUE(is_void(source->info(), values[1])) << bits;
+    EXPECT_FALSE(is_void(source->info(), values[4])) << bits;
+    EXPECT_TRUE(is_void(source->info(), values[5])) << bits;
+  }
+}
+
+TEST_F(Pds4, LabelsOfOtherThingsAreRefused) {
+  write("a.dat", "xy");
+  ErrorCode code{};
+  write("a.xml", pds4_label("a.dat"));
+  EXPECT_THAT(failure("a.xml", &code), HasSubstr("has 2 bytes, 3 x 2 samples"));
+  EXPECT_EQ(code, ErrorCode::kCorrupt);
+  write("a.xml", pds4_label("b.dat"));
+  EXPECT_THAT(failure("a.xml"), HasSubstr("its samples, b.dat, are not beside it"));
+  write("b.dat", std::string(20, 'x'));
+  EXPECT_THAT(failure("a.dat"), HasSubstr("describes"));
+  write("a.xml", "<?xml version=\"1.0\"?>\n<Product_Observational></Product_Observational>");
+  EXPECT_THAT(failure("a.xml", &code), HasSubstr("describes no array"));
+  EXPECT_EQ(code, ErrorCode::kUnsupported);
+  std::string label = pds4_label("b.dat");
+  label.replace(label.find("<scaling_factor>0.5"), 19, "<scaling_factor>abc");
+  write("a.xml", label);
+  EXPECT_THAT(failure("a.xml", &code), HasSubstr("scaling_factor is \"abc\", must be a number"));
+  EXPECT_EQ(code, ErrorCode::kCorrupt);
+  label = pds4_label("b.dat");
+  label.insert(label.find("<Axis_Array>"), "<axis_index_order>First Index Fastest</axis_index_order>");
+  write("a.xml", label);
+  EXPECT_THAT(failure("a.xml"), HasSubstr("must be \"Last Index Fastest\""));
+  Pds4Options options;
+  options.type = "ComplexLSB8";
+  write("a.xml", pds4_label("b.dat", options));
+  EXPECT_THAT(failure("a.xml", &code), HasSubstr("data_type is \"ComplexLSB8\""));
+}
+
+using Idrisi = Described;
+
+TEST_F(Idrisi, ParametersBesideNameTheReferenceSystem) {
+  const std::string header =
+      "file type : binary\ndata type : byte\ncolumns : 2\nrows : 2\nref. units : m\nmin. X : 4000000\nmax. X : "
+      "4000020\nmin. Y : 3000000\nmax. Y : 3000020\nref. system : ";
+  write("a.rst", "\1\2\3\4");
+  write("a.rdc", header + "laea\n");
+  const auto parameters = [](const std::string& projection) {
+    return "ref. system : ETRS89 / LAEA\nprojection : " + projection +
+           "\ndatum : ETRS89\nellipsoid : GRS 1980\nmajor s-ax : 6378137.000\nminor s-ax : 6356752.314\norigin long : "
+           "10\norigin lat : 52\norigin X : 4321000\norigin Y : 3210000\nscale fac : na\nunits : m\nparameters : 0\n";
+  };
+  write("LAEA.ref", parameters("Lambert North Oblique Azimuthal Equal Area"));
+  EXPECT_THAT(failure("a.rst"), HasSubstr("scale fac is \"na\""));
+  std::string whole = parameters("Lambert North Oblique Azimuthal Equal Area");
+  write("LAEA.ref", whole.replace(whole.find(": na"), 4, ": 0"));
+  const auto source = open("a.rst");
+  EXPECT_TRUE(source->info().warnings.empty());
+  const ReferenceSystem& system = source->info().georeference.system;
+  EXPECT_THAT(system.wkt, HasSubstr("Lambert_Azimuthal_Equal_Area"));
+  EXPECT_EQ(system.inverse_flattening, 298.257222101);
+  for (const auto& [name, why] : {std::pair("spc83ny4", "a system without parameters"), {"laea", "an unknown map"}}) {
+    write("a.rdc", header + name + "\n");
+    write("LAEA.ref", parameters("Hammer Aitoff"));
+    ASSERT_EQ(open("a.rst")->info().warnings.size(), 1U) << why;
+    EXPECT_THAT(open("a.rst")->info().warnings.front(), HasSubstr("the reference system is left out"));
+  }
+}
+
+TEST_F(Idrisi, APlaneIsNoSystemThatIsLeftOut) {
+  write("a.rst", "\1\2\3\4");
+  write("a.rdc",
+        "file type : binary\ndata type : byte\ncolumns : 2\nrows : 2\nref. units : m\nmin. X : 0\nmax. X : 2\n"
+        "min. Y : 0\nmax. Y : 2\nref. system : plane\n");
+  EXPECT_TRUE(open("a.rst")->info().warnings.empty());
+}
+
+#ifdef ISOHF_WITH_PROJ
+TEST_F(Idrisi, NamesOfStatePlanesAreCodes) {
+  set_module_folder(ISOHF_BIN_DIR);
+  write("a.rst", "\1\2\3\4");
+  const auto of = [&](const std::string& name, const std::string& unit) {
+    write("a.rdc", "file type : binary\ndata type : byte\ncolumns : 2\nrows : 2\nref. units : " + unit +
+                       "\nmin. X : 0\nmax. X : 20\nmin. Y : 0\nmax. Y : 20\nref. system : " + name + "\n");
+    const SourceInfo info = open("a.rst")->info();
+    if (!info.georeference.system.epsg) {
+      EXPECT_TRUE(std::ranges::any_of(info.warnings, [](const std::string& warning) {
+        return warning.find("the reference system is left out") != std::string::npos;
+      }));
+    }
+    return info.georeference.system.epsg.value_or(0);
+  };
+  EXPECT_EQ(of("spc83ca1", "m"), 26941);
+  EXPECT_EQ(of("spc83de1", "m"), 26957);
+  EXPECT_EQ(of("spc27ny3", "ft"), 32017);  // US feet, which are that zone's
+  EXPECT_EQ(of("spc83mt1", "ft"), 2256);   // feet, which are that state's
+  EXPECT_EQ(of("spc83xx1", "m"), 0);
+  EXPECT_EQ(of("spc83ca9", "m"), 0);
+  EXPECT_EQ(of("spc83ca1x", "m"), 0);
+}
+#endif
+
+using RoiPac = Described;
+
+TEST_F(RoiPac, DatumsAreNamedOrTold) {
+  write("a.dem", stored<std::int16_t>({1, 2, 3, 4}));
+  const auto header = [&](const std::string& projection, const std::string& datum) {
+    write("a.dem.rsc", "WIDTH 2\nFILE_LENGTH 2\nX_FIRST 500000\nX_STEP 30\nY_FIRST 4000000\nY_STEP -30\nPROJECTION " +
+                           projection + "\nDATUM " + datum + "\n");
+  };
+  for (const auto& [projection, datum, code] : {std::tuple("UTM11", "North_American_Datum_1983", 26911),
+                                                {"UTM32", "ED50", 23032},
+                                                {"UTM32", "WGS84", 32632},
+                                                {"UTM33", "ETRS89", 25833}}) {
+    header(projection, datum);
+    EXPECT_EQ(open("a.dem")->info().georeference.system.epsg, code) << datum;
+    EXPECT_TRUE(open("a.dem")->info().warnings.empty());
+  }
+  for (const auto& [projection, datum] : {std::pair("UTM60", "NAD83"), {"UTM33", "SWEREF99"}, {"UPS", "WGS84"}}) {
+    header(projection, datum);
+    ASSERT_EQ(open("a.dem")->info().warnings.size(), 1U) << datum;
+    EXPECT_THAT(open("a.dem")->info().warnings.front(), HasSubstr("the reference system is left out"));
+  }
+}
+
+using Graymap = Described;
+
+TEST_F(Graymap, EveryNumberOf16BitsIsAsStored) {
+  std::vector<std::uint16_t> all(65536);
+  for (std::size_t at = 0; at < all.size(); ++at) all[at] = static_cast<std::uint16_t>(at);
+  for (const char* largest : {"65535", "4095"}) {  // some write more than they say
+    write("a.pgm", fmt::format("P5 # of metres\n#P5\n256\n# rows\n256 {}\n", largest) + stored(all, true));
+    const auto source = open("a.pgm");
+    EXPECT_EQ(source->info().sample_type, SampleType::kUint16);
+    EXPECT_THAT(source->info().warnings, ::testing::IsEmpty());
+    const auto samples = values_of(*source);
+    for (std::size_t at = 0; at < all.size(); ++at) ASSERT_EQ(samples[at], static_cast<double>(at));
+  }
+}
+
+TEST_F(Graymap, BytesAreAsStoredAndDamageIsTold) {
+  write("a.pgm", "P5\t3 2 100 abcdef");
+  const auto source = open("a.pgm");
+  EXPECT_EQ(source->info().sample_type, SampleType::kUint8);
+  EXPECT_THAT(values_of(*source), ElementsAre('a', 'b', 'c', 'd', 'e', 'f'));
+  write("a.pgm", "P5\t3 2 100 abcdefghi");
+  EXPECT_THAT(open("a.pgm")->info().warnings, ElementsAre(HasSubstr("3 bytes follow the samples")));
+  write("a.pgm", "P5\t3 2 100 abcde");
+  EXPECT_THAT(failure("a.pgm"), HasSubstr("the file has 16 bytes, 3 x 2 samples"));
+  write("a.pgm", "P5\t3 2 65536 abcdef");
+  EXPECT_THAT(failure("a.pgm"), HasSubstr("largest value is 65536, must be from 1 to 65535"));
+  for (const char* header : {"P5", "P5 ", "P5 # 3 2 9", "P5 3 2", "P5 3 x 9 abc", "P5 0 2 9 "}) {
+    write("a.pgm", header);
+    EXPECT_THAT(failure("a.pgm"), HasSubstr("a.pgm: ")) << header;
+  }
+}
+
+TEST(Imagine, RunsAndPlainTilesAreTheSamples) {
+  const TemporaryFolder folder;
+  for (const bool spills : {false, true}) {
+    write_file(folder / "a.img", ImagineBytes().file(spills));
+    write_file(folder / "a.ige", ImagineBytes::spill());
+    const auto source = open_raster(folder / "a.img", {});
+    const std::vector<double> values = values_of(*source);
+    ASSERT_EQ(values.size(), 60U);
+    EXPECT_EQ(values[0], 16.0);
+    EXPECT_EQ(values[9], 33.0);
+    EXPECT_EQ(values[50], spills ? 16.0 : 19.0);  // the 41st sample of the tile
+    EXPECT_EQ(source->info().georeference.origin_x, 500000.0);
+    EXPECT_EQ(source->info().georeference.spacing_y, 10.0);
+    EXPECT_EQ(source->info().void_values, std::vector<double>{5.0});
+  }
+}
+
+}  // namespace
+}  // namespace isohf::test

@@ -1,0 +1,208 @@
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+
+#include "formats/raster_reference.h"
+#include "formats/reader_failure.h"
+#include "formats/readers.h"
+#include "isohf/error.h"
+#include "isohf/raster.h"
+#include "support/rasters/every_window.h"
+#include "support/rasters/samples.h"
+#include "support/real_files.h"
+#include "support/temporary_folder.h"
+
+namespace isohf {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr std::size_t kDtedHeader = 3428;
+
+/// What test cells hold: a void in the South-West corner, else by column and post from the South, below and above 0.
+int height_at(int column, int post) {
+  return column == 0 && post == 0 ? -32767 : 1000 * column - 7 * post - 1500;
+}
+
+void put(std::string& bytes, std::size_t at, const std::string& text) {
+  bytes.replace(at, text.size(), text);
+}
+
+void sign(std::string& cell, std::size_t record, int posts) {
+  std::uint32_t sum = 0;
+  const std::size_t end = record + 8 + 2 * static_cast<std::size_t>(posts);
+  for (std::size_t i = record; i < end; ++i) sum += static_cast<unsigned char>(cell[i]);
+  for (std::size_t b = 0; b < 4; ++b) cell[end + b] = static_cast<char>(sum >> (24 - 8 * b));
+}
+
+/// A cell of `columns` x `posts` at 80 W, 43 N, 30" by 15" apart.
+std::string cell(int columns = 4, int posts = 5) {
+  std::string bytes(kDtedHeader, ' ');
+  put(bytes, 0, "UHL10800000W0430000N030001500200U  ");
+  put(bytes, 47, fmt::format("{:04}{:04}0", columns, posts));
+  put(bytes, 80, "DSIU");
+  put(bytes, 80 + 141, "MSLWGS84");
+  put(bytes, 80 + 264, fmt::format("0000000.001500300{:04}{:04}00", posts, columns));
+  put(bytes, 728, "ACC");
+  for (int c = 0; c < columns; ++c) {
+    std::string record = {'\xAA', '\0', '\0', static_cast<char>(c), '\0', static_cast<char>(c), '\0', '\0'};
+    for (int p = 0; p < posts; ++p) {
+      const int value = height_at(c, p);
+      record.push_back(static_cast<char>((std::abs(value) >> 8) | (value < 0 ? 0x80 : 0)));
+      record.push_back(static_cast<char>(std::abs(value) & 0xFF));
+    }
+    const std::size_t at = bytes.size();
+    bytes += record + std::string(4, '\0');
+    sign(bytes, at, posts);
+  }
+  return bytes;
+}
+
+class Dted : public testing::Test {
+ protected:
+  std::string write(const std::string& bytes) const {
+    const std::string path = folder_ / "n43.dt0";
+    test::write_file(path, bytes);
+    return path;
+  }
+
+  /// What opening and reading all of it says; empty where it works.
+  std::string failure(const std::string& bytes, ErrorCode* code = nullptr) const {
+    const std::string path = write(bytes);
+    return test::failure_of(path, code, [&] {
+      const auto source = open_dted(path, {});
+      (void)test::read_whole(*source);
+    });
+  }
+
+  const test::TemporaryFolder folder_;
+};
+
+TEST_F(Dted, DeliversRealCellsAsTheReferenceDoes) {
+  const auto files = test::real_files({".dt0", ".dt1", ".dt2"});
+  if (files.empty()) GTEST_SKIP() << test::kNoRealFiles;
+  for (const auto& file : files) {
+    SCOPED_TRACE(file.string());
+    const auto source = open_raster(file.string(), {});
+    test::expect_as_reference(*source, test::reference_of(file));
+    EXPECT_EQ(source->info().format, "DTED");
+    EXPECT_EQ(source->info().vertical_unit, "metre");
+    EXPECT_EQ(source->info().georeference.system.body, "Earth");
+    EXPECT_TRUE(source->info().warnings.empty());
+  }
+}
+
+TEST_F(Dted, TurnsColumnsIntoRowsFromTheNorth) {
+  const auto source = open_raster(write(cell()), {});
+  const SourceInfo& info = source->info();
+  EXPECT_EQ(info.georeference.registration, Registration::kPoint);
+  EXPECT_DOUBLE_EQ(info.georeference.spacing_x, 30.0 / 3600.0);
+  EXPECT_DOUBLE_EQ(info.georeference.spacing_y, 15.0 / 3600.0);
+  EXPECT_DOUBLE_EQ(info.georeference.origin_x, -80.0);
+  EXPECT_DOUBLE_EQ(info.georeference.origin_y, 43.0 + 60.0 / 3600.0);
+  EXPECT_EQ(info.void_values, std::vector<double>{-32767.0});
+  test::expect_every_window(*source, test::stored<std::int16_t>(4, 5, [](std::int64_t c, std::int64_t r) {
+    return height_at(static_cast<int>(c), static_cast<int>(4 - r));
+  }));
+}
+
+TEST_F(Dted, WrongChecksumsAreTakenWhereTheUserSaysSo) {
+  std::string damaged = cell();
+  damaged.back() = static_cast<char>(damaged.back() + 1);
+  EXPECT_THAT(failure(damaged), HasSubstr("column 3 at byte"));
+  EXPECT_THAT(failure(damaged), HasSubstr("`ignore_checksums` takes them as they are"));
+  OpenOptions options;
+  options.ignore_checksums = true;
+  const auto source = open_raster(write(damaged), options);
+  test::expect_every_window(*source, test::stored<std::int16_t>(4, 5, [](std::int64_t c, std::int64_t r) {
+    return height_at(static_cast<int>(c), static_cast<int>(4 - r));
+  }));
+  put(damaged, kDtedHeader, "\xBB");  // a record of another kind
+  EXPECT_THROW((void)test::read_whole(*open_raster(write(damaged), options)), Error);
+}
+
+TEST_F(Dted, FindsTheCellBehindATapeRecord) {
+  EXPECT_EQ(failure("HDR1" + std::string(76, ' ') + cell()), "");
+  std::string south = cell();
+  put(south, 4, "0100000E0100000S");
+  const auto source = open_dted(write(south), {});
+  EXPECT_EQ(source->info().georeference.origin_x, 10.0);
+  EXPECT_DOUBLE_EQ(source->info().georeference.origin_y, -10.0 + 60.0 / 3600.0);
+}
+
+TEST_F(Dted, CarriesItsDatums) {
+  std::string old = cell();
+  put(old, 80 + 141, "E96WGS72");
+  const auto source = open_dted(write(old), {});
+  EXPECT_EQ(source->info().georeference.system.epsg, 4322);
+  EXPECT_EQ(source->info().georeference.system.vertical_epsg, 5773);
+  put(old, 80 + 144, "XXXXX");
+  // One about the datum, one about the name: this cell's posts are 15 seconds apart.
+  const std::vector<Warning> warnings = open_dted(write(old), {})->info().warnings;
+  ASSERT_EQ(warnings.size(), 2U);
+  EXPECT_EQ(warnings[0], "the horizontal datum in DSI is neither WGS84 nor WGS72; its ellipsoid is not known");
+  EXPECT_TRUE(warnings[1].starts_with("its name says DTED level 0, whose posts are 30 seconds apart")) << warnings[1];
+}
+
+TEST_F(Dted, NamesTheColumnOfEveryDamagedRecord) {
+  const std::string whole = cell();
+  const std::size_t record = 12 + 10;
+  for (std::size_t column = 0; column < 4; ++column) {
+    for (std::size_t i = 0; i < record; ++i) {
+      std::string damaged = whole;
+      const std::size_t at = kDtedHeader + column * record + i;
+      damaged[at] = static_cast<char>(damaged[at] ^ 0x04);
+      ErrorCode code = ErrorCode::kCancelled;
+      EXPECT_THAT(failure(damaged, &code),
+                  HasSubstr(fmt::format("column {} at byte {}", column, kDtedHeader + column * record)));
+      EXPECT_EQ(code, ErrorCode::kCorrupt);
+    }
+  }
+  std::string two = whole;
+  put(two, kDtedHeader + 8, "\xFF\xFB");  // -5 in two's complement
+  sign(two, kDtedHeader, 5);
+  EXPECT_THAT(failure(two), HasSubstr("post 0 from the South is at -32763 m"));
+}
+
+TEST_F(Dted, IgnoresWhatFollowsTheCell) {
+  EXPECT_EQ(failure(cell() + "tape"), "");
+}
+
+TEST_F(Dted, SurvivesDamagedLabels) {
+  const std::string whole = cell();
+  std::mt19937 random(21);
+  test::Damaged damage;
+  const std::string alphabet = "0123456789NSEW. -\xFF";
+  for (int round = 0; round < 3000; ++round) {
+    std::string damaged = whole;
+    for (unsigned k = random() % 4; k != 4; ++k) {
+      const std::size_t at = random() % 2 == 0 ? random() % 80 : 80 + 260 + random() % 40;
+      damaged[at] = alphabet[random() % alphabet.size()];
+    }
+    damage.try_one(write(damaged), [](const std::string& path) { return open_dted(path, {}); });
+  }
+  damage.expect_both();
+}
+
+TEST_F(Dted, SaysWhichLabelIsWrong) {
+  const auto says = [&](std::size_t at, const std::string& text) {
+    std::string wrong = cell();
+    put(wrong, at, text);
+    return failure(wrong);
+  };
+  EXPECT_THAT(says(4, "08X0000W"), HasSubstr("UHL: the longitude of the origin at byte 4"));
+  EXPECT_THAT(says(19, "E"), HasSubstr("UHL: the latitude of the origin at byte 12"));
+  EXPECT_THAT(says(20, "0000"), HasSubstr("longitude interval"));
+  EXPECT_THAT(says(47, "0003"), HasSubstr("DSI: says 4 x 5 posts, UHL 3 x 5"));
+  EXPECT_THAT(says(80 + 264, "0010000.0"), HasSubstr("rotated"));
+  EXPECT_THAT(says(728, "XXX"), HasSubstr("ACC: is not at byte 728"));
+  OpenOptions options;
+  options.channel = "1";
+  EXPECT_THROW((void)open_dted(write(cell()), options), Error);
+}
+
+}  // namespace
+}  // namespace isohf

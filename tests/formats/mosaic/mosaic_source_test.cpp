@@ -1,0 +1,324 @@
+#include "formats/mosaic/mosaic_source.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+
+#include "formats/mosaic/mosaic_pieces.h"
+#include "isohf/error.h"
+#include "isohf/raster.h"
+#include "support/rasters/samples.h"
+#include "support/temporary_folder.h"
+
+namespace isohf::test {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr SampleType kAllTypes[] = {SampleType::kUint8,   SampleType::kInt8,    SampleType::kUint16,
+                                    SampleType::kInt16,   SampleType::kUint32,  SampleType::kInt32,
+                                    SampleType::kFloat16, SampleType::kFloat32, SampleType::kFloat64};
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+/// The samples as elevations, NaN where void.
+std::vector<double> elevations(HeightSource& source, const Window& window) {
+  const std::vector<std::byte> raw = read_window(source, window);
+  std::vector<double> numbers(static_cast<std::size_t>(window.columns * window.rows));
+  numbers_from_samples(SampleKind::of(source.info()), raw, numbers);
+  for (double& number : numbers) number = number * source.info().z_scale + source.info().z_offset;
+  return numbers;
+}
+
+std::vector<double> elevations(HeightSource& source) {
+  return elevations(source, whole(source));
+}
+
+double at(const std::vector<double>& values, const HeightSource& source, std::int64_t column, std::int64_t row) {
+  return values[static_cast<std::size_t>(row * source.info().width + column)];
+}
+
+std::string why_refused(const std::vector<std::string>& paths, const OpenOptions& options = {}) {
+  try {
+    static_cast<void>(plan_mosaic(paths, options));
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "not refused";
+}
+
+TEST(MosaicSource, PiecesGiveTheWholeBitForBitInEveryType) {
+  for (const SampleType type : kAllTypes) {
+    for (const Registration registration : {Registration::kArea, Registration::kPoint}) {
+      SCOPED_TRACE(to_string(type) + " " + to_string(registration));
+      const TemporaryFolder folder;
+      const CutRaster raster = noise_raster(placed_spec(97, 61, type, registration));
+      raster.cut(folder / "whole.tif", {0, 0, 97, 61});
+      std::vector<std::string> paths = write_pieces(raster, folder / "", ragged_cut(97, 61, 5, 20));
+      std::reverse(paths.begin(), paths.end());
+      const auto mosaic = open_mosaic(paths);
+      const SourceInfo& info = mosaic->info();
+      const SourceInfo original = open_raster(folder / "whole.tif", {})->info();
+      EXPECT_EQ(info.width, 97);
+      EXPECT_EQ(info.height, 61);
+      EXPECT_EQ(info.sample_type, type);
+      EXPECT_EQ(info.georeference.origin_x, original.georeference.origin_x);
+      EXPECT_EQ(info.georeference.origin_y, original.georeference.origin_y);
+      EXPECT_EQ(info.georeference.spacing_x, original.georeference.spacing_x);
+      EXPECT_EQ(info.georeference.registration, registration);
+      EXPECT_EQ(info.georeference.system.epsg, 32632);
+      EXPECT_EQ(info.format, original.format);
+      EXPECT_EQ(info.warnings, std::vector<Warning>());
+      EXPECT_EQ(mosaic->plan().holes.samples, 0);
+      EXPECT_TRUE(read_whole(*mosaic) == raster.samples);
+    }
+  }
+}
+
+TEST(MosaicSource, AnyWindowInAnyOrderIsThatOfTheWhole) {
+  const TemporaryFolder folder;
+  const CutRaster raster = noise_raster(placed_spec(150, 130, SampleType::kInt16, Registration::kArea));
+  const auto mosaic = open_mosaic(write_pieces(raster, folder / "", ragged_cut(150, 130, 8, 30)));
+  std::mt19937 random(3);
+  for (int i = 0; i < 200; ++i) {
+    Window window;
+    window.column = i % 3 == 0 ? 0 : static_cast<std::int64_t>(random() % 150);
+    window.columns = i % 3 == 0 ? 150 : 1 + static_cast<std::int64_t>(random()) % (150 - window.column);
+    window.row = static_cast<std::int64_t>(random() % 130);
+    window.rows = 1 + static_cast<std::int64_t>(random()) % (130 - window.row);
+    ASSERT_TRUE(read_window(*mosaic, window) == raster.part(window)) << "seed 3, window " << i;
+  }
+}
+
+TEST(MosaicSource, DegreeTilesShareTheirPosts) {
+  const TemporaryFolder folder;
+  // 61 posts a degree; two by two tiles.
+  const auto height = [](std::int64_t c, std::int64_t r) { return static_cast<int>(c * 7 + r * 131) % 3000 - 40; };
+  for (int row = 0; row < 2; ++row) {
+    for (int column = 0; column < 2; ++column) {
+      std::string bytes;
+      for (int r = 0; r < 61; ++r) {
+        for (int c = 0; c < 61; ++c) {
+          const int value = height(column * 60 + c, row * 60 + r);
+          bytes += static_cast<char>((value >> 8) & 0xFF);
+          bytes += static_cast<char>(value & 0xFF);
+        }
+      }
+      const std::string name = "N" + std::to_string(45 - row) + "E00" + std::to_string(6 + column) + ".hgt";
+      write_file(folder / name, bytes);
+    }
+  }
+  const auto mosaic =
+      open_mosaic({folder / "N44E006.hgt", folder / "N45E007.hgt", folder / "N45E006.hgt", folder / "N44E007.hgt"});
+  EXPECT_EQ(mosaic->info().width, 121);
+  EXPECT_EQ(mosaic->info().height, 121);
+  EXPECT_EQ(mosaic->info().georeference.origin_x, 6.0);
+  EXPECT_EQ(mosaic->info().georeference.origin_y, 46.0);
+  EXPECT_EQ(mosaic->plan().holes.samples, 0);
+  const std::vector<double> found = elevations(*mosaic);
+  for (std::int64_t r = 0; r < 121; ++r) {
+    for (std::int64_t c = 0; c < 121; ++c) ASSERT_EQ(at(found, *mosaic, c, r), height(c, r)) << c << " " << r;
+  }
+}
+
+TEST(MosaicSource, BothSidesOfThe180thMeridianJoin) {
+  const TemporaryFolder folder;
+  for (const auto& [name, value] : {std::pair("N10E179.hgt", 1), std::pair("N10W180.hgt", 2)}) {
+    std::string bytes;
+    for (int i = 0; i < 11 * 11; ++i) bytes += {'\0', static_cast<char>(value)};
+    write_file(folder / name, bytes);
+  }
+  const auto mosaic = open_mosaic({folder / "N10W180.hgt", folder / "N10E179.hgt"});
+  EXPECT_EQ(mosaic->info().width, 21);
+  EXPECT_EQ(mosaic->info().height, 11);
+  EXPECT_EQ(mosaic->info().georeference.origin_x, 179.0);
+  const std::vector<double> found = elevations(*mosaic);
+  EXPECT_EQ(at(found, *mosaic, 9, 5), 1.0);
+  EXPECT_EQ(at(found, *mosaic, 10, 5), 1.0) << "the shared post is the last file's";
+  EXPECT_EQ(at(found, *mosaic, 11, 5), 2.0);
+}
+
+TEST(MosaicSource, MissingTilesAreVoidAndNamed) {
+  const TemporaryFolder folder;
+  std::vector<std::string> paths;
+  for (const char* name : {"N45E006.hgt", "N45E008.hgt", "N44E007.hgt", "N44E006.hgt"}) {
+    std::string bytes;
+    for (int i = 0; i < 11 * 11; ++i) bytes += {'\1', '\0'};
+    paths.push_back(folder / name);
+    write_file(paths.back(), bytes);
+  }
+  const auto mosaic = open_mosaic(paths);
+  const MosaicHoles& holes = mosaic->plan().holes;
+  EXPECT_EQ(holes.tiles, 6);
+  EXPECT_EQ(holes.tiles_missing, 2);
+  EXPECT_EQ(holes.missing, (std::vector<std::string>{"N45E007", "N44E008"}));
+  const std::vector<double> found = elevations(*mosaic);
+  EXPECT_EQ(holes.samples, std::count_if(found.begin(), found.end(), [](double z) { return std::isnan(z); }));
+  EXPECT_EQ(holes.samples, 9 * 10 + 10 * 10);
+  EXPECT_THAT(holes.describe(1), HasSubstr("2 of 6 tiles are missing (190 samples): N45E007 and 1 more"));
+}
+
+TEST(MosaicSource, GroundInNoFileOfARaggedCutIsCounted) {
+  const TemporaryFolder folder;
+  RasterSpec spec = placed_spec(90, 70, SampleType::kInt16, Registration::kArea);
+  spec.void_value = -9999.0;
+  const CutRaster raster = raster_of<std::int16_t>(spec, [](auto c, auto r) { return c + 100 * r; });
+  std::vector<Window> windows = ragged_cut(90, 70, 4, 15);
+  std::int64_t left_out = 0;
+  for (int i = 0; i < 3; ++i) {
+    left_out += windows.back().columns * windows.back().rows;
+    windows.pop_back();
+  }
+  windows.push_back({0, 0, 2, 2});  // so that the whole keeps its corners
+  windows.push_back({88, 68, 2, 2});
+  const auto mosaic = open_mosaic(write_pieces(raster, folder / "", windows));
+  ASSERT_EQ(mosaic->info().width, 90);
+  std::int64_t voids = 0;
+  std::vector<double> found = elevations(*mosaic);
+  for (std::int64_t r = 0; r < 70; ++r) {
+    for (std::int64_t c = 0; c < 90; ++c) {
+      if (std::isnan(at(found, *mosaic, c, r))) {
+        ++voids;
+      } else {
+        ASSERT_EQ(at(found, *mosaic, c, r), static_cast<double>(c + 100 * r));
+      }
+    }
+  }
+  EXPECT_EQ(mosaic->plan().holes.samples, voids);
+  EXPECT_LE(voids, left_out);
+  EXPECT_GT(voids, left_out - 8);
+  EXPECT_THAT(mosaic->plan().holes.describe(5), HasSubstr("samples lie in no file, the first at x "));
+}
+
+TEST(MosaicSource, IntegersWithoutAVoidGetALargerTypeForGaps) {
+  const TemporaryFolder folder;
+  const CutRaster raster = noise_raster(placed_spec(30, 10, SampleType::kUint16, Registration::kArea));
+  const auto mosaic = open_mosaic(write_pieces(raster, folder / "", {{0, 0, 10, 10}, {20, 0, 10, 10}}));
+  EXPECT_EQ(mosaic->info().sample_type, SampleType::kInt32);
+  EXPECT_THAT(mosaic->info().warnings, ::testing::ElementsAre(HasSubstr("uint16 has no number to spare for voids"),
+                                                              HasSubstr("1 of 3 tiles are missing (100 samples)")));
+  const std::vector<double> found = elevations(*mosaic);
+  for (std::int64_t c = 0; c < 30; ++c) {
+    EXPECT_EQ(std::isnan(at(found, *mosaic, c, 3)), c >= 10 && c < 20);
+  }
+}
+
+TEST(MosaicSource, OverlapShowsTheLastOrTheFirstAndVoidsWhatLiesBelow) {
+  const TemporaryFolder folder;
+  RasterSpec spec = placed_spec(20, 4, SampleType::kInt16, Registration::kArea);
+  spec.void_value = -1.0;
+  raster_of<std::int16_t>(spec, [](auto c, auto) {
+    return c == 12 || c == 13 ? -1 : 100;
+  }).cut(folder / "a.tif", {0, 0, 15, 4});
+  raster_of<std::int16_t>(spec, [](auto c, auto) {
+    return c == 11 || c == 13 ? -1 : 200;
+  }).cut(folder / "b.tif", {10, 0, 10, 4});
+  for (const OverlapRule rule : {OverlapRule::kLast, OverlapRule::kFirst}) {
+    const auto mosaic = open_mosaic({folder / "a.tif", folder / "b.tif"}, rule);
+    const std::vector<double> found = elevations(*mosaic);
+    const double upper = rule == OverlapRule::kLast ? 200.0 : 100.0;
+    EXPECT_EQ(at(found, *mosaic, 9, 1), 100.0);
+    EXPECT_EQ(at(found, *mosaic, 10, 1), upper);
+    EXPECT_EQ(at(found, *mosaic, 11, 1), 100.0) << "void in b";
+    EXPECT_EQ(at(found, *mosaic, 12, 1), 200.0) << "void in a";
+    EXPECT_TRUE(std::isnan(at(found, *mosaic, 13, 1)));
+    EXPECT_EQ(at(found, *mosaic, 14, 1), upper);
+    EXPECT_EQ(at(found, *mosaic, 15, 1), 200.0);
+  }
+}
+
+TEST(MosaicSource, OriginsRoundedInTheFileAreSnappedAndSaid) {
+  const TemporaryFolder folder;
+  CutRaster raster = raster_of<float>(placed_spec(40, 10, SampleType::kFloat32, Registration::kArea),
+                                      [](auto c, auto r) { return 0.25 * static_cast<double>(c + r); });
+  raster.cut(folder / "a.tif", {0, 0, 20, 10});
+  raster.spec.georeference->origin_x += 0.02 * 30.0;
+  raster.cut(folder / "b.tif", {20, 0, 20, 10});
+  const auto mosaic = open_mosaic({folder / "a.tif", folder / "b.tif"});
+  EXPECT_THAT(mosaic->info().warnings, ::testing::ElementsAre(HasSubstr("0.02 of a sample off")));
+  EXPECT_TRUE(read_whole(*mosaic) == raster.samples);
+  raster.spec.georeference->origin_x += 0.2 * 30.0;
+  std::filesystem::remove(folder / "b.tif");
+  raster.cut(folder / "b.tif", {20, 0, 20, 10});
+  const std::string why = why_refused({folder / "a.tif", folder / "b.tif"});
+  EXPECT_THAT(why, HasSubstr("b.tif: lies 0.22 of a sample off the grid of the other files of its resolution in x"));
+  EXPECT_THAT(why, HasSubstr("resample"));
+}
+
+TEST(MosaicSource, FilesThatDisagreeAreRefusedByName) {
+  const TemporaryFolder folder;
+  const RasterSpec spec = placed_spec(20, 10, SampleType::kFloat32, Registration::kArea);
+  raster_of<float>(spec, [](auto, auto) { return 1.0; }).cut(folder / "a.tif", {0, 0, 10, 10});
+  const auto refused = [&](const std::function<void(RasterSpec&)>& change) {
+    RasterSpec other = spec;
+    change(other);
+    std::filesystem::remove(folder / "b.tif");
+    raster_of<float>(other, [](auto, auto) { return 1.0; }).cut(folder / "b.tif", {10, 0, 10, 10});
+    return why_refused({folder / "a.tif", folder / "b.tif"});
+  };
+  EXPECT_EQ(refused([](RasterSpec&) {}), "not refused");
+  EXPECT_THAT(refused([](RasterSpec& b) { b.georeference->system.epsg = 32633; }),
+              HasSubstr("b.tif: its EPSG code is 32633, that of"));
+  EXPECT_THAT(refused([](RasterSpec& b) { b.vertical_unit = "foot"; }),
+              HasSubstr("b.tif: its elevations are in foot, those of " + (folder / "a.tif") +
+                        " in a unit that nothing states"));
+  EXPECT_EQ(refused([](RasterSpec& b) { b.vertical_unit = "metre"; }), "not refused");
+  EXPECT_THAT(refused([](RasterSpec& b) { b.georeference->registration = Registration::kPoint; }),
+              HasSubstr("b.tif: its samples stand for points"));
+  EXPECT_THAT(refused([](RasterSpec& b) {
+                b.georeference->unit = HorizontalUnit::kDegree;
+                b.georeference->system.epsg = 4326;
+              }),
+              HasSubstr("b.tif: its coordinates are in degrees"));
+  std::filesystem::remove(folder / "b.tif");
+  RasterSpec unplaced = spec;
+  unplaced.georeference.reset();
+  write_raster(folder / "b.tif", unplaced, std::vector<std::byte>(20 * 10 * 4));
+  EXPECT_THAT(why_refused({folder / "a.tif", folder / "b.tif"}), HasSubstr("b.tif: does not say where it lies"));
+  EXPECT_THAT(why_refused({folder / "a.tif", folder / "a.tif"}), HasSubstr("a.tif: is named twice"));
+  std::filesystem::create_symlink(folder / "a.tif", folder / "link.tif");
+  EXPECT_THAT(why_refused({folder / "a.tif", folder / "link.tif"}), HasSubstr("link.tif: is the same file as"));
+  EXPECT_THAT(why_refused({folder / "a.tif", folder / "none.tif"}), HasSubstr("none.tif: no such file"));
+}
+
+TEST(MosaicSource, AChangedOrBrokenMemberIsAnErrorThatNamesIt) {
+  const TemporaryFolder folder;
+  const CutRaster raster = noise_raster(placed_spec(40, 10, SampleType::kInt16, Registration::kArea));
+  const std::vector<std::string> paths = write_pieces(raster, folder / "", {{0, 0, 20, 10}, {20, 0, 20, 10}});
+  const auto mosaic = open_mosaic(paths);
+  std::filesystem::resize_file(paths[1], std::filesystem::file_size(paths[1]) - 7);
+  try {
+    static_cast<void>(read_whole(*mosaic));
+    FAIL() << "read";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::kIo);
+    EXPECT_THAT(error.what(), HasSubstr("piece1.tif: was changed or replaced while it was read"));
+  }
+  std::filesystem::remove(paths[1]);
+  EXPECT_THROW(static_cast<void>(read_whole(*mosaic)), Error);
+}
+
+TEST(MosaicSource, EveryMemberIsOpenedOnceInAPassOverSmallOnes) {
+  const TemporaryFolder folder;
+  const CutRaster raster = noise_raster(placed_spec(160, 160, SampleType::kInt16, Registration::kArea));
+  const auto mosaic = open_mosaic(write_pieces(raster, folder / "", regular_cut(160, 160, 16)));
+  ASSERT_EQ(mosaic->plan().layers.front().members.size(), 100U);
+  for (std::int64_t row = 0; row < 160; row += 7) {  // bands that end anywhere
+    const Window window{0, row, 160, std::min<std::int64_t>(7, 160 - row)};
+    ASSERT_TRUE(read_window(*mosaic, window) == raster.part(window)) << row;
+  }
+  EXPECT_EQ(mosaic->times_opened(), 100);
+  std::size_t open = 0;
+  for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd")) {
+    std::error_code gone;
+    const std::string target = std::filesystem::read_symlink(entry.path(), gone).string();
+    open += target.find("piece") != std::string::npos ? 1 : 0;
+  }
+  EXPECT_LE(open, most_open_rasters());
+  EXPECT_GT(open, 0U);
+}
+
+}  // namespace
+}  // namespace isohf::test

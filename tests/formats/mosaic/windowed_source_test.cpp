@@ -1,0 +1,158 @@
+#include "formats/decorate/windowed_source.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "isohf/surface/decorate/filled_source.h"
+#include "isohf/surface/decorate/geoid_source.h"
+#include "support/rasters/memory_source.h"
+#include "support/rasters/place_at.h"
+#include "support/rasters/small_geoid.h"
+#include "support/temporary_folder.h"
+
+namespace isohf::test {
+namespace {
+
+/// A globe of int16 samples, 5 degrees apart, the first column once more behind the last, with a hole. Remembers what
+/// it was asked to keep.
+class GlobeSource final : public MemorySource<std::int16_t> {
+ public:
+  GlobeSource()
+      : MemorySource(SampleType::kInt16, 73, 37,
+                     [](std::int64_t c, std::int64_t r) { return static_cast<double>(100 + 3 * (c % 72) + 5 * r); }) {
+    for (std::int64_t r = 10; r < 13; ++r) {
+      for (std::int64_t c = 20; c < 24; ++c) at(c, r) = -32768;
+    }
+    SourceInfo& info = mutable_info();
+    info.void_values = {-32768.0};
+    info.block_width = 8;
+    info.block_height = 4;
+    info.georeference = place_at(Registration::kPoint, HorizontalUnit::kDegree, -180.0, 90.0, 5.0);
+  }
+  void limit_buffers(std::uint64_t bytes) override { limit = bytes; }
+  [[nodiscard]] std::uint64_t buffer_bytes(std::uint64_t asked) const override { return std::min(asked, kUnlimited); }
+
+  static constexpr std::uint64_t kUnlimited = 1000000;
+  std::uint64_t limit = kUnlimited;
+};
+
+std::vector<std::int16_t> read(HeightSource& source, const Window& window) {
+  std::vector<std::int16_t> samples(static_cast<std::size_t>(window.columns * window.rows));
+  source.read_window(window, std::as_writable_bytes(std::span(samples)));
+  return samples;
+}
+
+std::unique_ptr<HeightSource> filled(std::unique_ptr<HeightSource> source) {
+  VoidTreatment treatment;
+  treatment.fill_distance = 10;
+  return std::make_unique<FilledSource>(std::move(source), treatment);
+}
+
+TEST(WindowedSource, HasTheSamplesAndThePlaceOfItsWindow) {
+  GlobeSource whole;
+  WindowedSource part(std::make_unique<GlobeSource>(), {16, 8, 20, 10});
+  EXPECT_EQ(part.info().width, 20);
+  EXPECT_EQ(part.info().height, 10);
+  EXPECT_EQ(part.info().georeference.origin_x, -180.0 + 16 * 5.0);
+  EXPECT_EQ(part.info().georeference.origin_y, 90.0 - 8 * 5.0);
+  EXPECT_EQ(read(part, {0, 0, 20, 10}), read(whole, {16, 8, 20, 10}));
+  EXPECT_EQ(read(part, {3, 4, 17, 2}), read(whole, {19, 12, 17, 2}));
+  EXPECT_EQ(&part.as_stored(), &part);
+}
+
+TEST(WindowedSource, LimitsBuffersWhereItsBlocksAreTheSources) {
+  auto inner = std::make_unique<GlobeSource>();
+  GlobeSource& globe = *inner;
+  WindowedSource aligned(std::move(inner), {16, 8, 20, 10});
+  aligned.limit_buffers(5000);
+  EXPECT_EQ(globe.limit, 5000U);
+  EXPECT_EQ(aligned.buffer_bytes(5000), 5000U);
+  for (const Window& window : {Window{15, 8, 20, 10}, Window{16, 7, 20, 10}}) {
+    inner = std::make_unique<GlobeSource>();
+    GlobeSource& other = *inner;
+    WindowedSource part(std::move(inner), window);
+    part.limit_buffers(5000);
+    EXPECT_EQ(other.limit, GlobeSource::kUnlimited) << "blocks would be decoded twice";
+    EXPECT_EQ(part.buffer_bytes(5000), GlobeSource::kUnlimited);
+  }
+}
+
+TEST(ClosedSource, LeavesOutTheLastColumn) {
+  GlobeSource whole;
+  ClosedSource source(std::make_unique<GlobeSource>());
+  EXPECT_EQ(source.info().width, 72);
+  EXPECT_EQ(source.info().warnings,
+            std::vector<Warning>{"memory: column 72 is the first one again, 360 degrees on, and is left out"});
+  EXPECT_EQ(read(source, {0, 0, 72, 37}), read(whole, {0, 0, 72, 37}));
+}
+
+TEST(ClosedSource, SaysWhereTheLastColumnIsAnother) {
+  auto globe = std::make_unique<GlobeSource>();
+  globe->at(72, 36) = 7;
+  const ClosedSource source(std::move(globe));
+  ASSERT_EQ(source.info().warnings.size(), 1U);
+  EXPECT_EQ(
+      source.info().warnings[0],
+      "memory: column 72 is the first one again, 360 degrees on, and is left out, although its samples are others: "
+      "in row 36, for one");
+  EXPECT_EQ(source.info().warnings[0].kind, Warning::Kind::kLoss);
+}
+
+TEST(Decorators, HaveTheSamplesAsStoredBehindEveryWindow) {
+  GlobeSource whole;
+  const Window part{16, 8, 57, 20};
+  ClosedSource source(std::make_unique<WindowedSource>(filled(std::make_unique<GlobeSource>()), part));
+  HeightSource& stored = source.as_stored();
+  ASSERT_NE(&stored, &source);
+  EXPECT_EQ(stored.info().width, 56);
+  EXPECT_EQ(stored.info().height, 20);
+  EXPECT_EQ(stored.info().georeference.origin_x, source.info().georeference.origin_x);
+  EXPECT_EQ(stored.info().georeference.origin_y, source.info().georeference.origin_y);
+  const std::vector<std::int16_t> as_stored = read(stored, {0, 0, 56, 20});
+  EXPECT_EQ(as_stored, read(whole, {16, 8, 56, 20}));
+  const std::vector<std::int16_t> as_filled = read(source, {0, 0, 56, 20});
+  int voids = 0;
+  for (std::size_t i = 0; i < as_stored.size(); ++i) {
+    const bool is_void = as_stored[i] == -32768;
+    voids += is_void ? 1 : 0;
+    EXPECT_EQ(is_void, as_stored[i] != as_filled[i]);
+  }
+  EXPECT_EQ(voids, 12);
+}
+
+TEST(Decorators, PassOnWhatBuffersMayHoldAndCountTheirOwn) {
+  const TemporaryFolder folder;
+  write_geoid(folder / "a.pgm", 720, 361, [](double, double) { return 20.0; });
+  auto inner = std::make_unique<GlobeSource>();
+  GlobeSource& globe = *inner;
+  std::unique_ptr<HeightSource> source = filled(std::move(inner));
+  const std::uint64_t fill = fill_memory_bytes(source->info(), false);
+  EXPECT_EQ(source->buffer_bytes(4096), 4096U + fill);
+  source = std::make_unique<ClosedSource>(std::move(source));
+  EXPECT_EQ(source->buffer_bytes(4096), 4096U + fill);
+  GeoidSource moved(std::move(source), {folder / "a.pgm", GeoidShift::kToEllipsoidal});
+  moved.limit_buffers(4096);
+  EXPECT_EQ(globe.limit, 4096U);
+  // The strip of the geoid: two degrees of two posts a degree, all the way round, of two bytes; int16 samples of the
+  // largest window (2048 bytes of floats, 7 rows of 72), a row of heights and one of shifts.
+  EXPECT_GT(moved.buffer_bytes(4096), 4096U + fill + 720U * 5U * 2U + 4U * 72U * 2U + 72U * 16U);
+  EXPECT_LT(moved.buffer_bytes(4096), 4096U + fill + 4U * (720U * 5U * 2U + 8U * 72U * 2U + 72U * 16U));
+}
+
+TEST(FilledSource, NarrowWindowsHaveTheSameSamples) {
+  const std::unique_ptr<HeightSource> one = filled(std::make_unique<GlobeSource>());
+  const std::unique_ptr<HeightSource> other = filled(std::make_unique<GlobeSource>());
+  const std::vector<std::int16_t> whole = read(*one, {0, 0, 73, 37});
+  const std::vector<std::int16_t> part = read(*other, {18, 0, 9, 37});
+  for (std::size_t r = 0; r < 37; ++r) {
+    for (std::size_t c = 0; c < 9; ++c) EXPECT_EQ(part[r * 9 + c], whole[r * 73 + 18 + c]) << c << "," << r;
+  }
+}
+
+}  // namespace
+}  // namespace isohf::test

@@ -1,0 +1,492 @@
+#include <OpenEXR/ImfChannelList.h>
+#include <OpenEXR/ImfFrameBuffer.h>
+#include <OpenEXR/ImfHeader.h>
+#include <OpenEXR/ImfMultiPartOutputFile.h>
+#include <OpenEXR/ImfOutputFile.h>
+#include <OpenEXR/ImfOutputPart.h>
+#include <OpenEXR/ImfPartType.h>
+#include <OpenEXR/ImfTiledOutputFile.h>
+#include <OpenEXR/ImfTiledOutputPart.h>
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "formats/raster_reference.h"
+#include "formats/reader_failure.h"
+#include "formats/readers.h"
+#include "formats/registry.h"
+#include "isohf/error.h"
+#include "isohf/raster.h"
+#include "support/rasters/samples.h"
+#include "support/real_files.h"
+#include "support/temporary_folder.h"
+
+namespace isohf::test {
+namespace {
+
+using ::testing::HasSubstr;
+
+/// What to write: every combination of these is read back below.
+struct ExrPicture {
+  int width = 37;
+  int height = 41;
+  Imath::V2i origin{0, 0};
+  Imf::PixelType type = Imf::FLOAT;
+  Imf::Compression compression = Imf::ZIP_COMPRESSION;
+  Imf::LineOrder order = Imf::INCREASING_Y;
+  std::vector<std::string> channels = {"Y"};
+  int tile_size = 0;  ///< 0: scan lines
+  Imf::LevelMode levels = Imf::ONE_LEVEL;
+};
+
+/// Small whole numbers: exact in half, and in every compression that rounds to no fewer than 11 bits.
+int value_at(int column, int row, std::size_t channel) {
+  return (column * 7 + row * 13) % 1000 + static_cast<int>(channel) * 1000;
+}
+
+class Samples {
+ public:
+  explicit Samples(const ExrPicture& picture) : picture_(picture) {
+    for (std::size_t c = 0; c < picture.channels.size(); ++c) {
+      auto& plane = planes_.emplace_back(static_cast<std::size_t>(picture.width * picture.height) * size());
+      for (int row = 0; row < picture.height; ++row) {
+        for (int column = 0; column < picture.width; ++column) {
+          store(plane.data() + static_cast<std::size_t>(row * picture.width + column) * size(),
+                value_at(column, row, c));
+        }
+      }
+    }
+  }
+
+  [[nodiscard]] std::size_t size() const { return picture_.type == Imf::HALF ? 2 : 4; }
+  [[nodiscard]] const std::vector<std::byte>& plane(std::size_t channel) const { return planes_[channel]; }
+
+  [[nodiscard]] Imf::FrameBuffer frame() {
+    Imf::FrameBuffer frame;
+    for (std::size_t c = 0; c < planes_.size(); ++c) {
+      frame.insert(picture_.channels[c], Imf::Slice::Make(picture_.type, planes_[c].data(), picture_.origin,
+                                                          picture_.width, picture_.height));
+    }
+    return frame;
+  }
+
+ private:
+  void store(std::byte* at, int value) const {
+    const auto put = [&](auto sample) { std::memcpy(at, &sample, sizeof sample); };
+    if (picture_.type == Imf::HALF) put(Imath::half(static_cast<float>(value)).bits());
+    if (picture_.type == Imf::FLOAT) put(static_cast<float>(value));
+    if (picture_.type == Imf::UINT) put(static_cast<std::uint32_t>(value));
+  }
+
+  ExrPicture picture_;
+  std::vector<std::vector<std::byte>> planes_;
+};
+
+Imf::Header header_of(const ExrPicture& picture) {
+  const Imath::Box2i window(picture.origin, picture.origin + Imath::V2i(picture.width - 1, picture.height - 1));
+  Imf::Header header(window, window);
+  header.compression() = picture.compression;
+  header.lineOrder() = picture.order;
+  for (const std::string& name : picture.channels) header.channels().insert(name, Imf::Channel(picture.type));
+  if (picture.tile_size > 0) {
+    const auto size = static_cast<unsigned>(picture.tile_size);
+    header.setTileDescription(Imf::TileDescription(size, size, picture.levels));
+  }
+  return header;
+}
+
+void write_tiled(const std::string& path, const ExrPicture& picture, Samples& samples) {
+  Imf::TiledOutputFile file(path.c_str(), header_of(picture));
+  for (int ly = 0; ly < file.numYLevels(); ++ly) {
+    for (int lx = 0; lx < file.numXLevels(); ++lx) {
+      if (!file.isValidLevel(lx, ly)) continue;
+      // The smaller levels repeat a corner of the largest: wrong values there must never be read.
+      file.setFrameBuffer(samples.frame());
+      file.writeTiles(0, file.numXTiles(lx) - 1, 0, file.numYTiles(ly) - 1, lx, ly);
+    }
+  }
+}
+
+void write_exr(const std::string& path, const ExrPicture& picture) {
+  Samples samples(picture);
+  if (picture.tile_size > 0) return write_tiled(path, picture, samples);
+  Imf::OutputFile file(path.c_str(), header_of(picture));
+  file.setFrameBuffer(samples.frame());
+  file.writePixels(picture.height);
+}
+
+void expect_reads_as(const std::string& path, const ExrPicture& picture) {
+  const Samples samples(picture);
+  const auto source = open_exr(path, {});
+  const SourceInfo& info = source->info();
+  ASSERT_EQ(info.width, picture.width);
+  ASSERT_EQ(info.height, picture.height);
+  ASSERT_EQ(size_bytes(info.sample_type), samples.size());
+  EXPECT_EQ(info.format, "OpenEXR");
+  ASSERT_EQ(read_whole(*source), samples.plane(0));
+  // Any order of windows gives the same samples: upwards, in odd rectangles.
+  for (int row = picture.height - 3; row >= 0; row -= 5) {
+    for (int column = 0; column + 6 <= picture.width; column += 11) {
+      const auto block = read_window(*source, {column, row, 6, 3});
+      for (int y = 0; y < 3; ++y) {
+        const auto at = static_cast<std::size_t>((row + y) * picture.width + column) * samples.size();
+        ASSERT_EQ(std::memcmp(block.data() + static_cast<std::size_t>(y * 6) * samples.size(),
+                              samples.plane(0).data() + at, 6 * samples.size()),
+                  0)
+            << "column " << column << " row " << row + y;
+      }
+    }
+  }
+}
+
+TEST(ExrSource, ReadsEverySampleTypeCompressionAndLayout) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "picture.exr";
+  for (const Imf::PixelType type : {Imf::HALF, Imf::FLOAT, Imf::UINT}) {
+    for (const Imf::Compression compression : {Imf::NO_COMPRESSION, Imf::RLE_COMPRESSION, Imf::ZIPS_COMPRESSION,
+                                               Imf::ZIP_COMPRESSION, Imf::PIZ_COMPRESSION, Imf::PXR24_COMPRESSION}) {
+      for (const int tile_size : {0, 16}) {
+        for (const Imf::LevelMode levels : {Imf::ONE_LEVEL, Imf::MIPMAP_LEVELS, Imf::RIPMAP_LEVELS}) {
+          if (tile_size == 0 && levels != Imf::ONE_LEVEL) continue;
+          for (const Imf::LineOrder order : {Imf::INCREASING_Y, Imf::DECREASING_Y, Imf::RANDOM_Y}) {
+            if (tile_size == 0 && order == Imf::RANDOM_Y) continue;
+            ExrPicture picture;
+            picture.type = type;
+            picture.compression = compression;
+            picture.tile_size = tile_size;
+            picture.levels = levels;
+            picture.order = order;
+            SCOPED_TRACE(fmt::format("type {} compression {} tiles {} levels {} order {}", type, compression, tile_size,
+                                     levels, order));
+            write_exr(path, picture);
+            expect_reads_as(path, picture);
+          }
+        }
+      }
+    }
+  }
+}
+
+TEST(ExrSource, ReadsLossyHalvesAsTheLibraryDecodesThem) {
+  const TemporaryFolder folder;
+  for (const Imf::Compression compression :
+       {Imf::B44_COMPRESSION, Imf::B44A_COMPRESSION, Imf::DWAA_COMPRESSION, Imf::DWAB_COMPRESSION}) {
+    ExrPicture picture;
+    picture.type = Imf::HALF;
+    picture.compression = compression;
+    picture.height = 300;  // more than the 256 lines that DWAB packs together
+    const std::string path = folder / "lossy.exr";
+    write_exr(path, picture);
+    const auto source = open_exr(path, {});
+    const auto samples = read_whole(*source);
+    // Rows one by one, from the last to the first, come out as they do all at once.
+    const auto row_bytes = static_cast<std::size_t>(picture.width) * 2;
+    for (int row = picture.height - 1; row >= 0; --row) {
+      const auto one = read_window(*source, {0, row, picture.width, 1});
+      ASSERT_EQ(std::memcmp(one.data(), samples.data() + static_cast<std::size_t>(row) * row_bytes, row_bytes), 0);
+    }
+  }
+}
+
+TEST(ExrSource, TakesTheDataWindowWhereverItLies) {
+  const TemporaryFolder folder;
+  for (const Imath::V2i& origin : {Imath::V2i(30, 40), Imath::V2i(-500, -7), Imath::V2i(-3, 1000000)}) {
+    for (const int tile_size : {0, 8}) {
+      ExrPicture picture;
+      picture.origin = origin;
+      picture.tile_size = tile_size;
+      const std::string path = folder / "offset.exr";
+      write_exr(path, picture);
+      expect_reads_as(path, picture);
+    }
+  }
+}
+
+TEST(ExrSource, WarnsWhenTheDisplayWindowDiffers) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "windows.exr";
+  ExrPicture picture;
+  Samples samples(picture);
+  Imf::Header header = header_of(picture);
+  header.displayWindow() = Imath::Box2i({0, 0}, {99, 99});
+  {
+    Imf::OutputFile file(path.c_str(), header);
+    file.setFrameBuffer(samples.frame());
+    file.writePixels(picture.height);
+  }
+  const auto source = open_exr(path, {});
+  ASSERT_EQ(source->info().warnings.size(), 1U);
+  EXPECT_THAT(source->info().warnings[0], HasSubstr("(0, 0) - (36, 40) is read; the display window (0, 0) - (99, 99)"));
+}
+
+TEST(ExrSource, IsPlacedByAWorldFile) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "a.exr";
+  std::filesystem::copy_file(std::string(ISOHF_SOURCE_DIR) + "/testdata/ridges_161x161_float.exr", path);
+  EXPECT_FALSE(open_raster(path, {})->info().georeference.has_origin);
+  write_file(folder / "a.erw", "0.5\n0\n0\n-0.25\n10.25\n50\n");
+  const Georeference place = open_raster(path, {})->info().georeference;
+  EXPECT_TRUE(place.has_origin);
+  EXPECT_EQ(place.origin_x, 10.25);
+  EXPECT_EQ(place.origin_y, 50.0);
+  EXPECT_EQ(place.spacing_x, 0.5);
+  EXPECT_EQ(place.spacing_y, 0.25);
+}
+
+TEST(ExrSource, PrefersElevationChannelsAndSaysSo) {
+  const TemporaryFolder folder;
+  const std::vector<std::pair<std::vector<std::string>, std::string>> cases = {
+      {{"A", "B", "G", "R"}, "R"},
+      {{"R", "Y"}, "Y"},
+      {{"R", "Z"}, "Z"},
+      {{"mask", "height"}, "height"},
+      {{"G", "A"}, "G"},
+      {{"a.mask", "b.Z"}, "b.Z"},
+      {{"B", "depth"}, "depth"},
+      {{"N.Y", "height.Y"}, "height.Y"},
+      {{"N.Z", "Z"}, "Z"},
+      {{"N.Y", "N.Z", "beauty.R"}, "beauty.R"},
+      {{"Y", "terrain.Height"}, "terrain.Height"},
+      {{"Y", "ELEVATION"}, "ELEVATION"}};
+  for (const auto& [channels, chosen] : cases) {
+    ExrPicture picture;
+    picture.channels = channels;
+    const std::string path = folder / "channels.exr";
+    write_exr(path, picture);
+    const auto source = open_exr(path, {});
+    EXPECT_EQ(source->info().channel, chosen);
+    ASSERT_EQ(source->info().warnings.size(), 1U);
+    EXPECT_THAT(source->info().warnings[0],
+                HasSubstr(fmt::format("channel {} is read, of {}", chosen, channels.size())));
+  }
+}
+
+TEST(ExrSource, ReadsTheChannelAskedForByNameOrNumber) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "channels.exr";
+  ExrPicture picture;
+  picture.channels = {"B", "G", "R"};
+  write_exr(path, picture);
+  const Samples samples(picture);
+  for (std::size_t channel = 0; channel < 3; ++channel) {
+    // Numbers count as oiiotool lists the channels: R, G, B.
+    for (const std::string& name : {picture.channels[channel], std::to_string(2 - channel)}) {
+      OpenOptions options;
+      options.channel = name;
+      const auto source = open_exr(path, options);
+      EXPECT_EQ(read_whole(*source), samples.plane(channel));
+      EXPECT_TRUE(source->info().warnings.empty());
+    }
+  }
+}
+
+TEST(ExrSource, ListsTheChannelsWhenTheOneAskedForIsMissing) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "channels.exr";
+  ExrPicture picture;
+  picture.channels = {"B", "G", "R"};
+  write_exr(path, picture);
+  for (const char* name : {"Y", "3", "-1", "1x", "r", "R "}) {
+    OpenOptions options;
+    options.channel = name;
+    const Error error = error_of([&] { (void)open_exr(path, options); });
+    EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
+    EXPECT_EQ(error.what(), fmt::format("{}: has no channel \"{}\"; it has R, G, B (or 0...2)", path, name));
+  }
+}
+
+TEST(ExrSource, ReadsPartsOfAMultiPartFile) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "parts.exr";
+  std::vector<ExrPicture> pictures(3);
+  pictures[0].channels = {"mask"};
+  pictures[1].channels = {"Y", "error"};
+  pictures[1].type = Imf::HALF;
+  pictures[1].tile_size = 16;
+  pictures[2].channels = {"Y"};
+  pictures[2].width = 5;
+  pictures[2].height = 9;
+  const std::vector<std::string> names = {"cover", "ground", "small"};
+  {
+    std::vector<Imf::Header> headers;
+    for (std::size_t part = 0; part < pictures.size(); ++part) {
+      Imf::Header header = header_of(pictures[part]);
+      header.displayWindow() = Imath::Box2i({0, 0}, {36, 40});  // shared by all parts
+      header.setName(names[part]);
+      header.setType(pictures[part].tile_size > 0 ? Imf::TILEDIMAGE : Imf::SCANLINEIMAGE);
+      headers.push_back(header);
+    }
+    Imf::MultiPartOutputFile file(path.c_str(), headers.data(), static_cast<int>(headers.size()));
+    for (int part = 0; part < 3; ++part) {
+      const ExrPicture& picture = pictures[static_cast<std::size_t>(part)];
+      Samples samples(picture);
+      if (picture.tile_size > 0) {
+        Imf::TiledOutputPart out(file, part);
+        out.setFrameBuffer(samples.frame());
+        out.writeTiles(0, out.numXTiles() - 1, 0, out.numYTiles() - 1);
+      } else {
+        Imf::OutputPart out(file, part);
+        out.setFrameBuffer(samples.frame());
+        out.writePixels(picture.height);
+      }
+    }
+  }
+  const auto expect = [&](const std::string& channel, std::size_t part, std::size_t plane, const std::string& name) {
+    OpenOptions options;
+    options.channel = channel;
+    const auto source = open_exr(path, options);
+    EXPECT_EQ(read_whole(*source), Samples(pictures[part]).plane(plane)) << channel;
+    EXPECT_EQ(source->info().channel, name);
+  };
+  expect("", 1, 0, "ground.Y");
+  expect("mask", 0, 0, "cover.mask");
+  expect("Y", 1, 0, "ground.Y");
+  expect("error", 1, 1, "ground.error");
+  expect("small.Y", 2, 0, "small.Y");
+  expect("3", 2, 0, "small.Y");
+  OpenOptions options;
+  options.channel = "Z";
+  EXPECT_THAT(error_of([&] { (void)open_exr(path, options); }).what(),
+              HasSubstr("it has cover.mask, ground.Y, ground.error, small.Y"));
+  const auto expect_part = [&](const char* part, const char* channel, std::size_t number, std::size_t plane,
+                               const std::string& name) {
+    OpenOptions of_part;
+    of_part.part = part;
+    of_part.channel = channel;
+    const auto source = open_raster(path, of_part);
+    EXPECT_EQ(read_whole(*source), Samples(pictures[number]).plane(plane)) << part;
+    EXPECT_EQ(source->info().channel, name);
+  };
+  expect_part("ground", "", 1, 0, "ground.Y");
+  expect_part("1", "error", 1, 1, "ground.error");
+  expect_part("small", "", 2, 0, "small.Y");
+  expect_part("2", "0", 2, 0, "small.Y");
+  OpenOptions wrong;
+  wrong.part = "sky";
+  EXPECT_THAT(error_of([&] { (void)open_exr(path, wrong); }).what(), HasSubstr("has no part \"sky\""));
+  wrong.part = "3";
+  EXPECT_THAT(error_of([&] { (void)open_exr(path, wrong); }).what(), HasSubstr("in parts 0...2"));
+  write_file(folder / "a.asc", "ncols 1\nnrows 1\n1\n");
+  EXPECT_THAT(error_of([&] { (void)open_raster(folder / "a.asc", wrong); }).what(),
+              HasSubstr("`part` is for archives and OpenEXR"));
+}
+
+TEST(ExrSource, RefusesSubsampledChannelsOnly) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "chroma.exr";
+  ExrPicture picture;
+  picture.width = picture.height = 8;
+  Samples samples(picture);
+  std::vector<float> chroma(16, 1.0F);
+  Imf::Header header = header_of(picture);
+  header.channels().insert("BY", Imf::Channel(Imf::FLOAT, 2, 2));
+  {
+    Imf::OutputFile file(path.c_str(), header);
+    Imf::FrameBuffer frame = samples.frame();
+    frame.insert("BY", Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(chroma.data()), 4, 16, 2, 2));
+    file.setFrameBuffer(frame);
+    file.writePixels(8);
+  }
+  EXPECT_EQ(read_whole(*open_exr(path, {})), samples.plane(0));
+  OpenOptions options;
+  options.channel = "BY";
+  const Error error = error_of([&] { (void)open_exr(path, options); });
+  EXPECT_EQ(error.code(), ErrorCode::kUnsupported);
+  EXPECT_THAT(error.what(), HasSubstr("BY is subsampled"));
+}
+
+/// Opens and reads: the right samples, or an Error that names the file.
+void expect_right_or_refused(const std::string& path, const std::vector<std::byte>& expected) {
+  try {
+    const auto source = open_exr(path, {});
+    EXPECT_EQ(read_whole(*source), expected);
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), HasSubstr(path));
+    EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos) << error.what();
+  }
+}
+
+TEST(ExrSource, ReportsEveryTruncation) {
+  const TemporaryFolder folder;
+  for (const int tile_size : {0, 16}) {
+    ExrPicture picture;
+    picture.tile_size = tile_size;
+    picture.levels = tile_size > 0 ? Imf::MIPMAP_LEVELS : Imf::ONE_LEVEL;
+    const std::string path = folder / "whole.exr";
+    write_exr(path, picture);
+    const Samples samples(picture);
+    const auto bytes = read_file(path);
+    const std::string cut = folder / "cut.exr";
+    for (std::size_t length = 0; length < bytes.size(); length += length < 700 ? 1 : 7) {
+      write_file(cut, bytes.substr(0, length));
+      SCOPED_TRACE(fmt::format("{} of {} bytes", length, bytes.size()));
+      expect_right_or_refused(cut, samples.plane(0));
+    }
+  }
+}
+
+TEST(ExrSource, SurvivesEveryHeaderByteWrong) {
+  const TemporaryFolder folder;
+  ExrPicture picture;
+  picture.width = picture.height = 9;
+  const std::string path = folder / "whole.exr";
+  write_exr(path, picture);
+  const auto bytes = read_file(path);
+  const std::string bad = folder / "bad.exr";
+  for (std::size_t at = 4; at < std::min<std::size_t>(bytes.size(), 420); ++at) {
+    for (const char wrong : {'\0', '\x01', '\x7F', '\xFF'}) {
+      auto changed = bytes;
+      changed[at] = wrong;
+      write_file(bad, changed);
+      try {
+        // Other samples may come out (a header says what the bytes mean); a crash or another exception must not.
+        (void)read_whole(*open_exr(bad, {}));
+      } catch (const Error& error) {
+        EXPECT_THAT(error.what(), HasSubstr(bad));
+      }
+    }
+  }
+}
+
+TEST(ExrSource, RefusesAbsurdSizesBeforeAllocating) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "absurd.exr";
+  ExrPicture picture;
+  write_exr(path, picture);
+  const auto bytes = read_file(path);
+  const auto patched = [&](const std::string& attribute, std::size_t skip, std::vector<std::int32_t> values) {
+    auto changed = bytes;
+    const std::size_t at = changed.find(attribute) + skip;
+    std::memcpy(changed.data() + at, values.data(), values.size() * 4);
+    write_file(path, changed);
+    return error_of([&] { (void)open_exr(path, {}); });
+  };
+  constexpr std::int32_t kHuge = 0x3FFFFFFF;
+  const std::size_t to_window = std::string("dataWindow").size() + 1 + std::string("box2i").size() + 1 + 4;
+  Error error = patched("dataWindow", to_window, {0, 0, kHuge, kHuge});
+  EXPECT_EQ(error.code(), ErrorCode::kCorrupt);
+  EXPECT_THAT(error.what(), HasSubstr("declares 1073741824 x 1073741824 pixels"));
+  error = patched("dataWindow", to_window, {0, 0, kHuge, 40});
+  EXPECT_EQ(error.code(), ErrorCode::kUnsupported);
+  EXPECT_THAT(error.what(), HasSubstr("larger than 32 MiB"));
+  error = patched("dataWindow", to_window, {0, 0, -1, 40});
+  EXPECT_THAT(error.what(), HasSubstr("is empty"));
+  error = patched("dataWindow", to_window, {INT32_MIN, INT32_MIN, INT32_MAX, INT32_MAX});
+  EXPECT_EQ(error.code(), ErrorCode::kCorrupt);
+  error = patched("dataWindow", to_window - 4, {INT32_MAX});
+  EXPECT_THAT(error.what(), HasSubstr("attribute \"dataWindow\": OpenEXR header ends early"));
+}
+
+TEST(ExrSource, AgreesWithReferenceReadersOnRealFiles) {
+  const auto files = real_files({".exr"});
+  if (files.empty()) GTEST_SKIP() << kNoRealFiles;
+  for (const auto& file : files) {
+    SCOPED_TRACE(file);
+    const auto source = open_raster(file, {});
+    expect_as_reference(*source, reference_of(file));
+    EXPECT_EQ(source->info().georeference.registration, Registration::kUnknown);
+  }
+}
+
+}  // namespace
+}  // namespace isohf::test
