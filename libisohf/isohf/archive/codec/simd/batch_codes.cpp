@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "isohf/archive/codec/predict/sample_lattice.h"
+#include "isohf/archive/codec/simd/sample_pairs.h"
 #include "isohf/archive/codec/simd/vector_operations.h"
 
 namespace isohf {
@@ -10,17 +11,6 @@ namespace {
 
 constexpr std::size_t kLanes = kBatchLanes;
 constexpr std::ptrdiff_t kStep = BatchRing::kStep;
-
-/// A sample less 2^15, so that it fits 16 bits with a sign. Weights add up to 2^12, hence the sum of weighted samples
-/// is that of the shifted ones and 2^27.
-constexpr std::int32_t kSampleShift = 1 << 15;
-
-/// Two neighbouring samples, shifted, of each lane: that of the place in the low half, that East of it in the high
-/// half. One multiplication by a pair of weights does for both.
-constexpr std::int32_t pair_of(std::int32_t west, std::int32_t east) {
-  return static_cast<std::int32_t>((static_cast<std::uint32_t>(west) & 0xffffU) | static_cast<std::uint32_t>(east)
-                                                                                      << 16U);
-}
 
 constexpr int kAnchor = static_cast<int>(kWeightCount);  // NE's weight
 /// A pair of terms: the place of its western sample from the predicted one, on which row, and the weights of both; a
@@ -98,28 +88,6 @@ ISOHF_KERNEL void restore_places(const Rows& rows, const StretchWeights& weights
   unaligned<Ints>(range.most_seen.data()).value = most_seen;
 }
 
-/// The samples of eight places from first on, lane by lane: the pairs of every other place, a transposed square.
-ISOHF_KERNEL void turn_square(const std::int32_t* samples, const PerLane<std::uint16_t*>& codes, int first) {
-  using Long = std::uint64_t __attribute__((vector_size(8 * kLanes / 2)));
-  using Quad = std::uint32_t __attribute__((vector_size(16)));
-  Words pairs[4];
-  for (std::size_t i = 0; i < 4; ++i) {
-    pairs[i] = unaligned<Words>(samples + 2 * i * kLanes).value ^ 0x80008000U;
-  }
-  // Within each half of the lanes: rows of four lanes become columns.
-  const Long a = (Long)__builtin_shufflevector(pairs[0], pairs[1], 0, 8, 1, 9, 4, 12, 5, 13);
-  const Long b = (Long)__builtin_shufflevector(pairs[0], pairs[1], 2, 10, 3, 11, 6, 14, 7, 15);
-  const Long c = (Long)__builtin_shufflevector(pairs[2], pairs[3], 0, 8, 1, 9, 4, 12, 5, 13);
-  const Long d = (Long)__builtin_shufflevector(pairs[2], pairs[3], 2, 10, 3, 11, 6, 14, 7, 15);
-  const Words turned[4] = {
-      (Words)__builtin_shufflevector(a, c, 0, 4, 2, 6), (Words)__builtin_shufflevector(a, c, 1, 5, 3, 7),
-      (Words)__builtin_shufflevector(b, d, 0, 4, 2, 6), (Words)__builtin_shufflevector(b, d, 1, 5, 3, 7)};
-  for (std::size_t lane = 0; lane < 4; ++lane) {
-    unaligned<Quad>(codes[lane] + first).value = __builtin_shufflevector(turned[lane], turned[lane], 0, 1, 2, 3);
-    unaligned<Quad>(codes[lane + 4] + first).value = __builtin_shufflevector(turned[lane], turned[lane], 4, 5, 6, 7);
-  }
-}
-
 /// A sample that a pair of all lanes holds, its eastern one or the other, twice in each of `count` pairs.
 void repeat_sample(const std::int32_t* pairs, bool is_eastern, std::int32_t* out, int count) {
   PerLane<std::int32_t> twice{};
@@ -185,7 +153,7 @@ void BatchCodes::write_row(int r, const PerLane<std::uint16_t*>& codes) const {
   const auto step = static_cast<int>(kLanes);
   const int last = r % 2 == 0 ? columns_ - 2 : columns_ - 1;
   int place = Lattice<std::int32_t>::first(r);
-  for (; place + step <= last + 1; place += step) vectorised<turn_square>(samples + place * kStep, codes, place);
+  for (; place + step <= last + 1; place += step) vectorised<turn_square<kStep>>(samples + place * kStep, codes, place);
   for (; place <= last; ++place) {
     for (std::size_t lane = 0; lane < stretches_.lanes(); ++lane) {
       codes[lane][place] = static_cast<std::uint16_t>(sample(r, place, lane));

@@ -3,14 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <functional>
 #include <limits>
-#include <numeric>
 #include <vector>
 
 #include "isohf/archive/codec/adaptive/symbol_model.h"
-#include "isohf/archive/codec/predict/sample_lattice.h"
-#include "isohf/archive/codec/simd/vector_operations.h"
+#include "isohf/archive/codec/simd/slanted_rows.h"
 #include "isohf/base/bytes.h"
 #include "isohf/base/simd.h"
 #if defined(ISOHF_HAS_WIDE_BUILTINS)
@@ -20,74 +17,8 @@
 namespace isohf {
 namespace {
 
-constexpr int kLanes = kBandRows;
-constexpr int kMargin = 3;
-constexpr int kRowsAbove = 3;
+constexpr int kLanes = SlantedRows::kLanes;
 constexpr std::size_t kSlack = 64;  ///< bytes that a step may read past words and extra bits
-
-using Eight = std::uint16_t __attribute__((vector_size(16)));
-
-/// When place 0 of a lane's row is worked on; lanes below 0 are the rows above the band.
-constexpr int delay(int lane) {
-  return (7 * lane + 1) >> 1;
-}
-
-/// Samples are kept less 2^15, so that they fit 16 bits with a sign, each behind that of the place West of it: one
-/// multiplication by a pair of weights does for both.
-constexpr std::int32_t kSampleShift = 1 << 15;
-constexpr std::int32_t pair_of(std::int32_t west, std::int32_t east) {
-  return static_cast<std::int32_t>((static_cast<std::uint32_t>(west) & 0xffffU) | static_cast<std::uint32_t>(east)
-                                                                                      << 16U);
-}
-
-/// What the lanes have at each time: lane i's place t - delay(i) at time t, so that each neighbour of all lanes' samples
-/// is one vector: of W the one a time before, of those on the row above the one a lane before, three times before.
-class SlantedRows {
- public:
-  static constexpr int kDeviationRowsAbove = 2;
-  /// A line of the cache.
-  struct alignas(64) Time {
-    std::array<std::int32_t, kRowsAbove + kLanes> pairs;
-    std::array<std::uint16_t, kDeviationRowsAbove + kLanes> deviations;
-
-    [[nodiscard]] std::int32_t& pair(int lane) { return pairs[static_cast<std::size_t>(kRowsAbove + lane)]; }
-    [[nodiscard]] std::uint16_t& deviation(int lane) {
-      return deviations[static_cast<std::size_t>(kDeviationRowsAbove + lane)];
-    }
-  };
-
-  explicit SlantedRows(int columns)
-      : times_(static_cast<std::size_t>(columns + kMargin + delay(kLanes - 1) + kAhead - kFirstTime)) {}
-
-  [[nodiscard]] Time& at(int time) { return times_[static_cast<std::size_t>(time - kFirstTime)]; }
-  [[nodiscard]] Time& at(int lane, int place) { return at(place + delay(lane)); }
-  [[nodiscard]] std::int32_t sample(int lane, int place) { return (at(lane, place).pair(lane) >> 16) + kSampleShift; }
-  [[nodiscard]] std::uint16_t deviation(int lane, int place) { return at(lane, place).deviation(lane); }
-  void fill(int lane, int begin, int end, std::int32_t sample, std::uint16_t deviation) {
-    const std::int32_t kept = sample - kSampleShift;
-    for (int place = begin; place < end; ++place) {
-      at(lane, place).pair(lane) = pair_of(kept, kept);
-      if (lane >= -kDeviationRowsAbove) at(lane, place).deviation(lane) = deviation;
-    }
-    std::int32_t& after = at(lane, end).pair(lane);
-    after = pair_of(kept, after >> 16);
-  }
-  /// The last rows become those above the next band.
-  void next_band(int columns) {
-    for (int time = kFirstTime; time < columns + kMargin; ++time) {
-      Time& above = at(time);
-      const Time& done = at(time + kAhead);
-      for (std::size_t i = 0; i < kRowsAbove; ++i) above.pairs[i] = done.pairs[kLanes + i];
-      for (std::size_t i = 0; i < kDeviationRowsAbove; ++i) above.deviations[i] = done.deviations[kLanes + i];
-    }
-  }
-
- private:
-  static constexpr int kFirstTime = delay(-kRowsAbove) - kMargin;
-  static constexpr int kAhead = delay(kLanes) - delay(0);  ///< a lane's row is one of the next band so much later
-
-  std::vector<Time> times_;
-};
 
 /// A symbol's start, 16 bits, and that of the one after it, or of the escape anything. Puts 2 + 2 times the symbol below
 /// `symbols`, which are those of the lanes after this one.
@@ -122,16 +53,7 @@ ISOHF_KERNEL std::uint32_t take_symbol(SymbolModel& model, SymbolModel::View& vi
   return table.starts[symbol] | next << 16U;
 }
 
-/// Eight numbers of 16 or 8 bits, as words.
-template <bool kIsWide>
-ISOHF_KERNEL Words from_shorts(const void* numbers) {
-  const Eight eight = unaligned<Eight>(numbers).value;
-#if defined(ISOHF_HAS_WIDE_BUILTINS)
-  using Shorts = short __attribute__((vector_size(16)));
-  if constexpr (kIsWide) return (Words)__builtin_ia32_pmovzxwd256((Shorts)eight);
-#endif
-  return __builtin_convertvector(eight, Words);
-}
+/// Eight numbers of 8 bits, as words.
 template <bool kIsWide>
 ISOHF_KERNEL Words from_bytes(const void* numbers) {
 #if defined(ISOHF_HAS_WIDE_BUILTINS)
@@ -154,18 +76,6 @@ constexpr auto kWordOfLane = [] {
   }
   return words;
 }();
-
-/// A bit for each lane.
-template <bool kIsWide>
-ISOHF_KERNEL unsigned lanes_of(Ints mask) {
-#if defined(ISOHF_HAS_WIDE_BUILTINS)
-  using Floats = float __attribute__((vector_size(32)));
-  if constexpr (kIsWide) return static_cast<unsigned>(__builtin_ia32_movmskps256((Floats)mask));
-#endif
-  unsigned lanes = 0;
-  for (int lane = 0; lane < kLanes; ++lane) lanes |= mask[lane] != 0 ? 1U << lane : 0;
-  return lanes;
-}
 
 /// Words and extra bits on their way.
 struct Source {
@@ -238,30 +148,9 @@ struct Source {
   }
 };
 
-/// A pair of terms of the prediction: the lane and the times before at which its eastern sample stands, and the weights
-/// of both; a negative one for none.
-struct TermPair {
-  int lane;
-  int back;
-  int west;
-  int east;
-};
-constexpr int kAnchor = static_cast<int>(kWeightCount);  // NE's weight
-constexpr std::array<TermPair, 10> kTermPairs = {{{-3, 11, 13, 11},
-                                                  {-3, 9, 10, 12},
-                                                  {-2, 10, -1, 17},
-                                                  {-2, 8, 9, 7},
-                                                  {-2, 6, 5, 6},
-                                                  {-2, 4, 8, 16},
-                                                  {-1, 5, 15, 4},
-                                                  {-1, 3, 1, kAnchor},
-                                                  {-1, 1, 3, 14},
-                                                  {0, 1, 2, 0}}};
-constexpr std::size_t kNearestPairs = 2;  ///< the last ones, of the time before
-
 /// Numbers of a step that stand in memory, where nothing takes a register or is made anew for them.
 struct LaneConstants {
-  std::array<Words, kTermPairs.size()> weights{};
+  std::array<Words, kSlantedTerms.size()> weights{};
   Words shifts = Words{} + (std::uint32_t{kSampleShift} << kWeightBits);  ///< of samples, in a sum
   Ints least;                                                             ///< of predictions, in eighths
   Ints most;
@@ -285,53 +174,11 @@ struct LaneConstants {
   Ints east_shift = Ints{} + std::numeric_limits<std::int32_t>::min();  ///< of the eastern sample of a pair
 };
 
-struct Band {
-  SlantedRows& slanted;
+struct Band : SlantedBand {
   Source& source;
   SymbolModel& model;
   const LaneConstants& constants;
-  int columns;
-  int rows;
-  const std::uint8_t* is_void;  ///< of the band's first row; nullptr where nothing is
 };
-
-/// What the last time left: a load that overlaps a store of just now would wait for it.
-struct Recent {
-  Ints own;
-  Ints north;  ///< of lanes one before
-  Ints off;
-  Ints off_north;
-  Ints lowest;  ///< of all samples
-  Ints highest;
-
-  /// `before` is what the lanes one before had: of all but the first it is what they have now.
-  ISOHF_KERNEL void keep(Ints pairs, Ints deviations, Ints pairs_before, Ints deviations_before) {
-    own = pairs;
-    off = deviations;
-    north = __builtin_shufflevector(pairs, pairs_before, 8, 0, 1, 2, 3, 4, 5, 6);
-    off_north = __builtin_shufflevector(deviations, deviations_before, 8, 0, 1, 2, 3, 4, 5, 6);
-  }
-  /// After a row has been opened or closed.
-  template <bool kIsWide>
-  ISOHF_KERNEL void reload(SlantedRows::Time& now) {
-    own = unaligned<Ints>(&now.pair(0)).value;
-    north = unaligned<Ints>(&now.pair(-1)).value;
-    off = (Ints)from_shorts<kIsWide>(&now.deviation(0));
-    off_north = (Ints)from_shorts<kIsWide>(&now.deviation(-1));
-  }
-};
-
-/// Of active lanes, and of others.
-ISOHF_KERNEL Ints voids_at(const Band& band, int t) {
-  Ints is_void{};
-  for (int lane = 0; lane < band.rows; ++lane) {
-    const int place = t - delay(lane);
-    if (place < 0 || place >= band.columns) continue;
-    const int column = column_of_place(band.columns, lane, place);
-    is_void[lane] = band.is_void[static_cast<std::ptrdiff_t>(lane) * band.columns + column] != 0 ? -1 : 0;
-  }
-  return is_void;
-}
 
 /// Places of the active lanes at a time. False where words or extra bits have run out.
 template <bool kIsWide, bool kHasOneState>
@@ -345,10 +192,10 @@ ISOHF_KERNEL bool decode_time(const Band& band, SymbolModel& model, SymbolModel:
 
   Words sum = by.shifts;
 #pragma GCC unroll 10
-  for (std::size_t i = 0; i < kTermPairs.size() - kNearestPairs; ++i) {
-    sum += multiply_pairs<kIsWide>(by.weights[i], pairs(kTermPairs[i].lane, kTermPairs[i].back));
+  for (std::size_t i = 0; i < kSlantedTerms.size() - kNearestPairs; ++i) {
+    sum += multiply_pairs<kIsWide>(by.weights[i], pairs(kSlantedTerms[i].lane, kSlantedTerms[i].back));
   }
-  sum += multiply_pairs<kIsWide>(by.weights[kTermPairs.size() - 2], (Words)recent.north);
+  sum += multiply_pairs<kIsWide>(by.weights[kSlantedTerms.size() - 2], (Words)recent.north);
   // As fine_energy has it.
   const Ints fours = off(-1, 3) + off(-1, 4) + off(-2, 7);
   const Ints twos = recent.off_north + off(-1, 5) + off(-2, 6) + off(-2, 8);
@@ -372,7 +219,7 @@ ISOHF_KERNEL bool decode_time(const Band& band, SymbolModel& model, SymbolModel:
   const Ints pattern = (Ints)(multiply_pairs<kIsWide>(compare(beside(north_east, north_west)), by.east_weights) +
                               multiply_pairs<kIsWide>(compare(beside(ne_nw, own_west)), by.west_weights));
   // As FinePrediction and context_of have it.
-  Ints eighths = (Ints)(sum + multiply_pairs<kIsWide>(by.weights[kTermPairs.size() - 1], (Words)recent.own)) >>
+  Ints eighths = (Ints)(sum + multiply_pairs<kIsWide>(by.weights[kSlantedTerms.size() - 1], (Words)recent.own)) >>
                  (kWeightBits - kEighthsBits);
   eighths = eighths < by.least ? by.least : eighths;
   eighths = eighths > by.most ? by.most : eighths;
@@ -387,7 +234,7 @@ ISOHF_KERNEL bool decode_time(const Band& band, SymbolModel& model, SymbolModel:
 
   Ints coded = active;
   if (!is_full) {
-    if (band.is_void != nullptr) coded &= ~voids_at(band, t);
+    if (band.is_void != nullptr) coded &= ~voids_at<kIsWide>(band, t);
     contexts = coded != 0 ? contexts : Ints{} + static_cast<std::int32_t>(SymbolModel::kNoContext);
   }
   alignas(32) std::array<std::uint32_t, kLanes> context_of_lane;
@@ -454,63 +301,16 @@ ISOHF_KERNEL bool decode_time(const Band& band, SymbolModel& model, SymbolModel:
   return true;
 }
 
-int first_of(int lane) {
-  return Lattice<std::int32_t>::first(lane);
-}
-int last_of(int lane, int columns) {
-  return lane % 2 == 0 ? columns - 2 : columns - 1;
-}
-
-/// Sets the margins of a row that begins, of one whose first two places are known, of one that is done.
-void open_row(const Band& band, int lane) {
-  const int first = first_of(lane);
-  band.slanted.fill(lane, first - 2, first, band.slanted.sample(lane - 1, first + lane % 2), 0);
-}
-void close_west(const Band& band, int lane) {
-  const int first = first_of(lane);
-  band.slanted.fill(lane, -kMargin, first, band.slanted.sample(lane, first), band.slanted.deviation(lane, first));
-}
-void close_east(const Band& band, int lane) {
-  const int last = last_of(lane, band.columns);
-  band.slanted.fill(lane, last + 1, band.columns + kMargin, band.slanted.sample(lane, last),
-                    band.slanted.deviation(lane, last));
-}
-
 template <bool kIsWide, bool kHasOneState>
 ISOHF_KERNEL bool decode_band(const Band& band) {
   SymbolModel::View view = band.model.view();
   SymbolModel& model = band.model;
   Source& source = band.source;
-  Recent recent;
-  recent.lowest = band.constants.high;
-  recent.highest = band.constants.low;
-  Ints active{};
-  // The next lanes to open, to close in the West and in the East: rows begin and end one after the other.
-  int opening = 0;
-  int west = 0;
-  int east = 0;
-  const int times = band.columns + delay(kLanes - 1);
-  for (int t = 0; t < times;) {
-    if (opening < band.rows && t == first_of(opening) + delay(opening)) {
-      open_row(band, opening);
-      active[opening++] = -1;
-    }
-    recent.reload<kIsWide>(band.slanted.at(t - 1));
-    const int opens = opening < band.rows ? first_of(opening) + delay(opening) : times;
-    const int has_west = west < band.rows ? first_of(west) + 2 + delay(west) : times;
-    const int ends = east < band.rows ? last_of(east, band.columns) + 1 + delay(east) : times;
-    const bool is_full = opening == kLanes && east == 0 && band.is_void == nullptr;
-    for (const int until = std::min({times, opens, has_west, ends}); t < until; ++t) {
-      SlantedRows::Time* const now = &band.slanted.at(t);
-      if (!decode_time<kIsWide, kHasOneState>(band, model, view, source, now, t, active, is_full, recent)) return false;
-    }
-    if (t == has_west && west < band.rows) close_west(band, west++);
-    if (t == ends && east < band.rows) {
-      close_east(band, east);
-      active[east++] = 0;
-    }
-  }
-  return lanes_of<kIsWide>((recent.lowest < band.constants.low) | (recent.highest > band.constants.high)) == 0;
+  Recent recent(band.constants.low, band.constants.high);
+  const bool is_whole = walk_band<kIsWide>(band, recent, [&](SlantedRows::Time* now, int t, Ints active, bool is_full) {
+    return decode_time<kIsWide, kHasOneState>(band, model, view, source, now, t, active, is_full, recent);
+  });
+  return is_whole && recent.is_within<kIsWide>(band.constants.low, band.constants.high);
 }
 
 class WavefrontDecoder {
@@ -521,6 +321,7 @@ class WavefrontDecoder {
         columns_(shape.columns()),
         rows_(shape.rows()),
         slanted_(columns_),
+        band_codes_(columns_),
         words_(payload.words.size() + kSlack),
         extra_(payload.extra.size() + kSlack) {
     std::copy(payload.words.begin(), payload.words.end(), words_.begin());
@@ -537,19 +338,19 @@ class WavefrontDecoder {
     source_.words_end = words_.data() + payload.words.size();
     source_.extra = extra_.data();
     source_.extra_end = 8 * std::uint64_t{payload.extra.size()};
-    for (int lane = -kRowsAbove; lane < 0; ++lane) slanted_.fill(lane, -kMargin, columns_ + kMargin, payload.base, 0);
+    slanted_.fill_above(columns_, payload.base);
   }
 
   bool run() {
     for (int top = 0; top < rows_; top += kBandRows) {
       const int rows = std::min(kBandRows, rows_ - top);
-      if (top <= kBandRows) set_weights(top);
+      if (top <= kBandRows) constants_.weights = slanted_weights(payload_.predictors, top);
       const std::uint8_t* is_void = nullptr;
       if (!payload_.is_void.empty()) {
         is_void = payload_.is_void.data() + static_cast<std::ptrdiff_t>(top) * columns_;
         if (std::find(is_void, is_void + rows * columns_, 1) == is_void + rows * columns_) is_void = nullptr;
       }
-      if (!decode({slanted_, source_, model_, constants_, columns_, rows, is_void}, top)) {
+      if (!decode({{slanted_, columns_, rows, is_void}, source_, model_, constants_}, top)) {
         return false;
       }
       model_.end_band();
@@ -559,27 +360,13 @@ class WavefrontDecoder {
   }
 
  private:
-  void set_weights(int top) {
-    for (int lane = 0; lane < kLanes; ++lane) {
-      const PredictorWeights& of_row = payload_.predictors.of_block(top + lane, 0);
-      const auto weight_of = [&](int i) -> std::int32_t {
-        if (i == kAnchor) return std::accumulate(of_row.begin(), of_row.end(), 1 << kWeightBits, std::minus<>());
-        return i < 0 ? 0 : of_row[static_cast<std::size_t>(i)];
-      };
-      for (std::size_t i = 0; i < kTermPairs.size(); ++i) {
-        constants_.weights[i][lane] =
-            static_cast<std::uint32_t>(pair_of(weight_of(kTermPairs[i].west), weight_of(kTermPairs[i].east)));
-      }
-    }
-  }
-
   bool decode(const Band& band, int top) {
     const bool is_good = source_.has_one_state ? vectorised<decode_band<false, true>, decode_band<true, true>>(band)
                                                : vectorised<decode_band<false, false>, decode_band<true, false>>(band);
     if (!is_good) return false;
+    band_codes_.store(band, tile_.codes.data() + static_cast<std::ptrdiff_t>(top) * columns_);
     for (int lane = 0; lane < band.rows; ++lane) {
       std::uint16_t* const codes = tile_.codes.data() + static_cast<std::ptrdiff_t>(top + lane) * columns_;
-      store_row(band, lane, codes);
       for (int side = 0; lane % 2 == 0 && side < 2; ++side) {
         if (!decode_slid(band, lane, side, codes)) return false;
       }
@@ -589,15 +376,6 @@ class WavefrontDecoder {
       for (int c = 0; c < columns_; ++c) codes[c] = is_void[c] != 0 ? void_code : codes[c];
     }
     return source_.is_good();
-  }
-
-  void store_row(const Band& band, int lane, std::uint16_t* codes) {
-    const int first = first_of(lane);
-    const int last = last_of(lane, columns_);
-    for (int p = first; p <= last; ++p) codes[p] = static_cast<std::uint16_t>(band.slanted.sample(lane, p));
-    if (lane % 2 != 0) return;
-    codes[0] = codes[first];
-    codes[columns_ - 1] = codes[last];
   }
 
   bool decode_slid(const Band& band, int lane, int side, std::uint16_t* codes) {
@@ -632,6 +410,7 @@ class WavefrontDecoder {
   int columns_;
   int rows_;
   SlantedRows slanted_;
+  BandCodes band_codes_;
   std::vector<std::byte> words_;
   std::vector<std::byte> extra_;
   Source source_{};

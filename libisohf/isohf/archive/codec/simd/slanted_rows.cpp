@@ -1,0 +1,33 @@
+#include "isohf/archive/codec/simd/slanted_rows.h"
+
+#include <algorithm>
+
+#include "isohf/base/simd.h"
+
+namespace isohf {
+namespace {
+
+ISOHF_KERNEL void turn_band(SlantedRows& slanted, const std::array<std::uint16_t*, 8>& codes, int times) {
+  constexpr auto kStride = static_cast<std::ptrdiff_t>(sizeof(SlantedRows::Time) / sizeof(std::int32_t));
+  for (int t = 0; t < times; t += 8) turn_square<kStride>(&slanted.at(t + 1).pair(0), codes, t);
+}
+
+}  // namespace
+
+void BandCodes::store(const SlantedBand& band, std::uint16_t* codes) {
+  std::array<std::uint16_t*, 8> rows{};
+  for (int lane = 0; lane < SlantedRows::kLanes; ++lane) {
+    rows[static_cast<std::size_t>(lane)] = codes_.data() + lane * stride_ + kSpare - delay(lane);
+  }
+  vectorised<turn_band>(band.slanted, rows, columns_ + delay(SlantedRows::kLanes - 1));
+  for (int lane = 0; lane < band.rows; ++lane) {
+    const std::uint16_t* const from = codes_.data() + lane * stride_ + kSpare;
+    std::uint16_t* const row =
+        std::copy_n(from, columns_, codes + static_cast<std::ptrdiff_t>(lane) * columns_) - columns_;
+    if (lane % 2 != 0) continue;
+    row[0] = from[first_of(lane)];
+    row[columns_ - 1] = from[last_of(lane, columns_)];
+  }
+}
+
+}  // namespace isohf
