@@ -835,6 +835,9 @@ class Archive:
                         expected.append(self.height(b * across + a, (X - a * wide) // 2 + 1, Z - b * high + 1))
                 name, found = "planes/%d/%d/%d.tile" % (plane, j, i), [None] * (columns * rows)
                 names.add(name)
+                below = range(j * F, min((j + 1) * F, down)), range(i * F, min((i + 1) * F, across))
+                if not any("tiles/%d/%d.tile" % (b, a) in self.members for b in below[0] for a in below[1]):
+                    expected = [None] * (columns * rows)
                 if name in self.members:
                     found, d = decode(self.member(name), columns, rows, self.kind)
                     found = [undropped(v, d) for v in found]

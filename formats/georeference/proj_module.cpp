@@ -4,6 +4,7 @@
 #include <proj_experimental.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -63,6 +64,9 @@ struct IsohfProjSystem {
   std::string wkt[ISOHF_WKTS];
   double degrees_per_unit = 1.0;  ///< of those longitudes and latitudes
   double prime_meridian_deg = 0.0;
+  /// How far, in its units, what is there and back may lie apart; 0: nothing is shown twice. Beyond the outline of maps
+  /// like the sinusoidal one the way back goes round the body again.
+  double most_apart = 0.0;
   mutable std::mutex mutex;
   mutable std::vector<Worker> idle;
 
@@ -234,6 +238,23 @@ Object as_named(PJ_CONTEXT* context, const PJ* system) {
   return named;
 }
 
+/// PROJ takes any word for the first name in which it finds it: "foo" for "Amersfoort".
+void check_name(const std::string& text, const char* found) {
+  if (text.find_first_of(":[{+=") != std::string::npos) return;
+  const auto letters = [](std::string_view name) {
+    std::string kept;
+    for (const char c : name) {
+      if (std::isalnum(static_cast<unsigned char>(c)) != 0)
+        kept += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    }
+    return kept;
+  };
+  if (found != nullptr && letters(text) == letters(found)) return;
+  refuse("it is the name of none" +
+         (found != nullptr ? std::string(": \"") + found + "\" is the nearest" : std::string()) +
+         "; EPSG:2154, WKT, a PROJ string or a whole name is wanted");
+}
+
 void open(const std::string& text, const char* heights, IsohfProjSystem& system, IsohfProjInfo& info) {
   system.context = make_context();
   PJ_CONTEXT* const context = system.context.get();
@@ -244,6 +265,7 @@ void open(const std::string& text, const char* heights, IsohfProjSystem& system,
     }
     refuse_text(context);
   }
+  check_name(text, proj_get_name(system.system.get()));
   system.horizontal = horizontal_part(context, system.system.get());
   if (text.starts_with("urn:ogc:def:crs,") && proj_get_id_code(system.horizontal.get(), 0) == nullptr) {
     if (Object named = as_named(context, system.system.get())) {
@@ -391,6 +413,8 @@ void open_pipeline(const char* pipeline, IsohfProjSystem& system) {
   refuse_text(system.context.get());
 }
 
+void find_outline(IsohfProjSystem& system);
+
 int module_find_operation(const char* from, const char* to, const double* ground, IsohfProjOperation* operation,
                           IsohfProjMessage* message) {
   return isohf::guarded(message, "PROJ", ErrorCode::kUnsupported,
@@ -401,6 +425,7 @@ int module_open_pipeline(const char* pipeline, IsohfProjSystem** system, IsohfPr
   return isohf::guarded(message, "PROJ", ErrorCode::kUnsupported, [&] {
     auto made = std::make_unique<IsohfProjSystem>();
     open_pipeline(pipeline, *made);
+    find_outline(*made);
     *system = made.release();
   });
 }
@@ -410,6 +435,7 @@ int module_open(const char* text, const char* vertical, IsohfProjSystem** system
   return isohf::guarded(message, "PROJ", ErrorCode::kUnsupported, [&] {
     auto made = std::make_unique<IsohfProjSystem>();
     open(text, vertical, *made, *info);
+    if (info->is_projected != 0) find_outline(*made);
     *system = made.release();
   });
 }
@@ -428,8 +454,15 @@ int module_same(const IsohfProjSystem* a, const IsohfProjSystem* b) {
 void move(const IsohfProjSystem& system, PJ_DIRECTION direction, double* places, std::size_t count) {
   constexpr double kNowhere = std::numeric_limits<double>::quiet_NaN();
   Worker worker = system.take();
+  const auto turned = [](PJ_DIRECTION way) { return way == PJ_FWD ? PJ_INV : PJ_FWD; };
   // A pipeline runs the other way.
-  const PJ_DIRECTION along = system.is_pipeline ? (direction == PJ_FWD ? PJ_INV : PJ_FWD) : direction;
+  const PJ_DIRECTION along = system.is_pipeline ? turned(direction) : direction;
+  const auto trans = [&worker](PJ_DIRECTION way, const PJ_COORD& from) {
+    const PJ_COORD to = proj_trans(worker.operation.get(), way, from);
+    if (proj_errno(worker.operation.get()) == 0) return to;
+    proj_errno_reset(worker.operation.get());
+    return proj_coord(kNowhere, kNowhere, 0.0, 0.0);
+  };
   for (std::size_t i = 0; i < count; ++i) {
     double* const at = places + 2 * i;
     PJ_COORD from = proj_coord(at[0], at[1], 0.0, HUGE_VAL);
@@ -439,13 +472,13 @@ void move(const IsohfProjSystem& system, PJ_DIRECTION direction, double* places,
     }
     PJ_COORD to = proj_coord(kNowhere, kNowhere, 0.0, 0.0);
     if (worker.operation && std::isfinite(from.xy.x) && std::isfinite(from.xy.y)) {
-      to = proj_trans(worker.operation.get(), along, from);
-      if (proj_errno(worker.operation.get()) != 0) {
-        proj_errno_reset(worker.operation.get());
-        to = proj_coord(kNowhere, kNowhere, 0.0, 0.0);
-      }
+      to = trans(along, from);
     }
-    const bool is_place = std::isfinite(to.xy.x) && std::isfinite(to.xy.y);
+    bool is_place = std::isfinite(to.xy.x) && std::isfinite(to.xy.y);
+    if (is_place && direction == PJ_FWD && system.most_apart > 0.0) {
+      const PJ_COORD back = trans(turned(along), to);
+      is_place = std::hypot(back.xy.x - from.xy.x, back.xy.y - from.xy.y) <= system.most_apart;
+    }
     at[0] = is_place ? to.xy.x : kNowhere;
     at[1] = is_place ? to.xy.y : kNowhere;
     if (direction == PJ_INV) continue;
@@ -453,6 +486,32 @@ void move(const IsohfProjSystem& system, PJ_DIRECTION direction, double* places,
     at[1] *= system.degrees_per_unit;
   }
   system.give_back(std::move(worker));
+}
+
+/// Sets most_apart where corners of the box around the whole body's image are none of its places.
+void find_outline(IsohfProjSystem& system) {
+  double box[4] = {HUGE_VAL, HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
+  for (int i = 0; i < 37 * 7; ++i) {
+    double at[2] = {-179.9 + (i % 37) * (359.8 / 36), -85.0 + (i / 37) * (170.0 / 6)};
+    move(system, PJ_INV, at, 1);
+    for (int axis = 0; axis < 2 && std::isfinite(at[0]) && std::isfinite(at[1]); ++axis) {
+      box[axis] = std::min(box[axis], at[axis]);
+      box[axis + 2] = std::max(box[axis + 2], at[axis]);
+    }
+  }
+  const double size = std::max(box[2] - box[0], box[3] - box[1]);
+  if (!(size > 0.0) || !std::isfinite(size)) return;
+  constexpr double kMostApart = 1e-4;
+  for (int corner = 0; corner < 4; ++corner) {
+    const double from[2] = {box[corner % 2 * 2], box[corner / 2 * 2 + 1]};
+    double at[2] = {from[0], from[1]};
+    move(system, PJ_FWD, at, 1);
+    if (!std::isfinite(at[0])) continue;
+    move(system, PJ_INV, at, 1);
+    if (std::hypot(at[0] - from[0], at[1] - from[1]) <= kMostApart * size) continue;
+    system.most_apart = kMostApart * size;
+    return;
+  }
 }
 
 void module_to_geo(const IsohfProjSystem* system, double* places, size_t count) {

@@ -132,9 +132,12 @@ ExportGrid asked_grid(const ExportOptions& options, ArchiveReader& archive) {
   const Metadata& metadata = archive.metadata();
   const WorldBounds ground = options.bbox ? ground_in_box(archive, *options.bbox) : ground_here(metadata);
   const bool area = samples_are_areas(metadata);
+  const auto& asked = options.bbox;
+  const auto box =
+      asked ? std::optional(MapBounds{asked->west, asked->south, asked->east, asked->north}) : std::nullopt;
   ExportGrid grid;
   if (!options.raster.system.empty()) {
-    grid.samples = asked_grid_in_system(options.raster, archive, ground, false);
+    grid.samples = asked_grid_in_system(options.raster, archive, ground, box, false);
   } else if (options.raster.size || options.raster.spacing) {
     grid.samples = grid_over(ground, area, options.raster.size, spacing_in_world(options.raster, metadata));
   } else {
@@ -155,7 +158,7 @@ ExportGrid asked_grid(const ExportOptions& options, ArchiveReader& archive) {
     if (grid.samples.system) {
       RasterOptions sized = options.raster;
       sized.size = size;
-      grid.samples = asked_grid_in_system(sized, archive, ground, true);
+      grid.samples = asked_grid_in_system(sized, archive, ground, box, true);
       return grid;
     }
     grid.samples = grid_over(ground, area, size, std::nullopt);

@@ -7,6 +7,7 @@
 
 #include "formats/files/text.h"
 #include "isohf/error.h"
+#include "isohf/restore/sample_grids.h"
 #include "options/option_values.h"
 #include "options/options_source.h"
 #include "output/standard_output.h"
@@ -43,7 +44,7 @@ void add_size_options(CommandLine& line, const std::string& size_description, Ra
 }
 
 SampleGrid asked_grid_in_system(const RasterOptions& options, ArchiveReader& archive, const WorldBounds& ground,
-                                bool quiet) {
+                                const std::optional<MapBounds>& box, bool quiet) {
   std::vector<Warning> warnings;
   auto system = understand_grid_system(archive, options.system, warnings);
   if (!quiet) print_warnings(warnings);
@@ -59,7 +60,13 @@ SampleGrid asked_grid_in_system(const RasterOptions& options, ArchiveReader& arc
     spacing = options.spacing->in_metres ? options.spacing->value / place.metres_per_unit : options.spacing->value;
   }
   try {
-    const SampleGrid grid = grid_in_system(archive.metadata(), ground, std::move(system), options.size, spacing);
+    std::optional<SampleGrid> own;
+    if (box && !options.size && !spacing && is_warped(archive.metadata())) {
+      own = own_grid_in_box(archive.metadata(), *system, *box);
+      if (own) own->system = system;
+    }
+    const SampleGrid grid =
+        own ? *own : grid_in_system(archive.metadata(), ground, std::move(system), options.size, spacing);
     if (grid.goes_by_places() && options.method == RestoreMethod::kHex) {
       throw Error(ErrorCode::kInvalidArgument,
                   "--crs: rows of another reference system are no rows of the archive, along which --method hex goes; "

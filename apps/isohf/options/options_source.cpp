@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <vector>
 
+#include "formats/files/text.h"
 #include "formats/readers.h"
 #include "isohf/base/output_file.h"
 #include "isohf/error.h"
@@ -19,7 +20,11 @@ std::string system_from(const std::string& text) {
   std::error_code ignored;
   if (text.empty())
     throw Error(ErrorCode::kInvalidArgument, "found '', must be EPSG:2154, WKT, a PROJ string or a file");
-  if (!std::filesystem::is_regular_file(text, ignored)) return text;
+  if (!std::filesystem::is_regular_file(text, ignored)) {
+    const std::string extension = lower_case(std::filesystem::path(text).extension().string());
+    if (extension != ".prj" && extension != ".wkt" && extension != ".txt") return text;
+    throw Error(ErrorCode::kInvalidArgument, "found '" + text + "', no such file");
+  }
   const std::vector<std::byte> bytes = head_of_file(text, kMostBytes);
   std::string held(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   while (!held.empty() && std::isspace(static_cast<unsigned char>(held.back())) != 0) held.pop_back();

@@ -82,6 +82,21 @@ MapBounds image_bounds(const MapBounds& rectangle, const std::function<MapPoint(
   return {bounds.west - rise, bounds.south - rise, bounds.east + rise, bounds.north + rise};
 }
 
+bool surrounds(const MapBounds& bounds, const MapBounds& rectangle,
+               const std::function<MapPoint(const MapPoint&)>& image) {
+  constexpr int kSteps = 16;
+  const double margin = 0.01 * std::max(bounds.east - bounds.west, bounds.north - bounds.south);
+  for (int i = 0; i < (kSteps - 1) * (kSteps - 1); ++i) {
+    const MapPoint at = image(MapPoint{between(rectangle.west, rectangle.east, 1 + i % (kSteps - 1), kSteps),
+                                       between(rectangle.south, rectangle.north, 1 + i / (kSteps - 1), kSteps)});
+    if (at.easting < bounds.west - margin || at.easting > bounds.east + margin || at.northing < bounds.south - margin ||
+        at.northing > bounds.north + margin) {
+      return false;
+    }
+  }
+  return true;
+}
+
 ShownImage shown_image(const MapBounds& rectangle, const std::function<MapPoint(const MapPoint&)>& image,
                        const std::vector<MapPoint>& more) {
   constexpr int kSteps = 128;
@@ -153,6 +168,20 @@ MapBounds projected_bounds(const Projection& projection, const GeoExtent& ground
         return projection.forward({at.easting, at.northing});
       },
       kStepsPerSide);
+}
+
+MapBounds globe_bounds(const Projection& projection, const GeoExtent& ground) {
+  const auto image = [&](const MapPoint& at) { return projection.forward({at.easting, at.northing}); };
+  // Most maps are cut open at the 180th meridian.
+  for (const GeoExtent& all : {GeoExtent{-180.0, ground.south, 180.0, ground.north}, ground}) {
+    const MapBounds bounds = projected_bounds(projection, all);
+    if (std::isfinite(bounds.west) && surrounds(bounds, {all.west, all.south, all.east, all.north}, image))
+      return bounds;
+  }
+  for (const double latitude : {ground.south, ground.north}) {
+    if (!is_shown(image({ground.west, latitude}))) return {NAN, NAN, NAN, NAN};
+  }
+  return shown_image({ground.west, ground.south, ground.east, ground.north}, image, {}).bounds;
 }
 
 MapBounds projected_bounds(const Projection& projection, const ReferenceMap& map, const MapBounds& rectangle) {

@@ -21,6 +21,14 @@ namespace isohf {
 [[nodiscard]] MapBounds image_bounds(const MapBounds& rectangle, const std::function<MapPoint(const MapPoint&)>& image,
                                      int steps_per_side);
 
+/// Whether an image's bounds hold what lies within its rectangle: those of the border do not where that is a globe's cut
+/// and its poles, which may all fall on one line.
+[[nodiscard]] bool surrounds(const MapBounds& bounds, const MapBounds& rectangle,
+                             const std::function<MapPoint(const MapPoint&)>& image);
+
+/// Of a globe's image, whatever meridian the ground begins at and the map is cut open at. NaN where a part has none.
+[[nodiscard]] MapBounds globe_bounds(const Projection& projection, const GeoExtent& ground);
+
 /// What a map shows of a rectangle.
 struct ShownImage {
   MapBounds bounds;      ///< NaN: nothing

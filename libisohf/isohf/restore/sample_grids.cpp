@@ -232,7 +232,7 @@ class ImageFinder {
     const MapBounds rectangle{ground.x0, -ground.z1, ground.x1, -ground.z0};
     const auto image = [this](const MapPoint& at) { return image_at(at); };
     const MapBounds whole = image_bounds(rectangle, image, kStepsPerSide);
-    if (std::isfinite(whole.west) && surrounds(whole, rectangle)) {
+    if (std::isfinite(whole.west) && surrounds(whole, rectangle, image)) {
       const double area = (whole.east - whole.west) * (whole.north - whole.south);
       return {whole, area / ((ground.x1 - ground.x0) * (ground.z1 - ground.z0))};
     }
@@ -249,23 +249,6 @@ class ImageFinder {
   }
 
  private:
-  /// The border's image does not where the border is a globe's cut and its poles, which may all fall on one line.
-  [[nodiscard]] bool surrounds(const MapBounds& image, const MapBounds& rectangle) const {
-    constexpr int kSteps = 16;
-    const double margin = 0.01 * std::max(image.east - image.west, image.north - image.south);
-    for (int i = 0; i < (kSteps - 1) * (kSteps - 1); ++i) {
-      const double across = static_cast<double>(1 + i % (kSteps - 1)) / kSteps;
-      const double down = static_cast<double>(1 + i / (kSteps - 1)) / kSteps;
-      const MapPoint at = image_at({rectangle.west + across * (rectangle.east - rectangle.west),
-                                    rectangle.south + down * (rectangle.north - rectangle.south)});
-      if (at.easting < image.west - margin || at.easting > image.east + margin || at.northing < image.south - margin ||
-          at.northing > image.north + margin) {
-        return false;
-      }
-    }
-    return true;
-  }
-
   /// nullopt where the map does not show the pole as a point. A shift of the datum has the map's own pole lie beside it:
   /// an arc or a place that is nowhere is known by the circles round the pole, which do not shrink to a point.
   [[nodiscard]] std::optional<MapPoint> pole_image(double latitude) const {
@@ -423,7 +406,23 @@ SampleGrid natural_grid_of_all(const Metadata& metadata) {
 
 SampleGrid natural_grid(const Metadata& metadata) {
   const SampleGrid all = natural_grid_of_all(metadata);
-  return part_record(metadata) ? part_of(all, ground_here(metadata)).value_or(all) : all;
+  if (!part_record(metadata)) return all;
+  std::optional<SampleGrid> part = part_of(all, ground_here(metadata));
+  if (!part) return all;
+  // What lies on the edge of two parts is the eastern, the southern one's: the tiles that it is looked up in are there.
+  const TileGrid& tiles = metadata.grid;
+  const TileRange here = tiles_here(metadata);
+  constexpr double kOnTheEdge = 1e-6;  // of a spacing
+  const auto drop_edge = [](std::int64_t& samples, double first, double spacing, double edge) {
+    if (samples > 1 && first + static_cast<double>(samples - 1) * spacing > edge - kOnTheEdge * spacing) --samples;
+  };
+  if (here.end.column < tiles.tile_columns()) {
+    drop_edge(part->width, part->first_x, part->spacing_x, static_cast<double>(here.end.column) * tiles.extent_x());
+  }
+  if (here.end.row < tiles.tile_rows()) {
+    drop_edge(part->height, part->first_z, part->spacing_z, static_cast<double>(here.end.row) * tiles.extent_z());
+  }
+  return *part;
 }
 
 SampleGrid grid_over(const WorldBounds& ground, bool areas, const std::optional<GridSize>& size,
@@ -453,6 +452,54 @@ SampleGrid grid_over(const WorldBounds& ground, bool areas, const std::optional<
   return grid;
 }
 
+namespace {
+
+/// Bounds in degrees, by as many turns on as bring them onto a grid's columns; all these where the bounds go round, or
+/// lie on both ends of a grid that does.
+MapBounds turned_onto(const SampleGrid& grid, double half, MapBounds bounds) {
+  const double west = grid.first_x - half * grid.spacing_x;
+  const double length = (static_cast<double>(grid.width - 1) + 2.0 * half) * grid.spacing_x;
+  const double width = bounds.east - bounds.west;
+  bounds.west -= kTurn * std::floor((bounds.west - west) / kTurn + 1e-9);
+  bounds.east = bounds.west + width;
+  // Where the ground begins behind the grid's East end it may end beyond its West one.
+  if (bounds.west >= west + length) {
+    bounds.west -= kTurn;
+    bounds.east -= kTurn;
+  }
+  const bool goes_round = length >= kTurn - 1.5 * grid.spacing_x;
+  if (width >= kTurn - grid.spacing_x || (goes_round && bounds.east > west + length + grid.spacing_x)) {
+    return {west, bounds.south, west + length, bounds.north};
+  }
+  return bounds;
+}
+
+}  // namespace
+
+std::optional<SampleGrid> own_grid_in_box(const Metadata& metadata, const GridSystem& system, const MapBounds& box) {
+  const Georeference& place = system.place;
+  const SourceRecord& source = metadata.source;
+  if (!place.has_origin || source.origin_x != place.origin_x || source.origin_y != place.origin_y) return std::nullopt;
+  SampleGrid all{source.width, source.height, place.origin_x, -place.origin_y, place.spacing_x, place.spacing_y};
+  MapBounds here = box;
+  if (place.unit == HorizontalUnit::kDegree) {
+    if (here.east <= here.west) here.east += kTurn;
+    const double turns = kTurn * std::floor((here.west - all.first_x) / kTurn + 1e-9);
+    here.west -= turns;
+    here.east -= turns;
+    // Columns go on behind the last one where they go round.
+    if (static_cast<double>(all.width) * all.spacing_x >= kTurn - 0.5 * all.spacing_x) all.width *= 2;
+  }
+  const WorldBounds within{std::max(here.west, all.first_x), std::max(-here.north, all.first_z),
+                           std::min(here.east, all.first_x + static_cast<double>(all.width - 1) * all.spacing_x),
+                           std::min(-here.south, all.first_z + static_cast<double>(all.height - 1) * all.spacing_z)};
+  auto part = part_of(all, within);
+  if (!part) return std::nullopt;
+  part->first_z = -part->first_z;
+  part->registration = place.registration;
+  return part;
+}
+
 SampleGrid grid_in_system(const Metadata& metadata, const WorldBounds& ground, std::shared_ptr<const GridSystem> system,
                           const std::optional<GridSize>& size, const std::optional<double>& spacing) {
   const Georeference& place = system->place;
@@ -464,7 +511,7 @@ SampleGrid grid_in_system(const Metadata& metadata, const WorldBounds& ground, s
     refuse("no sample of the archive's own grid lies there; give `size` or `spacing`");
   }
   const ImageFinder finder(metadata, *system);
-  const auto [bounds, stretch] = finder.image_of(ground);
+  auto [bounds, stretch] = finder.image_of(ground);
   SampleGrid grid;
   if (place.has_origin && !size && !spacing) {
     // The samples of the source that lie on the ground.
@@ -472,6 +519,7 @@ SampleGrid grid_in_system(const Metadata& metadata, const WorldBounds& ground, s
     grid = {source.width, source.height, place.origin_x, -place.origin_y, place.spacing_x, place.spacing_y};
     const double half = place.registration == Registration::kArea ? 0.5 : 0.0;
     const SampleGrid all = grid;
+    if (place.unit == HorizontalUnit::kDegree) bounds = turned_onto(all, half, bounds);
     const WorldBounds within{
         std::max(bounds.west, all.first_x - half * all.spacing_x),
         std::max(-bounds.north, all.first_z - half * all.spacing_z),

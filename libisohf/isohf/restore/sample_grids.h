@@ -41,6 +41,11 @@ struct Turn {
 /// rectangle there.
 [[nodiscard]] WorldBounds world_bounds(const Metadata& metadata, const MapBounds& box);
 
+/// The samples of the source itself in a box of its own system, where `system` is that and knows its grid; longitudes as
+/// it counts them. nullopt where there are none.
+[[nodiscard]] std::optional<SampleGrid> own_grid_in_box(const Metadata& metadata, const GridSystem& system,
+                                                        const MapBounds& box);
+
 /// The grid of another raster of elevations, in the archive's world or, where the archive's input was projected, in
 /// degrees. By the origins of both, also where one has no unit that is known and their grounds meet; never through a
 /// projection, where it has to be in degrees or on the archive's own map. Its longitudes stay as it counts them: RowReader

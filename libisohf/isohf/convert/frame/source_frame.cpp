@@ -190,11 +190,9 @@ void place_degrees(const SourceInfo& info, const GroundRequest& request, SourceF
     const DegreeLengths degree = degree_lengths(choice.spec.ellipsoid, ground.middle().latitude);
     frame.spacing_x = place.spacing_x * degree.along_parallel;
     frame.spacing_z = place.spacing_y * degree.along_meridian;
-    MapBounds bounds = projected_bounds(Projection(choice.spec), ground);
-    if (closure != Closure::kOpen && !std::isfinite(bounds.west)) {
-      // All the way round from some other meridian: most maps are cut open at the 180th.
-      bounds = projected_bounds(Projection(choice.spec), {-180.0, ground.south, 180.0, ground.north});
-    }
+    const Projection projection(choice.spec);
+    const MapBounds bounds =
+        closure == Closure::kOpen ? projected_bounds(projection, ground) : globe_bounds(projection, ground);
     return place_by_warp(info, asked, bounds, nullptr, frame);
   }
   place_by_scale(frame.projection->spec, info, frame);

@@ -242,6 +242,14 @@ class Comparison {
   }
 
   [[nodiscard]] double elevation_at(const TileRowSurface& surface, WorldPoint world) const {
+    // A projected source lies on the tiles as a whole: what does not is none of theirs.
+    const double far_x = std::abs(world.x / grid_.extent_x() - 0.5 * static_cast<double>(grid_.tile_columns()));
+    const double far_z = std::abs(world.z / grid_.extent_z() - 0.5 * static_cast<double>(grid_.tile_rows()));
+    constexpr double kOnTheEdge = 0.01;  // of a tile
+    if (!(far_x <= 0.5 * static_cast<double>(grid_.tile_columns()) + kOnTheEdge &&
+          far_z <= 0.5 * static_cast<double>(grid_.tile_rows()) + kOnTheEdge)) {
+      return NAN;
+    }
     const TilePoint at = locate(surface.tile_row, world);
     const std::vector<double>& elevations = surface.elevations[static_cast<std::size_t>(at.tile.column)];
     const View2D<const double> view(elevations.data(), grid_.shape().columns(), grid_.shape().rows());
@@ -354,6 +362,18 @@ class Comparison {
     return tile_row_at({0.0, least - margin}) <= tile_row && tile_row_at({0.0, most + margin}) >= tile_row;
   }
 
+  /// Whether the world's map ends within a triangle's reach of a sample, as at the outline of a map of the whole body.
+  [[nodiscard]] bool is_on_outline(std::int64_t column, std::int64_t row) const {
+    if (!warp_) return false;
+    const WorldPoint world = warp_->world_from_source({static_cast<double>(column), static_cast<double>(row)});
+    for (const double x : {-2.0 * grid_.sigma_x(), 0.0, 2.0 * grid_.sigma_x()}) {
+      for (const double z : {-grid_.sigma_z(), 0.0, grid_.sigma_z()}) {
+        if (std::isnan(warp_->source_from_world({world.x + x, world.z + z}).u)) return true;
+      }
+    }
+    return false;
+  }
+
   /// Samples that a triangle may reach over from this one.
   [[nodiscard]] std::int64_t reach_at(std::int64_t column, std::int64_t row) const {
     if (!warp_) return reach_;
@@ -376,6 +396,7 @@ class Comparison {
   void count_mismatch(const Band& band, std::int64_t column, std::int64_t row, bool void_in_source,
                       AccuracyReport& counts) const {
     ++(void_in_source ? counts.samples_invented : counts.samples_lost);
+    if (!void_in_source && is_on_outline(column, row)) return;
     const bool edge_is_void = archive_.metadata().outside == Outside::kVoid;
     const std::int64_t reach = reach_at(column, row);
     for (std::int64_t r = row - reach; r <= row + reach; ++r) {
