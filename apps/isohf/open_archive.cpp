@@ -3,10 +3,8 @@
 #include <fmt/format.h>
 
 #include "formats/files/foreign_file.h"
-#include "formats/georeference/units.h"
 #include "formats/registry.h"
 #include "isohf/error.h"
-#include "isohf/restore/ground_scale.h"
 #include "isohf/surface.h"
 
 namespace isohf::cli {
@@ -35,12 +33,6 @@ ArchiveReader open_archive(const std::string& path) {
     if (found.empty()) throw;
     throw Error(ErrorCode::kUnsupported, path + ": " + found);
   }
-}
-
-double elevation_units_per_world_unit(const Metadata& metadata) {
-  if (metadata.horizontal_unit != "metre" && !is_in_degrees(metadata)) return 1.0;
-  const auto unit = linear_unit(metadata.vertical_unit);
-  return unit ? 1.0 / unit->metres : 1.0;
 }
 
 }  // namespace isohf::cli

@@ -13,7 +13,4 @@ namespace isohf::cli {
 /// Error{kIo}.
 [[nodiscard]] std::string what_else(const std::string& path);
 
-/// Of an archive, for light on its slopes, which has metres for degrees; 1 where either unit is not known.
-[[nodiscard]] double elevation_units_per_world_unit(const Metadata& metadata);
-
 }  // namespace isohf::cli

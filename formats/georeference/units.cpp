@@ -99,6 +99,12 @@ std::string linear_unit_name(double metres) {
   return known == kUnits.end() ? "unit" : known->name;
 }
 
+double world_per_elevation(const Metadata& metadata) {
+  if (metadata.horizontal_unit != "metre" && metadata.source.crs_unit != "degree") return 1.0;
+  const auto unit = linear_unit(metadata.vertical_unit);
+  return unit ? unit->metres : 1.0;
+}
+
 ReferenceSystem wgs84_system() {
   ReferenceSystem system;
   system.name = "WGS 84";

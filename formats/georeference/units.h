@@ -4,6 +4,7 @@
 #include <string>
 #include <string_view>
 
+#include "isohf/metadata.h"
 #include "isohf/raster.h"
 
 namespace isohf {
@@ -23,6 +24,9 @@ struct LinearUnit {
 
 /// What a length of so many metres is called; "unit" where it has no name.
 [[nodiscard]] std::string linear_unit_name(double metres);
+
+/// World units of one elevation unit of an archive, whose degrees are drawn as metres; 1 where either is not known.
+[[nodiscard]] double world_per_elevation(const Metadata& metadata);
 
 /// WGS 84 in degrees, on the Earth.
 [[nodiscard]] ReferenceSystem wgs84_system();

@@ -11,6 +11,7 @@
 
 #include "commands/command.h"
 #include "commands/line_reader.h"
+#include "formats/georeference/units.h"
 #include "isohf/archive.h"
 #include "isohf/base/bytes.h"
 #include "isohf/error.h"
@@ -337,7 +338,7 @@ WorldGeoreference places_of(ArchiveReader& archive, bool needs_geo, bool needs_s
 int run(SampleOptions options) {
   ArchiveReader archive = open_archive(options.archive);
   const Metadata& metadata = archive.metadata();
-  options.sun.elevation_units_per_world_unit = elevation_units_per_world_unit(metadata);
+  options.sun.elevation_units_per_world_unit = 1.0 / world_per_elevation(metadata);
   if (options.with_shadow && is_in_degrees(metadata)) {
     throw Error(ErrorCode::kInvalidArgument,
                 archive.path() +

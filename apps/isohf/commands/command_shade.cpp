@@ -11,6 +11,7 @@
 
 #include "commands/command.h"
 #include "formats/files/text.h"
+#include "formats/georeference/units.h"
 #include "formats/write/raster_sink.h"
 #include "isohf/base/file.h"
 #include "isohf/error.h"
@@ -246,7 +247,7 @@ int run(ShadeCommand options) {
   const GridSize size = request.size.value_or(shade_size(archive, options.longest));
   request.size = size;
   if (!options.palette.empty()) request.colours = read_colour_relief(options.palette, archive.metadata());
-  request.elevation_units_per_world_unit = elevation_units_per_world_unit(archive.metadata());
+  request.elevation_units_per_world_unit = 1.0 / world_per_elevation(archive.metadata());
   request.floats = lower_case(std::filesystem::path(options.output).extension().string()) == ".exr";
   const ShadeSamples samples = shade_samples(request);
 

@@ -20,20 +20,13 @@
 namespace isohf::view {
 namespace {
 
-/// World units of one elevation unit; 1 where either is not known.
-double elevation_unit(const Metadata& metadata) {
-  if (metadata.horizontal_unit != "metre" && !is_in_degrees(metadata)) return 1.0;
-  const auto unit = linear_unit(metadata.vertical_unit);
-  return unit ? unit->metres : 1.0;
-}
-
 class ArchiveSource final : public TileSource {
  public:
   ArchiveSource(const std::string& path, const std::string& second)
       : reader_(path),
         ground_scale_(isohf::ground_scale(reader_.metadata())),
         grid_(scaled(reader_.grid(), ground_scale_)),
-        world_per_elevation_(elevation_unit(reader_.metadata())) {
+        world_per_elevation_(isohf::world_per_elevation(reader_.metadata())) {
     const Metadata& metadata = reader_.metadata();
     if (metadata.planes.count > 0) {
       planes_.emplace(grid_, metadata.planes.stride, metadata.planes.count, metadata.wraps_x);
