@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <vector>
@@ -50,6 +51,33 @@ TEST_F(ShadeTest, CastsTheShadowAwayFromTheSun) {
   options.shadows = false;
   const Picture none = shade(archive, options);
   EXPECT_EQ(brightness(none, 75, 50), brightness(none, 45, 50));
+}
+
+TEST(ShadeColours, ColourTheSeaOfTheEarthAloneAlsoWhereNothingLiesDeeper) {
+  Metadata metadata(TileGrid::make(TileShape::make(12, 11, 3), 1, 1, 1.0, 1.0));
+  const auto is_blue = [&](double elevation) {
+    const std::vector<ColourStop> stops = shade_colours(metadata);
+    const auto behind = std::upper_bound(stops.begin(), stops.end(), elevation,
+                                         [](double at, const ColourStop& stop) { return at < stop.elevation; });
+    const ColourStop& stop = behind == stops.begin() ? *behind : *(behind - 1);
+    return stop.blue > stop.green;
+  };
+  for (const CodeType type : {CodeType::kU16, CodeType::kF32}) {
+    metadata.quantisation.type = type;
+    metadata.quantisation.scale = 0.02;
+    metadata.source.body = "Earth";
+    metadata.statistics.max = 100.0;
+    for (const double low : {-40.0, 0.0}) {
+      metadata.statistics.min = low;
+      EXPECT_TRUE(is_blue(0.0)) << low;
+      EXPECT_FALSE(is_blue(0.02)) << low;
+    }
+    metadata.statistics.min = 1.0;
+    EXPECT_FALSE(is_blue(1.0));
+    metadata.statistics.min = -40.0;
+    metadata.source.body = "";
+    EXPECT_FALSE(is_blue(-40.0));
+  }
 }
 
 TEST_F(ShadeTest, LeavesNodataTransparent) {

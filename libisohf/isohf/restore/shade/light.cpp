@@ -21,6 +21,8 @@ constexpr Stop kElevationStops[] = {
 };
 /// From the deepest to the shore.
 constexpr Stop kSeaStops[] = {{0.0, {44, 76, 118}}, {0.6, {72, 116, 156}}, {1.0, {134, 174, 196}}};
+constexpr double kLeastDepth = 10.0;  ///< that has the deepest one's colour
+constexpr double kLeastLand = 1e-3;
 constexpr Stop kGrayStops[] = {{0.0, {150, 150, 150}}, {1.0, {225, 225, 225}}};
 /// Dark plains, rust, bright dust.
 constexpr Stop kMarsStops[] = {{0.00, {104, 72, 60}},
@@ -55,11 +57,12 @@ std::vector<ColourStop> shade_colours(const Metadata& metadata, std::optional<Sh
   std::vector<ColourStop> stops;
   switch (*palette) {
     case ShadePalette::kElevation: {
-      // 0 is the sea, and what rounds to it.
+      // 0 is the sea, and what rounds to it; shallows are bright.
       const Quantisation& codes = metadata.quantisation;
-      const double shore = codes.type == CodeType::kF32 ? 0.0 : std::min(0.5 * codes.scale, 0.5 * high);
-      const bool has_sea = is_earth && low < 0.0;
-      if (has_sea) append(kSeaStops, low, std::max(shore, 0.0), stops);
+      const double rounding = codes.type == CodeType::kF32 ? kLeastLand : 0.5 * codes.scale;
+      const double shore = std::min(rounding, 0.5 * high);
+      const bool has_sea = is_earth && low <= 0.0;
+      if (has_sea) append(kSeaStops, std::min(low, -kLeastDepth), std::max(shore, 0.0), stops);
       if (!has_sea || high > 0.0) append(kElevationStops, has_sea ? shore : low, high, stops);
       break;
     }
