@@ -1,6 +1,7 @@
 #include "camera.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "gl/block.h"
@@ -12,6 +13,7 @@ namespace {
 /// Range of heights of the shorter side below which ground looks flat, and above which it towers.
 constexpr double kFlat = 0.01;
 constexpr double kSteep = 0.5;
+constexpr double kHilly = 0.2;            ///< what ground of no known proportion is drawn with at most
 constexpr double kSteepest_rad = 1.5707;  // straight down has no heading
 
 /// Turns a vector about an axis of length 1, counter-clockwise seen against the axis.
@@ -60,6 +62,15 @@ Vec3 ray_through(const Camera& camera, const ViewState& view, double x, double y
   return normalised(camera.forward() + x * half_x * camera.right() + y * half_y * up);
 }
 
+std::optional<PicturePoint> project(const Camera& camera, const ViewState& view, Vec3 at) {
+  const Vec3 way = at - camera.eye;
+  const Vec3 up = cross(camera.right(), camera.forward());
+  const double depth = dot(way, camera.forward());
+  if (depth <= 1e-6 * length(way)) return std::nullopt;
+  return PicturePoint{0.5 * view.width + view.focal_px() * dot(way, camera.right()) / depth,
+                      0.5 * view.height - view.focal_px() * dot(way, up) / depth};
+}
+
 Camera between(const Camera& from, const Camera& to, double share) {
   Camera out;
   out.eye = from.eye + share * (to.eye - from.eye);
@@ -78,29 +89,32 @@ Camera overview_camera(const TileSource& source, const ViewState& view, Vec3* ta
   const Mat4 camera = look_along(-1.0 * way);
   const double half_y = std::tan(view.fov_y_rad / 2.0);
   const double half_x = half_y * view.width / view.height;
-  // The nearest distance from which every corner lies within nine tenths of the view; then the view moves up or down
-  // until the corners lie as far from its upper as from its lower edge, and again.
+  // The nearest distance from which every corner lies within nine tenths of the view; then the view moves until the
+  // corners lie as far from one edge as from the opposite one, and again.
   double distance = 0.0;
-  double lift = 0.0;
-  for (int round = 0; round < 8; ++round) {
+  std::array<double, 2> shift{};
+  for (int round = 0; round < 20; ++round) {
     double nearest = 0.0;
-    double top = -1e300;
-    double bottom = 1e300;
+    std::array<double, 2> most{-1e300, -1e300};
+    std::array<double, 2> least{1e300, 1e300};
     for (int corner = 0; corner < 8; ++corner) {
       const Vec3 at = box_corner({covered.x0, low, covered.z0}, {covered.x1, high, covered.z1}, corner) - middle;
-      const auto along = [&](int row) { return camera.along(row, at); };
-      const double aside = std::max(std::abs(along(0)) / half_x, std::abs(along(1) - lift) / half_y) / 0.9;
-      nearest = std::max(nearest, aside + along(2));
-      if (round == 0) continue;
-      const double height = (along(1) - lift) / (distance - along(2));
-      top = std::max(top, height);
-      bottom = std::min(bottom, height);
+      for (const int axis : {0, 1}) {
+        const auto a = static_cast<std::size_t>(axis);
+        const double aside = camera.along(axis, at) - shift[a];
+        const double along = camera.along(2, at);
+        nearest = std::max(nearest, std::abs(aside) / (axis == 0 ? half_x : half_y) / 0.9 + along);
+        most[a] = std::max(most[a], aside / (distance - along));
+        least[a] = std::min(least[a], aside / (distance - along));
+      }
     }
     distance = std::max(nearest, 1e-6);
-    if (round > 0) lift += 0.5 * (top + bottom) * distance;
+    if (round == 0) continue;
+    for (const std::size_t axis : {0, 1}) shift[axis] += 0.5 * (most[axis] + least[axis]) * distance;
   }
+  const Vec3 across{camera.at(0, 0), camera.at(0, 1), camera.at(0, 2)};
   const Vec3 up{camera.at(1, 0), camera.at(1, 1), camera.at(1, 2)};
-  const Vec3 pivot = middle + lift * up;
+  const Vec3 pivot = middle + shift[0] * across + shift[1] * up;
   if (target != nullptr) *target = pivot;
   Camera out;
   out.look_at(pivot + distance * way, pivot);
@@ -114,7 +128,7 @@ double default_exaggeration(const TileSource& source) {
   const double share = (whole.high - whole.low) / side;
   const bool is_fine = share > kFlat && (source.is_to_scale() || share < kSteep);
   if (!(share > 0.0) || is_fine) return 1.0;
-  return round_length((source.is_to_scale() ? 4.0 * kFlat : 0.5 * kSteep) / share);
+  return round_length((source.is_to_scale() ? 4.0 * kFlat : kHilly) / share);
 }
 
 double farthest_corner(const TileGrid& grid, const TileBounds& whole, Vec3 eye, double exaggeration) {

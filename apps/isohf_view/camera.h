@@ -27,6 +27,9 @@ struct Camera {
 /// Direction of the ray through a place on the screen: x and y from -1 to 1, eastwards and upwards of its middle.
 [[nodiscard]] Vec3 ray_through(const Camera& camera, const ViewState& view, double x, double y);
 
+/// Where a place is seen; nullopt: behind the eye.
+[[nodiscard]] std::optional<PicturePoint> project(const Camera& camera, const ViewState& view, Vec3 at);
+
 /// Part of the way from one camera to another, 0...1, the short way round.
 [[nodiscard]] Camera between(const Camera& from, const Camera& to, double share);
 

@@ -27,9 +27,6 @@ namespace {
 
 using nlohmann::ordered_json;
 
-/// Samples a pixel of a picture, which may take its time.
-constexpr int kPictureSamples = 4;
-
 /// A call that throws once the program was interrupted.
 std::function<void()> interrupt_check() {
   return [&interrupted = cli::watch_interrupts()] {

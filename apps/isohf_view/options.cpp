@@ -159,7 +159,7 @@ void add_picture(CommandLine& line, Options& options) {
       "known and heights would tower over it)",
       [&](const std::string& text) { options.exaggeration = cli::parse_positive_number(text); });
   line.option("--samples", "N",
-              "Draw pixels as means of 1, 2, 4 or 8 samples (default 4; 1 in a window that no GPU draws)",
+              "Draw pixels as means of 1, 2, 4 or 8 samples (default 4; 1 of what moves in a window that no GPU draws)",
               [&](const std::string& text) {
                 constexpr int kSamples[] = {1, 2, 4, 8};
                 options.samples = kSamples[cli::parse_word(text, {"1", "2", "4", "8"})];

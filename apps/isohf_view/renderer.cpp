@@ -4,6 +4,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <string>
 
 #include "reading/hud.h"
 
@@ -30,6 +31,7 @@ uniform vec3 zenith;
 void main() {
   vec3 ray = normalize(world_from_camera * vec3(v_ndc * half_view, -1.0));
   vec3 sky = mix(horizon, zenith, 1.0 - exp(-2.2 * max(ray.y, 0.0)));
+  sky *= 0.5 + 0.5 * exp(min(1.3 * ray.y, 0.0));
   if (sun.y > -0.1) {
     float near_sun = max(dot(ray, sun), 0.0);
     sky += vec3(1.0, 0.75, 0.45) * (0.25 * pow(near_sun, 24.0) + 0.6 * smoothstep(0.99993, 0.99997, near_sun));
@@ -38,8 +40,16 @@ void main() {
 }
 )glsl";
 
-constexpr Vec3 kHorizon{0.62, 0.70, 0.78};
-constexpr Vec3 kZenith{0.16, 0.30, 0.55};
+/// Of the Earth, and where the body is not known; of Mars, whose dust scatters; of bodies without air.
+constexpr Air kEarthAir{{0.62, 0.70, 0.78}, {0.16, 0.30, 0.55}, {0.33, 0.39, 0.48}};
+constexpr Air kDust{{0.72, 0.60, 0.47}, {0.47, 0.36, 0.28}, {0.42, 0.38, 0.35}};
+constexpr Air kNoAir{{0.07, 0.08, 0.10}, {0.03, 0.03, 0.04}, {0.34, 0.34, 0.36}};
+
+Air air_of(const Metadata* metadata) {
+  const std::string body = metadata == nullptr ? "" : metadata->source.body;
+  if (body == "Mars") return kDust;
+  return body.empty() || body == "Earth" || body == "Venus" || body == "Titan" ? kEarthAir : kNoAir;
+}
 
 void set_vec3(GLint place, Vec3 value) {
   glUniform3f(place, static_cast<float>(value.x), static_cast<float>(value.y), static_cast<float>(value.z));
@@ -53,19 +63,19 @@ Vec3 level_colour(int level) {
 
 /// A sky that dims with the sun.
 Vec3 by_day(Vec3 colour, Vec3 sun) {
-  return std::clamp(sun.y * 5.0 + 0.35, 0.06, 1.0) * colour;
+  return std::clamp(sun.y * 5.0 + 0.35, 0.08, 1.0) * colour;
 }
 
 /// The uniforms of light and haze.
 template <typename AnyProgram>
-void set_light(const AnyProgram& program, const ViewState& view) {
+void set_light(const AnyProgram& program, const ViewState& view, const Air& air) {
   const Vec3 sun = normalised(view.sun);
   set_vec3(program.uniform("sun"), sun);
   const double height = std::clamp(sun.y * 2.5, 0.0, 1.0);
   const Vec3 warm{1.0, 0.62 + height * 0.34, 0.36 + height * 0.52};
   set_vec3(program.uniform("sun_light"), (sun.y > 0.0 ? 0.95 : 0.0) * warm);
-  set_vec3(program.uniform("sky_light"), std::clamp(sun.y * 6.0 + 0.25, 0.05, 1.0) * Vec3{0.33, 0.39, 0.48});
-  set_vec3(program.uniform("horizon"), by_day(kHorizon, sun));
+  set_vec3(program.uniform("sky_light"), std::clamp(sun.y * 6.0 + 0.25, 0.12, 1.0) * air.light);
+  set_vec3(program.uniform("horizon"), by_day(air.horizon, sun));
   const double haze_begin = 0.55 * view.far_distance;
   const double haze_rise = view.haze ? 1.0 / (view.far_distance - haze_begin) : 0.0;
   glUniform2f(program.uniform("haze"), static_cast<float>(haze_begin), static_cast<float>(haze_rise));
@@ -172,6 +182,7 @@ Renderer::Renderer(const TileSource& source, const SharedGeometry& shared)
       shared_(shared),
       planes_(planes_of(source)),
       whole_(whole_bounds(source)),
+      air_(air_of(source.metadata())),
       flat_("wire", flat_fragment_shader),
       sky_("sky", kSkyVertex, kSkyFragment) {
   const std::array<std::uint8_t, 4> nothing{};
@@ -186,7 +197,8 @@ void Renderer::set_palette(const std::vector<ColourStop>& stops, double low, dou
   constexpr int kColours = 4096;
   std::vector<std::uint16_t> texels;
   for (int i = 0; i < kColours; ++i) {
-    const OverlayColour colour = colour_at(stops, low + (i + 0.5) / kColours * (high - low));
+    // The colour at the texel's lower edge: a doubled stop within it begins above, so that the sea is sea at 0.
+    const OverlayColour colour = colour_at(stops, low + static_cast<double>(i) / kColours * (high - low));
     for (const float value : {colour.red, colour.green, colour.blue}) {
       texels.push_back(static_cast<std::uint16_t>(65535.0F * std::pow(value, 1.6F) + 0.5F));
     }
@@ -194,7 +206,8 @@ void Renderer::set_palette(const std::vector<ColourStop>& stops, double low, dou
   glBindTexture(GL_TEXTURE_2D, palette_.get());
   glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
   glTexImage2D(GL_TEXTURE_2D, 0, GL_RGB16, kColours, 1, 0, GL_RGB, GL_UNSIGNED_SHORT, texels.data());
-  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
   glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
   glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAX_LEVEL, 0);
   glBindTexture(GL_TEXTURE_2D, 0);
@@ -269,7 +282,7 @@ void Renderer::begin_shading(const Frame& frame, const TerrainProgram& program) 
   const double codes = std::max(whole_.high - whole_.low, 1e-9) / scale.scale;
   glUniform2f(program.uniform("ramp"), static_cast<float>((whole_.low - scale.offset) / scale.scale),
               static_cast<float>(1.0 / codes));
-  set_light(program, view);
+  set_light(program, view, air_);
 }
 
 void Renderer::place_texture(const TerrainProgram& program, PlaneTile at) const {
@@ -384,7 +397,7 @@ void Renderer::draw_wires(Frame& frame) const {
 
 void Renderer::draw_base(const Frame& frame) {
   if (!block_) block_.emplace(source_);
-  set_light(block_->begin(frame.view, frame.terrain), frame.view);
+  set_light(block_->begin(frame.view, frame.terrain), frame.view, air_);
   block_->draw();
 }
 
@@ -402,8 +415,8 @@ void Renderer::draw_sky(const ViewState& view) const {
   glUniformMatrix3fv(sky_.uniform("world_from_camera"), 1, GL_FALSE, world_from_camera.data());
   glUniform2f(sky_.uniform("half_view"), static_cast<float>(half * view.width / view.height), static_cast<float>(half));
   set_vec3(sky_.uniform("sun"), sun);
-  set_vec3(sky_.uniform("horizon"), by_day(kHorizon, sun));
-  set_vec3(sky_.uniform("zenith"), by_day(kZenith, sun));
+  set_vec3(sky_.uniform("horizon"), by_day(air_.horizon, sun));
+  set_vec3(sky_.uniform("zenith"), by_day(air_.zenith, sun));
   // At the far end of depth: only where no ground is.
   const bool reversed = order_ == DepthOrder::kNearIsOne;
   glUniform1f(sky_.uniform("far_depth"), reversed ? 0.0F : 1.0F);

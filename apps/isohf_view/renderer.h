@@ -24,6 +24,13 @@ enum class DepthOrder { kNearIsZero, kNearIsOne };
 /// kNearIsOne where the driver can (GL_ARB_clip_control, OpenGL 4.5).
 [[nodiscard]] DepthOrder best_depth_order();
 
+/// What light comes from beside the sun: linear colours of the sky, and of what it lends level ground.
+struct Air {
+  Vec3 horizon;
+  Vec3 zenith;
+  Vec3 light;
+};
+
 /// What one frame drew.
 struct FrameFigures {
   std::int64_t visible_tiles = 0;  ///< in the view and resident
@@ -108,6 +115,7 @@ class Renderer {
   const SharedGeometry& shared_;
   Planes planes_;
   TileBounds whole_;
+  Air air_;
   DepthOrder order_ = best_depth_order();
   std::map<std::tuple<ColourMode, bool, bool>, TerrainProgram> shading_;  ///< by mode, borders, rim
   std::vector<DrawnMesh> drawn_;

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 #include <thread>
+#include <tuple>
 
 #include "gl/offscreen.h"
 #include "isohf/error.h"
@@ -181,8 +182,14 @@ Vec3 Session::eye_in_archive() const {
 
 void Session::begin_day(const SolarTime& time) {
   if (!sky_) sky_ = source_.sky();
+  if (!time_) sun_before_ = {sun_azimuth_deg, sun_elevation_deg};
   time_ = time;
   set_hours(time.hours);
+}
+
+void Session::leave_day() {
+  end_day();
+  std::tie(sun_azimuth_deg, sun_elevation_deg) = sun_before_;
 }
 
 void Session::set_hours(double hours) {
@@ -315,6 +322,7 @@ void Session::draw_overlay(const Shown& shown) {
   }
   reading.hours = hours();
   reading.profile = shown.profile;
+  for (const Vec3 at : shown.way) reading.way.push_back(project(camera, view, at));
   hud_.draw(reading, view.width, view.height, shown.screen_scale);
 }
 

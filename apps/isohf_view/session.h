@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "camera.h"
@@ -40,6 +41,7 @@ class Session {
     std::vector<std::string> place;  ///< under the cursor
     double middle_distance = 0.0;    ///< of the ground in the middle of the picture; 0: there is none
     std::optional<Profile> profile;
+    std::vector<Vec3> way;  ///< what is measured, as drawn
     double screen_scale = 1.0;
   };
   void draw_overlay(const Shown& shown);
@@ -51,8 +53,9 @@ class Session {
   /// Follows the sun of a day from here on. Throws Error{kInvalidArgument} where its way is not known.
   void begin_day(const SolarTime& time);
   void set_hours(double hours);
-  /// The sun stands where it is put.
+  /// The sun stands where it is put: from here on, or where it stood before the day.
   void end_day() { time_.reset(); }
+  void leave_day();
   [[nodiscard]] std::optional<double> hours() const { return time_ ? std::optional(time_->hours) : std::nullopt; }
 
   /// Other colours of the ground; those that the source has.
@@ -105,6 +108,7 @@ class Session {
   std::string driver_;
   std::optional<DaySky> sky_;
   std::optional<SolarTime> time_;
+  std::pair<double, double> sun_before_;  ///< the day: azimuth and elevation, degrees
   std::optional<double> far_distance_;
   FrameFigures figures_;
   double reach_wanted_ = 0.0;  ///< the far distance, or to the farthest corner where that is nearer

@@ -7,12 +7,6 @@
 
 namespace isohf::view {
 
-/// A place in the picture: pixels from its top left corner.
-struct PicturePoint {
-  double x = 0.0;
-  double y = 0.0;
-};
-
 /// What a hand on mouse and keys does to a camera: the ground sticks to the cursor, the wheel never passes what is under
 /// it, and the eye stays above ground. Knows nothing of windows.
 class Steering {
@@ -24,6 +18,7 @@ class Steering {
   void press(Drag kind, PicturePoint at);
   void move(PicturePoint at);
   void release() { drag_.reset(); }
+  [[nodiscard]] bool is_dragging() const { return drag_.has_value(); }
 
   /// Nearer to what is under the cursor (steps > 0), or away from it.
   void wheel(double steps, PicturePoint at);

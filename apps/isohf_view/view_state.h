@@ -45,6 +45,12 @@ struct ViewState {
   [[nodiscard]] double focal_px() const { return height / (2.0 * std::tan(fov_y_rad / 2.0)); }
 };
 
+/// A place in the picture: pixels from its top left corner.
+struct PicturePoint {
+  double x = 0.0;
+  double y = 0.0;
+};
+
 /// Unit vector towards a sun at `azimuth_deg`, clockwise from North, `elevation_deg` above the horizon.
 inline Vec3 sun_direction(double azimuth_deg, double elevation_deg) {
   const double radians = std::acos(-1.0) / 180.0;

@@ -97,14 +97,13 @@ class Controls {
       of(w).changed_ = true;
       of(w).steering_.wheel(steps, of(w).cursor_);
     });
-    glfwSetFramebufferSizeCallback(window, [](GLFWwindow* w, int, int) { of(w).changed_ = true; });
-    glfwSetWindowRefreshCallback(window, [](GLFWwindow* w) { of(w).changed_ = true; });
+    glfwSetWindowRefreshCallback(window, [](GLFWwindow* w) { of(w).touched_ = true; });
     glfwSetDropCallback(window, [](GLFWwindow* w, int count, const char** paths) {
       of(w).changed_ = true;
       if (count > 0) of(w).dropped = paths[count - 1];
     });
     glfwSetCursorEnterCallback(window, [](GLFWwindow* w, int inside) {
-      of(w).changed_ = true;
+      of(w).touched_ = true;
       of(w).inside_ = inside == GLFW_TRUE;
     });
   }
@@ -124,10 +123,11 @@ class Controls {
     take_over();
   }
 
-  /// Held keys and what goes on by itself, `seconds` since the last call. True where the picture has changed since.
-  bool update(double seconds) {
-    bool moves = changed_ || steering_.is_flying();
-    changed_ = false;
+  enum class Change { kNone, kReading, kPicture };  ///< kReading: of what is read over the picture alone
+  /// Held keys and what goes on by itself, `seconds` since the last call: what has changed since.
+  Change update(double seconds) {
+    const bool reading = std::exchange(touched_, false);
+    const bool moves = std::exchange(changed_, false) || steering_.is_flying();
     const double hurry = held(GLFW_KEY_LEFT_SHIFT) || held(GLFW_KEY_RIGHT_SHIFT)       ? 4.0
                          : held(GLFW_KEY_LEFT_CONTROL) || held(GLFW_KEY_RIGHT_CONTROL) ? 0.2
                                                                                        : 1.0;
@@ -145,7 +145,8 @@ class Controls {
       session_.sun_elevation_deg = std::clamp(session_.sun_elevation_deg + 25.0 * seconds * up, -10.0, 90.0);
     }
     tapped_.clear();
-    return moves || !(walk == Vec3{}) || round != 0.0 || up != 0.0 || later != 0.0;
+    if (moves || !(walk == Vec3{}) || round != 0.0 || up != 0.0 || later != 0.0) return Change::kPicture;
+    return reading ? Change::kReading : Change::kNone;
   }
 
   /// What is under the cursor and what is measured; the rest is the caller's.
@@ -162,15 +163,37 @@ class Controls {
     if (there) {
       for (std::string& line : lines_of(describe(*there))) shown.place.push_back(std::move(line));
     }
-    const std::optional<Vec3> end = measured_to_ ? measured_to_ : there;
+    const std::optional<Vec3> end = measured_to_ ? measured_to_ : there ? std::optional(true_place(*there)) : there;
     if (measured_from_ && end) {
+      const TileSource& source = session_.source();
       const Vec3 way = *end - *measured_from_;
-      shown.place.push_back(fmt::format("{} away, {:+.6g} up",
-                                        describe_length(std::hypot(way.x, way.z), session_.source().ground_unit()),
-                                        way.y / view.exaggeration / session_.source().world_per_elevation()));
+      const double rise = way.y / source.world_per_elevation();
+      const std::string unit = source.height_unit().empty() ? "" : " " + short_unit(source.height_unit());
+      shown.place.push_back(fmt::format(
+          "{} away, {:.{}f}{} {}", describe_length(std::hypot(way.x, way.z), source.ground_unit()), std::abs(rise),
+          source.describe({end->x, end->z}, end->y).decimals, unit, rise < 0.0 ? "lower" : "higher"));
     }
+    if (measured_from_) shown.way = measured_way(end);
     shown.profile = profile_;
     return shown;
+  }
+
+  /// As drawn: over the ground once both ends stand.
+  [[nodiscard]] std::vector<Vec3> measured_way(const std::optional<Vec3>& end) const {
+    const auto drawn = [this](Vec3 at) { return Vec3{at.x, at.y * session_.view.exaggeration, at.z}; };
+    std::vector<Vec3> way{drawn(*measured_from_)};
+    if (profile_ && measured_to_) {
+      const double last = static_cast<double>(profile_->heights.size() - 1);
+      for (std::size_t i = 1; i + 1 < profile_->heights.size(); ++i) {
+        const double height = profile_->heights[i] * session_.source().world_per_elevation();
+        if (std::isnan(height)) continue;
+        const double share = static_cast<double>(i) / last;
+        way.push_back(drawn({std::lerp(measured_from_->x, measured_to_->x, share), height,
+                             std::lerp(measured_from_->z, measured_to_->z, share)}));
+      }
+    }
+    if (end) way.push_back(drawn(*end));
+    return way;
   }
 
   /// nullopt: no ground.
@@ -196,8 +219,11 @@ class Controls {
     return (held(plus) || held(plus_too) ? 1.0 : 0.0) - (held(minus) || held(minus_too) ? 1.0 : 0.0);
   }
 
+  /// Of a place as drawn: without exaggeration.
+  [[nodiscard]] Vec3 true_place(Vec3 drawn) const { return {drawn.x, drawn.y / session_.view.exaggeration, drawn.z}; }
   [[nodiscard]] Place describe(Vec3 at) const {
-    return session_.source().describe({at.x, at.z}, at.y / session_.view.exaggeration);
+    const Vec3 place = true_place(at);
+    return session_.source().describe({place.x, place.z}, place.y);
   }
 
   void move(double x, double y) {
@@ -206,16 +232,17 @@ class Controls {
     int height = 1;
     glfwGetWindowSize(window_, &width, &height);
     cursor_ = {x * session_.view.width / std::max(width, 1), y * session_.view.height / std::max(height, 1)};
-    inside_ = changed_ = true;
+    inside_ = touched_ = true;
+    if (slides_ || steering_.is_dragging()) changed_ = true;
     if (!slides_) return steering_.move(cursor_);
     if (const auto hours = slider_hours()) session_.set_hours(*hours);
   }
 
   void click(int button, int action, int mods) {
-    changed_ = true;
+    touched_ = true;
     if (action == GLFW_RELEASE) return slides_ = false, steering_.release();
     if (const auto hours = slider_hours(); hours && button == GLFW_MOUSE_BUTTON_LEFT) {
-      slides_ = true;
+      slides_ = changed_ = true;
       return session_.set_hours(*hours);
     }
     const double now = glfwGetTime();
@@ -319,7 +346,8 @@ class Controls {
   void measure() {
     profile_.reset();
     if (measured_to_) return measured_from_.reset(), measured_to_.reset();
-    const auto here = steering_.pick(cursor_);
+    auto here = steering_.pick(cursor_);
+    if (here) here = true_place(*here);
     if (!measured_from_) return static_cast<void>(measured_from_ = here);
     measured_to_ = here;
     if (here) {
@@ -330,7 +358,7 @@ class Controls {
 
   /// The sun of today, where its way is known.
   void toggle_day() {
-    if (session_.hours()) return session_.end_day();
+    if (session_.hours()) return session_.leave_day();
     const std::chrono::year_month_day today{std::chrono::floor<std::chrono::days>(std::chrono::system_clock::now())};
     try {
       session_.begin_day({static_cast<int>(today.year()), static_cast<int>(static_cast<unsigned>(today.month())),
@@ -363,11 +391,12 @@ class Controls {
   Camera start_;
   bool looks_;  ///< the left button turns the head
   PicturePoint cursor_;
-  bool inside_ = false;  ///< the cursor, the window
-  bool changed_ = true;
-  std::set<int> tapped_;  ///< keys pressed since the last frame
-  bool slides_ = false;   ///< the left button holds the time slider
-  std::optional<Vec3> measured_from_;
+  bool inside_ = false;                ///< the cursor, the window
+  bool changed_ = true;                ///< what the picture shows
+  bool touched_ = false;               ///< what is read over it
+  std::set<int> tapped_;               ///< keys pressed since the last frame
+  bool slides_ = false;                ///< the left button holds the time slider
+  std::optional<Vec3> measured_from_;  ///< without exaggeration
   std::optional<Vec3> measured_to_;
   std::optional<Profile> profile_;
   double last_click_s_ = -1.0;
@@ -519,7 +548,12 @@ void run_window(const Options& options) {
   const Window window(options.view.width, options.view.height, "isohf-view");
   require_gl();
   Scenes scenes(window.get(), options, std::move(first));
-  std::optional<Offscreen> target;
+  // What stands still is drawn with more samples than a moving picture where that takes its time.
+  const std::array<int, 2> samples{options.samples.value_or(is_software_driver() ? 1 : kPictureSamples),
+                                   options.samples.value_or(kPictureSamples)};
+  std::array<std::optional<Offscreen>, 2> targets;
+  const Offscreen* picture = nullptr;  // the last one
+  bool is_final = false;               // it is what an eye that stands still sees
   using Clock = std::chrono::steady_clock;
   auto last = Clock::now();
   double smooth_s = 1.0 / 60.0;
@@ -536,47 +570,58 @@ void run_window(const Options& options) {
     scenes.follow();
     Session& session = scenes.now().session;
     Controls& controls = scenes.now().controls;
-    const bool changed = controls.update(std::min(seconds, 0.1));
+    const Controls::Change change = controls.update(std::min(seconds, 0.1));
+    const bool moves = change == Controls::Change::kPicture;
     int width = 0;
     int height = 0;
     glfwGetFramebufferSize(window.get(), &width, &height);
     const bool iconified = width < 1 || height < 1;
     // Where nothing moves and nothing is to come the picture stays; an event wakes us.
-    if (iconified || (!changed && options.frames == 0 && session.is_settled() && session.view.coarser == 1.0)) {
+    const bool stays = picture != nullptr && picture->width() == width && picture->height() == height && !moves &&
+                       is_final && options.frames == 0 && session.is_settled();
+    if (iconified || (stays && change == Controls::Change::kNone)) {
       glfwWaitEventsTimeout(kIdle_s);
       last = Clock::now();
       --frame;
       continue;
     }
     smooth_s += 0.1 * (seconds - smooth_s);
-    // What is drawn slowly is drawn coarser while it moves, and in full as soon as it stands still or is kept.
-    if (changed && options.frames == 0) {
-      coarser = std::clamp(coarser * (drawing_s > kSlow_s ? 1.5 : drawing_s < 0.4 * kSlow_s ? 0.8 : 1.0), 1.0, 64.0);
+    if (!stays) {
+      // What is drawn slowly is drawn coarser while it moves, and in full as soon as it stands still or is kept.
+      if (moves && options.frames == 0) {
+        coarser = std::clamp(coarser * (drawing_s > kSlow_s ? 1.5 : drawing_s < 0.4 * kSlow_s ? 0.8 : 1.0), 1.0, 64.0);
+      }
+      const bool in_full = !moves || controls.wants_picture;
+      is_final = !moves && session.is_settled();
+      session.view.coarser = in_full ? 1.0 : coarser;
+      session.view.width = width;
+      session.view.height = height;
+      const std::size_t which = samples[0] != samples[1] && (is_final || controls.wants_picture) ? 1 : 0;
+      std::optional<Offscreen>& target = targets[which];
+      if (!target || target->width() != width || target->height() != height) {
+        target.emplace(width, height, GL_RGBA8, samples[which]);
+      }
+      picture = &*target;
+      picture->bind();
+      session.frame();
+      is_final = is_final && session.is_settled();
+      ++drawn;
     }
-    session.view.coarser = changed && !controls.wants_picture ? coarser : 1.0;
-    session.view.width = width;
-    session.view.height = height;
-    if (!target || target->width() != width || target->height() != height) {
-      target.emplace(width, height, GL_RGBA8, options.samples.value_or(default_samples()));
-    }
-    target->bind();
-    session.frame();
     const bool is_last = options.frames > 0 && frame >= options.frames;
     if (controls.wants_picture) {
       controls.wants_picture = false;
       const std::string name = std::filesystem::absolute(next_picture_name()).string();
-      target->write_picture(name);
+      picture->write_picture(name);
       controls.message = "wrote " + name;
       if (!options.common.quiet) cli::print_note("wrote " + name);
     }
-    target->show();
+    picture->show();
     Session::Shown shown = controls.shown();
     shown.frames_per_second = 1.0 / smooth_s;
     session.draw_overlay(shown);
     if (is_last && !options.screenshot.empty()) write_picture(options.screenshot, width, height);
     glfwSwapBuffers(window.get());
-    if (changed) drawing_s = std::chrono::duration<double>(Clock::now() - now).count();
-    ++drawn;
+    if (moves) drawing_s = std::chrono::duration<double>(Clock::now() - now).count();
     if (is_last) break;
   }
   if (!options.common.json) return;

@@ -28,13 +28,7 @@ struct HandScene {
     return below ? camera.eye.y - *below * state.exaggeration : std::numeric_limits<double>::infinity();
   }
   /// Where a point of the world lies in the picture.
-  [[nodiscard]] view::PicturePoint project(view::Vec3 at) const {
-    const view::Vec3 way = at - camera.eye;
-    const view::Vec3 up = cross(camera.right(), camera.forward());
-    const double depth = dot(way, camera.forward());
-    return {0.5 * state.width + state.focal_px() * dot(way, camera.right()) / depth,
-            0.5 * state.height - state.focal_px() * dot(way, up) / depth};
-  }
+  [[nodiscard]] view::PicturePoint project(view::Vec3 at) const { return view::project(camera, state, at).value(); }
   /// At one of 9 x 9 places of the picture.
   [[nodiscard]] bool sees_ground() {
     for (int place = 0; place < 81; ++place) {

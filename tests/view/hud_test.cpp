@@ -24,6 +24,8 @@ TEST(Hud, WritesLengthsAsPeopleDo) {
   EXPECT_EQ(describe_length(20000.0, "metre"), "20 km");
   EXPECT_EQ(describe_length(0.5, "degree"), "0.5 degree");
   EXPECT_EQ(describe_length(3.0, ""), "3 world units");
+  EXPECT_EQ(describe_length(31146.6, "metre"), "31.147 km");
+  EXPECT_EQ(describe_length(40.0, "foot"), "40 ft");
 }
 
 TEST(Hud, BlendsColoursBetweenStopsAndKeepsThemSharpAtDoubledOnes) {
@@ -61,9 +63,11 @@ TEST(Place, IsNamedInAllItsWays) {
   Place place{{10.0, 20.0}, 12.345, {}, "metre", 1, MapPoint{500000.0, 4000000.0}, GeoPoint{-70.5, -33.25}};
   const std::vector<std::string> lines = lines_of(place);
   ASSERT_EQ(lines.size(), 3U);
-  EXPECT_EQ(lines[0], "x 10  z 20  elevation 12.3 metre");
+  EXPECT_EQ(lines[0], "x 10  z 20  elevation 12.3 m");
   EXPECT_EQ(lines[1], "E 500000.00  N 4000000.00");
   EXPECT_EQ(lines[2], "33.250000 S  70.500000 W");
+  place.at = {10862717.93, 0.125};
+  EXPECT_EQ(lines_of(place)[0], "x 10862718  z 0.125  elevation 12.3 m");
 }
 
 }  // namespace

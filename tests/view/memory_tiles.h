@@ -3,10 +3,13 @@
 #include <algorithm>
 #include <atomic>
 #include <functional>
+#include <optional>
 #include <span>
+#include <string>
 #include <utility>
 #include <vector>
 
+#include "isohf/metadata.h"
 #include "paging/tile_source.h"
 #include "support/rasters/analytic_surface.h"
 
@@ -42,6 +45,10 @@ class MemoryTiles final : public view::TileSource {
     if (alter_heights_) alter_heights_(tile, heights);
   }
 
+  /// On that planet or moon.
+  void set_body(const std::string& body) { metadata_.emplace(grid_).source.body = body; }
+  [[nodiscard]] const Metadata* metadata() const override { return metadata_ ? &*metadata_ : nullptr; }
+
   mutable std::atomic<int> reads{0};
 
  private:
@@ -70,6 +77,7 @@ class MemoryTiles final : public view::TileSource {
   std::function<void()> before_read_;
   std::vector<view::TileBounds> bounds_;
   AlterHeights alter_heights_;
+  std::optional<Metadata> metadata_;
 };
 
 }  // namespace isohf::test

@@ -375,6 +375,37 @@ TEST_F(ViewProgramTest, IsSteeredByMouseAndKeys) {
       << "an idle window takes no more than 1 % of a processor: 100 ticks are a second";
 }
 
+/// Moving the cursor draws no ground; what stands still, and what is saved, is drawn as pictures are; the sun goes back
+/// to where it stood before a day.
+TEST_F(ViewProgramTest, RestsWhileTheCursorMovesAndDrawsWhatStandsStillInFull) {
+  if (std::system("command -v xvfb-run >/dev/null 2>&1 && command -v xdotool >/dev/null 2>&1") != 0) {
+    GTEST_SKIP() << "xvfb-run or xdotool is not installed";
+  }
+  ASSERT_EQ(test::run_isohf({"convert", ISOHF_SOURCE_DIR "/testdata/coast_512x384_int16.tif", path("coast.isohf"),
+                             "--density", "0.1", "-q"})
+                .exit_code,
+            0);
+  test::write_file(path("rest.sh"), R"sh(
+    cd "$2"
+    "$1" coast.isohf -q --json --window --size 320x240 >rest.json & viewer=$!
+    id=$(timeout 30 xdotool search --sync --onlyvisible --name isohf-view | head -1)
+    xdotool windowmove "$id" 0 0 windowfocus "$id" sleep 2 key p sleep 1
+    for x in $(seq 60); do xdotool mousemove $((50 + x)) 120 sleep 0.03; done
+    xdotool key o sleep 0.5 key o sleep 0.5 key Escape
+    wait $viewer
+  )sh");
+  const Outcome outcome = test::run_program({"/usr/bin/env", "xvfb-run", "-a", "-s", "-screen 0 400x300x24", "sh",
+                                             path("rest.sh"), ISOHF_BIN_DIR "/isohf-view", path("")});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const auto end = nlohmann::json::parse(text("rest.json"));
+  EXPECT_LT(end.at("frames").get<int>(), 40) << end;
+  EXPECT_FALSE(end.at("under_cursor").is_null()) << end;
+  EXPECT_EQ(end.at("sun_azimuth_deg").get<double>(), 300.0) << end;
+  const Outcome drawn = run(path("coast.isohf") + " --size 320x240 --screenshot " + path("drawn.png"));
+  EXPECT_EQ(drawn.exit_code, 0) << drawn.err;
+  EXPECT_EQ(text("isohf-0001.png"), text("drawn.png"));
+}
+
 /// The place under the cursor, before a drag and after it, is the same.
 TEST_F(ViewProgramTest, ADragInTheWindowTakesTheGroundAlong) {
   if (std::system("command -v xvfb-run >/dev/null 2>&1 && command -v xdotool >/dev/null 2>&1") != 0) {

@@ -1,5 +1,6 @@
 #include "renderer.h"
 
+#include <array>
 #include <cstdlib>
 
 #include "camera.h"
@@ -61,6 +62,18 @@ TEST_F(RendererTest, OverviewsFromAnywhereHaveAllCornersInView) {
       view.width = width;
       view.height = height;
       const Camera camera = overview_camera(source, view, nullptr, way);
+      PicturePoint low{1e9, 1e9};
+      PicturePoint high{-1e9, -1e9};
+      for (int corner = 0; corner < 8; ++corner) {
+        const TileBounds whole = whole_bounds(source);
+        const auto at = project(
+            camera, view, box_corner({ground.x0, whole.low, ground.z0}, {ground.x1, whole.high, ground.z1}, corner));
+        ASSERT_TRUE(at);
+        low = {std::min(low.x, at->x), std::min(low.y, at->y)};
+        high = {std::max(high.x, at->x), std::max(high.y, at->y)};
+      }
+      EXPECT_NEAR(low.x, width - high.x, 2.0) << "in the middle";
+      EXPECT_NEAR(low.y, height - high.y, 2.0) << "in the middle";
       for (const double x : {ground.x0, ground.x1}) {
         for (const double z : {ground.z0, ground.z1}) {
           const Vec3 at = Vec3{x, 0.0, z} - camera.eye;
@@ -103,6 +116,77 @@ TEST_F(RendererTest, StandsOnABlockWhoseHatchedFloorShowsThroughVoids) {
   const Vec3 wall{1280.0, 0.0, 1920.0};
   EXPECT_LT(sky(beside, wall, true), sky(beside, wall, false) - 0.03);
   EXPECT_LT(Block::floor(source, options.view), whole_bounds(source).low * options.exaggeration.value_or(1.0));
+}
+
+/// Hatches are as wide in the picture from near as from afar, so that small voids have them as well.
+TEST_F(RendererTest, HatchesVoidsAsFinelyFromAnyDistance) {
+  const test::MemoryTiles source(small_grid(), [](TileIndex tile, std::vector<std::uint16_t>& codes) {
+    if (tile.column > 0) std::fill(codes.begin(), codes.end(), kVoidCode);
+  });
+  Options options;
+  options.view.width = 320;
+  options.view.height = 240;
+  options.view.base = true;
+  options.view.haze = false;
+  for (const double above : {1000.0, 300.0, 30.0}) {
+    const double floor = Block::floor(source, options.view);
+    options.position = Vec3{1600.0, floor + above, 960.0};
+    options.look_at = Vec3{1600.0, floor, 959.0};
+    options.exaggeration = 1.0;
+    Session session(source, options);
+    const Offscreen target(320, 240, GL_RGBA8);
+    session.complete_frame();
+    const auto pixels = target.read_rgba8();
+    int changes = 0;
+    for (std::size_t x = 1; x < 320; ++x) {
+      const auto at = [&](std::size_t column) { return static_cast<int>(pixels[(120 * 320 + column) * 4]); };
+      changes += (at(x) > 105) != (at(x - 1) > 105) ? 1 : 0;
+    }
+    EXPECT_GT(changes, 30) << above;
+    EXPECT_LT(changes, 160) << above;
+  }
+}
+
+TEST_F(RendererTest, HasTheSkyOfTheBody) {
+  const auto zenith = [](const std::string& body) {
+    test::MemoryTiles source(small_grid());
+    source.set_body(body);
+    Options options;
+    options.view.width = 32;
+    options.view.height = 32;
+    options.sun_elevation_deg = 20.0;
+    options.position = Vec3{100.0, 500.0, 100.0};
+    options.look_at = Vec3{100.0, 600.0, 90.0};
+    Session session(source, options);
+    const Offscreen target(32, 32, GL_RGBA8);
+    session.complete_frame();
+    const auto pixels = target.read_rgba8();
+    return std::array<int, 3>{pixels[0], pixels[1], pixels[2]};
+  };
+  EXPECT_GT(zenith("Earth")[2], zenith("Earth")[0] + 30) << "blue";
+  EXPECT_EQ(zenith(""), zenith("Earth"));
+  EXPECT_GT(zenith("Mars")[0], zenith("Mars")[2] + 20) << "dust";
+  EXPECT_LT(zenith("Moon")[2], 60) << "no air";
+}
+
+TEST_F(RendererTest, DrawsWhatLiesOnTheShoreInTheColourOfTheSea) {
+  // All at 0 but a hill, which makes a colour of the palette wide.
+  const test::MemoryTiles source(small_grid(), [](TileIndex tile, std::vector<std::uint16_t>& codes) {
+    std::fill(codes.begin(), codes.end(), tile == TileIndex{0, 0} ? std::uint16_t{60000} : std::uint16_t{10000});
+  });
+  Options options;
+  options.view.width = 160;
+  options.view.height = 120;
+  options.position = Vec3{1920.0, 500.0, 1300.0};
+  options.look_at = Vec3{1920.0, 0.0, 1299.0};
+  Session session(source, options);
+  const TileBounds whole = whole_bounds(source);
+  session.renderer().set_palette(
+      {{-20.0, 20, 40, 200}, {0.001, 20, 40, 200}, {0.001, 20, 200, 40}, {100.0, 20, 200, 40}}, whole.low, whole.high);
+  const Offscreen target(160, 120, GL_RGBA8);
+  session.complete_frame();
+  const auto pixels = target.read_rgba8();
+  for (std::size_t i = 0; i < pixels.size(); i += 4) ASSERT_GT(pixels[i + 2], pixels[i + 1]) << i / 4;
 }
 
 /// The largest change of any pixel between small steps of level, fading and switching.

@@ -29,20 +29,25 @@ constexpr const char* kBlockFragment = R"glsl(#version 330 core
 in vec4 v_place;
 out vec4 colour;
 uniform vec3 outwards;
-uniform float stripe;                 // width of a hatch and its gap
 uniform vec3 sun;
 uniform vec3 sun_light;
 uniform vec3 sky_light;
 uniform vec2 haze;
 uniform vec3 horizon;
+float hatch(float across, float wide) {
+  float at = across / wide;
+  return clamp((abs(fract(at) - 0.5) - 0.25) / fwidth(at) + 0.5, 0.0, 1.0);
+}
 void main() {
   vec3 base = vec3(0.60, 0.53, 0.46) * (0.75 + 0.25 * v_place.w);
   float direct = max(dot(outwards, sun), 0.0);
   if (outwards.y > 0.5) {
-    float across = (v_place.x + v_place.y) / stripe;
-    float blur = max(fwidth(across), 1e-6);
-    float line = clamp((abs(fract(across) - 0.5) - 0.25) / blur + 0.5, 0.0, 1.0);
-    base = mix(vec3(0.50), vec3(0.30), mix(line, 0.5, clamp(2.0 * blur - 0.5, 0.0, 1.0)));
+    // As wide on the screen from everywhere: a pattern gives way to one twice as wide.
+    float across = v_place.x + v_place.y;
+    float wide = log2(max(fwidth(across), 1e-30)) + 3.0;
+    float line = mix(hatch(across, exp2(floor(wide))), hatch(across, exp2(floor(wide) + 1.0)),
+                     smoothstep(0.3, 0.7, fract(wide)));
+    base = mix(vec3(0.50), vec3(0.30), line);
     direct = 0.3;
   }
   vec3 shown = base * (sky_light * (0.8 + 0.2 * outwards.y) + sun_light * direct);
@@ -57,7 +62,6 @@ constexpr double kMostVertices = 20000.0;
 /// Depth of the floor below the lowest ground: shares of the range of heights and of the ground's shorter side.
 constexpr double kRangeShare = 0.1;
 constexpr double kSideShare = 0.03;
-constexpr double kHatches = 60.0;
 
 }  // namespace
 
@@ -140,8 +144,6 @@ const Program& Block::begin(const ViewState& view, const TerrainFrame& frame) co
               static_cast<float>(covered_.z0 - view.eye.z));
   glUniform1f(program_.uniform("exaggeration"), static_cast<float>(view.exaggeration));
   glUniform1f(program_.uniform("floor_height"), static_cast<float>(floor(source_, view)));
-  const double side = std::max(covered_.x1 - covered_.x0, covered_.z1 - covered_.z0);
-  glUniform1f(program_.uniform("stripe"), static_cast<float>(side / kHatches));
   return program_;
 }
 

@@ -84,10 +84,6 @@ bool is_software_driver() {
          renderer.find("swrast") != std::string::npos;
 }
 
-int default_samples() {
-  return is_software_driver() ? 1 : 4;
-}
-
 Offscreen::Offscreen(int width, int height, GLenum colour_format, int samples) : width_(width), height_(height) {
   GLint most = 1;
   glGetIntegerv(GL_MAX_SAMPLES, &most);

@@ -24,8 +24,9 @@ class HeadlessContext {
   std::unique_ptr<State> state_;
 };
 
-/// Samples a pixel that pictures are drawn with unless the user says: 4, or 1 where software draws a window.
-[[nodiscard]] int default_samples();
+/// Samples a pixel of pictures, unless the user says.
+constexpr int kPictureSamples = 4;
+
 /// The name that the driver gives itself.
 [[nodiscard]] std::string driver_name();
 /// True where no GPU draws.

@@ -21,13 +21,16 @@ constexpr std::string_view kGlyphs =
 ehhehhe ehhf12c 0cc0cc0 0cc0c48 248g842 00v0v00 8421248 eh12404 ehnlnge ehhvhhh uhhuhhu ehggghe
 uhhhhhu vgguggv vgguggg ehgnhhf hhhvhhh e44444e 72222ic hikokih ggggggv hrllhhh hppljjh ehhhhhe
 uhhuggg ehhhlid uhhukih fgge11u v444444 hhhhhhe hhhhaa4 hhhllrh hha4ahh hha4444 v1248gv e88888e
-gg84211 e22222e 4ah0000 000000v 8400000 00e1fhf gguhhhu 00eggge 11fhhhf 00ehvge 688s888 00fhf1e
-gguhhhh 40c444e 20622ic ggikoki c44444e 00qllll 00uhhhh 00ehhhe 00uhugg 00fhf11 00mpggg 00fge1u
-88s8896 00hhhhf 00hhha4 00hllla 00ha4ah 00hhf1e 00v248v 2448442 4444444 8442448 00dm000)";
+gg84211 e22222e 4ah0000 000000v 8400000 00e1fhf gguhhhu 00eggge 11fhhhf 00ehvge 688s888 fhhhf1e
+gguhhhh 40c444e 20622ic ggikoki c44444e 00qllll 00uhhhh 00ehhhe uhhhugg fhhhf11 00mpggg 00fge1u
+88s8896 00hhhhf 00hhha4 00hllla 00ha4ah hhhhf1e 00v248v 2448442 4444444 8442448 00dm000)";
+/// Letters that begin where small ones do, and end below the line.
+constexpr std::string_view kDescending = "gpqy";
+constexpr int kDescent = 2;
 
 constexpr int kTexels = 4;  ///< of the font texture in a font pixel
 constexpr int kCellWidth = (kGlyphWidth + 2) * kTexels;
-constexpr int kCellHeight = (kGlyphHeight + 2) * kTexels;
+constexpr int kCellHeight = (kGlyphHeight + kDescent + 2) * kTexels;
 constexpr int kColumns = 16;  ///< glyphs a row of the font texture
 constexpr int kAdvance = kGlyphWidth + 1;
 constexpr int kLeading = kGlyphHeight + 4;
@@ -72,13 +75,16 @@ std::vector<Stroke> strokes_of(int glyph) {
     const int row = digit <= '9' ? digit - '0' : digit - 'a' + 10;
     return (row >> (kGlyphWidth - 1 - x) & 1) != 0;
   };
+  const bool descends = kDescending.find(static_cast<char>(kFirstGlyph + glyph)) != std::string_view::npos;
+  const float down = descends ? kDescent : 0;
   std::vector<Stroke> strokes;
   for (int y = 0; y < kGlyphHeight; ++y) {
     for (int x = 0; x < kGlyphWidth; ++x) {
       if (!is_set(x, y)) continue;
       const auto join = [&](int dx, int dy) {
-        strokes.push_back(
-            {static_cast<float>(x), static_cast<float>(y), static_cast<float>(x + dx), static_cast<float>(y + dy)});
+        const auto from_x = static_cast<float>(x);
+        const float from_y = static_cast<float>(y) + down;
+        strokes.push_back({from_x, from_y, from_x + static_cast<float>(dx), from_y + static_cast<float>(dy)});
       };
       join(0, 0);
       if (is_set(x + 1, y)) join(1, 0);

@@ -5,9 +5,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 namespace isohf::view {
 namespace {
+
+/// What is in the hand: the slider's knob, a measured way.
+constexpr OverlayColour kMark{1.0F, 0.8F, 0.35F, 1.0F};
 
 struct Slider {
   double x, y, width, height;
@@ -20,11 +24,6 @@ float text_size(int height, double scale) {
 Slider slider_of(int width, int height, double scale) {
   const double size = text_size(height, scale);
   return {0.28 * width, height - 20.0 * size, 0.44 * width, 6.0 * size};
-}
-
-/// Short names of units; others as they are.
-std::string short_unit(const std::string& unit) {
-  return unit == "metre" ? "m" : unit;
 }
 
 /// Lines of at most so many letters, cut between words where there are any.
@@ -67,10 +66,13 @@ double round_length(double most) {
   return power * (most >= 5.0 * power ? 5.0 : most >= 2.0 * power ? 2.0 : 1.0);
 }
 
+std::string short_unit(const std::string& unit) {
+  return unit == "metre" ? "m" : unit == "foot" ? "ft" : unit;
+}
+
 std::string describe_length(double length, const std::string& unit) {
-  if (unit == "metre" && length >= 1000.0) return fmt::format("{:.6g} km", length / 1000.0);
-  if (unit == "metre") return fmt::format("{:.6g} m", length);
-  return fmt::format("{:.6g} {}", length, unit.empty() ? "world units" : unit);
+  if (unit == "metre" && length >= 1000.0) return fmt::format("{:.5g} km", length / 1000.0);
+  return fmt::format("{:.5g} {}", length, unit.empty() ? "world units" : short_unit(unit));
 }
 
 void Hud::draw(const Reading& reading, int width, int height, double scale) {
@@ -78,6 +80,7 @@ void Hud::draw(const Reading& reading, int width, int height, double scale) {
   const auto w = static_cast<float>(width);
   const auto h = static_cast<float>(height);
   const float edge = 4.0F * overlay_.size();
+  draw_way(reading.way);
   if (!reading.colours.empty()) draw_legend(reading, w, h);
   if (reading.world_per_px > 0.0) {
     draw_scale(reading, h);
@@ -155,10 +158,10 @@ void Hud::draw_north(double heading_rad, float width, float height) {
   const auto join = [&](std::array<float, 2> from, std::array<float, 2> to) {
     overlay_.line(from[0], from[1], to[0], to[1], 1.4F * size, kInk);
   };
-  const auto tip = at(0.55F, 0.0F);
+  const auto tip = at(0.4F, 0.0F);
   join(at(-0.9F, 0.0F), tip);
-  join(at(0.2F, 0.22F), tip);
-  join(at(0.2F, -0.22F), tip);
+  join(at(0.1F, 0.22F), tip);
+  join(at(0.1F, -0.22F), tip);
   const auto letter = at(0.9F, 0.0F);
   overlay_.text(letter[0] - 2.5F * size, letter[1] - 3.5F * size, "N");
 }
@@ -178,7 +181,7 @@ void Hud::draw_slider(double hours, int width, int height, double scale) {
     overlay_.text(at - 0.5F * overlay_.width_of(text), y + 8.0F * size, text);
   }
   const float at = x + across * static_cast<float>(hours / 24.0);
-  overlay_.box(at - 2.0F * size, y - size, 4.0F * size, 8.0F * size, {1.0F, 0.8F, 0.35F, 1.0F});
+  overlay_.box(at - 2.0F * size, y - size, 4.0F * size, 8.0F * size, kMark);
   const auto minutes = static_cast<int>(std::lround(hours * 60.0));
   const std::string text = fmt::format("{:02}:{:02}", minutes / 60, minutes % 60);
   const float left = std::clamp(at - 0.5F * overlay_.width_of(text), x, x + across - overlay_.width_of(text));
@@ -192,6 +195,25 @@ std::optional<double> Hud::slider_hours(double x, double y, int width, int heigh
     return std::nullopt;
   }
   return std::clamp((x - bar.x) / bar.width * 24.0, 0.0, 24.0);
+}
+
+void Hud::draw_way(const std::vector<std::optional<PicturePoint>>& way) {
+  const float size = overlay_.size();
+  const auto x_of = [](const PicturePoint& at) { return static_cast<float>(at.x); };
+  const auto y_of = [](const PicturePoint& at) { return static_cast<float>(at.y); };
+  // A dark rim, so that it is seen on snow.
+  for (const auto& [rim, colour] : {std::pair{1.0F, kPanel}, std::pair{0.0F, kMark}}) {
+    for (std::size_t i = 0; i + 1 < way.size(); ++i) {
+      if (!way[i] || !way[i + 1]) continue;
+      overlay_.line(x_of(*way[i]), y_of(*way[i]), x_of(*way[i + 1]), y_of(*way[i + 1]), (1.2F + 2.0F * rim) * size,
+                    colour);
+    }
+    for (const std::size_t end : {std::size_t{0}, way.size() - 1}) {
+      if (way.empty() || !way[end]) continue;
+      const float half = (2.5F + rim) * size;
+      overlay_.box(x_of(*way[end]) - half, y_of(*way[end]) - half, 2.0F * half, 2.0F * half, colour);
+    }
+  }
 }
 
 void Hud::draw_profile(const Profile& profile, const Reading& reading, float width, float height) {
@@ -215,7 +237,7 @@ void Hud::draw_profile(const Profile& profile, const Reading& reading, float wid
   overlay_.box(left, top, across, deep, kPanel);
   overlay_.text(left + 4.0F * size, top + 4.0F * size, height_text(high));
   overlay_.text(left + 4.0F * size, top + deep - 11.0F * size, height_text(low));
-  const std::string length = describe_length(std::stod(fmt::format("{:.4g}", profile.length)), reading.ground_unit);
+  const std::string length = describe_length(profile.length, reading.ground_unit);
   overlay_.text(left + across - overlay_.width_of(length) - 4.0F * size, top + 4.0F * size, length);
   const double range = std::max(high - low, 1e-9);
   const float inner = deep - 30.0F * size;

@@ -6,6 +6,7 @@
 
 #include "gl/overlay.h"
 #include "isohf/shade.h"
+#include "view_state.h"
 
 namespace isohf::view {
 
@@ -28,6 +29,7 @@ struct Reading {
   double heading_rad = 0.0;
   std::optional<double> hours;  ///< of the day, on the slider
   std::optional<Profile> profile;
+  std::vector<std::optional<PicturePoint>> way;  ///< what is measured, in the picture; nullopt behind the eye
 };
 
 /// The colour at an elevation, sRGB; linear between stops.
@@ -35,6 +37,9 @@ struct Reading {
 
 /// The largest of 1, 2, 5, 10, ... that is not above `most`, > 0.
 [[nodiscard]] double round_length(double most);
+
+/// "m" for "metre"; others as they are.
+[[nodiscard]] std::string short_unit(const std::string& unit);
 
 /// A length as people write it: "500 m", "20 km", "3 world units".
 [[nodiscard]] std::string describe_length(double length, const std::string& unit);
@@ -52,6 +57,7 @@ class Hud {
   void draw_scale(const Reading& reading, float height);
   void draw_north(double heading_rad, float width, float height);
   void draw_slider(double hours, int width, int height, double scale);
+  void draw_way(const std::vector<std::optional<PicturePoint>>& way);
   void draw_profile(const Profile& profile, const Reading& reading, float width, float height);
 
   Overlay overlay_;

@@ -19,18 +19,23 @@ double rounded(double value, int decimals) {
   return std::round(value * unit) / unit + 0.0;
 }
 
+/// Seven digits, or all of a number that is longer.
+std::string plain(double value) {
+  return std::abs(value) < 1e7 ? fmt::format("{:.7g}", value) : fmt::format("{:.0f}", value);
+}
+
 }  // namespace
 
 std::vector<std::string> lines_of(const Place& place) {
-  std::vector<std::string> lines{fmt::format("x {:.7g}  z {:.7g}", place.at.x, place.at.z)};
+  std::vector<std::string> lines{"x " + plain(place.at.x) + "  z " + plain(place.at.z)};
+  const std::string unit = place.unit.empty() ? "" : " " + short_unit(place.unit);
   if (place.elevation) {
-    lines.back() += fmt::format("  elevation {:.{}f}", rounded(*place.elevation, place.decimals), place.decimals);
-    if (!place.unit.empty()) lines.back() += " " + place.unit;
+    lines.back() +=
+        fmt::format("  elevation {:.{}f}{}", rounded(*place.elevation, place.decimals), place.decimals, unit);
   }
   if (place.difference) {
     const int decimals = place.decimals + 1;
-    lines.push_back(fmt::format("the second lies {:+.{}f}", rounded(*place.difference, decimals), decimals));
-    if (!place.unit.empty()) lines.back() += " " + place.unit;
+    lines.push_back(fmt::format("the second lies {:+.{}f}{}", rounded(*place.difference, decimals), decimals, unit));
   }
   if (place.map) lines.push_back(fmt::format("E {:.2f}  N {:.2f}", place.map->easting, place.map->northing));
   if (place.geo) {
