@@ -381,13 +381,11 @@ TEST_F(ViewProgramTest, RestsWhileTheCursorMovesAndDrawsWhatStandsStillInFull) {
   if (std::system("command -v xvfb-run >/dev/null 2>&1 && command -v xdotool >/dev/null 2>&1") != 0) {
     GTEST_SKIP() << "xvfb-run or xdotool is not installed";
   }
-  ASSERT_EQ(test::run_isohf({"convert", ISOHF_SOURCE_DIR "/testdata/coast_512x384_int16.tif", path("coast.isohf"),
-                             "--density", "0.1", "-q"})
-                .exit_code,
-            0);
+  const std::string raster = ISOHF_SOURCE_DIR "/testdata/coast_512x384_int16.tif";
+  std::filesystem::create_directory(path("scratch"));
   test::write_file(path("rest.sh"), R"sh(
     cd "$2"
-    "$1" coast.isohf -q --json --window --size 320x240 >rest.json & viewer=$!
+    TMPDIR=scratch "$1" "$3" -q --json --window --size 320x240 >rest.json & viewer=$!
     id=$(timeout 30 xdotool search --sync --onlyvisible --name isohf-view | head -1)
     xdotool windowmove "$id" 0 0 windowfocus "$id" sleep 2 key p sleep 1
     for x in $(seq 60); do xdotool mousemove $((50 + x)) 120 sleep 0.03; done
@@ -395,13 +393,14 @@ TEST_F(ViewProgramTest, RestsWhileTheCursorMovesAndDrawsWhatStandsStillInFull) {
     wait $viewer
   )sh");
   const Outcome outcome = test::run_program({"/usr/bin/env", "xvfb-run", "-a", "-s", "-screen 0 400x300x24", "sh",
-                                             path("rest.sh"), ISOHF_BIN_DIR "/isohf-view", path("")});
+                                             path("rest.sh"), ISOHF_BIN_DIR "/isohf-view", path(""), raster});
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_TRUE(std::filesystem::is_empty(path("scratch")));
   const auto end = nlohmann::json::parse(text("rest.json"));
   EXPECT_LT(end.at("frames").get<int>(), 40) << end;
   EXPECT_FALSE(end.at("under_cursor").is_null()) << end;
   EXPECT_EQ(end.at("sun_azimuth_deg").get<double>(), 300.0) << end;
-  const Outcome drawn = run(path("coast.isohf") + " --size 320x240 --screenshot " + path("drawn.png"));
+  const Outcome drawn = run(raster + " -q --size 320x240 --screenshot " + path("drawn.png"));
   EXPECT_EQ(drawn.exit_code, 0) << drawn.err;
   EXPECT_EQ(text("isohf-0001.png"), text("drawn.png"));
 }
