@@ -111,6 +111,7 @@ ordered_json json_from(const ViewReport& report, const std::string& archive) {
 
 int verify(const TileSource& source, const Options& options) {
   ViewChecks wanted;
+  wanted.every = options.every;
   const TileGrid& grid = source.grid();
   if (const std::optional<isohf::TileRange>& tiles = options.tiles) {
     if (tiles->end.column > grid.tile_columns() || tiles->end.row > grid.tile_rows()) {

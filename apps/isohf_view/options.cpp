@@ -86,6 +86,8 @@ void add_actions(CommandLine& line, Options& options, bool& window, bool& verify
   line.option("--tiles", "A:B,C:D",
               "Verify columns A to B-1 and rows C to D-1 of tiles alone, from 0 in the North-West",
               [&](const std::string& text) { options.tiles = cli::parse_tile_range(text); });
+  line.option("--every", "N", "Verify one tile in N along each row and column, one row of shadows, one block of seams",
+              [&](const std::string& text) { options.every = cli::parse_whole_number(text, 1, 1000000); });
   line.flag("--sweep", "Go from level 0 to 2 in small steps and measure how the picture changes", sweep);
   line.option("--probe", "X,Z[,X,Z]",
               "Say what is known of a place, in world units; of two also the heights between them",
@@ -245,6 +247,7 @@ std::optional<Options> parse_options(const cli::Arguments& arguments) {
   needs("--csv", flies || sweep, "--flight or --sweep");
   needs("--steps", sweep, "--sweep");
   needs("--tiles", verify, "--verify");
+  needs("--every", verify, "--verify");
   needs("--time", options.date.has_value(), "--date");
   if (time) options.date->hours = *time;
   needs("--difference", options.archives.size() == 2, "a second archive");

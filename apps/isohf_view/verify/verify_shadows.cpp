@@ -71,6 +71,7 @@ void ShadowVerifier::verify() {
   const auto& wanted = context_.options.tiles;
   for (std::int64_t row = 0; row < grid.tile_rows(); ++row) {
     if (wanted && (row < wanted->first.row || row >= wanted->end.row)) continue;
+    if (row % context_.options.every != 0) continue;
     for (const LightTravel travel : {LightTravel::kEastward, LightTravel::kWestward}) verify_row(row, travel);
     if (context_.options.progress) context_.options.progress("shadows", row + 1, grid.tile_rows());
   }

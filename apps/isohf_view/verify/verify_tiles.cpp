@@ -275,7 +275,10 @@ void verify_tiles(const CheckContext& context) {
   TileVerifier verifier(context);
   for (std::int64_t flat = 0; flat < grid.tile_count(); ++flat) {
     const TileIndex tile = grid.tile_at(flat);
-    if (!context.here.contains(tile) || (context.options.tiles && !context.options.tiles->contains(tile))) continue;
+    if (!context.here.contains(tile) || (context.options.tiles && !context.options.tiles->contains(tile)) ||
+        (tile.column + tile.row) % context.options.every != 0) {
+      continue;
+    }
     verifier.verify(tile);
     if (context.options.progress) context.options.progress("tiles", flat + 1, grid.tile_count());
   }

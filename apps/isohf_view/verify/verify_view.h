@@ -30,6 +30,8 @@ struct ViewChecks {
   bool shadows = true;
   /// Only these tiles, the rows of their shadows, and seams near them.
   std::optional<isohf::TileRange> tiles;
+  /// Of them one in so many along each row and column, rows of shadows and blocks of seams; 1: all.
+  std::int64_t every = 1;
   /// Called now and then with what is looked at, how much of it has been, and all of it.
   std::function<void(const char*, std::int64_t, std::int64_t)> progress;
 };
