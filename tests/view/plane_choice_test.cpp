@@ -147,5 +147,31 @@ TEST_F(PlanePictureTest, HasNoHolesAndNoMoreTrianglesThanItNeeds) {
   }
 }
 
+/// What lies before a short far distance is drawn as finely as without one.
+TEST_F(PlanePictureTest, IsAsFineNearTheEyeWhereLessIsSeen) {
+  const test::MemoryPlanes planes(TileGrid::make(TileShape::make(28, 27, 3), 24, 20, 600.0, 600.0));
+  const auto finest = [&](std::optional<double> far_distance) {
+    Options options;
+    options.view.width = 480;
+    options.view.height = 320;
+    options.position = Vec3{7000.0, 100.0, 6000.0};
+    options.look_at = Vec3{8000.0, 0.0, 5000.0};
+    options.far_distance = far_distance;
+    options.memory_mib = 64;
+    Session session(planes, options);
+    const Offscreen into(options.view.width, options.view.height, GL_RGBA8);
+    session.complete_frame();
+    std::set<std::pair<std::int64_t, std::int64_t>> tiles;
+    for (const DrawnMesh& mesh : session.renderer().drawn()) {
+      const double x = (static_cast<double>(mesh.at.tile.column) + 0.5) * 600.0 - 7000.0;
+      const double z = (static_cast<double>(mesh.at.tile.row) + 0.5) * 600.0 - 6000.0;
+      if (mesh.at.plane == 0 && std::hypot(x, z) < 1200.0) tiles.insert({mesh.at.tile.column, mesh.at.tile.row});
+    }
+    return tiles;
+  };
+  EXPECT_GT(finest({}).size(), 2U);
+  EXPECT_EQ(finest(2500.0), finest({}));
+}
+
 }  // namespace
 }  // namespace isohf::view

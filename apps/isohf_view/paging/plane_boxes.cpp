@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "camera.h"
 #include "isohf/lattice/lod.h"
 
 namespace isohf::view {
@@ -38,9 +39,14 @@ std::optional<double> PlaneBoxes::radius(int plane, const ViewState& view, doubl
   }
   const double above = std::max(0.0, view.eye.y - whole_.high * view.exaggeration);
   if (!(distance > above)) return std::nullopt;
-  const TileGrid& coarser = planes_.grid(plane + 1);
-  const double around = std::sqrt(distance * distance - above * above);
-  return std::min(reach, around + std::hypot(coarser.extent_x(), coarser.extent_z()));
+  const auto across = [this](int of) { return std::hypot(planes_.grid(of).extent_x(), planes_.grid(of).extent_z()); };
+  // A tile gives way where all below it are resident and none beside it is coarser, so that what gives way within reach
+  // asks for tiles beyond it, of coarser planes the more.
+  double limit = reach;
+  for (int finer = 1; finer <= plane; ++finer) limit += across(finer);
+  const double around = std::min(limit, std::sqrt(distance * distance - above * above));
+  const double whole = farthest_corner(planes_.grid(0), whole_, view.eye, view.exaggeration);
+  return std::min(whole, around + across(plane + 1));
 }
 
 void PlaneBoxes::set_sun(const std::optional<CastingSun>& sun) {
